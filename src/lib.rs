@@ -1,0 +1,39 @@
+//! Repairs a 3D scan of a work-piece by touch.
+//!
+//! A stylus or a robot-held probe touches the real part. From the tip's pose and the felt force touchup predicts what
+//! the scan says should be felt, compares it with what is felt (the *haptic mismatch*), and moves the mesh until the
+//! two agree.
+//!
+//! The rooms, in the order in which data flows through them:
+//!
+//! | room | what happens there |
+//! |---|---|
+//! | [`touch`] | pose and wrench become one [`touch::Sample`]; weight and bias come off; is there contact? |
+//! | [`mesh`] | the triangle mesh, its closest face, its Laplacian |
+//! | [`refine`] | [`refine::Refiner::push`]: one sample moves the mesh |
+//! | [`sim`] | known surfaces, a scanner and a stylus to test against |
+//! | [`io`] | mesh files and recordings; with [`scene`] the only file access |
+//! | [`scene`] | the YAML that names the parts of a scene |
+//! | [`cli`] | one file for each verb of the command line |
+//!
+//! # Frames
+//!
+//! O object (the mesh) · T stylus tip (origin: centre of the ball; z: along the shaft, from tip to handle) · S force
+//! sensor · W world (z up). `pose_ot` maps T to O, `p_ot` is the tip in O, `force_o` is a force expressed in O.
+//! A wrench is what the object does to the stylus and normals point out of the object, so a stylus that presses has
+//! `force_o · normal > 0`.
+//!
+//! # Units
+//!
+//! SI throughout: m, N, N·m, kg, s, rad. A bare number that leaves the code carries its unit in its name
+//! (`mass_kg`, `stamp_ns`). Stamps are `i64` nanoseconds.
+#![cfg_attr(not(test), warn(clippy::unwrap_used))]
+#![warn(missing_docs)]
+
+pub mod cli;
+pub mod io;
+pub mod mesh;
+pub mod refine;
+pub mod scene;
+pub mod sim;
+pub mod touch;
