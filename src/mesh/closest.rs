@@ -1,0 +1,364 @@
+//! Closest face of a mesh that changes: a bounding volume tree that is exact and tight after every edit.
+//!
+//! A binary tree over the faces. Boxes are kept in single precision relative to the middle of the mesh and rounded
+//! outward, so a query that prunes by them never misses a face; distances to faces are computed in double precision.
+//! [`FaceTree::refit`] recomputes the boxes of the leaves that hold moved faces and walks up until a box does not
+//! change any more: boxes never only grow, so nothing is left to be tightened later.
+
+use nalgebra::{Point3, Vector3};
+
+use super::triangle::closest_point;
+use super::{FaceId, TriMesh};
+
+/// Faces in a leaf at most. Two to four are equally fast within noise; four makes the smallest tree.
+const LEAF_FACES: usize = 4;
+/// A split at the middle is taken only if it leaves at least this share on either side (1/4), so that the depth is at
+/// most log(2^32) / log(4/3) = 78.
+const SMALLEST_SHARE: usize = 4;
+/// Slots of the traversal stack: one for each level, see [`SMALLEST_SHARE`].
+const STACK: usize = 96;
+/// Two faces whose squared distances differ relatively by less than this meet at the closest point; 64 roundings.
+const TIE: f64 = 64.0 * f64::EPSILON;
+/// No node.
+const NONE: u32 = u32::MAX;
+
+/// The face that was asked for, and the point of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FaceHit {
+    /// the face
+    pub face: FaceId,
+    /// closest point (surface distance) or barycentre (Eq 12), m, in O
+    pub point: Point3<f64>,
+    /// barycentric coordinates of `point` in the order of the face's corners; sum 1
+    pub barycentric: [f64; 3],
+    /// squared distance from the query point to `point`, m²
+    pub distance_squared: f64,
+}
+
+/// An axis-aligned box in single precision, relative to the tree's origin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Aabb {
+    lo: [f32; 3],
+    hi: [f32; 3],
+}
+
+impl Aabb {
+    const EMPTY: Self = Self { lo: [f32::INFINITY; 3], hi: [f32::NEG_INFINITY; 3] };
+
+    fn union(&self, other: &Self) -> Self {
+        Self {
+            lo: std::array::from_fn(|i| self.lo[i].min(other.lo[i])),
+            hi: std::array::from_fn(|i| self.hi[i].max(other.hi[i])),
+        }
+    }
+
+    /// Squared distance to a point (relative to the tree's origin); 0 inside; infinite for the empty box.
+    #[inline]
+    fn distance_squared(&self, p: &Vector3<f64>) -> f64 {
+        let mut sum = 0.0;
+        for i in 0..3 {
+            let outside = (f64::from(self.lo[i]) - p[i]).max(p[i] - f64::from(self.hi[i])).max(0.0);
+            sum += outside * outside;
+        }
+        sum
+    }
+
+    #[inline]
+    fn overlaps(&self, lo: &Vector3<f64>, hi: &Vector3<f64>) -> bool {
+        (0..3).all(|i| f64::from(self.lo[i]) <= hi[i] && f64::from(self.hi[i]) >= lo[i])
+    }
+}
+
+/// One node; `count == 0` marks an inner node whose children are the pair `first`, else a leaf of `count` faces from
+/// `first` in the list of faces.
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    bounds: Aabb,
+    first: u32,
+    count: u32,
+}
+
+/// Two siblings share a cache line.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+struct Pair([Node; 2]);
+
+/// Bounding volume tree over the faces of one [`TriMesh`].
+#[derive(Clone, Debug)]
+pub struct FaceTree {
+    origin: Point3<f64>,
+    root: Node,
+    pairs: Vec<Pair>,
+    /// for each pair: the node above it (2 · pair + side), [`NONE`] at the root
+    parents: Vec<u32>,
+    /// faces of the leaves, leaf after leaf
+    leaf_faces: Vec<FaceId>,
+    /// leaf (2 · pair + side) of each face, [`NONE`] for the root and for removed faces
+    leaf_of_face: Vec<u32>,
+}
+
+/// A face while the tree is built.
+#[derive(Clone, Copy)]
+struct Item {
+    middle: [f32; 3],
+    face: FaceId,
+}
+
+impl FaceTree {
+    /// Builds the tree; O(F log F).
+    pub fn new(mesh: &TriMesh) -> Self {
+        let origin = middle_of(mesh);
+        let mut items: Vec<Item> = mesh
+            .faces()
+            .map(|(face, _)| {
+                let middle = mesh.barycentre(face) - origin;
+                Item { middle: [middle.x as f32, middle.y as f32, middle.z as f32], face }
+            })
+            .collect();
+        let mut tree = Self {
+            origin,
+            root: Node { bounds: Aabb::EMPTY, first: 0, count: 0 },
+            pairs: Vec::with_capacity(items.len() / 2),
+            parents: Vec::with_capacity(items.len() / 2),
+            leaf_faces: Vec::with_capacity(items.len()),
+            leaf_of_face: vec![NONE; mesh.face_slots()],
+        };
+        tree.root = tree.build(mesh, &mut items, NONE);
+        tree
+    }
+
+    fn build(&mut self, mesh: &TriMesh, items: &mut [Item], at: u32) -> Node {
+        if items.len() <= LEAF_FACES {
+            let first = self.leaf_faces.len() as u32;
+            let mut bounds = Aabb::EMPTY;
+            for item in items.iter() {
+                bounds = bounds.union(&face_bounds(mesh, item.face, &self.origin));
+                self.leaf_of_face[item.face.0 as usize] = at;
+                self.leaf_faces.push(item.face);
+            }
+            return Node { bounds, first, count: items.len() as u32 };
+        }
+        let split = split(items);
+        let pair = self.pairs.len() as u32;
+        let blank = Node { bounds: Aabb::EMPTY, first: 0, count: 0 };
+        self.pairs.push(Pair([blank; 2]));
+        self.parents.push(at);
+        let (left, right) = items.split_at_mut(split);
+        let children = [self.build(mesh, left, 2 * pair), self.build(mesh, right, 2 * pair + 1)];
+        self.pairs[pair as usize] = Pair(children);
+        Node { bounds: children[0].bounds.union(&children[1].bounds), first: pair, count: 0 }
+    }
+
+    /// The face whose surface is closest to `p`, among those nearer than `reach` (m); `None` when there is none.
+    ///
+    /// Where faces meet at the closest point (an edge or a corner), the one that `p` lies most squarely above or below
+    /// is named, so that the sign of (p − point)·n tells inside from outside; among equals the smallest id.
+    pub fn closest(&self, mesh: &TriMesh, p: &Point3<f64>, reach: f64) -> Option<FaceHit> {
+        self.search(
+            p,
+            reach,
+            |face| {
+                let (point, barycentric) = closest_point(p, &mesh.triangle(face));
+                FaceHit { face, point, barycentric, distance_squared: (p - point).norm_squared() }
+            },
+            |a, b| squareness(mesh, p, a) < squareness(mesh, p, b),
+        )
+    }
+
+    /// The face whose barycentre is closest to `p` (Eq 12), among those nearer than `reach` (m).
+    pub fn closest_barycentre(&self, mesh: &TriMesh, p: &Point3<f64>, reach: f64) -> Option<FaceHit> {
+        self.search(
+            p,
+            reach,
+            |face| {
+                let point = mesh.barycentre(face);
+                FaceHit { face, point, barycentric: [1.0 / 3.0; 3], distance_squared: (p - point).norm_squared() }
+            },
+            |_, _| false,
+        )
+    }
+
+    /// Branch and bound over the tree. `measure` gives the hit of one face, whose point must lie in the face's box;
+    /// `yields(a, b)` whether `a` steps back behind `b` when both are equally near.
+    #[inline]
+    fn search(
+        &self,
+        p: &Point3<f64>,
+        reach: f64,
+        measure: impl Fn(FaceId) -> FaceHit,
+        yields: impl Fn(&FaceHit, &FaceHit) -> bool,
+    ) -> Option<FaceHit> {
+        let q = p - self.origin;
+        let mut best: Option<FaceHit> = None;
+        let mut limit = reach * reach;
+        let mut stack = [(0.0f64, 0u32); STACK];
+        let mut depth = 0;
+        let mut node = &self.root;
+        loop {
+            if node.count > 0 {
+                for &face in self.faces_of(node) {
+                    let hit = measure(face);
+                    let nearer = match &best {
+                        _ if hit.distance_squared > limit * (1.0 + TIE) => false,
+                        None => hit.distance_squared < limit,
+                        Some(_) if hit.distance_squared < limit * (1.0 - TIE) => true,
+                        Some(best) => yields(best, &hit) || (!yields(&hit, best) && hit.face < best.face),
+                    };
+                    if nearer {
+                        limit = limit.min(hit.distance_squared);
+                        best = Some(hit);
+                    }
+                }
+            } else if let Some(pair) = self.pairs.get(node.first as usize) {
+                let d = [pair.0[0].bounds.distance_squared(&q), pair.0[1].bounds.distance_squared(&q)];
+                let near = usize::from(d[1] < d[0]);
+                if d[1 - near] <= limit * (1.0 + TIE) {
+                    stack[depth] = (d[1 - near], 2 * node.first + (1 - near) as u32);
+                    depth += 1;
+                }
+                if d[near] <= limit * (1.0 + TIE) {
+                    node = &pair.0[near];
+                    continue;
+                }
+            }
+            node = loop {
+                if depth == 0 {
+                    return best;
+                }
+                depth -= 1;
+                let (distance, at) = stack[depth];
+                if distance <= limit * (1.0 + TIE) {
+                    break self.node(at);
+                }
+            };
+        }
+    }
+
+    /// Appends to `found` every face whose box meets the box from `lo` to `hi` (m, in O).
+    pub fn faces_in_box(&self, lo: &Point3<f64>, hi: &Point3<f64>, found: &mut Vec<FaceId>) {
+        let (lo, hi) = (lo - self.origin, hi - self.origin);
+        let mut stack = [0u32; STACK];
+        let mut depth = 0;
+        let mut node = &self.root;
+        loop {
+            if node.count > 0 {
+                found.extend_from_slice(self.faces_of(node));
+            } else if let Some(pair) = self.pairs.get(node.first as usize) {
+                for side in 0..2 {
+                    if pair.0[side].bounds.overlaps(&lo, &hi) {
+                        stack[depth] = 2 * node.first + side as u32;
+                        depth += 1;
+                    }
+                }
+            }
+            if depth == 0 {
+                return;
+            }
+            depth -= 1;
+            node = self.node(stack[depth]);
+        }
+    }
+
+    /// Makes the tree exact again after the corners of `faces` moved.
+    pub fn refit(&mut self, mesh: &TriMesh, faces: &[FaceId]) {
+        let mut last = NONE;
+        for &face in faces {
+            let leaf = self.leaf_of_face[face.0 as usize];
+            if leaf == last && leaf != NONE {
+                continue;
+            }
+            last = leaf;
+            let node = *self.node(leaf);
+            let mut bounds = Aabb::EMPTY;
+            for &face in self.faces_of(&node) {
+                bounds = bounds.union(&face_bounds(mesh, face, &self.origin));
+            }
+            self.set_bounds(leaf, bounds);
+        }
+    }
+
+    fn set_bounds(&mut self, mut at: u32, mut bounds: Aabb) {
+        while at != NONE {
+            let pair = &mut self.pairs[at as usize / 2];
+            let node = &mut pair.0[at as usize % 2];
+            if node.bounds == bounds {
+                return;
+            }
+            node.bounds = bounds;
+            bounds = pair.0[0].bounds.union(&pair.0[1].bounds);
+            at = self.parents[at as usize / 2];
+        }
+        self.root.bounds = bounds;
+    }
+
+    #[inline]
+    fn node(&self, at: u32) -> &Node {
+        if at == NONE { &self.root } else { &self.pairs[at as usize / 2].0[at as usize % 2] }
+    }
+
+    #[inline]
+    fn faces_of(&self, leaf: &Node) -> &[FaceId] {
+        &self.leaf_faces[leaf.first as usize..(leaf.first + leaf.count) as usize]
+    }
+}
+
+/// |(p − point)·n|: how squarely `p` lies above or below the face that was hit.
+fn squareness(mesh: &TriMesh, p: &Point3<f64>, hit: &FaceHit) -> f64 {
+    (p - hit.point).dot(&mesh.normal(hit.face)).abs()
+}
+
+/// Middle of the bounding box, m, in O.
+fn middle_of(mesh: &TriMesh) -> Point3<f64> {
+    let (mut lo, mut hi) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+    for p in mesh.positions() {
+        (lo, hi) = (lo.inf(&p.coords), hi.sup(&p.coords));
+    }
+    if mesh.positions().is_empty() { Point3::origin() } else { Point3::from((lo + hi) / 2.0) }
+}
+
+#[inline]
+fn face_bounds(mesh: &TriMesh, face: FaceId, origin: &Point3<f64>) -> Aabb {
+    let [a, b, c] = mesh.triangle(face).map(|p| p - origin);
+    let (lo, hi) = (a.inf(&b).inf(&c), a.sup(&b).sup(&c));
+    Aabb { lo: std::array::from_fn(|i| round_down(lo[i])), hi: std::array::from_fn(|i| -round_down(-hi[i])) }
+}
+
+/// The largest `f32` not above `x`.
+#[inline]
+fn round_down(x: f64) -> f32 {
+    let rounded = x as f32;
+    if f64::from(rounded) > x { rounded.next_down() } else { rounded }
+}
+
+/// Sorts the items into two groups and gives the size of the first: at the middle of the longest axis, or by count
+/// where that would be lopsided.
+fn split(items: &mut [Item]) -> usize {
+    let (mut lo, mut hi) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+    for item in items.iter() {
+        for i in 0..3 {
+            lo[i] = lo[i].min(item.middle[i]);
+            hi[i] = hi[i].max(item.middle[i]);
+        }
+    }
+    let extent: [f32; 3] = std::array::from_fn(|i| hi[i] - lo[i]);
+    let axis = if extent[0] >= extent[1] && extent[0] >= extent[2] {
+        0
+    } else if extent[1] >= extent[2] {
+        1
+    } else {
+        2
+    };
+    let middle = lo[axis] + extent[axis] / 2.0;
+    let mut left = 0;
+    for i in 0..items.len() {
+        if items[i].middle[axis] < middle {
+            items.swap(left, i);
+            left += 1;
+        }
+    }
+    if left.min(items.len() - left) * SMALLEST_SHARE < items.len() {
+        left = items.len() / 2;
+        items.select_nth_unstable_by(left, |a, b| a.middle[axis].total_cmp(&b.middle[axis]).then(a.face.cmp(&b.face)));
+    }
+    left
+}

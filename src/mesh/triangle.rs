@@ -1,0 +1,110 @@
+//! Distances and intersections of single triangles.
+
+use nalgebra::{Point3, Vector3};
+
+/// The point of triangle `abc` that is closest to `p`, with its barycentric coordinates.
+///
+/// The Voronoi region of `p` (corner, edge or inside) is found from signed areas [Ericson 2005, sec. 5.1.5]. A triangle
+/// without area is treated as its longest edges: the result is always a point of the triangle.
+#[inline]
+pub fn closest_point(p: &Point3<f64>, [a, b, c]: &[Point3<f64>; 3]) -> (Point3<f64>, [f64; 3]) {
+    let (ab, ac, ap) = (b - a, c - a, p - a);
+    let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return (*a, [1.0, 0.0, 0.0]);
+    }
+    let bp = p - b;
+    let (d3, d4) = (ab.dot(&bp), ac.dot(&bp));
+    if d3 >= 0.0 && d4 <= d3 {
+        return (*b, [0.0, 1.0, 0.0]);
+    }
+    let vc = d1 * d4 - d3 * d2;
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        let t = d1 / (d1 - d3);
+        return (a + ab * t, [1.0 - t, t, 0.0]);
+    }
+    let cp = p - c;
+    let (d5, d6) = (ab.dot(&cp), ac.dot(&cp));
+    if d6 >= 0.0 && d5 <= d6 {
+        return (*c, [0.0, 0.0, 1.0]);
+    }
+    let vb = d5 * d2 - d1 * d6;
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        let t = d2 / (d2 - d6);
+        return (a + ac * t, [1.0 - t, 0.0, t]);
+    }
+    let va = d3 * d6 - d5 * d4;
+    if va <= 0.0 && d4 >= d3 && d5 >= d6 {
+        let t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+        return (b + (c - b) * t, [0.0, 1.0 - t, t]);
+    }
+    let scale = 1.0 / (va + vb + vc);
+    let (v, w) = (vb * scale, vc * scale);
+    (a + ab * v + ac * w, [1.0 - v - w, v, w])
+}
+
+/// Whether the segment from `p` to `q` passes through triangle `abc` or comes within `gap` (m) of doing so at its rim.
+///
+/// `gap` widens the triangle in its plane and lengthens the segment; pass a small share of the edge length.
+#[inline]
+pub fn segment_crosses(p: &Point3<f64>, q: &Point3<f64>, [a, b, c]: &[Point3<f64>; 3], gap: f64) -> bool {
+    let normal = (b - a).cross(&(c - a));
+    let length = normal.norm();
+    if length == 0.0 {
+        return false;
+    }
+    let unit = normal / length;
+    let (hp, hq) = (unit.dot(&(p - a)), unit.dot(&(q - a)));
+    if hp.min(hq) > gap || hp.max(hq) < -gap {
+        return false;
+    }
+    if (hp - hq).abs() <= gap {
+        // the segment runs along the plane
+        return coplanar_overlap(p, q, [a, b, c], &unit, gap);
+    }
+    let t = (hp / (hp - hq)).clamp(0.0, 1.0);
+    let x = p + (q - p) * t;
+    [(a, b), (b, c), (c, a)].iter().all(|(s, e)| {
+        let edge = *e - *s;
+        unit.dot(&edge.cross(&(x - *s))) >= -gap * edge.norm()
+    })
+}
+
+/// Whether a segment close to the plane of a triangle overlaps the triangle, seen along its unit normal.
+fn coplanar_overlap(
+    p: &Point3<f64>,
+    q: &Point3<f64>,
+    corners: [&Point3<f64>; 3],
+    unit: &Vector3<f64>,
+    gap: f64,
+) -> bool {
+    // clip the segment by the three edges
+    let (mut from, mut to) = (0.0f64, 1.0f64);
+    for i in 0..3 {
+        let (s, e) = (corners[i], corners[(i + 1) % 3]);
+        let inward = unit.cross(&(e - s));
+        let margin = gap * inward.norm();
+        let (hp, hq) = (inward.dot(&(p - s)) + margin, inward.dot(&(q - s)) + margin);
+        if hp < 0.0 && hq < 0.0 {
+            return false;
+        }
+        if hp < 0.0 {
+            from = from.max(hp / (hp - hq));
+        } else if hq < 0.0 {
+            to = to.min(hp / (hp - hq));
+        }
+    }
+    from <= to
+}
+
+/// Whether two triangles without a common corner meet, or come within `gap` (m) as in [`segment_crosses`].
+pub fn intersect(t: &[Point3<f64>; 3], u: &[Point3<f64>; 3], gap: f64) -> bool {
+    (0..3).any(|i| segment_crosses(&t[i], &t[(i + 1) % 3], u, gap) || segment_crosses(&u[i], &u[(i + 1) % 3], t, gap))
+}
+
+/// Twice the area over the square of the longest edge: 0.87 for an equilateral triangle, 0 for one without area.
+#[inline]
+pub fn shape_quality(t: &[Point3<f64>; 3], double_area: f64) -> f64 {
+    let longest = (t[1] - t[0]).norm_squared().max((t[2] - t[1]).norm_squared()).max((t[0] - t[2]).norm_squared());
+    if longest > 0.0 { double_area / longest } else { 0.0 }
+}
