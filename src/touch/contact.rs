@@ -1,0 +1,76 @@
+//! Is the stylus in contact? A gate on the felt force, with hysteresis.
+
+use nalgebra::Vector3;
+
+use super::SettingError;
+
+/// The two thresholds of a [`ContactGate`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactGateParams {
+    /// A force above this begins a contact, N. Default 0.4: eight times the 0.05 N by which both noise and bias of a
+    /// usual sensor vary, and far below the 2–4 N of a hand that presses.
+    pub on: f64,
+    /// A force below this ends it, N. Default 0.22: above noise and bias together, and so far below `on` that the noise
+    /// at the threshold does not chatter.
+    pub off: f64,
+}
+
+impl Default for ContactGateParams {
+    fn default() -> Self {
+        Self { on: 0.4, off: 0.22 }
+    }
+}
+
+/// A contact that is going on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Contact {
+    /// Time of the sample that began it, ns.
+    pub onset_ns: i64,
+}
+
+/// Tells contact from free motion by |F|: on above one threshold, off below a lower one.
+///
+/// Without it the expected force of a hovering stylus (f(0) > 0) would push the mesh away for ever.
+#[derive(Clone, Debug)]
+pub struct ContactGate {
+    params: ContactGateParams,
+    contact: Option<Contact>,
+    contacts: u64,
+}
+
+impl ContactGate {
+    /// A gate that starts open: no contact.
+    ///
+    /// # Errors
+    /// [`SettingError`] unless 0 ≤ `off` ≤ `on`, both finite.
+    pub fn new(params: ContactGateParams) -> Result<Self, SettingError> {
+        let ContactGateParams { on, off } = params;
+        if !(off >= 0.0 && off.is_finite()) {
+            return Err(SettingError { name: "contact off (N)", value: off, allowed: "0 or more" });
+        }
+        if !(on >= off && on.is_finite()) {
+            return Err(SettingError { name: "contact on (N)", value: on, allowed: "no less than contact off" });
+        }
+        Ok(Self { params, contact: None, contacts: 0 })
+    }
+
+    /// Takes the next force, N, in any frame; returns the contact that it begins or continues, if any.
+    #[inline]
+    pub fn update(&mut self, stamp_ns: i64, force: &Vector3<f64>) -> Option<Contact> {
+        let magnitude = force.norm();
+        self.contact = match self.contact {
+            Some(contact) if magnitude >= self.params.off => Some(contact),
+            None if magnitude > self.params.on => {
+                self.contacts += 1;
+                Some(Contact { onset_ns: stamp_ns })
+            }
+            _ => None,
+        };
+        self.contact
+    }
+
+    /// How many contacts have begun.
+    pub fn contacts(&self) -> u64 {
+        self.contacts
+    }
+}

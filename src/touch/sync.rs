@@ -1,0 +1,334 @@
+//! Pose and wrench brought to one instant: the pose is interpolated at the stamp of each wrench.
+//!
+//! The two streams have their own rates and clocks, and their messages arrive late, twice, out of order or not at all.
+//! Which samples come out depends on the messages alone: any order of arrival that moves no message by more than the
+//! reorder window gives the same samples, bit for bit.
+
+use std::collections::VecDeque;
+
+use nalgebra::Isometry3;
+use serde::Serialize;
+
+use super::{Message, Sample, SampleError, SettingError, StampedPose, StampedWrench};
+
+/// Settings of a [`Synchroniser`]; times in ns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SyncParams {
+    /// How far a message may lag behind the newest stamp of its stream. Default 20 ms: real transports swap and delay by
+    /// up to 16 ms; it is also how long a sample is held back.
+    pub reorder_ns: i64,
+    /// Largest distance between the two poses around a wrench. Default 30 ms: a hand at 50 mm/s goes 1.5 mm, the radius
+    /// of a usual ball, in that time; a longer path would be invented.
+    pub largest_gap_ns: i64,
+    /// A stamp this far ahead of its stream is believed only when the next one agrees. Default 10 s: a pause, not a
+    /// fault, when it is true.
+    pub largest_jump_ns: i64,
+    /// What the clock of the wrench reads beyond the clock of the pose; taken off its stamps. Default 0.
+    pub wrench_offset_ns: i64,
+    /// How many messages of each stream are held. Default 4096: four seconds at 1 kHz, half a megabyte.
+    pub capacity: usize,
+}
+
+impl Default for SyncParams {
+    fn default() -> Self {
+        Self {
+            reorder_ns: 20_000_000,
+            largest_gap_ns: 30_000_000,
+            largest_jump_ns: 10_000_000_000,
+            wrench_offset_ns: 0,
+            capacity: 4096,
+        }
+    }
+}
+
+/// Messages that became no sample, by reason. Every wrench is either in a sample, held, or counted here once.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct SyncCounts {
+    /// Wrenches whose poses before and after are too far apart.
+    pub gap: u64,
+    /// Wrenches older than the first pose.
+    pub no_pose_before: u64,
+    /// Wrenches newer than the last pose.
+    pub no_pose_after: u64,
+    /// Messages later than the reorder window allows.
+    pub late: u64,
+    /// Messages with the stamp of one already held.
+    pub duplicate: u64,
+    /// Messages with a NaN or infinite component.
+    pub not_finite: u64,
+    /// Messages that no stylus can cause, or whose orientation is no rotation.
+    pub absurd: u64,
+    /// Messages whose stamp leaps ahead and is not confirmed by the next.
+    pub jump: u64,
+    /// Wrenches pushed out of a full buffer, or whose poses were.
+    pub overflow: u64,
+}
+
+impl SyncCounts {
+    /// All of them.
+    pub fn total(&self) -> u64 {
+        let Self { gap, no_pose_before, no_pose_after, late, duplicate, not_finite, absurd, jump, overflow } = *self;
+        gap + no_pose_before + no_pose_after + late + duplicate + not_finite + absurd + jump + overflow
+    }
+}
+
+/// Turns two streams of messages into one stream of samples, in order of time.
+///
+/// Memory is bounded and allocated once, in [`Synchroniser::new`].
+///
+/// # Example
+/// ```
+/// # use touchup::touch::*;
+/// # use nalgebra::Isometry3;
+/// let mut sync = Synchroniser::new(SyncParams::default())?;
+/// for (stamp_ns, x) in [(0, 0.0), (2_000_000, 0.1)] {
+///     sync.push(Message::Pose(StampedPose { stamp_ns, pose_ot: Isometry3::translation(x, 0.0, 0.0) }));
+/// }
+/// sync.push(Message::Wrench(StampedWrench { stamp_ns: 500_000, wrench: Wrench::default() }));
+/// sync.finish();
+/// let sample = sync.next_sample().expect("the wrench lies between two poses");
+/// assert!((sample.pose_ot.translation.x - 0.025).abs() < 1e-15);
+/// # Ok::<(), SettingError>(())
+/// ```
+#[derive(Debug)]
+pub struct Synchroniser {
+    params: SyncParams,
+    poses: Stream<StampedPose>,
+    wrenches: Stream<StampedWrench>,
+    counts: SyncCounts,
+    finished: bool,
+}
+
+impl Synchroniser {
+    /// Checks the settings and allocates the buffers.
+    ///
+    /// # Errors
+    /// [`SettingError`] for a negative time and for a capacity below 2 or above a million.
+    pub fn new(params: SyncParams) -> Result<Self, SettingError> {
+        let times = [
+            ("reorder window (ns)", params.reorder_ns),
+            ("largest gap (ns)", params.largest_gap_ns),
+            ("largest jump (ns)", params.largest_jump_ns),
+        ];
+        if let Some(&(name, value)) = times.iter().find(|(_, value)| *value < 0) {
+            return Err(SettingError { name, value: value as f64, allowed: "0 or more" });
+        }
+        if !(2..=1_000_000).contains(&params.capacity) {
+            let value = params.capacity as f64;
+            return Err(SettingError { name: "buffer capacity (messages)", value, allowed: "2 to 1000000" });
+        }
+        let (poses, wrenches) = (Stream::with_capacity(params.capacity), Stream::with_capacity(params.capacity));
+        Ok(Self { params, poses, wrenches, counts: SyncCounts::default(), finished: false })
+    }
+
+    /// Takes one message; draw samples with [`Self::next_sample`] before the next one. What comes after
+    /// [`Self::finish`] is late.
+    pub fn push(&mut self, message: Message) {
+        if self.finished {
+            self.counts.late += 1;
+            return;
+        }
+        match message {
+            Message::Pose(pose) => match pose.check() {
+                Ok(()) => self.poses.push(pose, &self.params, &mut self.counts),
+                Err(why) => self.counts.refuse(why),
+            },
+            Message::Wrench(mut wrench) => match wrench.check() {
+                Ok(()) => {
+                    wrench.stamp_ns = wrench.stamp_ns.saturating_sub(self.params.wrench_offset_ns);
+                    self.wrenches.push(wrench, &self.params, &mut self.counts);
+                }
+                Err(why) => self.counts.refuse(why),
+            },
+        }
+    }
+
+    /// Nothing more will come: what is held may go out.
+    pub fn finish(&mut self) {
+        self.finished = true;
+        self.poses.finish(&self.params, &mut self.counts);
+        self.wrenches.finish(&self.params, &mut self.counts);
+    }
+
+    /// The next sample that no message still allowed to arrive could change; `None` when more messages are needed.
+    pub fn next_sample(&mut self) -> Option<Sample> {
+        loop {
+            let wrench = *self.wrenches.held.front()?;
+            if wrench.stamp_ns > self.settled(&self.wrenches) {
+                return None;
+            }
+            let settled = self.settled(&self.poses);
+            self.poses.forget_before(wrench.stamp_ns.min(settled));
+            let pose = self.pose_at(wrench.stamp_ns, settled)?;
+            self.wrenches.pop();
+            match pose {
+                Ok(pose_ot) => return Some(Sample { stamp_ns: wrench.stamp_ns, pose_ot, wrench: wrench.wrench }),
+                Err(count) => *count(&mut self.counts) += 1,
+            }
+        }
+    }
+
+    /// What was dropped so far, and why.
+    pub fn counts(&self) -> &SyncCounts {
+        &self.counts
+    }
+
+    /// Up to this stamp nothing of `stream` can arrive any more.
+    fn settled<T>(&self, stream: &Stream<T>) -> i64 {
+        if self.finished { i64::MAX } else { stream.settled }
+    }
+
+    /// The pose at `stamp_ns`, or the counter to raise when there is none; `None` while that is still open.
+    fn pose_at(&self, stamp_ns: i64, settled: i64) -> Option<Result<Isometry3<f64>, Counter>> {
+        let mut held = self.poses.held.iter();
+        let missing: Counter =
+            if self.poses.overflown { |counts| &mut counts.overflow } else { |counts| &mut counts.no_pose_before };
+        let Some(before) = held.next() else { return self.finished.then_some(Err(missing)) };
+        if before.stamp_ns == stamp_ns {
+            return Some(Ok(before.pose_ot));
+        }
+        if before.stamp_ns > stamp_ns {
+            return (stamp_ns <= settled).then_some(Err(missing));
+        }
+        let Some(after) = held.next() else { return self.finished.then_some(Err(|counts| &mut counts.no_pose_after)) };
+        if after.stamp_ns > settled {
+            return None;
+        }
+        let gap = after.stamp_ns.abs_diff(before.stamp_ns);
+        if gap > self.params.largest_gap_ns as u64 {
+            return Some(Err(|counts| &mut counts.gap));
+        }
+        let t = stamp_ns.abs_diff(before.stamp_ns) as f64 / gap as f64;
+        Some(Ok(interpolated(&before.pose_ot, &after.pose_ot, t)))
+    }
+}
+
+/// Which counter of [`SyncCounts`] to raise.
+type Counter = fn(&mut SyncCounts) -> &mut u64;
+
+impl SyncCounts {
+    fn refuse(&mut self, why: SampleError) {
+        match why {
+            SampleError::NotFinite { .. } => self.not_finite += 1,
+            SampleError::Absurd { .. } | SampleError::NotARotation { .. } => self.absurd += 1,
+            SampleError::NotAfter { .. } => self.late += 1,
+        }
+    }
+}
+
+/// One stream in order of time, as far as it is held.
+#[derive(Debug)]
+struct Stream<T> {
+    held: VecDeque<T>,
+    newest: Option<i64>,
+    /// a stamp up to here is late
+    settled: i64,
+    /// leaps ahead; waits for the next message to agree
+    suspect: Option<T>,
+    /// messages were pushed out of the full buffer
+    overflown: bool,
+}
+
+impl<T: Stamped + Copy> Stream<T> {
+    fn with_capacity(capacity: usize) -> Self {
+        Self {
+            held: VecDeque::with_capacity(capacity),
+            newest: None,
+            settled: i64::MIN,
+            suspect: None,
+            overflown: false,
+        }
+    }
+
+    fn push(&mut self, message: T, params: &SyncParams, counts: &mut SyncCounts) {
+        let stamp = message.stamp_ns();
+        if self.newest.is_some_and(|newest| stamp <= newest.saturating_add(params.largest_jump_ns)) {
+            return self.insert(message, params, counts);
+        }
+        match self.suspect.take() {
+            Some(first) if stamp.abs_diff(first.stamp_ns()) <= params.largest_jump_ns as u64 => {
+                self.insert(first, params, counts);
+                self.insert(message, params, counts);
+            }
+            refused => {
+                counts.jump += refused.is_some() as u64;
+                self.suspect = Some(message);
+            }
+        }
+    }
+
+    /// A message that nothing contradicted is kept.
+    fn finish(&mut self, params: &SyncParams, counts: &mut SyncCounts) {
+        match self.suspect.take() {
+            Some(only) if self.newest.is_none() => self.insert(only, params, counts),
+            refused => counts.jump += refused.is_some() as u64,
+        }
+    }
+
+    fn insert(&mut self, message: T, params: &SyncParams, counts: &mut SyncCounts) {
+        let stamp = message.stamp_ns();
+        if stamp <= self.settled {
+            counts.late += 1;
+            return;
+        }
+        let at = self.held.partition_point(|held| held.stamp_ns() < stamp);
+        if self.held.get(at).is_some_and(|held| held.stamp_ns() == stamp) {
+            counts.duplicate += 1;
+            return;
+        }
+        self.held.insert(at, message);
+        let newest = self.newest.map_or(stamp, |newest| newest.max(stamp));
+        self.newest = Some(newest);
+        self.settled = self.settled.max(newest.saturating_sub(params.reorder_ns).saturating_sub(1));
+        if self.held.len() == params.capacity {
+            self.pop();
+            self.overflown = true;
+            counts.overflow += T::IS_LOST_ALONE as u64;
+        }
+    }
+
+    /// Drops what lies before the last message at or before `stamp_ns`.
+    fn forget_before(&mut self, stamp_ns: i64) {
+        while self.held.get(1).is_some_and(|second| second.stamp_ns() <= stamp_ns) {
+            self.pop();
+        }
+    }
+
+    fn pop(&mut self) {
+        if let Some(gone) = self.held.pop_front() {
+            self.settled = self.settled.max(gone.stamp_ns());
+        }
+    }
+}
+
+trait Stamped {
+    /// Whether dropping one is a loss in itself; a pose is missed only by a wrench that would have needed it.
+    const IS_LOST_ALONE: bool;
+
+    fn stamp_ns(&self) -> i64;
+}
+
+impl Stamped for StampedPose {
+    const IS_LOST_ALONE: bool = false;
+
+    fn stamp_ns(&self) -> i64 {
+        self.stamp_ns
+    }
+}
+
+impl Stamped for StampedWrench {
+    const IS_LOST_ALONE: bool = true;
+
+    fn stamp_ns(&self) -> i64 {
+        self.stamp_ns
+    }
+}
+
+/// Between two poses: straight for the position, at constant angular velocity the shorter way for the orientation.
+fn interpolated(before: &Isometry3<f64>, after: &Isometry3<f64>, t: f64) -> Isometry3<f64> {
+    let position = before.translation.vector.lerp(&after.translation.vector, t);
+    // the power of the relative rotation keeps its digits at angles where a slerp by sines loses them
+    let mut rotation = before.rotation * (before.rotation.inverse() * after.rotation).powf(t);
+    rotation.renormalize();
+    Isometry3::from_parts(position.into(), rotation)
+}
