@@ -1,0 +1,125 @@
+//! The scene file from outside: the file that is shipped, what is refused, and what reaches the rooms.
+
+use std::collections::BTreeSet;
+
+use nalgebra::vector;
+use touchup::scene::{CompensationSection, PayloadSection, Scene};
+use touchup::touch::{SyncParams, WrenchFrame};
+
+const DEFAULT_YAML: &str = include_str!("../config/default.yaml");
+
+/// The file with the parts that stand in comments (`#   key: …`, `# compensation:`) taken in.
+fn with_commented_parts() -> String {
+    let uncomment = |line: &str| match line.strip_prefix("# ") {
+        Some(rest) if rest.starts_with("compensation:") || rest.starts_with("  ") => rest.to_owned(),
+        _ => line.to_owned(),
+    };
+    DEFAULT_YAML.lines().map(uncomment).collect::<Vec<_>>().join("\n")
+}
+
+#[test]
+fn the_shipped_file_is_the_default() {
+    assert_eq!(Scene::from_yaml(DEFAULT_YAML).unwrap(), Scene::default());
+    let whole = Scene::from_yaml(&with_commented_parts()).unwrap();
+    let compensation = whole.compensation.clone().unwrap();
+    assert_eq!(compensation.payload, Some(PayloadSection::default()));
+    assert_eq!(whole.compensator_params(WrenchFrame::Sensor).pose_ts, nalgebra::Isometry3::identity());
+    let plain = CompensationSection { payload: None, bias: None, sensor_orientation_xyzw: None, ..compensation };
+    assert_eq!(plain, CompensationSection::default());
+}
+
+/// Every key that the code knows, asked by giving each section a key that none has: the refusal lists the known ones.
+#[test]
+fn every_key_of_the_code_is_in_the_shipped_file_and_documented() {
+    let mut known = BTreeSet::new();
+    let sections = ["", "sync", "compensation", "compensation.payload", "compensation.bias", "contact", "tip", "scan"];
+    for section in sections {
+        let path: Vec<_> = section.split('.').filter(|name| !name.is_empty()).collect();
+        let yaml =
+            path.iter().rev().fold("{ no_such_key: 1 }".to_owned(), |inner, name| format!("{{ {name}: {inner} }}"));
+        let error = Scene::from_yaml(&yaml).unwrap_err().to_string();
+        let list = error.split("expected one of").nth(1).unwrap_or_else(|| panic!("{section}: {error}"));
+        let list = list.split(" at line").next().unwrap();
+        known.extend(
+            list.split([',', ' ', '`', ';']).filter(|key| key.contains(|c: char| c.is_alphabetic())).map(str::to_owned),
+        );
+    }
+    let whole = with_commented_parts();
+    let mut in_file = BTreeSet::new();
+    for line in whole.lines().filter(|line| !line.trim_start().starts_with('#')) {
+        in_file.extend(line.split_once(':').map(|(key, _)| key.trim().to_owned()));
+    }
+    assert_eq!(in_file, known);
+    assert!(known.len() >= 20, "{known:?}");
+}
+
+#[test]
+fn a_part_is_built_only_when_named() {
+    let none = Scene::from_yaml("{}").unwrap();
+    assert!(none.sync.is_none() && none.contact_params().is_none() && none.tip.is_none() && none.scan.is_none());
+    let SyncParams { reorder_ns, largest_gap_ns, .. } = none.sync_params();
+    assert_eq!((reorder_ns, largest_gap_ns), (0, 0));
+    assert_eq!(none.compensator_params(WrenchFrame::Object).payload, None);
+    let bare = Scene::from_yaml("sync:\ncontact: {}\ntip:\nscan:\n").unwrap();
+    assert_eq!(bare, Scene::default(), "a part named without keys takes its defaults");
+}
+
+#[test]
+fn units_are_turned_into_si_once() {
+    let scene = Scene::from_yaml(
+        "sync: { reorder_ms: 1.5, largest_gap_ms: 0, largest_jump_s: 2, wrench_offset_ms: -1.8, capacity: 10 }
+compensation:
+  sensor_position_mm: [0, 0, 120]
+  sensor_orientation_xyzw: [0, 0, 1, 0]
+  payload: { mass_kg: 0.2, centre_mm: [1, 2, 3], gravity_m_per_s2: [0, 9.8, 0] }
+  bias: { force_n: [1, 2, 3], torque_nm: [4, 5, 6] }",
+    )
+    .unwrap();
+    let expected = SyncParams {
+        reorder_ns: 1_500_000,
+        largest_gap_ns: 0,
+        largest_jump_ns: 2_000_000_000,
+        wrench_offset_ns: -1_800_000,
+        capacity: 10,
+    };
+    assert_eq!(scene.sync_params(), expected);
+    let params = scene.compensator_params(WrenchFrame::Object);
+    assert_eq!(params.wrench_frame, WrenchFrame::Object);
+    assert_eq!(params.pose_ts.translation.vector, vector![0.0, 0.0, 0.12]);
+    assert_eq!(params.pose_ts.rotation * vector![1.0, 0.0, 0.0], vector![-1.0, 0.0, 0.0], "half a turn about z");
+    let payload = params.payload.unwrap();
+    assert_eq!((payload.mass, payload.p_sc), (0.2, vector![0.001, 0.002, 0.003]));
+    assert_eq!(params.bias_s.unwrap().torque, vector![4.0, 5.0, 6.0]);
+}
+
+#[test]
+fn each_mistake_is_refused_in_one_line_that_says_where_and_what() {
+    let bad = [
+        ("sync:\n  reordr_ms: 3\n", &["reordr_ms", "did you mean `reorder_ms`", "line 2"][..]),
+        ("contcat: {}", &["contcat", "did you mean `contact`", "line 1"]),
+        ("contact:\n  on_n: much\n", &["line 2", "column 9"]),
+        ("contact: { on_n: 1 }\ncontact: {}", &["duplicate", "line 2"]),
+        ("contact: { on_n: 0.1 }", &["contact.on_n is 0.1", "contact.off_n to"]),
+        ("contact: { off_n: .nan }", &["contact.off_n is NaN", "0 to 1000 N"]),
+        ("tip: { radius_mm: -1 }", &["tip.radius_mm is -1", "0 to 1000 mm"]),
+        ("tip: { stiffness_n_per_mm: 0 }", &["tip.stiffness_n_per_mm is 0", "leave it out for rigid"]),
+        ("scan: { noise_mm: .inf }", &["scan.noise_mm is inf"]),
+        ("sync: { largest_gap_ms: -3 }", &["sync.largest_gap_ms is -3", "0 to 60000 ms"]),
+        ("sync: { capacity: 1 }", &["sync.capacity is 1"]),
+        ("compensation: { payload: { mass_kg: -2 } }", &["compensation.payload.mass_kg is -2"]),
+        ("compensation: { sensor_orientation_xyzw: [0, 0, 0, 0] }", &["sensor_orientation_xyzw is 0", "length"]),
+        ("compensation: { bias: { force_n: [1, 2] } }", &["line 1"]),
+        ("[", &["line"]),
+    ];
+    for (yaml, parts) in bad {
+        let error = Scene::from_yaml(yaml).unwrap_err().to_string();
+        assert!(!error.contains('\n'), "{error}");
+        assert!(parts.iter().all(|part| error.contains(part)), "{yaml:?}: {error}");
+    }
+}
+
+#[test]
+fn a_missing_file_is_named() {
+    let error = Scene::read(std::path::Path::new("no/such/scene.yaml")).unwrap_err().to_string();
+    assert!(error.contains("no/such/scene.yaml"), "{error}");
+}
