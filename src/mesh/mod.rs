@@ -1,8 +1,10 @@
-//! Triangle meshes: positions, adjacency, closest face.
+//! Triangle meshes: positions, adjacency, repair, closest face.
 
 mod closest;
+mod repair;
 mod tri_mesh;
 pub mod triangle;
 
 pub use closest::{FaceHit, FaceTree};
+pub use repair::{RepairReport, repair};
 pub use tri_mesh::{FaceId, MeshError, TriMesh, VertexId};

@@ -44,7 +44,7 @@ pub enum MeshError {
         vertex: usize,
     },
     /// More faces or vertices than 32-bit ids can name.
-    #[error("{count} {what} are more than this program can hold ({limit})", limit = u32::MAX - 1)]
+    #[error("{count} {what} are more than 32-bit numbers can count: reduce the mesh first")]
     TooMany {
         /// "faces" or "vertices"
         what: &'static str,
@@ -242,6 +242,11 @@ impl TriMesh {
         }
         self.free_faces.push(face);
         true
+    }
+
+    /// Turns a face over: its normal changes sign; its id and its neighbours stay.
+    pub fn flip_face(&mut self, face: FaceId) {
+        self.faces[face.0 as usize].swap(1, 2);
     }
 
     fn push_star(&mut self, vertex: u32, face: FaceId) {

@@ -1,0 +1,285 @@
+//! From the triangles of a file to a mesh that can be worked on, and a report of what was wrong.
+
+mod orient;
+mod weld;
+
+use std::fmt;
+
+use nalgebra::Point3;
+use serde::Serialize;
+
+use super::{MeshError, TriMesh};
+use orient::{Edges, boundary_loops};
+
+/// Two times the area below which a face counts as having none, relative to its longest edge times its largest
+/// coordinate: each coordinate was rounded at least once (digits of the file, unit), by up to ε/2 of itself, and moves
+/// an edge of the face by as much. 16 leaves room for the roundings of the cross product.
+const ZERO_AREA: f64 = 16.0 * f64::EPSILON;
+
+/// What [`repair`] found and did. Numbers only, no lengths.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct RepairReport {
+    /// vertices merged into an earlier one at the same position
+    pub welded_vertices: usize,
+    /// faces left out because a coordinate, or their area, is not a finite number
+    pub dropped_not_finite: usize,
+    /// faces left out because they name a vertex twice or have no area
+    pub dropped_zero_area: usize,
+    /// faces left out because an earlier face has the same three vertices
+    pub dropped_duplicates: usize,
+    /// faces turned over so that neighbours agree and closed pieces have their normals outside
+    pub flipped_faces: usize,
+    /// vertices left out because no face uses them
+    pub unused_vertices: usize,
+    /// edges of three faces or more; they stay
+    pub non_manifold_edges: usize,
+    /// edges of one face; they stay
+    pub boundary_edges: usize,
+    /// chains of boundary edges: holes and outer rims; rims that touch in a vertex count as one
+    pub boundary_loops: usize,
+    /// pieces that hang together over edges of two faces
+    pub components: usize,
+}
+
+impl fmt::Display for RepairReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "welded {} vertices, left out {} unused ones and {} faces ({} not finite, {} without area, {} twice), \
+             turned over {}; {} pieces, {} boundary edges in {} loops, {} non-manifold edges",
+            self.welded_vertices,
+            self.unused_vertices,
+            self.dropped_not_finite + self.dropped_zero_area + self.dropped_duplicates,
+            self.dropped_not_finite,
+            self.dropped_zero_area,
+            self.dropped_duplicates,
+            self.flipped_faces,
+            self.components,
+            self.boundary_edges,
+            self.boundary_loops,
+            self.non_manifold_edges
+        )
+    }
+}
+
+/// Makes a mesh of any triangles: welds vertices at the same position, leaves out faces that are not finite, have no
+/// area or are there twice, turns faces over until they agree, and leaves out vertices that no face uses.
+///
+/// What stays keeps its order, so a clean mesh comes out as it went in. Holes, non-manifold edges and
+/// self-intersections are left as they are: to close or cut is to invent surface.
+///
+/// - `positions`: V × 3, m, in O; NaN and infinity are allowed.
+/// - `faces`: F × 3.
+///
+/// # Errors
+/// [`MeshError::VertexOutOfRange`], [`MeshError::TooMany`]; [`MeshError::Empty`] when no face is left.
+///
+/// # Example
+/// ```
+/// use nalgebra::Point3;
+/// let p = |x, y| Point3::new(x, y, 0.0);
+/// // two triangles as STL has them: each with its own three vertices; the second one lies upside down
+/// let corners = vec![p(0.0, 0.0), p(1.0, 0.0), p(0.0, 1.0), p(1.0, 0.0), p(0.0, 1.0), p(1.0, 1.0)];
+/// let (mesh, report) = touchup::mesh::repair(corners, vec![[0, 1, 2], [3, 4, 5]])?;
+/// assert_eq!((mesh.vertex_count(), mesh.face_count()), (4, 2));
+/// assert_eq!((report.welded_vertices, report.flipped_faces), (2, 1));
+/// # Ok::<(), touchup::mesh::MeshError>(())
+/// ```
+pub fn repair(mut positions: Vec<Point3<f64>>, mut faces: Vec<[u32; 3]>) -> Result<(TriMesh, RepairReport), MeshError> {
+    check(&positions, &faces)?;
+    let mut report = RepairReport { welded_vertices: weld::weld(&mut positions, &mut faces), ..Default::default() };
+    drop_faces(&positions, &mut faces, &mut report);
+    report.unused_vertices = drop_unused(&mut positions, &mut faces);
+    if faces.is_empty() {
+        return Err(MeshError::Empty);
+    }
+    let (mut mesh, edges) = without_duplicates(TriMesh::new(positions, faces)?, &mut report)?;
+    report.boundary_edges = edges.boundary.len();
+    report.boundary_loops = boundary_loops(&edges.boundary);
+    report.non_manifold_edges = edges.non_manifold;
+    (report.flipped_faces, report.components) = edges.orient(&mut mesh);
+    Ok((mesh, report))
+}
+
+/// Counts fit, indices are in range.
+fn check(positions: &[Point3<f64>], faces: &[[u32; 3]]) -> Result<(), MeshError> {
+    // three corners of every face are counted in 32 bits
+    for (what, count, limit) in [("vertices", positions.len(), u32::MAX - 1), ("faces", faces.len(), u32::MAX / 3)] {
+        if count > limit as usize {
+            return Err(MeshError::TooMany { what, count });
+        }
+    }
+    let vertices = positions.len();
+    match faces.as_flattened().iter().position(|&v| v as usize >= vertices) {
+        Some(at) => Err(MeshError::VertexOutOfRange { face: at / 3, vertex: faces.as_flattened()[at], vertices }),
+        None => Ok(()),
+    }
+}
+
+/// Leaves out faces that are not finite or have no area.
+fn drop_faces(positions: &[Point3<f64>], faces: &mut Vec<[u32; 3]>, report: &mut RepairReport) {
+    faces.retain(|corners| {
+        let [a, b, c] = corners.map(|v| positions[v as usize]);
+        let (u, v) = (b - a, c - a);
+        let double_area_2 = u.cross(&v).norm_squared();
+        let longest_2 = u.norm_squared().max(v.norm_squared()).max((c - b).norm_squared());
+        let largest = a.coords.amax().max(b.coords.amax()).max(c.coords.amax());
+        let limit_2 = longest_2 * (ZERO_AREA * largest).powi(2);
+        let finite = double_area_2.is_finite() && limit_2.is_finite();
+        report.dropped_not_finite += usize::from(!finite);
+        report.dropped_zero_area += usize::from(finite && double_area_2 <= limit_2);
+        finite && double_area_2 > limit_2
+    });
+}
+
+/// Leaves out vertices that no face uses; returns how many.
+fn drop_unused(positions: &mut Vec<Point3<f64>>, faces: &mut [[u32; 3]]) -> usize {
+    let mut used = vec![false; positions.len()];
+    for &vertex in faces.as_flattened() {
+        used[vertex as usize] = true;
+    }
+    let unused = used.iter().filter(|&&u| !u).count();
+    if unused > 0 {
+        let mut kept = 0;
+        let renamed: Vec<u32> = used.iter().map(|&u| (kept, kept += u32::from(u)).0).collect();
+        let mut is_used = used.iter();
+        positions.retain(|_| is_used.next() == Some(&true));
+        for vertex in faces.as_flattened_mut() {
+            *vertex = renamed[*vertex as usize];
+        }
+    }
+    unused
+}
+
+/// The mesh with one face for each three vertices, and its edges.
+fn without_duplicates(mesh: TriMesh, report: &mut RepairReport) -> Result<(TriMesh, Edges), MeshError> {
+    let edges = Edges::of(&mesh);
+    if edges.duplicates.is_empty() {
+        return Ok((mesh, edges));
+    }
+    report.dropped_duplicates = edges.duplicates.len();
+    let kept = mesh.faces().filter(|(face, _)| edges.duplicates.binary_search(&face.0).is_err());
+    let faces = kept.map(|(_, corners)| corners.map(|v| v.0)).collect();
+    let mesh = TriMesh::new(mesh.positions().to_vec(), faces)?;
+    let edges = Edges::of(&mesh);
+    Ok((mesh, edges))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::FaceId;
+
+    /// A cube of edge 1, 12 faces, normals outside.
+    fn cube(at: f64) -> (Vec<Point3<f64>>, Vec<[u32; 3]>) {
+        let corner = |i: u32| Point3::new(at + f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2));
+        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        ((0..8).map(corner).collect(), quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect())
+    }
+
+    /// Divergence theorem over the faces as they stand.
+    fn volume(mesh: &TriMesh) -> f64 {
+        mesh.faces().map(|(f, _)| mesh.barycentre(f).coords.dot(&mesh.double_area_normal(f)) / 6.0).sum()
+    }
+
+    #[test]
+    fn a_clean_cube_comes_out_as_it_went_in() {
+        let (positions, faces) = cube(0.0);
+        let (mesh, report) = repair(positions.clone(), faces.clone()).unwrap();
+        assert_eq!(mesh.positions(), positions);
+        assert_eq!(mesh.faces().map(|(_, c)| c.map(|v| v.0)).collect::<Vec<_>>(), faces);
+        assert_eq!(report, RepairReport { components: 1, ..Default::default() });
+    }
+
+    #[test]
+    fn scrambled_cubes_are_turned_outside_and_keep_their_face_ids() {
+        let (positions, faces) = cube(5.0);
+        for pattern in 0..1 << 12 {
+            let mut scrambled = faces.clone();
+            for (bit, face) in scrambled.iter_mut().enumerate() {
+                if pattern >> bit & 1 == 1 {
+                    face.swap(0, 2);
+                }
+            }
+            let (mesh, report) = repair(positions.clone(), scrambled).unwrap();
+            assert!((volume(&mesh) - 1.0).abs() < 1e-12, "pattern {pattern:b}");
+            assert_eq!(report.flipped_faces, u32::count_ones(pattern) as usize);
+            for (id, face) in faces.iter().enumerate() {
+                let mut corners = mesh.corners(FaceId(id as u32)).map(|v| v.0);
+                let mut wanted = *face;
+                corners.sort_unstable();
+                wanted.sort_unstable();
+                assert_eq!(corners, wanted);
+            }
+        }
+    }
+
+    #[test]
+    fn an_open_patch_keeps_the_side_of_its_larger_area() {
+        // unit square in two halves of equal area and a flap three times as large, which lies upside down
+        let p = |x, y| Point3::new(x, y, 0.0);
+        let positions = vec![p(0.0, 0.0), p(1.0, 0.0), p(1.0, 1.0), p(0.0, 1.0), p(-6.0, 0.5)];
+        let (mesh, report) = repair(positions, vec![[0, 1, 2], [0, 2, 3], [0, 4, 3]]).unwrap();
+        assert_eq!((report.flipped_faces, report.boundary_edges, report.boundary_loops), (2, 5, 1));
+        assert!(mesh.faces().all(|(f, _)| mesh.normal(f).z == -1.0));
+    }
+
+    #[test]
+    fn two_inverted_cubes_that_share_an_edge_are_both_turned() {
+        // the second cube is the first one moved by (1, 1, 0): they share the edge x = y = 1
+        let (mut positions, mut faces) = cube(0.0);
+        let (mut moved, more) = cube(1.0);
+        moved.iter_mut().for_each(|p| p.y += 1.0);
+        positions.extend(moved);
+        faces.extend(more.iter().map(|f| f.map(|v| v + 8)));
+        faces.iter_mut().for_each(|f| f.swap(0, 1));
+        let (mesh, report) = repair(positions, faces).unwrap();
+        assert_eq!((report.non_manifold_edges, report.components, report.flipped_faces), (1, 2, 24));
+        assert_eq!((report.welded_vertices, mesh.vertex_count()), (2, 14));
+        assert!((volume(&mesh) - 2.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn useless_faces_and_vertices_are_left_out_and_counted() {
+        let (mut positions, mut faces) = cube(0.0);
+        positions.push(Point3::new(0.5, 0.0, 0.0)); // 8: on the edge 0–1, used only by a face without area
+        positions.push(Point3::new(f64::NAN, 0.0, 0.0)); // 9
+        positions.push(Point3::new(1e300, 0.0, 0.0)); // 10: finite, but no area can be worked out
+        positions.push(Point3::new(-0.0, 0.0, 0.0)); // 11: vertex 0 again
+        faces.extend([[0, 8, 1], [0, 0, 1], [0, 11, 2], [1, 2, 9], [1, 2, 10], [3, 0, 2], [2, 3, 0]]);
+        let (mesh, report) = repair(positions, faces).unwrap();
+        let wanted = RepairReport {
+            welded_vertices: 1,
+            dropped_not_finite: 2,
+            dropped_zero_area: 3,
+            dropped_duplicates: 2,
+            unused_vertices: 3,
+            components: 1,
+            ..Default::default()
+        };
+        assert_eq!(report, wanted);
+        assert_eq!((mesh.vertex_count(), mesh.face_count()), (8, 12));
+    }
+
+    #[test]
+    fn thin_faces_far_from_the_origin_stay_while_they_can_be_told_from_a_line() {
+        // at 10⁶ m a coordinate is rounded to 1.2e-10 m: a height of 1e-6 m is real, one of 2e-10 m is not
+        for (height, kept) in [(1e-6, 1), (2e-10, 0)] {
+            let p = |x: f64, y: f64| Point3::new(1e6 + x, 1e6 + y, 1e6);
+            let outcome = repair(vec![p(0.0, 0.0), p(1e-3, 0.0), p(5e-4, height)], vec![[0, 1, 2]]);
+            assert_eq!(outcome.map_or(0, |(mesh, _)| mesh.face_count()), kept, "height {height} m");
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_repaired_is_refused() {
+        let (positions, _) = cube(0.0);
+        let refusal = |faces| repair(positions.clone(), faces).map(|_| ()).unwrap_err();
+        assert_eq!(refusal(vec![]), MeshError::Empty);
+        assert_eq!(refusal(vec![[0, 1, 1]]), MeshError::Empty);
+        assert_eq!(
+            refusal(vec![[0, 1, 2], [0, 8, 1]]),
+            MeshError::VertexOutOfRange { face: 1, vertex: 8, vertices: 8 }
+        );
+    }
+}
