@@ -1,1 +1,4 @@
-//! io
+//! Mesh files: the only room, with [`crate::scene`], that touches the disk.
+
+pub mod atomic;
+pub mod mesh_file;

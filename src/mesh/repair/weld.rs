@@ -5,16 +5,25 @@ use nalgebra::Point3;
 /// Marks a free place in the table.
 const FREE: u32 = u32::MAX;
 
-/// Merges vertices whose coordinates are equal bit for bit, in order of first occurrence; −0 counts as 0 and becomes it.
+/// Width of a cell in which positions count as the same one, relative to the spread of the mesh (0.1 nm on 100 mm).
 ///
-/// No tolerance: exporters write a shared vertex with the same digits everywhere, while a tolerance would close thin
-/// gaps and slots that are really there, and would make the result depend on the order of the vertices.
+/// CAD programs write the same corner once as 0 and once as 1e-17, so that comparing bits leaves seams in their parts:
+/// of 11 binary STL parts four had such pairs, all closer than 1e-12 of the diagonal, and no other two vertices were
+/// closer than 1e-6 of it. Wider cells would begin to close slots that are really there.
+const CELL: f64 = 1e-9;
+
+/// Merges vertices in the same cell of a grid of width [`CELL`], in order of first occurrence, whose position stays;
+/// −0 becomes 0.
+///
+/// Zero lies in the middle of a cell, which is where the difference matters. Two positions that rounding put on two
+/// sides of a border between cells are not merged: it takes 16 digits that agree up to the last and a chance of 1e-6.
+/// In return the result depends on no order.
 ///
 /// - `positions`: V × 3, any unit; shortened in place.
 /// - `faces`: F × 3, every index below V; renamed in place.
 /// - returns: how many vertices went away.
 pub(super) fn weld(positions: &mut Vec<Point3<f64>>, faces: &mut [[u32; 3]]) -> usize {
-    let mut table = PositionTable::default();
+    let mut table = PositionTable::new(CELL * spread(positions));
     let mut renamed = Vec::with_capacity(positions.len());
     let mut kept = 0;
     for vertex in 0..positions.len() {
@@ -36,14 +45,35 @@ pub(super) fn weld(positions: &mut Vec<Point3<f64>>, faces: &mut [[u32; 3]]) -> 
     welded
 }
 
-/// Open-addressing table from position to vertex; at most half full.
-#[derive(Default)]
+/// Median distance (largest coordinate) from the median position, over a sample: single wild vertices do not count.
+fn spread(positions: &[Point3<f64>]) -> f64 {
+    /// Every n-th vertex, so that there are at least this many.
+    const SAMPLE: usize = 1000;
+    let sample = || positions.iter().step_by((positions.len() / SAMPLE).max(1));
+    let centre = [0, 1, 2].map(|axis| median(sample().map(|p| p[axis]).collect()));
+    median(sample().map(|p| (p - Point3::from(centre)).amax()).collect())
+}
+
+/// The middle one in rising order; 0 when there is none.
+fn median(mut values: Vec<f64>) -> f64 {
+    let middle = values.len() / 2;
+    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
+}
+
+/// Open-addressing table from the cell of a position to a vertex; at most half full.
 struct PositionTable {
     places: Vec<u32>,
     len: usize,
+    /// cells per length; 0 when positions must agree in every bit
+    cells: f64,
 }
 
 impl PositionTable {
+    fn new(cell: f64) -> Self {
+        let cells = if cell.is_normal() { cell.recip() } else { 0.0 };
+        Self { places: Vec::new(), len: 0, cells }
+    }
+
     /// The vertex at this position, or the next number, `known.len()`, which is then taken.
     fn find_or_add(&mut self, position: &Point3<f64>, known: &[Point3<f64>]) -> u32 {
         if 2 * self.len >= self.places.len() {
@@ -59,10 +89,10 @@ impl PositionTable {
 
     /// Where this position stands or would be put.
     fn place_of(&self, position: &Point3<f64>, known: &[Point3<f64>]) -> usize {
-        let wanted = bits(position);
+        let wanted = self.cell_of(position);
         let mask = self.places.len() - 1;
         let mut place = hash(wanted) as usize & mask;
-        while self.places[place] != FREE && bits(&known[self.places[place] as usize]) != wanted {
+        while self.places[place] != FREE && self.cell_of(&known[self.places[place] as usize]) != wanted {
             place = (place + 1) & mask;
         }
         place
@@ -75,13 +105,23 @@ impl PositionTable {
             self.places[place] = vertex as u32;
         }
     }
+
+    #[inline]
+    fn cell_of(&self, position: &Point3<f64>) -> [u64; 3] {
+        /// Added and taken away it rounds to whole numbers, as long as the sum keeps its exponent.
+        const ROUND: f64 = 1.5 * (1u64 << 52) as f64;
+        let cell = |x: f64| {
+            let scaled = x * self.cells;
+            if scaled.abs() < (1u64 << 51) as f64 && self.cells > 0.0 {
+                (scaled + ROUND).to_bits()
+            } else {
+                x.to_bits()
+            }
+        };
+        [cell(position.x), cell(position.y), cell(position.z)]
+    }
 }
 
-fn bits(position: &Point3<f64>) -> [u64; 3] {
-    [position.x.to_bits(), position.y.to_bits(), position.z.to_bits()]
-}
-
-/// Mixes all bits into the low ones: coordinates from `f32` have only zeros there.
 fn hash([x, y, z]: [u64; 3]) -> u64 {
     /// The fractional part of the golden ratio, odd: spreads equally spaced keys evenly.
     const SPREAD: u64 = 0x9e37_79b9_7f4a_7c15;
@@ -93,4 +133,46 @@ fn hash([x, y, z]: [u64; 3]) -> u64 {
         fold(x ^ SPREAD, SPREAD).rotate_left(17) ^ fold(y ^ SPREAD.rotate_left(23), SPREAD) ^ z.rotate_left(41),
         SPREAD,
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// How many of these are left, a hundred more being spread over 0 … 99 on each axis.
+    fn left(positions: &[[f64; 3]]) -> usize {
+        let mut all: Vec<_> = positions.iter().map(|&p| Point3::from(p)).collect();
+        all.extend((0..100).map(|i| Point3::new(f64::from(i), f64::from(i), f64::from(i) + 0.5)));
+        weld(&mut all, &mut []);
+        all.len() - 100
+    }
+
+    #[test]
+    fn rounding_is_welded_and_a_narrow_slot_is_not() {
+        assert_eq!(left(&[[1.0, 0.0, 2.0], [1.0, 4e-16, 2.0], [1.0, -1e-17, 2.0], [1.0, -0.0, 2.0]]), 1);
+        assert_eq!(left(&[[1.0, 3.3, 2.0], [1.0 + f64::EPSILON, 3.3, 2.0]]), 1);
+        assert_eq!(left(&[[1.0, 0.0, 2.0], [1.0, 1e-6, 2.0]]), 2);
+    }
+
+    #[test]
+    fn wild_vertices_do_not_widen_the_cells() {
+        let wild = [[1e300, 0.0, 0.0], [f64::NAN, 1.0, 1.0], [f64::INFINITY, 2.0, 2.0]];
+        assert_eq!(left(&wild), 3);
+        assert_eq!(left(&[wild[0], wild[1], [1.0, 0.0, 2.0], [1.0, 1e-6, 2.0]]), 4);
+    }
+
+    #[test]
+    fn far_from_the_origin_bits_decide() {
+        // 1e15 m: next number 0.125 m further
+        assert_eq!(left(&[[1e15, 0.0, 0.0], [1e15 + 0.125, 0.0, 0.0], [1e15, 0.0, 0.0]]), 2);
+    }
+
+    #[test]
+    fn the_first_occurrence_keeps_its_position_and_place() {
+        let point = |x, y| Point3::new(x, y, 0.0);
+        let mut positions = vec![point(3.0, 1e-17), point(9.0, 5.0), point(3.0, 0.0), point(0.0, 1.0), point(6.0, 2.0)];
+        let mut faces = [[2, 1, 0], [2, 3, 4]];
+        assert_eq!(weld(&mut positions, &mut faces), 1);
+        assert_eq!((positions[0].y, faces), (1e-17, [[0, 1, 0], [0, 2, 3]]));
+    }
 }

@@ -1,0 +1,152 @@
+//! Files that are there whole or not at all.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// A file that appears under its name only by [`AtomicFile::commit`].
+///
+/// Until then it stands beside its target under a temporary name; dropped without commit it is removed and an older
+/// file of that name stays untouched. A link is followed, so that what it points to is replaced.
+#[derive(Debug)]
+pub struct AtomicFile {
+    target: PathBuf,
+    temporary: PathBuf,
+    /// `None` once committed
+    writer: Option<BufWriter<File>>,
+}
+
+impl AtomicFile {
+    /// Opens a temporary file beside `path`.
+    ///
+    /// # Errors
+    /// The folder is missing, or may not be written to; `path` names something other than a plain file.
+    pub fn create(path: &Path) -> io::Result<Self> {
+        let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+        let refused = |kind, why: String| Err(io::Error::new(kind, why));
+        let Some(name) = target.file_name() else {
+            return refused(io::ErrorKind::InvalidInput, "the path names no file".into());
+        };
+        if fs::metadata(&target).is_ok_and(|m| !m.is_file()) {
+            return refused(io::ErrorKind::InvalidInput, "it is there already and is not a plain file".into());
+        }
+        let folder = folder_of(&target);
+        if !folder.is_dir() {
+            return refused(io::ErrorKind::NotFound, format!("there is no folder {}: make it first", folder.display()));
+        }
+        for attempt in 0u32.. {
+            let temporary = folder.join(format!(".{}.{}-{attempt}.part", name.display(), std::process::id()));
+            match OpenOptions::new().write(true).create_new(true).open(&temporary) {
+                Ok(file) => {
+                    return Ok(Self { target, temporary, writer: Some(BufWriter::with_capacity(1 << 16, file)) });
+                }
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+                Err(error) => return Err(error),
+            }
+        }
+        refused(io::ErrorKind::AlreadyExists, "no temporary name is free beside it".into())
+    }
+
+    /// Brings everything to the disk and gives the file its name, in place of an older one.
+    ///
+    /// # Errors
+    /// Whatever writing, synchronising or renaming reports; the temporary file is then removed.
+    pub fn commit(mut self) -> io::Result<()> {
+        self.buffer()?.flush()?;
+        self.buffer()?.get_ref().sync_all()?;
+        fs::rename(&self.temporary, &self.target)?;
+        self.writer = None;
+        // the new name is on the disk once its folder is; some file systems cannot be asked for that
+        let _ = File::open(folder_of(&self.target)).and_then(|folder| folder.sync_all());
+        Ok(())
+    }
+
+    fn buffer(&mut self) -> io::Result<&mut BufWriter<File>> {
+        self.writer.as_mut().ok_or_else(|| io::Error::from(io::ErrorKind::BrokenPipe))
+    }
+}
+
+impl Write for AtomicFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.buffer()?.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.buffer()?.flush()
+    }
+}
+
+impl Drop for AtomicFile {
+    fn drop(&mut self) {
+        if let Some(writer) = self.writer.take() {
+            // what is still buffered is not wanted
+            let _ = writer.into_parts();
+            let _ = fs::remove_file(&self.temporary);
+        }
+    }
+}
+
+/// Writes a whole file by `write`; on any error an older file of that name stays untouched.
+///
+/// # Errors
+/// Those of [`AtomicFile`] and of `write`.
+pub fn write_atomically(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
+    let mut file = AtomicFile::create(path)?;
+    write(file.buffer()?)?;
+    file.commit()
+}
+
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect()
+    }
+
+    #[test]
+    fn only_a_commit_changes_the_target() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        fs::write(&path, "old").unwrap();
+        let mut file = AtomicFile::create(&path).unwrap();
+        file.write_all(b"half").unwrap();
+        assert_eq!(names(folder.path()).len(), 2);
+        drop(file);
+        assert_eq!(names(folder.path()), ["a.txt"]);
+        let failed = write_atomically(&path, |w| w.write_all(b"half").and(Err(io::Error::other("disk full"))));
+        assert_eq!(failed.unwrap_err().to_string(), "disk full");
+        assert_eq!((fs::read_to_string(&path).unwrap().as_str(), names(folder.path()).len()), ("old", 1));
+        write_atomically(&path, |w| w.write_all(b"new")).unwrap();
+        assert_eq!((fs::read_to_string(&path).unwrap().as_str(), names(folder.path()).len()), ("new", 1));
+    }
+
+    #[test]
+    fn places_that_cannot_hold_a_file_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let missing = AtomicFile::create(&folder.path().join("no/a.txt")).unwrap_err().to_string();
+        assert!(missing.starts_with("there is no folder") && missing.ends_with("no: make it first"), "{missing}");
+        let taken = AtomicFile::create(folder.path()).unwrap_err().to_string();
+        assert!(taken.contains("not a plain file"), "{taken}");
+        assert!(names(folder.path()).is_empty());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_is_followed() {
+        let folder = tempfile::tempdir().unwrap();
+        let (path, link) = (folder.path().join("a.txt"), folder.path().join("link"));
+        fs::write(&path, "old").unwrap();
+        std::os::unix::fs::symlink(&path, &link).unwrap();
+        write_atomically(&link, |w| w.write_all(b"new")).unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "new");
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+    }
+}

@@ -1,0 +1,209 @@
+//! Triangle mesh files: PLY, STL and OBJ in, repaired on the way; the same three out.
+
+mod defect;
+mod obj;
+mod ply;
+mod stl;
+mod text;
+mod unit;
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use nalgebra::{Point3, Vector3};
+
+use super::atomic::write_atomically;
+use crate::mesh::{MeshError, RepairReport, TriMesh, repair};
+use defect::Syntax;
+pub use defect::{Defect, Place};
+pub use unit::{Implausible, LARGEST_M, MeshUnit, SMALLEST_M};
+
+/// Why a mesh file could not be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum MeshFileError {
+    /// The disk says no.
+    #[error("cannot read {}: {source}", path.display())]
+    Read {
+        /// the file
+        path: PathBuf,
+        /// what the system reports
+        source: io::Error,
+    },
+    /// The disk says no.
+    #[error("cannot write {}: {source}", path.display())]
+    Write {
+        /// the file
+        path: PathBuf,
+        /// what the system reports
+        source: io::Error,
+    },
+    /// Neither the name nor the content is known.
+    #[error("{}: not a kind of mesh file known here: convert it to .ply, .stl or .obj", path.display())]
+    UnknownFormat {
+        /// the file
+        path: PathBuf,
+    },
+    /// The content breaks the rules of its format.
+    #[error("{}, {place}: {defect}", path.display())]
+    Syntax {
+        /// the file
+        path: PathBuf,
+        /// where
+        place: Place,
+        /// what
+        defect: Defect,
+    },
+    /// Points without a surface.
+    #[error("{}: no face in it, only {vertices} vertices: make a triangle mesh of it first", path.display())]
+    NoFaces {
+        /// the file
+        path: PathBuf,
+        /// how many points
+        vertices: usize,
+    },
+    /// The triangles make no mesh.
+    #[error("{}: {source}", path.display())]
+    Mesh {
+        /// the file
+        path: PathBuf,
+        /// why
+        source: MeshError,
+    },
+    /// The unit cannot be right.
+    #[error("{}: {size}", path.display())]
+    Implausible {
+        /// the file
+        path: PathBuf,
+        /// the size and what it suggests
+        size: Implausible,
+    },
+}
+
+/// A mesh as read, and what had to be repaired.
+#[derive(Clone, Debug)]
+pub struct MeshFile {
+    /// vertices in m, in the file's own frame, which becomes O
+    pub mesh: TriMesh,
+    /// what was wrong with the file
+    pub repair: RepairReport,
+}
+
+/// Triangles as they stand in a file.
+#[derive(Debug, Default)]
+struct Soup {
+    positions: Vec<Point3<f64>>,
+    faces: Vec<[u32; 3]>,
+    /// vertices in the file that did not even get into `positions`
+    unused: usize,
+}
+
+impl Soup {
+    /// Three positions for each triangle.
+    fn of_triangles(positions: Vec<Point3<f64>>) -> Self {
+        // beyond 32 bits `repair` refuses by the number of positions
+        let faces = (0..positions.len() as u32 / 3).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
+        Self { positions, faces, unused: 0 }
+    }
+}
+
+#[derive(Clone, Copy)]
+enum Format {
+    Ply,
+    Stl,
+    Obj,
+}
+
+impl Format {
+    fn of_name(path: &Path) -> Option<Self> {
+        match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
+            "ply" => Some(Self::Ply),
+            "stl" => Some(Self::Stl),
+            "obj" => Some(Self::Obj),
+            _ => None,
+        }
+    }
+
+    /// By what stands in the file, where that leaves no doubt.
+    fn of_content(bytes: &[u8]) -> Option<Self> {
+        match bytes {
+            [b'p', b'l', b'y', b'\r' | b'\n', ..] => Some(Self::Ply),
+            _ if stl::is_binary(bytes) || stl::looks_ascii(bytes) => Some(Self::Stl),
+            _ => None,
+        }
+    }
+}
+
+/// Reads a PLY, STL or OBJ file and repairs it ([`repair`]).
+///
+/// The content decides about the format where it is unmistakable, the extension otherwise.
+///
+/// - `unit`: the unit of the coordinates in the file; the mesh comes out in m.
+///
+/// # Errors
+/// [`MeshFileError`]: one line that names the file, the place in it, and what to do.
+pub fn read_mesh(path: &Path, unit: MeshUnit) -> Result<MeshFile, MeshFileError> {
+    let bytes = std::fs::read(path).map_err(|source| MeshFileError::Read { path: path.into(), source })?;
+    let format = Format::of_content(&bytes)
+        .or_else(|| Format::of_name(path))
+        .ok_or_else(|| MeshFileError::UnknownFormat { path: path.into() })?;
+    let scale = unit.metres();
+    let soup = match format {
+        _ if bytes.is_empty() => Err(Syntax::ends(Place::Byte(0), "a mesh")),
+        Format::Ply => ply::read(&bytes, scale),
+        Format::Stl => stl::read(&bytes, scale),
+        Format::Obj => obj::read(&bytes, scale),
+    };
+    drop(bytes);
+    let Soup { positions, faces, unused } =
+        soup.map_err(|Syntax { place, defect }| MeshFileError::Syntax { path: path.into(), place, defect })?;
+    if faces.is_empty() {
+        return Err(MeshFileError::NoFaces { path: path.into(), vertices: positions.len() + unused });
+    }
+    let (mesh, mut report) =
+        repair(positions, faces).map_err(|source| MeshFileError::Mesh { path: path.into(), source })?;
+    report.unused_vertices += unused;
+    Implausible::check(sides(&mesh), unit).map_err(|size| MeshFileError::Implausible { path: path.into(), size })?;
+    Ok(MeshFile { mesh, repair: report })
+}
+
+/// Sides of the bounding box, m.
+fn sides(mesh: &TriMesh) -> Vector3<f64> {
+    let empty = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+    let (low, high) = mesh.positions().iter().fold(empty, |(low, high), p| (low.inf(&p.coords), high.sup(&p.coords)));
+    high - low
+}
+
+/// Writes a mesh as PLY (binary, double), STL (binary, which is single) or OBJ, by the extension of `path`.
+///
+/// Removed faces and vertices without a face are left out; the rest keeps its order. Same mesh, same bytes. The file
+/// appears whole or not at all ([`super::atomic`]).
+///
+/// - `unit`: the unit of the coordinates in the file; PLY and OBJ in m give back the mesh bit for bit.
+///
+/// # Errors
+/// [`MeshFileError::UnknownFormat`], [`MeshFileError::Write`].
+pub fn write_mesh(path: &Path, mesh: &TriMesh, unit: MeshUnit) -> Result<(), MeshFileError> {
+    let format = Format::of_name(path).ok_or_else(|| MeshFileError::UnknownFormat { path: path.into() })?;
+    let (soup, unit) = (used_part(mesh, unit.metres()), unit.to_string());
+    write_atomically(path, |out| match format {
+        Format::Ply => ply::write(&soup, &unit, out),
+        Format::Stl => stl::write(&soup, &unit, out),
+        Format::Obj => obj::write(&soup, &unit, out),
+    })
+    .map_err(|source| MeshFileError::Write { path: path.into(), source })
+}
+
+/// Faces that are there and the vertices they use; coordinates divided by `scale`.
+fn used_part(mesh: &TriMesh, scale: f64) -> Soup {
+    let mut soup = Soup::default();
+    let mut renamed = vec![u32::MAX; mesh.vertex_count()];
+    for (_, corners) in mesh.faces() {
+        corners.iter().for_each(|v| renamed[v.0 as usize] = 0);
+    }
+    for (name, p) in renamed.iter_mut().zip(mesh.positions()).filter(|(name, _)| **name == 0) {
+        *name = soup.positions.len() as u32;
+        soup.positions.push(p / scale);
+    }
+    soup.faces = mesh.faces().map(|(_, corners)| corners.map(|v| renamed[v.0 as usize])).collect();
+    soup
+}

@@ -1,0 +1,113 @@
+//! PLY: ASCII and binary of both byte orders, any scalar type, any further elements and properties.
+
+mod body;
+mod header;
+
+use std::io::{self, Write};
+
+use nalgebra::Point3;
+
+use super::Soup;
+use super::defect::{Place, Syntax};
+use body::Body;
+use header::{Element, Header};
+
+/// Names of the list of a face's vertices; both are common.
+const VERTEX_LISTS: [&str; 2] = ["vertex_indices", "vertex_index"];
+
+/// Reads `vertex`, and `face` or `tristrips`; coordinates are multiplied by `scale`, polygons are cut into fans.
+pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
+    let header = Header::read(bytes)?;
+    let mut body = Body::new(bytes, &header);
+    let mut soup = Soup::default();
+    for element in &header.elements {
+        body.check_count(element)?;
+        match element.name.as_str() {
+            "vertex" => read_vertices(&mut body, element, scale, &mut soup)?,
+            "face" => read_polygons(&mut body, element, &mut soup, fan)?,
+            "tristrips" => read_polygons(&mut body, element, &mut soup, strips)?,
+            _ => body.rows(element, element.count, None, |_, _| Ok(()))?,
+        }
+    }
+    Ok(soup)
+}
+
+/// Adds the triangles of one row to the faces.
+type Cut = fn(&[f64], Place, &mut Vec<[u32; 3]>) -> Result<(), Syntax>;
+
+fn read_vertices(body: &mut Body, element: &Element, scale: f64, soup: &mut Soup) -> Result<(), Syntax> {
+    let mut columns = [0; 3];
+    for (column, name) in columns.iter_mut().zip(["x", "y", "z"]) {
+        *column = element.scalar(name).ok_or_else(|| {
+            Syntax::unexpected(Place::Line(element.line), "a vertex with x, y and z", format!("no property {name}"))
+        })?;
+    }
+    soup.positions.reserve_exact(element.count);
+    if body.fixed_rows(element, columns, |xyz| soup.positions.push(Point3::from(xyz.map(|x| scale * x)))) {
+        return Ok(());
+    }
+    body.rows(element, element.count, None, |row, _| {
+        soup.positions.push(Point3::from(columns.map(|column| scale * row[column])));
+        Ok(())
+    })
+}
+
+fn read_polygons(body: &mut Body, element: &Element, soup: &mut Soup, cut: Cut) -> Result<(), Syntax> {
+    let list = VERTEX_LISTS
+        .iter()
+        .find_map(|name| element.list(name))
+        .ok_or_else(|| Syntax::unexpected(Place::Line(element.line), "faces with a list vertex_indices", "none"))?;
+    soup.faces.reserve_exact(element.count);
+    let triangles = body.triangles(element, |corners| soup.faces.push(corners));
+    body.rows(element, element.count - triangles, Some(list), |row, place| cut(row, place, &mut soup.faces))
+}
+
+fn vertex_number(value: f64, place: Place) -> Result<u32, Syntax> {
+    let whole = value as u32;
+    if f64::from(whole) == value { Ok(whole) } else { Err(Syntax::unexpected(place, "a vertex number", value)) }
+}
+
+/// Triangles from the first corner of a polygon to its sides; fewer than three corners make none.
+fn fan(polygon: &[f64], place: Place, faces: &mut Vec<[u32; 3]>) -> Result<(), Syntax> {
+    for pair in polygon.get(1..).unwrap_or_default().windows(2) {
+        faces.push([vertex_number(polygon[0], place)?, vertex_number(pair[0], place)?, vertex_number(pair[1], place)?]);
+    }
+    Ok(())
+}
+
+/// Strips end with −1; every second triangle of a strip runs the other way round.
+fn strips(numbers: &[f64], place: Place, faces: &mut Vec<[u32; 3]>) -> Result<(), Syntax> {
+    for strip in numbers.split(|&n| n == -1.0) {
+        for (i, corners) in strip.windows(3).enumerate() {
+            let (a, b) = if i % 2 == 0 { (0, 1) } else { (1, 0) };
+            faces.push([
+                vertex_number(corners[a], place)?,
+                vertex_number(corners[b], place)?,
+                vertex_number(corners[2], place)?,
+            ]);
+        }
+    }
+    Ok(())
+}
+
+/// Binary little endian, coordinates as double: nothing is rounded.
+pub(super) fn write(soup: &Soup, unit: &str, out: &mut impl Write) -> io::Result<()> {
+    write!(
+        out,
+        "ply\nformat binary_little_endian 1.0\ncomment touchup, unit {unit}, frame O\nelement vertex {}\n\
+         property double x\nproperty double y\nproperty double z\nelement face {}\n\
+         property list uchar uint vertex_indices\nend_header\n",
+        soup.positions.len(),
+        soup.faces.len()
+    )?;
+    for x in soup.positions.iter().flat_map(|p| p.coords.iter()) {
+        out.write_all(&x.to_le_bytes())?;
+    }
+    for corners in &soup.faces {
+        out.write_all(&[3])?;
+        for vertex in corners {
+            out.write_all(&vertex.to_le_bytes())?;
+        }
+    }
+    Ok(())
+}
