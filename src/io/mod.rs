@@ -2,3 +2,6 @@
 
 pub mod atomic;
 pub mod mesh_file;
+//! io
+
+pub mod recording;
