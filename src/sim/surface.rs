@@ -1,0 +1,73 @@
+//! What every known surface can tell: how far away it is, and where it is closest.
+
+use nalgebra::{Point3, Vector3};
+
+/// A point of a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfacePoint {
+    /// m, in O
+    pub point: Point3<f64>,
+    /// Unit normal of the surface there, out of the material; on an edge that of one of the pieces that meet.
+    pub normal: Vector3<f64>,
+}
+
+/// Axis-aligned box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// smallest coordinates, m, in O
+    pub min: Point3<f64>,
+    /// largest coordinates, m, in O
+    pub max: Point3<f64>,
+}
+
+impl Bounds {
+    /// The smallest box around `points`; `None` when there are none.
+    pub fn around<'a>(points: impl IntoIterator<Item = &'a Point3<f64>>) -> Option<Self> {
+        points.into_iter().fold(None, |bounds, p| {
+            let Bounds { min, max } = bounds.unwrap_or(Bounds { min: *p, max: *p });
+            Some(Bounds { min: min.inf(p), max: max.sup(p) })
+        })
+    }
+
+    /// The box with every side moved outwards by `margin` (m).
+    pub fn grown(&self, margin: f64) -> Self {
+        let by = Vector3::repeat(margin);
+        Self { min: self.min - by, max: self.max + by }
+    }
+
+    /// Length of the sides, m.
+    pub fn size(&self) -> Vector3<f64> {
+        self.max - self.min
+    }
+
+    /// Middle of the box, m, in O.
+    pub fn centre(&self) -> Point3<f64> {
+        nalgebra::center(&self.min, &self.max)
+    }
+}
+
+/// A surface that is known exactly, with material behind it.
+pub trait Surface {
+    /// Distance to the surface, m; positive outside the material, negative inside.
+    fn signed_distance(&self, p: &Point3<f64>) -> f64;
+
+    /// A point of the surface that no other point of it beats in closeness to `p`.
+    fn closest(&self, p: &Point3<f64>) -> SurfacePoint;
+
+    /// Box around the part that is of interest.
+    fn bounds(&self) -> Bounds;
+
+    /// Appends, for each smooth piece of the surface that comes within `reach` (m) of `p`, the point of it closest to
+    /// `p`: where a ball around `p` may touch. The closest of all is among them.
+    fn near(&self, p: &Point3<f64>, reach: f64, found: &mut Vec<SurfacePoint>);
+
+    /// Unit vector along which the signed distance grows fastest: out of the material, also beside edges.
+    fn outward(&self, p: &Point3<f64>) -> Vector3<f64> {
+        let closest = self.closest(p);
+        let offset = (p - closest.point) * self.signed_distance(p).signum();
+        offset.try_normalize(COINCIDENT).unwrap_or(closest.normal)
+    }
+}
+
+/// Below this distance (m) two points do not give a direction any more: a thousand roundings of a coordinate of 1 m.
+const COINCIDENT: f64 = 1e3 * f64::EPSILON;
