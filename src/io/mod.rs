@@ -1,7 +1,5 @@
-//! Mesh files: the only room, with [`crate::scene`], that touches the disk.
+//! Mesh files and recordings: the only room, with [`crate::scene`], that touches the disk.
 
 pub mod atomic;
 pub mod mesh_file;
-//! io
-
 pub mod recording;

@@ -1,14 +1,25 @@
 //! Known surfaces, a scanner and a stylus to test against.
 //!
 //! A [`Surface`] knows how far every point is from it. The scanner makes a bad mesh of one, the stylus slides a ball
-//! over it and says what it felt. All randomness comes from a seed.
+//! over it and says what it felt ([`touch`]). All randomness comes from a seed.
 
+mod ball;
+mod error;
+mod path;
 mod peaks;
 mod plate;
 mod plate_mesh;
+mod sensor;
+mod stylus;
 mod surface;
 mod triangulate;
+mod wander;
 
+pub use ball::{BallContact, push_ball};
+pub use error::SimError;
+pub use path::{Lines, PathParams, Region, Stroke, around_wall, plan_demo, plan_mesh, raster};
 pub use peaks::{Peaks, add_vertex_noise};
 pub use plate::{Plate, Stadium, TruthFeature, TruthShape};
+pub use sensor::SensorParams;
+pub use stylus::{Moment, StylusParams, Touch, touch};
 pub use surface::{Bounds, Surface, SurfacePoint};

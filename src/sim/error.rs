@@ -1,0 +1,59 @@
+/// Why a simulation cannot be run as asked.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SimError {
+    /// A parameter outside its range.
+    #[error("{name} is {value} {unit}, but must be {allowed}")]
+    BadParameter {
+        /// which one
+        name: &'static str,
+        /// what was given
+        value: f64,
+        /// its unit
+        unit: &'static str,
+        /// the range
+        allowed: &'static str,
+    },
+    /// The path does not start in the open.
+    #[error("the path starts {clearance_m} m from the part, less than the ball's radius of {radius_m} m: start higher")]
+    StartsInside {
+        /// m, from the surface to the start
+        clearance_m: f64,
+        /// m
+        radius_m: f64,
+    },
+    /// Nothing to follow.
+    #[error("the path has no point: give at least one stroke with two points")]
+    EmptyPath,
+    /// The scan would be larger than is sensible.
+    #[error("the part is {size_m} m long: at edges of {edge_m} m that is more than {limit} cells; use longer edges")]
+    TooFine {
+        /// longest side, m
+        size_m: f64,
+        /// m
+        edge_m: f64,
+        /// cells at most
+        limit: usize,
+    },
+    /// No surface was found in the part's bounds, or none that can be seen.
+    #[error("the scanner sees nothing of the part: check the view direction and the size of the holes it closes")]
+    NothingSeen,
+    /// The simulated scan is not a mesh.
+    #[error(transparent)]
+    Mesh(#[from] crate::mesh::MeshError),
+}
+
+/// Refuses values that are not finite or not above zero.
+pub(super) fn positive(name: &'static str, value: f64, unit: &'static str) -> Result<(), SimError> {
+    if value.is_finite() && value > 0.0 {
+        return Ok(());
+    }
+    Err(SimError::BadParameter { name, value, unit, allowed: "greater than zero" })
+}
+
+/// Refuses values that are not finite or below zero.
+pub(super) fn not_negative(name: &'static str, value: f64, unit: &'static str) -> Result<(), SimError> {
+    if value.is_finite() && value >= 0.0 {
+        return Ok(());
+    }
+    Err(SimError::BadParameter { name, value, unit, allowed: "zero or more" })
+}

@@ -1,0 +1,34 @@
+//! Slow, smooth random motion: of a hand, of a sensor's bias.
+
+use rand_distr::{Distribution, StandardNormal, StandardUniform};
+use rand_pcg::Pcg64;
+
+/// Waves in one [`Wander`]: with five the sum is close to Gaussian and does not visibly repeat.
+const WAVES: usize = 5;
+
+/// A smooth random function of time with mean 0 and root mean square 1: a few waves of random frequency and phase.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Wander {
+    /// rad/s and rad
+    waves: [(f64, f64); WAVES],
+}
+
+impl Wander {
+    /// - `period`: of the middle wave, s; the others lie within a factor of two.
+    pub(super) fn new(period: f64, rng: &mut Pcg64) -> Self {
+        let mut uniform = || -> f64 { StandardUniform.sample(rng) };
+        let turn = std::f64::consts::TAU;
+        Self { waves: [(); WAVES].map(|()| (turn / period * (2.0 * uniform() - 1.0).exp2(), turn * uniform())) }
+    }
+
+    /// Value at time `t` (s).
+    pub(super) fn at(&self, t: f64) -> f64 {
+        // each wave has mean square 1/2
+        self.waves.iter().map(|(rate, phase)| (rate * t + phase).sin()).sum::<f64>() * (2.0 / WAVES as f64).sqrt()
+    }
+}
+
+/// One draw from the standard normal distribution.
+pub(super) fn gauss(rng: &mut Pcg64) -> f64 {
+    StandardNormal.sample(rng)
+}
