@@ -1,0 +1,280 @@
+//! The exact flow of a sigmoid contact: du/dT = 1/(1 + eᵘ) − c.
+//!
+//! Integrated by partial fractions from u₀ to u₀ + D, with E₀ = e^{u₀} and ρ = E₀ / (1 − c − c E₀),
+//!
+//! ```text
+//! D + L = (1 − c) T,     L = ∫ 1/(1 + e⁻ᵘ) dT = −ln(1 − c y)/c,     y = ρ (e^D − 1)
+//! ```
+//!
+//! The reflection u → −u, c → 1 − c maps the equation to itself, so only a right-hand side that is positive at u₀ is
+//! solved. Then D and L have the sign of T, nothing cancels in the sum, and D keeps its relative precision however
+//! small it is. Where eᵘ is small D is nearly linear in T and the root of the sum is sought; where it is not, L is, and
+//! the root of D = ln(1 + y(L)/ρ), L = (1 − c) T − D is sought. Both are so straight there that two or three steps of
+//! Halley's method suffice.
+
+/// Beyond ±40 the logistic function is 0 or 1 to 4e-18, less than a rounding.
+const SATURATED: f64 = 40.0;
+/// A force below this share of f_max is none: what it moves in a step of T = 1e200 is still below a rounding.
+const NO_FORCE: f64 = 1e-280;
+/// Largest u whose exponential, times e, is finite with room to spare.
+const LARGEST_EXPONENT: f64 = 700.0;
+/// From here on the one in e^x − 1 or 1 + eˣ is below a rounding of what it is added to.
+const LARGE: f64 = 38.0;
+/// Beyond it the logarithm of a product is taken as the sum of logarithms.
+const LARGEST_PRODUCT: f64 = 1e300;
+/// Halley's method leaves at most the cube of its step (in u): stop where that is below a rounding of D.
+const CUBE_BELOW_ROUNDING: f64 = 1e-17;
+/// No progress is possible below two roundings.
+const ROUNDING: f64 = 2.0 * f64::EPSILON;
+/// Each step that Halley's method does not shorten halves the bracket: this many pin down any double.
+const MAX_ITERATIONS: usize = 120;
+
+/// What happens while the scaled time T passes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Advance {
+    /// Change of u, with its sign.
+    pub delta_u: f64,
+    /// ∫ 1/(1 + eᵘ) d|T|: impulse of the expected force in units of f_max; ≥ 0.
+    pub load: f64,
+}
+
+/// 1/(1 + eᵘ): the expected force in units of f_max.
+pub(super) fn share(u: f64) -> f64 {
+    let e = (-u.abs()).exp();
+    if u > 0.0 { e / (1.0 + e) } else { 1.0 / (1.0 + e) }
+}
+
+/// Exact solution of du/dT = 1/(1 + eᵘ) − c after the time `t`, which may be negative.
+///
+/// All arguments finite; no result is NaN.
+pub(super) fn advance(u: f64, c: f64, t: f64) -> Advance {
+    let c = if c.abs() < NO_FORCE { 0.0 } else { c };
+    let arc = Arc::new(u, c, 1.0 - c);
+    if arc.rate >= 0.0 {
+        let (rise, low, _) = arc.after(t);
+        Advance { delta_u: rise.copysign(t), load: low }
+    } else {
+        let (rise, _, high) = Arc::new(-u, 1.0 - c, c).after(t);
+        Advance { delta_u: -rise.copysign(t), load: high }
+    }
+}
+
+/// A start from which u rises while T grows.
+#[derive(Clone, Copy)]
+struct Arc {
+    u: f64,
+    c: f64,
+    /// 1 − c, given apart because the difference would lose it where c is near 1.
+    rest: f64,
+    /// E₀
+    e: f64,
+    /// 1/(1 + E₀) − c > 0
+    rate: f64,
+    /// E₀ / (1 − c − c E₀) > 0
+    rho: f64,
+}
+
+/// |D|, ∫ 1/(1 + eᵘ) d|T|, ∫ 1/(1 + e⁻ᵘ) d|T|.
+type Passed = (f64, f64, f64);
+
+impl Arc {
+    #[inline]
+    fn new(u: f64, c: f64, rest: f64) -> Self {
+        let small = (-u.abs()).exp();
+        let (e, margin) = if u > 0.0 { (1.0 / small, rest * small - c) } else { (small, rest - c * small) };
+        let rho = if u > 0.0 { 1.0 / margin } else { small / margin };
+        Self { u, c, rest, e, rate: margin / (1.0 + small), rho }
+    }
+
+    /// Straight parts first, where they reach that far, then the curved one.
+    fn after(self, t: f64) -> Passed {
+        let (span, down) = (t.abs(), t < 0.0);
+        if self.u < -SATURATED {
+            let edge = self.rest.min(1.0).ln() - SATURATED;
+            if self.u < edge {
+                return self.straight(span, down, self.rest, (!down).then_some(edge));
+            }
+        } else if self.u > SATURATED && self.c < 0.0 {
+            let edge = SATURATED - (-self.c).min(1.0).ln();
+            if self.u > edge {
+                return self.straight(span, down, -self.c, down.then_some(edge));
+            }
+        }
+        if self.u > LARGEST_EXPONENT {
+            return self.without_force(t);
+        }
+        self.curved(span, down)
+    }
+
+    /// u moves at the constant `slope`, at most to the `edge`; what is left of the time goes on from there.
+    fn straight(self, span: f64, down: bool, slope: f64, edge: Option<f64>) -> Passed {
+        let sign = if down { -1.0 } else { 1.0 };
+        let free = self.u + sign * slope * span;
+        let edge = edge.filter(|&edge| sign * (free - edge) > 0.0);
+        let (way, spent) = edge.map_or((slope * span, span), |edge| {
+            let way = (edge - self.u).abs();
+            (way, (way / slope).min(span))
+        });
+        // the vanishing one of the two integrals: the exponential tail between both ends
+        let nearest = self.u.abs().min(edge.unwrap_or(free).abs());
+        let tail = -(-way).exp_m1() * (-nearest).exp() / slope;
+        let here = if self.u < 0.0 { (way, spent, tail) } else { (way, tail, spent) };
+        let Some(edge) = edge else { return here };
+        let left = Self::new(edge, self.c, self.rest).after(sign * (span - spent));
+        (here.0 + left.0, here.1 + left.1, here.2 + left.2)
+    }
+
+    /// c = 0 and E₀ beyond the largest number: e^u grows linearly.
+    fn without_force(self, t: f64) -> Passed {
+        let rise = (t * (-self.u).exp()).ln_1p().abs();
+        (rise, rise, t.abs())
+    }
+
+    fn curved(self, span: f64, down: bool) -> Passed {
+        let sign = if down { -1.0 } else { 1.0 };
+        let total = self.rest * span;
+        // the rate falls while u rises
+        let (low, high) = if down { (self.rate * span, total) } else { (0.0, total.min(self.rate * span)) };
+        let Some(bend) = self.bend() else {
+            let way = self.solve(sign, total, low, high, high, Self::by_sum);
+            return self.passed(way, span, sign);
+        };
+        let to_bend = (bend / self.e).ln() * sign;
+        let beyond = to_bend < 0.0 || (to_bend < high && to_bend + self.high(sign * to_bend) < total);
+        let (low, high) = if beyond { (low.max(to_bend), high) } else { (low, high.min(to_bend)) };
+        let way = if beyond != down {
+            let start = if down || high > 2.0 { low } else { high };
+            self.solve(sign, total, low, high, start, Self::by_logarithm)
+        } else {
+            self.solve(sign, total, low, high, if down { low } else { high }, Self::by_sum)
+        };
+        self.passed(way, span, sign)
+    }
+
+    /// The value of eᵘ up to which D, and from which on L, is nearly linear in T; `None`: D always is.
+    #[inline]
+    fn bend(&self) -> Option<f64> {
+        if self.c <= -1.0 {
+            None
+        } else if self.c > 0.0 {
+            Some((0.5 * self.rest / self.c).min(1.0))
+        } else {
+            Some(1.0)
+        }
+    }
+
+    /// Halley's method for the distance |D|, kept between `low` and `high` by bisection.
+    ///
+    /// `equation`: residual, slope, and second derivative over slope, all for the distance.
+    #[inline]
+    fn solve(
+        &self,
+        sign: f64,
+        total: f64,
+        mut low: f64,
+        mut high: f64,
+        start: f64,
+        equation: impl Fn(&Self, f64, f64, f64) -> (f64, f64, f64),
+    ) -> f64 {
+        let mut way = start.clamp(low, high);
+        for _ in 0..MAX_ITERATIONS {
+            let (residual, slope, bend) = equation(self, sign, total, way);
+            if residual > 0.0 {
+                high = way
+            } else {
+                low = way
+            }
+            let newton = residual / slope;
+            let step = newton / (1.0 - 0.5 * newton * bend).max(0.5);
+            let next = way - step;
+            let inside = next >= low && next <= high;
+            if inside && (step * step * step.abs() <= CUBE_BELOW_ROUNDING * way || step.abs() <= ROUNDING * way) {
+                return next;
+            }
+            if !inside && (high - low <= ROUNDING * high || step.abs() <= ROUNDING * way) {
+                return way;
+            }
+            way = if inside { next } else { 0.5 * (low + high) };
+        }
+        way
+    }
+
+    /// D + L − (1 − c) T as a function of D.
+    #[inline]
+    fn by_sum(&self, sign: f64, total: f64, way: f64) -> (f64, f64, f64) {
+        let d = sign * way;
+        let e = self.e * d.exp();
+        let l = if e.is_finite() { e / (self.rest - self.c * e) } else { -1.0 / self.c };
+        (way + self.high(d) - total, 1.0 + l, sign * l * (1.0 + self.c * l) / (1.0 + l))
+    }
+
+    /// D − ln(1 + y(L)/ρ) with L = (1 − c) T − D, as a function of D.
+    #[inline]
+    fn by_logarithm(&self, sign: f64, total: f64, way: f64) -> (f64, f64, f64) {
+        let x = -self.c * sign * (total - way);
+        let (mapped, m) = if x > LARGE && self.c < 0.0 {
+            // 1 + y/ρ overflows or nearly so, its logarithm does not
+            (x - (-self.c * self.rho).ln(), -self.c)
+        } else {
+            let grown = x.exp_m1();
+            let y = if x.abs() < f64::EPSILON { sign * (total - way) } else { grown / -self.c };
+            ((y / self.rho).ln_1p(), (1.0 + grown) / (self.rho + y))
+        };
+        let residual = way - sign * mapped;
+        // D too small on the way down: the logarithm does not exist there
+        let residual = if residual.is_finite() { residual } else { -f64::MAX };
+        (residual, 1.0 + m, sign * m * (self.c + m) / (1.0 + m))
+    }
+
+    /// |L| after the signed change `d` of u: ∫ 1/(1 + e⁻ᵘ) d|T|, taken from the lower end so that nothing cancels.
+    #[inline]
+    fn high(&self, d: f64) -> f64 {
+        let way = d.abs();
+        let rho = if d < 0.0 { self.lower_rho(way) } else { self.rho };
+        let y = rho * way.exp_m1();
+        let x = -self.c * y;
+        if x.abs() < f64::EPSILON {
+            y
+        } else if x < LARGEST_PRODUCT {
+            x.ln_1p() / -self.c
+        } else {
+            (way + ((-way).exp() - self.c * rho).ln()) / -self.c
+        }
+    }
+
+    /// ρ at the lower end of an arc that goes down by `way`.
+    #[inline]
+    fn lower_rho(&self, way: f64) -> f64 {
+        let e = self.e * (-way).exp();
+        e / (self.rest - self.c * e)
+    }
+
+    /// Both integrals, each in the form that keeps its precision.
+    #[inline]
+    fn passed(&self, way: f64, span: f64, sign: f64) -> Passed {
+        if self.c > 0.0 {
+            let left = self.rest * span - way;
+            // near the equilibrium L follows from the sum, far from it from its own formula
+            let high = if left > 1.0 { left } else { self.high(sign * way) };
+            return (way, self.c * span + way, high);
+        }
+        (way, self.low(way, sign), self.high(sign * way))
+    }
+
+    /// ∫ 1/(1 + eᵘ) d|T| = ln((1−c−cE)/(1−c−cE e^D) · e^D)/(1−c) for c ≤ 0, E the lower end.
+    #[inline]
+    fn low(&self, way: f64, sign: f64) -> f64 {
+        if self.c == 0.0 {
+            return way;
+        }
+        let e = if sign < 0.0 { self.e * (-way).exp() } else { self.e };
+        let lower = self.rest - self.c * e;
+        let shrunk = (-way).exp_m1();
+        let x = self.rest * shrunk / lower;
+        if x > -0.5 {
+            -x.ln_1p() / self.rest
+        } else {
+            (lower / (self.rest * (1.0 + shrunk) - self.c * e)).ln() / self.rest
+        }
+    }
+}

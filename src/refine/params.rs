@@ -1,0 +1,160 @@
+//! The settings of a [`super::Refiner`], and the two presets.
+
+use super::guard::GuardParams;
+use super::{Along, ContactModel, DynamicsParams, RoiSize, SlidingParams, StepRule};
+use crate::touch::{CompensatorParams, ContactGateParams, SettingError};
+
+/// The ball at the end of stylus or probe.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TipParams {
+    /// m; 0 for a point
+    pub radius: f64,
+    /// What stylus and probe give way under force, N/m; `None` when rigid or not known.
+    pub stiffness: Option<f64>,
+}
+
+/// Which face is the closest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ClosestBy {
+    /// True distance to the surface.
+    Surface,
+    /// Distance to the barycentre \[paper, Eq 12\].
+    Barycentre,
+}
+
+/// Carving: what the ball passes through without a force is not there (case 2).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CarveParams {
+    /// Share of the depth that goes in a second, 1/s. Default 300: what the ball sweeps is certain, and it is gone soon.
+    pub rate: f64,
+    /// Depth that is left alone, m. Default 0.05 mm, the noise of a good tracking system.
+    pub tolerance: f64,
+    /// While in contact, a face within the cone of this cosine about the felt normal is the surface itself and left to
+    /// the contact. Default 0.7: 45°.
+    pub contact_cone_cosine: f64,
+    /// … unless it is deeper than this, m. Default 1 mm.
+    pub largest_contact_depth: f64,
+}
+
+impl Default for CarveParams {
+    fn default() -> Self {
+        Self { rate: 300.0, tolerance: 0.05e-3, contact_cone_cosine: 0.7, largest_contact_depth: 1e-3 }
+    }
+}
+
+/// All settings of a [`super::Refiner`]. What is `None` is not built.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RefineParams {
+    /// Weight, bias, frames.
+    pub compensator: CompensatorParams,
+    /// `None`: every sample is contact \[paper\].
+    pub gate: Option<ContactGateParams>,
+    /// The ball.
+    pub tip: TipParams,
+    /// Smoothing and friction; `None`: the raw sample, and the face's own normal \[paper\].
+    pub sliding: Option<SlidingParams>,
+    /// Which face is the handle.
+    pub closest: ClosestBy,
+    /// Eq 1–7.
+    pub dynamics: DynamicsParams,
+    /// Carving by free motion; `None` leaves it to the dynamics \[paper\].
+    pub carve: Option<CarveParams>,
+    /// Size of the region that follows the handle.
+    pub roi: RoiSize,
+    /// What an update may not do.
+    pub guard: GuardParams,
+    /// A face turned away from the felt normal by more than this cosine is another surface. Default −0.2: 102°.
+    pub smallest_contact_cosine: f64,
+    /// Longest step of a vertex in one update, in mean edges. Default 1/25, far below any feature the mesh can show.
+    pub longest_step_edges: f64,
+    /// A vertex stays within this many mean edges of where it was scanned: beyond that a triangle is too stretched to
+    /// show anything. Default 2.85.
+    pub largest_move_edges: f64,
+    /// … or within this many times the scan's noise, whichever is more. Default 5.
+    pub largest_move_noises: f64,
+    /// Standard deviation of the scan's vertices, m. Default 0.6 mm.
+    pub scan_noise: f64,
+}
+
+/// Relaxation of a touched face in [`RefineParams::robust`], 1/s: within 40 ms, twenty poses at 500 Hz, so that their
+/// noise is averaged, while a hand at 25 mm/s stays on a face of 2.4 mm for 100 ms.
+const RELAXATION: f64 = 25.0;
+/// Turning of a touched face at 2.3 N felt and expected: 1/s; about as fast as its motion.
+const TURNING: f64 = 40.0;
+/// The usual force of a hand, N.
+const USUAL_FORCE: f64 = 2.3;
+
+impl RefineParams {
+    /// What works on real scans: contact gate, friction, motion along the force, carving by free motion.
+    ///
+    /// With a known stiffness the contact model is the linear spring of the real tip, which has no bias; without one it
+    /// is the paper's sigmoid with the rigid-contact offset taken out.
+    pub fn robust(tip: TipParams) -> Self {
+        let sigmoid = DynamicsParams::default().model;
+        let (model, slope) = match tip.stiffness {
+            Some(stiffness_n_per_m) => (ContactModel::Spring { stiffness_n_per_m }, stiffness_n_per_m),
+            None => (sigmoid, 3.5e3),
+        };
+        Self {
+            compensator: CompensatorParams::default(),
+            gate: Some(ContactGateParams::default()),
+            tip,
+            sliding: Some(SlidingParams::default()),
+            closest: ClosestBy::Surface,
+            dynamics: DynamicsParams {
+                model,
+                alpha_m_per_n_s: RELAXATION / slope,
+                beta_per_n2_s: TURNING / (USUAL_FORCE * USUAL_FORCE),
+                rule: StepRule::Lie,
+                along: Along::Force,
+                take_out_rigid_offset: tip.stiffness.is_none(),
+            },
+            carve: Some(CarveParams::default()),
+            roi: RoiSize::Radius(tip.radius),
+            guard: GuardParams::default(),
+            smallest_contact_cosine: -0.2,
+            longest_step_edges: 0.04,
+            largest_move_edges: 2.85,
+            largest_move_noises: 5.0,
+            scan_noise: 0.6e-3,
+        }
+    }
+
+    /// The published rule, taken literally: Eq 1–7 and 12 with a one-ring region, no gate, no correction.
+    pub fn paper(tip: TipParams) -> Self {
+        Self {
+            gate: None,
+            sliding: None,
+            closest: ClosestBy::Barycentre,
+            dynamics: DynamicsParams {
+                along: Along::InitialNormal,
+                take_out_rigid_offset: false,
+                ..DynamicsParams::default()
+            },
+            carve: None,
+            roi: RoiSize::OneRing,
+            ..Self::robust(tip)
+        }
+    }
+
+    /// # Errors
+    /// [`SettingError`] naming the first setting outside its range.
+    pub fn check(&self) -> Result<(), SettingError> {
+        let positive = "finite and more than 0";
+        let (stiffness, radius) = (self.tip.stiffness.unwrap_or(1.0), self.tip.radius);
+        let rate = self.carve.map_or(1.0, |carve| carve.rate);
+        for (name, value, least, allowed) in [
+            ("tip radius (m)", radius, 0.0, "finite and 0 or more"),
+            ("tip stiffness (N/m)", stiffness, f64::MIN_POSITIVE, positive),
+            ("scan noise (m)", self.scan_noise, 0.0, "finite and 0 or more"),
+            ("carving rate (1/s)", rate, 0.0, "finite and 0 or more"),
+            ("longest step (edges)", self.longest_step_edges, f64::MIN_POSITIVE, positive),
+            ("largest move (edges)", self.largest_move_edges, f64::MIN_POSITIVE, positive),
+        ] {
+            if !(value.is_finite() && value >= least) {
+                return Err(SettingError { name, value, allowed });
+            }
+        }
+        Ok(())
+    }
+}
