@@ -6,9 +6,17 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use nalgebra::Vector3;
-use touchup::io::recording::{Recorded, RecordingReader, Topics};
+use nalgebra::{Translation3, Vector3};
+use proptest::prelude::*;
+use touchup::io::recording::{BadMessage, Place, Recorded, RecordingError, RecordingReader, Topics, write_recording};
 use touchup::touch::{StampedPose, StampedWrench};
+
+#[path = "recordings/damage.rs"]
+mod damage;
+#[path = "recordings/made.rs"]
+mod made;
+
+use made::{START_NS, db3_of, mcap_bytes, pose, put, read, touch, wrench};
 
 /// The real data beside the repository; `None` skips the test, except in CI, where it fails.
 fn shared(path: &str) -> Option<PathBuf> {
@@ -113,4 +121,188 @@ fn plate_gives_the_sums_that_rosbags_reads() {
     assert_eq!(position, Vector3::new(988.9942569732666, 1809.0157299041748, 481.8626708984375));
     let force: Vector3<f64> = wrenches.iter().map(|w| w.wrench.force).sum();
     assert_eq!(force, Vector3::new(1050.29833984375, -4037.46337890625, 119716.17724609375));
+}
+
+#[test]
+fn genuine_recordings_without_the_topics_list_what_they_have() {
+    let Some(bags) = shared("force/bags") else { return };
+    for (file, has) in [
+        ("ros2_rosbag2/talker.mcap", "/topic (std_msgs/msg/String)"),
+        ("ros2_rosbag2/talker.db3", "/topic (std_msgs/msg/String)"),
+        ("ros2_rosbag2/cdr_test_0.mcap", "/array_topic (test_msgs/msg/Arrays)"),
+        ("ros2_rosbag2/topics_and_services.mcap", "/rosout (rcl_interfaces/msg/Log)"),
+        ("plotjuggler_rosbag2_test", "/imu (sensor_msgs/msg/Imu)"),
+    ] {
+        let error = RecordingReader::open(&bags.join(file), &Topics::default()).err().unwrap();
+        assert!(matches!(error, RecordingError::MissingTopic { .. }), "{error}");
+        let text = error.to_string();
+        assert!(text.contains(has) && text.contains("--pose-topic") && text.contains(file), "{text}");
+    }
+    let other = |pose: &str, wrench: &str| {
+        let topics = Topics { pose: pose.into(), wrench: wrench.into() };
+        RecordingReader::open(&bags.join("plotjuggler_rosbag2_test"), &topics).err().unwrap().to_string()
+    };
+    let text = other("/pose", "/imu");
+    assert!(text.contains("sensor_msgs/msg/Imu") && text.contains("geometry_msgs/msg/WrenchStamped"), "{text}");
+    assert!(text.contains("--wrench-topic"), "{text}");
+    assert!(other("/pose", "/nothing").contains("--wrench-topic"));
+}
+
+proptest! {
+    #[test]
+    fn what_is_written_is_read(values in prop::collection::vec((any::<bool>(), any::<[f64; 3]>()), 0..200)) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("touch.mcap");
+        let stamp = |i: usize| START_NS + 1_234_567 * i as i64;
+        // the rotation must be one; the rest may be anything, NaN and infinity too
+        let angles = |v: [f64; 3]| v.map(|x| if x.is_finite() { x % 3.0 } else { 0.0 });
+        let make = |(i, (is_pose, v)): (usize, &(bool, [f64; 3]))| match (is_pose, pose(stamp(i), angles(*v))) {
+            (true, Recorded::Pose(mut pose)) => {
+                pose.pose_ot.translation = Translation3::from(*v);
+                Recorded::Pose(pose)
+            }
+            _ => wrench(stamp(i), *v),
+        };
+        let messages: Vec<_> = values.iter().enumerate().map(make).collect();
+        write_recording(&path, &Topics::default(), "O", "T", messages.iter().copied()).unwrap();
+        let back = read_all(&path, &Topics::default());
+        prop_assert_eq!(back.len(), messages.len());
+        for (ours, theirs) in back.iter().zip(&messages) {
+            prop_assert_eq!(bits(ours), bits(theirs));
+        }
+    }
+}
+
+/// All numbers of a message, bit by bit, so that NaN compares too.
+fn bits(message: &Recorded) -> (i64, Vec<u64>) {
+    let numbers: Vec<f64> = match message {
+        Recorded::Pose(p) => {
+            p.pose_ot.translation.vector.iter().chain(p.pose_ot.rotation.coords.iter()).copied().collect()
+        }
+        Recorded::Wrench(w) => w.wrench.force.iter().chain(w.wrench.torque.iter()).copied().collect(),
+    };
+    (message.stamp_ns(), numbers.into_iter().map(f64::to_bits).collect())
+}
+
+#[test]
+fn the_same_messages_give_the_same_bytes() {
+    let messages = touch(20_000);
+    assert_eq!(mcap_bytes(&messages), mcap_bytes(&messages));
+}
+
+#[test]
+fn a_failed_recording_leaves_the_old_file_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = put(folder.path(), "touch.mcap", b"old");
+    let messages = [touch(4), vec![wrench(-1, [0.0; 3])]].concat();
+    let error = write_recording(&path, &Topics::default(), "O", "T", messages).unwrap_err();
+    assert!(matches!(error, RecordingError::Stamp { stamp_ns: -1 }), "{error}");
+    assert_eq!(fs::read(&path).unwrap(), b"old");
+    assert_eq!(names_in(folder.path()), ["touch.mcap"]);
+}
+
+fn names_in(folder: &Path) -> Vec<String> {
+    let mut names: Vec<_> =
+        fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn compressed_files_and_messages_read_as_plain_ones() {
+    let folder = tempfile::tempdir().unwrap();
+    let messages = touch(3000);
+    let mcap = mcap_bytes(&messages);
+    let zstd = |bytes: &[u8]| zstd::encode_all(bytes, 3).unwrap();
+    let packed_mcap = put(folder.path(), "touch.mcap.zstd", &zstd(&mcap));
+    db3_of(&folder.path().join("each.db3"), &mcap, zstd);
+    db3_of(&folder.path().join("plain.db3"), &mcap, <[u8]>::to_vec);
+    let packed_db3 = put(folder.path(), "touch.db3.zstd", &zstd(&fs::read(folder.path().join("plain.db3")).unwrap()));
+    for path in [packed_mcap, packed_db3, folder.path().join("each.db3"), folder.path().join("plain.db3")] {
+        let outcome = read(&path);
+        assert!(outcome.error.is_none(), "{:?}", outcome.error);
+        assert!(!outcome.truncated && outcome.bad == 0);
+        assert!(outcome.messages == messages, "{path:?}");
+    }
+}
+
+#[test]
+fn a_db3_in_write_ahead_mode_is_read_without_a_trace() {
+    let folder = tempfile::tempdir().unwrap();
+    let messages = touch(30);
+    let path = folder.path().join("a b#c?d%41.db3");
+    db3_of(&path, &mcap_bytes(&messages), <[u8]>::to_vec);
+    let db = rusqlite::Connection::open(&path).unwrap();
+    db.pragma_update(None, "journal_mode", "WAL").unwrap();
+    db.close().unwrap();
+    assert!(read(&path).messages == messages);
+    assert_eq!(names_in(folder.path()), ["a b#c?d%41.db3"]);
+    let wal = put(folder.path(), "a b#c?d%41.db3-wal", b"the rest");
+    assert!(read(&path).truncated);
+    assert_eq!(fs::read(wal).unwrap(), b"the rest");
+}
+
+#[test]
+fn a_folder_is_read_in_the_order_of_its_metadata() {
+    let folder = tempfile::tempdir().unwrap();
+    let messages = touch(600);
+    put(folder.path(), "b.mcap", &mcap_bytes(&messages[..300]));
+    // a later part need not have both topics
+    let poses: Vec<_> = messages[300..].iter().filter(|m| matches!(m, Recorded::Pose(_))).copied().collect();
+    put(folder.path(), "a.mcap", &mcap_bytes(&poses));
+    let metadata = |second: &str| {
+        let text = format!("rosbag2_bagfile_information:\n  version: 5\n  relative_file_paths: [x/b.mcap, {second}]\n");
+        put(folder.path(), "metadata.yaml", text.as_bytes());
+        RecordingReader::open(folder.path(), &Topics::default())
+    };
+    let reader = metadata("a.mcap").unwrap();
+    assert_eq!(reader.message_count(), Some(400));
+    let back: Vec<_> = reader.map(Result::unwrap).collect();
+    assert!(back == [&messages[..300], &poses].concat());
+    let text = metadata("gone.mcap").err().unwrap().to_string();
+    assert!(text.contains("gone.mcap") && text.contains("metadata.yaml"), "{text}");
+    fs::write(folder.path().join("metadata.yaml"), "rosbag2_bagfile_information: [").unwrap();
+    assert!(matches!(RecordingReader::open(folder.path(), &Topics::default()), Err(RecordingError::Metadata { .. })));
+    fs::remove_file(folder.path().join("metadata.yaml")).unwrap();
+    assert!(matches!(RecordingReader::open(folder.path(), &Topics::default()), Err(RecordingError::Metadata { .. })));
+}
+
+#[test]
+fn messages_that_cannot_be_used_are_counted_and_reading_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("touch.db3");
+    let messages = touch(9); // poses at rows 1, 4, 7
+    db3_of(&path, &mcap_bytes(&messages), <[u8]>::to_vec);
+    let db = rusqlite::Connection::open(&path).unwrap();
+    // payload: 4 encapsulation, 8 stamp, 4 length, "O\0" and 2 bytes of padding, 24 position, 32 quaternion
+    let zeros = "substr(data, 1, 44) || zeroblob(32)";
+    db.execute(&format!("UPDATE messages SET data = CAST({zeros} AS BLOB) WHERE id = 4"), []).unwrap();
+    db.execute("UPDATE messages SET data = x'0001' WHERE id IN (2, 3)", []).unwrap();
+    let other_frame = "substr(data, 1, 16) || x'51' || substr(data, 18)";
+    db.execute(&format!("UPDATE messages SET data = CAST({other_frame} AS BLOB) WHERE id = 7"), []).unwrap();
+    db.execute("UPDATE messages SET data = zeroblob(100000) WHERE id = 9", []).unwrap();
+    db.close().unwrap();
+    let mut reader = RecordingReader::open(&path, &Topics::default()).unwrap();
+    let back: Vec<_> = reader.by_ref().map(Result::unwrap).collect();
+    assert_eq!(back, [messages[0], messages[4], messages[5], messages[7]]);
+    let bad: Vec<_> = reader.bad_messages().iter().map(|(why, bad)| (*why, bad.count, bad.place)).collect();
+    let expected = [
+        (BadMessage::Malformed, 3, Place::Row(2)),
+        (BadMessage::Quaternion, 1, Place::Row(4)),
+        (BadMessage::FrameChanged, 1, Place::Row(7)),
+    ];
+    assert_eq!(bad, expected);
+}
+
+#[test]
+fn other_files_are_named_for_what_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = |name: &str, bytes: &[u8]| read(&put(folder.path(), name, bytes)).error.unwrap().to_string();
+    assert!(text("empty.mcap", b"").contains("empty.mcap: not a ROS 2 recording: the file is empty"));
+    assert!(text("old.bag", b"#ROSBAG V2.0\n").contains("rosbags-convert"));
+    assert!(text("mesh.stl", b"solid part\n").contains("solid part"));
+    let path = folder.path().join("other.db3");
+    rusqlite::Connection::open(&path).unwrap().execute_batch("CREATE TABLE t(x)").unwrap();
+    assert!(read(&path).error.unwrap().to_string().contains("topics"));
+    assert!(matches!(read(&folder.path().join("none.mcap")).error, Some(RecordingError::Io { .. })));
 }

@@ -38,7 +38,7 @@ pub(super) struct Db3Reader {
     current: Vec<u8>,
     /// Time and row of the last message fetched.
     last: (i64, i64),
-    /// What ended the fetching; handed out after the rows before it.
+    /// What ended the fetching, or that the last page is cut; handed out after the rows before it.
     failed: Option<Damage>,
     done: bool,
     truncated: bool,
@@ -63,10 +63,11 @@ impl Db3Reader {
             return Err(RecordingError::NotARecording { path: path.to_owned(), reason });
         }
         let rows = read_topics(&db).map_err(|error| damaged(error.into()))?;
+        let failed = find_cut(&db, db_path).err();
         let id_of = |kind| rows.iter().find(|(_, info)| info.name == topics.name(kind)).map(|(id, _)| *id);
         Ok(Self {
             path: path.to_owned(),
-            truncated: has_unmerged_part(path),
+            truncated: failed.is_some() || has_unmerged_part(path),
             ids: Kind::ALL.map(id_of),
             db,
             _unpacked: unpacked,
@@ -74,7 +75,7 @@ impl Db3Reader {
             rows: VecDeque::new(),
             current: Vec::new(),
             last: (i64::MIN, i64::MIN),
-            failed: None,
+            failed,
             done: false,
         })
     }
@@ -99,9 +100,12 @@ impl Db3Reader {
 
     /// The next message of the two topics; `None` at the end.
     pub fn next_message(&mut self) -> Result<Option<RawMessage<'_>>, RecordingError> {
-        if self.rows.is_empty() && !self.done {
-            self.failed = self.fetch().err();
-            self.done |= self.failed.is_some();
+        if self.rows.is_empty()
+            && !self.done
+            && let Err(damage) = self.fetch()
+        {
+            self.failed = Some(damage);
+            self.done = true;
         }
         let Some(message) = self.rows.pop_front() else {
             return match self.failed.take() {
@@ -179,6 +183,15 @@ fn read_topics(db: &Connection) -> rusqlite::Result<Vec<(i64, TopicInfo)>> {
         Ok((row.get(0)?, TopicInfo { name: row.get(1)?, type_name: row.get(2)?, encoding: row.get(3)? }))
     })?;
     rows.collect()
+}
+
+/// SQLite reads a last page that is cut as if it ended in zeros (whole missing pages it refuses itself).
+fn find_cut(db: &Connection, path: &Path) -> Result<(), Damage> {
+    let page_bytes = db.pragma_query_value(None, "page_size", |row| row.get::<_, u32>(0))?;
+    match fs::metadata(path)?.len() % u64::from(page_bytes) {
+        0 => Ok(()),
+        left => Err(Damage::Cut { wanted: page_bytes.into(), left }),
+    }
 }
 
 fn has_unmerged_part(path: &Path) -> bool {

@@ -136,8 +136,8 @@ pub enum Damage {
     /// The stream cannot be read on: the disk, or a broken zstd frame.
     #[error("cannot be read: {0}")]
     Unreadable(#[from] io::Error),
-    /// The file ends inside a record.
-    #[error("the file ends inside a record: {wanted} bytes are announced, {left} are there")]
+    /// The file ends inside a record or a page.
+    #[error("cut off: {wanted} bytes are announced here, {left} are there")]
     Cut {
         /// announced, bytes
         wanted: u64,
