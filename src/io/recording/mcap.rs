@@ -2,31 +2,27 @@
 //!
 //! Framing and checks are done here, not by the `mcap` crate: that one (0.26) reserves memory for any string length it
 //! meets and overflows on an unchecked chunk whose records overrun it. Here a length is compared with what the file
-//! still holds and with [`MAX_RECORD_BYTES`] first, buffers grow only with bytes that are really there, and a chunk is
+//! still holds and with a limit of 256 MiB first, buffers grow only with bytes that are really there, and a chunk is
 //! verified before its first message is handed out.
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufReader, Read, Seek, SeekFrom};
+use std::io::{Read, Seek, SeekFrom};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use super::error::check_topic;
+use super::framing::{Fields, HEAD_BYTES, Stream, check_crc, check_length, split_record};
 use super::{Damage, Kind, Place, RawMessage, RecordingError, TopicInfo, Topics};
 
 pub(super) const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
-/// Longest record, packed or unpacked: far above the 1 MiB chunks of recorders, a small part of a machine's memory.
-pub(super) const MAX_RECORD_BYTES: u64 = 256 << 20;
-/// Opcode and length in front of every record.
-const HEAD_BYTES: usize = 9;
 /// Footer record and the magic behind it.
 const TAIL_BYTES: usize = HEAD_BYTES + 20 + MAGIC.len();
 /// Channel, sequence, log time and publish time in front of a message's payload.
 const MESSAGE_HEAD_BYTES: usize = 22;
-/// Piece in which records that nobody needs are passed over.
-const SKIP_BYTES: u64 = 1 << 20;
 
-mod op {
+/// Opcodes of the records that are read.
+pub(super) mod op {
     pub const FOOTER: u8 = 0x02;
     pub const SCHEMA: u8 = 0x03;
     pub const CHANNEL: u8 = 0x04;
@@ -252,84 +248,6 @@ fn unpack_chunk(chunk: &[u8], records: &mut Vec<u8>) -> Result<(), Damage> {
     check_crc("a chunk", crc, crc32fast::hash(records))
 }
 
-/// A stored checksum of 0 means that none was computed.
-fn check_crc(what: &'static str, stored: u32, computed: u32) -> Result<(), Damage> {
-    if stored == 0 || stored == computed { Ok(()) } else { Err(Damage::Checksum { what, stored, computed }) }
-}
-
-fn check_length(what: &'static str, bytes: u64) -> Result<(), Damage> {
-    if bytes <= MAX_RECORD_BYTES { Ok(()) } else { Err(Damage::TooLong { what, bytes, limit: MAX_RECORD_BYTES }) }
-}
-
-/// The bytes of a file from front to end, with position and checksum.
-struct Stream {
-    input: Box<dyn Read>,
-    at: u64,
-    /// Of the file; unknown while it is unpacked on the way.
-    size: Option<u64>,
-    crc: crc32fast::Hasher,
-}
-
-impl Stream {
-    fn open(path: &Path, packed: bool) -> std::io::Result<Self> {
-        let file = File::open(path)?;
-        let size = if packed { None } else { Some(file.metadata()?.len()) };
-        let input: Box<dyn Read> =
-            if packed { Box::new(BufReader::new(zstd::Decoder::new(file)?)) } else { Box::new(BufReader::new(file)) };
-        Ok(Self { input, at: 0, size, crc: crc32fast::Hasher::new() })
-    }
-
-    /// Opcode and length of the next record; `None` where the file ends between two records.
-    fn head(&mut self) -> Result<Option<(u8, u64)>, Damage> {
-        let mut head = Vec::with_capacity(HEAD_BYTES);
-        let left = self.input.by_ref().take(HEAD_BYTES as u64).read_to_end(&mut head)? as u64;
-        if left == 0 {
-            return Ok(None);
-        }
-        let mut fields = Fields(&head);
-        let cut = |_| Damage::Cut { wanted: HEAD_BYTES as u64, left };
-        let (opcode, len) = (fields.u8("opcode").map_err(cut)?, fields.u64("length").map_err(cut)?);
-        self.at += left;
-        if opcode != op::DATA_END {
-            self.crc.update(&head);
-        }
-        Ok(Some((opcode, len)))
-    }
-
-    /// Appends the next `len` bytes to `into`.
-    fn load(&mut self, len: u64, into: &mut Vec<u8>) -> Result<(), Damage> {
-        self.check_left(len)?;
-        check_length("record", len)?;
-        let start = into.len();
-        let left = self.input.by_ref().take(len).read_to_end(into)? as u64;
-        if left < len {
-            return Err(Damage::Cut { wanted: len, left });
-        }
-        self.at += len;
-        self.crc.update(&into[start..]);
-        Ok(())
-    }
-
-    fn skip(&mut self, len: u64, scratch: &mut Vec<u8>) -> Result<(), Damage> {
-        self.check_left(len)?;
-        let mut left = len;
-        while left > 0 {
-            let piece = left.min(SKIP_BYTES);
-            scratch.clear();
-            self.load(piece, scratch)?;
-            left -= piece;
-        }
-        Ok(())
-    }
-
-    fn check_left(&self, wanted: u64) -> Result<(), Damage> {
-        match self.size.map(|size| size.saturating_sub(self.at)) {
-            Some(left) if left < wanted => Err(Damage::Cut { wanted, left }),
-            _ => Ok(()),
-        }
-    }
-}
-
 /// Schemas and channels met so far; at most 65,536 of each.
 #[derive(Default)]
 struct Described {
@@ -435,51 +353,4 @@ fn read_counts(body: &[u8]) -> Result<BTreeMap<u16, u64>, Damage> {
         counts.insert(pairs.u16("message counts")?, pairs.u64("message counts")?);
     }
     Ok(counts)
-}
-
-/// Opcode and body of the record at the front of `bytes`.
-fn split_record(bytes: &[u8]) -> Result<(u8, &[u8]), Damage> {
-    let mut fields = Fields(bytes);
-    let (opcode, len) = (fields.u8("record")?, fields.u64("record")?);
-    Ok((opcode, fields.bytes(len, "record")?))
-}
-
-/// The rest of a record; each call takes one little-endian field off its front.
-struct Fields<'a>(&'a [u8]);
-
-impl<'a> Fields<'a> {
-    fn bytes(&mut self, len: u64, what: &'static str) -> Result<&'a [u8], Damage> {
-        let split = usize::try_from(len).ok().and_then(|len| self.0.split_at_checked(len));
-        let (front, rest) = split.ok_or(Damage::Field(what))?;
-        self.0 = rest;
-        Ok(front)
-    }
-
-    fn array<const N: usize>(&mut self, what: &'static str) -> Result<[u8; N], Damage> {
-        let (front, rest) = self.0.split_first_chunk().ok_or(Damage::Field(what))?;
-        self.0 = rest;
-        Ok(*front)
-    }
-
-    fn u8(&mut self, what: &'static str) -> Result<u8, Damage> {
-        self.array::<1>(what).map(|[byte]| byte)
-    }
-
-    fn u16(&mut self, what: &'static str) -> Result<u16, Damage> {
-        self.array(what).map(u16::from_le_bytes)
-    }
-
-    fn u32(&mut self, what: &'static str) -> Result<u32, Damage> {
-        self.array(what).map(u32::from_le_bytes)
-    }
-
-    fn u64(&mut self, what: &'static str) -> Result<u64, Damage> {
-        self.array(what).map(u64::from_le_bytes)
-    }
-
-    /// Bytes that are no UTF-8 are replaced: names only have to compare and print.
-    fn text(&mut self, what: &'static str) -> Result<String, Damage> {
-        let len = self.u32(what)?;
-        Ok(String::from_utf8_lossy(self.bytes(len.into(), what)?).into_owned())
-    }
 }

@@ -8,11 +8,12 @@
 mod cdr;
 mod db3;
 mod error;
+mod framing;
 mod mcap;
 mod reader;
 mod writer;
 
-pub use error::{BadCount, BadMessage, Damage, Place, RecordingError};
+pub use error::{BadCount, BadMessage, Damage, Place, RecordingError, TopicList};
 pub use reader::RecordingReader;
 pub use writer::{RecordingWriter, write_recording};
 
