@@ -24,6 +24,7 @@ pub use sliding::{Ball, SlidingParams, TipMotion};
 use crate::mesh::{FaceHit, FaceId, MeshError, TriMesh};
 use crate::touch::{Compensator, ContactGate, Sample, SampleError, SettingError};
 use deform::{Clay, Grip};
+use dynamics::turn;
 
 /// A held sample never acts for longer than this, s: what happened in a longer pause is not known.
 const LONGEST_HOLD: f64 = 0.03;
@@ -71,6 +72,17 @@ pub struct Mismatch {
     pub linear: Vector3<f64>,
     /// ε_R = F* × F, N² (Eq 5)
     pub rotational: Vector3<f64>,
+}
+
+/// What the force says.
+#[derive(Clone, Copy, Debug)]
+enum Felt {
+    /// no contact
+    Nothing,
+    /// contact; which way the surface faces is not asked \[paper\]
+    Something,
+    /// contact with a surface of this outward normal
+    Surface(Vector3<f64>),
 }
 
 /// What one sample did.
@@ -131,23 +143,23 @@ pub struct Refiner {
     gate: Option<ContactGate>,
     motion: TipMotion,
     dynamics: FaceDynamics,
-    /// the same without rotation: where no force is expected yet, a face is moved but not turned (case 3)
-    raising: FaceDynamics,
     clay: Clay,
     contact_grip: Grip,
     carve_grip: Grip,
     last_ns: Option<i64>,
-    last_face: Option<FaceId>,
     counts: RefineCounts,
 }
 
-/// The ball against the surface it feels.
+/// The ball against the face it touches.
 struct Pressing {
-    /// surface normal from the force, unit
+    hit: FaceHit,
+    /// the face before the update
+    face: FaceState,
+    /// outward normal of the surface as felt, unit; the face's own in [`RefineParams::paper`]
     normal: Vector3<f64>,
     /// the point of the reported ball that touches, m, in O
     point: Point3<f64>,
-    /// force along the normal, N
+    /// force on the stylus; only its part along `normal` where friction is known, N, in O
     force_o: Vector3<f64>,
 }
 
@@ -169,12 +181,10 @@ impl Refiner {
             gate: params.gate.map(ContactGate::new).transpose()?,
             motion: TipMotion::new(params.sliding.unwrap_or(SlidingParams { smoothing: 0.0, ..Default::default() })),
             dynamics: FaceDynamics::new(params.dynamics)?,
-            raising: FaceDynamics::new(DynamicsParams { beta_per_n2_s: 0.0, ..params.dynamics })?,
             clay,
             contact_grip: Grip::default(),
             carve_grip: Grip::default(),
             last_ns: None,
-            last_face: None,
             counts: RefineCounts::default(),
             params,
         })
@@ -192,84 +202,83 @@ impl Refiner {
         let tip = self.compensator.compensate(sample);
         let ball = self.motion.update(&tip, dt, LONGEST_HOLD);
         let dt = dt.min(LONGEST_HOLD);
-        let pressing = self.in_contact(sample.stamp_ns, &ball).then(|| self.pressing(&ball));
-        let update = match &pressing {
-            Some(pressing) => self.press(pressing, dt)?,
-            None => Update::FREE,
+        let felt = self.felt_normal(sample.stamp_ns, &ball);
+        let update = match felt {
+            Felt::Nothing => Update::FREE,
+            _ => self.press(&ball, felt, dt)?,
         };
         match self.params.carve {
-            Some(carve) => Ok(self.carve(&carve, &ball, pressing.as_ref(), dt, update)),
+            Some(carve) => Ok(self.carve(&carve, &ball, felt, dt, update)),
             None => Ok(update),
         }
     }
 
-    fn in_contact(&mut self, stamp_ns: i64, ball: &Ball) -> bool {
-        let Some(gate) = &mut self.gate else { return true };
-        let contact = gate.update(stamp_ns, &ball.force_o).is_some();
-        self.counts.contacts = gate.contacts();
-        contact
-    }
-
-    fn pressing(&self, ball: &Ball) -> Pressing {
-        match &self.params.sliding {
-            Some(sliding) => {
-                let normal = ball.surface_normal(sliding);
-                Pressing {
-                    normal,
-                    point: ball.reported - normal * self.params.tip.radius,
-                    force_o: normal * ball.force_o.dot(&normal),
-                }
-            }
-            // the published rule: the normal is the face's own
-            None => {
-                let normal = self.last_face.map_or_else(Vector3::zeros, |face| self.clay.mesh.normal(face));
-                Pressing { normal, point: ball.reported - normal * self.params.tip.radius, force_o: ball.force_o }
+    fn felt_normal(&mut self, stamp_ns: i64, ball: &Ball) -> Felt {
+        if let Some(gate) = &mut self.gate {
+            let contact = gate.update(stamp_ns, &ball.force_o).is_some();
+            self.counts.contacts = gate.contacts();
+            if !contact {
+                return Felt::Nothing;
             }
         }
+        self.params.sliding.map_or(Felt::Something, |sliding| Felt::Surface(ball.surface_normal(&sliding)))
     }
 
-    /// The closest face by the way that the parameters ask for; warm from the last one.
-    fn closest(&self, p: &Point3<f64>, reach: f64) -> Option<FaceHit> {
-        match self.params.closest {
-            ClosestBy::Surface => self.clay.tree.closest(&self.clay.mesh, p, reach),
-            ClosestBy::Barycentre => self.clay.tree.closest_barycentre(&self.clay.mesh, p, reach),
-        }
-    }
-
-    /// Cases 3 and 4, and without a gate also 1 and 2: the surface is felt where the ball touches it.
-    fn press(&mut self, pressing: &Pressing, dt: f64) -> Result<Update, RefineError> {
-        let reach = self.clay.largest_move + self.params.tip.radius;
-        let Some(hit) = self.closest(&pressing.point, reach) else {
+    /// Cases 3 and 4, and without a gate also 1 and 2: moves the face that the ball touches.
+    fn press(&mut self, ball: &Ball, felt: Felt, dt: f64) -> Result<Update, RefineError> {
+        let Some(pressing) = self.pressing(ball, felt) else {
             self.counts.out_of_reach += 1;
             return Ok(Update { case: Case::SurfaceOnly, mismatch: None, fit: None });
         };
-        self.last_face = Some(hit.face);
-        let face = FaceState { b: self.clay.mesh.barycentre(hit.face), n: self.clay.mesh.normal(hit.face) };
-        let mismatch = self.mismatch(hit.face, &face, pressing);
-        let both = mismatch.distance < 0.0;
-        let case = if both { Case::Both } else { Case::SurfaceOnly };
-        let opposed =
-            self.params.sliding.is_some() && face.n.dot(&pressing.normal) < self.params.smallest_contact_cosine;
-        if face.n == Vector3::zeros() || opposed {
-            return Ok(Update { case, mismatch: Some(mismatch), fit: None });
+        let mismatch = self.mismatch(&pressing);
+        let case = if mismatch.distance < 0.0 { Case::Both } else { Case::SurfaceOnly };
+        let untouched = Ok(Update { case, mismatch: Some(mismatch), fit: None });
+        let face = &pressing.face;
+        // without area a face has no normal; turned away from what is felt it is another surface
+        if face.n == Vector3::zeros() || face.n.dot(&pressing.normal) < self.params.smallest_contact_cosine {
+            return untouched;
         }
         self.counts.clamped += u64::from(self.params.dynamics.model.clamps(pressing.force_o.dot(&face.n)));
-        let dynamics = if both { &self.dynamics } else { &self.raising };
-        let next = dynamics.step(&face, &pressing.point, &pressing.force_o, dt)?;
-        if self.params.sliding.is_some() {
-            self.clay.feel(hit.face, &pressing.normal);
+        let mut next = self.dynamics.step(face, &pressing.point, &pressing.force_o, dt)?;
+        if let Some(turning) = self.params.turning {
+            next.n = turn(&face.n, &pressing.normal, turning * dt);
+            self.clay.feel(pressing.hit.face, &pressing.normal);
         }
-        let steps = self.rigid_steps(hit.face, &face, &next, pressing);
-        let fit = self.clay.deform(&mut self.contact_grip, hit.face, self.params.roi, &steps);
+        let steps = self.rigid_steps(&pressing, &next);
+        let fit = self.clay.deform(&mut self.contact_grip, pressing.hit.face, self.params.roi, &steps);
         self.count(fit);
         Ok(Update { case, mismatch: Some(mismatch), fit: Some(fit) })
     }
 
-    fn mismatch(&self, id: FaceId, face: &FaceState, pressing: &Pressing) -> Mismatch {
-        let distance = (pressing.point - face.b).dot(&face.n);
-        let expected = face.n * self.params.dynamics.model.force(distance);
+    /// The face that the ball touches; `None` beyond the reach.
+    fn pressing(&self, ball: &Ball, felt: Felt) -> Option<Pressing> {
+        let (mesh, tip) = (&self.clay.mesh, &self.params.tip);
+        let reach = self.clay.largest_move + tip.radius;
+        let seek = match felt {
+            Felt::Surface(normal) => ball.reported - normal * tip.radius,
+            _ => ball.reported,
+        };
+        let hit = match self.params.closest {
+            ClosestBy::Surface => self.clay.tree.closest(mesh, &seek, reach),
+            ClosestBy::Barycentre => self.clay.tree.closest_barycentre(mesh, &seek, reach),
+        }?;
+        let face = FaceState { b: mesh.barycentre(hit.face), n: mesh.normal(hit.face) };
+        Some(match felt {
+            Felt::Surface(normal) => {
+                Pressing { hit, face, normal, point: seek, force_o: normal * ball.force_o.dot(&normal) }
+            }
+            _ => {
+                let point = ball.reported - face.n * tip.radius;
+                Pressing { hit, face, normal: face.n, point, force_o: ball.force_o }
+            }
+        })
+    }
+
+    fn mismatch(&self, pressing: &Pressing) -> Mismatch {
+        let distance = (pressing.point - pressing.face.b).dot(&pressing.face.n);
+        let expected = pressing.face.n * self.params.dynamics.model.force(distance);
         Mismatch {
-            face: id,
+            face: pressing.hit.face,
             distance,
             expected_force_o: expected,
             linear: pressing.force_o - expected,
@@ -277,31 +286,24 @@ impl Refiner {
         }
     }
 
-    /// The rigid motion from one state of the handle to the next, as steps of its corners, m.
+    /// The rigid motion of the handle to its next state, as steps of its corners, m.
     ///
     /// Along the force a corner only goes along it: the turn's sideways part would make the triangles creep.
-    fn rigid_steps(&self, id: FaceId, face: &FaceState, next: &FaceState, pressing: &Pressing) -> [Vector3<f64>; 3] {
+    fn rigid_steps(&self, Pressing { hit, face, normal, .. }: &Pressing, next: &FaceState) -> [Vector3<f64>; 3] {
         let turn = UnitQuaternion::rotation_between(&face.n, &next.n).unwrap_or_else(UnitQuaternion::identity);
         let longest = self.params.longest_step_edges * self.clay.mean_edge;
-        let along = (self.params.dynamics.along == Along::Force).then_some(pressing.normal);
-        self.clay.mesh.triangle(id).map(|corner| {
+        let along = self.params.dynamics.along == Along::Force;
+        self.clay.mesh.triangle(hit.face).map(|corner| {
             let arm = corner - face.b;
             let step = turn * arm - arm + (next.b - face.b);
-            let step = along.map_or(step, |along| along * step.dot(&along));
+            let step = if along { normal * step.dot(normal) } else { step };
             let length = step.norm();
             if length > longest { step * (longest / length) } else { step }
         })
     }
 
     /// Case 2: what the ball passes through is not there.
-    fn carve(
-        &mut self,
-        carve: &CarveParams,
-        ball: &Ball,
-        pressing: Option<&Pressing>,
-        dt: f64,
-        update: Update,
-    ) -> Update {
+    fn carve(&mut self, carve: &CarveParams, ball: &Ball, felt: Felt, dt: f64, update: Update) -> Update {
         let centre = match self.params.tip.stiffness {
             Some(stiffness) => ball.reported + ball.force_o / stiffness,
             None => ball.reported,
@@ -309,7 +311,7 @@ impl Refiner {
         let radius = self.params.tip.radius;
         let Some(hit) = self.clay.tree.closest(&self.clay.mesh, &centre, radius) else { return update };
         let Some((away, depth)) = self.penetration(&centre, &hit) else { return update };
-        let felt_here = pressing.is_some_and(|pressing| away.dot(&pressing.normal) > carve.contact_cone_cosine);
+        let felt_here = matches!(felt, Felt::Surface(normal) if away.dot(&normal) > carve.contact_cone_cosine);
         if depth <= carve.tolerance || (felt_here && depth < carve.largest_contact_depth) {
             return update;
         }

@@ -32,13 +32,13 @@ pub struct CarveParams {
     /// While in contact, a face within the cone of this cosine about the felt normal is the surface itself and left to
     /// the contact. Default 0.7: 45°.
     pub contact_cone_cosine: f64,
-    /// … unless it is deeper than this, m. Default 1 mm.
+    /// … unless it is deeper than this, m. Default 0.5 mm.
     pub largest_contact_depth: f64,
 }
 
 impl Default for CarveParams {
     fn default() -> Self {
-        Self { rate: 300.0, tolerance: 0.05e-3, contact_cone_cosine: 0.7, largest_contact_depth: 1e-3 }
+        Self { rate: 300.0, tolerance: 0.05e-3, contact_cone_cosine: 0.7, largest_contact_depth: 0.5e-3 }
     }
 }
 
@@ -57,18 +57,21 @@ pub struct RefineParams {
     pub closest: ClosestBy,
     /// Eq 1–7.
     pub dynamics: DynamicsParams,
+    /// Rate at which a touched face turns to the felt normal, 1/s: tan(θ/2) falls as e^(−rate t), which is Eq 7 with
+    /// both forces at unit size (on a rigid part F* is F). `None`: Eq 7 as printed, in `dynamics`.
+    pub turning: Option<f64>,
     /// Carving by free motion; `None` leaves it to the dynamics \[paper\].
     pub carve: Option<CarveParams>,
     /// Size of the region that follows the handle.
     pub roi: RoiSize,
     /// What an update may not do.
     pub guard: GuardParams,
-    /// A face turned away from the felt normal by more than this cosine is another surface. Default −0.2: 102°.
+    /// A face turned away from the felt normal by more than this cosine is another surface. Default 0.2: 78°.
     pub smallest_contact_cosine: f64,
     /// Longest step of a vertex in one update, in mean edges. Default 1/25, far below any feature the mesh can show.
     pub longest_step_edges: f64,
     /// A vertex stays within this many mean edges of where it was scanned: beyond that a triangle is too stretched to
-    /// show anything. Default 2.85.
+    /// show anything. Default 2.6.
     pub largest_move_edges: f64,
     /// … or within this many times the scan's noise, whichever is more. Default 5.
     pub largest_move_noises: f64,
@@ -79,10 +82,10 @@ pub struct RefineParams {
 /// Relaxation of a touched face in [`RefineParams::robust`], 1/s: within 40 ms, twenty poses at 500 Hz, so that their
 /// noise is averaged, while a hand at 25 mm/s stays on a face of 2.4 mm for 100 ms.
 const RELAXATION: f64 = 25.0;
-/// Turning of a touched face at 2.3 N felt and expected: 1/s; about as fast as its motion.
+/// Turning of a touched face in [`RefineParams::robust`], 1/s: half as fast again as its motion.
 const TURNING: f64 = 40.0;
-/// The usual force of a hand, N.
-const USUAL_FORCE: f64 = 2.3;
+/// Slope of the paper's sigmoid at the 2–3 N of a hand, N/m.
+const SIGMOID_SLOPE: f64 = 3.5e3;
 
 impl RefineParams {
     /// What works on real scans: contact gate, friction, motion along the force, carving by free motion.
@@ -93,7 +96,7 @@ impl RefineParams {
         let sigmoid = DynamicsParams::default().model;
         let (model, slope) = match tip.stiffness {
             Some(stiffness_n_per_m) => (ContactModel::Spring { stiffness_n_per_m }, stiffness_n_per_m),
-            None => (sigmoid, 3.5e3),
+            None => (sigmoid, SIGMOID_SLOPE),
         };
         Self {
             compensator: CompensatorParams::default(),
@@ -104,17 +107,18 @@ impl RefineParams {
             dynamics: DynamicsParams {
                 model,
                 alpha_m_per_n_s: RELAXATION / slope,
-                beta_per_n2_s: TURNING / (USUAL_FORCE * USUAL_FORCE),
+                beta_per_n2_s: 0.0,
                 rule: StepRule::Lie,
                 along: Along::Force,
                 take_out_rigid_offset: tip.stiffness.is_none(),
             },
+            turning: Some(TURNING),
             carve: Some(CarveParams::default()),
             roi: RoiSize::Radius(tip.radius),
             guard: GuardParams::default(),
-            smallest_contact_cosine: -0.2,
+            smallest_contact_cosine: 0.2,
             longest_step_edges: 0.04,
-            largest_move_edges: 2.85,
+            largest_move_edges: 2.6,
             largest_move_noises: 5.0,
             scan_noise: 0.6e-3,
         }
@@ -131,8 +135,11 @@ impl RefineParams {
                 take_out_rigid_offset: false,
                 ..DynamicsParams::default()
             },
+            turning: None,
             carve: None,
             roi: RoiSize::OneRing,
+            smallest_contact_cosine: -1.0,
+            largest_move_edges: f64::MAX,
             ..Self::robust(tip)
         }
     }
