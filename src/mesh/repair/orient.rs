@@ -74,6 +74,9 @@ impl Edges {
     pub fn orient(mut self, mesh: &mut TriMesh) -> (usize, usize) {
         let (piece_of, pieces) = self.pieces.number();
         let open = self.open_pieces(&piece_of, pieces);
+        if !self.pieces.any_against && open.iter().all(|&o| o) {
+            return (0, pieces);
+        }
         let turned_parity = self.turned_parities(mesh, &piece_of, &open);
         let mut flipped = 0;
         for face in 0..mesh.face_slots() as u32 {
@@ -166,11 +169,13 @@ struct Pieces {
     /// parent (31 bits) and parity against it (1 bit)
     parents: Vec<u32>,
     roots: Vec<u32>,
+    /// whether any two neighbours disagreed
+    any_against: bool,
 }
 
 impl Pieces {
     fn new(faces: usize) -> Self {
-        Self { parents: (0..faces as u32).map(|f| f << 1).collect(), roots: Vec::new() }
+        Self { parents: (0..faces as u32).map(|f| f << 1).collect(), roots: Vec::new(), any_against: false }
     }
 
     /// Root of the set and parity against it; shortens the path on the way.
@@ -196,6 +201,7 @@ impl Pieces {
     /// Joins the sets of two neighbours; `against`: one of them is upside down. The lowest face is the root.
     #[inline]
     fn join(&mut self, a: u32, b: u32, against: bool) {
+        self.any_against |= against;
         let ((root_a, parity_a), (root_b, parity_b)) = (self.find(a), self.find(b));
         if root_a != root_b {
             let parity = parity_a ^ parity_b ^ u32::from(against);

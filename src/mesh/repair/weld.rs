@@ -2,8 +2,8 @@
 
 use nalgebra::Point3;
 
-/// Marks a free place in the table.
-const FREE: u32 = u32::MAX;
+/// Marks a free place in the table: no vertex has this number.
+const FREE: u64 = u64::MAX;
 
 /// Width of a cell in which positions count as the same one, relative to the spread of the mesh (0.1 nm on 100 mm).
 ///
@@ -23,7 +23,8 @@ const CELL: f64 = 1e-9;
 /// - `faces`: F × 3, every index below V; renamed in place.
 /// - returns: how many vertices went away.
 pub(super) fn weld(positions: &mut Vec<Point3<f64>>, faces: &mut [[u32; 3]]) -> usize {
-    let mut table = PositionTable::new(CELL * spread(positions));
+    // a closed mesh has half as many vertices as faces; the table has two places for each
+    let mut table = PositionTable::new(CELL * spread(positions), faces.len());
     let mut renamed = Vec::with_capacity(positions.len());
     let mut kept = 0;
     for vertex in 0..positions.len() {
@@ -62,47 +63,48 @@ fn median(mut values: Vec<f64>) -> f64 {
 
 /// Open-addressing table from the cell of a position to a vertex; at most half full.
 struct PositionTable {
-    places: Vec<u32>,
+    /// hash of the cell (upper 32 bits), vertex (lower 32 bits)
+    places: Vec<u64>,
     len: usize,
     /// cells per length; 0 when positions must agree in every bit
     cells: f64,
 }
 
 impl PositionTable {
-    fn new(cell: f64) -> Self {
+    fn new(cell: f64, places: usize) -> Self {
         let cells = if cell.is_normal() { cell.recip() } else { 0.0 };
-        Self { places: Vec::new(), len: 0, cells }
+        Self { places: vec![FREE; places.max(64).next_power_of_two()], len: 0, cells }
     }
 
-    /// The vertex at this position, or the next number, `known.len()`, which is then taken.
+    /// The vertex in the cell of this position, or the next number, `known.len()`, which is then taken.
     fn find_or_add(&mut self, position: &Point3<f64>, known: &[Point3<f64>]) -> u32 {
         if 2 * self.len >= self.places.len() {
             self.grow(known);
         }
-        let place = self.place_of(position, known);
-        if self.places[place] == FREE {
-            self.places[place] = known.len() as u32;
-            self.len += 1;
-        }
-        self.places[place]
-    }
-
-    /// Where this position stands or would be put.
-    fn place_of(&self, position: &Point3<f64>, known: &[Point3<f64>]) -> usize {
-        let wanted = self.cell_of(position);
+        let cell = self.cell_of(position);
+        let hash = hash(cell);
         let mask = self.places.len() - 1;
-        let mut place = hash(wanted) as usize & mask;
-        while self.places[place] != FREE && self.cell_of(&known[self.places[place] as usize]) != wanted {
+        let mut place = hash as usize & mask;
+        while self.places[place] != FREE {
+            let (tag, vertex) = (self.places[place] >> 32, self.places[place] as u32);
+            if tag == hash >> 32 && self.cell_of(&known[vertex as usize]) == cell {
+                return vertex;
+            }
             place = (place + 1) & mask;
         }
-        place
+        self.places[place] = hash >> 32 << 32 | known.len() as u64;
+        self.len += 1;
+        known.len() as u32
     }
 
     fn grow(&mut self, known: &[Point3<f64>]) {
-        self.places = vec![FREE; (4 * self.len).max(64).next_power_of_two()];
-        for (vertex, position) in known.iter().enumerate() {
-            let place = self.place_of(position, known);
-            self.places[place] = vertex as u32;
+        let mask = 2 * self.places.len() - 1;
+        for entry in std::mem::replace(&mut self.places, vec![FREE; mask + 1]).into_iter().filter(|&e| e != FREE) {
+            let mut place = hash(self.cell_of(&known[entry as u32 as usize])) as usize & mask;
+            while self.places[place] != FREE {
+                place = (place + 1) & mask;
+            }
+            self.places[place] = entry;
         }
     }
 
