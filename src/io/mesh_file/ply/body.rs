@@ -1,5 +1,7 @@
 //! The rows of a PLY file.
 
+use nalgebra::Point3;
+
 use super::super::defect::{Defect, Place, Syntax};
 use super::super::text::{Lines, number};
 use super::header::{Element, Encoding, Header, Kind, Scalar};
@@ -105,45 +107,46 @@ impl<'a> Body<'a> {
         Ok(())
     }
 
-    /// Reads all rows of a binary element without lists and hands out three of its columns; `false`, and nothing read,
-    /// when it has lists, is ASCII, or the file ends before its last row.
-    pub fn fixed_rows(&mut self, element: &Element, columns: [usize; 3], mut take: impl FnMut([f64; 3])) -> bool {
+    /// Three columns, multiplied by `scale`, of all rows of a binary element without lists; `None`, and nothing read, when it has lists, is
+    /// ASCII, or the file ends before its last row.
+    pub fn fixed_rows(&mut self, element: &Element, columns: [usize; 3], scale: f64) -> Option<Vec<Point3<f64>>> {
         let (mut offsets, mut len) = (Vec::new(), 0);
         for property in &element.properties {
-            let Kind::Scalar(scalar) = property.kind else { return false };
+            let Kind::Scalar(scalar) = property.kind else { return None };
             offsets.push((len, scalar));
             len += scalar.size();
         }
-        let end = self.at.saturating_add(len.saturating_mul(element.count));
-        let (Some(rows), false) = (self.bytes.get(self.at..end), self.encoding == Encoding::Ascii) else {
-            return false;
-        };
-        let columns = columns.map(|column| offsets[column]);
-        let big = self.encoding == Encoding::Big;
-        for row in rows.chunks_exact(len) {
-            take(columns.map(|(at, scalar)| value(&row[at..], scalar, big).unwrap_or(f64::NAN)));
-        }
+        let end = self.at.checked_add(len.checked_mul(element.count)?)?;
+        let rows = self.bytes.get(self.at..end).filter(|_| self.encoding != Encoding::Ascii)?.chunks_exact(len);
         self.at = end;
-        true
+        let [x, y, z] = columns.map(|column| offsets[column]);
+        let big = self.encoding == Encoding::Big;
+        let column = |row: &[u8], (at, scalar)| scale * value(&row[at..], scalar, big).unwrap_or(f64::NAN);
+        // the types are known to the compiler in the two usual cases
+        let point = |row, x, y, z| Point3::new(column(row, x), column(row, y), column(row, z));
+        let of_type = |row, t| point(row, (x.0, t), (y.0, t), (z.0, t));
+        Some(match [x.1, y.1, z.1] {
+            [Scalar::F32, Scalar::F32, Scalar::F32] => rows.map(|row| of_type(row, Scalar::F32)).collect(),
+            [Scalar::F64, Scalar::F64, Scalar::F64] => rows.map(|row| of_type(row, Scalar::F64)).collect(),
+            _ => rows.map(|row| point(row, x, y, z)).collect(),
+        })
     }
 
-    /// Reads the rows that are triangles in the usual layout (a list of three 32-bit numbers and nothing else, little
-    /// endian) up to the first row that is not; returns how many.
-    pub fn triangles(&mut self, element: &Element, mut take: impl FnMut([u32; 3])) -> usize {
+    /// The rows that are triangles in the usual layout (a list of three 32-bit numbers and nothing else, little endian),
+    /// up to the first row that is not. Strips look the same and are left alone.
+    pub fn triangles(&mut self, element: &Element) -> Vec<[u32; 3]> {
         const ROW: usize = 13;
         let usual = |kind| matches!(kind, Kind::List { count: Scalar::U8, item: Scalar::I32 | Scalar::U32 });
-        let layout_is_usual = matches!(&element.properties[..], [only] if usual(only.kind));
+        let layout_is_usual = element.name == "face" && matches!(&element.properties[..], [only] if usual(only.kind));
         if self.encoding != Encoding::Little || !layout_is_usual {
-            return 0;
+            return Vec::new();
         }
         let rows = self.bytes[self.at..].as_chunks::<ROW>().0;
         let rows = &rows[..element.count.min(rows.len())];
-        let read = rows.iter().position(|row| row[0] != 3).unwrap_or(rows.len());
-        for row in &rows[..read] {
-            take([1, 5, 9].map(|i| u32::from_le_bytes([row[i], row[i + 1], row[i + 2], row[i + 3]])));
-        }
-        self.at += read * ROW;
-        read
+        let rows = &rows[..rows.iter().position(|row| row[0] != 3).unwrap_or(rows.len())];
+        self.at += rows.len() * ROW;
+        let number = |row: &[u8; ROW], i| u32::from_le_bytes([row[i], row[i + 1], row[i + 2], row[i + 3]]);
+        rows.iter().map(|row| [number(row, 1), number(row, 5), number(row, 9)]).collect()
     }
 }
 

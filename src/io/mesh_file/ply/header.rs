@@ -118,6 +118,9 @@ impl Header {
                 _ if lines.number() == 1 && line != "ply" => return Err(Syntax::unexpected(place, "'ply'", &line)),
                 [] | ["ply" | "comment" | "obj_info", ..] => {}
                 ["format", name, _] => encoding = Some(encoding_of(name, place)?),
+                ["element", name, _] if elements.iter().any(|e| e.name == name) => {
+                    return Err(Syntax::unexpected(place, "each element once", name));
+                }
                 ["element", name, count] => elements.push(element(name, count, lines.number())?),
                 ["property", ref words @ ..] => {
                     let owner = elements.last_mut();

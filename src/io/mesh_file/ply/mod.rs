@@ -42,10 +42,11 @@ fn read_vertices(body: &mut Body, element: &Element, scale: f64, soup: &mut Soup
             Syntax::unexpected(Place::Line(element.line), "a vertex with x, y and z", format!("no property {name}"))
         })?;
     }
-    soup.positions.reserve_exact(element.count);
-    if body.fixed_rows(element, columns, |xyz| soup.positions.push(Point3::from(xyz.map(|x| scale * x)))) {
+    if let Some(positions) = body.fixed_rows(element, columns, scale) {
+        soup.positions = positions;
         return Ok(());
     }
+    soup.positions.reserve_exact(element.count);
     body.rows(element, element.count, None, |row, _| {
         soup.positions.push(Point3::from(columns.map(|column| scale * row[column])));
         Ok(())
@@ -57,9 +58,14 @@ fn read_polygons(body: &mut Body, element: &Element, soup: &mut Soup, cut: Cut) 
         .iter()
         .find_map(|name| element.list(name))
         .ok_or_else(|| Syntax::unexpected(Place::Line(element.line), "faces with a list vertex_indices", "none"))?;
-    soup.faces.reserve_exact(element.count);
-    let triangles = body.triangles(element, |corners| soup.faces.push(corners));
-    body.rows(element, element.count - triangles, Some(list), |row, place| cut(row, place, &mut soup.faces))
+    let triangles = body.triangles(element);
+    let rest = element.count - triangles.len();
+    if soup.faces.is_empty() {
+        soup.faces = triangles;
+    } else {
+        soup.faces.extend(triangles);
+    }
+    body.rows(element, rest, Some(list), |row, place| cut(row, place, &mut soup.faces))
 }
 
 fn vertex_number(value: f64, place: Place) -> Result<u32, Syntax> {
