@@ -175,7 +175,7 @@ fn flipped_facets_come_out_as_the_part_they_were_made_from() {
     }
 }
 
-/// Volume and counts of closed parts, from the index of the data (trimesh).
+/// Counts of closed parts, from the index of the data (trimesh).
 #[test]
 fn real_parts_come_out_watertight() {
     let Some(parts) = shared("parts/permissive") else { return };
@@ -328,6 +328,44 @@ fn ply_variants_are_read() {
             .ends_with("line 4: expected a vertex with x, y and z, found 'no property z'")
     );
     assert!(refusal(&plain.replace("end_header", "end")).contains("line 10: expected format"));
+}
+
+#[test]
+fn obj_variants_are_read() {
+    let read = |content: &[u8]| {
+        read_text("a.obj", content).map(|m| (m.mesh.vertex_count(), m.mesh.face_count(), m.repair.unused_vertices))
+    };
+    // colours on some vertices only, with alpha, a weight, a comment in Latin-1, indices of normals that are not there
+    let odd = b"# \xe9t\xe9\no a\nv 0 0 0 1 0 0\nv 1 0 0\n v 2 2 0 2\r\ng b\nv 0 1 0 1 0 0 1\nv 9 9 9\nusemtl x\nf 1//7 2//7 3//7 4//7";
+    assert_eq!(read(odd).unwrap(), (4, 2, 1));
+    let MeshFile { mesh, .. } = read_text("a.obj", odd).unwrap();
+    assert_eq!(mesh.position(VertexId(2)), Point3::new(1.0, 1.0, 0.0), "divided by its weight");
+    let refusal = |content: &str| read(content.as_bytes()).unwrap_err().to_string();
+    assert!(refusal("v 0 0 0\nv 1 0 0\nv 0 1\nf 1 2 3").contains("line 3: expected three coordinates"));
+    assert!(refusal("v 0 0 0\nv 1 0 0\nv 0 1 0\n\nf 1 2 x").contains("line 5: expected a face"));
+    assert!(
+        refusal("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 -4")
+            .ends_with("line 5: a face uses vertex -4, but there are only 3 vertices")
+    );
+    assert!(refusal("v 0 0 0\nv 1 0 0\nv 0 1 0\nf\nf 1 2 0").contains("line 4: expected numbers of vertices"));
+}
+
+#[test]
+fn stl_with_more_than_its_header_says_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.stl");
+    write_mesh(&path, &ball(), Metre).unwrap();
+    let mut bytes = std::fs::read(&path).unwrap();
+    let (faces, len) = (ball().face_count(), bytes.len());
+    bytes.push(0);
+    std::fs::write(&path, &bytes).unwrap();
+    let message = read_mesh(&path, Metre).unwrap_err().to_string();
+    let wanted = format!(
+        "byte {len}: the header announces {faces} triangles, which take {} bytes, but {} follow",
+        50 * faces,
+        50 * faces + 1
+    );
+    assert!(message.contains(&wanted), "{message}");
 }
 
 #[test]

@@ -14,7 +14,7 @@ use super::text::Lines;
 /// and materials are passed over. Vertices come in the order in which faces first name them.
 pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
     let bytes = as_utf8(bytes)?;
-    let mut geometry = Geometry { rest: &bytes, line: &[], number: 0, vertices: 0 };
+    let mut geometry = Geometry { rest: &bytes, line: &[], shortened: false, number: 0, vertices: 0 };
     let options = LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, ..Default::default() };
     let no_materials = |_: &std::path::Path| Err(LoadError::OpenFileFailed);
     let (models, _) = tobj::load_obj_buf(&mut geometry, &options, no_materials)
@@ -42,10 +42,12 @@ fn as_utf8(bytes: &[u8]) -> Result<Cow<'_, [u8]>, Syntax> {
     Ok(Cow::Owned(text.map_err(broken)?.into_bytes()))
 }
 
-/// Hands on the lines that make the mesh, `v` and `f`, and counts.
+/// Hands on the lines that make the mesh, `v` without colours and `f`, and counts.
 struct Geometry<'a> {
     rest: &'a [u8],
     line: &'a [u8],
+    /// the end of the line was cut off with its colour
+    shortened: bool,
     /// number of the line handed on last, counted from 1
     number: usize,
     vertices: usize,
@@ -53,6 +55,9 @@ struct Geometry<'a> {
 
 impl BufRead for Geometry<'_> {
     fn fill_buf(&mut self) -> io::Result<&[u8]> {
+        if self.line.is_empty() && std::mem::take(&mut self.shortened) {
+            self.line = b"\n";
+        }
         while self.line.is_empty() && !self.rest.is_empty() {
             let len = self.rest.iter().position(|&b| b == b'\n').map_or(self.rest.len(), |at| at + 1);
             let (line, rest) = self.rest.split_at(len);
@@ -60,7 +65,8 @@ impl BufRead for Geometry<'_> {
             let kind = line.trim_ascii_start();
             if let [kind @ (b'v' | b'f'), b' ' | b'\t', ..] = kind {
                 self.vertices += usize::from(*kind == b'v');
-                self.line = line;
+                self.line = if *kind == b'v' { without_colour(line) } else { line };
+                self.shortened = self.line.len() < line.len();
             }
         }
         Ok(self.line)
@@ -79,6 +85,21 @@ impl Read for Geometry<'_> {
     }
 }
 
+/// The line up to the third coordinate when more than a weight follows: files in which only some vertices have a colour
+/// would be refused.
+fn without_colour(line: &[u8]) -> &[u8] {
+    let (mut words, mut end, mut in_word) = (0, line.len(), false);
+    for (at, byte) in line.iter().enumerate() {
+        let blank = byte.is_ascii_whitespace();
+        words += usize::from(!blank && !in_word);
+        if blank && in_word && words == 4 {
+            end = at;
+        }
+        in_word = !blank;
+    }
+    if words > 5 { &line[..end] } else { line }
+}
+
 /// Where and what: errors in the use of vertices are found only at the end, when `tobj` has lost the line.
 fn place_of(error: LoadError, bytes: &[u8], number: usize) -> Syntax {
     let of_faces = matches!(error, LoadError::FaceVertexOutOfBounds | LoadError::InvalidPolygon);
@@ -88,7 +109,6 @@ fn place_of(error: LoadError, bytes: &[u8], number: usize) -> Syntax {
             LoadError::ReadError => "UTF-8 or UTF-16 text",
             LoadError::FaceParseError => "a face: numbers of vertices",
             LoadError::ScalingByZeroError => "a weight other than zero",
-            LoadError::ColorParseError | LoadError::FaceColorOutOfBounds => "three coordinates, or these and a colour",
             _ => "three coordinates with a decimal point",
         };
         let line = bytes.split(|&b| b == b'\n').nth(number.saturating_sub(1)).unwrap_or_default();

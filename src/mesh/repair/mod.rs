@@ -103,8 +103,8 @@ pub fn repair(mut positions: Vec<Point3<f64>>, mut faces: Vec<[u32; 3]>) -> Resu
 
 /// Counts fit, indices are in range.
 fn check(positions: &[Point3<f64>], faces: &[[u32; 3]]) -> Result<(), MeshError> {
-    // three corners of every face are counted in 32 bits
-    for (what, count, limit) in [("vertices", positions.len(), u32::MAX - 1), ("faces", faces.len(), u32::MAX / 3)] {
+    // two ends of three edges of every face are counted in 32 bits
+    for (what, count, limit) in [("vertices", positions.len(), u32::MAX - 1), ("faces", faces.len(), u32::MAX / 6)] {
         if count > limit as usize {
             return Err(MeshError::TooMany { what, count });
         }
@@ -167,6 +167,10 @@ fn without_duplicates(mesh: TriMesh, report: &mut RepairReport) -> Result<(TriMe
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+
+    use proptest::prelude::*;
+
     use super::*;
     use crate::mesh::FaceId;
 
@@ -281,5 +285,33 @@ mod tests {
             refusal(vec![[0, 1, 2], [0, 8, 1]]),
             MeshError::VertexOutOfRange { face: 1, vertex: 8, vertices: 8 }
         );
+    }
+
+    proptest! {
+        /// Any triangles over the 27 points of a small lattice: many shared, folded, flat and repeated ones.
+        #[test]
+        fn tangles_are_counted_right_and_a_second_repair_finds_nothing(
+            points in prop::collection::vec((0..3u8, 0..3u8, 0..3u8), 3..40),
+            picks in prop::collection::vec(any::<[prop::sample::Index; 3]>(), 1..60),
+        ) {
+            let positions: Vec<_> = points.iter().map(|&(x, y, z)| Point3::new(x.into(), y.into(), z.into())).collect();
+            let faces = picks.iter().map(|pick| pick.map(|i| i.index(points.len()) as u32)).collect();
+            let Ok((mesh, report)) = repair(positions, faces) else { return Ok(()) };
+            let corners: Vec<_> = mesh.faces().map(|(_, c)| c.map(|v| v.0)).collect();
+            let mut edges = BTreeMap::<[u32; 2], usize>::new();
+            for [a, b, c] in &corners {
+                for (p, q) in [(a, b), (b, c), (c, a)] {
+                    *edges.entry([*p.min(q), *p.max(q)]).or_default() += 1;
+                }
+            }
+            prop_assert_eq!(report.boundary_edges, edges.values().filter(|&&n| n == 1).count());
+            prop_assert_eq!(report.non_manifold_edges, edges.values().filter(|&&n| n > 2).count());
+            let (again, second) = repair(mesh.positions().to_vec(), corners.clone()).unwrap();
+            prop_assert_eq!(again.positions(), mesh.positions());
+            prop_assert!(again.faces().map(|(_, c)| c.map(|v| v.0)).eq(corners));
+            let RepairReport { boundary_edges, boundary_loops, non_manifold_edges, components, .. } = report;
+            let clean = RepairReport { boundary_edges, boundary_loops, non_manifold_edges, components, ..Default::default() };
+            prop_assert_eq!(second, clean);
+        }
     }
 }
