@@ -41,7 +41,7 @@ impl Default for SyncParams {
     }
 }
 
-/// Messages that became no sample, by reason. Every wrench is either in a sample, held, or counted here once.
+/// Messages of one stream that became no sample, by reason. Every wrench is in a sample, held, or counted once.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct SyncCounts {
     /// Wrenches whose poses before and after are too far apart.
@@ -65,10 +65,25 @@ pub struct SyncCounts {
 }
 
 impl SyncCounts {
+    /// Each reason by its name, in the order of the fields.
+    pub fn reasons(&self) -> [(&'static str, u64); 9] {
+        let Self { gap, no_pose_before, no_pose_after, late, duplicate, not_finite, absurd, jump, overflow } = *self;
+        [
+            ("gap", gap),
+            ("no_pose_before", no_pose_before),
+            ("no_pose_after", no_pose_after),
+            ("late", late),
+            ("duplicate", duplicate),
+            ("not_finite", not_finite),
+            ("absurd", absurd),
+            ("jump", jump),
+            ("overflow", overflow),
+        ]
+    }
+
     /// All of them.
     pub fn total(&self) -> u64 {
-        let Self { gap, no_pose_before, no_pose_after, late, duplicate, not_finite, absurd, jump, overflow } = *self;
-        gap + no_pose_before + no_pose_after + late + duplicate + not_finite + absurd + jump + overflow
+        self.reasons().iter().map(|(_, count)| count).sum()
     }
 }
 
@@ -95,7 +110,6 @@ pub struct Synchroniser {
     params: SyncParams,
     poses: Stream<StampedPose>,
     wrenches: Stream<StampedWrench>,
-    counts: SyncCounts,
     finished: bool,
 }
 
@@ -118,27 +132,25 @@ impl Synchroniser {
             return Err(SettingError { name: "buffer capacity (messages)", value, allowed: "2 to 1000000" });
         }
         let (poses, wrenches) = (Stream::with_capacity(params.capacity), Stream::with_capacity(params.capacity));
-        Ok(Self { params, poses, wrenches, counts: SyncCounts::default(), finished: false })
+        Ok(Self { params, poses, wrenches, finished: false })
     }
 
     /// Takes one message; draw samples with [`Self::next_sample`] before the next one. What comes after
     /// [`Self::finish`] is late.
     pub fn push(&mut self, message: Message) {
-        if self.finished {
-            self.counts.late += 1;
-            return;
-        }
         match message {
             Message::Pose(pose) => match pose.check() {
-                Ok(()) => self.poses.push(pose, &self.params, &mut self.counts),
-                Err(why) => self.counts.refuse(why),
+                _ if self.finished => self.poses.counts.late += 1,
+                Ok(()) => self.poses.push(pose, &self.params),
+                Err(why) => self.poses.counts.refuse(why),
             },
             Message::Wrench(mut wrench) => match wrench.check() {
+                _ if self.finished => self.wrenches.counts.late += 1,
                 Ok(()) => {
                     wrench.stamp_ns = wrench.stamp_ns.saturating_sub(self.params.wrench_offset_ns);
-                    self.wrenches.push(wrench, &self.params, &mut self.counts);
+                    self.wrenches.push(wrench, &self.params);
                 }
-                Err(why) => self.counts.refuse(why),
+                Err(why) => self.wrenches.counts.refuse(why),
             },
         }
     }
@@ -146,8 +158,8 @@ impl Synchroniser {
     /// Nothing more will come: what is held may go out.
     pub fn finish(&mut self) {
         self.finished = true;
-        self.poses.finish(&self.params, &mut self.counts);
-        self.wrenches.finish(&self.params, &mut self.counts);
+        self.poses.finish(&self.params);
+        self.wrenches.finish(&self.params);
     }
 
     /// The next sample that no message still allowed to arrive could change; `None` when more messages are needed.
@@ -163,14 +175,19 @@ impl Synchroniser {
             self.wrenches.pop();
             match pose {
                 Ok(pose_ot) => return Some(Sample { stamp_ns: wrench.stamp_ns, pose_ot, wrench: wrench.wrench }),
-                Err(count) => *count(&mut self.counts) += 1,
+                Err(count) => *count(&mut self.wrenches.counts) += 1,
             }
         }
     }
 
-    /// What was dropped so far, and why.
+    /// Wrenches that became no sample so far, and why.
     pub fn counts(&self) -> &SyncCounts {
-        &self.counts
+        &self.wrenches.counts
+    }
+
+    /// Poses dropped so far, and why; a wrench that misses one is counted in [`Self::counts`].
+    pub fn pose_counts(&self) -> &SyncCounts {
+        &self.poses.counts
     }
 
     /// Up to this stamp nothing of `stream` can arrive any more.
@@ -227,6 +244,7 @@ struct Stream<T> {
     suspect: Option<T>,
     /// messages were pushed out of the full buffer
     overflown: bool,
+    counts: SyncCounts,
 }
 
 impl<T: Stamped + Copy> Stream<T> {
@@ -237,43 +255,44 @@ impl<T: Stamped + Copy> Stream<T> {
             settled: i64::MIN,
             suspect: None,
             overflown: false,
+            counts: SyncCounts::default(),
         }
     }
 
-    fn push(&mut self, message: T, params: &SyncParams, counts: &mut SyncCounts) {
+    fn push(&mut self, message: T, params: &SyncParams) {
         let stamp = message.stamp_ns();
         if self.newest.is_some_and(|newest| stamp <= newest.saturating_add(params.largest_jump_ns)) {
-            return self.insert(message, params, counts);
+            return self.insert(message, params);
         }
         match self.suspect.take() {
             Some(first) if stamp.abs_diff(first.stamp_ns()) <= params.largest_jump_ns as u64 => {
-                self.insert(first, params, counts);
-                self.insert(message, params, counts);
+                self.insert(first, params);
+                self.insert(message, params);
             }
             refused => {
-                counts.jump += refused.is_some() as u64;
+                self.counts.jump += refused.is_some() as u64;
                 self.suspect = Some(message);
             }
         }
     }
 
     /// A message that nothing contradicted is kept.
-    fn finish(&mut self, params: &SyncParams, counts: &mut SyncCounts) {
+    fn finish(&mut self, params: &SyncParams) {
         match self.suspect.take() {
-            Some(only) if self.newest.is_none() => self.insert(only, params, counts),
-            refused => counts.jump += refused.is_some() as u64,
+            Some(only) if self.newest.is_none() => self.insert(only, params),
+            refused => self.counts.jump += refused.is_some() as u64,
         }
     }
 
-    fn insert(&mut self, message: T, params: &SyncParams, counts: &mut SyncCounts) {
+    fn insert(&mut self, message: T, params: &SyncParams) {
         let stamp = message.stamp_ns();
         if stamp <= self.settled {
-            counts.late += 1;
+            self.counts.late += 1;
             return;
         }
         let at = self.held.partition_point(|held| held.stamp_ns() < stamp);
         if self.held.get(at).is_some_and(|held| held.stamp_ns() == stamp) {
-            counts.duplicate += 1;
+            self.counts.duplicate += 1;
             return;
         }
         self.held.insert(at, message);
@@ -283,7 +302,7 @@ impl<T: Stamped + Copy> Stream<T> {
         if self.held.len() == params.capacity {
             self.pop();
             self.overflown = true;
-            counts.overflow += T::IS_LOST_ALONE as u64;
+            self.counts.overflow += T::IS_LOST_ALONE as u64;
         }
     }
 
