@@ -64,7 +64,7 @@ impl Peaks {
     /// Those of [`TriMesh::new`], for an `edge` so small that the faces cannot be counted.
     pub fn mesh(&self, edge: f64) -> Result<TriMesh, MeshError> {
         let cells = (SIDE / edge).ceil().clamp(1.0, u16::MAX.into()) as u32;
-        if cells == u16::MAX.into() {
+        if cells == u32::from(u16::MAX) {
             return Err(MeshError::TooMany { what: "faces", count: 2 * (cells as usize).pow(2) });
         }
         let at = |i: u32| (f64::from(i) / f64::from(cells) - 0.5) * SIDE;
