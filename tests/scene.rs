@@ -3,24 +3,26 @@
 use std::collections::BTreeSet;
 
 use nalgebra::vector;
-use touchup::scene::{CompensationSection, PayloadSection, Scene};
+use touchup::refine::{Along, ContactModel, DynamicsParams, RefineParams, RoiSize, StepRule, TipParams};
+use touchup::scene::{CompensationSection, Mode, PayloadSection, Scene};
 use touchup::touch::{SyncParams, WrenchFrame};
 
 const DEFAULT_YAML: &str = include_str!("../config/default.yaml");
 
-/// The file with the parts that stand in comments (`#   key: …`, `# compensation:`) taken in.
-fn with_commented_parts() -> String {
-    let uncomment = |line: &str| match line.strip_prefix("# ") {
-        Some(rest) if rest.starts_with("compensation:") || rest.starts_with("  ") => rest.to_owned(),
-        _ => line.to_owned(),
+/// The file with its settings that are off taken in: `#key` is one, `# prose` is not.
+fn with_all_settings() -> String {
+    let taken_in = |line: &str| {
+        let (indent, rest) = line.split_at(line.len() - line.trim_start().len());
+        let setting = rest.strip_prefix('#').filter(|after| !after.starts_with(' ') || after.starts_with("  "));
+        setting.map_or_else(|| line.to_owned(), |setting| format!("{indent}{setting}"))
     };
-    DEFAULT_YAML.lines().map(uncomment).collect::<Vec<_>>().join("\n")
+    DEFAULT_YAML.lines().map(taken_in).collect::<Vec<_>>().join("\n")
 }
 
 #[test]
 fn the_shipped_file_is_the_default() {
     assert_eq!(Scene::from_yaml(DEFAULT_YAML).unwrap(), Scene::default());
-    let whole = Scene::from_yaml(&with_commented_parts()).unwrap();
+    let whole = Scene::from_yaml(&with_all_settings()).unwrap();
     let compensation = whole.compensation.clone().unwrap();
     assert_eq!(compensation.payload, Some(PayloadSection::default()));
     assert_eq!(whole.compensator_params(WrenchFrame::Sensor).pose_ts, nalgebra::Isometry3::identity());
@@ -32,7 +34,9 @@ fn the_shipped_file_is_the_default() {
 #[test]
 fn every_key_of_the_code_is_in_the_shipped_file_and_documented() {
     let mut known = BTreeSet::new();
-    let sections = ["", "sync", "compensation", "compensation.payload", "compensation.bias", "contact", "tip", "scan"];
+    let inner = ["compensation.payload", "compensation.bias"];
+    let outer = ["", "sync", "compensation", "contact", "tip", "scan", "sliding", "carve", "refine"];
+    let sections = [&outer[..], &inner].concat();
     for section in sections {
         let path: Vec<_> = section.split('.').filter(|name| !name.is_empty()).collect();
         let yaml =
@@ -44,24 +48,62 @@ fn every_key_of_the_code_is_in_the_shipped_file_and_documented() {
             list.split([',', ' ', '`', ';']).filter(|key| key.contains(|c: char| c.is_alphabetic())).map(str::to_owned),
         );
     }
-    let whole = with_commented_parts();
+    let whole = with_all_settings();
     let mut in_file = BTreeSet::new();
     for line in whole.lines().filter(|line| !line.trim_start().starts_with('#')) {
         in_file.extend(line.split_once(':').map(|(key, _)| key.trim().to_owned()));
     }
     assert_eq!(in_file, known);
-    assert!(known.len() >= 20, "{known:?}");
+    assert!(known.len() >= 35, "{known:?}");
+}
+
+/// The presets of the room are the ones that a user gets who changes nothing.
+#[test]
+fn the_default_scene_is_the_preset_of_each_mode() {
+    let tip = TipParams { radius: 1.5e-3, stiffness: Some(2e4) };
+    let mut scene = Scene::default();
+    assert_eq!(scene.refine_params(WrenchFrame::Sensor), Some(RefineParams::robust(tip)));
+    scene.refine.as_mut().unwrap().mode = Mode::Paper;
+    assert_eq!(scene.refine_params(WrenchFrame::Sensor), Some(RefineParams::paper(tip)));
+    let mut scene = Scene::default();
+    scene.tip.as_mut().unwrap().stiffness_n_per_mm = None;
+    let rigid = RefineParams::robust(TipParams { stiffness: None, ..tip });
+    assert_eq!(scene.refine_params(WrenchFrame::Sensor), Some(rigid));
 }
 
 #[test]
 fn a_part_is_built_only_when_named() {
     let none = Scene::from_yaml("{}").unwrap();
-    assert!(none.sync.is_none() && none.contact_params().is_none() && none.tip.is_none() && none.scan.is_none());
+    assert!(none.refine_params(WrenchFrame::Sensor).is_none() && none.contact_params().is_none());
     let SyncParams { reorder_ns, largest_gap_ns, .. } = none.sync_params();
     assert_eq!((reorder_ns, largest_gap_ns), (0, 0));
     assert_eq!(none.compensator_params(WrenchFrame::Object).payload, None);
-    let bare = Scene::from_yaml("sync:\ncontact: {}\ntip:\nscan:\n").unwrap();
+
+    let loop_alone = Scene::from_yaml("refine:").unwrap().refine_params(WrenchFrame::Object).unwrap();
+    assert_eq!((loop_alone.gate, loop_alone.sliding, loop_alone.carve), (None, None, None));
+    assert_eq!((loop_alone.tip, loop_alone.scan_noise), (TipParams { radius: 0.0, stiffness: None }, 0.0));
+    assert_eq!(loop_alone.compensator.wrench_frame, WrenchFrame::Object);
+
+    let bare = Scene::from_yaml("sync:\ncontact: {}\ntip:\nscan:\nsliding:\ncarve:\nrefine:\n").unwrap();
     assert_eq!(bare, Scene::default(), "a part named without keys takes its defaults");
+}
+
+#[test]
+fn what_refine_says_goes_over_its_mode() {
+    let yaml = "tip: { radius_mm: 2, stiffness_n_per_mm: 0.1 }
+refine: { mode: paper, contact_model: spring, alpha_m_per_n_s: 0.5, beta_per_n2_s: 0, step: corrected, along: force, roi_mm: 4 }";
+    let params = Scene::from_yaml(yaml).unwrap().refine_params(WrenchFrame::Sensor).unwrap();
+    let DynamicsParams { model, alpha_m_per_n_s, beta_per_n2_s, rule, along, take_out_rigid_offset } = params.dynamics;
+    assert_eq!(model, ContactModel::Spring { stiffness_n_per_m: 100.0 });
+    assert_eq!((alpha_m_per_n_s, beta_per_n2_s), (0.5, 0.0));
+    assert_eq!((rule, along, take_out_rigid_offset), (StepRule::DriftCorrected, Along::Force, false));
+    assert_eq!((params.roi, params.gate), (RoiSize::Radius(0.004), None));
+
+    let yaml =
+        "tip: { stiffness_n_per_mm: 20 }\nrefine: { contact_model: sigmoid, f_max_n: 20, h_min_mm: 2, delta: 3 }";
+    let params = Scene::from_yaml(yaml).unwrap().refine_params(WrenchFrame::Sensor).unwrap();
+    assert_eq!(params.dynamics.model, ContactModel::Sigmoid { f_max_n: 20.0, h_min_m: 0.002, delta: 3.0 });
+    assert!(params.dynamics.take_out_rigid_offset);
 }
 
 #[test]
@@ -106,6 +148,14 @@ fn each_mistake_is_refused_in_one_line_that_says_where_and_what() {
         ("scan: { noise_mm: .inf }", &["scan.noise_mm is inf"]),
         ("sync: { largest_gap_ms: -3 }", &["sync.largest_gap_ms is -3", "0 to 60000 ms"]),
         ("sync: { capacity: 1 }", &["sync.capacity is 1"]),
+        (
+            "tip: {stiffness_n_per_mm: null}\nrefine: { contact_model: spring }",
+            &["spring needs tip.stiffness_n_per_mm"],
+        ),
+        ("refine: { mode: rough }", &["rough", "robust", "line 1"]),
+        ("refine: { h_min_mm: 0 }", &["refine.h_min_mm is 0"]),
+        ("carve: { contact_cone_cosine: 2 }", &["carve.contact_cone_cosine is 2", "-1 to 1"]),
+        ("sliding: { cone_cosine: -1 }", &["sliding.cone_cosine is -1", "0 to 1"]),
         ("compensation: { payload: { mass_kg: -2 } }", &["compensation.payload.mass_kg is -2"]),
         ("compensation: { sensor_orientation_xyzw: [0, 0, 0, 0] }", &["sensor_orientation_xyzw is 0", "length"]),
         ("compensation: { bias: { force_n: [1, 2] } }", &["line 1"]),

@@ -1,0 +1,120 @@
+//! The YAML that names the parts of a scene and their parameters, turned into the rooms' own settings.
+//!
+//! A part that is not named is not built: a scene that names only `refine` is the bare loop. A part that is named
+//! without keys takes its defaults. `config/default.yaml` is [`Scene::default`] written out, with every key explained.
+
+mod error;
+mod params;
+mod sections;
+
+use std::path::Path;
+
+use serde::Deserialize;
+
+pub use error::SceneError;
+use error::yaml_error;
+use sections::named;
+pub use sections::{
+    AlongName, BiasSection, CarveSection, CompensationSection, ContactSection, Mode, ModelName, PayloadSection,
+    RefineSection, ScanSection, SlidingSection, StepName, SyncSection, TipSection,
+};
+
+/// The parts of a scene. `None`: not built.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// Pairs poses with wrenches; without it only those of equal stamp pair.
+    #[serde(default, deserialize_with = "named")]
+    pub sync: Option<SyncSection>,
+    /// Takes weight and bias off the wrench.
+    #[serde(default, deserialize_with = "named")]
+    pub compensation: Option<CompensationSection>,
+    /// Tells contact from free motion; without it every sample counts as contact.
+    #[serde(default, deserialize_with = "named")]
+    pub contact: Option<ContactSection>,
+    /// The ball that touches; without it a rigid point does.
+    #[serde(default, deserialize_with = "named")]
+    pub tip: Option<TipSection>,
+    /// How good the scan is; without it the scan counts as free of noise.
+    #[serde(default, deserialize_with = "named")]
+    pub scan: Option<ScanSection>,
+    /// Smooths pose and force and takes friction out of the felt normal.
+    #[serde(default, deserialize_with = "named")]
+    pub sliding: Option<SlidingSection>,
+    /// Takes away what the ball passes through without a force.
+    #[serde(default, deserialize_with = "named")]
+    pub carve: Option<CarveSection>,
+    /// Moves the mesh; without it nothing does.
+    #[serde(default, deserialize_with = "named")]
+    pub refine: Option<RefineSection>,
+}
+
+impl Default for Scene {
+    /// All but compensation, which depends on the sensor.
+    fn default() -> Self {
+        Self {
+            sync: Some(SyncSection::default()),
+            compensation: None,
+            contact: Some(ContactSection::default()),
+            tip: Some(TipSection::default()),
+            scan: Some(ScanSection::default()),
+            sliding: Some(SlidingSection::default()),
+            carve: Some(CarveSection::default()),
+            refine: Some(RefineSection::default()),
+        }
+    }
+}
+
+impl Scene {
+    /// Reads and checks a scene.
+    ///
+    /// # Errors
+    /// [`SceneError`], with the path.
+    pub fn read(path: &Path) -> Result<Self, SceneError> {
+        let yaml =
+            std::fs::read_to_string(path).map_err(|source| SceneError::Read { path: path.to_owned(), source })?;
+        Self::from_yaml(&yaml).map_err(|error| SceneError::In { path: path.to_owned(), error: Box::new(error) })
+    }
+
+    /// Parses and checks a scene.
+    ///
+    /// # Errors
+    /// [`SceneError::Yaml`], [`SceneError::OutOfRange`].
+    ///
+    /// # Example
+    /// ```
+    /// let scene = touchup::scene::Scene::from_yaml("contact: { on_n: 0.5 }")?;
+    /// assert_eq!(scene.contact_params().unwrap().on, 0.5);
+    /// assert!(scene.sync.is_none());
+    /// # Ok::<(), touchup::scene::SceneError>(())
+    /// ```
+    pub fn from_yaml(yaml: &str) -> Result<Self, SceneError> {
+        let scene: Self = serde_saphyr::from_str(yaml).map_err(|error| yaml_error(&error))?;
+        scene.check()?;
+        Ok(scene)
+    }
+
+    /// Checks every range; to be called again after a flag changed a value.
+    ///
+    /// # Errors
+    /// [`SceneError::OutOfRange`], [`SceneError::Incomplete`].
+    pub fn check(&self) -> Result<(), SceneError> {
+        self.sync.iter().try_for_each(SyncSection::check)?;
+        self.compensation.iter().try_for_each(CompensationSection::check)?;
+        self.contact.iter().try_for_each(ContactSection::check)?;
+        self.tip.iter().try_for_each(TipSection::check)?;
+        self.scan.iter().try_for_each(ScanSection::check)?;
+        self.sliding.iter().try_for_each(SlidingSection::check)?;
+        self.carve.iter().try_for_each(CarveSection::check)?;
+        self.refine.iter().try_for_each(RefineSection::check)?;
+        let asks_for_spring =
+            self.refine.as_ref().is_some_and(|refine| refine.contact_model == Some(ModelName::Spring));
+        if asks_for_spring && self.tip.as_ref().is_none_or(|tip| tip.stiffness_n_per_mm.is_none()) {
+            return Err(SceneError::Incomplete {
+                key: "refine.contact_model: spring",
+                needs: "tip.stiffness_n_per_mm",
+            });
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,137 @@
+//! From sections to the settings of the rooms: units into SI, once.
+
+use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
+
+use super::{AlongName, CarveSection, Mode, ModelName, RefineSection, Scene, SlidingSection, StepName};
+use crate::refine::{Along, CarveParams, ContactModel, RefineParams, RoiSize, SlidingParams, StepRule, TipParams};
+use crate::touch::{CompensatorParams, ContactGateParams, Payload, SyncParams, Wrench, WrenchFrame};
+
+impl Scene {
+    /// Settings of the synchroniser; without `sync` only messages of equal stamp pair.
+    pub fn sync_params(&self) -> SyncParams {
+        let Some(sync) = &self.sync else {
+            return SyncParams { reorder_ns: 0, largest_gap_ns: 0, ..SyncParams::default() };
+        };
+        SyncParams {
+            reorder_ns: nanoseconds(sync.reorder_ms, 1e6),
+            largest_gap_ns: nanoseconds(sync.largest_gap_ms, 1e6),
+            largest_jump_ns: nanoseconds(sync.largest_jump_s, 1e9),
+            wrench_offset_ns: nanoseconds(sync.wrench_offset_ms, 1e6),
+            capacity: sync.capacity,
+        }
+    }
+
+    /// Settings of the compensator for a wrench that arrives in the axes of `wrench_frame`.
+    pub fn compensator_params(&self, wrench_frame: WrenchFrame) -> CompensatorParams {
+        let Some(compensation) = &self.compensation else {
+            return CompensatorParams { wrench_frame, ..CompensatorParams::default() };
+        };
+        let [x, y, z, w] = compensation.sensor_orientation_xyzw.unwrap_or([0.0, 0.0, 0.0, 1.0]);
+        let rotation = UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
+        CompensatorParams {
+            wrench_frame,
+            pose_ts: Isometry3::from_parts(metres(compensation.sensor_position_mm).into(), rotation),
+            payload: compensation.payload.as_ref().map(|payload| Payload {
+                mass: payload.mass_kg,
+                p_sc: metres(payload.centre_mm),
+                gravity_o: payload.gravity_m_per_s2.into(),
+            }),
+            bias_s: compensation
+                .bias
+                .as_ref()
+                .map(|bias| Wrench { force: bias.force_n.into(), torque: bias.torque_nm.into() }),
+        }
+    }
+
+    /// Thresholds of the contact gate, if there is one.
+    pub fn contact_params(&self) -> Option<ContactGateParams> {
+        self.contact.as_ref().map(|contact| ContactGateParams { on: contact.on_n, off: contact.off_n })
+    }
+
+    /// The ball; a point that does not give way when the scene names none.
+    pub fn tip_params(&self) -> TipParams {
+        let tip = self.tip.as_ref();
+        TipParams {
+            radius: tip.map_or(0.0, |tip| tip.radius_mm / 1e3),
+            stiffness: tip.and_then(|tip| tip.stiffness_n_per_mm).map(|stiffness| stiffness * 1e3),
+        }
+    }
+
+    /// Settings of the refiner for a wrench that arrives in the axes of `wrench_frame`; `None` without `refine`.
+    pub fn refine_params(&self, wrench_frame: WrenchFrame) -> Option<RefineParams> {
+        let section = self.refine.as_ref()?;
+        let mut params = match section.mode {
+            Mode::Paper => RefineParams::paper(self.tip_params()),
+            Mode::Robust => RefineParams {
+                gate: self.contact_params(),
+                sliding: self.sliding.as_ref().map(SlidingSection::params),
+                carve: self.carve.as_ref().map(CarveSection::params),
+                ..RefineParams::robust(self.tip_params())
+            },
+        };
+        params.compensator = self.compensator_params(wrench_frame);
+        params.scan_noise = self.scan.as_ref().map_or(0.0, |scan| scan.noise_mm / 1e3);
+        section.override_mut(&mut params);
+        Some(params)
+    }
+}
+
+impl SlidingSection {
+    fn params(&self) -> SlidingParams {
+        SlidingParams {
+            smoothing: self.smoothing_ms / 1e3,
+            velocity_smoothing: self.velocity_smoothing_ms / 1e3,
+            slowest: self.slowest_mm_per_s / 1e3,
+            cone_cosine: self.cone_cosine,
+        }
+    }
+}
+
+impl CarveSection {
+    fn params(&self) -> CarveParams {
+        CarveParams {
+            rate: self.rate_per_s,
+            tolerance: self.tolerance_mm / 1e3,
+            contact_cone_cosine: self.contact_cone_cosine,
+            largest_contact_depth: self.largest_contact_depth_mm / 1e3,
+        }
+    }
+}
+
+impl RefineSection {
+    /// What the scene says itself, over what the mode has.
+    fn override_mut(&self, params: &mut RefineParams) {
+        let dynamics = &mut params.dynamics;
+        let sigmoid = ContactModel::Sigmoid { f_max_n: self.f_max_n, h_min_m: self.h_min_mm / 1e3, delta: self.delta };
+        dynamics.model = match (self.contact_model, dynamics.model, params.tip.stiffness) {
+            (Some(ModelName::Spring), _, Some(stiffness_n_per_m)) => ContactModel::Spring { stiffness_n_per_m },
+            (Some(ModelName::Sigmoid), ..) | (None, ContactModel::Sigmoid { .. }, _) => sigmoid,
+            (_, as_is, _) => as_is,
+        };
+        let is_sigmoid = matches!(dynamics.model, ContactModel::Sigmoid { .. });
+        dynamics.take_out_rigid_offset = is_sigmoid && self.mode == Mode::Robust;
+        dynamics.alpha_m_per_n_s = self.alpha_m_per_n_s.unwrap_or(dynamics.alpha_m_per_n_s);
+        dynamics.beta_per_n2_s = self.beta_per_n2_s.unwrap_or(dynamics.beta_per_n2_s);
+        dynamics.rule = match self.step {
+            Some(StepName::Lie) => StepRule::Lie,
+            Some(StepName::Corrected) => StepRule::DriftCorrected,
+            Some(StepName::Dp5) => StepRule::DormandPrince,
+            None => dynamics.rule,
+        };
+        dynamics.along = match self.along {
+            Some(AlongName::Normal0) => Along::InitialNormal,
+            Some(AlongName::Force) => Along::Force,
+            None => dynamics.along,
+        };
+        params.roi = self.roi_mm.map_or(params.roi, |radius_mm| RoiSize::Radius(radius_mm / 1e3));
+    }
+}
+
+/// `value` in units of `unit_ns`; checked before, so that it fits.
+fn nanoseconds(value: f64, unit_ns: f64) -> i64 {
+    (value * unit_ns).round() as i64
+}
+
+fn metres(mm: [f64; 3]) -> Vector3<f64> {
+    Vector3::from(mm) / 1e3
+}
