@@ -1,1 +1,12 @@
-fn main() {}
+//! Starts logging and hands over to the command line.
+
+use std::process::ExitCode;
+
+use tracing_subscriber::EnvFilter;
+
+fn main() -> ExitCode {
+    // RUST_LOG=touchup=debug shows more; results go to stdout, all else to stderr
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn"));
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
+    touchup::cli::run(std::env::args_os())
+}

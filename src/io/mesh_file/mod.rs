@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{Point3, Vector3};
 
-use super::atomic::write_atomically;
+use super::atomic::{AtomicFile, write_atomically};
 use crate::mesh::{MeshError, RepairReport, TriMesh, repair};
 use defect::Syntax;
 pub use defect::{Defect, Place};
@@ -171,6 +171,15 @@ fn sides(mesh: &TriMesh) -> Vector3<f64> {
     let empty = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
     let (low, high) = mesh.positions().iter().fold(empty, |(low, high), p| (low.inf(&p.coords), high.sup(&p.coords)));
     high - low
+}
+
+/// Whether [`write_mesh`] can write there: to be asked before long work.
+///
+/// # Errors
+/// As [`write_mesh`].
+pub fn check_target(path: &Path) -> Result<(), MeshFileError> {
+    Format::of_name(path).ok_or_else(|| MeshFileError::UnknownFormat { path: path.into() })?;
+    AtomicFile::create(path).map(drop).map_err(|source| MeshFileError::Write { path: path.into(), source })
 }
 
 /// Writes a mesh as PLY (binary, double), STL (binary, which is single) or OBJ, by the extension of `path`.

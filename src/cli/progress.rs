@@ -1,0 +1,59 @@
+//! A bar for work that takes longer than a second: on stderr, and only when that is a terminal.
+
+use std::io::{IsTerminal, stderr};
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+/// Work shorter than this shows nothing.
+const QUIET_FOR: Duration = Duration::from_secs(1);
+/// The clock is looked at once in this many steps.
+const STEPS_PER_LOOK: u64 = 1024;
+
+/// Counts steps; shows them once the work has taken a second. The bar vanishes when dropped.
+#[derive(Debug)]
+pub struct Progress {
+    bar: ProgressBar,
+    started: Instant,
+    steps: u64,
+    waiting: bool,
+}
+
+impl Progress {
+    /// `steps`: how many there will be, where that is known.
+    pub fn new(what: &'static str, steps: Option<u64>) -> Self {
+        let bar = ProgressBar::with_draw_target(steps, ProgressDrawTarget::hidden());
+        let template = match steps {
+            Some(_) => "{msg} {wide_bar} {percent}% {eta}",
+            None => "{msg} {spinner} {human_pos} {elapsed}",
+        };
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style);
+        }
+        bar.set_message(what);
+        Self { bar, started: Instant::now(), steps: 0, waiting: stderr().is_terminal() }
+    }
+
+    /// One step is done.
+    #[inline]
+    pub fn step(&mut self) {
+        self.steps += 1;
+        if self.steps.is_multiple_of(STEPS_PER_LOOK) {
+            self.look();
+        }
+    }
+
+    fn look(&mut self) {
+        if self.waiting && self.started.elapsed() > QUIET_FOR {
+            self.bar.set_draw_target(ProgressDrawTarget::stderr());
+            self.waiting = false;
+        }
+        self.bar.set_position(self.steps);
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}

@@ -1,0 +1,100 @@
+//! A recording from its first message to its last, as samples.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::Losses;
+use super::progress::Progress;
+use crate::io::recording::{Recorded, RecordingError, RecordingReader, Topics};
+use crate::touch::{Message, Sample, Synchroniser, WrenchFrame};
+
+/// Reasons that are gaps in the recording itself; every other one is a message lost on the way.
+const NOT_A_LOSS: [&str; 4] = ["gap", "no_pose_before", "no_pose_after", "duplicate"];
+
+/// What a replay found besides its samples.
+#[derive(Debug, Default)]
+pub struct Replayed {
+    /// Wrenches of the recording: each could have been a sample.
+    pub wrenches: u64,
+    /// Wrenches that became none, by reason; reasons of lost poses begin with `pose_`.
+    pub refused: BTreeMap<String, u64>,
+    /// What a better recording would not lack.
+    pub losses: Losses,
+}
+
+/// Gives each sample of `recording` to `each`, in order of time.
+///
+/// # Errors
+/// [`RecordingError`] when the recording is damaged before its first message; later damage is a loss.
+pub fn replay(
+    mut recording: RecordingReader,
+    sync: &mut Synchroniser,
+    mut each: impl FnMut(&Sample),
+) -> Result<Replayed, RecordingError> {
+    let mut replayed = Replayed::default();
+    let mut progress = Progress::new("replay", recording.message_count());
+    let mut has_begun = false;
+    for message in recording.by_ref() {
+        match message {
+            Ok(message) => sync.push(taken(message, &mut replayed.wrenches)),
+            Err(damage) if !has_begun => return Err(damage),
+            Err(damage) => replayed.losses.push(damage.to_string()),
+        }
+        has_begun = true;
+        progress.step();
+        std::iter::from_fn(|| sync.next_sample()).for_each(|sample| each(&sample));
+    }
+    sync.finish();
+    std::iter::from_fn(|| sync.next_sample()).for_each(|sample| each(&sample));
+    replayed.account(&recording, sync);
+    Ok(replayed)
+}
+
+fn taken(message: Recorded, wrenches: &mut u64) -> Message {
+    match message {
+        Recorded::Pose(pose) => Message::Pose(pose),
+        Recorded::Wrench(wrench) => {
+            *wrenches += 1;
+            Message::Wrench(wrench)
+        }
+    }
+}
+
+/// In which axes the wrenches are: a header that names the frame of the pose means O, any other the stylus' own.
+///
+/// Reads up to the first message of both topics; a recording that has only one of them is told by the replay.
+///
+/// # Errors
+/// [`RecordingError`] of opening it.
+pub fn wrench_frame(path: &Path, topics: &Topics) -> Result<WrenchFrame, RecordingError> {
+    let mut recording = RecordingReader::open(path, topics)?;
+    while recording.pose_frame().is_none() || recording.wrench_frame().is_none() {
+        if !matches!(recording.next(), Some(Ok(_))) {
+            break;
+        }
+    }
+    let same = recording.wrench_frame() == recording.pose_frame();
+    Ok(if same { WrenchFrame::Object } else { WrenchFrame::Sensor })
+}
+
+impl Replayed {
+    /// Takes over what reader and synchroniser dropped.
+    fn account(&mut self, recording: &RecordingReader, sync: &Synchroniser) {
+        let of_wrenches = sync.counts().reasons().map(|(reason, count)| (reason, reason.to_owned(), count));
+        let of_poses = sync.pose_counts().reasons().map(|(reason, count)| (reason, format!("pose_{reason}"), count));
+        for (reason, name, count) in of_wrenches.into_iter().chain(of_poses).filter(|(.., count)| *count > 0) {
+            if !NOT_A_LOSS.contains(&reason) {
+                self.losses.push(format!("{count} messages {name}"));
+            }
+            self.refused.insert(name, count);
+        }
+        for (reason, bad) in recording.bad_messages() {
+            let (path, place, count) = (bad.path.display(), &bad.place, bad.count);
+            self.losses.push(format!("{count} messages {reason}, the first in {path} at {place}"));
+            *self.refused.entry(reason.name().to_owned()).or_default() += count;
+        }
+        if recording.truncated() {
+            self.losses.push("the recording has lost its end; what is there was read".to_owned());
+        }
+    }
+}
