@@ -36,6 +36,9 @@ struct Plane {
     held_back: f64,
 }
 
+/// Where the ball rests, and which planes hold it back how far, m.
+type Rest = (Point3<f64>, Vec<(usize, f64)>);
+
 /// Moves a ball from `from`, where it is free, towards `to`, and returns where it comes to rest: the point nearest to
 /// `to`, near `from`, at which it does not enter the surface; with its contacts there.
 ///
@@ -92,11 +95,7 @@ fn nearest_in_front(planes: &mut [Plane], to: &Point3<f64>) -> Point3<f64> {
 }
 
 /// The same for at most four planes, by trying every three, two and one of them; with the shares of those that push.
-fn nearest_in_front_of_few(
-    planes: &[Plane],
-    few: &[usize],
-    to: &Point3<f64>,
-) -> Option<(Point3<f64>, Vec<(usize, f64)>)> {
+fn nearest_in_front_of_few(planes: &[Plane], few: &[usize], to: &Point3<f64>) -> Option<Rest> {
     (1u32..1 << few.len()).filter(|set| set.count_ones() <= 3).find_map(|set| {
         let chosen: Vec<usize> = (0..few.len()).filter(|i| set >> i & 1 == 1).map(|i| few[i]).collect();
         let mut normals = Matrix3::zeros();

@@ -4,11 +4,14 @@
 //! over it and says what it felt ([`touch`]). All randomness comes from a seed.
 
 mod ball;
+mod contour;
 mod error;
+mod field;
 mod path;
 mod peaks;
 mod plate;
 mod plate_mesh;
+mod scanner;
 mod sensor;
 mod stylus;
 mod surface;
@@ -20,6 +23,7 @@ pub use error::SimError;
 pub use path::{Lines, PathParams, Region, Stroke, around_wall, plan_demo, plan_mesh, raster};
 pub use peaks::{Peaks, add_vertex_noise};
 pub use plate::{Plate, Stadium, TruthFeature, TruthShape};
+pub use scanner::{ScanQuality, ScannerParams, measure_badness, scan};
 pub use sensor::SensorParams;
 pub use stylus::{Moment, StylusParams, Touch, touch};
 pub use surface::{Bounds, Surface, SurfacePoint};

@@ -1,0 +1,288 @@
+//! A scanner that makes a bad mesh of a good surface.
+//!
+//! What it loses is lost on the signed distance, on a grid: a flat closing across the view fills holes that are too
+//! narrow, a blur rounds the edges, an offset makes the part too fat, a smooth random field makes it wavy. The level of
+//! such a field cannot cross itself, and its triangles keep to that. Then what cannot be seen goes, and the rest is
+//! misplaced.
+
+use nalgebra::{Isometry3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardUniform};
+use rand_pcg::Pcg64;
+
+use super::contour::contour;
+use super::error::{SimError, not_negative, positive};
+use super::field::{Field, cells};
+use super::surface::{Bounds, Surface};
+use super::wander::gauss;
+use crate::mesh::TriMesh;
+
+/// How bad the scanner is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScannerParams {
+    /// Median length of the triangles' edges, m.
+    pub edge: f64,
+    /// Noise along the normals, root mean square, m.
+    pub noise: f64,
+    /// Distance over which the noise stays alike, m.
+    pub noise_correlation: f64,
+    /// Share of the noise's power that is independent from vertex to vertex.
+    pub white_share: f64,
+    /// How much too fat the part looks, m.
+    pub bias: f64,
+    /// Standard deviation of the blur that rounds the edges, m.
+    pub rounding: f64,
+    /// Holes and slots narrower than this are closed over, m; where only a little narrower the noise may open them.
+    pub closes_holes_below: f64,
+    /// How far the scan is misplaced, m.
+    pub misplaced: f64,
+    /// And by which angle, rad.
+    pub misplaced_angle: f64,
+    /// Direction in which the scanner looks, in O.
+    pub view: Unit<Vector3<f64>>,
+    /// Whether what cannot be seen from the view direction is missing; otherwise the scan is closed.
+    pub open_back: bool,
+    /// Of all randomness.
+    pub seed: u64,
+}
+
+impl Default for ScannerParams {
+    /// A hand-held structured-light scanner of the cheaper kind, looking down.
+    fn default() -> Self {
+        Self {
+            edge: 2.4e-3,
+            noise: 0.6e-3,
+            noise_correlation: 3.5e-3,
+            white_share: 0.02,
+            bias: 0.3e-3,
+            rounding: 0.8e-3,
+            closes_holes_below: 11e-3,
+            misplaced: 0.2e-3,
+            misplaced_angle: 0.15f64.to_radians(),
+            view: -Vector3::z_axis(),
+            open_back: true,
+            seed: 1,
+        }
+    }
+}
+
+/// Nodes of the grid to a wanted edge.
+const NODES_PER_EDGE: f64 = 3.0;
+/// Most nodes of the grid: 300 × 300 × 250 mm at 0.8 mm; 0.3 GB.
+const MAX_NODES: usize = 36_000_000;
+/// Side of the contour's cells over the median edge of the evened triangles, measured.
+const CELL_PER_EDGE: f64 = 1.065;
+/// Waves that make up the noise: with a hundred its distribution is Gaussian to the eye.
+const WAVES: usize = 96;
+/// Faces that look away from the scanner by more than this (cosine of the angle to the view) are not seen. Walls that
+/// stand along the view are: the scanner is moved about.
+const SEEN: f64 = -0.35;
+/// Patches of fewer faces do not stand alone: seen ones are dirt, unseen ones in between are filled in.
+const FEWEST_FACES: usize = 30;
+
+impl ScannerParams {
+    fn check(&self) -> Result<(), SimError> {
+        positive("the scan's edge length", self.edge, "m")?;
+        not_negative("the scan's noise", self.noise, "m")?;
+        positive("the correlation length of the noise", self.noise_correlation, "m")?;
+        not_negative("the white share of the noise", self.white_share, "")?;
+        not_negative("the coloured share of the noise", 1.0 - self.white_share, "")?;
+        not_negative("the rounding", self.rounding, "m")?;
+        not_negative("the width of closed holes", self.closes_holes_below, "m")?;
+        not_negative("the misplacement", self.misplaced, "m")?;
+        not_negative("the misplacement's angle", self.misplaced_angle, "rad")?;
+        not_negative("the size of the bias", self.bias.abs(), "m")
+    }
+
+    /// Distance (m) from the surface beyond which the field need not be known: blur, bias and noise stay within.
+    fn band(&self) -> f64 {
+        3.0 * self.rounding + self.bias.abs() + 4.0 * self.noise
+    }
+}
+
+/// Scans a surface as badly as asked; same parameters, same mesh.
+///
+/// # Errors
+/// [`SimError::BadParameter`]; [`SimError::TooFine`] when the grid would not fit; [`SimError::NothingSeen`].
+pub fn scan(surface: &dyn Surface, params: &ScannerParams) -> Result<TriMesh, SimError> {
+    params.check()?;
+    let mut rng = Pcg64::seed_from_u64(params.seed);
+    let turn = UnitQuaternion::rotation_between(&Vector3::z(), &-params.view.into_inner())
+        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
+    let frame_ov = Isometry3::from_parts(surface.bounds().centre().coords.into(), turn);
+    let field = scanned_field(surface, params, &frame_ov, &mut rng)?;
+    let side = params.edge * CELL_PER_EDGE;
+    let mut soup = contour(&field, side);
+    soup.even_out_mut(&field, side);
+    for p in &mut soup.positions {
+        let normal = field.gradient(p).try_normalize(0.0).unwrap_or_else(Vector3::z);
+        *p += normal * (gauss(&mut rng) * params.noise * params.white_share.sqrt());
+    }
+    soup.retain_mut(FEWEST_FACES, |corners| !params.open_back || is_seen(&field, corners));
+    soup.drop_folds_mut(&field);
+    soup.tidy_mut();
+    soup.drop_unused_mut();
+    if soup.faces.is_empty() {
+        return Err(SimError::NothingSeen);
+    }
+    let slip_v = slip(params, &mut rng);
+    soup.positions.iter_mut().for_each(|p| *p = frame_ov * (slip_v * *p));
+    Ok(TriMesh::new(soup.positions, soup.faces)?)
+}
+
+/// The signed distance as the scanner's filters leave it, in V; zero where the scan will be.
+fn scanned_field(
+    surface: &dyn Surface,
+    params: &ScannerParams,
+    frame_ov: &Isometry3<f64>,
+    rng: &mut Pcg64,
+) -> Result<Field, SimError> {
+    let pitch = params.edge / NODES_PER_EDGE;
+    let bounds = bounds_in(&surface.bounds(), frame_ov).grown(params.band() + params.edge);
+    let nodes: f64 = bounds.size().iter().map(|side| side / pitch + 2.0).product();
+    if !nodes.is_finite() || nodes > MAX_NODES as f64 {
+        return Err(SimError::TooFine { size_m: bounds.size().max(), edge_m: params.edge, limit: MAX_NODES });
+    }
+    let band = params.band();
+    let mut field = Field::of_surface(surface, frame_ov, [bounds.min, bounds.max], pitch, band);
+    field.close_mut(params.closes_holes_below / 2.0);
+    field.blur_mut(params.rounding);
+    let waves = Waves::new(params, rng);
+    let (mean, deviation) = waves.spread(&field);
+    let amplitude = params.noise * (1.0 - params.white_share).sqrt() / deviation;
+    // far from the level the noise decides nothing
+    field.map_mut(|p, d| if d.abs() < band { d - params.bias - (waves.at(p) - mean) * amplitude } else { d });
+    Ok(field)
+}
+
+/// A smooth random field: waves with random directions, so that values correlate as exp(−r²/2ℓ²).
+struct Waves(Vec<(Vector3<f64>, f64)>);
+
+impl Waves {
+    fn new(params: &ScannerParams, rng: &mut Pcg64) -> Self {
+        let mut wave = || {
+            let vector = Vector3::from_fn(|_, _| gauss(rng) / params.noise_correlation);
+            let phase: f64 = StandardUniform.sample(rng);
+            (vector, std::f64::consts::TAU * phase)
+        };
+        Self((0..WAVES).map(|_| wave()).collect())
+    }
+
+    fn at(&self, p: &Point3<f64>) -> f64 {
+        self.0.iter().map(|(k, phase)| (k.dot(&p.coords) + phase).cos()).sum()
+    }
+
+    /// Mean and standard deviation over the nodes at the field's zero level: with them the noise of every seed is as
+    /// strong as asked, and the bias is the bias.
+    fn spread(&self, field: &Field) -> (f64, f64) {
+        let at_level = cells(field.nodes).filter(|&node| field.value(node).abs() < field.pitch);
+        let values: Vec<f64> = at_level.map(|node| self.at(&field.node(node))).collect();
+        let count = values.len().max(1) as f64;
+        let mean = values.iter().sum::<f64>() / count;
+        let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / count;
+        (mean, variance.sqrt().max(f64::MIN_POSITIVE))
+    }
+}
+
+/// The box around a box, seen from a frame V.
+fn bounds_in(bounds: &Bounds, frame_ov: &Isometry3<f64>) -> Bounds {
+    let corner = |k: usize| {
+        let pick = |i: usize| if k >> i & 1 == 0 { bounds.min[i] } else { bounds.max[i] };
+        frame_ov.inverse() * Point3::new(pick(0), pick(1), pick(2))
+    };
+    let corners: Vec<_> = (0..8).map(corner).collect();
+    Bounds {
+        min: corners.iter().fold(corners[0], |m, p| m.inf(p)),
+        max: corners.iter().fold(corners[0], |m, p| m.sup(p)),
+    }
+}
+
+/// Whether a face looks towards the scanner and nothing stands in between.
+fn is_seen(field: &Field, [a, b, c]: &[Point3<f64>; 3]) -> bool {
+    let middle = Point3::from((a.coords + b.coords + c.coords) / 3.0);
+    let Some(normal) = field.gradient(&middle).try_normalize(0.0) else { return false };
+    // from a little off the face, so that it does not hide itself
+    let start = middle + normal * (2.0 * field.pitch);
+    let top = field.node(field.nodes.map(|n| n - 1)).z;
+    let steps = ((top - start.z) / field.pitch).max(0.0) as usize;
+    normal.z > SEEN && (0..steps).all(|i| field.at(&(start + Vector3::z() * (i as f64 * field.pitch))) > -field.pitch)
+}
+
+/// The motion by which the scan is misplaced, about the middle of the part.
+fn slip(params: &ScannerParams, rng: &mut Pcg64) -> Isometry3<f64> {
+    let mut direction = || Unit::new_normalize(Vector3::from_fn(|_, _| gauss(rng)));
+    let shift = Translation3::from(direction().into_inner() * params.misplaced);
+    let turn = Rotation3::from_axis_angle(&direction(), params.misplaced_angle);
+    Isometry3::from_parts(shift, turn.into())
+}
+
+/// How far a scan is from the surface it shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScanQuality {
+    /// how many triangles
+    pub faces: usize,
+    /// median length of the edges, m
+    pub edge_median: f64,
+    /// mean distance of the mesh's points from the surface, m
+    pub mean: f64,
+    /// root mean square of it, m
+    pub rms: f64,
+    /// exceeded by one in twenty points, m
+    pub p95: f64,
+    /// median signed distance, m; positive where the scan lies outside the part
+    pub bias: f64,
+}
+
+/// Points measured on each face: its middle and three points around it, each standing for a quarter of its area.
+const SAMPLES: [[f64; 3]; 4] = [
+    [1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0],
+    [2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0],
+    [1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0],
+    [1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0],
+];
+
+/// Measures a mesh against the surface it should show; every point counts by the area it stands for.
+///
+/// - `within`: which points count, e.g. those of a touched region; the edges are those of all faces.
+/// - returns `None` when no point counts.
+pub fn measure_badness(
+    mesh: &TriMesh,
+    surface: &dyn Surface,
+    within: impl Fn(&Point3<f64>) -> bool,
+) -> Option<ScanQuality> {
+    let mut edges = Vec::new();
+    let mut points: Vec<(f64, f64)> = Vec::new();
+    for (face, _) in mesh.faces() {
+        let corners @ [a, b, c] = mesh.triangle(face);
+        edges.extend([(b - a).norm(), (c - b).norm(), (a - c).norm()].map(|length| (length, 1.0)));
+        let area = mesh.double_area_normal(face).norm() / 8.0;
+        let at = |w: [f64; 3]| Point3::from((0..3).map(|i| corners[i].coords * w[i]).sum::<Vector3<f64>>());
+        points.extend(SAMPLES.map(at).iter().filter(|p| within(p)).map(|p| (surface.signed_distance(p), area)));
+    }
+    let area: f64 = points.iter().map(|p| p.1).sum();
+    let mean_of = |f: &dyn Fn(f64) -> f64| points.iter().map(|(d, w)| f(*d) * w).sum::<f64>() / area;
+    let (mean, rms) = (mean_of(&f64::abs), mean_of(&|d| d * d).sqrt());
+    let mut sizes: Vec<_> = points.iter().map(|(d, w)| (d.abs(), *w)).collect();
+    Some(ScanQuality {
+        faces: mesh.face_count(),
+        edge_median: quantile(&mut edges, 0.5)?,
+        mean,
+        rms,
+        p95: quantile(&mut sizes, 0.95)?,
+        bias: quantile(&mut points, 0.5)?,
+    })
+}
+
+/// The value below which the given share of the weight lies.
+fn quantile(values: &mut [(f64, f64)], share: f64) -> Option<f64> {
+    values.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let total: f64 = values.iter().map(|v| v.1).sum();
+    let mut below = 0.0;
+    values
+        .iter()
+        .find(|v| {
+            below += v.1;
+            below >= share * total
+        })
+        .map(|v| v.0)
+}
