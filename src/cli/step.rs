@@ -1,0 +1,135 @@
+//! `touchup step`: the paper's equations for one held sample per JSON line, so that any other implementation can be
+//! compared.
+//!
+//! In: `{"p_m","force_n","b_m","n","dt_s","h_min_m","delta","f_max_n","alpha_m_per_n_s","beta_per_n2_s",
+//! "step":"lie|corrected|dp5","along":"normal0|force"}`, vectors as arrays of three, all in one frame;
+//! `k_n_per_m` instead of the three sigmoid values selects the linear spring. Out, in the same order:
+//! `{"b_m","n"}` with 17 digits, or `{"error"}`; a bad line does not end the run. No rigid-contact offset is taken out.
+
+use std::io::{self, BufRead, Write};
+
+use nalgebra::{Point3, Vector3};
+use serde::Deserialize;
+
+use crate::refine::{Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, StepRule};
+
+/// A longer line is not a sample.
+const LONGEST_LINE: u64 = 64 * 1024;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Question {
+    p_m: [f64; 3],
+    force_n: [f64; 3],
+    b_m: [f64; 3],
+    n: [f64; 3],
+    dt_s: f64,
+    h_min_m: Option<f64>,
+    delta: Option<f64>,
+    f_max_n: Option<f64>,
+    k_n_per_m: Option<f64>,
+    alpha_m_per_n_s: f64,
+    beta_per_n2_s: f64,
+    step: Rule,
+    along: Direction,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Rule {
+    Lie,
+    Corrected,
+    Dp5,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Direction {
+    Normal0,
+    Force,
+}
+
+#[derive(Debug, thiserror::Error)]
+enum StepError {
+    #[error("{0}")]
+    Json(#[from] serde_json::Error),
+    #[error("missing field `{0}` (or give `k_n_per_m` for the linear spring)")]
+    Missing(&'static str),
+    #[error("`{0}` and `k_n_per_m` exclude each other: one is of the sigmoid, the other of the linear spring")]
+    TwoModels(&'static str),
+    #[error("the line is longer than {LONGEST_LINE} bytes")]
+    TooLong,
+    #[error(transparent)]
+    Dynamics(#[from] DynamicsError),
+}
+
+/// Answers every line of `input` with one line on `output`, flushed at once; blank lines are skipped.
+///
+/// # Errors
+/// Only of reading and writing; a line that cannot be answered gets `{"error": …}`.
+pub fn run(mut input: impl BufRead, mut output: impl Write) -> io::Result<()> {
+    let mut line = Vec::new();
+    loop {
+        line.clear();
+        let length = io::Read::take(&mut input, LONGEST_LINE).read_until(b'\n', &mut line)?;
+        if length == 0 {
+            return Ok(());
+        }
+        let reply = if length as u64 == LONGEST_LINE && line.last() != Some(&b'\n') {
+            input.skip_until(b'\n')?;
+            Err(StepError::TooLong)
+        } else if line.trim_ascii().is_empty() {
+            continue;
+        } else {
+            answer(&line)
+        };
+        writeln!(output, "{}", reply.map_or_else(|error| refusal(&error), |face| as_json(&face)))?;
+        output.flush()?;
+    }
+}
+
+fn answer(line: &[u8]) -> Result<FaceState, StepError> {
+    let question: Question = serde_json::from_slice(line)?;
+    let dynamics = FaceDynamics::new(DynamicsParams {
+        model: model_of(&question)?,
+        alpha_m_per_n_s: question.alpha_m_per_n_s,
+        beta_per_n2_s: question.beta_per_n2_s,
+        rule: match question.step {
+            Rule::Lie => StepRule::Lie,
+            Rule::Corrected => StepRule::DriftCorrected,
+            Rule::Dp5 => StepRule::DormandPrince,
+        },
+        along: match question.along {
+            Direction::Normal0 => Along::InitialNormal,
+            Direction::Force => Along::Force,
+        },
+        take_out_rigid_offset: false,
+    })?;
+    let face = FaceState { b: Point3::from(question.b_m), n: Vector3::from(question.n) };
+    Ok(dynamics.step(&face, &Point3::from(question.p_m), &Vector3::from(question.force_n), question.dt_s)?)
+}
+
+fn model_of(question: &Question) -> Result<ContactModel, StepError> {
+    let sigmoid = [("h_min_m", question.h_min_m), ("delta", question.delta), ("f_max_n", question.f_max_n)];
+    if let Some(stiffness_n_per_m) = question.k_n_per_m {
+        return match sigmoid.iter().find(|(_, value)| value.is_some()) {
+            Some((name, _)) => Err(StepError::TwoModels(name)),
+            None => Ok(ContactModel::Spring { stiffness_n_per_m }),
+        };
+    }
+    let [h_min_m, delta, f_max_n] = sigmoid.map(|(name, value)| value.ok_or(StepError::Missing(name)));
+    Ok(ContactModel::Sigmoid { f_max_n: f_max_n?, h_min_m: h_min_m?, delta: delta? })
+}
+
+fn as_json(face: &FaceState) -> String {
+    format!("{{\"b_m\":{},\"n\":{}}}", array(&face.b.coords), array(&face.n))
+}
+
+/// 17 significant digits name a double uniquely.
+fn array(v: &Vector3<f64>) -> String {
+    format!("[{:.16e},{:.16e},{:.16e}]", v.x, v.y, v.z)
+}
+
+fn refusal(error: &StepError) -> String {
+    serde_json::json!({ "error": error.to_string() }).to_string()
+}
