@@ -73,8 +73,13 @@ def time_from_to(u0, u1, c):
 
 def change_of_u(u0, c, t):
     """u(t) - u(0), t of either sign, to about 45 digits."""
-    digits = 70 + 2 * mp.log10(2 + abs(t)) + 2 * mp.log10(2 + abs(u0)) + abs(c * (1 - c) * t if abs(c * t) < 4000 else 4000) / 2
-    digits += 2 * abs(mp.log10(abs(c))) + 2 * abs(mp.log10(abs(1 - c))) if c not in (0, 1) else min(abs(u0), 4000)
+    digits = 70 + 2 * mp.log10(2 + abs(t)) + 2 * mp.log10(2 + abs(u0))
+    if c in (0, 1):
+        digits += min(abs(u0), 4000)
+    else:
+        digits += 2 * abs(mp.log10(abs(c))) + 2 * abs(mp.log10(abs(1 - c)))
+    if 0 < c < 1:
+        digits += min(abs(c * (1 - c) * t), 400) / 2
     with mp.workdps(int(digits)):
         rate = share(u0) - c
         if rate == 0 or t == 0:

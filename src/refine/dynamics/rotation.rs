@@ -22,6 +22,6 @@ pub(super) fn turn(n: &Vector3<f64>, to: &Vector3<f64>, exponent: f64) -> Vector
         return *n;
     }
     let turned = 2.0 * e * m + ((1.0 - e) * (1.0 - e) * p - 2.0 * e * e) * to;
-    let length = turned.norm();
-    if length > f64::MIN_POSITIVE { turned / length } else { to }
+    // its length is 2e² + p (1 − e²): far above the smallest number, since p is 0 or at least 1e-33
+    turned / turned.norm()
 }

@@ -230,23 +230,20 @@ impl Arc {
     #[inline]
     fn high(&self, d: f64) -> f64 {
         let way = d.abs();
-        let rho = if d < 0.0 { self.lower_rho(way) } else { self.rho };
-        let y = rho * way.exp_m1();
+        let y = if d < 0.0 {
+            let shrunk = (-way).exp_m1();
+            -self.e * shrunk / (self.rest - self.c * self.e * (1.0 + shrunk))
+        } else {
+            self.rho * way.exp_m1()
+        };
         let x = -self.c * y;
         if x.abs() < f64::EPSILON {
             y
         } else if x < LARGEST_PRODUCT {
             x.ln_1p() / -self.c
         } else {
-            (way + ((-way).exp() - self.c * rho).ln()) / -self.c
+            (way + ((-way).exp() - self.c * self.rho).ln()) / -self.c
         }
-    }
-
-    /// ρ at the lower end of an arc that goes down by `way`.
-    #[inline]
-    fn lower_rho(&self, way: f64) -> f64 {
-        let e = self.e * (-way).exp();
-        e / (self.rest - self.c * e)
     }
 
     /// Both integrals, each in the form that keeps its precision.
@@ -261,18 +258,20 @@ impl Arc {
         (way, self.low(way, sign), self.high(sign * way))
     }
 
-    /// ∫ 1/(1 + eᵘ) d|T| = ln((1−c−cE)/(1−c−cE e^D) · e^D)/(1−c) for c ≤ 0, E the lower end.
+    /// ∫ 1/(1 + eᵘ) d|T| = (|D| + ln((1−c−cE)/(1−c−cE′)))/(1−c) for c ≤ 0, from the lower end E to the upper end E′.
     #[inline]
     fn low(&self, way: f64, sign: f64) -> f64 {
         if self.c == 0.0 {
             return way;
         }
-        let e = if sign < 0.0 { self.e * (-way).exp() } else { self.e };
-        let lower = self.rest - self.c * e;
         let shrunk = (-way).exp_m1();
+        let e = if sign < 0.0 { self.e * (1.0 + shrunk) } else { self.e };
+        let lower = self.rest - self.c * e;
         let x = self.rest * shrunk / lower;
         if x > -0.5 {
             -x.ln_1p() / self.rest
+        } else if sign < 0.0 {
+            (way + (lower / (self.rest - self.c * self.e)).ln()) / self.rest
         } else {
             (lower / (self.rest * (1.0 + shrunk) - self.c * e)).ln() / self.rest
         }
