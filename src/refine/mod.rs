@@ -1,4 +1,376 @@
-//! refine
-pub mod dynamics;
+//! The haptic update: one sample of pose and force moves the mesh.
+//!
+//! [`Refiner::push`] is the whole way: compensation, contact gate, closest face, face dynamics, deformation of the
+//! region around it, update of the tree. [`RefineParams::robust`] is what works on real scans, [`RefineParams::paper`]
+//! the published rule.
 
+mod deform;
+pub mod dynamics;
+mod guard;
+mod params;
+mod roi;
+mod sliding;
+
+use nalgebra::{Point3, UnitQuaternion, Vector3};
+use serde::Serialize;
+
+pub use deform::Fit;
 pub use dynamics::{Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, StepRule};
+pub use guard::GuardParams;
+pub use params::{CarveParams, ClosestBy, RefineParams, TipParams};
+pub use roi::RoiSize;
+pub use sliding::{Ball, SlidingParams, TipMotion};
+
+use crate::mesh::{FaceHit, FaceId, MeshError, TriMesh};
+use crate::touch::{Compensator, ContactGate, Sample, SampleError, SettingError};
+use deform::{Clay, Grip};
+use dynamics::turn;
+
+/// A held sample never acts for longer than this, s: what happened in a longer pause is not known.
+const LONGEST_HOLD: f64 = 0.03;
+
+/// Why a sample was refused, or a refiner not built. A refused sample changes nothing.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RefineError {
+    /// Not finite, absurd, or not in order of time.
+    #[error(transparent)]
+    Sample(#[from] SampleError),
+    /// A setting outside its range.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    /// A parameter of the dynamics outside its range, or a step that overflows.
+    #[error(transparent)]
+    Dynamics(#[from] DynamicsError),
+    /// Nothing to refine.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+}
+
+/// The four cases of haptic mismatch \[paper, Fig 5\].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub enum Case {
+    /// 1: nothing is felt and nothing expected.
+    Free,
+    /// 2: the mesh alone says contact; it is carved away.
+    MeshOnly,
+    /// 3: the surface alone is felt; the mesh is raised to it.
+    SurfaceOnly,
+    /// 4: both; the mesh is moved and turned.
+    Both,
+}
+
+/// Haptic mismatch at the face that was touched \[paper, Eq 1–5\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mismatch {
+    /// the handle
+    pub face: FaceId,
+    /// h, signed distance of the ball's contact point from the face, m (Eq 1)
+    pub distance: f64,
+    /// F*, N, in O (Eq 2)
+    pub expected_force_o: Vector3<f64>,
+    /// ε_L = F − F*, N (Eq 4)
+    pub linear: Vector3<f64>,
+    /// ε_R = F* × F, N² (Eq 5)
+    pub rotational: Vector3<f64>,
+}
+
+/// What the force says.
+#[derive(Clone, Copy, Debug)]
+enum Felt {
+    /// no contact
+    Nothing,
+    /// contact; which way the surface faces is not asked \[paper\]
+    Something,
+    /// contact with a surface of this outward normal
+    Surface(Vector3<f64>),
+}
+
+/// What one sample did.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Update {
+    /// which of the four cases
+    pub case: Case,
+    /// at the touched face; `None` in free motion and beyond the reach
+    pub mismatch: Option<Mismatch>,
+    /// how the deformation ended; `None` when nothing was to be moved
+    pub fit: Option<Fit>,
+}
+
+impl Update {
+    const FREE: Self = Self { case: Case::Free, mismatch: None, fit: None };
+}
+
+/// What became of the samples so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct RefineCounts {
+    /// taken
+    pub accepted: u64,
+    /// times that contact began
+    pub contacts: u64,
+    /// samples that moved the mesh, by contact or by carving
+    pub moved: u64,
+    /// updates shortened or given up to keep the mesh sound
+    pub cut_back: u64,
+    /// contacts beyond the reach of any face
+    pub out_of_reach: u64,
+    /// contacts with a force beyond what the contact model can answer; clamped
+    pub clamped: u64,
+}
+
+/// Refines a mesh by touch, sample by sample.
+///
+/// # Example
+/// ```
+/// use nalgebra::{Isometry3, Point3, Vector3};
+/// use touchup::{mesh::TriMesh, refine::*, touch::{Sample, Wrench}};
+///
+/// let p = |x, y| Point3::new(x, y, 0.0);
+/// let mesh = TriMesh::new(vec![p(0.0, 0.0), p(0.01, 0.0), p(0.0, 0.01)], vec![[0, 1, 2]])?;
+/// let mut refiner = Refiner::new(mesh, RefineParams::robust(TipParams { radius: 1e-3, stiffness: Some(2e4) }))?;
+/// // a ball of 1 mm rests 0.1 mm higher than the scan says, pressed with 2 N
+/// let wrench = Wrench { force: Vector3::new(0.0, 0.0, 2.0), torque: Vector3::zeros() };
+/// for i in 0..1000 {
+///     let pose_ot = Isometry3::translation(0.003, 0.003, 1.0e-3 + 0.1e-3 - 2.0 / 2e4);
+///     refiner.push(&Sample { stamp_ns: i * 1_000_000, pose_ot, wrench })?;
+/// }
+/// assert!((refiner.mesh().position(touchup::mesh::VertexId(0)).z - 0.1e-3).abs() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Refiner {
+    params: RefineParams,
+    compensator: Compensator,
+    gate: Option<ContactGate>,
+    motion: TipMotion,
+    dynamics: FaceDynamics,
+    clay: Clay,
+    contact_grip: Grip,
+    carve_grip: Grip,
+    last_ns: Option<i64>,
+    counts: RefineCounts,
+}
+
+/// The ball against the face it touches.
+struct Pressing {
+    hit: FaceHit,
+    /// the face before the update
+    face: FaceState,
+    /// outward normal of the surface as felt, unit; the face's own in [`RefineParams::paper`]
+    normal: Vector3<f64>,
+    /// the point of the reported ball that touches, m, in O
+    point: Point3<f64>,
+    /// force on the stylus; only its part along `normal` where friction is known, N, in O
+    force_o: Vector3<f64>,
+}
+
+impl Refiner {
+    /// Builds tree and buffers; takes O(F log F).
+    ///
+    /// # Errors
+    /// [`RefineError::Setting`], [`RefineError::Dynamics`], [`MeshError::Empty`].
+    pub fn new(mesh: TriMesh, params: RefineParams) -> Result<Self, RefineError> {
+        if mesh.face_count() == 0 {
+            return Err(MeshError::Empty.into());
+        }
+        params.check()?;
+        let mut clay = Clay::new(mesh, params.guard);
+        clay.largest_move =
+            (params.largest_move_edges * clay.mean_edge).max(params.largest_move_noises * params.scan_noise);
+        Ok(Self {
+            compensator: Compensator::new(params.compensator)?,
+            gate: params.gate.map(ContactGate::new).transpose()?,
+            motion: TipMotion::new(params.sliding.unwrap_or(SlidingParams { smoothing: 0.0, ..Default::default() })),
+            dynamics: FaceDynamics::new(params.dynamics)?,
+            clay,
+            contact_grip: Grip::default(),
+            carve_grip: Grip::default(),
+            last_ns: None,
+            counts: RefineCounts::default(),
+            params,
+        })
+    }
+
+    /// Takes the next sample and moves the mesh by what it tells.
+    ///
+    /// # Errors
+    /// [`RefineError::Sample`] for one that is not finite, absurd or not after the last; nothing is changed then.
+    pub fn push(&mut self, sample: &Sample) -> Result<Update, RefineError> {
+        sample.check()?;
+        let dt = sample.seconds_since(self.last_ns)?;
+        self.last_ns = Some(sample.stamp_ns);
+        self.counts.accepted += 1;
+        let tip = self.compensator.compensate(sample);
+        let ball = self.motion.update(&tip, dt, LONGEST_HOLD);
+        let dt = dt.min(LONGEST_HOLD);
+        let felt = self.felt_normal(sample.stamp_ns, &ball);
+        let update = match felt {
+            Felt::Nothing => Update::FREE,
+            _ => self.press(&ball, felt, dt)?,
+        };
+        match self.params.carve {
+            Some(carve) => Ok(self.carve(&carve, &ball, felt, dt, update)),
+            None => Ok(update),
+        }
+    }
+
+    fn felt_normal(&mut self, stamp_ns: i64, ball: &Ball) -> Felt {
+        if let Some(gate) = &mut self.gate {
+            let contact = gate.update(stamp_ns, &ball.force_o).is_some();
+            self.counts.contacts = gate.contacts();
+            if !contact {
+                return Felt::Nothing;
+            }
+        }
+        self.params.sliding.map_or(Felt::Something, |sliding| Felt::Surface(ball.surface_normal(&sliding)))
+    }
+
+    /// Cases 3 and 4, and without a gate also 1 and 2: moves the face that the ball touches.
+    fn press(&mut self, ball: &Ball, felt: Felt, dt: f64) -> Result<Update, RefineError> {
+        let Some(pressing) = self.pressing(ball, felt) else {
+            self.counts.out_of_reach += 1;
+            return Ok(Update { case: Case::SurfaceOnly, mismatch: None, fit: None });
+        };
+        let mismatch = self.mismatch(&pressing);
+        let case = if mismatch.distance < 0.0 { Case::Both } else { Case::SurfaceOnly };
+        let untouched = Ok(Update { case, mismatch: Some(mismatch), fit: None });
+        let face = &pressing.face;
+        // without area a face has no normal; turned away from what is felt it is another surface
+        if face.n == Vector3::zeros() || face.n.dot(&pressing.normal) < self.params.smallest_contact_cosine {
+            return untouched;
+        }
+        self.counts.clamped += u64::from(self.params.dynamics.model.clamps(pressing.force_o.dot(&face.n)));
+        let mut next = self.dynamics.step(face, &pressing.point, &pressing.force_o, dt)?;
+        if let Some(turning) = self.params.turning {
+            next.n = turn(&face.n, &pressing.normal, turning * dt);
+            self.clay.feel(pressing.hit.face, &pressing.normal);
+        }
+        let steps = self.rigid_steps(&pressing, &next);
+        let fit = self.clay.deform(&mut self.contact_grip, pressing.hit.face, self.params.roi, &steps);
+        self.count(fit);
+        Ok(Update { case, mismatch: Some(mismatch), fit: Some(fit) })
+    }
+
+    /// The face that the ball touches; `None` beyond the reach.
+    fn pressing(&self, ball: &Ball, felt: Felt) -> Option<Pressing> {
+        let (mesh, tip) = (&self.clay.mesh, &self.params.tip);
+        let reach = self.clay.largest_move + tip.radius;
+        let seek = match felt {
+            Felt::Surface(normal) => ball.reported - normal * tip.radius,
+            _ => ball.reported,
+        };
+        let hit = match self.params.closest {
+            ClosestBy::Surface => self.clay.tree.closest(mesh, &seek, reach),
+            ClosestBy::Barycentre => self.clay.tree.closest_barycentre(mesh, &seek, reach),
+        }?;
+        let face = FaceState { b: mesh.barycentre(hit.face), n: mesh.normal(hit.face) };
+        Some(match felt {
+            Felt::Surface(normal) => {
+                Pressing { hit, face, normal, point: seek, force_o: normal * ball.force_o.dot(&normal) }
+            }
+            _ => {
+                let point = ball.reported - face.n * tip.radius;
+                Pressing { hit, face, normal: face.n, point, force_o: ball.force_o }
+            }
+        })
+    }
+
+    fn mismatch(&self, pressing: &Pressing) -> Mismatch {
+        let distance = (pressing.point - pressing.face.b).dot(&pressing.face.n);
+        let expected = pressing.face.n * self.params.dynamics.model.force(distance);
+        Mismatch {
+            face: pressing.hit.face,
+            distance,
+            expected_force_o: expected,
+            linear: pressing.force_o - expected,
+            rotational: expected.cross(&pressing.force_o),
+        }
+    }
+
+    /// The rigid motion of the handle to its next state, as steps of its corners, m.
+    ///
+    /// Along the force a corner only goes along it: the turn's sideways part would make the triangles creep.
+    fn rigid_steps(&self, Pressing { hit, face, normal, .. }: &Pressing, next: &FaceState) -> [Vector3<f64>; 3] {
+        let turn = UnitQuaternion::rotation_between(&face.n, &next.n).unwrap_or_else(UnitQuaternion::identity);
+        let longest = self.params.longest_step_edges * self.clay.mean_edge;
+        let along = self.params.dynamics.along == Along::Force;
+        self.clay.mesh.triangle(hit.face).map(|corner| {
+            let arm = corner - face.b;
+            let step = turn * arm - arm + (next.b - face.b);
+            let step = if along { normal * step.dot(normal) } else { step };
+            let length = step.norm();
+            if length > longest { step * (longest / length) } else { step }
+        })
+    }
+
+    /// Case 2: what the ball passes through is not there.
+    fn carve(&mut self, carve: &CarveParams, ball: &Ball, felt: Felt, dt: f64, update: Update) -> Update {
+        let centre = match self.params.tip.stiffness {
+            Some(stiffness) => ball.reported + ball.force_o / stiffness,
+            None => ball.reported,
+        };
+        let radius = self.params.tip.radius;
+        let Some(hit) = self.clay.tree.closest(&self.clay.mesh, &centre, radius) else { return update };
+        let Some((away, depth)) = self.penetration(&centre, &hit) else { return update };
+        let felt_here = matches!(felt, Felt::Surface(normal) if away.dot(&normal) > carve.contact_cone_cosine);
+        if depth <= carve.tolerance || (felt_here && depth < carve.largest_contact_depth) {
+            return update;
+        }
+        let share = -(-carve.rate * dt).exp_m1();
+        let way = (share * (depth - carve.tolerance)).min(2.0 * self.params.longest_step_edges * self.clay.mean_edge);
+        let weight: f64 = hit.barycentric.iter().map(|x| x * x).sum();
+        let steps = hit.barycentric.map(|x| -away * (way * x / weight));
+        let fit = self.clay.deform(&mut self.carve_grip, hit.face, RoiSize::Handle, &steps);
+        self.count(fit);
+        match update.case {
+            Case::Free => Update { case: Case::MeshOnly, mismatch: None, fit: Some(fit) },
+            _ => update,
+        }
+    }
+
+    /// Which way the ball stands out of the mesh, and how deep it is in it, m.
+    fn penetration(&self, centre: &Point3<f64>, hit: &FaceHit) -> Option<(Vector3<f64>, f64)> {
+        let normal = self.clay.mesh.normal(hit.face);
+        let arm = centre - hit.point;
+        let distance = arm.norm();
+        let height = arm.dot(&normal);
+        if normal == Vector3::zeros() {
+            return None;
+        }
+        // beside a rim the arm says little about inside and outside
+        let away = if height.abs() <= SIDEWAYS * distance { normal } else { arm * (height.signum() / distance) };
+        Some((away, self.params.tip.radius - distance.copysign(height)))
+    }
+
+    fn count(&mut self, fit: Fit) {
+        self.counts.moved += 1;
+        self.counts.cut_back += u64::from(fit == Fit::CutBack);
+    }
+
+    /// The mesh as it stands.
+    pub fn mesh(&self) -> &TriMesh {
+        &self.clay.mesh
+    }
+
+    /// Gives the mesh back.
+    pub fn into_mesh(self) -> TriMesh {
+        self.clay.mesh
+    }
+
+    /// The closest face of the mesh as it stands, by true surface distance, nearer than `reach` (m).
+    pub fn closest_face(&self, p: &Point3<f64>, reach: f64) -> Option<FaceHit> {
+        self.clay.tree.closest(&self.clay.mesh, p, reach)
+    }
+
+    /// What became of the samples so far.
+    pub fn counts(&self) -> &RefineCounts {
+        &self.counts
+    }
+
+    /// The faces that the last contact changed.
+    pub fn touched_faces(&self) -> &[FaceId] {
+        self.contact_grip.faces()
+    }
+}
+
+/// An arm whose sine to the face is below this lies sideways.
+const SIDEWAYS: f64 = 0.2;

@@ -23,7 +23,7 @@ use nalgebra::{Point3, Vector3};
 
 pub use contact_model::{ContactModel, LARGEST_SHARE};
 use contact_model::{Hold, Shift};
-use rotation::turn;
+pub use rotation::turn;
 
 /// How far |n| may be from 1 on input: six digits in a file are enough.
 pub const UNIT_TOLERANCE: f64 = 1e-6;

@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 ///
 /// which needs no angle and keeps its precision where n and `to` are nearly opposite. Opposite vectors stay.
 #[inline]
-pub(super) fn turn(n: &Vector3<f64>, to: &Vector3<f64>, exponent: f64) -> Vector3<f64> {
+pub fn turn(n: &Vector3<f64>, to: &Vector3<f64>, exponent: f64) -> Vector3<f64> {
     if exponent == 0.0 {
         return *n;
     }
