@@ -54,6 +54,11 @@ impl Grip {
     pub fn faces(&self) -> &[FaceId] {
         self.roi.neighbourhood.moving()
     }
+
+    /// The vertices that the last update moved.
+    pub fn vertices(&self) -> &[VertexId] {
+        &self.roi.vertices
+    }
 }
 
 impl Clay {

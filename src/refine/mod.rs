@@ -21,7 +21,7 @@ pub use params::{CarveParams, ClosestBy, RefineParams, TipParams};
 pub use roi::RoiSize;
 pub use sliding::{Ball, SlidingParams, TipMotion};
 
-use crate::mesh::{FaceHit, FaceId, MeshError, TriMesh};
+use crate::mesh::{FaceHit, FaceId, MeshError, TriMesh, VertexId};
 use crate::touch::{Compensator, ContactGate, Sample, SampleError, SettingError};
 use deform::{Clay, Grip};
 use dynamics::turn;
@@ -364,6 +364,11 @@ impl Refiner {
     /// What became of the samples so far.
     pub fn counts(&self) -> &RefineCounts {
         &self.counts
+    }
+
+    /// The vertices that the last contact moved.
+    pub fn moved_vertices(&self) -> &[VertexId] {
+        self.contact_grip.vertices()
     }
 
     /// The faces that the last contact changed.
