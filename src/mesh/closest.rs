@@ -2,8 +2,8 @@
 //!
 //! A binary tree over the faces. Boxes are kept in single precision relative to the middle of the mesh and rounded
 //! outward, so a query that prunes by them never misses a face; distances to faces are computed in double precision.
-//! [`FaceTree::refit`] recomputes the boxes of the leaves that hold moved faces and walks up until a box does not
-//! change any more: boxes never only grow, so nothing is left to be tightened later.
+//! [`FaceTree::refit`] recomputes the boxes of the leaves that hold moved faces and all boxes above them: boxes never
+//! only grow, so nothing is left to be tightened later.
 
 use nalgebra::{Point3, Vector3};
 
@@ -19,6 +19,8 @@ const SMALLEST_SHARE: usize = 4;
 const STACK: usize = 96;
 /// Two faces whose squared distances differ relatively by less than this meet at the closest point; 64 roundings.
 const TIE: f64 = 64.0 * f64::EPSILON;
+/// The reach of a query with a hint over the distance to the hinted face.
+const HINT_WIDTH: f64 = 1.0 + 1e-6;
 /// No node.
 const NONE: u32 = u32::MAX;
 
@@ -45,22 +47,39 @@ struct Aabb {
 impl Aabb {
     const EMPTY: Self = Self { lo: [f32::INFINITY; 3], hi: [f32::NEG_INFINITY; 3] };
 
+    #[inline]
     fn union(&self, other: &Self) -> Self {
         Self {
-            lo: std::array::from_fn(|i| self.lo[i].min(other.lo[i])),
-            hi: std::array::from_fn(|i| self.hi[i].max(other.hi[i])),
+            lo: std::array::from_fn(|i| lesser(self.lo[i], other.lo[i])),
+            hi: std::array::from_fn(|i| greater(self.hi[i], other.hi[i])),
         }
     }
 
-    /// Squared distance to a point (relative to the tree's origin); 0 inside; infinite for the empty box.
+    /// Takes in the corners of a face, rounded to nearest; [`Self::rounded_outward`] makes up for that.
     #[inline]
-    fn distance_squared(&self, p: &Vector3<f64>) -> f64 {
-        let mut sum = 0.0;
-        for i in 0..3 {
-            let outside = (f64::from(self.lo[i]) - p[i]).max(p[i] - f64::from(self.hi[i])).max(0.0);
-            sum += outside * outside;
+    fn take(&mut self, mesh: &TriMesh, face: FaceId, origin: &Point3<f64>) {
+        for corner in mesh.triangle(face) {
+            let corner = [corner.x - origin.x, corner.y - origin.y, corner.z - origin.z].map(|x| x as f32);
+            for i in 0..3 {
+                self.lo[i] = lesser(self.lo[i], corner[i]);
+                self.hi[i] = greater(self.hi[i], corner[i]);
+            }
         }
-        sum
+    }
+
+    /// One unit in the last place wider on each side: rounding is monotone, so all corners are inside.
+    #[inline]
+    fn rounded_outward(&self) -> Self {
+        let unit = |x: f32| x.abs() * f32::EPSILON + f32::MIN_POSITIVE;
+        Self { lo: self.lo.map(|x| x - unit(x)), hi: self.hi.map(|x| x + unit(x)) }
+    }
+
+    /// Squared distance to a point (relative to the tree's origin), in single precision; 0 inside.
+    #[inline]
+    fn distance_squared(&self, p: &[f32; 3]) -> f32 {
+        let outside = |i: usize| greater(greater(self.lo[i] - p[i], p[i] - self.hi[i]), 0.0);
+        let (x, y, z) = (outside(0), outside(1), outside(2));
+        x * x + y * y + z * z
     }
 
     #[inline]
@@ -95,6 +114,13 @@ pub struct FaceTree {
     leaf_faces: Vec<FaceId>,
     /// leaf (2 · pair + side) of each face, [`NONE`] for the root and for removed faces
     leaf_of_face: Vec<u32>,
+}
+
+/// The boxes that depend on certain faces: leaves, and the pairs above them from the leaves up.
+#[derive(Clone, Debug, Default)]
+pub struct RefitPlan {
+    leaves: Vec<u32>,
+    pairs: Vec<u32>,
 }
 
 /// A face while the tree is built.
@@ -132,11 +158,11 @@ impl FaceTree {
             let first = self.leaf_faces.len() as u32;
             let mut bounds = Aabb::EMPTY;
             for item in items.iter() {
-                bounds = bounds.union(&face_bounds(mesh, item.face, &self.origin));
+                bounds.take(mesh, item.face, &self.origin);
                 self.leaf_of_face[item.face.0 as usize] = at;
                 self.leaf_faces.push(item.face);
             }
-            return Node { bounds, first, count: items.len() as u32 };
+            return Node { bounds: bounds.rounded_outward(), first, count: items.len() as u32 };
         }
         let split = split(items);
         let pair = self.pairs.len() as u32;
@@ -165,6 +191,14 @@ impl FaceTree {
         )
     }
 
+    /// [`Self::closest`] of a point that is likely near `hint`: the same answer, sooner.
+    pub fn closest_from(&self, mesh: &TriMesh, p: &Point3<f64>, hint: FaceId, reach: f64) -> Option<FaceHit> {
+        let (point, _) = closest_point(p, &mesh.triangle(hint));
+        // a little farther, so that the hint itself is found too; a touching point still has some reach
+        let known = (p - point).norm() * HINT_WIDTH + f64::MIN_POSITIVE.sqrt();
+        self.closest(mesh, p, reach.min(known))
+    }
+
     /// The face whose barycentre is closest to `p` (Eq 12), among those nearer than `reach` (m).
     pub fn closest_barycentre(&self, mesh: &TriMesh, p: &Point3<f64>, reach: f64) -> Option<FaceHit> {
         self.search(
@@ -189,9 +223,12 @@ impl FaceTree {
         yields: impl Fn(&FaceHit, &FaceHit) -> bool,
     ) -> Option<FaceHit> {
         let q = p - self.origin;
+        let slack = self.slack(&q);
+        let q = [q.x as f32, q.y as f32, q.z as f32];
         let mut best: Option<FaceHit> = None;
         let mut limit = reach * reach;
-        let mut stack = [(0.0f64, 0u32); STACK];
+        let mut far = beyond(limit, slack);
+        let mut stack = [(0.0f32, 0u32); STACK];
         let mut depth = 0;
         let mut node = &self.root;
         loop {
@@ -206,17 +243,18 @@ impl FaceTree {
                     };
                     if nearer {
                         limit = limit.min(hit.distance_squared);
+                        far = beyond(limit, slack);
                         best = Some(hit);
                     }
                 }
             } else if let Some(pair) = self.pairs.get(node.first as usize) {
                 let d = [pair.0[0].bounds.distance_squared(&q), pair.0[1].bounds.distance_squared(&q)];
                 let near = usize::from(d[1] < d[0]);
-                if d[1 - near] <= limit * (1.0 + TIE) {
+                if d[1 - near] <= far {
                     stack[depth] = (d[1 - near], 2 * node.first + (1 - near) as u32);
                     depth += 1;
                 }
-                if d[near] <= limit * (1.0 + TIE) {
+                if d[near] <= far {
                     node = &pair.0[near];
                     continue;
                 }
@@ -227,11 +265,19 @@ impl FaceTree {
                 }
                 depth -= 1;
                 let (distance, at) = stack[depth];
-                if distance <= limit * (1.0 + TIE) {
+                if distance <= far {
                     break self.node(at);
                 }
             };
         }
+    }
+
+    /// How much a distance between `q` and a box may be off in single precision, m: three roundings of the largest
+    /// coordinate that enters it.
+    fn slack(&self, q: &Vector3<f64>) -> f64 {
+        let bounds = &self.root.bounds;
+        let largest = (0..3).map(|i| f64::from(bounds.hi[i].max(-bounds.lo[i])).max(q[i].abs())).fold(0.0, f64::max);
+        4.0 * f64::from(f32::EPSILON) * largest
     }
 
     /// Appends to `found` every face whose box meets the box from `lo` to `hi` (m, in O).
@@ -261,34 +307,49 @@ impl FaceTree {
 
     /// Makes the tree exact again after the corners of `faces` moved.
     pub fn refit(&mut self, mesh: &TriMesh, faces: &[FaceId]) {
-        let mut last = NONE;
-        for &face in faces {
-            let leaf = self.leaf_of_face[face.0 as usize];
-            if leaf == last && leaf != NONE {
-                continue;
+        let mut plan = RefitPlan::default();
+        self.plan(faces, &mut plan);
+        self.refit_planned(mesh, &plan);
+    }
+
+    /// Notes which boxes depend on `faces`, for [`Self::refit_planned`]. Holds as long as no face is added or removed.
+    pub fn plan(&self, faces: &[FaceId], plan: &mut RefitPlan) {
+        plan.leaves.clear();
+        plan.leaves.extend(faces.iter().map(|face| self.leaf_of_face[face.0 as usize]));
+        plan.leaves.sort_unstable();
+        plan.leaves.dedup();
+        plan.pairs.clear();
+        plan.pairs.extend(plan.leaves.iter().filter(|&&leaf| leaf != NONE).map(|leaf| leaf / 2));
+        plan.pairs.dedup();
+        // children come after their parents: from the back, each pair meets its own children first
+        plan.pairs.sort_unstable_by(|a, b| b.cmp(a));
+        let mut next = 0;
+        while let Some(&pair) = plan.pairs.get(next) {
+            let above = self.parents[pair as usize];
+            if above != NONE {
+                let at = next + plan.pairs[next..].partition_point(|&other| other > above / 2);
+                if plan.pairs.get(at) != Some(&(above / 2)) {
+                    plan.pairs.insert(at, above / 2);
+                }
             }
-            last = leaf;
-            let node = *self.node(leaf);
-            let mut bounds = Aabb::EMPTY;
-            for &face in self.faces_of(&node) {
-                bounds = bounds.union(&face_bounds(mesh, face, &self.origin));
-            }
-            self.set_bounds(leaf, bounds);
+            next += 1;
         }
     }
 
-    fn set_bounds(&mut self, mut at: u32, mut bounds: Aabb) {
-        while at != NONE {
-            let pair = &mut self.pairs[at as usize / 2];
-            let node = &mut pair.0[at as usize % 2];
-            if node.bounds == bounds {
-                return;
+    /// Makes the tree exact again after the corners of the planned faces moved.
+    pub fn refit_planned(&mut self, mesh: &TriMesh, plan: &RefitPlan) {
+        for &leaf in &plan.leaves {
+            let mut bounds = Aabb::EMPTY;
+            for &face in self.faces_of(self.node(leaf)) {
+                bounds.take(mesh, face, &self.origin);
             }
-            node.bounds = bounds;
-            bounds = pair.0[0].bounds.union(&pair.0[1].bounds);
-            at = self.parents[at as usize / 2];
+            self.node_mut(leaf).bounds = bounds.rounded_outward();
         }
-        self.root.bounds = bounds;
+        for &pair in &plan.pairs {
+            let [left, right] = &self.pairs[pair as usize].0;
+            let bounds = left.bounds.union(&right.bounds);
+            self.node_mut(self.parents[pair as usize]).bounds = bounds;
+        }
     }
 
     #[inline]
@@ -297,9 +358,23 @@ impl FaceTree {
     }
 
     #[inline]
+    fn node_mut(&mut self, at: u32) -> &mut Node {
+        if at == NONE { &mut self.root } else { &mut self.pairs[at as usize / 2].0[at as usize % 2] }
+    }
+
+    #[inline]
     fn faces_of(&self, leaf: &Node) -> &[FaceId] {
         &self.leaf_faces[leaf.first as usize..(leaf.first + leaf.count) as usize]
     }
+}
+
+/// The single-precision squared distance to a box beyond which no face of it can be nearer than √`limit`, nor equally
+/// near within [`TIE`].
+#[inline]
+fn beyond(limit: f64, slack: f64) -> f32 {
+    let distance = limit.sqrt() + slack;
+    // 8 roundings: the squares, their sum, and this conversion; the smallest normal number for where they underflow
+    (distance * distance * (1.0 + 8.0 * f64::from(f32::EPSILON))) as f32 + f32::MIN_POSITIVE
 }
 
 /// |(p − point)·n|: how squarely `p` lies above or below the face that was hit.
@@ -316,18 +391,16 @@ fn middle_of(mesh: &TriMesh) -> Point3<f64> {
     if mesh.positions().is_empty() { Point3::origin() } else { Point3::from((lo + hi) / 2.0) }
 }
 
+/// The lesser of two numbers, neither of which is NaN; one instruction, unlike `f32::min`.
 #[inline]
-fn face_bounds(mesh: &TriMesh, face: FaceId, origin: &Point3<f64>) -> Aabb {
-    let [a, b, c] = mesh.triangle(face).map(|p| p - origin);
-    let (lo, hi) = (a.inf(&b).inf(&c), a.sup(&b).sup(&c));
-    Aabb { lo: std::array::from_fn(|i| round_down(lo[i])), hi: std::array::from_fn(|i| -round_down(-hi[i])) }
+fn lesser(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
 }
 
-/// The largest `f32` not above `x`.
+/// The greater of two numbers, neither of which is NaN.
 #[inline]
-fn round_down(x: f64) -> f32 {
-    let rounded = x as f32;
-    if f64::from(rounded) > x { rounded.next_down() } else { rounded }
+fn greater(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }
 
 /// Sorts the items into two groups and gives the size of the first: at the middle of the longest axis, or by count
@@ -336,8 +409,8 @@ fn split(items: &mut [Item]) -> usize {
     let (mut lo, mut hi) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
     for item in items.iter() {
         for i in 0..3 {
-            lo[i] = lo[i].min(item.middle[i]);
-            hi[i] = hi[i].max(item.middle[i]);
+            lo[i] = lesser(lo[i], item.middle[i]);
+            hi[i] = greater(hi[i], item.middle[i]);
         }
     }
     let extent: [f32; 3] = std::array::from_fn(|i| hi[i] - lo[i]);

@@ -2,14 +2,16 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::guard::GuardParams;
+use super::guard::{GuardParams, Verdict};
 use super::roi::{Roi, RoiSize};
-use crate::mesh::{FaceId, FaceTree, TriMesh, VertexId};
+use crate::mesh::{FaceHit, FaceId, FaceTree, RefitPlan, TriMesh, VertexId};
 
 /// An update that would break the mesh is tried again at this share of its length …
 const CUT: f64 = 0.35;
 /// … this often, and then given up.
 const TRIES: usize = 3;
+/// Faces within this many mean edges of a region are what it could run into.
+const MARGIN_EDGES: f64 = 0.2;
 /// Faces looked at to find the mean edge.
 const EDGE_SAMPLE: usize = 20_000;
 
@@ -46,10 +48,16 @@ pub(super) struct Clay {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Grip {
     roi: Roi,
+    refit: RefitPlan,
     seen: Option<u64>,
 }
 
 impl Grip {
+    /// The face that was moved last.
+    pub fn handle(&self) -> Option<FaceId> {
+        self.roi.handle()
+    }
+
     /// The faces that the last update changed.
     pub fn faces(&self) -> &[FaceId] {
         self.roi.neighbourhood.moving()
@@ -83,6 +91,14 @@ impl Clay {
         }
     }
 
+    /// The closest face nearer than `reach` (m), sooner if it is near `hint`.
+    pub fn closest(&self, p: &Point3<f64>, hint: Option<FaceId>, reach: f64) -> Option<FaceHit> {
+        match hint {
+            Some(hint) => self.tree.closest_from(&self.mesh, p, hint, reach),
+            None => self.tree.closest(&self.mesh, p, reach),
+        }
+    }
+
     /// Remembers that a surface facing `normal` was felt on `face`.
     pub fn feel(&mut self, face: FaceId, normal: &Vector3<f64>) {
         self.evidence[face.0 as usize] = normal.cast::<f32>().into();
@@ -90,34 +106,56 @@ impl Clay {
 
     /// Moves the corners of `handle` by `steps` (m) and the region around it after them.
     pub fn deform(&mut self, grip: &mut Grip, handle: FaceId, size: RoiSize, steps: &[Vector3<f64>; 3]) -> Fit {
-        let margin = 0.5 * self.mean_edge;
         if !grip.roi.is_for(handle) {
             grip.roi.rebuild(&self.mesh, handle, size);
+            self.tree.plan(grip.roi.neighbourhood.moving(), &mut grip.refit);
             grip.seen = None;
         }
+        let longest = self.displace(&grip.roi, steps);
+        let margin = MARGIN_EDGES * self.mean_edge;
         if grip.seen != Some(self.edits) {
             grip.roi.neighbourhood.refresh(&self.mesh, &self.tree, margin);
+        } else if grip.roi.neighbourhood.is_outdated(longest) {
+            grip.roi.neighbourhood.collect(&self.mesh, &self.tree, margin);
         }
-        let longest = self.displace(&grip.roi, steps);
-        let gap = self.guard.gap_share * self.mean_edge;
+        let fit = self.place_soundly(grip, longest, margin);
+        self.tree.refit_planned(&self.mesh, &grip.refit);
+        self.edits += 1;
+        grip.seen = Some(self.edits);
+        fit
+    }
+
+    /// Puts the region at the largest share of its displacement that leaves the mesh sound.
+    fn place_soundly(&mut self, grip: &mut Grip, longest: f64, margin: f64) -> Fit {
+        if grip.roi.neighbourhood.may_pass_unseen(longest) {
+            grip.roi.neighbourhood.pass_unseen(longest);
+            self.place(&grip.roi, 1.0);
+            return Fit::Whole;
+        }
         let mut share = 1.0;
-        for tried in 0..TRIES {
-            self.place(&grip.roi, share);
-            let (roi, before) = (&mut grip.roi, &self.before);
-            let marks = &roi.marks;
-            let was = |v: VertexId| marks.of(v.0).map_or_else(|| self.mesh.position(v), |i| before[i as usize]);
-            if roi.neighbourhood.is_sound(&self.mesh, &self.guard, &self.evidence, gap, was) {
-                self.edits += 1;
-                grip.seen = Some(self.edits);
-                self.tree.refit(&self.mesh, roi.neighbourhood.moving());
-                roi.neighbourhood.accept(&self.mesh, &self.tree, share * longest, margin);
-                return if tried == 0 { Fit::Whole } else { Fit::CutBack };
+        for _ in 0..TRIES {
+            let mut verdict = self.judge_at(grip, share);
+            if verdict == Verdict::Rough {
+                self.place(&grip.roi, 0.0);
+                grip.roi.neighbourhood.roughen(&self.mesh, &self.tree, margin);
+                verdict = self.judge_at(grip, share);
+            }
+            if verdict == Verdict::Sound {
+                grip.roi.neighbourhood.accept(share * longest);
+                return if share == 1.0 { Fit::Whole } else { Fit::CutBack };
             }
             share *= CUT;
         }
         self.place(&grip.roi, 0.0);
-        grip.seen = Some(self.edits);
         Fit::CutBack
+    }
+
+    fn judge_at(&mut self, grip: &mut Grip, share: f64) -> Verdict {
+        self.place(&grip.roi, share);
+        let gap = self.guard.gap_share * self.mean_edge;
+        let (mesh, before, marks) = (&self.mesh, &self.before, &grip.roi.marks);
+        let was = |v: VertexId| marks.of(v.0).map_or_else(|| mesh.position(v), |i| before[i as usize]);
+        grip.roi.neighbourhood.judge(mesh, &self.guard, &self.evidence, gap, was)
     }
 
     /// The displacement of each vertex of the region; returns the longest, m.

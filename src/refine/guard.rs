@@ -4,7 +4,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::roi::Marks;
+use super::marks::Marks;
 use crate::mesh::{FaceId, FaceTree, TriMesh, VertexId, triangle};
 
 /// Limits that keep a mesh sound.
@@ -40,12 +40,65 @@ impl Default for GuardParams {
 const SMOOTH_COSINE: f64 = 0.35;
 /// While each normal stays within this cosine (75°), the region remains a height field.
 const STILL_SMOOTH_COSINE: f64 = 0.25;
+/// Vertices of a smooth region that each moved by less than this share of the smallest altitude since the last look turn
+/// a normal by less than 0.04 rad and change a quality by less than 12 %, so that what passed with the margins below
+/// need not be looked at again. Proof: a normal turns by at most the sum of two corner motions over the altitude.
+const UNSEEN_SHARE: f64 = 0.02;
+/// Margin on the cosine of a normal with a fixed direction; 0.04 rad change it by no more than 0.04.
+const COSINE_MARGIN: f64 = 0.05;
+/// Margin on the cosine between two normals, both of which turn.
+const FOLD_MARGIN: f64 = 0.1;
+/// Margin on the quality.
+const QUALITY_MARGIN: f64 = 1.15;
 
-/// A face of the region, or the rim around it.
+/// A face of the region, or of the rim around it.
 #[derive(Clone, Copy, Debug)]
 struct Shape {
     normal: Vector3<f64>,
     quality: f64,
+    /// smallest altitude, m
+    altitude: f64,
+}
+
+/// What [`Neighbourhood::judge`] says of an update.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Verdict {
+    /// The mesh is no worse than before.
+    Sound,
+    /// A face would flip, fold, starve or meet another.
+    Broken,
+    /// The region ceases to be smooth: [`Neighbourhood::roughen`] it and ask again.
+    Rough,
+}
+
+/// How a look at the region ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Look {
+    Broken,
+    /// sound, but something is at its limit
+    Sound,
+    /// sound with margins
+    Safe,
+}
+
+impl Look {
+    fn of(broken: bool, at_limit: bool) -> Self {
+        if broken {
+            Self::Broken
+        } else if at_limit {
+            Self::Sound
+        } else {
+            Self::Safe
+        }
+    }
+
+    fn and(self, other: Self) -> Self {
+        match (self, other) {
+            (Self::Broken, _) | (_, Self::Broken) => Self::Broken,
+            (Self::Safe, Self::Safe) => Self::Safe,
+            _ => Self::Sound,
+        }
+    }
 }
 
 /// Two faces that could come to meet: one that moves, and how many corners they share.
@@ -65,28 +118,34 @@ pub(super) struct Neighbourhood {
     moving: usize,
     /// indices into `faces` of faces that share an edge, the first one moving
     edges: Vec<(u32, u32)>,
-    /// state before the update, for each of `faces`
+    /// state at the last look, for each of `faces`
     before: Vec<Shape>,
-    /// state after it, for the moving ones
+    /// state after the update, for the moving ones
     after: Vec<Shape>,
-    /// pairs to be looked at when the region is not smooth
-    suspects: Vec<Suspects>,
-    /// mean normal of a smooth region
+    /// mean normal of a smooth region; without one, `suspects` are looked at
     smooth: Option<Vector3<f64>>,
-    /// how far vertices may still move before `suspects` must be collected again, m
+    suspects: Vec<Suspects>,
+    /// how far vertices may still move before `suspects` or `smooth` must be found again, m
     allowance: f64,
+    /// how far vertices may still move before the region must be looked at again, m
+    unseen: f64,
     near: Vec<FaceId>,
-    marks: Marks,
+    known: Marks,
 }
 
-/// Twice the area vector split into unit normal and shape quality.
+/// Normal and proportions of a face.
 #[inline]
 fn shape_of(mesh: &TriMesh, face: FaceId) -> Shape {
-    let corners = mesh.triangle(face);
-    let double = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
-    let length = double.norm();
-    let normal = if length > 0.0 { double / length } else { Vector3::zeros() };
-    Shape { normal, quality: triangle::shape_quality(&corners, length) }
+    let [a, b, c] = mesh.triangle(face);
+    let double = (b - a).cross(&(c - a));
+    let double_area = double.norm();
+    let longest_squared = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared());
+    if double_area > 0.0 {
+        let altitude = double_area / longest_squared.sqrt();
+        Shape { normal: double / double_area, quality: double_area / longest_squared, altitude }
+    } else {
+        Shape { normal: Vector3::zeros(), quality: 0.0, altitude: 0.0 }
+    }
 }
 
 impl Neighbourhood {
@@ -95,15 +154,14 @@ impl Neighbourhood {
         &self.faces[..self.moving]
     }
 
-    /// Collects the faces around `vertices`.
-    pub fn rebuild(&mut self, mesh: &TriMesh, vertices: &[VertexId]) {
+    /// Collects the faces around `vertices`, which are those that `moves` knows.
+    pub fn rebuild(&mut self, mesh: &TriMesh, vertices: &[VertexId], moves: &Marks) {
         self.faces.clear();
         self.edges.clear();
-        self.marks.clear(mesh.face_slots());
+        self.known.clear();
         for &vertex in vertices {
             for &face in mesh.star(vertex) {
-                if self.marks.of(face.0).is_none() {
-                    self.marks.set(face.0, self.faces.len() as u32);
+                if self.known.insert(face.0, self.faces.len() as u32).is_none() {
                     self.faces.push(face);
                 }
             }
@@ -112,19 +170,28 @@ impl Neighbourhood {
         for index in 0..self.moving {
             let corners = mesh.corners(self.faces[index]);
             for side in 0..3 {
-                self.link(mesh, index as u32, corners[side], corners[(side + 1) % 3]);
+                self.link(mesh, index as u32, corners[side], corners[(side + 1) % 3], moves);
             }
         }
-        self.allowance = f64::NEG_INFINITY;
     }
 
-    fn link(&mut self, mesh: &TriMesh, index: u32, a: VertexId, b: VertexId) {
-        for face in mesh.faces_at_edge(a, b) {
-            let other = self.marks.of(face.0).unwrap_or_else(|| {
-                self.marks.set(face.0, self.faces.len() as u32);
-                self.faces.push(face);
-                self.faces.len() as u32 - 1
-            });
+    /// Notes the faces at one edge of the moving face `index`.
+    fn link(&mut self, mesh: &TriMesh, index: u32, a: VertexId, b: VertexId, moves: &Marks) {
+        let inside = moves.of(a.0).is_some() || moves.of(b.0).is_some();
+        for &face in mesh.star(if moves.of(a.0).is_some() { a } else { b }) {
+            let corners = mesh.corners(face);
+            if !(corners.contains(&a) && corners.contains(&b)) {
+                continue;
+            }
+            let other = match self.known.of(face.0) {
+                Some(other) => other,
+                None => {
+                    debug_assert!(!inside, "all faces at a moving vertex are known");
+                    self.known.insert(face.0, self.faces.len() as u32);
+                    self.faces.push(face);
+                    self.faces.len() as u32 - 1
+                }
+            };
             // pairs of moving faces are met from both sides
             if other > index {
                 self.edges.push((index, other));
@@ -132,16 +199,33 @@ impl Neighbourhood {
         }
     }
 
-    /// Brings the state before the update up to date after the mesh was changed elsewhere.
+    /// Looks at the region anew after the mesh was changed elsewhere.
     pub fn refresh(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64) {
         self.before.clear();
         self.before.extend(self.faces.iter().map(|&face| shape_of(mesh, face)));
+        self.unseen = 0.0;
         self.collect(mesh, tree, margin);
     }
 
     /// Looks for faces that could be met within `margin` (m) of motion.
-    fn collect(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64) {
+    pub fn collect(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64) {
         self.allowance = 0.5 * margin;
+        self.find_near(mesh, tree, margin);
+        self.smooth = self.smooth_normal(mesh);
+        if self.smooth.is_none() {
+            self.roughen(mesh, tree, margin);
+        }
+    }
+
+    /// Gives up the claim to be smooth: pairs of faces are looked at from now on.
+    pub fn roughen(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64) {
+        self.allowance = 0.5 * margin;
+        self.smooth = None;
+        self.find_near(mesh, tree, margin);
+        self.collect_suspects(mesh, margin);
+    }
+
+    fn find_near(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64) {
         let (mut lo, mut hi) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
         for &face in &self.faces[..self.moving] {
             for p in mesh.triangle(face) {
@@ -151,60 +235,66 @@ impl Neighbourhood {
         let margin_box = Vector3::repeat(margin);
         self.near.clear();
         tree.faces_in_box(&Point3::from(lo - margin_box), &Point3::from(hi + margin_box), &mut self.near);
-        self.suspects.clear();
-        self.smooth = self.smooth_normal(mesh);
-        if self.smooth.is_none() {
-            self.collect_suspects(mesh, margin);
-        }
     }
 
     /// The mean normal, if all faces nearby are within [`SMOOTH_COSINE`] of it and hang together.
     fn smooth_normal(&mut self, mesh: &TriMesh) -> Option<Vector3<f64>> {
         let sum: Vector3<f64> = self.before[..self.moving].iter().map(|shape| shape.normal).sum();
         let mean = sum.try_normalize(0.0)?;
-        self.marks.clear(mesh.face_slots());
-        for &face in &self.near {
-            let double = mesh.double_area_normal(face);
-            if double.dot(&mean) <= SMOOTH_COSINE * double.norm() {
-                return None;
-            }
-            self.marks.set(face.0, 0);
+        if self.before.iter().any(|shape| shape.normal.dot(&mean) <= SMOOTH_COSINE) {
+            return None;
         }
-        self.all_connected(mesh).then_some(mean)
+        self.known.clear();
+        for &face in &self.faces {
+            self.known.insert(FACE | u64::from(face.0), 0);
+            for vertex in mesh.corners(face) {
+                self.known.insert(vertex.0, 0);
+            }
+        }
+        let known = &self.known;
+        self.near.retain(|face| known.of(FACE | u64::from(face.0)).is_none());
+        let within = |face: &FaceId| {
+            let double = mesh.double_area_normal(*face);
+            double.dot(&mean) > SMOOTH_COSINE * double.norm()
+        };
+        (self.near.iter().all(within) && self.hangs_together(mesh)).then_some(mean)
     }
 
-    /// Whether the marked faces hang together over common corners; sorts `near` by that.
-    fn all_connected(&mut self, mesh: &TriMesh) -> bool {
-        let total = self.near.len();
-        self.near.clear();
-        self.near.push(self.faces[0]);
-        self.marks.set(self.faces[0].0, 1);
-        let mut next = 0;
-        while next < self.near.len() {
-            for vertex in mesh.corners(self.near[next]) {
-                for &face in mesh.star(vertex) {
-                    if self.marks.of(face.0) == Some(0) {
-                        self.marks.set(face.0, 1);
-                        self.near.push(face);
+    /// Whether the faces nearby reach the known vertices, over common corners among themselves; empties `near` by that.
+    fn hangs_together(&mut self, mesh: &TriMesh) -> bool {
+        loop {
+            let (known, before) = (&mut self.known, self.near.len());
+            self.near.retain(|&face| {
+                let corners = mesh.corners(face);
+                let reached = corners.iter().any(|corner| known.of(corner.0).is_some());
+                if reached {
+                    for corner in corners {
+                        known.insert(corner.0, 0);
                     }
                 }
+                !reached
+            });
+            if self.near.is_empty() {
+                return true;
             }
-            next += 1;
+            if self.near.len() == before {
+                return false;
+            }
         }
-        self.near.len() == total
     }
 
     fn collect_suspects(&mut self, mesh: &TriMesh, margin: f64) {
-        self.marks.clear(mesh.face_slots());
+        self.suspects.clear();
+        self.known.clear();
         for (index, &face) in self.faces[..self.moving].iter().enumerate() {
-            self.marks.set(face.0, index as u32);
+            self.known.insert(face.0, index as u32);
         }
         for moving in 0..self.moving {
             let face = self.faces[moving];
             let (corners, bounds) = (mesh.corners(face), bounds(&mesh.triangle(face)));
             for &other in &self.near {
                 // two moving faces are one pair
-                if self.marks.of(other.0).is_some_and(|index| index as usize <= moving) {
+                if self.known.of(other.0).is_some_and(|index| index as usize <= moving) {
                     continue;
                 }
                 if apart(&bounds, &self::bounds(&mesh.triangle(other)), margin) {
@@ -219,58 +309,88 @@ impl Neighbourhood {
         }
     }
 
-    /// Whether the mesh as it stands now is sound around the region, or at least no worse than before.
+    /// Whether the vertices may move by `way` (m) without a look.
+    #[inline]
+    pub fn may_pass_unseen(&self, way: f64) -> bool {
+        way <= self.unseen
+    }
+
+    /// Takes a motion of `way` (m) that [`Self::may_pass_unseen`].
+    #[inline]
+    pub fn pass_unseen(&mut self, way: f64) {
+        self.unseen -= way;
+        self.allowance -= way;
+    }
+
+    /// Judges the mesh as it stands now against what it was before the update.
     ///
     /// - `evidence`: for each face the last normal scanned or felt there.
     /// - `gap`: faces nearer than this touch, m.
     /// - `before`: the position of a vertex before the update, m.
-    pub fn is_sound(
+    pub fn judge(
         &mut self,
         mesh: &TriMesh,
         params: &GuardParams,
         evidence: &[[f32; 3]],
         gap: f64,
         before: impl Fn(VertexId) -> Point3<f64>,
-    ) -> bool {
+    ) -> Verdict {
+        self.unseen = 0.0;
+        let mut look = self.look_at_faces(mesh, params, evidence);
+        if look != Look::Broken {
+            look = look.and(self.look_at_edges(params));
+        }
+        if look == Look::Broken {
+            return Verdict::Broken;
+        }
+        let Some(mean) = self.smooth else {
+            return if self.is_clear(mesh, gap, before) { Verdict::Sound } else { Verdict::Broken };
+        };
+        let lowest = self.after.iter().map(|shape| shape.normal.dot(&mean)).fold(1.0, f64::min);
+        if lowest <= STILL_SMOOTH_COSINE {
+            return Verdict::Rough;
+        }
+        if look == Look::Safe && lowest > STILL_SMOOTH_COSINE + COSINE_MARGIN {
+            let altitude = self.after.iter().map(|shape| shape.altitude).fold(f64::INFINITY, f64::min);
+            self.unseen = UNSEEN_SHARE * altitude;
+        }
+        Verdict::Sound
+    }
+
+    fn look_at_faces(&mut self, mesh: &TriMesh, params: &GuardParams, evidence: &[[f32; 3]]) -> Look {
         self.after.clear();
-        let mut still_smooth = true;
-        for index in 0..self.moving {
-            let face = self.faces[index];
-            let (new, old) = (shape_of(mesh, face), self.before[index]);
+        let mut look = Look::Safe;
+        for (&face, old) in self.faces[..self.moving].iter().zip(&self.before) {
+            let new = shape_of(mesh, face);
             let seen = Vector3::from(evidence[face.0 as usize].map(f64::from));
             let worse = |new: f64, old: f64, limit: f64| new < limit && new < old;
-            if worse(new.quality, old.quality, params.smallest_quality)
-                || worse(new.normal.dot(&seen), old.normal.dot(&seen), params.smallest_evidence_cosine)
-                || new.normal.dot(&old.normal) < params.smallest_turn_cosine
-            {
-                return false;
+            let cosine = new.normal.dot(&seen);
+            let broken = worse(new.quality, old.quality, params.smallest_quality)
+                || worse(cosine, old.normal.dot(&seen), params.smallest_evidence_cosine)
+                || new.normal.dot(&old.normal) < params.smallest_turn_cosine;
+            let at_limit = new.quality < params.smallest_quality * QUALITY_MARGIN
+                || cosine < params.smallest_evidence_cosine + COSINE_MARGIN;
+            look = look.and(Look::of(broken, at_limit));
+            if look == Look::Broken {
+                break;
             }
-            still_smooth &= self.smooth.is_some_and(|mean| mean.dot(&new.normal) > STILL_SMOOTH_COSINE);
             self.after.push(new);
         }
-        if !self.folds_no_edge(params) {
-            return false;
-        }
-        if self.smooth.is_some() {
-            return still_smooth || self.rough_and_clear(mesh, gap, before);
-        }
-        self.is_clear(mesh, gap, before)
+        look
     }
 
-    fn folds_no_edge(&self, params: &GuardParams) -> bool {
-        self.edges.iter().all(|&(a, b)| {
-            let new_b = self.after.get(b as usize).unwrap_or(&self.before[b as usize]);
+    fn look_at_edges(&self, params: &GuardParams) -> Look {
+        let mut look = Look::Safe;
+        for &(a, b) in &self.edges {
+            let (old_a, old_b) = (&self.before[a as usize], &self.before[b as usize]);
+            let new_b = self.after.get(b as usize).unwrap_or(old_b);
             let cosine = self.after[a as usize].normal.dot(&new_b.normal);
-            cosine >= params.smallest_fold_cosine
-                || cosine >= self.before[a as usize].normal.dot(&self.before[b as usize].normal)
-        })
-    }
-
-    /// A region that ceases to be smooth is looked at pair by pair from now on.
-    fn rough_and_clear(&mut self, mesh: &TriMesh, gap: f64, before: impl Fn(VertexId) -> Point3<f64>) -> bool {
-        self.smooth = None;
-        self.collect_suspects(mesh, 2.0 * self.allowance);
-        self.is_clear(mesh, gap, before)
+            if cosine < params.smallest_fold_cosine + FOLD_MARGIN {
+                let broken = cosine < params.smallest_fold_cosine && cosine < old_a.normal.dot(&old_b.normal);
+                look = look.and(Look::of(broken, true));
+            }
+        }
+        look
     }
 
     fn is_clear(&self, mesh: &TriMesh, gap: f64, before: impl Fn(VertexId) -> Point3<f64>) -> bool {
@@ -281,15 +401,21 @@ impl Neighbourhood {
         })
     }
 
-    /// Takes the state after the update as the new state before; `moved` is the longest way of a vertex, m.
-    pub fn accept(&mut self, mesh: &TriMesh, tree: &FaceTree, moved: f64, margin: f64) {
+    /// Takes the state just looked at as the new state before; `way` is the longest of a vertex, m.
+    pub fn accept(&mut self, way: f64) {
         self.before[..self.moving].copy_from_slice(&self.after);
-        self.allowance -= moved;
-        if self.allowance < 0.0 {
-            self.collect(mesh, tree, margin);
-        }
+        self.allowance -= way;
+    }
+
+    /// Whether the faces nearby must be collected again before a motion of `way` (m).
+    #[inline]
+    pub fn is_outdated(&self, way: f64) -> bool {
+        self.allowance < way
     }
 }
+
+/// Keys of faces beside those of vertices.
+const FACE: u64 = 1 << 32;
 
 type Bounds = (Vector3<f64>, Vector3<f64>);
 

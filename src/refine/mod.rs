@@ -7,11 +7,12 @@
 mod deform;
 pub mod dynamics;
 mod guard;
+mod marks;
 mod params;
 mod roi;
 mod sliding;
 
-use nalgebra::{Point3, UnitQuaternion, Vector3};
+use nalgebra::{Point3, Vector3};
 use serde::Serialize;
 
 pub use deform::Fit;
@@ -259,7 +260,7 @@ impl Refiner {
             _ => ball.reported,
         };
         let hit = match self.params.closest {
-            ClosestBy::Surface => self.clay.tree.closest(mesh, &seek, reach),
+            ClosestBy::Surface => self.clay.closest(&seek, self.contact_grip.handle(), reach),
             ClosestBy::Barycentre => self.clay.tree.closest_barycentre(mesh, &seek, reach),
         }?;
         let face = FaceState { b: mesh.barycentre(hit.face), n: mesh.normal(hit.face) };
@@ -290,12 +291,15 @@ impl Refiner {
     ///
     /// Along the force a corner only goes along it: the turn's sideways part would make the triangles creep.
     fn rigid_steps(&self, Pressing { hit, face, normal, .. }: &Pressing, next: &FaceState) -> [Vector3<f64>; 3] {
-        let turn = UnitQuaternion::rotation_between(&face.n, &next.n).unwrap_or_else(UnitQuaternion::identity);
+        // the smallest rotation from n to n′: x + v × x + v × (v × x) / (1 + n·n′), v = n × n′
+        let axis = face.n.cross(&next.n);
+        let bend = 1.0 / (1.0 + face.n.dot(&next.n)).max(f64::EPSILON);
         let longest = self.params.longest_step_edges * self.clay.mean_edge;
         let along = self.params.dynamics.along == Along::Force;
         self.clay.mesh.triangle(hit.face).map(|corner| {
             let arm = corner - face.b;
-            let step = turn * arm - arm + (next.b - face.b);
+            let across = axis.cross(&arm);
+            let step = across + axis.cross(&across) * bend + (next.b - face.b);
             let step = if along { normal * step.dot(normal) } else { step };
             let length = step.norm();
             if length > longest { step * (longest / length) } else { step }
@@ -308,8 +312,13 @@ impl Refiner {
             Some(stiffness) => ball.reported + ball.force_o / stiffness,
             None => ball.reported,
         };
-        let radius = self.params.tip.radius;
-        let Some(hit) = self.clay.tree.closest(&self.clay.mesh, &centre, radius) else { return update };
+        // a mesh that the ball does not enter by more than the tolerance is left alone
+        let reach = self.params.tip.radius - carve.tolerance;
+        let hint = match felt {
+            Felt::Nothing => self.carve_grip.handle(),
+            _ => self.contact_grip.handle(),
+        };
+        let Some(hit) = self.clay.closest(&centre, hint, reach) else { return update };
         let Some((away, depth)) = self.penetration(&centre, &hit) else { return update };
         let felt_here = matches!(felt, Felt::Surface(normal) if away.dot(&normal) > carve.contact_cone_cosine);
         if depth <= carve.tolerance || (felt_here && depth < carve.largest_contact_depth) {

@@ -8,6 +8,7 @@
 use nalgebra::Point3;
 
 use super::guard::Neighbourhood;
+use super::marks::Marks;
 use crate::mesh::{FaceId, TriMesh, VertexId};
 
 /// How far the free vertices reach.
@@ -34,41 +35,9 @@ pub(super) struct Roi {
     pub weights: Vec<[f64; 3]>,
     /// what the guard looks at
     pub neighbourhood: Neighbourhood,
-    /// marks vertices: index in `vertices` where the stamp is current
+    /// index in `vertices` of each vertex that moves
     pub marks: Marks,
     solver: Solver,
-}
-
-/// A number for each vertex that is forgotten in no time.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Marks {
-    entries: Vec<(u32, u32)>,
-    stamp: u32,
-}
-
-impl Marks {
-    /// Forgets all marks and makes room for `size` ids.
-    pub fn clear(&mut self, size: usize) {
-        if self.entries.len() < size {
-            self.entries.resize(size, (0, 0));
-        }
-        self.stamp = self.stamp.wrapping_add(1);
-        if self.stamp == 0 {
-            self.entries.fill((0, 0));
-            self.stamp = 1;
-        }
-    }
-
-    #[inline]
-    pub fn set(&mut self, id: u32, value: u32) {
-        self.entries[id as usize] = (self.stamp, value);
-    }
-
-    #[inline]
-    pub fn of(&self, id: u32) -> Option<u32> {
-        let (stamp, value) = self.entries[id as usize];
-        (stamp == self.stamp).then_some(value)
-    }
 }
 
 impl Roi {
@@ -77,21 +46,26 @@ impl Roi {
         self.handle == Some(handle)
     }
 
+    /// The handle it was made for.
+    pub fn handle(&self) -> Option<FaceId> {
+        self.handle
+    }
+
     /// Makes the region of `handle`.
     pub fn rebuild(&mut self, mesh: &TriMesh, handle: FaceId, size: RoiSize) {
         self.handle = Some(handle);
-        self.marks.clear(mesh.vertex_count());
+        self.marks.clear();
         self.vertices.clear();
         for vertex in mesh.corners(handle) {
             self.add(vertex);
         }
         self.spread(mesh, mesh.barycentre(handle), size);
         self.solver.solve(mesh, &self.vertices, &self.marks, &mut self.weights);
-        self.neighbourhood.rebuild(mesh, &self.vertices);
+        self.neighbourhood.rebuild(mesh, &self.vertices, &self.marks);
     }
 
     fn add(&mut self, vertex: VertexId) {
-        self.marks.set(vertex.0, self.vertices.len() as u32);
+        self.marks.insert(vertex.0, self.vertices.len() as u32);
         self.vertices.push(vertex);
     }
 
