@@ -5,6 +5,7 @@
 
 mod ball;
 mod contour;
+pub mod coupled;
 mod error;
 mod field;
 mod path;

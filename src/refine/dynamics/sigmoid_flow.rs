@@ -215,6 +215,11 @@ impl Arc {
         let (mapped, m) = if x > LARGE && self.c < 0.0 {
             // 1 + y/ρ overflows or nearly so, its logarithm does not
             (x - (-self.c * self.rho).ln(), -self.c)
+        } else if sign < 0.0 && self.c < 0.0 {
+            // 1 + y/ρ nearly cancels while u is large, 1 + z does not
+            let grown = if -x < f64::EPSILON { total - way } else { (-x).exp_m1() / -self.c };
+            let z = -grown * self.rest / self.e;
+            (x + z.ln_1p(), 1.0 / (self.rho * (1.0 + z)))
         } else {
             let grown = x.exp_m1();
             let y = if x.abs() < f64::EPSILON { sign * (total - way) } else { grown / -self.c };
@@ -231,8 +236,7 @@ impl Arc {
     fn high(&self, d: f64) -> f64 {
         let way = d.abs();
         let y = if d < 0.0 {
-            let shrunk = (-way).exp_m1();
-            -self.e * shrunk / (self.rest - self.c * self.e * (1.0 + shrunk))
+            -self.e * (-way).exp_m1() / (self.rest - self.c * self.e * (-way).exp())
         } else {
             self.rho * way.exp_m1()
         };
@@ -264,16 +268,16 @@ impl Arc {
         if self.c == 0.0 {
             return way;
         }
-        let shrunk = (-way).exp_m1();
-        let e = if sign < 0.0 { self.e * (1.0 + shrunk) } else { self.e };
+        let shrunk = (-way).exp();
+        let e = if sign < 0.0 { self.e * shrunk } else { self.e };
         let lower = self.rest - self.c * e;
-        let x = self.rest * shrunk / lower;
+        let x = self.rest * (-way).exp_m1() / lower;
         if x > -0.5 {
             -x.ln_1p() / self.rest
         } else if sign < 0.0 {
             (way + (lower / (self.rest - self.c * self.e)).ln()) / self.rest
         } else {
-            (lower / (self.rest * (1.0 + shrunk) - self.c * e)).ln() / self.rest
+            (lower / (self.rest * shrunk - self.c * e)).ln() / self.rest
         }
     }
 }
