@@ -133,3 +133,27 @@ fn array(v: &Vector3<f64>) -> String {
 fn refusal(error: &StepError) -> String {
     serde_json::json!({ "error": error.to_string() }).to_string()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SPRING: &str = r#"{"p_m":[0,0,1e-3],"force_n":[0,0,0],"b_m":[0,0,0],"n":[0,0,1],"dt_s":1,"k_n_per_m":1e3,
+        "alpha_m_per_n_s":1,"beta_per_n2_s":0,"step":"lie","along":"force"}"#;
+
+    fn replies(input: &str) -> Vec<String> {
+        let mut output = Vec::new();
+        run(input.as_bytes(), &mut output).unwrap();
+        String::from_utf8(output).unwrap().lines().map(String::from).collect()
+    }
+
+    #[test]
+    fn every_line_gets_one_reply() {
+        // after e^−1000 of the distance is left, b lies at the tip; an unended last line counts
+        let good = SPRING.replace('\n', "");
+        let replies = replies(&format!("{good}\n\n{{}}\n{}\n{good}", good.replace("dt_s", "dt_ms")));
+        let at_tip = r#"{"b_m":[0.0000000000000000e0,0.0000000000000000e0,1.0000000000000000e-3],"n":[0.0000000000000000e0,0.0000000000000000e0,1.0000000000000000e0]}"#;
+        assert_eq!((replies.len(), &*replies[0], &*replies[3]), (4, at_tip, at_tip));
+        assert!(replies[1].contains("missing field `p_m`") && replies[2].contains("unknown field `dt_ms`"));
+    }
+}

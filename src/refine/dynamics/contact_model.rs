@@ -102,20 +102,17 @@ impl ContactModel {
         }
     }
 
-    /// Whether F·n is more than the model can answer; [`Self::rigid_offset`] and a step without the offset then take
-    /// [`LARGEST_SHARE`] · f_max instead.
+    /// Whether F·n is more than the model can answer: [`Self::rigid_offset`], and a step that takes the offset out,
+    /// then use [`LARGEST_SHARE`] · f_max instead; a step that does not lets the face escape.
     pub fn clamps(&self, force_n: f64) -> bool {
         matches!(*self, Self::Sigmoid { f_max_n, .. } if force_n > LARGEST_SHARE * f_max_n)
     }
 
     /// The force a rigid contact is compared with: F·n between f(0), below which the model cannot tell contact from
     /// none, and [`LARGEST_SHARE`] · f_max.
-    pub(super) fn comparable(&self, force_n: f64) -> f64 {
+    pub(super) fn comparable(&self, force_n: f64, at_zero_n: f64) -> f64 {
         match *self {
-            Self::Sigmoid { f_max_n, .. } => {
-                let largest = LARGEST_SHARE * f_max_n;
-                force_n.clamp(self.force(0.0).min(largest), largest)
-            }
+            Self::Sigmoid { f_max_n, .. } => force_n.max(at_zero_n).min(LARGEST_SHARE * f_max_n),
             Self::Spring { .. } => force_n,
         }
     }
@@ -124,7 +121,7 @@ impl ContactModel {
     ///
     /// Zero below f(0), clamped above [`LARGEST_SHARE`] · f_max: always finite.
     pub fn rigid_offset(&self, force_n: f64) -> f64 {
-        self.distance(self.comparable(force_n))
+        self.distance(self.comparable(force_n, self.force(0.0)))
     }
 
     /// Exact solution of ds/dt = α (F·n − f(h₀ + v t − (a·n) s)), s(0) = 0; not finite where it overflows.

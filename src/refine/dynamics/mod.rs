@@ -27,6 +27,8 @@ pub use rotation::turn;
 
 /// How far |n| may be from 1 on input: six digits in a file are enough.
 pub const UNIT_TOLERANCE: f64 = 1e-6;
+/// Squares below it have lost digits.
+const SMALLEST_SQUARE: f64 = f64::MIN_POSITIVE / f64::EPSILON;
 /// Below it the weight of the end is 1/2 + z/12 to rounding.
 const SMALL_DECAY: f64 = 1e-5;
 
@@ -158,6 +160,8 @@ impl Default for DynamicsParams {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FaceDynamics {
     params: DynamicsParams,
+    /// f(0), N
+    at_zero_n: f64,
 }
 
 /// A sample seen from the face.
@@ -183,7 +187,7 @@ impl FaceDynamics {
                 return Err(DynamicsError::BadParameter { name, value });
             }
         }
-        Ok(Self { params })
+        Ok(Self { params, at_zero_n: params.model.force(0.0) })
     }
 
     /// The parameters it was made with.
@@ -217,23 +221,14 @@ impl FaceDynamics {
     }
 
     fn touch(&self, face: &FaceState, p: &Point3<f64>, force: &Vector3<f64>, dt: f64) -> Result<Touch, DynamicsError> {
-        let largest = force.amax();
-        let towards = if largest > 0.0 { (force / largest).normalize() } else { Vector3::zeros() };
-        let magnitude = if largest > 0.0 { largest * (force / largest).norm() } else { 0.0 };
-        for (what, is_finite) in [
-            ("b", finite(&face.b.coords)),
-            ("n", finite(&face.n)),
-            ("p", finite(&p.coords)),
-            ("force", finite(force) && magnitude.is_finite()),
-            ("dt", dt.is_finite()),
-        ] {
-            if !is_finite {
-                return Err(DynamicsError::NotFinite { what });
-            }
+        let (magnitude, towards) = split(force);
+        let sum = face.b.coords + face.n + p.coords;
+        if !(finite(&sum) && finite(force) && magnitude.is_finite() && dt.is_finite()) {
+            return Err(not_finite(face, p, force));
         }
-        let length = face.n.norm();
-        if (length - 1.0).abs() > UNIT_TOLERANCE {
-            return Err(DynamicsError::NotUnit { length });
+        let length_squared = face.n.norm_squared();
+        if (length_squared - 1.0).abs() > 2.0 * UNIT_TOLERANCE {
+            return Err(DynamicsError::NotUnit { length: length_squared.sqrt() });
         }
         if dt < 0.0 {
             return Err(DynamicsError::BadTimeStep { dt_s: dt });
@@ -250,7 +245,7 @@ impl FaceDynamics {
         if !self.params.take_out_rigid_offset {
             return (force, h);
         }
-        let force = self.params.model.comparable(force);
+        let force = self.params.model.comparable(force, self.at_zero_n);
         (force, h + self.params.model.distance(force))
     }
 
@@ -339,6 +334,31 @@ fn end_weight(z: f64) -> f64 {
     1.0 / decayed - 1.0 / z
 }
 
+/// |F| and F/|F|, also where |F|² would underflow or overflow; zero where F is.
+#[inline]
+fn split(force: &Vector3<f64>) -> (f64, Vector3<f64>) {
+    let squared = force.norm_squared();
+    if (SMALLEST_SQUARE..f64::MAX).contains(&squared) {
+        let magnitude = squared.sqrt();
+        return (magnitude, force / magnitude);
+    }
+    let largest = force.amax();
+    if largest == 0.0 {
+        return (0.0, Vector3::zeros());
+    }
+    let scaled = force / largest;
+    let length = scaled.norm();
+    (largest * length, scaled / length)
+}
+
+#[cold]
+fn not_finite(face: &FaceState, p: &Point3<f64>, force: &Vector3<f64>) -> DynamicsError {
+    let parts = [("b", face.b.coords), ("n", face.n), ("p", p.coords), ("force", *force)];
+    let what = parts.iter().find(|(_, v)| !finite(v)).map_or("dt, |F| or a sum of the input", |(what, _)| what);
+    DynamicsError::NotFinite { what }
+}
+
+#[inline]
 fn finite(v: &Vector3<f64>) -> bool {
     v.iter().all(|x| x.is_finite())
 }

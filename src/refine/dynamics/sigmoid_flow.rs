@@ -24,6 +24,11 @@ const LARGE: f64 = 38.0;
 const LARGEST_PRODUCT: f64 = 1e300;
 /// Halley's method leaves at most the cube of its step (in u): stop where that is below a rounding of D.
 const CUBE_BELOW_ROUNDING: f64 = 1e-17;
+/// A difference smaller than this share of its terms is taken from another formula: three digits are lost at most.
+const CANCELLED: f64 = 1e-3;
+/// A way up (in u) so short that the sum serves on both sides of the bend, and (e^SHORT − 1)/SHORT, rounded up.
+const SHORT: f64 = 1.5;
+const SHORT_GROWTH: f64 = 2.33;
 /// No progress is possible below two roundings.
 const ROUNDING: f64 = 2.0 * f64::EPSILON;
 /// Each step that Halley's method does not shorten halves the bracket: this many pin down any double.
@@ -87,6 +92,7 @@ impl Arc {
     }
 
     /// Straight parts first, where they reach that far, then the curved one.
+    #[inline]
     fn after(self, t: f64) -> Passed {
         let (span, down) = (t.abs(), t < 0.0);
         if self.u < -SATURATED {
@@ -135,20 +141,30 @@ impl Arc {
         let total = self.rest * span;
         // the rate falls while u rises
         let (low, high) = if down { (self.rate * span, total) } else { (0.0, total.min(self.rate * span)) };
-        let Some(bend) = self.bend() else {
-            let way = self.solve(sign, total, low, high, high, Self::by_sum);
-            return self.passed(way, span, sign);
+        let start = if down { low } else { self.guess(span, high) };
+        let short = !down && high <= SHORT && self.c * self.rho * SHORT_GROWTH * high < 0.5;
+        let Some(bend) = self.bend().filter(|_| !short) else {
+            let way = self.solve(sign, total, low, high, start, Self::by_sum);
+            return self.passed(way, total, span, sign);
         };
-        let to_bend = (bend / self.e).ln() * sign;
-        let beyond = to_bend < 0.0 || (to_bend < high && to_bend + self.high(sign * to_bend) < total);
+        let to_bend = if down == (self.e < bend) { 0.0 } else { (bend / self.e).ln().abs() };
+        let beyond = to_bend == 0.0 || (to_bend < high && to_bend + self.high(sign * to_bend) < total);
         let (low, high) = if beyond { (low.max(to_bend), high) } else { (low, high.min(to_bend)) };
         let way = if beyond != down {
-            let start = if down || high > 2.0 { low } else { high };
+            // L must not start near 0 while eᵘ is small: its logarithm is steep there
+            let start = if self.e < bend { low } else { start };
             self.solve(sign, total, low, high, start, Self::by_logarithm)
         } else {
-            self.solve(sign, total, low, high, if down { low } else { high }, Self::by_sum)
+            self.solve(sign, total, low, high, start, Self::by_sum)
         };
-        self.passed(way, span, sign)
+        self.passed(way, total, span, sign)
+    }
+
+    /// D of a short or straight way up: (2, 1) Padé approximation of the decaying rate; at most `high`.
+    #[inline]
+    fn guess(&self, span: f64, high: f64) -> f64 {
+        let decay = self.e / ((1.0 + self.e) * (1.0 + self.e)) * span;
+        (self.rate * span / (1.0 + 0.5 * decay)).min(high)
     }
 
     /// The value of eᵘ up to which D, and from which on L, is nearly linear in T; `None`: D always is.
@@ -202,10 +218,9 @@ impl Arc {
     /// D + L − (1 − c) T as a function of D.
     #[inline]
     fn by_sum(&self, sign: f64, total: f64, way: f64) -> (f64, f64, f64) {
-        let d = sign * way;
-        let e = self.e * d.exp();
+        let (high, e) = self.high_and_end(sign * way);
         let l = if e.is_finite() { e / (self.rest - self.c * e) } else { -1.0 / self.c };
-        (way + self.high(d) - total, 1.0 + l, sign * l * (1.0 + self.c * l) / (1.0 + l))
+        (way + high - total, 1.0 + l, sign * l * (1.0 + self.c * l) / (1.0 + l))
     }
 
     /// D − ln(1 + y(L)/ρ) with L = (1 − c) T − D, as a function of D.
@@ -231,43 +246,45 @@ impl Arc {
         (residual, 1.0 + m, sign * m * (self.c + m) / (1.0 + m))
     }
 
-    /// |L| after the signed change `d` of u: ∫ 1/(1 + e⁻ᵘ) d|T|, taken from the lower end so that nothing cancels.
+    /// |L| after the signed change `d` of u: ∫ 1/(1 + e⁻ᵘ) d|T|.
     #[inline]
     fn high(&self, d: f64) -> f64 {
-        let way = d.abs();
-        let y = if d < 0.0 {
-            -self.e * (-way).exp_m1() / (self.rest - self.c * self.e * (-way).exp())
+        self.high_and_end(d).0
+    }
+
+    /// |L|, taken from the lower end so that nothing cancels, and eᵘ after the signed change `d` of u.
+    #[inline]
+    fn high_and_end(&self, d: f64) -> (f64, f64) {
+        let grown = d.exp_m1();
+        let (y, e) = if d < 0.0 {
+            let e = self.e * d.exp();
+            (-self.e * grown / (self.rest - self.c * e), e)
         } else {
-            self.rho * way.exp_m1()
+            (self.rho * grown, self.e * (1.0 + grown))
         };
         let x = -self.c * y;
-        if x.abs() < f64::EPSILON {
+        let high = if x.abs() < f64::EPSILON {
             y
         } else if x < LARGEST_PRODUCT {
             x.ln_1p() / -self.c
         } else {
-            (way + ((-way).exp() - self.c * self.rho).ln()) / -self.c
-        }
+            (d + ((-d).exp() - self.c * self.rho).ln()) / -self.c
+        };
+        (high, e)
     }
 
-    /// Both integrals, each in the form that keeps its precision.
+    /// Both integrals: from the sums D + L = (1 − c) T and ∫ 1/(1 + eᵘ) d|T| = |D| + c |T| unless they cancel.
     #[inline]
-    fn passed(&self, way: f64, span: f64, sign: f64) -> Passed {
-        if self.c > 0.0 {
-            let left = self.rest * span - way;
-            // near the equilibrium L follows from the sum, far from it from its own formula
-            let high = if left > 1.0 { left } else { self.high(sign * way) };
-            return (way, self.c * span + way, high);
-        }
-        (way, self.low(way, sign), self.high(sign * way))
+    fn passed(&self, way: f64, total: f64, span: f64, sign: f64) -> Passed {
+        let (low, high) = (way + self.c * span, total - way);
+        let low = if low > CANCELLED * way { low } else { self.low(way, sign) };
+        let high = if high > CANCELLED * total { high } else { self.high(sign * way) };
+        (way, low, high)
     }
 
     /// ∫ 1/(1 + eᵘ) d|T| = (|D| + ln((1−c−cE)/(1−c−cE′)))/(1−c) for c ≤ 0, from the lower end E to the upper end E′.
     #[inline]
     fn low(&self, way: f64, sign: f64) -> f64 {
-        if self.c == 0.0 {
-            return way;
-        }
         let shrunk = (-way).exp();
         let e = if sign < 0.0 { self.e * shrunk } else { self.e };
         let lower = self.rest - self.c * e;

@@ -4,8 +4,16 @@ use super::contact_model::{Hold, Shift};
 
 /// Below it the series is taken, above it the closed form (which there loses no more than four roundings).
 const SERIES_UP_TO: f64 = 1.0;
-/// 1/19! is below a rounding of 1/2.
-const SERIES_TERMS: u32 = 19;
+/// 1/k! for k = 2 … 19; the next one is below a rounding of 1/2.
+const INVERSE_FACTORIALS: [f64; 18] = {
+    let (mut inverse, mut factorial, mut k) = ([0.0; 18], 1.0, 2);
+    while k < 20 {
+        factorial *= k as f64;
+        inverse[k - 2] = 1.0 / factorial;
+        k += 1;
+    }
+    inverse
+};
 
 /// s = α t ((F·n + k h₀) φ₁(z) + k v t φ₂(z)), z = −α (a·n) k t, and J = −k ∫ h dt likewise.
 #[inline]
@@ -21,7 +29,7 @@ pub(super) fn flow(hold: &Hold, stiffness: f64) -> Shift {
 #[inline]
 fn phi(z: f64) -> (f64, f64) {
     if z.abs() < SERIES_UP_TO {
-        let phi2 = (3..=SERIES_TERMS).rev().fold(1.0, |sum, k| 1.0 + sum * z / f64::from(k)) / 2.0;
+        let phi2 = INVERSE_FACTORIALS.iter().rev().fold(0.0, |sum, inverse| sum * z + inverse);
         return (1.0 + z * phi2, phi2);
     }
     let phi1 = z.exp_m1() / z;
