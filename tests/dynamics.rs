@@ -102,6 +102,16 @@ fn beyond_f_max_the_face_escapes_at_constant_speed() {
 }
 
 #[test]
+fn a_pull_many_times_f_max_moves_the_face_away_at_its_own_rate() {
+    // u grows from 13.85 by |c| T = 963 and by less than e^−13.85 T more
+    let (u, c, scaled): (f64, f64, f64) = (13.85, -62.4, 15.43);
+    let moved = step(paper(0.1, 0.0), &UP, above(u), press(c * F_MAX), scaled * H_MIN / (0.1 * F_MAX)).b.z / -H_MIN;
+    let more = moved + c * scaled;
+    // ∫ e^−u dT with u growing at |c|; six roundings of 963
+    assert_near(more, (-u).exp() / -c, 6.0 * 963.0 * f64::EPSILON);
+}
+
+#[test]
 fn a_spring_halves_its_distance_to_rest() {
     let params = DynamicsParams { model: ContactModel::Spring { stiffness_n_per_m: 1e4 }, ..paper(0.1, 0.0) };
     // rest at h = −F/k = −0.2 mm, from h = 1 mm; half after ln 2/(α k)
@@ -307,6 +317,46 @@ proptest! {
         // the rate lies between −c and 1 − c
         let rate = after.b.z / -H_MIN / scaled;
         prop_assert!(rate >= -c - 1e-9 * (1.0 + 1e9 / scaled) && rate <= 1.0 - c + 1e-9 * (1.0 + 1e9 / scaled), "{rate}");
+    }
+}
+
+/// c = F·n/f_max on both sides of every special value.
+fn shares() -> impl Strategy<Value = f64> {
+    let power = |low: f64, high: f64| (low..high).prop_map(|x| 10f64.powf(x));
+    prop_oneof![
+        0.0..1.0,
+        power(-20.0, 0.0),
+        power(-16.0, 0.0).prop_map(|x| 1.0 - x),
+        power(-20.0, 6.0).prop_map(|x| -x),
+        power(-15.0, 6.0).prop_map(|x| 1.0 + x),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 20_000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn position_flows_add_up_in_every_regime(u in prop_oneof![-45.0..45.0, -700.0..700.0], c in shares(), scaled in -6.0..6.0f64, first in 0.05..0.95, tilted in any::<bool>()) {
+        let model = ContactModel::Sigmoid { f_max_n: 1.0, h_min_m: 1.0, delta: 0.0 };
+        let along = if tilted { Along::Force } else { Along::InitialNormal };
+        let params = DynamicsParams { model, along, ..paper(1.0, 0.0) };
+        let flow = |face: &FaceState, u, grow: f64, t: f64| {
+            let force = grow * Vector3::new(if tilted { c.abs() } else { 0.0 }, 0.0, c);
+            step(params, face, Point3::new(0.0, 0.0, u), force, t)
+        };
+        let (t, ulps) = (10f64.powf(scaled), 1.0 + 8e-16);
+        let once = flow(&UP, u, 1.0, t);
+        let half = flow(&UP, u, 1.0, first * t);
+        let twice = flow(&half, u, 1.0, (1.0 - first) * t);
+        // what four roundings of u, F, t, and of u half-way, do to the result
+        let moved = [
+            flow(&UP, u * ulps + 1e-15, 1.0, t).b - once.b,
+            flow(&UP, u, ulps, t).b - once.b,
+            flow(&UP, u, 1.0, ulps * t).b - once.b,
+            flow(&half, u * ulps + 1e-15 + 8e-16 * half.b.z.abs(), 1.0, (1.0 - first) * t).b - twice.b,
+        ];
+        let rounding: f64 = moved.iter().map(|v| v.norm()).sum();
+        prop_assert!((twice.b - once.b).norm() <= 1e-12 * once.b.coords.norm() + 4.0 * rounding);
     }
 }
 

@@ -192,7 +192,7 @@ impl Arc {
         start: f64,
         equation: impl Fn(&Self, f64, f64, f64) -> (f64, f64, f64),
     ) -> f64 {
-        let mut way = start.clamp(low, high);
+        let mut way = start.max(low).min(high); // rounding may cross the two
         for _ in 0..MAX_ITERATIONS {
             let (residual, slope, bend) = equation(self, sign, total, way);
             if residual > 0.0 {
@@ -219,7 +219,7 @@ impl Arc {
     #[inline]
     fn by_sum(&self, sign: f64, total: f64, way: f64) -> (f64, f64, f64) {
         let (high, e) = self.high_and_end(sign * way);
-        let l = if e.is_finite() { e / (self.rest - self.c * e) } else { -1.0 / self.c };
+        let l = 1.0 / (self.rest / e - self.c);
         (way + high - total, 1.0 + l, sign * l * (1.0 + self.c * l) / (1.0 + l))
     }
 
