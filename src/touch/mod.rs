@@ -5,6 +5,7 @@
 
 mod compensate;
 mod contact;
+mod stream;
 mod sync;
 
 pub use compensate::{Compensator, CompensatorParams, Payload, Tip, WrenchFrame};

@@ -4,11 +4,10 @@
 //! Which samples come out depends on the messages alone: any order of arrival that moves no message by more than the
 //! reorder window gives the same samples, bit for bit.
 
-use std::collections::VecDeque;
-
 use nalgebra::Isometry3;
 use serde::Serialize;
 
+use super::stream::Stream;
 use super::{Message, Sample, SampleError, SettingError, StampedPose, StampedWrench};
 
 /// Settings of a [`Synchroniser`]; times in ns.
@@ -230,116 +229,6 @@ impl SyncCounts {
             SampleError::Absurd { .. } | SampleError::NotARotation { .. } => self.absurd += 1,
             SampleError::NotAfter { .. } => self.late += 1,
         }
-    }
-}
-
-/// One stream in order of time, as far as it is held.
-#[derive(Debug)]
-struct Stream<T> {
-    held: VecDeque<T>,
-    newest: Option<i64>,
-    /// a stamp up to here is late
-    settled: i64,
-    /// leaps ahead; waits for the next message to agree
-    suspect: Option<T>,
-    /// messages were pushed out of the full buffer
-    overflown: bool,
-    counts: SyncCounts,
-}
-
-impl<T: Stamped + Copy> Stream<T> {
-    fn with_capacity(capacity: usize) -> Self {
-        Self {
-            held: VecDeque::with_capacity(capacity),
-            newest: None,
-            settled: i64::MIN,
-            suspect: None,
-            overflown: false,
-            counts: SyncCounts::default(),
-        }
-    }
-
-    fn push(&mut self, message: T, params: &SyncParams) {
-        let stamp = message.stamp_ns();
-        if self.newest.is_some_and(|newest| stamp <= newest.saturating_add(params.largest_jump_ns)) {
-            return self.insert(message, params);
-        }
-        match self.suspect.take() {
-            Some(first) if stamp.abs_diff(first.stamp_ns()) <= params.largest_jump_ns as u64 => {
-                self.insert(first, params);
-                self.insert(message, params);
-            }
-            refused => {
-                self.counts.jump += refused.is_some() as u64;
-                self.suspect = Some(message);
-            }
-        }
-    }
-
-    /// A message that nothing contradicted is kept.
-    fn finish(&mut self, params: &SyncParams) {
-        match self.suspect.take() {
-            Some(only) if self.newest.is_none() => self.insert(only, params),
-            refused => self.counts.jump += refused.is_some() as u64,
-        }
-    }
-
-    fn insert(&mut self, message: T, params: &SyncParams) {
-        let stamp = message.stamp_ns();
-        if stamp <= self.settled {
-            self.counts.late += 1;
-            return;
-        }
-        let at = self.held.partition_point(|held| held.stamp_ns() < stamp);
-        if self.held.get(at).is_some_and(|held| held.stamp_ns() == stamp) {
-            self.counts.duplicate += 1;
-            return;
-        }
-        self.held.insert(at, message);
-        let newest = self.newest.map_or(stamp, |newest| newest.max(stamp));
-        self.newest = Some(newest);
-        self.settled = self.settled.max(newest.saturating_sub(params.reorder_ns).saturating_sub(1));
-        if self.held.len() == params.capacity {
-            self.pop();
-            self.overflown = true;
-            self.counts.overflow += T::IS_LOST_ALONE as u64;
-        }
-    }
-
-    /// Drops what lies before the last message at or before `stamp_ns`.
-    fn forget_before(&mut self, stamp_ns: i64) {
-        while self.held.get(1).is_some_and(|second| second.stamp_ns() <= stamp_ns) {
-            self.pop();
-        }
-    }
-
-    fn pop(&mut self) {
-        if let Some(gone) = self.held.pop_front() {
-            self.settled = self.settled.max(gone.stamp_ns());
-        }
-    }
-}
-
-trait Stamped {
-    /// Whether dropping one is a loss in itself; a pose is missed only by a wrench that would have needed it.
-    const IS_LOST_ALONE: bool;
-
-    fn stamp_ns(&self) -> i64;
-}
-
-impl Stamped for StampedPose {
-    const IS_LOST_ALONE: bool = false;
-
-    fn stamp_ns(&self) -> i64 {
-        self.stamp_ns
-    }
-}
-
-impl Stamped for StampedWrench {
-    const IS_LOST_ALONE: bool = true;
-
-    fn stamp_ns(&self) -> i64 {
-        self.stamp_ns
     }
 }
 
