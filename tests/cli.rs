@@ -34,7 +34,7 @@ fn text(bytes: &[u8]) -> &str {
 
 #[test]
 fn wrong_usage_is_2_and_leaves_stdout_empty() {
-    for arguments in [&[][..], &["polish"], &["--verbose"]] {
+    for arguments in [&[][..], &["polish"], &["step", "--fast"], &["demo", "--seed", "x"], &["--verbose"]] {
         let output = touchup(arguments, "");
         assert_eq!((code(&output), text(&output.stdout)), (2, ""), "{arguments:?}");
         assert!(text(&output.stderr).contains("--help") || text(&output.stderr).contains("Usage"), "{arguments:?}");
@@ -43,7 +43,7 @@ fn wrong_usage_is_2_and_leaves_stdout_empty() {
 
 #[test]
 fn help_and_version_are_results() {
-    for arguments in [&["--help"][..], &["refine", "--help"]] {
+    for arguments in [&["--help"][..], &["refine", "--help"], &["demo", "--help"], &["step", "--help"]] {
         let output = touchup(arguments, "");
         assert_eq!((code(&output), text(&output.stderr)), (0, ""), "{arguments:?}");
         assert!(text(&output.stdout).contains("Usage: touchup"), "{arguments:?}");
@@ -302,4 +302,65 @@ fn losses_are_4_and_named() {
     let output = case.refine("cut.mcap", "cut.ply", &["--json"]);
     assert!([3, 4].contains(&code(&output)), "{}", text(&output.stderr));
     assert!(text(&output.stderr).contains("cut.mcap"), "{}", text(&output.stderr));
+}
+
+// ---- demo -------------------------------------------------------------------------------------------------------
+
+#[test]
+fn demo_lowers_the_error_at_least_two_and_a_half_fold() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("made/for/it");
+    let output = touchup(&["demo", "--out", out.to_str().unwrap()], "");
+    assert_eq!((code(&output), text(&output.stderr)), (0, ""));
+    assert!(text(&output.stdout).contains("times less"), "{}", text(&output.stdout));
+    let summary: Value = serde_json::from_slice(&fs::read(out.join("summary.json")).unwrap()).unwrap();
+    println!("{summary:#}");
+    for error in ["part_to_mesh_mm", "mesh_to_part_mm"] {
+        let [before, after] = ["before", "after"].map(|when| summary[when][error][0].as_f64().unwrap());
+        assert!(before > 2.5 * after && after > 0.0, "{error}: {before} -> {after}");
+    }
+    // as bad as the scans of the cases: edges of 2.4 mm, 0.6 mm of noise and 0.3 mm of bias
+    let scan = |key: &str| summary["scan"][key].as_f64().unwrap();
+    assert!((2.0..2.8).contains(&scan("edge_median_mm")), "{}", scan("edge_median_mm"));
+    assert!((0.5..1.0).contains(&scan("rms_mm")) && (0.2..0.6).contains(&scan("bias_mm")));
+    for name in ["truth.ply", "scan.ply", "refined.ply", "touch.mcap"] {
+        assert!(fs::metadata(out.join(name)).unwrap().len() > 1000, "{name}");
+    }
+}
+
+#[test]
+fn demo_depends_on_its_seed_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let refined = ["1", "1", "2"].iter().enumerate().map(|(run, seed)| {
+        let out = folder.path().join(run.to_string());
+        assert_eq!(code(&touchup(&["demo", "--seed", seed, "--out", out.to_str().unwrap()], "")), 0);
+        ["scan.ply", "touch.mcap", "refined.ply"].map(|name| fs::read(out.join(name)).unwrap())
+    });
+    let [first, again, other] = refined.collect::<Vec<_>>().try_into().unwrap();
+    assert!(first == again && first.iter().zip(&other).all(|(a, b)| a != b));
+}
+
+#[test]
+fn demo_that_cannot_write_is_1() {
+    let folder = tempfile::tempdir().unwrap();
+    let taken = folder.path().join("file");
+    fs::write(&taken, "").unwrap();
+    let output = touchup(&["demo", "--out", taken.to_str().unwrap()], "");
+    assert_eq!((code(&output), text(&output.stdout)), (1, ""));
+    assert!(text(&output.stderr).contains("file") && text(&output.stderr).lines().count() == 1);
+}
+
+// ---- step -------------------------------------------------------------------------------------------------------
+
+/// A linear spring at rest under no force: h = 0 stays 0, whatever the rest.
+#[test]
+fn step_answers_each_line_in_order_and_goes_on_after_a_bad_one() {
+    let good = r#"{"p_m":[0,0,0],"force_n":[0,0,0],"b_m":[0,0,0],"n":[0,0,1],"dt_s":0.001,"k_n_per_m":1000,"alpha_m_per_n_s":0.1,"beta_per_n2_s":0.1,"step":"lie","along":"normal0"}"#;
+    let output = touchup(&["step"], &format!("{good}\nnonsense\n{good}\n"));
+    assert_eq!((code(&output), text(&output.stderr)), (0, ""));
+    let answers: Vec<Value> = text(&output.stdout).lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_eq!(answers.len(), 3);
+    assert_eq!(answers[0], serde_json::json!({ "b_m": [0.0, 0.0, 0.0], "n": [0.0, 0.0, 1.0] }));
+    assert!(answers[1]["error"].is_string());
+    assert_eq!(answers[2], answers[0]);
 }

@@ -3,22 +3,28 @@
 //! Results go to stdout, everything else to stderr. Exit codes, which other tools rely on: 0 done, 1 the result could
 //! not be written, 2 wrong usage, 3 bad input file, 4 done with losses, which are named.
 
+mod demo;
 mod latency;
 mod progress;
 mod refine;
 mod replay;
+mod simulate;
 mod step;
+mod touched;
 
 use std::ffi::OsString;
-use std::io::Write;
+use std::io::{ErrorKind, Write, stderr, stdin, stdout};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
 use crate::io::mesh_file::MeshFileError;
 use crate::io::recording::RecordingError;
+use crate::mesh::MeshError;
 use crate::refine::RefineError;
 use crate::scene::SceneError;
+use crate::sim::SimError;
 use crate::touch::SettingError;
 
 /// Repairs a 3D scan by touch.
@@ -32,11 +38,19 @@ struct Arguments {
 const EXIT_CODES: &str = "Exit codes: 0 done, 1 result not written, 2 wrong usage, 3 bad input file, \
                           4 done with losses (named on stderr)";
 
+const STEP_FIELDS: &str = "\
+In, one object per line: p_m, force_n, b_m, n (arrays of three), dt_s, h_min_m, delta, f_max_n, alpha_m_per_n_s,
+beta_per_n2_s, step: lie|corrected|dp5, along: normal0|force. k_n_per_m instead of h_min_m, delta and f_max_n takes the
+linear spring. Out, in the same order: {\"b_m\",\"n\"} with 17 digits, or {\"error\"}.";
+
 #[derive(Debug, Subcommand)]
 enum Verb {
+    /// Makes a plate, scans it badly, touches it and refines the scan: needs no input
+    Demo(demo::DemoArguments),
     /// Refines a scan by a recording of touches
     Refine(refine::RefineArguments),
     /// Answers one held sample per JSON line on stdin, so that other implementations can be compared
+    #[command(after_help = STEP_FIELDS)]
     Step,
 }
 
@@ -54,6 +68,14 @@ enum CliError {
     ReadRecording(RecordingError),
     #[error("{0}")]
     WriteMesh(MeshFileError),
+    #[error("cannot write {}: {source}", path.display())]
+    Write { path: PathBuf, source: std::io::Error },
+    #[error("{0}")]
+    WriteRecording(RecordingError),
+    #[error(transparent)]
+    Simulate(#[from] SimError),
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
     #[error(transparent)]
     Setting(#[from] SettingError),
     #[error("cannot read stdin or write stdout: {0}")]
@@ -65,10 +87,11 @@ enum CliError {
 impl CliError {
     fn exit_code(&self) -> u8 {
         match self {
-            Self::WriteMesh(_) | Self::Stream(_) => 1,
+            Self::WriteMesh(_) | Self::WriteRecording(_) | Self::Write { .. } | Self::Stream(_) => 1,
             Self::Usage(_) => 2,
             // settings come from a scene file: its flags are checked before
-            Self::Scene(_) | Self::ReadMesh(_) | Self::ReadRecording(_) | Self::Setting(_) | Self::Refine(_) => 3,
+            Self::Scene(_) | Self::ReadMesh(_) | Self::ReadRecording(_) | Self::Simulate(_) => 3,
+            Self::Mesh(_) | Self::Setting(_) | Self::Refine(_) => 3,
         }
     }
 }
@@ -87,10 +110,9 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         }
     };
     let ended = match arguments.verb {
+        Verb::Demo(arguments) => demo::demo(&arguments),
         Verb::Refine(arguments) => refine::refine(&arguments),
-        Verb::Step => {
-            step::run(std::io::stdin().lock(), std::io::stdout().lock()).map(|()| Losses::new()).map_err(CliError::from)
-        }
+        Verb::Step => answer_steps(),
     };
     match ended {
         Ok(losses) if losses.is_empty() => ExitCode::SUCCESS,
@@ -105,12 +127,20 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     }
 }
 
+fn answer_steps() -> Result<Losses, CliError> {
+    match step::run(stdin().lock(), stdout().lock()) {
+        // a reader that has gone away wants no more answers
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error.into()),
+        _ => Ok(Losses::new()),
+    }
+}
+
 /// One line on stderr.
 fn complain(line: &str) {
-    let _ = writeln!(std::io::stderr(), "touchup: {}", line.replace('\n', " "));
+    let _ = writeln!(stderr(), "touchup: {}", line.replace('\n', " "));
 }
 
 /// One line, or several, on stdout. A reader that has gone away is no error of ours.
 fn tell(text: &str) {
-    let _ = writeln!(std::io::stdout(), "{text}");
+    let _ = writeln!(stdout(), "{text}");
 }

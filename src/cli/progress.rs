@@ -34,6 +34,17 @@ impl Progress {
         Self { bar, started: Instant::now(), steps: 0, waiting: stderr().is_terminal() }
     }
 
+    /// A stage that cannot say how far it is.
+    pub fn stage(what: &'static str) -> Self {
+        let mut stage = Self::new(what, None);
+        if stage.waiting {
+            stage.waiting = false;
+            stage.bar.set_draw_target(ProgressDrawTarget::stderr());
+            stage.bar.enable_steady_tick(QUIET_FOR);
+        }
+        stage
+    }
+
     /// One step is done.
     #[inline]
     pub fn step(&mut self) {

@@ -12,11 +12,11 @@ use super::latency::{Latencies, Quantiles};
 use super::replay::{replay, wrench_frame};
 use super::{CliError, Losses, tell};
 use crate::io::mesh_file::{MeshFile, MeshFileError, MeshUnit, check_target, read_mesh, write_mesh};
-use crate::io::recording::{RecordingReader, Topics};
-use crate::mesh::{TriMesh, VertexId};
+use crate::io::recording::{RecordingError, RecordingReader, Topics};
+use crate::mesh::{RepairReport, TriMesh, VertexId};
 use crate::refine::{RefineError, Refiner};
 use crate::scene::{Mode, Scene};
-use crate::touch::Synchroniser;
+use crate::touch::{Sample, WrenchFrame};
 
 #[derive(Debug, Args)]
 pub(super) struct RefineArguments {
@@ -60,7 +60,7 @@ pub(super) struct RefineArguments {
 
 /// What `--json` prints; times in s, `push_ns` in ns.
 #[derive(Debug, Serialize)]
-struct Summary {
+pub(super) struct Summary {
     /// wrenches of the recording: each could be a sample
     samples: u64,
     /// those that the refiner took
@@ -79,57 +79,48 @@ struct Summary {
     replay_s: f64,
 }
 
+/// What became of a scan.
+pub(super) struct Refined {
+    /// what had to be repaired in the file
+    repair: RepairReport,
+    pub summary: Summary,
+    pub losses: Losses,
+}
+
 const NOTHING_MOVES: &str = "the scene names no `refine`, so nothing would move the mesh: add `refine:` to it";
 
+/// The verb: refines and tells.
 pub(super) fn refine(arguments: &RefineArguments) -> Result<Losses, CliError> {
-    let scene = arguments.scene()?;
-    arguments.check_out()?;
-    let topics = Topics { pose: arguments.pose_topic.clone(), wrench: arguments.wrench_topic.clone() };
-    let started = Instant::now();
-    let MeshFile { mesh, repair } = read_mesh(&arguments.scan, arguments.mesh_unit).map_err(CliError::ReadMesh)?;
-    let wrench_frame = wrench_frame(&arguments.bag, &topics).map_err(CliError::ReadRecording)?;
-    let recording = RecordingReader::open(&arguments.bag, &topics).map_err(CliError::ReadRecording)?;
-    let mut sync = Synchroniser::new(scene.sync_params())?;
-    let params = scene.refine_params(wrench_frame).ok_or_else(|| CliError::Usage(NOTHING_MOVES.to_owned()))?;
-    let as_scanned = mesh.clone();
-    let mut refiner = Refiner::new(mesh, params)?;
-    let load_s = started.elapsed().as_secs_f64();
-
-    let started = Instant::now();
-    let mut latencies = Latencies::new();
-    let (mut accepted, mut refused) = (0, BTreeMap::<String, u64>::new());
-    let replayed = replay(recording, &mut sync, |sample| {
-        let begun = Instant::now();
-        let pushed = refiner.push(sample);
-        latencies.record(begun.elapsed());
-        match pushed {
-            Ok(_) => accepted += 1,
-            Err(error) => *refused.entry(reason_of(&error).to_owned()).or_default() += 1,
-        }
-    })
-    .map_err(CliError::ReadRecording)?;
-    let replay_s = started.elapsed().as_secs_f64();
-    write_mesh(&arguments.out, refiner.mesh(), arguments.mesh_unit).map_err(CliError::WriteMesh)?;
-
-    refused.extend(replayed.refused);
-    let counts = refiner.counts();
-    let summary = Summary {
-        samples: replayed.wrenches,
-        accepted,
-        refused,
-        contacts: counts.contacts,
-        moved_faces: moved_faces(&as_scanned, refiner.mesh()),
-        cut_back: counts.cut_back,
-        push_ns: latencies.quantiles(),
-        load_s,
-        replay_s,
-    };
+    let Refined { repair, summary, losses } = arguments.refined()?;
     if arguments.json {
         tell(&serde_json::to_string(&summary).expect("numbers and names alone cannot fail"));
     } else {
         tell(&format!("scan: {repair}\n{summary}\nwrote {}", arguments.out.display()));
     }
-    Ok(replayed.losses)
+    Ok(losses)
+}
+
+/// What became of the samples, and how long each took.
+struct Pushes {
+    accepted: u64,
+    refused: BTreeMap<String, u64>,
+    latencies: Latencies,
+}
+
+impl Pushes {
+    fn new() -> Self {
+        Self { accepted: 0, refused: BTreeMap::new(), latencies: Latencies::new() }
+    }
+
+    fn push(&mut self, refiner: &mut Refiner, sample: &Sample) {
+        let begun = Instant::now();
+        let pushed = refiner.push(sample);
+        self.latencies.record(begun.elapsed());
+        match pushed {
+            Ok(_) => self.accepted += 1,
+            Err(error) => *self.refused.entry(reason_of(&error).to_owned()).or_default() += 1,
+        }
+    }
 }
 
 /// Why the refiner did not take a sample. The synchroniser lets only checked samples out, in order of time, so that what
@@ -149,6 +140,65 @@ fn moved_faces(before: &TriMesh, after: &TriMesh) -> u64 {
 }
 
 impl RefineArguments {
+    /// The files alone, everything else as it is by default.
+    pub(super) fn of_files(scan: PathBuf, bag: PathBuf, out: PathBuf, mesh_unit: MeshUnit) -> Self {
+        let Topics { pose, wrench } = Topics::default();
+        Self {
+            scan,
+            bag,
+            out,
+            mesh_unit,
+            scene: None,
+            wrench_topic: wrench,
+            pose_topic: pose,
+            tip_radius_mm: None,
+            stiffness_n_per_mm: None,
+            scan_noise_mm: None,
+            mode: None,
+            json: false,
+        }
+    }
+
+    /// Reads, replays and writes.
+    pub(super) fn refined(&self) -> Result<Refined, CliError> {
+        let scene = self.scene()?;
+        self.check_out()?;
+        let started = Instant::now();
+        let MeshFile { mesh, repair } = read_mesh(&self.scan, self.mesh_unit).map_err(CliError::ReadMesh)?;
+        let as_scanned = mesh.clone();
+        let (recording, wrench_frame) = self.recording().map_err(CliError::ReadRecording)?;
+        let params = scene.refine_params(wrench_frame).ok_or_else(|| CliError::Usage(NOTHING_MOVES.to_owned()))?;
+        let mut refiner = Refiner::new(mesh, params)?;
+        let load_s = started.elapsed().as_secs_f64();
+
+        let started = Instant::now();
+        let mut pushes = Pushes::new();
+        let replayed = replay(recording, scene.sync_params(), |sample| pushes.push(&mut refiner, sample))?;
+        let replay_s = started.elapsed().as_secs_f64();
+        write_mesh(&self.out, refiner.mesh(), self.mesh_unit).map_err(CliError::WriteMesh)?;
+
+        let mut refused = pushes.refused;
+        refused.extend(replayed.refused);
+        let counts = refiner.counts();
+        let summary = Summary {
+            samples: replayed.wrenches,
+            accepted: pushes.accepted,
+            refused,
+            contacts: counts.contacts,
+            moved_faces: moved_faces(&as_scanned, refiner.mesh()),
+            cut_back: counts.cut_back,
+            push_ns: pushes.latencies.quantiles(),
+            load_s,
+            replay_s,
+        };
+        Ok(Refined { repair, summary, losses: replayed.losses })
+    }
+
+    fn recording(&self) -> Result<(RecordingReader, WrenchFrame), RecordingError> {
+        let topics = Topics { pose: self.pose_topic.clone(), wrench: self.wrench_topic.clone() };
+        Ok((RecordingReader::open(&self.bag, &topics)?, wrench_frame(&self.bag, &topics)?))
+    }
+
     /// The work is not begun when its result cannot be kept.
     fn check_out(&self) -> Result<(), CliError> {
         check_target(&self.out).map_err(|error| match error {

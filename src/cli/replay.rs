@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::Losses;
 use super::progress::Progress;
+use super::{CliError, Losses};
 use crate::io::recording::{Recorded, RecordingError, RecordingReader, Topics};
-use crate::touch::{Message, Sample, Synchroniser, WrenchFrame};
+use crate::touch::{Message, Sample, SyncParams, Synchroniser, WrenchFrame};
 
 /// Reasons that are gaps in the recording itself; every other one is a message lost on the way.
 const NOT_A_LOSS: [&str; 4] = ["gap", "no_pose_before", "no_pose_after", "duplicate"];
@@ -25,19 +25,20 @@ pub struct Replayed {
 /// Gives each sample of `recording` to `each`, in order of time.
 ///
 /// # Errors
-/// [`RecordingError`] when the recording is damaged before its first message; later damage is a loss.
+/// [`CliError::ReadRecording`] when the recording is damaged before its first message; later damage is a loss.
 pub fn replay(
     mut recording: RecordingReader,
-    sync: &mut Synchroniser,
+    sync: SyncParams,
     mut each: impl FnMut(&Sample),
-) -> Result<Replayed, RecordingError> {
+) -> Result<Replayed, CliError> {
+    let mut sync = Synchroniser::new(sync)?;
     let mut replayed = Replayed::default();
     let mut progress = Progress::new("replay", recording.message_count());
     let mut has_begun = false;
     for message in recording.by_ref() {
         match message {
             Ok(message) => sync.push(taken(message, &mut replayed.wrenches)),
-            Err(damage) if !has_begun => return Err(damage),
+            Err(damage) if !has_begun => return Err(CliError::ReadRecording(damage)),
             Err(damage) => replayed.losses.push(damage.to_string()),
         }
         has_begun = true;
@@ -46,7 +47,7 @@ pub fn replay(
     }
     sync.finish();
     std::iter::from_fn(|| sync.next_sample()).for_each(|sample| each(&sample));
-    replayed.account(&recording, sync);
+    replayed.account(&recording, &sync);
     Ok(replayed)
 }
 

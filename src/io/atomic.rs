@@ -96,6 +96,14 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&mut BufWriter<File>) ->
     file.commit()
 }
 
+/// Makes a folder and those above it, as far as they are not there.
+///
+/// # Errors
+/// Whatever the system reports.
+pub fn create_folder(path: &Path) -> io::Result<()> {
+    fs::create_dir_all(path)
+}
+
 fn folder_of(path: &Path) -> &Path {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,

@@ -1,0 +1,126 @@
+//! `touchup demo`: makes a plate, scans it badly, touches it, refines the scan, and says how much better it became.
+
+use std::fmt;
+use std::io::Write;
+use std::path::PathBuf;
+
+use clap::Args;
+use serde::Serialize;
+
+use super::progress::Progress;
+use super::refine::{RefineArguments, Refined, Summary};
+use super::simulate::{Simulated, write_simulation};
+use super::touched::{Error, Touched};
+use super::{CliError, Losses, tell};
+use crate::io::atomic::write_atomically;
+use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
+use crate::sim::{PathParams, Plate, ScannerParams, StylusParams, measure_badness, plan_demo};
+
+/// Largest distance of the written plate's round walls from circles, m.
+const CHORD_ERROR: f64 = 10e-6;
+
+#[derive(Debug, Args)]
+pub(super) struct DemoArguments {
+    /// Folder for truth.ply, scan.ply, touch.mcap, refined.ply (in mm) and summary.json
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    out: PathBuf,
+    /// Another seed makes another scan and another hand
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+}
+
+/// What `summary.json` holds; lengths in mm.
+#[derive(Debug, Serialize)]
+struct DemoSummary {
+    scan: ScanBadness,
+    touched_s: f64,
+    /// error inside the touched region of the scan
+    before: Error,
+    /// and of the refined mesh
+    after: Error,
+    refine: Summary,
+}
+
+/// The scan as a whole against the part.
+#[derive(Debug, Serialize)]
+struct ScanBadness {
+    faces: usize,
+    edge_median_mm: f64,
+    mean_mm: f64,
+    rms_mm: f64,
+    p95_mm: f64,
+    bias_mm: f64,
+}
+
+pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
+    let plate = Plate::default();
+    let path = plan_demo(&plate, &PathParams::default());
+    let scanner = ScannerParams { seed: arguments.seed, ..ScannerParams::default() };
+    let truth = plate.mesh(CHORD_ERROR)?;
+    let Simulated { scan, touch } =
+        write_simulation(&plate, &truth, &path, &scanner, &StylusParams::default(), arguments.seed, &arguments.out)?;
+
+    let refined_path = arguments.out.join("refined.ply");
+    let files = RefineArguments::of_files(
+        arguments.out.join("scan.ply"),
+        arguments.out.join("touch.mcap"),
+        refined_path.clone(),
+        MeshUnit::Millimetre,
+    );
+    let Refined { summary, losses, .. } = files.refined()?;
+    // measured is what was written
+    let MeshFile { mesh: refined, .. } = read_mesh(&refined_path, MeshUnit::Millimetre).map_err(CliError::ReadMesh)?;
+
+    let _measuring = Progress::stage("measure");
+    let touched = Touched::of(&touch.moments);
+    let demo = DemoSummary {
+        scan: ScanBadness::of(&plate, &scan)?,
+        touched_s: touch.moments.last().map_or(0.0, |moment| moment.t),
+        before: touched.error(&plate, &scan),
+        after: touched.error(&plate, &refined),
+        refine: summary,
+    };
+    demo.write(arguments)?;
+    tell(&format!("{demo}\nwrote {}", arguments.out.display()));
+    Ok(losses)
+}
+
+impl ScanBadness {
+    fn of(plate: &Plate, scan: &crate::mesh::TriMesh) -> Result<Self, CliError> {
+        let badness = measure_badness(scan, plate, |_| true).ok_or(crate::mesh::MeshError::Empty)?;
+        Ok(Self {
+            faces: badness.faces,
+            edge_median_mm: badness.edge_median * 1e3,
+            mean_mm: badness.mean * 1e3,
+            rms_mm: badness.rms * 1e3,
+            p95_mm: badness.p95 * 1e3,
+            bias_mm: badness.bias * 1e3,
+        })
+    }
+}
+
+impl DemoSummary {
+    fn write(&self, arguments: &DemoArguments) -> Result<(), CliError> {
+        let path = arguments.out.join("summary.json");
+        let text = serde_json::to_string_pretty(self).expect("numbers and names alone cannot fail");
+        write_atomically(&path, |out| writeln!(out, "{text}")).map_err(|source| CliError::Write { path, source })
+    }
+}
+
+impl fmt::Display for DemoSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ScanBadness { faces, edge_median_mm, mean_mm, rms_mm, p95_mm, bias_mm } = &self.scan;
+        writeln!(
+            f,
+            "scan: {faces} faces of {edge_median_mm:.2} mm; distance from the part: mean {mean_mm:.2} mm, \
+                     rms {rms_mm:.2} mm, p95 {p95_mm:.2} mm, bias {bias_mm:+.2} mm"
+        )?;
+        writeln!(f, "touched for {:.0} s of simulated time", self.touched_s)?;
+        writeln!(f, "{}", self.refine)?;
+        writeln!(f, "error in the touched region, mean (p95):")?;
+        let Error { part_to_mesh_mm: [pm, pm95], mesh_to_part_mm: [mp, mp95] } = self.before;
+        let Error { part_to_mesh_mm: [qm, qm95], mesh_to_part_mm: [mq, mq95] } = self.after;
+        writeln!(f, "  part to mesh {pm:.3} ({pm95:.3}) -> {qm:.3} ({qm95:.3}) mm, {:.1} times less", pm / qm)?;
+        write!(f, "  mesh to part {mp:.3} ({mp95:.3}) -> {mq:.3} ({mq95:.3}) mm, {:.1} times less", mp / mq)
+    }
+}
