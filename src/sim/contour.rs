@@ -5,6 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{Point3, Vector3};
 
 use super::field::{Field, cells};
+use crate::mesh::triangle::segment_crosses;
+use crate::mesh::{FaceId, FaceTree, MeshError, TriMesh};
 
 /// Rounds of flipping, evening out and going back to the level.
 const ROUNDS: usize = 12;
@@ -13,7 +15,7 @@ const EVEN: f64 = 0.5;
 /// A vertex may not tilt a face more than this (cosine) against the level's normal.
 const UPRIGHT: f64 = 0.3;
 /// Cosine between a face and the gradient below which it counts as folded over.
-const FOLDED: f64 = 0.3;
+const FOLDED: f64 = 0.05;
 /// Steps back to the level in one round.
 const RETURN_STEPS: usize = 3;
 
@@ -38,10 +40,18 @@ pub(super) fn contour(field: &Field, side: f64) -> Soup {
     let mut vertex = vec![u32::MAX; values.len()];
     for cell in cells(count) {
         let corner_of = |k: usize| [cell[0] + (k & 1), cell[1] + (k >> 1 & 1), cell[2] + (k >> 2)];
-        let full = (0..8).filter(|&k| inside(corner_of(k))).count();
-        if full != 0 && full != 8 {
+        // where the level crosses the cell's twelve edges
+        let edges = (0..8).flat_map(|k| [1, 2, 4].map(|bit| (k, k | bit))).filter(|(k, l)| k != l);
+        let crossing = |(k, l): (usize, usize)| {
+            let (c, d) = (corner_of(k), corner_of(l));
+            let (u, v) = (values[index(c)], values[index(d)]);
+            (inside(c) != inside(d)).then(|| corner(c) + (corner(d) - corner(c)) * (u / (u - v)))
+        };
+        let crossings: Vec<_> = edges.filter_map(crossing).collect();
+        if !crossings.is_empty() {
             vertex[index(cell)] = soup.positions.len() as u32;
-            soup.positions.push(corner(cell) + Vector3::repeat(side / 2.0));
+            let sum: Vector3<f64> = crossings.iter().map(|p| p.coords).sum();
+            soup.positions.push((sum / crossings.len() as f64).into());
         }
     }
     for c in cells(count) {
@@ -79,24 +89,23 @@ fn on_level(field: &Field, mut p: Point3<f64>, side: f64) -> Point3<f64> {
 impl Soup {
     /// Turns the lattice's triangles into nearly equilateral ones with all vertices on the field's zero level.
     pub(super) fn even_out_mut(&mut self, field: &Field, side: f64) {
-        for round in 0..=ROUNDS {
+        for _ in 0..ROUNDS {
             let stars = self.stars();
             for (v, star) in stars.iter().enumerate() {
-                // the first round only goes to the level
-                let even = if round == 0 { 0.0 } else { EVEN };
-                self.settle_mut(v as u32, star, field, side, even);
+                self.settle_mut(v as u32, star, field, side);
             }
             self.flip_mut();
         }
     }
 
-    /// Moves a vertex towards the middle of its neighbours along the level, and onto it; not if a face would turn over.
-    fn settle_mut(&mut self, vertex: u32, star: &[usize], field: &Field, side: f64, even: f64) {
-        let old = self.positions[vertex as usize];
+    /// Moves a vertex onto the level, and along it towards the middle of its neighbours if no face turns over by that.
+    fn settle_mut(&mut self, vertex: u32, star: &[usize], field: &Field, side: f64) {
+        let old = on_level(field, self.positions[vertex as usize], side);
+        self.positions[vertex as usize] = old;
         let corners = star.iter().flat_map(|&face| self.faces[face]).filter(|&v| v != vertex);
         let sum: Vector3<f64> = corners.map(|v| self.positions[v as usize] - old).sum();
         // inside the mesh every neighbour is counted twice
-        let shift = sum * (even / (2 * star.len()).max(1) as f64);
+        let shift = sum * (EVEN / (2 * star.len()).max(1) as f64);
         let normal = field.gradient(&old).try_normalize(0.0).unwrap_or_else(Vector3::zeros);
         let before = self.uprightness(star, &normal);
         let new = on_level(field, old + shift - normal * normal.dot(&shift), side);
@@ -215,23 +224,92 @@ impl Soup {
         self.faces.retain(|_| kept.next().unwrap_or(false));
     }
 
+    /// Drops faces that cross others.
+    ///
+    /// # Errors
+    /// Those of [`TriMesh::new`].
+    pub(super) fn drop_crossings_mut(&mut self) -> Result<(), MeshError> {
+        let mesh = TriMesh::new(self.positions.clone(), self.faces.clone())?;
+        let tree = FaceTree::new(&mesh);
+        let mut near = Vec::new();
+        let mut kept = vec![true; self.faces.len()];
+        for (face, corners) in mesh.faces() {
+            let triangle @ [a, b, c] = mesh.triangle(face);
+            near.clear();
+            tree.faces_in_box(&a.inf(&b).inf(&c), &a.sup(&b).sup(&c), &mut near);
+            let apart = |other: &&FaceId| mesh.corners(**other).iter().all(|v| !corners.contains(v));
+            for other in near.iter().filter(apart) {
+                let [d, e, f] = mesh.triangle(*other);
+                if [(d, e), (e, f), (f, d)].iter().any(|(p, q)| segment_crosses(p, q, &triangle, 0.0)) {
+                    kept[face.0 as usize] = false;
+                    kept[other.0 as usize] = false;
+                }
+            }
+        }
+        let mut kept = kept.into_iter();
+        self.faces.retain(|_| kept.next().unwrap_or(false));
+        Ok(())
+    }
+
     /// Drops, until none is left: faces at edges that more than two share, faces that hang on by one edge or less, and
-    /// all faces around vertices where two rims meet.
+    /// all faces around vertices where the mesh only meets in a point.
     pub(super) fn tidy_mut(&mut self) {
         loop {
             let edges = self.edges();
             let open = |a: u32, b: u32| !edges.contains_key(&(b, a));
-            let mut rims = vec![0; self.positions.len()];
-            edges.keys().filter(|(a, b)| open(*a, *b)).for_each(|(a, _)| rims[*a as usize] += 1);
+            let pinched: Vec<bool> =
+                self.stars().iter().enumerate().map(|(v, star)| self.is_pinched(v as u32, star)).collect();
             let before = self.faces.len();
             self.faces.retain(|&[a, b, c]| {
                 let sides = [(a, b), (b, c), (c, a)];
                 let loose = sides.iter().filter(|(a, b)| open(*a, *b)).count() > 1;
                 let crowded = sides.iter().any(|side| edges[side].len() > 1);
-                !loose && !crowded && [a, b, c].iter().all(|&v| rims[v as usize] < 2)
+                !loose && !crowded && ![a, b, c].iter().any(|&v| pinched[v as usize])
             });
             if self.faces.len() == before {
                 return;
+            }
+        }
+    }
+
+    /// Whether the faces around a vertex are more than one fan.
+    fn is_pinched(&self, vertex: u32, star: &[usize]) -> bool {
+        let side = |&face: &usize| {
+            let corners = self.faces[face];
+            let i = corners.iter().position(|v| *v == vertex).unwrap_or(0);
+            (corners[(i + 1) % 3], corners[(i + 2) % 3])
+        };
+        let next: BTreeMap<u32, u32> = star.iter().map(side).collect();
+        let first = next.keys().find(|v| !next.values().any(|w| w == *v)).or(next.keys().next());
+        let Some(&start) = first else { return false };
+        let mut at = start;
+        let mut fan = 0;
+        while let Some(&after) = next.get(&at).filter(|_| fan < star.len() && (fan == 0 || at != start)) {
+            at = after;
+            fan += 1;
+        }
+        fan < star.len()
+    }
+
+    /// Closes rims of at most `longest` edges with a fan around a new vertex in their middle; the mesh must be tidy, so
+    /// that one rim at most goes through a vertex.
+    pub(super) fn fill_mut(&mut self, longest: usize) {
+        let edges = self.edges();
+        let open = edges.keys().filter(|(a, b)| !edges.contains_key(&(*b, *a)));
+        // against the faces' sense, as the filling must go
+        let mut next: BTreeMap<u32, u32> = open.map(|&(a, b)| (b, a)).collect();
+        while let Some((start, mut at)) = next.pop_first() {
+            let mut rim = vec![start];
+            while at != start {
+                rim.push(at);
+                let Some(after) = next.remove(&at) else { break };
+                at = after;
+            }
+            if at == start && rim.len() <= longest {
+                let sum: Vector3<f64> = rim.iter().map(|&v| self.positions[v as usize].coords).sum();
+                let middle = self.positions.len() as u32;
+                self.positions.push((sum / rim.len() as f64).into());
+                self.faces.extend((0..rim.len()).map(|i| [rim[i], rim[(i + 1) % rim.len()], middle]));
             }
         }
     }

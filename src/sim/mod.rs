@@ -8,6 +8,7 @@ mod contour;
 pub mod coupled;
 mod error;
 mod field;
+mod mesh_surface;
 mod path;
 mod peaks;
 mod plate;
@@ -21,6 +22,7 @@ mod wander;
 
 pub use ball::{BallContact, push_ball};
 pub use error::SimError;
+pub use mesh_surface::MeshSurface;
 pub use path::{Lines, PathParams, Region, Stroke, around_wall, plan_demo, plan_mesh, raster};
 pub use peaks::{Peaks, add_vertex_noise};
 pub use plate::{Plate, Stadium, TruthFeature, TruthShape};

@@ -71,6 +71,10 @@ const FREE_SPEED: f64 = 0.08;
 const CLEARANCE: f64 = 3e-3;
 /// Share of a turn that a run around a wall repeats, so that no gap is left at its start.
 const OVERLAP: f64 = 0.1;
+/// Length of the pieces in which a planned line follows the surface, m.
+const PIECE: f64 = 1e-3;
+/// A ball this close touches, m: far less than it is pressed in.
+const TOUCHING: f64 = 10e-6;
 /// Longest chord of a run along a curved wall, m.
 const CHORD: f64 = 0.2e-3;
 
@@ -162,24 +166,68 @@ pub fn plan_demo(plate: &Plate, params: &PathParams) -> Vec<Stroke> {
 
 /// Rasters in both directions over all of a surface that can be reached from one side.
 ///
-/// - `view`: direction in which the hand looks and presses, in O.
-/// - The ball drops into whatever it fits, down to the far end of `bounds`. The pitch grows beyond
-///   [`PathParams::pitch`] where the rasters would last longer than [`PathParams::longest`].
-pub fn plan_mesh(bounds: &Bounds, view: &Unit<Vector3<f64>>, params: &PathParams) -> Vec<Stroke> {
-    // any turn about the view does
+/// - `bounds`: the part of it to go over, in O; `view`: direction in which the hand looks and presses, in O.
+/// - The ball drops into whatever it fits and a little way down the outer walls, but not behind overhangs. The pitch
+///   grows beyond [`PathParams::pitch`] where the rasters would last longer than [`PathParams::longest`].
+pub fn plan_mesh(
+    surface: &dyn Surface,
+    bounds: &Bounds,
+    view: &Unit<Vector3<f64>>,
+    params: &PathParams,
+) -> Vec<Stroke> {
+    let frame_ov = looking_along(view, bounds);
+    let seen = bounds.seen_from(&frame_ov);
+    let clear = seen.max.z + params.radius + CLEARANCE;
+    let (low, high, floor) = (seen.min.xy(), seen.max.xy(), seen.min.z + params.radius);
+    let region = Region { frame_ov, low, high, floor, clear };
+    let needed = 2.0 * seen.size().x * seen.size().y / (params.speed * params.longest);
+    let params = PathParams { pitch: params.pitch.max(needed), ..*params };
+    let mut strokes: Vec<_> =
+        [Lines::AlongX, Lines::AlongY].iter().flat_map(|&lines| raster(&region, lines, &params)).collect();
+    for stroke in strokes.iter_mut().filter(|stroke| stroke.press.is_some()) {
+        stroke.points = follow_heights(surface, &region, &stroke.points, &params);
+    }
+    strokes
+}
+
+/// The line in short pieces, as deep as a ball that comes from above goes at each of its points, and a little deeper.
+fn follow_heights(
+    surface: &dyn Surface,
+    region: &Region,
+    line: &[Point3<f64>],
+    params: &PathParams,
+) -> Vec<Point3<f64>> {
+    let mut level = region.clear;
+    let pieces = line.windows(2).flat_map(|ends| {
+        let count = ((ends[1] - ends[0]).norm() / PIECE).ceil().max(1.0);
+        (0..=count as usize).map(move |i| ends[0] + (ends[1] - ends[0]) * (i as f64 / count))
+    });
+    let at_depth = |p: Point3<f64>| {
+        let q = region.frame_ov.inverse() * p;
+        // beside the part the ball goes down the wall it left
+        level = first_contact(surface, region, &q.xy(), params.radius).unwrap_or(level - PIECE).max(region.floor);
+        region.at(q.xy(), level - params.lean)
+    };
+    pieces.map(at_depth).collect()
+}
+
+/// z in V at which a ball coming down at (x, y) first touches; `None` when it passes the floor.
+fn first_contact(surface: &dyn Surface, region: &Region, q: &Point2<f64>, radius: f64) -> Option<f64> {
+    let mut z = region.clear;
+    while z > region.floor {
+        // the distance says how far the ball can go without touching
+        let gap = surface.signed_distance(&region.at(*q, z)) - radius;
+        if gap < TOUCHING {
+            return Some(z);
+        }
+        z -= gap.max(TOUCHING);
+    }
+    None
+}
+
+/// A frame in the middle of a box whose z axis points against the direction of view; any turn about it does.
+pub(super) fn looking_along(view: &Unit<Vector3<f64>>, bounds: &Bounds) -> Isometry3<f64> {
     let turn = UnitQuaternion::rotation_between(&Vector3::z(), &-view.into_inner())
         .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
-    let frame_ov = Isometry3::from_parts(bounds.centre().coords.into(), turn);
-    let corners = (0..8).map(|k| {
-        let pick = |axis: usize| if k >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] };
-        frame_ov.inverse() * Point3::new(pick(0), pick(1), pick(2))
-    });
-    let corners: Vec<_> = corners.collect();
-    let (low, high) = corners.iter().fold((corners[0], corners[0]), |(l, h), p| (l.inf(p), h.sup(p)));
-    let clear = high.z + params.radius + CLEARANCE;
-    let region = Region { frame_ov, low: low.xy(), high: high.xy(), floor: low.z + params.radius, clear };
-    let size = high - low;
-    let needed = 2.0 * size.x * size.y / (params.speed * params.longest);
-    let params = PathParams { pitch: params.pitch.max(needed), ..*params };
-    [Lines::AlongX, Lines::AlongY].iter().flat_map(|&lines| raster(&region, lines, &params)).collect()
+    Isometry3::from_parts(bounds.centre().coords.into(), turn)
 }

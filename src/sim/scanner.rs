@@ -5,15 +5,16 @@
 //! such a field cannot cross itself, and its triangles keep to that. Then what cannot be seen goes, and the rest is
 //! misplaced.
 
-use nalgebra::{Isometry3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Rotation3, Translation3, Unit, Vector3};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardUniform};
 use rand_pcg::Pcg64;
 
-use super::contour::contour;
+use super::contour::{Soup, contour};
 use super::error::{SimError, not_negative, positive};
 use super::field::{Field, cells};
-use super::surface::{Bounds, Surface};
+use super::path::looking_along;
+use super::surface::Surface;
 use super::wander::gauss;
 use crate::mesh::TriMesh;
 
@@ -80,6 +81,11 @@ const SEEN: f64 = -0.35;
 /// Patches of fewer faces do not stand alone: seen ones are dirt, unseen ones in between are filled in.
 const FEWEST_FACES: usize = 30;
 
+/// Rounds of repair and evening out; the second finds little, the third next to nothing.
+const REPAIRS: usize = 2;
+/// Rims of so many edges at most are defects of the contour and filled.
+const LONGEST_FILLED: usize = 20;
+
 impl ScannerParams {
     fn check(&self) -> Result<(), SimError> {
         positive("the scan's edge length", self.edge, "m")?;
@@ -94,9 +100,9 @@ impl ScannerParams {
         not_negative("the size of the bias", self.bias.abs(), "m")
     }
 
-    /// Distance (m) from the surface beyond which the field need not be known: blur, bias and noise stay within.
+    /// Distance (m) from the surface beyond which the field need not be known: blur, bias, noise and the gradient stay within.
     fn band(&self) -> f64 {
-        3.0 * self.rounding + self.bias.abs() + 4.0 * self.noise
+        3.0 * self.rounding + self.bias.abs() + 4.0 * self.noise + self.edge
     }
 }
 
@@ -107,19 +113,22 @@ impl ScannerParams {
 pub fn scan(surface: &dyn Surface, params: &ScannerParams) -> Result<TriMesh, SimError> {
     params.check()?;
     let mut rng = Pcg64::seed_from_u64(params.seed);
-    let turn = UnitQuaternion::rotation_between(&Vector3::z(), &-params.view.into_inner())
-        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
-    let frame_ov = Isometry3::from_parts(surface.bounds().centre().coords.into(), turn);
+    let frame_ov = looking_along(&params.view, &surface.bounds());
     let field = scanned_field(surface, params, &frame_ov, &mut rng)?;
     let side = params.edge * CELL_PER_EDGE;
     let mut soup = contour(&field, side);
-    soup.even_out_mut(&field, side);
+    // the lattice's own defects are filled first, then the folds that evening out leaves
+    for _ in 0..REPAIRS {
+        repair_mut(&mut soup, &field);
+        soup.even_out_mut(&field, side);
+    }
+    repair_mut(&mut soup, &field);
     for p in &mut soup.positions {
         let normal = field.gradient(p).try_normalize(0.0).unwrap_or_else(Vector3::z);
         *p += normal * (gauss(&mut rng) * params.noise * params.white_share.sqrt());
     }
     soup.retain_mut(FEWEST_FACES, |corners| !params.open_back || is_seen(&field, corners));
-    soup.drop_folds_mut(&field);
+    soup.drop_crossings_mut()?;
     soup.tidy_mut();
     soup.drop_unused_mut();
     if soup.faces.is_empty() {
@@ -130,6 +139,13 @@ pub fn scan(surface: &dyn Surface, params: &ScannerParams) -> Result<TriMesh, Si
     Ok(TriMesh::new(soup.positions, soup.faces)?)
 }
 
+/// Fills in for what is not a clean surface.
+fn repair_mut(soup: &mut Soup, field: &Field) {
+    soup.drop_folds_mut(field);
+    soup.tidy_mut();
+    soup.fill_mut(LONGEST_FILLED);
+}
+
 /// The signed distance as the scanner's filters leave it, in V; zero where the scan will be.
 fn scanned_field(
     surface: &dyn Surface,
@@ -138,7 +154,7 @@ fn scanned_field(
     rng: &mut Pcg64,
 ) -> Result<Field, SimError> {
     let pitch = params.edge / NODES_PER_EDGE;
-    let bounds = bounds_in(&surface.bounds(), frame_ov).grown(params.band() + params.edge);
+    let bounds = surface.bounds().seen_from(frame_ov).grown(params.band());
     let nodes: f64 = bounds.size().iter().map(|side| side / pitch + 2.0).product();
     if !nodes.is_finite() || nodes > MAX_NODES as f64 {
         return Err(SimError::TooFine { size_m: bounds.size().max(), edge_m: params.edge, limit: MAX_NODES });
@@ -181,19 +197,6 @@ impl Waves {
         let mean = values.iter().sum::<f64>() / count;
         let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / count;
         (mean, variance.sqrt().max(f64::MIN_POSITIVE))
-    }
-}
-
-/// The box around a box, seen from a frame V.
-fn bounds_in(bounds: &Bounds, frame_ov: &Isometry3<f64>) -> Bounds {
-    let corner = |k: usize| {
-        let pick = |i: usize| if k >> i & 1 == 0 { bounds.min[i] } else { bounds.max[i] };
-        frame_ov.inverse() * Point3::new(pick(0), pick(1), pick(2))
-    };
-    let corners: Vec<_> = (0..8).map(corner).collect();
-    Bounds {
-        min: corners.iter().fold(corners[0], |m, p| m.inf(p)),
-        max: corners.iter().fold(corners[0], |m, p| m.sup(p)),
     }
 }
 

@@ -110,9 +110,9 @@ const BLOCKED: f64 = 1.2e-3;
 const FIRM: f64 = 0.01;
 /// Sliding slower than this leaves friction undecided, m/s.
 const CREEP: f64 = 1e-3;
-/// A stroke is given up after this many times the time it should take, and at least [`PATIENCE`] s.
-const PATIENCE_FACTOR: f64 = 4.0;
-const PATIENCE: f64 = 2.0;
+/// The hand gives up a line when it takes longer than this, s, beyond [`PATIENCE_FACTOR`] times what it should take.
+const PATIENCE: f64 = 0.5;
+const PATIENCE_FACTOR: f64 = 2.0;
 
 /// Slow motions of the hand.
 struct Hand {
@@ -188,7 +188,7 @@ impl Leading<'_> {
             guide = if stroke.press.is_some() { *first } else { guide };
         }
         for target in &stroke.points {
-            let patience = PATIENCE.max(PATIENCE_FACTOR * (target - guide).norm() / stroke.speed);
+            let patience = PATIENCE + PATIENCE_FACTOR * (target - guide).norm() / stroke.speed;
             let until = self.moments.len() + (patience / TICK) as usize;
             while self.moments.len() < until {
                 let lag = self.step(stroke, &guide);

@@ -1,6 +1,6 @@
 //! What every known surface can tell: how far away it is, and where it is closest.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 
 /// A point of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,6 +33,14 @@ impl Bounds {
     pub fn grown(&self, margin: f64) -> Self {
         let by = Vector3::repeat(margin);
         Self { min: self.min - by, max: self.max + by }
+    }
+
+    /// The box around this one along the axes of a frame V.
+    pub fn seen_from(&self, frame_ov: &Isometry3<f64>) -> Self {
+        let frame_vo = frame_ov.inverse();
+        let half = frame_vo.rotation.to_rotation_matrix().matrix().abs() * self.size() / 2.0;
+        let centre = frame_vo * self.centre();
+        Self { min: centre - half, max: centre + half }
     }
 
     /// Length of the sides, m.
