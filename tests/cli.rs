@@ -43,7 +43,9 @@ fn wrong_usage_is_2_and_leaves_stdout_empty() {
 
 #[test]
 fn help_and_version_are_results() {
-    for arguments in [&["--help"][..], &["refine", "--help"], &["demo", "--help"], &["step", "--help"]] {
+    for arguments in
+        [&["--help"][..], &["refine", "--help"], &["demo", "--help"], &["simulate", "--help"], &["step", "--help"]]
+    {
         let output = touchup(arguments, "");
         assert_eq!((code(&output), text(&output.stderr)), (0, ""), "{arguments:?}");
         assert!(text(&output.stdout).contains("Usage: touchup"), "{arguments:?}");
@@ -348,6 +350,33 @@ fn demo_that_cannot_write_is_1() {
     let output = touchup(&["demo", "--out", taken.to_str().unwrap()], "");
     assert_eq!((code(&output), text(&output.stdout)), (1, ""));
     assert!(text(&output.stderr).contains("file") && text(&output.stderr).lines().count() == 1);
+}
+
+// ---- simulate ---------------------------------------------------------------------------------------------------
+
+/// A known part goes the whole way: simulated in inches, refined in millimetres.
+#[test]
+fn simulate_makes_the_input_of_refine() {
+    use touchup::io::mesh_file::{MeshUnit, write_mesh};
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let plate = touchup::sim::Plate::default().mesh(20e-6).unwrap();
+    write_mesh(Path::new(&path("part.stl")), &plate, MeshUnit::Inch).unwrap();
+    let part = ["simulate", "--truth", &path("part.stl"), "--mesh-unit", "inch", "--out", &path("made")];
+    let output = touchup(&part, "");
+    assert_eq!((code(&output), text(&output.stderr)), (0, ""));
+    let [scan, bag, out] = ["made/scan.ply", "made/touch.mcap", "refined.ply"].map(path);
+    let output = touchup(&["refine", "--scan", &scan, "--bag", &bag, "--out", &out, "--json"], "");
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    let summary = json(&output);
+    assert!(summary["moved_faces"].as_u64().unwrap() > 100 && summary["contacts"].as_u64().unwrap() > 0, "{summary}");
+
+    for flags in [["--friction", "-1"], ["--tip-radius-mm", "nan"], ["--scan-edge-mm", "0"]] {
+        let bad = touchup(&[&part[..], &flags].concat(), "");
+        assert_eq!((code(&bad), text(&bad.stdout)), (2, ""), "{flags:?}: {}", text(&bad.stderr));
+    }
+    let missing = touchup(&["simulate", "--truth", "no.stl", "--out", &path("made")], "");
+    assert_eq!((code(&missing), text(&missing.stdout)), (3, ""));
 }
 
 // ---- step -------------------------------------------------------------------------------------------------------

@@ -49,6 +49,8 @@ enum Verb {
     Demo(demo::DemoArguments),
     /// Refines a scan by a recording of touches
     Refine(refine::RefineArguments),
+    /// Scans and touches a known part: makes the input of refine
+    Simulate(simulate::SimulateArguments),
     /// Answers one held sample per JSON line on stdin, so that other implementations can be compared
     #[command(after_help = STEP_FIELDS)]
     Step,
@@ -88,7 +90,7 @@ impl CliError {
     fn exit_code(&self) -> u8 {
         match self {
             Self::WriteMesh(_) | Self::WriteRecording(_) | Self::Write { .. } | Self::Stream(_) => 1,
-            Self::Usage(_) => 2,
+            Self::Usage(_) | Self::Simulate(SimError::BadParameter { .. } | SimError::TooFine { .. }) => 2,
             // settings come from a scene file: its flags are checked before
             Self::Scene(_) | Self::ReadMesh(_) | Self::ReadRecording(_) | Self::Simulate(_) => 3,
             Self::Mesh(_) | Self::Setting(_) | Self::Refine(_) => 3,
@@ -112,6 +114,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let ended = match arguments.verb {
         Verb::Demo(arguments) => demo::demo(&arguments),
         Verb::Refine(arguments) => refine::refine(&arguments),
+        Verb::Simulate(arguments) => simulate::simulate(&arguments),
         Verb::Step => answer_steps(),
     };
     match ended {

@@ -1,20 +1,90 @@
-//! What a known surface looks like to a bad scanner and feels like to a stylus, as the files that `refine` reads.
+//! `touchup simulate`: what a known surface looks like to a bad scanner and feels like to a stylus, as the files that
+//! `refine` reads.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use super::CliError;
+use clap::Args;
+
 use super::progress::Progress;
+use super::{CliError, Losses, tell};
 use crate::io::atomic::create_folder;
-use crate::io::mesh_file::{MeshUnit, write_mesh};
+use crate::io::mesh_file::{MeshUnit, read_mesh, write_mesh};
 use crate::io::recording::{Recorded, Topics, write_recording};
 use crate::mesh::TriMesh;
-use crate::sim::{ScannerParams, Stroke, StylusParams, Surface, Touch, scan, touch};
+use crate::sim::{
+    MeshSurface, PathParams, ScannerParams, Stroke, StylusParams, Surface, Touch, plan_mesh, scan, touch,
+};
 use crate::touch::Message;
 
 /// Frame of the poses in the recordings.
 const OBJECT_FRAME: &str = "object";
 /// Frame of the wrenches: the stylus' own.
 const STYLUS_FRAME: &str = "stylus";
+
+#[derive(Debug, Args)]
+pub(super) struct SimulateArguments {
+    /// The part as it is: a closed mesh, PLY, STL or OBJ
+    #[arg(long, value_name = "MESH")]
+    truth: PathBuf,
+    /// Unit of the coordinates in the part's file
+    #[arg(long, value_name = "U", default_value = "mm")]
+    mesh_unit: MeshUnit,
+    /// Folder for truth.ply, scan.ply (both in mm) and touch.mcap
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Another seed makes another scan and another hand
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Radius of the ball, mm
+    #[arg(long, value_name = "R", default_value_t = 1.5, allow_negative_numbers = true)]
+    tip_radius_mm: f64,
+    /// Stiffness of stylus and holder at the ball, N/mm
+    #[arg(long, value_name = "K", default_value_t = 20.0, allow_negative_numbers = true)]
+    stiffness_n_per_mm: f64,
+    /// Coefficient of friction between ball and part
+    #[arg(long, value_name = "MU", default_value_t = 0.15, allow_negative_numbers = true)]
+    friction: f64,
+    /// Median edge of the scan's triangles, mm
+    #[arg(long, value_name = "E", default_value_t = 2.4, allow_negative_numbers = true)]
+    scan_edge_mm: f64,
+    /// Noise of the scan along its normals, mm
+    #[arg(long, value_name = "S", default_value_t = 0.6, allow_negative_numbers = true)]
+    scan_noise_mm: f64,
+}
+
+/// The verb: scans the part from above (along −z), touches it from there, and tells.
+pub(super) fn simulate(arguments: &SimulateArguments) -> Result<Losses, CliError> {
+    if !(1e-3..=1e3).contains(&arguments.tip_radius_mm) {
+        return Err(CliError::Usage(format!("--tip-radius-mm {} must be 0.001 to 1000 mm", arguments.tip_radius_mm)));
+    }
+    let truth = read_mesh(&arguments.truth, arguments.mesh_unit).map_err(CliError::ReadMesh)?.mesh;
+    let surface = MeshSurface::new(&truth)?;
+    let scanner = ScannerParams {
+        edge: arguments.scan_edge_mm / 1e3,
+        noise: arguments.scan_noise_mm / 1e3,
+        seed: arguments.seed,
+        ..ScannerParams::default()
+    };
+    let radius = arguments.tip_radius_mm / 1e3;
+    let stylus = StylusParams {
+        radius,
+        stiffness: arguments.stiffness_n_per_mm * 1e3,
+        friction: arguments.friction,
+        ..StylusParams::default()
+    };
+    let hand = PathParams { radius, ..PathParams::default() };
+    let path = plan_mesh(&surface, &surface.bounds(), &scanner.view, &hand);
+    let Simulated { scan, touch } =
+        write_simulation(&surface, &truth, &path, &scanner, &stylus, arguments.seed, &arguments.out)?;
+    let seconds = touch.moments.last().map_or(0.0, |moment| moment.t);
+    tell(&format!(
+        "scan: {} faces\ntouched for {seconds:.0} s of simulated time: {} messages\nwrote {}",
+        scan.face_count(),
+        touch.messages.len(),
+        arguments.out.display()
+    ));
+    Ok(Losses::new())
+}
 
 /// A simulated scan and touch.
 pub(super) struct Simulated {
