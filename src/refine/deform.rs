@@ -134,11 +134,11 @@ impl Clay {
         }
         let mut share = 1.0;
         for _ in 0..TRIES {
-            let mut verdict = self.judge_at(grip, share);
+            let mut verdict = self.judge_at(grip, share, longest);
             if verdict == Verdict::Rough {
                 self.place(&grip.roi, 0.0);
                 grip.roi.neighbourhood.roughen(&self.mesh, &self.tree, margin);
-                verdict = self.judge_at(grip, share);
+                verdict = self.judge_at(grip, share, longest);
             }
             if verdict == Verdict::Sound {
                 grip.roi.neighbourhood.accept(share * longest);
@@ -150,12 +150,12 @@ impl Clay {
         Fit::CutBack
     }
 
-    fn judge_at(&mut self, grip: &mut Grip, share: f64) -> Verdict {
+    fn judge_at(&mut self, grip: &mut Grip, share: f64, longest: f64) -> Verdict {
         self.place(&grip.roi, share);
         let gap = self.guard.gap_share * self.mean_edge;
         let (mesh, before, marks) = (&self.mesh, &self.before, &grip.roi.marks);
         let was = |v: VertexId| marks.of(v.0).map_or_else(|| mesh.position(v), |i| before[i as usize]);
-        grip.roi.neighbourhood.judge(mesh, &self.guard, &self.evidence, gap, was)
+        grip.roi.neighbourhood.judge(mesh, &self.guard, &self.evidence, gap, share * longest, was)
     }
 
     /// The displacement of each vertex of the region; returns the longest, m.

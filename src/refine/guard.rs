@@ -4,8 +4,9 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::collision::Pairs;
 use super::marks::Marks;
-use crate::mesh::{FaceId, FaceTree, TriMesh, VertexId, triangle};
+use crate::mesh::{FaceId, FaceTree, TriMesh, VertexId};
 
 /// Limits that keep a mesh sound.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -101,14 +102,6 @@ impl Look {
     }
 }
 
-/// Two faces that could come to meet: one that moves, and how many corners they share.
-#[derive(Clone, Copy, Debug)]
-struct Suspects {
-    moving: u32,
-    other: FaceId,
-    shared: u8,
-}
-
 /// The faces that change when the vertices of a region move, and what they could run into.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Neighbourhood {
@@ -122,9 +115,9 @@ pub(super) struct Neighbourhood {
     before: Vec<Shape>,
     /// state after the update, for the moving ones
     after: Vec<Shape>,
-    /// mean normal of a smooth region; without one, `suspects` are looked at
+    /// mean normal of a smooth region; without one, the pairs in `suspects` are looked at
     smooth: Option<Vector3<f64>>,
-    suspects: Vec<Suspects>,
+    suspects: Pairs,
     /// how far vertices may still move before `suspects` or `smooth` must be found again, m
     allowance: f64,
     /// how far vertices may still move before the region must be looked at again, m
@@ -290,20 +283,10 @@ impl Neighbourhood {
             self.known.insert(face.0, index as u32);
         }
         for moving in 0..self.moving {
-            let face = self.faces[moving];
-            let (corners, bounds) = (mesh.corners(face), bounds(&mesh.triangle(face)));
             for &other in &self.near {
                 // two moving faces are one pair
-                if self.known.of(other.0).is_some_and(|index| index as usize <= moving) {
-                    continue;
-                }
-                if apart(&bounds, &self::bounds(&mesh.triangle(other)), margin) {
-                    continue;
-                }
-                let others = mesh.corners(other);
-                let shared = corners.iter().filter(|corner| others.contains(corner)).count() as u8;
-                if shared < 2 {
-                    self.suspects.push(Suspects { moving: moving as u32, other, shared });
+                if self.known.of(other.0).is_none_or(|index| index as usize > moving) {
+                    self.suspects.add(mesh, self.faces[moving], other, margin);
                 }
             }
         }
@@ -326,6 +309,7 @@ impl Neighbourhood {
     ///
     /// - `evidence`: for each face the last normal scanned or felt there.
     /// - `gap`: faces nearer than this touch, m.
+    /// - `way`: the longest way of a vertex in the update, m.
     /// - `before`: the position of a vertex before the update, m.
     pub fn judge(
         &mut self,
@@ -333,6 +317,7 @@ impl Neighbourhood {
         params: &GuardParams,
         evidence: &[[f32; 3]],
         gap: f64,
+        way: f64,
         before: impl Fn(VertexId) -> Point3<f64>,
     ) -> Verdict {
         self.unseen = 0.0;
@@ -344,7 +329,7 @@ impl Neighbourhood {
             return Verdict::Broken;
         }
         let Some(mean) = self.smooth else {
-            return if self.is_clear(mesh, gap, before) { Verdict::Sound } else { Verdict::Broken };
+            return if self.suspects.are_clear(mesh, gap, way, before) { Verdict::Sound } else { Verdict::Broken };
         };
         let lowest = self.after.iter().map(|shape| shape.normal.dot(&mean)).fold(1.0, f64::min);
         if lowest <= STILL_SMOOTH_COSINE {
@@ -393,17 +378,10 @@ impl Neighbourhood {
         look
     }
 
-    fn is_clear(&self, mesh: &TriMesh, gap: f64, before: impl Fn(VertexId) -> Point3<f64>) -> bool {
-        self.suspects.iter().all(|pair| {
-            let face = self.faces[pair.moving as usize];
-            let corners = [mesh.corners(face), mesh.corners(pair.other)];
-            !meet(&corners, pair.shared, gap, |v| mesh.position(v)) || meet(&corners, pair.shared, gap, &before)
-        })
-    }
-
     /// Takes the state just looked at as the new state before; `way` is the longest of a vertex, m.
     pub fn accept(&mut self, way: f64) {
         self.before[..self.moving].copy_from_slice(&self.after);
+        self.suspects.accept(way);
         self.allowance -= way;
     }
 
@@ -416,32 +394,3 @@ impl Neighbourhood {
 
 /// Keys of faces beside those of vertices.
 const FACE: u64 = 1 << 32;
-
-type Bounds = (Vector3<f64>, Vector3<f64>);
-
-#[inline]
-fn bounds([a, b, c]: &[Point3<f64>; 3]) -> Bounds {
-    (a.coords.inf(&b.coords).inf(&c.coords), a.coords.sup(&b.coords).sup(&c.coords))
-}
-
-#[inline]
-fn apart(a: &Bounds, b: &Bounds, gap: f64) -> bool {
-    (0..3).any(|i| a.0[i] > b.1[i] + gap || b.0[i] > a.1[i] + gap)
-}
-
-/// Whether two faces that share no edge meet, other than in their common corner.
-fn meet(corners: &[[VertexId; 3]; 2], shared: u8, gap: f64, position: impl Fn(VertexId) -> Point3<f64>) -> bool {
-    let [t, u] = corners.map(|face| face.map(&position));
-    if apart(&bounds(&t), &bounds(&u), gap) {
-        return false;
-    }
-    if shared == 0 {
-        return triangle::intersect(&t, &u, gap);
-    }
-    let opposite = |face: usize, other: usize| {
-        let at = (0..3).find(|&i| corners[other].contains(&corners[face][i])).unwrap_or(0);
-        ((at + 1) % 3, (at + 2) % 3)
-    };
-    let ((a, b), (c, d)) = (opposite(0, 1), opposite(1, 0));
-    triangle::segment_crosses(&t[a], &t[b], &u, 0.0) || triangle::segment_crosses(&u[c], &u[d], &t, 0.0)
-}

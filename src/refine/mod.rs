@@ -4,6 +4,7 @@
 //! region around it, update of the tree. [`RefineParams::robust`] is what works on real scans, [`RefineParams::paper`]
 //! the published rule.
 
+mod collision;
 mod deform;
 pub mod dynamics;
 mod guard;
