@@ -19,7 +19,7 @@ use serde::Serialize;
 pub use deform::Fit;
 pub use dynamics::{Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, StepRule};
 pub use guard::GuardParams;
-pub use params::{CarveParams, ClosestBy, RefineParams, TipParams};
+pub use params::{CarveParams, ClosestBy, RefineParams, TipParams, TouchPoint, relaxing_alpha};
 pub use roi::RoiSize;
 pub use sliding::{Ball, SlidingParams, TipMotion};
 
@@ -223,7 +223,11 @@ impl Refiner {
                 return Felt::Nothing;
             }
         }
-        self.params.sliding.map_or(Felt::Something, |sliding| Felt::Surface(ball.surface_normal(&sliding)))
+        match (self.params.touch_point, &self.params.sliding) {
+            (TouchPoint::FaceNormal, _) => Felt::Something,
+            (TouchPoint::FeltNormal, Some(sliding)) => Felt::Surface(ball.surface_normal(sliding)),
+            (TouchPoint::FeltNormal, None) => Felt::Surface(ball.force_o.try_normalize(0.0).unwrap_or_default()),
+        }
     }
 
     /// Cases 3 and 4, and without a gate also 1 and 2: moves the face that the ball touches.
@@ -244,8 +248,8 @@ impl Refiner {
         let mut next = self.dynamics.step(face, &pressing.point, &pressing.force_o, dt)?;
         if let Some(turning) = self.params.turning {
             next.n = turn(&face.n, &pressing.normal, turning * dt);
-            self.clay.feel(pressing.hit.face, &pressing.normal);
         }
+        self.clay.feel(pressing.hit.face, &pressing.normal);
         let steps = self.rigid_steps(&pressing, &next);
         let fit = self.clay.deform(&mut self.contact_grip, pressing.hit.face, self.params.roi, &steps);
         self.count(fit);

@@ -22,6 +22,15 @@ pub enum ClosestBy {
     Barycentre,
 }
 
+/// Which point of the ball touches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TouchPoint {
+    /// The one under the normal of the closest face; the force only says how hard \[paper\].
+    FaceNormal,
+    /// The one that the felt force points away from.
+    FeltNormal,
+}
+
 /// Carving: what the ball passes through without a force is not there (case 2).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CarveParams {
@@ -51,8 +60,10 @@ pub struct RefineParams {
     pub gate: Option<ContactGateParams>,
     /// The ball.
     pub tip: TipParams,
-    /// Smoothing and friction; `None`: the raw sample, and the face's own normal \[paper\].
+    /// Smoothing and friction; `None`: the sample as it is, and the force taken for the normal.
     pub sliding: Option<SlidingParams>,
+    /// Where on the ball the contact is.
+    pub touch_point: TouchPoint,
     /// Which face is the handle.
     pub closest: ClosestBy,
     /// Eq 1–7.
@@ -82,10 +93,23 @@ pub struct RefineParams {
 /// Relaxation of a touched face in [`RefineParams::robust`], 1/s: within 40 ms, twenty poses at 500 Hz, so that their
 /// noise is averaged, while a hand at 25 mm/s stays on a face of 2.4 mm for 100 ms.
 const RELAXATION: f64 = 25.0;
+/// Contact force at which [`relaxing_alpha`] holds, N.
+const USUAL_FORCE: f64 = 2.5;
 /// Turning of a touched face in [`RefineParams::robust`], 1/s: half as fast again as its motion.
 const TURNING: f64 = 40.0;
-/// Slope of the paper's sigmoid at the 2–3 N of a hand, N/m.
-const SIGMOID_SLOPE: f64 = 3.5e3;
+
+/// The α, m/(N·s), by which a face relaxes within 40 ms at the usual force of a hand: rate over −df/dh.
+pub fn relaxing_alpha(model: &ContactModel) -> f64 {
+    let slope = match *model {
+        ContactModel::Spring { stiffness_n_per_m } => stiffness_n_per_m,
+        // f (1 − f/f_max) / h_min; at more than half of f_max the slope falls again
+        ContactModel::Sigmoid { f_max_n, h_min_m, .. } => {
+            let share = (USUAL_FORCE / f_max_n).min(0.5);
+            f_max_n * share * (1.0 - share) / h_min_m
+        }
+    };
+    RELAXATION / slope
+}
 
 impl RefineParams {
     /// What works on real scans: contact gate, friction, motion along the force, carving by free motion.
@@ -93,20 +117,20 @@ impl RefineParams {
     /// With a known stiffness the contact model is the linear spring of the real tip, which has no bias; without one it
     /// is the paper's sigmoid with the rigid-contact offset taken out.
     pub fn robust(tip: TipParams) -> Self {
-        let sigmoid = DynamicsParams::default().model;
-        let (model, slope) = match tip.stiffness {
-            Some(stiffness_n_per_m) => (ContactModel::Spring { stiffness_n_per_m }, stiffness_n_per_m),
-            None => (sigmoid, SIGMOID_SLOPE),
+        let model = match tip.stiffness {
+            Some(stiffness_n_per_m) => ContactModel::Spring { stiffness_n_per_m },
+            None => DynamicsParams::default().model,
         };
         Self {
             compensator: CompensatorParams::default(),
             gate: Some(ContactGateParams::default()),
             tip,
             sliding: Some(SlidingParams::default()),
+            touch_point: TouchPoint::FeltNormal,
             closest: ClosestBy::Surface,
             dynamics: DynamicsParams {
                 model,
-                alpha_m_per_n_s: RELAXATION / slope,
+                alpha_m_per_n_s: relaxing_alpha(&model),
                 beta_per_n2_s: 0.0,
                 rule: StepRule::Lie,
                 along: Along::Force,
@@ -129,6 +153,7 @@ impl RefineParams {
         Self {
             gate: None,
             sliding: None,
+            touch_point: TouchPoint::FaceNormal,
             closest: ClosestBy::Barycentre,
             dynamics: DynamicsParams {
                 along: Along::InitialNormal,

@@ -3,7 +3,9 @@
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
 use super::{AlongName, CarveSection, Mode, ModelName, RefineSection, Scene, SlidingSection, StepName};
-use crate::refine::{Along, CarveParams, ContactModel, RefineParams, RoiSize, SlidingParams, StepRule, TipParams};
+use crate::refine::{
+    Along, CarveParams, ContactModel, RefineParams, RoiSize, SlidingParams, StepRule, TipParams, relaxing_alpha,
+};
 use crate::touch::{CompensatorParams, ContactGateParams, Payload, SyncParams, Wrench, WrenchFrame};
 
 impl Scene {
@@ -110,8 +112,17 @@ impl RefineSection {
         };
         let is_sigmoid = matches!(dynamics.model, ContactModel::Sigmoid { .. });
         dynamics.take_out_rigid_offset = is_sigmoid && self.mode == Mode::Robust;
-        dynamics.alpha_m_per_n_s = self.alpha_m_per_n_s.unwrap_or(dynamics.alpha_m_per_n_s);
+        let alpha = match self.mode {
+            Mode::Paper => dynamics.alpha_m_per_n_s,
+            Mode::Robust => relaxing_alpha(&dynamics.model),
+        };
+        dynamics.alpha_m_per_n_s = self.alpha_m_per_n_s.unwrap_or(alpha);
         dynamics.beta_per_n2_s = self.beta_per_n2_s.unwrap_or(dynamics.beta_per_n2_s);
+        params.turning = match (self.turning_per_s, self.beta_per_n2_s) {
+            (Some(turning), _) => Some(turning),
+            (None, Some(_)) => None,
+            (None, None) => params.turning,
+        };
         dynamics.rule = match self.step {
             Some(StepName::Lie) => StepRule::Lie,
             Some(StepName::Corrected) => StepRule::DriftCorrected,

@@ -242,6 +242,8 @@ pub struct RefineSection {
     pub alpha_m_per_n_s: Option<f64>,
     /// Turning speed of a face for each square newton of mismatch, 1/(N²·s).
     pub beta_per_n2_s: Option<f64>,
+    /// Rate at which a face turns to the felt normal, whatever the mismatch, 1/s.
+    pub turning_per_s: Option<f64>,
     /// How the sub-flows of a step are put together.
     pub step: Option<StepName>,
     /// In which direction a face moves.
@@ -265,6 +267,7 @@ impl Default for RefineSection {
             delta,
             alpha_m_per_n_s: None,
             beta_per_n2_s: None,
+            turning_per_s: None,
             step: None,
             along: None,
             roi_mm: None,
@@ -352,6 +355,7 @@ impl RefineSection {
         in_range("refine.delta", self.delta, -50.0, 50.0, "-50 to 50")?;
         in_range("refine.alpha_m_per_n_s", self.alpha_m_per_n_s.unwrap_or(0.0), 0.0, 1e6, "0 to 1e6 m/(N s)")?;
         in_range("refine.beta_per_n2_s", self.beta_per_n2_s.unwrap_or(0.0), 0.0, 1e9, "0 to 1e9 1/(N² s)")?;
+        in_range("refine.turning_per_s", self.turning_per_s.unwrap_or(0.0), 0.0, 1e6, "0 to 1e6 1/s")?;
         in_range("refine.roi_mm", self.roi_mm.unwrap_or(0.0), 0.0, 1e3, "0 to 1000 mm")
     }
 }
