@@ -260,9 +260,11 @@ impl Refiner {
     fn pressing(&self, ball: &Ball, felt: Felt) -> Option<Pressing> {
         let (mesh, tip) = (&self.clay.mesh, &self.params.tip);
         let reach = self.clay.largest_move + tip.radius;
+        // the spring expects the deflection F/k of the tip, a rigid contact does not
+        let centre = if self.params.dynamics.take_out_rigid_offset { self.centre(ball) } else { ball.reported };
         let seek = match felt {
-            Felt::Surface(normal) => ball.reported - normal * tip.radius,
-            _ => ball.reported,
+            Felt::Surface(normal) => centre - normal * tip.radius,
+            _ => centre,
         };
         let hit = match self.params.closest {
             ClosestBy::Surface => self.clay.closest(&seek, self.contact_grip.handle(), reach),
@@ -274,7 +276,7 @@ impl Refiner {
                 Pressing { hit, face, normal, point: seek, force_o: normal * ball.force_o.dot(&normal) }
             }
             _ => {
-                let point = ball.reported - face.n * tip.radius;
+                let point = centre - face.n * tip.radius;
                 Pressing { hit, face, normal: face.n, point, force_o: ball.force_o }
             }
         })
@@ -313,10 +315,7 @@ impl Refiner {
 
     /// Case 2: what the ball passes through is not there.
     fn carve(&mut self, carve: &CarveParams, ball: &Ball, felt: Felt, dt: f64, update: Update) -> Update {
-        let centre = match self.params.tip.stiffness {
-            Some(stiffness) => ball.reported + ball.force_o / stiffness,
-            None => ball.reported,
-        };
+        let centre = self.centre(ball);
         // a mesh that the ball does not enter by more than the tolerance is left alone
         let reach = self.params.tip.radius - carve.tolerance;
         let hint = match felt {
@@ -338,6 +337,14 @@ impl Refiner {
         match update.case {
             Case::Free => Update { case: Case::MeshOnly, mismatch: None, fit: Some(fit) },
             _ => update,
+        }
+    }
+
+    /// Where the ball really is: the reported centre, and what the tip gives way, m, in O.
+    fn centre(&self, ball: &Ball) -> Point3<f64> {
+        match self.params.tip.stiffness {
+            Some(stiffness) => ball.reported + ball.force_o / stiffness,
+            None => ball.reported,
         }
     }
 
