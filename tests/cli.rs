@@ -7,8 +7,8 @@ use std::process::{Command, Output, Stdio};
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3, vector};
 use serde_json::Value;
-use touchup::io::recording::{Recorded, Topics, write_recording};
-use touchup::touch::{StampedPose, StampedWrench, Wrench};
+use touchup::io::recording::{Topics, write_recording};
+use touchup::touch::{Message, StampedPose, StampedWrench, Wrench};
 
 fn touchup(arguments: &[&str], input: &str) -> Output {
     let mut child = Command::new(env!("CARGO_BIN_EXE_touchup"))
@@ -79,7 +79,7 @@ impl Case {
         self.folder.path().join(name)
     }
 
-    fn record(&self, name: &str, wrench_frame: &str, messages: &[Recorded]) {
+    fn record(&self, name: &str, wrench_frame: &str, messages: &[Message]) {
         let messages = messages.iter().copied();
         write_recording(&self.path(name), &Topics::default(), "object", wrench_frame, messages).unwrap();
     }
@@ -120,7 +120,7 @@ const SURFACE: f64 = 0.3e-3;
 const STIFFNESS: f64 = 20e3;
 
 /// One second: poses at 500 Hz, wrenches at 1 kHz. The wrench is in the axes of O, or of a stylus held at `rotation`.
-fn touch(rotation: UnitQuaternion<f64>, wrench_in_object: bool) -> Vec<Recorded> {
+fn touch(rotation: UnitQuaternion<f64>, wrench_in_object: bool) -> Vec<Message> {
     let mut messages = Vec::new();
     for tick in 0..=1000_i64 {
         let stamp_ns = 1_000_000_000 + tick * 1_000_000;
@@ -130,12 +130,12 @@ fn touch(rotation: UnitQuaternion<f64>, wrench_in_object: bool) -> Vec<Recorded>
         if tick % 2 == 0 {
             let height = RADIUS + SURFACE + above - force / STIFFNESS;
             let pose_ot = Isometry3::from_parts(Translation3::new(0.3e-3, 0.3e-3, height), rotation);
-            messages.push(Recorded::Pose(StampedPose { stamp_ns, pose_ot }));
+            messages.push(Message::Pose(StampedPose { stamp_ns, pose_ot }));
         }
         let force_o = vector![0.0, 0.0, force];
         let force = if wrench_in_object { force_o } else { rotation.inverse() * force_o };
         let wrench = Wrench { force, torque: Vector3::zeros() };
-        messages.push(Recorded::Wrench(StampedWrench { stamp_ns, wrench }));
+        messages.push(Message::Wrench(StampedWrench { stamp_ns, wrench }));
     }
     messages
 }
@@ -287,9 +287,9 @@ fn losses_are_4_and_named() {
     assert_eq!(code(&case.refine("touch.mcap", "sound.ply", &[])), 0);
     let mut messages = touch(UnitQuaternion::identity(), false);
     let nan = Wrench { force: vector![f64::NAN, 0.0, 0.0], torque: Vector3::zeros() };
-    messages.insert(300, Recorded::Wrench(StampedWrench { stamp_ns: 1_100_500_000, wrench: nan }));
+    messages.insert(300, Message::Wrench(StampedWrench { stamp_ns: 1_100_500_000, wrench: nan }));
     let far = Isometry3::translation(1e9, 0.0, 0.0);
-    messages.insert(400, Recorded::Pose(StampedPose { stamp_ns: 1_100_700_000, pose_ot: far }));
+    messages.insert(400, Message::Pose(StampedPose { stamp_ns: 1_100_700_000, pose_ot: far }));
     case.record("nan.mcap", "stylus", &messages);
     let output = case.refine("nan.mcap", "nan.ply", &["--json"]);
     assert_eq!(code(&output), 4);

@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{Translation3, Vector3};
 use proptest::prelude::*;
-use touchup::io::recording::{BadMessage, Place, Recorded, RecordingError, RecordingReader, Topics, write_recording};
-use touchup::touch::{StampedPose, StampedWrench};
+use touchup::io::recording::{BadMessage, Place, RecordingError, RecordingReader, Topics, write_recording};
+use touchup::touch::{Message, StampedPose, StampedWrench};
 
 #[path = "recordings/damage.rs"]
 mod damage;
@@ -33,18 +33,18 @@ fn probe_topics() -> Topics {
     Topics { pose: "/probe/pose".into(), wrench: "/probe/wrench".into() }
 }
 
-fn poses_and_wrenches(messages: &[Recorded]) -> (Vec<StampedPose>, Vec<StampedWrench>) {
+fn poses_and_wrenches(messages: &[Message]) -> (Vec<StampedPose>, Vec<StampedWrench>) {
     let mut split = (Vec::new(), Vec::new());
     for message in messages {
         match message {
-            Recorded::Pose(pose) => split.0.push(*pose),
-            Recorded::Wrench(wrench) => split.1.push(*wrench),
+            Message::Pose(pose) => split.0.push(*pose),
+            Message::Wrench(wrench) => split.1.push(*wrench),
         }
     }
     split
 }
 
-fn read_all(path: &Path, topics: &Topics) -> Vec<Recorded> {
+fn read_all(path: &Path, topics: &Topics) -> Vec<Message> {
     RecordingReader::open(path, topics).unwrap().collect::<Result<_, _>>().unwrap()
 }
 
@@ -157,9 +157,9 @@ proptest! {
         // the rotation must be one; the rest may be anything, NaN and infinity too
         let angles = |v: [f64; 3]| v.map(|x| if x.is_finite() { x % 3.0 } else { 0.0 });
         let make = |(i, (is_pose, v)): (usize, &(bool, [f64; 3]))| match (is_pose, pose(stamp(i), angles(*v))) {
-            (true, Recorded::Pose(mut pose)) => {
+            (true, Message::Pose(mut pose)) => {
                 pose.pose_ot.translation = Translation3::from(*v);
-                Recorded::Pose(pose)
+                Message::Pose(pose)
             }
             _ => wrench(stamp(i), *v),
         };
@@ -174,12 +174,12 @@ proptest! {
 }
 
 /// All numbers of a message, bit by bit, so that NaN compares too.
-fn bits(message: &Recorded) -> (i64, Vec<u64>) {
+fn bits(message: &Message) -> (i64, Vec<u64>) {
     let numbers: Vec<f64> = match message {
-        Recorded::Pose(p) => {
+        Message::Pose(p) => {
             p.pose_ot.translation.vector.iter().chain(p.pose_ot.rotation.coords.iter()).copied().collect()
         }
-        Recorded::Wrench(w) => w.wrench.force.iter().chain(w.wrench.torque.iter()).copied().collect(),
+        Message::Wrench(w) => w.wrench.force.iter().chain(w.wrench.torque.iter()).copied().collect(),
     };
     (message.stamp_ns(), numbers.into_iter().map(f64::to_bits).collect())
 }
@@ -248,7 +248,7 @@ fn a_folder_is_read_in_the_order_of_its_metadata() {
     let messages = touch(600);
     put(folder.path(), "b.mcap", &mcap_bytes(&messages[..300]));
     // a later part need not have both topics
-    let poses: Vec<_> = messages[300..].iter().filter(|m| matches!(m, Recorded::Pose(_))).copied().collect();
+    let poses: Vec<_> = messages[300..].iter().filter(|m| matches!(m, Message::Pose(_))).copied().collect();
     put(folder.path(), "a.mcap", &mcap_bytes(&poses));
     let metadata = |second: &str| {
         let text = format!("rosbag2_bagfile_information:\n  version: 5\n  relative_file_paths: [x/b.mcap, {second}]\n");

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::progress::Progress;
 use super::{CliError, Losses};
-use crate::io::recording::{Recorded, RecordingError, RecordingReader, Topics};
+use crate::io::recording::{RecordingError, RecordingReader, Topics};
 use crate::touch::{Message, Sample, SyncParams, Synchroniser, WrenchFrame};
 
 /// Reasons that are gaps in the recording itself; every other one is a message lost on the way.
@@ -37,7 +37,10 @@ pub fn replay(
     let mut has_begun = false;
     for message in recording.by_ref() {
         match message {
-            Ok(message) => sync.push(taken(message, &mut replayed.wrenches)),
+            Ok(message) => {
+                replayed.wrenches += u64::from(matches!(message, Message::Wrench(_)));
+                sync.push(message);
+            }
             Err(damage) if !has_begun => return Err(CliError::ReadRecording(damage)),
             Err(damage) => replayed.losses.push(damage.to_string()),
         }
@@ -49,16 +52,6 @@ pub fn replay(
     std::iter::from_fn(|| sync.next_sample()).for_each(|sample| each(&sample));
     replayed.account(&recording, &sync);
     Ok(replayed)
-}
-
-fn taken(message: Recorded, wrenches: &mut u64) -> Message {
-    match message {
-        Recorded::Pose(pose) => Message::Pose(pose),
-        Recorded::Wrench(wrench) => {
-            *wrenches += 1;
-            Message::Wrench(wrench)
-        }
-    }
 }
 
 /// In which axes the wrenches are: a header that names the frame of the pose means O, any other the stylus' own.

@@ -9,12 +9,11 @@ use super::progress::Progress;
 use super::{CliError, Losses, tell};
 use crate::io::atomic::create_folder;
 use crate::io::mesh_file::{MeshUnit, read_mesh, write_mesh};
-use crate::io::recording::{Recorded, Topics, write_recording};
+use crate::io::recording::{Topics, write_recording};
 use crate::mesh::TriMesh;
 use crate::sim::{
     MeshSurface, PathParams, ScannerParams, Stroke, StylusParams, Surface, Touch, plan_mesh, scan, touch,
 };
-use crate::touch::Message;
 
 /// Frame of the poses in the recordings.
 const OBJECT_FRAME: &str = "object";
@@ -108,10 +107,7 @@ pub(super) fn write_simulation(
     drop(stage);
     let _stage = Progress::stage("touch");
     let touch = touch(surface, path, stylus, seed)?;
-    let messages = touch.messages.iter().map(|message| match *message {
-        Message::Pose(pose) => Recorded::Pose(pose),
-        Message::Wrench(wrench) => Recorded::Wrench(wrench),
-    });
+    let messages = touch.messages.iter().copied();
     for (name, mesh) in [("truth.ply", truth), ("scan.ply", &scan)] {
         write_mesh(&folder.join(name), mesh, MeshUnit::Millimetre).map_err(CliError::WriteMesh)?;
     }

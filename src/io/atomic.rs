@@ -1,7 +1,7 @@
 //! Files that are there whole or not at all.
 
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 /// A file that appears under its name only by [`AtomicFile::commit`].
@@ -76,6 +76,17 @@ impl Write for AtomicFile {
     }
 }
 
+impl Seek for AtomicFile {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.buffer()?.seek(to)
+    }
+
+    /// Unlike a seek it leaves the buffer as it is.
+    fn stream_position(&mut self) -> io::Result<u64> {
+        self.buffer()?.stream_position()
+    }
+}
+
 impl Drop for AtomicFile {
     fn drop(&mut self) {
         if let Some(writer) = self.writer.take() {
@@ -90,9 +101,9 @@ impl Drop for AtomicFile {
 ///
 /// # Errors
 /// Those of [`AtomicFile`] and of `write`.
-pub fn write_atomically(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
+pub fn write_atomically(path: &Path, write: impl FnOnce(&mut AtomicFile) -> io::Result<()>) -> io::Result<()> {
     let mut file = AtomicFile::create(path)?;
-    write(file.buffer()?)?;
+    write(&mut file)?;
     file.commit()
 }
 

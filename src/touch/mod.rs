@@ -149,6 +149,16 @@ pub enum Message {
     Wrench(StampedWrench),
 }
 
+impl Message {
+    /// Time of measurement, ns.
+    pub fn stamp_ns(&self) -> i64 {
+        match self {
+            Self::Pose(pose) => pose.stamp_ns,
+            Self::Wrench(wrench) => wrench.stamp_ns,
+        }
+    }
+}
+
 /// Pose and wrench at one instant: what [`crate::refine::Refiner::push`] takes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {

@@ -6,7 +6,8 @@ use std::path::Path;
 
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
-use touchup::io::recording::{Recorded, RecordingError};
+use touchup::io::recording::RecordingError;
+use touchup::touch::Message;
 
 use crate::made::{Outcome, db3_of, mcap_bytes, put, read, touch};
 
@@ -55,13 +56,13 @@ fn read_metered(path: &Path) -> Outcome {
 }
 
 /// Whether `part` is `whole` with messages left out.
-fn is_subsequence(part: &[Recorded], whole: &[Recorded]) -> bool {
+fn is_subsequence(part: &[Message], whole: &[Message]) -> bool {
     let mut whole = whole.iter();
     part.iter().all(|message| whole.any(|other| other == message))
 }
 
 /// 30,000 messages: three chunks.
-fn whole() -> (Vec<Recorded>, Vec<u8>) {
+fn whole() -> (Vec<Message>, Vec<u8>) {
     let messages = touch(30_000);
     let bytes = mcap_bytes(&messages);
     (messages, bytes)

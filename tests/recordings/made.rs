@@ -6,29 +6,29 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rusqlite::{Connection, params};
-use touchup::io::recording::{Recorded, RecordingError, RecordingReader, RecordingWriter, Topics};
-use touchup::touch::{StampedPose, StampedWrench, Wrench};
+use touchup::io::recording::{RecordingError, RecordingReader, RecordingWriter, Topics};
+use touchup::touch::{Message, StampedPose, StampedWrench, Wrench};
 
 pub const START_NS: i64 = 1_760_000_000_000_000_000;
 
-pub fn pose(stamp_ns: i64, v: [f64; 3]) -> Recorded {
+pub fn pose(stamp_ns: i64, v: [f64; 3]) -> Message {
     let rotation = UnitQuaternion::from_euler_angles(v[0], v[1], v[2]);
-    Recorded::Pose(StampedPose { stamp_ns, pose_ot: Isometry3::from_parts(Translation3::from(v), rotation) })
+    Message::Pose(StampedPose { stamp_ns, pose_ot: Isometry3::from_parts(Translation3::from(v), rotation) })
 }
 
-pub fn wrench(stamp_ns: i64, v: [f64; 3]) -> Recorded {
+pub fn wrench(stamp_ns: i64, v: [f64; 3]) -> Message {
     let wrench = Wrench { force: Vector3::from(v), torque: -0.1 * Vector3::from(v) };
-    Recorded::Wrench(StampedWrench { stamp_ns, wrench })
+    Message::Wrench(StampedWrench { stamp_ns, wrench })
 }
 
 /// A pose, then two wrenches, over and over; numbers that do not compress to nothing.
-pub fn touch(messages: usize) -> Vec<Recorded> {
+pub fn touch(messages: usize) -> Vec<Message> {
     let values = |i: usize| [0.37, 0.59, 0.83].map(|rate| (rate * i as f64 * i as f64).sin());
     let stamp = |i: usize| START_NS + 500_000 * i as i64;
     (0..messages).map(|i| if i % 3 == 0 { pose(stamp(i), values(i)) } else { wrench(stamp(i), values(i)) }).collect()
 }
 
-pub fn mcap_bytes(messages: &[Recorded]) -> Vec<u8> {
+pub fn mcap_bytes(messages: &[Message]) -> Vec<u8> {
     let mut writer = RecordingWriter::new(Cursor::new(Vec::new()), &Topics::default(), "O", "T").unwrap();
     messages.iter().for_each(|message| writer.write(message).unwrap());
     writer.finish().unwrap().into_inner()
@@ -68,7 +68,7 @@ pub fn db3_of(path: &Path, mcap: &[u8], payload: impl Fn(&[u8]) -> Vec<u8>) {
 
 /// Everything that can be read, and the error that ended it.
 pub struct Outcome {
-    pub messages: Vec<Recorded>,
+    pub messages: Vec<Message>,
     pub error: Option<RecordingError>,
     pub truncated: bool,
     pub bad: u64,

@@ -1,9 +1,10 @@
 //! ROS 2 recordings of a touch: poses (`geometry_msgs/msg/PoseStamped`) and wrenches
 //! (`geometry_msgs/msg/WrenchStamped`), read from MCAP and rosbag2 SQLite files, written as MCAP.
 //!
-//! [`RecordingReader`] streams: its memory does not grow with the recording, and no length found in a file is
-//! believed before it is checked. [`RecordingWriter`] makes a file that rosbag2, Foxglove and the Python readers open;
-//! [`write_recording`] puts one under its final name only when it is whole.
+//! Both deal in [`crate::touch::Message`]s, stamped as the message headers are. [`RecordingReader`] streams: its memory
+//! does not grow with the recording, and no length found in a file is believed before it is checked.
+//! [`RecordingWriter`] makes a file that rosbag2, Foxglove and the Python readers open; [`write_recording`] puts one
+//! under its final name only when it is whole.
 
 mod cdr;
 mod db3;
@@ -16,8 +17,6 @@ mod writer;
 pub use error::{BadCount, BadMessage, Damage, Place, RecordingError, TopicList};
 pub use reader::RecordingReader;
 pub use writer::{RecordingWriter, write_recording};
-
-use crate::touch::{StampedPose, StampedWrench};
 
 /// Names of the two topics that make a touch.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -45,25 +44,6 @@ impl Topics {
 
     fn kind_of(&self, name: &str) -> Option<Kind> {
         Kind::ALL.into_iter().find(|kind| self.name(*kind) == name)
-    }
-}
-
-/// One message of a recording; stamps are those of the message headers.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Recorded {
-    /// Position may be NaN or absurd; the rotation is a unit quaternion.
-    Pose(StampedPose),
-    /// Force and torque may be NaN or absurd.
-    Wrench(StampedWrench),
-}
-
-impl Recorded {
-    /// Stamp of the message header, ns.
-    pub fn stamp_ns(&self) -> i64 {
-        match self {
-            Self::Pose(pose) => pose.stamp_ns,
-            Self::Wrench(wrench) => wrench.stamp_ns,
-        }
     }
 }
 

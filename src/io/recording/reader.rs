@@ -13,7 +13,8 @@ use super::cdr::{decode_pose, decode_wrench, unpack};
 use super::db3::{self, Db3Reader};
 use super::error::{BadCount, check_topics};
 use super::mcap::{self, McapReader};
-use super::{BadMessage, Kind, RawMessage, Recorded, RecordingError, TopicInfo, Topics};
+use super::{BadMessage, Kind, RawMessage, RecordingError, TopicInfo, Topics};
+use crate::touch::Message;
 
 const ZSTD_MAGIC: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
 const ROS1_MAGIC: &[u8] = b"#ROSBAG V";
@@ -26,14 +27,15 @@ const MAX_METADATA_BYTES: u64 = 16 << 20;
 /// reception and row. It is not the order of the header stamps: whoever pairs the two topics sorts by stamp within a
 /// bounded buffer.
 ///
-/// A message that cannot be used is left out and counted in [`Self::bad_messages`]. A file that is damaged is read up
-/// to the damage; then comes one last item, the error. Memory is bounded by the largest chunk, at most 256 MiB packed
-/// and as much unpacked.
+/// Positions, forces and torques may be NaN or absurd; rotations are unit quaternions. A message that cannot be used is
+/// left out and counted in [`Self::bad_messages`]. A file that is damaged is read up to the damage; then comes one last
+/// item, the error. Memory is bounded by the largest chunk, at most 256 MiB packed and as much unpacked.
 ///
 /// ```no_run
-/// use touchup::io::recording::{Recorded, RecordingReader, Topics};
+/// use touchup::io::recording::{RecordingReader, Topics};
+/// use touchup::touch::Message;
 /// let mut reader = RecordingReader::open("touch.mcap".as_ref(), &Topics::default())?;
-/// let poses = reader.by_ref().filter(|message| matches!(message, Ok(Recorded::Pose(_)))).count();
+/// let poses = reader.by_ref().filter(|message| matches!(message, Ok(Message::Pose(_)))).count();
 /// println!("{poses} poses in {:?}", reader.pose_frame());
 /// # Ok::<(), touchup::io::recording::RecordingError>(())
 /// ```
@@ -134,7 +136,7 @@ impl RecordingReader {
         self.rest.clear();
     }
 
-    fn advance(&mut self) -> Result<Option<Recorded>, RecordingError> {
+    fn advance(&mut self) -> Result<Option<Message>, RecordingError> {
         loop {
             let Some(source) = &mut self.source else { return Ok(None) };
             if let Some(raw) = source.next_message()? {
@@ -153,7 +155,7 @@ impl RecordingReader {
 }
 
 impl Iterator for RecordingReader {
-    type Item = Result<Recorded, RecordingError>;
+    type Item = Result<Message, RecordingError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         let next = self.advance();
@@ -182,7 +184,7 @@ impl Intake {
         }
     }
 
-    fn accept(&mut self, raw: &RawMessage, path: &Path) -> Option<Recorded> {
+    fn accept(&mut self, raw: &RawMessage, path: &Path) -> Option<Message> {
         match self.decode(raw) {
             Ok(message) => Some(message),
             Err(reason) => {
@@ -193,16 +195,16 @@ impl Intake {
         }
     }
 
-    fn decode(&mut self, raw: &RawMessage) -> Result<Recorded, BadMessage> {
+    fn decode(&mut self, raw: &RawMessage) -> Result<Message, BadMessage> {
         let payload = unpack(raw.payload)?;
         match raw.kind {
             Kind::Pose => {
                 let (frame, pose) = decode_pose(&payload)?;
-                same_frame(&mut self.pose_frame, frame).map(|()| Recorded::Pose(pose))
+                same_frame(&mut self.pose_frame, frame).map(|()| Message::Pose(pose))
             }
             Kind::Wrench => {
                 let (frame, wrench) = decode_wrench(&payload)?;
-                same_frame(&mut self.wrench_frame, frame).map(|()| Recorded::Wrench(wrench))
+                same_frame(&mut self.wrench_frame, frame).map(|()| Message::Wrench(wrench))
             }
         }
     }

@@ -1,16 +1,17 @@
 //! Writes a touch as MCAP with profile `ros2`.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File};
-use std::io::{BufWriter, Seek, Write};
+use std::io::{Seek, Write};
 use std::path::Path;
 
 use ::mcap::records::MessageHeader;
 use ::mcap::write::Writer;
-use ::mcap::{Compression, WriteOptions};
+use ::mcap::{Compression, McapError, WriteOptions};
 
 use super::cdr::{encode_pose, encode_wrench};
-use super::{Kind, Recorded, RecordingError, Topics};
+use super::{Kind, RecordingError, Topics};
+use crate::io::atomic::AtomicFile;
+use crate::touch::Message;
 
 /// Message definitions in the form rosbag2 stores: the type, then each type it uses behind a line of 80 equals signs.
 const RULE: &str = "================================================================================";
@@ -80,10 +81,10 @@ impl<W: Write + Seek> RecordingWriter<W> {
     ///
     /// # Errors
     /// [`RecordingError::Stamp`] when its stamp does not fit a ROS 2 message; [`RecordingError::Write`].
-    pub fn write(&mut self, message: &Recorded) -> Result<(), RecordingError> {
+    pub fn write(&mut self, message: &Message) -> Result<(), RecordingError> {
         let (payload, channel) = match message {
-            Recorded::Pose(pose) => (encode_pose(pose, &self.pose.frame)?, &mut self.pose),
-            Recorded::Wrench(wrench) => (encode_wrench(wrench, &self.wrench.frame)?, &mut self.wrench),
+            Message::Pose(pose) => (encode_pose(pose, &self.pose.frame)?, &mut self.pose),
+            Message::Wrench(wrench) => (encode_wrench(wrench, &self.wrench.frame)?, &mut self.wrench),
         };
         let stamp_ns = message.stamp_ns();
         let time = u64::try_from(stamp_ns).map_err(|_| RecordingError::Stamp { stamp_ns })?;
@@ -115,34 +116,27 @@ fn add_channel<W: Write + Seek>(
     Ok(Channel { id, frame: frame.to_owned(), sequence: 0 })
 }
 
-/// Writes a whole recording to `path`: first under a name of its own in the same folder, then renamed, so that `path`
-/// is never half a file.
+/// Writes a whole recording to `path`, which is never half a file ([`AtomicFile`]).
 ///
 /// # Errors
-/// As [`RecordingWriter`], and [`RecordingError::Io`] with the path.
+/// As [`RecordingWriter`], and [`RecordingError::Io`] with the path for whatever the system refuses.
 pub fn write_recording(
     path: &Path,
     topics: &Topics,
     pose_frame: &str,
     wrench_frame: &str,
-    messages: impl IntoIterator<Item = Recorded>,
+    messages: impl IntoIterator<Item = Message>,
 ) -> Result<(), RecordingError> {
     let io = |source| RecordingError::Io { path: path.to_owned(), source };
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(format!(".{}.part", std::process::id()));
-    let part = path.with_file_name(name);
+    let mut file = AtomicFile::create(path).map_err(io)?;
     let write = || {
-        let file = BufWriter::new(File::create(&part).map_err(io)?);
-        let mut writer = RecordingWriter::new(file, topics, pose_frame, wrench_frame)?;
+        let mut writer = RecordingWriter::new(&mut file, topics, pose_frame, wrench_frame)?;
         messages.into_iter().try_for_each(|message| writer.write(&message))?;
-        let file = writer.finish()?.into_inner().map_err(|error| io(error.into_error()))?;
-        file.sync_all().map_err(io)?;
-        fs::rename(&part, path).map_err(io)
+        writer.finish().map(drop)
     };
-    let written = write();
-    if written.is_err() {
-        // best effort: the error that counts is the first one
-        let _ = fs::remove_file(&part);
-    }
-    written
+    write().map_err(|error| match error {
+        RecordingError::Write(McapError::Io(source)) => io(source),
+        error => error,
+    })?;
+    file.commit().map_err(io)
 }
