@@ -126,6 +126,21 @@ fn lengths_that_lie_are_refused_before_memory_is_taken() {
     }
 }
 
+/// A thousand such chunks in a file of 50 kB would otherwise fill the memory with names.
+#[test]
+fn names_that_only_packing_makes_small_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut file = std::io::Cursor::new(Vec::new());
+    let mut writer = ::mcap::WriteOptions::new().profile("ros2").create(&mut file).unwrap();
+    let schema = writer.add_schema("std_msgs/msg/Empty", "ros2msg", b"").unwrap();
+    writer.add_channel(schema, &"x".repeat(1 << 20), "cdr", &Default::default()).unwrap();
+    writer.finish().unwrap();
+    drop(writer);
+    let outcome = read_metered(&put(folder.path(), "names.mcap", &file.into_inner()));
+    let error = outcome.error.expect("no topic is called that").to_string();
+    assert!(error.contains("topic of a channel of 1048576 bytes, over the limit of 65536 bytes"), "{error}");
+}
+
 /// An unchecked, uncompressed chunk whose message and names claim more than is there.
 #[test]
 fn records_that_overrun_an_unchecked_chunk_are_refused() {

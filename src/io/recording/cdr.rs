@@ -8,7 +8,7 @@ use byteorder::{BigEndian, LittleEndian};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::{BadMessage, RecordingError};
+use super::{BadMessage, RecordingError, ZSTD_MAGIC};
 use crate::touch::{StampedPose, StampedWrench, Wrench};
 
 /// Longest payload of a pose or wrench: 84 bytes of numbers and a frame name; more than this is no such message.
@@ -20,8 +20,6 @@ const QUATERNION_NORM_SLACK: f64 = 0.01;
 /// Roundings of a product of three rotations: such a quaternion is kept bit by bit, so that writing and reading again
 /// changes nothing.
 const QUATERNION_ROUNDING: f64 = 8.0 * f64::EPSILON;
-/// What a zstd frame begins with; CDR begins with 0.
-const ZSTD_MAGIC: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
 const NS_PER_S: i64 = 1_000_000_000;
 
 #[derive(Serialize, Deserialize)]

@@ -9,6 +9,8 @@ use super::mcap::op;
 
 /// Longest record, packed or unpacked: far above the 1 MiB chunks of recorders, a small part of a machine's memory.
 const MAX_RECORD_BYTES: u64 = 256 << 20;
+/// Longest name of a topic or type: the names of all channels are kept, and packed bytes can pretend to be long ones.
+const MAX_TEXT_BYTES: u64 = 64 << 10;
 /// Opcode and length in front of every record.
 pub(super) const HEAD_BYTES: usize = 9;
 /// Piece in which records that nobody needs are passed over.
@@ -135,7 +137,10 @@ impl<'a> Fields<'a> {
 
     /// Bytes that are no UTF-8 are replaced: names only have to compare and print.
     pub fn text(&mut self, what: &'static str) -> Result<String, Damage> {
-        let len = self.u32(what)?;
-        Ok(String::from_utf8_lossy(self.bytes(len.into(), what)?).into_owned())
+        let bytes = u64::from(self.u32(what)?);
+        if bytes > MAX_TEXT_BYTES {
+            return Err(Damage::TooLong { what, bytes, limit: MAX_TEXT_BYTES });
+        }
+        Ok(String::from_utf8_lossy(self.bytes(bytes, what)?).into_owned())
     }
 }

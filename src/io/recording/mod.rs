@@ -18,6 +18,9 @@ pub use error::{BadCount, BadMessage, Damage, Place, RecordingError, TopicList};
 pub use reader::RecordingReader;
 pub use writer::{RecordingWriter, write_recording};
 
+/// What a zstd frame begins with: a file compressed as a whole, or a message (CDR begins with 0).
+const ZSTD_MAGIC: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
+
 /// Names of the two topics that make a touch.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Topics {
@@ -73,7 +76,7 @@ impl Kind {
 }
 
 /// A topic as a file describes it.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct TopicInfo {
     name: String,
     type_name: String,

@@ -13,10 +13,9 @@ use super::cdr::{decode_pose, decode_wrench, unpack};
 use super::db3::{self, Db3Reader};
 use super::error::{BadCount, check_topics};
 use super::mcap::{self, McapReader};
-use super::{BadMessage, Kind, RawMessage, RecordingError, TopicInfo, Topics};
+use super::{BadMessage, Kind, RawMessage, RecordingError, TopicInfo, Topics, ZSTD_MAGIC};
 use crate::touch::Message;
 
-const ZSTD_MAGIC: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
 const ROS1_MAGIC: &[u8] = b"#ROSBAG V";
 /// Longest `metadata.yaml`: thousands of files and topics.
 const MAX_METADATA_BYTES: u64 = 16 << 20;
@@ -111,11 +110,9 @@ impl RecordingReader {
             first_damage = first_damage.or(damage);
             self.truncated |= source.truncated();
             self.message_count = self.message_count.zip(source.promised()).map(|(a, b)| a.saturating_add(b));
-            for info in source.topics() {
-                if !found.contains(&info) {
-                    found.push(info);
-                }
-            }
+            found.extend(source.topics());
+            found.sort_unstable();
+            found.dedup();
         }
         match (check_topics(path, &self.topics, &found), first_damage) {
             (Err(RecordingError::MissingTopic { .. }), Some(damage)) => Err(damage),
