@@ -1,5 +1,6 @@
 //! Starts logging and hands over to the command line.
 
+use std::io::{IsTerminal, stderr};
 use std::process::ExitCode;
 
 use tracing_subscriber::EnvFilter;
@@ -7,6 +8,7 @@ use tracing_subscriber::EnvFilter;
 fn main() -> ExitCode {
     // RUST_LOG=touchup=debug shows more; results go to stdout, all else to stderr
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn"));
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
+    let colours = stderr().is_terminal();
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(stderr).with_ansi(colours).without_time().init();
     touchup::cli::run(std::env::args_os())
 }

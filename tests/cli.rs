@@ -306,6 +306,38 @@ fn losses_are_4_and_named() {
     assert!(text(&output.stderr).contains("cut.mcap"), "{}", text(&output.stderr));
 }
 
+/// What a new user gets wrong first: another clock, another frame, no contact at all.
+#[test]
+fn a_recording_that_moves_nothing_says_why() {
+    let case = Case::new();
+    let sound = touch(UnitQuaternion::identity(), false);
+    let changed = |name: &str, change: &dyn Fn(&mut Message)| {
+        let mut messages = sound.clone();
+        messages.iter_mut().for_each(change);
+        case.record(name, "stylus", &messages);
+        let output = case.refine(name, "out.ply", &["--json"]);
+        assert_eq!(json(&output)["moved_faces"], 0, "{name}");
+        (code(&output), text(&output.stderr).to_owned())
+    };
+    let (exit, told) = changed("clock.mcap", &|message| {
+        if let Message::Wrench(wrench) = message {
+            wrench.stamp_ns += 60_000_000_000;
+        }
+    });
+    assert!(exit == 4 && told.contains("no sample came of 1001 wrenches") && told.contains("clock"), "{told}");
+    let (exit, told) = changed("frame.mcap", &|message| {
+        if let Message::Pose(pose) = message {
+            pose.pose_ot.translation.x += 1.0;
+        }
+    });
+    assert!(exit == 4 && told.contains("the scan has no face near") && told.contains("--mesh-unit"), "{told}");
+    let (exit, told) = changed("air.mcap", &|message| match message {
+        Message::Pose(pose) => pose.pose_ot.translation.z += 0.1,
+        Message::Wrench(wrench) => wrench.wrench.force /= 10.0,
+    });
+    assert!(exit == 0 && told.contains("contact.on_n") && told.lines().count() == 1, "{told}");
+}
+
 // ---- demo -------------------------------------------------------------------------------------------------------
 
 #[test]

@@ -139,6 +139,7 @@ fn each_mistake_is_refused_in_one_line_that_says_where_and_what() {
     let bad = [
         ("sync:\n  reordr_ms: 3\n", &["reordr_ms", "did you mean `reorder_ms`", "line 2"][..]),
         ("contcat: {}", &["contcat", "did you mean `contact`", "line 1"]),
+        ("refine: { moed: paper }", &["moed", "did you mean `mode`", "line 1"]),
         ("contact:\n  on_n: much\n", &["line 2", "column 9"]),
         ("contact: { on_n: 1 }\ncontact: {}", &["duplicate", "line 2"]),
         ("contact: { on_n: 0.1 }", &["contact.on_n is 0.1", "contact.off_n to"]),

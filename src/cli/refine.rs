@@ -7,14 +7,15 @@ use std::time::Instant;
 
 use clap::Args;
 use serde::Serialize;
+use tracing::{debug, warn};
 
 use super::latency::{Latencies, Quantiles};
-use super::replay::{replay, wrench_frame};
+use super::replay::{Replayed, replay, wrench_frame};
 use super::{CliError, Losses, tell};
 use crate::io::mesh_file::{MeshFile, MeshFileError, MeshUnit, check_target, read_mesh, write_mesh};
 use crate::io::recording::{RecordingError, RecordingReader, Topics};
 use crate::mesh::{RepairReport, TriMesh, VertexId};
-use crate::refine::{RefineError, Refiner};
+use crate::refine::{RefineCounts, RefineError, RefineParams, Refiner};
 use crate::scene::{Mode, Scene};
 use crate::touch::{Sample, WrenchFrame};
 
@@ -133,6 +134,27 @@ fn reason_of(error: &RefineError) -> &'static str {
     }
 }
 
+/// Wrenches of which not one became a sample, where no fault of single messages explains it.
+fn lost_samples(replayed: &Replayed, accepted: u64) -> Option<String> {
+    (accepted == 0 && replayed.losses.is_empty()).then(|| {
+        format!(
+            "no sample came of {} wrenches: each needs a pose shortly before and after it by the same clock \
+             (sync.wrench_offset_ms, sync.largest_gap_ms)",
+            replayed.wrenches
+        )
+    })
+}
+
+/// Contacts that were mostly felt where there is no mesh.
+fn lost_contacts(params: &RefineParams, counts: &RefineCounts) -> Option<String> {
+    (params.gate.is_some() && counts.out_of_reach > counts.moved).then(|| {
+        format!(
+            "{} samples felt contact where the scan has no face near: are the poses in its frame, and is --mesh-unit right?",
+            counts.out_of_reach
+        )
+    })
+}
+
 /// Faces of which a corner is not where it was.
 fn moved_faces(before: &TriMesh, after: &TriMesh) -> u64 {
     let is_moved = |corners: [VertexId; 3]| corners.iter().any(|&v| before.position(v) != after.position(v));
@@ -173,13 +195,19 @@ impl RefineArguments {
 
         let started = Instant::now();
         let mut pushes = Pushes::new();
-        let replayed = replay(recording, scene.sync_params(), |sample| pushes.push(&mut refiner, sample))?;
+        let mut replayed = replay(recording, scene.sync_params(), |sample| pushes.push(&mut refiner, sample))?;
         let replay_s = started.elapsed().as_secs_f64();
         write_mesh(&self.out, refiner.mesh(), self.mesh_unit).map_err(CliError::WriteMesh)?;
 
+        let counts = refiner.counts();
+        debug!(?counts, "replayed");
+        replayed.losses.extend(lost_samples(&replayed, pushes.accepted));
+        replayed.losses.extend(lost_contacts(&params, counts));
+        if params.gate.is_some() && pushes.accepted > 0 && counts.contacts == 0 {
+            warn!("the stylus never came into contact: no force was above contact.on_n, so the mesh is as scanned");
+        }
         let mut refused = pushes.refused;
         refused.extend(replayed.refused);
-        let counts = refiner.counts();
         let summary = Summary {
             samples: replayed.wrenches,
             accepted: pushes.accepted,

@@ -49,6 +49,9 @@ pub enum SceneError {
     },
 }
 
+/// What the parser adds for those who program with it.
+const FOR_PROGRAMMERS: &str = ", set DuplicateKeyPolicy in Options if acceptable";
+
 /// One line with the place, and the nearest known key where one is misspelt.
 pub(super) fn yaml_error(error: &serde_saphyr::Error) -> SceneError {
     let plain = error.without_snippet();
@@ -58,13 +61,13 @@ pub(super) fn yaml_error(error: &serde_saphyr::Error) -> SceneError {
         }
         _ => String::new(),
     };
-    SceneError::Yaml { message: plain.to_string().replace('\n', " "), hint }
+    SceneError::Yaml { message: plain.to_string().replace(FOR_PROGRAMMERS, "").replace('\n', " "), hint }
 }
 
-/// The known key that fewest edits turn `word` into, when that is less than half of it.
+/// The known key that fewest edits turn `word` into, when that is no more than half of it.
 fn nearest<'a>(word: &str, known: &[&'a str]) -> Option<&'a str> {
     let edits = |key: &&&str| edit_distance(word, key);
-    known.iter().min_by_key(edits).copied().filter(|key| 2 * edit_distance(word, key) < word.len())
+    known.iter().min_by_key(edits).copied().filter(|key| 2 * edit_distance(word, key) <= word.len())
 }
 
 /// Insertions, deletions and replacements that turn `a` into `b`.
