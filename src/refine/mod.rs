@@ -31,7 +31,7 @@ use dynamics::turn;
 /// A held sample never acts for longer than this, s: what happened in a longer pause is not known.
 const LONGEST_HOLD: f64 = 0.03;
 
-/// Why a sample was refused, or a refiner not built. A refused sample changes nothing.
+/// Why a sample was refused, or a refiner not built. A refused sample does not change the mesh.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RefineError {
     /// Not finite, absurd, or not in order of time.
@@ -196,11 +196,11 @@ impl Refiner {
     ///
     /// # Errors
     /// [`RefineError::Sample`] for one that is not finite, absurd or not after the last; nothing is changed then.
+    /// [`RefineError::Dynamics`] for a step that overflows or is too stiff for its rule; the mesh is not changed then.
     pub fn push(&mut self, sample: &Sample) -> Result<Update, RefineError> {
         sample.check()?;
         let dt = sample.seconds_since(self.last_ns)?;
         self.last_ns = Some(sample.stamp_ns);
-        self.counts.accepted += 1;
         let tip = self.compensator.compensate(sample);
         let ball = self.motion.update(&tip, dt, LONGEST_HOLD);
         let dt = dt.min(LONGEST_HOLD);
@@ -209,6 +209,7 @@ impl Refiner {
             Felt::Nothing => Update::FREE,
             _ => self.press(&ball, felt, dt)?,
         };
+        self.counts.accepted += 1;
         match self.params.carve {
             Some(carve) => Ok(self.carve(&carve, &ball, felt, dt, update)),
             None => Ok(update),

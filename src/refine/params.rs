@@ -172,21 +172,36 @@ impl RefineParams {
     /// # Errors
     /// [`SettingError`] naming the first setting outside its range.
     pub fn check(&self) -> Result<(), SettingError> {
-        let positive = "finite and more than 0";
-        let (stiffness, radius) = (self.tip.stiffness.unwrap_or(1.0), self.tip.radius);
-        let rate = self.carve.map_or(1.0, |carve| carve.rate);
-        for (name, value, least, allowed) in [
-            ("tip radius (m)", radius, 0.0, "finite and 0 or more"),
-            ("tip stiffness (N/m)", stiffness, f64::MIN_POSITIVE, positive),
-            ("scan noise (m)", self.scan_noise, 0.0, "finite and 0 or more"),
-            ("carving rate (1/s)", rate, 0.0, "finite and 0 or more"),
-            ("longest step (edges)", self.longest_step_edges, f64::MIN_POSITIVE, positive),
-            ("largest move (edges)", self.largest_move_edges, f64::MIN_POSITIVE, positive),
-        ] {
-            if !(value.is_finite() && value >= least) {
-                return Err(SettingError { name, value, allowed });
-            }
-        }
-        Ok(())
+        let carve = self.carve.unwrap_or_default();
+        let sliding = self.sliding.unwrap_or_default();
+        let roi = if let RoiSize::Radius(radius) = self.roi { radius } else { 0.0 };
+        let any = [
+            ("smallest contact cosine", self.smallest_contact_cosine),
+            ("carving's contact cone (cosine)", carve.contact_cone_cosine),
+            ("friction cone (cosine)", sliding.cone_cosine),
+        ];
+        let not_negative = [
+            ("tip radius (m)", self.tip.radius),
+            ("scan noise (m)", self.scan_noise),
+            ("turning (1/s)", self.turning.unwrap_or(0.0)),
+            ("region of interest (m)", roi),
+            ("largest move (noises)", self.largest_move_noises),
+            ("carving rate (1/s)", carve.rate),
+            ("carving tolerance (m)", carve.tolerance),
+            ("carving's contact depth (m)", carve.largest_contact_depth),
+            ("smoothing (s)", sliding.smoothing),
+            ("velocity smoothing (s)", sliding.velocity_smoothing),
+            ("slowest sliding (m/s)", sliding.slowest),
+        ];
+        let positive = [
+            ("tip stiffness (N/m)", self.tip.stiffness.unwrap_or(1.0)),
+            ("longest step (edges)", self.longest_step_edges),
+            ("largest move (edges)", self.largest_move_edges),
+        ];
+        any.iter().try_for_each(|&(name, x)| SettingError::check(name, x, true, "finite"))?;
+        not_negative
+            .iter()
+            .try_for_each(|&(name, x)| SettingError::check(name, x, x >= 0.0, "finite and 0 or more"))?;
+        positive.iter().try_for_each(|&(name, x)| SettingError::check(name, x, x > 0.0, "finite and more than 0"))
     }
 }

@@ -45,9 +45,9 @@ impl Payload {
     }
 
     fn check(&self) -> Result<(), SettingError> {
-        check_range("payload mass (kg)", self.mass, self.mass >= 0.0, "0 or more")?;
+        SettingError::check("payload mass (kg)", self.mass, self.mass >= 0.0, "0 or more")?;
         for x in self.p_sc.iter().chain(&self.gravity_o) {
-            check_range("payload centre (m) or gravity (m/s²)", *x, true, "finite")?;
+            SettingError::check("payload centre (m) or gravity (m/s²)", *x, true, "finite")?;
         }
         Ok(())
     }
@@ -92,14 +92,14 @@ impl Compensator {
     /// [`SettingError`] for a negative mass and for anything not finite.
     pub fn new(params: CompensatorParams) -> Result<Self, SettingError> {
         for x in params.pose_ts.translation.vector.iter().chain(&params.pose_ts.rotation.coords) {
-            check_range("sensor pose in the tip frame (m, quaternion)", *x, true, "finite")?;
+            SettingError::check("sensor pose in the tip frame (m, quaternion)", *x, true, "finite")?;
         }
         if let Some(payload) = &params.payload {
             payload.check()?;
         }
         if let Some(bias) = &params.bias_s {
             for x in bias.force.iter().chain(&bias.torque) {
-                check_range("bias (N, N·m)", *x, true, "finite")?;
+                SettingError::check("bias (N, N·m)", *x, true, "finite")?;
             }
         }
         Ok(Self { params })
@@ -128,8 +128,4 @@ impl Compensator {
 
 fn turned(rotation: &UnitQuaternion<f64>, wrench: &Wrench) -> Wrench {
     Wrench { force: rotation * wrench.force, torque: rotation * wrench.torque }
-}
-
-fn check_range(name: &'static str, value: f64, inside: bool, allowed: &'static str) -> Result<(), SettingError> {
-    if inside && value.is_finite() { Ok(()) } else { Err(SettingError { name, value, allowed }) }
 }

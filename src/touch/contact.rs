@@ -45,12 +45,8 @@ impl ContactGate {
     /// [`SettingError`] unless 0 ≤ `off` ≤ `on`, both finite.
     pub fn new(params: ContactGateParams) -> Result<Self, SettingError> {
         let ContactGateParams { on, off } = params;
-        if !(off >= 0.0 && off.is_finite()) {
-            return Err(SettingError { name: "contact off (N)", value: off, allowed: "0 or more" });
-        }
-        if !(on >= off && on.is_finite()) {
-            return Err(SettingError { name: "contact on (N)", value: on, allowed: "no less than contact off" });
-        }
+        SettingError::check("contact off (N)", off, off >= 0.0, "0 or more")?;
+        SettingError::check("contact on (N)", on, on >= off, "no less than contact off")?;
         Ok(Self { params, contact: None, contacts: 0 })
     }
 

@@ -83,6 +83,18 @@ pub struct SettingError {
     pub allowed: &'static str,
 }
 
+impl SettingError {
+    /// Refuses a value that is not finite or not `inside` the range that `allowed` names.
+    pub(crate) fn check(
+        name: &'static str,
+        value: f64,
+        inside: bool,
+        allowed: &'static str,
+    ) -> Result<(), SettingError> {
+        if inside && value.is_finite() { Ok(()) } else { Err(SettingError { name, value, allowed }) }
+    }
+}
+
 /// Force and torque that the object exerts on the stylus, N and N·m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Wrench {
@@ -166,7 +178,7 @@ pub struct Sample {
     pub stamp_ns: i64,
     /// Pose of T in O, m.
     pub pose_ot: Isometry3<f64>,
-    /// As measured: not compensated, expressed in the sensor's frame.
+    /// As measured: not compensated, in the axes that [`WrenchFrame`] names.
     pub wrench: Wrench,
 }
 
