@@ -19,9 +19,9 @@
 //! # Frames
 //!
 //! O object (the mesh) · T stylus tip (origin: centre of the ball; z: along the shaft, from tip to handle) · S force
-//! sensor · W world (z up). `pose_ot` maps T to O, `p_ot` is the tip in O, `force_o` is a force expressed in O.
-//! A wrench is what the object does to the stylus and normals point out of the object, so a stylus that presses has
-//! `force_o · normal > 0`.
+//! sensor · W world (z up) · V view (in [`sim`] alone; z: towards the scanner or the hand). `pose_ot` maps T to O, `p_ot`
+//! is the tip in O, `force_o` is a force expressed in O. A wrench is what the object does to the stylus and normals point
+//! out of the object, so a stylus that presses has `force_o · normal > 0`.
 //!
 //! # Units
 //!
