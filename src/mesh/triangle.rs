@@ -2,10 +2,14 @@
 
 use nalgebra::{Point3, Vector3};
 
+/// Twice the area over the longest edge squared, itself squared, below which the foot inside a triangle is looked for by
+/// another way: the quotient of areas loses ε/0.01 of the edge there, and everything where there is no area.
+const THIN: f64 = 0.01;
+
 /// The point of triangle `abc` that is closest to `p`, with its barycentric coordinates.
 ///
 /// The Voronoi region of `p` (corner, edge or inside) is found from signed areas [Ericson 2005, sec. 5.1.5]. A triangle
-/// without area is treated as its longest edges: the result is always a point of the triangle.
+/// without area is treated as its sides: the result is always a point of the triangle.
 #[inline]
 pub fn closest_point(p: &Point3<f64>, [a, b, c]: &[Point3<f64>; 3]) -> (Point3<f64>, [f64; 3]) {
     let (ab, ac, ap) = (b - a, c - a, p - a);
@@ -19,7 +23,7 @@ pub fn closest_point(p: &Point3<f64>, [a, b, c]: &[Point3<f64>; 3]) -> (Point3<f
         return (*b, [0.0, 1.0, 0.0]);
     }
     let vc = d1 * d4 - d3 * d2;
-    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+    if vc <= 0.0 && d1 >= 0.0 && d3 < 0.0 {
         let t = d1 / (d1 - d3);
         return (a + ab * t, [1.0 - t, t, 0.0]);
     }
@@ -29,7 +33,7 @@ pub fn closest_point(p: &Point3<f64>, [a, b, c]: &[Point3<f64>; 3]) -> (Point3<f
         return (*c, [0.0, 0.0, 1.0]);
     }
     let vb = d5 * d2 - d1 * d6;
-    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+    if vb <= 0.0 && d2 >= 0.0 && d6 < 0.0 {
         let t = d2 / (d2 - d6);
         return (a + ac * t, [1.0 - t, 0.0, t]);
     }
@@ -38,9 +42,46 @@ pub fn closest_point(p: &Point3<f64>, [a, b, c]: &[Point3<f64>; 3]) -> (Point3<f
         let t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
         return (b + (c - b) * t, [0.0, 1.0 - t, t]);
     }
-    let scale = 1.0 / (va + vb + vc);
+    let area = va + vb + vc;
+    // the squared edges are differences of what is there
+    let longest = (d1 - d3).max(d2 - d6).max((d4 - d3) + (d5 - d6));
+    if area < THIN * longest * longest {
+        return closest_point_of_thin(p, [a, b, c]);
+    }
+    let scale = 1.0 / area;
     let (v, w) = (vb * scale, vc * scale);
     (a + ab * v + ac * w, [1.0 - v - w, v, w])
+}
+
+/// [`closest_point`] of a triangle with little or no area: the nearest of the points on its sides, and of the foot on its
+/// plane where that is inside.
+#[cold]
+fn closest_point_of_thin(p: &Point3<f64>, corners: [&Point3<f64>; 3]) -> (Point3<f64>, [f64; 3]) {
+    let mut best = (*corners[0], [1.0, 0.0, 0.0]);
+    let mut take = |point: Point3<f64>, barycentric: [f64; 3]| {
+        if (p - point).norm_squared() < (p - best.0).norm_squared() {
+            best = (point, barycentric);
+        }
+    };
+    for i in 0..3 {
+        let (s, e) = (corners[i], corners[(i + 1) % 3]);
+        let side = e - s;
+        let length = side.norm_squared();
+        let t = if length > 0.0 { ((p - s).dot(&side) / length).clamp(0.0, 1.0) } else { 0.0 };
+        let mut barycentric = [0.0; 3];
+        (barycentric[i], barycentric[(i + 1) % 3]) = (1.0 - t, t);
+        take(s + side * t, barycentric);
+    }
+    let double = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
+    if let Some(normal) = double.try_normalize(0.0) {
+        let foot = p - normal * normal.dot(&(p - corners[0]));
+        let share = |s: &Point3<f64>, e: &Point3<f64>| normal.dot(&(s - foot).cross(&(e - foot))) / double.norm();
+        let (u, v) = (share(corners[1], corners[2]), share(corners[2], corners[0]));
+        if u >= 0.0 && v >= 0.0 && u + v <= 1.0 {
+            take(foot, [u, v, 1.0 - u - v]);
+        }
+    }
+    best
 }
 
 /// Whether the segment from `p` to `q` passes through triangle `abc` or comes within `gap` (m) of doing so at its rim.
