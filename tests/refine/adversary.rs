@@ -101,6 +101,16 @@ fn stepped_block() -> TriMesh {
     TriMesh::new(positions, faces).unwrap()
 }
 
+/// A plate of 0.8 mm, its two sides not joined: what is pushed down on the one meets the other.
+fn thin_plate() -> TriMesh {
+    let upper = bumpy(8);
+    let count = upper.vertex_count() as u32;
+    let lower = upper.positions().iter().map(|p| p - vector![0.0, 0.0, 0.8e-3]);
+    let faces = || upper.faces().map(|(_, corners)| corners.map(|v| v.0));
+    let turned = faces().map(|[a, b, c]| [a + count, c + count, b + count]);
+    TriMesh::new(upper.positions().iter().copied().chain(lower).collect(), faces().chain(turned).collect()).unwrap()
+}
+
 /// Wanders, jumps, presses, lets go, dives into the mesh, and pushes from every side.
 struct Adversary {
     rng: Pcg64,
@@ -229,7 +239,7 @@ fn torment(scan: &TriMesh, params: RefineParams, seeds: std::ops::Range<u64>) ->
 
 #[test]
 fn no_sample_makes_the_mesh_unsound() {
-    let scans = [("plate", bumpy(8)), ("block", stepped_block())];
+    let scans = [("sheet", bumpy(8)), ("block", stepped_block()), ("plate", thin_plate())];
     for (name, scan) in &scans {
         let (moved, cut_back) = torment(scan, RefineParams::robust(BALL), 0..20);
         println!("{name}: {moved} updates, {cut_back} cut back");
@@ -251,5 +261,32 @@ fn no_sample_makes_the_mesh_unsound_with_other_regions_and_rules() {
         let (moved, cut_back) = torment(&stepped_block(), params, 100..104);
         println!("preset {i}: {moved} updates, {cut_back} cut back");
         assert!(moved > 2_000, "preset {i}: {moved}");
+    }
+}
+
+/// A ball sinks on one spot, with and without a force: the lid before it comes down onto a floor 2 mm below, that was out
+/// of sight at first.
+#[test]
+fn a_lid_pushed_onto_a_floor_does_not_pierce_it() {
+    let lid = grid(15, EDGE, |_, _| 0.0);
+    let count = lid.vertex_count() as u32;
+    let floor = lid.positions().iter().map(|p| p - vector![0.3e-3, 0.2e-3, 2e-3]);
+    let positions: Vec<_> = lid.positions().iter().copied().chain(floor).collect();
+    let faces = || lid.faces().map(|(_, corners)| corners.map(|v| v.0));
+    let faces: Vec<_> = faces().chain(faces().map(|corners| corners.map(|v| v + count))).collect();
+    // the first spot is over the middle of a face, which stays the nearest for long
+    for (x, y) in [(-0.4e-3, -0.4e-3), (0.0, 0.0), (0.7e-3, 0.4e-3), (-1.9e-3, 1.1e-3)] {
+        for force in [0.0, 2.0] {
+            let scan = TriMesh::new(positions.clone(), faces.clone()).unwrap();
+            let mut refiner = Refiner::new(scan, RefineParams::robust(BALL)).unwrap();
+            for tick in 0..2_000 {
+                let centre = Point3::new(x, y, (RADIUS + 0.2e-3 - 4e-6 * tick as f64).max(RADIUS - 4e-3));
+                refiner.push(&sample(tick, centre, Vector3::z() * force)).unwrap();
+            }
+            let lowest = refiner.mesh().positions()[..count as usize].iter().map(|p| p.z).fold(0.0, f64::min);
+            println!("{force} N: the lid is at {:.3} mm, {:?}", lowest * 1e3, refiner.counts());
+            assert_eq!(intersections(refiner.mesh()), [], "{force} N at {x} {y}");
+            assert!(lowest < -1.5e-3 && refiner.counts().cut_back > 0, "it came down to the floor: {lowest:e} m");
+        }
     }
 }
