@@ -11,7 +11,7 @@ use rand_pcg::Pcg64;
 use serde_json::Value;
 use tempfile::TempDir;
 use touchup::io::mesh_file::{MeshUnit, read_mesh, write_mesh};
-use touchup::io::recording::{Recorded, RecordingReader, Topics, write_recording};
+use touchup::io::recording::{RecordingReader, Topics, write_recording};
 use touchup::mesh::{FaceTree, TriMesh};
 use touchup::refine::{RefineParams, Refiner, TipParams};
 use touchup::touch::{Message, StampedPose, StampedWrench, SyncParams, Synchroniser, Wrench};
@@ -88,8 +88,8 @@ fn messages(bag: &Path) -> (Vec<StampedPose>, Vec<StampedWrench>) {
     let (mut poses, mut wrenches) = (vec![], vec![]);
     for message in RecordingReader::open(bag, &topics).unwrap() {
         match message.unwrap() {
-            Recorded::Pose(pose) => poses.push(pose),
-            Recorded::Wrench(wrench) => wrenches.push(wrench),
+            Message::Pose(pose) => poses.push(pose),
+            Message::Wrench(wrench) => wrenches.push(wrench),
         }
     }
     (poses, wrenches)
@@ -208,7 +208,7 @@ impl Plate {
 }
 
 /// Four seconds: 21 lines of 20 mm, poses at 500 Hz and wrenches at 1 kHz, 2 N, friction 0.2, lifted between lines.
-fn plate_touches() -> Vec<Recorded> {
+fn plate_touches() -> Vec<Message> {
     let mut messages = vec![];
     for tick in 0..4_200_i64 {
         let stamp_ns = 1_700_000_000_000_000_000 + tick * 1_000_000;
@@ -219,10 +219,10 @@ fn plate_touches() -> Vec<Recorded> {
         let centre = Vector3::new(-10e-3 + 20e-3 * along, -10e-3 + 1e-3 * line as f64, 1.5e-3 + up) - force / 20e3;
         if tick % 2 == 0 {
             let pose_ot = Isometry3::from_parts(centre.into(), UnitQuaternion::identity());
-            messages.push(Recorded::Pose(StampedPose { stamp_ns, pose_ot }));
+            messages.push(Message::Pose(StampedPose { stamp_ns, pose_ot }));
         }
         let wrench = Wrench { force, torque: Vector3::zeros() };
-        messages.push(Recorded::Wrench(StampedWrench { stamp_ns, wrench }));
+        messages.push(Message::Wrench(StampedWrench { stamp_ns, wrench }));
     }
     messages
 }
@@ -243,8 +243,8 @@ fn a_replay_equals_the_first_run_byte_for_byte() {
     };
     for message in plate_touches() {
         sync.push(match message {
-            Recorded::Pose(pose) => Message::Pose(pose),
-            Recorded::Wrench(wrench) => Message::Wrench(wrench),
+            Message::Pose(pose) => Message::Pose(pose),
+            Message::Wrench(wrench) => Message::Wrench(wrench),
         });
         take(&mut sync);
     }
@@ -269,7 +269,7 @@ fn a_replay_equals_the_first_run_byte_for_byte() {
 fn the_numbers_add_up_when_a_pose_is_bad() {
     let plate = Plate::new();
     let mut messages = plate_touches();
-    let Recorded::Pose(pose) = &mut messages[300] else { panic!("every third message is a pose") };
+    let Message::Pose(pose) = &mut messages[300] else { panic!("every third message is a pose") };
     pose.pose_ot.rotation.as_mut_unchecked().coords *= 2.0;
     write_recording(&plate.at("touch.mcap"), &Topics::default(), "object", "stylus", messages).unwrap();
     let output = plate.refine("out.ply", &[]);

@@ -123,6 +123,14 @@ pub struct RefitPlan {
     pairs: Vec<u32>,
 }
 
+impl RefitPlan {
+    /// A plan with room for so many faces.
+    pub fn with_room(faces: usize) -> Self {
+        // the way from the leaves to the root adds a level or so for each halving of the mesh
+        Self { leaves: Vec::with_capacity(faces), pairs: Vec::with_capacity(2 * faces + STACK) }
+    }
+}
+
 /// A face while the tree is built.
 #[derive(Clone, Copy)]
 struct Item {

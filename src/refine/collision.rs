@@ -9,6 +9,9 @@ type Triangle = [Point3<f64>; 3];
 /// A share of the altitude below which the bound on a turning normal in [`margin_at_corner`] holds.
 const SMALL_TURN: f64 = 0.1;
 
+/// Pairs to make room for.
+const PAIRS_PER_FACE: usize = 16;
+
 /// Two faces that share no edge.
 #[derive(Clone, Copy, Debug)]
 struct Pair {
@@ -48,6 +51,11 @@ impl Pairs {
         if common.next().is_none() {
             self.list.push(Pair { faces: [a, b], common: first, safe_until: 0.0 });
         }
+    }
+
+    /// Makes room for the pairs of `faces` moving faces: a dozen neighbours over a corner each, and some more.
+    pub fn reserve(&mut self, faces: usize) {
+        self.list.reserve(PAIRS_PER_FACE * faces);
     }
 
     /// Whether no pair has come to meet by an update whose longest way is `way` (m).

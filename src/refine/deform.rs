@@ -45,7 +45,7 @@ pub(super) struct Clay {
 }
 
 /// A region of interest with the edit after which it was last looked at.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Grip {
     roi: Roi,
     refit: RefitPlan,
@@ -102,6 +102,14 @@ impl Clay {
     /// Remembers that a surface facing `normal` was felt on `face`.
     pub fn feel(&mut self, face: FaceId, normal: &Vector3<f64>) {
         self.evidence[face.0 as usize] = normal.cast::<f32>().into();
+    }
+
+    /// A grip for regions of this size.
+    pub fn grip(&mut self, size: RoiSize) -> Grip {
+        let vertices = size.room(self.mean_edge);
+        self.displacements.reserve(vertices);
+        self.before.reserve(vertices);
+        Grip { roi: Roi::with_room(vertices), refit: RefitPlan::with_room(3 * vertices), seen: None }
     }
 
     /// Moves the corners of `handle` by `steps` (m) and the region around it after them.

@@ -142,6 +142,19 @@ fn shape_of(mesh: &TriMesh, face: FaceId) -> Shape {
 }
 
 impl Neighbourhood {
+    /// Makes room for a region of so many vertices: two to three faces each, three edges for two faces.
+    pub fn reserve(&mut self, vertices: usize) {
+        let faces = 3 * vertices;
+        for list in [&mut self.before, &mut self.after] {
+            list.reserve(faces);
+        }
+        self.faces.reserve(faces);
+        self.edges.reserve(2 * faces);
+        self.near.reserve(2 * faces);
+        self.suspects.reserve(faces);
+        self.known.reserve(4 * faces);
+    }
+
     /// Faces whose corners move with the region.
     pub fn moving(&self) -> &[FaceId] {
         &self.faces[..self.moving]

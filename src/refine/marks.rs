@@ -60,8 +60,15 @@ impl Marks {
         None
     }
 
+    /// Makes room for `count` keys.
+    pub fn reserve(&mut self, count: usize) {
+        while self.entries.len() < 2 * count {
+            self.grow();
+        }
+    }
+
     fn grow(&mut self) {
-        let room = 2 * self.entries.len();
+        let room = (2 * self.entries.len()).max(FIRST_ROOM);
         let old = std::mem::replace(&mut self.entries, vec![(0, 0, 0); room]);
         for entry in old.into_iter().filter(|entry| entry.0 == self.stamp) {
             let at = self.slot(entry.1);

@@ -22,6 +22,10 @@ pub enum RoiSize {
     Radius(f64),
 }
 
+/// Room for more vertices is not made ahead.
+const LARGEST_ROOM: f64 = 1e4;
+/// Neighbours of a vertex; six in a regular mesh.
+const LINKS_PER_VERTEX: usize = 8;
 /// The weights are solved until the residual is below this share of the start.
 const SOLVED: f64 = 1e-9;
 
@@ -40,7 +44,32 @@ pub(super) struct Roi {
     solver: Solver,
 }
 
+impl RoiSize {
+    /// How many vertices to make room for, where edges are `mean_edge` (m) long: several times what a regular mesh
+    /// needs, so that a sample allocates nothing.
+    pub(super) fn room(self, mean_edge: f64) -> usize {
+        let rings = match self {
+            Self::Handle => 0.0,
+            Self::OneRing => 1.0,
+            Self::Radius(radius) => radius / mean_edge,
+        };
+        // a mesh far finer than the tip grows its buffers when it comes to that
+        (16.0 * (1.0 + rings) * (1.0 + rings)).min(LARGEST_ROOM) as usize
+    }
+}
+
 impl Roi {
+    /// A region with room for `vertices`.
+    pub fn with_room(vertices: usize) -> Self {
+        let mut roi = Self::default();
+        roi.vertices.reserve(vertices);
+        roi.weights.reserve(vertices);
+        roi.marks.reserve(vertices);
+        roi.solver.reserve(vertices);
+        roi.neighbourhood.reserve(vertices);
+        roi
+    }
+
     /// Whether it was made for this handle.
     pub fn is_for(&self, handle: FaceId) -> bool {
         self.handle == Some(handle)
@@ -106,6 +135,15 @@ struct Solver {
 }
 
 impl Solver {
+    fn reserve(&mut self, vertices: usize) {
+        self.starts.reserve(vertices);
+        self.links.reserve(LINKS_PER_VERTEX * vertices);
+        self.degrees.reserve(vertices);
+        for list in [&mut self.residual, &mut self.direction, &mut self.product] {
+            list.reserve(vertices);
+        }
+    }
+
     fn solve(&mut self, mesh: &TriMesh, vertices: &[VertexId], marks: &Marks, weights: &mut Vec<[f64; 3]>) {
         weights.clear();
         weights.extend([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
