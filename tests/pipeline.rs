@@ -242,10 +242,7 @@ fn a_replay_equals_the_first_run_byte_for_byte() {
         }
     };
     for message in plate_touches() {
-        sync.push(match message {
-            Message::Pose(pose) => Message::Pose(pose),
-            Message::Wrench(wrench) => Message::Wrench(wrench),
-        });
+        sync.push(message);
         take(&mut sync);
     }
     sync.finish();
