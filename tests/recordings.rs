@@ -285,7 +285,8 @@ fn messages_that_cannot_be_used_are_counted_and_reading_goes_on() {
     let mut reader = RecordingReader::open(&path, &Topics::default()).unwrap();
     let back: Vec<_> = reader.by_ref().map(Result::unwrap).collect();
     assert_eq!(back, [messages[0], messages[4], messages[5], messages[7]]);
-    let bad: Vec<_> = reader.bad_messages().iter().map(|(why, bad)| (*why, bad.count, bad.place)).collect();
+    let bad: Vec<_> =
+        reader.bad_messages().iter().map(|(why, bad)| (*why, bad.poses + bad.wrenches, bad.place)).collect();
     let expected = [
         (BadMessage::Malformed, 3, Place::Row(2)),
         (BadMessage::Quaternion, 1, Place::Row(4)),

@@ -83,9 +83,14 @@ impl Replayed {
             self.refused.insert(name, count);
         }
         for (reason, bad) in recording.bad_messages() {
-            let (path, place, count) = (bad.path.display(), &bad.place, bad.count);
+            let (path, place, count) = (bad.path.display(), &bad.place, bad.poses + bad.wrenches);
             self.losses.push(format!("{count} messages {reason}, the first in {path} at {place}"));
-            *self.refused.entry(reason.name().to_owned()).or_default() += count;
+            self.wrenches += bad.wrenches;
+            for (name, count) in [(reason.name().to_owned(), bad.wrenches), (format!("pose_{reason}"), bad.poses)] {
+                if count > 0 {
+                    *self.refused.entry(name).or_default() += count;
+                }
+            }
         }
         if recording.truncated() {
             self.losses.push("the recording has lost its end; what is there was read".to_owned());

@@ -17,8 +17,9 @@ const LEAF_FACES: usize = 4;
 const SMALLEST_SHARE: usize = 4;
 /// Slots of the traversal stack: one for each level, see [`SMALLEST_SHARE`].
 const STACK: usize = 96;
-/// Two faces whose squared distances differ relatively by less than this meet at the closest point; 64 roundings.
-const TIE: f64 = 64.0 * f64::EPSILON;
+/// Two faces whose distances differ by no more than this share of the largest coordinate meet at the closest point; 32
+/// roundings.
+const TIE: f64 = 32.0 * f64::EPSILON;
 /// The reach of a query with a hint over the distance to the hinted face.
 const HINT_WIDTH: f64 = 1.0 + 1e-6;
 /// No node.
@@ -60,10 +61,8 @@ impl Aabb {
     fn take(&mut self, mesh: &TriMesh, face: FaceId, origin: &Point3<f64>) {
         for corner in mesh.triangle(face) {
             let corner = [corner.x - origin.x, corner.y - origin.y, corner.z - origin.z].map(|x| x as f32);
-            for i in 0..3 {
-                self.lo[i] = lesser(self.lo[i], corner[i]);
-                self.hi[i] = greater(self.hi[i], corner[i]);
-            }
+            self.lo = std::array::from_fn(|i| lesser(self.lo[i], corner[i]));
+            self.hi = std::array::from_fn(|i| greater(self.hi[i], corner[i]));
         }
     }
 
@@ -231,10 +230,12 @@ impl FaceTree {
         yields: impl Fn(&FaceHit, &FaceHit) -> bool,
     ) -> Option<FaceHit> {
         let q = p - self.origin;
-        let slack = self.slack(&q);
+        let tie = TIE * (p.coords.amax() + q.amax());
+        let slack = self.slack(&q) + tie;
         let q = [q.x as f32, q.y as f32, q.z as f32];
         let mut best: Option<FaceHit> = None;
         let mut limit = reach * reach;
+        let mut width = (2.0 * reach + tie) * tie;
         let mut far = beyond(limit, slack);
         let mut stack = [(0.0f32, 0u32); STACK];
         let mut depth = 0;
@@ -244,13 +245,14 @@ impl FaceTree {
                 for &face in self.faces_of(node) {
                     let hit = measure(face);
                     let nearer = match &best {
-                        _ if hit.distance_squared > limit * (1.0 + TIE) => false,
+                        _ if hit.distance_squared > limit + width => false,
                         None => hit.distance_squared < limit,
-                        Some(_) if hit.distance_squared < limit * (1.0 - TIE) => true,
+                        Some(_) if hit.distance_squared < limit - width => true,
                         Some(best) => yields(best, &hit) || (!yields(&hit, best) && hit.face < best.face),
                     };
                     if nearer {
                         limit = limit.min(hit.distance_squared);
+                        width = (2.0 * limit.sqrt() + tie) * tie;
                         far = beyond(limit, slack);
                         best = Some(hit);
                     }

@@ -181,7 +181,10 @@ impl Refiner {
         Ok(Self {
             compensator: Compensator::new(params.compensator)?,
             gate: params.gate.map(ContactGate::new).transpose()?,
-            motion: TipMotion::new(params.sliding.unwrap_or(SlidingParams { smoothing: 0.0, ..Default::default() })),
+            motion: TipMotion::new(
+                params.sliding.unwrap_or(SlidingParams { smoothing: 0.0, ..Default::default() }),
+                params.tip,
+            ),
             dynamics: FaceDynamics::new(params.dynamics)?,
             contact_grip: clay.grip(params.roi),
             carve_grip: clay.grip(RoiSize::Handle),
@@ -262,7 +265,7 @@ impl Refiner {
         let (mesh, tip) = (&self.clay.mesh, &self.params.tip);
         let reach = self.clay.largest_move + tip.radius;
         // the spring expects the deflection F/k of the tip, a rigid contact does not
-        let centre = if self.params.dynamics.take_out_rigid_offset { self.centre(ball) } else { ball.reported };
+        let centre = if self.params.dynamics.take_out_rigid_offset { ball.centre } else { ball.reported };
         let seek = match felt {
             Felt::Surface(normal) => centre - normal * tip.radius,
             _ => centre,
@@ -316,7 +319,7 @@ impl Refiner {
 
     /// Case 2: what the ball passes through is not there.
     fn carve(&mut self, carve: &CarveParams, ball: &Ball, felt: Felt, dt: f64, update: Update) -> Update {
-        let centre = self.centre(ball);
+        let centre = ball.centre;
         // a mesh that the ball does not enter by more than the tolerance is left alone
         let reach = self.params.tip.radius - carve.tolerance;
         let hint = match felt {
@@ -338,14 +341,6 @@ impl Refiner {
         match update.case {
             Case::Free => Update { case: Case::MeshOnly, mismatch: None, fit: Some(fit) },
             _ => update,
-        }
-    }
-
-    /// Where the ball really is: the reported centre, and what the tip gives way, m, in O.
-    fn centre(&self, ball: &Ball) -> Point3<f64> {
-        match self.params.tip.stiffness {
-            Some(stiffness) => ball.reported + ball.force_o / stiffness,
-            None => ball.reported,
         }
     }
 

@@ -1,5 +1,7 @@
 //! The settings of a [`super::Refiner`], and the two presets.
 
+use nalgebra::{Point3, Vector3};
+
 use super::guard::GuardParams;
 use super::{Along, ContactModel, DynamicsParams, RoiSize, SlidingParams, StepRule};
 use crate::touch::{CompensatorParams, ContactGateParams, SettingError};
@@ -11,6 +13,13 @@ pub struct TipParams {
     pub radius: f64,
     /// What stylus and probe give way under force, N/m; `None` when rigid or not known.
     pub stiffness: Option<f64>,
+}
+
+impl TipParams {
+    /// Where the ball really is, m: the pose is that of a rigid stylus, and the force F bends it back by F/k.
+    pub fn centre(&self, reported: &Point3<f64>, force_o: &Vector3<f64>) -> Point3<f64> {
+        self.stiffness.map_or(*reported, |stiffness| reported + force_o / stiffness)
+    }
 }
 
 /// Which face is the closest.
@@ -175,10 +184,14 @@ impl RefineParams {
         let carve = self.carve.unwrap_or_default();
         let sliding = self.sliding.unwrap_or_default();
         let roi = if let RoiSize::Radius(radius) = self.roi { radius } else { 0.0 };
-        let any = [
+        let guard = &self.guard;
+        let cosines = [
             ("smallest contact cosine", self.smallest_contact_cosine),
             ("carving's contact cone (cosine)", carve.contact_cone_cosine),
             ("friction cone (cosine)", sliding.cone_cosine),
+            ("guard's turn (cosine)", guard.smallest_turn_cosine),
+            ("guard's evidence (cosine)", guard.smallest_evidence_cosine),
+            ("guard's fold (cosine)", guard.smallest_fold_cosine),
         ];
         let not_negative = [
             ("tip radius (m)", self.tip.radius),
@@ -192,13 +205,15 @@ impl RefineParams {
             ("smoothing (s)", sliding.smoothing),
             ("velocity smoothing (s)", sliding.velocity_smoothing),
             ("slowest sliding (m/s)", sliding.slowest),
+            ("guard's quality", guard.smallest_quality),
+            ("guard's gap (edges)", guard.gap_share),
         ];
         let positive = [
             ("tip stiffness (N/m)", self.tip.stiffness.unwrap_or(1.0)),
             ("longest step (edges)", self.longest_step_edges),
             ("largest move (edges)", self.largest_move_edges),
         ];
-        any.iter().try_for_each(|&(name, x)| SettingError::check(name, x, true, "finite"))?;
+        cosines.iter().try_for_each(|&(name, x)| SettingError::check(name, x, x.abs() <= 1.0, "-1 to 1"))?;
         not_negative
             .iter()
             .try_for_each(|&(name, x)| SettingError::check(name, x, x >= 0.0, "finite and 0 or more"))?;

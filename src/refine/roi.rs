@@ -127,6 +127,8 @@ struct Solver {
     /// neighbours of free vertex i: `links[starts[i]..starts[i + 1]]`, by index in `vertices`; the rim is left out
     starts: Vec<u32>,
     links: Vec<u32>,
+    /// neighbours of one vertex on the rim
+    rim: Vec<VertexId>,
     /// number of all neighbours, the rim's too
     degrees: Vec<f64>,
     residual: Vec<[f64; 3]>,
@@ -138,6 +140,7 @@ impl Solver {
     fn reserve(&mut self, vertices: usize) {
         self.starts.reserve(vertices);
         self.links.reserve(LINKS_PER_VERTEX * vertices);
+        self.rim.reserve(4 * LINKS_PER_VERTEX);
         self.degrees.reserve(vertices);
         for list in [&mut self.residual, &mut self.direction, &mut self.product] {
             list.reserve(vertices);
@@ -161,19 +164,19 @@ impl Solver {
         for &vertex in &vertices[3..] {
             let start = self.links.len();
             self.starts.push(start as u32);
-            let mut rim = 0.0;
+            self.rim.clear();
             for &face in mesh.star(vertex) {
                 for other in mesh.corners(face) {
                     match marks.of(other.0) {
                         _ if other == vertex => {}
                         Some(index) if self.links[start..].contains(&index) => {}
                         Some(index) => self.links.push(index),
-                        // inner rim vertices are met in two faces
-                        None => rim += 0.5,
+                        None if self.rim.contains(&other) => {}
+                        None => self.rim.push(other),
                     }
                 }
             }
-            self.degrees.push((self.links.len() - start) as f64 + rim);
+            self.degrees.push((self.links.len() - start + self.rim.len()) as f64);
         }
         self.starts.push(self.links.len() as u32);
     }

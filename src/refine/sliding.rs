@@ -5,6 +5,7 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::TipParams;
 use crate::touch::Tip;
 
 /// Parameters of [`TipMotion`] and of the normal under the ball.
@@ -33,9 +34,11 @@ impl Default for SlidingParams {
 pub struct Ball {
     /// Reported centre of the ball (that of a rigid stylus), smoothed, m, in O.
     pub reported: Point3<f64>,
+    /// Where it really is: the reported centre and what the tip gives way, m, in O.
+    pub centre: Point3<f64>,
     /// Force of the object on the stylus, smoothed alike, N, in O.
     pub force_o: Vector3<f64>,
-    /// Velocity of the centre, m/s, in O.
+    /// Velocity of the real centre, m/s, in O: that of the reported one would take a change of force for motion.
     pub velocity: Vector3<f64>,
 }
 
@@ -43,13 +46,14 @@ pub struct Ball {
 #[derive(Clone, Debug)]
 pub struct TipMotion {
     params: SlidingParams,
+    tip: TipParams,
     last: Option<Ball>,
 }
 
 impl TipMotion {
     /// A motion that has seen nothing yet.
-    pub fn new(params: SlidingParams) -> Self {
-        Self { params, last: None }
+    pub fn new(params: SlidingParams, tip: TipParams) -> Self {
+        Self { params, tip, last: None }
     }
 
     /// Takes the next tip, `dt` (s) after the one before; a longer pause than `largest_gap` (s) starts anew.
@@ -59,15 +63,19 @@ impl TipMotion {
             Some(last) if dt > 0.0 && dt <= largest_gap => {
                 let gain = follow(dt, self.params.smoothing);
                 let reported = last.reported + (here - last.reported) * gain;
-                let velocity_now = (reported - last.reported) / dt;
-                Ball {
-                    reported,
-                    force_o: last.force_o + (force - last.force_o) * gain,
-                    velocity: last.velocity
-                        + (velocity_now - last.velocity) * follow(dt, self.params.velocity_smoothing),
-                }
+                let force_o = last.force_o + (force - last.force_o) * gain;
+                let centre = self.tip.centre(&reported, &force_o);
+                let velocity_now = (centre - last.centre) / dt;
+                let velocity =
+                    last.velocity + (velocity_now - last.velocity) * follow(dt, self.params.velocity_smoothing);
+                Ball { reported, centre, force_o, velocity }
             }
-            _ => Ball { reported: here, force_o: force, velocity: Vector3::zeros() },
+            _ => Ball {
+                reported: here,
+                centre: self.tip.centre(&here, &force),
+                force_o: force,
+                velocity: Vector3::zeros(),
+            },
         };
         self.last = Some(ball);
         ball
@@ -101,6 +109,8 @@ mod tests {
     use super::*;
     use nalgebra::Isometry3;
 
+    const RIGID: TipParams = TipParams { radius: 1.5e-3, stiffness: None };
+
     fn tip(x: f64) -> Tip {
         Tip {
             stamp_ns: 0,
@@ -113,7 +123,7 @@ mod tests {
     #[test]
     fn friction_does_not_tilt_the_normal_of_a_sliding_ball() {
         let params = SlidingParams::default();
-        let mut motion = TipMotion::new(params);
+        let mut motion = TipMotion::new(params, RIGID);
         let mut ball = motion.update(&tip(0.0), 0.0, 0.03);
         assert_eq!(ball.surface_normal(&params), ball.force_o.normalize(), "at rest the force is all there is");
         for i in 1..100 {
@@ -124,8 +134,21 @@ mod tests {
     }
 
     #[test]
+    fn a_changing_force_on_an_elastic_tip_is_no_motion() {
+        let mut motion = TipMotion::new(SlidingParams::default(), TipParams { stiffness: Some(1e4), ..RIGID });
+        let mut ball = None;
+        for i in 0..100 {
+            // the real centre stays at x = 0 while the force rises by 2 N
+            let force_o = Vector3::x() * (1.0 + 0.02 * f64::from(i));
+            let pressed = Tip { force_o, ..tip(-force_o.x / 1e4) };
+            ball = Some(motion.update(&pressed, 1e-3, 0.03));
+        }
+        assert!(ball.unwrap().velocity.norm() < 1e-12);
+    }
+
+    #[test]
     fn a_pause_starts_the_filter_anew() {
-        let mut motion = TipMotion::new(SlidingParams::default());
+        let mut motion = TipMotion::new(SlidingParams::default(), RIGID);
         motion.update(&tip(0.0), 0.0, 0.03);
         let ball = motion.update(&tip(0.01), 0.5, 0.03);
         assert_eq!((ball.reported.x, ball.velocity), (0.01, Vector3::zeros()));

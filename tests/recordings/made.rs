@@ -91,6 +91,6 @@ pub fn read(path: &Path) -> Outcome {
         }
     }
     outcome.truncated = reader.truncated();
-    outcome.bad = reader.bad_messages().values().map(|bad| bad.count).sum();
+    outcome.bad = reader.bad_messages().values().map(|bad| bad.poses + bad.wrenches).sum();
     outcome
 }

@@ -237,8 +237,10 @@ impl fmt::Display for BadMessage {
 /// How many messages were left out for one reason.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BadCount {
-    /// messages
-    pub count: u64,
+    /// on the pose topic
+    pub poses: u64,
+    /// on the wrench topic
+    pub wrenches: u64,
     /// file of the first
     pub path: PathBuf,
     /// where in that file the first is

@@ -185,8 +185,12 @@ impl Intake {
         match self.decode(raw) {
             Ok(message) => Some(message),
             Err(reason) => {
-                let first = BadCount { count: 0, path: path.to_owned(), place: raw.place };
-                self.bad.entry(reason).or_insert(first).count += 1;
+                let first = BadCount { poses: 0, wrenches: 0, path: path.to_owned(), place: raw.place };
+                let bad = self.bad.entry(reason).or_insert(first);
+                match raw.kind {
+                    Kind::Pose => bad.poses += 1,
+                    Kind::Wrench => bad.wrenches += 1,
+                }
                 None
             }
         }
