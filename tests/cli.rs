@@ -246,6 +246,9 @@ fn wrong_flags_are_2_before_anything_is_read() {
         assert!(text(&output.stderr).contains(named), "{flags:?}: {}", text(&output.stderr));
     }
     assert_eq!(code(&case.refine("touch.mcap", "out.txt", &[])), 2);
+    let (scan, over) = (case.bytes("scan.ply"), case.refine("touch.mcap", "./scan.ply", &[]));
+    assert!(code(&over) == 2 && text(&over.stderr).contains("scan.ply, which --scan reads"), "{}", text(&over.stderr));
+    assert_eq!(case.bytes("scan.ply"), scan);
     assert_eq!(code(&touchup(&["refine", "--scan", "a.ply"], "")), 2);
     assert!(!case.path("out.ply").exists());
 }
@@ -407,6 +410,9 @@ fn simulate_makes_the_input_of_refine() {
         let bad = touchup(&[&part[..], &flags].concat(), "");
         assert_eq!((code(&bad), text(&bad.stdout)), (2, ""), "{flags:?}: {}", text(&bad.stderr));
     }
+    let made = path("made");
+    let over = touchup(&["simulate", "--truth", &path("made/truth.ply"), "--out", &made], "");
+    assert!(code(&over) == 2 && text(&over.stderr).contains("which --truth reads"), "{}", text(&over.stderr));
     let missing = touchup(&["simulate", "--truth", "no.stl", "--out", &path("made")], "");
     assert_eq!((code(&missing), text(&missing.stdout)), (3, ""));
 }

@@ -14,11 +14,12 @@ mod touched;
 
 use std::ffi::OsString;
 use std::io::{ErrorKind, Write, stderr, stdin, stdout};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use crate::io::atomic::is_same_file;
 use crate::io::mesh_file::MeshFileError;
 use crate::io::recording::RecordingError;
 use crate::mesh::MeshError;
@@ -136,6 +137,15 @@ fn answer_steps() -> Result<Losses, CliError> {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error.into()),
         _ => Ok(Losses::new()),
     }
+}
+
+/// Refuses an output that would take the place of the input.
+fn check_kept(flag: &str, input: &Path, output: &Path) -> Result<(), CliError> {
+    if !is_same_file(input, output) {
+        return Ok(());
+    }
+    let path = output.display();
+    Err(CliError::Usage(format!("--out would write over {path}, which {flag} reads: choose another place")))
 }
 
 /// One line on stderr.

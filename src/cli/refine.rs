@@ -11,7 +11,7 @@ use tracing::{debug, warn};
 
 use super::latency::{Latencies, Quantiles};
 use super::replay::{Replayed, replay, wrench_frame};
-use super::{CliError, Losses, tell};
+use super::{CliError, Losses, check_kept, tell};
 use crate::io::mesh_file::{MeshFile, MeshFileError, MeshUnit, check_target, read_mesh, write_mesh};
 use crate::io::recording::{RecordingError, RecordingReader, Topics};
 use crate::mesh::{RepairReport, TriMesh, VertexId};
@@ -234,7 +234,8 @@ impl RefineArguments {
                 CliError::Usage(format!("--out {} must end in .ply, .stl or .obj", path.display()))
             }
             error => CliError::WriteMesh(error),
-        })
+        })?;
+        check_kept("--scan", &self.scan, &self.out)
     }
 
     /// The scene with the flags over it.

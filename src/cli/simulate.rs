@@ -4,17 +4,20 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use tracing::warn;
 
 use super::progress::Progress;
-use super::{CliError, Losses, tell};
+use super::{CliError, Losses, check_kept, tell};
 use crate::io::atomic::create_folder;
-use crate::io::mesh_file::{MeshUnit, read_mesh, write_mesh};
+use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh, write_mesh};
 use crate::io::recording::{Topics, write_recording};
 use crate::mesh::TriMesh;
 use crate::sim::{
     MeshSurface, PathParams, ScannerParams, Stroke, StylusParams, Surface, Touch, plan_mesh, scan, touch,
 };
 
+/// File of the part as it is, in the folder that is asked for.
+const TRUTH_NAME: &str = "truth.ply";
 /// Frame of the poses in the recordings.
 const OBJECT_FRAME: &str = "object";
 /// Frame of the wrenches: the stylus' own.
@@ -56,7 +59,12 @@ pub(super) fn simulate(arguments: &SimulateArguments) -> Result<Losses, CliError
     if !(1e-3..=1e3).contains(&arguments.tip_radius_mm) {
         return Err(CliError::Usage(format!("--tip-radius-mm {} must be 0.001 to 1000 mm", arguments.tip_radius_mm)));
     }
-    let truth = read_mesh(&arguments.truth, arguments.mesh_unit).map_err(CliError::ReadMesh)?.mesh;
+    check_kept("--truth", &arguments.truth, &arguments.out.join(TRUTH_NAME))?;
+    let MeshFile { mesh: truth, repair } =
+        read_mesh(&arguments.truth, arguments.mesh_unit).map_err(CliError::ReadMesh)?;
+    if repair.boundary_edges > 0 {
+        warn!("{} edges of the part are open: near them inside and outside are guessed", repair.boundary_edges);
+    }
     let surface = MeshSurface::new(&truth)?;
     let scanner = ScannerParams {
         edge: arguments.scan_edge_mm / 1e3,
@@ -108,7 +116,7 @@ pub(super) fn write_simulation(
     let _stage = Progress::stage("touch");
     let touch = touch(surface, path, stylus, seed)?;
     let messages = touch.messages.iter().copied();
-    for (name, mesh) in [("truth.ply", truth), ("scan.ply", &scan)] {
+    for (name, mesh) in [(TRUTH_NAME, truth), ("scan.ply", &scan)] {
         write_mesh(&folder.join(name), mesh, MeshUnit::Millimetre).map_err(CliError::WriteMesh)?;
     }
     write_recording(&folder.join("touch.mcap"), &Topics::default(), OBJECT_FRAME, STYLUS_FRAME, messages)
