@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::progress::Progress;
 use super::refine::{RefineArguments, Refined, Summary};
 use super::simulate::{Simulated, write_simulation};
-use super::touched::{Error, Touched};
+use super::touched::{RegionError, Touched};
 use super::{CliError, Losses, tell};
 use crate::io::atomic::write_atomically;
 use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
@@ -35,9 +35,9 @@ struct DemoSummary {
     scan: ScanBadness,
     touched_s: f64,
     /// error inside the touched region of the scan
-    before: Error,
+    before: RegionError,
     /// and of the refined mesh
-    after: Error,
+    after: RegionError,
     refine: Summary,
 }
 
@@ -118,8 +118,8 @@ impl fmt::Display for DemoSummary {
         writeln!(f, "touched for {:.0} s of simulated time", self.touched_s)?;
         writeln!(f, "{}", self.refine)?;
         writeln!(f, "error in the touched region, mean (p95):")?;
-        let Error { part_to_mesh_mm: [pm, pm95], mesh_to_part_mm: [mp, mp95] } = self.before;
-        let Error { part_to_mesh_mm: [qm, qm95], mesh_to_part_mm: [mq, mq95] } = self.after;
+        let RegionError { part_to_mesh_mm: [pm, pm95], mesh_to_part_mm: [mp, mp95] } = self.before;
+        let RegionError { part_to_mesh_mm: [qm, qm95], mesh_to_part_mm: [mq, mq95] } = self.after;
         writeln!(f, "  part to mesh {pm:.3} ({pm95:.3}) -> {qm:.3} ({qm95:.3}) mm, {:.1} times less", pm / qm)?;
         write!(f, "  mesh to part {mp:.3} ({mp95:.3}) -> {mq:.3} ({mq95:.3}) mm, {:.1} times less", mp / mq)
     }

@@ -1,4 +1,4 @@
-//! How long each sample took, with exact tails and constant memory.
+//! How long each sample took: median and tails to 1/64, the longest exactly, in constant memory.
 
 use std::time::Duration;
 

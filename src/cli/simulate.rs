@@ -1,6 +1,7 @@
 //! `touchup simulate`: what a known surface looks like to a bad scanner and feels like to a stylus, as the files that
 //! `refine` reads.
 
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -18,6 +19,8 @@ use crate::sim::{
 
 /// File of the part as it is, in the folder that is asked for.
 const TRUTH_NAME: &str = "truth.ply";
+/// The hand moves 0.08 mm in each tick of the simulation: a smaller ball would go through the part and take for ever.
+const TIP_RADII_MM: RangeInclusive<f64> = 0.1..=100.0;
 /// Frame of the poses in the recordings.
 const OBJECT_FRAME: &str = "object";
 /// Frame of the wrenches: the stylus' own.
@@ -56,8 +59,9 @@ pub(super) struct SimulateArguments {
 
 /// The verb: scans the part from above (along −z), touches it from there, and tells.
 pub(super) fn simulate(arguments: &SimulateArguments) -> Result<Losses, CliError> {
-    if !(1e-3..=1e3).contains(&arguments.tip_radius_mm) {
-        return Err(CliError::Usage(format!("--tip-radius-mm {} must be 0.001 to 1000 mm", arguments.tip_radius_mm)));
+    if !TIP_RADII_MM.contains(&arguments.tip_radius_mm) {
+        let (given, smallest, largest) = (arguments.tip_radius_mm, TIP_RADII_MM.start(), TIP_RADII_MM.end());
+        return Err(CliError::Usage(format!("--tip-radius-mm {given} must be {smallest} to {largest} mm")));
     }
     check_kept("--truth", &arguments.truth, &arguments.out.join(TRUTH_NAME))?;
     let MeshFile { mesh: truth, repair } =

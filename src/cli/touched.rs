@@ -1,6 +1,6 @@
 //! The region that a simulated stylus really touched, and how far a mesh is from the part there.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use nalgebra::Point3;
 use serde::Serialize;
@@ -24,7 +24,7 @@ pub(super) struct Touched {
 
 /// Distances between part and mesh in the touched region, mean and 95th percentile, mm.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub(super) struct Error {
+pub(super) struct RegionError {
     /// from the points that were touched to the mesh: what is missing
     pub part_to_mesh_mm: [f64; 2],
     /// from the mesh to the part, where its closest point belongs to the region: what is wrong
@@ -38,10 +38,10 @@ fn cell_of(p: &Point3<f64>, size: f64) -> [i64; 3] {
 impl Touched {
     /// The true contacts of a simulated touch.
     pub fn of(moments: &[Moment]) -> Self {
-        let mut kept = HashMap::new();
+        let mut kept = HashSet::new();
         let mut touched = Self { contacts: Vec::new(), cells: HashMap::new() };
         for contact in moments.iter().flat_map(|moment| &moment.contacts) {
-            if kept.insert(cell_of(&contact.point, SPACING), ()).is_none() {
+            if kept.insert(cell_of(&contact.point, SPACING)) {
                 touched.cells.entry(cell_of(&contact.point, REACH)).or_default().push(touched.contacts.len());
                 touched.contacts.push(contact.point);
             }
@@ -59,7 +59,7 @@ impl Touched {
     }
 
     /// How far `mesh` and `part` are from each other here.
-    pub fn error(&self, part: &dyn Surface, mesh: &TriMesh) -> Error {
+    pub fn error(&self, part: &dyn Surface, mesh: &TriMesh) -> RegionError {
         let tree = FaceTree::new(mesh);
         let to_mesh = |p: &Point3<f64>| tree.closest(mesh, p, f64::INFINITY).map(|hit| (hit.point - p).norm());
         let mut distances: Vec<f64> = self.contacts.iter().filter_map(to_mesh).collect();
@@ -67,7 +67,7 @@ impl Touched {
         let mean = distances.iter().sum::<f64>() / distances.len().max(1) as f64;
         let p95 = distances.get(distances.len() * 95 / 100).copied().unwrap_or_default();
         let from_mesh = measure_badness(mesh, part, |p| self.is_near(&part.closest(p).point));
-        Error {
+        RegionError {
             part_to_mesh_mm: [mean * 1e3, p95 * 1e3],
             mesh_to_part_mm: from_mesh.map_or([0.0; 2], |quality| [quality.mean * 1e3, quality.p95 * 1e3]),
         }
