@@ -234,6 +234,7 @@ impl FaceTree {
         let slack = self.slack(&q) + tie;
         let q = [q.x as f32, q.y as f32, q.z as f32];
         let mut best: Option<FaceHit> = None;
+        let reach = reach.max(0.0);
         let mut limit = reach * reach;
         let mut width = (2.0 * reach + tie) * tie;
         let mut far = beyond(limit, slack);

@@ -8,7 +8,7 @@ const THIN: f64 = 0.01;
 
 /// The point of triangle `abc` that is closest to `p`, with its barycentric coordinates.
 ///
-/// The Voronoi region of `p` (corner, edge or inside) is found from signed areas [Ericson 2005, sec. 5.1.5]. A triangle
+/// The Voronoi region of `p` (corner, edge or inside) is found from signed areas \[Ericson 2005, sec. 5.1.5\]. A triangle
 /// without area is treated as its sides: the result is always a point of the triangle.
 #[inline]
 pub fn closest_point(p: &Point3<f64>, [a, b, c]: &[Point3<f64>; 3]) -> (Point3<f64>, [f64; 3]) {

@@ -104,8 +104,8 @@ pub struct RefineParams {
 const RELAXATION: f64 = 25.0;
 /// Contact force at which [`relaxing_alpha`] holds, N.
 const USUAL_FORCE: f64 = 2.5;
-/// Turning of a touched face in [`RefineParams::robust`], 1/s: half as fast again as its motion.
-const TURNING: f64 = 40.0;
+/// Turning of a touched face in [`RefineParams::robust`], 1/s: about as fast as its motion.
+const TURNING: f64 = 30.0;
 
 /// The α, m/(N·s), by which a face relaxes within 40 ms at the usual force of a hand: rate over −df/dh.
 pub fn relaxing_alpha(model: &ContactModel) -> f64 {

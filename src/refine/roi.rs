@@ -1,7 +1,7 @@
-//! The region of interest around a touched face: handle, free vertices, fixed rim [paper, Sec 4.3].
+//! The region of interest around a touched face: handle, free vertices, fixed rim \[paper, Sec 4.3\].
 //!
 //! The handle is the touched face. Free vertices follow it by Laplacian surface editing with uniform weights
-//! [Sorkine 2004]: the displacement of each free vertex is the mean of its neighbours' displacements, the handle's is
+//! \[Sorkine 2004\]: the displacement of each free vertex is the mean of its neighbours' displacements, the handle's is
 //! given, the rim's is zero. The solution is linear in the displacements of the three handle vertices, so it is solved
 //! once for each handle, as three weights for each free vertex.
 
@@ -16,7 +16,7 @@ use crate::mesh::{FaceId, TriMesh, VertexId};
 pub enum RoiSize {
     /// Only the handle moves.
     Handle,
-    /// All neighbours of the handle are free [paper].
+    /// All neighbours of the handle are free \[paper\].
     OneRing,
     /// Vertices within this distance (m) of the handle's barycentre are free, as far as they hang together.
     Radius(f64),

@@ -14,7 +14,7 @@ pub struct SlidingParams {
     /// Time constant of the first-order filter on position and force, s; 0 filters nothing. Default 6 ms: three poses at
     /// 500 Hz, so that 0.2 mm of pose noise becomes 0.1 mm, while a hand at 50 mm/s lags 0.3 mm behind, along the surface.
     pub smoothing: f64,
-    /// Time constant of the velocity, s. Default 8 ms: 0.05 mm of pose noise then reads as 5 mm/s.
+    /// Time constant of the velocity, s. Default 12 ms: 0.2 mm of pose noise then still tells which way 25 mm/s go.
     pub velocity_smoothing: f64,
     /// Slower than this the ball counts as being at rest, m/s. Default 8 mm/s, above the noise of the velocity.
     pub slowest: f64,
@@ -25,7 +25,7 @@ pub struct SlidingParams {
 
 impl Default for SlidingParams {
     fn default() -> Self {
-        Self { smoothing: 6e-3, velocity_smoothing: 8e-3, slowest: 8e-3, cone_cosine: 0.9135 }
+        Self { smoothing: 6e-3, velocity_smoothing: 12e-3, slowest: 8e-3, cone_cosine: 0.9135 }
     }
 }
 
