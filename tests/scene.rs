@@ -155,7 +155,7 @@ fn each_mistake_is_refused_in_one_line_that_says_where_and_what() {
         ),
         ("refine: { mode: rough }", &["rough", "robust", "line 1"]),
         ("refine: { h_min_mm: 0 }", &["refine.h_min_mm is 0"]),
-        ("carve: { contact_cone_cosine: 2 }", &["carve.contact_cone_cosine is 2", "-1 to 1"]),
+        ("carve: { contact_tolerance_mm: -1 }", &["carve.contact_tolerance_mm is -1", "0 to 1000"]),
         ("sliding: { cone_cosine: -1 }", &["sliding.cone_cosine is -1", "0 to 1"]),
         ("compensation: { payload: { mass_kg: -2 } }", &["compensation.payload.mass_kg is -2"]),
         ("compensation: { sensor_orientation_xyzw: [0, 0, 0, 0] }", &["sensor_orientation_xyzw is 0", "length"]),

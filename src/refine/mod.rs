@@ -321,17 +321,13 @@ impl Refiner {
     fn carve(&mut self, carve: &CarveParams, ball: &Ball, felt: Felt, dt: f64, update: Update) -> Update {
         let centre = ball.centre;
         // a mesh that the ball does not enter by more than the tolerance is left alone
-        let reach = self.params.tip.radius - carve.tolerance;
-        let hint = match felt {
-            Felt::Nothing => self.carve_grip.handle(),
-            _ => self.contact_grip.handle(),
+        let (tolerance, hint) = match felt {
+            Felt::Nothing => (carve.tolerance, self.carve_grip.handle()),
+            _ => (carve.contact_tolerance.max(carve.tolerance), self.contact_grip.handle()),
         };
+        let reach = self.params.tip.radius - tolerance;
         let Some(hit) = self.clay.closest(&centre, hint, reach) else { return update };
         let Some((away, depth)) = self.penetration(&centre, &hit) else { return update };
-        let felt_here = matches!(felt, Felt::Surface(normal) if away.dot(&normal) > carve.contact_cone_cosine);
-        if depth <= carve.tolerance || (felt_here && depth < carve.largest_contact_depth) {
-            return update;
-        }
         let share = -(-carve.rate * dt).exp_m1();
         let way = (share * (depth - carve.tolerance)).min(2.0 * self.params.longest_step_edges * self.clay.mean_edge);
         let weight: f64 = hit.barycentric.iter().map(|x| x * x).sum();

@@ -47,16 +47,14 @@ pub struct CarveParams {
     pub rate: f64,
     /// Depth that is left alone, m. Default 0.05 mm, the noise of a good tracking system.
     pub tolerance: f64,
-    /// While in contact, a face within the cone of this cosine about the felt normal is the surface itself and left to
-    /// the contact. Default 0.7: 45°.
-    pub contact_cone_cosine: f64,
-    /// … unless it is deeper than this, m. Default 0.5 mm.
-    pub largest_contact_depth: f64,
+    /// While in contact only what is deeper than this is carved, m: what is shallower may be the felt surface itself.
+    /// Default 0.2 mm.
+    pub contact_tolerance: f64,
 }
 
 impl Default for CarveParams {
     fn default() -> Self {
-        Self { rate: 300.0, tolerance: 0.05e-3, contact_cone_cosine: 0.7, largest_contact_depth: 0.5e-3 }
+        Self { rate: 300.0, tolerance: 0.05e-3, contact_tolerance: 0.2e-3 }
     }
 }
 
@@ -187,7 +185,6 @@ impl RefineParams {
         let guard = &self.guard;
         let cosines = [
             ("smallest contact cosine", self.smallest_contact_cosine),
-            ("carving's contact cone (cosine)", carve.contact_cone_cosine),
             ("friction cone (cosine)", sliding.cone_cosine),
             ("guard's turn (cosine)", guard.smallest_turn_cosine),
             ("guard's evidence (cosine)", guard.smallest_evidence_cosine),
@@ -201,7 +198,7 @@ impl RefineParams {
             ("largest move (noises)", self.largest_move_noises),
             ("carving rate (1/s)", carve.rate),
             ("carving tolerance (m)", carve.tolerance),
-            ("carving's contact depth (m)", carve.largest_contact_depth),
+            ("carving's tolerance in contact (m)", carve.contact_tolerance),
             ("smoothing (s)", sliding.smoothing),
             ("velocity smoothing (s)", sliding.velocity_smoothing),
             ("slowest sliding (m/s)", sliding.slowest),

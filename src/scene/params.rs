@@ -94,8 +94,7 @@ impl CarveSection {
         CarveParams {
             rate: self.rate_per_s,
             tolerance: self.tolerance_mm / 1e3,
-            contact_cone_cosine: self.contact_cone_cosine,
-            largest_contact_depth: self.largest_contact_depth_mm / 1e3,
+            contact_tolerance: self.contact_tolerance_mm / 1e3,
         }
     }
 }

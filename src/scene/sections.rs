@@ -163,21 +163,14 @@ pub struct CarveSection {
     pub rate_per_s: f64,
     /// Depth that is left alone, mm.
     pub tolerance_mm: f64,
-    /// While in contact, faces within the cone of this cosine about the felt normal are left to the contact.
-    pub contact_cone_cosine: f64,
-    /// … unless they are deeper than this, mm.
-    pub largest_contact_depth_mm: f64,
+    /// While in contact only what is deeper than this is carved, mm.
+    pub contact_tolerance_mm: f64,
 }
 
 impl Default for CarveSection {
     fn default() -> Self {
-        let CarveParams { rate, tolerance, contact_cone_cosine, largest_contact_depth } = CarveParams::default();
-        Self {
-            rate_per_s: rate,
-            tolerance_mm: tolerance * 1e3,
-            contact_cone_cosine,
-            largest_contact_depth_mm: largest_contact_depth * 1e3,
-        }
+        let CarveParams { rate, tolerance, contact_tolerance } = CarveParams::default();
+        Self { rate_per_s: rate, tolerance_mm: tolerance * 1e3, contact_tolerance_mm: contact_tolerance * 1e3 }
     }
 }
 
@@ -343,8 +336,7 @@ impl CarveSection {
     pub(super) fn check(&self) -> Result<(), SceneError> {
         in_range("carve.rate_per_s", self.rate_per_s, 0.0, 1e6, "0 to 1e6 1/s")?;
         in_range("carve.tolerance_mm", self.tolerance_mm, 0.0, 1e3, "0 to 1000 mm")?;
-        in_range("carve.contact_cone_cosine", self.contact_cone_cosine, -1.0, 1.0, "-1 to 1")?;
-        in_range("carve.largest_contact_depth_mm", self.largest_contact_depth_mm, 0.0, 1e3, "0 to 1000 mm")
+        in_range("carve.contact_tolerance_mm", self.contact_tolerance_mm, 0.0, 1e3, "0 to 1000 mm")
     }
 }
 

@@ -101,7 +101,7 @@ fn a_step_that_fails_is_a_refused_sample() {
 fn settings_without_a_meaning_are_refused() {
     type Change = fn(&mut RefineParams, f64);
     let anywhere_bad = [f64::NAN, f64::INFINITY, -1.0];
-    let changes: [(&str, Change); 26] = [
+    let changes: [(&str, Change); 25] = [
         ("tip radius", |p, x| p.tip.radius = x),
         ("tip stiffness", |p, x| p.tip.stiffness = Some(x)),
         ("scan noise", |p, x| p.scan_noise = x),
@@ -118,8 +118,7 @@ fn settings_without_a_meaning_are_refused() {
         ("cone cosine", |p, x| p.sliding = Some(SlidingParams { cone_cosine: 2.0 * x, ..Default::default() })),
         ("carving rate", |p, x| p.carve = Some(CarveParams { rate: x, ..Default::default() })),
         ("carving tolerance", |p, x| p.carve = Some(CarveParams { tolerance: x, ..Default::default() })),
-        ("carving cone", |p, x| p.carve = Some(CarveParams { contact_cone_cosine: 2.0 * x, ..Default::default() })),
-        ("carving depth", |p, x| p.carve = Some(CarveParams { largest_contact_depth: x, ..Default::default() })),
+        ("carving in contact", |p, x| p.carve = Some(CarveParams { contact_tolerance: x, ..Default::default() })),
         ("contact cosine", |p, x| p.smallest_contact_cosine = 2.0 * x),
         ("alpha", |p, x| p.dynamics.alpha_m_per_n_s = x),
         ("beta", |p, x| p.dynamics.beta_per_n2_s = x),
