@@ -365,11 +365,12 @@ fn one_face(params: DynamicsParams, face: FaceState, seconds: u32) -> Result<Vec
     let dynamics = FaceDynamics::new(params)?;
     let stylus = GuidedStylus::default();
     let surface = |p: &Point3<f64>| SIGMOID.force(p.z) * Vector3::z();
-    let (mut face, mut p) = (face, face.b + 5e-3 * Vector3::z());
+    let (initial_normal, mut p) = (face.n, face.b + 5e-3 * Vector3::z());
+    let mut face = face;
     (0..1000 * seconds)
         .map(|_| {
             let errors = (face.b.z.abs(), angle(&face.n, &Vector3::z()));
-            face = dynamics.step(&face, &p, &surface(&p), 1e-3)?;
+            face = dynamics.step_from(&initial_normal, &face, &p, &surface(&p), 1e-3)?;
             p = stylus.step(&p, &face.b, &face.n, surface, 1e-3);
             Ok(errors)
         })

@@ -130,7 +130,7 @@ fn reason_of(error: &RefineError) -> &'static str {
     match error {
         RefineError::Sample(_) => "sample",
         RefineError::Setting(_) | RefineError::Dynamics(_) => "dynamics",
-        RefineError::Mesh(_) => "mesh",
+        RefineError::Mesh(_) | RefineError::NoSuchFace { .. } => "mesh",
     }
 }
 

@@ -46,6 +46,12 @@ pub enum RefineError {
     /// Nothing to refine.
     #[error(transparent)]
     Mesh(#[from] MeshError),
+    /// A handle that is not in the mesh.
+    #[error("the mesh has no face {face}; take a handle from `TriMesh::faces`")]
+    NoSuchFace {
+        /// its id
+        face: u32,
+    },
 }
 
 /// The four cases of haptic mismatch \[paper, Fig 5\].
@@ -149,12 +155,14 @@ pub struct Refiner {
     contact_grip: Grip,
     carve_grip: Grip,
     last_ns: Option<i64>,
+    /// the handle and n*(0), its normal when it became the handle (Eq 6)
+    begun: Option<(FaceId, Vector3<f64>)>,
     counts: RefineCounts,
 }
 
 /// The ball against the face it touches.
 struct Pressing {
-    hit: FaceHit,
+    handle: FaceId,
     /// the face before the update
     face: FaceState,
     /// outward normal of the surface as felt, unit; the face's own in [`RefineParams::paper`]
@@ -190,6 +198,7 @@ impl Refiner {
             carve_grip: clay.grip(RoiSize::Handle),
             clay,
             last_ns: None,
+            begun: None,
             counts: RefineCounts::default(),
             params,
         })
@@ -201,6 +210,22 @@ impl Refiner {
     /// [`RefineError::Sample`] for one that is not finite, absurd or not after the last; nothing is changed then.
     /// [`RefineError::Dynamics`] for a step that overflows or is too stiff for its rule; the mesh is not changed then.
     pub fn push(&mut self, sample: &Sample) -> Result<Update, RefineError> {
+        self.take(sample, None)
+    }
+
+    /// As [`Self::push`], but a contact acts on `handle` instead of the closest face: for a stylus that is kept on one
+    /// face after the other \[paper, Sec 4.3\].
+    ///
+    /// # Errors
+    /// Those of [`Self::push`], and [`RefineError::NoSuchFace`]; nothing is changed then.
+    pub fn push_on(&mut self, handle: FaceId, sample: &Sample) -> Result<Update, RefineError> {
+        if !self.clay.mesh.has_face(handle) {
+            return Err(RefineError::NoSuchFace { face: handle.0 });
+        }
+        self.take(sample, Some(handle))
+    }
+
+    fn take(&mut self, sample: &Sample, handle: Option<FaceId>) -> Result<Update, RefineError> {
         sample.check()?;
         let dt = sample.seconds_since(self.last_ns)?;
         self.last_ns = Some(sample.stamp_ns);
@@ -210,7 +235,7 @@ impl Refiner {
         let felt = self.felt_normal(sample.stamp_ns, &ball);
         let update = match felt {
             Felt::Nothing => Update::FREE,
-            _ => self.press(&ball, felt, dt)?,
+            _ => self.press(&ball, felt, handle, dt)?,
         };
         self.counts.accepted += 1;
         match self.params.carve {
@@ -224,6 +249,7 @@ impl Refiner {
             let contact = gate.update(stamp_ns, &ball.force_o).is_some();
             self.counts.contacts = gate.contacts();
             if !contact {
+                self.begun = None;
                 return Felt::Nothing;
             }
         }
@@ -235,8 +261,8 @@ impl Refiner {
     }
 
     /// Cases 3 and 4, and without a gate also 1 and 2: moves the face that the ball touches.
-    fn press(&mut self, ball: &Ball, felt: Felt, dt: f64) -> Result<Update, RefineError> {
-        let Some(pressing) = self.pressing(ball, felt) else {
+    fn press(&mut self, ball: &Ball, felt: Felt, handle: Option<FaceId>, dt: f64) -> Result<Update, RefineError> {
+        let Some(pressing) = self.pressing(ball, felt, handle) else {
             self.counts.out_of_reach += 1;
             return Ok(Update { case: Case::SurfaceOnly, mismatch: None, fit: None });
         };
@@ -249,19 +275,21 @@ impl Refiner {
             return untouched;
         }
         self.counts.clamped += u64::from(self.params.dynamics.model.clamps(pressing.force_o.dot(&face.n)));
-        let mut next = self.dynamics.step(face, &pressing.point, &pressing.force_o, dt)?;
+        let initial = self.begun.filter(|(handle, _)| *handle == pressing.handle).map_or(face.n, |(_, n)| n);
+        self.begun = Some((pressing.handle, initial));
+        let mut next = self.dynamics.step_from(&initial, face, &pressing.point, &pressing.force_o, dt)?;
         if let Some(turning) = self.params.turning {
             next.n = turn(&face.n, &pressing.normal, turning * dt);
         }
-        self.clay.feel(pressing.hit.face, &pressing.normal);
+        self.clay.feel(pressing.handle, &pressing.normal);
         let steps = self.rigid_steps(&pressing, &next);
-        let fit = self.clay.deform(&mut self.contact_grip, pressing.hit.face, self.params.roi, &steps);
+        let fit = self.clay.deform(&mut self.contact_grip, pressing.handle, self.params.roi, &steps);
         self.count(fit);
         Ok(Update { case, mismatch: Some(mismatch), fit: Some(fit) })
     }
 
-    /// The face that the ball touches; `None` beyond the reach.
-    fn pressing(&self, ball: &Ball, felt: Felt) -> Option<Pressing> {
+    /// The ball against `handle`, else against the face that it touches; `None` beyond the reach.
+    fn pressing(&self, ball: &Ball, felt: Felt, handle: Option<FaceId>) -> Option<Pressing> {
         let (mesh, tip) = (&self.clay.mesh, &self.params.tip);
         let reach = self.clay.largest_move + tip.radius;
         // the spring expects the deflection F/k of the tip, a rigid contact does not
@@ -270,18 +298,19 @@ impl Refiner {
             Felt::Surface(normal) => centre - normal * tip.radius,
             _ => centre,
         };
-        let hit = match self.params.closest {
+        let closest = || match self.params.closest {
             ClosestBy::Surface => self.clay.closest(&seek, self.contact_grip.handle(), reach),
             ClosestBy::Barycentre => self.clay.tree.closest_barycentre(mesh, &seek, reach),
-        }?;
-        let face = FaceState { b: mesh.barycentre(hit.face), n: mesh.normal(hit.face) };
+        };
+        let handle = handle.or_else(|| closest().map(|hit| hit.face))?;
+        let face = FaceState { b: mesh.barycentre(handle), n: mesh.normal(handle) };
         Some(match felt {
             Felt::Surface(normal) => {
-                Pressing { hit, face, normal, point: seek, force_o: normal * ball.force_o.dot(&normal) }
+                Pressing { handle, face, normal, point: seek, force_o: normal * ball.force_o.dot(&normal) }
             }
             _ => {
                 let point = centre - face.n * tip.radius;
-                Pressing { hit, face, normal: face.n, point, force_o: ball.force_o }
+                Pressing { handle, face, normal: face.n, point, force_o: ball.force_o }
             }
         })
     }
@@ -290,7 +319,7 @@ impl Refiner {
         let distance = (pressing.point - pressing.face.b).dot(&pressing.face.n);
         let expected = pressing.face.n * self.params.dynamics.model.force(distance);
         Mismatch {
-            face: pressing.hit.face,
+            face: pressing.handle,
             distance,
             expected_force_o: expected,
             linear: pressing.force_o - expected,
@@ -301,13 +330,13 @@ impl Refiner {
     /// The rigid motion of the handle to its next state, as steps of its corners, m.
     ///
     /// Along the force a corner only goes along it: the turn's sideways part would make the triangles creep.
-    fn rigid_steps(&self, Pressing { hit, face, normal, .. }: &Pressing, next: &FaceState) -> [Vector3<f64>; 3] {
+    fn rigid_steps(&self, Pressing { handle, face, normal, .. }: &Pressing, next: &FaceState) -> [Vector3<f64>; 3] {
         // the smallest rotation from n to n′: x + v × x + v × (v × x) / (1 + n·n′), v = n × n′
         let axis = face.n.cross(&next.n);
         let bend = 1.0 / (1.0 + face.n.dot(&next.n)).max(f64::EPSILON);
         let longest = self.params.longest_step_edges * self.clay.mean_edge;
         let along = self.params.dynamics.along == Along::Force;
-        self.clay.mesh.triangle(hit.face).map(|corner| {
+        self.clay.mesh.triangle(*handle).map(|corner| {
             let arm = corner - face.b;
             let across = axis.cross(&arm);
             let step = across + axis.cross(&across) * bend + (next.b - face.b);

@@ -105,7 +105,7 @@ pub enum StepRule {
 /// The direction a in which b* moves.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Along {
-    /// n* at the start of the step \[paper, Eq 6\].
+    /// n*(0) \[paper, Eq 6\]: n* when the face was first touched, or at the start of the step if no other is told.
     InitialNormal,
     /// F/|F|, which stays bounded where n* is far off; n* at the start where F = 0.
     #[default]
@@ -207,7 +207,23 @@ impl FaceDynamics {
         force: &Vector3<f64>,
         dt: f64,
     ) -> Result<FaceState, DynamicsError> {
-        let touch = self.touch(face, p, force, dt)?;
+        self.step_from(&face.n, face, p, force, dt)
+    }
+
+    /// As [`Self::step`], with the n*(0) of an earlier step: [`Along::InitialNormal`] keeps b* on the line on which it
+    /// was then. n*(0) is taken as it is, |n*(0)| = 1.
+    ///
+    /// # Errors
+    /// Those of [`Self::step`].
+    pub fn step_from(
+        &self,
+        initial_normal: &Vector3<f64>,
+        face: &FaceState,
+        p: &Point3<f64>,
+        force: &Vector3<f64>,
+        dt: f64,
+    ) -> Result<FaceState, DynamicsError> {
+        let touch = self.touch(initial_normal, face, p, force, dt)?;
         let (way, n) = match self.params.rule {
             StepRule::Lie => self.lie(&face.n, &touch),
             StepRule::DriftCorrected => self.drift_corrected(&face.n, &touch),
@@ -220,7 +236,14 @@ impl FaceDynamics {
         Ok(FaceState { b, n })
     }
 
-    fn touch(&self, face: &FaceState, p: &Point3<f64>, force: &Vector3<f64>, dt: f64) -> Result<Touch, DynamicsError> {
+    fn touch(
+        &self,
+        initial_normal: &Vector3<f64>,
+        face: &FaceState,
+        p: &Point3<f64>,
+        force: &Vector3<f64>,
+        dt: f64,
+    ) -> Result<Touch, DynamicsError> {
         let (magnitude, towards) = split(force);
         let sum = face.b.coords + face.n + p.coords;
         if !(finite(&sum) && finite(force) && magnitude.is_finite() && dt.is_finite()) {
@@ -233,7 +256,7 @@ impl FaceDynamics {
         if dt < 0.0 {
             return Err(DynamicsError::BadTimeStep { dt_s: dt });
         }
-        let along = if self.params.along == Along::Force && magnitude > 0.0 { towards } else { face.n };
+        let along = if self.params.along == Along::Force && magnitude > 0.0 { towards } else { *initial_normal };
         Ok(Touch { towards, magnitude, along, arm: p - face.b, dt })
     }
 
