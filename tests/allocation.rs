@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Vector3};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 use touchup::mesh::TriMesh;
-use touchup::refine::{RefineParams, Refiner, RoiSize, TipParams};
+use touchup::refine::{GuardParams, RefineParams, Refiner, RoiSize, TipParams};
 use touchup::touch::{Sample, Wrench};
 
 #[path = "common/mod.rs"]
@@ -93,7 +93,8 @@ fn the_counter_counts() {
 
 #[test]
 fn no_sample_allocates_once_warm() {
-    let paper = RefineParams { largest_move_edges: 2.6, ..RefineParams::paper(TIP) };
+    let paper =
+        RefineParams { largest_move_edges: 2.6, guard: Some(GuardParams::default()), ..RefineParams::paper(TIP) };
     for (mode, params) in [("robust", RefineParams::robust(TIP)), ("paper", paper)] {
         for roi in [RoiSize::OneRing, RoiSize::Radius(1.5e-3), RoiSize::Radius(4e-3)] {
             assert_eq!(allocations(RefineParams { roi, ..params }), 0, "{mode} {roi:?}");

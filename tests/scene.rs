@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use nalgebra::vector;
-use touchup::refine::{Along, ContactModel, DynamicsParams, RefineParams, RoiSize, StepRule, TipParams};
+use touchup::refine::{Along, ContactModel, DynamicsParams, GuardParams, RefineParams, RoiSize, StepRule, TipParams};
 use touchup::scene::{CompensationSection, Mode, PayloadSection, Scene};
 use touchup::touch::{SyncParams, WrenchFrame};
 
@@ -35,7 +35,7 @@ fn the_shipped_file_is_the_default() {
 fn every_key_of_the_code_is_in_the_shipped_file_and_documented() {
     let mut known = BTreeSet::new();
     let inner = ["compensation.payload", "compensation.bias"];
-    let outer = ["", "sync", "compensation", "contact", "tip", "scan", "sliding", "carve", "refine"];
+    let outer = ["", "sync", "compensation", "contact", "tip", "scan", "sliding", "carve", "guard", "refine"];
     let sections = [&outer[..], &inner].concat();
     for section in sections {
         let path: Vec<_> = section.split('.').filter(|name| !name.is_empty()).collect();
@@ -64,6 +64,9 @@ fn the_default_scene_is_the_preset_of_each_mode() {
     let mut scene = Scene::default();
     assert_eq!(scene.refine_params(WrenchFrame::Sensor), Some(RefineParams::robust(tip)));
     scene.refine.as_mut().unwrap().mode = Mode::Paper;
+    let guard = Some(GuardParams::default());
+    assert_eq!(scene.refine_params(WrenchFrame::Sensor), Some(RefineParams { guard, ..RefineParams::paper(tip) }));
+    scene.guard = None;
     assert_eq!(scene.refine_params(WrenchFrame::Sensor), Some(RefineParams::paper(tip)));
     let mut scene = Scene::default();
     scene.tip.as_mut().unwrap().stiffness_n_per_mm = None;
@@ -80,11 +83,11 @@ fn a_part_is_built_only_when_named() {
     assert_eq!(none.compensator_params(WrenchFrame::Object).payload, None);
 
     let loop_alone = Scene::from_yaml("refine:").unwrap().refine_params(WrenchFrame::Object).unwrap();
-    assert_eq!((loop_alone.gate, loop_alone.sliding, loop_alone.carve), (None, None, None));
+    assert_eq!((loop_alone.gate, loop_alone.sliding, loop_alone.carve, loop_alone.guard), (None, None, None, None));
     assert_eq!((loop_alone.tip, loop_alone.scan_noise), (TipParams { radius: 0.0, stiffness: None }, 0.0));
     assert_eq!(loop_alone.compensator.wrench_frame, WrenchFrame::Object);
 
-    let bare = Scene::from_yaml("sync:\ncontact: {}\ntip:\nscan:\nsliding:\ncarve:\nrefine:\n").unwrap();
+    let bare = Scene::from_yaml("sync:\ncontact: {}\ntip:\nscan:\nsliding:\ncarve:\nguard:\nrefine:\n").unwrap();
     assert_eq!(bare, Scene::default(), "a part named without keys takes its defaults");
 }
 

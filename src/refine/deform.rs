@@ -33,7 +33,7 @@ pub(super) struct Clay {
     scanned: Vec<Point3<f64>>,
     /// for each face the last normal scanned or felt there
     evidence: Vec<[f32; 3]>,
-    guard: GuardParams,
+    guard: Option<GuardParams>,
     /// mean edge length, m
     pub mean_edge: f64,
     /// vertices stay within this distance of where they were scanned, m
@@ -70,7 +70,7 @@ impl Grip {
 }
 
 impl Clay {
-    pub fn new(mesh: TriMesh, guard: GuardParams) -> Self {
+    pub fn new(mesh: TriMesh, guard: Option<GuardParams>) -> Self {
         let tree = FaceTree::new(&mesh);
         let mut evidence = vec![[0.0; 3]; mesh.face_slots()];
         for (face, _) in mesh.faces() {
@@ -120,13 +120,13 @@ impl Clay {
             grip.seen = None;
         }
         let longest = self.displace(&grip.roi, steps);
-        let margin = MARGIN_EDGES * self.mean_edge;
-        if grip.seen != Some(self.edits) {
-            grip.roi.neighbourhood.refresh(&self.mesh, &self.tree, margin);
-        } else if grip.roi.neighbourhood.is_outdated(longest) {
-            grip.roi.neighbourhood.collect(&self.mesh, &self.tree, margin);
-        }
-        let fit = self.place_soundly(grip, longest, margin);
+        let fit = match self.guard {
+            Some(guard) => self.place_soundly(grip, longest, &guard),
+            None => {
+                self.place(&grip.roi, 1.0);
+                Fit::Whole
+            }
+        };
         self.tree.refit_planned(&self.mesh, &grip.refit);
         self.edits += 1;
         grip.seen = Some(self.edits);
@@ -134,7 +134,13 @@ impl Clay {
     }
 
     /// Puts the region at the largest share of its displacement that leaves the mesh sound.
-    fn place_soundly(&mut self, grip: &mut Grip, longest: f64, margin: f64) -> Fit {
+    fn place_soundly(&mut self, grip: &mut Grip, longest: f64, guard: &GuardParams) -> Fit {
+        let margin = MARGIN_EDGES * self.mean_edge;
+        if grip.seen != Some(self.edits) {
+            grip.roi.neighbourhood.refresh(&self.mesh, &self.tree, margin);
+        } else if grip.roi.neighbourhood.is_outdated(longest) {
+            grip.roi.neighbourhood.collect(&self.mesh, &self.tree, margin);
+        }
         if grip.roi.neighbourhood.may_pass_unseen(longest) {
             grip.roi.neighbourhood.pass_unseen(longest);
             self.place(&grip.roi, 1.0);
@@ -142,11 +148,11 @@ impl Clay {
         }
         let mut share = 1.0;
         for _ in 0..TRIES {
-            let mut verdict = self.judge_at(grip, share, longest);
+            let mut verdict = self.judge_at(grip, share, longest, guard);
             if verdict == Verdict::Rough {
                 self.place(&grip.roi, 0.0);
                 grip.roi.neighbourhood.roughen(&self.mesh, &self.tree, margin);
-                verdict = self.judge_at(grip, share, longest);
+                verdict = self.judge_at(grip, share, longest, guard);
             }
             if verdict == Verdict::Sound {
                 grip.roi.neighbourhood.accept(share * longest);
@@ -158,12 +164,12 @@ impl Clay {
         Fit::CutBack
     }
 
-    fn judge_at(&mut self, grip: &mut Grip, share: f64, longest: f64) -> Verdict {
+    fn judge_at(&mut self, grip: &mut Grip, share: f64, longest: f64, guard: &GuardParams) -> Verdict {
         self.place(&grip.roi, share);
-        let gap = self.guard.gap_share * self.mean_edge;
+        let gap = guard.gap_share * self.mean_edge;
         let (mesh, before, marks) = (&self.mesh, &self.before, &grip.roi.marks);
         let was = |v: VertexId| marks.of(v.0).map_or_else(|| mesh.position(v), |i| before[i as usize]);
-        grip.roi.neighbourhood.judge(mesh, &self.guard, &self.evidence, gap, share * longest, was)
+        grip.roi.neighbourhood.judge(mesh, guard, &self.evidence, gap, share * longest, was)
     }
 
     /// The displacement of each vertex of the region; returns the longest, m.

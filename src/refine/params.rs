@@ -82,8 +82,8 @@ pub struct RefineParams {
     pub carve: Option<CarveParams>,
     /// Size of the region that follows the handle.
     pub roi: RoiSize,
-    /// What an update may not do.
-    pub guard: GuardParams,
+    /// What an update may not do; `None`: anything \[paper\], which on a noisy scan ends in a blow-up.
+    pub guard: Option<GuardParams>,
     /// A face turned away from the felt normal by more than this cosine is another surface. Default 0.2: 78°.
     pub smallest_contact_cosine: f64,
     /// Longest step of a vertex in one update, in mean edges. Default 1/25, far below any feature the mesh can show.
@@ -146,7 +146,7 @@ impl RefineParams {
             turning: Some(TURNING),
             carve: Some(CarveParams::default()),
             roi: RoiSize::Radius(tip.radius),
-            guard: GuardParams::default(),
+            guard: Some(GuardParams::default()),
             smallest_contact_cosine: 0.2,
             longest_step_edges: 0.04,
             largest_move_edges: 2.6,
@@ -155,7 +155,7 @@ impl RefineParams {
         }
     }
 
-    /// The published rule, taken literally: Eq 1–7 and 12 with a one-ring region, no gate, no correction.
+    /// The published rule, taken literally: Eq 1–7 and 12 with a one-ring region, no gate, no correction, no guard.
     pub fn paper(tip: TipParams) -> Self {
         Self {
             gate: None,
@@ -169,6 +169,7 @@ impl RefineParams {
             },
             turning: None,
             carve: None,
+            guard: None,
             roi: RoiSize::OneRing,
             smallest_contact_cosine: -1.0,
             largest_move_edges: f64::MAX,
@@ -182,7 +183,7 @@ impl RefineParams {
         let carve = self.carve.unwrap_or_default();
         let sliding = self.sliding.unwrap_or_default();
         let roi = if let RoiSize::Radius(radius) = self.roi { radius } else { 0.0 };
-        let guard = &self.guard;
+        let guard = self.guard.unwrap_or_default();
         let cosines = [
             ("smallest contact cosine", self.smallest_contact_cosine),
             ("friction cone (cosine)", sliding.cone_cosine),

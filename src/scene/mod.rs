@@ -15,8 +15,8 @@ pub use error::SceneError;
 use error::yaml_error;
 use sections::named;
 pub use sections::{
-    AlongName, BiasSection, CarveSection, CompensationSection, ContactSection, Mode, ModelName, PayloadSection,
-    RefineSection, ScanSection, SlidingSection, StepName, SyncSection, TipSection,
+    AlongName, BiasSection, CarveSection, CompensationSection, ContactSection, GuardSection, Mode, ModelName,
+    PayloadSection, RefineSection, ScanSection, SlidingSection, StepName, SyncSection, TipSection,
 };
 
 /// The parts of a scene. `None`: not built.
@@ -44,6 +44,9 @@ pub struct Scene {
     /// Takes away what the ball passes through without a force.
     #[serde(default, deserialize_with = "named")]
     pub carve: Option<CarveSection>,
+    /// Keeps the mesh sound; without it an update may fold it.
+    #[serde(default, deserialize_with = "named")]
+    pub guard: Option<GuardSection>,
     /// Moves the mesh; without it nothing does.
     #[serde(default, deserialize_with = "named")]
     pub refine: Option<RefineSection>,
@@ -60,6 +63,7 @@ impl Default for Scene {
             scan: Some(ScanSection::default()),
             sliding: Some(SlidingSection::default()),
             carve: Some(CarveSection::default()),
+            guard: Some(GuardSection::default()),
             refine: Some(RefineSection::default()),
         }
     }
@@ -106,6 +110,7 @@ impl Scene {
         self.scan.iter().try_for_each(ScanSection::check)?;
         self.sliding.iter().try_for_each(SlidingSection::check)?;
         self.carve.iter().try_for_each(CarveSection::check)?;
+        self.guard.iter().try_for_each(GuardSection::check)?;
         self.refine.iter().try_for_each(RefineSection::check)?;
         let asks_for_spring =
             self.refine.as_ref().is_some_and(|refine| refine.contact_model == Some(ModelName::Spring));

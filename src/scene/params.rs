@@ -2,9 +2,10 @@
 
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
-use super::{AlongName, CarveSection, Mode, ModelName, RefineSection, Scene, SlidingSection, StepName};
+use super::{AlongName, CarveSection, GuardSection, Mode, ModelName, RefineSection, Scene, SlidingSection, StepName};
 use crate::refine::{
-    Along, CarveParams, ContactModel, RefineParams, RoiSize, SlidingParams, StepRule, TipParams, relaxing_alpha,
+    Along, CarveParams, ContactModel, GuardParams, RefineParams, RoiSize, SlidingParams, StepRule, TipParams,
+    relaxing_alpha,
 };
 use crate::touch::{CompensatorParams, ContactGateParams, Payload, SyncParams, Wrench, WrenchFrame};
 
@@ -71,6 +72,7 @@ impl Scene {
                 ..RefineParams::robust(self.tip_params())
             },
         };
+        params.guard = self.guard.as_ref().map(GuardSection::params);
         params.compensator = self.compensator_params(wrench_frame);
         params.scan_noise = self.scan.as_ref().map_or(0.0, |scan| scan.noise_mm / 1e3);
         section.override_mut(&mut params);
@@ -95,6 +97,18 @@ impl CarveSection {
             rate: self.rate_per_s,
             tolerance: self.tolerance_mm / 1e3,
             contact_tolerance: self.contact_tolerance_mm / 1e3,
+        }
+    }
+}
+
+impl GuardSection {
+    fn params(&self) -> GuardParams {
+        GuardParams {
+            smallest_quality: self.smallest_quality,
+            smallest_turn_cosine: self.smallest_turn_cosine,
+            smallest_evidence_cosine: self.smallest_evidence_cosine,
+            smallest_fold_cosine: self.smallest_fold_cosine,
+            gap_share: self.gap_edges,
         }
     }
 }

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Deserializer};
 
 use super::SceneError;
-use crate::refine::{CarveParams, ContactModel, DynamicsParams, SlidingParams};
+use crate::refine::{CarveParams, ContactModel, DynamicsParams, GuardParams, SlidingParams};
 use crate::touch::{ContactGateParams, SyncParams};
 
 /// `sync`
@@ -174,6 +174,35 @@ impl Default for CarveSection {
     }
 }
 
+/// `guard`
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct GuardSection {
+    /// Smallest twice area over longest edge squared.
+    pub smallest_quality: f64,
+    /// Smallest cosine between normals before and after one update.
+    pub smallest_turn_cosine: f64,
+    /// Smallest cosine between a normal and the last that was scanned or felt there.
+    pub smallest_evidence_cosine: f64,
+    /// Smallest cosine between neighbours.
+    pub smallest_fold_cosine: f64,
+    /// Faces nearer than this many mean edges count as touching.
+    pub gap_edges: f64,
+}
+
+impl Default for GuardSection {
+    fn default() -> Self {
+        let guard = GuardParams::default();
+        Self {
+            smallest_quality: guard.smallest_quality,
+            smallest_turn_cosine: guard.smallest_turn_cosine,
+            smallest_evidence_cosine: guard.smallest_evidence_cosine,
+            smallest_fold_cosine: guard.smallest_fold_cosine,
+            gap_edges: guard.gap_share,
+        }
+    }
+}
+
 /// Which rule moves the mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
@@ -329,6 +358,20 @@ impl SlidingSection {
         in_range("sliding.velocity_smoothing_ms", self.velocity_smoothing_ms, 0.0, 1e4, "0 to 10000 ms")?;
         in_range("sliding.slowest_mm_per_s", self.slowest_mm_per_s, 0.0, 1e6, "0 to 1e6 mm/s")?;
         in_range("sliding.cone_cosine", self.cone_cosine, 0.0, 1.0, "0 to 1")
+    }
+}
+
+impl GuardSection {
+    pub(super) fn check(&self) -> Result<(), SceneError> {
+        in_range("guard.smallest_quality", self.smallest_quality, 0.0, 0.87, "0 to 0.87")?;
+        for (key, value) in [
+            ("guard.smallest_turn_cosine", self.smallest_turn_cosine),
+            ("guard.smallest_evidence_cosine", self.smallest_evidence_cosine),
+            ("guard.smallest_fold_cosine", self.smallest_fold_cosine),
+        ] {
+            in_range(key, value, -1.0, 1.0, "-1 to 1")?;
+        }
+        in_range("guard.gap_edges", self.gap_edges, 0.0, 1.0, "0 to 1")
     }
 }
 

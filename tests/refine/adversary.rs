@@ -254,8 +254,8 @@ fn no_sample_makes_the_mesh_unsound_with_other_regions_and_rules() {
         RefineParams { roi: RoiSize::OneRing, ..RefineParams::robust(BALL) },
         RefineParams { roi: RoiSize::Radius(5e-3), ..RefineParams::robust(rigid) },
         RefineParams { carve: None, ..RefineParams::robust(BALL) },
-        RefineParams::paper(rigid),
-        RefineParams { largest_move_edges: 2.6, ..RefineParams::paper(BALL) },
+        RefineParams { guard: Some(GuardParams::default()), ..RefineParams::paper(rigid) },
+        RefineParams { largest_move_edges: 2.6, guard: Some(GuardParams::default()), ..RefineParams::paper(BALL) },
     ];
     for (i, params) in presets.into_iter().enumerate() {
         let (moved, cut_back) = torment(&stepped_block(), params, 100..104);

@@ -122,11 +122,13 @@ fn settings_without_a_meaning_are_refused() {
         ("contact cosine", |p, x| p.smallest_contact_cosine = 2.0 * x),
         ("alpha", |p, x| p.dynamics.alpha_m_per_n_s = x),
         ("beta", |p, x| p.dynamics.beta_per_n2_s = x),
-        ("quality", |p, x| p.guard = GuardParams { smallest_quality: x, ..p.guard }),
-        ("turn cosine", |p, x| p.guard = GuardParams { smallest_turn_cosine: 2.0 * x, ..p.guard }),
-        ("evidence cosine", |p, x| p.guard = GuardParams { smallest_evidence_cosine: 2.0 * x, ..p.guard }),
-        ("fold cosine", |p, x| p.guard = GuardParams { smallest_fold_cosine: 2.0 * x, ..p.guard }),
-        ("gap", |p, x| p.guard = GuardParams { gap_share: x, ..p.guard }),
+        ("quality", |p, x| p.guard = Some(GuardParams { smallest_quality: x, ..Default::default() })),
+        ("turn cosine", |p, x| p.guard = Some(GuardParams { smallest_turn_cosine: 2.0 * x, ..Default::default() })),
+        ("evidence cosine", |p, x| {
+            p.guard = Some(GuardParams { smallest_evidence_cosine: 2.0 * x, ..Default::default() })
+        }),
+        ("fold cosine", |p, x| p.guard = Some(GuardParams { smallest_fold_cosine: 2.0 * x, ..Default::default() })),
+        ("gap", |p, x| p.guard = Some(GuardParams { gap_share: x, ..Default::default() })),
     ];
     let mut taken = vec![];
     for (name, change) in changes {
