@@ -18,7 +18,7 @@ pub struct GuardParams {
     /// Smallest cosine between a face's normal and the last that was scanned or felt there. Default 0: a lid may become
     /// a wall, but not an overhang.
     pub smallest_evidence_cosine: f64,
-    /// Smallest cosine between neighbours. Default −0.75: 139° apart is a knife's edge, beyond it is a fold.
+    /// Smallest cosine between neighbours. Default −0.85: 148° apart is a knife's edge, beyond it is a fold.
     pub smallest_fold_cosine: f64,
     /// Faces nearer than this share of the mean edge count as touching. Default 0.01.
     pub gap_share: f64,
@@ -30,7 +30,7 @@ impl Default for GuardParams {
             smallest_quality: 0.15,
             smallest_turn_cosine: 0.5,
             smallest_evidence_cosine: 0.0,
-            smallest_fold_cosine: -0.75,
+            smallest_fold_cosine: -0.85,
             gap_share: 0.01,
         }
     }
