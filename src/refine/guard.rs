@@ -123,7 +123,10 @@ pub(super) struct Neighbourhood {
     /// how far vertices may still move before the region must be looked at again, m
     unseen: f64,
     near: Vec<FaceId>,
+    /// index in `faces`
     known: Marks,
+    /// corners that hang together with the region
+    reached: Marks,
 }
 
 /// Normal and proportions of a face.
@@ -152,7 +155,8 @@ impl Neighbourhood {
         self.edges.reserve(2 * faces);
         self.near.reserve(2 * faces);
         self.suspects.reserve(faces);
-        self.known.reserve(4 * faces);
+        self.known.reserve(faces);
+        self.reached.reserve(4 * faces);
     }
 
     /// Faces whose corners move with the region.
@@ -160,8 +164,8 @@ impl Neighbourhood {
         &self.faces[..self.moving]
     }
 
-    /// Collects the faces around `vertices`, which are those that `moves` knows.
-    pub fn rebuild(&mut self, mesh: &TriMesh, vertices: &[VertexId], moves: &Marks) {
+    /// Collects the faces around `vertices`.
+    pub fn rebuild(&mut self, mesh: &TriMesh, vertices: &[VertexId]) {
         self.faces.clear();
         self.edges.clear();
         self.known.clear();
@@ -176,28 +180,22 @@ impl Neighbourhood {
         for index in 0..self.moving {
             let corners = mesh.corners(self.faces[index]);
             for side in 0..3 {
-                self.link(mesh, index as u32, corners[side], corners[(side + 1) % 3], moves);
+                self.link(mesh, index as u32, corners[side], corners[(side + 1) % 3]);
             }
         }
     }
 
-    /// Notes the faces at one edge of the moving face `index`.
-    fn link(&mut self, mesh: &TriMesh, index: u32, a: VertexId, b: VertexId, moves: &Marks) {
-        let inside = moves.of(a.0).is_some() || moves.of(b.0).is_some();
-        for &face in mesh.star(if moves.of(a.0).is_some() { a } else { b }) {
-            let corners = mesh.corners(face);
-            if !(corners.contains(&a) && corners.contains(&b)) {
+    /// Notes the other faces at one edge of the moving face `index`.
+    fn link(&mut self, mesh: &TriMesh, index: u32, a: VertexId, b: VertexId) {
+        for &face in mesh.star(a) {
+            if face == self.faces[index as usize] || !mesh.corners(face).contains(&b) {
                 continue;
             }
-            let other = match self.known.of(face.0) {
-                Some(other) => other,
-                None => {
-                    debug_assert!(!inside, "all faces at a moving vertex are known");
-                    self.known.insert(face.0, self.faces.len() as u32);
-                    self.faces.push(face);
-                    self.faces.len() as u32 - 1
-                }
-            };
+            let next = self.faces.len() as u32;
+            let other = self.known.insert(face.0, next).unwrap_or_else(|| {
+                self.faces.push(face);
+                next
+            });
             // pairs of moving faces are met from both sides
             if other > index {
                 self.edges.push((index, other));
@@ -250,55 +248,36 @@ impl Neighbourhood {
         if self.before.iter().any(|shape| shape.normal.dot(&mean) <= SMOOTH_COSINE) {
             return None;
         }
-        self.known.clear();
-        for &face in &self.faces {
-            self.known.insert(FACE | u64::from(face.0), 0);
-            for vertex in mesh.corners(face) {
-                self.known.insert(vertex.0, 0);
-            }
-        }
         let known = &self.known;
-        self.near.retain(|face| known.of(FACE | u64::from(face.0)).is_none());
+        self.near.retain(|face| known.of(face.0).is_none());
         let within = |face: &FaceId| {
             let double = mesh.double_area_normal(*face);
             double.dot(&mean) > SMOOTH_COSINE * double.norm()
         };
-        (self.near.iter().all(within) && self.hangs_together(mesh)).then_some(mean)
-    }
-
-    /// Whether the faces nearby reach the known vertices, over common corners among themselves; empties `near` by that.
-    fn hangs_together(&mut self, mesh: &TriMesh) -> bool {
-        loop {
-            let (known, before) = (&mut self.known, self.near.len());
-            self.near.retain(|&face| {
-                let corners = mesh.corners(face);
-                let reached = corners.iter().any(|corner| known.of(corner.0).is_some());
-                if reached {
-                    for corner in corners {
-                        known.insert(corner.0, 0);
-                    }
-                }
-                !reached
-            });
-            if self.near.is_empty() {
-                return true;
+        if !self.near.iter().all(within) {
+            return None;
+        }
+        // nearly always the rim's other corners reach all; at a border some are reached from the moving faces
+        self.reached.clear();
+        let (moving, rim) = self.faces.split_at(self.moving);
+        for faces in [rim, moving] {
+            for corner in faces.iter().flat_map(|&face| mesh.corners(face)) {
+                self.reached.insert(corner.0, 0);
             }
-            if self.near.len() == before {
-                return false;
+            if reach_all(mesh, &mut self.near, &mut self.reached) {
+                return Some(mean);
             }
         }
+        None
     }
 
     fn collect_suspects(&mut self, mesh: &TriMesh, margin: f64) {
         self.suspects.clear();
-        self.known.clear();
-        for (index, &face) in self.faces[..self.moving].iter().enumerate() {
-            self.known.insert(face.0, index as u32);
-        }
         for moving in 0..self.moving {
             for &other in &self.near {
                 // two moving faces are one pair
-                if self.known.of(other.0).is_none_or(|index| index as usize > moving) {
+                let index = self.known.of(other.0).map(|index| index as usize);
+                if index.is_none_or(|index| index > moving) {
                     self.suspects.add(mesh, self.faces[moving], other, margin);
                 }
             }
@@ -405,5 +384,22 @@ impl Neighbourhood {
     }
 }
 
-/// Keys of faces beside those of vertices.
-const FACE: u64 = 1 << 32;
+/// Whether `faces` reach the corners already `reached`, over common corners among themselves; takes out those that do.
+fn reach_all(mesh: &TriMesh, faces: &mut Vec<FaceId>, reached: &mut Marks) -> bool {
+    loop {
+        let before = faces.len();
+        faces.retain(|&face| {
+            let corners = mesh.corners(face);
+            let is_reached = corners.iter().any(|corner| reached.of(corner.0).is_some());
+            if is_reached {
+                for corner in corners {
+                    reached.insert(corner.0, 0);
+                }
+            }
+            !is_reached
+        });
+        if faces.is_empty() || faces.len() == before {
+            return faces.is_empty();
+        }
+    }
+}

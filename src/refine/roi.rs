@@ -26,8 +26,8 @@ pub enum RoiSize {
 const LARGEST_ROOM: f64 = 1e4;
 /// Neighbours of a vertex; six in a regular mesh.
 const LINKS_PER_VERTEX: usize = 8;
-/// The weights are solved until the residual is below this share of the start.
-const SOLVED: f64 = 1e-9;
+/// Entries of a row of the skyline; twelve in a ring around a face, some thirty for a few hundred vertices.
+const ROW_ENTRIES: usize = 32;
 
 /// One handle and what moves with it.
 #[derive(Clone, Debug, Default)]
@@ -90,7 +90,7 @@ impl Roi {
         }
         self.spread(mesh, mesh.barycentre(handle), size);
         self.solver.solve(mesh, &self.vertices, &self.marks, &mut self.weights);
-        self.neighbourhood.rebuild(mesh, &self.vertices, &self.marks);
+        self.neighbourhood.rebuild(mesh, &self.vertices);
     }
 
     fn add(&mut self, vertex: VertexId) {
@@ -121,118 +121,161 @@ impl Roi {
     }
 }
 
-/// Solves the Laplace equation on the free vertices by conjugate gradients; its arrays are kept.
+/// Solves the Laplace equation on the free vertices by L D Lᵀ in skyline storage; its arrays are kept.
+///
+/// Vertices come ring by ring, so that the neighbours of one are not far from it in the order and the skyline is low.
 #[derive(Clone, Debug, Default)]
 struct Solver {
-    /// neighbours of free vertex i: `links[starts[i]..starts[i + 1]]`, by index in `vertices`; the rim is left out
-    starts: Vec<u32>,
+    /// row i of the matrix is `rows[starts[i]..starts[i + 1]]`: from its first entry to the diagonal
+    rows: Vec<f64>,
+    starts: Vec<usize>,
+    /// neighbours of one vertex, and their indices in `vertices` where they move
+    around: Vec<VertexId>,
     links: Vec<u32>,
-    /// neighbours of one vertex on the rim
-    rim: Vec<VertexId>,
-    /// number of all neighbours, the rim's too
-    degrees: Vec<f64>,
-    residual: Vec<[f64; 3]>,
-    direction: Vec<[f64; 3]>,
-    product: Vec<[f64; 3]>,
 }
 
 impl Solver {
     fn reserve(&mut self, vertices: usize) {
-        self.starts.reserve(vertices);
-        self.links.reserve(LINKS_PER_VERTEX * vertices);
-        self.rim.reserve(4 * LINKS_PER_VERTEX);
-        self.degrees.reserve(vertices);
-        for list in [&mut self.residual, &mut self.direction, &mut self.product] {
-            list.reserve(vertices);
-        }
+        self.rows.reserve(ROW_ENTRIES * vertices);
+        self.starts.reserve(vertices + 1);
+        self.around.reserve(4 * LINKS_PER_VERTEX);
+        self.links.reserve(4 * LINKS_PER_VERTEX);
     }
 
     fn solve(&mut self, mesh: &TriMesh, vertices: &[VertexId], marks: &Marks, weights: &mut Vec<[f64; 3]>) {
         weights.clear();
         weights.extend([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
         weights.resize(vertices.len(), [0.0; 3]);
-        if vertices.len() > 3 {
-            self.link(mesh, vertices, marks);
-            self.conjugate_gradients(&mut weights[..]);
-        }
+        let (_, free) = weights.split_at_mut(3);
+        self.assemble(mesh, &vertices[3..], marks, free);
+        self.factorise();
+        self.substitute(free);
     }
 
-    fn link(&mut self, mesh: &TriMesh, vertices: &[VertexId], marks: &Marks) {
+    /// degree · w − Σ w of the neighbours = 0: the handle's neighbours go to the right side, the rim's are zero.
+    fn assemble(&mut self, mesh: &TriMesh, free: &[VertexId], marks: &Marks, right: &mut [[f64; 3]]) {
+        self.rows.clear();
         self.starts.clear();
+        for (row, &vertex) in free.iter().enumerate() {
+            self.find_links(mesh, vertex, marks);
+            let earlier = self.links.iter().map(|&link| link as usize).filter(|&link| link >= 3);
+            let first = earlier.map(|link| link - 3).min().unwrap_or(row).min(row);
+            let start = self.rows.len();
+            self.starts.push(start);
+            self.rows.resize(start + row - first + 1, 0.0);
+            for &link in &self.links {
+                match (link as usize).checked_sub(3) {
+                    None => right[row][link as usize] += 1.0,
+                    Some(column) if column < row => self.rows[start + column - first] = -1.0,
+                    Some(_) => {}
+                }
+            }
+            if let Some(diagonal) = self.rows.last_mut() {
+                *diagonal = self.around.len() as f64;
+            }
+        }
+        self.starts.push(self.rows.len());
+    }
+
+    fn find_links(&mut self, mesh: &TriMesh, vertex: VertexId, marks: &Marks) {
+        self.around.clear();
         self.links.clear();
-        self.degrees.clear();
-        for &vertex in &vertices[3..] {
-            let start = self.links.len();
-            self.starts.push(start as u32);
-            self.rim.clear();
-            for &face in mesh.star(vertex) {
-                for other in mesh.corners(face) {
-                    match marks.of(other.0) {
-                        _ if other == vertex => {}
-                        Some(index) if self.links[start..].contains(&index) => {}
-                        Some(index) => self.links.push(index),
-                        None if self.rim.contains(&other) => {}
-                        None => self.rim.push(other),
-                    }
+        for other in mesh.star(vertex).iter().flat_map(|&face| mesh.corners(face)) {
+            if other != vertex && !self.around.contains(&other) {
+                self.around.push(other);
+                self.links.extend(marks.of(other.0));
+            }
+        }
+    }
+
+    /// First column of a row.
+    fn first(&self, row: usize) -> usize {
+        row + 1 - (self.starts[row + 1] - self.starts[row])
+    }
+
+    /// Puts L below the diagonal and D on it. The matrix is positive definite: every free vertex hangs on the handle.
+    fn factorise(&mut self) {
+        for row in 0..self.starts.len() - 1 {
+            let (first, start) = (self.first(row), self.starts[row]);
+            for column in first..row {
+                let (above_first, above) = (self.first(column), self.starts[column]);
+                let from = first.max(above_first);
+                let done = &self.rows[start + from - first..start + column - first];
+                let other = &self.rows[above + from - above_first..above + column - above_first];
+                let sum: f64 = done.iter().zip(other).map(|(x, y)| x * y).sum();
+                self.rows[start + column - first] -= sum;
+            }
+            // the row holds L D so far
+            let mut diagonal = self.rows[start + row - first];
+            for column in first..row {
+                let scaled = self.rows[start + column - first];
+                let factor = scaled / self.rows[self.starts[column + 1] - 1];
+                diagonal -= scaled * factor;
+                self.rows[start + column - first] = factor;
+            }
+            self.rows[start + row - first] = diagonal;
+        }
+    }
+
+    fn substitute(&self, x: &mut [[f64; 3]]) {
+        let rows = self.starts.len() - 1;
+        let below = |row: usize| (self.first(row), &self.rows[self.starts[row]..self.starts[row + 1] - 1]);
+        for row in 0..rows {
+            let (first, factors) = below(row);
+            for (column, factor) in (first..).zip(factors) {
+                for i in 0..3 {
+                    x[row][i] -= factor * x[column][i];
                 }
             }
-            self.degrees.push((self.links.len() - start + self.rim.len()) as f64);
         }
-        self.starts.push(self.links.len() as u32);
-    }
-
-    /// L w for the free vertices, with `w` of the handle first: degree · w − Σ w of the neighbours.
-    fn laplacian(&self, free: usize, w: &[[f64; 3]]) -> [f64; 3] {
-        let mut sum = w[free + 3].map(|x| x * self.degrees[free]);
-        for &link in &self.links[self.starts[free] as usize..self.starts[free + 1] as usize] {
-            for axis in 0..3 {
-                sum[axis] -= w[link as usize][axis];
+        for row in (0..rows).rev() {
+            // rows after this one have taken their share already: divide, then hand on
+            let diagonal = self.rows[self.starts[row + 1] - 1];
+            x[row] = x[row].map(|value| value / diagonal);
+        }
+        for row in (0..rows).rev() {
+            let (first, factors) = below(row);
+            for (column, factor) in (first..).zip(factors) {
+                for i in 0..3 {
+                    x[column][i] -= factor * x[row][i];
+                }
             }
         }
-        sum
     }
+}
 
-    fn conjugate_gradients(&mut self, weights: &mut [[f64; 3]]) {
-        let count = self.degrees.len();
-        let zero = [[0.0; 3]; 3];
-        self.residual.clear();
-        self.direction.clear();
-        self.direction.extend(zero);
-        for free in 0..count {
-            let residual = self.laplacian(free, weights).map(|x| -x);
-            self.residual.push(residual);
-            self.direction.push(residual);
-        }
-        self.product.resize(count, [0.0; 3]);
-        let dot = |a: &[[f64; 3]], b: &[[f64; 3]]| -> [f64; 3] {
-            a.iter().zip(b).fold([0.0; 3], |sum, (x, y)| std::array::from_fn(|i| sum[i] + x[i] * y[i]))
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A fan around vertex 0 with the handle 0–1–2 and a second ring, of which 3–8 and 12 are free.
+    #[test]
+    fn weights_solve_the_laplace_equation() {
+        let ring = |k: u32, radius: f64| {
+            let turn = std::f64::consts::TAU * f64::from(k) / 6.0;
+            Point3::new(radius * turn.cos(), radius * turn.sin(), 0.0)
         };
-        let mut size = dot(&self.residual, &self.residual);
-        let enough = size.map(|x| x * SOLVED * SOLVED);
-        // in exact arithmetic it ends after `count` rounds
-        for _ in 0..count {
-            if (0..3).all(|i| size[i] <= enough[i]) {
-                break;
+        let mut positions = vec![Point3::origin()];
+        positions.extend((0..6).map(|k| ring(k, 1.0)).chain((0..6).map(|k| ring(k, 2.0))));
+        let mut faces = Vec::new();
+        for k in 0..6 {
+            let (a, b, c, d) = (1 + k, 1 + (k + 1) % 6, 7 + k, 7 + (k + 1) % 6);
+            faces.extend([[0, a, b], [a, c, b], [b, c, d]]);
+        }
+        let mesh = TriMesh::new(positions, faces).unwrap();
+        let mut roi = Roi::with_room(16);
+        roi.rebuild(&mesh, FaceId(0), RoiSize::OneRing);
+        assert_eq!(roi.vertices.len(), 10, "the handle, four more of the inner ring, three of the outer");
+        for (vertex, weights) in roi.vertices.iter().zip(&roi.weights).skip(3) {
+            let mut around: Vec<_> = mesh.star(*vertex).iter().flat_map(|&face| mesh.corners(face)).collect();
+            around.sort_unstable();
+            around.dedup();
+            around.retain(|other| other != vertex);
+            let of = |v: &VertexId| roi.vertices.iter().position(|w| w == v).map_or([0.0; 3], |i| roi.weights[i]);
+            for i in 0..3 {
+                let mean = around.iter().map(|v| of(v)[i]).sum::<f64>() / around.len() as f64;
+                assert!((weights[i] - mean).abs() < 1e-15);
             }
-            for free in 0..count {
-                self.product[free] = self.laplacian(free, &self.direction);
-            }
-            let curvature = dot(&self.direction[3..], &self.product);
-            let step: [f64; 3] = std::array::from_fn(|i| if curvature[i] > 0.0 { size[i] / curvature[i] } else { 0.0 });
-            for free in 0..count {
-                for i in 0..3 {
-                    weights[free + 3][i] += step[i] * self.direction[free + 3][i];
-                    self.residual[free][i] -= step[i] * self.product[free][i];
-                }
-            }
-            let next = dot(&self.residual, &self.residual);
-            for free in 0..count {
-                for i in 0..3 {
-                    let turn = if size[i] > 0.0 { next[i] / size[i] } else { 0.0 };
-                    self.direction[free + 3][i] = self.residual[free][i] + turn * self.direction[free + 3][i];
-                }
-            }
-            size = next;
         }
     }
 }
