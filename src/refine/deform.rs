@@ -137,7 +137,7 @@ impl Clay {
     fn place_soundly(&mut self, grip: &mut Grip, longest: f64, guard: &GuardParams) -> Fit {
         let margin = MARGIN_EDGES * self.mean_edge;
         if grip.seen != Some(self.edits) {
-            grip.roi.neighbourhood.refresh(&self.mesh, &self.tree, margin);
+            grip.roi.neighbourhood.refresh(&self.mesh, &self.tree, margin, guard, &self.evidence);
         } else if grip.roi.neighbourhood.is_outdated(longest) {
             grip.roi.neighbourhood.collect(&self.mesh, &self.tree, margin);
         }

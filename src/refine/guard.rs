@@ -203,12 +203,25 @@ impl Neighbourhood {
         }
     }
 
-    /// Looks at the region anew after the mesh was changed elsewhere.
-    pub fn refresh(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64) {
+    /// Looks at the region anew after the mesh was changed elsewhere; arguments as in [`Self::judge`].
+    pub fn refresh(
+        &mut self,
+        mesh: &TriMesh,
+        tree: &FaceTree,
+        margin: f64,
+        params: &GuardParams,
+        evidence: &[[f32; 3]],
+    ) {
         self.before.clear();
         self.before.extend(self.faces.iter().map(|&face| shape_of(mesh, face)));
-        self.unseen = 0.0;
         self.collect(mesh, tree, margin);
+        self.unseen = 0.0;
+        if let Some(mean) = self.smooth {
+            self.after.clear();
+            self.after.extend_from_slice(&self.before[..self.moving]);
+            let lowest = self.after.iter().map(|shape| shape.normal.dot(&mean)).fold(1.0, f64::min);
+            self.allow_unseen(self.look(params, evidence), lowest);
+        }
     }
 
     /// Looks for faces that could be met within `margin` (m) of motion.
@@ -312,11 +325,10 @@ impl Neighbourhood {
         way: f64,
         before: impl Fn(VertexId) -> Point3<f64>,
     ) -> Verdict {
+        self.after.clear();
+        self.after.extend(self.faces[..self.moving].iter().map(|&face| shape_of(mesh, face)));
+        let look = self.look(params, evidence);
         self.unseen = 0.0;
-        let mut look = self.look_at_faces(mesh, params, evidence);
-        if look != Look::Broken {
-            look = look.and(self.look_at_edges(params));
-        }
         if look == Look::Broken {
             return Verdict::Broken;
         }
@@ -327,18 +339,28 @@ impl Neighbourhood {
         if lowest <= STILL_SMOOTH_COSINE {
             return Verdict::Rough;
         }
-        if look == Look::Safe && lowest > STILL_SMOOTH_COSINE + COSINE_MARGIN {
-            let altitude = self.after.iter().map(|shape| shape.altitude).fold(f64::INFINITY, f64::min);
-            self.unseen = UNSEEN_SHARE * altitude;
-        }
+        self.allow_unseen(look, lowest);
         Verdict::Sound
     }
 
-    fn look_at_faces(&mut self, mesh: &TriMesh, params: &GuardParams, evidence: &[[f32; 3]]) -> Look {
-        self.after.clear();
+    /// How far vertices may move without a look, after one at a smooth region.
+    fn allow_unseen(&mut self, look: Look, lowest_cosine: f64) {
+        if look == Look::Safe && lowest_cosine > STILL_SMOOTH_COSINE + COSINE_MARGIN {
+            let altitude = self.after.iter().map(|shape| shape.altitude).fold(f64::INFINITY, f64::min);
+            self.unseen = UNSEEN_SHARE * altitude;
+        }
+    }
+
+    fn look(&self, params: &GuardParams, evidence: &[[f32; 3]]) -> Look {
+        match self.look_at_faces(params, evidence) {
+            Look::Broken => Look::Broken,
+            look => look.and(self.look_at_edges(params)),
+        }
+    }
+
+    fn look_at_faces(&self, params: &GuardParams, evidence: &[[f32; 3]]) -> Look {
         let mut look = Look::Safe;
-        for (&face, old) in self.faces[..self.moving].iter().zip(&self.before) {
-            let new = shape_of(mesh, face);
+        for ((&face, old), new) in self.faces.iter().zip(&self.before).zip(&self.after) {
             let seen = Vector3::from(evidence[face.0 as usize].map(f64::from));
             let worse = |new: f64, old: f64, limit: f64| new < limit && new < old;
             let cosine = new.normal.dot(&seen);
@@ -351,7 +373,6 @@ impl Neighbourhood {
             if look == Look::Broken {
                 break;
             }
-            self.after.push(new);
         }
         look
     }

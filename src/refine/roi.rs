@@ -223,25 +223,26 @@ impl Solver {
         for row in 0..rows {
             let (first, factors) = below(row);
             for (column, factor) in (first..).zip(factors) {
-                for i in 0..3 {
-                    x[row][i] -= factor * x[column][i];
-                }
+                x[row] = less(&x[row], *factor, &x[column]);
             }
         }
-        for row in (0..rows).rev() {
-            // rows after this one have taken their share already: divide, then hand on
+        for (row, value) in x.iter_mut().enumerate() {
             let diagonal = self.rows[self.starts[row + 1] - 1];
-            x[row] = x[row].map(|value| value / diagonal);
+            *value = value.map(|value| value / diagonal);
         }
         for row in (0..rows).rev() {
             let (first, factors) = below(row);
             for (column, factor) in (first..).zip(factors) {
-                for i in 0..3 {
-                    x[column][i] -= factor * x[row][i];
-                }
+                x[column] = less(&x[column], *factor, &x[row]);
             }
         }
     }
+}
+
+/// x − factor · y.
+#[inline]
+fn less(x: &[f64; 3], factor: f64, y: &[f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|i| x[i] - factor * y[i])
 }
 
 #[cfg(test)]
@@ -272,9 +273,9 @@ mod tests {
             around.dedup();
             around.retain(|other| other != vertex);
             let of = |v: &VertexId| roi.vertices.iter().position(|w| w == v).map_or([0.0; 3], |i| roi.weights[i]);
-            for i in 0..3 {
+            for (i, weight) in weights.iter().enumerate() {
                 let mean = around.iter().map(|v| of(v)[i]).sum::<f64>() / around.len() as f64;
-                assert!((weights[i] - mean).abs() < 1e-15);
+                assert!((weight - mean).abs() < 1e-15);
             }
         }
     }
