@@ -72,21 +72,20 @@ impl Field {
 
     /// Closes what is narrower than 2 `radius` (m) across z: in every layer a disc takes the smallest, then the largest.
     ///
-    /// A flat disc fills holes level with what surrounds them and leaves straight walls where they are.
+    /// A flat disc fills holes level with what surrounds them and leaves straight walls where they are. Costs as many
+    /// steps for each node as the disc has rows.
     pub(super) fn close_mut(&mut self, radius: f64) {
-        let reach = (radius / self.pitch).floor() as isize;
-        if reach == 0 {
-            return;
-        }
-        let half_width = |dy: isize| ((radius / self.pitch).powi(2) - (dy * dy) as f64).max(0.0).sqrt() as usize;
-        let rows: Vec<_> = (-reach..=reach).map(|dy| (dy, half_width(dy))).collect();
+        let disc = Disc::new(radius / self.pitch, self.nodes);
         let [width, height, _] = self.nodes;
         for layer in self.values.chunks_mut(width * height) {
             if layer.iter().all(|v| *v == layer[0]) {
                 continue;
             }
-            disc_filter(layer, width, &rows, f64::min);
-            disc_filter(layer, width, &rows, f64::max);
+            // the largest is the smallest of the opposite; twice turned round, the sign is back
+            for _ in 0..2 {
+                disc.take_smallest_mut(layer);
+                layer.iter_mut().for_each(|v| *v = -*v);
+            }
         }
     }
 
@@ -141,18 +140,113 @@ pub(super) fn cells([nx, ny, nz]: [usize; 3]) -> impl Iterator<Item = [usize; 3]
     (0..nz).flat_map(move |k| (0..ny).flat_map(move |j| (0..nx).map(move |i| [i, j, k])))
 }
 
-/// `pick` over a disc around every node of one layer; `rows`: offset along y and half width along x of its rows.
-fn disc_filter(layer: &mut [f64], width: usize, rows: &[(isize, usize)], pick: fn(f64, f64) -> f64) {
-    let height = (layer.len() / width) as isize;
-    let old = layer.to_vec();
-    for (y, line) in layer.chunks_mut(width).enumerate() {
-        for &(dy, half) in rows {
-            let from = (y as isize + dy).clamp(0, height - 1) as usize * width;
-            let source = &old[from..from + width];
-            for (x, value) in line.iter_mut().enumerate() {
-                let window = &source[x.saturating_sub(half)..(x + half + 1).min(width)];
-                *value = window.iter().copied().fold(*value, pick);
+/// The nodes of a layer around one of them, row by row.
+struct Disc {
+    /// half the width of a row, by its distance along y
+    halves: Vec<usize>,
+    /// nodes in a row of the layer
+    width: usize,
+}
+
+impl Disc {
+    /// `radius` in nodes; what reaches beyond the layer takes part in nothing and is left out.
+    fn new(radius: f64, [width, height, _]: [usize; 3]) -> Self {
+        let reach = (radius.floor() as usize).min(height - 1);
+        let half = |dy: usize| ((radius.powi(2) - (dy * dy) as f64).max(0.0).sqrt() as usize).min(width - 1);
+        Self { halves: (0..=reach).map(half).collect(), width }
+    }
+
+    /// Every node takes the smallest value of the disc around it.
+    fn take_smallest_mut(&self, layer: &mut [f64]) {
+        let (width, height) = (self.width, layer.len() / self.width);
+        let old = layer.to_vec();
+        let mut runs = Runs::new(self.halves[0], width);
+        let mut smallest = vec![0.0; width];
+        for (y, row) in old.chunks(width).enumerate() {
+            runs.of_row_mut(row);
+            for (dy, &half) in self.halves.iter().enumerate() {
+                runs.smallest_into(half, &mut smallest);
+                let rows = [y.checked_sub(dy), Some(y + dy)];
+                for to in rows.into_iter().flatten().filter(|&to| to < height) {
+                    take_smaller_mut(&mut layer[to * width..][..width], &smallest);
+                }
             }
+        }
+    }
+}
+
+/// Smallest values of all runs of 1, 2, 4, … nodes of one row: two of them that overlap make up any window.
+struct Runs {
+    /// by the power of two; the row has `margin` infinite values at both ends
+    levels: Vec<Vec<f64>>,
+    margin: usize,
+}
+
+impl Runs {
+    /// For windows of up to `half` nodes on both sides.
+    fn new(half: usize, width: usize) -> Self {
+        let count = (2 * half + 1).ilog2() as usize + 1;
+        Self { levels: vec![vec![f64::INFINITY; width + 2 * half]; count], margin: half }
+    }
+
+    fn of_row_mut(&mut self, row: &[f64]) {
+        self.levels[0][self.margin..][..row.len()].copy_from_slice(row);
+        for power in 1..self.levels.len() {
+            let (finer, coarser) = self.levels.split_at_mut(power);
+            let (from, to) = (&finer[power - 1], &mut coarser[0]);
+            to.copy_from_slice(from);
+            take_smaller_mut(to, &from[1 << (power - 1)..]);
+        }
+    }
+
+    /// The smallest value of up to `half` nodes on both sides of each.
+    fn smallest_into(&self, half: usize, smallest: &mut [f64]) {
+        let length = 2 * half + 1;
+        let power = length.ilog2() as usize;
+        let runs = &self.levels[power][self.margin - half..];
+        smallest.copy_from_slice(&runs[..smallest.len()]);
+        take_smaller_mut(smallest, &runs[length - (1 << power)..]);
+    }
+}
+
+/// Each value becomes the smaller of itself and its partner, as far as both go.
+fn take_smaller_mut(values: &mut [f64], others: &[f64]) {
+    for (value, &other) in values.iter_mut().zip(others) {
+        *value = if other < *value { other } else { *value };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Closing by its definition: the smallest, then the largest over all nodes of the layer within the radius.
+    fn closed(field: &Field, radius: f64) -> Vec<f64> {
+        let over_disc = |values: &[f64], worst: f64, pick: fn(f64, f64) -> f64| -> Vec<f64> {
+            let near = |[i, j, k]: [usize; 3], [a, b, c]: [usize; 3]| {
+                let far = (a.abs_diff(i).pow(2) + b.abs_diff(j).pow(2)) as f64;
+                c == k && far <= (radius / field.pitch).powi(2)
+            };
+            let around = |node| {
+                let disc = cells(field.nodes).filter(move |&other| near(node, other));
+                disc.map(|other| values[field.index(other)]).fold(worst, pick)
+            };
+            cells(field.nodes).map(around).collect()
+        };
+        let smallest = over_disc(&field.values, f64::INFINITY, f64::min);
+        over_disc(&smallest, f64::NEG_INFINITY, f64::max)
+    }
+
+    #[test]
+    fn closing_is_the_largest_of_the_smallest_over_a_disc() {
+        let nodes = [13, 9, 3];
+        // no pattern: the fractional parts of multiples of the golden ratio
+        let values = (0..nodes.iter().product()).map(|i: usize| (i as f64 * 0.618_033_988_749_895).fract() - 0.5);
+        let field = Field { nodes, origin: Point3::origin(), pitch: 0.5, values: values.collect() };
+        for radius in [0.0, 0.4, 0.5, 0.75, 1.2, 1.5, 2.3, 4.0, 6.4, 50.0, 1e300] {
+            let mut found = field.clone();
+            found.close_mut(radius);
+            assert_eq!(found.values, closed(&field, radius), "radius {radius}");
         }
     }
 }
