@@ -91,7 +91,8 @@ impl CliError {
     fn exit_code(&self) -> u8 {
         match self {
             Self::WriteMesh(_) | Self::WriteRecording(_) | Self::Write { .. } | Self::Stream(_) => 1,
-            Self::Usage(_) | Self::Simulate(SimError::BadParameter { .. } | SimError::TooFine { .. }) => 2,
+            Self::Usage(_) => 2,
+            Self::Simulate(SimError::BadParameter { .. } | SimError::TooFine { .. } | SimError::TooCoarse { .. }) => 2,
             // settings come from a scene file: its flags are checked before
             Self::Scene(_) | Self::ReadMesh(_) | Self::ReadRecording(_) | Self::Simulate(_) => 3,
             Self::Mesh(_) | Self::Setting(_) | Self::Refine(_) => 3,

@@ -2,7 +2,7 @@
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SimError {
     /// A parameter outside its range.
-    #[error("{name} is {value} {unit}, but must be {allowed}")]
+    #[error("{name} is {value:?} {unit}, but must be {allowed}")]
     BadParameter {
         /// which one
         name: &'static str,
@@ -25,14 +25,28 @@ pub enum SimError {
     #[error("the path has no point: give at least one stroke with two points")]
     EmptyPath,
     /// The scan would be larger than is sensible.
-    #[error("the part is {size_m} m long: at edges of {edge_m} m that is more than {limit} cells; use longer edges")]
+    #[error(
+        "the part is {size_m:.3e} m long, with {margin_m:.3e} m around it for noise, bias and rounding: at edges of \
+         {edge_m:.3e} m that is more than {limit} cells; use {}",
+        if margin_m > size_m { "less of these three" } else { "longer edges" }
+    )]
     TooFine {
-        /// longest side, m
+        /// longest side of the part, m
         size_m: f64,
+        /// added on every side, m
+        margin_m: f64,
         /// m
         edge_m: f64,
         /// cells at most
         limit: usize,
+    },
+    /// The scan's triangles are so large that none is left.
+    #[error("edges of {edge_m:?} m leave nothing of a part that is {size_m:.3e} m long: use shorter ones")]
+    TooCoarse {
+        /// longest side of the part, m
+        size_m: f64,
+        /// m
+        edge_m: f64,
     },
     /// No surface was found in the part's bounds, or none that can be seen.
     #[error("the scanner sees nothing of the part: check the view direction and the size of the holes it closes")]
@@ -56,4 +70,18 @@ pub(super) fn not_negative(name: &'static str, value: f64, unit: &'static str) -
         return Ok(());
     }
     Err(SimError::BadParameter { name, value, unit, allowed: "zero or more" })
+}
+
+/// Refuses values that are not finite, below zero or beyond `largest`, which `allowed` names.
+pub(super) fn up_to(
+    name: &'static str,
+    value: f64,
+    unit: &'static str,
+    largest: f64,
+    allowed: &'static str,
+) -> Result<(), SimError> {
+    if (0.0..=largest).contains(&value) {
+        return Ok(());
+    }
+    Err(SimError::BadParameter { name, value, unit, allowed })
 }

@@ -52,22 +52,19 @@ impl Field {
         (k * self.nodes[1] + j) * self.nodes[0] + i
     }
 
-    /// Value at a node.
-    pub(super) fn value(&self, node: [usize; 3]) -> f64 {
-        self.values[self.index(node)]
-    }
-
     /// Position of a node, m, in V.
     pub(super) fn node(&self, node: [usize; 3]) -> Point3<f64> {
         self.origin + Vector3::from(node.map(|i| i as f64)) * self.pitch
     }
 
-    /// Applies `f(position in V, value)` to every node.
-    pub(super) fn map_mut(&mut self, f: impl Fn(&Point3<f64>, f64) -> f64) {
-        for node in cells(self.nodes) {
-            let at = self.index(node);
-            self.values[at] = f(&self.node(node), self.values[at]);
-        }
+    /// The values in runs of at most `length` nodes along x, each with the position of its first node, m, in V.
+    pub(super) fn runs_mut(&mut self, length: usize) -> impl Iterator<Item = (Point3<f64>, &mut [f64])> {
+        let ([width, height, _], origin, pitch) = (self.nodes, self.origin, self.pitch);
+        self.values.chunks_mut(width).enumerate().flat_map(move |(line, row)| {
+            let first = move |run: usize| [run * length, line % height, line / height];
+            let place = move |run: usize| origin + Vector3::from(first(run).map(|i| i as f64)) * pitch;
+            row.chunks_mut(length).enumerate().map(move |(run, values)| (place(run), values))
+        })
     }
 
     /// Closes what is narrower than 2 `radius` (m) across z: in every layer a disc takes the smallest, then the largest.

@@ -12,7 +12,7 @@ use rand_pcg::Pcg64;
 
 use super::contour::{Soup, contour};
 use super::error::{SimError, not_negative, positive};
-use super::field::{Field, cells};
+use super::field::Field;
 use super::path::looking_along;
 use super::surface::Surface;
 use super::wander::gauss;
@@ -75,6 +75,10 @@ const MAX_NODES: usize = 36_000_000;
 const CELL_PER_EDGE: f64 = 1.065;
 /// Waves that make up the noise: with a hundred its distribution is Gaussian to the eye.
 const WAVES: usize = 96;
+/// Nodes along x for which the waves are summed at once.
+const RUN: usize = 64;
+/// Where the edges are longer than this share of the part, a scan without a face comes of them.
+const COARSE: f64 = 0.1;
 /// Faces that look away from the scanner by more than this (cosine of the angle to the view) are not seen. Walls that
 /// stand along the view are: the scanner is moved about.
 const SEEN: f64 = -0.35;
@@ -109,7 +113,8 @@ impl ScannerParams {
 /// Scans a surface as badly as asked; same parameters, same mesh.
 ///
 /// # Errors
-/// [`SimError::BadParameter`]; [`SimError::TooFine`] when the grid would not fit; [`SimError::NothingSeen`].
+/// [`SimError::BadParameter`]; [`SimError::TooFine`] when the grid would not fit; [`SimError::TooCoarse`] and
+/// [`SimError::NothingSeen`] when no face is left.
 pub fn scan(surface: &dyn Surface, params: &ScannerParams) -> Result<TriMesh, SimError> {
     params.check()?;
     let mut rng = Pcg64::seed_from_u64(params.seed);
@@ -132,11 +137,17 @@ pub fn scan(surface: &dyn Surface, params: &ScannerParams) -> Result<TriMesh, Si
     soup.tidy_mut();
     soup.drop_unused_mut();
     if soup.faces.is_empty() {
-        return Err(SimError::NothingSeen);
+        return Err(why_empty(surface, params.edge));
     }
     let slip_v = slip(params, &mut rng);
     soup.positions.iter_mut().for_each(|p| *p = frame_ov * (slip_v * *p));
     Ok(TriMesh::new(soup.positions, soup.faces)?)
+}
+
+/// What to change where a scan has no face.
+fn why_empty(surface: &dyn Surface, edge_m: f64) -> SimError {
+    let size_m = surface.bounds().size().max();
+    if edge_m > COARSE * size_m { SimError::TooCoarse { size_m, edge_m } } else { SimError::NothingSeen }
 }
 
 /// Fills in for what is not a clean surface.
@@ -154,49 +165,84 @@ fn scanned_field(
     rng: &mut Pcg64,
 ) -> Result<Field, SimError> {
     let pitch = params.edge / NODES_PER_EDGE;
-    let bounds = surface.bounds().seen_from(frame_ov).grown(params.band());
+    let band = params.band();
+    let bounds = surface.bounds().seen_from(frame_ov).grown(band);
     let nodes: f64 = bounds.size().iter().map(|side| side / pitch + 2.0).product();
     if !nodes.is_finite() || nodes > MAX_NODES as f64 {
-        return Err(SimError::TooFine { size_m: bounds.size().max(), edge_m: params.edge, limit: MAX_NODES });
+        let size_m = surface.bounds().size().max();
+        return Err(SimError::TooFine { size_m, margin_m: band, edge_m: params.edge, limit: MAX_NODES });
     }
-    let band = params.band();
     let mut field = Field::of_surface(surface, frame_ov, [bounds.min, bounds.max], pitch, band);
     field.close_mut(params.closes_holes_below / 2.0);
     field.blur_mut(params.rounding);
-    let waves = Waves::new(params, rng);
-    let (mean, deviation) = waves.spread(&field);
+    let waves = Waves::new(params, pitch, rng);
+    let (mean, deviation) = waves.spread(&mut field);
     let amplitude = params.noise * (1.0 - params.white_share).sqrt() / deviation;
     // far from the level the noise decides nothing
-    field.map_mut(|p, d| if d.abs() < band { d - params.bias - (waves.at(p) - mean) * amplitude } else { d });
+    waves.visit(&mut field, band, |d, wave| *d -= params.bias + (wave - mean) * amplitude);
     Ok(field)
 }
 
 /// A smooth random field: waves with random directions, so that values correlate as exp(−r²/2ℓ²).
-struct Waves(Vec<(Vector3<f64>, f64)>);
+///
+/// Along x of the grid a wave turns by the same steps in every run of nodes: cos(α + β) = cos α cos β − sin α sin β,
+/// with α for the step, known beforehand, and β for the run's first node.
+struct Waves {
+    /// vector (1/m, in V) and phase
+    waves: Vec<(Vector3<f64>, f64)>,
+    /// cos α and sin α of each wave at the nodes of a run
+    turns: Vec<[[f64; RUN]; 2]>,
+}
 
 impl Waves {
-    fn new(params: &ScannerParams, rng: &mut Pcg64) -> Self {
+    fn new(params: &ScannerParams, pitch: f64, rng: &mut Pcg64) -> Self {
         let mut wave = || {
             let vector = Vector3::from_fn(|_, _| gauss(rng) / params.noise_correlation);
             let phase: f64 = StandardUniform.sample(rng);
             (vector, std::f64::consts::TAU * phase)
         };
-        Self((0..WAVES).map(|_| wave()).collect())
+        let waves: Vec<(Vector3<f64>, f64)> = (0..WAVES).map(|_| wave()).collect();
+        let alphas = |k: &Vector3<f64>| std::array::from_fn::<_, RUN, _>(|i| k.x * pitch * i as f64);
+        let turns = waves.iter().map(|(k, _)| [alphas(k).map(f64::cos), alphas(k).map(f64::sin)]).collect();
+        Self { waves, turns }
     }
 
-    fn at(&self, p: &Point3<f64>) -> f64 {
-        self.0.iter().map(|(k, phase)| (k.dot(&p.coords) + phase).cos()).sum()
+    /// The sum of the waves at the nodes of a run that begins at `first` (m, in V).
+    fn along(&self, first: &Point3<f64>) -> [f64; RUN] {
+        let mut sums = [0.0; RUN];
+        for ((k, phase), [cos, sin]) in self.waves.iter().zip(&self.turns) {
+            let (sin_first, cos_first) = (k.dot(&first.coords) + phase).sin_cos();
+            for i in 0..RUN {
+                sums[i] += cos[i] * cos_first - sin[i] * sin_first;
+            }
+        }
+        sums
     }
 
     /// Mean and standard deviation over the nodes at the field's zero level: with them the noise of every seed is as
     /// strong as asked, and the bias is the bias.
-    fn spread(&self, field: &Field) -> (f64, f64) {
-        let at_level = cells(field.nodes).filter(|&node| field.value(node).abs() < field.pitch);
-        let values: Vec<f64> = at_level.map(|node| self.at(&field.node(node))).collect();
-        let count = values.len().max(1) as f64;
-        let mean = values.iter().sum::<f64>() / count;
-        let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / count;
+    fn spread(&self, field: &mut Field) -> (f64, f64) {
+        let mut found = Vec::new();
+        let pitch = field.pitch;
+        self.visit(field, pitch, |_, wave| found.push(wave));
+        let count = found.len().max(1) as f64;
+        let mean = found.iter().sum::<f64>() / count;
+        let variance = found.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / count;
         (mean, variance.sqrt().max(f64::MIN_POSITIVE))
+    }
+
+    /// Calls `f(value of the field, sum of the waves)` for every node whose value is less than `level` from zero.
+    fn visit(&self, field: &mut Field, level: f64, mut f: impl FnMut(&mut f64, f64)) {
+        for (first, values) in field.runs_mut(RUN) {
+            if values.iter().any(|value| value.abs() < level) {
+                let sums = self.along(&first);
+                values
+                    .iter_mut()
+                    .zip(sums)
+                    .filter(|(value, _)| value.abs() < level)
+                    .for_each(|(value, sum)| f(value, sum));
+            }
+        }
     }
 }
 
