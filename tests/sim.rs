@@ -7,8 +7,9 @@ use nalgebra::{Point3, Vector3};
 use proptest::prelude::*;
 use touchup::mesh::TriMesh;
 use touchup::sim::{
-    MeshSurface, Moment, PathParams, Peaks, Plate, ScannerParams, SensorParams, SimError, Stroke, StylusParams,
-    Surface, Touch, TruthShape, add_vertex_noise, measure_badness, plan_demo, plan_mesh, push_ball, scan, touch,
+    Lines, MeshSurface, Moment, PathParams, Peaks, Plate, Region, ScannerParams, SensorParams, SimError, Stroke,
+    StylusParams, Surface, Touch, TruthShape, add_vertex_noise, measure_badness, plan_demo, plan_mesh, push_ball,
+    raster, scan, touch,
 };
 use touchup::touch::{Message, StampedPose, StampedWrench};
 
@@ -239,7 +240,7 @@ fn noisy_peaks_keep_their_faces_and_have_the_stated_noise() {
 
 fn demo_touch(params: &StylusParams, seed: u64) -> Touch {
     let plate = Plate::default();
-    touch(&plate, &plan_demo(&plate, &PathParams::default()), params, seed).unwrap()
+    touch(&plate, &plan_demo(&plate, &PathParams::default()).unwrap(), params, seed).unwrap()
 }
 
 fn quantile(values: &mut [f64], q: f64) -> f64 {
@@ -432,6 +433,66 @@ fn senseless_stylus_settings_are_refused() {
     assert!(matches!(run(&path(0.02), &with(-1.0)), SimError::BadParameter { .. }));
     assert!(matches!(run(&path(0.011), &with(1.5e-3)), SimError::StartsInside { .. }));
     assert_eq!(run(&[], &with(1.5e-3)), SimError::EmptyPath);
+    assert!(matches!(run(&path(f64::NAN), &with(1.5e-3)), SimError::BadParameter { .. }));
+    let base = StylusParams::default();
+    for params in [
+        StylusParams { stiffness: 1e-300, ..base },
+        StylusParams { stiffness: 3.9, ..base },
+        StylusParams { friction: 1e300, ..base },
+        StylusParams { force_range: [1.0, 1e4], ..base },
+        StylusParams { stray: 1e9, ..base },
+        StylusParams { sensor: SensorParams { pose_noise: 1e9, ..base.sensor }, ..base },
+        StylusParams { sensor: SensorParams { lost: 1.1, ..base.sensor }, ..base },
+    ] {
+        let told = run(&path(0.02), &params).to_string();
+        assert!(told.len() < 120, "{told}");
+    }
+    // 4 N bend this one by 1 m, which is allowed
+    touch(&plate, &path(0.02), &StylusParams { stiffness: 4.0, ..base }, 0).unwrap();
+}
+
+#[test]
+fn senseless_paths_are_refused() {
+    let plate = Plate::default();
+    let base = PathParams::default();
+    let far = |x: f64| Region {
+        frame_ov: nalgebra::Isometry3::identity(),
+        low: nalgebra::Point2::origin(),
+        high: nalgebra::Point2::new(x, 0.01),
+        floor: 0.0,
+        clear: 0.02,
+    };
+    for pitch in [0.0, -1e-3, f64::NAN, f64::INFINITY, 1e-300, 0.9e-7] {
+        let params = PathParams { pitch, ..base };
+        assert!(matches!(raster(&far(0.01), Lines::AlongX, &params), Err(SimError::BadParameter { .. })), "{pitch}");
+        assert!(plan_demo(&plate, &params).is_err(), "{pitch}");
+    }
+    for x in [-0.01, f64::NAN, f64::INFINITY] {
+        assert!(matches!(raster(&far(x), Lines::AlongX, &base), Err(SimError::BadParameter { .. })), "{x}");
+    }
+    let view = -Vector3::z_axis();
+    for params in [PathParams { pitch: f64::NAN, ..base }, PathParams { longest: 0.0, ..base }] {
+        assert!(matches!(plan_mesh(&plate, &plate.bounds(), &view, &params), Err(SimError::BadParameter { .. })));
+    }
+    // lines every 2 mm of 10 mm: six, of two ends each
+    assert_eq!(raster(&far(0.02), Lines::AlongX, &base).unwrap()[1].points.len(), 12);
+}
+
+#[test]
+fn points_and_edges_that_are_no_numbers_end_in_no_panic() {
+    let mesh = Plate::default().mesh(0.2e-3).unwrap();
+    let surface = MeshSurface::new(&mesh).unwrap();
+    for x in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let p = Point3::new(0.01, x, 0.01);
+        assert!(surface.signed_distance(&p).is_nan() && surface.closest(&p).point.x.is_nan());
+        assert!(surface.outward(&p).x.is_nan());
+        let mut near = Vec::new();
+        surface.near(&p, 1e-3, &mut near);
+        assert!(near.is_empty());
+    }
+    for edge in [f64::NAN, f64::INFINITY, 0.0, -1e-3, 1e-300, 0.8e-6, 24.9e-6] {
+        assert!(matches!(Peaks::default().mesh(edge), Err(SimError::BadParameter { .. })), "{edge}");
+    }
 }
 
 #[test]
@@ -457,9 +518,8 @@ fn ball_slides_over_any_mesh_from_any_side() {
     let surface = MeshSurface::new(&mesh).unwrap();
     for view in [-Vector3::z_axis(), Vector3::z_axis(), Vector3::x_axis()] {
         let params = PathParams { longest: 8.0, ..PathParams::default() };
-        let touched =
-            touch(&surface, &plan_mesh(&surface, &surface.bounds(), &view, &params), &StylusParams::default(), 4)
-                .unwrap();
+        let path = plan_mesh(&surface, &surface.bounds(), &view, &params).unwrap();
+        let touched = touch(&surface, &path, &StylusParams::default(), 4).unwrap();
         let contacts: usize = touched.moments.iter().filter(|m| !m.contacts.is_empty()).count();
         let share = contacts as f64 / touched.moments.len() as f64;
         println!("{} ms, {share:.2} in contact", touched.moments.len());
@@ -617,4 +677,10 @@ fn senseless_scanner_settings_are_refused() {
     assert!(matches!(run(ScannerParams { edge: 0.0, ..base }), SimError::BadParameter { .. }));
     assert!(matches!(run(ScannerParams { noise: f64::NAN, ..base }), SimError::BadParameter { .. }));
     assert!(matches!(run(ScannerParams { edge: 1e-6, ..base }), SimError::TooFine { .. }));
+    let told = |params: ScannerParams| run(params).to_string();
+    let (fine, noisy) = (told(ScannerParams { edge: 1e-6, ..base }), told(ScannerParams { noise: 1e300, ..base }));
+    assert!(fine.contains("use longer edges") && !fine.contains("less of"), "{fine}");
+    assert!(noisy.contains("use less of these three") && noisy.len() < 250, "{noisy}");
+    let coarse = run(ScannerParams { edge: 0.03, ..base });
+    assert!(matches!(coarse, SimError::TooCoarse { .. }) && coarse.to_string().contains("shorter"), "{coarse}");
 }

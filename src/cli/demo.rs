@@ -54,7 +54,7 @@ struct ScanBadness {
 
 pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
     let plate = Plate::default();
-    let path = plan_demo(&plate, &PathParams::default());
+    let path = plan_demo(&plate, &PathParams::default())?;
     let scanner = ScannerParams { seed: arguments.seed, ..ScannerParams::default() };
     let truth = plate.mesh(CHORD_ERROR)?;
     let Simulated { scan, touch } =

@@ -84,7 +84,7 @@ pub(super) fn simulate(arguments: &SimulateArguments) -> Result<Losses, CliError
         ..StylusParams::default()
     };
     let hand = PathParams { radius, ..PathParams::default() };
-    let path = plan_mesh(&surface, &surface.bounds(), &scanner.view, &hand);
+    let path = plan_mesh(&surface, &surface.bounds(), &scanner.view, &hand)?;
     let Simulated { scan, touch } =
         write_simulation(&surface, &truth, &path, &scanner, &stylus, arguments.seed, &arguments.out)?;
     let seconds = touch.moments.last().map_or(0.0, |moment| moment.t);

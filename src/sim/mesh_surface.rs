@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 use super::error::SimError;
 use super::surface::{Bounds, Surface, SurfacePoint};
 use crate::mesh::triangle::closest_point;
-use crate::mesh::{FaceId, FaceTree, MeshError, TriMesh, VertexId};
+use crate::mesh::{FaceHit, FaceId, FaceTree, MeshError, TriMesh, VertexId};
 
 /// A triangle mesh with exact distances to its triangles.
 ///
@@ -32,10 +32,9 @@ impl<'a> MeshSurface<'a> {
         Ok(Self { mesh, tree: FaceTree::new(mesh), bounds })
     }
 
-    /// The closest face with the point of it and its barycentric coordinates.
-    fn closest_face(&self, p: &Point3<f64>) -> (FaceId, Point3<f64>, [f64; 3]) {
-        let hit = self.tree.closest(self.mesh, p, f64::INFINITY).expect("the constructor saw a face");
-        (hit.face, hit.point, hit.barycentric)
+    /// The closest face; `None` for a point that is not finite.
+    fn closest_face(&self, p: &Point3<f64>) -> Option<FaceHit> {
+        self.tree.closest(self.mesh, p, f64::INFINITY).filter(|hit| hit.distance_squared.is_finite())
     }
 
     /// Sum of the normals of all faces that meet at a point of a face, each weighted by its angle there.
@@ -63,13 +62,15 @@ impl<'a> MeshSurface<'a> {
 
 impl Surface for MeshSurface<'_> {
     fn signed_distance(&self, p: &Point3<f64>) -> f64 {
-        let (face, point, weights) = self.closest_face(p);
-        (p - point).norm().copysign((p - point).dot(&self.pseudo_normal(face, &weights)))
+        let Some(hit) = self.closest_face(p) else { return f64::NAN };
+        let offset = p - hit.point;
+        offset.norm().copysign(offset.dot(&self.pseudo_normal(hit.face, &hit.barycentric)))
     }
 
     fn closest(&self, p: &Point3<f64>) -> SurfacePoint {
-        let (face, point, _) = self.closest_face(p);
-        SurfacePoint { point, normal: self.mesh.normal(face) }
+        let nowhere = SurfacePoint { point: Vector3::repeat(f64::NAN).into(), normal: Vector3::repeat(f64::NAN) };
+        self.closest_face(p)
+            .map_or(nowhere, |hit| SurfacePoint { point: hit.point, normal: self.mesh.normal(hit.face) })
     }
 
     fn bounds(&self) -> Bounds {

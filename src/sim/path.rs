@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, Point2, Point3, Unit, UnitQuaternion, Vector2, Vector3};
 
+use super::error::{SimError, not_negative, positive};
 use super::plate::{Plate, Stadium};
 use super::surface::{Bounds, Surface};
 
@@ -65,6 +66,8 @@ impl Default for PathParams {
     }
 }
 
+/// Lines of a raster at most: 200 m of them at the usual pitch.
+const MAX_LINES: f64 = 1e5;
 /// Speed of free moves, m/s.
 const FREE_SPEED: f64 = 0.08;
 /// Room between ball and part on free moves, m.
@@ -77,6 +80,17 @@ const PIECE: f64 = 1e-3;
 const TOUCHING: f64 = 10e-6;
 /// Longest chord of a run along a curved wall, m.
 const CHORD: f64 = 0.2e-3;
+
+impl PathParams {
+    fn check(&self) -> Result<(), SimError> {
+        positive("the ball's radius", self.radius, "m")?;
+        positive("the distance of the lines", self.pitch, "m")?;
+        positive("the speed along rasters", self.speed, "m/s")?;
+        positive("the speed along walls", self.wall_speed, "m/s")?;
+        not_negative("the size of the lean", self.lean.abs(), "m")?;
+        positive("the longest time", self.longest, "s")
+    }
+}
 
 impl Region {
     fn at(&self, q: Point2<f64>, z: f64) -> Point3<f64> {
@@ -94,10 +108,21 @@ fn free(points: Vec<Point3<f64>>) -> Stroke {
 }
 
 /// Goes over a region in lines to and fro, pressing; begins and ends with a free move at the region's clear height.
-pub fn raster(region: &Region, lines: Lines, params: &PathParams) -> Vec<Stroke> {
+///
+/// # Errors
+/// [`SimError::BadParameter`], also for more than 100,000 lines.
+pub fn raster(region: &Region, lines: Lines, params: &PathParams) -> Result<Vec<Stroke>, SimError> {
+    params.check()?;
     let size = region.high - region.low;
     let (length, width) = if lines == Lines::AlongX { (size.x, size.y) } else { (size.y, size.x) };
-    let count = (width / params.pitch).round().max(1.0) as usize;
+    not_negative("the length of the region", length, "m")?;
+    not_negative("the width of the region", width, "m")?;
+    let count = (width / params.pitch).round().max(1.0);
+    if count > MAX_LINES {
+        let (name, value, allowed) = ("the number of lines", count, "100000 or less: take a larger distance");
+        return Err(SimError::BadParameter { name, value, unit: "", allowed });
+    }
+    let count = count as usize;
     let corner = |i: usize, far: bool| {
         let (s, t) = (if far { length } else { 0.0 }, width * i as f64 / count as f64);
         region.low + if lines == Lines::AlongX { Vector2::new(s, t) } else { Vector2::new(t, s) }
@@ -105,12 +130,12 @@ pub fn raster(region: &Region, lines: Lines, params: &PathParams) -> Vec<Stroke>
     let track: Vec<_> = (0..=count).flat_map(|i| [corner(i, i % 2 == 1), corner(i, i % 2 == 0)]).collect();
     let (first, last) = (track[0], track[track.len() - 1]);
     let points = track.into_iter().map(|q| region.at(q, region.floor)).collect();
-    vec![
+    Ok(vec![
         free(vec![region.at(first, region.clear)]),
         Stroke { points, speed: params.speed, press: region.press() },
         // straight up first
         free(vec![region.at(last, region.clear)]),
-    ]
+    ])
 }
 
 /// Runs once around the wall that stands along z over an outline, at each of the given heights of the ball's centre.
@@ -139,7 +164,10 @@ pub fn around_wall(outline: &Stadium, inside: bool, heights: &[f64], clear: f64,
 
 /// About a minute over the plate's features: rasters in both directions, walls of the holes, slot and boss, and the
 /// step's edge. The far end of the plate and its rim stay untouched.
-pub fn plan_demo(plate: &Plate, params: &PathParams) -> Vec<Stroke> {
+///
+/// # Errors
+/// [`SimError::BadParameter`].
+pub fn plan_demo(plate: &Plate, params: &PathParams) -> Result<Vec<Stroke>, SimError> {
     let top = plate.bounds().max.z;
     let clear = top + params.radius + CLEARANCE;
     let region = |low: [f64; 2], high: [f64; 2]| Region {
@@ -150,18 +178,18 @@ pub fn plan_demo(plate: &Plate, params: &PathParams) -> Vec<Stroke> {
         clear,
     };
     let features = region([0.009, 0.008], [0.055, 0.042]);
-    let mut strokes = raster(&features, Lines::AlongX, params);
-    strokes.extend(raster(&features, Lines::AlongY, params));
+    let mut strokes = raster(&features, Lines::AlongX, params)?;
+    strokes.extend(raster(&features, Lines::AlongY, params)?);
     let step = plate.step_x;
     // across the edge in close lines, then along both of its sides
-    strokes.extend(raster(&region([step - 4e-3, 0.010], [step + 5e-3, 0.036]), Lines::AlongX, params));
-    strokes.extend(raster(&region([step - 1e-3, 0.010], [step + 2e-3, 0.036]), Lines::AlongY, params));
+    strokes.extend(raster(&region([step - 4e-3, 0.010], [step + 5e-3, 0.036]), Lines::AlongX, params)?);
+    strokes.extend(raster(&region([step - 1e-3, 0.010], [step + 2e-3, 0.036]), Lines::AlongY, params)?);
     for (e, inside) in [(&plate.through, true), (&plate.blind, true), (&plate.slot, true), (&plate.boss, false)] {
         // near the floor (floor and wall are felt together), half way, and just below the rim
         let heights = [e.low + 0.9 * params.radius, (e.low + e.high) / 2.0, e.high - params.radius / 2.0];
         strokes.extend(around_wall(&e.outline, inside, &heights, clear, params));
     }
-    strokes
+    Ok(strokes)
 }
 
 /// Rasters in both directions over all of a surface that can be reached from one side.
@@ -169,12 +197,16 @@ pub fn plan_demo(plate: &Plate, params: &PathParams) -> Vec<Stroke> {
 /// - `bounds`: the part of it to go over, in O; `view`: direction in which the hand looks and presses, in O.
 /// - The ball drops into whatever it fits and a little way down the outer walls, but not behind overhangs. The pitch
 ///   grows beyond [`PathParams::pitch`] where the rasters would last longer than [`PathParams::longest`].
+///
+/// # Errors
+/// [`SimError::BadParameter`].
 pub fn plan_mesh(
     surface: &dyn Surface,
     bounds: &Bounds,
     view: &Unit<Vector3<f64>>,
     params: &PathParams,
-) -> Vec<Stroke> {
+) -> Result<Vec<Stroke>, SimError> {
+    params.check()?;
     let frame_ov = looking_along(view, bounds);
     let seen = bounds.seen_from(&frame_ov);
     let clear = seen.max.z + params.radius + CLEARANCE;
@@ -182,12 +214,12 @@ pub fn plan_mesh(
     let region = Region { frame_ov, low, high, floor, clear };
     let needed = 2.0 * seen.size().x * seen.size().y / (params.speed * params.longest);
     let params = PathParams { pitch: params.pitch.max(needed), ..*params };
-    let mut strokes: Vec<_> =
-        [Lines::AlongX, Lines::AlongY].iter().flat_map(|&lines| raster(&region, lines, &params)).collect();
+    let mut strokes = raster(&region, Lines::AlongX, &params)?;
+    strokes.extend(raster(&region, Lines::AlongY, &params)?);
     for stroke in strokes.iter_mut().filter(|stroke| stroke.press.is_some()) {
         stroke.points = follow_heights(surface, &region, &stroke.points, &params);
     }
-    strokes
+    Ok(strokes)
 }
 
 /// The line in short pieces, as deep as a ball that comes from above goes at each of its points, and a little deeper.

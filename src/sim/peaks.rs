@@ -8,8 +8,9 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
+use super::error::{SimError, positive};
 use super::surface::{Bounds, Surface, SurfacePoint};
-use crate::mesh::{MeshError, TriMesh};
+use crate::mesh::TriMesh;
 
 /// Length of the sides, m.
 const SIDE: f64 = 0.050;
@@ -23,6 +24,8 @@ const RANGE: [f64; 2] = [-6.551_133_332_835_84, 8.106_213_589_442_332];
 const PITCH: f64 = 0.4e-3;
 /// The grid reaches so far beyond the square, m; there the formula is below 1e-6 of its height.
 const MARGIN: f64 = 0.015;
+/// Cells along a side of the mesh at most.
+const MAX_CELLS: f64 = 2000.0;
 /// Newton steps at most; ten are usual, with damping a few more.
 const MAX_STEPS: usize = 60;
 
@@ -61,12 +64,19 @@ impl Peaks {
     /// The square as a grid of right triangles whose legs are `edge` long or a little shorter (m), outward up.
     ///
     /// # Errors
-    /// Those of [`TriMesh::new`], for an `edge` so small that the faces cannot be counted.
-    pub fn mesh(&self, edge: f64) -> Result<TriMesh, MeshError> {
-        let cells = (SIDE / edge).ceil().clamp(1.0, u16::MAX.into()) as u32;
-        if cells == u32::from(u16::MAX) {
-            return Err(MeshError::TooMany { what: "faces", count: 2 * (cells as usize).pow(2) });
+    /// [`SimError::BadParameter`] for an `edge` that is no length, or so short that it makes more than eight million faces.
+    pub fn mesh(&self, edge: f64) -> Result<TriMesh, SimError> {
+        positive("the edge length", edge, "m")?;
+        let cells = (SIDE / edge).ceil();
+        if cells > MAX_CELLS {
+            return Err(SimError::BadParameter {
+                name: "the edge length",
+                value: edge,
+                unit: "m",
+                allowed: "25 µm or more",
+            });
         }
+        let cells = cells as u32;
         let at = |i: u32| (f64::from(i) / f64::from(cells) - 0.5) * SIDE;
         let row = cells + 1;
         let positions = (0..row * row).map(|k| {
@@ -77,7 +87,7 @@ impl Peaks {
             let a = k % cells + k / cells * row;
             [[a, a + 1, a + row + 1], [a, a + row + 1, a + row]]
         });
-        TriMesh::new(positions.collect(), faces.collect())
+        Ok(TriMesh::new(positions.collect(), faces.collect())?)
     }
 
     /// Nodes of the starting grid that none of their neighbours beats in closeness to `p`, within `reach` (m) sideways.

@@ -1,11 +1,13 @@
 //! From what really was to messages: noise, bias, clocks, and what goes wrong on the wire.
 
+use std::f64::consts::PI;
+
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_distr::{Distribution, Exp1, StandardUniform};
 use rand_pcg::Pcg64;
 
-use super::error::{SimError, not_negative};
+use super::error::{SimError, not_negative, up_to};
 use super::stylus::{Moment, TICK};
 use super::wander::{Wander, gauss};
 use crate::touch::{Message, StampedPose, StampedWrench, Wrench};
@@ -75,14 +77,14 @@ impl SensorParams {
     }
 
     pub(super) fn check(&self) -> Result<(), SimError> {
-        not_negative("the pose noise", self.pose_noise, "m")?;
-        not_negative("the orientation noise", self.orientation_noise, "rad")?;
-        not_negative("the force noise", self.force_noise, "N")?;
-        not_negative("the torque noise", self.torque_noise, "N m")?;
-        not_negative("the force bias", self.force_bias, "N")?;
+        up_to("the pose noise", self.pose_noise, "m", 1.0, "from zero to 1 m")?;
+        up_to("the orientation noise", self.orientation_noise, "rad", PI, "from zero to half a turn")?;
+        up_to("the force noise", self.force_noise, "N", 1e3, "from zero to 1 kN")?;
+        up_to("the torque noise", self.torque_noise, "N m", 1e3, "from zero to 1 kN m")?;
+        up_to("the force bias", self.force_bias, "N", 1e3, "from zero to 1 kN")?;
         not_negative("the jitter", self.jitter, "s")?;
-        not_negative("the share of lost messages", self.lost, "")?;
-        not_negative("the share of late messages", self.late, "")?;
+        up_to("the share of lost messages", self.lost, "", 1.0, "from zero to one")?;
+        up_to("the share of late messages", self.late, "", 1.0, "from zero to one")?;
         not_negative("the rate of gaps", self.gap_rate, "1/s")?;
         if self.wrench_clock.is_finite() && self.wrench_clock.abs() <= LARGEST_CLOCK {
             return Ok(());

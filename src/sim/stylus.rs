@@ -10,7 +10,7 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64;
 
 use super::ball::{BallContact, push_ball};
-use super::error::{SimError, not_negative, positive};
+use super::error::{SimError, not_negative, positive, up_to};
 use super::path::Stroke;
 use super::sensor::{Sensor, SensorParams};
 use super::surface::Surface;
@@ -59,15 +59,18 @@ impl Default for StylusParams {
 
 impl StylusParams {
     fn check(&self) -> Result<(), SimError> {
+        let [least, most] = self.force_range;
         positive("the ball's radius", self.radius, "m")?;
+        up_to("the ball's radius", self.radius, "m", 1.0, "1 m or less")?;
         positive("the tip's stiffness", self.stiffness, "N/m")?;
-        not_negative("the friction", self.friction, "")?;
-        not_negative("the hand's force", self.force, "N")?;
-        not_negative("the variation of force", self.force_variation, "N")?;
-        not_negative("the smallest force", self.force_range[0], "N")?;
-        not_negative("the largest force", self.force_range[1] - self.force_range[0], "N above the smallest")?;
-        not_negative("the tilt", self.tilt, "rad")?;
-        not_negative("the straying of the hand", self.stray, "m")?;
+        up_to("the friction", self.friction, "", 10.0, "from zero to ten")?;
+        up_to("the hand's force", self.force, "N", LARGEST_FORCE, "from zero to 1 kN")?;
+        up_to("the variation of force", self.force_variation, "N", LARGEST_FORCE, "from zero to 1 kN")?;
+        up_to("the smallest force", least, "N", LARGEST_FORCE, "from zero to 1 kN")?;
+        up_to("the largest force", most - least, "N above the smallest", LARGEST_FORCE, "from zero to 1 kN")?;
+        up_to("the bending of the tip", most / self.stiffness, "m", LARGEST_BEND, "1 m or less: take a stiffer one")?;
+        up_to("the tilt", self.tilt, "rad", std::f64::consts::PI, "from zero to half a turn")?;
+        up_to("the straying of the hand", self.stray, "m", 1.0, "from zero to 1 m")?;
         self.sensor.check()
     }
 }
@@ -94,6 +97,10 @@ pub struct Touch {
     pub moments: Vec<Moment>,
 }
 
+/// No hand presses harder, N; a sample may hold a hundred times as much.
+const LARGEST_FORCE: f64 = 1e3;
+/// A tip that bends further is none, m; a sample may be a thousand times as far.
+const LARGEST_BEND: f64 = 1.0;
 /// Time between two moments, s: the wrench's period.
 pub(super) const TICK: f64 = 1e-3;
 /// The hand closes a distance with this rate, 1/s: a lag of 0.4 mm at 40 mm/s.
@@ -155,6 +162,8 @@ struct Leading<'a> {
 pub fn touch(surface: &dyn Surface, path: &[Stroke], params: &StylusParams, seed: u64) -> Result<Touch, SimError> {
     params.check()?;
     path.iter().try_for_each(|stroke| positive("the speed of a stroke", stroke.speed, "m/s"))?;
+    let farthest = path.iter().flat_map(|s| &s.points).flat_map(|p| p.iter());
+    farthest.copied().try_for_each(|x| not_negative("the size of a path's coordinate", x.abs(), "m"))?;
     let start = path.iter().flat_map(|s| &s.points).next().ok_or(SimError::EmptyPath)?;
     let clearance_m = surface.signed_distance(start);
     if clearance_m < params.radius {

@@ -55,6 +55,8 @@ impl Bounds {
 }
 
 /// A surface that is known exactly, with material behind it.
+///
+/// The distance of a point that is not finite is NaN, and so is what is closest to it.
 pub trait Surface {
     /// Distance to the surface, m; positive outside the material, negative inside.
     fn signed_distance(&self, p: &Point3<f64>) -> f64;
