@@ -215,6 +215,35 @@ fn the_header_of_the_wrench_says_its_axes() {
     assert!((raised[0] - raised[2]).abs() > 1e-6, "the wrong axes must show: {raised:?}");
 }
 
+/// The frames are known only when both topics have begun; what was read before is not lost, nor is it kept for ever.
+#[test]
+fn a_topic_that_begins_late_loses_no_message() {
+    let case = Case::new();
+    let tilted = UnitQuaternion::from_euler_angles(0.5, -0.3, 1.0);
+    let spoken = touch(tilted, true);
+    // wrenches at 1 kHz before the first pose, in and beyond what is read ahead
+    for early in [1_000_i64, 100_001] {
+        let mut messages = spoken.clone();
+        for message in &mut messages {
+            match message {
+                Message::Pose(pose) => pose.stamp_ns += early * 1_000_000,
+                Message::Wrench(wrench) => wrench.stamp_ns += early * 1_000_000,
+            }
+        }
+        let none = Wrench { force: Vector3::zeros(), torque: Vector3::zeros() };
+        let waiting = (0..early)
+            .map(|tick| Message::Wrench(StampedWrench { stamp_ns: 1_000_000_000 + tick * 1_000_000, wrench: none }));
+        case.record("late.mcap", "object", &waiting.chain(messages).collect::<Vec<_>>());
+        let summary = json(&case.refine("late.mcap", "late.ply", &["--json"]));
+        assert_eq!((&summary["samples"], &summary["accepted"]), (&Value::from(1001 + early), &Value::from(1001)));
+        let refused = summary["refused"].as_object().unwrap().values().filter_map(Value::as_i64).sum::<i64>();
+        assert_eq!(refused, early, "{summary}");
+        case.record("object.mcap", "object", &spoken);
+        assert_eq!(code(&case.refine("object.mcap", "object.ply", &[])), 0);
+        assert_eq!(case.bytes("late.ply"), case.bytes("object.ply"), "{early} wrenches before");
+    }
+}
+
 #[test]
 fn flags_go_over_the_scene() {
     let case = Case::new();

@@ -10,14 +10,14 @@ use serde::Serialize;
 use tracing::{debug, warn};
 
 use super::latency::{Latencies, Quantiles};
-use super::replay::{Replayed, replay, wrench_frame};
+use super::replay::{Recording, Replayed, replay};
 use super::{CliError, Losses, check_kept, tell};
 use crate::io::mesh_file::{MeshFile, MeshFileError, MeshUnit, check_target, read_mesh, write_mesh};
-use crate::io::recording::{RecordingError, RecordingReader, Topics};
+use crate::io::recording::Topics;
 use crate::mesh::{RepairReport, TriMesh, VertexId};
 use crate::refine::{RefineCounts, RefineError, RefineParams, Refiner};
 use crate::scene::{Mode, Scene};
-use crate::touch::{Sample, WrenchFrame};
+use crate::touch::Sample;
 
 #[derive(Debug, Args)]
 pub(super) struct RefineArguments {
@@ -188,8 +188,10 @@ impl RefineArguments {
         let started = Instant::now();
         let MeshFile { mesh, repair } = read_mesh(&self.scan, self.mesh_unit).map_err(CliError::ReadMesh)?;
         let as_scanned = mesh.clone();
-        let (recording, wrench_frame) = self.recording().map_err(CliError::ReadRecording)?;
-        let params = scene.refine_params(wrench_frame).ok_or_else(|| CliError::Usage(NOTHING_MOVES.to_owned()))?;
+        let topics = Topics { pose: self.pose_topic.clone(), wrench: self.wrench_topic.clone() };
+        let recording = Recording::open(&self.bag, &topics).map_err(CliError::ReadRecording)?;
+        let params =
+            scene.refine_params(recording.wrench_frame).ok_or_else(|| CliError::Usage(NOTHING_MOVES.to_owned()))?;
         let mut refiner = Refiner::new(mesh, params)?;
         let load_s = started.elapsed().as_secs_f64();
 
@@ -220,11 +222,6 @@ impl RefineArguments {
             replay_s,
         };
         Ok(Refined { repair, summary, losses: replayed.losses })
-    }
-
-    fn recording(&self) -> Result<(RecordingReader, WrenchFrame), RecordingError> {
-        let topics = Topics { pose: self.pose_topic.clone(), wrench: self.wrench_topic.clone() };
-        Ok((RecordingReader::open(&self.bag, &topics)?, wrench_frame(&self.bag, &topics)?))
     }
 
     /// The work is not begun when its result cannot be kept.

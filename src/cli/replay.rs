@@ -1,6 +1,6 @@
 //! A recording from its first message to its last, as samples.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::path::Path;
 
 use super::progress::Progress;
@@ -22,20 +22,65 @@ pub struct Replayed {
     pub losses: Losses,
 }
 
+/// Messages that are kept at most while the frames are looked for: a minute of both topics, 20 MB.
+const MOST_AHEAD: usize = 100_000;
+
+/// A recording that has been read until the frames of both topics are known, and keeps what it has read.
+pub struct Recording {
+    reader: RecordingReader,
+    ahead: VecDeque<Result<Message, RecordingError>>,
+    /// In which axes the wrenches are: a header that names the frame of the pose means O, any other the stylus' own.
+    pub wrench_frame: WrenchFrame,
+}
+
+impl Recording {
+    /// Opens a recording and reads up to the first message of both topics; one that has only one of them is told by the
+    /// replay.
+    ///
+    /// # Errors
+    /// [`RecordingError`] of opening it.
+    pub fn open(path: &Path, topics: &Topics) -> Result<Self, RecordingError> {
+        let mut reader = RecordingReader::open(path, topics)?;
+        let mut ahead = VecDeque::new();
+        while !knows_frames(&reader) && ahead.len() < MOST_AHEAD {
+            let Some(message) = reader.next() else { break };
+            ahead.push_back(message);
+        }
+        let wrench_frame =
+            if ahead.len() < MOST_AHEAD { wrench_frame(&reader) } else { find_wrench_frame(path, topics)? };
+        Ok(Self { reader, ahead, wrench_frame })
+    }
+
+    fn next(&mut self) -> Option<Result<Message, RecordingError>> {
+        self.ahead.pop_front().or_else(|| self.reader.next())
+    }
+}
+
+fn knows_frames(reader: &RecordingReader) -> bool {
+    reader.pose_frame().is_some() && reader.wrench_frame().is_some()
+}
+
+fn wrench_frame(reader: &RecordingReader) -> WrenchFrame {
+    if reader.wrench_frame() == reader.pose_frame() { WrenchFrame::Object } else { WrenchFrame::Sensor }
+}
+
+/// Where one topic begins long after the other: by a reader of its own, which keeps nothing.
+fn find_wrench_frame(path: &Path, topics: &Topics) -> Result<WrenchFrame, RecordingError> {
+    let mut reader = RecordingReader::open(path, topics)?;
+    while !knows_frames(&reader) && reader.next().is_some() {}
+    Ok(wrench_frame(&reader))
+}
+
 /// Gives each sample of `recording` to `each`, in order of time.
 ///
 /// # Errors
 /// [`CliError::ReadRecording`] when the recording is damaged before its first message; later damage is a loss.
-pub fn replay(
-    mut recording: RecordingReader,
-    sync: SyncParams,
-    mut each: impl FnMut(&Sample),
-) -> Result<Replayed, CliError> {
+pub fn replay(mut recording: Recording, sync: SyncParams, mut each: impl FnMut(&Sample)) -> Result<Replayed, CliError> {
     let mut sync = Synchroniser::new(sync)?;
     let mut replayed = Replayed::default();
-    let mut progress = Progress::new("replay", recording.message_count());
+    let mut progress = Progress::new("replay", recording.reader.message_count());
     let mut has_begun = false;
-    for message in recording.by_ref() {
+    while let Some(message) = recording.next() {
         match message {
             Ok(message) => {
                 replayed.wrenches += u64::from(matches!(message, Message::Wrench(_)));
@@ -50,25 +95,8 @@ pub fn replay(
     }
     sync.finish();
     std::iter::from_fn(|| sync.next_sample()).for_each(|sample| each(&sample));
-    replayed.account(&recording, &sync);
+    replayed.account(&recording.reader, &sync);
     Ok(replayed)
-}
-
-/// In which axes the wrenches are: a header that names the frame of the pose means O, any other the stylus' own.
-///
-/// Reads up to the first message of both topics; a recording that has only one of them is told by the replay.
-///
-/// # Errors
-/// [`RecordingError`] of opening it.
-pub fn wrench_frame(path: &Path, topics: &Topics) -> Result<WrenchFrame, RecordingError> {
-    let mut recording = RecordingReader::open(path, topics)?;
-    while recording.pose_frame().is_none() || recording.wrench_frame().is_none() {
-        if !matches!(recording.next(), Some(Ok(_))) {
-            break;
-        }
-    }
-    let same = recording.wrench_frame() == recording.pose_frame();
-    Ok(if same { WrenchFrame::Object } else { WrenchFrame::Sensor })
 }
 
 impl Replayed {

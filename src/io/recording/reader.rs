@@ -67,9 +67,8 @@ impl RecordingReader {
             message_count: Some(0),
             truncated: false,
         };
-        reader.survey(path, &rest)?;
+        reader.source = reader.survey(path, &rest)?;
         if let Some(first) = rest.pop_front() {
-            reader.source = Some(Source::open(&first, topics)?.0);
             reader.path = first;
         }
         reader.rest = rest;
@@ -101,8 +100,9 @@ impl RecordingReader {
         self.truncated
     }
 
-    /// Looks into every file once: topics, counts, missing ends.
-    fn survey(&mut self, path: &Path, files: &VecDeque<PathBuf>) -> Result<(), RecordingError> {
+    /// Looks into every file once: topics, counts, missing ends. Returns the first, still open: it may be a packed one.
+    fn survey(&mut self, path: &Path, files: &VecDeque<PathBuf>) -> Result<Option<Source>, RecordingError> {
+        let mut first = None;
         let mut found: Vec<TopicInfo> = Vec::new();
         let mut first_damage = None;
         for file in files {
@@ -113,10 +113,11 @@ impl RecordingReader {
             found.extend(source.topics());
             found.sort_unstable();
             found.dedup();
+            first = first.or(Some(source));
         }
         match (check_topics(path, &self.topics, &found), first_damage) {
             (Err(RecordingError::MissingTopic { .. }), Some(damage)) => Err(damage),
-            (checked, _) => checked,
+            (checked, _) => checked.map(|()| first),
         }
     }
 
