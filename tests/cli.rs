@@ -434,8 +434,18 @@ fn simulate_makes_the_input_of_refine() {
     assert_eq!(code(&output), 0, "{}", text(&output.stderr));
     let summary = json(&output);
     assert!(summary["moved_faces"].as_u64().unwrap() > 100 && summary["contacts"].as_u64().unwrap() > 0, "{summary}");
+    // the scan is in mm: 25 times as large it is a plausible part that has nothing to do with the touches
+    let output = touchup(&["refine", "--scan", &scan, "--bag", &bag, "--out", &out, "--mesh-unit", "inch"], "");
+    let told = text(&output.stderr);
+    assert!(code(&output) == 4 && told.contains("updates were cut back") && told.contains("--mesh-unit"), "{told}");
 
-    for flags in [["--friction", "-1"], ["--tip-radius-mm", "nan"], ["--scan-edge-mm", "0"]] {
+    for flags in [
+        ["--friction", "-1"],
+        ["--tip-radius-mm", "nan"],
+        ["--scan-edge-mm", "0"],
+        ["--scan-edge-mm", "30"],
+        ["--stiffness-n-per-mm", "1e-303"],
+    ] {
         let bad = touchup(&[&part[..], &flags].concat(), "");
         assert_eq!((code(&bad), text(&bad.stdout)), (2, ""), "{flags:?}: {}", text(&bad.stderr));
     }

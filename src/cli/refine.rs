@@ -155,6 +155,19 @@ fn lost_contacts(params: &RefineParams, counts: &RefineCounts) -> Option<String>
     })
 }
 
+/// Updates that mostly could not be made in full: touches and scan do not fit, as with a scan that is 25 times too large.
+///
+/// On scans as bad as 1 mm a quarter is cut back at most; on one taken for inches it is nineteen of twenty.
+fn lost_updates(params: &RefineParams, counts: &RefineCounts) -> Option<String> {
+    (params.gate.is_some() && counts.cut_back > counts.moved / 2).then(|| {
+        format!(
+            "{} of {} updates were cut back because a face would have folded: is --mesh-unit right, and are the poses in \
+             the frame of the scan?",
+            counts.cut_back, counts.moved
+        )
+    })
+}
+
 /// Faces of which a corner is not where it was.
 fn moved_faces(before: &TriMesh, after: &TriMesh) -> u64 {
     let is_moved = |corners: [VertexId; 3]| corners.iter().any(|&v| before.position(v) != after.position(v));
@@ -205,6 +218,7 @@ impl RefineArguments {
         debug!(?counts, "replayed");
         replayed.losses.extend(lost_samples(&replayed, pushes.accepted));
         replayed.losses.extend(lost_contacts(&params, counts));
+        replayed.losses.extend(lost_updates(&params, counts));
         if params.gate.is_some() && pushes.accepted > 0 && counts.contacts == 0 {
             warn!("the stylus never came into contact: no force was above contact.on_n, so the mesh is as scanned");
         }
