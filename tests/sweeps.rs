@@ -192,7 +192,7 @@ fn raster_samples(peaks: &Peaks, friction: f64) -> Vec<Sample> {
         sensor: SensorParams::ideal(),
         ..StylusParams::default()
     };
-    let moments = touch(peaks, &path, &stylus, 1).unwrap().moments;
+    let moments = touch(peaks, &path.unwrap(), &stylus, 1).unwrap().moments;
     let sample = |(i, moment): (usize, &Moment)| {
         let mut pose_ot = moment.pose_ot;
         pose_ot.translation.vector -= moment.force_o / STIFFNESS;

@@ -155,10 +155,11 @@ fn lost_contacts(params: &RefineParams, counts: &RefineCounts) -> Option<String>
     })
 }
 
-/// Updates that mostly could not be made in full: touches and scan do not fit, as with a scan that is 25 times too large.
+/// A hint that touches and scan may not fit, where most updates could not be made in full.
 ///
-/// On scans as bad as 1 mm a quarter is cut back at most; on one taken for inches it is nineteen of twenty.
-fn lost_updates(params: &RefineParams, counts: &RefineCounts) -> Option<String> {
+/// On scans as bad as 1 mm a quarter is cut back at most; on one taken for inches it is nineteen of twenty. A mesh with
+/// triangles long and thin from the start comes here too, so it is no loss.
+fn misfit(params: &RefineParams, counts: &RefineCounts) -> Option<String> {
     (params.gate.is_some() && counts.cut_back > counts.moved / 2).then(|| {
         format!(
             "{} of {} updates were cut back because a face would have folded: is --mesh-unit right, and are the poses in \
@@ -218,7 +219,9 @@ impl RefineArguments {
         debug!(?counts, "replayed");
         replayed.losses.extend(lost_samples(&replayed, pushes.accepted));
         replayed.losses.extend(lost_contacts(&params, counts));
-        replayed.losses.extend(lost_updates(&params, counts));
+        if let Some(misfit) = misfit(&params, counts) {
+            warn!("{misfit}");
+        }
         if params.gate.is_some() && pushes.accepted > 0 && counts.contacts == 0 {
             warn!("the stylus never came into contact: no force was above contact.on_n, so the mesh is as scanned");
         }
