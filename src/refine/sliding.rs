@@ -126,8 +126,9 @@ mod tests {
         let mut motion = TipMotion::new(params, RIGID);
         let mut ball = motion.update(&tip(0.0), 0.0, 0.03);
         assert_eq!(ball.surface_normal(&params), ball.force_o.normalize(), "at rest the force is all there is");
-        for i in 1..100 {
-            ball = motion.update(&tip(i as f64 * 2e-5), 1e-3, 0.03); // 20 mm/s along x
+        // 20 mm/s along x, for 0.4 s: 33 time constants of the velocity
+        for i in 1..400 {
+            ball = motion.update(&tip(i as f64 * 2e-5), 1e-3, 0.03);
         }
         assert!((ball.velocity - Vector3::new(0.02, 0.0, 0.0)).norm() < 1e-6);
         assert!((ball.surface_normal(&params) - Vector3::z()).norm() < 1e-9);
