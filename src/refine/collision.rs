@@ -136,12 +136,11 @@ fn height_above(t: &Triangle, u: &Triangle) -> f64 {
 /// m, and |Δn| ≤ 3 m / altitude while m is small.
 fn margin_at_corner(t: &Triangle, i: usize, u: &Triangle, j: usize) -> f64 {
     let double = (t[1] - t[0]).cross(&(t[2] - t[0]));
-    let longest = (t[1] - t[0]).norm_squared().max((t[2] - t[1]).norm_squared()).max((t[0] - t[2]).norm_squared());
     let area = double.norm();
     if area == 0.0 {
         return 0.0;
     }
-    let altitude = area / longest.sqrt();
+    let altitude = (triangle::shape_quality(t, area) * area).sqrt();
     let arms = [u[(j + 1) % 3] - t[i], u[(j + 2) % 3] - t[i]];
     let [a, b] = arms.map(|arm| double.dot(&arm) / area);
     if a * b <= 0.0 {

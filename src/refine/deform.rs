@@ -26,7 +26,7 @@ pub enum Fit {
 
 /// A mesh under refinement: the triangles, the tree over them, and what was scanned or felt where.
 #[derive(Clone, Debug)]
-pub(super) struct Clay {
+pub(super) struct DeformableMesh {
     pub mesh: TriMesh,
     pub tree: FaceTree,
     /// positions as scanned, m
@@ -46,13 +46,13 @@ pub(super) struct Clay {
 
 /// A region of interest with the edit after which it was last looked at.
 #[derive(Clone, Debug)]
-pub(super) struct Grip {
+pub(super) struct HandleRegion {
     roi: Roi,
     refit: RefitPlan,
     seen: Option<u64>,
 }
 
-impl Grip {
+impl HandleRegion {
     /// The face that was moved last.
     pub fn handle(&self) -> Option<FaceId> {
         self.roi.handle()
@@ -69,7 +69,7 @@ impl Grip {
     }
 }
 
-impl Clay {
+impl DeformableMesh {
     pub fn new(mesh: TriMesh, guard: Option<GuardParams>) -> Self {
         let tree = FaceTree::new(&mesh);
         let mut evidence = vec![[0.0; 3]; mesh.face_slots()];
@@ -104,72 +104,78 @@ impl Clay {
         self.evidence[face.0 as usize] = normal.cast::<f32>().into();
     }
 
-    /// A grip for regions of this size.
-    pub fn grip(&mut self, size: RoiSize) -> Grip {
+    /// An empty region with room for one of this size.
+    pub fn region(&mut self, size: RoiSize) -> HandleRegion {
         let vertices = size.room(self.mean_edge);
         self.displacements.reserve(vertices);
         self.before.reserve(vertices);
-        Grip { roi: Roi::with_room(vertices), refit: RefitPlan::with_room(3 * vertices), seen: None }
+        HandleRegion { roi: Roi::with_room(vertices), refit: RefitPlan::with_room(3 * vertices), seen: None }
     }
 
     /// Moves the corners of `handle` by `steps` (m) and the region around it after them.
-    pub fn deform(&mut self, grip: &mut Grip, handle: FaceId, size: RoiSize, steps: &[Vector3<f64>; 3]) -> Fit {
-        if !grip.roi.is_for(handle) {
-            grip.roi.rebuild(&self.mesh, handle, size);
-            self.tree.plan(grip.roi.neighbourhood.moving(), &mut grip.refit);
-            grip.seen = None;
+    pub fn deform(
+        &mut self,
+        region: &mut HandleRegion,
+        handle: FaceId,
+        size: RoiSize,
+        steps: &[Vector3<f64>; 3],
+    ) -> Fit {
+        if !region.roi.is_for(handle) {
+            region.roi.rebuild(&self.mesh, handle, size);
+            self.tree.plan(region.roi.neighbourhood.moving(), &mut region.refit);
+            region.seen = None;
         }
-        let longest = self.displace(&grip.roi, steps);
+        let longest = self.displace(&region.roi, steps);
         let fit = match self.guard {
-            Some(guard) => self.place_soundly(grip, longest, &guard),
+            Some(guard) => self.place_soundly(region, longest, &guard),
             None => {
-                self.place(&grip.roi, 1.0);
+                self.place(&region.roi, 1.0);
                 Fit::Whole
             }
         };
-        self.tree.refit_planned(&self.mesh, &grip.refit);
+        self.tree.refit_planned(&self.mesh, &region.refit);
         self.edits += 1;
-        grip.seen = Some(self.edits);
+        region.seen = Some(self.edits);
         fit
     }
 
     /// Puts the region at the largest share of its displacement that leaves the mesh sound.
-    fn place_soundly(&mut self, grip: &mut Grip, longest: f64, guard: &GuardParams) -> Fit {
+    fn place_soundly(&mut self, region: &mut HandleRegion, longest: f64, guard: &GuardParams) -> Fit {
         let margin = MARGIN_EDGES * self.mean_edge;
-        if grip.seen != Some(self.edits) {
-            grip.roi.neighbourhood.refresh(&self.mesh, &self.tree, margin, guard, &self.evidence);
-        } else if grip.roi.neighbourhood.is_outdated(longest) {
-            grip.roi.neighbourhood.collect(&self.mesh, &self.tree, margin);
+        if region.seen != Some(self.edits) {
+            region.roi.neighbourhood.refresh(&self.mesh, &self.tree, margin, guard, &self.evidence);
+        } else if region.roi.neighbourhood.is_outdated(longest) {
+            region.roi.neighbourhood.collect(&self.mesh, &self.tree, margin);
         }
-        if grip.roi.neighbourhood.may_pass_unseen(longest) {
-            grip.roi.neighbourhood.pass_unseen(longest);
-            self.place(&grip.roi, 1.0);
+        if region.roi.neighbourhood.may_pass_unseen(longest) {
+            region.roi.neighbourhood.pass_unseen(longest);
+            self.place(&region.roi, 1.0);
             return Fit::Whole;
         }
         let mut share = 1.0;
         for _ in 0..TRIES {
-            let mut verdict = self.judge_at(grip, share, longest, guard);
+            let mut verdict = self.judge_at(region, share, longest, guard);
             if verdict == Verdict::Rough {
-                self.place(&grip.roi, 0.0);
-                grip.roi.neighbourhood.roughen(&self.mesh, &self.tree, margin);
-                verdict = self.judge_at(grip, share, longest, guard);
+                self.place(&region.roi, 0.0);
+                region.roi.neighbourhood.roughen(&self.mesh, &self.tree, margin);
+                verdict = self.judge_at(region, share, longest, guard);
             }
             if verdict == Verdict::Sound {
-                grip.roi.neighbourhood.accept(share * longest);
+                region.roi.neighbourhood.accept(share * longest);
                 return if share == 1.0 { Fit::Whole } else { Fit::CutBack };
             }
             share *= CUT;
         }
-        self.place(&grip.roi, 0.0);
+        self.place(&region.roi, 0.0);
         Fit::CutBack
     }
 
-    fn judge_at(&mut self, grip: &mut Grip, share: f64, longest: f64, guard: &GuardParams) -> Verdict {
-        self.place(&grip.roi, share);
+    fn judge_at(&mut self, region: &mut HandleRegion, share: f64, longest: f64, guard: &GuardParams) -> Verdict {
+        self.place(&region.roi, share);
         let gap = guard.gap_share * self.mean_edge;
-        let (mesh, before, marks) = (&self.mesh, &self.before, &grip.roi.marks);
+        let (mesh, before, marks) = (&self.mesh, &self.before, &region.roi.marks);
         let was = |v: VertexId| marks.of(v.0).map_or_else(|| mesh.position(v), |i| before[i as usize]);
-        grip.roi.neighbourhood.judge(mesh, guard, &self.evidence, gap, share * longest, was)
+        region.roi.neighbourhood.judge(mesh, guard, &self.evidence, gap, share * longest, was)
     }
 
     /// The displacement of each vertex of the region; returns the longest, m.

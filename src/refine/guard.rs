@@ -6,7 +6,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::collision::Pairs;
 use super::marks::Marks;
-use crate::mesh::{FaceId, FaceTree, TriMesh, VertexId};
+use crate::mesh::{FaceId, FaceTree, TriMesh, VertexId, triangle};
 
 /// Limits that keep a mesh sound.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -132,16 +132,13 @@ pub(super) struct Neighbourhood {
 /// Normal and proportions of a face.
 #[inline]
 fn shape_of(mesh: &TriMesh, face: FaceId) -> Shape {
-    let [a, b, c] = mesh.triangle(face);
-    let double = (b - a).cross(&(c - a));
+    let corners = mesh.triangle(face);
+    let double = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
     let double_area = double.norm();
-    let longest_squared = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared());
-    if double_area > 0.0 {
-        let altitude = double_area / longest_squared.sqrt();
-        Shape { normal: double / double_area, quality: double_area / longest_squared, altitude }
-    } else {
-        Shape { normal: Vector3::zeros(), quality: 0.0, altitude: 0.0 }
-    }
+    let quality = triangle::shape_quality(&corners, double_area);
+    let normal = if double_area > 0.0 { double / double_area } else { Vector3::zeros() };
+    // 2A / L from 2A / L² and 2A
+    Shape { normal, quality, altitude: (quality * double_area).sqrt() }
 }
 
 impl Neighbourhood {

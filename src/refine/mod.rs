@@ -25,7 +25,7 @@ pub use sliding::{Ball, SlidingParams, TipMotion};
 
 use crate::mesh::{FaceHit, FaceId, MeshError, TriMesh, VertexId};
 use crate::touch::{Compensator, ContactGate, Sample, SampleError, SettingError};
-use deform::{Clay, Grip};
+use deform::{DeformableMesh, HandleRegion};
 use dynamics::turn;
 
 /// A held sample never acts for longer than this, s: what happened in a longer pause is not known.
@@ -151,9 +151,9 @@ pub struct Refiner {
     gate: Option<ContactGate>,
     motion: TipMotion,
     dynamics: FaceDynamics,
-    clay: Clay,
-    contact_grip: Grip,
-    carve_grip: Grip,
+    deformable: DeformableMesh,
+    contact_region: HandleRegion,
+    carve_region: HandleRegion,
     last_ns: Option<i64>,
     /// the handle and n*(0), its normal when it became the handle (Eq 6)
     begun: Option<(FaceId, Vector3<f64>)>,
@@ -183,9 +183,9 @@ impl Refiner {
             return Err(MeshError::Empty.into());
         }
         params.check()?;
-        let mut clay = Clay::new(mesh, params.guard);
-        clay.largest_move =
-            (params.largest_move_edges * clay.mean_edge).max(params.largest_move_noises * params.scan_noise);
+        let mut deformable = DeformableMesh::new(mesh, params.guard);
+        deformable.largest_move =
+            (params.largest_move_edges * deformable.mean_edge).max(params.largest_move_noises * params.scan_noise);
         Ok(Self {
             compensator: Compensator::new(params.compensator)?,
             gate: params.gate.map(ContactGate::new).transpose()?,
@@ -194,9 +194,9 @@ impl Refiner {
                 params.tip,
             ),
             dynamics: FaceDynamics::new(params.dynamics)?,
-            contact_grip: clay.grip(params.roi),
-            carve_grip: clay.grip(RoiSize::Handle),
-            clay,
+            contact_region: deformable.region(params.roi),
+            carve_region: deformable.region(RoiSize::Handle),
+            deformable,
             last_ns: None,
             begun: None,
             counts: RefineCounts::default(),
@@ -219,7 +219,7 @@ impl Refiner {
     /// # Errors
     /// Those of [`Self::push`], and [`RefineError::NoSuchFace`]; nothing is changed then.
     pub fn push_on(&mut self, handle: FaceId, sample: &Sample) -> Result<Update, RefineError> {
-        if !self.clay.mesh.has_face(handle) {
+        if !self.deformable.mesh.has_face(handle) {
             return Err(RefineError::NoSuchFace { face: handle.0 });
         }
         self.take(sample, Some(handle))
@@ -281,17 +281,17 @@ impl Refiner {
         if let Some(turning) = self.params.turning {
             next.n = turn(&face.n, &pressing.normal, turning * dt);
         }
-        self.clay.feel(pressing.handle, &pressing.normal);
+        self.deformable.feel(pressing.handle, &pressing.normal);
         let steps = self.rigid_steps(&pressing, &next);
-        let fit = self.clay.deform(&mut self.contact_grip, pressing.handle, self.params.roi, &steps);
+        let fit = self.deformable.deform(&mut self.contact_region, pressing.handle, self.params.roi, &steps);
         self.count(fit);
         Ok(Update { case, mismatch: Some(mismatch), fit: Some(fit) })
     }
 
     /// The ball against `handle`, else against the face that it touches; `None` beyond the reach.
     fn pressing(&self, ball: &Ball, felt: Felt, handle: Option<FaceId>) -> Option<Pressing> {
-        let (mesh, tip) = (&self.clay.mesh, &self.params.tip);
-        let reach = self.clay.largest_move + tip.radius;
+        let (mesh, tip) = (&self.deformable.mesh, &self.params.tip);
+        let reach = self.deformable.largest_move + tip.radius;
         // the spring expects the deflection F/k of the tip, a rigid contact does not
         let centre = if self.params.dynamics.take_out_rigid_offset { ball.centre } else { ball.reported };
         let seek = match felt {
@@ -299,8 +299,8 @@ impl Refiner {
             _ => centre,
         };
         let closest = || match self.params.closest {
-            ClosestBy::Surface => self.clay.closest(&seek, self.contact_grip.handle(), reach),
-            ClosestBy::Barycentre => self.clay.tree.closest_barycentre(mesh, &seek, reach),
+            ClosestBy::Surface => self.deformable.closest(&seek, self.contact_region.handle(), reach),
+            ClosestBy::Barycentre => self.deformable.tree.closest_barycentre(mesh, &seek, reach),
         };
         let handle = handle.or_else(|| closest().map(|hit| hit.face))?;
         let face = FaceState { b: mesh.barycentre(handle), n: mesh.normal(handle) };
@@ -334,9 +334,9 @@ impl Refiner {
         // the smallest rotation from n to n′: x + v × x + v × (v × x) / (1 + n·n′), v = n × n′
         let axis = face.n.cross(&next.n);
         let bend = 1.0 / (1.0 + face.n.dot(&next.n)).max(f64::EPSILON);
-        let longest = self.params.longest_step_edges * self.clay.mean_edge;
+        let longest = self.params.longest_step_edges * self.deformable.mean_edge;
         let along = self.params.dynamics.along == Along::Force;
-        self.clay.mesh.triangle(*handle).map(|corner| {
+        self.deformable.mesh.triangle(*handle).map(|corner| {
             let arm = corner - face.b;
             let across = axis.cross(&arm);
             let step = across + axis.cross(&across) * bend + (next.b - face.b);
@@ -351,17 +351,18 @@ impl Refiner {
         let centre = ball.centre;
         // a mesh that the ball does not enter by more than the tolerance is left alone
         let (tolerance, hint) = match felt {
-            Felt::Nothing => (carve.tolerance, self.carve_grip.handle()),
-            _ => (carve.contact_tolerance.max(carve.tolerance), self.contact_grip.handle()),
+            Felt::Nothing => (carve.tolerance, self.carve_region.handle()),
+            _ => (carve.contact_tolerance.max(carve.tolerance), self.contact_region.handle()),
         };
         let reach = self.params.tip.radius - tolerance;
-        let Some(hit) = self.clay.closest(&centre, hint, reach) else { return update };
+        let Some(hit) = self.deformable.closest(&centre, hint, reach) else { return update };
         let Some((away, depth)) = self.penetration(&centre, &hit) else { return update };
         let share = -(-carve.rate * dt).exp_m1();
-        let way = (share * (depth - carve.tolerance)).min(2.0 * self.params.longest_step_edges * self.clay.mean_edge);
+        let way =
+            (share * (depth - carve.tolerance)).min(2.0 * self.params.longest_step_edges * self.deformable.mean_edge);
         let weight: f64 = hit.barycentric.iter().map(|x| x * x).sum();
         let steps = hit.barycentric.map(|x| -away * (way * x / weight));
-        let fit = self.clay.deform(&mut self.carve_grip, hit.face, RoiSize::Handle, &steps);
+        let fit = self.deformable.deform(&mut self.carve_region, hit.face, RoiSize::Handle, &steps);
         self.count(fit);
         match update.case {
             Case::Free => Update { case: Case::MeshOnly, mismatch: None, fit: Some(fit) },
@@ -371,7 +372,7 @@ impl Refiner {
 
     /// Which way the ball stands out of the mesh, and how deep it is in it, m.
     fn penetration(&self, centre: &Point3<f64>, hit: &FaceHit) -> Option<(Vector3<f64>, f64)> {
-        let normal = self.clay.mesh.normal(hit.face);
+        let normal = self.deformable.mesh.normal(hit.face);
         let arm = centre - hit.point;
         let distance = arm.norm();
         let height = arm.dot(&normal);
@@ -390,17 +391,17 @@ impl Refiner {
 
     /// The mesh as it stands.
     pub fn mesh(&self) -> &TriMesh {
-        &self.clay.mesh
+        &self.deformable.mesh
     }
 
     /// Gives the mesh back.
     pub fn into_mesh(self) -> TriMesh {
-        self.clay.mesh
+        self.deformable.mesh
     }
 
     /// The closest face of the mesh as it stands, by true surface distance, nearer than `reach` (m).
     pub fn closest_face(&self, p: &Point3<f64>, reach: f64) -> Option<FaceHit> {
-        self.clay.tree.closest(&self.clay.mesh, p, reach)
+        self.deformable.tree.closest(&self.deformable.mesh, p, reach)
     }
 
     /// What became of the samples so far.
@@ -410,12 +411,12 @@ impl Refiner {
 
     /// The vertices that the last contact moved.
     pub fn moved_vertices(&self) -> &[VertexId] {
-        self.contact_grip.vertices()
+        self.contact_region.vertices()
     }
 
     /// The faces that the last contact changed.
     pub fn touched_faces(&self) -> &[FaceId] {
-        self.contact_grip.faces()
+        self.contact_region.faces()
     }
 }
 
