@@ -58,11 +58,6 @@ impl HandleRegion {
         self.roi.handle()
     }
 
-    /// The faces that the last update changed.
-    pub fn faces(&self) -> &[FaceId] {
-        self.roi.neighbourhood.moving()
-    }
-
     /// The vertices that the last update moved.
     pub fn vertices(&self) -> &[VertexId] {
         &self.roi.vertices

@@ -115,13 +115,13 @@ pub struct RefineCounts {
     pub accepted: u64,
     /// times that contact began
     pub contacts: u64,
-    /// samples that moved the mesh, by contact or by carving
+    /// updates of the mesh, by contact or by carving; a sample can bring both
     pub moved: u64,
     /// updates shortened or given up to keep the mesh sound
     pub cut_back: u64,
     /// contacts beyond the reach of any face
     pub out_of_reach: u64,
-    /// contacts with a force beyond what the contact model can answer; clamped
+    /// contacts with a force beyond what the contact model can answer; clamped where the rigid offset is taken out
     pub clamped: u64,
 }
 
@@ -412,11 +412,6 @@ impl Refiner {
     /// The vertices that the last contact moved.
     pub fn moved_vertices(&self) -> &[VertexId] {
         self.contact_region.vertices()
-    }
-
-    /// The faces that the last contact changed.
-    pub fn touched_faces(&self) -> &[FaceId] {
-        self.contact_region.faces()
     }
 }
 
