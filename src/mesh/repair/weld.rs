@@ -3,7 +3,7 @@
 use nalgebra::Point3;
 
 /// Marks a free place in the table: no vertex has this number.
-const FREE: u64 = u64::MAX;
+const FREE: u32 = u32::MAX;
 
 /// Width of a cell in which positions count as the same one, relative to the spread of the mesh (0.1 nm on 100 mm).
 ///
@@ -24,21 +24,31 @@ const CELL: f64 = 1e-9;
 /// - returns: how many vertices went away.
 pub(super) fn weld(positions: &mut Vec<Point3<f64>>, faces: &mut [[u32; 3]]) -> usize {
     // a closed mesh has half as many vertices as faces; the table has two places for each
-    let mut table = PositionTable::new(CELL * spread(positions), faces.len());
-    let mut renamed = Vec::with_capacity(positions.len());
+    let mut table = PositionTable::new(CELL * spread(positions), positions.len(), faces.len());
+    // empty until the first vertex goes away
+    let mut renamed = Vec::new();
     let mut kept = 0;
-    for vertex in 0..positions.len() {
-        let position = positions[vertex].map(|x| x + 0.0);
-        let first = table.find_or_add(&position, &positions[..kept]);
-        if first as usize == kept {
-            positions[kept] = position;
-            kept += 1;
+    for start in (0..positions.len()).step_by(BLOCK) {
+        let block = start..positions.len().min(start + BLOCK);
+        table.make_room(&positions[..kept]);
+        let probes = table.probes(&positions[block.clone()]);
+        for (vertex, probe) in block.zip(&probes) {
+            let first = table.find_or_add(&positions[vertex], probe, &positions[..kept]);
+            if first as usize == kept {
+                positions[kept] = positions[vertex].map(|x| x + 0.0);
+                kept += 1;
+            } else if renamed.is_empty() {
+                renamed.extend(0..vertex as u32);
+            }
+            if kept <= vertex {
+                renamed.push(first);
+            }
         }
-        renamed.push(first);
     }
     let welded = positions.len() - kept;
     if welded > 0 {
         positions.truncate(kept);
+        positions.shrink_to_fit();
         for vertex in faces.as_flattened_mut() {
             *vertex = renamed[*vertex as usize];
         }
@@ -61,51 +71,102 @@ fn median(mut values: Vec<f64>) -> f64 {
     if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
 }
 
+/// Vertices that are looked up together: what they need from memory is on its way at the same time.
+const BLOCK: usize = 64;
+
+/// Where to look for a position in a [`PositionTable`].
+#[derive(Clone, Copy, Default)]
+struct Probe {
+    /// hash of its cell
+    hash: u64,
+    /// what stood at the first place when the block began
+    entry: u32,
+}
+
 /// Open-addressing table from the cell of a position to a vertex; at most half full.
 struct PositionTable {
-    /// hash of the cell (upper 32 bits), vertex (lower 32 bits)
-    places: Vec<u64>,
+    /// vertex (lower bits), part of the hash of its cell (the bits above)
+    places: Vec<u32>,
     len: usize,
+    /// bits for the vertex, one number more than there are vertices: so no entry is [`FREE`]
+    vertex_bits: u32,
     /// cells per length; 0 when positions must agree in every bit
     cells: f64,
 }
 
 impl PositionTable {
-    fn new(cell: f64, places: usize) -> Self {
+    /// For at most `vertices` below 2³² − 1.
+    fn new(cell: f64, vertices: usize, places: usize) -> Self {
         let cells = if cell.is_normal() { cell.recip() } else { 0.0 };
-        Self { places: vec![FREE; places.max(64).next_power_of_two()], len: 0, cells }
+        let places = vec![FREE; places.max(2 * BLOCK).next_power_of_two()];
+        Self { places, len: 0, vertex_bits: usize::BITS - vertices.leading_zeros(), cells }
+    }
+
+    /// Room for one more block; `known`: the positions of the vertices in the table.
+    fn make_room(&mut self, known: &[Point3<f64>]) {
+        if 2 * (self.len + BLOCK) > self.places.len() {
+            self.grow(known);
+        }
+    }
+
+    /// Where to look for each position of a block.
+    #[inline]
+    fn probes(&self, block: &[Point3<f64>]) -> [Probe; BLOCK] {
+        let mut probes = [Probe::default(); BLOCK];
+        for (probe, position) in probes.iter_mut().zip(block) {
+            probe.hash = hash(self.cell_of(position));
+        }
+        for probe in &mut probes[..block.len()] {
+            probe.entry = self.places[self.first_place(probe.hash)];
+        }
+        probes
     }
 
     /// The vertex in the cell of this position, or the next number, `known.len()`, which is then taken.
-    fn find_or_add(&mut self, position: &Point3<f64>, known: &[Point3<f64>]) -> u32 {
-        if 2 * self.len >= self.places.len() {
-            self.grow(known);
+    #[inline]
+    fn find_or_add(&mut self, position: &Point3<f64>, probe: &Probe, known: &[Point3<f64>]) -> u32 {
+        let (tag, mut place, mut entry) = (self.tag(probe.hash), self.first_place(probe.hash), probe.entry);
+        if entry == FREE {
+            // may have been taken since
+            entry = self.places[place];
         }
-        let cell = self.cell_of(position);
-        let hash = hash(cell);
-        let mask = self.places.len() - 1;
-        let mut place = hash as usize & mask;
-        while self.places[place] != FREE {
-            let (tag, vertex) = (self.places[place] >> 32, self.places[place] as u32);
-            if tag == hash >> 32 && self.cell_of(&known[vertex as usize]) == cell {
+        while entry != FREE {
+            let vertex = entry ^ tag;
+            // below only when the tags agree
+            if let Some(known) = known.get(vertex as usize)
+                && self.cell_of(known) == self.cell_of(position)
+            {
                 return vertex;
             }
-            place = (place + 1) & mask;
+            place = (place + 1) & (self.places.len() - 1);
+            entry = self.places[place];
         }
-        self.places[place] = hash >> 32 << 32 | known.len() as u64;
+        self.places[place] = tag | known.len() as u32;
         self.len += 1;
         known.len() as u32
     }
 
     fn grow(&mut self, known: &[Point3<f64>]) {
-        let mask = 2 * self.places.len() - 1;
-        for entry in std::mem::replace(&mut self.places, vec![FREE; mask + 1]).into_iter().filter(|&e| e != FREE) {
-            let mut place = hash(self.cell_of(&known[entry as u32 as usize])) as usize & mask;
+        self.places = vec![FREE; 2 * self.places.len()];
+        let mask = self.places.len() - 1;
+        for (vertex, position) in known.iter().enumerate() {
+            let hash = hash(self.cell_of(position));
+            let mut place = self.first_place(hash);
             while self.places[place] != FREE {
                 place = (place + 1) & mask;
             }
-            self.places[place] = entry;
+            self.places[place] = self.tag(hash) | vertex as u32;
         }
+    }
+
+    #[inline]
+    fn first_place(&self, hash: u64) -> usize {
+        hash as usize & (self.places.len() - 1)
+    }
+
+    #[inline]
+    fn tag(&self, hash: u64) -> u32 {
+        (hash >> 32 << self.vertex_bits) as u32
     }
 
     #[inline]
@@ -113,6 +174,7 @@ impl PositionTable {
         /// Added and taken away it rounds to whole numbers, as long as the sum keeps its exponent.
         const ROUND: f64 = 1.5 * (1u64 << 52) as f64;
         let cell = |x: f64| {
+            let x = x + 0.0;
             let scaled = x * self.cells;
             if scaled.abs() < (1u64 << 51) as f64 && self.cells > 0.0 {
                 (scaled + ROUND).to_bits()
@@ -139,6 +201,10 @@ fn hash([x, y, z]: [u64; 3]) -> u64 {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+
+    use proptest::prelude::*;
+
     use super::*;
 
     /// How many of these are left, a hundred more being spread over 0 … 99 on each axis.
@@ -176,5 +242,26 @@ mod tests {
         let mut faces = [[2, 1, 0], [2, 3, 4]];
         assert_eq!(weld(&mut positions, &mut faces), 1);
         assert_eq!((positions[0].y, faces), (1e-17, [[0, 1, 0], [0, 2, 3]]));
+    }
+
+    proptest! {
+        /// More vertices than a block and than the table is made for, each position many times: against an ordered map.
+        #[test]
+        fn copies_of_lattice_points_get_the_number_of_the_first(
+            points in prop::collection::vec((-4..4i8, -4..4i8, -4..4i8), 3..1500)
+        ) {
+            let mut first = BTreeMap::new();
+            let wanted: Vec<u32> = points.iter().map(|p| {
+                let next = first.len() as u32;
+                *first.entry(p).or_insert(next)
+            }).collect();
+            let mut positions: Vec<_> = points.iter().map(|&(x, y, z)| Point3::new(x.into(), y.into(), z.into())).collect();
+            let mut faces: Vec<_> = (0..points.len() as u32).map(|v| [v; 3]).collect();
+            prop_assert_eq!(weld(&mut positions, &mut faces), points.len() - first.len());
+            prop_assert!(faces.iter().map(|f| f[0]).eq(wanted.iter().copied()));
+            for (&(x, y, z), &name) in points.iter().zip(&wanted) {
+                prop_assert_eq!(positions[name as usize], Point3::new(x.into(), y.into(), z.into()));
+            }
+        }
     }
 }
