@@ -1,6 +1,7 @@
 //! From the triangles of a file to a mesh that can be worked on, and a report of what was wrong.
 
 mod orient;
+mod pieces;
 mod weld;
 
 use std::fmt;
