@@ -94,8 +94,16 @@ impl TriMesh {
         for (face, corners) in faces.iter().enumerate() {
             check_corners(corners, face, positions.len())?;
         }
-        let (star_slots, star_entries) = stars_of(positions.len(), &faces);
-        Ok(Self { positions, faces, star_slots, star_entries, free_faces: Vec::new() })
+        let mut valences = Valences::new(positions.len());
+        faces.iter().for_each(|corners| valences.add(corners));
+        Ok(Self::of_sound(positions, faces, valences))
+    }
+
+    /// Builds the adjacency of arrays that keep the invariants above, and whose faces have been counted.
+    pub(super) fn of_sound(positions: Vec<Point3<f64>>, faces: Vec<[u32; 3]>, valences: Valences) -> Self {
+        debug_assert!(faces.iter().all(|corners| check_corners(corners, 0, positions.len()).is_ok()));
+        let (star_slots, star_entries) = valences.stars_of(&faces);
+        Self { positions, faces, star_slots, star_entries, free_faces: Vec::new() }
     }
 
     /// Number of vertices.
@@ -275,26 +283,49 @@ fn check_corners(corners: &[u32; 3], face: usize, vertices: usize) -> Result<(),
     Ok(())
 }
 
-/// The faces around each vertex, by counting sort.
-fn stars_of(vertices: usize, faces: &[[u32; 3]]) -> (Vec<StarSlot>, Vec<FaceId>) {
-    let mut slots = vec![StarSlot::default(); vertices];
-    for &vertex in faces.as_flattened() {
-        slots[vertex as usize].capacity += 1;
+/// How many faces each vertex has: the first half of the counting sort that finds the stars, in the place of its result.
+pub(super) struct Valences(Vec<StarSlot>);
+
+impl Valences {
+    /// No faces yet.
+    pub fn new(vertices: usize) -> Self {
+        Self(vec![StarSlot::default(); vertices])
     }
-    let mut start = 0;
-    for slot in &mut slots {
-        slot.start = start;
-        start += slot.capacity;
+
+    /// Counts a face.
+    #[inline]
+    pub fn add(&mut self, corners: &[u32; 3]) {
+        corners.iter().for_each(|&v| self.0[v as usize].capacity += 1);
     }
-    let mut entries = vec![FaceId(REMOVED); start as usize];
-    for (face, corners) in faces.iter().enumerate() {
-        for &vertex in corners {
-            let slot = &mut slots[vertex as usize];
-            entries[(slot.start + slot.len) as usize] = FaceId(face as u32);
-            slot.len += 1;
+
+    /// Whether each vertex has a face.
+    pub fn used(&self) -> impl Iterator<Item = bool> {
+        self.0.iter().map(|slot| slot.capacity > 0)
+    }
+
+    /// Forgets the vertices without a face.
+    pub fn retain_used(&mut self) {
+        self.0.retain(|slot| slot.capacity > 0);
+    }
+
+    /// The faces around each vertex, in rising order; `faces`: those that were counted.
+    fn stars_of(self, faces: &[[u32; 3]]) -> (Vec<StarSlot>, Vec<FaceId>) {
+        let mut slots = self.0;
+        let mut end = 0;
+        for slot in &mut slots {
+            slot.start = end;
+            end += slot.capacity;
         }
+        let mut entries = vec![FaceId(REMOVED); end as usize];
+        for (face, corners) in faces.iter().enumerate() {
+            for &vertex in corners {
+                let slot = &mut slots[vertex as usize];
+                entries[(slot.start + slot.len) as usize] = FaceId(face as u32);
+                slot.len += 1;
+            }
+        }
+        (slots, entries)
     }
-    (slots, entries)
 }
 
 #[cfg(test)]

@@ -168,8 +168,14 @@ pub fn read_mesh(path: &Path, unit: MeshUnit) -> Result<MeshFile, MeshFileError>
 
 /// Sides of the bounding box, m.
 fn sides(mesh: &TriMesh) -> Vector3<f64> {
-    let empty = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
-    let (low, high) = mesh.positions().iter().fold(empty, |(low, high), p| (low.inf(&p.coords), high.sup(&p.coords)));
+    let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+    for p in mesh.positions() {
+        for axis in 0..3 {
+            // plain comparisons: a mesh has no NaN, for which `min` and `max` would take several instructions more
+            low[axis] = if p[axis] < low[axis] { p[axis] } else { low[axis] };
+            high[axis] = if p[axis] > high[axis] { p[axis] } else { high[axis] };
+        }
+    }
     high - low
 }
 

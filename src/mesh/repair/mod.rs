@@ -9,7 +9,7 @@ use std::fmt;
 use nalgebra::Point3;
 use serde::Serialize;
 
-use super::{MeshError, TriMesh};
+use super::tri_mesh::{MeshError, TriMesh, Valences};
 use orient::{Edges, boundary_loops};
 
 /// Two times the area below which a face counts as having none, relative to its longest edge times its largest
@@ -89,12 +89,12 @@ impl fmt::Display for RepairReport {
 pub fn repair(mut positions: Vec<Point3<f64>>, mut faces: Vec<[u32; 3]>) -> Result<(TriMesh, RepairReport), MeshError> {
     check(&positions, &faces)?;
     let mut report = RepairReport { welded_vertices: weld::weld(&mut positions, &mut faces), ..Default::default() };
-    drop_faces(&positions, &mut faces, &mut report);
-    report.unused_vertices = drop_unused(&mut positions, &mut faces);
+    let mut valences = drop_faces(&positions, &mut faces, &mut report);
+    report.unused_vertices = drop_unused(&mut valences, &mut positions, &mut faces);
     if faces.is_empty() {
         return Err(MeshError::Empty);
     }
-    let (mut mesh, edges) = without_duplicates(TriMesh::new(positions, faces)?, &mut report)?;
+    let (mut mesh, edges) = without_duplicates(TriMesh::of_sound(positions, faces, valences), &mut report)?;
     report.boundary_edges = edges.boundary.len();
     report.boundary_loops = boundary_loops(&edges.boundary);
     report.non_manifold_edges = edges.non_manifold;
@@ -110,41 +110,62 @@ fn check(positions: &[Point3<f64>], faces: &[[u32; 3]]) -> Result<(), MeshError>
             return Err(MeshError::TooMany { what, count });
         }
     }
-    let vertices = positions.len();
-    match faces.as_flattened().iter().position(|&v| v as usize >= vertices) {
-        Some(at) => Err(MeshError::VertexOutOfRange { face: at / 3, vertex: faces.as_flattened()[at], vertices }),
-        None => Ok(()),
+    let (vertices, used) = (positions.len(), faces.as_flattened());
+    let is_beyond = |v: u32| v as usize >= vertices;
+    // the highest is found without a branch for each
+    if used.iter().copied().max().is_some_and(is_beyond)
+        && let Some(at) = used.iter().position(|&v| is_beyond(v))
+    {
+        return Err(MeshError::VertexOutOfRange { face: at / 3, vertex: used[at], vertices });
     }
+    Ok(())
 }
 
-/// Leaves out faces that are not finite or have no area.
-fn drop_faces(positions: &[Point3<f64>], faces: &mut Vec<[u32; 3]>, report: &mut RepairReport) {
+/// Leaves out faces that are not finite or have no area; counts the others at their vertices.
+fn drop_faces(positions: &[Point3<f64>], faces: &mut Vec<[u32; 3]>, report: &mut RepairReport) -> Valences {
+    let mut valences = Valences::new(positions.len());
     faces.retain(|corners| {
         let [a, b, c] = corners.map(|v| positions[v as usize]);
         let (u, v) = (b - a, c - a);
         let double_area_2 = u.cross(&v).norm_squared();
-        let longest_2 = u.norm_squared().max(v.norm_squared()).max((c - b).norm_squared());
-        let largest = a.coords.amax().max(b.coords.amax()).max(c.coords.amax());
-        let limit_2 = longest_2 * (ZERO_AREA * largest).powi(2);
-        let finite = double_area_2.is_finite() && limit_2.is_finite();
-        report.dropped_not_finite += usize::from(!finite);
-        report.dropped_zero_area += usize::from(finite && double_area_2 <= limit_2);
-        finite && double_area_2 > limit_2
+        let longest_2 = larger(u.norm_squared(), larger(v.norm_squared(), (c - b).norm_squared()));
+        let limit_2 = longest_2 * (ZERO_AREA * larger(largest(&a), larger(largest(&b), largest(&c)))).powi(2);
+        // false for NaN, which every coordinate that is not finite brings about
+        let stays = double_area_2 > limit_2 && double_area_2 < f64::INFINITY;
+        if stays {
+            valences.add(corners);
+        } else if double_area_2.is_finite() && limit_2.is_finite() {
+            report.dropped_zero_area += 1;
+        } else {
+            report.dropped_not_finite += 1;
+        }
+        stays
     });
+    valences
+}
+
+/// The largest coordinate, without its sign.
+#[inline]
+fn largest(p: &Point3<f64>) -> f64 {
+    larger(p.x.abs(), larger(p.y.abs(), p.z.abs()))
+}
+
+/// The larger of two numbers, any of them when one is NaN: one instruction, where [`f64::max`] takes several.
+#[inline]
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
 }
 
 /// Leaves out vertices that no face uses; returns how many.
-fn drop_unused(positions: &mut Vec<Point3<f64>>, faces: &mut [[u32; 3]]) -> usize {
-    let mut used = vec![false; positions.len()];
-    for &vertex in faces.as_flattened() {
-        used[vertex as usize] = true;
-    }
-    let unused = used.iter().filter(|&&u| !u).count();
+fn drop_unused(valences: &mut Valences, positions: &mut Vec<Point3<f64>>, faces: &mut [[u32; 3]]) -> usize {
+    let unused = valences.used().filter(|used| !used).count();
     if unused > 0 {
         let mut kept = 0;
-        let renamed: Vec<u32> = used.iter().map(|&u| (kept, kept += u32::from(u)).0).collect();
-        let mut is_used = used.iter();
-        positions.retain(|_| is_used.next() == Some(&true));
+        let renamed: Vec<u32> = valences.used().map(|used| (kept, kept += u32::from(used)).0).collect();
+        let mut used = valences.used();
+        positions.retain(|_| used.next() == Some(true));
+        drop(used);
+        valences.retain_used();
         for vertex in faces.as_flattened_mut() {
             *vertex = renamed[*vertex as usize];
         }
