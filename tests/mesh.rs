@@ -7,7 +7,7 @@ use nalgebra::{Point3, Vector3, vector};
 use proptest::prelude::*;
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
-use touchup::mesh::{FaceHit, FaceId, FaceTree, TriMesh, VertexId, triangle};
+use touchup::mesh::{BoxQuery, FaceHit, FaceId, FaceTree, TriMesh, VertexId, triangle};
 
 #[path = "common/mod.rs"]
 mod common;
@@ -241,14 +241,13 @@ proptest! {
     fn faces_in_box_miss_none_and_come_once((mut mesh, scale, shift, seed) in any_mesh()) {
         let mut rng = Pcg64::seed_from_u64(!seed);
         let mut tree = FaceTree::new(&mesh);
+        let mut in_box = BoxQuery::default();
         for _ in 0..12 {
             move_one(&mut mesh, &mut tree, &mut rng, scale, shift);
             let (a, b) = (query(&mesh, scale, shift, &mut rng), query(&mesh, scale, shift, &mut rng));
             let (lo, hi) = (a.inf(&b), a.sup(&b));
-            let mut found = vec![FaceId(u32::MAX)];
-            tree.faces_in_box(&lo, &hi, &mut found);
-            prop_assert_eq!(found[0], FaceId(u32::MAX), "it appends");
-            found.remove(0);
+            tree.faces_in_box(&lo, &hi, &mut in_box);
+            let mut found = in_box.faces.clone();
             found.sort_unstable();
             prop_assert!(found.windows(2).all(|pair| pair[0] != pair[1]), "none comes twice");
             for (face, _) in mesh.faces() {
@@ -384,9 +383,9 @@ fn a_query_that_is_no_point_or_finds_nothing_gives_none() {
         assert_eq!(tree.closest(&mesh, &Point3::new(0.1, 0.1, 0.1), reach), None);
     }
     let empty = TriMesh::new(vec![], vec![]).unwrap();
-    let mut found = vec![];
+    let mut found = BoxQuery::default();
     FaceTree::new(&empty).faces_in_box(&Point3::new(-1.0, -1.0, -1.0), &Point3::new(1.0, 1.0, 1.0), &mut found);
-    assert_eq!((FaceTree::new(&empty).closest(&empty, &Point3::origin(), 1.0), found), (None, vec![]));
+    assert_eq!((FaceTree::new(&empty).closest(&empty, &Point3::origin(), 1.0), found.faces), (None, vec![]));
 }
 
 #[test]

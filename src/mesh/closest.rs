@@ -85,9 +85,16 @@ impl Aabb {
         x * x + y * y + z * z
     }
 
+    /// The largest box of single precision within a box: it overlaps the same boxes of single precision.
+    fn within(lo: &Vector3<f64>, hi: &Vector3<f64>) -> Self {
+        let up = |x: f64| if f64::from(x as f32) < x { (x as f32).next_up() } else { x as f32 };
+        Self { lo: [lo.x, lo.y, lo.z].map(up), hi: [hi.x, hi.y, hi.z].map(|x| -up(-x)) }
+    }
+
+    /// Whether two boxes meet; without branches, for which way it goes cannot be foretold.
     #[inline]
-    fn overlaps(&self, lo: &Vector3<f64>, hi: &Vector3<f64>) -> bool {
-        (0..3).all(|i| f64::from(self.lo[i]) <= hi[i] && f64::from(self.hi[i]) >= lo[i])
+    fn overlaps(&self, other: &Self) -> bool {
+        (0..3).fold(true, |all, i| all & (self.lo[i] <= other.hi[i]) & (self.hi[i] >= other.lo[i]))
     }
 }
 
@@ -119,7 +126,7 @@ pub struct FaceTree {
     leaf_of_face: Vec<u32>,
 }
 
-/// The boxes that depend on certain faces: leaves, and the pairs above them from the leaves up.
+/// The boxes that depend on certain faces: leaves, and the pairs above them from the root down.
 #[derive(Clone, Debug, Default)]
 pub struct RefitPlan {
     leaves: Vec<u32>,
@@ -131,6 +138,25 @@ impl RefitPlan {
     pub fn with_room(faces: usize) -> Self {
         // the way from the leaves to the root adds a level or so for each halving of the mesh
         Self { leaves: Vec::with_capacity(faces), pairs: Vec::with_capacity(2 * faces + STACK) }
+    }
+}
+
+/// The faces found by [`FaceTree::faces_in_box`], with the buffers of the search.
+#[derive(Clone, Debug, Default)]
+pub struct BoxQuery {
+    /// in no particular order
+    pub faces: Vec<FaceId>,
+    /// pairs met, in order
+    pairs: Vec<u32>,
+    /// first face and number of faces of the leaves met
+    leaves: Vec<(u32, u32)>,
+}
+
+impl BoxQuery {
+    /// A query with room for so many faces.
+    pub fn with_room(faces: usize) -> Self {
+        let (pairs, leaves) = (vec![0; faces + STACK], vec![(0, 0); faces + STACK]);
+        Self { faces: Vec::with_capacity(faces + LEAF_FACES), pairs, leaves }
     }
 }
 
@@ -157,10 +183,12 @@ impl FaceTree {
             root: Node { bounds: Aabb::EMPTY, first: 0, count: 0 },
             pairs: Vec::with_capacity(items.len() / 2),
             parents: Vec::with_capacity(items.len() / 2),
-            leaf_faces: Vec::with_capacity(items.len()),
+            leaf_faces: Vec::with_capacity(items.len() + LEAF_FACES),
             leaf_of_face: vec![NONE; mesh.face_slots()],
         };
         tree.root = tree.build(mesh, &mut items, NONE);
+        // so that any leaf can be read as if it were full
+        tree.leaf_faces.extend([FaceId(NONE); LEAF_FACES]);
         tree
     }
 
@@ -300,28 +328,58 @@ impl FaceTree {
         4.0 * f64::from(f32::EPSILON) * largest
     }
 
-    /// Appends to `found` every face whose box meets the box from `lo` to `hi` (m, in O).
-    pub fn faces_in_box(&self, lo: &Point3<f64>, hi: &Point3<f64>, found: &mut Vec<FaceId>) {
-        let (lo, hi) = (lo - self.origin, hi - self.origin);
-        let mut stack = [0u32; STACK];
-        let mut depth = 0;
-        let mut node = &self.root;
-        loop {
-            if node.count > 0 {
-                found.extend_from_slice(self.faces_of(node));
-            } else if let Some(pair) = self.pairs.get(node.first as usize) {
-                for side in 0..2 {
-                    if pair.0[side].bounds.overlaps(&lo, &hi) {
-                        stack[depth] = 2 * node.first + side as u32;
-                        depth += 1;
-                    }
+    /// Finds every face whose leaf's box meets the box from `lo` to `hi` (m, in O); those of the last query are forgotten.
+    pub fn faces_in_box(&self, lo: &Point3<f64>, hi: &Point3<f64>, query: &mut BoxQuery) {
+        let wanted = Aabb::within(&(lo - self.origin), &(hi - self.origin));
+        let BoxQuery { faces, pairs, leaves } = query;
+        faces.clear();
+        if self.pairs.is_empty() {
+            faces.extend_from_slice(self.faces_of(&self.root));
+            return;
+        }
+        let (mut level, mut hits) = (0..1, 0);
+        pairs.clear();
+        pairs.push(self.narrow_down(&wanted));
+        // level by level: the boxes of one are fetched from memory at the same time
+        while !level.is_empty() {
+            let mut met = level.end;
+            pairs.resize(pairs.len().max(met + 2 * level.len()), 0);
+            leaves.resize(leaves.len().max(hits + 2 * level.len()), (0, 0));
+            let (above, below) = pairs.split_at_mut(met);
+            for &pair in &above[level.clone()] {
+                for node in &self.pairs[pair as usize].0 {
+                    // no branches: which boxes are met cannot be foretold
+                    let (is_met, is_leaf) = (node.bounds.overlaps(&wanted), node.count > 0);
+                    below[met - level.end] = node.first;
+                    met += usize::from(is_met & !is_leaf);
+                    leaves[hits] = (node.first, node.count);
+                    hits += usize::from(is_met & is_leaf);
                 }
             }
-            if depth == 0 {
-                return;
+            level = level.end..met;
+        }
+        for &(first, count) in &leaves[..hits] {
+            // a full leaf is copied sooner than a part of it
+            let (first, count) = (first as usize, count as usize);
+            faces.extend_from_slice(&self.leaf_faces[first..first + LEAF_FACES]);
+            faces.truncate(faces.len() + count - LEAF_FACES);
+        }
+    }
+
+    /// The pair below which all leaves that meet a box are found, from the root down as long as one side alone is met.
+    fn narrow_down(&self, wanted: &Aabb) -> u32 {
+        let mut at = self.root.first;
+        loop {
+            let [left, right] = &self.pairs[at as usize].0;
+            let node = match [left, right].map(|node| node.bounds.overlaps(wanted)) {
+                [true, false] => left,
+                [false, true] => right,
+                _ => return at,
+            };
+            if node.count > 0 {
+                return at;
             }
-            depth -= 1;
-            node = self.node(stack[depth]);
+            at = node.first;
         }
     }
 
@@ -336,23 +394,20 @@ impl FaceTree {
     pub fn plan(&self, faces: &[FaceId], plan: &mut RefitPlan) {
         plan.leaves.clear();
         plan.leaves.extend(faces.iter().map(|face| self.leaf_of_face[face.0 as usize]));
+        plan.leaves.dedup();
         plan.leaves.sort_unstable();
         plan.leaves.dedup();
         plan.pairs.clear();
-        plan.pairs.extend(plan.leaves.iter().filter(|&&leaf| leaf != NONE).map(|leaf| leaf / 2));
-        plan.pairs.dedup();
-        // children come after their parents: from the back, each pair meets its own children first
-        plan.pairs.sort_unstable_by(|a, b| b.cmp(a));
-        let mut next = 0;
-        while let Some(&pair) = plan.pairs.get(next) {
-            let above = self.parents[pair as usize];
-            if above != NONE {
-                let at = next + plan.pairs[next..].partition_point(|&other| other > above / 2);
-                if plan.pairs.get(at) != Some(&(above / 2)) {
-                    plan.pairs.insert(at, above / 2);
-                }
+        let mut last = None;
+        for &leaf in plan.leaves.iter().filter(|&&leaf| leaf != NONE) {
+            // pairs are numbered subtree by subtree: one above this leaf and not after the last leaf is above both
+            let (known, mut at) = (plan.pairs.len(), leaf);
+            while at != NONE && last < Some(at / 2) {
+                plan.pairs.push(at / 2);
+                at = self.parents[at as usize / 2];
             }
-            next += 1;
+            plan.pairs[known..].reverse();
+            last = Some(leaf / 2);
         }
     }
 
@@ -365,7 +420,7 @@ impl FaceTree {
             }
             self.node_mut(leaf).bounds = bounds.rounded_outward();
         }
-        for &pair in &plan.pairs {
+        for &pair in plan.pairs.iter().rev() {
             let [left, right] = &self.pairs[pair as usize].0;
             let bounds = left.bounds.union(&right.bounds);
             self.node_mut(self.parents[pair as usize]).bounds = bounds;

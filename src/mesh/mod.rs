@@ -5,6 +5,6 @@ mod repair;
 mod tri_mesh;
 pub mod triangle;
 
-pub use closest::{FaceHit, FaceTree, RefitPlan};
+pub use closest::{BoxQuery, FaceHit, FaceTree, RefitPlan};
 pub use repair::{RepairReport, repair};
 pub use tri_mesh::{FaceId, MeshError, TriMesh, VertexId};

@@ -117,7 +117,7 @@ impl DeformableMesh {
     ) -> Fit {
         if !region.roi.is_for(handle) {
             region.roi.rebuild(&self.mesh, handle, size);
-            self.tree.plan(region.roi.neighbourhood.moving(), &mut region.refit);
+            self.tree.plan(region.roi.neighbourhood.patch.moving(), &mut region.refit);
             region.seen = None;
         }
         let longest = self.displace(&region.roi, steps);
@@ -169,7 +169,8 @@ impl DeformableMesh {
         self.place(&region.roi, share);
         let gap = guard.gap_share * self.mean_edge;
         let (mesh, before, marks) = (&self.mesh, &self.before, &region.roi.marks);
-        let was = |v: VertexId| marks.of(v.0).map_or_else(|| mesh.position(v), |i| before[i as usize]);
+        let moved = |v: VertexId| marks.of(v.0).and_then(|i| before.get(i as usize));
+        let was = |v: VertexId| moved(v).copied().unwrap_or_else(|| mesh.position(v));
         region.roi.neighbourhood.judge(mesh, guard, &self.evidence, gap, share * longest, was)
     }
 

@@ -6,7 +6,8 @@ use nalgebra::{Point3, Vector3};
 
 use super::collision::Pairs;
 use super::marks::Marks;
-use crate::mesh::{FaceId, FaceTree, TriMesh, VertexId, triangle};
+use super::patch::Patch;
+use crate::mesh::{BoxQuery, FaceId, FaceTree, TriMesh, VertexId, triangle};
 
 /// Limits that keep a mesh sound.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -105,13 +106,8 @@ impl Look {
 /// The faces that change when the vertices of a region move, and what they could run into.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Neighbourhood {
-    /// faces with a moving vertex, then the faces that share an edge with one of these
-    faces: Vec<FaceId>,
-    /// how many of them move
-    moving: usize,
-    /// indices into `faces` of faces that share an edge, the first one moving
-    edges: Vec<(u32, u32)>,
-    /// state at the last look, for each of `faces`
+    pub patch: Patch,
+    /// state at the last look, for each face of the patch
     before: Vec<Shape>,
     /// state after the update, for the moving ones
     after: Vec<Shape>,
@@ -122,9 +118,7 @@ pub(super) struct Neighbourhood {
     allowance: f64,
     /// how far vertices may still move before the region must be looked at again, m
     unseen: f64,
-    near: Vec<FaceId>,
-    /// index in `faces`
-    known: Marks,
+    near: BoxQuery,
     /// corners that hang together with the region
     reached: Marks,
 }
@@ -148,56 +142,10 @@ impl Neighbourhood {
         for list in [&mut self.before, &mut self.after] {
             list.reserve(faces);
         }
-        self.faces.reserve(faces);
-        self.edges.reserve(2 * faces);
-        self.near.reserve(2 * faces);
+        self.patch.reserve(vertices);
+        self.near = BoxQuery::with_room(2 * faces);
         self.suspects.reserve(faces);
-        self.known.reserve(faces);
         self.reached.reserve(4 * faces);
-    }
-
-    /// Faces whose corners move with the region.
-    pub fn moving(&self) -> &[FaceId] {
-        &self.faces[..self.moving]
-    }
-
-    /// Collects the faces around `vertices`.
-    pub fn rebuild(&mut self, mesh: &TriMesh, vertices: &[VertexId]) {
-        self.faces.clear();
-        self.edges.clear();
-        self.known.clear();
-        for &vertex in vertices {
-            for &face in mesh.star(vertex) {
-                if self.known.insert(face.0, self.faces.len() as u32).is_none() {
-                    self.faces.push(face);
-                }
-            }
-        }
-        self.moving = self.faces.len();
-        for index in 0..self.moving {
-            let corners = mesh.corners(self.faces[index]);
-            for side in 0..3 {
-                self.link(mesh, index as u32, corners[side], corners[(side + 1) % 3]);
-            }
-        }
-    }
-
-    /// Notes the other faces at one edge of the moving face `index`.
-    fn link(&mut self, mesh: &TriMesh, index: u32, a: VertexId, b: VertexId) {
-        for &face in mesh.star(a) {
-            if face == self.faces[index as usize] || !mesh.corners(face).contains(&b) {
-                continue;
-            }
-            let next = self.faces.len() as u32;
-            let other = self.known.insert(face.0, next).unwrap_or_else(|| {
-                self.faces.push(face);
-                next
-            });
-            // pairs of moving faces are met from both sides
-            if other > index {
-                self.edges.push((index, other));
-            }
-        }
     }
 
     /// Looks at the region anew after the mesh was changed elsewhere; arguments as in [`Self::judge`].
@@ -210,12 +158,12 @@ impl Neighbourhood {
         evidence: &[[f32; 3]],
     ) {
         self.before.clear();
-        self.before.extend(self.faces.iter().map(|&face| shape_of(mesh, face)));
+        self.before.extend(self.patch.faces.iter().map(|&face| shape_of(mesh, face)));
         self.collect(mesh, tree, margin);
         self.unseen = 0.0;
         if let Some(mean) = self.smooth {
             self.after.clear();
-            self.after.extend_from_slice(&self.before[..self.moving]);
+            self.after.extend_from_slice(&self.before[..self.patch.moving]);
             let lowest = self.after.iter().map(|shape| shape.normal.dot(&mean)).fold(1.0, f64::min);
             self.allow_unseen(self.look(params, evidence), lowest);
         }
@@ -241,40 +189,39 @@ impl Neighbourhood {
 
     fn find_near(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64) {
         let (mut lo, mut hi) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
-        for &face in &self.faces[..self.moving] {
+        for &face in self.patch.moving() {
             for p in mesh.triangle(face) {
                 (lo, hi) = (lo.inf(&p.coords), hi.sup(&p.coords));
             }
         }
         let margin_box = Vector3::repeat(margin);
-        self.near.clear();
         tree.faces_in_box(&Point3::from(lo - margin_box), &Point3::from(hi + margin_box), &mut self.near);
     }
 
     /// The mean normal, if all faces nearby are within [`SMOOTH_COSINE`] of it and hang together.
     fn smooth_normal(&mut self, mesh: &TriMesh) -> Option<Vector3<f64>> {
-        let sum: Vector3<f64> = self.before[..self.moving].iter().map(|shape| shape.normal).sum();
+        let sum: Vector3<f64> = self.before[..self.patch.moving].iter().map(|shape| shape.normal).sum();
         let mean = sum.try_normalize(0.0)?;
         if self.before.iter().any(|shape| shape.normal.dot(&mean) <= SMOOTH_COSINE) {
             return None;
         }
-        let known = &self.known;
-        self.near.retain(|face| known.of(face.0).is_none());
+        let patch = &self.patch;
+        retain(&mut self.near.faces, |face| patch.number_of(face).is_none());
         let within = |face: &FaceId| {
             let double = mesh.double_area_normal(*face);
             double.dot(&mean) > SMOOTH_COSINE * double.norm()
         };
-        if !self.near.iter().all(within) {
+        if !self.near.faces.iter().all(within) {
             return None;
         }
         // nearly always the rim's other corners reach all; at a border some are reached from the moving faces
         self.reached.clear();
-        let (moving, rim) = self.faces.split_at(self.moving);
+        let (moving, rim) = self.patch.faces.split_at(self.patch.moving);
         for faces in [rim, moving] {
-            for corner in faces.iter().flat_map(|&face| mesh.corners(face)) {
-                self.reached.insert(corner.0, 0);
+            for &face in faces {
+                self.reached.number(mesh.corners(face).map(|corner| corner.0));
             }
-            if reach_all(mesh, &mut self.near, &mut self.reached) {
+            if reach_all(mesh, &mut self.near.faces, &mut self.reached) {
                 return Some(mean);
             }
         }
@@ -283,12 +230,12 @@ impl Neighbourhood {
 
     fn collect_suspects(&mut self, mesh: &TriMesh, margin: f64) {
         self.suspects.clear();
-        for moving in 0..self.moving {
-            for &other in &self.near {
+        for moving in 0..self.patch.moving {
+            for &other in &self.near.faces {
                 // two moving faces are one pair
-                let index = self.known.of(other.0).map(|index| index as usize);
+                let index = self.patch.number_of(other).map(|index| index as usize);
                 if index.is_none_or(|index| index > moving) {
-                    self.suspects.add(mesh, self.faces[moving], other, margin);
+                    self.suspects.add(mesh, self.patch.faces[moving], other, margin);
                 }
             }
         }
@@ -323,7 +270,7 @@ impl Neighbourhood {
         before: impl Fn(VertexId) -> Point3<f64>,
     ) -> Verdict {
         self.after.clear();
-        self.after.extend(self.faces[..self.moving].iter().map(|&face| shape_of(mesh, face)));
+        self.after.extend(self.patch.faces[..self.patch.moving].iter().map(|&face| shape_of(mesh, face)));
         let look = self.look(params, evidence);
         self.unseen = 0.0;
         if look == Look::Broken {
@@ -357,7 +304,7 @@ impl Neighbourhood {
 
     fn look_at_faces(&self, params: &GuardParams, evidence: &[[f32; 3]]) -> Look {
         let mut look = Look::Safe;
-        for ((&face, old), new) in self.faces.iter().zip(&self.before).zip(&self.after) {
+        for ((&face, old), new) in self.patch.faces.iter().zip(&self.before).zip(&self.after) {
             let seen = Vector3::from(evidence[face.0 as usize].map(f64::from));
             let worse = |new: f64, old: f64, limit: f64| new < limit && new < old;
             let cosine = new.normal.dot(&seen);
@@ -376,7 +323,7 @@ impl Neighbourhood {
 
     fn look_at_edges(&self, params: &GuardParams) -> Look {
         let mut look = Look::Safe;
-        for &(a, b) in &self.edges {
+        for &(a, b) in &self.patch.edges {
             let (old_a, old_b) = (&self.before[a as usize], &self.before[b as usize]);
             let new_b = self.after.get(b as usize).unwrap_or(old_b);
             let cosine = self.after[a as usize].normal.dot(&new_b.normal);
@@ -390,7 +337,7 @@ impl Neighbourhood {
 
     /// Takes the state just looked at as the new state before; `way` is the longest of a vertex, m.
     pub fn accept(&mut self, way: f64) {
-        self.before[..self.moving].copy_from_slice(&self.after);
+        self.before[..self.patch.moving].copy_from_slice(&self.after);
         self.suspects.accept(way);
         self.allowance -= way;
     }
@@ -406,13 +353,12 @@ impl Neighbourhood {
 fn reach_all(mesh: &TriMesh, faces: &mut Vec<FaceId>, reached: &mut Marks) -> bool {
     loop {
         let before = faces.len();
-        faces.retain(|&face| {
-            let corners = mesh.corners(face);
-            let is_reached = corners.iter().any(|corner| reached.of(corner.0).is_some());
-            if is_reached {
-                for corner in corners {
-                    reached.insert(corner.0, 0);
-                }
+        retain(faces, |face| {
+            let (corners, known) = (mesh.corners(face).map(|corner| corner.0), reached.len());
+            reached.number(corners);
+            let is_reached = reached.len() < known + 3;
+            if !is_reached {
+                reached.take_back(corners);
             }
             !is_reached
         });
@@ -420,4 +366,16 @@ fn reach_all(mesh: &TriMesh, faces: &mut Vec<FaceId>, reached: &mut Marks) -> bo
             return faces.is_empty();
         }
     }
+}
+
+/// As [`Vec::retain`], without a branch on the answer: it cannot be foretold.
+#[inline]
+fn retain(faces: &mut Vec<FaceId>, mut stays: impl FnMut(FaceId) -> bool) {
+    let mut kept = 0;
+    for at in 0..faces.len() {
+        let face = faces[at];
+        faces[kept] = face;
+        kept += usize::from(stays(face));
+    }
+    faces.truncate(kept);
 }

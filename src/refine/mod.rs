@@ -10,6 +10,7 @@ pub mod dynamics;
 mod guard;
 mod marks;
 mod params;
+mod patch;
 mod roi;
 mod sliding;
 

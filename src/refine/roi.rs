@@ -9,6 +9,7 @@ use nalgebra::Point3;
 
 use super::guard::Neighbourhood;
 use super::marks::Marks;
+use super::patch::Patch;
 use crate::mesh::{FaceId, TriMesh, VertexId};
 
 /// How far the free vertices reach.
@@ -24,8 +25,6 @@ pub enum RoiSize {
 
 /// Room for more vertices is not made ahead.
 const LARGEST_ROOM: f64 = 1e4;
-/// Neighbours of a vertex; six in a regular mesh.
-const LINKS_PER_VERTEX: usize = 8;
 /// Entries of a row of the skyline; twelve in a ring around a face, some thirty for a few hundred vertices.
 const ROW_ENTRIES: usize = 32;
 
@@ -39,7 +38,7 @@ pub(super) struct Roi {
     pub weights: Vec<[f64; 3]>,
     /// what the guard looks at
     pub neighbourhood: Neighbourhood,
-    /// index in `vertices` of each vertex that moves
+    /// index in `vertices` of each vertex that moves; their neighbours have higher numbers
     pub marks: Marks,
     solver: Solver,
 }
@@ -64,7 +63,7 @@ impl Roi {
         let mut roi = Self::default();
         roi.vertices.reserve(vertices);
         roi.weights.reserve(vertices);
-        roi.marks.reserve(vertices);
+        roi.marks.reserve(4 * vertices);
         roi.solver.reserve(vertices);
         roi.neighbourhood.reserve(vertices);
         roi
@@ -89,12 +88,12 @@ impl Roi {
             self.add(vertex);
         }
         self.spread(mesh, mesh.barycentre(handle), size);
-        self.solver.solve(mesh, &self.vertices, &self.marks, &mut self.weights);
-        self.neighbourhood.rebuild(mesh, &self.vertices);
+        self.neighbourhood.patch.rebuild(mesh, &self.vertices, &mut self.marks);
+        self.solver.solve(&self.neighbourhood.patch, self.vertices.len(), &mut self.weights);
     }
 
     fn add(&mut self, vertex: VertexId) {
-        self.marks.insert(vertex.0, self.vertices.len() as u32);
+        self.marks.number([vertex.0]);
         self.vertices.push(vertex);
     }
 
@@ -129,63 +128,47 @@ struct Solver {
     /// row i of the matrix is `rows[starts[i]..starts[i + 1]]`: from its first entry to the diagonal
     rows: Vec<f64>,
     starts: Vec<usize>,
-    /// neighbours of one vertex, and their indices in `vertices` where they move
-    around: Vec<VertexId>,
-    links: Vec<u32>,
 }
 
 impl Solver {
     fn reserve(&mut self, vertices: usize) {
         self.rows.reserve(ROW_ENTRIES * vertices);
         self.starts.reserve(vertices + 1);
-        self.around.reserve(4 * LINKS_PER_VERTEX);
-        self.links.reserve(4 * LINKS_PER_VERTEX);
     }
 
-    fn solve(&mut self, mesh: &TriMesh, vertices: &[VertexId], marks: &Marks, weights: &mut Vec<[f64; 3]>) {
+    fn solve(&mut self, patch: &Patch, vertices: usize, weights: &mut Vec<[f64; 3]>) {
         weights.clear();
         weights.extend([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
-        weights.resize(vertices.len(), [0.0; 3]);
+        weights.resize(vertices, [0.0; 3]);
         let (_, free) = weights.split_at_mut(3);
-        self.assemble(mesh, &vertices[3..], marks, free);
+        self.assemble(patch, free);
         self.factorise();
         self.substitute(free);
     }
 
     /// degree · w − Σ w of the neighbours = 0: the handle's neighbours go to the right side, the rim's are zero.
-    fn assemble(&mut self, mesh: &TriMesh, free: &[VertexId], marks: &Marks, right: &mut [[f64; 3]]) {
+    fn assemble(&mut self, patch: &Patch, right: &mut [[f64; 3]]) {
         self.rows.clear();
         self.starts.clear();
-        for (row, &vertex) in free.iter().enumerate() {
-            self.find_links(mesh, vertex, marks);
-            let earlier = self.links.iter().map(|&link| link as usize).filter(|&link| link >= 3);
-            let first = earlier.map(|link| link - 3).min().unwrap_or(row).min(row);
+        for (row, right) in right.iter_mut().enumerate() {
+            let neighbours = patch.neighbours(row + 3);
+            let earlier = neighbours.iter().map(|&other| other as usize).filter(|&other| other >= 3);
+            let first = earlier.map(|other| other - 3).min().unwrap_or(row).min(row);
             let start = self.rows.len();
             self.starts.push(start);
             self.rows.resize(start + row - first + 1, 0.0);
-            for &link in &self.links {
-                match (link as usize).checked_sub(3) {
-                    None => right[row][link as usize] += 1.0,
+            for &other in neighbours {
+                match (other as usize).checked_sub(3) {
+                    None => right[other as usize] += 1.0,
                     Some(column) if column < row => self.rows[start + column - first] = -1.0,
                     Some(_) => {}
                 }
             }
             if let Some(diagonal) = self.rows.last_mut() {
-                *diagonal = self.around.len() as f64;
+                *diagonal = neighbours.len() as f64;
             }
         }
         self.starts.push(self.rows.len());
-    }
-
-    fn find_links(&mut self, mesh: &TriMesh, vertex: VertexId, marks: &Marks) {
-        self.around.clear();
-        self.links.clear();
-        for other in mesh.star(vertex).iter().flat_map(|&face| mesh.corners(face)) {
-            if other != vertex && !self.around.contains(&other) {
-                self.around.push(other);
-                self.links.extend(marks.of(other.0));
-            }
-        }
     }
 
     /// First column of a row.

@@ -6,7 +6,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::field::{Field, cells};
 use crate::mesh::triangle::segment_crosses;
-use crate::mesh::{FaceId, FaceTree, MeshError, TriMesh};
+use crate::mesh::{BoxQuery, FaceId, FaceTree, MeshError, TriMesh};
 
 /// Rounds of flipping, evening out and going back to the level.
 const ROUNDS: usize = 12;
@@ -231,14 +231,13 @@ impl Soup {
     pub(super) fn drop_crossings_mut(&mut self) -> Result<(), MeshError> {
         let mesh = TriMesh::new(self.positions.clone(), self.faces.clone())?;
         let tree = FaceTree::new(&mesh);
-        let mut near = Vec::new();
+        let mut near = BoxQuery::default();
         let mut kept = vec![true; self.faces.len()];
         for (face, corners) in mesh.faces() {
             let triangle @ [a, b, c] = mesh.triangle(face);
-            near.clear();
             tree.faces_in_box(&a.inf(&b).inf(&c), &a.sup(&b).sup(&c), &mut near);
             let apart = |other: &&FaceId| mesh.corners(**other).iter().all(|v| !corners.contains(v));
-            for other in near.iter().filter(apart) {
+            for other in near.faces.iter().filter(apart) {
                 let [d, e, f] = mesh.triangle(*other);
                 if [(d, e), (e, f), (f, d)].iter().any(|(p, q)| segment_crosses(p, q, &triangle, 0.0)) {
                     kept[face.0 as usize] = false;

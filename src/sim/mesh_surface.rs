@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 use super::error::SimError;
 use super::surface::{Bounds, Surface, SurfacePoint};
 use crate::mesh::triangle::closest_point;
-use crate::mesh::{FaceHit, FaceId, FaceTree, MeshError, TriMesh, VertexId};
+use crate::mesh::{BoxQuery, FaceHit, FaceId, FaceTree, MeshError, TriMesh, VertexId};
 
 /// A triangle mesh with exact distances to its triangles.
 ///
@@ -79,8 +79,9 @@ impl Surface for MeshSurface<'_> {
 
     fn near(&self, p: &Point3<f64>, reach: f64, found: &mut Vec<SurfacePoint>) {
         let around = Bounds { min: *p, max: *p }.grown(reach);
-        let mut faces = Vec::new();
-        self.tree.faces_in_box(&around.min, &around.max, &mut faces);
+        let mut query = BoxQuery::default();
+        self.tree.faces_in_box(&around.min, &around.max, &mut query);
+        let mut faces = query.faces;
         // the order of the tree must not reach the result
         faces.sort_unstable();
         let points = faces.into_iter().map(|face| SurfacePoint {
