@@ -7,7 +7,7 @@ use nalgebra::{Point3, Vector3, vector};
 use proptest::prelude::*;
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
-use touchup::mesh::{BoxQuery, FaceHit, FaceId, FaceTree, TriMesh, VertexId, triangle};
+use touchup::mesh::{BoxQuery, FaceHit, FaceId, FaceTree, TriMesh, VertexId, signed_distance, triangle};
 
 #[path = "common/mod.rs"]
 mod common;
@@ -616,6 +616,34 @@ proptest! {
         let tree = FaceTree::new(&mesh);
         if let Some(hit) = tree.closest(&mesh, &Point3::new(0.1, 0.2, 0.3), f64::INFINITY) {
             prop_assert!(mesh.has_face(hit.face));
+        }
+    }
+}
+
+// ---- inside and outside -----------------------------------------------------------------------------------------
+
+/// How often a closed mesh winds around `p`: the solid angles of its faces \[Van Oosterom Strackee 1983\] over 4π.
+fn winding(mesh: &TriMesh, p: &Point3<f64>) -> f64 {
+    let of_face = |t: Triangle| {
+        let [a, b, c] = t.map(|x| x - p);
+        let (la, lb, lc) = (a.norm(), b.norm(), c.norm());
+        2.0 * a.dot(&b.cross(&c)).atan2(la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb)
+    };
+    mesh.faces().map(|(face, _)| of_face(mesh.triangle(face))).sum::<f64>() / (2.0 * TAU)
+}
+
+#[test]
+fn the_signed_distance_is_negative_where_the_mesh_winds_around() {
+    let mut rng = Pcg64::seed_from_u64(7);
+    for _ in 0..8 {
+        // spikes and dents: every second point lies nearest to an edge or a corner
+        let mesh = ball(8, 12, |direction| direction * within(&mut rng, 0.4, 1.0));
+        let tree = FaceTree::new(&mesh);
+        for _ in 0..500 {
+            let p = Point3::from(point(&mut rng));
+            let d = signed_distance(&mesh, &tree, &p, f64::INFINITY).unwrap();
+            assert!((d.abs() - brute_distance(&mesh, &p)).abs() < 1e-12);
+            assert_eq!(d < 0.0, winding(&mesh, &p) > 0.5, "{p}: {d}");
         }
     }
 }

@@ -1,10 +1,12 @@
-//! Triangle meshes: positions, adjacency, repair, closest face.
+//! Triangle meshes: positions, adjacency, repair, closest face, signed distance.
 
 mod closest;
 mod repair;
+mod signed_distance;
 mod tri_mesh;
 pub mod triangle;
 
 pub use closest::{BoxQuery, FaceHit, FaceTree, RefitPlan};
 pub use repair::{RepairReport, repair};
+pub use signed_distance::{pseudo_normal, signed_distance};
 pub use tri_mesh::{FaceId, MeshError, TriMesh, VertexId};
