@@ -10,6 +10,7 @@
 //! |---|---|
 //! | [`touch`] | pose and wrench become one [`touch::Sample`]; weight and bias come off; is there contact? |
 //! | [`mesh`] | the triangle mesh, its closest face, its Laplacian |
+//! | [`patch`] | the scan meshed anew where it was touched |
 //! | [`refine`] | [`refine::Refiner::push`]: one sample moves the mesh |
 //! | [`sim`] | known surfaces, a scanner and a stylus to test against |
 //! | [`io`] | mesh files and recordings; with [`scene`] the only file access |
@@ -38,6 +39,7 @@ struct Readme;
 pub mod cli;
 pub mod io;
 pub mod mesh;
+pub mod patch;
 pub mod refine;
 pub mod scene;
 pub mod sim;

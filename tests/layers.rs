@@ -8,6 +8,7 @@ use std::path::Path;
 const MAY_USE: &[(&str, &[&str])] = &[
     ("touch", &[]),
     ("mesh", &[]),
+    ("patch", &["touch", "mesh"]),
     ("refine", &["touch", "mesh"]),
     ("sim", &["touch", "mesh"]),
     ("io", &["touch", "mesh"]),
@@ -16,7 +17,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
 ];
 
 /// Same input, same bytes out: nothing of the world outside comes in.
-const PURE: &[&str] = &["touch", "mesh", "refine", "sim"];
+const PURE: &[&str] = &["touch", "mesh", "patch", "refine", "sim"];
 
 /// What a pure room may not name.
 const IMPURE_PATHS: &[&str] = &["std::fs", "std::thread", "std::env", "std::io", "std::net", "std::process"];

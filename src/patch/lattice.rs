@@ -1,0 +1,238 @@
+//! The lattice and the names of everything that stands on it.
+
+use nalgebra::{Point3, Vector3};
+
+use super::table::Key;
+use crate::mesh::{FaceId, VertexId};
+
+/// A node of the lattice, or the cell of which it is the lowest corner.
+pub type Node = [i32; 3];
+
+/// Bits of a packed node for each axis: cells up to ±10⁶ from the origin differ in them.
+const NODE_BITS: u32 = 21;
+
+impl Key for Node {
+    #[inline]
+    fn bits(&self) -> u64 {
+        let part = |i: usize| u64::from(self[i] as u32 & ((1 << NODE_BITS) - 1)) << (NODE_BITS * i as u32);
+        part(0) | part(1) | part(2)
+    }
+}
+
+/// `node`, `count` steps along `axis`.
+#[inline]
+pub(super) fn stepped(mut node: Node, axis: usize, count: i32) -> Node {
+    node[axis] = node[axis].saturating_add(count);
+    node
+}
+
+/// The two axes that follow `axis`, so that (axis, u, v) is right-handed.
+#[inline]
+pub(super) fn across(axis: usize) -> (usize, usize) {
+    ((axis + 1) % 3, (axis + 2) % 3)
+}
+
+/// A cubic lattice in the object frame O.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lattice {
+    /// position of node (0, 0, 0), m, in O; best such that no coordinate of the scan falls on a plane of the lattice
+    pub origin: Point3<f64>,
+    /// edge length of a cell, m, > 0
+    pub pitch: f64,
+}
+
+impl Lattice {
+    /// Where plane number `index` across `axis` stands on that axis, m.
+    #[inline]
+    pub fn coordinate(&self, axis: usize, index: i32) -> f64 {
+        self.origin[axis] + self.pitch * f64::from(index)
+    }
+
+    /// Position of a node, m, in O.
+    #[inline]
+    pub fn position(&self, node: Node) -> Point3<f64> {
+        Point3::new(self.coordinate(0, node[0]), self.coordinate(1, node[1]), self.coordinate(2, node[2]))
+    }
+
+    /// The last plane across `axis` at or below coordinate `x` (m), exactly as [`Self::coordinate`] places it.
+    #[inline]
+    pub fn index_of(&self, axis: usize, x: f64) -> i32 {
+        // the conversion saturates
+        let index = ((x - self.origin[axis]) / self.pitch).floor() as i32;
+        if self.coordinate(axis, index) > x {
+            index.saturating_sub(1)
+        } else if self.coordinate(axis, index.saturating_add(1)) <= x {
+            index.saturating_add(1)
+        } else {
+            index
+        }
+    }
+
+    /// The cell that holds `p`; a point on a plane belongs to the cell above it.
+    #[inline]
+    pub fn cell_of(&self, p: &Point3<f64>) -> Node {
+        [self.index_of(0, p.x), self.index_of(1, p.y), self.index_of(2, p.z)]
+    }
+
+    /// Lowest and highest corner of a cell, drawn in by `margin` (share of the pitch).
+    #[inline]
+    pub(super) fn inner_box(&self, cell: Node, margin: f64) -> [Point3<f64>; 2] {
+        let inset = Vector3::repeat(margin * self.pitch);
+        [self.position(cell) + inset, self.position(cell.map(|x| x.saturating_add(1))) - inset]
+    }
+
+    /// `p` brought into the box from `node` that spans `size` cells, `margin` (share of the pitch) inside where the box
+    /// has any extent.
+    #[inline]
+    pub(super) fn clamped(&self, p: Point3<f64>, node: Node, size: [i32; 3], margin: f64) -> Point3<f64> {
+        Point3::from(Vector3::from_fn(|i, _| {
+            if size[i] == 0 {
+                return self.coordinate(i, node[i]);
+            }
+            let (lo, hi) = (self.coordinate(i, node[i]), self.coordinate(i, node[i].saturating_add(size[i])));
+            p[i].max(lo + margin * self.pitch).min(hi - margin * self.pitch)
+        }))
+    }
+}
+
+/// An edge of the lattice: from `node` one step up along `axis`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Edge {
+    /// its lower end
+    pub node: Node,
+    /// 0, 1, 2 for x, y, z
+    pub axis: u8,
+}
+
+impl Edge {
+    /// The four cells around it, counter-clockwise seen against `axis`.
+    pub fn cells(&self) -> [Node; 4] {
+        let (u, v) = across(self.axis as usize);
+        let left = stepped(self.node, u, -1);
+        [self.node, left, stepped(left, v, -1), stepped(self.node, v, -1)]
+    }
+
+    /// The four squares that end at it: number i stands between cells i and i + 1 of [`Self::cells`].
+    pub fn squares(&self) -> [Square; 4] {
+        let (u, v) = across(self.axis as usize);
+        let square = |node, axis: usize| Square { node, axis: axis as u8 };
+        [
+            square(self.node, u),
+            square(stepped(self.node, u, -1), v),
+            square(stepped(self.node, v, -1), u),
+            square(self.node, v),
+        ]
+    }
+
+    /// Its upper end.
+    #[inline]
+    pub fn end(&self) -> Node {
+        stepped(self.node, self.axis as usize, 1)
+    }
+}
+
+impl Key for Edge {
+    #[inline]
+    fn bits(&self) -> u64 {
+        self.node.bits() ^ (u64::from(self.axis) + 1) << 62
+    }
+}
+
+/// A square of the lattice: from `node` one step along each of the two axes other than `axis`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Square {
+    /// its lowest corner
+    pub node: Node,
+    /// the axis at right angles to it: 0, 1, 2 for x, y, z
+    pub axis: u8,
+}
+
+impl Square {
+    /// Its corners, counter-clockwise seen against `axis`.
+    pub fn corners(&self) -> [Node; 4] {
+        let (u, v) = across(self.axis as usize);
+        let right = stepped(self.node, u, 1);
+        [self.node, right, stepped(right, v, 1), stepped(self.node, v, 1)]
+    }
+
+    /// Its edges: number i joins corners i and i + 1 of [`Self::corners`].
+    pub fn edges(&self) -> [Edge; 4] {
+        let (u, v) = across(self.axis as usize);
+        let edge = |node, axis: usize| Edge { node, axis: axis as u8 };
+        [edge(self.node, u), edge(stepped(self.node, u, 1), v), edge(stepped(self.node, v, 1), u), edge(self.node, v)]
+    }
+
+    /// The cell below it and the one above, along `axis`.
+    pub fn cells(&self) -> [Node; 2] {
+        [stepped(self.node, self.axis as usize, -1), self.node]
+    }
+}
+
+impl Key for Square {
+    #[inline]
+    fn bits(&self) -> u64 {
+        self.node.bits() ^ (u64::from(self.axis) + 1) << 62
+    }
+}
+
+/// The name of a vertex: faces that use the same name meet there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum VertexKey {
+    /// a vertex of the scan
+    Scan(VertexId),
+    /// of a loop of the surface around a cell; loops are numbered from 0
+    Cell(Node, u8),
+    /// on a square between two cells of the region; for each segment of the surface there, numbered from 0
+    Square(Square, u8),
+    /// where f changes its sign on an edge
+    Edge(Edge),
+    /// where an edge of the scan crosses a plane of the lattice
+    Trace {
+        /// the ends of the scan's edge, the smaller id first
+        ends: [VertexId; 2],
+        /// the axis that the plane is at right angles to
+        axis: u8,
+        /// number of the plane
+        plane: i32,
+    },
+    /// where a face of the scan crosses an edge of the lattice
+    Pierce(Edge, FaceId),
+}
+
+impl Key for VertexKey {
+    #[inline]
+    fn bits(&self) -> u64 {
+        let mixed = |a: u64, b: u64| a.wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29) ^ b;
+        match *self {
+            Self::Scan(vertex) => u64::from(vertex.0) << 32,
+            Self::Cell(node, number) => mixed(u64::from(number) + 1, node.bits()),
+            Self::Square(square, number) => mixed(u64::from(number) + 11, square.bits()),
+            Self::Edge(edge) => mixed(21, edge.bits()),
+            Self::Trace { ends, axis, plane } => {
+                let edge = u64::from(ends[0].0) << 32 | u64::from(ends[1].0);
+                mixed(edge, u64::from(plane as u32) << 2 | u64::from(axis))
+            }
+            Self::Pierce(edge, face) => mixed(u64::from(face.0), edge.bits()),
+        }
+    }
+}
+
+/// Which part of the lattice or of the scan a face of the patch belongs to; its faces depend on what is nearby alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Owner {
+    /// the surface around an edge on which f changes its sign
+    Edge(Edge),
+    /// the fan from the region to the trace of the scan on a square that bounds it
+    Square(Square),
+    /// what the region leaves of a face of the scan
+    Scan(FaceId),
+}
+
+/// A new face, counter-clockwise seen from outside; corners are indices into the vertices of its patch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PatchFace {
+    /// indices into the patch's vertices
+    pub corners: [u32; 3],
+    /// what it belongs to
+    pub owner: Owner,
+}
