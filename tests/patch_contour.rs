@@ -1,6 +1,6 @@
 //! The patch as a mesh: closed, without intersections, on the surface, and one with the scan around it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use nalgebra::{Point3, Unit, UnitQuaternion, Vector3, vector};
@@ -11,7 +11,7 @@ use touchup::io::mesh_file::{MeshUnit, read_mesh};
 use touchup::mesh::triangle::shape_quality;
 use touchup::mesh::{FaceId, FaceTree, TriMesh, VertexId, signed_distance};
 use touchup::patch::{
-    ContourParams, Crossing, Cut, Edge, Lattice, Node, NodeValues, OpenSquare, Patch, Region, contour,
+    ContourParams, Crossing, Cut, Edge, Lattice, Node, NodeValues, OpenSquare, Owner, Patch, Region, contour,
 };
 
 #[path = "common/mod.rs"]
@@ -404,6 +404,27 @@ fn what_is_done_far_away_changes_no_face_here() {
     assert!(alone.len() > 20 && together.len() > 10 * alone.len());
     assert!(alone.iter().all(|(owner, faces)| together.get(owner) == Some(faces)));
     assert!(far.len() > 10);
+}
+
+#[test]
+fn a_field_that_contradicts_the_scan_is_not_joined_to_it() {
+    let scan = rough_plate(1e-3, 0.1e-3, 5);
+    let tree = FaceTree::new(&scan);
+    let lattice = lattice(PITCH);
+    let region = region_around(&lattice, &scan, &[Point3::new(0.0, 0.0, 1e-3)], 3e-3, 0.0);
+    let own = |p: &Point3<f64>| signed_distance(&scan, &tree, p, 1.0).unwrap();
+    let joined = patch_of(&lattice, &region, &scan, &tree, &own);
+    assert!(joined.open.is_empty());
+    let shared: BTreeSet<_> =
+        joined.faces.iter().filter(|face| matches!(face.owner, Owner::Square(_))).map(|face| face.owner).collect();
+    // material above instead of below; and a plane that misses the scan
+    let (turned, apart) = (|p: &Point3<f64>| -own(p), |p: &Point3<f64>| p.z + 1.4e-3);
+    for field in [&turned as Field, &apart] {
+        let patch = patch_of(&lattice, &region, &scan, &tree, field);
+        assert!(patch.faces.iter().all(|face| !matches!(face.owner, Owner::Square(_))));
+        assert_eq!(patch.open.iter().filter(|open| open.is_scanned).count(), shared.len());
+        spliced(&scan, &patch, PITCH);
+    }
 }
 
 /// A rough plate: squares of side `edge`, heights off by up to `noise` (m).

@@ -54,7 +54,7 @@ fn kept_points(pieces: &Pieces, rims: &[Rim], corners: &[usize]) -> Vec<u32> {
     let is_kept = |at: usize| {
         let (before, here) = (&rims[corners[(at + corners.len() - 1) % corners.len()]], &rims[corners[at]]);
         let is_trace = matches!(pieces.place(here.from), Place::Trace { .. });
-        !(is_trace && matches!(here.side, Side::Face(_)) && before.side == here.side)
+        !(is_trace && before.side == here.side)
     };
     (0..corners.len()).filter(|&at| is_kept(at)).map(|at| rims[corners[at]].from).collect()
 }
