@@ -8,7 +8,7 @@ use super::fill::fill;
 use super::lattice::{Edge, Lattice, Node, Owner, PatchFace, Square, VertexKey};
 use super::outline::outline;
 use super::table::{Key, Table};
-use crate::mesh::{FaceId, FaceTree, TriMesh};
+use crate::mesh::{BoxQuery, FaceId, FaceTree, TriMesh};
 
 /// Side of the blocks of cells for which the faces nearby are looked up at once, in cells.
 const BLOCK: i32 = 8;
@@ -267,11 +267,12 @@ fn bounds_of(region: &Region) -> [Node; 2] {
 /// The faces of the scan that may meet the region, by id.
 fn faces_near(lattice: &Lattice, region: &Region, tree: &FaceTree) -> Vec<FaceId> {
     let blocks: Table<Node, ()> = region.iter().map(|(cell, ())| cell.map(|x| x.div_euclid(BLOCK))).collect();
-    let mut faces = Vec::new();
+    let (mut faces, mut query) = (Vec::new(), BoxQuery::default());
     for (block, ()) in blocks.iter() {
         let lo = block.map(|x| x.saturating_mul(BLOCK));
         let hi = lo.map(|x| x.saturating_add(BLOCK));
-        tree.faces_in_box(&lattice.position(lo), &lattice.position(hi), &mut faces);
+        tree.faces_in_box(&lattice.position(lo), &lattice.position(hi), &mut query);
+        faces.extend_from_slice(&query.faces);
     }
     faces.sort_unstable();
     faces.dedup();

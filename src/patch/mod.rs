@@ -1,32 +1,53 @@
-//! The patch: where the scan was touched it is meshed anew, as one closed skin by construction.
+//! The surface meshed anew where it was touched, as one closed skin by construction.
 //!
-//! A regular [`Lattice`] lies over the part. In a set of its cells, the *region*, the surface is the zero set of a field f
-//! (f < 0 in the material), found by dual contouring that cannot intersect itself (after \[Ju Udeshi 2006\]); outside, the
-//! scan stays. On the squares that bound the region both sides share one *trace*: the polyline in which the scan crosses
-//! that square. [`Cut`] clips the scan and holds the traces, [`contour`] makes the new faces, [`Patch::applied_to`] puts
-//! the two together.
+//! [`TouchFinder`] makes touches of samples; [`ContactStore`] and [`SweptSpace`] keep what was touched and where the ball
+//! went. [`Evidence`] says what these and the scan know about a point, [`Restored`] holds that at the nodes of a regular
+//! [`Lattice`], completed where nothing is known. [`Patcher`] is the whole way.
+//!
+//! In a set of the lattice's cells, the *region*, the surface is the zero set of that field f (f < 0 in the material),
+//! found by dual contouring that cannot intersect itself (after \[Ju Udeshi 2006\]); outside, the scan stays. On the
+//! squares that bound the region both sides share one *trace*: the polyline in which the scan crosses that square. [`Cut`]
+//! clips the scan and holds the traces, [`contour`] makes the new faces, [`Patch::applied_to`] puts the two together.
 //!
 //! Vertices are named by [`VertexKey`], so neighbours share them without a search and no crack can arise. Each face has an
 //! [`Owner`] whose faces depend on the field, the region and the scan nearby alone.
 
 mod clip;
+mod complete;
+mod contact_store;
 mod contour;
+mod crossing;
 mod cut;
 mod dual;
+mod evidence;
+mod field;
 mod fill;
 mod lattice;
 mod loops;
 mod outline;
+mod patcher;
 mod qef;
+mod restore;
+mod scan_value;
 mod splice;
+mod swept;
 mod table;
+mod touches;
 mod trace;
 
+pub use contact_store::{ContactStore, MeanContact};
 pub use contour::{ContourParams, Crossing, contour};
 pub use cut::Cut;
+pub use evidence::{Evidence, EvidenceParams, Finding, Source};
+pub use field::{FieldParams, FieldScratch, FieldValue};
 pub use lattice::{Edge, Lattice, Node, Owner, PatchFace, Square, VertexKey};
+pub use patcher::{Patcher, PatcherParams};
+pub use restore::{NodeState, Restored, restore};
+pub use scan_value::ScanValue;
 pub use splice::Patch;
+pub use swept::SweptSpace;
 pub use table::{Key, Table};
+pub use touches::{Contact, Touch, TouchFinder, TouchFinderParams};
 pub use trace::OpenSquare;
 
 /// The lattice cells in which the surface is replaced, each named by its lowest node.

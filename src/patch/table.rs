@@ -91,6 +91,12 @@ impl<K: Key, V> Table<K, V> {
         self.index_of(key).map(|at| &mut self.entries[at as usize].1)
     }
 
+    /// The value of the `at`-th key that came, to be changed.
+    #[inline]
+    pub fn value_mut(&mut self, at: u32) -> &mut V {
+        &mut self.entries[at as usize].1
+    }
+
     /// Gives `key` the value of `make` unless it has one; returns its index and whether it is new.
     #[inline]
     pub fn insert_with(&mut self, key: K, make: impl FnOnce() -> V) -> (u32, bool) {

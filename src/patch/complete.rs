@@ -1,0 +1,152 @@
+//! Fills the field where nothing is known.
+//!
+//! Between the known values goes the smoothest field: ∇²f = 0. Flat goes on flat, a gap between two touched walls closes,
+//! and no island can arise. Where the ball was, f stays above the depth to which it was there. Deep in the material the
+//! scan's own distance pulls weakly, so that a pocket that was felt down to somewhere gets a bottom.
+
+use super::evidence::Source;
+use super::lattice::{Node, stepped};
+use super::restore::{NodeState, Restored, cell_at, node_at};
+
+/// Settings of [`complete`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct CompleteParams {
+    /// weight of the scan beside the six neighbours of a node that is far from it
+    pull: f64,
+    /// changes below this end the relaxation, m
+    enough: f64,
+}
+
+impl CompleteParams {
+    /// For cells of `pitch` and a ball of `radius` (m): the pull reaches two radii deep.
+    pub fn new(pitch: f64, radius: f64) -> Self {
+        Self { pull: (pitch / (2.0 * radius)).powi(2), enough: 1e-6 * pitch }
+    }
+}
+
+/// Over-relaxation that converges fast on domains some ten nodes across.
+const RELAXATION: f64 = 1.6;
+/// Sweeps at most: twice what the largest gaps of the tested parts need.
+const SWEEPS: usize = 200;
+/// No neighbour.
+const NONE: u32 = u32::MAX;
+
+/// Fills in what is not known, then gives up what nothing holds in its place.
+pub(super) fn complete(restored: &mut Restored, params: &CompleteParams) {
+    relax(restored, params);
+    if drop_islands(restored) {
+        relax(restored, params);
+    }
+    open_ends(restored);
+}
+
+fn is_open_question(state: &NodeState) -> bool {
+    matches!(state.source, Source::Nothing | Source::Far)
+}
+
+/// Successive over-relaxation, from below by the space that the ball went through.
+fn relax(restored: &mut Restored, params: &CompleteParams) {
+    let open: Vec<(u32, [u32; 6])> = (0..restored.nodes.len() as u32)
+        .filter(|&at| is_open_question(&restored.nodes.entry(at).1))
+        .map(|at| (at, neighbours(restored, at)))
+        .collect();
+    for _ in 0..SWEEPS {
+        let mut largest = 0.0f64;
+        for (at, around) in &open {
+            let state = restored.nodes.entry(*at).1;
+            let weight = if state.source == Source::Far { params.pull } else { 0.0 };
+            let (mut sum, mut count) = (weight * state.scan, weight);
+            for &other in around.iter().filter(|&&other| other != NONE) {
+                sum += restored.nodes.entry(other).1.value;
+                count += 1.0;
+            }
+            if count > 0.0 {
+                let next = (state.value + RELAXATION * (sum / count - state.value)).max(state.least);
+                largest = largest.max((next - state.value).abs());
+                restored.nodes.value_mut(*at).value = next;
+            }
+        }
+        if largest < params.enough {
+            return;
+        }
+    }
+}
+
+/// The nodes around one, as far as they are there and say something.
+fn neighbours(restored: &Restored, at: u32) -> [u32; 6] {
+    let node = restored.nodes.entry(at).0;
+    std::array::from_fn(|i| {
+        let other = stepped(node, i / 2, if i % 2 == 0 { 1 } else { -1 });
+        let index = restored.nodes.index_of(&other);
+        index.filter(|&index| restored.nodes.entry(index).1.source != Source::Beyond).unwrap_or(NONE)
+    })
+}
+
+/// Gives up material and void that nothing holds in its place: a piece of one sign, within the nodes looked at, that was
+/// neither touched nor swept. Returns whether there was any.
+fn drop_islands(restored: &mut Restored) -> bool {
+    let mut is_seen = vec![false; restored.nodes.len()];
+    let (mut island, mut has_dropped) = (Vec::new(), false);
+    for start in 0..restored.nodes.len() as u32 {
+        if std::mem::replace(&mut is_seen[start as usize], true) {
+            continue;
+        }
+        island.clear();
+        island.push(start);
+        if !is_held(restored, &mut island, &mut is_seen) {
+            has_dropped = true;
+            for &at in &island {
+                let state = restored.nodes.value_mut(at);
+                (state.source, state.value) = (Source::Nothing, 0.0);
+            }
+        }
+    }
+    has_dropped
+}
+
+/// Gathers the piece of one sign around its first node; whether evidence or the rim of what was looked at holds it.
+fn is_held(restored: &Restored, piece: &mut Vec<u32>, is_seen: &mut [bool]) -> bool {
+    let (mut next, mut is_held) = (0, false);
+    while let Some(&at) = piece.get(next) {
+        next += 1;
+        let state = &restored.nodes.entry(at).1;
+        let around = neighbours(restored, at);
+        is_held |= matches!(state.source, Source::Touch | Source::Beyond) || state.least > 0.0;
+        is_held |= around.contains(&NONE);
+        for other in around.into_iter().filter(|&other| other != NONE) {
+            let is_same = (restored.nodes.entry(other).1.value < 0.0) == (state.value < 0.0);
+            if is_same && !std::mem::replace(&mut is_seen[other as usize], true) {
+                piece.push(other);
+            }
+        }
+    }
+    is_held
+}
+
+/// Finds where a filled surface hangs on a ball that moved freely, and opens it up to the nearest evidence: a hole that
+/// the ball left at its far end has no bottom.
+fn open_ends(restored: &mut Restored) {
+    let is_end = |state: &NodeState| state.is_free_end && state.value <= state.least;
+    let ends = restored.nodes.iter().filter(|(_, state)| is_end(state));
+    let mut cells: Vec<Node> = ends.flat_map(|(node, _)| (0..8).map(move |corner| cell_at(node, corner))).collect();
+    let mut next = 0;
+    while let Some(&cell) = cells.get(next) {
+        next += 1;
+        if is_unheld_surface(restored, cell) && restored.open.insert_with(cell, || ()).1 {
+            cells.extend((0..6).map(|i| stepped(cell, i / 2, if i % 2 == 0 { 1 } else { -1 })));
+        }
+    }
+}
+
+/// Whether the surface passes through a cell of which no corner is known.
+fn is_unheld_surface(restored: &Restored, cell: Node) -> bool {
+    let mut material = 0;
+    for corner in 0..8 {
+        let Some(state) = restored.nodes.get(&node_at(cell, corner)) else { return false };
+        if !is_open_question(state) {
+            return false;
+        }
+        material += u8::from(state.value < 0.0);
+    }
+    material % 8 != 0
+}

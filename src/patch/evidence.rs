@@ -1,0 +1,192 @@
+//! What touches, free space and the scan say about one point.
+
+use nalgebra::Point3;
+
+use super::contact_store::ContactStore;
+use super::field::{FieldParams, FieldScratch, FieldValue};
+use super::scan_value::ScanValue;
+use super::swept::SweptSpace;
+use crate::mesh::{FaceTree, TriMesh};
+
+/// How far each kind of evidence is believed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EvidenceParams {
+    /// radius of the ball, m
+    pub radius: f64,
+    /// the fit of the contacts
+    pub field: FieldParams,
+    /// how deep the ball may seem to be in the surface by noise alone, m
+    pub swept_margin: f64,
+    /// contacts all around a point speak for it up to this distance along the surface, m
+    pub inner_support: f64,
+    /// the last contacts of a surface speak for what is beyond them up to this, m
+    pub border_support: f64,
+    /// two felt surfaces go on towards their common edge up to this, m
+    pub edge_support: f64,
+    /// the tilted plane at an edge that the ball rolled over goes on up to this, m
+    pub fan_support: f64,
+    /// a contact speaks for what is nearer to its surface than this, m: behind it may be another wall
+    pub touch_depth: f64,
+    /// the ball is free when nothing is touched within this distance of its centre, m
+    pub free_reach: f64,
+    /// the scan is not believed within this distance of a contact that faces alike, m
+    pub scan_removal: f64,
+    /// … of any contact, m
+    pub wall_removal: f64,
+    /// cosine of the widest angle between normals that face alike
+    pub alike_cosine: f64,
+    /// the scan speaks for what is nearer to it than this, m
+    pub scan_reach: f64,
+    /// a scan that the ball came nearer to than its radius and this was swept away, m
+    pub swept_reach: f64,
+}
+
+impl EvidenceParams {
+    /// Settings that hold for a ball of `radius` (m) and a scan whose points are off by `noise` (m).
+    pub fn new(radius: f64, noise: f64) -> Self {
+        Self {
+            radius,
+            field: FieldParams::for_ball(radius),
+            swept_margin: 0.027 * radius,
+            inner_support: 1.3 * radius,
+            border_support: 0.75 * radius,
+            edge_support: radius,
+            fan_support: radius / 4.0,
+            touch_depth: 0.8 * radius,
+            free_reach: 1.5 * radius,
+            scan_removal: 1.3 * radius,
+            wall_removal: radius / 3.0,
+            alike_cosine: 0.6,
+            scan_reach: (3.0 * noise).max(radius / 2.0),
+            swept_reach: 0.067 * radius,
+        }
+    }
+}
+
+/// What a value rests on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// the scan, which nothing contradicts
+    Scan,
+    /// touches
+    Touch,
+    /// the scan, beside touches of another surface
+    Both,
+    /// nothing nearby: to be filled
+    Nothing,
+    /// nothing, deep inside or far outside the scan: to be filled, with a pull towards the scan
+    Far,
+    /// nothing, beyond an open rim of the scan: the surface ends here
+    Beyond,
+}
+
+/// What is known at a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Finding {
+    /// signed distance from the surface, m: positive outside; the scan's own where there is no better
+    pub value: f64,
+    /// what it rests on
+    pub source: Source,
+    /// signed distance from the scan, m
+    pub scan: f64,
+    /// how deep the point is in the space that the ball went through, m; not more than 0 outside of it
+    pub swept_depth: f64,
+    /// nothing was touched near the ball that was here
+    pub is_ball_free: bool,
+}
+
+/// All evidence.
+#[derive(Clone, Copy, Debug)]
+pub struct Evidence<'a> {
+    /// how far it is believed
+    pub params: &'a EvidenceParams,
+    /// what was touched
+    pub contacts: &'a ContactStore,
+    /// where the ball has been
+    pub swept: &'a SweptSpace,
+    /// the scan as it came
+    pub scan: &'a TriMesh,
+    /// … and the tree over its faces
+    pub tree: &'a FaceTree,
+}
+
+impl Evidence<'_> {
+    /// What is known at `x` (m, in O); `None` where the scan has no face.
+    pub fn at(&self, x: &Point3<f64>, scratch: &mut FieldScratch) -> Option<Finding> {
+        let scan = ScanValue::at(self.scan, self.tree, x)?;
+        let (mut value, mut source) = match self.params.field.at(self.contacts, x, scratch) {
+            Some(touched) => self.beside_touches(&touched, &scan),
+            None => (scan.value, self.away_from_touches(&scan)),
+        };
+        let (swept_depth, is_ball_free) = self.swept_depth(x);
+        if swept_depth > 0.0 && source != Source::Touch {
+            (value, source) = (scan.value, Source::Nothing);
+        }
+        if scan.is_on_rim && !matches!(source, Source::Touch | Source::Both) {
+            source = Source::Beyond;
+        }
+        Some(Finding { value, source, scan: scan.value, swept_depth, is_ball_free })
+    }
+
+    /// The field of the touches where they speak for the point, else that of the scan where it holds.
+    fn beside_touches(&self, touched: &FieldValue, scan: &ScanValue) -> (f64, Source) {
+        let p = self.params;
+        let lateral = (touched.nearest * touched.nearest - touched.value * touched.value).max(0.0).sqrt();
+        let support = match (touched.is_border, touched.is_fan) {
+            _ if touched.is_edge => p.edge_support,
+            (false, _) => p.inner_support,
+            (true, false) => p.border_support,
+            (true, true) => p.fan_support,
+        };
+        let is_supported = lateral <= support && touched.value.abs() <= p.touch_depth;
+        if is_supported && (!touched.is_border || touched.is_edge) {
+            return (touched.value, Source::Touch);
+        }
+        let is_wall = scan.normal.dot(&touched.gradient) < p.alike_cosine;
+        let ends_at_wall = is_wall && scan.value > touched.value;
+        if (ends_at_wall || !is_supported) && self.scan_holds(scan) {
+            // a wall of the scan ends the surface that was touched
+            return (if is_wall { scan.value.max(touched.value) } else { scan.value }, Source::Both);
+        }
+        if is_supported { (touched.value, Source::Touch) } else { (scan.value, Source::Nothing) }
+    }
+
+    fn away_from_touches(&self, scan: &ScanValue) -> Source {
+        if scan.value.abs() > self.params.scan_reach {
+            Source::Far
+        } else if self.is_swept_away(scan) {
+            Source::Nothing
+        } else {
+            Source::Scan
+        }
+    }
+
+    /// Whether the scan is believed at its foot: near, not swept, and no contact beside it says otherwise.
+    fn scan_holds(&self, scan: &ScanValue) -> bool {
+        let p = self.params;
+        if scan.value.abs() > p.scan_reach || scan.is_on_rim || self.is_swept_away(scan) {
+            return false;
+        }
+        let mut holds = true;
+        self.contacts.near(&scan.foot, p.scan_removal, |distance_squared, index| {
+            let is_alike = self.contacts.means()[index as usize].normal.dot(&scan.normal) > p.alike_cosine;
+            let limit = if is_alike { p.scan_removal } else { p.wall_removal };
+            holds &= distance_squared > limit * limit;
+        });
+        holds
+    }
+
+    fn is_swept_away(&self, scan: &ScanValue) -> bool {
+        let limit = self.params.radius + self.params.swept_reach;
+        self.swept.nearest(&scan.foot).is_some_and(|(distance, _)| distance < limit)
+    }
+
+    /// How deep `x` lies in the space that the ball went through, m, and whether that ball was free.
+    fn swept_depth(&self, x: &Point3<f64>) -> (f64, bool) {
+        let p = self.params;
+        let Some((distance, centre)) = self.swept.nearest(x) else { return (f64::NEG_INFINITY, false) };
+        let mut is_free = true;
+        self.contacts.near(&centre, p.free_reach, |_, _| is_free = false);
+        (p.radius - p.swept_margin - distance, is_free)
+    }
+}

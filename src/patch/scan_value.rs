@@ -1,0 +1,63 @@
+//! What the scan says about a point.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::mesh::{FaceHit, FaceTree, TriMesh, VertexId, pseudo_normal};
+
+/// The scan as seen from one point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScanValue {
+    /// signed distance, m: positive outside
+    pub value: f64,
+    /// unit normal of the scan at the foot
+    pub normal: Vector3<f64>,
+    /// closest point of the scan, m, in O
+    pub foot: Point3<f64>,
+    /// the foot lies on an open rim: beyond it the scan says nothing
+    pub is_on_rim: bool,
+}
+
+impl ScanValue {
+    /// What `scan` says at `x` (m, in O); `None` where there is no face.
+    pub fn at(scan: &TriMesh, tree: &FaceTree, x: &Point3<f64>) -> Option<Self> {
+        let hit = tree.closest(scan, x, f64::INFINITY)?;
+        let normal = pseudo_normal(scan, &hit);
+        let is_behind = (x - hit.point).dot(&normal) < 0.0;
+        let distance = hit.distance_squared.sqrt();
+        let value = if is_behind { -distance } else { distance };
+        Some(Self { value, normal, foot: hit.point, is_on_rim: is_on_rim(scan, &hit) })
+    }
+}
+
+/// Whether a closest point lies on an edge that one face alone has.
+fn is_on_rim(scan: &TriMesh, hit: &FaceHit) -> bool {
+    let corners = scan.corners(hit.face);
+    let is_open = |a: VertexId, b: VertexId| scan.faces_at_edge(a, b).nth(1).is_none();
+    let mut on = (0..3).filter(|&i| hit.barycentric[i] != 0.0).map(|i| corners[i]);
+    match (on.next(), on.next(), on.next()) {
+        (Some(corner), None, None) => {
+            let mut around = scan.star(corner).iter().flat_map(|&face| scan.corners(face));
+            around.any(|other| other != corner && is_open(corner, other))
+        }
+        (Some(a), Some(b), None) => is_open(a, b),
+        _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rim_of_an_open_sheet_is_told_from_its_inside() {
+        // four triangles around a middle vertex
+        let p = [[0., 0.], [1., 0.], [1., 1.], [0., 1.], [0.5, 0.5]].map(|[x, y]| Point3::new(x, y, 0.0));
+        let sheet = TriMesh::new(p.into(), vec![[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]).unwrap();
+        let tree = FaceTree::new(&sheet);
+        let at = |x, y, z| ScanValue::at(&sheet, &tree, &Point3::new(x, y, z)).unwrap();
+        assert_eq!((at(0.5, 0.5, 0.2).value, at(0.5, 0.5, -0.2).value), (0.2, -0.2));
+        assert!(!at(0.5, 0.5, 0.2).is_on_rim, "above the middle vertex");
+        assert!(!at(0.25, 0.25, 0.2).is_on_rim, "above an inner edge");
+        assert!(at(0.5, -0.2, 0.0).is_on_rim && at(-1.0, -1.0, 0.0).is_on_rim, "beyond an edge, beyond a corner");
+    }
+}

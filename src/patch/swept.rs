@@ -1,0 +1,68 @@
+//! Where the ball has been: no material can be there.
+
+use nalgebra::Point3;
+
+use super::contact_store::{around, cell_of};
+use super::lattice::Node;
+use super::table::Table;
+
+/// Centres of the ball, thinned to one for each small cell.
+#[derive(Clone, Debug)]
+pub struct SweptSpace {
+    cell: f64,
+    reach: f64,
+    thinned: Table<Node, ()>,
+    centres: Table<Node, Vec<Point3<f64>>>,
+}
+
+impl SweptSpace {
+    /// Nothing swept yet: one centre is kept for each cube of edge `cell` (m), queries go up to `reach` (m).
+    pub fn new(cell: f64, reach: f64) -> Self {
+        Self { cell, reach, thinned: Table::default(), centres: Table::default() }
+    }
+
+    /// Takes a centre, m, in O.
+    pub fn add(&mut self, centre: &Point3<f64>) {
+        let (_, is_new) = self.thinned.insert_with(cell_of(centre, self.cell), || ());
+        if is_new {
+            let (at, _) = self.centres.insert_with(cell_of(centre, self.reach), Vec::new);
+            self.centres.value_mut(at).push(*centre);
+        }
+    }
+
+    /// The centres that were kept.
+    pub fn centres(&self) -> impl Iterator<Item = &Point3<f64>> + '_ {
+        self.centres.iter().flat_map(|(_, centres)| centres)
+    }
+
+    /// Distance from `x` to the nearest centre, m, and that centre; `None` beyond the reach.
+    pub fn nearest(&self, x: &Point3<f64>) -> Option<(f64, Point3<f64>)> {
+        let mut best = (self.reach * self.reach, None);
+        for bin in around(cell_of(x, self.reach)) {
+            for centre in self.centres.get(&bin).into_iter().flatten() {
+                let distance_squared = (centre - x).norm_squared();
+                if distance_squared < best.0 {
+                    best = (distance_squared, Some(*centre));
+                }
+            }
+        }
+        best.1.map(|centre| (best.0.sqrt(), centre))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_centre_is_found_up_to_the_reach() {
+        let mut swept = SweptSpace::new(0.1e-3, 2e-3);
+        for i in 0..1000 {
+            swept.add(&Point3::new(f64::from(i) * 1e-5, 0.0, 0.0));
+        }
+        assert_eq!(swept.centres().count(), 100, "one for each tenth of a millimetre");
+        let (distance, centre) = swept.nearest(&Point3::new(5e-3, 1.2e-3, 0.0)).unwrap();
+        assert!((distance - 1.2e-3).abs() < 1e-5 && (centre.x - 5e-3).abs() < 1e-4);
+        assert_eq!(swept.nearest(&Point3::new(5e-3, 2.1e-3, 0.0)), None);
+    }
+}
