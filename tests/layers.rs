@@ -12,8 +12,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("refine", &["touch", "mesh"]),
     ("sim", &["touch", "mesh"]),
     ("io", &["touch", "mesh"]),
-    ("scene", &["touch", "mesh", "refine", "sim", "io"]),
-    ("cli", &["touch", "mesh", "refine", "sim", "io", "scene"]),
+    ("scene", &["touch", "mesh", "patch", "refine", "sim", "io"]),
+    ("cli", &["touch", "mesh", "patch", "refine", "sim", "io", "scene"]),
 ];
 
 /// Same input, same bytes out: nothing of the world outside comes in.

@@ -35,7 +35,7 @@ fn the_shipped_file_is_the_default() {
 fn every_key_of_the_code_is_in_the_shipped_file_and_documented() {
     let mut known = BTreeSet::new();
     let inner = ["compensation.payload", "compensation.bias"];
-    let outer = ["", "sync", "compensation", "contact", "tip", "scan", "sliding", "carve", "guard", "refine"];
+    let outer = ["", "sync", "compensation", "contact", "tip", "scan", "sliding", "carve", "guard", "patch", "refine"];
     let sections = [&outer[..], &inner].concat();
     for section in sections {
         let path: Vec<_> = section.split('.').filter(|name| !name.is_empty()).collect();

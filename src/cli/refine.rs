@@ -10,11 +10,15 @@ use serde::Serialize;
 use tracing::{debug, warn};
 
 use super::latency::{Latencies, Quantiles};
+use super::progress::Progress;
 use super::replay::{Recording, Replayed, replay};
 use super::{CliError, Losses, check_kept, tell};
-use crate::io::mesh_file::{MeshFile, MeshFileError, MeshUnit, check_target, read_mesh, write_mesh};
+use crate::io::mesh_file::{
+    MeshFile, MeshFileError, MeshUnit, VertexColumn, check_target, read_mesh, write_mesh, write_mesh_with,
+};
 use crate::io::recording::Topics;
-use crate::mesh::{RepairReport, TriMesh, VertexId};
+use crate::mesh::{FaceId, FaceTree, RepairReport, TriMesh, VertexId};
+use crate::patch::{Patched, Patcher, Support};
 use crate::refine::{RefineCounts, RefineError, RefineParams, Refiner};
 use crate::scene::{Mode, Scene};
 use crate::touch::Sample;
@@ -78,6 +82,22 @@ pub(super) struct Summary {
     push_ns: Quantiles,
     load_s: f64,
     replay_s: f64,
+    /// what was meshed anew; `null` when the scene has no `patch`, or nothing was touched
+    patch: Option<PatchSummary>,
+}
+
+/// What `--json` prints of the patch.
+#[derive(Debug, Serialize)]
+struct PatchSummary {
+    /// edge length of the new faces
+    pitch_mm: f64,
+    /// faces of the scan that went
+    removed_faces: usize,
+    /// faces that came
+    added_faces: usize,
+    /// share of the new vertices that rest on what was felt nearby, not there
+    guessed_share: f64,
+    build_s: f64,
 }
 
 /// What became of a scan.
@@ -113,9 +133,12 @@ impl Pushes {
         Self { accepted: 0, refused: BTreeMap::new(), latencies: Latencies::new() }
     }
 
-    fn push(&mut self, refiner: &mut Refiner, sample: &Sample) {
+    fn push(&mut self, refiner: &mut Refiner, patcher: Option<&mut Patcher>, sample: &Sample) {
         let begun = Instant::now();
         let pushed = refiner.push(sample);
+        if let (Ok(_), Some(patcher)) = (&pushed, patcher) {
+            patcher.push(sample);
+        }
         self.latencies.record(begun.elapsed());
         match pushed {
             Ok(_) => self.accepted += 1,
@@ -169,10 +192,13 @@ fn misfit(params: &RefineParams, counts: &RefineCounts) -> Option<String> {
     })
 }
 
-/// Faces of which a corner is not where it was.
+/// Faces that are new, or of which a corner is not where it was.
 fn moved_faces(before: &TriMesh, after: &TriMesh) -> u64 {
-    let is_moved = |corners: [VertexId; 3]| corners.iter().any(|&v| before.position(v) != after.position(v));
-    after.faces().filter(|&(_, corners)| is_moved(corners)).count() as u64
+    let is_moved = |v: VertexId| before.position(v) != after.position(v);
+    let is_as_scanned = |face: FaceId, corners: [VertexId; 3]| {
+        before.has_face(face) && before.corners(face) == corners && !corners.into_iter().any(is_moved)
+    };
+    after.faces().filter(|&(face, corners)| !is_as_scanned(face, corners)).count() as u64
 }
 
 impl RefineArguments {
@@ -206,16 +232,25 @@ impl RefineArguments {
         let recording = Recording::open(&self.bag, &topics).map_err(CliError::ReadRecording)?;
         let params =
             scene.refine_params(recording.wrench_frame).ok_or_else(|| CliError::Usage(NOTHING_MOVES.to_owned()))?;
+        let mut patcher = scene.patcher_params(recording.wrench_frame).map(Patcher::new).transpose()?;
         let mut refiner = Refiner::new(mesh, params)?;
         let load_s = started.elapsed().as_secs_f64();
 
         let started = Instant::now();
         let mut pushes = Pushes::new();
-        let mut replayed = replay(recording, scene.sync_params(), |sample| pushes.push(&mut refiner, sample))?;
+        let mut replayed = replay(recording, scene.sync_params(), |sample| {
+            pushes.push(&mut refiner, patcher.as_mut(), sample);
+        })?;
         let replay_s = started.elapsed().as_secs_f64();
-        write_mesh(&self.out, refiner.mesh(), self.mesh_unit).map_err(CliError::WriteMesh)?;
-
         let counts = refiner.counts();
+        let patcher = patcher.filter(|_| counts.contacts > 0);
+        let (moved_faces, patch) = match patcher {
+            Some(patcher) => self.write_patched(patcher, &as_scanned)?,
+            None => {
+                write_mesh(&self.out, refiner.mesh(), self.mesh_unit).map_err(CliError::WriteMesh)?;
+                (moved_faces(&as_scanned, refiner.mesh()), None)
+            }
+        };
         debug!(?counts, "replayed");
         replayed.losses.extend(lost_samples(&replayed, pushes.accepted));
         replayed.losses.extend(lost_contacts(&params, counts));
@@ -232,13 +267,26 @@ impl RefineArguments {
             accepted: pushes.accepted,
             refused,
             contacts: counts.contacts,
-            moved_faces: moved_faces(&as_scanned, refiner.mesh()),
+            moved_faces,
             cut_back: counts.cut_back,
             push_ns: pushes.latencies.quantiles(),
             load_s,
             replay_s,
+            patch,
         };
         Ok(Refined { repair, summary, losses: replayed.losses })
+    }
+
+    /// Meshes the touched part of the scan anew and writes the result; returns how many faces are new or moved.
+    fn write_patched(&self, mut patcher: Patcher, scan: &TriMesh) -> Result<(u64, Option<PatchSummary>), CliError> {
+        let _patching = Progress::stage("mesh anew");
+        let started = Instant::now();
+        let patched = patcher.patched(scan, &FaceTree::new(scan))?;
+        let build_s = started.elapsed().as_secs_f64();
+        let touched = VertexColumn { name: "touched", values: touched_column(&patched).into() };
+        write_mesh_with(&self.out, &patched.mesh, &[touched], self.mesh_unit).map_err(CliError::WriteMesh)?;
+        debug!(open_squares = patched.open_squares, "patched");
+        Ok((moved_faces(scan, &patched.mesh), Some(PatchSummary::of(&patched, build_s))))
     }
 
     /// The work is not begun when its result cannot be kept.
@@ -273,6 +321,42 @@ impl RefineArguments {
     }
 }
 
+/// 1 for a vertex that was touched, 0.5 for one that is guessed from touches nearby, 0 for one of the scan.
+fn touched_column(patched: &Patched) -> Vec<f32> {
+    let touched = |support: &Support| match support {
+        Support::Touched => 1.0,
+        Support::Guessed => 0.5,
+        Support::Scan => 0.0,
+    };
+    patched.support.iter().map(touched).collect()
+}
+
+impl PatchSummary {
+    fn of(patched: &Patched, build_s: f64) -> Self {
+        let count = |wanted: Support| patched.support.iter().filter(|&&support| support == wanted).count() as f64;
+        let (touched, guessed) = (count(Support::Touched), count(Support::Guessed));
+        Self {
+            pitch_mm: patched.pitch * 1e3,
+            removed_faces: patched.removed_faces,
+            added_faces: patched.added_faces,
+            guessed_share: guessed / (touched + guessed).max(1.0),
+            build_s,
+        }
+    }
+}
+
+impl fmt::Display for PatchSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { pitch_mm, removed_faces, added_faces, guessed_share, build_s } = self;
+        write!(
+            f,
+            "meshed anew: {added_faces} faces of {pitch_mm:.2} mm for {removed_faces} of the scan, {:.0} % of their \
+             vertices guessed, in {build_s:.2} s",
+            guessed_share * 100.0
+        )
+    }
+}
+
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let refused: Vec<_> = self.refused.iter().map(|(reason, count)| format!("{count} {reason}")).collect();
@@ -284,7 +368,8 @@ impl fmt::Display for Summary {
             self.contacts, self.moved_faces, self.cut_back
         )?;
         write!(f, "push: median {median} ns, p99 {p99} ns, p99.9 {p999} ns, max {max} ns; ")?;
-        write!(f, "loaded in {:.2} s, replayed in {:.2} s", self.load_s, self.replay_s)
+        write!(f, "loaded in {:.2} s, replayed in {:.2} s", self.load_s, self.replay_s)?;
+        self.patch.iter().try_for_each(|patch| write!(f, "\n{patch}"))
     }
 }
 

@@ -41,7 +41,7 @@ pub use cut::Cut;
 pub use evidence::{Evidence, EvidenceParams, Finding, Source};
 pub use field::{FieldParams, FieldScratch, FieldValue};
 pub use lattice::{Edge, Lattice, Node, Owner, PatchFace, Square, VertexKey};
-pub use patcher::{Patcher, PatcherParams};
+pub use patcher::{Patched, Patcher, PatcherParams, Support};
 pub use restore::{NodeState, Restored, restore};
 pub use scan_value::ScanValue;
 pub use splice::Patch;

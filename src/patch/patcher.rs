@@ -7,10 +7,10 @@ use super::contact_store::ContactStore;
 use super::contour::{ContourParams, contour};
 use super::crossing::crossing;
 use super::cut::Cut;
-use super::evidence::{Evidence, EvidenceParams};
+use super::evidence::{Evidence, EvidenceParams, Source};
 use super::field::FieldScratch;
-use super::lattice::Lattice;
-use super::restore::{Restored, restore};
+use super::lattice::{Lattice, Node, VertexKey};
+use super::restore::{Restored, node_at, restore};
 use super::splice::Patch;
 use super::swept::SweptSpace;
 use super::touches::{Touch, TouchFinder, TouchFinderParams};
@@ -59,6 +59,34 @@ impl PatcherParams {
     }
 }
 
+/// What a vertex rests on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Support {
+    /// the scan
+    Scan,
+    /// touches
+    Touched,
+    /// what touches, free space and scan nearby suggest; nothing was felt here
+    Guessed,
+}
+
+/// A scan with its touched part meshed anew.
+#[derive(Clone, Debug)]
+pub struct Patched {
+    /// vertices and faces that were not touched keep their ids
+    pub mesh: TriMesh,
+    /// what each vertex rests on, by id
+    pub support: Vec<Support>,
+    /// edge length of the lattice, m
+    pub pitch: f64,
+    /// faces of the scan that went
+    pub removed_faces: usize,
+    /// faces that came
+    pub added_faces: usize,
+    /// squares on which scan and patch could not be joined
+    pub open_squares: usize,
+}
+
 /// Keeps what was touched and where the ball went, and makes the patch of it.
 ///
 /// # Example
@@ -69,7 +97,7 @@ impl PatcherParams {
 /// // a scan of 20 mm that lies 0.4 mm too high
 /// let p = |x: f64, y: f64| Point3::new(x * 1e-3, y * 1e-3, 0.4e-3);
 /// let scan = TriMesh::new(vec![p(0., 0.), p(20., 0.), p(20., 20.), p(0., 20.)], vec![[0, 1, 2], [0, 2, 3]])?;
-/// let mut patcher = Patcher::new(PatcherParams { most_faces: 1e4, ..PatcherParams::new(1.5e-3, None, 0.3e-3) })?;
+/// let mut patcher = Patcher::new(PatcherParams::new(1.5e-3, None, 0.3e-3))?;
 /// // a ball slides over the real surface, z = 0, in lines 1 mm apart
 /// for i in 0..8000_i64 {
 ///     let (line, along) = ((i / 800) as f64, (i % 800) as f64 * 0.0125e-3);
@@ -78,7 +106,7 @@ impl PatcherParams {
 ///     let wrench = Wrench { force: Vector3::new(0.0, 0.0, 2.0), torque: Vector3::zeros() };
 ///     patcher.push(&Sample { stamp_ns: i * 1_000_000, pose_ot, wrench });
 /// }
-/// let mesh = patcher.mesh(&scan, &FaceTree::new(&scan))?;
+/// let mesh = patcher.patched(&scan, &FaceTree::new(&scan))?.mesh;
 /// let tree = FaceTree::new(&mesh);
 /// let found = tree.closest(&mesh, &Point3::new(10e-3, 10e-3, 0.0), 1e-3).ok_or("no face")?;
 /// assert!(found.point.z.abs() < 1e-6);
@@ -105,6 +133,8 @@ const FAN_WIDTH: f64 = 0.4;
 const FAN_COSINE: f64 = 0.906;
 /// Rounds in which the region grows over squares where scan and patch cannot be joined.
 const GROWTH: usize = 3;
+/// A budget below this many faces is none: a box has twelve.
+const LEAST_BUDGET: f64 = 5000.0;
 /// Rounds in which the lattice is made coarser to keep the budget.
 const COARSER: usize = 3;
 /// Places the planes of the lattice, in pitches, where no coordinate that a person chose falls on them.
@@ -141,12 +171,27 @@ impl Patcher {
     ///
     /// # Errors
     /// [`MeshError::TooMany`] when 32-bit ids do not suffice.
-    pub fn mesh(&mut self, scan: &TriMesh, tree: &FaceTree) -> Result<TriMesh, MeshError> {
-        self.patch(scan, tree).applied_to(scan)
+    pub fn patched(&mut self, scan: &TriMesh, tree: &FaceTree) -> Result<Patched, MeshError> {
+        let Made { pitch, restored, patch } = self.make(scan, tree);
+        let (mesh, ids) = patch.applied_to(scan)?;
+        let mut support = vec![Support::Scan; mesh.vertex_count()];
+        for ((key, _), id) in patch.vertices.iter().zip(ids) {
+            if let Some(id) = id {
+                support[id.0 as usize] = support_of(&key, &restored);
+            }
+        }
+        Ok(Patched {
+            mesh,
+            support,
+            pitch,
+            removed_faces: patch.removed.len(),
+            added_faces: patch.faces.len(),
+            open_squares: patch.open.len(),
+        })
     }
 
     /// The patch for all that was felt so far, within the budget.
-    pub fn patch(&mut self, scan: &TriMesh, tree: &FaceTree) -> Patch {
+    fn make(&mut self, scan: &TriMesh, tree: &FaceTree) -> Made {
         let Self { finder, contacts, swept, params, .. } = self;
         finder.flush(|touch| keep(contacts, swept, &touch));
         let radius = params.evidence.radius;
@@ -154,19 +199,17 @@ impl Patcher {
         contacts.refute(|mean| swept.nearest(&mean.point).is_some_and(|(distance, _)| distance < deepest));
         contacts.mark_fans(FAN_WIDTH * radius, FAN_COSINE);
         let evidence = Evidence { params: &params.evidence, contacts, swept, scan, tree };
-        let budget = params.most_faces * scan.face_count() as f64;
-        let mut pitch = params.pitch;
-        let mut patch = patch_of(&evidence, pitch);
+        let budget = (params.most_faces * scan.face_count() as f64).max(LEAST_BUDGET);
+        let mut made = Made::of(&evidence, params.pitch);
         for _ in 0..COARSER {
-            let faces = (scan.face_count() + patch.faces.len() - patch.removed.len()) as f64;
+            let faces = (scan.face_count() + made.patch.faces.len() - made.patch.removed.len()) as f64;
             if faces <= budget {
                 break;
             }
             // the number of faces falls with the square of the pitch
-            pitch *= 1.02 * (faces / budget).sqrt();
-            patch = patch_of(&evidence, pitch);
+            made = Made::of(&evidence, made.pitch * 1.02 * (faces / budget).sqrt());
         }
-        patch
+        made
     }
 }
 
@@ -177,22 +220,43 @@ fn keep(contacts: &mut ContactStore, swept: &mut SweptSpace, touch: &Touch) {
     }
 }
 
-fn patch_of(evidence: &Evidence<'_>, pitch: f64) -> Patch {
-    let lattice = Lattice { origin: Point3::from(Vector3::from(ORIGIN) * pitch), pitch };
-    let restored = restore(evidence, &lattice);
-    let mut region = restored.region();
-    let mut patch = contoured(evidence, &lattice, &restored, &region);
-    for _ in 0..GROWTH {
-        let before = region.len();
-        for open in patch.open.iter().filter(|open| open.is_scanned && restored.can_take(open.beyond)) {
-            region.insert_with(open.beyond, || ());
+/// A patch with the field that it shows.
+struct Made {
+    pitch: f64,
+    restored: Restored,
+    patch: Patch,
+}
+
+impl Made {
+    fn of(evidence: &Evidence<'_>, pitch: f64) -> Self {
+        let lattice = Lattice { origin: Point3::from(Vector3::from(ORIGIN) * pitch), pitch };
+        let restored = restore(evidence, &lattice);
+        let mut region = restored.region();
+        let mut patch = contoured(evidence, &lattice, &restored, &region);
+        for _ in 0..GROWTH {
+            let before = region.len();
+            for open in patch.open.iter().filter(|open| open.is_scanned && restored.can_take(open.beyond)) {
+                region.insert_with(open.beyond, || ());
+            }
+            if region.len() == before {
+                break;
+            }
+            patch = contoured(evidence, &lattice, &restored, &region);
         }
-        if region.len() == before {
-            break;
-        }
-        patch = contoured(evidence, &lattice, &restored, &region);
+        Self { pitch, restored, patch }
     }
-    patch
+}
+
+/// A vertex is touched when most of the corners of its cell are near the surface that was; those on the scan are its own.
+fn support_of(key: &VertexKey, restored: &Restored) -> Support {
+    let is_touched = |node: &Node| restored.nodes.get(node).is_some_and(|state| state.source == Source::Touch);
+    let touched = match *key {
+        VertexKey::Scan(_) | VertexKey::Trace { .. } | VertexKey::Pierce(..) => return Support::Scan,
+        VertexKey::Cell(cell, _) => (0..8).filter(|&corner| is_touched(&node_at(cell, corner))).count() >= 4,
+        VertexKey::Square(square, _) => square.corners().iter().filter(|node| is_touched(node)).count() >= 2,
+        VertexKey::Edge(edge) => is_touched(&edge.node) || is_touched(&edge.end()),
+    };
+    if touched { Support::Touched } else { Support::Guessed }
 }
 
 fn contoured(evidence: &Evidence<'_>, lattice: &Lattice, restored: &Restored, region: &Region) -> Patch {

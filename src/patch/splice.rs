@@ -21,12 +21,13 @@ pub struct Patch {
 }
 
 impl Patch {
-    /// A copy of the scan with the patch in it: vertices and untouched faces keep their ids.
+    /// A copy of the scan with the patch in it, and the id there of each vertex of the patch that a face uses: vertices and
+    /// untouched faces of the scan keep their ids.
     ///
     /// # Errors
     /// [`MeshError::TooMany`] when 32-bit ids do not suffice, [`MeshError::NotFinite`] when the field's crossings were not
     /// finite.
-    pub fn applied_to(&self, scan: &TriMesh) -> Result<TriMesh, MeshError> {
+    pub fn applied_to(&self, scan: &TriMesh) -> Result<(TriMesh, Vec<Option<VertexId>>), MeshError> {
         let mut mesh = scan.clone();
         for &face in &self.removed {
             mesh.remove_face(face);
@@ -43,6 +44,6 @@ impl Patch {
             }
             mesh.add_face(corners)?;
         }
-        Ok(mesh)
+        Ok((mesh, ids))
     }
 }

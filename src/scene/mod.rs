@@ -16,7 +16,7 @@ use error::yaml_error;
 use sections::named;
 pub use sections::{
     AlongName, BiasSection, CarveSection, CompensationSection, ContactSection, GuardSection, Mode, ModelName,
-    PayloadSection, RefineSection, ScanSection, SlidingSection, StepName, SyncSection, TipSection,
+    PatchSection, PayloadSection, RefineSection, ScanSection, SlidingSection, StepName, SyncSection, TipSection,
 };
 
 /// The parts of a scene. `None`: not built.
@@ -47,6 +47,9 @@ pub struct Scene {
     /// Keeps the mesh sound; without it an update may fold it.
     #[serde(default, deserialize_with = "named")]
     pub guard: Option<GuardSection>,
+    /// Meshes the surface anew where it was touched; without it the triangles of the scan stay.
+    #[serde(default, deserialize_with = "named")]
+    pub patch: Option<PatchSection>,
     /// Moves the mesh; without it nothing does.
     #[serde(default, deserialize_with = "named")]
     pub refine: Option<RefineSection>,
@@ -64,6 +67,7 @@ impl Default for Scene {
             sliding: Some(SlidingSection::default()),
             carve: Some(CarveSection::default()),
             guard: Some(GuardSection::default()),
+            patch: Some(PatchSection::default()),
             refine: Some(RefineSection::default()),
         }
     }
@@ -111,6 +115,7 @@ impl Scene {
         self.sliding.iter().try_for_each(SlidingSection::check)?;
         self.carve.iter().try_for_each(CarveSection::check)?;
         self.guard.iter().try_for_each(GuardSection::check)?;
+        self.patch.iter().try_for_each(PatchSection::check)?;
         self.refine.iter().try_for_each(RefineSection::check)?;
         let asks_for_spring =
             self.refine.as_ref().is_some_and(|refine| refine.contact_model == Some(ModelName::Spring));
@@ -119,6 +124,14 @@ impl Scene {
                 key: "refine.contact_model: spring",
                 needs: "tip.stiffness_n_per_mm",
             });
+        }
+        if self.patch.is_some() {
+            if self.tip.as_ref().is_none_or(|tip| tip.radius_mm <= 0.0) {
+                return Err(SceneError::Incomplete { key: "patch", needs: "tip.radius_mm above 0" });
+            }
+            if self.contact.is_none() {
+                return Err(SceneError::Incomplete { key: "patch", needs: "contact" });
+            }
         }
         Ok(())
     }

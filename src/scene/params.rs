@@ -3,6 +3,7 @@
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
 use super::{AlongName, CarveSection, GuardSection, Mode, ModelName, RefineSection, Scene, SlidingSection, StepName};
+use crate::patch::PatcherParams;
 use crate::refine::{
     Along, CarveParams, ContactModel, GuardParams, RefineParams, RoiSize, SlidingParams, StepRule, TipParams,
     relaxing_alpha,
@@ -76,6 +77,25 @@ impl Scene {
         params.compensator = self.compensator_params(wrench_frame);
         params.scan_noise = self.scan.as_ref().map_or(0.0, |scan| scan.noise_mm / 1e3);
         section.override_mut(&mut params);
+        Some(params)
+    }
+
+    /// Settings of the patcher for a wrench that arrives in the axes of `wrench_frame`; `None` without `patch`, and in the
+    /// mode of the paper.
+    pub fn patcher_params(&self, wrench_frame: WrenchFrame) -> Option<PatcherParams> {
+        let section = self.patch.as_ref()?;
+        if self.refine.as_ref().is_some_and(|refine| refine.mode == Mode::Paper) {
+            return None;
+        }
+        let (tip, noise) = (self.tip_params(), self.scan.as_ref().map_or(0.0, |scan| scan.noise_mm / 1e3));
+        let mut params = PatcherParams::new(tip.radius, tip.stiffness, noise);
+        params.compensator = self.compensator_params(wrench_frame);
+        params.touches.gate = self.contact_params()?;
+        if let Some(sync) = &self.sync {
+            params.touches.largest_gap_ns = nanoseconds(sync.largest_gap_ms, 1e6);
+        }
+        params.pitch = section.pitch_mm.map_or(params.pitch, |pitch_mm| pitch_mm / 1e3);
+        params.most_faces = section.most_faces;
         Some(params)
     }
 }

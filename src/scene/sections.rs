@@ -297,6 +297,22 @@ impl Default for RefineSection {
     }
 }
 
+/// `patch`
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PatchSection {
+    /// Edge length of the new faces, mm; none: half the radius of the tip.
+    pub pitch_mm: Option<f64>,
+    /// The result has at most this many times the faces of the scan.
+    pub most_faces: f64,
+}
+
+impl Default for PatchSection {
+    fn default() -> Self {
+        Self { pitch_mm: None, most_faces: 10.0 }
+    }
+}
+
 impl SyncSection {
     pub(super) fn check(&self) -> Result<(), SceneError> {
         in_range("sync.reorder_ms", self.reorder_ms, 0.0, 6e4, "0 to 60000 ms")?;
@@ -380,6 +396,13 @@ impl CarveSection {
         in_range("carve.rate_per_s", self.rate_per_s, 0.0, 1e6, "0 to 1e6 1/s")?;
         in_range("carve.tolerance_mm", self.tolerance_mm, 0.0, 1e3, "0 to 1000 mm")?;
         in_range("carve.contact_tolerance_mm", self.contact_tolerance_mm, 0.0, 1e3, "0 to 1000 mm")
+    }
+}
+
+impl PatchSection {
+    pub(super) fn check(&self) -> Result<(), SceneError> {
+        in_range("patch.pitch_mm", self.pitch_mm.unwrap_or(1.0), 1e-3, 1e3, "0.001 to 1000 mm")?;
+        in_range("patch.most_faces", self.most_faces, 1.0, 1e6, "1 to 1000000 times the faces of the scan")
     }
 }
 

@@ -7,6 +7,7 @@ mod stl;
 mod text;
 mod unit;
 
+use std::borrow::Cow;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -198,24 +199,58 @@ pub fn check_target(path: &Path) -> Result<(), MeshFileError> {
 /// # Errors
 /// [`MeshFileError::UnknownFormat`], [`MeshFileError::Write`].
 pub fn write_mesh(path: &Path, mesh: &TriMesh, unit: MeshUnit) -> Result<(), MeshFileError> {
+    write_mesh_with(path, mesh, &[], unit)
+}
+
+/// One number for each vertex of a mesh, by id; a property of the vertices in a PLY file.
+#[derive(Clone, Debug)]
+pub struct VertexColumn<'a> {
+    /// name of the property, with its unit
+    pub name: &'static str,
+    /// as many as the mesh has vertices
+    pub values: Cow<'a, [f32]>,
+}
+
+/// [`write_mesh`] with `columns`, which STL and OBJ have no place for.
+///
+/// # Errors
+/// As [`write_mesh`].
+pub fn write_mesh_with(
+    path: &Path,
+    mesh: &TriMesh,
+    columns: &[VertexColumn<'_>],
+    unit: MeshUnit,
+) -> Result<(), MeshFileError> {
     let format = Format::of_name(path).ok_or_else(|| MeshFileError::UnknownFormat { path: path.into() })?;
-    let (soup, unit) = (used_part(mesh, unit.metres()), unit.to_string());
+    let is_used = used_vertices(mesh);
+    let (soup, unit) = (used_part(mesh, &is_used, unit.metres()), unit.to_string());
+    let of_used = |column: &VertexColumn<'_>| -> Vec<f32> {
+        column.values.iter().zip(&is_used).filter(|(_, is_used)| **is_used).map(|(value, _)| *value).collect()
+    };
+    let columns: Vec<_> =
+        columns.iter().map(|column| VertexColumn { name: column.name, values: of_used(column).into() }).collect();
     write_atomically(path, |out| match format {
-        Format::Ply => ply::write(&soup, &unit, out),
+        Format::Ply => ply::write(&soup, &columns, &unit, out),
         Format::Stl => stl::write(&soup, &unit, out),
         Format::Obj => obj::write(&soup, &unit, out),
     })
     .map_err(|source| MeshFileError::Write { path: path.into(), source })
 }
 
+/// For each vertex, whether a face uses it.
+fn used_vertices(mesh: &TriMesh) -> Vec<bool> {
+    let mut is_used = vec![false; mesh.vertex_count()];
+    for (_, corners) in mesh.faces() {
+        corners.iter().for_each(|v| is_used[v.0 as usize] = true);
+    }
+    is_used
+}
+
 /// Faces that are there and the vertices they use; coordinates divided by `scale`.
-fn used_part(mesh: &TriMesh, scale: f64) -> Soup {
+fn used_part(mesh: &TriMesh, is_used: &[bool], scale: f64) -> Soup {
     let mut soup = Soup::default();
     let mut renamed = vec![u32::MAX; mesh.vertex_count()];
-    for (_, corners) in mesh.faces() {
-        corners.iter().for_each(|v| renamed[v.0 as usize] = 0);
-    }
-    for (name, p) in renamed.iter_mut().zip(mesh.positions()).filter(|(name, _)| **name == 0) {
+    for ((name, p), _) in renamed.iter_mut().zip(mesh.positions()).zip(is_used).filter(|(_, is_used)| **is_used) {
         *name = soup.positions.len() as u32;
         soup.positions.push(p / scale);
     }

@@ -7,8 +7,8 @@ use std::io::{self, Write};
 
 use nalgebra::Point3;
 
-use super::Soup;
 use super::defect::{Place, Syntax};
+use super::{Soup, VertexColumn};
 use body::Body;
 use header::{Element, Header};
 
@@ -96,18 +96,20 @@ fn strips(numbers: &[f64], place: Place, faces: &mut Vec<[u32; 3]>) -> Result<()
     Ok(())
 }
 
-/// Binary little endian, coordinates as double: nothing is rounded.
-pub(super) fn write(soup: &Soup, unit: &str, out: &mut impl Write) -> io::Result<()> {
+/// Binary little endian, coordinates as double: nothing is rounded. Each column is a property of the vertices.
+pub(super) fn write(soup: &Soup, columns: &[VertexColumn<'_>], unit: &str, out: &mut impl Write) -> io::Result<()> {
+    let properties: String = columns.iter().map(|column| format!("property float {}\n", column.name)).collect();
     write!(
         out,
         "ply\nformat binary_little_endian 1.0\ncomment touchup, unit {unit}, frame O\nelement vertex {}\n\
-         property double x\nproperty double y\nproperty double z\nelement face {}\n\
+         property double x\nproperty double y\nproperty double z\n{properties}element face {}\n\
          property list uchar uint vertex_indices\nend_header\n",
         soup.positions.len(),
         soup.faces.len()
     )?;
-    for x in soup.positions.iter().flat_map(|p| p.coords.iter()) {
-        out.write_all(&x.to_le_bytes())?;
+    for (row, p) in soup.positions.iter().enumerate() {
+        p.coords.iter().try_for_each(|x| out.write_all(&x.to_le_bytes()))?;
+        columns.iter().try_for_each(|column| out.write_all(&column.values[row].to_le_bytes()))?;
     }
     for corners in &soup.faces {
         out.write_all(&[3])?;
