@@ -25,6 +25,18 @@ UNCHANGED_MM = 3**0.5 * 128 * 2**-24
 UNMOVED_MM = 4 * 128 * 2**-52
 # beyond this the judge counts a place as not touched, mm
 FAR_MM = 6
+# both baselines that throw the scan's mesh away, of which the better counts in each column
+OFFLINE = ["poisson", "carve"]
+# what a hard case may be worse than the baselines on the std one
+HARD = 1.5
+# share of the openings of holes that may stay covered where the baselines are better
+COVERED = 0.02
+# share of the scanned or touched surface that may be lost
+LOST = 0.005
+# faces of the result for each of the scan
+FACES = 10
+# a rim may be so much longer than the scan's own and the ends of the through-holes, as the lattice cuts it, mm
+RIM_SLACK_MM = 5.0
 
 Judged = namedtuple("Judged", "summary scan refined folder mesh")
 
@@ -52,22 +64,42 @@ def baselines(judge):
 
 
 @pytest.fixture(scope="module")
-def judged(touchup, judging, shared, tmp_path_factory):
-    """Each case: what touchup says, and what the judge says about the scan and about the refined mesh."""
-    out, found = tmp_path_factory.mktemp("judge"), {}
-    for case in CASES:
+def run(touchup, judging, shared, tmp_path_factory):
+    """Refines one case, with or without a scene: what touchup says, and what the judge says about scan and result."""
+    out = tmp_path_factory.mktemp("judge")
+
+    def run(case, scene=None):
         folder = shared / "data" / "cases" / case
-        refined = out / f"{case}.ply"
+        refined = out / f"{case}_{scene.stem if scene else 'default'}.ply"
         files = ["--scan", folder / "scan.ply", "--bag", folder / "touch.mcap", "--out", refined]
-        done = touchup("refine", *files, *KNOWN, "--json")
+        done = touchup("refine", *files, *KNOWN, *(["--scene", scene] if scene else []), "--json")
         # 4: the recordings lose messages on purpose
         assert done.returncode in (0, 4), done.stderr
         before, after = (judging.judge(str(folder), str(mesh)) for mesh in (folder / "scan.ply", refined))
-        found[case] = Judged(json.loads(done.stdout), before, after, folder, refined)
+        return Judged(json.loads(done.stdout), before, after, folder, refined)
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def judged(run):
+    """Each case as plain `touchup refine` does it."""
+    found = {case: run(case) for case in CASES}
     (ROOT / "target").mkdir(exist_ok=True)
     (ROOT / "target" / "judge.md").write_text(table_of(found))
     print("\n" + table_of(found))
     return found
+
+
+@pytest.fixture(scope="module")
+def moved(run, tmp_path_factory):
+    """Each part by the haptic update alone: the scene without `patch`."""
+    scene = tmp_path_factory.mktemp("scene") / "without_patch.yaml"
+    sections = (ROOT / "config" / "default.yaml").read_text().split("\n\n")
+    kept = [section for section in sections if "\npatch:" not in section]
+    assert len(kept) == len(sections) - 1
+    scene.write_text("\n\n".join(kept))
+    return {part: run(part, scene) for part in PARTS}
 
 
 def table_of(found):
@@ -79,7 +111,10 @@ def table_of(found):
         "refined m2t mean / p95",
         "normal median",
         "covered",
+        "lost %",
+        "open rims (scan's own), mm",
         "flipped (scan's own)",
+        "faces",
         "µs per sample",
     ]
     rows = [head, ["---"] * len(head)]
@@ -87,8 +122,10 @@ def table_of(found):
         row = [case, " / ".join(f"{mean(scan, direction):.3f}" for direction in DIRECTIONS)]
         row += [f"{mean(refined, direction):.3f} / {touched(refined, direction)['p95']:.3f}" for direction in DIRECTIONS]
         row += [f"{refined['touched']['normal_deg']['median']:.1f}", f"{refined['holes']['covered_share']:.3f}"]
-        row += [f"{flipped(refined)} ({flipped(scan)})"]
-        row += [f"{summary['replay_s'] / summary['samples'] * 1e6:.1f}"]
+        missing = refined["missing"]
+        row += [f"{missing['lost_share'] * 100:.2f}", f"{missing['open_rim_mm']:.0f} ({missing['scan_open_rim_mm']:.0f})"]
+        row += [f"{flipped(refined)} ({flipped(scan)})", str(refined["health"]["faces"])]
+        row += [f"{(summary['replay_s'] + summary['patch']['build_s']) / summary['samples'] * 1e6:.1f}"]
         rows.append(row)
     return "".join("| " + " | ".join(row) + " |\n" for row in rows)
 
@@ -105,21 +142,64 @@ def flipped(verdict):
     return verdict["health"]["flipped_faces"]
 
 
-@pytest.mark.parametrize("direction, column", list(zip(DIRECTIONS, ["t2m mean", "m2t mean"])))
-@pytest.mark.parametrize("part", PARTS)
-def test_std_is_better_than_the_robust_baseline(judged, baselines, part, direction, column):
-    assert mean(judged[part].refined, direction) < float(baselines[part, "robust"][column])
+def columns_of(verdict):
+    """The columns of the baselines' table that a case is compared in."""
+    t2m, m2t = (touched(verdict, direction) for direction in DIRECTIONS)
+    return {
+        "t2m mean": t2m["mean"],
+        "t2m p95": t2m["p95"],
+        "m2t mean": m2t["mean"],
+        "m2t p95": m2t["p95"],
+        "normal": verdict["touched"]["normal_deg"]["median"],
+        "covered": verdict["holes"]["covered_share"],
+    }
 
 
-@pytest.mark.parametrize("direction", DIRECTIONS)
-@pytest.mark.parametrize("part", PARTS)
-def test_hard_is_at_most_half_again_std(judged, part, direction):
-    assert mean(judged[f"{part}_hard"].refined, direction) <= 1.5 * mean(judged[part].refined, direction)
+def best_offline(baselines, part, column):
+    # "median / p95" of the normals: the median counts
+    return min(float(baselines[part, method][column].split("/")[0]) for method in OFFLINE)
+
+
+@pytest.mark.parametrize("column", ["t2m mean", "t2m p95", "m2t mean", "m2t p95", "normal", "covered"])
+@pytest.mark.parametrize("case", CASES)
+def test_no_worse_than_the_better_offline_baseline(judged, baselines, case, column):
+    limit = best_offline(baselines, case.split("_")[0], column) * (HARD if case.endswith("hard") else 1)
+    if column == "covered":
+        limit = max(limit, COVERED)
+    assert columns_of(judged[case].refined)[column] <= limit
 
 
 @pytest.mark.parametrize("direction", DIRECTIONS)
 def test_clean_is_no_worse_than_std(judged, direction):
     assert mean(judged["featuretype_clean"].refined, direction) <= mean(judged["featuretype"].refined, direction)
+
+
+def through_hole_ends_mm(folder):
+    features = json.loads((folder / "truth_features.json").read_text())["features"]
+    return sum(np.pi * f["diameter_mm"] for f in features if f["kind"] == "hole" and f.get("through") and f.get("ball_fits"))
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_one_closed_skin(judged, case):
+    missing = judged[case].refined["missing"]
+    assert missing["lost_share"] <= LOST
+    ends = through_hole_ends_mm(judged[case].folder)
+    assert missing["open_rim_mm"] <= missing["scan_open_rim_mm"] + ends + RIM_SLACK_MM
+
+
+@pytest.mark.parametrize("direction, column", list(zip(DIRECTIONS, ["t2m mean", "m2t mean"])))
+@pytest.mark.parametrize("part", PARTS)
+def test_the_haptic_update_alone_is_better_than_the_robust_baseline(moved, baselines, part, direction, column):
+    assert mean(moved[part].refined, direction) < float(baselines[part, "robust"][column])
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_the_haptic_update_alone_keeps_the_faces_and_their_soundness(moved, part):
+    scan, refined = (verdict["health"] for verdict in moved[part][1:3])
+    assert (refined["vertices"], refined["faces"]) == (scan["vertices"], scan["faces"])
+    assert refined["flipped_faces"] <= scan["flipped_faces"]
+    assert refined["self_intersecting_faces"] == 0
+    assert moved[part].summary["patch"] is None
 
 
 @pytest.mark.parametrize("direction", DIRECTIONS)
@@ -135,7 +215,7 @@ def test_the_mesh_stays_sound(judged, case):
     assert refined["self_intersecting_faces"] == 0 == scan["self_intersecting_faces"]
     assert refined["zero_area"] == 0
     assert refined["nonmanifold_edges"] <= scan["nonmanifold_edges"]
-    assert (refined["vertices"], refined["faces"]) == (scan["vertices"], scan["faces"])
+    assert refined["faces"] <= FACES * scan["faces"]
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -152,7 +232,7 @@ def test_what_was_not_touched_is_unchanged(judged, case):
     to_ball = cKDTree(contacts["centres"]).query(scan)[0]
     far = (to_contact > FAR_MM) & (to_ball > FAR_MM)
     assert far.sum() > 100
-    assert np.abs(refined - scan)[far].max() <= UNMOVED_MM
+    assert cKDTree(refined).query(scan[far])[0].max() <= UNMOVED_MM
 
 
 @pytest.mark.parametrize("case", CASES)
