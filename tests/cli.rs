@@ -163,13 +163,26 @@ fn refine_json_is_one_object_with_the_documented_keys() {
     let output = case.refine("touch.mcap", "out.ply", &["--json"]);
     assert_eq!((code(&output), text(&output.stderr)), (0, ""));
     let summary = json(&output);
-    let mut documented =
-        ["samples", "accepted", "refused", "contacts", "moved_faces", "cut_back", "push_ns", "load_s", "replay_s"];
+    let mut documented = [
+        "samples",
+        "accepted",
+        "refused",
+        "contacts",
+        "moved_faces",
+        "cut_back",
+        "push_ns",
+        "load_s",
+        "replay_s",
+        "patch",
+    ];
     documented.sort_unstable();
     assert_eq!(keys(&summary), documented);
     let mut tails = ["median", "p99", "p999", "max"];
     tails.sort_unstable();
     assert_eq!(keys(&summary["push_ns"]), tails);
+    let mut patch = ["pitch_mm", "removed_faces", "added_faces", "guessed_share", "build_s"];
+    patch.sort_unstable();
+    assert_eq!(keys(&summary["patch"]), patch);
     assert_eq!((&summary["samples"], &summary["accepted"]), (&Value::from(1001), &Value::from(1001)));
     assert_eq!((&summary["refused"], &summary["contacts"]), (&serde_json::json!({}), &Value::from(1)));
     assert!(summary["moved_faces"].as_u64().unwrap() > 0);
@@ -373,7 +386,7 @@ fn a_recording_that_moves_nothing_says_why() {
 // ---- demo -------------------------------------------------------------------------------------------------------
 
 #[test]
-fn demo_lowers_the_error_at_least_two_and_a_half_fold() {
+fn demo_lowers_the_error_at_least_fivefold() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("made/for/it");
     let output = touchup(&["demo", "--out", out.to_str().unwrap()], "");
@@ -383,7 +396,7 @@ fn demo_lowers_the_error_at_least_two_and_a_half_fold() {
     println!("{summary:#}");
     for error in ["part_to_mesh_mm", "mesh_to_part_mm"] {
         let [before, after] = ["before", "after"].map(|when| summary[when][error][0].as_f64().unwrap());
-        assert!(before > 2.5 * after && after > 0.0, "{error}: {before} -> {after}");
+        assert!(before > 5.0 * after && after > 0.0, "{error}: {before} -> {after}");
     }
     // as bad as the scans of the cases: edges of 2.4 mm, 0.6 mm of noise and 0.3 mm of bias
     let scan = |key: &str| summary["scan"][key].as_f64().unwrap();

@@ -1,0 +1,173 @@
+//! The touched part of a simulated scan meshed anew, against the part that the simulator knows.
+
+use std::collections::BTreeSet;
+
+use nalgebra::{Point3, Vector3};
+use touchup::mesh::{FaceId, FaceTree, TriMesh};
+use touchup::patch::{Patched, Patcher, PatcherParams, Support};
+use touchup::sim::{
+    Moment, PathParams, Plate, ScannerParams, StylusParams, Surface, TruthShape, measure_badness, plan_demo, scan,
+    touch,
+};
+use touchup::touch::{SyncParams, Synchroniser};
+
+#[path = "common/soundness.rs"]
+mod soundness;
+use soundness::{intersections, rim_length, soundness};
+
+/// A touched plate: how it was scanned, where the ball really touched, and what the patcher made of it.
+struct Case {
+    scan: TriMesh,
+    contacts: Vec<Point3<f64>>,
+    patched: Patched,
+}
+
+fn full() -> bool {
+    std::env::var_os("TOUCHUP_FULL").is_some()
+}
+
+fn case(stylus: &StylusParams, seed: u64) -> Case {
+    let plate = Plate::default();
+    let scanner = ScannerParams { seed, ..ScannerParams::default() };
+    let hand = PathParams { radius: stylus.radius, ..PathParams::default() };
+    let scan = scan(&plate, &scanner).unwrap();
+    let touch = touch(&plate, &plan_demo(&plate, &hand).unwrap(), stylus, seed).unwrap();
+    let mut patcher = Patcher::new(PatcherParams::new(stylus.radius, Some(stylus.stiffness), scanner.noise)).unwrap();
+    let mut sync = Synchroniser::new(SyncParams::default()).unwrap();
+    for message in &touch.messages {
+        sync.push(*message);
+        std::iter::from_fn(|| sync.next_sample()).for_each(|sample| patcher.push(&sample));
+    }
+    sync.finish();
+    std::iter::from_fn(|| sync.next_sample()).for_each(|sample| patcher.push(&sample));
+    let patched = patcher.patched(&scan, &FaceTree::new(&scan)).unwrap();
+    let contact_points = |moment: &Moment| moment.contacts.iter().map(|contact| contact.point).collect::<Vec<_>>();
+    let contacts = touch.moments.iter().step_by(7).flat_map(contact_points).collect();
+    Case { scan, contacts, patched }
+}
+
+impl Case {
+    /// Mean distances within 1 mm of a true contact, mm: from the part to the mesh, and back.
+    fn errors(&self, mesh: &TriMesh) -> [f64; 2] {
+        let plate = Plate::default();
+        let tree = FaceTree::new(mesh);
+        let to_mesh = |p: &Point3<f64>| tree.closest(mesh, p, f64::INFINITY).unwrap().distance_squared.sqrt();
+        let forth = self.contacts.iter().map(to_mesh).sum::<f64>() / self.contacts.len() as f64;
+        let cell = |p: &Point3<f64>| [p.x, p.y, p.z].map(|x| (x / 1e-3).floor() as i64);
+        let touched: BTreeSet<[i64; 3]> = self.contacts.iter().map(cell).collect();
+        let is_near = |p: &Point3<f64>| touched.contains(&cell(&plate.closest(p).point));
+        let back = measure_badness(mesh, &plate, is_near).unwrap().mean;
+        [forth * 1e3, back * 1e3]
+    }
+
+    /// How many of the points along the axis of a hole or slot, 1 mm below its opening, are under a face.
+    fn is_covered(&self, centre: &Point3<f64>) -> bool {
+        let mesh = &self.patched.mesh;
+        let below = centre - Vector3::z() * 1e-3;
+        mesh.faces().any(|(face, _)| {
+            let [a, b, c] = mesh.triangle(face);
+            let side = |p: Point3<f64>, q: Point3<f64>| (q.x - p.x) * (below.y - p.y) - (q.y - p.y) * (below.x - p.x);
+            let [u, v, w] = [side(b, c), side(c, a), side(a, b)];
+            let sum = u + v + w;
+            let is_inside = (u > 0.0) == (v > 0.0) && (v > 0.0) == (w > 0.0) && sum != 0.0;
+            is_inside && (a.z * u + b.z * v + c.z * w) / sum > below.z
+        })
+    }
+
+    fn is_new(&self, face: FaceId) -> bool {
+        !self.scan.has_face(face) || self.scan.corners(face) != self.patched.mesh.corners(face)
+    }
+}
+
+/// Perimeter of the ends of the plate's through-holes, m.
+fn through_ends() -> f64 {
+    let perimeter = |shape: &TruthShape| match shape {
+        TruthShape::Hole { diameter, through: true, .. } => std::f64::consts::PI * diameter,
+        _ => 0.0,
+    };
+    Plate::default().features().iter().map(|feature| perimeter(&feature.shape)).sum()
+}
+
+#[test]
+fn the_touched_part_is_right_and_one_closed_skin() {
+    let case = case(&StylusParams::default(), 1);
+    let ([before, before_back], [after, after_back]) = (case.errors(&case.scan), case.errors(&case.patched.mesh));
+    println!("part to mesh {before:.3} -> {after:.3} mm, mesh to part {before_back:.3} -> {after_back:.3} mm");
+    assert!(after < before / 20.0 && after_back < before_back / 10.0);
+
+    let (was, is) = (soundness(&case.scan), soundness(&case.patched.mesh));
+    let (rim_before, rim_after) = (rim_length(&case.scan, &was.rims), rim_length(&case.patched.mesh, &is.rims));
+    println!(
+        "rims {:.1} -> {:.1} mm, ends of through-holes {:.1} mm",
+        rim_before * 1e3,
+        rim_after * 1e3,
+        through_ends() * 1e3
+    );
+    assert!(rim_after <= rim_before + 1.1 * through_ends());
+    assert!(is.bad_edges <= was.bad_edges, "{is:?}");
+    assert_eq!(intersections(&case.patched.mesh, 1e-3, |face| case.is_new(face)), Vec::<[FaceId; 2]>::new());
+}
+
+#[test]
+fn closed_holes_open() {
+    let case = case(&StylusParams::default(), 2);
+    let plate = Plate::default();
+    for feature in plate.features() {
+        if matches!(feature.shape, TruthShape::Hole { .. } | TruthShape::Slot { .. }) {
+            assert!(!case.is_covered(&feature.centre), "{} is still closed", feature.name);
+        }
+    }
+}
+
+#[test]
+fn what_was_not_touched_keeps_its_ids_and_bits() {
+    let case = case(&StylusParams::default(), 3);
+    let mesh = &case.patched.mesh;
+    let far = |p: &Point3<f64>| case.contacts.iter().all(|contact| (contact - p).norm() > 8e-3);
+    let mut kept = 0;
+    for (face, corners) in case.scan.faces() {
+        if corners.iter().all(|&v| far(&case.scan.position(v))) {
+            assert_eq!(mesh.corners(face), corners);
+            assert!(corners.iter().all(|&v| mesh.position(v) == case.scan.position(v)));
+            assert!(corners.iter().all(|&v| case.patched.support[v.0 as usize] == Support::Scan));
+            kept += 1;
+        }
+    }
+    assert!(kept > 100, "{kept}");
+    assert_eq!(case.patched.support.len(), mesh.vertex_count());
+}
+
+#[test]
+fn the_same_samples_make_the_same_mesh() {
+    let [a, b] = [0, 1].map(|_| case(&StylusParams::default(), 4).patched.mesh);
+    assert_eq!(a.positions(), b.positions());
+    assert!(a.faces().eq(b.faces()));
+}
+
+#[test]
+fn other_tips_hands_and_friction() {
+    let seeds = if full() { 20 } else { 2 };
+    let styli = [
+        ("1.5 mm", StylusParams::default()),
+        ("1 mm", StylusParams { radius: 1e-3, ..StylusParams::default() }),
+        ("2.5 mm", StylusParams { radius: 2.5e-3, ..StylusParams::default() }),
+        ("friction 0.05", StylusParams { friction: 0.05, ..StylusParams::default() }),
+        ("friction 0.35", StylusParams { friction: 0.35, ..StylusParams::default() }),
+        ("tilt 15°", StylusParams { tilt: 15f64.to_radians(), ..StylusParams::default() }),
+        ("soft, 5 N/mm", StylusParams { stiffness: 5e3, ..StylusParams::default() }),
+    ];
+    println!("{:14} {:>28} {:>28} {:>10}", "", "part to mesh, worst, mm", "mesh to part, worst, mm", "rim, mm");
+    for (name, stylus) in styli {
+        let (mut worst, mut rim) = ([0.0f64; 2], 0.0f64);
+        for seed in 1..=seeds {
+            let case = case(&stylus, seed);
+            let errors = case.errors(&case.patched.mesh);
+            worst = [0, 1].map(|i| worst[i].max(errors[i]));
+            let rims = soundness(&case.patched.mesh).rims;
+            rim = rim.max(rim_length(&case.patched.mesh, &rims) - rim_length(&case.scan, &soundness(&case.scan).rims));
+        }
+        println!("{name:14} {:28.3} {:28.3} {:10.1}", worst[0], worst[1], rim * 1e3);
+        assert!(worst[0] < 0.06 && worst[1] < 0.12, "{name}: {worst:?}");
+        assert!(rim < 2.0 * through_ends(), "{name}: {rim}");
+    }
+}
