@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{Point3, Vector3};
 use proptest::prelude::*;
-use touchup::io::mesh_file::{MeshFile, MeshFileError, MeshUnit, read_mesh, write_mesh};
+use touchup::io::mesh_file::{MeshFile, MeshFileError, MeshUnit, VertexColumn, read_mesh, write_mesh, write_mesh_with};
 use touchup::mesh::{FaceId, TriMesh, VertexId, repair};
 
 use MeshUnit::{Inch, Metre, Millimetre};
@@ -267,6 +267,27 @@ fn ply_keeps_the_order_and_leaves_out_what_was_removed() {
     let MeshFile { mesh, repair } = read_mesh(&path, Metre).unwrap();
     assert_eq!(mesh.positions(), &ball.positions()[1..]);
     assert_eq!((mesh.face_count(), repair.unused_vertices, repair.boundary_loops), (ball.face_count(), 0, 1));
+}
+
+/// By hand: 4 vertices of three doubles and one float each follow the header; the one without a face is left out.
+#[test]
+fn columns_are_properties_of_the_vertices_in_ply() {
+    let p = [[0.0, 0.0], [1.0, 0.0], [9.0, 9.0], [0.0, 1.0], [1.0, 1.0]].map(|[x, y]| Point3::new(x, y, 0.0));
+    let mesh = TriMesh::new(p.into(), vec![[0, 1, 3], [1, 4, 3]]).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.ply");
+    let column = VertexColumn { name: "touched", values: vec![0.0, 0.5, 9.0, 1.0, 0.25].into() };
+    write_mesh_with(&path, &mesh, &[column], Metre).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    let end = b"end_header\n";
+    let body = bytes.windows(end.len()).position(|w| w == end).unwrap() + end.len();
+    assert!(
+        String::from_utf8_lossy(&bytes[..body]).contains("property double z\nproperty float touched\nelement face 2")
+    );
+    let value = |row: usize| f32::from_le_bytes(bytes[body + 28 * row + 24..][..4].try_into().unwrap());
+    assert_eq!([0, 1, 2, 3].map(value), [0.0, 0.5, 1.0, 0.25]);
+    let read = read_mesh(&path, Metre).unwrap().mesh;
+    assert_eq!((read.vertex_count(), corners_of(&read)), (4, corners_of(&mesh)));
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use nalgebra::vector;
+use touchup::patch::PatcherParams;
 use touchup::refine::{Along, ContactModel, DynamicsParams, GuardParams, RefineParams, RoiSize, StepRule, TipParams};
 use touchup::scene::{CompensationSection, Mode, PayloadSection, Scene};
 use touchup::touch::{SyncParams, WrenchFrame};
@@ -78,6 +79,7 @@ fn the_default_scene_is_the_preset_of_each_mode() {
 fn a_part_is_built_only_when_named() {
     let none = Scene::from_yaml("{}").unwrap();
     assert!(none.refine_params(WrenchFrame::Sensor).is_none() && none.contact_params().is_none());
+    assert!(none.patcher_params(WrenchFrame::Sensor).is_none());
     let SyncParams { reorder_ns, largest_gap_ns, .. } = none.sync_params();
     assert_eq!((reorder_ns, largest_gap_ns), (0, 0));
     assert_eq!(none.compensator_params(WrenchFrame::Object).payload, None);
@@ -87,8 +89,28 @@ fn a_part_is_built_only_when_named() {
     assert_eq!((loop_alone.tip, loop_alone.scan_noise), (TipParams { radius: 0.0, stiffness: None }, 0.0));
     assert_eq!(loop_alone.compensator.wrench_frame, WrenchFrame::Object);
 
-    let bare = Scene::from_yaml("sync:\ncontact: {}\ntip:\nscan:\nsliding:\ncarve:\nguard:\nrefine:\n").unwrap();
+    let bare =
+        Scene::from_yaml("sync:\ncontact: {}\ntip:\nscan:\nsliding:\ncarve:\nguard:\npatch:\nrefine:\n").unwrap();
     assert_eq!(bare, Scene::default(), "a part named without keys takes its defaults");
+}
+
+#[test]
+fn the_patch_needs_a_ball_and_a_gate_and_is_no_part_of_the_paper() {
+    for yaml in ["contact:\npatch:\nrefine:\n", "tip: { radius_mm: 0 }\ncontact:\npatch:\n", "tip:\npatch:\n"] {
+        let error = Scene::from_yaml(yaml).unwrap_err().to_string();
+        assert!(error.starts_with("patch needs "), "{yaml}: {error}");
+    }
+    let yaml = "tip: { radius_mm: 2 }\ncontact: { on_n: 1, off_n: 0.5 }\nscan: { noise_mm: 2 }\n\
+                patch: { pitch_mm: 0.4, most_faces: 3 }";
+    let params = Scene::from_yaml(yaml).unwrap().patcher_params(WrenchFrame::Object).unwrap();
+    assert_eq!((params.pitch, params.most_faces), (0.4e-3, 3.0));
+    assert_eq!((params.touches.gate.on, params.touches.stiffness), (1.0, Some(2e4)));
+    assert_eq!((params.evidence.radius, params.evidence.scan_reach), (2e-3, 6e-3));
+    assert_eq!(params.compensator.wrench_frame, WrenchFrame::Object);
+    let default = Scene::default().patcher_params(WrenchFrame::Sensor);
+    assert_eq!(default, Some(PatcherParams::new(1.5e-3, Some(2e4), 0.6e-3)));
+    let paper = Scene::from_yaml("tip:\ncontact:\npatch:\nrefine: { mode: paper }").unwrap();
+    assert!(paper.patcher_params(WrenchFrame::Sensor).is_none());
 }
 
 #[test]

@@ -243,8 +243,7 @@ impl RefineArguments {
         })?;
         let replay_s = started.elapsed().as_secs_f64();
         let counts = refiner.counts();
-        let patcher = patcher.filter(|_| counts.contacts > 0);
-        let (moved_faces, patch) = match patcher {
+        let (moved_faces, patch) = match patcher.filter(|_| counts.contacts > 0) {
             Some(patcher) => self.write_patched(patcher, &as_scanned)?,
             None => {
                 write_mesh(&self.out, refiner.mesh(), self.mesh_unit).map_err(CliError::WriteMesh)?;
@@ -280,8 +279,14 @@ impl RefineArguments {
     /// Meshes the touched part of the scan anew and writes the result; returns how many faces are new or moved.
     fn write_patched(&self, mut patcher: Patcher, scan: &TriMesh) -> Result<(u64, Option<PatchSummary>), CliError> {
         let _patching = Progress::stage("mesh anew");
-        let started = Instant::now();
+        let (started, wanted) = (Instant::now(), patcher.params().pitch);
         let patched = patcher.patched(scan, &FaceTree::new(scan))?;
+        if patched.pitch > wanted {
+            let (pitch_mm, wanted_mm) = (patched.pitch * 1e3, wanted * 1e3);
+            warn!(
+                "new faces of {pitch_mm:.2} mm instead of {wanted_mm:.2}: finer ones would be more than patch.most_faces"
+            );
+        }
         let build_s = started.elapsed().as_secs_f64();
         let touched = VertexColumn { name: "touched", values: touched_column(&patched).into() };
         write_mesh_with(&self.out, &patched.mesh, &[touched], self.mesh_unit).map_err(CliError::WriteMesh)?;

@@ -157,6 +157,11 @@ impl Patcher {
         })
     }
 
+    /// The settings.
+    pub fn params(&self) -> &PatcherParams {
+        &self.params
+    }
+
     /// Takes the next sample, which is later than the one before. What it says counts once the smoothing window around it
     /// is complete.
     pub fn push(&mut self, sample: &Sample) {
