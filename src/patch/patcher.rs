@@ -11,6 +11,7 @@ use super::evidence::{Evidence, EvidenceParams, Source};
 use super::field::FieldScratch;
 use super::lattice::{Lattice, Node, VertexKey};
 use super::restore::{Restored, node_at, restore};
+use super::scan_value::ScanValue;
 use super::splice::Patch;
 use super::swept::SweptSpace;
 use super::touches::{Touch, TouchFinder, TouchFinderParams};
@@ -127,6 +128,8 @@ const CONTACT_CELL: f64 = 1.0 / 3.0;
 const SWEPT_CELL: f64 = 0.1;
 /// A contact that the ball went into by more than this is none, in radii: four times the noise of a usual tracker.
 const REFUTED_DEPTH: f64 = 0.133;
+/// A contact farther outside of the scan than this belongs to something else, in radii.
+const OUTSIDE: f64 = 4.0;
 /// Normals within this many radii …
 const FAN_WIDTH: f64 = 0.4;
 /// … that differ by more than 25° are those of an edge.
@@ -201,7 +204,11 @@ impl Patcher {
         finder.flush(|touch| keep(contacts, swept, &touch));
         let radius = params.evidence.radius;
         let deepest = radius * (1.0 - REFUTED_DEPTH);
-        contacts.refute(|mean| swept.nearest(&mean.point).is_some_and(|(distance, _)| distance < deepest));
+        let bounds = bounds_of(scan, OUTSIDE * radius);
+        contacts.refute(|mean| {
+            swept.nearest(&mean.point).is_some_and(|(distance, _)| distance < deepest)
+                || is_elsewhere(&mean.point, scan, tree, &bounds, OUTSIDE * radius)
+        });
         contacts.mark_fans(FAN_WIDTH * radius, FAN_COSINE);
         let evidence = Evidence { params: &params.evidence, contacts, swept, scan, tree };
         let budget = (params.most_faces * scan.face_count() as f64).max(LEAST_BUDGET);
@@ -223,6 +230,19 @@ fn keep(contacts: &mut ContactStore, swept: &mut SweptSpace, touch: &Touch) {
     if let Some(contact) = &touch.contact {
         contacts.add(contact);
     }
+}
+
+/// The box around the scan, wider by `margin` (m).
+fn bounds_of(scan: &TriMesh, margin: f64) -> [Point3<f64>; 2] {
+    let empty = [Point3::from(Vector3::repeat(f64::INFINITY)), Point3::from(Vector3::repeat(f64::NEG_INFINITY))];
+    let [lo, hi] = scan.positions().iter().fold(empty, |[lo, hi], p| [lo.inf(p), hi.sup(p)]);
+    [lo - Vector3::repeat(margin), hi + Vector3::repeat(margin)]
+}
+
+/// Whether a contact is so far outside that the part of the scan cannot have been touched there.
+fn is_elsewhere(p: &Point3<f64>, scan: &TriMesh, tree: &FaceTree, bounds: &[Point3<f64>; 2], reach: f64) -> bool {
+    let is_within = bounds[0].inf(p) == bounds[0] && bounds[1].sup(p) == bounds[1];
+    !is_within || ScanValue::at(scan, tree, p).is_none_or(|scan| scan.value > reach)
 }
 
 /// A patch with the field that it shows.
