@@ -15,12 +15,15 @@ pub(super) struct CompleteParams {
     pull: f64,
     /// changes below this end the relaxation, m
     enough: f64,
+    /// a hole without a bottom is opened this far around where the ball left it, in cells
+    end_reach: i32,
 }
 
 impl CompleteParams {
     /// For cells of `pitch` and a ball of `radius` (m): the pull reaches two radii deep.
     pub fn new(pitch: f64, radius: f64) -> Self {
-        Self { pull: (pitch / (2.0 * radius)).powi(2), enough: 1e-6 * pitch }
+        let end_reach = (END_REACH * radius / pitch).ceil() as i32;
+        Self { pull: (pitch / (2.0 * radius)).powi(2), enough: 1e-6 * pitch, end_reach }
     }
 }
 
@@ -28,6 +31,8 @@ impl CompleteParams {
 const RELAXATION: f64 = 1.6;
 /// Sweeps at most: twice what the largest gaps of the tested parts need.
 const SWEEPS: usize = 200;
+/// Radii around the end of a way within which a hole is opened: as wide as holes that a ball is let through.
+const END_REACH: f64 = 3.0;
 /// No neighbour.
 const NONE: u32 = u32::MAX;
 
@@ -37,7 +42,7 @@ pub(super) fn complete(restored: &mut Restored, params: &CompleteParams) {
     if drop_islands(restored) {
         relax(restored, params);
     }
-    open_ends(restored);
+    open_ends(restored, params.end_reach);
 }
 
 fn is_open_question(state: &NodeState) -> bool {
@@ -123,17 +128,19 @@ fn is_held(restored: &Restored, piece: &mut Vec<u32>, is_seen: &mut [bool]) -> b
     is_held
 }
 
-/// Finds where a filled surface hangs on a ball that moved freely, and opens it up to the nearest evidence: a hole that
-/// the ball left at its far end has no bottom.
-fn open_ends(restored: &mut Restored) {
+/// Finds where a filled surface hangs on a ball that ended its way freely, and opens it up to the nearest evidence, within
+/// `reach` cells: a hole that the ball left at its far end has no bottom.
+fn open_ends(restored: &mut Restored, reach: i32) {
     let is_end = |state: &NodeState| state.is_free_end && state.value <= state.least;
-    let ends = restored.nodes.iter().filter(|(_, state)| is_end(state));
-    let mut cells: Vec<Node> = ends.flat_map(|(node, _)| (0..8).map(move |corner| cell_at(node, corner))).collect();
+    let ends = restored.nodes.iter().filter(|(_, state)| is_end(state)).map(|(node, _)| node);
+    let mut cells: Vec<(Node, Node)> =
+        ends.flat_map(|end| (0..8).map(move |corner| (cell_at(end, corner), end))).collect();
     let mut next = 0;
-    while let Some(&cell) = cells.get(next) {
+    while let Some(&(cell, end)) = cells.get(next) {
         next += 1;
-        if is_unheld_surface(restored, cell) && restored.open.insert_with(cell, || ()).1 {
-            cells.extend((0..6).map(|i| stepped(cell, i / 2, if i % 2 == 0 { 1 } else { -1 })));
+        let is_near = (0..3).map(|i| (cell[i] - end[i]).pow(2)).sum::<i32>() <= reach * reach;
+        if is_near && is_unheld_surface(restored, cell) && restored.open.insert_with(cell, || ()).1 {
+            cells.extend((0..6).map(|i| (stepped(cell, i / 2, if i % 2 == 0 { 1 } else { -1 }), end)));
         }
     }
 }

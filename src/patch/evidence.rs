@@ -91,8 +91,8 @@ pub struct Finding {
     pub scan: f64,
     /// how deep the point is in the space that the ball went through, m; not more than 0 outside of it
     pub swept_depth: f64,
-    /// nothing was touched near the ball that was here
-    pub is_ball_free: bool,
+    /// the ball that was here ended its way towards the point and touched nothing
+    pub is_free_end: bool,
 }
 
 /// All evidence.
@@ -118,14 +118,14 @@ impl Evidence<'_> {
             Some(touched) => self.beside_touches(&touched, &scan),
             None => (scan.value, self.away_from_touches(&scan)),
         };
-        let (swept_depth, is_ball_free) = self.swept_depth(x);
+        let (swept_depth, is_free_end) = self.swept_depth(x);
         if swept_depth > 0.0 && source != Source::Touch {
             (value, source) = (scan.value, Source::Nothing);
         }
         if scan.is_on_rim && !matches!(source, Source::Touch | Source::Both) {
             source = Source::Beyond;
         }
-        Some(Finding { value, source, scan: scan.value, swept_depth, is_ball_free })
+        Some(Finding { value, source, scan: scan.value, swept_depth, is_free_end })
     }
 
     /// The field of the touches where they speak for the point, else that of the scan where it holds.
@@ -181,11 +181,13 @@ impl Evidence<'_> {
         self.swept.nearest(&scan.foot).is_some_and(|(distance, _)| distance < limit)
     }
 
-    /// How deep `x` lies in the space that the ball went through, m, and whether that ball was free.
+    /// How deep `x` lies in the space that the ball went through, m, and whether that ball ended its way here freely.
     fn swept_depth(&self, x: &Point3<f64>) -> (f64, bool) {
         let p = self.params;
         let Some((distance, centre)) = self.swept.nearest(x) else { return (f64::NEG_INFINITY, false) };
-        let mut is_free = true;
+        let mut is_free = (x - centre)
+            .try_normalize(0.0)
+            .is_some_and(|direction| self.swept.is_end(&centre, &direction, p.radius / 2.0));
         self.contacts.near(&centre, p.free_reach, |_, _| is_free = false);
         (p.radius - p.swept_margin - distance, is_free)
     }

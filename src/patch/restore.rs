@@ -18,7 +18,7 @@ pub struct NodeState {
     pub scan: f64,
     /// the ball was here: f is no less than this, m
     pub least: f64,
-    /// … and touched nothing nearby, deep inside the scan
+    /// … and ended its way here without touching anything, deep inside the scan
     pub is_free_end: bool,
 }
 
@@ -64,7 +64,7 @@ fn evaluate(evidence: &Evidence<'_>, lattice: &Lattice, node: Node, scratch: &mu
         source: found.source,
         scan: found.scan.clamp(-widest, widest),
         least,
-        is_free_end: least > 0.0 && found.is_ball_free && found.scan < -evidence.params.scan_reach,
+        is_free_end: least > 0.0 && found.is_free_end && found.scan < -evidence.params.scan_reach,
     })
 }
 

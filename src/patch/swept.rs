@@ -1,10 +1,13 @@
 //! Where the ball has been: no material can be there.
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 use super::contact_store::{around, cell_of};
 use super::lattice::Node;
 use super::table::Table;
+
+/// Cosine of the widest angle between a way and what counts as straight ahead: 45°.
+const STRAIGHT: f64 = 0.7;
 
 /// Centres of the ball, thinned to one for each small cell.
 #[derive(Clone, Debug)]
@@ -35,6 +38,22 @@ impl SweptSpace {
         self.centres.iter().flat_map(|(_, centres)| centres)
     }
 
+    /// Whether the way of the ball ended at `centre`, going in `direction` (unit): within `width` (m) all of it is behind.
+    pub fn is_end(&self, centre: &Point3<f64>, direction: &Vector3<f64>, width: f64) -> bool {
+        let (mut sum, mut count) = (Vector3::zeros(), 0.0f64);
+        for bin in around(cell_of(centre, self.reach)) {
+            for other in self.centres.get(&bin).into_iter().flatten() {
+                if (other - centre).norm_squared() < width * width {
+                    sum += other - centre;
+                    count += 1.0;
+                }
+            }
+        }
+        // on a straight way the mean is half the width behind
+        let behind = -sum.dot(direction) / count.max(1.0);
+        behind > STRAIGHT * sum.norm() / count.max(1.0) && behind > width / 4.0
+    }
+
     /// Distance from `x` to the nearest centre, m, and that centre; `None` beyond the reach.
     pub fn nearest(&self, x: &Point3<f64>) -> Option<(f64, Point3<f64>)> {
         let mut best = (self.reach * self.reach, None);
@@ -53,6 +72,18 @@ impl SweptSpace {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_way_ends_where_all_of_it_is_behind() {
+        let mut swept = SweptSpace::new(0.1e-3, 2e-3);
+        for i in 0..=100 {
+            swept.add(&Point3::new(0.0, 0.0, f64::from(i) * -1e-4));
+        }
+        let [top, middle, bottom] = [0.0, -5e-3, -1e-2].map(|z| Point3::new(0.0, 0.0, z));
+        assert!(swept.is_end(&bottom, &-Vector3::z(), 1e-3) && swept.is_end(&top, &Vector3::z(), 1e-3));
+        assert!(!swept.is_end(&bottom, &Vector3::z(), 1e-3) && !swept.is_end(&bottom, &Vector3::x(), 1e-3));
+        assert!(!swept.is_end(&middle, &-Vector3::z(), 1e-3) && !swept.is_end(&middle, &Vector3::x(), 1e-3));
+    }
 
     #[test]
     fn the_nearest_centre_is_found_up_to_the_reach() {
