@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{Point3, Vector3, vector};
+use nalgebra::{Isometry3, Point3, Vector3, vector};
 use proptest::prelude::*;
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
@@ -55,11 +55,23 @@ fn brute_barycentre_distance(mesh: &TriMesh, p: &Point3<f64>) -> f64 {
     mesh.faces().map(|(face, _)| (p - mesh.barycentre(face)).norm()).fold(f64::INFINITY, f64::min)
 }
 
-/// What rounding may do to a distance: a few roundings of the coordinates and of the distance itself, and for each face
-/// what it costs to tell inside from side. For a face of quality q (height over longest edge L) that is ε L/q; but a
-/// mistake between two sides is never more than the height q L.
+/// How far a distance may be from the true one when all is computed in doubles, and the face named from the nearest.
+///
+/// Let M be the largest coordinate, D the diagonal of the mesh, d the distance; ε/2 is one rounding.
+///
+/// - A point of a face, a corner and two shares of edges, is rounded twice by ε/2 · M along each axis and by ε D for the
+///   products; its distance to `p` by 5/4 ε d. So one distance is off by e = √3 ε M + ε D + 5/4 ε d. Two faces nearer to
+///   each other than 2e cannot be told apart and have to be taken for equal, so the distance of the face named is off by
+///   that and by e for each of the two: 4e < 8 ε M + 4 ε D + 5 ε d.
+/// - The shares are quotients of products of edges with `p` − corner: each moves the point along an edge by up to
+///   9 ε (D + d), the quotient of dots of three terms. That counts in full only where d is as small, once for either face.
+/// - The brute force works relative to a corner, so M does not enter: 7 ε (D + d), from the same products.
+/// - For each face what it costs to tell inside from side: the normal of a face of quality q (height over longest edge L)
+///   is off by 3 ε/2 / q, and the foot by 16 ε L/q at most; but a mistake between two sides is never more than the height.
 fn rounding(mesh: &TriMesh, p: &Point3<f64>, distance: f64) -> f64 {
     let coordinate = mesh.positions().iter().map(|x| x.coords.amax()).fold(p.coords.amax(), f64::max);
+    let (mut lo, mut hi) = (mesh.positions()[0], mesh.positions()[0]);
+    mesh.positions().iter().for_each(|x| (lo, hi) = (lo.inf(x), hi.sup(x)));
     let of_face = |t: &Triangle| {
         let longest = (0..3).map(|i| (t[(i + 1) % 3] - t[i]).norm()).fold(0.0, f64::max);
         let height = (t[1] - t[0]).cross(&(t[2] - t[0])).norm() / longest;
@@ -68,7 +80,7 @@ fn rounding(mesh: &TriMesh, p: &Point3<f64>, distance: f64) -> f64 {
         if longest > 0.0 { height.min(16.0 * f64::EPSILON * size * size / height) } else { 0.0 }
     };
     let of_faces = mesh.faces().map(|(face, _)| of_face(&mesh.triangle(face))).fold(0.0, f64::max);
-    16.0 * f64::EPSILON * (coordinate + distance) + of_faces
+    f64::EPSILON * (8.0 * coordinate + 30.0 * ((hi - lo).norm() + distance)) + of_faces
 }
 
 /// Checks one query of either kind, inside and outside the reach.
@@ -318,15 +330,20 @@ fn outside(outline: &[[f64; 2]], p: &Point3<f64>) -> f64 {
     most
 }
 
-/// Points straight off every edge and corner in all directions, where two to six faces are equally near.
+/// Points straight off every edge and corner in all directions, where two to six faces are equally near; also far from
+/// the origin and askew, where the closest point of each is rounded differently.
 #[test]
 fn at_edges_and_corners_the_sign_tells_inside_from_outside() {
     let cube = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
     // tan 5° · 2 = 0.175: a wedge of 5° at x = 1
     let wedge = [[-1.0, -0.0875], [1.0, 0.0], [-1.0, 0.0875]];
     let mut rng = Pcg64::seed_from_u64(3);
-    for outline in [&cube[..], &wedge] {
-        let solid = prism(outline);
+    for (outline, far) in [(&cube[..], 0.0), (&wedge, 0.0), (&cube, 1e6), (&wedge, 1e6)] {
+        let shift = vector![far, -0.7 * far, 0.3 * far];
+        let pose = Isometry3::new(shift, vector![0.3, 0.5, 0.7] * (far / 1e6));
+        let upright = prism(outline);
+        let faces = upright.faces().map(|(_, corners)| corners.map(|v| v.0)).collect();
+        let solid = TriMesh::new(upright.positions().iter().map(|x| pose * x).collect(), faces).unwrap();
         let mut cavity = solid.clone();
         (0..solid.face_count()).for_each(|face| cavity.flip_face(FaceId(face as u32)));
         for (mesh, sign) in [(&solid, 1.0), (&cavity, -1.0)] {
@@ -338,8 +355,9 @@ fn at_edges_and_corners_the_sign_tells_inside_from_outside() {
                     for step in 0..60 {
                         let on_edge = if step % 3 == 0 { a } else { a + (b - a) * within(&mut rng, 0.0, 1.0) };
                         let p = on_edge + point(&mut rng) * 10f64.powf(within(&mut rng, -4.0, 0.0));
-                        let truth = outside(outline, &p);
-                        if truth.abs() < 1e-9 {
+                        let truth = outside(outline, &pose.inverse_transform_point(&p));
+                        // corners are rounded by 6e-11 along each axis at 1e6
+                        if truth.abs() < 1e-9 + 1e-15 * far {
                             continue;
                         }
                         let hit = tree.closest(mesh, &p, f64::INFINITY).unwrap();
@@ -365,6 +383,21 @@ fn off_an_edge_the_face_that_the_point_is_most_squarely_above_is_named() {
     let face = |x, z| tree.closest(&mesh, &p(x, 0.2, z), 9.0).unwrap().face.0;
     assert_eq!((face(0.1, 0.3), face(0.3, 0.1)), (0, 1));
     assert_eq!(face(0.2, 0.2), 0, "among equals the smallest id");
+}
+
+/// By hand: a point in the plane of a flat face, 0.6 off its open edge, 7e-5 from the end of that. A face that has only
+/// this corner in common is (7e-5)² / (2 · 0.6) = 4.1e-9 farther and lies squarely: more than rounding makes up for at
+/// 1e6 (4 √3 ε · 1e6 = 1.5e-9), so it is not named.
+#[test]
+fn a_face_that_is_nearly_as_near_is_not_named() {
+    for far in [0.0, 1e6] {
+        let at = |x: f64, y: f64, z: f64| Point3::new(far + x, far + y, far + z);
+        let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]];
+        let positions = positions.map(|[x, y, z]| at(x, y, z)).to_vec();
+        let mesh = TriMesh::new(positions, vec![[0, 1, 2], [0, 3, 4]]).unwrap();
+        let hit = FaceTree::new(&mesh).closest(&mesh, &at(-7e-5, -0.6, 0.0), 9.0).unwrap();
+        assert_eq!(hit.face, FaceId(1), "{far}");
+    }
 }
 
 #[test]
