@@ -17,9 +17,17 @@ const LEAF_FACES: usize = 4;
 const SMALLEST_SHARE: usize = 4;
 /// Slots of the traversal stack: one for each level, see [`SMALLEST_SHARE`].
 const STACK: usize = 96;
-/// Two faces whose distances differ by no more than this share of the largest coordinate meet at the closest point; 32
-/// roundings.
-const TIE: f64 = 32.0 * f64::EPSILON;
+/// Roundings of the largest coordinate M by which the distances of two faces that meet at the closest point may differ.
+///
+/// The point a + v·ab + w·ac is rounded by ε/2 · M at each sum, which makes ε M along each axis, √3 ε M in length. The
+/// products add ε times the longest edge, at most the diagonal D of the mesh; difference to `p`, squares and their sum
+/// 5/4 ε times the distance d. Two faces: 2√3 ε M + 2 ε D + 5/2 ε d. That v and w are rounded too moves the point along
+/// the face, where the distance is stationary; only for a `p` on the surface to rounding it is not, and that has no side.
+const TIE_COORDINATE: f64 = 4.0 * f64::EPSILON;
+/// The same for the diagonal of the mesh, see [`TIE_COORDINATE`].
+const TIE_DIAGONAL: f64 = 2.0 * f64::EPSILON;
+/// The same for the distance, see [`TIE_COORDINATE`].
+const TIE_DISTANCE: f64 = 3.0 * f64::EPSILON;
 /// What cancellation may take from the precision of a squared height, where the angle is not below [`NEEDLE`].
 const PLANE_MARGIN: f64 = 1e-6;
 /// Squared sine of the least angle at which a normal is trusted: 0.06°.
@@ -267,13 +275,13 @@ impl FaceTree {
         yields: impl Fn(&FaceHit, &FaceHit) -> bool,
     ) -> Option<FaceHit> {
         let q = p - self.origin;
-        let tie = TIE * (p.coords.amax() + q.amax());
+        let tie = self.tie();
         let slack = self.slack(&q) + tie;
         let q = [q.x as f32, q.y as f32, q.z as f32];
         let mut best: Option<FaceHit> = None;
         let reach = reach.max(0.0);
         let mut limit = reach * reach;
-        let mut width = (2.0 * reach + tie) * tie;
+        let mut width = tie_squared(limit, tie);
         let mut far = beyond(limit, slack);
         let mut stack = [(0.0f32, 0u32); STACK];
         let mut depth = 0;
@@ -285,13 +293,16 @@ impl FaceTree {
                     let nearer = match &best {
                         _ if hit.distance_squared > limit + width => false,
                         None => hit.distance_squared < limit,
-                        Some(_) if hit.distance_squared < limit - width => true,
+                        Some(best) if hit.distance_squared < best.distance_squared - width => true,
                         Some(best) => yields(best, &hit) || (!yields(&hit, best) && hit.face < best.face),
                     };
-                    if nearer {
-                        limit = limit.min(hit.distance_squared);
-                        width = (2.0 * limit.sqrt() + tie) * tie;
+                    // also where the other face is named, which then is no farther than this one and a tie
+                    if hit.distance_squared < limit {
+                        limit = hit.distance_squared;
+                        width = tie_squared(limit, tie);
                         far = beyond(limit, slack);
+                    }
+                    if nearer {
                         best = Some(hit);
                     }
                 }
@@ -326,6 +337,16 @@ impl FaceTree {
         let bounds = &self.root.bounds;
         let largest = (0..3).map(|i| f64::from(bounds.hi[i].max(-bounds.lo[i])).max(q[i].abs())).fold(0.0, f64::max);
         4.0 * f64::from(f32::EPSILON) * largest
+    }
+
+    /// How much the distances of faces that meet at the closest point may differ, without the part of the distance, m.
+    fn tie(&self) -> f64 {
+        let Aabb { lo, hi } = self.root.bounds;
+        let largest = |i: usize| self.origin[i].abs() + f64::from(hi[i].max(-lo[i]));
+        let diagonal = Vector3::from_fn(|i, _| f64::from(hi[i] - lo[i])).norm();
+        let tie = TIE_COORDINATE * largest(0).max(largest(1)).max(largest(2)) + TIE_DIAGONAL * diagonal;
+        // an empty box, or one beyond single precision, says nothing
+        if tie.is_finite() { tie } else { 0.0 }
     }
 
     /// Finds every face whose leaf's box meets the box from `lo` to `hi` (m, in O); those of the last query are forgotten.
@@ -443,8 +464,16 @@ impl FaceTree {
     }
 }
 
+/// How much squared distances about `limit` may differ where the distances may by `tie` and [`TIE_DISTANCE`].
+#[inline]
+fn tie_squared(limit: f64, tie: f64) -> f64 {
+    let distance = limit.sqrt();
+    let tie = tie + TIE_DISTANCE * distance;
+    (2.0 * distance + tie) * tie
+}
+
 /// The single-precision squared distance to a box beyond which no face of it can be nearer than √`limit`, nor equally
-/// near within [`TIE`].
+/// near within the tie that `slack` holds; [`TIE_DISTANCE`] is far below the roundings of single precision.
 #[inline]
 fn beyond(limit: f64, slack: f64) -> f32 {
     let distance = limit.sqrt() + slack;

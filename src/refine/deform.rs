@@ -117,7 +117,7 @@ impl DeformableMesh {
     ) -> Fit {
         if !region.roi.is_for(handle) {
             region.roi.rebuild(&self.mesh, handle, size);
-            self.tree.plan(region.roi.neighbourhood.patch.moving(), &mut region.refit);
+            self.tree.plan(region.roi.neighbourhood.ring.moving(), &mut region.refit);
             region.seen = None;
         }
         let longest = self.displace(&region.roi, steps);

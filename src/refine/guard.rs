@@ -6,7 +6,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::collision::Pairs;
 use super::marks::Marks;
-use super::patch::Patch;
+use super::ring::Ring;
 use crate::mesh::{BoxQuery, FaceId, FaceTree, TriMesh, VertexId, triangle};
 
 /// Limits that keep a mesh sound.
@@ -106,8 +106,8 @@ impl Look {
 /// The faces that change when the vertices of a region move, and what they could run into.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Neighbourhood {
-    pub patch: Patch,
-    /// state at the last look, for each face of the patch
+    pub ring: Ring,
+    /// state at the last look, for each face of the ring
     before: Vec<Shape>,
     /// state after the update, for the moving ones
     after: Vec<Shape>,
@@ -142,7 +142,7 @@ impl Neighbourhood {
         for list in [&mut self.before, &mut self.after] {
             list.reserve(faces);
         }
-        self.patch.reserve(vertices);
+        self.ring.reserve(vertices);
         self.near = BoxQuery::with_room(2 * faces);
         self.suspects.reserve(faces);
         self.reached.reserve(4 * faces);
@@ -158,12 +158,12 @@ impl Neighbourhood {
         evidence: &[[f32; 3]],
     ) {
         self.before.clear();
-        self.before.extend(self.patch.faces.iter().map(|&face| shape_of(mesh, face)));
+        self.before.extend(self.ring.faces.iter().map(|&face| shape_of(mesh, face)));
         self.collect(mesh, tree, margin);
         self.unseen = 0.0;
         if let Some(mean) = self.smooth {
             self.after.clear();
-            self.after.extend_from_slice(&self.before[..self.patch.moving]);
+            self.after.extend_from_slice(&self.before[..self.ring.moving]);
             let lowest = self.after.iter().map(|shape| shape.normal.dot(&mean)).fold(1.0, f64::min);
             self.allow_unseen(self.look(params, evidence), lowest);
         }
@@ -189,7 +189,7 @@ impl Neighbourhood {
 
     fn find_near(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64) {
         let (mut lo, mut hi) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
-        for &face in self.patch.moving() {
+        for &face in self.ring.moving() {
             for p in mesh.triangle(face) {
                 (lo, hi) = (lo.inf(&p.coords), hi.sup(&p.coords));
             }
@@ -200,13 +200,13 @@ impl Neighbourhood {
 
     /// The mean normal, if all faces nearby are within [`SMOOTH_COSINE`] of it and hang together.
     fn smooth_normal(&mut self, mesh: &TriMesh) -> Option<Vector3<f64>> {
-        let sum: Vector3<f64> = self.before[..self.patch.moving].iter().map(|shape| shape.normal).sum();
+        let sum: Vector3<f64> = self.before[..self.ring.moving].iter().map(|shape| shape.normal).sum();
         let mean = sum.try_normalize(0.0)?;
         if self.before.iter().any(|shape| shape.normal.dot(&mean) <= SMOOTH_COSINE) {
             return None;
         }
-        let patch = &self.patch;
-        retain(&mut self.near.faces, |face| patch.number_of(face).is_none());
+        let ring = &self.ring;
+        retain(&mut self.near.faces, |face| ring.number_of(face).is_none());
         let within = |face: &FaceId| {
             let double = mesh.double_area_normal(*face);
             double.dot(&mean) > SMOOTH_COSINE * double.norm()
@@ -216,7 +216,7 @@ impl Neighbourhood {
         }
         // nearly always the rim's other corners reach all; at a border some are reached from the moving faces
         self.reached.clear();
-        let (moving, rim) = self.patch.faces.split_at(self.patch.moving);
+        let (moving, rim) = self.ring.faces.split_at(self.ring.moving);
         for faces in [rim, moving] {
             for &face in faces {
                 self.reached.number(mesh.corners(face).map(|corner| corner.0));
@@ -230,12 +230,12 @@ impl Neighbourhood {
 
     fn collect_suspects(&mut self, mesh: &TriMesh, margin: f64) {
         self.suspects.clear();
-        for moving in 0..self.patch.moving {
+        for moving in 0..self.ring.moving {
             for &other in &self.near.faces {
                 // two moving faces are one pair
-                let index = self.patch.number_of(other).map(|index| index as usize);
+                let index = self.ring.number_of(other).map(|index| index as usize);
                 if index.is_none_or(|index| index > moving) {
-                    self.suspects.add(mesh, self.patch.faces[moving], other, margin);
+                    self.suspects.add(mesh, self.ring.faces[moving], other, margin);
                 }
             }
         }
@@ -270,7 +270,7 @@ impl Neighbourhood {
         before: impl Fn(VertexId) -> Point3<f64>,
     ) -> Verdict {
         self.after.clear();
-        self.after.extend(self.patch.faces[..self.patch.moving].iter().map(|&face| shape_of(mesh, face)));
+        self.after.extend(self.ring.faces[..self.ring.moving].iter().map(|&face| shape_of(mesh, face)));
         let look = self.look(params, evidence);
         self.unseen = 0.0;
         if look == Look::Broken {
@@ -304,7 +304,7 @@ impl Neighbourhood {
 
     fn look_at_faces(&self, params: &GuardParams, evidence: &[[f32; 3]]) -> Look {
         let mut look = Look::Safe;
-        for ((&face, old), new) in self.patch.faces.iter().zip(&self.before).zip(&self.after) {
+        for ((&face, old), new) in self.ring.faces.iter().zip(&self.before).zip(&self.after) {
             let seen = Vector3::from(evidence[face.0 as usize].map(f64::from));
             let worse = |new: f64, old: f64, limit: f64| new < limit && new < old;
             let cosine = new.normal.dot(&seen);
@@ -323,7 +323,7 @@ impl Neighbourhood {
 
     fn look_at_edges(&self, params: &GuardParams) -> Look {
         let mut look = Look::Safe;
-        for &(a, b) in &self.patch.edges {
+        for &(a, b) in &self.ring.edges {
             let (old_a, old_b) = (&self.before[a as usize], &self.before[b as usize]);
             let new_b = self.after.get(b as usize).unwrap_or(old_b);
             let cosine = self.after[a as usize].normal.dot(&new_b.normal);
@@ -337,7 +337,7 @@ impl Neighbourhood {
 
     /// Takes the state just looked at as the new state before; `way` is the longest of a vertex, m.
     pub fn accept(&mut self, way: f64) {
-        self.before[..self.patch.moving].copy_from_slice(&self.after);
+        self.before[..self.ring.moving].copy_from_slice(&self.after);
         self.suspects.accept(way);
         self.allowance -= way;
     }

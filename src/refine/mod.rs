@@ -10,7 +10,7 @@ pub mod dynamics;
 mod guard;
 mod marks;
 mod params;
-mod patch;
+mod ring;
 mod roi;
 mod sliding;
 

@@ -9,7 +9,7 @@ use nalgebra::Point3;
 
 use super::guard::Neighbourhood;
 use super::marks::Marks;
-use super::patch::Patch;
+use super::ring::Ring;
 use crate::mesh::{FaceId, TriMesh, VertexId};
 
 /// How far the free vertices reach.
@@ -88,8 +88,8 @@ impl Roi {
             self.add(vertex);
         }
         self.spread(mesh, mesh.barycentre(handle), size);
-        self.neighbourhood.patch.rebuild(mesh, &self.vertices, &mut self.marks);
-        self.solver.solve(&self.neighbourhood.patch, self.vertices.len(), &mut self.weights);
+        self.neighbourhood.ring.rebuild(mesh, &self.vertices, &mut self.marks);
+        self.solver.solve(&self.neighbourhood.ring, self.vertices.len(), &mut self.weights);
     }
 
     fn add(&mut self, vertex: VertexId) {
@@ -136,22 +136,22 @@ impl Solver {
         self.starts.reserve(vertices + 1);
     }
 
-    fn solve(&mut self, patch: &Patch, vertices: usize, weights: &mut Vec<[f64; 3]>) {
+    fn solve(&mut self, ring: &Ring, vertices: usize, weights: &mut Vec<[f64; 3]>) {
         weights.clear();
         weights.extend([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
         weights.resize(vertices, [0.0; 3]);
         let (_, free) = weights.split_at_mut(3);
-        self.assemble(patch, free);
+        self.assemble(ring, free);
         self.factorise();
         self.substitute(free);
     }
 
     /// degree · w − Σ w of the neighbours = 0: the handle's neighbours go to the right side, the rim's are zero.
-    fn assemble(&mut self, patch: &Patch, right: &mut [[f64; 3]]) {
+    fn assemble(&mut self, ring: &Ring, right: &mut [[f64; 3]]) {
         self.rows.clear();
         self.starts.clear();
         for (row, right) in right.iter_mut().enumerate() {
-            let neighbours = patch.neighbours(row + 3);
+            let neighbours = ring.neighbours(row + 3);
             let earlier = neighbours.iter().map(|&other| other as usize).filter(|&other| other >= 3);
             let first = earlier.map(|other| other - 3).min().unwrap_or(row).min(row);
             let start = self.rows.len();

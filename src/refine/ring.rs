@@ -1,4 +1,4 @@
-//! The faces around the vertices that move, and how they hang together: found once, then used by number.
+//! The ring: the faces around the vertices that move, and how they hang together. Found once, then used by number.
 
 use std::hint::select_unpredictable;
 use std::ops::Range;
@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::marks::Marks;
 use crate::mesh::{FaceId, TriMesh, VertexId};
 
-/// Vertices around a patch that do not move, for each that does: all around a single face.
+/// Vertices around the ring that do not move, for each that does: all around a single face.
 const RIM_SHARE: usize = 4;
 /// Faces around a vertex; six in a regular mesh.
 const STAR_FACES: usize = 8;
@@ -15,7 +15,7 @@ const NONE: u32 = u32::MAX;
 
 /// Faces and vertices have numbers here: their order in `faces`, and in the marks of the region.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Patch {
+pub(super) struct Ring {
     /// faces with a moving vertex, then the faces that share an edge with one of these
     pub faces: Vec<FaceId>,
     /// how many of them move
@@ -44,7 +44,7 @@ struct Found {
     crowded: bool,
 }
 
-impl Patch {
+impl Ring {
     /// Makes room for so many moving vertices: two to three faces each, three edges for two faces.
     pub fn reserve(&mut self, vertices: usize) {
         let faces = 3 * vertices;
