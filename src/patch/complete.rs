@@ -27,7 +27,7 @@ impl CompleteParams {
 /// Over-relaxation that converges fast on domains some ten nodes across.
 const RELAXATION: f64 = 1.6;
 /// Weight, at most, of a touched surface going straight on beside the six neighbours of a node: it is left within a cell.
-const STRAIGHT: f64 = 1.0;
+const STRAIGHT: f64 = 3.0;
 /// Sweeps at most: twice what the largest gaps of the tested parts need.
 const SWEEPS: usize = 200;
 /// No neighbour.

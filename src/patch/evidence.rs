@@ -134,7 +134,7 @@ impl Evidence<'_> {
         if scan.is_on_rim && !matches!(source, Source::Touch | Source::Both) {
             source = Source::Beyond;
         }
-        let straight = touched.and_then(|touched| self.straight_on(&touched));
+        let straight = touched.and_then(|touched| self.straight_on(&touched, &scan));
         Some(Finding { value, source, scan: scan.value, straight, swept_depth, is_ball_free })
     }
 
@@ -161,12 +161,14 @@ impl Evidence<'_> {
         if is_supported { (touched.value, Source::Touch) } else { (scan.value, Source::Nothing) }
     }
 
-    /// The touched surface beyond its support: it goes straight on, unless the ball rolled over an edge there.
-    fn straight_on(&self, touched: &FieldValue) -> Option<(f64, f64)> {
+    /// The touched surface beyond its support: it goes straight on, unless the ball rolled over an edge there, and not out
+    /// of the scan.
+    fn straight_on(&self, touched: &FieldValue, scan: &ScanValue) -> Option<(f64, f64)> {
         let p = self.params;
+        let inside = (1.0 - scan.value / p.scan_reach).clamp(0.0, 1.0);
         let share = (p.field.reach - lateral(touched)) / (p.field.reach - p.border_support);
         let goes_on = !touched.is_fan && touched.value.abs() <= p.touch_depth;
-        goes_on.then(|| (touched.value, share.clamp(0.0, 1.0).powi(2)))
+        goes_on.then(|| (touched.value, inside * share.clamp(0.0, 1.0).powi(2)))
     }
 
     fn away_from_touches(&self, scan: &ScanValue) -> Source {
@@ -189,8 +191,10 @@ impl Evidence<'_> {
         self.contacts.near(&scan.foot, p.scan_removal, |distance_squared, index| {
             let contact = &self.contacts.means()[index as usize];
             let cosine = contact.normal.dot(&scan.normal);
-            // a scan in front of a touched surface that faces it leaves its wall no thickness: a gap would be wider
-            let is_pierced = cosine < -p.alike_cosine && contact.normal.dot(&(scan.foot - contact.point)) > 0.0;
+            // a scan that faces a touched surface and is not clearly behind it leaves its wall no thickness; in front of
+            // it the ball had no room for it
+            let depth = contact.normal.dot(&(contact.point - scan.foot));
+            let is_pierced = cosine < -p.alike_cosine && depth < p.wall_removal;
             let limit = if cosine > p.alike_cosine || is_pierced { p.scan_removal } else { p.wall_removal };
             holds &= distance_squared > limit * limit;
         });
