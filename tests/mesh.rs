@@ -1,6 +1,5 @@
 //! The mesh from outside: closest face against brute force, triangles against exact arithmetic, inside and outside
-//! against winding numbers, adjacency against a
-//! mesh that is built anew.
+//! against winding numbers, adjacency against a mesh that is built anew.
 
 #[path = "mesh/adjacency.rs"]
 mod adjacency;

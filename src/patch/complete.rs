@@ -29,6 +29,8 @@ impl CompleteParams {
 
 /// Over-relaxation that converges fast on domains some ten nodes across.
 const RELAXATION: f64 = 1.6;
+/// Weight, at most, of a touched surface going straight on beside the six neighbours of a node: it is left within a cell.
+const STRAIGHT: f64 = 3.0;
 /// Sweeps at most: twice what the largest gaps of the tested parts need.
 const SWEEPS: usize = 200;
 /// Radii around the end of a way within which a hole is opened: as wide as holes that a ball is let through.
@@ -59,8 +61,10 @@ fn relax(restored: &mut Restored, params: &CompleteParams) {
         let mut largest = 0.0f64;
         for (at, around) in &open {
             let state = restored.nodes.entry(*at).1;
-            let weight = if state.source == Source::Far { params.pull } else { 0.0 };
-            let (mut sum, mut count) = (weight * state.scan, weight);
+            let pull = if state.source == Source::Far { params.pull } else { 0.0 };
+            let (straight, share) = state.straight;
+            let weight = STRAIGHT * share;
+            let (mut sum, mut count) = (pull * state.scan + weight * straight, pull + weight);
             for &other in around.iter().filter(|&&other| other != NONE) {
                 sum += restored.nodes.entry(other).1.value;
                 count += 1.0;

@@ -7,7 +7,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::cut::{Cut, Segment};
-use super::dual::{bend, diagonal, passes};
+use super::dual::{bend, diagonal, passes, unfolded};
 use super::lattice::{Edge, Lattice, Node, Owner, PatchFace, Square, VertexKey};
 use super::loops::{Loops, NONE, edge_corners, edge_of, number_in, ring_corners, ring_edges, segments, square_of};
 use super::qef::Planes;
@@ -34,6 +34,9 @@ pub struct ContourParams {
     /// how far inside its cell a vertex stays, as a share of the pitch: what keeps triangles from losing their area
     pub margin: f64,
 }
+
+/// The middle of a fan may leave the surface by this share of the pitch to keep the fan from folding over.
+const DRIFT: f64 = 0.05;
 
 impl Default for ContourParams {
     fn default() -> Self {
@@ -75,6 +78,7 @@ pub fn contour(
         rim: Vec::new(),
         segments: Vec::new(),
         planes: Planes::default(),
+        moved: Vec::new(),
         patch,
     };
     for (cell, ()) in region.iter() {
@@ -84,6 +88,9 @@ pub fn contour(
         skin.close_edges(at);
     }
     skin.close_rim();
+    for &(vertex, point) in &skin.moved {
+        *skin.patch.vertices.value_mut(vertex) = point;
+    }
     skin.patch
 }
 
@@ -148,6 +155,8 @@ struct Skin<'a, F> {
     rim: Vec<Rim>,
     segments: Vec<Segment>,
     planes: Planes,
+    /// middles of fans that are to be moved once all faces are made
+    moved: Vec<(u32, Point3<f64>)>,
     patch: Patch,
 }
 
@@ -315,7 +324,10 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
                 return;
             }
         }
-        let (centre, _) = self.crossing(edge);
+        let (centre, normal) = self.crossing(edge);
+        if let [Some(a), Some(b), Some(c), Some(d)] = vertices {
+            self.unfold(edge, (centre, &normal), is_upward, [a, b, c, d], middles);
+        }
         for i in 0..4 {
             let (Some(from), Some(to)) = (vertices[i], vertices[(i + 1) % 4]) else { continue };
             if !self.is_fanned(i, &vertices, &squares) {
@@ -326,6 +338,39 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
             if between != to {
                 self.add_face(edge, is_upward, [centre, between, to]);
             }
+        }
+    }
+
+    /// Moves the middle of a fan that goes all around an edge so that it does not fold over; one of the scan stays.
+    fn unfold(
+        &mut self,
+        edge: &Edge,
+        (centre, normal): (u32, &Vector3<f64>),
+        is_upward: bool,
+        vertices: [u32; 4],
+        middles: [Option<u32>; 4],
+    ) {
+        if self.cut.shared_crossing(edge, self.values).is_some() {
+            return;
+        }
+        let at = |vertex: u32| self.patch.vertices.entry(vertex).1;
+        let mut ring = [[Point3::origin(); 2]; 8];
+        for i in 0..4 {
+            let (from, to) = (vertices[i], vertices[(i + 1) % 4]);
+            let between = middles[i].unwrap_or(to);
+            (ring[2 * i], ring[2 * i + 1]) = ([at(from), at(between)], [at(between), at(to)]);
+        }
+        if !is_upward {
+            ring.iter_mut().for_each(|step| step.reverse());
+        }
+        let middle = at(centre);
+        let margin = self.params.margin * self.lattice.pitch;
+        let ends = [edge.node, edge.end()].map(|node| self.lattice.position(node) - middle);
+        let within = ends.map(|end| end * (1.0 - margin / end.norm().max(margin)));
+        let steps = ring.iter().filter(|[from, to]| from != to).copied().collect::<Vec<_>>();
+        let point = unfolded(&middle, normal, within, &steps, DRIFT * self.lattice.pitch);
+        if point != middle {
+            self.moved.push((centre, point));
         }
     }
 

@@ -15,6 +15,8 @@ const INSET: f64 = 1e-3;
 const SLACK: f64 = 1e-9;
 /// Difference of the angles (cosine) at the two diagonals above which the flatter one is taken: a crease runs along it.
 const CREASE: f64 = 0.06;
+/// Places tried on either side of the middle of a fan that folds over.
+const STEPS: u32 = 8;
 /// Sine of the angle between two normals on a square above which there is a corner between them: 37°.
 const CORNER: f64 = 0.6;
 
@@ -84,6 +86,42 @@ pub(super) fn diagonal(e0: &Point3<f64>, e1: &Point3<f64>, c: &[Point3<f64>; 4],
     }
 }
 
+/// Moves the middle of a fan along its edge where the fan would fold over: there the surface hardly leaves the edge, and
+/// where it crosses it is chance. Any point of the edge is safe.
+///
+/// - `middle`: a point of the edge; `normal`: unit normal of the surface there.
+/// - `edge`: the parts of the edge below and above the middle, m, as vectors.
+/// - `ring`: the steps around the fan, counter-clockwise seen against the normal.
+/// - `drift`: how far the middle may leave the surface, m.
+pub(super) fn unfolded(
+    middle: &Point3<f64>,
+    normal: &Vector3<f64>,
+    edge: [Vector3<f64>; 2],
+    ring: &[[Point3<f64>; 2]],
+    drift: f64,
+) -> Point3<f64> {
+    let least_height = |move_by: Vector3<f64>| {
+        let from = middle + move_by;
+        let height = |[p, q]: &[Point3<f64>; 2]| (p - from).cross(&(q - from)).dot(normal) / (q - p).norm().max(drift);
+        ring.iter().map(height).fold(f64::INFINITY, f64::min)
+    };
+    let (mut best, mut most) = (Vector3::zeros(), least_height(Vector3::zeros()));
+    if most >= 0.0 {
+        return *middle;
+    }
+    for side in edge {
+        let share = (drift / normal.dot(&side).abs()).min(1.0);
+        for step in 1..=STEPS {
+            let move_by = side * (share * f64::from(step) / f64::from(STEPS));
+            let height = least_height(move_by);
+            if height > most {
+                (best, most) = (move_by, height);
+            }
+        }
+    }
+    middle + best
+}
+
 /// The flatter diagonal where they differ clearly, else the one with the better triangles.
 fn better(c: &[Point3<f64>; 4]) -> usize {
     let rate = |i: usize| {
@@ -140,5 +178,20 @@ mod tests {
         let a = Point3::new(0.4, 0.1, 0.1);
         assert!(passes(&lattice, &square, &a, &Point3::new(0.9, 0.4, 0.4)));
         assert!(!passes(&lattice, &square, &Point3::new(0.1, 0.45, 0.1), &Point3::new(0.6, 0.55, 0.4)));
+    }
+
+    #[test]
+    fn the_middle_of_a_fan_that_folds_over_moves_to_where_it_does_not() {
+        // a square in the plane x = 0, which holds the edge
+        let ring = [(-1.0, 0.2), (1.0, 0.2), (1.0, 0.6), (-1.0, 0.6)].map(|(y, z)| Point3::new(0.0, y, z));
+        let steps: Vec<_> = (0..4).map(|i| [ring[i], ring[(i + 1) % 4]]).collect();
+        let unfold = |z: f64, normal: Vector3<f64>| {
+            let edge = [Vector3::new(0.0, 0.0, -z), Vector3::new(0.0, 0.0, 1.0 - z)];
+            unfolded(&Point3::new(0.0, 0.0, z), &normal, edge, &steps, 0.05).z
+        };
+        assert_eq!(unfold(0.3, Vector3::x()), 0.3, "it does not fold over");
+        assert!((0.2..=0.6).contains(&unfold(0.1, Vector3::x())) && (0.2..=0.6).contains(&unfold(0.9, Vector3::x())));
+        let steep = Vector3::new(0.8, 0.0, 0.6);
+        assert!(unfold(0.1, steep) - 0.1 <= 0.05 / 0.6 + 1e-12, "it stays near the surface");
     }
 }

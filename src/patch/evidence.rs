@@ -89,6 +89,9 @@ pub struct Finding {
     pub source: Source,
     /// signed distance from the scan, m
     pub scan: f64,
+    /// where there is nothing: the signed distance from a touched surface going straight on, m, and how far that is
+    /// believed, from 1 where its support ends down to 0 where it is out of reach
+    pub straight: Option<(f64, f64)>,
     /// how deep the point is in the space that the ball went through, m; not more than 0 outside of it
     pub swept_depth: f64,
     /// the ball that was here ended its way towards the point and touched nothing
@@ -110,12 +113,18 @@ pub struct Evidence<'a> {
     pub tree: &'a FaceTree,
 }
 
+/// Distance from the nearest contact along the surface, m.
+fn lateral(touched: &FieldValue) -> f64 {
+    (touched.nearest * touched.nearest - touched.value * touched.value).max(0.0).sqrt()
+}
+
 impl Evidence<'_> {
     /// What is known at `x` (m, in O); `None` where the scan has no face.
     pub fn at(&self, x: &Point3<f64>, scratch: &mut FieldScratch) -> Option<Finding> {
         let scan = ScanValue::at(self.scan, self.tree, x)?;
-        let (mut value, mut source) = match self.params.field.at(self.contacts, x, scratch) {
-            Some(touched) => self.beside_touches(&touched, &scan),
+        let touched = self.params.field.at(self.contacts, x, scratch);
+        let (mut value, mut source) = match &touched {
+            Some(touched) => self.beside_touches(touched, &scan),
             None => (scan.value, self.away_from_touches(&scan)),
         };
         let (swept_depth, is_free_end) = self.swept_depth(x);
@@ -125,13 +134,14 @@ impl Evidence<'_> {
         if scan.is_on_rim && !matches!(source, Source::Touch | Source::Both) {
             source = Source::Beyond;
         }
-        Some(Finding { value, source, scan: scan.value, swept_depth, is_free_end })
+        let straight = touched.and_then(|touched| self.straight_on(&touched, &scan));
+        Some(Finding { value, source, scan: scan.value, straight, swept_depth, is_free_end })
     }
 
     /// The field of the touches where they speak for the point, else that of the scan where it holds.
     fn beside_touches(&self, touched: &FieldValue, scan: &ScanValue) -> (f64, Source) {
         let p = self.params;
-        let lateral = (touched.nearest * touched.nearest - touched.value * touched.value).max(0.0).sqrt();
+        let lateral = lateral(touched);
         let support = match (touched.is_border, touched.is_fan) {
             _ if touched.is_edge => p.edge_support,
             (false, _) => p.inner_support,
@@ -149,6 +159,16 @@ impl Evidence<'_> {
             return (if is_wall { scan.value.max(touched.value) } else { scan.value }, Source::Both);
         }
         if is_supported { (touched.value, Source::Touch) } else { (scan.value, Source::Nothing) }
+    }
+
+    /// The touched surface beyond its support: it goes straight on, unless the ball rolled over an edge there, and not out
+    /// of the scan.
+    fn straight_on(&self, touched: &FieldValue, scan: &ScanValue) -> Option<(f64, f64)> {
+        let p = self.params;
+        let inside = (1.0 - scan.value / p.scan_reach).clamp(0.0, 1.0);
+        let share = (p.field.reach - lateral(touched)) / (p.field.reach - p.border_support);
+        let goes_on = !touched.is_fan && touched.value.abs() <= p.touch_depth;
+        goes_on.then(|| (touched.value, inside * share.clamp(0.0, 1.0).powi(2)))
     }
 
     fn away_from_touches(&self, scan: &ScanValue) -> Source {
@@ -169,8 +189,13 @@ impl Evidence<'_> {
         }
         let mut holds = true;
         self.contacts.near(&scan.foot, p.scan_removal, |distance_squared, index| {
-            let is_alike = self.contacts.means()[index as usize].normal.dot(&scan.normal) > p.alike_cosine;
-            let limit = if is_alike { p.scan_removal } else { p.wall_removal };
+            let contact = &self.contacts.means()[index as usize];
+            let cosine = contact.normal.dot(&scan.normal);
+            // a scan that faces a touched surface and is not clearly behind it leaves its wall no thickness; in front of
+            // it the ball had no room for it
+            let depth = contact.normal.dot(&(contact.point - scan.foot));
+            let is_pierced = cosine < -p.alike_cosine && depth < p.wall_removal;
+            let limit = if cosine > p.alike_cosine || is_pierced { p.scan_removal } else { p.wall_removal };
             holds &= distance_squared > limit * limit;
         });
         holds

@@ -201,26 +201,42 @@ impl FieldParams {
         let is_believed = |piece: &Piece| piece.weight >= self.least_weight;
         let first_at = pieces.iter().position(is_believed).unwrap_or(0);
         let first = pieces.get(first_at)?;
-        let mut combined =
-            Combined { value: first.value(), gradient: first.facing, is_edge: false, piece: first_at as u32 };
-        let slack = OVERLAP * self.sigma;
+        let mut solid = Solid { values: [0.0; MOST_PIECES], is_convex: [0; MOST_PIECES] };
+        solid.values[first_at] = first.value();
+        let (mut taken, mut is_edge) = (1u8 << first_at, false);
         for (at, piece) in pieces.iter().enumerate().filter(|(at, piece)| *at != first_at && is_believed(piece)) {
-            let cosine = first.facing.dot(&piece.facing);
-            if cosine > self.piece_cosine {
-                continue;
+            let Some(convex) = self.convex_among(pieces, taken, piece) else { continue };
+            solid.values[at] = piece.value();
+            solid.take(at, convex);
+            taken |= 1 << at;
+            let is_flat = first.flat_weight.min(piece.flat_weight) >= self.least_weight;
+            let is_near = piece.value().max(first.value()) < EDGE_NEAR * self.sigma;
+            is_edge |=
+                convex >> first_at & 1 == 1 && is_flat && is_near && first.facing.dot(&piece.facing) < EDGE_COSINE;
+        }
+        let (value, at) = solid.evaluate(taken, first_at);
+        Some(Combined { value, gradient: pieces[at].facing, is_edge, piece: at as u32 })
+    }
+
+    /// With which of the pieces in the set `taken` another one makes a convex edge: with the rest it makes a concave one.
+    /// `None` where it makes neither with some.
+    fn convex_among(&self, pieces: &[Piece], taken: u8, piece: &Piece) -> Option<u8> {
+        let mut convex = 0;
+        for at in members(taken) {
+            let other = &pieces[at];
+            if other.facing.dot(&piece.facing) > self.piece_cosine {
+                return None;
             }
-            let arm = piece.point - first.point;
-            let (from_first, from_piece) = (first.facing.dot(&arm), piece.facing.dot(&arm));
-            let is_convex = from_first <= slack && from_piece >= -slack;
-            let is_concave = from_first > 0.0 && from_piece < 0.0;
-            let (value, is_flat) = (piece.value(), first.flat_weight.min(piece.flat_weight) >= self.least_weight);
-            let is_near = value.max(first.value()) < EDGE_NEAR * self.sigma;
-            combined.is_edge |= is_convex && is_flat && is_near && cosine < EDGE_COSINE;
-            if (is_convex && value > combined.value) || (is_concave && value < combined.value) {
-                combined = Combined { value, gradient: piece.facing, piece: at as u32, ..combined };
+            let arm = piece.point - other.point;
+            let (from_other, from_piece) = (other.facing.dot(&arm), piece.facing.dot(&arm));
+            let slack = OVERLAP * self.sigma;
+            if from_other <= slack && from_piece >= -slack {
+                convex |= 1 << at;
+            } else if from_other <= 0.0 || from_piece >= 0.0 {
+                return None;
             }
         }
-        Some(combined)
+        Some(convex)
     }
 }
 
@@ -231,6 +247,69 @@ struct Combined {
     is_edge: bool,
     /// the one that decides
     piece: u32,
+}
+
+/// The half-spaces behind the pieces, put together to the solid whose edges are as the pieces meet: pieces that meet in
+/// convex edges are intersected, in concave ones united. Which comes first follows from all pairs: what no convex edge
+/// joins is united, what no concave edge joins is intersected (the cotree of the graph of convex edges).
+struct Solid {
+    values: [f64; MOST_PIECES],
+    /// bit k of entry i: pieces i and k meet in a convex edge
+    is_convex: [u8; MOST_PIECES],
+}
+
+/// The numbers in a set.
+fn members(set: u8) -> impl Iterator<Item = usize> {
+    (0..MOST_PIECES).filter(move |&at| set >> at & 1 == 1)
+}
+
+impl Solid {
+    /// Takes in a piece that makes convex edges with those in the set `convex`.
+    fn take(&mut self, at: usize, convex: u8) {
+        self.is_convex[at] |= convex;
+        members(convex).for_each(|other| self.is_convex[other] |= 1 << at);
+    }
+
+    /// Value of the solid of the pieces in `set`, and the piece that decides; of the part with `first` where the edges
+    /// contradict each other.
+    fn evaluate(&self, set: u8, first: usize) -> (f64, usize) {
+        if set.is_power_of_two() {
+            let at = set.trailing_zeros() as usize;
+            return (self.values[at], at);
+        }
+        let of_parts = |are_convex: bool| {
+            let mut rest = set;
+            std::iter::from_fn(move || {
+                let part = self.connected(rest, are_convex);
+                rest &= !part;
+                (part != 0).then_some(part)
+            })
+        };
+        if self.connected(set, true) != set {
+            let parts = of_parts(true).map(|part| self.evaluate(part, first));
+            return parts.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((self.values[first], first));
+        }
+        if self.connected(set, false) != set {
+            let parts = of_parts(false).map(|part| self.evaluate(part, first));
+            return parts.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((self.values[first], first));
+        }
+        // the farthest contradicts
+        let last = members(set).filter(|&at| at != first).last().unwrap_or(first);
+        self.evaluate(set & !(1 << last), first)
+    }
+
+    /// The part of `set` that hangs together with its lowest member by convex edges, or by concave ones.
+    fn connected(&self, set: u8, by_convex: bool) -> u8 {
+        let mut part = set & set.wrapping_neg();
+        loop {
+            let joined = |at: usize| if by_convex { self.is_convex[at] } else { !self.is_convex[at] };
+            let next = members(part).fold(part, |next, at| next | joined(at) & set);
+            if next == part {
+                return part;
+            }
+            part = next;
+        }
+    }
 }
 
 /// Whether contacts at `arms` from a point leave a wide gap in the plane across `normal`.

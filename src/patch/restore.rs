@@ -16,6 +16,8 @@ pub struct NodeState {
     pub source: Source,
     /// the scan's own value, m
     pub scan: f64,
+    /// where nothing is known: value of a touched surface going straight on, m, and how far it is believed, 0 to 1
+    pub straight: (f64, f64),
     /// the ball was here: f is no less than this, m
     pub least: f64,
     /// … and ended its way here without touching anything, deep inside the scan
@@ -63,6 +65,7 @@ fn evaluate(evidence: &Evidence<'_>, lattice: &Lattice, node: Node, scratch: &mu
         value: found.value.clamp(-widest, widest).max(least),
         source: found.source,
         scan: found.scan.clamp(-widest, widest),
+        straight: found.straight.map_or((0.0, 0.0), |(value, share)| (value.clamp(-widest, widest), share)),
         least,
         is_free_end: least > 0.0 && found.is_free_end && found.scan < -evidence.params.scan_reach,
     })
