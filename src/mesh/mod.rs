@@ -2,6 +2,7 @@
 
 mod closest;
 mod repair;
+mod stars;
 mod tri_mesh;
 pub mod triangle;
 

@@ -211,7 +211,7 @@ pub fn write_mesh(path: &Path, mesh: &TriMesh, unit: MeshUnit) -> Result<(), Mes
 /// Faces that are there and the vertices they use; coordinates divided by `scale`.
 fn used_part(mesh: &TriMesh, scale: f64) -> Soup {
     let mut soup = Soup::default();
-    let mut renamed = vec![u32::MAX; mesh.vertex_count()];
+    let mut renamed = vec![u32::MAX; mesh.vertex_slots()];
     for (_, corners) in mesh.faces() {
         corners.iter().for_each(|v| renamed[v.0 as usize] = 0);
     }
