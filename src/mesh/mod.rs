@@ -3,6 +3,7 @@
 mod closest;
 mod repair;
 mod signed_distance;
+mod stars;
 mod tri_mesh;
 pub mod triangle;
 

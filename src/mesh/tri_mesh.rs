@@ -2,16 +2,20 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::stars::{MOST_FACES, Stars, Valences};
+
 /// A face of one [`TriMesh`]; stays valid until that face is removed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct FaceId(pub u32);
 
-/// A vertex of one [`TriMesh`].
+/// A vertex of one [`TriMesh`]; stays valid until that vertex is removed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct VertexId(pub u32);
 
-/// Marks the slot of a removed face.
+/// Marks the slot of a removed face; no id.
 const REMOVED: u32 = u32::MAX;
+/// Vertices that ids can name.
+const MOST_VERTICES: usize = REMOVED as usize - 1;
 
 /// What makes a triangle soup unusable as a [`TriMesh`].
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -29,6 +33,14 @@ pub enum MeshError {
         /// how many vertices there are
         vertices: usize,
     },
+    /// A face that names a vertex that was removed.
+    #[error("face {face} uses vertex {vertex}, which was removed")]
+    RemovedVertex {
+        /// which face, counted from 0
+        face: usize,
+        /// the vertex that is gone
+        vertex: u32,
+    },
     /// A face that names a vertex twice.
     #[error("face {face} uses vertex {vertex} twice")]
     RepeatedVertex {
@@ -43,22 +55,14 @@ pub enum MeshError {
         /// which vertex, counted from 0
         vertex: usize,
     },
-    /// More faces or vertices than 32-bit ids can name.
-    #[error("{count} {what} are more than 32-bit numbers can count: reduce the mesh first")]
+    /// More faces or vertices than 32-bit ids can name, or than there is memory for.
+    #[error("{count} {what} are more than 32-bit numbers can count or memory can hold: reduce the mesh first")]
     TooMany {
         /// "faces" or "vertices"
         what: &'static str,
         /// how many
         count: usize,
     },
-}
-
-/// Where the faces around one vertex stand in [`TriMesh::star_entries`].
-#[derive(Clone, Copy, Debug, Default)]
-struct StarSlot {
-    start: u32,
-    len: u32,
-    capacity: u32,
 }
 
 /// A triangle mesh whose vertices are expressed in the object frame O.
@@ -72,9 +76,9 @@ struct StarSlot {
 pub struct TriMesh {
     positions: Vec<Point3<f64>>,
     faces: Vec<[u32; 3]>,
-    star_slots: Vec<StarSlot>,
-    star_entries: Vec<FaceId>,
+    stars: Stars,
     free_faces: Vec<FaceId>,
+    free_vertices: Vec<VertexId>,
 }
 
 impl TriMesh {
@@ -83,8 +87,8 @@ impl TriMesh {
     /// # Errors
     /// Every breach of the invariants above; nothing is repaired here.
     pub fn new(positions: Vec<Point3<f64>>, faces: Vec<[u32; 3]>) -> Result<Self, MeshError> {
-        for (what, count) in [("vertices", positions.len()), ("faces", faces.len())] {
-            if count >= REMOVED as usize {
+        for (what, count, limit) in [("vertices", positions.len(), MOST_VERTICES), ("faces", faces.len(), MOST_FACES)] {
+            if count > limit {
                 return Err(MeshError::TooMany { what, count });
             }
         }
@@ -102,12 +106,17 @@ impl TriMesh {
     /// Builds the adjacency of arrays that keep the invariants above, and whose faces have been counted.
     pub(super) fn of_sound(positions: Vec<Point3<f64>>, faces: Vec<[u32; 3]>, valences: Valences) -> Self {
         debug_assert!(faces.iter().all(|corners| check_corners(corners, 0, positions.len()).is_ok()));
-        let (star_slots, star_entries) = valences.stars_of(&faces);
-        Self { positions, faces, star_slots, star_entries, free_faces: Vec::new() }
+        let stars = valences.stars_of(&faces);
+        Self { positions, faces, stars, free_faces: Vec::new(), free_vertices: Vec::new() }
     }
 
-    /// Number of vertices.
+    /// Number of vertices, removed ones not counted.
     pub fn vertex_count(&self) -> usize {
+        self.positions.len() - self.free_vertices.len()
+    }
+
+    /// One more than the largest vertex id ever given out: the size of an array indexed by [`VertexId`].
+    pub fn vertex_slots(&self) -> usize {
         self.positions.len()
     }
 
@@ -121,7 +130,7 @@ impl TriMesh {
         self.faces.len()
     }
 
-    /// All positions, m, in O, indexed by [`VertexId`].
+    /// All positions, m, in O, indexed by [`VertexId`]; a removed vertex keeps its last one.
     pub fn positions(&self) -> &[Point3<f64>] {
         &self.positions
     }
@@ -133,6 +142,11 @@ impl TriMesh {
             .enumerate()
             .filter(|(_, corners)| corners[0] != REMOVED)
             .map(|(face, corners)| (FaceId(face as u32), corners.map(VertexId)))
+    }
+
+    /// Whether `vertex` names a vertex that is there.
+    pub fn has_vertex(&self, vertex: VertexId) -> bool {
+        self.stars.has(vertex.0)
     }
 
     /// Whether `face` names a face that is there.
@@ -181,8 +195,7 @@ impl TriMesh {
     /// The faces around a vertex, in no particular order.
     #[inline]
     pub fn star(&self, vertex: VertexId) -> &[FaceId] {
-        let slot = self.star_slots[vertex.0 as usize];
-        &self.star_entries[slot.start as usize..(slot.start + slot.len) as usize]
+        self.stars.of(vertex.0)
     }
 
     /// The faces that share the edge from `a` to `b` (either direction), in no particular order.
@@ -197,57 +210,91 @@ impl TriMesh {
         self.positions[vertex.0 as usize] = position;
     }
 
-    /// Adds a vertex that no face uses yet.
+    /// Makes room for so many vertices and faces more: adding them in the shape of a regular mesh allocates nothing.
+    ///
+    /// # Errors
+    /// [`MeshError::TooMany`] where memory is short.
+    pub fn reserve(&mut self, vertices: usize, faces: usize) -> Result<(), MeshError> {
+        let short = |what, count| MeshError::TooMany { what, count };
+        self.positions.try_reserve(vertices).map_err(|_| short("vertices", vertices))?;
+        self.faces.try_reserve(faces).map_err(|_| short("faces", faces))?;
+        self.stars.reserve(vertices, faces).ok_or(short("faces", faces))
+    }
+
+    /// Memory, bytes.
+    pub fn bytes(&self) -> usize {
+        let ids = self.free_faces.capacity() + self.free_vertices.capacity();
+        self.positions.capacity() * size_of::<Point3<f64>>()
+            + self.faces.capacity() * size_of::<[u32; 3]>()
+            + ids * size_of::<u32>()
+            + self.stars.bytes()
+    }
+
+    /// Adds a vertex that no face uses yet; the slot of a removed vertex is used again first.
     ///
     /// # Errors
     /// [`MeshError::NotFinite`], [`MeshError::TooMany`].
     pub fn add_vertex(&mut self, position: Point3<f64>) -> Result<VertexId, MeshError> {
-        let vertex = self.positions.len();
+        let next = self.positions.len();
+        let vertex = self.free_vertices.last().map_or(next, |vertex| vertex.0 as usize);
         if !position.coords.iter().all(|x| x.is_finite()) {
             return Err(MeshError::NotFinite { vertex });
         }
-        if vertex >= REMOVED as usize - 1 {
+        if vertex >= MOST_VERTICES {
             return Err(MeshError::TooMany { what: "vertices", count: vertex + 1 });
         }
-        self.positions.push(position);
-        self.star_slots.push(StarSlot::default());
+        match self.free_vertices.pop() {
+            Some(_) => self.positions[vertex] = position,
+            None => self.positions.push(position),
+        }
+        self.stars.add_vertex(vertex as u32);
         Ok(VertexId(vertex as u32))
+    }
+
+    /// Removes a vertex that no face uses; the ids of the others stay. Returns whether there was such a vertex.
+    pub fn remove_vertex(&mut self, vertex: VertexId) -> bool {
+        if !self.has_vertex(vertex) || !self.star(vertex).is_empty() {
+            return false;
+        }
+        self.stars.remove_vertex(vertex.0);
+        self.free_vertices.push(vertex);
+        true
     }
 
     /// Adds a face, counter-clockwise seen from outside; the slot of a removed face is used again first.
     ///
     /// # Errors
-    /// [`MeshError::VertexOutOfRange`], [`MeshError::RepeatedVertex`], [`MeshError::TooMany`].
+    /// [`MeshError::VertexOutOfRange`], [`MeshError::RemovedVertex`], [`MeshError::RepeatedVertex`],
+    /// [`MeshError::TooMany`].
     pub fn add_face(&mut self, corners: [VertexId; 3]) -> Result<FaceId, MeshError> {
         let corners = corners.map(|v| v.0);
-        check_corners(&corners, self.faces.len(), self.positions.len())?;
-        if self.free_faces.is_empty() && self.faces.len() >= REMOVED as usize - 1 {
-            return Err(MeshError::TooMany { what: "faces", count: self.faces.len() + 1 });
+        let next = self.faces.len();
+        let face = self.free_faces.last().map_or(next, |face| face.0 as usize);
+        check_corners(&corners, face, self.positions.len())?;
+        if let Some(&vertex) = corners.iter().find(|&&v| !self.stars.has(v)) {
+            return Err(MeshError::RemovedVertex { face, vertex });
         }
-        let face = self.free_faces.pop().unwrap_or_else(|| {
-            self.faces.push([REMOVED; 3]);
-            FaceId(self.faces.len() as u32 - 1)
-        });
-        self.faces[face.0 as usize] = corners;
-        for vertex in corners {
-            self.push_star(vertex, face);
+        if face >= MOST_FACES || !self.stars.have_room(&corners) {
+            return Err(MeshError::TooMany { what: "faces", count: self.face_count() + 1 });
         }
+        match self.free_faces.pop() {
+            Some(_) => self.faces[face] = corners,
+            None => self.faces.push(corners),
+        }
+        let face = FaceId(face as u32);
+        corners.into_iter().for_each(|vertex| self.stars.push(vertex, face));
         Ok(face)
     }
 
     /// Removes a face; its vertices stay. Returns whether there was such a face.
+    ///
+    /// An index over the faces must be told before ([`crate::mesh::FaceTree::remove`]).
     pub fn remove_face(&mut self, face: FaceId) -> bool {
         if !self.has_face(face) {
             return false;
         }
-        for vertex in std::mem::replace(&mut self.faces[face.0 as usize], [REMOVED; 3]) {
-            let slot = &mut self.star_slots[vertex as usize];
-            let star = &mut self.star_entries[slot.start as usize..(slot.start + slot.len) as usize];
-            if let Some(at) = star.iter().position(|&f| f == face) {
-                star.swap(at, slot.len as usize - 1);
-                slot.len -= 1;
-            }
-        }
+        let corners = std::mem::replace(&mut self.faces[face.0 as usize], [REMOVED; 3]);
+        corners.into_iter().for_each(|vertex| self.stars.remove(vertex, face));
         self.free_faces.push(face);
         true
     }
@@ -255,20 +302,6 @@ impl TriMesh {
     /// Turns a face over: its normal changes sign; its id and its neighbours stay.
     pub fn flip_face(&mut self, face: FaceId) {
         self.faces[face.0 as usize].swap(1, 2);
-    }
-
-    fn push_star(&mut self, vertex: u32, face: FaceId) {
-        let slot = &mut self.star_slots[vertex as usize];
-        if slot.len == slot.capacity {
-            // the star moves to the end with room to grow; the old entries are left behind
-            let old = slot.start as usize..(slot.start + slot.len) as usize;
-            slot.start = self.star_entries.len() as u32;
-            slot.capacity = (2 * slot.len).max(8);
-            self.star_entries.extend_from_within(old);
-            self.star_entries.resize((slot.start + slot.capacity) as usize, FaceId(REMOVED));
-        }
-        self.star_entries[(slot.start + slot.len) as usize] = face;
-        slot.len += 1;
     }
 }
 
@@ -281,51 +314,6 @@ fn check_corners(corners: &[u32; 3], face: usize, vertices: usize) -> Result<(),
         return Err(MeshError::RepeatedVertex { face, vertex: if b == c { b } else { a } });
     }
     Ok(())
-}
-
-/// How many faces each vertex has: the first half of the counting sort that finds the stars, in the place of its result.
-pub(super) struct Valences(Vec<StarSlot>);
-
-impl Valences {
-    /// No faces yet.
-    pub fn new(vertices: usize) -> Self {
-        Self(vec![StarSlot::default(); vertices])
-    }
-
-    /// Counts a face.
-    #[inline]
-    pub fn add(&mut self, corners: &[u32; 3]) {
-        corners.iter().for_each(|&v| self.0[v as usize].capacity += 1);
-    }
-
-    /// Whether each vertex has a face.
-    pub fn used(&self) -> impl Iterator<Item = bool> {
-        self.0.iter().map(|slot| slot.capacity > 0)
-    }
-
-    /// Forgets the vertices without a face.
-    pub fn retain_used(&mut self) {
-        self.0.retain(|slot| slot.capacity > 0);
-    }
-
-    /// The faces around each vertex, in rising order; `faces`: those that were counted.
-    fn stars_of(self, faces: &[[u32; 3]]) -> (Vec<StarSlot>, Vec<FaceId>) {
-        let mut slots = self.0;
-        let mut end = 0;
-        for slot in &mut slots {
-            slot.start = end;
-            end += slot.capacity;
-        }
-        let mut entries = vec![FaceId(REMOVED); end as usize];
-        for (face, corners) in faces.iter().enumerate() {
-            for &vertex in corners {
-                let slot = &mut slots[vertex as usize];
-                entries[(slot.start + slot.len) as usize] = FaceId(face as u32);
-                slot.len += 1;
-            }
-        }
-        (slots, entries)
-    }
 }
 
 #[cfg(test)]
@@ -369,5 +357,21 @@ mod tests {
         let mut bad = p;
         bad[2].y = f64::NAN;
         assert_eq!(TriMesh::new(bad, vec![[0, 1, 2]]).unwrap_err(), MeshError::NotFinite { vertex: 2 });
+    }
+
+    #[test]
+    fn a_vertex_goes_only_when_no_face_uses_it() {
+        let mut mesh = quad();
+        assert!(!mesh.remove_vertex(VertexId(3)), "in use");
+        assert!(mesh.remove_face(FaceId(1)));
+        assert!(mesh.remove_vertex(VertexId(3)));
+        assert!(!mesh.remove_vertex(VertexId(3)) && !mesh.has_vertex(VertexId(3)), "gone");
+        assert!(!mesh.remove_vertex(VertexId(4)), "never there");
+        assert_eq!((mesh.vertex_count(), mesh.vertex_slots(), mesh.star(VertexId(3)).len()), (3, 4, 0));
+        let corners = [1, 3, 2].map(VertexId);
+        assert_eq!(mesh.add_face(corners), Err(MeshError::RemovedVertex { face: 1, vertex: 3 }));
+        assert_eq!(mesh.add_vertex(Point3::new(2.0, 2.0, 0.0)), Ok(VertexId(3)), "a freed slot is used first");
+        assert_eq!(mesh.add_face(corners), Ok(FaceId(1)));
+        assert_eq!((mesh.position(VertexId(3)).x, mesh.star(VertexId(3))), (2.0, &[FaceId(1)][..]));
     }
 }

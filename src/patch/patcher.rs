@@ -182,7 +182,7 @@ impl Patcher {
     pub fn patched(&mut self, scan: &TriMesh, tree: &FaceTree) -> Result<Patched, MeshError> {
         let Made { pitch, restored, patch } = self.make(scan, tree);
         let (mesh, ids) = patch.applied_to(scan)?;
-        let mut support = vec![Support::Scan; mesh.vertex_count()];
+        let mut support = vec![Support::Scan; mesh.vertex_slots()];
         for ((key, _), id) in patch.vertices.iter().zip(ids) {
             if let Some(id) = id {
                 support[id.0 as usize] = support_of(&key, &restored);

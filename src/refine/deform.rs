@@ -128,7 +128,7 @@ impl DeformableMesh {
                 Fit::Whole
             }
         };
-        self.tree.refit_planned(&self.mesh, &region.refit);
+        self.tree.refit_planned(&self.mesh, &mut region.refit);
         self.edits += 1;
         region.seen = Some(self.edits);
         fit

@@ -239,7 +239,7 @@ pub fn write_mesh_with(
 
 /// For each vertex, whether a face uses it.
 fn used_vertices(mesh: &TriMesh) -> Vec<bool> {
-    let mut is_used = vec![false; mesh.vertex_count()];
+    let mut is_used = vec![false; mesh.vertex_slots()];
     for (_, corners) in mesh.faces() {
         corners.iter().for_each(|v| is_used[v.0 as usize] = true);
     }
@@ -249,7 +249,7 @@ fn used_vertices(mesh: &TriMesh) -> Vec<bool> {
 /// Faces that are there and the vertices they use; coordinates divided by `scale`.
 fn used_part(mesh: &TriMesh, is_used: &[bool], scale: f64) -> Soup {
     let mut soup = Soup::default();
-    let mut renamed = vec![u32::MAX; mesh.vertex_count()];
+    let mut renamed = vec![u32::MAX; mesh.vertex_slots()];
     for ((name, p), _) in renamed.iter_mut().zip(mesh.positions()).zip(is_used).filter(|(_, is_used)| **is_used) {
         *name = soup.positions.len() as u32;
         soup.positions.push(p / scale);

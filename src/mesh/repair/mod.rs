@@ -9,7 +9,8 @@ use std::fmt;
 use nalgebra::Point3;
 use serde::Serialize;
 
-use super::tri_mesh::{MeshError, TriMesh, Valences};
+use super::stars::Valences;
+use super::tri_mesh::{MeshError, TriMesh};
 use orient::{Edges, boundary_loops};
 
 /// Two times the area below which a face counts as having none, relative to its longest edge times its largest

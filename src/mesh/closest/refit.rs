@@ -1,0 +1,84 @@
+//! Boxes after vertices moved.
+
+use super::{FaceTree, NONE, ROOT, STACK};
+use crate::mesh::{FaceId, TriMesh};
+
+/// Marks a pair that a plan has met; pairs are numbered below it.
+const SEEN: u32 = 1 << 31;
+
+/// The boxes of one tree that depend on certain faces: leaves, and the pairs above them from the root down.
+#[derive(Clone, Debug, Default)]
+pub struct RefitPlan {
+    faces: Vec<FaceId>,
+    leaves: Vec<u32>,
+    pairs: Vec<u32>,
+    /// the tree's count of edits when it was made
+    edits: u64,
+}
+
+impl RefitPlan {
+    /// A plan with room for so many faces.
+    pub fn with_room(faces: usize) -> Self {
+        // the way from the leaves to the root adds a level or so for each halving of the mesh
+        let pairs = Vec::with_capacity(2 * faces + STACK);
+        Self { faces: Vec::with_capacity(faces), leaves: Vec::with_capacity(faces), pairs, edits: 0 }
+    }
+}
+
+impl FaceTree {
+    /// Makes the tree exact again after the corners of `faces` moved.
+    pub fn refit(&mut self, mesh: &TriMesh, faces: &[FaceId]) {
+        let mut plan = RefitPlan::default();
+        self.plan(faces, &mut plan);
+        self.refit_planned(mesh, &mut plan);
+    }
+
+    /// Notes which boxes depend on `faces`, for [`Self::refit_planned`]; faces that the tree does not hold are skipped.
+    pub fn plan(&mut self, faces: &[FaceId], plan: &mut RefitPlan) {
+        plan.faces.clear();
+        plan.faces.extend_from_slice(faces);
+        self.renew(plan);
+    }
+
+    /// Makes the tree exact again after the corners of the planned faces moved; a plan made before faces were inserted
+    /// or removed is made anew.
+    pub fn refit_planned(&mut self, mesh: &TriMesh, plan: &mut RefitPlan) {
+        if plan.edits != self.edits {
+            self.renew(plan);
+        }
+        for &leaf in &plan.leaves {
+            let node = *self.node(leaf);
+            self.node_mut(leaf).bounds = self.bounds_of(mesh, self.faces_of(&node));
+        }
+        for &pair in plan.pairs.iter().rev() {
+            let [left, right] = &self.pairs[pair as usize].0;
+            let bounds = left.bounds.union(&right.bounds);
+            self.node_mut(self.parents[pair as usize]).bounds = bounds;
+        }
+    }
+
+    fn renew(&mut self, plan: &mut RefitPlan) {
+        let RefitPlan { faces, leaves, pairs, edits } = plan;
+        *edits = self.edits;
+        leaves.clear();
+        leaves.extend(faces.iter().filter_map(|face| self.leaf_of_face.get(face.0 as usize)));
+        leaves.dedup();
+        leaves.sort_unstable();
+        leaves.dedup();
+        if leaves.last() == Some(&NONE) {
+            leaves.pop();
+        }
+        pairs.clear();
+        for &leaf in leaves.iter() {
+            // the way up ends where it meets that of an earlier leaf, so that what is above stands before what is below
+            let (known, mut at) = (pairs.len(), leaf);
+            while at != ROOT && self.parents[at as usize / 2] & SEEN == 0 {
+                pairs.push(at / 2);
+                let above = &mut self.parents[at as usize / 2];
+                at = std::mem::replace(above, *above | SEEN);
+            }
+            pairs[known..].reverse();
+        }
+        pairs.iter().for_each(|&pair| self.parents[pair as usize] &= !SEEN);
+    }
+}
