@@ -21,6 +21,7 @@ impl FaceTree {
     /// Takes in a face of `mesh`: after [`TriMesh::add_face`]. O(log F).
     ///
     /// Every face in the tree must still be in the mesh. Returns whether there was such a face, and not in the tree yet.
+    /// Arrays that are full are copied once and doubled, a pause of milliseconds on a large mesh: see [`Self::reserve`].
     pub fn insert(&mut self, mesh: &TriMesh, face: FaceId) -> bool {
         if !mesh.has_face(face) || self.has(face) {
             return false;
