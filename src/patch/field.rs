@@ -98,8 +98,10 @@ pub struct FieldScratch {
 const MOST_PIECES: usize = 8;
 /// No piece.
 const NO_PIECE: u32 = u32::MAX;
-/// Pieces that stand at more than this to each other (cos 60°) make an edge.
+/// Pieces that stand at more than this to each other (cos 60°) make an edge, or the two sides of a thin wall.
 const EDGE_COSINE: f64 = 0.5;
+/// Share of the reach within which the tilted planes of an edge count as much as others.
+const TILTED_REACH: f64 = 0.5;
 /// An edge is near within this many σ.
 const EDGE_NEAR: f64 = 1.5;
 /// Share of σ by which two pieces may seem to overlap at a convex edge.
@@ -196,23 +198,32 @@ impl FieldParams {
         }
     }
 
-    /// Puts the pieces together around the nearest one that is believed.
+    /// Puts the pieces together around the nearest one that is believed. The tilted planes of edges that the ball rolled
+    /// over say little from afar: such can only cut off.
     fn combine(&self, pieces: &[Piece]) -> Option<Combined> {
-        let is_believed = |piece: &Piece| piece.weight >= self.least_weight;
-        let first_at = pieces.iter().position(is_believed).unwrap_or(0);
+        let is_flat = |at: usize| pieces[at].flat_weight >= self.least_weight;
+        let is_tilted_afar =
+            |at: usize| !is_flat(at) && pieces[at].nearest_squared > (TILTED_REACH * self.reach).powi(2);
+        let believed = || (0..pieces.len()).filter(|&at| pieces[at].weight >= self.least_weight);
+        let near = believed().filter(|&at| !is_tilted_afar(at));
+        let mut in_order = near.chain(believed().filter(|&at| is_tilted_afar(at)));
+        let first_at = in_order.next().unwrap_or(0);
         let first = pieces.get(first_at)?;
         let mut solid = Solid { values: [0.0; MOST_PIECES], is_convex: [0; MOST_PIECES] };
         solid.values[first_at] = first.value();
         let (mut taken, mut is_edge) = (1u8 << first_at, false);
-        for (at, piece) in pieces.iter().enumerate().filter(|(at, piece)| *at != first_at && is_believed(piece)) {
+        for at in in_order {
+            let piece = &pieces[at];
             let Some(convex) = self.convex_among(pieces, taken, piece) else { continue };
+            if is_tilted_afar(at) && convex != taken {
+                continue;
+            }
             solid.values[at] = piece.value();
             solid.take(at, convex);
             taken |= 1 << at;
-            let is_flat = first.flat_weight.min(piece.flat_weight) >= self.least_weight;
             let is_near = piece.value().max(first.value()) < EDGE_NEAR * self.sigma;
-            is_edge |=
-                convex >> first_at & 1 == 1 && is_flat && is_near && first.facing.dot(&piece.facing) < EDGE_COSINE;
+            let meets = first.facing.dot(&piece.facing) < EDGE_COSINE && convex >> first_at & 1 == 1;
+            is_edge |= is_near && meets && is_flat(first_at) && is_flat(at);
         }
         let (value, at) = solid.evaluate(taken, first_at);
         Some(Combined { value, gradient: pieces[at].facing, is_edge, piece: at as u32 })
@@ -330,4 +341,89 @@ fn is_border(
     let (Some(first), Some(last)) = (angles.first(), angles.last()) else { return true };
     let around = first + std::f64::consts::TAU - last;
     angles.windows(2).map(|pair| pair[1] - pair[0]).fold(around, f64::max) >= BORDER_GAP
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::patch::Contact;
+
+    const RADIUS: f64 = 1.5e-3;
+
+    /// Contacts of a surface at the points of a grid of 0.5 mm, each weighing 5.
+    fn store_of(surfaces: &[&dyn Fn(f64, f64) -> Option<(Point3<f64>, Vector3<f64>)>]) -> ContactStore {
+        let mut store = ContactStore::new(RADIUS / 3.0, 2.0 * RADIUS);
+        for surface in surfaces {
+            for (i, j) in (-16..=16).flat_map(|i| (-16..=16).map(move |j| (i, j))) {
+                if let Some((point, normal)) = surface(f64::from(i) * 0.5e-3, f64::from(j) * 0.5e-3) {
+                    store.add(&Contact { point, normal, weight: 5.0 });
+                }
+            }
+        }
+        store
+    }
+
+    fn value(store: &ContactStore, x: f64, y: f64, z: f64) -> f64 {
+        let x = Point3::new(x, y, z) * 1e-3;
+        FieldParams::for_ball(RADIUS).at(store, &x, &mut FieldScratch::default()).unwrap().value * 1e3
+    }
+
+    /// A cylinder around z of radius `radius` (m), seen from outside (1) or inside (−1), below z = 0; `a` runs around it.
+    fn cylinder(radius: f64, side: f64) -> impl Fn(f64, f64) -> Option<(Point3<f64>, Vector3<f64>)> {
+        move |a, z| {
+            let normal = Vector3::new((a / radius).cos(), (a / radius).sin(), 0.0);
+            (z < -0.4e-3).then(|| (Point3::from(normal * radius + Vector3::z() * z), normal * side))
+        }
+    }
+
+    #[test]
+    fn a_plane_and_a_cylinder_are_exact() {
+        let plane = store_of(&[&|x, y| Some((Point3::new(x, y, 0.0), Vector3::z()))]);
+        assert!((value(&plane, 0.3, 0.2, 0.7) - 0.7).abs() < 1e-9);
+        let tube = store_of(&[&cylinder(4e-3, 1.0)]);
+        for radius in [3.6, 4.0, 4.5] {
+            assert!((value(&tube, radius, 0.1, -3.0) - (radius.hypot(0.1) - 4.0)).abs() < 0.02, "{radius}");
+        }
+    }
+
+    #[test]
+    fn the_far_side_of_a_hole_does_not_cut_the_face_around_it() {
+        let radius = 2.5e-3;
+        let around = |x: f64, y: f64| (x.hypot(y) > radius).then(|| (Point3::new(x, y, 0.0), Vector3::z()));
+        let hole = store_of(&[&around, &cylinder(radius, -1.0)]);
+        for turn in 0..24 {
+            let angle = f64::from(turn) * std::f64::consts::TAU / 24.0;
+            for (from_axis, z) in [(2.9, -0.4), (3.3, -0.8), (3.3, -0.2), (2.8, 0.3), (2.1, -0.5), (2.2, 0.2)] {
+                let (x, y) = (from_axis * angle.cos(), from_axis * angle.sin());
+                // the solid: below the face and outside the hole
+                let is_material = z < 0.0 && from_axis > 2.5;
+                assert_eq!(value(&hole, x, y, z) < 0.0, is_material, "{from_axis} {z} at {angle}");
+            }
+        }
+    }
+
+    #[test]
+    fn convex_pieces_on_a_floor_stay_a_boss() {
+        // two walls of a boss (0, 1) on a floor (2), as seen from the foot of its corner
+        let solid = |values: [f64; 3]| {
+            let mut solid = Solid { values: [0.0; MOST_PIECES], is_convex: [0; MOST_PIECES] };
+            solid.values[..3].copy_from_slice(&values);
+            solid.take(1, 0b001);
+            solid.take(2, 0);
+            solid.evaluate(0b111, 0)
+        };
+        assert_eq!(solid([-1.0, 0.5, 2.0]), (0.5, 1), "beside the boss, above the floor");
+        assert_eq!(solid([-1.0, -0.5, 2.0]), (-0.5, 1), "in the boss");
+        assert_eq!(solid([1.0, 0.5, -0.2]), (-0.2, 2), "in the floor");
+    }
+
+    #[test]
+    fn edges_that_contradict_each_other_leave_out_the_farthest() {
+        // a path 0–1–2–3 of convex edges has no solid
+        let mut solid = Solid { values: [1.0, 2.0, 3.0, -9.0, 0.0, 0.0, 0.0, 0.0], is_convex: [0; MOST_PIECES] };
+        solid.take(1, 0b001);
+        solid.take(2, 0b010);
+        solid.take(3, 0b100);
+        assert_eq!(solid.evaluate(0b1111, 0), (2.0, 1), "max(1, min(0, 2))");
+    }
 }
