@@ -163,8 +163,18 @@ fn refine_json_is_one_object_with_the_documented_keys() {
     let output = case.refine("touch.mcap", "out.ply", &["--json"]);
     assert_eq!((code(&output), text(&output.stderr)), (0, ""));
     let summary = json(&output);
-    let mut documented =
-        ["samples", "accepted", "refused", "contacts", "moved_faces", "cut_back", "push_ns", "load_s", "replay_s"];
+    let mut documented = [
+        "samples",
+        "accepted",
+        "refused",
+        "contacts",
+        "moved_faces",
+        "cut_back",
+        "friction",
+        "push_ns",
+        "load_s",
+        "replay_s",
+    ];
     documented.sort_unstable();
     assert_eq!(keys(&summary), documented);
     let mut tails = ["median", "p99", "p999", "max"];
