@@ -170,7 +170,7 @@ impl Friction {
         // how far the direction along the surface can be told from noise
         let squared = across_speed * across_speed;
         let clear = squared / (squared + 2.0 * noise * noise + CREEP * CREEP);
-        variance += angle * angle * (astray * astray + 1.0 - clear * clear);
+        variance += angle * angle * (astray * astray + 1.0 - clear * clear).min(1.0);
         let normal = (along_force + across_force * (angle.tan() * clear / across_speed)).normalize();
         Some(FeltNormal { normal, sigma: variance.sqrt() })
     }
