@@ -170,6 +170,7 @@ fn refine_json_is_one_object_with_the_documented_keys() {
         "contacts",
         "moved_faces",
         "cut_back",
+        "friction",
         "push_ns",
         "load_s",
         "replay_s",

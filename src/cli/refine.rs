@@ -78,6 +78,8 @@ pub(super) struct Summary {
     moved_faces: u64,
     /// updates made smaller because a face would have folded
     cut_back: u64,
+    /// of the ball on the part; `null` when it never slid far enough
+    friction: Option<FrictionFound>,
     /// of one sample through the whole chain
     push_ns: Quantiles,
     load_s: f64,
@@ -98,6 +100,13 @@ struct PatchSummary {
     /// share of the new vertices that rest on what was felt nearby, not there
     guessed_share: f64,
     build_s: f64,
+}
+
+/// Coefficient of kinetic friction and its standard error.
+#[derive(Debug, Serialize)]
+struct FrictionFound {
+    mu: f64,
+    sigma: f64,
 }
 
 /// What became of a scan.
@@ -268,6 +277,7 @@ impl RefineArguments {
             contacts: counts.contacts,
             moved_faces,
             cut_back: counts.cut_back,
+            friction: refiner.friction().map(|found| FrictionFound { mu: found.mu, sigma: found.sigma }),
             push_ns: pushes.latencies.quantiles(),
             load_s,
             replay_s,
@@ -365,6 +375,9 @@ impl fmt::Display for PatchSummary {
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let refused: Vec<_> = self.refused.iter().map(|(reason, count)| format!("{count} {reason}")).collect();
+        if let Some(FrictionFound { mu, sigma }) = &self.friction {
+            writeln!(f, "friction: {mu:.3} ± {sigma:.3}")?;
+        }
         let Quantiles { median, p99, p999, max } = self.push_ns;
         writeln!(f, "samples: {} read, {} accepted; refused: {}", self.samples, self.accepted, list(&refused))?;
         writeln!(

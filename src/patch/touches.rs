@@ -1,13 +1,16 @@
 //! From compensated tips to touches: where the ball really was, and what it touched there.
 //!
 //! The patch follows a few tens of milliseconds behind the stream, so position and force are smoothed by a window that
-//! looks as far ahead as back: it does not lag.
+//! looks as far ahead as back: it does not lag. Its length follows from the noise: as long as the velocity needs, and no
+//! longer than the path is a parabola.
 
 use std::collections::VecDeque;
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
-use crate::touch::{ContactGate, ContactGateParams, SettingError, Tip};
+use crate::touch::{
+    ContactGate, ContactGateParams, FeltNormal, Friction, FrictionCoefficient, LocalMotion, SettingError, Sliding, Tip,
+};
 
 /// How touches are found.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,17 +21,15 @@ pub struct TouchFinderParams {
     pub stiffness: Option<f64>,
     /// tells contact from free motion
     pub gate: ContactGateParams,
-    /// half of the smoothing window, ns. Default 16 ms: 0.2 mm of pose noise at 500 Hz then becomes 0.05 mm, and a velocity of
-    /// 25 mm/s is known to 5 mm/s.
+    /// half of the longest smoothing window, ns. Default 32 ms: 0.2 mm of pose noise at 500 Hz then leaves the direction of
+    /// 25 mm/s uncertain by 6°, which friction known from the stream turns into a normal within 1–2°.
     pub half_window_ns: i64,
     /// a pause longer than this parts the stream, ns. Default 30 ms.
     pub largest_gap_ns: i64,
-    /// slower than this the ball counts as being at rest, m/s. Default 8 mm/s.
-    pub slowest: f64,
-    /// cosine of the widest friction cone believed. Default cos 24°.
+    /// cosine of the widest friction cone believed. Default cos 24° (μ = 0.45, dry metal on metal).
     pub cone_cosine: f64,
-    /// weight of a touch whose normal is the force itself, beside 1 where friction was taken out. Default 0.1.
-    pub resting_weight: f64,
+    /// a touch whose normal is uncertain by this much weighs half, rad. Default 5°: what curved pieces take for smooth.
+    pub uncertain_normal: f64,
 }
 
 impl TouchFinderParams {
@@ -38,11 +39,10 @@ impl TouchFinderParams {
             radius,
             stiffness,
             gate: ContactGateParams::default(),
-            half_window_ns: 16_000_000,
+            half_window_ns: 32_000_000,
             largest_gap_ns: 30_000_000,
-            slowest: 8e-3,
             cone_cosine: 0.9135,
-            resting_weight: 0.1,
+            uncertain_normal: 5f64.to_radians(),
         }
     }
 }
@@ -54,7 +54,7 @@ pub struct Contact {
     pub point: Point3<f64>,
     /// outward unit normal of the surface there, in O
     pub normal: Vector3<f64>,
-    /// how much it counts beside others; 1 for a sliding ball
+    /// how much it counts beside others: at most 1, less where the normal is uncertain
     pub weight: f64,
 }
 
@@ -83,6 +83,8 @@ pub struct TouchFinder {
     params: TouchFinderParams,
     gate: ContactGate,
     bias: FreeAirBias,
+    friction: Friction,
+    noise: PathNoise,
     /// samples since the last gap, as far as a window may still need them
     held: VecDeque<Entry>,
     /// the first of `held` whose touch has not been given out
@@ -96,7 +98,9 @@ impl TouchFinder {
         Ok(Self {
             gate: ContactGate::new(params.gate)?,
             params,
-            bias: FreeAirBias::default(),
+            bias: FreeAirBias::new(&params.gate),
+            friction: Friction::new(params.cone_cosine.clamp(-1.0, 1.0).acos()),
+            noise: PathNoise::default(),
             held: VecDeque::new(),
             next: 0,
         })
@@ -132,44 +136,132 @@ impl TouchFinder {
             each(self.touch(at));
         }
         self.held.clear();
+        self.friction.lift();
         self.next = 0;
     }
 
-    fn touch(&self, at: usize) -> Touch {
-        let middle = &self.held[at];
-        let window = |entry: &&Entry| (entry.stamp_ns - middle.stamp_ns).abs() <= self.params.half_window_ns;
-        let (mut count, mut centre, mut force) = (0.0, Vector3::zeros(), Vector3::zeros());
-        let (mut time, mut times, mut way) = (0.0, 0.0, Vector3::zeros());
-        let mut is_steady = true;
-        for entry in self.held.iter().filter(window) {
-            is_steady &= entry.in_contact;
-            let t = (entry.stamp_ns - middle.stamp_ns) as f64 * 1e-9;
-            let arm = entry.centre - middle.centre;
-            count += 1.0;
-            centre += arm;
-            force += entry.force_o;
-            time += t;
-            times += t * t;
-            way += arm * t;
-        }
-        let spread = times - time * time / count;
-        let velocity = if spread > 0.0 { (way - centre * (time / count)) / spread } else { Vector3::zeros() };
-        let centre = middle.centre + centre / count;
-        let contact = if is_steady { self.contact(&centre, &force, &velocity) } else { None };
-        Touch { stamp_ns: middle.stamp_ns, centre, contact }
+    /// Kinetic friction as felt so far; `None` until the ball has slid far enough.
+    pub fn friction(&self) -> Option<FrictionCoefficient> {
+        self.friction.coefficient()
     }
 
-    fn contact(&self, centre: &Point3<f64>, force: &Vector3<f64>, velocity: &Vector3<f64>) -> Option<Contact> {
-        let along_force = force.try_normalize(0.0)?;
-        let (mut normal, mut weight) = (along_force, self.params.resting_weight);
-        if velocity.norm() > self.params.slowest {
-            let sliding = velocity.normalize();
-            let across = along_force - sliding * along_force.dot(&sliding);
-            if across.norm() >= self.params.cone_cosine {
-                (normal, weight) = (across.normalize(), 1.0);
-            }
+    fn touch(&mut self, at: usize) -> Touch {
+        let window = self.window(at);
+        let motion = window.sums.motion();
+        let velocity_sigma = motion.velocity_gain * self.noise.sigma * SHARED_NOISE;
+        let sliding = Sliding { force_o: window.force / window.count(), velocity: motion.velocity, velocity_sigma };
+        let mut contact = None;
+        if window.is_alike && self.held[at].in_contact {
+            let dt = if at > 0 { self.held[at].stamp_ns - self.held[at - 1].stamp_ns } else { 0 };
+            self.friction.observe(&sliding, dt as f64 * 1e-9);
+            contact = self.friction.normal(&sliding).map(|felt| self.contact(&motion.centre, &felt));
+        } else {
+            self.friction.lift();
         }
-        Some(Contact { point: centre - normal * self.params.radius, normal, weight })
+        Touch { stamp_ns: self.held[at].stamp_ns, centre: motion.centre, contact }
+    }
+
+    /// The longest window around a sample over which the path is a parabola and contact does not change; the shortest in
+    /// any case.
+    fn window(&mut self, at: usize) -> Window {
+        let longest = self.params.half_window_ns;
+        let mut best = Window::new(&self.held[at], at, longest);
+        best.widen(&self.held, at, longest / 8 * WINDOWS[0]);
+        self.noise.note(best.sums.motion().residual);
+        for eighths in &WINDOWS[1..] {
+            let mut wider = best.clone();
+            wider.widen(&self.held, at, longest / 8 * eighths);
+            if !wider.is_alike || wider.sums.motion().residual > ROUGH * self.noise.sigma {
+                break;
+            }
+            best = wider;
+        }
+        best
+    }
+
+    fn contact(&self, centre: &Point3<f64>, felt: &FeltNormal) -> Contact {
+        let FeltNormal { normal, sigma } = *felt;
+        let weight = 1.0 / (1.0 + (sigma / self.params.uncertain_normal).powi(2));
+        Contact { point: centre - normal * self.params.radius, normal, weight }
+    }
+}
+
+/// Halves of the windows that are tried, in eighths of the longest.
+const WINDOWS: [i64; 4] = [3, 4, 6, 8];
+/// A path whose residuals are so many times the noise is no parabola any more.
+const ROUGH: f64 = 1.5;
+/// Samples between two poses share their noise, so that it averages out more slowly than that of as many poses.
+const SHARED_NOISE: f64 = 1.3;
+
+/// The samples around one.
+#[derive(Clone, Debug)]
+struct Window {
+    first: usize,
+    last: usize,
+    sums: LocalMotion,
+    /// sum of the forces, N
+    force: Vector3<f64>,
+    /// all in contact, or none
+    is_alike: bool,
+}
+
+impl Window {
+    fn new(middle: &Entry, at: usize, longest_ns: i64) -> Self {
+        let mut sums = LocalMotion::new(middle.centre, (longest_ns as f64 * 1e-9).max(f64::MIN_POSITIVE));
+        sums.add(0.0, &middle.centre);
+        Self { first: at, last: at, sums, force: middle.force_o, is_alike: true }
+    }
+
+    fn count(&self) -> f64 {
+        (self.last - self.first + 1) as f64
+    }
+
+    /// Takes in all samples up to `half_ns` before and after.
+    fn widen(&mut self, held: &VecDeque<Entry>, at: usize, half_ns: i64) {
+        let middle = held[at].stamp_ns;
+        while self.first > 0 && middle - held[self.first - 1].stamp_ns <= half_ns {
+            self.first -= 1;
+            self.add(&held[self.first], &held[at]);
+        }
+        while self.last + 1 < held.len() && held[self.last + 1].stamp_ns - middle <= half_ns {
+            self.last += 1;
+            self.add(&held[self.last], &held[at]);
+        }
+    }
+
+    fn add(&mut self, entry: &Entry, middle: &Entry) {
+        self.sums.add((entry.stamp_ns - middle.stamp_ns) as f64 * 1e-9, &entry.centre);
+        self.force += entry.force_o;
+        self.is_alike &= entry.in_contact == middle.in_contact;
+    }
+}
+
+/// Follows the noise of the positions: the median distance from short pieces of the path to their parabolas.
+#[derive(Clone, Debug)]
+struct PathNoise {
+    /// m
+    sigma: f64,
+}
+
+/// Step of the running median: settles within some hundred samples.
+const NOISE_STEP: f64 = 0.01;
+/// What is never undercut, m: a good tracker at rest.
+const LEAST_NOISE: f64 = 1e-6;
+/// … and where it starts, m.
+const USUAL_NOISE: f64 = 0.03e-3;
+
+impl Default for PathNoise {
+    fn default() -> Self {
+        Self { sigma: USUAL_NOISE }
+    }
+}
+
+impl PathNoise {
+    fn note(&mut self, residual: f64) {
+        if residual.is_finite() {
+            let step = if residual > self.sigma { NOISE_STEP } else { -NOISE_STEP };
+            self.sigma = (self.sigma * (1.0 + step)).max(LEAST_NOISE);
+        }
     }
 }
 
@@ -178,29 +270,29 @@ impl TouchFinder {
 struct FreeAirBias {
     /// in the axes of T, N
     bias_t: Vector3<f64>,
+    /// less than this from the bias is free air, N
+    free_force: f64,
     free_since_ns: Option<i64>,
     last_ns: i64,
 }
 
-/// Less than this from the bias is free air, N: above its noise, below a contact.
-const FREE_FORCE: f64 = 0.3;
+/// Less than this from the bias is free air, as a share of the force that begins a contact.
+const FREE_SHARE: f64 = 0.75;
 /// … when it lasts so long, ns.
 const FREE_TIME_NS: i64 = 60_000_000;
 /// Time constant of the running mean, s.
 const BIAS_TIME: f64 = 0.3;
 
-impl Default for FreeAirBias {
-    fn default() -> Self {
-        Self { bias_t: Vector3::zeros(), free_since_ns: None, last_ns: 0 }
-    }
-}
-
 impl FreeAirBias {
+    fn new(gate: &ContactGateParams) -> Self {
+        Self { bias_t: Vector3::zeros(), free_force: FREE_SHARE * gate.on, free_since_ns: None, last_ns: 0 }
+    }
+
     /// The force of a tip without the bias, N, in O.
     fn compensate(&mut self, tip: &Tip) -> Vector3<f64> {
         let rotation: &UnitQuaternion<f64> = &tip.pose_ot.rotation;
         let rest_t = rotation.inverse_transform_vector(&tip.force_o) - self.bias_t;
-        if rest_t.norm() < FREE_FORCE {
+        if rest_t.norm() < self.free_force {
             let since = *self.free_since_ns.get_or_insert(tip.stamp_ns);
             if tip.stamp_ns - since >= FREE_TIME_NS {
                 let dt = (tip.stamp_ns - self.last_ns) as f64 * 1e-9;

@@ -25,7 +25,7 @@ pub use roi::RoiSize;
 pub use sliding::{Ball, SlidingParams, TipMotion};
 
 use crate::mesh::{FaceHit, FaceId, MeshError, TriMesh, VertexId};
-use crate::touch::{Compensator, ContactGate, Sample, SampleError, SettingError};
+use crate::touch::{Compensator, ContactGate, FrictionCoefficient, Sample, SampleError, SettingError};
 use deform::{DeformableMesh, HandleRegion};
 use dynamics::turn;
 
@@ -233,7 +233,7 @@ impl Refiner {
         let tip = self.compensator.compensate(sample);
         let ball = self.motion.update(&tip, dt, LONGEST_HOLD);
         let dt = dt.min(LONGEST_HOLD);
-        let felt = self.felt_normal(sample.stamp_ns, &ball);
+        let felt = self.felt_normal(sample.stamp_ns, &ball, dt);
         let update = match felt {
             Felt::Nothing => Update::FREE,
             _ => self.press(&ball, felt, handle, dt)?,
@@ -245,18 +245,19 @@ impl Refiner {
         }
     }
 
-    fn felt_normal(&mut self, stamp_ns: i64, ball: &Ball) -> Felt {
+    fn felt_normal(&mut self, stamp_ns: i64, ball: &Ball, dt: f64) -> Felt {
         if let Some(gate) = &mut self.gate {
             let contact = gate.update(stamp_ns, &ball.force_o).is_some();
             self.counts.contacts = gate.contacts();
             if !contact {
                 self.begun = None;
+                self.motion.lift();
                 return Felt::Nothing;
             }
         }
-        match (self.params.touch_point, &self.params.sliding) {
+        match (self.params.touch_point, self.params.sliding) {
             (TouchPoint::FaceNormal, _) => Felt::Something,
-            (TouchPoint::FeltNormal, Some(sliding)) => Felt::Surface(ball.surface_normal(sliding)),
+            (TouchPoint::FeltNormal, Some(_)) => Felt::Surface(self.motion.surface_normal(ball, dt)),
             (TouchPoint::FeltNormal, None) => Felt::Surface(ball.force_o.try_normalize(0.0).unwrap_or_default()),
         }
     }
@@ -408,6 +409,11 @@ impl Refiner {
     /// What became of the samples so far.
     pub fn counts(&self) -> &RefineCounts {
         &self.counts
+    }
+
+    /// Kinetic friction as felt so far; `None` until the ball has slid far enough, or where friction is not asked for.
+    pub fn friction(&self) -> Option<FrictionCoefficient> {
+        self.motion.friction()
     }
 
     /// The vertices that the last contact moved.

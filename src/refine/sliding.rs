@@ -1,12 +1,9 @@
-//! Where the ball is, which way it slides, and which way the surface under it faces.
-//!
-//! A sliding ball feels friction: F = N (n + μ t). The part of F at right angles to the sliding direction v̂ is along
-//! the normal whatever μ is; at rest the force is all there is.
+//! Where the ball is, which way it slides, and which way the surface under it faces, from the past alone.
 
 use nalgebra::{Point3, Vector3};
 
 use super::TipParams;
-use crate::touch::Tip;
+use crate::touch::{Friction, FrictionCoefficient, Sliding, Tip};
 
 /// Parameters of [`TipMotion`] and of the normal under the ball.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,9 +13,10 @@ pub struct SlidingParams {
     pub smoothing: f64,
     /// Time constant of the velocity, s. Default 12 ms: 0.2 mm of pose noise then still tells which way 25 mm/s go.
     pub velocity_smoothing: f64,
-    /// Slower than this the ball counts as being at rest, m/s. Default 8 mm/s, above the noise of the velocity.
+    /// Slower than this the direction of sliding is not known, m/s: 2.5 times the noise of the velocity. Default 8 mm/s,
+    /// for 0.2 mm of pose noise.
     pub slowest: f64,
-    /// Cosine of the widest friction cone believed; a force farther off than that is not friction. Default cos 24°
+    /// Cosine of the widest friction cone believed: the normal is nowhere farther from the force. Default cos 24°
     /// (μ = 0.45, dry metal on metal).
     pub cone_cosine: f64,
 }
@@ -38,6 +36,8 @@ pub struct Ball {
     pub centre: Point3<f64>,
     /// Force of the object on the stylus, smoothed alike, N, in O.
     pub force_o: Vector3<f64>,
+    /// Force smoothed once more, as the velocity is, so that the two are of one time, N, in O.
+    pub force_with_velocity: Vector3<f64>,
     /// Velocity of the real centre, m/s, in O: that of the reported one would take a change of force for motion.
     pub velocity: Vector3<f64>,
 }
@@ -48,12 +48,22 @@ pub struct TipMotion {
     params: SlidingParams,
     tip: TipParams,
     last: Option<Ball>,
+    friction: Friction,
+    /// s
+    touched_for: f64,
 }
+
+/// The filters still hold what was before a contact for so many of their time constants.
+const SETTLED: f64 = 4.0;
+
+/// Noise of the velocity, as a share of [`SlidingParams::slowest`].
+const VELOCITY_NOISE: f64 = 0.4;
 
 impl TipMotion {
     /// A motion that has seen nothing yet.
     pub fn new(params: SlidingParams, tip: TipParams) -> Self {
-        Self { params, tip, last: None }
+        let friction = Friction::new(params.cone_cosine.clamp(-1.0, 1.0).acos());
+        Self { params, tip, last: None, friction, touched_for: 0.0 }
     }
 
     /// Takes the next tip, `dt` (s) after the one before; a longer pause than `largest_gap` (s) starts anew.
@@ -66,36 +76,43 @@ impl TipMotion {
                 let force_o = last.force_o + (force - last.force_o) * gain;
                 let centre = self.tip.centre(&reported, &force_o);
                 let velocity_now = (centre - last.centre) / dt;
-                let velocity =
-                    last.velocity + (velocity_now - last.velocity) * follow(dt, self.params.velocity_smoothing);
-                Ball { reported, centre, force_o, velocity }
+                let slow_gain = follow(dt, self.params.velocity_smoothing);
+                let velocity = last.velocity + (velocity_now - last.velocity) * slow_gain;
+                let force_with_velocity = last.force_with_velocity + (force_o - last.force_with_velocity) * slow_gain;
+                Ball { reported, centre, force_o, force_with_velocity, velocity }
             }
             _ => Ball {
                 reported: here,
                 centre: self.tip.centre(&here, &force),
                 force_o: force,
+                force_with_velocity: force,
                 velocity: Vector3::zeros(),
             },
         };
         self.last = Some(ball);
         ball
     }
-}
 
-impl Ball {
-    /// Outward normal of the surface under the ball, from force and sliding direction; zero without a force.
-    ///
-    /// n = (F − (F·v̂) v̂) / |…| while sliding faster than `slowest` and F is within the friction cone of it, else F/|F|.
-    pub fn surface_normal(&self, params: &SlidingParams) -> Vector3<f64> {
-        let Some(along_force) = self.force_o.try_normalize(0.0) else { return Vector3::zeros() };
-        let speed = self.velocity.norm();
-        if speed <= params.slowest {
-            return along_force;
+    /// Outward normal of the surface under the ball, which has been in contact for the last `dt` (s); zero without a force.
+    pub fn surface_normal(&mut self, ball: &Ball, dt: f64) -> Vector3<f64> {
+        let velocity_sigma = VELOCITY_NOISE * self.params.slowest;
+        let sliding = Sliding { force_o: ball.force_o, velocity: ball.velocity, velocity_sigma };
+        self.touched_for += dt;
+        if self.touched_for > SETTLED * (self.params.smoothing + self.params.velocity_smoothing) {
+            self.friction.observe(&Sliding { force_o: ball.force_with_velocity, ..sliding }, dt);
         }
-        let sliding = self.velocity / speed;
-        let across = along_force - sliding * along_force.dot(&sliding);
-        let cosine = across.norm();
-        if cosine < params.cone_cosine { along_force } else { across / cosine }
+        self.friction.normal(&sliding).map_or_else(Vector3::zeros, |felt| felt.normal)
+    }
+
+    /// The ball is free.
+    pub fn lift(&mut self) {
+        self.touched_for = 0.0;
+        self.friction.lift();
+    }
+
+    /// Kinetic friction as felt so far; `None` until the ball has slid far enough.
+    pub fn friction(&self) -> Option<FrictionCoefficient> {
+        self.friction.coefficient()
     }
 }
 
@@ -122,16 +139,23 @@ mod tests {
 
     #[test]
     fn friction_does_not_tilt_the_normal_of_a_sliding_ball() {
-        let params = SlidingParams::default();
-        let mut motion = TipMotion::new(params, RIGID);
+        let mut motion = TipMotion::new(SlidingParams::default(), RIGID);
         let mut ball = motion.update(&tip(0.0), 0.0, 0.03);
-        assert_eq!(ball.surface_normal(&params), ball.force_o.normalize(), "at rest the force is all there is");
+        assert_eq!(motion.surface_normal(&ball, 0.0), ball.force_o.normalize(), "at rest the force is all there is");
         // 20 mm/s along x, for 0.4 s: 33 time constants of the velocity
         for i in 1..400 {
             ball = motion.update(&tip(i as f64 * 2e-5), 1e-3, 0.03);
         }
         assert!((ball.velocity - Vector3::new(0.02, 0.0, 0.0)).norm() < 1e-6);
-        assert!((ball.surface_normal(&params) - Vector3::z()).norm() < 1e-9);
+        let first = motion.surface_normal(&ball, 1e-3);
+        assert!(first.angle(&Vector3::z()).to_degrees() < 2.0, "before the friction is known: {first}");
+        // 40 mm: eight stretches
+        for _ in 0..2000 {
+            motion.surface_normal(&ball, 1e-3);
+        }
+        // noise of 3.2 mm/s is reckoned with: 2 · 3.2² / 20² = 5 % of atan 0.15 stay
+        assert!(motion.surface_normal(&ball, 1e-3).angle(&Vector3::z()).to_degrees() < 0.6);
+        assert!((motion.friction().unwrap().mu - 0.15).abs() < 5e-3);
     }
 
     #[test]
