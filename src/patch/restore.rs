@@ -33,6 +33,8 @@ pub struct Restored {
     pub open: Table<Node, ()>,
 }
 
+/// A touched node within this many cells of the surface counts as outside.
+const IN_PLANE: f64 = 0.05;
 /// Values are cut off at ± this many cells: far from the surface only the sign matters.
 const WIDEST: f64 = 2.7;
 /// Nodes within this many radii of a contact are looked at.
@@ -62,7 +64,11 @@ fn evaluate(evidence: &Evidence<'_>, lattice: &Lattice, node: Node, scratch: &mu
         _ => f64::NEG_INFINITY,
     };
     Some(NodeState {
-        value: found.value.clamp(-widest, widest).max(least),
+        value: match found.source {
+            // where a plane of the lattice lies in the surface, noise would fold it from one side to the other
+            Source::Touch if found.value.abs() < IN_PLANE * lattice.pitch => f64::MIN_POSITIVE,
+            _ => found.value.clamp(-widest, widest).max(least),
+        },
         source: found.source,
         scan: found.scan.clamp(-widest, widest),
         straight: found.straight.map_or((0.0, 0.0), |(value, share)| (value.clamp(-widest, widest), share)),
