@@ -5,9 +5,9 @@
 
 use std::collections::VecDeque;
 
-use nalgebra::{Point3, UnitQuaternion, Vector3};
+use nalgebra::{Point3, Vector3};
 
-use crate::touch::{ContactGate, ContactGateParams, SettingError, Tip};
+use crate::touch::{BiasParams, BiasTracker, ContactGate, ContactGateParams, SettingError, Tip};
 
 /// How touches are found.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,7 +82,7 @@ struct Entry {
 pub struct TouchFinder {
     params: TouchFinderParams,
     gate: ContactGate,
-    bias: FreeAirBias,
+    bias: BiasTracker,
     /// samples since the last gap, as far as a window may still need them
     held: VecDeque<Entry>,
     /// the first of `held` whose touch has not been given out
@@ -96,7 +96,7 @@ impl TouchFinder {
         Ok(Self {
             gate: ContactGate::new(params.gate)?,
             params,
-            bias: FreeAirBias::default(),
+            bias: BiasTracker::new(BiasParams::default())?,
             held: VecDeque::new(),
             next: 0,
         })
@@ -170,46 +170,5 @@ impl TouchFinder {
             }
         }
         Some(Contact { point: centre - normal * self.params.radius, normal, weight })
-    }
-}
-
-/// Follows the slow drift of a force sensor while nothing is touched.
-#[derive(Clone, Debug)]
-struct FreeAirBias {
-    /// in the axes of T, N
-    bias_t: Vector3<f64>,
-    free_since_ns: Option<i64>,
-    last_ns: i64,
-}
-
-/// Less than this from the bias is free air, N: above its noise, below a contact.
-const FREE_FORCE: f64 = 0.3;
-/// … when it lasts so long, ns.
-const FREE_TIME_NS: i64 = 60_000_000;
-/// Time constant of the running mean, s.
-const BIAS_TIME: f64 = 0.3;
-
-impl Default for FreeAirBias {
-    fn default() -> Self {
-        Self { bias_t: Vector3::zeros(), free_since_ns: None, last_ns: 0 }
-    }
-}
-
-impl FreeAirBias {
-    /// The force of a tip without the bias, N, in O.
-    fn compensate(&mut self, tip: &Tip) -> Vector3<f64> {
-        let rotation: &UnitQuaternion<f64> = &tip.pose_ot.rotation;
-        let rest_t = rotation.inverse_transform_vector(&tip.force_o) - self.bias_t;
-        if rest_t.norm() < FREE_FORCE {
-            let since = *self.free_since_ns.get_or_insert(tip.stamp_ns);
-            if tip.stamp_ns - since >= FREE_TIME_NS {
-                let dt = (tip.stamp_ns - self.last_ns) as f64 * 1e-9;
-                self.bias_t += rest_t * (1.0 - (-dt / BIAS_TIME).exp());
-            }
-        } else {
-            self.free_since_ns = None;
-        }
-        self.last_ns = tip.stamp_ns;
-        tip.force_o - rotation * self.bias_t
     }
 }

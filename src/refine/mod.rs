@@ -25,7 +25,7 @@ pub use roi::RoiSize;
 pub use sliding::{Ball, SlidingParams, TipMotion};
 
 use crate::mesh::{FaceHit, FaceId, MeshError, TriMesh, VertexId};
-use crate::touch::{Compensator, ContactGate, Sample, SampleError, SettingError};
+use crate::touch::{BiasTracker, Compensator, ContactGate, Sample, SampleError, SettingError};
 use deform::{DeformableMesh, HandleRegion};
 use dynamics::turn;
 
@@ -149,6 +149,7 @@ pub struct RefineCounts {
 pub struct Refiner {
     params: RefineParams,
     compensator: Compensator,
+    bias: Option<BiasTracker>,
     gate: Option<ContactGate>,
     motion: TipMotion,
     dynamics: FaceDynamics,
@@ -189,6 +190,7 @@ impl Refiner {
             (params.largest_move_edges * deformable.mean_edge).max(params.largest_move_noises * params.scan_noise);
         Ok(Self {
             compensator: Compensator::new(params.compensator)?,
+            bias: params.bias.map(BiasTracker::new).transpose()?,
             gate: params.gate.map(ContactGate::new).transpose()?,
             motion: TipMotion::new(
                 params.sliding.unwrap_or(SlidingParams { smoothing: 0.0, ..Default::default() }),
@@ -230,7 +232,10 @@ impl Refiner {
         sample.check()?;
         let dt = sample.seconds_since(self.last_ns)?;
         self.last_ns = Some(sample.stamp_ns);
-        let tip = self.compensator.compensate(sample);
+        let mut tip = self.compensator.compensate(sample);
+        if let Some(bias) = &mut self.bias {
+            tip.force_o = bias.compensate(&tip);
+        }
         let ball = self.motion.update(&tip, dt, LONGEST_HOLD);
         let dt = dt.min(LONGEST_HOLD);
         let felt = self.felt_normal(sample.stamp_ns, &ball);

@@ -7,7 +7,7 @@ use crate::refine::{
     Along, CarveParams, ContactModel, GuardParams, RefineParams, RoiSize, SlidingParams, StepRule, TipParams,
     relaxing_alpha,
 };
-use crate::touch::{CompensatorParams, ContactGateParams, Payload, SyncParams, Wrench, WrenchFrame};
+use crate::touch::{BiasParams, CompensatorParams, ContactGateParams, Payload, SyncParams, Wrench, WrenchFrame};
 
 impl Scene {
     /// Settings of the synchroniser; without `sync` only messages of equal stamp pair.
@@ -46,6 +46,15 @@ impl Scene {
         }
     }
 
+    /// Settings of the bias tracker, if there is one.
+    pub fn bias_params(&self) -> Option<BiasParams> {
+        self.bias_tracking.as_ref().map(|tracking| BiasParams {
+            free: tracking.free_n,
+            settle_ns: nanoseconds(tracking.settle_ms, 1e6),
+            time: tracking.time_s,
+        })
+    }
+
     /// Thresholds of the contact gate, if there is one.
     pub fn contact_params(&self) -> Option<ContactGateParams> {
         self.contact.as_ref().map(|contact| ContactGateParams { on: contact.on_n, off: contact.off_n })
@@ -66,6 +75,7 @@ impl Scene {
         let mut params = match section.mode {
             Mode::Paper => RefineParams::paper(self.tip_params()),
             Mode::Robust => RefineParams {
+                bias: self.bias_params(),
                 gate: self.contact_params(),
                 sliding: self.sliding.as_ref().map(SlidingSection::params),
                 carve: self.carve.as_ref().map(CarveSection::params),

@@ -4,7 +4,7 @@ use serde::{Deserialize, Deserializer};
 
 use super::SceneError;
 use crate::refine::{CarveParams, ContactModel, DynamicsParams, GuardParams, SlidingParams};
-use crate::touch::{ContactGateParams, SyncParams};
+use crate::touch::{BiasParams, ContactGateParams, SyncParams};
 
 /// `sync`
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -78,6 +78,25 @@ pub struct BiasSection {
     pub force_n: [f64; 3],
     /// In the axes of the sensor, N·m.
     pub torque_nm: [f64; 3],
+}
+
+/// `bias_tracking`
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct BiasTrackingSection {
+    /// A force within this of the bias is free air, N.
+    pub free_n: f64,
+    /// … once it has lasted so long, ms.
+    pub settle_ms: f64,
+    /// Time constant of the running mean, s.
+    pub time_s: f64,
+}
+
+impl Default for BiasTrackingSection {
+    fn default() -> Self {
+        let BiasParams { free, settle_ns, time } = BiasParams::default();
+        Self { free_n: free, settle_ms: settle_ns as f64 * 1e-6, time_s: time }
+    }
 }
 
 /// `contact`
@@ -328,6 +347,14 @@ impl CompensationSection {
             all("compensation.bias.torque_nm", &bias.torque_nm, 1e4, "-10000 to 10000 N·m")?;
         }
         Ok(())
+    }
+}
+
+impl BiasTrackingSection {
+    pub(super) fn check(&self) -> Result<(), SceneError> {
+        in_range("bias_tracking.free_n", self.free_n, 1e-6, 1e3, "1e-6 to 1000 N")?;
+        in_range("bias_tracking.settle_ms", self.settle_ms, 1e-3, 6e4, "0.001 to 60000 ms")?;
+        in_range("bias_tracking.time_s", self.time_s, 1e-6, 1e6, "1e-6 to 1e6 s")
     }
 }
 

@@ -1,13 +1,15 @@
 //! From raw pose and wrench messages to samples the refiner can use.
 //!
 //! [`Synchroniser`] brings the two streams to one instant, [`Compensator`] takes weight and bias off and turns the force
-//! into the frame of the object, [`ContactGate`] says whether the stylus touches.
+//! into the frame of the object, [`BiasTracker`] follows what drifts, [`ContactGate`] says whether the stylus touches.
 
+mod bias;
 mod compensate;
 mod contact;
 mod stream;
 mod sync;
 
+pub use bias::{BiasParams, BiasTracker};
 pub use compensate::{Compensator, CompensatorParams, Payload, Tip, WrenchFrame};
 pub use contact::{Contact, ContactGate, ContactGateParams};
 pub use sync::{SyncCounts, SyncParams, Synchroniser};
