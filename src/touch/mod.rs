@@ -1,17 +1,21 @@
 //! From raw pose and wrench messages to samples the refiner can use.
 //!
-//! [`Synchroniser`] brings the two streams to one instant, [`Compensator`] takes weight and bias off and turns the force
+//! [`MarkerFilter`] makes the pose of the markers on the stylus, [`Synchroniser`] brings the two streams to one instant, [`Compensator`] takes weight and bias off and turns the force
 //! into the frame of the object, [`BiasTracker`] follows what drifts, [`ContactGate`] says whether the stylus touches.
 
 mod bias;
 mod compensate;
 mod contact;
+mod markers;
 mod stream;
 mod sync;
 
 pub use bias::{BiasParams, BiasTracker};
 pub use compensate::{Compensator, CompensatorParams, Payload, Tip, WrenchFrame};
 pub use contact::{Contact, ContactGate, ContactGateParams};
+pub use markers::{
+    MOST_MARKERS, MarkerBody, MarkerCounts, MarkerFilter, MarkerFrame, MarkerParams, SeenMarker, SpringParams, Tracking,
+};
 pub use sync::{SyncCounts, SyncParams, Synchroniser};
 
 use nalgebra::{Isometry3, Vector3};
