@@ -132,12 +132,11 @@ fn no_spring_and_no_set_of_markers_blows_up() {
             let spring = SpringParams { frequency, damping };
             let poses = filtered(&mut filter(MarkerParams { spring, ..MarkerParams::default() }), frames);
             assert!(poses.len() > 5000);
-            // nothing farther off than the gate of 4 mm pulls; three markers at one end tell the centroid to 1 mm
-            let bound = if (frequency, damping) == (12.0, 1.0) { 2e-3 } else { 8e-3 };
             for pose in poses {
                 pose.check().unwrap();
                 let centroid = pose.pose_ot * body().centroid_t() - body().centroid_t();
-                assert!(centroid.norm() < bound, "{frequency} Hz, {damping}: {centroid}");
+                // what is farther off than the gate of 4 mm does not pull, and without a pull there is soon no pose
+                assert!(centroid.norm() < 8e-3, "{frequency} Hz, {damping}: {centroid}");
             }
         }
     }

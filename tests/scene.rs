@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use nalgebra::vector;
 use touchup::refine::{Along, ContactModel, DynamicsParams, GuardParams, RefineParams, RoiSize, StepRule, TipParams};
-use touchup::scene::{CompensationSection, Mode, PayloadSection, Scene};
+use touchup::scene::{BiasTrackingSection, CompensationSection, MarkersSection, Mode, PayloadSection, Scene};
 use touchup::touch::{BiasParams, SyncParams, WrenchFrame};
 
 const DEFAULT_YAML: &str = include_str!("../config/default.yaml");
@@ -23,6 +23,8 @@ fn with_all_settings() -> String {
 fn the_shipped_file_is_the_default() {
     assert_eq!(Scene::from_yaml(DEFAULT_YAML).unwrap(), Scene::default());
     let whole = Scene::from_yaml(&with_all_settings()).unwrap();
+    assert_eq!(whole.markers, Some(MarkersSection::default()));
+    assert_eq!(whole.bias_tracking, Some(BiasTrackingSection::default()));
     let compensation = whole.compensation.clone().unwrap();
     assert_eq!(compensation.payload, Some(PayloadSection::default()));
     assert_eq!(whole.compensator_params(WrenchFrame::Sensor).pose_ts, nalgebra::Isometry3::identity());
@@ -35,8 +37,20 @@ fn the_shipped_file_is_the_default() {
 fn every_key_of_the_code_is_in_the_shipped_file_and_documented() {
     let mut known = BTreeSet::new();
     let inner = ["compensation.payload", "compensation.bias"];
-    let outer =
-        ["", "sync", "compensation", "bias_tracking", "contact", "tip", "scan", "sliding", "carve", "guard", "refine"];
+    let outer = [
+        "",
+        "sync",
+        "markers",
+        "compensation",
+        "bias_tracking",
+        "contact",
+        "tip",
+        "scan",
+        "sliding",
+        "carve",
+        "guard",
+        "refine",
+    ];
     let sections = [&outer[..], &inner].concat();
     for section in sections {
         let path: Vec<_> = section.split('.').filter(|name| !name.is_empty()).collect();

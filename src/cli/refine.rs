@@ -17,7 +17,7 @@ use crate::io::recording::Topics;
 use crate::mesh::{RepairReport, TriMesh, VertexId};
 use crate::refine::{RefineCounts, RefineError, RefineParams, Refiner};
 use crate::scene::{Mode, Scene};
-use crate::touch::Sample;
+use crate::touch::{MarkerCounts, MarkerFilter, Sample};
 
 #[derive(Debug, Args)]
 pub(super) struct RefineArguments {
@@ -42,6 +42,9 @@ pub(super) struct RefineArguments {
     /// geometry_msgs/PoseStamped: centre of the ball in the frame of the scan
     #[arg(long, value_name = "TOPIC", default_value = "/stylus/pose")]
     pose_topic: String,
+    /// sensor_msgs/PointCloud2: the markers on the stylus, read in place of the pose; the scene says where they sit
+    #[arg(long, value_name = "TOPIC", conflicts_with = "pose_topic")]
+    markers_topic: Option<String>,
     /// Radius of the ball, mm
     #[arg(long, value_name = "R", allow_negative_numbers = true)]
     tip_radius_mm: Option<f64>,
@@ -70,6 +73,9 @@ pub(super) struct Summary {
     refused: BTreeMap<String, u64>,
     /// times that the stylus came into contact
     contacts: u64,
+    /// of the markers, where they tell the pose
+    #[serde(skip_serializing_if = "Option::is_none")]
+    markers: Option<MarkerCounts>,
     /// faces that are not where the scan had them
     moved_faces: u64,
     /// updates made smaller because a face would have folded
@@ -89,6 +95,8 @@ pub(super) struct Refined {
 }
 
 const NOTHING_MOVES: &str = "the scene names no `refine`, so nothing would move the mesh: add `refine:` to it";
+
+const NO_MARKERS: &str = "--markers-topic needs a scene that says where the markers sit: add `markers:` to it";
 
 /// The verb: refines and tells.
 pub(super) fn refine(arguments: &RefineArguments) -> Result<Losses, CliError> {
@@ -178,7 +186,7 @@ fn moved_faces(before: &TriMesh, after: &TriMesh) -> u64 {
 impl RefineArguments {
     /// The files alone, everything else as it is by default.
     pub(super) fn of_files(scan: PathBuf, bag: PathBuf, out: PathBuf, mesh_unit: MeshUnit) -> Self {
-        let Topics { pose, wrench } = Topics::default();
+        let Topics { pose, wrench, markers } = Topics::default();
         Self {
             scan,
             bag,
@@ -187,6 +195,7 @@ impl RefineArguments {
             scene: None,
             wrench_topic: wrench,
             pose_topic: pose,
+            markers_topic: markers,
             tip_radius_mm: None,
             stiffness_n_per_mm: None,
             scan_noise_mm: None,
@@ -202,7 +211,8 @@ impl RefineArguments {
         let started = Instant::now();
         let MeshFile { mesh, repair } = read_mesh(&self.scan, self.mesh_unit).map_err(CliError::ReadMesh)?;
         let as_scanned = mesh.clone();
-        let topics = Topics { pose: self.pose_topic.clone(), wrench: self.wrench_topic.clone() };
+        let markers = self.marker_filter(&scene)?;
+        let topics = self.topics();
         let recording = Recording::open(&self.bag, &topics).map_err(CliError::ReadRecording)?;
         let params =
             scene.refine_params(recording.wrench_frame).ok_or_else(|| CliError::Usage(NOTHING_MOVES.to_owned()))?;
@@ -211,7 +221,7 @@ impl RefineArguments {
 
         let started = Instant::now();
         let mut pushes = Pushes::new();
-        let mut replayed = replay(recording, scene.sync_params(), |sample| pushes.push(&mut refiner, sample))?;
+        let mut replayed = replay(recording, scene.sync_params(), markers, |sample| pushes.push(&mut refiner, sample))?;
         let replay_s = started.elapsed().as_secs_f64();
         write_mesh(&self.out, refiner.mesh(), self.mesh_unit).map_err(CliError::WriteMesh)?;
 
@@ -232,6 +242,7 @@ impl RefineArguments {
             accepted: pushes.accepted,
             refused,
             contacts: counts.contacts,
+            markers: replayed.markers,
             moved_faces: moved_faces(&as_scanned, refiner.mesh()),
             cut_back: counts.cut_back,
             push_ns: pushes.latencies.quantiles(),
@@ -239,6 +250,20 @@ impl RefineArguments {
             replay_s,
         };
         Ok(Refined { repair, summary, losses: replayed.losses })
+    }
+
+    fn topics(&self) -> Topics {
+        let (pose, wrench) = (self.pose_topic.clone(), self.wrench_topic.clone());
+        Topics { pose, wrench, markers: self.markers_topic.clone() }
+    }
+
+    /// What makes poses of markers, when the recording has those.
+    fn marker_filter(&self, scene: &Scene) -> Result<Option<MarkerFilter>, CliError> {
+        if self.markers_topic.is_none() {
+            return Ok(None);
+        }
+        let filter = scene.marker_filter().map_err(|error| CliError::Usage(error.to_string()))?;
+        filter.map(Some).ok_or_else(|| CliError::Usage(NO_MARKERS.to_owned()))
     }
 
     /// The work is not begun when its result cannot be kept.
@@ -283,6 +308,13 @@ impl fmt::Display for Summary {
             "contacts: {}; faces moved: {}; updates cut back: {}",
             self.contacts, self.moved_faces, self.cut_back
         )?;
+        if let Some(MarkerCounts { held, coasting, lost, relabelled, rejected }) = self.markers {
+            writeln!(
+                f,
+                "marker frames: {held} held the pose, {coasting} coasted, {lost} without a pose; markers: {relabelled} \
+                 relabelled, {rejected} rejected"
+            )?;
+        }
         write!(f, "push: median {median} ns, p99 {p99} ns, p99.9 {p999} ns, max {max} ns; ")?;
         write!(f, "loaded in {:.2} s, replayed in {:.2} s", self.load_s, self.replay_s)
     }

@@ -7,7 +7,10 @@ use crate::refine::{
     Along, CarveParams, ContactModel, GuardParams, RefineParams, RoiSize, SlidingParams, StepRule, TipParams,
     relaxing_alpha,
 };
-use crate::touch::{BiasParams, CompensatorParams, ContactGateParams, Payload, SyncParams, Wrench, WrenchFrame};
+use crate::touch::{
+    BiasParams, CompensatorParams, ContactGateParams, MarkerBody, MarkerFilter, MarkerParams, Payload, SettingError,
+    SpringParams, SyncParams, Wrench, WrenchFrame,
+};
 
 impl Scene {
     /// Settings of the synchroniser; without `sync` only messages of equal stamp pair.
@@ -22,6 +25,24 @@ impl Scene {
             wrench_offset_ns: nanoseconds(sync.wrench_offset_ms, 1e6),
             capacity: sync.capacity,
         }
+    }
+
+    /// The filter that makes poses of markers, if there is one.
+    ///
+    /// # Errors
+    /// [`SettingError`] for markers on one line, or closer together than the gate allows.
+    pub fn marker_filter(&self) -> Result<Option<MarkerFilter>, SettingError> {
+        let Some(markers) = &self.markers else { return Ok(None) };
+        let body = MarkerBody::new(markers.positions_mm.iter().map(|&mm| metres(mm).into()).collect())?;
+        let params = MarkerParams {
+            spring: SpringParams { frequency: markers.spring_hz, damping: markers.damping },
+            noise: markers.noise_mm / 1e3,
+            gate: markers.gate_mm / 1e3,
+            coast_ns: nanoseconds(markers.coast_ms, 1e6),
+            period_ns: nanoseconds(markers.period_ms, 1e6),
+            reorder_ns: nanoseconds(markers.reorder_ms, 1e6),
+        };
+        MarkerFilter::new(body, params).map(Some)
     }
 
     /// Settings of the compensator for a wrench that arrives in the axes of `wrench_frame`.

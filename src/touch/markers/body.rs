@@ -22,6 +22,15 @@ pub struct MarkerBody {
     second_extent: f64,
 }
 
+impl Default for MarkerBody {
+    /// Six LEDs around the handle, 120 to 180 mm above the ball: the stylus of the simulation.
+    fn default() -> Self {
+        let mm = [[28, 0, 120], [-20, 22, 128], [-16, -26, 140], [18, 24, 155], [-30, 2, 168], [6, -22, 180]];
+        let markers_t = mm.map(|place| Point3::from(place.map(|x| f64::from(x) * 1e-3))).to_vec();
+        Self::new(markers_t).expect("six markers apart from each other that are not on one line")
+    }
+}
+
 /// Which marker of the body is where: pairs of its index and a position in O.
 pub(super) type Pairs = [(usize, Point3<f64>)];
 
