@@ -4,6 +4,7 @@
 //! into the frame of the object, [`BiasTracker`] follows what drifts, [`ContactGate`] says whether the stylus touches.
 
 mod bias;
+mod clock;
 mod compensate;
 mod contact;
 mod markers;
@@ -11,6 +12,7 @@ mod stream;
 mod sync;
 
 pub use bias::{BiasParams, BiasTracker};
+pub use clock::{ClockEstimator, ClockOffset, ClockParams};
 pub use compensate::{Compensator, CompensatorParams, Payload, Tip, WrenchFrame};
 pub use contact::{Contact, ContactGate, ContactGateParams};
 pub use markers::{
