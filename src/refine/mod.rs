@@ -11,6 +11,7 @@ mod guard;
 mod marks;
 mod params;
 mod patch;
+mod registration;
 mod roi;
 mod sliding;
 
@@ -21,6 +22,7 @@ pub use deform::Fit;
 pub use dynamics::{Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, StepRule};
 pub use guard::GuardParams;
 pub use params::{CarveParams, ClosestBy, RefineParams, TipParams, TouchPoint, relaxing_alpha};
+pub use registration::{Registrar, Registration, RegistrationError, RegistrationParams};
 pub use roi::RoiSize;
 pub use sliding::{Ball, SlidingParams, TipMotion};
 
