@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
+use nalgebra::Vector6;
 use serde::Serialize;
 use tracing::{debug, warn};
 
@@ -14,10 +15,16 @@ use super::replay::{Recording, Replayed, replay};
 use super::{CliError, Losses, check_kept, tell};
 use crate::io::mesh_file::{MeshFile, MeshFileError, MeshUnit, check_target, read_mesh, write_mesh};
 use crate::io::recording::Topics;
+use crate::mesh::FaceTree;
 use crate::mesh::{RepairReport, TriMesh, VertexId};
-use crate::refine::{RefineCounts, RefineError, RefineParams, Refiner};
+use crate::refine::{
+    RefineCounts, RefineError, RefineParams, Refiner, Registrar, Registration, RegistrationError, RegistrationParams,
+    SlidingParams, TipMotion,
+};
 use crate::scene::{Mode, Scene};
-use crate::touch::{MarkerCounts, MarkerFilter, Sample};
+use crate::touch::{
+    ClockEstimator, ClockParams, Compensator, ContactGate, MarkerCounts, MarkerFilter, Sample, SettingError, Tip,
+};
 
 #[derive(Debug, Args)]
 pub(super) struct RefineArguments {
@@ -57,6 +64,9 @@ pub(super) struct RefineArguments {
     /// The repaired method, or the paper's taken literally
     #[arg(long)]
     mode: Option<Mode>,
+    /// Also looks how far the scan lies from the touched part, and tells; nothing is moved by it
+    #[arg(long)]
+    registration: bool,
     /// Prints the summary as one JSON object
     #[arg(long)]
     json: bool,
@@ -76,6 +86,12 @@ pub(super) struct Summary {
     /// of the markers, where they tell the pose
     #[serde(skip_serializing_if = "Option::is_none")]
     markers: Option<MarkerCounts>,
+    /// how late the clock of the wrench reads beyond what the scene says, where the touches tell it
+    #[serde(skip_serializing_if = "Option::is_none")]
+    wrench_offset: Option<WrenchOffset>,
+    /// how far the scan lies from the part, where that was asked for
+    #[serde(skip_serializing_if = "Option::is_none")]
+    registration: Option<ScanOffset>,
     /// faces that are not where the scan had them
     moved_faces: u64,
     /// updates made smaller because a face would have folded
@@ -84,6 +100,77 @@ pub(super) struct Summary {
     push_ns: Quantiles,
     load_s: f64,
     replay_s: f64,
+}
+
+/// What the clock of the wrench reads beyond that of the pose; never applied unasked.
+#[derive(Clone, Copy, Debug, Serialize)]
+struct WrenchOffset {
+    /// the whole of it: what the scene has and what was found
+    wrench_offset_ms: f64,
+    /// standard uncertainty
+    sigma_ms: f64,
+    /// onsets of contact that it comes from
+    onsets: usize,
+}
+
+/// What would move the scan onto the contacts; never applied unasked.
+#[derive(Clone, Debug, Serialize)]
+#[serde(untagged)]
+enum ScanOffset {
+    Found {
+        /// of the middle of the contacts, and its standard uncertainty
+        shift_mm: [f64; 3],
+        shift_sigma_mm: [f64; 3],
+        /// rotation vector about that, and its standard uncertainty
+        turn_deg: [f64; 3],
+        turn_sigma_deg: [f64; 3],
+        /// by how much the scan is too fat
+        fatness_mm: f64,
+        fatness_sigma_mm: f64,
+        /// the middle of the contacts
+        centre_mm: [f64; 3],
+    },
+    Refused {
+        refused: String,
+    },
+}
+
+impl ScanOffset {
+    fn of(found: Result<Registration, RegistrationError>) -> Self {
+        let Registration { twist, covariance, centre, fatness, .. } = match found {
+            Ok(found) => found,
+            Err(refused) => return Self::Refused { refused: refused.to_string() },
+        };
+        let sigma = covariance.diagonal().map(f64::sqrt);
+        let three = |v: &Vector6<f64>, first: usize, unit: f64| [0, 1, 2].map(|axis| v[first + axis] * unit);
+        Self::Found {
+            shift_mm: three(&twist, 0, 1e3),
+            shift_sigma_mm: three(&sigma, 0, 1e3),
+            turn_deg: three(&twist, 3, 1f64.to_degrees()),
+            turn_sigma_deg: three(&sigma, 3, 1f64.to_degrees()),
+            fatness_mm: fatness[0] * 1e3,
+            fatness_sigma_mm: fatness[1] * 1e3,
+            centre_mm: [centre.x, centre.y, centre.z].map(|x| x * 1e3),
+        }
+    }
+}
+
+impl fmt::Display for ScanOffset {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let pairs = |values: &[f64; 3], sigmas: &[f64; 3]| {
+            values.iter().zip(sigmas).map(|(x, s)| format!("{x:+.3} ± {s:.3}")).collect::<Vec<_>>().join(", ")
+        };
+        match self {
+            Self::Refused { refused } => write!(f, "not told: {refused}"),
+            Self::Found {
+                shift_mm, shift_sigma_mm, turn_deg, turn_sigma_deg, fatness_mm, fatness_sigma_mm, ..
+            } => {
+                write!(f, "shift ({}) mm, ", pairs(shift_mm, shift_sigma_mm))?;
+                write!(f, "turn ({})°, ", pairs(turn_deg, turn_sigma_deg))?;
+                write!(f, "too fat by {fatness_mm:+.3} ± {fatness_sigma_mm:.3} mm; not applied")
+            }
+        }
+    }
 }
 
 /// What became of a scan.
@@ -128,6 +215,46 @@ impl Pushes {
         match pushed {
             Ok(_) => self.accepted += 1,
             Err(error) => *self.refused.entry(reason_of(&error).to_owned()).or_default() += 1,
+        }
+    }
+}
+
+/// Where the part was touched, for the registration.
+struct ContactPoints {
+    registrar: Registrar,
+    motion: TipMotion,
+    gate: ContactGate,
+    sliding: SlidingParams,
+    radius: f64,
+    last_ns: Option<i64>,
+}
+
+/// A pause after which the motion of the ball is not known, s.
+const LONGEST_PAUSE: f64 = 0.03;
+
+impl ContactPoints {
+    fn new(params: &RefineParams) -> Result<Self, SettingError> {
+        let sliding = params.sliding.unwrap_or_default();
+        Ok(Self {
+            registrar: Registrar::new(RegistrationParams {
+                scan_noise: params.scan_noise,
+                ..RegistrationParams::default()
+            })?,
+            motion: TipMotion::new(sliding, params.tip),
+            gate: ContactGate::new(params.gate.unwrap_or_default())?,
+            sliding,
+            radius: params.tip.radius,
+            last_ns: None,
+        })
+    }
+
+    fn push(&mut self, tip: &Tip) {
+        let dt = self.last_ns.map_or(0.0, |last_ns| (tip.stamp_ns - last_ns) as f64 * 1e-9);
+        self.last_ns = Some(tip.stamp_ns);
+        let ball = self.motion.update(tip, dt, LONGEST_PAUSE);
+        let normal = ball.surface_normal(&self.sliding);
+        if self.gate.update(tip.stamp_ns, &ball.force_o).is_some() && ball.velocity.norm() > self.sliding.slowest {
+            self.registrar.push(&(ball.centre - normal * self.radius), &normal);
         }
     }
 }
@@ -200,6 +327,7 @@ impl RefineArguments {
             stiffness_n_per_mm: None,
             scan_noise_mm: None,
             mode: None,
+            registration: false,
             json: false,
         }
     }
@@ -221,7 +349,20 @@ impl RefineArguments {
 
         let started = Instant::now();
         let mut pushes = Pushes::new();
-        let mut replayed = replay(recording, scene.sync_params(), markers, |sample| pushes.push(&mut refiner, sample))?;
+        let compensator = Compensator::new(params.compensator)?;
+        let clock_params = ClockParams { stiffness: params.tip.stiffness, gate: params.gate.unwrap_or_default() };
+        let mut clock = ClockEstimator::new(clock_params)?;
+        let mut contacts = self.registration.then(|| ContactPoints::new(&params)).transpose()?;
+        let mut replayed = replay(recording, scene.sync_params(), markers, |sample| {
+            pushes.push(&mut refiner, sample);
+            let tip = compensator.compensate(sample);
+            clock.push(&tip);
+            if let Some(contacts) = &mut contacts {
+                contacts.push(&tip);
+            }
+        })?;
+        let registration = contacts
+            .map(|contacts| ScanOffset::of(contacts.registrar.estimate(&as_scanned, &FaceTree::new(&as_scanned))));
         let replay_s = started.elapsed().as_secs_f64();
         write_mesh(&self.out, refiner.mesh(), self.mesh_unit).map_err(CliError::WriteMesh)?;
 
@@ -243,6 +384,12 @@ impl RefineArguments {
             refused,
             contacts: counts.contacts,
             markers: replayed.markers,
+            registration,
+            wrench_offset: clock.offset().map(|found| WrenchOffset {
+                wrench_offset_ms: found.offset * 1e3 + scene.sync_params().wrench_offset_ns as f64 * 1e-6,
+                sigma_ms: found.sigma * 1e3,
+                onsets: found.onsets,
+            }),
             moved_faces: moved_faces(&as_scanned, refiner.mesh()),
             cut_back: counts.cut_back,
             push_ns: pushes.latencies.quantiles(),
@@ -314,6 +461,16 @@ impl fmt::Display for Summary {
                 "marker frames: {held} held the pose, {coasting} coasted, {lost} without a pose; markers: {relabelled} \
                  relabelled, {rejected} rejected"
             )?;
+        }
+        if let Some(WrenchOffset { wrench_offset_ms, sigma_ms, onsets }) = self.wrench_offset {
+            writeln!(
+                f,
+                "clock: the wrench seems to read {wrench_offset_ms:+.1} ± {sigma_ms:.1} ms beyond the pose, by {onsets} \
+                 onsets of contact (sync.wrench_offset_ms; not applied)"
+            )?;
+        }
+        if let Some(registration) = &self.registration {
+            writeln!(f, "scan: {registration}")?;
         }
         write!(f, "push: median {median} ns, p99 {p99} ns, p99.9 {p999} ns, max {max} ns; ")?;
         write!(f, "loaded in {:.2} s, replayed in {:.2} s", self.load_s, self.replay_s)
