@@ -132,11 +132,13 @@ fn no_spring_and_no_set_of_markers_blows_up() {
             let spring = SpringParams { frequency, damping };
             let poses = filtered(&mut filter(MarkerParams { spring, ..MarkerParams::default() }), frames);
             assert!(poses.len() > 5000);
+            let bound = if frequency <= 12.0 { 4e-3 } else { 20e-3 };
             for pose in poses {
                 pose.check().unwrap();
                 let centroid = pose.pose_ot * body().centroid_t() - body().centroid_t();
-                // what is farther off than the gate of 4 mm does not pull, and without a pull there is soon no pose
-                assert!(centroid.norm() < 8e-3, "{frequency} Hz, {damping}: {centroid}");
+                // the stiffest take 0.2 mm of noise within 1 ms for a speed, and fly on with it for up to 30 ms;
+                // what blows up would be metres off, or no number
+                assert!(centroid.norm() < bound, "{frequency} Hz, {damping}: {centroid}");
             }
         }
     }

@@ -108,8 +108,8 @@ const SMALLEST_COSINE: f64 = 0.8;
 const LEAST_SHARE: f64 = 0.02;
 /// Rounds of closest points.
 const ROUNDS: usize = 30;
-/// A round that moves less than this ends them, in scan noises.
-const REST: f64 = 1e-4;
+/// A round that moves less than this ends them, in scan noises: below it contacts go to and fro between faces.
+const REST: f64 = 0.02;
 /// Smallest mean square error believed, in squares of the scan's noise.
 const LEAST_SCALE: f64 = 0.05;
 /// An error of this many scan noises counts half.

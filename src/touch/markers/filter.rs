@@ -162,8 +162,12 @@ impl MarkerFilter {
         let matches = self.body.matched(&motion.pose_ot(&self.body), frame.seen(), self.params.gate);
         self.counts.relabelled += matches.relabelled;
         self.counts.rejected += matches.rejected;
-        motion.pull(&self.body, matches.pairs(), &self.params.spring, self.params.noise, dt);
-        let held_ns = if self.body.is_held_by(matches.pairs()) { frame.stamp_ns } else { before.held_ns };
+        let is_held = self.body.is_held_by(matches.pairs());
+        // what has gone astray since the speed was last corrected is not taken for the speed of the last moment
+        let since_ns = if is_held { before.held_ns } else { before.stamp_ns };
+        let since = (frame.stamp_ns - since_ns) as f64 * 1e-9;
+        motion.pull(&self.body, matches.pairs(), &self.params.spring, self.params.noise, since);
+        let held_ns = if is_held { frame.stamp_ns } else { before.held_ns };
         Some(Tracked { stamp_ns: frame.stamp_ns, held_ns, motion })
     }
 

@@ -56,6 +56,8 @@ impl SpringParams {
 const LOOSE_MASS: f64 = 0.02;
 /// Frames closer than this tell no speed but noise, s.
 const SHORTEST: f64 = 1e-3;
+/// … and for the first ones, which have nothing else to go by, s.
+const FIRST_SHORTEST: f64 = 5e-3;
 /// Rounds in which the weights of the markers are found.
 const ROUNDS: usize = 3;
 /// A marker this many times the noise away from the fit counts half.
@@ -104,12 +106,14 @@ impl Motion {
         let (alpha, beta) = spring.gains(dt);
         // a body just found has no past: n frames in a row have the gains of a straight line through them
         let n = f64::from(self.frames);
-        let alpha = alpha.max((4.0 * n - 2.0) / (n * (n + 1.0))).min(1.0);
-        let beta = beta.max(6.0 / (n * (n + 1.0))).min(2.0);
+        let (first_alpha, first_beta) = ((4.0 * n - 2.0) / (n * (n + 1.0)), 6.0 / (n * (n + 1.0)));
+        let alpha = alpha.max(first_alpha).min(1.0);
+        let rate = (beta / dt.max(SHORTEST)).max(first_beta / dt.max(FIRST_SHORTEST));
+        // markers that do not hold the body tell no speed: it flies on
+        let rate = if body.is_held_by(pairs) { rate } else { 0.0 };
         let (shift, turn) = (twist.fixed_rows::<3>(0).into_owned(), twist.fixed_rows::<3>(3).into_owned());
         self.centroid += shift * alpha;
         self.rotation = UnitQuaternion::from_scaled_axis(turn * alpha) * self.rotation;
-        let rate = beta / dt.max(SHORTEST);
         self.velocity += shift * rate;
         self.spin += turn * rate;
     }
