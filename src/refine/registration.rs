@@ -110,6 +110,8 @@ const LEAST_SHARE: f64 = 0.02;
 const ROUNDS: usize = 30;
 /// A round that moves less than this ends them, in scan noises: below it contacts go to and fro between faces.
 const REST: f64 = 0.02;
+/// Late rounds that go to and fro by less than this many standard uncertainties are at rest for all that can be told.
+const SMALL_STEP: f64 = 0.3;
 /// Smallest mean square error believed, in squares of the scan's noise.
 const LEAST_SCALE: f64 = 0.05;
 /// An error of this many scan noises counts half.
@@ -159,7 +161,7 @@ impl Registrar {
         let count = contacts.len().max(1) as f64;
         let centre = Point3::from(contacts.iter().map(|(p, _)| p.coords).sum::<Vector3<f64>>() / count);
         let mut pose = Isometry3::identity();
-        for _ in 0..ROUNDS {
+        for round in 0..ROUNDS {
             let fit = Fit::of(self, &contacts, scan, tree, &centre, &pose)?;
             let step = fit.step;
             pose = moved(&pose, &centre, &step);
@@ -167,9 +169,9 @@ impl Registrar {
             if !largest.is_finite() || (pose * centre - centre).norm() > REACH * self.params.scan_noise {
                 break;
             }
-            if (step.fixed_rows::<3>(0).norm() + step.fixed_rows::<3>(3).norm() * fit.lever)
-                < REST * self.params.scan_noise
-            {
+            let moved = step.fixed_rows::<3>(0).norm() + step.fixed_rows::<3>(3).norm() * fit.lever;
+            let is_at_rest = moved < REST * self.params.scan_noise;
+            if is_at_rest || (round >= ROUNDS / 2 && fit.step_in_sigmas() < SMALL_STEP) {
                 return Ok(fit.registration(&pose, &centre));
             }
         }
@@ -202,6 +204,13 @@ struct Fit {
 }
 
 impl Fit {
+    /// Length of the step in standard uncertainties; infinite when those are none.
+    fn step_in_sigmas(&self) -> f64 {
+        let twist = self.step.fixed_rows::<6>(0).into_owned();
+        let covariance = self.covariance.fixed_view::<6, 6>(0, 0).into_owned();
+        covariance.cholesky().map_or(f64::INFINITY, |c| twist.dot(&c.solve(&twist)).sqrt())
+    }
+
     fn of(
         registrar: &Registrar,
         contacts: &[(Point3<f64>, Vector3<f64>)],
