@@ -3,12 +3,14 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 use touchup::mesh::TriMesh;
 use touchup::refine::{GuardParams, RefineParams, Refiner, RoiSize, TipParams};
-use touchup::touch::{Sample, Wrench};
+use touchup::touch::{
+    BiasParams, MarkerBody, MarkerFilter, MarkerFrame, MarkerParams, Sample, SeenMarker, StampedPose, Wrench,
+};
 
 #[path = "common/mod.rs"]
 mod common;
@@ -95,9 +97,36 @@ fn the_counter_counts() {
 fn no_sample_allocates_once_warm() {
     let paper =
         RefineParams { largest_move_edges: 2.6, guard: Some(GuardParams::default()), ..RefineParams::paper(TIP) };
-    for (mode, params) in [("robust", RefineParams::robust(TIP)), ("paper", paper)] {
+    let tracked = RefineParams { bias: Some(BiasParams::default()), ..RefineParams::robust(TIP) };
+    for (mode, params) in [("robust", RefineParams::robust(TIP)), ("paper", paper), ("bias", tracked)] {
         for roi in [RoiSize::OneRing, RoiSize::Radius(1.5e-3), RoiSize::Radius(4e-3)] {
             assert_eq!(allocations(RefineParams { roi, ..params }), 0, "{mode} {roi:?}");
         }
     }
+}
+
+/// Frames with occlusion, outliers, losses and new first poses.
+#[test]
+fn no_marker_frame_allocates() {
+    let markers_t = [[28, 0, 120], [-20, 22, 128], [-16, -26, 140], [18, 24, 155], [-30, 2, 168], [6, -22, 180]];
+    let body = MarkerBody::new(markers_t.map(|p| Point3::from(p.map(|x| f64::from(x) * 1e-3))).to_vec()).unwrap();
+    let mut filter = MarkerFilter::new(body.clone(), MarkerParams::default()).unwrap();
+    let (mut poses, mut last) = (0_u64, None::<StampedPose>);
+    let before = REQUESTS.get();
+    for i in 0..2000_i64 {
+        let mut frame = MarkerFrame::new(i * 5_000_000);
+        let pose_ot = Isometry3::translation(0.05 * (i as f64 * 0.01).sin(), 0.0, 0.0);
+        for (label, marker) in body.markers_t().iter().enumerate() {
+            let is_seen = (i / 20 + label as i64) % 4 != 0 && i % 400 < 350;
+            let far = if label as i64 == i % 50 { 0.1 } else { 0.0 };
+            let position = pose_ot * marker + Vector3::x() * far;
+            assert!(!is_seen || frame.see(SeenMarker { label: label as u32, position }));
+        }
+        filter.push(&frame, |pose| {
+            poses += 1;
+            last = Some(pose);
+        });
+    }
+    assert_eq!(REQUESTS.get() - before, 0);
+    assert!(poses > 5000 && filter.counts().lost > 100 && filter.counts().rejected > 100, "{:?}", filter.counts());
 }

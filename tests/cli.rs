@@ -432,6 +432,51 @@ fn demo_that_cannot_write_is_1() {
 
 // ---- simulate ---------------------------------------------------------------------------------------------------
 
+/// The markers on the stylus in place of its pose, with occlusion, swaps and outliers, lower the error as poses do.
+#[test]
+fn simulated_markers_refine_the_scan() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    fs::write(path("part.ply"), cube_in_mm()).unwrap();
+    let made = touchup(&["simulate", "--truth", &path("part.ply"), "--out", &path("made"), "--markers"], "");
+    assert_eq!(code(&made), 0, "{}", text(&made.stderr));
+    let (scan, bag, out) = (path("made/scan.ply"), path("made/touch.mcap"), path("out.ply"));
+    let refine = ["refine", "--scan", &scan, "--bag", &bag, "--out", &out, "--json"];
+    let with = |more: &[&str]| touchup(&[&refine[..], more].concat(), "");
+    let nowhere = with(&["--markers-topic", "/stylus/markers"]);
+    assert_eq!(code(&nowhere), 2);
+    assert!(text(&nowhere.stderr).contains("markers:"), "{}", text(&nowhere.stderr));
+    let default_yaml = include_str!("../config/default.yaml");
+    fs::write(path("scene.yaml"), format!("{default_yaml}\nmarkers:\n")).unwrap();
+    let output = with(&["--markers-topic", "/stylus/markers", "--scene", &path("scene.yaml")]);
+    let by_markers = json(&output);
+    let by_poses = json(&with(&[]));
+    let count = |value: &Value, key: &str| value[key].as_u64().unwrap() as f64;
+    assert!(by_poses.get("markers").is_none());
+    let markers = &by_markers["markers"];
+    assert!(count(markers, "held") > 9.0 * (count(markers, "lost") + count(markers, "coasting")), "{by_markers}");
+    assert!(count(markers, "relabelled") > 0.0 && count(markers, "rejected") > 0.0, "{by_markers}");
+    for key in ["accepted", "moved_faces"] {
+        let share = count(&by_markers, key) / count(&by_poses, key);
+        assert!((0.9..1.1).contains(&share), "{key}: {by_markers} {by_poses}");
+    }
+}
+
+/// A closed cube with an edge of 30 mm.
+fn cube_in_mm() -> String {
+    let corner = |i: u32| [0, 1, 2].map(|axis| if i >> axis & 1 == 1 { "30" } else { "0" }.to_owned()).join(" ");
+    let corners: Vec<_> = (0..8).map(corner).collect();
+    let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let faces: Vec<_> =
+        faces.iter().flat_map(|[a, b, c, d]| [format!("3 {a} {b} {c}"), format!("3 {a} {c} {d}")]).collect();
+    format!(
+        "ply\nformat ascii 1.0\nelement vertex 8\nproperty double x\nproperty double y\nproperty double z\n\
+         element face 12\nproperty list uchar int vertex_indices\nend_header\n{}\n{}\n",
+        corners.join("\n"),
+        faces.join("\n")
+    )
+}
+
 /// A known part goes the whole way: simulated in inches, refined in millimetres.
 #[test]
 fn simulate_makes_the_input_of_refine() {

@@ -85,7 +85,7 @@ const PROBE: [&str; 7] =
 
 /// Poses and wrenches of a recording, by stamp.
 fn messages(bag: &Path) -> (Vec<StampedPose>, Vec<StampedWrench>) {
-    let topics = Topics { pose: "/probe/pose".into(), wrench: "/probe/wrench".into() };
+    let topics = Topics { pose: "/probe/pose".into(), wrench: "/probe/wrench".into(), markers: None };
     let (mut poses, mut wrenches) = (vec![], vec![]);
     for message in RecordingReader::open(bag, &topics).unwrap() {
         match message.unwrap() {

@@ -15,6 +15,8 @@ use touchup::touch::{Message, StampedPose, StampedWrench};
 mod damage;
 #[path = "recordings/made.rs"]
 mod made;
+#[path = "recordings/markers.rs"]
+mod markers;
 
 use made::{START_NS, db3_of, mcap_bytes, pose, put, read, touch, wrench};
 
@@ -30,7 +32,7 @@ fn shared(path: &str) -> Option<PathBuf> {
 }
 
 fn probe_topics() -> Topics {
-    Topics { pose: "/probe/pose".into(), wrench: "/probe/wrench".into() }
+    Topics { pose: "/probe/pose".into(), wrench: "/probe/wrench".into(), markers: None }
 }
 
 fn poses_and_wrenches(messages: &[Message]) -> (Vec<StampedPose>, Vec<StampedWrench>) {
@@ -139,7 +141,7 @@ fn genuine_recordings_without_the_topics_list_what_they_have() {
         assert!(text.contains(has) && text.contains("--pose-topic") && text.contains(file), "{text}");
     }
     let other = |pose: &str, wrench: &str| {
-        let topics = Topics { pose: pose.into(), wrench: wrench.into() };
+        let topics = Topics { pose: pose.into(), wrench: wrench.into(), markers: None };
         RecordingReader::open(&bags.join("plotjuggler_rosbag2_test"), &topics).err().unwrap().to_string()
     };
     let text = other("/pose", "/imu");

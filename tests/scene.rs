@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use nalgebra::vector;
 use touchup::patch::PatcherParams;
 use touchup::refine::{Along, ContactModel, DynamicsParams, GuardParams, RefineParams, RoiSize, StepRule, TipParams};
-use touchup::scene::{CompensationSection, Mode, PayloadSection, Scene};
-use touchup::touch::{SyncParams, WrenchFrame};
+use touchup::scene::{BiasTrackingSection, CompensationSection, MarkersSection, Mode, PayloadSection, Scene};
+use touchup::touch::{BiasParams, SyncParams, WrenchFrame};
 
 const DEFAULT_YAML: &str = include_str!("../config/default.yaml");
 
@@ -24,6 +24,8 @@ fn with_all_settings() -> String {
 fn the_shipped_file_is_the_default() {
     assert_eq!(Scene::from_yaml(DEFAULT_YAML).unwrap(), Scene::default());
     let whole = Scene::from_yaml(&with_all_settings()).unwrap();
+    assert_eq!(whole.markers, Some(MarkersSection::default()));
+    assert_eq!(whole.bias_tracking, Some(BiasTrackingSection::default()));
     let compensation = whole.compensation.clone().unwrap();
     assert_eq!(compensation.payload, Some(PayloadSection::default()));
     assert_eq!(whole.compensator_params(WrenchFrame::Sensor).pose_ts, nalgebra::Isometry3::identity());
@@ -36,7 +38,21 @@ fn the_shipped_file_is_the_default() {
 fn every_key_of_the_code_is_in_the_shipped_file_and_documented() {
     let mut known = BTreeSet::new();
     let inner = ["compensation.payload", "compensation.bias"];
-    let outer = ["", "sync", "compensation", "contact", "tip", "scan", "sliding", "carve", "guard", "patch", "refine"];
+    let outer = [
+        "",
+        "sync",
+        "markers",
+        "compensation",
+        "bias_tracking",
+        "contact",
+        "tip",
+        "scan",
+        "sliding",
+        "carve",
+        "guard",
+        "patch",
+        "refine",
+    ];
     let sections = [&outer[..], &inner].concat();
     for section in sections {
         let path: Vec<_> = section.split('.').filter(|name| !name.is_empty()).collect();
@@ -198,4 +214,16 @@ fn each_mistake_is_refused_in_one_line_that_says_where_and_what() {
 fn a_missing_file_is_named() {
     let error = Scene::read(std::path::Path::new("no/such/scene.yaml")).unwrap_err().to_string();
     assert!(error.contains("no/such/scene.yaml"), "{error}");
+}
+
+#[test]
+fn bias_tracking_is_built_only_when_named_and_not_in_the_paper() {
+    let bias = |yaml: &str| Scene::from_yaml(yaml).unwrap().refine_params(WrenchFrame::Sensor).unwrap().bias;
+    assert_eq!(bias("refine:"), None);
+    assert_eq!(bias("{ refine: , bias_tracking: }"), Some(BiasParams::default()));
+    let named = bias("{ refine: , bias_tracking: { free_n: 0.5, settle_ms: 20, time_s: 2 } }");
+    assert_eq!(named, Some(BiasParams { free: 0.5, settle_ns: 20_000_000, time: 2.0 }));
+    assert_eq!(bias("{ refine: { mode: paper }, bias_tracking: }"), None);
+    let text = Scene::from_yaml("bias_tracking: { time_s: 0 }").unwrap_err().to_string();
+    assert!(text.contains("bias_tracking.time_s is 0"), "{text}");
 }

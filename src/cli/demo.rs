@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::progress::Progress;
 use super::refine::{RefineArguments, Refined, Summary};
-use super::simulate::{Simulated, write_simulation};
+use super::simulate::{Feel, Simulated, write_simulation};
 use super::touched::{RegionError, Touched};
 use super::{CliError, Losses, tell};
 use crate::io::atomic::write_atomically;
@@ -57,8 +57,8 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
     let path = plan_demo(&plate, &PathParams::default())?;
     let scanner = ScannerParams { seed: arguments.seed, ..ScannerParams::default() };
     let truth = plate.mesh(CHORD_ERROR)?;
-    let Simulated { scan, touch } =
-        write_simulation(&plate, &truth, &path, &scanner, &StylusParams::default(), arguments.seed, &arguments.out)?;
+    let feel = Feel { stylus: StylusParams::default(), camera: None, seed: arguments.seed };
+    let Simulated { scan, touch } = write_simulation(&plate, &truth, &path, &scanner, &feel, &arguments.out)?;
 
     let refined_path = arguments.out.join("refined.ply");
     let files = RefineArguments::of_files(

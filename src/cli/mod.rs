@@ -5,6 +5,7 @@
 
 mod demo;
 mod latency;
+mod offsets;
 mod progress;
 mod refine;
 mod replay;

@@ -10,6 +10,7 @@ use serde::Serialize;
 use tracing::{debug, warn};
 
 use super::latency::{Latencies, Quantiles};
+use super::offsets::{ContactPoints, ScanOffset, WrenchOffset};
 use super::progress::Progress;
 use super::replay::{Recording, Replayed, replay};
 use super::{CliError, Losses, check_kept, tell};
@@ -21,7 +22,7 @@ use crate::mesh::{FaceId, FaceTree, RepairReport, TriMesh, VertexId};
 use crate::patch::{Patched, Patcher, Support};
 use crate::refine::{RefineCounts, RefineError, RefineParams, Refiner};
 use crate::scene::{Mode, Scene};
-use crate::touch::Sample;
+use crate::touch::{ClockEstimator, ClockParams, Compensator, MarkerCounts, MarkerFilter, Sample};
 
 #[derive(Debug, Args)]
 pub(super) struct RefineArguments {
@@ -46,6 +47,9 @@ pub(super) struct RefineArguments {
     /// geometry_msgs/PoseStamped: centre of the ball in the frame of the scan
     #[arg(long, value_name = "TOPIC", default_value = "/stylus/pose")]
     pose_topic: String,
+    /// sensor_msgs/PointCloud2: the markers on the stylus, read in place of the pose; the scene says where they sit
+    #[arg(long, value_name = "TOPIC", conflicts_with = "pose_topic")]
+    markers_topic: Option<String>,
     /// Radius of the ball, mm
     #[arg(long, value_name = "R", allow_negative_numbers = true)]
     tip_radius_mm: Option<f64>,
@@ -58,6 +62,9 @@ pub(super) struct RefineArguments {
     /// The repaired method, or the paper's taken literally
     #[arg(long)]
     mode: Option<Mode>,
+    /// Also looks how far the scan lies from the touched part, and tells; nothing is moved by it
+    #[arg(long)]
+    registration: bool,
     /// Prints the summary as one JSON object
     #[arg(long)]
     json: bool,
@@ -74,6 +81,15 @@ pub(super) struct Summary {
     refused: BTreeMap<String, u64>,
     /// times that the stylus came into contact
     contacts: u64,
+    /// of the markers, where they tell the pose
+    #[serde(skip_serializing_if = "Option::is_none")]
+    markers: Option<MarkerCounts>,
+    /// how late the clock of the wrench reads beyond what the scene says, where the touches tell it
+    #[serde(skip_serializing_if = "Option::is_none")]
+    wrench_offset: Option<WrenchOffset>,
+    /// how far the scan lies from the part, where that was asked for
+    #[serde(skip_serializing_if = "Option::is_none")]
+    registration: Option<ScanOffset>,
     /// faces that are not where the scan had them
     moved_faces: u64,
     /// updates made smaller because a face would have folded
@@ -118,6 +134,8 @@ pub(super) struct Refined {
 }
 
 const NOTHING_MOVES: &str = "the scene names no `refine`, so nothing would move the mesh: add `refine:` to it";
+
+const NO_MARKERS: &str = "--markers-topic needs a scene that says where the markers sit: add `markers:` to it";
 
 /// The verb: refines and tells.
 pub(super) fn refine(arguments: &RefineArguments) -> Result<Losses, CliError> {
@@ -213,7 +231,7 @@ fn moved_faces(before: &TriMesh, after: &TriMesh) -> u64 {
 impl RefineArguments {
     /// The files alone, everything else as it is by default.
     pub(super) fn of_files(scan: PathBuf, bag: PathBuf, out: PathBuf, mesh_unit: MeshUnit) -> Self {
-        let Topics { pose, wrench } = Topics::default();
+        let Topics { pose, wrench, markers } = Topics::default();
         Self {
             scan,
             bag,
@@ -222,10 +240,12 @@ impl RefineArguments {
             scene: None,
             wrench_topic: wrench,
             pose_topic: pose,
+            markers_topic: markers,
             tip_radius_mm: None,
             stiffness_n_per_mm: None,
             scan_noise_mm: None,
             mode: None,
+            registration: false,
             json: false,
         }
     }
@@ -237,7 +257,8 @@ impl RefineArguments {
         let started = Instant::now();
         let MeshFile { mesh, repair } = read_mesh(&self.scan, self.mesh_unit).map_err(CliError::ReadMesh)?;
         let as_scanned = mesh.clone();
-        let topics = Topics { pose: self.pose_topic.clone(), wrench: self.wrench_topic.clone() };
+        let markers = self.marker_filter(&scene)?;
+        let topics = self.topics();
         let recording = Recording::open(&self.bag, &topics).map_err(CliError::ReadRecording)?;
         let params =
             scene.refine_params(recording.wrench_frame).ok_or_else(|| CliError::Usage(NOTHING_MOVES.to_owned()))?;
@@ -247,9 +268,20 @@ impl RefineArguments {
 
         let started = Instant::now();
         let mut pushes = Pushes::new();
-        let mut replayed = replay(recording, scene.sync_params(), |sample| {
+        let compensator = Compensator::new(params.compensator)?;
+        let clock_params = ClockParams { stiffness: params.tip.stiffness, gate: params.gate.unwrap_or_default() };
+        let mut clock = ClockEstimator::new(clock_params)?;
+        let mut contacts = self.registration.then(|| ContactPoints::new(&params)).transpose()?;
+        let mut replayed = replay(recording, scene.sync_params(), markers, |sample| {
             pushes.push(&mut refiner, patcher.as_mut(), sample);
+            let tip = compensator.compensate(sample);
+            clock.push(&tip);
+            if let Some(contacts) = &mut contacts {
+                contacts.push(&tip);
+            }
         })?;
+        let registration = contacts
+            .map(|contacts| ScanOffset::of(contacts.registrar.estimate(&as_scanned, &FaceTree::new(&as_scanned))));
         let replay_s = started.elapsed().as_secs_f64();
         let counts = refiner.counts();
         let (moved_faces, patch) = match patcher.filter(|_| counts.contacts > 0) {
@@ -275,6 +307,9 @@ impl RefineArguments {
             accepted: pushes.accepted,
             refused,
             contacts: counts.contacts,
+            markers: replayed.markers,
+            registration,
+            wrench_offset: clock.offset().map(|found| WrenchOffset::of(&found, scene.sync_params().wrench_offset_ns)),
             moved_faces,
             cut_back: counts.cut_back,
             friction: refiner.friction().map(|found| FrictionFound { mu: found.mu, sigma: found.sigma }),
@@ -302,6 +337,20 @@ impl RefineArguments {
         write_mesh_with(&self.out, &patched.mesh, &[touched], self.mesh_unit).map_err(CliError::WriteMesh)?;
         debug!(open_squares = patched.open_squares, "patched");
         Ok((moved_faces(scan, &patched.mesh), Some(PatchSummary::of(&patched, build_s))))
+    }
+
+    fn topics(&self) -> Topics {
+        let (pose, wrench) = (self.pose_topic.clone(), self.wrench_topic.clone());
+        Topics { pose, wrench, markers: self.markers_topic.clone() }
+    }
+
+    /// What makes poses of markers, when the recording has those.
+    fn marker_filter(&self, scene: &Scene) -> Result<Option<MarkerFilter>, CliError> {
+        if self.markers_topic.is_none() {
+            return Ok(None);
+        }
+        let filter = scene.marker_filter().map_err(|error| CliError::Usage(error.to_string()))?;
+        filter.map(Some).ok_or_else(|| CliError::Usage(NO_MARKERS.to_owned()))
     }
 
     /// The work is not begun when its result cannot be kept.
@@ -385,6 +434,19 @@ impl fmt::Display for Summary {
             "contacts: {}; faces moved: {}; updates cut back: {}",
             self.contacts, self.moved_faces, self.cut_back
         )?;
+        if let Some(MarkerCounts { held, coasting, lost, relabelled, rejected }) = self.markers {
+            writeln!(
+                f,
+                "marker frames: {held} held the pose, {coasting} coasted, {lost} without a pose; markers: {relabelled} \
+                 relabelled, {rejected} rejected"
+            )?;
+        }
+        if let Some(clock) = &self.wrench_offset {
+            writeln!(f, "clock: {clock}")?;
+        }
+        if let Some(registration) = &self.registration {
+            writeln!(f, "scan: {registration}")?;
+        }
         write!(f, "push: median {median} ns, p99 {p99} ns, p99.9 {p999} ns, max {max} ns; ")?;
         write!(f, "loaded in {:.2} s, replayed in {:.2} s", self.load_s, self.replay_s)?;
         self.patch.iter().try_for_each(|patch| write!(f, "\n{patch}"))

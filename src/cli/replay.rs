@@ -5,8 +5,8 @@ use std::path::Path;
 
 use super::progress::Progress;
 use super::{CliError, Losses};
-use crate::io::recording::{RecordingError, RecordingReader, Topics};
-use crate::touch::{Message, Sample, SyncParams, Synchroniser, WrenchFrame};
+use crate::io::recording::{Record, RecordingError, RecordingReader, Topics};
+use crate::touch::{MarkerCounts, MarkerFilter, Message, Sample, SyncParams, Synchroniser, WrenchFrame};
 
 /// Reasons that are gaps in the recording itself; every other one is a message lost on the way.
 const NOT_A_LOSS: [&str; 4] = ["gap", "no_pose_before", "no_pose_after", "duplicate"];
@@ -20,15 +20,17 @@ pub struct Replayed {
     pub refused: BTreeMap<String, u64>,
     /// What a better recording would not lack.
     pub losses: Losses,
+    /// What became of the markers, where they tell the pose.
+    pub markers: Option<MarkerCounts>,
 }
 
-/// Messages that are kept at most while the frames are looked for: a minute of both topics, 20 MB.
+/// Messages that are kept at most while the frames are looked for: a minute of both topics, 20 MB; 60 MB with markers.
 const MOST_AHEAD: usize = 100_000;
 
 /// A recording that has been read until the frames of both topics are known, and keeps what it has read.
 pub struct Recording {
     reader: RecordingReader,
-    ahead: VecDeque<Result<Message, RecordingError>>,
+    ahead: VecDeque<Result<Record, RecordingError>>,
     /// In which axes the wrenches are: a header that names the frame of the pose means O, any other the stylus' own.
     pub wrench_frame: WrenchFrame,
 }
@@ -43,16 +45,16 @@ impl Recording {
         let mut reader = RecordingReader::open(path, topics)?;
         let mut ahead = VecDeque::new();
         while !knows_frames(&reader) && ahead.len() < MOST_AHEAD {
-            let Some(message) = reader.next() else { break };
-            ahead.push_back(message);
+            let Some(record) = reader.next_record() else { break };
+            ahead.push_back(record);
         }
         let wrench_frame =
             if ahead.len() < MOST_AHEAD { wrench_frame(&reader) } else { find_wrench_frame(path, topics)? };
         Ok(Self { reader, ahead, wrench_frame })
     }
 
-    fn next(&mut self) -> Option<Result<Message, RecordingError>> {
-        self.ahead.pop_front().or_else(|| self.reader.next())
+    fn next(&mut self) -> Option<Result<Record, RecordingError>> {
+        self.ahead.pop_front().or_else(|| self.reader.next_record())
     }
 }
 
@@ -67,31 +69,50 @@ fn wrench_frame(reader: &RecordingReader) -> WrenchFrame {
 /// Where one topic begins long after the other: by a reader of its own, which keeps nothing.
 fn find_wrench_frame(path: &Path, topics: &Topics) -> Result<WrenchFrame, RecordingError> {
     let mut reader = RecordingReader::open(path, topics)?;
-    while !knows_frames(&reader) && reader.next().is_some() {}
+    while !knows_frames(&reader) && reader.next_record().is_some() {}
     Ok(wrench_frame(&reader))
 }
 
 /// Gives each sample of `recording` to `each`, in order of time.
 ///
+/// - `markers`: makes the poses of a recording that holds markers.
+///
 /// # Errors
 /// [`CliError::ReadRecording`] when the recording is damaged before its first message; later damage is a loss.
-pub fn replay(mut recording: Recording, sync: SyncParams, mut each: impl FnMut(&Sample)) -> Result<Replayed, CliError> {
+pub fn replay(
+    mut recording: Recording,
+    sync: SyncParams,
+    mut markers: Option<MarkerFilter>,
+    mut each: impl FnMut(&Sample),
+) -> Result<Replayed, CliError> {
     let mut sync = Synchroniser::new(sync)?;
     let mut replayed = Replayed::default();
     let mut progress = Progress::new("replay", recording.reader.message_count());
     let mut has_begun = false;
-    while let Some(message) = recording.next() {
-        match message {
-            Ok(message) => {
+    let mut take = |sync: &mut Synchroniser, message| {
+        sync.push(message);
+        std::iter::from_fn(|| sync.next_sample()).for_each(|sample| each(&sample));
+    };
+    while let Some(record) = recording.next() {
+        match record {
+            Ok(Record::Message(message)) => {
                 replayed.wrenches += u64::from(matches!(message, Message::Wrench(_)));
-                sync.push(message);
+                take(&mut sync, message);
+            }
+            Ok(Record::Markers(frame)) => {
+                if let Some(filter) = &mut markers {
+                    filter.push(&frame, |pose| take(&mut sync, Message::Pose(pose)));
+                }
             }
             Err(damage) if !has_begun => return Err(CliError::ReadRecording(damage)),
             Err(damage) => replayed.losses.push(damage.to_string()),
         }
         has_begun = true;
         progress.step();
-        std::iter::from_fn(|| sync.next_sample()).for_each(|sample| each(&sample));
+    }
+    if let Some(filter) = &mut markers {
+        filter.finish(|pose| take(&mut sync, Message::Pose(pose)));
+        replayed.account_markers(filter);
     }
     sync.finish();
     std::iter::from_fn(|| sync.next_sample()).for_each(|sample| each(&sample));
@@ -100,6 +121,17 @@ pub fn replay(mut recording: Recording, sync: SyncParams, mut each: impl FnMut(&
 }
 
 impl Replayed {
+    /// Takes over what the filter of the markers dropped.
+    fn account_markers(&mut self, filter: &MarkerFilter) {
+        for (reason, count) in filter.frame_counts().reasons().into_iter().filter(|(_, count)| *count > 0) {
+            if !NOT_A_LOSS.contains(&reason) {
+                self.losses.push(format!("{count} marker frames {reason}"));
+            }
+            self.refused.insert(format!("markers_{reason}"), count);
+        }
+        self.markers = Some(*filter.counts());
+    }
+
     /// Takes over what reader and synchroniser dropped.
     fn account(&mut self, recording: &RecordingReader, sync: &Synchroniser) {
         let of_wrenches = sync.counts().reasons().map(|(reason, count)| (reason, reason.to_owned(), count));

@@ -11,11 +11,13 @@ use super::progress::Progress;
 use super::{CliError, Losses, check_kept, tell};
 use crate::io::atomic::create_folder;
 use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh, write_mesh};
-use crate::io::recording::{Topics, write_recording};
+use crate::io::recording::{Record, Topics, write_recording};
 use crate::mesh::TriMesh;
 use crate::sim::{
-    MeshSurface, PathParams, ScannerParams, Stroke, StylusParams, Surface, Touch, plan_mesh, scan, touch,
+    CameraParams, MeshSurface, PathParams, ScannerParams, Stroke, StylusParams, Surface, Touch, plan_mesh, scan,
+    see_markers, touch,
 };
+use crate::touch::{MarkerFrame, Message};
 
 /// File of the part as it is, in the folder that is asked for.
 const TRUTH_NAME: &str = "truth.ply";
@@ -25,6 +27,8 @@ const TIP_RADII_MM: RangeInclusive<f64> = 0.1..=100.0;
 const OBJECT_FRAME: &str = "object";
 /// Frame of the wrenches: the stylus' own.
 const STYLUS_FRAME: &str = "stylus";
+/// Topic of the markers.
+const MARKERS_TOPIC: &str = "/stylus/markers";
 
 #[derive(Debug, Args)]
 pub(super) struct SimulateArguments {
@@ -55,6 +59,9 @@ pub(super) struct SimulateArguments {
     /// Noise of the scan along its normals, mm
     #[arg(long, value_name = "S", default_value_t = 0.6, allow_negative_numbers = true)]
     scan_noise_mm: f64,
+    /// Also writes the markers on the stylus, with occlusion, swaps and outliers, as the topic /stylus/markers
+    #[arg(long)]
+    markers: bool,
 }
 
 /// The verb: scans the part from above (along −z), touches it from there, and tells.
@@ -83,10 +90,10 @@ pub(super) fn simulate(arguments: &SimulateArguments) -> Result<Losses, CliError
         friction: arguments.friction,
         ..StylusParams::default()
     };
+    let feel = Feel { stylus, camera: arguments.markers.then(CameraParams::default), seed: arguments.seed };
     let hand = PathParams { radius, ..PathParams::default() };
     let path = plan_mesh(&surface, &surface.bounds(), &scanner.view, &hand)?;
-    let Simulated { scan, touch } =
-        write_simulation(&surface, &truth, &path, &scanner, &stylus, arguments.seed, &arguments.out)?;
+    let Simulated { scan, touch } = write_simulation(&surface, &truth, &path, &scanner, &feel, &arguments.out)?;
     let seconds = touch.moments.last().map_or(0.0, |moment| moment.t);
     tell(&format!(
         "scan: {} faces\ntouched for {seconds:.0} s of simulated time: {} messages\nwrote {}",
@@ -97,20 +104,28 @@ pub(super) fn simulate(arguments: &SimulateArguments) -> Result<Losses, CliError
     Ok(Losses::new())
 }
 
+/// What touches the part, and what watches it.
+pub(super) struct Feel {
+    pub stylus: StylusParams,
+    /// sees the markers on the stylus
+    pub camera: Option<CameraParams>,
+    pub seed: u64,
+}
+
 /// A simulated scan and touch.
 pub(super) struct Simulated {
     pub scan: TriMesh,
     pub touch: Touch,
 }
 
-/// Scans and touches `surface`, and writes truth.ply, scan.ply (both in mm) and touch.mcap into `folder`.
+/// Scans and touches `surface`, and writes truth.ply, scan.ply (both in mm) and touch.mcap into `folder`; with a
+/// camera the recording also has what that saw of the markers on the stylus.
 pub(super) fn write_simulation(
     surface: &dyn Surface,
     truth: &TriMesh,
     path: &[Stroke],
     scanner: &ScannerParams,
-    stylus: &StylusParams,
-    seed: u64,
+    feel: &Feel,
     folder: &Path,
 ) -> Result<Simulated, CliError> {
     create_folder(folder).map_err(|source| CliError::Write { path: folder.to_owned(), source })?;
@@ -118,12 +133,27 @@ pub(super) fn write_simulation(
     let scan = scan(surface, scanner)?;
     drop(stage);
     let _stage = Progress::stage("touch");
-    let touch = touch(surface, path, stylus, seed)?;
-    let messages = touch.messages.iter().copied();
+    let Feel { stylus, camera, seed } = feel;
+    let touch = touch(surface, path, stylus, *seed)?;
+    let see = |camera: &CameraParams| see_markers(&touch.moments, stylus.stiffness, camera, *seed);
+    let frames = camera.as_ref().map_or_else(|| Ok(Vec::new()), see)?;
+    let topics = Topics { markers: camera.as_ref().map(|_| MARKERS_TOPIC.to_owned()), ..Topics::default() };
     for (name, mesh) in [(TRUTH_NAME, truth), ("scan.ply", &scan)] {
         write_mesh(&folder.join(name), mesh, MeshUnit::Millimetre).map_err(CliError::WriteMesh)?;
     }
-    write_recording(&folder.join("touch.mcap"), &Topics::default(), OBJECT_FRAME, STYLUS_FRAME, messages)
+    write_recording(&folder.join("touch.mcap"), &topics, OBJECT_FRAME, STYLUS_FRAME, merged(&touch.messages, frames))
         .map_err(CliError::WriteRecording)?;
     Ok(Simulated { scan, touch })
+}
+
+/// Each frame of markers in front of the first message that is later.
+fn merged(messages: &[Message], frames: Vec<MarkerFrame>) -> impl Iterator<Item = Record> {
+    let mut frames = frames.into_iter().peekable();
+    let last_ns = messages.iter().map(Message::stamp_ns).max();
+    messages.iter().flat_map(move |message| {
+        let until_ns = if Some(message.stamp_ns()) == last_ns { i64::MAX } else { message.stamp_ns() };
+        let before = std::iter::from_fn(|| frames.next_if(|frame| frame.stamp_ns < until_ns));
+        let before: Vec<_> = before.map(|frame| Record::Markers(Box::new(frame))).collect();
+        before.into_iter().chain([Record::Message(*message)])
+    })
 }

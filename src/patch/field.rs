@@ -350,8 +350,11 @@ mod tests {
 
     const RADIUS: f64 = 1.5e-3;
 
+    /// A point of a surface and its normal, where the surface has that parameter.
+    type Patch<'a> = &'a dyn Fn(f64, f64) -> Option<(Point3<f64>, Vector3<f64>)>;
+
     /// Contacts of a surface at the points of a grid of 0.5 mm, each weighing 5.
-    fn store_of(surfaces: &[&dyn Fn(f64, f64) -> Option<(Point3<f64>, Vector3<f64>)>]) -> ContactStore {
+    fn store_of(surfaces: &[Patch<'_>]) -> ContactStore {
         let mut store = ContactStore::new(RADIUS / 3.0, 2.0 * RADIUS);
         for surface in surfaces {
             for (i, j) in (-16..=16).flat_map(|i| (-16..=16).map(move |j| (i, j))) {

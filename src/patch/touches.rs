@@ -6,10 +6,11 @@
 
 use std::collections::VecDeque;
 
-use nalgebra::{Point3, UnitQuaternion, Vector3};
+use nalgebra::{Point3, Vector3};
 
 use crate::touch::{
-    ContactGate, ContactGateParams, FeltNormal, Friction, FrictionCoefficient, LocalMotion, SettingError, Sliding, Tip,
+    BiasParams, BiasTracker, ContactGate, ContactGateParams, FeltNormal, Friction, FrictionCoefficient, LocalMotion,
+    SettingError, Sliding, Tip,
 };
 
 /// How touches are found.
@@ -82,7 +83,7 @@ struct Entry {
 pub struct TouchFinder {
     params: TouchFinderParams,
     gate: ContactGate,
-    bias: FreeAirBias,
+    bias: BiasTracker,
     friction: Friction,
     noise: PathNoise,
     /// samples since the last gap, as far as a window may still need them
@@ -98,7 +99,7 @@ impl TouchFinder {
         Ok(Self {
             gate: ContactGate::new(params.gate)?,
             params,
-            bias: FreeAirBias::new(&params.gate),
+            bias: BiasTracker::new(BiasParams { free: FREE_SHARE * params.gate.on, ..BiasParams::default() })?,
             friction: Friction::new(params.cone_cosine.clamp(-1.0, 1.0).acos()),
             noise: PathNoise::default(),
             held: VecDeque::new(),
@@ -265,43 +266,5 @@ impl PathNoise {
     }
 }
 
-/// Follows the slow drift of a force sensor while nothing is touched.
-#[derive(Clone, Debug)]
-struct FreeAirBias {
-    /// in the axes of T, N
-    bias_t: Vector3<f64>,
-    /// less than this from the bias is free air, N
-    free_force: f64,
-    free_since_ns: Option<i64>,
-    last_ns: i64,
-}
-
 /// Less than this from the bias is free air, as a share of the force that begins a contact.
 const FREE_SHARE: f64 = 0.75;
-/// … when it lasts so long, ns.
-const FREE_TIME_NS: i64 = 60_000_000;
-/// Time constant of the running mean, s.
-const BIAS_TIME: f64 = 0.3;
-
-impl FreeAirBias {
-    fn new(gate: &ContactGateParams) -> Self {
-        Self { bias_t: Vector3::zeros(), free_force: FREE_SHARE * gate.on, free_since_ns: None, last_ns: 0 }
-    }
-
-    /// The force of a tip without the bias, N, in O.
-    fn compensate(&mut self, tip: &Tip) -> Vector3<f64> {
-        let rotation: &UnitQuaternion<f64> = &tip.pose_ot.rotation;
-        let rest_t = rotation.inverse_transform_vector(&tip.force_o) - self.bias_t;
-        if rest_t.norm() < self.free_force {
-            let since = *self.free_since_ns.get_or_insert(tip.stamp_ns);
-            if tip.stamp_ns - since >= FREE_TIME_NS {
-                let dt = (tip.stamp_ns - self.last_ns) as f64 * 1e-9;
-                self.bias_t += rest_t * (1.0 - (-dt / BIAS_TIME).exp());
-            }
-        } else {
-            self.free_since_ns = None;
-        }
-        self.last_ns = tip.stamp_ns;
-        tip.force_o - rotation * self.bias_t
-    }
-}

@@ -10,6 +10,7 @@ pub mod dynamics;
 mod guard;
 mod marks;
 mod params;
+mod registration;
 mod ring;
 mod roi;
 mod sliding;
@@ -21,11 +22,12 @@ pub use deform::Fit;
 pub use dynamics::{Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, StepRule};
 pub use guard::GuardParams;
 pub use params::{CarveParams, ClosestBy, RefineParams, TipParams, TouchPoint, relaxing_alpha};
+pub use registration::{Registrar, Registration, RegistrationError, RegistrationParams};
 pub use roi::RoiSize;
 pub use sliding::{Ball, SlidingParams, TipMotion};
 
 use crate::mesh::{FaceHit, FaceId, MeshError, TriMesh, VertexId};
-use crate::touch::{Compensator, ContactGate, FrictionCoefficient, Sample, SampleError, SettingError};
+use crate::touch::{BiasTracker, Compensator, ContactGate, FrictionCoefficient, Sample, SampleError, SettingError};
 use deform::{DeformableMesh, HandleRegion};
 use dynamics::turn;
 
@@ -149,6 +151,7 @@ pub struct RefineCounts {
 pub struct Refiner {
     params: RefineParams,
     compensator: Compensator,
+    bias: Option<BiasTracker>,
     gate: Option<ContactGate>,
     motion: TipMotion,
     dynamics: FaceDynamics,
@@ -189,6 +192,7 @@ impl Refiner {
             (params.largest_move_edges * deformable.mean_edge).max(params.largest_move_noises * params.scan_noise);
         Ok(Self {
             compensator: Compensator::new(params.compensator)?,
+            bias: params.bias.map(BiasTracker::new).transpose()?,
             gate: params.gate.map(ContactGate::new).transpose()?,
             motion: TipMotion::new(
                 params.sliding.unwrap_or(SlidingParams { smoothing: 0.0, ..Default::default() }),
@@ -230,7 +234,10 @@ impl Refiner {
         sample.check()?;
         let dt = sample.seconds_since(self.last_ns)?;
         self.last_ns = Some(sample.stamp_ns);
-        let tip = self.compensator.compensate(sample);
+        let mut tip = self.compensator.compensate(sample);
+        if let Some(bias) = &mut self.bias {
+            tip.force_o = bias.compensate(&tip);
+        }
         let ball = self.motion.update(&tip, dt, LONGEST_HOLD);
         let dt = dt.min(LONGEST_HOLD);
         let felt = self.felt_normal(sample.stamp_ns, &ball, dt);

@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::guard::GuardParams;
 use super::{Along, ContactModel, DynamicsParams, RoiSize, SlidingParams, StepRule};
-use crate::touch::{CompensatorParams, ContactGateParams, SettingError};
+use crate::touch::{BiasParams, CompensatorParams, ContactGateParams, SettingError};
 
 /// The ball at the end of stylus or probe.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,6 +63,8 @@ impl Default for CarveParams {
 pub struct RefineParams {
     /// Weight, bias, frames.
     pub compensator: CompensatorParams,
+    /// Slow drift of the sensor, followed in free air; `None`: it has none \[paper\].
+    pub bias: Option<BiasParams>,
     /// `None`: every sample is contact \[paper\].
     pub gate: Option<ContactGateParams>,
     /// The ball.
@@ -130,6 +132,7 @@ impl RefineParams {
         };
         Self {
             compensator: CompensatorParams::default(),
+            bias: None,
             gate: Some(ContactGateParams::default()),
             tip,
             sliding: Some(SlidingParams::default()),

@@ -15,8 +15,9 @@ pub use error::SceneError;
 use error::yaml_error;
 use sections::named;
 pub use sections::{
-    AlongName, BiasSection, CarveSection, CompensationSection, ContactSection, GuardSection, Mode, ModelName,
-    PatchSection, PayloadSection, RefineSection, ScanSection, SlidingSection, StepName, SyncSection, TipSection,
+    AlongName, BiasSection, BiasTrackingSection, CarveSection, CompensationSection, ContactSection, GuardSection,
+    MarkersSection, Mode, ModelName, PatchSection, PayloadSection, RefineSection, ScanSection, SlidingSection,
+    StepName, SyncSection, TipSection,
 };
 
 /// The parts of a scene. `None`: not built.
@@ -26,9 +27,15 @@ pub struct Scene {
     /// Pairs poses with wrenches; without it only those of equal stamp pair.
     #[serde(default, deserialize_with = "named")]
     pub sync: Option<SyncSection>,
+    /// The markers on the stylus, when they and not its pose are recorded.
+    #[serde(default, deserialize_with = "named")]
+    pub markers: Option<MarkersSection>,
     /// Takes weight and bias off the wrench.
     #[serde(default, deserialize_with = "named")]
     pub compensation: Option<CompensationSection>,
+    /// Follows the slow drift of the sensor in free air; without it the bias stays as it is named.
+    #[serde(default, deserialize_with = "named")]
+    pub bias_tracking: Option<BiasTrackingSection>,
     /// Tells contact from free motion; without it every sample counts as contact.
     #[serde(default, deserialize_with = "named")]
     pub contact: Option<ContactSection>,
@@ -56,11 +63,13 @@ pub struct Scene {
 }
 
 impl Default for Scene {
-    /// All but compensation, which depends on the sensor.
+    /// All but compensation, which depends on the sensor, and the parts that only some sensors need.
     fn default() -> Self {
         Self {
             sync: Some(SyncSection::default()),
+            markers: None,
             compensation: None,
+            bias_tracking: None,
             contact: Some(ContactSection::default()),
             tip: Some(TipSection::default()),
             scan: Some(ScanSection::default()),
@@ -109,6 +118,8 @@ impl Scene {
     pub fn check(&self) -> Result<(), SceneError> {
         self.sync.iter().try_for_each(SyncSection::check)?;
         self.compensation.iter().try_for_each(CompensationSection::check)?;
+        self.markers.iter().try_for_each(MarkersSection::check)?;
+        self.bias_tracking.iter().try_for_each(BiasTrackingSection::check)?;
         self.contact.iter().try_for_each(ContactSection::check)?;
         self.tip.iter().try_for_each(TipSection::check)?;
         self.scan.iter().try_for_each(ScanSection::check)?;

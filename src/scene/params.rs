@@ -8,7 +8,10 @@ use crate::refine::{
     Along, CarveParams, ContactModel, GuardParams, RefineParams, RoiSize, SlidingParams, StepRule, TipParams,
     relaxing_alpha,
 };
-use crate::touch::{CompensatorParams, ContactGateParams, Payload, SyncParams, Wrench, WrenchFrame};
+use crate::touch::{
+    BiasParams, CompensatorParams, ContactGateParams, MarkerBody, MarkerFilter, MarkerParams, Payload, SettingError,
+    SpringParams, SyncParams, Wrench, WrenchFrame,
+};
 
 impl Scene {
     /// Settings of the synchroniser; without `sync` only messages of equal stamp pair.
@@ -23,6 +26,24 @@ impl Scene {
             wrench_offset_ns: nanoseconds(sync.wrench_offset_ms, 1e6),
             capacity: sync.capacity,
         }
+    }
+
+    /// The filter that makes poses of markers, if there is one.
+    ///
+    /// # Errors
+    /// [`SettingError`] for markers on one line, or closer together than the gate allows.
+    pub fn marker_filter(&self) -> Result<Option<MarkerFilter>, SettingError> {
+        let Some(markers) = &self.markers else { return Ok(None) };
+        let body = MarkerBody::new(markers.positions_mm.iter().map(|&mm| metres(mm).into()).collect())?;
+        let params = MarkerParams {
+            spring: SpringParams { frequency: markers.spring_hz, damping: markers.damping },
+            noise: markers.noise_mm / 1e3,
+            gate: markers.gate_mm / 1e3,
+            coast_ns: nanoseconds(markers.coast_ms, 1e6),
+            period_ns: nanoseconds(markers.period_ms, 1e6),
+            reorder_ns: nanoseconds(markers.reorder_ms, 1e6),
+        };
+        MarkerFilter::new(body, params).map(Some)
     }
 
     /// Settings of the compensator for a wrench that arrives in the axes of `wrench_frame`.
@@ -47,6 +68,15 @@ impl Scene {
         }
     }
 
+    /// Settings of the bias tracker, if there is one.
+    pub fn bias_params(&self) -> Option<BiasParams> {
+        self.bias_tracking.as_ref().map(|tracking| BiasParams {
+            free: tracking.free_n,
+            settle_ns: nanoseconds(tracking.settle_ms, 1e6),
+            time: tracking.time_s,
+        })
+    }
+
     /// Thresholds of the contact gate, if there is one.
     pub fn contact_params(&self) -> Option<ContactGateParams> {
         self.contact.as_ref().map(|contact| ContactGateParams { on: contact.on_n, off: contact.off_n })
@@ -67,6 +97,7 @@ impl Scene {
         let mut params = match section.mode {
             Mode::Paper => RefineParams::paper(self.tip_params()),
             Mode::Robust => RefineParams {
+                bias: self.bias_params(),
                 gate: self.contact_params(),
                 sliding: self.sliding.as_ref().map(SlidingSection::params),
                 carve: self.carve.as_ref().map(CarveSection::params),

@@ -4,7 +4,7 @@ use serde::{Deserialize, Deserializer};
 
 use super::SceneError;
 use crate::refine::{CarveParams, ContactModel, DynamicsParams, GuardParams, SlidingParams};
-use crate::touch::{ContactGateParams, SyncParams};
+use crate::touch::{BiasParams, ContactGateParams, MarkerBody, MarkerParams, SyncParams};
 
 /// `sync`
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -32,6 +32,46 @@ impl Default for SyncSection {
             largest_jump_s: largest_jump_ns as f64 * 1e-9,
             wrench_offset_ms: wrench_offset_ns as f64 * 1e-6,
             capacity,
+        }
+    }
+}
+
+/// `markers`
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct MarkersSection {
+    /// Each marker from the centre of the ball, in the axes of the tip, by label from 0 on, mm.
+    pub positions_mm: Vec<[f64; 3]>,
+    /// Natural frequency √(k/m) / 2π of the springs between the body and its markers, Hz.
+    pub spring_hz: f64,
+    /// Damping d / (2 √(k m)).
+    pub damping: f64,
+    /// Noise of a marker per axis, mm.
+    pub noise_mm: f64,
+    /// A marker farther than this from where it is expected is another one, or none, mm.
+    pub gate_mm: f64,
+    /// How long the body flies on when its markers do not determine it, ms.
+    pub coast_ms: f64,
+    /// Time between two poses, ms.
+    pub period_ms: f64,
+    /// How far a frame may lag behind the newest one, ms.
+    pub reorder_ms: f64,
+}
+
+impl Default for MarkersSection {
+    /// The stylus of the simulation.
+    fn default() -> Self {
+        let MarkerParams { spring, noise, gate, coast_ns, period_ns, reorder_ns } = MarkerParams::default();
+        let millimetres = |p: &nalgebra::Point3<f64>| [p.x, p.y, p.z].map(|x| (x * 1e6).round() * 1e-3);
+        Self {
+            positions_mm: MarkerBody::default().markers_t().iter().map(millimetres).collect(),
+            spring_hz: spring.frequency,
+            damping: spring.damping,
+            noise_mm: noise * 1e3,
+            gate_mm: gate * 1e3,
+            coast_ms: coast_ns as f64 * 1e-6,
+            period_ms: period_ns as f64 * 1e-6,
+            reorder_ms: reorder_ns as f64 * 1e-6,
         }
     }
 }
@@ -78,6 +118,25 @@ pub struct BiasSection {
     pub force_n: [f64; 3],
     /// In the axes of the sensor, N·m.
     pub torque_nm: [f64; 3],
+}
+
+/// `bias_tracking`
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct BiasTrackingSection {
+    /// A force within this of the bias is free air, N.
+    pub free_n: f64,
+    /// … once it has lasted so long, ms.
+    pub settle_ms: f64,
+    /// Time constant of the running mean, s.
+    pub time_s: f64,
+}
+
+impl Default for BiasTrackingSection {
+    fn default() -> Self {
+        let BiasParams { free, settle_ns, time } = BiasParams::default();
+        Self { free_n: free, settle_ms: settle_ns as f64 * 1e-6, time_s: time }
+    }
 }
 
 /// `contact`
@@ -344,6 +403,30 @@ impl CompensationSection {
             all("compensation.bias.torque_nm", &bias.torque_nm, 1e4, "-10000 to 10000 N·m")?;
         }
         Ok(())
+    }
+}
+
+impl MarkersSection {
+    pub(super) fn check(&self) -> Result<(), SceneError> {
+        in_range("the number of markers.positions_mm", self.positions_mm.len() as f64, 3.0, 16.0, "3 to 16")?;
+        for &x in self.positions_mm.iter().flatten() {
+            in_range("markers.positions_mm", x, -1e4, 1e4, "-10000 to 10000 mm")?;
+        }
+        in_range("markers.spring_hz", self.spring_hz, 1e-3, 1e6, "0.001 to 1e6 Hz")?;
+        in_range("markers.damping", self.damping, 0.5, 100.0, "0.5 to 100")?;
+        in_range("markers.noise_mm", self.noise_mm, 1e-6, 1e3, "1e-6 to 1000 mm")?;
+        in_range("markers.gate_mm", self.gate_mm, 1e-6, 1e3, "1e-6 to 1000 mm")?;
+        in_range("markers.coast_ms", self.coast_ms, 1e-3, 1e4, "0.001 to 10000 ms")?;
+        in_range("markers.period_ms", self.period_ms, 0.05, 1e4, "0.05 to 10000 ms")?;
+        in_range("markers.reorder_ms", self.reorder_ms, 0.0, 6e4, "0 to 60000 ms")
+    }
+}
+
+impl BiasTrackingSection {
+    pub(super) fn check(&self) -> Result<(), SceneError> {
+        in_range("bias_tracking.free_n", self.free_n, 1e-6, 1e3, "1e-6 to 1000 N")?;
+        in_range("bias_tracking.settle_ms", self.settle_ms, 1e-3, 6e4, "0.001 to 60000 ms")?;
+        in_range("bias_tracking.time_s", self.time_s, 1e-6, 1e6, "1e-6 to 1e6 s")
     }
 }
 

@@ -8,6 +8,7 @@ mod contour;
 pub mod coupled;
 mod error;
 mod field;
+mod markers;
 mod mesh_surface;
 mod path;
 mod peaks;
@@ -22,6 +23,7 @@ mod wander;
 
 pub use ball::{BallContact, push_ball};
 pub use error::SimError;
+pub use markers::{CameraParams, see_markers};
 pub use mesh_surface::MeshSurface;
 pub use path::{Lines, PathParams, Region, Stroke, around_wall, plan_demo, plan_mesh, raster};
 pub use peaks::{Peaks, add_vertex_noise};

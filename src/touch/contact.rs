@@ -65,6 +65,11 @@ impl ContactGate {
         self.contact
     }
 
+    /// Whether a contact is going on.
+    pub fn is_in_contact(&self) -> bool {
+        self.contact.is_some()
+    }
+
     /// How many contacts have begun.
     pub fn contacts(&self) -> u64 {
         self.contacts

@@ -1,20 +1,29 @@
 //! From raw pose and wrench messages to samples the refiner can use.
 //!
-//! [`Synchroniser`] brings the two streams to one instant, [`Compensator`] takes weight and bias off and turns the force
-//! into the frame of the object, [`ContactGate`] says whether the stylus touches. [`LocalMotion`] and [`Friction`] say how
-//! the ball slides and which way the surface under it faces.
+//! [`MarkerFilter`] makes the pose of the markers on the stylus, [`Synchroniser`] brings the two streams to one instant,
+//! [`Compensator`] takes weight and bias off and turns the force into the frame of the object, [`BiasTracker`] follows
+//! what drifts, [`ContactGate`] says whether the stylus touches. [`LocalMotion`] and [`Friction`] say how the ball slides
+//! and which way the surface under it faces.
 
+mod bias;
+mod clock;
 mod compensate;
 mod contact;
 mod friction;
 mod local_motion;
+mod markers;
 mod stream;
 mod sync;
 
+pub use bias::{BiasParams, BiasTracker};
+pub use clock::{ClockEstimator, ClockOffset, ClockParams};
 pub use compensate::{Compensator, CompensatorParams, Payload, Tip, WrenchFrame};
 pub use contact::{Contact, ContactGate, ContactGateParams};
 pub use friction::{FeltNormal, Friction, FrictionCoefficient, Sliding};
 pub use local_motion::{LocalMotion, Motion};
+pub use markers::{
+    MOST_MARKERS, MarkerBody, MarkerCounts, MarkerFilter, MarkerFrame, MarkerParams, SeenMarker, SpringParams, Tracking,
+};
 pub use sync::{SyncCounts, SyncParams, Synchroniser};
 
 use nalgebra::{Isometry3, Vector3};

@@ -233,7 +233,7 @@ impl SyncCounts {
 }
 
 /// Between two poses: straight for the position, at constant angular velocity the shorter way for the orientation.
-fn interpolated(before: &Isometry3<f64>, after: &Isometry3<f64>, t: f64) -> Isometry3<f64> {
+pub(super) fn interpolated(before: &Isometry3<f64>, after: &Isometry3<f64>, t: f64) -> Isometry3<f64> {
     let position = before.translation.vector.lerp(&after.translation.vector, t);
     // the power of the relative rotation keeps its digits at angles where a slerp by sines loses them
     let mut rotation = before.rotation * (before.rotation.inverse() * after.rotation).powf(t);

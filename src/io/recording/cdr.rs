@@ -1,4 +1,4 @@
-//! The two message types as CDR (XCDR version 1, either byte order), fields in the order of the `.msg` files.
+//! Poses and wrenches as CDR (XCDR version 1, either byte order), fields in the order of the `.msg` files.
 //!
 //! Quaternions are x, y, z, w here and nowhere else.
 
@@ -29,9 +29,9 @@ struct TimeMsg {
 }
 
 #[derive(Serialize, Deserialize)]
-struct HeaderMsg<'a> {
+pub(super) struct HeaderMsg<'a> {
     stamp: TimeMsg,
-    frame_id: Cow<'a, str>,
+    pub frame_id: Cow<'a, str>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -91,7 +91,7 @@ impl QuaternionMsg {
 }
 
 impl<'a> HeaderMsg<'a> {
-    fn new(stamp_ns: i64, frame: &'a str) -> Result<Self, RecordingError> {
+    pub(super) fn new(stamp_ns: i64, frame: &'a str) -> Result<Self, RecordingError> {
         let (sec, nanosec) = (stamp_ns.div_euclid(NS_PER_S), stamp_ns.rem_euclid(NS_PER_S));
         match (i32::try_from(sec), u32::try_from(nanosec)) {
             (Ok(sec @ 0..), Ok(nanosec)) => Ok(Self { stamp: TimeMsg { sec, nanosec }, frame_id: frame.into() }),
@@ -99,7 +99,7 @@ impl<'a> HeaderMsg<'a> {
         }
     }
 
-    fn stamp_ns(&self) -> Result<i64, BadMessage> {
+    pub(super) fn stamp_ns(&self) -> Result<i64, BadMessage> {
         let nanosec = i64::from(self.stamp.nanosec);
         if nanosec < NS_PER_S { Ok(i64::from(self.stamp.sec) * NS_PER_S + nanosec) } else { Err(BadMessage::Stamp) }
     }
@@ -132,7 +132,7 @@ pub(super) fn decode_wrench(payload: &[u8]) -> Result<(Cow<'_, str>, StampedWren
     Ok((msg.header.frame_id, StampedWrench { stamp_ns, wrench }))
 }
 
-fn decode<'a, T: Deserialize<'a>>(payload: &'a [u8]) -> Result<T, BadMessage> {
+pub(super) fn decode<'a, T: Deserialize<'a>>(payload: &'a [u8]) -> Result<T, BadMessage> {
     let Some((&[0, order, _, _], body)) = payload.split_first_chunk() else {
         return Err(BadMessage::Malformed);
     };
@@ -170,7 +170,7 @@ pub(super) fn encode_wrench(wrench: &StampedWrench, frame: &str) -> Result<Vec<u
     })
 }
 
-fn encode<T: Serialize>(msg: &T) -> Result<Vec<u8>, RecordingError> {
+pub(super) fn encode<T: Serialize>(msg: &T) -> Result<Vec<u8>, RecordingError> {
     let mut payload = vec![0, 1, 0, 0];
     payload.extend(cdr_encoding::to_vec::<T, LittleEndian>(msg)?);
     Ok(payload)

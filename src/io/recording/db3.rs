@@ -32,7 +32,9 @@ pub(super) struct Db3Reader {
     /// Holds the unpacked file while it is read.
     _unpacked: Option<NamedTempFile>,
     topics: Vec<TopicInfo>,
-    /// Row of each topic in the table `topics`.
+    /// What is read.
+    kinds: [Kind; 2],
+    /// Row of each of them in the table `topics`.
     ids: [Option<i64>; 2],
     rows: VecDeque<Message>,
     current: Vec<u8>,
@@ -68,7 +70,8 @@ impl Db3Reader {
         Ok(Self {
             path: path.to_owned(),
             truncated: failed.is_some() || has_unmerged_part(path),
-            ids: Kind::ALL.map(id_of),
+            kinds: topics.kinds(),
+            ids: topics.kinds().map(id_of),
             db,
             _unpacked: unpacked,
             topics: rows.into_iter().map(|(_, info)| info).collect(),
@@ -129,7 +132,7 @@ impl Db3Reader {
         let (time, id) = self.last;
         let mut rows = statement.query(params![MAX_MESSAGE_BYTES as i64, pose, wrench, time, id, BATCH_ROWS as i64])?;
         while let Some(row) = rows.next()? {
-            let message = read_message(row, pose)?;
+            let message = read_message(row, pose, self.kinds)?;
             let key = (message.timestamp, message.id);
             if key <= self.last {
                 return Err(Damage::RowOrder);
@@ -142,8 +145,8 @@ impl Db3Reader {
     }
 }
 
-fn read_message(row: &Row, pose: Option<i64>) -> rusqlite::Result<Message> {
-    let kind = if Some(row.get(2)?) == pose { Kind::Pose } else { Kind::Wrench };
+fn read_message(row: &Row, first: Option<i64>, kinds: [Kind; 2]) -> rusqlite::Result<Message> {
+    let kind = if Some(row.get(2)?) == first { kinds[0] } else { kinds[1] };
     // text, a number or NULL in place of the blob: an empty payload, which counts as malformed
     let payload = row.get_ref(3)?.as_blob().unwrap_or_default().to_vec();
     Ok(Message { id: row.get(0)?, timestamp: row.get(1)?, kind, payload })

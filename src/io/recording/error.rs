@@ -212,6 +212,8 @@ pub enum BadMessage {
     Stamp,
     /// A quaternion whose norm is not finite or not within 1 ± 0.01.
     Quaternion,
+    /// A point cloud without x, y and z, or whose sizes do not fit its data.
+    Cloud,
     /// The header names another frame than the first message of the topic did.
     FrameChanged,
 }
@@ -223,6 +225,7 @@ impl BadMessage {
             Self::Malformed => "malformed_message",
             Self::Stamp => "bad_stamp",
             Self::Quaternion => "bad_quaternion",
+            Self::Cloud => "bad_cloud",
             Self::FrameChanged => "frame_changed",
         }
     }
@@ -237,7 +240,7 @@ impl fmt::Display for BadMessage {
 /// How many messages were left out for one reason.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BadCount {
-    /// on the pose topic
+    /// on the topic of poses or markers
     pub poses: u64,
     /// on the wrench topic
     pub wrenches: u64,
@@ -253,7 +256,7 @@ pub(super) fn check_topics(
     topics: &super::Topics,
     found: &[TopicInfo],
 ) -> Result<(), RecordingError> {
-    for kind in Kind::ALL {
+    for kind in topics.kinds() {
         let topic = topics.name(kind);
         let Some(info) = found.iter().find(|info| info.name == topic) else {
             return Err(RecordingError::MissingTopic {

@@ -278,7 +278,7 @@ impl Described {
     }
 
     fn has(&self, topics: &Topics) -> bool {
-        Kind::ALL.into_iter().all(|kind| self.channels.values().any(|info| info.name == topics.name(kind)))
+        topics.kinds().into_iter().all(|kind| self.channels.values().any(|info| info.name == topics.name(kind)))
     }
 }
 

@@ -1,5 +1,6 @@
 //! ROS 2 recordings of a touch: poses (`geometry_msgs/msg/PoseStamped`) and wrenches
-//! (`geometry_msgs/msg/WrenchStamped`), read from MCAP and rosbag2 SQLite files, written as MCAP.
+//! (`geometry_msgs/msg/WrenchStamped`), or in place of the poses the markers on the stylus
+//! (`sensor_msgs/msg/PointCloud2`), read from MCAP and rosbag2 SQLite files, written as MCAP.
 //!
 //! Both deal in [`crate::touch::Message`]s, stamped as the message headers are. [`RecordingReader`] streams: its memory
 //! does not grow with the recording, and no length found in a file is believed before it is checked.
@@ -11,6 +12,7 @@ mod db3;
 mod error;
 mod framing;
 mod mcap;
+mod point_cloud;
 mod reader;
 mod writer;
 
@@ -21,19 +23,49 @@ pub use writer::{RecordingWriter, write_recording};
 /// What a zstd frame begins with: a file compressed as a whole, or a message (CDR begins with 0).
 const ZSTD_MAGIC: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
 
-/// Names of the two topics that make a touch.
+use crate::touch::{MarkerFrame, Message};
+
+/// One entry of a recording.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Record {
+    /// A pose or a wrench.
+    Message(Message),
+    /// The markers that were seen at one instant.
+    Markers(Box<MarkerFrame>),
+}
+
+impl From<Message> for Record {
+    fn from(message: Message) -> Self {
+        Self::Message(message)
+    }
+}
+
+impl Record {
+    /// Time of measurement, ns.
+    pub fn stamp_ns(&self) -> i64 {
+        match self {
+            Self::Message(message) => message.stamp_ns(),
+            Self::Markers(frame) => frame.stamp_ns,
+        }
+    }
+}
+
+/// Names of the topics that make a touch.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Topics {
     /// `geometry_msgs/msg/PoseStamped`: tip T in the object frame O, m.
     pub pose: String,
     /// `geometry_msgs/msg/WrenchStamped`: what the object does to the stylus, N and N·m.
     pub wrench: String,
+    /// `sensor_msgs/msg/PointCloud2`: the markers on the stylus in O, m. When it is named it is read in place of the
+    /// pose, and written beside it.
+    pub markers: Option<String>,
 }
 
 impl Default for Topics {
-    /// `/stylus/pose` and `/stylus/wrench`.
+    /// `/stylus/pose` and `/stylus/wrench`, no markers.
     fn default() -> Self {
-        Self { pose: "/stylus/pose".into(), wrench: "/stylus/wrench".into() }
+        Self { pose: "/stylus/pose".into(), wrench: "/stylus/wrench".into(), markers: None }
     }
 }
 
@@ -42,28 +74,34 @@ impl Topics {
         match kind {
             Kind::Pose => &self.pose,
             Kind::Wrench => &self.wrench,
+            Kind::Markers => self.markers.as_deref().unwrap_or_default(),
         }
     }
 
+    /// The two that are read: what tells the pose, and the wrench.
+    fn kinds(&self) -> [Kind; 2] {
+        [if self.markers.is_some() { Kind::Markers } else { Kind::Pose }, Kind::Wrench]
+    }
+
     fn kind_of(&self, name: &str) -> Option<Kind> {
-        Kind::ALL.into_iter().find(|kind| self.name(*kind) == name)
+        self.kinds().into_iter().find(|kind| self.name(*kind) == name)
     }
 }
 
-/// Which of the two topics.
+/// Which of the topics.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Kind {
     Pose,
     Wrench,
+    Markers,
 }
 
 impl Kind {
-    const ALL: [Self; 2] = [Self::Pose, Self::Wrench];
-
     fn type_name(self) -> &'static str {
         match self {
             Self::Pose => "geometry_msgs/msg/PoseStamped",
             Self::Wrench => "geometry_msgs/msg/WrenchStamped",
+            Self::Markers => "sensor_msgs/msg/PointCloud2",
         }
     }
 
@@ -71,6 +109,7 @@ impl Kind {
         match self {
             Self::Pose => "--pose-topic",
             Self::Wrench => "--wrench-topic",
+            Self::Markers => "--markers-topic",
         }
     }
 }

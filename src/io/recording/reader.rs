@@ -13,7 +13,8 @@ use super::cdr::{decode_pose, decode_wrench, unpack};
 use super::db3::{self, Db3Reader};
 use super::error::{BadCount, check_topics};
 use super::mcap::{self, McapReader};
-use super::{BadMessage, Kind, RawMessage, RecordingError, TopicInfo, Topics, ZSTD_MAGIC};
+use super::point_cloud::decode_markers;
+use super::{BadMessage, Kind, RawMessage, Record, RecordingError, TopicInfo, Topics, ZSTD_MAGIC};
 use crate::touch::Message;
 
 const ROS1_MAGIC: &[u8] = b"#ROSBAG V";
@@ -28,7 +29,7 @@ const MAX_METADATA_BYTES: u64 = 16 << 20;
 ///
 /// Positions, forces and torques may be NaN or absurd; rotations are unit quaternions. A message that cannot be used is
 /// left out and counted in [`Self::bad_messages`]. A file that is damaged is read up to the damage; then comes one last
-/// item, the error. Memory is bounded by the largest chunk, at most 256 MiB packed and as much unpacked.
+/// item, the error. The iterator gives poses and wrenches; [`Self::next_record`] also markers. Memory is bounded by the largest chunk, at most 256 MiB packed and as much unpacked.
 ///
 /// ```no_run
 /// use touchup::io::recording::{RecordingReader, Topics};
@@ -80,14 +81,14 @@ impl RecordingReader {
         self.message_count
     }
 
-    /// Frame of the poses: the object frame O. `None` before the first pose.
+    /// Frame of the poses, or of the markers: the object frame O. `None` before the first.
     pub fn pose_frame(&self) -> Option<&str> {
-        self.intake.frame(Kind::Pose)
+        self.intake.pose_frame.as_deref()
     }
 
     /// Frame in which the wrenches are expressed. `None` before the first wrench.
     pub fn wrench_frame(&self) -> Option<&str> {
-        self.intake.frame(Kind::Wrench)
+        self.intake.wrench_frame.as_deref()
     }
 
     /// Messages left out so far, and where the first of each reason is.
@@ -134,12 +135,21 @@ impl RecordingReader {
         self.rest.clear();
     }
 
-    fn advance(&mut self) -> Result<Option<Message>, RecordingError> {
+    /// The next pose, wrench or frame of markers; after damage the error, then `None`.
+    pub fn next_record(&mut self) -> Option<Result<Record, RecordingError>> {
+        let next = self.advance();
+        if next.is_err() {
+            self.stop();
+        }
+        next.transpose()
+    }
+
+    fn advance(&mut self) -> Result<Option<Record>, RecordingError> {
         loop {
             let Some(source) = &mut self.source else { return Ok(None) };
             if let Some(raw) = source.next_message()? {
-                if let Some(message) = self.intake.accept(&raw, &self.path) {
-                    return Ok(Some(message));
+                if let Some(record) = self.intake.accept(&raw, &self.path) {
+                    return Ok(Some(record));
                 }
                 continue;
             }
@@ -156,11 +166,13 @@ impl Iterator for RecordingReader {
     type Item = Result<Message, RecordingError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        let next = self.advance();
-        if next.is_err() {
-            self.stop();
+        loop {
+            match self.next_record()? {
+                Ok(Record::Message(message)) => return Some(Ok(message)),
+                Ok(Record::Markers(_)) => {}
+                Err(error) => return Some(Err(error)),
+            }
         }
-        next.transpose()
     }
 }
 
@@ -175,21 +187,14 @@ struct Intake {
 }
 
 impl Intake {
-    fn frame(&self, kind: Kind) -> Option<&str> {
-        match kind {
-            Kind::Pose => self.pose_frame.as_deref(),
-            Kind::Wrench => self.wrench_frame.as_deref(),
-        }
-    }
-
-    fn accept(&mut self, raw: &RawMessage, path: &Path) -> Option<Message> {
+    fn accept(&mut self, raw: &RawMessage, path: &Path) -> Option<Record> {
         match self.decode(raw) {
-            Ok(message) => Some(message),
+            Ok(record) => Some(record),
             Err(reason) => {
                 let first = BadCount { poses: 0, wrenches: 0, path: path.to_owned(), place: raw.place };
                 let bad = self.bad.entry(reason).or_insert(first);
                 match raw.kind {
-                    Kind::Pose => bad.poses += 1,
+                    Kind::Pose | Kind::Markers => bad.poses += 1,
                     Kind::Wrench => bad.wrenches += 1,
                 }
                 None
@@ -197,16 +202,20 @@ impl Intake {
         }
     }
 
-    fn decode(&mut self, raw: &RawMessage) -> Result<Message, BadMessage> {
+    fn decode(&mut self, raw: &RawMessage) -> Result<Record, BadMessage> {
         let payload = unpack(raw.payload)?;
         match raw.kind {
             Kind::Pose => {
                 let (frame, pose) = decode_pose(&payload)?;
-                same_frame(&mut self.pose_frame, frame).map(|()| Message::Pose(pose))
+                same_frame(&mut self.pose_frame, frame).map(|()| Message::Pose(pose).into())
             }
             Kind::Wrench => {
                 let (frame, wrench) = decode_wrench(&payload)?;
-                same_frame(&mut self.wrench_frame, frame).map(|()| Message::Wrench(wrench))
+                same_frame(&mut self.wrench_frame, frame).map(|()| Message::Wrench(wrench).into())
+            }
+            Kind::Markers => {
+                let (frame, markers) = decode_markers(&payload)?;
+                same_frame(&mut self.pose_frame, frame).map(|()| Record::Markers(Box::new(markers)))
             }
         }
     }

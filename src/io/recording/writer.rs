@@ -9,7 +9,8 @@ use ::mcap::write::Writer;
 use ::mcap::{Compression, McapError, WriteOptions};
 
 use super::cdr::{encode_pose, encode_wrench};
-use super::{Kind, RecordingError, Topics};
+use super::point_cloud::{POINT_CLOUD, POINT_FIELD, encode_markers};
+use super::{Kind, Record, RecordingError, Topics};
 use crate::io::atomic::AtomicFile;
 use crate::touch::Message;
 
@@ -34,6 +35,7 @@ fn definition(kind: Kind) -> String {
     let (mut text, parts) = match kind {
         Kind::Pose => (POSE_STAMPED.to_owned(), [HEADER, TIME, POSE, POINT, QUATERNION].as_slice()),
         Kind::Wrench => (WRENCH_STAMPED.to_owned(), [HEADER, TIME, WRENCH, VECTOR3].as_slice()),
+        Kind::Markers => (POINT_CLOUD.to_owned(), [HEADER, TIME, POINT_FIELD].as_slice()),
     };
     for (name, fields) in parts {
         text.push_str(&format!("{RULE}\nMSG: {name}\n{fields}"));
@@ -41,7 +43,7 @@ fn definition(kind: Kind) -> String {
     text
 }
 
-/// Writes poses and wrenches into an MCAP file: zstd chunks, CDR messages, index at the end.
+/// Writes poses, wrenches and, when [`Topics::markers`] is named, markers into an MCAP file: zstd chunks, CDR messages, index at the end.
 ///
 /// Log and publish time are the stamp of the message, so messages should come in the order of their stamps. The same
 /// messages give the same bytes.
@@ -49,6 +51,7 @@ pub struct RecordingWriter<W: Write + Seek> {
     mcap: Writer<W>,
     pose: Channel,
     wrench: Channel,
+    markers: Option<Channel>,
 }
 
 struct Channel {
@@ -60,7 +63,7 @@ struct Channel {
 impl<W: Write + Seek> RecordingWriter<W> {
     /// Begins a recording.
     ///
-    /// - `pose_frame`: name of the object frame O; `wrench_frame`: name of the frame the wrenches are expressed in.
+    /// - `pose_frame`: name of the object frame O, which poses and markers are in; `wrench_frame`: name of the frame the wrenches are expressed in.
     ///
     /// # Errors
     /// [`RecordingError::Write`] when `out` cannot be written.
@@ -74,7 +77,9 @@ impl<W: Write + Seek> RecordingWriter<W> {
         let mut mcap = options.create(out)?;
         let pose = add_channel(&mut mcap, topics, Kind::Pose, pose_frame)?;
         let wrench = add_channel(&mut mcap, topics, Kind::Wrench, wrench_frame)?;
-        Ok(Self { mcap, pose, wrench })
+        let wanted = topics.markers.iter();
+        let markers = wanted.map(|_| add_channel(&mut mcap, topics, Kind::Markers, pose_frame)).next().transpose()?;
+        Ok(Self { mcap, pose, wrench, markers })
     }
 
     /// Appends one message.
@@ -82,11 +87,23 @@ impl<W: Write + Seek> RecordingWriter<W> {
     /// # Errors
     /// [`RecordingError::Stamp`] when its stamp does not fit a ROS 2 message; [`RecordingError::Write`].
     pub fn write(&mut self, message: &Message) -> Result<(), RecordingError> {
-        let (payload, channel) = match message {
-            Message::Pose(pose) => (encode_pose(pose, &self.pose.frame)?, &mut self.pose),
-            Message::Wrench(wrench) => (encode_wrench(wrench, &self.wrench.frame)?, &mut self.wrench),
+        self.write_record(&Record::Message(*message))
+    }
+
+    /// Appends one message or frame of markers; markers without a topic are left out.
+    ///
+    /// # Errors
+    /// As [`Self::write`].
+    pub fn write_record(&mut self, record: &Record) -> Result<(), RecordingError> {
+        let (payload, channel) = match record {
+            Record::Message(Message::Pose(pose)) => (encode_pose(pose, &self.pose.frame)?, &mut self.pose),
+            Record::Message(Message::Wrench(wrench)) => (encode_wrench(wrench, &self.wrench.frame)?, &mut self.wrench),
+            Record::Markers(frame) => {
+                let Some(channel) = &mut self.markers else { return Ok(()) };
+                (encode_markers(frame, &channel.frame)?, channel)
+            }
         };
-        let stamp_ns = message.stamp_ns();
+        let stamp_ns = record.stamp_ns();
         let time = u64::try_from(stamp_ns).map_err(|_| RecordingError::Stamp { stamp_ns })?;
         let sequence = channel.sequence;
         channel.sequence = sequence.wrapping_add(1);
@@ -125,13 +142,13 @@ pub fn write_recording(
     topics: &Topics,
     pose_frame: &str,
     wrench_frame: &str,
-    messages: impl IntoIterator<Item = Message>,
+    records: impl IntoIterator<Item = impl Into<Record>>,
 ) -> Result<(), RecordingError> {
     let io = |source| RecordingError::Io { path: path.to_owned(), source };
     let mut file = AtomicFile::create(path).map_err(io)?;
     let write = || {
         let mut writer = RecordingWriter::new(&mut file, topics, pose_frame, wrench_frame)?;
-        messages.into_iter().try_for_each(|message| writer.write(&message))?;
+        records.into_iter().try_for_each(|record| writer.write_record(&record.into()))?;
         writer.finish().map(drop)
     };
     write().map_err(|error| match error {

@@ -1,0 +1,147 @@
+//! What a replay tells of clock and registration: offered in the summary, never applied unasked.
+
+use std::fmt;
+
+use nalgebra::Vector6;
+use serde::Serialize;
+
+use crate::refine::{
+    RefineParams, Registrar, Registration, RegistrationError, RegistrationParams, SlidingParams, TipMotion,
+};
+use crate::touch::{ClockOffset, ContactGate, SettingError, Tip};
+
+/// What the clock of the wrench reads beyond that of the pose; never applied unasked.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(super) struct WrenchOffset {
+    /// the whole of it: what the scene has and what was found
+    pub wrench_offset_ms: f64,
+    /// standard uncertainty
+    pub sigma_ms: f64,
+    /// onsets of contact that it comes from
+    pub onsets: usize,
+}
+
+impl WrenchOffset {
+    /// - `applied_ns`: what the scene takes off already.
+    pub fn of(found: &ClockOffset, applied_ns: i64) -> Self {
+        Self {
+            wrench_offset_ms: found.offset * 1e3 + applied_ns as f64 * 1e-6,
+            sigma_ms: found.sigma * 1e3,
+            onsets: found.onsets,
+        }
+    }
+}
+
+impl fmt::Display for WrenchOffset {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { wrench_offset_ms, sigma_ms, onsets } = self;
+        write!(
+            f,
+            "the wrench seems to read {wrench_offset_ms:+.1} ± {sigma_ms:.1} ms beyond the pose, by {onsets} onsets of \
+             contact (sync.wrench_offset_ms; not applied)"
+        )
+    }
+}
+
+/// What would move the scan onto the contacts; never applied unasked.
+#[derive(Clone, Debug, Serialize)]
+#[serde(untagged)]
+pub(super) enum ScanOffset {
+    Found {
+        /// of the middle of the contacts, and its standard uncertainty
+        shift_mm: [f64; 3],
+        shift_sigma_mm: [f64; 3],
+        /// rotation vector about that, and its standard uncertainty
+        turn_deg: [f64; 3],
+        turn_sigma_deg: [f64; 3],
+        /// by how much the scan is too fat
+        fatness_mm: f64,
+        fatness_sigma_mm: f64,
+        /// the middle of the contacts
+        centre_mm: [f64; 3],
+    },
+    Refused {
+        refused: String,
+    },
+}
+
+impl ScanOffset {
+    pub fn of(found: Result<Registration, RegistrationError>) -> Self {
+        let Registration { twist, covariance, centre, fatness, .. } = match found {
+            Ok(found) => found,
+            Err(refused) => return Self::Refused { refused: refused.to_string() },
+        };
+        let sigma = covariance.diagonal().map(f64::sqrt);
+        let three = |v: &Vector6<f64>, first: usize, unit: f64| [0, 1, 2].map(|axis| v[first + axis] * unit);
+        Self::Found {
+            shift_mm: three(&twist, 0, 1e3),
+            shift_sigma_mm: three(&sigma, 0, 1e3),
+            turn_deg: three(&twist, 3, 1f64.to_degrees()),
+            turn_sigma_deg: three(&sigma, 3, 1f64.to_degrees()),
+            fatness_mm: fatness[0] * 1e3,
+            fatness_sigma_mm: fatness[1] * 1e3,
+            centre_mm: [centre.x, centre.y, centre.z].map(|x| x * 1e3),
+        }
+    }
+}
+
+impl fmt::Display for ScanOffset {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let pairs = |values: &[f64; 3], sigmas: &[f64; 3]| {
+            values.iter().zip(sigmas).map(|(x, s)| format!("{x:+.3} ± {s:.3}")).collect::<Vec<_>>().join(", ")
+        };
+        match self {
+            Self::Refused { refused } => write!(f, "not told: {refused}"),
+            Self::Found {
+                shift_mm, shift_sigma_mm, turn_deg, turn_sigma_deg, fatness_mm, fatness_sigma_mm, ..
+            } => {
+                write!(f, "shift ({}) mm, ", pairs(shift_mm, shift_sigma_mm))?;
+                write!(f, "turn ({})°, ", pairs(turn_deg, turn_sigma_deg))?;
+                write!(f, "too fat by {fatness_mm:+.3} ± {fatness_sigma_mm:.3} mm; not applied")
+            }
+        }
+    }
+}
+
+/// Where the part was touched, for the registration.
+pub(super) struct ContactPoints {
+    pub registrar: Registrar,
+    motion: TipMotion,
+    gate: ContactGate,
+    sliding: SlidingParams,
+    radius: f64,
+    last_ns: Option<i64>,
+}
+
+/// A pause after which the motion of the ball is not known, s.
+const LONGEST_PAUSE: f64 = 0.03;
+
+impl ContactPoints {
+    pub fn new(params: &RefineParams) -> Result<Self, SettingError> {
+        let sliding = params.sliding.unwrap_or_default();
+        Ok(Self {
+            registrar: Registrar::new(RegistrationParams {
+                scan_noise: params.scan_noise,
+                ..RegistrationParams::default()
+            })?,
+            motion: TipMotion::new(sliding, params.tip),
+            gate: ContactGate::new(params.gate.unwrap_or_default())?,
+            sliding,
+            radius: params.tip.radius,
+            last_ns: None,
+        })
+    }
+
+    pub fn push(&mut self, tip: &Tip) {
+        let dt = self.last_ns.map_or(0.0, |last_ns| (tip.stamp_ns - last_ns) as f64 * 1e-9);
+        self.last_ns = Some(tip.stamp_ns);
+        let ball = self.motion.update(tip, dt, LONGEST_PAUSE);
+        if self.gate.update(tip.stamp_ns, &ball.force_o).is_none() {
+            return self.motion.lift();
+        }
+        let normal = self.motion.surface_normal(&ball, dt.min(LONGEST_PAUSE));
+        if ball.velocity.norm() > self.sliding.slowest {
+            self.registrar.push(&(ball.centre - normal * self.radius), &normal);
+        }
+    }
+}
