@@ -78,7 +78,8 @@ fn a_varying_force_draws_no_ripples_but_does_in_paper_mode() {
     let point = TipParams { radius: 0.0, stiffness: None };
     for tip in [point, TipParams { radius: RADIUS, ..point }] {
         let [lo, _, hi] = after_waves(tip, RefineParams::robust(tip));
-        assert!(lo.abs() < 1e-9 && hi.abs() < 1e-9, "the plate is true and stays so: {lo:e} {hi:e} m");
+        // friction is known to a few thousandths only, so that a normal may be 0.3° off and a corner of a face 6 µm
+        assert!(lo.abs() < 1e-5 && hi.abs() < 1e-5, "the plate is true and stays so: {lo:e} {hi:e} m");
     }
     let [lo, mean, hi] = after_waves(point, RefineParams::paper(point));
     // a face floats by 1.40 mm where 1 N was felt last and by 2.30 mm where it was 4 N; then lower neighbours are nearer

@@ -18,7 +18,10 @@ const TIE_COORDINATE: f64 = 4.0 * f64::EPSILON;
 const TIE_DIAGONAL: f64 = 2.0 * f64::EPSILON;
 /// The same for the distance, see [`TIE_COORDINATE`].
 const TIE_DISTANCE: f64 = 3.0 * f64::EPSILON;
-/// What cancellation may take from the precision of a squared height, where the angle is not below [`NEEDLE`].
+/// By how much the triple product (ab × ac)·ap is rounded, as a share of |ab| |ac| |ap|: 2 ε for each component of the
+/// cross product and 3 ε for the sum, √3 of it in length; 16 ε to be sure.
+const HEIGHT_ROUNDING: f64 = 16.0 * f64::EPSILON;
+/// What the quotient of two squares may lose beside that.
 const PLANE_MARGIN: f64 = 1e-6;
 /// Squared sine of the least angle at which a normal is trusted: 0.06°.
 const NEEDLE: f64 = 1e-6;
@@ -262,11 +265,14 @@ fn beyond(limit: f64, slack: f64) -> f32 {
 /// most faces that a query meets.
 #[inline]
 fn is_plane_beyond(p: &Point3<f64>, [a, b, c]: &[Point3<f64>; 3], limit: f64) -> bool {
-    let (ab, ac) = (b - a, c - a);
+    let (ab, ac, ap) = (b - a, c - a, p - a);
     let normal = ab.cross(&ac);
-    let (height, size) = (normal.dot(&(p - a)), normal.norm_squared());
+    let (height, size) = (normal.dot(&ap), normal.norm_squared());
+    let sides = ab.norm_squared() * ac.norm_squared();
+    // (√l + e)² ≤ l (1 + m) + e² (1 + 1/m)
+    let rounding = HEIGHT_ROUNDING * HEIGHT_ROUNDING * sides * ap.norm_squared() * (1.0 + 1.0 / PLANE_MARGIN);
     // the normal of a needle is mostly rounding
-    size > NEEDLE * ab.norm_squared() * ac.norm_squared() && height * height > limit * size * (1.0 + PLANE_MARGIN)
+    size > NEEDLE * sides && height * height > limit * size * (1.0 + PLANE_MARGIN) + rounding
 }
 
 /// |(p − point)·n|: how squarely `p` lies above or below the face that was hit.
