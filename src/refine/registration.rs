@@ -91,7 +91,7 @@ struct Mean {
 type Unknowns = SVector<f64, 7>;
 type Information = SMatrix<f64, 7, 7>;
 
-/// Collects contacts; so many means of them at most that memory is bounded.
+/// Collects contacts as the means of small cells, of which it keeps a bounded number.
 #[derive(Clone, Debug)]
 pub struct Registrar {
     params: RegistrationParams,
