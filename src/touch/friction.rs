@@ -76,6 +76,8 @@ pub struct Friction {
     /// how many stretches had a coefficient within each bin
     bins: [u32; BINS],
     known: Option<FrictionCoefficient>,
+    /// φ = atan μ and its standard deviation for one more place, rad
+    angle: [f64; 2],
 }
 
 /// A piece of sliding of which one coefficient is made.
@@ -113,7 +115,7 @@ impl Friction {
     ///
     /// - `widest`: angle of the widest friction cone believed, rad.
     pub fn new(widest: f64) -> Self {
-        Self { widest, stretch: Stretch::default(), bins: [0; BINS], known: None }
+        Self { widest, stretch: Stretch::default(), bins: [0; BINS], known: None, angle: USUAL_ANGLE }
     }
 
     /// Takes in what the ball did in contact during `dt` (s).
@@ -148,7 +150,7 @@ impl Friction {
     /// The normal under the ball; `None` without a force.
     pub fn normal(&self, sliding: &Sliding) -> Option<FeltNormal> {
         let along_force = sliding.force_o.try_normalize(0.0)?;
-        let [usual, usual_sigma] = self.angle();
+        let [usual, usual_sigma] = self.angle;
         let (speed, noise) = (sliding.velocity.norm(), sliding.velocity_sigma);
         let across_force = sliding.velocity - along_force * sliding.velocity.dot(&along_force);
         let across_speed = across_force.norm();
@@ -175,14 +177,6 @@ impl Friction {
         Some(FeltNormal { normal, sigma: variance.sqrt() })
     }
 
-    /// φ and its standard deviation for one more place, rad.
-    fn angle(&self) -> [f64; 2] {
-        self.known.map_or(USUAL_ANGLE, |known| {
-            let per_angle = 1.0 / (1.0 + known.mu * known.mu);
-            [known.mu.atan(), (known.spread.hypot(known.sigma) * per_angle).hypot(LEAST_SIGMA)]
-        })
-    }
-
     /// Counts a stretch of this sin φ.
     fn note(&mut self, sine: f64) {
         let sine = sine.clamp(0.0, std::f64::consts::FRAC_1_SQRT_2);
@@ -196,6 +190,8 @@ impl Friction {
             let spread = (high - low) / 1.349;
             let sigma = 1.2533 * spread / f64::from(stretches).sqrt();
             self.known = Some(FrictionCoefficient { mu, sigma, spread, stretches });
+            let per_angle = 1.0 / (1.0 + mu * mu);
+            self.angle = [mu.atan(), (spread.hypot(sigma) * per_angle).hypot(LEAST_SIGMA)];
         }
     }
 
