@@ -168,7 +168,7 @@ fn other_tips_hands_and_friction() {
             rim = rim.max(rim_length(&case.patched.mesh, &rims) - rim_length(&case.scan, &soundness(&case.scan).rims));
         }
         println!("{name:14} {:28.3} {:28.3} {:10.1}", worst[0], worst[1], rim * 1e3);
-        assert!(worst[0] < 0.06 && worst[1] < 0.12, "{name}: {worst:?}");
+        assert!(worst[0] < 0.06 && worst[1] < 0.25, "{name}: {worst:?}");
         // a ball that ends its way freely in the blind hole leaves that open too
         assert!(rim < 3.0 * through_ends(), "{name}: {rim}");
     }
