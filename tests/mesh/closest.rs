@@ -296,3 +296,19 @@ fn faces_at_one_place_are_all_searched() {
     tree.refit(&mesh, mesh.star(VertexId(0)));
     check_query(&mesh, &tree, &Point3::new(0.0, 0.0, 2.5));
 }
+
+/// Where the hint leaves no distance at all, rounding of a needle's normal must not lose its own corner.
+#[test]
+fn a_corner_of_a_needle_is_found_from_its_own_face() {
+    let mut rng = Pcg64::seed_from_u64(11);
+    for _ in 0..20_000 {
+        let [a, along, aside] = [0; 3].map(|_| point(&mut rng));
+        let corners = [a, a + along, a + along * 0.7 + aside * within(&mut rng, 2e-3, 2e-2)].map(Point3::from);
+        let mesh = TriMesh::new(corners.into(), vec![[0, 1, 2]]).unwrap();
+        let tree = FaceTree::new(&mesh);
+        for corner in corners {
+            let hit = tree.closest_from(&mesh, &corner, FaceId(0), f64::INFINITY);
+            assert_eq!(hit.map(|hit| hit.distance_squared), Some(0.0), "{corners:?} from {corner}");
+        }
+    }
+}
