@@ -95,13 +95,13 @@ def judged(run):
 
 @pytest.fixture(scope="module")
 def moved(run, tmp_path_factory):
-    """Each part by the haptic update alone: the scene without `patch`."""
+    """Each case by the haptic update alone: the scene without `patch`."""
     scene = tmp_path_factory.mktemp("scene") / "without_patch.yaml"
     sections = (ROOT / "config" / "default.yaml").read_text().split("\n\n")
     kept = [section for section in sections if "\npatch:" not in section]
     assert len(kept) == len(sections) - 1
     scene.write_text("\n\n".join(kept))
-    return {part: run(part, scene) for part in PARTS}
+    return {case: run(case, scene) for case in CASES}
 
 
 def table_of(found):
@@ -195,13 +195,21 @@ def test_the_haptic_update_alone_is_better_than_the_robust_baseline(moved, basel
     assert mean(moved[part].refined, direction) < float(baselines[part, "robust"][column])
 
 
+@pytest.mark.parametrize("direction", DIRECTIONS)
 @pytest.mark.parametrize("part", PARTS)
-def test_the_haptic_update_alone_keeps_the_faces_and_their_soundness(moved, part):
-    scan, refined = (verdict["health"] for verdict in moved[part][1:3])
+def test_the_haptic_update_alone_is_at_most_half_again_as_far_on_hard(moved, part, direction):
+    assert mean(moved[f"{part}_hard"].refined, direction) <= HARD * mean(moved[part].refined, direction)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_haptic_update_alone_keeps_the_faces_and_their_soundness(moved, case):
+    scan, refined = (verdict["health"] for verdict in moved[case][1:3])
     assert (refined["vertices"], refined["faces"]) == (scan["vertices"], scan["faces"])
     assert refined["flipped_faces"] <= scan["flipped_faces"]
     assert refined["self_intersecting_faces"] == 0
-    assert moved[part].summary["patch"] is None
+    assert refined["zero_area"] == 0
+    assert refined["nonmanifold_edges"] <= scan["nonmanifold_edges"]
+    assert moved[case].summary["patch"] is None
 
 
 @pytest.mark.parametrize("direction", DIRECTIONS)
