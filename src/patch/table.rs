@@ -1,4 +1,5 @@
-//! A small map that keeps the order in which keys came, so that walking it never depends on hashing.
+//! A small map that keeps the order in which keys came, as long as none goes, so that walking it never depends on
+//! hashing.
 
 /// What a [`Table`] can look up.
 pub trait Key: Copy + Eq {
@@ -56,10 +57,15 @@ impl<K: Key, V> Table<K, V> {
 
     /// Fibonacci hashing: the high bits of a product are well mixed.
     #[inline]
+    fn first_slot(&self, key: &K) -> usize {
+        let hash = key.bits().wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        (hash >> (u64::BITS - self.slots.len().trailing_zeros())) as usize
+    }
+
+    #[inline]
     fn slot(&self, key: &K) -> usize {
         let mask = self.slots.len() - 1;
-        let hash = key.bits().wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        let mut at = (hash >> (u64::BITS - self.slots.len().trailing_zeros())) as usize;
+        let mut at = self.first_slot(key);
         while self.slots[at] != EMPTY && self.entries[self.slots[at] as usize].0 != *key {
             at = (at + 1) & mask;
         }
@@ -123,6 +129,41 @@ impl<K: Key, V> Table<K, V> {
         }
     }
 
+    /// Takes `key` out; the key that came last takes its number. Returns its value.
+    pub fn remove(&mut self, key: &K) -> Option<V> {
+        let slot = self.slot(key);
+        let at = self.slots[slot];
+        if at == EMPTY {
+            return None;
+        }
+        self.vacate(slot);
+        let last = self.entries.len() as u32 - 1;
+        if at != last {
+            let of_last = self.slot(&self.entries[last as usize].0);
+            self.slots[of_last] = at;
+        }
+        Some(self.entries.swap_remove(at as usize).1)
+    }
+
+    /// Empties a slot, and brings what was put off because of it nearer to where it belongs.
+    fn vacate(&mut self, mut hole: usize) {
+        let mask = self.slots.len() - 1;
+        let mut at = hole;
+        loop {
+            at = (at + 1) & mask;
+            if self.slots[at] == EMPTY {
+                break;
+            }
+            let wanted = self.first_slot(&self.entries[self.slots[at] as usize].0);
+            // the entry may move back to the hole unless its first slot lies behind it
+            if (at.wrapping_sub(wanted) & mask) >= (at.wrapping_sub(hole) & mask) {
+                self.slots[hole] = self.slots[at];
+                hole = at;
+            }
+        }
+        self.slots[hole] = EMPTY;
+    }
+
     fn grow(&mut self) {
         self.slots = vec![EMPTY; 2 * self.slots.len()];
         for at in 0..self.entries.len() {
@@ -167,5 +208,28 @@ mod tests {
             table.insert([-3, -7, 7000], 8);
             assert_eq!((table.get(&[-3, -7, 7000]), table.len()), (Some(&8), 1000));
         }
+    }
+
+    /// Beside the standard library's map, over keys of which many share their first slots.
+    #[test]
+    fn what_was_taken_out_is_gone_and_the_rest_stays() {
+        let mut table = Table::default();
+        let mut map = std::collections::BTreeMap::new();
+        let mut state = 7u64;
+        for step in 0..20_000u32 {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            let key = [(state >> 40) as i32 % 12, (state >> 50) as i32 % 9, 0];
+            if state >> 63 == 0 {
+                assert_eq!(table.remove(&key), map.remove(&key), "step {step}");
+            } else {
+                table.insert(key, step);
+                map.insert(key, step);
+            }
+            assert_eq!(table.len(), map.len());
+        }
+        let mut rest: Vec<_> = table.iter().map(|(key, value)| (key, *value)).collect();
+        rest.sort_unstable();
+        assert!(rest.into_iter().eq(map));
+        assert!((0..12).all(|x| (0..9).all(|y| table.get(&[x, y, 0]).is_some() == table.contains(&[x, y, 0]))));
     }
 }
