@@ -40,6 +40,7 @@ fn case(stylus: &StylusParams, seed: u64) -> Case {
     }
     sync.finish();
     std::iter::from_fn(|| sync.next_sample()).for_each(|sample| patcher.push(&sample));
+    patcher.flush();
     let patched = patcher.patched(&scan, &FaceTree::new(&scan)).unwrap();
     let contact_points = |moment: &Moment| moment.contacts.iter().map(|contact| contact.point).collect::<Vec<_>>();
     let contacts = touch.moments.iter().step_by(7).flat_map(contact_points).collect();

@@ -251,6 +251,7 @@ fn a_replay_equals_the_first_run_byte_for_byte() {
     }
     sync.finish();
     take(&mut sync);
+    patcher.flush();
     let Patched { mesh, support, .. } = patcher.patched(&scan, &FaceTree::new(&scan)).unwrap();
     let touched = |support: &Support| match support {
         Support::Touched => 1.0,

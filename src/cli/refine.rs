@@ -325,6 +325,7 @@ impl RefineArguments {
     fn write_patched(&self, mut patcher: Patcher, scan: &TriMesh) -> Result<(u64, Option<PatchSummary>), CliError> {
         let _patching = Progress::stage("mesh anew");
         let (started, wanted) = (Instant::now(), patcher.params().pitch);
+        patcher.flush();
         let patched = patcher.patched(scan, &FaceTree::new(scan))?;
         if patched.pitch > wanted {
             let (pitch_mm, wanted_mm) = (patched.pitch * 1e3, wanted * 1e3);

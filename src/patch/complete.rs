@@ -6,6 +6,7 @@
 
 use super::evidence::Source;
 use super::lattice::{Node, stepped};
+use super::table::Table;
 use super::restore::{NodeState, Restored, cell_at, node_at};
 
 /// Settings of [`complete`].
@@ -16,7 +17,7 @@ pub(super) struct CompleteParams {
     /// changes below this end the relaxation, m
     enough: f64,
     /// a hole without a bottom is opened this far around where the ball left it, in cells
-    end_reach: i32,
+    pub end_reach: i32,
 }
 
 impl CompleteParams {
@@ -38,24 +39,21 @@ const END_REACH: f64 = 3.0;
 /// No neighbour.
 const NONE: u32 = u32::MAX;
 
-/// Fills in what is not known, then gives up what nothing holds in its place.
-pub(super) fn complete(restored: &mut Restored, params: &CompleteParams) {
-    relax(restored, params);
-    if drop_islands(restored) {
-        relax(restored, params);
+/// Fills in what is not known among the nodes `at`, then gives up what nothing holds in its place; what is around them
+/// stays as it is.
+pub(super) fn complete(restored: &mut Restored, at: &[u32], params: &CompleteParams) {
+    relax(restored, at, params);
+    if drop_islands(restored, at) {
+        relax(restored, at, params);
     }
-    open_ends(restored, params.end_reach);
-}
-
-fn is_open_question(state: &NodeState) -> bool {
-    matches!(state.source, Source::Nothing | Source::Far)
 }
 
 /// Successive over-relaxation, from below by the space that the ball went through.
-fn relax(restored: &mut Restored, params: &CompleteParams) {
-    let open: Vec<(u32, [u32; 6])> = (0..restored.nodes.len() as u32)
-        .filter(|&at| is_open_question(&restored.nodes.entry(at).1))
-        .map(|at| (at, neighbours(restored, at)))
+fn relax(restored: &mut Restored, at: &[u32], params: &CompleteParams) {
+    let open: Vec<(u32, [u32; 6])> = at
+        .iter()
+        .filter(|&&at| restored.nodes.entry(at).1.is_open_question())
+        .map(|&at| (at, neighbours(restored, at)))
         .collect();
     for _ in 0..SWEEPS {
         let mut largest = 0.0f64;
@@ -93,16 +91,18 @@ fn neighbours(restored: &Restored, at: u32) -> [u32; 6] {
 
 /// Gives up material and void that nothing holds in its place: a piece of one sign, within the nodes looked at, that was
 /// neither touched nor swept. Returns whether there was any.
-fn drop_islands(restored: &mut Restored) -> bool {
-    let mut is_seen = vec![false; restored.nodes.len()];
+fn drop_islands(restored: &mut Restored, at: &[u32]) -> bool {
+    let mut seen = vec![Seen::Outside; restored.nodes.len()];
+    at.iter().for_each(|&at| seen[at as usize] = Seen::NotYet);
     let (mut island, mut has_dropped) = (Vec::new(), false);
-    for start in 0..restored.nodes.len() as u32 {
-        if std::mem::replace(&mut is_seen[start as usize], true) {
+    for &start in at {
+        if seen[start as usize] != Seen::NotYet {
             continue;
         }
+        seen[start as usize] = Seen::Yes;
         island.clear();
         island.push(start);
-        if !is_held(restored, &mut island, &mut is_seen) {
+        if !is_held(restored, &mut island, &mut seen) {
             has_dropped = true;
             for &at in &island {
                 let state = restored.nodes.value_mut(at);
@@ -113,8 +113,17 @@ fn drop_islands(restored: &mut Restored) -> bool {
     has_dropped
 }
 
-/// Gathers the piece of one sign around its first node; whether evidence or the rim of what was looked at holds it.
-fn is_held(restored: &Restored, piece: &mut Vec<u32>, is_seen: &mut [bool]) -> bool {
+/// Whether a node was met while pieces are gathered.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Seen {
+    /// it is not among those looked at
+    Outside,
+    NotYet,
+    Yes,
+}
+
+/// Gathers the piece of one sign around its first node; whether evidence or what lies beyond those looked at holds it.
+fn is_held(restored: &Restored, piece: &mut Vec<u32>, seen: &mut [Seen]) -> bool {
     let (mut next, mut is_held) = (0, false);
     while let Some(&at) = piece.get(next) {
         next += 1;
@@ -124,7 +133,9 @@ fn is_held(restored: &Restored, piece: &mut Vec<u32>, is_seen: &mut [bool]) -> b
         is_held |= around.contains(&NONE);
         for other in around.into_iter().filter(|&other| other != NONE) {
             let is_same = (restored.nodes.entry(other).1.value < 0.0) == (state.value < 0.0);
-            if is_same && !std::mem::replace(&mut is_seen[other as usize], true) {
+            is_held |= is_same && seen[other as usize] == Seen::Outside;
+            if is_same && seen[other as usize] == Seen::NotYet {
+                seen[other as usize] = Seen::Yes;
                 piece.push(other);
             }
         }
@@ -132,21 +143,23 @@ fn is_held(restored: &Restored, piece: &mut Vec<u32>, is_seen: &mut [bool]) -> b
     is_held
 }
 
-/// Finds where a filled surface hangs on a ball that ended its way freely, and opens it up to the nearest evidence, within
+/// The cells in which a filled surface hangs on a ball that ended its way freely, from there to the nearest evidence within
 /// `reach` cells: a hole that the ball left at its far end has no bottom.
-fn open_ends(restored: &mut Restored, reach: i32) {
+pub(super) fn open_cells(restored: &Restored, ends: impl Iterator<Item = Node>, reach: i32) -> Table<Node, ()> {
     let is_end = |state: &NodeState| state.is_free_end && state.value <= state.least;
-    let ends = restored.nodes.iter().filter(|(_, state)| is_end(state)).map(|(node, _)| node);
+    let ends = ends.filter(|end| restored.nodes.get(end).is_some_and(is_end));
     let mut cells: Vec<(Node, Node)> =
         ends.flat_map(|end| (0..8).map(move |corner| (cell_at(end, corner), end))).collect();
+    let mut open = Table::default();
     let mut next = 0;
     while let Some(&(cell, end)) = cells.get(next) {
         next += 1;
         let is_near = (0..3).map(|i| (cell[i] - end[i]).pow(2)).sum::<i32>() <= reach * reach;
-        if is_near && is_unheld_surface(restored, cell) && restored.open.insert_with(cell, || ()).1 {
+        if is_near && is_unheld_surface(restored, cell) && open.insert_with(cell, || ()).1 {
             cells.extend((0..6).map(|i| (stepped(cell, i / 2, if i % 2 == 0 { 1 } else { -1 }), end)));
         }
     }
+    open
 }
 
 /// Whether the surface passes through a cell of which no corner is known.
@@ -154,7 +167,7 @@ fn is_unheld_surface(restored: &Restored, cell: Node) -> bool {
     let mut material = 0;
     for corner in 0..8 {
         let Some(state) = restored.nodes.get(&node_at(cell, corner)) else { return false };
-        if !is_open_question(state) {
+        if !state.is_open_question() {
             return false;
         }
         material += u8::from(state.value < 0.0);

@@ -41,6 +41,8 @@ struct Sums {
     point: Vector3<f64>,
     normal: Vector3<f64>,
     weight: f64,
+    /// whether it stands in [`ContactStore::changed`]
+    is_noted: bool,
 }
 
 /// Contacts, by place and facing.
@@ -52,6 +54,7 @@ pub struct ContactStore {
     sums: Vec<Sums>,
     means: Vec<MeanContact>,
     nearby: Table<Node, Vec<u32>>,
+    changed: Vec<u32>,
 }
 
 /// Normals whose components differ by less than this share a mean.
@@ -61,7 +64,7 @@ impl ContactStore {
     /// An empty store of cells of edge `cell` (m), for queries up to `reach` (m).
     pub fn new(cell: f64, reach: f64) -> Self {
         let (of_bin, nearby) = (Table::default(), Table::default());
-        Self { cell, reach, of_bin, sums: Vec::new(), means: Vec::new(), nearby }
+        Self { cell, reach, of_bin, sums: Vec::new(), means: Vec::new(), nearby, changed: Vec::new() }
     }
 
     /// Adds a contact to the mean of its cell.
@@ -70,13 +73,16 @@ impl ContactStore {
         let bin = Bin { cell: cell_of(&contact.point, self.cell), facing };
         let (index, is_new) = self.of_bin.insert_with(bin, || ());
         if is_new {
-            self.sums.push(Sums { point: Vector3::zeros(), normal: Vector3::zeros(), weight: 0.0 });
+            self.sums.push(Sums { point: Vector3::zeros(), normal: Vector3::zeros(), weight: 0.0, is_noted: false });
             let Contact { point, normal, weight } = *contact;
             self.means.push(MeanContact { point, normal, weight, is_fan: false });
             let (at, _) = self.nearby.insert_with(cell_of(&point, self.reach), Vec::new);
             self.nearby.value_mut(at).push(index);
         }
         let (sums, mean) = (&mut self.sums[index as usize], &mut self.means[index as usize]);
+        if !std::mem::replace(&mut sums.is_noted, true) {
+            self.changed.push(index);
+        }
         sums.point += contact.point.coords * contact.weight;
         sums.normal += contact.normal * contact.weight;
         sums.weight += contact.weight;
@@ -85,25 +91,29 @@ impl ContactStore {
         mean.weight = sums.weight;
     }
 
-    /// Takes the means that `is_refuted` names out of all queries until it names them no more; returns how many.
-    pub fn refute(&mut self, is_refuted: impl Fn(&MeanContact) -> bool) -> usize {
-        let mut count = 0;
-        for (mean, sums) in self.means.iter_mut().zip(&self.sums) {
-            let refuted = is_refuted(mean);
-            count += usize::from(refuted);
-            mean.weight = if refuted { 0.0 } else { sums.weight };
-        }
-        count
+    /// The numbers of the means that came or changed since this was last asked, each once, in the order of their first
+    /// change.
+    pub fn take_changed(&mut self) -> Vec<u32> {
+        let changed = std::mem::take(&mut self.changed);
+        changed.iter().for_each(|&at| self.sums[at as usize].is_noted = false);
+        changed
     }
 
-    /// Finds the means around which normals within `width` (m) differ by more than the angle of `cosine`.
-    pub fn mark_fans(&mut self, width: f64, cosine: f64) {
-        for at in 0..self.means.len() {
-            let MeanContact { point, normal, .. } = self.means[at];
-            let mut is_fan = false;
-            self.near(&point, width, |_, other| is_fan |= self.means[other as usize].normal.dot(&normal) < cosine);
-            self.means[at].is_fan = is_fan;
-        }
+    /// Takes a mean out of all queries, or back in; returns whether that is new.
+    pub fn refute(&mut self, at: u32, is_refuted: bool) -> bool {
+        let mean = &mut self.means[at as usize];
+        let before = std::mem::replace(&mut mean.weight, if is_refuted { 0.0 } else { self.sums[at as usize].weight });
+        (before == 0.0) != is_refuted
+    }
+
+    /// Finds whether normals within `width` (m) of a mean differ by more than the angle of `cosine`; returns whether that
+    /// is new.
+    pub fn mark_fan(&mut self, at: u32, width: f64, cosine: f64) -> bool {
+        let MeanContact { point, normal, is_fan: before, .. } = self.means[at as usize];
+        let mut is_fan = false;
+        self.near(&point, width, |_, other| is_fan |= self.means[other as usize].normal.dot(&normal) < cosine);
+        self.means[at as usize].is_fan = is_fan;
+        is_fan != before
     }
 
     /// All means, in the order in which their cells were first touched.
@@ -185,7 +195,18 @@ mod tests {
             store.near(&Point3::origin(), 1e-3, |_, _| count += 1);
             count
         };
-        assert_eq!((store.refute(|_| true), count(&store)), (1, 0));
-        assert_eq!((store.refute(|_| false), count(&store)), (0, 1));
+        assert_eq!((store.refute(0, true), store.refute(0, true), count(&store)), (true, false, 0));
+        assert_eq!((store.refute(0, false), store.refute(0, false), count(&store)), (true, false, 1));
+    }
+
+    #[test]
+    fn each_change_is_told_once() {
+        let mut store = ContactStore::new(0.5e-3, 3e-3);
+        for x in [0.6e-3, 0.1e-3, 0.2e-3, 0.7e-3] {
+            store.add(&contact(x, Vector3::z(), 1.0));
+        }
+        assert_eq!((store.take_changed(), store.take_changed()), (vec![0, 1], vec![]));
+        store.add(&contact(0.3e-3, Vector3::z(), 1.0));
+        assert_eq!(store.take_changed(), [1]);
     }
 }

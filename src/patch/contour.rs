@@ -8,7 +8,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::cut::{Cut, Segment};
 use super::dual::{bend, diagonal, passes, unfolded};
-use super::lattice::{Edge, Lattice, Node, Owner, PatchFace, Square, VertexKey};
+use super::lattice::{CellBox, Edge, Lattice, Node, Owner, PatchFace, Square, VertexKey};
 use super::loops::{Loops, NONE, edge_corners, edge_of, number_in, ring_corners, ring_edges, segments, square_of};
 use super::qef::Planes;
 use super::splice::Patch;
@@ -57,6 +57,23 @@ pub fn contour(
     params: &ContourParams,
     crossing: impl FnMut(&Edge) -> Crossing,
 ) -> Patch {
+    contour_in(lattice, region, &CellBox::ALL, values, cut, params, crossing)
+}
+
+/// As [`contour`], but of the new faces those alone that touch a cell in `core`: what else is in the patch, and stands
+/// around, is not whole.
+///
+/// - `values`: f at all corners of the cells of the region in `core` and around it.
+/// - `cut`: the scan clipped at least in the cells up to two away from `core`.
+pub(super) fn contour_in(
+    lattice: &Lattice,
+    region: &Region,
+    core: &CellBox,
+    values: &NodeValues,
+    cut: &Cut,
+    params: &ContourParams,
+    crossing: impl FnMut(&Edge) -> Crossing,
+) -> Patch {
     let patch = Patch {
         vertices: cut.vertices.clone(),
         faces: cut.faces.clone(),
@@ -66,6 +83,7 @@ pub fn contour(
     let mut skin = Skin {
         lattice,
         region,
+        core,
         values,
         cut,
         params,
@@ -81,9 +99,7 @@ pub fn contour(
         moved: Vec::new(),
         patch,
     };
-    for (cell, ()) in region.iter() {
-        skin.take_cell(cell);
-    }
+    core.widened(1, 1).each_in(region, |cell, ()| skin.take_cell(cell));
     for at in 0..skin.cells.len() as u32 {
         skin.close_edges(at);
     }
@@ -140,6 +156,7 @@ struct Fan {
 struct Skin<'a, F> {
     lattice: &'a Lattice,
     region: &'a Region,
+    core: &'a CellBox,
     values: &'a NodeValues,
     cut: &'a Cut,
     params: &'a ContourParams,
@@ -202,7 +219,9 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
     /// Takes up the trace on a square on the rim of the region; whether patch and scan can meet there.
     fn take_trace(&mut self, side: u8, square: &Square, beyond: Node) -> bool {
         if !self.cut.trace_into(square, self.values, &mut self.trace) {
-            self.patch.open.push(self.cut.open_square(*square, beyond));
+            if square.cells().iter().any(|cell| self.core.contains(cell)) {
+                self.patch.open.push(self.cut.open_square(*square, beyond));
+            }
             return false;
         }
         if self.trace.lines.is_empty() {
@@ -241,7 +260,7 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
         }
         let cell = Cell { material, loop_at, loops: count, vertex };
         self.cells.insert(node, cell);
-        for rim in &self.rim {
+        for rim in self.rim.iter().filter(|_| self.core.contains(&node)) {
             let (square, vertex) = (square_of(node, rim.side), cell.vertex_at(rim.from));
             let segments = &self.segments[rim.first..][..rim.count];
             self.fans.extend(segments.iter().map(|&segment| Fan { square, vertex, segment }));
@@ -296,7 +315,8 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
         for number in (0..12).filter(|&number| cell.loop_at[number as usize] != NONE) {
             let edge = edge_of(node, number);
             let around = edge.cells().map(|node| self.cells.index_of(&node));
-            if around.iter().flatten().min() == Some(&at) {
+            let is_wanted = edge.cells().iter().any(|cell| self.core.contains(cell));
+            if is_wanted && around.iter().flatten().min() == Some(&at) {
                 self.close_edge(&edge, around, cell.is_material(edge_corners(number)[0]));
             }
         }

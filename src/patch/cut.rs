@@ -5,7 +5,7 @@ use nalgebra::{Point2, Point3, Vector3};
 use super::Region;
 use super::clip::{Pieces, Place, wall};
 use super::fill::fill;
-use super::lattice::{Edge, Lattice, Node, Owner, PatchFace, Square, VertexKey};
+use super::lattice::{CellBox, Edge, Lattice, Node, Owner, PatchFace, Square, VertexKey};
 use super::outline::outline;
 use super::table::{Key, Table};
 use crate::mesh::{BoxQuery, FaceId, FaceTree, TriMesh};
@@ -70,11 +70,24 @@ struct Scratch {
 impl Cut {
     /// Clips `scan` at the squares that bound `region`.
     pub fn new(lattice: &Lattice, region: &Region, scan: &TriMesh, tree: &FaceTree) -> Self {
+        let faces = faces_near(lattice, region.iter().map(|(cell, ())| cell), tree);
+        Self::of_faces(lattice, region, &bounds_of(region), scan, &faces)
+    }
+
+    /// Clips `faces` of `scan`, each as a whole, at the squares that bound `region`.
+    ///
+    /// - `bounds`: a box that holds the region.
+    pub(super) fn of_faces(
+        lattice: &Lattice,
+        region: &Region,
+        bounds: &CellBox,
+        scan: &TriMesh,
+        faces: &[FaceId],
+    ) -> Self {
         let mut cut = Self { pitch: lattice.pitch, ..Self::default() };
         let mut scratch = Scratch::default();
-        let bounds = bounds_of(region);
-        for face in faces_near(lattice, region, tree) {
-            cut.take(lattice, region, scan, face, &bounds, &mut scratch);
+        for &face in faces {
+            cut.take(lattice, region, scan, face, bounds, &mut scratch);
         }
         cut
     }
@@ -101,20 +114,19 @@ impl Cut {
         region: &Region,
         scan: &TriMesh,
         face: FaceId,
-        bounds: &[Node; 2],
+        bounds: &CellBox,
         scratch: &mut Scratch,
     ) {
         let triangle = scan.triangle(face);
         let (lo, hi) =
             (triangle[0].inf(&triangle[1]).inf(&triangle[2]), triangle[0].sup(&triangle[1]).sup(&triangle[2]));
-        let (lo, hi) = (lattice.cell_of(&lo), lattice.cell_of(&hi));
-        let Some(held) = held_within(region, lo, hi, bounds) else { return };
+        let cells = CellBox { lo: lattice.cell_of(&lo), hi: lattice.cell_of(&hi) };
+        let Some(held) = held_within(region, &cells, bounds) else { return };
         if held.is_all {
             self.removed.push(face);
             return;
         }
-        let lo = std::array::from_fn(|i| lo[i].max(held.lo[i].saturating_sub(1)));
-        let hi = std::array::from_fn(|i| hi[i].min(held.hi[i].saturating_add(1)));
+        let CellBox { lo, hi } = cells.meet(&held.cells.widened(1, 1));
         scratch.pieces.cut(scan, face, lattice, lo, hi);
         if scratch.pieces.iter().all(|(cell, _)| !region.contains(&cell)) {
             return;
@@ -223,50 +235,32 @@ fn loosened(key: VertexKey, mut point: Point3<f64>, pitch: f64) -> Point3<f64> {
 
 /// The cells of the region within a box.
 struct Held {
-    lo: Node,
-    hi: Node,
+    cells: CellBox,
     is_all: bool,
 }
 
-/// The cells of the region from `lo` to `hi`; `None` when there are none.
-fn held_within(region: &Region, lo: Node, hi: Node, bounds: &[Node; 2]) -> Option<Held> {
-    let (from, to): (Node, Node) =
-        (std::array::from_fn(|i| lo[i].max(bounds[0][i])), std::array::from_fn(|i| hi[i].min(bounds[1][i])));
-    if (0..3).any(|i| from[i] > to[i]) {
-        return None;
-    }
-    let volume = |lo: &Node, hi: &Node| (0..3).map(|i| f64::from(hi[i]) - f64::from(lo[i]) + 1.0).product::<f64>();
-    let mut held = Held { lo: [i32::MAX; 3], hi: [i32::MIN; 3], is_all: false };
+/// The cells of the region in `cells`; `None` when there are none.
+fn held_within(region: &Region, cells: &CellBox, bounds: &CellBox) -> Option<Held> {
+    let mut held = Held { cells: CellBox::EMPTY, is_all: false };
     let mut count = 0u32;
-    let mut take = |cell: Node| {
+    cells.meet(bounds).each_in(region, |cell, ()| {
         count += 1;
-        held.lo = std::array::from_fn(|i| held.lo[i].min(cell[i]));
-        held.hi = std::array::from_fn(|i| held.hi[i].max(cell[i]));
-    };
-    if volume(&from, &to) < region.len() as f64 {
-        for x in from[0]..=to[0] {
-            for y in from[1]..=to[1] {
-                (from[2]..=to[2]).map(|z| [x, y, z]).filter(|cell| region.contains(cell)).for_each(&mut take);
-            }
-        }
-    } else {
-        let is_within = |cell: &Node| (0..3).all(|i| from[i] <= cell[i] && cell[i] <= to[i]);
-        region.iter().map(|(cell, ())| cell).filter(is_within).for_each(&mut take);
-    }
-    held.is_all = f64::from(count) == volume(&lo, &hi);
+        held.cells.take(&cell);
+    });
+    held.is_all = f64::from(count) == cells.volume();
     (count > 0).then_some(held)
 }
 
-/// Lowest and highest cell of the region on each axis.
-fn bounds_of(region: &Region) -> [Node; 2] {
-    region.iter().fold([[i32::MAX; 3], [i32::MIN; 3]], |[lo, hi], (cell, ())| {
-        [std::array::from_fn(|i| lo[i].min(cell[i])), std::array::from_fn(|i| hi[i].max(cell[i]))]
-    })
+/// A box around the region.
+fn bounds_of(region: &Region) -> CellBox {
+    let mut bounds = CellBox::EMPTY;
+    region.iter().for_each(|(cell, ())| bounds.take(&cell));
+    bounds
 }
 
-/// The faces of the scan that may meet the region, by id.
-fn faces_near(lattice: &Lattice, region: &Region, tree: &FaceTree) -> Vec<FaceId> {
-    let blocks: Table<Node, ()> = region.iter().map(|(cell, ())| cell.map(|x| x.div_euclid(BLOCK))).collect();
+/// The faces of the scan that may meet any of `cells`, by id.
+pub(super) fn faces_near(lattice: &Lattice, cells: impl Iterator<Item = Node>, tree: &FaceTree) -> Vec<FaceId> {
+    let blocks: Table<Node, ()> = cells.map(|cell| cell.map(|x| x.div_euclid(BLOCK))).collect();
     let (mut faces, mut query) = (Vec::new(), BoxQuery::default());
     for (block, ()) in blocks.iter() {
         let lo = block.map(|x| x.saturating_mul(BLOCK));

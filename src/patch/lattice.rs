@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::table::Key;
+use super::table::{Key, Table};
 use crate::mesh::{FaceId, VertexId};
 
 /// A node of the lattice, or the cell of which it is the lowest corner.
@@ -92,6 +92,73 @@ impl Lattice {
             let (lo, hi) = (self.coordinate(i, node[i]), self.coordinate(i, node[i].saturating_add(size[i])));
             p[i].max(lo + margin * self.pitch).min(hi - margin * self.pitch)
         }))
+    }
+}
+
+/// The cells from `lo` to `hi`, both included.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct CellBox {
+    pub lo: Node,
+    pub hi: Node,
+}
+
+impl CellBox {
+    /// No cell.
+    pub const EMPTY: Self = Self { lo: [i32::MAX; 3], hi: [i32::MIN; 3] };
+    /// Every cell.
+    pub const ALL: Self = Self { lo: [i32::MIN; 3], hi: [i32::MAX; 3] };
+
+    pub fn is_empty(&self) -> bool {
+        (0..3).any(|i| self.lo[i] > self.hi[i])
+    }
+
+    #[inline]
+    pub fn contains(&self, cell: &Node) -> bool {
+        (0..3).all(|i| self.lo[i] <= cell[i] && cell[i] <= self.hi[i])
+    }
+
+    #[inline]
+    pub fn take(&mut self, cell: &Node) {
+        self.lo = std::array::from_fn(|i| self.lo[i].min(cell[i]));
+        self.hi = std::array::from_fn(|i| self.hi[i].max(cell[i]));
+    }
+
+    /// The cells in both.
+    pub fn meet(&self, other: &Self) -> Self {
+        let lo = std::array::from_fn(|i| self.lo[i].max(other.lo[i]));
+        Self { lo, hi: std::array::from_fn(|i| self.hi[i].min(other.hi[i])) }
+    }
+
+    /// Wider by `below` cells below and `above` cells above, on each axis.
+    pub fn widened(&self, below: i32, above: i32) -> Self {
+        Self { lo: self.lo.map(|x| x.saturating_sub(below)), hi: self.hi.map(|x| x.saturating_add(above)) }
+    }
+
+    /// Number of cells: ∞ where it is beyond what a float can count.
+    pub fn volume(&self) -> f64 {
+        if self.is_empty() {
+            return 0.0;
+        }
+        (0..3).map(|i| f64::from(self.hi[i]) - f64::from(self.lo[i]) + 1.0).product()
+    }
+
+    /// The cells, x slowest.
+    pub fn iter(&self) -> impl Iterator<Item = Node> + use<> {
+        let Self { lo, hi } = *self;
+        (lo[0]..=hi[0]).flat_map(move |x| (lo[1]..=hi[1]).flat_map(move |y| (lo[2]..=hi[2]).map(move |z| [x, y, z])))
+    }
+
+    /// Calls `each` with the keys of a table that lie in the box, by whichever way is shorter; in no particular order.
+    pub fn each_in<V>(&self, table: &Table<Node, V>, mut each: impl FnMut(Node, &V)) {
+        if self.volume() < table.len() as f64 {
+            for cell in self.iter() {
+                if let Some(value) = table.get(&cell) {
+                    each(cell, value);
+                }
+            }
+        } else {
+            table.iter().filter(|(cell, _)| self.contains(cell)).for_each(|(cell, value)| each(cell, value));
+        }
     }
 }
 
@@ -226,6 +293,17 @@ pub enum Owner {
     Square(Square),
     /// what the region leaves of a face of the scan
     Scan(FaceId),
+}
+
+impl Key for Owner {
+    #[inline]
+    fn bits(&self) -> u64 {
+        match self {
+            Self::Edge(edge) => edge.bits(),
+            Self::Square(square) => square.bits().rotate_left(32),
+            Self::Scan(face) => u64::from(face.0) << 32 | 5,
+        }
+    }
 }
 
 /// A new face, counter-clockwise seen from outside; corners are indices into the vertices of its patch.

@@ -2,18 +2,16 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::Region;
 use super::contact_store::ContactStore;
-use super::contour::{ContourParams, contour};
-use super::crossing::crossing;
-use super::cut::Cut;
+use super::delta::{PatchDelta, Shown};
 use super::evidence::{Evidence, EvidenceParams, Source};
-use super::field::FieldScratch;
-use super::lattice::{Lattice, Node, VertexKey};
-use super::restore::{Restored, node_at, restore};
+use super::lattice::{CellBox, Lattice, Node, VertexKey};
+use super::remesh::{Remesh, Renewed};
+use super::restore::{News, Restored, node_at};
 use super::scan_value::ScanValue;
 use super::splice::Patch;
 use super::swept::SweptSpace;
+use super::table::Table;
 use super::touches::{Touch, TouchFinder, TouchFinderParams};
 use crate::mesh::{FaceTree, MeshError, TriMesh};
 use crate::touch::{Compensator, CompensatorParams, Sample, SettingError};
@@ -107,6 +105,7 @@ pub struct Patched {
 ///     let wrench = Wrench { force: Vector3::new(0.0, 0.0, 2.0), torque: Vector3::zeros() };
 ///     patcher.push(&Sample { stamp_ns: i * 1_000_000, pose_ot, wrench });
 /// }
+/// patcher.flush();
 /// let mesh = patcher.patched(&scan, &FaceTree::new(&scan))?.mesh;
 /// let tree = FaceTree::new(&mesh);
 /// let found = tree.closest(&mesh, &Point3::new(10e-3, 10e-3, 0.0), 1e-3).ok_or("no face")?;
@@ -120,6 +119,18 @@ pub struct Patcher {
     finder: TouchFinder,
     contacts: ContactStore,
     swept: SweptSpace,
+    /// the box around the scan in which contacts may be its own, once the scan is known
+    bounds: Option<[Point3<f64>; 2]>,
+    live: Option<Live>,
+}
+
+/// The patch that a mesh follows.
+#[derive(Clone, Debug)]
+struct Live {
+    remesh: Remesh,
+    shown: Shown,
+    /// what came to the stores since
+    news: News,
 }
 
 /// Edge of the cells of one mean contact, in radii.
@@ -134,8 +145,6 @@ const OUTSIDE: f64 = 4.0;
 const FAN_WIDTH: f64 = 0.4;
 /// … that differ by more than 25° are those of an edge.
 const FAN_COSINE: f64 = 0.906;
-/// Rounds in which the region grows over squares where scan and patch cannot be joined.
-const GROWTH: usize = 3;
 /// A budget below this many faces is none: a box has twelve.
 const LEAST_BUDGET: f64 = 5000.0;
 /// Rounds in which the lattice is made coarser to keep the budget.
@@ -156,6 +165,8 @@ impl Patcher {
             finder: TouchFinder::new(params.touches)?,
             contacts: ContactStore::new(CONTACT_CELL * radius, params.evidence.field.reach),
             swept: SweptSpace::new(SWEPT_CELL * radius, 5.0 / 3.0 * radius),
+            bounds: None,
+            live: None,
             params,
         })
     }
@@ -173,56 +184,149 @@ impl Patcher {
         finder.push(&tip, |touch| keep(contacts, swept, &touch));
     }
 
-    /// The scan with its touched part meshed anew; vertices and faces that were not touched keep their ids.
+    /// Takes in what is still in the smoothing window: the stream has ended or pauses.
+    pub fn flush(&mut self) {
+        let Self { finder, contacts, swept, .. } = self;
+        finder.flush(|touch| keep(contacts, swept, &touch));
+    }
+
+    /// The scan with its touched part meshed anew from all that counts so far; vertices and faces that were not touched
+    /// keep their ids.
     ///
     /// - `scan`: as it came, with the tree over its faces.
     ///
     /// # Errors
     /// [`MeshError::TooMany`] when 32-bit ids do not suffice.
     pub fn patched(&mut self, scan: &TriMesh, tree: &FaceTree) -> Result<Patched, MeshError> {
-        let Made { pitch, restored, patch } = self.make(scan, tree);
+        self.settle(scan, tree);
+        let (remesh, Renewed { patch, .. }) = self.meshed_anew(scan, tree);
         let (mesh, ids) = patch.applied_to(scan)?;
         let mut support = vec![Support::Scan; mesh.vertex_slots()];
         for ((key, _), id) in patch.vertices.iter().zip(ids) {
             if let Some(id) = id {
-                support[id.0 as usize] = support_of(&key, &restored);
+                support[id.0 as usize] = support_of(&key, remesh.restored());
             }
         }
         Ok(Patched {
             mesh,
             support,
-            pitch,
+            pitch: remesh.lattice().pitch,
             removed_faces: patch.removed.len(),
             added_faces: patch.faces.len(),
             open_squares: patch.open.len(),
         })
     }
 
-    /// The patch for all that was felt so far, within the budget.
-    fn make(&mut self, scan: &TriMesh, tree: &FaceTree) -> Made {
-        let Self { finder, contacts, swept, params, .. } = self;
-        finder.flush(|touch| keep(contacts, swept, &touch));
-        let radius = params.evidence.radius;
-        let deepest = radius * (1.0 - REFUTED_DEPTH);
-        let bounds = bounds_of(scan, OUTSIDE * radius);
-        contacts.refute(|mean| {
-            swept.nearest(&mean.point).is_some_and(|(distance, _)| distance < deepest)
-                || is_elsewhere(&mean.point, scan, tree, &bounds, OUTSIDE * radius)
+    /// What changed in the patch since this was last asked. It takes as long as there is to mesh anew near what changed;
+    /// where the budget was passed, everything is meshed anew, by a coarser lattice.
+    ///
+    /// What [`Self::patched`] shows can differ from the sum of these by some thousandths of an edge of the lattice, and where
+    /// nothing was felt by more.
+    ///
+    /// - `scan`, `tree`: as in [`Self::patched`], the same each time.
+    /// - `until_ns`: stamp of the last sample.
+    pub fn renewed(&mut self, scan: &TriMesh, tree: &FaceTree, until_ns: i64) -> PatchDelta {
+        self.settle(scan, tree);
+        let mut live = self.live.take().unwrap_or_else(|| Live {
+            remesh: Remesh::new(lattice_of(self.params.pitch)),
+            shown: Shown::default(),
+            news: self.all_news(),
         });
-        contacts.mark_fans(FAN_WIDTH * radius, FAN_COSINE);
-        let evidence = Evidence { params: &params.evidence, contacts, swept, scan, tree };
-        let budget = (params.most_faces * scan.face_count() as f64).max(LEAST_BUDGET);
-        let mut made = Made::of(&evidence, params.pitch);
+        let news = std::mem::take(&mut live.news);
+        let faces = scan.face_count() as f64 + live.shown.faces_more();
+        let renewed = if faces > self.budget(scan) {
+            let (remesh, mut renewed) = self.meshed_anew(scan, tree);
+            live.remesh = remesh;
+            renewed.core = CellBox::ALL;
+            renewed.scanned.extend(live.shown.scan_faces());
+            renewed
+        } else {
+            live.remesh.renew(&self.evidence(scan, tree), &news)
+        };
+        let support = |key: &VertexKey| support_of(key, live.remesh.restored());
+        let delta = live.shown.take(&renewed, live.remesh.region(), scan, support);
+        self.live = Some(live);
+        PatchDelta { until_ns, ..delta }
+    }
+
+    /// Decides which contacts count and which are those of an edge, where anything came since it was last decided.
+    fn settle(&mut self, scan: &TriMesh, tree: &FaceTree) {
+        let Self { contacts, swept, params, .. } = self;
+        let radius = params.evidence.radius;
+        let (deepest, outside) = (radius * (1.0 - REFUTED_DEPTH), OUTSIDE * radius);
+        let bounds = *self.bounds.get_or_insert_with(|| bounds_of(scan, outside));
+        let mut changed: Table<u32, ()> = contacts.take_changed().into_iter().collect();
+        let centres = swept.take_added();
+        let mut doubtful = changed.clone();
+        for centre in &centres {
+            contacts.near(centre, deepest, |_, at| add(&mut doubtful, at));
+        }
+        for (at, ()) in doubtful.iter() {
+            let point = contacts.means()[at as usize].point;
+            let is_refuted = swept.nearest(&point).is_some_and(|(distance, _)| distance < deepest)
+                || is_elsewhere(&point, scan, tree, &bounds, outside);
+            if contacts.refute(at, is_refuted) {
+                add(&mut changed, at);
+            }
+        }
+        let mut beside = changed.clone();
+        for (at, ()) in changed.iter() {
+            // the width, and how far a mean can have moved within its cell
+            contacts.near(&contacts.means()[at as usize].point, 2.0 * FAN_WIDTH * radius, |_, other| add(&mut beside, other));
+        }
+        for (at, ()) in beside.iter() {
+            if contacts.mark_fan(at, FAN_WIDTH * radius, FAN_COSINE) {
+                add(&mut changed, at);
+            }
+        }
+        if let Some(live) = &mut self.live {
+            live.news.means.extend(changed.iter().map(|(at, ())| contacts.means()[at as usize].point));
+            live.news.centres.extend(centres);
+        }
+    }
+
+    fn all_news(&self) -> News {
+        let means = self.contacts.means().iter().map(|mean| mean.point).collect();
+        News { means, centres: self.swept.centres().copied().collect() }
+    }
+
+    fn evidence<'a>(&'a self, scan: &'a TriMesh, tree: &'a FaceTree) -> Evidence<'a> {
+        let Self { contacts, swept, params, .. } = self;
+        Evidence { params: &params.evidence, contacts, swept, scan, tree }
+    }
+
+    fn budget(&self, scan: &TriMesh) -> f64 {
+        (self.params.most_faces * scan.face_count() as f64).max(LEAST_BUDGET)
+    }
+
+    /// The patch of everything, within the budget.
+    fn meshed_anew(&self, scan: &TriMesh, tree: &FaceTree) -> (Remesh, Renewed) {
+        let (evidence, news, budget) = (self.evidence(scan, tree), self.all_news(), self.budget(scan));
+        let meshed = |pitch: f64| {
+            let mut remesh = Remesh::new(lattice_of(pitch));
+            let renewed = remesh.renew(&evidence, &news);
+            (remesh, renewed)
+        };
+        let mut made = meshed(self.params.pitch);
         for _ in 0..COARSER {
-            let faces = (scan.face_count() + made.patch.faces.len() - made.patch.removed.len()) as f64;
+            let Patch { faces, removed, .. } = &made.1.patch;
+            let faces = (scan.face_count() + faces.len() - removed.len()) as f64;
             if faces <= budget {
                 break;
             }
             // the number of faces falls with the square of the pitch
-            made = Made::of(&evidence, made.pitch * 1.02 * (faces / budget).sqrt());
+            made = meshed(made.0.lattice().pitch * 1.02 * (faces / budget).sqrt());
         }
         made
     }
+}
+
+fn add(numbers: &mut Table<u32, ()>, number: u32) {
+    numbers.insert_with(number, || ());
+}
+
+fn lattice_of(pitch: f64) -> Lattice {
+    Lattice { origin: Point3::from(Vector3::from(ORIGIN) * pitch), pitch }
 }
 
 fn keep(contacts: &mut ContactStore, swept: &mut SweptSpace, touch: &Touch) {
@@ -245,33 +349,6 @@ fn is_elsewhere(p: &Point3<f64>, scan: &TriMesh, tree: &FaceTree, bounds: &[Poin
     !is_within || ScanValue::at(scan, tree, p).is_none_or(|scan| scan.value > reach)
 }
 
-/// A patch with the field that it shows.
-struct Made {
-    pitch: f64,
-    restored: Restored,
-    patch: Patch,
-}
-
-impl Made {
-    fn of(evidence: &Evidence<'_>, pitch: f64) -> Self {
-        let lattice = Lattice { origin: Point3::from(Vector3::from(ORIGIN) * pitch), pitch };
-        let restored = restore(evidence, &lattice);
-        let mut region = restored.region();
-        let mut patch = contoured(evidence, &lattice, &restored, &region);
-        for _ in 0..GROWTH {
-            let before = region.len();
-            for open in patch.open.iter().filter(|open| open.is_scanned && restored.can_take(open.beyond)) {
-                region.insert_with(open.beyond, || ());
-            }
-            if region.len() == before {
-                break;
-            }
-            patch = contoured(evidence, &lattice, &restored, &region);
-        }
-        Self { pitch, restored, patch }
-    }
-}
-
 /// A vertex is touched when most of the corners of its cell are near the surface that was; those on the scan are its own.
 fn support_of(key: &VertexKey, restored: &Restored) -> Support {
     let is_touched = |node: &Node| restored.nodes.get(node).is_some_and(|state| state.source == Source::Touch);
@@ -282,12 +359,4 @@ fn support_of(key: &VertexKey, restored: &Restored) -> Support {
         VertexKey::Edge(edge) => is_touched(&edge.node) || is_touched(&edge.end()),
     };
     if touched { Support::Touched } else { Support::Guessed }
-}
-
-fn contoured(evidence: &Evidence<'_>, lattice: &Lattice, restored: &Restored, region: &Region) -> Patch {
-    let cut = Cut::new(lattice, region, evidence.scan, evidence.tree);
-    let mut scratch = FieldScratch::default();
-    contour(lattice, region, &restored.values(), &cut, &ContourParams::default(), |edge| {
-        crossing(restored, evidence, lattice, edge, &mut scratch)
-    })
 }

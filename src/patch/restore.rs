@@ -1,15 +1,17 @@
 //! The field at the nodes of the lattice, around everything that was touched or swept.
 
-use super::complete::{CompleteParams, complete};
+use nalgebra::Point3;
+
+use super::complete::{CompleteParams, complete, open_cells};
 use super::evidence::{Evidence, Source};
 use super::field::FieldScratch;
-use super::lattice::{Lattice, Node};
+use super::lattice::{CellBox, Lattice, Node};
 use super::table::Table;
 use super::{NodeValues, Region};
 
 /// The field at one node.
 #[derive(Clone, Copy, Debug)]
-pub struct NodeState {
+pub(super) struct NodeState {
     /// f, m
     pub value: f64,
     /// what it rests on
@@ -24,13 +26,57 @@ pub struct NodeState {
     pub is_free_end: bool,
 }
 
+impl NodeState {
+    /// Whether nothing is known here, so that the value is filled in.
+    pub fn is_open_question(&self) -> bool {
+        matches!(self.source, Source::Nothing | Source::Far)
+    }
+
+    /// Whether the skin differs from the scan here.
+    fn is_changed(&self) -> bool {
+        match self.source {
+            Source::Touch | Source::Both | Source::Nothing => true,
+            Source::Far => (self.value < 0.0) != (self.scan < 0.0),
+            Source::Scan | Source::Beyond => false,
+        }
+    }
+
+    /// Whether it shows another surface than `other`, by more than `slack` (m).
+    fn differs(&self, other: &Self, slack: f64) -> bool {
+        self.source != other.source
+            || (self.value < 0.0) != (other.value < 0.0)
+            || (self.value - other.value).abs() > slack
+    }
+}
+
+/// What came to the stores: where the contacts are whose mean is new or moved, and the centres that were kept, m, in O.
+#[derive(Clone, Debug, Default)]
+pub(super) struct News {
+    pub means: Vec<Point3<f64>>,
+    pub centres: Vec<Point3<f64>>,
+}
+
+/// What a renewal changed.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Changed {
+    /// nodes that are new, or whose value or source is another
+    pub nodes: Vec<Node>,
+    /// cells that are to stay open now, or no more
+    pub open: Vec<Node>,
+}
+
 /// The field around everything that was touched or swept.
 #[derive(Clone, Debug, Default)]
-pub struct Restored {
+pub(super) struct Restored {
     /// every node looked at
     pub nodes: Table<Node, NodeState>,
     /// cells in which the surface would rest on a freely moving ball alone: they stay open
     pub open: Table<Node, ()>,
+    /// the nodes at which a ball ended its way freely
+    ends: Table<Node, ()>,
+    /// cells with a contact, and with a ball that went into the scan: what is around them is looked at
+    touched: Table<Node, ()>,
+    swept: Table<Node, ()>,
 }
 
 /// A touched node within this many cells of the surface counts as outside.
@@ -41,18 +87,186 @@ const WIDEST: f64 = 2.7;
 const REACH: f64 = 2.8;
 /// … and within this many cells of a ball that went into the scan.
 const BALL_MARGIN: f64 = 2.0;
+/// A node whose value would change by less than this keeps it, in cells: a thousandth of what the tip resolves.
+const SLACK: f64 = 2e-3;
+/// What is filled in is filled in anew up to this many cells around what was looked at again.
+const SETTLED: i32 = 4;
 
-/// Evaluates the field around all touches and completes it where nothing is known.
-pub fn restore(evidence: &Evidence<'_>, lattice: &Lattice) -> Restored {
-    let mut restored = Restored::default();
-    let mut scratch = FieldScratch::default();
-    for (node, ()) in domain(evidence, lattice).iter() {
-        if let Some(state) = evaluate(evidence, lattice, node, &mut scratch) {
-            restored.nodes.insert_with(node, || state);
+impl Restored {
+    /// Brings the field up to date with what came to the stores of `evidence`.
+    pub fn renew(&mut self, evidence: &Evidence<'_>, lattice: &Lattice, news: &News) -> Changed {
+        let mut look = self.known_near(evidence, lattice, news);
+        self.widen(evidence, lattice, news, &mut look);
+        let mut area = CellBox::EMPTY;
+        let mut scratch = FieldScratch::default();
+        for at in 0..look.len() as u32 {
+            let node = look.entry(at).0;
+            let before = self.nodes.get(&node).copied();
+            if let Some(mut state) = evaluate(evidence, lattice, node, &mut scratch) {
+                if let Some(before) = before.filter(|before| before.is_open_question() && state.is_open_question()) {
+                    state.value = before.value.max(state.least);
+                }
+                *look.value_mut(at) = before;
+                self.put(node, state);
+                area.take(&node);
+            }
+        }
+        self.settle(evidence, lattice, &area, &look)
+    }
+
+    fn put(&mut self, node: Node, state: NodeState) {
+        self.nodes.insert(node, state);
+        if state.is_free_end {
+            self.ends.insert_with(node, || ());
+        } else if !self.ends.is_empty() {
+            self.ends.remove(&node);
         }
     }
-    complete(&mut restored, &CompleteParams::new(lattice.pitch, evidence.params.radius));
-    restored
+
+    /// Fills in what is not known in and around `area`; finds what is another now than `before` says, or than it was.
+    fn settle(
+        &mut self,
+        evidence: &Evidence<'_>,
+        lattice: &Lattice,
+        area: &CellBox,
+        before: &Table<Node, Option<NodeState>>,
+    ) -> Changed {
+        if area.is_empty() {
+            return Changed::default();
+        }
+        let params = CompleteParams::new(lattice.pitch, evidence.params.radius);
+        let area = area.widened(SETTLED, SETTLED);
+        let at = self.indices_in(&area);
+        let was: Vec<Option<NodeState>> = at
+            .iter()
+            .map(|&at| {
+                let (node, state) = self.nodes.entry(at);
+                before.get(node).map_or(Some(*state), |before| *before)
+            })
+            .collect();
+        complete(self, &at, &params);
+        let mut changed = Changed::default();
+        for (&at, was) in at.iter().zip(&was) {
+            let (node, state) = *self.nodes.entry(at);
+            match was {
+                Some(was) if !state.differs(was, SLACK * lattice.pitch) => {
+                    self.nodes.value_mut(at).value = was.value.max(state.least);
+                }
+                _ => changed.nodes.push(node),
+            }
+        }
+        changed.open = self.renew_open(&area, &params);
+        changed
+    }
+
+    /// Numbers of the nodes in a box; in the order in which they came where that is all of them.
+    fn indices_in(&self, area: &CellBox) -> Vec<u32> {
+        if area.volume() < self.nodes.len() as f64 {
+            area.iter().filter_map(|node| self.nodes.index_of(&node)).collect()
+        } else {
+            (0..self.nodes.len() as u32).filter(|&at| area.contains(&self.nodes.entry(at).0)).collect()
+        }
+    }
+
+    /// Finds anew which cells stay open, if a way ends near `area`; returns those for which that is new.
+    fn renew_open(&mut self, area: &CellBox, params: &CompleteParams) -> Vec<Node> {
+        let near = area.widened(params.end_reach, params.end_reach);
+        if !self.ends.iter().any(|(end, ())| near.contains(&end)) && self.open.is_empty() {
+            return Vec::new();
+        }
+        let open = open_cells(self, self.ends.iter().map(|(end, ())| end), params.end_reach);
+        let old = std::mem::replace(&mut self.open, open);
+        let gone = old.iter().filter(|(cell, ())| !self.open.contains(cell));
+        gone.chain(self.open.iter().filter(|(cell, ())| !old.contains(cell))).map(|(cell, ())| cell).collect()
+    }
+
+    /// The known nodes whose finding may depend on the news.
+    fn known_near(&self, evidence: &Evidence<'_>, lattice: &Lattice, news: &News) -> Table<Node, Option<NodeState>> {
+        let mut look = Table::default();
+        if self.nodes.is_empty() {
+            return look;
+        }
+        let p = evidence.params;
+        let of_contact = p.field.reach.max(p.scan_removal + p.scan_reach);
+        let of_centre = p.radius.max(p.radius + p.swept_reach + p.scan_reach);
+        for (points, reach) in [(&news.means, of_contact), (&news.centres, of_centre)] {
+            let offsets = ball((reach / lattice.pitch).ceil() as i32 + 1);
+            for point in points {
+                let cell = lattice.cell_of(point);
+                for node in offsets.iter().map(|offset| moved(&cell, offset)) {
+                    let is_near = (lattice.position(node) - point).norm_squared() < reach * reach;
+                    if is_near && self.nodes.contains(&node) {
+                        look.insert_with(node, || None);
+                    }
+                }
+            }
+        }
+        // whether a way ended depends on the way, and on contacts beside its end
+        for (end, ()) in self.ends.iter() {
+            let x = lattice.position(end);
+            let is_near = |points: &[Point3<f64>], reach: f64| points.iter().any(|p| (p - x).norm() < reach);
+            if is_near(&news.means, p.radius + p.free_reach) || is_near(&news.centres, 1.5 * p.radius) {
+                look.insert_with(end, || None);
+            }
+        }
+        look
+    }
+
+    /// Adds the nodes near contacts, and those near the ball where it went into the scan.
+    fn widen(
+        &mut self,
+        evidence: &Evidence<'_>,
+        lattice: &Lattice,
+        news: &News,
+        look: &mut Table<Node, Option<NodeState>>,
+    ) {
+        let radius = evidence.params.radius;
+        let around_contact = ball((REACH * radius / lattice.pitch).ceil() as i32);
+        let around_ball = ball((radius / lattice.pitch + BALL_MARGIN).ceil() as i32);
+        let mut add = |cell: &Node, offsets: &[Node]| {
+            for node in offsets.iter().map(|offset| moved(cell, offset)) {
+                if !self.nodes.contains(&node) {
+                    look.insert_with(node, || None);
+                }
+            }
+        };
+        for cell in news.means.iter().map(|point| lattice.cell_of(point)) {
+            if self.touched.insert_with(cell, || ()).1 {
+                add(&cell, &around_contact);
+            }
+        }
+        for centre in &news.centres {
+            let cell = lattice.cell_of(centre);
+            let is_near = || evidence.tree.closest(evidence.scan, centre, radius + lattice.pitch).is_some();
+            if !self.swept.contains(&cell) && is_near() {
+                self.swept.insert_with(cell, || ());
+                add(&cell, &around_ball);
+            }
+        }
+    }
+
+    /// Whether the skin in a cell is not the scan.
+    pub fn is_in_region(&self, cell: Node) -> bool {
+        self.can_take(cell)
+            && (0..8).any(|corner| self.nodes.get(&node_at(cell, corner)).is_some_and(NodeState::is_changed))
+    }
+
+    /// Whether the field is known at all corners of a cell that is not to stay open.
+    pub fn can_take(&self, cell: Node) -> bool {
+        let is_known = |node: Node| self.nodes.get(&node).is_some_and(|state| state.source != Source::Beyond);
+        !self.open.contains(&cell) && (0..8).all(|corner| is_known(node_at(cell, corner)))
+    }
+
+    /// The values at the corners of the cells in a box.
+    pub fn values_in(&self, cells: &CellBox) -> NodeValues {
+        let mut values = NodeValues::default();
+        cells.widened(0, 1).each_in(&self.nodes, |node, state| {
+            if state.source != Source::Beyond {
+                values.insert_with(node, || state.value);
+            }
+        });
+        values
+    }
 }
 
 fn evaluate(evidence: &Evidence<'_>, lattice: &Lattice, node: Node, scratch: &mut FieldScratch) -> Option<NodeState> {
@@ -77,72 +291,14 @@ fn evaluate(evidence: &Evidence<'_>, lattice: &Lattice, node: Node, scratch: &mu
     })
 }
 
-/// The nodes near contacts, and those near the ball where it went into the scan.
-fn domain(evidence: &Evidence<'_>, lattice: &Lattice) -> Table<Node, ()> {
-    let radius = evidence.params.radius;
-    let mut touched: Table<Node, ()> = Table::default();
-    for mean in evidence.contacts.means() {
-        touched.insert_with(lattice.cell_of(&mean.point), || ());
-    }
-    let mut swept: Table<Node, ()> = Table::default();
-    for centre in evidence.swept.centres() {
-        if evidence.tree.closest(evidence.scan, centre, radius + lattice.pitch).is_some() {
-            swept.insert_with(lattice.cell_of(centre), || ());
-        }
-    }
-    let mut domain = Table::default();
-    add_balls(&mut domain, &touched, (REACH * radius / lattice.pitch).ceil() as i32);
-    add_balls(&mut domain, &swept, (radius / lattice.pitch + BALL_MARGIN).ceil() as i32);
-    domain
+/// The steps from a node to those within `radius` steps.
+fn ball(radius: i32) -> Vec<Node> {
+    let all = CellBox { lo: [-radius; 3], hi: [radius; 3] };
+    all.iter().filter(|[i, j, k]| i * i + j * j + k * k <= radius * radius).collect()
 }
 
-fn add_balls(domain: &mut Table<Node, ()>, centres: &Table<Node, ()>, radius: i32) {
-    let offsets: Vec<Node> = (-radius..=radius)
-        .flat_map(|i| (-radius..=radius).flat_map(move |j| (-radius..=radius).map(move |k| [i, j, k])))
-        .filter(|[i, j, k]| i * i + j * j + k * k <= radius * radius)
-        .collect();
-    for (centre, ()) in centres.iter() {
-        for offset in &offsets {
-            domain.insert_with(std::array::from_fn(|i| centre[i].saturating_add(offset[i])), || ());
-        }
-    }
-}
-
-impl Restored {
-    /// The cells in which the skin is not the scan.
-    pub fn region(&self) -> Region {
-        let mut region = Region::default();
-        for (node, state) in self.nodes.iter().filter(|(_, state)| is_changed(state)) {
-            debug_assert!(state.value.is_finite());
-            for corner in 0..8 {
-                let cell = cell_at(node, corner);
-                if self.can_take(cell) {
-                    region.insert_with(cell, || ());
-                }
-            }
-        }
-        region
-    }
-
-    /// Whether the field is known at all corners of a cell that is not to stay open.
-    pub fn can_take(&self, cell: Node) -> bool {
-        let is_known = |node: Node| self.nodes.get(&node).is_some_and(|state| state.source != Source::Beyond);
-        !self.open.contains(&cell) && (0..8).all(|corner| is_known(node_at(cell, corner)))
-    }
-
-    /// The values alone.
-    pub fn values(&self) -> NodeValues {
-        let known = self.nodes.iter().filter(|(_, state)| state.source != Source::Beyond);
-        known.map(|(node, state)| (node, state.value)).collect()
-    }
-}
-
-fn is_changed(state: &NodeState) -> bool {
-    match state.source {
-        Source::Touch | Source::Both | Source::Nothing => true,
-        Source::Far => (state.value < 0.0) != (state.scan < 0.0),
-        Source::Scan | Source::Beyond => false,
-    }
+fn moved(node: &Node, offset: &Node) -> Node {
+    std::array::from_fn(|i| node[i].saturating_add(offset[i]))
 }
 
 /// Corner `corner` of a cell: bit i says whether it is the upper one along axis i.
@@ -153,4 +309,10 @@ pub(super) fn node_at(cell: Node, corner: u8) -> Node {
 /// The cell that has `node` as its corner `corner`.
 pub(super) fn cell_at(node: Node, corner: u8) -> Node {
     std::array::from_fn(|i| node[i].saturating_sub(i32::from(corner >> i & 1)))
+}
+
+/// The cells that a renewal may have taken into the region or out of it.
+pub(super) fn cells_of(changed: &Changed) -> Region {
+    let around = changed.nodes.iter().flat_map(|&node| (0..8).map(move |corner| cell_at(node, corner)));
+    around.chain(changed.open.iter().copied()).collect()
 }

@@ -1,11 +1,12 @@
-//! The patch, and a scan with the patch in it.
+//! The patch, a scan with the patch in it, and a mesh that follows the patch.
 
 use nalgebra::Point3;
 
-use super::lattice::{PatchFace, VertexKey};
+use super::delta::{PatchDelta, PatchVertex};
+use super::lattice::{Owner, PatchFace, VertexKey};
 use super::table::Table;
 use super::trace::OpenSquare;
-use crate::mesh::{FaceId, MeshError, TriMesh, VertexId};
+use crate::mesh::{FaceId, FaceTree, MeshError, TriMesh, VertexId};
 
 /// New faces for a region, and the faces of the scan that they replace.
 #[derive(Clone, Debug, Default)]
@@ -45,5 +46,100 @@ impl Patch {
             mesh.add_face(corners)?;
         }
         Ok((mesh, ids))
+    }
+}
+
+/// A mesh follows a patch: which of its faces and vertices are those of the patch.
+#[derive(Clone, Debug, Default)]
+pub struct Splice {
+    faces: Table<Owner, Vec<FaceId>>,
+    vertices: Table<VertexKey, VertexId>,
+    added: Vec<FaceId>,
+    placed: Vec<VertexId>,
+    refit: Vec<FaceId>,
+}
+
+impl Splice {
+    /// Brings the mesh up to date with the patch; faces and vertices that it does not touch keep their ids.
+    ///
+    /// - `mesh`, `tree`: the scan with all deltas before this one in it.
+    ///
+    /// # Errors
+    /// [`MeshError::TooMany`] when 32-bit ids do not suffice, [`MeshError::NotFinite`] for a position that is not finite;
+    /// the mesh is torn then.
+    pub fn apply(&mut self, delta: &PatchDelta, mesh: &mut TriMesh, tree: &mut FaceTree) -> Result<(), MeshError> {
+        for &(owner, _) in &delta.owners {
+            self.remove_faces(owner, mesh, tree);
+        }
+        self.place(delta, mesh, tree)?;
+        self.added.clear();
+        let mut faces = delta.faces.iter();
+        for &(owner, count) in &delta.owners {
+            let mut ours = Vec::with_capacity(count as usize);
+            for corners in faces.by_ref().take(count as usize) {
+                let face = mesh.add_face(corners.map(|corner| self.placed[corner as usize]))?;
+                tree.insert(mesh, face);
+                ours.push(face);
+            }
+            self.added.extend_from_slice(&ours);
+            if count > 0 || matches!(owner, Owner::Scan(_)) {
+                self.faces.insert(owner, ours);
+            }
+        }
+        for key in &delta.gone {
+            if let Some(vertex) = self.vertices.remove(key) {
+                mesh.remove_vertex(vertex);
+            }
+        }
+        Ok(())
+    }
+
+    /// The faces that the last delta added.
+    pub fn added(&self) -> &[FaceId] {
+        &self.added
+    }
+
+    /// The vertices of the last delta, in its order.
+    pub fn placed(&self) -> &[VertexId] {
+        &self.placed
+    }
+
+    fn remove_faces(&mut self, owner: Owner, mesh: &mut TriMesh, tree: &mut FaceTree) {
+        let ours = match (self.faces.remove(&owner), owner) {
+            (Some(ours), _) => ours,
+            (None, Owner::Scan(face)) => vec![face],
+            (None, _) => return,
+        };
+        for face in ours {
+            tree.remove(mesh, face);
+            mesh.remove_face(face);
+        }
+    }
+
+    /// Adds new vertices and moves those that are elsewhere now.
+    fn place(&mut self, delta: &PatchDelta, mesh: &mut TriMesh, tree: &mut FaceTree) -> Result<(), MeshError> {
+        self.placed.clear();
+        self.refit.clear();
+        for &PatchVertex { key, position, .. } in &delta.vertices {
+            let known = match key {
+                VertexKey::Scan(id) => Some(id),
+                _ => self.vertices.get(&key).copied(),
+            };
+            let id = match known {
+                Some(id) => id,
+                None => mesh.add_vertex(position)?,
+            };
+            if known.is_none() {
+                self.vertices.insert(key, id);
+            } else if mesh.position(id) != position {
+                mesh.set_position(id, position);
+                self.refit.extend_from_slice(mesh.star(id));
+            }
+            self.placed.push(id);
+        }
+        self.refit.sort_unstable();
+        self.refit.dedup();
+        tree.refit(mesh, &self.refit);
+        Ok(())
     }
 }

@@ -16,12 +16,13 @@ pub struct SweptSpace {
     reach: f64,
     thinned: Table<Node, ()>,
     centres: Table<Node, Vec<Point3<f64>>>,
+    added: Vec<Point3<f64>>,
 }
 
 impl SweptSpace {
     /// Nothing swept yet: one centre is kept for each cube of edge `cell` (m), queries go up to `reach` (m).
     pub fn new(cell: f64, reach: f64) -> Self {
-        Self { cell, reach, thinned: Table::default(), centres: Table::default() }
+        Self { cell, reach, thinned: Table::default(), centres: Table::default(), added: Vec::new() }
     }
 
     /// Takes a centre, m, in O.
@@ -30,7 +31,13 @@ impl SweptSpace {
         if is_new {
             let (at, _) = self.centres.insert_with(cell_of(centre, self.reach), Vec::new);
             self.centres.value_mut(at).push(*centre);
+            self.added.push(*centre);
         }
+    }
+
+    /// The centres that were kept since this was last asked.
+    pub fn take_added(&mut self) -> Vec<Point3<f64>> {
+        std::mem::take(&mut self.added)
     }
 
     /// The centres that were kept.

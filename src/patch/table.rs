@@ -7,6 +7,13 @@ pub trait Key: Copy + Eq {
     fn bits(&self) -> u64;
 }
 
+impl Key for u32 {
+    #[inline]
+    fn bits(&self) -> u64 {
+        u64::from(*self)
+    }
+}
+
 /// Open addressing with linear probing over a list of entries in order of insertion.
 #[derive(Clone, Debug)]
 pub struct Table<K, V> {

@@ -1,0 +1,124 @@
+//! The field, the region and the new faces in it, brought up to date where evidence came.
+
+use super::Region;
+use super::contour::{ContourParams, contour_in};
+use super::crossing::crossing;
+use super::cut::{Cut, faces_near};
+use super::evidence::Evidence;
+use super::field::FieldScratch;
+use super::lattice::{CellBox, Lattice, Node};
+use super::restore::{News, Restored, cells_of};
+use super::splice::Patch;
+use super::table::Table;
+use crate::mesh::FaceId;
+
+/// Rounds in which the region grows over squares where scan and patch cannot be joined.
+const GROWTH: usize = 3;
+
+/// What is meshed anew, and why.
+#[derive(Clone, Debug)]
+pub(super) struct Remesh {
+    lattice: Lattice,
+    restored: Restored,
+    region: Region,
+    /// cells that are in the region only because patch and scan cannot be joined at their squares
+    grown: Table<Node, ()>,
+    /// a box that holds the region
+    bounds: CellBox,
+}
+
+/// The new faces in and around a part of the lattice.
+#[derive(Clone, Debug)]
+pub(super) struct Renewed {
+    /// what is around these cells is new …
+    pub core: CellBox,
+    /// … and stands here, beside more of which not all is there
+    pub patch: Patch,
+    /// the faces of the scan that were looked at: what is left of them stands in the patch
+    pub scanned: Vec<FaceId>,
+}
+
+impl Remesh {
+    /// Nothing meshed anew yet.
+    pub fn new(lattice: Lattice) -> Self {
+        let (restored, region, grown) = (Restored::default(), Region::default(), Table::default());
+        Self { lattice, restored, region, grown, bounds: CellBox::EMPTY }
+    }
+
+    pub fn lattice(&self) -> &Lattice {
+        &self.lattice
+    }
+
+    pub fn restored(&self) -> &Restored {
+        &self.restored
+    }
+
+    pub fn region(&self) -> &Region {
+        &self.region
+    }
+
+    /// Brings everything up to date with what came to the stores of `evidence`.
+    pub fn renew(&mut self, evidence: &Evidence<'_>, news: &News) -> Renewed {
+        let changed = self.restored.renew(evidence, &self.lattice, news);
+        let mut core = CellBox::EMPTY;
+        for node in &changed.nodes {
+            // the slope at a crossing is taken over the nodes beside it
+            core.take(&node.map(|x| x.saturating_sub(2)));
+            core.take(&node.map(|x| x.saturating_add(1)));
+        }
+        let mut blocks = Vec::new();
+        for (cell, ()) in cells_of(&changed).iter() {
+            let was_in = self.region.contains(&cell);
+            self.grown.remove(&cell);
+            if self.restored.is_in_region(cell) {
+                self.region.insert(cell, ());
+                self.bounds.take(&cell);
+            } else if was_in {
+                self.region.remove(&cell);
+                blocks.push(cell);
+            }
+        }
+        changed.open.iter().for_each(|cell| take_around(&mut core, cell));
+        self.grow(evidence, core, &blocks)
+    }
+
+    /// Makes the faces around `core`, and takes cells into the region where they cannot be joined to the scan.
+    ///
+    /// - `left`: cells that are in the region no more.
+    fn grow(&mut self, evidence: &Evidence<'_>, mut core: CellBox, left: &[Node]) -> Renewed {
+        let mut renewed = self.contoured(evidence, core, left);
+        for _ in 0..GROWTH {
+            let mut has_grown = false;
+            for open in renewed.patch.open.iter().filter(|open| open.is_scanned && self.restored.can_take(open.beyond)) {
+                has_grown |= self.region.insert_with(open.beyond, || ()).1;
+                self.grown.insert_with(open.beyond, || ());
+                self.bounds.take(&open.beyond);
+                take_around(&mut core, &open.beyond);
+            }
+            if !has_grown {
+                break;
+            }
+            renewed = self.contoured(evidence, core, left);
+        }
+        renewed
+    }
+
+    fn contoured(&self, evidence: &Evidence<'_>, core: CellBox, left: &[Node]) -> Renewed {
+        let Self { lattice, restored, region, bounds, .. } = self;
+        let mut cells = left.to_vec();
+        core.widened(2, 2).each_in(region, |cell, ()| cells.push(cell));
+        let scanned = faces_near(lattice, cells.into_iter(), evidence.tree);
+        let cut = Cut::of_faces(lattice, region, bounds, evidence.scan, &scanned);
+        let values = restored.values_in(&core.widened(1, 1));
+        let mut scratch = FieldScratch::default();
+        let patch = contour_in(lattice, region, &core, &values, &cut, &ContourParams::default(), |edge| {
+            crossing(restored, evidence, lattice, edge, &mut scratch)
+        });
+        Renewed { core, patch, scanned }
+    }
+}
+
+fn take_around(cells: &mut CellBox, cell: &Node) {
+    cells.take(&cell.map(|x| x.saturating_sub(1)));
+    cells.take(&cell.map(|x| x.saturating_add(1)));
+}
