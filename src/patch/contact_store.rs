@@ -43,6 +43,8 @@ struct Sums {
     weight: f64,
     /// whether it stands in [`ContactStore::changed`]
     is_noted: bool,
+    /// the mean when it was last told
+    told: (Point3<f64>, Vector3<f64>),
 }
 
 /// Contacts, by place and facing.
@@ -59,6 +61,10 @@ pub struct ContactStore {
 
 /// Normals whose components differ by less than this share a mean.
 const FACING: f64 = 0.25;
+/// A mean is told again when it has shifted along its normal by more than this, in cells: 5 µm for a ball of 1.5 mm …
+const SHIFT: f64 = 0.01;
+/// … or turned by more than this, rad: 0.3°, which are 5 µm a millimetre away.
+const TURN: f64 = 5e-3;
 
 impl ContactStore {
     /// An empty store of cells of edge `cell` (m), for queries up to `reach` (m).
@@ -73,30 +79,46 @@ impl ContactStore {
         let bin = Bin { cell: cell_of(&contact.point, self.cell), facing };
         let (index, is_new) = self.of_bin.insert_with(bin, || ());
         if is_new {
-            self.sums.push(Sums { point: Vector3::zeros(), normal: Vector3::zeros(), weight: 0.0, is_noted: false });
             let Contact { point, normal, weight } = *contact;
+            let (zero, told) = (Vector3::zeros(), (point, normal));
+            self.sums.push(Sums { point: zero, normal: zero, weight: 0.0, is_noted: true, told });
+            self.changed.push(index);
             self.means.push(MeanContact { point, normal, weight, is_fan: false });
             let (at, _) = self.nearby.insert_with(cell_of(&point, self.reach), Vec::new);
             self.nearby.value_mut(at).push(index);
         }
         let (sums, mean) = (&mut self.sums[index as usize], &mut self.means[index as usize]);
-        if !std::mem::replace(&mut sums.is_noted, true) {
-            self.changed.push(index);
-        }
         sums.point += contact.point.coords * contact.weight;
         sums.normal += contact.normal * contact.weight;
         sums.weight += contact.weight;
         mean.point = Point3::from(sums.point / sums.weight);
         mean.normal = sums.normal.try_normalize(0.0).unwrap_or(contact.normal);
-        mean.weight = sums.weight;
+        if is_new || mean.weight > 0.0 {
+            mean.weight = sums.weight;
+        }
+        let (point, normal) = &sums.told;
+        let is_shifted = (mean.point - point).dot(normal).abs() > SHIFT * self.cell
+            || (mean.normal - normal).norm_squared() > TURN * TURN;
+        if is_shifted && !std::mem::replace(&mut sums.is_noted, true) {
+            self.changed.push(index);
+        }
     }
 
-    /// The numbers of the means that came or changed since this was last asked, each once, in the order of their first
-    /// change.
+    /// The numbers of the means that came since this was last asked, or are clearly elsewhere than when they were last
+    /// told, each once.
     pub fn take_changed(&mut self) -> Vec<u32> {
         let changed = std::mem::take(&mut self.changed);
-        changed.iter().for_each(|&at| self.sums[at as usize].is_noted = false);
+        for &at in &changed {
+            let (sums, mean) = (&mut self.sums[at as usize], &self.means[at as usize]);
+            (sums.is_noted, sums.told) = (false, (mean.point, mean.normal));
+        }
         changed
+    }
+
+    /// Lets [`Self::take_changed`] tell all means.
+    pub fn note_all(&mut self) {
+        self.changed = (0..self.means.len() as u32).collect();
+        self.sums.iter_mut().for_each(|sums| sums.is_noted = true);
     }
 
     /// Takes a mean out of all queries, or back in; returns whether that is new.
@@ -200,13 +222,15 @@ mod tests {
     }
 
     #[test]
-    fn each_change_is_told_once() {
+    fn clear_changes_are_told_once() {
         let mut store = ContactStore::new(0.5e-3, 3e-3);
         for x in [0.6e-3, 0.1e-3, 0.2e-3, 0.7e-3] {
             store.add(&contact(x, Vector3::z(), 1.0));
         }
         assert_eq!((store.take_changed(), store.take_changed()), (vec![0, 1], vec![]));
         store.add(&contact(0.3e-3, Vector3::z(), 1.0));
+        assert_eq!(store.take_changed(), [], "it went along the surface");
+        store.add(&contact(0.3e-3, Vector3::new(0.1, 0.0, 0.995).normalize(), 1.0));
         assert_eq!(store.take_changed(), [1]);
     }
 }

@@ -131,6 +131,29 @@ struct Live {
     shown: Shown,
     /// what came to the stores since
     news: News,
+    /// what came and was taken in only nearby
+    late: News,
+    /// times since that was taken in as a whole
+    since_late: u32,
+}
+
+/// News are taken in as a whole each so many times, or when there is nothing else to do.
+const LATE_EVERY: u32 = 4;
+
+impl Live {
+    /// What is to be taken in nearby, and what as a whole.
+    fn take_news(&mut self) -> (News, News) {
+        let news = std::mem::take(&mut self.news);
+        self.since_late += 1;
+        if self.since_late < LATE_EVERY && !news.is_empty() {
+            self.late.extend(&news);
+            return (news, News::default());
+        }
+        self.since_late = 0;
+        let mut late = std::mem::take(&mut self.late);
+        late.extend(&news);
+        (news, late)
+    }
 }
 
 /// Edge of the cells of one mean contact, in radii.
@@ -198,6 +221,7 @@ impl Patcher {
     /// # Errors
     /// [`MeshError::TooMany`] when 32-bit ids do not suffice.
     pub fn patched(&mut self, scan: &TriMesh, tree: &FaceTree) -> Result<Patched, MeshError> {
+        self.contacts.note_all();
         self.settle(scan, tree);
         let (remesh, Renewed { patch, .. }) = self.meshed_anew(scan, tree);
         let (mesh, ids) = patch.applied_to(scan)?;
@@ -231,8 +255,10 @@ impl Patcher {
             remesh: Remesh::new(lattice_of(self.params.pitch)),
             shown: Shown::default(),
             news: self.all_news(),
+            late: News::default(),
+            since_late: 0,
         });
-        let news = std::mem::take(&mut live.news);
+        let (news, late) = live.take_news();
         let faces = scan.face_count() as f64 + live.shown.faces_more();
         let renewed = if faces > self.budget(scan) {
             let (remesh, mut renewed) = self.meshed_anew(scan, tree);
@@ -241,7 +267,7 @@ impl Patcher {
             renewed.scanned.extend(live.shown.scan_faces());
             renewed
         } else {
-            live.remesh.renew(&self.evidence(scan, tree), &news)
+            live.remesh.renew(&self.evidence(scan, tree), &news, &late)
         };
         let support = |key: &VertexKey| support_of(key, live.remesh.restored());
         let delta = live.shown.take(&renewed, live.remesh.region(), scan, support);
@@ -304,7 +330,7 @@ impl Patcher {
         let (evidence, news, budget) = (self.evidence(scan, tree), self.all_news(), self.budget(scan));
         let meshed = |pitch: f64| {
             let mut remesh = Remesh::new(lattice_of(pitch));
-            let renewed = remesh.renew(&evidence, &news);
+            let renewed = remesh.renew(&evidence, &news, &News::default());
             (remesh, renewed)
         };
         let mut made = meshed(self.params.pitch);

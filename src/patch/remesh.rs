@@ -57,9 +57,9 @@ impl Remesh {
         &self.region
     }
 
-    /// Brings everything up to date with what came to the stores of `evidence`.
-    pub fn renew(&mut self, evidence: &Evidence<'_>, news: &News) -> Renewed {
-        let changed = self.restored.renew(evidence, &self.lattice, news);
+    /// Brings everything up to date with what came to the stores of `evidence`: as [`Restored::renew`].
+    pub fn renew(&mut self, evidence: &Evidence<'_>, news: &News, late: &News) -> Renewed {
+        let changed = self.restored.renew(evidence, &self.lattice, news, late);
         let mut core = CellBox::EMPTY;
         for node in &changed.nodes {
             // the slope at a crossing is taken over the nodes beside it

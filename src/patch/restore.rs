@@ -56,6 +56,17 @@ pub(super) struct News {
     pub centres: Vec<Point3<f64>>,
 }
 
+impl News {
+    pub fn is_empty(&self) -> bool {
+        self.means.is_empty() && self.centres.is_empty()
+    }
+
+    pub fn extend(&mut self, more: &Self) {
+        self.means.extend_from_slice(&more.means);
+        self.centres.extend_from_slice(&more.centres);
+    }
+}
+
 /// What a renewal changed.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Changed {
@@ -87,6 +98,8 @@ const WIDEST: f64 = 2.7;
 const REACH: f64 = 2.8;
 /// … and within this many cells of a ball that went into the scan.
 const BALL_MARGIN: f64 = 2.0;
+/// News count most within this many radii.
+const NEAR: f64 = 1.1;
 /// A node whose value would change by less than this keeps it, in cells: a thousandth of what the tip resolves.
 const SLACK: f64 = 2e-3;
 /// What is filled in is filled in anew up to this many cells around what was looked at again.
@@ -94,8 +107,19 @@ const SETTLED: i32 = 4;
 
 impl Restored {
     /// Brings the field up to date with what came to the stores of `evidence`.
-    pub fn renew(&mut self, evidence: &Evidence<'_>, lattice: &Lattice, news: &News) -> Changed {
-        let mut look = self.known_near(evidence, lattice, news);
+    ///
+    /// - `news`: taken in up to where they count most.
+    /// - `late`: earlier news, taken in up to where they count at all.
+    pub fn renew(&mut self, evidence: &Evidence<'_>, lattice: &Lattice, news: &News, late: &News) -> Changed {
+        let mut look = Table::default();
+        if !self.nodes.is_empty() {
+            let p = evidence.params;
+            self.look_near(lattice, &news.means, NEAR * p.radius, &mut look);
+            self.look_near(lattice, &news.centres, p.radius, &mut look);
+            self.look_near(lattice, &late.means, p.field.reach.max(p.scan_removal + p.scan_reach), &mut look);
+            self.look_near(lattice, &late.centres, p.radius + p.swept_reach + p.scan_reach, &mut look);
+            self.look_at_ends(evidence, lattice, late, &mut look);
+        }
         self.widen(evidence, lattice, news, &mut look);
         let mut area = CellBox::EMPTY;
         let mut scratch = FieldScratch::default();
@@ -180,28 +204,35 @@ impl Restored {
         gone.chain(self.open.iter().filter(|(cell, ())| !old.contains(cell))).map(|(cell, ())| cell).collect()
     }
 
-    /// The known nodes whose finding may depend on the news.
-    fn known_near(&self, evidence: &Evidence<'_>, lattice: &Lattice, news: &News) -> Table<Node, Option<NodeState>> {
-        let mut look = Table::default();
-        if self.nodes.is_empty() {
-            return look;
-        }
-        let p = evidence.params;
-        let of_contact = p.field.reach.max(p.scan_removal + p.scan_reach);
-        let of_centre = p.radius.max(p.radius + p.swept_reach + p.scan_reach);
-        for (points, reach) in [(&news.means, of_contact), (&news.centres, of_centre)] {
-            let offsets = ball((reach / lattice.pitch).ceil() as i32 + 1);
-            for point in points {
-                let cell = lattice.cell_of(point);
-                for node in offsets.iter().map(|offset| moved(&cell, offset)) {
-                    let is_near = (lattice.position(node) - point).norm_squared() < reach * reach;
-                    if is_near && self.nodes.contains(&node) {
-                        look.insert_with(node, || None);
-                    }
+    /// Adds the known nodes within `reach` (m) of any of `points`.
+    fn look_near(
+        &self,
+        lattice: &Lattice,
+        points: &[Point3<f64>],
+        reach: f64,
+        look: &mut Table<Node, Option<NodeState>>,
+    ) {
+        let offsets = ball((reach / lattice.pitch).ceil() as i32 + 1);
+        for point in points {
+            let cell = lattice.cell_of(point);
+            for node in offsets.iter().map(|offset| moved(&cell, offset)) {
+                let is_near = (lattice.position(node) - point).norm_squared() < reach * reach;
+                if is_near && self.nodes.contains(&node) {
+                    look.insert_with(node, || None);
                 }
             }
         }
-        // whether a way ended depends on the way, and on contacts beside its end
+    }
+
+    /// Adds the ends of ways near the news: whether a way ended there depends on the way, and on contacts beside its end.
+    fn look_at_ends(
+        &self,
+        evidence: &Evidence<'_>,
+        lattice: &Lattice,
+        news: &News,
+        look: &mut Table<Node, Option<NodeState>>,
+    ) {
+        let p = evidence.params;
         for (end, ()) in self.ends.iter() {
             let x = lattice.position(end);
             let is_near = |points: &[Point3<f64>], reach: f64| points.iter().any(|p| (p - x).norm() < reach);
@@ -209,7 +240,6 @@ impl Restored {
                 look.insert_with(end, || None);
             }
         }
-        look
     }
 
     /// Adds the nodes near contacts, and those near the ball where it went into the scan.
