@@ -7,28 +7,53 @@ use super::evidence::{Evidence, Source};
 use super::field::FieldScratch;
 use super::lattice::{Edge, Lattice, Node, stepped};
 use super::restore::Restored;
+use super::table::Table;
 
 /// Steps towards the zero of the touched field: the values at the ends are its own, so few are needed.
 const STEPS: usize = 3;
 
-/// The crossing of an edge whose ends differ in sign: by the touched field itself between touched nodes, else between
-/// the values at the ends.
-pub(super) fn crossing(
-    restored: &Restored,
-    evidence: &Evidence<'_>,
-    lattice: &Lattice,
-    edge: &Edge,
-    scratch: &mut FieldScratch,
-) -> Crossing {
+/// Crossings of the touched field, kept as long as the values at both ends stay.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Crossings {
+    known: Table<Edge, Known>,
+    scratch: FieldScratch,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Known {
+    crossing: Crossing,
+    /// the renewals that gave the ends their values
+    renewals: [u32; 2],
+}
+
+impl Crossings {
+    /// The crossing of an edge whose ends differ in sign: by the touched field itself between touched nodes, else between
+    /// the values at the ends.
+    pub fn at(&mut self, restored: &Restored, evidence: &Evidence<'_>, lattice: &Lattice, edge: &Edge) -> Crossing {
+        let ends = [edge.node, edge.end()];
+        let [Some(a), Some(b)] = ends.map(|node| restored.nodes.get(&node)) else {
+            return between(restored, lattice, edge, [0.0; 2]);
+        };
+        let values = [a.value, b.value];
+        if [a, b].iter().any(|state| state.source != Source::Touch) {
+            return between(restored, lattice, edge, values);
+        }
+        let renewals = [a.renewal, b.renewal];
+        if let Some(known) = self.known.get(edge).filter(|known| known.renewals == renewals) {
+            return known.crossing;
+        }
+        let [a, b] = ends.map(|node| lattice.position(node));
+        let crossing = of_touches(evidence, [&a, &b], values, &mut self.scratch)
+            .unwrap_or_else(|| between(restored, lattice, edge, values));
+        self.known.insert(*edge, Known { crossing, renewals });
+        crossing
+    }
+}
+
+/// The crossing of an edge by the values at its ends.
+fn between(restored: &Restored, lattice: &Lattice, edge: &Edge, values: [f64; 2]) -> Crossing {
     let ends = [edge.node, edge.end()];
     let [a, b] = ends.map(|node| lattice.position(node));
-    let values = ends.map(|node| restored.nodes.get(&node).map_or(0.0, |state| state.value));
-    let is_touched = |node: &Node| restored.nodes.get(node).is_some_and(|state| state.source == Source::Touch);
-    if ends.iter().all(is_touched)
-        && let Some(crossing) = of_touches(evidence, [&a, &b], values, scratch)
-    {
-        return crossing;
-    }
     let share = share_of(values);
     let slope = gradient(restored, &ends[0]) * (1.0 - share) + gradient(restored, &ends[1]) * share;
     let outward = (b - a) * (values[1] - values[0]).signum();

@@ -2,10 +2,9 @@
 
 use super::Region;
 use super::contour::{ContourParams, contour_in};
-use super::crossing::crossing;
+use super::crossing::Crossings;
 use super::cut::{Cut, faces_near};
 use super::evidence::Evidence;
-use super::field::FieldScratch;
 use super::lattice::{CellBox, Lattice, Node};
 use super::restore::{News, Restored, cells_of};
 use super::splice::Patch;
@@ -25,6 +24,7 @@ pub(super) struct Remesh {
     grown: Table<Node, ()>,
     /// a box that holds the region
     bounds: CellBox,
+    crossings: Crossings,
 }
 
 /// The new faces in and around a part of the lattice.
@@ -41,8 +41,14 @@ pub(super) struct Renewed {
 impl Remesh {
     /// Nothing meshed anew yet.
     pub fn new(lattice: Lattice) -> Self {
-        let (restored, region, grown) = (Restored::default(), Region::default(), Table::default());
-        Self { lattice, restored, region, grown, bounds: CellBox::EMPTY }
+        Self {
+            lattice,
+            restored: Restored::default(),
+            region: Region::default(),
+            grown: Table::default(),
+            bounds: CellBox::EMPTY,
+            crossings: Crossings::default(),
+        }
     }
 
     pub fn lattice(&self) -> &Lattice {
@@ -103,16 +109,15 @@ impl Remesh {
         renewed
     }
 
-    fn contoured(&self, evidence: &Evidence<'_>, core: CellBox, left: &[Node]) -> Renewed {
-        let Self { lattice, restored, region, bounds, .. } = self;
+    fn contoured(&mut self, evidence: &Evidence<'_>, core: CellBox, left: &[Node]) -> Renewed {
+        let Self { lattice, restored, region, bounds, crossings, .. } = self;
         let mut cells = left.to_vec();
         core.widened(2, 2).each_in(region, |cell, ()| cells.push(cell));
         let scanned = faces_near(lattice, cells.into_iter(), evidence.tree);
         let cut = Cut::of_faces(lattice, region, bounds, evidence.scan, &scanned);
         let values = restored.values_in(&core.widened(1, 1));
-        let mut scratch = FieldScratch::default();
         let patch = contour_in(lattice, region, &core, &values, &cut, &ContourParams::default(), |edge| {
-            crossing(restored, evidence, lattice, edge, &mut scratch)
+            crossings.at(restored, evidence, lattice, edge)
         });
         Renewed { core, patch, scanned }
     }

@@ -24,6 +24,8 @@ pub(super) struct NodeState {
     pub least: f64,
     /// … and ended its way here without touching anything, deep inside the scan
     pub is_free_end: bool,
+    /// number of the renewal that gave it this value
+    pub renewal: u32,
 }
 
 impl NodeState {
@@ -88,6 +90,7 @@ pub(super) struct Restored {
     /// cells with a contact, and with a ball that went into the scan: what is around them is looked at
     touched: Table<Node, ()>,
     swept: Table<Node, ()>,
+    renewals: u32,
 }
 
 /// A touched node within this many cells of the surface counts as outside.
@@ -100,8 +103,8 @@ const REACH: f64 = 2.8;
 const BALL_MARGIN: f64 = 2.0;
 /// News count most within this many radii.
 const NEAR: f64 = 1.1;
-/// A node whose value would change by less than this keeps it, in cells: a thousandth of what the tip resolves.
-const SLACK: f64 = 2e-3;
+/// A node whose value would change by less than this keeps it, in cells: 3 µm for a ball of 1.5 mm.
+const SLACK: f64 = 4e-3;
 /// What is filled in is filled in anew up to this many cells around what was looked at again.
 const SETTLED: i32 = 4;
 
@@ -111,6 +114,7 @@ impl Restored {
     /// - `news`: taken in up to where they count most.
     /// - `late`: earlier news, taken in up to where they count at all.
     pub fn renew(&mut self, evidence: &Evidence<'_>, lattice: &Lattice, news: &News, late: &News) -> Changed {
+        self.renewals += 1;
         let mut look = Table::default();
         if !self.nodes.is_empty() {
             let p = evidence.params;
@@ -171,12 +175,16 @@ impl Restored {
         complete(self, &at, &params);
         let mut changed = Changed::default();
         for (&at, was) in at.iter().zip(&was) {
-            let (node, state) = *self.nodes.entry(at);
+            let (node, now) = *self.nodes.entry(at);
+            let state = self.nodes.value_mut(at);
             match was {
-                Some(was) if !state.differs(was, SLACK * lattice.pitch) => {
-                    self.nodes.value_mut(at).value = was.value.max(state.least);
+                Some(was) if !now.differs(was, SLACK * lattice.pitch) => {
+                    (state.value, state.renewal) = (was.value.max(now.least), was.renewal);
                 }
-                _ => changed.nodes.push(node),
+                _ => {
+                    state.renewal = self.renewals;
+                    changed.nodes.push(node);
+                }
             }
         }
         changed.open = self.renew_open(&area, &params);
@@ -318,6 +326,7 @@ fn evaluate(evidence: &Evidence<'_>, lattice: &Lattice, node: Node, scratch: &mu
         straight: found.straight.map_or((0.0, 0.0), |(value, share)| (value.clamp(-widest, widest), share)),
         least,
         is_free_end: least > 0.0 && found.is_free_end && found.scan < -evidence.params.scan_reach,
+        renewal: 0,
     })
 }
 
