@@ -12,6 +12,7 @@
 //! | [`mesh`] | the triangle mesh, its closest face, its Laplacian |
 //! | [`patch`] | the scan meshed anew where it was touched |
 //! | [`refine`] | [`refine::Refiner::push`]: one sample moves the mesh |
+//! | [`live`] | both rates: [`refine`] at every sample, [`patch`] beside it on a thread of its own |
 //! | [`sim`] | known surfaces, a scanner and a stylus to test against |
 //! | [`io`] | mesh files and recordings; with [`scene`] the only file access |
 //! | [`scene`] | the YAML that names the parts of a scene |
@@ -38,6 +39,7 @@ struct Readme;
 
 pub mod cli;
 pub mod io;
+pub mod live;
 pub mod mesh;
 pub mod patch;
 pub mod refine;

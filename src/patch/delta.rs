@@ -13,7 +13,7 @@ use crate::mesh::{FaceId, TriMesh};
 /// What changed in the patch.
 #[derive(Clone, Debug, Default)]
 pub struct PatchDelta {
-    /// samples up to this stamp are in it, ns
+    /// what was touched up to this stamp is in it, ns
     pub until_ns: i64,
     /// vertices that are new, have moved, or are corners of `faces`
     pub vertices: Vec<PatchVertex>,

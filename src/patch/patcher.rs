@@ -122,6 +122,8 @@ pub struct Patcher {
     /// the box around the scan in which contacts may be its own, once the scan is known
     bounds: Option<[Point3<f64>; 2]>,
     live: Option<Live>,
+    /// stamp of the last touch that counts, ns
+    until_ns: i64,
 }
 
 /// The patch that a mesh follows.
@@ -190,6 +192,7 @@ impl Patcher {
             swept: SweptSpace::new(SWEPT_CELL * radius, 5.0 / 3.0 * radius),
             bounds: None,
             live: None,
+            until_ns: i64::MIN,
             params,
         })
     }
@@ -203,14 +206,20 @@ impl Patcher {
     /// is complete.
     pub fn push(&mut self, sample: &Sample) {
         let tip = self.compensator.compensate(sample);
-        let Self { finder, contacts, swept, .. } = self;
-        finder.push(&tip, |touch| keep(contacts, swept, &touch));
+        let Self { finder, contacts, swept, until_ns, .. } = self;
+        finder.push(&tip, |touch| {
+            keep(contacts, swept, &touch);
+            *until_ns = touch.stamp_ns;
+        });
     }
 
     /// Takes in what is still in the smoothing window: the stream has ended or pauses.
     pub fn flush(&mut self) {
-        let Self { finder, contacts, swept, .. } = self;
-        finder.flush(|touch| keep(contacts, swept, &touch));
+        let Self { finder, contacts, swept, until_ns, .. } = self;
+        finder.flush(|touch| {
+            keep(contacts, swept, &touch);
+            *until_ns = touch.stamp_ns;
+        });
     }
 
     /// The scan with its touched part meshed anew from all that counts so far; vertices and faces that were not touched
@@ -248,8 +257,7 @@ impl Patcher {
     /// nothing was felt by more.
     ///
     /// - `scan`, `tree`: as in [`Self::patched`], the same each time.
-    /// - `until_ns`: stamp of the last sample.
-    pub fn renewed(&mut self, scan: &TriMesh, tree: &FaceTree, until_ns: i64) -> PatchDelta {
+    pub fn renewed(&mut self, scan: &TriMesh, tree: &FaceTree) -> PatchDelta {
         self.settle(scan, tree);
         let mut live = self.live.take().unwrap_or_else(|| Live {
             remesh: Remesh::new(lattice_of(self.params.pitch)),
@@ -272,7 +280,7 @@ impl Patcher {
         let support = |key: &VertexKey| support_of(key, live.remesh.restored());
         let delta = live.shown.take(&renewed, live.remesh.region(), scan, support);
         self.live = Some(live);
-        PatchDelta { until_ns, ..delta }
+        PatchDelta { until_ns: self.until_ns, ..delta }
     }
 
     /// Decides which contacts count and which are those of an edge, where anything came since it was last decided.

@@ -2,9 +2,11 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::followed::FollowedPatch;
 use super::guard::{GuardParams, Verdict};
 use super::roi::{Roi, RoiSize};
-use crate::mesh::{FaceHit, FaceId, FaceTree, RefitPlan, TriMesh, VertexId};
+use crate::mesh::{FaceHit, FaceId, FaceTree, MeshError, RefitPlan, TriMesh, VertexId};
+use crate::patch::PatchDelta;
 
 /// An update that would break the mesh is tried again at this share of its length …
 const CUT: f64 = 0.35;
@@ -38,10 +40,13 @@ pub(super) struct DeformableMesh {
     pub mean_edge: f64,
     /// vertices stay within this distance of where they were scanned, m
     pub largest_move: f64,
+    /// stamp of the sample at hand, ns
+    pub now_ns: i64,
     /// counts the edits, so that a region knows whether others came between
     edits: u64,
     displacements: Vec<Vector3<f64>>,
     before: Vec<Point3<f64>>,
+    patch: Option<FollowedPatch>,
 }
 
 /// A region of interest with the edit after which it was last looked at.
@@ -56,6 +61,12 @@ impl HandleRegion {
     /// The face that was moved last.
     pub fn handle(&self) -> Option<FaceId> {
         self.roi.handle()
+    }
+
+    /// Forgets the face that was moved last: faces came or went.
+    pub fn forget(&mut self) {
+        self.roi.forget();
+        self.seen = None;
     }
 
     /// The vertices that the last update moved.
@@ -78,9 +89,11 @@ impl DeformableMesh {
             guard,
             mean_edge,
             largest_move: f64::INFINITY,
+            now_ns: i64::MIN,
             edits: 0,
             displacements: Vec::new(),
             before: Vec::new(),
+            patch: None,
             mesh,
             tree,
         }
@@ -131,7 +144,46 @@ impl DeformableMesh {
         self.tree.refit_planned(&self.mesh, &mut region.refit);
         self.edits += 1;
         region.seen = Some(self.edits);
+        if let Some(patch) = &mut self.patch {
+            patch.note_moved(&region.roi.vertices, self.now_ns);
+        }
         fit
+    }
+
+    /// Makes ready to follow a patch, with room for so many new faces.
+    pub fn expect_patch(&mut self, faces: usize) -> Result<(), MeshError> {
+        self.mesh.reserve(faces / 2, faces)?;
+        self.tree.reserve(faces)?;
+        self.scanned.reserve(faces / 2);
+        self.evidence.reserve(faces);
+        self.patch = Some(FollowedPatch::new(&self.mesh, faces / 2));
+        Ok(())
+    }
+
+    /// Whether all corners of a face were touched: the patch alone moves it then.
+    #[inline]
+    pub fn is_stiff(&self, face: FaceId) -> bool {
+        self.patch.as_ref().is_some_and(|patch| self.mesh.corners(face).into_iter().all(|v| patch.is_touched(v)))
+    }
+
+    /// Takes up what changed in the patch, and puts back what was moved before that; returns whether anything changed.
+    pub fn follow(&mut self, delta: &PatchDelta) -> Result<bool, MeshError> {
+        let Some(patch) = &mut self.patch else { return Ok(false) };
+        let has_put_back = patch.put_back(&mut self.mesh, &mut self.tree, &self.scanned, delta.until_ns);
+        if !delta.is_empty() {
+            patch.apply(delta, &mut self.mesh, &mut self.tree)?;
+            self.scanned.resize(self.mesh.vertex_slots(), Point3::origin());
+            for (&vertex, placed) in patch.placed().iter().zip(&delta.vertices) {
+                self.scanned[vertex.0 as usize] = placed.position;
+            }
+            self.evidence.resize(self.mesh.face_slots(), [0.0; 3]);
+            for &face in patch.added() {
+                self.evidence[face.0 as usize] = self.mesh.normal(face).cast::<f32>().into();
+            }
+        }
+        let has_changed = has_put_back || !delta.is_empty();
+        self.edits += u64::from(has_changed);
+        Ok(has_changed)
     }
 
     /// Puts the region at the largest share of its displacement that leaves the mesh sound.
@@ -181,9 +233,10 @@ impl DeformableMesh {
         let mut longest = 0.0f64;
         for (&vertex, weights) in roi.vertices.iter().zip(&roi.weights) {
             let here = self.mesh.position(vertex);
+            let is_stiff = self.patch.as_ref().is_some_and(|patch| patch.is_touched(vertex));
             let mut step = steps[0] * weights[0] + steps[1] * weights[1] + steps[2] * weights[2];
             let (way, next) = (here - self.scanned[vertex.0 as usize], here + step - self.scanned[vertex.0 as usize]);
-            if next.norm_squared() > self.largest_move * self.largest_move && next.norm() > way.norm() {
+            if is_stiff || next.norm_squared() > self.largest_move * self.largest_move && next.norm() > way.norm() {
                 step = Vector3::zeros();
             }
             longest = longest.max(step.norm_squared());

@@ -7,6 +7,7 @@
 mod collision;
 mod deform;
 pub mod dynamics;
+mod followed;
 mod guard;
 mod marks;
 mod params;
@@ -27,6 +28,7 @@ pub use roi::RoiSize;
 pub use sliding::{Ball, SlidingParams, TipMotion};
 
 use crate::mesh::{FaceHit, FaceId, MeshError, TriMesh, VertexId};
+use crate::patch::PatchDelta;
 use crate::touch::{BiasTracker, Compensator, ContactGate, FrictionCoefficient, Sample, SampleError, SettingError};
 use deform::{DeformableMesh, HandleRegion};
 use dynamics::turn;
@@ -234,6 +236,7 @@ impl Refiner {
         sample.check()?;
         let dt = sample.seconds_since(self.last_ns)?;
         self.last_ns = Some(sample.stamp_ns);
+        self.deformable.now_ns = sample.stamp_ns;
         let mut tip = self.compensator.compensate(sample);
         if let Some(bias) = &mut self.bias {
             tip.force_o = bias.compensate(&tip);
@@ -280,7 +283,8 @@ impl Refiner {
         let untouched = Ok(Update { case, mismatch: Some(mismatch), fit: None });
         let face = &pressing.face;
         // without area a face has no normal; turned away from what is felt it is another surface
-        if face.n == Vector3::zeros() || face.n.dot(&pressing.normal) < self.params.smallest_contact_cosine {
+        let is_apart = face.n == Vector3::zeros() || face.n.dot(&pressing.normal) < self.params.smallest_contact_cosine;
+        if is_apart || self.deformable.is_stiff(pressing.handle) {
             return untouched;
         }
         self.counts.clamped += u64::from(self.params.dynamics.model.clamps(pressing.force_o.dot(&face.n)));
@@ -365,6 +369,9 @@ impl Refiner {
         };
         let reach = self.params.tip.radius - tolerance;
         let Some(hit) = self.deformable.closest(&centre, hint, reach) else { return update };
+        if self.deformable.is_stiff(hit.face) {
+            return update;
+        }
         let Some((away, depth)) = self.penetration(&centre, &hit) else { return update };
         let share = -(-carve.rate * dt).exp_m1();
         let way =
@@ -391,6 +398,29 @@ impl Refiner {
         // beside a rim the arm says little about inside and outside
         let away = if height.abs() <= SIDEWAYS * distance { normal } else { arm * (height.signum() / distance) };
         Some((away, self.params.tip.radius - distance.copysign(height)))
+    }
+
+    /// Makes ready to follow a patch, with room for so many new faces: more are taken in all the same, with a pause.
+    ///
+    /// # Errors
+    /// [`MeshError::TooMany`] where memory is short.
+    pub fn expect_patch(&mut self, faces: usize) -> Result<(), RefineError> {
+        Ok(self.deformable.expect_patch(faces)?)
+    }
+
+    /// Takes up what changed in the patch of this scan. What this moved up to the patch's last touch goes back to where scan
+    /// and patch have it; what was touched stands in the patch now, which alone moves it from then on. Does nothing before
+    /// [`Self::expect_patch`].
+    ///
+    /// # Errors
+    /// [`MeshError::TooMany`] when 32-bit ids do not suffice, [`MeshError::NotFinite`]; the mesh is torn then.
+    pub fn follow(&mut self, delta: &PatchDelta) -> Result<(), RefineError> {
+        if self.deformable.follow(delta)? {
+            self.contact_region.forget();
+            self.carve_region.forget();
+            self.begun = None;
+        }
+        Ok(())
     }
 
     fn count(&mut self, fit: Fit) {

@@ -79,6 +79,11 @@ impl Roi {
         self.handle
     }
 
+    /// Forgets what it was made for.
+    pub fn forget(&mut self) {
+        self.handle = None;
+    }
+
     /// Makes the region of `handle`.
     pub fn rebuild(&mut self, mesh: &TriMesh, handle: FaceId, size: RoiSize) {
         self.handle = Some(handle);

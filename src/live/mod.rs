@@ -1,0 +1,185 @@
+//! Two rates: the haptic update answers every sample at once, the patch follows beside it on a thread of its own.
+//!
+//! When the patch is renewed, and at which sample its change is taken up, follows from the stamps alone. So the result
+//! never depends on how fast the machine is: where the patch is late, [`LiveRefiner::push`] waits for it.
+
+mod worker;
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use crate::mesh::{FaceTree, TriMesh};
+use crate::patch::{PatchDelta, Patcher};
+use crate::refine::{RefineError, Refiner, Update};
+use crate::touch::{Sample, SettingError};
+use worker::Worker;
+
+/// Why a sample was not taken.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum LiveError {
+    /// The haptic update refused it.
+    #[error(transparent)]
+    Refine(#[from] RefineError),
+    /// A setting outside its range.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    /// The system gives no thread.
+    #[error("no thread for the patch: {0}; end other programs, or leave `patch` out of the scene")]
+    NoThread(String),
+    /// The thread of the patch ended.
+    #[error("the thread of the patch ended by a fault of touchup: please report it with the recording")]
+    Stopped,
+}
+
+/// When the patch is renewed, in time of the samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pace {
+    /// time from one renewal to the next, ns
+    pub every_ns: i64,
+    /// … and from a renewal until its change is taken up, ns: what the thread of the patch has for it
+    pub after_ns: i64,
+}
+
+impl Default for Pace {
+    /// 10 ms and 8 ms: with a smoothing window of 32 ms to either side, a touch is in the mesh after 50 ms at most.
+    fn default() -> Self {
+        Self { every_ns: 10_000_000, after_ns: 8_000_000 }
+    }
+}
+
+impl Pace {
+    fn check(&self) -> Result<(), SettingError> {
+        let (every, after) = (self.every_ns as f64, self.after_ns as f64);
+        SettingError::check("time between renewals of the patch (ns)", every, every > 0.0, "more than 0")?;
+        SettingError::check("time for a renewal of the patch (ns)", after, after >= 0.0, "0 or more")
+    }
+}
+
+/// How far the patch was behind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LiveCounts {
+    /// renewals taken up
+    pub renewals: u64,
+    /// those for which a push had to wait
+    pub waits: u64,
+}
+
+/// Refines a scan by touch, sample by sample, with the patch beside it.
+#[derive(Debug)]
+pub struct LiveRefiner {
+    refiner: Refiner,
+    worker: Worker,
+    pace: Pace,
+    /// samples since the last renewal
+    batch: Vec<Sample>,
+    /// number of the time between two renewals in which the last sample lies
+    slot: Option<i64>,
+    /// when the changes that were asked for are to be taken up, ns
+    due_ns: VecDeque<i64>,
+    /// the change that was taken up last
+    delta: PatchDelta,
+    counts: LiveCounts,
+}
+
+impl LiveRefiner {
+    /// Puts the two side by side; starts the thread.
+    ///
+    /// - `scan`: as it came, with the tree over its faces; `refiner` was made of the same.
+    /// - `room`: for so many new faces memory is taken now; more are taken in all the same, with a pause.
+    ///
+    /// # Errors
+    /// [`LiveError::Setting`], [`LiveError::Refine`] where memory is short, [`LiveError::NoThread`].
+    pub fn new(
+        scan: Arc<(TriMesh, FaceTree)>,
+        mut refiner: Refiner,
+        patcher: Patcher,
+        pace: Pace,
+        room: usize,
+    ) -> Result<Self, LiveError> {
+        pace.check()?;
+        refiner.expect_patch(room)?;
+        Ok(Self {
+            refiner,
+            worker: Worker::new(scan, patcher)?,
+            pace,
+            batch: Vec::new(),
+            slot: None,
+            due_ns: VecDeque::new(),
+            delta: PatchDelta::default(),
+            counts: LiveCounts::default(),
+        })
+    }
+
+    /// Takes the next sample and moves the mesh by what it tells, then by what the patch has found that is due by now.
+    ///
+    /// # Errors
+    /// Those of [`Refiner::push`], by which nothing is changed, and [`LiveError::Stopped`].
+    pub fn push(&mut self, sample: &Sample) -> Result<Update, LiveError> {
+        let update = self.refiner.push(sample)?;
+        let slot = sample.stamp_ns.div_euclid(self.pace.every_ns);
+        if self.slot.replace(slot).is_some_and(|before| slot > before) {
+            self.ask()?;
+            self.due_ns.push_back(slot.saturating_mul(self.pace.every_ns).saturating_add(self.pace.after_ns));
+        }
+        self.batch.push(*sample);
+        while self.due_ns.front().is_some_and(|&due_ns| due_ns <= sample.stamp_ns) {
+            self.take_up()?;
+        }
+        Ok(update)
+    }
+
+    /// Waits until the patch knows all samples so far, as after a pause.
+    ///
+    /// # Errors
+    /// [`LiveError::Stopped`], [`LiveError::Refine`].
+    pub fn catch_up(&mut self) -> Result<(), LiveError> {
+        self.ask()?;
+        // the second time for what was taken in only nearby
+        self.worker.ask_all()?;
+        self.worker.ask_all()?;
+        self.due_ns.extend([i64::MAX; 3]);
+        while !self.due_ns.is_empty() {
+            self.take_up()?;
+        }
+        Ok(())
+    }
+
+    /// Hands the samples over.
+    fn ask(&mut self) -> Result<(), LiveError> {
+        let batch = std::mem::replace(&mut self.batch, self.worker.empty_batch());
+        self.worker.ask(batch)
+    }
+
+    fn take_up(&mut self) -> Result<(), LiveError> {
+        self.due_ns.pop_front();
+        let (delta, has_waited) = self.worker.answer()?;
+        self.delta = delta;
+        self.counts.renewals += 1;
+        self.counts.waits += u64::from(has_waited);
+        Ok(self.refiner.follow(&self.delta)?)
+    }
+
+    /// The haptic update, with the mesh as it stands.
+    pub fn refiner(&self) -> &Refiner {
+        &self.refiner
+    }
+
+    /// The change of the patch that was taken up last.
+    pub fn delta(&self) -> &PatchDelta {
+        &self.delta
+    }
+
+    /// How far the patch was behind.
+    pub fn counts(&self) -> LiveCounts {
+        self.counts
+    }
+
+    /// Ends the thread; gives both back.
+    ///
+    /// # Errors
+    /// [`LiveError::Stopped`].
+    pub fn finish(mut self) -> Result<(Refiner, Patcher), LiveError> {
+        self.catch_up()?;
+        Ok((self.refiner, self.worker.finish()?))
+    }
+}

@@ -1,0 +1,91 @@
+//! The thread of the patch.
+
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
+use std::thread::{Builder, JoinHandle};
+
+use super::LiveError;
+use crate::mesh::{FaceTree, TriMesh};
+use crate::patch::{PatchDelta, Patcher};
+use crate::touch::Sample;
+
+/// What the thread is asked for.
+enum Question {
+    /// take these in, and tell what changed
+    Renew(Vec<Sample>),
+    /// take in what is still in the smoothing window, and tell what changed
+    Flush,
+}
+
+struct Answer {
+    delta: PatchDelta,
+    /// to be filled again
+    batch: Vec<Sample>,
+}
+
+/// A patcher on a thread of its own. Each question has one answer, in the same order; no more questions are open than
+/// renewals fit into the time that one of them has.
+#[derive(Debug)]
+pub(super) struct Worker {
+    questions: Sender<Question>,
+    answers: Receiver<Answer>,
+    thread: JoinHandle<Patcher>,
+    batches: Vec<Vec<Sample>>,
+}
+
+impl Worker {
+    pub fn new(scan: Arc<(TriMesh, FaceTree)>, mut patcher: Patcher) -> Result<Self, LiveError> {
+        let (questions, inbox) = channel::<Question>();
+        let (outbox, answers) = channel();
+        let work = move || {
+            for question in inbox {
+                let mut batch = Vec::new();
+                match question {
+                    Question::Renew(samples) => {
+                        samples.iter().for_each(|sample| patcher.push(sample));
+                        batch = samples;
+                        batch.clear();
+                    }
+                    Question::Flush => patcher.flush(),
+                }
+                let delta = patcher.renewed(&scan.0, &scan.1);
+                if outbox.send(Answer { delta, batch }).is_err() {
+                    break;
+                }
+            }
+            patcher
+        };
+        let thread = Builder::new().name("patch".to_owned()).spawn(work);
+        let thread = thread.map_err(|error| LiveError::NoThread(error.to_string()))?;
+        Ok(Self { questions, answers, thread, batches: Vec::new() })
+    }
+
+    pub fn empty_batch(&mut self) -> Vec<Sample> {
+        self.batches.pop().unwrap_or_default()
+    }
+
+    pub fn ask(&self, samples: Vec<Sample>) -> Result<(), LiveError> {
+        self.questions.send(Question::Renew(samples)).map_err(|_| LiveError::Stopped)
+    }
+
+    /// Asks to take in everything that was handed over; has one answer more.
+    pub fn ask_all(&self) -> Result<(), LiveError> {
+        self.questions.send(Question::Flush).map_err(|_| LiveError::Stopped)
+    }
+
+    /// The next answer, and whether it had to be waited for.
+    pub fn answer(&mut self) -> Result<(PatchDelta, bool), LiveError> {
+        let (answer, has_waited) = match self.answers.try_recv() {
+            Ok(answer) => (answer, false),
+            Err(TryRecvError::Empty) => (self.answers.recv().map_err(|_| LiveError::Stopped)?, true),
+            Err(TryRecvError::Disconnected) => return Err(LiveError::Stopped),
+        };
+        self.batches.push(answer.batch);
+        Ok((answer.delta, has_waited))
+    }
+
+    pub fn finish(self) -> Result<Patcher, LiveError> {
+        drop(self.questions);
+        self.thread.join().map_err(|_| LiveError::Stopped)
+    }
+}

@@ -1,0 +1,102 @@
+//! The patch in the mesh that the haptic update works on.
+//!
+//! What the patch knows from touches is stiff. What the update moves of the rest, scan and guesses, is there at once, and
+//! for the moment: when the patch has caught up with that touch it is put back, and what was felt stands in the patch.
+
+use nalgebra::Point3;
+
+use crate::mesh::{FaceId, FaceTree, MeshError, TriMesh, VertexId};
+use crate::patch::{PatchDelta, Splice, Support};
+
+/// Never moved.
+const NEVER: i64 = i64::MIN;
+
+/// The patch as the mesh shows it, and what was moved beside it.
+#[derive(Clone, Debug)]
+pub(super) struct FollowedPatch {
+    splice: Splice,
+    /// for each vertex, whether it was touched
+    is_touched: Vec<bool>,
+    /// vertices that are not where scan and patch have them
+    moved: Vec<VertexId>,
+    /// … and when each of them moved last, ns
+    moved_ns: Vec<i64>,
+    refit: Vec<FaceId>,
+}
+
+impl FollowedPatch {
+    /// For a scan without a patch, with room for so many new vertices.
+    pub fn new(scan: &TriMesh, vertices: usize) -> Self {
+        let slots = scan.vertex_slots();
+        let (mut is_touched, mut moved_ns) = (Vec::with_capacity(slots + vertices), Vec::with_capacity(slots + vertices));
+        is_touched.resize(slots, false);
+        moved_ns.resize(slots, NEVER);
+        Self { splice: Splice::default(), is_touched, moved: Vec::new(), moved_ns, refit: Vec::new() }
+    }
+
+    #[inline]
+    pub fn is_touched(&self, vertex: VertexId) -> bool {
+        self.is_touched[vertex.0 as usize]
+    }
+
+    /// Remembers that these were moved.
+    pub fn note_moved(&mut self, vertices: &[VertexId], stamp_ns: i64) {
+        for &vertex in vertices {
+            let moved_ns = &mut self.moved_ns[vertex.0 as usize];
+            if *moved_ns == NEVER {
+                self.moved.push(vertex);
+            }
+            *moved_ns = stamp_ns;
+        }
+    }
+
+    /// Puts vertices that moved last at `until_ns` or before back to where they were `scanned`, or are in the patch; returns
+    /// whether there was any.
+    pub fn put_back(
+        &mut self,
+        mesh: &mut TriMesh,
+        tree: &mut FaceTree,
+        scanned: &[Point3<f64>],
+        until_ns: i64,
+    ) -> bool {
+        let Self { moved, moved_ns, refit, .. } = self;
+        refit.clear();
+        moved.retain(|&vertex| {
+            let at = vertex.0 as usize;
+            let is_late = moved_ns[at] > until_ns;
+            if !is_late {
+                moved_ns[at] = NEVER;
+                if mesh.position(vertex) != scanned[at] {
+                    mesh.set_position(vertex, scanned[at]);
+                    refit.extend_from_slice(mesh.star(vertex));
+                }
+            }
+            is_late
+        });
+        refit.sort_unstable();
+        refit.dedup();
+        tree.refit(mesh, refit);
+        !refit.is_empty()
+    }
+
+    /// Brings the mesh up to date with the patch.
+    pub fn apply(&mut self, delta: &PatchDelta, mesh: &mut TriMesh, tree: &mut FaceTree) -> Result<(), MeshError> {
+        self.splice.apply(delta, mesh, tree)?;
+        self.is_touched.resize(mesh.vertex_slots(), false);
+        self.moved_ns.resize(mesh.vertex_slots(), NEVER);
+        for (vertex, placed) in self.splice.placed().iter().zip(&delta.vertices) {
+            self.is_touched[vertex.0 as usize] = placed.support == Support::Touched;
+        }
+        Ok(())
+    }
+
+    /// The faces that the last delta added.
+    pub fn added(&self) -> &[FaceId] {
+        self.splice.added()
+    }
+
+    /// The vertices of the last delta, in its order.
+    pub fn placed(&self) -> &[VertexId] {
+        self.splice.placed()
+    }
+}
