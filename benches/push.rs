@@ -6,48 +6,24 @@
 //!
 //! `cargo bench --bench push [-- FACES…]`
 
+#[path = "common/slide.rs"]
+mod slide;
 #[path = "../tests/common/wavy.rs"]
 mod wavy;
 
 use std::hint::black_box;
 use std::time::Instant;
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Point3, Vector3};
+use slide::{FORCE_N, RADIUS, STIFFNESS, sample};
 use touchup::mesh::{FaceTree, TriMesh, VertexId, triangle};
 use touchup::refine::{RefineParams, Refiner, RoiSize, TipParams};
-use touchup::touch::{Sample, Wrench};
-use wavy::{SIDE, height, wavy_plate};
+use wavy::wavy_plate;
 
-const RADIUS: f64 = 1.5e-3;
-const STIFFNESS: f64 = 2e4;
-const FORCE_N: f64 = 2.0;
-/// The part lies this much below the scan, m.
-const DEPTH: f64 = 0.05e-3;
-/// m/s
-const SPEED: f64 = 0.05;
-const STEP_NS: i64 = 1_000_000;
+/// Width of the raster, m.
+const WIDTH: f64 = 0.8 * wavy::SIDE;
 const WARM: usize = 20_000;
 const TIMED: usize = 100_000;
-
-/// Raster over the middle of the plate, one line each 0.7 mm.
-fn sample(i: usize) -> Sample {
-    let length = 0.8 * SIDE;
-    let way = SPEED * i as f64 * STEP_NS as f64 * 1e-9;
-    let (line, along) = ((way / length).floor(), way % length);
-    let x = 0.1 * SIDE + if line % 2.0 == 0.0 { along } else { length - along };
-    let y = 0.1 * SIDE + (line * 0.7e-3) % length;
-    let slope = 1e-6;
-    let normal = Vector3::new(
-        (height(x - slope, y) - height(x + slope, y)) / (2.0 * slope),
-        (height(x, y - slope) - height(x, y + slope)) / (2.0 * slope),
-        1.0,
-    )
-    .normalize();
-    let contact = Point3::new(x, y, height(x, y)) - normal * DEPTH;
-    let reported = contact + normal * (RADIUS - FORCE_N / STIFFNESS);
-    let wrench = Wrench { force: normal * FORCE_N, torque: Vector3::zeros() };
-    Sample { stamp_ns: i as i64 * STEP_NS, pose_ot: Isometry3::translation(reported.x, reported.y, reported.z), wrench }
-}
 
 fn percentile(sorted: &[u64], share: f64) -> u64 {
     sorted[((sorted.len() - 1) as f64 * share).round() as usize]
@@ -74,7 +50,7 @@ fn push(name: &str, mesh: &TriMesh, roi: RoiSize, carve: bool) {
     let mut times = Vec::with_capacity(TIMED);
     let mut vertices = 0;
     for i in 0..WARM + TIMED {
-        let sample = sample(i);
+        let sample = sample(i, WIDTH);
         let start = Instant::now();
         let update = black_box(refiner.push(black_box(&sample))).expect("the sample is sound");
         let time = start.elapsed().as_nanos() as u64;
@@ -93,7 +69,7 @@ fn push(name: &str, mesh: &TriMesh, roi: RoiSize, carve: bool) {
 fn check_index(refiner: &Refiner) {
     let mesh = refiner.mesh();
     for i in 0..1_000 {
-        let at = sample(WARM + i * TIMED / 1_000).pose_ot.translation.vector;
+        let at = sample(WARM + i * TIMED / 1_000, WIDTH).pose_ot.translation.vector;
         let p = Point3::from(at + Vector3::new(0.3e-3, -0.2e-3, 0.1e-3));
         let hit = refiner.closest_face(&p, 0.1).expect("there is a face");
         let nearest = mesh
@@ -114,7 +90,7 @@ fn check_against_new_tree(refiner: &Refiner) {
     let mesh = refiner.mesh();
     let tree = FaceTree::new(mesh);
     for i in 0..1_000 {
-        let p = Point3::from(sample(WARM + i * TIMED / 1_000).pose_ot.translation.vector);
+        let p = Point3::from(sample(WARM + i * TIMED / 1_000, WIDTH).pose_ot.translation.vector);
         assert_eq!(refiner.closest_face(&p, 0.1), tree.closest(mesh, &p, 0.1), "query {i}");
     }
 }
@@ -127,7 +103,7 @@ fn minimal(mesh: &TriMesh) {
     let mut times = Vec::with_capacity(TIMED);
     let mut faces = Vec::new();
     for i in 0..WARM + TIMED {
-        let sample = sample(i);
+        let sample = sample(i, WIDTH);
         let start = Instant::now();
         let normal = sample.wrench.force / FORCE_N;
         let p = Point3::from(sample.pose_ot.translation.vector) + sample.wrench.force / STIFFNESS - normal * RADIUS;

@@ -5,14 +5,13 @@ use std::collections::BTreeSet;
 use nalgebra::{Point3, Vector3};
 use touchup::mesh::{FaceId, FaceTree, TriMesh};
 use touchup::patch::{Patched, Patcher, PatcherParams, Support};
-use touchup::sim::{
-    Moment, PathParams, Plate, ScannerParams, StylusParams, Surface, TruthShape, measure_badness, plan_demo, scan,
-    touch,
-};
-use touchup::touch::{SyncParams, Synchroniser};
+use touchup::sim::{Moment, Plate, StylusParams, Surface, TruthShape, measure_badness};
 
+#[path = "common/plate_stream.rs"]
+mod plate_stream;
 #[path = "common/soundness.rs"]
 mod soundness;
+use plate_stream::{PlateStream, plate_stream};
 use soundness::{intersections, rim_length, soundness};
 
 /// A touched plate: how it was scanned, where the ball really touched, and what the patcher made of it.
@@ -27,19 +26,9 @@ fn full() -> bool {
 }
 
 fn case(stylus: &StylusParams, seed: u64) -> Case {
-    let plate = Plate::default();
-    let scanner = ScannerParams { seed, ..ScannerParams::default() };
-    let hand = PathParams { radius: stylus.radius, ..PathParams::default() };
-    let scan = scan(&plate, &scanner).unwrap();
-    let touch = touch(&plate, &plan_demo(&plate, &hand).unwrap(), stylus, seed).unwrap();
-    let mut patcher = Patcher::new(PatcherParams::new(stylus.radius, Some(stylus.stiffness), scanner.noise)).unwrap();
-    let mut sync = Synchroniser::new(SyncParams::default()).unwrap();
-    for message in &touch.messages {
-        sync.push(*message);
-        std::iter::from_fn(|| sync.next_sample()).for_each(|sample| patcher.push(&sample));
-    }
-    sync.finish();
-    std::iter::from_fn(|| sync.next_sample()).for_each(|sample| patcher.push(&sample));
+    let (PlateStream { scan, noise, samples }, touch) = plate_stream(stylus, seed);
+    let mut patcher = Patcher::new(PatcherParams::new(stylus.radius, Some(stylus.stiffness), noise)).unwrap();
+    samples.iter().for_each(|sample| patcher.push(sample));
     patcher.flush();
     let patched = patcher.patched(&scan, &FaceTree::new(&scan)).unwrap();
     let contact_points = |moment: &Moment| moment.contacts.iter().map(|contact| contact.point).collect::<Vec<_>>();

@@ -6,8 +6,8 @@
 
 use super::evidence::Source;
 use super::lattice::{Node, stepped};
-use super::table::Table;
 use super::restore::{NodeState, Restored, cell_at, node_at};
+use super::table::Table;
 
 /// Settings of [`complete`].
 #[derive(Clone, Copy, Debug, PartialEq)]

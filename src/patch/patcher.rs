@@ -306,7 +306,9 @@ impl Patcher {
         let mut beside = changed.clone();
         for (at, ()) in changed.iter() {
             // the width, and how far a mean can have moved within its cell
-            contacts.near(&contacts.means()[at as usize].point, 2.0 * FAN_WIDTH * radius, |_, other| add(&mut beside, other));
+            contacts.near(&contacts.means()[at as usize].point, 2.0 * FAN_WIDTH * radius, |_, other| {
+                add(&mut beside, other)
+            });
         }
         for (at, ()) in beside.iter() {
             if contacts.mark_fan(at, FAN_WIDTH * radius, FAN_COSINE) {

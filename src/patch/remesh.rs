@@ -95,7 +95,8 @@ impl Remesh {
         let mut renewed = self.contoured(evidence, core, left);
         for _ in 0..GROWTH {
             let mut has_grown = false;
-            for open in renewed.patch.open.iter().filter(|open| open.is_scanned && self.restored.can_take(open.beyond)) {
+            for open in renewed.patch.open.iter().filter(|open| open.is_scanned && self.restored.can_take(open.beyond))
+            {
                 has_grown |= self.region.insert_with(open.beyond, || ()).1;
                 self.grown.insert_with(open.beyond, || ());
                 self.bounds.take(&open.beyond);

@@ -28,7 +28,8 @@ impl FollowedPatch {
     /// For a scan without a patch, with room for so many new vertices.
     pub fn new(scan: &TriMesh, vertices: usize) -> Self {
         let slots = scan.vertex_slots();
-        let (mut is_touched, mut moved_ns) = (Vec::with_capacity(slots + vertices), Vec::with_capacity(slots + vertices));
+        let (mut is_touched, mut moved_ns) =
+            (Vec::with_capacity(slots + vertices), Vec::with_capacity(slots + vertices));
         is_touched.resize(slots, false);
         moved_ns.resize(slots, NEVER);
         Self { splice: Splice::default(), is_touched, moved: Vec::new(), moved_ns, refit: Vec::new() }

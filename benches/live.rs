@@ -1,0 +1,104 @@
+//! What one sample costs with everything on, and how far the patch is behind: samples come at 1 kHz in real time, the
+//! patch has a thread of its own.
+//!
+//! A ball slides over a wavy plate in a raster, felt a little deeper than the scan says. One line for each minute: times of
+//! [`LiveRefiner::push`], how old the touches are that the patch shows (in time of the samples), how often a push had to
+//! wait for it, faces, and memory of the process.
+//!
+//! `cargo bench --bench live [-- FACES [SECONDS [fast]]]`; `fast` does not wait for real time, so that each push waits for
+//! the patch and pushes are not timed.
+
+#[path = "common/slide.rs"]
+mod slide;
+#[path = "../tests/common/wavy.rs"]
+mod wavy;
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use nalgebra::Vector3;
+use slide::{RADIUS, STEP_NS, STIFFNESS, sample};
+use touchup::live::{LiveRefiner, Pace};
+use touchup::mesh::FaceTree;
+use touchup::patch::{Patcher, PatcherParams};
+use touchup::refine::{RefineParams, Refiner, TipParams};
+use touchup::touch::Sample;
+use wavy::wavy_plate;
+
+/// Width of the raster, m: passed over each 4.6 minutes.
+const WIDTH: f64 = 40e-3;
+/// Noise of the tracker on each axis, m.
+const NOISE: f64 = 0.03e-3;
+/// Samples in one line of the table.
+const MINUTE: usize = 60_000;
+
+fn percentile(sorted: &[u64], share: f64) -> f64 {
+    sorted[((sorted.len() - 1) as f64 * share).round() as usize] as f64 * 1e-3
+}
+
+/// Evenly spread noise of the wanted standard deviation, the same each time.
+fn noisy(i: usize) -> Sample {
+    let mut sample = sample(i, WIDTH);
+    let mut state = i as u64;
+    let mut draw = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((state >> 33) as f64 / f64::from(1u32 << 31) - 0.5) * 12f64.sqrt() * NOISE
+    };
+    draw();
+    sample.pose_ot.translation.vector += Vector3::new(draw(), draw(), draw());
+    sample
+}
+
+/// Memory of the process, MB.
+fn resident() -> f64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let kilobytes =
+        status.lines().find_map(|line| line.strip_prefix("VmRSS:")?.trim().strip_suffix(" kB")?.parse().ok());
+    kilobytes.map_or(f64::NAN, |kilobytes: f64| kilobytes / 1e3)
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
+    let number = |at: usize, default: usize| arguments.get(at).map_or(default, |x| x.parse().expect("a whole number"));
+    let (faces, seconds, is_fast) = (number(0, 1_000_000), number(1, 60), arguments.len() > 2);
+    let mesh = wavy_plate(faces);
+    let tip = TipParams { radius: RADIUS, stiffness: Some(STIFFNESS) };
+    let refiner = Refiner::new(mesh.clone(), RefineParams::robust(tip)).expect("the settings are in range");
+    let patcher = Patcher::new(PatcherParams::new(RADIUS, Some(STIFFNESS), 0.3e-3)).expect("the settings are in range");
+    let scan = Arc::new((mesh.clone(), FaceTree::new(&mesh)));
+    let mut live = LiveRefiner::new(scan, refiner, patcher, Pace::default(), 1 << 18).expect("there is memory");
+    println!("{} faces, {:.0} MB; {seconds} s at 1 kHz", mesh.face_count(), resident());
+    let (mut times, mut ages, mut waits, begun) = (Vec::new(), Vec::new(), 0, Instant::now());
+    for i in 0..seconds * 1000 {
+        let sample = noisy(i);
+        while !is_fast && begun.elapsed() < Duration::from_millis(i as u64) {
+            std::hint::spin_loop();
+        }
+        let start = Instant::now();
+        live.push(&sample).expect("the sample is sound");
+        times.push(start.elapsed().as_nanos() as u64);
+        if i > 1000 {
+            ages.push((sample.stamp_ns - live.delta().until_ns) as u64 / 1000);
+        }
+        if (i + 1) % MINUTE == 0 || i + 1 == seconds * 1000 {
+            times.sort_unstable();
+            ages.sort_unstable();
+            let [median, p99, p999] = [0.5, 0.99, 0.999].map(|share| percentile(&times, share));
+            println!(
+                "{:5.1} min: push median {median:6.2} us p99 {p99:7.2} p99.9 {p999:7.1} max {:8.0}; patch behind {:4.1} ms, \
+                 p99 {:4.1}; waited {:4}; {} faces, {:.0} MB, {:.0} s",
+                (i + 1) as f64 * STEP_NS as f64 * 1e-9 / 60.0,
+                percentile(&times, 1.0),
+                percentile(&ages, 0.5),
+                percentile(&ages, 0.99),
+                live.counts().waits - waits,
+                live.refiner().mesh().face_count(),
+                resident(),
+                begun.elapsed().as_secs_f64(),
+            );
+            waits = live.counts().waits;
+            times.clear();
+            ages.clear();
+        }
+    }
+}

@@ -1,0 +1,206 @@
+//! The patch beside the haptic update: the same skin as all at once, sound at every moment, whatever the machine does.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use nalgebra::Point3;
+use touchup::live::{LiveRefiner, Pace};
+use touchup::mesh::{FaceId, FaceTree, TriMesh, VertexId};
+use touchup::patch::{PatchDelta, Patcher, PatcherParams, Splice};
+use touchup::refine::{RefineParams, Refiner, TipParams};
+use touchup::sim::StylusParams;
+use touchup::touch::Sample;
+
+#[path = "common/plate_stream.rs"]
+mod plate_stream;
+#[path = "common/soundness.rs"]
+mod soundness;
+use plate_stream::{PlateStream, plate_stream};
+use soundness::{intersections, rim_length, soundness};
+
+/// Time between renewals, ns.
+const EVERY: i64 = 10_000_000;
+
+fn stream(seed: u64, share: f64) -> PlateStream {
+    let (mut stream, _) = plate_stream(&StylusParams::default(), seed);
+    stream.samples.truncate((stream.samples.len() as f64 * share) as usize);
+    stream
+}
+
+fn patcher(stream: &PlateStream) -> Patcher {
+    let StylusParams { radius, stiffness, .. } = StylusParams::default();
+    Patcher::new(PatcherParams::new(radius, Some(stiffness), stream.noise)).unwrap()
+}
+
+fn refiner(scan: &TriMesh) -> Refiner {
+    let StylusParams { radius, stiffness, .. } = StylusParams::default();
+    Refiner::new(scan.clone(), RefineParams::robust(TipParams { radius, stiffness: Some(stiffness) })).unwrap()
+}
+
+/// Calls `each` with the change of each renewal, and at the end once more for what is left.
+fn renew(stream: &PlateStream, patcher: &mut Patcher, tree: &FaceTree, mut each: impl FnMut(PatchDelta)) {
+    let mut slot = None;
+    for sample in &stream.samples {
+        let here = sample.stamp_ns.div_euclid(EVERY);
+        if slot.replace(here).is_some_and(|before| here > before) {
+            each(patcher.renewed(&stream.scan, tree));
+        }
+        patcher.push(sample);
+    }
+    patcher.flush();
+    for _ in 0..2 {
+        each(patcher.renewed(&stream.scan, tree));
+    }
+}
+
+/// Distances of all corners of faces of one mesh from another, m, in order of size.
+fn distances(from: &TriMesh, to: &TriMesh) -> Vec<f64> {
+    let tree = FaceTree::new(to);
+    let corners = from.faces().flat_map(|(_, corners)| corners);
+    let mut distances: Vec<f64> =
+        corners.map(|v| tree.closest(to, &from.position(v), f64::INFINITY).unwrap().distance_squared.sqrt()).collect();
+    distances.sort_unstable_by(f64::total_cmp);
+    distances
+}
+
+#[test]
+fn renewed_bit_by_bit_it_is_the_skin_of_all_at_once_and_sound_all_along() {
+    let stream = stream(1, 0.25);
+    let (scan, tree) = (&stream.scan, FaceTree::new(&stream.scan));
+    let mut patcher = patcher(&stream);
+    let (mut mesh, mut mesh_tree, mut splice) = (scan.clone(), FaceTree::new(scan), Splice::default());
+    let was = soundness(scan);
+    let mut renewals = 0;
+    renew(&stream, &mut patcher, &tree, |delta| {
+        splice.apply(&delta, &mut mesh, &mut mesh_tree).unwrap();
+        renewals += 1;
+        if renewals % 200 == 0 {
+            let is = soundness(&mesh);
+            assert!(is.bad_edges <= was.bad_edges, "{} bad edges after {renewals} renewals", is.bad_edges);
+            let is_new = |face| !scan.has_face(face) || scan.corners(face) != mesh.corners(face);
+            assert_eq!(intersections(&mesh, 1e-3, is_new), Vec::<[FaceId; 2]>::new(), "after {renewals} renewals");
+        }
+    });
+    let whole = patcher.patched(scan, &tree).unwrap().mesh;
+    let faces = [&mesh, &whole].map(|mesh| mesh.face_count() as f64);
+    println!("{renewals} renewals, {faces:?} faces bit by bit and at once");
+    assert!((faces[0] / faces[1] - 1.0).abs() < 0.01);
+    for (name, distances) in [("there", distances(&mesh, &whole)), ("back", distances(&whole, &mesh))] {
+        let at = |share: f64| distances[((distances.len() - 1) as f64 * share) as usize] * 1e3;
+        println!("{name}: median {:.1e}, 95 % {:.1e}, 99 % {:.1e} mm", at(0.5), at(0.95), at(0.99));
+        assert!(at(0.5) < 0.002 && at(0.95) < 0.01 && at(0.99) < 0.1);
+    }
+    let rims = [&mesh, &whole].map(|mesh| rim_length(mesh, &soundness(mesh).rims) * 1e3);
+    println!("rims {rims:.1?} mm");
+    assert!((rims[0] - rims[1]).abs() < 3.0);
+    // the tree followed
+    let anew = FaceTree::new(&mesh);
+    for corner in whole.positions().iter().step_by(7) {
+        let x = corner + nalgebra::Vector3::new(0.3e-3, -0.2e-3, 0.4e-3);
+        let [a, b] = [&mesh_tree, &anew].map(|tree| tree.closest(&mesh, &x, 1.0).unwrap().distance_squared);
+        assert_eq!(a, b);
+    }
+    // and what no touch came near stayed
+    for (face, corners) in
+        scan.faces().filter(|(face, _)| whole.has_face(*face) && whole.corners(*face) == scan.corners(*face))
+    {
+        assert_eq!(mesh.corners(face), corners);
+    }
+}
+
+/// The same by hand, on one thread.
+fn one_after_the_other(stream: &PlateStream, pace: Pace) -> (TriMesh, TriMesh) {
+    let tree = FaceTree::new(&stream.scan);
+    let (mut patcher, mut refiner) = (patcher(stream), refiner(&stream.scan));
+    refiner.expect_patch(0).unwrap();
+    let mut due: VecDeque<(i64, PatchDelta)> = VecDeque::new();
+    let mut slot = None;
+    for sample in &stream.samples {
+        refiner.push(sample).unwrap();
+        let here = sample.stamp_ns.div_euclid(pace.every_ns);
+        if slot.replace(here).is_some_and(|before| here > before) {
+            due.push_back((here * pace.every_ns + pace.after_ns, patcher.renewed(&stream.scan, &tree)));
+        }
+        patcher.push(sample);
+        while due.front().is_some_and(|(due_ns, _)| *due_ns <= sample.stamp_ns) {
+            refiner.follow(&due.pop_front().unwrap().1).unwrap();
+        }
+    }
+    let touching = refiner.mesh().clone();
+    due.into_iter().for_each(|(_, delta)| refiner.follow(&delta).unwrap());
+    refiner.follow(&patcher.renewed(&stream.scan, &tree)).unwrap();
+    patcher.flush();
+    for _ in 0..2 {
+        refiner.follow(&patcher.renewed(&stream.scan, &tree)).unwrap();
+    }
+    (touching, refiner.into_mesh())
+}
+
+fn assert_same(a: &TriMesh, b: &TriMesh) {
+    assert_eq!(a.positions(), b.positions());
+    assert!(a.faces().eq(b.faces()));
+}
+
+#[test]
+fn two_threads_do_what_one_does_and_leave_the_scan_where_it_was() {
+    let stream = stream(2, 0.1);
+    let pace = Pace::default();
+    let (touching, at_the_end) = one_after_the_other(&stream, pace);
+    let scan = Arc::new((stream.scan.clone(), FaceTree::new(&stream.scan)));
+    let mut live = LiveRefiner::new(scan, refiner(&stream.scan), patcher(&stream), pace, 1000).unwrap();
+    stream.samples.iter().for_each(|sample| assert!(live.push(sample).is_ok()));
+    assert_same(live.refiner().mesh(), &touching);
+    let moved = |mesh: &TriMesh| {
+        (0..stream.scan.vertex_slots() as u32)
+            .filter(|&v| mesh.position(VertexId(v)) != stream.scan.position(VertexId(v)))
+            .count()
+    };
+    println!("{} vertices of the scan moved for the moment", moved(&touching));
+    let (refiner, _) = live.finish().unwrap();
+    assert_same(refiner.mesh(), &at_the_end);
+    assert_eq!(moved(refiner.mesh()), 0);
+}
+
+/// A touch counts at once for the haptic update, and within 50 ms for the patch.
+#[test]
+fn a_touch_moves_the_mesh_at_once_and_is_in_the_patch_within_50_ms() {
+    let p = |x: f64, y: f64| Point3::new(x * 2.5e-3, y * 2.5e-3, 0.0);
+    let side = 17;
+    let positions = (0..side * side).map(|i| p(f64::from(i % side), f64::from(i / side))).collect();
+    let cells = (0..side - 1).flat_map(|x| (0..side - 1).map(move |y| (x + side * y) as u32));
+    let side = side as u32;
+    let faces = cells.flat_map(|a| [[a, a + 1, a + side + 1], [a, a + side + 1, a + side]]).collect();
+    let scan = TriMesh::new(positions, faces).unwrap();
+    // the real surface is 0.3 mm lower; a ball of 1.5 mm slides over it in lines
+    let sample = |i: i64| {
+        let (line, along) = ((i / 600) as f64, (i % 600) as f64 * 0.025e-3);
+        let x = if line % 2.0 == 0.0 { 12.5e-3 + along } else { 27.5e-3 - along };
+        let pose_ot = nalgebra::Isometry3::translation(x, 15e-3 + 0.7e-3 * line, 1.2e-3);
+        let force = nalgebra::Vector3::new(0.0, 0.0, 2.0);
+        Sample {
+            stamp_ns: i * 1_000_000,
+            pose_ot,
+            wrench: touchup::touch::Wrench { force, torque: nalgebra::Vector3::zeros() },
+        }
+    };
+    let tip = TipParams { radius: 1.5e-3, stiffness: None };
+    let refiner = Refiner::new(scan.clone(), RefineParams::robust(tip)).unwrap();
+    let patcher = Patcher::new(PatcherParams::new(tip.radius, None, 0.3e-3)).unwrap();
+    let both = Arc::new((scan.clone(), FaceTree::new(&scan)));
+    let mut live = LiveRefiner::new(both, refiner, patcher, Pace::default(), 1000).unwrap();
+    let (mut at_once, mut late) = (0, 0);
+    for i in 0..6000 {
+        let before = live.refiner().closest_face(&(sample(i).pose_ot.translation.vector.into()), 1.0).unwrap();
+        live.push(&sample(i)).unwrap();
+        let after = live.refiner().closest_face(&(sample(i).pose_ot.translation.vector.into()), 1.0).unwrap();
+        at_once += i32::from(i < 100 && after.distance_squared > before.distance_squared);
+        // once a patch is there at all, which takes some touches, it follows
+        if i > 2000 {
+            let then = Point3::from(sample(i - 50).pose_ot.translation.vector);
+            let found = live.refiner().closest_face(&then, 1.0).unwrap();
+            late += i32::from((found.distance_squared.sqrt() - 1.5e-3).abs() > 0.05e-3);
+        }
+    }
+    println!("moved at once {at_once} of 100, farther than 0.05 mm after 50 ms {late} of 4000");
+    assert!(at_once > 50 && late < 40);
+}
