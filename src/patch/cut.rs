@@ -117,10 +117,7 @@ impl Cut {
         bounds: &CellBox,
         scratch: &mut Scratch,
     ) {
-        let triangle = scan.triangle(face);
-        let (lo, hi) =
-            (triangle[0].inf(&triangle[1]).inf(&triangle[2]), triangle[0].sup(&triangle[1]).sup(&triangle[2]));
-        let cells = CellBox { lo: lattice.cell_of(&lo), hi: lattice.cell_of(&hi) };
+        let cells = cells_around(lattice, scan, face);
         let Some(held) = held_within(region, &cells, bounds) else { return };
         if held.is_all {
             self.removed.push(face);
@@ -231,6 +228,13 @@ fn loosened(key: VertexKey, mut point: Point3<f64>, pitch: f64) -> Point3<f64> {
         _ => {}
     }
     point
+}
+
+/// The box of the cells that a face may meet.
+pub(super) fn cells_around(lattice: &Lattice, scan: &TriMesh, face: FaceId) -> CellBox {
+    let [a, b, c] = scan.triangle(face);
+    let (lo, hi) = (a.inf(&b).inf(&c), a.sup(&b).sup(&c));
+    CellBox { lo: lattice.cell_of(&lo), hi: lattice.cell_of(&hi) }
 }
 
 /// The cells of the region within a box.

@@ -3,7 +3,7 @@
 use super::Region;
 use super::contour::{ContourParams, contour_in};
 use super::crossing::Crossings;
-use super::cut::{Cut, faces_near};
+use super::cut::{Cut, cells_around, faces_near};
 use super::evidence::Evidence;
 use super::lattice::{CellBox, Lattice, Node};
 use super::restore::{News, Restored, cells_of};
@@ -112,9 +112,10 @@ impl Remesh {
 
     fn contoured(&mut self, evidence: &Evidence<'_>, core: CellBox, left: &[Node]) -> Renewed {
         let Self { lattice, restored, region, bounds, crossings, .. } = self;
-        let mut cells = left.to_vec();
-        core.widened(2, 2).each_in(region, |cell, ()| cells.push(cell));
-        let scanned = faces_near(lattice, cells.into_iter(), evidence.tree);
+        let (mut cells, around) = (left.to_vec(), core.widened(2, 2));
+        around.each_in(region, |cell, ()| cells.push(cell));
+        let mut scanned = faces_near(lattice, cells.into_iter(), evidence.tree);
+        scanned.retain(|&face| !cells_around(lattice, evidence.scan, face).meet(&around).is_empty());
         let cut = Cut::of_faces(lattice, region, bounds, evidence.scan, &scanned);
         let values = restored.values_in(&core.widened(1, 1));
         let patch = contour_in(lattice, region, &core, &values, &cut, &ContourParams::default(), |edge| {
