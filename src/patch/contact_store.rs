@@ -4,6 +4,7 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::history::History;
 use super::lattice::Node;
 use super::table::{Key, Table};
 use super::touches::Contact;
@@ -45,6 +46,16 @@ struct Sums {
     is_noted: bool,
     /// the mean when it was last told
     told: (Point3<f64>, Vector3<f64>),
+    /// the cell in [`ContactStore::nearby`]
+    home: Node,
+}
+
+/// One mean with all that the store knows of it.
+#[derive(Clone, Copy, Debug)]
+struct Kept {
+    bin: Bin,
+    sums: Sums,
+    mean: MeanContact,
 }
 
 /// Contacts, by place and facing.
@@ -57,10 +68,13 @@ pub struct ContactStore {
     means: Vec<MeanContact>,
     nearby: Table<Node, Vec<u32>>,
     changed: Vec<u32>,
+    history: History<u32, Option<Kept>>,
 }
 
 /// Normals whose components differ by less than this share a mean.
 const FACING: f64 = 0.25;
+/// Means kept for undoing: 60 MB at most.
+const MOST_KEPT: usize = 200_000;
 /// A mean is told again when it has shifted along its normal by more than this, in cells: 5 µm for a ball of 1.5 mm …
 const SHIFT: f64 = 0.01;
 /// … or turned by more than this, rad: 0.3°, which are 5 µm a millimetre away.
@@ -70,7 +84,16 @@ impl ContactStore {
     /// An empty store of cells of edge `cell` (m), for queries up to `reach` (m).
     pub fn new(cell: f64, reach: f64) -> Self {
         let (of_bin, nearby) = (Table::default(), Table::default());
-        Self { cell, reach, of_bin, sums: Vec::new(), means: Vec::new(), nearby, changed: Vec::new() }
+        Self {
+            cell,
+            reach,
+            of_bin,
+            sums: Vec::new(),
+            means: Vec::new(),
+            nearby,
+            changed: Vec::new(),
+            history: History::new(MOST_KEPT),
+        }
     }
 
     /// Adds a contact to the mean of its cell.
@@ -81,12 +104,15 @@ impl ContactStore {
         if is_new {
             let Contact { point, normal, weight } = *contact;
             let (zero, told) = (Vector3::zeros(), (point, normal));
-            self.sums.push(Sums { point: zero, normal: zero, weight: 0.0, is_noted: true, told });
+            let home = cell_of(&point, self.reach);
+            self.sums.push(Sums { point: zero, normal: zero, weight: 0.0, is_noted: true, told, home });
             self.changed.push(index);
             self.means.push(MeanContact { point, normal, weight, is_fan: false });
-            let (at, _) = self.nearby.insert_with(cell_of(&point, self.reach), Vec::new);
+            let (at, _) = self.nearby.insert_with(home, Vec::new);
             self.nearby.value_mut(at).push(index);
         }
+        let kept = || Kept { bin, sums: self.sums[index as usize], mean: self.means[index as usize] };
+        self.history.note(index, || (!is_new).then(kept));
         let (sums, mean) = (&mut self.sums[index as usize], &mut self.means[index as usize]);
         sums.point += contact.point.coords * contact.weight;
         sums.normal += contact.normal * contact.weight;
@@ -101,6 +127,65 @@ impl ContactStore {
             || (mean.normal - normal).norm_squared() > TURN * TURN;
         if is_shifted && !std::mem::replace(&mut sums.is_noted, true) {
             self.changed.push(index);
+        }
+    }
+
+    /// Begins a stroke, which can be undone.
+    pub fn begin_stroke(&mut self) {
+        self.history.begin();
+    }
+
+    /// How many strokes can be undone.
+    pub fn strokes(&self) -> usize {
+        self.history.len()
+    }
+
+    /// Takes back what came since the last stroke began. Returns whether there was one.
+    pub fn undo(&mut self) -> bool {
+        self.exchange(|history, swap| history.undo(swap))
+    }
+
+    /// Does again what was undone last. Returns whether there was anything.
+    pub fn redo(&mut self) -> bool {
+        self.exchange(|history, swap| history.redo(swap))
+    }
+
+    fn exchange(
+        &mut self,
+        act: impl FnOnce(&mut History<u32, Option<Kept>>, &mut dyn FnMut(u32, &mut Option<Kept>)) -> bool,
+    ) -> bool {
+        let mut history = std::mem::replace(&mut self.history, History::new(MOST_KEPT));
+        let has_changed = act(&mut history, &mut |at, kept| self.swap(at, kept));
+        self.history = history;
+        self.note_all();
+        has_changed
+    }
+
+    /// Exchanges a mean with what was kept of it; those that came last go first.
+    fn swap(&mut self, at: u32, kept: &mut Option<Kept>) {
+        let here = self.means.get(at as usize).map(|mean| Kept {
+            bin: self.of_bin.entry(at).0,
+            sums: self.sums[at as usize],
+            mean: *mean,
+        });
+        match std::mem::replace(kept, here) {
+            Some(Kept { bin, sums, mean }) if here.is_none() => {
+                self.of_bin.insert_with(bin, || ());
+                self.sums.push(sums);
+                self.means.push(mean);
+                let (home, _) = self.nearby.insert_with(sums.home, Vec::new);
+                self.nearby.value_mut(home).push(at);
+            }
+            Some(Kept { sums, mean, .. }) => (self.sums[at as usize], self.means[at as usize]) = (sums, mean),
+            None => {
+                let Some(Kept { bin, sums, .. }) = here else { return };
+                self.of_bin.remove(&bin);
+                self.sums.pop();
+                self.means.pop();
+                if let Some(home) = self.nearby.get_mut(&sums.home) {
+                    home.pop();
+                }
+            }
         }
     }
 
@@ -230,7 +315,7 @@ mod tests {
         assert_eq!((store.take_changed(), store.take_changed()), (vec![0, 1], vec![]));
         store.add(&contact(0.3e-3, Vector3::z(), 1.0));
         assert!(store.take_changed().is_empty(), "it went along the surface");
-        store.add(&contact(0.3e-3, Vector3::new(0.05, 0.0, 1.0).normalize(), 1.0));
-        assert_eq!(store.take_changed(), [1]);
+        store.add(&Contact { point: Point3::new(0.3e-3, 0.1e-3, 0.2e-3), normal: Vector3::z(), weight: 1.0 });
+        assert_eq!(store.take_changed(), [1], "it rose by 20 µm");
     }
 }

@@ -117,13 +117,40 @@ pub struct Patcher {
     params: PatcherParams,
     compensator: Compensator,
     finder: TouchFinder,
-    contacts: ContactStore,
-    swept: SweptSpace,
+    felt: Felt,
     /// the box around the scan in which contacts may be its own, once the scan is known
     bounds: Option<[Point3<f64>; 2]>,
     live: Option<Live>,
+}
+
+/// All that was felt.
+#[derive(Clone, Debug)]
+struct Felt {
+    contacts: ContactStore,
+    swept: SweptSpace,
     /// stamp of the last touch that counts, ns
     until_ns: i64,
+    last_contact_ns: Option<i64>,
+}
+
+/// A pause longer than this parts two strokes, ns.
+const STROKE_PAUSE: i64 = 100_000_000;
+
+impl Felt {
+    fn keep(&mut self, touch: &Touch) {
+        if touch.contact.is_some() {
+            if self.last_contact_ns.is_none_or(|last| touch.stamp_ns - last > STROKE_PAUSE) {
+                self.contacts.begin_stroke();
+                self.swept.begin_stroke();
+            }
+            self.last_contact_ns = Some(touch.stamp_ns);
+        }
+        self.swept.add(&touch.centre);
+        if let Some(contact) = &touch.contact {
+            self.contacts.add(contact);
+        }
+        self.until_ns = touch.stamp_ns;
+    }
 }
 
 /// The patch that a mesh follows.
@@ -137,6 +164,8 @@ struct Live {
     late: News,
     /// times since that was taken in as a whole
     since_late: u32,
+    /// strokes were undone: everything is to be meshed anew
+    is_outdated: bool,
 }
 
 /// News are taken in as a whole each so many times, or when there is nothing else to do.
@@ -188,11 +217,14 @@ impl Patcher {
         Ok(Self {
             compensator: Compensator::new(params.compensator)?,
             finder: TouchFinder::new(params.touches)?,
-            contacts: ContactStore::new(CONTACT_CELL * radius, params.evidence.field.reach),
-            swept: SweptSpace::new(SWEPT_CELL * radius, 5.0 / 3.0 * radius),
+            felt: Felt {
+                contacts: ContactStore::new(CONTACT_CELL * radius, params.evidence.field.reach),
+                swept: SweptSpace::new(SWEPT_CELL * radius, 5.0 / 3.0 * radius),
+                until_ns: i64::MIN,
+                last_contact_ns: None,
+            },
             bounds: None,
             live: None,
-            until_ns: i64::MIN,
             params,
         })
     }
@@ -206,20 +238,51 @@ impl Patcher {
     /// is complete.
     pub fn push(&mut self, sample: &Sample) {
         let tip = self.compensator.compensate(sample);
-        let Self { finder, contacts, swept, until_ns, .. } = self;
-        finder.push(&tip, |touch| {
-            keep(contacts, swept, &touch);
-            *until_ns = touch.stamp_ns;
-        });
+        let Self { finder, felt, .. } = self;
+        finder.push(&tip, |touch| felt.keep(&touch));
     }
 
     /// Takes in what is still in the smoothing window: the stream has ended or pauses.
     pub fn flush(&mut self) {
-        let Self { finder, contacts, swept, until_ns, .. } = self;
-        finder.flush(|touch| {
-            keep(contacts, swept, &touch);
-            *until_ns = touch.stamp_ns;
-        });
+        let Self { finder, felt, .. } = self;
+        finder.flush(|touch| felt.keep(&touch));
+    }
+
+    /// How many strokes can be undone. A stroke is what was touched without a pause of a tenth of a second, and where the
+    /// ball went after it.
+    pub fn strokes(&self) -> usize {
+        self.felt.contacts.strokes().min(self.felt.swept.strokes())
+    }
+
+    /// Takes the last stroke back, up to the last sample: what counts is bit by bit what counted before it. Returns whether
+    /// there was one. What the samples told of friction and bias stays.
+    pub fn undo(&mut self) -> bool {
+        self.flush();
+        let can_undo = self.strokes() > 0;
+        if can_undo {
+            self.felt.contacts.undo();
+            self.felt.swept.undo();
+            self.start_over();
+        }
+        can_undo
+    }
+
+    /// Does the stroke again that was undone last, bit by bit, unless something was touched since. Returns whether there was
+    /// one.
+    pub fn redo(&mut self) -> bool {
+        let has_redone = self.felt.contacts.redo() && self.felt.swept.redo();
+        if has_redone {
+            self.start_over();
+        }
+        has_redone
+    }
+
+    /// What is touched next begins a stroke, and the next renewal meshes everything anew.
+    fn start_over(&mut self) {
+        self.felt.last_contact_ns = None;
+        if let Some(live) = &mut self.live {
+            live.is_outdated = true;
+        }
     }
 
     /// The scan with its touched part meshed anew from all that counts so far; vertices and faces that were not touched
@@ -230,7 +293,7 @@ impl Patcher {
     /// # Errors
     /// [`MeshError::TooMany`] when 32-bit ids do not suffice.
     pub fn patched(&mut self, scan: &TriMesh, tree: &FaceTree) -> Result<Patched, MeshError> {
-        self.contacts.note_all();
+        self.felt.contacts.note_all();
         self.settle(scan, tree);
         let (remesh, Renewed { patch, .. }) = self.meshed_anew(scan, tree);
         let (mesh, ids) = patch.applied_to(scan)?;
@@ -265,12 +328,13 @@ impl Patcher {
             news: self.all_news(),
             late: News::default(),
             since_late: 0,
+            is_outdated: false,
         });
         let (news, late) = live.take_news();
         let faces = scan.face_count() as f64 + live.shown.faces_more();
-        let renewed = if faces > self.budget(scan) {
+        let renewed = if live.is_outdated || faces > self.budget(scan) {
             let (remesh, mut renewed) = self.meshed_anew(scan, tree);
-            live.remesh = remesh;
+            (live.remesh, live.is_outdated) = (remesh, false);
             renewed.core = CellBox::ALL;
             renewed.scanned.extend(live.shown.scan_faces());
             renewed
@@ -280,12 +344,12 @@ impl Patcher {
         let support = |key: &VertexKey| support_of(key, live.remesh.restored());
         let delta = live.shown.take(&renewed, live.remesh.region(), scan, support);
         self.live = Some(live);
-        PatchDelta { until_ns: self.until_ns, ..delta }
+        PatchDelta { until_ns: self.felt.until_ns, ..delta }
     }
 
     /// Decides which contacts count and which are those of an edge, where anything came since it was last decided.
     fn settle(&mut self, scan: &TriMesh, tree: &FaceTree) {
-        let Self { contacts, swept, params, .. } = self;
+        let Self { felt: Felt { contacts, swept, .. }, params, .. } = self;
         let radius = params.evidence.radius;
         let (deepest, outside) = (radius * (1.0 - REFUTED_DEPTH), OUTSIDE * radius);
         let bounds = *self.bounds.get_or_insert_with(|| bounds_of(scan, outside));
@@ -322,12 +386,12 @@ impl Patcher {
     }
 
     fn all_news(&self) -> News {
-        let means = self.contacts.means().iter().map(|mean| mean.point).collect();
-        News { means, centres: self.swept.centres().copied().collect() }
+        let means = self.felt.contacts.means().iter().map(|mean| mean.point).collect();
+        News { means, centres: self.felt.swept.centres().copied().collect() }
     }
 
     fn evidence<'a>(&'a self, scan: &'a TriMesh, tree: &'a FaceTree) -> Evidence<'a> {
-        let Self { contacts, swept, params, .. } = self;
+        let Self { felt: Felt { contacts, swept, .. }, params, .. } = self;
         Evidence { params: &params.evidence, contacts, swept, scan, tree }
     }
 
@@ -363,13 +427,6 @@ fn add(numbers: &mut Table<u32, ()>, number: u32) {
 
 fn lattice_of(pitch: f64) -> Lattice {
     Lattice { origin: Point3::from(Vector3::from(ORIGIN) * pitch), pitch }
-}
-
-fn keep(contacts: &mut ContactStore, swept: &mut SweptSpace, touch: &Touch) {
-    swept.add(&touch.centre);
-    if let Some(contact) = &touch.contact {
-        contacts.add(contact);
-    }
 }
 
 /// The box around the scan, wider by `margin` (m).

@@ -3,11 +3,15 @@
 use nalgebra::{Point3, Vector3};
 
 use super::contact_store::{around, cell_of};
+use super::history::History;
 use super::lattice::Node;
 use super::table::Table;
 
 /// Cosine of the widest angle between a way and what counts as straight ahead: 45°.
 const STRAIGHT: f64 = 0.7;
+
+/// Centres kept for undoing.
+const MOST_KEPT: usize = 500_000;
 
 /// Centres of the ball, thinned to one for each small cell.
 #[derive(Clone, Debug)]
@@ -17,22 +21,94 @@ pub struct SweptSpace {
     thinned: Table<Node, ()>,
     centres: Table<Node, Vec<Point3<f64>>>,
     added: Vec<Point3<f64>>,
+    history: History<Node, Option<Point3<f64>>>,
 }
 
 impl SweptSpace {
     /// Nothing swept yet: one centre is kept for each cube of edge `cell` (m), queries go up to `reach` (m).
     pub fn new(cell: f64, reach: f64) -> Self {
-        Self { cell, reach, thinned: Table::default(), centres: Table::default(), added: Vec::new() }
+        Self {
+            cell,
+            reach,
+            thinned: Table::default(),
+            centres: Table::default(),
+            added: Vec::new(),
+            history: History::new(MOST_KEPT),
+        }
     }
 
     /// Takes a centre, m, in O.
     pub fn add(&mut self, centre: &Point3<f64>) {
-        let (_, is_new) = self.thinned.insert_with(cell_of(centre, self.cell), || ());
+        let cell = cell_of(centre, self.cell);
+        let (_, is_new) = self.thinned.insert_with(cell, || ());
         if is_new {
+            self.history.note(cell, || None);
             let (at, _) = self.centres.insert_with(cell_of(centre, self.reach), Vec::new);
             self.centres.value_mut(at).push(*centre);
             self.added.push(*centre);
         }
+    }
+
+    /// Begins a stroke, which can be undone.
+    pub fn begin_stroke(&mut self) {
+        self.history.begin();
+    }
+
+    /// How many strokes can be undone.
+    pub fn strokes(&self) -> usize {
+        self.history.len()
+    }
+
+    /// Takes back what came since the last stroke began. Returns whether there was one.
+    pub fn undo(&mut self) -> bool {
+        self.exchange(|history, swap| history.undo(swap))
+    }
+
+    /// Does again what was undone last. Returns whether there was anything.
+    pub fn redo(&mut self) -> bool {
+        self.exchange(|history, swap| history.redo(swap))
+    }
+
+    fn exchange(
+        &mut self,
+        act: impl FnOnce(&mut History<Node, Option<Point3<f64>>>, &mut dyn FnMut(Node, &mut Option<Point3<f64>>)) -> bool,
+    ) -> bool {
+        let mut history = std::mem::replace(&mut self.history, History::new(MOST_KEPT));
+        let has_changed = act(&mut history, &mut |cell, kept| self.swap(cell, kept));
+        self.history = history;
+        self.added.clear();
+        has_changed
+    }
+
+    /// Puts a centre in, or takes it out and keeps it; those that came last go first.
+    fn swap(&mut self, cell: Node, kept: &mut Option<Point3<f64>>) {
+        match kept.take() {
+            Some(centre) => {
+                self.thinned.insert_with(cell, || ());
+                let (at, _) = self.centres.insert_with(cell_of(&centre, self.reach), Vec::new);
+                self.centres.value_mut(at).push(centre);
+            }
+            None => {
+                self.thinned.remove(&cell);
+                *kept = self.take_last_in(cell);
+            }
+        }
+    }
+
+    /// Takes the centre of a small cell out of where it stands last.
+    fn take_last_in(&mut self, cell: Node) -> Option<Point3<f64>> {
+        let middle = Point3::from(nalgebra::Vector3::from(cell.map(|x| (f64::from(x) + 0.5) * self.cell)));
+        for bin in around(cell_of(&middle, self.reach)) {
+            let Some(centres) = self.centres.get_mut(&bin) else { continue };
+            if centres.last().is_some_and(|centre| cell_of(centre, self.cell) == cell) {
+                let centre = centres.pop();
+                if centres.is_empty() {
+                    self.centres.remove(&bin);
+                }
+                return centre;
+            }
+        }
+        None
     }
 
     /// The centres that were kept since this was last asked.
