@@ -1,12 +1,19 @@
 //! What was touched, thinned to one mean contact for each small cell and facing.
 //!
 //! Nothing is ever integrated into a field: the field is evaluated anew from what is stored here.
+//!
+//! Contacts are independent from one pass to the next, not from sample to sample: [`Visits`] counts the passes. With a
+//! gate, a contact that contradicts the mean of its place (or of the place beside it, where it is the first) by more than
+//! both can be off is held apart. A second pass that says the same takes the place; one that confirms the mean forgets it.
 
 use nalgebra::{Point3, Vector3};
 
+use super::contact_sigma::ContactSigma;
+use super::knocks::{Knock, Knocks};
 use super::lattice::Node;
-use super::table::{Key, Table};
+use super::table::Table;
 use super::touches::Contact;
+use super::visits::{Visit, Visits};
 
 /// The mean of the contacts in one cell that face alike.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,26 +28,73 @@ pub struct MeanContact {
     pub is_fan: bool,
 }
 
-/// A small cell and a range of normals.
+/// What became of a contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Bin {
-    cell: Node,
-    facing: [i8; 3],
+pub enum Verdict {
+    /// it is in the mean of its place
+    Taken,
+    /// it contradicts its place and is held apart
+    HeldApart,
+    /// the second pass that contradicts: the place has moved to it
+    Insisted,
 }
 
-impl Key for Bin {
-    #[inline]
-    fn bits(&self) -> u64 {
-        let facing = self.facing.iter().fold(0u64, |bits, &x| bits << 4 | u64::from(x as u8 & 15));
-        self.cell.bits() ^ facing << 48
-    }
+/// When a contact is held apart.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GateParams {
+    /// a contact contradicts by more than this many standard deviations
+    pub sigmas: f64,
+    /// contacts of one place within this time share their noise, ns: the longest smoothing window
+    pub window_ns: i64,
 }
 
+/// Contacts added up.
 #[derive(Clone, Copy, Debug)]
 struct Sums {
     point: Vector3<f64>,
     normal: Vector3<f64>,
     weight: f64,
+    /// Σ w σ² of noise, m², and of the normal, rad²
+    noise: f64,
+    tilt: f64,
+    /// Σ w σ of the calibration, m
+    calibration: f64,
+}
+
+/// A small cell and a range of normals.
+#[derive(Clone, Copy, Debug)]
+struct Bin {
+    cell: Node,
+    facing: [i8; 3],
+}
+
+/// A mean that a contact contradicts.
+#[derive(Clone, Copy, Debug)]
+struct Rival {
+    index: u32,
+    /// m
+    innovation: f64,
+    sigmas: f64,
+}
+
+/// All of one mean that queries do not need.
+#[derive(Clone, Copy, Debug)]
+struct Kept {
+    facing: [i8; 3],
+    /// the next mean of the same cell, [`NONE`] for the last
+    next: u32,
+    sums: Sums,
+    visits: Visits,
+    /// number of what was held apart here, [`NONE`] where nothing is
+    apart: u32,
+}
+
+/// Contacts that contradict a mean and agree with each other.
+#[derive(Clone, Copy, Debug)]
+struct Apart {
+    sums: Sums,
+    visits: Visits,
+    last_ns: i64,
 }
 
 /// Contacts, by place and facing.
@@ -48,50 +102,239 @@ struct Sums {
 pub struct ContactStore {
     cell: f64,
     reach: f64,
-    of_bin: Table<Bin, ()>,
-    sums: Vec<Sums>,
+    gate: Option<GateParams>,
+    /// the first mean of each cell
+    of_cell: Table<Node, u32>,
+    kept: Vec<Kept>,
     means: Vec<MeanContact>,
     nearby: Table<Node, Vec<u32>>,
+    apart: Vec<Apart>,
+    knocks: Knocks,
 }
 
 /// Normals whose components differ by less than this share a mean.
 const FACING: f64 = 0.25;
+/// None.
+const NONE: u32 = u32::MAX;
+/// A mean with less weight than this contradicts nothing; a sliding contact weighs 1.
+const LEAST_EVIDENCE: f64 = 3.0;
+/// Normals within 25° are those of one surface.
+const ALIKE: f64 = 0.906;
+/// So many cells above and below a contact there is nothing that faces alike, or the ball would not have fitted in.
+const DEPTH: i32 = 3;
+/// Share of a cell by which a surface may be off the chord between two of its points.
+const ROUGHNESS: f64 = 0.02;
+/// So many windows without a contact part two passes.
+const PAUSE: i64 = 2;
+
+impl Sums {
+    const ZERO: Self = Self {
+        point: Vector3::new(0.0, 0.0, 0.0),
+        normal: Vector3::new(0.0, 0.0, 0.0),
+        weight: 0.0,
+        noise: 0.0,
+        tilt: 0.0,
+        calibration: 0.0,
+    };
+
+    fn add(&mut self, contact: &Contact) {
+        let Contact { point, normal, weight, sigma, .. } = contact;
+        self.point += point.coords * *weight;
+        self.normal += normal * *weight;
+        self.weight += weight;
+        self.noise += weight * sigma.noise * sigma.noise;
+        self.tilt += weight * sigma.normal * sigma.normal;
+        self.calibration += weight * sigma.calibration;
+    }
+
+    fn point(&self) -> Point3<f64> {
+        Point3::from(self.point / self.weight)
+    }
+
+    /// How well one pass of those that were added knows the place.
+    fn sigma(&self) -> ContactSigma {
+        let [noise, calibration, tilt] = [self.noise, self.calibration, self.tilt].map(|sum| sum / self.weight);
+        ContactSigma { noise: noise.sqrt(), calibration, normal: tilt.sqrt() }
+    }
+
+    /// How far a contact is off the chord to the mean, m, and how many standard deviations that is. What calibration
+    /// leaves is the same in both.
+    ///
+    /// - `roughness`: by which the surface itself may be off a chord, m.
+    fn innovation(&self, visits: &Visits, contact: &Contact, roughness: f64) -> (f64, f64) {
+        let normal = self.normal.try_normalize(0.0).unwrap_or(contact.normal);
+        let arm = contact.point - self.point();
+        let off = 0.5 * (contact.normal + normal).dot(&arm);
+        let own = self.sigma();
+        let across = 0.25 * (arm.norm_squared() - off * off).max(0.0);
+        let tilt = across * (own.normal * own.normal + contact.sigma.normal * contact.sigma.normal);
+        let of_mean = own.noise * own.noise / f64::from(visits.count().max(1));
+        let variance = contact.sigma.noise * contact.sigma.noise + of_mean + tilt + roughness * roughness;
+        (off, off.abs() / variance.sqrt().max(f64::MIN_POSITIVE))
+    }
+}
 
 impl ContactStore {
     /// An empty store of cells of edge `cell` (m), for queries up to `reach` (m).
-    pub fn new(cell: f64, reach: f64) -> Self {
-        let (of_bin, nearby) = (Table::default(), Table::default());
-        Self { cell, reach, of_bin, sums: Vec::new(), means: Vec::new(), nearby }
+    ///
+    /// - `gate`: when contacts are held apart; `None`: never.
+    pub fn new(cell: f64, reach: f64, gate: Option<GateParams>) -> Self {
+        Self {
+            cell,
+            reach,
+            gate,
+            of_cell: Table::default(),
+            kept: Vec::new(),
+            means: Vec::new(),
+            nearby: Table::default(),
+            apart: Vec::new(),
+            knocks: Knocks::default(),
+        }
     }
 
-    /// Adds a contact to the mean of its cell.
-    pub fn add(&mut self, contact: &Contact) {
+    /// Adds a contact to the mean of its cell, unless it contradicts what is known there.
+    pub fn add(&mut self, contact: &Contact) -> Verdict {
         let facing = [contact.normal.x, contact.normal.y, contact.normal.z].map(|x| (x / FACING).floor() as i8);
         let bin = Bin { cell: cell_of(&contact.point, self.cell), facing };
-        let (index, is_new) = self.of_bin.insert_with(bin, || ());
-        if is_new {
-            self.sums.push(Sums { point: Vector3::zeros(), normal: Vector3::zeros(), weight: 0.0 });
-            let Contact { point, normal, weight } = *contact;
-            self.means.push(MeanContact { point, normal, weight, is_fan: false });
-            let (at, _) = self.nearby.insert_with(cell_of(&point, self.reach), Vec::new);
-            self.nearby.value_mut(at).push(index);
+        let own = self.find(&bin);
+        if let Some(gate) = self.gate
+            && let Some(rival) = self.rival(contact, bin.cell, own, &gate)
+        {
+            return self.contest(&rival, contact, &bin, &gate);
         }
-        let (sums, mean) = (&mut self.sums[index as usize], &mut self.means[index as usize]);
-        sums.point += contact.point.coords * contact.weight;
-        sums.normal += contact.normal * contact.weight;
-        sums.weight += contact.weight;
-        mean.point = Point3::from(sums.point / sums.weight);
+        let index = own.unwrap_or_else(|| self.begin(&bin, contact));
+        let kept = &mut self.kept[index as usize];
+        kept.sums.add(contact);
+        if let Some(gate) = self.gate
+            && kept.visits.note(contact.stamp_ns, contact.weight, gate.window_ns)
+            && kept.apart != NONE
+        {
+            // a pass that confirms the mean: what is held apart was a knock
+            self.apart[kept.apart as usize].sums = Sums::ZERO;
+        }
+        self.renew(index, contact);
+        Verdict::Taken
+    }
+
+    /// The means of a cell.
+    fn in_cell(&self, cell: Node) -> impl Iterator<Item = u32> + '_ {
+        let first = self.of_cell.get(&cell).copied();
+        std::iter::successors(first, |&index| Some(self.kept[index as usize].next).filter(|&next| next != NONE))
+    }
+
+    fn find(&self, bin: &Bin) -> Option<u32> {
+        self.in_cell(bin.cell).find(|&index| self.kept[index as usize].facing == bin.facing)
+    }
+
+    /// The mean that a contact contradicts: that of its own cell, or where it is the first there the nearest around that
+    /// faces alike.
+    fn rival(&self, contact: &Contact, cell: Node, own: Option<u32>, gate: &GateParams) -> Option<Rival> {
+        let is_rival = |index: &u32| {
+            let (kept, mean) = (&self.kept[*index as usize], &self.means[*index as usize]);
+            kept.sums.weight >= LEAST_EVIDENCE && mean.normal.dot(&contact.normal) > ALIKE
+        };
+        let distance = |index: u32| (self.means[index as usize].point - contact.point).norm_squared();
+        let nearer = |a: &u32, b: &u32| distance(*a).total_cmp(&distance(*b)).then(a.cmp(b));
+        let here = own.filter(is_rival).or_else(|| self.in_cell(cell).filter(is_rival).min_by(nearer));
+        let index = match here {
+            None if own.is_some() => return None,
+            None => {
+                let deep = (2..=DEPTH).flat_map(|k| [-k, k]).map(|k| contact.normal * (f64::from(k) * self.cell));
+                let deep = deep.map(|way| cell_of(&(contact.point + way), self.cell));
+                around(cell).chain(deep).flat_map(|cell| self.in_cell(cell)).filter(is_rival).min_by(nearer)?
+            }
+            Some(index) => index,
+        };
+        let kept = &self.kept[index as usize];
+        let (innovation, sigmas) = kept.sums.innovation(&kept.visits, contact, ROUGHNESS * self.cell);
+        (sigmas > gate.sigmas).then_some(Rival { index, innovation, sigmas })
+    }
+
+    /// Holds a contact apart, or lets it take the place of the mean that it contradicts in a second pass.
+    fn contest(&mut self, rival: &Rival, contact: &Contact, bin: &Bin, gate: &GateParams) -> Verdict {
+        let roughness = ROUGHNESS * self.cell;
+        let kept = &mut self.kept[rival.index as usize];
+        if kept.apart == NONE {
+            kept.apart = self.apart.len() as u32;
+            self.apart.push(Apart { sums: Sums::ZERO, visits: Visits::default(), last_ns: contact.stamp_ns });
+        }
+        let apart = &mut self.apart[kept.apart as usize];
+        let agrees =
+            apart.sums.weight > 0.0 && apart.sums.innovation(&apart.visits, contact, roughness).1 <= gate.sigmas;
+        let is_second = agrees && contact.stamp_ns.saturating_sub(apart.last_ns) > PAUSE * gate.window_ns;
+        if !agrees {
+            (apart.sums, apart.visits) = (Sums::ZERO, Visits::default());
+        }
+        apart.sums.add(contact);
+        apart.visits.note(contact.stamp_ns, contact.weight, gate.window_ns);
+        apart.last_ns = contact.stamp_ns;
+        if is_second {
+            let Apart { sums, visits, .. } = std::mem::replace(apart, Apart { sums: Sums::ZERO, ..*apart });
+            self.move_to(rival.index, (sums, visits), contact, bin);
+            return Verdict::Insisted;
+        }
+        let Contact { stamp_ns, point, normal, .. } = *contact;
+        let Rival { innovation, sigmas, .. } = *rival;
+        self.knocks.note(Knock { stamp_ns, point, normal, innovation, sigmas, contacts: 1 }, gate.window_ns);
+        Verdict::HeldApart
+    }
+
+    /// Empties a mean and puts what was held apart in the cell where it was felt.
+    fn move_to(&mut self, rival: u32, (sums, visits): (Sums, Visits), contact: &Contact, bin: &Bin) {
+        self.knocks.insisted += 1;
+        let old = &mut self.kept[rival as usize];
+        (old.sums, old.visits) = (Sums::ZERO, Visits::default());
+        self.means[rival as usize].weight = 0.0;
+        let index = self.find(bin).unwrap_or_else(|| self.begin(bin, contact));
+        let kept = &mut self.kept[index as usize];
+        (kept.sums, kept.visits) = (sums, visits);
+        self.renew(index, contact);
+    }
+
+    /// An empty mean for a bin.
+    fn begin(&mut self, bin: &Bin, contact: &Contact) -> u32 {
+        let index = self.means.len() as u32;
+        let (at, is_new) = self.of_cell.insert_with(bin.cell, || index);
+        let next = if is_new { NONE } else { std::mem::replace(self.of_cell.value_mut(at), index) };
+        let (sums, visits) = (Sums::ZERO, Visits::default());
+        self.kept.push(Kept { facing: bin.facing, next, sums, visits, apart: NONE });
+        let Contact { point, normal, weight, .. } = *contact;
+        self.means.push(MeanContact { point, normal, weight, is_fan: false });
+        let (at, _) = self.nearby.insert_with(cell_of(&point, self.reach), Vec::new);
+        self.nearby.value_mut(at).push(index);
+        index
+    }
+
+    /// Brings a mean up to its sums.
+    fn renew(&mut self, index: u32, contact: &Contact) {
+        let (sums, mean) = (&self.kept[index as usize].sums, &mut self.means[index as usize]);
+        mean.point = sums.point();
         mean.normal = sums.normal.try_normalize(0.0).unwrap_or(contact.normal);
         mean.weight = sums.weight;
+    }
+
+    /// How well one pass knows a mean.
+    pub(super) fn sigma(&self, index: u32) -> ContactSigma {
+        self.kept[index as usize].sums.sigma()
+    }
+
+    /// The passes over the place of a mean.
+    pub(super) fn visits(&self, index: u32) -> impl Iterator<Item = &Visit> + '_ {
+        self.kept[index as usize].visits.iter()
+    }
+
+    /// What was held apart.
+    pub fn knocks(&self) -> &Knocks {
+        &self.knocks
     }
 
     /// Takes the means that `is_refuted` names out of all queries until it names them no more; returns how many.
     pub fn refute(&mut self, is_refuted: impl Fn(&MeanContact) -> bool) -> usize {
         let mut count = 0;
-        for (mean, sums) in self.means.iter_mut().zip(&self.sums) {
+        for (mean, kept) in self.means.iter_mut().zip(&self.kept) {
             let refuted = is_refuted(mean);
             count += usize::from(refuted);
-            mean.weight = if refuted { 0.0 } else { sums.weight };
+            mean.weight = if refuted { 0.0 } else { kept.sums.weight };
         }
         count
     }
@@ -143,12 +386,12 @@ mod tests {
     use super::*;
 
     fn contact(x: f64, normal: Vector3<f64>, weight: f64) -> Contact {
-        Contact { point: Point3::new(x, 0.1e-3, 0.1e-3), normal, weight }
+        Contact { point: Point3::new(x, 0.1e-3, 0.1e-3), normal, weight, stamp_ns: 0, sigma: ContactSigma::default() }
     }
 
     #[test]
     fn contacts_of_one_cell_are_averaged_by_weight_unless_they_face_apart() {
-        let mut store = ContactStore::new(0.5e-3, 3e-3);
+        let mut store = ContactStore::new(0.5e-3, 3e-3, None);
         store.add(&contact(0.1e-3, Vector3::z(), 1.0));
         store.add(&contact(0.4e-3, Vector3::z(), 3.0));
         store.add(&contact(0.2e-3, Vector3::x(), 1.0));
@@ -159,11 +402,17 @@ mod tests {
 
     #[test]
     fn near_finds_what_a_walk_over_all_finds() {
-        let mut store = ContactStore::new(0.5e-3, 3e-3);
+        let mut store = ContactStore::new(0.5e-3, 3e-3, None);
         let scattered = |i: u32| f64::from(i.wrapping_mul(2_654_435_761) >> 20) / 4096.0 * 10e-3 - 5e-3;
         for i in 0..900 {
             let point = Point3::new(scattered(3 * i), scattered(3 * i + 1), scattered(3 * i + 2));
-            store.add(&Contact { point, normal: Vector3::z(), weight: 1.0 });
+            store.add(&Contact {
+                point,
+                normal: Vector3::z(),
+                weight: 1.0,
+                stamp_ns: 0,
+                sigma: ContactSigma::default(),
+            });
         }
         for i in 0..50 {
             let x = Point3::new(scattered(7 * i), scattered(5 * i + 1), scattered(11 * i));
@@ -178,7 +427,7 @@ mod tests {
 
     #[test]
     fn a_refuted_contact_is_silent_until_it_is_not_refuted_any_more() {
-        let mut store = ContactStore::new(0.5e-3, 3e-3);
+        let mut store = ContactStore::new(0.5e-3, 3e-3, None);
         store.add(&contact(0.0, Vector3::z(), 1.0));
         let count = |store: &ContactStore| {
             let mut count = 0;

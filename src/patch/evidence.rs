@@ -111,18 +111,26 @@ pub struct Evidence<'a> {
     pub scan: &'a TriMesh,
     /// … and the tree over its faces
     pub tree: &'a FaceTree,
+    /// how well the scan was known before; `None`: where something was touched it does not count
+    pub prior: Option<ScanPrior>,
 }
 
-/// Distance from the nearest contact along the surface, m.
-fn lateral(touched: &FieldValue) -> f64 {
-    (touched.nearest * touched.nearest - touched.value * touched.value).max(0.0).sqrt()
+/// How well the scan is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScanPrior {
+    /// standard deviation, m; more than 0
+    pub sigma: f64,
+    /// a scan that is off by more standard deviations shows something else
+    pub gate_sigmas: f64,
+    /// contacts within this time share their noise, ns
+    pub window_ns: i64,
 }
 
 impl Evidence<'_> {
     /// What is known at `x` (m, in O); `None` where the scan has no face.
     pub fn at(&self, x: &Point3<f64>, scratch: &mut FieldScratch) -> Option<Finding> {
         let scan = ScanValue::at(self.scan, self.tree, x)?;
-        let touched = self.params.field.at(self.contacts, x, scratch);
+        let touched = self.touched_beside(x, || Some(scan), scratch);
         let (mut value, mut source) = match &touched {
             Some(touched) => self.beside_touches(touched, &scan),
             None => (scan.value, self.away_from_touches(&scan)),
@@ -138,10 +146,39 @@ impl Evidence<'_> {
         Some(Finding { value, source, scan: scan.value, straight, swept_depth, is_free_end })
     }
 
+    /// The field of the touches at `x` (m, in O), which take the place of the scan by the gain σₛ² / (σₛ² + σₜ²); `None`
+    /// where none is within reach.
+    pub fn touched(&self, x: &Point3<f64>, scratch: &mut FieldScratch) -> Option<FieldValue> {
+        self.touched_beside(x, || ScanValue::at(self.scan, self.tree, x), scratch)
+    }
+
+    fn touched_beside(
+        &self,
+        x: &Point3<f64>,
+        scan: impl FnOnce() -> Option<ScanValue>,
+        scratch: &mut FieldScratch,
+    ) -> Option<FieldValue> {
+        let field = &self.params.field;
+        let mut found = field.at(self.contacts, x, scratch)?;
+        // what is farther away than the scan can be off is none of its surface
+        let prior = self.prior.filter(|prior| found.value.abs() < prior.gate_sigmas * prior.sigma);
+        if let Some(prior) = prior
+            && let Some(scan) = scan()
+        {
+            let off = scan.value - found.value;
+            let is_alike = scan.normal.dot(&found.gradient) > self.params.alike_cosine;
+            if is_alike && !scan.is_on_rim && off.abs() < prior.gate_sigmas * prior.sigma {
+                let touch = field.sigma_of(&found, self.contacts, x, prior.window_ns, scratch).total();
+                found.value += off * touch * touch / (touch * touch + prior.sigma * prior.sigma);
+            }
+        }
+        Some(found)
+    }
+
     /// The field of the touches where they speak for the point, else that of the scan where it holds.
     fn beside_touches(&self, touched: &FieldValue, scan: &ScanValue) -> (f64, Source) {
         let p = self.params;
-        let lateral = lateral(touched);
+        let lateral = touched.lateral();
         let support = match (touched.is_border, touched.is_fan) {
             _ if touched.is_edge => p.edge_support,
             (false, _) => p.inner_support,
@@ -166,7 +203,7 @@ impl Evidence<'_> {
     fn straight_on(&self, touched: &FieldValue, scan: &ScanValue) -> Option<(f64, f64)> {
         let p = self.params;
         let inside = (1.0 - scan.value / p.scan_reach).clamp(0.0, 1.0);
-        let share = (p.field.reach - lateral(touched)) / (p.field.reach - p.border_support);
+        let share = (p.field.reach - touched.lateral()) / (p.field.reach - p.border_support);
         let goes_on = !touched.is_fan && touched.value.abs() <= p.touch_depth;
         goes_on.then(|| (touched.value, inside * share.clamp(0.0, 1.0).powi(2)))
     }

@@ -3,18 +3,21 @@
 use nalgebra::{Point3, Vector3};
 
 use super::Region;
-use super::contact_store::ContactStore;
+use super::contact_sigma::CalibrationParams;
+use super::contact_store::{ContactStore, GateParams, Verdict};
 use super::contour::{ContourParams, contour};
 use super::crossing::crossing;
 use super::cut::Cut;
-use super::evidence::{Evidence, EvidenceParams, Source};
+use super::evidence::{Evidence, EvidenceParams, ScanPrior, Source};
 use super::field::FieldScratch;
+use super::knocks::Knocks;
 use super::lattice::{Lattice, Node, VertexKey};
 use super::restore::{Restored, node_at, restore};
 use super::scan_value::ScanValue;
 use super::splice::Patch;
 use super::swept::SweptSpace;
 use super::touches::{Touch, TouchFinder, TouchFinderParams};
+use super::vertex_sigma::vertex_sigma;
 use crate::mesh::{FaceTree, MeshError, TriMesh};
 use crate::touch::{Compensator, CompensatorParams, Sample, SettingError};
 
@@ -31,6 +34,38 @@ pub struct PatcherParams {
     pub pitch: f64,
     /// a patch may have this many times the faces of the scan: where it would have more, the lattice is made coarser
     pub most_faces: f64,
+    /// how well things are known; `None`: nobody asks, and nothing is held apart
+    pub uncertainty: Option<UncertaintyParams>,
+}
+
+/// What is said of how well the mesh is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UncertaintyParams {
+    /// standard deviation of a vertex of the scan, m; 0: free of noise
+    pub scan: f64,
+    /// what the calibration leaves
+    pub calibration: CalibrationParams,
+    /// contacts that contradict by more standard deviations than this are held apart
+    pub gate_sigmas: f64,
+}
+
+impl UncertaintyParams {
+    /// The defaults, for a scan whose points are off by `noise` (m).
+    pub fn new(noise: f64) -> Self {
+        Self { scan: noise, calibration: CalibrationParams::default(), gate_sigmas: 4.0 }
+    }
+
+    fn check(&self) -> Result<(), SettingError> {
+        let CalibrationParams { position, stiffness_share } = self.calibration;
+        for (name, value) in [
+            ("noise of the scan (m)", self.scan),
+            ("uncertainty of the calibration (m)", position),
+            ("uncertainty of the stiffness (share)", stiffness_share),
+        ] {
+            SettingError::check(name, value, value >= 0.0, "0 or more")?;
+        }
+        SettingError::check("gate (standard deviations)", self.gate_sigmas, self.gate_sigmas > 0.0, "more than 0")
+    }
 }
 
 impl PatcherParams {
@@ -43,7 +78,29 @@ impl PatcherParams {
             evidence: EvidenceParams::new(radius, noise),
             pitch: radius / 2.0,
             most_faces: 10.0,
+            uncertainty: Some(UncertaintyParams::new(noise)),
         }
+    }
+
+    /// The longest smoothing window: contacts within it share their noise, ns.
+    fn window_ns(&self) -> i64 {
+        2 * self.touches.half_window_ns
+    }
+
+    /// When contacts are held apart.
+    fn gate(&self) -> Option<GateParams> {
+        self.uncertainty.map(|known| GateParams { sigmas: known.gate_sigmas, window_ns: self.window_ns() })
+    }
+
+    /// How well the scan is known; a scan free of noise is no better than touches that contradict it.
+    fn scan_prior(&self) -> Option<ScanPrior> {
+        let UncertaintyParams { scan: sigma, gate_sigmas, .. } = self.uncertainty.filter(|known| known.scan > 0.0)?;
+        Some(ScanPrior { sigma, gate_sigmas, window_ns: self.window_ns() })
+    }
+
+    /// How touches are found; what calibration leaves is asked for with the rest.
+    fn finder_params(&self) -> TouchFinderParams {
+        TouchFinderParams { calibration: self.uncertainty.map(|known| known.calibration), ..self.touches }
     }
 
     /// # Errors
@@ -56,7 +113,7 @@ impl PatcherParams {
         ] {
             SettingError::check(name, value, value > 0.0, "more than 0")?;
         }
-        Ok(())
+        self.uncertainty.iter().try_for_each(UncertaintyParams::check)
     }
 }
 
@@ -78,6 +135,8 @@ pub struct Patched {
     pub mesh: TriMesh,
     /// what each vertex rests on, by id
     pub support: Vec<Support>,
+    /// standard deviation of each vertex along the normal, m, by id; none where [`PatcherParams::uncertainty`] is not set
+    pub sigma: Vec<f64>,
     /// edge length of the lattice, m
     pub pitch: f64,
     /// faces of the scan that went
@@ -153,11 +212,16 @@ impl Patcher {
         let radius = params.evidence.radius;
         Ok(Self {
             compensator: Compensator::new(params.compensator)?,
-            finder: TouchFinder::new(params.touches)?,
-            contacts: ContactStore::new(CONTACT_CELL * radius, params.evidence.field.reach),
+            finder: TouchFinder::new(params.finder_params())?,
+            contacts: ContactStore::new(CONTACT_CELL * radius, params.evidence.field.reach, params.gate()),
             swept: SweptSpace::new(SWEPT_CELL * radius, 5.0 / 3.0 * radius),
             params,
         })
+    }
+
+    /// What was held apart because it contradicted the place it was felt at.
+    pub fn knocks(&self) -> &Knocks {
+        self.contacts.knocks()
     }
 
     /// The settings.
@@ -169,8 +233,8 @@ impl Patcher {
     /// is complete.
     pub fn push(&mut self, sample: &Sample) {
         let tip = self.compensator.compensate(sample);
-        let Self { finder, contacts, swept, .. } = self;
-        finder.push(&tip, |touch| keep(contacts, swept, &touch));
+        let Self { finder, contacts, swept, params, .. } = self;
+        finder.push(&tip, |touch| keep(contacts, swept, params.evidence.radius, &touch));
     }
 
     /// The scan with its touched part meshed anew; vertices and faces that were not touched keep their ids.
@@ -188,9 +252,11 @@ impl Patcher {
                 support[id.0 as usize] = support_of(&key, &restored);
             }
         }
+        let sigma = self.sigma(scan, tree, &mesh, &support);
         Ok(Patched {
             mesh,
             support,
+            sigma,
             pitch,
             removed_faces: patch.removed.len(),
             added_faces: patch.faces.len(),
@@ -198,11 +264,21 @@ impl Patcher {
         })
     }
 
+    /// How well each vertex is known, if somebody asks.
+    fn sigma(&self, scan: &TriMesh, tree: &FaceTree, mesh: &TriMesh, support: &[Support]) -> Vec<f64> {
+        let Self { contacts, swept, params, .. } = self;
+        let Some(uncertainty) = &params.uncertainty else { return Vec::new() };
+        let evidence = Evidence { params: &params.evidence, contacts, swept, scan, tree, prior: None };
+        let (window_ns, mut scratch) = (params.window_ns(), FieldScratch::default());
+        let mut of = |(p, &support)| vertex_sigma(&evidence, p, support, uncertainty.scan, window_ns, &mut scratch);
+        mesh.positions().iter().zip(support).map(&mut of).collect()
+    }
+
     /// The patch for all that was felt so far, within the budget.
     fn make(&mut self, scan: &TriMesh, tree: &FaceTree) -> Made {
         let Self { finder, contacts, swept, params, .. } = self;
-        finder.flush(|touch| keep(contacts, swept, &touch));
         let radius = params.evidence.radius;
+        finder.flush(|touch| keep(contacts, swept, radius, &touch));
         let deepest = radius * (1.0 - REFUTED_DEPTH);
         let bounds = bounds_of(scan, OUTSIDE * radius);
         contacts.refute(|mean| {
@@ -210,7 +286,8 @@ impl Patcher {
                 || is_elsewhere(&mean.point, scan, tree, &bounds, OUTSIDE * radius)
         });
         contacts.mark_fans(FAN_WIDTH * radius, FAN_COSINE);
-        let evidence = Evidence { params: &params.evidence, contacts, swept, scan, tree };
+        let prior = params.scan_prior();
+        let evidence = Evidence { params: &params.evidence, contacts, swept, scan, tree, prior };
         let budget = (params.most_faces * scan.face_count() as f64).max(LEAST_BUDGET);
         let mut made = Made::of(&evidence, params.pitch);
         for _ in 0..COARSER {
@@ -225,10 +302,14 @@ impl Patcher {
     }
 }
 
-fn keep(contacts: &mut ContactStore, swept: &mut SweptSpace, touch: &Touch) {
-    swept.add(&touch.centre);
-    if let Some(contact) = &touch.contact {
-        contacts.add(contact);
+fn keep(contacts: &mut ContactStore, swept: &mut SweptSpace, radius: f64, touch: &Touch) {
+    match touch.contact.as_ref().map(|contact| (contact, contacts.add(contact))) {
+        None | Some((_, Verdict::Taken)) => swept.add(&touch.centre),
+        Some((_, Verdict::HeldApart)) => {}
+        Some((contact, Verdict::Insisted)) => {
+            swept.forget(&contact.point, radius * (1.0 - REFUTED_DEPTH));
+            swept.add(&touch.centre);
+        }
     }
 }
 

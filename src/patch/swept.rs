@@ -33,6 +33,15 @@ impl SweptSpace {
         }
     }
 
+    /// Forgets the centres nearer to `p` than `distance` (m, up to the reach).
+    pub fn forget(&mut self, p: &Point3<f64>, distance: f64) {
+        for bin in around(cell_of(p, self.reach)) {
+            if let Some(centres) = self.centres.get_mut(&bin) {
+                centres.retain(|centre| (centre - p).norm_squared() >= distance * distance);
+            }
+        }
+    }
+
     /// The centres that were kept.
     pub fn centres(&self) -> impl Iterator<Item = &Point3<f64>> + '_ {
         self.centres.iter().flat_map(|(_, centres)| centres)
