@@ -28,7 +28,9 @@ impl Default for CalibrationParams {
 pub struct ContactSigma {
     /// of the point along the normal by what averages out, m
     pub noise: f64,
-    /// … by what does not, m
+    /// … by how far the ball reaches over the surface where the normal is off, m
+    pub reach: f64,
+    /// … by what does not average out, m
     pub calibration: f64,
     /// of the direction of the normal, rad
     pub normal: f64,
@@ -49,9 +51,9 @@ impl ContactSigma {
         normal: f64,
         radius: f64,
     ) -> Self {
-        let reach = radius * (1.0 - normal.cos());
         Self {
-            noise: (pose * SHARED_NOISE).hypot(force).hypot(reach),
+            noise: (pose * SHARED_NOISE).hypot(force),
+            reach: radius * (1.0 - normal.cos()),
             calibration: calibration.position.hypot(calibration.stiffness_share * bend),
             normal,
         }

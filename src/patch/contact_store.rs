@@ -54,8 +54,9 @@ struct Sums {
     point: Vector3<f64>,
     normal: Vector3<f64>,
     weight: f64,
-    /// Σ w σ² of noise, m², and of the normal, rad²
+    /// Σ w σ² of noise and reach, m², and of the normal, rad²
     noise: f64,
+    reach: f64,
     tilt: f64,
     /// Σ w σ of the calibration, m
     calibration: f64,
@@ -110,6 +111,8 @@ pub struct ContactStore {
     nearby: Table<Node, Vec<u32>>,
     apart: Vec<Apart>,
     knocks: Knocks,
+    /// the mean that the last contact went into, and when, ns
+    last: Option<(u32, i64)>,
 }
 
 /// Normals whose components differ by less than this share a mean.
@@ -120,10 +123,14 @@ const NONE: u32 = u32::MAX;
 const LEAST_EVIDENCE: f64 = 3.0;
 /// Normals within 25° are those of one surface.
 const ALIKE: f64 = 0.906;
+/// No normal is known better than this, rad: 1°.
+const LEAST_TILT: f64 = 0.017;
 /// So many cells above and below a contact there is nothing that faces alike, or the ball would not have fitted in.
 const DEPTH: i32 = 3;
 /// Share of a cell by which a surface may be off the chord between two of its points.
 const ROUGHNESS: f64 = 0.02;
+/// So many cells away the contact before still says where the next one has to be.
+const WAY: f64 = 3.0;
 /// So many windows without a contact part two passes.
 const PAUSE: i64 = 2;
 
@@ -133,6 +140,7 @@ impl Sums {
         normal: Vector3::new(0.0, 0.0, 0.0),
         weight: 0.0,
         noise: 0.0,
+        reach: 0.0,
         tilt: 0.0,
         calibration: 0.0,
     };
@@ -143,6 +151,7 @@ impl Sums {
         self.normal += normal * *weight;
         self.weight += weight;
         self.noise += weight * sigma.noise * sigma.noise;
+        self.reach += weight * sigma.reach * sigma.reach;
         self.tilt += weight * sigma.normal * sigma.normal;
         self.calibration += weight * sigma.calibration;
     }
@@ -153,23 +162,27 @@ impl Sums {
 
     /// How well one pass of those that were added knows the place.
     fn sigma(&self) -> ContactSigma {
-        let [noise, calibration, tilt] = [self.noise, self.calibration, self.tilt].map(|sum| sum / self.weight);
-        ContactSigma { noise: noise.sqrt(), calibration, normal: tilt.sqrt() }
+        let [noise, reach, tilt] = [self.noise, self.reach, self.tilt].map(|sum| (sum / self.weight).sqrt());
+        ContactSigma { noise, reach, calibration: self.calibration / self.weight, normal: tilt }
     }
 
-    /// How far a contact is off the chord to the mean, m, and how many standard deviations that is. What calibration
-    /// leaves is the same in both.
+    /// How far a contact is off the chord to the mean, m, and how many standard deviations that is. The chord is at right
+    /// angles to the mean of both normals, unless one is known much better. What calibration leaves is the same in both.
     ///
     /// - `roughness`: by which the surface itself may be off a chord, m.
     fn innovation(&self, visits: &Visits, contact: &Contact, roughness: f64) -> (f64, f64) {
         let normal = self.normal.try_normalize(0.0).unwrap_or(contact.normal);
         let arm = contact.point - self.point();
-        let off = 0.5 * (contact.normal + normal).dot(&arm);
         let own = self.sigma();
-        let across = 0.25 * (arm.norm_squared() - off * off).max(0.0);
-        let tilt = across * (own.normal * own.normal + contact.sigma.normal * contact.sigma.normal);
-        let of_mean = own.noise * own.noise / f64::from(visits.count().max(1));
-        let variance = contact.sigma.noise * contact.sigma.noise + of_mean + tilt + roughness * roughness;
+        let [tilt, of_contact] = [own.normal, contact.sigma.normal].map(|tilt| tilt * tilt + LEAST_TILT * LEAST_TILT);
+        let share = of_contact / (tilt + of_contact);
+        let off = (normal * share + contact.normal * (1.0 - share)).dot(&arm);
+        let across = (arm.norm_squared() - off * off).max(0.0);
+        let [of_mean, of_one] = [own, contact.sigma].map(|sigma| sigma.noise.powi(2) + sigma.reach.powi(2));
+        let variance = of_one
+            + of_mean / f64::from(visits.count().max(1))
+            + across * tilt * of_contact / (tilt + of_contact)
+            + roughness * roughness;
         (off, off.abs() / variance.sqrt().max(f64::MIN_POSITIVE))
     }
 }
@@ -189,6 +202,7 @@ impl ContactStore {
             nearby: Table::default(),
             apart: Vec::new(),
             knocks: Knocks::default(),
+            last: None,
         }
     }
 
@@ -213,6 +227,9 @@ impl ContactStore {
             self.apart[kept.apart as usize].sums = Sums::ZERO;
         }
         self.renew(index, contact);
+        if self.kept[index as usize].sums.weight >= LEAST_EVIDENCE {
+            self.last = Some((index, contact.stamp_ns));
+        }
         Verdict::Taken
     }
 
@@ -226,28 +243,48 @@ impl ContactStore {
         self.in_cell(bin.cell).find(|&index| self.kept[index as usize].facing == bin.facing)
     }
 
-    /// The mean that a contact contradicts: that of its own cell, or where it is the first there the nearest around that
-    /// faces alike.
+    /// The mean that a contact contradicts: that of its own cell, or where it is among the first there the nearest around
+    /// that faces alike, or where there is none the one before it on its way.
     fn rival(&self, contact: &Contact, cell: Node, own: Option<u32>, gate: &GateParams) -> Option<Rival> {
-        let is_rival = |index: &u32| {
-            let (kept, mean) = (&self.kept[*index as usize], &self.means[*index as usize]);
-            kept.sums.weight >= LEAST_EVIDENCE && mean.normal.dot(&contact.normal) > ALIKE
+        let nearest = |found: &mut dyn Iterator<Item = u32>| {
+            let distance = |index: u32| (self.means[index as usize].point - contact.point).norm_squared();
+            let nearer = |a: &u32, b: &u32| distance(*a).total_cmp(&distance(*b)).then(a.cmp(b));
+            found.filter(|&index| self.faces_alike(index, contact)).min_by(nearer)
         };
-        let distance = |index: u32| (self.means[index as usize].point - contact.point).norm_squared();
-        let nearer = |a: &u32, b: &u32| distance(*a).total_cmp(&distance(*b)).then(a.cmp(b));
-        let here = own.filter(is_rival).or_else(|| self.in_cell(cell).filter(is_rival).min_by(nearer));
-        let index = match here {
-            None if own.is_some() => return None,
-            None => {
-                let deep = (2..=DEPTH).flat_map(|k| [-k, k]).map(|k| contact.normal * (f64::from(k) * self.cell));
-                let deep = deep.map(|way| cell_of(&(contact.point + way), self.cell));
-                around(cell).chain(deep).flat_map(|cell| self.in_cell(cell)).filter(is_rival).min_by(nearer)?
-            }
+        let here = own.filter(|&index| self.faces_alike(index, contact));
+        let index = match here.or_else(|| nearest(&mut self.in_cell(cell))) {
+            None => nearest(&mut self.around(contact, cell)).or_else(|| self.before(contact, gate))?,
             Some(index) => index,
         };
-        let kept = &self.kept[index as usize];
-        let (innovation, sigmas) = kept.sums.innovation(&kept.visits, contact, ROUGHNESS * self.cell);
+        let (innovation, sigmas) = self.innovation(index, contact);
         (sigmas > gate.sigmas).then_some(Rival { index, innovation, sigmas })
+    }
+
+    /// Whether a mean speaks for the surface that a contact is of.
+    fn faces_alike(&self, index: u32, contact: &Contact) -> bool {
+        let (kept, mean) = (&self.kept[index as usize], &self.means[index as usize]);
+        kept.sums.weight >= LEAST_EVIDENCE && mean.normal.dot(&contact.normal) > ALIKE
+    }
+
+    /// The means in the cells around a contact, and above and below it.
+    fn around(&self, contact: &Contact, cell: Node) -> impl Iterator<Item = u32> + '_ {
+        let (point, step) = (contact.point, contact.normal * self.cell);
+        let deep = (2..=DEPTH).flat_map(|k| [-k, k]);
+        let deep = deep.map(move |k| cell_of(&(point + step * f64::from(k)), self.cell));
+        around(cell).chain(deep).flat_map(|cell| self.in_cell(cell))
+    }
+
+    /// The mean that the contact before went into, while that is near in time and place.
+    fn before(&self, contact: &Contact, gate: &GateParams) -> Option<u32> {
+        let (index, last_ns) = self.last?;
+        let is_recent = contact.stamp_ns.saturating_sub(last_ns) <= gate.window_ns;
+        let way = (self.means[index as usize].point - contact.point).norm();
+        (is_recent && way < WAY * self.cell && self.faces_alike(index, contact)).then_some(index)
+    }
+
+    fn innovation(&self, index: u32, contact: &Contact) -> (f64, f64) {
+        let kept = &self.kept[index as usize];
+        kept.sums.innovation(&kept.visits, contact, ROUGHNESS * self.cell)
     }
 
     /// Holds a contact apart, or lets it take the place of the mean that it contradicts in a second pass.
@@ -270,7 +307,7 @@ impl ContactStore {
         apart.last_ns = contact.stamp_ns;
         if is_second {
             let Apart { sums, visits, .. } = std::mem::replace(apart, Apart { sums: Sums::ZERO, ..*apart });
-            self.move_to(rival.index, (sums, visits), contact, bin);
+            self.move_to(rival.index, (sums, visits), contact, bin, gate.sigmas);
             return Verdict::Insisted;
         }
         let Contact { stamp_ns, point, normal, .. } = *contact;
@@ -279,12 +316,20 @@ impl ContactStore {
         Verdict::HeldApart
     }
 
-    /// Empties a mean and puts what was held apart in the cell where it was felt.
-    fn move_to(&mut self, rival: u32, (sums, visits): (Sums, Visits), contact: &Contact, bin: &Bin) {
+    /// Empties the means that a contact contradicts and puts what was held apart in the cell where it was felt.
+    fn move_to(&mut self, rival: u32, (sums, visits): (Sums, Visits), contact: &Contact, bin: &Bin, sigmas: f64) {
         self.knocks.insisted += 1;
-        let old = &mut self.kept[rival as usize];
-        (old.sums, old.visits) = (Sums::ZERO, Visits::default());
-        self.means[rival as usize].weight = 0.0;
+        let contradicts = |&index: &u32| {
+            let is_alike = self.kept[index as usize].sums.weight > 0.0
+                && self.means[index as usize].normal.dot(&contact.normal) > ALIKE;
+            index == rival || is_alike && self.innovation(index, contact).1 > sigmas
+        };
+        let old: Vec<u32> = self.around(contact, bin.cell).chain([rival]).filter(contradicts).collect();
+        for index in old {
+            let old = &mut self.kept[index as usize];
+            (old.sums, old.visits) = (Sums::ZERO, Visits::default());
+            self.means[index as usize].weight = 0.0;
+        }
         let index = self.find(bin).unwrap_or_else(|| self.begin(bin, contact));
         let kept = &mut self.kept[index as usize];
         (kept.sums, kept.visits) = (sums, visits);
@@ -316,6 +361,12 @@ impl ContactStore {
     /// How well one pass knows a mean.
     pub(super) fn sigma(&self, index: u32) -> ContactSigma {
         self.kept[index as usize].sums.sigma()
+    }
+
+    /// Variance of a mean along its normal by noise and calibration, m²: noise averages out by the number of passes.
+    pub(super) fn variance(&self, index: u32) -> f64 {
+        let (sigma, visits) = (self.sigma(index), self.kept[index as usize].visits.count().max(1));
+        sigma.noise * sigma.noise / f64::from(visits) + sigma.calibration * sigma.calibration
     }
 
     /// The passes over the place of a mean.

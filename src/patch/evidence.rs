@@ -98,6 +98,16 @@ pub struct Finding {
     pub is_free_end: bool,
 }
 
+/// The scan is not asked where it moves a touch by less than this share of what that may be off anyway.
+const NOTICED: f64 = 0.1;
+
+impl ScanPrior {
+    /// The variance of a touch, m², unless the scan says nothing beside it: it moves a touch by gate × σₜ² / σₛ at most.
+    fn comparable(&self, of_touch: f64) -> Option<f64> {
+        (self.gate_sigmas * of_touch.sqrt() > NOTICED * self.sigma).then_some(of_touch)
+    }
+}
+
 /// All evidence.
 #[derive(Clone, Copy, Debug)]
 pub struct Evidence<'a> {
@@ -122,8 +132,6 @@ pub struct ScanPrior {
     pub sigma: f64,
     /// a scan that is off by more standard deviations shows something else
     pub gate_sigmas: f64,
-    /// contacts within this time share their noise, ns
-    pub window_ns: i64,
 }
 
 impl Evidence<'_> {
@@ -146,8 +154,8 @@ impl Evidence<'_> {
         Some(Finding { value, source, scan: scan.value, straight, swept_depth, is_free_end })
     }
 
-    /// The field of the touches at `x` (m, in O), which take the place of the scan by the gain σₛ² / (σₛ² + σₜ²); `None`
-    /// where none is within reach.
+    /// The field of the touches at `x` (m, in O), which take the place of the scan by the gain σₛ² / (σₛ² + σₜ²) of the
+    /// nearest one; `None` where none is within reach.
     pub fn touched(&self, x: &Point3<f64>, scratch: &mut FieldScratch) -> Option<FieldValue> {
         self.touched_beside(x, || ScanValue::at(self.scan, self.tree, x), scratch)
     }
@@ -158,18 +166,16 @@ impl Evidence<'_> {
         scan: impl FnOnce() -> Option<ScanValue>,
         scratch: &mut FieldScratch,
     ) -> Option<FieldValue> {
-        let field = &self.params.field;
-        let mut found = field.at(self.contacts, x, scratch)?;
-        // what is farther away than the scan can be off is none of its surface
-        let prior = self.prior.filter(|prior| found.value.abs() < prior.gate_sigmas * prior.sigma);
-        if let Some(prior) = prior
+        let mut found = self.params.field.at(self.contacts, x, scratch)?;
+        if let Some(prior) = self.prior
+            && found.value.abs() < prior.gate_sigmas * prior.sigma
+            && let Some(of_touch) = prior.comparable(self.contacts.variance(found.contact))
             && let Some(scan) = scan()
         {
-            let off = scan.value - found.value;
-            let is_alike = scan.normal.dot(&found.gradient) > self.params.alike_cosine;
-            if is_alike && !scan.is_on_rim && off.abs() < prior.gate_sigmas * prior.sigma {
-                let touch = field.sigma_of(&found, self.contacts, x, prior.window_ns, scratch).total();
-                found.value += off * touch * touch / (touch * touch + prior.sigma * prior.sigma);
+            let is_alike = !scan.is_on_rim && scan.normal.dot(&found.gradient) > self.params.alike_cosine;
+            let (off, of_both) = (scan.value - found.value, of_touch + prior.sigma * prior.sigma);
+            if is_alike && off * off < prior.gate_sigmas * prior.gate_sigmas * of_both {
+                found.value += off * of_touch / of_both;
             }
         }
         Some(found)

@@ -45,6 +45,8 @@ pub struct FieldValue {
     pub gradient: Vector3<f64>,
     /// distance to the nearest contact, m
     pub nearest: f64,
+    /// number of that contact
+    pub contact: u32,
     /// the nearest contact is one of an edge that the ball rolled over
     pub is_fan: bool,
     /// the contacts of the piece that decides do not surround the point: it is beyond the last of them
@@ -152,6 +154,7 @@ impl FieldParams {
             value: combined.value,
             gradient: combined.gradient,
             nearest: nearest.distance_squared.sqrt(),
+            contact: nearest.index,
             is_fan: means[nearest.index as usize].is_fan,
             is_border: is_border(arms, &combined.gradient, UNDER * self.sigma, angles),
             is_edge: combined.is_edge,

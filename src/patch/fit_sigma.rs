@@ -82,7 +82,7 @@ impl FieldParams {
             shares.extend(store.visits(member.index).map(|visit| {
                 let share = weight * visit.weight / mean.weight / f64::from(visit.count).sqrt();
                 let tilt = share * 0.5 * lateral * sigma.normal;
-                Share { began_ns: visit.began_ns, noise: share * sigma.noise, tilt }
+                Share { began_ns: visit.began_ns, noise: share * sigma.noise.hypot(sigma.reach), tilt }
             }));
         }
         shares.sort_unstable_by(|a, b| a.began_ns.cmp(&b.began_ns).then(a.noise.total_cmp(&b.noise)));
@@ -135,7 +135,7 @@ mod tests {
         for i in 0..64 * passes {
             let along = (i % 64) as f64 * 0.04e-3 - 1.28e-3;
             let stamp_ns = i / 64 * 1_000_000_000 + i % 64 * spacing_ns;
-            let sigma = ContactSigma { noise: 10e-6, calibration: 3e-6, normal: 0.0 };
+            let sigma = ContactSigma { noise: 10e-6, reach: 0.0, calibration: 3e-6, normal: 0.0 };
             store.add(&Contact {
                 point: Point3::new(along, 0.1e-3, 0.0),
                 normal: Vector3::z(),

@@ -95,7 +95,7 @@ impl PatcherParams {
     /// How well the scan is known; a scan free of noise is no better than touches that contradict it.
     fn scan_prior(&self) -> Option<ScanPrior> {
         let UncertaintyParams { scan: sigma, gate_sigmas, .. } = self.uncertainty.filter(|known| known.scan > 0.0)?;
-        Some(ScanPrior { sigma, gate_sigmas, window_ns: self.window_ns() })
+        Some(ScanPrior { sigma, gate_sigmas })
     }
 
     /// How touches are found; what calibration leaves is asked for with the rest.
@@ -187,6 +187,8 @@ const CONTACT_CELL: f64 = 1.0 / 3.0;
 const SWEPT_CELL: f64 = 0.1;
 /// A contact that the ball went into by more than this is none, in radii: four times the noise of a usual tracker.
 const REFUTED_DEPTH: f64 = 0.133;
+/// Where touches insist, the ball has been nearer than this to what was believed before, in radii.
+const FORGOTTEN: f64 = 1.1;
 /// A contact farther outside of the scan than this belongs to something else, in radii.
 const OUTSIDE: f64 = 4.0;
 /// Normals within this many radii …
@@ -307,7 +309,7 @@ fn keep(contacts: &mut ContactStore, swept: &mut SweptSpace, radius: f64, touch:
         None | Some((_, Verdict::Taken)) => swept.add(&touch.centre),
         Some((_, Verdict::HeldApart)) => {}
         Some((contact, Verdict::Insisted)) => {
-            swept.forget(&contact.point, radius * (1.0 - REFUTED_DEPTH));
+            swept.forget(&contact.point, FORGOTTEN * radius);
             swept.add(&touch.centre);
         }
     }

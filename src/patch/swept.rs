@@ -14,7 +14,8 @@ const STRAIGHT: f64 = 0.7;
 pub struct SweptSpace {
     cell: f64,
     reach: f64,
-    thinned: Table<Node, ()>,
+    /// whether a centre of the cube is kept
+    thinned: Table<Node, bool>,
     centres: Table<Node, Vec<Point3<f64>>>,
 }
 
@@ -26,8 +27,8 @@ impl SweptSpace {
 
     /// Takes a centre, m, in O.
     pub fn add(&mut self, centre: &Point3<f64>) {
-        let (_, is_new) = self.thinned.insert_with(cell_of(centre, self.cell), || ());
-        if is_new {
+        let (thinned, _) = self.thinned.insert_with(cell_of(centre, self.cell), || false);
+        if !std::mem::replace(self.thinned.value_mut(thinned), true) {
             let (at, _) = self.centres.insert_with(cell_of(centre, self.reach), Vec::new);
             self.centres.value_mut(at).push(*centre);
         }
@@ -36,9 +37,14 @@ impl SweptSpace {
     /// Forgets the centres nearer to `p` than `distance` (m, up to the reach).
     pub fn forget(&mut self, p: &Point3<f64>, distance: f64) {
         for bin in around(cell_of(p, self.reach)) {
-            if let Some(centres) = self.centres.get_mut(&bin) {
-                centres.retain(|centre| (centre - p).norm_squared() >= distance * distance);
-            }
+            let Some(centres) = self.centres.get_mut(&bin) else { continue };
+            centres.retain(|centre| {
+                let stays = (centre - p).norm_squared() >= distance * distance;
+                if !stays && let Some(is_kept) = self.thinned.get_mut(&cell_of(centre, self.cell)) {
+                    *is_kept = false;
+                }
+                stays
+            });
         }
     }
 
@@ -104,5 +110,11 @@ mod tests {
         let (distance, centre) = swept.nearest(&Point3::new(5e-3, 1.2e-3, 0.0)).unwrap();
         assert!((distance - 1.2e-3).abs() < 1e-5 && (centre.x - 5e-3).abs() < 1e-4);
         assert_eq!(swept.nearest(&Point3::new(5e-3, 2.1e-3, 0.0)), None);
+        // what is forgotten can be swept again
+        swept.forget(&Point3::new(5e-3, 0.0, 0.0), 1.01e-3);
+        let nearest = |swept: &SweptSpace| swept.nearest(&Point3::new(5e-3, 0.0, 0.0)).unwrap().0;
+        assert!(nearest(&swept) > 1e-3 && swept.centres().count() < 82);
+        swept.add(&Point3::new(5.01e-3, 0.0, 0.0));
+        assert!(nearest(&swept) < 0.02e-3);
     }
 }

@@ -194,11 +194,21 @@ impl TouchFinder {
         best
     }
 
+    /// Variance of the centre where even the shortest window is no parabola, as after a knock: as much as the path is off
+    /// it, in those of its noise. Such errors are alike in all of the window and do not average out in it.
+    fn roughness(&self, motion: &Motion) -> f64 {
+        let noise = self.noise.sigma.max(LEAST_ROUGH * self.params.radius);
+        let residual = motion.residual / noise;
+        let excess = (residual * residual - ROUGH * ROUGH).max(0.0) / motion.centre_gain;
+        if excess.is_finite() { excess } else { 0.0 }
+    }
+
     fn contact(&self, stamp_ns: i64, motion: &Motion, force_o: &Vector3<f64>, felt: &FeltNormal) -> Contact {
         let FeltNormal { normal, sigma } = *felt;
-        let weight = 1.0 / (1.0 + (sigma / self.params.uncertain_normal).powi(2));
+        let mut weight = 1.0 / (1.0 + (sigma / self.params.uncertain_normal).powi(2));
         let point = motion.centre - normal * self.params.radius;
         let sigma = self.params.calibration.map_or_else(ContactSigma::default, |calibration| {
+            weight /= 1.0 + self.roughness(motion);
             let softness = self.params.stiffness.map_or(0.0, |stiffness| 1.0 / stiffness);
             ContactSigma::of(
                 &calibration,
@@ -216,6 +226,8 @@ impl TouchFinder {
 const WINDOWS: [i64; 4] = [3, 4, 6, 8];
 /// A path whose residuals are so many times the noise is no parabola any more.
 const ROUGH: f64 = 1.5;
+/// What the path of a calm hand over an edge is off a parabola, in radii.
+const LEAST_ROUGH: f64 = 0.02;
 /// Samples between two poses share their noise, so that it averages out more slowly than that of as many poses.
 const SHARED_NOISE: f64 = 1.3;
 
