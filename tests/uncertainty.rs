@@ -137,7 +137,7 @@ fn only_new_vertices_are_better_known_than_the_scan_and_nobody_pays_who_does_not
 const PERIOD_NS: i64 = 1_000_000_000;
 
 /// Knocks `messages` every second: by turns a spike of force, which a shaken handle makes, and a jump of the pose, as when
-/// the stylus slips in the hand; both out of the part.
+/// the stylus slips off, and its shaft still touches.
 fn knocked(messages: &[Message]) -> Vec<Message> {
     let (spike_ns, slip_ns) = (8_000_000, 40_000_000);
     let is_in = |stamp_ns: i64, turn: i64, length_ns: i64| {
@@ -149,7 +149,7 @@ fn knocked(messages: &[Message]) -> Vec<Message> {
         match message {
             Message::Wrench(stamped) if is_in(stamped.stamp_ns, 0, spike_ns) => stamped.wrench.force.z += 25.0,
             Message::Pose(stamped) if is_in(stamped.stamp_ns, 1, slip_ns) => {
-                stamped.pose_ot.translation.vector.z += 0.3e-3;
+                stamped.pose_ot.translation.vector.z += 0.8e-3;
             }
             _ => {}
         }
@@ -196,7 +196,9 @@ fn knocks_are_counted_and_do_not_dent_the_mesh() {
         };
         places += hit.len();
         listed += patchers[1].knocks().last().filter(|knock| near(knock.stamp_ns)).count();
-        println!("{seed}: {} held apart, calm {}", patchers[1].knocks().held_apart, patchers[0].knocks().held_apart);
+        let [held, calm] = [1, 0].map(|i| patchers[i].knocks().held_apart);
+        println!("seed {seed}: {held} contacts held apart, {calm} when calm");
+        assert!(held > 5 * calm, "{held} {calm}");
     }
     let [calm, gated, open] = errors.map(|mut errors| {
         errors.sort_by(f64::total_cmp);
@@ -205,8 +207,8 @@ fn knocks_are_counted_and_do_not_dent_the_mesh() {
     println!(
         "dents at {places} knocks on planes, mm, 50, 80, 95 %: calm {calm:.3?}, knocked {gated:.3?}, without          uncertainty {open:.3?}; {listed} knocks listed"
     );
-    assert!(2 * listed > places);
-    assert!(gated[1] < 1.3 * calm[1] && gated[2] < 0.5 * open[2]);
+    assert!(listed > places, "{listed}");
+    assert!(gated[1] < 1.5 * calm[1] && gated[2] < 0.06, "{gated:?}");
 }
 
 /// Goes over the square from −4 to 4 mm in lines 1 mm apart at height `z` (m), from `start_ns` on; returns the time after.
