@@ -488,4 +488,46 @@ mod tests {
         assert_eq!((store.refute(|_| true), count(&store)), (1, 0));
         assert_eq!((store.refute(|_| false), count(&store)), (0, 1));
     }
+
+    /// A pass of eight contacts at height `z` (m) from `stamp_ns` on; what became of the last.
+    fn pass(store: &mut ContactStore, z: f64, stamp_ns: i64) -> Verdict {
+        let sigma = ContactSigma { noise: 10e-6, ..ContactSigma::default() };
+        let at = |i: i64| Point3::new(0.1e-3 + 0.03e-3 * i as f64, 0.1e-3, 0.1e-3 + z);
+        let contact = |i: i64| Contact {
+            point: at(i),
+            normal: Vector3::z(),
+            weight: 1.0,
+            stamp_ns: stamp_ns + i * 1_000_000,
+            sigma,
+        };
+        (0..8).map(|i| store.add(&contact(i))).last().unwrap()
+    }
+
+    #[test]
+    fn what_contradicts_is_held_apart_until_a_second_pass_insists() {
+        let gate = GateParams { sigmas: 4.0, window_ns: 64_000_000 };
+        let second = 1_000_000_000;
+        // within the cell, and in the one above
+        for moved in [0.2e-3, 0.45e-3] {
+            let mut store = ContactStore::new(0.5e-3, 3e-3, Some(gate));
+            let near = |store: &ContactStore| {
+                let mut heights = Vec::new();
+                store.near(&Point3::new(0.2e-3, 0.1e-3, 0.3e-3), 1e-3, |_, index| {
+                    heights.push((store.means()[index as usize].point.z * 1e6).round());
+                });
+                heights
+            };
+            assert_eq!(pass(&mut store, 0.0, second), Verdict::Taken);
+            assert_eq!(pass(&mut store, 0.01e-3, 2 * second), Verdict::Taken);
+            assert_eq!(near(&store), [105.0], "what agrees is averaged");
+            assert_eq!(pass(&mut store, moved, 3 * second), Verdict::HeldApart);
+            assert_eq!((near(&store), store.knocks().held_apart), (vec![105.0], 8));
+            // a pass that confirms the mean: the next that contradicts is the first again
+            assert_eq!(pass(&mut store, 0.0, 4 * second), Verdict::Taken);
+            assert_eq!(pass(&mut store, moved, 5 * second), Verdict::HeldApart);
+            pass(&mut store, moved, 6 * second);
+            assert_eq!(store.knocks().insisted, 1);
+            assert_eq!(near(&store), [((100e-6 + moved) * 1e6).round()]);
+        }
+    }
 }

@@ -61,3 +61,23 @@ impl Knocks {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn contacts_in_a_row_are_one_knock_and_the_last_ones_are_kept() {
+        let mut knocks = Knocks::default();
+        for i in 0..100 {
+            for (after_ns, sigmas) in [(0, 5.0), (10, 9.0), (20, 6.0)] {
+                let (point, normal) = (Point3::origin(), Vector3::z());
+                let stamp_ns = 1000 * (i + 1) + after_ns;
+                knocks.note(Knock { stamp_ns, point, normal, innovation: 1e-4, sigmas, contacts: 1 }, 64);
+            }
+        }
+        assert_eq!((knocks.held_apart, knocks.last().count()), (300, KEPT));
+        let (first, last) = (knocks.last().next().unwrap(), knocks.last().last().unwrap());
+        assert_eq!((first.stamp_ns, last.stamp_ns, last.contacts, last.sigmas), (37_000, 100_000, 3, 9.0));
+    }
+}
