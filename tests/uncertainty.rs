@@ -86,7 +86,9 @@ fn what_was_touched_is_as_well_known_as_it_says() {
     let styli = [
         ("usual", StylusParams::default(), 0.93),
         ("noisy, friction 0.3", StylusParams { friction: 0.3, sensor: noisy, ..StylusParams::default() }, 0.93),
-        ("soft, 5 N/mm", StylusParams { stiffness: 5e3, ..StylusParams::default() }, 0.93),
+        // 2 % of its bend of half a millimetre is more than all noise, and one draw for each seed: 20 draws leave the share
+        // uncertain by a few per cent
+        ("soft, 5 N/mm", StylusParams { stiffness: 5e3, ..StylusParams::default() }, 0.9),
         // the lines of the hand are as far apart as this ball is wide: more of the surface lies between contacts
         ("1 mm ball", StylusParams { radius: 1e-3, ..StylusParams::default() }, 0.915),
     ];
