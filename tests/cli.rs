@@ -175,6 +175,7 @@ fn refine_json_is_one_object_with_the_documented_keys() {
         "load_s",
         "replay_s",
         "patch",
+        "uncertainty",
     ];
     documented.sort_unstable();
     assert_eq!(keys(&summary), documented);
@@ -184,6 +185,11 @@ fn refine_json_is_one_object_with_the_documented_keys() {
     let mut patch = ["pitch_mm", "removed_faces", "added_faces", "guessed_share", "build_s"];
     patch.sort_unstable();
     assert_eq!(keys(&summary["patch"]), patch);
+    assert_eq!(keys(&summary["uncertainty"]), ["held_apart", "insisted", "knocks", "touched_sigma_mm"]);
+    assert_eq!(
+        (&summary["uncertainty"]["held_apart"], &summary["uncertainty"]["knocks"]),
+        (&0.into(), &serde_json::json!([]))
+    );
     assert_eq!((&summary["samples"], &summary["accepted"]), (&Value::from(1001), &Value::from(1001)));
     assert_eq!((&summary["refused"], &summary["contacts"]), (&serde_json::json!({}), &Value::from(1)));
     assert!(summary["moved_faces"].as_u64().unwrap() > 0);

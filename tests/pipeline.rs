@@ -252,14 +252,17 @@ fn a_replay_equals_the_first_run_byte_for_byte() {
     sync.finish();
     take(&mut sync);
     patcher.flush();
-    let Patched { mesh, support, .. } = patcher.patched(&scan, &FaceTree::new(&scan)).unwrap();
+    let Patched { mesh, support, sigma, .. } = patcher.patched(&scan, &FaceTree::new(&scan)).unwrap();
     let touched = |support: &Support| match support {
         Support::Touched => 1.0,
         Support::Guessed => 0.5,
         Support::Scan => 0.0,
     };
-    let column = VertexColumn { name: "touched", values: support.iter().map(touched).collect::<Vec<_>>().into() };
-    write_mesh_with(&plate.at("live.ply"), &mesh, &[column], MeshUnit::Millimetre).unwrap();
+    let touched: Vec<f32> = support.iter().map(touched).collect();
+    let sigma_mm: Vec<f32> = sigma.iter().map(|sigma| (sigma * 1e3) as f32).collect();
+    let columns = [("touched", touched), ("sigma_mm", sigma_mm)];
+    let columns = columns.map(|(name, values)| VertexColumn { name, values: values.into() });
+    write_mesh_with(&plate.at("live.ply"), &mesh, &columns, MeshUnit::Millimetre).unwrap();
 
     for out in ["one.ply", "two.ply"] {
         let output = plate.refine(out, &[]);

@@ -51,6 +51,7 @@ fn every_key_of_the_code_is_in_the_shipped_file_and_documented() {
         "carve",
         "guard",
         "patch",
+        "uncertainty",
         "refine",
     ];
     let sections = [&outer[..], &inner].concat();
@@ -106,7 +107,8 @@ fn a_part_is_built_only_when_named() {
     assert_eq!(loop_alone.compensator.wrench_frame, WrenchFrame::Object);
 
     let bare =
-        Scene::from_yaml("sync:\ncontact: {}\ntip:\nscan:\nsliding:\ncarve:\nguard:\npatch:\nrefine:\n").unwrap();
+        Scene::from_yaml("sync:\ncontact: {}\ntip:\nscan:\nsliding:\ncarve:\nguard:\npatch:\nuncertainty:\nrefine:\n")
+            .unwrap();
     assert_eq!(bare, Scene::default(), "a part named without keys takes its defaults");
 }
 

@@ -4,6 +4,7 @@
 //! not be written, 2 wrong usage, 3 bad input file, 4 done with losses, which are named.
 
 mod demo;
+mod knocks;
 mod latency;
 mod offsets;
 mod progress;

@@ -9,6 +9,7 @@ use clap::Args;
 use serde::Serialize;
 use tracing::{debug, warn};
 
+use super::knocks::UncertaintySummary;
 use super::latency::{Latencies, Quantiles};
 use super::offsets::{ContactPoints, ScanOffset, WrenchOffset};
 use super::progress::Progress;
@@ -102,6 +103,16 @@ pub(super) struct Summary {
     replay_s: f64,
     /// what was meshed anew; `null` when the scene has no `patch`, or nothing was touched
     patch: Option<PatchSummary>,
+    /// how well that is known; not there when the scene has no `uncertainty`
+    #[serde(skip_serializing_if = "Option::is_none")]
+    uncertainty: Option<UncertaintySummary>,
+}
+
+/// What became of the touched part.
+struct Remeshed {
+    moved_faces: u64,
+    patch: Option<PatchSummary>,
+    uncertainty: Option<UncertaintySummary>,
 }
 
 /// What `--json` prints of the patch.
@@ -284,11 +295,12 @@ impl RefineArguments {
             .map(|contacts| ScanOffset::of(contacts.registrar.estimate(&as_scanned, &FaceTree::new(&as_scanned))));
         let replay_s = started.elapsed().as_secs_f64();
         let counts = refiner.counts();
-        let (moved_faces, patch) = match patcher.filter(|_| counts.contacts > 0) {
+        let Remeshed { moved_faces, patch, uncertainty } = match patcher.filter(|_| counts.contacts > 0) {
             Some(patcher) => self.write_patched(patcher, &as_scanned)?,
             None => {
                 write_mesh(&self.out, refiner.mesh(), self.mesh_unit).map_err(CliError::WriteMesh)?;
-                (moved_faces(&as_scanned, refiner.mesh()), None)
+                let moved_faces = moved_faces(&as_scanned, refiner.mesh());
+                Remeshed { moved_faces, patch: None, uncertainty: None }
             }
         };
         debug!(?counts, "replayed");
@@ -317,12 +329,13 @@ impl RefineArguments {
             load_s,
             replay_s,
             patch,
+            uncertainty,
         };
         Ok(Refined { repair, summary, losses: replayed.losses })
     }
 
-    /// Meshes the touched part of the scan anew and writes the result; returns how many faces are new or moved.
-    fn write_patched(&self, mut patcher: Patcher, scan: &TriMesh) -> Result<(u64, Option<PatchSummary>), CliError> {
+    /// Meshes the touched part of the scan anew and writes the result.
+    fn write_patched(&self, mut patcher: Patcher, scan: &TriMesh) -> Result<Remeshed, CliError> {
         let _patching = Progress::stage("mesh anew");
         let (started, wanted) = (Instant::now(), patcher.params().pitch);
         patcher.flush();
@@ -334,10 +347,15 @@ impl RefineArguments {
             );
         }
         let build_s = started.elapsed().as_secs_f64();
-        let touched = VertexColumn { name: "touched", values: touched_column(&patched).into() };
-        write_mesh_with(&self.out, &patched.mesh, &[touched], self.mesh_unit).map_err(CliError::WriteMesh)?;
+        let mut columns = vec![VertexColumn { name: "touched", values: touched_column(&patched).into() }];
+        let uncertainty = patcher.params().uncertainty.map(|_| UncertaintySummary::of(&patched, patcher.knocks()));
+        if uncertainty.is_some() {
+            columns.push(VertexColumn { name: "sigma_mm", values: sigma_column(&patched).into() });
+        }
+        write_mesh_with(&self.out, &patched.mesh, &columns, self.mesh_unit).map_err(CliError::WriteMesh)?;
         debug!(open_squares = patched.open_squares, "patched");
-        Ok((moved_faces(scan, &patched.mesh), Some(PatchSummary::of(&patched, build_s))))
+        let moved_faces = moved_faces(scan, &patched.mesh);
+        Ok(Remeshed { moved_faces, patch: Some(PatchSummary::of(&patched, build_s)), uncertainty })
     }
 
     fn topics(&self) -> Topics {
@@ -396,6 +414,11 @@ fn touched_column(patched: &Patched) -> Vec<f32> {
     patched.support.iter().map(touched).collect()
 }
 
+/// Standard deviation of each vertex along the normal, mm.
+fn sigma_column(patched: &Patched) -> Vec<f32> {
+    patched.sigma.iter().map(|sigma| (sigma * 1e3) as f32).collect()
+}
+
 impl PatchSummary {
     fn of(patched: &Patched, build_s: f64) -> Self {
         let count = |wanted: Support| patched.support.iter().filter(|&&support| support == wanted).count() as f64;
@@ -450,7 +473,8 @@ impl fmt::Display for Summary {
         }
         write!(f, "push: median {median} ns, p99 {p99} ns, p99.9 {p999} ns, max {max} ns; ")?;
         write!(f, "loaded in {:.2} s, replayed in {:.2} s", self.load_s, self.replay_s)?;
-        self.patch.iter().try_for_each(|patch| write!(f, "\n{patch}"))
+        self.patch.iter().try_for_each(|patch| write!(f, "\n{patch}"))?;
+        self.uncertainty.iter().try_for_each(|known| write!(f, "\n{known}"))
     }
 }
 

@@ -77,7 +77,7 @@ fn of_touches(
     let mut share = share_of(values);
     let mut normal = Vector3::zeros();
     for _ in 0..STEPS {
-        let here = evidence.params.field.at(evidence.contacts, &(a + (b - a) * share), scratch)?;
+        let here = evidence.touched(&(a + (b - a) * share), scratch)?;
         normal = here.gradient;
         if (here.value < 0.0) == (values[0] < 0.0) {
             (low, values[0]) = (share, here.value);

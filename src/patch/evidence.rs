@@ -98,6 +98,16 @@ pub struct Finding {
     pub is_free_end: bool,
 }
 
+/// The scan is not asked where it moves a touch by less than this share of what that may be off anyway.
+const NOTICED: f64 = 0.1;
+
+impl ScanPrior {
+    /// The variance of a touch, m², unless the scan says nothing beside it: it moves a touch by gate × σₜ² / σₛ at most.
+    fn comparable(&self, of_touch: f64) -> Option<f64> {
+        (self.gate_sigmas * of_touch.sqrt() > NOTICED * self.sigma).then_some(of_touch)
+    }
+}
+
 /// All evidence.
 #[derive(Clone, Copy, Debug)]
 pub struct Evidence<'a> {
@@ -111,18 +121,24 @@ pub struct Evidence<'a> {
     pub scan: &'a TriMesh,
     /// … and the tree over its faces
     pub tree: &'a FaceTree,
+    /// how well the scan was known before; `None`: where something was touched it does not count
+    pub prior: Option<ScanPrior>,
 }
 
-/// Distance from the nearest contact along the surface, m.
-fn lateral(touched: &FieldValue) -> f64 {
-    (touched.nearest * touched.nearest - touched.value * touched.value).max(0.0).sqrt()
+/// How well the scan is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScanPrior {
+    /// standard deviation, m; more than 0
+    pub sigma: f64,
+    /// a scan that is off by more standard deviations shows something else
+    pub gate_sigmas: f64,
 }
 
 impl Evidence<'_> {
     /// What is known at `x` (m, in O); `None` where the scan has no face.
     pub fn at(&self, x: &Point3<f64>, scratch: &mut FieldScratch) -> Option<Finding> {
         let scan = ScanValue::at(self.scan, self.tree, x)?;
-        let touched = self.params.field.at(self.contacts, x, scratch);
+        let touched = self.touched_beside(x, || Some(scan), scratch);
         let (mut value, mut source) = match &touched {
             Some(touched) => self.beside_touches(touched, &scan),
             None => (scan.value, self.away_from_touches(&scan)),
@@ -138,10 +154,37 @@ impl Evidence<'_> {
         Some(Finding { value, source, scan: scan.value, straight, swept_depth, is_free_end })
     }
 
+    /// The field of the touches at `x` (m, in O), which take the place of the scan by the gain σₛ² / (σₛ² + σₜ²) of the
+    /// nearest one; `None` where none is within reach.
+    pub fn touched(&self, x: &Point3<f64>, scratch: &mut FieldScratch) -> Option<FieldValue> {
+        self.touched_beside(x, || ScanValue::at(self.scan, self.tree, x), scratch)
+    }
+
+    fn touched_beside(
+        &self,
+        x: &Point3<f64>,
+        scan: impl FnOnce() -> Option<ScanValue>,
+        scratch: &mut FieldScratch,
+    ) -> Option<FieldValue> {
+        let mut found = self.params.field.at(self.contacts, x, scratch)?;
+        if let Some(prior) = self.prior
+            && found.value.abs() < prior.gate_sigmas * prior.sigma
+            && let Some(of_touch) = prior.comparable(self.contacts.variance(found.contact))
+            && let Some(scan) = scan()
+        {
+            let is_alike = !scan.is_on_rim && scan.normal.dot(&found.gradient) > self.params.alike_cosine;
+            let (off, of_both) = (scan.value - found.value, of_touch + prior.sigma * prior.sigma);
+            if is_alike && off * off < prior.gate_sigmas * prior.gate_sigmas * of_both {
+                found.value += off * of_touch / of_both;
+            }
+        }
+        Some(found)
+    }
+
     /// The field of the touches where they speak for the point, else that of the scan where it holds.
     fn beside_touches(&self, touched: &FieldValue, scan: &ScanValue) -> (f64, Source) {
         let p = self.params;
-        let lateral = lateral(touched);
+        let lateral = touched.lateral();
         let support = match (touched.is_border, touched.is_fan) {
             _ if touched.is_edge => p.edge_support,
             (false, _) => p.inner_support,
@@ -166,7 +209,7 @@ impl Evidence<'_> {
     fn straight_on(&self, touched: &FieldValue, scan: &ScanValue) -> Option<(f64, f64)> {
         let p = self.params;
         let inside = (1.0 - scan.value / p.scan_reach).clamp(0.0, 1.0);
-        let share = (p.field.reach - lateral(touched)) / (p.field.reach - p.border_support);
+        let share = (p.field.reach - touched.lateral()) / (p.field.reach - p.border_support);
         let goes_on = !touched.is_fan && touched.value.abs() <= p.touch_depth;
         goes_on.then(|| (touched.value, inside * share.clamp(0.0, 1.0).powi(2)))
     }

@@ -12,6 +12,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::contact_store::{ContactStore, MeanContact};
+use super::fit_sigma::Share;
 
 /// How contacts are grouped and weighted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,6 +45,8 @@ pub struct FieldValue {
     pub gradient: Vector3<f64>,
     /// distance to the nearest contact, m
     pub nearest: f64,
+    /// number of that contact
+    pub contact: u32,
     /// the nearest contact is one of an edge that the ball rolled over
     pub is_fan: bool,
     /// the contacts of the piece that decides do not surround the point: it is beyond the last of them
@@ -52,18 +55,26 @@ pub struct FieldValue {
     pub is_edge: bool,
 }
 
+impl FieldValue {
+    /// Distance from the nearest contact along the surface, m.
+    pub fn lateral(&self) -> f64 {
+        (self.nearest * self.nearest - self.value * self.value).max(0.0).sqrt()
+    }
+}
+
 /// A contact near the point.
 #[derive(Clone, Copy, Debug)]
-struct Member {
-    distance_squared: f64,
-    index: u32,
+pub(super) struct Member {
+    /// m²; weight of the fit once that is made
+    pub(super) distance_squared: f64,
+    pub(super) index: u32,
     /// number of its piece; [`NO_PIECE`] for one too many
-    piece: u32,
+    pub(super) piece: u32,
 }
 
 /// Contacts that lie and face alike.
 #[derive(Clone, Copy, Debug, Default)]
-struct Piece {
+pub(super) struct Piece {
     weight: f64,
     /// weight of the members that are not on an edge
     flat_weight: f64,
@@ -73,15 +84,15 @@ struct Piece {
     point: Vector3<f64>,
     normal: Vector3<f64>,
     /// unit
-    facing: Vector3<f64>,
+    pub(super) facing: Vector3<f64>,
     /// Σ w
-    fit_weight: f64,
+    pub(super) fit_weight: f64,
     /// Σ w ½(n + g)·(x − c)
     fit_value: f64,
 }
 
 impl Piece {
-    fn value(&self) -> f64 {
+    pub(super) fn value(&self) -> f64 {
         self.fit_value / self.fit_weight
     }
 }
@@ -89,9 +100,20 @@ impl Piece {
 /// Room for one evaluation, used again by the next.
 #[derive(Clone, Debug, Default)]
 pub struct FieldScratch {
-    near: Vec<Member>,
-    pieces: Vec<Piece>,
+    pub(super) near: Vec<Member>,
+    pub(super) pieces: Vec<Piece>,
     angles: Vec<f64>,
+    /// number of the piece that decided
+    pub(super) decides: u32,
+    pub(super) shares: Vec<Share>,
+}
+
+impl FieldScratch {
+    /// How far the value of the piece that decided is from that of the nearest other piece, m.
+    pub(super) fn nearest_other(&self, value: f64) -> f64 {
+        let others = (0..).zip(&self.pieces).filter(|(at, _)| *at != self.decides);
+        others.map(|(_, piece)| (piece.value() - value).abs()).fold(f64::INFINITY, f64::min)
+    }
 }
 
 /// Pieces looked at, at most: three faces of a corner, and fans between them.
@@ -114,7 +136,7 @@ const UNDER: f64 = 0.13;
 impl FieldParams {
     /// The field at `x` (m, in O); `None` where no contact is within reach.
     pub fn at(&self, store: &ContactStore, x: &Point3<f64>, scratch: &mut FieldScratch) -> Option<FieldValue> {
-        let FieldScratch { near, pieces, angles } = scratch;
+        let FieldScratch { near, pieces, angles, decides, .. } = scratch;
         near.clear();
         store.near(x, self.reach, |distance_squared, index| {
             near.push(Member { distance_squared, index, piece: NO_PIECE });
@@ -125,12 +147,14 @@ impl FieldParams {
         self.group(means, near, pieces);
         self.fit(means, x, near, pieces);
         let combined = self.combine(pieces)?;
+        *decides = combined.piece;
         let members = near.iter().filter(|member| member.piece == combined.piece);
         let arms = members.map(|member| means[member.index as usize].point - x);
         Some(FieldValue {
             value: combined.value,
             gradient: combined.gradient,
             nearest: nearest.distance_squared.sqrt(),
+            contact: nearest.index,
             is_fan: means[nearest.index as usize].is_fan,
             is_border: is_border(arms, &combined.gradient, UNDER * self.sigma, angles),
             is_edge: combined.is_edge,
@@ -346,7 +370,7 @@ fn is_border(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::patch::Contact;
+    use crate::patch::{Contact, ContactSigma};
 
     const RADIUS: f64 = 1.5e-3;
 
@@ -355,11 +379,12 @@ mod tests {
 
     /// Contacts of a surface at the points of a grid of 0.5 mm, each weighing 5.
     fn store_of(surfaces: &[Patch<'_>]) -> ContactStore {
-        let mut store = ContactStore::new(RADIUS / 3.0, 2.0 * RADIUS);
+        let mut store = ContactStore::new(RADIUS / 3.0, 2.0 * RADIUS, None);
         for surface in surfaces {
             for (i, j) in (-16..=16).flat_map(|i| (-16..=16).map(move |j| (i, j))) {
                 if let Some((point, normal)) = surface(f64::from(i) * 0.5e-3, f64::from(j) * 0.5e-3) {
-                    store.add(&Contact { point, normal, weight: 5.0 });
+                    let sigma = ContactSigma::default();
+                    store.add(&Contact { point, normal, weight: 5.0, stamp_ns: 0, sigma });
                 }
             }
         }

@@ -2,9 +2,12 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::contact_store::ContactStore;
+use super::contact_sigma::CalibrationParams;
+use super::contact_store::{ContactStore, GateParams, Verdict};
 use super::delta::{PatchDelta, Shown};
-use super::evidence::{Evidence, EvidenceParams, Source};
+use super::evidence::{Evidence, EvidenceParams, ScanPrior, Source};
+use super::field::FieldScratch;
+use super::knocks::Knocks;
 use super::lattice::{CellBox, Lattice, Node, VertexKey};
 use super::remesh::{Remesh, Renewed};
 use super::restore::{News, Restored, node_at};
@@ -13,6 +16,7 @@ use super::splice::Patch;
 use super::swept::SweptSpace;
 use super::table::Table;
 use super::touches::{Touch, TouchFinder, TouchFinderParams};
+use super::vertex_sigma::vertex_sigma;
 use crate::mesh::{FaceTree, MeshError, TriMesh};
 use crate::touch::{Compensator, CompensatorParams, Sample, SettingError};
 
@@ -29,6 +33,38 @@ pub struct PatcherParams {
     pub pitch: f64,
     /// a patch may have this many times the faces of the scan: where it would have more, the lattice is made coarser
     pub most_faces: f64,
+    /// how well things are known; `None`: nobody asks, and nothing is held apart
+    pub uncertainty: Option<UncertaintyParams>,
+}
+
+/// What is said of how well the mesh is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UncertaintyParams {
+    /// standard deviation of a vertex of the scan, m; 0: free of noise
+    pub scan: f64,
+    /// what the calibration leaves
+    pub calibration: CalibrationParams,
+    /// contacts that contradict by more standard deviations than this are held apart
+    pub gate_sigmas: f64,
+}
+
+impl UncertaintyParams {
+    /// The defaults, for a scan whose points are off by `noise` (m).
+    pub fn new(noise: f64) -> Self {
+        Self { scan: noise, calibration: CalibrationParams::default(), gate_sigmas: 4.0 }
+    }
+
+    fn check(&self) -> Result<(), SettingError> {
+        let CalibrationParams { position, stiffness_share } = self.calibration;
+        for (name, value) in [
+            ("noise of the scan (m)", self.scan),
+            ("uncertainty of the calibration (m)", position),
+            ("uncertainty of the stiffness (share)", stiffness_share),
+        ] {
+            SettingError::check(name, value, value >= 0.0, "0 or more")?;
+        }
+        SettingError::check("gate (standard deviations)", self.gate_sigmas, self.gate_sigmas > 0.0, "more than 0")
+    }
 }
 
 impl PatcherParams {
@@ -41,7 +77,29 @@ impl PatcherParams {
             evidence: EvidenceParams::new(radius, noise),
             pitch: radius / 2.0,
             most_faces: 10.0,
+            uncertainty: Some(UncertaintyParams::new(noise)),
         }
+    }
+
+    /// The longest smoothing window: contacts within it share their noise, ns.
+    fn window_ns(&self) -> i64 {
+        2 * self.touches.half_window_ns
+    }
+
+    /// When contacts are held apart.
+    fn gate(&self) -> Option<GateParams> {
+        self.uncertainty.map(|known| GateParams { sigmas: known.gate_sigmas, window_ns: self.window_ns() })
+    }
+
+    /// How well the scan is known; a scan free of noise is no better than touches that contradict it.
+    fn scan_prior(&self) -> Option<ScanPrior> {
+        let UncertaintyParams { scan: sigma, gate_sigmas, .. } = self.uncertainty.filter(|known| known.scan > 0.0)?;
+        Some(ScanPrior { sigma, gate_sigmas })
+    }
+
+    /// How touches are found; what calibration leaves is asked for with the rest.
+    fn finder_params(&self) -> TouchFinderParams {
+        TouchFinderParams { calibration: self.uncertainty.map(|known| known.calibration), ..self.touches }
     }
 
     /// # Errors
@@ -54,7 +112,7 @@ impl PatcherParams {
         ] {
             SettingError::check(name, value, value > 0.0, "more than 0")?;
         }
-        Ok(())
+        self.uncertainty.iter().try_for_each(UncertaintyParams::check)
     }
 }
 
@@ -76,6 +134,8 @@ pub struct Patched {
     pub mesh: TriMesh,
     /// what each vertex rests on, by id
     pub support: Vec<Support>,
+    /// standard deviation of each vertex along the normal, m, by id; none where [`PatcherParams::uncertainty`] is not set
+    pub sigma: Vec<f64>,
     /// edge length of the lattice, m
     pub pitch: f64,
     /// faces of the scan that went
@@ -128,6 +188,8 @@ pub struct Patcher {
 struct Felt {
     contacts: ContactStore,
     swept: SweptSpace,
+    /// of the ball, m
+    radius: f64,
     /// stamp of the last touch that counts, ns
     until_ns: i64,
     last_contact_ns: Option<i64>,
@@ -145,9 +207,13 @@ impl Felt {
             }
             self.last_contact_ns = Some(touch.stamp_ns);
         }
-        self.swept.add(&touch.centre);
-        if let Some(contact) = &touch.contact {
-            self.contacts.add(contact);
+        match touch.contact.as_ref().map(|contact| (contact, self.contacts.add(contact))) {
+            None | Some((_, Verdict::Taken)) => self.swept.add(&touch.centre),
+            Some((_, Verdict::HeldApart)) => {}
+            Some((contact, Verdict::Insisted)) => {
+                self.swept.forget(&contact.point, FORGOTTEN * self.radius);
+                self.swept.add(&touch.centre);
+            }
         }
         self.until_ns = touch.stamp_ns;
     }
@@ -193,6 +259,8 @@ const CONTACT_CELL: f64 = 1.0 / 3.0;
 const SWEPT_CELL: f64 = 0.1;
 /// A contact that the ball went into by more than this is none, in radii: four times the noise of a usual tracker.
 const REFUTED_DEPTH: f64 = 0.133;
+/// Where touches insist, the ball has been nearer than this to what was believed before, in radii.
+const FORGOTTEN: f64 = 1.1;
 /// A contact farther outside of the scan than this belongs to something else, in radii.
 const OUTSIDE: f64 = 4.0;
 /// Normals within this many radii …
@@ -216,10 +284,11 @@ impl Patcher {
         let radius = params.evidence.radius;
         Ok(Self {
             compensator: Compensator::new(params.compensator)?,
-            finder: TouchFinder::new(params.touches)?,
+            finder: TouchFinder::new(params.finder_params())?,
             felt: Felt {
-                contacts: ContactStore::new(CONTACT_CELL * radius, params.evidence.field.reach),
+                contacts: ContactStore::new(CONTACT_CELL * radius, params.evidence.field.reach, params.gate()),
                 swept: SweptSpace::new(SWEPT_CELL * radius, 5.0 / 3.0 * radius),
+                radius,
                 until_ns: i64::MIN,
                 last_contact_ns: None,
             },
@@ -227,6 +296,11 @@ impl Patcher {
             live: None,
             params,
         })
+    }
+
+    /// What was held apart because it contradicted the place it was felt at.
+    pub fn knocks(&self) -> &Knocks {
+        self.felt.contacts.knocks()
     }
 
     /// The settings.
@@ -303,14 +377,26 @@ impl Patcher {
                 support[id.0 as usize] = support_of(&key, remesh.restored());
             }
         }
+        let sigma = self.sigma(scan, tree, &mesh, &support);
         Ok(Patched {
             mesh,
             support,
+            sigma,
             pitch: remesh.lattice().pitch,
             removed_faces: patch.removed.len(),
             added_faces: patch.faces.len(),
             open_squares: patch.open.len(),
         })
+    }
+
+    /// How well each vertex is known, if somebody asks.
+    fn sigma(&self, scan: &TriMesh, tree: &FaceTree, mesh: &TriMesh, support: &[Support]) -> Vec<f64> {
+        let Self { params, .. } = self;
+        let Some(uncertainty) = &params.uncertainty else { return Vec::new() };
+        let evidence = Evidence { prior: None, ..self.evidence(scan, tree) };
+        let (window_ns, mut scratch) = (params.window_ns(), FieldScratch::default());
+        let mut of = |(p, &support)| vertex_sigma(&evidence, p, support, uncertainty.scan, window_ns, &mut scratch);
+        mesh.positions().iter().zip(support).map(&mut of).collect()
     }
 
     /// What changed in the patch since this was last asked. It takes as long as there is to mesh anew near what changed;
@@ -354,7 +440,7 @@ impl Patcher {
         let (deepest, outside) = (radius * (1.0 - REFUTED_DEPTH), OUTSIDE * radius);
         let bounds = *self.bounds.get_or_insert_with(|| bounds_of(scan, outside));
         let mut changed: Table<u32, ()> = contacts.take_changed().into_iter().collect();
-        let centres = swept.take_added();
+        let centres = swept.take_changed();
         let mut doubtful = changed.clone();
         for centre in &centres {
             contacts.near(centre, deepest, |_, at| add(&mut doubtful, at));
@@ -392,7 +478,7 @@ impl Patcher {
 
     fn evidence<'a>(&'a self, scan: &'a TriMesh, tree: &'a FaceTree) -> Evidence<'a> {
         let Self { felt: Felt { contacts, swept, .. }, params, .. } = self;
-        Evidence { params: &params.evidence, contacts, swept, scan, tree }
+        Evidence { params: &params.evidence, contacts, swept, scan, tree, prior: params.scan_prior() }
     }
 
     fn budget(&self, scan: &TriMesh) -> f64 {

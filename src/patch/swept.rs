@@ -10,18 +10,23 @@ use super::table::Table;
 /// Cosine of the widest angle between a way and what counts as straight ahead: 45°.
 const STRAIGHT: f64 = 0.7;
 
-/// Centres kept for undoing.
-const MOST_KEPT: usize = 500_000;
+/// The centres of one cube of the reach's size; `None` where there was none.
+type Bin = Option<Vec<Point3<f64>>>;
+type BinHistory = History<Node, Bin>;
+
+/// Cubes kept for undoing: some tens of MB.
+const MOST_KEPT: usize = 2000;
 
 /// Centres of the ball, thinned to one for each small cell.
 #[derive(Clone, Debug)]
 pub struct SweptSpace {
     cell: f64,
     reach: f64,
-    thinned: Table<Node, ()>,
+    /// whether a centre of the cube is kept
+    thinned: Table<Node, bool>,
     centres: Table<Node, Vec<Point3<f64>>>,
-    added: Vec<Point3<f64>>,
-    history: History<Node, Option<Point3<f64>>>,
+    changed: Vec<Point3<f64>>,
+    history: BinHistory,
 }
 
 impl SweptSpace {
@@ -32,21 +37,51 @@ impl SweptSpace {
             reach,
             thinned: Table::default(),
             centres: Table::default(),
-            added: Vec::new(),
+            changed: Vec::new(),
             history: History::new(MOST_KEPT),
         }
     }
 
     /// Takes a centre, m, in O.
     pub fn add(&mut self, centre: &Point3<f64>) {
-        let cell = cell_of(centre, self.cell);
-        let (_, is_new) = self.thinned.insert_with(cell, || ());
-        if is_new {
-            self.history.note(cell, || None);
-            let (at, _) = self.centres.insert_with(cell_of(centre, self.reach), Vec::new);
+        let (thinned, _) = self.thinned.insert_with(cell_of(centre, self.cell), || false);
+        if !std::mem::replace(self.thinned.value_mut(thinned), true) {
+            let bin = cell_of(centre, self.reach);
+            self.note(bin);
+            let (at, _) = self.centres.insert_with(bin, Vec::new);
             self.centres.value_mut(at).push(*centre);
-            self.added.push(*centre);
+            self.changed.push(*centre);
         }
+    }
+
+    /// Forgets the centres nearer to `p` than `distance` (m, up to the reach).
+    pub fn forget(&mut self, p: &Point3<f64>, distance: f64) {
+        for bin in around(cell_of(p, self.reach)) {
+            if !self.centres.contains(&bin) {
+                continue;
+            }
+            self.note(bin);
+            let Self { centres, thinned, changed, cell, .. } = self;
+            let Some(centres) = centres.get_mut(&bin) else { continue };
+            centres.retain(|centre| {
+                let stays = (centre - p).norm_squared() >= distance * distance;
+                if !stays && let Some(is_kept) = thinned.get_mut(&cell_of(centre, *cell)) {
+                    *is_kept = false;
+                    changed.push(*centre);
+                }
+                stays
+            });
+        }
+    }
+
+    fn note(&mut self, bin: Node) {
+        let Self { history, centres, .. } = self;
+        history.note(bin, || centres.get(&bin).cloned());
+    }
+
+    /// The centres that came or went since this was last asked.
+    pub fn take_changed(&mut self) -> Vec<Point3<f64>> {
+        std::mem::take(&mut self.changed)
     }
 
     /// Begins a stroke, which can be undone.
@@ -69,51 +104,36 @@ impl SweptSpace {
         self.exchange(|history, swap| history.redo(swap))
     }
 
-    fn exchange(
-        &mut self,
-        act: impl FnOnce(&mut History<Node, Option<Point3<f64>>>, &mut dyn FnMut(Node, &mut Option<Point3<f64>>)) -> bool,
-    ) -> bool {
+    fn exchange(&mut self, act: impl FnOnce(&mut BinHistory, &mut dyn FnMut(Node, &mut Bin)) -> bool) -> bool {
         let mut history = std::mem::replace(&mut self.history, History::new(MOST_KEPT));
-        let has_changed = act(&mut history, &mut |cell, kept| self.swap(cell, kept));
+        let has_changed = act(&mut history, &mut |bin, past| self.swap(bin, past));
         self.history = history;
-        self.added.clear();
+        self.changed.clear();
         has_changed
     }
 
-    /// Puts a centre in, or takes it out and keeps it; those that came last go first.
-    fn swap(&mut self, cell: Node, kept: &mut Option<Point3<f64>>) {
-        match kept.take() {
-            Some(centre) => {
-                self.thinned.insert_with(cell, || ());
-                let (at, _) = self.centres.insert_with(cell_of(&centre, self.reach), Vec::new);
-                self.centres.value_mut(at).push(centre);
-            }
-            None => {
-                self.thinned.remove(&cell);
-                *kept = self.take_last_in(cell);
-            }
-        }
-    }
-
-    /// Takes the centre of a small cell out of where it stands last.
-    fn take_last_in(&mut self, cell: Node) -> Option<Point3<f64>> {
-        let middle = Point3::from(nalgebra::Vector3::from(cell.map(|x| (f64::from(x) + 0.5) * self.cell)));
-        for bin in around(cell_of(&middle, self.reach)) {
-            let Some(centres) = self.centres.get_mut(&bin) else { continue };
-            if centres.last().is_some_and(|centre| cell_of(centre, self.cell) == cell) {
-                let centre = centres.pop();
-                if centres.is_empty() {
-                    self.centres.remove(&bin);
+    /// Exchanges the centres of a cube with those that were kept; cubes that came last go first.
+    fn swap(&mut self, bin: Node, past: &mut Bin) {
+        let there = match past.take() {
+            None => self.centres.remove(&bin),
+            Some(before) => match self.centres.get_mut(&bin) {
+                Some(centres) => Some(std::mem::replace(centres, before)),
+                None => {
+                    self.centres.insert(bin, before);
+                    None
                 }
-                return centre;
-            }
-        }
-        None
+            },
+        };
+        self.mark(there.as_deref().unwrap_or_default(), false);
+        *past = there;
+        let now = self.centres.get(&bin).cloned().unwrap_or_default();
+        self.mark(&now, true);
     }
 
-    /// The centres that were kept since this was last asked.
-    pub fn take_added(&mut self) -> Vec<Point3<f64>> {
-        std::mem::take(&mut self.added)
+    fn mark(&mut self, centres: &[Point3<f64>], is_kept: bool) {
+        for centre in centres {
+            self.thinned.insert(cell_of(centre, self.cell), is_kept);
+        }
     }
 
     /// The centres that were kept.
@@ -178,5 +198,11 @@ mod tests {
         let (distance, centre) = swept.nearest(&Point3::new(5e-3, 1.2e-3, 0.0)).unwrap();
         assert!((distance - 1.2e-3).abs() < 1e-5 && (centre.x - 5e-3).abs() < 1e-4);
         assert_eq!(swept.nearest(&Point3::new(5e-3, 2.1e-3, 0.0)), None);
+        // what is forgotten can be swept again
+        swept.forget(&Point3::new(5e-3, 0.0, 0.0), 1.01e-3);
+        let nearest = |swept: &SweptSpace| swept.nearest(&Point3::new(5e-3, 0.0, 0.0)).unwrap().0;
+        assert!(nearest(&swept) > 1e-3 && swept.centres().count() < 82);
+        swept.add(&Point3::new(5.01e-3, 0.0, 0.0));
+        assert!(nearest(&swept) < 0.02e-3);
     }
 }

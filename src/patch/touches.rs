@@ -8,9 +8,10 @@ use std::collections::VecDeque;
 
 use nalgebra::{Point3, Vector3};
 
+use super::contact_sigma::{CalibrationParams, ContactSigma, ForceNoise};
 use crate::touch::{
     BiasParams, BiasTracker, ContactGate, ContactGateParams, FeltNormal, Friction, FrictionCoefficient, LocalMotion,
-    SettingError, Sliding, Tip,
+    Motion, SettingError, Sliding, Tip,
 };
 
 /// How touches are found.
@@ -31,6 +32,8 @@ pub struct TouchFinderParams {
     pub cone_cosine: f64,
     /// a touch whose normal is uncertain by this much weighs half, rad. Default 5°: what curved pieces take for smooth.
     pub uncertain_normal: f64,
+    /// what the calibration leaves uncertain; `None`: the uncertainty of a contact is not asked for
+    pub calibration: Option<CalibrationParams>,
 }
 
 impl TouchFinderParams {
@@ -44,6 +47,7 @@ impl TouchFinderParams {
             largest_gap_ns: 30_000_000,
             cone_cosine: 0.9135,
             uncertain_normal: 5f64.to_radians(),
+            calibration: None,
         }
     }
 }
@@ -57,6 +61,10 @@ pub struct Contact {
     pub normal: Vector3<f64>,
     /// how much it counts beside others: at most 1, less where the normal is uncertain
     pub weight: f64,
+    /// ns
+    pub stamp_ns: i64,
+    /// how well it is known; all 0 where that was not asked for
+    pub sigma: ContactSigma,
 }
 
 /// The ball at one instant.
@@ -86,6 +94,7 @@ pub struct TouchFinder {
     bias: BiasTracker,
     friction: Friction,
     noise: PathNoise,
+    shake: ForceNoise,
     /// samples since the last gap, as far as a window may still need them
     held: VecDeque<Entry>,
     /// the first of `held` whose touch has not been given out
@@ -102,6 +111,7 @@ impl TouchFinder {
             bias: BiasTracker::new(BiasParams { free: FREE_SHARE * params.gate.on, ..BiasParams::default() })?,
             friction: Friction::new(params.cone_cosine.clamp(-1.0, 1.0).acos()),
             noise: PathNoise::default(),
+            shake: ForceNoise::default(),
             held: VecDeque::new(),
             next: 0,
         })
@@ -113,6 +123,9 @@ impl TouchFinder {
             self.flush(&mut each);
         }
         let force_o = self.bias.compensate(tip);
+        if let Some(last) = self.held.back() {
+            self.shake.note(&last.force_o, &force_o);
+        }
         let bend = self.params.stiffness.map_or_else(Vector3::zeros, |stiffness| force_o / stiffness);
         self.held.push_back(Entry {
             stamp_ns: tip.stamp_ns,
@@ -155,7 +168,8 @@ impl TouchFinder {
         if window.is_alike && self.held[at].in_contact {
             let dt = if at > 0 { self.held[at].stamp_ns - self.held[at - 1].stamp_ns } else { 0 };
             self.friction.observe(&sliding, dt as f64 * 1e-9);
-            contact = self.friction.normal(&sliding).map(|felt| self.contact(&motion.centre, &felt));
+            let found = self.friction.normal(&sliding);
+            contact = found.map(|felt| self.contact(self.held[at].stamp_ns, &motion, &sliding.force_o, &felt));
         } else {
             self.friction.lift();
         }
@@ -180,10 +194,31 @@ impl TouchFinder {
         best
     }
 
-    fn contact(&self, centre: &Point3<f64>, felt: &FeltNormal) -> Contact {
+    /// Variance of the centre where even the shortest window is no parabola, as after a knock: as much as the path is off
+    /// it, in those of its noise. Such errors are alike in all of the window and do not average out in it.
+    fn roughness(&self, motion: &Motion) -> f64 {
+        let noise = self.noise.sigma.max(LEAST_ROUGH * self.params.radius);
+        let residual = motion.residual / noise;
+        let excess = (residual * residual - ROUGH * ROUGH).max(0.0) / motion.centre_gain;
+        if excess.is_finite() { excess } else { 0.0 }
+    }
+
+    fn contact(&self, stamp_ns: i64, motion: &Motion, force_o: &Vector3<f64>, felt: &FeltNormal) -> Contact {
         let FeltNormal { normal, sigma } = *felt;
-        let weight = 1.0 / (1.0 + (sigma / self.params.uncertain_normal).powi(2));
-        Contact { point: centre - normal * self.params.radius, normal, weight }
+        let mut weight = 1.0 / (1.0 + (sigma / self.params.uncertain_normal).powi(2));
+        let point = motion.centre - normal * self.params.radius;
+        let sigma = self.params.calibration.map_or_else(ContactSigma::default, |calibration| {
+            weight /= 1.0 + self.roughness(motion);
+            let softness = self.params.stiffness.map_or(0.0, |stiffness| 1.0 / stiffness);
+            ContactSigma::of(
+                &calibration,
+                [self.noise.sigma, self.shake.sigma() * softness].map(|noise| noise * motion.centre_gain.sqrt()),
+                force_o.dot(&normal) * softness,
+                sigma,
+                self.params.radius,
+            )
+        });
+        Contact { point, normal, weight, stamp_ns, sigma }
     }
 }
 
@@ -191,6 +226,8 @@ impl TouchFinder {
 const WINDOWS: [i64; 4] = [3, 4, 6, 8];
 /// A path whose residuals are so many times the noise is no parabola any more.
 const ROUGH: f64 = 1.5;
+/// What the path of a calm hand over an edge is off a parabola, in radii.
+const LEAST_ROUGH: f64 = 0.02;
 /// Samples between two poses share their noise, so that it averages out more slowly than that of as many poses.
 const SHARED_NOISE: f64 = 1.3;
 

@@ -17,7 +17,7 @@ use sections::named;
 pub use sections::{
     AlongName, BiasSection, BiasTrackingSection, CarveSection, CompensationSection, ContactSection, GuardSection,
     MarkersSection, Mode, ModelName, PatchSection, PayloadSection, RefineSection, ScanSection, SlidingSection,
-    StepName, SyncSection, TipSection,
+    StepName, SyncSection, TipSection, UncertaintySection,
 };
 
 /// The parts of a scene. `None`: not built.
@@ -57,6 +57,9 @@ pub struct Scene {
     /// Meshes the surface anew where it was touched; without it the triangles of the scan stay.
     #[serde(default, deserialize_with = "named")]
     pub patch: Option<PatchSection>,
+    /// Says how well the surface that was meshed anew is known and holds knocks apart; without it every touch counts.
+    #[serde(default, deserialize_with = "named")]
+    pub uncertainty: Option<UncertaintySection>,
     /// Moves the mesh; without it nothing does.
     #[serde(default, deserialize_with = "named")]
     pub refine: Option<RefineSection>,
@@ -77,6 +80,7 @@ impl Default for Scene {
             carve: Some(CarveSection::default()),
             guard: Some(GuardSection::default()),
             patch: Some(PatchSection::default()),
+            uncertainty: Some(UncertaintySection::default()),
             refine: Some(RefineSection::default()),
         }
     }
@@ -127,6 +131,7 @@ impl Scene {
         self.carve.iter().try_for_each(CarveSection::check)?;
         self.guard.iter().try_for_each(GuardSection::check)?;
         self.patch.iter().try_for_each(PatchSection::check)?;
+        self.uncertainty.iter().try_for_each(UncertaintySection::check)?;
         self.refine.iter().try_for_each(RefineSection::check)?;
         let asks_for_spring =
             self.refine.as_ref().is_some_and(|refine| refine.contact_model == Some(ModelName::Spring));

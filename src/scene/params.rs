@@ -2,8 +2,11 @@
 
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
-use super::{AlongName, CarveSection, GuardSection, Mode, ModelName, RefineSection, Scene, SlidingSection, StepName};
-use crate::patch::PatcherParams;
+use super::{
+    AlongName, CarveSection, GuardSection, Mode, ModelName, RefineSection, Scene, SlidingSection, StepName,
+    UncertaintySection,
+};
+use crate::patch::{CalibrationParams, PatcherParams, UncertaintyParams};
 use crate::refine::{
     Along, CarveParams, ContactModel, GuardParams, RefineParams, RoiSize, SlidingParams, StepRule, TipParams,
     relaxing_alpha,
@@ -127,6 +130,7 @@ impl Scene {
         }
         params.pitch = section.pitch_mm.map_or(params.pitch, |pitch_mm| pitch_mm / 1e3);
         params.most_faces = section.most_faces;
+        params.uncertainty = self.uncertainty.as_ref().map(|known| known.params(noise));
         Some(params)
     }
 }
@@ -139,6 +143,15 @@ impl SlidingSection {
             slowest: self.slowest_mm_per_s / 1e3,
             cone_cosine: self.cone_cosine,
         }
+    }
+}
+
+impl UncertaintySection {
+    /// - `scan`: standard deviation of the scan, m.
+    fn params(&self, scan: f64) -> UncertaintyParams {
+        let calibration =
+            CalibrationParams { position: self.calibration_mm / 1e3, stiffness_share: self.stiffness_percent / 100.0 };
+        UncertaintyParams { scan, calibration, gate_sigmas: self.gate_sigmas }
     }
 }
 

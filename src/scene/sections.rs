@@ -3,6 +3,7 @@
 use serde::{Deserialize, Deserializer};
 
 use super::SceneError;
+use crate::patch::{CalibrationParams, UncertaintyParams};
 use crate::refine::{CarveParams, ContactModel, DynamicsParams, GuardParams, SlidingParams};
 use crate::touch::{BiasParams, ContactGateParams, MarkerBody, MarkerParams, SyncParams};
 
@@ -372,6 +373,26 @@ impl Default for PatchSection {
     }
 }
 
+/// `uncertainty`
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct UncertaintySection {
+    /// What is left after calibrating the tip's radius and the frame of the scan, along the normal, mm.
+    pub calibration_mm: f64,
+    /// … and the stiffness of the tip, %.
+    pub stiffness_percent: f64,
+    /// A touch that contradicts its place by more than this many standard deviations is held apart.
+    pub gate_sigmas: f64,
+}
+
+impl Default for UncertaintySection {
+    fn default() -> Self {
+        let CalibrationParams { position, stiffness_share } = CalibrationParams::default();
+        let gate_sigmas = UncertaintyParams::new(0.0).gate_sigmas;
+        Self { calibration_mm: position * 1e3, stiffness_percent: stiffness_share * 100.0, gate_sigmas }
+    }
+}
+
 impl SyncSection {
     pub(super) fn check(&self) -> Result<(), SceneError> {
         in_range("sync.reorder_ms", self.reorder_ms, 0.0, 6e4, "0 to 60000 ms")?;
@@ -486,6 +507,14 @@ impl PatchSection {
     pub(super) fn check(&self) -> Result<(), SceneError> {
         in_range("patch.pitch_mm", self.pitch_mm.unwrap_or(1.0), 1e-3, 1e3, "0.001 to 1000 mm")?;
         in_range("patch.most_faces", self.most_faces, 1.0, 1e6, "1 to 1000000 times the faces of the scan")
+    }
+}
+
+impl UncertaintySection {
+    pub(super) fn check(&self) -> Result<(), SceneError> {
+        in_range("uncertainty.calibration_mm", self.calibration_mm, 0.0, 1e3, "0 to 1000 mm")?;
+        in_range("uncertainty.stiffness_percent", self.stiffness_percent, 0.0, 100.0, "0 to 100 %")?;
+        in_range("uncertainty.gate_sigmas", self.gate_sigmas, 0.5, 1e6, "0.5 to 1000000 standard deviations")
     }
 }
 

@@ -26,6 +26,8 @@ pub struct Motion {
     pub centre: Point3<f64>,
     /// m/s, in O
     pub velocity: Vector3<f64>,
+    /// variance of a component of the centre for positions off by 1 m, m²
+    pub centre_gain: f64,
     /// standard deviation of a component of the velocity for positions off by 1 m, 1/s
     pub velocity_gain: f64,
     /// standard deviation of a component of a position from the parabola, m
@@ -64,7 +66,8 @@ impl LocalMotion {
         let Some(inverse) = parabola else {
             let centre = self.middle + self.moments[0] / n.max(1.0);
             let velocity = Vector3::zeros();
-            return Motion { centre, velocity, velocity_gain: f64::INFINITY, residual: f64::INFINITY };
+            let (centre_gain, residual) = (1.0 / n.max(1.0), f64::INFINITY);
+            return Motion { centre, velocity, centre_gain, velocity_gain: f64::INFINITY, residual };
         };
         let [m0, m1, m2] = &self.moments;
         let [a, b, c] = [0, 1, 2].map(|row| m0 * inverse[(row, 0)] + m1 * inverse[(row, 1)] + m2 * inverse[(row, 2)]);
@@ -72,6 +75,7 @@ impl LocalMotion {
         Motion {
             centre: self.middle + a,
             velocity: b / self.scale,
+            centre_gain: inverse[(0, 0)].max(0.0),
             velocity_gain: inverse[(1, 1)].max(0.0).sqrt() / self.scale,
             residual: ((self.squares - explained).max(0.0) / (3.0 * (n - 3.0))).sqrt(),
         }
