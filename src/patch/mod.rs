@@ -22,6 +22,7 @@ mod dual;
 mod evidence;
 mod field;
 mod fill;
+mod jumps;
 mod lattice;
 mod loops;
 mod outline;

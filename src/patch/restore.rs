@@ -3,6 +3,7 @@
 use super::complete::{CompleteParams, complete};
 use super::evidence::{Evidence, Source};
 use super::field::FieldScratch;
+use super::jumps::drop_jumps;
 use super::lattice::{Lattice, Node};
 use super::table::Table;
 use super::{NodeValues, Region};
@@ -51,6 +52,7 @@ pub fn restore(evidence: &Evidence<'_>, lattice: &Lattice) -> Restored {
             restored.nodes.insert_with(node, || state);
         }
     }
+    drop_jumps(&mut restored.nodes, lattice.pitch);
     complete(&mut restored, &CompleteParams::new(lattice.pitch, evidence.params.radius));
     restored
 }
