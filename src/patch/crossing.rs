@@ -126,8 +126,10 @@ mod tests {
                 found.point.y.abs() < 0.02 * RADIUS / 2.0 && (found.normal - Vector3::y()).norm() < 1e-9,
                 "{depth}: {found:?}"
             );
-            // the same values the other way round are a jump: the wall does not face there
-            assert_eq!(of_touches(&evidence, [&a, &b], [-values[0], -values[1]], &mut scratch), None);
         }
+        // from outside below into the material above the face: no surface of the touches
+        let [a, b] = [-0.2e-3, 0.2e-3].map(|z| Point3::new(0.1e-3, -4e-3, z));
+        assert!(of_touches(&evidence, [&a, &b], [-0.2e-3, 0.2e-3], &mut scratch).is_some());
+        assert_eq!(of_touches(&evidence, [&a, &b], [0.2e-3, -0.2e-3], &mut scratch), None);
     }
 }
