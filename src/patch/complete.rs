@@ -30,8 +30,8 @@ impl CompleteParams {
 
 /// Over-relaxation that converges fast on domains some ten nodes across.
 const RELAXATION: f64 = 1.6;
-/// Weight, at most, of a touched surface going straight on beside the six neighbours of a node: it is left within a cell.
-const STRAIGHT: f64 = 3.0;
+/// Weight, at most, of a touched surface going straight on beside the six neighbours of a node: as much as all of them.
+const STRAIGHT: f64 = 6.0;
 /// Sweeps at most: twice what the largest gaps of the tested parts need.
 const SWEEPS: usize = 200;
 /// Radii around the end of a way within which a hole is opened: as wide as holes that a ball is let through.

@@ -128,6 +128,8 @@ const TILTED_REACH: f64 = 0.5;
 const EDGE_NEAR: f64 = 1.5;
 /// Share of σ by which two pieces may seem to overlap at a convex edge.
 const OVERLAP: f64 = 0.1;
+/// Share of σ by which noise may make a piece cut off the nearest contact.
+const CUT: f64 = 0.3;
 /// Seen from a point at a border, contacts in the tangent plane leave a gap of this angle, rad.
 const BORDER_GAP: f64 = 150.0 * std::f64::consts::PI / 180.0;
 /// A contact nearer in the tangent plane than this share of σ is under the point.
@@ -146,7 +148,8 @@ impl FieldParams {
         let means = store.means();
         self.group(means, near, pieces);
         self.fit(means, x, near, pieces);
-        let combined = self.combine(pieces)?;
+        let arm = means[nearest.index as usize].point - x;
+        let combined = self.combine(pieces, &arm)?;
         *decides = combined.piece;
         let members = near.iter().filter(|member| member.piece == combined.piece);
         let arms = members.map(|member| means[member.index as usize].point - x);
@@ -223,8 +226,10 @@ impl FieldParams {
     }
 
     /// Puts the pieces together around the nearest one that is believed. The tilted planes of edges that the ball rolled
-    /// over say little from afar: such can only cut off.
-    fn combine(&self, pieces: &[Piece]) -> Option<Combined> {
+    /// over say little from afar: such can only cut off. A piece that would cut off the nearest contact itself is refuted.
+    ///
+    /// - `arm`: from the point to that contact, m.
+    fn combine(&self, pieces: &[Piece], arm: &Vector3<f64>) -> Option<Combined> {
         let is_flat = |at: usize| pieces[at].flat_weight >= self.least_weight;
         let is_tilted_afar =
             |at: usize| !is_flat(at) && pieces[at].nearest_squared > (TILTED_REACH * self.reach).powi(2);
@@ -240,6 +245,10 @@ impl FieldParams {
             let piece = &pieces[at];
             let Some(convex) = self.convex_among(pieces, taken, piece) else { continue };
             if is_tilted_afar(at) && convex != taken {
+                continue;
+            }
+            let cuts_by = piece.value() + piece.facing.dot(arm);
+            if convex >> first_at & 1 == 1 && cuts_by > CUT * self.sigma && arm.norm() < self.sigma {
                 continue;
             }
             solid.values[at] = piece.value();
@@ -428,6 +437,21 @@ mod tests {
                 assert_eq!(value(&hole, x, y, z) < 0.0, is_material, "{from_axis} {z} at {angle}");
             }
         }
+    }
+
+    #[test]
+    fn a_tilted_wall_does_not_cut_off_what_was_felt() {
+        // a step along y = 0; the wall was felt 2 mm aside alone, and drag has tilted its normals
+        let top = |x: f64, y: f64| (y <= 0.0).then(|| (Point3::new(x, y, 0.0), Vector3::z()));
+        let tilted = Vector3::new(0.15, 0.99, 0.0).normalize();
+        let wall =
+            |x: f64, z: f64| ((-4.1e-3..-1.9e-3).contains(&x) && z < -0.4e-3).then(|| (Point3::new(x, 0.0, z), tilted));
+        let step = store_of(&[&top, &wall]);
+        for y in [-0.2, -0.1] {
+            assert!((value(&step, 0.0, y, -0.2) + 0.2).abs() < 1e-9, "{y}: {}", value(&step, 0.0, y, -0.2));
+        }
+        // where it was felt it ends the face
+        assert!(value(&step, -3.0, 0.4, -0.4) > 0.2);
     }
 
     #[test]

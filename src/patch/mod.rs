@@ -26,6 +26,7 @@ mod field;
 mod fill;
 mod fit_sigma;
 mod history;
+mod jumps;
 mod knocks;
 mod lattice;
 mod loops;

@@ -6,14 +6,19 @@ use nalgebra::{Matrix3, Point3, Vector3};
 const SWEEPS: usize = 6;
 /// Steps towards the best point on the rim of a box; the error falls by a half or more with each.
 const STEPS: usize = 16;
+/// Shares of the way from the start tried where the best point turns the surface over.
+const BACK: [f64; 3] = [0.5, 0.25, 0.0];
 /// How strongly the start holds on where nothing else decides, as a share of the trace.
 const PULL: f64 = 1e-3;
 
 /// Planes n·(x − p) = 0 with weights, to be met in the least-squares sense near the mean of their points.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Planes {
-    list: Vec<(Point3<f64>, Vector3<f64>, f64)>,
+    list: Vec<Plane>,
 }
+
+/// A point, its unit normal, its weight.
+type Plane = (Point3<f64>, Vector3<f64>, f64);
 
 impl Planes {
     pub fn clear(&mut self) {
@@ -32,7 +37,7 @@ impl Planes {
     }
 
     /// The point nearest to `start` at which Σ w (n·(x − p))² is least within the box from `lo` to `hi`, which holds
-    /// `start`; directions in which the sum of the w n nᵀ has an eigenvalue below `threshold` times their sum do not count.
+    /// `start`, and from which no part of the loop is seen from behind. Directions in which the sum of the w n nᵀ has an eigenvalue below `threshold` times their sum do not count.
     pub fn solve(&self, start: &Point3<f64>, threshold: f64, [lo, hi]: &[Point3<f64>; 2]) -> Point3<f64> {
         let (mut a, mut b) = (Matrix3::zeros(), Vector3::zeros());
         for (p, n, weight) in &self.list {
@@ -51,8 +56,37 @@ impl Planes {
             }
         }
         let (lo, hi) = (lo - start, hi - start);
-        let is_inside = (0..3).all(|i| (lo[i]..=hi[i]).contains(&x[i]));
-        start + if is_inside { x } else { least_in_box(&kept, &(kept * x), &lo, &hi) }
+        if !(0..3).all(|i| (lo[i]..=hi[i]).contains(&x[i])) {
+            x = least_in_box(&kept, &(kept * x), &lo, &hi);
+        }
+        self.unturned(start, &x)
+    }
+
+    /// `start` + `best`, or the first point on the way back to `start` from which no step of the loop through the planes'
+    /// points, in their order, is seen from behind; where there is none, the one from which that is least.
+    fn unturned(&self, start: &Point3<f64>, best: &Vector3<f64>) -> Point3<f64> {
+        let sum =
+            |term: &dyn Fn(&Plane, &Plane) -> Vector3<f64>| self.steps().map(|(a, b)| term(a, b)).sum::<Vector3<f64>>();
+        let area = sum(&|a, b| (a.0 - start).cross(&(b.0 - start)));
+        let side = area.dot(&sum(&|a, _| a.1)).signum();
+        let volume = |from: &Point3<f64>| {
+            let of_step = |(a, b): (&Plane, &Plane)| side * (a.0 - from).cross(&(b.0 - from)).dot(&(a.1 + b.1));
+            self.steps().map(of_step).fold(f64::INFINITY, f64::min)
+        };
+        let mut found = (start + best, volume(&(start + best)));
+        for share in BACK {
+            let from = start + best * share;
+            let here = volume(&from);
+            if found.1 < 0.0 && here > found.1 {
+                found = (from, here);
+            }
+        }
+        found.0
+    }
+
+    /// Each plane with the next, the last with the first.
+    fn steps(&self) -> impl Iterator<Item = (&Plane, &Plane)> {
+        self.list.iter().zip(self.list.iter().cycle().skip(1))
     }
 }
 
@@ -142,11 +176,27 @@ mod tests {
     fn a_point_beyond_the_box_is_brought_to_the_best_place_on_its_rim() {
         // the line x = y leaves the box at x = 1: with the plane z = 0.5 that leaves one point
         let mut planes = Planes::default();
-        planes.push(Point3::new(0.0, 0.0, 0.0), Vector3::new(1.0, -1.0, 0.0).normalize(), 1.0);
-        planes.push(Point3::new(0.0, 0.0, 0.5), Vector3::z(), 1.0);
-        planes.push(Point3::new(3.0, 2.0, 0.0), Vector3::x(), 1.0);
+        for normal in [Vector3::new(1.0, -1.0, 0.0).normalize(), Vector3::z(), Vector3::x()] {
+            planes.push(Point3::new(3.0, 3.0, 0.5), normal, 1.0);
+        }
         let bounds = [Point3::origin(), Point3::from([1.0; 3])];
         let found = planes.solve(&Point3::from([0.1; 3]), 0.05, &bounds);
         assert!((found - Point3::new(1.0, 1.0, 0.5)).norm() < 5e-3, "{found}");
+    }
+
+    #[test]
+    fn a_point_that_sees_the_loop_from_behind_goes_back() {
+        let mut planes = Planes::default();
+        for (x, y) in [(0.3, -0.3), (0.3, 0.3), (-0.3, 0.3), (-0.3, -0.3)] {
+            planes.push(Point3::new(x, y, 0.0), Vector3::z(), 1.0);
+        }
+        // over the square every step is seen from the front, beside it one is not
+        let found = |x: f64| planes.unturned(&Point3::origin(), &Vector3::new(x, 0.0, 0.1)).x;
+        assert_eq!(found(0.2), 0.2);
+        assert_eq!(found(0.5), 0.25);
+        assert_eq!(found(0.9), 0.225);
+        // the other way round as well
+        planes.list.reverse();
+        assert_eq!(planes.unturned(&Point3::origin(), &Vector3::new(0.9, 0.0, 0.1)).x, 0.225);
     }
 }

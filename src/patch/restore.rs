@@ -5,7 +5,8 @@ use nalgebra::Point3;
 use super::complete::{CompleteParams, complete, open_cells};
 use super::evidence::{Evidence, Source};
 use super::field::FieldScratch;
-use super::lattice::{CellBox, Lattice, Node};
+use super::jumps::is_torn;
+use super::lattice::{CellBox, Lattice, Node, stepped};
 use super::table::Table;
 use super::{NodeValues, Region};
 
@@ -24,6 +25,8 @@ pub(super) struct NodeState {
     pub least: f64,
     /// … and ended its way here without touching anything, deep inside the scan
     pub is_free_end: bool,
+    /// what the touches say, m; `None` where they do not speak
+    pub felt: Option<f64>,
     /// number of the renewal that gave it this value
     pub renewal: u32,
 }
@@ -139,7 +142,32 @@ impl Restored {
                 area.take(&node);
             }
         }
+        self.tear(lattice, &mut look, &mut area);
         self.settle(evidence, lattice, &area, &look)
+    }
+
+    /// Gives up, or takes back, what touches seem to say where it contradicts itself: at the nodes looked at and beside them.
+    fn tear(&mut self, lattice: &Lattice, look: &mut Table<Node, Option<NodeState>>, area: &mut CellBox) {
+        let beside = |node: Node| std::iter::once(node).chain(neighbours(node));
+        let near: Table<Node, ()> = look.iter().flat_map(|(node, _)| beside(node)).collect();
+        for (node, ()) in near.iter() {
+            let Some(before) = self.nodes.get(&node).copied() else { continue };
+            let Some(felt) = before.felt else { continue };
+            let is_torn = is_torn(&self.nodes, node, felt, lattice.pitch);
+            if is_torn == (before.source == Source::Nothing) {
+                continue;
+            }
+            let (at, _) = look.insert_with(node, || Some(before));
+            let last = look.entry(at).1.filter(NodeState::is_open_question);
+            let state = NodeState {
+                source: if is_torn { Source::Nothing } else { Source::Touch },
+                value: if is_torn { last.map_or(felt, |last| last.value) } else { felt },
+                straight: (0.0, 0.0),
+                ..before
+            };
+            self.nodes.insert(node, state);
+            area.take(&node);
+        }
     }
 
     fn put(&mut self, node: Node, state: NodeState) {
@@ -315,12 +343,14 @@ fn evaluate(evidence: &Evidence<'_>, lattice: &Lattice, node: Node, scratch: &mu
         _ if found.swept_depth > 0.0 => found.swept_depth.min(widest),
         _ => f64::NEG_INFINITY,
     };
+    let value = match found.source {
+        // where a plane of the lattice lies in the surface, noise would fold it from one side to the other
+        Source::Touch if found.value.abs() < IN_PLANE * lattice.pitch => f64::MIN_POSITIVE,
+        _ => found.value.clamp(-widest, widest).max(least),
+    };
     Some(NodeState {
-        value: match found.source {
-            // where a plane of the lattice lies in the surface, noise would fold it from one side to the other
-            Source::Touch if found.value.abs() < IN_PLANE * lattice.pitch => f64::MIN_POSITIVE,
-            _ => found.value.clamp(-widest, widest).max(least),
-        },
+        value,
+        felt: (found.source == Source::Touch).then_some(value),
         source: found.source,
         scan: found.scan.clamp(-widest, widest),
         straight: found.straight.map_or((0.0, 0.0), |(value, share)| (value.clamp(-widest, widest), share)),
@@ -338,6 +368,11 @@ fn ball(radius: i32) -> Vec<Node> {
 
 fn moved(node: &Node, offset: &Node) -> Node {
     std::array::from_fn(|i| node[i].saturating_add(offset[i]))
+}
+
+/// The six nodes one step away.
+pub(super) fn neighbours(node: Node) -> impl Iterator<Item = Node> {
+    (0..6).map(move |i| stepped(node, i / 2, if i % 2 == 0 { 1 } else { -1 }))
 }
 
 /// Corner `corner` of a cell: bit i says whether it is the upper one along axis i.

@@ -35,8 +35,8 @@ COVERED = 0.02
 LOST = 0.005
 # faces of the result for each of the scan
 FACES = 10
-# share of the faces that may be turned over: the aim, no more than the scan's own, is missed (the table says by how much)
-FLIPPED = 0.0015
+# faces that may be turned over beyond the scan's own: the aim, none, is missed by two on the plate, by one on the featuretype
+FLIPPED = 2
 # a rim may be so much longer than the scan's own and the ends of the through-holes, as the lattice cuts it, mm
 RIM_SLACK_MM = 5.0
 
@@ -221,7 +221,7 @@ def test_every_case_is_nearer_to_the_truth_than_its_scan(judged, case, direction
 @pytest.mark.parametrize("case", CASES)
 def test_the_mesh_stays_sound(judged, case):
     scan, refined = (verdict["health"] for verdict in judged[case][1:3])
-    assert refined["flipped_faces"] <= scan["flipped_faces"] + FLIPPED * refined["faces"]
+    assert refined["flipped_faces"] <= scan["flipped_faces"] + FLIPPED
     assert refined["self_intersecting_faces"] == 0 == scan["self_intersecting_faces"]
     assert refined["zero_area"] == 0
     assert refined["nonmanifold_edges"] <= scan["nonmanifold_edges"]
