@@ -18,6 +18,8 @@ mod soundness;
 use plate_stream::{PlateStream, plate_stream};
 use soundness::{intersections, rim_length, soundness};
 
+/// Parts of the patch that are taken up at one sample.
+const AT_ONCE: usize = 100;
 /// Time between renewals, ns.
 const EVERY: i64 = 10_000_000;
 
@@ -114,7 +116,7 @@ fn one_after_the_other(stream: &PlateStream, pace: Pace) -> (TriMesh, TriMesh) {
     let (mut patcher, mut refiner) = (patcher(stream), refiner(&stream.scan));
     refiner.expect_patch(0).unwrap();
     let mut due: VecDeque<(i64, PatchDelta)> = VecDeque::new();
-    let mut slot = None;
+    let (mut slot, mut at_hand) = (None, None::<PatchDelta>);
     for sample in &stream.samples {
         refiner.push(sample).unwrap();
         let here = sample.stamp_ns.div_euclid(pace.every_ns);
@@ -122,11 +124,17 @@ fn one_after_the_other(stream: &PlateStream, pace: Pace) -> (TriMesh, TriMesh) {
             due.push_back((here * pace.every_ns + pace.after_ns, patcher.renewed(&stream.scan, &tree)));
         }
         patcher.push(sample);
-        while due.front().is_some_and(|(due_ns, _)| *due_ns <= sample.stamp_ns) {
-            refiner.follow(&due.pop_front().unwrap().1).unwrap();
+        if at_hand.as_ref().is_some_and(|delta| refiner.go_on_following(delta, AT_ONCE).unwrap()) {
+            at_hand = None;
+        }
+        while at_hand.is_none() && due.front().is_some_and(|(due_ns, _)| *due_ns <= sample.stamp_ns) {
+            let delta = due.pop_front().unwrap().1;
+            refiner.begin_to_follow(&delta).unwrap();
+            at_hand = (!refiner.go_on_following(&delta, AT_ONCE).unwrap()).then_some(delta);
         }
     }
     let touching = refiner.mesh().clone();
+    at_hand.iter().for_each(|delta| assert!(refiner.go_on_following(delta, usize::MAX).unwrap()));
     due.into_iter().for_each(|(_, delta)| refiner.follow(&delta).unwrap());
     refiner.follow(&patcher.renewed(&stream.scan, &tree)).unwrap();
     patcher.flush();

@@ -55,6 +55,9 @@ impl Pace {
     }
 }
 
+/// Parts of the patch whose faces are replaced at one sample: some 100 µs on a mesh of a million faces.
+const AT_ONCE: usize = 100;
+
 /// How far the patch was behind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LiveCounts {
@@ -76,8 +79,10 @@ pub struct LiveRefiner {
     slot: Option<i64>,
     /// when the changes that were asked for are to be taken up, ns
     due_ns: VecDeque<i64>,
-    /// the change that was taken up last
+    /// the change that was taken up last …
     delta: PatchDelta,
+    /// … and whether all of it is in the mesh
+    is_done: bool,
     counts: LiveCounts,
 }
 
@@ -106,6 +111,7 @@ impl LiveRefiner {
             slot: None,
             due_ns: VecDeque::new(),
             delta: PatchDelta::default(),
+            is_done: true,
             counts: LiveCounts::default(),
         })
     }
@@ -122,10 +128,20 @@ impl LiveRefiner {
             self.due_ns.push_back(slot.saturating_mul(self.pace.every_ns).saturating_add(self.pace.after_ns));
         }
         self.batch.push(*sample);
-        while self.due_ns.front().is_some_and(|&due_ns| due_ns <= sample.stamp_ns) {
+        self.go_on(AT_ONCE)?;
+        while self.is_done && self.due_ns.front().is_some_and(|&due_ns| due_ns <= sample.stamp_ns) {
             self.take_up()?;
+            self.go_on(AT_ONCE)?;
         }
         Ok(update)
+    }
+
+    /// Replaces some more faces of the change at hand.
+    fn go_on(&mut self, most: usize) -> Result<(), LiveError> {
+        if !self.is_done {
+            self.is_done = self.refiner.go_on_following(&self.delta, most)?;
+        }
+        Ok(())
     }
 
     /// Waits until the patch knows all samples so far, as after a pause.
@@ -138,8 +154,10 @@ impl LiveRefiner {
         self.worker.ask_all()?;
         self.worker.ask_all()?;
         self.due_ns.extend([i64::MAX; 3]);
+        self.go_on(usize::MAX)?;
         while !self.due_ns.is_empty() {
             self.take_up()?;
+            self.go_on(usize::MAX)?;
         }
         Ok(())
     }
@@ -156,12 +174,18 @@ impl LiveRefiner {
         self.delta = delta;
         self.counts.renewals += 1;
         self.counts.waits += u64::from(has_waited);
-        Ok(self.refiner.follow(&self.delta)?)
+        self.is_done = false;
+        Ok(self.refiner.begin_to_follow(&self.delta)?)
     }
 
     /// The haptic update, with the mesh as it stands.
     pub fn refiner(&self) -> &Refiner {
         &self.refiner
+    }
+
+    /// Whether the mesh is one skin: large changes of the patch are taken up over several samples.
+    pub fn is_whole(&self) -> bool {
+        self.is_done
     }
 
     /// The change of the patch that was taken up last.

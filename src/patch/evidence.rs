@@ -137,7 +137,12 @@ pub struct ScanPrior {
 impl Evidence<'_> {
     /// What is known at `x` (m, in O); `None` where the scan has no face.
     pub fn at(&self, x: &Point3<f64>, scratch: &mut FieldScratch) -> Option<Finding> {
-        let scan = ScanValue::at(self.scan, self.tree, x)?;
+        Some(self.beside(&ScanValue::at(self.scan, self.tree, x)?, x, scratch))
+    }
+
+    /// What is known at `x` (m, in O), where the scan is as `scan` says.
+    pub(super) fn beside(&self, scan: &ScanValue, x: &Point3<f64>, scratch: &mut FieldScratch) -> Finding {
+        let scan = *scan;
         let touched = self.touched_beside(x, || Some(scan), scratch);
         let (mut value, mut source) = match &touched {
             Some(touched) => self.beside_touches(touched, &scan),
@@ -151,7 +156,7 @@ impl Evidence<'_> {
             source = Source::Beyond;
         }
         let straight = touched.and_then(|touched| self.straight_on(&touched, &scan));
-        Some(Finding { value, source, scan: scan.value, straight, swept_depth, is_free_end })
+        Finding { value, source, scan: scan.value, straight, swept_depth, is_free_end }
     }
 
     /// The field of the touches at `x` (m, in O), which take the place of the scan by the gain σₛ² / (σₛ² + σₜ²) of the

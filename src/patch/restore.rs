@@ -7,6 +7,7 @@ use super::evidence::{Evidence, Source};
 use super::field::FieldScratch;
 use super::jumps::is_torn;
 use super::lattice::{CellBox, Lattice, Node, stepped};
+use super::scan_value::ScanValue;
 use super::table::Table;
 use super::{NodeValues, Region};
 
@@ -93,6 +94,8 @@ pub(super) struct Restored {
     /// cells with a contact, and with a ball that went into the scan: what is around them is looked at
     touched: Table<Node, ()>,
     swept: Table<Node, ()>,
+    /// what the scan says at each of `nodes`: it never changes
+    scan: Vec<ScanValue>,
     renewals: u32,
 }
 
@@ -132,15 +135,22 @@ impl Restored {
         let mut scratch = FieldScratch::default();
         for at in 0..look.len() as u32 {
             let node = look.entry(at).0;
-            let before = self.nodes.get(&node).copied();
-            if let Some(mut state) = evaluate(evidence, lattice, node, &mut scratch) {
-                if let Some(before) = before.filter(|before| before.is_open_question() && state.is_open_question()) {
-                    state.value = before.value.max(state.least);
-                }
-                *look.value_mut(at) = before;
-                self.put(node, state);
-                area.take(&node);
+            let known = self.nodes.index_of(&node);
+            let before = known.map(|known| self.nodes.entry(known).1);
+            let scan = match known {
+                Some(known) => self.scan[known as usize],
+                None => match ScanValue::at(evidence.scan, evidence.tree, &lattice.position(node)) {
+                    Some(scan) => scan,
+                    None => continue,
+                },
+            };
+            let mut state = evaluate(evidence, lattice, node, &scan, &mut scratch);
+            if let Some(before) = before.filter(|before| before.is_open_question() && state.is_open_question()) {
+                state.value = before.value.max(state.least);
             }
+            *look.value_mut(at) = before;
+            self.put(node, state, scan);
+            area.take(&node);
         }
         self.tear(lattice, &mut look, &mut area);
         self.settle(evidence, lattice, &area, &look)
@@ -170,8 +180,12 @@ impl Restored {
         }
     }
 
-    fn put(&mut self, node: Node, state: NodeState) {
-        self.nodes.insert(node, state);
+    fn put(&mut self, node: Node, state: NodeState, scan: ScanValue) {
+        let (at, is_new) = self.nodes.insert_with(node, || state);
+        if is_new {
+            self.scan.push(scan);
+        }
+        *self.nodes.value_mut(at) = state;
         if state.is_free_end {
             self.ends.insert_with(node, || ());
         } else if !self.ends.is_empty() {
@@ -335,8 +349,14 @@ impl Restored {
     }
 }
 
-fn evaluate(evidence: &Evidence<'_>, lattice: &Lattice, node: Node, scratch: &mut FieldScratch) -> Option<NodeState> {
-    let found = evidence.at(&lattice.position(node), scratch)?;
+fn evaluate(
+    evidence: &Evidence<'_>,
+    lattice: &Lattice,
+    node: Node,
+    scan: &ScanValue,
+    scratch: &mut FieldScratch,
+) -> NodeState {
+    let found = evidence.beside(scan, &lattice.position(node), scratch);
     let widest = WIDEST * lattice.pitch;
     let least = match found.source {
         Source::Touch => f64::NEG_INFINITY,
@@ -348,7 +368,7 @@ fn evaluate(evidence: &Evidence<'_>, lattice: &Lattice, node: Node, scratch: &mu
         Source::Touch if found.value.abs() < IN_PLANE * lattice.pitch => f64::MIN_POSITIVE,
         _ => found.value.clamp(-widest, widest).max(least),
     };
-    Some(NodeState {
+    NodeState {
         value,
         felt: (found.source == Source::Touch).then_some(value),
         source: found.source,
@@ -357,7 +377,7 @@ fn evaluate(evidence: &Evidence<'_>, lattice: &Lattice, node: Node, scratch: &mu
         least,
         is_free_end: least > 0.0 && found.is_free_end && found.scan < -evidence.params.scan_reach,
         renewal: 0,
-    })
+    }
 }
 
 /// The steps from a node to those within `radius` steps.

@@ -57,6 +57,9 @@ pub struct Splice {
     added: Vec<FaceId>,
     placed: Vec<VertexId>,
     refit: Vec<FaceId>,
+    /// how many owners and faces of the delta at hand are done
+    next_owner: usize,
+    next_face: usize,
 }
 
 impl Splice {
@@ -68,33 +71,59 @@ impl Splice {
     /// [`MeshError::TooMany`] when 32-bit ids do not suffice, [`MeshError::NotFinite`] for a position that is not finite;
     /// the mesh is torn then.
     pub fn apply(&mut self, delta: &PatchDelta, mesh: &mut TriMesh, tree: &mut FaceTree) -> Result<(), MeshError> {
-        for &(owner, _) in &delta.owners {
-            self.remove_faces(owner, mesh, tree);
-        }
-        self.place(delta, mesh, tree)?;
+        self.begin(delta, mesh, tree)?;
+        self.go_on(delta, usize::MAX, mesh, tree)?;
+        Ok(())
+    }
+
+    /// Places the vertices of a delta; its faces are those before until [`Self::go_on`] has replaced them.
+    ///
+    /// # Errors
+    /// As [`Self::apply`].
+    pub fn begin(&mut self, delta: &PatchDelta, mesh: &mut TriMesh, tree: &mut FaceTree) -> Result<(), MeshError> {
+        (self.next_owner, self.next_face) = (0, 0);
         self.added.clear();
-        let mut faces = delta.faces.iter();
-        for &(owner, count) in &delta.owners {
+        self.place(delta, mesh, tree)
+    }
+
+    /// Replaces the faces of up to `most` owners more of the delta that was begun; returns whether that was all. In between
+    /// the mesh has gaps and overlaps where old faces meet new ones.
+    ///
+    /// # Errors
+    /// As [`Self::apply`].
+    pub fn go_on(
+        &mut self,
+        delta: &PatchDelta,
+        most: usize,
+        mesh: &mut TriMesh,
+        tree: &mut FaceTree,
+    ) -> Result<bool, MeshError> {
+        self.added.clear();
+        for &(owner, count) in delta.owners.iter().skip(self.next_owner).take(most) {
+            self.remove_faces(owner, mesh, tree);
             let mut ours = Vec::with_capacity(count as usize);
-            for corners in faces.by_ref().take(count as usize) {
+            for corners in delta.faces.iter().skip(self.next_face).take(count as usize) {
                 let face = mesh.add_face(corners.map(|corner| self.placed[corner as usize]))?;
                 tree.insert(mesh, face);
                 ours.push(face);
             }
+            self.next_owner += 1;
+            self.next_face += count as usize;
             self.added.extend_from_slice(&ours);
             if count > 0 || matches!(owner, Owner::Scan(_)) {
                 self.faces.insert(owner, ours);
             }
         }
-        for key in &delta.gone {
+        let is_done = self.next_owner >= delta.owners.len();
+        for key in delta.gone.iter().filter(|_| is_done) {
             if let Some(vertex) = self.vertices.remove(key) {
                 mesh.remove_vertex(vertex);
             }
         }
-        Ok(())
+        Ok(is_done)
     }
 
-    /// The faces that the last delta added.
+    /// The faces that were added last.
     pub fn added(&self) -> &[FaceId] {
         &self.added
     }

@@ -166,24 +166,30 @@ impl DeformableMesh {
         self.patch.as_ref().is_some_and(|patch| self.mesh.corners(face).into_iter().all(|v| patch.is_touched(v)))
     }
 
-    /// Takes up what changed in the patch, and puts back what was moved before that; returns whether anything changed.
-    pub fn follow(&mut self, delta: &PatchDelta) -> Result<bool, MeshError> {
+    /// Begins to take up what changed in the patch, and puts back what was moved before that; returns whether anything moved.
+    pub fn begin_delta(&mut self, delta: &PatchDelta) -> Result<bool, MeshError> {
         let Some(patch) = &mut self.patch else { return Ok(false) };
         let has_put_back = patch.put_back(&mut self.mesh, &mut self.tree, &self.scanned, delta.until_ns);
-        if !delta.is_empty() {
-            patch.apply(delta, &mut self.mesh, &mut self.tree)?;
-            self.scanned.resize(self.mesh.vertex_slots(), Point3::origin());
-            for (&vertex, placed) in patch.placed().iter().zip(&delta.vertices) {
-                self.scanned[vertex.0 as usize] = placed.position;
-            }
-            self.evidence.resize(self.mesh.face_slots(), [0.0; 3]);
-            for &face in patch.added() {
-                self.evidence[face.0 as usize] = self.mesh.normal(face).cast::<f32>().into();
-            }
+        patch.begin(delta, &mut self.mesh, &mut self.tree)?;
+        self.scanned.resize(self.mesh.vertex_slots(), Point3::origin());
+        for (&vertex, placed) in patch.placed().iter().zip(&delta.vertices) {
+            self.scanned[vertex.0 as usize] = placed.position;
         }
-        let has_changed = has_put_back || !delta.is_empty();
-        self.edits += u64::from(has_changed);
-        Ok(has_changed)
+        let has_moved = has_put_back || !delta.vertices.is_empty();
+        self.edits += u64::from(has_moved);
+        Ok(has_moved)
+    }
+
+    /// Replaces the faces of up to `most` owners more; whether that was all.
+    pub fn go_on(&mut self, delta: &PatchDelta, most: usize) -> Result<bool, MeshError> {
+        let Some(patch) = &mut self.patch else { return Ok(true) };
+        let is_done = patch.go_on(delta, most, &mut self.mesh, &mut self.tree)?;
+        self.evidence.resize(self.mesh.face_slots(), [0.0; 3]);
+        for &face in patch.added() {
+            self.evidence[face.0 as usize] = self.mesh.normal(face).cast::<f32>().into();
+        }
+        self.edits += 1;
+        Ok(is_done)
     }
 
     /// Puts the region at the largest share of its displacement that leaves the mesh sound.

@@ -80,9 +80,9 @@ impl FollowedPatch {
         !refit.is_empty()
     }
 
-    /// Brings the mesh up to date with the patch.
-    pub fn apply(&mut self, delta: &PatchDelta, mesh: &mut TriMesh, tree: &mut FaceTree) -> Result<(), MeshError> {
-        self.splice.apply(delta, mesh, tree)?;
+    /// Places the vertices of a delta.
+    pub fn begin(&mut self, delta: &PatchDelta, mesh: &mut TriMesh, tree: &mut FaceTree) -> Result<(), MeshError> {
+        self.splice.begin(delta, mesh, tree)?;
         self.is_touched.resize(mesh.vertex_slots(), false);
         self.moved_ns.resize(mesh.vertex_slots(), NEVER);
         for (vertex, placed) in self.splice.placed().iter().zip(&delta.vertices) {
@@ -91,7 +91,18 @@ impl FollowedPatch {
         Ok(())
     }
 
-    /// The faces that the last delta added.
+    /// Replaces faces of up to `most` owners more; whether that was all.
+    pub fn go_on(
+        &mut self,
+        delta: &PatchDelta,
+        most: usize,
+        mesh: &mut TriMesh,
+        tree: &mut FaceTree,
+    ) -> Result<bool, MeshError> {
+        self.splice.go_on(delta, most, mesh, tree)
+    }
+
+    /// The faces that were added last.
     pub fn added(&self) -> &[FaceId] {
         self.splice.added()
     }
