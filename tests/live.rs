@@ -19,7 +19,7 @@ use plate_stream::{PlateStream, plate_stream};
 use soundness::{intersections, rim_length, soundness};
 
 /// Parts of the patch that are taken up at one sample.
-const AT_ONCE: usize = 100;
+const AT_ONCE: usize = 60;
 /// Time between renewals, ns.
 const EVERY: i64 = 10_000_000;
 
@@ -127,10 +127,9 @@ fn one_after_the_other(stream: &PlateStream, pace: Pace) -> (TriMesh, TriMesh) {
         if at_hand.as_ref().is_some_and(|delta| refiner.go_on_following(delta, AT_ONCE).unwrap()) {
             at_hand = None;
         }
-        while at_hand.is_none() && due.front().is_some_and(|(due_ns, _)| *due_ns <= sample.stamp_ns) {
-            let delta = due.pop_front().unwrap().1;
-            refiner.begin_to_follow(&delta).unwrap();
-            at_hand = (!refiner.go_on_following(&delta, AT_ONCE).unwrap()).then_some(delta);
+        if at_hand.is_none() && due.front().is_some_and(|(due_ns, _)| *due_ns <= sample.stamp_ns) {
+            at_hand = due.pop_front().map(|(_, delta)| delta);
+            at_hand.iter().for_each(|delta| refiner.begin_to_follow(delta).unwrap());
         }
     }
     let touching = refiner.mesh().clone();

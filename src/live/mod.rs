@@ -41,9 +41,9 @@ pub struct Pace {
 }
 
 impl Default for Pace {
-    /// 10 ms and 8 ms: with a smoothing window of 32 ms to either side, a touch is in the mesh after 50 ms at most.
+    /// 8 ms and 10 ms: with a smoothing window of 32 ms to either side, a touch is in the mesh after 50 ms.
     fn default() -> Self {
-        Self { every_ns: 10_000_000, after_ns: 8_000_000 }
+        Self { every_ns: 8_000_000, after_ns: 10_000_000 }
     }
 }
 
@@ -55,8 +55,8 @@ impl Pace {
     }
 }
 
-/// Parts of the patch whose faces are replaced at one sample: some 100 µs on a mesh of a million faces.
-const AT_ONCE: usize = 100;
+/// Parts of the patch whose faces are replaced at one sample: some 60 µs on a mesh of a million faces.
+const AT_ONCE: usize = 60;
 
 /// How far the patch was behind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -129,9 +129,8 @@ impl LiveRefiner {
         }
         self.batch.push(*sample);
         self.go_on(AT_ONCE)?;
-        while self.is_done && self.due_ns.front().is_some_and(|&due_ns| due_ns <= sample.stamp_ns) {
+        if self.is_done && self.due_ns.front().is_some_and(|&due_ns| due_ns <= sample.stamp_ns) {
             self.take_up()?;
-            self.go_on(AT_ONCE)?;
         }
         Ok(update)
     }
