@@ -16,7 +16,7 @@ use super::splice::Patch;
 use super::swept::SweptSpace;
 use super::touches::{Touch, TouchFinder, TouchFinderParams};
 use crate::mesh::{FaceTree, MeshError, TriMesh};
-use crate::touch::{Compensator, CompensatorParams, Sample, SettingError};
+use crate::touch::{Compensator, CompensatorParams, Sample, SettingError, TipBody, TipPlace, TipShape};
 
 /// Settings of a [`Patcher`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,6 +44,17 @@ impl PatcherParams {
             pitch: radius / 2.0,
             most_faces: 10.0,
         }
+    }
+
+    /// Settings for a tip of `shape` whose ball, flat end or nose has `radius` (m), else as [`Self::new`]. How far evidence
+    /// is believed goes by the size of what the tip can show.
+    ///
+    /// # Errors
+    /// [`SettingError`] for sizes of which no tip can be made.
+    pub fn for_tip(shape: TipShape, radius: f64, stiffness: Option<f64>, noise: f64) -> Result<Self, SettingError> {
+        let mut params = Self::new(TipBody::new(shape, radius)?.scale(), stiffness, noise);
+        (params.touches.shape, params.touches.radius) = (shape, radius);
+        Ok(params)
     }
 
     /// # Errors
@@ -155,7 +166,11 @@ impl Patcher {
             compensator: Compensator::new(params.compensator)?,
             finder: TouchFinder::new(params.touches)?,
             contacts: ContactStore::new(CONTACT_CELL * radius, params.evidence.field.reach),
-            swept: SweptSpace::new(SWEPT_CELL * radius, 5.0 / 3.0 * radius),
+            swept: SweptSpace::of_tip(
+                TipBody::new(params.touches.shape, params.touches.radius)?,
+                SWEPT_CELL * radius,
+                5.0 / 3.0 * radius,
+            ),
             params,
         })
     }
@@ -226,7 +241,7 @@ impl Patcher {
 }
 
 fn keep(contacts: &mut ContactStore, swept: &mut SweptSpace, touch: &Touch) {
-    swept.add(&touch.centre);
+    swept.add_place(&TipPlace { centre: touch.centre, axis: touch.axis });
     if let Some(contact) = &touch.contact {
         contacts.add(contact);
     }

@@ -85,14 +85,15 @@ fn domain(evidence: &Evidence<'_>, lattice: &Lattice) -> Table<Node, ()> {
         touched.insert_with(lattice.cell_of(&mean.point), || ());
     }
     let mut swept: Table<Node, ()> = Table::default();
-    for centre in evidence.swept.centres() {
-        if evidence.tree.closest(evidence.scan, centre, radius + lattice.pitch).is_some() {
+    let cover = evidence.swept.cover_radius(radius);
+    evidence.swept.cover(|centre| {
+        if evidence.tree.closest(evidence.scan, centre, cover + lattice.pitch).is_some() {
             swept.insert_with(lattice.cell_of(centre), || ());
         }
-    }
+    });
     let mut domain = Table::default();
     add_balls(&mut domain, &touched, (REACH * radius / lattice.pitch).ceil() as i32);
-    add_balls(&mut domain, &swept, (radius / lattice.pitch + BALL_MARGIN).ceil() as i32);
+    add_balls(&mut domain, &swept, (cover / lattice.pitch + BALL_MARGIN).ceil() as i32);
     domain
 }
 

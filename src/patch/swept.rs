@@ -1,41 +1,108 @@
-//! Where the ball has been: no material can be there.
+//! Where the tip has been: no material can be there.
 
 use nalgebra::{Point3, Vector3};
 
 use super::contact_store::{around, cell_of};
 use super::lattice::Node;
-use super::table::Table;
+use super::table::{Key, Table};
+use crate::touch::{TipBody, TipPlace};
 
 /// Cosine of the widest angle between a way and what counts as straight ahead: 45°.
 const STRAIGHT: f64 = 0.7;
 
-/// Centres of the ball, thinned to one for each small cell.
+/// A tip that leans by more than this, as the difference of a component of its axis, is kept beside one in the same cell:
+/// 2°, which moves a shaft of two radii by a fourteenth of a radius.
+const LEAN: f64 = 0.035;
+/// A body that is no ball is told apart from free space up to this share of its scale around it.
+const AROUND: f64 = 2.0 / 3.0;
+
+/// A small cell and a range of axes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Posture {
+    cell: Node,
+    lean: [i8; 3],
+}
+
+impl Key for Posture {
+    #[inline]
+    fn bits(&self) -> u64 {
+        let lean = self.lean.iter().fold(0u64, |bits, &x| bits << 6 | u64::from(x as u8 & 63));
+        self.cell.bits() ^ lean << 40
+    }
+}
+
+/// Places of the tip, thinned to one for each small cell.
 #[derive(Clone, Debug)]
 pub struct SweptSpace {
     cell: f64,
     reach: f64,
-    thinned: Table<Node, ()>,
+    thinned: Table<Posture, ()>,
     centres: Table<Node, Vec<Point3<f64>>>,
+    body: Option<SweptBody>,
+}
+
+/// A tip that is no ball.
+#[derive(Clone, Debug)]
+struct SweptBody {
+    tip: TipBody,
+    /// of each of the centres, in their order
+    axes: Table<Node, Vec<Vector3<f64>>>,
 }
 
 impl SweptSpace {
     /// Nothing swept yet: one centre is kept for each cube of edge `cell` (m), queries go up to `reach` (m).
     pub fn new(cell: f64, reach: f64) -> Self {
-        Self { cell, reach, thinned: Table::default(), centres: Table::default() }
+        Self { cell, reach, thinned: Table::default(), centres: Table::default(), body: None }
     }
 
-    /// Takes a centre, m, in O.
+    /// Nothing swept yet by a tip of any shape, of which one place is kept for each cube of edge `cell` (m).
+    pub fn of_tip(tip: TipBody, cell: f64, reach: f64) -> Self {
+        if tip.is_ball() {
+            return Self::new(cell, reach);
+        }
+        let (middle, bound) = tip.bound();
+        let reach = middle.abs() + bound + AROUND * tip.scale();
+        Self { body: Some(SweptBody { tip, axes: Table::default() }), ..Self::new(cell, reach) }
+    }
+
+    /// Takes a centre of a ball, m, in O.
     pub fn add(&mut self, centre: &Point3<f64>) {
-        let (_, is_new) = self.thinned.insert_with(cell_of(centre, self.cell), || ());
+        self.add_place(&TipPlace { centre: *centre, axis: Vector3::z() });
+    }
+
+    /// Takes a place of the tip.
+    pub fn add_place(&mut self, TipPlace { centre, axis }: &TipPlace) {
+        let lean = if self.body.is_some() { [axis.x, axis.y, axis.z] } else { [0.0; 3] };
+        let posture = Posture { cell: cell_of(centre, self.cell), lean: lean.map(|x| (x / LEAN).floor() as i8) };
+        let (_, is_new) = self.thinned.insert_with(posture, || ());
         if is_new {
-            let (at, _) = self.centres.insert_with(cell_of(centre, self.reach), Vec::new);
+            let cell = cell_of(centre, self.reach);
+            let (at, _) = self.centres.insert_with(cell, Vec::new);
             self.centres.value_mut(at).push(*centre);
+            if let Some(body) = &mut self.body {
+                let (at, _) = body.axes.insert_with(cell, Vec::new);
+                body.axes.value_mut(at).push(*axis);
+            }
         }
     }
 
     /// The centres that were kept.
     pub fn centres(&self) -> impl Iterator<Item = &Point3<f64>> + '_ {
         self.centres.iter().flat_map(|(_, centres)| centres)
+    }
+
+    /// Radius of the balls of [`Self::cover`], m; of a tip that is a ball its `radius`.
+    pub fn cover_radius(&self, radius: f64) -> f64 {
+        self.body.as_ref().map_or(radius, |body| body.tip.cover().1)
+    }
+
+    /// Calls `each` with the middles of balls that together cover what was swept, m.
+    pub fn cover(&self, mut each: impl FnMut(&Point3<f64>)) {
+        let Some(body) = &self.body else { return self.centres().for_each(each) };
+        let (heights, _) = body.tip.cover();
+        for (centre, axis) in self.centres().zip(body.axes.iter().flat_map(|(_, axes)| axes)) {
+            heights.iter().for_each(|&height| each(&(centre + axis * height)));
+        }
     }
 
     /// Whether the way of the ball ended at `centre`, going in `direction` (unit): within `width` (m) all of it is behind.
@@ -55,7 +122,12 @@ impl SweptSpace {
     }
 
     /// Distance from `x` to the nearest centre, m, and that centre; `None` beyond the reach.
+    ///
+    /// Of a tip that is no ball it is the signed distance from its body plus its scale: like a ball of that radius.
     pub fn nearest(&self, x: &Point3<f64>) -> Option<(f64, Point3<f64>)> {
+        if let Some(body) = &self.body {
+            return self.nearest_body(body, x);
+        }
         let mut best = (self.reach * self.reach, None);
         for bin in around(cell_of(x, self.reach)) {
             for centre in self.centres.get(&bin).into_iter().flatten() {
@@ -66,6 +138,24 @@ impl SweptSpace {
             }
         }
         best.1.map(|centre| (best.0.sqrt(), centre))
+    }
+
+    fn nearest_body(&self, SweptBody { tip, axes }: &SweptBody, x: &Point3<f64>) -> Option<(f64, Point3<f64>)> {
+        let (middle, bound) = tip.bound();
+        let mut best = (AROUND * tip.scale(), None);
+        for bin in around(cell_of(x, self.reach)) {
+            let (Some(centres), Some(axes)) = (self.centres.get(&bin), axes.get(&bin)) else { continue };
+            for (centre, axis) in centres.iter().zip(axes) {
+                let from_middle = (x - (centre + axis * middle)).norm_squared();
+                if from_middle < (bound + best.0).max(0.0).powi(2) {
+                    let distance = tip.signed_distance(&TipPlace { centre: *centre, axis: *axis }, x);
+                    if distance < best.0 {
+                        best = (distance, Some(*centre));
+                    }
+                }
+            }
+        }
+        best.1.map(|centre| (best.0 + tip.scale(), centre))
     }
 }
 
@@ -83,6 +173,34 @@ mod tests {
         assert!(swept.is_end(&bottom, &-Vector3::z(), 1e-3) && swept.is_end(&top, &Vector3::z(), 1e-3));
         assert!(!swept.is_end(&bottom, &Vector3::z(), 1e-3) && !swept.is_end(&bottom, &Vector3::x(), 1e-3));
         assert!(!swept.is_end(&middle, &-Vector3::z(), 1e-3) && !swept.is_end(&middle, &Vector3::x(), 1e-3));
+    }
+
+    #[test]
+    fn a_flat_end_sweeps_its_whole_width_and_a_cone_its_flank() {
+        use crate::touch::TipShape;
+        let shapes = [
+            (TipShape::Flat { edge_radius: 0.0, length: 4e-3 }, 2e-3, 2e-3),
+            (TipShape::Cone { half_angle: 0.5, length: 4e-3 }, 0.3e-3, 0.5f64.tan() * 2e-3 + 0.3e-3 / 0.5f64.cos()),
+        ];
+        for (shape, radius, wide) in shapes {
+            let tip = TipBody::new(shape, radius).unwrap();
+            let mut swept = SweptSpace::of_tip(tip, 0.1e-3, 1.0);
+            // along x, upright: 2 mm above its origin the tip is `wide` to either side
+            for i in 0..=100 {
+                let centre = Point3::new(f64::from(i) * 1e-4, 0.0, 0.0);
+                swept.add_place(&TipPlace { centre, axis: Vector3::z() });
+            }
+            let depth = |y: f64, z: f64| swept.nearest(&Point3::new(5e-3, y, z)).map(|found| tip.scale() - found.0);
+            assert!(depth(wide - 0.05e-3, 2e-3).unwrap() > 0.0 && depth(wide + 0.05e-3, 2e-3).unwrap() < 0.0);
+            assert!(depth(0.0, -radius - 0.05e-3).unwrap() < 0.0);
+            assert_eq!(depth(0.0, -radius - 2e-3), None, "far below");
+            let (mut covered, mut farthest) = (0, 0.0f64);
+            swept.cover(|middle| {
+                covered += 1;
+                farthest = farthest.max(middle.y.abs());
+            });
+            assert!(covered >= 101 && farthest == 0.0 && swept.cover_radius(0.0) >= wide);
+        }
     }
 
     #[test]

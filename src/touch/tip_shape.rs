@@ -168,13 +168,13 @@ impl TipBody {
         let height = arm.dot(&place.axis);
         let across = arm - place.axis * height;
         let from_axis = across.norm();
-        let (distance, [out, up]) = self.from_core([from_axis, height]);
+        let (distance, [out, up]) = self.core_distance([from_axis, height]);
         let outward = across.try_normalize(ON_AXIS * self.radius).unwrap_or_else(|| across_of(&place.axis));
         (distance - self.round, outward * out + place.axis * up)
     }
 
     /// Signed distance of a point of the half plane from the core, m, and its gradient there.
-    fn from_core(&self, p: [f64; 2]) -> (f64, [f64; 2]) {
+    fn core_distance(&self, p: [f64; 2]) -> (f64, [f64; 2]) {
         let Self { low, high, flank, .. } = self;
         let sides = [
             (low[1] - p[1], [0.0, -1.0]),
