@@ -32,7 +32,8 @@ fn case(stylus: &StylusParams, seed: u64) -> Case {
     let hand = PathParams { radius: stylus.radius, ..PathParams::default() };
     let scan = scan(&plate, &scanner).unwrap();
     let touch = touch(&plate, &plan_demo(&plate, &hand).unwrap(), stylus, seed).unwrap();
-    let mut patcher = Patcher::new(PatcherParams::new(stylus.radius, Some(stylus.stiffness), scanner.noise)).unwrap();
+    let params = PatcherParams::for_tip(stylus.shape, stylus.radius, Some(stylus.stiffness), scanner.noise).unwrap();
+    let mut patcher = Patcher::new(params).unwrap();
     let mut sync = Synchroniser::new(SyncParams::default()).unwrap();
     for message in &touch.messages {
         sync.push(*message);

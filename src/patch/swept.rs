@@ -179,10 +179,15 @@ mod tests {
     fn a_flat_end_sweeps_its_whole_width_and_a_cone_its_flank() {
         use crate::touch::TipShape;
         let shapes = [
-            (TipShape::Flat { edge_radius: 0.0, length: 4e-3 }, 2e-3, 2e-3),
-            (TipShape::Cone { half_angle: 0.5, length: 4e-3 }, 0.3e-3, 0.5f64.tan() * 2e-3 + 0.3e-3 / 0.5f64.cos()),
+            (TipShape::Flat { edge_radius: 0.0, length: 4e-3 }, 2e-3, 2e-3, 0.0),
+            (
+                TipShape::Cone { half_angle: 0.5, length: 4e-3 },
+                0.3e-3,
+                0.5f64.tan() * 2e-3 + 0.3e-3 / 0.5f64.cos(),
+                -0.3e-3,
+            ),
         ];
-        for (shape, radius, wide) in shapes {
+        for (shape, radius, wide, low) in shapes {
             let tip = TipBody::new(shape, radius).unwrap();
             let mut swept = SweptSpace::of_tip(tip, 0.1e-3, 1.0);
             // along x, upright: 2 mm above its origin the tip is `wide` to either side
@@ -192,8 +197,8 @@ mod tests {
             }
             let depth = |y: f64, z: f64| swept.nearest(&Point3::new(5e-3, y, z)).map(|found| tip.scale() - found.0);
             assert!(depth(wide - 0.05e-3, 2e-3).unwrap() > 0.0 && depth(wide + 0.05e-3, 2e-3).unwrap() < 0.0);
-            assert!(depth(0.0, -radius - 0.05e-3).unwrap() < 0.0);
-            assert_eq!(depth(0.0, -radius - 2e-3), None, "far below");
+            assert!(depth(0.0, low - 0.05e-3).unwrap() < 0.0);
+            assert_eq!(depth(0.0, low - 2e-3), None, "far below");
             let (mut covered, mut farthest) = (0, 0.0f64);
             swept.cover(|middle| {
                 covered += 1;
