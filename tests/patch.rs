@@ -2,14 +2,14 @@
 
 use std::collections::BTreeSet;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use touchup::mesh::{FaceId, FaceTree, TriMesh};
 use touchup::patch::{Patched, Patcher, PatcherParams, Support};
 use touchup::sim::{
-    Moment, PathParams, Plate, ScannerParams, StylusParams, Surface, TruthShape, measure_badness, plan_demo, scan,
-    touch,
+    Lines, Moment, PathParams, Plate, Region, ScannerParams, Stroke, StylusParams, Surface, TruthShape,
+    measure_badness, plan_demo, raster, scan, touch,
 };
-use touchup::touch::{SyncParams, Synchroniser};
+use touchup::touch::{SyncParams, Synchroniser, TipShape};
 
 #[path = "common/soundness.rs"]
 mod soundness;
@@ -22,6 +22,23 @@ struct Case {
     patched: Patched,
 }
 
+const FLAT: TipShape = TipShape::Flat { edge_radius: 0.2e-3, length: 6e-3 };
+const CONE: TipShape = TipShape::Cone { half_angle: 0.35, length: 6e-3 };
+
+/// A ball or a flat end goes over the plate as in the demo; a cone, which would get stuck in holes, over it in two rasters
+/// that let it sink into them a little.
+fn path(stylus: &StylusParams) -> Vec<Stroke> {
+    let plate = Plate::default();
+    let hand = PathParams { radius: stylus.radius, ..PathParams::default() };
+    if !matches!(stylus.shape, TipShape::Cone { .. }) {
+        return plan_demo(&plate, &hand).unwrap();
+    }
+    let (low, high, frame_ov) = ([0.009, 0.008].into(), [0.065, 0.042].into(), Isometry3::identity());
+    let region = Region { frame_ov, low, high, floor: 8e-3, clear: 20e-3 };
+    let hand = PathParams { pitch: 1e-3, ..hand };
+    [Lines::AlongX, Lines::AlongY].iter().flat_map(|lines| raster(&region, *lines, &hand).unwrap()).collect()
+}
+
 fn full() -> bool {
     std::env::var_os("TOUCHUP_FULL").is_some()
 }
@@ -29,9 +46,8 @@ fn full() -> bool {
 fn case(stylus: &StylusParams, seed: u64) -> Case {
     let plate = Plate::default();
     let scanner = ScannerParams { seed, ..ScannerParams::default() };
-    let hand = PathParams { radius: stylus.radius, ..PathParams::default() };
     let scan = scan(&plate, &scanner).unwrap();
-    let touch = touch(&plate, &plan_demo(&plate, &hand).unwrap(), stylus, seed).unwrap();
+    let touch = touch(&plate, &path(stylus), stylus, seed).unwrap();
     let params = PatcherParams::for_tip(stylus.shape, stylus.radius, Some(stylus.stiffness), scanner.noise).unwrap();
     let mut patcher = Patcher::new(params).unwrap();
     let mut sync = Synchroniser::new(SyncParams::default()).unwrap();
@@ -157,10 +173,16 @@ fn other_tips_hands_and_friction() {
         ("friction 0.35", StylusParams { friction: 0.35, ..StylusParams::default() }),
         ("tilt 15°", StylusParams { tilt: 15f64.to_radians(), ..StylusParams::default() }),
         ("soft, 5 N/mm", StylusParams { stiffness: 5e3, ..StylusParams::default() }),
+        ("flat, 1.5 mm", StylusParams { shape: FLAT, ..StylusParams::default() }),
+        ("flat, upright", StylusParams { shape: FLAT, tilt: 0.0, ..StylusParams::default() }),
+        ("flat, tilt 15°", StylusParams { shape: FLAT, tilt: 15f64.to_radians(), ..StylusParams::default() }),
+        ("cone, 20°", StylusParams { shape: CONE, radius: 0.5e-3, ..StylusParams::default() }),
     ];
     println!("{:14} {:>28} {:>28} {:>10}", "", "part to mesh, worst, mm", "mesh to part, worst, mm", "rim, mm");
     for (name, stylus) in styli {
         let (mut worst, mut rim) = ([0.0f64; 2], 0.0f64);
+        // a tip of many balls takes the simulator longer
+        let seeds = if stylus.shape == TipShape::Ball || full() { seeds } else { 1 };
         for seed in 1..=seeds {
             let case = case(&stylus, seed);
             let errors = case.errors(&case.patched.mesh);
@@ -170,7 +192,8 @@ fn other_tips_hands_and_friction() {
         }
         println!("{name:14} {:28.3} {:28.3} {:10.1}", worst[0], worst[1], rim * 1e3);
         assert!(worst[0] < 0.06 && worst[1] < 0.25, "{name}: {worst:?}");
-        // a ball that ends its way freely in the blind hole leaves that open too
-        assert!(rim < 3.0 * through_ends(), "{name}: {rim}");
+        // a ball that ends its way freely in the blind hole leaves that open too, a cone does so in each of the three
+        let openings = if name.starts_with("cone") { 5.0 } else { 3.0 };
+        assert!(rim < openings * through_ends(), "{name}: {rim}");
     }
 }

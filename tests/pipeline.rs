@@ -254,7 +254,7 @@ fn a_replay_equals_the_first_run_byte_for_byte() {
     let Patched { mesh, support, .. } = patcher.patched(&scan, &FaceTree::new(&scan)).unwrap();
     let touched = |support: &Support| match support {
         Support::Touched => 1.0,
-        Support::Guessed => 0.5,
+        Support::Guessed | Support::Unreachable => 0.5,
         Support::Scan => 0.0,
     };
     let column = VertexColumn { name: "touched", values: support.iter().map(touched).collect::<Vec<_>>().into() };

@@ -95,20 +95,9 @@ fn the_simulated_tip_does_not_enter_the_part() {
             }
             // the tip is known up to 6 mm; the simulated one goes on
             let on_tip = |p: &Point3<f64>| {
-                (p - place.centre).dot(&place.axis) > 6e-3 || body.signed_distance(&place, p).abs() < 10e-6
+                (p - place.centre).dot(&place.axis) > 6e-3 || body.signed_distance(&place, p).abs() < 20e-6
             };
-            for c in &moment.contacts {
-                if !on_tip(&c.point) {
-                    println!(
-                        "off {:.4} mm h {:.3} normal {:?} axis {:?} p {:?}",
-                        body.signed_distance(&place, &c.point) * 1e3,
-                        (c.point - place.centre).dot(&place.axis) * 1e3,
-                        c.normal,
-                        place.axis,
-                        c.point * 1e3
-                    );
-                }
-            }
+            assert!(moment.contacts.iter().all(|contact| on_tip(&contact.point)));
         }
         println!("{shape:?}: {:.1} um deep at most, {touching} touching", deepest * 1e6);
         assert!(deepest < 8e-6 && touching > 100, "{deepest}");
@@ -131,5 +120,10 @@ fn a_tip_says_where_it_touched() {
     for (name, stylus) in tips {
         let [share, median, p90, angle_median, angle_p90] = quality(&felt(&stylus, 1));
         println!("{name:24} {share:6.2} {median:6.3} {p90:7.3} {angle_median:6.1} {angle_p90:7.1}");
+        // noise of 0.05 mm at 500 Hz, averaged over 16 ms and more, and a tenth of the samples at edges and turns
+        assert!(share > 0.8 && median < 0.03 && angle_median < 3.0, "{name}");
+        // the side of a leaning cylinder on the edge of a hole is taken for its end
+        let worst = if name == "flat, tilt 15°" { 2.0 } else { 0.15 };
+        assert!(p90 < worst && angle_p90 < 10.0, "{name}");
     }
 }

@@ -96,6 +96,11 @@ impl ContactStore {
         count
     }
 
+    /// Takes these means out of all queries until the next [`Self::refute`].
+    pub(super) fn silence(&mut self, indices: &[u32]) {
+        indices.iter().for_each(|&index| self.means[index as usize].weight = 0.0);
+    }
+
     /// Finds the means around which normals within `width` (m) differ by more than the angle of `cosine`.
     pub fn mark_fans(&mut self, width: f64, cosine: f64) {
         for at in 0..self.means.len() {

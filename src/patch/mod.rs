@@ -34,6 +34,8 @@ mod swept;
 mod table;
 mod touches;
 mod trace;
+mod two_points;
+mod unreachable;
 
 pub use contact_store::{ContactStore, MeanContact};
 pub use contour::{ContourParams, Crossing, contour};

@@ -15,6 +15,8 @@ use super::scan_value::ScanValue;
 use super::splice::Patch;
 use super::swept::SweptSpace;
 use super::touches::{Touch, TouchFinder, TouchFinderParams};
+use super::two_points;
+use super::unreachable::mark_unreachable;
 use crate::mesh::{FaceTree, MeshError, TriMesh};
 use crate::touch::{Compensator, CompensatorParams, Sample, SettingError, TipBody, TipPlace, TipShape};
 
@@ -80,6 +82,8 @@ pub enum Support {
     Touched,
     /// what touches, free space and scan nearby suggest; nothing was felt here
     Guessed,
+    /// as that, and nothing can be felt here: the ball does not go so far into an inner corner, or into what is narrower
+    Unreachable,
 }
 
 /// A scan with its touched part meshed anew.
@@ -184,8 +188,20 @@ impl Patcher {
     /// is complete.
     pub fn push(&mut self, sample: &Sample) {
         let tip = self.compensator.compensate(sample);
+        let ball = self.ball();
         let Self { finder, contacts, swept, .. } = self;
-        finder.push(&tip, |touch| keep(contacts, swept, &touch));
+        finder.push(&tip, |touch| keep(contacts, swept, ball, &touch));
+    }
+
+    /// What was touched, as it was kept.
+    pub fn contacts(&self) -> &ContactStore {
+        &self.contacts
+    }
+
+    /// Radius of the tip when it is a ball, m.
+    fn ball(&self) -> Option<f64> {
+        let touches = &self.params.touches;
+        (touches.shape == TipShape::Ball).then_some(touches.radius)
     }
 
     /// The scan with its touched part meshed anew; vertices and faces that were not touched keep their ids.
@@ -203,6 +219,9 @@ impl Patcher {
                 support[id.0 as usize] = support_of(&key, &restored);
             }
         }
+        if let Some(radius) = self.ball() {
+            mark_unreachable(&mesh, &mut support, &self.swept, radius)?;
+        }
         Ok(Patched {
             mesh,
             support,
@@ -215,8 +234,9 @@ impl Patcher {
 
     /// The patch for all that was felt so far, within the budget.
     fn make(&mut self, scan: &TriMesh, tree: &FaceTree) -> Made {
+        let ball = self.ball();
         let Self { finder, contacts, swept, params, .. } = self;
-        finder.flush(|touch| keep(contacts, swept, &touch));
+        finder.flush(|touch| keep(contacts, swept, ball, &touch));
         let radius = params.evidence.radius;
         let deepest = radius * (1.0 - REFUTED_DEPTH);
         let bounds = bounds_of(scan, OUTSIDE * radius);
@@ -224,6 +244,9 @@ impl Patcher {
             swept.nearest(&mean.point).is_some_and(|(distance, _)| distance < deepest)
                 || is_elsewhere(&mean.point, scan, tree, &bounds, OUTSIDE * radius)
         });
+        if let Some(radius) = ball {
+            two_points::drop_mixed(contacts, radius);
+        }
         contacts.mark_fans(FAN_WIDTH * radius, FAN_COSINE);
         let evidence = Evidence { params: &params.evidence, contacts, swept, scan, tree };
         let budget = (params.most_faces * scan.face_count() as f64).max(LEAST_BUDGET);
@@ -240,10 +263,13 @@ impl Patcher {
     }
 }
 
-fn keep(contacts: &mut ContactStore, swept: &mut SweptSpace, touch: &Touch) {
+/// - `ball`: radius of the tip when it is one, m.
+fn keep(contacts: &mut ContactStore, swept: &mut SweptSpace, ball: Option<f64>, touch: &Touch) {
     swept.add_place(&TipPlace { centre: touch.centre, axis: touch.axis });
-    if let Some(contact) = &touch.contact {
-        contacts.add(contact);
+    let Some(contact) = &touch.contact else { return };
+    match ball.and_then(|radius| two_points::split(contacts, radius, &touch.centre, contact)) {
+        Some(two) => two.iter().for_each(|contact| contacts.add(contact)),
+        None => contacts.add(contact),
     }
 }
 

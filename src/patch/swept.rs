@@ -45,8 +45,8 @@ pub struct SweptSpace {
 #[derive(Clone, Debug)]
 struct SweptBody {
     tip: TipBody,
-    /// of each of the centres, in their order
-    axes: Table<Node, Vec<Vector3<f64>>>,
+    /// by the middles of the balls that hold the tip there, in cells as large as its scale
+    places: Table<Node, Vec<TipPlace>>,
 }
 
 impl SweptSpace {
@@ -60,9 +60,7 @@ impl SweptSpace {
         if tip.is_ball() {
             return Self::new(cell, reach);
         }
-        let (middle, bound) = tip.bound();
-        let reach = middle.abs() + bound + AROUND * tip.scale();
-        Self { body: Some(SweptBody { tip, axes: Table::default() }), ..Self::new(cell, reach) }
+        Self { body: Some(SweptBody { tip, places: Table::default() }), ..Self::new(cell, reach) }
     }
 
     /// Takes a centre of a ball, m, in O.
@@ -76,12 +74,12 @@ impl SweptSpace {
         let posture = Posture { cell: cell_of(centre, self.cell), lean: lean.map(|x| (x / LEAN).floor() as i8) };
         let (_, is_new) = self.thinned.insert_with(posture, || ());
         if is_new {
-            let cell = cell_of(centre, self.reach);
-            let (at, _) = self.centres.insert_with(cell, Vec::new);
+            let (at, _) = self.centres.insert_with(cell_of(centre, self.reach), Vec::new);
             self.centres.value_mut(at).push(*centre);
-            if let Some(body) = &mut self.body {
-                let (at, _) = body.axes.insert_with(cell, Vec::new);
-                body.axes.value_mut(at).push(*axis);
+            if let Some(SweptBody { tip, places }) = &mut self.body {
+                let middle = centre + axis * tip.bound().0;
+                let (at, _) = places.insert_with(cell_of(&middle, tip.scale()), Vec::new);
+                places.value_mut(at).push(TipPlace { centre: *centre, axis: *axis });
             }
         }
     }
@@ -100,7 +98,7 @@ impl SweptSpace {
     pub fn cover(&self, mut each: impl FnMut(&Point3<f64>)) {
         let Some(body) = &self.body else { return self.centres().for_each(each) };
         let (heights, _) = body.tip.cover();
-        for (centre, axis) in self.centres().zip(body.axes.iter().flat_map(|(_, axes)| axes)) {
+        for TipPlace { centre, axis } in body.places.iter().flat_map(|(_, places)| places) {
             heights.iter().for_each(|&height| each(&(centre + axis * height)));
         }
     }
@@ -126,7 +124,7 @@ impl SweptSpace {
     /// Of a tip that is no ball it is the signed distance from its body plus its scale: like a ball of that radius.
     pub fn nearest(&self, x: &Point3<f64>) -> Option<(f64, Point3<f64>)> {
         if let Some(body) = &self.body {
-            return self.nearest_body(body, x);
+            return body.nearest(x);
         }
         let mut best = (self.reach * self.reach, None);
         for bin in around(cell_of(x, self.reach)) {
@@ -139,24 +137,39 @@ impl SweptSpace {
         }
         best.1.map(|centre| (best.0.sqrt(), centre))
     }
+}
 
-    fn nearest_body(&self, SweptBody { tip, axes }: &SweptBody, x: &Point3<f64>) -> Option<(f64, Point3<f64>)> {
-        let (middle, bound) = tip.bound();
-        let mut best = (AROUND * tip.scale(), None);
-        for bin in around(cell_of(x, self.reach)) {
-            let (Some(centres), Some(axes)) = (self.centres.get(&bin), axes.get(&bin)) else { continue };
-            for (centre, axis) in centres.iter().zip(axes) {
-                let from_middle = (x - (centre + axis * middle)).norm_squared();
-                if from_middle < (bound + best.0).max(0.0).powi(2) {
-                    let distance = tip.signed_distance(&TipPlace { centre: *centre, axis: *axis }, x);
+impl SweptBody {
+    /// As [`SweptSpace::nearest`].
+    fn nearest(&self, x: &Point3<f64>) -> Option<(f64, Point3<f64>)> {
+        let (middle, bound) = self.tip.bound();
+        let size = self.tip.scale();
+        let mut best = (AROUND * size, None);
+        let (home, steps) = (cell_of(x, size), ((bound + best.0) / size).ceil() as i32);
+        for cell in (-steps..=steps)
+            .flat_map(|i| (-steps..=steps).flat_map(move |j| (-steps..=steps).map(move |k| [i, j, k])))
+            .map(|step| [0, 1, 2].map(|i| home[i].saturating_add(step[i])))
+        {
+            let limit = |distance: f64| (bound + distance).max(0.0).powi(2);
+            if cell_distance_squared(&cell, size, x) >= limit(best.0) {
+                continue;
+            }
+            for place in self.places.get(&cell).into_iter().flatten() {
+                if (x - (place.centre + place.axis * middle)).norm_squared() < limit(best.0) {
+                    let distance = self.tip.signed_distance(place, x);
                     if distance < best.0 {
-                        best = (distance, Some(*centre));
+                        best = (distance, Some(place.centre));
                     }
                 }
             }
         }
-        best.1.map(|centre| (best.0 + tip.scale(), centre))
+        best.1.map(|centre| (best.0 + size, centre))
     }
+}
+
+/// Squared distance of a point from a cell of edge `size`, m².
+fn cell_distance_squared(cell: &Node, size: f64, x: &Point3<f64>) -> f64 {
+    (0..3).map(|i| (f64::from(cell[i]) * size - x[i]).max(x[i] - f64::from(cell[i] + 1) * size).max(0.0).powi(2)).sum()
 }
 
 #[cfg(test)]
