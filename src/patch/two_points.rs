@@ -5,7 +5,7 @@
 //! contacts and not one. On a convex edge the ball is nearer to the planes on either side than its radius, so that this
 //! does not take it for a corner.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::contact_store::ContactStore;
 use super::touches::Contact;
@@ -25,6 +25,11 @@ const PRESSED: f64 = 0.1;
 const OFF_PLANE: f64 = 0.34;
 /// A surface is known by as much as so many contacts while sliding.
 const LEAST_WEIGHT: f64 = 2.0;
+/// The two take no more together than this many times what is felt: a corner of 75° or wider, and no wedge.
+const MOST_FORCE: f64 = 1.6;
+/// Standard deviation of the centres of the balls that touched a surface, across the corner, in radii: those of a ball that
+/// bridges it all lie on one line, to within the noise.
+const SPREAD: f64 = 0.03;
 /// Surfaces looked at.
 const MOST: usize = 8;
 
@@ -36,6 +41,29 @@ struct Wall {
     /// unit
     facing: Vector3<f64>,
     weight: f64,
+    /// how many means
+    count: f64,
+    /// Σ d and Σ d dᵀ, d: where the centres of the balls were that touched it, from that of the ball, m and m²
+    offset: Vector3<f64>,
+    spread: Matrix3<f64>,
+}
+
+impl Wall {
+    const NONE: Self = Self {
+        normal: Vector3::new(0.0, 0.0, 0.0),
+        facing: Vector3::new(0.0, 0.0, 0.0),
+        weight: 0.0,
+        count: 0.0,
+        offset: Vector3::new(0.0, 0.0, 0.0),
+        spread: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    };
+
+    /// Whether it was touched from places apart across the corner that it makes with another.
+    fn is_wide(&self, other: &Self, radius: f64) -> bool {
+        let across = self.facing.cross(&self.facing.cross(&other.facing)).normalize();
+        let mean = across.dot(&self.offset) / self.count;
+        across.dot(&(self.spread * across)) / self.count - mean * mean > (SPREAD * radius).powi(2)
+    }
 }
 
 /// The two contacts of a ball of `radius` (m) with its centre at `centre` (m, in O) for which the one felt along `normal`
@@ -48,9 +76,13 @@ pub(super) fn two_points(
 ) -> Option<[Vector3<f64>; 2]> {
     let (walls, count) = walls(contacts, radius, centre);
     let known = || walls[..count].iter().filter(|wall| wall.weight >= LEAST_WEIGHT);
-    let pairs = known().enumerate().flat_map(|(at, a)| known().skip(at + 1).map(move |b| [a.facing, b.facing]));
-    let between = pairs.filter(|[a, b]| a.dot(b) < APART && is_between(normal, a, b));
-    between.min_by(|[a, b], [c, d]| a.dot(b).total_cmp(&c.dot(d)))
+    let pairs = known().enumerate().flat_map(|(at, a)| known().skip(at + 1).map(move |b| [a, b]));
+    // two bridges of one corner are no walls of another
+    let between = pairs.filter(|[a, b]| {
+        let is_corner = a.facing.dot(&b.facing) < APART && is_between(normal, &a.facing, &b.facing);
+        is_corner && (a.is_wide(b, radius) || b.is_wide(a, radius))
+    });
+    between.map(|[a, b]| [a.facing, b.facing]).min_by(|[a, b], [c, d]| a.dot(b).total_cmp(&c.dot(d)))
 }
 
 /// The contact as what it is: one, or two with half of its weight each.
@@ -81,7 +113,7 @@ pub(super) fn drop_mixed(contacts: &mut ContactStore, radius: f64) -> usize {
 
 /// The surfaces that a ball lies on, and how many.
 fn walls(contacts: &ContactStore, radius: f64, centre: &Point3<f64>) -> ([Wall; MOST], usize) {
-    let mut walls = [Wall { normal: Vector3::zeros(), facing: Vector3::zeros(), weight: 0.0 }; MOST];
+    let mut walls = [Wall::NONE; MOST];
     let mut count = 0;
     let reach = radius * (1.0 + ON_SURFACE).hypot(NEARBY);
     contacts.near(centre, reach, |distance_squared, index| {
@@ -99,6 +131,10 @@ fn walls(contacts: &ContactStore, radius: f64, centre: &Point3<f64>) -> ([Wall; 
             wall.normal += mean.normal * mean.weight;
             wall.facing = wall.normal.try_normalize(0.0).unwrap_or(mean.normal);
             wall.weight += mean.weight;
+            let from_ball = mean.point + mean.normal * radius - centre;
+            wall.count += 1.0;
+            wall.offset += from_ball;
+            wall.spread += from_ball * from_ball.transpose();
         }
     });
     (walls, count)
@@ -115,7 +151,8 @@ fn is_between(normal: &Vector3<f64>, a: &Vector3<f64>, b: &Vector3<f64>) -> bool
     let (along_a, along_b) = (normal.dot(a), normal.dot(b));
     let [share_a, share_b] = [(along_a - cosine * along_b) / squared_sine, (along_b - cosine * along_a) / squared_sine];
     let off = normal - a * share_a - b * share_b;
-    off.norm() < OFF_PLANE && share_a > PRESSED * share_b && share_b > PRESSED * share_a
+    let is_shared = share_a > PRESSED * share_b && share_b > PRESSED * share_a;
+    is_shared && share_a + share_b < MOST_FORCE && off.norm() < OFF_PLANE
 }
 
 #[cfg(test)]
@@ -180,7 +217,8 @@ mod tests {
         let point = Point3::new(RADIUS, 0.0, RADIUS) - normal * RADIUS;
         store.add(&Contact { point, normal, weight: 5.0 });
         assert_eq!(drop_mixed(&mut store, RADIUS), 1);
-        assert_eq!(store.means().iter().filter(|mean| mean.weight == 0.0).map(|mean| mean.point).next(), Some(point));
+        let dropped: Vec<_> = store.means().iter().filter(|mean| mean.weight == 0.0).collect();
+        assert!(dropped.len() == 1 && (dropped[0].point - point).norm() < 1e-15);
         store.refute(|_| false);
         assert!(store.means().iter().all(|mean| mean.weight > 0.0));
     }
