@@ -257,8 +257,15 @@ fn a_replay_equals_the_first_run_byte_for_byte() {
         Support::Guessed | Support::Unreachable => 0.5,
         Support::Scan => 0.0,
     };
-    let column = VertexColumn { name: "touched", values: support.iter().map(touched).collect::<Vec<_>>().into() };
-    write_mesh_with(&plate.at("live.ply"), &mesh, &[column], MeshUnit::Millimetre).unwrap();
+    let named = |support: &Support| match support {
+        Support::Scan => 0.0,
+        Support::Touched => 1.0,
+        Support::Guessed => 2.0,
+        Support::Unreachable => 3.0,
+    };
+    let touched = VertexColumn { name: "touched", values: support.iter().map(touched).collect::<Vec<_>>().into() };
+    let named = VertexColumn { name: "support", values: support.iter().map(named).collect::<Vec<_>>().into() };
+    write_mesh_with(&plate.at("live.ply"), &mesh, &[touched, named], MeshUnit::Millimetre).unwrap();
 
     for out in ["one.ply", "two.ply"] {
         let output = plate.refine(out, &[]);
