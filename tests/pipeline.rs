@@ -255,12 +255,19 @@ fn a_replay_equals_the_first_run_byte_for_byte() {
     let Patched { mesh, support, sigma, .. } = patcher.patched(&scan, &FaceTree::new(&scan)).unwrap();
     let touched = |support: &Support| match support {
         Support::Touched => 1.0,
-        Support::Guessed => 0.5,
+        Support::Guessed | Support::Unreachable => 0.5,
         Support::Scan => 0.0,
     };
     let touched: Vec<f32> = support.iter().map(touched).collect();
     let sigma_mm: Vec<f32> = sigma.iter().map(|sigma| (sigma * 1e3) as f32).collect();
-    let columns = [("touched", touched), ("sigma_mm", sigma_mm)];
+    let named = |support: &Support| match support {
+        Support::Scan => 0.0,
+        Support::Touched => 1.0,
+        Support::Guessed => 2.0,
+        Support::Unreachable => 3.0,
+    };
+    let support: Vec<f32> = support.iter().map(named).collect();
+    let columns = [("touched", touched), ("support", support), ("sigma_mm", sigma_mm)];
     let columns = columns.map(|(name, values)| VertexColumn { name, values: values.into() });
     write_mesh_with(&plate.at("live.ply"), &mesh, &columns, MeshUnit::Millimetre).unwrap();
 

@@ -19,7 +19,7 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64;
 use touchup::mesh::{TriMesh, VertexId};
 use touchup::refine::{CarveParams, RefineParams, Refiner, TipParams};
-use touchup::touch::{Sample, Wrench};
+use touchup::touch::{Sample, TipShape, Wrench};
 
 use common::{grid, within};
 
@@ -179,6 +179,30 @@ fn nothing_of_a_lid_stays_inside_the_ball_deeper_than_the_tolerance() {
         assert!(left < 1.02 * tolerance, "{left:e} m");
         assert!(worst < tolerance + 3.0 * speed / rate, "{worst:e} m");
         assert!(refiner.counts().contacts == 0 && refiner.counts().moved > 0);
+    }
+}
+
+/// One update moves all faces inside the tip and not the closest alone, and none that it does not enter.
+#[test]
+fn all_faces_inside_the_tip_move_at_once() {
+    let flat = TipShape::Flat { edge_radius: 0.0, length: 6e-3 };
+    for (shape, lowest) in [(TipShape::Ball, -RADIUS), (flat, 0.0)] {
+        // a third of the ball: several faces are inside
+        let edge = EDGE / 4.0;
+        let mesh = grid(15, edge, |_, _| 0.0);
+        let mut refiner = Refiner::new(mesh.clone(), RefineParams { shape, ..RefineParams::robust(BALL) }).unwrap();
+        // the tip is 0.5 mm deep in the lid; the first sample has no time to act in
+        let centre = Point3::new(0.3e-3, 0.2e-3, -0.5e-3 - lowest);
+        (0..2).for_each(|tick| {
+            refiner.push(&sample(tick, centre, Vector3::zeros())).unwrap();
+        });
+        let moved = |v: &VertexId| refiner.mesh().position(*v) != mesh.position(*v);
+        let count = (0..mesh.vertex_count() as u32).map(VertexId).filter(moved).count();
+        assert!(count > 3 && refiner.counts().moved > 1, "{count} vertices");
+        for (face, corners) in mesh.faces().filter(|(_, corners)| corners.iter().all(moved)) {
+            let from_axis = mesh.barycentre(face).xy() - centre.xy();
+            assert!(from_axis.norm() < RADIUS + edge, "{corners:?}");
+        }
     }
 }
 

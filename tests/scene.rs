@@ -6,7 +6,7 @@ use nalgebra::vector;
 use touchup::patch::PatcherParams;
 use touchup::refine::{Along, ContactModel, DynamicsParams, GuardParams, RefineParams, RoiSize, StepRule, TipParams};
 use touchup::scene::{BiasTrackingSection, CompensationSection, MarkersSection, Mode, PayloadSection, Scene};
-use touchup::touch::{BiasParams, SyncParams, WrenchFrame};
+use touchup::touch::{BiasParams, SyncParams, TipShape, WrenchFrame};
 
 const DEFAULT_YAML: &str = include_str!("../config/default.yaml");
 
@@ -189,6 +189,12 @@ fn each_mistake_is_refused_in_one_line_that_says_where_and_what() {
         ("contact: { off_n: .nan }", &["contact.off_n is NaN", "0 to 1000 N"]),
         ("tip: { radius_mm: -1 }", &["tip.radius_mm is -1", "0 to 1000 mm"]),
         ("tip: { stiffness_n_per_mm: 0 }", &["tip.stiffness_n_per_mm is 0", "leave it out for rigid"]),
+        ("tip: { shape: cube }", &["cube", "ball", "flat", "cone"]),
+        ("tip: { shape: cone }", &["tip.shape: cone needs tip.half_angle_deg"]),
+        ("tip: { shape: cone, half_angle_deg: 85 }", &["tip.half_angle_deg is 85", "1 to 80 degrees", "flat"]),
+        ("tip: { shape: flat, edge_radius_mm: 2 }", &["tip.edge_radius_mm is 2", "0 mm to tip.radius_mm"]),
+        ("tip: { shape: flat, radius_mm: 0 }", &["tip.radius_mm is 0", "for a flat tip"]),
+        ("tip: { shape: flat, length_mm: 0 }", &["tip.length_mm is 0", "1000 mm"]),
         ("scan: { noise_mm: .inf }", &["scan.noise_mm is inf"]),
         ("sync: { largest_gap_ms: -3 }", &["sync.largest_gap_ms is -3", "0 to 60000 ms"]),
         ("sync: { capacity: 1 }", &["sync.capacity is 1"]),
@@ -210,6 +216,24 @@ fn each_mistake_is_refused_in_one_line_that_says_where_and_what() {
         assert!(!error.contains('\n'), "{error}");
         assert!(parts.iter().all(|part| error.contains(part)), "{yaml:?}: {error}");
     }
+}
+
+#[test]
+fn the_shape_of_the_tip_reaches_refiner_and_patcher() {
+    let shapes = |yaml: &str| {
+        let scene = Scene::from_yaml(&format!("{{ contact: , refine: , patch: , tip: {{ {yaml} }} }}")).unwrap();
+        let refiner = scene.refine_params(WrenchFrame::Sensor).unwrap();
+        let patcher = scene.patcher_params(WrenchFrame::Sensor).unwrap();
+        assert_eq!((refiner.shape, refiner.tip.radius), (patcher.touches.shape, patcher.touches.radius));
+        assert!(refiner.check().is_ok() && touchup::patch::Patcher::new(patcher).is_ok());
+        (refiner.shape, patcher.evidence.radius)
+    };
+    assert_eq!(shapes("radius_mm: 1.5"), (TipShape::Ball, 1.5e-3));
+    let flat = TipShape::Flat { edge_radius: 0.25e-3, length: 8e-3 };
+    assert_eq!(shapes("shape: flat, radius_mm: 2, edge_radius_mm: 0.25"), (flat, 2e-3));
+    let cone = TipShape::Cone { half_angle: 20f64.to_radians(), length: 6e-3 };
+    // what a sharp nose can show is limited by the hand
+    assert_eq!(shapes("shape: cone, radius_mm: 0.25, half_angle_deg: 20, length_mm: 6"), (cone, 1e-3));
 }
 
 #[test]

@@ -347,7 +347,10 @@ impl RefineArguments {
             );
         }
         let build_s = started.elapsed().as_secs_f64();
-        let mut columns = vec![VertexColumn { name: "touched", values: touched_column(&patched).into() }];
+        let mut columns = vec![
+            VertexColumn { name: "touched", values: touched_column(&patched).into() },
+            VertexColumn { name: "support", values: support_column(&patched).into() },
+        ];
         let uncertainty = patcher.params().uncertainty.map(|_| UncertaintySummary::of(&patched, patcher.knocks()));
         if uncertainty.is_some() {
             columns.push(VertexColumn { name: "sigma_mm", values: sigma_column(&patched).into() });
@@ -408,7 +411,7 @@ impl RefineArguments {
 fn touched_column(patched: &Patched) -> Vec<f32> {
     let touched = |support: &Support| match support {
         Support::Touched => 1.0,
-        Support::Guessed => 0.5,
+        Support::Guessed | Support::Unreachable => 0.5,
         Support::Scan => 0.0,
     };
     patched.support.iter().map(touched).collect()
@@ -419,10 +422,21 @@ fn sigma_column(patched: &Patched) -> Vec<f32> {
     patched.sigma.iter().map(|sigma| (sigma * 1e3) as f32).collect()
 }
 
+/// 0 for a vertex of the scan, 1 for one that was touched, 2 for one that is guessed, 3 for one that the ball cannot reach.
+fn support_column(patched: &Patched) -> Vec<f32> {
+    let support = |support: &Support| match support {
+        Support::Scan => 0.0,
+        Support::Touched => 1.0,
+        Support::Guessed => 2.0,
+        Support::Unreachable => 3.0,
+    };
+    patched.support.iter().map(support).collect()
+}
+
 impl PatchSummary {
     fn of(patched: &Patched, build_s: f64) -> Self {
         let count = |wanted: Support| patched.support.iter().filter(|&&support| support == wanted).count() as f64;
-        let (touched, guessed) = (count(Support::Touched), count(Support::Guessed));
+        let (touched, guessed) = (count(Support::Touched), count(Support::Guessed) + count(Support::Unreachable));
         Self {
             pitch_mm: patched.pitch * 1e3,
             removed_faces: patched.removed_faces,

@@ -135,6 +135,12 @@ impl TriMesh {
         &self.positions
     }
 
+    /// The lowest and the highest corner of the box around all vertices, m, in O; inverted where there is none.
+    pub fn bounds(&self) -> [Point3<f64>; 2] {
+        let empty = [f64::INFINITY, f64::NEG_INFINITY].map(|x| Point3::new(x, x, x));
+        self.positions.iter().fold(empty, |[lo, hi], p| [lo.inf(p), hi.sup(p)])
+    }
+
     /// All faces with their ids, in order of id, removed ones left out.
     pub fn faces(&self) -> impl Iterator<Item = (FaceId, [VertexId; 3])> + '_ {
         self.faces

@@ -95,8 +95,17 @@ struct Kept {
     /// whether it stands in [`ContactStore::changed`]
     is_noted: bool,
     is_refuted: bool,
+    /// stands for two contacts at once
+    is_mixed: bool,
     /// the mean when it was last told
     told: (Point3<f64>, Vector3<f64>),
+}
+
+impl Kept {
+    /// What it counts in queries.
+    fn weight(&self) -> f64 {
+        if self.is_refuted || self.is_mixed { 0.0 } else { self.sums.weight }
+    }
 }
 
 /// What was there before a stroke, and `None` where nothing was.
@@ -422,6 +431,7 @@ impl ContactStore {
             apart: NONE,
             is_noted: false,
             is_refuted: false,
+            is_mixed: false,
             told: (point, normal),
         };
         self.push(kept, MeanContact { point, normal, weight, is_fan: false });
@@ -457,10 +467,10 @@ impl ContactStore {
     /// Brings a mean up to its sums, unless it was refuted.
     fn renew(&mut self, index: u32, contact: &Contact) {
         let (kept, mean) = (&self.kept[index as usize], &mut self.means[index as usize]);
-        let Kept { sums, told: (point, normal), is_refuted, .. } = kept;
-        mean.point = sums.point();
-        mean.normal = sums.normal.try_normalize(0.0).unwrap_or(contact.normal);
-        let before = std::mem::replace(&mut mean.weight, if *is_refuted { 0.0 } else { sums.weight });
+        let (point, normal) = &kept.told;
+        mean.point = kept.sums.point();
+        mean.normal = kept.sums.normal.try_normalize(0.0).unwrap_or(contact.normal);
+        let before = std::mem::replace(&mut mean.weight, kept.weight());
         let is_back = before == 0.0 && mean.weight > 0.0;
         let is_shifted = is_back
             || (mean.point - point).dot(normal).abs() > SHIFT * self.cell
@@ -563,9 +573,21 @@ impl ContactStore {
     pub fn refute(&mut self, at: u32, is_refuted: bool) -> bool {
         let (kept, mean) = (&mut self.kept[at as usize], &mut self.means[at as usize]);
         kept.is_refuted = is_refuted;
-        let weight = if is_refuted { 0.0 } else { kept.sums.weight };
-        let before = std::mem::replace(&mut mean.weight, weight);
-        (before == 0.0) != (weight == 0.0)
+        let before = std::mem::replace(&mut mean.weight, kept.weight());
+        (before == 0.0) != (mean.weight == 0.0)
+    }
+
+    /// Takes a mean that stands for two contacts out of all queries, or back in; returns whether that is new.
+    pub(super) fn mark_mixed(&mut self, at: u32, is_mixed: bool) -> bool {
+        let (kept, mean) = (&mut self.kept[at as usize], &mut self.means[at as usize]);
+        kept.is_mixed = is_mixed;
+        let before = std::mem::replace(&mut mean.weight, kept.weight());
+        (before == 0.0) != (mean.weight == 0.0)
+    }
+
+    /// What was felt at a mean, whether it counts in queries or not, in contacts while sliding.
+    pub(super) fn weight(&self, at: u32) -> f64 {
+        self.kept[at as usize].sums.weight
     }
 
     /// Finds whether normals within `width` (m) of a mean differ by more than the angle of `cosine`; returns whether that
@@ -587,12 +609,22 @@ impl ContactStore {
     /// cut off at that of the store.
     #[inline]
     pub fn near(&self, x: &Point3<f64>, reach: f64, mut each: impl FnMut(f64, u32)) {
+        self.near_known(x, reach, |distance_squared, index| {
+            if self.means[index as usize].weight > 0.0 {
+                each(distance_squared, index);
+            }
+        });
+    }
+
+    /// As [`Self::near`], but also those that are taken out of queries.
+    #[inline]
+    pub(super) fn near_known(&self, x: &Point3<f64>, reach: f64, mut each: impl FnMut(f64, u32)) {
         let limit = reach.min(self.reach).powi(2);
         for bin in around(cell_of(x, self.reach)) {
             for &index in self.nearby.get(&bin).into_iter().flatten() {
                 let mean = &self.means[index as usize];
                 let distance_squared = (mean.point - x).norm_squared();
-                if distance_squared < limit && mean.weight > 0.0 {
+                if distance_squared < limit {
                     each(distance_squared, index);
                 }
             }

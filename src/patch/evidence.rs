@@ -11,7 +11,7 @@ use crate::mesh::{FaceTree, TriMesh};
 /// How far each kind of evidence is believed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EvidenceParams {
-    /// radius of the ball, m
+    /// radius of the ball, or how large the tip is, m
     pub radius: f64,
     /// the fit of the contacts
     pub field: FieldParams,

@@ -3,22 +3,22 @@
 use nalgebra::{Point3, Vector3};
 
 use super::contact_sigma::CalibrationParams;
-use super::contact_store::{ContactStore, GateParams, Verdict};
+use super::contact_store::{ContactStore, GateParams};
 use super::delta::{PatchDelta, Shown};
 use super::evidence::{Evidence, EvidenceParams, ScanPrior, Source};
+use super::felt::Felt;
 use super::field::FieldScratch;
 use super::knocks::Knocks;
 use super::lattice::{CellBox, Lattice, Node, VertexKey};
 use super::remesh::{Remesh, Renewed};
 use super::restore::{News, Restored, node_at};
-use super::scan_value::ScanValue;
 use super::splice::Patch;
 use super::swept::SweptSpace;
-use super::table::Table;
-use super::touches::{Touch, TouchFinder, TouchFinderParams};
+use super::touches::{TouchFinder, TouchFinderParams};
+use super::unreachable::mark_unreachable;
 use super::vertex_sigma::vertex_sigma;
 use crate::mesh::{FaceTree, MeshError, TriMesh};
-use crate::touch::{Compensator, CompensatorParams, Sample, SettingError};
+use crate::touch::{Compensator, CompensatorParams, Sample, SettingError, TipBody, TipShape};
 
 /// Settings of a [`Patcher`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,6 +86,11 @@ impl PatcherParams {
         2 * self.touches.half_window_ns
     }
 
+    /// Radius of the tip when it is a ball, m.
+    fn ball(&self) -> Option<f64> {
+        (self.touches.shape == TipShape::Ball).then_some(self.touches.radius)
+    }
+
     /// When contacts are held apart.
     fn gate(&self) -> Option<GateParams> {
         self.uncertainty.map(|known| GateParams { sigmas: known.gate_sigmas, window_ns: self.window_ns() })
@@ -100,6 +105,17 @@ impl PatcherParams {
     /// How touches are found; what calibration leaves is asked for with the rest.
     fn finder_params(&self) -> TouchFinderParams {
         TouchFinderParams { calibration: self.uncertainty.map(|known| known.calibration), ..self.touches }
+    }
+
+    /// Settings for a tip of `shape` whose ball, flat end or nose has `radius` (m), else as [`Self::new`]. How far evidence
+    /// is believed goes by the size of what the tip can show.
+    ///
+    /// # Errors
+    /// [`SettingError`] for sizes of which no tip can be made.
+    pub fn for_tip(shape: TipShape, radius: f64, stiffness: Option<f64>, noise: f64) -> Result<Self, SettingError> {
+        let mut params = Self::new(TipBody::new(shape, radius)?.scale(), stiffness, noise);
+        (params.touches.shape, params.touches.radius) = (shape, radius);
+        Ok(params)
     }
 
     /// # Errors
@@ -125,6 +141,8 @@ pub enum Support {
     Touched,
     /// what touches, free space and scan nearby suggest; nothing was felt here
     Guessed,
+    /// as that, and nothing can be felt here: the ball does not go so far into an inner corner, or into what is narrower
+    Unreachable,
 }
 
 /// A scan with its touched part meshed anew.
@@ -178,45 +196,7 @@ pub struct Patcher {
     compensator: Compensator,
     finder: TouchFinder,
     felt: Felt,
-    /// the box around the scan in which contacts may be its own, once the scan is known
-    bounds: Option<[Point3<f64>; 2]>,
     live: Option<Live>,
-}
-
-/// All that was felt.
-#[derive(Clone, Debug)]
-struct Felt {
-    contacts: ContactStore,
-    swept: SweptSpace,
-    /// of the ball, m
-    radius: f64,
-    /// stamp of the last touch that counts, ns
-    until_ns: i64,
-    last_contact_ns: Option<i64>,
-}
-
-/// A pause longer than this parts two strokes, ns.
-const STROKE_PAUSE: i64 = 100_000_000;
-
-impl Felt {
-    fn keep(&mut self, touch: &Touch) {
-        if touch.contact.is_some() {
-            if self.last_contact_ns.is_none_or(|last| touch.stamp_ns - last > STROKE_PAUSE) {
-                self.contacts.begin_stroke();
-                self.swept.begin_stroke();
-            }
-            self.last_contact_ns = Some(touch.stamp_ns);
-        }
-        match touch.contact.as_ref().map(|contact| (contact, self.contacts.add(contact))) {
-            None | Some((_, Verdict::Taken)) => self.swept.add(&touch.centre),
-            Some((_, Verdict::HeldApart)) => {}
-            Some((contact, Verdict::Insisted)) => {
-                self.swept.forget(&contact.point, FORGOTTEN * self.radius);
-                self.swept.add(&touch.centre);
-            }
-        }
-        self.until_ns = touch.stamp_ns;
-    }
 }
 
 /// The patch that a mesh follows.
@@ -257,16 +237,6 @@ impl Live {
 const CONTACT_CELL: f64 = 1.0 / 3.0;
 /// Edge of the cells of one centre, in radii.
 const SWEPT_CELL: f64 = 0.1;
-/// A contact that the ball went into by more than this is none, in radii: four times the noise of a usual tracker.
-const REFUTED_DEPTH: f64 = 0.133;
-/// Where touches insist, the ball has been nearer than this to what was believed before, in radii.
-const FORGOTTEN: f64 = 1.1;
-/// A contact farther outside of the scan than this belongs to something else, in radii.
-const OUTSIDE: f64 = 4.0;
-/// Normals within this many radii …
-const FAN_WIDTH: f64 = 0.4;
-/// … that differ by more than 25° are those of an edge.
-const FAN_COSINE: f64 = 0.906;
 /// A budget below this many faces is none: a box has twelve.
 const LEAST_BUDGET: f64 = 5000.0;
 /// Rounds in which the lattice is made coarser to keep the budget.
@@ -285,14 +255,16 @@ impl Patcher {
         Ok(Self {
             compensator: Compensator::new(params.compensator)?,
             finder: TouchFinder::new(params.finder_params())?,
-            felt: Felt {
-                contacts: ContactStore::new(CONTACT_CELL * radius, params.evidence.field.reach, params.gate()),
-                swept: SweptSpace::new(SWEPT_CELL * radius, 5.0 / 3.0 * radius),
+            felt: Felt::new(
+                ContactStore::new(CONTACT_CELL * radius, params.evidence.field.reach, params.gate()),
+                SweptSpace::of_tip(
+                    TipBody::new(params.touches.shape, params.touches.radius)?,
+                    SWEPT_CELL * radius,
+                    5.0 / 3.0 * radius,
+                ),
                 radius,
-                until_ns: i64::MIN,
-                last_contact_ns: None,
-            },
-            bounds: None,
+                params.ball(),
+            ),
             live: None,
             params,
         })
@@ -316,6 +288,11 @@ impl Patcher {
         finder.push(&tip, |touch| felt.keep(&touch));
     }
 
+    /// What was touched, as it was kept.
+    pub fn contacts(&self) -> &ContactStore {
+        &self.felt.contacts
+    }
+
     /// Takes in what is still in the smoothing window: the stream has ended or pauses.
     pub fn flush(&mut self) {
         let Self { finder, felt, .. } = self;
@@ -325,37 +302,30 @@ impl Patcher {
     /// How many strokes can be undone. A stroke is what was touched without a pause of a tenth of a second, and where the
     /// ball went after it.
     pub fn strokes(&self) -> usize {
-        self.felt.contacts.strokes().min(self.felt.swept.strokes())
+        self.felt.strokes()
     }
 
     /// Takes the last stroke back, up to the last sample: what counts is bit by bit what counted before it. Returns whether
     /// there was one. What the samples told of friction and bias stays.
     pub fn undo(&mut self) -> bool {
         self.flush();
-        let can_undo = self.strokes() > 0;
-        if can_undo {
-            self.felt.contacts.undo();
-            self.felt.swept.undo();
-            self.start_over();
-        }
-        can_undo
+        let has_undone = self.felt.undo();
+        self.start_over(has_undone);
+        has_undone
     }
 
     /// Does the stroke again that was undone last, bit by bit, unless something was touched since. Returns whether there was
     /// one.
     pub fn redo(&mut self) -> bool {
-        let has_redone = self.felt.contacts.redo() && self.felt.swept.redo();
-        if has_redone {
-            self.start_over();
-        }
+        let has_redone = self.felt.redo();
+        self.start_over(has_redone);
         has_redone
     }
 
-    /// What is touched next begins a stroke, and the next renewal meshes everything anew.
-    fn start_over(&mut self) {
-        self.felt.last_contact_ns = None;
+    /// The next renewal meshes everything anew.
+    fn start_over(&mut self, is_outdated: bool) {
         if let Some(live) = &mut self.live {
-            live.is_outdated = true;
+            live.is_outdated |= is_outdated;
         }
     }
 
@@ -376,6 +346,9 @@ impl Patcher {
             if let Some(id) = id {
                 support[id.0 as usize] = support_of(&key, remesh.restored());
             }
+        }
+        if let Some(radius) = self.params.ball() {
+            mark_unreachable(&mesh, &mut support, &self.felt.swept, radius)?;
         }
         let sigma = self.sigma(scan, tree, &mesh, &support);
         Ok(Patched {
@@ -433,47 +406,18 @@ impl Patcher {
         PatchDelta { until_ns: self.felt.until_ns, ..delta }
     }
 
-    /// Decides which contacts count and which are those of an edge, where anything came since it was last decided.
     fn settle(&mut self, scan: &TriMesh, tree: &FaceTree) {
-        let Self { felt: Felt { contacts, swept, .. }, params, .. } = self;
-        let radius = params.evidence.radius;
-        let (deepest, outside) = (radius * (1.0 - REFUTED_DEPTH), OUTSIDE * radius);
-        let bounds = *self.bounds.get_or_insert_with(|| bounds_of(scan, outside));
-        let mut changed: Table<u32, ()> = contacts.take_changed().into_iter().collect();
-        let centres = swept.take_changed();
-        let mut doubtful = changed.clone();
-        for centre in &centres {
-            contacts.near(centre, deepest, |_, at| add(&mut doubtful, at));
-        }
-        for (at, ()) in doubtful.iter() {
-            let point = contacts.means()[at as usize].point;
-            let is_refuted = swept.nearest(&point).is_some_and(|(distance, _)| distance < deepest)
-                || is_elsewhere(&point, scan, tree, &bounds, outside);
-            if contacts.refute(at, is_refuted) {
-                add(&mut changed, at);
-            }
-        }
-        let mut beside = changed.clone();
-        for (at, ()) in changed.iter() {
-            // the width, and how far a mean can have moved within its cell
-            contacts.near(&contacts.means()[at as usize].point, 2.0 * FAN_WIDTH * radius, |_, other| {
-                add(&mut beside, other)
-            });
-        }
-        for (at, ()) in beside.iter() {
-            if contacts.mark_fan(at, FAN_WIDTH * radius, FAN_COSINE) {
-                add(&mut changed, at);
-            }
-        }
+        let news = self.felt.settle(scan, tree);
         if let Some(live) = &mut self.live {
-            live.news.means.extend(changed.iter().map(|(at, ())| contacts.means()[at as usize].point));
-            live.news.centres.extend(centres);
+            live.news.extend(&news);
         }
     }
 
     fn all_news(&self) -> News {
         let means = self.felt.contacts.means().iter().map(|mean| mean.point).collect();
-        News { means, centres: self.felt.swept.centres().copied().collect() }
+        let mut centres = Vec::new();
+        self.felt.swept.cover(|centre| centres.push(*centre));
+        News { means, centres }
     }
 
     fn evidence<'a>(&'a self, scan: &'a TriMesh, tree: &'a FaceTree) -> Evidence<'a> {
@@ -507,25 +451,8 @@ impl Patcher {
     }
 }
 
-fn add(numbers: &mut Table<u32, ()>, number: u32) {
-    numbers.insert_with(number, || ());
-}
-
 fn lattice_of(pitch: f64) -> Lattice {
     Lattice { origin: Point3::from(Vector3::from(ORIGIN) * pitch), pitch }
-}
-
-/// The box around the scan, wider by `margin` (m).
-fn bounds_of(scan: &TriMesh, margin: f64) -> [Point3<f64>; 2] {
-    let empty = [Point3::from(Vector3::repeat(f64::INFINITY)), Point3::from(Vector3::repeat(f64::NEG_INFINITY))];
-    let [lo, hi] = scan.positions().iter().fold(empty, |[lo, hi], p| [lo.inf(p), hi.sup(p)]);
-    [lo - Vector3::repeat(margin), hi + Vector3::repeat(margin)]
-}
-
-/// Whether a contact is so far outside that the part of the scan cannot have been touched there.
-fn is_elsewhere(p: &Point3<f64>, scan: &TriMesh, tree: &FaceTree, bounds: &[Point3<f64>; 2], reach: f64) -> bool {
-    let is_within = bounds[0].inf(p) == bounds[0] && bounds[1].sup(p) == bounds[1];
-    !is_within || ScanValue::at(scan, tree, p).is_none_or(|scan| scan.value > reach)
 }
 
 /// A vertex is touched when most of the corners of its cell are near the surface that was; those on the scan are its own.

@@ -125,9 +125,10 @@ impl Restored {
         if !self.nodes.is_empty() {
             let p = evidence.params;
             self.look_near(lattice, &news.means, NEAR * p.radius, &mut look);
-            self.look_near(lattice, &news.centres, p.radius, &mut look);
+            let cover = evidence.swept.cover_radius(p.radius);
+            self.look_near(lattice, &news.centres, cover, &mut look);
             self.look_near(lattice, &late.means, p.field.reach.max(p.scan_removal + p.scan_reach), &mut look);
-            self.look_near(lattice, &late.centres, p.radius + p.swept_reach + p.scan_reach, &mut look);
+            self.look_near(lattice, &late.centres, cover + p.swept_reach + p.scan_reach, &mut look);
             self.look_at_ends(evidence, lattice, late, &mut look);
         }
         self.widen(evidence, lattice, news, &mut look);
@@ -302,7 +303,8 @@ impl Restored {
     ) {
         let radius = evidence.params.radius;
         let around_contact = ball((REACH * radius / lattice.pitch).ceil() as i32);
-        let around_ball = ball((radius / lattice.pitch + BALL_MARGIN).ceil() as i32);
+        let cover = evidence.swept.cover_radius(radius);
+        let around_ball = ball((cover / lattice.pitch + BALL_MARGIN).ceil() as i32);
         let mut add = |cell: &Node, offsets: &[Node]| {
             for node in offsets.iter().map(|offset| moved(cell, offset)) {
                 if !self.nodes.contains(&node) {
@@ -317,7 +319,7 @@ impl Restored {
         }
         for centre in &news.centres {
             let cell = lattice.cell_of(centre);
-            let is_near = || evidence.tree.closest(evidence.scan, centre, radius + lattice.pitch).is_some();
+            let is_near = || evidence.tree.closest(evidence.scan, centre, cover + lattice.pitch).is_some();
             if !self.swept.contains(&cell) && is_near() {
                 self.swept.insert_with(cell, || ());
                 add(&cell, &around_ball);

@@ -11,14 +11,16 @@ use nalgebra::{Point3, Vector3};
 use super::contact_sigma::{CalibrationParams, ContactSigma, ForceNoise};
 use crate::touch::{
     BiasParams, BiasTracker, ContactGate, ContactGateParams, FeltNormal, Friction, FrictionCoefficient, LocalMotion,
-    Motion, SettingError, Sliding, Tip,
+    Motion, SettingError, Sliding, Tip, TipBody, TipContact, TipPlace, TipShape,
 };
 
 /// How touches are found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TouchFinderParams {
-    /// radius of the ball, m
+    /// radius of the ball, of the flat end or of the nose, m
     pub radius: f64,
+    /// which tip it is
+    pub shape: TipShape,
     /// what stylus and probe give way under force, N/m; `None`: rigid
     pub stiffness: Option<f64>,
     /// tells contact from free motion
@@ -41,6 +43,7 @@ impl TouchFinderParams {
     pub fn new(radius: f64, stiffness: Option<f64>) -> Self {
         Self {
             radius,
+            shape: TipShape::Ball,
             stiffness,
             gate: ContactGateParams::default(),
             half_window_ns: 32_000_000,
@@ -74,7 +77,9 @@ pub struct Touch {
     pub stamp_ns: i64,
     /// centre of the real ball, m, in O
     pub centre: Point3<f64>,
-    /// `None` in free motion
+    /// from the tip to the handle, unit, in O
+    pub axis: Vector3<f64>,
+    /// `None` in free motion, and where it is not known which point of the tip touches
     pub contact: Option<Contact>,
 }
 
@@ -82,6 +87,7 @@ pub struct Touch {
 struct Entry {
     stamp_ns: i64,
     centre: Point3<f64>,
+    axis: Vector3<f64>,
     force_o: Vector3<f64>,
     in_contact: bool,
 }
@@ -90,6 +96,7 @@ struct Entry {
 #[derive(Clone, Debug)]
 pub struct TouchFinder {
     params: TouchFinderParams,
+    body: TipBody,
     gate: ContactGate,
     bias: BiasTracker,
     friction: Friction,
@@ -103,10 +110,11 @@ pub struct TouchFinder {
 
 impl TouchFinder {
     /// # Errors
-    /// [`SettingError`] of the gate.
+    /// [`SettingError`] of the gate and of the tip.
     pub fn new(params: TouchFinderParams) -> Result<Self, SettingError> {
         Ok(Self {
             gate: ContactGate::new(params.gate)?,
+            body: TipBody::new(params.shape, params.radius)?,
             params,
             bias: BiasTracker::new(BiasParams { free: FREE_SHARE * params.gate.on, ..BiasParams::default() })?,
             friction: Friction::new(params.cone_cosine.clamp(-1.0, 1.0).acos()),
@@ -127,9 +135,11 @@ impl TouchFinder {
             self.shake.note(&last.force_o, &force_o);
         }
         let bend = self.params.stiffness.map_or_else(Vector3::zeros, |stiffness| force_o / stiffness);
+        let TipPlace { centre, axis } = TipPlace::from(&tip.pose_ot);
         self.held.push_back(Entry {
             stamp_ns: tip.stamp_ns,
-            centre: Point3::from(tip.pose_ot.translation.vector + bend),
+            centre: centre + bend,
+            axis,
             force_o,
             in_contact: self.gate.update(tip.stamp_ns, &force_o).is_some(),
         });
@@ -164,16 +174,17 @@ impl TouchFinder {
         let motion = window.sums.motion();
         let velocity_sigma = motion.velocity_gain * self.noise.sigma * SHARED_NOISE;
         let sliding = Sliding { force_o: window.force / window.count(), velocity: motion.velocity, velocity_sigma };
+        let place = TipPlace { centre: motion.centre, axis: self.held[at].axis };
         let mut contact = None;
         if window.is_alike && self.held[at].in_contact {
             let dt = if at > 0 { self.held[at].stamp_ns - self.held[at - 1].stamp_ns } else { 0 };
             self.friction.observe(&sliding, dt as f64 * 1e-9);
             let found = self.friction.normal(&sliding);
-            contact = found.map(|felt| self.contact(self.held[at].stamp_ns, &motion, &sliding.force_o, &felt));
+            contact = found.and_then(|felt| self.contact(at, &motion, &sliding.force_o, &felt));
         } else {
             self.friction.lift();
         }
-        Touch { stamp_ns: self.held[at].stamp_ns, centre: motion.centre, contact }
+        Touch { stamp_ns: self.held[at].stamp_ns, centre: place.centre, axis: place.axis, contact }
     }
 
     /// The longest window around a sample over which the path is a parabola and contact does not change; the shortest in
@@ -203,10 +214,12 @@ impl TouchFinder {
         if excess.is_finite() { excess } else { 0.0 }
     }
 
-    fn contact(&self, stamp_ns: i64, motion: &Motion, force_o: &Vector3<f64>, felt: &FeltNormal) -> Contact {
-        let FeltNormal { normal, sigma } = *felt;
-        let mut weight = 1.0 / (1.0 + (sigma / self.params.uncertain_normal).powi(2));
-        let point = motion.centre - normal * self.params.radius;
+    fn contact(&self, at: usize, motion: &Motion, force_o: &Vector3<f64>, felt: &FeltNormal) -> Option<Contact> {
+        let Entry { stamp_ns, axis, .. } = self.held[at];
+        let place = TipPlace { centre: motion.centre, axis };
+        let TipContact { point, normal, is_vague } = self.body.touched(&place, &felt.normal, felt.sigma)?;
+        let share = if is_vague { VAGUE } else { 1.0 };
+        let mut weight = share / (1.0 + (felt.sigma / self.params.uncertain_normal).powi(2));
         let sigma = self.params.calibration.map_or_else(ContactSigma::default, |calibration| {
             weight /= 1.0 + self.roughness(motion);
             let softness = self.params.stiffness.map_or(0.0, |stiffness| 1.0 / stiffness);
@@ -214,14 +227,16 @@ impl TouchFinder {
                 &calibration,
                 [self.noise.sigma, self.shake.sigma() * softness].map(|noise| noise * motion.centre_gain.sqrt()),
                 force_o.dot(&normal) * softness,
-                sigma,
+                felt.sigma,
                 self.params.radius,
             )
         });
-        Contact { point, normal, weight, stamp_ns, sigma }
+        Some(Contact { point, normal, weight, stamp_ns, sigma })
     }
 }
 
+/// What a contact counts of which it is not known how far up the side of the tip it was.
+const VAGUE: f64 = 0.25;
 /// Halves of the windows that are tried, in eighths of the longest.
 const WINDOWS: [i64; 4] = [3, 4, 6, 8];
 /// A path whose residuals are so many times the noise is no parabola any more.

@@ -4,6 +4,7 @@
 //! region around it, update of the tree. [`RefineParams::robust`] is what works on real scans, [`RefineParams::paper`]
 //! the published rule.
 
+mod carve;
 mod collision;
 mod deform;
 pub mod dynamics;
@@ -29,12 +30,18 @@ pub use sliding::{Ball, SlidingParams, TipMotion};
 
 use crate::mesh::{FaceHit, FaceId, MeshError, TriMesh, VertexId};
 use crate::patch::PatchDelta;
-use crate::touch::{BiasTracker, Compensator, ContactGate, FrictionCoefficient, Sample, SampleError, SettingError};
+use crate::touch::{
+    BiasTracker, Compensator, ContactGate, FrictionCoefficient, Sample, SampleError, SettingError, TipBody, TipPlace,
+};
+use carve::InsideScratch;
 use deform::{DeformableMesh, HandleRegion};
 use dynamics::turn;
 
 /// A held sample never acts for longer than this, s: what happened in a longer pause is not known.
 const LONGEST_HOLD: f64 = 0.03;
+
+/// The felt normal of one sample is uncertain by this, rad: a flat tip that may lie on its face does.
+const FLUSH: f64 = 0.05;
 
 /// Why a sample was refused, or a refiner not built. A refused sample does not change the mesh.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -160,6 +167,10 @@ pub struct Refiner {
     deformable: DeformableMesh,
     contact_region: HandleRegion,
     carve_region: HandleRegion,
+    body: TipBody,
+    /// from the tip to the handle, unit, in O; a ball needs none
+    axis: Vector3<f64>,
+    inside: InsideScratch,
     last_ns: Option<i64>,
     /// the handle and n*(0), its normal when it became the handle (Eq 6)
     begun: Option<(FaceId, Vector3<f64>)>,
@@ -204,6 +215,9 @@ impl Refiner {
             contact_region: deformable.region(params.roi),
             carve_region: deformable.region(RoiSize::Handle),
             deformable,
+            body: TipBody::new(params.shape, params.tip.radius)?,
+            axis: Vector3::z(),
+            inside: InsideScratch::new(),
             last_ns: None,
             begun: None,
             counts: RefineCounts::default(),
@@ -242,6 +256,9 @@ impl Refiner {
             tip.force_o = bias.compensate(&tip);
         }
         let ball = self.motion.update(&tip, dt, LONGEST_HOLD);
+        if !self.body.is_ball() {
+            self.axis = TipPlace::from(&tip.pose_ot).axis;
+        }
         let dt = dt.min(LONGEST_HOLD);
         let felt = self.felt_normal(sample.stamp_ns, &ball, dt);
         let update = match felt {
@@ -303,12 +320,12 @@ impl Refiner {
 
     /// The ball against `handle`, else against the face that it touches; `None` beyond the reach.
     fn pressing(&self, ball: &Ball, felt: Felt, handle: Option<FaceId>) -> Option<Pressing> {
-        let (mesh, tip) = (&self.deformable.mesh, &self.params.tip);
-        let reach = self.deformable.largest_move + tip.radius;
+        let mesh = &self.deformable.mesh;
+        let reach = self.deformable.largest_move + self.params.tip.radius;
         // the spring expects the deflection F/k of the tip, a rigid contact does not
         let centre = if self.params.dynamics.take_out_rigid_offset { ball.centre } else { ball.reported };
         let seek = match felt {
-            Felt::Surface(normal) => centre - normal * tip.radius,
+            Felt::Surface(normal) => self.touching_point(centre, &normal),
             _ => centre,
         };
         let closest = || match self.params.closest {
@@ -322,10 +339,19 @@ impl Refiner {
                 Pressing { handle, face, normal, point: seek, force_o: normal * ball.force_o.dot(&normal) }
             }
             _ => {
-                let point = centre - face.n * tip.radius;
+                let point = self.touching_point(centre, &face.n);
                 Pressing { handle, face, normal: face.n, point, force_o: ball.force_o }
             }
         })
+    }
+
+    /// The point of the tip that touches a surface of this outward normal, m, in O.
+    fn touching_point(&self, centre: Point3<f64>, normal: &Vector3<f64>) -> Point3<f64> {
+        let place = TipPlace { centre, axis: self.axis };
+        match self.body.touched(&place, normal, FLUSH) {
+            Some(touched) => touched.point,
+            None => self.body.support(&place, &-normal),
+        }
     }
 
     fn mismatch(&self, pressing: &Pressing) -> Mismatch {
@@ -357,47 +383,6 @@ impl Refiner {
             let length = step.norm();
             if length > longest { step * (longest / length) } else { step }
         })
-    }
-
-    /// Case 2: what the ball passes through is not there.
-    fn carve(&mut self, carve: &CarveParams, ball: &Ball, felt: Felt, dt: f64, update: Update) -> Update {
-        let centre = ball.centre;
-        // a mesh that the ball does not enter by more than the tolerance is left alone
-        let (tolerance, hint) = match felt {
-            Felt::Nothing => (carve.tolerance, self.carve_region.handle()),
-            _ => (carve.contact_tolerance.max(carve.tolerance), self.contact_region.handle()),
-        };
-        let reach = self.params.tip.radius - tolerance;
-        let Some(hit) = self.deformable.closest(&centre, hint, reach) else { return update };
-        if self.deformable.is_stiff(hit.face) {
-            return update;
-        }
-        let Some((away, depth)) = self.penetration(&centre, &hit) else { return update };
-        let share = -(-carve.rate * dt).exp_m1();
-        let way =
-            (share * (depth - carve.tolerance)).min(2.0 * self.params.longest_step_edges * self.deformable.mean_edge);
-        let weight: f64 = hit.barycentric.iter().map(|x| x * x).sum();
-        let steps = hit.barycentric.map(|x| -away * (way * x / weight));
-        let fit = self.deformable.deform(&mut self.carve_region, hit.face, RoiSize::Handle, &steps);
-        self.count(fit);
-        match update.case {
-            Case::Free => Update { case: Case::MeshOnly, mismatch: None, fit: Some(fit) },
-            _ => update,
-        }
-    }
-
-    /// Which way the ball stands out of the mesh, and how deep it is in it, m.
-    fn penetration(&self, centre: &Point3<f64>, hit: &FaceHit) -> Option<(Vector3<f64>, f64)> {
-        let normal = self.deformable.mesh.normal(hit.face);
-        let arm = centre - hit.point;
-        let distance = arm.norm();
-        let height = arm.dot(&normal);
-        if normal == Vector3::zeros() {
-            return None;
-        }
-        // beside a rim the arm says little about inside and outside
-        let away = if height.abs() <= SIDEWAYS * distance { normal } else { arm * (height.signum() / distance) };
-        Some((away, self.params.tip.radius - distance.copysign(height)))
     }
 
     /// Makes ready to follow a patch, with room for so many new faces: more are taken in all the same, with a pause.
@@ -486,6 +471,3 @@ impl Refiner {
         self.contact_region.vertices()
     }
 }
-
-/// An arm whose sine to the face is below this lies sideways.
-const SIDEWAYS: f64 = 0.2;

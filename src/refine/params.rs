@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::guard::GuardParams;
 use super::{Along, ContactModel, DynamicsParams, RoiSize, SlidingParams, StepRule};
-use crate::touch::{BiasParams, CompensatorParams, ContactGateParams, SettingError};
+use crate::touch::{BiasParams, CompensatorParams, ContactGateParams, SettingError, TipBody, TipShape};
 
 /// The ball at the end of stylus or probe.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,8 +67,10 @@ pub struct RefineParams {
     pub bias: Option<BiasParams>,
     /// `None`: every sample is contact \[paper\].
     pub gate: Option<ContactGateParams>,
-    /// The ball.
+    /// Size and stiffness of the tip.
     pub tip: TipParams,
+    /// Which tip it is: a ball in both presets.
+    pub shape: TipShape,
     /// Smoothing and friction; `None`: the sample as it is, and the force taken for the normal.
     pub sliding: Option<SlidingParams>,
     /// Where on the ball the contact is.
@@ -135,6 +137,7 @@ impl RefineParams {
             bias: None,
             gate: Some(ContactGateParams::default()),
             tip,
+            shape: TipShape::Ball,
             sliding: Some(SlidingParams::default()),
             touch_point: TouchPoint::FeltNormal,
             closest: ClosestBy::Surface,
@@ -183,6 +186,7 @@ impl RefineParams {
     /// # Errors
     /// [`SettingError`] naming the first setting outside its range.
     pub fn check(&self) -> Result<(), SettingError> {
+        TipBody::new(self.shape, self.tip.radius)?;
         let carve = self.carve.unwrap_or_default();
         let sliding = self.sliding.unwrap_or_default();
         let roi = if let RoiSize::Radius(radius) = self.roi { radius } else { 0.0 };
@@ -195,7 +199,6 @@ impl RefineParams {
             ("guard's fold (cosine)", guard.smallest_fold_cosine),
         ];
         let not_negative = [
-            ("tip radius (m)", self.tip.radius),
             ("scan noise (m)", self.scan_noise),
             ("turning (1/s)", self.turning.unwrap_or(0.0)),
             ("region of interest (m)", roi),

@@ -16,8 +16,8 @@ use error::yaml_error;
 use sections::named;
 pub use sections::{
     AlongName, BiasSection, BiasTrackingSection, CarveSection, CompensationSection, ContactSection, GuardSection,
-    MarkersSection, Mode, ModelName, PatchSection, PayloadSection, RefineSection, ScanSection, SlidingSection,
-    StepName, SyncSection, TipSection, UncertaintySection,
+    MarkersSection, Mode, ModelName, PatchSection, PayloadSection, RefineSection, ScanSection, ShapeName,
+    SlidingSection, StepName, SyncSection, TipSection, UncertaintySection,
 };
 
 /// The parts of a scene. `None`: not built.
@@ -142,7 +142,7 @@ impl Scene {
             });
         }
         if self.patch.is_some() {
-            if self.tip.as_ref().is_none_or(|tip| tip.radius_mm <= 0.0) {
+            if self.tip.as_ref().is_none_or(|tip| tip.radius_mm <= 0.0 && tip.shape != ShapeName::Cone) {
                 return Err(SceneError::Incomplete { key: "patch", needs: "tip.radius_mm above 0" });
             }
             if self.contact.is_none() {

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
 use super::{
-    AlongName, CarveSection, GuardSection, Mode, ModelName, RefineSection, Scene, SlidingSection, StepName,
+    AlongName, CarveSection, GuardSection, Mode, ModelName, RefineSection, Scene, SlidingSection, StepName, TipSection,
     UncertaintySection,
 };
 use crate::patch::{CalibrationParams, PatcherParams, UncertaintyParams};
@@ -13,7 +13,7 @@ use crate::refine::{
 };
 use crate::touch::{
     BiasParams, CompensatorParams, ContactGateParams, MarkerBody, MarkerFilter, MarkerParams, Payload, SettingError,
-    SpringParams, SyncParams, Wrench, WrenchFrame,
+    SpringParams, SyncParams, TipBody, TipShape, Wrench, WrenchFrame,
 };
 
 impl Scene {
@@ -94,6 +94,11 @@ impl Scene {
         }
     }
 
+    /// Which tip touches.
+    pub fn tip_shape(&self) -> TipShape {
+        self.tip.as_ref().map_or(TipShape::Ball, TipSection::tip_shape)
+    }
+
     /// Settings of the refiner for a wrench that arrives in the axes of `wrench_frame`; `None` without `refine`.
     pub fn refine_params(&self, wrench_frame: WrenchFrame) -> Option<RefineParams> {
         let section = self.refine.as_ref()?;
@@ -107,6 +112,10 @@ impl Scene {
                 ..RefineParams::robust(self.tip_params())
             },
         };
+        params.shape = self.tip_shape();
+        if params.shape != TipShape::Ball {
+            params.roi = RoiSize::Radius(TipBody::new(params.shape, params.tip.radius).map_or(0.0, |tip| tip.scale()));
+        }
         params.guard = self.guard.as_ref().map(GuardSection::params);
         params.compensator = self.compensator_params(wrench_frame);
         params.scan_noise = self.scan.as_ref().map_or(0.0, |scan| scan.noise_mm / 1e3);
@@ -122,7 +131,10 @@ impl Scene {
             return None;
         }
         let (tip, noise) = (self.tip_params(), self.scan.as_ref().map_or(0.0, |scan| scan.noise_mm / 1e3));
-        let mut params = PatcherParams::new(tip.radius, tip.stiffness, noise);
+        let (shape, plain) = (self.tip_shape(), PatcherParams::new(tip.radius, tip.stiffness, noise));
+        // a tip that cannot be is refused by the patcher
+        let mut params = PatcherParams::for_tip(shape, tip.radius, tip.stiffness, noise).unwrap_or(plain);
+        params.touches.shape = shape;
         params.compensator = self.compensator_params(wrench_frame);
         params.touches.gate = self.contact_params()?;
         if let Some(sync) = &self.sync {

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::surface::{Surface, SurfacePoint};
+use super::tip::TipBall;
 
 /// Rounds of linearising the surface around the ball. Each gains a factor of about radius / step, so ten are usual.
 const ROUNDS: usize = 40;
@@ -22,7 +23,7 @@ const IDLE: f64 = 1e-6;
 pub struct BallContact {
     /// Point of the surface, m, in O.
     pub point: Point3<f64>,
-    /// From there to the centre of the ball, unit vector in O: the contact normal, also on edges and corners.
+    /// From there to the centre of the ball, or out of the tip, unit vector in O: the contact normal, also on edges and corners.
     pub normal: Vector3<f64>,
     /// How far the ball is held back along `normal` from where it was pushed, m.
     pub held_back: f64,
@@ -52,17 +53,32 @@ pub fn push_ball(
     to: &Point3<f64>,
     radius: f64,
 ) -> (Point3<f64>, Vec<BallContact>) {
+    push_balls(surface, from, to, &[TipBall { offset: Vector3::zeros(), radius }])
+}
+
+/// As [`push_ball`], for balls that are fixed to each other: `from`, `to` and the result are their common origin.
+pub(super) fn push_balls(
+    surface: &dyn Surface,
+    from: &Point3<f64>,
+    to: &Point3<f64>,
+    balls: &[TipBall],
+) -> (Point3<f64>, Vec<BallContact>) {
     let step = (to - from).norm();
-    let mut near = Vec::new();
+    let (mut near, mut planes) = (Vec::new(), Vec::new());
     let mut x = *to;
     for _ in 0..ROUNDS {
-        near.clear();
-        surface.near(&x, radius + 2.0 * step, &mut near);
-        let mut planes: Vec<Plane> = near.iter().filter_map(|s| plane(&x, s, radius)).collect();
+        planes.clear();
+        for ball in balls {
+            near.clear();
+            let middle = x + ball.offset;
+            surface.near(&middle, ball.radius + 2.0 * step, &mut near);
+            planes.extend(near.iter().filter_map(|s| plane(&middle, s, ball)));
+        }
         let next = nearest_in_front(&mut planes, to);
         let moved = (next - x).norm();
         x = next;
-        if moved <= REST && surface.signed_distance(&x) >= radius - REST {
+        let is_free = |ball: &TipBall| surface.signed_distance(&(x + ball.offset)) >= ball.radius - REST;
+        if moved <= REST && balls.iter().all(is_free) {
             return (x, contacts(&planes));
         }
     }
@@ -70,9 +86,10 @@ pub fn push_ball(
     (*from, Vec::new())
 }
 
-fn plane(x: &Point3<f64>, s: &SurfacePoint, radius: f64) -> Option<Plane> {
-    let normal = (x - s.point).try_normalize(0.0)?;
-    Some(Plane { point: s.point, normal, level: normal.dot(&s.point.coords) + radius, held_back: 0.0 })
+fn plane(middle: &Point3<f64>, s: &SurfacePoint, ball: &TipBall) -> Option<Plane> {
+    let normal = (middle - s.point).try_normalize(0.0)?;
+    let level = normal.dot(&s.point.coords) + ball.radius - normal.dot(&ball.offset);
+    Some(Plane { point: s.point, normal, level, held_back: 0.0 })
 }
 
 /// The point nearest to `to` in front of all planes, and in each plane's `held_back` how much it takes part.

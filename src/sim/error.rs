@@ -14,13 +14,18 @@ pub enum SimError {
         allowed: &'static str,
     },
     /// The path does not start in the open.
-    #[error("the path starts {clearance_m} m from the part, less than the ball's radius of {radius_m} m: start higher")]
+    #[error(
+        "the path starts {clearance_m} m from the part, less than the {radius_m} m of the tip around it: start higher"
+    )]
     StartsInside {
         /// m, from the surface to the start
         clearance_m: f64,
         /// m
         radius_m: f64,
     },
+    /// A tip that cannot be.
+    #[error(transparent)]
+    Tip(#[from] crate::touch::SettingError),
     /// Nothing to follow.
     #[error("the path has no point: give at least one stroke with two points")]
     EmptyPath,

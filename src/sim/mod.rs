@@ -18,6 +18,7 @@ mod scanner;
 mod sensor;
 mod stylus;
 mod surface;
+mod tip;
 mod triangulate;
 mod wander;
 

@@ -1,7 +1,7 @@
-//! A hand-held stylus: a ball tip led over a rigid surface, and what its sensors say.
+//! A hand-held stylus: a tip led over a rigid surface, and what its sensors say.
 //!
-//! The hand pulls the ball along [`Stroke`]s, presses, slows where it is blocked and climbs out of what it fell into.
-//! The ball does not enter the part ([`push_ball`]); what holds it back gives the direction of the force, the hand gives
+//! The hand pulls the tip, a ball unless said otherwise, along [`Stroke`]s, presses, slows where it is blocked and climbs
+//! out of what it fell into. The tip does not enter the part ([`super::push_ball`]); what holds it back gives the direction of the force, the hand gives
 //! its size, friction is added against the motion: F = N Σ w_i (n_i − μ t_i), Σ w_i = 1. The reported pose is that of a
 //! rigid stylus, so a tip of stiffness k makes it read centre − F/k.
 
@@ -9,19 +9,22 @@ use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 
-use super::ball::{BallContact, push_ball};
+use super::ball::BallContact;
 use super::error::{SimError, not_negative, positive, up_to};
 use super::path::Stroke;
 use super::sensor::{Sensor, SensorParams};
 use super::surface::Surface;
+use super::tip::SimTip;
 use super::wander::Wander;
-use crate::touch::Message;
+use crate::touch::{Message, TipShape};
 
 /// The stylus and the hand that leads it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StylusParams {
-    /// Ball radius, m.
+    /// Radius of the ball, of the flat end, or of the nose of the cone, m.
     pub radius: f64,
+    /// Which tip it is; its z points along the shaft. A sharp edge or nose is rounded by 0.05 mm.
+    pub shape: TipShape,
     /// Stiffness of the tip, N/m.
     pub stiffness: f64,
     /// Coefficient of friction.
@@ -45,6 +48,7 @@ impl Default for StylusParams {
     fn default() -> Self {
         Self {
             radius: 1.5e-3,
+            shape: TipShape::Ball,
             stiffness: 20e3,
             friction: 0.15,
             force: 2.5,
@@ -146,6 +150,7 @@ struct Leading<'a> {
     params: &'a StylusParams,
     hand: Hand,
     upright: UnitQuaternion<f64>,
+    tip: SimTip,
     centre: Point3<f64>,
     climbing: bool,
     firmness: f64,
@@ -165,10 +170,6 @@ pub fn touch(surface: &dyn Surface, path: &[Stroke], params: &StylusParams, seed
     let farthest = path.iter().flat_map(|s| &s.points).flat_map(|p| p.iter());
     farthest.copied().try_for_each(|x| not_negative("the size of a path's coordinate", x.abs(), "m"))?;
     let start = path.iter().flat_map(|s| &s.points).next().ok_or(SimError::EmptyPath)?;
-    let clearance_m = surface.signed_distance(start);
-    if clearance_m < params.radius {
-        return Err(SimError::StartsInside { clearance_m, radius_m: params.radius });
-    }
     let shaft = path.iter().find_map(|s| s.press).map_or_else(Vector3::z, |press| -press.into_inner());
     let upright = UnitQuaternion::rotation_between(&Vector3::z(), &shaft)
         .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
@@ -177,6 +178,7 @@ pub fn touch(surface: &dyn Surface, path: &[Stroke], params: &StylusParams, seed
         params,
         hand: Hand::new(seed),
         upright,
+        tip: SimTip::new(params.shape, params.radius, surface, start, upright)?,
         centre: *start,
         climbing: false,
         firmness: 0.0,
@@ -227,15 +229,22 @@ impl Leading<'_> {
         }
         let velocity = sink + (error * FOLLOW).cap_magnitude(TOP_SPEED);
         let to = self.centre + velocity * TICK;
-        let (centre, contacts) = push_ball(self.surface, &self.centre, &to, self.params.radius);
+        let orientation = self.orientation(t);
+        let (centre, contacts) = self.tip.push(self.surface, &self.centre, &to, orientation);
         let sliding = (centre - self.centre) / TICK;
         self.centre = centre;
-        self.note(t, sliding, contacts);
+        self.note(t, orientation, sliding, contacts);
         error.norm()
     }
 
+    /// The true orientation of the stylus.
+    fn orientation(&self, t: f64) -> UnitQuaternion<f64> {
+        let [x, y, z] = [0, 1, 2].map(|i| self.hand.tilt[i].at(t) * self.params.tilt);
+        self.upright * UnitQuaternion::from_scaled_axis(Vector3::new(x, y, z))
+    }
+
     /// Adds the moment's force and orientation to the record.
-    fn note(&mut self, t: f64, sliding: Vector3<f64>, contacts: Vec<BallContact>) {
+    fn note(&mut self, t: f64, orientation: UnitQuaternion<f64>, sliding: Vector3<f64>, contacts: Vec<BallContact>) {
         let p = self.params;
         let goal = if contacts.is_empty() { 0.0 } else { 1.0 };
         self.firmness += (goal - self.firmness) * (TICK / FIRM);
@@ -247,9 +256,7 @@ impl Leading<'_> {
             (c.normal - drag) * (c.held_back / total)
         };
         let force_o = contacts.iter().map(force).sum::<Vector3<f64>>() * (wanted * self.firmness);
-        let [x, y, z] = self.hand.tilt.map(|tilt| tilt.at(t) * p.tilt);
-        let tilt = UnitQuaternion::from_scaled_axis(Vector3::new(x, y, z));
-        let pose_ot = Isometry3::from_parts(self.centre.coords.into(), self.upright * tilt);
+        let pose_ot = Isometry3::from_parts(self.centre.coords.into(), orientation);
         self.moments.push(Moment { t, pose_ot, force_o, contacts });
     }
 }

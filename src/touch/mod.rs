@@ -2,7 +2,7 @@
 //!
 //! [`MarkerFilter`] makes the pose of the markers on the stylus, [`Synchroniser`] brings the two streams to one instant,
 //! [`Compensator`] takes weight and bias off and turns the force into the frame of the object, [`BiasTracker`] follows
-//! what drifts, [`ContactGate`] says whether the stylus touches. [`LocalMotion`] and [`Friction`] say how the ball slides
+//! what drifts, [`ContactGate`] says whether the stylus touches, [`TipBody`] with which of its points. [`LocalMotion`] and [`Friction`] say how the ball slides
 //! and which way the surface under it faces.
 
 mod bias;
@@ -14,6 +14,7 @@ mod local_motion;
 mod markers;
 mod stream;
 mod sync;
+mod tip_shape;
 
 pub use bias::{BiasParams, BiasTracker};
 pub use clock::{ClockEstimator, ClockOffset, ClockParams};
@@ -25,6 +26,7 @@ pub use markers::{
     MOST_MARKERS, MarkerBody, MarkerCounts, MarkerFilter, MarkerFrame, MarkerParams, SeenMarker, SpringParams, Tracking,
 };
 pub use sync::{SyncCounts, SyncParams, Synchroniser};
+pub use tip_shape::{TipBody, TipContact, TipPlace, TipShape};
 
 use nalgebra::{Isometry3, Vector3};
 

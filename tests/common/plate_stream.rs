@@ -1,8 +1,11 @@
 //! The demo plate scanned and touched: the samples that a program gets.
 
+use nalgebra::Isometry3;
 use touchup::mesh::TriMesh;
-use touchup::sim::{PathParams, Plate, ScannerParams, StylusParams, Touch, plan_demo, scan, touch};
-use touchup::touch::{Sample, SyncParams, Synchroniser};
+use touchup::sim::{
+    Lines, PathParams, Plate, Region, ScannerParams, Stroke, StylusParams, Touch, plan_demo, raster, scan, touch,
+};
+use touchup::touch::{Sample, SyncParams, Synchroniser, TipShape};
 
 /// A scan of the demo plate and what was felt on the plate.
 pub struct PlateStream {
@@ -12,13 +15,26 @@ pub struct PlateStream {
     pub samples: Vec<Sample>,
 }
 
+/// A ball or a flat end goes over the plate as in the demo; a cone, which would get stuck in holes, over it in two rasters
+/// that let it sink into them a little.
+fn path(stylus: &StylusParams) -> Vec<Stroke> {
+    let plate = Plate::default();
+    let hand = PathParams { radius: stylus.radius, ..PathParams::default() };
+    if !matches!(stylus.shape, TipShape::Cone { .. }) {
+        return plan_demo(&plate, &hand).unwrap();
+    }
+    let (low, high, frame_ov) = ([0.009, 0.008].into(), [0.065, 0.042].into(), Isometry3::identity());
+    let region = Region { frame_ov, low, high, floor: 8e-3, clear: 20e-3 };
+    let hand = PathParams { pitch: 1e-3, ..hand };
+    [Lines::AlongX, Lines::AlongY].iter().flat_map(|lines| raster(&region, *lines, &hand).unwrap()).collect()
+}
+
 /// With what the simulator knows of it.
 pub fn plate_stream(stylus: &StylusParams, seed: u64) -> (PlateStream, Touch) {
     let plate = Plate::default();
     let scanner = ScannerParams { seed, ..ScannerParams::default() };
-    let hand = PathParams { radius: stylus.radius, ..PathParams::default() };
     let scan = scan(&plate, &scanner).unwrap();
-    let touch = touch(&plate, &plan_demo(&plate, &hand).unwrap(), stylus, seed).unwrap();
+    let touch = touch(&plate, &path(stylus), stylus, seed).unwrap();
     let mut samples = Vec::new();
     let mut sync = Synchroniser::new(SyncParams::default()).unwrap();
     for message in &touch.messages {

@@ -1,0 +1,401 @@
+//! The tip that touches: a ball, the flat end of a cylinder, or a cone with a small nose.
+//!
+//! All three are bodies of revolution about z of the tip frame T, which points from the tip to the handle, and all are a
+//! *core* grown by a radius: a ball is a point, a flat end a cylinder, a cone a cone. The core is bounded by the half
+//! profile (0, z₀)–(a₀, z₀)–(a₁, z₁)–(0, z₁), so that one closed form serves all: the point farthest along a direction is
+//! that of the core and the radius on top, the distance is that from the core less the radius.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use super::SettingError;
+
+/// Which tip it is; its radius is a setting of its own.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum TipShape {
+    /// A ball; the origin of T is its centre.
+    #[default]
+    Ball,
+    /// The end of a cylinder of the tip's radius; the origin of T is the middle of its face.
+    Flat {
+        /// radius of the rounded edge, m; 0 for a sharp one
+        edge_radius: f64,
+        /// how far from the face the cylinder is known to reach, m
+        length: f64,
+    },
+    /// A cone whose nose is a ball of the tip's radius; the origin of T is the centre of that ball.
+    Cone {
+        /// between axis and flank, rad
+        half_angle: f64,
+        /// how far from the centre of the nose the cone is known to reach, m
+        length: f64,
+    },
+}
+
+/// Where a tip is: a body of revolution needs no more of its pose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TipPlace {
+    /// origin of T, m, in O
+    pub centre: Point3<f64>,
+    /// z of T: from the tip to the handle, unit, in O
+    pub axis: Vector3<f64>,
+}
+
+impl From<&Isometry3<f64>> for TipPlace {
+    fn from(pose_ot: &Isometry3<f64>) -> Self {
+        Self { centre: pose_ot.translation.vector.into(), axis: pose_ot.rotation * Vector3::z() }
+    }
+}
+
+/// Where a tip touches a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TipContact {
+    /// point of the surface, m, in O
+    pub point: Point3<f64>,
+    /// outward normal of the surface, unit, in O
+    pub normal: Vector3<f64>,
+    /// a whole line or face of the tip may touch, and this is the point of it nearest to the end of the tip
+    pub is_vague: bool,
+}
+
+/// A tip of known size and shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TipBody {
+    shape: TipShape,
+    radius: f64,
+    /// what the core is grown by, m
+    round: f64,
+    /// (a₀, z₀), m
+    low: [f64; 2],
+    /// (a₁, z₁), m
+    high: [f64; 2],
+    /// outward normal of the flank: away from the axis, along it
+    flank: [f64; 2],
+}
+
+/// A blunter cone is a flat tip, rad: 80°.
+const BLUNTEST: f64 = 80.0 * std::f64::consts::PI / 180.0;
+/// A more pointed cone is a needle, which bends, rad: 1°.
+const SHARPEST: f64 = std::f64::consts::PI / 180.0;
+/// What a sharp tip can show is limited by how close a hand leads it past itself, m.
+const HAND: f64 = 1e-3;
+/// A face or a line of the tip may touch as a whole when the normal is within so many standard deviations of it …
+const FLUSH_SIGMAS: f64 = 1.5;
+/// … but no less than this, rad: a degree, what an optical tracker leaves of the axis.
+const LEAST_FLUSH: f64 = 0.0175;
+
+/// What is off the axis by less than this share of its length is on it: below, rounding is all there is.
+const ON_AXIS: f64 = 1e-9;
+
+impl TipBody {
+    /// A ball of `radius` (m).
+    pub fn ball(radius: f64) -> Self {
+        Self { shape: TipShape::Ball, radius, round: radius, low: [0.0; 2], high: [0.0; 2], flank: [1.0, 0.0] }
+    }
+
+    /// A tip of `shape` with `radius` (m): of the ball, of the flat end, or of the nose of the cone.
+    ///
+    /// # Errors
+    /// [`SettingError`] for sizes of which no tip can be made.
+    pub fn new(shape: TipShape, radius: f64) -> Result<Self, SettingError> {
+        SettingError::check("tip radius (m)", radius, radius >= 0.0, "0 or more")?;
+        let (round, low, high) = match shape {
+            TipShape::Ball => return Ok(Self::ball(radius)),
+            TipShape::Flat { edge_radius, length } => {
+                SettingError::check("radius of a flat tip (m)", radius, radius > 0.0, "more than 0")?;
+                let is_edge = (0.0..=radius).contains(&edge_radius);
+                SettingError::check("edge radius of a flat tip (m)", edge_radius, is_edge, "0 to the tip's radius")?;
+                let is_length = length > edge_radius;
+                SettingError::check("length of a flat tip (m)", length, is_length, "more than its edge radius")?;
+                (edge_radius, [radius - edge_radius, edge_radius], [radius - edge_radius, length])
+            }
+            TipShape::Cone { half_angle, length } => {
+                let is_angle = (SHARPEST..=BLUNTEST).contains(&half_angle);
+                let allowed = "0.0175 to 1.396 (1° to 80°): a blunter tip is a flat one";
+                SettingError::check("half angle of a cone tip (rad)", half_angle, is_angle, allowed)?;
+                SettingError::check("length of a cone tip (m)", length, length > 0.0, "more than 0")?;
+                (radius, [0.0, 0.0], [length * half_angle.tan(), length])
+            }
+        };
+        let (across, along) = (high[0] - low[0], high[1] - low[1]);
+        let slant = across.hypot(along);
+        Ok(Self { shape, radius, round, low, high, flank: [along / slant, -across / slant] })
+    }
+
+    /// Which tip it is.
+    pub fn shape(&self) -> TipShape {
+        self.shape
+    }
+
+    /// Of the ball, of the flat end, or of the nose of the cone, m.
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    /// Whether it is a plain ball.
+    #[inline]
+    pub fn is_ball(&self) -> bool {
+        self.shape == TipShape::Ball
+    }
+
+    /// The size of what it can show, m: its radius, but for a cone with a sharp nose no less than a hand can lead it.
+    pub fn scale(&self) -> f64 {
+        match self.shape {
+            TipShape::Cone { .. } => self.radius.max(HAND),
+            _ => self.radius,
+        }
+    }
+
+    /// The tip's point farthest along `direction` (unit, in O), m, in O.
+    pub fn support(&self, place: &TipPlace, direction: &Vector3<f64>) -> Point3<f64> {
+        if self.is_ball() {
+            return place.centre + direction * self.round;
+        }
+        let (along, across, outward) = split(&place.axis, direction);
+        let height = |corner: &[f64; 2]| corner[0] * across + corner[1] * along;
+        let corner = if height(&self.high) > height(&self.low) { self.high } else { self.low };
+        place.centre + outward * corner[0] + place.axis * corner[1] + direction * self.round
+    }
+
+    /// Signed distance of `x` (m, in O) from the tip, m: negative inside.
+    #[inline]
+    pub fn signed_distance(&self, place: &TipPlace, x: &Point3<f64>) -> f64 {
+        if self.is_ball() { (x - place.centre).norm() - self.round } else { self.way_out(place, x).0 }
+    }
+
+    /// Signed distance of `x` (m, in O), and the direction in which it grows, unit, in O; zero where there is none.
+    pub fn way_out(&self, place: &TipPlace, x: &Point3<f64>) -> (f64, Vector3<f64>) {
+        let arm = x - place.centre;
+        let height = arm.dot(&place.axis);
+        let across = arm - place.axis * height;
+        let from_axis = across.norm();
+        let (distance, [out, up]) = self.core_distance([from_axis, height]);
+        let outward = across.try_normalize(ON_AXIS * self.radius).unwrap_or_else(|| across_of(&place.axis));
+        (distance - self.round, outward * out + place.axis * up)
+    }
+
+    /// Signed distance of a point of the half plane from the core, m, and its gradient there.
+    fn core_distance(&self, p: [f64; 2]) -> (f64, [f64; 2]) {
+        let Self { low, high, flank, .. } = self;
+        let sides = [
+            (low[1] - p[1], [0.0, -1.0]),
+            ((p[0] - low[0]) * flank[0] + (p[1] - low[1]) * flank[1], *flank),
+            (p[1] - high[1], [0.0, 1.0]),
+        ];
+        let deepest = if sides[1].0 > sides[0].0 { sides[1] } else { sides[0] };
+        let deepest = if sides[2].0 > deepest.0 { sides[2] } else { deepest };
+        if deepest.0 <= 0.0 {
+            return deepest;
+        }
+        let closest = [([0.0, low[1]], *low), (*low, *high), (*high, [0.0, high[1]])].map(|(a, b)| {
+            let (along, arm) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);
+            let length = (along[0] * along[0] + along[1] * along[1]).max(f64::MIN_POSITIVE);
+            let share = ((along[0] * arm[0] + along[1] * arm[1]) / length).clamp(0.0, 1.0);
+            [arm[0] - share * along[0], arm[1] - share * along[1]]
+        });
+        let arm = closest.into_iter().min_by(|a, b| a[0].hypot(a[1]).total_cmp(&b[0].hypot(b[1])));
+        let arm = arm.unwrap_or([0.0, 0.0]);
+        let distance = arm[0].hypot(arm[1]).max(f64::MIN_POSITIVE);
+        (distance, [arm[0] / distance, arm[1] / distance])
+    }
+
+    /// Where the tip touches a surface that faces `normal` (unit, in O), which is uncertain by `sigma` (rad).
+    ///
+    /// A flat end touches with its whole face where its axis may be the normal, else with the point of its rim; the side
+    /// of a cylinder may lie on a wall or lean on an edge. `None` where the flank of a cone or what is behind it touches:
+    /// where along it, the force does not say.
+    pub fn touched(&self, place: &TipPlace, normal: &Vector3<f64>, sigma: f64) -> Option<TipContact> {
+        let sharp = |point| Some(TipContact { point, normal: *normal, is_vague: false });
+        if self.is_ball() {
+            return sharp(place.centre - normal * self.round);
+        }
+        let (along, across, outward) = split(&place.axis, &-normal);
+        let flush = (FLUSH_SIGMAS * sigma).max(LEAST_FLUSH);
+        let lean = across.atan2(-along);
+        if lean < flush && self.low[0] > 0.0 {
+            let point = place.centre + place.axis * (self.low[1] - self.round);
+            return Some(TipContact { point, normal: place.axis, is_vague: false });
+        }
+        let is_vague = lean > self.flank[0].atan2(-self.flank[1]) - flush;
+        let is_beyond = lean > self.flank[0].atan2(-self.flank[1]) + flush;
+        if is_beyond || (is_vague && self.low[0] != self.high[0]) {
+            return None;
+        }
+        let point = place.centre + outward * self.low[0] + place.axis * self.low[1] - normal * self.round;
+        Some(TipContact { point, normal: *normal, is_vague })
+    }
+
+    /// Heights on the axis of balls of one radius that together cover the tip, and that radius, m.
+    pub fn cover(&self) -> (Vec<f64>, f64) {
+        if self.is_ball() {
+            return (vec![0.0], self.round);
+        }
+        let length = self.high[1] - self.low[1];
+        // finer than the tip is wide brings nothing, coarser covers what is beside it
+        let widest = self.low[0].max(self.high[0]);
+        let count = (length / (widest + self.round)).ceil().clamp(1.0, 64.0);
+        let half = 0.5 * length / count;
+        let heights = (0..count as usize).map(|i| self.low[1] + half * (2.0 * i as f64 + 1.0)).collect();
+        (heights, widest.hypot(half) + self.round)
+    }
+
+    /// Height on the axis of the middle of a ball that holds the tip, and its radius, m.
+    pub fn bound(&self) -> (f64, f64) {
+        let half = 0.5 * (self.high[1] - self.low[1]);
+        let widest = self.low[0].max(self.high[0]);
+        (self.low[1] + half, widest.hypot(half) + self.round)
+    }
+}
+
+/// A direction as its part along the axis, the size of that across it, and the direction of the latter.
+fn split(axis: &Vector3<f64>, direction: &Vector3<f64>) -> (f64, f64, Vector3<f64>) {
+    let along = direction.dot(axis);
+    let across = direction - axis * along;
+    let size = across.norm();
+    (along, size, if size > ON_AXIS { across / size } else { across_of(axis) })
+}
+
+/// Some unit vector across a unit vector.
+fn across_of(axis: &Vector3<f64>) -> Vector3<f64> {
+    let other = if axis.x.abs() < 0.5 { Vector3::x() } else { Vector3::y() };
+    axis.cross(&other).normalize()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::UnitQuaternion;
+
+    const FLAT: TipShape = TipShape::Flat { edge_radius: 0.2e-3, length: 5e-3 };
+    const CONE: TipShape = TipShape::Cone { half_angle: 0.5, length: 4e-3 };
+
+    fn bodies() -> [TipBody; 4] {
+        [
+            TipBody::ball(1.5e-3),
+            TipBody::new(FLAT, 2e-3).unwrap(),
+            TipBody::new(TipShape::Flat { edge_radius: 0.0, length: 3e-3 }, 2e-3).unwrap(),
+            TipBody::new(CONE, 0.4e-3).unwrap(),
+        ]
+    }
+
+    /// Directions all around, and places of a tip in them.
+    fn directions() -> Vec<Vector3<f64>> {
+        let turn = |i: i32| UnitQuaternion::from_euler_angles(f64::from(i), 1.7 * f64::from(i), 0.3);
+        (0..40).map(|i| turn(i) * Vector3::z()).collect()
+    }
+
+    fn place(axis: Vector3<f64>) -> TipPlace {
+        TipPlace { centre: Point3::new(1e-3, -2e-3, 3e-3), axis }
+    }
+
+    #[test]
+    fn the_support_point_is_on_the_tip_and_no_point_of_it_is_farther() {
+        for body in bodies() {
+            for axis in directions() {
+                let place = place(axis);
+                for direction in directions() {
+                    let farthest = body.support(&place, &direction);
+                    assert!(body.signed_distance(&place, &farthest).abs() < 1e-12, "{body:?}");
+                    // all of the tip is behind the plane there: a point in front of it is at least so far away
+                    let beyond = farthest + direction * 1e-3;
+                    assert!((body.signed_distance(&place, &beyond) - 1e-3).abs() < 1e-12);
+                    for other in directions() {
+                        let point = body.support(&place, &other);
+                        assert!((point - farthest).dot(&direction) < 1e-12);
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_distance_is_what_a_walk_to_the_surface_takes() {
+        for body in bodies() {
+            for (i, axis) in directions().into_iter().enumerate() {
+                let place = place(axis);
+                for (j, direction) in directions().into_iter().enumerate() {
+                    let x = place.centre + direction * (((7 * i + j) % 13) as f64 * 0.4e-3);
+                    let (distance, out) = body.way_out(&place, &x);
+                    let there = x - out * distance;
+                    assert!(body.signed_distance(&place, &there).abs() < 1e-9, "{body:?} {distance}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn sizes_by_hand() {
+        let up = TipPlace { centre: Point3::origin(), axis: Vector3::z() };
+        let [ball, flat, sharp, cone] = bodies();
+        assert_eq!(ball.support(&up, &-Vector3::z()), Point3::new(0.0, 0.0, -1.5e-3));
+        // the face is at z = 0, the side at 2 mm
+        assert!(flat.signed_distance(&up, &Point3::new(1e-3, 0.0, 0.0)).abs() < 1e-15);
+        assert!(flat.signed_distance(&up, &Point3::new(0.0, 2e-3, 3e-3)).abs() < 1e-15);
+        assert!((flat.signed_distance(&up, &Point3::new(0.0, 0.0, 1.5e-3)) + 1.5e-3).abs() < 1e-15);
+        assert!((sharp.signed_distance(&up, &Point3::new(2.3e-3, 0.0, -0.4e-3)) - 0.5e-3).abs() < 1e-15);
+        // 3 mm up, the flank stands 0.4 mm from a cone of 0.5 rad: tan 0.5 · 3 mm + 0.4 mm / cos 0.5
+        let flank = Point3::new(0.5f64.tan() * 3e-3 + 0.4e-3 / 0.5f64.cos(), 0.0, 3e-3);
+        assert!(cone.signed_distance(&up, &flank).abs() < 1e-15);
+        assert!(cone.signed_distance(&up, &Point3::new(0.0, 0.0, -0.4e-3)).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_flat_end_touches_with_its_face_or_with_its_rim() {
+        let flat = TipBody::new(TipShape::Flat { edge_radius: 0.0, length: 5e-3 }, 2e-3).unwrap();
+        let tilted = |degrees: f64| {
+            let axis = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), degrees.to_radians()) * Vector3::z();
+            flat.touched(&TipPlace { centre: Point3::origin(), axis }, &Vector3::z(), 2f64.to_radians())
+        };
+        let face = tilted(2.5).unwrap();
+        assert_eq!(face.point, Point3::origin());
+        assert!((face.normal.angle(&Vector3::z()).to_degrees() - 2.5).abs() < 1e-9);
+        // tilted by 10°, the rim at +x is 2 mm · sin 10° below the middle
+        let rim = tilted(10.0).unwrap();
+        assert!((rim.point - Point3::new(2e-3 * 0.984_808, 0.0, -2e-3 * 0.173_648)).norm() < 1e-8);
+        assert_eq!((rim.normal, rim.is_vague), (Vector3::z(), false));
+        // the side on a wall
+        assert!(tilted(88.0).unwrap().is_vague && !tilted(85.0).unwrap().is_vague);
+        assert_eq!(tilted(95.0), None, "the shaft, somewhere");
+    }
+
+    #[test]
+    fn a_cone_says_nothing_of_where_its_flank_touches() {
+        let cone = TipBody::new(CONE, 0.4e-3).unwrap();
+        let up = TipPlace { centre: Point3::origin(), axis: Vector3::z() };
+        let facing = |angle: f64| Vector3::new(-angle.sin(), 0.0, angle.cos());
+        let nose = cone.touched(&up, &facing(0.8), 0.03).unwrap();
+        assert!((nose.point - Point3::from(facing(0.8) * -0.4e-3)).norm() < 1e-15);
+        let flank = std::f64::consts::FRAC_PI_2 - 0.5;
+        assert_eq!(cone.touched(&up, &facing(flank), 0.03), None);
+        assert!(cone.touched(&up, &facing(flank - 0.06), 0.03).is_some());
+    }
+
+    #[test]
+    fn balls_on_the_axis_cover_the_tip() {
+        for body in bodies() {
+            let (heights, radius) = body.cover();
+            let (middle, bound) = body.bound();
+            for axis in directions() {
+                let place = place(axis);
+                for direction in directions() {
+                    let point = body.support(&place, &direction);
+                    let near = |height: &f64| (point - (place.centre + axis * *height)).norm() <= radius + 1e-12;
+                    assert!(heights.iter().any(near), "{body:?}");
+                    assert!((point - (place.centre + axis * middle)).norm() <= bound + 1e-12);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn impossible_tips_are_refused_by_name_value_and_remedy() {
+        let refused = |shape, radius| TipBody::new(shape, radius).unwrap_err().to_string();
+        let wide = TipShape::Flat { edge_radius: 3e-3, length: 5e-3 };
+        assert_eq!(refused(wide, 2e-3), "edge radius of a flat tip (m) is 0.003; it must be 0 to the tip's radius");
+        let blunt = TipShape::Cone { half_angle: 1.5, length: 5e-3 };
+        assert!(refused(blunt, 1e-3).contains("half angle of a cone tip (rad) is 1.5"));
+        assert!(refused(TipShape::Cone { half_angle: 0.3, length: 0.0 }, 1e-3).contains("length"));
+        assert!(refused(TipShape::Flat { edge_radius: 0.0, length: f64::NAN }, 1e-3).contains("length"));
+        assert!(refused(FLAT, 0.0).contains("radius"));
+        assert!(refused(TipShape::Ball, -1.0).contains("radius"));
+    }
+}
