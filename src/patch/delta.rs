@@ -142,10 +142,14 @@ impl Shown {
         if 6.0 * near.volume() > self.faces.len() as f64 {
             return self.faces.iter().map(|(owner, _)| owner).filter(is_around).collect();
         }
-        let of_axis = |axis: u8| {
-            near.iter().flat_map(move |node| [Owner::Edge(Edge { node, axis }), Owner::Square(Square { node, axis })])
-        };
-        (0..3).flat_map(of_axis).filter(|owner| self.faces.contains(owner) && is_around(owner)).collect()
+        let mut owners = Vec::new();
+        near.each(|node| {
+            for axis in 0..3 {
+                let both = [Owner::Edge(Edge { node, axis }), Owner::Square(Square { node, axis })];
+                owners.extend(both.into_iter().filter(|owner| self.faces.contains(owner) && is_around(owner)));
+            }
+        });
+        owners
     }
 
     /// Gives an owner other faces, unless they are the same.

@@ -148,14 +148,27 @@ impl CellBox {
         (lo[0]..=hi[0]).flat_map(move |x| (lo[1]..=hi[1]).flat_map(move |y| (lo[2]..=hi[2]).map(move |z| [x, y, z])))
     }
 
+    /// Calls `each` with the cells, x slowest; faster than [`Self::iter`].
+    #[inline]
+    pub fn each(&self, mut each: impl FnMut(Node)) {
+        for x in self.lo[0]..=self.hi[0] {
+            for y in self.lo[1]..=self.hi[1] {
+                for z in self.lo[2]..=self.hi[2] {
+                    each([x, y, z]);
+                }
+            }
+        }
+    }
+
     /// Calls `each` with the keys of a table that lie in the box, by whichever way is shorter; in no particular order.
+    #[inline]
     pub fn each_in<V>(&self, table: &Table<Node, V>, mut each: impl FnMut(Node, &V)) {
         if self.volume() < table.len() as f64 {
-            for cell in self.iter() {
+            self.each(|cell| {
                 if let Some(value) = table.get(&cell) {
                     each(cell, value);
                 }
-            }
+            });
         } else {
             table.iter().filter(|(cell, _)| self.contains(cell)).for_each(|(cell, value)| each(cell, value));
         }

@@ -237,7 +237,9 @@ impl Restored {
     /// Numbers of the nodes in a box; in the order in which they came where that is all of them.
     fn indices_in(&self, area: &CellBox) -> Vec<u32> {
         if area.volume() < self.nodes.len() as f64 {
-            area.iter().filter_map(|node| self.nodes.index_of(&node)).collect()
+            let mut at = Vec::new();
+            area.each(|node| at.extend(self.nodes.index_of(&node)));
+            at
         } else {
             (0..self.nodes.len() as u32).filter(|&at| area.contains(&self.nodes.entry(at).0)).collect()
         }
