@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::Point3;
 use touchup::live::{LiveRefiner, Pace};
 use touchup::mesh::{FaceId, FaceTree, TriMesh, VertexId};
-use touchup::patch::{PatchDelta, Patcher, PatcherParams, Splice};
+use touchup::patch::{PatchDelta, Patcher, PatcherParams, Splice, UncertaintyParams};
 use touchup::refine::{RefineParams, Refiner, TipParams};
 use touchup::sim::StylusParams;
 use touchup::touch::Sample;
@@ -26,6 +26,13 @@ const EVERY: i64 = 10_000_000;
 fn stream(seed: u64, share: f64) -> PlateStream {
     let (mut stream, _) = plate_stream(&StylusParams::default(), seed);
     stream.samples.truncate((stream.samples.len() as f64 * share) as usize);
+    stream
+}
+
+/// The last share of a stream: short strokes in holes and slots.
+fn last_strokes(seed: u64, share: f64) -> PlateStream {
+    let (mut stream, _) = plate_stream(&StylusParams::default(), seed);
+    stream.samples.drain(..(stream.samples.len() as f64 * (1.0 - share)) as usize);
     stream
 }
 
@@ -210,4 +217,101 @@ fn a_touch_moves_the_mesh_at_once_and_is_in_the_patch_within_50_ms() {
     }
     println!("moved at once {at_once} of 100, farther than 0.05 mm after 50 ms {late} of 4000");
     assert!(at_once > 50 && late < 40);
+}
+
+/// Triangles by the positions of their corners, in order, whatever their ids.
+fn triangles(mesh: &TriMesh) -> Vec<[[u64; 3]; 3]> {
+    let mut triangles: Vec<_> = mesh
+        .faces()
+        .map(|(face, _)| {
+            let mut corners = mesh.triangle(face).map(|p| [p.x, p.y, p.z].map(f64::to_bits));
+            let first = (0..3).min_by_key(|&i| corners[i]).unwrap();
+            corners.rotate_left(first);
+            corners
+        })
+        .collect();
+    triangles.sort_unstable();
+    triangles
+}
+
+/// What the patcher makes of all that counts now, to the last bit: triangles, and how well vertices are known.
+fn whole(stream: &PlateStream, patcher: &Patcher) -> (Vec<[[u64; 3]; 3]>, Vec<u64>) {
+    let patched = patcher.clone().patched(&stream.scan, &FaceTree::new(&stream.scan)).unwrap();
+    (triangles(&patched.mesh), patched.sigma.iter().map(|sigma| sigma.to_bits()).collect())
+}
+
+#[test]
+fn strokes_are_undone_and_redone_bit_for_bit() {
+    let stream = last_strokes(3, 0.2);
+    let StylusParams { radius, stiffness, .. } = StylusParams::default();
+    let mut params = PatcherParams::new(radius, Some(stiffness), stream.noise);
+    params.uncertainty = Some(UncertaintyParams::new(stream.noise));
+    let mut patcher = Patcher::new(params).unwrap();
+    // the samples with which a stroke begins to count …
+    let mut begun = Vec::new();
+    for (i, sample) in stream.samples.iter().enumerate() {
+        let strokes = patcher.strokes();
+        patcher.push(sample);
+        begun.extend((patcher.strokes() > strokes).then_some(i));
+    }
+    patcher.flush();
+    println!("{} strokes", begun.len());
+    assert!(begun.len() >= 3);
+    // … and what was known just before each of them, and at the end
+    let mut states = Vec::new();
+    let mut again = Patcher::new(params).unwrap();
+    for (i, sample) in stream.samples.iter().enumerate() {
+        if begun.contains(&i) {
+            states.push(whole(&stream, &again));
+        }
+        again.push(sample);
+    }
+    again.flush();
+    states.push(whole(&stream, &again));
+    for expected in states.iter().rev().skip(1) {
+        assert!(patcher.undo());
+        assert!(whole(&stream, &patcher) == *expected);
+    }
+    assert!(!patcher.undo(), "nothing is left");
+    for expected in &states[1..] {
+        assert!(patcher.redo());
+        assert!(whole(&stream, &patcher) == *expected);
+    }
+    assert!(!patcher.redo());
+}
+
+#[test]
+fn undoing_while_touching_brings_the_mesh_back() {
+    let stream = last_strokes(4, 0.15);
+    let scan = Arc::new((stream.scan.clone(), FaceTree::new(&stream.scan)));
+    let mut live = LiveRefiner::new(scan, refiner(&stream.scan), patcher(&stream), Pace::default(), 1000).unwrap();
+    // the same without the last stroke: what came before it
+    let mut before = patcher(&stream);
+    let mut counted = patcher(&stream);
+    let mut last_stroke = 0;
+    for (i, sample) in stream.samples.iter().enumerate() {
+        let strokes = counted.strokes();
+        counted.push(sample);
+        if counted.strokes() > strokes {
+            last_stroke = i;
+        }
+        live.push(sample).unwrap();
+    }
+    assert!(last_stroke > 1000);
+    live.catch_up().unwrap();
+    let touched = triangles(live.refiner().mesh());
+    assert!(live.undo().unwrap());
+    let undone = triangles(live.refiner().mesh());
+    assert!(live.redo().unwrap());
+    let redone = triangles(live.refiner().mesh());
+    assert!(undone != touched && undone != redone);
+    // what was undone is what all strokes but the last make at once …
+    stream.samples[..last_stroke].iter().for_each(|sample| before.push(sample));
+    before.flush();
+    let (mesh, anew) = (live.refiner().mesh().clone(), live.finish().unwrap().1);
+    assert!(redone == triangles(&mesh));
+    assert!(redone == whole(&stream, &anew).0, "and redone what all of them make");
+    let close = |a: usize, b: usize| (a as f64 / b as f64 - 1.0).abs() < 0.01;
+    assert!(close(undone.len(), whole(&stream, &before).0.len()));
+    assert!(close(touched.len(), redone.len()));
 }

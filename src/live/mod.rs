@@ -12,7 +12,7 @@ use crate::mesh::{FaceTree, TriMesh};
 use crate::patch::{PatchDelta, Patcher};
 use crate::refine::{RefineError, Refiner, Update};
 use crate::touch::{Sample, SettingError};
-use worker::Worker;
+use worker::{Answer, Question, Worker};
 
 /// Why a sample was not taken.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -124,8 +124,7 @@ impl LiveRefiner {
         let update = self.refiner.push(sample)?;
         let slot = sample.stamp_ns.div_euclid(self.pace.every_ns);
         if self.slot.replace(slot).is_some_and(|before| slot > before) {
-            self.ask()?;
-            self.due_ns.push_back(slot.saturating_mul(self.pace.every_ns).saturating_add(self.pace.after_ns));
+            self.ask(slot.saturating_mul(self.pace.every_ns).saturating_add(self.pace.after_ns))?;
         }
         self.batch.push(*sample);
         self.go_on(AT_ONCE)?;
@@ -148,33 +147,68 @@ impl LiveRefiner {
     /// # Errors
     /// [`LiveError::Stopped`], [`LiveError::Refine`].
     pub fn catch_up(&mut self) -> Result<(), LiveError> {
-        self.ask()?;
+        self.ask(i64::MAX)?;
         // the second time for what was taken in only nearby
-        self.worker.ask_all()?;
-        self.worker.ask_all()?;
-        self.due_ns.extend([i64::MAX; 3]);
-        self.go_on(usize::MAX)?;
-        while !self.due_ns.is_empty() {
-            self.take_up()?;
-            self.go_on(usize::MAX)?;
+        for _ in 0..2 {
+            self.worker.ask(Question::Flush)?;
+            self.due_ns.push_back(i64::MAX);
         }
+        self.take_up_all()?;
         Ok(())
     }
 
-    /// Hands the samples over.
-    fn ask(&mut self) -> Result<(), LiveError> {
-        let batch = std::mem::replace(&mut self.batch, self.worker.empty_batch());
-        self.worker.ask(batch)
+    /// Takes the last stroke back, as [`Patcher::undo`], and waits until the mesh is that of the patch before it. Returns
+    /// whether there was one.
+    ///
+    /// # Errors
+    /// As [`Self::catch_up`].
+    pub fn undo(&mut self) -> Result<bool, LiveError> {
+        self.change_strokes(Question::Undo)
     }
 
-    fn take_up(&mut self) -> Result<(), LiveError> {
+    /// Does again what was undone last, as [`Patcher::redo`]. Returns whether there was anything.
+    ///
+    /// # Errors
+    /// As [`Self::catch_up`].
+    pub fn redo(&mut self) -> Result<bool, LiveError> {
+        self.change_strokes(Question::Redo)
+    }
+
+    fn change_strokes(&mut self, question: Question) -> Result<bool, LiveError> {
+        self.catch_up()?;
+        self.worker.ask(question)?;
+        self.due_ns.push_back(i64::MAX);
+        self.take_up_all()
+    }
+
+    /// Hands the samples over, for a change that is to be taken up at `due_ns`.
+    fn ask(&mut self, due_ns: i64) -> Result<(), LiveError> {
+        let batch = std::mem::replace(&mut self.batch, self.worker.empty_batch());
+        self.worker.ask(Question::Renew(batch))?;
+        self.due_ns.push_back(due_ns);
+        Ok(())
+    }
+
+    /// Takes up all changes that were asked for, as a whole; whether the last one was one of strokes.
+    fn take_up_all(&mut self) -> Result<bool, LiveError> {
+        self.go_on(usize::MAX)?;
+        let mut has_changed_strokes = false;
+        while !self.due_ns.is_empty() {
+            has_changed_strokes = self.take_up()?;
+            self.go_on(usize::MAX)?;
+        }
+        Ok(has_changed_strokes)
+    }
+
+    fn take_up(&mut self) -> Result<bool, LiveError> {
         self.due_ns.pop_front();
-        let (delta, has_waited) = self.worker.answer()?;
+        let (Answer { delta, has_changed_strokes, .. }, has_waited) = self.worker.answer()?;
         self.delta = delta;
         self.counts.renewals += 1;
         self.counts.waits += u64::from(has_waited);
         self.is_done = false;
-        Ok(self.refiner.begin_to_follow(&self.delta)?)
+        self.refiner.begin_to_follow(&self.delta)?;
+        Ok(has_changed_strokes)
     }
 
     /// The haptic update, with the mesh as it stands.

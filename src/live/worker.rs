@@ -10,15 +10,21 @@ use crate::patch::{PatchDelta, Patcher};
 use crate::touch::Sample;
 
 /// What the thread is asked for.
-enum Question {
+pub(super) enum Question {
     /// take these in, and tell what changed
     Renew(Vec<Sample>),
     /// take in what is still in the smoothing window, and tell what changed
     Flush,
+    /// take the last stroke back, or do it again, and tell what changed
+    Undo,
+    Redo,
 }
 
-struct Answer {
-    delta: PatchDelta,
+/// What the thread found.
+pub(super) struct Answer {
+    pub delta: PatchDelta,
+    /// whether there was a stroke to take back, or to do again
+    pub has_changed_strokes: bool,
     /// to be filled again
     batch: Vec<Sample>,
 }
@@ -39,7 +45,7 @@ impl Worker {
         let (outbox, answers) = channel();
         let work = move || {
             for question in inbox {
-                let mut batch = Vec::new();
+                let (mut batch, mut has_changed_strokes) = (Vec::new(), false);
                 match question {
                     Question::Renew(samples) => {
                         samples.iter().for_each(|sample| patcher.push(sample));
@@ -47,9 +53,11 @@ impl Worker {
                         batch.clear();
                     }
                     Question::Flush => patcher.flush(),
+                    Question::Undo => has_changed_strokes = patcher.undo(),
+                    Question::Redo => has_changed_strokes = patcher.redo(),
                 }
                 let delta = patcher.renewed(&scan.0, &scan.1);
-                if outbox.send(Answer { delta, batch }).is_err() {
+                if outbox.send(Answer { delta, has_changed_strokes, batch }).is_err() {
                     break;
                 }
             }
@@ -64,24 +72,20 @@ impl Worker {
         self.batches.pop().unwrap_or_default()
     }
 
-    pub fn ask(&self, samples: Vec<Sample>) -> Result<(), LiveError> {
-        self.questions.send(Question::Renew(samples)).map_err(|_| LiveError::Stopped)
-    }
-
-    /// Asks to take in everything that was handed over; has one answer more.
-    pub fn ask_all(&self) -> Result<(), LiveError> {
-        self.questions.send(Question::Flush).map_err(|_| LiveError::Stopped)
+    /// Asks; there will be one answer more.
+    pub fn ask(&self, question: Question) -> Result<(), LiveError> {
+        self.questions.send(question).map_err(|_| LiveError::Stopped)
     }
 
     /// The next answer, and whether it had to be waited for.
-    pub fn answer(&mut self) -> Result<(PatchDelta, bool), LiveError> {
-        let (answer, has_waited) = match self.answers.try_recv() {
+    pub fn answer(&mut self) -> Result<(Answer, bool), LiveError> {
+        let (mut answer, has_waited) = match self.answers.try_recv() {
             Ok(answer) => (answer, false),
             Err(TryRecvError::Empty) => (self.answers.recv().map_err(|_| LiveError::Stopped)?, true),
             Err(TryRecvError::Disconnected) => return Err(LiveError::Stopped),
         };
-        self.batches.push(answer.batch);
-        Ok((answer.delta, has_waited))
+        self.batches.push(std::mem::take(&mut answer.batch));
+        Ok((answer, has_waited))
     }
 
     pub fn finish(self) -> Result<Patcher, LiveError> {
