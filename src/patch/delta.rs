@@ -3,7 +3,7 @@
 use nalgebra::Point3;
 
 use super::Region;
-use super::lattice::{CellBox, Edge, Owner, Square, VertexKey};
+use super::lattice::{CellBox, Node, Owner, VertexKey};
 use super::patcher::Support;
 use super::remesh::Renewed;
 use super::splice::Patch;
@@ -44,6 +44,13 @@ impl PatchDelta {
     }
 }
 
+/// Side of the blocks in which owners are looked up, in cells.
+const BLOCK: i32 = 4;
+
+fn block_of(node: Node) -> Node {
+    node.map(|x| x.div_euclid(BLOCK))
+}
+
 /// Corners by name.
 type NamedFace = [VertexKey; 3];
 
@@ -51,6 +58,8 @@ type NamedFace = [VertexKey; 3];
 #[derive(Clone, Debug, Default)]
 pub(super) struct Shown {
     faces: Table<Owner, Vec<NamedFace>>,
+    /// the owners of the lattice among them, by blocks of cells
+    blocks: Table<Node, Vec<Owner>>,
     vertices: Table<VertexKey, Placed>,
     face_count: usize,
     /// faces of the scan that went
@@ -103,7 +112,7 @@ impl Shown {
         let mut draft = Draft::default();
         for owner in self.owners_around(&renewed.core, region).into_iter().filter(|owner| !next.contains(owner)) {
             self.replace(owner, Vec::new(), &mut draft);
-            self.faces.remove(&owner);
+            self.forget(owner);
         }
         for owner in renewed.scanned.iter().map(|&face| Owner::Scan(face)).filter(|owner| !next.contains(owner)) {
             if self.faces.contains(&owner) {
@@ -139,17 +148,20 @@ impl Shown {
             Owner::Scan(_) => false,
         };
         let near = core.widened(0, 1);
-        if 6.0 * near.volume() > self.faces.len() as f64 {
-            return self.faces.iter().map(|(owner, _)| owner).filter(is_around).collect();
-        }
+        let blocks = CellBox { lo: block_of(near.lo), hi: block_of(near.hi) };
         let mut owners = Vec::new();
-        near.each(|node| {
-            for axis in 0..3 {
-                let both = [Owner::Edge(Edge { node, axis }), Owner::Square(Square { node, axis })];
-                owners.extend(both.into_iter().filter(|owner| self.faces.contains(owner) && is_around(owner)));
-            }
-        });
+        blocks.each_in(&self.blocks, |_, block| owners.extend(block.iter().copied().filter(is_around)));
         owners
+    }
+
+    /// Forgets an owner that has no faces any more.
+    fn forget(&mut self, owner: Owner) {
+        self.faces.remove(&owner);
+        if let Some(block) = owner.node().and_then(|node| self.blocks.get_mut(&block_of(node)))
+            && let Some(at) = block.iter().position(|&other| other == owner)
+        {
+            block.swap_remove(at);
+        }
     }
 
     /// Gives an owner other faces, unless they are the same.
@@ -158,7 +170,15 @@ impl Shown {
         if !is_new && *self.faces.value_mut(at) == faces {
             return;
         }
-        self.gone += usize::from(is_new && matches!(owner, Owner::Scan(_)));
+        if is_new {
+            match owner.node() {
+                None => self.gone += 1,
+                Some(node) => {
+                    let (block, _) = self.blocks.insert_with(block_of(node), Vec::new);
+                    self.blocks.value_mut(block).push(owner);
+                }
+            }
+        }
         draft.delta.owners.push((owner, faces.len() as u32));
         for key in faces.iter().flatten() {
             let unplaced = || Placed { position: Point3::origin(), support: Support::Scan, uses: 0 };

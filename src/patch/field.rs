@@ -102,7 +102,7 @@ impl Piece {
 pub struct FieldScratch {
     pub(super) near: Vec<Member>,
     pub(super) pieces: Vec<Piece>,
-    angles: Vec<f64>,
+    angles: Vec<(f64, f64, f64)>,
     /// number of the piece that decided
     pub(super) decides: u32,
     pub(super) shares: Vec<Share>,
@@ -130,8 +130,8 @@ const EDGE_NEAR: f64 = 1.5;
 const OVERLAP: f64 = 0.1;
 /// Share of σ by which noise may make a piece cut off the nearest contact.
 const CUT: f64 = 0.3;
-/// Seen from a point at a border, contacts in the tangent plane leave a gap of this angle, rad.
-const BORDER_GAP: f64 = 150.0 * std::f64::consts::PI / 180.0;
+/// Seen from a point at a border, contacts in the tangent plane leave a gap of 150° or more: its cosine.
+const BORDER_COSINE: f64 = -0.866_025_403_784_438_6;
 /// A contact nearer in the tangent plane than this share of σ is under the point.
 const UNDER: f64 = 0.13;
 
@@ -361,19 +361,31 @@ fn is_border(
     arms: impl Iterator<Item = Vector3<f64>>,
     normal: &Vector3<f64>,
     under: f64,
-    angles: &mut Vec<f64>,
+    angles: &mut Vec<(f64, f64, f64)>,
 ) -> bool {
     let side = if normal.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
     let u = normal.cross(&side).normalize();
     let v = normal.cross(&u);
     angles.clear();
-    angles.extend(
-        arms.map(|arm| (arm.dot(&u), arm.dot(&v))).filter(|(a, b)| a.hypot(*b) > under).map(|(a, b)| b.atan2(a)),
-    );
-    angles.sort_unstable_by(f64::total_cmp);
+    let flat = arms.map(|arm| (arm.dot(&u), arm.dot(&v))).filter(|(a, b)| a * a + b * b > under * under);
+    angles.extend(flat.map(|(a, b)| (turn(a, b), a, b)));
+    angles.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let (Some(first), Some(last)) = (angles.first(), angles.last()) else { return true };
-    let around = first + std::f64::consts::TAU - last;
-    angles.windows(2).map(|pair| pair[1] - pair[0]).fold(around, f64::max) >= BORDER_GAP
+    let next = angles.iter().cycle().skip(1);
+    first.0 == last.0 || angles.iter().zip(next).any(|(&(_, a, b), &(_, c, d))| is_gap(a, b, c, d))
+}
+
+/// Grows with the angle of (a, b), from −2 at −180° to 2 at 180°.
+fn turn(a: f64, b: f64) -> f64 {
+    let side = b / (a.abs() + b.abs());
+    if a >= 0.0 { side } else { (2.0 - side.abs()).copysign(b) }
+}
+
+/// Whether the turn to the left from (a, b) to (c, d) is a gap at a border.
+fn is_gap(a: f64, b: f64, c: f64, d: f64) -> bool {
+    let (cross, dot) = (a * d - b * c, a * c + b * d);
+    // the same direction twice is no gap
+    cross < 0.0 || dot < 0.0 && dot * dot >= BORDER_COSINE * BORDER_COSINE * ((a * a + b * b) * (c * c + d * d))
 }
 
 #[cfg(test)]
@@ -411,6 +423,20 @@ mod tests {
             let normal = Vector3::new((a / radius).cos(), (a / radius).sin(), 0.0);
             (z < -0.4e-3).then(|| (Point3::from(normal * radius + Vector3::z() * z), normal * side))
         }
+    }
+
+    #[test]
+    fn a_gap_of_more_than_150_degrees_makes_a_border() {
+        let is_border_of = |degrees: &[f64]| {
+            let arms = degrees.iter().map(|a| Vector3::new(a.to_radians().cos(), a.to_radians().sin(), 0.3) * 1e-3);
+            is_border(arms, &Vector3::z(), 0.1e-3, &mut Vec::new())
+        };
+        for start in [-170.0, -80.0, 0.0, 33.0, 95.0] {
+            let at = |gap: f64| [0.0, 100.0, 360.0 - gap].map(|a| a + start);
+            assert!(is_border_of(&at(151.0)) && !is_border_of(&at(149.0)) && is_border_of(&at(200.0)), "{start}");
+            assert!(is_border_of(&[start]) && is_border_of(&[start; 3]) && is_border_of(&[start, start + 120.0]));
+        }
+        assert!(is_border_of(&[]));
     }
 
     #[test]

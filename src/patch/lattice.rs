@@ -308,6 +308,17 @@ pub enum Owner {
     Scan(FaceId),
 }
 
+impl Owner {
+    /// Where it stands on the lattice; `None` for a face of the scan.
+    pub(super) fn node(&self) -> Option<Node> {
+        match self {
+            Self::Edge(edge) => Some(edge.node),
+            Self::Square(square) => Some(square.node),
+            Self::Scan(_) => None,
+        }
+    }
+}
+
 impl Key for Owner {
     #[inline]
     fn bits(&self) -> u64 {
