@@ -9,11 +9,12 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("touch", &[]),
     ("mesh", &[]),
     ("patch", &["touch", "mesh"]),
-    ("refine", &["touch", "mesh"]),
+    ("refine", &["touch", "mesh", "patch"]),
+    ("live", &["touch", "mesh", "patch", "refine"]),
     ("sim", &["touch", "mesh"]),
     ("io", &["touch", "mesh"]),
     ("scene", &["touch", "mesh", "patch", "refine", "sim", "io"]),
-    ("cli", &["touch", "mesh", "patch", "refine", "sim", "io", "scene"]),
+    ("cli", &["touch", "mesh", "patch", "refine", "live", "sim", "io", "scene"]),
 ];
 
 /// Same input, same bytes out: nothing of the world outside comes in.

@@ -1,8 +1,9 @@
 //! The surface meshed anew where it was touched, as one closed skin by construction.
 //!
-//! [`TouchFinder`] makes touches of samples; [`ContactStore`] and [`SweptSpace`] keep what was touched and where the ball
-//! went. [`Evidence`] says what these and the scan know about a point, [`Restored`] holds that at the nodes of a regular
-//! [`Lattice`], completed where nothing is known. [`Patcher`] is the whole way.
+//! [`TouchFinder`] makes touches of samples; [`ContactStore`] and [`SweptSpace`] keep what was touched and where the tip
+//! went. [`Evidence`] says what these and the scan know about a point; that is held at the nodes of a regular [`Lattice`] and
+//! completed where nothing is known. [`Patcher`] is the whole way: everything at once, or what changed since the last time, as
+//! a [`PatchDelta`] for a mesh that follows by [`Splice`].
 //!
 //! In a set of the lattice's cells, the *region*, the surface is the zero set of that field f (f < 0 in the material),
 //! found by dual contouring that cannot intersect itself (after \[Ju Udeshi 2006\]); outside, the scan stays. On the
