@@ -12,6 +12,8 @@ mod plate;
 mod refusal;
 #[path = "refine/region.rs"]
 mod region;
+#[path = "refine/strokes.rs"]
+mod strokes;
 
 use nalgebra::{Isometry3, Point3, Vector3, vector};
 use proptest::prelude::*;

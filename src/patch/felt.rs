@@ -10,7 +10,7 @@ use super::table::Table;
 use super::touches::Touch;
 use super::two_points::{is_mixed, split};
 use crate::mesh::{FaceTree, TriMesh};
-use crate::touch::TipPlace;
+use crate::touch::{STROKE_PAUSE_NS, TipPlace};
 
 /// A contact that the ball went into by more than this is none, in radii: four times the noise of a usual tracker.
 const REFUTED_DEPTH: f64 = 0.133;
@@ -24,8 +24,6 @@ const FAN_WIDTH: f64 = 0.4;
 const FAN_COSINE: f64 = 0.906;
 /// A mean moves within its cell; what depends on it is looked for this many times as far.
 const MOVED: f64 = 2.0;
-/// A pause longer than this parts two strokes, ns.
-const STROKE_PAUSE: i64 = 100_000_000;
 
 /// All that was felt.
 #[derive(Clone, Debug)]
@@ -53,7 +51,7 @@ impl Felt {
         self.until_ns = touch.stamp_ns;
         let place = TipPlace { centre: touch.centre, axis: touch.axis };
         let Some(contact) = &touch.contact else { return self.swept.add_place(&place) };
-        if self.last_contact_ns.is_none_or(|last| touch.stamp_ns - last > STROKE_PAUSE) {
+        if self.last_contact_ns.is_none_or(|last| touch.stamp_ns - last > STROKE_PAUSE_NS) {
             self.contacts.begin_stroke();
             self.swept.begin_stroke();
         }

@@ -5,6 +5,7 @@ use nalgebra::{Point3, Vector3};
 use super::followed::FollowedPatch;
 use super::guard::{GuardParams, Verdict};
 use super::roi::{Roi, RoiSize};
+use super::strokes::Strokes;
 use crate::mesh::{FaceHit, FaceId, FaceTree, MeshError, RefitPlan, TriMesh, VertexId};
 use crate::patch::PatchDelta;
 
@@ -47,6 +48,7 @@ pub(super) struct DeformableMesh {
     displacements: Vec<Vector3<f64>>,
     before: Vec<Point3<f64>>,
     patch: Option<FollowedPatch>,
+    strokes: Option<Strokes>,
 }
 
 /// A region of interest with the edit after which it was last looked at.
@@ -94,6 +96,7 @@ impl DeformableMesh {
             displacements: Vec::new(),
             before: Vec::new(),
             patch: None,
+            strokes: None,
             mesh,
             tree,
         }
@@ -109,6 +112,9 @@ impl DeformableMesh {
 
     /// Remembers that a surface facing `normal` was felt on `face`.
     pub fn feel(&mut self, face: FaceId, normal: &Vector3<f64>) {
+        if let Some(strokes) = &mut self.strokes {
+            strokes.note_evidence(face, self.evidence[face.0 as usize]);
+        }
         self.evidence[face.0 as usize] = normal.cast::<f32>().into();
     }
 
@@ -133,6 +139,9 @@ impl DeformableMesh {
             self.tree.plan(region.roi.neighbourhood.ring.moving(), &mut region.refit);
             region.seen = None;
         }
+        if let Some(strokes) = &mut self.strokes {
+            strokes.note_positions(&region.roi.vertices, &self.mesh);
+        }
         let longest = self.displace(&region.roi, steps);
         let fit = match self.guard {
             Some(guard) => self.place_soundly(region, longest, &guard),
@@ -150,12 +159,43 @@ impl DeformableMesh {
         fit
     }
 
+    /// Keeps what it takes to undo strokes from here on, unless a patch is followed.
+    pub fn keep_strokes(&mut self) {
+        self.strokes = self.patch.is_none().then(Strokes::default);
+    }
+
+    /// Notes that the sample at hand touches.
+    pub fn touch(&mut self) {
+        if let Some(strokes) = &mut self.strokes {
+            strokes.touch(self.now_ns);
+        }
+    }
+
+    /// How many strokes can be undone.
+    pub fn strokes(&self) -> usize {
+        self.strokes.as_ref().map_or(0, Strokes::len)
+    }
+
+    /// Takes the last stroke back, or does again what was undone last; returns whether there was any.
+    pub fn change_strokes(&mut self, is_undo: bool) -> bool {
+        let Self { strokes, mesh, tree, evidence, .. } = self;
+        let change = if is_undo { Strokes::undo } else { Strokes::redo };
+        let Some(moved) = strokes.as_mut().and_then(|strokes| change(strokes, mesh, evidence)) else { return false };
+        let mut faces: Vec<FaceId> = moved.iter().flat_map(|&vertex| mesh.star(vertex)).copied().collect();
+        faces.sort_unstable();
+        faces.dedup();
+        tree.refit(mesh, &faces);
+        self.edits += 1;
+        true
+    }
+
     /// Makes ready to follow a patch, with room for so many new faces.
     pub fn expect_patch(&mut self, faces: usize) -> Result<(), MeshError> {
         self.mesh.reserve(faces / 2, faces)?;
         self.tree.reserve(faces)?;
         self.scanned.reserve(faces / 2);
         self.evidence.reserve(faces);
+        self.strokes = None;
         self.patch = Some(FollowedPatch::new(&self.mesh, faces / 2));
         Ok(())
     }

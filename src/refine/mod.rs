@@ -16,6 +16,7 @@ mod registration;
 mod ring;
 mod roi;
 mod sliding;
+mod strokes;
 
 use nalgebra::{Point3, Vector3};
 use serde::Serialize;
@@ -263,7 +264,10 @@ impl Refiner {
         let felt = self.felt_normal(sample.stamp_ns, &ball, dt);
         let update = match felt {
             Felt::Nothing => Update::FREE,
-            _ => self.press(&ball, felt, handle, dt)?,
+            _ => {
+                self.deformable.touch();
+                self.press(&ball, felt, handle, dt)?
+            }
         };
         self.counts.accepted += 1;
         match self.params.carve {
@@ -383,6 +387,37 @@ impl Refiner {
             let length = step.norm();
             if length > longest { step * (longest / length) } else { step }
         })
+    }
+
+    /// Keeps what it takes to undo strokes from here on; with a patch that is followed, it is the patch's strokes that are
+    /// undone ([`crate::patch::Patcher::undo`]).
+    pub fn keep_strokes(&mut self) {
+        self.deformable.keep_strokes();
+    }
+
+    /// How many strokes can be undone: 64 at most.
+    pub fn strokes(&self) -> usize {
+        self.deformable.strokes()
+    }
+
+    /// Takes the last stroke back, bit by bit: what was touched without a pause of a tenth of a second, and what the tip moved
+    /// after it. Returns whether there was one. What the samples told of friction and bias stays.
+    pub fn undo(&mut self) -> bool {
+        self.change_strokes(true)
+    }
+
+    /// Does the stroke again that was undone last, bit by bit, unless something was touched since. Returns whether there was
+    /// one.
+    pub fn redo(&mut self) -> bool {
+        self.change_strokes(false)
+    }
+
+    fn change_strokes(&mut self, is_undo: bool) -> bool {
+        let has_changed = self.deformable.change_strokes(is_undo);
+        if has_changed {
+            self.forget_regions();
+        }
+        has_changed
     }
 
     /// Makes ready to follow a patch, with room for so many new faces: more are taken in all the same, with a pause.

@@ -4,6 +4,9 @@ use nalgebra::Vector3;
 
 use super::SettingError;
 
+/// A pause in contact longer than this parts two strokes, ns: a hand that lifts the stylus, not one that bounces.
+pub const STROKE_PAUSE_NS: i64 = 100_000_000;
+
 /// The two thresholds of a [`ContactGate`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactGateParams {

@@ -19,7 +19,7 @@ mod tip_shape;
 pub use bias::{BiasParams, BiasTracker};
 pub use clock::{ClockEstimator, ClockOffset, ClockParams};
 pub use compensate::{Compensator, CompensatorParams, Payload, Tip, WrenchFrame};
-pub use contact::{Contact, ContactGate, ContactGateParams};
+pub use contact::{Contact, ContactGate, ContactGateParams, STROKE_PAUSE_NS};
 pub use friction::{FeltNormal, Friction, FrictionCoefficient, Sliding};
 pub use local_motion::{LocalMotion, Motion};
 pub use markers::{
