@@ -281,6 +281,14 @@ fn a_replay_equals_the_first_run_byte_for_byte() {
         assert!(plate.bytes(out) == plate.bytes("live.ply"), "{out}");
     }
     assert!(plate.bytes("live.ply") != plate.bytes("scan.ply"));
+
+    // in real time, with the patch on a thread of its own
+    let output = plate.refine("beside.ply", &["--live"]);
+    assert_eq!((code(&output), told(&output)), (0, String::new()));
+    let live = &summary(&output)["live"];
+    // 4.2 s in steps of 8 ms, and what is left at the end
+    assert!((520..=530).contains(&number(live, "renewals")), "{live}");
+    assert!(plate.bytes("beside.ply") == plate.bytes("live.ply"));
 }
 
 /// A pose that is no rotation is a lost pose: no sample is lost for it, and the sum says so.

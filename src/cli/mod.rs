@@ -8,6 +8,7 @@ mod knocks;
 mod latency;
 mod offsets;
 mod progress;
+mod rates;
 mod refine;
 mod replay;
 mod simulate;
@@ -24,6 +25,7 @@ use clap::{Parser, Subcommand};
 use crate::io::atomic::is_same_file;
 use crate::io::mesh_file::MeshFileError;
 use crate::io::recording::RecordingError;
+use crate::live::LiveError;
 use crate::mesh::MeshError;
 use crate::refine::RefineError;
 use crate::scene::SceneError;
@@ -87,6 +89,8 @@ enum CliError {
     Stream(#[from] std::io::Error),
     #[error("the scan cannot be refined: {0}")]
     Refine(#[from] RefineError),
+    #[error(transparent)]
+    Live(#[from] LiveError),
 }
 
 impl CliError {
@@ -97,7 +101,7 @@ impl CliError {
             Self::Simulate(SimError::BadParameter { .. } | SimError::TooFine { .. } | SimError::TooCoarse { .. }) => 2,
             // settings come from a scene file: its flags are checked before
             Self::Scene(_) | Self::ReadMesh(_) | Self::ReadRecording(_) | Self::Simulate(_) => 3,
-            Self::Mesh(_) | Self::Setting(_) | Self::Refine(_) => 3,
+            Self::Mesh(_) | Self::Setting(_) | Self::Refine(_) | Self::Live(_) => 3,
         }
     }
 }

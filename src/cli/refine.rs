@@ -13,6 +13,7 @@ use super::knocks::UncertaintySummary;
 use super::latency::{Latencies, Quantiles};
 use super::offsets::{ContactPoints, ScanOffset, WrenchOffset};
 use super::progress::Progress;
+use super::rates::{Ended, LiveSummary, Rates};
 use super::replay::{Recording, Replayed, replay};
 use super::{CliError, Losses, check_kept, tell};
 use crate::io::mesh_file::{
@@ -66,6 +67,10 @@ pub(super) struct RefineArguments {
     /// Also looks how far the scan lies from the touched part, and tells; nothing is moved by it
     #[arg(long)]
     registration: bool,
+    /// Replays in real time with the patch beside it, as next to a stylus, and tells how far it is behind; the result is
+    /// the same
+    #[arg(long)]
+    live: bool,
     /// Prints the summary as one JSON object
     #[arg(long)]
     json: bool,
@@ -101,6 +106,9 @@ pub(super) struct Summary {
     push_ns: Quantiles,
     load_s: f64,
     replay_s: f64,
+    /// of the patch beside the samples, where that was asked for
+    #[serde(skip_serializing_if = "Option::is_none")]
+    live: Option<LiveSummary>,
     /// what was meshed anew; `null` when the scene has no `patch`, or nothing was touched
     patch: Option<PatchSummary>,
     /// how well that is known; not there when the scene has no `uncertainty`
@@ -146,6 +154,8 @@ pub(super) struct Refined {
 
 const NOTHING_MOVES: &str = "the scene names no `refine`, so nothing would move the mesh: add `refine:` to it";
 
+const NO_PATCH: &str = "--live lets the patch follow, and the scene has none: add `patch:` to it";
+
 const NO_MARKERS: &str = "--markers-topic needs a scene that says where the markers sit: add `markers:` to it";
 
 /// The verb: refines and tells.
@@ -171,15 +181,14 @@ impl Pushes {
         Self { accepted: 0, refused: BTreeMap::new(), latencies: Latencies::new() }
     }
 
-    fn push(&mut self, refiner: &mut Refiner, patcher: Option<&mut Patcher>, sample: &Sample) {
-        let begun = Instant::now();
-        let pushed = refiner.push(sample);
-        if let (Ok(_), Some(patcher)) = (&pushed, patcher) {
-            patcher.push(sample);
-        }
-        self.latencies.record(begun.elapsed());
+    fn push(&mut self, rates: &mut Rates, sample: &Sample) {
+        let (pushed, time) = match rates.push(sample) {
+            Ok(time) => (Ok(()), time),
+            Err((error, time)) => (Err(error), time),
+        };
+        self.latencies.record(time);
         match pushed {
-            Ok(_) => self.accepted += 1,
+            Ok(()) => self.accepted += 1,
             Err(error) => *self.refused.entry(reason_of(&error).to_owned()).or_default() += 1,
         }
     }
@@ -257,6 +266,7 @@ impl RefineArguments {
             scan_noise_mm: None,
             mode: None,
             registration: false,
+            live: false,
             json: false,
         }
     }
@@ -273,8 +283,8 @@ impl RefineArguments {
         let recording = Recording::open(&self.bag, &topics).map_err(CliError::ReadRecording)?;
         let params =
             scene.refine_params(recording.wrench_frame).ok_or_else(|| CliError::Usage(NOTHING_MOVES.to_owned()))?;
-        let mut patcher = scene.patcher_params(recording.wrench_frame).map(Patcher::new).transpose()?;
-        let mut refiner = Refiner::new(mesh, params)?;
+        let patcher = scene.patcher_params(recording.wrench_frame).map(Patcher::new).transpose()?;
+        let mut rates = self.rates(Refiner::new(mesh, params)?, patcher, &as_scanned)?;
         let load_s = started.elapsed().as_secs_f64();
 
         let started = Instant::now();
@@ -284,7 +294,7 @@ impl RefineArguments {
         let mut clock = ClockEstimator::new(clock_params)?;
         let mut contacts = self.registration.then(|| ContactPoints::new(&params)).transpose()?;
         let mut replayed = replay(recording, scene.sync_params(), markers, |sample| {
-            pushes.push(&mut refiner, patcher.as_mut(), sample);
+            pushes.push(&mut rates, sample);
             let tip = compensator.compensate(sample);
             clock.push(&tip);
             if let Some(contacts) = &mut contacts {
@@ -293,6 +303,7 @@ impl RefineArguments {
         })?;
         let registration = contacts
             .map(|contacts| ScanOffset::of(contacts.registrar.estimate(&as_scanned, &FaceTree::new(&as_scanned))));
+        let Ended { refiner, patcher, live } = rates.finish()?;
         let replay_s = started.elapsed().as_secs_f64();
         let counts = refiner.counts();
         let Remeshed { moved_faces, patch, uncertainty } = match patcher.filter(|_| counts.contacts > 0) {
@@ -328,10 +339,20 @@ impl RefineArguments {
             push_ns: pushes.latencies.quantiles(),
             load_s,
             replay_s,
+            live,
             patch,
             uncertainty,
         };
         Ok(Refined { repair, summary, losses: replayed.losses })
+    }
+
+    /// Which way the samples go.
+    fn rates(&self, refiner: Refiner, patcher: Option<Patcher>, scan: &TriMesh) -> Result<Rates, CliError> {
+        match patcher {
+            Some(patcher) if self.live => Ok(Rates::live(scan, refiner, patcher)?),
+            None if self.live => Err(CliError::Usage(NO_PATCH.to_owned())),
+            patcher => Ok(Rates::AtOnce { refiner: Box::new(refiner), patcher: patcher.map(Box::new) }),
+        }
     }
 
     /// Meshes the touched part of the scan anew and writes the result.
@@ -487,6 +508,7 @@ impl fmt::Display for Summary {
         }
         write!(f, "push: median {median} ns, p99 {p99} ns, p99.9 {p999} ns, max {max} ns; ")?;
         write!(f, "loaded in {:.2} s, replayed in {:.2} s", self.load_s, self.replay_s)?;
+        self.live.iter().try_for_each(|live| write!(f, "\n{live}"))?;
         self.patch.iter().try_for_each(|patch| write!(f, "\n{patch}"))?;
         self.uncertainty.iter().try_for_each(|known| write!(f, "\n{known}"))
     }

@@ -1,0 +1,136 @@
+//! How samples come: as fast as they can be read, or in real time with the patch beside them.
+
+use std::sync::Arc;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use serde::Serialize;
+
+use super::latency::{Latencies, Quantiles};
+use crate::live::{LiveCounts, LiveError, LiveRefiner, Pace};
+use crate::mesh::{FaceTree, TriMesh};
+use crate::patch::Patcher;
+use crate::refine::{RefineError, Refiner};
+use crate::touch::Sample;
+
+/// Room for new faces that is made ahead.
+const ROOM: usize = 1 << 18;
+
+/// What `--json` prints of `--live`.
+#[derive(Debug, Serialize)]
+pub(super) struct LiveSummary {
+    /// how old the touches are that the mesh shows, in time of the samples
+    behind_ns: Quantiles,
+    renewals: u64,
+    /// renewals for which a sample had to wait
+    waits: u64,
+}
+
+/// The refiner and what keeps what it feels.
+pub(super) enum Rates {
+    /// as fast as they can be read; the patch is made at the end
+    AtOnce { refiner: Box<Refiner>, patcher: Option<Box<Patcher>> },
+    /// in real time
+    Live(Box<Live>),
+}
+
+pub(super) struct Live {
+    refiner: LiveRefiner,
+    /// when the first sample came, and its stamp, ns
+    begun: Option<(Instant, i64)>,
+    behind: Latencies,
+    stopped: Option<LiveError>,
+}
+
+/// What is left when all samples were pushed.
+pub(super) struct Ended {
+    pub refiner: Refiner,
+    pub patcher: Option<Patcher>,
+    pub live: Option<LiveSummary>,
+}
+
+impl Rates {
+    /// - `scan`: as the refiner has it.
+    ///
+    /// # Errors
+    /// As [`LiveRefiner::new`].
+    pub fn live(scan: &TriMesh, refiner: Refiner, patcher: Patcher) -> Result<Self, LiveError> {
+        let scan = Arc::new((scan.clone(), FaceTree::new(scan)));
+        let refiner = LiveRefiner::new(scan, refiner, patcher, Pace::default(), ROOM)?;
+        Ok(Self::Live(Box::new(Live { refiner, begun: None, behind: Latencies::new(), stopped: None })))
+    }
+
+    /// Takes the next sample, in real time when it is due; returns how long that took.
+    ///
+    /// # Errors
+    /// [`RefineError`] for a sample that was refused.
+    pub fn push(&mut self, sample: &Sample) -> Result<Duration, (RefineError, Duration)> {
+        match self {
+            Self::AtOnce { refiner, patcher } => {
+                let begun = Instant::now();
+                let pushed = refiner.push(sample);
+                if let (Ok(_), Some(patcher)) = (&pushed, patcher) {
+                    patcher.push(sample);
+                }
+                let time = begun.elapsed();
+                pushed.map(|_| time).map_err(|error| (error, time))
+            }
+            Self::Live(live) => live.push(sample),
+        }
+    }
+
+    /// Ends the thread of the patch, if there is one.
+    ///
+    /// # Errors
+    /// [`LiveError::Stopped`] when it ended before.
+    pub fn finish(self) -> Result<Ended, LiveError> {
+        match self {
+            Self::AtOnce { refiner, patcher } => {
+                Ok(Ended { refiner: *refiner, patcher: patcher.map(|patcher| *patcher), live: None })
+            }
+            Self::Live(live) => {
+                let Live { refiner, behind, stopped, .. } = *live;
+                if let Some(stopped) = stopped {
+                    return Err(stopped);
+                }
+                let LiveCounts { renewals, waits } = refiner.counts();
+                let (refiner, patcher) = refiner.finish()?;
+                let live = LiveSummary { behind_ns: behind.quantiles(), renewals, waits };
+                Ok(Ended { refiner, patcher: Some(patcher), live: Some(live) })
+            }
+        }
+    }
+}
+
+impl Live {
+    fn push(&mut self, sample: &Sample) -> Result<Duration, (RefineError, Duration)> {
+        let (begun, first_ns) = *self.begun.get_or_insert((Instant::now(), sample.stamp_ns));
+        let due = Duration::from_nanos(u64::try_from(sample.stamp_ns.saturating_sub(first_ns)).unwrap_or(0));
+        sleep(due.saturating_sub(begun.elapsed()));
+        let pushing = Instant::now();
+        let pushed = self.refiner.push(sample);
+        let time = pushing.elapsed();
+        let behind_ns = sample.stamp_ns.saturating_sub(self.refiner.delta().until_ns);
+        if let (Ok(behind_ns), true) = (u64::try_from(behind_ns), self.refiner.counts().renewals > 0) {
+            self.behind.record(Duration::from_nanos(behind_ns));
+        }
+        match pushed {
+            Ok(_) => Ok(time),
+            Err(LiveError::Refine(error)) => Err((error, time)),
+            Err(error) => {
+                // told at the end: the samples that are left change nothing
+                self.stopped = Some(error);
+                Ok(time)
+            }
+        }
+    }
+}
+
+impl std::fmt::Display for LiveSummary {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Quantiles { median, p99, .. } = self.behind_ns;
+        let [median, p99] = [median, p99].map(|ns| ns as f64 * 1e-6);
+        let Self { renewals, waits, .. } = self;
+        write!(f, "live: patch {median:.0} ms behind, p99 {p99:.0} ms; {renewals} renewals, {waits} waited for")
+    }
+}
