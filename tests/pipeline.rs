@@ -289,6 +289,10 @@ fn a_replay_equals_the_first_run_byte_for_byte() {
     // 4.2 s in steps of 8 ms, and what is left at the end
     assert!((520..=530).contains(&number(live, "renewals")), "{live}");
     assert!(plate.bytes("beside.ply") == plate.bytes("live.ply"));
+    fs::write(plate.at("scene.yaml"), "tip:\n  radius_mm: 1.5\nrefine:\n").unwrap();
+    let output = plate.refine("none.ply", &["--live", "--scene", plate.at("scene.yaml").to_str().unwrap()]);
+    assert_eq!(code(&output), 2);
+    assert!(told(&output).contains("add `patch:` to it"), "{}", told(&output));
 }
 
 /// A pose that is no rotation is a lost pose: no sample is lost for it, and the sum says so.
