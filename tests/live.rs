@@ -19,7 +19,7 @@ use plate_stream::{PlateStream, plate_stream};
 use soundness::{intersections, rim_length, soundness};
 
 /// Parts of the patch that are taken up at one sample.
-const AT_ONCE: usize = 60;
+const AT_ONCE: usize = 40;
 /// Time between renewals, ns.
 const EVERY: i64 = 10_000_000;
 
