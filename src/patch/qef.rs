@@ -8,6 +8,8 @@ const SWEEPS: usize = 6;
 const STEPS: usize = 16;
 /// Shares of the way from the start tried where the best point turns the surface over.
 const BACK: [f64; 3] = [0.5, 0.25, 0.0];
+/// A vertex lies on a plane to within this share of how far the crossings are from their mean.
+const ON_PLANE: f64 = 0.1;
 /// How strongly the start holds on where nothing else decides, as a share of the trace.
 const PULL: f64 = 1e-3;
 
@@ -65,6 +67,11 @@ impl Planes {
     /// `start` + `best`, or the first point on the way back to `start` from which no step of the loop through the planes'
     /// points, in their order, is seen from behind; where there is none, the one from which that is least.
     fn unturned(&self, start: &Point3<f64>, best: &Vector3<f64>) -> Point3<f64> {
+        // on all planes at once it is their edge or corner, however its loop looks from there
+        let size = self.steps().map(|(a, _)| (a.0 - start).norm()).fold(0.0, f64::max);
+        if self.steps().all(|(a, _)| a.1.dot(&(start + best - a.0)).abs() < ON_PLANE * size) {
+            return start + best;
+        }
         let sum =
             |term: &dyn Fn(&Plane, &Plane) -> Vector3<f64>| self.steps().map(|(a, b)| term(a, b)).sum::<Vector3<f64>>();
         let area = sum(&|a, b| (a.0 - start).cross(&(b.0 - start)));
