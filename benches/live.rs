@@ -20,7 +20,7 @@ use nalgebra::Vector3;
 use slide::{RADIUS, STEP_NS, STIFFNESS, sample};
 use touchup::live::{LiveRefiner, Pace};
 use touchup::mesh::FaceTree;
-use touchup::patch::{Patcher, PatcherParams};
+use touchup::patch::{Patcher, PatcherParams, UncertaintyParams};
 use touchup::refine::{RefineParams, Refiner, TipParams};
 use touchup::touch::Sample;
 use wavy::wavy_plate;
@@ -29,6 +29,8 @@ use wavy::wavy_plate;
 const WIDTH: f64 = 40e-3;
 /// Noise of the tracker on each axis, m.
 const NOISE: f64 = 0.03e-3;
+/// What the scan is taken to be off, m.
+const SCAN_NOISE: f64 = 0.3e-3;
 /// Samples in one line of the table.
 const MINUTE: usize = 60_000;
 
@@ -64,7 +66,9 @@ fn main() {
     let mesh = wavy_plate(faces);
     let tip = TipParams { radius: RADIUS, stiffness: Some(STIFFNESS) };
     let refiner = Refiner::new(mesh.clone(), RefineParams::robust(tip)).expect("the settings are in range");
-    let patcher = Patcher::new(PatcherParams::new(RADIUS, Some(STIFFNESS), 0.3e-3)).expect("the settings are in range");
+    let mut params = PatcherParams::new(RADIUS, Some(STIFFNESS), SCAN_NOISE);
+    params.uncertainty = Some(UncertaintyParams::new(SCAN_NOISE));
+    let patcher = Patcher::new(params).expect("the settings are in range");
     let scan = Arc::new((mesh.clone(), FaceTree::new(&mesh)));
     let mut live = LiveRefiner::new(scan, refiner, patcher, Pace::default(), 1 << 18).expect("there is memory");
     println!("{} faces, {:.0} MB; {seconds} s at 1 kHz", mesh.face_count(), resident());
