@@ -20,7 +20,7 @@ use nalgebra::Vector3;
 use slide::{RADIUS, STEP_NS, STIFFNESS, sample};
 use touchup::live::{LiveRefiner, Pace};
 use touchup::mesh::FaceTree;
-use touchup::patch::{Patcher, PatcherParams, UncertaintyParams};
+use touchup::patch::{Patcher, PatcherParams};
 use touchup::refine::{RefineParams, Refiner, TipParams};
 use touchup::touch::Sample;
 use wavy::wavy_plate;
@@ -66,8 +66,8 @@ fn main() {
     let mesh = wavy_plate(faces);
     let tip = TipParams { radius: RADIUS, stiffness: Some(STIFFNESS) };
     let refiner = Refiner::new(mesh.clone(), RefineParams::robust(tip)).expect("the settings are in range");
-    let mut params = PatcherParams::new(RADIUS, Some(STIFFNESS), SCAN_NOISE);
-    params.uncertainty = Some(UncertaintyParams::new(SCAN_NOISE));
+    // its uncertainty is asked for, too
+    let params = PatcherParams::new(RADIUS, Some(STIFFNESS), SCAN_NOISE);
     let patcher = Patcher::new(params).expect("the settings are in range");
     let scan = Arc::new((mesh.clone(), FaceTree::new(&mesh)));
     let mut live = LiveRefiner::new(scan, refiner, patcher, Pace::default(), 1 << 18).expect("there is memory");

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::Point3;
 use touchup::live::{LiveRefiner, Pace};
 use touchup::mesh::{FaceId, FaceTree, TriMesh, VertexId};
-use touchup::patch::{PatchDelta, Patcher, PatcherParams, Splice, UncertaintyParams};
+use touchup::patch::{PatchDelta, Patcher, PatcherParams, Splice};
 use touchup::refine::{RefineParams, Refiner, TipParams};
 use touchup::sim::StylusParams;
 use touchup::touch::Sample;
@@ -243,10 +243,8 @@ fn whole(stream: &PlateStream, patcher: &Patcher) -> (Vec<[[u64; 3]; 3]>, Vec<u6
 #[test]
 fn strokes_are_undone_and_redone_bit_for_bit() {
     let stream = last_strokes(3, 0.2);
-    let StylusParams { radius, stiffness, .. } = StylusParams::default();
-    let mut params = PatcherParams::new(radius, Some(stiffness), stream.noise);
-    params.uncertainty = Some(UncertaintyParams::new(stream.noise));
-    let mut patcher = Patcher::new(params).unwrap();
+    let mut patcher = patcher(&stream);
+    let mut again = patcher.clone();
     // the samples with which a stroke begins to count …
     let mut begun = Vec::new();
     for (i, sample) in stream.samples.iter().enumerate() {
@@ -259,7 +257,6 @@ fn strokes_are_undone_and_redone_bit_for_bit() {
     assert!(begun.len() >= 3);
     // … and what was known just before each of them, and at the end
     let mut states = Vec::new();
-    let mut again = Patcher::new(params).unwrap();
     for (i, sample) in stream.samples.iter().enumerate() {
         if begun.contains(&i) {
             states.push(whole(&stream, &again));
@@ -299,6 +296,7 @@ fn undoing_while_touching_brings_the_mesh_back() {
     }
     assert!(last_stroke > 1000);
     live.catch_up().unwrap();
+    assert!(live.is_whole());
     let touched = triangles(live.refiner().mesh());
     assert!(live.undo().unwrap());
     let undone = triangles(live.refiner().mesh());

@@ -135,18 +135,12 @@ pub struct ScanPrior {
 }
 
 impl Evidence<'_> {
-    /// What is known at `x` (m, in O); `None` where the scan has no face.
-    pub fn at(&self, x: &Point3<f64>, scratch: &mut FieldScratch) -> Option<Finding> {
-        Some(self.beside(&ScanValue::at(self.scan, self.tree, x)?, x, scratch))
-    }
-
     /// What is known at `x` (m, in O), where the scan is as `scan` says.
     pub(super) fn beside(&self, scan: &ScanValue, x: &Point3<f64>, scratch: &mut FieldScratch) -> Finding {
-        let scan = *scan;
-        let touched = self.touched_beside(x, || Some(scan), scratch);
+        let touched = self.touched_beside(x, || Some(*scan), scratch);
         let (mut value, mut source) = match &touched {
-            Some(touched) => self.beside_touches(touched, &scan),
-            None => (scan.value, self.away_from_touches(&scan)),
+            Some(touched) => self.beside_touches(touched, scan),
+            None => (scan.value, self.away_from_touches(scan)),
         };
         let (swept_depth, is_free_end) = self.swept_depth(x);
         if swept_depth > 0.0 && source != Source::Touch {
@@ -155,7 +149,7 @@ impl Evidence<'_> {
         if scan.is_on_rim && !matches!(source, Source::Touch | Source::Both) {
             source = Source::Beyond;
         }
-        let straight = touched.and_then(|touched| self.straight_on(&touched, &scan));
+        let straight = touched.and_then(|touched| self.straight_on(&touched, scan));
         Finding { value, source, scan: scan.value, straight, swept_depth, is_free_end }
     }
 

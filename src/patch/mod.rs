@@ -17,6 +17,7 @@ mod clip;
 mod complete;
 mod contact_sigma;
 mod contact_store;
+mod contact_sums;
 mod contour;
 mod crossing;
 mod cut;

@@ -82,7 +82,6 @@ impl Splice {
     /// As [`Self::apply`].
     pub fn begin(&mut self, delta: &PatchDelta, mesh: &mut TriMesh, tree: &mut FaceTree) -> Result<(), MeshError> {
         (self.next_owner, self.next_face) = (0, 0);
-        self.added.clear();
         self.place(delta, mesh, tree)
     }
 
@@ -166,8 +165,6 @@ impl Splice {
             }
             self.placed.push(id);
         }
-        self.refit.sort_unstable();
-        self.refit.dedup();
         tree.refit(mesh, &self.refit);
         Ok(())
     }

@@ -181,9 +181,7 @@ impl DeformableMesh {
         let Self { strokes, mesh, tree, evidence, .. } = self;
         let change = if is_undo { Strokes::undo } else { Strokes::redo };
         let Some(moved) = strokes.as_mut().and_then(|strokes| change(strokes, mesh, evidence)) else { return false };
-        let mut faces: Vec<FaceId> = moved.iter().flat_map(|&vertex| mesh.star(vertex)).copied().collect();
-        faces.sort_unstable();
-        faces.dedup();
+        let faces: Vec<FaceId> = moved.iter().flat_map(|&vertex| mesh.star(vertex)).copied().collect();
         tree.refit(mesh, &faces);
         self.edits += 1;
         true
@@ -212,7 +210,7 @@ impl DeformableMesh {
         let has_put_back = patch.put_back(&mut self.mesh, &mut self.tree, &self.scanned, delta.until_ns);
         patch.begin(delta, &mut self.mesh, &mut self.tree)?;
         self.scanned.resize(self.mesh.vertex_slots(), Point3::origin());
-        for (&vertex, placed) in patch.placed().iter().zip(&delta.vertices) {
+        for (&vertex, placed) in patch.splice.placed().iter().zip(&delta.vertices) {
             self.scanned[vertex.0 as usize] = placed.position;
         }
         let has_moved = has_put_back || !delta.vertices.is_empty();
@@ -223,9 +221,9 @@ impl DeformableMesh {
     /// Replaces the faces of up to `most` owners more; whether that was all.
     pub fn go_on(&mut self, delta: &PatchDelta, most: usize) -> Result<bool, MeshError> {
         let Some(patch) = &mut self.patch else { return Ok(true) };
-        let is_done = patch.go_on(delta, most, &mut self.mesh, &mut self.tree)?;
+        let is_done = patch.splice.go_on(delta, most, &mut self.mesh, &mut self.tree)?;
         self.evidence.resize(self.mesh.face_slots(), [0.0; 3]);
-        for &face in patch.added() {
+        for &face in patch.splice.added() {
             self.evidence[face.0 as usize] = self.mesh.normal(face).cast::<f32>().into();
         }
         self.edits += 1;

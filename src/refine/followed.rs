@@ -14,7 +14,7 @@ const NEVER: i64 = i64::MIN;
 /// The patch as the mesh shows it, and what was moved beside it.
 #[derive(Clone, Debug)]
 pub(super) struct FollowedPatch {
-    splice: Splice,
+    pub splice: Splice,
     /// for each vertex, whether it was touched
     is_touched: Vec<bool>,
     /// vertices that are not where scan and patch have them
@@ -74,8 +74,6 @@ impl FollowedPatch {
             }
             is_late
         });
-        refit.sort_unstable();
-        refit.dedup();
         tree.refit(mesh, refit);
         !refit.is_empty()
     }
@@ -89,26 +87,5 @@ impl FollowedPatch {
             self.is_touched[vertex.0 as usize] = placed.support == Support::Touched;
         }
         Ok(())
-    }
-
-    /// Replaces faces of up to `most` owners more; whether that was all.
-    pub fn go_on(
-        &mut self,
-        delta: &PatchDelta,
-        most: usize,
-        mesh: &mut TriMesh,
-        tree: &mut FaceTree,
-    ) -> Result<bool, MeshError> {
-        self.splice.go_on(delta, most, mesh, tree)
-    }
-
-    /// The faces that were added last.
-    pub fn added(&self) -> &[FaceId] {
-        self.splice.added()
-    }
-
-    /// The vertices of the last delta, in its order.
-    pub fn placed(&self) -> &[VertexId] {
-        self.splice.placed()
     }
 }

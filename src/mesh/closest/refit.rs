@@ -26,7 +26,7 @@ impl RefitPlan {
 }
 
 impl FaceTree {
-    /// Makes the tree exact again after the corners of `faces` moved.
+    /// Makes the tree exact again after the corners of `faces`, each named once or more often, moved.
     pub fn refit(&mut self, mesh: &TriMesh, faces: &[FaceId]) {
         let mut plan = RefitPlan::default();
         self.plan(faces, &mut plan);
