@@ -5,7 +5,7 @@
 //! scan's own distance pulls weakly, so that a pocket that was felt down to somewhere gets a bottom.
 
 use super::evidence::Source;
-use super::lattice::{Node, stepped};
+use super::lattice::{Node, Numbers, stepped};
 use super::restore::{NodeState, Restored, cell_at, node_at};
 use super::table::Table;
 
@@ -41,57 +41,97 @@ const NONE: u32 = u32::MAX;
 
 /// Fills in what is not known among the nodes `at`, then gives up what nothing holds in its place; what is around them
 /// stays as it is.
-pub(super) fn complete(restored: &mut Restored, at: &[u32], params: &CompleteParams) {
-    relax(restored, at, params);
-    if drop_islands(restored, at) {
-        relax(restored, at, params);
+///
+/// - `numbers`: of the nodes around these.
+pub(super) fn complete(restored: &mut Restored, at: &[u32], numbers: &Numbers, params: &CompleteParams) {
+    relax(restored, at, numbers, params);
+    if drop_islands(restored, at, numbers) {
+        relax(restored, at, numbers, params);
     }
+}
+
+/// An open question, and what decides it.
+struct Question {
+    /// its number, and those of its neighbours that say something, among the values at hand
+    here: u32,
+    around: [u32; 6],
+    neighbours: u8,
+    /// Σ w f and Σ w over all but the neighbours, then over all
+    pull: f64,
+    weight: f64,
+    least: f64,
 }
 
 /// Successive over-relaxation, from below by the space that the ball went through.
-fn relax(restored: &mut Restored, at: &[u32], params: &CompleteParams) {
-    let open: Vec<(u32, [u32; 6])> = at
-        .iter()
-        .filter(|&&at| restored.nodes.entry(at).1.is_open_question())
-        .map(|&at| (at, neighbours(restored, at)))
-        .collect();
+fn relax(restored: &mut Restored, at: &[u32], numbers: &Numbers, params: &CompleteParams) {
+    let open: Vec<u32> = at.iter().copied().filter(|&at| restored.nodes.entry(at).1.is_open_question()).collect();
+    // the values at hand, close together
+    let mut met: Table<u32, f64> = Table::default();
+    let mut number = |at: u32| met.insert_with(at, || restored.nodes.entry(at).1.value).0;
+    let questions: Vec<Question> =
+        open.iter().map(|&at| question(restored, at, numbers, params, &mut number)).collect();
+    let mut values: Vec<f64> = met.iter().map(|(_, value)| *value).collect();
     for _ in 0..SWEEPS {
         let mut largest = 0.0f64;
-        for (at, around) in &open {
-            let state = restored.nodes.entry(*at).1;
-            let pull = if state.source == Source::Far { params.pull } else { 0.0 };
-            let (straight, share) = state.straight;
-            let weight = STRAIGHT * share;
-            let (mut sum, mut count) = (pull * state.scan + weight * straight, pull + weight);
-            for &other in around.iter().filter(|&&other| other != NONE) {
-                sum += restored.nodes.entry(other).1.value;
-                count += 1.0;
+        for question in questions.iter().filter(|question| question.weight > 0.0) {
+            let mut sum = question.pull;
+            for &other in &question.around[..question.neighbours as usize] {
+                sum += values[other as usize];
             }
-            if count > 0.0 {
-                let next = (state.value + RELAXATION * (sum / count - state.value)).max(state.least);
-                largest = largest.max((next - state.value).abs());
-                restored.nodes.value_mut(*at).value = next;
-            }
+            let value = &mut values[question.here as usize];
+            let next = (*value + RELAXATION * (sum / question.weight - *value)).max(question.least);
+            largest = largest.max((next - *value).abs());
+            *value = next;
         }
         if largest < params.enough {
-            return;
+            break;
         }
+    }
+    for (&at, question) in open.iter().zip(&questions) {
+        restored.nodes.value_mut(at).value = values[question.here as usize];
     }
 }
 
+fn question(
+    restored: &Restored,
+    at: u32,
+    numbers: &Numbers,
+    params: &CompleteParams,
+    mut number: impl FnMut(u32) -> u32,
+) -> Question {
+    let state = &restored.nodes.entry(at).1;
+    let pull = if state.source == Source::Far { params.pull } else { 0.0 };
+    let (straight, share) = state.straight;
+    let weight = STRAIGHT * share;
+    let mut question = Question {
+        here: number(at),
+        around: [0; 6],
+        neighbours: 0,
+        pull: pull * state.scan + weight * straight,
+        weight: pull + weight,
+        least: state.least,
+    };
+    for other in neighbours(restored, at, numbers).into_iter().filter(|&other| other != NONE) {
+        question.around[question.neighbours as usize] = number(other);
+        question.neighbours += 1;
+        question.weight += 1.0;
+    }
+    question
+}
+
 /// The nodes around one, as far as they are there and say something.
-fn neighbours(restored: &Restored, at: u32) -> [u32; 6] {
+fn neighbours(restored: &Restored, at: u32, numbers: &Numbers) -> [u32; 6] {
     let node = restored.nodes.entry(at).0;
     std::array::from_fn(|i| {
         let other = stepped(node, i / 2, if i % 2 == 0 { 1 } else { -1 });
-        let index = restored.nodes.index_of(&other);
+        let index = numbers.of(&restored.nodes, &other);
         index.filter(|&index| restored.nodes.entry(index).1.source != Source::Beyond).unwrap_or(NONE)
     })
 }
 
 /// Gives up material and void that nothing holds in its place: a piece of one sign, within the nodes looked at, that was
 /// neither touched nor swept. Returns whether there was any.
-fn drop_islands(restored: &mut Restored, at: &[u32]) -> bool {
+fn drop_islands(restored: &mut Restored, at: &[u32], numbers: &Numbers) -> bool {
     let mut seen = vec![Seen::Outside; restored.nodes.len()];
     at.iter().for_each(|&at| seen[at as usize] = Seen::NotYet);
     let (mut island, mut has_dropped) = (Vec::new(), false);
@@ -102,7 +142,7 @@ fn drop_islands(restored: &mut Restored, at: &[u32]) -> bool {
         seen[start as usize] = Seen::Yes;
         island.clear();
         island.push(start);
-        if !is_held(restored, &mut island, &mut seen) {
+        if !is_held(restored, &mut island, &mut seen, numbers) {
             has_dropped = true;
             for &at in &island {
                 let state = restored.nodes.value_mut(at);
@@ -123,12 +163,12 @@ enum Seen {
 }
 
 /// Gathers the piece of one sign around its first node; whether evidence or what lies beyond those looked at holds it.
-fn is_held(restored: &Restored, piece: &mut Vec<u32>, seen: &mut [Seen]) -> bool {
+fn is_held(restored: &Restored, piece: &mut Vec<u32>, seen: &mut [Seen], numbers: &Numbers) -> bool {
     let (mut next, mut is_held) = (0, false);
     while let Some(&at) = piece.get(next) {
         next += 1;
         let state = &restored.nodes.entry(at).1;
-        let around = neighbours(restored, at);
+        let around = neighbours(restored, at, numbers);
         is_held |= matches!(state.source, Source::Touch | Source::Beyond) || state.least > 0.0;
         is_held |= around.contains(&NONE);
         for other in around.into_iter().filter(|&other| other != NONE) {

@@ -94,7 +94,7 @@ pub struct Finding {
     pub straight: Option<(f64, f64)>,
     /// how deep the point is in the space that the ball went through, m; not more than 0 outside of it
     pub swept_depth: f64,
-    /// the ball that was here ended its way towards the point and touched nothing
+    /// the ball that went through it ended its way towards the point and touched nothing
     pub is_free_end: bool,
 }
 
@@ -252,10 +252,14 @@ impl Evidence<'_> {
     fn swept_depth(&self, x: &Point3<f64>) -> (f64, bool) {
         let p = self.params;
         let Some((distance, centre)) = self.swept.nearest(x) else { return (f64::NEG_INFINITY, false) };
+        let depth = p.radius - p.swept_margin - distance;
+        if depth <= 0.0 {
+            return (depth, false);
+        }
         let mut is_free = (x - centre)
             .try_normalize(0.0)
             .is_some_and(|direction| self.swept.is_end(&centre, &direction, p.radius / 2.0));
         self.contacts.near(&centre, p.free_reach, |_, _| is_free = false);
-        (p.radius - p.swept_margin - distance, is_free)
+        (depth, is_free)
     }
 }

@@ -175,6 +175,40 @@ impl CellBox {
     }
 }
 
+/// Numbers of the keys of a table, found by place within a box where that is small, else by the table. It holds until a
+/// key comes or goes.
+pub(super) struct Numbers {
+    cells: CellBox,
+    size: [usize; 3],
+    /// [`Self::NONE`] where there is no key
+    numbers: Vec<u32>,
+}
+
+impl Numbers {
+    /// No key.
+    const NONE: u32 = u32::MAX;
+
+    /// Looks the keys in `cells` up.
+    pub fn new<V>(table: &Table<Node, V>, cells: &CellBox) -> Self {
+        let cells = if cells.volume() < table.len() as f64 { *cells } else { CellBox::EMPTY };
+        let mut numbers = Vec::with_capacity(cells.volume() as usize);
+        cells.each(|node| numbers.push(table.index_of(&node).unwrap_or(Self::NONE)));
+        let size = std::array::from_fn(|i| if cells.is_empty() { 0 } else { (cells.hi[i] - cells.lo[i]) as usize + 1 });
+        Self { cells, size, numbers }
+    }
+
+    /// The number of `node` in the table that this was made of.
+    #[inline]
+    pub fn of<V>(&self, table: &Table<Node, V>, node: &Node) -> Option<u32> {
+        if !self.cells.contains(node) {
+            return table.index_of(node);
+        }
+        let [x, y, z]: [usize; 3] = std::array::from_fn(|i| (node[i] - self.cells.lo[i]) as usize);
+        let number = self.numbers[(x * self.size[1] + y) * self.size[2] + z];
+        (number != Self::NONE).then_some(number)
+    }
+}
+
 /// An edge of the lattice: from `node` one step up along `axis`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Edge {

@@ -22,6 +22,8 @@ pub(super) struct Remesh {
     region: Region,
     /// cells that are in the region only because patch and scan cannot be joined at their squares
     grown: Table<Node, ()>,
+    /// cells that patch and scan would need to be joined, for which nothing was known
+    wanted: Table<Node, ()>,
     /// a box that holds the region
     bounds: CellBox,
     crossings: Crossings,
@@ -46,6 +48,7 @@ impl Remesh {
             restored: Restored::default(),
             region: Region::default(),
             grown: Table::default(),
+            wanted: Table::default(),
             bounds: CellBox::EMPTY,
             crossings: Crossings::default(),
         }
@@ -67,7 +70,7 @@ impl Remesh {
     pub fn renew(&mut self, evidence: &Evidence<'_>, news: &News, late: &News) -> Renewed {
         let changed = self.restored.renew(evidence, &self.lattice, news, late);
         let mut core = CellBox::EMPTY;
-        for node in &changed.nodes {
+        for node in &changed.at_surface {
             // the slope at a crossing is taken over the nodes beside it
             core.take(&node.map(|x| x.saturating_sub(2)));
             core.take(&node.map(|x| x.saturating_add(1)));
@@ -76,12 +79,16 @@ impl Remesh {
         for (cell, ()) in cells_of(&changed).iter() {
             let was_in = self.region.contains(&cell);
             self.grown.remove(&cell);
-            if self.restored.is_in_region(cell) {
+            let is_in = self.restored.is_in_region(cell);
+            if is_in && !was_in {
                 self.region.insert(cell, ());
                 self.bounds.take(&cell);
-            } else if was_in {
+            } else if was_in && !is_in {
                 self.region.remove(&cell);
                 blocks.push(cell);
+            }
+            if is_in != was_in || self.wanted.contains(&cell) {
+                take_around(&mut core, &cell);
             }
         }
         changed.open.iter().for_each(|cell| take_around(&mut core, cell));
@@ -99,6 +106,7 @@ impl Remesh {
             {
                 has_grown |= self.region.insert_with(open.beyond, || ()).1;
                 self.grown.insert_with(open.beyond, || ());
+                self.wanted.remove(&open.beyond);
                 self.bounds.take(&open.beyond);
                 take_around(&mut core, &open.beyond);
             }
@@ -106,6 +114,9 @@ impl Remesh {
                 break;
             }
             renewed = self.contoured(evidence, core, left);
+        }
+        for open in renewed.patch.open.iter().filter(|open| open.is_scanned) {
+            self.wanted.insert(open.beyond, ());
         }
         renewed
     }

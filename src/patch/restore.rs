@@ -6,7 +6,7 @@ use super::complete::{CompleteParams, complete, open_cells};
 use super::evidence::{Evidence, Source};
 use super::field::FieldScratch;
 use super::jumps::is_torn;
-use super::lattice::{CellBox, Lattice, Node, stepped};
+use super::lattice::{CellBox, Lattice, Node, Numbers, stepped};
 use super::scan_value::ScanValue;
 use super::table::Table;
 use super::{NodeValues, Region};
@@ -78,6 +78,8 @@ impl News {
 pub(super) struct Changed {
     /// nodes that are new, or whose value or source is another
     pub nodes: Vec<Node>,
+    /// those of them on which the surface in the cells around them depends
+    pub at_surface: Vec<Node>,
     /// cells that are to stay open now, or no more
     pub open: Vec<Node>,
 }
@@ -208,6 +210,7 @@ impl Restored {
         let params = CompleteParams::new(lattice.pitch, evidence.params.radius);
         let area = area.widened(SETTLED, SETTLED);
         let at = self.indices_in(&area);
+        let numbers = Numbers::new(&self.nodes, &area);
         let was: Vec<Option<NodeState>> = at
             .iter()
             .map(|&at| {
@@ -215,8 +218,8 @@ impl Restored {
                 before.get(node).map_or(Some(*state), |before| *before)
             })
             .collect();
-        complete(self, &at, &params);
-        let mut changed = Changed::default();
+        complete(self, &at, &numbers, &params);
+        let (mut changed, mut turned) = (Changed::default(), Vec::new());
         for (&at, was) in at.iter().zip(&was) {
             let (node, now) = *self.nodes.entry(at);
             let state = self.nodes.value_mut(at);
@@ -227,11 +230,28 @@ impl Restored {
                 _ => {
                     state.renewal = self.renewals;
                     changed.nodes.push(node);
+                    turned.push(was.is_some_and(|was| (was.value < 0.0) != (now.value < 0.0)));
                 }
             }
         }
+        let nodes = changed.nodes.iter().zip(turned);
+        let at_surface = nodes.filter(|(node, has_turned)| *has_turned || self.is_at_surface(&numbers, node));
+        changed.at_surface = at_surface.map(|(node, _)| *node).collect();
         changed.open = self.renew_open(&area, &params);
         changed
+    }
+
+    /// Whether the surface in the cells around a node depends on its value: one of them is crossed, or an edge from a
+    /// neighbour is, at whose crossing the slope is taken with it.
+    fn is_at_surface(&self, numbers: &Numbers, node: &Node) -> bool {
+        let is_material = |node: Node| {
+            let at = numbers.of(&self.nodes, &node)?;
+            Some(self.nodes.entry(at).1.value < 0.0)
+        };
+        let here = is_material(*node);
+        let beyond = (0..6).map(|i| stepped(*node, i / 2, if i % 2 == 0 { 2 } else { -2 }));
+        let is_other = |other: Node| is_material(other).is_some_and(|other| Some(other) != here);
+        CellBox { lo: *node, hi: *node }.widened(1, 1).iter().chain(beyond).any(is_other)
     }
 
     /// Numbers of the nodes in a box; in the order in which they came where that is all of them.
