@@ -131,12 +131,12 @@ fn one_after_the_other(stream: &PlateStream, pace: Pace) -> (TriMesh, TriMesh) {
             due.push_back((here * pace.every_ns + pace.after_ns, patcher.renewed(&stream.scan, &tree)));
         }
         patcher.push(sample);
-        if at_hand.as_ref().is_some_and(|delta| refiner.go_on_following(delta, AT_ONCE).unwrap()) {
-            at_hand = None;
-        }
         if at_hand.is_none() && due.front().is_some_and(|(due_ns, _)| *due_ns <= sample.stamp_ns) {
             at_hand = due.pop_front().map(|(_, delta)| delta);
-            at_hand.iter().for_each(|delta| refiner.begin_to_follow(delta).unwrap());
+            at_hand.iter().for_each(|delta| refiner.begin_to_follow(delta));
+        }
+        if at_hand.as_ref().is_some_and(|delta| refiner.go_on_following(delta, AT_ONCE).unwrap()) {
+            at_hand = None;
         }
     }
     let touching = refiner.mesh().clone();

@@ -55,7 +55,7 @@ impl Pace {
     }
 }
 
-/// Parts of the patch whose faces are replaced at one sample: some 50 µs on a mesh of a million faces.
+/// Parts of a change of the patch that are taken up at one sample: some 50 µs on a mesh of a million faces.
 const AT_ONCE: usize = 40;
 
 /// How far the patch was behind.
@@ -127,14 +127,16 @@ impl LiveRefiner {
             self.ask(slot.saturating_mul(self.pace.every_ns).saturating_add(self.pace.after_ns))?;
         }
         self.batch.push(*sample);
-        self.go_on(AT_ONCE)?;
-        if self.is_done && self.due_ns.front().is_some_and(|&due_ns| due_ns <= sample.stamp_ns) {
+        if !self.is_done {
+            self.go_on(AT_ONCE)?;
+        } else if self.due_ns.front().is_some_and(|&due_ns| due_ns <= sample.stamp_ns) {
             self.take_up()?;
+            self.go_on(AT_ONCE)?;
         }
         Ok(update)
     }
 
-    /// Replaces some more faces of the change at hand.
+    /// Takes up some more of the change at hand.
     fn go_on(&mut self, most: usize) -> Result<(), LiveError> {
         if !self.is_done {
             self.is_done = self.refiner.go_on_following(&self.delta, most)?;
@@ -207,7 +209,7 @@ impl LiveRefiner {
         self.counts.renewals += 1;
         self.counts.waits += u64::from(has_waited);
         self.is_done = false;
-        self.refiner.begin_to_follow(&self.delta)?;
+        self.refiner.begin_to_follow(&self.delta);
         Ok(has_changed_strokes)
     }
 

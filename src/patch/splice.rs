@@ -49,6 +49,9 @@ impl Patch {
     }
 }
 
+/// To place so many vertices takes as long as to replace the faces of one owner.
+const VERTICES_OF_A_PART: usize = 4;
+
 /// A mesh follows a patch: which of its faces and vertices are those of the patch.
 #[derive(Clone, Debug, Default)]
 pub struct Splice {
@@ -71,22 +74,20 @@ impl Splice {
     /// [`MeshError::TooMany`] when 32-bit ids do not suffice, [`MeshError::NotFinite`] for a position that is not finite;
     /// the mesh is torn then.
     pub fn apply(&mut self, delta: &PatchDelta, mesh: &mut TriMesh, tree: &mut FaceTree) -> Result<(), MeshError> {
-        self.begin(delta, mesh, tree)?;
+        self.begin();
         self.go_on(delta, usize::MAX, mesh, tree)?;
         Ok(())
     }
 
-    /// Places the vertices of a delta; its faces are those before until [`Self::go_on`] has replaced them.
-    ///
-    /// # Errors
-    /// As [`Self::apply`].
-    pub fn begin(&mut self, delta: &PatchDelta, mesh: &mut TriMesh, tree: &mut FaceTree) -> Result<(), MeshError> {
+    /// Begins with the next delta: [`Self::go_on`] takes it up.
+    pub fn begin(&mut self) {
+        self.placed.clear();
         (self.next_owner, self.next_face) = (0, 0);
-        self.place(delta, mesh, tree)
     }
 
-    /// Replaces the faces of up to `most` owners more of the delta that was begun; returns whether that was all. In between
-    /// the mesh has gaps and overlaps where old faces meet new ones.
+    /// Takes up to `most` parts more of the delta that was begun: places its vertices, a few to a part, then replaces the
+    /// faces of its owners; returns whether that was all. In between the mesh has gaps and overlaps where old faces meet new
+    /// ones.
     ///
     /// # Errors
     /// As [`Self::apply`].
@@ -98,7 +99,9 @@ impl Splice {
         tree: &mut FaceTree,
     ) -> Result<bool, MeshError> {
         self.added.clear();
-        for &(owner, count) in delta.owners.iter().skip(self.next_owner).take(most) {
+        let left = most - self.place(delta, most, mesh, tree)?;
+        let left = if self.placed.len() < delta.vertices.len() { 0 } else { left };
+        for &(owner, count) in delta.owners.iter().skip(self.next_owner).take(left) {
             self.remove_faces(owner, mesh, tree);
             let mut ours = Vec::with_capacity(count as usize);
             for corners in delta.faces.iter().skip(self.next_face).take(count as usize) {
@@ -113,7 +116,7 @@ impl Splice {
                 self.faces.insert(owner, ours);
             }
         }
-        let is_done = self.next_owner >= delta.owners.len();
+        let is_done = self.placed.len() >= delta.vertices.len() && self.next_owner >= delta.owners.len();
         for key in delta.gone.iter().filter(|_| is_done) {
             if let Some(vertex) = self.vertices.remove(key) {
                 mesh.remove_vertex(vertex);
@@ -127,7 +130,7 @@ impl Splice {
         &self.added
     }
 
-    /// The vertices of the last delta, in its order.
+    /// The vertices of the last delta that were placed so far, in its order.
     pub fn placed(&self) -> &[VertexId] {
         &self.placed
     }
@@ -144,11 +147,19 @@ impl Splice {
         }
     }
 
-    /// Adds new vertices and moves those that are elsewhere now.
-    fn place(&mut self, delta: &PatchDelta, mesh: &mut TriMesh, tree: &mut FaceTree) -> Result<(), MeshError> {
-        self.placed.clear();
+    /// Adds new vertices and moves those that are elsewhere now, up to `most` parts of them; returns how many those were.
+    fn place(
+        &mut self,
+        delta: &PatchDelta,
+        most: usize,
+        mesh: &mut TriMesh,
+        tree: &mut FaceTree,
+    ) -> Result<usize, MeshError> {
         self.refit.clear();
-        for &PatchVertex { key, position, .. } in &delta.vertices {
+        let before = self.placed.len();
+        for &PatchVertex { key, position, .. } in
+            delta.vertices.iter().skip(before).take(most.saturating_mul(VERTICES_OF_A_PART))
+        {
             let known = match key {
                 VertexKey::Scan(id) => Some(id),
                 _ => self.vertices.get(&key).copied(),
@@ -166,6 +177,6 @@ impl Splice {
             self.placed.push(id);
         }
         tree.refit(mesh, &self.refit);
-        Ok(())
+        Ok((self.placed.len() - before).div_ceil(VERTICES_OF_A_PART))
     }
 }

@@ -204,24 +204,19 @@ impl DeformableMesh {
         self.patch.as_ref().is_some_and(|patch| self.mesh.corners(face).into_iter().all(|v| patch.is_touched(v)))
     }
 
-    /// Begins to take up what changed in the patch, and puts back what was moved before that; returns whether anything moved.
-    pub fn begin_delta(&mut self, delta: &PatchDelta) -> Result<bool, MeshError> {
-        let Some(patch) = &mut self.patch else { return Ok(false) };
+    /// Begins to take up what changed in the patch: puts back what was moved before that; returns whether anything was.
+    pub fn begin_delta(&mut self, delta: &PatchDelta) -> bool {
+        let Some(patch) = &mut self.patch else { return false };
+        patch.splice.begin();
         let has_put_back = patch.put_back(&mut self.mesh, &mut self.tree, &self.scanned, delta.until_ns);
-        patch.begin(delta, &mut self.mesh, &mut self.tree)?;
-        self.scanned.resize(self.mesh.vertex_slots(), Point3::origin());
-        for (&vertex, placed) in patch.splice.placed().iter().zip(&delta.vertices) {
-            self.scanned[vertex.0 as usize] = placed.position;
-        }
-        let has_moved = has_put_back || !delta.vertices.is_empty();
-        self.edits += u64::from(has_moved);
-        Ok(has_moved)
+        self.edits += u64::from(has_put_back);
+        has_put_back
     }
 
-    /// Replaces the faces of up to `most` owners more; whether that was all.
+    /// Takes up to `most` parts more of it; whether that was all.
     pub fn go_on(&mut self, delta: &PatchDelta, most: usize) -> Result<bool, MeshError> {
-        let Some(patch) = &mut self.patch else { return Ok(true) };
-        let is_done = patch.splice.go_on(delta, most, &mut self.mesh, &mut self.tree)?;
+        let Self { patch: Some(patch), mesh, tree, scanned, .. } = self else { return Ok(true) };
+        let is_done = patch.go_on(delta, most, mesh, tree, scanned)?;
         self.evidence.resize(self.mesh.face_slots(), [0.0; 3]);
         for &face in patch.splice.added() {
             self.evidence[face.0 as usize] = self.mesh.normal(face).cast::<f32>().into();

@@ -78,14 +78,24 @@ impl FollowedPatch {
         !refit.is_empty()
     }
 
-    /// Places the vertices of a delta.
-    pub fn begin(&mut self, delta: &PatchDelta, mesh: &mut TriMesh, tree: &mut FaceTree) -> Result<(), MeshError> {
-        self.splice.begin(delta, mesh, tree)?;
+    /// Takes up some more of a delta, as [`Splice::go_on`]; notes what its vertices rest on, and where they are `scanned`.
+    pub fn go_on(
+        &mut self,
+        delta: &PatchDelta,
+        most: usize,
+        mesh: &mut TriMesh,
+        tree: &mut FaceTree,
+        scanned: &mut Vec<Point3<f64>>,
+    ) -> Result<bool, MeshError> {
+        let before = self.splice.placed().len();
+        let is_done = self.splice.go_on(delta, most, mesh, tree)?;
         self.is_touched.resize(mesh.vertex_slots(), false);
         self.moved_ns.resize(mesh.vertex_slots(), NEVER);
-        for (vertex, placed) in self.splice.placed().iter().zip(&delta.vertices) {
+        scanned.resize(mesh.vertex_slots(), Point3::origin());
+        for (vertex, placed) in self.splice.placed().iter().zip(&delta.vertices).skip(before) {
             self.is_touched[vertex.0 as usize] = placed.support == Support::Touched;
+            scanned[vertex.0 as usize] = placed.position;
         }
-        Ok(())
+        Ok(is_done)
     }
 }

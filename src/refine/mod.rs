@@ -435,30 +435,26 @@ impl Refiner {
     /// # Errors
     /// [`MeshError::TooMany`] when 32-bit ids do not suffice, [`MeshError::NotFinite`]; the mesh is torn then.
     pub fn follow(&mut self, delta: &PatchDelta) -> Result<(), RefineError> {
-        self.begin_to_follow(delta)?;
+        self.begin_to_follow(delta);
         self.go_on_following(delta, usize::MAX)?;
         Ok(())
     }
 
     /// As [`Self::follow`], bit by bit, so that no sample has to wait for long: [`Self::go_on_following`] is to be called with
     /// the same delta until it is done.
-    ///
-    /// # Errors
-    /// As [`Self::follow`].
-    pub fn begin_to_follow(&mut self, delta: &PatchDelta) -> Result<(), RefineError> {
-        if self.deformable.begin_delta(delta)? {
+    pub fn begin_to_follow(&mut self, delta: &PatchDelta) {
+        if self.deformable.begin_delta(delta) {
             self.forget_regions();
         }
-        Ok(())
     }
 
-    /// Replaces faces of up to `most` parts of the patch more; returns whether that was all. In between the mesh has gaps and
-    /// overlaps where old faces meet new ones.
+    /// Takes up to `most` parts more of the change of the patch, as [`crate::patch::Splice::go_on`]; returns whether that was
+    /// all. In between the mesh has gaps and overlaps where old faces meet new ones.
     ///
     /// # Errors
     /// As [`Self::follow`].
     pub fn go_on_following(&mut self, delta: &PatchDelta, most: usize) -> Result<bool, RefineError> {
-        if !delta.owners.is_empty() {
+        if !delta.is_empty() {
             self.forget_regions();
         }
         Ok(self.deformable.go_on(delta, most)?)
