@@ -37,11 +37,25 @@ impl Pairs {
         self.travel = 0.0;
     }
 
-    /// Adds a pair unless it shares an edge (neighbours fold, they do not pierce) or is farther apart than `margin` (m).
-    pub fn add(&mut self, mesh: &TriMesh, a: FaceId, b: FaceId, margin: f64) {
-        if apart(&bounds(&mesh.triangle(a)), &bounds(&mesh.triangle(b)), margin) {
-            return;
+    /// Finds the pairs of `face` and each of `others` that are no farther apart than `margin` (m) and that `is_wanted`,
+    /// unless they share an edge: neighbours fold, they do not pierce.
+    pub fn add_near(
+        &mut self,
+        mesh: &TriMesh,
+        face: FaceId,
+        others: &[(FaceId, Bounds)],
+        margin: f64,
+        is_wanted: impl Fn(FaceId) -> bool,
+    ) {
+        let here = bounds(&mesh.triangle(face));
+        for &(other, _) in others.iter().filter(|(_, there)| !apart(&here, there, margin)) {
+            if is_wanted(other) {
+                self.add(mesh, face, other);
+            }
         }
+    }
+
+    fn add(&mut self, mesh: &TriMesh, a: FaceId, b: FaceId) {
         let (corners, others) = (mesh.corners(a), mesh.corners(b));
         let mut common = (0..3).filter_map(|i| {
             let at = others.iter().position(|other| *other == corners[i])?;
@@ -85,10 +99,11 @@ impl Pairs {
     }
 }
 
-type Bounds = (Vector3<f64>, Vector3<f64>);
+/// Lowest and highest coordinates, m.
+pub(super) type Bounds = (Vector3<f64>, Vector3<f64>);
 
 #[inline]
-fn bounds([a, b, c]: &Triangle) -> Bounds {
+pub(super) fn bounds([a, b, c]: &Triangle) -> Bounds {
     (a.coords.inf(&b.coords).inf(&c.coords), a.coords.sup(&b.coords).sup(&c.coords))
 }
 

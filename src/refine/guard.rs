@@ -4,7 +4,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::collision::Pairs;
+use super::collision::{Bounds, Pairs, bounds};
 use super::marks::Marks;
 use super::ring::Ring;
 use crate::mesh::{BoxQuery, FaceId, FaceTree, TriMesh, VertexId, triangle};
@@ -119,6 +119,8 @@ pub(super) struct Neighbourhood {
     /// how far vertices may still move before the region must be looked at again, m
     unseen: f64,
     near: BoxQuery,
+    /// the faces nearby with their boxes
+    boxes: Vec<(FaceId, Bounds)>,
     /// corners that hang together with the region
     reached: Marks,
 }
@@ -144,6 +146,7 @@ impl Neighbourhood {
         }
         self.ring.reserve(vertices);
         self.near = BoxQuery::with_room(2 * faces);
+        self.boxes.reserve(2 * faces);
         self.suspects.reserve(faces);
         self.reached.reserve(4 * faces);
     }
@@ -230,14 +233,12 @@ impl Neighbourhood {
 
     fn collect_suspects(&mut self, mesh: &TriMesh, margin: f64) {
         self.suspects.clear();
-        for moving in 0..self.ring.moving {
-            for &other in &self.near.faces {
-                // two moving faces are one pair
-                let index = self.ring.number_of(other).map(|index| index as usize);
-                if index.is_none_or(|index| index > moving) {
-                    self.suspects.add(mesh, self.ring.faces[moving], other, margin);
-                }
-            }
+        self.boxes.clear();
+        self.boxes.extend(self.near.faces.iter().map(|&face| (face, bounds(&mesh.triangle(face)))));
+        for (moving, &face) in self.ring.moving().iter().enumerate() {
+            // two moving faces are one pair
+            let is_wanted = |other| self.ring.number_of(other).is_none_or(|index| index as usize > moving);
+            self.suspects.add_near(mesh, face, &self.boxes, margin, is_wanted);
         }
     }
 
