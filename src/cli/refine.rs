@@ -368,14 +368,9 @@ impl RefineArguments {
             );
         }
         let build_s = started.elapsed().as_secs_f64();
-        let mut columns = vec![
-            VertexColumn { name: "touched", values: touched_column(&patched).into() },
-            VertexColumn { name: "support", values: support_column(&patched).into() },
-        ];
         let uncertainty = patcher.params().uncertainty.map(|_| UncertaintySummary::of(&patched, patcher.knocks()));
-        if uncertainty.is_some() {
-            columns.push(VertexColumn { name: "sigma_mm", values: sigma_column(&patched).into() });
-        }
+        let columns = patched.columns().into_iter();
+        let columns: Vec<_> = columns.map(|(name, values)| VertexColumn { name, values: values.into() }).collect();
         write_mesh_with(&self.out, &patched.mesh, &columns, self.mesh_unit).map_err(CliError::WriteMesh)?;
         debug!(open_squares = patched.open_squares, "patched");
         let moved_faces = moved_faces(scan, &patched.mesh);
@@ -426,32 +421,6 @@ impl RefineArguments {
         scene.check().map_err(|error| CliError::Usage(error.to_string()))?;
         Ok(scene)
     }
-}
-
-/// 1 for a vertex that was touched, 0.5 for one that is guessed from touches nearby, 0 for one of the scan.
-fn touched_column(patched: &Patched) -> Vec<f32> {
-    let touched = |support: &Support| match support {
-        Support::Touched => 1.0,
-        Support::Guessed | Support::Unreachable => 0.5,
-        Support::Scan => 0.0,
-    };
-    patched.support.iter().map(touched).collect()
-}
-
-/// Standard deviation of each vertex along the normal, mm.
-fn sigma_column(patched: &Patched) -> Vec<f32> {
-    patched.sigma.iter().map(|sigma| (sigma * 1e3) as f32).collect()
-}
-
-/// 0 for a vertex of the scan, 1 for one that was touched, 2 for one that is guessed, 3 for one that the ball cannot reach.
-fn support_column(patched: &Patched) -> Vec<f32> {
-    let support = |support: &Support| match support {
-        Support::Scan => 0.0,
-        Support::Touched => 1.0,
-        Support::Guessed => 2.0,
-        Support::Unreachable => 3.0,
-    };
-    patched.support.iter().map(support).collect()
 }
 
 impl PatchSummary {

@@ -10,6 +10,7 @@ use super::felt::Felt;
 use super::field::FieldScratch;
 use super::knocks::Knocks;
 use super::lattice::{CellBox, Lattice, Node, VertexKey};
+use super::patched::{Patched, Support};
 use super::remesh::{Remesh, Renewed};
 use super::restore::{News, Restored, node_at};
 use super::splice::Patch;
@@ -130,38 +131,6 @@ impl PatcherParams {
         }
         self.uncertainty.iter().try_for_each(UncertaintyParams::check)
     }
-}
-
-/// What a vertex rests on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Support {
-    /// the scan
-    Scan,
-    /// touches
-    Touched,
-    /// what touches, free space and scan nearby suggest; nothing was felt here
-    Guessed,
-    /// as that, and nothing can be felt here: the ball does not go so far into an inner corner, or into what is narrower
-    Unreachable,
-}
-
-/// A scan with its touched part meshed anew.
-#[derive(Clone, Debug)]
-pub struct Patched {
-    /// vertices and faces that were not touched keep their ids
-    pub mesh: TriMesh,
-    /// what each vertex rests on, by id
-    pub support: Vec<Support>,
-    /// standard deviation of each vertex along the normal, m, by id; none where [`PatcherParams::uncertainty`] is not set
-    pub sigma: Vec<f64>,
-    /// edge length of the lattice, m
-    pub pitch: f64,
-    /// faces of the scan that went
-    pub removed_faces: usize,
-    /// faces that came
-    pub added_faces: usize,
-    /// squares on which scan and patch could not be joined
-    pub open_squares: usize,
 }
 
 /// Keeps what was touched and where the ball went, and makes the patch of it.
