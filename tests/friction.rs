@@ -208,14 +208,15 @@ fn the_median_normal_of_a_sliding_ball_is_within_three_degrees_whatever_the_fric
             );
             let expected = f64::atan(mu).to_degrees();
             assert!((raw[0] - expected).abs() < 1.0, "the raw force errs by atan mu: {} {expected}", raw[0]);
-            // with the most noise a tenth is worse: the ends of lines, and the first 20 mm, where friction is not known yet
-            let worse = if pose_noise > 0.1e-3 { 6.0 } else { 3.0 };
-            assert!(centred[0] < 3.0 && centred[1] < worse, "{centred:?}");
-            // the past alone leaves the way along the surface to noise: 0.2 mm on each axis, 500 times a second, is too much
-            assert!(causal[0] < worse.min(5.0), "{causal:?}");
-            check_friction(&found.friction, &found.true_friction, 0.01);
+            // with the most noise a tenth is worse, at less than 20 mm/s: the way along the surface is off by φ σᵥ / v, which
+            // is 2.8° for μ = 0.4 at 15 mm/s, one standard deviation
+            let [[median, worse], [past_median, past_worse]] =
+                if pose_noise > 0.1e-3 { [[2.0, 4.5], [3.0, 7.0]] } else { [[1.0, 2.0], [1.5, 3.0]] };
+            assert!(centred[0] < median && centred[1] < worse, "{centred:?}");
+            assert!(causal[0] < past_median && causal[1] < past_worse, "{causal:?}");
+            check_friction(&found.friction, &found.true_friction, 0.004);
             // the past alone: the noise of the velocity is a setting and not measured
-            check_friction(&found.causal_friction, &found.true_friction, 0.03);
+            check_friction(&found.causal_friction, &found.true_friction, 0.012);
         }
     }
 }
@@ -244,7 +245,7 @@ fn nothing_is_said_of_friction_before_the_ball_has_slid_four_stretches() {
     (0..5).for_each(|_| friction.observe(&sliding(0.2, 0.0), 1e-3));
     let found = friction.coefficient().unwrap();
     assert_eq!(found.stretches, 4);
-    assert!((found.mu - 0.2).abs() <= 0.005, "within the width of a bin");
+    assert!((found.mu - 0.2).abs() <= 0.001, "within the width of a bin");
 }
 
 #[test]
