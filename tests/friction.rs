@@ -3,13 +3,13 @@
 //! The stylus of the simulator adds friction, noise and clock errors; the truth is the surface's own normal under the
 //! true centre. `--nocapture` or `--show-output` shows the tables.
 
-use nalgebra::{Point3, UnitVector3, Vector3};
+use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 use touchup::patch::{TouchFinder, TouchFinderParams};
 use touchup::refine::{SlidingParams, TipMotion, TipParams};
 use touchup::sim::{Bounds, Moment, SensorParams, Stroke, StylusParams, Surface, SurfacePoint, touch};
 use touchup::touch::{
     Compensator, CompensatorParams, ContactGate, ContactGateParams, Friction, FrictionCoefficient, LocalMotion, Sample,
-    Sliding, SyncParams, Synchroniser,
+    Sliding, SyncParams, Synchroniser, Tip,
 };
 
 #[path = "friction/measured.rs"]
@@ -262,6 +262,26 @@ fn a_ball_at_rest_teaches_nothing_and_its_normal_is_as_uncertain_as_the_cone_is_
         assert!((felt.sigma - f64::atan(0.3)).abs() < 0.02, "{}", felt.sigma);
     }
     assert_eq!(friction.normal(&Sliding { force_o: Vector3::zeros(), ..resting }), None);
+}
+
+/// A rigid ball slides along x at 25 mm/s on z = 0, friction 0.15.
+#[test]
+fn where_friction_is_not_asked_for_the_normal_is_the_force() {
+    let force_o = Vector3::new(-0.3, 0.0, 2.0);
+    let touched = |cone_cosine: Option<f64>| {
+        let params = TouchFinderParams { cone_cosine, ..TouchFinderParams::new(RADIUS, None) };
+        let (mut finder, mut touches) = (TouchFinder::new(params).unwrap(), Vec::new());
+        for i in 0..2000_i64 {
+            let pose_ot = Isometry3::translation(i as f64 * 25e-6, 0.0, RADIUS);
+            let tip = Tip { stamp_ns: i * 1_000_000, pose_ot, force_o, torque_o: Vector3::zeros() };
+            finder.push(&tip, |touch| touches.push(touch));
+        }
+        (touches.last().unwrap().contact.unwrap().normal, finder.friction())
+    };
+    let (normal, friction) = touched(None);
+    assert!((normal - force_o.normalize()).norm() < 1e-9 && friction.is_none());
+    let (normal, friction) = touched(Some(0.9135));
+    assert!(normal.angle(&Vector3::z()) < 0.01 && (friction.unwrap().mu - 0.15).abs() < 2e-3);
 }
 
 #[test]

@@ -113,6 +113,22 @@ fn a_part_is_built_only_when_named() {
 }
 
 #[test]
+fn friction_and_free_space_are_parts_of_the_update_and_of_the_patch_or_of_neither() {
+    let parts = |yaml: &str| {
+        let scene = Scene::from_yaml(&format!("{{ contact: , tip: , patch: , refine: , {yaml} }}")).unwrap();
+        let refiner = scene.refine_params(WrenchFrame::Sensor).unwrap();
+        let patcher = scene.patcher_params(WrenchFrame::Sensor).unwrap();
+        assert_eq!(refiner.sliding.map(|sliding| sliding.cone_cosine), patcher.touches.cone_cosine);
+        assert_eq!(refiner.carve.is_some(), patcher.free_space);
+        (patcher.touches.cone_cosine, patcher.free_space)
+    };
+    assert_eq!(parts(""), (None, false));
+    assert_eq!(parts("sliding: "), (Some(0.9135), false));
+    assert_eq!(parts("sliding: { cone_cosine: 0.8 }, carve: "), (Some(0.8), true));
+    assert_eq!(parts("carve: "), (None, true));
+}
+
+#[test]
 fn the_patch_needs_a_ball_and_a_gate_and_is_no_part_of_the_paper() {
     for yaml in ["contact:\npatch:\nrefine:\n", "tip: { radius_mm: 0 }\ncontact:\npatch:\n", "tip:\npatch:\n"] {
         let error = Scene::from_yaml(yaml).unwrap_err().to_string();

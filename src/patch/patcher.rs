@@ -30,6 +30,8 @@ pub struct PatcherParams {
     pub touches: TouchFinderParams,
     /// how far they are believed
     pub evidence: EvidenceParams,
+    /// whether free space is evidence: where the tip went, nothing is. Else the scan stays where nothing was touched
+    pub free_space: bool,
     /// edge length of the lattice, m
     pub pitch: f64,
     /// a patch may have this many times the faces of the scan: where it would have more, the lattice is made coarser
@@ -76,6 +78,7 @@ impl PatcherParams {
             compensator: CompensatorParams::default(),
             touches: TouchFinderParams::new(radius, stiffness),
             evidence: EvidenceParams::new(radius, noise),
+            free_space: true,
             pitch: radius / 2.0,
             most_faces: 10.0,
             uncertainty: Some(UncertaintyParams::new(noise)),
@@ -231,6 +234,7 @@ impl Patcher {
                     SWEPT_CELL * radius,
                     5.0 / 3.0 * radius,
                 ),
+                params.free_space,
                 radius,
                 params.ball(),
             ),

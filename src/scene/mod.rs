@@ -45,10 +45,10 @@ pub struct Scene {
     /// How good the scan is; without it the scan counts as free of noise.
     #[serde(default, deserialize_with = "named")]
     pub scan: Option<ScanSection>,
-    /// Smooths pose and force and takes friction out of the felt normal.
+    /// Takes friction out of the felt normal, in the haptic update and in the patch; without it the force is the normal.
     #[serde(default, deserialize_with = "named")]
     pub sliding: Option<SlidingSection>,
-    /// Takes away what the ball passes through without a force.
+    /// Takes away what the tip passes through without a force, in the haptic update and in the patch; without it lids stay.
     #[serde(default, deserialize_with = "named")]
     pub carve: Option<CarveSection>,
     /// Keeps the mesh sound; without it an update may fold it.

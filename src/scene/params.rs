@@ -137,6 +137,8 @@ impl Scene {
         params.touches.shape = shape;
         params.compensator = self.compensator_params(wrench_frame);
         params.touches.gate = self.contact_params()?;
+        params.touches.cone_cosine = self.sliding.as_ref().map(|sliding| sliding.cone_cosine);
+        params.free_space = self.carve.is_some();
         if let Some(sync) = &self.sync {
             params.touches.largest_gap_ns = nanoseconds(sync.largest_gap_ms, 1e6);
         }

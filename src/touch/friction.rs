@@ -31,6 +31,15 @@ pub struct FeltNormal {
     pub sigma: f64,
 }
 
+impl FeltNormal {
+    /// The force itself, where friction is not asked for; `None` without one.
+    ///
+    /// - `force_o`: force of the object on the stylus, N, in O.
+    pub fn of_force(force_o: &Vector3<f64>) -> Option<Self> {
+        force_o.try_normalize(0.0).map(|normal| Self { normal, sigma: LEAST_SIGMA })
+    }
+}
+
 /// A coefficient of kinetic friction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrictionCoefficient {
