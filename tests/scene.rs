@@ -5,7 +5,9 @@ use std::collections::BTreeSet;
 use nalgebra::vector;
 use touchup::patch::PatcherParams;
 use touchup::refine::{Along, ContactModel, DynamicsParams, GuardParams, RefineParams, RoiSize, StepRule, TipParams};
-use touchup::scene::{BiasTrackingSection, CompensationSection, MarkersSection, Mode, PayloadSection, Scene};
+use touchup::scene::{
+    BiasSection, BiasTrackingSection, CompensationSection, MarkersSection, Mode, PayloadSection, Scene,
+};
 use touchup::touch::{BiasParams, SyncParams, TipShape, WrenchFrame};
 
 const DEFAULT_YAML: &str = include_str!("../config/default.yaml");
@@ -110,6 +112,40 @@ fn a_part_is_built_only_when_named() {
         Scene::from_yaml("sync:\ncontact: {}\ntip:\nscan:\nsliding:\ncarve:\nguard:\npatch:\nuncertainty:\nrefine:\n")
             .unwrap();
     assert_eq!(bare, Scene::default(), "a part named without keys takes its defaults");
+}
+
+/// Each section of the shipped file by its header alone: the keys below it are off.
+#[test]
+fn a_header_alone_takes_the_defaults() {
+    let lines: Vec<_> = DEFAULT_YAML.lines().collect();
+    let name_of = |line: &str| {
+        let name = line.strip_prefix('#').unwrap_or(line).strip_suffix(':')?;
+        name.chars().all(|c| c.is_ascii_lowercase() || c == '_').then(|| name.to_owned())
+    };
+    let mut sections = 0;
+    for at in 0..lines.len() {
+        let Some(name) = name_of(lines[at]) else { continue };
+        let end = lines[at..].iter().position(|line| line.is_empty()).map_or(lines.len(), |length| at + length);
+        let edited = |(i, line): (usize, &&str)| match i {
+            _ if i == at => format!("{name}:"),
+            _ if (at..end).contains(&i) && line.starts_with(' ') => format!("#{line}"),
+            _ => (*line).to_owned(),
+        };
+        let yaml = lines.iter().enumerate().map(edited).collect::<Vec<_>>().join("\n");
+        let scene = Scene::from_yaml(&yaml).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let mut expected = Scene::default();
+        match name.as_str() {
+            "markers" => expected.markers = Some(MarkersSection::default()),
+            "compensation" => expected.compensation = Some(CompensationSection::default()),
+            "bias_tracking" => expected.bias_tracking = Some(BiasTrackingSection::default()),
+            _ => {}
+        }
+        assert_eq!(scene, expected, "{name}");
+        sections += 1;
+    }
+    assert_eq!(sections, 13);
+    let inner = Scene::from_yaml("compensation:\n  payload:\n  bias:\n").unwrap().compensation.unwrap();
+    assert_eq!((inner.payload, inner.bias), (Some(PayloadSection::default()), Some(BiasSection::default())));
 }
 
 #[test]

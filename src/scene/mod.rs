@@ -110,7 +110,9 @@ impl Scene {
     /// # Ok::<(), touchup::scene::SceneError>(())
     /// ```
     pub fn from_yaml(yaml: &str) -> Result<Self, SceneError> {
-        let scene: Self = serde_saphyr::from_str(yaml).map_err(|error| yaml_error(&error))?;
+        // comments between a key and its value are held, and there are few places for them
+        let options = serde_saphyr::options! { emit_comments: false };
+        let scene: Self = serde_saphyr::from_str_with_options(yaml, options).map_err(|error| yaml_error(&error))?;
         scene.check()?;
         Ok(scene)
     }
