@@ -102,15 +102,19 @@ fn a_part_is_built_only_when_named() {
     let SyncParams { reorder_ns, largest_gap_ns, .. } = none.sync_params();
     assert_eq!((reorder_ns, largest_gap_ns), (0, 0));
     assert_eq!(none.compensator_params(WrenchFrame::Object).payload, None);
+    assert_eq!(none.clock_params(), None);
+    let clock = Scene::from_yaml("{ clock: , tip: , contact: { on_n: 1 } }").unwrap().clock_params().unwrap();
+    assert_eq!((clock.stiffness, clock.gate.on), (Some(2e4), 1.0));
 
     let loop_alone = Scene::from_yaml("refine:").unwrap().refine_params(WrenchFrame::Object).unwrap();
     assert_eq!((loop_alone.gate, loop_alone.sliding, loop_alone.carve, loop_alone.guard), (None, None, None, None));
     assert_eq!((loop_alone.tip, loop_alone.scan_noise), (TipParams { radius: 0.0, stiffness: None }, 0.0));
     assert_eq!(loop_alone.compensator.wrench_frame, WrenchFrame::Object);
 
-    let bare =
-        Scene::from_yaml("sync:\ncontact: {}\ntip:\nscan:\nsliding:\ncarve:\nguard:\npatch:\nuncertainty:\nrefine:\n")
-            .unwrap();
+    let bare = Scene::from_yaml(
+        "sync:\nclock:\ncontact: {}\ntip:\nscan:\nsliding:\ncarve:\nguard:\npatch:\nuncertainty:\nrefine:\n",
+    )
+    .unwrap();
     assert_eq!(bare, Scene::default(), "a part named without keys takes its defaults");
 }
 
@@ -143,7 +147,7 @@ fn a_header_alone_takes_the_defaults() {
         assert_eq!(scene, expected, "{name}");
         sections += 1;
     }
-    assert_eq!(sections, 13);
+    assert_eq!(sections, 14);
     let inner = Scene::from_yaml("compensation:\n  payload:\n  bias:\n").unwrap().compensation.unwrap();
     assert_eq!((inner.payload, inner.bias), (Some(PayloadSection::default()), Some(BiasSection::default())));
 }

@@ -24,7 +24,7 @@ use crate::mesh::{FaceId, FaceTree, RepairReport, TriMesh, VertexId};
 use crate::patch::{Patched, Patcher, Support};
 use crate::refine::{RefineCounts, RefineError, RefineParams, Refiner};
 use crate::scene::{Mode, Scene};
-use crate::touch::{ClockEstimator, ClockParams, Compensator, MarkerCounts, MarkerFilter, Sample};
+use crate::touch::{ClockEstimator, Compensator, MarkerCounts, MarkerFilter, Sample};
 
 #[derive(Debug, Args)]
 pub(super) struct RefineArguments {
@@ -90,7 +90,7 @@ pub(super) struct Summary {
     /// of the markers, where they tell the pose
     #[serde(skip_serializing_if = "Option::is_none")]
     markers: Option<MarkerCounts>,
-    /// how late the clock of the wrench reads beyond what the scene says, where the touches tell it
+    /// how late the clock of the wrench reads beyond what the scene says, where the touches tell it and the scene has `clock`
     #[serde(skip_serializing_if = "Option::is_none")]
     wrench_offset: Option<WrenchOffset>,
     /// how far the scan lies from the part, where that was asked for
@@ -290,13 +290,14 @@ impl RefineArguments {
         let started = Instant::now();
         let mut pushes = Pushes::new();
         let compensator = Compensator::new(params.compensator)?;
-        let clock_params = ClockParams { stiffness: params.tip.stiffness, gate: params.gate.unwrap_or_default() };
-        let mut clock = ClockEstimator::new(clock_params)?;
+        let mut clock = scene.clock_params().map(ClockEstimator::new).transpose()?;
         let mut contacts = self.registration.then(|| ContactPoints::new(&params)).transpose()?;
         let mut replayed = replay(recording, scene.sync_params(), markers, |sample| {
             pushes.push(&mut rates, sample);
             let tip = compensator.compensate(sample);
-            clock.push(&tip);
+            if let Some(clock) = &mut clock {
+                clock.push(&tip);
+            }
             if let Some(contacts) = &mut contacts {
                 contacts.push(&tip);
             }
@@ -332,7 +333,9 @@ impl RefineArguments {
             contacts: counts.contacts,
             markers: replayed.markers,
             registration,
-            wrench_offset: clock.offset().map(|found| WrenchOffset::of(&found, scene.sync_params().wrench_offset_ns)),
+            wrench_offset: clock
+                .and_then(|clock| clock.offset())
+                .map(|found| WrenchOffset::of(&found, scene.sync_params().wrench_offset_ns)),
             moved_faces,
             cut_back: counts.cut_back,
             friction: refiner.friction().map(|found| FrictionFound { mu: found.mu, sigma: found.sigma }),

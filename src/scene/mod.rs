@@ -15,8 +15,8 @@ pub use error::SceneError;
 use error::yaml_error;
 use sections::named;
 pub use sections::{
-    AlongName, BiasSection, BiasTrackingSection, CarveSection, CompensationSection, ContactSection, GuardSection,
-    MarkersSection, Mode, ModelName, PatchSection, PayloadSection, RefineSection, ScanSection, ShapeName,
+    AlongName, BiasSection, BiasTrackingSection, CarveSection, ClockSection, CompensationSection, ContactSection,
+    GuardSection, MarkersSection, Mode, ModelName, PatchSection, PayloadSection, RefineSection, ScanSection, ShapeName,
     SlidingSection, StepName, SyncSection, TipSection, UncertaintySection,
 };
 
@@ -27,6 +27,9 @@ pub struct Scene {
     /// Pairs poses with wrenches; without it only those of equal stamp pair.
     #[serde(default, deserialize_with = "named")]
     pub sync: Option<SyncSection>,
+    /// Finds how late the clock of the wrench reads; without it nobody asks.
+    #[serde(default, deserialize_with = "named")]
+    pub clock: Option<ClockSection>,
     /// The markers on the stylus, when they and not its pose are recorded.
     #[serde(default, deserialize_with = "named")]
     pub markers: Option<MarkersSection>,
@@ -70,6 +73,7 @@ impl Default for Scene {
     fn default() -> Self {
         Self {
             sync: Some(SyncSection::default()),
+            clock: Some(ClockSection::default()),
             markers: None,
             compensation: None,
             bias_tracking: None,

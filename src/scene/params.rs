@@ -12,8 +12,8 @@ use crate::refine::{
     relaxing_alpha,
 };
 use crate::touch::{
-    BiasParams, CompensatorParams, ContactGateParams, MarkerBody, MarkerFilter, MarkerParams, Payload, SettingError,
-    SpringParams, SyncParams, TipBody, TipShape, Wrench, WrenchFrame,
+    BiasParams, ClockParams, CompensatorParams, ContactGateParams, MarkerBody, MarkerFilter, MarkerParams, Payload,
+    SettingError, SpringParams, SyncParams, TipBody, TipShape, Wrench, WrenchFrame,
 };
 
 impl Scene {
@@ -29,6 +29,12 @@ impl Scene {
             wrench_offset_ns: nanoseconds(sync.wrench_offset_ms, 1e6),
             capacity: sync.capacity,
         }
+    }
+
+    /// Settings of the estimate of the clock, if there is one.
+    pub fn clock_params(&self) -> Option<ClockParams> {
+        let gate = self.contact_params().unwrap_or_default();
+        self.clock.as_ref().map(|_| ClockParams { stiffness: self.tip_params().stiffness, gate })
     }
 
     /// The filter that makes poses of markers, if there is one.

@@ -46,6 +46,11 @@ impl SyncSection {
     }
 }
 
+/// `clock`; it has no keys.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ClockSection {}
+
 /// `markers`
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
