@@ -3,13 +3,13 @@
 //! The stylus of the simulator adds friction, noise and clock errors; the truth is the surface's own normal under the
 //! true centre. `--nocapture` or `--show-output` shows the tables.
 
-use nalgebra::{Point3, UnitVector3, Vector3};
+use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 use touchup::patch::{TouchFinder, TouchFinderParams};
 use touchup::refine::{SlidingParams, TipMotion, TipParams};
 use touchup::sim::{Bounds, Moment, SensorParams, Stroke, StylusParams, Surface, SurfacePoint, touch};
 use touchup::touch::{
     Compensator, CompensatorParams, ContactGate, ContactGateParams, Friction, FrictionCoefficient, LocalMotion, Sample,
-    Sliding, SyncParams, Synchroniser,
+    Sliding, SyncParams, Synchroniser, Tip,
 };
 
 #[path = "friction/measured.rs"]
@@ -208,14 +208,15 @@ fn the_median_normal_of_a_sliding_ball_is_within_three_degrees_whatever_the_fric
             );
             let expected = f64::atan(mu).to_degrees();
             assert!((raw[0] - expected).abs() < 1.0, "the raw force errs by atan mu: {} {expected}", raw[0]);
-            // with the most noise a tenth is worse: the ends of lines, and the first 20 mm, where friction is not known yet
-            let worse = if pose_noise > 0.1e-3 { 6.0 } else { 3.0 };
-            assert!(centred[0] < 3.0 && centred[1] < worse, "{centred:?}");
-            // the past alone leaves the way along the surface to noise: 0.2 mm on each axis, 500 times a second, is too much
-            assert!(causal[0] < worse.min(5.0), "{causal:?}");
-            check_friction(&found.friction, &found.true_friction, 0.01);
+            // with the most noise a tenth is worse, at less than 20 mm/s: the way along the surface is off by φ σᵥ / v, which
+            // is 2.8° for μ = 0.4 at 15 mm/s, one standard deviation
+            let [[median, worse], [past_median, past_worse]] =
+                if pose_noise > 0.1e-3 { [[2.0, 4.5], [3.0, 7.0]] } else { [[1.0, 2.0], [1.5, 3.0]] };
+            assert!(centred[0] < median && centred[1] < worse, "{centred:?}");
+            assert!(causal[0] < past_median && causal[1] < past_worse, "{causal:?}");
+            check_friction(&found.friction, &found.true_friction, 0.004);
             // the past alone: the noise of the velocity is a setting and not measured
-            check_friction(&found.causal_friction, &found.true_friction, 0.03);
+            check_friction(&found.causal_friction, &found.true_friction, 0.012);
         }
     }
 }
@@ -244,7 +245,7 @@ fn nothing_is_said_of_friction_before_the_ball_has_slid_four_stretches() {
     (0..5).for_each(|_| friction.observe(&sliding(0.2, 0.0), 1e-3));
     let found = friction.coefficient().unwrap();
     assert_eq!(found.stretches, 4);
-    assert!((found.mu - 0.2).abs() <= 0.005, "within the width of a bin");
+    assert!((found.mu - 0.2).abs() <= 0.001, "within the width of a bin");
 }
 
 #[test]
@@ -261,6 +262,26 @@ fn a_ball_at_rest_teaches_nothing_and_its_normal_is_as_uncertain_as_the_cone_is_
         assert!((felt.sigma - f64::atan(0.3)).abs() < 0.02, "{}", felt.sigma);
     }
     assert_eq!(friction.normal(&Sliding { force_o: Vector3::zeros(), ..resting }), None);
+}
+
+/// A rigid ball slides along x at 25 mm/s on z = 0, friction 0.15.
+#[test]
+fn where_friction_is_not_asked_for_the_normal_is_the_force() {
+    let force_o = Vector3::new(-0.3, 0.0, 2.0);
+    let touched = |cone_cosine: Option<f64>| {
+        let params = TouchFinderParams { cone_cosine, ..TouchFinderParams::new(RADIUS, None) };
+        let (mut finder, mut touches) = (TouchFinder::new(params).unwrap(), Vec::new());
+        for i in 0..2000_i64 {
+            let pose_ot = Isometry3::translation(i as f64 * 25e-6, 0.0, RADIUS);
+            let tip = Tip { stamp_ns: i * 1_000_000, pose_ot, force_o, torque_o: Vector3::zeros() };
+            finder.push(&tip, |touch| touches.push(touch));
+        }
+        (touches.last().unwrap().contact.unwrap().normal, finder.friction())
+    };
+    let (normal, friction) = touched(None);
+    assert!((normal - force_o.normalize()).norm() < 1e-9 && friction.is_none());
+    let (normal, friction) = touched(Some(0.9135));
+    assert!(normal.angle(&Vector3::z()) < 0.01 && (friction.unwrap().mu - 0.15).abs() < 2e-3);
 }
 
 #[test]

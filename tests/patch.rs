@@ -2,11 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use touchup::mesh::{FaceId, FaceTree, TriMesh};
 use touchup::patch::{Patched, Patcher, PatcherParams, Support};
 use touchup::sim::{Moment, Plate, StylusParams, Surface, TruthShape, measure_badness};
-use touchup::touch::TipShape;
+use touchup::touch::{Sample, TipShape, Wrench};
 
 #[path = "common/plate_stream.rs"]
 mod plate_stream;
@@ -30,8 +30,14 @@ fn full() -> bool {
 }
 
 fn case(stylus: &StylusParams, seed: u64) -> Case {
+    case_with(stylus, seed, |_| {})
+}
+
+/// … with other settings than those that hold for the tip.
+fn case_with(stylus: &StylusParams, seed: u64, change: impl Fn(&mut PatcherParams)) -> Case {
     let (PlateStream { scan, noise, samples }, touch) = plate_stream(stylus, seed);
-    let params = PatcherParams::for_tip(stylus.shape, stylus.radius, Some(stylus.stiffness), noise).unwrap();
+    let mut params = PatcherParams::for_tip(stylus.shape, stylus.radius, Some(stylus.stiffness), noise).unwrap();
+    change(&mut params);
     let mut patcher = Patcher::new(params).unwrap();
     samples.iter().for_each(|sample| patcher.push(sample));
     patcher.flush();
@@ -115,6 +121,52 @@ fn closed_holes_open() {
     }
 }
 
+/// A ball slides over a sheet at x = 0 to 10 mm, and goes to and fro through it at x = 20 to 30 mm, where it feels nothing.
+#[test]
+fn where_free_space_is_no_evidence_lids_stay() {
+    let corner = |i: u32| Point3::new(f64::from(i % 21) * 2e-3, f64::from(i / 21) * 2e-3, 0.0);
+    let square = |i: u32| [[i, i + 1, i + 22], [i, i + 22, i + 21]];
+    let faces = (0..20).flat_map(|row| (0..20).flat_map(move |column| square(21 * row + column)));
+    let scan = TriMesh::new((0..21 * 21).map(corner).collect(), faces.collect()).unwrap();
+    let mut samples = Vec::new();
+    let mut add = |x: f64, y: f64, z: f64, newtons: f64| {
+        let wrench = Wrench { force: Vector3::z() * newtons, torque: Vector3::zeros() };
+        let stamp_ns = samples.len() as i64 * 1_000_000;
+        samples.push(Sample { stamp_ns, pose_ot: Isometry3::translation(x * 1e-3, y * 1e-3, z * 1e-3), wrench });
+    };
+    for i in 0..4000 {
+        let (line, along) = (f64::from(i / 400), f64::from(i % 400) / 40.0);
+        add(if i / 400 % 2 == 0 { along } else { 10.0 - along }, 15.0 + line, 1.5, 2.0);
+    }
+    for i in 0..4000 {
+        add(20.0 + f64::from(i) / 400.0, 20.0, 4.0 * (f64::from(i) / 40.0).sin(), 0.0);
+    }
+    let distance = |free_space: bool| {
+        let params = PatcherParams { free_space, ..PatcherParams::new(1.5e-3, None, 0.1e-3) };
+        let mut patcher = Patcher::new(params).unwrap();
+        samples.iter().for_each(|sample| patcher.push(sample));
+        patcher.flush();
+        let mesh = patcher.patched(&scan, &FaceTree::new(&scan)).unwrap().mesh;
+        let lid = Point3::new(25e-3, 20e-3, 0.0);
+        FaceTree::new(&mesh).closest(&mesh, &lid, f64::INFINITY).unwrap().distance_squared.sqrt()
+    };
+    let [with, without] = [true, false].map(distance);
+    assert!(with > 1e-3 && without < 1e-9, "{with:e} {without:e} m");
+}
+
+/// Friction of 0.35 tilts the force by 19°, to and fro.
+#[test]
+fn where_friction_is_no_part_the_patch_is_worse_for_it() {
+    let stylus = StylusParams { friction: 0.35, ..StylusParams::default() };
+    let [with, without] = [Some(0.9135), None].map(|cone_cosine| {
+        let case = case_with(&stylus, 1, |params| params.touches.cone_cosine = cone_cosine);
+        case.errors(&case.patched.mesh)
+    });
+    println!("with {with:.3?}, without {without:.3?} mm");
+    // 1.5 mm (1 − cos 19°) is 0.08 mm
+    assert!(without[0] > with[0] + 0.04 && without[1] > with[1] + 0.04, "{with:?} {without:?}");
+}
+
 #[test]
 fn what_was_not_touched_keeps_its_ids_and_bits() {
     let case = case(&StylusParams::default(), 3);
@@ -169,7 +221,8 @@ fn other_tips_hands_and_friction() {
             rim = rim.max(rim_length(&case.patched.mesh, &rims) - rim_length(&case.scan, &soundness(&case.scan).rims));
         }
         println!("{name:14} {:28.3} {:28.3} {:10.1}", worst[0], worst[1], rim * 1e3);
-        assert!(worst[0] < 0.06 && worst[1] < 0.25, "{name}: {worst:?}");
+        let back = if name == "1 mm" { 0.2 } else { 0.05 };
+        assert!(worst[0] < 0.04 && worst[1] < back, "{name}: {worst:?}");
         // a ball that ends its way freely in the blind hole leaves that open too, a cone does so in each of the three
         let openings = if name.starts_with("cone") { 5.0 } else { 3.0 };
         assert!(rim < openings * through_ends(), "{name}: {rim}");

@@ -13,7 +13,7 @@ use tempfile::TempDir;
 use touchup::io::mesh_file::{MeshUnit, VertexColumn, read_mesh, write_mesh, write_mesh_with};
 use touchup::io::recording::{RecordingReader, Topics, write_recording};
 use touchup::mesh::{FaceTree, TriMesh};
-use touchup::patch::{Patched, Patcher, PatcherParams, Support};
+use touchup::patch::{Patcher, PatcherParams};
 use touchup::refine::{RefineParams, Refiner, TipParams};
 use touchup::touch::{Message, StampedPose, StampedWrench, SyncParams, Synchroniser, Wrench};
 
@@ -252,24 +252,10 @@ fn a_replay_equals_the_first_run_byte_for_byte() {
     sync.finish();
     take(&mut sync);
     patcher.flush();
-    let Patched { mesh, support, sigma, .. } = patcher.patched(&scan, &FaceTree::new(&scan)).unwrap();
-    let touched = |support: &Support| match support {
-        Support::Touched => 1.0,
-        Support::Guessed | Support::Unreachable => 0.5,
-        Support::Scan => 0.0,
-    };
-    let touched: Vec<f32> = support.iter().map(touched).collect();
-    let sigma_mm: Vec<f32> = sigma.iter().map(|sigma| (sigma * 1e3) as f32).collect();
-    let named = |support: &Support| match support {
-        Support::Scan => 0.0,
-        Support::Touched => 1.0,
-        Support::Guessed => 2.0,
-        Support::Unreachable => 3.0,
-    };
-    let support: Vec<f32> = support.iter().map(named).collect();
-    let columns = [("touched", touched), ("support", support), ("sigma_mm", sigma_mm)];
-    let columns = columns.map(|(name, values)| VertexColumn { name, values: values.into() });
-    write_mesh_with(&plate.at("live.ply"), &mesh, &columns, MeshUnit::Millimetre).unwrap();
+    let patched = patcher.patched(&scan, &FaceTree::new(&scan)).unwrap();
+    let columns = patched.columns().into_iter();
+    let columns: Vec<_> = columns.map(|(name, values)| VertexColumn { name, values: values.into() }).collect();
+    write_mesh_with(&plate.at("live.ply"), &patched.mesh, &columns, MeshUnit::Millimetre).unwrap();
 
     for out in ["one.ply", "two.ply"] {
         let output = plate.refine(out, &[]);

@@ -5,7 +5,9 @@ use std::collections::BTreeSet;
 use nalgebra::vector;
 use touchup::patch::PatcherParams;
 use touchup::refine::{Along, ContactModel, DynamicsParams, GuardParams, RefineParams, RoiSize, StepRule, TipParams};
-use touchup::scene::{BiasTrackingSection, CompensationSection, MarkersSection, Mode, PayloadSection, Scene};
+use touchup::scene::{
+    BiasSection, BiasTrackingSection, CompensationSection, MarkersSection, Mode, PayloadSection, Scene,
+};
 use touchup::touch::{BiasParams, SyncParams, TipShape, WrenchFrame};
 
 const DEFAULT_YAML: &str = include_str!("../config/default.yaml");
@@ -100,16 +102,70 @@ fn a_part_is_built_only_when_named() {
     let SyncParams { reorder_ns, largest_gap_ns, .. } = none.sync_params();
     assert_eq!((reorder_ns, largest_gap_ns), (0, 0));
     assert_eq!(none.compensator_params(WrenchFrame::Object).payload, None);
+    assert_eq!(none.clock_params(), None);
+    let clock = Scene::from_yaml("{ clock: , tip: , contact: { on_n: 1 } }").unwrap().clock_params().unwrap();
+    assert_eq!((clock.stiffness, clock.gate.on), (Some(2e4), 1.0));
 
     let loop_alone = Scene::from_yaml("refine:").unwrap().refine_params(WrenchFrame::Object).unwrap();
     assert_eq!((loop_alone.gate, loop_alone.sliding, loop_alone.carve, loop_alone.guard), (None, None, None, None));
     assert_eq!((loop_alone.tip, loop_alone.scan_noise), (TipParams { radius: 0.0, stiffness: None }, 0.0));
     assert_eq!(loop_alone.compensator.wrench_frame, WrenchFrame::Object);
 
-    let bare =
-        Scene::from_yaml("sync:\ncontact: {}\ntip:\nscan:\nsliding:\ncarve:\nguard:\npatch:\nuncertainty:\nrefine:\n")
-            .unwrap();
+    let bare = Scene::from_yaml(
+        "sync:\nclock:\ncontact: {}\ntip:\nscan:\nsliding:\ncarve:\nguard:\npatch:\nuncertainty:\nrefine:\n",
+    )
+    .unwrap();
     assert_eq!(bare, Scene::default(), "a part named without keys takes its defaults");
+}
+
+/// Each section of the shipped file by its header alone: the keys below it are off.
+#[test]
+fn a_header_alone_takes_the_defaults() {
+    let lines: Vec<_> = DEFAULT_YAML.lines().collect();
+    let name_of = |line: &str| {
+        let name = line.strip_prefix('#').unwrap_or(line).strip_suffix(':')?;
+        name.chars().all(|c| c.is_ascii_lowercase() || c == '_').then(|| name.to_owned())
+    };
+    let mut sections = 0;
+    for at in 0..lines.len() {
+        let Some(name) = name_of(lines[at]) else { continue };
+        let end = lines[at..].iter().position(|line| line.is_empty()).map_or(lines.len(), |length| at + length);
+        let edited = |(i, line): (usize, &&str)| match i {
+            _ if i == at => format!("{name}:"),
+            _ if (at..end).contains(&i) && line.starts_with(' ') => format!("#{line}"),
+            _ => (*line).to_owned(),
+        };
+        let yaml = lines.iter().enumerate().map(edited).collect::<Vec<_>>().join("\n");
+        let scene = Scene::from_yaml(&yaml).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let mut expected = Scene::default();
+        match name.as_str() {
+            "markers" => expected.markers = Some(MarkersSection::default()),
+            "compensation" => expected.compensation = Some(CompensationSection::default()),
+            "bias_tracking" => expected.bias_tracking = Some(BiasTrackingSection::default()),
+            _ => {}
+        }
+        assert_eq!(scene, expected, "{name}");
+        sections += 1;
+    }
+    assert_eq!(sections, 14);
+    let inner = Scene::from_yaml("compensation:\n  payload:\n  bias:\n").unwrap().compensation.unwrap();
+    assert_eq!((inner.payload, inner.bias), (Some(PayloadSection::default()), Some(BiasSection::default())));
+}
+
+#[test]
+fn friction_and_free_space_are_parts_of_the_update_and_of_the_patch_or_of_neither() {
+    let parts = |yaml: &str| {
+        let scene = Scene::from_yaml(&format!("{{ contact: , tip: , patch: , refine: , {yaml} }}")).unwrap();
+        let refiner = scene.refine_params(WrenchFrame::Sensor).unwrap();
+        let patcher = scene.patcher_params(WrenchFrame::Sensor).unwrap();
+        assert_eq!(refiner.sliding.map(|sliding| sliding.cone_cosine), patcher.touches.cone_cosine);
+        assert_eq!(refiner.carve.is_some(), patcher.free_space);
+        (patcher.touches.cone_cosine, patcher.free_space)
+    };
+    assert_eq!(parts(""), (None, false));
+    assert_eq!(parts("sliding: "), (Some(0.9135), false));
+    assert_eq!(parts("sliding: { cone_cosine: 0.8 }, carve: "), (Some(0.8), true));
+    assert_eq!(parts("carve: "), (None, true));
 }
 
 #[test]

@@ -24,7 +24,7 @@ use crate::mesh::{FaceId, FaceTree, RepairReport, TriMesh, VertexId};
 use crate::patch::{Patched, Patcher, Support};
 use crate::refine::{RefineCounts, RefineError, RefineParams, Refiner};
 use crate::scene::{Mode, Scene};
-use crate::touch::{ClockEstimator, ClockParams, Compensator, MarkerCounts, MarkerFilter, Sample};
+use crate::touch::{ClockEstimator, Compensator, MarkerCounts, MarkerFilter, Sample};
 
 #[derive(Debug, Args)]
 pub(super) struct RefineArguments {
@@ -90,7 +90,7 @@ pub(super) struct Summary {
     /// of the markers, where they tell the pose
     #[serde(skip_serializing_if = "Option::is_none")]
     markers: Option<MarkerCounts>,
-    /// how late the clock of the wrench reads beyond what the scene says, where the touches tell it
+    /// how late the clock of the wrench reads beyond what the scene says, where the touches tell it and the scene has `clock`
     #[serde(skip_serializing_if = "Option::is_none")]
     wrench_offset: Option<WrenchOffset>,
     /// how far the scan lies from the part, where that was asked for
@@ -290,13 +290,14 @@ impl RefineArguments {
         let started = Instant::now();
         let mut pushes = Pushes::new();
         let compensator = Compensator::new(params.compensator)?;
-        let clock_params = ClockParams { stiffness: params.tip.stiffness, gate: params.gate.unwrap_or_default() };
-        let mut clock = ClockEstimator::new(clock_params)?;
+        let mut clock = scene.clock_params().map(ClockEstimator::new).transpose()?;
         let mut contacts = self.registration.then(|| ContactPoints::new(&params)).transpose()?;
         let mut replayed = replay(recording, scene.sync_params(), markers, |sample| {
             pushes.push(&mut rates, sample);
             let tip = compensator.compensate(sample);
-            clock.push(&tip);
+            if let Some(clock) = &mut clock {
+                clock.push(&tip);
+            }
             if let Some(contacts) = &mut contacts {
                 contacts.push(&tip);
             }
@@ -332,7 +333,9 @@ impl RefineArguments {
             contacts: counts.contacts,
             markers: replayed.markers,
             registration,
-            wrench_offset: clock.offset().map(|found| WrenchOffset::of(&found, scene.sync_params().wrench_offset_ns)),
+            wrench_offset: clock
+                .and_then(|clock| clock.offset())
+                .map(|found| WrenchOffset::of(&found, scene.sync_params().wrench_offset_ns)),
             moved_faces,
             cut_back: counts.cut_back,
             friction: refiner.friction().map(|found| FrictionFound { mu: found.mu, sigma: found.sigma }),
@@ -368,14 +371,9 @@ impl RefineArguments {
             );
         }
         let build_s = started.elapsed().as_secs_f64();
-        let mut columns = vec![
-            VertexColumn { name: "touched", values: touched_column(&patched).into() },
-            VertexColumn { name: "support", values: support_column(&patched).into() },
-        ];
         let uncertainty = patcher.params().uncertainty.map(|_| UncertaintySummary::of(&patched, patcher.knocks()));
-        if uncertainty.is_some() {
-            columns.push(VertexColumn { name: "sigma_mm", values: sigma_column(&patched).into() });
-        }
+        let columns = patched.columns().into_iter();
+        let columns: Vec<_> = columns.map(|(name, values)| VertexColumn { name, values: values.into() }).collect();
         write_mesh_with(&self.out, &patched.mesh, &columns, self.mesh_unit).map_err(CliError::WriteMesh)?;
         debug!(open_squares = patched.open_squares, "patched");
         let moved_faces = moved_faces(scan, &patched.mesh);
@@ -426,32 +424,6 @@ impl RefineArguments {
         scene.check().map_err(|error| CliError::Usage(error.to_string()))?;
         Ok(scene)
     }
-}
-
-/// 1 for a vertex that was touched, 0.5 for one that is guessed from touches nearby, 0 for one of the scan.
-fn touched_column(patched: &Patched) -> Vec<f32> {
-    let touched = |support: &Support| match support {
-        Support::Touched => 1.0,
-        Support::Guessed | Support::Unreachable => 0.5,
-        Support::Scan => 0.0,
-    };
-    patched.support.iter().map(touched).collect()
-}
-
-/// Standard deviation of each vertex along the normal, mm.
-fn sigma_column(patched: &Patched) -> Vec<f32> {
-    patched.sigma.iter().map(|sigma| (sigma * 1e3) as f32).collect()
-}
-
-/// 0 for a vertex of the scan, 1 for one that was touched, 2 for one that is guessed, 3 for one that the ball cannot reach.
-fn support_column(patched: &Patched) -> Vec<f32> {
-    let support = |support: &Support| match support {
-        Support::Scan => 0.0,
-        Support::Touched => 1.0,
-        Support::Guessed => 2.0,
-        Support::Unreachable => 3.0,
-    };
-    patched.support.iter().map(support).collect()
 }
 
 impl PatchSummary {

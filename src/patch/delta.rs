@@ -4,7 +4,7 @@ use nalgebra::Point3;
 
 use super::Region;
 use super::lattice::{CellBox, Node, Owner, VertexKey};
-use super::patcher::Support;
+use super::patched::Support;
 use super::remesh::Renewed;
 use super::splice::Patch;
 use super::table::Table;

@@ -30,6 +30,8 @@ const MOVED: f64 = 2.0;
 pub(super) struct Felt {
     pub contacts: ContactStore,
     pub swept: SweptSpace,
+    /// whether where the tip went counts; else `swept` stays empty
+    keeps_free_space: bool,
     /// size of the tip, m
     radius: f64,
     /// radius of the tip when it is a ball, m
@@ -43,14 +45,21 @@ pub(super) struct Felt {
 
 impl Felt {
     /// Nothing felt yet.
-    pub fn new(contacts: ContactStore, swept: SweptSpace, radius: f64, ball: Option<f64>) -> Self {
-        Self { contacts, swept, radius, ball, until_ns: i64::MIN, last_contact_ns: None, bounds: None }
+    pub fn new(
+        contacts: ContactStore,
+        swept: SweptSpace,
+        keeps_free_space: bool,
+        radius: f64,
+        ball: Option<f64>,
+    ) -> Self {
+        let until_ns = i64::MIN;
+        Self { contacts, swept, keeps_free_space, radius, ball, until_ns, last_contact_ns: None, bounds: None }
     }
 
     pub fn keep(&mut self, touch: &Touch) {
         self.until_ns = touch.stamp_ns;
         let place = TipPlace { centre: touch.centre, axis: touch.axis };
-        let Some(contact) = &touch.contact else { return self.swept.add_place(&place) };
+        let Some(contact) = &touch.contact else { return self.sweep(&place) };
         if self.last_contact_ns.is_none_or(|last| touch.stamp_ns - last > STROKE_PAUSE_NS) {
             self.contacts.begin_stroke();
             self.swept.begin_stroke();
@@ -66,7 +75,13 @@ impl Felt {
             }
         }
         if is_believed {
-            self.swept.add_place(&place);
+            self.sweep(&place);
+        }
+    }
+
+    fn sweep(&mut self, place: &TipPlace) {
+        if self.keeps_free_space {
+            self.swept.add_place(place);
         }
     }
 

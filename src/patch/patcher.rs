@@ -10,6 +10,7 @@ use super::felt::Felt;
 use super::field::FieldScratch;
 use super::knocks::Knocks;
 use super::lattice::{CellBox, Lattice, Node, VertexKey};
+use super::patched::{Patched, Support};
 use super::remesh::{Remesh, Renewed};
 use super::restore::{News, Restored, node_at};
 use super::splice::Patch;
@@ -29,6 +30,8 @@ pub struct PatcherParams {
     pub touches: TouchFinderParams,
     /// how far they are believed
     pub evidence: EvidenceParams,
+    /// whether free space is evidence: where the tip went, nothing is. Else the scan stays where nothing was touched
+    pub free_space: bool,
     /// edge length of the lattice, m
     pub pitch: f64,
     /// a patch may have this many times the faces of the scan: where it would have more, the lattice is made coarser
@@ -75,6 +78,7 @@ impl PatcherParams {
             compensator: CompensatorParams::default(),
             touches: TouchFinderParams::new(radius, stiffness),
             evidence: EvidenceParams::new(radius, noise),
+            free_space: true,
             pitch: radius / 2.0,
             most_faces: 10.0,
             uncertainty: Some(UncertaintyParams::new(noise)),
@@ -130,38 +134,6 @@ impl PatcherParams {
         }
         self.uncertainty.iter().try_for_each(UncertaintyParams::check)
     }
-}
-
-/// What a vertex rests on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Support {
-    /// the scan
-    Scan,
-    /// touches
-    Touched,
-    /// what touches, free space and scan nearby suggest; nothing was felt here
-    Guessed,
-    /// as that, and nothing can be felt here: the ball does not go so far into an inner corner, or into what is narrower
-    Unreachable,
-}
-
-/// A scan with its touched part meshed anew.
-#[derive(Clone, Debug)]
-pub struct Patched {
-    /// vertices and faces that were not touched keep their ids
-    pub mesh: TriMesh,
-    /// what each vertex rests on, by id
-    pub support: Vec<Support>,
-    /// standard deviation of each vertex along the normal, m, by id; none where [`PatcherParams::uncertainty`] is not set
-    pub sigma: Vec<f64>,
-    /// edge length of the lattice, m
-    pub pitch: f64,
-    /// faces of the scan that went
-    pub removed_faces: usize,
-    /// faces that came
-    pub added_faces: usize,
-    /// squares on which scan and patch could not be joined
-    pub open_squares: usize,
 }
 
 /// Keeps what was touched and where the ball went, and makes the patch of it.
@@ -262,6 +234,7 @@ impl Patcher {
                     SWEPT_CELL * radius,
                     5.0 / 3.0 * radius,
                 ),
+                params.free_space,
                 radius,
                 params.ball(),
             ),

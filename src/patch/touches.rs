@@ -30,8 +30,9 @@ pub struct TouchFinderParams {
     pub half_window_ns: i64,
     /// a pause longer than this parts the stream, ns. Default 30 ms.
     pub largest_gap_ns: i64,
-    /// cosine of the widest friction cone believed. Default cos 24° (μ = 0.45, dry metal on metal).
-    pub cone_cosine: f64,
+    /// cosine of the widest friction cone believed; `None`: friction is not asked for, the normal is the force. Default
+    /// cos 24° (μ = 0.45, dry metal on metal).
+    pub cone_cosine: Option<f64>,
     /// a touch whose normal is uncertain by this much weighs half, rad. Default 5°: what curved pieces take for smooth.
     pub uncertain_normal: f64,
     /// what the calibration leaves uncertain; `None`: the uncertainty of a contact is not asked for
@@ -48,7 +49,7 @@ impl TouchFinderParams {
             gate: ContactGateParams::default(),
             half_window_ns: 32_000_000,
             largest_gap_ns: 30_000_000,
-            cone_cosine: 0.9135,
+            cone_cosine: Some(0.9135),
             uncertain_normal: 5f64.to_radians(),
             calibration: None,
         }
@@ -99,7 +100,7 @@ pub struct TouchFinder {
     body: TipBody,
     gate: ContactGate,
     bias: BiasTracker,
-    friction: Friction,
+    friction: Option<Friction>,
     noise: PathNoise,
     shake: ForceNoise,
     /// samples since the last gap, as far as a window may still need them
@@ -117,7 +118,7 @@ impl TouchFinder {
             body: TipBody::new(params.shape, params.radius)?,
             params,
             bias: BiasTracker::new(BiasParams { free: FREE_SHARE * params.gate.on, ..BiasParams::default() })?,
-            friction: Friction::new(params.cone_cosine.clamp(-1.0, 1.0).acos()),
+            friction: params.cone_cosine.map(|cosine| Friction::new(cosine.clamp(-1.0, 1.0).acos())),
             noise: PathNoise::default(),
             shake: ForceNoise::default(),
             held: VecDeque::new(),
@@ -160,13 +161,24 @@ impl TouchFinder {
             each(self.touch(at));
         }
         self.held.clear();
-        self.friction.lift();
+        self.lift();
         self.next = 0;
     }
 
-    /// Kinetic friction as felt so far; `None` until the ball has slid far enough.
+    /// Kinetic friction as felt so far; `None` until the ball has slid far enough, or where friction is not asked for.
     pub fn friction(&self) -> Option<FrictionCoefficient> {
-        self.friction.coefficient()
+        self.friction.as_ref()?.coefficient()
+    }
+
+    fn lift(&mut self) {
+        self.friction.iter_mut().for_each(Friction::lift);
+    }
+
+    /// The normal under the ball, which has been in contact for the last `dt` (s); `None` without a force.
+    fn normal(&mut self, sliding: &Sliding, dt: f64) -> Option<FeltNormal> {
+        let Some(friction) = &mut self.friction else { return FeltNormal::of_force(&sliding.force_o) };
+        friction.observe(sliding, dt);
+        friction.normal(sliding)
     }
 
     fn touch(&mut self, at: usize) -> Touch {
@@ -178,11 +190,10 @@ impl TouchFinder {
         let mut contact = None;
         if window.is_alike && self.held[at].in_contact {
             let dt = if at > 0 { self.held[at].stamp_ns - self.held[at - 1].stamp_ns } else { 0 };
-            self.friction.observe(&sliding, dt as f64 * 1e-9);
-            let found = self.friction.normal(&sliding);
+            let found = self.normal(&sliding, dt as f64 * 1e-9);
             contact = found.and_then(|felt| self.contact(at, &motion, &sliding.force_o, &felt));
         } else {
-            self.friction.lift();
+            self.lift();
         }
         Touch { stamp_ns: self.held[at].stamp_ns, centre: place.centre, axis: place.axis, contact }
     }

@@ -4,7 +4,7 @@ use nalgebra::Point3;
 
 use super::evidence::Evidence;
 use super::field::FieldScratch;
-use super::patcher::Support;
+use super::patched::Support;
 
 /// A vertex is off where it is not on the fit: edges and corners are put together of several pieces.
 const OFF_FIT: f64 = 1.4;

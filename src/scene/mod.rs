@@ -15,8 +15,8 @@ pub use error::SceneError;
 use error::yaml_error;
 use sections::named;
 pub use sections::{
-    AlongName, BiasSection, BiasTrackingSection, CarveSection, CompensationSection, ContactSection, GuardSection,
-    MarkersSection, Mode, ModelName, PatchSection, PayloadSection, RefineSection, ScanSection, ShapeName,
+    AlongName, BiasSection, BiasTrackingSection, CarveSection, ClockSection, CompensationSection, ContactSection,
+    GuardSection, MarkersSection, Mode, ModelName, PatchSection, PayloadSection, RefineSection, ScanSection, ShapeName,
     SlidingSection, StepName, SyncSection, TipSection, UncertaintySection,
 };
 
@@ -27,6 +27,9 @@ pub struct Scene {
     /// Pairs poses with wrenches; without it only those of equal stamp pair.
     #[serde(default, deserialize_with = "named")]
     pub sync: Option<SyncSection>,
+    /// Finds how late the clock of the wrench reads; without it nobody asks.
+    #[serde(default, deserialize_with = "named")]
+    pub clock: Option<ClockSection>,
     /// The markers on the stylus, when they and not its pose are recorded.
     #[serde(default, deserialize_with = "named")]
     pub markers: Option<MarkersSection>,
@@ -45,10 +48,10 @@ pub struct Scene {
     /// How good the scan is; without it the scan counts as free of noise.
     #[serde(default, deserialize_with = "named")]
     pub scan: Option<ScanSection>,
-    /// Smooths pose and force and takes friction out of the felt normal.
+    /// Takes friction out of the felt normal, in the haptic update and in the patch; without it the force is the normal.
     #[serde(default, deserialize_with = "named")]
     pub sliding: Option<SlidingSection>,
-    /// Takes away what the ball passes through without a force.
+    /// Takes away what the tip passes through without a force, in the haptic update and in the patch; without it lids stay.
     #[serde(default, deserialize_with = "named")]
     pub carve: Option<CarveSection>,
     /// Keeps the mesh sound; without it an update may fold it.
@@ -70,6 +73,7 @@ impl Default for Scene {
     fn default() -> Self {
         Self {
             sync: Some(SyncSection::default()),
+            clock: Some(ClockSection::default()),
             markers: None,
             compensation: None,
             bias_tracking: None,
@@ -110,7 +114,9 @@ impl Scene {
     /// # Ok::<(), touchup::scene::SceneError>(())
     /// ```
     pub fn from_yaml(yaml: &str) -> Result<Self, SceneError> {
-        let scene: Self = serde_saphyr::from_str(yaml).map_err(|error| yaml_error(&error))?;
+        // comments between a key and its value are held, and there are few places for them
+        let options = serde_saphyr::options! { emit_comments: false };
+        let scene: Self = serde_saphyr::from_str_with_options(yaml, options).map_err(|error| yaml_error(&error))?;
         scene.check()?;
         Ok(scene)
     }

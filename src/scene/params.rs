@@ -12,8 +12,8 @@ use crate::refine::{
     relaxing_alpha,
 };
 use crate::touch::{
-    BiasParams, CompensatorParams, ContactGateParams, MarkerBody, MarkerFilter, MarkerParams, Payload, SettingError,
-    SpringParams, SyncParams, TipBody, TipShape, Wrench, WrenchFrame,
+    BiasParams, ClockParams, CompensatorParams, ContactGateParams, MarkerBody, MarkerFilter, MarkerParams, Payload,
+    SettingError, SpringParams, SyncParams, TipBody, TipShape, Wrench, WrenchFrame,
 };
 
 impl Scene {
@@ -29,6 +29,12 @@ impl Scene {
             wrench_offset_ns: nanoseconds(sync.wrench_offset_ms, 1e6),
             capacity: sync.capacity,
         }
+    }
+
+    /// Settings of the estimate of the clock, if there is one.
+    pub fn clock_params(&self) -> Option<ClockParams> {
+        let gate = self.contact_params().unwrap_or_default();
+        self.clock.as_ref().map(|_| ClockParams { stiffness: self.tip_params().stiffness, gate })
     }
 
     /// The filter that makes poses of markers, if there is one.
@@ -137,6 +143,8 @@ impl Scene {
         params.touches.shape = shape;
         params.compensator = self.compensator_params(wrench_frame);
         params.touches.gate = self.contact_params()?;
+        params.touches.cone_cosine = self.sliding.as_ref().map(|sliding| sliding.cone_cosine);
+        params.free_space = self.carve.is_some();
         if let Some(sync) = &self.sync {
             params.touches.largest_gap_ns = nanoseconds(sync.largest_gap_ms, 1e6);
         }

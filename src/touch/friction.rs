@@ -31,6 +31,15 @@ pub struct FeltNormal {
     pub sigma: f64,
 }
 
+impl FeltNormal {
+    /// The force itself, where friction is not asked for; `None` without one.
+    ///
+    /// - `force_o`: force of the object on the stylus, N, in O.
+    pub fn of_force(force_o: &Vector3<f64>) -> Option<Self> {
+        force_o.try_normalize(0.0).map(|normal| Self { normal, sigma: LEAST_SIGMA })
+    }
+}
+
 /// A coefficient of kinetic friction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrictionCoefficient {
@@ -73,6 +82,8 @@ pub struct Friction {
     /// rad
     widest: f64,
     stretch: Stretch,
+    /// all of the way until enough is known
+    early: Stretch,
     /// how many stretches had a coefficient within each bin
     bins: [u32; BINS],
     known: Option<FrictionCoefficient>,
@@ -91,14 +102,26 @@ struct Stretch {
     most_work: f64,
 }
 
-/// Width of a bin: a tenth of the friction between dry metals.
-const BIN: f64 = 0.005;
+impl Stretch {
+    fn extend(&mut self, piece: &Self) {
+        self.length += piece.length;
+        self.work += piece.work;
+        self.most_work += piece.most_work;
+    }
+}
+
+/// Width of a bin: a normal is off by 0.03° for half of it.
+const BIN: f64 = 0.001;
 /// Bins from 0 to 1.
-const BINS: usize = 200;
+const BINS: usize = 1000;
 /// Length of a stretch, m: 0.2 s of a calm hand, long enough for the noise of the positions to vanish.
 const STRETCH: f64 = 5e-3;
 /// So many make a coefficient.
 const FEWEST: u32 = 4;
+/// Before that all of the way so far tells φ by this standard deviation, rad: place and direction change friction …
+const EARLY_SIGMA: f64 = 0.03;
+/// … and the ends of the way are off by this, m: 0.2 mm of pose noise after smoothing.
+const EARLY_WAY: f64 = 0.1e-3;
 /// Slower than this the ball creeps, and friction is undecided, m/s …
 const CREEP: f64 = 1e-3;
 /// … and slower than so many times the noise of the velocity it may as well rest.
@@ -115,7 +138,8 @@ impl Friction {
     ///
     /// - `widest`: angle of the widest friction cone believed, rad.
     pub fn new(widest: f64) -> Self {
-        Self { widest, stretch: Stretch::default(), bins: [0; BINS], known: None, angle: USUAL_ANGLE }
+        let (stretch, early) = (Stretch::default(), Stretch::default());
+        Self { widest, stretch, early, bins: [0; BINS], known: None, angle: USUAL_ANGLE }
     }
 
     /// Takes in what the ball did in contact during `dt` (s).
@@ -126,9 +150,13 @@ impl Friction {
         if speed < CREEP.max(CLEAR * velocity_sigma) {
             return;
         }
-        self.stretch.length += speed * dt;
-        self.stretch.work -= force_o.dot(velocity) * dt;
-        self.stretch.most_work += force_o.norm() * speed * dt;
+        let (length, work) = (speed * dt, -force_o.dot(velocity) * dt);
+        let piece = Stretch { length, work, most_work: force_o.norm() * length };
+        self.stretch.extend(&piece);
+        if self.known.is_none() {
+            self.early.extend(&piece);
+            self.guess();
+        }
         if self.stretch.length >= STRETCH {
             let Stretch { work, most_work, .. } = std::mem::take(&mut self.stretch);
             if most_work > 0.0 {
@@ -193,6 +221,16 @@ impl Friction {
             let per_angle = 1.0 / (1.0 + mu * mu);
             self.angle = [mu.atan(), (spread.hypot(sigma) * per_angle).hypot(LEAST_SIGMA)];
         }
+    }
+
+    /// φ while there are too few stretches.
+    fn guess(&mut self) {
+        let Stretch { length, work, most_work } = self.early;
+        let sine = (work / most_work.max(f64::MIN_POSITIVE)).clamp(0.0, std::f64::consts::FRAC_1_SQRT_2);
+        let ([usual, usual_sigma], felt_sigma) = (USUAL_ANGLE, EARLY_SIGMA.hypot(EARLY_WAY / length));
+        let [felt, before] = [felt_sigma, usual_sigma].map(|sigma| sigma.powi(-2));
+        let mean = (sine.asin() * felt + usual * before) / (felt + before);
+        self.angle = [mean, (felt + before).powf(-0.5).hypot(EARLY_SIGMA)];
     }
 
     /// The coefficient below which `rank` stretches lie, interpolated within its bin.

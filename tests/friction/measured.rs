@@ -109,7 +109,7 @@ fn on_real_streams_at_most_half_of_the_raw_forces_error_is_left() {
             // 66 Hz, 4 mm/s
             half_window_ns: 200_000_000,
             largest_gap_ns: GAP_NS,
-            cone_cosine: 0.82,
+            cone_cosine: Some(0.82),
             ..TouchFinderParams::new(BALL, None)
         };
         let mut finder = TouchFinder::new(params).unwrap();
