@@ -74,6 +74,8 @@ const FREE_SPEED: f64 = 0.08;
 const CLEARANCE: f64 = 3e-3;
 /// Share of a turn that a run around a wall repeats, so that no gap is left at its start.
 const OVERLAP: f64 = 0.1;
+/// Radii of the ball by which a raster over a whole part goes beyond it: the ball leaves the edge and sinks beside it.
+const OVERRUN: f64 = 2.5;
 /// Length of the pieces in which a planned line follows the surface, m.
 const PIECE: f64 = 1e-3;
 /// A ball this close touches, m: far less than it is pressed in.
@@ -210,9 +212,11 @@ pub fn plan_mesh(
     let frame_ov = looking_along(view, bounds);
     let seen = bounds.seen_from(&frame_ov);
     let clear = seen.max.z + params.radius + CLEARANCE;
-    let (low, high, floor) = (seen.min.xy(), seen.max.xy(), seen.min.z + params.radius);
+    let overrun = Vector2::repeat(OVERRUN * params.radius);
+    let (low, high, floor) = (seen.min.xy() - overrun, seen.max.xy() + overrun, seen.min.z + params.radius);
     let region = Region { frame_ov, low, high, floor, clear };
-    let needed = 2.0 * seen.size().x * seen.size().y / (params.speed * params.longest);
+    let size = high - low;
+    let needed = 2.0 * size.x * size.y / (params.speed * params.longest);
     let params = PathParams { pitch: params.pitch.max(needed), ..*params };
     let mut strokes = raster(&region, Lines::AlongX, &params)?;
     strokes.extend(raster(&region, Lines::AlongY, &params)?);
