@@ -121,19 +121,61 @@ fn closed_holes_open() {
     }
 }
 
-/// A ball slides over a sheet at x = 0 to 10 mm, and goes to and fro through it at x = 20 to 30 mm, where it feels nothing.
-#[test]
-fn where_free_space_is_no_evidence_lids_stay() {
+/// A sheet of 40 mm × 40 mm at z = 0, in triangles of 2 mm.
+fn sheet() -> TriMesh {
     let corner = |i: u32| Point3::new(f64::from(i % 21) * 2e-3, f64::from(i / 21) * 2e-3, 0.0);
     let square = |i: u32| [[i, i + 1, i + 22], [i, i + 22, i + 21]];
     let faces = (0..20).flat_map(|row| (0..20).flat_map(move |column| square(21 * row + column)));
-    let scan = TriMesh::new((0..21 * 21).map(corner).collect(), faces.collect()).unwrap();
-    let mut samples = Vec::new();
-    let mut add = |x: f64, y: f64, z: f64, newtons: f64| {
-        let wrench = Wrench { force: Vector3::z() * newtons, torque: Vector3::zeros() };
-        let stamp_ns = samples.len() as i64 * 1_000_000;
-        samples.push(Sample { stamp_ns, pose_ot: Isometry3::translation(x * 1e-3, y * 1e-3, z * 1e-3), wrench });
+    TriMesh::new((0..21 * 21).map(corner).collect(), faces.collect()).unwrap()
+}
+
+/// The `at`-th sample of a tip with its centre at `p_mm`, pressed upwards with `newtons`.
+fn sample(at: usize, p_mm: [f64; 3], newtons: f64) -> Sample {
+    let [x, y, z] = p_mm.map(|x| x * 1e-3);
+    let wrench = Wrench { force: Vector3::z() * newtons, torque: Vector3::zeros() };
+    Sample { stamp_ns: at as i64 * 1_000_000, pose_ot: Isometry3::translation(x, y, z), wrench }
+}
+
+/// A ball goes round and round in a moat of 12 mm across, down to its floor at z = -9.5 mm, which it touches from
+/// `inner_mm` off the middle on. What stands in the middle is a post where the floor below it was not reached, and else
+/// floats.
+#[test]
+fn what_the_ball_went_all_around_is_no_part() {
+    const MOAT_MM: f64 = 6.0;
+    let scan = sheet();
+    let top_mm = |inner_mm: f64| {
+        let mut samples = Vec::new();
+        let mut add = |radius: f64, turns: f64, z: f64, newtons: f64| {
+            let (sin, cos) = (turns * std::f64::consts::TAU).sin_cos();
+            samples.push(sample(samples.len(), [20.0 + radius * cos, 20.0 + radius * sin, z], newtons));
+        };
+        for level in 0..=10 {
+            let (z, newtons) = (2.0 - f64::from(level), if level == 10 { 2.0 } else { 0.0 });
+            (0..1000).for_each(|i| add(MOAT_MM, f64::from(i) / 1000.0, z, newtons));
+        }
+        // a spiral on the floor
+        for i in 0..10_000 {
+            let turns = f64::from(i) / 1000.0;
+            add(MOAT_MM - (MOAT_MM - inner_mm) * turns / 10.0, turns, -8.0, 2.0);
+        }
+        let mut patcher = Patcher::new(PatcherParams::new(1.5e-3, None, 0.1e-3)).unwrap();
+        samples.iter().for_each(|sample| patcher.push(sample));
+        patcher.flush();
+        let mesh = patcher.patched(&scan, &FaceTree::new(&scan)).unwrap().mesh;
+        let in_the_middle = |p: &Point3<f64>| (p.x - 20e-3).hypot(p.y - 20e-3) < 1e-3;
+        let corners = mesh.faces().flat_map(|(face, _)| mesh.triangle(face)).filter(in_the_middle);
+        corners.map(|p| p.z * 1e3).fold(f64::NEG_INFINITY, f64::max)
     };
+    let [post, floor] = [MOAT_MM, 0.0].map(top_mm);
+    assert!(post.abs() < 1e-9 && (floor + 9.5).abs() < 0.05, "{post} {floor} mm");
+}
+
+/// A ball slides over a sheet at x = 0 to 10 mm, and goes to and fro through it at x = 20 to 30 mm, where it feels nothing.
+#[test]
+fn where_free_space_is_no_evidence_lids_stay() {
+    let scan = sheet();
+    let mut samples = Vec::new();
+    let mut add = |x, y, z, newtons| samples.push(sample(samples.len(), [x, y, z], newtons));
     for i in 0..4000 {
         let (line, along) = (f64::from(i / 400), f64::from(i % 400) / 40.0);
         add(if i / 400 % 2 == 0 { along } else { 10.0 - along }, 15.0 + line, 1.5, 2.0);

@@ -154,15 +154,15 @@ fn invented(profile: &Profile, patcher: &Patcher) -> f64 {
 
 #[test]
 fn no_normal_is_invented_between_two_walls() {
-    for (name, profile, path) in
-        [("corner", Profile::corner(), over_the_corner()), ("slot", Profile::slot(), along_the_slot())]
-    {
+    let corner = ("corner", Profile::corner(), over_the_corner(), 0.025);
+    let slot = ("slot", Profile::slot(), along_the_slot(), 0.06);
+    for (name, profile, path, most) in [corner, slot] {
         for friction in [0.05, 0.15, 0.4] {
             let (patcher, _) = felt(&profile, &path, friction, 1);
             let share = invented(&profile, &patcher);
             println!("{name}, friction {friction}: {:.1} % farther than 5 degrees", share * 1e2);
             // what stays is from before both walls were known, and from where the ball changes from one to the other
-            assert!(share < 0.06, "{name}, friction {friction}: {share}");
+            assert!(share < most, "{name}, friction {friction}: {share}");
         }
     }
 }
@@ -192,4 +192,24 @@ fn what_the_ball_cannot_reach_is_marked() {
     println!("in the corner {fillet:?}, on the walls {walls:?}: reachable, not");
     assert!(fillet[1] > 50 && fillet[1] > 10 * fillet[0], "{fillet:?}");
     assert!(walls[0] > 500 && walls[0] > 100 * walls[1], "{walls:?}");
+}
+
+#[test]
+fn an_inner_corner_is_a_crease() {
+    let profile = Profile::corner();
+    for friction in [0.05, 0.15, 0.4] {
+        let (_, patched) = felt(&profile, &over_the_corner(), friction, 1);
+        let in_corner = |p: &Point3<f64>| p.y.abs() < 4e-3 && p.x.max(p.z) < 0.8 * RADIUS;
+        let vertices = patched.mesh.positions().iter().zip(&patched.support);
+        let (mut off, mut guessed) = (Vec::new(), 0);
+        for (p, support) in vertices.filter(|(p, support)| **support != Support::Scan && in_corner(p)) {
+            off.push(profile.signed_distance(p).abs());
+            guessed += usize::from(*support != Support::Touched);
+        }
+        let mean = off.iter().sum::<f64>() / off.len() as f64;
+        println!("friction {friction}: {:.4} mm off in the corner, {guessed} of {} guessed", mean * 1e3, off.len());
+        assert!(off.len() > 25 && guessed == off.len());
+        // a ball that fills the corner is off by 0.2 mm on average over this stretch, and by 0.44 mm in the middle
+        assert!(mean < 0.1e-3, "{mean}");
+    }
 }

@@ -14,6 +14,8 @@ use super::table::Table;
 pub(super) struct CompleteParams {
     /// weight of the scan beside the six neighbours of a node that is far from it
     pull: f64,
+    /// a node this near to the surface may be taken for one on its other side, m
+    nearly: f64,
     /// changes below this end the relaxation, m
     enough: f64,
     /// a hole without a bottom is opened this far around where the ball left it, in cells
@@ -24,7 +26,7 @@ impl CompleteParams {
     /// For cells of `pitch` and a ball of `radius` (m): the pull reaches two radii deep.
     pub fn new(pitch: f64, radius: f64) -> Self {
         let end_reach = (END_REACH * radius / pitch).ceil() as i32;
-        Self { pull: (pitch / (2.0 * radius)).powi(2), enough: 1e-6 * pitch, end_reach }
+        Self { pull: (pitch / (2.0 * radius)).powi(2), enough: 1e-6 * pitch, nearly: NEARLY * pitch, end_reach }
     }
 }
 
@@ -32,6 +34,14 @@ impl CompleteParams {
 const RELAXATION: f64 = 1.6;
 /// Weight, at most, of a touched surface going straight on beside the six neighbours of a node: as much as all of them.
 const STRAIGHT: f64 = 6.0;
+/// Weight of the scan out of reach of all evidence: the surface is back at it within a cell or two.
+const FURTHER_PULL: f64 = 1.0;
+/// Nodes of a piece of noise at most: two cells in each direction.
+const SPECK: usize = 8;
+/// A node that differs from so many of its six neighbours is alone.
+const ALONE: usize = 5;
+/// … and may be taken for one on their side, if it is within this many cells of the surface.
+const NEARLY: f64 = 0.5;
 /// Sweeps at most: twice what the largest gaps of the tested parts need.
 const SWEEPS: usize = 200;
 /// Radii around the end of a way within which a hole is opened: as wide as holes that a ball is let through.
@@ -47,6 +57,22 @@ pub(super) fn complete(restored: &mut Restored, at: &[u32], numbers: &Numbers, p
     relax(restored, at, numbers, params);
     if drop_islands(restored, at, numbers) {
         relax(restored, at, numbers, params);
+    }
+    blunt(restored, at, numbers, params);
+}
+
+/// Takes nodes near the surface that differ from nearly all around them back to their side: tips and pits that noise makes
+/// where the surface passes through a node.
+fn blunt(restored: &mut Restored, at: &[u32], numbers: &Numbers, params: &CompleteParams) {
+    for &at in at {
+        let state = restored.nodes.entry(at).1;
+        if state.value.abs() < params.nearly && state.least <= 0.0 {
+            let is_other = |other: u32| (restored.nodes.entry(other).1.value < 0.0) != (state.value < 0.0);
+            let around = neighbours(restored, at, numbers);
+            if around.into_iter().filter(|&other| other != NONE && is_other(other)).count() >= ALONE {
+                restored.nodes.value_mut(at).value = -f64::MIN_POSITIVE.copysign(state.value);
+            }
+        }
     }
 }
 
@@ -100,7 +126,11 @@ fn question(
     mut number: impl FnMut(u32) -> u32,
 ) -> Question {
     let state = &restored.nodes.entry(at).1;
-    let pull = if state.source == Source::Far { params.pull } else { 0.0 };
+    let pull = match state.source {
+        _ if state.is_further => FURTHER_PULL,
+        Source::Far => params.pull,
+        _ => 0.0,
+    };
     let (straight, share) = state.straight;
     let weight = STRAIGHT * share;
     let mut question = Question {
@@ -111,7 +141,9 @@ fn question(
         weight: pull + weight,
         least: state.least,
     };
-    for other in neighbours(restored, at, numbers).into_iter().filter(|&other| other != NONE) {
+    // what was looked at further follows; how far that went decides nothing here
+    let counts = |other: u32| other != NONE && (state.is_further || !restored.nodes.entry(other).1.is_further);
+    for other in neighbours(restored, at, numbers).into_iter().filter(|&other| counts(other)) {
         question.around[question.neighbours as usize] = number(other);
         question.neighbours += 1;
         question.weight += 1.0;
@@ -130,7 +162,7 @@ fn neighbours(restored: &Restored, at: u32, numbers: &Numbers) -> [u32; 6] {
 }
 
 /// Gives up material and void that nothing holds in its place: a piece of one sign, within the nodes looked at, that was
-/// neither touched nor swept. Returns whether there was any.
+/// neither touched nor swept, or is smaller than anything a ball can feel. Returns whether there was any.
 fn drop_islands(restored: &mut Restored, at: &[u32], numbers: &Numbers) -> bool {
     let mut seen = vec![Seen::Outside; restored.nodes.len()];
     at.iter().for_each(|&at| seen[at as usize] = Seen::NotYet);
@@ -162,25 +194,26 @@ enum Seen {
     Yes,
 }
 
-/// Gathers the piece of one sign around its first node; whether evidence or what lies beyond those looked at holds it.
+/// Gathers the piece of one sign around its first node; whether what lies beyond those looked at holds it, or evidence and
+/// its size.
 fn is_held(restored: &Restored, piece: &mut Vec<u32>, seen: &mut [Seen], numbers: &Numbers) -> bool {
-    let (mut next, mut is_held) = (0, false);
+    let (mut next, mut is_felt, mut goes_on) = (0, false, false);
     while let Some(&at) = piece.get(next) {
         next += 1;
         let state = &restored.nodes.entry(at).1;
         let around = neighbours(restored, at, numbers);
-        is_held |= matches!(state.source, Source::Touch | Source::Beyond) || state.least > 0.0;
-        is_held |= around.contains(&NONE);
+        is_felt |= matches!(state.source, Source::Touch | Source::Beyond) || state.least > 0.0;
+        goes_on |= around.contains(&NONE);
         for other in around.into_iter().filter(|&other| other != NONE) {
             let is_same = (restored.nodes.entry(other).1.value < 0.0) == (state.value < 0.0);
-            is_held |= is_same && seen[other as usize] == Seen::Outside;
+            goes_on |= is_same && seen[other as usize] == Seen::Outside;
             if is_same && seen[other as usize] == Seen::NotYet {
                 seen[other as usize] = Seen::Yes;
                 piece.push(other);
             }
         }
     }
-    is_held
+    goes_on || is_felt && piece.len() > SPECK
 }
 
 /// The cells in which a filled surface hangs on a ball that ended its way freely, from there to the nearest evidence within
@@ -207,7 +240,7 @@ fn is_unheld_surface(restored: &Restored, cell: Node) -> bool {
     let mut material = 0;
     for corner in 0..8 {
         let Some(state) = restored.nodes.get(&node_at(cell, corner)) else { return false };
-        if !state.is_open_question() {
+        if !state.is_open_question() && !state.is_corner {
             return false;
         }
         material += u8::from(state.value < 0.0);

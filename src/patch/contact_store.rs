@@ -178,8 +178,7 @@ impl ContactStore {
 
     /// Adds a contact to the mean of its cell, unless it contradicts what is known there.
     pub fn add(&mut self, contact: &Contact) -> Verdict {
-        let facing = [contact.normal.x, contact.normal.y, contact.normal.z].map(|x| (x / FACING).floor() as i8);
-        let bin = Bin { cell: cell_of(&contact.point, self.cell), facing };
+        let bin = self.bin_of(contact);
         let own = self.find(&bin);
         if let Some(gate) = self.gate
             && let Some(rival) = self.rival(contact, bin.cell, own, &gate)
@@ -203,6 +202,17 @@ impl ContactStore {
             self.last = Some((index, contact.stamp_ns));
         }
         Verdict::Taken
+    }
+
+    /// Whether a contact contradicts what is known at its place, and would be held apart.
+    pub(super) fn contradicts(&self, contact: &Contact) -> bool {
+        let bin = self.bin_of(contact);
+        self.gate.is_some_and(|gate| self.rival(contact, bin.cell, self.find(&bin), &gate).is_some())
+    }
+
+    fn bin_of(&self, contact: &Contact) -> Bin {
+        let facing = [contact.normal.x, contact.normal.y, contact.normal.z].map(|x| (x / FACING).floor() as i8);
+        Bin { cell: cell_of(&contact.point, self.cell), facing }
     }
 
     /// The means of a cell.

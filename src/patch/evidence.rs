@@ -4,6 +4,7 @@ use nalgebra::Point3;
 
 use super::contact_store::ContactStore;
 use super::field::{FieldParams, FieldScratch, FieldValue};
+use super::inner_corner::is_inner_corner;
 use super::scan_value::ScanValue;
 use super::swept::SweptSpace;
 use crate::mesh::{FaceTree, TriMesh};
@@ -87,6 +88,8 @@ pub struct Finding {
     pub value: f64,
     /// what it rests on
     pub source: Source,
+    /// touches of two surfaces, going straight on to where they meet in an inner corner: nothing was felt here
+    pub is_corner: bool,
     /// signed distance from the scan, m
     pub scan: f64,
     /// where there is nothing: the signed distance from a touched surface going straight on, m, and how far that is
@@ -146,11 +149,17 @@ impl Evidence<'_> {
         if swept_depth > 0.0 && source != Source::Touch {
             (value, source) = (scan.value, Source::Nothing);
         }
+        let is_corner = matches!(source, Source::Nothing | Source::Both)
+            && touched
+                .is_some_and(|touched| swept_depth <= touched.value.max(0.0) && self.is_corner(&touched, scratch));
+        if let Some(touched) = touched.filter(|_| is_corner) {
+            (value, source) = (touched.value, Source::Touch);
+        }
         if scan.is_on_rim && !matches!(source, Source::Touch | Source::Both) {
             source = Source::Beyond;
         }
         let straight = touched.and_then(|touched| self.straight_on(&touched, scan));
-        Finding { value, source, scan: scan.value, straight, swept_depth, is_free_end }
+        Finding { value, source, is_corner, scan: scan.value, straight, swept_depth, is_free_end }
     }
 
     /// The field of the touches at `x` (m, in O), which take the place of the scan by the gain σₛ² / (σₛ² + σₜ²) of the
@@ -211,6 +220,12 @@ impl Evidence<'_> {
         let share = (p.field.reach - touched.lateral()) / (p.field.reach - p.border_support);
         let goes_on = !touched.is_fan && touched.value.abs() <= p.touch_depth;
         goes_on.then(|| (touched.value, inside * share.clamp(0.0, 1.0).powi(2)))
+    }
+
+    /// Whether two touched surfaces go straight on into an inner corner, there where the field was evaluated last.
+    fn is_corner(&self, touched: &FieldValue, scratch: &FieldScratch) -> bool {
+        let p = self.params;
+        touched.value.abs() <= p.touch_depth && is_inner_corner(self.contacts, &p.field, p.radius, scratch)
     }
 
     fn away_from_touches(&self, scan: &ScanValue) -> Source {

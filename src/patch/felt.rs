@@ -68,6 +68,10 @@ impl Felt {
         let two = self.ball.and_then(|radius| split(&self.contacts, radius, &touch.centre, contact));
         let mut is_believed = false;
         for contact in two.as_ref().map_or(std::slice::from_ref(contact), |two| two) {
+            // a wall that the ball would have to be nearer to is not touched: that is no knock
+            if two.is_some() && self.contacts.contradicts(contact) {
+                continue;
+            }
             let verdict = self.contacts.add(contact);
             is_believed |= verdict != Verdict::HeldApart;
             if verdict == Verdict::Insisted {
@@ -155,8 +159,9 @@ fn beside(contacts: &ContactStore, means: &Table<u32, ()>, reach: f64) -> Table<
     beside
 }
 
-/// Whether a contact is so far outside that the part of the scan cannot have been touched there.
+/// Whether a contact is so far outside that the part of the scan cannot have been touched there. Below a scan without sides
+/// it may be in a hole, but not beyond its rim.
 fn is_elsewhere(p: &Point3<f64>, scan: &TriMesh, tree: &FaceTree, bounds: &[Point3<f64>; 2], reach: f64) -> bool {
     let is_within = bounds[0].inf(p) == bounds[0] && bounds[1].sup(p) == bounds[1];
-    !is_within || ScanValue::at(scan, tree, p).is_none_or(|scan| scan.value > reach)
+    ScanValue::at(scan, tree, p).is_none_or(|scan| scan.value > reach || !is_within && scan.is_on_rim)
 }

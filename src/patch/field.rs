@@ -77,11 +77,11 @@ pub(super) struct Member {
 pub(super) struct Piece {
     weight: f64,
     /// weight of the members that are not on an edge
-    flat_weight: f64,
+    pub(super) flat_weight: f64,
     /// squared distance of the nearest member, m²
-    nearest_squared: f64,
+    pub(super) nearest_squared: f64,
     /// Σ W c and Σ W n of the members so far, then Σ w c / Σ w and Σ w n of the fit
-    point: Vector3<f64>,
+    pub(super) point: Vector3<f64>,
     normal: Vector3<f64>,
     /// unit
     pub(super) facing: Vector3<f64>,
@@ -100,6 +100,8 @@ impl Piece {
 /// Room for one evaluation, used again by the next.
 #[derive(Clone, Debug, Default)]
 pub struct FieldScratch {
+    /// the point, m
+    pub(super) at: Point3<f64>,
     pub(super) near: Vec<Member>,
     pub(super) pieces: Vec<Piece>,
     angles: Vec<(f64, f64, f64)>,
@@ -138,6 +140,7 @@ const UNDER: f64 = 0.13;
 impl FieldParams {
     /// The field at `x` (m, in O); `None` where no contact is within reach.
     pub fn at(&self, store: &ContactStore, x: &Point3<f64>, scratch: &mut FieldScratch) -> Option<FieldValue> {
+        scratch.at = *x;
         let FieldScratch { near, pieces, angles, decides, .. } = scratch;
         near.clear();
         store.near(x, self.reach, |distance_squared, index| {

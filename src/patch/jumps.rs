@@ -23,7 +23,18 @@ mod tests {
 
     fn state(value: f64) -> NodeState {
         let (source, straight) = (Source::Touch, (value, 1.0));
-        NodeState { value, source, scan: 0.0, straight, least: 0.0, is_free_end: false, felt: Some(value), renewal: 0 }
+        NodeState {
+            value,
+            source,
+            is_corner: false,
+            scan: 0.0,
+            straight,
+            least: 0.0,
+            is_free_end: false,
+            is_further: false,
+            felt: Some(value),
+            renewal: 0,
+        }
     }
 
     /// Which of a line of nodes one pitch (2 mm) apart are torn.

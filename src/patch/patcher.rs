@@ -12,7 +12,7 @@ use super::knocks::Knocks;
 use super::lattice::{CellBox, Lattice, Node, VertexKey};
 use super::patched::{Patched, Support};
 use super::remesh::{Remesh, Renewed};
-use super::restore::{News, Restored, node_at};
+use super::restore::{News, NodeState, Restored, node_at};
 use super::splice::Patch;
 use super::swept::SweptSpace;
 use super::touches::{TouchFinder, TouchFinderParams};
@@ -430,7 +430,8 @@ fn lattice_of(pitch: f64) -> Lattice {
 
 /// A vertex is touched when most of the corners of its cell are near the surface that was; those on the scan are its own.
 fn support_of(key: &VertexKey, restored: &Restored) -> Support {
-    let is_touched = |node: &Node| restored.nodes.get(node).is_some_and(|state| state.source == Source::Touch);
+    let is_felt = |state: &NodeState| state.source == Source::Touch && !state.is_corner;
+    let is_touched = |node: &Node| restored.nodes.get(node).is_some_and(is_felt);
     let touched = match *key {
         VertexKey::Scan(_) | VertexKey::Trace { .. } | VertexKey::Pierce(..) => return Support::Scan,
         VertexKey::Cell(cell, _) => (0..8).filter(|&corner| is_touched(&node_at(cell, corner))).count() >= 4,

