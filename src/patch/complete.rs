@@ -247,3 +247,63 @@ fn is_unheld_surface(restored: &Restored, cell: Node) -> bool {
     }
     material % 8 != 0
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::patch::lattice::CellBox;
+
+    const PITCH: f64 = 0.75e-3;
+    const BOX: CellBox = CellBox { lo: [0; 3], hi: [6; 3] };
+
+    /// The signs of nodes that were touched everywhere, filled in: those of `value` (pitches) before, at each node.
+    fn completed(value: impl Fn(Node) -> f64) -> Restored {
+        let state = |node: Node| NodeState {
+            value: value(node) * PITCH,
+            source: Source::Touch,
+            is_corner: false,
+            scan: 0.0,
+            straight: (0.0, 0.0),
+            least: f64::NEG_INFINITY,
+            is_free_end: false,
+            is_further: false,
+            felt: Some(value(node) * PITCH),
+            renewal: 0,
+        };
+        let mut restored = Restored::default();
+        BOX.each(|node| {
+            restored.nodes.insert(node, state(node));
+        });
+        let at: Vec<u32> = (0..restored.nodes.len() as u32).collect();
+        let numbers = Numbers::new(&restored.nodes, &BOX);
+        complete(&mut restored, &at, &numbers, &CompleteParams::new(PITCH, 1.5e-3));
+        restored
+    }
+
+    /// Material below z = 2.8 pitches.
+    fn floor([.., k]: Node) -> f64 {
+        f64::from(k) - 2.8
+    }
+
+    fn is_material(restored: &Restored, node: Node) -> bool {
+        restored.nodes.get(&node).is_some_and(|state| state.value < 0.0)
+    }
+
+    #[test]
+    fn a_tip_of_noise_goes_and_a_post_stays() {
+        let tip = [3, 3, 3];
+        let with_tip = |depth: f64| completed(move |node| if node == tip { -depth } else { floor(node) });
+        assert!(!is_material(&with_tip(0.1), tip));
+        assert!(is_material(&with_tip(0.6), tip), "more than noise");
+        let post = completed(|node| if node[0] == 3 && node[2] == 3 { -0.1 } else { floor(node) });
+        assert!(is_material(&post, tip), "a ridge");
+    }
+
+    #[test]
+    fn a_speck_goes_whatever_it_rests_on() {
+        let speck = completed(|node| if node == [3, 3, 5] { -1.0 } else { floor(node) });
+        assert!(!is_material(&speck, [3, 3, 5]) && is_material(&speck, [3, 3, 2]));
+        let lump = completed(|node| if node[2] == 5 { -1.0 } else { floor(node) });
+        assert!(is_material(&lump, [3, 3, 5]), "it goes on beyond what was looked at");
+    }
+}
