@@ -240,7 +240,7 @@ fn is_unheld_surface(restored: &Restored, cell: Node) -> bool {
     let mut material = 0;
     for corner in 0..8 {
         let Some(state) = restored.nodes.get(&node_at(cell, corner)) else { return false };
-        if !state.is_open_question() && !state.is_corner {
+        if !state.is_open_question() {
             return false;
         }
         material += u8::from(state.value < 0.0);
@@ -290,13 +290,13 @@ mod tests {
     }
 
     #[test]
-    fn a_tip_of_noise_goes_and_a_post_stays() {
+    fn a_tip_of_noise_goes_and_a_ridge_stays() {
         let tip = [3, 3, 3];
         let with_tip = |depth: f64| completed(move |node| if node == tip { -depth } else { floor(node) });
         assert!(!is_material(&with_tip(0.1), tip));
         assert!(is_material(&with_tip(0.6), tip), "more than noise");
-        let post = completed(|node| if node[0] == 3 && node[2] == 3 { -0.1 } else { floor(node) });
-        assert!(is_material(&post, tip), "a ridge");
+        let ridge = completed(|node| if node[0] == 3 && node[2] == 3 { -0.1 } else { floor(node) });
+        assert!(is_material(&ridge, tip));
     }
 
     #[test]

@@ -114,6 +114,7 @@ const REACH: f64 = 2.8;
 const BALL_MARGIN: f64 = 2.0;
 /// News count most within this many radii.
 const NEAR: f64 = 1.1;
+
 impl Restored {
     /// Brings the field up to date with what came to the stores of `evidence`.
     ///

@@ -1,7 +1,7 @@
 """python tests/python/more_cases.py TOUCHUP OUT: the judged cases in other frames, and other parts, as a table on stdout.
 
 Turned and shifted recordings show what depends on how a part lies in the lattice; the other parts are scanned and touched by
-`touchup simulate` and show what was tuned on the judged ones. Needs manifold3d beside requirements.txt; takes ten minutes.
+`touchup simulate` and show what was tuned on the judged ones. It takes ten minutes.
 """
 
 import json
