@@ -13,6 +13,7 @@
 //! | [`patch`] | the scan meshed anew where it was touched |
 //! | [`refine`] | [`refine::Refiner::push`]: one sample moves the mesh |
 //! | [`live`] | both rates: [`refine`] at every sample, [`patch`] beside it on a thread of its own |
+//! | [`features`] | what a mesh and the touches on it are made of: holes, slots, planes, with their uncertainty |
 //! | [`sim`] | known surfaces, a scanner and a stylus to test against |
 //! | [`io`] | mesh files and recordings; with [`scene`] the only file access |
 //! | [`scene`] | the YAML that names the parts of a scene |
@@ -21,9 +22,10 @@
 //! # Frames
 //!
 //! O object (the mesh) · T stylus tip (origin: centre of the ball; z: along the shaft, from tip to handle) · S force
-//! sensor · W world (z up) · V view (in [`sim`] alone; z: towards the scanner or the hand). `pose_ot` maps T to O, `p_ot`
-//! is the tip in O, `force_o` is a force expressed in O. A wrench is what the object does to the stylus and normals point
-//! out of the object, so a stylus that presses has `force_o · normal > 0`.
+//! sensor · W world (z up) · V view (in [`sim`] alone; z: towards the scanner or the hand) · F fitted surface (in
+//! [`features`] alone; z: its axis or normal). `pose_ot` maps T to O, `p_ot` is the tip in O, `force_o` is a force
+//! expressed in O. A wrench is what the object does to the stylus and normals point out of the object, so a stylus that
+//! presses has `force_o · normal > 0`.
 //!
 //! # Units
 //!
@@ -38,6 +40,7 @@
 struct Readme;
 
 pub mod cli;
+pub mod features;
 pub mod io;
 pub mod live;
 pub mod mesh;

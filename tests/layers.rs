@@ -9,6 +9,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("touch", &[]),
     ("mesh", &[]),
     ("patch", &["touch", "mesh"]),
+    ("features", &["touch", "mesh"]),
     ("refine", &["touch", "mesh", "patch"]),
     ("live", &["touch", "mesh", "patch", "refine"]),
     ("sim", &["touch", "mesh"]),
@@ -18,7 +19,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
 ];
 
 /// Same input, same bytes out: nothing of the world outside comes in.
-const PURE: &[&str] = &["touch", "mesh", "patch", "refine", "sim"];
+const PURE: &[&str] = &["touch", "mesh", "patch", "features", "refine", "sim"];
 
 /// What a pure room may not name.
 const IMPURE_PATHS: &[&str] = &["std::fs", "std::thread", "std::env", "std::io", "std::net", "std::process"];

@@ -1,0 +1,144 @@
+//! The cone: countersinks, chamfers of holes, tapers.
+
+use std::f64::consts::FRAC_PI_2;
+
+use nalgebra::{Isometry3, Point3, Translation3, Vector3};
+
+use super::circle::{radial, side};
+use super::normals::{AxisGuess, pose_along};
+use super::{Distance, Estimate, Fit, FitError, Freedom, OrientedPoint, Surface};
+
+/// A cone, by one of its circles and the angle between its lines and its axis.
+///
+/// Its freedoms are a shift along its normal and the angle, turned about the circle: both stay well conditioned from a
+/// cylinder (angle 0) to a flat cone (angle near 90°), where apex and radius are not.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cone {
+    /// Frame F in O: the origin is the centre of the circle, z the axis.
+    pub pose_of: Isometry3<f64>,
+    /// Radius of the circle, m.
+    pub radius: f64,
+    /// Angle between the lines and the axis, rad, within ± π/2; positive where it widens along z.
+    pub half_angle: f64,
+    /// Whether the air is inside (a countersink) and not the material.
+    pub concave: bool,
+}
+
+impl Cone {
+    /// From the centre of a circle, the axis (any length but 0), radius of the circle, half angle.
+    pub fn new(center: Point3<f64>, axis: &Vector3<f64>, radius: f64, half_angle: f64, concave: bool) -> Self {
+        Self { pose_of: pose_along(center, axis), radius, half_angle, concave }
+    }
+
+    /// First guess from places with normals, such as the faces of a tessellated countersink.
+    ///
+    /// All normals n have the same n · axis, so their tips lie on a plane, whose normal is the axis.
+    ///
+    /// # Errors
+    /// [`FitError::NoGuess`] when the normals do not spread in two directions.
+    pub fn from_normals(faces: &[OrientedPoint]) -> Result<Self, FitError> {
+        let none = FitError::NoGuess { surface: Self::NAME, count: faces.len() };
+        let guess = AxisGuess::of_tips(faces).ok_or(none)?;
+        // the normal of a boss is cos α away from the axis and −sin α along it, of a hole the opposite
+        let half_angle = (-side(guess.concave) * guess.along).clamp(-1.0, 1.0).asin();
+        Ok(Self { pose_of: guess.pose_of, radius: guess.radius, half_angle, concave: guess.concave }.widening())
+    }
+
+    /// The same cone with z towards where it is wider.
+    pub fn widening(self) -> Self {
+        if self.half_angle >= 0.0 {
+            return self;
+        }
+        let over = nalgebra::UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+        Self { pose_of: self.pose_of * over, half_angle: -self.half_angle, ..self }
+    }
+
+    /// Centre of the circle, m, in O.
+    pub fn center(&self) -> Point3<f64> {
+        self.pose_of.translation.vector.into()
+    }
+
+    /// Radius at a height above the circle along z, m.
+    pub fn radius_at(&self, height: f64) -> f64 {
+        self.radius + height * self.half_angle.tan()
+    }
+
+    /// Where all lines meet, m, in O; `None` for a cylinder.
+    pub fn apex(&self) -> Option<Point3<f64>> {
+        let height = -self.radius / self.half_angle.tan();
+        height.is_finite().then(|| self.pose_of * Point3::new(0.0, 0.0, height))
+    }
+}
+
+impl Surface for Cone {
+    const NAME: &'static str = "cone";
+    const FREE: [bool; 8] = [true, true, false, true, true, false, true, true];
+    const NEEDED: [bool; 8] = Self::FREE;
+    const SECOND_IS_LENGTH: bool = false;
+
+    fn name_of(freedom: Freedom) -> &'static str {
+        match freedom {
+            Freedom::TiltX | Freedom::TiltY => "direction of the axis",
+            Freedom::Size => "radius",
+            Freedom::Second => "half angle",
+            _ => "centre",
+        }
+    }
+
+    fn pose_of(&self) -> &Isometry3<f64> {
+        &self.pose_of
+    }
+
+    fn distance_at(&self, q: &Vector3<f64>) -> Distance {
+        let (rho, away) = radial(q);
+        let (sin, cos) = self.half_angle.sin_cos();
+        let s = side(self.concave);
+        let (out, along) = (rho - self.radius, q.z);
+        Distance {
+            value: s * (out * cos - along * sin),
+            normal: s * (away * cos - Vector3::z() * sin),
+            by_size: [-s, -s * (out * sin + along * cos)],
+        }
+    }
+
+    fn with(&self, pose_of: Isometry3<f64>, [shift, turn]: [f64; 2]) -> Self {
+        let (sin, cos) = self.half_angle.sin_cos();
+        Self {
+            pose_of: pose_of * Translation3::new(0.0, 0.0, -shift * sin),
+            radius: self.radius + shift * cos,
+            half_angle: self.half_angle + turn,
+            concave: self.concave,
+        }
+    }
+
+    fn described_from(&self, q: &Vector3<f64>, rho: f64) -> Self {
+        let (sin, cos) = self.half_angle.sin_cos();
+        let along = (rho - self.radius) * sin + q.z * cos;
+        let pose_of = self.pose_of * Translation3::new(0.0, 0.0, along * cos);
+        Self { pose_of, radius: self.radius + along * sin, ..*self }
+    }
+
+    fn check(&self) -> Result<(), FitError> {
+        let bad = |what, value| Err(FitError::BadSize { what, value });
+        match (self.radius, self.half_angle) {
+            (radius, _) if !(radius > 0.0 && radius.is_finite()) => bad("radius", radius),
+            (_, angle) if angle.is_nan() || angle.abs() >= FRAC_PI_2 => bad("half angle", angle),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Fit<Cone> {
+    /// Diameter at a height above the reference circle along z, m: where it meets the plane around it.
+    pub fn diameter_at(&self, height: f64) -> Option<Estimate> {
+        let cone = &self.surface;
+        let cos = cone.half_angle.cos();
+        let by = [(Freedom::Size, 2.0 / cos), (Freedom::Second, 2.0 * height / (cos * cos))];
+        self.estimate(2.0 * cone.radius_at(height), &by)
+    }
+
+    /// Full angle between opposite lines, rad, ≥ 0.
+    pub fn full_angle(&self) -> Option<Estimate> {
+        self.estimate(2.0 * self.surface.half_angle.abs(), &[(Freedom::Second, 2.0)])
+    }
+}

@@ -1,0 +1,88 @@
+//! The cylinder: holes, bores, bosses, fillets.
+
+use nalgebra::{Isometry3, Point3, Translation3, Vector3};
+
+use super::circle::{radial, side};
+use super::normals::{AxisGuess, pose_along};
+use super::{Distance, Estimate, Fit, FitError, Freedom, OrientedPoint, Surface};
+
+/// A cylinder without ends.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cylinder {
+    /// Frame F in O: the origin lies on the axis, z along it.
+    pub pose_of: Isometry3<f64>,
+    /// m
+    pub radius: f64,
+    /// Whether the air is inside (a hole) and not the material (a boss).
+    pub concave: bool,
+}
+
+impl Cylinder {
+    /// From a point on the axis and the axis, of any length but 0.
+    pub fn new(point: Point3<f64>, axis: &Vector3<f64>, radius: f64, concave: bool) -> Self {
+        Self { pose_of: pose_along(point, axis), radius, concave }
+    }
+
+    /// First guess from places with normals, such as the faces of a tessellated hole.
+    ///
+    /// The axis is the direction that the normals have least of; the centre is where their lines pass closest, the radius
+    /// the mean distance from it.
+    ///
+    /// # Errors
+    /// [`FitError::NoGuess`] when the normals are all parallel or no lines meet.
+    pub fn from_normals(faces: &[OrientedPoint]) -> Result<Self, FitError> {
+        let none = FitError::NoGuess { surface: Self::NAME, count: faces.len() };
+        let guess = AxisGuess::across_normals(faces).ok_or(none)?;
+        Ok(Self { pose_of: guess.pose_of, radius: guess.radius, concave: guess.concave })
+    }
+
+    /// The point on the axis that F starts from, m, in O.
+    pub fn center(&self) -> Point3<f64> {
+        self.pose_of.translation.vector.into()
+    }
+}
+
+impl Surface for Cylinder {
+    const NAME: &'static str = "cylinder";
+    const FREE: [bool; 8] = [true, true, false, true, true, false, true, false];
+    const NEEDED: [bool; 8] = Self::FREE;
+    const SECOND_IS_LENGTH: bool = false;
+
+    fn name_of(freedom: Freedom) -> &'static str {
+        match freedom {
+            Freedom::TiltX | Freedom::TiltY => "direction of the axis",
+            Freedom::Size => "radius",
+            _ => "centre",
+        }
+    }
+
+    fn pose_of(&self) -> &Isometry3<f64> {
+        &self.pose_of
+    }
+
+    fn distance_at(&self, q: &Vector3<f64>) -> Distance {
+        let (rho, away) = radial(q);
+        let s = side(self.concave);
+        Distance { value: s * (rho - self.radius), normal: s * away, by_size: [-s, 0.0] }
+    }
+
+    fn with(&self, pose_of: Isometry3<f64>, by: [f64; 2]) -> Self {
+        Self { pose_of, radius: self.radius + by[0], concave: self.concave }
+    }
+
+    fn described_from(&self, q: &Vector3<f64>, _: f64) -> Self {
+        Self { pose_of: self.pose_of * Translation3::new(0.0, 0.0, q.z), ..*self }
+    }
+
+    fn check(&self) -> Result<(), FitError> {
+        let value = self.radius;
+        (value > 0.0 && value.is_finite()).then_some(()).ok_or(FitError::BadSize { what: "radius", value })
+    }
+}
+
+impl Fit<Cylinder> {
+    /// Twice the radius, m.
+    pub fn diameter(&self) -> Option<Estimate> {
+        self.estimate(2.0 * self.surface.radius, &[(Freedom::Size, 2.0)])
+    }
+}

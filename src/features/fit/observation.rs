@@ -1,0 +1,66 @@
+//! What is fitted to, and how.
+
+use nalgebra::Point3;
+
+use super::FitError;
+
+/// One measured point and how far it should be from the surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Observation {
+    /// The point in O, m: the centre of the ball that touches, or a vertex of the mesh.
+    pub point: Point3<f64>,
+    /// Signed distance it should have from the surface, m, positive in the air: the ball's radius, or 0 for a vertex.
+    pub offset: f64,
+    /// Standard deviation along the normal, m, > 0; across the normal it is taken to be the same.
+    pub sigma: f64,
+    /// Observations of one group share their error, those of different groups do not: one pass of the stylus over about
+    /// 0.1 s.
+    pub group: u32,
+}
+
+/// What a fit is told beside its observations.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FitParams {
+    /// Standard deviation of an error that all observations have in common along their normals, m: the calibration of
+    /// the ball's radius. It goes into radii and widths in full, into a diameter twice, and not into an axis.
+    pub common_sigma: f64,
+    /// How well the axis of the first guess is known before, rad in each of two directions; `None`: not at all. A hole in
+    /// thin metal has its axis from the plane around it.
+    pub axis_sigma: Option<f64>,
+    /// What lies farther from the surface than this many standard deviations is an outlier. 4: one in 16000 good ones.
+    pub rejection: f64,
+}
+
+impl Default for FitParams {
+    fn default() -> Self {
+        Self { common_sigma: 0.0, axis_sigma: None, rejection: 4.0 }
+    }
+}
+
+impl FitParams {
+    pub(super) fn check(&self) -> Result<(), FitError> {
+        let positive = |what, sigma: f64| match sigma > 0.0 && sigma.is_finite() {
+            true => Ok(()),
+            false => Err(FitError::BadSigma { what, sigma }),
+        };
+        if !(self.common_sigma >= 0.0 && self.common_sigma.is_finite()) {
+            return Err(FitError::BadSigma { what: "common_sigma", sigma: self.common_sigma });
+        }
+        positive("rejection", self.rejection)?;
+        self.axis_sigma.map_or(Ok(()), |sigma| positive("axis_sigma", sigma))
+    }
+}
+
+impl Observation {
+    pub(super) fn check_all(observations: &[Observation]) -> Result<(), FitError> {
+        for (index, o) in observations.iter().enumerate() {
+            if !(o.point.coords.iter().all(|x| x.is_finite()) && o.offset.is_finite()) {
+                return Err(FitError::NotFinite { index });
+            }
+            if !(o.sigma > 0.0 && o.sigma.is_finite()) {
+                return Err(FitError::BadSigma { what: "sigma of an observation", sigma: o.sigma });
+            }
+        }
+        Ok(())
+    }
+}

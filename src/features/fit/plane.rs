@@ -1,0 +1,85 @@
+//! The plane.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use super::normals::pose_along;
+use super::{Distance, Fit, FitError, Freedom, OrientedPoint, Surface};
+
+/// A plane whose air is on the side of z.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plane {
+    /// Frame F in O: the origin lies on the plane, z is its normal out of the material.
+    pub pose_of: Isometry3<f64>,
+}
+
+impl Plane {
+    /// The plane through a point with a normal of any length but 0.
+    pub fn new(point: Point3<f64>, normal: &Vector3<f64>) -> Self {
+        Self { pose_of: pose_along(point, normal) }
+    }
+
+    /// Weighted mean of the points and of the normals.
+    ///
+    /// # Errors
+    /// [`FitError::NoGuess`] when there are none or their normals cancel.
+    pub fn from_normals(faces: &[OrientedPoint]) -> Result<Self, FitError> {
+        let none = FitError::NoGuess { surface: Self::NAME, count: faces.len() };
+        let weight: f64 = faces.iter().map(|f| f.weight).sum();
+        let normal: Vector3<f64> = faces.iter().map(|f| f.normal * f.weight).sum();
+        let point = faces.iter().map(|f| f.point.coords * f.weight).sum::<Vector3<f64>>() / weight;
+        let sound = weight > 0.0 && normal.norm() > weight * 0.5 && point.iter().all(|x| x.is_finite());
+        sound.then(|| Self::new(point.into(), &normal)).ok_or(none)
+    }
+
+    /// Normal out of the material, in O.
+    pub fn normal(&self) -> Vector3<f64> {
+        self.axis()
+    }
+
+    /// A point on it, m, in O.
+    pub fn point(&self) -> Point3<f64> {
+        self.pose_of.translation.vector.into()
+    }
+}
+
+impl Surface for Plane {
+    const NAME: &'static str = "plane";
+    const FREE: [bool; 8] = [false, false, true, true, true, false, false, false];
+    const NEEDED: [bool; 8] = Self::FREE;
+    const SECOND_IS_LENGTH: bool = false;
+
+    fn name_of(freedom: Freedom) -> &'static str {
+        match freedom {
+            Freedom::Z => "position along the normal",
+            _ => "direction of the normal",
+        }
+    }
+
+    fn pose_of(&self) -> &Isometry3<f64> {
+        &self.pose_of
+    }
+
+    fn distance_at(&self, q: &Vector3<f64>) -> Distance {
+        Distance { value: q.z, normal: Vector3::z(), by_size: [0.0; 2] }
+    }
+
+    fn with(&self, pose_of: Isometry3<f64>, _: [f64; 2]) -> Self {
+        Self { pose_of }
+    }
+
+    fn described_from(&self, q: &Vector3<f64>, _: f64) -> Self {
+        Self { pose_of: self.pose_of * nalgebra::Translation3::new(q.x, q.y, 0.0) }
+    }
+
+    fn check(&self) -> Result<(), FitError> {
+        Ok(())
+    }
+}
+
+impl Fit<Plane> {
+    /// Standard deviation of the plane along its normal at a point of it given in O, m.
+    pub fn std_at(&self, point: &Point3<f64>) -> Option<f64> {
+        let (_, by) = self.surface.derivatives(point);
+        self.std_of(&by)
+    }
+}

@@ -1,0 +1,150 @@
+//! The slot and its counterpart, the oblong boss: two parallel walls with half-round or flat ends.
+
+use nalgebra::{Isometry3, Point3, Translation3, Vector3};
+
+use super::circle::side;
+use super::normals::pose_along;
+use super::{Distance, Estimate, Fit, FitError, Freedom, Surface};
+
+/// What closes a slot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ends {
+    /// Half circles as wide as the slot.
+    Round,
+    /// Walls across.
+    Straight,
+}
+
+/// A prism over a stadium or a rectangle, without top and bottom.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stadium {
+    /// Frame F in O: the origin is the centre, z the direction of the walls' lines (out of the part), x along the slot.
+    pub pose_of: Isometry3<f64>,
+    /// From wall to wall, m.
+    pub width: f64,
+    /// From end to end, over all, m; not less than the width where the ends are round.
+    pub length: f64,
+    /// What closes it.
+    pub ends: Ends,
+    /// Whether the air is inside (a slot) and not the material.
+    pub concave: bool,
+}
+
+impl Stadium {
+    /// From its centre, axis (any length but 0), direction along the slot (not parallel to the axis) and sizes.
+    pub fn new(
+        center: Point3<f64>,
+        axis: &Vector3<f64>,
+        along: &Vector3<f64>,
+        [width, length]: [f64; 2],
+        ends: Ends,
+        concave: bool,
+    ) -> Self {
+        let upright = pose_along(center, axis);
+        let x = upright.inverse_transform_vector(along);
+        let turn = nalgebra::UnitQuaternion::from_axis_angle(&Vector3::z_axis(), x.y.atan2(x.x));
+        Self { pose_of: upright * turn, width, length, ends, concave }
+    }
+
+    /// Its centre, m, in O.
+    pub fn center(&self) -> Point3<f64> {
+        self.pose_of.translation.vector.into()
+    }
+
+    /// Unit vector along it, in O.
+    pub fn direction(&self) -> Vector3<f64> {
+        self.pose_of.rotation * Vector3::x()
+    }
+
+    /// Distance outside the outline, its normal, and its derivatives by width and length.
+    ///
+    /// Round: all points half a width from a segment as long as length − width.
+    fn round_outline(&self, q: &Vector3<f64>) -> (f64, [f64; 2], [f64; 2]) {
+        let half_segment = (self.length - self.width).max(0.0) / 2.0;
+        let beyond = (q.x.abs() - half_segment).max(0.0).copysign(q.x);
+        let rho = beyond.hypot(q.y);
+        let normal = if rho > 0.0 { [beyond / rho, q.y / rho] } else { [0.0, 1.0] };
+        let along = normal[0].abs() / 2.0;
+        (rho - self.width / 2.0, normal, [along - 0.5, -along])
+    }
+
+    /// The same for the rectangle: outside its corners are rounded off by the distance.
+    fn straight_outline(&self, q: &Vector3<f64>) -> (f64, [f64; 2], [f64; 2]) {
+        let (dx, dy) = (q.x.abs() - self.length / 2.0, q.y.abs() - self.width / 2.0);
+        let (value, [x, y]) = match (dx > 0.0 && dy > 0.0, dx > dy) {
+            (true, _) => (dx.hypot(dy), [dx, dy].map(|d| d / dx.hypot(dy))),
+            (false, true) => (dx, [1.0, 0.0]),
+            (false, false) => (dy, [0.0, 1.0]),
+        };
+        (value, [x.copysign(q.x), y.copysign(q.y)], [-y / 2.0, -x / 2.0])
+    }
+}
+
+impl Surface for Stadium {
+    const NAME: &'static str = "slot";
+    const FREE: [bool; 8] = [true, true, false, true, true, true, true, true];
+    const NEEDED: [bool; 8] = [false; 8];
+    const SECOND_IS_LENGTH: bool = true;
+
+    fn name_of(freedom: Freedom) -> &'static str {
+        match freedom {
+            Freedom::X => "centre along the slot",
+            Freedom::Y | Freedom::Z => "centre across the slot",
+            Freedom::TiltX | Freedom::TiltY => "direction of the axis",
+            Freedom::Turn => "direction of the slot",
+            Freedom::Size => "width",
+            Freedom::Second => "length",
+        }
+    }
+
+    fn pose_of(&self) -> &Isometry3<f64> {
+        &self.pose_of
+    }
+
+    fn distance_at(&self, q: &Vector3<f64>) -> Distance {
+        let (value, normal, by_size) = match self.ends {
+            Ends::Round => self.round_outline(q),
+            Ends::Straight => self.straight_outline(q),
+        };
+        let s = side(self.concave);
+        let normal = Vector3::new(s * normal[0], s * normal[1], 0.0);
+        Distance { value: s * value, normal, by_size: by_size.map(|d| s * d) }
+    }
+
+    fn with(&self, pose_of: Isometry3<f64>, by: [f64; 2]) -> Self {
+        let width = self.width + by[0];
+        let shortest = if self.ends == Ends::Round { width } else { 0.0 };
+        Self { pose_of, width, length: (self.length + by[1]).max(shortest), ..*self }
+    }
+
+    fn described_from(&self, q: &Vector3<f64>, _: f64) -> Self {
+        Self { pose_of: self.pose_of * Translation3::new(0.0, 0.0, q.z), ..*self }
+    }
+
+    fn check(&self) -> Result<(), FitError> {
+        let sizes = [("width", self.width), ("length", self.length)];
+        match sizes.into_iter().find(|(_, value)| !(*value > 0.0 && value.is_finite())) {
+            Some((what, value)) => Err(FitError::BadSize { what, value }),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Fit<Stadium> {
+    /// From wall to wall, m; `None` where only one wall was touched.
+    pub fn width(&self) -> Option<Estimate> {
+        self.estimate(self.surface.width, &[(Freedom::Size, 1.0)])
+    }
+
+    /// From end to end, m; `None` unless both ends were touched.
+    pub fn length(&self) -> Option<Estimate> {
+        self.estimate(self.surface.length, &[(Freedom::Second, 1.0)])
+    }
+
+    /// How far the end in direction `sign` (1: along x of F, −1: against it) is from the origin of F, m; `None` where it
+    /// was not touched.
+    pub fn end(&self, sign: f64) -> Option<Estimate> {
+        let sign = 1f64.copysign(sign);
+        self.estimate(self.surface.length / 2.0, &[(Freedom::X, sign), (Freedom::Second, 0.5)])
+    }
+}

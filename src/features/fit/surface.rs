@@ -1,0 +1,125 @@
+//! What every surface that can be fitted has in common: a pose and up to two sizes that can change.
+
+use nalgebra::{Isometry3, Point3, SVector, Translation3, UnitQuaternion, Vector3};
+
+use super::FitError;
+
+/// How many [`Freedom`]s there are.
+pub const FREEDOMS: usize = 8;
+
+/// A small change of each freedom, m or rad, indexed by [`Freedom`].
+pub type Steps = SVector<f64, FREEDOMS>;
+
+/// One way in which a surface can change. Directions are those of its own frame F, whose z is its axis or normal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Freedom {
+    /// Shift along x of F, m.
+    X,
+    /// Shift along y of F, m.
+    Y,
+    /// Shift along z of F, m.
+    Z,
+    /// z leans towards x, rad.
+    TiltX,
+    /// z leans towards y, rad.
+    TiltY,
+    /// Turn about z, rad.
+    Turn,
+    /// First size: radius of a cylinder, shift of a cone along its normal, width of a slot; m.
+    Size,
+    /// Second size: half angle of a cone (rad), length of a slot (m).
+    Second,
+}
+
+impl Freedom {
+    /// All, in the order of [`Steps`].
+    pub const ALL: [Freedom; FREEDOMS] = [
+        Freedom::X,
+        Freedom::Y,
+        Freedom::Z,
+        Freedom::TiltX,
+        Freedom::TiltY,
+        Freedom::Turn,
+        Freedom::Size,
+        Freedom::Second,
+    ];
+}
+
+/// Where a point lies with respect to a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Distance {
+    /// Signed distance, m, positive in the air.
+    pub value: f64,
+    /// Its gradient in F: the unit normal into the air at the nearest place.
+    pub normal: Vector3<f64>,
+    /// Its derivatives by the two sizes.
+    pub by_size: [f64; 2],
+}
+
+/// A surface that [`super::fit`] can fit.
+pub trait Surface: Clone {
+    /// What it is called in errors.
+    const NAME: &'static str;
+    /// The freedoms it has.
+    const FREE: [bool; FREEDOMS];
+    /// The freedoms without which a fit of it is worth nothing; the others may come out undetermined.
+    const NEEDED: [bool; FREEDOMS];
+    /// Whether its second size is a length.
+    const SECOND_IS_LENGTH: bool;
+
+    /// What a freedom is called.
+    fn name_of(freedom: Freedom) -> &'static str;
+
+    /// Maps its own frame F to O.
+    fn pose_of(&self) -> &Isometry3<f64>;
+
+    /// Distance of a point given in F.
+    fn distance_at(&self, q: &Vector3<f64>) -> Distance;
+
+    /// The same shape with another pose, and its sizes changed by so much.
+    fn with(&self, pose_of: Isometry3<f64>, by: [f64; 2]) -> Self;
+
+    /// The same surface, described from its place near points whose mean is `q` (in F) and whose mean distance from the
+    /// z axis is `rho`.
+    fn described_from(&self, q: &Vector3<f64>, rho: f64) -> Self;
+
+    /// Refuses sizes that no such surface has.
+    ///
+    /// # Errors
+    /// [`FitError::BadSize`].
+    fn check(&self) -> Result<(), FitError>;
+
+    /// Its axis or normal: z of F, in O.
+    fn axis(&self) -> Vector3<f64> {
+        self.pose_of().rotation * Vector3::z()
+    }
+
+    /// Signed distance of a point in O, m, positive in the air.
+    fn distance(&self, point: &Point3<f64>) -> f64 {
+        self.distance_at(&self.pose_of().inverse_transform_point(point).coords).value
+    }
+
+    /// Signed distance of a point in O and its derivatives by each freedom; 0 for those it has not.
+    ///
+    /// Shifting F by t and turning it by ω (both in F) takes a fixed point from q to q − t − ω × q, so with the normal n
+    /// the derivatives are −n by t and −q × n by ω; a tilt towards x is ω = (0, 1, 0), towards y (−1, 0, 0).
+    fn derivatives(&self, point: &Point3<f64>) -> (f64, Steps) {
+        let q = self.pose_of().inverse_transform_point(point).coords;
+        let Distance { value, normal: n, by_size } = self.distance_at(&q);
+        let turn = -q.cross(&n);
+        let all = [-n.x, -n.y, -n.z, turn.y, -turn.x, turn.z, by_size[0], by_size[1]];
+        (value, Steps::from_fn(|i, _| if Self::FREE[i] { all[i] } else { 0.0 }))
+    }
+
+    /// Changed by so much in each of its freedoms.
+    fn moved(&self, steps: &Steps) -> Self {
+        let shift = Translation3::new(steps[0], steps[1], steps[2]);
+        let turn = UnitQuaternion::from_scaled_axis(Vector3::new(-steps[4], steps[3], steps[5]));
+        self.with(self.pose_of() * Isometry3::from_parts(shift, turn), [steps[6], steps[7]])
+    }
+
+    /// How many freedoms it has.
+    fn freedom_count() -> usize {
+        Self::FREE.iter().filter(|free| **free).count()
+    }
+}
