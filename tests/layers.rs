@@ -13,9 +13,9 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("refine", &["touch", "mesh", "patch"]),
     ("live", &["touch", "mesh", "patch", "refine"]),
     ("sim", &["touch", "mesh"]),
-    ("io", &["touch", "mesh"]),
+    ("io", &["touch", "mesh", "features"]),
     ("scene", &["touch", "mesh", "patch", "refine", "sim", "io"]),
-    ("cli", &["touch", "mesh", "patch", "refine", "live", "sim", "io", "scene"]),
+    ("cli", &["touch", "mesh", "patch", "refine", "live", "features", "sim", "io", "scene"]),
 ];
 
 /// Same input, same bytes out: nothing of the world outside comes in.

@@ -4,6 +4,7 @@
 //! not be written, 2 wrong usage, 3 bad input file, 4 done with losses, which are named.
 
 mod demo;
+mod features;
 mod knocks;
 mod latency;
 mod offsets;
@@ -23,8 +24,10 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 use crate::io::atomic::is_same_file;
+use crate::io::features_file::FeaturesFileError;
 use crate::io::mesh_file::MeshFileError;
 use crate::io::recording::RecordingError;
+use crate::io::touches_file::TouchesFileError;
 use crate::live::LiveError;
 use crate::mesh::MeshError;
 use crate::refine::RefineError;
@@ -54,6 +57,8 @@ enum Verb {
     Demo(demo::DemoArguments),
     /// Refines a scan by a recording of touches
     Refine(refine::RefineArguments),
+    /// Finds holes, slots, pockets, bosses, edges, corners and planes on a mesh, and measures them
+    Features(features::FeaturesArguments),
     /// Scans and touches a known part: makes the input of refine
     Simulate(simulate::SimulateArguments),
     /// Answers one held sample per JSON line on stdin, so that other implementations can be compared
@@ -80,6 +85,10 @@ enum CliError {
     #[error("{0}")]
     WriteRecording(RecordingError),
     #[error(transparent)]
+    Touches(#[from] TouchesFileError),
+    #[error(transparent)]
+    Features(#[from] FeaturesFileError),
+    #[error(transparent)]
     Simulate(#[from] SimError),
     #[error(transparent)]
     Mesh(#[from] MeshError),
@@ -97,10 +106,12 @@ impl CliError {
     fn exit_code(&self) -> u8 {
         match self {
             Self::WriteMesh(_) | Self::WriteRecording(_) | Self::Write { .. } | Self::Stream(_) => 1,
+            Self::Touches(TouchesFileError::Write { .. }) | Self::Features(FeaturesFileError::Write { .. }) => 1,
             Self::Usage(_) => 2,
             Self::Simulate(SimError::BadParameter { .. } | SimError::TooFine { .. } | SimError::TooCoarse { .. }) => 2,
             // settings come from a scene file: its flags are checked before
             Self::Scene(_) | Self::ReadMesh(_) | Self::ReadRecording(_) | Self::Simulate(_) => 3,
+            Self::Touches(_) | Self::Features(_) => 3,
             Self::Mesh(_) | Self::Setting(_) | Self::Refine(_) | Self::Live(_) => 3,
         }
     }
@@ -122,6 +133,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let ended = match arguments.verb {
         Verb::Demo(arguments) => demo::demo(&arguments),
         Verb::Refine(arguments) => refine::refine(&arguments),
+        Verb::Features(arguments) => features::features(&arguments),
         Verb::Simulate(arguments) => simulate::simulate(&arguments),
         Verb::Step => answer_steps(),
     };

@@ -9,6 +9,7 @@ use clap::Args;
 use serde::Serialize;
 use tracing::{debug, warn};
 
+use super::features::find;
 use super::knocks::UncertaintySummary;
 use super::latency::{Latencies, Quantiles};
 use super::offsets::{ContactPoints, ScanOffset, WrenchOffset};
@@ -16,15 +17,17 @@ use super::progress::Progress;
 use super::rates::{Ended, LiveSummary, Rates};
 use super::replay::{Recording, Replayed, replay};
 use super::{CliError, Losses, check_kept, tell};
+use crate::io::features_file::write_features;
 use crate::io::mesh_file::{
     MeshFile, MeshFileError, MeshUnit, VertexColumn, check_target, read_mesh, write_mesh, write_mesh_with,
 };
 use crate::io::recording::Topics;
+use crate::io::touches_file::write_touches;
 use crate::mesh::{FaceId, FaceTree, RepairReport, TriMesh, VertexId};
 use crate::patch::{Patched, Patcher, Support};
 use crate::refine::{RefineCounts, RefineError, RefineParams, Refiner};
 use crate::scene::{Mode, Scene};
-use crate::touch::{ClockEstimator, Compensator, MarkerCounts, MarkerFilter, Sample};
+use crate::touch::{ClockEstimator, Compensator, MarkerCounts, MarkerFilter, ProbedPoint, Sample};
 
 #[derive(Debug, Args)]
 pub(super) struct RefineArguments {
@@ -71,6 +74,12 @@ pub(super) struct RefineArguments {
     /// the same
     #[arg(long)]
     live: bool,
+    /// Where the features of the refined mesh go, measured by the touches, as JSON
+    #[arg(long, value_name = "JSON")]
+    features_out: Option<PathBuf>,
+    /// Where the touches go that features name, as CSV
+    #[arg(long, value_name = "CSV")]
+    touches_out: Option<PathBuf>,
     /// Prints the summary as one JSON object
     #[arg(long)]
     json: bool,
@@ -267,6 +276,8 @@ impl RefineArguments {
             mode: None,
             registration: false,
             live: false,
+            features_out: None,
+            touches_out: None,
             json: false,
         }
     }
@@ -311,6 +322,7 @@ impl RefineArguments {
             Some(patcher) => self.write_patched(patcher, &as_scanned)?,
             None => {
                 write_mesh(&self.out, refiner.mesh(), self.mesh_unit).map_err(CliError::WriteMesh)?;
+                self.write_features(refiner.mesh(), &[])?;
                 let moved_faces = moved_faces(&as_scanned, refiner.mesh());
                 Remeshed { moved_faces, patch: None, uncertainty: None }
             }
@@ -376,8 +388,20 @@ impl RefineArguments {
         let columns: Vec<_> = columns.map(|(name, values)| VertexColumn { name, values: values.into() }).collect();
         write_mesh_with(&self.out, &patched.mesh, &columns, self.mesh_unit).map_err(CliError::WriteMesh)?;
         debug!(open_squares = patched.open_squares, "patched");
+        self.write_features(&patched.mesh, patcher.probed())?;
         let moved_faces = moved_faces(scan, &patched.mesh);
         Ok(Remeshed { moved_faces, patch: Some(PatchSummary::of(&patched, build_s)), uncertainty })
+    }
+
+    /// Writes what was touched, and the features of the result, where that was asked for.
+    fn write_features(&self, mesh: &TriMesh, touches: &[ProbedPoint]) -> Result<(), CliError> {
+        if let Some(out) = &self.touches_out {
+            write_touches(out, touches)?;
+        }
+        if let Some(out) = &self.features_out {
+            write_features(out, &find(mesh, touches).1)?;
+        }
+        Ok(())
     }
 
     fn topics(&self) -> Topics {
@@ -402,7 +426,10 @@ impl RefineArguments {
             }
             error => CliError::WriteMesh(error),
         })?;
-        check_kept("--scan", &self.scan, &self.out)
+        for out in [Some(&self.out), self.features_out.as_ref(), self.touches_out.as_ref()].into_iter().flatten() {
+            check_kept("--scan", &self.scan, out)?;
+        }
+        Ok(())
     }
 
     /// The scene with the flags over it.

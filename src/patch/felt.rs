@@ -3,6 +3,7 @@
 use nalgebra::Point3;
 
 use super::contact_store::{ContactStore, Verdict};
+use super::probed_log::ProbedLog;
 use super::restore::News;
 use super::scan_value::ScanValue;
 use super::swept::SweptSpace;
@@ -30,6 +31,7 @@ const MOVED: f64 = 2.0;
 pub(super) struct Felt {
     pub contacts: ContactStore,
     pub swept: SweptSpace,
+    pub probed: ProbedLog,
     /// whether where the tip went counts; else `swept` stays empty
     keeps_free_space: bool,
     /// size of the tip, m
@@ -53,7 +55,8 @@ impl Felt {
         ball: Option<f64>,
     ) -> Self {
         let until_ns = i64::MIN;
-        Self { contacts, swept, keeps_free_space, radius, ball, until_ns, last_contact_ns: None, bounds: None }
+        let probed = ProbedLog::new(ball);
+        Self { contacts, swept, probed, keeps_free_space, radius, ball, until_ns, last_contact_ns: None, bounds: None }
     }
 
     pub fn keep(&mut self, touch: &Touch) {
@@ -63,6 +66,7 @@ impl Felt {
         if self.last_contact_ns.is_none_or(|last| touch.stamp_ns - last > STROKE_PAUSE_NS) {
             self.contacts.begin_stroke();
             self.swept.begin_stroke();
+            self.probed.begin_stroke();
         }
         self.last_contact_ns = Some(touch.stamp_ns);
         let two = self.ball.and_then(|radius| split(&self.contacts, radius, &touch.centre, contact));
@@ -73,6 +77,7 @@ impl Felt {
                 continue;
             }
             let verdict = self.contacts.add(contact);
+            self.probed.note(touch, contact, verdict);
             is_believed |= verdict != Verdict::HeldApart;
             if verdict == Verdict::Insisted {
                 self.swept.forget(&contact.point, FORGOTTEN * self.radius);
@@ -97,13 +102,21 @@ impl Felt {
     /// Takes the last stroke back; returns whether there was one.
     pub fn undo(&mut self) -> bool {
         self.last_contact_ns = None;
-        self.strokes() > 0 && self.contacts.undo() && self.swept.undo()
+        let is_undone = self.strokes() > 0 && self.contacts.undo() && self.swept.undo();
+        if is_undone {
+            self.probed.undo();
+        }
+        is_undone
     }
 
     /// Does the stroke again that was undone last; returns whether there was one.
     pub fn redo(&mut self) -> bool {
         self.last_contact_ns = None;
-        self.contacts.redo() && self.swept.redo()
+        let is_redone = self.contacts.redo() && self.swept.redo();
+        if is_redone {
+            self.probed.redo();
+        }
+        is_redone
     }
 
     /// Decides which contacts count and which are those of an edge, where anything came since it was last decided; returns

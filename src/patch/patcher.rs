@@ -19,7 +19,7 @@ use super::touches::{TouchFinder, TouchFinderParams};
 use super::unreachable::mark_unreachable;
 use super::vertex_sigma::vertex_sigma;
 use crate::mesh::{FaceTree, MeshError, TriMesh};
-use crate::touch::{Compensator, CompensatorParams, Sample, SettingError, TipBody, TipShape};
+use crate::touch::{Compensator, CompensatorParams, ProbedPoint, Sample, SettingError, TipBody, TipShape};
 
 /// Settings of a [`Patcher`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -259,6 +259,11 @@ impl Patcher {
         let tip = self.compensator.compensate(sample);
         let Self { finder, felt, .. } = self;
         finder.push(&tip, |touch| felt.keep(&touch));
+    }
+
+    /// The touches themselves, in order of time.
+    pub fn probed(&self) -> &[ProbedPoint] {
+        self.felt.probed.points()
     }
 
     /// What was touched, as it was kept.

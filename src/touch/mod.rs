@@ -12,6 +12,7 @@ mod contact;
 mod friction;
 mod local_motion;
 mod markers;
+mod probed;
 mod stream;
 mod sync;
 mod tip_shape;
@@ -25,6 +26,7 @@ pub use local_motion::{LocalMotion, Motion};
 pub use markers::{
     MOST_MARKERS, MarkerBody, MarkerCounts, MarkerFilter, MarkerFrame, MarkerParams, SeenMarker, SpringParams, Tracking,
 };
+pub use probed::ProbedPoint;
 pub use sync::{SyncCounts, SyncParams, Synchroniser};
 pub use tip_shape::{TipBody, TipContact, TipPlace, TipShape};
 

@@ -1,0 +1,143 @@
+//! `touchup features`: a mesh in, and touches where there are any; its holes, slots, edges and planes out.
+
+use std::fmt;
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::Args;
+
+use super::progress::Progress;
+use super::{CliError, Losses, check_kept, tell};
+use crate::features::{Detection, Feature, FittedTo, Kind, Measured, detect};
+use crate::io::features_file::{FeatureFile, write_features};
+use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
+use crate::io::touches_file::read_touches;
+use crate::mesh::{FaceTree, TriMesh};
+use crate::touch::ProbedPoint;
+
+#[derive(Debug, Args)]
+pub(super) struct FeaturesArguments {
+    /// PLY, STL or OBJ
+    #[arg(value_name = "MESH")]
+    mesh: PathBuf,
+    /// Unit of the coordinates in its file
+    #[arg(long, value_name = "U", default_value = "mm")]
+    mesh_unit: MeshUnit,
+    /// What was touched, as refine --touches-out writes it
+    #[arg(long, value_name = "CSV")]
+    touches: Option<PathBuf>,
+    /// Where the features go, as JSON
+    #[arg(long, value_name = "JSON")]
+    out: Option<PathBuf>,
+    /// Prints the features as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// The verb: finds and tells.
+pub(super) fn features(arguments: &FeaturesArguments) -> Result<Losses, CliError> {
+    if let Some(out) = &arguments.out {
+        check_kept("MESH", &arguments.mesh, out)?;
+        if let Some(touches) = &arguments.touches {
+            check_kept("--touches", touches, out)?;
+        }
+    }
+    let MeshFile { mesh, repair } = read_mesh(&arguments.mesh, arguments.mesh_unit).map_err(CliError::ReadMesh)?;
+    let touches = arguments.touches.as_deref().map_or_else(|| Ok(Vec::new()), read_touches)?;
+    let started = Instant::now();
+    let (detection, file) = find(&mesh, &touches);
+    let took_s = started.elapsed().as_secs_f64();
+    if let Some(out) = &arguments.out {
+        write_features(out, &file)?;
+    }
+    if arguments.json {
+        tell(&serde_json::to_string(&file).expect("finite numbers and names alone cannot fail"));
+        return Ok(Losses::new());
+    }
+    tell(&format!("mesh: {repair}\n{}\nfound in {took_s:.2} s", FeatureTable(&detection)));
+    if let Some(out) = &arguments.out {
+        tell(&format!("wrote {}", out.display()));
+    }
+    Ok(Losses::new())
+}
+
+/// What is on a mesh, and the file of it.
+pub(super) fn find(mesh: &TriMesh, touches: &[ProbedPoint]) -> (Detection, FeatureFile) {
+    let _finding = Progress::stage("find features");
+    let detection = detect(mesh, &FaceTree::new(mesh), touches);
+    let file = FeatureFile::of(&detection.features, detection.unexplained);
+    (detection, file)
+}
+
+/// Features as people read them.
+pub(super) struct FeatureTable<'a>(pub &'a Detection);
+
+impl fmt::Display for FeatureTable<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Detection { features, unexplained } = self.0;
+        if features.is_empty() {
+            write!(f, "no features")?;
+        } else {
+            let counts: Vec<_> = KINDS.into_iter().filter_map(|kind| count(features, kind)).collect();
+            writeln!(f, "features: {}", counts.join(", "))?;
+            write!(f, "{:>4}  {:<7} {:>28}  {:<44} fitted to", "id", "kind", "center, mm", "size, mm")?;
+            for feature in features.iter().filter(|feature| feature.kind != Kind::Plane) {
+                write!(f, "\n{}", Row(feature))?;
+            }
+        }
+        if *unexplained > TOLD {
+            write!(f, "\nnot looked at: {:.0} % of the surface, which is neither flat nor round", unexplained * 100.0)?;
+        }
+        Ok(())
+    }
+}
+
+/// A share of the surface that is worth a line.
+const TOLD: f64 = 0.05;
+
+const KINDS: [Kind; 7] = [Kind::Hole, Kind::Slot, Kind::Pocket, Kind::Boss, Kind::Edge, Kind::Corner, Kind::Plane];
+
+fn count(features: &[Feature], kind: Kind) -> Option<String> {
+    let count = features.iter().filter(|feature| feature.kind == kind).count();
+    (count > 0).then(|| format!("{count} {}{}", kind.name(), if count == 1 { "" } else { "s" }))
+}
+
+struct Row<'a>(&'a Feature);
+
+impl fmt::Display for Row<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let feature = self.0;
+        let c = feature.centre.value.coords * 1e3;
+        let place = format!("{:.2} {:.2} {:.2}", c.x, c.y, c.z);
+        let from = match feature.fitted_to {
+            FittedTo::Touches => format!("touches, {:.0} % touched", feature.touched * 100.0),
+            FittedTo::Mesh => "mesh".to_owned(),
+        };
+        write!(f, "{:>4}  {:<7} {place:>28}  {:<44} {from}", feature.id, feature.kind.name(), size(feature))
+    }
+}
+
+fn size(feature: &Feature) -> String {
+    let mut parts = Vec::new();
+    let mut part = |before: &str, measured: &Option<Measured<f64>>| {
+        if let Some(measured) = measured {
+            parts.push(format!("{before}{}", with_std(measured)));
+        }
+    };
+    part("Ø ", &feature.diameter);
+    part("", &feature.width);
+    part("× ", &feature.length);
+    match feature.through {
+        Some(true) => parts.push("through".to_owned()),
+        _ => part("deep ", &feature.depth),
+    }
+    if let Some(cone) = &feature.cone_angle {
+        parts.push(format!("countersunk {:.1}°", cone.value.to_degrees()));
+    }
+    parts.join(" ")
+}
+
+fn with_std(measured: &Measured<f64>) -> String {
+    let std = measured.std.map_or_else(String::new, |std| format!(" ± {:.3}", std * 1e3));
+    format!("{:.3}{std}", measured.value * 1e3)
+}

@@ -1,0 +1,149 @@
+//! Where segments meet: straight edges between planes.
+//!
+//! Between two planes of a measured mesh there is often a seam of faces that belong to neither. Each segment first grows
+//! over the faces around it that no strong segment has; where the grown ones meet near the line in which both planes
+//! intersect, there is the edge.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Point3, Vector3};
+
+use super::facets::NONE;
+use super::primitive::Primitive;
+use super::scene::Parted;
+use super::segment::Segmentation;
+
+/// A straight edge between two planes.
+#[derive(Clone, Debug)]
+pub(super) struct StraightEdge {
+    /// numbers of the planes, the smaller first
+    pub planes: [usize; 2],
+    /// its ends, m, in O
+    pub ends: [Point3<f64>; 2],
+    /// whether the material is inside of it
+    pub is_convex: bool,
+}
+
+/// A seam is at most so many faces wide on each side.
+const SEAM: usize = 3;
+/// Planes meet in an edge from this angle on: sine of 15°.
+const SHARP: f64 = 0.26;
+/// A border is at the edge when it is within so many tolerances of the planes, or within this share of the median edge.
+const NEAR_TOLERANCES: f64 = 4.0;
+const NEAR_EDGES: f64 = 1.5;
+/// Pieces of an edge closer together than this are one, in median edges …
+const GAP_EDGES: f64 = 3.0;
+/// … and at least in diagonals of the mesh.
+const GAP: f64 = 0.005;
+/// Shortest edge, in diagonals.
+const SHORTEST: f64 = 0.02;
+
+/// The segment of each face, those of the seams too.
+pub(super) fn without_seams(parted: &Parted) -> Vec<u32> {
+    let label = |&number: &u32| if number != NONE && parted.is_strong(number as usize) { number } else { NONE };
+    let mut of_face: Vec<u32> = parted.segmentation.of_face.iter().map(label).collect();
+    let mut front: Vec<u32> = (0..of_face.len() as u32).filter(|&face| of_face[face as usize] != NONE).collect();
+    for _ in 0..SEAM {
+        let mut next = Vec::new();
+        for face in front {
+            for (_, other) in parted.facets.beside(face) {
+                if of_face[other as usize] == NONE {
+                    of_face[other as usize] = of_face[face as usize];
+                    next.push(other);
+                }
+            }
+        }
+        front = next;
+    }
+    of_face
+}
+
+/// A mesh edge between two segments.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Border {
+    /// m, in O
+    pub ends: [Point3<f64>; 2],
+    /// the faces beside it, in the order of the segments
+    pub faces: [u32; 2],
+}
+
+/// The mesh edges between each two segments, the smaller number first.
+pub(super) type Borders = BTreeMap<[u32; 2], Vec<Border>>;
+
+pub(super) fn borders(parted: &Parted, of_face: &[u32]) -> Borders {
+    let mut borders = Borders::new();
+    for face in 0..of_face.len() as u32 {
+        let label = of_face[face as usize];
+        if label == Segmentation::NONE {
+            continue;
+        }
+        for (edge, other) in parted.facets.beside(face) {
+            let beside = of_face[other as usize];
+            if beside != Segmentation::NONE && label < beside {
+                let border = Border { ends: parted.facets.edge(face, edge), faces: [face, other] };
+                borders.entry([label, beside]).or_default().push(border);
+            }
+        }
+    }
+    borders
+}
+
+/// All straight edges, in order of their planes.
+pub(super) fn straight_edges(parted: &Parted, borders: &Borders) -> Vec<StraightEdge> {
+    borders.iter().flat_map(|(&[i, j], border)| edges_between(parted, [i as usize, j as usize], border)).collect()
+}
+
+fn edges_between(parted: &Parted, planes: [usize; 2], border: &[Border]) -> Vec<StraightEdge> {
+    let segments = planes.map(|number| parted.segment(number));
+    let [Primitive::Plane { point: p, normal: n }, Primitive::Plane { point: q, normal: m }] =
+        segments.map(|s| s.primitive)
+    else {
+        return Vec::new();
+    };
+    let Some(way) = n.cross(&m).try_normalize(SHARP) else { return Vec::new() };
+    let origin = on_both([p, q], [n, m], &border[0].ends[0]);
+    let tolerance = segments[0].tolerance.max(segments[1].tolerance);
+    let near = (NEAR_TOLERANCES * tolerance).max(NEAR_EDGES * parted.edge.min(GAP * parted.diagonal));
+    let is_near = |x: &Point3<f64>| {
+        let v = x - origin;
+        (v - way * v.dot(&way)).norm() < near
+    };
+    let mut pieces: Vec<[f64; 2]> = border
+        .iter()
+        .filter(|border| border.ends.iter().all(is_near))
+        .map(|border| border.ends.map(|x| (x - origin).dot(&way)))
+        .map(|[a, b]| [a.min(b), a.max(b)])
+        .collect();
+    pieces.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let gap = (GAP_EDGES * parted.edge).min(GAP * parted.diagonal).max(near);
+    let mut joint: Vec<[f64; 2]> = Vec::new();
+    for piece in pieces {
+        match joint.last_mut() {
+            Some(last) if piece[0] - last[1] <= gap => last[1] = last[1].max(piece[1]),
+            _ => joint.push(piece),
+        }
+    }
+    let is_convex = is_convex(parted, border, [(p, n), (q, m)]);
+    joint
+        .into_iter()
+        .filter(|[a, b]| b - a > SHORTEST * parted.diagonal)
+        .map(|ends| StraightEdge { planes, ends: ends.map(|t| origin + way * t), is_convex })
+        .collect()
+}
+
+/// Whether each of two planes falls away from the other where they meet.
+pub(super) fn is_convex(parted: &Parted, border: &[Border], planes: [(Point3<f64>, Vector3<f64>); 2]) -> bool {
+    let height = |face: u32, (p, n): (Point3<f64>, Vector3<f64>)| {
+        parted.facets.triangle(face).map(|x| (x - p).dot(&n)).iter().sum::<f64>()
+    };
+    let along = |border: &Border| (border.ends[1] - border.ends[0]).norm();
+    let above = |b: &Border| (height(b.faces[1], planes[0]) + height(b.faces[0], planes[1])) * along(b);
+    border.iter().map(above).sum::<f64>() < 0.0
+}
+
+/// The point on both planes closest to `near`.
+pub(super) fn on_both([p, q]: [Point3<f64>; 2], [n, m]: [Vector3<f64>; 2], near: &Point3<f64>) -> Point3<f64> {
+    let (a, b, c) = ((p - near).dot(&n), (q - near).dot(&m), n.dot(&m));
+    let square = 1.0 - c * c;
+    near + n * ((a - c * b) / square) + m * ((b - c * a) / square)
+}

@@ -1,0 +1,126 @@
+//! Cones that begin where the wall of a hole ends: countersinks, chamfers, tips of drills.
+//!
+//! A short cone says little of its axis, that of its hole is known: so cones are looked for around the ends of holes.
+
+use nalgebra::Point3;
+
+use super::facets::NONE;
+use super::primitive::{Primitive, Side, refined, square_to};
+use super::scene::Parted;
+use super::segment::{Segment, belongs};
+use super::walls::{Wall, median};
+
+/// Directions in which the ring beyond an end is looked at.
+const AROUND: usize = 36;
+/// Rings are this much wider and narrower than the hole, as a share of the radius, and that far beyond its end.
+const BESIDE: f64 = 0.08;
+/// A face belongs to a ring when it is within this many radii.
+const NEAR: f64 = 0.15;
+/// Sine of the flattest and of the steepest half angle: 80° and 8°.
+const SINES: [f64; 2] = [0.14, 0.985];
+/// Sines around a ring are alike within this.
+const ALIKE: f64 = 0.2;
+/// So much of the ring has to be alike.
+const LEAST_SHARE: f64 = 0.5;
+/// Corners may be off a cone by this many radii, and off the first guess of it.
+const SLACK: f64 = 0.005;
+const FIRST_SLACK: f64 = 0.05;
+/// A cone covers at least this share of a turn.
+const COVERAGE: f64 = 0.6;
+
+/// Adds the cones at both ends of each hole's wall to the segmentation and to the walls.
+pub(super) fn add_cones(parted: &mut Parted, walls: &mut Vec<Wall>) {
+    walls.retain(|wall| !wall.is_cone());
+    let holes: Vec<Wall> =
+        walls.iter().filter(|wall| wall.side() == Side::Hole && wall.coverage > COVERAGE).cloned().collect();
+    for wall in holes {
+        for (which, out) in [(0, -1.0), (1, 1.0)] {
+            let Some(segment) = cone_beyond(parted, &wall, wall.ends[which], out) else { continue };
+            let number = parted.segmentation.segments.len();
+            let cone = Wall::of_faces(&parted.facets, &segment.primitive, &segment.faces, vec![number]);
+            if let Some(cone) = cone.filter(|cone| cone.coverage > COVERAGE) {
+                walls.push(cone);
+                parted.segmentation.add(&parted.facets, segment);
+            }
+        }
+    }
+}
+
+fn cone_beyond(parted: &Parted, wall: &Wall, end: f64, out: f64) -> Option<Segment> {
+    let radius = wall.radius();
+    let of_hole = parted.segment(wall.segments[0]);
+    let (tolerance, is_exact) = (of_hole.tolerance.max(SLACK * radius), of_hole.is_exact);
+    [1.0 + BESIDE, 1.0 - BESIDE].into_iter().find_map(|wider| {
+        let faces = ring(parted, wall, end + out * BESIDE * radius, wider * radius);
+        let start = cone_of(parted, wall, &faces, out)?;
+        let faces = flood(parted, faces, &start, tolerance.max(FIRST_SLACK * radius));
+        let better = refined(&start, &parted.facets, &faces).filter(|better| is_along(better, wall)).unwrap_or(start);
+        let faces = flood(parted, faces, &better, tolerance);
+        let area = faces.iter().map(|&face| parted.facets.area(face)).sum();
+        (!faces.is_empty()).then_some(Segment { primitive: better, faces, area, tolerance, is_exact })
+    })
+}
+
+/// Faces on a ring around the axis that look at it.
+fn ring(parted: &Parted, wall: &Wall, t: f64, radius: f64) -> Vec<u32> {
+    let [e, g] = square_to(&wall.axis);
+    let mut faces: Vec<u32> = (0..AROUND)
+        .filter_map(|i| {
+            let (sine, cosine) = (std::f64::consts::TAU * i as f64 / AROUND as f64).sin_cos();
+            let radial = e * cosine + g * sine;
+            let p = wall.at(t) + radial * radius;
+            let face = parted.tree.closest(parted.facets.mesh, &p, NEAR * wall.radius())?.face.0;
+            (parted.facets.normal(face).dot(&radial) < -SINES[0]).then_some(face)
+        })
+        .collect();
+    faces.sort_unstable();
+    faces.dedup();
+    faces
+}
+
+/// The cone about the axis of the wall on which most of a ring's faces lie.
+fn cone_of(parted: &Parted, wall: &Wall, faces: &[u32], out: f64) -> Option<Primitive> {
+    let along = |face: u32| parted.facets.normal(face).dot(&wall.axis) * out;
+    let sine = median(faces.iter().map(|&face| along(face)).collect())?;
+    let is_alike = |face: u32| (along(face) - sine).abs() < ALIKE;
+    let alike: Vec<u32> = faces.iter().copied().filter(|&face| is_alike(face)).collect();
+    let is_cone =
+        sine.abs() > SINES[0] && sine.abs() < SINES[1] && alike.len() as f64 > LEAST_SHARE * faces.len() as f64;
+    if !is_cone {
+        return None;
+    }
+    let (axis, half_angle) = (wall.axis * (out * sine.signum()), sine.abs().asin());
+    let apex_of = |&face: &u32| {
+        let v = parted.facets.triangle(face)[0] - wall.origin;
+        let t = v.dot(&axis);
+        t - (v - axis * t).norm() / half_angle.tan()
+    };
+    let apex: Point3<f64> = wall.origin + axis * median(alike.iter().map(apex_of).collect())?;
+    Some(Primitive::Cone { apex, axis, half_angle, side: Side::Hole })
+}
+
+/// Whether a cone still has the axis of its hole.
+fn is_along(cone: &Primitive, wall: &Wall) -> bool {
+    let Primitive::Cone { apex, axis, .. } = cone else { return false };
+    let v = apex - wall.origin;
+    let off = (v - wall.axis * v.dot(&wall.axis)).norm();
+    axis.dot(&wall.axis).abs() > SINES[1] && off < NEAR * wall.radius()
+}
+
+/// Faces that lie on the cone, from those of `seeds` on, planes and round walls left alone.
+fn flood(parted: &Parted, seeds: Vec<u32>, cone: &Primitive, tolerance: f64) -> Vec<u32> {
+    let facets = &parted.facets;
+    let is_on = |face: u32| belongs(facets, face, cone, tolerance);
+    let mut found: Vec<u32> = seeds.into_iter().filter(|&face| is_on(face)).collect();
+    let mut seen: std::collections::BTreeSet<u32> = found.iter().copied().collect();
+    let mut at = 0;
+    while at < found.len() {
+        for other in facets.facets[found[at] as usize].beside {
+            if other != NONE && seen.insert(other) && is_on(other) {
+                found.push(other);
+            }
+        }
+        at += 1;
+    }
+    found
+}

@@ -1,0 +1,226 @@
+//! Round holes and bosses: round walls that have nothing, or material, inside.
+
+use nalgebra::{Point3, Vector3};
+
+use super::primitive::Side;
+use super::scene::{Parted, along_to_plane};
+use super::walls::Wall;
+
+/// A round hole.
+#[derive(Clone, Debug)]
+pub(super) struct Hole {
+    /// number of its wall
+    pub wall: usize,
+    /// where the axis leaves through the opening, m, in O
+    pub opening: Point3<f64>,
+    /// unit vector out of the opening
+    pub out: Vector3<f64>,
+    /// m
+    pub depth: f64,
+    pub through: bool,
+    /// number of the plane around the opening
+    pub rim: Option<usize>,
+    /// number of the plane that is its floor
+    pub floor: Option<usize>,
+    /// number of the wall that is its countersink
+    pub countersink: Option<usize>,
+}
+
+/// A round boss.
+#[derive(Clone, Debug)]
+pub(super) struct Boss {
+    pub wall: usize,
+    /// middle of the foot, m, in O
+    pub foot: Point3<f64>,
+    /// unit vector from foot to top
+    pub out: Vector3<f64>,
+    /// m
+    pub height: f64,
+    /// numbers of the planes
+    pub base: usize,
+    pub top: Option<usize>,
+}
+
+/// A wall around a hole covers at least this share of a turn: with a keyway or a slit it is a hole still.
+const HOLE_COVERAGE: f64 = 0.6;
+/// That of a boss.
+const BOSS_COVERAGE: f64 = 0.75;
+/// Least height of a wall, in radii: a rim rounded by noise is lower.
+const LEAST_HEIGHT: f64 = 0.08;
+/// So much of the radius around the axis is free in a hole.
+const FREE: f64 = 0.5;
+/// Points of the axis that are looked at.
+const PROBES: usize = 7;
+/// What closes a hole is no farther from the end of its wall than this many radii.
+const CLOSED: f64 = 1.0;
+/// Rings around an opening, in its radii: the land beside a hole may be narrow.
+const RINGS: [f64; 3] = [1.06, 1.15, 1.3];
+/// A plane around an opening is within this many radii of the end of the wall.
+const NEAR_END: f64 = 0.4;
+/// Share of the rings that a plane has to have.
+const RIM: f64 = 0.2;
+/// Walls of one hole are no farther apart along the axis than this many radii.
+const SAME_HOLE: f64 = 0.5;
+/// Axes of one stepped hole are no farther apart than this share of the radius.
+const SAME_AXIS: f64 = 0.15;
+
+/// One end of a wall.
+#[derive(Clone, Copy, Debug)]
+struct End {
+    /// along the axis of the wall, m
+    t: f64,
+    /// out of the hole, ±1 times the axis
+    out: f64,
+    /// what closes it, along the axis, m
+    closed_at: Option<f64>,
+    /// the plane around it and its share of the ring
+    rim: Option<(usize, f64)>,
+}
+
+/// All round holes.
+pub(super) fn holes(parted: &Parted, walls: &[Wall]) -> Vec<Hole> {
+    let is_hole = |wall: &Wall| wall.side() == Side::Hole && !wall.is_cone();
+    (0..walls.len()).filter(|&at| is_hole(&walls[at])).filter_map(|at| hole(parted, walls, at)).collect()
+}
+
+fn hole(parted: &Parted, walls: &[Wall], at: usize) -> Option<Hole> {
+    let wall = &walls[at];
+    let radius = wall.radius();
+    if wall.coverage < HOLE_COVERAGE || wall.height() < LEAST_HEIGHT * radius || !is_free(parted, wall) {
+        return None;
+    }
+    let ends = [end(parted, wall, 0), end(parted, wall, 1)];
+    let open = match ends.map(|end| end.closed_at.is_none()) {
+        [false, false] => return None,
+        [true, false] => 0,
+        [false, true] => 1,
+        [true, true] => usize::from(openness(walls, at, &ends[1]) > openness(walls, at, &ends[0])),
+    };
+    let (open, other) = (ends[open], ends[1 - open]);
+    let on_plane = |end: &End| {
+        let (number, _) = end.rim?;
+        let t = along_to_plane(&parted.segment(number).primitive, &wall.origin, &wall.axis)?;
+        ((t - end.t).abs() < NEAR_END * radius).then_some((number, t))
+    };
+    let rim = on_plane(&open);
+    let top = rim.map_or(open.t, |(_, t)| t);
+    let tip = cone_beside(walls, at, &other);
+    let (bottom, floor) = match other.closed_at {
+        // the tip of a drill: the depth is that of the cylinder
+        Some(_) if tip.is_some() => (other.t, None),
+        Some(t) => (t, floor_at(parted, wall, t)),
+        None => (on_plane(&other).map_or(other.t, |(_, t)| t), None),
+    };
+    Some(Hole {
+        wall: at,
+        opening: wall.at(top),
+        out: wall.axis * open.out,
+        depth: (top - bottom).abs(),
+        through: other.closed_at.is_none(),
+        rim: rim.map(|(number, _)| number),
+        floor,
+        countersink: cone_beside(walls, at, &open).filter(|&cone| walls[cone].axis.dot(&wall.axis) * open.out > 0.0),
+    })
+}
+
+/// Whether there is nothing around the axis.
+fn is_free(parted: &Parted, wall: &Wall) -> bool {
+    let free = (1..PROBES).filter(|&i| {
+        let p = wall.at(wall.ends[0] + wall.height() * i as f64 / PROBES as f64);
+        parted.tree.closest(parted.facets.mesh, &p, FREE * wall.radius()).is_none()
+    });
+    // a lid that the scanner saw, or a chip, may close a part of it
+    2 * free.count() >= PROBES
+}
+
+fn end(parted: &Parted, wall: &Wall, which: usize) -> End {
+    let (t, out) = (wall.ends[which], if which == 0 { -1.0 } else { 1.0 });
+    let radius = wall.radius();
+    let middle = wall.middle();
+    let reach = wall.height() / 2.0 + CLOSED * radius;
+    let met = parted.rays(radius).first(&wall.at(middle), &(wall.axis * out), reach);
+    let closed_at = met.map(|met| middle + out * met.distance);
+    let rings = RINGS.map(|ring| ring * radius);
+    let rim = parted.plane_around(&wall.at(t), &(wall.axis * out), &rings, NEAR_END * radius);
+    End { t, out, closed_at, rim: rim.filter(|&(_, share)| share > RIM) }
+}
+
+/// How much of an opening an end is, beside the other end.
+fn openness(walls: &[Wall], at: usize, end: &End) -> f64 {
+    let wall = &walls[at];
+    let is_next = |other: &&Wall| {
+        let beyond = (other.at(other.middle()) - wall.at(end.t)).dot(&wall.axis) * end.out;
+        other.side() == Side::Hole
+            && other.coverage >= HOLE_COVERAGE
+            && other.is_coaxial(wall, SAME_AXIS)
+            && other.gap(wall) < SAME_HOLE * wall.radius()
+            && beyond > 0.0
+    };
+    let next = walls.iter().enumerate().filter(|&(number, _)| number != at).map(|(_, other)| other).find(is_next);
+    let stepped = next.map_or(0.0, |next| 2.0 * (next.radius() - wall.radius()).signum());
+    stepped + end.rim.map_or(0.0, |(_, share)| share)
+}
+
+/// The cone that goes on from an end.
+fn cone_beside(walls: &[Wall], at: usize, end: &End) -> Option<usize> {
+    let wall = &walls[at];
+    (0..walls.len()).find(|&other| {
+        let cone = &walls[other];
+        let beyond = (cone.at(cone.middle()) - wall.at(end.t)).dot(&wall.axis) * end.out;
+        cone.is_cone()
+            && cone.side() == Side::Hole
+            && cone.coverage > HOLE_COVERAGE
+            && cone.is_coaxial(wall, SAME_AXIS)
+            && cone.gap(wall).abs() < SAME_HOLE * wall.radius()
+            && beyond > 0.0
+    })
+}
+
+/// The plane that closes a wall at `t`.
+fn floor_at(parted: &Parted, wall: &Wall, t: f64) -> Option<usize> {
+    let number = parted.segment_at(&wall.at(t), NEAR_END * wall.radius())?;
+    along_to_plane(&parted.segment(number).primitive, &wall.origin, &wall.axis).map(|_| number)
+}
+
+/// Holes that follow each other on one axis: the group of each, where it has company.
+pub(super) fn groups(walls: &[Wall], holes: &[Hole]) -> Vec<Option<usize>> {
+    let mut group: Vec<Option<usize>> = vec![None; holes.len()];
+    for i in 0..holes.len() {
+        for j in 0..i {
+            let (a, b) = (&walls[holes[i].wall], &walls[holes[j].wall]);
+            let is_next = a.is_coaxial(b, SAME_AXIS) && a.gap(b) < SAME_HOLE * a.radius().max(b.radius());
+            if is_next {
+                let number = group[j].unwrap_or(j);
+                (group[i], group[j]) = (Some(number), Some(number));
+            }
+        }
+    }
+    group
+}
+
+/// All round bosses: walls with material inside that stand on a plane.
+pub(super) fn bosses(parted: &Parted, walls: &[Wall]) -> Vec<Boss> {
+    let is_boss = |wall: &Wall| wall.side() == Side::Boss && !wall.is_cone() && wall.coverage >= BOSS_COVERAGE;
+    (0..walls.len()).filter(|&at| is_boss(&walls[at])).filter_map(|at| boss(parted, walls, at)).collect()
+}
+
+fn boss(parted: &Parted, walls: &[Wall], at: usize) -> Option<Boss> {
+    let wall = &walls[at];
+    let radius = wall.radius();
+    [(0, 1.0), (1, -1.0)].into_iter().find_map(|(which, out)| {
+        let (foot, top) = (wall.ends[which], wall.ends[1 - which]);
+        let way = wall.axis * out;
+        let (base, share) =
+            parted.plane_around(&wall.at(foot), &way, &RINGS.map(|ring| ring * radius), NEAR_END * radius)?;
+        if share < 2.0 * RIM || wall.height() < LEAST_HEIGHT * radius {
+            return None;
+        }
+        let to_plane = |number: usize| along_to_plane(&parted.segment(number).primitive, &wall.origin, &wall.axis);
+        let foot = to_plane(base)?;
+        let lid =
+            parted.plane_around(&wall.at(top), &way, &[FREE * radius], NEAR_END * radius).map(|(number, _)| number);
+        let top = lid.and_then(to_plane).unwrap_or(top);
+        let height = (top - foot) * out;
+        (height > 0.0).then(|| Boss { wall: at, foot: wall.at(foot), out: way, height, base, top: lid })
+    })
+}

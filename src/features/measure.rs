@@ -1,0 +1,217 @@
+//! The surfaces of features, measured: fitted to what was touched, or to the mesh.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+
+use nalgebra::{Point3, Vector3};
+
+use super::feature::{FittedTo, Measured};
+use super::fit::{Cone, Cylinder, Ends, Fit, FitParams, Freedom, Observation, Plane, Stadium, Surface, fit};
+use super::observe::Observed;
+use super::primitive::{Primitive, Side, square_to};
+use super::slots::Slot;
+use super::walls::Wall;
+
+/// A fitted surface and what it was fitted to.
+#[derive(Clone, Debug)]
+pub(super) struct Fitted<S> {
+    pub surface: S,
+    /// `None` where no fit held: the surface is that of the segments
+    pub fit: Option<Fit<S>>,
+    /// numbers of the touches that were used
+    pub touches: Vec<u32>,
+    pub to: FittedTo,
+}
+
+/// Fits surfaces; each plane once.
+pub(super) struct Measure<'a> {
+    pub observed: &'a Observed<'a>,
+    planes: RefCell<BTreeMap<usize, Fitted<Plane>>>,
+}
+
+/// Fewer touches than this are left to the mesh.
+const LEAST_TOUCHES: usize = 12;
+/// Touches around less of a turn than this are left to the mesh.
+const LEAST_TURN: f64 = 0.4;
+/// Into so many parts a turn is divided.
+const PARTS: usize = 24;
+/// A wall touched over less than this many diameters of its height has its axis from the plane around it.
+const SHORT: f64 = 0.35;
+/// A touch beside the outline of a slot by less than this share of its width is of it.
+const BESIDE: f64 = 0.15;
+/// How well a hole is drilled, and a slot milled, square to the plane around it, rad: 0.5°.
+const DRILLED: f64 = 0.0087;
+
+impl<'a> Measure<'a> {
+    pub fn new(observed: &'a Observed<'a>) -> Self {
+        Self { observed, planes: RefCell::new(BTreeMap::new()) }
+    }
+
+    /// The plane of a segment.
+    pub fn plane(&self, number: usize) -> Option<Fitted<Plane>> {
+        if let Some(known) = self.planes.borrow().get(&number) {
+            return Some(known.clone());
+        }
+        let Primitive::Plane { point, normal } = self.observed.parted.segment(number).primitive else { return None };
+        let guess = Plane::new(point, &normal);
+        let touches = self.observed.touches_of(&[number]);
+        let is_enough = touches.len() >= LEAST_TOUCHES && self.spread(&touches, &point) > LEAST_TURN;
+        let fitted = self.fitted(&guess, if is_enough { touches } else { Vec::new() }, &[number], None);
+        self.planes.borrow_mut().insert(number, fitted.clone());
+        Some(fitted)
+    }
+
+    /// The cylinder of a wall.
+    ///
+    /// - `rim`: number of the plane around its opening.
+    pub fn cylinder(&self, wall: &Wall, rim: Option<usize>) -> Fitted<Cylinder> {
+        let touches = self.observed.touches_of(&wall.segments);
+        let mut guess = Cylinder::new(wall.at(wall.middle()), &wall.axis, wall.radius(), wall.side() == Side::Hole);
+        let mut axis_sigma = None;
+        let is_enough = touches.len() >= LEAST_TOUCHES && self.turn(&touches, wall) >= LEAST_TURN;
+        let height = if is_enough { self.height(&touches, wall) } else { wall.height() };
+        if height < SHORT * 2.0 * wall.radius()
+            && let Some(plane) = rim.and_then(|rim| self.plane(rim))
+        {
+            let normal = plane.surface.normal();
+            guess = Cylinder::new(wall.at(wall.middle()), &normal, wall.radius(), wall.side() == Side::Hole);
+            axis_sigma = Some(DRILLED);
+        }
+        self.fitted(&guess, if is_enough { touches } else { Vec::new() }, &wall.segments, axis_sigma)
+    }
+
+    /// The cone of a wall; `None` for a cylinder.
+    pub fn cone(&self, wall: &Wall) -> Option<Fitted<Cone>> {
+        let Primitive::Cone { half_angle, side, .. } = wall.primitive else { return None };
+        let touches = self.observed.touches_of(&wall.segments);
+        let is_enough = touches.len() >= LEAST_TOUCHES && self.turn(&touches, wall) >= LEAST_TURN;
+        let middle = wall.middle();
+        let guess = Cone::new(wall.at(middle), &wall.axis, wall.radius_at(middle), half_angle, side == Side::Hole);
+        Some(self.fitted(&guess, if is_enough { touches } else { Vec::new() }, &wall.segments, None))
+    }
+
+    /// The walls of a slot or pocket.
+    pub fn stadium(&self, slot: &Slot, ends: Ends) -> Fitted<Stadium> {
+        let land = self.plane(slot.land).map_or(slot.out, |land| land.surface.normal());
+        let centre = slot.centre - slot.out * (slot.depth / 2.0);
+        let guess = Stadium::new(centre, &land, &slot.direction, [slot.width, slot.length], ends, true);
+        // its walls and ends may go on beyond it, and its corners may be round
+        let is_of = |p: &Point3<f64>, is_wall: bool| {
+            let q = guess.pose_of.inverse_transform_point(p);
+            let room = BESIDE * slot.width * if ends == Ends::Round { 1.0 } else { -1.0 };
+            let (half_length, half_width) = (slot.length / 2.0, slot.width / 2.0);
+            if is_wall { q.x.abs() < half_length + room.min(0.0) } else { q.y.abs() < half_width + room }
+        };
+        let of_part = |segments: Vec<usize>, is_wall: bool| {
+            let mut touches = self.observed.touches_of(&segments);
+            touches.retain(|&number| is_of(&self.observed.touch(number).point, is_wall));
+            let mut of_mesh = if segments.is_empty() { Vec::new() } else { self.observed.of_mesh(&segments) };
+            of_mesh.retain(|observation| is_of(&observation.point, is_wall));
+            (touches, of_mesh)
+        };
+        let (mut touches, mut of_mesh) = of_part(slot.walls.to_vec(), true);
+        let (touches_of_ends, mesh_of_ends) = of_part(slot.ends.into_iter().flatten().collect(), false);
+        let is_enough = |wall: &usize| {
+            let of_wall = self.observed.touches_of(&[*wall]);
+            of_wall.iter().filter(|&number| touches.binary_search(number).is_ok()).count() >= LEAST_TOUCHES / 2
+        };
+        if slot.walls.iter().all(is_enough) {
+            touches.extend(touches_of_ends);
+            touches.sort_unstable();
+        } else {
+            touches.clear();
+        }
+        of_mesh.extend(mesh_of_ends);
+        self.fitted_or(&guess, touches, &of_mesh, Some(DRILLED))
+    }
+
+    /// Fits to touches; where there are none, or it fails, to the mesh.
+    fn fitted<S: Surface>(
+        &self,
+        guess: &S,
+        touches: Vec<u32>,
+        segments: &[usize],
+        axis_sigma: Option<f64>,
+    ) -> Fitted<S> {
+        self.fitted_or(guess, touches, &self.observed.of_mesh(segments), axis_sigma)
+    }
+
+    fn fitted_or<S: Surface>(
+        &self,
+        guess: &S,
+        touches: Vec<u32>,
+        of_mesh: &[Observation],
+        axis_sigma: Option<f64>,
+    ) -> Fitted<S> {
+        let params =
+            FitParams { common_sigma: self.observed.common_sigma(&touches), axis_sigma, ..FitParams::default() };
+        if !touches.is_empty()
+            && let Ok(found) = fit(guess, &self.observed.of_touches(&touches), &params)
+        {
+            let touches = touches.into_iter().zip(&found.used).filter(|&(_, used)| *used).map(|(touch, _)| touch);
+            let touches = touches.collect();
+            return Fitted { surface: found.surface.clone(), fit: Some(found), touches, to: FittedTo::Touches };
+        }
+        let params = FitParams { axis_sigma, ..FitParams::default() };
+        let found = fit(guess, of_mesh, &params).ok();
+        let surface = found.as_ref().map_or_else(|| guess.clone(), |found| found.surface.clone());
+        Fitted { surface, fit: found, touches: Vec::new(), to: FittedTo::Mesh }
+    }
+
+    /// Share of a turn around a wall that touches cover.
+    fn turn(&self, touches: &[u32], wall: &Wall) -> f64 {
+        let [e, g] = square_to(&wall.axis);
+        let mut parts = [false; PARTS];
+        for &number in touches {
+            let v = self.observed.touch(number).point - wall.origin;
+            let turn = v.dot(&g).atan2(v.dot(&e)) / std::f64::consts::TAU;
+            parts[((turn * PARTS as f64).floor() as i64).rem_euclid(PARTS as i64) as usize] = true;
+        }
+        parts.iter().filter(|&&part| part).count() as f64 / PARTS as f64
+    }
+
+    /// Between the lowest and the highest tenth of the touches along the axis of a wall, m.
+    fn height(&self, touches: &[u32], wall: &Wall) -> f64 {
+        let along = |&number: &u32| (self.observed.touch(number).point - wall.origin).dot(&wall.axis);
+        let mut along: Vec<f64> = touches.iter().map(along).collect();
+        along.sort_by(f64::total_cmp);
+        along[along.len() * 9 / 10] - along[along.len() / 10]
+    }
+
+    /// How much the touches on a plane are spread in their second direction, beside the first.
+    fn spread(&self, touches: &[u32], about: &Point3<f64>) -> f64 {
+        let count = touches.len() as f64;
+        let points = || touches.iter().map(|&number| self.observed.touch(number).point - about);
+        let mean = points().sum::<Vector3<f64>>() / count;
+        let spread = points().map(|v| (v - mean) * (v - mean).transpose()).sum::<nalgebra::Matrix3<f64>>() / count;
+        let mut sizes: Vec<f64> = spread.symmetric_eigenvalues().iter().map(|x| x.max(0.0).sqrt()).collect();
+        sizes.sort_by(f64::total_cmp);
+        // two lines far apart are as good as a field
+        if sizes[2] > 0.0 { (sizes[1] / sizes[2] * 4.0).min(1.0) } else { 0.0 }
+    }
+}
+
+impl Fitted<Plane> {
+    /// Where a line meets the plane, and how well that is known along the normal, m.
+    pub fn met(&self, from: &Point3<f64>, way: &Vector3<f64>) -> Option<(Point3<f64>, Option<f64>)> {
+        let (point, normal) = (self.surface.point(), self.surface.normal());
+        let t = (point - from).dot(&normal) / way.dot(&normal);
+        let met = from + way * t;
+        t.is_finite().then(|| (met, self.fit.as_ref().and_then(|fit| fit.std_at(&met))))
+    }
+}
+
+impl<S: Surface> Fitted<S> {
+    /// The direction of the surface, turned to `way`.
+    pub fn axis(&self, way: &Vector3<f64>) -> Measured<Vector3<f64>> {
+        let axis = self.surface.pose_of().rotation * Vector3::z();
+        let value = if axis.dot(way) < 0.0 { -axis } else { axis };
+        Measured { value, std: self.fit.as_ref().and_then(Fit::axis_std), touches: self.touches.clone() }
+    }
+
+    /// A number that was fitted, or what it is without a fit.
+    pub fn number(&self, value: f64, by: &[(Freedom, f64)]) -> Measured<f64> {
+        let estimate = self.fit.as_ref().and_then(|fit| fit.estimate(value, by));
+        Measured { value, std: estimate.map(|estimate| estimate.std), touches: self.touches.clone() }
+    }
+}

@@ -1,0 +1,107 @@
+//! A mesh parted into segments, and what can be asked of it.
+
+use nalgebra::{Point3, Vector3};
+
+use super::borders::{borders, without_seams};
+use super::facets::Facets;
+use super::primitive::{Primitive, square_to};
+use super::rays::Rays;
+use super::segment::{Segment, Segmentation, median_edge};
+use crate::mesh::{FaceTree, TriMesh};
+
+/// A parted mesh.
+pub(super) struct Parted<'a> {
+    pub facets: Facets<'a>,
+    pub tree: &'a FaceTree,
+    pub segmentation: Segmentation,
+    /// of the box around all, m
+    pub diagonal: f64,
+    /// median length of an edge, m
+    pub edge: f64,
+}
+
+/// Directions in which the surroundings of an axis are looked at.
+const AROUND: usize = 24;
+/// A segment of less area than this is no neighbour worth naming, in squared diagonals.
+const LEAST_AREA: f64 = 1e-5;
+/// A plane around an opening is square to the axis within 20°.
+const SQUARE: f64 = 0.94;
+
+impl<'a> Parted<'a> {
+    pub fn of(mesh: &'a TriMesh, tree: &'a FaceTree) -> Self {
+        let facets = Facets::of(mesh);
+        let segmentation = Segmentation::of(&facets);
+        let [lo, hi] = mesh.bounds();
+        let edge = median_edge(&facets);
+        let mut parted = Self { facets, tree, segmentation, diagonal: (hi - lo).norm(), edge };
+        let of_face = without_seams(&parted);
+        let beside: Vec<_> = borders(&parted, &of_face).into_keys().collect();
+        parted.segmentation.join_planes(&parted.facets, beside.into_iter());
+        parted
+    }
+
+    pub fn segment(&self, number: usize) -> &Segment {
+        &self.segmentation.segments[number]
+    }
+
+    /// Whether a segment is large enough to be named beside others.
+    pub fn is_strong(&self, number: usize) -> bool {
+        self.segment(number).area > LEAST_AREA * self.diagonal * self.diagonal
+    }
+
+    /// Numbers and segments, planes alone: a point, the normal.
+    pub fn planes(&self) -> impl Iterator<Item = (usize, Point3<f64>, Vector3<f64>)> + '_ {
+        self.segmentation.segments.iter().enumerate().filter_map(|(number, segment)| match segment.primitive {
+            Primitive::Plane { point, normal } => Some((number, point, normal)),
+            _ => None,
+        })
+    }
+
+    pub fn rays(&self, piece: f64) -> Rays<'_> {
+        Rays::new(self.facets.mesh, self.tree, piece)
+    }
+
+    /// The segment of the face closest to `p`, when one is within `reach`, m.
+    pub fn segment_at(&self, p: &Point3<f64>, reach: f64) -> Option<usize> {
+        let hit = self.tree.closest(self.facets.mesh, p, reach)?;
+        let number = self.segmentation.of_face[hit.face.0 as usize];
+        (number != Segmentation::NONE).then_some(number as usize)
+    }
+
+    /// The plane that most of some rings lie on which faces along `way`, and its share of them.
+    ///
+    /// - `middle`, `radii`: of the rings, square to `way`, m
+    /// - `reach`: how far the plane may be, m
+    pub fn plane_around(
+        &self,
+        middle: &Point3<f64>,
+        way: &Vector3<f64>,
+        radii: &[f64],
+        reach: f64,
+    ) -> Option<(usize, f64)> {
+        let [e, g] = square_to(way);
+        let mut votes: Vec<(usize, usize)> = Vec::new();
+        for (i, radius) in (0..AROUND).flat_map(|i| radii.iter().map(move |radius| (i, radius))) {
+            let (sine, cosine) = (std::f64::consts::TAU * i as f64 / AROUND as f64).sin_cos();
+            let p = middle + (e * cosine + g * sine) * *radius;
+            let Some(number) = self.segment_at(&p, reach) else { continue };
+            let Primitive::Plane { normal, .. } = self.segment(number).primitive else { continue };
+            if normal.dot(way) < SQUARE {
+                continue;
+            }
+            match votes.iter_mut().find(|(other, _)| *other == number) {
+                Some((_, count)) => *count += 1,
+                None => votes.push((number, 1)),
+            }
+        }
+        let (number, count) = votes.into_iter().max_by_key(|&(number, count)| (count, usize::MAX - number))?;
+        Some((number, count as f64 / (AROUND * radii.len()) as f64))
+    }
+}
+
+/// How far from `from` along `way` a plane is met, m.
+pub(super) fn along_to_plane(primitive: &Primitive, from: &Point3<f64>, way: &Vector3<f64>) -> Option<f64> {
+    let Primitive::Plane { point, normal } = primitive else { return None };
+    let t = (point - from).dot(normal) / way.dot(normal);
+    t.is_finite().then_some(t)
+}

@@ -1,0 +1,276 @@
+//! Slots and pockets: two planes that face each other over a void.
+
+use nalgebra::{Point3, Vector3};
+
+use super::borders::{Borders, is_convex};
+use super::facets::NONE;
+use super::primitive::{Primitive, Side};
+use super::scene::{Parted, along_to_plane};
+
+/// A void between two walls that face each other.
+#[derive(Clone, Debug)]
+pub(super) struct Slot {
+    /// numbers of the walls
+    pub walls: [usize; 2],
+    /// numbers of the segments that end it, `None` where it is open or ends at nothing that has a name
+    pub ends: [Option<usize>; 2],
+    /// in the middle of the opening, m, in O
+    pub centre: Point3<f64>,
+    /// unit vector out of the opening
+    pub out: Vector3<f64>,
+    /// unit vector along it
+    pub direction: Vector3<f64>,
+    /// m
+    pub width: f64,
+    /// m; at an open end to where the walls end
+    pub length: f64,
+    /// m
+    pub depth: f64,
+    pub through: bool,
+    /// number of the plane that is its floor
+    pub floor: Option<usize>,
+    /// number of the plane around the opening
+    pub land: usize,
+    /// whether both ends are closed by planes, so that it is no slot unless it is long
+    pub is_boxed: bool,
+    /// area over which the walls face each other, m²
+    pub area: f64,
+}
+
+/// Walls are parallel within 6°.
+const PARALLEL: f64 = 0.9945;
+/// A land or a floor is square to the walls within 9°.
+const SQUARE: f64 = 0.15;
+/// Points of a wall from which it is looked across.
+const SAMPLES: usize = 60;
+/// Share of the smaller wall that faces the other.
+const LEAST_SHARE: f64 = 0.2;
+/// A slot is longer than this many widths; when its ends are flat, longer than that many.
+const LONG: f64 = 1.2;
+const LONG_BOX: f64 = 2.0;
+/// A slot is not wider than this many depths.
+const WIDE: f64 = 3.0;
+/// A pocket's walls face each other over this share of them.
+const POCKET_SHARE: f64 = 0.5;
+/// Voids are the same when widths and places agree within this share of the width.
+const SAME: f64 = 0.4;
+/// A line that starts on a wall starts this share of the width off it.
+const OFF: f64 = 1e-3;
+
+/// All slots, and all pockets.
+///
+/// - `of_face`: the segment of each face, seams included.
+pub(super) fn slots(parted: &Parted, of_face: &[u32], borders: &Borders) -> (Vec<Slot>, Vec<Slot>) {
+    let planes: Vec<_> = parted.planes().filter(|&(number, ..)| parted.is_strong(number)).collect();
+    let (mut slots, mut pockets): (Vec<Slot>, Vec<Slot>) = (Vec::new(), Vec::new());
+    for (at, &(i, p, n)) in planes.iter().enumerate() {
+        for &(j, q, m) in &planes[..at] {
+            let is_facing = n.dot(&m) < -PARALLEL && (q - p).dot(&n) > 0.0 && (p - q).dot(&m) > 0.0;
+            if !is_facing {
+                continue;
+            }
+            let Some((slot, share)) = between(parted, of_face, borders, [i, j]) else { continue };
+            let is_slot = slot.length > if slot.is_boxed { LONG_BOX } else { LONG } * slot.width;
+            if slot.width > WIDE * slot.depth {
+                continue;
+            }
+            if is_slot {
+                slots.push(slot);
+            } else if slot.is_boxed
+                && share > POCKET_SHARE
+                && slot.length > slot.width / LONG_BOX
+                && slot.floor.is_some()
+            {
+                pockets.push(slot);
+            }
+        }
+    }
+    (distinct(slots, is_same_slot), distinct(pockets, is_same_pocket))
+}
+
+/// A void may be seen by several pairs of walls: the largest pair names it.
+fn distinct(mut all: Vec<Slot>, is_same: fn(&Slot, &Slot) -> bool) -> Vec<Slot> {
+    all.sort_by(|a, b| b.area.total_cmp(&a.area));
+    let mut kept: Vec<Slot> = Vec::new();
+    for slot in all {
+        if !kept.iter().any(|other| is_same(other, &slot)) {
+            kept.push(slot);
+        }
+    }
+    kept
+}
+
+/// Each pair of walls of a pocket sees it.
+fn is_same_pocket(one: &Slot, other: &Slot) -> bool {
+    (one.centre - other.centre).norm() < SAME * one.width
+}
+
+/// The walls of a slot may be in pieces.
+fn is_same_slot(one: &Slot, other: &Slot) -> bool {
+    let between = other.centre - one.centre;
+    let along = between.dot(&one.direction);
+    let aside = (between - one.direction * along - one.out * between.dot(&one.out)).norm();
+    one.direction.dot(&other.direction).abs() > PARALLEL
+        && (one.width - other.width).abs() < SAME * one.width
+        && aside < SAME * one.width
+        && along.abs() < (one.length + other.length) / 2.0
+}
+
+/// The void between two walls, and the share of the smaller one that faces the other.
+fn between(parted: &Parted, of_face: &[u32], borders: &Borders, walls: [usize; 2]) -> Option<(Slot, f64)> {
+    let [Primitive::Plane { normal: n, .. }, other] = walls.map(|wall| parted.segment(wall).primitive) else {
+        return None;
+    };
+    // across from the smaller wall: the larger one may go on far beyond
+    let [from, to] =
+        if parted.segment(walls[0]).area < parted.segment(walls[1]).area { walls } else { [walls[1], walls[0]] };
+    let Primitive::Plane { normal, .. } = parted.segment(from).primitive else { return None };
+    let starts = samples(parted, from);
+    let mut middles = Vec::new();
+    for p in &starts {
+        let width = along_to_plane(&parted.segment(to).primitive, p, &normal)?;
+        let met = parted.rays(width).first(&(p + normal * (OFF * width)), &normal, 1.1 * width);
+        let is_met = met.is_some_and(|met| of_face[met.face.0 as usize] == to as u32);
+        if is_met && width > 0.0 {
+            middles.push(p + normal * (width / 2.0));
+        }
+    }
+    let share = middles.len() as f64 / starts.len().max(1) as f64;
+    if share < LEAST_SHARE {
+        return None;
+    }
+    let mean = Point3::from(middles.iter().map(|p| p.coords).sum::<Vector3<f64>>() / middles.len() as f64);
+    let far = |p: &Point3<f64>| (p - mean).norm();
+    let middle = *middles.iter().min_by(|a, b| far(a).total_cmp(&far(b)))?;
+    let width =
+        along_to_plane(&other, &middle, &n)? + along_to_plane(&parted.segment(walls[0]).primitive, &middle, &-n)?;
+    let area = share * parted.segment(from).area;
+    let lands = lands(parted, borders, walls, &n);
+    let seen = lands.into_iter().filter_map(|(land, out)| {
+        opened(parted, of_face, &Opened { walls, middle, middles: &middles, across: n, width, land, out, area })
+    });
+    let longest = seen.max_by(|a, b| a.length.total_cmp(&b.length))?;
+    Some((longest, share))
+}
+
+/// Points of a segment, spread over its faces.
+fn samples(parted: &Parted, number: usize) -> Vec<Point3<f64>> {
+    let faces = &parted.segment(number).faces;
+    let step = faces.len().div_ceil(SAMPLES).max(1);
+    let each = (SAMPLES / faces.len().max(1)).clamp(1, 16);
+    let rows = (each as f64).sqrt() as usize;
+    let mut points = Vec::new();
+    for &face in faces.iter().step_by(step) {
+        let [a, b, c] = parted.facets.triangle(face);
+        for k in 0..rows * rows {
+            // a lattice of the unit square, folded onto the triangle
+            let (u, v) = ((k % rows) as f64 + 0.4, (k / rows) as f64 + 0.4);
+            let (u, v) = (u / rows as f64, v / rows as f64);
+            let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+            points.push(a + (b - a) * u + (c - a) * v);
+        }
+    }
+    points
+}
+
+/// Planes that fall away from one of the walls, square to both: around an opening. With the way out.
+fn lands(parted: &Parted, borders: &Borders, walls: [usize; 2], across: &Vector3<f64>) -> Vec<(usize, Vector3<f64>)> {
+    let mut lands: Vec<(usize, Vector3<f64>)> = Vec::new();
+    for (pair, border) in borders {
+        let [a, b] = pair.map(|number| number as usize);
+        let land = if walls.contains(&a) { b } else { a };
+        if walls.contains(&a) == walls.contains(&b) {
+            continue;
+        }
+        let [Primitive::Plane { point: p, normal: n }, Primitive::Plane { point: q, normal: m }] =
+            [a, b].map(|number| parted.segment(number).primitive)
+        else {
+            continue;
+        };
+        let out = if land == a { n } else { m };
+        let is_new = lands.iter().all(|(_, other)| other.dot(&out) < PARALLEL);
+        if is_new && out.dot(across).abs() < SQUARE && is_convex(parted, border, [(p, n), (q, m)]) {
+            let out = (out - across * out.dot(across)).normalize();
+            lands.push((land, out));
+        }
+    }
+    lands
+}
+
+/// Two walls, seen from one of the planes around them.
+struct Opened<'a> {
+    walls: [usize; 2],
+    middle: Point3<f64>,
+    middles: &'a [Point3<f64>],
+    across: Vector3<f64>,
+    width: f64,
+    land: usize,
+    out: Vector3<f64>,
+    area: f64,
+}
+
+fn opened(parted: &Parted, of_face: &[u32], seen: &Opened) -> Option<Slot> {
+    let Opened { walls, middle, middles, across, width, land, out, area } = *seen;
+    let mut rays = parted.rays(width);
+    let reach = parted.diagonal;
+    let up = along_to_plane(&parted.segment(land).primitive, &middle, &out)?;
+    if up < 0.0 || rays.free(&middle, &out, reach) < up + width / 2.0 {
+        return None;
+    }
+    let named = |face: crate::mesh::FaceId| of_face[face.0 as usize];
+    let below = rays.first(&middle, &-out, reach);
+    let walls_end = |way: &Vector3<f64>| middles.iter().map(|p| (p - middle).dot(way)).fold(0.0, f64::max);
+    // a floor far below belongs to something else
+    let deepest = walls_end(&-out) + 2.0 * width;
+    let met = below.filter(|met| met.distance < deepest);
+    let floor = met.map(|met| named(met.face)).filter(|&number| number != NONE).map(|number| number as usize);
+    let flat_floor = floor.filter(|&number| is_square(parted, number, &out));
+    let down = match (flat_floor, met) {
+        (Some(number), _) => along_to_plane(&parted.segment(number).primitive, &middle, &-out)?,
+        (None, Some(met)) => met.distance,
+        (None, None) => walls_end(&-out),
+    };
+    let direction = out.cross(&across).normalize();
+    let (mut ends, mut lengths, mut flat) = ([None; 2], [0.0; 2], 0);
+    for (at, way) in [direction, -direction].into_iter().enumerate() {
+        let met = rays.first(&middle, &way, reach).filter(|met| met.distance < walls_end(&way) + 1.5 * width);
+        lengths[at] = met.map_or_else(|| walls_end(&way), |met| met.distance);
+        let number = met.map(|met| named(met.face)).filter(|&number| number != NONE).map(|number| number as usize);
+        flat += usize::from(number.is_some_and(|number| is_square(parted, number, &way)));
+        ends[at] = number;
+        if let Some(number) = number.filter(|&number| is_round_end(parted, number, &out, width)) {
+            ends[at] = Some(number);
+        }
+    }
+    let centre = middle + out * up + direction * ((lengths[0] - lengths[1]) / 2.0);
+    Some(Slot {
+        walls,
+        ends,
+        centre,
+        out,
+        direction,
+        width,
+        length: lengths[0] + lengths[1],
+        depth: up + down,
+        through: met.is_none(),
+        floor: flat_floor,
+        land,
+        is_boxed: flat == 2,
+        area,
+    })
+}
+
+/// Whether a segment is a plane square to `way`.
+fn is_square(parted: &Parted, number: usize, way: &Vector3<f64>) -> bool {
+    matches!(parted.segment(number).primitive, Primitive::Plane { normal, .. } if normal.dot(way).abs() > PARALLEL.powi(4))
+}
+
+/// Whether a segment is a half-round end of a slot.
+fn is_round_end(parted: &Parted, number: usize, out: &Vector3<f64>, width: f64) -> bool {
+    match parted.segment(number).primitive {
+        Primitive::Cylinder { axis, radius, side: Side::Hole, .. } => {
+            axis.dot(out).abs() > PARALLEL && (2.0 * radius - width).abs() < 0.2 * width
+        }
+        _ => false,
+    }
+}

@@ -1,0 +1,179 @@
+//! Round walls: the segments on one cylinder, or one cone, put together.
+
+use nalgebra::{Point3, Vector3};
+
+use super::facets::Facets;
+use super::primitive::{Primitive, Side, square_to};
+use super::segment::Segmentation;
+
+/// What is left of a round wall.
+#[derive(Clone, Debug)]
+pub(super) struct Wall {
+    /// of its largest segment
+    pub primitive: Primitive,
+    /// numbers of its segments, the largest first
+    pub segments: Vec<usize>,
+    /// a point of the axis, m, in O: lengths along it are measured from here
+    pub origin: Point3<f64>,
+    /// unit vector; of a cone from the apex into it
+    pub axis: Vector3<f64>,
+    /// from where to where it goes along the axis, m
+    pub ends: [f64; 2],
+    /// share of the turn that it covers
+    pub coverage: f64,
+    /// m²
+    pub area: f64,
+}
+
+/// Into so many parts a turn is divided.
+const PARTS: usize = 72;
+/// Axes of one wall differ by less: 6°.
+const SAME_AXIS: f64 = 0.9945;
+/// Radii of one wall differ by less than this share, and so do places of the axis.
+const SAME_RADIUS: f64 = 0.08;
+/// Pieces of a wall are no farther apart along the axis than this many radii.
+const SAME_WALL: f64 = 2.0;
+
+impl Wall {
+    /// All round walls of a mesh, the largest first.
+    pub fn all(facets: &Facets, segmentation: &Segmentation) -> Vec<Self> {
+        let mut walls: Vec<Self> = Vec::new();
+        for number in 0..segmentation.segments.len() {
+            let Some(wall) = Self::of(facets, segmentation, vec![number]) else { continue };
+            let same = walls.iter_mut().find(|other| other.goes_on_as(&wall));
+            match same {
+                Some(other) => {
+                    let segments = [other.segments.clone(), wall.segments].concat();
+                    if let Some(joint) = Self::of(facets, segmentation, segments) {
+                        *other = joint;
+                    }
+                }
+                None => walls.push(wall),
+            }
+        }
+        walls
+    }
+
+    /// The wall that these segments are.
+    fn of(facets: &Facets, segmentation: &Segmentation, segments: Vec<usize>) -> Option<Self> {
+        let of_wall = |&number: &usize| segmentation.segments[number].faces.iter().copied();
+        let faces: Vec<u32> = segments.iter().flat_map(of_wall).collect();
+        Self::of_faces(facets, &segmentation.segments[segments[0]].primitive, &faces, segments)
+    }
+
+    /// The wall that these faces are; `None` for a plane.
+    pub fn of_faces(facets: &Facets, primitive: &Primitive, faces: &[u32], segments: Vec<usize>) -> Option<Self> {
+        let primitive = *primitive;
+        let (origin, axis) = match primitive {
+            Primitive::Plane { .. } => return None,
+            Primitive::Cylinder { point, axis, .. } => (point, axis),
+            Primitive::Cone { apex, axis, .. } => (apex, axis),
+        };
+        let [e, g] = square_to(&axis);
+        let (mut parts, mut area) = ([[f64::INFINITY, f64::NEG_INFINITY]; PARTS], 0.0);
+        for &face in faces {
+            let corners = facets.triangle(face).map(|p| p - origin);
+            let along = corners.map(|v| v.dot(&axis));
+            for part in parts_between(corners.map(|v| v.dot(&g).atan2(v.dot(&e)))) {
+                along.iter().for_each(|t| parts[part] = [parts[part][0].min(*t), parts[part][1].max(*t)]);
+            }
+            area += facets.area(face);
+        }
+        let covered: Vec<_> = parts.iter().filter(|part| part[0] <= part[1]).collect();
+        let coverage = covered.len() as f64 / PARTS as f64;
+        // the usual end, not the farthest: walls have ears
+        let ends = [0, 1].map(|end| median(covered.iter().map(|part| part[end]).collect()));
+        let [Some(low), Some(high)] = ends else { return None };
+        let ends = [low, high];
+        Some(Self { primitive, segments, origin, axis, ends, coverage, area })
+    }
+
+    /// Whether `other` is a piece of the same wall.
+    fn goes_on_as(&self, other: &Self) -> bool {
+        let is_same = match (self.primitive, other.primitive) {
+            (Primitive::Cylinder { radius, side, .. }, Primitive::Cylinder { radius: r, side: s, .. }) => {
+                side == s && (radius - r).abs() < SAME_RADIUS * radius
+            }
+            (Primitive::Cone { half_angle, side, .. }, Primitive::Cone { half_angle: h, side: s, .. }) => {
+                side == s && (half_angle - h).abs() < SAME_RADIUS && (self.origin - other.origin).norm() < self.radius()
+            }
+            _ => return false,
+        };
+        is_same && self.is_coaxial(other, SAME_RADIUS) && self.gap(other) < SAME_WALL * self.radius()
+    }
+
+    /// Whether the axes are one within a share of the radius.
+    pub fn is_coaxial(&self, other: &Self, share: f64) -> bool {
+        let middle = other.at(other.middle());
+        let v = middle - self.origin;
+        let off = (v - self.axis * v.dot(&self.axis)).norm();
+        self.axis.dot(&other.axis).abs() > SAME_AXIS && off < share * self.radius().max(other.radius())
+    }
+
+    /// Distance between the walls along the axis, m; negative where they overlap.
+    pub fn gap(&self, other: &Self) -> f64 {
+        let along = other.ends.map(|t| (other.at(t) - self.origin).dot(&self.axis));
+        let (low, high) = (along[0].min(along[1]), along[0].max(along[1]));
+        (low - self.ends[1]).max(self.ends[0] - high)
+    }
+
+    /// Point of the axis, m.
+    pub fn at(&self, t: f64) -> Point3<f64> {
+        self.origin + self.axis * t
+    }
+
+    pub fn middle(&self) -> f64 {
+        (self.ends[0] + self.ends[1]) / 2.0
+    }
+
+    pub fn height(&self) -> f64 {
+        self.ends[1] - self.ends[0]
+    }
+
+    pub fn side(&self) -> Side {
+        match self.primitive {
+            Primitive::Cylinder { side, .. } | Primitive::Cone { side, .. } => side,
+            // no wall is one
+            Primitive::Plane { .. } => Side::Boss,
+        }
+    }
+
+    /// m; of a cone half way.
+    pub fn radius(&self) -> f64 {
+        match self.primitive {
+            Primitive::Cylinder { radius, .. } => radius,
+            _ => self.radius_at(self.middle()),
+        }
+    }
+
+    /// m
+    pub fn radius_at(&self, t: f64) -> f64 {
+        match self.primitive {
+            Primitive::Cylinder { radius, .. } => radius,
+            Primitive::Cone { half_angle, .. } => t * half_angle.tan(),
+            Primitive::Plane { .. } => f64::INFINITY,
+        }
+    }
+
+    pub fn is_cone(&self) -> bool {
+        matches!(self.primitive, Primitive::Cone { .. })
+    }
+}
+
+/// The middle one of `values`.
+pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+/// The parts of a turn between the corners of a face.
+fn parts_between(angles: [f64; 3]) -> impl Iterator<Item = usize> {
+    use std::f64::consts::{PI, TAU};
+    let from = angles[0];
+    let turned = angles.map(|angle| (angle - from + PI).rem_euclid(TAU) - PI);
+    let low = turned.iter().copied().fold(0.0, f64::min) + from;
+    let high = turned.iter().copied().fold(0.0, f64::max) + from;
+    let size = TAU / PARTS as f64;
+    let (first, last) = ((low / size).floor() as i64, (high / size).ceil() as i64);
+    (first..last).map(|at| at.rem_euclid(PARTS as i64) as usize)
+}
