@@ -214,9 +214,9 @@ pub(super) fn cylinder_of(facets: &Facets, faces: &[u32], axis: &Vector3<f64>) -
 }
 
 /// Rounds of least squares.
-const ROUNDS: usize = 8;
+const ROUNDS: usize = 6;
 /// A step below this share of the size ends them.
-const REST: f64 = 1e-9;
+const REST: f64 = 1e-7;
 /// How much a normal counts beside a corner: as an arm of this share of the radius.
 const NORMAL_ARM: f64 = 0.2;
 
@@ -233,32 +233,32 @@ pub(super) fn refined(primitive: &Primitive, facets: &Facets, faces: &[u32]) -> 
 fn refined_cylinder(start: &Primitive, facets: &Facets, faces: &[u32]) -> Option<Primitive> {
     let Primitive::Cylinder { mut point, mut axis, mut radius, side } = *start else { return None };
     // the axis turns about the middle of the faces
-    let along: f64 =
-        faces.iter().map(|&f| (facets.triangle(f)[0] - point).dot(&axis)).sum::<f64>() / faces.len() as f64;
+    let along: f64 = faces.iter().map(|&f| (facets.triangle(f)[0] - point).dot(&axis)).sum::<f64>() / faces.len() as f64;
     point += axis * along;
     let step = faces.len().div_ceil(MOST_ROWS);
     for _ in 0..ROUNDS {
         let [e, g] = square_to(&axis);
-        let (mut m, mut right) = (SMatrix::<f64, 5, 5>::zeros(), SVector::<f64, 5>::zeros());
-        for &face in faces.iter().step_by(step) {
-            for p in facets.triangle(face) {
+        let mut normal = NormalEquations::<5>::new();
+        for (at, &face) in faces.iter().step_by(step).enumerate() {
+            let mut corner = |p: &Point3<f64>| {
                 let v = p - point;
                 let t = v.dot(&axis);
                 let q = v - axis * t;
                 let distance = q.norm();
                 let u = q / distance.max(f64::MIN_POSITIVE);
                 let (ue, ug) = (u.dot(&e), u.dot(&g));
-                let row = SVector::<f64, 5>::new(ue, ug, t * ue, t * ug, 1.0);
-                m += row * row.transpose();
-                right += row * (distance - radius);
+                normal.add([ue, ug, t * ue, t * ug, 1.0], distance - radius);
+            };
+            let corners = facets.triangle(face);
+            match faces.len() < FEW {
+                true => corners.iter().for_each(&mut corner),
+                false => corner(&corners[at % 3]),
             }
             let n = facets.normal(face);
             let arm = NORMAL_ARM * radius;
-            let row = SVector::<f64, 5>::new(0.0, 0.0, n.dot(&e) * arm, n.dot(&g) * arm, 0.0);
-            m += row * row.transpose();
-            right -= row * (n.dot(&axis) * arm);
+            normal.add([0.0, 0.0, n.dot(&e) * arm, n.dot(&g) * arm, 0.0], -n.dot(&axis) * arm);
         }
-        let x = m.cholesky()?.solve(&right);
+        let x = normal.solution()?;
         point += e * x[0] + g * x[1];
         axis = (axis + e * x[2] + g * x[3]).normalize();
         radius += x[4];
@@ -272,8 +272,37 @@ fn refined_cylinder(start: &Primitive, facets: &Facets, faces: &[u32]) -> Option
     Some(Primitive::Cylinder { point, axis, radius, side })
 }
 
+/// Least squares of N unknowns, collected row by row.
+struct NormalEquations<const N: usize> {
+    /// lower triangle
+    matrix: [[f64; N]; N],
+    right: [f64; N],
+}
+
+impl<const N: usize> NormalEquations<N> {
+    fn new() -> Self {
+        Self { matrix: [[0.0; N]; N], right: [0.0; N] }
+    }
+
+    fn add(&mut self, row: [f64; N], value: f64) {
+        for i in 0..N {
+            for j in 0..=i {
+                self.matrix[i][j] += row[i] * row[j];
+            }
+            self.right[i] += row[i] * value;
+        }
+    }
+
+    fn solution(&self) -> Option<SVector<f64, N>> {
+        let matrix = SMatrix::<f64, N, N>::from_fn(|i, j| self.matrix[i.max(j)][i.min(j)]);
+        Some(matrix.cholesky()?.solve(&SVector::from(self.right)))
+    }
+}
+
+/// Of fewer faces all corners count, of more one each: neighbours share theirs.
+const FEW: usize = 40;
 /// So many faces are enough while a region grows.
-const MOST_ROWS: usize = 1500;
+const MOST_ROWS: usize = 500;
 
 fn refined_cone(start: &Primitive, facets: &Facets, faces: &[u32]) -> Option<Primitive> {
     let Primitive::Cone { mut apex, mut axis, mut half_angle, side } = *start else { return None };
@@ -281,7 +310,7 @@ fn refined_cone(start: &Primitive, facets: &Facets, faces: &[u32]) -> Option<Pri
     for _ in 0..ROUNDS {
         let [e, g] = square_to(&axis);
         let (sine, cosine) = half_angle.sin_cos();
-        let (mut m, mut right, mut size) = (SMatrix::<f64, 6, 6>::zeros(), SVector::<f64, 6>::zeros(), 0.0f64);
+        let (mut normal, mut size) = (NormalEquations::<6>::new(), 0.0f64);
         for p in faces.iter().step_by(step).flat_map(|&face| facets.triangle(face)) {
             let v = p - apex;
             let t = v.dot(&axis);
@@ -290,12 +319,11 @@ fn refined_cone(start: &Primitive, facets: &Facets, faces: &[u32]) -> Option<Pri
             let u = q / distance.max(f64::MIN_POSITIVE);
             let slope = t * cosine + distance * sine;
             let (ue, ug) = (u.dot(&e), u.dot(&g));
-            let row = SVector::<f64, 6>::new(ue * cosine, ug * cosine, -sine, ue * slope, ug * slope, slope);
-            m += row * row.transpose();
-            right += row * (distance * cosine - t * sine);
+            let row = [ue * cosine, ug * cosine, -sine, ue * slope, ug * slope, slope];
+            normal.add(row, distance * cosine - t * sine);
             size = size.max(distance);
         }
-        let x = m.cholesky()?.solve(&right);
+        let x = normal.solution()?;
         apex += e * x[0] + g * x[1] + axis * x[2];
         axis = (axis + e * x[3] + g * x[4]).normalize();
         half_angle += x[5];

@@ -280,7 +280,7 @@ impl<'a> Growing<'a> {
             // what was tried in vain is tried again with more tolerance
             None => {
                 let needs = needs.max(self.closeness * (1.0 + f64::EPSILON));
-                near.iter().take(NEAR / 2).for_each(|&face| self.needs[face as usize] = needs);
+                near.iter().for_each(|&face| self.needs[face as usize] = needs);
             }
         }
     }

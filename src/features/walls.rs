@@ -21,8 +21,6 @@ pub(super) struct Wall {
     pub ends: [f64; 2],
     /// share of the turn that it covers
     pub coverage: f64,
-    /// m²
-    pub area: f64,
 }
 
 /// Into so many parts a turn is divided.
@@ -70,14 +68,13 @@ impl Wall {
             Primitive::Cone { apex, axis, .. } => (apex, axis),
         };
         let [e, g] = square_to(&axis);
-        let (mut parts, mut area) = ([[f64::INFINITY, f64::NEG_INFINITY]; PARTS], 0.0);
+        let mut parts = [[f64::INFINITY, f64::NEG_INFINITY]; PARTS];
         for &face in faces {
             let corners = facets.triangle(face).map(|p| p - origin);
             let along = corners.map(|v| v.dot(&axis));
             for part in parts_between(corners.map(|v| v.dot(&g).atan2(v.dot(&e)))) {
                 along.iter().for_each(|t| parts[part] = [parts[part][0].min(*t), parts[part][1].max(*t)]);
             }
-            area += facets.area(face);
         }
         let covered: Vec<_> = parts.iter().filter(|part| part[0] <= part[1]).collect();
         let coverage = covered.len() as f64 / PARTS as f64;
@@ -85,7 +82,7 @@ impl Wall {
         let ends = [0, 1].map(|end| median(covered.iter().map(|part| part[end]).collect()));
         let [Some(low), Some(high)] = ends else { return None };
         let ends = [low, high];
-        Some(Self { primitive, segments, origin, axis, ends, coverage, area })
+        Some(Self { primitive, segments, origin, axis, ends, coverage })
     }
 
     /// Whether `other` is a piece of the same wall.
