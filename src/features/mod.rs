@@ -1,3 +1,4 @@
-//! What a mesh and the touches on it are made of: fitted surfaces with their uncertainty.
+//! What a mesh and the touches on it are made of: curvature, its clusters, and fitted surfaces with their uncertainty.
 
+pub mod curvature;
 pub mod fit;
