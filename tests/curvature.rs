@@ -1,6 +1,7 @@
 //! Curvature against Gauss and Bonnet and against surfaces whose curvature is known; clusters against what is there.
 
-#[allow(dead_code, reason = "shared with the benches and other tests")]
+#[path = "curvature/clusters.rs"]
+mod clusters_of;
 mod common;
 #[path = "common/shapes.rs"]
 mod shapes;
@@ -11,7 +12,7 @@ use common::{grid, within};
 use nalgebra::{Point3, Vector3};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
-use shapes::{icosphere, torus};
+use shapes::{icosphere, subdivided, torus};
 use touchup::features::curvature::{VertexKind, curvature};
 use touchup::mesh::TriMesh;
 
