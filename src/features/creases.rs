@@ -32,7 +32,8 @@ impl Creases {
         for (face, corners) in mesh.faces() {
             for i in 0..3 {
                 let ends = [corners[i], corners[(i + 1) % 3]];
-                let Some(other) = neighbour(mesh, face, ends).filter(|other| face < *other) else { continue };
+                // once for each edge: the other face runs along it the other way
+                let Some(other) = (ends[0] < ends[1]).then(|| neighbour(mesh, face, ends)).flatten() else { continue };
                 let (n, m) = (normals[face.0 as usize], normals[other.0 as usize]);
                 if n.dot(&m) < cos_sharp && n != Vector3::zeros() && m != Vector3::zeros() {
                     let along = mesh.position(ends[1]) - mesh.position(ends[0]);

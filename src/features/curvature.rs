@@ -56,7 +56,11 @@ impl VertexCurvature {
 /// Curvature at all vertices, indexed by [`VertexId`].
 pub fn curvature(mesh: &TriMesh) -> Vec<VertexCurvature> {
     let mut fan = Fan::default();
-    (0..mesh.vertex_slots()).map(|v| fan.curvature(mesh, VertexId(v as u32))).collect()
+    let mut all = Vec::with_capacity(mesh.vertex_slots());
+    for vertex in 0..mesh.vertex_slots() as u32 {
+        all.push(fan.curvature(mesh, VertexId(vertex)));
+    }
+    all
 }
 
 /// The faces around a vertex, as pairs of its neighbours; kept only for its memory.
@@ -92,12 +96,26 @@ impl Fan {
     #[inline]
     fn gather(&mut self, mesh: &TriMesh, vertex: VertexId) {
         self.links.clear();
-        self.links.extend(mesh.star(vertex).iter().map(|&face| {
-            let [a, b, c] = mesh.corners(face).map(|v| v.0);
-            let v = vertex.0;
+        for &face in mesh.star(vertex) {
+            let [VertexId(a), VertexId(b), VertexId(c)] = mesh.corners(face);
             // written so that no branch has to be guessed
-            [if v == a { b } else { if v == b { c } else { a } }, if v == a { c } else { if v == b { a } else { b } }]
-        }));
+            let (at_a, at_b) = (vertex.0 == a, vertex.0 == b);
+            let next = if at_a {
+                b
+            } else if at_b {
+                c
+            } else {
+                a
+            };
+            let last = if at_a {
+                c
+            } else if at_b {
+                a
+            } else {
+                b
+            };
+            self.links.push([next, last]);
+        }
     }
 
     #[inline]
@@ -129,17 +147,19 @@ impl Fan {
         }
         // always all places, so that the loop is a few wide instructions; no vertex has the number u32::MAX
         let mut starts = [u32::MAX; SMALL_FAN];
-        starts.iter_mut().zip(&self.links).for_each(|(start, link)| *start = link[0]);
+        for (start, link) in starts.iter_mut().zip(&self.links) {
+            *start = link[0];
+        }
         let mut sound = true;
-        self.next.extend(self.links.iter().map(|&[_, end]| {
+        for &[_, end] in &self.links {
             let (mut found, mut at) = (0, 0);
             for (i, &start) in starts.iter().enumerate() {
                 found += u32::from(start == end);
                 at |= if start == end { i as u32 } else { 0 };
             }
             sound &= found == 1;
-            at
-        }));
+            self.next.push(at);
+        }
         sound
     }
 
