@@ -1,12 +1,20 @@
-//! Finds what machined parts are made of: holes, slots, pockets, bosses, edges, corners and planes.
+//! What a mesh and the touches on it are made of: holes, slots, pockets, bosses, edges, corners and planes.
+//!
+//! The mesh is parted into planes, cylinders and cones ; what they make together is named, and measured
+//! by the touches on it where there are enough, else by the mesh ([`detect`]). [`curvature`] and its [`clusters`] are the
+//! paper's way to the places of features.
 
 mod borders;
+pub mod clusters;
 mod cones;
+mod creases;
+pub mod curvature;
 mod detect;
 mod facets;
 mod feature;
 pub mod fit;
 mod holes;
+mod k_means;
 mod measure;
 mod observe;
 mod primitive;
@@ -18,3 +26,4 @@ mod walls;
 
 pub use detect::{Detection, detect};
 pub use feature::{Feature, FittedTo, Kind, Measured};
+pub use k_means::{KMeans, k_means};

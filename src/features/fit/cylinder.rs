@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
 use super::circle::{radial, side};
-use super::normals::{AxisGuess, pose_along};
+use super::normals::{AxisGuess, mean, pose_along};
 use super::{Distance, Estimate, Fit, FitError, Freedom, OrientedPoint, Surface};
 
 /// A cylinder without ends.
@@ -70,7 +70,8 @@ impl Surface for Cylinder {
         Self { pose_of, radius: self.radius + by[0], concave: self.concave }
     }
 
-    fn described_from(&self, q: &Vector3<f64>, _: f64) -> Self {
+    fn described_from(&self, points: &[Vector3<f64>]) -> Self {
+        let q = mean(points);
         Self { pose_of: self.pose_of * Translation3::new(0.0, 0.0, q.z), ..*self }
     }
 

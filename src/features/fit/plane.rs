@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::normals::pose_along;
+use super::normals::{mean, pose_along};
 use super::{Distance, Fit, FitError, Freedom, OrientedPoint, Surface};
 
 /// A plane whose air is on the side of z.
@@ -67,7 +67,8 @@ impl Surface for Plane {
         Self { pose_of }
     }
 
-    fn described_from(&self, q: &Vector3<f64>, _: f64) -> Self {
+    fn described_from(&self, points: &[Vector3<f64>]) -> Self {
+        let q = mean(points);
         Self { pose_of: self.pose_of * nalgebra::Translation3::new(q.x, q.y, 0.0) }
     }
 

@@ -6,8 +6,8 @@ use super::{Fit, FitError, FitParams, Observation, Surface};
 
 /// Weight updates in one round; the weights settle long before.
 const MOST_UPDATES: usize = 50;
-/// Weights that change by less than this have settled.
-const SETTLED_WEIGHT: f64 = 1e-4;
+/// Weights that change by less than this have settled; the rounds after them need no more.
+const SETTLED_WEIGHT: f64 = 1e-2;
 /// Rounds of rejection; what is kept repeats after two or three.
 const MOST_REJECTIONS: usize = 10;
 /// Median of |x| to standard deviation, for the normal distribution: 1/Φ⁻¹(3/4).

@@ -155,15 +155,10 @@ impl<'a> Problem<'a> {
         Err(FitError::NotConverged { iterations: MOST_STEPS })
     }
 
-    /// The same surface described from the middle of what is kept.
+    /// The same surface described from amid what is kept, of which there is at least one.
     pub fn described<M: Surface>(&self, surface: &M, kept: &[f64]) -> M {
-        let total: f64 = kept.iter().sum();
-        let (mut mean, mut rho) = (Vector3::zeros(), 0.0);
-        for (o, k) in self.observations.iter().zip(kept) {
-            let q = surface.pose_of().inverse_transform_point(&o.point).coords;
-            mean += q * (k / total);
-            rho += q.x.hypot(q.y) * k / total;
-        }
-        surface.described_from(&mean, rho)
+        let is_kept = self.observations.iter().zip(kept).filter(|(_, k)| **k > 0.0);
+        let local = |o: &Observation| surface.pose_of().inverse_transform_point(&o.point).coords;
+        surface.described_from(&is_kept.map(|(o, _)| local(o)).collect::<Vec<_>>())
     }
 }

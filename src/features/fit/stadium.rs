@@ -3,8 +3,13 @@
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
 use super::circle::side;
-use super::normals::pose_along;
+use super::normals::{mean, pose_along};
 use super::{Distance, Estimate, Fit, FitError, Freedom, Surface};
+
+/// A touch tells where an end is when its normal has at least this share along the slot: 30° from the wall.
+const LEAST_ALONG: f64 = 0.5;
+/// An end is touched when so many touches tell where it is; one may be an outlier.
+const LEAST_TOUCHES: usize = 2;
 
 /// What closes a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,7 +27,8 @@ pub struct Stadium {
     pub pose_of: Isometry3<f64>,
     /// From wall to wall, m.
     pub width: f64,
-    /// From end to end, over all, m; not less than the width where the ends are round.
+    /// From end to end, over all, m; not less than the width where the ends are round. After a fit that leaves it
+    /// undetermined it only says how far no end is: see [`Fit::length`].
     pub length: f64,
     /// What closes it.
     pub ends: Ends,
@@ -54,6 +60,17 @@ impl Stadium {
     /// Unit vector along it, in O.
     pub fn direction(&self) -> Vector3<f64> {
         self.pose_of.rotation * Vector3::x()
+    }
+
+    /// Where the end in direction `sign` is along x; an end that was not touched is put where no point tells of it, for
+    /// otherwise the last touches of the walls, with their noise, would decide how near it is.
+    fn end_beyond(&self, points: &[Vector3<f64>], sign: f64) -> f64 {
+        let faces_end = |q: &&Vector3<f64>| q.x * sign > 0.0 && self.distance_at(q).normal.x.abs() > LEAST_ALONG;
+        if points.iter().filter(faces_end).count() >= LEAST_TOUCHES {
+            return sign * self.length / 2.0;
+        }
+        let farthest = points.iter().map(|q| sign * q.x).fold(self.length / 2.0, f64::max);
+        sign * (farthest + self.width)
     }
 
     /// Distance outside the outline, its normal, and its derivatives by width and length.
@@ -117,8 +134,11 @@ impl Surface for Stadium {
         Self { pose_of, width, length: (self.length + by[1]).max(shortest), ..*self }
     }
 
-    fn described_from(&self, q: &Vector3<f64>, _: f64) -> Self {
-        Self { pose_of: self.pose_of * Translation3::new(0.0, 0.0, q.z), ..*self }
+    fn described_from(&self, points: &[Vector3<f64>]) -> Self {
+        let q = mean(points);
+        let [low, high] = [-1.0, 1.0].map(|sign| self.end_beyond(points, sign));
+        let pose_of = self.pose_of * Translation3::new((low + high) / 2.0, 0.0, q.z);
+        Self { pose_of, length: high - low, ..*self }
     }
 
     fn check(&self) -> Result<(), FitError> {

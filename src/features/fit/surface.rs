@@ -79,9 +79,8 @@ pub trait Surface: Clone {
     /// The same shape with another pose, and its sizes changed by so much.
     fn with(&self, pose_of: Isometry3<f64>, by: [f64; 2]) -> Self;
 
-    /// The same surface, described from its place near points whose mean is `q` (in F) and whose mean distance from the
-    /// z axis is `rho`.
-    fn described_from(&self, q: &Vector3<f64>, rho: f64) -> Self;
+    /// The same surface, described from its place amid points given in F, of which there is at least one.
+    fn described_from(&self, points: &[Vector3<f64>]) -> Self;
 
     /// Refuses sizes that no such surface has.
     ///
