@@ -12,13 +12,15 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("refine", &["touch", "mesh", "patch"]),
     ("live", &["touch", "mesh", "patch", "refine"]),
     ("sim", &["touch", "mesh"]),
-    ("io", &["touch", "mesh"]),
+    ("align", &["mesh"]),
+    ("calibrate", &["touch", "align"]),
+    ("io", &["touch", "mesh", "align"]),
     ("scene", &["touch", "mesh", "patch", "refine", "sim", "io"]),
-    ("cli", &["touch", "mesh", "patch", "refine", "live", "sim", "io", "scene"]),
+    ("cli", &["touch", "mesh", "patch", "refine", "live", "sim", "align", "calibrate", "io", "scene"]),
 ];
 
 /// Same input, same bytes out: nothing of the world outside comes in.
-const PURE: &[&str] = &["touch", "mesh", "patch", "refine", "sim"];
+const PURE: &[&str] = &["touch", "mesh", "patch", "refine", "align", "calibrate", "sim"];
 
 /// What a pure room may not name.
 const IMPURE_PATHS: &[&str] = &["std::fs", "std::thread", "std::env", "std::io", "std::net", "std::process"];

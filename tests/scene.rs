@@ -44,6 +44,7 @@ fn every_key_of_the_code_is_in_the_shipped_file_and_documented() {
         "",
         "sync",
         "markers",
+        "scan_to_space",
         "compensation",
         "bias_tracking",
         "contact",

@@ -292,7 +292,7 @@ impl RefineArguments {
         let compensator = Compensator::new(params.compensator)?;
         let mut clock = scene.clock_params().map(ClockEstimator::new).transpose()?;
         let mut contacts = self.registration.then(|| ContactPoints::new(&params)).transpose()?;
-        let mut replayed = replay(recording, scene.sync_params(), markers, |sample| {
+        let mut replayed = replay(recording, scene.placement(), scene.sync_params(), markers, |sample| {
             pushes.push(&mut rates, sample);
             let tip = compensator.compensate(sample);
             if let Some(clock) = &mut clock {

@@ -16,8 +16,8 @@ use error::yaml_error;
 use sections::named;
 pub use sections::{
     AlongName, BiasSection, BiasTrackingSection, CarveSection, ClockSection, CompensationSection, ContactSection,
-    GuardSection, MarkersSection, Mode, ModelName, PatchSection, PayloadSection, RefineSection, ScanSection, ShapeName,
-    SlidingSection, StepName, SyncSection, TipSection, UncertaintySection,
+    GravityAxes, GuardSection, MarkersSection, Mode, ModelName, PatchSection, PayloadSection, RefineSection, ScanSection,
+    ScanToSpaceSection, ShapeName, SlidingSection, StepName, SyncSection, TipSection, UncertaintySection,
 };
 
 /// The parts of a scene. `None`: not built.
@@ -33,6 +33,9 @@ pub struct Scene {
     /// The markers on the stylus, when they and not its pose are recorded.
     #[serde(default, deserialize_with = "named")]
     pub markers: Option<MarkersSection>,
+    /// Where the scan lies in the frame of the recorded poses; without it they are in the frame of the scan.
+    #[serde(default, deserialize_with = "named")]
+    pub scan_to_space: Option<ScanToSpaceSection>,
     /// Takes weight and bias off the wrench.
     #[serde(default, deserialize_with = "named")]
     pub compensation: Option<CompensationSection>,
@@ -75,6 +78,7 @@ impl Default for Scene {
             sync: Some(SyncSection::default()),
             clock: Some(ClockSection::default()),
             markers: None,
+            scan_to_space: None,
             compensation: None,
             bias_tracking: None,
             contact: Some(ContactSection::default()),
@@ -127,6 +131,7 @@ impl Scene {
     /// [`SceneError::OutOfRange`], [`SceneError::Incomplete`].
     pub fn check(&self) -> Result<(), SceneError> {
         self.sync.iter().try_for_each(SyncSection::check)?;
+        self.scan_to_space.iter().try_for_each(ScanToSpaceSection::check)?;
         self.compensation.iter().try_for_each(CompensationSection::check)?;
         self.markers.iter().try_for_each(MarkersSection::check)?;
         self.bias_tracking.iter().try_for_each(BiasTrackingSection::check)?;

@@ -1,0 +1,373 @@
+//! The rigid motion that takes picked points onto the same points picked elsewhere.
+//!
+//! R, t minimise Σ wᵢ |bᵢ − (R aᵢ + t)|²: with the weighted centroids taken off, R = U diag(1, 1, det U Vᵀ) Vᵀ of the
+//! singular value decomposition Σ wᵢ b′ᵢ a′ᵢᵀ = U S Vᵀ [Kabsch 1976, Umeyama 1991]. About the centroid shift and turn are
+//! independent: cov = σ² diag(I / Σ wᵢ, (Σ wᵢ (|qᵢ|² I − qᵢ qᵢᵀ))⁻¹), qᵢ = R a′ᵢ.
+//!
+//! People pick wrong points, in wrong units and wrong axes. What is told from the pairs alone: one pair against all the
+//! others (leave one out, with an F test), distances that differ by a known factor, a mirror image that fits better.
+
+mod misfit;
+
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Rotation3, SVD, UnitQuaternion, Vector3};
+
+/// Farther from the origin than this, a point is a fault, m.
+const LARGEST_COORDINATE: f64 = 1e6;
+/// Points count as on one line when they scatter across it by less than this share of their scatter along it: 1°.
+const LINE_SHARE: f64 = 0.02;
+/// … or by less than so many standard deviations of a pick: the turn about the line is then anything.
+const LINE_SIGMAS: f64 = 3.0;
+/// Picks closer together than this share of their scatter are one point.
+const SAME_SHARE: f64 = 1e-6;
+
+/// One point seen twice, m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointPair {
+    /// Where it is before the motion: on the scan, in O.
+    pub from: Point3<f64>,
+    /// Where it is after: in space, in W.
+    pub to: Point3<f64>,
+    /// Standard deviation of the two together, per axis, m; `None`: as good as the others.
+    pub sigma: Option<f64>,
+}
+
+/// Settings of [`fit_pairs`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PairsParams {
+    /// Standard deviation of a pair that names none, per axis, m; `None`: found from the residuals.
+    pub sigma: Option<f64>,
+    /// Largest rms residual that is believed, m; never more than a tenth of the points' scatter. Default 3 mm: a pick on
+    /// a scan of a consumer camera is good to one or two.
+    pub largest_rms: f64,
+    /// A pair that is off by less than this is kept, however well the others agree, m. Default 0.2 mm: nobody picks better.
+    /// Where a sigma is known, four times that is taken instead.
+    pub least_misfit: f64,
+}
+
+impl Default for PairsParams {
+    fn default() -> Self {
+        Self { sigma: None, largest_rms: 3e-3, least_misfit: 0.2e-3 }
+    }
+}
+
+/// A motion found from pairs, and how well it is known.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PairsFit {
+    /// Maps `from` to `to`.
+    pub motion: Isometry3<f64>,
+    /// `to` − motion · `from` of each pair, m.
+    pub residuals: Vec<Vector3<f64>>,
+    /// √(mean |residual|²), m.
+    pub rms: f64,
+    /// Standard deviation of a pair of unit weight, per axis, m: as given, or from the residuals with 3 n − 6 degrees of
+    /// freedom.
+    pub sigma: f64,
+    /// Middle of the pairs, in the frame of `to`, m.
+    pub centroid: Point3<f64>,
+    /// Of (shift of the centroid, rotation vector about it), both in the frame of `to`; m², m·rad, rad².
+    pub covariance: Matrix6<f64>,
+}
+
+/// Which of the two points of a pair.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// Before the motion: the scan.
+    From,
+    /// After it: space.
+    To,
+}
+
+impl std::fmt::Display for Side {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::From => "scan",
+            Self::To => "space",
+        })
+    }
+}
+
+/// Why pairs do not tell a motion. Pairs are counted from 1.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PairsError {
+    /// Fewer than three.
+    #[error("{count} pairs do not determine a motion: pick at least 3, better 6, far apart and not on one line")]
+    TooFew {
+        /// how many there are
+        count: usize,
+    },
+    /// NaN, infinite or absurdly far.
+    #[error("pair {pair}: its {side} point is not finite or farther than 1000 km away; pick it again")]
+    BadPoint {
+        /// which pair
+        pair: usize,
+        /// which of its points
+        side: Side,
+    },
+    /// A standard deviation that is none.
+    #[error("pair {pair}: its sigma is {sigma_mm} mm; it must be more than 0, leave it out where it is not known")]
+    BadSigma {
+        /// which pair
+        pair: usize,
+        /// as given
+        sigma_mm: f64,
+    },
+    /// Fewer than three different points.
+    #[error("pairs {first} and {second} have the same {side} point, {distance_mm:.6} mm apart, and fewer than 3 differ: pick points far apart")]
+    Coincident {
+        /// one pair
+        first: usize,
+        /// the other
+        second: usize,
+        /// where they coincide
+        side: Side,
+        /// between the two
+        distance_mm: f64,
+    },
+    /// All points near one line.
+    #[error(
+        "the {side} points lie on one line: they scatter by {across_mm:.3} mm across it and {along_mm:.1} mm along it, so \
+         the turn about it is not determined; pick one more, far off the line"
+    )]
+    Collinear {
+        /// of which side
+        side: Side,
+        /// rms distance from the middle along the line
+        along_mm: f64,
+        /// rms distance across
+        across_mm: f64,
+    },
+    /// Distances differ by a factor.
+    #[error("distances in space are {factor:.5} times those on the scan{named}: give both in one unit")]
+    Scale {
+        /// space over scan
+        factor: f64,
+        /// what that factor is known for
+        named: &'static str,
+    },
+    /// A left-handed set of axes.
+    #[error(
+        "the pairs fit a mirror image (rms {mirrored_mm:.3} mm) and no motion (rms {rms_mm:.3} mm): the sign of one axis is \
+         wrong, two axes are swapped, or one set of axes is left-handed"
+    )]
+    Mirrored {
+        /// of the best motion
+        rms_mm: f64,
+        /// of the best mirror image
+        mirrored_mm: f64,
+    },
+    /// One pair against all the others.
+    #[error(
+        "pair {pair} does not fit: it is {distance_mm:.3} mm from where the other {others} put it, and they agree within \
+         {rest_mm:.3} mm rms; pick it again or take it out"
+    )]
+    Outlier {
+        /// which
+        pair: usize,
+        /// from where the others put it
+        distance_mm: f64,
+        /// how many others
+        others: usize,
+        /// rms of the others without it
+        rest_mm: f64,
+    },
+    /// No motion fits.
+    #[error(
+        "the pairs disagree by {rms_mm:.3} mm rms, more than {limit_mm:.3} mm; pair {worst} is worst with {worst_mm:.3} mm: \
+         check that each row names one point twice{hint}"
+    )]
+    Disagree {
+        /// √(mean |residual|²)
+        rms_mm: f64,
+        /// what is believed
+        limit_mm: f64,
+        /// pair with the largest residual
+        worst: usize,
+        /// its residual
+        worst_mm: f64,
+        /// what would tell more
+        hint: &'static str,
+    },
+    /// The decomposition did not converge.
+    #[error("the pairs tell no rotation: their coordinates are out of all proportion; check them")]
+    NoRotation,
+}
+
+/// The motion, or why there is none.
+///
+/// # Errors
+/// [`PairsError`]: too few, coincident or collinear points, points that are no numbers, another unit, a mirror image, a
+/// pair that does not fit the others (named with 5 pairs or more), pairs that disagree.
+///
+/// # Example
+/// ```
+/// # use touchup::align::{PairsParams, PointPair, fit_pairs};
+/// # use nalgebra::{Point3, Vector3};
+/// let corners = [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]].map(Point3::from);
+/// let pairs = corners.map(|from| PointPair { from, to: from + Vector3::new(0.0, 0.0, 0.5), sigma: None });
+/// let fit = fit_pairs(&pairs, &PairsParams::default())?;
+/// assert!((fit.motion.translation.z - 0.5).abs() < 1e-12 && fit.motion.rotation.angle() < 1e-12);
+/// # Ok::<(), touchup::align::PairsError>(())
+/// ```
+pub fn fit_pairs(pairs: &[PointPair], params: &PairsParams) -> Result<PairsFit, PairsError> {
+    check(pairs)?;
+    check_extent(pairs, params)?;
+    let weights = weights(pairs, params);
+    let solved = Solved::of(pairs, &weights, None).ok_or(PairsError::NoRotation)?;
+    misfit::check(pairs, &weights, params, &solved)?;
+    let fit = solved.fit(pairs, &weights, given_sigma(pairs, params));
+    check_lines(pairs, fit.sigma)?;
+    Ok(fit)
+}
+
+/// A best motion with what tells how good it is.
+struct Solved {
+    motion: Isometry3<f64>,
+    /// Weighted middle of `from`.
+    middle: Point3<f64>,
+    /// Σ w |residual|².
+    squares: f64,
+    /// The same of the best mirror image or motion.
+    mirrored_squares: f64,
+}
+
+impl Solved {
+    /// - `without`: a pair that is left out.
+    fn of(pairs: &[PointPair], weights: &[f64], without: Option<usize>) -> Option<Self> {
+        let kept = || pairs.iter().zip(weights).enumerate().filter(|(i, _)| Some(*i) != without).map(|(_, pair)| pair);
+        let total: f64 = kept().map(|(_, w)| w).sum();
+        let mean = |side: fn(&PointPair) -> Point3<f64>| {
+            Point3::from(kept().map(|(pair, w)| side(pair).coords * *w).sum::<Vector3<f64>>() / total)
+        };
+        let (a, b) = (mean(|pair| pair.from), mean(|pair| pair.to));
+        let cross: Matrix3<f64> = kept().map(|(p, w)| (p.to - b) * (p.from - a).transpose() * *w).sum();
+        let svd = SVD::try_new(cross, true, true, f64::EPSILON, 1000)?;
+        let (u, v_t) = (svd.u?, svd.v_t?);
+        let smallest = svd.singular_values.imin();
+        let mut signs = Vector3::repeat(1.0);
+        signs[smallest] = (u.determinant() * v_t.determinant()).signum();
+        let turn = u * Matrix3::from_diagonal(&signs) * v_t;
+        let mut rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn));
+        rotation.renormalize();
+        let motion = Isometry3::from_parts((b - rotation * a.coords).into(), rotation);
+        let mut squares = [motion.rotation.to_rotation_matrix().into_inner(), u * v_t].into_iter().map(|turn| {
+            kept().map(|(p, w)| w * ((p.to - b) - turn * (p.from - a)).norm_squared()).sum::<f64>()
+        });
+        let (squares, mirrored_squares) = (squares.next()?, squares.next()?);
+        squares.is_finite().then_some(Self { motion, middle: a, squares, mirrored_squares })
+    }
+
+    fn fit(&self, pairs: &[PointPair], weights: &[f64], given: Option<f64>) -> PairsFit {
+        let residuals: Vec<_> = pairs.iter().map(|p| p.to - self.motion * p.from).collect();
+        let n = pairs.len() as f64;
+        let rms = (residuals.iter().map(Vector3::norm_squared).sum::<f64>() / n).sqrt();
+        let sigma = given.unwrap_or_else(|| (self.squares / (3.0 * n - 6.0)).sqrt());
+        let inertia: Matrix3<f64> = pairs
+            .iter()
+            .zip(weights)
+            .map(|(pair, w)| {
+                let q = self.motion.rotation * (pair.from - self.middle);
+                (Matrix3::identity() * q.norm_squared() - q * q.transpose()) * *w
+            })
+            .sum();
+        let mut covariance = Matrix6::zeros();
+        let shift = Matrix3::identity() / weights.iter().sum::<f64>();
+        covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&shift);
+        // not singular: the points are on no line
+        covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&inertia.try_inverse().unwrap_or_default());
+        let centroid = self.motion * self.middle;
+        PairsFit { motion: self.motion, residuals, rms, sigma, centroid, covariance: covariance * (sigma * sigma) }
+    }
+}
+
+/// σ of a pair of unit weight, where it is known beforehand.
+fn given_sigma(pairs: &[PointPair], params: &PairsParams) -> Option<f64> {
+    params.sigma.or_else(|| pairs.iter().all(|pair| pair.sigma.is_some()).then(|| pairs[0].sigma).flatten())
+}
+
+/// (σ₀ / σᵢ)², so that a pair of σ₀ weighs 1. A pair that names no sigma weighs as the median of those that do.
+fn weights(pairs: &[PointPair], params: &PairsParams) -> Vec<f64> {
+    let mut named: Vec<f64> = pairs.iter().filter_map(|pair| pair.sigma).collect();
+    named.sort_by(f64::total_cmp);
+    let usual = params.sigma.or(named.get(named.len() / 2).copied()).unwrap_or(1.0);
+    let unit = given_sigma(pairs, params).unwrap_or(usual);
+    pairs.iter().map(|pair| (unit / pair.sigma.unwrap_or(usual)).powi(2)).collect()
+}
+
+fn check(pairs: &[PointPair]) -> Result<(), PairsError> {
+    if pairs.len() < 3 {
+        return Err(PairsError::TooFew { count: pairs.len() });
+    }
+    for (i, pair) in pairs.iter().enumerate() {
+        for (side, point) in [(Side::From, &pair.from), (Side::To, &pair.to)] {
+            if !point.iter().all(|x| x.abs() <= LARGEST_COORDINATE) {
+                return Err(PairsError::BadPoint { pair: i + 1, side });
+            }
+        }
+        // far outside this range its square is no number
+        if let Some(sigma) = pair.sigma.filter(|sigma| !(1e-12..=1e3).contains(sigma)) {
+            return Err(PairsError::BadSigma { pair: i + 1, sigma_mm: sigma * 1e3 });
+        }
+    }
+    Ok(())
+}
+
+/// Points that are too few or too close together on either side.
+fn check_extent(pairs: &[PointPair], params: &PairsParams) -> Result<(), PairsError> {
+    for side in [Side::From, Side::To] {
+        let points: Vec<_> = pairs.iter().map(|pair| pair.on(side)).collect();
+        let scatter = Scatter::of(&points);
+        let apart = SAME_SHARE * scatter.along;
+        let mut distinct: Vec<usize> = Vec::new();
+        let mut same = None;
+        for (i, point) in points.iter().enumerate() {
+            match distinct.iter().find(|&&j| (points[j] - point).norm() <= apart) {
+                Some(&j) => same = same.or(Some((j, i, (points[j] - point).norm()))),
+                None if distinct.len() < 3 => distinct.push(i),
+                None => {}
+            }
+        }
+        if let (Some((first, second, distance)), 0..3) = (same, distinct.len()) {
+            let (first, second) = (first + 1, second + 1);
+            return Err(PairsError::Coincident { first, second, side, distance_mm: distance * 1e3 });
+        }
+    }
+    check_lines(pairs, params.sigma.unwrap_or(0.0))
+}
+
+/// - `sigma`: of a pick, m.
+fn check_lines(pairs: &[PointPair], sigma: f64) -> Result<(), PairsError> {
+    for side in [Side::From, Side::To] {
+        let points: Vec<_> = pairs.iter().map(|pair| pair.on(side)).collect();
+        let Scatter { along, across } = Scatter::of(&points);
+        if across <= (LINE_SHARE * along).max(LINE_SIGMAS * sigma) {
+            return Err(PairsError::Collinear { side, along_mm: along * 1e3, across_mm: across * 1e3 });
+        }
+    }
+    Ok(())
+}
+
+impl PointPair {
+    fn on(&self, side: Side) -> Point3<f64> {
+        match side {
+            Side::From => self.from,
+            Side::To => self.to,
+        }
+    }
+}
+
+/// Rms distance from the middle along the longest axis and along the next, m.
+struct Scatter {
+    along: f64,
+    across: f64,
+}
+
+impl Scatter {
+    fn of(points: &[Point3<f64>]) -> Self {
+        let n = points.len() as f64;
+        let mean = points.iter().map(|p| p.coords / n).sum::<Vector3<f64>>();
+        let covariance: Matrix3<f64> = points.iter().map(|p| (p.coords - mean) * (p.coords - mean).transpose() / n).sum();
+        let mut axes = covariance.symmetric_eigenvalues();
+        axes.as_mut_slice().sort_by(f64::total_cmp);
+        Self { along: axes[2].max(0.0).sqrt(), across: axes[1].max(0.0).sqrt() }
+    }
+}
