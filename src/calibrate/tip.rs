@@ -16,8 +16,8 @@ pub type SwingPose = Isometry3<f64>;
 pub struct TipFitParams {
     /// A ball that rests strays by less than this, rms, m. Default 1 mm.
     pub largest_rms: f64,
-    /// Smallest swing to either side across any axis, rms, rad. Default 8°: below it a tracker's noise of 0.1 mm moves the
-    /// offset by seven times that.
+    /// Smallest swing to either side across any axis, rms, rad. Default 8°, that is ±12° each way: below it the noise of the
+    /// tracker comes into the offset sevenfold.
     pub smallest_swing: f64,
 }
 

@@ -14,7 +14,7 @@ use super::latency::{Latencies, Quantiles};
 use super::offsets::{ContactPoints, ScanOffset, WrenchOffset};
 use super::progress::Progress;
 use super::rates::{Ended, LiveSummary, Rates};
-use super::replay::{Recording, Replayed, replay};
+use super::replay::{Recording, Replayed, marker_filter, replay};
 use super::{CliError, Losses, check_kept, tell};
 use crate::io::mesh_file::{
     MeshFile, MeshFileError, MeshUnit, VertexColumn, check_target, read_mesh, write_mesh, write_mesh_with,
@@ -24,7 +24,7 @@ use crate::mesh::{FaceId, FaceTree, RepairReport, TriMesh, VertexId};
 use crate::patch::{Patched, Patcher, Support};
 use crate::refine::{RefineCounts, RefineError, RefineParams, Refiner};
 use crate::scene::{Mode, Scene};
-use crate::touch::{ClockEstimator, Compensator, MarkerCounts, MarkerFilter, Sample};
+use crate::touch::{ClockEstimator, Compensator, MarkerCounts, Sample};
 
 #[derive(Debug, Args)]
 pub(super) struct RefineArguments {
@@ -156,8 +156,6 @@ const NOTHING_MOVES: &str = "the scene names no `refine`, so nothing would move 
 
 const NO_PATCH: &str = "--live lets the patch follow, and the scene has none: add `patch:` to it";
 
-const NO_MARKERS: &str = "--markers-topic needs a scene that says where the markers sit: add `markers:` to it";
-
 /// The verb: refines and tells.
 pub(super) fn refine(arguments: &RefineArguments) -> Result<Losses, CliError> {
     let Refined { repair, summary, losses } = arguments.refined()?;
@@ -278,7 +276,7 @@ impl RefineArguments {
         let started = Instant::now();
         let MeshFile { mesh, repair } = read_mesh(&self.scan, self.mesh_unit).map_err(CliError::ReadMesh)?;
         let as_scanned = mesh.clone();
-        let markers = self.marker_filter(&scene)?;
+        let markers = marker_filter(&scene, self.markers_topic.as_deref())?;
         let topics = self.topics();
         let recording = Recording::open(&self.bag, &topics).map_err(CliError::ReadRecording)?;
         let params =
@@ -383,15 +381,6 @@ impl RefineArguments {
     fn topics(&self) -> Topics {
         let (pose, wrench) = (self.pose_topic.clone(), self.wrench_topic.clone());
         Topics { pose, wrench, markers: self.markers_topic.clone() }
-    }
-
-    /// What makes poses of markers, when the recording has those.
-    fn marker_filter(&self, scene: &Scene) -> Result<Option<MarkerFilter>, CliError> {
-        if self.markers_topic.is_none() {
-            return Ok(None);
-        }
-        let filter = scene.marker_filter().map_err(|error| CliError::Usage(error.to_string()))?;
-        filter.map(Some).ok_or_else(|| CliError::Usage(NO_MARKERS.to_owned()))
     }
 
     /// The work is not begun when its result cannot be kept.

@@ -6,6 +6,7 @@ use std::path::Path;
 use super::progress::Progress;
 use super::{CliError, Losses};
 use crate::io::recording::{Record, RecordingError, RecordingReader, Topics};
+use crate::scene::Scene;
 use crate::touch::{MarkerCounts, MarkerFilter, Message, Placement, Sample, SyncParams, Synchroniser, WrenchFrame};
 
 /// Reasons that are gaps in the recording itself; every other one is a message lost on the way.
@@ -71,6 +72,20 @@ fn find_wrench_frame(path: &Path, topics: &Topics) -> Result<WrenchFrame, Record
     let mut reader = RecordingReader::open(path, topics)?;
     while !knows_frames(&reader) && reader.next_record().is_some() {}
     Ok(wrench_frame(&reader))
+}
+
+const NO_MARKERS: &str = "--markers-topic needs a scene that says where the markers sit: add `markers:` to it";
+
+/// What makes poses of markers, when the recording has those on `topic`.
+///
+/// # Errors
+/// [`CliError::Usage`] when the scene does not say where they sit.
+pub fn marker_filter(scene: &Scene, topic: Option<&str>) -> Result<Option<MarkerFilter>, CliError> {
+    if topic.is_none() {
+        return Ok(None);
+    }
+    let filter = scene.marker_filter().map_err(|error| CliError::Usage(error.to_string()))?;
+    filter.map(Some).ok_or_else(|| CliError::Usage(NO_MARKERS.to_owned()))
 }
 
 /// Gives each sample of `recording` to `each`, in order of time.

@@ -3,6 +3,7 @@
 //! A part that is not named is not built: a scene that names only `refine` is the bare loop. A part that is named
 //! without keys takes its defaults. `config/default.yaml` is [`Scene::default`] written out, with every key explained.
 
+mod edit;
 mod error;
 mod params;
 mod sections;
@@ -11,6 +12,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 
+pub use edit::Setting;
 pub use error::SceneError;
 use error::yaml_error;
 use sections::named;
@@ -100,9 +102,18 @@ impl Scene {
     /// # Errors
     /// [`SceneError`], with the path.
     pub fn read(path: &Path) -> Result<Self, SceneError> {
+        Self::read_with_text(path).map(|(scene, _)| scene)
+    }
+
+    /// Reads and checks a scene, and keeps its text for [`Self::edited`].
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn read_with_text(path: &Path) -> Result<(Self, String), SceneError> {
         let yaml =
             std::fs::read_to_string(path).map_err(|source| SceneError::Read { path: path.to_owned(), source })?;
-        Self::from_yaml(&yaml).map_err(|error| SceneError::In { path: path.to_owned(), error: Box::new(error) })
+        let in_file = |error| SceneError::In { path: path.to_owned(), error: Box::new(error) };
+        Ok((Self::from_yaml(&yaml).map_err(in_file)?, yaml))
     }
 
     /// Parses and checks a scene.
