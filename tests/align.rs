@@ -102,6 +102,17 @@ fn the_stated_uncertainty_holds() {
     }
 }
 
+/// A sigma that was given far too small is not believed against the residuals.
+#[test]
+fn a_sigma_that_the_residuals_contradict_is_not_believed() {
+    let pairs = pairs_of(&motion(), 0.4e-3, 1);
+    let given =
+        |sigma| fit_pairs(&pairs, &PairsParams { sigma: Some(sigma), least_misfit: 1.0, ..PairsParams::default() });
+    assert_eq!(given(0.4e-3).unwrap().sigma, 0.4e-3);
+    let (small, found) = (given(0.1e-3).unwrap(), fit(&pairs).unwrap());
+    assert!((small.sigma - found.sigma).abs() < 1e-12 && (small.covariance - found.covariance).amax() < 1e-18);
+}
+
 /// By hand: two pairs that count four times as much as the other two draw the shift to their mean.
 #[test]
 fn sigmas_are_weights() {
@@ -135,6 +146,8 @@ fn what_determines_no_motion_is_refused() {
     let mut bad = good.clone();
     bad[1].sigma = Some(-1e-3);
     assert_eq!(fit(&bad).unwrap_err(), PairsError::BadSigma { pair: 2, sigma_mm: -1.0 });
+    let nothing = PairsParams { sigma: Some(0.0), ..PairsParams::default() };
+    assert_eq!(fit_pairs(&good, &nothing).unwrap_err(), PairsError::BadGivenSigma { sigma_mm: 0.0 });
     let twice = [good[0], good[1], good[1]];
     assert!(matches!(fit(&twice), Err(PairsError::Coincident { first: 2, second: 3, side: Side::From, .. })));
     let line: Vec<_> = (0..6)
@@ -183,7 +196,8 @@ fn units_and_mirrors_are_named() {
         let to_unit = |pair: PointPair| PointPair { to: pair.to * factor, ..pair };
         fit(&pairs.into_iter().map(to_unit).collect::<Vec<_>>()).unwrap_err()
     };
-    for (factor, named) in [(1000.0, "1000:"), (1e-3, "1/1000"), (25.4, "25.4:"), (1.0 / 25.4, "1/25.4"), (10.0, "cm")] {
+    for (factor, named) in [(1000.0, "1000:"), (1e-3, "1/1000"), (25.4, "25.4:"), (1.0 / 25.4, "1/25.4"), (10.0, "cm")]
+    {
         let told = scaled(factor);
         assert!(matches!(told, PairsError::Scale { .. }) && told.to_string().contains(named), "{told}");
     }
@@ -193,6 +207,9 @@ fn units_and_mirrors_are_named() {
     let told = fit(&pairs).unwrap_err();
     assert!(matches!(told, PairsError::Mirrored { .. }), "{told}");
     // a half turn is no mirror
-    let turned = Isometry3::from_parts(motion().translation, UnitQuaternion::from(Rotation3::new(vector![0.0, 3.14159, 0.0])));
+    let turned = Isometry3::from_parts(
+        motion().translation,
+        UnitQuaternion::from(Rotation3::new(vector![0.0, std::f64::consts::PI, 0.0])),
+    );
     assert!(fit(&pairs_of(&turned, 0.1e-3, 5)).is_ok());
 }

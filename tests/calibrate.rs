@@ -8,7 +8,8 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64Mcg;
 use touchup::calibrate::{
-    Known, PayloadError, PayloadParams, StaticPose, StillFinder, StillParams, TipError, TipFitParams, fit_payload, fit_tip,
+    Known, PayloadError, PayloadParams, StaticPose, StillFinder, StillParams, TipError, TipFitParams, fit_payload,
+    fit_tip,
 };
 use touchup::touch::{Sample, Wrench, WrenchFrame};
 
@@ -193,7 +194,10 @@ fn seven_real_poses_weigh_what_their_authors_found() {
     }
     let pose = |(pose, wrench): (&Vec<f64>, &Vec<f64>)| StaticPose {
         r_wt: turn_of(&pose[3..7]),
-        wrench: Wrench { force: Vector3::from_column_slice(&wrench[..3]), torque: Vector3::from_column_slice(&wrench[3..]) },
+        wrench: Wrench {
+            force: Vector3::from_column_slice(&wrench[..3]),
+            torque: Vector3::from_column_slice(&wrench[3..]),
+        },
         noise: None,
         samples: 1,
     };
@@ -232,7 +236,10 @@ fn a_real_stream_weighs_the_same_within_its_settling() {
     let by_rows = fit_payload(&poses, &params).unwrap();
     for (name, found) in [("phases", &by_phases), ("rows", &by_rows)] {
         let (poses, rejected, tilt) = (found.poses, found.rejected.len(), found.tilt.to_degrees());
-        println!("{name}: {:?} N, rms {:.3} N, {poses} poses, {rejected} left out, {tilt:.1}°", found.weight, found.rms_force);
+        println!(
+            "{name}: {:?} N, rms {:.3} N, {poses} poses, {rejected} left out, {tilt:.1}°",
+            found.weight, found.rms_force
+        );
     }
     assert!(still.len() >= 10, "{}", still.len());
     for found in [&by_phases, &by_rows] {

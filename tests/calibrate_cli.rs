@@ -1,6 +1,7 @@
 //! `touchup calibrate` at the boundary of the process: a recording in another frame, with another tip and a heavy sensor,
 //! gives the mesh that the plain recording gives, once the scene is calibrated.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -10,7 +11,7 @@ use serde_json::Value;
 use touchup::io::mesh_file::{MeshUnit, read_mesh, write_mesh};
 use touchup::io::recording::{RecordingReader, Topics, write_recording};
 use touchup::mesh::TriMesh;
-use touchup::touch::{Message, StampedPose, StampedWrench, Wrench};
+use touchup::touch::{Message, StampedPose, StampedWrench, SyncParams, Synchroniser, Wrench};
 
 const DEFAULT_YAML: &str = include_str!("../config/default.yaml");
 
@@ -94,25 +95,40 @@ fn in_space(messages: &[Message], offset: Vector3<f64>) -> Vec<Message> {
     messages.iter().map(moved).collect()
 }
 
-/// Weight and bias on each wrench; the pose at its stamp is that before it, which is why the stylus of the test must not
-/// turn quickly: the simulated one does not turn.
-fn weighed(messages: &[Message]) -> Vec<Message> {
-    let mut r_wt = messages.iter().find_map(|message| match message {
-        Message::Pose(pose) => Some(pose.pose_ot.rotation),
-        Message::Wrench(_) => None,
-    });
-    let mut weigh = |message: &Message| match *message {
-        Message::Pose(pose) => {
-            r_wt = Some(pose.pose_ot.rotation);
-            Message::Pose(pose)
-        }
-        Message::Wrench(StampedWrench { stamp_ns, wrench }) => {
-            let weight = felt(&r_wt.unwrap());
-            let (force, torque) = (wrench.force + weight.force, wrench.torque + weight.torque);
-            Message::Wrench(StampedWrench { stamp_ns, wrench: Wrench { force, torque } })
+/// Orientation of the stylus at the stamp of each wrench that becomes a sample.
+fn turns(messages: &[Message]) -> BTreeMap<i64, UnitQuaternion<f64>> {
+    let mut sync = Synchroniser::new(SyncParams::default()).unwrap();
+    let mut turns = BTreeMap::new();
+    let mut draw = |sync: &mut Synchroniser| {
+        while let Some(sample) = sync.next_sample() {
+            turns.insert(sample.stamp_ns, sample.pose_ot.rotation);
         }
     };
-    messages.iter().map(&mut weigh).collect()
+    for message in messages {
+        sync.push(*message);
+        draw(&mut sync);
+    }
+    sync.finish();
+    draw(&mut sync);
+    turns
+}
+
+/// Each wrench that becomes a sample changed, by what `change` makes of the orientation at its stamp.
+fn changed(messages: &[Message], change: impl Fn(&UnitQuaternion<f64>, Wrench) -> Wrench) -> Vec<Message> {
+    let turns = turns(messages);
+    let change = |message: &Message| match *message {
+        Message::Wrench(StampedWrench { stamp_ns, wrench }) if turns.contains_key(&stamp_ns) => {
+            Message::Wrench(StampedWrench { stamp_ns, wrench: change(&turns[&stamp_ns], wrench) })
+        }
+        other => other,
+    };
+    messages.iter().map(change).collect()
+}
+
+/// Weight and bias on top of what is felt.
+fn weighed(r_wt: &UnitQuaternion<f64>, wrench: Wrench) -> Wrench {
+    let weight = felt(r_wt);
+    Wrench { force: wrench.force + weight.force, torque: wrench.torque + weight.torque }
 }
 
 fn felt(r_wt: &UnitQuaternion<f64>) -> Wrench {
@@ -184,7 +200,8 @@ fn a_calibrated_scene_gives_the_mesh_of_the_plain_recording() {
         serde_json::from_str(done(&case.calibrate(&["tip", "--bag", &swing], "plain.yaml", "tip.yaml"))).unwrap();
     assert!((told["offset_mm"]["value"][2].as_f64().unwrap() + 141.8).abs() < 1e-7, "{told}");
     let told: Value =
-        serde_json::from_str(done(&case.calibrate(&["payload", "--bag", &still], "plain.yaml", "payload.yaml"))).unwrap();
+        serde_json::from_str(done(&case.calibrate(&["payload", "--bag", &still], "plain.yaml", "payload.yaml")))
+            .unwrap();
     assert!((told["weight_n"].as_f64().unwrap() - WEIGHT_W.norm()).abs() < 1e-9, "{told}");
     assert_eq!(told["still_phases"], 12);
     // all three, the payload first: its gravity is in the axes of space and turns with the scan that comes after it
@@ -200,14 +217,12 @@ fn a_calibrated_scene_gives_the_mesh_of_the_plain_recording() {
     let other_tip: Vec<_> = moved
         .iter()
         .map(|message| match *message {
-            Message::Pose(pose) => {
-                Message::Pose(StampedPose { pose_ot: pose_wo().inverse() * pose.pose_ot, ..pose })
-            }
+            Message::Pose(pose) => Message::Pose(StampedPose { pose_ot: pose_wo().inverse() * pose.pose_ot, ..pose }),
             wrench => wrench,
         })
         .collect();
     case.record("tip.mcap", "stylus", &other_tip);
-    case.record("all.mcap", "stylus", &weighed(&moved));
+    case.record("all.mcap", "stylus", &changed(&moved, weighed));
     for (bag, scene) in [("moved.mcap", "scan.yaml"), ("tip.mcap", "tip.yaml"), ("all.mcap", "all.yaml")] {
         let mesh = case.refined(bag, scene, "out.ply");
         let difference = largest_difference(&plain, &mesh);
@@ -215,20 +230,11 @@ fn a_calibrated_scene_gives_the_mesh_of_the_plain_recording() {
         assert!(difference < 1e-9, "{bag}: {difference:e}");
     }
     // a wrench in the axes of the poses is turned with them
-    let mut r_wt = UnitQuaternion::identity();
-    let in_pose_axes: Vec<_> = in_space(&touches, zero)
-        .iter()
-        .map(|message| match *message {
-            Message::Pose(pose) => {
-                r_wt = pose.pose_ot.rotation;
-                Message::Pose(pose)
-            }
-            Message::Wrench(StampedWrench { stamp_ns, wrench: Wrench { force, torque } }) => {
-                let wrench = Wrench { force: r_wt * force, torque: r_wt * torque };
-                Message::Wrench(StampedWrench { stamp_ns, wrench })
-            }
-        })
-        .collect();
+    let turned = |r_wt: &UnitQuaternion<f64>, wrench: Wrench| Wrench {
+        force: r_wt * wrench.force,
+        torque: r_wt * wrench.torque,
+    };
+    let in_pose_axes = changed(&in_space(&touches, zero), turned);
     case.record("axes.mcap", "space", &in_pose_axes);
     let difference = largest_difference(&plain, &case.refined("axes.mcap", "scan.yaml", "out.ply"));
     println!("wrench in space: {difference:e} m");
@@ -274,10 +280,66 @@ fn results_are_told_and_written_and_bad_data_is_3() {
 
     // one orientation alone
     let resting = recording(500, |_| Isometry3::identity());
-    write_recording(&folder.path().join("rest.mcap"), &Topics::default(), "space", "stylus", resting.into_iter()).unwrap();
+    write_recording(&folder.path().join("rest.mcap"), &Topics::default(), "space", "stylus", resting).unwrap();
     let rest = name("rest.mcap");
     refused(touchup(&["calibrate", "tip", "--bag", &rest, "--out", &out]), 3, "swung by 0.0°");
     refused(touchup(&["calibrate", "payload", "--bag", &rest, "--out", &out]), 3, "1 still phases");
+}
+
+/// The stylus goes from point to point and rests on each for 0.8 s, pressing with 2 N along the normal; the poses are of H.
+fn resting_on(points: &[(Point3<f64>, Vector3<f64>)]) -> Vec<Message> {
+    let (radius, stiffness) = (1.5e-3, 20e3);
+    let mut messages = Vec::new();
+    for (k, (point, normal)) in points.iter().enumerate() {
+        for tick in 0..1300_i64 {
+            let stamp_ns = 1_000_000_000 + (k as i64 * 1300 + tick) * 1_000_000;
+            let presses = (250..1050).contains(&tick);
+            let away = 80e-6 * (250 - tick).max(tick - 1050).max(0) as f64;
+            let force_o = if presses { normal * 2.0 } else { Vector3::zeros() };
+            let turn = UnitQuaternion::from_scaled_axis(vector![0.1 * k as f64, 0.2, -0.3]);
+            let centre = point + normal * (radius + away) - force_o / stiffness;
+            let pose_oh = Isometry3::from_parts(centre.coords.into(), turn) * Translation3::from(-OFFSET);
+            messages.push(Message::Pose(StampedPose { stamp_ns, pose_ot: pose_wo() * pose_oh }));
+            let wrench = Wrench { force: turn.inverse() * force_o, torque: Vector3::zeros() };
+            messages.push(Message::Wrench(StampedWrench { stamp_ns, wrench }));
+        }
+    }
+    messages
+}
+
+#[test]
+fn points_can_be_picked_with_the_stylus() {
+    let folder = tempfile::tempdir().unwrap();
+    let name = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let points = [
+        (Point3::new(0.0, 0.01, 0.0), -Vector3::x()),
+        (Point3::new(0.02, 0.0, 0.01), -Vector3::y()),
+        (Point3::new(0.03, 0.02, 0.02), Vector3::x()),
+        (Point3::new(0.01, 0.01, 0.03), Vector3::z()),
+        (Point3::new(0.015, 0.03, 0.005), Vector3::y()),
+    ];
+    let mut csv = "scan_x_mm,scan_y_mm,scan_z_mm\n".to_owned();
+    for (point, _) in &points {
+        let mm = point.coords * 1e3;
+        csv += &format!("{},{},{}\n", mm.x, mm.y, mm.z);
+    }
+    fs::write(name("points.csv"), csv).unwrap();
+    let offset = format!("  offset_mm: [{}, {}, {}]\n", OFFSET.x * 1e3, OFFSET.y * 1e3, OFFSET.z * 1e3);
+    fs::write(name("tip.yaml"), DEFAULT_YAML.replace("tip:\n", &format!("tip:\n{offset}"))).unwrap();
+    let scan = |bag: &str, points: &[(Point3<f64>, Vector3<f64>)]| {
+        write_recording(Path::new(&name(bag)), &Topics::default(), "space", "stylus", resting_on(points)).unwrap();
+        let [pairs, bag, scene, out] = ["points.csv", bag, "tip.yaml", "out.yaml"].map(name);
+        touchup(&["calibrate", "scan", "--pairs", &pairs, "--bag", &bag, "--scene", &scene, "--out", &out, "--json"])
+    };
+    let told: Value = serde_json::from_str(done(&scan("rests.mcap", &points))).unwrap();
+    assert!(told["rms_mm"].as_f64().unwrap() < 1e-6, "{told}");
+    let found: Vec<f64> =
+        told["scan_to_space"]["position_mm"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect();
+    let off = Vector3::from_column_slice(&found) - pose_wo().translation.vector * 1e3;
+    assert!(off.norm() < 1e-5, "{off}");
+    let output = scan("four.mcap", &points[..4]);
+    assert_eq!(output.status.code(), Some(3));
+    assert!(text(&output.stderr).contains("rested 4 times") && text(&output.stderr).contains("5 points"));
 }
 
 /// The real static poses of the room's tests, through the command line.

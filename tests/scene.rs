@@ -6,7 +6,8 @@ use nalgebra::vector;
 use touchup::patch::PatcherParams;
 use touchup::refine::{Along, ContactModel, DynamicsParams, GuardParams, RefineParams, RoiSize, StepRule, TipParams};
 use touchup::scene::{
-    BiasSection, BiasTrackingSection, CompensationSection, MarkersSection, Mode, PayloadSection, Scene,
+    BiasSection, BiasTrackingSection, CompensationSection, GravityAxes, MarkersSection, Mode, PayloadSection,
+    ScanToSpaceSection, Scene, SceneError, Setting,
 };
 use touchup::touch::{BiasParams, SyncParams, TipShape, WrenchFrame};
 
@@ -141,6 +142,7 @@ fn a_header_alone_takes_the_defaults() {
         let mut expected = Scene::default();
         match name.as_str() {
             "markers" => expected.markers = Some(MarkersSection::default()),
+            "scan_to_space" => expected.scan_to_space = Some(ScanToSpaceSection::default()),
             "compensation" => expected.compensation = Some(CompensationSection::default()),
             "bias_tracking" => expected.bias_tracking = Some(BiasTrackingSection::default()),
             _ => {}
@@ -148,7 +150,7 @@ fn a_header_alone_takes_the_defaults() {
         assert_eq!(scene, expected, "{name}");
         sections += 1;
     }
-    assert_eq!(sections, 14);
+    assert_eq!(sections, 15);
     let inner = Scene::from_yaml("compensation:\n  payload:\n  bias:\n").unwrap().compensation.unwrap();
     assert_eq!((inner.payload, inner.bias), (Some(PayloadSection::default()), Some(BiasSection::default())));
 }
@@ -313,8 +315,6 @@ fn bias_tracking_is_built_only_when_named_and_not_in_the_paper() {
 
 // ---- settings put into the text ---------------------------------------------------------------------------------
 
-use touchup::scene::{GravityAxes, ScanToSpaceSection, SceneError, Setting};
-
 /// A scene as a user wrote it, with what each calibration sets.
 fn calibrated(yaml: &str) -> Result<String, SceneError> {
     let mut expected = if yaml.trim().is_empty() { Scene::from_yaml("{}") } else { Scene::from_yaml(yaml) }.unwrap();
@@ -339,7 +339,10 @@ fn calibrated(yaml: &str) -> Result<String, SceneError> {
 /// The lines of `before` that are not in `after`, in order.
 fn lost<'a>(before: &'a str, after: &str) -> Vec<&'a str> {
     let mut rest = after.lines();
-    before.lines().filter(|line| !rest.clone().any(|other| other == *line) || !rest.any(|other| other == *line)).collect()
+    before
+        .lines()
+        .filter(|line| !rest.clone().any(|other| other == *line) || !rest.any(|other| other == *line))
+        .collect()
 }
 
 #[test]
@@ -413,7 +416,9 @@ fn every_way_of_writing_is_edited_or_refused() {
         }
         match calibrated(way) {
             Ok(_) => {}
-            Err(error) => assert!(error.to_string().contains("by hand: scan_to_space.position_mm: [1.5, -2, 3.25]"), "{error}"),
+            Err(error) => {
+                assert!(error.to_string().contains("by hand: scan_to_space.position_mm: [1.5, -2, 3.25]"), "{error}")
+            }
         }
     }
 }

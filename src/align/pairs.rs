@@ -9,10 +9,16 @@
 
 mod misfit;
 
+use std::ops::RangeInclusive;
+
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Rotation3, SVD, UnitQuaternion, Vector3};
 
 /// Farther from the origin than this, a point is a fault, m.
 const LARGEST_COORDINATE: f64 = 1e6;
+/// Standard deviations of a pick that are believed, m: far outside, their squares are no numbers.
+const BELIEVABLE_SIGMA: RangeInclusive<f64> = 1e-12..=1e3;
+/// A given standard deviation is believed unless the residuals say so many times more: with three pairs once in 130.
+const LARGEST_SIGMA_RATIO: f64 = 2.0;
 /// Points count as on one line when they scatter across it by less than this share of their scatter along it: 1°.
 const LINE_SHARE: f64 = 0.02;
 /// … or by less than so many standard deviations of a pick: the turn about the line is then anything.
@@ -60,7 +66,7 @@ pub struct PairsFit {
     /// √(mean |residual|²), m.
     pub rms: f64,
     /// Standard deviation of a pair of unit weight, per axis, m: as given, or from the residuals with 3 n − 6 degrees of
-    /// freedom.
+    /// freedom where none is given or they say more than twice as much.
     pub sigma: f64,
     /// Middle of the pairs, in the frame of `to`, m.
     pub centroid: Point3<f64>,
@@ -111,8 +117,16 @@ pub enum PairsError {
         /// as given
         sigma_mm: f64,
     },
+    /// The same for all pairs.
+    #[error("the sigma of the pairs is {sigma_mm} mm; it must be 1e-9 to 1e6 mm, leave it out where it is not known")]
+    BadGivenSigma {
+        /// as given
+        sigma_mm: f64,
+    },
     /// Fewer than three different points.
-    #[error("pairs {first} and {second} have the same {side} point, {distance_mm:.6} mm apart, and fewer than 3 differ: pick points far apart")]
+    #[error(
+        "pairs {first} and {second} have the same {side} point, {distance_mm:.6} mm apart, and fewer than 3 differ: pick points far apart"
+    )]
     Coincident {
         /// one pair
         first: usize,
@@ -209,6 +223,9 @@ pub enum PairsError {
 /// # Ok::<(), touchup::align::PairsError>(())
 /// ```
 pub fn fit_pairs(pairs: &[PointPair], params: &PairsParams) -> Result<PairsFit, PairsError> {
+    if let Some(sigma) = params.sigma.filter(|sigma| !BELIEVABLE_SIGMA.contains(sigma)) {
+        return Err(PairsError::BadGivenSigma { sigma_mm: sigma * 1e3 });
+    }
     check(pairs)?;
     check_extent(pairs, params)?;
     let weights = weights(pairs, params);
@@ -249,9 +266,9 @@ impl Solved {
         let mut rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn));
         rotation.renormalize();
         let motion = Isometry3::from_parts((b - rotation * a.coords).into(), rotation);
-        let mut squares = [motion.rotation.to_rotation_matrix().into_inner(), u * v_t].into_iter().map(|turn| {
-            kept().map(|(p, w)| w * ((p.to - b) - turn * (p.from - a)).norm_squared()).sum::<f64>()
-        });
+        let mut squares = [motion.rotation.to_rotation_matrix().into_inner(), u * v_t]
+            .into_iter()
+            .map(|turn| kept().map(|(p, w)| w * ((p.to - b) - turn * (p.from - a)).norm_squared()).sum::<f64>());
         let (squares, mirrored_squares) = (squares.next()?, squares.next()?);
         squares.is_finite().then_some(Self { motion, middle: a, squares, mirrored_squares })
     }
@@ -260,7 +277,8 @@ impl Solved {
         let residuals: Vec<_> = pairs.iter().map(|p| p.to - self.motion * p.from).collect();
         let n = pairs.len() as f64;
         let rms = (residuals.iter().map(Vector3::norm_squared).sum::<f64>() / n).sqrt();
-        let sigma = given.unwrap_or_else(|| (self.squares / (3.0 * n - 6.0)).sqrt());
+        let seen = (self.squares / (3.0 * n - 6.0)).sqrt();
+        let sigma = given.filter(|given| seen <= LARGEST_SIGMA_RATIO * given).unwrap_or(seen);
         let inertia: Matrix3<f64> = pairs
             .iter()
             .zip(weights)
@@ -303,8 +321,7 @@ fn check(pairs: &[PointPair]) -> Result<(), PairsError> {
                 return Err(PairsError::BadPoint { pair: i + 1, side });
             }
         }
-        // far outside this range its square is no number
-        if let Some(sigma) = pair.sigma.filter(|sigma| !(1e-12..=1e3).contains(sigma)) {
+        if let Some(sigma) = pair.sigma.filter(|sigma| !BELIEVABLE_SIGMA.contains(sigma)) {
             return Err(PairsError::BadSigma { pair: i + 1, sigma_mm: sigma * 1e3 });
         }
     }
@@ -365,7 +382,8 @@ impl Scatter {
     fn of(points: &[Point3<f64>]) -> Self {
         let n = points.len() as f64;
         let mean = points.iter().map(|p| p.coords / n).sum::<Vector3<f64>>();
-        let covariance: Matrix3<f64> = points.iter().map(|p| (p.coords - mean) * (p.coords - mean).transpose() / n).sum();
+        let covariance: Matrix3<f64> =
+            points.iter().map(|p| (p.coords - mean) * (p.coords - mean).transpose() / n).sum();
         let mut axes = covariance.symmetric_eigenvalues();
         axes.as_mut_slice().sort_by(f64::total_cmp);
         Self { along: axes[2].max(0.0).sqrt(), across: axes[1].max(0.0).sqrt() }

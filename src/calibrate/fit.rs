@@ -144,8 +144,7 @@ fn least_squares(equations: &[Equation], kept: Vec<bool>) -> Option<Fit> {
 
 fn solve(equations: &[Equation], weights: &[f64]) -> Option<(Vector3<f64>, Vector3<f64>)> {
     let (_, a, z) = means(equations, weights);
-    let right: Vector3<f64> =
-        equations.iter().zip(weights).map(|(e, w)| (e.a - a).transpose() * (e.z - z) * *w).sum();
+    let right: Vector3<f64> = equations.iter().zip(weights).map(|(e, w)| (e.a - a).transpose() * (e.z - z) * *w).sum();
     let x = normal(equations, weights, &a).cholesky()?.solve(&right);
     Some((x, z - a * x))
 }

@@ -104,6 +104,9 @@ enum CliError {
     Payload { path: PathBuf, error: PayloadError },
     #[error("{path}: {error}", path = path.display())]
     Tip { path: PathBuf, error: TipError },
+    #[error("{path}: the stylus rested {found} times for half a second in contact, and {wanted} points are picked on the scan; \
+             they are matched in order: rest once on each, in the order of the file", path = path.display())]
+    Rests { path: PathBuf, found: usize, wanted: usize },
     #[error(transparent)]
     Live(#[from] LiveError),
 }
@@ -116,7 +119,7 @@ impl CliError {
             Self::Simulate(SimError::BadParameter { .. } | SimError::TooFine { .. } | SimError::TooCoarse { .. }) => 2,
             // settings come from a scene file: its flags are checked before
             Self::Scene(_) | Self::ReadMesh(_) | Self::ReadRecording(_) | Self::Simulate(_) => 3,
-            Self::Table(_) | Self::Pairs { .. } | Self::Payload { .. } | Self::Tip { .. } => 3,
+            Self::Table(_) | Self::Pairs { .. } | Self::Payload { .. } | Self::Tip { .. } | Self::Rests { .. } => 3,
             Self::Mesh(_) | Self::Setting(_) | Self::Refine(_) | Self::Live(_) => 3,
         }
     }

@@ -46,7 +46,8 @@ pub(super) struct RefineArguments {
     /// geometry_msgs/WrenchStamped: what the part does to the stylus
     #[arg(long, value_name = "TOPIC", default_value = "/stylus/wrench")]
     wrench_topic: String,
-    /// geometry_msgs/PoseStamped: centre of the ball in the frame of the scan
+    /// geometry_msgs/PoseStamped: centre of the ball in the frame of the scan, or as tip.offset_mm and scan_to_space in the
+    /// scene say
     #[arg(long, value_name = "TOPIC", default_value = "/stylus/pose")]
     pose_topic: String,
     /// sensor_msgs/PointCloud2: the markers on the stylus, read in place of the pose; the scene says where they sit

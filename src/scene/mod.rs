@@ -18,8 +18,8 @@ use error::yaml_error;
 use sections::named;
 pub use sections::{
     AlongName, BiasSection, BiasTrackingSection, CarveSection, ClockSection, CompensationSection, ContactSection,
-    GravityAxes, GuardSection, MarkersSection, Mode, ModelName, PatchSection, PayloadSection, RefineSection, ScanSection,
-    ScanToSpaceSection, ShapeName, SlidingSection, StepName, SyncSection, TipSection, UncertaintySection,
+    GravityAxes, GuardSection, MarkersSection, Mode, ModelName, PatchSection, PayloadSection, RefineSection,
+    ScanSection, ScanToSpaceSection, ShapeName, SlidingSection, StepName, SyncSection, TipSection, UncertaintySection,
 };
 
 /// The parts of a scene. `None`: not built.

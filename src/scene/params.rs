@@ -3,8 +3,8 @@
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
 use super::{
-    AlongName, CarveSection, GravityAxes, GuardSection, Mode, ModelName, PayloadSection, RefineSection, Scene, SlidingSection, StepName, TipSection,
-    UncertaintySection,
+    AlongName, CarveSection, GravityAxes, GuardSection, Mode, ModelName, PayloadSection, RefineSection, Scene,
+    SlidingSection, StepName, TipSection, UncertaintySection,
 };
 use crate::patch::{CalibrationParams, PatcherParams, UncertaintyParams};
 use crate::refine::{

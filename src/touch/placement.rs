@@ -70,7 +70,8 @@ mod tests {
         let pose_wo = Some(Isometry3::from_parts(Translation3::new(1.0, 0.0, 0.0), quarter));
         let placement = Placement { pose_wo, p_ht: Some(vector![0.0, 0.0, -0.1]) };
         let pose_ot = Isometry3::translation(1.0, 0.5, 0.3);
-        let Message::Pose(placed) = placement.place(Message::Pose(StampedPose { stamp_ns: 7, pose_ot }), WrenchFrame::Sensor)
+        let Message::Pose(placed) =
+            placement.place(Message::Pose(StampedPose { stamp_ns: 7, pose_ot }), WrenchFrame::Sensor)
         else {
             panic!("a pose stays one");
         };

@@ -16,7 +16,7 @@ use crate::calibrate::Known;
 use crate::io::atomic::write_atomically;
 use crate::io::recording::Topics;
 use crate::scene::{Scene, Setting};
-use crate::touch::{Placement, Sample, WrenchFrame};
+use crate::touch::{Placement, Sample};
 
 #[derive(Debug, Subcommand)]
 pub(super) enum CalibrateArguments {
@@ -124,23 +124,17 @@ struct Source {
 }
 
 impl Source {
-    /// Gives each sample to `each`; tells in which axes its wrench is.
-    fn replay(
-        &self,
-        bag: &Path,
-        scene: &Scene,
-        placement: Option<Placement>,
-        each: impl FnMut(&Sample),
-    ) -> Result<(WrenchFrame, Replayed), CliError> {
-        let topics = Topics {
-            pose: self.pose_topic.clone(),
-            wrench: self.wrench_topic.clone(),
-            markers: self.markers_topic.clone(),
-        };
+    fn open(&self, bag: &Path) -> Result<Recording, CliError> {
+        let (pose, wrench) = (self.pose_topic.clone(), self.wrench_topic.clone());
+        let topics = Topics { pose, wrench, markers: self.markers_topic.clone() };
+        Recording::open(bag, &topics).map_err(CliError::ReadRecording)
+    }
+
+    /// Gives each sample to `each`, its pose in the frame of the recording: of the ball where the scene says where it is.
+    fn replay(&self, recording: Recording, scene: &Scene, each: impl FnMut(&Sample)) -> Result<Replayed, CliError> {
         let markers = marker_filter(scene, self.markers_topic.as_deref())?;
-        let recording = Recording::open(bag, &topics).map_err(CliError::ReadRecording)?;
-        let wrench_frame = recording.wrench_frame;
-        Ok((wrench_frame, replay(recording, placement, scene.sync_params(), markers, each)?))
+        let placement = scene.placement().map(|placement| Placement { pose_wo: None, ..placement });
+        replay(recording, placement, scene.sync_params(), markers, each)
     }
 }
 

@@ -88,8 +88,9 @@ impl PayloadArguments {
         }
         let mut finder = StillFinder::new(StillParams::default());
         let bag = self.bag.as_deref().unwrap_or_else(|| "".as_ref());
-        let (recorded, replayed) =
-            self.source.replay(bag, &draft.reading(), None, |sample| finder.push(sample))?;
+        let recording = self.source.open(bag)?;
+        let recorded = recording.wrench_frame;
+        let replayed = self.source.replay(recording, &draft.reading(), |sample| finder.push(sample))?;
         Ok((finder.finish(), told.unwrap_or(recorded), replayed.losses))
     }
 }

@@ -1,45 +1,86 @@
 //! `touchup calibrate scan`: where the scan lies in space, from picked pairs.
 
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use nalgebra::Vector6;
 use serde::Serialize;
 use tracing::warn;
 
-use super::super::{CliError, Losses};
-use super::{Change, Draft, Target, rounded};
+use super::super::{CliError, Losses, check_kept};
+use super::{Change, Draft, Source, Target, rounded};
 use crate::align::{PairsFit, PairsParams, PointPair, fit_pairs};
-use crate::io::pairs_file::{PairsFile, read_pairs};
+use crate::calibrate::{RestFinder, RestParams};
+use crate::io::pairs_file::{PairsFile, read_pairs, read_scan_points};
 use crate::scene::{GravityAxes, ScanToSpaceSection, Scene, Setting};
+use crate::touch::Compensator;
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct ScanArguments {
     /// Pairs of points, CSV: scan_x_mm,scan_y_mm,scan_z_mm,space_x_mm,space_y_mm,space_z_mm, where wanted name, sigma_mm
     #[arg(long, value_name = "CSV")]
     pairs: PathBuf,
+    /// A recording in which the stylus rests on each point for a second, in the order of the file, which then needs no
+    /// columns of space
+    #[arg(long, value_name = "RECORDING")]
+    bag: Option<PathBuf>,
     /// Standard deviation of a pair per axis, mm; left out: found from the residuals
     #[arg(long, value_name = "S")]
     sigma_mm: Option<f64>,
+    #[command(flatten)]
+    source: Source,
     #[command(flatten)]
     target: Target,
 }
 
 /// The verb.
 pub(super) fn scan(arguments: &ScanArguments) -> Result<Losses, CliError> {
-    let ScanArguments { pairs: path, sigma_mm, target } = arguments;
+    let ScanArguments { pairs: path, bag, sigma_mm, target, .. } = arguments;
     if let Some(sigma) = sigma_mm.filter(|sigma| !(1e-6..=1e3).contains(sigma)) {
         return Err(CliError::Usage(format!("--sigma-mm is {sigma}; it must be 1e-6 to 1000 mm")));
     }
     let draft = target.open("--pairs", path)?;
-    let PairsFile { pairs, names } = read_pairs(path)?;
+    let (PairsFile { pairs, names }, losses) = match bag {
+        Some(bag) => arguments.touched_pairs(bag, &draft)?,
+        None => (read_pairs(path)?, Losses::new()),
+    };
     let params = PairsParams { sigma: sigma_mm.map(|sigma| sigma / 1e3), ..PairsParams::default() };
     let fit = fit_pairs(&pairs, &params).map_err(|error| CliError::Pairs { path: path.clone(), error })?;
     warn_of_gravity(&draft.scene);
     let found = ScanFound::of(&pairs, names, &fit);
     target.write(&draft, &found.change(&draft), &found)?;
-    Ok(Losses::new())
+    Ok(losses)
+}
+
+impl ScanArguments {
+    /// The points of the file, each with the place where the stylus rested.
+    fn touched_pairs(&self, bag: &Path, draft: &Draft) -> Result<(PairsFile, Losses), CliError> {
+        check_kept("--bag", bag, &self.target.out)?;
+        let mut file = read_scan_points(&self.pairs)?;
+        // the poses stay in space: that is what is looked for
+        let scene = Scene { scan_to_space: None, ..draft.reading() };
+        let tip = scene.tip_params();
+        let params = RestParams {
+            gate: scene.contact_params().unwrap_or_default(),
+            radius: tip.radius,
+            stiffness: tip.stiffness,
+            ..RestParams::default()
+        };
+        let mut finder = RestFinder::new(params)?;
+        let recording = self.source.open(bag)?;
+        let compensator = Compensator::new(scene.compensator_params(recording.wrench_frame))?;
+        let replayed = self.source.replay(recording, &scene, |sample| finder.push(&compensator.compensate(sample)))?;
+        let rests = finder.finish();
+        if rests.len() != file.pairs.len() {
+            let (found, wanted) = (rests.len(), file.pairs.len());
+            return Err(CliError::Rests { path: bag.to_owned(), found, wanted });
+        }
+        for (pair, rest) in file.pairs.iter_mut().zip(rests) {
+            pair.to = rest.point;
+        }
+        Ok((file, replayed.losses))
+    }
 }
 
 /// A weight whose direction was named in the axes of the scan may not have been meant for the scan as it lies now.
@@ -130,7 +171,13 @@ impl fmt::Display for ScanFound {
         let [a, b, c] = self.turn_std_deg;
         writeln!(f, "rms {:.3} mm; one axis of a pair is good to {:.3} mm", self.rms_mm, self.sigma_mm)?;
         let ([p, q, r], [i, j, k, w]) = (self.scan_to_space.position_mm, self.scan_to_space.orientation_xyzw);
-        writeln!(f, "scan to space: position ({p:.3}, {q:.3}, {r:.3}) mm, orientation xyzw ({i:.6}, {j:.6}, {k:.6}, {w:.6})")?;
-        write!(f, "known to ({x:.3}, {y:.3}, {z:.3}) mm in the middle of the pairs, and to ({a:.3}, {b:.3}, {c:.3})° about it")
+        writeln!(
+            f,
+            "scan to space: position ({p:.3}, {q:.3}, {r:.3}) mm, orientation xyzw ({i:.6}, {j:.6}, {k:.6}, {w:.6})"
+        )?;
+        write!(
+            f,
+            "known to ({x:.3}, {y:.3}, {z:.3}) mm in the middle of the pairs, and to ({a:.3}, {b:.3}, {c:.3})° about it"
+        )
     }
 }

@@ -54,9 +54,12 @@ pub(super) fn tip(arguments: &TipArguments) -> Result<Losses, CliError> {
     let TipArguments { bag, source, target } = arguments;
     let draft = target.open("--bag", bag)?;
     let mut swing = Swing { poses: Vec::new(), stride: 1, seen: 0 };
-    let (_, replayed) = source.replay(bag, &draft.reading(), None, |sample| swing.push(sample.pose_ot))?;
-    let fit = fit_tip(&swing.poses, &TipFitParams::default())
-        .map_err(|error| CliError::Tip { path: bag.clone(), error })?;
+    let mut scene = draft.reading();
+    // the poses as they are recorded: an older offset does not count
+    scene.tip.iter_mut().for_each(|tip| tip.offset_mm = None);
+    let replayed = source.replay(source.open(bag)?, &scene, |sample| swing.push(sample.pose_ot))?;
+    let fit =
+        fit_tip(&swing.poses, &TipFitParams::default()).map_err(|error| CliError::Tip { path: bag.clone(), error })?;
     let found = TipFound::of(&fit);
     target.write(&draft, &found.change(&draft), &found)?;
     Ok(replayed.losses)

@@ -172,7 +172,12 @@ pub enum GravityAxes {
 
 impl Default for PayloadSection {
     fn default() -> Self {
-        Self { mass_kg: 0.0, centre_mm: [0.0; 3], gravity_m_per_s2: [0.0, 0.0, -9.81], gravity_axes: GravityAxes::Object }
+        Self {
+            mass_kg: 0.0,
+            centre_mm: [0.0; 3],
+            gravity_m_per_s2: [0.0, 0.0, -9.81],
+            gravity_axes: GravityAxes::Object,
+        }
     }
 }
 
