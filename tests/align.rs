@@ -189,6 +189,21 @@ fn a_pair_that_does_not_fit_is_named() {
     assert!((0..50).all(|seed| fit(&pairs_of(&motion(), 1e-3, seed)).is_ok()));
 }
 
+/// As many as a file can hold: the time does not grow with their square.
+#[test]
+fn a_hundred_thousand_pairs_are_fitted_at_once() {
+    let mut rng = Pcg64Mcg::seed_from_u64(8);
+    let pair = |_| {
+        let from = Point3::from(normal(&mut rng, 0.1));
+        PointPair { from, to: motion() * from + normal(&mut rng, 0.2e-3), sigma: None }
+    };
+    let mut pairs: Vec<_> = (0..100_000).map(pair).collect();
+    let found = fit(&pairs).unwrap();
+    assert!(error(&found, &motion()).amax() < 1e-5 && (found.sigma / 0.2e-3 - 1.0).abs() < 0.01);
+    pairs[4711].to.x += 5e-3;
+    assert!(matches!(fit(&pairs), Err(PairsError::Outlier { pair: 4712, .. })));
+}
+
 #[test]
 fn units_and_mirrors_are_named() {
     let scaled = |factor: f64| {

@@ -9,9 +9,9 @@ use std::process::{Command, Output};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3, vector};
 use serde_json::Value;
 use touchup::io::mesh_file::{MeshUnit, read_mesh, write_mesh};
-use touchup::io::recording::{RecordingReader, Topics, write_recording};
+use touchup::io::recording::{Record, RecordingReader, Topics, write_recording};
 use touchup::mesh::TriMesh;
-use touchup::touch::{Message, StampedPose, StampedWrench, SyncParams, Synchroniser, Wrench};
+use touchup::touch::{MarkerFrame, Message, SeenMarker, StampedPose, StampedWrench, SyncParams, Synchroniser, Wrench};
 
 const DEFAULT_YAML: &str = include_str!("../config/default.yaml");
 
@@ -252,7 +252,8 @@ fn results_are_told_and_written_and_bad_data_is_3() {
     let told = done(&output);
     assert!(told.contains("residual, mm") && told.contains("rms 0.000 mm") && told.contains(&out), "{told}");
     let new = fs::read_to_string(&out).unwrap();
-    assert!(new.starts_with("# Made by `touchup calibrate`: scan: 5 pairs, residuals 0.000 mm rms"), "{new}");
+    assert!(new.starts_with("# Made by `touchup calibrate`") && new.contains("\n# E "), "{new}");
+    assert!(new.contains("# touchup calibrate scan: 5 pairs, residuals 0.000 mm rms"), "{new}");
     assert!(touchup::scene::Scene::read(Path::new(&out)).unwrap().scan_to_space.is_some());
 
     let refused = |output: Output, exit: i32, named: &str| {
@@ -340,6 +341,45 @@ fn points_can_be_picked_with_the_stylus() {
     let output = scan("four.mcap", &points[..4]);
     assert_eq!(output.status.code(), Some(3));
     assert!(text(&output.stderr).contains("rested 4 times") && text(&output.stderr).contains("5 points"));
+}
+
+/// The markers of a tracker in space, where they are read in place of the pose.
+#[test]
+fn markers_in_space_refine_as_those_in_the_frame_of_the_scan() {
+    let case = Case::new();
+    let part = case.name("part.ply");
+    done(&touchup(&["simulate", "--truth", &part, "--out", &case.name("made"), "--markers"]));
+    let topics = Topics { markers: Some("/stylus/markers".to_owned()), ..Topics::default() };
+    let mut reader = RecordingReader::open(&case.path("made/touch.mcap"), &topics).unwrap();
+    let moved = std::iter::from_fn(|| reader.next_record()).map(|record| match record.unwrap() {
+        Record::Markers(frame) => {
+            let mut in_space = MarkerFrame::new(frame.stamp_ns);
+            for marker in frame.seen() {
+                in_space.see(SeenMarker { position: pose_wo() * marker.position, ..*marker });
+            }
+            Record::Markers(Box::new(in_space))
+        }
+        message => message,
+    });
+    let records: Vec<_> = moved.collect();
+    write_recording(&case.path("space.mcap"), &topics, "space", "stylus", records).unwrap();
+    let markers = format!("{DEFAULT_YAML}\nmarkers:\n");
+    fs::write(case.path("markers.yaml"), &markers).unwrap();
+    fs::write(case.path("pairs.csv"), pairs_csv()).unwrap();
+    done(&case.calibrate(&["scan", "--pairs", &case.name("pairs.csv")], "markers.yaml", "space.yaml"));
+    let refined = |bag: &str, scene: &str| -> Value {
+        let [scan, bag, scene, out] = ["made/scan.ply", bag, scene, "out.ply"].map(|name| case.name(name));
+        let refine = ["refine", "--scan", &scan, "--bag", &bag, "--scene", &scene, "--out", &out, "--json"];
+        let output = touchup(&[&refine[..], &["--markers-topic", "/stylus/markers"]].concat());
+        serde_json::from_str(text(&output.stdout)).unwrap()
+    };
+    let (plain, space) = (refined("made/touch.mcap", "markers.yaml"), refined("space.mcap", "space.yaml"));
+    // markers are recorded in single precision, so that 1e-8 m is all that can be asked
+    let ratio = |key: &str| space[key].as_f64().unwrap() / plain[key].as_f64().unwrap();
+    assert!(plain["moved_faces"].as_u64().unwrap() > 1000, "{plain}");
+    for key in ["accepted", "moved_faces", "contacts"] {
+        assert!((ratio(key) - 1.0).abs() < 0.01, "{key}: {plain} {space}");
+    }
 }
 
 /// The real static poses of the room's tests, through the command line.

@@ -37,7 +37,7 @@ impl Scene {
     /// The text of a scene with `settings` in it.
     ///
     /// - `yaml`: the scene as it was; empty for a new one.
-    /// - `remark`: stands behind each key that is set, where nothing else does; one line.
+    /// - `remark`: stands behind the first key that is set, where no comment of the user does; one line.
     /// - `expected`: what the new text must parse to.
     ///
     /// # Errors
@@ -45,8 +45,9 @@ impl Scene {
     pub fn edited(yaml: &str, settings: &[Setting], remark: &str, expected: &Self) -> Result<String, SceneError> {
         let refused = |why: String| SceneError::CannotEdit { why, settings: listed(settings) };
         let mut text = yaml.to_owned();
-        for Setting { path, value } in settings {
-            text = set(&text, path, value, &format!("{MARK} {remark}"))
+        for (i, Setting { path, value }) in settings.iter().enumerate() {
+            let remark = if i == 0 { format!("  {MARK} {remark}") } else { String::new() };
+            text = set(&text, path, value, &remark)
                 .ok_or_else(|| refused(format!("{} is written in an unusual way", path.join("."))))?;
         }
         match Self::from_yaml(&text) {

@@ -85,7 +85,7 @@ impl Target {
     ) -> Result<(), CliError> {
         let Change { settings, remark, expected } = change;
         let start = match draft.text.as_str() {
-            "" => format!("# Made by `touchup calibrate`: {remark}.\n# One section of a scene: put it into yours.\n"),
+            "" => format!("{}\n", new_file(found)),
             text => text.to_owned(),
         };
         let text = Scene::edited(&start, settings, remark, expected)?;
@@ -98,6 +98,12 @@ impl Target {
         }
         Ok(())
     }
+}
+
+/// How the result came about, as comments above it.
+fn new_file(found: &impl std::fmt::Display) -> String {
+    let lines = format!("Made by `touchup calibrate`; one section of a scene: put it into yours.\n\n{found}");
+    lines.lines().map(|line| format!("# {line}").trim_end().to_owned()).collect::<Vec<_>>().join("\n")
 }
 
 /// What a calibration does to the scene.
@@ -154,7 +160,8 @@ impl Vector {
 
 impl std::fmt::Display for Vector {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let pair = |(x, s): (&f64, &f64)| format!("{x:+.4} ± {s:.4}");
+        let digits = f.precision().unwrap_or(4);
+        let pair = |(x, s): (&f64, &f64)| format!("{x:+.digits$} ± {s:.digits$}");
         f.write_str(&self.value.iter().zip(&self.std).map(pair).collect::<Vec<_>>().join(", "))
     }
 }

@@ -183,7 +183,7 @@ impl fmt::Display for PayloadFound {
         writeln!(f, "centre      {} mm, in the axes of the sensor", self.centre_mm)?;
         writeln!(f, "down        ({x:+.4}, {y:+.4}, {z:+.4}), in the axes of the poses")?;
         writeln!(f, "bias        {} N", self.bias_force_n)?;
-        writeln!(f, "            {} N·m", self.bias_torque_nm)?;
+        writeln!(f, "            {:.5} N·m", self.bias_torque_nm)?;
         write!(f, "residuals   {:.4} N, {:.5} N·m rms", self.residual_force_n, self.residual_torque_nm)?;
         self.expected_residual_n.iter().try_for_each(|n| write!(f, "; {n:.4} N by the noise of the sensor"))
     }

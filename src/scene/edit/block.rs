@@ -7,7 +7,7 @@ use super::{MARK, flow};
 /// Spaces that a new level is set in by.
 const STEP: usize = 2;
 
-/// The text with `path` set to `value`; the line of the key gets `remark` where it has no comment of its own.
+/// The text with `path` set to `value`; the line of the key ends with `remark` where it has no comment of its own.
 pub(super) fn set(text: &str, path: &[&str], value: &str, remark: &str) -> Option<String> {
     let lines: Vec<&str> = text.split_inclusive('\n').collect();
     let whole = 0..lines.iter().position(|line| line.trim_end() == "...").unwrap_or(lines.len());
@@ -35,8 +35,9 @@ fn set_in(
     let (inline, comment) = split_comment(&lines[key_line][behind..]);
     if rest.is_empty() {
         let kept: String = body.map(|at| lines[at]).filter(|line| !is_content(line)).collect();
-        let comment = if comment.is_empty() || comment.starts_with(MARK) { remark } else { comment };
-        let line = format!("{} {value}  {comment}\n", &lines[key_line][..behind]);
+        let is_free = comment.is_empty() || comment.starts_with(MARK);
+        let comment = if is_free { remark.to_owned() } else { format!("  {comment}") };
+        let line = format!("{} {value}{comment}\n", &lines[key_line][..behind]);
         let after = body_end(lines, key_line + 1..range.end, indent);
         return Some(lines[..key_line].concat() + &line + &kept + &lines[after..].concat());
     }
@@ -80,7 +81,7 @@ fn new_lines(indent: usize, path: &[&str], value: &str, remark: &str, gap: bool)
     let mut text = if gap { "\n".to_owned() } else { String::new() };
     for (depth, key) in path.iter().enumerate() {
         let is_last = depth + 1 == path.len();
-        let rest = if is_last { format!(" {value}  {remark}") } else { String::new() };
+        let rest = if is_last { format!(" {value}{remark}") } else { String::new() };
         text += &format!("{:width$}{key}:{rest}\n", "", width = indent + STEP * depth);
     }
     text
