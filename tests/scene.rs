@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use nalgebra::vector;
+use proptest::prelude::*;
 use touchup::patch::PatcherParams;
 use touchup::refine::{Along, ContactModel, DynamicsParams, GuardParams, RefineParams, RoiSize, StepRule, TipParams};
 use touchup::scene::{
@@ -420,6 +421,44 @@ fn every_way_of_writing_is_edited_or_refused() {
                 assert!(error.to_string().contains("by hand: scan_to_space.position_mm: [1.5, -2, 3.25]"), "{error}")
             }
         }
+    }
+}
+
+proptest! {
+    /// Sections in any order, in lines or in braces, set in by two or four, with comments and empty lines anywhere.
+    #[test]
+    fn any_plain_scene_is_edited_and_keeps_its_comments(
+        order in Just(vec![0usize, 1, 2, 3]).prop_shuffle(),
+        in_braces in prop::array::uniform4(any::<bool>()),
+        deep in any::<bool>(),
+        remarks in prop::array::uniform8(any::<bool>()),
+    ) {
+        let sections: [(&str, &[&str]); 4] = [
+            ("tip", &["radius_mm: 2", "offset_mm: [1, 2, 3]"]),
+            ("compensation", &["sensor_position_mm: [0, 0, 9]", "payload: { mass_kg: 3 }"]),
+            ("contact", &["on_n: 1"]),
+            ("scan_to_space", &["position_mm: [9, 9, 9]"]),
+        ];
+        let indent = if deep { "    " } else { "  " };
+        let mut yaml = String::new();
+        for &i in &order {
+            let (name, keys) = sections[i];
+            if remarks[i] {
+                yaml += &format!("\n# about {name}\n\n");
+            }
+            if in_braces[i] {
+                yaml += &format!("{name}: {{ {} }} # in braces: {{ {name}\n", keys.join(", "));
+                continue;
+            }
+            yaml += &format!("{name}:{}\n", if remarks[i + 4] { "  # named" } else { "" });
+            for key in keys {
+                yaml += &format!("{indent}# about {key}\n{indent}{key}   # why\n");
+            }
+        }
+        let after = calibrated(&yaml).unwrap();
+        let remarks = |text: &str| text.matches('#').count();
+        prop_assert!(remarks(&after) >= remarks(&yaml), "{yaml}\n{after}");
+        prop_assert_eq!(calibrated(&after).unwrap(), after);
     }
 }
 

@@ -98,8 +98,11 @@ pub enum PayloadError {
     },
     /// Poses that differ too little.
     #[error(
-        "the poses turn by {tilt_deg:.1}° at most about every axis across ({:.2}, {:.2}, {:.2}) of the poses' frame, so the weight \
-         along it is not told from the bias: tilt the stylus by 30° or more across that axis too", axis[0], axis[1], axis[2]
+        "besides turning about ({:.2}, {:.2}, {:.2}) of the poses' frame the stylus was tilted by {tilt_deg:.1}° only, so the \
+         weight along that axis is not told from the bias: tilt it by 30° or more about axes across that one too",
+        axis[0],
+        axis[1],
+        axis[2]
     )]
     TooAlike {
         /// rms to either side, degrees

@@ -57,8 +57,11 @@ pub enum TipError {
     },
     /// The swing is too small, or about one axis.
     #[error(
-        "the stylus swung by {swing_deg:.1}° only across its axis ({:.2}, {:.2}, {:.2}), so the offset along it is not \
-         determined: tilt that axis by {wanted_deg:.0}° or more to all sides", axis[0], axis[1], axis[2]
+        "besides turning about its own axis ({:.2}, {:.2}, {:.2}) the stylus swung by {swing_deg:.1}° only, so the offset of the \
+         ball along that axis is not determined: swing it by {wanted_deg:.0}° or more to either side about axes across that one",
+        axis[0],
+        axis[1],
+        axis[2]
     )]
     TooSmall {
         /// rms to either side, degrees

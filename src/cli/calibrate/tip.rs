@@ -22,8 +22,8 @@ pub(in crate::cli) struct TipArguments {
     target: Target,
 }
 
-/// Poses that are held at most: a quarter of an hour at 1 kHz, 56 MB. Of a longer swing every second one is dropped.
-const MOST_POSES: usize = 1_000_000;
+/// Poses that are held at most: three minutes at 1 kHz. Of a longer swing every second one is dropped.
+const MOST_POSES: usize = 200_000;
 
 /// Every so many-th pose of a swing.
 struct Swing {
