@@ -82,8 +82,8 @@ proptest! {
     }
 }
 
-/// Each component of the error over its stated uncertainty has an rms of 1, over 200 seeds; the uncertainty comes from the
-/// residuals.
+/// Each component of the error over its stated uncertainty has an rms of 1, over 200 seeds; the uncertainty comes from
+/// the residuals.
 #[test]
 fn the_stated_uncertainty_holds() {
     let truth = motion();

@@ -144,8 +144,8 @@ fn poses_that_do_not_tell_are_refused() {
     assert!(matches!(fitted(&leaning), Err(PayloadError::Inconsistent { .. } | PayloadError::NoWeight { .. })));
 }
 
-/// A robot that turns to eight orientations and rests in each for a second: the phases are found, the turning between them
-/// and the settling after it are not in them.
+/// A robot that turns to eight orientations and rests in each for a second: the phases are found, the turning between
+/// them and the settling after it are not in them.
 #[test]
 fn still_phases_of_a_recording_are_found() {
     let mut rng = Pcg64Mcg::seed_from_u64(9);
@@ -184,8 +184,8 @@ fn turn_of(xyzw: &[f64]) -> UnitQuaternion<f64> {
     UnitQuaternion::from_quaternion(Quaternion::new(xyzw[3], xyzw[0], xyzw[1], xyzw[2]))
 }
 
-/// Seven static poses of an ATI Axia80, the wrench in the axes of the poses: the authors found 10.80 N. An independent least
-/// squares (numpy) gives 10.807 N, residuals of 0.147 N rms per axis, and gravity along −z of the robot's base.
+/// Seven static poses of an ATI Axia80, the wrench in the axes of the poses: the authors found 10.80 N. An independent
+/// least squares (numpy) gives 10.807 N, residuals of 0.147 N rms per axis, and gravity along −z of the robot's base.
 #[test]
 fn seven_real_poses_weigh_what_their_authors_found() {
     let (poses, wrenches) = (real("pose_7.txt"), real("wrench_7.txt"));
@@ -213,8 +213,9 @@ fn seven_real_poses_weigh_what_their_authors_found() {
     assert!(matches!(told, PayloadError::WrongAxes { other: "pose", .. }), "{told}");
 }
 
-/// Three minutes of the same set-up, the wrench in the sensor's own axes, settling slowly after each turn. Over all rows an
-/// independent least squares (numpy) gives 11.413 N: 5.7 % more than the authors' result from their other poses.
+/// Three minutes of the same set-up, the wrench in the sensor's own axes, settling slowly after each turn. Over all
+/// rows an independent least squares (numpy) gives 11.413 N: 5.7 % more than the authors' result from their other
+/// poses.
 #[test]
 fn a_real_stream_weighs_the_same_within_its_settling() {
     let rows = real("GP2025.txt");

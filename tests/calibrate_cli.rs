@@ -1,5 +1,5 @@
-//! `touchup calibrate` at the boundary of the process: a recording in another frame, with another tip and a heavy sensor,
-//! gives the mesh that the plain recording gives, once the scene is calibrated.
+//! `touchup calibrate` at the boundary of the process: a recording in another frame, with another tip and a heavy
+//! sensor, gives the mesh that the plain recording gives, once the scene is calibrated.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -287,7 +287,8 @@ fn results_are_told_and_written_and_bad_data_is_3() {
     refused(touchup(&["calibrate", "payload", "--bag", &rest, "--out", &out]), 3, "1 still phases");
 }
 
-/// The stylus goes from point to point and rests on each for 0.8 s, pressing with 2 N along the normal; the poses are of H.
+/// The stylus goes from point to point and rests on each for 0.8 s, pressing with 2 N along the normal; the poses are
+/// of H.
 fn resting_on(points: &[(Point3<f64>, Vector3<f64>)]) -> Vec<Message> {
     let (radius, stiffness) = (1.5e-3, 20e3);
     let mut messages = Vec::new();

@@ -1,16 +1,18 @@
 //! The rigid motion that takes picked points onto the same points picked elsewhere.
 //!
 //! R, t minimise Σ wᵢ |bᵢ − (R aᵢ + t)|²: with the weighted centroids taken off, R = U diag(1, 1, det U Vᵀ) Vᵀ of the
-//! singular value decomposition Σ wᵢ b′ᵢ a′ᵢᵀ = U S Vᵀ [Kabsch 1976, Umeyama 1991]. About the centroid shift and turn are
-//! independent: cov = σ² diag(I / Σ wᵢ, (Σ wᵢ (|qᵢ|² I − qᵢ qᵢᵀ))⁻¹), qᵢ = R a′ᵢ.
+//! singular value decomposition Σ wᵢ b′ᵢ a′ᵢᵀ = U S Vᵀ [Kabsch 1976, Umeyama 1991]. About the centroid shift and turn
+//! are independent: cov = σ² diag(I / Σ wᵢ, (Σ wᵢ (|qᵢ|² I − qᵢ qᵢᵀ))⁻¹), qᵢ = R a′ᵢ.
 //!
 //! People pick wrong points, in wrong units and wrong axes. What is told from the pairs alone: one pair against all the
 //! others (leave one out, with an F test), distances that differ by a known factor, a mirror image that fits better.
 
+mod error;
 mod misfit;
 
 use std::ops::RangeInclusive;
 
+pub use error::{PairsError, Side};
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Rotation3, SVD, UnitQuaternion, Vector3};
 
 /// Farther from the origin than this, a point is a fault, m.
@@ -42,11 +44,11 @@ pub struct PointPair {
 pub struct PairsParams {
     /// Standard deviation of a pair that names none, per axis, m; `None`: found from the residuals.
     pub sigma: Option<f64>,
-    /// Largest rms residual that is believed, m; never more than a tenth of the points' scatter. Default 3 mm: a pick on
-    /// a scan of a consumer camera is good to one or two.
+    /// Largest rms residual that is believed, m; never more than a tenth of the points' scatter. Default 3 mm: a pick
+    /// on a scan of a consumer camera is good to one or two.
     pub largest_rms: f64,
-    /// A pair that is off by less than this is kept, however well the others agree, m. Default 0.2 mm: nobody picks better.
-    /// Where a sigma is known, four times that is taken instead.
+    /// A pair that is off by less than this is kept, however well the others agree, m. Default 0.2 mm: nobody picks
+    /// better. Where a sigma is known, four times that is taken instead.
     pub least_misfit: f64,
 }
 
@@ -65,145 +67,13 @@ pub struct PairsFit {
     pub residuals: Vec<Vector3<f64>>,
     /// √(mean |residual|²), m.
     pub rms: f64,
-    /// Standard deviation of a pair of unit weight, per axis, m: as given, or from the residuals with 3 n − 6 degrees of
-    /// freedom where none is given or they say more than twice as much.
+    /// Standard deviation of a pair of unit weight, per axis, m: as given, or from the residuals with 3 n − 6 degrees
+    /// of freedom where none is given or they say more than twice as much.
     pub sigma: f64,
     /// Middle of the pairs, in the frame of `to`, m.
     pub centroid: Point3<f64>,
     /// Of (shift of the centroid, rotation vector about it), both in the frame of `to`; m², m·rad, rad².
     pub covariance: Matrix6<f64>,
-}
-
-/// Which of the two points of a pair.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
-    /// Before the motion: the scan.
-    From,
-    /// After it: space.
-    To,
-}
-
-impl std::fmt::Display for Side {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::From => "scan",
-            Self::To => "space",
-        })
-    }
-}
-
-/// Why pairs do not tell a motion. Pairs are counted from 1.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum PairsError {
-    /// Fewer than three.
-    #[error("{count} pairs do not determine a motion: pick at least 3, better 6, far apart and not on one line")]
-    TooFew {
-        /// how many there are
-        count: usize,
-    },
-    /// NaN, infinite or absurdly far.
-    #[error("pair {pair}: its {side} point is not finite or farther than 1000 km away; pick it again")]
-    BadPoint {
-        /// which pair
-        pair: usize,
-        /// which of its points
-        side: Side,
-    },
-    /// A standard deviation that is none.
-    #[error("pair {pair}: its sigma is {sigma_mm} mm; it must be more than 0, leave it out where it is not known")]
-    BadSigma {
-        /// which pair
-        pair: usize,
-        /// as given
-        sigma_mm: f64,
-    },
-    /// The same for all pairs.
-    #[error("the sigma of the pairs is {sigma_mm} mm; it must be 1e-9 to 1e6 mm, leave it out where it is not known")]
-    BadGivenSigma {
-        /// as given
-        sigma_mm: f64,
-    },
-    /// Fewer than three different points.
-    #[error(
-        "pairs {first} and {second} have the same {side} point, {distance_mm:.6} mm apart, and fewer than 3 differ: pick points far apart"
-    )]
-    Coincident {
-        /// one pair
-        first: usize,
-        /// the other
-        second: usize,
-        /// where they coincide
-        side: Side,
-        /// between the two
-        distance_mm: f64,
-    },
-    /// All points near one line.
-    #[error(
-        "the {side} points lie on one line: they scatter by {across_mm:.3} mm across it and {along_mm:.1} mm along it, so \
-         the turn about it is not determined; pick one more, far off the line"
-    )]
-    Collinear {
-        /// of which side
-        side: Side,
-        /// rms distance from the middle along the line
-        along_mm: f64,
-        /// rms distance across
-        across_mm: f64,
-    },
-    /// Distances differ by a factor.
-    #[error("distances in space are {factor:.5} times those on the scan{named}: give both in one unit")]
-    Scale {
-        /// space over scan
-        factor: f64,
-        /// what that factor is known for
-        named: &'static str,
-    },
-    /// A left-handed set of axes.
-    #[error(
-        "the pairs fit a mirror image (rms {mirrored_mm:.3} mm) and no motion (rms {rms_mm:.3} mm): the sign of one axis is \
-         wrong, two axes are swapped, or one set of axes is left-handed"
-    )]
-    Mirrored {
-        /// of the best motion
-        rms_mm: f64,
-        /// of the best mirror image
-        mirrored_mm: f64,
-    },
-    /// One pair against all the others.
-    #[error(
-        "pair {pair} does not fit: it is {distance_mm:.3} mm from where the other {others} put it, and they agree within \
-         {rest_mm:.3} mm rms; pick it again or take it out"
-    )]
-    Outlier {
-        /// which
-        pair: usize,
-        /// from where the others put it
-        distance_mm: f64,
-        /// how many others
-        others: usize,
-        /// rms of the others without it
-        rest_mm: f64,
-    },
-    /// No motion fits.
-    #[error(
-        "the pairs disagree by {rms_mm:.3} mm rms, more than {limit_mm:.3} mm; pair {worst} is worst with {worst_mm:.3} mm: \
-         check that each row names one point twice{hint}"
-    )]
-    Disagree {
-        /// √(mean |residual|²)
-        rms_mm: f64,
-        /// what is believed
-        limit_mm: f64,
-        /// pair with the largest residual
-        worst: usize,
-        /// its residual
-        worst_mm: f64,
-        /// what would tell more
-        hint: &'static str,
-    },
-    /// The decomposition did not converge.
-    #[error("the pairs tell no rotation: their coordinates are out of all proportion; check them")]
-    NoRotation,
 }
 
 /// The motion, or why there is none.

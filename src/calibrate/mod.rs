@@ -1,5 +1,5 @@
-//! What the scene must know about the stylus, from recordings made for it: [`fit_payload`] finds weight, centre of mass and
-//! bias from still poses, [`fit_tip`] finds the centre of the ball from a swing about it.
+//! What the scene must know about the stylus, from recordings made for it: [`fit_payload`] finds weight, centre of mass
+//! and bias from still poses, [`fit_tip`] finds the centre of the ball from a swing about it.
 //!
 //! [`RestFinder`] finds points that were picked with the stylus.
 //!

@@ -1,8 +1,8 @@
 //! Weight, centre of mass and bias of what hangs on the sensor, from static poses.
 //!
-//! At rest and in free air the sensor feels f_S = R_WSᵀ w + b_f and τ_S = p_SC × R_WSᵀ w + b_τ with the weight w = m g in the
-//! frame of the poses. The first is linear in w and b_f: the direction of gravity is found, not assumed. With w known the
-//! second is linear in p_SC and b_τ.
+//! At rest and in free air the sensor feels f_S = R_WSᵀ w + b_f and τ_S = p_SC × R_WSᵀ w + b_τ with the weight w = m g
+//! in the frame of the poses. The first is linear in w and b_f: the direction of gravity is found, not assumed. With w
+//! known the second is linear in p_SC and b_τ.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
@@ -161,8 +161,8 @@ pub enum PayloadError {
 const FEWEST_POSES: usize = 4;
 /// sin² of the smallest tilt to either side: 5°. The uncertainty is then ten times that of a wide tilt.
 const SMALLEST_SPREAD: f64 = 0.0076;
-/// The same for the centre of mass, by how much gravity turns in the sensor: 2°. What is known worse for it is told by its
-/// uncertainty, and harms little: the force does not need it.
+/// The same for the centre of mass, by how much gravity turns in the sensor: 2°. What is known worse for it is told by
+/// its uncertainty, and harms little: the force does not need it.
 const SMALLEST_CENTRE_SPREAD: f64 = 0.0012;
 /// The axes of the wrench are believed wrong when the other ones fit so many times better.
 const AXES_RATIO: f64 = 2.0;
@@ -174,8 +174,8 @@ const LARGEST_REJECTED: f64 = 0.4;
 /// Weight, centre of mass and bias.
 ///
 /// # Errors
-/// [`PayloadError`]: too few poses or too alike (which direction is not determined), no weight, wrong axes, too many poses
-/// that do not fit.
+/// [`PayloadError`]: too few poses or too alike (which direction is not determined), no weight, wrong axes, too many
+/// poses that do not fit.
 pub fn fit_payload(poses: &[StaticPose], params: &PayloadParams) -> Result<PayloadFit, PayloadError> {
     if poses.len() < FEWEST_POSES {
         return Err(PayloadError::TooFew { count: poses.len() });

@@ -1,7 +1,7 @@
 //! The still phases of a recording: where neither the stylus turns nor the wrench changes.
 //!
-//! Samples are averaged over blocks of a fifth of a second, which takes the noise out of the rates; blocks between which
-//! pose and wrench change slowly make a phase, and a phase that lasts is one static pose.
+//! Samples are averaged over blocks of a fifth of a second, which takes the noise out of the rates; blocks between
+//! which pose and wrench change slowly make a phase, and a phase that lasts is one static pose.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
@@ -27,10 +27,11 @@ pub struct StillParams {
     pub block_ns: i64,
     /// Shortest phase, ns. Default 0.6 s: three blocks.
     pub least_ns: i64,
-    /// Turning slower than this is rest, rad/s. Default 0.02: a robot's settling, less than a hand's trembling over a block.
+    /// Turning slower than this is rest, rad/s. Default 0.02: a robot's settling, less than a hand's trembling over a
+    /// block.
     pub turning: f64,
-    /// The force changes more slowly than this at rest, N/s. Default 0.3: a sensor with 0.05 N of noise at 200 Hz reaches a
-    /// third of it by chance.
+    /// The force changes more slowly than this at rest, N/s. Default 0.3: a sensor with 0.05 N of noise at 200 Hz
+    /// reaches a third of it by chance.
     pub force_rate: f64,
     /// … and the torque, N·m/s. Default 0.03.
     pub torque_rate: f64,

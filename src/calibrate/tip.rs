@@ -1,7 +1,8 @@
 //! The centre of the ball in the tracked stylus, from a swing about it.
 //!
-//! The ball rests in a cone or a divot while the stylus is swung: p_WH + R_WH d = c for all poses, with the offset d of the
-//! ball and the resting point c. Linear in both; where the stylus turned about one axis alone, d along it is not determined.
+//! The ball rests in a cone or a divot while the stylus is swung: p_WH + R_WH d = c for all poses, with the offset d of
+//! the ball and the resting point c. Linear in both; where the stylus turned about one axis alone, d along it is not
+//! determined.
 
 use nalgebra::{Isometry3, Vector3};
 
@@ -16,8 +17,8 @@ pub type SwingPose = Isometry3<f64>;
 pub struct TipFitParams {
     /// A ball that rests strays by less than this, rms, m. Default 1 mm.
     pub largest_rms: f64,
-    /// Smallest swing to either side across any axis, rms, rad. Default 8°, that is ±12° each way: below it the noise of the
-    /// tracker comes into the offset sevenfold.
+    /// Smallest swing to either side across any axis, rms, rad. Default 8°, that is ±12° each way: below it the noise
+    /// of the tracker comes into the offset sevenfold.
     pub smallest_swing: f64,
 }
 
@@ -133,7 +134,8 @@ fn too_small(least: &Undetermined, params: &TipFitParams) -> TipError {
     }
 }
 
-/// (1 + ρ) / (1 − ρ) with ρ the correlation of neighbouring residuals: a tracker's noise does not come anew with each pose.
+/// (1 + ρ) / (1 − ρ) with ρ the correlation of neighbouring residuals: a tracker's noise does not come anew with each
+/// pose.
 fn correlation(found: &Fit, equations: &[Equation]) -> f64 {
     let residuals: Vec<Vector3<f64>> =
         equations.iter().zip(&found.kept).filter(|(_, kept)| **kept).map(|(e, _)| found.residual(e)).collect();

@@ -1,7 +1,7 @@
 //! Settings put into the text of a scene; comments, order and everything else stay as they were written.
 //!
-//! Only the lines of the keys that are set are touched. Whether that went well is not believed but seen: the new text must
-//! parse to exactly the scene that is expected, or it is refused.
+//! Only the lines of the keys that are set are touched. Whether that went well is not believed but seen: the new text
+//! must parse to exactly the scene that is expected, or it is refused.
 
 mod block;
 mod flow;

@@ -1,8 +1,8 @@
 //! Where the recorded poses belong: from the tracked stylus to the ball, and from space to the scan.
 //!
-//! A tracker gives the pose of its own point H on the stylus, in its own frame W. The centre of the ball is d from H, in the
-//! axes of H, and the scan lies at `pose_wo`: pose_OT = pose_WO⁻¹ · pose_WH · d. A wrench in the stylus' own axes is as it
-//! was; one in the axes of W is turned into those of O.
+//! A tracker gives the pose of its own point H on the stylus, in its own frame W. The centre of the ball is d from H,
+//! in the axes of H, and the scan lies at `pose_wo`: pose_OT = pose_WO⁻¹ · pose_WH · d. A wrench in the stylus' own
+//! axes is as it was; one in the axes of W is turned into those of O.
 
 use nalgebra::{Isometry3, Translation3, Vector3};
 

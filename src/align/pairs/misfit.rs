@@ -110,7 +110,8 @@ fn check_each(pairs: &[PointPair], weights: &[f64], params: &PairsParams, all: &
     worst.map_or(Ok(()), |(_, outlier)| Err(outlier))
 }
 
-/// Chance that a Beta(a, 3/2) variable is below `x`, a ≥ 3: ∫₀ˣ tᵃ⁻¹ √(1 − t) dt over the same to 1, by the midpoint rule.
+/// Chance that a Beta(a, 3/2) variable is below `x`, a ≥ 3: ∫₀ˣ tᵃ⁻¹ √(1 − t) dt over the same to 1, by the midpoint
+/// rule.
 fn beta_below(x: f64, a: f64) -> f64 {
     const STEPS: u32 = 512;
     let x = x.clamp(0.0, 1.0);

@@ -136,7 +136,8 @@ impl Source {
         Recording::open(bag, &topics).map_err(CliError::ReadRecording)
     }
 
-    /// Gives each sample to `each`, its pose in the frame of the recording: of the ball where the scene says where it is.
+    /// Gives each sample to `each`, its pose in the frame of the recording: of the ball where the scene says where it
+    /// is.
     fn replay(&self, recording: Recording, scene: &Scene, each: impl FnMut(&Sample)) -> Result<Replayed, CliError> {
         let markers = marker_filter(scene, self.markers_topic.as_deref())?;
         let placement = scene.placement().map(|placement| Placement { pose_wo: None, ..placement });

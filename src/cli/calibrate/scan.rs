@@ -18,7 +18,8 @@ use crate::touch::Compensator;
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct ScanArguments {
-    /// Pairs of points, CSV: scan_x_mm,scan_y_mm,scan_z_mm,space_x_mm,space_y_mm,space_z_mm, where wanted name, sigma_mm
+    /// Pairs of points, CSV: scan_x_mm,scan_y_mm,scan_z_mm,space_x_mm,space_y_mm,space_z_mm, where wanted name,
+    /// sigma_mm
     #[arg(long, value_name = "CSV")]
     pairs: PathBuf,
     /// A recording in which the stylus rests on each point for a second, in the order of the file, which then needs no

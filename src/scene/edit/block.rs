@@ -61,14 +61,15 @@ fn set_in(
     }
 }
 
-/// Where a new key of the mapping in `range` goes: behind its last line, be that a comment that is set in as its keys are.
+/// Where a new key of the mapping in `range` goes: behind its last line, be that a comment that is set in as its keys
+/// are.
 fn end_of(lines: &[&str], range: Range<usize>, indent: usize) -> usize {
     let is_part = |at: &usize| !lines[*at].trim().is_empty() && indent_of(lines[*at]) >= indent;
     range.clone().rev().find(is_part).map_or(range.start, |at| at + 1)
 }
 
-/// Behind the last line of what stands under a key: deeper ones, and items of a list at its own depth. Comments and empty
-/// lines at the end belong to the next key, unless they are deeper.
+/// Behind the last line of what stands under a key: deeper ones, and items of a list at its own depth. Comments and
+/// empty lines at the end belong to the next key, unless they are deeper.
 fn body_end(lines: &[&str], range: Range<usize>, indent: usize) -> usize {
     let is_item = |line: &str| indent_of(line) == indent && line.trim_start().starts_with('-');
     let is_inside = |line: &str| indent_of(line) > indent || is_item(line);
