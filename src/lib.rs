@@ -14,6 +14,8 @@
 //! | [`refine`] | [`refine::Refiner::push`]: one sample moves the mesh |
 //! | [`live`] | both rates: [`refine`] at every sample, [`patch`] beside it on a thread of its own |
 //! | [`features`] | what a mesh and the touches on it are made of: holes, slots, planes, with their uncertainty |
+//! | [`align`] | where the scan lies: the motion that picked pairs of points tell |
+//! | [`calibrate`] | what hangs on the sensor, and where the ball is |
 //! | [`sim`] | known surfaces, a scanner and a stylus to test against |
 //! | [`io`] | mesh files and recordings; with [`scene`] the only file access |
 //! | [`scene`] | the YAML that names the parts of a scene |
@@ -22,10 +24,11 @@
 //! # Frames
 //!
 //! O object (the mesh) · T stylus tip (origin: centre of the ball; z: along the shaft, from tip to handle) · S force
-//! sensor · W world (z up) · V view (in [`sim`] alone; z: towards the scanner or the hand) · F fitted surface (in
-//! [`features`] alone; z: its axis or normal). `pose_ot` maps T to O, `p_ot` is the tip in O, `force_o` is a force
-//! expressed in O. A wrench is what the object does to the stylus and normals point out of the object, so a stylus that
-//! presses has `force_o · normal > 0`.
+//! sensor · H the stylus as it is tracked (axes of T; the scene says where the ball is in it) · W world or space, in which
+//! it is tracked (the scene says where O is in it; in [`sim`] z is up) · V view (in [`sim`] alone; z: towards the scanner or
+//! the hand) · F fitted surface (in [`features`] alone; z: its axis or normal). `pose_ot` maps T to O, `p_ot` is the tip in
+//! O, `force_o` is a force expressed in O. A wrench is what the object does to the stylus and normals point out of the
+//! object, so a stylus that presses has `force_o · normal > 0`.
 //!
 //! # Units
 //!
@@ -39,6 +42,8 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+pub mod align;
+pub mod calibrate;
 pub mod cli;
 pub mod features;
 pub mod io;

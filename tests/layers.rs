@@ -9,17 +9,19 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("touch", &[]),
     ("mesh", &[]),
     ("patch", &["touch", "mesh"]),
-    ("features", &["touch", "mesh"]),
     ("refine", &["touch", "mesh", "patch"]),
     ("live", &["touch", "mesh", "patch", "refine"]),
     ("sim", &["touch", "mesh"]),
-    ("io", &["touch", "mesh", "features"]),
+    ("features", &["touch", "mesh"]),
+    ("align", &["mesh", "features"]),
+    ("calibrate", &["touch", "align"]),
+    ("io", &["touch", "mesh", "features", "align"]),
     ("scene", &["touch", "mesh", "patch", "refine", "sim", "io"]),
-    ("cli", &["touch", "mesh", "patch", "refine", "live", "features", "sim", "io", "scene"]),
+    ("cli", &["touch", "mesh", "patch", "refine", "live", "features", "sim", "align", "calibrate", "io", "scene"]),
 ];
 
 /// Same input, same bytes out: nothing of the world outside comes in.
-const PURE: &[&str] = &["touch", "mesh", "patch", "features", "refine", "sim"];
+const PURE: &[&str] = &["touch", "mesh", "patch", "features", "refine", "align", "calibrate", "sim"];
 
 /// What a pure room may not name.
 const IMPURE_PATHS: &[&str] = &["std::fs", "std::thread", "std::env", "std::io", "std::net", "std::process"];

@@ -3,10 +3,12 @@
 use std::collections::BTreeSet;
 
 use nalgebra::vector;
+use proptest::prelude::*;
 use touchup::patch::PatcherParams;
 use touchup::refine::{Along, ContactModel, DynamicsParams, GuardParams, RefineParams, RoiSize, StepRule, TipParams};
 use touchup::scene::{
-    BiasSection, BiasTrackingSection, CompensationSection, MarkersSection, Mode, PayloadSection, Scene,
+    BiasSection, BiasTrackingSection, CompensationSection, GravityAxes, MarkersSection, Mode, PayloadSection,
+    ScanToSpaceSection, Scene, SceneError, Setting,
 };
 use touchup::touch::{BiasParams, SyncParams, TipShape, WrenchFrame};
 
@@ -44,6 +46,7 @@ fn every_key_of_the_code_is_in_the_shipped_file_and_documented() {
         "",
         "sync",
         "markers",
+        "scan_to_space",
         "compensation",
         "bias_tracking",
         "contact",
@@ -140,6 +143,7 @@ fn a_header_alone_takes_the_defaults() {
         let mut expected = Scene::default();
         match name.as_str() {
             "markers" => expected.markers = Some(MarkersSection::default()),
+            "scan_to_space" => expected.scan_to_space = Some(ScanToSpaceSection::default()),
             "compensation" => expected.compensation = Some(CompensationSection::default()),
             "bias_tracking" => expected.bias_tracking = Some(BiasTrackingSection::default()),
             _ => {}
@@ -147,7 +151,7 @@ fn a_header_alone_takes_the_defaults() {
         assert_eq!(scene, expected, "{name}");
         sections += 1;
     }
-    assert_eq!(sections, 14);
+    assert_eq!(sections, 15);
     let inner = Scene::from_yaml("compensation:\n  payload:\n  bias:\n").unwrap().compensation.unwrap();
     assert_eq!((inner.payload, inner.bias), (Some(PayloadSection::default()), Some(BiasSection::default())));
 }
@@ -308,4 +312,169 @@ fn bias_tracking_is_built_only_when_named_and_not_in_the_paper() {
     assert_eq!(bias("{ refine: { mode: paper }, bias_tracking: }"), None);
     let text = Scene::from_yaml("bias_tracking: { time_s: 0 }").unwrap_err().to_string();
     assert!(text.contains("bias_tracking.time_s is 0"), "{text}");
+}
+
+// ---- settings put into the text ---------------------------------------------------------------------------------
+
+/// A scene as a user wrote it, with what each calibration sets.
+fn calibrated(yaml: &str) -> Result<String, SceneError> {
+    let mut expected = if yaml.trim().is_empty() { Scene::from_yaml("{}") } else { Scene::from_yaml(yaml) }.unwrap();
+    let section = ScanToSpaceSection { position_mm: [1.5, -2.0, 3.25], orientation_xyzw: [0.0, 0.6, 0.0, 0.8] };
+    expected.scan_to_space = Some(section);
+    expected.tip.get_or_insert_default().offset_mm = Some([0.5, 0.0, -142.0]);
+    let compensation = expected.compensation.get_or_insert_default();
+    let payload = compensation.payload.get_or_insert_default();
+    (payload.mass_kg, payload.gravity_axes) = (0.25, GravityAxes::Space);
+    compensation.bias.get_or_insert_default().force_n = [1.0, 2.0, 3.0];
+    let settings = [
+        Setting::list(&["scan_to_space", "position_mm"], &[1.5, -2.0, 3.25]),
+        Setting::list(&["scan_to_space", "orientation_xyzw"], &[0.0, 0.6, 0.0, 0.8]),
+        Setting::list(&["tip", "offset_mm"], &[0.5, 0.0, -142.0]),
+        Setting::scalar(&["compensation", "payload", "mass_kg"], 0.25),
+        Setting::scalar(&["compensation", "payload", "gravity_axes"], "space"),
+        Setting::list(&["compensation", "bias", "force_n"], &[1.0, 2.0, 3.0]),
+    ];
+    Scene::edited(yaml, &settings, "by a test", &expected)
+}
+
+/// The lines of `before` that are not in `after`, in order.
+fn lost<'a>(before: &'a str, after: &str) -> Vec<&'a str> {
+    let mut rest = after.lines();
+    before
+        .lines()
+        .filter(|line| !rest.clone().any(|other| other == *line) || !rest.any(|other| other == *line))
+        .collect()
+}
+
+#[test]
+fn what_the_user_wrote_survives_a_calibration() {
+    let after = calibrated(DEFAULT_YAML).unwrap();
+    assert_eq!(lost(DEFAULT_YAML, &after), Vec::<&str>::new(), "{after}");
+    assert_eq!(calibrated(&after).unwrap(), after, "done twice is done once");
+    assert_eq!(after.matches("# touchup calibrate by a test").count(), 1);
+
+    let written = "\
+# my cell
+refine:            # all defaults
+tip:
+    # measured on Tuesday
+    radius_mm: 1.0  # ruby
+    offset_mm:
+      # by hand
+      - 1
+      - 2
+      - 3
+    stiffness_n_per_mm: 20
+
+compensation: { payload: { mass_kg: 1, centre_mm: [1, 2, 3] }, # the new sensor
+  sensor_position_mm: [0, 0, 9] }
+# the end
+";
+    let after = calibrated(written).unwrap();
+    let gone = [
+        "    offset_mm:",
+        "      - 1",
+        "      - 2",
+        "      - 3",
+        "compensation: { payload: { mass_kg: 1, centre_mm: [1, 2, 3] }, # the new sensor",
+        "  sensor_position_mm: [0, 0, 9] }",
+    ];
+    assert_eq!(lost(written, &after), gone, "{after}");
+    for kept in ["      # by hand", "# the new sensor", "sensor_position_mm: [0, 0, 9]", "# all defaults"] {
+        assert!(after.contains(kept), "{kept}: {after}");
+    }
+}
+
+/// However a scene is written, the result is right (which `edited` checks itself), or it is refused with what to do.
+#[test]
+fn every_way_of_writing_is_edited_or_refused() {
+    let ways = [
+        "",
+        "# only a comment",
+        "tip:",
+        "tip: ~",
+        "tip: null # none\nscan:",
+        "{}",
+        "{ tip: , contact: { on_n: 3 } }",
+        "{\n  tip: { radius_mm: 2, }, # a ball, of 2: { mm }\n}\n",
+        "---\ntip:\n  radius_mm: 2",
+        "---\ntip:\n  radius_mm: 2\n...\n",
+        "  tip:\n    radius_mm: 2\n  contact: { on_n: 1 }\n",
+        "\"tip\":\n  'offset_mm' : [1, 2, 3] # old\ncontact:\r\n  on_n: 1\r\n",
+        "compensation:\n  bias:\n  payload: {mass_kg: 3}\n  # last\n\n\n\ntip: {offset_mm: [1,\n 2, 3]}",
+        "compensation:\n  bias: {}\n  payload: ~\n",
+        "scan_to_space: {}\ntip:\n  # nothing\n#tail\n",
+    ];
+    for way in ways {
+        let after = calibrated(way).unwrap_or_else(|error| panic!("{way:?}: {error}"));
+        assert_eq!(calibrated(&after).unwrap(), after, "{way:?} twice");
+        let comments = |text: &str| text.lines().filter(|line| line.trim_start().starts_with('#')).count();
+        assert!(comments(&after) >= comments(way), "{way:?}: {after}");
+    }
+    for way in ["tip: &t { radius_mm: 2 }\n", "tip: !!map\n  radius_mm: 2\n", "? tip\n: { radius_mm: 2 }\n"] {
+        if Scene::from_yaml(way).is_err() {
+            continue;
+        }
+        match calibrated(way) {
+            Ok(_) => {}
+            Err(error) => {
+                assert!(error.to_string().contains("by hand: scan_to_space.position_mm: [1.5, -2, 3.25]"), "{error}")
+            }
+        }
+    }
+}
+
+proptest! {
+    /// Sections in any order, in lines or in braces, set in by two or four, with comments and empty lines anywhere.
+    #[test]
+    fn any_plain_scene_is_edited_and_keeps_its_comments(
+        order in Just(vec![0usize, 1, 2, 3]).prop_shuffle(),
+        in_braces in prop::array::uniform4(any::<bool>()),
+        deep in any::<bool>(),
+        remarks in prop::array::uniform8(any::<bool>()),
+    ) {
+        let sections: [(&str, &[&str]); 4] = [
+            ("tip", &["radius_mm: 2", "offset_mm: [1, 2, 3]"]),
+            ("compensation", &["sensor_position_mm: [0, 0, 9]", "payload: { mass_kg: 3 }"]),
+            ("contact", &["on_n: 1"]),
+            ("scan_to_space", &["position_mm: [9, 9, 9]"]),
+        ];
+        let indent = if deep { "    " } else { "  " };
+        let mut yaml = String::new();
+        for &i in &order {
+            let (name, keys) = sections[i];
+            if remarks[i] {
+                yaml += &format!("\n# about {name}\n\n");
+            }
+            if in_braces[i] {
+                yaml += &format!("{name}: {{ {} }} # in braces: {{ {name}\n", keys.join(", "));
+                continue;
+            }
+            yaml += &format!("{name}:{}\n", if remarks[i + 4] { "  # named" } else { "" });
+            for key in keys {
+                yaml += &format!("{indent}# about {key}\n{indent}{key}   # why\n");
+            }
+        }
+        let after = calibrated(&yaml).unwrap();
+        let remarks = |text: &str| text.matches('#').count();
+        prop_assert!(remarks(&after) >= remarks(&yaml), "{yaml}\n{after}");
+        prop_assert_eq!(calibrated(&after).unwrap(), after);
+    }
+}
+
+#[test]
+fn gravity_in_the_axes_of_space_turns_with_the_scan() {
+    let scene = |axes: &str, space: &str| {
+        let yaml = format!("{{ compensation: {{ payload: {{ mass_kg: 1, gravity_axes: {axes} }} }}, {space} }}");
+        Scene::from_yaml(&yaml).unwrap().compensator_params(WrenchFrame::Sensor).payload.unwrap().gravity_o
+    };
+    // the scan is turned by 90° about x of space: its y points up
+    let turned = "scan_to_space: { orientation_xyzw: [0.7071068, 0, 0, 0.7071068] }";
+    assert!((scene("space", turned) - vector![0.0, -9.81, 0.0]).norm() < 1e-6, "{}", scene("space", turned));
+    assert_eq!(scene("object", turned), vector![0.0, 0.0, -9.81]);
+    assert_eq!(scene("space", "tip: "), vector![0.0, 0.0, -9.81]);
+    for bad in ["scan_to_space: { orientation_xyzw: [0, 0, 0, 0.9] }", "tip: { offset_mm: [0, 0, 1e9] }"] {
+        assert!(matches!(Scene::from_yaml(bad), Err(SceneError::OutOfRange { .. })), "{bad}");
+    }
+    assert_eq!(Scene::default().placement(), None);
 }

@@ -3,6 +3,7 @@
 //! Results go to stdout, everything else to stderr. Exit codes, which other tools rely on: 0 done, 1 the result could
 //! not be written, 2 wrong usage, 3 bad input file, 4 done with losses, which are named.
 
+mod calibrate;
 mod demo;
 mod features;
 mod knocks;
@@ -23,10 +24,13 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use crate::align::PairsError;
+use crate::calibrate::{PayloadError, TipError};
 use crate::io::atomic::is_same_file;
 use crate::io::features_file::FeaturesFileError;
 use crate::io::mesh_file::MeshFileError;
 use crate::io::recording::RecordingError;
+use crate::io::table::TableError;
 use crate::io::touches_file::TouchesFileError;
 use crate::live::LiveError;
 use crate::mesh::MeshError;
@@ -53,6 +57,9 @@ linear spring. Out, in the same order: {\"b_m\",\"n\"} with 17 digits, or {\"err
 
 #[derive(Debug, Subcommand)]
 enum Verb {
+    /// Finds what the scene must know: where the scan lies, what hangs on the sensor, where the ball is
+    #[command(subcommand)]
+    Calibrate(calibrate::CalibrateArguments),
     /// Makes a plate, scans it badly, touches it and refines the scan: needs no input
     Demo(demo::DemoArguments),
     /// Refines a scan by a recording of touches
@@ -99,6 +106,17 @@ enum CliError {
     #[error("the scan cannot be refined: {0}")]
     Refine(#[from] RefineError),
     #[error(transparent)]
+    Table(#[from] TableError),
+    #[error("{path}: {error}", path = path.display())]
+    Pairs { path: PathBuf, error: PairsError },
+    #[error("{path}: {error}", path = path.display())]
+    Payload { path: PathBuf, error: PayloadError },
+    #[error("{path}: {error}", path = path.display())]
+    Tip { path: PathBuf, error: TipError },
+    #[error("{path}: the stylus rested {found} times for half a second in contact, and {wanted} points are picked on the scan; \
+             they are matched in order: rest once on each, in the order of the file", path = path.display())]
+    Rests { path: PathBuf, found: usize, wanted: usize },
+    #[error(transparent)]
     Live(#[from] LiveError),
 }
 
@@ -112,6 +130,7 @@ impl CliError {
             // settings come from a scene file: its flags are checked before
             Self::Scene(_) | Self::ReadMesh(_) | Self::ReadRecording(_) | Self::Simulate(_) => 3,
             Self::Touches(_) | Self::Features(_) => 3,
+            Self::Table(_) | Self::Pairs { .. } | Self::Payload { .. } | Self::Tip { .. } | Self::Rests { .. } => 3,
             Self::Mesh(_) | Self::Setting(_) | Self::Refine(_) | Self::Live(_) => 3,
         }
     }
@@ -131,6 +150,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         }
     };
     let ended = match arguments.verb {
+        Verb::Calibrate(arguments) => calibrate::calibrate(&arguments),
         Verb::Demo(arguments) => demo::demo(&arguments),
         Verb::Refine(arguments) => refine::refine(&arguments),
         Verb::Features(arguments) => features::features(&arguments),

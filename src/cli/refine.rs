@@ -15,7 +15,7 @@ use super::latency::{Latencies, Quantiles};
 use super::offsets::{ContactPoints, ScanOffset, WrenchOffset};
 use super::progress::Progress;
 use super::rates::{Ended, LiveSummary, Rates};
-use super::replay::{Recording, Replayed, replay};
+use super::replay::{Recording, Replayed, marker_filter, replay};
 use super::{CliError, Losses, check_kept, tell};
 use crate::io::features_file::write_features;
 use crate::io::mesh_file::{
@@ -27,7 +27,7 @@ use crate::mesh::{FaceId, FaceTree, RepairReport, TriMesh, VertexId};
 use crate::patch::{Patched, Patcher, Support};
 use crate::refine::{RefineCounts, RefineError, RefineParams, Refiner};
 use crate::scene::{Mode, Scene};
-use crate::touch::{ClockEstimator, Compensator, MarkerCounts, MarkerFilter, ProbedPoint, Sample};
+use crate::touch::{ClockEstimator, Compensator, MarkerCounts, ProbedPoint, Sample};
 
 #[derive(Debug, Args)]
 pub(super) struct RefineArguments {
@@ -49,7 +49,8 @@ pub(super) struct RefineArguments {
     /// geometry_msgs/WrenchStamped: what the part does to the stylus
     #[arg(long, value_name = "TOPIC", default_value = "/stylus/wrench")]
     wrench_topic: String,
-    /// geometry_msgs/PoseStamped: centre of the ball in the frame of the scan
+    /// geometry_msgs/PoseStamped: centre of the ball in the frame of the scan, or as tip.offset_mm and scan_to_space in the
+    /// scene say
     #[arg(long, value_name = "TOPIC", default_value = "/stylus/pose")]
     pose_topic: String,
     /// sensor_msgs/PointCloud2: the markers on the stylus, read in place of the pose; the scene says where they sit
@@ -164,8 +165,6 @@ pub(super) struct Refined {
 const NOTHING_MOVES: &str = "the scene names no `refine`, so nothing would move the mesh: add `refine:` to it";
 
 const NO_PATCH: &str = "--live lets the patch follow, and the scene has none: add `patch:` to it";
-
-const NO_MARKERS: &str = "--markers-topic needs a scene that says where the markers sit: add `markers:` to it";
 
 /// The verb: refines and tells.
 pub(super) fn refine(arguments: &RefineArguments) -> Result<Losses, CliError> {
@@ -289,7 +288,7 @@ impl RefineArguments {
         let started = Instant::now();
         let MeshFile { mesh, repair } = read_mesh(&self.scan, self.mesh_unit).map_err(CliError::ReadMesh)?;
         let as_scanned = mesh.clone();
-        let markers = self.marker_filter(&scene)?;
+        let markers = marker_filter(&scene, self.markers_topic.as_deref())?;
         let topics = self.topics();
         let recording = Recording::open(&self.bag, &topics).map_err(CliError::ReadRecording)?;
         let params =
@@ -303,7 +302,7 @@ impl RefineArguments {
         let compensator = Compensator::new(params.compensator)?;
         let mut clock = scene.clock_params().map(ClockEstimator::new).transpose()?;
         let mut contacts = self.registration.then(|| ContactPoints::new(&params)).transpose()?;
-        let mut replayed = replay(recording, scene.sync_params(), markers, |sample| {
+        let mut replayed = replay(recording, scene.placement(), scene.sync_params(), markers, |sample| {
             pushes.push(&mut rates, sample);
             let tip = compensator.compensate(sample);
             if let Some(clock) = &mut clock {
@@ -407,15 +406,6 @@ impl RefineArguments {
     fn topics(&self) -> Topics {
         let (pose, wrench) = (self.pose_topic.clone(), self.wrench_topic.clone());
         Topics { pose, wrench, markers: self.markers_topic.clone() }
-    }
-
-    /// What makes poses of markers, when the recording has those.
-    fn marker_filter(&self, scene: &Scene) -> Result<Option<MarkerFilter>, CliError> {
-        if self.markers_topic.is_none() {
-            return Ok(None);
-        }
-        let filter = scene.marker_filter().map_err(|error| CliError::Usage(error.to_string()))?;
-        filter.map(Some).ok_or_else(|| CliError::Usage(NO_MARKERS.to_owned()))
     }
 
     /// The work is not begun when its result cannot be kept.

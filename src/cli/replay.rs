@@ -6,7 +6,8 @@ use std::path::Path;
 use super::progress::Progress;
 use super::{CliError, Losses};
 use crate::io::recording::{Record, RecordingError, RecordingReader, Topics};
-use crate::touch::{MarkerCounts, MarkerFilter, Message, Sample, SyncParams, Synchroniser, WrenchFrame};
+use crate::scene::Scene;
+use crate::touch::{MarkerCounts, MarkerFilter, Message, Placement, Sample, SyncParams, Synchroniser, WrenchFrame};
 
 /// Reasons that are gaps in the recording itself; every other one is a message lost on the way.
 const NOT_A_LOSS: [&str; 4] = ["gap", "no_pose_before", "no_pose_after", "duplicate"];
@@ -73,24 +74,42 @@ fn find_wrench_frame(path: &Path, topics: &Topics) -> Result<WrenchFrame, Record
     Ok(wrench_frame(&reader))
 }
 
+const NO_MARKERS: &str = "--markers-topic needs a scene that says where the markers sit: add `markers:` to it";
+
+/// What makes poses of markers, when the recording has those on `topic`.
+///
+/// # Errors
+/// [`CliError::Usage`] when the scene does not say where they sit.
+pub fn marker_filter(scene: &Scene, topic: Option<&str>) -> Result<Option<MarkerFilter>, CliError> {
+    if topic.is_none() {
+        return Ok(None);
+    }
+    let filter = scene.marker_filter().map_err(|error| CliError::Usage(error.to_string()))?;
+    filter.map(Some).ok_or_else(|| CliError::Usage(NO_MARKERS.to_owned()))
+}
+
 /// Gives each sample of `recording` to `each`, in order of time.
 ///
+/// - `placement`: brings each message into the frames of the scene.
 /// - `markers`: makes the poses of a recording that holds markers.
 ///
 /// # Errors
 /// [`CliError::ReadRecording`] when the recording is damaged before its first message; later damage is a loss.
 pub fn replay(
     mut recording: Recording,
+    placement: Option<Placement>,
     sync: SyncParams,
     mut markers: Option<MarkerFilter>,
     mut each: impl FnMut(&Sample),
 ) -> Result<Replayed, CliError> {
     let mut sync = Synchroniser::new(sync)?;
+    placement.iter().try_for_each(Placement::check)?;
+    let wrench_frame = recording.wrench_frame;
     let mut replayed = Replayed::default();
     let mut progress = Progress::new("replay", recording.reader.message_count());
     let mut has_begun = false;
     let mut take = |sync: &mut Synchroniser, message| {
-        sync.push(message);
+        sync.push(placement.map_or(message, |placement| placement.place(message, wrench_frame)));
         std::iter::from_fn(|| sync.next_sample()).for_each(|sample| each(&sample));
     };
     while let Some(record) = recording.next() {

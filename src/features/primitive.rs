@@ -233,7 +233,8 @@ pub(super) fn refined(primitive: &Primitive, facets: &Facets, faces: &[u32]) -> 
 fn refined_cylinder(start: &Primitive, facets: &Facets, faces: &[u32]) -> Option<Primitive> {
     let Primitive::Cylinder { mut point, mut axis, mut radius, side } = *start else { return None };
     // the axis turns about the middle of the faces
-    let along: f64 = faces.iter().map(|&f| (facets.triangle(f)[0] - point).dot(&axis)).sum::<f64>() / faces.len() as f64;
+    let along: f64 =
+        faces.iter().map(|&f| (facets.triangle(f)[0] - point).dot(&axis)).sum::<f64>() / faces.len() as f64;
     point += axis * along;
     let step = faces.len().div_ceil(MOST_ROWS);
     for _ in 0..ROUNDS {

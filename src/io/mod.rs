@@ -1,7 +1,10 @@
-//! Mesh files and recordings: the only room, with [`crate::scene`], that touches the disk.
+//! Mesh files, recordings and picked points: the only room, with [`crate::scene`], that touches the disk.
 
 pub mod atomic;
 pub mod features_file;
 pub mod mesh_file;
+pub mod pairs_file;
 pub mod recording;
+pub mod static_poses;
+pub mod table;
 pub mod touches_file;

@@ -39,6 +39,14 @@ pub enum SceneError {
         /// section and key
         needs: &'static str,
     },
+    /// A file that is written in a way that cannot be edited without harm to the rest of it.
+    #[error("the scene cannot be edited ({why}); put this in by hand: {settings}")]
+    CannotEdit {
+        /// what stands in the way
+        why: String,
+        /// keys and values
+        settings: String,
+    },
     /// The error of one file.
     #[error("{path}: {error}", path = path.display())]
     In {

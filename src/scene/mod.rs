@@ -3,6 +3,7 @@
 //! A part that is not named is not built: a scene that names only `refine` is the bare loop. A part that is named
 //! without keys takes its defaults. `config/default.yaml` is [`Scene::default`] written out, with every key explained.
 
+mod edit;
 mod error;
 mod params;
 mod sections;
@@ -11,13 +12,14 @@ use std::path::Path;
 
 use serde::Deserialize;
 
+pub use edit::Setting;
 pub use error::SceneError;
 use error::yaml_error;
 use sections::named;
 pub use sections::{
     AlongName, BiasSection, BiasTrackingSection, CarveSection, ClockSection, CompensationSection, ContactSection,
-    GuardSection, MarkersSection, Mode, ModelName, PatchSection, PayloadSection, RefineSection, ScanSection, ShapeName,
-    SlidingSection, StepName, SyncSection, TipSection, UncertaintySection,
+    GravityAxes, GuardSection, MarkersSection, Mode, ModelName, PatchSection, PayloadSection, RefineSection,
+    ScanSection, ScanToSpaceSection, ShapeName, SlidingSection, StepName, SyncSection, TipSection, UncertaintySection,
 };
 
 /// The parts of a scene. `None`: not built.
@@ -33,6 +35,9 @@ pub struct Scene {
     /// The markers on the stylus, when they and not its pose are recorded.
     #[serde(default, deserialize_with = "named")]
     pub markers: Option<MarkersSection>,
+    /// Where the scan lies in the frame of the recorded poses; without it they are in the frame of the scan.
+    #[serde(default, deserialize_with = "named")]
+    pub scan_to_space: Option<ScanToSpaceSection>,
     /// Takes weight and bias off the wrench.
     #[serde(default, deserialize_with = "named")]
     pub compensation: Option<CompensationSection>,
@@ -75,6 +80,7 @@ impl Default for Scene {
             sync: Some(SyncSection::default()),
             clock: Some(ClockSection::default()),
             markers: None,
+            scan_to_space: None,
             compensation: None,
             bias_tracking: None,
             contact: Some(ContactSection::default()),
@@ -96,9 +102,18 @@ impl Scene {
     /// # Errors
     /// [`SceneError`], with the path.
     pub fn read(path: &Path) -> Result<Self, SceneError> {
+        Self::read_with_text(path).map(|(scene, _)| scene)
+    }
+
+    /// Reads and checks a scene, and keeps its text for [`Self::edited`].
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn read_with_text(path: &Path) -> Result<(Self, String), SceneError> {
         let yaml =
             std::fs::read_to_string(path).map_err(|source| SceneError::Read { path: path.to_owned(), source })?;
-        Self::from_yaml(&yaml).map_err(|error| SceneError::In { path: path.to_owned(), error: Box::new(error) })
+        let in_file = |error| SceneError::In { path: path.to_owned(), error: Box::new(error) };
+        Ok((Self::from_yaml(&yaml).map_err(in_file)?, yaml))
     }
 
     /// Parses and checks a scene.
@@ -127,6 +142,7 @@ impl Scene {
     /// [`SceneError::OutOfRange`], [`SceneError::Incomplete`].
     pub fn check(&self) -> Result<(), SceneError> {
         self.sync.iter().try_for_each(SyncSection::check)?;
+        self.scan_to_space.iter().try_for_each(ScanToSpaceSection::check)?;
         self.compensation.iter().try_for_each(CompensationSection::check)?;
         self.markers.iter().try_for_each(MarkersSection::check)?;
         self.bias_tracking.iter().try_for_each(BiasTrackingSection::check)?;

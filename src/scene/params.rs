@@ -3,8 +3,8 @@
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
 use super::{
-    AlongName, CarveSection, GuardSection, Mode, ModelName, RefineSection, Scene, SlidingSection, StepName, TipSection,
-    UncertaintySection,
+    AlongName, CarveSection, GravityAxes, GuardSection, Mode, ModelName, PayloadSection, RefineSection, Scene,
+    SlidingSection, StepName, TipSection, UncertaintySection,
 };
 use crate::patch::{CalibrationParams, PatcherParams, UncertaintyParams};
 use crate::refine::{
@@ -13,7 +13,7 @@ use crate::refine::{
 };
 use crate::touch::{
     BiasParams, ClockParams, CompensatorParams, ContactGateParams, MarkerBody, MarkerFilter, MarkerParams, Payload,
-    SettingError, SpringParams, SyncParams, TipBody, TipShape, Wrench, WrenchFrame,
+    Placement, SettingError, SpringParams, SyncParams, TipBody, TipShape, Wrench, WrenchFrame,
 };
 
 impl Scene {
@@ -29,6 +29,15 @@ impl Scene {
             wrench_offset_ns: nanoseconds(sync.wrench_offset_ms, 1e6),
             capacity: sync.capacity,
         }
+    }
+
+    /// Where recorded messages belong; `None` when they are as the rooms take them.
+    pub fn placement(&self) -> Option<Placement> {
+        let pose_wo = self.scan_to_space.as_ref().map(|space| {
+            Isometry3::from_parts(metres(space.position_mm).into(), unit_quaternion(space.orientation_xyzw))
+        });
+        let p_ht = self.tip.as_ref().and_then(|tip| tip.offset_mm).map(metres);
+        (pose_wo.is_some() || p_ht.is_some()).then_some(Placement { pose_wo, p_ht })
     }
 
     /// Settings of the estimate of the clock, if there is one.
@@ -60,15 +69,19 @@ impl Scene {
         let Some(compensation) = &self.compensation else {
             return CompensatorParams { wrench_frame, ..CompensatorParams::default() };
         };
-        let [x, y, z, w] = compensation.sensor_orientation_xyzw.unwrap_or([0.0, 0.0, 0.0, 1.0]);
-        let rotation = UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
+        let rotation = unit_quaternion(compensation.sensor_orientation_xyzw.unwrap_or([0.0, 0.0, 0.0, 1.0]));
+        let space = self.scan_to_space.as_ref().map(|space| unit_quaternion(space.orientation_xyzw));
+        let gravity_o = |payload: &PayloadSection| match (payload.gravity_axes, space) {
+            (GravityAxes::Space, Some(r_wo)) => r_wo.inverse() * Vector3::from(payload.gravity_m_per_s2),
+            _ => payload.gravity_m_per_s2.into(),
+        };
         CompensatorParams {
             wrench_frame,
             pose_ts: Isometry3::from_parts(metres(compensation.sensor_position_mm).into(), rotation),
             payload: compensation.payload.as_ref().map(|payload| Payload {
                 mass: payload.mass_kg,
                 p_sc: metres(payload.centre_mm),
-                gravity_o: payload.gravity_m_per_s2.into(),
+                gravity_o: gravity_o(payload),
             }),
             bias_s: compensation
                 .bias
@@ -238,6 +251,10 @@ impl RefineSection {
 /// `value` in units of `unit_ns`; checked before, so that it fits.
 fn nanoseconds(value: f64, unit_ns: f64) -> i64 {
     (value * unit_ns).round() as i64
+}
+
+fn unit_quaternion([x, y, z, w]: [f64; 4]) -> UnitQuaternion<f64> {
+    UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z))
 }
 
 fn metres(mm: [f64; 3]) -> Vector3<f64> {

@@ -1,6 +1,7 @@
 //! From raw pose and wrench messages to samples the refiner can use.
 //!
-//! [`MarkerFilter`] makes the pose of the markers on the stylus, [`Synchroniser`] brings the two streams to one instant,
+//! [`MarkerFilter`] makes the pose of the markers on the stylus, [`Placement`] brings it to the ball and into the frame of
+//! the scan, [`Synchroniser`] brings the two streams to one instant,
 //! [`Compensator`] takes weight and bias off and turns the force into the frame of the object, [`BiasTracker`] follows
 //! what drifts, [`ContactGate`] says whether the stylus touches, [`TipBody`] with which of its points. [`LocalMotion`] and [`Friction`] say how the ball slides
 //! and which way the surface under it faces.
@@ -12,6 +13,7 @@ mod contact;
 mod friction;
 mod local_motion;
 mod markers;
+mod placement;
 mod probed;
 mod stream;
 mod sync;
@@ -26,6 +28,7 @@ pub use local_motion::{LocalMotion, Motion};
 pub use markers::{
     MOST_MARKERS, MarkerBody, MarkerCounts, MarkerFilter, MarkerFrame, MarkerParams, SeenMarker, SpringParams, Tracking,
 };
+pub use placement::Placement;
 pub use probed::ProbedPoint;
 pub use sync::{SyncCounts, SyncParams, Synchroniser};
 pub use tip_shape::{TipBody, TipContact, TipPlace, TipShape};

@@ -10,7 +10,8 @@ use serde::{Deserialize, Deserializer};
 use super::SceneError;
 pub use evidence::{CarveSection, PatchSection, SlidingSection, UncertaintySection};
 pub use stream::{
-    BiasSection, BiasTrackingSection, ClockSection, CompensationSection, MarkersSection, PayloadSection, SyncSection,
+    BiasSection, BiasTrackingSection, ClockSection, CompensationSection, GravityAxes, MarkersSection, PayloadSection,
+    ScanToSpaceSection, SyncSection,
 };
 pub use tip::{ContactSection, ScanSection, ShapeName, TipSection};
 pub use update::{AlongName, GuardSection, Mode, ModelName, RefineSection, StepName};

@@ -130,9 +130,7 @@ impl CompensationSection {
         };
         all("compensation.sensor_position_mm", &self.sensor_position_mm, 1e5, "-100000 to 100000 mm")?;
         if let Some(xyzw) = self.sensor_orientation_xyzw {
-            let norm = xyzw.iter().map(|c| c * c).sum::<f64>().sqrt();
-            let allowed = "a quaternion of length 1 within 0.001 (this is its length)";
-            in_range("compensation.sensor_orientation_xyzw", norm, 0.999, 1.001, allowed)?;
+            is_unit("compensation.sensor_orientation_xyzw", &xyzw)?;
         }
         if let Some(payload) = &self.payload {
             in_range("compensation.payload.mass_kg", payload.mass_kg, 0.0, 1e3, "0 to 1000 kg")?;
@@ -155,13 +153,31 @@ pub struct PayloadSection {
     pub mass_kg: f64,
     /// Centre of mass from the sensor's origin, in the axes of the sensor, mm.
     pub centre_mm: [f64; 3],
-    /// Acceleration of gravity in the axes of the object, m/s².
+    /// Acceleration of gravity in the axes that `gravity_axes` names, m/s².
     pub gravity_m_per_s2: [f64; 3],
+    /// Whose axes those are.
+    pub gravity_axes: GravityAxes,
+}
+
+/// In which axes gravity is named.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum GravityAxes {
+    /// Those of the scan: it must be named anew when the part is laid down otherwise.
+    #[default]
+    Object,
+    /// Those of the recorded poses: `scan_to_space` turns it.
+    Space,
 }
 
 impl Default for PayloadSection {
     fn default() -> Self {
-        Self { mass_kg: 0.0, centre_mm: [0.0; 3], gravity_m_per_s2: [0.0, 0.0, -9.81] }
+        Self {
+            mass_kg: 0.0,
+            centre_mm: [0.0; 3],
+            gravity_m_per_s2: [0.0, 0.0, -9.81],
+            gravity_axes: GravityAxes::Object,
+        }
     }
 }
 
@@ -173,6 +189,38 @@ pub struct BiasSection {
     pub force_n: [f64; 3],
     /// In the axes of the sensor, N·m.
     pub torque_nm: [f64; 3],
+}
+
+/// `scan_to_space`: p_space = R p_scan + t
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ScanToSpaceSection {
+    /// Origin of the scan in the frame of the recorded poses, mm.
+    pub position_mm: [f64; 3],
+    /// Orientation of the scan's axes in that frame, quaternion x, y, z, w.
+    pub orientation_xyzw: [f64; 4],
+}
+
+impl Default for ScanToSpaceSection {
+    /// The recorded poses are in the frame of the scan.
+    fn default() -> Self {
+        Self { position_mm: [0.0; 3], orientation_xyzw: [0.0, 0.0, 0.0, 1.0] }
+    }
+}
+
+impl ScanToSpaceSection {
+    pub(in crate::scene) fn check(&self) -> Result<(), SceneError> {
+        for &x in &self.position_mm {
+            in_range("scan_to_space.position_mm", x, -1e6, 1e6, "-1000000 to 1000000 mm")?;
+        }
+        is_unit("scan_to_space.orientation_xyzw", &self.orientation_xyzw)
+    }
+}
+
+/// Refuses a quaternion that is no rotation.
+fn is_unit(key: &'static str, xyzw: &[f64; 4]) -> Result<(), SceneError> {
+    let norm = xyzw.iter().map(|c| c * c).sum::<f64>().sqrt();
+    in_range(key, norm, 0.999, 1.001, "a quaternion of length 1 within 0.001 (this is its length)")
 }
 
 /// `bias_tracking`

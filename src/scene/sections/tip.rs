@@ -59,6 +59,8 @@ pub struct TipSection {
     pub length_mm: Option<f64>,
     /// Stiffness of stylus and holder at the ball, N/mm; none: rigid.
     pub stiffness_n_per_mm: Option<f64>,
+    /// Centre of the ball from the origin of the recorded pose, in its axes, mm; none: it is that origin.
+    pub offset_mm: Option<[f64; 3]>,
 }
 
 impl Default for TipSection {
@@ -71,6 +73,7 @@ impl Default for TipSection {
             half_angle_deg: None,
             length_mm: None,
             stiffness_n_per_mm: Some(20.0),
+            offset_mm: None,
         }
     }
 }
@@ -95,6 +98,9 @@ impl TipSection {
     pub(in crate::scene) fn check(&self) -> Result<(), SceneError> {
         in_range("tip.radius_mm", self.radius_mm, 0.0, 1e3, "0 to 1000 mm")?;
         self.check_shape()?;
+        for &x in self.offset_mm.iter().flatten() {
+            in_range("tip.offset_mm", x, -1e4, 1e4, "-10000 to 10000 mm")?;
+        }
         let stiffness = self.stiffness_n_per_mm.unwrap_or(1.0);
         in_range("tip.stiffness_n_per_mm", stiffness, 1e-3, 1e9, "0.001 to 1e9 N/mm; leave it out for rigid")
     }

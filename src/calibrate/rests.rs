@@ -1,0 +1,109 @@
+//! Points picked with the stylus itself: where it rests on the part for a moment.
+//!
+//! While it presses and stays where it is, the mean of its ball and of the force make one point: c + F / k − r n, with
+//! the stiffness k of the stylus and n along the force. Friction lets a resting force lean: on a slope of the pressing
+//! hand by φ the point is off by r sin φ along the surface.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::touch::{ContactGate, ContactGateParams, SettingError, Tip};
+
+/// Settings of a [`RestFinder`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RestParams {
+    /// A rest lasts at least so long, ns. Default 0.5 s: longer than a turning point of a stroke.
+    pub dwell_ns: i64,
+    /// … and the ball stays within this of where it began, m. Default 0.5 mm: a hand trembles by a tenth of that.
+    pub wander: f64,
+    /// Tells contact.
+    pub gate: ContactGateParams,
+    /// Of the ball, m.
+    pub radius: f64,
+    /// Of stylus and holder at the ball, N/m; `None`: rigid.
+    pub stiffness: Option<f64>,
+}
+
+impl Default for RestParams {
+    /// A rigid point.
+    fn default() -> Self {
+        let gate = ContactGateParams::default();
+        Self { dwell_ns: 500_000_000, wander: 0.5e-3, gate, radius: 0.0, stiffness: None }
+    }
+}
+
+/// A point picked by resting on it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rest {
+    /// The point on the part, in the frame of the poses, m.
+    pub point: Point3<f64>,
+    /// When it began, ns.
+    pub begin_ns: i64,
+    /// How long it lasted, s.
+    pub seconds: f64,
+    /// Mean force, in the frame of the poses, N.
+    pub force: Vector3<f64>,
+}
+
+/// A stretch in one place.
+#[derive(Clone, Copy, Debug)]
+struct Stretch {
+    anchor: Vector3<f64>,
+    begin_ns: i64,
+    end_ns: i64,
+    centre: Vector3<f64>,
+    force: Vector3<f64>,
+    count: f64,
+}
+
+/// Finds rests in samples in order of time.
+#[derive(Debug)]
+pub struct RestFinder {
+    params: RestParams,
+    gate: ContactGate,
+    stretch: Option<Stretch>,
+    found: Vec<Rest>,
+}
+
+impl RestFinder {
+    /// Nothing seen yet.
+    ///
+    /// # Errors
+    /// [`SettingError`] of the gate.
+    pub fn new(params: RestParams) -> Result<Self, SettingError> {
+        Ok(Self { params, gate: ContactGate::new(params.gate)?, stretch: None, found: Vec::new() })
+    }
+
+    /// Takes what is felt at one instant; O stands for the frame of the poses.
+    pub fn push(&mut self, tip: &Tip) {
+        if self.gate.update(tip.stamp_ns, &tip.force_o).is_none() {
+            return self.close();
+        }
+        let centre = tip.pose_ot.translation.vector + tip.force_o / self.params.stiffness.unwrap_or(f64::INFINITY);
+        if self.stretch.is_some_and(|stretch| (centre - stretch.anchor).norm() > self.params.wander) {
+            self.close();
+        }
+        let (begin_ns, zero) = (tip.stamp_ns, Vector3::zeros());
+        let new = Stretch { anchor: centre, begin_ns, end_ns: begin_ns, centre: zero, force: zero, count: 0.0 };
+        let stretch = self.stretch.get_or_insert(new);
+        stretch.end_ns = tip.stamp_ns;
+        stretch.centre += centre;
+        stretch.force += tip.force_o;
+        stretch.count += 1.0;
+    }
+
+    /// The rests, in order of time.
+    pub fn finish(mut self) -> Vec<Rest> {
+        self.close();
+        self.found
+    }
+
+    fn close(&mut self) {
+        let Some(Stretch { begin_ns, end_ns, centre, force, count, .. }) = self.stretch.take() else { return };
+        let lasted_ns = end_ns.saturating_sub(begin_ns);
+        let (centre, force) = (centre / count, force / count);
+        if let (true, Some(normal)) = (lasted_ns >= self.params.dwell_ns, force.try_normalize(0.0)) {
+            let point = Point3::from(centre - normal * self.params.radius);
+            self.found.push(Rest { point, begin_ns, seconds: lasted_ns as f64 * 1e-9, force });
+        }
+    }
+}

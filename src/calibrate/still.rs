@@ -1,0 +1,207 @@
+//! The still phases of a recording: where neither the stylus turns nor the wrench changes.
+//!
+//! Samples are averaged over blocks of a fifth of a second, which takes the noise out of the rates; blocks between
+//! which pose and wrench change slowly make a phase, and a phase that lasts is one static pose.
+
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+
+use crate::touch::{Sample, Wrench};
+
+/// A stylus at rest: means over a time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StaticPose {
+    /// Orientation of T (or H, which has its axes) in the frame of the poses.
+    pub r_wt: UnitQuaternion<f64>,
+    /// As measured, N and N·m.
+    pub wrench: Wrench,
+    /// Standard deviation of one reading of the force, per axis, N; `None` when it is not known.
+    pub noise: Option<f64>,
+    /// Readings in the means.
+    pub samples: usize,
+}
+
+/// Settings of a [`StillFinder`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StillParams {
+    /// Length of a block, ns. Default 0.2 s.
+    pub block_ns: i64,
+    /// Shortest phase, ns. Default 0.6 s: three blocks.
+    pub least_ns: i64,
+    /// Turning slower than this is rest, rad/s. Default 0.02: a robot's settling, less than a hand's trembling over a
+    /// block.
+    pub turning: f64,
+    /// The force changes more slowly than this at rest, N/s. Default 0.3: a sensor with 0.05 N of noise at 200 Hz
+    /// reaches a third of it by chance.
+    pub force_rate: f64,
+    /// … and the torque, N·m/s. Default 0.03.
+    pub torque_rate: f64,
+    /// A phase ends when the stylus has turned so far since its beginning, rad. Default 0.03.
+    pub largest_turn: f64,
+}
+
+impl Default for StillParams {
+    fn default() -> Self {
+        Self {
+            block_ns: 200_000_000,
+            least_ns: 600_000_000,
+            turning: 0.02,
+            force_rate: 0.3,
+            torque_rate: 0.03,
+            largest_turn: 0.03,
+        }
+    }
+}
+
+/// A block, or blocks that belong together.
+#[derive(Clone, Copy, Debug)]
+struct Block {
+    begin_ns: i64,
+    end_ns: i64,
+    count: usize,
+    /// Σ q, each turned to the half of the first
+    orientation: Quaternion<f64>,
+    force: Vector3<f64>,
+    torque: Vector3<f64>,
+    /// Σ |fᵢ − fᵢ₋₁|² within blocks, and how many
+    squares: f64,
+    differences: usize,
+    last_force: Vector3<f64>,
+}
+
+impl Block {
+    fn of(sample: &Sample) -> Self {
+        let Sample { stamp_ns, pose_ot, wrench } = sample;
+        let orientation = *pose_ot.rotation.quaternion();
+        Self {
+            begin_ns: *stamp_ns,
+            end_ns: *stamp_ns,
+            count: 1,
+            orientation,
+            force: wrench.force,
+            torque: wrench.torque,
+            squares: 0.0,
+            differences: 0,
+            last_force: wrench.force,
+        }
+    }
+
+    fn add(&mut self, sample: &Sample) {
+        let mut other = Self::of(sample);
+        other.squares = (sample.wrench.force - self.last_force).norm_squared();
+        other.differences = 1;
+        self.join(&other);
+    }
+
+    fn join(&mut self, other: &Self) {
+        let half = if self.orientation.dot(&other.orientation) < 0.0 { -1.0 } else { 1.0 };
+        self.orientation += other.orientation * half;
+        self.end_ns = other.end_ns;
+        self.count += other.count;
+        self.force += other.force;
+        self.torque += other.torque;
+        self.squares += other.squares;
+        self.differences += other.differences;
+        self.last_force = other.last_force;
+    }
+
+    fn rotation(&self) -> UnitQuaternion<f64> {
+        UnitQuaternion::from_quaternion(self.orientation)
+    }
+
+    fn static_pose(&self) -> StaticPose {
+        let n = self.count as f64;
+        // a difference of two readings has twice the variance of one, on three axes
+        let noise = (self.differences > 0).then(|| (self.squares / (6 * self.differences) as f64).sqrt());
+        let wrench = Wrench { force: self.force / n, torque: self.torque / n };
+        StaticPose { r_wt: self.rotation(), wrench, noise, samples: self.count }
+    }
+}
+
+/// Finds the still phases of samples in order of time.
+///
+/// # Example
+/// ```
+/// # use touchup::calibrate::{StillFinder, StillParams};
+/// # use touchup::touch::{Sample, Wrench};
+/// # use nalgebra::Isometry3;
+/// let mut finder = StillFinder::new(StillParams::default());
+/// for ms in 0..1000 {
+///     finder.push(&Sample { stamp_ns: ms * 1_000_000, pose_ot: Isometry3::identity(), wrench: Wrench::default() });
+/// }
+/// assert_eq!(finder.finish().len(), 1);
+/// ```
+#[derive(Debug)]
+pub struct StillFinder {
+    params: StillParams,
+    block: Option<Block>,
+    /// the last whole block
+    last: Option<Block>,
+    /// blocks of the phase so far, and its first
+    phase: Option<(Block, Block)>,
+    found: Vec<StaticPose>,
+}
+
+impl StillFinder {
+    /// Nothing seen yet.
+    pub fn new(params: StillParams) -> Self {
+        Self { params, block: None, last: None, phase: None, found: Vec::new() }
+    }
+
+    /// Takes one sample; those that cannot be a measurement, or are not after the one before, are left out.
+    pub fn push(&mut self, sample: &Sample) {
+        if sample.check().is_err() || self.block.is_some_and(|block| sample.stamp_ns <= block.end_ns) {
+            return;
+        }
+        match &mut self.block {
+            Some(block) if sample.stamp_ns.saturating_sub(block.begin_ns) < self.params.block_ns => block.add(sample),
+            block => {
+                let whole = block.replace(Block::of(sample));
+                whole.into_iter().for_each(|whole| self.take(whole));
+            }
+        }
+    }
+
+    /// The phases, in order of time.
+    pub fn finish(mut self) -> Vec<StaticPose> {
+        self.block.take().into_iter().for_each(|block| self.take(block));
+        self.close();
+        self.found
+    }
+
+    fn take(&mut self, block: Block) {
+        let is_still = self.last.is_some_and(|last| self.is_still(&last, &block));
+        match &mut self.phase {
+            Some((phase, first)) if is_still && is_near(first, &block, self.params.largest_turn) => phase.join(&block),
+            _ => {
+                self.close();
+                self.phase = Some((block, block));
+            }
+        }
+        self.last = Some(block);
+    }
+
+    fn close(&mut self) {
+        let Some((phase, _)) = self.phase.take() else { return };
+        if phase.end_ns.saturating_sub(phase.begin_ns) >= self.params.least_ns {
+            self.found.push(phase.static_pose());
+        }
+    }
+
+    fn is_still(&self, before: &Block, after: &Block) -> bool {
+        let apart_ns = after.begin_ns.saturating_sub(before.begin_ns).max(1);
+        let seconds = apart_ns as f64 * 1e-9;
+        let change = |of: fn(&Block) -> Vector3<f64>| {
+            (of(after) / after.count as f64 - of(before) / before.count as f64).norm() / seconds
+        };
+        let StillParams { block_ns, turning, force_rate, torque_rate, .. } = self.params;
+        // across a pause nothing is known
+        apart_ns < block_ns.saturating_mul(3)
+            && before.rotation().angle_to(&after.rotation()) < turning * seconds
+            && change(|block| block.force) < force_rate
+            && change(|block| block.torque) < torque_rate
+    }
+}
+
+fn is_near(first: &Block, block: &Block, largest_turn: f64) -> bool {
+    first.rotation().angle_to(&block.rotation()) < largest_turn
+}

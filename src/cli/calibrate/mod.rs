@@ -1,0 +1,175 @@
+//! `touchup calibrate`: what the scene must know of scan, sensor and tip, found and written into it.
+
+mod payload;
+mod scan;
+mod tip;
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, Subcommand};
+use serde::Serialize;
+
+use super::replay::{Recording, Replayed, marker_filter, replay};
+use super::{CliError, Losses, check_kept, tell};
+use crate::calibrate::Known;
+use crate::io::atomic::write_atomically;
+use crate::io::recording::Topics;
+use crate::scene::{Scene, Setting};
+use crate::touch::{Placement, Sample};
+
+#[derive(Debug, Subcommand)]
+pub(super) enum CalibrateArguments {
+    /// Where the scan lies in the frame of the recorded poses, from points picked on both
+    Scan(scan::ScanArguments),
+    /// Weight, centre of mass and bias of the sensor, from still poses in free air
+    Payload(payload::PayloadArguments),
+    /// The centre of the ball in the tracked stylus, from a swing about it
+    Tip(tip::TipArguments),
+}
+
+/// The verb.
+pub(super) fn calibrate(arguments: &CalibrateArguments) -> Result<Losses, CliError> {
+    match arguments {
+        CalibrateArguments::Scan(arguments) => scan::scan(arguments),
+        CalibrateArguments::Payload(arguments) => payload::payload(arguments),
+        CalibrateArguments::Tip(arguments) => tip::tip(arguments),
+    }
+}
+
+/// What is written, and how it is told.
+#[derive(Debug, Args)]
+struct Target {
+    /// The scene to put the result into: all else in it stays as it was written. Left out: a new file
+    #[arg(long, value_name = "YAML")]
+    scene: Option<PathBuf>,
+    /// Where the scene goes; may be the one that --scene names
+    #[arg(long, value_name = "YAML")]
+    out: PathBuf,
+    /// Prints the result as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// A scene with its text.
+struct Draft {
+    text: String,
+    /// what the text says
+    scene: Scene,
+}
+
+impl Draft {
+    /// The settings by which a recording is read: those of the scene, or the default ones where there is none.
+    fn reading(&self) -> Scene {
+        if self.text.is_empty() { Scene::default() } else { self.scene.clone() }
+    }
+}
+
+impl Target {
+    /// Refuses to write over `input`, and reads the scene.
+    fn open(&self, flag: &str, input: &Path) -> Result<Draft, CliError> {
+        check_kept(flag, input, &self.out)?;
+        let Some(path) = &self.scene else {
+            return Ok(Draft { text: String::new(), scene: Scene::from_yaml("{}")? });
+        };
+        let (scene, text) = Scene::read_with_text(path)?;
+        Ok(Draft { text, scene })
+    }
+
+    /// Puts `found` into the scene and tells what it was.
+    fn write<T: Serialize + std::fmt::Display>(
+        &self,
+        draft: &Draft,
+        change: &Change,
+        found: &T,
+    ) -> Result<(), CliError> {
+        let Change { settings, remark, expected } = change;
+        let start = match draft.text.as_str() {
+            "" => format!("{}\n", new_file(found)),
+            text => text.to_owned(),
+        };
+        let text = Scene::edited(&start, settings, remark, expected)?;
+        write_atomically(&self.out, |file| file.write_all(text.as_bytes()))
+            .map_err(|source| CliError::Write { path: self.out.clone(), source })?;
+        if self.json {
+            tell(&serde_json::to_string(found).expect("numbers and names alone cannot fail"));
+        } else {
+            tell(&format!("{found}\nwrote {}", self.out.display()));
+        }
+        Ok(())
+    }
+}
+
+/// How the result came about, as comments above it.
+fn new_file(found: &impl std::fmt::Display) -> String {
+    let lines = format!("Made by `touchup calibrate`; one section of a scene: put it into yours.\n\n{found}");
+    lines.lines().map(|line| format!("# {line}").trim_end().to_owned()).collect::<Vec<_>>().join("\n")
+}
+
+/// What a calibration does to the scene.
+struct Change {
+    settings: Vec<Setting>,
+    /// how it came about, in one line
+    remark: String,
+    /// the scene with it
+    expected: Scene,
+}
+
+/// A recording made for a calibration.
+#[derive(Debug, Args)]
+struct Source {
+    /// geometry_msgs/WrenchStamped
+    #[arg(long, value_name = "TOPIC", default_value = "/stylus/wrench")]
+    wrench_topic: String,
+    /// geometry_msgs/PoseStamped
+    #[arg(long, value_name = "TOPIC", default_value = "/stylus/pose")]
+    pose_topic: String,
+    /// sensor_msgs/PointCloud2: the markers on the stylus, read in place of the pose; the scene says where they sit
+    #[arg(long, value_name = "TOPIC", conflicts_with = "pose_topic")]
+    markers_topic: Option<String>,
+}
+
+impl Source {
+    fn open(&self, bag: &Path) -> Result<Recording, CliError> {
+        let (pose, wrench) = (self.pose_topic.clone(), self.wrench_topic.clone());
+        let topics = Topics { pose, wrench, markers: self.markers_topic.clone() };
+        Recording::open(bag, &topics).map_err(CliError::ReadRecording)
+    }
+
+    /// Gives each sample to `each`, its pose in the frame of the recording: of the ball where the scene says where it
+    /// is.
+    fn replay(&self, recording: Recording, scene: &Scene, each: impl FnMut(&Sample)) -> Result<Replayed, CliError> {
+        let markers = marker_filter(scene, self.markers_topic.as_deref())?;
+        let placement = scene.placement().map(|placement| Placement { pose_wo: None, ..placement });
+        replay(recording, placement, scene.sync_params(), markers, each)
+    }
+}
+
+/// A value of three components as JSON has it, and its standard uncertainty.
+#[derive(Clone, Copy, Debug, Serialize)]
+struct Vector {
+    value: [f64; 3],
+    std: [f64; 3],
+}
+
+impl Vector {
+    /// - `unit`: how many of the unit are one of SI.
+    fn of(known: &Known, unit: f64) -> Self {
+        Self { value: (known.value * unit).into(), std: (known.sigma * unit).into() }
+    }
+}
+
+impl std::fmt::Display for Vector {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let digits = f.precision().unwrap_or(4);
+        let pair = |(x, s): (&f64, &f64)| format!("{x:+.digits$} ± {s:.digits$}");
+        f.write_str(&self.value.iter().zip(&self.std).map(pair).collect::<Vec<_>>().join(", "))
+    }
+}
+
+/// As many digits as a scene needs: 1e-7 mm and 1e-10 of the other units are far below any noise.
+fn rounded(x: f64, digits: i32) -> f64 {
+    let scale = 10f64.powi(digits);
+    // no negative zero in a file for people
+    (x * scale).round() / scale + 0.0
+}

@@ -1,0 +1,190 @@
+//! `touchup calibrate payload`: what hangs on the sensor, from still poses.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use nalgebra::Vector3;
+use serde::Serialize;
+use tracing::warn;
+
+use super::super::{CliError, Losses};
+use super::{Change, Draft, Source, Target, Vector, rounded};
+use crate::calibrate::{PayloadFit, PayloadParams, StaticPose, StillFinder, StillParams, fit_payload};
+use crate::io::static_poses::read_static_poses;
+use crate::scene::{BiasSection, GravityAxes, PayloadSection, Scene, Setting};
+use crate::touch::WrenchFrame;
+
+#[derive(Debug, Args)]
+#[group(id = "poses", required = true, multiple = false, args = ["bag", "samples"])]
+pub(in crate::cli) struct PayloadArguments {
+    /// A recording in which the stylus is held still in free air in several orientations
+    #[arg(long, value_name = "RECORDING")]
+    bag: Option<PathBuf>,
+    /// Static poses, CSV: qx,qy,qz,qw,fx_n,fy_n,fz_n,tx_nm,ty_nm,tz_nm
+    #[arg(long, value_name = "CSV")]
+    samples: Option<PathBuf>,
+    /// In whose axes the wrench is; left out: as the recording says, or the sensor's for --samples
+    #[arg(long, value_name = "AXES")]
+    wrench_axes: Option<Axes>,
+    /// Acceleration of gravity, by which the weight is divided
+    #[arg(long, value_name = "G", default_value = "9.81")]
+    gravity_m_per_s2: f64,
+    #[command(flatten)]
+    source: Source,
+    #[command(flatten)]
+    target: Target,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Axes {
+    /// The sensor's own
+    Sensor,
+    /// Those of the poses
+    Pose,
+}
+
+/// A residual so many times what the noise explains has another cause.
+const UNEXPLAINED: f64 = 5.0;
+
+/// The verb.
+pub(super) fn payload(arguments: &PayloadArguments) -> Result<Losses, CliError> {
+    let gravity = arguments.gravity_m_per_s2;
+    if !(1.0..=100.0).contains(&gravity) {
+        return Err(CliError::Usage(format!("--gravity-m-per-s2 is {gravity}; it must be 1 to 100 m/s²")));
+    }
+    let (flag, path) = match (&arguments.bag, &arguments.samples) {
+        (Some(bag), _) => ("--bag", bag),
+        (None, Some(samples)) => ("--samples", samples),
+        (None, None) => return Err(CliError::Usage("give --bag or --samples".to_owned())),
+    };
+    let draft = arguments.target.open(flag, path)?;
+    let (poses, wrench_frame, losses) = arguments.poses(&draft)?;
+    let mounted = draft.scene.compensator_params(wrench_frame).pose_ts.rotation;
+    let params = PayloadParams { wrench_frame, r_ts: mounted, gravity };
+    let fit = fit_payload(&poses, &params).map_err(|error| CliError::Payload { path: path.clone(), error })?;
+    if let Some(expected) = fit.expected_force.filter(|expected| fit.rms_force > UNEXPLAINED * expected) {
+        warn!(
+            "the residuals of {:.3} N are more than the noise explains ({expected:.3} N): does a cable pull, is the sensor \
+             mounted as compensation.sensor_orientation_xyzw says, had it settled?",
+            fit.rms_force
+        );
+    }
+    let found = PayloadFound::of(&fit);
+    arguments.target.write(&draft, &found.change(&draft), &found)?;
+    Ok(losses)
+}
+
+impl PayloadArguments {
+    fn poses(&self, draft: &Draft) -> Result<(Vec<StaticPose>, WrenchFrame, Losses), CliError> {
+        let told = self.wrench_axes.map(|axes| match axes {
+            Axes::Sensor => WrenchFrame::Sensor,
+            Axes::Pose => WrenchFrame::Object,
+        });
+        if let Some(samples) = &self.samples {
+            let pose = |(r_wt, wrench)| StaticPose { r_wt, wrench, noise: None, samples: 1 };
+            let poses = read_static_poses(samples)?.into_iter().map(pose).collect();
+            return Ok((poses, told.unwrap_or_default(), Losses::new()));
+        }
+        let mut finder = StillFinder::new(StillParams::default());
+        let bag = self.bag.as_deref().unwrap_or_else(|| "".as_ref());
+        let recording = self.source.open(bag)?;
+        let recorded = recording.wrench_frame;
+        let replayed = self.source.replay(recording, &draft.reading(), |sample| finder.push(sample))?;
+        Ok((finder.finish(), told.unwrap_or(recorded), replayed.losses))
+    }
+}
+
+/// What `--json` prints.
+#[derive(Debug, Serialize)]
+struct PayloadFound {
+    still_phases: usize,
+    /// those that did not fit, from 0 on
+    left_out: Vec<usize>,
+    tilt_deg: f64,
+    weight_n: f64,
+    weight_std_n: f64,
+    mass_kg: f64,
+    mass_std_kg: f64,
+    /// in the axes of the sensor
+    centre_mm: Vector,
+    /// in the axes of the recorded poses
+    gravity_m_per_s2: [f64; 3],
+    bias_force_n: Vector,
+    bias_torque_nm: Vector,
+    residual_force_n: f64,
+    residual_torque_nm: f64,
+    /// what the noise of the sensor lets expect
+    expected_residual_n: Option<f64>,
+}
+
+impl PayloadFound {
+    fn of(fit: &PayloadFit) -> Self {
+        let payload = fit.payload();
+        let [weight, sigma] = fit.weight;
+        Self {
+            still_phases: fit.poses,
+            left_out: fit.rejected.clone(),
+            tilt_deg: fit.tilt.to_degrees(),
+            weight_n: weight,
+            weight_std_n: sigma,
+            mass_kg: payload.mass,
+            mass_std_kg: payload.mass * sigma / weight,
+            centre_mm: Vector::of(&fit.p_sc, 1e3),
+            gravity_m_per_s2: payload.gravity_o.into(),
+            bias_force_n: Vector::of(&fit.bias_force, 1.0),
+            bias_torque_nm: Vector::of(&fit.bias_torque, 1.0),
+            residual_force_n: fit.rms_force,
+            residual_torque_nm: fit.rms_torque,
+            expected_residual_n: fit.expected_force,
+        }
+    }
+
+    fn change(&self, draft: &Draft) -> Change {
+        let digits = |values: &[f64; 3], digits| values.map(|x| rounded(x, digits));
+        let payload = PayloadSection {
+            mass_kg: rounded(self.mass_kg, 10),
+            centre_mm: digits(&self.centre_mm.value, 7),
+            gravity_m_per_s2: digits(&self.gravity_m_per_s2, 10),
+            gravity_axes: GravityAxes::Space,
+        };
+        let bias = BiasSection {
+            force_n: digits(&self.bias_force_n.value, 10),
+            torque_nm: digits(&self.bias_torque_nm.value, 10),
+        };
+        let key = |key| ["compensation", "payload", key];
+        let settings = vec![
+            Setting::scalar(&key("mass_kg"), payload.mass_kg),
+            Setting::list(&key("centre_mm"), &payload.centre_mm),
+            Setting::list(&key("gravity_m_per_s2"), &payload.gravity_m_per_s2),
+            Setting::scalar(&key("gravity_axes"), "space"),
+            Setting::list(&["compensation", "bias", "force_n"], &bias.force_n),
+            Setting::list(&["compensation", "bias", "torque_nm"], &bias.torque_nm),
+        ];
+        let mut expected: Scene = draft.scene.clone();
+        let compensation = expected.compensation.get_or_insert_default();
+        (compensation.payload, compensation.bias) = (Some(payload), Some(bias));
+        let remark = format!(
+            "payload: {} still phases, residuals {:.3} N and {:.4} N·m rms",
+            self.still_phases, self.residual_force_n, self.residual_torque_nm
+        );
+        Change { settings, remark, expected }
+    }
+}
+
+impl fmt::Display for PayloadFound {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let down = Vector3::from(self.gravity_m_per_s2);
+        let [x, y, z]: [f64; 3] = (down / down.norm()).into();
+        let (phases, left_out, tilt) = (self.still_phases, self.left_out.len(), self.tilt_deg);
+        writeln!(f, "still phases: {phases}, left out: {left_out}; tilted by {tilt:.0}° or more about every axis")?;
+        writeln!(f, "weight      {:.4} ± {:.4} N", self.weight_n, self.weight_std_n)?;
+        writeln!(f, "mass        {:.5} ± {:.5} kg", self.mass_kg, self.mass_std_kg)?;
+        writeln!(f, "centre      {} mm, in the axes of the sensor", self.centre_mm)?;
+        writeln!(f, "down        ({x:+.4}, {y:+.4}, {z:+.4}), in the axes of the poses")?;
+        writeln!(f, "bias        {} N", self.bias_force_n)?;
+        writeln!(f, "            {:.5} N·m", self.bias_torque_nm)?;
+        write!(f, "residuals   {:.4} N, {:.5} N·m rms", self.residual_force_n, self.residual_torque_nm)?;
+        self.expected_residual_n.iter().try_for_each(|n| write!(f, "; {n:.4} N by the noise of the sensor"))
+    }
+}

@@ -1,0 +1,184 @@
+//! `touchup calibrate scan`: where the scan lies in space, from picked pairs.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use nalgebra::Vector6;
+use serde::Serialize;
+use tracing::warn;
+
+use super::super::{CliError, Losses, check_kept};
+use super::{Change, Draft, Source, Target, rounded};
+use crate::align::{PairsFit, PairsParams, PointPair, fit_pairs};
+use crate::calibrate::{RestFinder, RestParams};
+use crate::io::pairs_file::{PairsFile, read_pairs, read_scan_points};
+use crate::scene::{GravityAxes, ScanToSpaceSection, Scene, Setting};
+use crate::touch::Compensator;
+
+#[derive(Debug, Args)]
+pub(in crate::cli) struct ScanArguments {
+    /// Pairs of points, CSV: scan_x_mm,scan_y_mm,scan_z_mm,space_x_mm,space_y_mm,space_z_mm, where wanted name,
+    /// sigma_mm
+    #[arg(long, value_name = "CSV")]
+    pairs: PathBuf,
+    /// A recording in which the stylus rests on each point for a second, in the order of the file, which then needs no
+    /// columns of space
+    #[arg(long, value_name = "RECORDING")]
+    bag: Option<PathBuf>,
+    /// Standard deviation of a pair per axis, mm; left out: found from the residuals
+    #[arg(long, value_name = "S")]
+    sigma_mm: Option<f64>,
+    #[command(flatten)]
+    source: Source,
+    #[command(flatten)]
+    target: Target,
+}
+
+/// The verb.
+pub(super) fn scan(arguments: &ScanArguments) -> Result<Losses, CliError> {
+    let ScanArguments { pairs: path, bag, sigma_mm, target, .. } = arguments;
+    if let Some(sigma) = sigma_mm.filter(|sigma| !(1e-6..=1e3).contains(sigma)) {
+        return Err(CliError::Usage(format!("--sigma-mm is {sigma}; it must be 1e-6 to 1000 mm")));
+    }
+    let draft = target.open("--pairs", path)?;
+    let (PairsFile { pairs, names }, losses) = match bag {
+        Some(bag) => arguments.touched_pairs(bag, &draft)?,
+        None => (read_pairs(path)?, Losses::new()),
+    };
+    let params = PairsParams { sigma: sigma_mm.map(|sigma| sigma / 1e3), ..PairsParams::default() };
+    let fit = fit_pairs(&pairs, &params).map_err(|error| CliError::Pairs { path: path.clone(), error })?;
+    warn_of_gravity(&draft.scene);
+    let found = ScanFound::of(&pairs, names, &fit);
+    target.write(&draft, &found.change(&draft), &found)?;
+    Ok(losses)
+}
+
+impl ScanArguments {
+    /// The points of the file, each with the place where the stylus rested.
+    fn touched_pairs(&self, bag: &Path, draft: &Draft) -> Result<(PairsFile, Losses), CliError> {
+        check_kept("--bag", bag, &self.target.out)?;
+        let mut file = read_scan_points(&self.pairs)?;
+        // the poses stay in space: that is what is looked for
+        let scene = Scene { scan_to_space: None, ..draft.reading() };
+        let tip = scene.tip_params();
+        let params = RestParams {
+            gate: scene.contact_params().unwrap_or_default(),
+            radius: tip.radius,
+            stiffness: tip.stiffness,
+            ..RestParams::default()
+        };
+        let mut finder = RestFinder::new(params)?;
+        let recording = self.source.open(bag)?;
+        let compensator = Compensator::new(scene.compensator_params(recording.wrench_frame))?;
+        let replayed = self.source.replay(recording, &scene, |sample| finder.push(&compensator.compensate(sample)))?;
+        let rests = finder.finish();
+        if rests.len() != file.pairs.len() {
+            let (found, wanted) = (rests.len(), file.pairs.len());
+            return Err(CliError::Rests { path: bag.to_owned(), found, wanted });
+        }
+        for (pair, rest) in file.pairs.iter_mut().zip(rests) {
+            pair.to = rest.point;
+        }
+        Ok((file, replayed.losses))
+    }
+}
+
+/// A weight whose direction was named in the axes of the scan may not have been meant for the scan as it lies now.
+fn warn_of_gravity(scene: &Scene) {
+    let payload = scene.compensation.as_ref().and_then(|compensation| compensation.payload.as_ref());
+    if payload.is_some_and(|payload| payload.gravity_axes == GravityAxes::Object && payload.mass_kg > 0.0) {
+        warn!(
+            "compensation.payload.gravity_m_per_s2 stays in the axes of the scan: see that it points down there, or calibrate \
+             the payload anew, which names it in those of space"
+        );
+    }
+}
+
+/// What `--json` prints.
+#[derive(Debug, Serialize)]
+struct ScanFound {
+    pairs: Vec<PairFound>,
+    rms_mm: f64,
+    /// of a pair of unit weight, per axis
+    sigma_mm: f64,
+    /// p_space = R p_scan + t
+    scan_to_space: Motion,
+    /// middle of the pairs in space, for which the shift is told
+    centroid_mm: [f64; 3],
+    shift_std_mm: [f64; 3],
+    turn_std_deg: [f64; 3],
+}
+
+#[derive(Debug, Serialize)]
+struct PairFound {
+    name: String,
+    scan_mm: [f64; 3],
+    residual_mm: [f64; 3],
+    distance_mm: f64,
+}
+
+#[derive(Clone, Copy, Debug, Serialize)]
+struct Motion {
+    position_mm: [f64; 3],
+    orientation_xyzw: [f64; 4],
+}
+
+impl ScanFound {
+    fn of(pairs: &[PointPair], names: Vec<String>, fit: &PairsFit) -> Self {
+        let found = names.into_iter().zip(pairs).zip(&fit.residuals).map(|((name, pair), residual)| PairFound {
+            name,
+            scan_mm: (pair.from.coords * 1e3).into(),
+            residual_mm: (residual * 1e3).into(),
+            distance_mm: residual.norm() * 1e3,
+        });
+        let sigma = fit.covariance.diagonal().map(f64::sqrt);
+        let three = |v: &Vector6<f64>, first: usize, unit: f64| [0, 1, 2].map(|axis| v[first + axis] * unit);
+        let [x, y, z] = [0, 1, 2].map(|axis| rounded(fit.motion.translation.vector[axis] * 1e3, 7));
+        let q = fit.motion.rotation.coords.map(|c| rounded(c, 12));
+        Self {
+            pairs: found.collect(),
+            rms_mm: fit.rms * 1e3,
+            sigma_mm: fit.sigma * 1e3,
+            scan_to_space: Motion { position_mm: [x, y, z], orientation_xyzw: q.into() },
+            centroid_mm: (fit.centroid.coords * 1e3).into(),
+            shift_std_mm: three(&sigma, 0, 1e3),
+            turn_std_deg: three(&sigma, 3, 1f64.to_degrees()),
+        }
+    }
+
+    fn change(&self, draft: &Draft) -> Change {
+        let Motion { position_mm, orientation_xyzw } = self.scan_to_space;
+        let section = ScanToSpaceSection { position_mm, orientation_xyzw };
+        Change {
+            settings: vec![
+                Setting::list(&["scan_to_space", "position_mm"], &position_mm),
+                Setting::list(&["scan_to_space", "orientation_xyzw"], &orientation_xyzw),
+            ],
+            remark: format!("scan: {} pairs, residuals {:.3} mm rms", self.pairs.len(), self.rms_mm),
+            expected: Scene { scan_to_space: Some(section), ..draft.scene.clone() },
+        }
+    }
+}
+
+impl fmt::Display for ScanFound {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let width = self.pairs.iter().map(|pair| pair.name.chars().count()).max().unwrap_or(0).max(4);
+        writeln!(f, "{:width$}  {:^29}  {:^26}  {:>6}", "pair", "on the scan, mm", "residual, mm", "|r|")?;
+        for PairFound { name, scan_mm: [x, y, z], residual_mm: [u, v, w], distance_mm } in &self.pairs {
+            writeln!(f, "{name:width$}  {x:9.3} {y:9.3} {z:9.3}  {u:8.3} {v:8.3} {w:8.3}  {distance_mm:6.3}")?;
+        }
+        let [x, y, z] = self.shift_std_mm;
+        let [a, b, c] = self.turn_std_deg;
+        writeln!(f, "rms {:.3} mm; one axis of a pair is good to {:.3} mm", self.rms_mm, self.sigma_mm)?;
+        let ([p, q, r], [i, j, k, w]) = (self.scan_to_space.position_mm, self.scan_to_space.orientation_xyzw);
+        writeln!(
+            f,
+            "scan to space: position ({p:.3}, {q:.3}, {r:.3}) mm, orientation xyzw ({i:.6}, {j:.6}, {k:.6}, {w:.6})"
+        )?;
+        write!(
+            f,
+            "known to ({x:.3}, {y:.3}, {z:.3}) mm in the middle of the pairs, and to ({a:.3}, {b:.3}, {c:.3})° about it"
+        )
+    }
+}

@@ -1,0 +1,116 @@
+//! `touchup calibrate tip`: where the ball is in the tracked stylus, from a swing about it.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use clap::Args;
+use serde::Serialize;
+
+use super::super::{CliError, Losses};
+use super::{Change, Draft, Source, Target, Vector, rounded};
+use crate::calibrate::{SwingPose, TipFit, TipFitParams, fit_tip};
+use crate::scene::{Scene, Setting};
+
+#[derive(Debug, Args)]
+pub(in crate::cli) struct TipArguments {
+    /// A recording in which the ball rests in a cone or divot while the stylus is swung to all sides
+    #[arg(long, value_name = "RECORDING")]
+    bag: PathBuf,
+    #[command(flatten)]
+    source: Source,
+    #[command(flatten)]
+    target: Target,
+}
+
+/// Poses that are held at most: three minutes at 1 kHz. Of a longer swing every second one is dropped.
+const MOST_POSES: usize = 200_000;
+
+/// Every so many-th pose of a swing.
+struct Swing {
+    poses: Vec<SwingPose>,
+    stride: usize,
+    seen: usize,
+}
+
+impl Swing {
+    fn push(&mut self, pose: SwingPose) {
+        if self.seen.is_multiple_of(self.stride) {
+            if self.poses.len() == MOST_POSES {
+                let mut at = 0;
+                self.poses.retain(|_| {
+                    at += 1;
+                    at % 2 == 1
+                });
+                self.stride *= 2;
+            }
+            self.poses.push(pose);
+        }
+        self.seen += 1;
+    }
+}
+
+/// The verb.
+pub(super) fn tip(arguments: &TipArguments) -> Result<Losses, CliError> {
+    let TipArguments { bag, source, target } = arguments;
+    let draft = target.open("--bag", bag)?;
+    let mut swing = Swing { poses: Vec::new(), stride: 1, seen: 0 };
+    let mut scene = draft.reading();
+    // the poses as they are recorded: an older offset does not count
+    scene.tip.iter_mut().for_each(|tip| tip.offset_mm = None);
+    let replayed = source.replay(source.open(bag)?, &scene, |sample| swing.push(sample.pose_ot))?;
+    let fit =
+        fit_tip(&swing.poses, &TipFitParams::default()).map_err(|error| CliError::Tip { path: bag.clone(), error })?;
+    let found = TipFound::of(&fit);
+    target.write(&draft, &found.change(&draft), &found)?;
+    Ok(replayed.losses)
+}
+
+/// What `--json` prints.
+#[derive(Debug, Serialize)]
+struct TipFound {
+    poses: usize,
+    left_out: usize,
+    swing_deg: f64,
+    /// in the axes of the recorded pose
+    offset_mm: Vector,
+    /// where the ball rested, in the frame of the poses
+    rest_mm: Vector,
+    residual_mm: f64,
+    /// poses that tell as much as one if each told something new
+    correlation: f64,
+}
+
+impl TipFound {
+    fn of(fit: &TipFit) -> Self {
+        Self {
+            poses: fit.poses,
+            left_out: fit.rejected,
+            swing_deg: fit.swing.to_degrees(),
+            offset_mm: Vector::of(&fit.offset, 1e3),
+            rest_mm: Vector::of(&fit.rest, 1e3),
+            residual_mm: fit.rms * 1e3,
+            correlation: fit.correlation,
+        }
+    }
+
+    fn change(&self, draft: &Draft) -> Change {
+        let offset_mm = self.offset_mm.value.map(|x| rounded(x, 7));
+        let mut expected: Scene = draft.scene.clone();
+        expected.tip.get_or_insert_default().offset_mm = Some(offset_mm);
+        Change {
+            settings: vec![Setting::list(&["tip", "offset_mm"], &offset_mm)],
+            remark: format!("tip: {} poses, residuals {:.3} mm rms", self.poses, self.residual_mm),
+            expected,
+        }
+    }
+}
+
+impl fmt::Display for TipFound {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { poses, left_out, swing_deg, offset_mm, rest_mm, residual_mm, .. } = self;
+        writeln!(f, "poses: {poses}, left out: {left_out}; swung by {swing_deg:.0}° or more across every axis")?;
+        writeln!(f, "offset      {offset_mm} mm, in the axes of the recorded pose")?;
+        writeln!(f, "rested at   {rest_mm} mm, in the frame of the poses")?;
+        write!(f, "residuals   {residual_mm:.4} mm rms")
+    }
+}

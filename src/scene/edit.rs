@@ -1,0 +1,72 @@
+//! Settings put into the text of a scene; comments, order and everything else stay as they were written.
+//!
+//! Only the lines of the keys that are set are touched. Whether that went well is not believed but seen: the new text
+//! must parse to exactly the scene that is expected, or it is refused.
+
+mod block;
+mod flow;
+
+use super::{Scene, SceneError};
+
+/// One key and its value.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Setting {
+    /// From the section down, e.g. `["compensation", "bias", "force_n"]`.
+    pub path: Vec<&'static str>,
+    /// As YAML on one line: a number, a word, or a list in brackets.
+    pub value: String,
+}
+
+impl Setting {
+    /// A list of numbers in brackets.
+    pub fn list(path: &[&'static str], values: &[f64]) -> Self {
+        let values: Vec<_> = values.iter().map(f64::to_string).collect();
+        Self { path: path.to_vec(), value: format!("[{}]", values.join(", ")) }
+    }
+
+    /// A number or a word.
+    pub fn scalar(path: &[&'static str], value: impl ToString) -> Self {
+        Self { path: path.to_vec(), value: value.to_string() }
+    }
+}
+
+/// What a remark of this program begins with; one that is there already is replaced.
+const MARK: &str = "# touchup calibrate";
+
+impl Scene {
+    /// The text of a scene with `settings` in it.
+    ///
+    /// - `yaml`: the scene as it was; empty for a new one.
+    /// - `remark`: stands behind the first key that is set, where no comment of the user does; one line.
+    /// - `expected`: what the new text must parse to.
+    ///
+    /// # Errors
+    /// [`SceneError::CannotEdit`] when the result would not be the expected scene.
+    pub fn edited(yaml: &str, settings: &[Setting], remark: &str, expected: &Self) -> Result<String, SceneError> {
+        let refused = |why: String| SceneError::CannotEdit { why, settings: listed(settings) };
+        let mut text = yaml.to_owned();
+        for (i, Setting { path, value }) in settings.iter().enumerate() {
+            let remark = if i == 0 { format!("  {MARK} {remark}") } else { String::new() };
+            text = set(&text, path, value, &remark)
+                .ok_or_else(|| refused(format!("{} is written in an unusual way", path.join("."))))?;
+        }
+        match Self::from_yaml(&text) {
+            Ok(scene) if scene == *expected => Ok(text),
+            Ok(_) => Err(refused("another section would change".to_owned())),
+            Err(error) => Err(refused(error.to_string())),
+        }
+    }
+}
+
+fn listed(settings: &[Setting]) -> String {
+    let settings: Vec<_> = settings.iter().map(|s| format!("{}: {}", s.path.join("."), s.value)).collect();
+    settings.join("; ")
+}
+
+/// `None`: written in a way that is not understood.
+fn set(text: &str, path: &[&str], value: &str, remark: &str) -> Option<String> {
+    if let Some(begin) = flow::start(text) {
+        return flow::set(text, begin, path, value);
+    }
+    block::set(text, path, value, remark)
+}

@@ -1,0 +1,92 @@
+//! Where the recorded poses belong: from the tracked stylus to the ball, and from space to the scan.
+//!
+//! A tracker gives the pose of its own point H on the stylus, in its own frame W. The centre of the ball is d from H,
+//! in the axes of H, and the scan lies at `pose_wo`: pose_OT = pose_WO⁻¹ · pose_WH · d. A wrench in the stylus' own
+//! axes is as it was; one in the axes of W is turned into those of O.
+
+use nalgebra::{Isometry3, Translation3, Vector3};
+
+use super::{Message, SettingError, StampedPose, StampedWrench, Wrench, WrenchFrame};
+
+/// Applied to each message as it is read, before all else. The default changes nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Placement {
+    /// Pose of the scan's frame O in the frame W of the recorded poses; `None`: they are in O.
+    pub pose_wo: Option<Isometry3<f64>>,
+    /// Centre of the ball from the origin of the recorded pose, in its axes, m; `None`: it is that origin.
+    pub p_ht: Option<Vector3<f64>>,
+}
+
+impl Placement {
+    /// Refuses what is no number.
+    ///
+    /// # Errors
+    /// [`SettingError`]
+    pub fn check(&self) -> Result<(), SettingError> {
+        let pose = self.pose_wo.iter().flat_map(|pose| pose.translation.vector.iter().chain(&pose.rotation.coords));
+        let offset = self.p_ht.iter().flat_map(|offset| offset.iter());
+        pose.chain(offset).try_for_each(|x| SettingError::check("scan in space or tip offset (m)", *x, true, "finite"))
+    }
+
+    /// `message` in the frames of the scene.
+    ///
+    /// - `wrench_frame`: [`WrenchFrame::Object`] when its wrenches are in the axes of its poses.
+    pub fn place(&self, message: Message, wrench_frame: WrenchFrame) -> Message {
+        match message {
+            Message::Pose(pose) => Message::Pose(self.pose(pose)),
+            Message::Wrench(wrench) if wrench_frame == WrenchFrame::Object => Message::Wrench(self.wrench(wrench)),
+            wrench => wrench,
+        }
+    }
+
+    fn pose(&self, mut pose: StampedPose) -> StampedPose {
+        if let Some(offset) = self.p_ht {
+            pose.pose_ot *= Translation3::from(offset);
+        }
+        if let Some(pose_wo) = &self.pose_wo {
+            pose.pose_ot = pose_wo.inv_mul(&pose.pose_ot);
+        }
+        pose
+    }
+
+    fn wrench(&self, wrench: StampedWrench) -> StampedWrench {
+        let Some(pose_wo) = &self.pose_wo else { return wrench };
+        let turned = |vector: &Vector3<f64>| pose_wo.rotation.inverse_transform_vector(vector);
+        let StampedWrench { stamp_ns, wrench: Wrench { force, torque } } = &wrench;
+        StampedWrench { stamp_ns: *stamp_ns, wrench: Wrench { force: turned(force), torque: turned(torque) } }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{UnitQuaternion, vector};
+
+    use super::*;
+
+    /// Worked by hand: the scan lies 1 m along x of space, turned by 90° about z; the ball hangs 0.1 m below H.
+    #[test]
+    fn a_pose_and_a_wrench_in_space_come_into_the_frame_of_the_scan() {
+        let quarter = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::FRAC_PI_2);
+        let pose_wo = Some(Isometry3::from_parts(Translation3::new(1.0, 0.0, 0.0), quarter));
+        let placement = Placement { pose_wo, p_ht: Some(vector![0.0, 0.0, -0.1]) };
+        let pose_ot = Isometry3::translation(1.0, 0.5, 0.3);
+        let Message::Pose(placed) =
+            placement.place(Message::Pose(StampedPose { stamp_ns: 7, pose_ot }), WrenchFrame::Sensor)
+        else {
+            panic!("a pose stays one");
+        };
+        assert!((placed.pose_ot.translation.vector - vector![0.5, 0.0, 0.2]).norm() < 1e-15 && placed.stamp_ns == 7);
+        assert!((placed.pose_ot.rotation * Vector3::y() - Vector3::x()).norm() < 1e-15);
+        let wrench = Wrench { force: vector![0.0, 2.0, 1.0], torque: vector![0.0, 3.0, 0.0] };
+        let message = Message::Wrench(StampedWrench { stamp_ns: 7, wrench });
+        assert_eq!(placement.place(message, WrenchFrame::Sensor), message);
+        let Message::Wrench(turned) = placement.place(message, WrenchFrame::Object) else {
+            panic!("a wrench stays one");
+        };
+        assert!((turned.wrench.force - vector![2.0, 0.0, 1.0]).norm() < 1e-15);
+        assert!((turned.wrench.torque - vector![3.0, 0.0, 0.0]).norm() < 1e-15);
+        assert_eq!(Placement::default().place(message, WrenchFrame::Object), message);
+        let lost = Placement { p_ht: Some(vector![f64::NAN, 0.0, 0.0]), ..placement };
+        assert!(placement.check().is_ok() && lost.check().is_err());
+    }
+}
