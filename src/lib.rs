@@ -37,7 +37,9 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+pub mod align;
 pub mod cli;
+pub mod compare;
 pub mod io;
 pub mod live;
 pub mod mesh;

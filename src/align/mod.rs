@@ -1,0 +1,1 @@
+//! Where a part lies: the rigid motion that brings one shape onto another.

@@ -1,0 +1,22 @@
+//! How far a mesh is from the part as it is: deviation point to surface and cloud to cloud, normals, and pictures of them.
+//!
+//! All distances are in m. A deviation is positive where the mesh stands proud of the true part and negative where it lies
+//! in its material, whichever of the two the points were taken from.
+
+mod deviation;
+
+pub use deviation::{closest_places, deviations};
+
+/// Why two shapes cannot be compared.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CompareError {
+    /// NaN or infinity.
+    #[error("point {point} has a coordinate that is not finite")]
+    NotFinite {
+        /// which, counted from 0
+        point: usize,
+    },
+    /// Nothing to measure to.
+    #[error("the mesh to compare with has no faces")]
+    NoFaces,
+}
