@@ -2,9 +2,10 @@
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
+use touchup::align::{IcpParams, icp};
 use touchup::compare::deviations;
 use touchup::mesh::{FaceTree, TriMesh};
 
@@ -48,4 +49,17 @@ fn point_to_surface(bencher: Bencher, faces: usize) {
     let largest = deviations(&points, &mesh, &tree).expect("finite").into_iter().fold(0.0, |a: f64, b| a.max(b.abs()));
     assert!(largest > NOISE && largest < 10.0 * NOISE, "{largest}");
     bencher.counter(ItemsCount::new(points.len())).bench(|| deviations(&points, &mesh, &tree));
+}
+
+/// A hundred thousand points, 1 mm and 0.6° off, onto a surface of so many faces.
+#[divan::bench(args = [10_000, 200_000, 2_000_000], sample_count = 10)]
+fn points_to_mesh(bencher: Bencher, faces: usize) {
+    let moved = Isometry3::new(Vector3::new(0.6e-3, -0.5e-3, 0.6e-3), Vector3::new(0.004, -0.005, 0.008));
+    let (mut points, (mesh, tree)) = (points(100_000), truth(faces));
+    points.iter_mut().for_each(|p| *p = moved.inverse() * *p);
+    let register = || icp(&points, &mesh, &tree, &Isometry3::identity(), &IcpParams::default());
+    let found = register().expect("roughly in place");
+    // the scatter over the root of the count, times five
+    assert!((found.source_to_target.translation.vector - moved.translation.vector).norm() < 5e-6, "{found:?}");
+    bencher.counter(ItemsCount::new(points.len())).bench(register);
 }

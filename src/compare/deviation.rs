@@ -6,7 +6,7 @@ use super::CompareError;
 use crate::mesh::{FaceHit, FaceTree, TriMesh, coherent_order, pseudo_normal};
 
 /// Finds the place of `mesh` closest to each of `points` and hands it to `take` with the number of the point: each point
-/// once, in an order in which neighbours follow each other, so that the face of one is a hint for the next.
+/// once, in an order in which neighbours follow each other, so that what one query has read is still at hand for the next.
 ///
 /// - `points`: m, in the frame of `mesh`.
 ///
@@ -19,16 +19,10 @@ pub fn closest_places(
     mut take: impl FnMut(usize, &FaceHit),
 ) -> Result<(), CompareError> {
     check_finite(points)?;
-    let mut hint = None;
     for at in coherent_order(points) {
-        let p = &points[at as usize];
-        let hit = match hint {
-            Some(face) => tree.closest_from(mesh, p, face, f64::INFINITY),
-            None => tree.closest(mesh, p, f64::INFINITY),
-        };
-        let hit = hit.ok_or(CompareError::NoFaces)?;
-        hint = Some(hit.face);
-        take(at as usize, &hit);
+        let at = at as usize;
+        let hit = tree.closest(mesh, &points[at], f64::INFINITY).ok_or(CompareError::NoFaces)?;
+        take(at, &hit);
     }
     Ok(())
 }
