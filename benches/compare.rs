@@ -52,7 +52,7 @@ fn point_to_surface(bencher: Bencher, faces: usize) {
 }
 
 /// A hundred thousand points, 1 mm and 0.6° off, onto a surface of so many faces.
-#[divan::bench(args = [10_000, 200_000, 2_000_000], sample_count = 10)]
+#[divan::bench(args = [200_000, 2_000_000], sample_count = 10)]
 fn points_to_mesh(bencher: Bencher, faces: usize) {
     let moved = Isometry3::new(Vector3::new(0.6e-3, -0.5e-3, 0.6e-3), Vector3::new(0.004, -0.005, 0.008));
     let (mut points, (mesh, tree)) = (points(100_000), truth(faces));

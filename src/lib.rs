@@ -13,6 +13,8 @@
 //! | [`patch`] | the scan meshed anew where it was touched |
 //! | [`refine`] | [`refine::Refiner::push`]: one sample moves the mesh |
 //! | [`live`] | both rates: [`refine`] at every sample, [`patch`] beside it on a thread of its own |
+//! | [`align`] | the rigid motion that brings one shape onto another |
+//! | [`compare`] | how far a mesh is from the true part, in numbers and as a picture |
 //! | [`sim`] | known surfaces, a scanner and a stylus to test against |
 //! | [`io`] | mesh files and recordings; with [`scene`] the only file access |
 //! | [`scene`] | the YAML that names the parts of a scene |

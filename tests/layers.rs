@@ -8,17 +8,19 @@ use std::path::Path;
 const MAY_USE: &[(&str, &[&str])] = &[
     ("touch", &[]),
     ("mesh", &[]),
+    ("align", &["mesh", "features"]),
+    ("compare", &["mesh", "align", "features"]),
     ("patch", &["touch", "mesh"]),
     ("refine", &["touch", "mesh", "patch"]),
     ("live", &["touch", "mesh", "patch", "refine"]),
     ("sim", &["touch", "mesh"]),
     ("io", &["touch", "mesh"]),
     ("scene", &["touch", "mesh", "patch", "refine", "sim", "io"]),
-    ("cli", &["touch", "mesh", "patch", "refine", "live", "sim", "io", "scene"]),
+    ("cli", &["touch", "mesh", "patch", "refine", "live", "sim", "io", "scene", "align", "compare"]),
 ];
 
 /// Same input, same bytes out: nothing of the world outside comes in.
-const PURE: &[&str] = &["touch", "mesh", "patch", "refine", "sim"];
+const PURE: &[&str] = &["touch", "mesh", "align", "compare", "patch", "refine", "sim"];
 
 /// What a pure room may not name.
 const IMPURE_PATHS: &[&str] = &["std::fs", "std::thread", "std::env", "std::io", "std::net", "std::process"];

@@ -122,8 +122,10 @@ const SIGMA_OF_MEDIAN: f64 = 1.4826;
 const SHRINK: f64 = 0.5;
 /// The first width, over the distance within which nine of ten points are.
 const FIRST_WIDTH: f64 = 2.0;
-/// A round that moves less than this ends a level, in scatters: it is what 12 000 points leave open.
-const REST: f64 = 0.02;
+/// A round that moves less than this ends a level, in scatters: partners then stay where they are to the second order.
+const REST: f64 = 0.3;
+/// How often the weights are made anew before the next partners.
+const WEIGHINGS: usize = 4;
 /// Lengths below this are rounding, over the size of the target: 10 nm for 100 mm would still be seen.
 const ROUNDING: f64 = 1e-11;
 
@@ -195,11 +197,20 @@ struct Search<'a> {
     rounding: f64,
     rounds: usize,
     most_rounds: usize,
+    partners: Vec<Partner>,
     /// sizes of the residuals of a round
     sizes: Vec<f64>,
 }
 
-/// What one round found before it moved.
+/// A point with the tangent plane of its closest place.
+struct Partner {
+    /// how the residual changes with shift and turn, turns counted by the lever
+    row: Vector6<f64>,
+    /// before the step, m
+    residual: f64,
+}
+
+/// What one round found, and its step.
 struct Round {
     /// ΣW rows rowsᵀ / ΣW, turns counted by the lever
     information: Matrix6<f64>,
@@ -246,15 +257,27 @@ impl<'a> Search<'a> {
             rounding,
             rounds: 0,
             most_rounds: params.most_rounds,
+            partners: Vec::new(),
             sizes: Vec::new(),
         })
     }
 
     /// Looks for partners of every `stride`-th point and moves once.
     fn round(&mut self, stride: usize) -> Result<Round, IcpError> {
-        let mut round = self.residuals(stride)?;
+        self.find_partners(stride);
+        let mut round = self.weigh(&Vector6::zeros())?;
+        let mut step = solve(&round);
+        // the weights follow the residuals before partners are looked for again, which takes longest
+        for _ in 1..WEIGHINGS {
+            round = self.weigh(&step)?;
+            let next = solve(&round);
+            let change = (next - step).norm();
+            step = next;
+            if change <= self.rest() {
+                break;
+            }
+        }
         self.rounds += 1;
-        let step = solve(&round.information, &round.right);
         let (shift, turn) = (step.fixed_rows::<3>(0).into_owned(), step.fixed_rows::<3>(3) / self.lever);
         round.step = shift.norm() + turn.norm() * self.lever;
         if self.rounds > self.most_rounds || !round.step.is_finite() {
@@ -263,51 +286,67 @@ impl<'a> Search<'a> {
         let centre = (self.pose * self.middle).coords;
         let turn = UnitQuaternion::from_scaled_axis(turn);
         self.pose = Isometry3::from_parts((shift + centre - turn * centre).into(), turn) * self.pose;
-        // the median of those within the width: a wide one lets in what is no partner
-        let middle = self.sizes.len() / 2;
-        self.scatter = SIGMA_OF_MEDIAN * *self.sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
-        let wanted = (WIDTH * self.scatter).max(WIDTH * self.rounding);
-        round.is_narrow = wanted >= self.width * SHRINK;
-        self.width = wanted.clamp(self.width * SHRINK, self.width);
+        self.narrow(&mut round, &step);
         Ok(round)
     }
 
-    fn residuals(&mut self, stride: usize) -> Result<Round, IcpError> {
+    /// The closest places of every `stride`-th point, as far as they are within the width.
+    fn find_partners(&mut self, stride: usize) {
         let centre = self.pose * self.middle;
-        let (mut information, mut right, mut weights) = (Matrix6::zeros(), Vector6::zeros(), 0.0);
-        let (mut inliers, mut square) = (0, 0.0);
-        self.sizes.clear();
+        self.partners.clear();
         for p in self.points.iter().step_by(stride) {
             let x = self.pose * p;
             let Some(hit) = self.tree.closest(self.target, &x, self.width) else { continue };
             let normal = self.target.normal(hit.face);
-            let residual = normal.dot(&(x - hit.point));
             let turn = (x - centre).cross(&normal) / self.lever;
             let row = Vector6::new(normal.x, normal.y, normal.z, turn.x, turn.y, turn.z);
-            let weight = (1.0 - (residual / self.width).powi(2)).max(0.0).powi(2);
+            self.partners.push(Partner { row, residual: normal.dot(&(x - hit.point)) });
+        }
+    }
+
+    /// The normal equations with the weights that the residuals have after `step`.
+    fn weigh(&self, step: &Vector6<f64>) -> Result<Round, IcpError> {
+        let (mut information, mut right, mut weights) = (Matrix6::zeros(), Vector6::zeros(), 0.0);
+        let (mut inliers, mut square) = (0, 0.0);
+        for Partner { row, residual } in &self.partners {
+            let left = residual + row.dot(step);
+            let weight = (1.0 - (left / self.width).powi(2)).max(0.0).powi(2);
             let weighted = row * weight;
             information += weighted * row.transpose();
-            right -= weighted * residual;
+            right -= weighted * *residual;
             weights += weight;
-            inliers += usize::from(weight > 0.0);
-            square += residual * residual;
-            self.sizes.push(residual.abs());
+            if weight > 0.0 {
+                inliers += 1;
+                square += left * left;
+            }
         }
         if inliers < LEAST_POINTS {
             return Err(IcpError::TooFew { found: inliers, needed: LEAST_POINTS, reach: self.width });
         }
-        Ok(Round {
-            information: information / weights,
-            right: right / weights,
-            inliers,
-            square,
-            step: 0.0,
-            is_narrow: false,
-        })
+        let (information, right) = (information / weights, right / weights);
+        Ok(Round { information, right, inliers, square, step: 0.0, is_narrow: false })
+    }
+
+    /// Brings the width of the weights towards the scatter that is left: at once where the pose has come to rest, else in
+    /// steps.
+    fn narrow(&mut self, round: &mut Round, step: &Vector6<f64>) {
+        self.sizes.clear();
+        self.sizes.extend(self.partners.iter().map(|Partner { row, residual }| (residual + row.dot(step)).abs()));
+        let middle = self.sizes.len() / 2;
+        self.scatter = SIGMA_OF_MEDIAN * *self.sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let wanted = WIDTH * self.scatter.max(self.rounding);
+        round.is_narrow = wanted >= self.width * SHRINK;
+        let least = if round.step <= self.rest() { wanted } else { self.width * SHRINK };
+        self.width = wanted.max(least).min(self.width);
+    }
+
+    /// A step that is none, m.
+    fn rest(&self) -> f64 {
+        (REST * self.scatter).max(self.rounding)
     }
 
     fn is_at_rest(&self, round: &Round) -> bool {
-        round.is_narrow && round.step <= (REST * self.scatter).max(self.rounding)
+        round.is_narrow && round.step <= self.rest()
     }
 
     fn unsettled(&self, step: f64) -> IcpError {
@@ -336,12 +375,12 @@ impl<'a> Search<'a> {
 }
 
 /// The smallest step that solves the equations in the directions that are determined.
-fn solve(information: &Matrix6<f64>, right: &Vector6<f64>) -> Vector6<f64> {
-    let eigen = information.symmetric_eigen();
+fn solve(round: &Round) -> Vector6<f64> {
+    let eigen = round.information.symmetric_eigen();
     let along = |i: usize| {
         let v = eigen.eigenvectors.column(i).into_owned();
         let share = eigen.eigenvalues[i];
-        if share < LEAST_SHARE { Vector6::zeros() } else { v * (v.dot(right) / share) }
+        if share < LEAST_SHARE { Vector6::zeros() } else { v * (v.dot(&round.right) / share) }
     };
     (0..6).map(along).sum()
 }

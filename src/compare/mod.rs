@@ -3,9 +3,19 @@
 //! All distances are in m. A deviation is positive where the mesh stands proud of the true part and negative where it lies
 //! in its material, whichever of the two the points were taken from.
 
+mod cloud;
+mod comparison;
 mod deviation;
+mod normals;
+mod sampling;
+mod summary;
 
+pub use cloud::cloud_distances;
+pub use comparison::{CompareParams, Comparison, Region, RegionComparison, Regions, Shape, compare};
 pub use deviation::{closest_places, deviations};
+pub use normals::{Tilt, TiltSummary, angle_between, tilts};
+pub use sampling::{Sample, sample_surface, surface_area};
+pub use summary::{BINS, Histogram, Summary, quantile};
 
 /// Why two shapes cannot be compared.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -19,4 +29,15 @@ pub enum CompareError {
     /// Nothing to measure to.
     #[error("the mesh to compare with has no faces")]
     NoFaces,
+    /// Nothing to measure to.
+    #[error("the cloud to compare with has no points")]
+    NoPoints,
+    /// More than can be counted.
+    #[error("{points} points are more than {most}: take fewer samples")]
+    TooManyPoints {
+        /// how many
+        points: usize,
+        /// at most
+        most: usize,
+    },
 }
