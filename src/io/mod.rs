@@ -2,4 +2,5 @@
 
 pub mod atomic;
 pub mod mesh_file;
+pub mod png;
 pub mod recording;
