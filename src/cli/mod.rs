@@ -3,6 +3,7 @@
 //! Results go to stdout, everything else to stderr. Exit codes, which other tools rely on: 0 done, 1 the result could
 //! not be written, 2 wrong usage, 3 bad input file, 4 done with losses, which are named.
 
+mod compare;
 mod demo;
 mod knocks;
 mod latency;
@@ -22,6 +23,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use crate::align::IcpError;
+use crate::compare::CompareError;
 use crate::io::atomic::is_same_file;
 use crate::io::mesh_file::MeshFileError;
 use crate::io::recording::RecordingError;
@@ -52,6 +55,8 @@ linear spring. Out, in the same order: {\"b_m\",\"n\"} with 17 digits, or {\"err
 enum Verb {
     /// Makes a plate, scans it badly, touches it and refines the scan: needs no input
     Demo(demo::DemoArguments),
+    /// Tells how far a mesh is from the true part, in numbers and as a picture
+    Compare(compare::CompareArguments),
     /// Refines a scan by a recording of touches
     Refine(refine::RefineArguments),
     /// Scans and touches a known part: makes the input of refine
@@ -71,6 +76,9 @@ enum CliError {
     Scene(#[from] SceneError),
     #[error("{0}")]
     ReadMesh(MeshFileError),
+    /// The same of the true part, which has a flag of its own.
+    #[error("{}", .0.to_string().replace("--mesh-unit", "--truth-unit"))]
+    ReadTruth(MeshFileError),
     #[error(transparent)]
     ReadRecording(RecordingError),
     #[error("{0}")]
@@ -91,6 +99,10 @@ enum CliError {
     Refine(#[from] RefineError),
     #[error(transparent)]
     Live(#[from] LiveError),
+    #[error("the mesh cannot be aligned with the truth: {0}")]
+    Align(#[from] IcpError),
+    #[error("the two cannot be compared: {0}")]
+    Compare(#[from] CompareError),
 }
 
 impl CliError {
@@ -100,8 +112,9 @@ impl CliError {
             Self::Usage(_) => 2,
             Self::Simulate(SimError::BadParameter { .. } | SimError::TooFine { .. } | SimError::TooCoarse { .. }) => 2,
             // settings come from a scene file: its flags are checked before
-            Self::Scene(_) | Self::ReadMesh(_) | Self::ReadRecording(_) | Self::Simulate(_) => 3,
+            Self::Scene(_) | Self::ReadMesh(_) | Self::ReadTruth(_) | Self::ReadRecording(_) | Self::Simulate(_) => 3,
             Self::Mesh(_) | Self::Setting(_) | Self::Refine(_) | Self::Live(_) => 3,
+            Self::Align(_) | Self::Compare(_) => 3,
         }
     }
 }
@@ -120,6 +133,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         }
     };
     let ended = match arguments.verb {
+        Verb::Compare(arguments) => compare::compare(&arguments),
         Verb::Demo(arguments) => demo::demo(&arguments),
         Verb::Refine(arguments) => refine::refine(&arguments),
         Verb::Simulate(arguments) => simulate::simulate(&arguments),

@@ -4,16 +4,20 @@
 //! in its material, whichever of the two the points were taken from.
 
 mod cloud;
+mod colour;
 mod comparison;
 mod deviation;
 mod normals;
+mod picture;
 mod sampling;
 mod summary;
 
 pub use cloud::cloud_distances;
+pub use colour::{Rgb, colour_of};
 pub use comparison::{CompareParams, Comparison, Region, RegionComparison, Regions, Shape, compare};
 pub use deviation::{closest_places, deviations};
 pub use normals::{Tilt, TiltSummary, angle_between, tilts};
+pub use picture::{Panel, Picture, PictureParams, draw_picture};
 pub use sampling::{Sample, sample_surface, surface_area};
 pub use summary::{BINS, Histogram, Summary, quantile};
 
