@@ -7,7 +7,7 @@ use super::normals::{Tilt, TiltSummary, tilts};
 use super::sampling::{Sample, nearest_corner, sample_surface, surface_area};
 use super::summary::{Histogram, Summary, quantile};
 use super::{CompareError, closest_places, cloud_distances};
-use crate::mesh::{FaceTree, TriMesh, VertexId};
+use crate::mesh::{FaceId, FaceTree, TriMesh, VertexId};
 
 /// A mesh and the tree over its faces.
 #[derive(Clone, Copy, Debug)]
@@ -60,6 +60,9 @@ impl Default for CompareParams {
 /// Narrowest range chosen, m: nothing that is scanned or felt is known better.
 const SMALLEST_RANGE: f64 = 1e-6;
 
+/// Least distance within which a true place is taken for the one that the mesh shows, m: the noise of a poor scan.
+const LEAST_REACH: f64 = 1e-3;
+
 /// How far one region is from the truth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RegionComparison {
@@ -69,11 +72,12 @@ pub struct RegionComparison {
     pub mesh_to_truth: Option<Summary>,
     /// the same in bins
     pub histogram: Histogram,
-    /// points spread over the true surface, to the mesh: what is missing
+    /// points spread over the true surface, to the mesh: what is missing. A region has those that the mesh shows; all of it
+    /// has also what was never scanned.
     pub truth_to_mesh: Option<Summary>,
     /// the mesh's vertices, to the true surface
     pub vertices_to_truth: Option<Summary>,
-    /// points spread over the mesh, to the nearest of those spread over the truth
+    /// points spread over the mesh, to the nearest of those spread over the truth; without sign, `bias` is the mean
     pub cloud_to_truth: Option<Summary>,
     /// and the other way
     pub truth_to_cloud: Option<Summary>,
@@ -88,22 +92,24 @@ pub struct Comparison {
     pub density: f64,
     /// half the range of the histograms, m
     pub range: f64,
+    /// share of the true surface that the mesh, or the one that has the regions, does not show: never scanned, or missing
+    pub unseen: f64,
     /// all of it, then the regions that there are
     pub regions: Vec<RegionComparison>,
     /// of each vertex slot, m, + outside; 0 where no vertex is
     pub vertex_deviations: Vec<f64>,
 }
 
-/// Deviations, m, with the region of each.
+/// Deviations, m, with the region of each; `None`: in no region.
 struct Sorted {
     values: Vec<f64>,
-    regions: Vec<Region>,
+    regions: Vec<Option<Region>>,
 }
 
 impl Sorted {
     fn within(&self, region: Option<Region>) -> Vec<f64> {
         let both = self.values.iter().zip(&self.regions);
-        both.filter(|(_, at)| region.is_none_or(|region| region == **at)).map(|(value, _)| *value).collect()
+        both.filter(|(_, at)| region.is_none() || region == **at).map(|(value, _)| *value).collect()
     }
 
     fn summary(&self, region: Option<Region>) -> Option<Summary> {
@@ -116,6 +122,7 @@ impl Sorted {
 struct Foot {
     deviation: f64,
     point: Point3<f64>,
+    face: FaceId,
     corner: VertexId,
 }
 
@@ -157,7 +164,9 @@ pub fn compare(
     let is_there = |part: &RegionComparison| part.mesh_to_truth.is_some() || part.truth_to_mesh.is_some();
     let whole = measured.told(None, range);
     let regions = std::iter::once(whole).chain(parts.into_iter().filter(is_there)).collect();
-    Ok(Comparison { density, range, regions, vertex_deviations: measured.vertex_deviations })
+    let unseen = measured.to_mesh.regions.iter().filter(|region| region.is_none()).count() as f64;
+    let unseen = unseen / measured.to_mesh.regions.len().max(1) as f64;
+    Ok(Comparison { density, range, unseen, regions, vertex_deviations: measured.vertex_deviations })
 }
 
 /// - `samples`: of the mesh and of the truth.
@@ -189,7 +198,7 @@ fn measure(
     let to_mesh = Sorted {
         // a true point outside of the mesh is material that the mesh lacks
         values: truth_feet.iter().map(|foot| -foot.deviation).collect(),
-        regions: regions_of(regions, truth_feet.iter().map(|foot| foot.corner), &truth_points)?,
+        regions: regions_of_truth(regions, truth, on_truth, &truth_feet, mesh, reach(&to_truth.values))?,
     };
     let cloud = |points: &[_], cloud: &[_], like: &Sorted| -> Result<Sorted, CompareError> {
         Ok(Sorted { values: cloud_distances(points, cloud)?, regions: like.regions.clone() })
@@ -199,7 +208,7 @@ fn measure(
     let (mut of_slot, mut vertex_deviations) =
         (vec![Region::Untouched; mesh.mesh.vertex_slots()], vec![0.0; mesh.mesh.vertex_slots()]);
     for ((vertex, region), deviation) in there.iter().zip(&vertices.regions).zip(&vertices.values) {
-        of_slot[vertex.0 as usize] = *region;
+        of_slot[vertex.0 as usize] = region.unwrap_or(Region::Untouched);
         vertex_deviations[vertex.0 as usize] = *deviation;
     }
     let tilts = tilts(mesh.mesh, truth.mesh, truth.tree)?;
@@ -226,11 +235,11 @@ impl Measured {
 
 /// The feet of `points` on a shape, in their order.
 fn feet(points: &[Point3<f64>], shape: Shape<'_>) -> Result<Vec<Foot>, CompareError> {
-    let nowhere = Foot { deviation: 0.0, point: Point3::origin(), corner: VertexId(0) };
+    let nowhere = Foot { deviation: 0.0, point: Point3::origin(), face: FaceId(0), corner: VertexId(0) };
     let mut feet = vec![nowhere; points.len()];
     closest_places(points, shape.mesh, shape.tree, |at, hit| {
         let corner = nearest_corner(shape.mesh.corners(hit.face), &hit.barycentric);
-        feet[at] = Foot { deviation: signed(&points[at], shape.mesh, hit), point: hit.point, corner };
+        feet[at] = Foot { deviation: signed(&points[at], shape.mesh, hit), point: hit.point, face: hit.face, corner };
     })?;
     Ok(feet)
 }
@@ -243,14 +252,53 @@ fn regions_of(
     regions: Regions<'_>,
     own: impl Iterator<Item = VertexId>,
     places: &[Point3<f64>],
-) -> Result<Vec<Region>, CompareError> {
+) -> Result<Vec<Option<Region>>, CompareError> {
     Ok(match regions {
-        Regions::Unknown => vec![Region::Untouched; places.len()],
-        Regions::Own(of_vertex) => own.map(|vertex| of_vertex[vertex.0 as usize]).collect(),
+        Regions::Unknown => vec![Some(Region::Untouched); places.len()],
+        Regions::Own(of_vertex) => own.map(|vertex| Some(of_vertex[vertex.0 as usize])).collect(),
         Regions::Of(other, of_vertex) => {
-            feet(places, other)?.iter().map(|foot| of_vertex[foot.corner.0 as usize]).collect()
+            feet(places, other)?.iter().map(|foot| Some(of_vertex[foot.corner.0 as usize])).collect()
         }
     })
+}
+
+/// The region of each point of the truth: that of the closest place of the mesh that has the regions, where this is within
+/// `reach` (m) and faces the same way. A scan from above says nothing of the underside.
+///
+/// - `feet`: of the points on `mesh`.
+fn regions_of_truth(
+    regions: Regions<'_>,
+    truth: Shape<'_>,
+    points: &[Sample],
+    feet_on_mesh: &[Foot],
+    mesh: Shape<'_>,
+    reach: f64,
+) -> Result<Vec<Option<Region>>, CompareError> {
+    let (shape, looked_up) = match regions {
+        Regions::Of(other, _) => (other, feet(&points.iter().map(|sample| sample.point).collect::<Vec<_>>(), other)?),
+        _ => (mesh, feet_on_mesh.to_vec()),
+    };
+    let region_at = |corner: VertexId| match regions {
+        Regions::Unknown => Region::Untouched,
+        Regions::Own(of_vertex) | Regions::Of(_, of_vertex) => of_vertex[corner.0 as usize],
+    };
+    let region = |(sample, foot): (&Sample, &Foot)| {
+        let faces = truth.mesh.double_area_normal(sample.face).dot(&shape.mesh.double_area_normal(foot.face));
+        (foot.deviation.abs() <= reach && faces > 0.0).then(|| region_at(foot.corner))
+    };
+    Ok(points.iter().zip(&looked_up).map(region).collect())
+}
+
+/// How far a true place may be from the mesh and yet be the one that it shows, m.
+fn reach(deviations: &[f64]) -> f64 {
+    sorted_quantile(deviations, 0.99).max(LEAST_REACH)
+}
+
+/// A quantile of the sizes of what is in no order.
+fn sorted_quantile(deviations: &[f64], share: f64) -> f64 {
+    let mut sizes: Vec<f64> = deviations.iter().map(|d| d.abs()).collect();
+    sizes.sort_unstable_by(f64::total_cmp);
+    quantile(&sizes, share)
 }
 
 /// The region of two corners of three, the one between where all differ.
@@ -262,10 +310,8 @@ fn most_common(corners: [VertexId; 3], of_vertex: &[Region]) -> Region {
 
 /// A round number just above the 95th percentile of the sizes: 1, 1.5, 2, 3, 5 or 7 times a power of ten, m.
 fn fitting_range(deviations: &[f64]) -> f64 {
-    let mut sizes: Vec<f64> = deviations.iter().map(|d| d.abs()).collect();
-    sizes.sort_unstable_by(f64::total_cmp);
     // a perfect mesh has rounding alone
-    round_up(quantile(&sizes, 0.95).max(SMALLEST_RANGE))
+    round_up(sorted_quantile(deviations, 0.95).max(SMALLEST_RANGE))
 }
 
 /// The next of the round numbers above `x` > 0.

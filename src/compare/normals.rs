@@ -56,7 +56,7 @@ impl TiltSummary {
     pub fn of(mut tilts: Vec<Tilt>) -> Option<Self> {
         tilts.sort_unstable_by(|a, b| a.angle.total_cmp(&b.angle).then(a.face.cmp(&b.face)));
         let total: f64 = tilts.iter().map(|tilt| tilt.area).sum();
-        let flipped: f64 = tilts.iter().filter(|tilt| tilt.angle > FRAC_PI_2).map(|tilt| tilt.area).sum();
+        let flipped: f64 = tilts.iter().filter(|tilt| tilt.angle > FRAC_PI_2).fold(0.0, |sum, tilt| sum + tilt.area);
         let at = |share: f64| {
             let mut area = 0.0;
             let reached = |tilt: &&Tilt| {

@@ -12,6 +12,8 @@ use crate::compare::{Comparison, Histogram, Region, RegionComparison, Summary, T
 pub(super) struct ComparisonTold {
     /// points spread over each surface
     density_per_mm2: f64,
+    /// of the true surface, which the mesh does not show: never scanned, or missing
+    unseen_share: f64,
     /// all, touched, guessed, untouched, as far as they are there
     regions: Vec<RegionTold>,
 }
@@ -39,7 +41,9 @@ struct SummaryTold {
     p95_mm: f64,
     p99_mm: f64,
     max_mm: f64,
-    bias_mm: f64,
+    /// not of clouds, which have no sides
+    #[serde(skip_serializing_if = "Option::is_none")]
+    bias_mm: Option<f64>,
 }
 
 #[derive(Debug, Serialize)]
@@ -62,21 +66,22 @@ struct HistogramTold {
 impl ComparisonTold {
     pub fn of(comparison: &Comparison) -> Self {
         let regions = comparison.regions.iter().map(RegionTold::of).collect();
-        Self { density_per_mm2: comparison.density * 1e-6, regions }
+        Self { density_per_mm2: comparison.density * 1e-6, unseen_share: comparison.unseen, regions }
     }
 }
 
 impl RegionTold {
     fn of(part: &RegionComparison) -> Self {
         let told = |summary: &Option<Summary>| summary.as_ref().map(SummaryTold::of);
+        let unsigned = |summary| told(summary).map(|told| SummaryTold { bias_mm: None, ..told });
         let Histogram { from, width, counts, below, above } = &part.histogram;
         Self {
             region: name_of(part.region),
             mesh_to_truth: told(&part.mesh_to_truth),
             truth_to_mesh: told(&part.truth_to_mesh),
             vertices_to_truth: told(&part.vertices_to_truth),
-            cloud_to_truth: told(&part.cloud_to_truth),
-            truth_to_cloud: told(&part.truth_to_cloud),
+            cloud_to_truth: unsigned(&part.cloud_to_truth),
+            truth_to_cloud: unsigned(&part.truth_to_cloud),
             normals: part.tilt.map(|TiltSummary { median, p95, flipped }| NormalsTold {
                 median_deg: median.to_degrees(),
                 p95_deg: p95.to_degrees(),
@@ -98,7 +103,7 @@ impl SummaryTold {
         let Summary { points, mean, rms, median, p95, p99, max, bias } = *summary;
         let [mean_mm, rms_mm, median_mm, p95_mm, p99_mm, max_mm, bias_mm] =
             [mean, rms, median, p95, p99, max, bias].map(|x| x * 1e3);
-        Self { points, mean_mm, rms_mm, median_mm, p95_mm, p99_mm, max_mm, bias_mm }
+        Self { points, mean_mm, rms_mm, median_mm, p95_mm, p99_mm, max_mm, bias_mm: Some(bias_mm) }
     }
 }
 
@@ -133,11 +138,9 @@ impl fmt::Display for Told {
         if let Some(alignment) = &self.alignment {
             writeln!(f, "{alignment}")?;
         }
-        writeln!(
-            f,
-            "distances in mm; bias +: too much material; {:.2} points/mm2\n{HEAD}",
-            self.after.density_per_mm2
-        )?;
+        writeln!(f, "distances in mm; bias +: too much material; {:.2} points/mm2", self.after.density_per_mm2)?;
+        writeln!(f, "the mesh shows {:.1} % of the true surface", (1.0 - self.after.unseen_share) * 100.0)?;
+        writeln!(f, "{HEAD}")?;
         match &self.before {
             Some(before) => write!(f, "before\n{before}\nafter\n{}", self.after),
             None => write!(f, "{}", self.after),
@@ -187,6 +190,9 @@ impl fmt::Display for SummaryTold {
         for x in [self.mean_mm, self.rms_mm, self.median_mm, self.p95_mm, self.p99_mm, self.max_mm] {
             write!(f, "{x:9.4}")?;
         }
-        write!(f, "{:+9.4}{:10}", self.bias_mm, self.points)
+        match self.bias_mm {
+            Some(bias_mm) => write!(f, "{bias_mm:+9.4}{:10}", self.points),
+            None => write!(f, "{:9}{:10}", "", self.points),
+        }
     }
 }

@@ -13,9 +13,9 @@ const FINE: u32 = 3;
 /// Colours of the scale that are worked out beforehand.
 const SHADES: usize = 512;
 /// Light that is everywhere; the rest comes from the lamp.
-const AMBIENT: f64 = 0.42;
+const AMBIENT: f64 = 0.55;
 /// Where the lamp is: right, up, towards the viewer.
-const LAMP: [f64; 3] = [-0.35, 0.5, 0.8];
+const LAMP: [f64; 3] = [-0.3, 0.45, 0.85];
 /// What the inside of a surface shows of its colour; the rest is grey.
 const INSIDE: f64 = 0.35;
 /// Grey of the inside.
