@@ -170,7 +170,7 @@ impl CompareArguments {
     ) -> Result<MeasuredBoth, CliError> {
         let _measuring = Progress::stage("measure");
         let range = self.range_mm.map(|range| range * 1e-3);
-        let params = CompareParams { samples: self.samples as usize, seed: self.seed, range };
+        let params = CompareParams { samples: self.samples as usize, seed: self.seed, range, ..Default::default() };
         let own = regions.map_or(Regions::Unknown, Regions::Own);
         let Some(before) = before else {
             return Ok(MeasuredBoth {

@@ -49,19 +49,19 @@ pub struct CompareParams {
     pub seed: u64,
     /// Half the range of the histogram, m. Default: from the 95th percentile.
     pub range: Option<f64>,
+    /// How far a true place may be from the mesh and yet be one that it shows, m. Default 2 mm: three times the noise of a
+    /// poor scan.
+    pub reach: f64,
 }
 
 impl Default for CompareParams {
     fn default() -> Self {
-        Self { samples: 200_000, seed: 1, range: None }
+        Self { samples: 200_000, seed: 1, range: None, reach: 2e-3 }
     }
 }
 
 /// Narrowest range chosen, m: nothing that is scanned or felt is known better.
 const SMALLEST_RANGE: f64 = 1e-6;
-
-/// Least distance within which a true place is taken for the one that the mesh shows, m: the noise of a poor scan.
-const LEAST_REACH: f64 = 1e-3;
 
 /// How far one region is from the truth.
 #[derive(Clone, Debug, PartialEq)]
@@ -153,7 +153,7 @@ pub fn compare(
         return Err(CompareError::NoFaces);
     }
     let samples = [mesh, truth].map(|shape| sample_surface(shape.mesh, density, params.seed));
-    let measured = measure(mesh, truth, regions, &samples)?;
+    let measured = measure(mesh, truth, regions, &samples, params.reach)?;
     let range = params.range.unwrap_or_else(|| fitting_range(&measured.to_truth.values));
     let parts = match regions {
         Regions::Unknown => Vec::new(),
@@ -175,6 +175,7 @@ fn measure(
     truth: Shape<'_>,
     regions: Regions<'_>,
     samples: &[Vec<Sample>; 2],
+    reach: f64,
 ) -> Result<Measured, CompareError> {
     let [on_mesh, on_truth] = samples;
     let [mesh_points, truth_points] =
@@ -198,7 +199,7 @@ fn measure(
     let to_mesh = Sorted {
         // a true point outside of the mesh is material that the mesh lacks
         values: truth_feet.iter().map(|foot| -foot.deviation).collect(),
-        regions: regions_of_truth(regions, truth, on_truth, &truth_feet, mesh, reach(&to_truth.values))?,
+        regions: regions_of_truth(regions, truth, on_truth, &truth_feet, mesh, reach)?,
     };
     let cloud = |points: &[_], cloud: &[_], like: &Sorted| -> Result<Sorted, CompareError> {
         Ok(Sorted { values: cloud_distances(points, cloud)?, regions: like.regions.clone() })
@@ -287,11 +288,6 @@ fn regions_of_truth(
         (foot.deviation.abs() <= reach && faces > 0.0).then(|| region_at(foot.corner))
     };
     Ok(points.iter().zip(&looked_up).map(region).collect())
-}
-
-/// How far a true place may be from the mesh and yet be the one that it shows, m.
-fn reach(deviations: &[f64]) -> f64 {
-    sorted_quantile(deviations, 0.99).max(LEAST_REACH)
 }
 
 /// A quantile of the sizes of what is in no order.

@@ -24,8 +24,8 @@ impl Camera {
     /// Looks from the direction `out` with `up` upwards, as far as that can be.
     pub fn new(out: &Vector3<f64>, up: &Vector3<f64>) -> Self {
         let out = out.try_normalize(0.0).unwrap_or_else(Vector3::z);
-        let other = Vector3::ith(out.iamin(), 1.0);
-        // nearly along the view there is no up
+        // nearly along the view `up` says nothing
+        let other = if out.y.abs() < 0.9 { Vector3::y() } else { Vector3::z() };
         let right = up.cross(&out).try_normalize(1e-6).unwrap_or_else(|| other.cross(&out).normalize());
         Self { right, up: out.cross(&right), out }
     }
