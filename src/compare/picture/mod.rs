@@ -51,8 +51,10 @@ const INK: Rgb = [32, 36, 44];
 const SOFT_INK: Rgb = [92, 98, 110];
 /// What a panel leaves free around the part, share of its sides.
 const AIR: f64 = 0.05;
-/// A panel is at least and at most so high over its width.
-const ASPECT: [f64; 2] = [0.45, 1.0];
+/// A panel is at least so high over its width.
+const FLATTEST: f64 = 0.45;
+/// And a picture of one panel or more at most, so that it fits on a screen.
+const HIGHEST: f64 = 0.62;
 /// The bar of colours, pixels.
 const BAR: [i32; 2] = [640, 24];
 
@@ -100,7 +102,7 @@ fn camera_for(panels: &[Panel<'_>], params: &PictureParams<'_>) -> Camera {
 fn frame_for(panels: &[Panel<'_>], camera: &Camera, width: i32) -> Frame {
     let [lo, hi] = camera.bounds(panels.iter().map(|panel| panel.mesh));
     let sides = (hi - lo).map(|side| if side.is_finite() { side.max(f64::MIN_POSITIVE) } else { 1.0 });
-    let aspect = (sides.y / sides.x).clamp(ASPECT[0], ASPECT[1]);
+    let aspect = (sides.y / sides.x).clamp(FLATTEST, (HIGHEST * panels.len() as f64).max(FLATTEST));
     let size = [f64::from(width), (f64::from(width) * aspect).round()];
     let scale = (1.0 - 2.0 * AIR) * (size[0] / sides.x).min(size[1] / sides.y);
     let middle = if panels.is_empty() { Vector2::zeros() } else { (lo + hi) / 2.0 };
