@@ -156,7 +156,9 @@ pub fn compare(
     if !density.is_normal() {
         return Err(CompareError::NoFaces);
     }
-    let samples = [mesh, truth].map(|shape| sample_surface(shape.mesh, density, params.seed));
+    // a mesh that is the truth must not meet its own points
+    let [seed, other] = [params.seed, params.seed.wrapping_add(1)];
+    let samples = [sample_surface(mesh.mesh, density, seed), sample_surface(truth.mesh, density, other)];
     let measured = measure(mesh, truth, regions, &samples, params.reach)?;
     let range = params.range.unwrap_or_else(|| fitting_range(&measured.to_truth.values));
     let parts = match regions {

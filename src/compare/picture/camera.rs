@@ -2,12 +2,15 @@
 
 use nalgebra::{Matrix2, Point3, Vector2, Vector3};
 
-use crate::mesh::{TriMesh, VertexId};
+use crate::mesh::{FaceId, TriMesh, VertexId};
 
 /// How much the view leaves the direction in which the part is touched: about 37°, so that walls and steps are seen too.
 const TILT: f64 = 0.7;
 /// And to the side.
 const YAW: f64 = 0.25;
+
+/// What looks one way, over all that matters, for it to be a side: less is left over by chance.
+const LEAST_SIDE: f64 = 0.05;
 
 /// A parallel projection.
 #[derive(Clone, Copy, Debug)]
@@ -34,10 +37,13 @@ impl Camera {
     ///
     /// - `weight`: of each vertex slot, 0 or more.
     pub fn towards(mesh: &TriMesh, weight: impl Fn(VertexId) -> f64) -> Self {
-        let weighted = mesh
-            .faces()
-            .map(|(face, corners)| mesh.double_area_normal(face) * corners.into_iter().map(&weight).sum::<f64>());
-        let facing = weighted.sum::<Vector3<f64>>().try_normalize(0.0).unwrap_or_else(Vector3::z);
+        let weighted = |(face, corners): (FaceId, [VertexId; 3])| {
+            mesh.double_area_normal(face) * corners.into_iter().map(&weight).sum::<f64>()
+        };
+        let total: f64 = mesh.faces().map(weighted).map(|n| n.norm()).sum();
+        let sum: Vector3<f64> = mesh.faces().map(weighted).sum();
+        // a closed shell that matters everywhere alike has no such side
+        let facing = if sum.norm() > LEAST_SIDE * total { sum.normalize() } else { Vector3::z() };
         let flat = Self::new(&facing, &Vector3::y());
         let across = flat.longest(mesh);
         let along = facing.cross(&across);
