@@ -14,7 +14,8 @@
 //! | [`refine`] | [`refine::Refiner::push`]: one sample moves the mesh |
 //! | [`live`] | both rates: [`refine`] at every sample, [`patch`] beside it on a thread of its own |
 //! | [`features`] | what a mesh and the touches on it are made of: holes, slots, planes, with their uncertainty |
-//! | [`align`] | where the scan lies: the motion that picked pairs of points tell |
+//! | [`align`] | where one shape lies on another: rigid motions of pairs and of surfaces |
+//! | [`compare`] | how far a mesh is from the true part, in numbers and as a picture |
 //! | [`calibrate`] | what hangs on the sensor, and where the ball is |
 //! | [`sim`] | known surfaces, a scanner and a stylus to test against |
 //! | [`io`] | mesh files and recordings; with [`scene`] the only file access |
@@ -45,6 +46,7 @@ struct Readme;
 pub mod align;
 pub mod calibrate;
 pub mod cli;
+pub mod compare;
 pub mod features;
 pub mod io;
 pub mod live;

@@ -14,14 +14,31 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("sim", &["touch", "mesh"]),
     ("features", &["touch", "mesh"]),
     ("align", &["mesh", "features"]),
+    ("compare", &["mesh", "align", "features"]),
     ("calibrate", &["touch", "align"]),
     ("io", &["touch", "mesh", "features", "align"]),
     ("scene", &["touch", "mesh", "patch", "refine", "sim", "io"]),
-    ("cli", &["touch", "mesh", "patch", "refine", "live", "features", "sim", "align", "calibrate", "io", "scene"]),
+    (
+        "cli",
+        &[
+            "touch",
+            "mesh",
+            "patch",
+            "refine",
+            "live",
+            "features",
+            "sim",
+            "align",
+            "calibrate",
+            "compare",
+            "io",
+            "scene",
+        ],
+    ),
 ];
 
 /// Same input, same bytes out: nothing of the world outside comes in.
-const PURE: &[&str] = &["touch", "mesh", "patch", "features", "refine", "align", "calibrate", "sim"];
+const PURE: &[&str] = &["touch", "mesh", "patch", "features", "refine", "align", "compare", "calibrate", "sim"];
 
 /// What a pure room may not name.
 const IMPURE_PATHS: &[&str] = &["std::fs", "std::thread", "std::env", "std::io", "std::net", "std::process"];

@@ -4,6 +4,7 @@
 //! not be written, 2 wrong usage, 3 bad input file, 4 done with losses, which are named.
 
 mod calibrate;
+mod compare;
 mod demo;
 mod features;
 mod knocks;
@@ -24,8 +25,10 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use crate::align::IcpError;
 use crate::align::PairsError;
 use crate::calibrate::{PayloadError, TipError};
+use crate::compare::CompareError;
 use crate::io::atomic::is_same_file;
 use crate::io::features_file::FeaturesFileError;
 use crate::io::mesh_file::MeshFileError;
@@ -62,6 +65,8 @@ enum Verb {
     Calibrate(calibrate::CalibrateArguments),
     /// Makes a plate, scans it badly, touches it and refines the scan: needs no input
     Demo(demo::DemoArguments),
+    /// Tells how far a mesh is from the true part, in numbers and as a picture
+    Compare(compare::CompareArguments),
     /// Refines a scan by a recording of touches
     Refine(refine::RefineArguments),
     /// Finds holes, slots, pockets, bosses, edges, corners and planes on a mesh, and measures them
@@ -83,6 +88,9 @@ enum CliError {
     Scene(#[from] SceneError),
     #[error("{0}")]
     ReadMesh(MeshFileError),
+    /// The same of the true part, which has a flag of its own.
+    #[error("{}", .0.to_string().replace("--mesh-unit", "--truth-unit"))]
+    ReadTruth(MeshFileError),
     #[error(transparent)]
     ReadRecording(RecordingError),
     #[error("{0}")]
@@ -118,6 +126,10 @@ enum CliError {
     Rests { path: PathBuf, found: usize, wanted: usize },
     #[error(transparent)]
     Live(#[from] LiveError),
+    #[error("the mesh cannot be aligned with the truth: {0}")]
+    Align(#[from] IcpError),
+    #[error("the two cannot be compared: {0}")]
+    Compare(#[from] CompareError),
 }
 
 impl CliError {
@@ -128,10 +140,11 @@ impl CliError {
             Self::Usage(_) => 2,
             Self::Simulate(SimError::BadParameter { .. } | SimError::TooFine { .. } | SimError::TooCoarse { .. }) => 2,
             // settings come from a scene file: its flags are checked before
-            Self::Scene(_) | Self::ReadMesh(_) | Self::ReadRecording(_) | Self::Simulate(_) => 3,
+            Self::Scene(_) | Self::ReadMesh(_) | Self::ReadTruth(_) | Self::ReadRecording(_) | Self::Simulate(_) => 3,
             Self::Touches(_) | Self::Features(_) => 3,
             Self::Table(_) | Self::Pairs { .. } | Self::Payload { .. } | Self::Tip { .. } | Self::Rests { .. } => 3,
             Self::Mesh(_) | Self::Setting(_) | Self::Refine(_) | Self::Live(_) => 3,
+            Self::Align(_) | Self::Compare(_) => 3,
         }
     }
 }
@@ -151,6 +164,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     };
     let ended = match arguments.verb {
         Verb::Calibrate(arguments) => calibrate::calibrate(&arguments),
+        Verb::Compare(arguments) => compare::compare(&arguments),
         Verb::Demo(arguments) => demo::demo(&arguments),
         Verb::Refine(arguments) => refine::refine(&arguments),
         Verb::Features(arguments) => features::features(&arguments),

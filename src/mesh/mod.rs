@@ -1,6 +1,7 @@
 //! Triangle meshes: positions, adjacency, repair, closest face, signed distance.
 
 mod closest;
+mod coherent;
 mod repair;
 mod signed_distance;
 mod stars;
@@ -8,6 +9,7 @@ mod tri_mesh;
 pub mod triangle;
 
 pub use closest::{BoxQuery, FaceHit, FaceTree, RefitPlan};
+pub use coherent::coherent_order;
 pub use repair::{RepairReport, repair};
 pub use signed_distance::{pseudo_normal, signed_distance};
 pub use tri_mesh::{FaceId, MeshError, TriMesh, VertexId};

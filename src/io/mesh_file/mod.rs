@@ -167,6 +167,37 @@ pub fn read_mesh(path: &Path, unit: MeshUnit) -> Result<MeshFile, MeshFileError>
     Ok(MeshFile { mesh, repair: report })
 }
 
+/// The scalar properties `names` of the vertices of a PLY file, as far as it has them, for each vertex of the `mesh` that
+/// [`read_mesh`] makes of it; nothing of a file of another kind.
+///
+/// - `mesh`: of that file, in `unit`.
+/// - returns: for each name the numbers by vertex id, or `None`.
+///
+/// # Errors
+/// [`MeshFileError::Read`], [`MeshFileError::Syntax`].
+pub fn read_vertex_columns<const N: usize>(
+    path: &Path,
+    unit: MeshUnit,
+    mesh: &TriMesh,
+    names: [&str; N],
+) -> Result<[Option<Vec<f32>>; N], MeshFileError> {
+    let bytes = std::fs::read(path).map_err(|source| MeshFileError::Read { path: path.into(), source })?;
+    if !matches!(Format::of_content(&bytes), Some(Format::Ply)) {
+        return Ok([const { None }; N]);
+    }
+    let syntax = |Syntax { place, defect }| MeshFileError::Syntax { path: path.into(), place, defect };
+    let (positions, columns) = ply::read_columns(&bytes, unit.metres(), names).map_err(syntax)?;
+    let rows = rows_of(mesh, &positions);
+    Ok(columns.map(|column| column.map(|values| rows.iter().map(|&row| values[row]).collect())))
+}
+
+/// For each vertex the row of the file that it comes from: repair keeps the order, and of equal positions the first.
+fn rows_of(mesh: &TriMesh, positions: &[Point3<f64>]) -> Vec<usize> {
+    let mut rows = positions.iter().enumerate();
+    let mut row_of = |wanted: &Point3<f64>| rows.find(|(_, p)| p.coords == wanted.coords).map(|(row, _)| row);
+    mesh.positions().iter().map_while(&mut row_of).collect()
+}
+
 /// Sides of the bounding box, m.
 fn sides(mesh: &TriMesh) -> Vector3<f64> {
     let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
@@ -208,7 +239,41 @@ pub struct VertexColumn<'a> {
     /// name of the property, with its unit
     pub name: &'static str,
     /// as many as the mesh has vertices
-    pub values: Cow<'a, [f32]>,
+    pub values: ColumnValues<'a>,
+}
+
+/// The numbers of a [`VertexColumn`], with their type in the file.
+#[derive(Clone, Debug)]
+pub enum ColumnValues<'a> {
+    /// `float`
+    Single(Cow<'a, [f32]>),
+    /// `uchar`, as colours are
+    Byte(Cow<'a, [u8]>),
+}
+
+impl From<Vec<f32>> for ColumnValues<'_> {
+    fn from(values: Vec<f32>) -> Self {
+        Self::Single(values.into())
+    }
+}
+
+impl From<Vec<u8>> for ColumnValues<'_> {
+    fn from(values: Vec<u8>) -> Self {
+        Self::Byte(values.into())
+    }
+}
+
+impl ColumnValues<'_> {
+    /// Those of the vertices that are used.
+    fn of_used(&self, is_used: &[bool]) -> ColumnValues<'static> {
+        fn kept<T: Copy>(values: &[T], is_used: &[bool]) -> Vec<T> {
+            values.iter().zip(is_used).filter(|(_, is_used)| **is_used).map(|(value, _)| *value).collect()
+        }
+        match self {
+            Self::Single(values) => kept(values, is_used).into(),
+            Self::Byte(values) => kept(values, is_used).into(),
+        }
+    }
 }
 
 /// [`write_mesh`] with `columns`, which STL and OBJ have no place for.
@@ -224,11 +289,9 @@ pub fn write_mesh_with(
     let format = Format::of_name(path).ok_or_else(|| MeshFileError::UnknownFormat { path: path.into() })?;
     let is_used = used_vertices(mesh);
     let (soup, unit) = (used_part(mesh, &is_used, unit.metres()), unit.to_string());
-    let of_used = |column: &VertexColumn<'_>| -> Vec<f32> {
-        column.values.iter().zip(&is_used).filter(|(_, is_used)| **is_used).map(|(value, _)| *value).collect()
-    };
-    let columns: Vec<_> =
-        columns.iter().map(|column| VertexColumn { name: column.name, values: of_used(column).into() }).collect();
+    let of_used =
+        |column: &VertexColumn<'_>| VertexColumn { name: column.name, values: column.values.of_used(&is_used) };
+    let columns: Vec<_> = columns.iter().map(of_used).collect();
     write_atomically(path, |out| match format {
         Format::Ply => ply::write(&soup, &columns, &unit, out),
         Format::Stl => stl::write(&soup, &unit, out),

@@ -8,7 +8,7 @@ use std::io::{self, Write};
 use nalgebra::Point3;
 
 use super::defect::{Place, Syntax};
-use super::{Soup, VertexColumn};
+use super::{ColumnValues, Soup, VertexColumn};
 use body::Body;
 use header::{Element, Header};
 
@@ -32,16 +32,47 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
     Ok(soup)
 }
 
+/// For each name the numbers of the rows, where the file has them.
+type Columns<const N: usize> = [Option<Vec<f32>>; N];
+
+/// The positions of the vertices, multiplied by `scale`, and the scalar properties `names` of them, where they are there.
+pub(super) fn read_columns<const N: usize>(
+    bytes: &[u8],
+    scale: f64,
+    names: [&str; N],
+) -> Result<(Vec<Point3<f64>>, Columns<N>), Syntax> {
+    let header = Header::read(bytes)?;
+    let mut body = Body::new(bytes, &header);
+    let (mut positions, mut columns) = (Vec::new(), [const { None }; N]);
+    for element in &header.elements {
+        body.check_count(element)?;
+        if element.name != "vertex" {
+            body.rows(element, element.count, None, |_, _| Ok(()))?;
+            continue;
+        }
+        let place = position_columns(element)?;
+        let found = names.map(|name| element.scalar(name));
+        columns = found.map(|column| column.map(|_| Vec::with_capacity(element.count)));
+        positions.reserve_exact(element.count);
+        body.rows(element, element.count, None, |row, _| {
+            positions.push(Point3::from(place.map(|column| scale * row[column])));
+            for (values, column) in columns.iter_mut().zip(found) {
+                if let (Some(values), Some(column)) = (values, column) {
+                    values.push(row[column] as f32);
+                }
+            }
+            Ok(())
+        })?;
+        break;
+    }
+    Ok((positions, columns))
+}
+
 /// Adds the triangles of one row to the faces.
 type Cut = fn(&[f64], Place, &mut Vec<[u32; 3]>) -> Result<(), Syntax>;
 
 fn read_vertices(body: &mut Body, element: &Element, scale: f64, soup: &mut Soup) -> Result<(), Syntax> {
-    let mut columns = [0; 3];
-    for (column, name) in columns.iter_mut().zip(["x", "y", "z"]) {
-        *column = element.scalar(name).ok_or_else(|| {
-            Syntax::unexpected(Place::Line(element.line), "a vertex with x, y and z", format!("no property {name}"))
-        })?;
-    }
+    let columns = position_columns(element)?;
     if let Some(positions) = body.fixed_rows(element, columns, scale) {
         soup.positions = positions;
         return Ok(());
@@ -51,6 +82,17 @@ fn read_vertices(body: &mut Body, element: &Element, scale: f64, soup: &mut Soup
         soup.positions.push(Point3::from(columns.map(|column| scale * row[column])));
         Ok(())
     })
+}
+
+/// The columns of x, y and z.
+fn position_columns(element: &Element) -> Result<[usize; 3], Syntax> {
+    let mut columns = [0; 3];
+    for (column, name) in columns.iter_mut().zip(["x", "y", "z"]) {
+        *column = element.scalar(name).ok_or_else(|| {
+            Syntax::unexpected(Place::Line(element.line), "a vertex with x, y and z", format!("no property {name}"))
+        })?;
+    }
+    Ok(columns)
 }
 
 fn read_polygons(body: &mut Body, element: &Element, soup: &mut Soup, cut: Cut) -> Result<(), Syntax> {
@@ -98,7 +140,12 @@ fn strips(numbers: &[f64], place: Place, faces: &mut Vec<[u32; 3]>) -> Result<()
 
 /// Binary little endian, coordinates as double: nothing is rounded. Each column is a property of the vertices.
 pub(super) fn write(soup: &Soup, columns: &[VertexColumn<'_>], unit: &str, out: &mut impl Write) -> io::Result<()> {
-    let properties: String = columns.iter().map(|column| format!("property float {}\n", column.name)).collect();
+    let kind = |values: &ColumnValues<'_>| match values {
+        ColumnValues::Single(_) => "float",
+        ColumnValues::Byte(_) => "uchar",
+    };
+    let properties: String =
+        columns.iter().map(|column| format!("property {} {}\n", kind(&column.values), column.name)).collect();
     write!(
         out,
         "ply\nformat binary_little_endian 1.0\ncomment touchup, unit {unit}, frame O\nelement vertex {}\n\
@@ -109,7 +156,10 @@ pub(super) fn write(soup: &Soup, columns: &[VertexColumn<'_>], unit: &str, out: 
     )?;
     for (row, p) in soup.positions.iter().enumerate() {
         p.coords.iter().try_for_each(|x| out.write_all(&x.to_le_bytes()))?;
-        columns.iter().try_for_each(|column| out.write_all(&column.values[row].to_le_bytes()))?;
+        columns.iter().try_for_each(|column| match &column.values {
+            ColumnValues::Single(values) => out.write_all(&values[row].to_le_bytes()),
+            ColumnValues::Byte(values) => out.write_all(&[values[row]]),
+        })?;
     }
     for corners in &soup.faces {
         out.write_all(&[3])?;

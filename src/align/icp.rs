@@ -1,0 +1,386 @@
+//! Rigid registration of points to a mesh, point to plane.
+//!
+//! A point x with the closest place q of the target and the normal n there meets the target when n·(x − q) vanishes; for a
+//! small twist (t, θ) about c that is n·t + ((x − c) × n)·θ = −n·(x − q) \[Chen Medioni 1992\]. Each round solves it by
+//! least squares with Tukey's weights, whose width begins at the distances found and shrinks to the scatter of the
+//! residuals: what alone holds a direction, such as the walls of a few holes, would else count as outliers before it has
+//! come to rest. A direction that nothing holds is left as it was and told.
+
+use nalgebra::{Isometry3, Matrix6, Point3, UnitQuaternion, Vector3, Vector6};
+
+use crate::mesh::{FaceTree, TriMesh, coherent_order};
+
+/// Settings of [`icp`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IcpParams {
+    /// Points farther from the target than this have no part in it, m. Default: none is too far at first.
+    pub reach: f64,
+    /// Rounds after which it is given up. Default 100; from a start within reach it takes 10 to 20.
+    pub most_rounds: usize,
+}
+
+impl Default for IcpParams {
+    fn default() -> Self {
+        Self { reach: f64::INFINITY, most_rounds: 100 }
+    }
+}
+
+/// One of six independent small motions about [`IcpFit::centre`], and how much the target holds it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    /// shift of the centre, in the frame of the target; with `turn` of unit length
+    pub shift: Vector3<f64>,
+    /// rotation vector, counted by the shift that it gives on average: times [`IcpFit::lever`]
+    pub turn: Vector3<f64>,
+    /// mean square of how much the motion changes the distances, relative to a motion along all normals: 0 to 1 or a little
+    /// more
+    pub share: f64,
+}
+
+impl Motion {
+    /// Whether the target tells where to stop.
+    pub fn is_determined(&self) -> bool {
+        self.share >= LEAST_SHARE
+    }
+}
+
+/// Where the points fit the target.
+#[derive(Clone, Debug, PartialEq)]
+pub struct IcpFit {
+    /// Moves the points, as they were given, onto the target.
+    pub source_to_target: Isometry3<f64>,
+    /// Root mean square of the distances to the tangent planes, over the inliers, m.
+    pub rms: f64,
+    /// The same robustly, 1.48 times the median, m.
+    pub scatter: f64,
+    /// Points that have weight at the end.
+    pub inliers: usize,
+    /// Rounds that it took.
+    pub rounds: usize,
+    /// The middle of the moved points, m, in the frame of the target.
+    pub centre: Point3<f64>,
+    /// Root mean square distance of the points from it, m.
+    pub lever: f64,
+    /// Independent motions, the least determined first.
+    pub motions: [Motion; 6],
+}
+
+impl IcpFit {
+    /// The motions that leave the fit as it is: a sphere turns, a plane slides. The pose is where the start had it in
+    /// these.
+    pub fn undetermined(&self) -> impl Iterator<Item = &Motion> {
+        self.motions.iter().filter(|motion| !motion.is_determined())
+    }
+}
+
+/// Why there is no [`IcpFit`].
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum IcpError {
+    /// NaN or infinity.
+    #[error("point {point} has a coordinate that is not finite")]
+    NotFinite {
+        /// which, counted from 0
+        point: usize,
+    },
+    /// Nothing to fit.
+    #[error("{found} points lie within {:.3} mm of the target, {needed} are needed: {LOOK_AT}", .reach * 1e3)]
+    TooFew {
+        /// points with a partner
+        found: usize,
+        /// at least
+        needed: usize,
+        /// how far partners may be, m
+        reach: f64,
+    },
+    /// The rounds do not come to rest.
+    #[error("after {rounds} rounds the fit still moves by {:.4} mm, at a scatter of {:.4} mm: {LOOK_AT}",
+            .step * 1e3, .scatter * 1e3)]
+    Unsettled {
+        /// how many were made
+        rounds: usize,
+        /// the last one, m
+        step: f64,
+        /// of the distances to the tangent planes, m
+        scatter: f64,
+    },
+}
+
+const LOOK_AT: &str = "are both in the same unit, and roughly in place?";
+
+/// Six unknowns, each held by two points.
+const LEAST_POINTS: usize = 12;
+/// A motion is undetermined below this share: facets make a cylinder of 32 sides hold its turn by 0.003, while the walls
+/// of one hole of 6 mm hold a plate of 100 mm × 60 mm by 0.009.
+const LEAST_SHARE: f64 = 0.004;
+/// Points of the first rounds, and of those before all take part; each is every n-th along the curve.
+const LEVELS: [usize; 2] = [1_500, 12_000];
+/// Width of Tukey's weights in standard deviations: 95 % as good as plain least squares where there are no outliers.
+const WIDTH: f64 = 4.685;
+/// Standard deviation of normal errors over their median.
+const SIGMA_OF_MEDIAN: f64 = 1.4826;
+/// The width is at most halved in a round.
+const SHRINK: f64 = 0.5;
+/// The first width, over the distance within which nine of ten points are.
+const FIRST_WIDTH: f64 = 2.0;
+/// A round that moves less than this ends a level, in scatters: partners then stay where they are to the second order.
+const REST: f64 = 0.3;
+/// How often the weights are made anew before the next partners.
+const WEIGHINGS: usize = 4;
+/// Lengths below this are rounding, over the size of the target: 10 nm for 100 mm would still be seen.
+const ROUNDING: f64 = 1e-11;
+
+/// The rigid motion at which `points` fit `target`, from a start that is roughly right.
+///
+/// - `points`: m, in their own frame, in any order; a subset of them finds the way, all of them tell the end.
+/// - `tree`: over the faces of `target`.
+/// - `start`: moves the points to about where they belong.
+/// - returns: the motion; directions that are undetermined are listed in it.
+///
+/// # Errors
+/// [`IcpError`].
+///
+/// # Example
+/// ```
+/// use nalgebra::{Isometry3, Point3};
+/// use touchup::align::{IcpParams, icp};
+/// use touchup::mesh::{FaceTree, TriMesh};
+/// let p = |x, y| Point3::new(x, y, 0.0);
+/// let square = TriMesh::new(vec![p(0., 0.), p(1., 0.), p(1., 1.), p(0., 1.)], vec![[0, 1, 2], [0, 2, 3]])?;
+/// let above: Vec<_> = (0..100).map(|i| Point3::new(0.1 * f64::from(i % 10), 0.1 * f64::from(i / 10), 0.02)).collect();
+/// let fit = icp(&above, &square, &FaceTree::new(&square), &Isometry3::identity(), &IcpParams::default())?;
+/// assert!((fit.source_to_target.translation.z + 0.02).abs() < 1e-9);
+/// assert_eq!(fit.undetermined().count(), 3, "it slides in two directions, and turns");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn icp(
+    points: &[Point3<f64>],
+    target: &TriMesh,
+    tree: &FaceTree,
+    start: &Isometry3<f64>,
+    params: &IcpParams,
+) -> Result<IcpFit, IcpError> {
+    if let Some(point) = points.iter().position(|p| !p.coords.iter().all(|x| x.is_finite())) {
+        return Err(IcpError::NotFinite { point });
+    }
+    let ordered: Vec<_> = coherent_order(points).into_iter().map(|at| points[at as usize]).collect();
+    let mut search = Search::new(&ordered, target, tree, start, params)?;
+    for count in LEVELS.into_iter().filter(|&count| count < points.len()).chain([points.len()]) {
+        let stride = points.len() / count;
+        loop {
+            let round = search.round(stride)?;
+            if search.is_at_rest(&round) {
+                if stride == 1 {
+                    return Ok(search.fit(&round));
+                }
+                break;
+            }
+        }
+    }
+    // `chain` above ends with a stride of 1, which returns
+    Err(search.unsettled(f64::NAN))
+}
+
+/// The state between rounds.
+struct Search<'a> {
+    /// along the curve
+    points: &'a [Point3<f64>],
+    target: &'a TriMesh,
+    tree: &'a FaceTree,
+    pose: Isometry3<f64>,
+    /// of the points, in their own frame
+    middle: Point3<f64>,
+    lever: f64,
+    /// width of the weights and farthest partner, m
+    width: f64,
+    scatter: f64,
+    /// length that is rounding, m
+    rounding: f64,
+    rounds: usize,
+    most_rounds: usize,
+    partners: Vec<Partner>,
+    /// sizes of the residuals of a round
+    sizes: Vec<f64>,
+}
+
+/// A point with the tangent plane of its closest place.
+struct Partner {
+    /// how the residual changes with shift and turn, turns counted by the lever
+    row: Vector6<f64>,
+    /// before the step, m
+    residual: f64,
+}
+
+/// What one round found, and its step.
+struct Round {
+    /// ΣW rows rowsᵀ / ΣW, turns counted by the lever
+    information: Matrix6<f64>,
+    right: Vector6<f64>,
+    inliers: usize,
+    square: f64,
+    /// length of the step made, m
+    step: f64,
+    /// whether the width of the weights has stopped shrinking
+    is_narrow: bool,
+}
+
+impl<'a> Search<'a> {
+    fn new(
+        points: &'a [Point3<f64>],
+        target: &'a TriMesh,
+        tree: &'a FaceTree,
+        start: &Isometry3<f64>,
+        params: &IcpParams,
+    ) -> Result<Self, IcpError> {
+        let stride = (points.len() / LEVELS[0]).max(1);
+        let distance =
+            |p: &Point3<f64>| tree.closest(target, &(start * p), params.reach).map(|hit| hit.distance_squared);
+        let mut squares: Vec<f64> = points.iter().step_by(stride).filter_map(distance).collect();
+        if squares.len() < LEAST_POINTS {
+            return Err(IcpError::TooFew { found: squares.len(), needed: LEAST_POINTS, reach: params.reach });
+        }
+        let nine_of_ten = squares.len() * 9 / 10;
+        let far = squares.select_nth_unstable_by(nine_of_ten, f64::total_cmp).1.sqrt();
+        let count = points.len() as f64;
+        let middle = Point3::from(points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / count);
+        let lever = (points.iter().map(|p| (p - middle).norm_squared()).sum::<f64>() / count).sqrt();
+        let [lo, hi] = target.bounds();
+        let rounding = ROUNDING * ((hi - lo).norm() + lo.coords.amax().max(hi.coords.amax()));
+        Ok(Self {
+            points,
+            target,
+            tree,
+            pose: *start,
+            middle,
+            lever: lever.max(f64::MIN_POSITIVE),
+            width: (FIRST_WIDTH * far).min(params.reach).max(WIDTH * rounding),
+            scatter: far,
+            rounding,
+            rounds: 0,
+            most_rounds: params.most_rounds,
+            partners: Vec::new(),
+            sizes: Vec::new(),
+        })
+    }
+
+    /// Looks for partners of every `stride`-th point and moves once.
+    fn round(&mut self, stride: usize) -> Result<Round, IcpError> {
+        self.find_partners(stride);
+        let mut round = self.weigh(&Vector6::zeros())?;
+        let mut step = solve(&round);
+        // the weights follow the residuals before partners are looked for again, which takes longest
+        for _ in 1..WEIGHINGS {
+            round = self.weigh(&step)?;
+            let next = solve(&round);
+            let change = (next - step).norm();
+            step = next;
+            if change <= self.rest() {
+                break;
+            }
+        }
+        self.rounds += 1;
+        let (shift, turn) = (step.fixed_rows::<3>(0).into_owned(), step.fixed_rows::<3>(3) / self.lever);
+        round.step = shift.norm() + turn.norm() * self.lever;
+        if self.rounds > self.most_rounds || !round.step.is_finite() {
+            return Err(self.unsettled(round.step));
+        }
+        let centre = (self.pose * self.middle).coords;
+        let turn = UnitQuaternion::from_scaled_axis(turn);
+        self.pose = Isometry3::from_parts((shift + centre - turn * centre).into(), turn) * self.pose;
+        self.narrow(&mut round, &step);
+        Ok(round)
+    }
+
+    /// The closest places of every `stride`-th point, as far as they are within the width.
+    fn find_partners(&mut self, stride: usize) {
+        let centre = self.pose * self.middle;
+        self.partners.clear();
+        for p in self.points.iter().step_by(stride) {
+            let x = self.pose * p;
+            let Some(hit) = self.tree.closest(self.target, &x, self.width) else { continue };
+            let normal = self.target.normal(hit.face);
+            let turn = (x - centre).cross(&normal) / self.lever;
+            let row = Vector6::new(normal.x, normal.y, normal.z, turn.x, turn.y, turn.z);
+            self.partners.push(Partner { row, residual: normal.dot(&(x - hit.point)) });
+        }
+    }
+
+    /// The normal equations with the weights that the residuals have after `step`.
+    fn weigh(&self, step: &Vector6<f64>) -> Result<Round, IcpError> {
+        let (mut information, mut right, mut weights) = (Matrix6::zeros(), Vector6::zeros(), 0.0);
+        let (mut inliers, mut square) = (0, 0.0);
+        for Partner { row, residual } in &self.partners {
+            let left = residual + row.dot(step);
+            let weight = (1.0 - (left / self.width).powi(2)).max(0.0).powi(2);
+            let weighted = row * weight;
+            information += weighted * row.transpose();
+            right -= weighted * *residual;
+            weights += weight;
+            if weight > 0.0 {
+                inliers += 1;
+                square += left * left;
+            }
+        }
+        if inliers < LEAST_POINTS {
+            return Err(IcpError::TooFew { found: inliers, needed: LEAST_POINTS, reach: self.width });
+        }
+        let (information, right) = (information / weights, right / weights);
+        Ok(Round { information, right, inliers, square, step: 0.0, is_narrow: false })
+    }
+
+    /// Brings the width of the weights towards the scatter that is left: at once where the pose has come to rest, else in
+    /// steps.
+    fn narrow(&mut self, round: &mut Round, step: &Vector6<f64>) {
+        self.sizes.clear();
+        self.sizes.extend(self.partners.iter().map(|Partner { row, residual }| (residual + row.dot(step)).abs()));
+        let middle = self.sizes.len() / 2;
+        self.scatter = SIGMA_OF_MEDIAN * *self.sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let wanted = WIDTH * self.scatter.max(self.rounding);
+        round.is_narrow = wanted >= self.width * SHRINK;
+        let least = if round.step <= self.rest() { wanted } else { self.width * SHRINK };
+        self.width = wanted.max(least).min(self.width);
+    }
+
+    /// A step that is none, m.
+    fn rest(&self) -> f64 {
+        (REST * self.scatter).max(self.rounding)
+    }
+
+    fn is_at_rest(&self, round: &Round) -> bool {
+        round.is_narrow && round.step <= self.rest()
+    }
+
+    fn unsettled(&self, step: f64) -> IcpError {
+        IcpError::Unsettled { rounds: self.rounds, step, scatter: self.scatter }
+    }
+
+    fn fit(&self, round: &Round) -> IcpFit {
+        let eigen = round.information.symmetric_eigen();
+        let mut motions: [Motion; 6] = std::array::from_fn(|i| {
+            let v = eigen.eigenvectors.column(i);
+            let [shift, turn] = [0, 3].map(|at| v.fixed_rows::<3>(at).into_owned());
+            Motion { shift, turn, share: eigen.eigenvalues[i].max(0.0) }
+        });
+        motions.sort_by(|a, b| a.share.total_cmp(&b.share));
+        IcpFit {
+            source_to_target: self.pose,
+            rms: (round.square / round.inliers as f64).sqrt(),
+            scatter: self.scatter,
+            inliers: round.inliers,
+            rounds: self.rounds,
+            centre: self.pose * self.middle,
+            lever: self.lever,
+            motions,
+        }
+    }
+}
+
+/// The smallest step that solves the equations in the directions that are determined.
+fn solve(round: &Round) -> Vector6<f64> {
+    let eigen = round.information.symmetric_eigen();
+    let along = |i: usize| {
+        let v = eigen.eigenvectors.column(i).into_owned();
+        let share = eigen.eigenvalues[i];
+        if share < LEAST_SHARE { Vector6::zeros() } else { v * (v.dot(&round.right) / share) }
+    };
+    (0..6).map(along).sum()
+}

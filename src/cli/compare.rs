@@ -1,0 +1,334 @@
+//! `touchup compare`: how far a mesh is from the true part.
+
+mod alignment;
+mod table;
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use nalgebra::{Isometry3, Vector3};
+use serde::Serialize;
+use tracing::warn;
+
+use self::alignment::{Alignment, aligned, moved};
+use self::table::ComparisonTold;
+use super::progress::Progress;
+use super::{CliError, Losses, tell};
+use crate::compare::{
+    CompareParams, Comparison, Panel, PictureParams, Region, Regions, Shape, colour_of, compare as compare_shapes,
+    draw_picture,
+};
+use crate::io::atomic::{AtomicFile, is_same_file};
+use crate::io::mesh_file::{MeshFile, MeshUnit, VertexColumn, read_mesh, read_vertex_columns, write_mesh_with};
+use crate::io::png::write_png;
+use crate::mesh::{FaceTree, TriMesh};
+
+#[derive(Debug, Args)]
+pub(super) struct CompareArguments {
+    /// The mesh to be judged: PLY, STL or OBJ; a refined PLY is told by what was touched and what was not
+    mesh: PathBuf,
+    /// The part as it should be, or truly is: PLY, STL or OBJ
+    truth: PathBuf,
+    /// Unit of the coordinates in MESH, and in the mesh of --before
+    #[arg(long, value_name = "U", default_value = "mm")]
+    mesh_unit: MeshUnit,
+    /// Unit of the coordinates in TRUTH
+    #[arg(long, value_name = "U", default_value = "mm")]
+    truth_unit: MeshUnit,
+    /// The scan before it was refined, in the frame of MESH: told beside it
+    #[arg(long, value_name = "MESH")]
+    before: Option<PathBuf>,
+    /// How MESH is brought onto TRUTH: not at all, or from about the right place point to plane
+    #[arg(long, value_name = "HOW", default_value = "none")]
+    align: Align,
+    /// Writes a picture of MESH in the colours of its deviation
+    #[arg(long, value_name = "PNG")]
+    picture: Option<PathBuf>,
+    /// Writes MESH with these colours and the column `deviation_mm`, in its own frame and unit
+    #[arg(long, value_name = "PLY")]
+    coloured: Option<PathBuf>,
+    /// Ends of the colours and of the histogram, mm; by default from the 95th percentile
+    #[arg(long, value_name = "R", value_parser = positive)]
+    range_mm: Option<f64>,
+    /// From which direction the picture is taken, in the frame of TRUTH; by default the side that was touched
+    #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', num_args = 3, allow_negative_numbers = true)]
+    view: Option<Vec<f64>>,
+    /// Points spread over TRUTH; over MESH they are as dense
+    #[arg(long, value_name = "N", default_value_t = 200_000, value_parser = clap::value_parser!(u32).range(100..=20_000_000))]
+    samples: u32,
+    /// Another seed spreads them anew
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Prints one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// How the mesh is brought onto the truth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Align {
+    /// it is there
+    None,
+    /// iterated closest points, point to plane
+    Icp,
+}
+
+/// What `--json` prints.
+#[derive(Debug, Serialize)]
+struct Told {
+    mesh: ShapeTold,
+    truth: ShapeTold,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    alignment: Option<Alignment>,
+    /// the scan, where that was asked for
+    #[serde(skip_serializing_if = "Option::is_none")]
+    before: Option<ComparisonTold>,
+    /// the mesh
+    after: ComparisonTold,
+}
+
+#[derive(Debug, Serialize)]
+struct ShapeTold {
+    file: String,
+    vertices: usize,
+    faces: usize,
+    /// sides of the box around it
+    size_mm: [f64; 3],
+}
+
+/// A mesh that was read, brought into the frame of the truth.
+struct Placed {
+    mesh: TriMesh,
+    tree: FaceTree,
+}
+
+impl Placed {
+    fn new(mesh: TriMesh) -> Self {
+        Self { tree: FaceTree::new(&mesh), mesh }
+    }
+
+    fn shape(&self) -> Shape<'_> {
+        Shape { mesh: &self.mesh, tree: &self.tree }
+    }
+}
+
+/// The verb: compares and tells.
+pub(super) fn compare(arguments: &CompareArguments) -> Result<Losses, CliError> {
+    arguments.check_outputs()?;
+    let reading = Progress::stage("read");
+    let MeshFile { mesh: as_read, .. } = read_mesh(&arguments.mesh, arguments.mesh_unit).map_err(CliError::ReadMesh)?;
+    let MeshFile { mesh: truth, .. } =
+        read_mesh(&arguments.truth, arguments.truth_unit).map_err(CliError::ReadTruth)?;
+    let before = arguments.before.as_ref().map(|path| read_mesh(path, arguments.mesh_unit)).transpose();
+    let before = before.map_err(CliError::ReadMesh)?.map(|file| file.mesh);
+    let regions = read_regions(&arguments.mesh, arguments.mesh_unit, &as_read)?;
+    if let Some(hint) = unit_hint([&as_read, &truth], [arguments.mesh_unit, arguments.truth_unit]) {
+        warn!("{hint}");
+    }
+    let truth = Placed::new(truth);
+    drop(reading);
+
+    let (pose, alignment) = match arguments.align {
+        Align::None => (Isometry3::identity(), None),
+        Align::Icp => aligned(&as_read, truth.shape(), arguments.seed).map(|(pose, told)| (pose, Some(told)))?,
+    };
+    let mesh = Placed::new(moved(&as_read, &pose));
+    let before = before.map(|scan| Placed::new(moved(&scan, &pose)));
+    let measured = arguments.measure(&mesh, &truth, before.as_ref(), regions.as_deref())?;
+    arguments.draw(&mesh, before.as_ref(), &measured, regions.as_deref())?;
+    if let Some(path) = &arguments.coloured {
+        write_coloured(path, &as_read, arguments.mesh_unit, &measured.after)?;
+    }
+    let told = Told {
+        mesh: ShapeTold::of(&arguments.mesh, &as_read),
+        truth: ShapeTold::of(&arguments.truth, &truth.mesh),
+        alignment,
+        before: measured.before.as_ref().map(ComparisonTold::of),
+        after: ComparisonTold::of(&measured.after),
+    };
+    if arguments.json {
+        tell(&serde_json::to_string(&told).expect("numbers and names alone cannot fail"));
+    } else {
+        tell(&told.to_string());
+    }
+    Ok(Losses::new())
+}
+
+/// Both comparisons, in one range.
+struct MeasuredBoth {
+    before: Option<Comparison>,
+    after: Comparison,
+}
+
+impl CompareArguments {
+    fn measure(
+        &self,
+        mesh: &Placed,
+        truth: &Placed,
+        before: Option<&Placed>,
+        regions: Option<&[Region]>,
+    ) -> Result<MeasuredBoth, CliError> {
+        let _measuring = Progress::stage("measure");
+        let range = self.range_mm.map(|range| range * 1e-3);
+        let params = CompareParams { samples: self.samples as usize, seed: self.seed, range, ..Default::default() };
+        let own = regions.map_or(Regions::Unknown, Regions::Own);
+        let Some(before) = before else {
+            return Ok(MeasuredBoth {
+                before: None,
+                after: compare_shapes(mesh.shape(), truth.shape(), own, &params)?,
+            });
+        };
+        let through = regions.map_or(Regions::Unknown, |regions| Regions::Of(mesh.shape(), regions));
+        let before = compare_shapes(before.shape(), truth.shape(), through, &params)?;
+        // the scale of what was shows how much better it is
+        let params = CompareParams { range: Some(before.range), ..params };
+        let after = compare_shapes(mesh.shape(), truth.shape(), own, &params)?;
+        Ok(MeasuredBoth { before: Some(before), after })
+    }
+
+    /// Draws what was measured, where that is asked for.
+    fn draw(
+        &self,
+        mesh: &Placed,
+        before: Option<&Placed>,
+        measured: &MeasuredBoth,
+        regions: Option<&[Region]>,
+    ) -> Result<(), CliError> {
+        let Some(path) = &self.picture else { return Ok(()) };
+        let _drawing = Progress::stage("draw");
+        let name = |path: &Path| path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned());
+        let title = format!("{} against {}", name(&self.mesh), name(&self.truth));
+        let scan = before.zip(measured.before.as_ref()).zip(self.before.as_ref()).map(|((placed, compared), path)| {
+            (placed, compared, format!("before: {}", name(path)), table::note(compared))
+        });
+        let now = (mesh, &measured.after, format!("after: {}", name(&self.mesh)), table::note(&measured.after));
+        let panels: Vec<Panel<'_>> = scan
+            .iter()
+            .chain([&now])
+            .map(|(placed, compared, title, note)| Panel {
+                mesh: &placed.mesh,
+                deviations: &compared.vertex_deviations,
+                title: if scan.is_some() { title } else { "" },
+                note,
+            })
+            .collect();
+        let weights = regions.filter(|regions| regions.contains(&Region::Touched)).map(|regions| {
+            regions.iter().map(|region| if *region == Region::Touched { 1.0 } else { 0.0 }).collect::<Vec<f64>>()
+        });
+        let from = self.view.as_ref().map(|view| Vector3::from_column_slice(view));
+        let params = PictureParams {
+            title: &title,
+            width: 1600,
+            range: measured.after.range,
+            from,
+            weights: weights.as_deref(),
+        };
+        let picture = draw_picture(&panels, &params);
+        let write = |source| CliError::Write { path: path.clone(), source };
+        write_png(path, picture.size, &picture.pixels).map_err(write)
+    }
+
+    /// The work is not begun when its result cannot be kept.
+    fn check_outputs(&self) -> Result<(), CliError> {
+        let outputs = [("--picture", ".png", &self.picture), ("--coloured", ".ply", &self.coloured)];
+        for (flag, ending, path) in
+            outputs.iter().filter_map(|(flag, ending, path)| Some((flag, ending, (*path).as_ref()?)))
+        {
+            let shown = path.display();
+            if !shown.to_string().to_ascii_lowercase().ends_with(ending) {
+                return Err(CliError::Usage(format!("{flag} {shown} must end in {ending}")));
+            }
+            for input in [Some(&self.mesh), Some(&self.truth), self.before.as_ref()].into_iter().flatten() {
+                if is_same_file(input, path) {
+                    return Err(CliError::Usage(format!(
+                        "{flag} would write over {shown}, which is compared: choose another place"
+                    )));
+                }
+            }
+            AtomicFile::create(path).map(drop).map_err(|source| CliError::Write { path: path.clone(), source })?;
+        }
+        match &self.view {
+            Some(view) if !view.iter().all(|x| x.is_finite()) || view.iter().all(|x| *x == 0.0) => {
+                Err(CliError::Usage("--view must be a direction, such as 1,-1,0.5".to_owned()))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err("must be a number above 0".to_owned()),
+    }
+}
+
+/// What each vertex of a refined PLY rests on; `None` for a mesh that does not say.
+fn read_regions(path: &Path, unit: MeshUnit, mesh: &TriMesh) -> Result<Option<Vec<Region>>, CliError> {
+    let columns = read_vertex_columns(path, unit, mesh, ["support", "touched"]).map_err(CliError::ReadMesh)?;
+    let of_support = |support: &f32| match *support {
+        0.0 => Region::Untouched,
+        1.0 => Region::Touched,
+        _ => Region::Guessed,
+    };
+    let of_touched = |touched: &f32| match *touched {
+        ..=0.0 => Region::Untouched,
+        1.0.. => Region::Touched,
+        _ => Region::Guessed,
+    };
+    let regions = match columns {
+        [Some(support), _] => support.iter().map(of_support).collect::<Vec<_>>(),
+        [None, Some(touched)] => touched.iter().map(of_touched).collect(),
+        [None, None] => return Ok(None),
+    };
+    Ok((regions.len() == mesh.vertex_slots()).then_some(regions))
+}
+
+/// The mesh as a PLY with colours.
+fn write_coloured(path: &Path, mesh: &TriMesh, unit: MeshUnit, measured: &Comparison) -> Result<(), CliError> {
+    let deviations = &measured.vertex_deviations;
+    let channel = |i: usize| deviations.iter().map(|&d| colour_of(d, measured.range)[i]).collect::<Vec<u8>>().into();
+    let in_mm: Vec<f32> = deviations.iter().map(|d| (d * 1e3) as f32).collect();
+    let columns = [
+        VertexColumn { name: "red", values: channel(0) },
+        VertexColumn { name: "green", values: channel(1) },
+        VertexColumn { name: "blue", values: channel(2) },
+        VertexColumn { name: "deviation_mm", values: in_mm.into() },
+    ];
+    write_mesh_with(path, mesh, &columns, unit).map_err(CliError::WriteMesh)
+}
+
+/// A hint where one shape is so much larger than the other that a unit is probably wrong.
+fn unit_hint([mesh, truth]: [&TriMesh; 2], [mesh_unit, truth_unit]: [MeshUnit; 2]) -> Option<String> {
+    /// A scan may show a part of the part.
+    const PLAUSIBLE: std::ops::Range<f64> = 0.125..8.0;
+    const ALIKE: std::ops::Range<f64> = 0.6..1.7;
+    let size = |mesh: &TriMesh| {
+        let [lo, hi] = mesh.bounds();
+        (hi - lo).norm()
+    };
+    let ratio = size(mesh) / size(truth);
+    if PLAUSIBLE.contains(&ratio) {
+        return None;
+    }
+    let units = [MeshUnit::Millimetre, MeshUnit::Inch, MeshUnit::Metre];
+    let of_mesh = units.iter().filter(|u| ALIKE.contains(&(ratio * u.metres() / mesh_unit.metres())));
+    let of_truth = units.iter().filter(|u| ALIKE.contains(&(ratio / u.metres() * truth_unit.metres())));
+    let flags: Vec<String> = of_mesh
+        .map(|unit| format!("--mesh-unit {unit}"))
+        .chain(of_truth.map(|unit| format!("--truth-unit {unit}")))
+        .collect();
+    let (factor, way) = if ratio > 1.0 { (ratio, "larger") } else { (1.0 / ratio, "smaller") };
+    let advice =
+        if flags.is_empty() { "are these the same part?".to_owned() } else { format!("try {}", flags.join(" or ")) };
+    Some(format!("the mesh is {factor:.1} times {way} than the truth: {advice}"))
+}
+
+impl ShapeTold {
+    fn of(path: &Path, mesh: &TriMesh) -> Self {
+        let [lo, hi] = mesh.bounds();
+        let size = (hi - lo) * 1e3;
+        let (vertices, faces) = (mesh.vertex_count(), mesh.face_count());
+        Self { file: path.display().to_string(), vertices, faces, size_mm: [size.x, size.y, size.z] }
+    }
+}

@@ -1,0 +1,198 @@
+//! A comparison as JSON in mm, and as a table.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::Told;
+use crate::compare::{Comparison, Histogram, Region, RegionComparison, Summary, TiltSummary};
+
+/// What `--json` prints of one mesh.
+#[derive(Debug, Serialize)]
+pub(super) struct ComparisonTold {
+    /// points spread over each surface
+    density_per_mm2: f64,
+    /// of the true surface, which the mesh does not show: never scanned, or missing
+    unseen_share: f64,
+    /// all, touched, guessed, untouched, as far as they are there
+    regions: Vec<RegionTold>,
+}
+
+#[derive(Debug, Serialize)]
+struct RegionTold {
+    region: &'static str,
+    mesh_to_truth: Option<SummaryTold>,
+    truth_to_mesh: Option<SummaryTold>,
+    vertices_to_truth: Option<SummaryTold>,
+    cloud_to_truth: Option<SummaryTold>,
+    truth_to_cloud: Option<SummaryTold>,
+    normals: Option<NormalsTold>,
+    /// of `mesh_to_truth`
+    histogram: HistogramTold,
+}
+
+/// Distances; all but `bias_mm` without sign.
+#[derive(Debug, Serialize)]
+struct SummaryTold {
+    points: usize,
+    mean_mm: f64,
+    rms_mm: f64,
+    median_mm: f64,
+    p95_mm: f64,
+    p99_mm: f64,
+    max_mm: f64,
+    /// not of clouds, which have no sides
+    #[serde(skip_serializing_if = "Option::is_none")]
+    bias_mm: Option<f64>,
+}
+
+#[derive(Debug, Serialize)]
+struct NormalsTold {
+    median_deg: f64,
+    p95_deg: f64,
+    /// of the area, more than 90 degrees off
+    flipped_share: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct HistogramTold {
+    from_mm: f64,
+    bin_mm: f64,
+    counts: Vec<usize>,
+    below: usize,
+    above: usize,
+}
+
+impl ComparisonTold {
+    pub fn of(comparison: &Comparison) -> Self {
+        let regions = comparison.regions.iter().map(RegionTold::of).collect();
+        Self { density_per_mm2: comparison.density * 1e-6, unseen_share: comparison.unseen, regions }
+    }
+}
+
+impl RegionTold {
+    fn of(part: &RegionComparison) -> Self {
+        let told = |summary: &Option<Summary>| summary.as_ref().map(SummaryTold::of);
+        let unsigned = |summary| told(summary).map(|told| SummaryTold { bias_mm: None, ..told });
+        let Histogram { from, width, counts, below, above } = &part.histogram;
+        Self {
+            region: name_of(part.region),
+            mesh_to_truth: told(&part.mesh_to_truth),
+            truth_to_mesh: told(&part.truth_to_mesh),
+            vertices_to_truth: told(&part.vertices_to_truth),
+            cloud_to_truth: unsigned(&part.cloud_to_truth),
+            truth_to_cloud: unsigned(&part.truth_to_cloud),
+            normals: part.tilt.map(|TiltSummary { median, p95, flipped }| NormalsTold {
+                median_deg: median.to_degrees(),
+                p95_deg: p95.to_degrees(),
+                flipped_share: flipped,
+            }),
+            histogram: HistogramTold {
+                from_mm: from * 1e3,
+                bin_mm: width * 1e3,
+                counts: counts.clone(),
+                below: *below,
+                above: *above,
+            },
+        }
+    }
+}
+
+impl SummaryTold {
+    fn of(summary: &Summary) -> Self {
+        let Summary { points, mean, rms, median, p95, p99, max, bias } = *summary;
+        let [mean_mm, rms_mm, median_mm, p95_mm, p99_mm, max_mm, bias_mm] =
+            [mean, rms, median, p95, p99, max, bias].map(|x| x * 1e3);
+        Self { points, mean_mm, rms_mm, median_mm, p95_mm, p99_mm, max_mm, bias_mm: Some(bias_mm) }
+    }
+}
+
+fn name_of(region: Option<Region>) -> &'static str {
+    match region {
+        None => "all",
+        Some(Region::Touched) => "touched",
+        Some(Region::Guessed) => "guessed",
+        Some(Region::Untouched) => "untouched",
+    }
+}
+
+/// What stands below a picture: how far the touched part is off where there is one, else all, and what the colours clip.
+pub(super) fn note(comparison: &Comparison) -> String {
+    let touched = comparison.regions.iter().find(|part| part.region == Some(Region::Touched));
+    let Some(part) = touched.or(comparison.regions.first()) else { return String::new() };
+    let Some(Summary { mean, p95, .. }) = part.mesh_to_truth else { return String::new() };
+    let Histogram { counts, below, above, .. } = &comparison.regions[0].histogram;
+    let beyond = (below + above) as f64 / (below + above + counts.iter().sum::<usize>()).max(1) as f64;
+    let (name, [mean, p95]) = (name_of(part.region), [mean, p95].map(|x| x * 1e3));
+    format!("{name}: mean {mean:.3}, p95 {p95:.3} mm; beyond the colours {:.1} %", beyond * 100.0)
+}
+
+const HEAD: &str = "                            mean      rms   median      p95      p99      max     bias    points";
+
+impl fmt::Display for Told {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (what, shape) in [("mesh", &self.mesh), ("truth", &self.truth)] {
+            let [x, y, z] = shape.size_mm;
+            writeln!(f, "{what:5} {}: {} faces, {x:.1} x {y:.1} x {z:.1} mm", shape.file, shape.faces)?;
+        }
+        if let Some(alignment) = &self.alignment {
+            writeln!(f, "{alignment}")?;
+        }
+        writeln!(f, "distances in mm; bias +: too much material; {:.2} points/mm2", self.after.density_per_mm2)?;
+        writeln!(f, "the mesh shows {:.1} % of the true surface", (1.0 - self.after.unseen_share) * 100.0)?;
+        writeln!(f, "{HEAD}")?;
+        match &self.before {
+            Some(before) => write!(f, "before\n{before}\nafter\n{}", self.after),
+            None => write!(f, "{}", self.after),
+        }
+    }
+}
+
+impl fmt::Display for ComparisonTold {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (at, part) in self.regions.iter().enumerate() {
+            if at > 0 {
+                writeln!(f)?;
+            }
+            write!(f, "{part}")?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for RegionTold {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let rows = [
+            ("mesh to truth", &self.mesh_to_truth),
+            ("truth to mesh", &self.truth_to_mesh),
+            ("vertices", &self.vertices_to_truth),
+            ("cloud", &self.cloud_to_truth),
+            ("truth to cloud", &self.truth_to_cloud),
+        ];
+        let mut region = self.region;
+        for (what, summary) in rows.iter().filter_map(|(what, summary)| Some((what, (*summary).as_ref()?))) {
+            writeln!(f, "{region:9} {what:14} {summary}")?;
+            region = "";
+        }
+        match &self.normals {
+            Some(NormalsTold { median_deg, p95_deg, flipped_share }) => write!(
+                f,
+                "{region:9} normals        median {median_deg:.2}, p95 {p95_deg:.2} deg, flipped {:.3} %",
+                flipped_share * 100.0
+            ),
+            None => write!(f, "{region:9} normals        none"),
+        }
+    }
+}
+
+impl fmt::Display for SummaryTold {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for x in [self.mean_mm, self.rms_mm, self.median_mm, self.p95_mm, self.p99_mm, self.max_mm] {
+            write!(f, "{x:9.4}")?;
+        }
+        match self.bias_mm {
+            Some(bias_mm) => write!(f, "{bias_mm:+9.4}{:10}", self.points),
+            None => write!(f, "{:9}{:10}", "", self.points),
+        }
+    }
+}

@@ -1,0 +1,41 @@
+//! Colours of signed deviations: blue lacks material, white fits, red has too much. The colour-blind can tell them too.
+
+/// Red, green and blue, 0 to 255 each, sRGB.
+pub type Rgb = [u8; 3];
+
+/// From −1 to 1 in equal steps: dark to light blue, nearly white, light to dark red.
+const STOPS: [[f64; 3]; 9] = [
+    [18.0, 44.0, 108.0],
+    [38.0, 92.0, 168.0],
+    [92.0, 150.0, 207.0],
+    [170.0, 205.0, 232.0],
+    [246.0, 245.0, 242.0],
+    [249.0, 200.0, 164.0],
+    [232.0, 132.0, 92.0],
+    [196.0, 58.0, 50.0],
+    [122.0, 12.0, 32.0],
+];
+
+/// The colour of `deviation` on a scale from −`range` to `range` (m, more than 0); what is beyond has the colour of its
+/// end.
+pub fn colour_of(deviation: f64, range: f64) -> Rgb {
+    let last = STOPS.len() - 1;
+    let at = ((deviation / range).clamp(-1.0, 1.0) + 1.0) / 2.0 * last as f64;
+    // NaN becomes 0
+    let below = (at as usize).min(last - 1);
+    let part = at - below as f64;
+    std::array::from_fn(|i| (STOPS[below][i] + (STOPS[below + 1][i] - STOPS[below][i]) * part).round() as u8)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ends_and_middle_are_as_listed_and_what_is_beyond_is_clipped() {
+        for (deviation, stop) in [(-2.0, 0), (-9.0, 0), (0.0, 4), (1.0, 6), (2.0, 8), (f64::INFINITY, 8)] {
+            assert_eq!(colour_of(deviation, 2.0).map(f64::from), STOPS[stop], "{deviation}");
+        }
+        assert_eq!(colour_of(-0.25, 2.0), [208, 225, 237]);
+    }
+}

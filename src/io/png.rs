@@ -1,0 +1,31 @@
+//! Pictures as PNG files.
+
+use std::io;
+use std::path::Path;
+
+use super::atomic::write_atomically;
+
+/// Writes a picture of 8 bits for each of red, green and blue; the file appears whole or not at all.
+///
+/// - `size`: width and height, pixels.
+/// - `pixels`: row by row from the top, three bytes each.
+///
+/// # Errors
+/// [`io::ErrorKind::InvalidInput`] where `pixels` are not as many as `size` says; whatever the disk reports.
+pub fn write_png(path: &Path, size: [u32; 2], pixels: &[u8]) -> io::Result<()> {
+    write_atomically(path, |out| {
+        let mut encoder = png::Encoder::new(out, size[0], size[1]);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        let mut writer = encoder.write_header().map_err(told)?;
+        writer.write_image_data(pixels).map_err(told)?;
+        writer.finish().map_err(told)
+    })
+}
+
+fn told(error: png::EncodingError) -> io::Error {
+    match error {
+        png::EncodingError::IoError(error) => error,
+        error => io::Error::new(io::ErrorKind::InvalidInput, error),
+    }
+}
