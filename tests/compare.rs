@@ -278,7 +278,7 @@ fn a_picture_shows_too_much_in_red_on_the_side_where_it_is() {
     let picture = picture_of(&sides, &mesh, 1);
     let [width, height] = picture.size;
     assert_eq!((width, picture.pixels.len()), (800, 3 * (width * height) as usize));
-    let [left, right] = [width / 8, width * 7 / 8].map(|x| pixel(&picture, x, height / 2));
+    let [left, right] = [width * 5 / 16, width * 11 / 16].map(|x| pixel(&picture, x, height / 2));
     assert!(left[2] > left[0] + 40, "blue where there is too little: {left:?}");
     assert!(right[0] > right[2] + 40, "red where there is too much: {right:?}");
     // the bar of colours has both its ends, clear of light and shade
