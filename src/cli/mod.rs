@@ -7,6 +7,7 @@ mod calibrate;
 mod compare;
 mod demo;
 mod features;
+mod found;
 mod knocks;
 mod latency;
 mod offsets;

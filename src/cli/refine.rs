@@ -281,6 +281,11 @@ impl RefineArguments {
         }
     }
 
+    /// Writes features and touches too.
+    pub(super) fn with_features(self, features: PathBuf, touches: PathBuf) -> Self {
+        Self { features_out: Some(features), touches_out: Some(touches), ..self }
+    }
+
     /// Reads, replays and writes.
     pub(super) fn refined(&self) -> Result<Refined, CliError> {
         let scene = self.scene()?;

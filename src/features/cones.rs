@@ -16,8 +16,12 @@ const AROUND: usize = 36;
 const BESIDE: f64 = 0.08;
 /// A face belongs to a ring when it is within this many radii.
 const NEAR: f64 = 0.15;
-/// Sine of the flattest and of the steepest half angle: 80° and 8°.
-const SINES: [f64; 2] = [0.14, 0.985];
+/// Sines of the sharpest and of the flattest half angle, 20° and 75°: drills and countersinks have 30° to 70°.
+const SINES: [f64; 2] = [0.34, 0.966];
+/// A cone widens by at least this share of the radius.
+const LEAST_WIDTH: f64 = 0.1;
+/// Faces cover at least this share of it.
+const FILLED: f64 = 0.4;
 /// Sines around a ring are alike within this.
 const ALIKE: f64 = 0.2;
 /// So much of the ring has to be alike.
@@ -38,7 +42,11 @@ pub(super) fn add_cones(parted: &mut Parted, walls: &mut Vec<Wall>) {
             let Some(segment) = cone_beyond(parted, &wall, wall.ends[which], out) else { continue };
             let number = parted.segmentation.segments.len();
             let cone = Wall::of_faces(&parted.facets, &segment.primitive, &segment.faces, vec![number]);
-            if let Some(cone) = cone.filter(|cone| cone.coverage > COVERAGE) {
+            let is_sound = |cone: &Wall| {
+                let width = (cone.radius_at(cone.ends[1]) - cone.radius_at(cone.ends[0])).abs();
+                cone.coverage > COVERAGE && cone.filled > FILLED && width > LEAST_WIDTH * wall.radius()
+            };
+            if let Some(cone) = cone.filter(is_sound) {
                 walls.push(cone);
                 parted.segmentation.add(&parted.facets, segment);
             }

@@ -42,6 +42,7 @@ pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detec
     let holes = holes(&parted, &walls);
     let (slots, pockets) = slots(&parted, &of_face, &borders);
     let edges: Vec<_> = straight_edges(&parted, &borders).into_iter().filter(|edge| is_sure(&parted, edge)).collect();
+    let holes: Vec<_> = holes.into_iter().filter(|hole| !is_slot_end(&walls[hole.wall], &slots)).collect();
     let observed = Observed::of(&parted, &of_face, touches);
     let measure = Measure::new(&observed);
 
@@ -64,6 +65,20 @@ pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detec
     features.iter_mut().enumerate().for_each(|(id, feature)| feature.id = id as u32);
     Detection { features, unexplained: unexplained(&parted) }
 }
+
+/// Whether a wall is the half-round end of a slot: with its corners it may look like more than half a turn.
+fn is_slot_end(wall: &Wall, slots: &[Slot]) -> bool {
+    slots.iter().any(|slot| {
+        let is_wide = (2.0 * wall.radius() - slot.width).abs() < ALIKE * slot.width;
+        let v = wall.at(wall.middle()) - slot.centre;
+        let across = slot.out.cross(&slot.direction);
+        let is_inside = v.dot(&across).abs() < ALIKE * slot.width && v.dot(&slot.direction).abs() < slot.length / 2.0;
+        is_wide && is_inside
+    })
+}
+
+/// A wall is an end of a slot when width and place agree within this share of the width.
+const ALIKE: f64 = 0.2;
 
 fn unexplained(parted: &Parted) -> f64 {
     let all: f64 = parted.facets.facets.iter().map(|facet| facet.area).sum();
@@ -113,6 +128,14 @@ impl Place {
     }
 }
 
+impl Place {
+    /// Beside numbers that were touched, how well the mesh is known is not: nobody felt whether it is true.
+    fn known_as(self, to: FittedTo) -> Self {
+        let is_known = to == FittedTo::Mesh || !self.touches.is_empty();
+        Self { std: self.std.filter(|_| is_known), ..self }
+    }
+}
+
 /// The place of a round feature on its axis.
 fn on_axis(fitted: &Fitted<Cylinder>, near: &Point3<f64>) -> Point3<f64> {
     let (start, axis) = (fitted.surface.center(), fitted.surface.pose_of.rotation * Vector3::z());
@@ -131,7 +154,7 @@ fn hole_feature(measure: &Measure, walls: &[Wall], hole: &Hole) -> Feature {
     let axis = fitted.axis(&hole.out);
     let opening = Place::on(measure, hole.rim, &on_axis(&fitted, &hole.opening), &axis.value);
     let bottom = on_axis(&fitted, &(hole.opening - hole.out * hole.depth));
-    let floor = Place::on(measure, hole.floor, &bottom, &axis.value);
+    let floor = Place::on(measure, hole.floor, &bottom, &axis.value).known_as(fitted.to);
     let std = fitted.fit.as_ref().and_then(|fit| lateral_std(fit, &opening.point));
     let touches = together([&fitted.touches, &opening.touches]);
     let centre = Measured { value: opening.point, std, touches };
@@ -141,7 +164,7 @@ fn hole_feature(measure: &Measure, walls: &[Wall], hole: &Hole) -> Feature {
         diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),
         depth: Some(between(&opening, &floor, &axis.value)),
         axis: Some(axis),
-        through: Some(hole.through),
+        through: hole.through,
         cone_angle: cone.map(|cone| cone.number(2.0 * cone.surface.half_angle.abs(), &[(Freedom::Second, 2.0)])),
         ..Feature::new(Kind::Hole, centre, touched, fitted.to)
     }
@@ -153,7 +176,7 @@ fn boss_feature(measure: &Measure, walls: &[Wall], boss: &Boss) -> Feature {
     let axis = fitted.axis(&boss.out);
     let foot = Place::on(measure, Some(boss.base), &on_axis(&fitted, &boss.foot), &axis.value);
     let top = on_axis(&fitted, &(boss.foot + boss.out * boss.height));
-    let top = Place::on(measure, boss.top, &top, &axis.value);
+    let top = Place::on(measure, boss.top, &top, &axis.value).known_as(fitted.to);
     let std = fitted.fit.as_ref().and_then(|fit| lateral_std(fit, &foot.point));
     let centre = Measured { value: foot.point, std, touches: together([&fitted.touches, &foot.touches]) };
     Feature {
@@ -178,7 +201,7 @@ fn slot_feature(measure: &Measure, slot: &Slot, kind: Kind) -> Feature {
     let along = if is_fixed(Freedom::X) { 0.0 } else { (slot.centre - start).dot(&direction) };
     let near = start + direction * along + axis.value * (slot.centre - start).dot(&axis.value);
     let opening = Place::on(measure, Some(slot.land), &near, &axis.value);
-    let floor = Place::on(measure, slot.floor, &(near - axis.value * slot.depth), &axis.value);
+    let floor = Place::on(measure, slot.floor, &(near - axis.value * slot.depth), &axis.value).known_as(fitted.to);
     let across = fitted.fit.as_ref().and_then(|fit| fit.std(Freedom::Y));
     let along = fitted.fit.as_ref().and_then(|fit| fit.std(Freedom::X));
     let centre = Measured {

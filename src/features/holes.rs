@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::primitive::Side;
+use super::primitive::{Primitive, Side};
 use super::scene::{Parted, along_to_plane};
 use super::walls::Wall;
 
@@ -17,7 +17,8 @@ pub(super) struct Hole {
     pub out: Vector3<f64>,
     /// m
     pub depth: f64,
-    pub through: bool,
+    /// `None`: something closes it, and neither a floor nor the tip of a drill
+    pub through: Option<bool>,
     /// number of the plane around the opening
     pub rim: Option<usize>,
     /// number of the plane that is its floor
@@ -43,6 +44,12 @@ pub(super) struct Boss {
 
 /// A wall around a hole covers at least this share of a turn: with a keyway or a slit it is a hole still.
 const HOLE_COVERAGE: f64 = 0.6;
+/// Faces cover at least this share of what a wall is between its ends.
+const FILLED: f64 = 0.4;
+/// A wall is the rest of another when it fits so much worse …
+const LOOSER: f64 = 2.0;
+/// … and place and radius agree within this share of the radius.
+const REST: f64 = 0.3;
 /// That of a boss.
 const BOSS_COVERAGE: f64 = 0.75;
 /// Least height of a wall, in radii: a rim rounded by noise is lower.
@@ -55,10 +62,14 @@ const PROBES: usize = 7;
 const CLOSED: f64 = 1.0;
 /// Rings around an opening, in its radii: the land beside a hole may be narrow.
 const RINGS: [f64; 3] = [1.06, 1.15, 1.3];
+/// Those around a foot: a ball does not reach into its corner.
+const FOOT_RINGS: [f64; 3] = [1.2, 1.35, 1.5];
 /// A plane around an opening is within this many radii of the end of the wall.
 const NEAR_END: f64 = 0.4;
 /// Share of the rings that a plane has to have.
 const RIM: f64 = 0.2;
+/// A floor is square to the axis within 20°.
+const SQUARE: f64 = 0.94;
 /// Walls of one hole are no farther apart along the axis than this many radii.
 const SAME_HOLE: f64 = 0.5;
 /// Axes of one stepped hole are no farther apart than this share of the radius.
@@ -80,13 +91,30 @@ struct End {
 /// All round holes.
 pub(super) fn holes(parted: &Parted, walls: &[Wall]) -> Vec<Hole> {
     let is_hole = |wall: &Wall| wall.side() == Side::Hole && !wall.is_cone();
-    (0..walls.len()).filter(|&at| is_hole(&walls[at])).filter_map(|at| hole(parted, walls, at)).collect()
+    let found: Vec<Hole> =
+        (0..walls.len()).filter(|&at| is_hole(&walls[at])).filter_map(|at| hole(parted, walls, at)).collect();
+    let is_rest = |hole: &Hole| found.iter().any(|other| is_rest_of(parted, &walls[hole.wall], &walls[other.wall]));
+    found.iter().filter(|hole| !is_rest(hole)).cloned().collect()
+}
+
+/// Whether a wall is what a better one leaves of the same hole: where it was hardly touched it is crooked.
+fn is_rest_of(parted: &Parted, wall: &Wall, better: &Wall) -> bool {
+    let tolerance = |wall: &Wall| parted.segment(wall.segments[0]).tolerance;
+    let v = wall.at(wall.middle()) - better.origin;
+    let along = v.dot(&better.axis);
+    let aside = (v - better.axis * along).norm();
+    let beyond = (better.ends[0] - along).max(along - better.ends[1]);
+    tolerance(wall) > LOOSER * tolerance(better)
+        && (wall.radius() - better.radius()).abs() < REST * better.radius()
+        && aside < REST * better.radius()
+        && beyond < better.radius() + wall.height()
 }
 
 fn hole(parted: &Parted, walls: &[Wall], at: usize) -> Option<Hole> {
     let wall = &walls[at];
     let radius = wall.radius();
-    if wall.coverage < HOLE_COVERAGE || wall.height() < LEAST_HEIGHT * radius || !is_free(parted, wall) {
+    let is_whole = wall.coverage >= HOLE_COVERAGE && wall.filled >= FILLED;
+    if !is_whole || wall.height() < LEAST_HEIGHT * radius || !is_free(parted, wall) {
         return None;
     }
     let ends = [end(parted, wall, 0), end(parted, wall, 1)];
@@ -108,7 +136,10 @@ fn hole(parted: &Parted, walls: &[Wall], at: usize) -> Option<Hole> {
     let (bottom, floor) = match other.closed_at {
         // the tip of a drill: the depth is that of the cylinder
         Some(_) if tip.is_some() => (other.t, None),
-        Some(t) => (t, floor_at(parted, wall, t)),
+        Some(t) => match floor_at(parted, wall, t) {
+            Some(floor) => (t, Some(floor)),
+            None => (other.t, None),
+        },
         None => (on_plane(&other).map_or(other.t, |(_, t)| t), None),
     };
     Some(Hole {
@@ -116,7 +147,10 @@ fn hole(parted: &Parted, walls: &[Wall], at: usize) -> Option<Hole> {
         opening: wall.at(top),
         out: wall.axis * open.out,
         depth: (top - bottom).abs(),
-        through: other.closed_at.is_none(),
+        through: match other.closed_at {
+            None => Some(true),
+            Some(_) => (floor.is_some() || tip.is_some()).then_some(false),
+        },
         rim: rim.map(|(number, _)| number),
         floor,
         countersink: cone_beside(walls, at, &open).filter(|&cone| walls[cone].axis.dot(&wall.axis) * open.out > 0.0),
@@ -176,10 +210,13 @@ fn cone_beside(walls: &[Wall], at: usize, end: &End) -> Option<usize> {
     })
 }
 
-/// The plane that closes a wall at `t`.
+/// The plane square to the axis that closes a wall at `t`.
 fn floor_at(parted: &Parted, wall: &Wall, t: f64) -> Option<usize> {
     let number = parted.segment_at(&wall.at(t), NEAR_END * wall.radius())?;
-    along_to_plane(&parted.segment(number).primitive, &wall.origin, &wall.axis).map(|_| number)
+    match parted.segment(number).primitive {
+        Primitive::Plane { normal, .. } if normal.dot(&wall.axis).abs() > SQUARE => Some(number),
+        _ => None,
+    }
 }
 
 /// Holes that follow each other on one axis: the group of each, where it has company.
@@ -211,7 +248,7 @@ fn boss(parted: &Parted, walls: &[Wall], at: usize) -> Option<Boss> {
         let (foot, top) = (wall.ends[which], wall.ends[1 - which]);
         let way = wall.axis * out;
         let (base, share) =
-            parted.plane_around(&wall.at(foot), &way, &RINGS.map(|ring| ring * radius), NEAR_END * radius)?;
+            parted.plane_around(&wall.at(foot), &way, &FOOT_RINGS.map(|ring| ring * radius), NEAR_END * radius)?;
         if share < 2.0 * RIM || wall.height() < LEAST_HEIGHT * radius {
             return None;
         }
