@@ -46,10 +46,12 @@ pub(super) struct Boss {
 const HOLE_COVERAGE: f64 = 0.6;
 /// Faces cover at least this share of what a wall is between its ends.
 const FILLED: f64 = 0.4;
-/// A wall is the rest of another when it fits so much worse …
-const LOOSER: f64 = 2.0;
-/// … and place and radius agree within this share of the radius.
+/// A wall is the rest of another when it is so much smaller …
+const SMALLER: f64 = 0.5;
+/// … place and radius agree within this share of the radius …
 const REST: f64 = 0.3;
+/// … and its axis is off by more than 6°, or its radius by nothing.
+const STRAIGHT: f64 = 0.9945;
 /// That of a boss.
 const BOSS_COVERAGE: f64 = 0.75;
 /// Least height of a wall, in radii: a rim rounded by noise is lower.
@@ -99,14 +101,18 @@ pub(super) fn holes(parted: &Parted, walls: &[Wall]) -> Vec<Hole> {
 
 /// Whether a wall is what a better one leaves of the same hole: where it was hardly touched it is crooked.
 fn is_rest_of(parted: &Parted, wall: &Wall, better: &Wall) -> bool {
-    let tolerance = |wall: &Wall| parted.segment(wall.segments[0]).tolerance;
+    let (rest, whole) = (parted.segment(wall.segments[0]), parted.segment(better.segments[0]));
     let v = wall.at(wall.middle()) - better.origin;
     let along = v.dot(&better.axis);
     let aside = (v - better.axis * along).norm();
     let beyond = (better.ends[0] - along).max(along - better.ends[1]);
-    tolerance(wall) > LOOSER * tolerance(better)
-        && (wall.radius() - better.radius()).abs() < REST * better.radius()
-        && aside < REST * better.radius()
+    let wider = (wall.radius() - better.radius()).abs();
+    // a step of the hole would be straight, and of another radius
+    let is_crooked = wall.axis.dot(&better.axis).abs() < STRAIGHT;
+    !rest.is_exact
+        && rest.area < SMALLER * whole.area
+        && (is_crooked || wider < rest.tolerance)
+        && wider.max(aside) < REST * better.radius()
         && beyond < better.radius() + wall.height()
 }
 
