@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::borders::{StraightEdge, borders, on_both, straight_edges, without_seams};
 use super::cones::add_cones;
-use super::feature::{Feature, FittedTo, Kind, Measured};
+use super::feature::{Feature, FittedTo, Kind, Measured, Surface};
 use super::fit::{Cylinder, Ends, Fit, Freedom, Plane, Stadium};
 use super::holes::{Boss, Hole, bosses, groups, holes};
 use super::measure::{Fitted, Measure};
@@ -165,6 +165,7 @@ fn hole_feature(measure: &Measure, walls: &[Wall], hole: &Hole) -> Feature {
         depth: Some(between(&opening, &floor, &axis.value)),
         axis: Some(axis),
         through: hole.through,
+        surface: Surface::Round(fitted.surface.clone()),
         cone_angle: cone.map(|cone| cone.number(2.0 * cone.surface.half_angle.abs(), &[(Freedom::Second, 2.0)])),
         ..Feature::new(Kind::Hole, centre, touched, fitted.to)
     }
@@ -183,6 +184,7 @@ fn boss_feature(measure: &Measure, walls: &[Wall], boss: &Boss) -> Feature {
         diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),
         depth: Some(between(&top, &foot, &axis.value)),
         axis: Some(axis),
+        surface: Surface::Round(fitted.surface.clone()),
         ..Feature::new(Kind::Boss, centre, measure.observed.touched_share(&wall.segments), fitted.to)
     }
 }
@@ -224,6 +226,7 @@ fn slot_feature(measure: &Measure, slot: &Slot, kind: Kind) -> Feature {
         depth: Some(depth),
         axis: Some(axis),
         through: Some(slot.through),
+        surface: Surface::Slot(fitted.surface.clone()),
         points: vec![opening.point - half, opening.point + half],
         ..Feature::new(kind, centre, touched, fitted.to)
     }

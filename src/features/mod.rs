@@ -22,11 +22,13 @@ mod rays;
 mod scene;
 mod segment;
 mod slots;
+mod track;
 mod walls;
 
 pub use detect::{Detection, detect};
 pub use feature::{Feature, FittedTo, Kind, Measured};
 pub use k_means::{KMeans, k_means};
+pub use track::Tracker;
 
 /// debug
 #[doc(hidden)]

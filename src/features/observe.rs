@@ -36,6 +36,8 @@ const ALIKE: f64 = 0.77;
 const REACH: f64 = 1e-3;
 /// Least standard deviation, m: where none is stated the residuals tell.
 const LEAST_SIGMA: f64 = 1e-6;
+/// A touch counts at least this much.
+const LEAST_WEIGHT: f64 = 0.01;
 /// Vertices of which a surface is fitted, at most.
 const MOST_VERTICES: usize = 1500;
 /// Faces that are asked whether they were touched, at most.
@@ -91,11 +93,7 @@ impl<'a> Observed<'a> {
 
     /// What touches say to a fit.
     pub fn of_touches(&self, numbers: &[u32]) -> Vec<Observation> {
-        let observation = |&number: &u32| {
-            let ProbedPoint { centre, radius, sigma, weight, .. } = self.touches[number as usize];
-            let sigma = (sigma / weight.max(0.01).sqrt()).max(LEAST_SIGMA);
-            Observation { point: centre, offset: radius, sigma, group: self.group[number as usize] }
-        };
+        let observation = |&number: &u32| observation(&self.touches[number as usize], self.group[number as usize]);
         numbers.iter().map(observation).collect()
     }
 
@@ -170,8 +168,15 @@ impl<'a> Observed<'a> {
     }
 }
 
+/// What a touch says to a fit.
+pub(super) fn observation(touch: &ProbedPoint, group: u32) -> Observation {
+    let ProbedPoint { centre, radius, sigma, weight, .. } = *touch;
+    let sigma = (sigma / weight.max(LEAST_WEIGHT).sqrt()).max(LEAST_SIGMA);
+    Observation { point: centre, offset: radius, sigma, group }
+}
+
 /// Numbers of the groups of touches that share their error.
-fn groups(touches: &[ProbedPoint]) -> Vec<u32> {
+pub(super) fn groups(touches: &[ProbedPoint]) -> Vec<u32> {
     let mut last: Option<(u32, i64)> = None;
     let mut group = 0;
     let mut number = |touch: &ProbedPoint| {
