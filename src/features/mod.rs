@@ -4,6 +4,7 @@
 //! by the touches on it where there are enough, else by the mesh ([`detect`]). [`curvature`] and its [`clusters`] are the
 //! paper's way to the places of features.
 
+mod bodies;
 mod borders;
 pub mod clusters;
 mod cones;

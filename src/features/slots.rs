@@ -129,7 +129,7 @@ fn between(parted: &Parted, of_face: &[u32], borders: &Borders, walls: [usize; 2
     let mut middles = Vec::new();
     for p in &starts {
         let width = along_to_plane(&parted.segment(to).primitive, p, &normal)?;
-        let met = parted.rays(width).first(&(p + normal * (OFF * width)), &normal, 1.1 * width);
+        let met = parted.around(from).rays(width).first(&(p + normal * (OFF * width)), &normal, 1.1 * width);
         let is_met = met.is_some_and(|met| of_face[met.face.0 as usize] == to as u32);
         if is_met && width > 0.0 {
             middles.push(p + normal * (width / 2.0));
@@ -211,7 +211,7 @@ struct Opened<'a> {
 
 fn opened(parted: &Parted, of_face: &[u32], seen: &Opened) -> Option<Slot> {
     let Opened { walls, middle, middles, across, width, land, out, area } = *seen;
-    let mut rays = parted.rays(width);
+    let mut rays = parted.around(walls[0]).rays(width);
     let reach = parted.diagonal;
     let up = along_to_plane(&parted.segment(land).primitive, &middle, &out)?;
     if up < 0.0 || rays.free(&middle, &out, reach) < up + width / 2.0 {
