@@ -77,6 +77,8 @@ const LEAST_LEFT: f64 = 0.3;
 const NEAR: usize = 16;
 /// Root mean square of the normals' sines around a flat seed: 5°.
 const FLAT: f64 = 0.09;
+/// A flat piece that goes on in round ones is so many times larger than their facets.
+const FLAT_AMONG_ROUND: f64 = 20.0;
 /// The same around the seed of a cylinder, at least: 5° is what 17° of its turn have.
 const BENT: f64 = 0.09;
 /// A region is a plane without asking further when less than this share of its border goes on smoothly.
@@ -267,6 +269,9 @@ impl<'a> Growing<'a> {
         if bend.spread < FLAT {
             best = self.plane_from(seed, &near, &mut needs);
         }
+        if best.is_none() && self.closeness <= ROUNDING * self.scale.diagonal {
+            best = self.flat_from(seed);
+        }
         let is_bounded = best.as_ref().is_some_and(|plane| self.smooth_share(plane) < BOUNDED);
         if !is_bounded {
             let enough = best.as_ref().map_or(0.0, |plane| MORE * plane.area);
@@ -301,6 +306,21 @@ impl<'a> Growing<'a> {
         let start = moments.plane()?;
         self.is_close(&start, near, needs).then_some(())?;
         self.grown(seed, start)
+    }
+
+    /// The flat piece around a seed of a drawing, where it goes on in round ones, of facets much smaller than it is.
+    fn flat_from(&mut self, seed: u32) -> Option<Region> {
+        let mut moments = Moments::about(self.facets.triangle(seed)[0]);
+        moments.add(self.facets, seed);
+        let region = self.grown(seed, moments.plane()?)?;
+        let facets = self.facets;
+        let is_beside = |&(face, other): &(u32, u32)| {
+            facets.normal(face).dot(&facets.normal(other)).max(0.0) > SMOOTH && region.faces.iter().all(|&f| f != other)
+        };
+        let of_face = |&face: &u32| facets.beside(face).map(move |(_, other)| (face, other));
+        let beside = region.faces.iter().flat_map(of_face).filter(is_beside);
+        let largest = beside.map(|(_, other)| facets.area(other)).fold(0.0, f64::max);
+        (region.area > FLAT_AMONG_ROUND * largest).then_some(region)
     }
 
     /// The largest cylinder through the faces around a seed.

@@ -50,6 +50,10 @@ const LONG: f64 = 1.2;
 const LONG_BOX: f64 = 2.0;
 /// A slot is not wider than this many depths.
 const WIDE: f64 = 3.0;
+/// A pocket is not wider than this many depths: shallower is a step that an uneven surface has too.
+const SHALLOW: f64 = 12.0;
+/// A pocket is at least as long as wide, but for what the sides of a square one differ by.
+const SQUARISH: f64 = 0.95;
 /// A pocket's walls face each other over this share of them.
 const POCKET_SHARE: f64 = 0.5;
 /// Voids are the same when widths and places agree within this share of the width.
@@ -71,21 +75,20 @@ pub(super) fn slots(parted: &Parted, of_face: &[u32], borders: &Borders) -> (Vec
             }
             let Some((slot, share)) = between(parted, of_face, borders, [i, j]) else { continue };
             let is_slot = slot.length > if slot.is_boxed { LONG_BOX } else { LONG } * slot.width;
-            if slot.width > WIDE * slot.depth {
-                continue;
-            }
-            if is_slot {
+            if is_slot && slot.width < WIDE * slot.depth {
                 slots.push(slot);
-            } else if slot.is_boxed
-                && share > POCKET_SHARE
-                && slot.length > slot.width / LONG_BOX
-                && slot.floor.is_some()
-            {
+            } else if !is_slot && share > POCKET_SHARE && is_pocket(&slot) {
                 pockets.push(slot);
             }
         }
     }
     (distinct(slots, is_same_slot), distinct(pockets, is_same_pocket))
+}
+
+/// Whether a void with flat ends is a pocket, seen by the pair of walls that is closer.
+fn is_pocket(slot: &Slot) -> bool {
+    let is_closed = slot.is_boxed && slot.floor.is_some();
+    is_closed && slot.length > SQUARISH * slot.width && slot.width < SHALLOW * slot.depth
 }
 
 /// A void may be seen by several pairs of walls: the largest pair names it.
@@ -236,11 +239,10 @@ fn opened(parted: &Parted, of_face: &[u32], seen: &Opened) -> Option<Slot> {
         let met = rays.first(&middle, &way, reach).filter(|met| met.distance < walls_end(&way) + 1.5 * width);
         lengths[at] = met.map_or_else(|| walls_end(&way), |met| met.distance);
         let number = met.map(|met| named(met.face)).filter(|&number| number != NONE).map(|number| number as usize);
-        flat += usize::from(number.is_some_and(|number| is_square(parted, number, &way)));
-        ends[at] = number;
-        if let Some(number) = number.filter(|&number| is_round_end(parted, number, &out, width)) {
-            ends[at] = Some(number);
-        }
+        let is_flat = number.is_some_and(|number| is_square(parted, number, &way));
+        flat += usize::from(is_flat);
+        // what only reaches there over a seam, as a floor does, is no end
+        ends[at] = number.filter(|&number| is_flat || is_round_end(parted, number, &out, width));
     }
     let centre = middle + out * up + direction * ((lengths[0] - lengths[1]) / 2.0);
     Some(Slot {
