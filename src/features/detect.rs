@@ -236,8 +236,9 @@ fn edge_feature(measure: &Measure, edge: &StraightEdge) -> Option<Feature> {
     })
 }
 
-/// Ends of edges closer together than this are one corner, in diagonals.
+/// Ends of edges closer together than this are one corner, in diagonals; of exact planes: what is farther off is round.
 const SAME_CORNER: f64 = 0.02;
+const SAME_EXACT_CORNER: f64 = 1e-4;
 
 fn corners(parted: &Parted, measure: &Measure, edges: &[StraightEdge]) -> Vec<Feature> {
     let mut found: Vec<([usize; 3], Feature)> = Vec::new();
@@ -248,7 +249,8 @@ fn corners(parted: &Parted, measure: &Measure, edges: &[StraightEdge]) -> Vec<Fe
             planes.dedup();
             let &[i, j, k] = planes.as_slice() else { continue };
             let Some(corner) = corner_of(measure, [i, j, k]) else { continue };
-            let near = SAME_CORNER * parted.diagonal;
+            let is_exact = planes.iter().all(|&number| parted.segment(number).is_exact);
+            let near = if is_exact { SAME_EXACT_CORNER } else { SAME_CORNER } * parted.diagonal;
             let ends = |edge: &StraightEdge| edge.ends.iter().any(|end| (end - corner.centre.value).norm() < near);
             let is_new = found.iter().all(|(planes, _)| *planes != [i, j, k]);
             if is_new && ends(first) && ends(second) {

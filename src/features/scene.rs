@@ -15,6 +15,8 @@ pub(super) struct Parted<'a> {
     pub tree: &'a FaceTree,
     bodies: Bodies,
     pub segmentation: Segmentation,
+    /// of a drawing how far corners are off by rounding, m; `None`: the mesh was measured
+    pub rounding: Option<f64>,
     /// of the box around all, m
     pub diagonal: f64,
     /// median length of an edge, m
@@ -35,7 +37,9 @@ impl<'a> Parted<'a> {
         let [lo, hi] = mesh.bounds();
         let edge = median_edge(&facets);
         let bodies = Bodies::of(&facets);
-        let mut parted = Self { facets, bodies, tree, segmentation, diagonal: (hi - lo).norm(), edge };
+        let exact = segmentation.segments.iter().filter(|segment| segment.is_exact).map(|segment| segment.tolerance);
+        let rounding = exact.min_by(f64::total_cmp);
+        let mut parted = Self { rounding, facets, bodies, tree, segmentation, diagonal: (hi - lo).norm(), edge };
         let of_face = without_seams(&parted);
         let beside: Vec<_> = borders(&parted, &of_face).into_keys().collect();
         parted.segmentation.join_planes(&parted.facets, beside.into_iter());

@@ -310,17 +310,27 @@ impl<'a> Growing<'a> {
 
     /// The flat piece around a seed of a drawing, where it goes on in round ones, of facets much smaller than it is.
     fn flat_from(&mut self, seed: u32) -> Option<Region> {
-        let mut moments = Moments::about(self.facets.triangle(seed)[0]);
-        moments.add(self.facets, seed);
-        let region = self.grown(seed, moments.plane()?)?;
         let facets = self.facets;
-        let is_beside = |&(face, other): &(u32, u32)| {
-            facets.normal(face).dot(&facets.normal(other)).max(0.0) > SMOOTH && region.faces.iter().all(|&f| f != other)
-        };
-        let of_face = |&face: &u32| facets.beside(face).map(move |(_, other)| (face, other));
-        let beside = region.faces.iter().flat_map(of_face).filter(is_beside);
-        let largest = beside.map(|(_, other)| facets.area(other)).fold(0.0, f64::max);
-        (region.area > FLAT_AMONG_ROUND * largest).then_some(region)
+        self.round += 1;
+        self.seen[seed as usize] = self.round;
+        let (mut flat, mut area, mut largest) = (vec![seed], 0.0, 0.0f64);
+        let mut at = 0;
+        while at < flat.len() {
+            area += facets.area(flat[at]);
+            for (_, other) in facets.beside(flat[at]) {
+                let cosine = facets.normal(seed).dot(&facets.normal(other));
+                if cosine > SMOOTH && 1.0 - cosine > COPLANAR {
+                    largest = largest.max(facets.area(other));
+                } else if cosine > SMOOTH && self.seen[other as usize] != self.round {
+                    self.seen[other as usize] = self.round;
+                    flat.push(other);
+                }
+            }
+            at += 1;
+        }
+        let mut moments = Moments::about(facets.triangle(seed)[0]);
+        moments.add(facets, seed);
+        if area > FLAT_AMONG_ROUND * largest { self.grown(seed, moments.plane()?) } else { None }
     }
 
     /// The largest cylinder through the faces around a seed.
