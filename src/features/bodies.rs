@@ -11,7 +11,9 @@ use crate::mesh::{FaceId, FaceTree, TriMesh};
 
 /// The closed pieces of a mesh, where there is more than one piece.
 pub(super) struct Bodies {
-    /// number of the body of each face, [`NONE`] where a piece has a border
+    /// number of the piece of each face; empty where there is one alone
+    piece_of: Vec<u32>,
+    /// number of the body of each face, [`NONE`] where a piece has a border; empty where there is one piece alone
     of_face: Vec<u32>,
     bodies: Vec<Body>,
 }
@@ -36,7 +38,7 @@ impl Bodies {
     pub fn of(facets: &Facets) -> Self {
         let (piece_of, pieces) = pieces(facets);
         if pieces.len() < 2 {
-            return Self { of_face: Vec::new(), bodies: Vec::new() };
+            return Self { piece_of: Vec::new(), of_face: Vec::new(), bodies: Vec::new() };
         }
         let mut of_face = vec![NONE; piece_of.len()];
         let mut bodies = Vec::new();
@@ -47,7 +49,12 @@ impl Bodies {
             faces.iter().for_each(|&face| of_face[face as usize] = bodies.len() as u32);
             bodies.push(Body { tree: FaceTree::new(&mesh), mesh, faces });
         }
-        Self { of_face, bodies }
+        Self { piece_of, of_face, bodies }
+    }
+
+    /// Number of the piece that a face belongs to.
+    pub fn piece_of(&self, face: u32) -> u32 {
+        self.piece_of.get(face as usize).copied().unwrap_or(0)
     }
 
     /// What a face sees.

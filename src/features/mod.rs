@@ -20,6 +20,7 @@ mod measure;
 mod observe;
 mod primitive;
 mod rays;
+mod rims;
 mod scene;
 mod segment;
 mod slots;

@@ -186,6 +186,11 @@ impl<'a> Observed<'a> {
         (0..count).filter(|&i| self.is_touched(&at(i))).count() as f64 / count as f64
     }
 
+    /// Share of some places that was touched.
+    pub fn touched_at(&self, places: &[Point3<f64>]) -> f64 {
+        places.iter().filter(|p| self.is_touched(p)).count() as f64 / places.len().max(1) as f64
+    }
+
     fn is_touched(&self, p: &Point3<f64>) -> bool {
         let [x, y, z] = self.cell(p);
         let near = |&number: &u32| (self.touches[number as usize].point - p).norm() <= self.reach;

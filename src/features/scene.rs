@@ -13,7 +13,7 @@ use crate::mesh::{FaceTree, TriMesh};
 pub(super) struct Parted<'a> {
     pub facets: Facets<'a>,
     pub tree: &'a FaceTree,
-    bodies: Bodies,
+    pub bodies: Bodies,
     pub segmentation: Segmentation,
     /// of a drawing how far corners are off by rounding, m; `None`: the mesh was measured
     pub rounding: Option<f64>,
