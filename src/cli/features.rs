@@ -178,7 +178,12 @@ const KINDS: [Kind; 7] = [Kind::Hole, Kind::Slot, Kind::Pocket, Kind::Boss, Kind
 
 fn count(features: &[Feature], kind: Kind) -> Option<String> {
     let count = features.iter().filter(|feature| feature.kind == kind).count();
-    (count > 0).then(|| format!("{count} {}{}", kind.name(), if count == 1 { "" } else { "s" }))
+    let ending = match kind {
+        _ if count == 1 => "",
+        Kind::Boss => "es",
+        _ => "s",
+    };
+    (count > 0).then(|| format!("{count} {}{ending}", kind.name()))
 }
 
 struct Row<'a>(&'a Feature);

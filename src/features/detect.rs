@@ -10,6 +10,7 @@ use super::holes::{Boss, Hole, bosses, groups, holes};
 use super::measure::{Fitted, Measure};
 use super::observe::Observed;
 use super::primitive::Primitive;
+use super::rims::{Rim, rims};
 use super::scene::Parted;
 use super::slots::{Slot, slots};
 use super::walls::Wall;
@@ -51,6 +52,8 @@ pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detec
         let group = group.map(|number| number as u32);
         features.push(Feature { group, ..hole_feature(&measure, &walls, hole) });
     }
+    let is_new = |rim: &Rim| holes.iter().all(|hole| !is_rim_of(&walls[hole.wall], rim));
+    features.extend(rims(&parted).iter().filter(|rim| is_new(rim)).map(|rim| rim_feature(&measure, rim)));
     features.extend(slots.iter().map(|slot| slot_feature(&measure, slot, Kind::Slot)));
     features.extend(pockets.iter().map(|pocket| slot_feature(&measure, pocket, Kind::Pocket)));
     features.extend(bosses(&parted, &walls).iter().map(|boss| boss_feature(&measure, &walls, boss)));
@@ -171,6 +174,33 @@ fn hole_feature(measure: &Measure, walls: &[Wall], hole: &Hole) -> Feature {
     }
 }
 
+/// A rim is of a wall when it is no farther from its axis, and from its ends, than this many radii.
+const OF_WALL: f64 = 0.5;
+
+/// Whether a round opening is an end of a hole that has a wall.
+fn is_rim_of(wall: &Wall, rim: &Rim) -> bool {
+    let (v, near) = (rim.centre - wall.origin, OF_WALL * wall.radius());
+    let along = v.dot(&wall.axis);
+    let is_between = along > wall.ends[0] - near && along < wall.ends[1] + near;
+    is_between && (v - wall.axis * along).norm() < near
+}
+
+/// A hole of which there is no wall: how deep it is and whether it goes through is not known.
+fn rim_feature(measure: &Measure, rim: &Rim) -> Feature {
+    let fitted = Fitted {
+        surface: rim.fit.surface.clone(),
+        fit: Some(rim.fit.clone()),
+        touches: Vec::new(),
+        to: FittedTo::Mesh,
+    };
+    let centre = Measured { value: rim.centre, std: lateral_std(&rim.fit, &rim.centre), touches: Vec::new() };
+    Feature {
+        diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),
+        axis: Some(fitted.axis(&rim.out)),
+        ..Feature::new(Kind::Hole, centre, measure.observed.touched_at(&rim.corners), FittedTo::Mesh)
+    }
+}
+
 fn boss_feature(measure: &Measure, walls: &[Wall], boss: &Boss) -> Feature {
     let wall = &walls[boss.wall];
     let fitted = measure.cylinder(wall, Some(boss.base));
@@ -262,8 +292,9 @@ fn edge_feature(measure: &Measure, edge: &StraightEdge) -> Option<Feature> {
     })
 }
 
-/// Ends of edges closer together than this are one corner, in diagonals.
+/// Ends of edges closer together than this are one corner, in diagonals; of exact planes: what is farther off is round.
 const SAME_CORNER: f64 = 0.02;
+const SAME_EXACT_CORNER: f64 = 1e-4;
 
 fn corners(parted: &Parted, measure: &Measure, edges: &[StraightEdge]) -> Vec<Feature> {
     let mut found: Vec<([usize; 3], Feature)> = Vec::new();
@@ -274,7 +305,8 @@ fn corners(parted: &Parted, measure: &Measure, edges: &[StraightEdge]) -> Vec<Fe
             planes.dedup();
             let &[i, j, k] = planes.as_slice() else { continue };
             let Some(corner) = corner_of(measure, [i, j, k]) else { continue };
-            let near = SAME_CORNER * parted.diagonal;
+            let is_exact = planes.iter().all(|&number| parted.segment(number).is_exact);
+            let near = if is_exact { SAME_EXACT_CORNER } else { SAME_CORNER } * parted.diagonal;
             let ends = |edge: &StraightEdge| edge.ends.iter().any(|end| (end - corner.centre.value).norm() < near);
             let is_new = found.iter().all(|(planes, _)| *planes != [i, j, k]);
             if is_new && ends(first) && ends(second) {

@@ -76,6 +76,8 @@ const SQUARE: f64 = 0.94;
 const SAME_HOLE: f64 = 0.5;
 /// Axes of one stepped hole are no farther apart than this share of the radius.
 const SAME_AXIS: f64 = 0.15;
+/// Heads of countersunk screws are 1.8 to 2 times as wide as their holes, broken edges seldom more than 1.1 times.
+const HEAD: f64 = 1.25;
 
 /// One end of a wall.
 #[derive(Clone, Copy, Debug)]
@@ -138,7 +140,7 @@ fn hole(parted: &Parted, walls: &[Wall], at: usize) -> Option<Hole> {
     };
     let rim = on_plane(&open);
     let top = rim.map_or(open.t, |(_, t)| t);
-    let tip = cone_beside(walls, at, &other);
+    let tip = cone_beside(walls, at, &other).filter(|&cone| walls[cone].axis.dot(&wall.axis) * other.out < 0.0);
     let (bottom, floor) = match other.closed_at {
         // the tip of a drill: the depth is that of the cylinder
         Some(_) if tip.is_some() => (other.t, None),
@@ -159,15 +161,16 @@ fn hole(parted: &Parted, walls: &[Wall], at: usize) -> Option<Hole> {
         },
         rim: rim.map(|(number, _)| number),
         floor,
-        countersink: cone_beside(walls, at, &open).filter(|&cone| walls[cone].axis.dot(&wall.axis) * open.out > 0.0),
+        countersink: cone_beside(walls, at, &open).filter(|&cone| is_countersink(&walls[cone], wall, open.out)),
     })
 }
 
 /// Whether there is nothing around the axis.
 fn is_free(parted: &Parted, wall: &Wall) -> bool {
+    let around = parted.around(wall.segments[0]);
     let free = (1..PROBES).filter(|&i| {
         let p = wall.at(wall.ends[0] + wall.height() * i as f64 / PROBES as f64);
-        parted.tree.closest(parted.facets.mesh, &p, FREE * wall.radius()).is_none()
+        around.closest(&p, FREE * wall.radius()).is_none()
     });
     // a lid that the scanner saw, or a chip, may close a part of it
     2 * free.count() >= PROBES
@@ -178,10 +181,11 @@ fn end(parted: &Parted, wall: &Wall, which: usize) -> End {
     let radius = wall.radius();
     let middle = wall.middle();
     let reach = wall.height() / 2.0 + CLOSED * radius;
-    let met = parted.rays(radius).first(&wall.at(middle), &(wall.axis * out), reach);
+    let around = parted.around(wall.segments[0]);
+    let met = around.rays(radius).first(&wall.at(middle), &(wall.axis * out), reach);
     let closed_at = met.map(|met| middle + out * met.distance);
     let rings = RINGS.map(|ring| ring * radius);
-    let rim = parted.plane_around(&wall.at(t), &(wall.axis * out), &rings, NEAR_END * radius);
+    let rim = parted.plane_around(&around, &wall.at(t), &(wall.axis * out), &rings, NEAR_END * radius);
     End { t, out, closed_at, rim: rim.filter(|&(_, share)| share > RIM) }
 }
 
@@ -216,9 +220,14 @@ fn cone_beside(walls: &[Wall], at: usize, end: &End) -> Option<usize> {
     })
 }
 
+/// Whether a cone at the opening of a hole is wide enough for the head of a screw, not the edge of the hole broken.
+fn is_countersink(cone: &Wall, wall: &Wall, out: f64) -> bool {
+    cone.axis.dot(&wall.axis) * out > 0.0 && cone.radius_at(cone.ends[1]) > HEAD * wall.radius()
+}
+
 /// The plane square to the axis that closes a wall at `t`.
 fn floor_at(parted: &Parted, wall: &Wall, t: f64) -> Option<usize> {
-    let number = parted.segment_at(&wall.at(t), NEAR_END * wall.radius())?;
+    let number = parted.segment_at(&parted.around(wall.segments[0]), &wall.at(t), NEAR_END * wall.radius())?;
     match parted.segment(number).primitive {
         Primitive::Plane { normal, .. } if normal.dot(&wall.axis).abs() > SQUARE => Some(number),
         _ => None,
@@ -249,19 +258,25 @@ pub(super) fn bosses(parted: &Parted, walls: &[Wall]) -> Vec<Boss> {
 
 fn boss(parted: &Parted, walls: &[Wall], at: usize) -> Option<Boss> {
     let wall = &walls[at];
-    let radius = wall.radius();
+    let (radius, around) = (wall.radius(), parted.around(wall.segments[0]));
     [(0, 1.0), (1, -1.0)].into_iter().find_map(|(which, out)| {
         let (foot, top) = (wall.ends[which], wall.ends[1 - which]);
         let way = wall.axis * out;
-        let (base, share) =
-            parted.plane_around(&wall.at(foot), &way, &FOOT_RINGS.map(|ring| ring * radius), NEAR_END * radius)?;
+        let (base, share) = parted.plane_around(
+            &around,
+            &wall.at(foot),
+            &way,
+            &FOOT_RINGS.map(|ring| ring * radius),
+            NEAR_END * radius,
+        )?;
         if share < 2.0 * RIM || wall.height() < LEAST_HEIGHT * radius {
             return None;
         }
         let to_plane = |number: usize| along_to_plane(&parted.segment(number).primitive, &wall.origin, &wall.axis);
         let foot = to_plane(base)?;
-        let lid =
-            parted.plane_around(&wall.at(top), &way, &[FREE * radius], NEAR_END * radius).map(|(number, _)| number);
+        let lid = parted
+            .plane_around(&around, &wall.at(top), &way, &[FREE * radius], NEAR_END * radius)
+            .map(|(number, _)| number);
         let top = lid.and_then(to_plane).unwrap_or(top);
         let height = (top - foot) * out;
         (height > 0.0).then(|| Boss { wall: at, foot: wall.at(foot), out: way, height, base, top: lid })

@@ -4,6 +4,7 @@
 //! by the touches on it where there are enough, else by the mesh ([`detect`]). [`curvature`] and its [`clusters`] are the
 //! paper's way to the places of features.
 
+mod bodies;
 mod borders;
 pub mod clusters;
 mod cones;
@@ -19,6 +20,7 @@ mod measure;
 mod observe;
 mod primitive;
 mod rays;
+mod rims;
 mod scene;
 mod segment;
 mod slots;

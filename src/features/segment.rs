@@ -83,6 +83,8 @@ const LEAST_LEFT: f64 = 0.3;
 const NEAR: usize = 16;
 /// Root mean square of the normals' sines around a flat seed: 5°.
 const FLAT: f64 = 0.09;
+/// A flat piece that goes on in round ones is so many times larger than their facets.
+const FLAT_AMONG_ROUND: f64 = 20.0;
 /// The same around the seed of a cylinder, at least: 5° is what 17° of its turn have.
 const BENT: f64 = 0.09;
 /// A region is a plane without asking further when less than this share of its border goes on smoothly.
@@ -282,6 +284,9 @@ impl<'a> Growing<'a> {
         if bend.spread < FLAT {
             best = self.plane_from(seed, &near, &mut needs);
         }
+        if best.is_none() && self.closeness <= ROUNDING * self.scale.diagonal {
+            best = self.flat_from(seed);
+        }
         let is_bounded = best.as_ref().is_some_and(|plane| self.smooth_share(plane) < BOUNDED);
         if !is_bounded {
             let enough = best.as_ref().map_or(0.0, |plane| MORE * plane.area);
@@ -327,6 +332,31 @@ impl<'a> Growing<'a> {
     /// Whether only what a drawing has is taken in this round.
     fn is_exact(&self) -> bool {
         self.tolerance <= ROUNDING * self.scale.diagonal
+    }
+
+    /// The flat piece around a seed of a drawing, where it goes on in round ones, of facets much smaller than it is.
+    fn flat_from(&mut self, seed: u32) -> Option<Region> {
+        let facets = self.facets;
+        self.round += 1;
+        self.seen[seed as usize] = self.round;
+        let (mut flat, mut area, mut largest) = (vec![seed], 0.0, 0.0f64);
+        let mut at = 0;
+        while at < flat.len() {
+            area += facets.area(flat[at]);
+            for (_, other) in facets.beside(flat[at]) {
+                let cosine = facets.normal(seed).dot(&facets.normal(other));
+                if cosine > SMOOTH && 1.0 - cosine > COPLANAR {
+                    largest = largest.max(facets.area(other));
+                } else if cosine > SMOOTH && self.seen[other as usize] != self.round {
+                    self.seen[other as usize] = self.round;
+                    flat.push(other);
+                }
+            }
+            at += 1;
+        }
+        let mut moments = Moments::about(facets.triangle(seed)[0]);
+        moments.add(facets, seed);
+        if area > FLAT_AMONG_ROUND * largest { self.grown(seed, moments.plane()?) } else { None }
     }
 
     /// The largest cylinder through the faces around a seed.
