@@ -278,7 +278,7 @@ fn a_picture_shows_too_much_in_red_on_the_side_where_it_is() {
     let picture = picture_of(&sides, &mesh, 1);
     let [width, height] = picture.size;
     assert_eq!((width, picture.pixels.len()), (800, 3 * (width * height) as usize));
-    let [left, right] = [width / 8, width * 7 / 8].map(|x| pixel(&picture, x, height / 2));
+    let [left, right] = [width * 5 / 16, width * 11 / 16].map(|x| pixel(&picture, x, height / 2));
     assert!(left[2] > left[0] + 40, "blue where there is too little: {left:?}");
     assert!(right[0] > right[2] + 40, "red where there is too much: {right:?}");
     // the bar of colours has both its ends, clear of light and shade
@@ -396,6 +396,35 @@ fn the_verb_tells_numbers_and_writes_picture_and_colours() {
     assert_eq!(code, 0);
     assert!(err.contains("3 motions leave the mesh"), "{err}");
     assert!(out.contains("aligned by icp") && out.contains("not determined") && out.contains("mesh to truth"), "{out}");
+}
+
+#[test]
+fn a_refined_mesh_is_told_by_what_it_rests_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let [_, truth] = plates(folder.path());
+    let path = folder.path().join("refined.ply");
+    let mesh = square(4, 0.25e-3);
+    let told_of = |columns: &[VertexColumn<'_>]| -> Vec<(String, u64)> {
+        write_mesh_with(&path, &mesh, columns, MeshUnit::Millimetre).unwrap();
+        let output = touchup(&["compare", path.to_str().unwrap(), &truth, "--samples", "1000", "--json"]);
+        let (code, out, err) = told(&output);
+        assert_eq!((code, err), (0, ""));
+        let told: serde_json::Value = serde_json::from_str(out).unwrap();
+        let regions = told["after"]["regions"].as_array().unwrap().iter();
+        let points = |part: &serde_json::Value| part["vertices_to_truth"]["points"].as_u64().unwrap();
+        regions.map(|part| (part["region"].as_str().unwrap().to_owned(), points(part))).collect()
+    };
+    // 3 scanned, 10 felt, 7 guessed, 5 that the ball cannot reach, which are guessed too
+    let support: Vec<f32> =
+        [(0.0, 3), (1.0, 10), (2.0, 7), (3.0, 5)].iter().flat_map(|&(n, times)| vec![n; times]).collect();
+    let touched: Vec<f32> = [(0.0, 4), (1.0, 12), (0.5, 9)].iter().flat_map(|&(n, times)| vec![n; times]).collect();
+    let column = |name, values: &Vec<f32>| VertexColumn { name, values: values.clone().into() };
+    let named = |counts: [u64; 4]| -> Vec<(String, u64)> {
+        ["all", "touched", "guessed", "untouched"].iter().map(|name| (*name).to_owned()).zip(counts).collect()
+    };
+    assert_eq!(told_of(&[column("touched", &touched), column("support", &support)]), named([25, 10, 12, 3]));
+    assert_eq!(told_of(&[column("touched", &touched)]), named([25, 12, 9, 4]));
+    assert_eq!(told_of(&[]), [("all".to_owned(), 25)]);
 }
 
 #[test]

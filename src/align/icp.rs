@@ -126,7 +126,7 @@ const FIRST_WIDTH: f64 = 2.0;
 const REST: f64 = 0.3;
 /// How often the weights are made anew before the next partners.
 const WEIGHINGS: usize = 4;
-/// Lengths below this are rounding, over the size of the target: 10 nm for 100 mm would still be seen.
+/// Lengths below this are rounding, over the size of the target and its distance from the origin: 1 pm for 100 mm.
 const ROUNDING: f64 = 1e-11;
 
 /// The rigid motion at which `points` fit `target`, from a start that is roughly right.

@@ -54,7 +54,7 @@ pub(super) struct CompareArguments {
     #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', num_args = 3, allow_negative_numbers = true)]
     view: Option<Vec<f64>>,
     /// Points spread over TRUTH; over MESH they are as dense
-    #[arg(long, value_name = "N", default_value_t = 200_000, value_parser = clap::value_parser!(u32).range(100..=20_000_000))]
+    #[arg(long, value_name = "N", default_value_t = 200_000, value_parser = clap::value_parser!(u32).range(100..=5_000_000))]
     samples: u32,
     /// Another seed spreads them anew
     #[arg(long, value_name = "N", default_value_t = 1)]
