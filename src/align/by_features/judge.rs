@@ -6,26 +6,30 @@ use super::matching::Matching;
 use super::{Alternative, OrientedPoint, SAME, Surfaces};
 use crate::align::icp::{IcpFit, IcpParams, icp};
 
-/// Points with which motions are compared, at most; all bring the last ones to rest.
-const MOST_POINTS: usize = 6_000;
+/// Points that bring each motion to rest, at most; all judge it, and bring the last ones to rest.
+const MOST_POINTS: usize = 5_000;
 /// Points farther than so many tolerances have no part in a fit: lids on holes, what is not there.
-const REACH: f64 = 10.0;
+const REACH: f64 = 5.0;
 /// A point agrees within so many scatters of the best fit.
 const SCATTERS: f64 = 4.0;
 /// … or this share of a tolerance: below it nothing is told apart.
-const LEAST_NEAR: f64 = 0.1;
+const LEAST_NEAR: f64 = 0.05;
 /// Cosine between normals that face the same way: 45°, as noise turns the small faces of a scan.
 const FACING: f64 = 0.7;
 /// A point belongs to the target at all within so many tolerances: a scan that is noisy and too fat still does.
-const COARSE: f64 = 3.0;
+const COARSE: f64 = 1.5;
 /// What a motion explains alone outweighs so many times what the other explains alone.
 const CLEARLY: f64 = 3.0;
-/// Share of the surface that decides.
-const SURFACE: f64 = 0.005;
+/// Points that decide, at least …
+const POINTS: f64 = 8.0;
+/// … and over the points that the better motion leaves over: where it fits all but the noise, noise decides nothing.
+const LEFT_OVER: f64 = 0.05;
 /// Weight of features that decides: one opening, or what else is as much.
 const FEATURES: f64 = 1.0;
-/// A feature is not there when it is off by so many times what it may be.
-const ABSENT: f64 = 2.0;
+/// A feature is not there when it is off by so many times what half of those that are there are off …
+const ABSENT: f64 = 3.0;
+/// … but at least, and at most, by so much of what it may be.
+const ABSENT_BETWEEN: [f64; 2] = [0.3, 2.0];
 
 /// A motion with what it explains.
 #[derive(Clone, Debug)]
@@ -34,10 +38,9 @@ pub(super) struct Judged {
     fit: Option<IcpFit>,
     /// of each feature of the source: its best partner, and how far that is off over what it may be
     partners: Vec<Option<(usize, f64)>>,
-    /// of each point: whether it lies on the target as well as the best fit lets it; empty without surfaces
-    agrees: Vec<bool>,
-    /// share of the points that belong to the target at all
-    agreeing: Option<f64>,
+    /// of each point: how far it is from the target that faces the same way, m; infinite beyond the coarse bound. Empty
+    /// without surfaces
+    distances: Vec<f64>,
 }
 
 impl Judged {
@@ -51,12 +54,21 @@ impl Judged {
 
     /// Share of the points that agree.
     pub fn agreeing(&self) -> Option<f64> {
-        self.agreeing
+        let count = self.distances.iter().filter(|distance| distance.is_finite()).count();
+        (!self.distances.is_empty()).then(|| count as f64 / self.distances.len() as f64)
     }
 
     /// Of what is explained.
     pub fn weight(&self, matching: &Matching) -> f64 {
         self.explained().map(|[own, _]| matching.source[own].weight()).sum()
+    }
+
+    /// From which misfit on a feature is not there, by how well others fit.
+    fn absent(&self) -> f64 {
+        let mut misfits: Vec<f64> = self.explained().map(|[own, _]| self.misfit(own)).collect();
+        misfits.sort_by(f64::total_cmp);
+        let middle = misfits.get(misfits.len() / 2).copied().unwrap_or(1.0);
+        (ABSENT * middle).clamp(ABSENT_BETWEEN[0], ABSENT_BETWEEN[1])
     }
 
     fn misfit(&self, own: usize) -> f64 {
@@ -68,25 +80,25 @@ impl Judged {
 pub(super) struct Judge<'a> {
     pub matching: Matching,
     surfaces: Option<&'a Surfaces<'a>>,
-    /// a part of the points, in the mirror where that is asked for
+    /// in the mirror where that is asked for
     points: Vec<OrientedPoint>,
 }
 
 impl<'a> Judge<'a> {
     pub fn new(matching: Matching, surfaces: Option<&'a Surfaces<'a>>, in_mirror: bool) -> Self {
         let points = surfaces.map_or(&[][..], |surfaces| surfaces.points);
-        let step = points.len().div_ceil(MOST_POINTS).max(1);
         let flip = |v: Vector3<f64>| if in_mirror { Vector3::new(-v.x, v.y, v.z) } else { v };
-        let some = points
+        let all = points
             .iter()
             .step_by(step)
             .map(|p| OrientedPoint { point: Point3::from(flip(p.point.coords)), normal: flip(p.normal) });
-        Self { matching, surfaces, points: some.collect() }
+        Self { matching, surfaces, points: all.collect() }
     }
 
     /// Brings each motion to rest and judges it; the best first, no two alike.
     pub fn all(&self, motions: &[Isometry3<f64>]) -> Vec<Judged> {
-        let points: Vec<Point3<f64>> = self.points.iter().map(|p| p.point).collect();
+        let step = self.points.len().div_ceil(MOST_POINTS).max(1);
+        let points: Vec<Point3<f64>> = self.points.iter().step_by(step).map(|p| p.point).collect();
         let mut rested: Vec<(Isometry3<f64>, Option<IcpFit>)> = Vec::new();
         for coarse in motions {
             let fit = self.rest(&points, coarse);
@@ -96,10 +108,7 @@ impl<'a> Judge<'a> {
                 rested.push((motion, fit));
             }
         }
-        let scatter = rested.iter().filter_map(|(_, fit)| Some(fit.as_ref()?.scatter)).fold(f64::INFINITY, f64::min);
-        let tolerance = self.matching.tolerance;
-        let near = (SCATTERS * scatter).clamp(LEAST_NEAR * tolerance, COARSE * tolerance);
-        let mut judged: Vec<_> = rested.into_iter().map(|(motion, fit)| self.judged(motion, fit, near)).collect();
+        let mut judged: Vec<_> = rested.into_iter().map(|(motion, fit)| self.judged(motion, fit)).collect();
         let all = self.matching.source.iter().map(|own| own.weight()).sum::<f64>();
         let merit = |judged: &Judged| judged.weight(&self.matching) / all + judged.agreeing().unwrap_or(0.0);
         judged.sort_by(|a, b| merit(b).total_cmp(&merit(a)));
@@ -112,7 +121,7 @@ impl<'a> Judge<'a> {
         icp(points, target, tree, coarse, &params).ok()
     }
 
-    fn judged(&self, motion: Isometry3<f64>, fit: Option<IcpFit>, near: f64) -> Judged {
+    fn judged(&self, motion: Isometry3<f64>, fit: Option<IcpFit>) -> Judged {
         let coarse = COARSE * self.matching.tolerance;
         let distance = |p: &OrientedPoint| {
             let Surfaces { target, tree, .. } = self.surfaces?;
@@ -120,21 +129,21 @@ impl<'a> Judge<'a> {
             let faces = target.normal(hit.face).dot(&(motion * p.normal)) > FACING;
             faces.then(|| hit.distance_squared.sqrt())
         };
-        let distances: Vec<Option<f64>> = self.points.iter().map(distance).collect();
-        let agreeing = distances.iter().flatten().count() as f64 / distances.len() as f64;
-        Judged {
-            motion,
-            fit,
-            partners: self.matching.partners(&motion),
-            agrees: distances.iter().map(|distance| distance.is_some_and(|d| d <= near)).collect(),
-            agreeing: (!distances.is_empty()).then_some(agreeing),
-        }
+        let distances = self.points.iter().map(|p| distance(p).unwrap_or(f64::INFINITY)).collect();
+        Judged { motion, fit, partners: self.matching.partners(&motion), distances }
     }
 
     /// Whether the evidence decides for `a` against `b`, and nothing against that.
-    pub fn rules_out(&self, a: &Judged, b: &Judged) -> bool {
+    fn rules_out(&self, a: &Judged, b: &Judged) -> bool {
         let speaks = |a, b| self.by_surface(a, b) || self.by_features(a, b);
         speaks(a, b) && !speaks(b, a)
+    }
+
+    /// Those that no other rules out; all where each is ruled out by one.
+    pub fn left_over(&self, judged: Vec<Judged>) -> Vec<Judged> {
+        let is_ruled_out = |b: &Judged| judged.iter().any(|a| self.rules_out(a, b));
+        let left: Vec<Judged> = judged.iter().filter(|b| !is_ruled_out(b)).cloned().collect();
+        if left.is_empty() { judged } else { left }
     }
 
     /// Whether all evidence decides for `a` against `b`.
@@ -142,16 +151,31 @@ impl<'a> Judge<'a> {
         self.by_features(a, b) && (self.surfaces.is_none() || self.by_surface(a, b))
     }
 
+    /// Among all points that belong to the target at all, or among those that lie on it as well as the best fit lets them.
     fn by_surface(&self, a: &Judged, b: &Judged) -> bool {
-        let alone = |a: &Judged, b: &Judged| a.agrees.iter().zip(&b.agrees).filter(|(a, b)| **a && !**b).count() as f64;
-        let (own, other) = (alone(a, b), alone(b, a));
-        own - other >= SURFACE * self.points.len() as f64 && own > CLEARLY * other
+        let alone = |a: &Judged, b: &Judged, near: f64| {
+            a.distances.iter().zip(&b.distances).filter(|(a, b)| **a <= near && **b > near).count() as f64
+        };
+        [self.near(a), COARSE * self.matching.tolerance].into_iter().any(|near| {
+            let (own, other) = (alone(a, b, near), alone(b, a, near));
+            let left_over = a.distances.iter().filter(|distance| **distance > near).count() as f64;
+            own - other >= POINTS.max(LEFT_OVER * left_over) && own > CLEARLY * other
+        })
+    }
+
+    /// Within which a point lies on the target as well as the fit lets it, m.
+    fn near(&self, judged: &Judged) -> f64 {
+        let (tolerance, scatter) = (self.matching.tolerance, judged.fit.as_ref().map_or(0.0, |fit| fit.scatter));
+        (SCATTERS * scatter).clamp(LEAST_NEAR * tolerance, COARSE * tolerance)
     }
 
     fn by_features(&self, a: &Judged, b: &Judged) -> bool {
         let alone = |a: &Judged, b: &Judged| -> f64 {
+            let absent = a.absent();
             let own = self.matching.source.iter().enumerate();
-            own.filter(|(i, _)| a.misfit(*i) <= 1.0 && b.misfit(*i) > ABSENT).map(|(_, own)| own.weight()).sum()
+            own.filter(|(i, _)| a.misfit(*i) <= 1.0 && b.misfit(*i) > absent.max(a.misfit(*i)))
+                .map(|(_, own)| own.weight())
+                .sum()
         };
         let (own, other) = (alone(a, b), alone(b, a));
         own >= FEATURES && own > CLEARLY * other
@@ -159,8 +183,7 @@ impl<'a> Judge<'a> {
 
     /// The motions as they are told, brought to rest with all points.
     pub fn settled(&self, judged: Vec<Judged>) -> Vec<Alternative> {
-        let points: Vec<Point3<f64>> =
-            self.surfaces.map_or(&[][..], |surfaces| surfaces.points).iter().map(|p| p.point).collect();
+        let points: Vec<Point3<f64>> = self.points.iter().map(|p| p.point).collect();
         let mut alternatives: Vec<Alternative> = Vec::new();
         for judged in judged {
             let fit = self.rest(&points, &judged.motion).or_else(|| judged.fit.clone());

@@ -27,7 +27,7 @@ use crate::mesh::{FaceTree, TriMesh};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FeaturesParams {
     /// By how much features may be out of place beyond three standard uncertainties, over the size of the target. Default
-    /// 0.005: 0.5 mm on a part of 100 mm, as a scan has them.
+    /// 0.01: 1 mm on a part of 100 mm, as a poor scan has them.
     pub tolerance: f64,
     /// By how much diameters and widths may differ beyond three standard uncertainties, over their size. Default 0.05:
     /// the flats of a hole of 12 sides lie 3.4 % inside.
@@ -36,7 +36,7 @@ pub struct FeaturesParams {
 
 impl Default for FeaturesParams {
     fn default() -> Self {
-        Self { tolerance: 0.005, size_tolerance: 0.05 }
+        Self { tolerance: 0.01, size_tolerance: 0.05 }
     }
 }
 
@@ -122,7 +122,7 @@ pub fn align_features(
     let [own, theirs] = [source, target].map(|features| landmarks(features, params, size));
     let mirror = own.iter().map(Landmark::mirrored).collect();
     let judge = Judge::new(Matching::new(own, theirs.clone(), params, size), surfaces, false);
-    let mut judged = judge.all(&candidates(&judge.matching, MOST_CANDIDATES)?);
+    let judged = judge.left_over(judge.all(&candidates(&judge.matching, MOST_CANDIDATES)?));
     let mirror = Judge::new(Matching::new(mirror, theirs, params, size), surfaces, true);
     let mirrored = mirror.all(&candidates(&mirror.matching, MOST_MIRRORED)?).into_iter().next();
     let is_clear = |best: &Judged| match best.agreeing() {
@@ -132,10 +132,7 @@ pub fn align_features(
     if let Some(error) = refusal(&judge, judged.first(), mirrored.as_ref(), source.len(), is_clear) {
         return Err(error);
     }
-    let best = judged.remove(0);
-    let mut left: Vec<_> = judged.into_iter().filter(|other| !judge.rules_out(&best, other)).collect();
-    left.insert(0, best);
-    let mut alternatives = judge.settled(left);
+    let mut alternatives = judge.settled(judged);
     match alternatives.len() {
         1 => Ok(alternatives.remove(0)),
         _ => Err(FeaturesError::Ambiguous { alternatives }),
