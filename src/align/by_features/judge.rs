@@ -88,11 +88,9 @@ impl<'a> Judge<'a> {
     pub fn new(matching: Matching, surfaces: Option<&'a Surfaces<'a>>, in_mirror: bool) -> Self {
         let points = surfaces.map_or(&[][..], |surfaces| surfaces.points);
         let flip = |v: Vector3<f64>| if in_mirror { Vector3::new(-v.x, v.y, v.z) } else { v };
-        let all = points
-            .iter()
-            .step_by(step)
-            .map(|p| OrientedPoint { point: Point3::from(flip(p.point.coords)), normal: flip(p.normal) });
-        Self { matching, surfaces, points: all.collect() }
+        let point = |p: &OrientedPoint| OrientedPoint { point: flip(p.point.coords).into(), normal: flip(p.normal) };
+        let points = points.iter().map(point).collect();
+        Self { matching, surfaces, points }
     }
 
     /// Brings each motion to rest and judges it; the best first, no two alike.
