@@ -14,7 +14,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("sim", &["touch", "mesh"]),
     ("features", &["touch", "mesh"]),
     ("align", &["mesh", "features"]),
-    ("compare", &["mesh", "align", "features"]),
+    ("compare", &["touch", "mesh", "align", "features"]),
     ("calibrate", &["touch", "align"]),
     ("io", &["touch", "mesh", "features", "align"]),
     ("scene", &["touch", "mesh", "patch", "refine", "sim", "io"]),

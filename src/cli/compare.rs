@@ -10,7 +10,7 @@ use nalgebra::{Isometry3, Vector3};
 use serde::Serialize;
 use tracing::warn;
 
-use self::alignment::{Alignment, aligned, moved};
+use self::alignment::{Alignment, aligned_by_features, aligned_by_icp, aligned_by_pairs, moved};
 use self::table::ComparisonTold;
 use super::progress::Progress;
 use super::{CliError, Losses, tell};
@@ -29,6 +29,9 @@ pub(super) struct CompareArguments {
     mesh: PathBuf,
     /// The part as it should be, or truly is: PLY, STL or OBJ
     truth: PathBuf,
+    /// With --align pairs: the same points on MESH (columns scan_x_mm …) and on TRUTH (space_x_mm …), as CSV
+    #[arg(value_name = "PAIRS")]
+    pairs: Option<PathBuf>,
     /// Unit of the coordinates in MESH, and in the mesh of --before
     #[arg(long, value_name = "U", default_value = "mm")]
     mesh_unit: MeshUnit,
@@ -38,9 +41,12 @@ pub(super) struct CompareArguments {
     /// The scan before it was refined, in the frame of MESH: told beside it
     #[arg(long, value_name = "MESH")]
     before: Option<PathBuf>,
-    /// How MESH is brought onto TRUTH: not at all, or from about the right place point to plane
+    /// How MESH is brought onto TRUTH
     #[arg(long, value_name = "HOW", default_value = "none")]
     align: Align,
+    /// Which of several motions, where --align features found more than one
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..))]
+    alternative: Option<u16>,
     /// Writes a picture of MESH in the colours of its deviation
     #[arg(long, value_name = "PNG")]
     picture: Option<PathBuf>,
@@ -67,10 +73,14 @@ pub(super) struct CompareArguments {
 /// How the mesh is brought onto the truth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Align {
-    /// it is there
+    /// It is there
     None,
-    /// iterated closest points, point to plane
+    /// From about the right place, point to plane
     Icp,
+    /// From anywhere, by holes, slots, corners and planes, then point to plane
+    Features,
+    /// By points picked on both, in the file PAIRS
+    Pairs,
 }
 
 /// What `--json` prints.
@@ -125,6 +135,7 @@ pub(super) fn compare(arguments: &CompareArguments) -> Result<Losses, CliError> 
 
 /// Compares, and writes what is asked for.
 pub(super) fn compared(arguments: &CompareArguments) -> Result<Told, CliError> {
+    arguments.check_alignment()?;
     arguments.check_outputs()?;
     let reading = Progress::stage("read");
     let MeshFile { mesh: as_read, .. } = read_mesh(&arguments.mesh, arguments.mesh_unit).map_err(CliError::ReadMesh)?;
@@ -139,9 +150,15 @@ pub(super) fn compared(arguments: &CompareArguments) -> Result<Told, CliError> {
     let truth = Placed::new(truth);
     drop(reading);
 
+    let with_told = |(pose, told)| (pose, Some(told));
     let (pose, alignment) = match arguments.align {
         Align::None => (Isometry3::identity(), None),
-        Align::Icp => aligned(&as_read, truth.shape(), arguments.seed).map(|(pose, told)| (pose, Some(told)))?,
+        Align::Icp => aligned_by_icp(&as_read, truth.shape(), arguments.seed).map(with_told)?,
+        Align::Features => {
+            let alternative = arguments.alternative.map(usize::from);
+            aligned_by_features(&as_read, truth.shape(), arguments.seed, alternative, arguments.json).map(with_told)?
+        }
+        Align::Pairs => aligned_by_pairs(arguments.pairs()?).map(with_told)?,
     };
     let mesh = Placed::new(moved(&as_read, &pose));
     let before = before.map(|scan| Placed::new(moved(&scan, &pose)));
@@ -175,6 +192,8 @@ impl CompareArguments {
             truth_unit: MeshUnit::Millimetre,
             before: Some(before),
             align: Align::None,
+            alternative: None,
+            pairs: None,
             picture: Some(picture),
             view: None,
             coloured: None,
@@ -252,6 +271,25 @@ impl CompareArguments {
         write_png(path, picture.size, &picture.pixels).map_err(write)
     }
 
+    fn pairs(&self) -> Result<&Path, CliError> {
+        let missing =
+            || CliError::Usage("--align pairs needs a file: compare MESH TRUTH --align pairs FILE".to_owned());
+        self.pairs.as_deref().ok_or_else(missing)
+    }
+
+    fn check_alignment(&self) -> Result<(), CliError> {
+        if self.align == Align::Pairs {
+            self.pairs()?;
+        } else if let Some(path) = &self.pairs {
+            let path = path.display();
+            return Err(CliError::Usage(format!("{path} is one file too many without --align pairs")));
+        }
+        if self.alternative.is_some() && self.align != Align::Features {
+            return Err(CliError::Usage("--alternative chooses among what --align features finds".to_owned()));
+        }
+        Ok(())
+    }
+
     /// The work is not begun when its result cannot be kept.
     fn check_outputs(&self) -> Result<(), CliError> {
         let outputs = [("--picture", ".png", &self.picture), ("--coloured", ".ply", &self.coloured)];
@@ -262,7 +300,9 @@ impl CompareArguments {
             if !shown.to_string().to_ascii_lowercase().ends_with(ending) {
                 return Err(CliError::Usage(format!("{flag} {shown} must end in {ending}")));
             }
-            for input in [Some(&self.mesh), Some(&self.truth), self.before.as_ref()].into_iter().flatten() {
+            for input in
+                [Some(&self.mesh), Some(&self.truth), self.before.as_ref(), self.pairs.as_ref()].into_iter().flatten()
+            {
                 if is_same_file(input, path) {
                     return Err(CliError::Usage(format!(
                         "{flag} would write over {shown}, which is compared: choose another place"

@@ -26,8 +26,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use crate::align::IcpError;
-use crate::align::PairsError;
+use crate::align::{FeaturesError, IcpError, PairsError};
 use crate::calibrate::{PayloadError, TipError};
 use crate::compare::CompareError;
 use crate::io::atomic::is_same_file;
@@ -129,6 +128,8 @@ enum CliError {
     Live(#[from] LiveError),
     #[error("the mesh cannot be aligned with the truth: {0}")]
     Align(#[from] IcpError),
+    #[error(transparent)]
+    AlignFeatures(#[from] FeaturesError),
     #[error("the two cannot be compared: {0}")]
     Compare(#[from] CompareError),
 }
@@ -145,7 +146,7 @@ impl CliError {
             Self::Touches(_) | Self::Features(_) => 3,
             Self::Table(_) | Self::Pairs { .. } | Self::Payload { .. } | Self::Tip { .. } | Self::Rests { .. } => 3,
             Self::Mesh(_) | Self::Setting(_) | Self::Refine(_) | Self::Live(_) => 3,
-            Self::Align(_) | Self::Compare(_) => 3,
+            Self::Align(_) | Self::AlignFeatures(_) | Self::Compare(_) => 3,
         }
     }
 }

@@ -7,6 +7,7 @@ mod cloud;
 mod colour;
 mod comparison;
 mod deviation;
+mod disagreement;
 mod normals;
 mod picture;
 mod sampling;
@@ -16,6 +17,9 @@ pub use cloud::cloud_distances;
 pub use colour::{Rgb, colour_of};
 pub use comparison::{CompareParams, Comparison, Region, RegionComparison, Regions, Shape, compare};
 pub use deviation::{closest_places, deviations};
+pub use disagreement::{
+    BadTouches, Class, ClassMap, Disagreement, DisagreementRegion, Evidence, Known, RefinedShape, Scanner, disagreement,
+};
 pub use normals::{Tilt, TiltSummary, angle_between, tilts};
 pub use picture::{Panel, Picture, PictureParams, draw_picture};
 pub use sampling::{Sample, sample_surface, surface_area};

@@ -356,7 +356,7 @@ impl<'a> Growing<'a> {
         }
         let mut moments = Moments::about(facets.triangle(seed)[0]);
         moments.add(facets, seed);
-        if area > FLAT_AMONG_ROUND * largest { self.grown(seed, moments.plane()?) } else { None }
+        if area > FLAT_AMONG_ROUND * largest { self.grown(seed, moments.plane()?, flat.len()) } else { None }
     }
 
     /// The largest cylinder through the faces around a seed.

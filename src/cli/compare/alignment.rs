@@ -1,35 +1,82 @@
 //! The mesh brought onto the truth, and how that is told.
 
 use std::fmt;
+use std::path::Path;
 
 use nalgebra::{Isometry3, Vector3};
 use serde::Serialize;
 use tracing::warn;
 
-use crate::align::{IcpFit, IcpParams, Motion, icp};
-use crate::cli::CliError;
+use crate::align::{
+    Alternative, FeaturesError, FeaturesParams, IcpFit, IcpParams, Motion, OrientedPoint, PairsParams, Surfaces,
+    align_features, fit_pairs, icp,
+};
 use crate::cli::progress::Progress;
+use crate::cli::{CliError, tell};
 use crate::compare::{Shape, sample_surface, surface_area};
-use crate::mesh::{TriMesh, VertexId};
+use crate::features::detect;
+use crate::io::pairs_file::read_pairs;
+use crate::mesh::{FaceTree, TriMesh, VertexId};
 
 /// Points of the mesh that are brought onto the truth.
 const POINTS: f64 = 100_000.0;
+/// … where that is done for each of many motions.
+const POINTS_EACH: f64 = 20_000.0;
 
 /// What `--json` prints of the alignment.
 #[derive(Debug, Serialize)]
 pub(super) struct Alignment {
     method: &'static str,
-    /// moves the mesh, as it is in its file, onto the truth: rows of the rotation
+    #[serde(flatten)]
+    motion: MotionTold,
+    /// of the points to the tangent planes, or of the pairs
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rms_mm: Option<f64>,
+    /// point to plane
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    fit: Option<FitTold>,
+    /// by features
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    explained: Option<Explained>,
+    /// of each pair
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    residuals: Vec<Residual>,
+    /// small motions that leave the fit as it is
+    undetermined: Vec<Loose>,
+}
+
+/// Moves the mesh, as it is in its file, onto the truth.
+#[derive(Debug, Serialize)]
+struct MotionTold {
+    /// rows of the rotation
     rotation: [[f64; 3]; 3],
     /// and then the shift
     translation_mm: [f64; 3],
-    /// of the points to the tangent planes
-    rms_mm: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct FitTold {
     points: usize,
     inliers: usize,
     rounds: usize,
-    /// small motions that leave the fit as it is
-    undetermined: Vec<Loose>,
+}
+
+#[derive(Debug, Serialize)]
+struct Explained {
+    /// features of the mesh that lie on one of the truth
+    explained_features: usize,
+    mesh_features: usize,
+    truth_features: usize,
+    /// share of the mesh's surface that lies on the truth
+    agreeing_share: Option<f64>,
+}
+
+/// Where a pair is off: truth − moved mesh.
+#[derive(Debug, Serialize)]
+struct Residual {
+    pair: String,
+    residual_mm: [f64; 3],
+    distance_mm: f64,
 }
 
 /// A motion that nothing holds: a shift along and a turn about a point.
@@ -42,23 +89,113 @@ struct Loose {
     about_mm: [f64; 3],
 }
 
-/// The motion that brings `mesh` onto the truth, and what is said of it.
+/// The motions of which one must be chosen.
+#[derive(Debug, Serialize)]
+struct Choices {
+    ambiguous: Vec<Choice>,
+}
+
+#[derive(Debug, Serialize)]
+struct Choice {
+    /// as --alternative takes it
+    alternative: usize,
+    #[serde(flatten)]
+    motion: MotionTold,
+    #[serde(flatten)]
+    explained: Explained,
+    rms_mm: Option<f64>,
+    /// against the first
+    turn_deg: f64,
+    turn_axis: [f64; 3],
+    /// of the middle of the features, against the first
+    shift_mm: [f64; 3],
+}
+
+type Aligned = Result<(Isometry3<f64>, Alignment), CliError>;
+
+/// The motion that brings `mesh` onto the truth from roughly in place, and what is said of it.
 ///
 /// # Errors
 /// [`CliError::Align`].
-pub(super) fn aligned(mesh: &TriMesh, truth: Shape<'_>, seed: u64) -> Result<(Isometry3<f64>, Alignment), CliError> {
+pub(super) fn aligned_by_icp(mesh: &TriMesh, truth: Shape<'_>, seed: u64) -> Aligned {
     let _aligning = Progress::stage("align");
-    let samples = sample_surface(mesh, POINTS / surface_area(mesh).max(f64::MIN_POSITIVE), seed);
-    let points: Vec<_> = samples.iter().map(|sample| sample.point).collect();
+    let points: Vec<_> = spread(mesh, POINTS, seed).iter().map(|p| p.point).collect();
     let fit = icp(&points, truth.mesh, truth.tree, &Isometry3::identity(), &IcpParams::default())?;
-    let told = Alignment::of(&fit, points.len());
-    if !told.undetermined.is_empty() {
-        warn!(
-            "{} motions leave the mesh on the truth as it is: it stays where its file has it in these",
-            told.undetermined.len()
-        );
-    }
+    let told = Alignment { fit: Some(FitTold::of(&fit, points.len())), ..Alignment::of_icp("icp", &fit) };
+    told.warn();
     Ok((fit.source_to_target, told))
+}
+
+/// The same from anywhere, by features.
+///
+/// - `alternative`: which of several motions, from 1 on.
+///
+/// # Errors
+/// [`CliError::AlignFeatures`], after the alternatives went to stdout; [`CliError::Usage`] where there are fewer.
+pub(super) fn aligned_by_features(
+    mesh: &TriMesh,
+    truth: Shape<'_>,
+    seed: u64,
+    alternative: Option<usize>,
+    json: bool,
+) -> Aligned {
+    let _aligning = Progress::stage("align by features");
+    let own = detect(mesh, &FaceTree::new(mesh), &[]).features;
+    let theirs = detect(truth.mesh, truth.tree, &[]).features;
+    let points = spread(mesh, POINTS_EACH, seed);
+    let surfaces = Surfaces { points: &points, target: truth.mesh, tree: truth.tree };
+    let counts = [own.len(), theirs.len()];
+    let found = match align_features(&own, &theirs, Some(&surfaces), &FeaturesParams::default()) {
+        Ok(only) => vec![only],
+        Err(FeaturesError::Ambiguous { alternatives }) => alternatives,
+        Err(error) => return Err(error.into()),
+    };
+    let chosen = match alternative {
+        Some(number) => found.get(number.wrapping_sub(1)).ok_or_else(|| {
+            CliError::Usage(format!("--alternative {number} is not there: {} motions were found", found.len()))
+        })?,
+        None if found.len() == 1 => &found[0],
+        None => {
+            let choices = Choices::of(&found, counts);
+            let as_json = || serde_json::to_string(&choices).expect("numbers and names alone cannot fail");
+            tell(&if json { as_json() } else { choices.to_string() });
+            return Err(FeaturesError::Ambiguous { alternatives: found }.into());
+        }
+    };
+    let explained = Some(Explained::of(chosen, counts));
+    let told = match &chosen.icp {
+        Some(fit) => {
+            Alignment { explained, fit: Some(FitTold::of(fit, points.len())), ..Alignment::of_icp("features", fit) }
+        }
+        None => Alignment { explained, ..Alignment::of("features", &chosen.source_to_target) },
+    };
+    told.warn();
+    Ok((chosen.source_to_target, told))
+}
+
+/// The motion that pairs of picked points tell; `scan` is the mesh and `space` the truth.
+///
+/// # Errors
+/// [`CliError::Table`], [`CliError::Pairs`].
+pub(super) fn aligned_by_pairs(path: &Path) -> Aligned {
+    let file = read_pairs(path)?;
+    let refused = |error| CliError::Pairs { path: path.to_owned(), error };
+    let fit = fit_pairs(&file.pairs, &PairsParams::default()).map_err(refused)?;
+    let residual = |(r, name): (&Vector3<f64>, &String)| Residual {
+        pair: name.clone(),
+        residual_mm: mm(*r),
+        distance_mm: r.norm() * 1e3,
+    };
+    let numbered: Vec<String> = (1..=file.pairs.len()).map(|number| number.to_string()).collect();
+    let names = if file.names.len() == file.pairs.len() { &file.names } else { &numbered };
+    let residuals = fit.residuals.iter().zip(names).map(residual).collect();
+    let told = Alignment { residuals, rms_mm: Some(fit.rms * 1e3), ..Alignment::of("pairs", &fit.motion) };
+    Ok((fit.motion, told))
+}
+
+fn spread(mesh: &TriMesh, count: f64, seed: u64) -> Vec<OrientedPoint> {
+    let samples = sample_surface(mesh, count / surface_area(mesh).max(f64::MIN_POSITIVE), seed);
+    samples.iter().map(|sample| OrientedPoint { point: sample.point, normal: mesh.normal(sample.face) }).collect()
 }
 
 /// The mesh after a motion.
@@ -72,38 +209,105 @@ pub(super) fn moved(mesh: &TriMesh, pose: &Isometry3<f64>) -> TriMesh {
     moved
 }
 
-impl Alignment {
+fn mm(v: Vector3<f64>) -> [f64; 3] {
+    [v.x, v.y, v.z].map(|x| x * 1e3)
+}
+
+impl MotionTold {
+    fn of(motion: &Isometry3<f64>) -> Self {
+        let rotation = motion.rotation.to_rotation_matrix();
+        Self {
+            rotation: std::array::from_fn(|row| std::array::from_fn(|column| rotation[(row, column)])),
+            translation_mm: mm(motion.translation.vector),
+        }
+    }
+}
+
+impl FitTold {
     fn of(fit: &IcpFit, points: usize) -> Self {
-        let rotation = fit.source_to_target.rotation.to_rotation_matrix();
-        let mm = |v: Vector3<f64>| [v.x, v.y, v.z].map(|x| x * 1e3);
+        Self { points, inliers: fit.inliers, rounds: fit.rounds }
+    }
+}
+
+impl Explained {
+    fn of(alternative: &Alternative, [mesh_features, truth_features]: [usize; 2]) -> Self {
+        let (explained_features, agreeing_share) = (alternative.explained.len(), alternative.agreeing);
+        Self { explained_features, mesh_features, truth_features, agreeing_share }
+    }
+}
+
+impl Choices {
+    fn of(alternatives: &[Alternative], counts: [usize; 2]) -> Self {
+        let choice = |(at, alternative): (usize, &Alternative)| {
+            let [turn, shift] = alternative.differs;
+            Choice {
+                alternative: at + 1,
+                motion: MotionTold::of(&alternative.source_to_target),
+                explained: Explained::of(alternative, counts),
+                rms_mm: alternative.icp.as_ref().map(|fit| fit.rms * 1e3),
+                turn_deg: turn.norm().to_degrees(),
+                turn_axis: turn.try_normalize(1e-9).unwrap_or_else(Vector3::zeros).into(),
+                shift_mm: mm(shift),
+            }
+        };
+        Self { ambiguous: alternatives.iter().enumerate().map(choice).collect() }
+    }
+}
+
+impl Alignment {
+    fn of(method: &'static str, motion: &Isometry3<f64>) -> Self {
+        let motion = MotionTold::of(motion);
+        Self {
+            method,
+            motion,
+            rms_mm: None,
+            fit: None,
+            explained: None,
+            residuals: Vec::new(),
+            undetermined: Vec::new(),
+        }
+    }
+
+    fn of_icp(method: &'static str, fit: &IcpFit) -> Self {
         let loose = |motion: &Motion| Loose {
             shift: motion.shift.into(),
             turn_rad_per_mm: (motion.turn / fit.lever * 1e-3).into(),
             about_mm: mm(fit.centre.coords),
         };
         Self {
-            method: "icp",
-            rotation: std::array::from_fn(|row| std::array::from_fn(|column| rotation[(row, column)])),
-            translation_mm: mm(fit.source_to_target.translation.vector),
-            rms_mm: fit.rms * 1e3,
-            points,
-            inliers: fit.inliers,
-            rounds: fit.rounds,
+            rms_mm: Some(fit.rms * 1e3),
             undetermined: fit.undetermined().map(loose).collect(),
+            ..Self::of(method, &fit.source_to_target)
+        }
+    }
+
+    fn warn(&self) {
+        if !self.undetermined.is_empty() {
+            warn!(
+                "{} motions leave the mesh on the truth as it is: it stays where it is in these",
+                self.undetermined.len()
+            );
         }
     }
 }
 
 impl fmt::Display for Alignment {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { method, rms_mm, inliers, points, rounds, undetermined, .. } = self;
-        let [x, y, z] = self.translation_mm;
-        write!(
-            f,
-            "aligned by {method}: shift ({x:.3}, {y:.3}, {z:.3}) mm, rms {rms_mm:.4} mm of {inliers} of {points} points, \
-             {rounds} rounds"
-        )?;
-        for Loose { shift, turn_rad_per_mm, about_mm } in undetermined {
+        let [x, y, z] = self.motion.translation_mm;
+        write!(f, "aligned by {}: shift ({x:.3}, {y:.3}, {z:.3}) mm", self.method)?;
+        if let Some(explained) = &self.explained {
+            write!(f, ", {explained}")?;
+        }
+        if let Some(rms_mm) = self.rms_mm {
+            write!(f, ", rms {rms_mm:.4} mm")?;
+        }
+        if let Some(FitTold { points, inliers, rounds }) = self.fit {
+            write!(f, " of {inliers} of {points} points, {rounds} rounds")?;
+        }
+        for Residual { pair, residual_mm: [x, y, z], distance_mm } in &self.residuals {
+            write!(f, "\n  pair {pair}: off by ({x:.3}, {y:.3}, {z:.3}) mm, {distance_mm:.3} mm")?;
+        }
+        for Loose { shift, turn_rad_per_mm, about_mm } in &self.undetermined {
             let three =
                 |v: &[f64; 3], digits: usize| format!("({:.digits$}, {:.digits$}, {:.digits$})", v[0], v[1], v[2]);
             write!(
@@ -112,6 +316,44 @@ impl fmt::Display for Alignment {
                 three(shift, 2),
                 three(turn_rad_per_mm, 4),
                 three(about_mm, 1)
+            )?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for Explained {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} of {} features", self.explained_features, self.mesh_features)?;
+        match self.agreeing_share {
+            Some(share) => write!(f, " and {:.1} % of the surface agree", share * 100.0),
+            None => Ok(()),
+        }
+    }
+}
+
+impl fmt::Display for Choices {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "these motions explain the mesh about equally well; --alternative K takes one")?;
+        write!(
+            f,
+            "{:>2}  {:>30}  {:>8}  {:>7}  {:>8}   against the first: turn about, and shift",
+            "K", "shift, mm", "features", "surface", "rms, mm"
+        )?;
+        for choice in &self.ambiguous {
+            let three = |v: &[f64; 3], digits: usize| format!("{:.digits$} {:.digits$} {:.digits$}", v[0], v[1], v[2]);
+            let Explained { explained_features, mesh_features, agreeing_share, .. } = &choice.explained;
+            let surface = agreeing_share.map_or_else(String::new, |share| format!("{:.1} %", share * 100.0));
+            let rms = choice.rms_mm.map_or_else(String::new, |rms| format!("{rms:.4}"));
+            write!(
+                f,
+                "\n{:>2}  {:>30}  {:>8}  {surface:>7}  {rms:>8}   {:.2}° ({}), ({}) mm",
+                choice.alternative,
+                three(&choice.motion.translation_mm, 3),
+                format!("{explained_features}/{mesh_features}"),
+                choice.turn_deg,
+                three(&choice.turn_axis, 3),
+                three(&choice.shift_mm, 3)
             )?;
         }
         Ok(())

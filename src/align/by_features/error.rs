@@ -1,0 +1,80 @@
+//! Why features tell no motion, or more than one.
+
+use std::fmt;
+
+use super::Alternative;
+
+/// Which of the two shapes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FeaturesSide {
+    /// what is to be moved: the mesh
+    Source,
+    /// what it is moved onto: the true part
+    Target,
+}
+
+impl fmt::Display for FeaturesSide {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Source => "mesh",
+            Self::Target => "truth",
+        })
+    }
+}
+
+/// Why there is no one motion.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FeaturesError {
+    /// Nothing was found on one side.
+    #[error("no features were found on the {side}: {OTHER_WAYS}")]
+    NoFeatures {
+        /// which
+        side: FeaturesSide,
+    },
+    /// What was found leaves a turn or a shift open.
+    #[error(
+        "the {found} features of the {side} leave a turn or a shift open; two holes or slots, one and a plane beside it, or a \
+         corner of three planes would tell it: touch one more, or {OTHER_WAYS}"
+    )]
+    TooFew {
+        /// which
+        side: FeaturesSide,
+        /// how many there are
+        found: usize,
+    },
+    /// No motion brings enough together.
+    #[error(
+        "no motion brings the mesh onto the truth: the best explains {explained} of {of} features{}: are both the same part \
+         and in the same unit? If so, {OTHER_WAYS}",
+        agreeing.map_or_else(String::new, |share| format!(" and {:.0} % of the surface", share * 100.0))
+    )]
+    NoMatch {
+        /// features of the mesh
+        explained: usize,
+        /// all features of the mesh
+        of: usize,
+        /// share of the surface of the mesh
+        agreeing: Option<f64>,
+    },
+    /// Left-handed.
+    #[error(
+        "the mesh fits a mirror image of the truth ({mirrored} of {of} features) and no motion of it ({explained}): the sign \
+         of one axis of a file is wrong, or it is the part's left-handed twin"
+    )]
+    Mirrored {
+        /// features that the best motion explains
+        explained: usize,
+        /// features that the best mirror image explains
+        mirrored: usize,
+        /// all features of the mesh
+        of: usize,
+    },
+    /// Several motions are about as good: a symmetric part, or too little of it was seen.
+    #[error("{} motions explain the mesh about equally well: the part is symmetric, or what tells them apart was not seen", .alternatives.len())]
+    Ambiguous {
+        /// all of them, the best first
+        alternatives: Vec<Alternative>,
+    },
+}
+
+const OTHER_WAYS: &str = "pick pairs of points (pairs), or bring it roughly into place (icp)";

@@ -1,0 +1,182 @@
+//! Features as registration sees them: where, which way, how large, and what of that is known.
+
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+
+use super::FeaturesParams;
+use crate::features::{Feature, Kind};
+
+/// A feature, or the other end of it.
+#[derive(Clone, Debug)]
+pub(super) struct Landmark {
+    pub kind: Kind,
+    pub place: Point3<f64>,
+    /// out of the opening, along an edge, outward normal
+    pub axis: Option<Vector3<f64>>,
+    /// along a slot
+    pub direction: Option<Vector3<f64>>,
+    /// diameter or width with its standard uncertainty, m
+    size: Option<[f64; 2]>,
+    /// standard uncertainty of the place, m
+    sigma: f64,
+    /// how far it goes on from its place along the axis, backwards and forwards, m
+    span: [f64; 2],
+    /// it goes through: which end is the opening is a matter of how it was seen
+    is_through: bool,
+    is_convex: Option<bool>,
+    /// normals of the planes that meet in a corner, so that they turn to the left seen from outside
+    pub normals: Option<[Vector3<f64>; 3]>,
+}
+
+/// Cosine of the largest angle between axes that are taken for one: 6°.
+const ALIKE: f64 = 0.9945;
+/// Standard uncertainties that are allowed for.
+const SIGMAS: f64 = 3.0;
+/// Volume that the normals at a corner span, at least.
+const SPATIAL: f64 = 0.17;
+
+/// All features as landmarks, in their order.
+pub(super) fn landmarks(features: &[Feature], params: &FeaturesParams, diagonal: f64) -> Vec<Landmark> {
+    let planes: Vec<(Point3<f64>, Vector3<f64>)> = features
+        .iter()
+        .filter(|feature| feature.kind == Kind::Plane)
+        .filter_map(|feature| Some((feature.centre.value, feature.axis.as_ref()?.value)))
+        .collect();
+    let near = params.tolerance * diagonal;
+    features.iter().map(|feature| Landmark::of(feature, &planes, near)).collect()
+}
+
+impl Landmark {
+    fn of(feature: &Feature, planes: &[(Point3<f64>, Vector3<f64>)], near: f64) -> Self {
+        let place = feature.centre.value;
+        let size = feature.diameter.as_ref().or(feature.width.as_ref());
+        let reach = match feature.kind {
+            Kind::Edge => feature.length.as_ref().map_or([0.0; 2], |length| [length.value / 2.0; 2]),
+            _ => [feature.depth.as_ref().map_or(0.0, |depth| depth.value), 0.0],
+        };
+        Self {
+            kind: feature.kind,
+            place,
+            axis: feature.axis.as_ref().map(|axis| axis.value),
+            direction: feature.direction,
+            size: size.map(|size| [size.value, size.std.unwrap_or(0.0)]),
+            sigma: feature.centre.std.unwrap_or(0.0),
+            span: reach,
+            is_through: feature.through == Some(true),
+            is_convex: feature.is_convex,
+            normals: (feature.kind == Kind::Corner).then(|| normals_at(&place, planes, near)).flatten(),
+        }
+    }
+
+    /// Whether it has a place of its own and a way out, so that two of them tell a motion.
+    pub fn is_located(&self) -> bool {
+        matches!(self.kind, Kind::Hole | Kind::Slot | Kind::Pocket | Kind::Boss) && self.axis.is_some()
+    }
+
+    /// Its kind; where a slot ends and a pocket begins is a matter of taste.
+    pub fn class(&self) -> Kind {
+        if self.kind == Kind::Pocket { Kind::Slot } else { self.kind }
+    }
+
+    /// Itself, and what goes through also from its other end.
+    pub fn ends(&self) -> impl Iterator<Item = Self> + '_ {
+        let other = self.axis.filter(|_| self.is_through && self.is_located()).map(|axis| Self {
+            place: self.place - axis * self.span[0],
+            axis: Some(-axis),
+            ..self.clone()
+        });
+        std::iter::once(self.clone()).chain(other)
+    }
+
+    /// What it counts: an opening is one thing, an edge part of many.
+    pub fn weight(&self) -> f64 {
+        match self.kind {
+            Kind::Hole | Kind::Slot | Kind::Pocket | Kind::Boss => 1.0,
+            Kind::Corner => 0.5,
+            Kind::Edge => 0.25,
+            Kind::Plane => 0.2,
+        }
+    }
+
+    /// Whether both may be the same thing, by what does not depend on where they are.
+    pub fn is_like(&self, other: &Self, params: &FeaturesParams) -> bool {
+        let sizes = self
+            .size
+            .zip(other.size)
+            .is_none_or(|([a, s], [b, t])| (a - b).abs() <= params.size_tolerance * a.max(b) + SIGMAS * s.hypot(t));
+        let sides = self.is_convex.zip(other.is_convex).is_none_or(|(a, b)| a == b);
+        self.class() == other.class() && sizes && sides
+    }
+
+    /// How far the place of one may be from that of the other, m.
+    pub fn play(&self, other: &Self, tolerance: f64) -> f64 {
+        tolerance + (SIGMAS * self.sigma.hypot(other.sigma)).min(3.0 * tolerance)
+    }
+
+    /// How far it is from `other` after `motion`, over what it may be; infinite where it looks another way. An edge or what
+    /// goes through may be anywhere along the other.
+    ///
+    /// - `tolerance`: m
+    pub fn misfit(&self, motion: &Isometry3<f64>, other: &Self, tolerance: f64) -> f64 {
+        let play = self.play(other, tolerance);
+        let offset = motion * self.place - other.place;
+        let Some((own, theirs)) = self.axis.zip(other.axis) else { return offset.norm() / play };
+        let cosine = (motion * own).dot(&theirs);
+        let is_free = self.is_line() || other.is_line();
+        if (if is_free { cosine.abs() } else { cosine }) < ALIKE {
+            return f64::INFINITY;
+        }
+        let along = offset.dot(&theirs);
+        let across = (offset - theirs * along).norm();
+        let left = match self.kind {
+            Kind::Plane => along.abs(),
+            _ if !is_free => offset.norm(),
+            _ => across.hypot((-along - other.span[0]).max(along - other.span[1]).max(0.0)),
+        };
+        left / play
+    }
+
+    fn is_line(&self) -> bool {
+        self.is_through || self.kind == Kind::Edge
+    }
+
+    /// Which offsets from `other` say that it is not there.
+    pub fn held(&self, other: &Self) -> Matrix3<f64> {
+        match other.axis {
+            Some(axis) if self.kind == Kind::Plane => axis * axis.transpose(),
+            Some(axis) if self.is_line() || other.is_line() => Matrix3::identity() - axis * axis.transpose(),
+            _ => Matrix3::identity(),
+        }
+    }
+
+    /// 1/variance of the place beside that of another, 1/m².
+    pub fn trust(&self, other: &Self, tolerance: f64) -> f64 {
+        1.0 / (self.sigma.powi(2) + other.sigma.powi(2) + (0.1 * tolerance).powi(2))
+    }
+
+    /// As in a mirror at x = 0.
+    pub fn mirrored(&self) -> Self {
+        let flip = |v: Vector3<f64>| Vector3::new(-v.x, v.y, v.z);
+        Self {
+            place: flip(self.place.coords).into(),
+            axis: self.axis.map(flip),
+            direction: self.direction.map(flip),
+            normals: self.normals.map(|[a, b, c]| [flip(a), flip(c), flip(b)]),
+            ..self.clone()
+        }
+    }
+}
+
+/// Normals of three planes that meet in `place`; `None` where there are not just three such directions.
+fn normals_at(place: &Point3<f64>, planes: &[(Point3<f64>, Vector3<f64>)], near: f64) -> Option<[Vector3<f64>; 3]> {
+    let mut found: Vec<(f64, Vector3<f64>)> = Vec::new();
+    let mut by_distance: Vec<_> = planes.iter().map(|(p, n)| ((place - p).dot(n).abs(), *n)).collect();
+    by_distance.sort_by(|a, b| a.0.total_cmp(&b.0));
+    for (distance, normal) in by_distance.into_iter().filter(|(distance, _)| *distance <= near) {
+        if found.len() < 3 && found.iter().all(|(_, other)| other.dot(&normal).abs() < ALIKE) {
+            found.push((distance, normal));
+        }
+    }
+    let &[(_, a), (_, b), (_, c)] = found.as_slice() else { return None };
+    let volume = a.cross(&b).dot(&c);
+    (volume.abs() > SPATIAL).then_some(if volume > 0.0 { [a, b, c] } else { [a, c, b] })
+}

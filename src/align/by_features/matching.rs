@@ -1,0 +1,113 @@
+//! How many features a motion explains, and the motion that explains them best.
+
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
+
+use super::FeaturesParams;
+use super::landmark::Landmark;
+
+/// Both sets of features, and which may be the same.
+pub(super) struct Matching {
+    pub source: Vec<Landmark>,
+    pub target: Vec<Landmark>,
+    /// features of the target that each of the source may be
+    like: Vec<Vec<usize>>,
+    /// m
+    pub tolerance: f64,
+    /// middle of the features of the source
+    pub middle: Point3<f64>,
+    /// half their extent, m: what a turn moves
+    pub lever: f64,
+}
+
+/// Rounds of least squares: the features that are explained change little.
+const ROUNDS: usize = 4;
+
+impl Matching {
+    /// - `size`: of the target, m: what tolerances are shares of
+    pub fn new(source: Vec<Landmark>, target: Vec<Landmark>, params: &FeaturesParams, size: f64) -> Self {
+        let partners = |own: &Landmark| (0..target.len()).filter(|&i| own.is_like(&target[i], params)).collect();
+        let like = source.iter().map(partners).collect();
+        let count = source.len().max(1) as f64;
+        let middle = Point3::from(source.iter().map(|own| own.place.coords).sum::<Vector3<f64>>() / count);
+        let lever = source.iter().map(|own| (own.place - middle).norm()).fold(0.0, f64::max);
+        Self { source, target, like, tolerance: params.tolerance * size, middle, lever: lever.max(size / 8.0) }
+    }
+
+    /// Pairs of landmarks that could be one another.
+    pub fn is_like(&self, own: usize, theirs: usize) -> bool {
+        self.like[own].binary_search(&theirs).is_ok()
+    }
+
+    /// Comparisons that one motion costs.
+    pub fn cost(&self) -> usize {
+        self.like.iter().map(Vec::len).sum::<usize>() + self.source.len()
+    }
+
+    /// The best partner of each feature and how well it fits: at most 1 is explained.
+    pub fn partners(&self, motion: &Isometry3<f64>) -> Vec<Option<(usize, f64)>> {
+        (0..self.source.len()).map(|own| self.partner(motion, own)).collect()
+    }
+
+    fn partner(&self, motion: &Isometry3<f64>, own: usize) -> Option<(usize, f64)> {
+        let misfit = |&theirs: &usize| (theirs, self.source[own].misfit(motion, &self.target[theirs], self.tolerance));
+        self.like[own].iter().map(misfit).min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// Sum of the weights of the features that are explained, each the less the farther it is off.
+    pub fn score(&self, motion: &Isometry3<f64>) -> f64 {
+        let part = |own: usize| match self.partner(motion, own) {
+            Some((_, misfit)) if misfit <= 1.0 => self.source[own].weight() * (1.0 - 0.25 * misfit),
+            _ => 0.0,
+        };
+        (0..self.source.len()).map(part).sum()
+    }
+
+    /// How far two motions bring the features apart, m.
+    pub fn apart(&self, a: &Isometry3<f64>, b: &Isometry3<f64>) -> f64 {
+        (a * self.middle - b * self.middle).norm() + self.lever * a.rotation.angle_to(&b.rotation)
+    }
+
+    /// Least squares over the features that a motion explains.
+    pub fn refined(&self, start: &Isometry3<f64>) -> Isometry3<f64> {
+        let mut motion = *start;
+        for _ in 0..ROUNDS {
+            let Some(better) = self.step(&motion) else { return motion };
+            motion = better;
+        }
+        motion
+    }
+
+    fn step(&self, motion: &Isometry3<f64>) -> Option<Isometry3<f64>> {
+        let centre = motion * self.middle;
+        let (mut normal, mut right) = (Matrix6::zeros(), Vector6::zeros());
+        let mut add = |held: &Matrix3<f64>, arm: &Vector3<f64>, shifts: f64, offset: &Vector3<f64>, weight: f64| {
+            // a small turn θ moves the arm by θ × arm; both counted by the lever
+            let mut rows = nalgebra::Matrix3x6::zeros();
+            rows.fixed_columns_mut::<3>(0).copy_from(&(held * shifts));
+            rows.fixed_columns_mut::<3>(3).copy_from(&(held * -arm.cross_matrix() / self.lever));
+            normal += rows.transpose() * rows * weight;
+            right -= rows.transpose() * (held * offset) * weight;
+        };
+        for (own, partner) in self.partners(motion).into_iter().enumerate() {
+            let Some((theirs, _)) = partner.filter(|(_, misfit)| *misfit <= 1.0) else { continue };
+            let (own, theirs) = (&self.source[own], &self.target[theirs]);
+            let weight = own.weight() * own.trust(theirs, self.tolerance);
+            let place = motion * own.place;
+            add(&own.held(theirs), &(place - centre), 1.0, &(place - theirs.place), weight);
+            if let Some((axis, onto)) = own.axis.zip(theirs.axis) {
+                let axis = motion * axis;
+                // as long as what it is the axis of may be far: a tenth of the extent
+                let arm = 0.1 * self.lever;
+                let offset = axis * arm - onto * (arm * axis.dot(&onto).signum());
+                add(&Matrix3::identity(), &(axis * arm), 0.0, &offset, weight);
+            }
+        }
+        // what nothing holds stays
+        normal += Matrix6::identity() * (normal.diagonal().max() * 1e-9).max(f64::MIN_POSITIVE);
+        let twist = normal.cholesky()?.solve(&right);
+        let (shift, turn) = (twist.fixed_rows::<3>(0).into_owned(), twist.fixed_rows::<3>(3) / self.lever);
+        let turn = UnitQuaternion::from_scaled_axis(turn);
+        let moved = Isometry3::from_parts(Translation3::from(shift + centre.coords - turn * centre.coords), turn);
+        twist.iter().all(|x| x.is_finite()).then(|| moved * motion)
+    }
+}

@@ -1,0 +1,250 @@
+//! Where touch and scan disagree, without a true part: what of it looks like this scanner, what like a part that is no longer
+//! what was scanned, and what like a bad touch.
+//!
+//! How the scanner errs is found where it should see well, on touched places away from edges: its offset b, its noise σ
+//! and the distance ℓ over which that stays alike, Cov = σ² exp(−r²/2ℓ²). The mean over a region of area A then has the
+//! variance σ²/(1 + A/2πℓ²), and a region that is off by many times its root was changed. Near edges and in what is
+//! narrower than a few edges of the scan's triangles the scan lacks what it could not see.
+
+mod bad_touches;
+mod cells;
+mod regions;
+mod scanner;
+
+use nalgebra::Point3;
+
+pub use self::bad_touches::BadTouches;
+pub use self::regions::{DisagreementRegion, Evidence};
+pub use self::scanner::Scanner;
+use super::deviation::{closest_places, signed};
+use super::{CompareError, Shape};
+use crate::mesh::{FaceHit, TriMesh, VertexId};
+use crate::touch::ProbedPoint;
+
+/// What a vertex of a refined mesh rests on, as `refine` writes it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Known {
+    /// the scan, or what is near touches suggests
+    NotTouched,
+    /// touches
+    Touched,
+    /// nothing can be felt here
+    Unreachable,
+}
+
+/// A refined mesh.
+#[derive(Clone, Copy, Debug)]
+pub struct RefinedShape<'a> {
+    /// in the frame of the scan
+    pub shape: Shape<'a>,
+    /// by vertex slot
+    pub known: &'a [Known],
+}
+
+/// What a place is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Class {
+    /// scan and touch agree within the noise of the scan
+    Agrees,
+    /// they do not, and it looks like this scanner: its noise, a rounded edge, a closed hole
+    ScannerError,
+    /// the part is not what was scanned
+    ChangedPart,
+    /// the touch is wrong
+    BadTouch,
+    /// may be changed as well as the scanner's error
+    Unsure,
+    /// nothing is known but the scan
+    NeverTouched,
+    /// the ball does not get there
+    Unreachable,
+}
+
+impl Class {
+    /// All, in the order in which they are told.
+    pub const ALL: [Self; 7] = [
+        Self::Agrees,
+        Self::ScannerError,
+        Self::ChangedPart,
+        Self::BadTouch,
+        Self::Unsure,
+        Self::NeverTouched,
+        Self::Unreachable,
+    ];
+
+    /// As it is told.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Agrees => "agrees",
+            Self::ScannerError => "scanner error",
+            Self::ChangedPart => "changed part",
+            Self::BadTouch => "bad touch",
+            Self::Unsure => "unsure",
+            Self::NeverTouched => "never touched",
+            Self::Unreachable => "unreachable",
+        }
+    }
+}
+
+/// A mesh with its classes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ClassMap {
+    /// by vertex slot, m: how far the touched surface lies outside of the scan; 0 where nothing was touched
+    pub disagreement: Vec<f64>,
+    /// by vertex slot
+    pub classes: Vec<Class>,
+    /// of each of [`Class::ALL`], m²
+    pub areas: [f64; 7],
+}
+
+/// Where touch and scan disagree.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Disagreement {
+    /// how the scanner errs; `None` where too little was touched to tell, and then nothing is called changed
+    pub scanner: Option<Scanner>,
+    /// the refined mesh
+    pub refined: ClassMap,
+    /// the scan
+    pub scan: ClassMap,
+    /// what hangs together, the largest first: changed, unsure, and scanner errors beyond its noise
+    pub regions: Vec<DisagreementRegion>,
+    /// touches that others contradict, in order of time
+    pub bad_touches: Vec<BadTouches>,
+}
+
+/// Standard deviations of the scan within which it agrees.
+const AGREES: f64 = 2.0;
+
+/// Tells where touch and scan disagree, and why, as far as the data can tell.
+///
+/// - `scan`: as it was.
+/// - `refined`: what came of it.
+/// - `touches`: of which it came.
+///
+/// # Errors
+/// [`CompareError::NoFaces`] where either mesh has none.
+pub fn disagreement(
+    scan: Shape<'_>,
+    refined: &RefinedShape<'_>,
+    touches: &[ProbedPoint],
+) -> Result<Disagreement, CompareError> {
+    if refined.shape.mesh.face_count() == 0 {
+        return Err(CompareError::NoFaces);
+    }
+    let places = Places::of(scan, refined)?;
+    let scanner = Scanner::of(scan.mesh, &places);
+    let bad_touches = bad_touches::find(refined, touches)?;
+    let mut classes = places.first_classes(refined, scanner.as_ref());
+    let regions = scanner.as_ref().map_or_else(Vec::new, |scanner| {
+        regions::find(&regions::Seen { scan: scan.mesh, refined, places: &places, scanner, touches }, &mut classes)
+    });
+    bad_touches::mark(refined, touches, &bad_touches, &mut classes);
+    let mut off = places.off.clone();
+    let is_felt = |class: &Class| !matches!(class, Class::NeverTouched | Class::Unreachable);
+    off.iter_mut().zip(&classes).filter(|(_, class)| !is_felt(class)).for_each(|(off, _)| *off = 0.0);
+    let on_scan = carried(scan, refined, &classes)?;
+    Ok(Disagreement {
+        scanner,
+        refined: ClassMap::of(refined.shape.mesh, off, classes),
+        scan: on_scan,
+        regions,
+        bad_touches,
+    })
+}
+
+/// What is known of each vertex of the refined mesh beside its class.
+struct Places {
+    /// m, by slot
+    pub positions: Vec<Point3<f64>>,
+    /// how far it lies outside of the scan, m, by slot
+    pub off: Vec<f64>,
+    /// whether it was touched, and the scan is there at all
+    pub is_seen: Vec<bool>,
+    /// whether a scanner of this resolution sees it well: no edge near, and no narrow place
+    pub is_open: Vec<bool>,
+    /// normals, by slot; zero where there are none
+    pub normals: Vec<nalgebra::Vector3<f64>>,
+    /// a third of the faces at it, m²
+    pub areas: Vec<f64>,
+}
+
+impl Places {
+    fn of(scan: Shape<'_>, refined: &RefinedShape<'_>) -> Result<Self, CompareError> {
+        let mesh = refined.shape.mesh;
+        let mut off = vec![0.0; mesh.vertex_slots()];
+        let mut is_seen = vec![false; mesh.vertex_slots()];
+        closest_places(mesh.positions(), scan.mesh, scan.tree, |at, hit| {
+            let p = mesh.position(VertexId(at as u32));
+            off[at] = signed(&p, scan.mesh, hit);
+            is_seen[at] = !is_on_rim(scan.mesh, hit) && refined.known[at] == Known::Touched;
+        })?;
+        let (normals, areas) = vertex_normals(mesh);
+        let is_open = scanner::open_places(scan.mesh, refined, &is_seen, &normals);
+        Ok(Self { positions: mesh.positions().to_vec(), off, is_seen, is_open, normals, areas })
+    }
+
+    fn first_classes(&self, refined: &RefinedShape<'_>, scanner: Option<&Scanner>) -> Vec<Class> {
+        let class = |(at, known): (usize, &Known)| match (known, scanner) {
+            (Known::NotTouched, _) => Class::NeverTouched,
+            (Known::Unreachable, _) => Class::Unreachable,
+            (Known::Touched, None) => Class::Unsure,
+            (Known::Touched, Some(scanner)) if self.is_seen[at] => match scanner.is_noise(self.off[at], AGREES) {
+                true => Class::Agrees,
+                false => Class::ScannerError,
+            },
+            // the scan has nothing there
+            (Known::Touched, Some(_)) => Class::ScannerError,
+        };
+        refined.known.iter().enumerate().map(class).collect()
+    }
+}
+
+impl ClassMap {
+    fn of(mesh: &TriMesh, disagreement: Vec<f64>, classes: Vec<Class>) -> Self {
+        let mut areas = [0.0; 7];
+        for (face, corners) in mesh.faces() {
+            let third = mesh.double_area_normal(face).norm() / 6.0;
+            corners.into_iter().for_each(|v| areas[classes[v.0 as usize] as usize] += third);
+        }
+        Self { disagreement, classes, areas }
+    }
+}
+
+/// Whether the surface ends where `hit` is.
+fn is_on_rim(mesh: &TriMesh, hit: &FaceHit) -> bool {
+    let corners = mesh.corners(hit.face);
+    (0..3).filter(|&i| hit.barycentric[i] <= 0.0).any(|i| {
+        let [a, b] = [corners[(i + 1) % 3], corners[(i + 2) % 3]];
+        mesh.faces_at_edge(a, b).count() < 2
+    })
+}
+
+fn vertex_normals(mesh: &TriMesh) -> (Vec<nalgebra::Vector3<f64>>, Vec<f64>) {
+    let mut normals = vec![nalgebra::Vector3::zeros(); mesh.vertex_slots()];
+    let mut areas = vec![0.0; mesh.vertex_slots()];
+    for (face, corners) in mesh.faces() {
+        let double = mesh.double_area_normal(face);
+        for vertex in corners {
+            normals[vertex.0 as usize] += double;
+            areas[vertex.0 as usize] += double.norm() / 6.0;
+        }
+    }
+    normals.iter_mut().for_each(|n| *n = n.try_normalize(0.0).unwrap_or_default());
+    (normals, areas)
+}
+
+/// The classes at the closest places of the refined mesh, for each vertex of the scan.
+fn carried(scan: Shape<'_>, refined: &RefinedShape<'_>, classes: &[Class]) -> Result<ClassMap, CompareError> {
+    let mesh = scan.mesh;
+    let mut off = vec![0.0; mesh.vertex_slots()];
+    let mut carried = vec![Class::NeverTouched; mesh.vertex_slots()];
+    closest_places(mesh.positions(), refined.shape.mesh, refined.shape.tree, |at, hit| {
+        let p: Point3<f64> = mesh.position(VertexId(at as u32));
+        let corner = super::sampling::nearest_corner(refined.shape.mesh.corners(hit.face), &hit.barycentric);
+        carried[at] = classes[corner.0 as usize];
+        if !matches!(carried[at], Class::NeverTouched | Class::Unreachable) {
+            off[at] = -signed(&p, refined.shape.mesh, hit);
+        }
+    })?;
+    Ok(ClassMap::of(mesh, off, carried))
+}

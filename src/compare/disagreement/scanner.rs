@@ -1,0 +1,155 @@
+//! How the scanner errs, found from scan and touch themselves.
+
+use nalgebra::{Point3, Vector3};
+
+use super::cells::Cells;
+use super::{Places, RefinedShape};
+use crate::mesh::{TriMesh, VertexId};
+
+/// How the scanner errs where it should see well.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scanner {
+    /// median of touch − scan, m: negative where the part looks too fat
+    pub offset: f64,
+    /// standard deviation about it, robustly, m
+    pub noise: f64,
+    /// distance ℓ over which it stays alike, m
+    pub correlation: f64,
+    /// median edge of the scan's triangles, m
+    pub edge: f64,
+    /// what is narrower may be closed over, m
+    pub sees_from: f64,
+    /// on so many places
+    pub places: usize,
+}
+
+/// Standard deviation of normal errors over their median.
+const SIGMA_OF_MEDIAN: f64 = 1.4826;
+/// The median of a squared normal number of variance 1.
+const MEDIAN_OF_SQUARE: f64 = 0.4549;
+/// What is so many edges of the scan's triangles wide is seen: a facet on each wall, one on the floor, and one in between.
+const NARROW: f64 = 5.0;
+/// Edges are rounded within so many edges of the triangles.
+const ROUNDED: f64 = 1.5;
+/// An edge of the refined mesh turns by more than this, as a cosine: 35°.
+const SHARP: f64 = 0.82;
+/// A ball of the least seen width touches nothing but the place it rests on within this share of its radius.
+const FITS: f64 = 0.85;
+/// Places of which the scanner can be told.
+const FEWEST: usize = 200;
+/// Places whose pairs are looked at.
+const MOST_PLACES: usize = 1_500;
+/// Distances up to so many edges of the triangles, in so many bins.
+const LONGEST: f64 = 8.0;
+const BINS: usize = 32;
+/// Pairs that fill a bin.
+const FULL: usize = 50;
+/// Where half the mean square difference has grown to 1 − 1/e of the variance, in ℓ.
+const GROWN: f64 = std::f64::consts::SQRT_2;
+/// Noise below this share of the edges is no noise that matters: nothing is told apart below it.
+const LEAST_NOISE: f64 = 1e-3;
+
+/// Median length of the edges, m.
+pub(super) fn median_edge(mesh: &TriMesh) -> f64 {
+    let sides = |[a, b, c]: [Point3<f64>; 3]| [(a - b).norm(), (b - c).norm(), (c - a).norm()];
+    let mut lengths: Vec<f64> = mesh.faces().flat_map(|(face, _)| sides(mesh.triangle(face))).collect();
+    median(&mut lengths)
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    let middle = values.len() / 2;
+    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
+}
+
+/// Where edges may be rounded, m.
+pub(super) fn rounded(edge: f64) -> f64 {
+    ROUNDED * edge
+}
+
+/// Vertices at sharp edges between touched faces, by slot.
+pub(super) fn sharp_vertices(mesh: &TriMesh, is_seen: &[bool]) -> Vec<bool> {
+    let mut is_sharp = vec![false; mesh.vertex_slots()];
+    for (face, corners) in mesh.faces() {
+        for i in 0..3 {
+            let [a, b] = [corners[i], corners[(i + 1) % 3]];
+            let is_own = is_seen[a.0 as usize] || is_seen[b.0 as usize];
+            let turns = |other| mesh.normal(face).dot(&mesh.normal(other)) < SHARP;
+            if is_own && a < b && mesh.faces_at_edge(a, b).any(|other| other != face && turns(other)) {
+                [a, b].into_iter().for_each(|v| is_sharp[v.0 as usize] = true);
+            }
+        }
+    }
+    is_sharp
+}
+
+/// Touched places that a scanner of this resolution sees well, by slot.
+pub(super) fn open_places(
+    scan: &TriMesh,
+    refined: &RefinedShape<'_>,
+    is_seen: &[bool],
+    normals: &[Vector3<f64>],
+) -> Vec<bool> {
+    let mesh = refined.shape.mesh;
+    let edge = median_edge(scan);
+    let (reach, radius) = (rounded(edge), NARROW * edge / 2.0);
+    let is_sharp = sharp_vertices(mesh, is_seen);
+    let sharp = Cells::new(mesh.positions(), (0..is_sharp.len()).filter(|&at| is_sharp[at]), reach);
+    let fits = |p: &Point3<f64>, normal: &Vector3<f64>| {
+        let middle = p + normal * radius;
+        refined.shape.tree.closest(mesh, &middle, FITS * radius).is_none()
+    };
+    (0..mesh.vertex_slots())
+        .map(|at| {
+            let p = mesh.position(VertexId(at as u32));
+            is_seen[at] && sharp.near(&p, reach).next().is_none() && fits(&p, &normals[at])
+        })
+        .collect()
+}
+
+impl Scanner {
+    /// `None` where too few places are open.
+    pub(super) fn of(scan: &TriMesh, places: &Places) -> Option<Self> {
+        let open: Vec<usize> = (0..places.off.len()).filter(|&at| places.is_open[at]).collect();
+        if open.len() < FEWEST {
+            return None;
+        }
+        let edge = median_edge(scan);
+        let mut values: Vec<f64> = open.iter().map(|&at| places.off[at]).collect();
+        let offset = median(&mut values);
+        values.iter_mut().for_each(|value| *value = (*value - offset).abs());
+        let noise = (SIGMA_OF_MEDIAN * median(&mut values)).max(LEAST_NOISE * edge);
+        let correlation = correlation(places, &open, noise, edge);
+        Some(Self { offset, noise, correlation, edge, sees_from: NARROW * edge, places: open.len() })
+    }
+
+    /// Whether a disagreement is within so many standard deviations.
+    pub(super) fn is_noise(&self, off: f64, sigmas: f64) -> bool {
+        (off - self.offset).abs() <= sigmas * self.noise
+    }
+
+    /// Standard deviation of the mean over an area (m²), m.
+    pub fn sigma_of_mean(&self, area: f64) -> f64 {
+        let alike = std::f64::consts::TAU * self.correlation.powi(2);
+        self.noise / (1.0 + area / alike.max(f64::MIN_POSITIVE)).sqrt()
+    }
+}
+
+/// Distance over which disagreements stay alike, m: half the mean square of their differences grows to 1 − 1/e of the
+/// variance within √2 ℓ.
+fn correlation(places: &Places, open: &[usize], noise: f64, edge: f64) -> f64 {
+    let some: Vec<usize> = open.iter().copied().step_by(open.len().div_ceil(MOST_PLACES)).collect();
+    let width = LONGEST * edge / BINS as f64;
+    let mut bins: Vec<Vec<f64>> = vec![Vec::new(); BINS];
+    for (i, &a) in some.iter().enumerate() {
+        for &b in &some[..i] {
+            let bin = ((places.positions[a] - places.positions[b]).norm() / width) as usize;
+            if bin < BINS && places.normals[a].dot(&places.normals[b]) > SHARP {
+                bins[bin].push((places.off[a] - places.off[b]).powi(2) / 2.0);
+            }
+        }
+    }
+    let grown = (1.0 - (-1.0f64).exp()) * noise.powi(2);
+    let is_grown = |bin: &mut Vec<f64>| bin.len() >= FULL && median(bin) / MEDIAN_OF_SQUARE >= grown;
+    let at = bins.iter_mut().position(is_grown).unwrap_or(BINS);
+    ((at as f64 + 0.5) * width / GROWN).max(edge / 2.0)
+}
