@@ -64,7 +64,9 @@ fn cone_beyond(parted: &Parted, wall: &Wall, end: f64, out: f64) -> Option<Segme
         let faces = flood(parted, faces, &start, tolerance.max(FIRST_SLACK * radius));
         let moved = refined(&start, &parted.facets, &faces).filter(|better| is_along(better, wall));
         let misfit = |cone: &Primitive| misfit(parted, &faces, cone);
-        let better = [moved, through_corners(parted, wall, &faces, &start), Some(start)].into_iter().flatten();
+        // those of a measured mesh are no better than its facets
+        let drawn = parted.rounding.and_then(|_| through_corners(parted, wall, &faces, &start));
+        let better = [moved, drawn, Some(start)].into_iter().flatten();
         let better = better.min_by(|a, b| misfit(a).total_cmp(&misfit(b)))?;
         let faces = flood(parted, faces, &better, tolerance);
         let area = faces.iter().map(|&face| parted.facets.area(face)).sum();

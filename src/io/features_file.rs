@@ -100,7 +100,7 @@ pub struct FeatureRecord {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub width_mm: Option<f64>,
     /// hole, slot, pocket: from opening to floor, of one that goes through as far as its wall goes (of a drilled hole
-    /// without the tip); boss: its height
+    /// without the tip; of a round opening in a sheet left out, as is `through`); boss: its height
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth_mm: Option<f64>,
     /// hole, slot, pocket
