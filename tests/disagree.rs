@@ -204,7 +204,7 @@ fn spikes_of_the_pose_are_bad_touches() {
                         break;
                     }
                     if let Message::Pose(pose) = message {
-                        pose.pose.translation.z += 1.2e-3;
+                        pose.pose_ot.translation.z += 1.2e-3;
                     }
                 }
             }

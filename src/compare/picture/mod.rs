@@ -58,6 +58,9 @@ const AIR: f64 = 0.05;
 const FLATTEST: f64 = 0.45;
 /// And a picture of one panel or more at most, so that it fits on a screen.
 const HIGHEST: f64 = 0.62;
+/// What stands above the bar of colours.
+const OF_TRUTH: &str = "deviation, mm:  - too little   + too much material";
+const OF_TOUCHES: &str = "touch - scan, mm:  - inside of the scan   + outside";
 /// The bar of colours, pixels.
 const BAR: [i32; 2] = [640, 24];
 
@@ -87,7 +90,8 @@ pub fn draw_picture(panels: &[Panel<'_>], params: &PictureParams<'_>) -> Picture
         draw_legend(&mut picture, foot);
     }
     let foot = foot + legend;
-    draw_scale(&mut picture, foot, params.range);
+    let label = if has_classes { OF_TOUCHES } else { OF_TRUTH };
+    draw_scale(&mut picture, foot, params.range, label);
     draw_length(&mut picture, foot + NOTE.height() + 8, &frame);
     picture
 }
@@ -134,12 +138,11 @@ fn draw_legend(picture: &mut Picture, top: i32) {
 }
 
 /// The bar of colours in the middle, its unit above and ticks below.
-fn draw_scale(picture: &mut Picture, top: i32, range: f64) {
+fn draw_scale(picture: &mut Picture, top: i32, range: f64, label: &str) {
     let width = picture.size[0] as i32;
     let [length, thickness] = [BAR[0].min(width * 2 / 5), BAR[1]];
     let left = (width - length) / 2;
     let bar = top + NOTE.height() + 8;
-    let label = "deviation, mm:  - too little   + too much material";
     picture.write([(width - NOTE.width(label)) / 2, top], NOTE, SOFT_INK, label);
     picture.fill([left - 1, bar - 1], [length + 2, thickness + 2], SOFT_INK);
     for x in 0..length {
