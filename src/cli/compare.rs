@@ -251,6 +251,7 @@ impl CompareArguments {
             .map(|(placed, compared, title, note)| Panel {
                 mesh: &placed.mesh,
                 deviations: &compared.vertex_deviations,
+                classes: None,
                 title: if scan.is_some() { title } else { "" },
                 note,
             })

@@ -6,6 +6,7 @@
 mod calibrate;
 mod compare;
 mod demo;
+mod disagree;
 mod features;
 mod found;
 mod knocks;
@@ -67,6 +68,8 @@ enum Verb {
     Demo(demo::DemoArguments),
     /// Tells how far a mesh is from the true part, in numbers and as a picture
     Compare(compare::CompareArguments),
+    /// Tells where touch and scan disagree, and whether scanner, part or touch is to blame
+    Disagree(disagree::DisagreeArguments),
     /// Refines a scan by a recording of touches
     Refine(refine::RefineArguments),
     /// Finds holes, slots, pockets, bosses, edges, corners and planes on a mesh, and measures them
@@ -168,6 +171,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Verb::Calibrate(arguments) => calibrate::calibrate(&arguments),
         Verb::Compare(arguments) => compare::compare(&arguments),
         Verb::Demo(arguments) => demo::demo(&arguments),
+        Verb::Disagree(arguments) => disagree::disagree(&arguments),
         Verb::Refine(arguments) => refine::refine(&arguments),
         Verb::Features(arguments) => features::features(&arguments),
         Verb::Simulate(arguments) => simulate::simulate(&arguments),

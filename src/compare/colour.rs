@@ -1,4 +1,7 @@
-//! Colours of signed deviations: blue lacks material, white fits, red has too much. The colour-blind can tell them too.
+//! Colours of signed deviations: blue lacks material, white fits, red has too much. The colour-blind can tell them too. And of
+//! classes of disagreement.
+
+use super::disagreement::Class;
 
 /// Red, green and blue, 0 to 255 each, sRGB.
 pub type Rgb = [u8; 3];
@@ -25,6 +28,19 @@ pub fn colour_of(deviation: f64, range: f64) -> Rgb {
     let below = (at as usize).min(last - 1);
     let part = at - below as f64;
     std::array::from_fn(|i| (STOPS[below][i] + (STOPS[below + 1][i] - STOPS[below][i]) * part).round() as u8)
+}
+
+/// The colour of a class, set apart also for the colour-blind.
+pub fn colour_of_class(class: Class) -> Rgb {
+    match class {
+        Class::Agrees => [226, 236, 222],
+        Class::ScannerError => [112, 172, 216],
+        Class::ChangedPart => [204, 56, 40],
+        Class::BadTouch => [122, 40, 138],
+        Class::Unsure => [244, 180, 62],
+        Class::NeverTouched => [186, 188, 192],
+        Class::Unreachable => [96, 98, 104],
+    }
 }
 
 #[cfg(test)]

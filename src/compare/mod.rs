@@ -14,7 +14,7 @@ mod sampling;
 mod summary;
 
 pub use cloud::cloud_distances;
-pub use colour::{Rgb, colour_of};
+pub use colour::{Rgb, colour_of, colour_of_class};
 pub use comparison::{CompareParams, Comparison, Region, RegionComparison, Regions, Shape, compare};
 pub use deviation::{closest_places, deviations};
 pub use disagreement::{

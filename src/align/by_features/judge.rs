@@ -131,10 +131,14 @@ impl<'a> Judge<'a> {
         Judged { motion, fit, partners: self.matching.partners(&motion), distances }
     }
 
-    /// Whether the evidence decides for `a` against `b`, and nothing against that.
+    /// Whether the evidence decides for `a` against `b`: the surface, and where that does not tell, the features, which were
+    /// found on it.
     fn rules_out(&self, a: &Judged, b: &Judged) -> bool {
-        let speaks = |a, b| self.by_surface(a, b) || self.by_features(a, b);
-        speaks(a, b) && !speaks(b, a)
+        match (self.by_surface(a, b), self.by_surface(b, a)) {
+            (true, false) => true,
+            (false, true) => false,
+            _ => self.by_features(a, b) && !self.by_features(b, a),
+        }
     }
 
     /// Those that no other rules out; all where each is ruled out by one.

@@ -21,7 +21,7 @@ pub struct BadTouches {
     pub sigmas: f64,
     /// how many were held apart while the mesh was refined
     pub held_apart: usize,
-    /// good touches of other strokes or times nearby
+    /// good touches of other times that felt the same way there
     pub against: usize,
 }
 
@@ -29,6 +29,12 @@ pub struct BadTouches {
 const SIGMAS: f64 = 6.0;
 /// … and by more than this, m: what a lattice of half a millimetre leaves at an edge.
 const LEAST_OFF: f64 = 0.15e-3;
+/// Touches of other times that contradict one, at least.
+const FEWEST: usize = 3;
+/// They felt the same way within 26°.
+const ALIKE: f64 = 0.9;
+/// A standard deviation below this is none, m.
+const LEAST_SIGMA: f64 = 1e-6;
 /// Touches so close together in time are one, ns.
 const PAUSE_NS: i64 = 100_000_000;
 /// Touches so near speak of the same place, m, where there is no ball; else its radius.
@@ -36,47 +42,83 @@ const NEAR: f64 = 1e-3;
 /// A place is badly touched when this share of its touches is bad.
 const SHARE: f64 = 0.5;
 
-/// Those held apart, and those that lie off the surface which all others make.
+/// Those held apart, and those that lie off the surface and off what others felt there.
 pub(super) fn find(refined: &RefinedShape<'_>, touches: &[ProbedPoint]) -> Result<Vec<BadTouches>, CompareError> {
-    let off = distances(refined, touches)?;
-    let is_bad = |at: usize| {
-        let touch = &touches[at];
-        let limit = (SIGMAS * touch.sigma.hypot(touch.calibration)).max(LEAST_OFF);
-        touch.is_held_apart || off[at].abs() > limit
-    };
-    let bad: Vec<usize> = (0..touches.len()).filter(|&at| is_bad(at)).collect();
+    let (off, feet) = distances(refined, touches)?;
     let points: Vec<Point3<f64>> = touches.iter().map(|touch| touch.point).collect();
     let reach = reach(touches);
+    let taken = Cells::new(&points, (0..touches.len()).filter(|&at| !touches[at].is_held_apart), reach);
+    let is_bad = |at: usize| {
+        let limit = limit(&touches[at]);
+        touches[at].is_held_apart
+            || (off[at].abs() > limit
+                && contradiction(touches, at, &taken, &feet[at], reach).is_some_and(|d| d > limit))
+    };
+    let bad: Vec<usize> = (0..touches.len()).filter(|&at| is_bad(at)).collect();
     let good = Cells::new(&points, (0..touches.len()).filter(|at| bad.binary_search(at).is_err()), reach);
     let goes_on = |a: &usize, b: &usize| touches[*b].stamp_ns.saturating_sub(touches[*a].stamp_ns) <= PAUSE_NS;
-    Ok(bad.chunk_by(goes_on).map(|numbers| told(numbers, touches, &off, &good, reach)).collect())
+    let told = |numbers: &[usize]| {
+        told(numbers, touches, &off, |worst| against(touches, worst, &good, &feet[worst], reach).count())
+    };
+    Ok(bad.chunk_by(goes_on).map(told).collect())
 }
 
-fn told(numbers: &[usize], touches: &[ProbedPoint], off: &[f64], good: &Cells<'_>, reach: f64) -> BadTouches {
+/// How far off a touch must be, m.
+fn limit(touch: &ProbedPoint) -> f64 {
+    (SIGMAS * touch.sigma.hypot(touch.calibration)).max(LEAST_OFF)
+}
+
+/// Touches of other times near the foot of a touch on the surface, that felt the same way.
+fn against<'a>(
+    touches: &'a [ProbedPoint],
+    at: usize,
+    others: &'a Cells<'_>,
+    foot: &'a Point3<f64>,
+    reach: f64,
+) -> impl Iterator<Item = usize> + 'a {
+    others.near(foot, reach / 2.0).filter(move |&other| {
+        let is_other = touches[other].stamp_ns.abs_diff(touches[at].stamp_ns) > PAUSE_NS.unsigned_abs();
+        is_other && touches[other].normal.dot(&touches[at].normal) > ALIKE
+    })
+}
+
+/// How far a touch is from the planes that others felt there, the middle of them, m; `None` where they are too few.
+fn contradiction(touches: &[ProbedPoint], at: usize, taken: &Cells<'_>, foot: &Point3<f64>, reach: f64) -> Option<f64> {
+    let off = |other: usize| (touches[at].point - touches[other].point).dot(&touches[other].normal).abs();
+    let mut off: Vec<f64> = against(touches, at, taken, foot, reach).map(off).collect();
+    off.sort_by(f64::total_cmp);
+    (off.len() >= FEWEST).then(|| off[off.len() / 2])
+}
+
+fn told(numbers: &[usize], touches: &[ProbedPoint], off: &[f64], against: impl Fn(usize) -> usize) -> BadTouches {
     let sum: Vector3<f64> = numbers.iter().map(|&at| touches[at].point.coords).sum();
-    let sigmas = |at: usize| off[at] / touches[at].sigma.hypot(touches[at].calibration).max(1e-9);
+    let sigmas = |at: usize| off[at] / touches[at].sigma.hypot(touches[at].calibration).max(LEAST_SIGMA);
     let worst = numbers.iter().copied().max_by(|a, b| off[*a].abs().total_cmp(&off[*b].abs())).unwrap_or(numbers[0]);
-    let is_other = |at: &usize| touches[*at].stamp_ns.abs_diff(touches[worst].stamp_ns) > PAUSE_NS.unsigned_abs();
     BadTouches {
         touches: numbers.iter().map(|&at| at as u32).collect(),
         centre: (sum / numbers.len() as f64).into(),
         off: off[worst],
         sigmas: sigmas(worst).abs(),
         held_apart: numbers.iter().filter(|&&at| touches[at].is_held_apart).count(),
-        against: good.near(&touches[worst].point, reach).filter(is_other).count(),
+        against: against(worst),
     }
 }
 
 /// How far the surface that each touch says is from the refined one, m: of a ball by its centre, which the felt normal
-/// does not move.
-fn distances(refined: &RefinedShape<'_>, touches: &[ProbedPoint]) -> Result<Vec<f64>, CompareError> {
+/// does not move; and the closest place there.
+fn distances(
+    refined: &RefinedShape<'_>,
+    touches: &[ProbedPoint],
+) -> Result<(Vec<f64>, Vec<Point3<f64>>), CompareError> {
     let mut off = vec![0.0; touches.len()];
     let mesh = refined.shape.mesh;
+    let mut feet = vec![Point3::origin(); touches.len()];
     let centres: Vec<Point3<f64>> = touches.iter().map(|touch| touch.centre).collect();
     closest_places(&centres, mesh, refined.shape.tree, |at, hit| {
         off[at] = super::signed(&centres[at], mesh, hit) - touches[at].radius;
+        feet[at] = hit.point;
     })?;
-    Ok(off)
+    Ok((off, feet))
 }
 
 fn reach(touches: &[ProbedPoint]) -> f64 {

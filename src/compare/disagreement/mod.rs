@@ -136,7 +136,7 @@ pub fn disagreement(
     let bad_touches = bad_touches::find(refined, touches)?;
     let mut classes = places.first_classes(refined, scanner.as_ref());
     let regions = scanner.as_ref().map_or_else(Vec::new, |scanner| {
-        regions::find(&regions::Seen { scan: scan.mesh, refined, places: &places, scanner, touches }, &mut classes)
+        regions::find(&regions::Seen { refined, places: &places, scanner, touches }, &mut classes)
     });
     bad_touches::mark(refined, touches, &bad_touches, &mut classes);
     let mut off = places.off.clone();

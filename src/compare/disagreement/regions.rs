@@ -40,7 +40,6 @@ pub struct DisagreementRegion {
 
 /// What regions are found in.
 pub(super) struct Seen<'a> {
-    pub scan: &'a TriMesh,
     pub refined: &'a RefinedShape<'a>,
     pub places: &'a Places,
     pub scanner: &'a Scanner,

@@ -6,8 +6,9 @@ mod raster;
 
 use nalgebra::{Vector2, Vector3};
 
-use super::colour::{Rgb, colour_of};
+use super::colour::{Rgb, colour_of, colour_of_class};
 use super::comparison::round_up;
+use super::disagreement::Class;
 use crate::mesh::{TriMesh, VertexId};
 use camera::Camera;
 pub use canvas::Picture;
@@ -21,6 +22,8 @@ pub struct Panel<'a> {
     pub mesh: &'a TriMesh,
     /// of each vertex slot, m, + outside
     pub deviations: &'a [f64],
+    /// of each vertex slot; drawn in their colours where they are given
+    pub classes: Option<&'a [Class]>,
     /// stands above it; ASCII
     pub title: &'a str,
     /// stands below it; ASCII
@@ -55,6 +58,9 @@ const AIR: f64 = 0.05;
 const FLATTEST: f64 = 0.45;
 /// And a picture of one panel or more at most, so that it fits on a screen.
 const HIGHEST: f64 = 0.62;
+/// What stands above the bar of colours.
+const OF_TRUTH: &str = "deviation, mm:  - too little   + too much material";
+const OF_TOUCHES: &str = "touch - scan, mm:  - inside of the scan   + outside";
 /// The bar of colours, pixels.
 const BAR: [i32; 2] = [640, 24];
 
@@ -69,7 +75,9 @@ pub fn draw_picture(panels: &[Panel<'_>], params: &PictureParams<'_>) -> Picture
 
     let above = MARGIN + TITLE.height() + GAP / 2;
     let foot = above + TEXT.height() + 8 + panel_height + 10 + NOTE.height() + GAP;
-    let height = foot + NOTE.height() + 8 + BAR[1] + 10 + TEXT.height() + MARGIN;
+    let has_classes = panels.iter().any(|panel| panel.classes.is_some());
+    let legend = if has_classes { NOTE.height() + GAP } else { 0 };
+    let height = foot + legend + NOTE.height() + 8 + BAR[1] + 10 + TEXT.height() + MARGIN;
     let mut picture = Picture::blank([width, height].map(|side| side as u32), PAPER);
     picture.write([MARGIN, MARGIN], TITLE, INK, &fitted(params.title, TITLE, width - 2 * MARGIN));
     for (panel, left) in panels.iter().zip((0..).map(|i| MARGIN + i * (panel_width + GAP))) {
@@ -78,7 +86,12 @@ pub fn draw_picture(panels: &[Panel<'_>], params: &PictureParams<'_>) -> Picture
         picture.paste([left, top], &draw(panel, &camera, &frame, params.range));
         picture.write([left, top + panel_height + 10], NOTE, SOFT_INK, &fitted(panel.note, NOTE, panel_width));
     }
-    draw_scale(&mut picture, foot, params.range);
+    if has_classes {
+        draw_legend(&mut picture, foot);
+    }
+    let foot = foot + legend;
+    let label = if has_classes { OF_TOUCHES } else { OF_TRUTH };
+    draw_scale(&mut picture, foot, params.range, label);
     draw_length(&mut picture, foot + NOTE.height() + 8, &frame);
     picture
 }
@@ -109,13 +122,27 @@ fn frame_for(panels: &[Panel<'_>], camera: &Camera, width: i32) -> Frame {
     Frame { middle, scale, size: size.map(|side| side as u32) }
 }
 
+/// The classes with their colours in one line.
+fn draw_legend(picture: &mut Picture, top: i32) {
+    let side = NOTE.height();
+    let width = picture.size[0] as i32 - 2 * MARGIN;
+    let lengths = Class::ALL.map(|class| side + 8 + NOTE.width(class.name()));
+    let gap = ((width - lengths.iter().sum::<i32>()) / (lengths.len() as i32 - 1)).max(8);
+    let mut left = MARGIN;
+    for (class, length) in Class::ALL.into_iter().zip(lengths) {
+        picture.fill([left, top], [side, side], SOFT_INK);
+        picture.fill([left + 1, top + 1], [side - 2, side - 2], colour_of_class(class));
+        picture.write([left + side + 8, top], NOTE, INK, class.name());
+        left += length + gap;
+    }
+}
+
 /// The bar of colours in the middle, its unit above and ticks below.
-fn draw_scale(picture: &mut Picture, top: i32, range: f64) {
+fn draw_scale(picture: &mut Picture, top: i32, range: f64, label: &str) {
     let width = picture.size[0] as i32;
     let [length, thickness] = [BAR[0].min(width * 2 / 5), BAR[1]];
     let left = (width - length) / 2;
     let bar = top + NOTE.height() + 8;
-    let label = "deviation, mm:  - too little   + too much material";
     picture.write([(width - NOTE.width(label)) / 2, top], NOTE, SOFT_INK, label);
     picture.fill([left - 1, bar - 1], [length + 2, thickness + 2], SOFT_INK);
     for x in 0..length {

@@ -5,7 +5,7 @@ use nalgebra::{Vector2, Vector3};
 use super::camera::Camera;
 use super::canvas::Picture;
 use super::{BACKGROUND, Panel};
-use crate::compare::colour::{Rgb, colour_of};
+use crate::compare::colour::{Rgb, colour_of, colour_of_class};
 use crate::mesh::FaceId;
 
 /// Samples on each axis of a pixel.
@@ -64,7 +64,16 @@ pub(super) fn draw(panel: &Panel<'_>, camera: &Camera, frame: &Frame, range: f64
         let places = panel.mesh.triangle(face).map(|p| place(&camera.project(&p)));
         let values = corners.map(|vertex| panel.deviations.get(vertex.0 as usize).map_or(0.0, |d| d / range));
         let light = light_on(panel, camera, face);
-        samples.fill(&places, |shares| shade(&shades, shares.iter().zip(values).map(|(s, v)| s * v).sum(), light));
+        match panel.classes {
+            Some(classes) => {
+                let colours = corners.map(|v| classes.get(v.0 as usize).map_or(BACKGROUND, |&c| colour_of_class(c)));
+                samples.fill(&places, |shares| lit(colours[largest(&shares)], light));
+            }
+            None => {
+                samples
+                    .fill(&places, |shares| shade(&shades, shares.iter().zip(values).map(|(s, v)| s * v).sum(), light));
+            }
+        }
     }
     samples.outline((STEP * height as f64 / scale) as f32);
     samples.averaged(frame.size)
@@ -84,8 +93,18 @@ fn light_on(panel: &Panel<'_>, camera: &Camera, face: FaceId) -> f64 {
 /// - `light`: as of [`light_on`].
 fn shade(shades: &[Rgb], value: f64, light: f64) -> Rgb {
     let at = (value.clamp(-1.0, 1.0) + 1.0) / 2.0 * (SHADES - 1) as f64;
+    lit(shades[(at.round() as usize).min(SHADES - 1)], light)
+}
+
+/// A colour in the light of [`light_on`].
+fn lit(colour: Rgb, light: f64) -> Rgb {
     let inside = |c: f64| if light < 0.0 { INSIDE_GREY + (c - INSIDE_GREY) * INSIDE } else { c };
-    shades[(at.round() as usize).min(SHADES - 1)].map(|c| (inside(f64::from(c)) * light.abs()).round() as u8)
+    colour.map(|c| (inside(f64::from(c)) * light.abs()).round() as u8)
+}
+
+/// The corner with the largest share.
+fn largest(shares: &[f64; 3]) -> usize {
+    (1..3).fold(0, |at, i| if shares[i] > shares[at] { i } else { at })
 }
 
 impl Samples {

@@ -1,0 +1,336 @@
+//! `touchup disagree`: where touch and scan disagree, and whether the scanner, the part or a touch is to blame.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use nalgebra::{Point3, Vector3};
+use serde::Serialize;
+
+use super::progress::Progress;
+use super::{CliError, Losses, tell};
+use crate::compare::{
+    BadTouches, Class, ClassMap, Disagreement, DisagreementRegion, Known, Panel, PictureParams, RefinedShape, Scanner,
+    Shape, colour_of_class, disagreement, draw_picture,
+};
+use crate::io::atomic::{AtomicFile, is_same_file};
+use crate::io::mesh_file::{MeshUnit, VertexColumn, read_mesh, read_vertex_columns, write_mesh_with};
+use crate::io::png::write_png;
+use crate::io::touches_file::read_touches;
+use crate::mesh::{FaceTree, TriMesh};
+
+#[derive(Debug, Args)]
+pub(super) struct DisagreeArguments {
+    /// The scan as it was: PLY, STL or OBJ
+    scan: PathBuf,
+    /// What refine made of it: a PLY, which says what was touched
+    refined: PathBuf,
+    /// The touches, as refine --touches-out writes them
+    #[arg(long, value_name = "CSV")]
+    touches: PathBuf,
+    /// Unit of the coordinates in SCAN and REFINED
+    #[arg(long, value_name = "U", default_value = "mm")]
+    mesh_unit: MeshUnit,
+    /// Writes REFINED with the colours of its classes and the columns `disagreement_mm` and `class`
+    #[arg(long, value_name = "PLY")]
+    coloured: Option<PathBuf>,
+    /// The same of SCAN
+    #[arg(long, value_name = "PLY")]
+    coloured_scan: Option<PathBuf>,
+    /// Writes a picture of REFINED in the colours of its classes, and of its disagreement with SCAN
+    #[arg(long, value_name = "PNG")]
+    picture: Option<PathBuf>,
+    /// From which direction the picture is taken; by default the side that was touched
+    #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', num_args = 3, allow_negative_numbers = true)]
+    view: Option<Vec<f64>>,
+    /// Prints one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// What `--json` prints.
+#[derive(Debug, Serialize)]
+struct Told {
+    /// `null` where too little was touched to tell how the scanner errs
+    scanner: Option<ScannerTold>,
+    classes: Vec<ClassTold>,
+    regions: Vec<RegionTold>,
+    bad_touches: Vec<BadTold>,
+}
+
+#[derive(Debug, Serialize)]
+struct ScannerTold {
+    /// touch − scan where the scanner sees well: negative where the part looks too fat
+    offset_mm: f64,
+    noise_mm: f64,
+    correlation_mm: f64,
+    edge_mm: f64,
+    sees_from_mm: f64,
+    places: usize,
+}
+
+#[derive(Debug, Serialize)]
+struct ClassTold {
+    class: &'static str,
+    /// as in the column `class`
+    number: usize,
+    refined_mm2: f64,
+    scan_mm2: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct RegionTold {
+    class: &'static str,
+    center_mm: [f64; 3],
+    area_mm2: f64,
+    mean_mm: f64,
+    sigmas: f64,
+    open_area_mm2: f64,
+    correlation_lengths: f64,
+    passes: usize,
+    edge_share_of_rim: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct BadTold {
+    center_mm: [f64; 3],
+    touches: Vec<u32>,
+    off_mm: f64,
+    sigmas: f64,
+    held_apart: usize,
+    against: usize,
+}
+
+/// The verb: finds and tells.
+pub(super) fn disagree(arguments: &DisagreeArguments) -> Result<Losses, CliError> {
+    arguments.check_outputs()?;
+    let reading = Progress::stage("read");
+    let unit = arguments.mesh_unit;
+    let [scan, refined] = [&arguments.scan, &arguments.refined].map(|path| read_mesh(path, unit));
+    let scan = scan.map_err(CliError::ReadMesh)?.mesh;
+    let refined = refined.map_err(CliError::ReadMesh)?.mesh;
+    let known = read_known(&arguments.refined, unit, &refined)?;
+    let touches = read_touches(&arguments.touches)?;
+    drop(reading);
+
+    let measuring = Progress::stage("compare");
+    let [scan_tree, refined_tree] = [&scan, &refined].map(FaceTree::new);
+    let shape = Shape { mesh: &refined, tree: &refined_tree };
+    let found =
+        disagreement(Shape { mesh: &scan, tree: &scan_tree }, &RefinedShape { shape, known: &known }, &touches)?;
+    drop(measuring);
+    arguments.draw(&refined, &found)?;
+    for (path, mesh, map) in
+        [(&arguments.coloured, &refined, &found.refined), (&arguments.coloured_scan, &scan, &found.scan)]
+    {
+        if let Some(path) = path {
+            write_coloured(path, mesh, map, unit)?;
+        }
+    }
+    let told = Told::of(&found);
+    let json = || serde_json::to_string(&told).expect("finite numbers and names alone cannot fail");
+    tell(&if arguments.json { json() } else { told.to_string() });
+    Ok(Losses::new())
+}
+
+/// What each vertex rests on.
+fn read_known(path: &Path, unit: MeshUnit, mesh: &TriMesh) -> Result<Vec<Known>, CliError> {
+    let [support] = read_vertex_columns(path, unit, mesh, ["support"]).map_err(CliError::ReadMesh)?;
+    let support = support.filter(|support| support.len() == mesh.vertex_slots()).ok_or_else(|| {
+        CliError::Usage(format!("{} does not say what was touched: give the PLY that refine wrote", path.display()))
+    })?;
+    let known = |support: &f32| match *support {
+        1.0 => Known::Touched,
+        3.0 => Known::Unreachable,
+        _ => Known::NotTouched,
+    };
+    Ok(support.iter().map(known).collect())
+}
+
+fn write_coloured(path: &Path, mesh: &TriMesh, map: &ClassMap, unit: MeshUnit) -> Result<(), CliError> {
+    let channel = |i: usize| map.classes.iter().map(|&class| colour_of_class(class)[i]).collect::<Vec<u8>>().into();
+    let in_mm: Vec<f32> = map.disagreement.iter().map(|d| (d * 1e3) as f32).collect();
+    let number: Vec<u8> = map.classes.iter().map(|&class| class as u8).collect();
+    let columns = [
+        VertexColumn { name: "red", values: channel(0) },
+        VertexColumn { name: "green", values: channel(1) },
+        VertexColumn { name: "blue", values: channel(2) },
+        VertexColumn { name: "disagreement_mm", values: in_mm.into() },
+        VertexColumn { name: "class", values: number.into() },
+    ];
+    write_mesh_with(path, mesh, &columns, unit).map_err(CliError::WriteMesh)
+}
+
+impl DisagreeArguments {
+    /// The work is not begun when its result cannot be kept.
+    fn check_outputs(&self) -> Result<(), CliError> {
+        let outputs = [
+            ("--picture", ".png", &self.picture),
+            ("--coloured", ".ply", &self.coloured),
+            ("--coloured-scan", ".ply", &self.coloured_scan),
+        ];
+        for (flag, ending, path) in
+            outputs.iter().filter_map(|(flag, ending, path)| Some((flag, ending, (*path).as_ref()?)))
+        {
+            let shown = path.display();
+            if !shown.to_string().to_ascii_lowercase().ends_with(ending) {
+                return Err(CliError::Usage(format!("{flag} {shown} must end in {ending}")));
+            }
+            if [&self.scan, &self.refined, &self.touches].into_iter().any(|input| is_same_file(input, path)) {
+                return Err(CliError::Usage(format!("{flag} would write over {shown}, which is read")));
+            }
+            AtomicFile::create(path).map(drop).map_err(|source| CliError::Write { path: path.clone(), source })?;
+        }
+        match &self.view {
+            Some(view) if !view.iter().all(|x| x.is_finite()) || view.iter().all(|x| *x == 0.0) => {
+                Err(CliError::Usage("--view must be a direction, such as 1,-1,0.5".to_owned()))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn draw(&self, refined: &TriMesh, found: &Disagreement) -> Result<(), CliError> {
+        let Some(path) = &self.picture else { return Ok(()) };
+        let _drawing = Progress::stage("draw");
+        let map = &found.refined;
+        let is_felt = |class: &Class| !matches!(class, Class::NeverTouched | Class::Unreachable);
+        let weights: Vec<f64> = map.classes.iter().map(|class| if is_felt(class) { 1.0 } else { 0.0 }).collect();
+        let range = found.scanner.map_or(1e-3, |scanner| (4.0 * scanner.noise + scanner.offset.abs()).max(1e-6));
+        let panel = |classes, title| Panel { mesh: refined, deviations: &map.disagreement, classes, title, note: "" };
+        let panels = [panel(Some(&map.classes[..]), "why"), panel(None, "touch - scan")];
+        let file = |path: &Path| path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned());
+        let params = PictureParams {
+            title: &format!("where {} and the scan {} disagree", file(&self.refined), file(&self.scan)),
+            width: 1600,
+            range,
+            from: self.view.as_ref().map(|view| Vector3::from_column_slice(view)),
+            weights: Some(&weights),
+        };
+        let picture = draw_picture(&panels, &params);
+        let write = |source| CliError::Write { path: path.clone(), source };
+        write_png(path, picture.size, &picture.pixels).map_err(write)
+    }
+}
+
+fn mm(p: &Point3<f64>) -> [f64; 3] {
+    [p.x, p.y, p.z].map(|x| x * 1e3)
+}
+
+impl Told {
+    fn of(found: &Disagreement) -> Self {
+        let class = |(number, class): (usize, Class)| ClassTold {
+            class: class.name(),
+            number,
+            refined_mm2: found.refined.areas[number] * 1e6,
+            scan_mm2: found.scan.areas[number] * 1e6,
+        };
+        Self {
+            scanner: found.scanner.as_ref().map(ScannerTold::of),
+            classes: Class::ALL.into_iter().enumerate().map(class).collect(),
+            regions: found.regions.iter().map(RegionTold::of).collect(),
+            bad_touches: found.bad_touches.iter().map(BadTold::of).collect(),
+        }
+    }
+}
+
+impl ScannerTold {
+    fn of(scanner: &Scanner) -> Self {
+        Self {
+            offset_mm: scanner.offset * 1e3,
+            noise_mm: scanner.noise * 1e3,
+            correlation_mm: scanner.correlation * 1e3,
+            edge_mm: scanner.edge * 1e3,
+            sees_from_mm: scanner.sees_from * 1e3,
+            places: scanner.places,
+        }
+    }
+}
+
+impl RegionTold {
+    fn of(region: &DisagreementRegion) -> Self {
+        let evidence = &region.evidence;
+        Self {
+            class: region.class.name(),
+            center_mm: mm(&region.centre),
+            area_mm2: region.area * 1e6,
+            mean_mm: region.mean * 1e3,
+            sigmas: evidence.sigmas,
+            open_area_mm2: evidence.open_area * 1e6,
+            correlation_lengths: evidence.lengths,
+            passes: evidence.passes,
+            edge_share_of_rim: evidence.edges,
+        }
+    }
+}
+
+impl BadTold {
+    fn of(bad: &BadTouches) -> Self {
+        let BadTouches { touches, centre, off, sigmas, held_apart, against } = bad;
+        Self {
+            center_mm: mm(centre),
+            touches: touches.clone(),
+            off_mm: off * 1e3,
+            sigmas: *sigmas,
+            held_apart: *held_apart,
+            against: *against,
+        }
+    }
+}
+
+/// So many regions and bad touches are told; `--json` has all.
+const MOST_TOLD: usize = 12;
+
+impl fmt::Display for Told {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.scanner {
+            Some(ScannerTold { offset_mm, noise_mm, correlation_mm, edge_mm, sees_from_mm, places }) => writeln!(
+                f,
+                "the scanner, by {places} touched places that it should see well: offset {offset_mm:+.3} mm, noise \
+                 {noise_mm:.3} mm alike over {correlation_mm:.1} mm; edges of {edge_mm:.2} mm, so that what is narrower than \
+                 {sees_from_mm:.1} mm may be closed over"
+            )?,
+            None => writeln!(f, "too little was touched to tell how the scanner errs: nothing is called changed")?,
+        }
+        write!(f, "{:<14} {:>12} {:>12}", "class", "refined, mm2", "scan, mm2")?;
+        for ClassTold { class, refined_mm2, scan_mm2, .. } in &self.classes {
+            write!(f, "\n{class:<14} {refined_mm2:>12.1} {scan_mm2:>12.1}")?;
+        }
+        if !self.regions.is_empty() {
+            write!(
+                f,
+                "\n{:<14} {:>24} {:>9} {:>9} {:>7} {:>8} {:>7} {:>9}",
+                "region", "center, mm", "area, mm2", "mean, mm", "sigmas", "lengths", "passes", "at edges"
+            )?;
+        }
+        for region in self.regions.iter().take(MOST_TOLD) {
+            let [x, y, z] = region.center_mm;
+            write!(
+                f,
+                "\n{:<14} {:>24} {:>9.1} {:>+9.3} {:>7.1} {:>8.1} {:>7} {:>7.0} %",
+                region.class,
+                format!("{x:.1} {y:.1} {z:.1}"),
+                region.area_mm2,
+                region.mean_mm,
+                region.sigmas,
+                region.correlation_lengths,
+                region.passes,
+                region.edge_share_of_rim * 100.0
+            )?;
+        }
+        more(f, self.regions.len(), "regions")?;
+        for bad in self.bad_touches.iter().take(MOST_TOLD) {
+            let ([x, y, z], count) = (bad.center_mm, bad.touches.len());
+            write!(
+                f,
+                "\nbad touch at ({x:.1}, {y:.1}, {z:.1}) mm: {:+.3} mm or {:.0} standard deviations off, {count} touches from \
+                 {} on, {} held apart, against {} nearby",
+                bad.off_mm, bad.sigmas, bad.touches[0], bad.held_apart, bad.against
+            )?;
+        }
+        more(f, self.bad_touches.len(), "bad touches")
+    }
+}
+
+fn more(f: &mut fmt::Formatter<'_>, count: usize, what: &str) -> fmt::Result {
+    if count > MOST_TOLD { write!(f, "\n… and {} more {what}", count - MOST_TOLD) } else { Ok(()) }
+}
