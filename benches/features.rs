@@ -2,12 +2,12 @@
 
 #[path = "../tests/common/plate_stream.rs"]
 mod plate_stream;
-#[path = "../tests/common/shapes.rs"]
-mod shapes;
+#[path = "../tests/common/subdivided.rs"]
+mod subdivided;
 
 use divan::{Bencher, black_box};
 use plate_stream::plate_stream;
-use shapes::subdivided;
+use subdivided::subdivided;
 use touchup::features::{Tracker, detect};
 use touchup::mesh::{FaceTree, TriMesh};
 use touchup::patch::{Patcher, PatcherParams, UncertaintyParams};
