@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::primitive::{Primitive, Side};
+use super::primitive::{Primitive, Side, square_to};
 use super::scene::{Parted, along_to_plane};
 use super::walls::Wall;
 
@@ -62,6 +62,8 @@ const FREE: f64 = 0.5;
 const PROBES: usize = 7;
 /// What closes a hole is no farther from the end of its wall than this many radii.
 const CLOSED: f64 = 1.0;
+/// Lines that look for what closes a hole are this share of the radius beside its axis.
+const ASIDE: f64 = 0.05;
 /// Rings around an opening, in its radii: the land beside a hole may be narrow.
 const RINGS: [f64; 3] = [1.06, 1.15, 1.3];
 /// Those around a foot: a ball does not reach into its corner.
@@ -182,8 +184,15 @@ fn end(parted: &Parted, wall: &Wall, which: usize) -> End {
     let middle = wall.middle();
     let reach = wall.height() / 2.0 + CLOSED * radius;
     let around = parted.around(wall.segments[0]);
-    let met = around.rays(radius).first(&wall.at(middle), &(wall.axis * out), reach);
-    let closed_at = met.map(|met| middle + out * met.distance);
+    // beside the axis: on it lie the tips of cones and the edges of floors, which a line may slip through
+    let [e, g] = square_to(&wall.axis);
+    let mut rays = around.rays(radius);
+    let mut met = [0.4f64, 2.5, 4.6].map(|turn| {
+        let aside = (e * turn.cos() + g * turn.sin()) * (ASIDE * radius);
+        rays.first(&(wall.at(middle) + aside), &(wall.axis * out), reach).map_or(f64::INFINITY, |met| met.distance)
+    });
+    met.sort_by(f64::total_cmp);
+    let closed_at = met[1].is_finite().then(|| middle + out * met[1]);
     let rings = RINGS.map(|ring| ring * radius);
     let rim = parted.plane_around(&around, &wall.at(t), &(wall.axis * out), &rings, NEAR_END * radius);
     End { t, out, closed_at, rim: rim.filter(|&(_, share)| share > RIM) }

@@ -291,15 +291,16 @@ impl<'a> Growing<'a> {
         if !is_bounded {
             let enough = best.as_ref().map_or(0.0, |plane| MORE * plane.area);
             let faces = best.as_ref().map_or(0, |plane| plane.faces.len());
-            let mut curved = self.cylinder_from(seed, faces, &mut needs);
+            let is_more = |curved: &Region| curved.area > enough;
+            let mut curved = self.cylinder_from(seed, faces, &mut needs).filter(is_more);
             if curved.is_none() && faces > 0 && self.is_exact() {
                 // facets of a drawing that were divided further lie off the circle
                 let exact = (self.closeness, self.tolerance);
                 (self.closeness, self.tolerance) = self.divided;
-                curved = self.cylinder_from(seed, faces, &mut needs);
+                curved = self.cylinder_from(seed, faces, &mut needs).filter(is_more);
                 (self.closeness, self.tolerance) = exact;
             }
-            best = curved.filter(|curved| curved.area > enough).or(best);
+            best = curved.or(best);
         }
         match best.filter(|best| best.area > (LEAST_WIDTH * self.tolerance).powi(2)) {
             Some(region) => self.accept(region),
@@ -383,6 +384,10 @@ impl<'a> Growing<'a> {
                 continue;
             }
             let Some(region) = self.grown(seed, start, before) else { continue };
+            // any facet lies on some cylinder
+            if Bend::of(self.facets, &region.faces).is_none_or(|bend| bend.spread < BENT) {
+                continue;
+            }
             if best.as_ref().is_none_or(|best| region.area > best.area) {
                 best = Some(region);
             }
@@ -411,7 +416,7 @@ impl<'a> Growing<'a> {
             faces = self.flood(vec![seed], &mut primitive, near);
             let used = primitive;
             primitive = self.fitted(&used, &faces)?;
-            if self.is_settled(&used, &primitive, &faces) {
+            if matches!(used, Primitive::Plane { .. }) && self.is_settled(&used, &primitive, &faces) {
                 break;
             }
         }
