@@ -115,6 +115,9 @@ pub struct Disagreement {
 /// Standard deviations of the scan within which it agrees.
 const AGREES: f64 = 2.0;
 
+/// Scan and touch speak of the same side of the part when their normals are within 60°.
+const FACING: f64 = 0.5;
+
 /// Tells where touch and scan disagree, and why, as far as the data can tell.
 ///
 /// - `scan`: as it was.
@@ -173,13 +176,16 @@ impl Places {
         let mesh = refined.shape.mesh;
         let mut off = vec![0.0; mesh.vertex_slots()];
         let mut is_seen = vec![false; mesh.vertex_slots()];
+        let mut faces_alike = vec![false; mesh.vertex_slots()];
+        let (normals, areas) = vertex_normals(mesh);
         closest_places(mesh.positions(), scan.mesh, scan.tree, |at, hit| {
             let p = mesh.position(VertexId(at as u32));
             off[at] = signed(&p, scan.mesh, hit);
             is_seen[at] = !is_on_rim(scan.mesh, hit) && refined.known[at] == Known::Touched;
+            faces_alike[at] = scan.mesh.normal(hit.face).dot(&normals[at]) > FACING;
         })?;
-        let (normals, areas) = vertex_normals(mesh);
-        let is_open = scanner::open_places(scan.mesh, refined, &is_seen, &normals);
+        let mut is_open = scanner::open_places(scan.mesh, refined, &is_seen, &normals);
+        is_open.iter_mut().zip(&faces_alike).for_each(|(is_open, alike)| *is_open &= alike);
         Ok(Self { positions: mesh.positions().to_vec(), off, is_seen, is_open, normals, areas })
     }
 
@@ -213,10 +219,16 @@ impl ClassMap {
 /// Whether the surface ends where `hit` is.
 fn is_on_rim(mesh: &TriMesh, hit: &FaceHit) -> bool {
     let corners = mesh.corners(hit.face);
-    (0..3).filter(|&i| hit.barycentric[i] <= 0.0).any(|i| {
-        let [a, b] = [corners[(i + 1) % 3], corners[(i + 2) % 3]];
-        mesh.faces_at_edge(a, b).count() < 2
-    })
+    let is_rim = |a: VertexId, b: VertexId| mesh.faces_at_edge(a, b).count() < 2;
+    let on: Vec<VertexId> = (0..3).filter(|&i| hit.barycentric[i] > 0.0).map(|i| corners[i]).collect();
+    match on[..] {
+        [vertex] => {
+            let around = mesh.star(vertex).iter().flat_map(|&face| mesh.corners(face));
+            around.into_iter().any(|other| other != vertex && is_rim(vertex, other))
+        }
+        [a, b] => is_rim(a, b),
+        _ => false,
+    }
 }
 
 fn vertex_normals(mesh: &TriMesh) -> (Vec<nalgebra::Vector3<f64>>, Vec<f64>) {
