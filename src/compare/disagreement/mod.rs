@@ -1,19 +1,21 @@
 //! Where touch and scan disagree, without a true part: what of it looks like this scanner, what like a part that is no longer
 //! what was scanned, and what like a bad touch.
 //!
-//! How the scanner errs is found where it should see well, on touched places away from edges: its offset b, its noise σ
+//! What the scan is misplaced as a whole comes off first. How the scanner errs is then found where it should see well, on touched places away from edges: its offset b, its noise σ
 //! and the distance ℓ over which that stays alike, Cov = σ² exp(−r²/2ℓ²). The mean over a region of area A then has the
 //! variance σ²/(1 + A/2πℓ²), and a region that is off by many times its root was changed. Near edges and in what is
 //! narrower than a few edges of the scan's triangles the scan lacks what it could not see.
 
 mod bad_touches;
 mod cells;
+mod misplaced;
 mod regions;
 mod scanner;
 
 use nalgebra::Point3;
 
 pub use self::bad_touches::BadTouches;
+pub use self::misplaced::Misplaced;
 pub use self::regions::{DisagreementRegion, Evidence};
 pub use self::scanner::Scanner;
 use super::deviation::{closest_places, signed};
@@ -100,6 +102,8 @@ pub struct ClassMap {
 /// Where touch and scan disagree.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Disagreement {
+    /// how the scan lies off as a whole, which is taken off before the rest is looked at; `None` where nothing tells
+    pub misplaced: Option<Misplaced>,
     /// how the scanner errs; `None` where too little was touched to tell, and then nothing is called changed
     pub scanner: Option<Scanner>,
     /// the refined mesh
@@ -134,7 +138,12 @@ pub fn disagreement(
     if refined.shape.mesh.face_count() == 0 {
         return Err(CompareError::NoFaces);
     }
-    let places = Places::of(scan, refined)?;
+    let mut places = Places::of(scan, refined)?;
+    let off = places.off.clone();
+    let misplaced = Misplaced::of(&places);
+    if let Some(misplaced) = &misplaced {
+        places.take_off(misplaced);
+    }
     let scanner = Scanner::of(scan.mesh, &places);
     let bad_touches = bad_touches::find(refined, touches)?;
     let mut classes = places.first_classes(refined, scanner.as_ref());
@@ -142,11 +151,12 @@ pub fn disagreement(
         regions::find(&regions::Seen { refined, places: &places, scanner, touches }, &mut classes)
     });
     bad_touches::mark(refined, touches, &bad_touches, &mut classes);
-    let mut off = places.off.clone();
+    let mut off = off;
     let is_felt = |class: &Class| !matches!(class, Class::NeverTouched | Class::Unreachable);
     off.iter_mut().zip(&classes).filter(|(_, class)| !is_felt(class)).for_each(|(off, _)| *off = 0.0);
     let on_scan = carried(scan, refined, &classes)?;
     Ok(Disagreement {
+        misplaced: misplaced.filter(|_| scanner.is_some()),
         scanner,
         refined: ClassMap::of(refined.shape.mesh, off, classes),
         scan: on_scan,
@@ -159,7 +169,7 @@ pub fn disagreement(
 struct Places {
     /// m, by slot
     pub positions: Vec<Point3<f64>>,
-    /// how far it lies outside of the scan, m, by slot
+    /// how far it lies outside of the scan, m, by slot; without what the scan is misplaced, once that is known
     pub off: Vec<f64>,
     /// whether it was touched, and the scan is there at all
     pub is_seen: Vec<bool>,
@@ -187,6 +197,11 @@ impl Places {
         let mut is_open = scanner::open_places(scan.mesh, refined, &is_seen, &normals);
         is_open.iter_mut().zip(&faces_alike).for_each(|(is_open, alike)| *is_open &= alike);
         Ok(Self { positions: mesh.positions().to_vec(), off, is_seen, is_open, normals, areas })
+    }
+
+    fn take_off(&mut self, misplaced: &Misplaced) {
+        let both = self.positions.iter().zip(&self.normals);
+        self.off.iter_mut().zip(both).for_each(|(off, (p, normal))| *off -= misplaced.at(p, normal));
     }
 
     fn first_classes(&self, refined: &RefinedShape<'_>, scanner: Option<&Scanner>) -> Vec<Class> {
