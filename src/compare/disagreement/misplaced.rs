@@ -25,7 +25,7 @@ const WIDTH: f64 = 4.685;
 /// Standard deviation of normal errors over their median.
 const SIGMA_OF_MEDIAN: f64 = 1.4826;
 /// By which share of the weight of all places shift and turn are held back.
-const HELD_BACK: f64 = 0.01;
+const HELD_BACK: f64 = 0.03;
 
 impl Misplaced {
     /// Of the open places; `None` where they tell nothing.

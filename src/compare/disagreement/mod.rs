@@ -173,6 +173,8 @@ struct Places {
     pub off: Vec<f64>,
     /// whether it was touched, and the scan is there at all
     pub is_seen: Vec<bool>,
+    /// whether a scanner of this resolution sees it at all: no narrow place
+    pub is_wide: Vec<bool>,
     /// whether a scanner of this resolution sees it well: no edge near, and no narrow place
     pub is_open: Vec<bool>,
     /// normals, by slot; zero where there are none
@@ -194,9 +196,11 @@ impl Places {
             is_seen[at] = !is_on_rim(scan.mesh, hit) && refined.known[at] == Known::Touched;
             faces_alike[at] = scan.mesh.normal(hit.face).dot(&normals[at]) > FACING;
         })?;
-        let mut is_open = scanner::open_places(scan.mesh, refined, &is_seen, &normals);
-        is_open.iter_mut().zip(&faces_alike).for_each(|(is_open, alike)| *is_open &= alike);
-        Ok(Self { positions: mesh.positions().to_vec(), off, is_seen, is_open, normals, areas })
+        let [mut is_wide, mut is_open] = scanner::wide_and_open(scan.mesh, refined, &is_seen, &normals);
+        for flags in [&mut is_wide, &mut is_open] {
+            flags.iter_mut().zip(&faces_alike).for_each(|(flag, alike)| *flag &= alike);
+        }
+        Ok(Self { positions: mesh.positions().to_vec(), off, is_seen, is_wide, is_open, normals, areas })
     }
 
     fn take_off(&mut self, misplaced: &Misplaced) {
@@ -211,6 +215,8 @@ impl Places {
             (Known::Touched, None) => Class::Unsure,
             (Known::Touched, Some(scanner)) if self.is_seen[at] => match scanner.is_noise(self.off[at], AGREES) {
                 true => Class::Agrees,
+                // at an edge, and yet by more than a rounded edge
+                false if self.is_wide[at] && !scanner.may_round(self.off[at], AGREES) => Class::Unsure,
                 false => Class::ScannerError,
             },
             // the scan has nothing there
