@@ -9,7 +9,7 @@ use touchup::mesh::{FaceId, FaceTree, TriMesh, VertexId};
 use touchup::patch::{PatchDelta, Patcher, PatcherParams, Splice};
 use touchup::refine::{RefineParams, Refiner, TipParams};
 use touchup::sim::StylusParams;
-use touchup::touch::Sample;
+use touchup::touch::{ProbedPoint, Sample};
 
 #[path = "common/plate_stream.rs"]
 mod plate_stream;
@@ -234,10 +234,12 @@ fn triangles(mesh: &TriMesh) -> Vec<[[u64; 3]; 3]> {
     triangles
 }
 
-/// What the patcher makes of all that counts now, to the last bit: triangles, and how well vertices are known.
-fn whole(stream: &PlateStream, patcher: &Patcher) -> (Vec<[[u64; 3]; 3]>, Vec<u64>) {
+/// What the patcher makes of all that counts now, to the last bit: triangles, and how well vertices are known; and the
+/// touches of which features are measured.
+fn whole(stream: &PlateStream, patcher: &Patcher) -> (Vec<[[u64; 3]; 3]>, Vec<u64>, Vec<ProbedPoint>) {
     let patched = patcher.clone().patched(&stream.scan, &FaceTree::new(&stream.scan)).unwrap();
-    (triangles(&patched.mesh), patched.sigma.iter().map(|sigma| sigma.to_bits()).collect())
+    let sigma = patched.sigma.iter().map(|sigma| sigma.to_bits()).collect();
+    (triangles(&patched.mesh), sigma, patcher.probed().to_vec())
 }
 
 #[test]
@@ -265,6 +267,7 @@ fn strokes_are_undone_and_redone_bit_for_bit() {
     }
     again.flush();
     states.push(whole(&stream, &again));
+    assert!(states.windows(2).all(|pair| pair[0].2.len() < pair[1].2.len()), "each stroke has touches of its own");
     for expected in states.iter().rev().skip(1) {
         assert!(patcher.undo());
         assert!(whole(&stream, &patcher) == *expected);

@@ -85,7 +85,7 @@ enum Align {
 
 /// What `--json` prints.
 #[derive(Debug, Serialize)]
-struct Told {
+pub(super) struct Told {
     mesh: ShapeTold,
     truth: ShapeTold,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -124,6 +124,17 @@ impl Placed {
 
 /// The verb: compares and tells.
 pub(super) fn compare(arguments: &CompareArguments) -> Result<Losses, CliError> {
+    let told = compared(arguments)?;
+    if arguments.json {
+        tell(&serde_json::to_string(&told).expect("numbers and names alone cannot fail"));
+    } else {
+        tell(&told.to_string());
+    }
+    Ok(Losses::new())
+}
+
+/// Compares, and writes what is asked for.
+pub(super) fn compared(arguments: &CompareArguments) -> Result<Told, CliError> {
     arguments.check_alignment()?;
     arguments.check_outputs()?;
     let reading = Progress::stage("read");
@@ -156,19 +167,13 @@ pub(super) fn compare(arguments: &CompareArguments) -> Result<Losses, CliError> 
     if let Some(path) = &arguments.coloured {
         write_coloured(path, &as_read, arguments.mesh_unit, &measured.after)?;
     }
-    let told = Told {
+    Ok(Told {
         mesh: ShapeTold::of(&arguments.mesh, &as_read),
         truth: ShapeTold::of(&arguments.truth, &truth.mesh),
         alignment,
         before: measured.before.as_ref().map(ComparisonTold::of),
         after: ComparisonTold::of(&measured.after),
-    };
-    if arguments.json {
-        tell(&serde_json::to_string(&told).expect("numbers and names alone cannot fail"));
-    } else {
-        tell(&told.to_string());
-    }
-    Ok(Losses::new())
+    })
 }
 
 /// Both comparisons, in one range.
@@ -178,6 +183,27 @@ struct MeasuredBoth {
 }
 
 impl CompareArguments {
+    /// A picture of a mesh in mm and of what it was before, beside the truth.
+    pub(super) fn of_picture([mesh, truth, before, picture]: [PathBuf; 4]) -> Self {
+        Self {
+            mesh,
+            truth,
+            mesh_unit: MeshUnit::Millimetre,
+            truth_unit: MeshUnit::Millimetre,
+            before: Some(before),
+            align: Align::None,
+            alternative: None,
+            pairs: None,
+            picture: Some(picture),
+            view: None,
+            coloured: None,
+            range_mm: None,
+            samples: 200_000,
+            seed: 1,
+            json: false,
+        }
+    }
+
     fn measure(
         &self,
         mesh: &Placed,

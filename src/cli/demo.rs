@@ -1,4 +1,5 @@
-//! `touchup demo`: makes a plate, scans it badly, touches it, refines the scan, and says how much better it became.
+//! `touchup demo`: makes a plate, scans it badly, touches it, refines the scan, and says how much better it became and what
+//! was found on it.
 
 use std::fmt;
 use std::io::Write;
@@ -7,12 +8,15 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 
+use super::compare::{CompareArguments, compared};
+use super::found::FoundTable;
 use super::progress::Progress;
 use super::refine::{RefineArguments, Refined, Summary};
 use super::simulate::{Feel, Simulated, write_simulation};
 use super::touched::{RegionError, Touched};
 use super::{CliError, Losses, tell};
 use crate::io::atomic::write_atomically;
+use crate::io::features_file::read_features;
 use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
 use crate::sim::{PathParams, Plate, ScannerParams, StylusParams, measure_badness, plan_demo};
 
@@ -21,7 +25,8 @@ const CHORD_ERROR: f64 = 10e-6;
 
 #[derive(Debug, Args)]
 pub(super) struct DemoArguments {
-    /// Folder for truth.ply, scan.ply, touch.mcap, refined.ply (in mm) and summary.json
+    /// Folder for truth.ply, scan.ply, touch.mcap, refined.ply, features.json, touches.csv, deviation.png (all in mm) and
+    /// summary.json
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
     /// Another seed makes another scan and another hand
@@ -39,6 +44,8 @@ struct DemoSummary {
     /// and of the refined mesh
     after: RegionError,
     refine: Summary,
+    /// true features beside what was found of them
+    found: FoundTable,
 }
 
 /// The scan as a whole against the part.
@@ -61,15 +68,18 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
     let Simulated { scan, touch } = write_simulation(&plate, &truth, &path, &scanner, &feel, &arguments.out)?;
 
     let refined_path = arguments.out.join("refined.ply");
-    let files = RefineArguments::of_files(
-        arguments.out.join("scan.ply"),
-        arguments.out.join("touch.mcap"),
-        refined_path.clone(),
-        MeshUnit::Millimetre,
-    );
+    let [scan_path, touches_path, features_path] =
+        ["scan.ply", "touches.csv", "features.json"].map(|name| arguments.out.join(name));
+    let bag = arguments.out.join("touch.mcap");
+    let files = RefineArguments::of_files(scan_path.clone(), bag, refined_path.clone(), MeshUnit::Millimetre)
+        .with_features(features_path.clone(), touches_path);
     let Refined { summary, losses, .. } = files.refined()?;
     // measured is what was written
     let MeshFile { mesh: refined, .. } = read_mesh(&refined_path, MeshUnit::Millimetre).map_err(CliError::ReadMesh)?;
+
+    let found = FoundTable::of(&plate.features(), &read_features(&features_path)?.features);
+    let picture = [refined_path, arguments.out.join("truth.ply"), scan_path, arguments.out.join("deviation.png")];
+    compared(&CompareArguments::of_picture(picture))?;
 
     let _measuring = Progress::stage("measure");
     let touched = Touched::of(&touch.moments);
@@ -79,9 +89,11 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
         before: touched.error(&plate, &scan),
         after: touched.error(&plate, &refined),
         refine: summary,
+        found,
     };
     demo.write(arguments)?;
-    tell(&format!("{demo}\nwrote {}", arguments.out.display()));
+    let picture = arguments.out.join("deviation.png");
+    tell(&format!("{demo}\nwrote {}; where it was wrong and is right: {}", arguments.out.display(), picture.display()));
     Ok(losses)
 }
 
@@ -121,6 +133,7 @@ impl fmt::Display for DemoSummary {
         let RegionError { part_to_mesh_mm: [pm, pm95], mesh_to_part_mm: [mp, mp95] } = self.before;
         let RegionError { part_to_mesh_mm: [qm, qm95], mesh_to_part_mm: [mq, mq95] } = self.after;
         writeln!(f, "  part to mesh {pm:.3} ({pm95:.3}) -> {qm:.3} ({qm95:.3}) mm, {:.1} times less", pm / qm)?;
-        write!(f, "  mesh to part {mp:.3} ({mp95:.3}) -> {mq:.3} ({mq95:.3}) mm, {:.1} times less", mp / mq)
+        writeln!(f, "  mesh to part {mp:.3} ({mp95:.3}) -> {mq:.3} ({mq95:.3}) mm, {:.1} times less", mp / mq)?;
+        write!(f, "\n{}\n", self.found)
     }
 }

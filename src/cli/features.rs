@@ -4,10 +4,12 @@ use std::fmt;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 
 use super::progress::Progress;
 use super::{CliError, Losses, check_kept, tell};
+use crate::features::clusters::{Cluster, ClusterParams, PaperParams, clusters, paper_clusters};
+use crate::features::curvature::curvature;
 use crate::features::{Detection, Feature, FittedTo, Kind, Measured, detect};
 use crate::io::features_file::{FeatureFile, write_features};
 use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
@@ -26,6 +28,15 @@ pub(super) struct FeaturesArguments {
     /// What was touched, as refine --touches-out writes it
     #[arg(long, value_name = "CSV")]
     touches: Option<PathBuf>,
+    /// What is looked for
+    #[arg(long, value_name = "MODE", default_value = "fitted")]
+    mode: FeaturesMode,
+    /// paper: number of clusters; left out: it comes from the data
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    clusters: Option<u32>,
+    /// paper: vertices of more Gaussian curvature than this belong to clusters, 1/mm²
+    #[arg(long, value_name = "T", default_value_t = 0.3)]
+    threshold_per_mm2: f64,
     /// Where the features go, as JSON
     #[arg(long, value_name = "JSON")]
     out: Option<PathBuf>,
@@ -34,8 +45,18 @@ pub(super) struct FeaturesArguments {
     json: bool,
 }
 
+/// What is looked for on a mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum FeaturesMode {
+    /// holes, slots, pockets, bosses, edges, corners and planes, fitted by least squares
+    Fitted,
+    /// the paper's control points: clusters of high Gaussian curvature
+    Paper,
+}
+
 /// The verb: finds and tells.
 pub(super) fn features(arguments: &FeaturesArguments) -> Result<Losses, CliError> {
+    arguments.check()?;
     if let Some(out) = &arguments.out {
         check_kept("MESH", &arguments.mesh, out)?;
         if let Some(touches) = &arguments.touches {
@@ -45,7 +66,16 @@ pub(super) fn features(arguments: &FeaturesArguments) -> Result<Losses, CliError
     let MeshFile { mesh, repair } = read_mesh(&arguments.mesh, arguments.mesh_unit).map_err(CliError::ReadMesh)?;
     let touches = arguments.touches.as_deref().map_or_else(|| Ok(Vec::new()), read_touches)?;
     let started = Instant::now();
-    let (detection, file) = find(&mesh, &touches);
+    let (table, file) = match arguments.mode {
+        FeaturesMode::Fitted => {
+            let (detection, file) = find(&mesh, &touches);
+            (FeatureTable(&detection).to_string(), file)
+        }
+        FeaturesMode::Paper => {
+            let file = FeatureFile::of_clusters(&arguments.find_clusters(&mesh));
+            (ClusterTable(&file).to_string(), file)
+        }
+    };
     let took_s = started.elapsed().as_secs_f64();
     if let Some(out) = &arguments.out {
         write_features(out, &file)?;
@@ -54,11 +84,60 @@ pub(super) fn features(arguments: &FeaturesArguments) -> Result<Losses, CliError
         tell(&serde_json::to_string(&file).expect("finite numbers and names alone cannot fail"));
         return Ok(Losses::new());
     }
-    tell(&format!("mesh: {repair}\n{}\nfound in {took_s:.2} s", FeatureTable(&detection)));
+    tell(&format!("mesh: {repair}\n{table}\nfound in {took_s:.2} s"));
     if let Some(out) = &arguments.out {
         tell(&format!("wrote {}", out.display()));
     }
     Ok(Losses::new())
+}
+
+impl FeaturesArguments {
+    /// Flags that do not go together.
+    fn check(&self) -> Result<(), CliError> {
+        let is_paper = self.mode == FeaturesMode::Paper;
+        if self.clusters.is_some() && !is_paper {
+            return Err(CliError::Usage("--clusters is for --mode paper".to_owned()));
+        }
+        if self.touches.is_some() && is_paper {
+            return Err(CliError::Usage("--touches measures features, and --mode paper has none".to_owned()));
+        }
+        if !(self.threshold_per_mm2 > 0.0 && self.threshold_per_mm2.is_finite()) {
+            return Err(CliError::Usage("--threshold-per-mm2 must be above 0".to_owned()));
+        }
+        Ok(())
+    }
+
+    fn find_clusters(&self, mesh: &TriMesh) -> Vec<Cluster> {
+        let _finding = Progress::stage("find clusters");
+        let curvature = curvature(mesh);
+        match self.clusters {
+            Some(k) => {
+                let params =
+                    PaperParams { threshold: self.threshold_per_mm2 * 1e6, k: k as usize, ..PaperParams::default() };
+                paper_clusters(mesh, &curvature, &params)
+            }
+            None => clusters(mesh, &curvature, &ClusterParams::default()),
+        }
+    }
+}
+
+/// Clusters as people read them.
+struct ClusterTable<'a>(&'a FeatureFile);
+
+impl fmt::Display for ClusterTable<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let clusters = &self.0.clusters;
+        if clusters.is_empty() {
+            return write!(f, "no vertex is curved enough: a lower --threshold-per-mm2, or leave --clusters out");
+        }
+        write!(f, "{} clusters\n{:>28}  {:>8}  bent", clusters.len(), "center, mm", "vertices")?;
+        for cluster in clusters {
+            let [x, y, z] = cluster.center_mm;
+            let bent = cluster.convex.map_or("", |convex| if convex { "outward" } else { "inward" });
+            write!(f, "\n{:>28}  {:>8}  {bent}", format!("{x:.2} {y:.2} {z:.2}"), cluster.vertices)?;
+        }
+        Ok(())
+    }
 }
 
 /// What is on a mesh, and the file of it.
@@ -99,7 +178,12 @@ const KINDS: [Kind; 7] = [Kind::Hole, Kind::Slot, Kind::Pocket, Kind::Boss, Kind
 
 fn count(features: &[Feature], kind: Kind) -> Option<String> {
     let count = features.iter().filter(|feature| feature.kind == kind).count();
-    (count > 0).then(|| format!("{count} {}{}", kind.name(), if count == 1 { "" } else { "s" }))
+    let ending = match kind {
+        _ if count == 1 => "",
+        Kind::Boss => "es",
+        _ => "s",
+    };
+    (count > 0).then(|| format!("{count} {}{ending}", kind.name()))
 }
 
 struct Row<'a>(&'a Feature);

@@ -8,6 +8,7 @@ mod compare;
 mod demo;
 mod disagree;
 mod features;
+mod found;
 mod knocks;
 mod latency;
 mod offsets;
@@ -199,11 +200,16 @@ fn answer_steps() -> Result<Losses, CliError> {
 
 /// Refuses an output that would take the place of the input.
 fn check_kept(flag: &str, input: &Path, output: &Path) -> Result<(), CliError> {
+    check_kept_by("--out", flag, input, output)
+}
+
+/// … by the flag `by`.
+fn check_kept_by(by: &str, flag: &str, input: &Path, output: &Path) -> Result<(), CliError> {
     if !is_same_file(input, output) {
         return Ok(());
     }
     let path = output.display();
-    Err(CliError::Usage(format!("--out would write over {path}, which {flag} reads: choose another place")))
+    Err(CliError::Usage(format!("{by} would write over {path}, which {flag} reads: choose another place")))
 }
 
 /// One line on stderr.

@@ -16,13 +16,14 @@ use super::offsets::{ContactPoints, ScanOffset, WrenchOffset};
 use super::progress::Progress;
 use super::rates::{Ended, LiveSummary, Rates};
 use super::replay::{Recording, Replayed, marker_filter, replay};
-use super::{CliError, Losses, check_kept, tell};
+use super::{CliError, Losses, check_kept_by, tell};
+use crate::io::atomic::{AtomicFile, is_same_file};
 use crate::io::features_file::write_features;
 use crate::io::mesh_file::{
     MeshFile, MeshFileError, MeshUnit, VertexColumn, check_target, read_mesh, write_mesh, write_mesh_with,
 };
 use crate::io::recording::Topics;
-use crate::io::touches_file::write_touches;
+use crate::io::touches_file::{as_written, write_touches};
 use crate::mesh::{FaceId, FaceTree, RepairReport, TriMesh, VertexId};
 use crate::patch::{Patched, Patcher, Support};
 use crate::refine::{RefineCounts, RefineError, RefineParams, Refiner};
@@ -281,6 +282,11 @@ impl RefineArguments {
         }
     }
 
+    /// Writes features and touches too.
+    pub(super) fn with_features(self, features: PathBuf, touches: PathBuf) -> Self {
+        Self { features_out: Some(features), touches_out: Some(touches), ..self }
+    }
+
     /// Reads, replays and writes.
     pub(super) fn refined(&self) -> Result<Refined, CliError> {
         let scene = self.scene()?;
@@ -321,7 +327,7 @@ impl RefineArguments {
             Some(patcher) => self.write_patched(patcher, &as_scanned)?,
             None => {
                 write_mesh(&self.out, refiner.mesh(), self.mesh_unit).map_err(CliError::WriteMesh)?;
-                self.write_features(refiner.mesh(), &[])?;
+                self.write_features(&[])?;
                 let moved_faces = moved_faces(&as_scanned, refiner.mesh());
                 Remeshed { moved_faces, patch: None, uncertainty: None }
             }
@@ -387,18 +393,20 @@ impl RefineArguments {
         let columns: Vec<_> = columns.map(|(name, values)| VertexColumn { name, values: values.into() }).collect();
         write_mesh_with(&self.out, &patched.mesh, &columns, self.mesh_unit).map_err(CliError::WriteMesh)?;
         debug!(open_squares = patched.open_squares, "patched");
-        self.write_features(&patched.mesh, patcher.probed())?;
+        self.write_features(patcher.probed())?;
         let moved_faces = moved_faces(scan, &patched.mesh);
         Ok(Remeshed { moved_faces, patch: Some(PatchSummary::of(&patched, build_s)), uncertainty })
     }
 
-    /// Writes what was touched, and the features of the result, where that was asked for.
-    fn write_features(&self, mesh: &TriMesh, touches: &[ProbedPoint]) -> Result<(), CliError> {
+    /// Writes what was touched, and the features of the result, where that was asked for: of the mesh and by the touches as
+    /// they are written, so that `touchup features` finds the same to the last bit.
+    fn write_features(&self, touches: &[ProbedPoint]) -> Result<(), CliError> {
         if let Some(out) = &self.touches_out {
             write_touches(out, touches)?;
         }
         if let Some(out) = &self.features_out {
-            write_features(out, &find(mesh, touches).1)?;
+            let MeshFile { mesh, .. } = read_mesh(&self.out, self.mesh_unit).map_err(CliError::ReadMesh)?;
+            write_features(out, &find(&mesh, &as_written(touches)).1)?;
         }
         Ok(())
     }
@@ -406,6 +414,13 @@ impl RefineArguments {
     fn topics(&self) -> Topics {
         let (pose, wrench) = (self.pose_topic.clone(), self.wrench_topic.clone());
         Topics { pose, wrench, markers: self.markers_topic.clone() }
+    }
+
+    /// What is written, by its flag.
+    fn outputs(&self) -> Vec<(&'static str, &PathBuf)> {
+        let more = [("--features-out", &self.features_out), ("--touches-out", &self.touches_out)];
+        let more = more.into_iter().filter_map(|(flag, out)| Some((flag, out.as_ref()?)));
+        [("--out", &self.out)].into_iter().chain(more).collect()
     }
 
     /// The work is not begun when its result cannot be kept.
@@ -416,8 +431,19 @@ impl RefineArguments {
             }
             error => CliError::WriteMesh(error),
         })?;
-        for out in [Some(&self.out), self.features_out.as_ref(), self.touches_out.as_ref()].into_iter().flatten() {
-            check_kept("--scan", &self.scan, out)?;
+        let outputs = self.outputs();
+        for (at, (flag, out)) in outputs.iter().enumerate() {
+            if let Some((other, _)) = outputs[..at].iter().find(|(_, other)| other == out || is_same_file(other, out)) {
+                let path = out.display();
+                return Err(CliError::Usage(format!(
+                    "{flag} and {other} would both write {path}: choose another place"
+                )));
+            }
+            let inputs = [("--scan", Some(&self.scan)), ("--bag", Some(&self.bag)), ("--scene", self.scene.as_ref())];
+            for (read, input) in inputs.into_iter().filter_map(|(read, input)| Some((read, input?))) {
+                check_kept_by(flag, read, input, out)?;
+            }
+            AtomicFile::create(out).map(drop).map_err(|source| CliError::Write { path: (*out).clone(), source })?;
         }
         Ok(())
     }

@@ -2,7 +2,7 @@
 //!
 //! A short cone says little of its axis, that of its hole is known: so cones are looked for around the ends of holes.
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector2, Vector3};
 
 use super::facets::NONE;
 use super::primitive::{Primitive, Side, refined, square_to};
@@ -16,8 +16,12 @@ const AROUND: usize = 36;
 const BESIDE: f64 = 0.08;
 /// A face belongs to a ring when it is within this many radii.
 const NEAR: f64 = 0.15;
-/// Sine of the flattest and of the steepest half angle: 80° and 8°.
-const SINES: [f64; 2] = [0.14, 0.985];
+/// Sines of the sharpest and of the flattest half angle, 20° and 75°: drills and countersinks have 30° to 70°.
+const SINES: [f64; 2] = [0.34, 0.966];
+/// A cone widens by at least this share of the radius.
+const LEAST_WIDTH: f64 = 0.1;
+/// Faces cover at least this share of it.
+const FILLED: f64 = 0.4;
 /// Sines around a ring are alike within this.
 const ALIKE: f64 = 0.2;
 /// So much of the ring has to be alike.
@@ -38,7 +42,11 @@ pub(super) fn add_cones(parted: &mut Parted, walls: &mut Vec<Wall>) {
             let Some(segment) = cone_beyond(parted, &wall, wall.ends[which], out) else { continue };
             let number = parted.segmentation.segments.len();
             let cone = Wall::of_faces(&parted.facets, &segment.primitive, &segment.faces, vec![number]);
-            if let Some(cone) = cone.filter(|cone| cone.coverage > COVERAGE) {
+            let is_sound = |cone: &Wall| {
+                let width = (cone.radius_at(cone.ends[1]) - cone.radius_at(cone.ends[0])).abs();
+                cone.coverage > COVERAGE && cone.filled > FILLED && width > LEAST_WIDTH * wall.radius()
+            };
+            if let Some(cone) = cone.filter(is_sound) {
                 walls.push(cone);
                 parted.segmentation.add(&parted.facets, segment);
             }
@@ -54,7 +62,12 @@ fn cone_beyond(parted: &Parted, wall: &Wall, end: f64, out: f64) -> Option<Segme
         let faces = ring(parted, wall, end + out * BESIDE * radius, wider * radius);
         let start = cone_of(parted, wall, &faces, out)?;
         let faces = flood(parted, faces, &start, tolerance.max(FIRST_SLACK * radius));
-        let better = refined(&start, &parted.facets, &faces).filter(|better| is_along(better, wall)).unwrap_or(start);
+        let moved = refined(&start, &parted.facets, &faces).filter(|better| is_along(better, wall));
+        let misfit = |cone: &Primitive| misfit(parted, &faces, cone);
+        // those of a measured mesh are no better than its facets
+        let drawn = parted.rounding.and_then(|_| through_corners(parted, wall, &faces, &start));
+        let better = [moved, drawn, Some(start)].into_iter().flatten();
+        let better = better.min_by(|a, b| misfit(a).total_cmp(&misfit(b)))?;
         let faces = flood(parted, faces, &better, tolerance);
         let area = faces.iter().map(|&face| parted.facets.area(face)).sum();
         (!faces.is_empty()).then_some(Segment { primitive: better, faces, area, tolerance, is_exact })
@@ -64,12 +77,13 @@ fn cone_beyond(parted: &Parted, wall: &Wall, end: f64, out: f64) -> Option<Segme
 /// Faces on a ring around the axis that look at it.
 fn ring(parted: &Parted, wall: &Wall, t: f64, radius: f64) -> Vec<u32> {
     let [e, g] = square_to(&wall.axis);
+    let around = parted.around(wall.segments[0]);
     let mut faces: Vec<u32> = (0..AROUND)
         .filter_map(|i| {
             let (sine, cosine) = (std::f64::consts::TAU * i as f64 / AROUND as f64).sin_cos();
             let radial = e * cosine + g * sine;
             let p = wall.at(t) + radial * radius;
-            let face = parted.tree.closest(parted.facets.mesh, &p, NEAR * wall.radius())?.face.0;
+            let face = around.closest(&p, NEAR * wall.radius())?;
             (parted.facets.normal(face).dot(&radial) < -SINES[0]).then_some(face)
         })
         .collect();
@@ -97,6 +111,28 @@ fn cone_of(parted: &Parted, wall: &Wall, faces: &[u32], out: f64) -> Option<Prim
     };
     let apex: Point3<f64> = wall.origin + axis * median(alike.iter().map(apex_of).collect())?;
     Some(Primitive::Cone { apex, axis, half_angle, side: Side::Hole })
+}
+
+/// The cone about the axis of the wall through the corners of faces: those of a coarse one lie on it, its facets do not.
+fn through_corners(parted: &Parted, wall: &Wall, faces: &[u32], start: &Primitive) -> Option<Primitive> {
+    let Primitive::Cone { axis, side, .. } = *start else { return None };
+    let corners = || faces.iter().flat_map(|&face| parted.facets.triangle(face)).map(|p| p - wall.origin);
+    // radius over height, a straight line
+    let place = |v: Vector3<f64>| Vector2::new(v.dot(&axis), (v - axis * v.dot(&axis)).norm());
+    let mean = corners().map(place).sum::<Vector2<f64>>() / (3 * faces.len()).max(1) as f64;
+    let (mut square, mut product) = (0.0, 0.0);
+    for d in corners().map(|v| place(v) - mean) {
+        (square, product) = (square + d.x * d.x, product + d.x * d.y);
+    }
+    let slope = product / square;
+    let apex = wall.origin + axis * (mean.x - mean.y / slope);
+    let is_cone = slope > 0.0 && apex.coords.iter().all(|x| x.is_finite());
+    is_cone.then(|| Primitive::Cone { apex, axis, half_angle: slope.atan(), side })
+}
+
+/// Sum of the squares by which corners are off a cone, m².
+fn misfit(parted: &Parted, faces: &[u32], cone: &Primitive) -> f64 {
+    faces.iter().flat_map(|&face| parted.facets.triangle(face)).map(|p| cone.distance(&p).powi(2)).sum()
 }
 
 /// Whether a cone still has the axis of its hole.

@@ -4,12 +4,13 @@ use nalgebra::{Point3, Vector3};
 
 use super::borders::{StraightEdge, borders, on_both, straight_edges, without_seams};
 use super::cones::add_cones;
-use super::feature::{Feature, FittedTo, Kind, Measured};
+use super::feature::{Feature, FittedTo, Kind, Measured, Surface};
 use super::fit::{Cylinder, Ends, Fit, Freedom, Plane, Stadium};
 use super::holes::{Boss, Hole, bosses, groups, holes};
 use super::measure::{Fitted, Measure};
 use super::observe::Observed;
 use super::primitive::Primitive;
+use super::rims::{Rim, rims};
 use super::scene::Parted;
 use super::slots::{Slot, slots};
 use super::walls::Wall;
@@ -42,6 +43,7 @@ pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detec
     let holes = holes(&parted, &walls);
     let (slots, pockets) = slots(&parted, &of_face, &borders);
     let edges: Vec<_> = straight_edges(&parted, &borders).into_iter().filter(|edge| is_sure(&parted, edge)).collect();
+    let holes: Vec<_> = holes.into_iter().filter(|hole| !is_slot_end(&walls[hole.wall], &slots)).collect();
     let observed = Observed::of(&parted, &of_face, touches);
     let measure = Measure::new(&observed);
 
@@ -50,6 +52,8 @@ pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detec
         let group = group.map(|number| number as u32);
         features.push(Feature { group, ..hole_feature(&measure, &walls, hole) });
     }
+    let is_new = |rim: &Rim| holes.iter().all(|hole| !is_rim_of(&walls[hole.wall], rim));
+    features.extend(rims(&parted).iter().filter(|rim| is_new(rim)).map(|rim| rim_feature(&measure, rim)));
     features.extend(slots.iter().map(|slot| slot_feature(&measure, slot, Kind::Slot)));
     features.extend(pockets.iter().map(|pocket| slot_feature(&measure, pocket, Kind::Pocket)));
     features.extend(bosses(&parted, &walls).iter().map(|boss| boss_feature(&measure, &walls, boss)));
@@ -64,6 +68,20 @@ pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detec
     features.iter_mut().enumerate().for_each(|(id, feature)| feature.id = id as u32);
     Detection { features, unexplained: unexplained(&parted) }
 }
+
+/// Whether a wall is the half-round end of a slot: with its corners it may look like more than half a turn.
+fn is_slot_end(wall: &Wall, slots: &[Slot]) -> bool {
+    slots.iter().any(|slot| {
+        let is_wide = (2.0 * wall.radius() - slot.width).abs() < ALIKE * slot.width;
+        let v = wall.at(wall.middle()) - slot.centre;
+        let across = slot.out.cross(&slot.direction);
+        let is_inside = v.dot(&across).abs() < ALIKE * slot.width && v.dot(&slot.direction).abs() < slot.length / 2.0;
+        is_wide && is_inside
+    })
+}
+
+/// A wall is an end of a slot when width and place agree within this share of the width.
+const ALIKE: f64 = 0.2;
 
 fn unexplained(parted: &Parted) -> f64 {
     let all: f64 = parted.facets.facets.iter().map(|facet| facet.area).sum();
@@ -113,6 +131,14 @@ impl Place {
     }
 }
 
+impl Place {
+    /// Beside numbers that were touched, how well the mesh is known is not: nobody felt whether it is true.
+    fn known_as(self, to: FittedTo) -> Self {
+        let is_known = to == FittedTo::Mesh || !self.touches.is_empty();
+        Self { std: self.std.filter(|_| is_known), ..self }
+    }
+}
+
 /// The place of a round feature on its axis.
 fn on_axis(fitted: &Fitted<Cylinder>, near: &Point3<f64>) -> Point3<f64> {
     let (start, axis) = (fitted.surface.center(), fitted.surface.pose_of.rotation * Vector3::z());
@@ -131,7 +157,7 @@ fn hole_feature(measure: &Measure, walls: &[Wall], hole: &Hole) -> Feature {
     let axis = fitted.axis(&hole.out);
     let opening = Place::on(measure, hole.rim, &on_axis(&fitted, &hole.opening), &axis.value);
     let bottom = on_axis(&fitted, &(hole.opening - hole.out * hole.depth));
-    let floor = Place::on(measure, hole.floor, &bottom, &axis.value);
+    let floor = Place::on(measure, hole.floor, &bottom, &axis.value).known_as(fitted.to);
     let std = fitted.fit.as_ref().and_then(|fit| lateral_std(fit, &opening.point));
     let touches = together([&fitted.touches, &opening.touches]);
     let centre = Measured { value: opening.point, std, touches };
@@ -141,9 +167,37 @@ fn hole_feature(measure: &Measure, walls: &[Wall], hole: &Hole) -> Feature {
         diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),
         depth: Some(between(&opening, &floor, &axis.value)),
         axis: Some(axis),
-        through: Some(hole.through),
+        through: hole.through,
+        surface: Surface::Round(fitted.surface.clone()),
         cone_angle: cone.map(|cone| cone.number(2.0 * cone.surface.half_angle.abs(), &[(Freedom::Second, 2.0)])),
         ..Feature::new(Kind::Hole, centre, touched, fitted.to)
+    }
+}
+
+/// A rim is of a wall when it is no farther from its axis, and from its ends, than this many radii.
+const OF_WALL: f64 = 0.5;
+
+/// Whether a round opening is an end of a hole that has a wall.
+fn is_rim_of(wall: &Wall, rim: &Rim) -> bool {
+    let (v, near) = (rim.centre - wall.origin, OF_WALL * wall.radius());
+    let along = v.dot(&wall.axis);
+    let is_between = along > wall.ends[0] - near && along < wall.ends[1] + near;
+    is_between && (v - wall.axis * along).norm() < near
+}
+
+/// A hole of which there is no wall: how deep it is and whether it goes through is not known.
+fn rim_feature(measure: &Measure, rim: &Rim) -> Feature {
+    let fitted = Fitted {
+        surface: rim.fit.surface.clone(),
+        fit: Some(rim.fit.clone()),
+        touches: Vec::new(),
+        to: FittedTo::Mesh,
+    };
+    let centre = Measured { value: rim.centre, std: lateral_std(&rim.fit, &rim.centre), touches: Vec::new() };
+    Feature {
+        diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),
+        axis: Some(fitted.axis(&rim.out)),
+        ..Feature::new(Kind::Hole, centre, measure.observed.touched_at(&rim.corners), FittedTo::Mesh)
     }
 }
 
@@ -153,13 +207,14 @@ fn boss_feature(measure: &Measure, walls: &[Wall], boss: &Boss) -> Feature {
     let axis = fitted.axis(&boss.out);
     let foot = Place::on(measure, Some(boss.base), &on_axis(&fitted, &boss.foot), &axis.value);
     let top = on_axis(&fitted, &(boss.foot + boss.out * boss.height));
-    let top = Place::on(measure, boss.top, &top, &axis.value);
+    let top = Place::on(measure, boss.top, &top, &axis.value).known_as(fitted.to);
     let std = fitted.fit.as_ref().and_then(|fit| lateral_std(fit, &foot.point));
     let centre = Measured { value: foot.point, std, touches: together([&fitted.touches, &foot.touches]) };
     Feature {
         diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),
         depth: Some(between(&top, &foot, &axis.value)),
         axis: Some(axis),
+        surface: Surface::Round(fitted.surface.clone()),
         ..Feature::new(Kind::Boss, centre, measure.observed.touched_share(&wall.segments), fitted.to)
     }
 }
@@ -178,7 +233,7 @@ fn slot_feature(measure: &Measure, slot: &Slot, kind: Kind) -> Feature {
     let along = if is_fixed(Freedom::X) { 0.0 } else { (slot.centre - start).dot(&direction) };
     let near = start + direction * along + axis.value * (slot.centre - start).dot(&axis.value);
     let opening = Place::on(measure, Some(slot.land), &near, &axis.value);
-    let floor = Place::on(measure, slot.floor, &(near - axis.value * slot.depth), &axis.value);
+    let floor = Place::on(measure, slot.floor, &(near - axis.value * slot.depth), &axis.value).known_as(fitted.to);
     let across = fitted.fit.as_ref().and_then(|fit| fit.std(Freedom::Y));
     let along = fitted.fit.as_ref().and_then(|fit| fit.std(Freedom::X));
     let centre = Measured {
@@ -201,6 +256,7 @@ fn slot_feature(measure: &Measure, slot: &Slot, kind: Kind) -> Feature {
         depth: Some(depth),
         axis: Some(axis),
         through: Some(slot.through),
+        surface: Surface::Slot(fitted.surface.clone()),
         points: vec![opening.point - half, opening.point + half],
         ..Feature::new(kind, centre, touched, fitted.to)
     }
@@ -236,8 +292,9 @@ fn edge_feature(measure: &Measure, edge: &StraightEdge) -> Option<Feature> {
     })
 }
 
-/// Ends of edges closer together than this are one corner, in diagonals.
+/// Ends of edges closer together than this are one corner, in diagonals; of exact planes: what is farther off is round.
 const SAME_CORNER: f64 = 0.02;
+const SAME_EXACT_CORNER: f64 = 1e-4;
 
 fn corners(parted: &Parted, measure: &Measure, edges: &[StraightEdge]) -> Vec<Feature> {
     let mut found: Vec<([usize; 3], Feature)> = Vec::new();
@@ -248,7 +305,8 @@ fn corners(parted: &Parted, measure: &Measure, edges: &[StraightEdge]) -> Vec<Fe
             planes.dedup();
             let &[i, j, k] = planes.as_slice() else { continue };
             let Some(corner) = corner_of(measure, [i, j, k]) else { continue };
-            let near = SAME_CORNER * parted.diagonal;
+            let is_exact = planes.iter().all(|&number| parted.segment(number).is_exact);
+            let near = if is_exact { SAME_EXACT_CORNER } else { SAME_CORNER } * parted.diagonal;
             let ends = |edge: &StraightEdge| edge.ends.iter().any(|end| (end - corner.centre.value).norm() < near);
             let is_new = found.iter().all(|(planes, _)| *planes != [i, j, k]);
             if is_new && ends(first) && ends(second) {

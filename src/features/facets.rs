@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::mesh::{FaceId, TriMesh};
+use crate::mesh::{FaceId, TriMesh, VertexId};
 
 /// No face lies across this edge: the mesh ends, more than two faces meet, or the one there is turned over.
 pub(super) const NONE: u32 = u32::MAX;
@@ -31,10 +31,14 @@ impl<'a> Facets<'a> {
         let mut facets = vec![gone; mesh.face_slots()];
         for (face, _) in mesh.faces() {
             let double = mesh.double_area_normal(face);
+            let length = double.norm();
             let facet = &mut facets[face.0 as usize];
-            facet.area = double.norm() / 2.0;
-            facet.normal = double.try_normalize(0.0).unwrap_or_else(Vector3::zeros);
-            facet.beside = beside(mesh, face);
+            facet.area = length / 2.0;
+            facet.normal = if length > 0.0 { double / length } else { Vector3::zeros() };
+        }
+        let mut corners = Vec::new();
+        for vertex in 0..mesh.vertex_slots() as u32 {
+            join_around(mesh, VertexId(vertex), &mut corners, &mut facets);
         }
         Self { mesh, facets }
     }
@@ -63,20 +67,31 @@ impl<'a> Facets<'a> {
     }
 }
 
-/// Across each edge the one face that runs along it the other way.
-fn beside(mesh: &TriMesh, face: FaceId) -> [u32; 3] {
-    let corners = mesh.corners(face);
-    [0, 1, 2].map(|i| {
-        let (from, to) = (corners[i], corners[(i + 1) % 3]);
+/// A face around a vertex: the vertices before and after it there, the face, and the number of its edge to the next.
+type Corner = (u32, u32, u32, usize);
+
+/// Sets what is across each edge that begins at a vertex: the one other face there, when it runs along it the other way.
+fn join_around(mesh: &TriMesh, vertex: VertexId, corners: &mut Vec<Corner>, facets: &mut [Facet]) {
+    if !mesh.has_vertex(vertex) {
+        return;
+    }
+    corners.clear();
+    for &face in mesh.star(vertex) {
+        let [a, b, c] = mesh.corners(face).map(|corner| corner.0);
+        corners.push(match vertex.0 {
+            v if v == a => (c, b, face.0, 0),
+            v if v == b => (a, c, face.0, 1),
+            _ => (b, a, face.0, 2),
+        });
+    }
+    for &(_, next, face, edge) in corners.iter() {
         let (mut across, mut at_edge) = (NONE, 0);
-        for &other in mesh.star(from) {
-            let c = mesh.corners(other);
-            let Some(at) = (0..3).find(|&k| c[k] == to) else { continue };
-            at_edge += 1;
-            if c[(at + 1) % 3] == from {
-                across = other.0;
+        for &(before, after, other, _) in corners.iter() {
+            at_edge += u32::from(before == next) + u32::from(after == next);
+            if before == next {
+                across = other;
             }
         }
-        if at_edge == 2 { across } else { NONE }
-    })
+        facets[face as usize].beside[edge] = if at_edge == 2 { across } else { NONE };
+    }
 }

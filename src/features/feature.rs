@@ -2,6 +2,8 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::fit::{Cylinder, Stadium};
+
 /// What a feature is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
@@ -92,6 +94,19 @@ pub struct Feature {
     pub touched: f64,
     /// what its numbers were fitted to
     pub fitted_to: FittedTo,
+    /// the surface that its sizes are of
+    pub(super) surface: Surface,
+}
+
+/// The surface that the sizes of a feature are of.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Surface {
+    /// of a hole or boss
+    Round(Cylinder),
+    /// of a slot or pocket
+    Slot(Stadium),
+    /// none alone
+    Other,
 }
 
 impl Feature {
@@ -114,6 +129,7 @@ impl Feature {
             is_convex: None,
             touched,
             fitted_to,
+            surface: Surface::Other,
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::primitive::Side;
+use super::primitive::{Primitive, Side};
 use super::scene::{Parted, along_to_plane};
 use super::walls::Wall;
 
@@ -17,7 +17,8 @@ pub(super) struct Hole {
     pub out: Vector3<f64>,
     /// m
     pub depth: f64,
-    pub through: bool,
+    /// `None`: something closes it, and neither a floor nor the tip of a drill
+    pub through: Option<bool>,
     /// number of the plane around the opening
     pub rim: Option<usize>,
     /// number of the plane that is its floor
@@ -43,6 +44,14 @@ pub(super) struct Boss {
 
 /// A wall around a hole covers at least this share of a turn: with a keyway or a slit it is a hole still.
 const HOLE_COVERAGE: f64 = 0.6;
+/// Faces cover at least this share of what a wall is between its ends.
+const FILLED: f64 = 0.4;
+/// A wall is the rest of another when it is so much smaller …
+const SMALLER: f64 = 0.5;
+/// … place and radius agree within this share of the radius …
+const REST: f64 = 0.3;
+/// … and its axis is off by more than 6°, or its radius by nothing.
+const STRAIGHT: f64 = 0.9945;
 /// That of a boss.
 const BOSS_COVERAGE: f64 = 0.75;
 /// Least height of a wall, in radii: a rim rounded by noise is lower.
@@ -55,14 +64,20 @@ const PROBES: usize = 7;
 const CLOSED: f64 = 1.0;
 /// Rings around an opening, in its radii: the land beside a hole may be narrow.
 const RINGS: [f64; 3] = [1.06, 1.15, 1.3];
+/// Those around a foot: a ball does not reach into its corner.
+const FOOT_RINGS: [f64; 3] = [1.2, 1.35, 1.5];
 /// A plane around an opening is within this many radii of the end of the wall.
 const NEAR_END: f64 = 0.4;
 /// Share of the rings that a plane has to have.
 const RIM: f64 = 0.2;
+/// A floor is square to the axis within 20°.
+const SQUARE: f64 = 0.94;
 /// Walls of one hole are no farther apart along the axis than this many radii.
 const SAME_HOLE: f64 = 0.5;
 /// Axes of one stepped hole are no farther apart than this share of the radius.
 const SAME_AXIS: f64 = 0.15;
+/// Heads of countersunk screws are 1.8 to 2 times as wide as their holes, broken edges seldom more than 1.1 times.
+const HEAD: f64 = 1.25;
 
 /// One end of a wall.
 #[derive(Clone, Copy, Debug)]
@@ -80,13 +95,34 @@ struct End {
 /// All round holes.
 pub(super) fn holes(parted: &Parted, walls: &[Wall]) -> Vec<Hole> {
     let is_hole = |wall: &Wall| wall.side() == Side::Hole && !wall.is_cone();
-    (0..walls.len()).filter(|&at| is_hole(&walls[at])).filter_map(|at| hole(parted, walls, at)).collect()
+    let found: Vec<Hole> =
+        (0..walls.len()).filter(|&at| is_hole(&walls[at])).filter_map(|at| hole(parted, walls, at)).collect();
+    let is_rest = |hole: &Hole| found.iter().any(|other| is_rest_of(parted, &walls[hole.wall], &walls[other.wall]));
+    found.iter().filter(|hole| !is_rest(hole)).cloned().collect()
+}
+
+/// Whether a wall is what a better one leaves of the same hole: where it was hardly touched it is crooked.
+fn is_rest_of(parted: &Parted, wall: &Wall, better: &Wall) -> bool {
+    let (rest, whole) = (parted.segment(wall.segments[0]), parted.segment(better.segments[0]));
+    let v = wall.at(wall.middle()) - better.origin;
+    let along = v.dot(&better.axis);
+    let aside = (v - better.axis * along).norm();
+    let beyond = (better.ends[0] - along).max(along - better.ends[1]);
+    let wider = (wall.radius() - better.radius()).abs();
+    // a step of the hole would be straight, and of another radius
+    let is_crooked = wall.axis.dot(&better.axis).abs() < STRAIGHT;
+    !rest.is_exact
+        && rest.area < SMALLER * whole.area
+        && (is_crooked || wider < rest.tolerance)
+        && wider.max(aside) < REST * better.radius()
+        && beyond < better.radius() + wall.height()
 }
 
 fn hole(parted: &Parted, walls: &[Wall], at: usize) -> Option<Hole> {
     let wall = &walls[at];
     let radius = wall.radius();
-    if wall.coverage < HOLE_COVERAGE || wall.height() < LEAST_HEIGHT * radius || !is_free(parted, wall) {
+    let is_whole = wall.coverage >= HOLE_COVERAGE && wall.filled >= FILLED;
+    if !is_whole || wall.height() < LEAST_HEIGHT * radius || !is_free(parted, wall) {
         return None;
     }
     let ends = [end(parted, wall, 0), end(parted, wall, 1)];
@@ -104,11 +140,14 @@ fn hole(parted: &Parted, walls: &[Wall], at: usize) -> Option<Hole> {
     };
     let rim = on_plane(&open);
     let top = rim.map_or(open.t, |(_, t)| t);
-    let tip = cone_beside(walls, at, &other);
+    let tip = cone_beside(walls, at, &other).filter(|&cone| walls[cone].axis.dot(&wall.axis) * other.out < 0.0);
     let (bottom, floor) = match other.closed_at {
         // the tip of a drill: the depth is that of the cylinder
         Some(_) if tip.is_some() => (other.t, None),
-        Some(t) => (t, floor_at(parted, wall, t)),
+        Some(t) => match floor_at(parted, wall, t) {
+            Some(floor) => (t, Some(floor)),
+            None => (other.t, None),
+        },
         None => (on_plane(&other).map_or(other.t, |(_, t)| t), None),
     };
     Some(Hole {
@@ -116,18 +155,22 @@ fn hole(parted: &Parted, walls: &[Wall], at: usize) -> Option<Hole> {
         opening: wall.at(top),
         out: wall.axis * open.out,
         depth: (top - bottom).abs(),
-        through: other.closed_at.is_none(),
+        through: match other.closed_at {
+            None => Some(true),
+            Some(_) => (floor.is_some() || tip.is_some()).then_some(false),
+        },
         rim: rim.map(|(number, _)| number),
         floor,
-        countersink: cone_beside(walls, at, &open).filter(|&cone| walls[cone].axis.dot(&wall.axis) * open.out > 0.0),
+        countersink: cone_beside(walls, at, &open).filter(|&cone| is_countersink(&walls[cone], wall, open.out)),
     })
 }
 
 /// Whether there is nothing around the axis.
 fn is_free(parted: &Parted, wall: &Wall) -> bool {
+    let around = parted.around(wall.segments[0]);
     let free = (1..PROBES).filter(|&i| {
         let p = wall.at(wall.ends[0] + wall.height() * i as f64 / PROBES as f64);
-        parted.tree.closest(parted.facets.mesh, &p, FREE * wall.radius()).is_none()
+        around.closest(&p, FREE * wall.radius()).is_none()
     });
     // a lid that the scanner saw, or a chip, may close a part of it
     2 * free.count() >= PROBES
@@ -138,10 +181,11 @@ fn end(parted: &Parted, wall: &Wall, which: usize) -> End {
     let radius = wall.radius();
     let middle = wall.middle();
     let reach = wall.height() / 2.0 + CLOSED * radius;
-    let met = parted.rays(radius).first(&wall.at(middle), &(wall.axis * out), reach);
+    let around = parted.around(wall.segments[0]);
+    let met = around.rays(radius).first(&wall.at(middle), &(wall.axis * out), reach);
     let closed_at = met.map(|met| middle + out * met.distance);
     let rings = RINGS.map(|ring| ring * radius);
-    let rim = parted.plane_around(&wall.at(t), &(wall.axis * out), &rings, NEAR_END * radius);
+    let rim = parted.plane_around(&around, &wall.at(t), &(wall.axis * out), &rings, NEAR_END * radius);
     End { t, out, closed_at, rim: rim.filter(|&(_, share)| share > RIM) }
 }
 
@@ -176,10 +220,18 @@ fn cone_beside(walls: &[Wall], at: usize, end: &End) -> Option<usize> {
     })
 }
 
-/// The plane that closes a wall at `t`.
+/// Whether a cone at the opening of a hole is wide enough for the head of a screw, not the edge of the hole broken.
+fn is_countersink(cone: &Wall, wall: &Wall, out: f64) -> bool {
+    cone.axis.dot(&wall.axis) * out > 0.0 && cone.radius_at(cone.ends[1]) > HEAD * wall.radius()
+}
+
+/// The plane square to the axis that closes a wall at `t`.
 fn floor_at(parted: &Parted, wall: &Wall, t: f64) -> Option<usize> {
-    let number = parted.segment_at(&wall.at(t), NEAR_END * wall.radius())?;
-    along_to_plane(&parted.segment(number).primitive, &wall.origin, &wall.axis).map(|_| number)
+    let number = parted.segment_at(&parted.around(wall.segments[0]), &wall.at(t), NEAR_END * wall.radius())?;
+    match parted.segment(number).primitive {
+        Primitive::Plane { normal, .. } if normal.dot(&wall.axis).abs() > SQUARE => Some(number),
+        _ => None,
+    }
 }
 
 /// Holes that follow each other on one axis: the group of each, where it has company.
@@ -206,19 +258,25 @@ pub(super) fn bosses(parted: &Parted, walls: &[Wall]) -> Vec<Boss> {
 
 fn boss(parted: &Parted, walls: &[Wall], at: usize) -> Option<Boss> {
     let wall = &walls[at];
-    let radius = wall.radius();
+    let (radius, around) = (wall.radius(), parted.around(wall.segments[0]));
     [(0, 1.0), (1, -1.0)].into_iter().find_map(|(which, out)| {
         let (foot, top) = (wall.ends[which], wall.ends[1 - which]);
         let way = wall.axis * out;
-        let (base, share) =
-            parted.plane_around(&wall.at(foot), &way, &RINGS.map(|ring| ring * radius), NEAR_END * radius)?;
+        let (base, share) = parted.plane_around(
+            &around,
+            &wall.at(foot),
+            &way,
+            &FOOT_RINGS.map(|ring| ring * radius),
+            NEAR_END * radius,
+        )?;
         if share < 2.0 * RIM || wall.height() < LEAST_HEIGHT * radius {
             return None;
         }
         let to_plane = |number: usize| along_to_plane(&parted.segment(number).primitive, &wall.origin, &wall.axis);
         let foot = to_plane(base)?;
-        let lid =
-            parted.plane_around(&wall.at(top), &way, &[FREE * radius], NEAR_END * radius).map(|(number, _)| number);
+        let lid = parted
+            .plane_around(&around, &wall.at(top), &way, &[FREE * radius], NEAR_END * radius)
+            .map(|(number, _)| number);
         let top = lid.and_then(to_plane).unwrap_or(top);
         let height = (top - foot) * out;
         (height > 0.0).then(|| Boss { wall: at, foot: wall.at(foot), out: way, height, base, top: lid })

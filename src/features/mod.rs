@@ -4,6 +4,7 @@
 //! by the touches on it where there are enough, else by the mesh ([`detect`]). [`curvature`] and its [`clusters`] are the
 //! paper's way to the places of features.
 
+mod bodies;
 mod borders;
 pub mod clusters;
 mod cones;
@@ -19,11 +20,14 @@ mod measure;
 mod observe;
 mod primitive;
 mod rays;
+mod rims;
 mod scene;
 mod segment;
 mod slots;
+mod track;
 mod walls;
 
 pub use detect::{Detection, detect};
 pub use feature::{Feature, FittedTo, Kind, Measured};
 pub use k_means::{KMeans, k_means};
+pub use track::Tracker;

@@ -2,12 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 use super::fit::Observation;
+use super::primitive::Primitive;
 use super::scene::Parted;
 use super::segment::Segmentation;
-use crate::mesh::FaceId;
+use crate::mesh::{FaceId, TriMesh, VertexId};
 use crate::touch::ProbedPoint;
 
 /// The touches on a parted mesh.
@@ -36,8 +37,16 @@ const ALIKE: f64 = 0.77;
 const REACH: f64 = 1e-3;
 /// Least standard deviation, m: where none is stated the residuals tell.
 const LEAST_SIGMA: f64 = 1e-6;
+/// A touch counts at least this much.
+const LEAST_WEIGHT: f64 = 0.01;
 /// Vertices of which a surface is fitted, at most.
 const MOST_VERTICES: usize = 1500;
+/// Fewer vertices than this are not picked out.
+const LEAST_ON: usize = 8;
+/// Faces around a vertex, at most, where it is asked whether it is on a chord.
+const MOST_AROUND: usize = 32;
+/// A line is along the straight lines of a round surface when it is within 25° of them.
+const STRAIGHT: f64 = 0.9;
 /// Faces that are asked whether they were touched, at most.
 const MOST_FACES: usize = 400;
 /// Of a measured mesh the vertices within this many edges share their error.
@@ -91,11 +100,7 @@ impl<'a> Observed<'a> {
 
     /// What touches say to a fit.
     pub fn of_touches(&self, numbers: &[u32]) -> Vec<Observation> {
-        let observation = |&number: &u32| {
-            let ProbedPoint { centre, radius, sigma, weight, .. } = self.touches[number as usize];
-            let sigma = (sigma / weight.max(0.01).sqrt()).max(LEAST_SIGMA);
-            Observation { point: centre, offset: radius, sigma, group: self.group[number as usize] }
-        };
+        let observation = |&number: &u32| observation(&self.touches[number as usize], self.group[number as usize]);
         numbers.iter().map(observation).collect()
     }
 
@@ -112,25 +117,44 @@ impl<'a> Observed<'a> {
     /// What the mesh says to a fit.
     pub fn of_mesh(&self, segments: &[usize]) -> Vec<Observation> {
         let mesh = self.parted.facets.mesh;
-        let faces = segments.iter().flat_map(|&number| &self.parted.segment(number).faces);
-        let mut vertices: Vec<_> = faces.flat_map(|&face| mesh.corners(FaceId(face))).collect();
-        vertices.sort_unstable();
-        vertices.dedup();
+        let vertices = self.vertices_of(segments);
         let step = vertices.len().div_ceil(MOST_VERTICES).max(1);
         let segment = self.parted.segment(segments[0]);
-        let (sigma, cell) = (segment.tolerance / 6.0, SHARED_EDGES * self.parted.edge);
+        // of a drawing the residuals tell what is more than rounding
+        let sigma = self.parted.rounding.unwrap_or(segment.tolerance) / 6.0;
+        let cell = SHARED_EDGES * self.parted.edge;
         let mut cells: BTreeMap<[i64; 3], u32> = BTreeMap::new();
         let mut observations = Vec::new();
         for vertex in vertices.into_iter().step_by(step) {
             let point = mesh.position(vertex);
             let own = observations.len() as u32;
-            let group = match segment.is_exact {
-                true => own,
-                false => *cells.entry([point.x, point.y, point.z].map(|x| (x / cell).floor() as i64)).or_insert(own),
+            let group = match self.parted.rounding {
+                Some(_) => own,
+                None => *cells.entry([point.x, point.y, point.z].map(|x| (x / cell).floor() as i64)).or_insert(own),
             };
             observations.push(Observation { point, offset: 0.0, sigma, group });
         }
         observations
+    }
+
+    /// The vertices of some segments, in ascending order; of round ones in a drawing without those on chords: a tessellation
+    /// has them where a neighbour needed a corner, and they are not on the surface.
+    fn vertices_of(&self, segments: &[usize]) -> Vec<VertexId> {
+        let mesh = self.parted.facets.mesh;
+        let mut corners: Vec<(VertexId, FaceId)> = Vec::new();
+        for &face in segments.iter().flat_map(|&number| &self.parted.segment(number).faces) {
+            corners.extend(mesh.corners(FaceId(face)).map(|vertex| (vertex, FaceId(face))));
+        }
+        corners.sort_unstable();
+        let primitive = self.parted.segment(segments[0]).primitive;
+        let is_flat = matches!(primitive, Primitive::Plane { .. });
+        let rounding = self.parted.rounding.filter(|_| !is_flat);
+        let of_vertex = || corners.chunk_by(|a, b| a.0 == b.0);
+        let is_on = |faces: &[(VertexId, FaceId)]| {
+            rounding.is_none_or(|rounding| !is_on_chord(mesh, faces, &primitive, rounding))
+        };
+        let on: Vec<_> = of_vertex().filter(|faces| is_on(faces)).map(|faces| faces[0].0).collect();
+        if on.len() < LEAST_ON { of_vertex().map(|faces| faces[0].0).collect() } else { on }
     }
 
     /// Share of the area of some segments that was touched.
@@ -160,6 +184,11 @@ impl<'a> Observed<'a> {
         (0..count).filter(|&i| self.is_touched(&at(i))).count() as f64 / count as f64
     }
 
+    /// Share of some places that was touched.
+    pub fn touched_at(&self, places: &[Point3<f64>]) -> f64 {
+        places.iter().filter(|p| self.is_touched(p)).count() as f64 / places.len().max(1) as f64
+    }
+
     fn is_touched(&self, p: &Point3<f64>) -> bool {
         let [x, y, z] = self.cell(p);
         let near = |&number: &u32| (self.touches[number as usize].point - p).norm() <= self.reach;
@@ -170,8 +199,36 @@ impl<'a> Observed<'a> {
     }
 }
 
+/// What a touch says to a fit.
+pub(super) fn observation(touch: &ProbedPoint, group: u32) -> Observation {
+    let ProbedPoint { centre, radius, sigma, weight, .. } = *touch;
+    let sigma = (sigma / weight.max(LEAST_WEIGHT).sqrt()).max(LEAST_SIGMA);
+    Observation { point: centre, offset: radius, sigma, group }
+}
+
+/// Whether a vertex is between two others of its faces on a line that is not one of the straight lines of the surface.
+fn is_on_chord(mesh: &TriMesh, faces: &[(VertexId, FaceId)], primitive: &Primitive, rounding: f64) -> bool {
+    if faces.len() > MOST_AROUND {
+        return false;
+    }
+    let p = mesh.position(faces[0].0);
+    let straight = match primitive {
+        Primitive::Plane { .. } => return false,
+        Primitive::Cylinder { axis, .. } => *axis,
+        Primitive::Cone { apex, .. } => (p - apex).try_normalize(0.0).unwrap_or_else(Vector3::zeros),
+    };
+    let others = || faces.iter().flat_map(|&(_, face)| mesh.triangle(face)).filter(|q| *q != p);
+    let is_between = |a: &Point3<f64>, b: &Point3<f64>| {
+        let Some(way) = (b - a).try_normalize(0.0) else { return false };
+        let v = p - a;
+        let off = (v - way * v.dot(&way)).norm();
+        (p - a).dot(&(p - b)) < 0.0 && off < rounding && way.dot(&straight).abs() < STRAIGHT
+    };
+    others().any(|a| others().any(|b| is_between(&a, &b)))
+}
+
 /// Numbers of the groups of touches that share their error.
-fn groups(touches: &[ProbedPoint]) -> Vec<u32> {
+pub(super) fn groups(touches: &[ProbedPoint]) -> Vec<u32> {
     let mut last: Option<(u32, i64)> = None;
     let mut group = 0;
     let mut number = |touch: &ProbedPoint| {

@@ -10,6 +10,8 @@ pub(super) struct Rays<'a> {
     tree: &'a FaceTree,
     /// length of the pieces in which a line is followed, m: a box around a long one holds too many faces
     piece: f64,
+    /// what the faces are called, where the mesh is a part of another
+    names: Option<&'a [u32]>,
     query: BoxQuery,
 }
 
@@ -22,8 +24,8 @@ pub(super) struct Crossing {
 }
 
 impl<'a> Rays<'a> {
-    pub fn new(mesh: &'a TriMesh, tree: &'a FaceTree, piece: f64) -> Self {
-        Self { mesh, tree, piece, query: BoxQuery::default() }
+    pub fn new(mesh: &'a TriMesh, tree: &'a FaceTree, piece: f64, names: Option<&'a [u32]>) -> Self {
+        Self { mesh, tree, piece, names, query: BoxQuery::default() }
     }
 
     /// The first face between `from` and the point `reach` (m) away along the unit vector `way`.
@@ -40,7 +42,8 @@ impl<'a> Rays<'a> {
             // a face of this box may be crossed in a later one, behind a nearer face that is not here
             let nearest = found.min_by(|a, b| a.distance.total_cmp(&b.distance).then(a.face.cmp(&b.face)));
             if let Some(nearest) = nearest.filter(|nearest| nearest.distance <= piece * (i + 1) as f64) {
-                return Some(nearest);
+                let face = self.names.map_or(nearest.face, |names| FaceId(names[nearest.face.0 as usize]));
+                return Some(Crossing { face, ..nearest });
             }
         }
         None
@@ -75,7 +78,7 @@ mod tests {
         let positions = [floor(1.0), floor(2.5)].concat();
         let mesh = TriMesh::new(positions, vec![[0, 1, 2], [3, 4, 5]]).unwrap();
         let tree = FaceTree::new(&mesh);
-        let mut rays = Rays::new(&mesh, &tree, 0.7);
+        let mut rays = Rays::new(&mesh, &tree, 0.7, None);
         let met = rays.first(&Point3::new(1.0, 1.0, 5.0), &-Vector3::z(), 10.0).unwrap();
         assert_eq!((met.face, met.distance), (FaceId(1), 2.5));
         assert_eq!(rays.free(&Point3::new(1.0, 1.0, 5.0), &-Vector3::z(), 2.0), 2.0, "too short");

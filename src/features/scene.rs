@@ -2,10 +2,10 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::bodies::{Bodies, Surroundings};
 use super::borders::{borders, without_seams};
 use super::facets::Facets;
 use super::primitive::{Primitive, square_to};
-use super::rays::Rays;
 use super::segment::{Segment, Segmentation, median_edge};
 use crate::mesh::{FaceTree, TriMesh};
 
@@ -13,7 +13,10 @@ use crate::mesh::{FaceTree, TriMesh};
 pub(super) struct Parted<'a> {
     pub facets: Facets<'a>,
     pub tree: &'a FaceTree,
+    pub bodies: Bodies,
     pub segmentation: Segmentation,
+    /// of a drawing how far corners are off by rounding, m; `None`: the mesh was measured
+    pub rounding: Option<f64>,
     /// of the box around all, m
     pub diagonal: f64,
     /// median length of an edge, m
@@ -33,7 +36,10 @@ impl<'a> Parted<'a> {
         let segmentation = Segmentation::of(&facets);
         let [lo, hi] = mesh.bounds();
         let edge = median_edge(&facets);
-        let mut parted = Self { facets, tree, segmentation, diagonal: (hi - lo).norm(), edge };
+        let bodies = Bodies::of(&facets);
+        let exact = segmentation.segments.iter().filter(|segment| segment.is_exact).map(|segment| segment.tolerance);
+        let rounding = exact.min_by(f64::total_cmp);
+        let mut parted = Self { rounding, facets, bodies, tree, segmentation, diagonal: (hi - lo).norm(), edge };
         let of_face = without_seams(&parted);
         let beside: Vec<_> = borders(&parted, &of_face).into_keys().collect();
         parted.segmentation.join_planes(&parted.facets, beside.into_iter());
@@ -57,14 +63,14 @@ impl<'a> Parted<'a> {
         })
     }
 
-    pub fn rays(&self, piece: f64) -> Rays<'_> {
-        Rays::new(self.facets.mesh, self.tree, piece)
+    /// What is around a segment.
+    pub fn around(&self, number: usize) -> Surroundings<'_> {
+        self.bodies.around(self.segment(number).faces.first().copied(), self.facets.mesh, self.tree)
     }
 
     /// The segment of the face closest to `p`, when one is within `reach`, m.
-    pub fn segment_at(&self, p: &Point3<f64>, reach: f64) -> Option<usize> {
-        let hit = self.tree.closest(self.facets.mesh, p, reach)?;
-        let number = self.segmentation.of_face[hit.face.0 as usize];
+    pub fn segment_at(&self, around: &Surroundings, p: &Point3<f64>, reach: f64) -> Option<usize> {
+        let number = self.segmentation.of_face[around.closest(p, reach)? as usize];
         (number != Segmentation::NONE).then_some(number as usize)
     }
 
@@ -74,6 +80,7 @@ impl<'a> Parted<'a> {
     /// - `reach`: how far the plane may be, m
     pub fn plane_around(
         &self,
+        around: &Surroundings,
         middle: &Point3<f64>,
         way: &Vector3<f64>,
         radii: &[f64],
@@ -84,7 +91,7 @@ impl<'a> Parted<'a> {
         for (i, radius) in (0..AROUND).flat_map(|i| radii.iter().map(move |radius| (i, radius))) {
             let (sine, cosine) = (std::f64::consts::TAU * i as f64 / AROUND as f64).sin_cos();
             let p = middle + (e * cosine + g * sine) * *radius;
-            let Some(number) = self.segment_at(&p, reach) else { continue };
+            let Some(number) = self.segment_at(around, &p, reach) else { continue };
             let Primitive::Plane { normal, .. } = self.segment(number).primitive else { continue };
             if normal.dot(way) < SQUARE {
                 continue;

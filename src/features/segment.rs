@@ -65,6 +65,12 @@ const COPLANAR: f64 = 1.5e-8;
 const SPREAD: f64 = 4.0;
 /// Largest tolerance of a round surface, in its radii.
 const SHARPNESS: f64 = 0.08;
+/// So many faces tell a plane while it grows.
+const MOST_OF_PLANE: usize = 20_000;
+/// A primitive has settled when it moves by less than this share of the tolerance …
+const SETTLED: f64 = 0.1;
+/// … at so many faces.
+const SAMPLE: usize = 64;
 /// A region is at least so many tolerances wide.
 const LEAST_WIDTH: f64 = 12.0;
 /// Across a sharper edge than this no region grows, and a normal may be off by no more: half of a polygon of 9 sides. 40°.
@@ -77,6 +83,8 @@ const LEAST_LEFT: f64 = 0.3;
 const NEAR: usize = 16;
 /// Root mean square of the normals' sines around a flat seed: 5°.
 const FLAT: f64 = 0.09;
+/// A flat piece that goes on in round ones is so many times larger than their facets.
+const FLAT_AMONG_ROUND: f64 = 20.0;
 /// The same around the seed of a cylinder, at least: 5° is what 17° of its turn have.
 const BENT: f64 = 0.09;
 /// A region is a plane without asking further when less than this share of its border goes on smoothly.
@@ -85,6 +93,10 @@ const BOUNDED: f64 = 0.2;
 const MORE: f64 = 1.3;
 /// Faces around the seed of a curved surface, in turn.
 const CURVED_NEAR: [usize; 3] = [12, 32, 90];
+/// Beyond a plane it is looked at so many faces …
+const MOST_NEAR: usize = 50_000;
+/// … and so many of them are fitted.
+const MOST_FITTED: usize = 300;
 
 impl Segmentation {
     /// Adds a segment, which takes its faces from those that had them; returns its number.
@@ -144,6 +156,8 @@ impl Segmentation {
     pub(super) fn of(facets: &Facets) -> Self {
         let mut growing = Growing::of(facets);
         let mut seeds = growing.seeds();
+        let divided = WAVES_OF_ALL * growing.scale.diagonal;
+        growing.divided = (divided, WIDER * divided);
         for (closeness, tolerance) in growing.scale.tolerances(facets) {
             (growing.closeness, growing.tolerance) = (closeness, tolerance);
             seeds.retain(|&face| growing.is_free(face) && facets.area(face) > 0.0);
@@ -195,6 +209,8 @@ struct Growing<'a> {
     closeness: f64,
     /// how near the others, m
     tolerance: f64,
+    /// both for facets of a drawing that were divided further, m
+    divided: (f64, f64),
 }
 
 /// A region before it is accepted.
@@ -218,6 +234,7 @@ impl<'a> Growing<'a> {
             needs: vec![0.0; slots],
             closeness: 0.0,
             tolerance: 0.0,
+            divided: (0.0, 0.0),
         }
     }
 
@@ -267,13 +284,22 @@ impl<'a> Growing<'a> {
         if bend.spread < FLAT {
             best = self.plane_from(seed, &near, &mut needs);
         }
+        if best.is_none() && self.closeness <= ROUNDING * self.scale.diagonal {
+            best = self.flat_from(seed);
+        }
         let is_bounded = best.as_ref().is_some_and(|plane| self.smooth_share(plane) < BOUNDED);
         if !is_bounded {
             let enough = best.as_ref().map_or(0.0, |plane| MORE * plane.area);
             let faces = best.as_ref().map_or(0, |plane| plane.faces.len());
-            if let Some(curved) = self.cylinder_from(seed, faces, &mut needs).filter(|curved| curved.area > enough) {
-                best = Some(curved);
+            let mut curved = self.cylinder_from(seed, faces, &mut needs);
+            if curved.is_none() && faces > 0 && self.is_exact() {
+                // facets of a drawing that were divided further lie off the circle
+                let exact = (self.closeness, self.tolerance);
+                (self.closeness, self.tolerance) = self.divided;
+                curved = self.cylinder_from(seed, faces, &mut needs);
+                (self.closeness, self.tolerance) = exact;
             }
+            best = curved.filter(|curved| curved.area > enough).or(best);
         }
         match best.filter(|best| best.area > (LEAST_WIDTH * self.tolerance).powi(2)) {
             Some(region) => self.accept(region),
@@ -300,7 +326,37 @@ impl<'a> Growing<'a> {
         near.iter().for_each(|&face| moments.add(self.facets, face));
         let start = moments.plane()?;
         self.is_close(&start, near, needs).then_some(())?;
-        self.grown(seed, start)
+        self.grown(seed, start, near.len())
+    }
+
+    /// Whether only what a drawing has is taken in this round.
+    fn is_exact(&self) -> bool {
+        self.tolerance <= ROUNDING * self.scale.diagonal
+    }
+
+    /// The flat piece around a seed of a drawing, where it goes on in round ones, of facets much smaller than it is.
+    fn flat_from(&mut self, seed: u32) -> Option<Region> {
+        let facets = self.facets;
+        self.round += 1;
+        self.seen[seed as usize] = self.round;
+        let (mut flat, mut area, mut largest) = (vec![seed], 0.0, 0.0f64);
+        let mut at = 0;
+        while at < flat.len() {
+            area += facets.area(flat[at]);
+            for (_, other) in facets.beside(flat[at]) {
+                let cosine = facets.normal(seed).dot(&facets.normal(other));
+                if cosine > SMOOTH && 1.0 - cosine > COPLANAR {
+                    largest = largest.max(facets.area(other));
+                } else if cosine > SMOOTH && self.seen[other as usize] != self.round {
+                    self.seen[other as usize] = self.round;
+                    flat.push(other);
+                }
+            }
+            at += 1;
+        }
+        let mut moments = Moments::about(facets.triangle(seed)[0]);
+        moments.add(facets, seed);
+        if area > FLAT_AMONG_ROUND * largest { self.grown(seed, moments.plane()?, flat.len()) } else { None }
     }
 
     /// The largest cylinder through the faces around a seed.
@@ -309,12 +365,16 @@ impl<'a> Growing<'a> {
     fn cylinder_from(&mut self, seed: u32, plane: usize, needs: &mut f64) -> Option<Region> {
         let mut best: Option<Region> = None;
         let mut before = 0;
-        for most in CURVED_NEAR.into_iter().chain([(3 * plane + 24).min(2000)]) {
-            let near = self.near(seed, most);
+        for most in CURVED_NEAR.into_iter().chain([(3 * plane + 24).min(MOST_NEAR)]) {
+            let mut near = self.near(seed, most);
             if near.len() <= before {
                 continue;
             }
             before = near.len();
+            let step = before.div_ceil(MOST_FITTED);
+            if step > 1 {
+                near = near.into_iter().step_by(step).collect();
+            }
             let bend = Bend::of(self.facets, &near).filter(|bend| bend.spread > BENT);
             let Some(axis) = bend.and_then(|bend| bend.cylinder_axis()) else { continue };
             let start = cylinder_of(self.facets, &near, &axis);
@@ -322,7 +382,7 @@ impl<'a> Growing<'a> {
             if !self.is_close(&start, &near, needs) {
                 continue;
             }
-            let Some(region) = self.grown(seed, start) else { continue };
+            let Some(region) = self.grown(seed, start, before) else { continue };
             if best.as_ref().is_none_or(|best| region.area > best.area) {
                 best = Some(region);
             }
@@ -339,15 +399,21 @@ impl<'a> Growing<'a> {
     }
 
     /// The region around `seed` that a primitive explains, and the primitive through all of it.
-    fn grown(&mut self, seed: u32, start: Primitive) -> Option<Region> {
+    ///
+    /// - `near`: from how many faces around the primitive comes.
+    fn grown(&mut self, seed: u32, start: Primitive, near: usize) -> Option<Region> {
         let mut primitive = start;
         let mut faces = Vec::new();
         for _ in 0..2 {
             if !self.belongs(seed, &primitive) {
                 return None;
             }
-            faces = self.flood(vec![seed], &mut primitive);
-            primitive = self.fitted(&primitive, &faces)?;
+            faces = self.flood(vec![seed], &mut primitive, near);
+            let used = primitive;
+            primitive = self.fitted(&used, &faces)?;
+            if self.is_settled(&used, &primitive, &faces) {
+                break;
+            }
         }
         if self.closeness > SHARPNESS * self.roundness(&primitive, &faces) {
             return None;
@@ -358,10 +424,12 @@ impl<'a> Growing<'a> {
 
     /// Goes from the faces of `found` over all that belong to the primitive, which follows them each time their number has
     /// doubled.
-    fn flood(&mut self, mut found: Vec<u32>, primitive: &mut Primitive) -> Vec<u32> {
+    ///
+    /// - `fitted`: how many faces tell the primitive already; fewer of them may be flat by themselves.
+    fn flood(&mut self, mut found: Vec<u32>, primitive: &mut Primitive, fitted: usize) -> Vec<u32> {
         self.round += 1;
         found.iter().for_each(|&face| self.seen[face as usize] = self.round);
-        let (mut at, mut refit_at) = (0, 2 * found.len().max(NEAR));
+        let (mut at, mut refit_at) = (0, 2 * found.len().max(fitted));
         while at < found.len() {
             let face = found[at];
             at += 1;
@@ -384,6 +452,14 @@ impl<'a> Growing<'a> {
         found
     }
 
+    /// Whether two primitives are the same on a sample of faces, as far as the tolerance goes.
+    fn is_settled(&self, one: &Primitive, other: &Primitive, faces: &[u32]) -> bool {
+        faces.iter().step_by(faces.len().div_ceil(SAMPLE)).all(|&face| {
+            let p = self.facets.triangle(face)[0];
+            (one.distance(&p) - other.distance(&p)).abs() < SETTLED * self.tolerance
+        })
+    }
+
     /// A length of which a surface is round, m: the radius, of a cone the mean one; infinite for a plane.
     fn roundness(&self, primitive: &Primitive, faces: &[u32]) -> f64 {
         match primitive {
@@ -403,7 +479,8 @@ impl<'a> Growing<'a> {
     fn fitted(&self, primitive: &Primitive, faces: &[u32]) -> Option<Primitive> {
         if let Primitive::Plane { point, .. } = primitive {
             let mut moments = Moments::about(*point);
-            faces.iter().for_each(|&face| moments.add(self.facets, face));
+            let step = faces.len().div_ceil(MOST_OF_PLANE);
+            faces.iter().step_by(step).for_each(|&face| moments.add(self.facets, face));
             return moments.plane();
         }
         refined(primitive, self.facets, faces)
@@ -451,7 +528,8 @@ impl<'a> Growing<'a> {
                 }
             }
             left.retain(|&face| self.belongs(face, &primitive));
-            let faces = self.flood(left, &mut primitive);
+            let fitted = left.len();
+            let faces = self.flood(left, &mut primitive, fitted);
             let area: f64 = faces.iter().map(|&face| self.facets.area(face)).sum();
             if area < LEAST_LEFT * segment.area || area < (LEAST_WIDTH * self.tolerance).powi(2) {
                 continue;
@@ -496,11 +574,17 @@ impl Scale {
     /// How near the faces around a seed have to be, and how near the rest. Tight ones first: what they explain is not left
     /// to loose ones.
     fn tolerances(&self, facets: &Facets) -> Vec<(f64, f64)> {
-        let exact = ROUNDING * self.diagonal;
-        let waves = (WAVES * self.edge).min(WAVES_OF_ALL * self.diagonal).max(exact);
-        let loose =
-            (0..RUNGS).map(|rung| waves * f64::powi(WIDER, rung)).map(|closeness| (closeness, WIDER * closeness));
+        let (exact, (closeness, tolerance)) = (ROUNDING * self.diagonal, self.waves());
+        let wider = |rung| f64::powi(WIDER, rung);
+        let loose = (0..RUNGS).map(|rung| (closeness * wider(rung), tolerance * wider(rung)));
         is_exact(facets).then_some((exact, exact)).into_iter().chain(loose).collect()
+    }
+
+    /// What surfaces that are good but no drawing need.
+    fn waves(&self) -> (f64, f64) {
+        let least = ROUNDING * self.diagonal;
+        let closeness = (WAVES * self.edge).min(WAVES_OF_ALL * self.diagonal).max(least);
+        (closeness, WIDER * closeness)
     }
 }
 

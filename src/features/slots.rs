@@ -33,6 +33,8 @@ pub(super) struct Slot {
     pub land: usize,
     /// whether both ends are closed by planes, so that it is no slot unless it is long
     pub is_boxed: bool,
+    /// whether a wall aslant closes an end: it is a recess of another outline
+    is_aslant: bool,
     /// area over which the walls face each other, m²
     pub area: f64,
 }
@@ -50,8 +52,14 @@ const LONG: f64 = 1.2;
 const LONG_BOX: f64 = 2.0;
 /// A slot is not wider than this many depths.
 const WIDE: f64 = 3.0;
+/// A pocket is not wider than this many depths: shallower is a step that an uneven surface has too.
+const SHALLOW: f64 = 12.0;
+/// A pocket is at least as long as wide, but for what the sides of a square one differ by.
+const SQUARISH: f64 = 0.95;
 /// A pocket's walls face each other over this share of them.
 const POCKET_SHARE: f64 = 0.5;
+/// Cosine between a slot and the normal of a wall that closes it aslant: 20° to 75°.
+const ASLANT: std::ops::Range<f64> = 0.26..0.94;
 /// Voids are the same when widths and places agree within this share of the width.
 const SAME: f64 = 0.4;
 /// A line that starts on a wall starts this share of the width off it.
@@ -71,21 +79,20 @@ pub(super) fn slots(parted: &Parted, of_face: &[u32], borders: &Borders) -> (Vec
             }
             let Some((slot, share)) = between(parted, of_face, borders, [i, j]) else { continue };
             let is_slot = slot.length > if slot.is_boxed { LONG_BOX } else { LONG } * slot.width;
-            if slot.width > WIDE * slot.depth {
-                continue;
-            }
-            if is_slot {
+            if is_slot && !slot.is_aslant && slot.width < WIDE * slot.depth {
                 slots.push(slot);
-            } else if slot.is_boxed
-                && share > POCKET_SHARE
-                && slot.length > slot.width / LONG_BOX
-                && slot.floor.is_some()
-            {
+            } else if !is_slot && share > POCKET_SHARE && is_pocket(&slot) {
                 pockets.push(slot);
             }
         }
     }
     (distinct(slots, is_same_slot), distinct(pockets, is_same_pocket))
+}
+
+/// Whether a void with flat ends is a pocket, seen by the pair of walls that is closer.
+fn is_pocket(slot: &Slot) -> bool {
+    let is_closed = slot.is_boxed && slot.floor.is_some();
+    is_closed && slot.length > SQUARISH * slot.width && slot.width < SHALLOW * slot.depth
 }
 
 /// A void may be seen by several pairs of walls: the largest pair names it.
@@ -129,7 +136,7 @@ fn between(parted: &Parted, of_face: &[u32], borders: &Borders, walls: [usize; 2
     let mut middles = Vec::new();
     for p in &starts {
         let width = along_to_plane(&parted.segment(to).primitive, p, &normal)?;
-        let met = parted.rays(width).first(&(p + normal * (OFF * width)), &normal, 1.1 * width);
+        let met = parted.around(from).rays(width).first(&(p + normal * (OFF * width)), &normal, 1.1 * width);
         let is_met = met.is_some_and(|met| of_face[met.face.0 as usize] == to as u32);
         if is_met && width > 0.0 {
             middles.push(p + normal * (width / 2.0));
@@ -211,7 +218,7 @@ struct Opened<'a> {
 
 fn opened(parted: &Parted, of_face: &[u32], seen: &Opened) -> Option<Slot> {
     let Opened { walls, middle, middles, across, width, land, out, area } = *seen;
-    let mut rays = parted.rays(width);
+    let mut rays = parted.around(walls[0]).rays(width);
     let reach = parted.diagonal;
     let up = along_to_plane(&parted.segment(land).primitive, &middle, &out)?;
     if up < 0.0 || rays.free(&middle, &out, reach) < up + width / 2.0 {
@@ -231,16 +238,16 @@ fn opened(parted: &Parted, of_face: &[u32], seen: &Opened) -> Option<Slot> {
         (None, None) => walls_end(&-out),
     };
     let direction = out.cross(&across).normalize();
-    let (mut ends, mut lengths, mut flat) = ([None; 2], [0.0; 2], 0);
+    let (mut ends, mut lengths, mut flat, mut is_aslant) = ([None; 2], [0.0; 2], 0, false);
     for (at, way) in [direction, -direction].into_iter().enumerate() {
         let met = rays.first(&middle, &way, reach).filter(|met| met.distance < walls_end(&way) + 1.5 * width);
         lengths[at] = met.map_or_else(|| walls_end(&way), |met| met.distance);
         let number = met.map(|met| named(met.face)).filter(|&number| number != NONE).map(|number| number as usize);
-        flat += usize::from(number.is_some_and(|number| is_square(parted, number, &way)));
-        ends[at] = number;
-        if let Some(number) = number.filter(|&number| is_round_end(parted, number, &out, width)) {
-            ends[at] = Some(number);
-        }
+        let is_flat = number.is_some_and(|number| is_square(parted, number, &way));
+        flat += usize::from(is_flat);
+        is_aslant |= number.is_some_and(|number| is_wall_aslant(parted, number, &way, &out));
+        // what only reaches there over a seam, as a floor does, is no end
+        ends[at] = number.filter(|&number| is_flat || is_round_end(parted, number, &out, width));
     }
     let centre = middle + out * up + direction * ((lengths[0] - lengths[1]) / 2.0);
     Some(Slot {
@@ -256,6 +263,7 @@ fn opened(parted: &Parted, of_face: &[u32], seen: &Opened) -> Option<Slot> {
         floor: flat_floor,
         land,
         is_boxed: flat == 2,
+        is_aslant,
         area,
     })
 }
@@ -263,6 +271,12 @@ fn opened(parted: &Parted, of_face: &[u32], seen: &Opened) -> Option<Slot> {
 /// Whether a segment is a plane square to `way`.
 fn is_square(parted: &Parted, number: usize, way: &Vector3<f64>) -> bool {
     matches!(parted.segment(number).primitive, Primitive::Plane { normal, .. } if normal.dot(way).abs() > PARALLEL.powi(4))
+}
+
+/// Whether a segment is an upright wall that `way` meets aslant.
+fn is_wall_aslant(parted: &Parted, number: usize, way: &Vector3<f64>, out: &Vector3<f64>) -> bool {
+    let Primitive::Plane { normal, .. } = parted.segment(number).primitive else { return false };
+    ASLANT.contains(&-normal.dot(way)) && normal.dot(out).abs() < SQUARE
 }
 
 /// Whether a segment is a half-round end of a slot.

@@ -21,6 +21,8 @@ pub(super) struct Wall {
     pub ends: [f64; 2],
     /// share of the turn that it covers
     pub coverage: f64,
+    /// share of what it is between its ends that its faces cover
+    pub filled: f64,
 }
 
 /// Into so many parts a turn is divided.
@@ -82,7 +84,15 @@ impl Wall {
         let ends = [0, 1].map(|end| median(covered.iter().map(|part| part[end]).collect()));
         let [Some(low), Some(high)] = ends else { return None };
         let ends = [low, high];
-        Some(Self { primitive, segments, origin, axis, ends, coverage })
+        let radius = match primitive {
+            Primitive::Cone { half_angle, .. } => (low + high) / 2.0 * half_angle.tan() / half_angle.cos(),
+            Primitive::Cylinder { radius, .. } => radius,
+            Primitive::Plane { .. } => return None,
+        };
+        let area: f64 = faces.iter().map(|&face| facets.area(face)).sum();
+        let whole = std::f64::consts::TAU * radius * (high - low) * coverage;
+        let filled = if whole > 0.0 { area / whole } else { 0.0 };
+        Some(Self { primitive, segments, origin, axis, ends, coverage, filled })
     }
 
     /// Whether `other` is a piece of the same wall.

@@ -8,6 +8,7 @@ use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::atomic::write_atomically;
+use crate::features::clusters::{Bend, Cluster};
 use crate::features::{Feature, FittedTo, Measured};
 
 /// Why a file of features could not be read or written.
@@ -47,6 +48,31 @@ pub struct FeatureFile {
     /// share of the mesh's area that belongs to no plane, cylinder or cone: nothing was looked for there
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unexplained: Option<f64>,
+    /// places of high curvature, the paper's way to features; there only in that mode
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub clusters: Vec<ClusterRecord>,
+}
+
+/// Vertices of high curvature that belong together.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct ClusterRecord {
+    /// their middle
+    pub center_mm: [f64; 3],
+    /// how many
+    pub vertices: usize,
+    /// whether they bend outward, as the rim of a hole; left out where the number of clusters was given
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub convex: Option<bool>,
+}
+
+impl From<&Cluster> for ClusterRecord {
+    fn from(cluster: &Cluster) -> Self {
+        Self {
+            center_mm: point_mm(&cluster.center),
+            vertices: cluster.vertices.len(),
+            convex: cluster.bend.map(|bend| bend == Bend::Convex),
+        }
+    }
 }
 
 /// One feature; what does not apply to its kind, or is not known, is left out.
@@ -74,7 +100,7 @@ pub struct FeatureRecord {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub width_mm: Option<f64>,
     /// hole, slot, pocket: from opening to floor, of one that goes through as far as its wall goes (of a drilled hole
-    /// without the tip); boss: its height
+    /// without the tip; of a round opening in a sheet left out, as is `through`); boss: its height
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth_mm: Option<f64>,
     /// hole, slot, pocket
@@ -190,7 +216,13 @@ fn runs(numbers: &[u32]) -> Vec<[u32; 2]> {
 impl FeatureFile {
     /// The features as a file has them.
     pub fn of(features: &[Feature], unexplained: f64) -> Self {
-        Self { features: features.iter().map(FeatureRecord::from).collect(), unexplained: Some(unexplained) }
+        let features = features.iter().map(FeatureRecord::from).collect();
+        Self { features, unexplained: Some(unexplained), clusters: Vec::new() }
+    }
+
+    /// Clusters alone.
+    pub fn of_clusters(clusters: &[Cluster]) -> Self {
+        Self { clusters: clusters.iter().map(ClusterRecord::from).collect(), ..Self::default() }
     }
 }
 

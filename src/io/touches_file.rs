@@ -60,34 +60,41 @@ pub enum TouchesFileError {
 pub fn write_touches(path: &Path, touches: &[ProbedPoint]) -> Result<(), TouchesFileError> {
     let wrote = write_atomically(path, |out| {
         writeln!(out, "{HEADER}")?;
-        for (number, touch) in touches.iter().enumerate() {
-            let ProbedPoint { stamp_ns, stroke, centre, radius, point, normal, sigma, calibration, weight, .. } = touch;
-            let [c, p] = [centre, point].map(|p| p.coords * 1e3);
-            writeln!(
-                out,
-                "{number},{stamp_ns},{stroke},{:.6},{:.6},{:.6},{},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6},{:.4},{}",
-                c.x,
-                c.y,
-                c.z,
-                radius * 1e3,
-                p.x,
-                p.y,
-                p.z,
-                normal.x,
-                normal.y,
-                normal.z,
-                sigma * 1e3,
-                calibration * 1e3,
-                weight,
-                u8::from(touch.is_held_apart)
-            )?;
-        }
-        Ok(())
+        touches.iter().enumerate().try_for_each(|(number, touch)| writeln!(out, "{}", line_of(touch, number)))
     });
     wrote.map_err(|source| TouchesFileError::Write { path: path.to_owned(), source })
 }
 
-/// Reads what [`write_touches`] wrote.
+/// Touches as [`read_touches`] has them after [`write_touches`]: to the digits written. What is measured by them can be
+/// measured again from the file.
+pub fn as_written(touches: &[ProbedPoint]) -> Vec<ProbedPoint> {
+    let rounded = |(number, touch)| touch_of(&line_of(touch, number), number).unwrap_or(*touch);
+    touches.iter().enumerate().map(rounded).collect()
+}
+
+fn line_of(touch: &ProbedPoint, number: usize) -> String {
+    let ProbedPoint { stamp_ns, stroke, centre, radius, point, normal, sigma, calibration, weight, .. } = touch;
+    let [c, p] = [centre, point].map(|p| p.coords * 1e3);
+    format!(
+        "{number},{stamp_ns},{stroke},{:.6},{:.6},{:.6},{},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6},{:.4},{}",
+        c.x,
+        c.y,
+        c.z,
+        radius * 1e3,
+        p.x,
+        p.y,
+        p.z,
+        normal.x,
+        normal.y,
+        normal.z,
+        sigma * 1e3,
+        calibration * 1e3,
+        weight,
+        u8::from(touch.is_held_apart)
+    )
+}
+
+/// Reads what [`write_touches`] wrote, also as spreadsheets save it: with a byte order mark, CRLF, empty lines.
 ///
 /// # Errors
 /// [`TouchesFileError`], with the line.
@@ -95,16 +102,29 @@ pub fn read_touches(path: &Path) -> Result<Vec<ProbedPoint>, TouchesFileError> {
     let own = || path.to_owned();
     let text = std::fs::read(path).map_err(|source| TouchesFileError::Read { path: own(), source })?;
     let text = String::from_utf8_lossy(&text);
-    let mut lines = text.lines();
+    let mut lines = text.strip_prefix('\u{feff}').unwrap_or(&text).lines();
     if lines.next().map(str::trim_end) != Some(HEADER) {
         return Err(TouchesFileError::NoTouches { path: own() });
     }
-    let mut touches = Vec::new();
+    let mut touches: Vec<ProbedPoint> = Vec::new();
     for (at, line) in lines.enumerate().filter(|(_, line)| !line.trim().is_empty()) {
-        let touch = touch_of(line, touches.len());
+        let touch = touch_of(line, touches.len()).and_then(|touch| in_order(&touches, touch));
         touches.push(touch.map_err(|what| TouchesFileError::BadLine { path: own(), line: at + 2, what })?);
     }
     Ok(touches)
+}
+
+/// Touches come in order of time, and all within a span that can be told in ns.
+fn in_order(before: &[ProbedPoint], touch: ProbedPoint) -> Result<ProbedPoint, String> {
+    let (Some(first), Some(last)) = (before.first(), before.last()) else { return Ok(touch) };
+    let ProbedPoint { stamp_ns, stroke, .. } = touch;
+    if stamp_ns < last.stamp_ns || stroke < last.stroke {
+        let (before_ns, before) = (last.stamp_ns, last.stroke);
+        return Err(format!(
+            "stamp_ns {stamp_ns}, stroke {stroke} after {before_ns}, {before}: touches stand in order"
+        ));
+    }
+    stamp_ns.checked_sub(first.stamp_ns).map(|_| touch).ok_or_else(|| "stamp_ns 292 years after the first".to_owned())
 }
 
 fn touch_of(line: &str, number: usize) -> Result<ProbedPoint, String> {
@@ -132,7 +152,7 @@ fn touch_of(line: &str, number: usize) -> Result<ProbedPoint, String> {
     let normal = normal.try_normalize(0.5).ok_or("the normal has no length")?;
     Ok(ProbedPoint {
         stamp_ns: integer(1)?,
-        stroke: u32::try_from(integer(2)?).map_err(|_| "stroke below 0".to_owned())?,
+        stroke: u32::try_from(integer(2)?).map_err(|_| format!("stroke {} is no number of a stroke", fields[2]))?,
         centre: Point3::from(triple(3)? * 1e-3),
         radius: not_negative(6)? * 1e-3,
         point: Point3::from(triple(7)? * 1e-3),
@@ -140,6 +160,10 @@ fn touch_of(line: &str, number: usize) -> Result<ProbedPoint, String> {
         sigma: not_negative(13)? * 1e-3,
         calibration: not_negative(14)? * 1e-3,
         weight: not_negative(15)?,
-        is_held_apart: integer(16)? != 0,
+        is_held_apart: match integer(16)? {
+            0 => false,
+            1 => true,
+            other => return Err(format!("held_apart is {other}, neither 0 nor 1")),
+        },
     })
 }

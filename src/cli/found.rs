@@ -1,0 +1,152 @@
+//! Features that were found, beside those of a part that is known.
+
+use std::fmt;
+
+use nalgebra::{Point3, Vector3};
+use serde::Serialize;
+
+use crate::io::features_file::FeatureRecord;
+use crate::sim::{TruthFeature, TruthShape};
+
+/// A true feature and what was found of it; lengths in mm, angles in degrees.
+#[derive(Debug, Serialize)]
+pub(super) struct FoundFeature {
+    name: &'static str,
+    /// its number in features.json; `null`: not found
+    id: Option<u32>,
+    numbers: Vec<FoundNumber>,
+    center_off_mm: Option<f64>,
+    axis_off_deg: Option<f64>,
+    touched: Option<f64>,
+}
+
+/// A number of a drawing, and what was measured.
+#[derive(Debug, Serialize)]
+struct FoundNumber {
+    name: &'static str,
+    truth: f64,
+    found: Option<f64>,
+    std: Option<f64>,
+}
+
+/// All features of a part, and how many found ones are none of them.
+#[derive(Debug, Serialize)]
+pub(super) struct FoundTable {
+    features: Vec<FoundFeature>,
+    /// holes, slots, pockets and bosses that the part does not have
+    invented: usize,
+}
+
+/// A feature is found when its middle is within this of the true one, mm.
+const NEAR_MM: f64 = 1.5;
+/// Those of a kind that a part of holes, slots and bosses should not have more of.
+const COUNTED: [&str; 4] = ["hole", "slot", "pocket", "boss"];
+
+impl FoundTable {
+    /// Looks for each true feature among the found ones.
+    pub fn of(truth: &[TruthFeature], found: &[FeatureRecord]) -> Self {
+        let features: Vec<_> = truth.iter().map(|truth| FoundFeature::of(truth, found)).collect();
+        let matched = |record: &&FeatureRecord| features.iter().any(|feature| feature.id == Some(record.id));
+        let counted = found.iter().filter(|record| COUNTED.contains(&record.kind.as_str()));
+        Self { invented: counted.filter(|record| !matched(record)).count(), features }
+    }
+}
+
+impl FoundFeature {
+    fn of(truth: &TruthFeature, found: &[FeatureRecord]) -> Self {
+        let kind = match truth.shape {
+            TruthShape::Hole { .. } => "hole",
+            TruthShape::Slot { .. } => "slot",
+            TruthShape::Boss { .. } => "boss",
+            TruthShape::Step { .. } => "edge",
+        };
+        let of_kind = found.iter().filter(|record| record.kind == kind);
+        let off = |record: &&FeatureRecord| off_mm(truth, record).unwrap_or(f64::INFINITY);
+        let record = of_kind.min_by(|a, b| off(a).total_cmp(&off(b))).filter(|record| off(record) < NEAR_MM);
+        let number = |name, truth: f64, value: fn(&FeatureRecord) -> Option<f64>| FoundNumber {
+            name,
+            truth: truth * 1e3,
+            found: record.and_then(value),
+            std: record.and_then(|record| record.std.get(name).copied()),
+        };
+        let diameter = |d| number("diameter_mm", d, |record| record.diameter_mm);
+        let depth = |d| number("depth_mm", d, |record| record.depth_mm);
+        let numbers = match truth.shape {
+            TruthShape::Hole { diameter: d, through: true, .. } => vec![diameter(d)],
+            TruthShape::Hole { diameter: d, depth: h, .. } => vec![diameter(d), depth(h)],
+            TruthShape::Slot { width, length, depth: h, .. } => vec![
+                number("width_mm", width, |record| record.width_mm),
+                number("length_mm", length, |record| record.length_mm),
+                depth(h),
+            ],
+            TruthShape::Boss { diameter: d, height } => vec![diameter(d), depth(height)],
+            TruthShape::Step { .. } => Vec::new(),
+        };
+        Self {
+            name: truth.name,
+            id: record.map(|record| record.id),
+            numbers,
+            center_off_mm: record.and_then(|record| off_mm(truth, record)),
+            axis_off_deg: record.and_then(|record| axis_off_deg(truth, record)),
+            touched: record.map(|record| record.touched),
+        }
+    }
+}
+
+/// The direction that both should share.
+fn axis_of(truth: &TruthFeature) -> Vector3<f64> {
+    match truth.shape {
+        TruthShape::Step { direction, .. } => direction,
+        _ => truth.axis,
+    }
+}
+
+/// Distance across the axis, mm.
+fn off_mm(truth: &TruthFeature, record: &FeatureRecord) -> Option<f64> {
+    let off = Point3::from(record.center_mm?) - truth.centre * 1e3;
+    Some(off.cross(&axis_of(truth)).norm())
+}
+
+fn axis_off_deg(truth: &TruthFeature, record: &FeatureRecord) -> Option<f64> {
+    let (axis, truth) = (Vector3::from(record.axis?), axis_of(truth));
+    Some(axis.cross(&truth).norm().atan2(axis.dot(&truth).abs()).to_degrees())
+}
+
+impl fmt::Display for FoundTable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:<14} {:>22} {:>26} {:>10}   center, axis off   touched", "feature", "true, mm", "found", "error")?;
+        for feature in &self.features {
+            write!(f, "\n{feature}")?;
+        }
+        match self.invented {
+            0 => write!(f, "\nnone invented"),
+            count => write!(f, "\n{count} invented"),
+        }
+    }
+}
+
+impl fmt::Display for FoundFeature {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Some(_) = self.id else { return write!(f, "{:<14} not found", self.name) };
+        let place = format!(
+            "{} {}",
+            self.center_off_mm.map_or(String::new(), |off| format!("{off:.3} mm")),
+            self.axis_off_deg.map_or(String::new(), |off| format!("{off:.2}°"))
+        );
+        let touched = self.touched.map_or(String::new(), |share| format!("{:.0} %", share * 100.0));
+        let Some((first, others)) = self.numbers.split_first() else {
+            return write!(f, "{:<14} {:>60}   {place:<18} {touched}", self.name, "");
+        };
+        write!(f, "{:<14} {first}   {place:<18} {touched}", self.name)?;
+        others.iter().try_for_each(|number| write!(f, "\n{:<14} {number}", ""))
+    }
+}
+
+impl fmt::Display for FoundNumber {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let truth = format!("{} {:.3}", self.name.trim_end_matches("_mm"), self.truth);
+        let Some(found) = self.found else { return write!(f, "{truth:>22} {:>26} {:>10}", "not measured", "") };
+        let std = self.std.map_or("(not felt)".to_owned(), |std| format!("± {std:.3}"));
+        write!(f, "{truth:>22} {:>26} {:>10}", format!("{found:.3} {std}"), format!("{:+.3}", found - self.truth))
+    }
+}
