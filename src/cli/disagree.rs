@@ -53,6 +53,8 @@ pub(super) struct DisagreeArguments {
 struct Told {
     /// `null` where too little was touched to tell how the scanner errs
     scanner: Option<ScannerTold>,
+    /// of the scan as a whole, taken off before places are judged
+    misplaced: Option<MisplacedTold>,
     classes: Vec<ClassTold>,
     regions: Vec<RegionTold>,
     bad_touches: Vec<BadTold>,
@@ -67,6 +69,15 @@ struct ScannerTold {
     edge_mm: f64,
     sees_from_mm: f64,
     places: usize,
+}
+
+#[derive(Debug, Serialize)]
+struct MisplacedTold {
+    /// would bring the scan onto the touches, at `center_mm`
+    shift_mm: [f64; 3],
+    /// and rotation vector
+    turn_deg: [f64; 3],
+    center_mm: [f64; 3],
 }
 
 #[derive(Debug, Serialize)]
@@ -226,6 +237,11 @@ impl Told {
         };
         Self {
             scanner: found.scanner.as_ref().map(ScannerTold::of),
+            misplaced: found.misplaced.as_ref().map(|misplaced| MisplacedTold {
+                shift_mm: mm(&misplaced.shift.into()),
+                turn_deg: misplaced.turn.map(f64::to_degrees).into(),
+                center_mm: mm(&misplaced.centre),
+            }),
             classes: Class::ALL.into_iter().enumerate().map(class).collect(),
             regions: found.regions.iter().map(RegionTold::of).collect(),
             bad_touches: found.bad_touches.iter().map(BadTold::of).collect(),
@@ -290,6 +306,13 @@ impl fmt::Display for Told {
                  {sees_from_mm:.1} mm may be closed over"
             )?,
             None => writeln!(f, "too little was touched to tell how the scanner errs: nothing is called changed")?,
+        }
+        if let Some(MisplacedTold { shift_mm: [x, y, z], turn_deg, .. }) = &self.misplaced {
+            let turn = Vector3::from(*turn_deg).norm();
+            writeln!(
+                f,
+                "the scan as a whole lies off by ({x:.3}, {y:.3}, {z:.3}) mm and {turn:.3}°, which is taken off"
+            )?;
         }
         write!(f, "{:<14} {:>12} {:>12}", "class", "refined, mm2", "scan, mm2")?;
         for ClassTold { class, refined_mm2, scan_mm2, .. } in &self.classes {

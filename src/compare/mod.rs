@@ -18,7 +18,8 @@ pub use colour::{Rgb, colour_of, colour_of_class};
 pub use comparison::{CompareParams, Comparison, Region, RegionComparison, Regions, Shape, compare};
 pub use deviation::{closest_places, deviations};
 pub use disagreement::{
-    BadTouches, Class, ClassMap, Disagreement, DisagreementRegion, Evidence, Known, RefinedShape, Scanner, disagreement,
+    BadTouches, Class, ClassMap, Disagreement, DisagreementRegion, Evidence, Known, Misplaced, RefinedShape, Scanner,
+    disagreement,
 };
 pub use normals::{Tilt, TiltSummary, angle_between, tilts};
 pub use picture::{Panel, Picture, PictureParams, draw_picture};

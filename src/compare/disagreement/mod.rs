@@ -1,19 +1,21 @@
 //! Where touch and scan disagree, without a true part: what of it looks like this scanner, what like a part that is no longer
 //! what was scanned, and what like a bad touch.
 //!
-//! How the scanner errs is found where it should see well, on touched places away from edges: its offset b, its noise σ
+//! What the scan is misplaced as a whole comes off first. How the scanner errs is then found where it should see well, on touched places away from edges: its offset b, its noise σ
 //! and the distance ℓ over which that stays alike, Cov = σ² exp(−r²/2ℓ²). The mean over a region of area A then has the
 //! variance σ²/(1 + A/2πℓ²), and a region that is off by many times its root was changed. Near edges and in what is
 //! narrower than a few edges of the scan's triangles the scan lacks what it could not see.
 
 mod bad_touches;
 mod cells;
+mod misplaced;
 mod regions;
 mod scanner;
 
 use nalgebra::Point3;
 
 pub use self::bad_touches::BadTouches;
+pub use self::misplaced::Misplaced;
 pub use self::regions::{DisagreementRegion, Evidence};
 pub use self::scanner::Scanner;
 use super::deviation::{closest_places, signed};
@@ -100,6 +102,8 @@ pub struct ClassMap {
 /// Where touch and scan disagree.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Disagreement {
+    /// how the scan lies off as a whole, which is taken off before the rest is looked at; `None` where nothing tells
+    pub misplaced: Option<Misplaced>,
     /// how the scanner errs; `None` where too little was touched to tell, and then nothing is called changed
     pub scanner: Option<Scanner>,
     /// the refined mesh
@@ -114,6 +118,9 @@ pub struct Disagreement {
 
 /// Standard deviations of the scan within which it agrees.
 const AGREES: f64 = 2.0;
+
+/// Scan and touch speak of the same side of the part when their normals are within 60°.
+const FACING: f64 = 0.5;
 
 /// Tells where touch and scan disagree, and why, as far as the data can tell.
 ///
@@ -131,7 +138,12 @@ pub fn disagreement(
     if refined.shape.mesh.face_count() == 0 {
         return Err(CompareError::NoFaces);
     }
-    let places = Places::of(scan, refined)?;
+    let mut places = Places::of(scan, refined)?;
+    let off = places.off.clone();
+    let misplaced = Misplaced::of(&places);
+    if let Some(misplaced) = &misplaced {
+        places.take_off(misplaced);
+    }
     let scanner = Scanner::of(scan.mesh, &places);
     let bad_touches = bad_touches::find(refined, touches)?;
     let mut classes = places.first_classes(refined, scanner.as_ref());
@@ -139,11 +151,12 @@ pub fn disagreement(
         regions::find(&regions::Seen { refined, places: &places, scanner, touches }, &mut classes)
     });
     bad_touches::mark(refined, touches, &bad_touches, &mut classes);
-    let mut off = places.off.clone();
+    let mut off = off;
     let is_felt = |class: &Class| !matches!(class, Class::NeverTouched | Class::Unreachable);
     off.iter_mut().zip(&classes).filter(|(_, class)| !is_felt(class)).for_each(|(off, _)| *off = 0.0);
     let on_scan = carried(scan, refined, &classes)?;
     Ok(Disagreement {
+        misplaced: misplaced.filter(|_| scanner.is_some()),
         scanner,
         refined: ClassMap::of(refined.shape.mesh, off, classes),
         scan: on_scan,
@@ -156,10 +169,12 @@ pub fn disagreement(
 struct Places {
     /// m, by slot
     pub positions: Vec<Point3<f64>>,
-    /// how far it lies outside of the scan, m, by slot
+    /// how far it lies outside of the scan, m, by slot; without what the scan is misplaced, once that is known
     pub off: Vec<f64>,
     /// whether it was touched, and the scan is there at all
     pub is_seen: Vec<bool>,
+    /// whether a scanner of this resolution sees it at all: no narrow place
+    pub is_wide: Vec<bool>,
     /// whether a scanner of this resolution sees it well: no edge near, and no narrow place
     pub is_open: Vec<bool>,
     /// normals, by slot; zero where there are none
@@ -173,14 +188,24 @@ impl Places {
         let mesh = refined.shape.mesh;
         let mut off = vec![0.0; mesh.vertex_slots()];
         let mut is_seen = vec![false; mesh.vertex_slots()];
+        let mut faces_alike = vec![false; mesh.vertex_slots()];
+        let (normals, areas) = vertex_normals(mesh);
         closest_places(mesh.positions(), scan.mesh, scan.tree, |at, hit| {
             let p = mesh.position(VertexId(at as u32));
             off[at] = signed(&p, scan.mesh, hit);
             is_seen[at] = !is_on_rim(scan.mesh, hit) && refined.known[at] == Known::Touched;
+            faces_alike[at] = scan.mesh.normal(hit.face).dot(&normals[at]) > FACING;
         })?;
-        let (normals, areas) = vertex_normals(mesh);
-        let is_open = scanner::open_places(scan.mesh, refined, &is_seen, &normals);
-        Ok(Self { positions: mesh.positions().to_vec(), off, is_seen, is_open, normals, areas })
+        let [mut is_wide, mut is_open] = scanner::wide_and_open(scan.mesh, refined, &is_seen, &normals);
+        for flags in [&mut is_wide, &mut is_open] {
+            flags.iter_mut().zip(&faces_alike).for_each(|(flag, alike)| *flag &= alike);
+        }
+        Ok(Self { positions: mesh.positions().to_vec(), off, is_seen, is_wide, is_open, normals, areas })
+    }
+
+    fn take_off(&mut self, misplaced: &Misplaced) {
+        let both = self.positions.iter().zip(&self.normals);
+        self.off.iter_mut().zip(both).for_each(|(off, (p, normal))| *off -= misplaced.at(p, normal));
     }
 
     fn first_classes(&self, refined: &RefinedShape<'_>, scanner: Option<&Scanner>) -> Vec<Class> {
@@ -190,6 +215,8 @@ impl Places {
             (Known::Touched, None) => Class::Unsure,
             (Known::Touched, Some(scanner)) if self.is_seen[at] => match scanner.is_noise(self.off[at], AGREES) {
                 true => Class::Agrees,
+                // at an edge, and yet by more than a rounded edge
+                false if self.is_wide[at] && !scanner.may_round(self.off[at], AGREES) => Class::Unsure,
                 false => Class::ScannerError,
             },
             // the scan has nothing there
@@ -213,10 +240,16 @@ impl ClassMap {
 /// Whether the surface ends where `hit` is.
 fn is_on_rim(mesh: &TriMesh, hit: &FaceHit) -> bool {
     let corners = mesh.corners(hit.face);
-    (0..3).filter(|&i| hit.barycentric[i] <= 0.0).any(|i| {
-        let [a, b] = [corners[(i + 1) % 3], corners[(i + 2) % 3]];
-        mesh.faces_at_edge(a, b).count() < 2
-    })
+    let is_rim = |a: VertexId, b: VertexId| mesh.faces_at_edge(a, b).count() < 2;
+    let on: Vec<VertexId> = (0..3).filter(|&i| hit.barycentric[i] > 0.0).map(|i| corners[i]).collect();
+    match on[..] {
+        [vertex] => {
+            let around = mesh.star(vertex).iter().flat_map(|&face| mesh.corners(face));
+            around.into_iter().any(|other| other != vertex && is_rim(vertex, other))
+        }
+        [a, b] => is_rim(a, b),
+        _ => false,
+    }
 }
 
 fn vertex_normals(mesh: &TriMesh) -> (Vec<nalgebra::Vector3<f64>>, Vec<f64>) {

@@ -82,13 +82,14 @@ pub(super) fn sharp_vertices(mesh: &TriMesh, is_seen: &[bool]) -> Vec<bool> {
     is_sharp
 }
 
-/// Touched places that a scanner of this resolution sees well, by slot.
-pub(super) fn open_places(
+/// Touched places that are wide enough for a scanner of this resolution, and those of them that have no edge near, so that
+/// it sees them well; by slot.
+pub(super) fn wide_and_open(
     scan: &TriMesh,
     refined: &RefinedShape<'_>,
     is_seen: &[bool],
     normals: &[Vector3<f64>],
-) -> Vec<bool> {
+) -> [Vec<bool>; 2] {
     let mesh = refined.shape.mesh;
     let edge = median_edge(scan);
     let (reach, radius) = (rounded(edge), NARROW * edge / 2.0);
@@ -98,12 +99,12 @@ pub(super) fn open_places(
         let middle = p + normal * radius;
         refined.shape.tree.closest(mesh, &middle, FITS * radius).is_none()
     };
-    (0..mesh.vertex_slots())
-        .map(|at| {
-            let p = mesh.position(VertexId(at as u32));
-            is_seen[at] && sharp.near(&p, reach).next().is_none() && fits(&p, &normals[at])
-        })
-        .collect()
+    let place = |at: usize| mesh.position(VertexId(at as u32));
+    let is_wide = |at: usize| is_seen[at] && fits(&place(at), &normals[at]);
+    let wide: Vec<bool> = (0..mesh.vertex_slots()).map(is_wide).collect();
+    let is_open = |at: usize| wide[at] && sharp.near(&place(at), reach).next().is_none();
+    let open = (0..mesh.vertex_slots()).map(is_open).collect();
+    [wide, open]
 }
 
 impl Scanner {
@@ -125,6 +126,11 @@ impl Scanner {
     /// Whether a disagreement is within so many standard deviations.
     pub(super) fn is_noise(&self, off: f64, sigmas: f64) -> bool {
         (off - self.offset).abs() <= sigmas * self.noise
+    }
+
+    /// Whether rounding an edge and noise may explain a disagreement.
+    pub(super) fn may_round(&self, off: f64, sigmas: f64) -> bool {
+        (off - self.offset).abs() <= self.edge + sigmas * self.noise
     }
 
     /// Standard deviation of the mean over an area (m²), m.
