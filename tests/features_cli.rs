@@ -141,8 +141,14 @@ fn json_has_the_documented_fields() {
     let file: Value = serde_json::from_str(stdout).unwrap();
     let features = file["features"].as_array().unwrap();
     let count = |kind: &str| features.iter().filter(|feature| feature["kind"] == kind).count();
-    // a block with a step is a prism over a hexagon: 18 edges, 12 corners
-    assert_eq!(["hole", "pocket", "boss", "edge", "corner"].map(count), [2, 0, 1, 18, 12]);
+    // a block with a step is a prism over a hexagon: 18 edges, 12 corners; the slot lies between y = 10 and 18 mm
+    assert_eq!(["hole", "pocket", "boss", "corner"].map(count), [2, 0, 1, 12]);
+    let is_of_slot = |feature: &&Value| {
+        let at = |i: usize| feature["center_mm"][i].as_f64().unwrap();
+        (14.0..36.0).contains(&at(0)) && (10.0..18.0).contains(&at(1))
+    };
+    let edges: Vec<_> = features.iter().filter(|feature| feature["kind"] == "edge").collect();
+    assert_eq!(edges.iter().filter(|edge| !is_of_slot(edge)).count(), 18);
     for (at, feature) in features.iter().enumerate() {
         assert_eq!(feature["id"], at);
         assert!(feature["fitted_to"] == "mesh" && feature["touched"] == 0.0, "{feature}");
