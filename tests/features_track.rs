@@ -76,5 +76,9 @@ fn nothing_new_changes_nothing() {
     assert!(tracker.update(&touches).is_empty());
     assert_eq!(tracker.features(), first);
     assert!(tracker.update(&touches[..100]).is_empty(), "a stroke was undone");
+    // numbers of touches mean others now, and some are beyond the last
+    let others: Vec<ProbedPoint> = touches.iter().step_by(2).copied().collect();
+    assert!(tracker.update(&others).is_empty());
+    assert_eq!(tracker.features(), first);
     assert_eq!(tracker.renew(&mesh, &tree, &touches), first, "the same, by the same numbers");
 }

@@ -5,9 +5,10 @@
 use nalgebra::{Point3, Vector2, Vector3};
 
 use super::facets::NONE;
+use super::grow::belongs;
 use super::primitive::{Primitive, Side, refined, square_to};
 use super::scene::Parted;
-use super::segment::{Segment, belongs};
+use super::segment::Segment;
 use super::walls::{Wall, median};
 
 /// Directions in which the ring beyond an end is looked at.

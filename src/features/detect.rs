@@ -129,9 +129,7 @@ impl Place {
         });
         met.unwrap_or_else(|| Self { point: *point, std: None, touches: Vec::new() })
     }
-}
 
-impl Place {
     /// Beside numbers that were touched, how well the mesh is known is not: nobody felt whether it is true.
     fn known_as(self, to: FittedTo) -> Self {
         let is_known = to == FittedTo::Mesh || !self.touches.is_empty();
@@ -146,7 +144,7 @@ fn on_axis(fitted: &Fitted<Cylinder>, near: &Point3<f64>) -> Point3<f64> {
 }
 
 /// Root mean square distance across the axis by which a place on it may be off, m.
-fn lateral_std(fit: &Fit<Cylinder>, at: &Point3<f64>) -> Option<f64> {
+pub(super) fn lateral_std(fit: &Fit<Cylinder>, at: &Point3<f64>) -> Option<f64> {
     let height = fit.surface.pose_of.inverse_transform_point(at).z;
     fit.center_covariance(height).map(|covariance| covariance.trace().max(0.0).sqrt())
 }
@@ -219,6 +217,12 @@ fn boss_feature(measure: &Measure, walls: &[Wall], boss: &Boss) -> Feature {
     }
 }
 
+/// By how much the middle of a slot may be off, m: across it, and along it where its ends tell that.
+pub(super) fn middle_std(fit: &Fit<Stadium>) -> Option<f64> {
+    let across = fit.std(Freedom::Y)?;
+    Some(fit.std(Freedom::X).map_or(across, |along| across.hypot(along)))
+}
+
 fn slot_feature(measure: &Measure, slot: &Slot, kind: Kind) -> Feature {
     let is_round =
         |&number: &usize| matches!(measure.observed.parted.segment(number).primitive, Primitive::Cylinder { .. });
@@ -234,11 +238,9 @@ fn slot_feature(measure: &Measure, slot: &Slot, kind: Kind) -> Feature {
     let near = start + direction * along + axis.value * (slot.centre - start).dot(&axis.value);
     let opening = Place::on(measure, Some(slot.land), &near, &axis.value);
     let floor = Place::on(measure, slot.floor, &(near - axis.value * slot.depth), &axis.value).known_as(fitted.to);
-    let across = fitted.fit.as_ref().and_then(|fit| fit.std(Freedom::Y));
-    let along = fitted.fit.as_ref().and_then(|fit| fit.std(Freedom::X));
     let centre = Measured {
         value: opening.point,
-        std: across.map(|across| along.map_or(across, |along| across.hypot(along))),
+        std: fitted.fit.as_ref().and_then(middle_std),
         touches: together([&fitted.touches, &opening.touches]),
     };
     let length = if is_fixed(Freedom::Second) { length } else { slot.length };

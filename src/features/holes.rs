@@ -44,6 +44,8 @@ pub(super) struct Boss {
 
 /// A wall around a hole covers at least this share of a turn: with a keyway or a slit it is a hole still.
 const HOLE_COVERAGE: f64 = 0.6;
+/// That of a boss.
+const BOSS_COVERAGE: f64 = 0.75;
 /// Faces cover at least this share of what a wall is between its ends.
 const FILLED: f64 = 0.4;
 /// A wall is the rest of another when it is so much smaller …
@@ -52,8 +54,6 @@ const SMALLER: f64 = 0.5;
 const REST: f64 = 0.3;
 /// … and its axis is off by more than 6°, or its radius by nothing.
 const STRAIGHT: f64 = 0.9945;
-/// That of a boss.
-const BOSS_COVERAGE: f64 = 0.75;
 /// Least height of a wall, in radii: a rim rounded by noise is lower.
 const LEAST_HEIGHT: f64 = 0.08;
 /// So much of the radius around the axis is free in a hole.

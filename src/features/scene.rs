@@ -5,8 +5,9 @@ use nalgebra::{Point3, Vector3};
 use super::bodies::{Bodies, Surroundings};
 use super::borders::{borders, without_seams};
 use super::facets::Facets;
+use super::grow::median_edge;
 use super::primitive::{Primitive, square_to};
-use super::segment::{Segment, Segmentation, median_edge};
+use super::segment::{Segment, Segmentation};
 use crate::mesh::{FaceTree, TriMesh};
 
 /// A parted mesh.

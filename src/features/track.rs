@@ -5,7 +5,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::detect::{Detection, detect};
+use super::detect::{Detection, detect, lateral_std, middle_std};
 use super::feature::{Feature, FittedTo, Kind, Measured, Surface};
 use super::fit::{self, Cylinder, Fit, FitParams, Freedom, Stadium, fit};
 use super::observe::{groups, observation};
@@ -19,6 +19,8 @@ pub struct Tracker {
     next_id: u32,
     /// touches that were looked at
     seen: usize,
+    /// stamp of the last of them, ns
+    until_ns: Option<i64>,
 }
 
 /// Features are the same when their places are nearer than this share of their size …
@@ -55,8 +57,13 @@ impl Tracker {
         }
         features.sort_by_key(|feature| feature.id);
         self.features = features;
-        self.seen = touches.len();
+        self.note(touches);
         &self.features
+    }
+
+    fn note(&mut self, touches: &[ProbedPoint]) {
+        self.seen = touches.len();
+        self.until_ns = touches.last().map(|last| last.stamp_ns);
     }
 
     fn fresh_id(&mut self) -> u32 {
@@ -67,10 +74,15 @@ impl Tracker {
     /// Takes the touches that came since into the holes, bosses, slots and pockets that they are on; returns the ids of
     /// those.
     ///
-    /// - `touches`: all of them, as for [`Self::renew`]; fewer than before, as after an undone stroke, change nothing here.
+    /// - `touches`: all of them, as for [`Self::renew`]. When some that were there are gone, as after an undone stroke,
+    ///   nothing changes until the whole mesh is looked at again: features name touches by number.
     pub fn update(&mut self, touches: &[ProbedPoint]) -> Vec<u32> {
-        let news = self.seen.min(touches.len())..touches.len();
-        self.seen = touches.len();
+        let last = self.seen.checked_sub(1).map(|last| touches.get(last).map(|touch| touch.stamp_ns));
+        if last.unwrap_or_default() != self.until_ns {
+            return Vec::new();
+        }
+        let news = self.seen..touches.len();
+        self.note(touches);
         let mut changed = Vec::new();
         for feature in &mut self.features {
             let is_on = |&number: &usize| is_on(feature, &touches[number]);
@@ -170,9 +182,7 @@ impl Feature {
         let start = found.surface.center();
         let axis = self.turned(found.surface.pose_of.rotation * Vector3::z());
         let centre = start + axis * (self.centre.value - start).dot(&axis);
-        let height = found.surface.pose_of.inverse_transform_point(&centre).z;
-        let std = found.center_covariance(height).map(|covariance| covariance.trace().max(0.0).sqrt());
-        self.centre = Measured { value: centre, std, touches: touches.clone() };
+        self.centre = Measured { value: centre, std: lateral_std(found, &centre), touches: touches.clone() };
         self.axis = Some(Measured { value: axis, std: found.axis_std(), touches: touches.clone() });
         let diameter = found.diameter();
         let value = 2.0 * found.surface.radius;
@@ -191,11 +201,12 @@ impl Feature {
             self.length = Some(estimate(found.surface.length, Freedom::Second));
         }
         let start = found.surface.center();
-        let along = if found.std(Freedom::X).is_some() { 0.0 } else { 1.0 };
         let direction = found.surface.direction();
         let off = self.centre.value - start;
-        let value = start + axis * off.dot(&axis) + direction * (along * off.dot(&direction));
-        self.centre = Measured { value, std: found.std(Freedom::Y), touches: touches.clone() };
+        // along the slot only what ends it tells where it is
+        let along = if found.std(Freedom::X).is_some() { 0.0 } else { off.dot(&direction) };
+        let value = start + axis * off.dot(&axis) + direction * along;
+        self.centre = Measured { value, std: middle_std(found), touches: touches.clone() };
         self.axis = Some(Measured { value: axis, std: found.axis_std(), touches: touches.clone() });
         self.surface = Surface::Slot(found.surface.clone());
     }

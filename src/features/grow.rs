@@ -1,0 +1,510 @@
+//! Parts a mesh into planes and cylinders; cones are found beside holes, once those are known.
+//!
+//! From the flattest faces on, each free face is the seed of a region: a plane or a cylinder is fitted to the faces around
+//! it and grows over neighbours whose corners lie on it and which face as it does. Where a plane ends without an edge it may
+//! be a strip of something round: then whatever explains more of the surface is taken.
+
+use nalgebra::{Point3, Vector3};
+
+use super::facets::{Facets, NONE};
+use super::primitive::{Bend, Moments, Primitive, cylinder_of, refined};
+use super::segment::{Segment, Segmentation};
+
+/// Lengths that come with the mesh.
+#[derive(Clone, Copy, Debug)]
+struct Scale {
+    /// m
+    diagonal: f64,
+    /// median, m
+    edge: f64,
+}
+
+/// Rounding of coordinates that were stored in single precision, in diagonals.
+const ROUNDING: f64 = 1e-6;
+/// Waves of a surface that is good otherwise, in median edges.
+const WAVES: f64 = 0.05;
+/// The same, at most, in diagonals of the mesh.
+const WAVES_OF_ALL: f64 = 3e-4;
+/// From one tolerance to the next.
+const WIDER: f64 = 3.0;
+/// How often.
+const RUNGS: i32 = 3;
+/// A mesh is exact when this share of its faces lies in one plane with a neighbour …
+const EXACT_SHARE: f64 = 0.2;
+/// … within this, 1 − cos: 0.01°, what single precision makes of small faces.
+const COPLANAR: f64 = 1.5e-8;
+/// A corner is off by at most so many root mean squares of the faces around the seed.
+const SPREAD: f64 = 4.0;
+/// Largest tolerance of a round surface, in its radii.
+const SHARPNESS: f64 = 0.08;
+/// So many faces tell a plane while it grows.
+const MOST_OF_PLANE: usize = 20_000;
+/// A primitive has settled when it moves by less than this share of the tolerance …
+const SETTLED: f64 = 0.1;
+/// … at so many faces.
+const SAMPLE: usize = 64;
+/// A region is at least so many tolerances wide.
+const LEAST_WIDTH: f64 = 12.0;
+/// Across a sharper edge than this no region grows, and a normal may be off by no more: half of a polygon of 9 sides. 40°.
+const SMOOTH: f64 = 0.766;
+/// A face's normal may be off that of the primitive by this much: 25°.
+const ALIKE: f64 = 0.906;
+/// A segment of which stronger ones leave less than this is none.
+const LEAST_LEFT: f64 = 0.3;
+/// Faces around a seed, to begin with.
+const NEAR: usize = 16;
+/// Root mean square of the normals' sines around a flat seed: 5°.
+const FLAT: f64 = 0.09;
+/// A flat piece that goes on in round ones is so many times larger than their facets.
+const FLAT_AMONG_ROUND: f64 = 20.0;
+/// The same around the seed of a cylinder, at least: 5° is what 17° of its turn have.
+const BENT: f64 = 0.09;
+/// A region is a plane without asking further when less than this share of its border goes on smoothly.
+const BOUNDED: f64 = 0.2;
+/// A curved surface must explain so much more than the plane in its place.
+const MORE: f64 = 1.3;
+/// Faces around the seed of a curved surface, in turn.
+const CURVED_NEAR: [usize; 3] = [12, 32, 90];
+/// Beyond a plane it is looked at so many faces …
+const MOST_NEAR: usize = 50_000;
+/// … and so many of them are fitted.
+const MOST_FITTED: usize = 300;
+
+impl Segmentation {
+    /// Parts `mesh`.
+    pub(super) fn of(facets: &Facets) -> Self {
+        let mut growing = Growing::of(facets);
+        let mut seeds = growing.seeds();
+        for (closeness, tolerance) in growing.scale.tolerances(facets) {
+            (growing.closeness, growing.tolerance) = (closeness, tolerance);
+            seeds.retain(|&face| growing.is_free(face) && facets.area(face) > 0.0);
+            for &face in &seeds {
+                if growing.is_free(face) && growing.needs[face as usize] <= closeness {
+                    growing.grow_from(face);
+                }
+            }
+        }
+        growing.finish()
+    }
+}
+
+struct Growing<'a> {
+    facets: &'a Facets<'a>,
+    scale: Scale,
+    of_face: Vec<u32>,
+    segments: Vec<Segment>,
+    /// the round in which a face was last looked at
+    seen: Vec<u32>,
+    round: u32,
+    /// what a region from here would need, as far as that is known, m
+    needs: Vec<f64>,
+    /// how near the faces around a seed have to be in this round, m
+    closeness: f64,
+    /// how near the others, m
+    tolerance: f64,
+}
+
+/// A region before it is accepted.
+struct Region {
+    primitive: Primitive,
+    faces: Vec<u32>,
+    area: f64,
+    tolerance: f64,
+}
+
+impl<'a> Growing<'a> {
+    fn of(facets: &'a Facets<'a>) -> Self {
+        let slots = facets.facets.len();
+        Self {
+            facets,
+            scale: Scale::of(facets),
+            of_face: vec![Segmentation::NONE; slots],
+            segments: Vec::new(),
+            seen: vec![0; slots],
+            round: 0,
+            needs: vec![0.0; slots],
+            closeness: 0.0,
+            tolerance: 0.0,
+        }
+    }
+
+    /// Faces by how flat their surroundings are, in order of id where they are alike.
+    fn seeds(&self) -> Vec<u32> {
+        let mut buckets: [Vec<u32>; 16] = Default::default();
+        for (face, facet) in self.facets.facets.iter().enumerate() {
+            let turn = |&other: &u32| 1.0 - facet.normal.dot(&self.facets.normal(other));
+            let sharpest = facet.beside.iter().filter(|&&other| other != NONE).map(turn);
+            let sharpest = sharpest.fold(0.0, f64::max);
+            // 1 − cos: a bucket for each power of two above a thousandth of a degree
+            let at = ((sharpest / 1.5e-10).max(1.0).log2() / 2.0) as usize;
+            buckets[at.min(15)].push(face as u32);
+        }
+        buckets.concat()
+    }
+
+    /// Free faces around `seed` that are reached over smooth edges, the nearest first.
+    fn near(&mut self, seed: u32, most: usize) -> Vec<u32> {
+        self.round += 1;
+        let mut found = vec![seed];
+        self.seen[seed as usize] = self.round;
+        let mut at = 0;
+        while at < found.len() && found.len() < most {
+            let face = found[at];
+            at += 1;
+            for (_, other) in self.facets.beside(face) {
+                let is_new = self.seen[other as usize] != self.round && self.is_free(other);
+                if is_new && self.facets.normal(face).dot(&self.facets.normal(other)) > SMOOTH {
+                    self.seen[other as usize] = self.round;
+                    found.push(other);
+                }
+            }
+        }
+        found
+    }
+
+    fn is_free(&self, face: u32) -> bool {
+        self.of_face[face as usize] == Segmentation::NONE
+    }
+
+    fn grow_from(&mut self, seed: u32) {
+        let near = self.near(seed, NEAR);
+        let Some(bend) = Bend::of(self.facets, &near) else { return };
+        let mut needs = f64::INFINITY;
+        let mut best = None;
+        if bend.spread < FLAT {
+            best = self.plane_from(seed, &near, &mut needs);
+        }
+        if best.is_none() && self.is_exact() {
+            best = self.flat_from(seed);
+        }
+        let is_bounded = best.as_ref().is_some_and(|plane| self.smooth_share(plane) < BOUNDED);
+        if !is_bounded {
+            let enough = best.as_ref().map_or(0.0, |plane| MORE * plane.area);
+            let faces = best.as_ref().map_or(0, |plane| plane.faces.len());
+            let is_more = |curved: &Region| curved.area > enough;
+            let mut curved = self.cylinder_from(seed, faces, &mut needs).filter(is_more);
+            if curved.is_none() && faces > 0 && self.is_exact() {
+                // facets of a drawing that were divided further lie off the circle
+                let exact = (self.closeness, self.tolerance);
+                (self.closeness, self.tolerance) = self.scale.divided();
+                curved = self.cylinder_from(seed, faces, &mut needs).filter(is_more);
+                (self.closeness, self.tolerance) = exact;
+            }
+            best = curved.or(best);
+        }
+        match best.filter(|best| best.area > (LEAST_WIDTH * self.tolerance).powi(2)) {
+            Some(region) => self.accept(region),
+            // what was tried in vain is tried again with more tolerance
+            None => {
+                let needs = needs.max(self.closeness * (1.0 + f64::EPSILON));
+                near.iter().for_each(|&face| self.needs[face as usize] = needs);
+            }
+        }
+    }
+
+    fn accept(&mut self, region: Region) {
+        let Region { primitive, mut faces, area, tolerance } = region;
+        faces.sort_unstable();
+        for &face in &faces {
+            self.of_face[face as usize] = self.segments.len() as u32;
+        }
+        let is_exact = tolerance <= self.scale.exact();
+        self.segments.push(Segment { primitive, faces, area, tolerance, is_exact });
+    }
+
+    fn plane_from(&mut self, seed: u32, near: &[u32], needs: &mut f64) -> Option<Region> {
+        let mut moments = Moments::about(self.facets.triangle(seed)[0]);
+        near.iter().for_each(|&face| moments.add(self.facets, face));
+        let start = moments.plane()?;
+        self.is_close(&start, near, needs).then_some(())?;
+        self.grown(seed, start, near.len())
+    }
+
+    /// Whether only what a drawing has is taken in this round.
+    fn is_exact(&self) -> bool {
+        self.tolerance <= self.scale.exact()
+    }
+
+    /// The flat piece around a seed of a drawing, where it goes on in round ones, of facets much smaller than it is.
+    fn flat_from(&mut self, seed: u32) -> Option<Region> {
+        let facets = self.facets;
+        self.round += 1;
+        self.seen[seed as usize] = self.round;
+        let (mut flat, mut area, mut largest) = (vec![seed], 0.0, 0.0f64);
+        let mut at = 0;
+        while at < flat.len() {
+            area += facets.area(flat[at]);
+            for (_, other) in facets.beside(flat[at]) {
+                let cosine = facets.normal(seed).dot(&facets.normal(other));
+                if cosine > SMOOTH && 1.0 - cosine > COPLANAR {
+                    largest = largest.max(facets.area(other));
+                } else if cosine > SMOOTH && self.seen[other as usize] != self.round {
+                    self.seen[other as usize] = self.round;
+                    flat.push(other);
+                }
+            }
+            at += 1;
+        }
+        let mut moments = Moments::about(facets.triangle(seed)[0]);
+        moments.add(facets, seed);
+        if area > FLAT_AMONG_ROUND * largest { self.grown(seed, moments.plane()?, flat.len()) } else { None }
+    }
+
+    /// The largest cylinder through the faces around a seed.
+    ///
+    /// - `plane`: number of faces of the plane that was found there.
+    fn cylinder_from(&mut self, seed: u32, plane: usize, needs: &mut f64) -> Option<Region> {
+        let mut best: Option<Region> = None;
+        let mut before = 0;
+        for most in CURVED_NEAR.into_iter().chain([(3 * plane + 24).min(MOST_NEAR)]) {
+            let mut near = self.near(seed, most);
+            if near.len() <= before {
+                continue;
+            }
+            before = near.len();
+            let step = before.div_ceil(MOST_FITTED);
+            if step > 1 {
+                near = near.into_iter().step_by(step).collect();
+            }
+            let bend = Bend::of(self.facets, &near).filter(|bend| bend.spread > BENT);
+            let Some(axis) = bend.and_then(|bend| bend.cylinder_axis()) else { continue };
+            let start = cylinder_of(self.facets, &near, &axis);
+            let Some(start) = start.and_then(|start| refined(&start, self.facets, &near)) else { continue };
+            if !self.is_close(&start, &near, needs) {
+                continue;
+            }
+            let Some(region) = self.grown(seed, start, before) else { continue };
+            // any facet lies on some cylinder
+            if Bend::of(self.facets, &region.faces).is_none_or(|bend| bend.spread < BENT) {
+                continue;
+            }
+            if best.as_ref().is_none_or(|best| region.area > best.area) {
+                best = Some(region);
+            }
+        }
+        best
+    }
+
+    /// Whether corners of `near` are as near as the tolerance wants them; else tells what they need.
+    fn is_close(&self, primitive: &Primitive, near: &[u32], needs: &mut f64) -> bool {
+        let squares = near.iter().flat_map(|&face| self.facets.triangle(face)).map(|p| primitive.distance(&p).powi(2));
+        let needed = SPREAD * (squares.sum::<f64>() / (3 * near.len()) as f64).sqrt();
+        *needs = needs.min(needed);
+        needed <= self.closeness
+    }
+
+    /// The region around `seed` that a primitive explains, and the primitive through all of it.
+    ///
+    /// - `near`: from how many faces around the primitive comes.
+    fn grown(&mut self, seed: u32, start: Primitive, near: usize) -> Option<Region> {
+        let mut primitive = start;
+        let mut faces = Vec::new();
+        for _ in 0..2 {
+            if !self.belongs(seed, &primitive) {
+                return None;
+            }
+            faces = self.flood(vec![seed], &mut primitive, near);
+            let used = primitive;
+            primitive = self.fitted(&used, &faces)?;
+            if matches!(used, Primitive::Plane { .. }) && self.is_settled(&used, &primitive, &faces) {
+                break;
+            }
+        }
+        if matches!(primitive, Primitive::Cylinder { radius, .. } if self.closeness > SHARPNESS * radius) {
+            return None;
+        }
+        let area = faces.iter().map(|&face| self.facets.area(face)).sum();
+        Some(Region { primitive, faces, area, tolerance: self.tolerance })
+    }
+
+    /// Goes from the faces of `found` over all that belong to the primitive, which follows them each time their number has
+    /// doubled.
+    ///
+    /// - `fitted`: how many faces tell the primitive already; fewer of them may be flat by themselves.
+    fn flood(&mut self, mut found: Vec<u32>, primitive: &mut Primitive, fitted: usize) -> Vec<u32> {
+        self.round += 1;
+        found.iter().for_each(|&face| self.seen[face as usize] = self.round);
+        let (mut at, mut refit_at) = (0, 2 * found.len().max(fitted));
+        while at < found.len() {
+            let face = found[at];
+            at += 1;
+            for (_, other) in self.facets.beside(face) {
+                if self.seen[other as usize] == self.round || !self.is_free(other) {
+                    continue;
+                }
+                self.seen[other as usize] = self.round;
+                if self.belongs(other, primitive) {
+                    found.push(other);
+                }
+            }
+            if found.len() >= refit_at {
+                refit_at *= 2;
+                if let Some(better) = self.fitted(primitive, &found) {
+                    *primitive = better;
+                }
+            }
+        }
+        found
+    }
+
+    /// Whether two primitives are the same on a sample of faces, as far as the tolerance goes.
+    fn is_settled(&self, one: &Primitive, other: &Primitive, faces: &[u32]) -> bool {
+        faces.iter().step_by(faces.len().div_ceil(SAMPLE)).all(|&face| {
+            let p = self.facets.triangle(face)[0];
+            (one.distance(&p) - other.distance(&p)).abs() < SETTLED * self.tolerance
+        })
+    }
+
+    fn belongs(&self, face: u32, primitive: &Primitive) -> bool {
+        belongs(self.facets, face, primitive, self.tolerance)
+    }
+
+    fn fitted(&self, primitive: &Primitive, faces: &[u32]) -> Option<Primitive> {
+        if let Primitive::Plane { point, .. } = primitive {
+            let mut moments = Moments::about(*point);
+            let step = faces.len().div_ceil(MOST_OF_PLANE);
+            faces.iter().step_by(step).for_each(|&face| moments.add(self.facets, face));
+            return moments.plane();
+        }
+        refined(primitive, self.facets, faces)
+    }
+
+    /// How much of a region's border goes on without an edge.
+    fn smooth_share(&self, region: &Region) -> f64 {
+        let mut inside = region.faces.clone();
+        inside.sort_unstable();
+        let (mut smooth, mut all) = (0.0, f64::MIN_POSITIVE);
+        for &face in &region.faces {
+            for edge in 0..3 {
+                let other = self.facets.facets[face as usize].beside[edge];
+                if other != NONE && inside.binary_search(&other).is_ok() {
+                    continue;
+                }
+                let [a, b] = self.facets.edge(face, edge);
+                let length = (a - b).norm();
+                all += length;
+                let goes_on = |other: u32| self.facets.normal(face).dot(&self.facets.normal(other)) > SMOOTH;
+                if other != NONE && goes_on(other) {
+                    smooth += length;
+                }
+            }
+        }
+        smooth / all
+    }
+
+    /// Parts the mesh once more: tight and large segments take what they explain of loose and small ones.
+    fn claim(&mut self) {
+        let mut order = std::mem::take(&mut self.segments);
+        order.sort_by(|a, b| a.tolerance.total_cmp(&b.tolerance).then(b.area.total_cmp(&a.area)));
+        self.of_face.fill(Segmentation::NONE);
+        for segment in order {
+            self.tolerance = segment.tolerance;
+            let mut left: Vec<u32> = segment.faces.iter().copied().filter(|&face| self.is_free(face)).collect();
+            if left.is_empty() {
+                continue;
+            }
+            let mut primitive = segment.primitive;
+            if left.len() < segment.faces.len() {
+                match self.fitted(&primitive, &left) {
+                    Some(fitted) => primitive = fitted,
+                    None => continue,
+                }
+            }
+            left.retain(|&face| self.belongs(face, &primitive));
+            let fitted = left.len();
+            let faces = self.flood(left, &mut primitive, fitted);
+            let area: f64 = faces.iter().map(|&face| self.facets.area(face)).sum();
+            if area < LEAST_LEFT * segment.area || area < (LEAST_WIDTH * self.tolerance).powi(2) {
+                continue;
+            }
+            let primitive = self.fitted(&primitive, &faces).unwrap_or(primitive);
+            self.accept(Region { primitive, faces, area, tolerance: segment.tolerance });
+        }
+    }
+
+    fn finish(mut self) -> Segmentation {
+        self.claim();
+        let Self { mut segments, mut of_face, .. } = self;
+        segments.sort_by(|a, b| b.area.total_cmp(&a.area));
+        for (number, segment) in segments.iter().enumerate() {
+            segment.faces.iter().for_each(|&face| of_face[face as usize] = number as u32);
+        }
+        Segmentation { segments, of_face }
+    }
+}
+
+/// Whether a face lies on the primitive within `tolerance` (m) and faces as it does.
+pub(super) fn belongs(facets: &Facets, face: u32, primitive: &Primitive, tolerance: f64) -> bool {
+    let corners = facets.triangle(face);
+    if corners.iter().any(|p| primitive.distance(p).abs() > tolerance) {
+        return false;
+    }
+    let middle = Point3::from((corners[0].coords + corners[1].coords + corners[2].coords) / 3.0);
+    if facets.normal(face).dot(&primitive.normal_at(&middle)) > ALIKE {
+        return true;
+    }
+    // the normal of a sliver says nothing
+    let longest = (0..3).map(|i| (corners[i] - corners[(i + 1) % 3]).norm()).fold(0.0, f64::max);
+    2.0 * facets.area(face) < tolerance * longest
+}
+
+impl Scale {
+    fn of(facets: &Facets) -> Self {
+        let [lo, hi] = facets.mesh.bounds();
+        Self { diagonal: (hi - lo).norm(), edge: median_edge(facets) }
+    }
+
+    /// How near the faces around a seed have to be, and how near the rest. Tight ones first: what they explain is not left
+    /// to loose ones.
+    fn tolerances(&self, facets: &Facets) -> Vec<(f64, f64)> {
+        let (exact, (closeness, tolerance)) = (self.exact(), self.waves());
+        let wider = |rung| f64::powi(WIDER, rung);
+        let loose = (0..RUNGS).map(|rung| (closeness * wider(rung), tolerance * wider(rung)));
+        is_exact(facets).then_some((exact, exact)).into_iter().chain(loose).collect()
+    }
+
+    /// What a drawing needs, m.
+    fn exact(&self) -> f64 {
+        ROUNDING * self.diagonal
+    }
+
+    /// What the facets of a drawing need that were divided further.
+    fn divided(&self) -> (f64, f64) {
+        let closeness = WAVES_OF_ALL * self.diagonal;
+        (closeness, WIDER * closeness)
+    }
+
+    /// What surfaces that are good but no drawing need.
+    fn waves(&self) -> (f64, f64) {
+        let closeness = (WAVES * self.edge).min(WAVES_OF_ALL * self.diagonal).max(self.exact());
+        (closeness, WIDER * closeness)
+    }
+}
+
+/// Whether neighbours lie in one plane as they do in a drawing, and in no measurement.
+fn is_exact(facets: &Facets) -> bool {
+    let (mut coplanar, mut all) = (0, 0);
+    for (face, facet) in facets.facets.iter().enumerate().filter(|(_, facet)| facet.area > 0.0) {
+        let is_coplanar = |other: u32| 1.0 - facet.normal.dot(&facets.normal(other)) < COPLANAR;
+        all += 1;
+        coplanar += usize::from(facets.beside(face as u32).any(|(_, other)| is_coplanar(other)));
+    }
+    coplanar as f64 > EXACT_SHARE * all as f64
+}
+
+/// Median over a sample of the first edges of faces, m.
+pub(super) fn median_edge(facets: &Facets) -> f64 {
+    let count = facets.facets.len();
+    let step = (count / 10_000).max(1);
+    let mut lengths: Vec<f64> = (0..count)
+        .step_by(step)
+        .filter(|&face| facets.facets[face].area > 0.0)
+        .map(|face| facets.edge(face as u32, 0))
+        .map(|[a, b]: [Point3<f64>; 2]| -> f64 {
+            let v: Vector3<f64> = b - a;
+            v.norm()
+        })
+        .collect();
+    let middle = lengths.len() / 2;
+    if lengths.is_empty() { 0.0 } else { *lengths.select_nth_unstable_by(middle, f64::total_cmp).1 }
+}
