@@ -9,6 +9,8 @@ mod command;
 mod common;
 #[path = "features/controls.rs"]
 mod controls;
+#[path = "features/drawn_plate.rs"]
+mod drawn_plate;
 #[path = "features/expected.rs"]
 mod expected;
 #[path = "features/laws.rs"]

@@ -192,6 +192,6 @@ fn what_was_touched_is_found_and_as_good_as_it_says() {
     let all = rms(table.rows.iter().flat_map(Row::normalised));
     println!("all: {all:.2}; wrongly through or blind: {} of {} holes", table.wrongly_through, 2 * seeds());
     assert!((0.5..=2.0).contains(&all), "rms of error over uncertainty {all}");
-    // where no floor was felt the mesh guesses, wrongly for 13 of 100 holes
-    assert!(table.wrongly_through as f64 <= 0.3 * 2.0 * seeds() as f64, "{}", table.wrongly_through);
+    // where no floor was felt it is not known
+    assert_eq!(table.wrongly_through, 0);
 }

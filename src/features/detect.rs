@@ -156,6 +156,8 @@ fn hole_feature(measure: &Measure, walls: &[Wall], hole: &Hole) -> Feature {
     let opening = Place::on(measure, hole.rim, &on_axis(&fitted, &hole.opening), &axis.value);
     let bottom = on_axis(&fitted, &(hole.opening - hole.out * hole.depth));
     let floor = Place::on(measure, hole.floor, &bottom, &axis.value).known_as(fitted.to);
+    // beside a wall that was touched, a floor that was not may be a guess
+    let is_told = hole.floor.is_none() || fitted.to == FittedTo::Mesh || !floor.touches.is_empty();
     let std = fitted.fit.as_ref().and_then(|fit| lateral_std(fit, &opening.point));
     let touches = together([&fitted.touches, &opening.touches]);
     let centre = Measured { value: opening.point, std, touches };
@@ -165,7 +167,7 @@ fn hole_feature(measure: &Measure, walls: &[Wall], hole: &Hole) -> Feature {
         diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),
         depth: Some(between(&opening, &floor, &axis.value)),
         axis: Some(axis),
-        through: hole.through,
+        through: hole.through.filter(|_| is_told),
         surface: Surface::Round(fitted.surface.clone()),
         cone_angle: cone.map(|cone| cone.number(2.0 * cone.surface.half_angle.abs(), &[(Freedom::Second, 2.0)])),
         ..Feature::new(Kind::Hole, centre, touched, fitted.to)

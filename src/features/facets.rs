@@ -51,9 +51,25 @@ impl<'a> Facets<'a> {
         self.facets[face as usize].area
     }
 
+    /// m²
+    pub fn area_of(&self, faces: &[u32]) -> f64 {
+        faces.iter().map(|&face| self.area(face)).sum()
+    }
+
     /// The faces beside, each with the number of its edge.
     pub fn beside(&self, face: u32) -> impl Iterator<Item = (usize, u32)> + '_ {
         self.facets[face as usize].beside.iter().copied().enumerate().filter(|&(_, other)| other != NONE)
+    }
+
+    /// Ends of the edges of a face that have no other face at all, m.
+    pub fn open_edges(&self, face: u32) -> impl Iterator<Item = [Point3<f64>; 2]> + '_ {
+        let corners = self.mesh.corners(FaceId(face));
+        let beside = self.facets[face as usize].beside;
+        let is_open = move |&edge: &usize| {
+            let ends = (corners[edge], corners[(edge + 1) % 3]);
+            beside[edge] == NONE && self.mesh.faces_at_edge(ends.0, ends.1).count() == 1
+        };
+        (0..3).filter(is_open).map(move |edge| self.edge(face, edge))
     }
 
     pub fn triangle(&self, face: u32) -> [Point3<f64>; 3] {

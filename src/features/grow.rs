@@ -57,6 +57,8 @@ const NEAR: usize = 16;
 const FLAT: f64 = 0.09;
 /// A flat piece that goes on in round ones is so many times larger than their facets.
 const FLAT_AMONG_ROUND: f64 = 20.0;
+/// … and than the flat pieces of which those may be made.
+const FLAT_BESIDE_FLAT: f64 = 5.0;
 /// The same around the seed of a cylinder, at least: 5° is what 17° of its turn have.
 const BENT: f64 = 0.09;
 /// A region is a plane without asking further when less than this share of its border goes on smoothly.
@@ -82,6 +84,9 @@ impl Segmentation {
                 if growing.is_free(face) && growing.needs[face as usize] <= closeness {
                     growing.grow_from(face);
                 }
+            }
+            if growing.is_exact() {
+                growing.take_flat(&seeds);
             }
         }
         growing.finish()
@@ -192,7 +197,7 @@ impl<'a> Growing<'a> {
             }
             best = curved.or(best);
         }
-        match best.filter(|best| best.area > (LEAST_WIDTH * self.tolerance).powi(2)) {
+        match best.filter(|best| self.is_wide(best)) {
             Some(region) => self.accept(region),
             // what was tried in vain is tried again with more tolerance
             None => {
@@ -227,27 +232,71 @@ impl<'a> Growing<'a> {
 
     /// The flat piece around a seed of a drawing, where it goes on in round ones, of facets much smaller than it is.
     fn flat_from(&mut self, seed: u32) -> Option<Region> {
-        let facets = self.facets;
+        let flat = self.flat_around(seed);
+        self.flat_among_round(seed, &flat)
+    }
+
+    /// The faces that lie in one plane with `seed` and hang together with it.
+    fn flat_around(&mut self, seed: u32) -> Vec<u32> {
+        let normal = self.facets.normal(seed);
         self.round += 1;
         self.seen[seed as usize] = self.round;
-        let (mut flat, mut area, mut largest) = (vec![seed], 0.0, 0.0f64);
-        let mut at = 0;
+        let (mut flat, mut at) = (vec![seed], 0);
         while at < flat.len() {
-            area += facets.area(flat[at]);
-            for (_, other) in facets.beside(flat[at]) {
-                let cosine = facets.normal(seed).dot(&facets.normal(other));
-                if cosine > SMOOTH && 1.0 - cosine > COPLANAR {
-                    largest = largest.max(facets.area(other));
-                } else if cosine > SMOOTH && self.seen[other as usize] != self.round {
+            for (_, other) in self.facets.beside(flat[at]) {
+                let is_flat = 1.0 - normal.dot(&self.facets.normal(other)) <= COPLANAR;
+                if is_flat && self.seen[other as usize] != self.round {
                     self.seen[other as usize] = self.round;
                     flat.push(other);
                 }
             }
             at += 1;
         }
+        flat
+    }
+
+    fn flat_among_round(&mut self, seed: u32, flat: &[u32]) -> Option<Region> {
+        let (facets, area) = (self.facets, self.facets.area_of(flat));
+        let largest = self.round_beside(seed, flat).map(|face| facets.area(face)).fold(0.0, f64::max);
         let mut moments = Moments::about(facets.triangle(seed)[0]);
         moments.add(facets, seed);
         if area > FLAT_AMONG_ROUND * largest { self.grown(seed, moments.plane()?, flat.len()) } else { None }
+    }
+
+    /// The faces in which a flat piece goes on without an edge.
+    fn round_beside(&self, seed: u32, flat: &[u32]) -> impl Iterator<Item = u32> {
+        let (facets, normal) = (self.facets, self.facets.normal(seed));
+        let beside = flat.iter().flat_map(move |&face| facets.beside(face)).map(|(_, other)| other);
+        beside.filter(move |&other| (COPLANAR..1.0 - SMOOTH).contains(&(1.0 - normal.dot(&facets.normal(other)))))
+    }
+
+    /// Takes the flat pieces of a drawing that are left between its round ones: what is beside may have kept a seed from
+    /// being tried.
+    fn take_flat(&mut self, seeds: &[u32]) {
+        let mut is_tried = vec![false; self.of_face.len()];
+        for &seed in seeds {
+            if !self.is_free(seed) || is_tried[seed as usize] {
+                continue;
+            }
+            let flat = self.flat_around(seed);
+            flat.iter().for_each(|&face| is_tried[face as usize] = true);
+            if flat.len() < 2 {
+                continue;
+            }
+            // of something round that was divided further, what is beside is as large
+            let beside: Vec<u32> = self.round_beside(seed, &flat).collect();
+            let area = self.facets.area_of(&flat);
+            if beside.into_iter().any(|face| area < FLAT_BESIDE_FLAT * self.facets.area_of(&self.flat_around(face))) {
+                continue;
+            }
+            if let Some(region) = self.flat_among_round(seed, &flat).filter(|region| self.is_wide(region)) {
+                self.accept(region);
+            }
+        }
+    }
+
+    fn is_wide(&self, region: &Region) -> bool {
+        region.area > (LEAST_WIDTH * self.tolerance).powi(2)
     }
 
     /// The largest cylinder through the faces around a seed.
@@ -313,7 +362,7 @@ impl<'a> Growing<'a> {
         if matches!(primitive, Primitive::Cylinder { radius, .. } if self.closeness > SHARPNESS * radius) {
             return None;
         }
-        let area = faces.iter().map(|&face| self.facets.area(face)).sum();
+        let area = self.facets.area_of(&faces);
         Some(Region { primitive, faces, area, tolerance: self.tolerance })
     }
 
@@ -413,7 +462,7 @@ impl<'a> Growing<'a> {
             left.retain(|&face| self.belongs(face, &primitive));
             let fitted = left.len();
             let faces = self.flood(left, &mut primitive, fitted);
-            let area: f64 = faces.iter().map(|&face| self.facets.area(face)).sum();
+            let area = self.facets.area_of(&faces);
             if area < LEAST_LEFT * segment.area || area < (LEAST_WIDTH * self.tolerance).powi(2) {
                 continue;
             }

@@ -5,6 +5,7 @@ use nalgebra::{Point3, Vector3};
 use super::primitive::{Primitive, Side, square_to};
 use super::scene::{Parted, along_to_plane};
 use super::walls::Wall;
+use crate::mesh::{BoxQuery, FaceId};
 
 /// A round hole.
 #[derive(Clone, Debug)]
@@ -17,7 +18,7 @@ pub(super) struct Hole {
     pub out: Vector3<f64>,
     /// m
     pub depth: f64,
-    /// `None`: something closes it, and neither a floor nor the tip of a drill
+    /// `None`: what closes it is neither a floor nor the tip of a drill, or the mesh ends there
     pub through: Option<bool>,
     /// number of the plane around the opening
     pub rim: Option<usize>,
@@ -62,11 +63,13 @@ const FREE: f64 = 0.5;
 const PROBES: usize = 7;
 /// What closes a hole is no farther from the end of its wall than this many radii.
 const CLOSED: f64 = 1.0;
+/// Where no plane is around an end and something is met within this many radii, the wall may go on to there unseen.
+const MAYBE_CLOSED: f64 = 3.0;
 /// Lines that look for what closes a hole are this share of the radius beside its axis.
 const ASIDE: f64 = 0.05;
 /// Rings around an opening, in its radii: the land beside a hole may be narrow.
 const RINGS: [f64; 3] = [1.06, 1.15, 1.3];
-/// Those around a foot: a ball does not reach into its corner.
+/// Those around a foot that was scanned or touched: a ball does not reach into its corner.
 const FOOT_RINGS: [f64; 3] = [1.2, 1.35, 1.5];
 /// A plane around an opening is within this many radii of the end of the wall.
 const NEAR_END: f64 = 0.4;
@@ -74,6 +77,10 @@ const NEAR_END: f64 = 0.4;
 const RIM: f64 = 0.2;
 /// A floor is square to the axis within 20°.
 const SQUARE: f64 = 0.94;
+/// An end is torn by borders of the mesh from so many radii before it to so many behind it, and as far around it.
+const TORN: [f64; 2] = [0.5, 1.5];
+/// Directions in which an end is looked at.
+const AROUND: usize = 24;
 /// Walls of one hole are no farther apart along the axis than this many radii.
 const SAME_HOLE: f64 = 0.5;
 /// Axes of one stepped hole are no farther apart than this share of the radius.
@@ -90,6 +97,8 @@ struct End {
     out: f64,
     /// what closes it, along the axis, m
     closed_at: Option<f64>,
+    /// whether nothing closes it, or may do so farther away
+    is_open: bool,
     /// the plane around it and its share of the ring
     rim: Option<(usize, f64)>,
 }
@@ -158,7 +167,7 @@ fn hole(parted: &Parted, walls: &[Wall], at: usize) -> Option<Hole> {
         out: wall.axis * open.out,
         depth: (top - bottom).abs(),
         through: match other.closed_at {
-            None => Some(true),
+            None => (other.is_open && !is_torn(parted, wall, &other)).then_some(true),
             Some(_) => (floor.is_some() || tip.is_some()).then_some(false),
         },
         rim: rim.map(|(number, _)| number),
@@ -182,20 +191,46 @@ fn end(parted: &Parted, wall: &Wall, which: usize) -> End {
     let (t, out) = (wall.ends[which], if which == 0 { -1.0 } else { 1.0 });
     let radius = wall.radius();
     let middle = wall.middle();
-    let reach = wall.height() / 2.0 + CLOSED * radius;
     let around = parted.around(wall.segments[0]);
+    let rings = RINGS.map(|ring| ring * radius);
+    let rim = parted.plane_around(&around, &wall.at(t), &(wall.axis * out), &rings, NEAR_END * radius);
+    let rim = rim.filter(|&(_, share)| share > RIM);
+    let reach = [CLOSED, MAYBE_CLOSED].map(|radii| wall.height() / 2.0 + radii * radius);
     // beside the axis: on it lie the tips of cones and the edges of floors, which a line may slip through
     let [e, g] = square_to(&wall.axis);
     let mut rays = around.rays(radius);
     let mut met = [0.4f64, 2.5, 4.6].map(|turn| {
         let aside = (e * turn.cos() + g * turn.sin()) * (ASIDE * radius);
-        rays.first(&(wall.at(middle) + aside), &(wall.axis * out), reach).map_or(f64::INFINITY, |met| met.distance)
+        rays.first(&(wall.at(middle) + aside), &(wall.axis * out), reach[1]).map_or(f64::INFINITY, |met| met.distance)
     });
     met.sort_by(f64::total_cmp);
-    let closed_at = met[1].is_finite().then(|| middle + out * met[1]);
-    let rings = RINGS.map(|ring| ring * radius);
-    let rim = parted.plane_around(&around, &wall.at(t), &(wall.axis * out), &rings, NEAR_END * radius);
-    End { t, out, closed_at, rim: rim.filter(|&(_, share)| share > RIM) }
+    let closed_at = (met[1] <= reach[0]).then(|| middle + out * met[1]);
+    let is_open = closed_at.is_none() && (rim.is_some() || met[1].is_infinite());
+    End { t, out, closed_at, is_open, rim }
+}
+
+/// Whether the mesh ends there: what the wall goes on in was not seen and not felt. Where a plane is around the end, the
+/// border has to be as long as half of the turn.
+fn is_torn(parted: &Parted, wall: &Wall, end: &End) -> bool {
+    let (middle, [e, g]) = (wall.at(end.t), square_to(&wall.axis));
+    let near = TORN.map(|radii| radii * wall.radius());
+    // of a box that holds all of them, however the axis lies
+    let reach = Vector3::repeat(near[1] * f64::sqrt(2.0));
+    let mut found = BoxQuery::default();
+    parted.tree.faces_in_box(&(middle - reach), &(middle + reach), &mut found);
+    let mut torn = [false; AROUND];
+    for &FaceId(face) in &found.faces {
+        for [from, to] in parted.facets.open_edges(face) {
+            let v = from + (to - from) / 2.0 - middle;
+            let (along, aside) = (v.dot(&wall.axis) * end.out, v.cross(&wall.axis).norm());
+            if along > -near[0] && along < near[1] && aside < near[1] {
+                let turn = v.dot(&g).atan2(v.dot(&e)).rem_euclid(std::f64::consts::TAU);
+                torn[(turn / std::f64::consts::TAU * AROUND as f64) as usize % AROUND] = true;
+            }
+        }
+    }
+    let torn = torn.iter().filter(|torn| **torn).count();
+    2 * torn >= if end.rim.is_some() { AROUND } else { 1 }
 }
 
 /// How much of an opening an end is, beside the other end.
@@ -268,16 +303,11 @@ pub(super) fn bosses(parted: &Parted, walls: &[Wall]) -> Vec<Boss> {
 fn boss(parted: &Parted, walls: &[Wall], at: usize) -> Option<Boss> {
     let wall = &walls[at];
     let (radius, around) = (wall.radius(), parted.around(wall.segments[0]));
+    let rings = if parted.rounding.is_some() { RINGS } else { FOOT_RINGS }.map(|ring| ring * radius);
     [(0, 1.0), (1, -1.0)].into_iter().find_map(|(which, out)| {
         let (foot, top) = (wall.ends[which], wall.ends[1 - which]);
         let way = wall.axis * out;
-        let (base, share) = parted.plane_around(
-            &around,
-            &wall.at(foot),
-            &way,
-            &FOOT_RINGS.map(|ring| ring * radius),
-            NEAR_END * radius,
-        )?;
+        let (base, share) = parted.plane_around(&around, &wall.at(foot), &way, &rings, NEAR_END * radius)?;
         if share < 2.0 * RIM || wall.height() < LEAST_HEIGHT * radius {
             return None;
         }

@@ -62,6 +62,8 @@ const POCKET_SHARE: f64 = 0.5;
 const ASLANT: std::ops::Range<f64> = 0.26..0.94;
 /// Voids are the same when widths and places agree within this share of the width.
 const SAME: f64 = 0.4;
+/// The axis of an end is where it should be within this share of the width.
+const ABOUT: f64 = 0.1;
 /// A line that starts on a wall starts this share of the width off it.
 const OFF: f64 = 1e-3;
 
@@ -247,7 +249,8 @@ fn opened(parted: &Parted, of_face: &[u32], seen: &Opened) -> Option<Slot> {
         flat += usize::from(is_flat);
         is_aslant |= number.is_some_and(|number| is_wall_aslant(parted, number, &way, &out));
         // what only reaches there over a seam, as a floor does, is no end
-        ends[at] = number.filter(|&number| is_flat || is_round_end(parted, number, &out, width));
+        let met = number.filter(|&number| is_flat || is_round_end(parted, number, &out, width));
+        ends[at] = met.or_else(|| round_end_about(parted, &(middle + way * (lengths[at] - width / 2.0)), &out, width));
     }
     let centre = middle + out * up + direction * ((lengths[0] - lengths[1]) / 2.0);
     Some(Slot {
@@ -277,6 +280,16 @@ fn is_square(parted: &Parted, number: usize, way: &Vector3<f64>) -> bool {
 fn is_wall_aslant(parted: &Parted, number: usize, way: &Vector3<f64>, out: &Vector3<f64>) -> bool {
     let Primitive::Plane { normal, .. } = parted.segment(number).primitive else { return false };
     ASLANT.contains(&-normal.dot(way)) && normal.dot(out).abs() < SQUARE
+}
+
+/// The half-round end about a point: where the wall was hardly touched it may be in pieces, and the line meet another.
+fn round_end_about(parted: &Parted, middle: &Point3<f64>, out: &Vector3<f64>, width: f64) -> Option<usize> {
+    let is_there = |number: usize| match parted.segment(number).primitive {
+        Primitive::Cylinder { point, axis, .. } => (middle - point).cross(&axis).norm() < ABOUT * width,
+        _ => false,
+    };
+    // the largest first
+    (0..parted.segmentation.segments.len()).find(|&at| is_there(at) && is_round_end(parted, at, out, width))
 }
 
 /// Whether a segment is a half-round end of a slot.

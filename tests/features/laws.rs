@@ -1,5 +1,7 @@
 //! What detection must not depend on: where the part lies, how it is turned, and in which unit it was drawn.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Isometry3, Point3, Rotation3, Vector3};
 use proptest::prelude::*;
 use touchup::features::{Feature, Kind};
@@ -14,6 +16,9 @@ const PARTS: [(&str, MeshUnit); 4] = [
     ("crs_ee2.stl", Metre),
     ("crs_ee3.stl", Metre),
 ];
+
+/// Those whose circles have at least 30 sides.
+const FINE: [(&str, MeshUnit); 2] = [PARTS[0], PARTS[1]];
 
 fn moved(mesh: &TriMesh, place: impl Fn(&Point3<f64>) -> Point3<f64>) -> TriMesh {
     let faces = mesh.faces().map(|(_, corners)| corners.map(|v| v.0)).collect();
@@ -51,6 +56,45 @@ fn check(name: &str, mesh: &TriMesh, motion: &Isometry3<f64>, scale: f64) -> Res
         prop_assert_eq!(images, 1, "{}: {:?}", name, one);
     }
     Ok(())
+}
+
+/// Each face in four, cut at the middles of its edges.
+fn divided(mesh: &TriMesh) -> TriMesh {
+    let mut positions = mesh.positions().to_vec();
+    let mut middles = BTreeMap::new();
+    let mut faces = Vec::new();
+    for (_, corners) in mesh.faces() {
+        let [a, b, c] = corners.map(|v| v.0);
+        let [ab, bc, ca] = [[a, b], [b, c], [c, a]].map(|[from, to]| {
+            *middles.entry([from.min(to), from.max(to)]).or_insert_with(|| {
+                positions.push(nalgebra::center(&positions[from as usize], &positions[to as usize]));
+                positions.len() as u32 - 1
+            })
+        });
+        faces.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
+    }
+    TriMesh::new(positions, faces).unwrap()
+}
+
+/// Dividing the faces of a drawing leaves the part as it is, where circles have many sides: a hole of twelve flat sides,
+/// each of several faces, is not taken for a round one.
+#[test]
+fn finer_faces_change_nothing() {
+    for (name, unit) in FINE {
+        let Some(mut mesh) = part(name, unit) else { return };
+        let [lo, hi] = mesh.bounds();
+        let before = found(&mesh);
+        while mesh.face_count() < 50_000 {
+            mesh = divided(&mesh);
+            let after = found(&mesh);
+            let (one, other) = (holes_slots_pockets(&before), holes_slots_pockets(&after));
+            assert_eq!(one.len(), other.len(), "{name}, {} faces", mesh.face_count());
+            for one in one {
+                let is_same = |f: &&&Feature| is_image(one, f, &Isometry3::identity(), 1.0, 2e-6 * (hi - lo).norm());
+                assert_eq!(other.iter().filter(is_same).count(), 1, "{name}, {} faces: {one:?}", mesh.face_count());
+            }
+        }
+    }
 }
 
 proptest! {
