@@ -59,6 +59,7 @@ impl Side {
 
 impl Primitive {
     /// Signed distance of `p`, m: positive in the air.
+    #[inline]
     pub fn distance(&self, p: &Point3<f64>) -> f64 {
         match self {
             Self::Plane { point, normal } => (p - point).dot(normal),
@@ -75,6 +76,7 @@ impl Primitive {
     }
 
     /// Outward unit normal at the foot of `p`.
+    #[inline]
     pub fn normal_at(&self, p: &Point3<f64>) -> Vector3<f64> {
         let radial = |origin: &Point3<f64>, axis: &Vector3<f64>| {
             let v = p - origin;
@@ -96,9 +98,13 @@ pub(super) struct Moments {
     origin: Point3<f64>,
     area: f64,
     first: Vector3<f64>,
+    /// lower triangle
     second: Matrix3<f64>,
     normals: Vector3<f64>,
 }
+
+/// Rows and columns of the lower triangle of a symmetric matrix.
+const LOWER: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
 
 impl Moments {
     /// - `origin`: near the faces, so that squares stay small.
@@ -113,15 +119,19 @@ impl Moments {
         self.area += area;
         self.first += sum * (area / 3.0);
         // ∫ x xᵀ over a triangle: A/12 (Σ vᵢ vᵢᵀ + (Σ vᵢ)(Σ vᵢ)ᵀ)
-        let squares = corners.iter().fold(sum * sum.transpose(), |m, v| m + v * v.transpose());
-        self.second += squares * (area / 12.0);
+        for (i, j) in LOWER {
+            let square = corners.iter().fold(sum[i] * sum[j], |sum, v| sum + v[i] * v[j]);
+            self.second[(i, j)] += square * (area / 12.0);
+        }
         self.normals += facets.normal(face) * area;
     }
 
     /// The plane through the middle of the area, square to its thinnest direction; `None` without area.
     pub fn plane(&self) -> Option<Primitive> {
         let mean = self.first / self.area;
-        let spread = self.second / self.area - mean * mean.transpose();
+        let mut second = self.second;
+        second.fill_upper_triangle_with_lower_triangle();
+        let spread = second / self.area - mean * mean.transpose();
         let towards = self.normals.try_normalize(0.0)?;
         if !spread.iter().all(|x| x.is_finite()) {
             return None;
@@ -140,10 +150,8 @@ impl Moments {
 pub(super) struct Bend {
     /// largest standard deviation of the normals from their mean
     pub spread: f64,
-    /// direction along which there is least of them: the axis of a cylinder
-    axis: Vector3<f64>,
-    /// how much there is of them along it, and along the next
-    along: [f64; 2],
+    /// second moments of the normals
+    second: Matrix3<f64>,
 }
 
 impl Bend {
@@ -153,24 +161,29 @@ impl Bend {
             let (a, n) = (facets.area(face), facets.normal(face));
             area += a;
             first += n * a;
-            second += n * n.transpose() * a;
+            LOWER.iter().for_each(|&(i, j)| second[(i, j)] += n[i] * n[j] * a);
         }
         if area <= 0.0 {
             return None;
         }
+        second.fill_upper_triangle_with_lower_triangle();
         let (mean, second) = (first / area, second / area);
-        let root = |x: f64| x.max(0.0).sqrt();
         let spread = root((second - mean * mean.transpose()).symmetric_eigenvalues().max());
-        let eigen = second.symmetric_eigen();
-        let mut pairs = [0, 1, 2].map(|i| (eigen.eigenvalues[i], eigen.eigenvectors.column(i).into_owned()));
-        pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
-        Some(Self { spread, axis: pairs[0].1, along: [root(pairs[0].0), root(pairs[1].0)] })
+        Some(Self { spread, second })
     }
 
-    /// Axis of the cylinder whose normals these could be.
+    /// Axis of the cylinder whose normals these could be: the direction along which there is least of them.
     pub fn cylinder_axis(&self) -> Option<Vector3<f64>> {
-        (self.along[0] < CLEAR * self.along[1]).then_some(self.axis)
+        let eigen = self.second.symmetric_eigen();
+        let mut pairs = [0, 1, 2].map(|i| (eigen.eigenvalues[i], eigen.eigenvectors.column(i).into_owned()));
+        pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+        (root(pairs[0].0) < CLEAR * root(pairs[1].0)).then_some(pairs[0].1)
     }
+}
+
+/// Rounding may leave less than nothing.
+fn root(x: f64) -> f64 {
+    x.max(0.0).sqrt()
 }
 
 /// The direction without normals is clear when they differ so much more in the next.
