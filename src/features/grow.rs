@@ -10,6 +10,7 @@ use super::facets::{Facets, NONE};
 use super::marks::sort;
 use super::primitive::{Bend, Moments, Primitive, cylinder_of, refined};
 use super::segment::{Segment, Segmentation};
+use crate::mesh::{FaceId, VertexId};
 
 /// Lengths that come with the mesh.
 #[derive(Clone, Copy, Debug)]
@@ -452,19 +453,27 @@ impl<'a> Growing<'a> {
 
 /// Whether a face lies on the primitive within `tolerance` (m) and faces as it does.
 pub(super) fn belongs(facets: &Facets, face: u32, primitive: &Primitive, tolerance: f64) -> bool {
-    let corners = facets.triangle(face);
-    let is_off = match primitive {
-        // most are planes, and short of what is asked for the others
-        Primitive::Plane { point, normal } => corners.iter().any(|p| (p - point).dot(normal).abs() > tolerance),
-        curved => corners.iter().any(|p| curved.distance(p).abs() > tolerance),
+    let normal = match primitive {
+        // most are planes: no more is loaded and reckoned than they need
+        Primitive::Plane { point, normal } => {
+            let off = |&vertex: &VertexId| (facets.mesh.position(vertex) - point).dot(normal).abs();
+            if facets.mesh.corners(FaceId(face)).iter().any(|vertex| off(vertex) > tolerance) {
+                return false;
+            }
+            *normal
+        }
+        curved => {
+            let [a, b, c] = facets.triangle(face);
+            if [a, b, c].iter().any(|p| curved.distance(p).abs() > tolerance) {
+                return false;
+            }
+            curved.normal_at(&Point3::from((a.coords + b.coords + c.coords) / 3.0))
+        }
     };
-    if is_off {
-        return false;
-    }
-    let middle = Point3::from((corners[0].coords + corners[1].coords + corners[2].coords) / 3.0);
-    if facets.normal(face).dot(&primitive.normal_at(&middle)) > ALIKE {
+    if facets.normal(face).dot(&normal) > ALIKE {
         return true;
     }
+    let corners = facets.triangle(face);
     // the normal of a sliver says nothing
     let longest = (0..3).map(|i| (corners[i] - corners[(i + 1) % 3]).norm()).fold(0.0, f64::max);
     2.0 * facets.area(face) < tolerance * longest

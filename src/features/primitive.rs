@@ -270,7 +270,7 @@ fn refined_cylinder(start: &Primitive, facets: &Facets, faces: &[u32]) -> Option
             }
             let n = facets.normal(face);
             let arm = NORMAL_ARM * radius;
-            normal.add([0.0, 0.0, n.dot(&e) * arm, n.dot(&g) * arm, 0.0], -n.dot(&axis) * arm);
+            normal.add_two([2, 3], [n.dot(&e) * arm, n.dot(&g) * arm], -n.dot(&axis) * arm);
         }
         let x = normal.solution()?;
         point += e * x[0] + g * x[1];
@@ -305,6 +305,15 @@ impl<const N: usize> NormalEquations<N> {
             }
             self.right[i] += row[i] * value;
         }
+    }
+
+    /// A row of which all but two numbers, at rising places, are zero.
+    fn add_two(&mut self, [i, j]: [usize; 2], [a, b]: [f64; 2], value: f64) {
+        self.matrix[i][i] += a * a;
+        self.matrix[j][i] += b * a;
+        self.matrix[j][j] += b * b;
+        self.right[i] += a * value;
+        self.right[j] += b * value;
     }
 
     fn solution(&self) -> Option<SVector<f64, N>> {
