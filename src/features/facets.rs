@@ -82,23 +82,24 @@ const AT_ONCE: usize = 8;
 
 impl Fan {
     fn gather(&mut self, mesh: &TriMesh, vertex: VertexId) {
-        self.before.clear();
-        self.after.clear();
+        let star = mesh.star(vertex);
+        let size = star.len().next_multiple_of(AT_ONCE);
         self.faces.clear();
-        for &face in mesh.star(vertex) {
+        for numbers in [&mut self.before, &mut self.after] {
+            numbers.clear();
+            numbers.resize(size, NONE);
+        }
+        let places = self.before.iter_mut().zip(&mut self.after);
+        self.faces.extend(star.iter().zip(places).map(|(&face, place)| {
             let [a, b, c] = mesh.corners(face).map(|corner| corner.0);
             let (before, after, edge) = match vertex.0 {
                 v if v == a => (c, b, 0),
                 v if v == b => (a, c, 1),
                 _ => (b, a, 2),
             };
-            self.before.push(before);
-            self.after.push(after);
-            self.faces.push((face.0, edge));
-        }
-        let size = self.faces.len().next_multiple_of(AT_ONCE);
-        self.before.resize(size, NONE);
-        self.after.resize(size, NONE);
+            (*place.0, *place.1) = (before, after);
+            (face.0, edge)
+        }));
     }
 
     /// The place of the face across the edge to vertex `next`, when there is that one and no third, and it runs along it

@@ -4,6 +4,7 @@
 use nalgebra::{Matrix3, Point3, SMatrix, SVector, Vector3};
 
 use super::facets::Facets;
+use crate::mesh::FaceId;
 
 /// Which side of a curved surface the material is on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -114,7 +115,7 @@ impl Moments {
 
     pub fn add(&mut self, facets: &Facets, face: u32) {
         let area = facets.area(face);
-        let corners = facets.triangle(face).map(|p| p - self.origin);
+        let corners = facets.mesh.corners(FaceId(face)).map(|vertex| facets.mesh.position(vertex) - self.origin);
         let sum = corners[0] + corners[1] + corners[2];
         self.area += area;
         self.first += sum * (area / 3.0);
