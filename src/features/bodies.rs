@@ -43,7 +43,7 @@ impl Bodies {
         let mut of_face = vec![NONE; piece_of.len()];
         let mut bodies = Vec::new();
         let closed =
-            pieces.into_iter().filter(|faces| faces.iter().all(|&f| !facets.facets[f as usize].beside.contains(&NONE)));
+            pieces.into_iter().filter(|faces| faces.iter().all(|&f| !facets.beside[f as usize].contains(&NONE)));
         for faces in closed {
             let Some(mesh) = part(facets.mesh, &faces) else { continue };
             faces.iter().for_each(|&face| of_face[face as usize] = bodies.len() as u32);
@@ -82,29 +82,30 @@ impl<'a> Surroundings<'a> {
 
 /// The piece of each face, and the faces of each piece: those that hang together over edges of two faces.
 fn pieces(facets: &Facets) -> (Vec<u32>, Vec<Vec<u32>>) {
-    let mut piece_of = vec![NONE; facets.facets.len()];
-    let mut pieces: Vec<Vec<u32>> = Vec::new();
+    let mut piece_of = vec![NONE; facets.slots()];
+    let mut pieces = 0;
+    let mut found = Vec::new();
     for (FaceId(first), _) in facets.mesh.faces() {
         if piece_of[first as usize] != NONE {
             continue;
         }
-        let number = pieces.len() as u32;
-        let mut faces = vec![first];
-        piece_of[first as usize] = number;
-        let mut at = 0;
-        while at < faces.len() {
-            for other in facets.facets[faces[at] as usize].beside {
+        piece_of[first as usize] = pieces;
+        found.push(first);
+        while let Some(face) = found.pop() {
+            for other in facets.beside[face as usize] {
                 if other != NONE && piece_of[other as usize] == NONE {
-                    piece_of[other as usize] = number;
-                    faces.push(other);
+                    piece_of[other as usize] = pieces;
+                    found.push(other);
                 }
             }
-            at += 1;
         }
-        faces.sort_unstable();
-        pieces.push(faces);
+        pieces += 1;
     }
-    (piece_of, pieces)
+    let mut faces = vec![Vec::new(); pieces as usize];
+    for (face, &piece) in piece_of.iter().enumerate().filter(|&(_, &piece)| pieces > 1 && piece != NONE) {
+        faces[piece as usize].push(face as u32);
+    }
+    (piece_of, faces)
 }
 
 /// Some faces of a mesh as a mesh of their own.

@@ -40,9 +40,14 @@ const SHORTEST: f64 = 0.02;
 
 /// The segment of each face, those of the seams too.
 pub(super) fn without_seams(parted: &Parted) -> Vec<u32> {
-    let label = |&number: &u32| if number != NONE && parted.is_strong(number as usize) { number } else { NONE };
+    let is_strong: Vec<bool> = (0..parted.segmentation.segments.len()).map(|number| parted.is_strong(number)).collect();
+    let label = |&number: &u32| if number != NONE && is_strong[number as usize] { number } else { NONE };
     let mut of_face: Vec<u32> = parted.segmentation.of_face.iter().map(label).collect();
-    let mut front: Vec<u32> = (0..of_face.len() as u32).filter(|&face| of_face[face as usize] != NONE).collect();
+    let without = (0..of_face.len() as u32).filter(|&face| of_face[face as usize] == NONE);
+    let mut front: Vec<u32> = without.flat_map(|face| parted.facets.beside(face)).map(|(_, other)| other).collect();
+    front.retain(|&face| of_face[face as usize] != NONE);
+    front.sort_unstable();
+    front.dedup();
     for _ in 0..SEAM {
         let mut next = Vec::new();
         for face in front {

@@ -152,7 +152,7 @@ fn flood(parted: &Parted, seeds: Vec<u32>, cone: &Primitive, tolerance: f64) -> 
     let mut seen: std::collections::BTreeSet<u32> = found.iter().copied().collect();
     let mut at = 0;
     while at < found.len() {
-        for other in facets.facets[found[at] as usize].beside {
+        for other in facets.beside[found[at] as usize] {
             if other != NONE && seen.insert(other) && is_on(other) {
                 found.push(other);
             }

@@ -73,6 +73,8 @@ pub struct Fan {
 
 /// Fans up to this size are searched all at once, larger ones by halves.
 const SMALL_FAN: usize = 8;
+/// More than the sum of all places in one.
+const COUNTED: u32 = 64;
 
 impl Fan {
     /// Curvature at one vertex: what an edit changes are the vertices of the moved faces.
@@ -96,7 +98,7 @@ impl Fan {
     #[inline]
     fn gather(&mut self, mesh: &TriMesh, vertex: VertexId) {
         self.links.clear();
-        for &face in mesh.star(vertex) {
+        self.links.extend(mesh.star(vertex).iter().map(|&face| {
             let [VertexId(a), VertexId(b), VertexId(c)] = mesh.corners(face);
             // written so that no branch has to be guessed
             let (at_a, at_b) = (vertex.0 == a, vertex.0 == b);
@@ -114,8 +116,8 @@ impl Fan {
             } else {
                 b
             };
-            self.links.push([next, last]);
-        }
+            [next, last]
+        }));
     }
 
     #[inline]
@@ -151,15 +153,13 @@ impl Fan {
             *start = link[0];
         }
         let mut sound = true;
-        for &[_, end] in &self.links {
-            let (mut found, mut at) = (0, 0);
-            for (i, &start) in starts.iter().enumerate() {
-                found += u32::from(start == end);
-                at |= if start == end { i as u32 } else { 0 };
-            }
-            sound &= found == 1;
-            self.next.push(at);
-        }
+        self.next.extend(self.links.iter().map(|&[_, end]| {
+            // how many were found, and the sum of their places, in one number
+            let found = |(i, &start): (usize, &u32)| if start == end { COUNTED + i as u32 } else { 0 };
+            let places: u32 = starts.iter().enumerate().map(found).sum();
+            sound &= places / COUNTED == 1;
+            places % COUNTED
+        }));
         sound
     }
 
@@ -205,6 +205,15 @@ struct CornerSums {
     area_gradient: Vector3<f64>,
 }
 
+/// What a face has at one of its corners.
+struct Corner {
+    cos: f64,
+    sin: f64,
+    area: f64,
+    normal: Vector3<f64>,
+    gradient: Vector3<f64>,
+}
+
 /// Products outside this range are brought back to 1, long before they overflow.
 const MAGNITUDES: std::ops::Range<f64> = 1e-100..1e100;
 /// Up to this tangent the series of the arc tangent to the 17th power is exact: the next term is below 2⁻⁶¹ of the angle.
@@ -219,28 +228,26 @@ impl CornerSums {
         let scale = if first > f64::MIN_POSITIVE { first.recip() } else { 1.0 };
         let mut sums =
             Self { re: 1.0, im: 0.0, turns: 0, scale, area: 0.0, double_area_normal: zero, area_gradient: zero };
-        for [p, q] in links {
-            sums.add(&(positions[*p as usize] - vertex), &(positions[*q as usize] - vertex));
+        let corner = |&[p, q]: &[u32; 2]| [positions[p as usize] - vertex, positions[q as usize] - vertex];
+        let (pairs, last) = links.as_chunks::<2>();
+        for pair in pairs {
+            let [one, other] = Corners::between([corner(&pair[0]), corner(&pair[1])]).each();
+            sums.add(&one);
+            sums.add(&other);
+        }
+        for link in last {
+            let [one, _] = Corners::between([corner(link); 2]).each();
+            sums.add(&one);
         }
         sums
     }
 
-    /// Adds the corner between two edges, counter-clockwise.
     #[inline]
-    fn add(&mut self, e: &Vector3<f64>, f: &Vector3<f64>) {
-        let normal = e.cross(f);
-        let (cos, sin) = (e.dot(f), normal.norm());
-        self.turn(cos * self.scale, sin * self.scale);
-        if sin > 0.0 {
-            let per_sin = sin.recip();
-            let (ee, ff) = (e.norm_squared(), f.norm_squared());
-            // e·(e − f) and f·(f − e): the cosines at the two other corners; over sin, their cotangents
-            let (at_e, at_f) = (ee - cos, ff - cos);
-            let nearest = (ee * at_f + ff * at_e) * per_sin / 8.0;
-            self.area += mixed_area(nearest, sin, [cos, at_e, at_f]);
-            self.double_area_normal += normal;
-            self.area_gradient -= (f * at_e + e * at_f) * (0.5 * per_sin);
-        }
+    fn add(&mut self, corner: &Corner) {
+        self.turn(corner.cos * self.scale, corner.sin * self.scale);
+        self.area += corner.area;
+        self.double_area_normal += corner.normal;
+        self.area_gradient -= corner.gradient;
     }
 
     /// Turns the product by an angle of 0 to π of any length. It comes round where it passes the negative half of the real
@@ -291,6 +298,58 @@ fn argument(re: f64, im: f64) -> f64 {
     let tt = t * t;
     let series = [17.0, -15.0, 13.0, -11.0, 9.0, -7.0, 5.0, -3.0].iter().fold(0.0, |sum, n| sum * tt + 1.0 / n);
     t + t * tt * series
+}
+
+/// Two numbers, reckoned with at once.
+type Two = [f64; 2];
+
+#[inline]
+fn two(of: impl Fn(usize) -> f64) -> Two {
+    [of(0), of(1)]
+}
+
+/// Two corners at once: one wide instruction does the same sum for both.
+struct Corners {
+    cos: Two,
+    sin: Two,
+    area: Two,
+    normal: [Two; 3],
+    gradient: [Two; 3],
+}
+
+impl Corners {
+    /// Each between two edges, counter-clockwise.
+    #[inline]
+    fn between(edges: [[Vector3<f64>; 2]; 2]) -> Self {
+        let e = [0, 1, 2].map(|axis| two(|i| edges[i][0][axis]));
+        let f = [0, 1, 2].map(|axis| two(|i| edges[i][1][axis]));
+        let dot = |a: &[Two; 3], b: &[Two; 3]| two(|i| a[0][i] * b[0][i] + a[1][i] * b[1][i] + a[2][i] * b[2][i]);
+        let normal = [(1, 2), (2, 0), (0, 1)].map(|(j, k)| two(|i| e[j][i] * f[k][i] - e[k][i] * f[j][i]));
+        let (cos, square) = (dot(&e, &f), dot(&normal, &normal));
+        let sin = two(|i| square[i].sqrt());
+        // without area nothing is added
+        let per_sin = two(|i| if sin[i] > 0.0 { 1.0 / sin[i] } else { 0.0 });
+        let (ee, ff) = (dot(&e, &e), dot(&f, &f));
+        // e·(e − f) and f·(f − e): the cosines at the two other corners; over sin, their cotangents
+        let (at_e, at_f) = (two(|i| ee[i] - cos[i]), two(|i| ff[i] - cos[i]));
+        let nearest = two(|i| (ee[i] * at_f[i] + ff[i] * at_e[i]) * per_sin[i] / 8.0);
+        let area = two(|i| mixed_area(nearest[i], sin[i], [cos[i], at_e[i], at_f[i]]));
+        let gradient =
+            [0, 1, 2].map(|axis| two(|i| (f[axis][i] * at_e[i] + e[axis][i] * at_f[i]) * (0.5 * per_sin[i])));
+        Self { cos, sin, area, normal, gradient }
+    }
+
+    #[inline]
+    fn each(&self) -> [Corner; 2] {
+        let vector = |v: &[Two; 3], i: usize| Vector3::new(v[0][i], v[1][i], v[2][i]);
+        [0, 1].map(|i| Corner {
+            cos: self.cos[i],
+            sin: self.sin[i],
+            area: self.area[i],
+            normal: vector(&self.normal, i),
+            gradient: vector(&self.gradient, i),
+        })
+    }
 }
 
 /// What a corner has of its triangle: the part nearest to it, or of an obtuse triangle half (the obtuse corner) or a

@@ -84,7 +84,7 @@ fn is_slot_end(wall: &Wall, slots: &[Slot]) -> bool {
 const ALIKE: f64 = 0.2;
 
 fn unexplained(parted: &Parted) -> f64 {
-    let all: f64 = parted.facets.facets.iter().map(|facet| facet.area).sum();
+    let all: f64 = parted.facets.areas.iter().sum();
     let explained: f64 = parted.segmentation.segments.iter().map(|segment| segment.area).sum();
     if all > 0.0 { (1.0 - explained / all).max(0.0) } else { 0.0 }
 }

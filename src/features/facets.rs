@@ -7,48 +7,50 @@ use crate::mesh::{FaceId, TriMesh, VertexId};
 /// No face lies across this edge: the mesh ends, more than two faces meet, or the one there is turned over.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// One face, flat.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Facet {
-    /// outward unit normal; zero for a face without area
-    pub normal: Vector3<f64>,
-    /// m²
-    pub area: f64,
-    /// the face across the edge that begins at each corner
-    pub beside: [u32; 3],
-}
-
-/// All faces of a mesh, by id.
+/// All faces of a mesh, by id; each question has an array of its own, so that asking one does not load the others.
 #[derive(Clone, Debug)]
 pub(super) struct Facets<'a> {
     pub mesh: &'a TriMesh,
-    pub facets: Vec<Facet>,
+    /// outward unit normals; zero for a face without area
+    pub normals: Vec<Vector3<f64>>,
+    /// m²
+    pub areas: Vec<f64>,
+    /// the faces across the edges that begin at each corner
+    pub beside: Vec<[u32; 3]>,
 }
 
 impl<'a> Facets<'a> {
     pub fn of(mesh: &'a TriMesh) -> Self {
-        let gone = Facet { normal: Vector3::zeros(), area: 0.0, beside: [NONE; 3] };
-        let mut facets = vec![gone; mesh.face_slots()];
-        for (face, _) in mesh.faces() {
-            let double = mesh.double_area_normal(face);
+        let slots = mesh.face_slots();
+        let (mut normals, mut areas) = (Vec::with_capacity(slots), Vec::with_capacity(slots));
+        for face in (0..slots as u32).map(FaceId) {
+            let double = if mesh.has_face(face) { mesh.double_area_normal(face) } else { Vector3::zeros() };
             let length = double.norm();
-            let facet = &mut facets[face.0 as usize];
-            facet.area = length / 2.0;
-            facet.normal = if length > 0.0 { double / length } else { Vector3::zeros() };
+            areas.push(length / 2.0);
+            normals.push(if length > 0.0 { double / length } else { Vector3::zeros() });
         }
-        let mut corners = Vec::new();
-        for vertex in 0..mesh.vertex_slots() as u32 {
-            join_around(mesh, VertexId(vertex), &mut corners, &mut facets);
+        let mut beside = vec![[NONE; 3]; slots];
+        let mut fan = Fan::default();
+        for vertex in (0..mesh.vertex_slots() as u32).map(VertexId).filter(|&vertex| mesh.has_vertex(vertex)) {
+            fan.gather(mesh, vertex);
+            fan.join(vertex, &mut beside);
         }
-        Self { mesh, facets }
+        Self { mesh, normals, areas, beside }
     }
 
+    /// Number of faces, removed ones counted.
+    pub fn slots(&self) -> usize {
+        self.areas.len()
+    }
+
+    #[inline]
     pub fn normal(&self, face: u32) -> Vector3<f64> {
-        self.facets[face as usize].normal
+        self.normals[face as usize]
     }
 
+    #[inline]
     pub fn area(&self, face: u32) -> f64 {
-        self.facets[face as usize].area
+        self.areas[face as usize]
     }
 
     /// m²
@@ -57,8 +59,8 @@ impl<'a> Facets<'a> {
     }
 
     /// The faces beside, each with the number of its edge.
-    pub fn beside(&self, face: u32) -> impl Iterator<Item = (usize, u32)> + '_ {
-        self.facets[face as usize].beside.iter().copied().enumerate().filter(|&(_, other)| other != NONE)
+    pub fn beside(&self, face: u32) -> impl Iterator<Item = (usize, u32)> + use<> {
+        self.beside[face as usize].into_iter().enumerate().filter(|&(_, other)| other != NONE)
     }
 
     /// Ends of the edges of a face that have no other face at all, m.
@@ -83,31 +85,63 @@ impl<'a> Facets<'a> {
     }
 }
 
-/// A face around a vertex: the vertices before and after it there, the face, and the number of its edge to the next.
-type Corner = (u32, u32, u32, usize);
+/// The faces around a vertex: the vertices before and after it in each, the face, and the number of its edge to the next.
+#[derive(Default)]
+struct Fan {
+    before: Vec<u32>,
+    after: Vec<u32>,
+    faces: Vec<(u32, usize)>,
+}
 
-/// Sets what is across each edge that begins at a vertex: the one other face there, when it runs along it the other way.
-fn join_around(mesh: &TriMesh, vertex: VertexId, corners: &mut Vec<Corner>, facets: &mut [Facet]) {
-    if !mesh.has_vertex(vertex) {
-        return;
+/// So many neighbours are compared at once; places without one have no number of a vertex.
+const AT_ONCE: usize = 8;
+
+impl Fan {
+    fn gather(&mut self, mesh: &TriMesh, vertex: VertexId) {
+        let star = mesh.star(vertex);
+        let size = star.len().next_multiple_of(AT_ONCE);
+        self.faces.clear();
+        for numbers in [&mut self.before, &mut self.after] {
+            numbers.clear();
+            numbers.resize(size, NONE);
+        }
+        let places = self.before.iter_mut().zip(&mut self.after);
+        self.faces.extend(star.iter().zip(places).map(|(&face, place)| {
+            let [a, b, c] = mesh.corners(face).map(|corner| corner.0);
+            let (before, after, edge) = match vertex.0 {
+                v if v == a => (c, b, 0),
+                v if v == b => (a, c, 1),
+                _ => (b, a, 2),
+            };
+            (*place.0, *place.1) = (before, after);
+            (face.0, edge)
+        }));
     }
-    corners.clear();
-    for &face in mesh.star(vertex) {
-        let [a, b, c] = mesh.corners(face).map(|corner| corner.0);
-        corners.push(match vertex.0 {
-            v if v == a => (c, b, face.0, 0),
-            v if v == b => (a, c, face.0, 1),
-            _ => (b, a, face.0, 2),
-        });
-    }
-    for &(_, next, face, edge) in corners.iter() {
-        let (mut across, mut at_edge) = (NONE, 0);
-        for &(before, after, other, _) in corners.iter() {
-            at_edge += u32::from(before == next) + u32::from(after == next);
-            if before == next {
-                across = other;
+
+    /// The place of the face across the edge to vertex `next`, when there is that one and no third, and it runs along it
+    /// the other way.
+    fn across(&self, next: u32) -> Option<usize> {
+        let (mut faces, mut place) = (0, 0);
+        let (before, after) = (self.before.as_chunks::<AT_ONCE>().0, self.after.as_chunks::<AT_ONCE>().0);
+        for (chunk, (before, after)) in before.iter().zip(after).enumerate() {
+            for at in 0..AT_ONCE {
+                let is_across = before[at] == next;
+                faces += u32::from(is_across) + u32::from(after[at] == next);
+                place += if is_across { (chunk * AT_ONCE + at + 1) as u32 } else { 0 };
             }
         }
-        facets[face as usize].beside[edge] = if at_edge == 2 { across } else { NONE };
+        if faces == 2 { (place as usize).checked_sub(1) } else { None }
+    }
+
+    /// Sets what is across each edge between the vertex and a later one.
+    fn join(&self, vertex: VertexId, beside: &mut [[u32; 3]]) {
+        for (&(face, edge), &next) in self.faces.iter().zip(&self.after).filter(|&(_, &next)| next > vertex.0) {
+            if let Some(place) = self.across(next) {
+                // its edge to this vertex ends where the one from here begins
+                let (other, its_edge) = self.faces[place];
+                beside[face as usize][edge] = other;
+                beside[other as usize][(its_edge + 2) % 3] = face;
+            }
+        }
     }
 }

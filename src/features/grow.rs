@@ -7,8 +7,10 @@
 use nalgebra::{Point3, Vector3};
 
 use super::facets::{Facets, NONE};
+use super::marks::sort;
 use super::primitive::{Bend, Moments, Primitive, cylinder_of, refined};
 use super::segment::{Segment, Segmentation};
+use crate::mesh::{FaceId, VertexId};
 
 /// Lengths that come with the mesh.
 #[derive(Clone, Copy, Debug)]
@@ -67,6 +69,8 @@ const BOUNDED: f64 = 0.2;
 const MORE: f64 = 1.3;
 /// Faces around the seed of a curved surface, in turn.
 const CURVED_NEAR: [usize; 3] = [12, 32, 90];
+/// Room for as many is made at once.
+const USUAL_NEAR: usize = 100;
 /// Beyond a plane it is looked at so many faces …
 const MOST_NEAR: usize = 50_000;
 /// … and so many of them are fitted.
@@ -119,7 +123,7 @@ struct Region {
 
 impl<'a> Growing<'a> {
     fn of(facets: &'a Facets<'a>) -> Self {
-        let slots = facets.facets.len();
+        let slots = facets.slots();
         Self {
             facets,
             scale: Scale::of(facets),
@@ -135,22 +139,32 @@ impl<'a> Growing<'a> {
 
     /// Faces by how flat their surroundings are, in order of id where they are alike.
     fn seeds(&self) -> Vec<u32> {
-        let mut buckets: [Vec<u32>; 16] = Default::default();
-        for (face, facet) in self.facets.facets.iter().enumerate() {
-            let turn = |&other: &u32| 1.0 - facet.normal.dot(&self.facets.normal(other));
-            let sharpest = facet.beside.iter().filter(|&&other| other != NONE).map(turn);
-            let sharpest = sharpest.fold(0.0, f64::max);
+        const BUCKETS: usize = 16;
+        let (mut bucket_of, mut ends) = (Vec::with_capacity(self.facets.slots()), [0; BUCKETS]);
+        for (face, normal) in self.facets.normals.iter().enumerate() {
+            let turns = self.facets.beside(face as u32).map(|(_, other)| 1.0 - normal.dot(&self.facets.normal(other)));
+            let sharpest = turns.fold(0.0, f64::max);
             // 1 − cos: a bucket for each power of two above a thousandth of a degree
-            let at = ((sharpest / 1.5e-10).max(1.0).log2() / 2.0) as usize;
-            buckets[at.min(15)].push(face as u32);
+            let at = power_of_two((sharpest / 1.5e-10).max(1.0)) / 2;
+            bucket_of.push(at.min(BUCKETS - 1) as u8);
+            ends[at.min(BUCKETS - 1)] += 1;
         }
-        buckets.concat()
+        let mut starts = ends.iter().scan(0, |end, count| Some(std::mem::replace(end, *end + count)));
+        let mut places: [usize; BUCKETS] = std::array::from_fn(|_| starts.next().unwrap_or(0));
+        let mut seeds = vec![0; bucket_of.len()];
+        for (face, &bucket) in bucket_of.iter().enumerate() {
+            seeds[places[bucket as usize]] = face as u32;
+            places[bucket as usize] += 1;
+        }
+        seeds
     }
 
     /// Free faces around `seed` that are reached over smooth edges, the nearest first.
     fn near(&mut self, seed: u32, most: usize) -> Vec<u32> {
         self.round += 1;
-        let mut found = vec![seed];
+        // of the last face all neighbours may come
+        let mut found = Vec::with_capacity(most.min(USUAL_NEAR) + 2);
+        found.push(seed);
         self.seen[seed as usize] = self.round;
         let mut at = 0;
         while at < found.len() && found.len() < most {
@@ -209,7 +223,7 @@ impl<'a> Growing<'a> {
 
     fn accept(&mut self, region: Region) {
         let Region { primitive, mut faces, area, tolerance } = region;
-        faces.sort_unstable();
+        sort(&mut faces, self.of_face.len());
         for &face in &faces {
             self.of_face[face as usize] = self.segments.len() as u32;
         }
@@ -304,9 +318,13 @@ impl<'a> Growing<'a> {
     /// - `plane`: number of faces of the plane that was found there.
     fn cylinder_from(&mut self, seed: u32, plane: usize, needs: &mut f64) -> Option<Region> {
         let mut best: Option<Region> = None;
-        let mut before = 0;
+        let (mut before, mut is_all) = (0, false);
         for most in CURVED_NEAR.into_iter().chain([(3 * plane + 24).min(MOST_NEAR)]) {
+            if is_all || most <= before {
+                continue;
+            }
             let mut near = self.near(seed, most);
+            is_all = near.len() < most;
             if near.len() <= before {
                 continue;
             }
@@ -419,14 +437,14 @@ impl<'a> Growing<'a> {
     }
 
     /// How much of a region's border goes on without an edge.
-    fn smooth_share(&self, region: &Region) -> f64 {
-        let mut inside = region.faces.clone();
-        inside.sort_unstable();
+    fn smooth_share(&mut self, region: &Region) -> f64 {
+        self.round += 1;
+        region.faces.iter().for_each(|&face| self.seen[face as usize] = self.round);
         let (mut smooth, mut all) = (0.0, f64::MIN_POSITIVE);
         for &face in &region.faces {
             for edge in 0..3 {
-                let other = self.facets.facets[face as usize].beside[edge];
-                if other != NONE && inside.binary_search(&other).is_ok() {
+                let other = self.facets.beside[face as usize][edge];
+                if other != NONE && self.seen[other as usize] == self.round {
                     continue;
                 }
                 let [a, b] = self.facets.edge(face, edge);
@@ -484,17 +502,35 @@ impl<'a> Growing<'a> {
 
 /// Whether a face lies on the primitive within `tolerance` (m) and faces as it does.
 pub(super) fn belongs(facets: &Facets, face: u32, primitive: &Primitive, tolerance: f64) -> bool {
-    let corners = facets.triangle(face);
-    if corners.iter().any(|p| primitive.distance(p).abs() > tolerance) {
-        return false;
-    }
-    let middle = Point3::from((corners[0].coords + corners[1].coords + corners[2].coords) / 3.0);
-    if facets.normal(face).dot(&primitive.normal_at(&middle)) > ALIKE {
+    let normal = match primitive {
+        // most are planes: no more is loaded and reckoned than they need
+        Primitive::Plane { point, normal } => {
+            let off = |&vertex: &VertexId| (facets.mesh.position(vertex) - point).dot(normal).abs();
+            if facets.mesh.corners(FaceId(face)).iter().any(|vertex| off(vertex) > tolerance) {
+                return false;
+            }
+            *normal
+        }
+        curved => {
+            let [a, b, c] = facets.triangle(face);
+            if [a, b, c].iter().any(|p| curved.distance(p).abs() > tolerance) {
+                return false;
+            }
+            curved.normal_at(&Point3::from((a.coords + b.coords + c.coords) / 3.0))
+        }
+    };
+    if facets.normal(face).dot(&normal) > ALIKE {
         return true;
     }
+    let corners = facets.triangle(face);
     // the normal of a sliver says nothing
     let longest = (0..3).map(|i| (corners[i] - corners[(i + 1) % 3]).norm()).fold(0.0, f64::max);
     2.0 * facets.area(face) < tolerance * longest
+}
+
+/// The largest power of two, as its exponent, that is not above `x`, from 1 on.
+fn power_of_two(x: f64) -> usize {
+    (x.to_bits() >> (f64::MANTISSA_DIGITS - 1)) as usize - (f64::MAX_EXP - 1) as usize
 }
 
 impl Scale {
@@ -532,22 +568,23 @@ impl Scale {
 
 /// Whether neighbours lie in one plane as they do in a drawing, and in no measurement.
 fn is_exact(facets: &Facets) -> bool {
-    let (mut coplanar, mut all) = (0, 0);
-    for (face, facet) in facets.facets.iter().enumerate().filter(|(_, facet)| facet.area > 0.0) {
-        let is_coplanar = |other: u32| 1.0 - facet.normal.dot(&facets.normal(other)) < COPLANAR;
-        all += 1;
-        coplanar += usize::from(facets.beside(face as u32).any(|(_, other)| is_coplanar(other)));
-    }
-    coplanar as f64 > EXACT_SHARE * all as f64
+    let all = facets.areas.iter().filter(|&&area| area > 0.0).count();
+    let is_coplanar = |&face: &u32| {
+        let is_alike = |other: u32| 1.0 - facets.normal(face).dot(&facets.normal(other)) < COPLANAR;
+        facets.area(face) > 0.0 && facets.beside(face).any(|(_, other)| is_alike(other))
+    };
+    // no more are looked at than it takes
+    let enough = (EXACT_SHARE * all as f64) as usize + 1;
+    (0..facets.slots() as u32).filter(is_coplanar).take(enough).count() == enough
 }
 
 /// Median over a sample of the first edges of faces, m.
 pub(super) fn median_edge(facets: &Facets) -> f64 {
-    let count = facets.facets.len();
+    let count = facets.slots();
     let step = (count / 10_000).max(1);
     let mut lengths: Vec<f64> = (0..count)
         .step_by(step)
-        .filter(|&face| facets.facets[face].area > 0.0)
+        .filter(|&face| facets.areas[face] > 0.0)
         .map(|face| facets.edge(face as u32, 0))
         .map(|[a, b]: [Point3<f64>; 2]| -> f64 {
             let v: Vector3<f64> = b - a;

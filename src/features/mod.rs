@@ -17,6 +17,7 @@ pub mod fit;
 mod grow;
 mod holes;
 mod k_means;
+mod marks;
 mod measure;
 mod observe;
 mod primitive;

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Point3, Vector3};
 
 use super::fit::Observation;
+use super::marks::Marks;
 use super::primitive::Primitive;
 use super::scene::Parted;
 use super::segment::Segmentation;
@@ -140,21 +141,23 @@ impl<'a> Observed<'a> {
     /// The vertices of some segments, in ascending order; of round ones in a drawing without those on chords: a tessellation
     /// has them where a neighbour needed a corner, and they are not on the surface.
     fn vertices_of(&self, segments: &[usize]) -> Vec<VertexId> {
-        let mesh = self.parted.facets.mesh;
-        let mut corners: Vec<(VertexId, FaceId)> = Vec::new();
+        let Parted { facets, segmentation, rounding, .. } = self.parted;
+        let mesh = facets.mesh;
+        let mut vertices = Marks::below(mesh.vertex_slots());
         for &face in segments.iter().flat_map(|&number| &self.parted.segment(number).faces) {
-            corners.extend(mesh.corners(FaceId(face)).map(|vertex| (vertex, FaceId(face))));
+            mesh.corners(FaceId(face)).iter().for_each(|vertex| vertices.add(vertex.0));
         }
-        corners.sort_unstable();
+        let vertices: Vec<VertexId> = vertices.iter().map(VertexId).collect();
         let primitive = self.parted.segment(segments[0]).primitive;
         let is_flat = matches!(primitive, Primitive::Plane { .. });
-        let rounding = self.parted.rounding.filter(|_| !is_flat);
-        let of_vertex = || corners.chunk_by(|a, b| a.0 == b.0);
-        let is_on = |faces: &[(VertexId, FaceId)]| {
-            rounding.is_none_or(|rounding| !is_on_chord(mesh, faces, &primitive, rounding))
+        let Some(rounding) = rounding.filter(|_| !is_flat) else { return vertices };
+        let is_of = |face: &FaceId| segments.contains(&(segmentation.of_face[face.0 as usize] as usize));
+        let is_on = |&vertex: &VertexId| {
+            let faces: Vec<FaceId> = mesh.star(vertex).iter().copied().filter(is_of).collect();
+            !is_on_chord(mesh, vertex, &faces, &primitive, rounding)
         };
-        let on: Vec<_> = of_vertex().filter(|faces| is_on(faces)).map(|faces| faces[0].0).collect();
-        if on.len() < LEAST_ON { of_vertex().map(|faces| faces[0].0).collect() } else { on }
+        let on: Vec<VertexId> = vertices.iter().copied().filter(is_on).collect();
+        if on.len() < LEAST_ON { vertices } else { on }
     }
 
     /// Share of the area of some segments that was touched.
@@ -207,24 +210,30 @@ pub(super) fn observation(touch: &ProbedPoint, group: u32) -> Observation {
 }
 
 /// Whether a vertex is between two others of its faces on a line that is not one of the straight lines of the surface.
-fn is_on_chord(mesh: &TriMesh, faces: &[(VertexId, FaceId)], primitive: &Primitive, rounding: f64) -> bool {
+fn is_on_chord(mesh: &TriMesh, vertex: VertexId, faces: &[FaceId], primitive: &Primitive, rounding: f64) -> bool {
     if faces.len() > MOST_AROUND {
         return false;
     }
-    let p = mesh.position(faces[0].0);
+    let p = mesh.position(vertex);
     let straight = match primitive {
         Primitive::Plane { .. } => return false,
         Primitive::Cylinder { axis, .. } => *axis,
         Primitive::Cone { apex, .. } => (p - apex).try_normalize(0.0).unwrap_or_else(Vector3::zeros),
     };
-    let others = || faces.iter().flat_map(|&(_, face)| mesh.triangle(face)).filter(|q| *q != p);
+    let mut around: Vec<VertexId> = faces.iter().flat_map(|&face| mesh.corners(face)).collect();
+    around.sort_unstable();
+    around.dedup();
+    let around: Vec<Point3<f64>> = around.into_iter().map(|other| mesh.position(other)).filter(|q| *q != p).collect();
     let is_between = |a: &Point3<f64>, b: &Point3<f64>| {
+        if (p - a).dot(&(p - b)) >= 0.0 {
+            return false;
+        }
         let Some(way) = (b - a).try_normalize(0.0) else { return false };
         let v = p - a;
         let off = (v - way * v.dot(&way)).norm();
-        (p - a).dot(&(p - b)) < 0.0 && off < rounding && way.dot(&straight).abs() < STRAIGHT
+        off < rounding && way.dot(&straight).abs() < STRAIGHT
     };
-    others().any(|a| others().any(|b| is_between(&a, &b)))
+    around.iter().any(|a| around.iter().any(|b| is_between(a, b)))
 }
 
 /// Numbers of the groups of touches that share their error.

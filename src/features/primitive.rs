@@ -4,6 +4,7 @@
 use nalgebra::{Matrix3, Point3, SMatrix, SVector, Vector3};
 
 use super::facets::Facets;
+use crate::mesh::FaceId;
 
 /// Which side of a curved surface the material is on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,6 +60,7 @@ impl Side {
 
 impl Primitive {
     /// Signed distance of `p`, m: positive in the air.
+    #[inline]
     pub fn distance(&self, p: &Point3<f64>) -> f64 {
         match self {
             Self::Plane { point, normal } => (p - point).dot(normal),
@@ -75,6 +77,7 @@ impl Primitive {
     }
 
     /// Outward unit normal at the foot of `p`.
+    #[inline]
     pub fn normal_at(&self, p: &Point3<f64>) -> Vector3<f64> {
         let radial = |origin: &Point3<f64>, axis: &Vector3<f64>| {
             let v = p - origin;
@@ -96,9 +99,13 @@ pub(super) struct Moments {
     origin: Point3<f64>,
     area: f64,
     first: Vector3<f64>,
+    /// lower triangle
     second: Matrix3<f64>,
     normals: Vector3<f64>,
 }
+
+/// Rows and columns of the lower triangle of a symmetric matrix.
+const LOWER: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
 
 impl Moments {
     /// - `origin`: near the faces, so that squares stay small.
@@ -108,20 +115,24 @@ impl Moments {
 
     pub fn add(&mut self, facets: &Facets, face: u32) {
         let area = facets.area(face);
-        let corners = facets.triangle(face).map(|p| p - self.origin);
+        let corners = facets.mesh.corners(FaceId(face)).map(|vertex| facets.mesh.position(vertex) - self.origin);
         let sum = corners[0] + corners[1] + corners[2];
         self.area += area;
         self.first += sum * (area / 3.0);
         // ∫ x xᵀ over a triangle: A/12 (Σ vᵢ vᵢᵀ + (Σ vᵢ)(Σ vᵢ)ᵀ)
-        let squares = corners.iter().fold(sum * sum.transpose(), |m, v| m + v * v.transpose());
-        self.second += squares * (area / 12.0);
+        for (i, j) in LOWER {
+            let square = corners.iter().fold(sum[i] * sum[j], |sum, v| sum + v[i] * v[j]);
+            self.second[(i, j)] += square * (area / 12.0);
+        }
         self.normals += facets.normal(face) * area;
     }
 
     /// The plane through the middle of the area, square to its thinnest direction; `None` without area.
     pub fn plane(&self) -> Option<Primitive> {
         let mean = self.first / self.area;
-        let spread = self.second / self.area - mean * mean.transpose();
+        let mut second = self.second;
+        second.fill_upper_triangle_with_lower_triangle();
+        let spread = second / self.area - mean * mean.transpose();
         let towards = self.normals.try_normalize(0.0)?;
         if !spread.iter().all(|x| x.is_finite()) {
             return None;
@@ -140,10 +151,8 @@ impl Moments {
 pub(super) struct Bend {
     /// largest standard deviation of the normals from their mean
     pub spread: f64,
-    /// direction along which there is least of them: the axis of a cylinder
-    axis: Vector3<f64>,
-    /// how much there is of them along it, and along the next
-    along: [f64; 2],
+    /// second moments of the normals
+    second: Matrix3<f64>,
 }
 
 impl Bend {
@@ -153,24 +162,29 @@ impl Bend {
             let (a, n) = (facets.area(face), facets.normal(face));
             area += a;
             first += n * a;
-            second += n * n.transpose() * a;
+            LOWER.iter().for_each(|&(i, j)| second[(i, j)] += n[i] * n[j] * a);
         }
         if area <= 0.0 {
             return None;
         }
+        second.fill_upper_triangle_with_lower_triangle();
         let (mean, second) = (first / area, second / area);
-        let root = |x: f64| x.max(0.0).sqrt();
         let spread = root((second - mean * mean.transpose()).symmetric_eigenvalues().max());
-        let eigen = second.symmetric_eigen();
-        let mut pairs = [0, 1, 2].map(|i| (eigen.eigenvalues[i], eigen.eigenvectors.column(i).into_owned()));
-        pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
-        Some(Self { spread, axis: pairs[0].1, along: [root(pairs[0].0), root(pairs[1].0)] })
+        Some(Self { spread, second })
     }
 
-    /// Axis of the cylinder whose normals these could be.
+    /// Axis of the cylinder whose normals these could be: the direction along which there is least of them.
     pub fn cylinder_axis(&self) -> Option<Vector3<f64>> {
-        (self.along[0] < CLEAR * self.along[1]).then_some(self.axis)
+        let eigen = self.second.symmetric_eigen();
+        let mut pairs = [0, 1, 2].map(|i| (eigen.eigenvalues[i], eigen.eigenvectors.column(i).into_owned()));
+        pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+        (root(pairs[0].0) < CLEAR * root(pairs[1].0)).then_some(pairs[0].1)
     }
+}
+
+/// Rounding may leave less than nothing.
+fn root(x: f64) -> f64 {
+    x.max(0.0).sqrt()
 }
 
 /// The direction without normals is clear when they differ so much more in the next.
@@ -257,7 +271,7 @@ fn refined_cylinder(start: &Primitive, facets: &Facets, faces: &[u32]) -> Option
             }
             let n = facets.normal(face);
             let arm = NORMAL_ARM * radius;
-            normal.add([0.0, 0.0, n.dot(&e) * arm, n.dot(&g) * arm, 0.0], -n.dot(&axis) * arm);
+            normal.add_two([2, 3], [n.dot(&e) * arm, n.dot(&g) * arm], -n.dot(&axis) * arm);
         }
         let x = normal.solution()?;
         point += e * x[0] + g * x[1];
@@ -292,6 +306,15 @@ impl<const N: usize> NormalEquations<N> {
             }
             self.right[i] += row[i] * value;
         }
+    }
+
+    /// A row of which all but two numbers, at rising places, are zero.
+    fn add_two(&mut self, [i, j]: [usize; 2], [a, b]: [f64; 2], value: f64) {
+        self.matrix[i][i] += a * a;
+        self.matrix[j][i] += b * a;
+        self.matrix[j][j] += b * b;
+        self.right[i] += a * value;
+        self.right[j] += b * value;
     }
 
     fn solution(&self) -> Option<SVector<f64, N>> {

@@ -69,7 +69,7 @@ fn loops(facets: &Facets) -> Vec<Loop> {
     let mut next: BTreeMap<VertexId, (VertexId, u32)> = BTreeMap::new();
     let mut forked: Vec<VertexId> = Vec::new();
     for (face, corners) in facets.mesh.faces() {
-        for (i, _) in facets.facets[face.0 as usize].beside.iter().enumerate().filter(|(_, beside)| **beside == NONE) {
+        for (i, _) in facets.beside[face.0 as usize].iter().enumerate().filter(|(_, beside)| **beside == NONE) {
             let (from, to) = (corners[i], corners[(i + 1) % 3]);
             let is_border = facets.mesh.faces_at_edge(from, to).count() == 1;
             if is_border && next.insert(from, (to, face.0)).is_some() {

@@ -1,6 +1,7 @@
 //! A mesh parted into pieces that one surface each explains.
 
 use super::facets::Facets;
+use super::marks::sort;
 use super::primitive::{Moments, Primitive};
 
 /// A connected piece of the mesh that one primitive explains.
@@ -37,15 +38,18 @@ impl Segmentation {
     pub(super) fn add(&mut self, facets: &Facets, mut segment: Segment) -> usize {
         let number = self.segments.len() as u32;
         segment.faces.sort_unstable();
+        let mut poorer = Vec::new();
         for &face in &segment.faces {
             let before = std::mem::replace(&mut self.of_face[face as usize], number);
             if before != Self::NONE {
-                let poorer = &mut self.segments[before as usize];
-                poorer.area -= facets.area(face);
-                if let Ok(at) = poorer.faces.binary_search(&face) {
-                    poorer.faces.remove(at);
-                }
+                self.segments[before as usize].area -= facets.area(face);
+                poorer.push(before);
             }
+        }
+        poorer.sort_unstable();
+        poorer.dedup();
+        for before in poorer {
+            self.segments[before as usize].faces.retain(|&face| self.of_face[face as usize] == before);
         }
         self.segments.push(segment);
         number as usize
@@ -64,6 +68,7 @@ impl Segmentation {
         }
         let parts = std::mem::take(&mut self.segments);
         let mut number_of = vec![0; parts.len()];
+        let mut joint = Vec::new();
         // the largest is first, so that each root comes before what belongs to it
         for (at, part) in parts.into_iter().enumerate() {
             let of = root(&of, at);
@@ -76,7 +81,13 @@ impl Segmentation {
             whole.area += part.area;
             whole.tolerance = whole.tolerance.max(part.tolerance);
             whole.faces.extend(part.faces);
-            whole.faces.sort_unstable();
+            joint.push(number_of[of]);
+        }
+        joint.sort_unstable();
+        joint.dedup();
+        for number in joint {
+            let whole = &mut self.segments[number];
+            sort(&mut whole.faces, facets.slots());
             let mut moments = Moments::about(facets.triangle(whole.faces[0])[0]);
             whole.faces.iter().for_each(|&face| moments.add(facets, face));
             whole.primitive = moments.plane().unwrap_or(whole.primitive);
