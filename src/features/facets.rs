@@ -66,7 +66,7 @@ impl<'a> Facets<'a> {
     /// Ends of the edges of a face that have no other face at all, m.
     pub fn open_edges(&self, face: u32) -> impl Iterator<Item = [Point3<f64>; 2]> + '_ {
         let corners = self.mesh.corners(FaceId(face));
-        let beside = self.facets[face as usize].beside;
+        let beside = self.beside[face as usize];
         let is_open = move |&edge: &usize| {
             let ends = (corners[edge], corners[(edge + 1) % 3]);
             beside[edge] == NONE && self.mesh.faces_at_edge(ends.0, ends.1).count() == 1
