@@ -80,7 +80,7 @@ pub struct Feature {
     pub width: Option<Measured<f64>>,
     /// from opening to floor, or the height of a boss, m
     pub depth: Option<Measured<f64>>,
-    /// whether a hole or slot goes through
+    /// whether a hole or slot goes through; `None` where the mesh ends before the hole does, or nobody touched its floor
     pub through: Option<bool>,
     /// full angle of the countersink, rad
     pub cone_angle: Option<Measured<f64>>,

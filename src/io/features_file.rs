@@ -103,7 +103,7 @@ pub struct FeatureRecord {
     /// without the tip; of a round opening in a sheet left out, as is `through`); boss: its height
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth_mm: Option<f64>,
-    /// hole, slot, pocket
+    /// hole, slot, pocket; left out where the mesh ends before the hole does, or nobody touched its floor
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub through: Option<bool>,
     /// hole: full angle of its countersink
