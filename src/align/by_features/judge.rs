@@ -5,6 +5,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use super::matching::Matching;
 use super::{Alternative, OrientedPoint, SAME, Surfaces};
 use crate::align::icp::{IcpFit, IcpParams, icp};
+use crate::mesh::Alone;
 
 /// Points that bring each motion to rest, at most; all judge it, and bring the last ones to rest.
 const MOST_POINTS: usize = 5_000;
@@ -116,7 +117,7 @@ impl<'a> Judge<'a> {
     fn rest(&self, points: &[Point3<f64>], coarse: &Isometry3<f64>) -> Option<IcpFit> {
         let Surfaces { target, tree, .. } = self.surfaces?;
         let params = IcpParams { reach: REACH * self.matching.tolerance, ..IcpParams::default() };
-        icp(points, target, tree, coarse, &params).ok()
+        icp(points, target, tree, coarse, &params, &Alone).ok()
     }
 
     fn judged(&self, motion: Isometry3<f64>, fit: Option<IcpFit>) -> Judged {

@@ -12,7 +12,7 @@ use crate::align::{
     align_features, fit_pairs, icp,
 };
 use crate::cli::progress::Progress;
-use crate::cli::{CliError, tell};
+use crate::cli::{CliError, Threads, tell};
 use crate::compare::{Shape, sample_surface, surface_area};
 use crate::features::detect;
 use crate::io::pairs_file::read_pairs;
@@ -120,7 +120,7 @@ type Aligned = Result<(Isometry3<f64>, Alignment), CliError>;
 pub(super) fn aligned_by_icp(mesh: &TriMesh, truth: Shape<'_>, seed: u64) -> Aligned {
     let _aligning = Progress::stage("align");
     let points: Vec<_> = spread(mesh, POINTS, seed).iter().map(|p| p.point).collect();
-    let fit = icp(&points, truth.mesh, truth.tree, &Isometry3::identity(), &IcpParams::default())?;
+    let fit = icp(&points, truth.mesh, truth.tree, &Isometry3::identity(), &IcpParams::default(), &Threads)?;
     let told = Alignment { fit: Some(FitTold::of(&fit, points.len())), ..Alignment::of_icp("icp", &fit) };
     told.warn();
     Ok((fit.source_to_target, told))
