@@ -9,6 +9,7 @@ use nalgebra::{Point3, Vector3};
 use super::facets::{Facets, NONE};
 use super::primitive::{Bend, Moments, Primitive, cylinder_of, refined};
 use super::segment::{Segment, Segmentation};
+use crate::mesh::median;
 
 /// Lengths that come with the mesh.
 #[derive(Clone, Copy, Debug)]
@@ -505,6 +506,5 @@ pub(super) fn median_edge(facets: &Facets) -> f64 {
             v.norm()
         })
         .collect();
-    let middle = lengths.len() / 2;
-    if lengths.is_empty() { 0.0 } else { *lengths.select_nth_unstable_by(middle, f64::total_cmp).1 }
+    median(&mut lengths).unwrap_or(0.0)
 }
