@@ -6,8 +6,9 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use touchup::align::{IcpParams, icp};
+use touchup::cli::Threads;
 use touchup::compare::deviations;
-use touchup::mesh::{FaceTree, TriMesh};
+use touchup::mesh::{Alone, FaceTree, TriMesh, Workers};
 
 #[path = "../tests/common/wavy.rs"]
 mod wavy;
@@ -42,22 +43,43 @@ fn truth(faces: usize) -> (TriMesh, FaceTree) {
     (mesh, tree)
 }
 
-/// Signed distance of a million points from a surface of so many faces.
+/// Signed distance of a million points from a surface of so many faces, as `touchup compare` measures it.
 #[divan::bench(args = [100_000, 1_000_000, 2_000_000], sample_count = 5)]
 fn point_to_surface(bencher: Bencher, faces: usize) {
+    distances(bencher, faces, &Threads);
+}
+
+/// The same by one thread.
+#[divan::bench(args = [100_000, 1_000_000, 2_000_000], sample_count = 5)]
+fn point_to_surface_alone(bencher: Bencher, faces: usize) {
+    distances(bencher, faces, &Alone);
+}
+
+fn distances(bencher: Bencher, faces: usize, workers: &dyn Workers) {
     let (points, (mesh, tree)) = (points(1_000_000), truth(faces));
-    let largest = deviations(&points, &mesh, &tree).expect("finite").into_iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+    let found = deviations(&points, &mesh, &tree, workers).expect("finite");
+    let largest = found.into_iter().fold(0.0, |a: f64, b| a.max(b.abs()));
     assert!(largest > NOISE && largest < 10.0 * NOISE, "{largest}");
-    bencher.counter(ItemsCount::new(points.len())).bench(|| deviations(&points, &mesh, &tree));
+    bencher.counter(ItemsCount::new(points.len())).bench(|| deviations(&points, &mesh, &tree, workers));
 }
 
 /// A hundred thousand points, 1 mm and 0.6° off, onto a surface of so many faces.
 #[divan::bench(args = [200_000, 2_000_000], sample_count = 10)]
 fn points_to_mesh(bencher: Bencher, faces: usize) {
+    register(bencher, faces, &Threads);
+}
+
+/// The same by one thread.
+#[divan::bench(args = [200_000, 2_000_000], sample_count = 10)]
+fn points_to_mesh_alone(bencher: Bencher, faces: usize) {
+    register(bencher, faces, &Alone);
+}
+
+fn register(bencher: Bencher, faces: usize, workers: &dyn Workers) {
     let moved = Isometry3::new(Vector3::new(0.6e-3, -0.5e-3, 0.6e-3), Vector3::new(0.004, -0.005, 0.008));
     let (mut points, (mesh, tree)) = (points(100_000), truth(faces));
     points.iter_mut().for_each(|p| *p = moved.inverse() * *p);
-    let register = || icp(&points, &mesh, &tree, &Isometry3::identity(), &IcpParams::default());
+    let register = || icp(&points, &mesh, &tree, &Isometry3::identity(), &IcpParams::default(), workers);
     let found = register().expect("roughly in place");
     // the scatter over the root of the count, times five
     assert!((found.source_to_target.translation.vector - moved.translation.vector).norm() < 5e-6, "{found:?}");

@@ -10,10 +10,10 @@ use rand_pcg::Pcg64;
 use touchup::align::{IcpError, IcpFit, IcpParams, icp};
 use touchup::compare::{sample_surface, surface_area};
 use touchup::io::mesh_file::{MeshUnit, read_mesh};
-use touchup::mesh::{FaceTree, TriMesh};
+use touchup::mesh::{Alone, FaceTree, TriMesh};
 
 fn fitted(points: &[Point3<f64>], target: &TriMesh) -> Result<IcpFit, IcpError> {
-    icp(points, target, &FaceTree::new(target), &Isometry3::identity(), &IcpParams::default())
+    icp(points, target, &FaceTree::new(target), &Isometry3::identity(), &IcpParams::default(), &Alone)
 }
 
 /// About `count` points of a mesh, with normal noise on each axis (m).
@@ -150,7 +150,7 @@ fn what_cannot_be_fitted_is_refused_with_numbers() {
     let tree = FaceTree::new(&plane);
     let far = vec![Point3::new(0.0, 0.0, 1.0); 100];
     let near = IcpParams { reach: 1e-3, ..Default::default() };
-    let refused = icp(&far, &plane, &tree, &Isometry3::identity(), &near).unwrap_err();
+    let refused = icp(&far, &plane, &tree, &Isometry3::identity(), &near, &Alone).unwrap_err();
     assert_eq!(refused, IcpError::TooFew { found: 0, needed: 12, reach: 1e-3 });
     assert_eq!(
         refused.to_string(),

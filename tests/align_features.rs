@@ -265,6 +265,92 @@ fn what_cannot_be_aligned_is_told_with_what_to_do() {
     assert!(matches!(told, FeaturesError::NoMatch { .. }), "{told:?}");
 }
 
+/// A body of revolution about z, of so many sides: corners of its outline as radius and height, m, from the axis outside and
+/// up; where it begins and ends at the same radius above 0 it has a bore.
+fn turned_part(outline: &[[f64; 2]], sides: u32) -> TriMesh {
+    let is_open = outline[0][0] == 0.0;
+    let ring = |[radius, height]: [f64; 2]| {
+        (0..sides).map(move |i| {
+            let angle = std::f64::consts::TAU * f64::from(i) / f64::from(sides);
+            Point3::new(radius * angle.cos(), radius * angle.sin(), height)
+        })
+    };
+    let rings: Vec<[f64; 2]> = outline.iter().copied().filter(|[radius, _]| *radius > 0.0).collect();
+    let mut positions: Vec<Point3<f64>> = rings.iter().flat_map(|&corner| ring(corner)).collect();
+    let count = rings.len() as u32;
+    let strips = if is_open { count - 1 } else { count };
+    let mut faces = Vec::new();
+    for (low, i) in (0..strips).flat_map(|low| (0..sides).map(move |i| (low, i))) {
+        let (high, j) = ((low + 1) % count, (i + 1) % sides);
+        let [a, b, c, d] = [low * sides + i, low * sides + j, high * sides + j, high * sides + i];
+        faces.extend([[a, b, c], [a, c, d]]);
+    }
+    if is_open {
+        let [bottom, top] = [positions.len() as u32, positions.len() as u32 + 1];
+        positions.extend([outline[0], outline[outline.len() - 1]].map(|[_, z]| Point3::new(0.0, 0.0, z)));
+        let last = (count - 1) * sides;
+        faces.extend((0..sides).flat_map(|i| {
+            let j = (i + 1) % sides;
+            [[bottom, j, i], [top, last + i, last + j]]
+        }));
+    }
+    TriMesh::new(positions, faces).unwrap()
+}
+
+fn mm(outline: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    outline.iter().map(|corner| corner.map(|x| x * 1e-3)).collect()
+}
+
+// A continuum of motions, of which any one would be as good: the axis is that of the body, z before it was moved.
+#[test]
+fn a_part_of_revolution_is_told_to_be_free_to_turn() {
+    let bar =
+        mm(&[[0.0, 0.0], [15.0, 0.0], [15.0, 20.0], [10.0, 20.0], [10.0, 45.0], [6.0, 45.0], [6.0, 60.0], [0.0, 60.0]]);
+    let flange = mm(&[[8.0, 0.0], [40.0, 0.0], [40.0, 10.0], [20.0, 10.0], [20.0, 25.0], [8.0, 25.0]]);
+    let disc = mm(&[[8.0, 0.0], [40.0, 0.0], [40.0, 10.0], [8.0, 10.0]]);
+    let mut rng = Pcg64::new(17, 2);
+    for (name, outline, ways) in [("bar", &bar, 1), ("flange", &flange, 1), ("disc", &disc, 2)] {
+        for sides in [64, 90] {
+            let target = Part::new(turned_part(outline, sides));
+            let known = anywhere(&mut rng);
+            let source = target.moved(&known.inverse());
+            let told = align(&source, &source.features, &target);
+            let Err(FeaturesError::FreeTurn { turn, alternatives }) = told else {
+                panic!("{name}, {sides} sides: {told:?}")
+            };
+            assert!(turn.axis.z.abs() > 0.9999 && turn.through.coords.xy().norm() < 0.1e-3, "{name}: {turn:?}");
+            assert_eq!(alternatives.len(), ways, "{name}, {sides}: laid onto the axis from one end, or from both");
+            // what is told is right but for the turn
+            let turned = alternatives[0].source_to_target * known.inverse();
+            let off = |p: Point3<f64>| {
+                let [own, there] = [p, turned * p];
+                (own.z - there.z).abs().max((own.coords.xy().norm() - there.coords.xy().norm()).abs())
+            };
+            let largest =
+                [[0.01, 0.0, 0.0], [0.0, 0.04, 0.01]].map(|p| off(Point3::from(p))).into_iter().fold(0.0, f64::max);
+            assert!(name == "disc" || largest < 0.1e-3, "{name}: {largest}");
+        }
+    }
+}
+
+// Two holes beside the middle, at different distances, hold the turn.
+#[test]
+fn a_flange_with_more_than_its_middle_hole_is_not_free() {
+    let Some(part) = Part::read("crs_ee3.stl", MeshUnit::Metre) else { return };
+    let told = align(&part, &part.features, &part);
+    assert!(told.is_ok(), "{told:?}");
+    // its middle hole and the planes square to it alone tell no turn, and the surface says that there is one
+    let middle = |f: &Feature| match f.kind {
+        Kind::Hole => f.centre.value.coords.xz().norm() < 1e-3,
+        Kind::Plane => f.axis.as_ref().is_some_and(|axis| axis.value.y.abs() > 0.99),
+        _ => false,
+    };
+    let few: Vec<Feature> = part.features.iter().filter(|f| middle(f)).cloned().collect();
+    assert!(few.iter().any(|f| f.kind == Kind::Hole));
+    let told = align(&part, &few, &part).unwrap_err();
+    assert_eq!(told, FeaturesError::TooFew { side: FeaturesSide::Source, found: few.len() });
+}
+
 // ---- at the boundary of the process -------------------------------------------------------------------------------
 
 fn touchup(arguments: &[&str]) -> std::process::Output {

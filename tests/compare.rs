@@ -6,13 +6,17 @@ use std::process::{Command, Output};
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use proptest::prelude::*;
+use touchup::align::{IcpParams, icp};
 use touchup::compare::{
     CompareError, CompareParams, Comparison, Panel, Picture, PictureParams, Region, Regions, Shape, Summary,
     cloud_distances, colour_of, compare, deviations, draw_picture, sample_surface, surface_area, tilts,
 };
 use touchup::io::mesh_file::{MeshUnit, VertexColumn, read_mesh, read_vertex_columns, write_mesh, write_mesh_with};
 use touchup::io::png::write_png;
-use touchup::mesh::{FaceTree, TriMesh};
+use touchup::mesh::{Alone, FaceTree, Job, TriMesh, Workers};
+
+#[path = "common/wavy.rs"]
+mod wavy;
 
 /// A square of 20 mm at a height, in 2 × `cells`² triangles, normals up.
 fn square(cells: u32, height: f64) -> TriMesh {
@@ -58,7 +62,7 @@ fn icosahedron(radius: f64) -> TriMesh {
 fn compared(mesh: &TriMesh, truth: &TriMesh, params: &CompareParams) -> Comparison {
     let trees = [mesh, truth].map(FaceTree::new);
     let shapes = [Shape { mesh, tree: &trees[0] }, Shape { mesh: truth, tree: &trees[1] }];
-    compare(shapes[0], shapes[1], Regions::Unknown, params).unwrap()
+    compare(shapes[0], shapes[1], Regions::Unknown, params, &Alone).unwrap()
 }
 
 fn few() -> CompareParams {
@@ -107,17 +111,17 @@ fn a_ball_of_facets_has_the_distances_of_its_facets() {
     let truth = icosahedron(inner);
     let tree = FaceTree::new(&truth);
     let above_corners = icosahedron(outer);
-    for deviation in deviations(above_corners.positions(), &truth, &tree).unwrap() {
+    for deviation in deviations(above_corners.positions(), &truth, &tree, &Alone).unwrap() {
         assert!((deviation - (outer - inner)).abs() < 1e-16, "{deviation}");
     }
     // the radius of the ball inside an icosahedron over that around it: √((5 + 2√5) / 15)
     let in_radius = inner * ((5.0 + 2.0 * 5.0_f64.sqrt()) / 15.0).sqrt();
     let above_facets: Vec<_> =
         truth.faces().map(|(face, _)| Point3::from(truth.barycentre(face).coords.normalize() * outer)).collect();
-    for deviation in deviations(&above_facets, &truth, &tree).unwrap() {
+    for deviation in deviations(&above_facets, &truth, &tree, &Alone).unwrap() {
         assert!((deviation - (outer - in_radius)).abs() < 1e-16, "{deviation}");
     }
-    let centre = deviations(&[Point3::origin()], &truth, &tree).unwrap()[0];
+    let centre = deviations(&[Point3::origin()], &truth, &tree, &Alone).unwrap()[0];
     assert!((centre + in_radius).abs() < 1e-16, "{centre}");
 }
 
@@ -180,8 +184,8 @@ fn regions_are_told_apart_and_looked_up_for_the_scan() {
     let trees = [&mesh, &truth, &scan].map(FaceTree::new);
     let [after, part, before] =
         [(&mesh, 0), (&truth, 1), (&scan, 2)].map(|(mesh, at)| Shape { mesh, tree: &trees[at] });
-    let own = compare(after, part, Regions::Own(&regions), &few()).unwrap();
-    let through = compare(before, part, Regions::Of(after, &regions), &few()).unwrap();
+    let own = compare(after, part, Regions::Own(&regions), &few(), &Alone).unwrap();
+    let through = compare(before, part, Regions::Of(after, &regions), &few(), &Alone).unwrap();
     for found in [&own, &through] {
         let names: Vec<_> = found.regions.iter().map(|part| part.region).collect();
         assert_eq!(names, [None, Some(Region::Touched), Some(Region::Untouched)]);
@@ -203,15 +207,15 @@ fn what_is_no_number_or_no_mesh_is_refused() {
     let mesh = square(1, 0.0);
     let tree = FaceTree::new(&mesh);
     let bad = [Point3::origin(), Point3::new(0.0, f64::INFINITY, 0.0)];
-    assert_eq!(deviations(&bad, &mesh, &tree), Err(CompareError::NotFinite { point: 1 }));
+    assert_eq!(deviations(&bad, &mesh, &tree, &Alone), Err(CompareError::NotFinite { point: 1 }));
     assert_eq!(cloud_distances(&bad, &bad[..1]), Err(CompareError::NotFinite { point: 1 }));
     let empty = TriMesh::new(vec![Point3::origin()], vec![]).unwrap();
     let nothing = FaceTree::new(&empty);
-    assert_eq!(deviations(&bad[..1], &empty, &nothing), Err(CompareError::NoFaces));
+    assert_eq!(deviations(&bad[..1], &empty, &nothing, &Alone), Err(CompareError::NoFaces));
     assert_eq!(tilts(&mesh, &empty, &nothing), Err(CompareError::NoFaces));
     let shapes = [Shape { mesh: &mesh, tree: &tree }, Shape { mesh: &empty, tree: &nothing }];
     for (mesh, truth) in [(shapes[0], shapes[1]), (shapes[1], shapes[0]), (shapes[1], shapes[1])] {
-        assert_eq!(compare(mesh, truth, Regions::Unknown, &few()), Err(CompareError::NoFaces));
+        assert_eq!(compare(mesh, truth, Regions::Unknown, &few(), &Alone), Err(CompareError::NoFaces));
     }
 }
 
@@ -467,4 +471,43 @@ fn bad_use_is_refused_before_any_work() {
     assert_eq!(told(&nowhere).0, 1);
     let missing = touchup(&["compare", &mesh, "/no/such/part.stl"]);
     assert_eq!(told(&missing).0, 3);
+}
+
+/// So many threads, each with its share.
+struct SoMany(usize);
+
+impl Workers for SoMany {
+    fn count(&self) -> usize {
+        self.0
+    }
+
+    fn run(&self, jobs: Vec<Job<'_>>) {
+        std::thread::scope(|threads| jobs.into_iter().for_each(|job| drop(threads.spawn(job))));
+    }
+}
+
+#[test]
+fn any_number_of_threads_finds_the_same_to_the_last_bit() {
+    let mesh = wavy::wavy_plate(20_000);
+    let tree = FaceTree::new(&mesh);
+    let shape = Shape { mesh: &mesh, tree: &tree };
+    let points: Vec<Point3<f64>> = sample_surface(&mesh, 3e5, 1)
+        .iter()
+        .enumerate()
+        .map(|(i, s)| s.point + Vector3::z() * 1e-6 * i as f64)
+        .collect();
+    assert!(points.len() > 20_000);
+    let bits = |workers: &dyn Workers| -> Vec<u64> {
+        deviations(&points, &mesh, &tree, workers).unwrap().into_iter().map(f64::to_bits).collect()
+    };
+    let start = Isometry3::identity();
+    let register = |workers: &dyn Workers| icp(&points, &mesh, &tree, &start, &IcpParams::default(), workers);
+    let whole = |workers: &dyn Workers| compare(shape, shape, Regions::Unknown, &few(), workers);
+    let (one, motion, all) = (bits(&Alone), register(&Alone), whole(&Alone));
+    // one by one, in the order given
+    let by_hand = |p| tree.closest(&mesh, p, f64::INFINITY).unwrap().distance_squared.sqrt().to_bits();
+    assert!(points.iter().zip(&one).all(|(p, found)| by_hand(p) == found & (u64::MAX >> 1)));
+    for workers in [&SoMany(2) as &dyn Workers, &SoMany(3), &touchup::cli::Threads] {
+        assert!(bits(workers) == one && register(workers) == motion && whole(workers) == all);
+    }
 }

@@ -149,7 +149,9 @@ fn a_part_that_was_not_changed_is_not_called_changed() {
             assert_eq!(regions(&told, "changed part").len(), 0, "{seed}: {told}");
             assert_eq!(area(&told, "changed part"), 0.0);
             let felt = area(&told, "agrees") + area(&told, "scanner error");
-            let small = |class| area(&told, class) < 0.02 * felt;
+            // noise at an edge cannot be told from a small change, least of all that of a poor scanner
+            let share = if scanner.noise > 0.3e-3 { 0.06 } else { 0.04 };
+            let small = |class| area(&told, class) < share * felt;
             assert!(small("unsure") && small("bad touch"), "{seed}: {} {}", told["classes"], told["regions"]);
             // what it was told to be, as far as a few dozen independent places can tell
             let noise = told["scanner"]["noise_mm"].as_f64().unwrap();
@@ -238,4 +240,24 @@ fn what_is_written_is_what_was_told() {
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&output.stderr).contains("give the PLY that refine wrote"));
     assert!(Path::new(&case.text("map.ply")).exists());
+}
+
+// The scan is turned by 0.15° and shifted by 0.2 mm, of which noise of 0.6 mm hides most: what is told is no more than that,
+// as far as the stated deviation goes. Turned by 3°, it is told in most.
+#[test]
+fn a_scan_is_told_to_be_turned_only_as_far_as_that_is_known() {
+    let mut told_turned = 0;
+    for seed in [1, 2, 3] {
+        let poor = ScannerParams { seed, ..Default::default() };
+        let told = Case::new(&plate(), &plate(), &poor, |_| ()).disagree();
+        let vector = |name: &str| Vector3::from_fn(|i, _| told["misplaced"][name][i].as_f64().unwrap());
+        if !told["misplaced"].is_null() {
+            let far = vector("turn_deg").norm() - 0.15;
+            assert!(far < 3.0 * vector("turn_std_deg").norm(), "{seed}: {}", told["misplaced"]);
+        }
+        let turned = ScannerParams { misplaced_angle: 3f64.to_radians(), ..poor };
+        let told = Case::new(&plate(), &plate(), &turned, |_| ()).disagree();
+        told_turned += usize::from(!told["misplaced"].is_null());
+    }
+    assert!(told_turned >= 2, "{told_turned} of 3");
 }

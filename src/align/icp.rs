@@ -8,7 +8,7 @@
 
 use nalgebra::{Isometry3, Matrix6, Point3, UnitQuaternion, Vector3, Vector6};
 
-use crate::mesh::{FaceTree, TriMesh, coherent_order};
+use crate::mesh::{FaceTree, TriMesh, Workers, coherent_order, map_by};
 
 /// Settings of [`icp`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -134,6 +134,7 @@ const ROUNDING: f64 = 1e-11;
 /// - `points`: m, in their own frame, in any order; a subset of them finds the way, all of them tell the end.
 /// - `tree`: over the faces of `target`.
 /// - `start`: moves the points to about where they belong.
+/// - `workers`: who looks for the closest places; the motion is the same to the last bit.
 /// - returns: the motion; directions that are undetermined are listed in it.
 ///
 /// # Errors
@@ -143,11 +144,12 @@ const ROUNDING: f64 = 1e-11;
 /// ```
 /// use nalgebra::{Isometry3, Point3};
 /// use touchup::align::{IcpParams, icp};
-/// use touchup::mesh::{FaceTree, TriMesh};
+/// use touchup::mesh::{Alone, FaceTree, TriMesh};
 /// let p = |x, y| Point3::new(x, y, 0.0);
 /// let square = TriMesh::new(vec![p(0., 0.), p(1., 0.), p(1., 1.), p(0., 1.)], vec![[0, 1, 2], [0, 2, 3]])?;
 /// let above: Vec<_> = (0..100).map(|i| Point3::new(0.1 * f64::from(i % 10), 0.1 * f64::from(i / 10), 0.02)).collect();
-/// let fit = icp(&above, &square, &FaceTree::new(&square), &Isometry3::identity(), &IcpParams::default())?;
+/// let tree = FaceTree::new(&square);
+/// let fit = icp(&above, &square, &tree, &Isometry3::identity(), &IcpParams::default(), &Alone)?;
 /// assert!((fit.source_to_target.translation.z + 0.02).abs() < 1e-9);
 /// assert_eq!(fit.undetermined().count(), 3, "it slides in two directions, and turns");
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -158,12 +160,13 @@ pub fn icp(
     tree: &FaceTree,
     start: &Isometry3<f64>,
     params: &IcpParams,
+    workers: &dyn Workers,
 ) -> Result<IcpFit, IcpError> {
     if let Some(point) = points.iter().position(|p| !p.coords.iter().all(|x| x.is_finite())) {
         return Err(IcpError::NotFinite { point });
     }
     let ordered: Vec<_> = coherent_order(points).into_iter().map(|at| points[at as usize]).collect();
-    let mut search = Search::new(&ordered, target, tree, start, params)?;
+    let mut search = Search::new(&ordered, target, tree, start, params, workers)?;
     for count in LEVELS.into_iter().filter(|&count| count < points.len()).chain([points.len()]) {
         let stride = points.len() / count;
         loop {
@@ -186,6 +189,7 @@ struct Search<'a> {
     points: &'a [Point3<f64>],
     target: &'a TriMesh,
     tree: &'a FaceTree,
+    workers: &'a dyn Workers,
     pose: Isometry3<f64>,
     /// of the points, in their own frame
     middle: Point3<f64>,
@@ -230,6 +234,7 @@ impl<'a> Search<'a> {
         tree: &'a FaceTree,
         start: &Isometry3<f64>,
         params: &IcpParams,
+        workers: &'a dyn Workers,
     ) -> Result<Self, IcpError> {
         let stride = (points.len() / LEVELS[0]).max(1);
         let distance =
@@ -249,6 +254,7 @@ impl<'a> Search<'a> {
             points,
             target,
             tree,
+            workers,
             pose: *start,
             middle,
             lever: lever.max(f64::MIN_POSITIVE),
@@ -293,15 +299,17 @@ impl<'a> Search<'a> {
     /// The closest places of every `stride`-th point, as far as they are within the width.
     fn find_partners(&mut self, stride: usize) {
         let centre = self.pose * self.middle;
-        self.partners.clear();
-        for p in self.points.iter().step_by(stride) {
-            let x = self.pose * p;
-            let Some(hit) = self.tree.closest(self.target, &x, self.width) else { continue };
+        let partner = |at: usize| {
+            let x = self.pose * self.points[at * stride];
+            let hit = self.tree.closest(self.target, &x, self.width)?;
             let normal = self.target.normal(hit.face);
             let turn = (x - centre).cross(&normal) / self.lever;
             let row = Vector6::new(normal.x, normal.y, normal.z, turn.x, turn.y, turn.z);
-            self.partners.push(Partner { row, residual: normal.dot(&(x - hit.point)) });
-        }
+            Some(Partner { row, residual: normal.dot(&(x - hit.point)) })
+        };
+        let found = map_by(self.workers, self.points.len().div_ceil(stride), partner);
+        self.partners.clear();
+        self.partners.extend(found.into_iter().flatten());
     }
 
     /// The normal equations with the weights that the residuals have after `step`.

@@ -5,7 +5,7 @@ mod icp;
 mod pairs;
 
 pub use by_features::{
-    Alternative, FeaturesError, FeaturesParams, FeaturesSide, OrientedPoint, Surfaces, align_features,
+    Alternative, FeaturesError, FeaturesParams, FeaturesSide, FreeTurn, OrientedPoint, Surfaces, align_features,
 };
 pub use icp::{IcpError, IcpFit, IcpParams, Motion, icp};
 pub use pairs::{PairsError, PairsFit, PairsParams, PointPair, Side, fit_pairs};

@@ -13,7 +13,7 @@ use tracing::warn;
 use self::alignment::{Alignment, aligned_by_features, aligned_by_icp, aligned_by_pairs, moved};
 use self::table::ComparisonTold;
 use super::progress::Progress;
-use super::{CliError, Losses, tell};
+use super::{CliError, Losses, Threads, tell};
 use crate::compare::{
     CompareParams, Comparison, Panel, PictureParams, Region, Regions, Shape, colour_of, compare as compare_shapes,
     draw_picture,
@@ -218,14 +218,14 @@ impl CompareArguments {
         let Some(before) = before else {
             return Ok(MeasuredBoth {
                 before: None,
-                after: compare_shapes(mesh.shape(), truth.shape(), own, &params)?,
+                after: compare_shapes(mesh.shape(), truth.shape(), own, &params, &Threads)?,
             });
         };
         let through = regions.map_or(Regions::Unknown, |regions| Regions::Of(mesh.shape(), regions));
-        let before = compare_shapes(before.shape(), truth.shape(), through, &params)?;
+        let before = compare_shapes(before.shape(), truth.shape(), through, &params, &Threads)?;
         // the scale of what was shows how much better it is
         let params = CompareParams { range: Some(before.range), ..params };
-        let after = compare_shapes(mesh.shape(), truth.shape(), own, &params)?;
+        let after = compare_shapes(mesh.shape(), truth.shape(), own, &params, &Threads)?;
         Ok(MeasuredBoth { before: Some(before), after })
     }
 

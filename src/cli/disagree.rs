@@ -77,6 +77,10 @@ struct MisplacedTold {
     shift_mm: [f64; 3],
     /// and rotation vector
     turn_deg: [f64; 3],
+    /// standard deviation on each axis
+    shift_std_mm: [f64; 3],
+    /// and about each
+    turn_std_deg: [f64; 3],
     center_mm: [f64; 3],
 }
 
@@ -240,6 +244,8 @@ impl Told {
             misplaced: found.misplaced.as_ref().map(|misplaced| MisplacedTold {
                 shift_mm: mm(&misplaced.shift.into()),
                 turn_deg: misplaced.turn.map(f64::to_degrees).into(),
+                shift_std_mm: mm(&misplaced.shift_sigma.into()),
+                turn_std_deg: misplaced.turn_sigma.map(f64::to_degrees).into(),
                 center_mm: mm(&misplaced.centre),
             }),
             classes: Class::ALL.into_iter().enumerate().map(class).collect(),

@@ -18,7 +18,10 @@ mod refine;
 mod replay;
 mod simulate;
 mod step;
+mod threads;
 mod touched;
+
+pub use threads::Threads;
 
 use std::ffi::OsString;
 use std::io::{ErrorKind, Write, stderr, stdin, stdout};

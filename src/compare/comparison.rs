@@ -2,12 +2,12 @@
 
 use nalgebra::Point3;
 
-use super::deviation::signed;
+use super::deviation::{at_closest_places, signed};
 use super::normals::{Tilt, TiltSummary, tilts};
 use super::sampling::{Sample, nearest_corner, sample_surface, surface_area};
 use super::summary::{Histogram, Summary, quantile};
-use super::{CompareError, closest_places, cloud_distances};
-use crate::mesh::{FaceId, FaceTree, TriMesh, VertexId};
+use super::{CompareError, cloud_distances};
+use crate::mesh::{FaceId, FaceTree, TriMesh, VertexId, Workers};
 
 /// A mesh and the tree over its faces.
 #[derive(Clone, Copy, Debug)]
@@ -142,6 +142,8 @@ struct Measured {
 
 /// Compares a mesh with the truth; both lie in one frame.
 ///
+/// - `workers`: who looks for the closest places; what comes out is the same to the last bit.
+///
 /// # Errors
 /// [`CompareError::NoFaces`] of either; [`CompareError::TooManyPoints`].
 pub fn compare(
@@ -149,6 +151,7 @@ pub fn compare(
     truth: Shape<'_>,
     regions: Regions<'_>,
     params: &CompareParams,
+    workers: &dyn Workers,
 ) -> Result<Comparison, CompareError> {
     // by the truth alone, so that a scan and what became of it are held against the same places
     let area = surface_area(truth.mesh).max(surface_area(mesh.mesh) / MOST_AREA);
@@ -159,7 +162,7 @@ pub fn compare(
     // a mesh that is the truth must not meet its own points
     let [seed, other] = [params.seed, params.seed.wrapping_add(1)];
     let samples = [sample_surface(mesh.mesh, density, seed), sample_surface(truth.mesh, density, other)];
-    let measured = measure(mesh, truth, regions, &samples, params.reach)?;
+    let measured = measure(mesh, truth, regions, &samples, params.reach, workers)?;
     let range = params.range.unwrap_or_else(|| fitting_range(&measured.to_truth.values));
     let parts = match regions {
         Regions::Unknown => Vec::new(),
@@ -182,6 +185,7 @@ fn measure(
     regions: Regions<'_>,
     samples: &[Vec<Sample>; 2],
     reach: f64,
+    workers: &dyn Workers,
 ) -> Result<Measured, CompareError> {
     let [on_mesh, on_truth] = samples;
     let [mesh_points, truth_points] =
@@ -190,22 +194,22 @@ fn measure(
         (0..mesh.mesh.vertex_slots() as u32).map(VertexId).filter(|&vertex| mesh.mesh.has_vertex(vertex)).collect();
     let vertex_points: Vec<_> = there.iter().map(|&vertex| mesh.mesh.position(vertex)).collect();
 
-    let (mesh_feet, vertex_feet) = (feet(&mesh_points, truth)?, feet(&vertex_points, truth)?);
-    let truth_feet = feet(&truth_points, mesh)?;
+    let (mesh_feet, vertex_feet) = (feet(&mesh_points, truth, workers)?, feet(&vertex_points, truth, workers)?);
+    let truth_feet = feet(&truth_points, mesh, workers)?;
     let deviations = |feet: &[Foot]| feet.iter().map(|foot| foot.deviation).collect::<Vec<f64>>();
     let on_true_part = |feet: &[Foot]| feet.iter().map(|foot| foot.point).collect::<Vec<_>>();
     let to_truth = Sorted {
         values: deviations(&mesh_feet),
-        regions: regions_of(regions, on_mesh.iter().map(|sample| sample.corner), &on_true_part(&mesh_feet))?,
+        regions: regions_of(regions, on_mesh.iter().map(|sample| sample.corner), &on_true_part(&mesh_feet), workers)?,
     };
     let vertices = Sorted {
         values: deviations(&vertex_feet),
-        regions: regions_of(regions, there.iter().copied(), &on_true_part(&vertex_feet))?,
+        regions: regions_of(regions, there.iter().copied(), &on_true_part(&vertex_feet), workers)?,
     };
     let to_mesh = Sorted {
         // a true point outside of the mesh is material that the mesh lacks
         values: truth_feet.iter().map(|foot| -foot.deviation).collect(),
-        regions: regions_of_truth(regions, truth, on_truth, &truth_feet, mesh, reach)?,
+        regions: regions_of_truth(regions, truth, on_truth, &truth_feet, mesh, reach, workers)?,
     };
     let cloud = |points: &[_], cloud: &[_], like: &Sorted| -> Result<Sorted, CompareError> {
         Ok(Sorted { values: cloud_distances(points, cloud)?, regions: like.regions.clone() })
@@ -241,14 +245,11 @@ impl Measured {
 }
 
 /// The feet of `points` on a shape, in their order.
-fn feet(points: &[Point3<f64>], shape: Shape<'_>) -> Result<Vec<Foot>, CompareError> {
-    let nowhere = Foot { deviation: 0.0, point: Point3::origin(), face: FaceId(0), corner: VertexId(0) };
-    let mut feet = vec![nowhere; points.len()];
-    closest_places(points, shape.mesh, shape.tree, |at, hit| {
+fn feet(points: &[Point3<f64>], shape: Shape<'_>, workers: &dyn Workers) -> Result<Vec<Foot>, CompareError> {
+    at_closest_places(points, shape.mesh, shape.tree, workers, |p, hit| {
         let corner = nearest_corner(shape.mesh.corners(hit.face), &hit.barycentric);
-        feet[at] = Foot { deviation: signed(&points[at], shape.mesh, hit), point: hit.point, face: hit.face, corner };
-    })?;
-    Ok(feet)
+        Foot { deviation: signed(p, shape.mesh, hit), point: hit.point, face: hit.face, corner }
+    })
 }
 
 /// The region of each point.
@@ -259,12 +260,13 @@ fn regions_of(
     regions: Regions<'_>,
     own: impl Iterator<Item = VertexId>,
     places: &[Point3<f64>],
+    workers: &dyn Workers,
 ) -> Result<Vec<Option<Region>>, CompareError> {
     Ok(match regions {
         Regions::Unknown => vec![Some(Region::Untouched); places.len()],
         Regions::Own(of_vertex) => own.map(|vertex| Some(of_vertex[vertex.0 as usize])).collect(),
         Regions::Of(other, of_vertex) => {
-            feet(places, other)?.iter().map(|foot| Some(of_vertex[foot.corner.0 as usize])).collect()
+            feet(places, other, workers)?.iter().map(|foot| Some(of_vertex[foot.corner.0 as usize])).collect()
         }
     })
 }
@@ -280,9 +282,12 @@ fn regions_of_truth(
     feet_on_mesh: &[Foot],
     mesh: Shape<'_>,
     reach: f64,
+    workers: &dyn Workers,
 ) -> Result<Vec<Option<Region>>, CompareError> {
     let (shape, looked_up) = match regions {
-        Regions::Of(other, _) => (other, feet(&points.iter().map(|sample| sample.point).collect::<Vec<_>>(), other)?),
+        Regions::Of(other, _) => {
+            (other, feet(&points.iter().map(|sample| sample.point).collect::<Vec<_>>(), other, workers)?)
+        }
         _ => (mesh, feet_on_mesh.to_vec()),
     };
     let region_at = |corner: VertexId| match regions {

@@ -3,7 +3,7 @@
 use nalgebra::Point3;
 
 use super::CompareError;
-use crate::mesh::{FaceHit, FaceTree, TriMesh, coherent_order, pseudo_normal};
+use crate::mesh::{FaceHit, FaceTree, TriMesh, Workers, coherent_order, map_by, pseudo_normal};
 
 /// Finds the place of `mesh` closest to each of `points` and hands it to `take` with the number of the point: each point
 /// once, in an order in which neighbours follow each other, so that what one query has read is still at hand for the next.
@@ -18,18 +18,51 @@ pub fn closest_places(
     tree: &FaceTree,
     mut take: impl FnMut(usize, &FaceHit),
 ) -> Result<(), CompareError> {
-    check_finite(points)?;
-    for at in coherent_order(points) {
-        let at = at as usize;
-        let hit = tree.closest(mesh, &points[at], f64::INFINITY).ok_or(CompareError::NoFaces)?;
-        take(at, &hit);
+    let (order, ordered) = in_order(points)?;
+    for (at, p) in order.into_iter().zip(&ordered) {
+        take(at as usize, &tree.closest(mesh, p, f64::INFINITY).ok_or(CompareError::NoFaces)?);
     }
     Ok(())
+}
+
+/// What `tell` makes of each of `points` and its closest place, in their order; the same for any `workers`.
+///
+/// # Errors
+/// As [`closest_places`].
+pub(super) fn at_closest_places<T: Send + Clone>(
+    points: &[Point3<f64>],
+    mesh: &TriMesh,
+    tree: &FaceTree,
+    workers: &dyn Workers,
+    tell: impl Fn(&Point3<f64>, &FaceHit) -> T + Sync,
+) -> Result<Vec<T>, CompareError> {
+    let (order, ordered) = in_order(points)?;
+    let told = map_by(workers, ordered.len(), |at| {
+        tree.closest(mesh, &ordered[at], f64::INFINITY).map(|hit| tell(&ordered[at], &hit))
+    });
+    let Some(Some(first)) = told.first() else {
+        return if points.is_empty() { Ok(Vec::new()) } else { Err(CompareError::NoFaces) };
+    };
+    let mut in_place = vec![first.clone(); points.len()];
+    for (at, told) in order.into_iter().zip(told) {
+        in_place[at as usize] = told.ok_or(CompareError::NoFaces)?;
+    }
+    Ok(in_place)
+}
+
+/// Numbers of the points so that neighbours follow each other, and the points in this order: read one by one they would
+/// each be waited for.
+fn in_order(points: &[Point3<f64>]) -> Result<(Vec<u32>, Vec<Point3<f64>>), CompareError> {
+    check_finite(points)?;
+    let order = coherent_order(points);
+    let ordered = order.iter().map(|&at| points[at as usize]).collect();
+    Ok((order, ordered))
 }
 
 /// Signed distance of each point from a surface, m: positive outside of it, negative in the material.
 ///
 /// - `points`: m, in the frame of `truth`.
+/// - `workers`: who looks for the closest places; the distances are the same to the last bit.
 ///
 /// # Errors
 /// As [`closest_places`].
@@ -38,17 +71,20 @@ pub fn closest_places(
 /// ```
 /// use nalgebra::Point3;
 /// use touchup::compare::deviations;
-/// use touchup::mesh::{FaceTree, TriMesh};
+/// use touchup::mesh::{Alone, FaceTree, TriMesh};
 /// let p = |x, y| Point3::new(x, y, 0.0);
 /// let truth = TriMesh::new(vec![p(0.0, 0.0), p(1.0, 0.0), p(0.0, 1.0)], vec![[0, 1, 2]])?;
 /// let points = [Point3::new(0.2, 0.2, 0.5), Point3::new(0.2, 0.2, -0.25)];
-/// assert_eq!(deviations(&points, &truth, &FaceTree::new(&truth))?, [0.5, -0.25]);
+/// assert_eq!(deviations(&points, &truth, &FaceTree::new(&truth), &Alone)?, [0.5, -0.25]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn deviations(points: &[Point3<f64>], truth: &TriMesh, tree: &FaceTree) -> Result<Vec<f64>, CompareError> {
-    let mut found = vec![0.0; points.len()];
-    closest_places(points, truth, tree, |at, hit| found[at] = signed(&points[at], truth, hit))?;
-    Ok(found)
+pub fn deviations(
+    points: &[Point3<f64>],
+    truth: &TriMesh,
+    tree: &FaceTree,
+    workers: &dyn Workers,
+) -> Result<Vec<f64>, CompareError> {
+    at_closest_places(points, truth, tree, workers, |p, hit| signed(p, truth, hit))
 }
 
 /// The distance between `p` and its closest place, m, negative where `p` is behind it.

@@ -9,7 +9,8 @@ use super::grow::belongs;
 use super::primitive::{Primitive, Side, refined, square_to};
 use super::scene::Parted;
 use super::segment::Segment;
-use super::walls::{Wall, median};
+use super::walls::Wall;
+use crate::mesh::median;
 
 /// Directions in which the ring beyond an end is looked at.
 const AROUND: usize = 36;
@@ -96,7 +97,7 @@ fn ring(parted: &Parted, wall: &Wall, t: f64, radius: f64) -> Vec<u32> {
 /// The cone about the axis of the wall on which most of a ring's faces lie.
 fn cone_of(parted: &Parted, wall: &Wall, faces: &[u32], out: f64) -> Option<Primitive> {
     let along = |face: u32| parted.facets.normal(face).dot(&wall.axis) * out;
-    let sine = median(faces.iter().map(|&face| along(face)).collect())?;
+    let sine = median(&mut faces.iter().map(|&face| along(face)).collect::<Vec<_>>())?;
     let is_alike = |face: u32| (along(face) - sine).abs() < ALIKE;
     let alike: Vec<u32> = faces.iter().copied().filter(|&face| is_alike(face)).collect();
     let is_cone =
@@ -110,7 +111,7 @@ fn cone_of(parted: &Parted, wall: &Wall, faces: &[u32], out: f64) -> Option<Prim
         let t = v.dot(&axis);
         t - (v - axis * t).norm() / half_angle.tan()
     };
-    let apex: Point3<f64> = wall.origin + axis * median(alike.iter().map(apex_of).collect())?;
+    let apex: Point3<f64> = wall.origin + axis * median(&mut alike.iter().map(apex_of).collect::<Vec<_>>())?;
     Some(Primitive::Cone { apex, axis, half_angle, side: Side::Hole })
 }
 

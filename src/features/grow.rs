@@ -10,7 +10,7 @@ use super::facets::{Facets, NONE};
 use super::marks::sort;
 use super::primitive::{Bend, Moments, Primitive, cylinder_of, refined};
 use super::segment::{Segment, Segmentation};
-use crate::mesh::{FaceId, VertexId};
+use crate::mesh::{FaceId, VertexId, median};
 
 /// Lengths that come with the mesh.
 #[derive(Clone, Copy, Debug)]
@@ -591,6 +591,5 @@ pub(super) fn median_edge(facets: &Facets) -> f64 {
             v.norm()
         })
         .collect();
-    let middle = lengths.len() / 2;
-    if lengths.is_empty() { 0.0 } else { *lengths.select_nth_unstable_by(middle, f64::total_cmp).1 }
+    median(&mut lengths).unwrap_or(0.0)
 }

@@ -5,6 +5,7 @@ use nalgebra::{Point3, Vector3};
 use super::facets::Facets;
 use super::primitive::{Primitive, Side, square_to};
 use super::segment::Segmentation;
+use crate::mesh::median;
 
 /// What is left of a round wall.
 #[derive(Clone, Debug)]
@@ -81,7 +82,7 @@ impl Wall {
         let covered: Vec<_> = parts.iter().filter(|part| part[0] <= part[1]).collect();
         let coverage = covered.len() as f64 / PARTS as f64;
         // the usual end, not the farthest: walls have ears
-        let ends = [0, 1].map(|end| median(covered.iter().map(|part| part[end]).collect()));
+        let ends = [0, 1].map(|end| median(&mut covered.iter().map(|part| part[end]).collect::<Vec<_>>()));
         let [Some(low), Some(high)] = ends else { return None };
         let ends = [low, high];
         let radius = match primitive {
@@ -165,12 +166,6 @@ impl Wall {
     pub fn is_cone(&self) -> bool {
         matches!(self.primitive, Primitive::Cone { .. })
     }
-}
-
-/// The middle one of `values`.
-pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
 }
 
 /// The parts of a turn between the corners of a face.

@@ -2,14 +2,18 @@
 
 mod closest;
 mod coherent;
+mod median;
 mod repair;
 mod signed_distance;
 mod stars;
 mod tri_mesh;
 pub mod triangle;
+mod workers;
 
 pub use closest::{BoxQuery, FaceHit, FaceTree, RefitPlan};
 pub use coherent::coherent_order;
+pub use median::median;
 pub use repair::{RepairReport, repair};
 pub use signed_distance::{pseudo_normal, signed_distance};
 pub use tri_mesh::{FaceId, MeshError, TriMesh, VertexId};
+pub use workers::{Alone, Job, Workers, map_by};

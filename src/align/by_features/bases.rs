@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 
-use super::landmark::Landmark;
+use super::landmark::{ALIKE, Landmark};
 use crate::features::Kind;
 
 /// What kind of set it is of.
@@ -16,6 +16,8 @@ enum Class {
     Slot,
     /// three planes that meet
     Corner,
+    /// two features about one axis, or one and a plane square to it: the turn is open
+    Axis(Kind, Kind),
 }
 
 /// A frame that features make.
@@ -113,6 +115,37 @@ fn corner(at: usize, landmark: &Landmark, way: usize) -> Option<Base> {
         origin: landmark.place,
         axes: frame(&a, &b)?,
         of: [at, at],
+    })
+}
+
+/// Sets that leave the turn about an axis open, each with one turn of many.
+///
+/// - `all_ways`: as in [`bases`].
+pub(super) fn axial_bases(landmarks: &[Landmark], all_ways: bool) -> Vec<Base> {
+    let located = landmarks.iter().enumerate().filter(|(_, landmark)| landmark.is_located()).take(MOST_LOCATED);
+    let mut found = Vec::new();
+    for (at, landmark) in located {
+        for end in landmark.ends().take(if all_ways { 2 } else { 1 }) {
+            let others = landmarks.iter().enumerate().filter(|(other, _)| *other != at);
+            found.extend(others.filter_map(|(other, second)| about([at, other], &end, second)));
+        }
+    }
+    found
+}
+
+fn about(of: [usize; 2], first: &Landmark, second: &Landmark) -> Option<Base> {
+    let (axis, other) = (first.axis?, second.axis?);
+    let between = second.place - first.place;
+    let is_about = second.kind == Kind::Plane
+        || (second.is_located() && axis.cross(&between).norm() <= LEAST_SINE * between.norm());
+    let aside = Vector3::ith(axis.iamin(), 1.0);
+    (is_about && axis.dot(&other).abs() >= ALIKE).then_some(Base {
+        class: Class::Axis(first.class(), second.class()),
+        lengths: [between.dot(&axis), 0.0],
+        cosines: [axis.dot(&other), 0.0, 0.0, 0.0],
+        origin: first.place,
+        axes: frame(&axis, &aside)?,
+        of,
     })
 }
 

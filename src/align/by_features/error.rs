@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::Alternative;
+use super::{Alternative, FreeTurn};
 
 /// Which of the two shapes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,6 +68,19 @@ pub enum FeaturesError {
         mirrored: usize,
         /// all features of the mesh
         of: usize,
+    },
+    /// A part of revolution: a continuum of motions.
+    #[error(
+        "the part is free to turn about the axis ({:.3}, {:.3}, {:.3}) through ({:.2}, {:.2}, {:.2}) mm: neither its features \
+         nor its surface tell the turn; {OTHER_WAYS}",
+        .turn.axis.x, .turn.axis.y, .turn.axis.z,
+        .turn.through.x * 1e3, .turn.through.y * 1e3, .turn.through.z * 1e3
+    )]
+    FreeTurn {
+        /// about which axis
+        turn: FreeTurn,
+        /// one motion for each way of laying the axis onto the other, the best first, each with one turn of all
+        alternatives: Vec<Alternative>,
     },
     /// Several motions are about as good: a symmetric part, or too little of it was seen.
     #[error("{} motions explain the mesh about equally well: the part is symmetric, or what tells them apart was not seen", .alternatives.len())]

@@ -5,6 +5,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use super::matching::Matching;
 use super::{Alternative, OrientedPoint, SAME, Surfaces};
 use crate::align::icp::{IcpFit, IcpParams, icp};
+use crate::mesh::Alone;
 
 /// Points that bring each motion to rest, at most; all judge it, and bring the last ones to rest.
 const MOST_POINTS: usize = 5_000;
@@ -24,6 +25,9 @@ const CLEARLY: f64 = 3.0;
 const POINTS: f64 = 8.0;
 /// … and over the points that the better motion leaves over: where it fits all but the noise, noise decides nothing.
 const LEFT_OVER: f64 = 0.05;
+/// Share of the points that a part of revolution may lose when it is turned: at the rim of its ends, where facets of one turn
+/// stand proud of those of another.
+const AT_RIMS: f64 = 0.003;
 /// Weight of features that decides: one opening, or what else is as much.
 const FEATURES: f64 = 1.0;
 /// A feature is not there when it is off by so many times what half of those that are there are off …
@@ -116,7 +120,7 @@ impl<'a> Judge<'a> {
     fn rest(&self, points: &[Point3<f64>], coarse: &Isometry3<f64>) -> Option<IcpFit> {
         let Surfaces { target, tree, .. } = self.surfaces?;
         let params = IcpParams { reach: REACH * self.matching.tolerance, ..IcpParams::default() };
-        icp(points, target, tree, coarse, &params).ok()
+        icp(points, target, tree, coarse, &params, &Alone).ok()
     }
 
     fn judged(&self, motion: Isometry3<f64>, fit: Option<IcpFit>) -> Judged {
@@ -181,6 +185,14 @@ impl<'a> Judge<'a> {
         };
         let (own, other) = (alone(a, b), alone(b, a));
         own >= FEATURES && own > CLEARLY * other
+    }
+
+    /// Whether the surface is as much on the target after `turn`, facets of a round part taken for round.
+    pub fn stays(&self, best: &Judged, turn: &Isometry3<f64>) -> bool {
+        let turned = self.judged(turn * best.motion, None);
+        let is_lost = |(own, turned): &(&f64, &f64)| own.is_finite() && !turned.is_finite();
+        let lost = best.distances.iter().zip(&turned.distances).filter(is_lost).count() as f64;
+        lost <= POINTS.max(AT_RIMS * self.points.len() as f64)
     }
 
     /// The motions as they are told, brought to rest with all points.

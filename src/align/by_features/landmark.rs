@@ -28,7 +28,7 @@ pub(super) struct Landmark {
 }
 
 /// Cosine of the largest angle between axes that are taken for one: 6°.
-const ALIKE: f64 = 0.9945;
+pub(super) const ALIKE: f64 = 0.9945;
 /// Standard uncertainties that are allowed for.
 const SIGMAS: f64 = 3.0;
 /// Volume that the normals at a corner span, at least.

@@ -4,18 +4,21 @@
 //! the other in what a motion leaves alone (kinds, sizes, distances, angles, handedness) is a hypothesis. It counts what it
 //! explains of all features, so some may be missing or false on either side; the best are brought to rest by least squares
 //! and point to plane, and judged by how much of the surface then agrees. Two that the evidence does not tell apart are both
-//! told. All is exhaustive and in one order, so nothing is drawn.
+//! told. Features about one axis alone leave the turn about it open: where the surface does not tell it either, that is told.
+//! All is exhaustive and in one order, so nothing is drawn.
 
 mod bases;
 mod error;
+mod free_turn;
 mod judge;
 mod landmark;
 mod matching;
 
 pub use error::{FeaturesError, FeaturesSide};
+pub use free_turn::FreeTurn;
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use self::bases::{Sorted, bases};
+use self::bases::{Base, Sorted, axial_bases, bases};
 use self::judge::{Judge, Judged};
 use self::landmark::{Landmark, landmarks};
 use self::matching::Matching;
@@ -103,7 +106,8 @@ const LEAST_EXPLAINED: f64 = 2.5;
 /// - `surfaces`: where they are at hand they decide, and make the motion as exact as they are.
 ///
 /// # Errors
-/// [`FeaturesError`]; [`FeaturesError::Ambiguous`] has all motions among which the evidence does not decide.
+/// [`FeaturesError`]; [`FeaturesError::Ambiguous`] has all motions among which the evidence does not decide,
+/// [`FeaturesError::FreeTurn`] those of a part of revolution, each with one turn of many.
 pub fn align_features(
     source: &[Feature],
     target: &[Feature],
@@ -122,17 +126,29 @@ pub fn align_features(
     let [own, theirs] = [source, target].map(|features| landmarks(features, params, size));
     let mirror = own.iter().map(Landmark::mirrored).collect();
     let judge = Judge::new(Matching::new(own, theirs.clone(), params, size), surfaces, false);
-    let judged = judge.left_over(judge.all(&candidates(&judge.matching, MOST_CANDIDATES)?));
+    let frames = Frames::of(&judge.matching)?;
+    let judged = judge.left_over(judge.all(&candidates(&judge.matching, &frames, MOST_CANDIDATES)));
     let mirror = Judge::new(Matching::new(mirror, theirs, params, size), surfaces, true);
-    let mirrored = mirror.all(&candidates(&mirror.matching, MOST_MIRRORED)?).into_iter().next();
+    let mirrored_frames = Frames::of(&mirror.matching)?;
+    let mirrored = mirror.all(&candidates(&mirror.matching, &mirrored_frames, MOST_MIRRORED)).into_iter().next();
     let is_clear = |best: &Judged| match best.agreeing() {
         Some(share) => share >= LEAST_AGREEING,
+        None if frames.is_axial => best.explained().count() == source.len(),
         None => best.weight(&judge.matching) >= LEAST_EXPLAINED,
     };
     if let Some(error) = refusal(&judge, judged.first(), mirrored.as_ref(), source.len(), is_clear) {
         return Err(error);
     }
+    let free = judged.first().and_then(|best| judge.free_turn(best));
+    if frames.is_axial && free.is_none() {
+        // the surface breaks the symmetry, but from which turn on is not known
+        return Err(FeaturesError::TooFew { side: frames.poor, found: frames.found });
+    }
     let mut alternatives = judge.settled(judged);
+    if let Some(turn) = free {
+        let alternatives = turn.ways(alternatives, SAME * judge.matching.tolerance);
+        return Err(FeaturesError::FreeTurn { turn, alternatives });
+    }
     match alternatives.len() {
         1 => Ok(alternatives.remove(0)),
         _ => Err(FeaturesError::Ambiguous { alternatives }),
@@ -169,17 +185,8 @@ fn size_of(points: impl Iterator<Item = Point3<f64>> + Clone) -> f64 {
 }
 
 /// The motions that explain most, the best first, no two alike.
-fn candidates(matching: &Matching, most: usize) -> Result<Vec<Isometry3<f64>>, FeaturesError> {
-    let own = bases(&matching.source, false);
-    let theirs = bases(&matching.target, true);
-    for (side, bases, landmarks) in
-        [(FeaturesSide::Source, &own, &matching.source), (FeaturesSide::Target, &theirs, &matching.target)]
-    {
-        if bases.is_empty() {
-            return Err(FeaturesError::TooFew { side, found: landmarks.len() });
-        }
-    }
-    let mut found = hypotheses(matching, &own, &Sorted::new(theirs));
+fn candidates(matching: &Matching, frames: &Frames, most: usize) -> Vec<Isometry3<f64>> {
+    let mut found = hypotheses(matching, &frames.own, &frames.theirs);
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut kept: Vec<(f64, Isometry3<f64>)> = Vec::new();
     let is_new = |kept: &[(f64, Isometry3<f64>)], motion: &Isometry3<f64>| {
@@ -200,22 +207,50 @@ fn candidates(matching: &Matching, most: usize) -> Result<Vec<Isometry3<f64>>, F
     }
     kept.sort_by(|a, b| b.0.total_cmp(&a.0));
     let least = kept.first().map_or(0.0, |(best, _)| CANDIDATE * best);
-    Ok(kept.into_iter().take(most).filter(|(score, _)| *score >= least).map(|(_, motion)| motion).collect())
+    kept.into_iter().take(most).filter(|(score, _)| *score >= least).map(|(_, motion)| motion).collect()
+}
+
+/// The frames that the features of both sides make.
+struct Frames {
+    own: Vec<Base>,
+    theirs: Sorted,
+    /// whether they leave a turn open, for the features of one side tell none
+    is_axial: bool,
+    /// which side, and how many features it has
+    poor: FeaturesSide,
+    found: usize,
+}
+
+impl Frames {
+    fn of(matching: &Matching) -> Result<Self, FeaturesError> {
+        let sides = [(FeaturesSide::Source, &matching.source), (FeaturesSide::Target, &matching.target)];
+        let [own, theirs] = [bases(&matching.source, false), bases(&matching.target, true)];
+        let (poor, landmarks) = if own.is_empty() { sides[0] } else { sides[1] };
+        let found = landmarks.len();
+        if !own.is_empty() && !theirs.is_empty() {
+            return Ok(Self { own, theirs: Sorted::new(theirs), is_axial: false, poor, found });
+        }
+        let [own, theirs] = [axial_bases(&matching.source, false), axial_bases(&matching.target, true)];
+        if own.is_empty() || theirs.is_empty() {
+            return Err(FeaturesError::TooFew { side: poor, found });
+        }
+        Ok(Self { own, theirs: Sorted::new(theirs), is_axial: true, poor, found })
+    }
 }
 
 /// Two motions are one when they bring features no farther apart than so many tolerances.
 const SAME: f64 = 2.0;
 
 /// Every motion that brings a frame onto one like it, with what it explains.
-fn hypotheses(matching: &Matching, own: &[bases::Base], theirs: &Sorted) -> Vec<(f64, Isometry3<f64>)> {
+fn hypotheses(matching: &Matching, own: &[Base], theirs: &Sorted) -> Vec<(f64, Isometry3<f64>)> {
     let play = 2.0 * matching.tolerance;
-    let like = |base| -> Vec<&bases::Base> {
-        let base: &bases::Base = base;
-        let is_like = |other: &&bases::Base| (0..2).all(|i| matching.is_like(base.of[i], other.of[i]));
+    let like = |base| -> Vec<&Base> {
+        let base: &Base = base;
+        let is_like = |other: &&Base| (0..2).all(|i| matching.is_like(base.of[i], other.of[i]));
         theirs.like(base, play).filter(is_like).collect()
     };
     let tried = own.iter().step_by(own.len().div_ceil(MOST_BASES));
-    let mut matches: Vec<(&bases::Base, Vec<&bases::Base>)> = tried.map(|base| (base, like(base))).collect();
+    let mut matches: Vec<(&Base, Vec<&Base>)> = tried.map(|base| (base, like(base))).collect();
     // what few can be tells most
     matches.sort_by_key(|(_, others)| others.len());
     let most = (MOST_COMPARISONS / matching.cost().max(1)).min(MOST_HYPOTHESES);

@@ -12,7 +12,7 @@ use crate::align::{
     align_features, fit_pairs, icp,
 };
 use crate::cli::progress::Progress;
-use crate::cli::{CliError, tell};
+use crate::cli::{CliError, Threads, tell};
 use crate::compare::{Shape, sample_surface, surface_area};
 use crate::features::detect;
 use crate::io::pairs_file::read_pairs;
@@ -93,6 +93,15 @@ struct Loose {
 #[derive(Debug, Serialize)]
 struct Choices {
     ambiguous: Vec<Choice>,
+    /// the axis about which each may be turned
+    #[serde(skip_serializing_if = "Option::is_none")]
+    free_turn: Option<FreeTurnTold>,
+}
+
+#[derive(Debug, Serialize)]
+struct FreeTurnTold {
+    axis: [f64; 3],
+    through_mm: [f64; 3],
 }
 
 #[derive(Debug, Serialize)]
@@ -120,7 +129,7 @@ type Aligned = Result<(Isometry3<f64>, Alignment), CliError>;
 pub(super) fn aligned_by_icp(mesh: &TriMesh, truth: Shape<'_>, seed: u64) -> Aligned {
     let _aligning = Progress::stage("align");
     let points: Vec<_> = spread(mesh, POINTS, seed).iter().map(|p| p.point).collect();
-    let fit = icp(&points, truth.mesh, truth.tree, &Isometry3::identity(), &IcpParams::default())?;
+    let fit = icp(&points, truth.mesh, truth.tree, &Isometry3::identity(), &IcpParams::default(), &Threads)?;
     let told = Alignment { fit: Some(FitTold::of(&fit, points.len())), ..Alignment::of_icp("icp", &fit) };
     told.warn();
     Ok((fit.source_to_target, told))
@@ -145,21 +154,24 @@ pub(super) fn aligned_by_features(
     let points = spread(mesh, POINTS_EACH, seed);
     let surfaces = Surfaces { points: &points, target: truth.mesh, tree: truth.tree };
     let counts = [own.len(), theirs.len()];
-    let found = match align_features(&own, &theirs, Some(&surfaces), &FeaturesParams::default()) {
-        Ok(only) => vec![only],
-        Err(FeaturesError::Ambiguous { alternatives }) => alternatives,
+    let (found, undecided) = match align_features(&own, &theirs, Some(&surfaces), &FeaturesParams::default()) {
+        Ok(only) => (vec![only], None),
+        Err(
+            ref error @ (FeaturesError::Ambiguous { ref alternatives }
+            | FeaturesError::FreeTurn { ref alternatives, .. }),
+        ) => (alternatives.clone(), Some(error.clone())),
         Err(error) => return Err(error.into()),
     };
-    let chosen = match alternative {
-        Some(number) => found.get(number.wrapping_sub(1)).ok_or_else(|| {
+    let chosen = match (alternative, undecided) {
+        (Some(number), _) => found.get(number.wrapping_sub(1)).ok_or_else(|| {
             CliError::Usage(format!("--alternative {number} is not there: {} motions were found", found.len()))
         })?,
-        None if found.len() == 1 => &found[0],
-        None => {
-            let choices = Choices::of(&found, counts);
+        (None, None) => &found[0],
+        (None, Some(error)) => {
+            let choices = Choices::of(&found, counts, &error);
             let as_json = || serde_json::to_string(&choices).expect("numbers and names alone cannot fail");
             tell(&if json { as_json() } else { choices.to_string() });
-            return Err(FeaturesError::Ambiguous { alternatives: found }.into());
+            return Err(error.into());
         }
     };
     let explained = Some(Explained::of(chosen, counts));
@@ -237,7 +249,13 @@ impl Explained {
 }
 
 impl Choices {
-    fn of(alternatives: &[Alternative], counts: [usize; 2]) -> Self {
+    fn of(alternatives: &[Alternative], counts: [usize; 2], error: &FeaturesError) -> Self {
+        let free_turn = match error {
+            FeaturesError::FreeTurn { turn, .. } => {
+                Some(FreeTurnTold { axis: turn.axis.into(), through_mm: mm(turn.through.coords) })
+            }
+            _ => None,
+        };
         let choice = |(at, alternative): (usize, &Alternative)| {
             let [turn, shift] = alternative.differs;
             Choice {
@@ -250,7 +268,7 @@ impl Choices {
                 shift_mm: mm(shift),
             }
         };
-        Self { ambiguous: alternatives.iter().enumerate().map(choice).collect() }
+        Self { ambiguous: alternatives.iter().enumerate().map(choice).collect(), free_turn }
     }
 }
 
@@ -334,7 +352,14 @@ impl fmt::Display for Explained {
 
 impl fmt::Display for Choices {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "these motions explain the mesh about equally well; --alternative K takes one")?;
+        match &self.free_turn {
+            None => writeln!(f, "these motions explain the mesh about equally well; --alternative K takes one")?,
+            Some(FreeTurnTold { axis: [a, b, c], through_mm: [x, y, z] }) => writeln!(
+                f,
+                "free to turn about ({a:.3}, {b:.3}, {c:.3}) through ({x:.2}, {y:.2}, {z:.2}) mm; --alternative K takes one \
+                 with the turn that it has"
+            )?,
+        }
         write!(
             f,
             "{:>2}  {:>30}  {:>8}  {:>7}  {:>8}   against the first: turn about, and shift",

@@ -1,10 +1,12 @@
 //! Where touch and scan disagree, without a true part: what of it looks like this scanner, what like a part that is no longer
 //! what was scanned, and what like a bad touch.
 //!
-//! What the scan is misplaced as a whole comes off first. How the scanner errs is then found where it should see well, on touched places away from edges: its offset b, its noise σ
-//! and the distance ℓ over which that stays alike, Cov = σ² exp(−r²/2ℓ²). The mean over a region of area A then has the
-//! variance σ²/(1 + A/2πℓ²), and a region that is off by many times its root was changed. Near edges and in what is
-//! narrower than a few edges of the scan's triangles the scan lacks what it could not see.
+//! What the scan is misplaced as a whole, where that is more than noise, comes off first. How the scanner errs is then found
+//! where it should see well, on touched places away from edges: its offset b, its noise σ and the distance ℓ over which that
+//! stays alike, Cov = σ² exp(−r²/2ℓ²). The mean over a region of area A then has the variance σ²/(1 + A/2πℓ²), and a region
+//! that is off by many times its root was changed. In what is narrower than a few edges of the scan's triangles the scan lacks
+//! what it could not see, and it rounds edges: of one that stands out it takes off, and one that turns in it fills. Near an
+//! edge a disagreement the other way is not the scanner's rounding, but too near to be sure of.
 
 mod bad_touches;
 mod cells;
@@ -102,7 +104,8 @@ pub struct ClassMap {
 /// Where touch and scan disagree.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Disagreement {
-    /// how the scan lies off as a whole, which is taken off before the rest is looked at; `None` where nothing tells
+    /// how the scan lies off as a whole, which is taken off before the rest is looked at; `None` where it is no more than the
+    /// noise of the scan may make of itself
     pub misplaced: Option<Misplaced>,
     /// how the scanner errs; `None` where too little was touched to tell, and then nothing is called changed
     pub scanner: Option<Scanner>,
@@ -140,11 +143,18 @@ pub fn disagreement(
     }
     let mut places = Places::of(scan, refined)?;
     let off = places.off.clone();
-    let misplaced = Misplaced::of(&places);
-    if let Some(misplaced) = &misplaced {
-        places.take_off(misplaced);
+    let mut scanner = Scanner::of(scan.mesh, &places);
+    let mut misplaced = None;
+    if let Some(fit) = misplaced::Fit::of(&places) {
+        places.take_off(&fit);
+        let placed = Scanner::of(scan.mesh, &places);
+        misplaced = placed.as_ref().and_then(|placed| fit.told(placed));
+        if misplaced.is_some() {
+            scanner = placed;
+        } else {
+            places.off.copy_from_slice(&off);
+        }
     }
-    let scanner = Scanner::of(scan.mesh, &places);
     let bad_touches = bad_touches::find(refined, touches)?;
     let mut classes = places.first_classes(refined, scanner.as_ref());
     let regions = scanner.as_ref().map_or_else(Vec::new, |scanner| {
@@ -156,7 +166,7 @@ pub fn disagreement(
     off.iter_mut().zip(&classes).filter(|(_, class)| !is_felt(class)).for_each(|(off, _)| *off = 0.0);
     let on_scan = carried(scan, refined, &classes)?;
     Ok(Disagreement {
-        misplaced: misplaced.filter(|_| scanner.is_some()),
+        misplaced,
         scanner,
         refined: ClassMap::of(refined.shape.mesh, off, classes),
         scan: on_scan,
@@ -177,6 +187,8 @@ struct Places {
     pub is_wide: Vec<bool>,
     /// whether a scanner of this resolution sees it well: no edge near, and no narrow place
     pub is_open: Vec<bool>,
+    /// whether an edge near that the scanner rounds may leave it too low, and too high
+    pub may_be: Vec<[bool; 2]>,
     /// normals, by slot; zero where there are none
     pub normals: Vec<nalgebra::Vector3<f64>>,
     /// a third of the faces at it, m²
@@ -196,14 +208,15 @@ impl Places {
             is_seen[at] = !is_on_rim(scan.mesh, hit) && refined.known[at] == Known::Touched;
             faces_alike[at] = scan.mesh.normal(hit.face).dot(&normals[at]) > FACING;
         })?;
+        let may_be = scanner::rounded_at(scan.mesh, refined, &is_seen, &normals);
         let [mut is_wide, mut is_open] = scanner::wide_and_open(scan.mesh, refined, &is_seen, &normals);
         for flags in [&mut is_wide, &mut is_open] {
             flags.iter_mut().zip(&faces_alike).for_each(|(flag, alike)| *flag &= alike);
         }
-        Ok(Self { positions: mesh.positions().to_vec(), off, is_seen, is_wide, is_open, normals, areas })
+        Ok(Self { positions: mesh.positions().to_vec(), off, is_seen, is_wide, is_open, may_be, normals, areas })
     }
 
-    fn take_off(&mut self, misplaced: &Misplaced) {
+    fn take_off(&mut self, misplaced: &misplaced::Fit) {
         let both = self.positions.iter().zip(&self.normals);
         self.off.iter_mut().zip(both).for_each(|(off, (p, normal))| *off -= misplaced.at(p, normal));
     }

@@ -68,8 +68,8 @@ pub(super) fn find(seen: &Seen<'_>, classes: &mut [Class]) -> Vec<DisagreementRe
     let (mesh, places, scanner) = (seen.refined.shape.mesh, seen.places, seen.scanner);
     let smooth = smoothed(mesh, places, scanner);
     let sign = |at: usize| match (smooth[at] - scanner.offset) / scanner.noise {
-        z if places.is_open[at] && z > OFF => 1i8,
-        z if places.is_open[at] && z < -OFF => -1,
+        z if z > OFF && tells(places, at, 0) => 1i8,
+        z if z < -OFF && tells(places, at, 1) => -1,
         _ => 0,
     };
     let signs: Vec<i8> = (0..smooth.len()).map(sign).collect();
@@ -89,19 +89,25 @@ pub(super) fn find(seen: &Seen<'_>, classes: &mut [Class]) -> Vec<DisagreementRe
     regions
 }
 
-/// Means over the surroundings of open places, m, by slot.
+/// Whether a disagreement is none that the scanner makes of what it cannot see: the scan too low, `way` 0, or too high, 1.
+fn tells(places: &Places, at: usize, way: usize) -> bool {
+    places.is_open[at] || (places.is_wide[at] && !places.may_be[at][way])
+}
+
+/// Means over the surroundings, m, by slot: of open places over open ones, of others over all that are wide.
 fn smoothed(mesh: &TriMesh, places: &Places, scanner: &Scanner) -> Vec<f64> {
     let reach = scanner.correlation / 2.0;
-    let open = Cells::new(&places.positions, (0..places.off.len()).filter(|&at| places.is_open[at]), reach);
+    let cells = |is_own: &[bool]| Cells::new(&places.positions, (0..places.off.len()).filter(|&at| is_own[at]), reach);
+    let [open, wide] = [&places.is_open, &places.is_wide].map(|is_own| cells(is_own));
     let mean = |at: usize| {
-        let near = open.near(&mesh.positions()[at], reach);
+        let near = if places.is_open[at] { &open } else { &wide }.near(&mesh.positions()[at], reach);
         let alike = near.filter(|&other| places.normals[at].dot(&places.normals[other]) > ALIKE);
         let (sum, area) = alike.fold((0.0, f64::MIN_POSITIVE), |(sum, area), other| {
             (sum + places.off[other] * places.areas[other], area + places.areas[other])
         });
         sum / area
     };
-    (0..places.off.len()).map(|at| if places.is_open[at] { mean(at) } else { places.off[at] }).collect()
+    (0..places.off.len()).map(|at| if places.is_wide[at] { mean(at) } else { places.off[at] }).collect()
 }
 
 fn neighbours(mesh: &TriMesh, at: usize) -> impl Iterator<Item = usize> + '_ {
@@ -125,20 +131,31 @@ fn flood(mesh: &TriMesh, start: usize, is_own: impl Fn(usize) -> bool, is_taken:
     found
 }
 
+/// Area, m², and mean of touch − scan, m, of some places.
+fn mean_of(places: &Places, own: impl Iterator<Item = usize>) -> (f64, f64) {
+    let (area, sum) =
+        own.fold((0.0, 0.0), |(area, sum), at| (area + places.areas[at], sum + places.off[at] * places.areas[at]));
+    (area, sum / area)
+}
+
 /// What a region is, if it is worth telling; its places get its class.
-fn judged(seen: &Seen<'_>, own: &[usize], is_sharp: &[bool], classes: &mut [Class]) -> Option<DisagreementRegion> {
+fn judged(seen: &Seen<'_>, own: &[usize], is_sharp: &[[bool; 2]], classes: &mut [Class]) -> Option<DisagreementRegion> {
     let (mesh, places, scanner) = (seen.refined.shape.mesh, seen.places, seen.scanner);
-    let open_area: f64 = own.iter().map(|&at| places.areas[at]).sum();
-    let open_mean = own.iter().map(|&at| places.off[at] * places.areas[at]).sum::<f64>() / open_area;
-    let sigmas = (open_mean - scanner.offset).abs() / scanner.sigma_of_mean(open_area);
-    if !open_mean.is_finite() || open_area < LEAST_AREA * scanner.edge.powi(2) {
+    let is_open = |at: &usize| places.is_open[*at];
+    let (own_area, own_mean) = mean_of(places, own.iter().copied());
+    let (open_area, open_mean) = mean_of(places, own.iter().copied().filter(is_open));
+    if !own_mean.is_finite() || own_area < LEAST_AREA * scanner.edge.powi(2) {
         return None;
     }
+    let sigmas_of = |area: f64, mean: f64| (mean - scanner.offset).abs() / scanner.sigma_of_mean(area);
+    let sigmas = sigmas_of(own_area, own_mean);
+    // what lies at edges alone makes nothing sure
+    let is_sure = open_area >= LEAST_AREA * scanner.edge.powi(2) && sigmas_of(open_area, open_mean) >= CHANGED;
     // on to the edges that it ends at, which the scanner rounds
     let reach = rounded(scanner.edge);
     let near = Cells::new(&places.positions, own.iter().copied(), reach);
     let is_off = |at: usize| {
-        let [off, mean] = [places.off[at], open_mean].map(|off| off - scanner.offset);
+        let [off, mean] = [places.off[at], own_mean].map(|off| off - scanner.offset);
         off * mean.signum() > (GOES_ON * mean.abs()).max(2.0 * scanner.noise)
     };
     let goes_on =
@@ -172,7 +189,7 @@ fn judged(seen: &Seen<'_>, own: &[usize], is_sharp: &[bool], classes: &mut [Clas
     };
     let class = match sigmas {
         _ if sigmas < UNSURE => Class::ScannerError,
-        _ if sigmas < CHANGED || evidence.passes < PASSES || evidence.lengths < 1.0 => Class::Unsure,
+        _ if !is_sure || evidence.passes < PASSES || evidence.lengths < 1.0 => Class::Unsure,
         _ => Class::ChangedPart,
     };
     if class != Class::ScannerError {
@@ -196,8 +213,15 @@ fn passes(touches: &[ProbedPoint], region: &Cells<'_>, reach: f64) -> usize {
 }
 
 /// Share of the places at the rim of a region that have an edge near.
-fn rim_at_edges(mesh: &TriMesh, places: &Places, all: &[usize], is_own: &[bool], is_sharp: &[bool], reach: f64) -> f64 {
-    let sharp = Cells::new(&places.positions, (0..is_sharp.len()).filter(|&at| is_sharp[at]), reach);
+fn rim_at_edges(
+    mesh: &TriMesh,
+    places: &Places,
+    all: &[usize],
+    is_own: &[bool],
+    is_sharp: &[[bool; 2]],
+    reach: f64,
+) -> f64 {
+    let sharp = Cells::new(&places.positions, (0..is_sharp.len()).filter(|&at| is_sharp[at] != [false; 2]), reach);
     let rim: Vec<usize> = all.iter().copied().filter(|&at| neighbours(mesh, at).any(|other| !is_own[other])).collect();
     let at_edge = rim.iter().filter(|&&at| sharp.near(&places.positions[at], reach).next().is_some()).count();
     at_edge as f64 / rim.len().max(1) as f64

@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::cells::Cells;
 use super::{Places, RefinedShape};
-use crate::mesh::{TriMesh, VertexId};
+use crate::mesh::{TriMesh, VertexId, median};
 
 /// How the scanner errs where it should see well.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,6 +31,8 @@ const MEDIAN_OF_SQUARE: f64 = 0.4549;
 const NARROW: f64 = 5.0;
 /// Edges are rounded within so many edges of the triangles.
 const ROUNDED: f64 = 1.5;
+/// An edge is one of the surface that a place lies on when it is within so many edges of its tangent plane.
+const LEVEL: f64 = 0.2;
 /// An edge of the refined mesh turns by more than this, as a cosine: 35°.
 const SHARP: f64 = 0.82;
 /// A ball of the least seen width touches nothing but the place it rests on within this share of its radius.
@@ -53,12 +55,7 @@ const LEAST_NOISE: f64 = 1e-3;
 pub(super) fn median_edge(mesh: &TriMesh) -> f64 {
     let sides = |[a, b, c]: [Point3<f64>; 3]| [(a - b).norm(), (b - c).norm(), (c - a).norm()];
     let mut lengths: Vec<f64> = mesh.faces().flat_map(|(face, _)| sides(mesh.triangle(face))).collect();
-    median(&mut lengths)
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    let middle = values.len() / 2;
-    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
+    median(&mut lengths).unwrap_or(0.0)
 }
 
 /// Where edges may be rounded, m.
@@ -66,20 +63,48 @@ pub(super) fn rounded(edge: f64) -> f64 {
     ROUNDED * edge
 }
 
-/// Vertices at sharp edges between touched faces, by slot.
-pub(super) fn sharp_vertices(mesh: &TriMesh, is_seen: &[bool]) -> Vec<bool> {
-    let mut is_sharp = vec![false; mesh.vertex_slots()];
+/// Vertices at sharp edges between touched faces, by slot: whether one stands out there, and whether one turns in.
+pub(super) fn sharp_vertices(mesh: &TriMesh, is_seen: &[bool]) -> Vec<[bool; 2]> {
+    let mut is_sharp = vec![[false; 2]; mesh.vertex_slots()];
     for (face, corners) in mesh.faces() {
         for i in 0..3 {
             let [a, b] = [corners[i], corners[(i + 1) % 3]];
-            let is_own = is_seen[a.0 as usize] || is_seen[b.0 as usize];
-            let turns = |other| mesh.normal(face).dot(&mesh.normal(other)) < SHARP;
-            if is_own && a < b && mesh.faces_at_edge(a, b).any(|other| other != face && turns(other)) {
-                [a, b].into_iter().for_each(|v| is_sharp[v.0 as usize] = true);
+            if !(a < b && (is_seen[a.0 as usize] || is_seen[b.0 as usize])) {
+                continue;
+            }
+            for other in mesh.faces_at_edge(a, b).filter(|&other| other != face) {
+                if mesh.normal(face).dot(&mesh.normal(other)) < SHARP {
+                    let way = usize::from((mesh.barycentre(other) - mesh.position(a)).dot(&mesh.normal(face)) > 0.0);
+                    [a, b].into_iter().for_each(|v| is_sharp[v.0 as usize][way] = true);
+                }
             }
         }
     }
     is_sharp
+}
+
+/// Whether an edge of the surface that a place lies on, near it, stands out, so that a scan may be too low there, and whether
+/// one turns in, so that it may be too high; by slot.
+pub(super) fn rounded_at(
+    scan: &TriMesh,
+    refined: &RefinedShape<'_>,
+    is_seen: &[bool],
+    normals: &[Vector3<f64>],
+) -> Vec<[bool; 2]> {
+    let mesh = refined.shape.mesh;
+    let edge = median_edge(scan);
+    let reach = rounded(edge);
+    let is_sharp = sharp_vertices(mesh, is_seen);
+    let sharp = Cells::new(mesh.positions(), (0..is_sharp.len()).filter(|&at| is_sharp[at] != [false; 2]), reach);
+    let rounded = |at: usize| {
+        let p = mesh.position(VertexId(at as u32));
+        let is_own = |other: &usize| (mesh.positions()[*other] - p).dot(&normals[at]).abs() <= LEVEL * edge;
+        sharp
+            .near(&p, reach)
+            .filter(is_own)
+            .fold([false; 2], |[out, inward], other| [out || is_sharp[other][0], inward || is_sharp[other][1]])
+    };
+    (0..mesh.vertex_slots()).map(|at| if is_seen[at] { rounded(at) } else { [true; 2] }).collect()
 }
 
 /// Touched places that are wide enough for a scanner of this resolution, and those of them that have no edge near, so that
@@ -94,7 +119,7 @@ pub(super) fn wide_and_open(
     let edge = median_edge(scan);
     let (reach, radius) = (rounded(edge), NARROW * edge / 2.0);
     let is_sharp = sharp_vertices(mesh, is_seen);
-    let sharp = Cells::new(mesh.positions(), (0..is_sharp.len()).filter(|&at| is_sharp[at]), reach);
+    let sharp = Cells::new(mesh.positions(), (0..is_sharp.len()).filter(|&at| is_sharp[at] != [false; 2]), reach);
     let fits = |p: &Point3<f64>, normal: &Vector3<f64>| {
         let middle = p + normal * radius;
         refined.shape.tree.closest(mesh, &middle, FITS * radius).is_none()
@@ -116,9 +141,9 @@ impl Scanner {
         }
         let edge = median_edge(scan);
         let mut values: Vec<f64> = open.iter().map(|&at| places.off[at]).collect();
-        let offset = median(&mut values);
+        let offset = median(&mut values)?;
         values.iter_mut().for_each(|value| *value = (*value - offset).abs());
-        let noise = (SIGMA_OF_MEDIAN * median(&mut values)).max(LEAST_NOISE * edge);
+        let noise = (SIGMA_OF_MEDIAN * median(&mut values)?).max(LEAST_NOISE * edge);
         let correlation = correlation(places, &open, noise, edge);
         Some(Self { offset, noise, correlation, edge, sees_from: NARROW * edge, places: open.len() })
     }
@@ -155,7 +180,8 @@ fn correlation(places: &Places, open: &[usize], noise: f64, edge: f64) -> f64 {
         }
     }
     let grown = (1.0 - (-1.0f64).exp()) * noise.powi(2);
-    let is_grown = |bin: &mut Vec<f64>| bin.len() >= FULL && median(bin) / MEDIAN_OF_SQUARE >= grown;
+    let is_grown =
+        |bin: &mut Vec<f64>| bin.len() >= FULL && median(bin).is_some_and(|median| median / MEDIAN_OF_SQUARE >= grown);
     let at = bins.iter_mut().position(is_grown).unwrap_or(BINS);
     ((at as f64 + 0.5) * width / GROWN).max(edge / 2.0)
 }

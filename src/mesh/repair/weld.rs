@@ -2,6 +2,8 @@
 
 use nalgebra::Point3;
 
+use crate::mesh::median;
+
 /// Marks a free place in the table: no vertex has this number.
 const FREE: u32 = u32::MAX;
 
@@ -61,14 +63,9 @@ fn spread(positions: &[Point3<f64>]) -> f64 {
     /// Every n-th vertex, so that there are at least this many.
     const SAMPLE: usize = 1000;
     let sample = || positions.iter().step_by((positions.len() / SAMPLE).max(1));
-    let centre = [0, 1, 2].map(|axis| median(sample().map(|p| p[axis]).collect()));
-    median(sample().map(|p| (p - Point3::from(centre)).amax()).collect())
-}
-
-/// The middle one in rising order; 0 when there is none.
-fn median(mut values: Vec<f64>) -> f64 {
-    let middle = values.len() / 2;
-    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
+    let middle = |mut values: Vec<f64>| median(&mut values).unwrap_or(0.0);
+    let centre = [0, 1, 2].map(|axis| middle(sample().map(|p| p[axis]).collect()));
+    middle(sample().map(|p| (p - Point3::from(centre)).amax()).collect())
 }
 
 /// Vertices that are looked up together: what they need from memory is on its way at the same time.

@@ -1,0 +1,77 @@
+//! Parts of revolution: features about one axis tell no turn about it.
+
+use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
+
+use super::Alternative;
+use super::judge::{Judge, Judged};
+use super::landmark::{ALIKE, Landmark};
+use crate::features::Kind;
+
+/// A turn that nothing holds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FreeTurn {
+    /// unit direction, in the frame of the target
+    pub axis: Vector3<f64>,
+    /// a point of the axis, m
+    pub through: Point3<f64>,
+}
+
+/// Turns that are tried, each by [`STEP`] more: 16 do not meet the symmetry of any part of fewer holes.
+const TURNS: u32 = 16;
+/// The golden angle, rad: no multiple of it comes near one before.
+const STEP: f64 = 2.399_963_229_728_653;
+
+impl Judge<'_> {
+    /// The axis about which a motion may be turned and explains as much: all features that it explains lie about it, and so
+    /// does the surface where that is at hand.
+    pub(super) fn free_turn(&self, best: &Judged) -> Option<FreeTurn> {
+        let explained: Vec<&Landmark> = best.explained().map(|[_, theirs]| &self.matching.target[theirs]).collect();
+        let turn = axis_of(&explained, self.matching.tolerance)?;
+        let is_alike = |step: u32| self.stays(best, &turn.by(f64::from(step) * STEP));
+        (1..=TURNS).all(is_alike).then_some(turn)
+    }
+}
+
+impl FreeTurn {
+    /// Those of the motions that are no such turn of one before.
+    ///
+    /// - `near`: by how much a turn may move the axis, m
+    pub(super) fn ways(&self, alternatives: Vec<Alternative>, near: f64) -> Vec<Alternative> {
+        let mut ways: Vec<Alternative> = Vec::new();
+        for alternative in alternatives {
+            let is_turn_of = |other: &Alternative| {
+                let between = alternative.source_to_target * other.source_to_target.inverse();
+                let is_along = (between * self.axis).dot(&self.axis) >= ALIKE;
+                is_along && (between * self.through - self.through).norm() <= near
+            };
+            if !ways.iter().any(is_turn_of) {
+                ways.push(alternative);
+            }
+        }
+        ways
+    }
+
+    fn by(&self, angle: f64) -> Isometry3<f64> {
+        let turn = UnitQuaternion::from_axis_angle(&Unit::new_unchecked(self.axis), angle);
+        let shift = Translation3::from(self.through.coords - turn * self.through.coords);
+        Isometry3::from_parts(shift, turn)
+    }
+}
+
+/// The line about which all are of revolution.
+///
+/// - `near`: by how much they may be off it, m
+fn axis_of(landmarks: &[&Landmark], near: f64) -> Option<FreeTurn> {
+    let first = landmarks.iter().find(|landmark| landmark.is_located())?;
+    let (axis, through) = (first.axis?, first.place);
+    let is_about = |landmark: &&Landmark| {
+        let is_along = landmark.axis.is_some_and(|own| own.dot(&axis).abs() >= ALIKE);
+        let is_on = (landmark.place - through).cross(&axis).norm() <= near;
+        match landmark.kind {
+            Kind::Plane => is_along,
+            Kind::Hole | Kind::Boss => is_along && is_on,
+            Kind::Slot | Kind::Pocket | Kind::Edge | Kind::Corner => false,
+        }
+    };
+    landmarks.iter().all(is_about).then_some(FreeTurn { axis, through })
+}

@@ -1,0 +1,77 @@
+//! Work that falls into pieces: a pure room says what is to be done, its caller who does it.
+
+/// A piece of work.
+pub type Job<'a> = Box<dyn FnOnce() + Send + 'a>;
+
+/// Who does pieces of work that do not depend on each other. What comes of them is the same whoever does them, and in
+/// whatever order.
+pub trait Workers: Sync {
+    /// How many pieces are done at the same time, about.
+    fn count(&self) -> usize;
+
+    /// Does them all before it returns.
+    fn run(&self, jobs: Vec<Job<'_>>);
+}
+
+/// One piece after the other, by who asked.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Alone;
+
+impl Workers for Alone {
+    fn count(&self) -> usize {
+        1
+    }
+
+    fn run(&self, jobs: Vec<Job<'_>>) {
+        jobs.into_iter().for_each(|job| job());
+    }
+}
+
+/// Items of a piece at least: a thread costs as much as a hundred closest faces.
+const LEAST_PIECE: usize = 4_000;
+
+/// What `each` makes of 0 to `count` − 1, in this order, for any workers.
+pub fn map_by<T: Send>(workers: &dyn Workers, count: usize, each: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    let pieces = workers.count().min(count / LEAST_PIECE).max(1);
+    if pieces == 1 {
+        return (0..count).map(each).collect();
+    }
+    let size = count.div_ceil(pieces);
+    let mut parts: Vec<Vec<T>> = (0..pieces).map(|_| Vec::new()).collect();
+    let each = &each;
+    let jobs = parts.iter_mut().enumerate().map(|(at, part)| {
+        let own = (at * size).min(count)..((at + 1) * size).min(count);
+        Box::new(move || part.extend(own.map(each))) as Job<'_>
+    });
+    workers.run(jobs.collect());
+    parts.into_iter().flatten().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The last piece first.
+    struct Backwards(usize);
+
+    impl Workers for Backwards {
+        fn count(&self) -> usize {
+            self.0
+        }
+
+        fn run(&self, jobs: Vec<Job<'_>>) {
+            jobs.into_iter().rev().for_each(|job| job());
+        }
+    }
+
+    #[test]
+    fn every_item_comes_once_and_in_order_whoever_does_it() {
+        for count in [0, 1, LEAST_PIECE - 1, 2 * LEAST_PIECE, 3 * LEAST_PIECE + 1] {
+            let by_hand: Vec<usize> = (0..count).map(|i| i * i).collect();
+            for workers in 1..6 {
+                assert_eq!(map_by(&Backwards(workers), count, |i| i * i), by_hand, "{count} by {workers}");
+            }
+            assert_eq!(map_by(&Alone, count, |i| i * i), by_hand);
+        }
+    }
+}
