@@ -460,3 +460,32 @@ fn the_command_line_tells_alternatives_and_takes_one() {
         String::from_utf8_lossy(&told.stderr)
     );
 }
+
+#[test]
+fn the_command_line_tells_about_which_axis_a_part_is_free_to_turn() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let [mesh, truth] = [path("mesh.ply"), path("truth.ply")];
+    let flange = mm(&[[8.0, 0.0], [40.0, 0.0], [40.0, 10.0], [20.0, 10.0], [20.0, 25.0], [8.0, 25.0]]);
+    let part = turned_part(&flange, 64);
+    write_mesh(truth.as_ref(), &part, MeshUnit::Millimetre).unwrap();
+    let known = anywhere(&mut Pcg64::new(8, 4));
+    write_mesh(mesh.as_ref(), &moved(&part, |p| known * p), MeshUnit::Millimetre).unwrap();
+    let call = |more: &[&str]| {
+        touchup(&[&["compare", &mesh, &truth, "--align", "features", "--samples", "1000"], more].concat())
+    };
+    let told = call(&[]);
+    let text = String::from_utf8_lossy(&told.stdout).into_owned();
+    assert_eq!(told.status.code(), Some(3), "{text}");
+    assert!(text.contains("free to turn about") && text.contains("--alternative K"), "{text}");
+    let told = call(&["--json"]);
+    let told: serde_json::Value = serde_json::from_slice(&told.stdout).unwrap();
+    let axis = told["free_turn"]["axis"].as_array().unwrap_or_else(|| panic!("{told}"));
+    assert!(axis[2].as_f64().unwrap().abs() > 0.9999, "{told}");
+    // of a body of 64 sides any turn is as good, within what its sides are off the circle
+    let taken = call(&["--json", "--alternative", "1"]);
+    assert!(taken.status.success(), "{}", String::from_utf8_lossy(&taken.stderr));
+    let taken: serde_json::Value = serde_json::from_slice(&taken.stdout).unwrap();
+    let most = taken["after"]["regions"][0]["mesh_to_truth"]["max_mm"].as_f64().unwrap();
+    assert!(most < 40.0 * (1.0 - (std::f64::consts::PI / 64.0).cos()), "{most}");
+}
