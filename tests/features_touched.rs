@@ -168,7 +168,7 @@ fn of_truth<'a>(truth: &TruthFeature, kind: Kind, features: &'a [Feature]) -> &'
 /// χ² by Wilson and Hilferty's cube (six have 0.05 and 3.78 as mean squares; Abramowitz & Stegun, table 26.8, 0.06 and 3.74).
 fn told_by(count: usize) -> [f64; 2] {
     let spread = 2.0 / (9.0 * count as f64);
-    [-3.09, 3.09].map(|z| (1.0 - spread + z * spread.sqrt()).powi(3).sqrt())
+    [-3.09, 3.09].map(|z| (1.0 - spread + z * spread.sqrt()).max(0.0).powf(1.5))
 }
 
 #[test]
