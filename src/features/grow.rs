@@ -7,6 +7,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::facets::{Facets, NONE};
+use super::flats::{Flat, Flats, is_drawn};
 use super::marks::sort;
 use super::primitive::{Bend, Moments, Primitive, cylinder_of, refined};
 use super::segment::{Segment, Segmentation};
@@ -31,10 +32,6 @@ const WAVES_OF_ALL: f64 = 3e-4;
 const WIDER: f64 = 3.0;
 /// How often.
 const RUNGS: i32 = 3;
-/// A mesh is exact when this share of its faces lies in one plane with a neighbour …
-const EXACT_SHARE: f64 = 0.2;
-/// … within this, 1 − cos: 0.01°, what single precision makes of small faces.
-const COPLANAR: f64 = 1.5e-8;
 /// A corner is off by at most so many root mean squares of the faces around the seed.
 const SPREAD: f64 = 4.0;
 /// Largest tolerance of a round surface, in its radii.
@@ -48,7 +45,7 @@ const SAMPLE: usize = 64;
 /// A region is at least so many tolerances wide.
 const LEAST_WIDTH: f64 = 12.0;
 /// Across a sharper edge than this no region grows, and a normal may be off by no more: half of a polygon of 9 sides. 40°.
-const SMOOTH: f64 = 0.766;
+pub(super) const SMOOTH: f64 = 0.766;
 /// A face's normal may be off that of the primitive by this much: 25°.
 const ALIKE: f64 = 0.906;
 /// A segment of which stronger ones leave less than this is none.
@@ -81,16 +78,17 @@ impl Segmentation {
     pub(super) fn of(facets: &Facets) -> Self {
         let mut growing = Growing::of(facets);
         let mut seeds = growing.seeds();
-        for (closeness, tolerance) in growing.scale.tolerances(facets) {
+        let flats = is_drawn(facets).then(|| Flats::of(facets));
+        for (closeness, tolerance) in growing.scale.tolerances(flats.is_some()) {
             (growing.closeness, growing.tolerance) = (closeness, tolerance);
             seeds.retain(|&face| growing.is_free(face) && facets.area(face) > 0.0);
             for &face in &seeds {
                 if growing.is_free(face) && growing.needs[face as usize] <= closeness {
-                    growing.grow_from(face);
+                    growing.grow_from(face, flats.as_ref());
                 }
             }
-            if growing.is_exact() {
-                growing.take_flat(&seeds);
+            if let Some(flats) = flats.as_ref().filter(|_| growing.is_exact()) {
+                growing.take_flat(flats);
             }
         }
         growing.finish()
@@ -185,7 +183,7 @@ impl<'a> Growing<'a> {
         self.of_face[face as usize] == Segmentation::NONE
     }
 
-    fn grow_from(&mut self, seed: u32) {
+    fn grow_from(&mut self, seed: u32, flats: Option<&Flats>) {
         let near = self.near(seed, NEAR);
         let Some(bend) = Bend::of(self.facets, &near) else { return };
         let mut needs = f64::INFINITY;
@@ -193,8 +191,8 @@ impl<'a> Growing<'a> {
         if bend.spread < FLAT {
             best = self.plane_from(seed, &near, &mut needs);
         }
-        if best.is_none() && self.is_exact() {
-            best = self.flat_from(seed);
+        if let Some(flats) = flats.filter(|_| best.is_none() && self.is_exact()) {
+            best = self.flat_from(&flats.at(seed));
         }
         let is_bounded = best.as_ref().is_some_and(|plane| self.smooth_share(plane) < BOUNDED);
         if !is_bounded {
@@ -244,66 +242,22 @@ impl<'a> Growing<'a> {
         self.tolerance <= self.scale.exact()
     }
 
-    /// The flat piece around a seed of a drawing, where it goes on in round ones, of facets much smaller than it is.
-    fn flat_from(&mut self, seed: u32) -> Option<Region> {
-        let flat = self.flat_around(seed);
-        self.flat_among_round(seed, &flat)
-    }
-
-    /// The faces that lie in one plane with `seed` and hang together with it.
-    fn flat_around(&mut self, seed: u32) -> Vec<u32> {
-        let normal = self.facets.normal(seed);
-        self.round += 1;
-        self.seen[seed as usize] = self.round;
-        let (mut flat, mut at) = (vec![seed], 0);
-        while at < flat.len() {
-            for (_, other) in self.facets.beside(flat[at]) {
-                let is_flat = 1.0 - normal.dot(&self.facets.normal(other)) <= COPLANAR;
-                if is_flat && self.seen[other as usize] != self.round {
-                    self.seen[other as usize] = self.round;
-                    flat.push(other);
-                }
-            }
-            at += 1;
-        }
-        flat
-    }
-
-    fn flat_among_round(&mut self, seed: u32, flat: &[u32]) -> Option<Region> {
-        let (facets, area) = (self.facets, self.facets.area_of(flat));
-        let largest = self.round_beside(seed, flat).map(|face| facets.area(face)).fold(0.0, f64::max);
-        let mut moments = Moments::about(facets.triangle(seed)[0]);
-        moments.add(facets, seed);
-        if area > FLAT_AMONG_ROUND * largest { self.grown(seed, moments.plane()?, flat.len()) } else { None }
-    }
-
-    /// The faces in which a flat piece goes on without an edge.
-    fn round_beside(&self, seed: u32, flat: &[u32]) -> impl Iterator<Item = u32> {
-        let (facets, normal) = (self.facets, self.facets.normal(seed));
-        let beside = flat.iter().flat_map(move |&face| facets.beside(face)).map(|(_, other)| other);
-        beside.filter(move |&other| (COPLANAR..1.0 - SMOOTH).contains(&(1.0 - normal.dot(&facets.normal(other)))))
+    /// A flat piece of a drawing, where it goes on in round ones, of facets much smaller than it is.
+    fn flat_from(&mut self, flat: &Flat) -> Option<Region> {
+        let mut moments = Moments::about(self.facets.triangle(flat.face)[0]);
+        moments.add(self.facets, flat.face);
+        let is_large = flat.area > FLAT_AMONG_ROUND * flat.face_beside;
+        if is_large { self.grown(flat.face, moments.plane()?, flat.faces) } else { None }
     }
 
     /// Takes the flat pieces of a drawing that are left between its round ones: what is beside may have kept a seed from
     /// being tried.
-    fn take_flat(&mut self, seeds: &[u32]) {
-        let mut is_tried = vec![false; self.of_face.len()];
-        for &seed in seeds {
-            if !self.is_free(seed) || is_tried[seed as usize] {
-                continue;
-            }
-            let flat = self.flat_around(seed);
-            flat.iter().for_each(|&face| is_tried[face as usize] = true);
-            if flat.len() < 2 {
-                continue;
-            }
-            // of something round that was divided further, what is beside is as large
-            let beside: Vec<u32> = self.round_beside(seed, &flat).collect();
-            let area = self.facets.area_of(&flat);
-            if beside.into_iter().any(|face| area < FLAT_BESIDE_FLAT * self.facets.area_of(&self.flat_around(face))) {
-                continue;
-            }
-            if let Some(region) = self.flat_among_round(seed, &flat).filter(|region| self.is_wide(region)) {
+    fn take_flat(&mut self, flats: &Flats) {
+        // of something round that was divided further, what is beside is as large
+        let is_likely = |flat: &Flat| flat.faces > 1 && flat.area > FLAT_BESIDE_FLAT * flat.flat_beside;
+        for flat in flats.iter().filter(is_likely) {
+            let found = if self.is_free(flat.face) { self.flat_from(&flat) } else { None };
+            if let Some(region) = found.filter(|region| self.is_wide(region)) {
                 self.accept(region);
             }
         }
@@ -541,11 +495,13 @@ impl Scale {
 
     /// How near the faces around a seed have to be, and how near the rest. Tight ones first: what they explain is not left
     /// to loose ones.
-    fn tolerances(&self, facets: &Facets) -> Vec<(f64, f64)> {
+    ///
+    /// - `is_drawn`: as [`is_drawn`] tells.
+    fn tolerances(&self, is_drawn: bool) -> Vec<(f64, f64)> {
         let (exact, (closeness, tolerance)) = (self.exact(), self.waves());
         let wider = |rung| f64::powi(WIDER, rung);
         let loose = (0..RUNGS).map(|rung| (closeness * wider(rung), tolerance * wider(rung)));
-        is_exact(facets).then_some((exact, exact)).into_iter().chain(loose).collect()
+        is_drawn.then_some((exact, exact)).into_iter().chain(loose).collect()
     }
 
     /// What a drawing needs, m.
@@ -564,18 +520,6 @@ impl Scale {
         let closeness = (WAVES * self.edge).min(WAVES_OF_ALL * self.diagonal).max(self.exact());
         (closeness, WIDER * closeness)
     }
-}
-
-/// Whether neighbours lie in one plane as they do in a drawing, and in no measurement.
-fn is_exact(facets: &Facets) -> bool {
-    let all = facets.areas.iter().filter(|&&area| area > 0.0).count();
-    let is_coplanar = |&face: &u32| {
-        let is_alike = |other: u32| 1.0 - facets.normal(face).dot(&facets.normal(other)) < COPLANAR;
-        facets.area(face) > 0.0 && facets.beside(face).any(|(_, other)| is_alike(other))
-    };
-    // no more are looked at than it takes
-    let enough = (EXACT_SHARE * all as f64) as usize + 1;
-    (0..facets.slots() as u32).filter(is_coplanar).take(enough).count() == enough
 }
 
 /// Median over a sample of the first edges of faces, m.

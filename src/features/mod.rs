@@ -14,6 +14,7 @@ mod detect;
 mod facets;
 mod feature;
 pub mod fit;
+mod flats;
 mod grow;
 mod holes;
 mod k_means;
