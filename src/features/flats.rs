@@ -9,86 +9,66 @@ const DRAWN_SHARE: f64 = 0.2;
 /// … within this, 1 − cos: 0.01°, what single precision makes of small faces.
 const COPLANAR: f64 = 1.5e-8;
 
-/// All flat pieces.
+/// Flat pieces, each found when it is asked for.
 #[derive(Clone, Debug)]
 pub(super) struct Flats {
-    /// number of the piece of each face
+    /// number of the piece of each face, as far as they are known
     of_face: Vec<u32>,
     flats: Vec<Flat>,
 }
 
-/// A flat piece, and in what it goes on without an edge.
-#[derive(Clone, Copy, Debug, Default)]
+/// A flat piece.
+#[derive(Clone, Debug)]
 pub(super) struct Flat {
-    /// one of its faces
-    pub face: u32,
-    /// how many it has
-    pub faces: usize,
+    pub faces: Vec<u32>,
     /// m²
     pub area: f64,
-    /// the largest face beside it, m²
-    pub face_beside: f64,
-    /// the largest flat piece beside it, m²
-    pub flat_beside: f64,
 }
 
 impl Flats {
-    pub fn of(facets: &Facets) -> Self {
-        let mut flats = Self { of_face: vec![Segmentation::NONE; facets.slots()], flats: Vec::new() };
-        for (face, _) in facets.mesh.faces() {
-            if flats.of_face[face.0 as usize] == Segmentation::NONE {
-                flats.add(facets, face.0);
-            }
-        }
-        flats.look_beside(facets);
-        flats
+    /// `None` for a mesh that is no drawing.
+    pub fn of(facets: &Facets) -> Option<Self> {
+        let of_face = || vec![Segmentation::NONE; facets.slots()];
+        is_drawn(facets).then(|| Self { of_face: of_face(), flats: Vec::new() })
     }
 
-    fn add(&mut self, facets: &Facets, seed: u32) {
+    /// That of a face.
+    pub fn at(&mut self, facets: &Facets, face: u32) -> &Flat {
+        let known = self.of_face[face as usize];
+        let number = if known == Segmentation::NONE { self.add(facets, face) } else { known };
+        &self.flats[number as usize]
+    }
+
+    fn add(&mut self, facets: &Facets, seed: u32) -> u32 {
         let (normal, number) = (facets.normal(seed), self.flats.len() as u32);
         self.of_face[seed as usize] = number;
         let (mut faces, mut at) = (vec![seed], 0);
         while at < faces.len() {
             for (_, other) in facets.beside(faces[at]) {
-                let is_free = self.of_face[other as usize] == Segmentation::NONE;
-                if is_free && 1.0 - normal.dot(&facets.normal(other)) < COPLANAR {
+                let is_new = self.of_face[other as usize] == Segmentation::NONE;
+                if is_new && 1.0 - normal.dot(&facets.normal(other)) < COPLANAR {
                     self.of_face[other as usize] = number;
                     faces.push(other);
                 }
             }
             at += 1;
         }
-        self.flats.push(Flat { face: seed, faces: faces.len(), area: facets.area_of(&faces), ..Flat::default() });
+        self.flats.push(Flat { area: facets.area_of(&faces), faces });
+        number
     }
+}
 
-    fn look_beside(&mut self, facets: &Facets) {
-        for (face, _) in facets.mesh.faces() {
-            let number = self.of_face[face.0 as usize];
-            for (_, other) in facets.beside(face.0) {
-                let beside = self.of_face[other as usize];
-                if beside != number && facets.normal(face.0).dot(&facets.normal(other)) > SMOOTH {
-                    let area = self.flats[beside as usize].area;
-                    let flat = &mut self.flats[number as usize];
-                    flat.face_beside = flat.face_beside.max(facets.area(other));
-                    flat.flat_beside = flat.flat_beside.max(area);
-                }
-            }
-        }
-    }
-
-    /// That of a face.
-    pub fn at(&self, face: u32) -> Flat {
-        self.flats[self.of_face[face as usize] as usize]
-    }
-
-    /// All of them.
-    pub fn iter(&self) -> impl Iterator<Item = Flat> + '_ {
-        self.flats.iter().copied()
+impl Flat {
+    /// The faces in which it goes on without an edge.
+    pub fn beside<'a>(&'a self, facets: &'a Facets) -> impl Iterator<Item = u32> + 'a {
+        let normal = facets.normal(self.faces[0]);
+        let beside = self.faces.iter().flat_map(|&face| facets.beside(face)).map(|(_, other)| other);
+        beside.filter(move |&other| (COPLANAR..1.0 - SMOOTH).contains(&(1.0 - normal.dot(&facets.normal(other)))))
     }
 }
 
 /// Whether neighbours lie in one plane as they do in a drawing, and in no measurement.
-pub(super) fn is_drawn(facets: &Facets) -> bool {
+fn is_drawn(facets: &Facets) -> bool {
     let all = facets.areas.iter().filter(|&&area| area > 0.0).count();
     let is_coplanar = |&face: &u32| {
         let is_alike = |other: u32| 1.0 - facets.normal(face).dot(&facets.normal(other)) < COPLANAR;

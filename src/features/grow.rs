@@ -7,7 +7,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::facets::{Facets, NONE};
-use super::flats::{Flat, Flats, is_drawn};
+use super::flats::{Flat, Flats};
 use super::marks::sort;
 use super::primitive::{Bend, Moments, Primitive, cylinder_of, refined};
 use super::segment::{Segment, Segmentation};
@@ -78,17 +78,17 @@ impl Segmentation {
     pub(super) fn of(facets: &Facets) -> Self {
         let mut growing = Growing::of(facets);
         let mut seeds = growing.seeds();
-        let flats = is_drawn(facets).then(|| Flats::of(facets));
+        let mut flats = Flats::of(facets);
         for (closeness, tolerance) in growing.scale.tolerances(flats.is_some()) {
             (growing.closeness, growing.tolerance) = (closeness, tolerance);
             seeds.retain(|&face| growing.is_free(face) && facets.area(face) > 0.0);
             for &face in &seeds {
                 if growing.is_free(face) && growing.needs[face as usize] <= closeness {
-                    growing.grow_from(face, flats.as_ref());
+                    growing.grow_from(face, flats.as_mut());
                 }
             }
-            if let Some(flats) = flats.as_ref().filter(|_| growing.is_exact()) {
-                growing.take_flat(flats);
+            if let Some(flats) = flats.as_mut().filter(|_| growing.is_exact()) {
+                growing.take_flat(&seeds, flats);
             }
         }
         growing.finish()
@@ -183,7 +183,7 @@ impl<'a> Growing<'a> {
         self.of_face[face as usize] == Segmentation::NONE
     }
 
-    fn grow_from(&mut self, seed: u32, flats: Option<&Flats>) {
+    fn grow_from(&mut self, seed: u32, flats: Option<&mut Flats>) {
         let near = self.near(seed, NEAR);
         let Some(bend) = Bend::of(self.facets, &near) else { return };
         let mut needs = f64::INFINITY;
@@ -192,7 +192,7 @@ impl<'a> Growing<'a> {
             best = self.plane_from(seed, &near, &mut needs);
         }
         if let Some(flats) = flats.filter(|_| best.is_none() && self.is_exact()) {
-            best = self.flat_from(&flats.at(seed));
+            best = self.flat_from(flats.at(self.facets, seed));
         }
         let is_bounded = best.as_ref().is_some_and(|plane| self.smooth_share(plane) < BOUNDED);
         if !is_bounded {
@@ -244,20 +244,32 @@ impl<'a> Growing<'a> {
 
     /// A flat piece of a drawing, where it goes on in round ones, of facets much smaller than it is.
     fn flat_from(&mut self, flat: &Flat) -> Option<Region> {
-        let mut moments = Moments::about(self.facets.triangle(flat.face)[0]);
-        moments.add(self.facets, flat.face);
-        let is_large = flat.area > FLAT_AMONG_ROUND * flat.face_beside;
-        if is_large { self.grown(flat.face, moments.plane()?, flat.faces) } else { None }
+        let (facets, seed) = (self.facets, flat.faces[0]);
+        let largest = flat.beside(facets).map(|face| facets.area(face)).fold(0.0, f64::max);
+        let mut moments = Moments::about(facets.triangle(seed)[0]);
+        moments.add(facets, seed);
+        if flat.area > FLAT_AMONG_ROUND * largest { self.grown(seed, moments.plane()?, flat.faces.len()) } else { None }
     }
 
     /// Takes the flat pieces of a drawing that are left between its round ones: what is beside may have kept a seed from
     /// being tried.
-    fn take_flat(&mut self, flats: &Flats) {
-        // of something round that was divided further, what is beside is as large
-        let is_likely = |flat: &Flat| flat.faces > 1 && flat.area > FLAT_BESIDE_FLAT * flat.flat_beside;
-        for flat in flats.iter().filter(is_likely) {
-            let found = if self.is_free(flat.face) { self.flat_from(&flat) } else { None };
-            if let Some(region) = found.filter(|region| self.is_wide(region)) {
+    fn take_flat(&mut self, seeds: &[u32], flats: &mut Flats) {
+        for &seed in seeds {
+            if !self.is_free(seed) {
+                continue;
+            }
+            let flat = flats.at(self.facets, seed);
+            // each once
+            if flat.faces.len() < 2 || flat.faces[0] != seed {
+                continue;
+            }
+            let flat = flat.clone();
+            // of something round that was divided further, what is beside is as large
+            let is_large = |face: u32| FLAT_BESIDE_FLAT * flats.at(self.facets, face).area > flat.area;
+            if flat.beside(self.facets).any(is_large) {
+                continue;
+            }
+            if let Some(region) = self.flat_from(&flat).filter(|region| self.is_wide(region)) {
                 self.accept(region);
             }
         }
@@ -496,7 +508,7 @@ impl Scale {
     /// How near the faces around a seed have to be, and how near the rest. Tight ones first: what they explain is not left
     /// to loose ones.
     ///
-    /// - `is_drawn`: as [`is_drawn`] tells.
+    /// - `is_drawn`: whether neighbours lie in one plane as they do in a drawing.
     fn tolerances(&self, is_drawn: bool) -> Vec<(f64, f64)> {
         let (exact, (closeness, tolerance)) = (self.exact(), self.waves());
         let wider = |rung| f64::powi(WIDER, rung);
