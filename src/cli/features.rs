@@ -215,6 +215,9 @@ fn size(feature: &Feature) -> String {
         Some(true) => parts.push("through".to_owned()),
         _ => part("deep ", &feature.depth),
     }
+    if feature.kind == Kind::Hole && feature.through.is_none() && feature.depth.is_some() {
+        parts.push("or more".to_owned());
+    }
     if let Some(cone) = &feature.cone_angle {
         parts.push(format!("countersunk {:.1}°", cone.value.to_degrees()));
     }
