@@ -1,0 +1,7 @@
+//! The node's side of ROS 2: the messages, the parameters, and the port through which both go.
+//!
+//! The node knows [`port`] alone. What is behind it is chosen when the process starts.
+
+pub mod messages;
+pub mod parameters;
+pub mod port;
