@@ -32,8 +32,9 @@ fn main() -> anyhow::Result<()> {
     let port = dds::start(&config, inbox.clone())?;
     (0..tiles).for_each(|id| port.publish(Publication::Tile(tile(id))));
     thread::spawn(move || {
+        // ends as well when nobody holds the other end any more
         let _ = std::io::copy(&mut stdin(), &mut std::io::sink());
-        inbox.send(Arrival::Shutdown)
+        let _ = inbox.send(Arrival::Shutdown);
     });
     println!("ready");
     for arrival in arrivals {

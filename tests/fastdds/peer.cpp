@@ -2,6 +2,7 @@
 //
 //   peer tiles DOMAIN COUNT     listens to rt/mesh as a late joiner until COUNT different tiles have come
 //   peer undo DOMAIN COUNT      calls rq/touchup/undo COUNT times with 1, 2, ..., and checks each answer
+//   peer echo DOMAIN COUNT      sends COUNT wrenches at 1 kHz, and times the mismatches that come back
 //
 // Prints "ok" with what it measured, or what is wrong; ends with 0 or 1.
 
@@ -14,6 +15,7 @@
 #include <mutex>
 #include <set>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <fastdds/dds/domain/DomainParticipant.hpp>
@@ -115,9 +117,10 @@ struct Node {
     type.register_type(participant);
     return participant->create_topic(name, type_name, TOPIC_QOS_DEFAULT);
   }
-  DataReader* reader(const char* name, const char* type_name, bool latched, Listener& listener) {
+  DataReader* reader(const char* name, const char* type_name, bool latched, DataReaderListener& listener,
+                     bool reliable = true) {
     DataReaderQos qos = DATAREADER_QOS_DEFAULT;
-    qos.reliability().kind = RELIABLE_RELIABILITY_QOS;
+    qos.reliability().kind = reliable ? RELIABLE_RELIABILITY_QOS : BEST_EFFORT_RELIABILITY_QOS;
     qos.durability().kind = latched ? TRANSIENT_LOCAL_DURABILITY_QOS : VOLATILE_DURABILITY_QOS;
     qos.history().kind = KEEP_LAST_HISTORY_QOS;
     qos.history().depth = latched ? 4096 : 10;
@@ -125,9 +128,9 @@ struct Node {
     auto* subscriber = participant->create_subscriber(SUBSCRIBER_QOS_DEFAULT);
     return subscriber->create_datareader(topic(name, type_name), qos, &listener);
   }
-  DataWriter* writer(const char* name, const char* type_name) {
+  DataWriter* writer(const char* name, const char* type_name, bool reliable = true) {
     DataWriterQos qos = DATAWRITER_QOS_DEFAULT;
-    qos.reliability().kind = RELIABLE_RELIABILITY_QOS;
+    qos.reliability().kind = reliable ? RELIABLE_RELIABILITY_QOS : BEST_EFFORT_RELIABILITY_QOS;
     qos.endpoint().history_memory_policy = eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
     auto* publisher = participant->create_publisher(PUBLISHER_QOS_DEFAULT);
     return publisher->create_datawriter(topic(name, type_name), qos);
@@ -209,9 +212,60 @@ int undo(int domain, uint32_t count) {
   return 0;
 }
 
+// when each of the messages came back
+struct Times : DataReaderListener {
+  std::vector<Clock::time_point> came;
+  explicit Times(size_t count) : came(count) {}
+  void on_data_available(DataReader* reader) override {
+    Bytes bytes;
+    SampleInfo info;
+    while (reader->take_next_sample(&bytes, &info) == ReturnCode_t::RETCODE_OK) {
+      if (!info.valid_data) continue;
+      Cdr cdr{bytes};
+      const auto number = cdr.number<uint32_t>();
+      if (number < came.size()) came[number] = Clock::now();
+    }
+  }
+};
+
+int echo(int domain, uint32_t count) {
+  Times times(count);
+  Node node(domain);
+  node.reader("rt/mismatch", "touchup_msgs::msg::dds_::HapticMismatch_", false, times, false);
+  auto* writer = node.writer("rt/stylus/wrench", "geometry_msgs::msg::dds_::WrenchStamped_", false);
+  std::this_thread::sleep_for(std::chrono::seconds(3));
+  std::vector<Clock::time_point> sent(count);
+  auto next = Clock::now();
+  for (uint32_t number = 0; number < count; ++number) {
+    Bytes wrench(4 + 16 + 48, 0);
+    wrench[1] = 1;
+    std::memcpy(&wrench[4], &number, 4);
+    wrench[12] = 2;
+    wrench[16] = 's';
+    sent[number] = Clock::now();
+    writer->write(&wrench);
+    next += std::chrono::milliseconds(1);
+    std::this_thread::sleep_until(next);
+  }
+  std::this_thread::sleep_for(std::chrono::seconds(1));
+  std::vector<double> took;
+  for (uint32_t number = 0; number < count; ++number)
+    if (times.came[number] != Clock::time_point{})
+      took.push_back(std::chrono::duration<double, std::micro>(times.came[number] - sent[number]).count());
+  std::sort(took.begin(), took.end());
+  if (took.size() < count) {
+    std::printf("only %zu of %u came back\n", took.size(), count);
+    return 1;
+  }
+  const auto at = [&](double share) { return took[size_t(share * (took.size() - 1))]; };
+  std::printf("ok %u echoes p50 %.0f us p99 %.0f us max %.0f us\n", count, at(0.5), at(0.99), at(1));
+  return 0;
+}
+
 int main(int argc, char** argv) {
   if (argc == 4 && std::string(argv[1]) == "tiles") return tiles(std::stoi(argv[2]), std::stoul(argv[3]));
   if (argc == 4 && std::string(argv[1]) == "undo") return undo(std::stoi(argv[2]), std::stoul(argv[3]));
-  std::printf("usage: peer tiles|undo DOMAIN COUNT\n");
+  if (argc == 4 && std::string(argv[1]) == "echo") return echo(std::stoi(argv[2]), std::stoul(argv[3]));
+  std::printf("usage: peer tiles|undo|echo DOMAIN COUNT\n");
   return 1;
 }

@@ -7,7 +7,7 @@ from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.idl import IdlStruct
 from cyclonedds.idl.annotations import final
-from cyclonedds.idl.types import float32, float64, int32, int64, sequence, uint8, uint32, uint64
+from cyclonedds.idl.types import array, float32, float64, int8, int32, int64, sequence, uint8, uint32, uint64
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
@@ -91,6 +91,12 @@ class Wrench:
 class WrenchStamped:
     header: Header
     wrench: Wrench
+
+
+# what ends too early
+@message("geometry_msgs/msg/WrenchStamped")
+class HeaderAlone:
+    header: Header
 
 
 @message("geometry_msgs/msg/PoseStamped")
@@ -233,6 +239,92 @@ class GetParametersResponse:
     guid: uint64
     seq: int64
     values: sequence[ParameterValue]
+
+
+@message("touchup_msgs/msg/ProbeSettings")
+class ProbeSettings:
+    quantity: uint8
+    tolerance: float64
+    confidence: float64
+    pattern: uint8
+    max_touches: uint32
+    max_duration: float64
+    max_force: float64
+    max_search_speed: float64
+    max_link_speed: float64
+    max_search_travel: float64
+    dry_run: bool
+
+
+@message("touchup_msgs/action/Probe_SendGoal_Request")
+class SendGoalRequest:
+    guid: uint64
+    seq: int64
+    goal_id: array[uint8, 16]
+    ids: sequence[uint32]
+    settings: ProbeSettings
+
+
+@message("touchup_msgs/action/Probe_SendGoal_Response")
+class SendGoalResponse:
+    guid: uint64
+    seq: int64
+    accepted: bool
+    stamp: Time
+
+
+@message("touchup_msgs/action/Probe_GetResult_Request")
+class GetResultRequest:
+    guid: uint64
+    seq: int64
+    goal_id: array[uint8, 16]
+
+
+# of the results only how many there are: the tests send none
+@message("touchup_msgs/action/Probe_GetResult_Response")
+class GetResultResponse:
+    guid: uint64
+    seq: int64
+    status: int8
+    header: Header
+    code: uint8
+    message: str
+    results: sequence[uint8]
+
+
+@message("touchup_msgs/action/Probe_FeedbackMessage")
+class FeedbackMessage:
+    goal_id: array[uint8, 16]
+    id: uint32
+    feature: uint32
+    feature_count: uint32
+    phase: uint8
+    touch: uint32
+    touch_count: uint32
+    force: float64
+    uncertainty: float64
+    elapsed: float64
+
+
+@message("action_msgs/msg/GoalInfo")
+class GoalInfo:
+    goal_id: array[uint8, 16]
+    stamp: Time
+
+
+@message("action_msgs/srv/CancelGoal_Request")
+class CancelGoalRequest:
+    guid: uint64
+    seq: int64
+    goal_info: GoalInfo
+
+
+@message("action_msgs/srv/CancelGoal_Response")
+class CancelGoalResponse:
+    guid: uint64
+    seq: int64
+    return_code: int8
+    goals_canceling: sequence[GoalInfo]
 
 
 def parameter_value(value=None):

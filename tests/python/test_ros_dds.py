@@ -4,30 +4,34 @@ The other end is the example ros_echo: wrench in, mismatch out, tiles latched, c
 """
 
 import itertools
-import os
-import subprocess
-import threading
 import time
 
 import pytest
-from conftest import ROOT
-
-cyclone = pytest.importorskip("ros_cyclone", reason="needs cyclonedds")
-from ros_cyclone import (  # noqa: E402
+from ros_cyclone import (
     BEST_EFFORT,
     LATCHED,
     RELIABLE,
+    CancelGoalRequest,
+    CancelGoalResponse,
+    FeedbackMessage,
     GetParametersRequest,
     GetParametersResponse,
+    GetResultRequest,
+    GetResultResponse,
+    GoalInfo,
     HapticMismatch,
     Header,
+    HeaderAlone,
     Marker,
     Parameter,
     Peer,
     Point,
     Pose,
     PoseStamped,
+    ProbeSettings,
     Quaternion,
+    SendGoalRequest,
+    SendGoalResponse,
     SetParametersRequest,
     SetParametersResponse,
     Time,
@@ -38,57 +42,7 @@ from ros_cyclone import (  # noqa: E402
     WrenchStamped,
     parameter_value,
 )
-
-DEADLINE_S = 20
-# a domain of its own for each test; those of users are low
-domains = itertools.count(140 + os.getpid() % 60)
-
-
-def echo_binary():
-    built = os.environ.get("TOUCHUP_ECHO") or ROOT / "target/release/examples/ros_echo"
-    if not os.path.exists(built):
-        pytest.skip("needs cargo build --release --example ros_echo")
-    return str(built)
-
-
-class Echo:
-    """A running ros_echo and the lines that it writes."""
-
-    def __init__(self, domain, *arguments, wrapper=()):
-        command = [*wrapper, echo_binary(), *arguments]
-        environment = {**os.environ, "ROS_DOMAIN_ID": str(domain)}
-        pipe = subprocess.PIPE
-        self.process = subprocess.Popen(
-            command, env=environment, stdin=pipe, stdout=pipe, stderr=subprocess.STDOUT, text=True
-        )
-        self.lines = []
-        threading.Thread(target=self.read, daemon=True).start()
-        self.wait_for(lambda: "ready" in self.lines)
-
-    def read(self):
-        for line in self.process.stdout:
-            self.lines.append(line.rstrip())
-
-    def wait_for(self, condition):
-        until = time.monotonic() + DEADLINE_S
-        while not condition():
-            assert time.monotonic() < until, "\n".join(self.lines)
-            time.sleep(0.01)
-
-    def has(self, *words):
-        return any(all(word in line for word in words) for line in self.lines)
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.process.stdin.close()
-        try:
-            self.process.wait(10)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            raise
-
+from ros_echo import Echo, domains
 
 @pytest.fixture
 def domain():
@@ -107,7 +61,7 @@ def until_answered(echo, write, take):
     def once():
         write()
         time.sleep(0.05)
-        found.extend(take())
+        found.extend(take() or [])
         return found
 
     echo.wait_for(once)
@@ -142,7 +96,7 @@ def test_a_pose_arrives_with_every_field(domain):
         writer = Peer(domain).writer("/stylus/pose", PoseStamped, BEST_EFFORT)
         pose = Pose(Point(1.5, 2.5, 3.5), Quaternion(0.1, 0.2, 0.3, 0.9))
         sent = PoseStamped(Header(Time(-3, 999_999_999), "tracker"), pose)
-        until_answered(echo, lambda: writer.write(sent), lambda: [1] if echo.has("Pose(") else [])
+        until_answered(echo, lambda: writer.write(sent), lambda: echo.has("Pose(") and [1])
         assert echo.has("sec: -3, nanosec: 999999999", '"tracker"', "x: 1.5, y: 2.5, z: 3.5", "x: 0.1, y: 0.2, z: 0.3, w: 0.9")
 
 
@@ -240,3 +194,38 @@ def test_it_is_counted_when_a_listener_comes_and_goes(domain):
         echo.wait_for(lambda: echo.has("Matched", '"/mesh"', "count: 1"))
         del reader, peer
         echo.wait_for(lambda: echo.has("Matched", '"/mesh"', "count: 0"))
+
+
+def test_a_message_that_cannot_be_read_is_told_and_the_next_is_taken(domain):
+    with Echo(domain) as echo:
+        peer = Peer(domain)
+        short = peer.writer("/stylus/wrench", HeaderAlone, BEST_EFFORT)
+        header = Header(Time(1, 2), "sensor")
+        until_answered(echo, lambda: short.write(HeaderAlone(header)), lambda: echo.has("Unreadable", '"stylus/wrench"') and [1])
+        writer = peer.writer("/stylus/pose", PoseStamped, BEST_EFFORT)
+        pose = PoseStamped(header, Pose(Point(1, 2, 3), Quaternion(0, 0, 0, 1)))
+        until_answered(echo, lambda: writer.write(pose), lambda: echo.has("Pose(") and [1])
+
+
+def test_an_action_is_taken_up_goes_on_and_ends(domain):
+    with Echo(domain, "--ros-args", "-p", "service_mapping:=cyclone") as echo:
+        peer, action = Peer(domain), "/touchup/probe/_action"
+        send_goal = peer.client(f"{action}/send_goal", SendGoalRequest, SendGoalResponse)
+        get_result = peer.client(f"{action}/get_result", GetResultRequest, GetResultResponse)
+        cancel_goal = peer.client(f"{action}/cancel_goal", CancelGoalRequest, CancelGoalResponse)
+        feedback = peer.reader(f"{action}/feedback", FeedbackMessage, RELIABLE)
+        # until the services are matched: nobody knows this goal
+        unknown, done = list(range(16)), list(range(16, 32))
+        assert call(echo, get_result, GetResultRequest(1, 0, unknown)).status == 0
+        assert call(echo, cancel_goal, CancelGoalRequest(1, 0, GoalInfo(unknown, Time(0, 0)))).return_code == 2
+
+        settings = ProbeSettings(1, 0.1, 0.95, 0, 9, 60.0, 2.0, 0.01, 0.1, 0.02, True)
+        # a goal without features is refused by the echo, and may be sent again
+        assert not call(echo, send_goal, SendGoalRequest(1, 0, done, [], settings)).accepted
+        accepted = call(echo, send_goal, SendGoalRequest(1, 0, done, [7, 8], settings))
+        assert accepted.accepted and accepted.stamp.sec > 1_700_000_000
+        result = call(echo, get_result, GetResultRequest(1, 0, done))
+        assert (result.status, result.code, result.results) == (4, 4, [])
+        got = feedback.take(10)
+        assert [(list(message.goal_id), message.touch) for message in got] == [(done, 0), (done, 1), (done, 2)]
+        assert call(echo, cancel_goal, CancelGoalRequest(1, 0, GoalInfo(done, Time(0, 0)))).return_code == 3

@@ -146,6 +146,9 @@ impl Probe {
         let goal = Goal {
             accept: Reply::new(move |is_accepted| for_accept.accept(request_id, id, is_accepted)),
             feedback: Feedback(Box::new(move |feedback| {
+                if !for_feedback.goals().is_running(id) {
+                    return;
+                }
                 for_feedback.later(move |probe| {
                     // nobody waits for it who misses it
                     let _ = probe.server.send_feedback(id, feedback);
@@ -185,7 +188,7 @@ impl Probe {
                 known.result = Some(response.clone());
                 std::mem::take(&mut known.waiting)
             }
-            None => Vec::new(),
+            None => return,
         };
         self.later(move |probe| {
             for request_id in waiting {
@@ -271,6 +274,10 @@ impl Goals {
         true
     }
 
+    fn is_running(&self, id: GoalId) -> bool {
+        self.known.get(&id).is_some_and(|known| !known.is_over())
+    }
+
     /// Forgets one that was not taken up.
     fn refuse(&mut self, id: GoalId) {
         if self.known.get(&id).is_some_and(|known| known.accepted == Time::ZERO) {
@@ -304,4 +311,61 @@ impl Goals {
 
 fn nanoseconds(time: &Time) -> i64 {
     time.to_nanos()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn flag() -> Arc<AtomicBool> {
+        Arc::new(AtomicBool::new(false))
+    }
+
+    fn at(goals: &mut Goals, id: GoalId, ns: i64) {
+        goals.known.get_mut(&id).unwrap().accepted = Time::from_nanos(ns);
+    }
+
+    #[test]
+    fn canceling_takes_the_goals_that_it_names() {
+        let (mut goals, ids) = (Goals::default(), [(); 3].map(|()| GoalId::new_random()));
+        let flags = ids.map(|id| {
+            let flag = flag();
+            assert!(goals.add(id, flag.clone()));
+            flag
+        });
+        ids.iter().zip([10, 20, 30]).for_each(|(id, ns)| at(&mut goals, *id, ns));
+        let canceled = |flags: &[Arc<AtomicBool>; 3]| flags.each_ref().map(|flag| flag.load(Ordering::Relaxed));
+
+        let response = goals.cancel((*ids[2].uuid.as_bytes(), 0));
+        assert_eq!((response.return_code, response.goals_canceling.len()), (CancelGoalResponseEnum::None, 1));
+        assert_eq!(canceled(&flags), [false, false, true]);
+        goals.cancel(([0; 16], 10));
+        assert_eq!(canceled(&flags), [true, false, true]);
+        goals.cancel(([0; 16], 0));
+        assert_eq!(canceled(&flags), [true, true, true]);
+    }
+
+    #[test]
+    fn what_is_over_or_unknown_is_not_canceled() {
+        let (mut goals, id) = (Goals::default(), GoalId::new_random());
+        assert!(goals.add(id, flag()));
+        goals.known.get_mut(&id).unwrap().result = Some(ProbeResponse::default());
+        assert_eq!(goals.cancel((*id.uuid.as_bytes(), 0)).return_code, CancelGoalResponseEnum::GoalTerminated);
+        assert_eq!(goals.cancel(([7; 16], 0)).return_code, CancelGoalResponseEnum::UnknownGoal);
+        assert_eq!(goals.cancel(([0; 16], 0)).return_code, CancelGoalResponseEnum::Rejected);
+    }
+
+    #[test]
+    fn goals_are_forgotten_only_when_they_are_over() {
+        let mut goals = Goals::default();
+        let ids: Vec<GoalId> = (0..MOST_GOALS).map(|_| GoalId::new_random()).collect();
+        assert!(ids.iter().all(|id| goals.add(*id, flag())));
+        assert!(!goals.add(ids[3], flag()), "the same again");
+        assert!(!goals.add(GoalId::new_random(), flag()), "one too many");
+        for number in [5, 4] {
+            goals.known.get_mut(&ids[number]).unwrap().result = Some(ProbeResponse::default());
+        }
+        assert!(goals.add(GoalId::new_random(), flag()));
+        assert!(!goals.known.contains_key(&ids[4]) && goals.known.contains_key(&ids[5]));
+    }
 }
