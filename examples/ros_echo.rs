@@ -63,6 +63,6 @@ fn main() -> anyhow::Result<()> {
         }
         stdout().flush()?;
     }
-    println!("dropped {:?} unsent {:?}", port.dropped(), port.unsent());
+    println!("dropped {:?} lost {:?} unsent {:?}", port.dropped(), port.lost(), port.unsent());
     Ok(())
 }

@@ -35,6 +35,10 @@ impl Port for InProcess {
         self.dropped.each_ref().map(|count| count.load(Ordering::Relaxed))
     }
 
+    fn lost(&self) -> [u64; 2] {
+        [0, 0]
+    }
+
     fn unsent(&self) -> [u64; 2] {
         [0, self.unsent.load(Ordering::Relaxed)]
     }

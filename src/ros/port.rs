@@ -167,6 +167,9 @@ pub trait Port: Send + Sync {
     /// Arrivals dropped so far because the node did not take them: wrenches and poses, others.
     fn dropped(&self) -> [u64; 2];
 
+    /// Wrenches and poses that were sent and did not come: gaps in the numbers of their senders, where the port sees them.
+    fn lost(&self) -> [u64; 2];
+
     /// Publications not sent so far because nobody took them fast enough: tiles, others.
     fn unsent(&self) -> [u64; 2];
 }

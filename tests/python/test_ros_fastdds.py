@@ -56,7 +56,7 @@ def test_a_service_answers_in_the_mapping_of_fast_dds(peer, domain):
 def test_no_wrench_of_a_kilohertz_is_lost(peer, domain):
     with Echo(domain) as echo:
         assert "ok 3000 echoes" in peer("echo", domain, 3000)
-    assert echo.has("dropped [0, 0] unsent [0, 0]")
+    assert echo.has("dropped [0, 0] lost [0, 0] unsent [0, 0]")
 
 
 def test_the_wrong_mapping_is_told(peer, domain):

@@ -1,12 +1,13 @@
 //! One thread takes everything that comes.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::thread::{Builder, JoinHandle};
 
-use ros2_client::Subscription;
 use ros2_client::dds::rustdds::mio1::event::Source;
 use ros2_client::dds::rustdds::mio1::{Events, Interest, Poll, Token, Waker};
+use ros2_client::{Gid, Subscription};
 
 use super::{RosError, Shared};
 use crate::ros::messages::Message;
@@ -65,12 +66,36 @@ pub(super) fn listen(
     Ok((waker, thread))
 }
 
+/// The last number of each sender.
+#[derive(Default)]
+pub(super) struct Numbers(BTreeMap<Gid, i64>);
+
+impl Numbers {
+    /// Senders that are followed.
+    const MOST: usize = 64;
+    /// A gap that is larger is no loss: 100 s at 10 kHz.
+    const LARGEST: i64 = 1_000_000;
+
+    /// How many are missing before this one.
+    fn missing(&mut self, sender: Gid, number: i64) -> u64 {
+        if self.0.len() >= Self::MOST && !self.0.contains_key(&sender) {
+            self.0.pop_first();
+        }
+        let Some(last) = self.0.insert(sender, number) else { return 0 };
+        let gap = number.saturating_sub(last).saturating_sub(1);
+        if (1..=Self::LARGEST).contains(&gap) { gap as u64 } else { 0 }
+    }
+}
+
 /// A topic that is listened to.
 pub(super) struct Topic<M: Message> {
     pub name: &'static str,
     pub subscription: Subscription<M>,
     pub shared: Arc<Shared>,
     pub arrival: fn(&Shared, M) -> Option<Arrival>,
+    /// which of the two counters of what was lost on the way
+    pub counter: Option<usize>,
+    pub numbers: Numbers,
 }
 
 impl<M: Message> Listener for Topic<M> {
@@ -81,7 +106,11 @@ impl<M: Message> Listener for Topic<M> {
     fn take(&mut self) {
         loop {
             match self.subscription.take() {
-                Ok(Some((message, _))) => {
+                Ok(Some((message, info))) => {
+                    if let Some(counter) = self.counter {
+                        let lost = self.numbers.missing(info.publisher_gid(), info.sequence_number());
+                        self.shared.arrivals.lost[counter].fetch_add(lost, Ordering::Relaxed);
+                    }
                     if let Some(arrival) = (self.arrival)(&self.shared, message) {
                         self.shared.arrivals.put(arrival);
                     }
@@ -90,5 +119,20 @@ impl<M: Message> Listener for Topic<M> {
                 Err(error) => self.shared.arrivals.put(Arrival::Unreadable(self.name, error.to_string())),
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gaps_are_counted_for_each_sender_alone() {
+        let mut numbers = Numbers::default();
+        let [a, b] = [Gid::default(), Gid::from([1; 16])];
+        let missing: Vec<u64> = [(a, 7), (a, 8), (b, 1), (a, 12), (b, 2), (a, 3), (a, 4), (b, i64::MAX), (b, i64::MIN)]
+            .map(|(sender, number)| numbers.missing(sender, number))
+            .into();
+        assert_eq!(missing, [0, 0, 0, 3, 0, 0, 0, 0, 0]);
     }
 }

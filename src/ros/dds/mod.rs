@@ -58,6 +58,8 @@ struct Arrivals {
     inbox: Inbox,
     dropped_samples: AtomicU64,
     dropped_others: AtomicU64,
+    /// wrenches, poses that did not come
+    lost: [AtomicU64; 2],
     is_over: AtomicBool,
 }
 
@@ -106,6 +108,10 @@ impl Port for DdsPort {
         [arrivals.dropped_samples.load(Ordering::Relaxed), arrivals.dropped_others.load(Ordering::Relaxed)]
     }
 
+    fn lost(&self) -> [u64; 2] {
+        self.shared.arrivals.lost.each_ref().map(|count| count.load(Ordering::Relaxed))
+    }
+
     fn unsent(&self) -> [u64; 2] {
         self.shared.outgoing.unsent()
     }
@@ -135,6 +141,7 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
             inbox,
             dropped_samples: AtomicU64::new(0),
             dropped_others: AtomicU64::new(0),
+            lost: [const { AtomicU64::new(0) }; 2],
             is_over: AtomicBool::new(false),
         },
         clock: RosClock::new(is_simulated),

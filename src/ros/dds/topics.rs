@@ -6,7 +6,7 @@ use ros2_client::qos::{Durability, History, QosProfile, WhenFull};
 use ros2_client::{MessageTypeName, Name, Node, Publisher};
 
 use super::graph::Graph;
-use super::incoming::{Listener, Topic};
+use super::incoming::{Listener, Numbers, Topic};
 use super::{RosError, Shared};
 use crate::ros::arguments::NodeConfig;
 use crate::ros::clock::steady_ns;
@@ -113,7 +113,9 @@ impl Readers<'_> {
         let subscription = self.node.create_subscription::<M>(&topic, Some(qos));
         let subscription = subscription.map_err(|error| RosError::dds("subscribing to a topic", &error))?;
         self.graph.add(subscription.guid(), &topic);
-        self.listeners.push(Box::new(Topic { name, subscription, shared: self.shared.clone(), arrival }));
+        let counter = ["wrench", "pose"].iter().position(|sample| name.ends_with(sample));
+        let (shared, numbers) = (self.shared.clone(), Numbers::default());
+        self.listeners.push(Box::new(Topic { name, subscription, shared, arrival, counter, numbers }));
         Ok(())
     }
 }
