@@ -53,6 +53,11 @@ class Header:
     frame_id: str
 
 
+@message("rosgraph_msgs/msg/Clock")
+class Clock:
+    clock: Time
+
+
 @message("geometry_msgs/msg/Vector3")
 class Vector3:
     x: float64
