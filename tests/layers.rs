@@ -19,6 +19,23 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("io", &["touch", "mesh", "features", "align"]),
     ("scene", &["touch", "mesh", "patch", "refine", "sim", "io"]),
     (
+        "ros",
+        &[
+            "touch",
+            "mesh",
+            "patch",
+            "refine",
+            "live",
+            "features",
+            "sim",
+            "align",
+            "calibrate",
+            "compare",
+            "io",
+            "scene",
+        ],
+    ),
+    (
         "cli",
         &[
             "touch",
@@ -33,6 +50,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "compare",
             "io",
             "scene",
+            "ros",
         ],
     ),
 ];

@@ -1,0 +1,122 @@
+"""A cell: the node, the frames of its scene, and RViz.
+
+    ros2 launch touchup cell.launch.py scan:=part.ply
+    ros2 launch touchup cell.launch.py scan:=part.ply robot:=ur ur_type:=ur5e source:=probe scene:=cell.yaml
+
+The hand stylus, or the arm of somebody else with the probe, publishes wrench and pose; with robot:=sim or robot:=ur the
+node does. Everything runs in `namespace`. Who touches, who moves and the scene come from here, as the frames depend on them;
+other parameters come from the file `params` unless they are given here.
+"""
+
+import os
+import shlex
+
+from ament_index_python.packages import get_package_share_directory
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
+from launch.substitutions import Command, LaunchConfiguration
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+
+
+def path(*below):
+    """Absolute path of what is installed with touchup."""
+    return os.path.join(get_package_share_directory("touchup"), *below)
+
+
+def absolute(given):
+    """The path as seen from here, whatever the folder in which a process starts; empty stays empty."""
+    return os.path.abspath(os.path.expanduser(given)) if given else ""
+
+
+def text(value):
+    """A parameter that is text, even where it looks like a number."""
+    return ParameterValue(value, value_type=str)
+
+
+def frames(name, arguments, common):
+    """Publishes the frames of urdf/NAME.xacro, and the description as NAME_description."""
+    command = " ".join(shlex.quote(word) for word in ["xacro", path("urdf", f"{name}.xacro"), *arguments])
+    return Node(
+        package="robot_state_publisher",
+        executable="robot_state_publisher",
+        name=f"{name}_state_publisher",
+        namespace=common["namespace"],
+        parameters=[{"robot_description": text(Command(command)), "use_sim_time": common["use_sim_time"]}],
+        remappings=[("robot_description", f"{name}_description")],
+    )
+
+
+def actions(context):
+    """What the arguments ask for."""
+    given = lambda name: LaunchConfiguration(name).perform(context)  # noqa: E731
+    # an empty namespace is refused where none is not
+    common = {"namespace": given("namespace") or None, "use_sim_time": given("use_sim_time") == "true"}
+    robot, source = given("robot"), given("source")
+    # the frames are made of the scene that the node refines by
+    scene = absolute(given("scene")) or path("config", "default.yaml")
+
+    parameters = {"source": text(source), "robot": text(robot), "use_sim_time": common["use_sim_time"]}
+    if given("scan"):
+        parameters["scan"] = text(absolute(given("scan")))
+    if given("mesh_unit"):
+        parameters["mesh_unit"] = text(given("mesh_unit"))
+    started = [
+        Node(
+            package="touchup",
+            executable="touchup",
+            name="touchup",
+            namespace=common["namespace"],
+            arguments=["node", "--scene", scene],
+            parameters=[absolute(given("params")) or path("config", "node.yaml"), parameters],
+            output="screen",
+            # it saves when it ends
+            sigterm_timeout="30",
+            on_exit=Shutdown(reason="the node of touchup ended"),
+        )
+    ]
+
+    place = [f"{name}:={given(name)}" for name in ("ur_type", "robot_xyz", "robot_rpy", "tcp_xyz", "tcp_rpy") if given(name)]
+    started.append(frames("cell", [f"robot:={robot}", f"scene:={scene}", *place], common))
+    # a UR arm holds the probe in its own tree
+    tools = {source, "probe"} if robot != "none" else {source}
+    held = {"probe"} if robot == "ur" else set()
+    started += [frames(tool, [f"scene:={scene}"], common) for tool in sorted(tools - held)]
+
+    if given("rviz") == "true":
+        started.append(
+            Node(
+                package="rviz2",
+                executable="rviz2",
+                name="rviz",
+                namespace=common["namespace"],
+                arguments=["-d", path("config", "touchup.rviz")],
+                parameters=[{"use_sim_time": common["use_sim_time"]}],
+            )
+        )
+    return started
+
+
+def generate_launch_description():
+    """The arguments, and what follows from them."""
+    argument = DeclareLaunchArgument
+    yes_no = ["true", "false"]
+    return LaunchDescription(
+        [
+            argument("robot", default_value="none", choices=["none", "sim", "ur"], description="Who moves the probe."),
+            argument("source", default_value="stylus", choices=["stylus", "probe"], description="Who touches."),
+            argument("scan", default_value="", description="The mesh to refine: PLY, STL or OBJ."),
+            argument("mesh_unit", default_value="", choices=["", "m", "mm", "inch"], description="Unit of its file."),
+            argument("scene", default_value="", description="The scene YAML; empty: config/default.yaml."),
+            argument("params", default_value="", description="Parameters of the node; empty: config/node.yaml."),
+            argument("rviz", default_value="true", choices=yes_no, description="Start RViz."),
+            argument("namespace", default_value="", description="Namespace of the node and of RViz."),
+            argument("use_sim_time", default_value="false", choices=yes_no, description="Time from /clock."),
+            argument("ur_type", default_value="ur5e", description="With robot:=ur: which arm, as ur_description names it."),
+            argument("robot_xyz", default_value="", description="Its base_link in the cell, m; empty: 0 0 0."),
+            argument("robot_rpy", default_value="", description="... rad; empty: 0 0 0."),
+            argument("tcp_xyz", default_value="", description="Its tool centre point from tool0, m; empty: 0 0 0."),
+            argument("tcp_rpy", default_value="", description="... rad; empty: pi 0 0, z from tip to handle."),
+            OpaqueFunction(function=actions),
+        ]
+    )

@@ -1,0 +1,138 @@
+//! One thread takes everything that comes.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::thread::{Builder, JoinHandle};
+
+use ros2_client::dds::rustdds::mio1::event::Source;
+use ros2_client::dds::rustdds::mio1::{Events, Interest, Poll, Token, Waker};
+use ros2_client::{Gid, Subscription};
+
+use super::{RosError, Shared};
+use crate::ros::messages::Message;
+use crate::ros::port::Arrival;
+
+/// Something that messages come from.
+pub(super) trait Listener: Send {
+    /// What wakes the thread: once for all that came since it was last read empty. Asked for once for each number below
+    /// [`Self::sources`].
+    fn source(&mut self, number: usize) -> &mut dyn Source;
+
+    /// How many sources there are.
+    fn sources(&self) -> usize {
+        1
+    }
+
+    /// Takes all that is there.
+    fn take(&mut self);
+}
+
+/// Not the number of any listener.
+const WAKE: Token = Token(usize::MAX);
+
+/// Starts the thread; the waker lets it look whether all is over.
+pub(super) fn listen(
+    mut listeners: Vec<Box<dyn Listener>>,
+    shared: Arc<Shared>,
+) -> Result<(Arc<Waker>, JoinHandle<()>), RosError> {
+    let mut poll = Poll::new()?;
+    for (token, listener) in listeners.iter_mut().enumerate() {
+        for number in 0..listener.sources() {
+            poll.registry().register(listener.source(number), Token(token), Interest::READABLE)?;
+        }
+    }
+    let waker = Arc::new(Waker::new(poll.registry(), WAKE)?);
+    let thread = Builder::new().name("touchup-receive".to_owned()).spawn(move || {
+        let mut events = Events::with_capacity(128);
+        // what came before the registration wakes nobody
+        listeners.iter_mut().for_each(|listener| listener.take());
+        while !shared.arrivals.is_over.load(Ordering::Relaxed) {
+            if let Err(error) = poll.poll(&mut events, None) {
+                if error.kind() == std::io::ErrorKind::Interrupted {
+                    continue;
+                }
+                tracing::error!(%error, "the node hears nothing any more");
+                shared.arrivals.put(Arrival::Shutdown);
+                return;
+            }
+            for event in &events {
+                if let Some(listener) = listeners.get_mut(event.token().0) {
+                    listener.take();
+                }
+            }
+        }
+    })?;
+    Ok((waker, thread))
+}
+
+/// The last number of each sender.
+#[derive(Default)]
+pub(super) struct Numbers(BTreeMap<Gid, i64>);
+
+impl Numbers {
+    /// Senders that are followed.
+    const MOST: usize = 64;
+    /// A gap that is larger is no loss: 100 s at 10 kHz.
+    const LARGEST: i64 = 1_000_000;
+
+    /// How many are missing before this one.
+    fn missing(&mut self, sender: Gid, number: i64) -> u64 {
+        if self.0.len() >= Self::MOST && !self.0.contains_key(&sender) {
+            self.0.pop_first();
+        }
+        let Some(last) = self.0.insert(sender, number) else { return 0 };
+        let gap = number.saturating_sub(last).saturating_sub(1);
+        if (1..=Self::LARGEST).contains(&gap) { gap as u64 } else { 0 }
+    }
+}
+
+/// A topic that is listened to.
+pub(super) struct Topic<M: Message> {
+    pub name: &'static str,
+    pub subscription: Subscription<M>,
+    pub shared: Arc<Shared>,
+    pub arrival: fn(&Shared, M) -> Option<Arrival>,
+    /// which of the two counters of what was lost on the way
+    pub counter: Option<usize>,
+    pub numbers: Numbers,
+}
+
+impl<M: Message> Listener for Topic<M> {
+    fn source(&mut self, _: usize) -> &mut dyn Source {
+        &mut self.subscription
+    }
+
+    fn take(&mut self) {
+        loop {
+            match self.subscription.take() {
+                Ok(Some((message, info))) => {
+                    if let Some(counter) = self.counter {
+                        let lost = self.numbers.missing(info.publisher_gid(), info.sequence_number());
+                        self.shared.arrivals.lost[counter].fetch_add(lost, Ordering::Relaxed);
+                    }
+                    if let Some(arrival) = (self.arrival)(&self.shared, message) {
+                        self.shared.arrivals.put(arrival);
+                    }
+                }
+                Ok(None) => return,
+                Err(error) => self.shared.arrivals.put(Arrival::Unreadable(self.name, error.to_string())),
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gaps_are_counted_for_each_sender_alone() {
+        let mut numbers = Numbers::default();
+        let [a, b] = [Gid::default(), Gid::from([1; 16])];
+        let missing: Vec<u64> = [(a, 7), (a, 8), (b, 1), (a, 12), (b, 2), (a, 3), (a, 4), (b, i64::MAX), (b, i64::MIN)]
+            .map(|(sender, number)| numbers.missing(sender, number))
+            .into();
+        assert_eq!(missing, [0, 0, 0, 3, 0, 0, 0, 0, 0]);
+    }
+}

@@ -1,0 +1,12 @@
+//! The node's side of ROS 2: the messages, the parameters, and the port through which both go.
+//!
+//! The node knows [`port`] alone. What is behind it is chosen when the process starts.
+
+pub mod arguments;
+pub mod clock;
+pub mod dds;
+pub mod in_process;
+pub mod messages;
+pub mod names;
+pub mod parameters;
+pub mod port;

@@ -1,0 +1,401 @@
+//! The parameters of the node: one table, and what may be set.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use thiserror::Error;
+
+/// Value of a parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ParameterValue {
+    /// on or off
+    Bool(bool),
+    /// a whole number
+    Integer(i64),
+    /// a number
+    Double(f64),
+    /// a word
+    String(String),
+}
+
+impl ParameterValue {
+    /// A value as YAML has it: `true`, `3`, `0.5`, `hole`, `"3"`.
+    pub fn from_yaml(text: &str) -> Self {
+        let text = text.trim();
+        let quoted = |quote| text.len() >= 2 && text.starts_with(quote) && text.ends_with(quote);
+        if quoted('"') || quoted('\'') {
+            return Self::String(text[1..text.len() - 1].to_owned());
+        }
+        match text {
+            "true" | "True" | "TRUE" => return Self::Bool(true),
+            "false" | "False" | "FALSE" => return Self::Bool(false),
+            ".inf" | "+.inf" => return Self::Double(f64::INFINITY),
+            "-.inf" => return Self::Double(f64::NEG_INFINITY),
+            ".nan" => return Self::Double(f64::NAN),
+            _ => {}
+        }
+        if let Ok(whole) = text.parse() {
+            return Self::Integer(whole);
+        }
+        let is_number = text.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c));
+        match text.parse() {
+            Ok(number) if is_number => Self::Double(number),
+            _ => Self::String(text.to_owned()),
+        }
+    }
+
+    /// Its type, as `ros2 param describe` has it.
+    pub fn type_name(&self) -> &'static str {
+        match self {
+            Self::Bool(_) => "bool",
+            Self::Integer(_) => "integer",
+            Self::Double(_) => "double",
+            Self::String(_) => "string",
+        }
+    }
+}
+
+impl fmt::Display for ParameterValue {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Bool(on) => on.fmt(f),
+            Self::Integer(whole) => whole.fmt(f),
+            Self::Double(number) => write!(f, "{number:?}"),
+            Self::String(word) => word.fmt(f),
+        }
+    }
+}
+
+/// What a parameter may be, and what it is when nobody sets it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Allowed {
+    /// on or off
+    Bool(bool),
+    /// the default, and the smallest and largest number; a whole number is taken too
+    Double(f64, f64, f64),
+    /// any word
+    String(&'static str),
+    /// the default, and the words to choose from
+    OneOf(&'static str, &'static [&'static str]),
+}
+
+/// What is declared of a parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ParameterDescriptor {
+    /// snake_case, the unit at its end
+    pub name: &'static str,
+    /// its default and its range
+    pub allowed: Allowed,
+    /// whether it can be set while the node runs
+    pub live: bool,
+    /// what it does
+    pub description: &'static str,
+}
+
+/// All parameters of the node, those of docs/ros.md and the one that every node has.
+pub const PARAMETERS: &[ParameterDescriptor] = {
+    use Allowed::{Bool, Double, OneOf, String};
+    const fn fixed(name: &'static str, allowed: Allowed, description: &'static str) -> ParameterDescriptor {
+        ParameterDescriptor { name, allowed, live: false, description }
+    }
+    const fn live(name: &'static str, allowed: Allowed, description: &'static str) -> ParameterDescriptor {
+        ParameterDescriptor { name, allowed, live: true, description }
+    }
+    &[
+        fixed("scene", String(""), "the scene; empty: that of config/default.yaml"),
+        fixed("scan", String(""), "the mesh to be refined"),
+        fixed("mesh_unit", OneOf("mm", &["m", "mm", "inch"]), "unit of its coordinates"),
+        fixed("source", OneOf("stylus", &["stylus", "probe"]), "who touches"),
+        fixed("session_folder", String("sessions"), "where sessions go, each in a folder of its own"),
+        fixed("object_frame", String("object"), "frame of the mesh"),
+        fixed("tool_frame", String(""), "frame whose pose comes; empty: as source"),
+        live("view_rate_hz", Double(20.0, 0.1, 100.0), "tiles and tip markers"),
+        live("features_rate_hz", Double(5.0, 0.1, 100.0), "features while they change"),
+        live("mismatch_rate_hz", Double(0.0, 0.0, 10_000.0), "at most; 0: every sample"),
+        live("colour_by", OneOf("touched", &["touched", "mismatch"]), "colours of the mesh"),
+        live("stale_ms", Double(100.0, 1.0, 10_000.0), "a stream without a message for so long is stale"),
+        live(
+            "flag_kind",
+            OneOf("hole", &["unknown", "hole", "slot", "pocket", "boss", "edge", "corner", "plane"]),
+            "what a clicked point flags",
+        ),
+        live("flag_radius_mm", Double(5.0, 0.1, 1_000.0), "how far around it is looked for"),
+        fixed("robot", OneOf("none", &["none", "sim", "ur"]), "the arm"),
+        live("allow_motion", Bool(false), "whether it may move"),
+        fixed(
+            "service_mapping",
+            OneOf("enhanced", &["enhanced", "cyclone"]),
+            "header of services, as the RMW of the others has it (Fast DDS, Cyclone); not with r2r",
+        ),
+        fixed("use_sim_time", Bool(false), "the time is that of the topic /clock"),
+    ]
+};
+
+/// Why a parameter is not set. The text is what `ros2 param set` shows.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum ParameterError {
+    /// none has this name; the one that is meant, when one is near
+    #[error("there is no parameter \"{name}\"{}", did_you_mean(.near))]
+    Unknown {
+        /// as given
+        name: String,
+        /// the one that is meant, when one is near
+        near: Option<&'static str>,
+    },
+    /// of another type
+    #[error("{name} is a {wanted}, \"{value}\" is a {given}")]
+    Type {
+        /// which one
+        name: &'static str,
+        /// what it is
+        wanted: &'static str,
+        /// what came
+        given: &'static str,
+        /// as given
+        value: ParameterValue,
+    },
+    /// a number outside of its range
+    #[error("{name} is {value:?}: it may be {from} to {to}")]
+    Range {
+        /// which one
+        name: &'static str,
+        /// as given
+        value: f64,
+        /// smallest
+        from: f64,
+        /// largest
+        to: f64,
+    },
+    /// none of the words to choose from
+    #[error("{name} is \"{value}\": it may be {}", .words.join(", "))]
+    Word {
+        /// which one
+        name: &'static str,
+        /// as given
+        value: String,
+        /// to choose from
+        words: &'static [&'static str],
+    },
+    /// only when the node starts
+    #[error("{name} cannot be set while the node runs: start it again with -p {name}:={value}")]
+    NotLive {
+        /// which one
+        name: &'static str,
+        /// as given
+        value: ParameterValue,
+    },
+}
+
+fn did_you_mean(near: &Option<&'static str>) -> String {
+    near.map_or_else(String::new, |near| format!(": did you mean \"{near}\"?"))
+}
+
+impl ParameterDescriptor {
+    /// What it is when nobody sets it.
+    pub fn default_value(&self) -> ParameterValue {
+        match self.allowed {
+            Allowed::Bool(on) => ParameterValue::Bool(on),
+            Allowed::Double(number, ..) => ParameterValue::Double(number),
+            Allowed::String(word) | Allowed::OneOf(word, _) => ParameterValue::String(word.to_owned()),
+        }
+    }
+
+    /// The value as it is to be kept.
+    ///
+    /// # Errors
+    /// [`ParameterError::Type`], [`ParameterError::Range`] (NaN too) or [`ParameterError::Word`].
+    pub fn check(&self, value: &ParameterValue) -> Result<ParameterValue, ParameterError> {
+        let name = self.name;
+        match (self.allowed, value) {
+            (Allowed::Bool(_), ParameterValue::Bool(_)) | (Allowed::String(_), ParameterValue::String(_)) => {
+                Ok(value.clone())
+            }
+            (Allowed::Double(_, from, to), ParameterValue::Double(number)) => within(name, *number, from, to),
+            // exact up to 2^53, far beyond every range
+            (Allowed::Double(_, from, to), ParameterValue::Integer(whole)) => within(name, *whole as f64, from, to),
+            (Allowed::OneOf(_, words), ParameterValue::String(word)) if words.contains(&word.as_str()) => {
+                Ok(value.clone())
+            }
+            (Allowed::OneOf(_, words), ParameterValue::String(word)) => {
+                Err(ParameterError::Word { name, value: word.clone(), words })
+            }
+            _ => {
+                let (wanted, given) = (self.default_value().type_name(), value.type_name());
+                Err(ParameterError::Type { name, wanted, given, value: value.clone() })
+            }
+        }
+    }
+}
+
+fn within(name: &'static str, value: f64, from: f64, to: f64) -> Result<ParameterValue, ParameterError> {
+    if (from..=to).contains(&value) {
+        return Ok(ParameterValue::Double(value));
+    }
+    Err(ParameterError::Range { name, value, from, to })
+}
+
+/// What is declared of the parameter of that name.
+///
+/// # Errors
+/// [`ParameterError::Unknown`], with the name that is meant when one is near.
+pub fn descriptor(name: &str) -> Result<&'static ParameterDescriptor, ParameterError> {
+    PARAMETERS.iter().find(|declared| declared.name == name).ok_or_else(|| {
+        let near = nearest(name, PARAMETERS.iter().map(|declared| declared.name));
+        ParameterError::Unknown { name: name.to_owned(), near }
+    })
+}
+
+/// The word that is meant: at most a third of its letters differ.
+pub(super) fn nearest(word: &str, known: impl Iterator<Item = &'static str>) -> Option<&'static str> {
+    // nobody types such a name by mistake, and the distance takes as long as both lengths multiplied
+    const LONGEST: usize = 64;
+    if word.len() > LONGEST {
+        return None;
+    }
+    let (distance, near) = known.map(|known| (edits(word, known), known)).min()?;
+    (3 * distance <= near.len()).then_some(near)
+}
+
+/// Letters to change, add or leave out to make one word of the other [Levenshtein 1966].
+fn edits(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, from) in a.chars().enumerate() {
+        let mut diagonal = std::mem::replace(&mut row[0], i + 1);
+        for (j, &to) in b.iter().enumerate() {
+            let changed = diagonal + usize::from(from != to);
+            diagonal = row[j + 1];
+            row[j + 1] = changed.min(diagonal + 1).min(row[j] + 1);
+        }
+    }
+    row[b.len()]
+}
+
+/// Values of all parameters. Each is what its descriptor allows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameters(BTreeMap<&'static str, ParameterValue>);
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self(PARAMETERS.iter().map(|declared| (declared.name, declared.default_value())).collect())
+    }
+}
+
+impl Parameters {
+    /// Sets one before the node runs.
+    ///
+    /// # Errors
+    /// [`ParameterError`]; nothing is changed then.
+    pub fn set(&mut self, name: &str, value: &ParameterValue) -> Result<(), ParameterError> {
+        let declared = descriptor(name)?;
+        self.0.insert(declared.name, declared.check(value)?);
+        Ok(())
+    }
+
+    /// Sets one while the node runs. To set what is set already is no change, and allowed.
+    ///
+    /// # Errors
+    /// [`ParameterError`]; nothing is changed then.
+    pub fn set_live(&mut self, name: &str, value: &ParameterValue) -> Result<(), ParameterError> {
+        let declared = descriptor(name)?;
+        let value = declared.check(value)?;
+        if !declared.live && self.0.get(declared.name) != Some(&value) {
+            return Err(ParameterError::NotLive { name: declared.name, value });
+        }
+        self.0.insert(declared.name, value);
+        Ok(())
+    }
+
+    /// One of them.
+    pub fn value(&self, name: &str) -> Option<&ParameterValue> {
+        self.0.get(name)
+    }
+
+    /// One that is a word; empty for a name that is none.
+    pub fn string(&self, name: &str) -> &str {
+        match self.0.get(name) {
+            Some(ParameterValue::String(word)) => word,
+            _ => "",
+        }
+    }
+
+    /// One that is a number; NaN for a name that is none.
+    pub fn double(&self, name: &str) -> f64 {
+        match self.0.get(name) {
+            Some(ParameterValue::Double(number)) => *number,
+            _ => f64::NAN,
+        }
+    }
+
+    /// One that is on or off; off for a name that is none.
+    pub fn bool(&self, name: &str) -> bool {
+        self.0.get(name) == Some(&ParameterValue::Bool(true))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn yaml_scalars_have_the_type_that_ros_gives_them() {
+        let cases = [
+            ("true", ParameterValue::Bool(true)),
+            ("3", ParameterValue::Integer(3)),
+            ("-3", ParameterValue::Integer(-3)),
+            ("3.0", ParameterValue::Double(3.0)),
+            ("1e-3", ParameterValue::Double(0.001)),
+            (".5", ParameterValue::Double(0.5)),
+            ("inch", ParameterValue::String("inch".into())),
+            ("infinity", ParameterValue::String("infinity".into())),
+            ("\"3\"", ParameterValue::String("3".into())),
+            ("'", ParameterValue::String("'".into())),
+            ("", ParameterValue::String(String::new())),
+        ];
+        for (text, value) in cases {
+            assert_eq!(ParameterValue::from_yaml(text), value, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_refused_value_says_why_and_changes_nothing() {
+        let mut parameters = Parameters::default();
+        let cases = [
+            ("view_rate_hz", ParameterValue::Double(0.05), "view_rate_hz is 0.05: it may be 0.1 to 100"),
+            ("view_rate_hz", ParameterValue::Double(f64::NAN), "view_rate_hz is NaN: it may be 0.1 to 100"),
+            ("view_rate_hz", ParameterValue::Bool(true), "view_rate_hz is a double, \"true\" is a bool"),
+            ("flag_kind", ParameterValue::String("holes".into()), "flag_kind is \"holes\": it may be unknown, hole, "),
+            (
+                "view_rate",
+                ParameterValue::Double(1.0),
+                "there is no parameter \"view_rate\": did you mean \"view_rate_hz\"?",
+            ),
+            ("xyz", ParameterValue::Double(1.0), "there is no parameter \"xyz\""),
+            (
+                "robot",
+                ParameterValue::String("sim".into()),
+                "robot cannot be set while the node runs: start it again with -p robot:=sim",
+            ),
+        ];
+        for (name, value, reason) in cases {
+            let told = parameters.set_live(name, &value).unwrap_err().to_string();
+            assert!(told.starts_with(reason), "{told}");
+        }
+        assert_eq!(parameters, Parameters::default());
+    }
+
+    #[test]
+    fn a_whole_number_sets_a_double() {
+        let mut parameters = Parameters::default();
+        parameters.set_live("stale_ms", &ParameterValue::Integer(250)).unwrap();
+        assert_eq!(parameters.double("stale_ms"), 250.0);
+    }
+
+    #[test]
+    fn what_is_set_already_may_be_set_again() {
+        let mut parameters = Parameters::default();
+        parameters.set("robot", &ParameterValue::String("sim".into())).unwrap();
+        parameters.set_live("robot", &ParameterValue::String("sim".into())).unwrap();
+        assert_eq!(parameters.string("robot"), "sim");
+    }
+}

@@ -1,0 +1,178 @@
+//! What the node needs of ROS 2, and no more: what comes in, what goes out, and a way to answer.
+//!
+//! Behind it stand native DDS, r2r, or nothing at all (in-process, for tests and the demo). No type of theirs leaves their
+//! file: messages are the plain structs of [`super::messages`], a request carries the closure that answers it.
+
+use std::fmt;
+use std::sync::mpsc::SyncSender;
+
+use super::messages::{
+    Clock, DetectFeaturesRequest, DetectFeaturesResponse, DiagnosticArray, FeatureArray, FlagFeatureRequest,
+    FlagFeatureResponse, HapticMismatch, Marker, MarkerArray, MeshPatch, Path, PointStamped, PoseStamped,
+    ProbeFeatureRequest, ProbeFeatureResponse, ProbeFeedback, ProbeGoal, ProbeResponse, ResyncMeshRequest,
+    ResyncMeshResponse, SaveMeshRequest, SaveMeshResponse, SetBoolRequest, SetBoolResponse, TFMessage, TriggerResponse,
+    UndoRequest, UndoResponse, UnflagFeatureRequest, UnflagFeatureResponse, WrenchStamped,
+};
+use super::parameters::ParameterValue;
+
+/// Something that came in.
+#[derive(Debug)]
+pub enum Arrival {
+    /// `SOURCE/wrench`, and when it came, ns of a steady clock
+    Wrench(WrenchStamped, i64),
+    /// `SOURCE/pose`, and when it came, ns of a steady clock
+    Pose(PoseStamped, i64),
+    /// `/tf`
+    Tf(TFMessage),
+    /// `/tf_static`
+    TfStatic(TFMessage),
+    /// `/clicked_point`
+    ClickedPoint(PointStamped),
+    /// `/clock`
+    Clock(Clock),
+    /// a message that could not be read: its topic, and why
+    Unreadable(&'static str, String),
+    /// a service was called
+    Call(Call),
+    /// somebody wants a parameter changed
+    SetParameter(String, ParameterValue, Reply<Result<(), String>>),
+    /// other software that listens or sends came or went on a topic: for the diagnostics
+    Matched(Endpoint),
+    /// the process is asked to end
+    Shutdown,
+}
+
+/// A call of a service, with what answers it.
+#[derive(Debug)]
+pub enum Call {
+    /// `~/flag_feature`
+    Flag(FlagFeatureRequest, Reply<FlagFeatureResponse>),
+    /// `~/unflag_feature`
+    Unflag(UnflagFeatureRequest, Reply<UnflagFeatureResponse>),
+    /// `~/detect_features`
+    Detect(DetectFeaturesRequest, Reply<DetectFeaturesResponse>),
+    /// `~/save_mesh`
+    Save(SaveMeshRequest, Reply<SaveMeshResponse>),
+    /// `~/resync_mesh`
+    Resync(ResyncMeshRequest, Reply<ResyncMeshResponse>),
+    /// `~/undo`
+    Undo(UndoRequest, Reply<UndoResponse>),
+    /// `~/redo`
+    Redo(UndoRequest, Reply<UndoResponse>),
+    /// `~/reset`
+    Reset(Reply<TriggerResponse>),
+    /// `~/pause`
+    Pause(SetBoolRequest, Reply<SetBoolResponse>),
+    /// `~/probe_feature`
+    ProbeFeature(ProbeFeatureRequest, Reply<ProbeFeatureResponse>),
+    /// `~/probe`
+    Probe(ProbeGoal, Goal),
+}
+
+/// A goal of the action `~/probe`.
+#[derive(Debug)]
+pub struct Goal {
+    /// takes it up, or refuses it
+    pub accept: Reply<bool>,
+    /// feedback; may be called often, drops what nobody waits for
+    pub feedback: Feedback,
+    /// ends it
+    pub result: Reply<(GoalEnd, ProbeResponse)>,
+    /// whether a cancel was asked for
+    pub is_cancelled: std::sync::Arc<std::sync::atomic::AtomicBool>,
+}
+
+/// How a goal ended, as actions name it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GoalEnd {
+    /// done
+    Succeeded,
+    /// stopped because somebody asked for it
+    Canceled,
+    /// not done
+    Aborted,
+}
+
+/// Sends feedback of a goal.
+pub struct Feedback(pub Box<dyn Fn(ProbeFeedback) + Send>);
+
+/// Answers once. Dropped without an answer, the caller gets none.
+pub struct Reply<T>(Box<dyn FnOnce(T) + Send>);
+
+impl<T> Reply<T> {
+    /// A reply that hands the answer to `send`, which must not block.
+    pub fn new(send: impl FnOnce(T) + Send + 'static) -> Self {
+        Self(Box::new(send))
+    }
+
+    /// Answers.
+    pub fn send(self, answer: T) {
+        (self.0)(answer);
+    }
+}
+
+impl<T> fmt::Debug for Reply<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Reply")
+    }
+}
+
+impl fmt::Debug for Feedback {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Feedback")
+    }
+}
+
+/// Something that goes out.
+#[derive(Clone, Debug)]
+pub enum Publication {
+    /// `mesh`: one tile
+    Tile(Marker),
+    /// `mesh_patch`
+    MeshPatch(MeshPatch),
+    /// `features`
+    Features(FeatureArray),
+    /// `feature_markers`
+    FeatureMarkers(MarkerArray),
+    /// `tip`
+    Tip(MarkerArray),
+    /// `path`
+    Path(Path),
+    /// `mismatch`
+    Mismatch(HapticMismatch),
+    /// `/diagnostics`
+    Diagnostics(DiagnosticArray),
+}
+
+/// Who else is on a topic.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Endpoint {
+    /// as on the wire
+    pub topic: String,
+    /// how many there are now
+    pub count: usize,
+    /// why one does not fit, where one does not: quality of service, type, service mapping
+    pub mismatch: Option<String>,
+}
+
+/// The way out. What comes in goes to the [`SyncSender`] that a port is started with; where that is full, the port counts
+/// what it drops ([`Port::dropped`]).
+pub trait Port: Send + Sync {
+    /// Sends; never blocks for longer than it takes to write the message down.
+    fn publish(&self, publication: Publication);
+
+    /// Time of ROS, ns: the system's, or that of `/clock` with `use_sim_time`.
+    fn now_ns(&self) -> i64;
+
+    /// Arrivals dropped so far because the node did not take them: wrenches and poses, others.
+    fn dropped(&self) -> [u64; 2];
+
+    /// Wrenches and poses that were sent and did not come: gaps in the numbers of their senders, where the port sees them.
+    fn lost(&self) -> [u64; 2];
+
+    /// Publications not sent so far because nobody took them fast enough: tiles, others.
+    fn unsent(&self) -> [u64; 2];
+}
+
+/// Where arrivals go.
+pub type Inbox = SyncSender<Arrival>;
