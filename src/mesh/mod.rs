@@ -2,6 +2,7 @@
 
 mod closest;
 mod coherent;
+mod journal;
 mod repair;
 mod signed_distance;
 mod stars;
@@ -10,6 +11,7 @@ pub mod triangle;
 
 pub use closest::{BoxQuery, FaceHit, FaceTree, RefitPlan};
 pub use coherent::coherent_order;
+pub use journal::Changes;
 pub use repair::{RepairReport, repair};
 pub use signed_distance::{pseudo_normal, signed_distance};
 pub use tri_mesh::{FaceId, MeshError, TriMesh, VertexId};
