@@ -6,6 +6,7 @@ pub mod mesh_file;
 pub mod pairs_file;
 pub mod png;
 pub mod recording;
+pub mod session_folder;
 pub mod static_poses;
 pub mod table;
 pub mod touches_file;

@@ -3,7 +3,8 @@
 //! When the patch is renewed, and at which sample its change is taken up, follows from the stamps alone. So the result
 //! never depends on how fast the machine is: where the patch is late, [`LiveRefiner::push`] waits for it.
 
-pub mod probed;
+mod latency;
+mod probed;
 mod worker;
 
 use std::collections::VecDeque;
@@ -14,7 +15,8 @@ use crate::mesh::{Changes, FaceTree, TriMesh};
 use crate::patch::{PatchDelta, Patcher};
 use crate::refine::{RefineError, Refiner, Update};
 use crate::touch::{Sample, SettingError};
-use probed::ProbedNews;
+pub use latency::{Latencies, Quantiles};
+pub use probed::ProbedNews;
 use worker::{Answer, Question, Worker};
 
 /// Why a sample was not taken.

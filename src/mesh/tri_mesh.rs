@@ -231,6 +231,11 @@ impl TriMesh {
         self.journal.as_mut().is_none_or(|journal| journal.take(most, into))
     }
 
+    /// How many edits were noted since [`Self::watch`]: it grows with each.
+    pub fn edits(&self) -> u64 {
+        self.journal.as_ref().map_or(0, |journal| journal.edits())
+    }
+
     #[inline]
     fn note_vertex(&mut self, vertex: u32) {
         if let Some(journal) = &mut self.journal {
