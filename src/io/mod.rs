@@ -4,6 +4,7 @@ pub mod atomic;
 pub mod features_file;
 pub mod mesh_file;
 pub mod pairs_file;
+pub mod parameters_file;
 pub mod png;
 pub mod recording;
 pub mod session_folder;

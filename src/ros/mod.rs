@@ -2,6 +2,11 @@
 //!
 //! The node knows [`port`] alone. What is behind it is chosen when the process starts.
 
+pub mod arguments;
+pub mod clock;
+pub mod dds;
+pub mod in_process;
 pub mod messages;
+pub mod names;
 pub mod parameters;
 pub mod port;

@@ -136,19 +136,54 @@ pub const PARAMETERS: &[ParameterDescriptor] = {
 pub enum ParameterError {
     /// none has this name; the one that is meant, when one is near
     #[error("there is no parameter \"{name}\"{}", did_you_mean(.near))]
-    Unknown { name: String, near: Option<&'static str> },
+    Unknown {
+        /// as given
+        name: String,
+        /// the one that is meant, when one is near
+        near: Option<&'static str>,
+    },
     /// of another type
     #[error("{name} is a {wanted}, \"{value}\" is a {given}")]
-    Type { name: &'static str, wanted: &'static str, given: &'static str, value: ParameterValue },
+    Type {
+        /// which one
+        name: &'static str,
+        /// what it is
+        wanted: &'static str,
+        /// what came
+        given: &'static str,
+        /// as given
+        value: ParameterValue,
+    },
     /// a number outside of its range
     #[error("{name} is {value:?}: it may be {from} to {to}")]
-    Range { name: &'static str, value: f64, from: f64, to: f64 },
+    Range {
+        /// which one
+        name: &'static str,
+        /// as given
+        value: f64,
+        /// smallest
+        from: f64,
+        /// largest
+        to: f64,
+    },
     /// none of the words to choose from
     #[error("{name} is \"{value}\": it may be {}", .words.join(", "))]
-    Word { name: &'static str, value: String, words: &'static [&'static str] },
+    Word {
+        /// which one
+        name: &'static str,
+        /// as given
+        value: String,
+        /// to choose from
+        words: &'static [&'static str],
+    },
     /// only when the node starts
     #[error("{name} cannot be set while the node runs: start it again with -p {name}:={value}")]
-    NotLive { name: &'static str, value: ParameterValue },
+    NotLive {
+        /// which one
+        name: &'static str,
+        /// as given
+        value: ParameterValue,
+    },
 }
 
 fn did_you_mean(near: &Option<&'static str>) -> String {

@@ -166,6 +166,9 @@ pub trait Port: Send + Sync {
 
     /// Arrivals dropped so far because the node did not take them: wrenches and poses, others.
     fn dropped(&self) -> [u64; 2];
+
+    /// Publications not sent so far because nobody took them fast enough: tiles, others.
+    fn unsent(&self) -> [u64; 2];
 }
 
 /// Where arrivals go.

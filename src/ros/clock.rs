@@ -1,0 +1,67 @@
+//! The two times of a node: one that is steady, and that of ROS.
+
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicI64, Ordering};
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
+
+use super::messages::Time;
+
+/// Time since the process first asked, ns: never jumps, never goes back.
+pub fn steady_ns() -> i64 {
+    static START: OnceLock<Instant> = OnceLock::new();
+    // 292 years fit
+    START.get_or_init(Instant::now).elapsed().as_nanos() as i64
+}
+
+/// A stamp as one number, ns.
+pub fn stamp_ns(time: Time) -> i64 {
+    i64::from(time.sec) * 1_000_000_000 + i64::from(time.nanosec)
+}
+
+/// The time of ROS: the system's, or that of `/clock`.
+#[derive(Debug)]
+pub struct RosClock {
+    is_simulated: bool,
+    simulated_ns: AtomicI64,
+}
+
+impl RosClock {
+    /// - `is_simulated`: the parameter `use_sim_time`.
+    pub fn new(is_simulated: bool) -> Self {
+        Self { is_simulated, simulated_ns: AtomicI64::new(0) }
+    }
+
+    /// Takes up what came on `/clock`.
+    pub fn set(&self, time: Time) {
+        self.simulated_ns.store(stamp_ns(time), Ordering::Relaxed);
+    }
+
+    /// Now, ns; 0 before the first message of a simulated clock.
+    pub fn now_ns(&self) -> i64 {
+        if self.is_simulated {
+            return self.simulated_ns.load(Ordering::Relaxed);
+        }
+        SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos() as i64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_simulated_clock_says_what_it_was_told() {
+        let clock = RosClock::new(true);
+        assert_eq!(clock.now_ns(), 0);
+        clock.set(Time { sec: 2, nanosec: 5 });
+        assert_eq!(clock.now_ns(), 2_000_000_005);
+        clock.set(Time { sec: 1, nanosec: 0 });
+        assert_eq!(clock.now_ns(), 1_000_000_000, "a recording that is played again");
+    }
+
+    #[test]
+    fn steady_time_does_not_go_back() {
+        let before = steady_ns();
+        assert!(steady_ns() >= before);
+    }
+}

@@ -1,0 +1,307 @@
+//! The action `~/probe`: three services and two topics, and the goals that are known.
+
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use byteorder::LittleEndian;
+use ros2_client::action::{
+    ActionServerQosPolicies, CancelGoalRequest, CancelGoalResponse, GetResultResponse, GoalId, GoalInfo,
+    GoalStatusEnum, SendGoalRequest, SendGoalResponse,
+};
+use ros2_client::action_msgs::{CancelGoalResponseEnum, GoalStatus, GoalStatusArray};
+use ros2_client::builtin_interfaces::Time;
+use ros2_client::dds::rustdds::mio1::event::Source;
+use ros2_client::qos::{Durability, History};
+use ros2_client::{ActionServer, ActionTypeName, Node, RmwRequestId};
+
+use super::incoming::Listener;
+use super::services::{SERVICE, unreadable};
+use super::topics::dds_name;
+use super::{RosError, Shared, mapping};
+use crate::ros::arguments::NodeConfig;
+use crate::ros::messages::{ProbeFeedback, ProbeGoal, ProbeResponse};
+use crate::ros::port::{Arrival, Call, Feedback, Goal, GoalEnd, Reply};
+
+impl ros2_client::Message for ProbeGoal {}
+impl ros2_client::Message for ProbeResponse {}
+impl ros2_client::Message for ProbeFeedback {}
+
+const NAME: &str = "~/probe";
+/// Goals that are remembered; of those that ended the oldest are forgotten first.
+const MOST_GOALS: usize = 32;
+/// Calls that wait for the result of one goal.
+const MOST_WAITING: usize = 16;
+
+type Server = ActionServer<ProbeGoal, ProbeResponse, ProbeFeedback>;
+
+struct Known {
+    status: GoalStatusEnum,
+    accepted: Time,
+    number: u64,
+    is_cancelled: Arc<AtomicBool>,
+    result: Option<ProbeResponse>,
+    waiting: Vec<RmwRequestId>,
+}
+
+impl Known {
+    fn is_over(&self) -> bool {
+        self.result.is_some()
+    }
+}
+
+#[derive(Default)]
+struct Goals {
+    known: BTreeMap<GoalId, Known>,
+    next: u64,
+}
+
+struct Probe {
+    server: Server,
+    shared: Arc<Shared>,
+    goals: Mutex<Goals>,
+}
+
+struct ProbeListener(Arc<Probe>);
+
+/// The server of the action.
+pub(super) fn server(
+    config: &NodeConfig,
+    node: &mut Node,
+    shared: &Arc<Shared>,
+) -> Result<Box<dyn Listener>, RosError> {
+    let latched = SERVICE.durability(Durability::TransientLocal).history(History::KeepLast { depth: 1 });
+    let qos = ActionServerQosPolicies {
+        goal_service: SERVICE,
+        result_service: SERVICE,
+        cancel_service: SERVICE,
+        feedback_publisher: SERVICE,
+        status_publisher: latched,
+    };
+    let name = dds_name(&config.resolve(NAME)?)?;
+    let type_name = ActionTypeName::new("touchup_msgs", "Probe");
+    let server = node.create_action_server(mapping(config), &name, &type_name, qos);
+    let server = server.map_err(|error| RosError::dds("offering an action", &error))?;
+    let probe = Probe { server, shared: shared.clone(), goals: Mutex::default() };
+    Ok(Box::new(ProbeListener(Arc::new(probe))))
+}
+
+impl Listener for ProbeListener {
+    fn sources(&self) -> usize {
+        3
+    }
+
+    fn source(&mut self, number: usize) -> &mut dyn Source {
+        let probe = Arc::get_mut(&mut self.0).expect("sources are asked for before any goal is there");
+        match number {
+            0 => probe.server.goal_server(),
+            1 => probe.server.cancel_server(),
+            _ => probe.server.result_server(),
+        }
+    }
+
+    fn take(&mut self) {
+        let probe = &self.0;
+        drain(&probe.shared, || probe.server.receive_goal(), |id, request| probe.ask(id, request));
+        drain(&probe.shared, || probe.server.receive_cancel_request(), |id, request| probe.cancel(id, &request));
+        drain(&probe.shared, || probe.server.receive_result_request(), |id, r| probe.wait_for(id, r.goal_id));
+    }
+}
+
+fn drain<T>(
+    shared: &Shared,
+    receive: impl Fn() -> ros2_client::ReadResult<Option<(RmwRequestId, T)>>,
+    take: impl Fn(RmwRequestId, T),
+) {
+    loop {
+        match receive() {
+            Ok(Some((id, request))) => take(id, request),
+            Ok(None) => return,
+            Err(error) => unreadable(NAME, shared, &error),
+        }
+    }
+}
+
+impl Probe {
+    fn goals(&self) -> MutexGuard<'_, Goals> {
+        // no code of ours panics while it holds it
+        self.goals.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Does it in the thread that sends.
+    fn later(self: &Arc<Self>, send: impl FnOnce(&Self) + Send + 'static) {
+        let probe = self.clone();
+        self.shared.outgoing.answer(Box::new(move || send(&probe)));
+    }
+
+    /// A new goal: the node decides.
+    fn ask(self: &Arc<Self>, request_id: RmwRequestId, request: SendGoalRequest<ProbeGoal>) {
+        let id = request.goal_id;
+        let is_cancelled = Arc::new(AtomicBool::new(false));
+        if !self.goals().add(id, is_cancelled.clone()) {
+            return self.accept(request_id, id, false);
+        }
+        let [for_accept, for_feedback, for_result] = [self.clone(), self.clone(), self.clone()];
+        let goal = Goal {
+            accept: Reply::new(move |is_accepted| for_accept.accept(request_id, id, is_accepted)),
+            feedback: Feedback(Box::new(move |feedback| {
+                for_feedback.later(move |probe| {
+                    // nobody waits for it who misses it
+                    let _ = probe.server.send_feedback(id, feedback);
+                });
+            })),
+            result: Reply::new(move |(end, response)| for_result.end(id, end, response)),
+            is_cancelled,
+        };
+        self.shared.arrivals.put(Arrival::Call(Call::Probe(request.goal, goal)));
+    }
+
+    fn accept(self: &Arc<Self>, request_id: RmwRequestId, id: GoalId, accepted: bool) {
+        let stamp = Time::now();
+        if accepted {
+            if let Some(known) = self.goals().known.get_mut(&id) {
+                known.status = GoalStatusEnum::Executing;
+                known.accepted = stamp;
+            }
+        } else {
+            self.goals().refuse(id);
+        }
+        self.later(move |probe| {
+            report("send_goal", probe.server.send_goal_response(request_id, SendGoalResponse { accepted, stamp }));
+            probe.tell_status();
+        });
+    }
+
+    fn end(self: &Arc<Self>, id: GoalId, end: GoalEnd, response: ProbeResponse) {
+        let status = match end {
+            GoalEnd::Succeeded => GoalStatusEnum::Succeeded,
+            GoalEnd::Canceled => GoalStatusEnum::Canceled,
+            GoalEnd::Aborted => GoalStatusEnum::Aborted,
+        };
+        let waiting = match self.goals().known.get_mut(&id) {
+            Some(known) => {
+                known.status = status;
+                known.result = Some(response.clone());
+                std::mem::take(&mut known.waiting)
+            }
+            None => Vec::new(),
+        };
+        self.later(move |probe| {
+            for request_id in waiting {
+                probe.send_result(request_id, status, response.clone());
+            }
+            probe.tell_status();
+        });
+    }
+
+    /// Somebody waits for the result of a goal.
+    fn wait_for(self: &Arc<Self>, request_id: RmwRequestId, id: GoalId) {
+        let (status, response) = match self.goals().known.get_mut(&id) {
+            Some(Known { result: None, waiting, .. }) if waiting.len() < MOST_WAITING => {
+                waiting.push(request_id);
+                return;
+            }
+            Some(Known { result: Some(response), status, .. }) => (*status, response.clone()),
+            _ => (GoalStatusEnum::Unknown, ProbeResponse::default()),
+        };
+        self.later(move |probe| probe.send_result(request_id, status, response));
+    }
+
+    fn send_result(&self, request_id: RmwRequestId, status: GoalStatusEnum, result: ProbeResponse) {
+        report("get_result", self.server.send_result(request_id, GetResultResponse { status, result }));
+    }
+
+    /// Somebody wants goals stopped; the node does it when it can.
+    fn cancel(self: &Arc<Self>, request_id: RmwRequestId, request: &CancelGoalRequest) {
+        let response = self.goals().cancel(wanted(request));
+        self.later(move |probe| {
+            report("cancel_goal", probe.server.send_cancel_response(request_id, response));
+            probe.tell_status();
+        });
+    }
+
+    fn tell_status(&self) {
+        let status = |(id, known): (&GoalId, &Known)| GoalStatus {
+            goal_info: GoalInfo { goal_id: *id, stamp: known.accepted },
+            status: known.status,
+        };
+        let statuses = GoalStatusArray { status_list: self.goals().known.iter().map(status).collect() };
+        if self.server.send_goal_statuses(statuses).is_err() {
+            tracing::warn!("the states of the goals are not sent");
+        }
+    }
+}
+
+fn report(service: &str, sent: Result<(), ros2_client::WriteError<()>>) {
+    if let Err(error) = sent {
+        tracing::warn!(service, %error, "an answer is not sent");
+    }
+}
+
+/// What a request to cancel names: the goal (zeros: none), and the moment up to which goals are meant (0: none), ns.
+///
+/// The fields of that message are closed to us; its bytes are not.
+fn wanted(request: &CancelGoalRequest) -> ([u8; 16], i64) {
+    let bytes = cdr_encoding::to_vec::<_, LittleEndian>(request).unwrap_or_default();
+    let part = |from: usize| bytes.get(from..from + 4).and_then(|part| part.try_into().ok()).unwrap_or([0; 4]);
+    let uuid = bytes.get(..16).and_then(|part| part.try_into().ok()).unwrap_or([0; 16]);
+    let (sec, nanosec) = (i32::from_le_bytes(part(16)), u32::from_le_bytes(part(20)));
+    (uuid, i64::from(sec) * 1_000_000_000 + i64::from(nanosec))
+}
+
+impl Goals {
+    /// Whether there was room, and it is a new one.
+    fn add(&mut self, id: GoalId, is_cancelled: Arc<AtomicBool>) -> bool {
+        if self.known.len() >= MOST_GOALS {
+            let over = self.known.iter().filter(|(_, known)| known.is_over());
+            let Some(oldest) = over.min_by_key(|(_, known)| known.number).map(|(id, _)| *id) else { return false };
+            self.known.remove(&oldest);
+        }
+        let Entry::Vacant(place) = self.known.entry(id) else { return false };
+        place.insert(Known {
+            status: GoalStatusEnum::Accepted,
+            accepted: Time::ZERO,
+            number: self.next,
+            is_cancelled,
+            result: None,
+            waiting: Vec::new(),
+        });
+        self.next += 1;
+        true
+    }
+
+    /// Forgets one that was not taken up.
+    fn refuse(&mut self, id: GoalId) {
+        if self.known.get(&id).is_some_and(|known| known.accepted == Time::ZERO) {
+            self.known.remove(&id);
+        }
+    }
+
+    /// As `CancelGoal` says: one goal, all up to a moment, both, or all.
+    fn cancel(&mut self, (uuid, until_ns): ([u8; 16], i64)) -> CancelGoalResponse {
+        let is_named = |id: &GoalId| *id.uuid.as_bytes() == uuid;
+        let names_one = uuid != [0; 16];
+        let all = !names_one && until_ns == 0;
+        let mut goals_canceling = Vec::new();
+        for (id, known) in self.known.iter_mut().filter(|(_, known)| !known.is_over()) {
+            let stamp = &known.accepted;
+            if all || (names_one && is_named(id)) || (until_ns > 0 && nanoseconds(stamp) <= until_ns) {
+                known.is_cancelled.store(true, Ordering::Relaxed);
+                known.status = GoalStatusEnum::Canceling;
+                goals_canceling.push(GoalInfo { goal_id: *id, stamp: known.accepted });
+            }
+        }
+        let return_code = match self.known.iter().find(|(id, _)| is_named(id)) {
+            _ if !goals_canceling.is_empty() => CancelGoalResponseEnum::None,
+            None if names_one => CancelGoalResponseEnum::UnknownGoal,
+            Some((_, known)) if known.is_over() => CancelGoalResponseEnum::GoalTerminated,
+            _ => CancelGoalResponseEnum::Rejected,
+        };
+        CancelGoalResponse { return_code, goals_canceling }
+    }
+}
+
+fn nanoseconds(time: &Time) -> i64 {
+    time.to_nanos()
+}

@@ -1,0 +1,191 @@
+//! Who else is on our topics, and why somebody who is does not fit.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use ros2_client::dds::rustdds::mio1::event::Source;
+use ros2_client::dds::rustdds::policy::Durability;
+use ros2_client::dds::rustdds::{
+    DomainParticipantStatusEvent as Event, DomainParticipantStatusListener, GUID, QosPolicies, RTPSEntity,
+    StatusEvented, Topic, TopicDescription,
+};
+use ros2_client::{Context, ServiceMapping};
+
+use super::Shared;
+use super::incoming::Listener;
+use crate::ros::port::{Arrival, Endpoint};
+
+/// Vendors by their number on the wire: who knows one mapping of services alone.
+const FAST_DDS: [u8; 2] = [0x01, 0x0f];
+const CYCLONE_DDS: [u8; 2] = [0x01, 0x10];
+/// Participants that are remembered; a domain holds 120.
+const MOST_PARTICIPANTS: usize = 1024;
+
+pub(super) struct Graph {
+    listener: DomainParticipantStatusListener,
+    shared: Arc<Shared>,
+    mapping: ServiceMapping,
+    own: GUID,
+    /// ROS name and type of our topics, by their name in DDS
+    names: BTreeMap<String, (String, String)>,
+    /// ROS names of our services
+    services: Vec<String>,
+    /// our readers and writers: name in DDS, and who is matched
+    matched: BTreeMap<GUID, (String, BTreeSet<GUID>)>,
+    /// of the other participants
+    vendors: BTreeMap<GUID, [u8; 2]>,
+    /// said once for each
+    told: BTreeSet<GUID>,
+}
+
+impl Graph {
+    pub fn new(context: &Context, shared: &Arc<Shared>, mapping: ServiceMapping) -> Self {
+        let participant = context.domain_participant();
+        Self {
+            listener: participant.status_listener(),
+            shared: shared.clone(),
+            mapping,
+            own: participant.guid(),
+            names: BTreeMap::new(),
+            services: Vec::new(),
+            matched: BTreeMap::new(),
+            vendors: BTreeMap::new(),
+            told: BTreeSet::new(),
+        }
+    }
+
+    /// A topic of ours, and what it is called in ROS.
+    pub fn name(&mut self, topic: &Topic, whole: String) {
+        self.names.insert(topic.name(), (whole, topic.get_type().name().to_owned()));
+    }
+
+    /// A service of ours.
+    pub fn serve(&mut self, whole: String) {
+        self.services.push(whole);
+    }
+
+    /// A reader or writer of ours.
+    pub fn add(&mut self, guid: GUID, topic: &Topic) {
+        self.matched.insert(guid, (topic.name(), BTreeSet::new()));
+    }
+
+    fn on(&mut self, event: Event) {
+        match event {
+            Event::ParticipantDiscovered { dpd } if self.vendors.len() < MOST_PARTICIPANTS => {
+                self.vendors.insert(dpd.guid, dpd.vendor_id.as_bytes());
+            }
+            Event::ParticipantLost { id, .. } => {
+                self.vendors.retain(|guid, _| guid.prefix != id);
+                self.told.retain(|guid| guid.prefix != id);
+            }
+            Event::ReaderDetected { reader: other } | Event::WriterDetected { writer: other } => {
+                self.seen(other.guid, &other.topic_name, &other.type_name);
+            }
+            Event::RemoteReaderMatched { local_writer: local, remote_reader: remote }
+            | Event::RemoteWriterMatched { local_reader: local, remote_writer: remote } => {
+                let is_new = self.matched.get_mut(&local).is_some_and(|(_, others)| others.insert(remote));
+                if is_new {
+                    self.tell(local, None);
+                }
+            }
+            Event::ReaderLost { guid, .. } | Event::WriterLost { guid, .. } => self.lost(guid),
+            Event::RemoteReaderQosIncompatible { local_writer, requested_qos, offered_qos, remote_reader } => {
+                self.misfit(local_writer, remote_reader, &requested_qos, &offered_qos, "a listener");
+            }
+            Event::RemoteWriterQosIncompatible { local_reader, requested_qos, offered_qos, remote_writer } => {
+                self.misfit(local_reader, remote_writer, &requested_qos, &offered_qos, "a sender");
+            }
+            _ => {}
+        }
+    }
+
+    fn lost(&mut self, guid: GUID) {
+        self.told.remove(&guid);
+        let locals: Vec<GUID> = self.matched.keys().copied().collect();
+        for local in locals {
+            if self.matched.get_mut(&local).is_some_and(|(_, others)| others.remove(&guid)) {
+                self.tell(local, None);
+            }
+        }
+    }
+
+    fn misfit(&mut self, local: GUID, remote: GUID, wanted: &QosPolicies, offered: &QosPolicies, who: &str) {
+        if self.told.insert(remote) {
+            self.tell(local, Some(format!("{who} does not fit: {}", difference(wanted, offered))));
+        }
+    }
+
+    /// Somebody has a topic or a service of ours: with the same type, and the same mapping?
+    fn seen(&mut self, guid: GUID, topic: &str, type_name: &str) {
+        if guid.prefix == self.own.prefix {
+            return;
+        }
+        if let Some((name, ours)) = self.names.get(topic) {
+            if ours != type_name && self.told.insert(guid) {
+                let reason = format!("somebody has it with the type {type_name}, here it is {ours}");
+                let (name, count) = (name.clone(), self.count(topic));
+                self.report(name, count, Some(reason));
+            }
+            return;
+        }
+        let vendor = self.vendors.iter().find(|(participant, _)| participant.prefix == guid.prefix);
+        let wants = match vendor.map(|(_, vendor)| vendor) {
+            Some(&CYCLONE_DDS) => ServiceMapping::Cyclone,
+            Some(&FAST_DDS) => ServiceMapping::Enhanced,
+            _ => return,
+        };
+        let Some(service) = topic.strip_prefix("rq").and_then(|topic| topic.strip_suffix("Request")) else { return };
+        if self.services.iter().any(|own| own == service) && wants != self.mapping && self.told.insert(guid) {
+            let right = if wants == ServiceMapping::Cyclone { "cyclone" } else { "enhanced" };
+            let reason = format!(
+                "somebody who calls it has another header: start this node with -p service_mapping:={right}, or all with one RMW"
+            );
+            self.report(service.to_owned(), 1, Some(reason));
+        }
+    }
+
+    fn count(&self, topic: &str) -> usize {
+        self.matched.values().filter(|(name, _)| name == topic).map(|(_, others)| others.len()).sum()
+    }
+
+    fn tell(&self, local: GUID, mismatch: Option<String>) {
+        let Some((topic, others)) = self.matched.get(&local) else { return };
+        let name = self.names.get(topic).map_or_else(|| topic.clone(), |(name, _)| name.clone());
+        self.report(name, others.len(), mismatch);
+    }
+
+    fn report(&self, topic: String, count: usize, mismatch: Option<String>) {
+        match &mismatch {
+            Some(reason) => tracing::warn!(topic, "{reason}"),
+            None => tracing::info!(topic, others = count, "who is on a topic has changed"),
+        }
+        self.shared.arrivals.put(Arrival::Matched(Endpoint { topic, count, mismatch }));
+    }
+}
+
+/// What is asked for and not offered.
+fn difference(wanted: &QosPolicies, offered: &QosPolicies) -> String {
+    if wanted.is_reliable() && !offered.is_reliable() {
+        return "it wants reliable, offered is best effort".to_owned();
+    }
+    let latched = |qos: &QosPolicies| !matches!(qos.durability(), None | Some(Durability::Volatile));
+    if latched(wanted) && !latched(offered) {
+        return "it wants transient local, offered is volatile".to_owned();
+    }
+    match offered.compliance_failure_wrt(wanted) {
+        Some(policy) => format!("the quality of service {policy:?} that it wants is not offered"),
+        None => "its quality of service".to_owned(),
+    }
+}
+
+impl Listener for Graph {
+    fn source(&mut self, _: usize) -> &mut dyn Source {
+        self.listener.as_status_source_mio1()
+    }
+
+    fn take(&mut self) {
+        while let Some(event) = self.listener.try_recv_status() {
+            self.on(event);
+        }
+    }
+}

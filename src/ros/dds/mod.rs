@@ -1,0 +1,184 @@
+//! The port on its own DDS: ros2-client over RustDDS, no ROS installation needed.
+//!
+//! Three threads of ours stand beside those of DDS. One takes what comes and hands it to the node. Two send: one what is
+//! small and urgent, answers among it; one the mesh, where a slow listener may hold things up.
+
+mod action;
+mod graph;
+mod incoming;
+mod outgoing;
+mod parameter_services;
+mod services;
+mod topics;
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::TrySendError;
+use std::thread::JoinHandle;
+
+use ros2_client::dds::rustdds;
+use ros2_client::{Context, Node, NodeName, NodeOptions, ServiceMapping};
+use thiserror::Error;
+
+use super::arguments::NodeConfig;
+use super::clock::RosClock;
+use super::names::NameError;
+use super::port::{Arrival, Inbox, Port, Publication};
+use outgoing::Outgoing;
+
+/// Why the node cannot speak to others.
+#[derive(Debug, Error)]
+pub enum RosError {
+    /// a name that a rule made is none
+    #[error(transparent)]
+    Name(#[from] NameError),
+    /// DDS does not do what it is asked for
+    #[error(
+        "{call}: {reason}; is the network up (ip link show lo), and are there fewer than 120 nodes in this domain?"
+    )]
+    Dds {
+        /// which call
+        call: &'static str,
+        /// what it says
+        reason: String,
+    },
+    /// no thread is to be had
+    #[error("cannot start a thread: {0}")]
+    Thread(#[from] std::io::Error),
+}
+
+impl RosError {
+    fn dds(call: &'static str, reason: &impl std::fmt::Debug) -> Self {
+        Self::Dds { call, reason: format!("{reason:?}") }
+    }
+}
+
+/// Where arrivals go, and how many could not.
+struct Arrivals {
+    inbox: Inbox,
+    dropped_samples: AtomicU64,
+    dropped_others: AtomicU64,
+    is_over: AtomicBool,
+}
+
+impl Arrivals {
+    /// Hands it to the node, or counts it.
+    fn put(&self, arrival: Arrival) {
+        match self.inbox.try_send(arrival) {
+            Ok(()) => {}
+            Err(TrySendError::Full(Arrival::Wrench(..) | Arrival::Pose(..))) => {
+                self.dropped_samples.fetch_add(1, Ordering::Relaxed);
+            }
+            Err(TrySendError::Full(_)) => {
+                self.dropped_others.fetch_add(1, Ordering::Relaxed);
+            }
+            Err(TrySendError::Disconnected(_)) => self.is_over.store(true, Ordering::Relaxed),
+        }
+    }
+}
+
+/// What the parts of the port share.
+struct Shared {
+    arrivals: Arrivals,
+    clock: RosClock,
+    outgoing: Outgoing,
+}
+
+struct DdsPort {
+    shared: Arc<Shared>,
+    waker: Arc<rustdds::mio1::Waker>,
+    threads: Vec<JoinHandle<()>>,
+    // its entities leave the graph when it goes
+    _node: Arc<Node>,
+}
+
+impl Port for DdsPort {
+    fn publish(&self, publication: Publication) {
+        self.shared.outgoing.publish(publication);
+    }
+
+    fn now_ns(&self) -> i64 {
+        self.shared.clock.now_ns()
+    }
+
+    fn dropped(&self) -> [u64; 2] {
+        let arrivals = &self.shared.arrivals;
+        [arrivals.dropped_samples.load(Ordering::Relaxed), arrivals.dropped_others.load(Ordering::Relaxed)]
+    }
+
+    fn unsent(&self) -> [u64; 2] {
+        self.shared.outgoing.unsent()
+    }
+}
+
+impl Drop for DdsPort {
+    fn drop(&mut self) {
+        self.shared.arrivals.is_over.store(true, Ordering::Relaxed);
+        self.shared.outgoing.close();
+        // without it the thread stays until the next message: nothing worse
+        let _ = self.waker.wake();
+        for thread in self.threads.drain(..) {
+            // one that panicked has said so
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Joins the network as a node: what comes goes to `inbox` from now on.
+///
+/// # Errors
+/// [`RosError`]: a name that is none, no network, no thread.
+pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosError> {
+    let is_simulated = config.parameters.bool("use_sim_time");
+    let shared = Arc::new(Shared {
+        arrivals: Arrivals {
+            inbox,
+            dropped_samples: AtomicU64::new(0),
+            dropped_others: AtomicU64::new(0),
+            is_over: AtomicBool::new(false),
+        },
+        clock: RosClock::new(is_simulated),
+        outgoing: Outgoing::default(),
+    });
+    let (context, mut node) = join(config)?;
+    let mut graph = graph::Graph::new(&context, &shared, mapping(config));
+    let (urgent, mesh) = topics::writers(config, &mut node, &mut graph)?;
+    let mut listeners = topics::readers(config, &mut node, &mut graph, &shared)?;
+    listeners.extend(services::servers(config, &mut node, &mut graph, &shared)?);
+    listeners.push(action::server(config, &mut node, &shared)?);
+    let parameters = parameter_services::servers(config, &mut node, &shared)?;
+    let node = Arc::new(node);
+    listeners.extend(parameters.listeners(&node));
+    listeners.push(Box::new(graph));
+    let (waker, listening) = incoming::listen(listeners, shared.clone())?;
+    let threads = vec![
+        listening,
+        outgoing::spawn("touchup-send", &shared, move |shared| shared.outgoing.send_urgent(&urgent))?,
+        outgoing::spawn("touchup-mesh", &shared, move |shared| shared.outgoing.send_mesh(&mesh))?,
+    ];
+    Ok(Arc::new(DdsPort { shared, waker, threads, _node: node }))
+}
+
+fn mapping(config: &NodeConfig) -> ServiceMapping {
+    match config.parameters.string("service_mapping") {
+        "cyclone" => ServiceMapping::Cyclone,
+        _ => ServiceMapping::Enhanced,
+    }
+}
+
+fn join(config: &NodeConfig) -> Result<(Context, Node), RosError> {
+    let mut builder = rustdds::DomainParticipantBuilder::new(config.domain_id);
+    if config.localhost_only {
+        builder = builder.with_only_networks([std::net::Ipv4Addr::LOCALHOST]);
+    }
+    let participant = builder.build().map_err(|error| RosError::dds("joining the domain", &error))?;
+    let context = Context::from_domain_participant(participant);
+    let context = context.map_err(|error| RosError::dds("joining the graph", &error))?;
+    let namespace = if config.place.namespace.is_empty() { "/" } else { &config.place.namespace };
+    let name =
+        NodeName::new(namespace, &config.place.node).map_err(|error| RosError::dds("naming the node", &error))?;
+    // its own parameter services know one mapping alone, and nothing of ranges
+    let options = parameter_services::declare(NodeOptions::new().start_parameter_services(false), &config.parameters);
+    let node = context.new_node(name, options).map_err(|error| RosError::dds("making the node", &error))?;
+    Ok((context, node))
+}
