@@ -1,11 +1,13 @@
 //! `touchup refine`: a scan and a recording in, the refined mesh out.
 
 use std::collections::BTreeMap;
+use std::ffi::OsStr;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use clap::Args;
+use clap::builder::{PathBufValueParser, TypedValueParser};
+use clap::{Arg, Args, Command};
 use serde::Serialize;
 use tracing::{debug, warn};
 
@@ -28,13 +30,13 @@ use crate::touch::{ClockEstimator, Compensator, MarkerCounts, Sample};
 #[derive(Clone, Debug, Args)]
 pub(super) struct RefineArguments {
     /// The scan: PLY, STL or OBJ
-    #[arg(long, value_name = "MESH", required_unless_present = "resume", default_value = "")]
+    #[arg(long, value_name = "MESH", required_unless_present = "resume", default_value = "", value_parser = PathOrNone)]
     scan: PathBuf,
     /// The touches: a ROS 2 recording, MCAP or SQLite, a file or a folder
-    #[arg(long, value_name = "RECORDING", required_unless_present = "resume", default_value = "")]
+    #[arg(long, value_name = "RECORDING", required_unless_present = "resume", default_value = "", value_parser = PathOrNone)]
     bag: PathBuf,
     /// Where the refined mesh goes: PLY, STL or OBJ, in the unit of the scan
-    #[arg(long, value_name = "MESH", required_unless_present = "resume", default_value = "")]
+    #[arg(long, value_name = "MESH", required_unless_present = "resume", default_value = "", value_parser = PathOrNone)]
     out: PathBuf,
     /// Unit of the coordinates in the scan's file
     #[arg(long, value_name = "U", default_value = "mm")]
@@ -87,6 +89,21 @@ pub(super) struct RefineArguments {
     /// Prints the summary as one JSON object
     #[arg(long)]
     json: bool,
+}
+
+/// Takes a path that may be left out with `--resume`; empty: left out.
+#[derive(Clone)]
+struct PathOrNone;
+
+impl TypedValueParser for PathOrNone {
+    type Value = PathBuf;
+
+    fn parse_ref(&self, command: &Command, argument: Option<&Arg>, value: &OsStr) -> Result<PathBuf, clap::Error> {
+        match value.is_empty() {
+            true => Ok(PathBuf::new()),
+            false => PathBufValueParser::new().parse_ref(command, argument, value),
+        }
+    }
 }
 
 /// What `--json` prints; times in s, `push_ns` in ns.

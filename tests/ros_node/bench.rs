@@ -12,11 +12,11 @@ use touchup::mesh::TriMesh;
 use touchup::ros::clock::steady_ns;
 use touchup::ros::in_process::{World, start};
 use touchup::ros::messages::{
-    Header, MeshPatch, Point, Pose, PoseStamped, Quaternion, Time, Vector3, Wrench, WrenchStamped,
+    Header, MeshPatch, Point, Pose, PoseStamped, Quaternion, SetBoolRequest, Time, Vector3, Wrench, WrenchStamped,
 };
 use touchup::ros::node::{INBOX, Node, NodeEnd};
 use touchup::ros::parameters::{ParameterValue, Parameters};
-use touchup::ros::port::{Arrival, Publication};
+use touchup::ros::port::{Arrival, Call, Publication};
 use touchup::sim::StylusParams;
 use touchup::touch::Message;
 
@@ -30,11 +30,21 @@ pub struct Plate {
 }
 
 impl Plate {
+    /// The first share: long strokes over its top.
     pub fn touched(share: f64) -> Self {
+        Self::of(|count| 0..(count as f64 * share) as usize)
+    }
+
+    /// The last share: short strokes in holes and slots.
+    pub fn touched_last(share: f64) -> Self {
+        Self::of(|count| (count as f64 * (1.0 - share)) as usize..count)
+    }
+
+    fn of(share: impl Fn(usize) -> std::ops::Range<usize>) -> Self {
         let (stream, touch) = plate_stream(&StylusParams::default(), 1);
         let mut messages = touch.messages;
         messages.sort_by_key(Message::stamp_ns);
-        messages.truncate((messages.len() as f64 * share) as usize);
+        let messages = messages[share(messages.len())].to_vec();
         let plate = Self { folder: tempfile::tempdir().unwrap(), scan: stream.scan, messages };
         write_mesh(&plate.path("scan.ply"), &plate.scan, MeshUnit::Millimetre).unwrap();
         plate.record("touch.mcap", &plate.messages);
@@ -151,9 +161,11 @@ impl Bench {
 
     /// Value of a key of the diagnostics, once all arrivals before are in it.
     pub fn diagnostic(&mut self, key: &str) -> Option<String> {
+        // the answer comes when all that arrived before was taken
+        let pause = SetBoolRequest { data: false };
+        self.world.call(|reply| Call::Pause(pause, reply)).recv().unwrap();
         self.world.published();
-        self.published.clear();
-        // the second is of a whole second in which nothing came
+        // the first may have been on its way already
         for _ in 0..2 {
             self.published.clear();
             self.wait_for("diagnostics", |published| matches!(published, Publication::Diagnostics(_)).then_some(()));
