@@ -396,3 +396,38 @@ fn it_holds_while_a_stream_is_away_and_after_the_clock_was_set_back_and_goes_on(
     refine(&["--resume".as_ref(), end.folder.as_os_str(), "--out".as_ref(), plate.path("again.ply").as_os_str()]);
     assert!(std::fs::read(plate.path("again.ply")).unwrap() == read(&end.folder, "refined.ply"));
 }
+
+/// What kill -9 leaves is what the system has at that moment: a copy of the folder.
+#[test]
+fn what_is_on_the_disk_at_any_moment_can_be_refined_and_lacks_a_tenth_of_a_second() {
+    let plate = Plate::touched(0.1);
+    let bench = Bench::start(&plate);
+    let begun = std::time::Instant::now();
+    let first_ns = plate.messages[0].stamp_ns();
+    // in the time of the touch, for a second and a half
+    let mut fed = 0;
+    for message in &plate.messages {
+        let due = std::time::Duration::from_nanos((message.stamp_ns() - first_ns) as u64);
+        if due > std::time::Duration::from_millis(1500) {
+            break;
+        }
+        std::thread::sleep(due.saturating_sub(begun.elapsed()));
+        bench.feed([message]);
+        fed += 1;
+    }
+    let killed = plate.path("killed");
+    std::fs::create_dir_all(killed.join("recording")).unwrap();
+    for name in ["session.json", "scene.yaml", "recording/touch_0000.mcap"] {
+        std::fs::copy(bench.node.folder().join(name), killed.join(name)).unwrap();
+    }
+    bench.end();
+    let reader = touchup::io::recording::RecordingReader::open(&killed.join("recording"), &Default::default()).unwrap();
+    let on_disk: Vec<Message> = reader.map_while(Result::ok).collect();
+    let lost_ns = plate.messages[fed - 1].stamp_ns() - on_disk.last().unwrap().stamp_ns();
+    assert!(lost_ns < 100_000_000, "{} ms lost", lost_ns / 1_000_000);
+    let was: Vec<Message> = plate.messages[..on_disk.len()].to_vec();
+    assert_eq!(on_disk, was, "in the order in which they came");
+    plate.record("was.mcap", &was);
+    refine(&["--resume".as_ref(), killed.as_os_str()]);
+    assert!(read(&killed, "refined.ply") == plate.refined("was.mcap"));
+}

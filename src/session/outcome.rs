@@ -94,6 +94,12 @@ pub fn moved_faces(before: &TriMesh, after: &TriMesh) -> u64 {
     after.faces().filter(|&(face, corners)| !is_as_scanned(face, corners)).count() as u64
 }
 
+/// Vertices and faces in a file of the mesh: a vertex that no face uses is not in it.
+fn written_counts(mesh: &TriMesh) -> [usize; 2] {
+    let is_used = |vertex: &u32| mesh.has_vertex(VertexId(*vertex)) && !mesh.star(VertexId(*vertex)).is_empty();
+    [(0..mesh.vertex_slots() as u32).filter(is_used).count(), mesh.face_count()]
+}
+
 impl OutcomePlaces<'_> {
     /// Writes what was refined.
     ///
@@ -107,7 +113,7 @@ impl OutcomePlaces<'_> {
         let Some(patcher) = patcher else {
             write_mesh(self.mesh, refined, self.unit).map_err(OutcomeError::WriteMesh)?;
             self.write_features(&[])?;
-            let counts = [refined.vertex_count(), refined.face_count()];
+            let counts = written_counts(refined);
             return Ok(Outcome { moved_faces: moved_faces(scan, refined), patch: None, uncertainty: None, counts });
         };
         self.write_patched(scan, patcher)
@@ -135,7 +141,7 @@ impl OutcomePlaces<'_> {
             moved_faces: moved_faces(scan, &patched.mesh),
             patch: Some(PatchSummary::of(&patched, build_s)),
             uncertainty,
-            counts: [patched.mesh.vertex_count(), patched.mesh.face_count()],
+            counts: written_counts(&patched.mesh),
         })
     }
 
