@@ -21,6 +21,7 @@
 //! | [`io`] | mesh files and recordings; with [`scene`] the only file access |
 //! | [`scene`] | the YAML that names the parts of a scene |
 //! | `ros` | the node's side of ROS 2 (feature `ros`): messages, parameters, and the port to what is behind them |
+//! | [`session`] | one run of touching: what comes of it, and what it takes to get the same again |
 //! | [`cli`] | one file for each verb of the command line |
 //!
 //! # Frames
@@ -57,5 +58,6 @@ pub mod refine;
 #[cfg(feature = "ros")]
 pub mod ros;
 pub mod scene;
+pub mod session;
 pub mod sim;
 pub mod touch;

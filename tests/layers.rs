@@ -18,6 +18,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("calibrate", &["touch", "align"]),
     ("io", &["touch", "mesh", "features", "align"]),
     ("scene", &["touch", "mesh", "patch", "refine", "sim", "io"]),
+    ("session", &["touch", "mesh", "patch", "refine", "live", "features", "io"]),
     (
         "ros",
         &[
@@ -33,6 +34,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "compare",
             "io",
             "scene",
+            "session",
         ],
     ),
     (
@@ -50,6 +52,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "compare",
             "io",
             "scene",
+            "session",
             "ros",
         ],
     ),

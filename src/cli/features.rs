@@ -10,11 +10,12 @@ use super::progress::Progress;
 use super::{CliError, Losses, check_kept, tell};
 use crate::features::clusters::{Cluster, ClusterParams, PaperParams, clusters, paper_clusters};
 use crate::features::curvature::curvature;
-use crate::features::{Detection, Feature, FittedTo, Kind, Measured, detect};
+use crate::features::{Detection, Feature, FittedTo, Kind, Measured};
 use crate::io::features_file::{FeatureFile, write_features};
 use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
 use crate::io::touches_file::read_touches;
-use crate::mesh::{FaceTree, TriMesh};
+use crate::mesh::TriMesh;
+use crate::session::found;
 use crate::touch::ProbedPoint;
 
 #[derive(Debug, Args)]
@@ -143,9 +144,7 @@ impl fmt::Display for ClusterTable<'_> {
 /// What is on a mesh, and the file of it.
 pub(super) fn find(mesh: &TriMesh, touches: &[ProbedPoint]) -> (Detection, FeatureFile) {
     let _finding = Progress::stage("find features");
-    let detection = detect(mesh, &FaceTree::new(mesh), touches);
-    let file = FeatureFile::of(&detection.features, detection.unexplained);
-    (detection, file)
+    found(mesh, touches)
 }
 
 /// Features as people read them.

@@ -9,8 +9,6 @@ mod demo;
 mod disagree;
 mod features;
 mod found;
-mod knocks;
-mod latency;
 mod offsets;
 mod progress;
 mod rates;
@@ -43,6 +41,7 @@ use crate::live::LiveError;
 use crate::mesh::MeshError;
 use crate::refine::RefineError;
 use crate::scene::SceneError;
+use crate::session::{OutcomeError, SessionError};
 use crate::sim::SimError;
 use crate::touch::SettingError;
 
@@ -106,6 +105,8 @@ enum CliError {
     #[error("{0}")]
     WriteRecording(RecordingError),
     #[error(transparent)]
+    Session(#[from] SessionError),
+    #[error(transparent)]
     Touches(#[from] TouchesFileError),
     #[error(transparent)]
     Features(#[from] FeaturesFileError),
@@ -140,6 +141,18 @@ enum CliError {
     Compare(#[from] CompareError),
 }
 
+impl From<OutcomeError> for CliError {
+    fn from(error: OutcomeError) -> Self {
+        match error {
+            OutcomeError::WriteMesh(error) => Self::WriteMesh(error),
+            OutcomeError::ReadMesh(error) => Self::ReadMesh(error),
+            OutcomeError::Touches(error) => Self::Touches(error),
+            OutcomeError::Features(error) => Self::Features(error),
+            OutcomeError::Mesh(error) => Self::Mesh(error),
+        }
+    }
+}
+
 impl CliError {
     fn exit_code(&self) -> u8 {
         match self {
@@ -149,7 +162,7 @@ impl CliError {
             Self::Simulate(SimError::BadParameter { .. } | SimError::TooFine { .. } | SimError::TooCoarse { .. }) => 2,
             // settings come from a scene file: its flags are checked before
             Self::Scene(_) | Self::ReadMesh(_) | Self::ReadTruth(_) | Self::ReadRecording(_) | Self::Simulate(_) => 3,
-            Self::Touches(_) | Self::Features(_) => 3,
+            Self::Touches(_) | Self::Features(_) | Self::Session(_) => 3,
             Self::Table(_) | Self::Pairs { .. } | Self::Payload { .. } | Self::Tip { .. } | Self::Rests { .. } => 3,
             Self::Mesh(_) | Self::Setting(_) | Self::Refine(_) | Self::Live(_) => 3,
             Self::Align(_) | Self::AlignFeatures(_) | Self::Compare(_) => 3,

@@ -6,8 +6,7 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-use super::latency::{Latencies, Quantiles};
-use crate::live::{LiveCounts, LiveError, LiveRefiner, Pace};
+use crate::live::{Latencies, LiveCounts, LiveError, LiveRefiner, Pace, Quantiles};
 use crate::mesh::{FaceTree, TriMesh};
 use crate::patch::Patcher;
 use crate::refine::{RefineError, Refiner};
@@ -79,6 +78,24 @@ impl Rates {
         }
     }
 
+    /// Takes the last stroke back, or does it again.
+    pub fn change_strokes(&mut self, is_undo: bool) {
+        let of_patch = |patcher: &mut Patcher| if is_undo { patcher.undo() } else { patcher.redo() };
+        match self {
+            Self::AtOnce { patcher: Some(patcher), .. } => {
+                of_patch(patcher);
+            }
+            Self::AtOnce { refiner, .. } => {
+                if is_undo {
+                    refiner.undo()
+                } else {
+                    refiner.redo()
+                };
+            }
+            Self::Live(live) => live.change_strokes(is_undo),
+        }
+    }
+
     /// Ends the thread of the patch, if there is one.
     ///
     /// # Errors
@@ -103,6 +120,13 @@ impl Rates {
 }
 
 impl Live {
+    fn change_strokes(&mut self, is_undo: bool) {
+        let changed = if is_undo { self.refiner.undo() } else { self.refiner.redo() };
+        if let Err(error) = changed {
+            self.stopped = Some(error);
+        }
+    }
+
     fn push(&mut self, sample: &Sample) -> Result<Duration, (RefineError, Duration)> {
         let (begun, first_ns) = *self.begun.get_or_insert((Instant::now(), sample.stamp_ns));
         let due = Duration::from_nanos(u64::try_from(sample.stamp_ns.saturating_sub(first_ns)).unwrap_or(0));

@@ -1,45 +1,42 @@
 //! `touchup refine`: a scan and a recording in, the refined mesh out.
 
 use std::collections::BTreeMap;
+use std::ffi::OsStr;
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use clap::Args;
+use clap::builder::{PathBufValueParser, TypedValueParser};
+use clap::{Arg, Args, Command};
 use serde::Serialize;
 use tracing::{debug, warn};
 
-use super::features::find;
-use super::knocks::UncertaintySummary;
-use super::latency::{Latencies, Quantiles};
 use super::offsets::{ContactPoints, ScanOffset, WrenchOffset};
 use super::progress::Progress;
 use super::rates::{Ended, LiveSummary, Rates};
 use super::replay::{Recording, Replayed, marker_filter, replay};
 use super::{CliError, Losses, check_kept_by, tell};
 use crate::io::atomic::{AtomicFile, is_same_file};
-use crate::io::features_file::write_features;
-use crate::io::mesh_file::{
-    MeshFile, MeshFileError, MeshUnit, VertexColumn, check_target, read_mesh, write_mesh, write_mesh_with,
-};
+use crate::io::mesh_file::{MeshFile, MeshFileError, MeshUnit, check_target, read_mesh};
 use crate::io::recording::Topics;
-use crate::io::touches_file::{as_written, write_touches};
-use crate::mesh::{FaceId, FaceTree, RepairReport, TriMesh, VertexId};
-use crate::patch::{Patched, Patcher, Support};
+use crate::live::{Latencies, Quantiles};
+use crate::mesh::{FaceTree, RepairReport, TriMesh};
+use crate::patch::Patcher;
 use crate::refine::{RefineCounts, RefineError, RefineParams, Refiner};
 use crate::scene::{Mode, Scene};
-use crate::touch::{ClockEstimator, Compensator, MarkerCounts, ProbedPoint, Sample};
+use crate::session::{Outcome, OutcomePlaces, PatchSummary, SessionRecord, StrokeChange, UncertaintySummary};
+use crate::touch::{ClockEstimator, Compensator, MarkerCounts, Sample};
 
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub(super) struct RefineArguments {
     /// The scan: PLY, STL or OBJ
-    #[arg(long, value_name = "MESH")]
+    #[arg(long, value_name = "MESH", required_unless_present = "resume", default_value = "", value_parser = PathOrNone)]
     scan: PathBuf,
     /// The touches: a ROS 2 recording, MCAP or SQLite, a file or a folder
-    #[arg(long, value_name = "RECORDING")]
+    #[arg(long, value_name = "RECORDING", required_unless_present = "resume", default_value = "", value_parser = PathOrNone)]
     bag: PathBuf,
     /// Where the refined mesh goes: PLY, STL or OBJ, in the unit of the scan
-    #[arg(long, value_name = "MESH")]
+    #[arg(long, value_name = "MESH", required_unless_present = "resume", default_value = "", value_parser = PathOrNone)]
     out: PathBuf,
     /// Unit of the coordinates in the scan's file
     #[arg(long, value_name = "U", default_value = "mm")]
@@ -82,9 +79,31 @@ pub(super) struct RefineArguments {
     /// Where the touches go that features name, as CSV
     #[arg(long, value_name = "CSV")]
     touches_out: Option<PathBuf>,
+    /// Folder of a session of the node: takes scan, scene and touches from there, also after a crash, and writes refined.ply,
+    /// features.json and touches.csv there unless they have places of their own
+    #[arg(long, value_name = "SESSION", conflicts_with_all = ["scan", "bag", "scene", "mesh_unit", "wrench_topic", "pose_topic", "markers_topic"])]
+    resume: Option<PathBuf>,
+    /// Strokes that were taken back or done again in the session
+    #[arg(skip)]
+    strokes: Vec<StrokeChange>,
     /// Prints the summary as one JSON object
     #[arg(long)]
     json: bool,
+}
+
+/// Takes a path that may be left out with `--resume`; empty: left out.
+#[derive(Clone)]
+struct PathOrNone;
+
+impl TypedValueParser for PathOrNone {
+    type Value = PathBuf;
+
+    fn parse_ref(&self, command: &Command, argument: Option<&Arg>, value: &OsStr) -> Result<PathBuf, clap::Error> {
+        match value.is_empty() {
+            true => Ok(PathBuf::new()),
+            false => PathBufValueParser::new().parse_ref(command, argument, value),
+        }
+    }
 }
 
 /// What `--json` prints; times in s, `push_ns` in ns.
@@ -127,27 +146,6 @@ pub(super) struct Summary {
     uncertainty: Option<UncertaintySummary>,
 }
 
-/// What became of the touched part.
-struct Remeshed {
-    moved_faces: u64,
-    patch: Option<PatchSummary>,
-    uncertainty: Option<UncertaintySummary>,
-}
-
-/// What `--json` prints of the patch.
-#[derive(Debug, Serialize)]
-struct PatchSummary {
-    /// edge length of the new faces
-    pitch_mm: f64,
-    /// faces of the scan that went
-    removed_faces: usize,
-    /// faces that came
-    added_faces: usize,
-    /// share of the new vertices that rest on what was felt nearby, not there
-    guessed_share: f64,
-    build_s: f64,
-}
-
 /// Coefficient of kinetic friction and its standard error.
 #[derive(Debug, Serialize)]
 struct FrictionFound {
@@ -169,6 +167,8 @@ const NO_PATCH: &str = "--live lets the patch follow, and the scene has none: ad
 
 /// The verb: refines and tells.
 pub(super) fn refine(arguments: &RefineArguments) -> Result<Losses, CliError> {
+    let resumed = arguments.resume.as_deref().map(|session| arguments.resumed(session)).transpose()?;
+    let arguments = resumed.as_ref().unwrap_or(arguments);
     let Refined { repair, summary, losses } = arguments.refined()?;
     if arguments.json {
         tell(&serde_json::to_string(&summary).expect("numbers and names alone cannot fail"));
@@ -199,6 +199,19 @@ impl Pushes {
         match pushed {
             Ok(()) => self.accepted += 1,
             Err(error) => *self.refused.entry(reason_of(&error).to_owned()).or_default() += 1,
+        }
+    }
+}
+
+/// Strokes that are still to be taken back or done again.
+struct Strokes<'a>(&'a [StrokeChange]);
+
+impl Strokes<'_> {
+    /// Changes those that were changed before the sample of this stamp came.
+    fn apply_until(&mut self, stamp_ns: i64, rates: &mut Rates) {
+        while let Some((first, rest)) = self.0.split_first().filter(|(first, _)| first.after_ns < stamp_ns) {
+            rates.change_strokes(first.is_undo);
+            self.0 = rest;
         }
     }
 }
@@ -248,15 +261,6 @@ fn misfit(params: &RefineParams, counts: &RefineCounts) -> Option<String> {
     })
 }
 
-/// Faces that are new, or of which a corner is not where it was.
-fn moved_faces(before: &TriMesh, after: &TriMesh) -> u64 {
-    let is_moved = |v: VertexId| before.position(v) != after.position(v);
-    let is_as_scanned = |face: FaceId, corners: [VertexId; 3]| {
-        before.has_face(face) && before.corners(face) == corners && !corners.into_iter().any(is_moved)
-    };
-    after.faces().filter(|&(face, corners)| !is_as_scanned(face, corners)).count() as u64
-}
-
 impl RefineArguments {
     /// The files alone, everything else as it is by default.
     pub(super) fn of_files(scan: PathBuf, bag: PathBuf, out: PathBuf, mesh_unit: MeshUnit) -> Self {
@@ -278,6 +282,8 @@ impl RefineArguments {
             live: false,
             features_out: None,
             touches_out: None,
+            resume: None,
+            strokes: Vec::new(),
             json: false,
         }
     }
@@ -285,6 +291,26 @@ impl RefineArguments {
     /// Writes features and touches too.
     pub(super) fn with_features(self, features: PathBuf, touches: PathBuf) -> Self {
         Self { features_out: Some(features), touches_out: Some(touches), ..self }
+    }
+
+    /// What refines a session again.
+    fn resumed(&self, session: &Path) -> Result<Self, CliError> {
+        let SessionRecord { scan, mesh_unit, scene, recording, topics, strokes } = SessionRecord::open(session)?;
+        let or = |chosen: Option<PathBuf>, name: &str| chosen.unwrap_or_else(|| session.join(name));
+        let out = Some(self.out.clone()).filter(|out| !out.as_os_str().is_empty());
+        Ok(Self {
+            scan,
+            bag: recording,
+            out: or(out, "refined.ply"),
+            mesh_unit,
+            scene: Some(scene),
+            wrench_topic: topics.wrench,
+            pose_topic: topics.pose,
+            features_out: Some(or(self.features_out.clone(), "features.json")),
+            touches_out: Some(or(self.touches_out.clone(), "touches.csv")),
+            strokes,
+            ..self.clone()
+        })
     }
 
     /// Reads, replays and writes.
@@ -299,16 +325,22 @@ impl RefineArguments {
         let recording = Recording::open(&self.bag, &topics).map_err(CliError::ReadRecording)?;
         let params =
             scene.refine_params(recording.wrench_frame).ok_or_else(|| CliError::Usage(NOTHING_MOVES.to_owned()))?;
+        let mut refiner = Refiner::new(mesh, params)?;
+        if !self.strokes.is_empty() {
+            refiner.keep_strokes();
+        }
         let patcher = scene.patcher_params(recording.wrench_frame).map(Patcher::new).transpose()?;
-        let mut rates = self.rates(Refiner::new(mesh, params)?, patcher, &as_scanned)?;
+        let mut rates = self.rates(refiner, patcher, &as_scanned)?;
         let load_s = started.elapsed().as_secs_f64();
 
         let started = Instant::now();
         let mut pushes = Pushes::new();
+        let mut strokes = Strokes(&self.strokes);
         let compensator = Compensator::new(params.compensator)?;
         let mut clock = scene.clock_params().map(ClockEstimator::new).transpose()?;
         let mut contacts = self.registration.then(|| ContactPoints::new(&params)).transpose()?;
         let mut replayed = replay(recording, scene.placement(), scene.sync_params(), markers, |sample| {
+            strokes.apply_until(sample.stamp_ns, &mut rates);
             pushes.push(&mut rates, sample);
             let tip = compensator.compensate(sample);
             if let Some(clock) = &mut clock {
@@ -318,20 +350,17 @@ impl RefineArguments {
                 contacts.push(&tip);
             }
         })?;
+        strokes.apply_until(i64::MAX, &mut rates);
         let registration = contacts
             .map(|contacts| ScanOffset::of(contacts.registrar.estimate(&as_scanned, &FaceTree::new(&as_scanned))));
         let Ended { refiner, patcher, live } = rates.finish()?;
         let replay_s = started.elapsed().as_secs_f64();
         let counts = refiner.counts();
-        let Remeshed { moved_faces, patch, uncertainty } = match patcher.filter(|_| counts.contacts > 0) {
-            Some(patcher) => self.write_patched(patcher, &as_scanned)?,
-            None => {
-                write_mesh(&self.out, refiner.mesh(), self.mesh_unit).map_err(CliError::WriteMesh)?;
-                self.write_features(&[])?;
-                let moved_faces = moved_faces(&as_scanned, refiner.mesh());
-                Remeshed { moved_faces, patch: None, uncertainty: None }
-            }
-        };
+        let stage = Progress::stage("mesh anew");
+        let patcher = patcher.filter(|_| counts.contacts > 0);
+        let Outcome { moved_faces, patch, uncertainty, .. } =
+            self.places().write(&as_scanned, refiner.mesh(), patcher)?;
+        drop(stage);
         debug!(?counts, "replayed");
         replayed.losses.extend(lost_samples(&replayed, pushes.accepted));
         replayed.losses.extend(lost_contacts(&params, counts));
@@ -375,40 +404,9 @@ impl RefineArguments {
         }
     }
 
-    /// Meshes the touched part of the scan anew and writes the result.
-    fn write_patched(&self, mut patcher: Patcher, scan: &TriMesh) -> Result<Remeshed, CliError> {
-        let _patching = Progress::stage("mesh anew");
-        let (started, wanted) = (Instant::now(), patcher.params().pitch);
-        patcher.flush();
-        let patched = patcher.patched(scan, &FaceTree::new(scan))?;
-        if patched.pitch > wanted {
-            let (pitch_mm, wanted_mm) = (patched.pitch * 1e3, wanted * 1e3);
-            warn!(
-                "new faces of {pitch_mm:.2} mm instead of {wanted_mm:.2}: finer ones would be more than patch.most_faces"
-            );
-        }
-        let build_s = started.elapsed().as_secs_f64();
-        let uncertainty = patcher.params().uncertainty.map(|_| UncertaintySummary::of(&patched, patcher.knocks()));
-        let columns = patched.columns().into_iter();
-        let columns: Vec<_> = columns.map(|(name, values)| VertexColumn { name, values: values.into() }).collect();
-        write_mesh_with(&self.out, &patched.mesh, &columns, self.mesh_unit).map_err(CliError::WriteMesh)?;
-        debug!(open_squares = patched.open_squares, "patched");
-        self.write_features(patcher.probed())?;
-        let moved_faces = moved_faces(scan, &patched.mesh);
-        Ok(Remeshed { moved_faces, patch: Some(PatchSummary::of(&patched, build_s)), uncertainty })
-    }
-
-    /// Writes what was touched, and the features of the result, where that was asked for: of the mesh and by the touches as
-    /// they are written, so that `touchup features` finds the same to the last bit.
-    fn write_features(&self, touches: &[ProbedPoint]) -> Result<(), CliError> {
-        if let Some(out) = &self.touches_out {
-            write_touches(out, touches)?;
-        }
-        if let Some(out) = &self.features_out {
-            let MeshFile { mesh, .. } = read_mesh(&self.out, self.mesh_unit).map_err(CliError::ReadMesh)?;
-            write_features(out, &find(&mesh, &as_written(touches)).1)?;
-        }
-        Ok(())
+    fn places(&self) -> OutcomePlaces<'_> {
+        let [features, touches] = [&self.features_out, &self.touches_out].map(|out| out.as_deref());
+        OutcomePlaces { mesh: &self.out, unit: self.mesh_unit, features, touches }
     }
 
     fn topics(&self) -> Topics {
@@ -466,32 +464,6 @@ impl RefineArguments {
         // the file was in range when it was read: what is not now came by a flag
         scene.check().map_err(|error| CliError::Usage(error.to_string()))?;
         Ok(scene)
-    }
-}
-
-impl PatchSummary {
-    fn of(patched: &Patched, build_s: f64) -> Self {
-        let count = |wanted: Support| patched.support.iter().filter(|&&support| support == wanted).count() as f64;
-        let (touched, guessed) = (count(Support::Touched), count(Support::Guessed) + count(Support::Unreachable));
-        Self {
-            pitch_mm: patched.pitch * 1e3,
-            removed_faces: patched.removed_faces,
-            added_faces: patched.added_faces,
-            guessed_share: guessed / (touched + guessed).max(1.0),
-            build_s,
-        }
-    }
-}
-
-impl fmt::Display for PatchSummary {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { pitch_mm, removed_faces, added_faces, guessed_share, build_s } = self;
-        write!(
-            f,
-            "meshed anew: {added_faces} faces of {pitch_mm:.2} mm for {removed_faces} of the scan, {:.0} % of their \
-             vertices guessed, in {build_s:.2} s",
-            guessed_share * 100.0
-        )
     }
 }
 

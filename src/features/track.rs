@@ -16,6 +16,8 @@ use crate::touch::ProbedPoint;
 #[derive(Clone, Debug, Default)]
 pub struct Tracker {
     features: Vec<Feature>,
+    /// share of the area that belonged to no primitive at the last look
+    unexplained: Option<f64>,
     next_id: u32,
     /// touches that were looked at
     seen: usize,
@@ -49,7 +51,8 @@ impl Tracker {
 
     /// Looks at the whole mesh again; features that were known keep their ids.
     pub fn renew(&mut self, mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> &[Feature] {
-        let Detection { mut features, .. } = detect(mesh, tree, touches);
+        let Detection { mut features, unexplained } = detect(mesh, tree, touches);
+        self.unexplained = Some(unexplained);
         let mut known = std::mem::take(&mut self.features);
         for feature in &mut features {
             let same = known.iter().position(|before| is_same(before, feature));
@@ -66,7 +69,13 @@ impl Tracker {
         self.until_ns = touches.last().map(|last| last.stamp_ns);
     }
 
-    fn fresh_id(&mut self) -> u32 {
+    /// Share of the mesh's area in which nothing was looked for, at the last look at the whole mesh; `None` before the first.
+    pub fn unexplained(&self) -> Option<f64> {
+        self.unexplained
+    }
+
+    /// A number that no feature has, had or will get: for what is known before it is found.
+    pub fn fresh_id(&mut self) -> u32 {
         self.next_id += 1;
         self.next_id - 1
     }

@@ -7,6 +7,7 @@ pub mod pairs_file;
 pub mod parameters_file;
 pub mod png;
 pub mod recording;
+pub mod session_folder;
 pub mod static_poses;
 pub mod table;
 pub mod touches_file;

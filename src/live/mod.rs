@@ -3,15 +3,20 @@
 //! When the patch is renewed, and at which sample its change is taken up, follows from the stamps alone. So the result
 //! never depends on how fast the machine is: where the patch is late, [`LiveRefiner::push`] waits for it.
 
+mod latency;
+mod probed;
 mod worker;
 
 use std::collections::VecDeque;
 use std::sync::Arc;
+use std::sync::mpsc::{Receiver, sync_channel};
 
-use crate::mesh::{FaceTree, TriMesh};
+use crate::mesh::{Changes, FaceTree, TriMesh};
 use crate::patch::{PatchDelta, Patcher};
 use crate::refine::{RefineError, Refiner, Update};
 use crate::touch::{Sample, SettingError};
+pub use latency::{Latencies, Quantiles};
+pub use probed::ProbedNews;
 use worker::{Answer, Question, Worker};
 
 /// Why a sample was not taken.
@@ -83,6 +88,8 @@ pub struct LiveRefiner {
     delta: PatchDelta,
     /// … and whether all of it is in the mesh
     is_done: bool,
+    /// touches that nobody asked for yet
+    probed: ProbedNews,
     counts: LiveCounts,
 }
 
@@ -112,6 +119,7 @@ impl LiveRefiner {
             due_ns: VecDeque::new(),
             delta: PatchDelta::default(),
             is_done: true,
+            probed: ProbedNews::default(),
             counts: LiveCounts::default(),
         })
     }
@@ -204,13 +212,40 @@ impl LiveRefiner {
 
     fn take_up(&mut self) -> Result<bool, LiveError> {
         self.due_ns.pop_front();
-        let (Answer { delta, has_changed_strokes, .. }, has_waited) = self.worker.answer()?;
+        let (Answer { delta, probed, has_changed_strokes, .. }, has_waited) = self.worker.answer()?;
         self.delta = delta;
+        self.probed.extend(probed);
         self.counts.renewals += 1;
         self.counts.waits += u64::from(has_waited);
         self.is_done = false;
         self.refiner.begin_to_follow(&self.delta);
         Ok(has_changed_strokes)
+    }
+
+    /// A copy of what the patch knows of all samples so far, and of nothing that it has made of it: it comes when the thread
+    /// has made it. [`Patcher::flush`] and [`Patcher::patched`] make of it what they would make at the end.
+    ///
+    /// # Errors
+    /// [`LiveError::Stopped`].
+    pub fn copy_patcher(&self) -> Result<Receiver<Patcher>, LiveError> {
+        let (to, copy) = sync_channel(1);
+        self.worker.ask(Question::Copy(self.batch.clone(), to))?;
+        Ok(copy)
+    }
+
+    /// Touches that the patch has found, or lost, since this was last asked.
+    pub fn take_probed(&mut self) -> Option<ProbedNews> {
+        (!self.probed.is_empty()).then(|| std::mem::take(&mut self.probed))
+    }
+
+    /// From here on notes what changes in the mesh, for [`Self::take_changes`].
+    pub fn watch(&mut self) {
+        self.refiner.watch();
+    }
+
+    /// What changed in the mesh since this was last asked, as [`TriMesh::take_changes`].
+    pub fn take_changes(&mut self, most: usize, into: &mut Changes) -> bool {
+        self.refiner.take_changes(most, into)
     }
 
     /// The haptic update, with the mesh as it stands.

@@ -1,10 +1,11 @@
 //! The thread of the patch.
 
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
+use std::sync::mpsc::{Receiver, Sender, SyncSender, TryRecvError, channel};
 use std::thread::{Builder, JoinHandle};
 
 use super::LiveError;
+use super::probed::{ProbedNews, Told};
 use crate::mesh::{FaceTree, TriMesh};
 use crate::patch::{PatchDelta, Patcher};
 use crate::touch::Sample;
@@ -15,6 +16,8 @@ pub(super) enum Question {
     Renew(Vec<Sample>),
     /// take in what is still in the smoothing window, and tell what changed
     Flush,
+    /// copy what is known, with these samples more
+    Copy(Vec<Sample>, SyncSender<Patcher>),
     /// take the last stroke back, or do it again, and tell what changed
     Undo,
     Redo,
@@ -23,14 +26,15 @@ pub(super) enum Question {
 /// What the thread found.
 pub(super) struct Answer {
     pub delta: PatchDelta,
+    pub probed: ProbedNews,
     /// whether there was a stroke to take back, or to do again
     pub has_changed_strokes: bool,
     /// to be filled again
     batch: Vec<Sample>,
 }
 
-/// A patcher on a thread of its own. Each question has one answer, in the same order; no more questions are open than
-/// renewals fit into the time that one of them has.
+/// A patcher on a thread of its own. Each question but that for a copy has one answer, in the same order; no more questions
+/// are open than renewals fit into the time that one of them has.
 #[derive(Debug)]
 pub(super) struct Worker {
     questions: Sender<Question>,
@@ -44,6 +48,7 @@ impl Worker {
         let (questions, inbox) = channel::<Question>();
         let (outbox, answers) = channel();
         let work = move || {
+            let mut told = Told::default();
             for question in inbox {
                 let (mut batch, mut has_changed_strokes) = (Vec::new(), false);
                 match question {
@@ -52,12 +57,20 @@ impl Worker {
                         batch = samples;
                         batch.clear();
                     }
+                    Question::Copy(samples, to) => {
+                        let mut copy = patcher.copy();
+                        samples.iter().for_each(|sample| copy.push(sample));
+                        // who asked may want it no more
+                        let _ = to.send(copy);
+                        continue;
+                    }
                     Question::Flush => patcher.flush(),
                     Question::Undo => has_changed_strokes = patcher.undo(),
                     Question::Redo => has_changed_strokes = patcher.redo(),
                 }
                 let delta = patcher.renewed(&scan.0, &scan.1);
-                if outbox.send(Answer { delta, has_changed_strokes, batch }).is_err() {
+                let probed = told.news(patcher.probed());
+                if outbox.send(Answer { delta, probed, has_changed_strokes, batch }).is_err() {
                     break;
                 }
             }

@@ -2,6 +2,7 @@
 
 mod closest;
 mod coherent;
+mod journal;
 mod median;
 mod repair;
 mod signed_distance;
@@ -12,6 +13,7 @@ mod workers;
 
 pub use closest::{BoxQuery, FaceHit, FaceTree, RefitPlan};
 pub use coherent::coherent_order;
+pub use journal::{Changes, IdSet};
 pub use median::median;
 pub use repair::{RepairReport, repair};
 pub use signed_distance::{pseudo_normal, signed_distance};

@@ -2,6 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::journal::{Changes, Journal};
 use super::stars::{MOST_FACES, Stars, Valences};
 
 /// A face of one [`TriMesh`]; stays valid until that face is removed.
@@ -79,6 +80,8 @@ pub struct TriMesh {
     stars: Stars,
     free_faces: Vec<FaceId>,
     free_vertices: Vec<VertexId>,
+    /// what changed since somebody asked, when somebody does
+    journal: Option<Box<Journal>>,
 }
 
 impl TriMesh {
@@ -107,7 +110,7 @@ impl TriMesh {
     pub(super) fn of_sound(positions: Vec<Point3<f64>>, faces: Vec<[u32; 3]>, valences: Valences) -> Self {
         debug_assert!(faces.iter().all(|corners| check_corners(corners, 0, positions.len()).is_ok()));
         let stars = valences.stars_of(&faces);
-        Self { positions, faces, stars, free_faces: Vec::new(), free_vertices: Vec::new() }
+        Self { positions, faces, stars, free_faces: Vec::new(), free_vertices: Vec::new(), journal: None }
     }
 
     /// Number of vertices, removed ones not counted.
@@ -214,6 +217,37 @@ impl TriMesh {
     pub fn set_position(&mut self, vertex: VertexId, position: Point3<f64>) {
         debug_assert!(position.coords.iter().all(|x| x.is_finite()));
         self.positions[vertex.0 as usize] = position;
+        self.note_vertex(vertex.0);
+    }
+
+    /// From here on notes what changes, for [`Self::take_changes`].
+    pub fn watch(&mut self) {
+        self.journal = Some(Box::new(Journal::new(self.vertex_slots(), self.face_slots())));
+    }
+
+    /// Tells what changed since this was last asked, up to `most` vertices and as many faces, and adds it to `into`; returns
+    /// whether that was all. Nothing before [`Self::watch`].
+    pub fn take_changes(&mut self, most: usize, into: &mut Changes) -> bool {
+        self.journal.as_mut().is_none_or(|journal| journal.take(most, into))
+    }
+
+    /// How many edits were noted since [`Self::watch`]: it grows with each.
+    pub fn edits(&self) -> u64 {
+        self.journal.as_ref().map_or(0, |journal| journal.edits())
+    }
+
+    #[inline]
+    fn note_vertex(&mut self, vertex: u32) {
+        if let Some(journal) = &mut self.journal {
+            journal.note_vertex(vertex);
+        }
+    }
+
+    #[inline]
+    fn note_face(&mut self, face: FaceId) {
+        if let Some(journal) = &mut self.journal {
+            journal.note_face(face.0);
+        }
     }
 
     /// Makes room for so many vertices and faces more: adding them in the shape of a regular mesh allocates nothing.
@@ -234,6 +268,7 @@ impl TriMesh {
             + self.faces.capacity() * size_of::<[u32; 3]>()
             + ids * size_of::<u32>()
             + self.stars.bytes()
+            + self.journal.as_ref().map_or(0, |journal| journal.bytes())
     }
 
     /// Adds a vertex that no face uses yet; the slot of a removed vertex is used again first.
@@ -254,6 +289,7 @@ impl TriMesh {
             None => self.positions.push(position),
         }
         self.stars.add_vertex(vertex as u32);
+        self.note_vertex(vertex as u32);
         Ok(VertexId(vertex as u32))
     }
 
@@ -264,6 +300,7 @@ impl TriMesh {
         }
         self.stars.remove_vertex(vertex.0);
         self.free_vertices.push(vertex);
+        self.note_vertex(vertex.0);
         true
     }
 
@@ -289,6 +326,7 @@ impl TriMesh {
         }
         let face = FaceId(face as u32);
         corners.into_iter().for_each(|vertex| self.stars.push(vertex, face));
+        self.note_face(face);
         Ok(face)
     }
 
@@ -302,12 +340,14 @@ impl TriMesh {
         let corners = std::mem::replace(&mut self.faces[face.0 as usize], [REMOVED; 3]);
         corners.into_iter().for_each(|vertex| self.stars.remove(vertex, face));
         self.free_faces.push(face);
+        self.note_face(face);
         true
     }
 
     /// Turns a face over: its normal changes sign; its id and its neighbours stay.
     pub fn flip_face(&mut self, face: FaceId) {
         self.faces[face.0 as usize].swap(1, 2);
+        self.note_face(face);
     }
 }
 

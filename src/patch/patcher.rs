@@ -248,6 +248,18 @@ impl Patcher {
         self.felt.contacts.knocks()
     }
 
+    /// A copy of what was felt, without what was made of it for a mesh that follows.
+    pub fn copy(&self) -> Self {
+        let Self { params, compensator, finder, felt, .. } = self;
+        Self {
+            params: *params,
+            compensator: compensator.clone(),
+            finder: finder.clone(),
+            felt: felt.clone(),
+            live: None,
+        }
+    }
+
     /// The settings.
     pub fn params(&self) -> &PatcherParams {
         &self.params

@@ -7,7 +7,7 @@ use super::guard::{GuardParams, Verdict};
 use super::roi::{Roi, RoiSize};
 use super::strokes::Strokes;
 use crate::mesh::{FaceHit, FaceId, FaceTree, MeshError, RefitPlan, TriMesh, VertexId};
-use crate::patch::PatchDelta;
+use crate::patch::{PatchDelta, Support};
 
 /// An update that would break the mesh is tried again at this share of its length …
 const CUT: f64 = 0.35;
@@ -108,6 +108,11 @@ impl DeformableMesh {
             Some(hint) => self.tree.closest_from(&self.mesh, p, hint, reach),
             None => self.tree.closest(&self.mesh, p, reach),
         }
+    }
+
+    /// What a vertex rests on in the patch that is followed.
+    pub fn support(&self, vertex: VertexId) -> Option<Support> {
+        self.patch.as_ref().map(|patch| patch.support(vertex))
     }
 
     /// Remembers that a surface facing `normal` was felt on `face`.

@@ -15,8 +15,8 @@ const NEVER: i64 = i64::MIN;
 #[derive(Clone, Debug)]
 pub(super) struct FollowedPatch {
     pub splice: Splice,
-    /// for each vertex, whether it was touched
-    is_touched: Vec<bool>,
+    /// for each vertex, what it rests on
+    support: Vec<Support>,
     /// vertices that are not where scan and patch have them
     moved: Vec<VertexId>,
     /// … and when each of them moved last, ns
@@ -28,16 +28,21 @@ impl FollowedPatch {
     /// For a scan without a patch, with room for so many new vertices.
     pub fn new(scan: &TriMesh, vertices: usize) -> Self {
         let slots = scan.vertex_slots();
-        let (mut is_touched, mut moved_ns) =
-            (Vec::with_capacity(slots + vertices), Vec::with_capacity(slots + vertices));
-        is_touched.resize(slots, false);
+        let (mut support, mut moved_ns) = (Vec::with_capacity(slots + vertices), Vec::with_capacity(slots + vertices));
+        support.resize(slots, Support::Scan);
         moved_ns.resize(slots, NEVER);
-        Self { splice: Splice::default(), is_touched, moved: Vec::new(), moved_ns, refit: Vec::new() }
+        Self { splice: Splice::default(), support, moved: Vec::new(), moved_ns, refit: Vec::new() }
     }
 
     #[inline]
     pub fn is_touched(&self, vertex: VertexId) -> bool {
-        self.is_touched[vertex.0 as usize]
+        self.support(vertex) == Support::Touched
+    }
+
+    /// What a vertex rests on in the patch.
+    #[inline]
+    pub fn support(&self, vertex: VertexId) -> Support {
+        self.support[vertex.0 as usize]
     }
 
     /// Remembers that these were moved.
@@ -89,11 +94,11 @@ impl FollowedPatch {
     ) -> Result<bool, MeshError> {
         let before = self.splice.placed().len();
         let is_done = self.splice.go_on(delta, most, mesh, tree)?;
-        self.is_touched.resize(mesh.vertex_slots(), false);
+        self.support.resize(mesh.vertex_slots(), Support::Scan);
         self.moved_ns.resize(mesh.vertex_slots(), NEVER);
         scanned.resize(mesh.vertex_slots(), Point3::origin());
         for (vertex, placed) in self.splice.placed().iter().zip(&delta.vertices).skip(before) {
-            self.is_touched[vertex.0 as usize] = placed.support == Support::Touched;
+            self.support[vertex.0 as usize] = placed.support;
             scanned[vertex.0 as usize] = placed.position;
         }
         Ok(is_done)

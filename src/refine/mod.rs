@@ -29,8 +29,8 @@ pub use registration::{Registrar, Registration, RegistrationError, RegistrationP
 pub use roi::RoiSize;
 pub use sliding::{Ball, SlidingParams, TipMotion};
 
-use crate::mesh::{FaceHit, FaceId, MeshError, TriMesh, VertexId};
-use crate::patch::PatchDelta;
+use crate::mesh::{Changes, FaceHit, FaceId, MeshError, TriMesh, VertexId};
+use crate::patch::{PatchDelta, Support};
 use crate::touch::{
     BiasTracker, Compensator, ContactGate, FrictionCoefficient, Sample, SampleError, SettingError, TipBody, TipPlace,
 };
@@ -475,6 +475,21 @@ impl Refiner {
     /// The mesh as it stands.
     pub fn mesh(&self) -> &TriMesh {
         &self.deformable.mesh
+    }
+
+    /// From here on notes what changes in the mesh, for [`Self::take_changes`].
+    pub fn watch(&mut self) {
+        self.deformable.mesh.watch();
+    }
+
+    /// What changed in the mesh since this was last asked, as [`TriMesh::take_changes`].
+    pub fn take_changes(&mut self, most: usize, into: &mut Changes) -> bool {
+        self.deformable.mesh.take_changes(most, into)
+    }
+
+    /// What a vertex rests on in the patch that is followed; `None` where none is.
+    pub fn support(&self, vertex: VertexId) -> Option<Support> {
+        self.deformable.support(vertex)
     }
 
     /// Gives the mesh back.

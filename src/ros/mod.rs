@@ -8,5 +8,6 @@ pub mod dds;
 pub mod in_process;
 pub mod messages;
 pub mod names;
+pub mod node;
 pub mod parameters;
 pub mod port;

@@ -33,7 +33,7 @@ pub use probed::ProbedPoint;
 pub use sync::{SyncCounts, SyncParams, Synchroniser};
 pub use tip_shape::{TipBody, TipContact, TipPlace, TipShape};
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
 /// Farther from the object's origin than this, a pose is a fault and not a measurement, m.
 ///
@@ -114,6 +114,21 @@ impl SettingError {
     ) -> Result<(), SettingError> {
         if inside && value.is_finite() { Ok(()) } else { Err(SettingError { name, value, allowed }) }
     }
+}
+
+/// A measured quaternion is rounded, not wrong, this close to norm 1.
+const QUATERNION_NORM_SLACK: f64 = 0.01;
+/// Roundings of a product of three rotations: such a quaternion is kept bit by bit, so that writing and reading again
+/// changes nothing.
+const QUATERNION_ROUNDING: f64 = 8.0 * f64::EPSILON;
+
+/// The rotation that a message means, as its source rounded it; `None` for what is none, NaN among it.
+pub fn measured_rotation(q: Quaternion<f64>) -> Option<UnitQuaternion<f64>> {
+    let off = (q.norm() - 1.0).abs();
+    if off <= QUATERNION_ROUNDING {
+        return Some(UnitQuaternion::new_unchecked(q));
+    }
+    (off <= QUATERNION_NORM_SLACK).then(|| UnitQuaternion::new_normalize(q))
 }
 
 /// Force and torque that the object exerts on the stylus, N and N·m.

@@ -13,24 +13,28 @@ pub(super) struct Stream<T> {
     pub settled: i64,
     /// leaps ahead; waits for the next message to agree
     suspect: Option<T>,
+    /// how far a message may lag behind the newest, and one more, ns; 0: none may
+    wait_ns: i64,
     /// messages were pushed out of the full buffer
     pub overflown: bool,
     pub counts: SyncCounts,
 }
 
 impl<T: Stamped + Copy> Stream<T> {
-    pub fn with_capacity(capacity: usize) -> Self {
+    pub fn new(capacity: usize, wait_ns: i64) -> Self {
         Self {
             held: VecDeque::with_capacity(capacity),
             newest: None,
             settled: i64::MIN,
             suspect: None,
+            wait_ns,
             overflown: false,
             counts: SyncCounts::default(),
         }
     }
 
-    pub fn push(&mut self, message: T, params: &SyncParams) {
+    /// Takes a message, or counts why not; whether it is kept, for now at least.
+    pub fn push(&mut self, message: T, params: &SyncParams) -> bool {
         let stamp = message.stamp_ns();
         if self.newest.is_some_and(|newest| stamp <= newest.saturating_add(params.largest_jump_ns)) {
             return self.insert(message, params);
@@ -38,11 +42,12 @@ impl<T: Stamped + Copy> Stream<T> {
         match self.suspect.take() {
             Some(first) if stamp.abs_diff(first.stamp_ns()) <= params.largest_jump_ns as u64 => {
                 self.insert(first, params);
-                self.insert(message, params);
+                self.insert(message, params)
             }
             refused => {
                 self.counts.jump += refused.is_some() as u64;
                 self.suspect = Some(message);
+                true
             }
         }
     }
@@ -50,31 +55,35 @@ impl<T: Stamped + Copy> Stream<T> {
     /// A message that nothing contradicted is kept.
     pub fn finish(&mut self, params: &SyncParams) {
         match self.suspect.take() {
-            Some(only) if self.newest.is_none() => self.insert(only, params),
+            Some(only) if self.newest.is_none() => drop(self.insert(only, params)),
             refused => self.counts.jump += refused.is_some() as u64,
         }
     }
 
-    fn insert(&mut self, message: T, params: &SyncParams) {
+    fn insert(&mut self, message: T, params: &SyncParams) -> bool {
         let stamp = message.stamp_ns();
         if stamp <= self.settled {
-            self.counts.late += 1;
-            return;
+            match self.wait_ns {
+                0 if self.newest == Some(stamp) => self.counts.duplicate += 1,
+                _ => self.counts.late += 1,
+            }
+            return false;
         }
         let at = self.held.partition_point(|held| held.stamp_ns() < stamp);
         if self.held.get(at).is_some_and(|held| held.stamp_ns() == stamp) {
             self.counts.duplicate += 1;
-            return;
+            return false;
         }
         self.held.insert(at, message);
         let newest = self.newest.map_or(stamp, |newest| newest.max(stamp));
         self.newest = Some(newest);
-        self.settled = self.settled.max(newest.saturating_sub(params.reorder_ns).saturating_sub(1));
+        self.settled = self.settled.max(newest.saturating_sub(self.wait_ns));
         if self.held.len() == params.capacity {
             self.pop();
             self.overflown = true;
             self.counts.overflow += T::IS_LOST_ALONE as u64;
         }
+        true
     }
 
     /// Drops what lies before the last message at or before `stamp_ns`.

@@ -118,6 +118,20 @@ impl Synchroniser {
     /// # Errors
     /// [`SettingError`] for a negative time and for a capacity below 2 or above a million.
     pub fn new(params: SyncParams) -> Result<Self, SettingError> {
+        Self::waiting(params, params.reorder_ns.saturating_add(1))
+    }
+
+    /// As [`Self::new`], for streams each of which comes in order of its stamps, however the two interleave: a sample goes
+    /// out with the later of its wrench and the pose after it, and what is out of order is late. As long as nothing is, the
+    /// samples are those of any reorder window.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn in_order(params: SyncParams) -> Result<Self, SettingError> {
+        Self::waiting(params, 0)
+    }
+
+    fn waiting(params: SyncParams, wait_ns: i64) -> Result<Self, SettingError> {
         let times = [
             ("reorder window (ns)", params.reorder_ns),
             ("largest gap (ns)", params.largest_gap_ns),
@@ -130,24 +144,24 @@ impl Synchroniser {
             let value = params.capacity as f64;
             return Err(SettingError { name: "buffer capacity (messages)", value, allowed: "2 to 1000000" });
         }
-        let (poses, wrenches) = (Stream::with_capacity(params.capacity), Stream::with_capacity(params.capacity));
+        let (poses, wrenches) = (Stream::new(params.capacity, wait_ns), Stream::new(params.capacity, wait_ns));
         Ok(Self { params, poses, wrenches, finished: false })
     }
 
     /// Takes one message; draw samples with [`Self::next_sample`] before the next one. What comes after
-    /// [`Self::finish`] is late.
-    pub fn push(&mut self, message: Message) {
+    /// [`Self::finish`] is late. Returns whether it was taken: what was not is counted and changes nothing else.
+    pub fn push(&mut self, message: Message) -> bool {
         match message {
             Message::Pose(pose) => match pose.check() {
-                _ if self.finished => self.poses.counts.late += 1,
+                _ if self.finished => self.poses.counts.refuse_late(),
                 Ok(()) => self.poses.push(pose, &self.params),
                 Err(why) => self.poses.counts.refuse(why),
             },
             Message::Wrench(mut wrench) => match wrench.check() {
-                _ if self.finished => self.wrenches.counts.late += 1,
+                _ if self.finished => self.wrenches.counts.refuse_late(),
                 Ok(()) => {
                     wrench.stamp_ns = wrench.stamp_ns.saturating_sub(self.params.wrench_offset_ns);
-                    self.wrenches.push(wrench, &self.params);
+                    self.wrenches.push(wrench, &self.params)
                 }
                 Err(why) => self.wrenches.counts.refuse(why),
             },
@@ -223,12 +237,18 @@ impl Synchroniser {
 type Counter = fn(&mut SyncCounts) -> &mut u64;
 
 impl SyncCounts {
-    fn refuse(&mut self, why: SampleError) {
+    fn refuse(&mut self, why: SampleError) -> bool {
         match why {
             SampleError::NotFinite { .. } => self.not_finite += 1,
             SampleError::Absurd { .. } | SampleError::NotARotation { .. } => self.absurd += 1,
             SampleError::NotAfter { .. } => self.late += 1,
         }
+        false
+    }
+
+    fn refuse_late(&mut self) -> bool {
+        self.late += 1;
+        false
     }
 }
 

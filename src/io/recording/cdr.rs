@@ -9,17 +9,12 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::{BadMessage, RecordingError, ZSTD_MAGIC};
-use crate::touch::{StampedPose, StampedWrench, Wrench};
+use crate::touch::{StampedPose, StampedWrench, Wrench, measured_rotation};
 
 /// Longest payload of a pose or wrench: 84 bytes of numbers and a frame name; more than this is no such message.
 pub(super) const MAX_MESSAGE_BYTES: usize = 64 * 1024;
 /// Serialized payloads are padded to four bytes by some middlewares; more left over is another type.
 const MAX_PADDING_BYTES: usize = 3;
-/// A measured quaternion is rounded, not wrong, this close to norm 1.
-const QUATERNION_NORM_SLACK: f64 = 0.01;
-/// Roundings of a product of three rotations: such a quaternion is kept bit by bit, so that writing and reading again
-/// changes nothing.
-const QUATERNION_ROUNDING: f64 = 8.0 * f64::EPSILON;
 const NS_PER_S: i64 = 1_000_000_000;
 
 #[derive(Serialize, Deserialize)]
@@ -77,16 +72,7 @@ impl From<Vector3Msg> for Vector3<f64> {
 
 impl QuaternionMsg {
     fn rotation(&self) -> Result<UnitQuaternion<f64>, BadMessage> {
-        let q = Quaternion::new(self.w, self.x, self.y, self.z);
-        let off = (q.norm() - 1.0).abs();
-        if off <= QUATERNION_ROUNDING {
-            Ok(UnitQuaternion::new_unchecked(q))
-        } else if off <= QUATERNION_NORM_SLACK {
-            Ok(UnitQuaternion::new_normalize(q))
-        } else {
-            // NaN ends here too
-            Err(BadMessage::Quaternion)
-        }
+        measured_rotation(Quaternion::new(self.w, self.x, self.y, self.z)).ok_or(BadMessage::Quaternion)
     }
 }
 

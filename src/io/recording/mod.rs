@@ -5,7 +5,7 @@
 //! Both deal in [`crate::touch::Message`]s, stamped as the message headers are. [`RecordingReader`] streams: its memory
 //! does not grow with the recording, and no length found in a file is believed before it is checked.
 //! [`RecordingWriter`] makes a file that rosbag2, Foxglove and the Python readers open; [`write_recording`] puts one
-//! under its final name only when it is whole.
+//! under its final name only when it is whole, [`SegmentedWriter`] writes one that grows, in pieces that a crash leaves whole.
 
 mod cdr;
 mod db3;
@@ -14,10 +14,12 @@ mod framing;
 mod mcap;
 mod point_cloud;
 mod reader;
+mod segments;
 mod writer;
 
 pub use error::{BadCount, BadMessage, Damage, Place, RecordingError, TopicList};
 pub use reader::RecordingReader;
+pub use segments::SegmentedWriter;
 pub use writer::{RecordingWriter, write_recording};
 
 /// What a zstd frame begins with: a file compressed as a whole, or a message (CDR begins with 0).

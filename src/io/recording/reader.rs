@@ -14,6 +14,7 @@ use super::db3::{self, Db3Reader};
 use super::error::{BadCount, check_topics};
 use super::mcap::{self, McapReader};
 use super::point_cloud::decode_markers;
+use super::segments::segments_of;
 use super::{BadMessage, Kind, RawMessage, Record, RecordingError, TopicInfo, Topics, ZSTD_MAGIC};
 use crate::touch::Message;
 
@@ -51,7 +52,8 @@ pub struct RecordingReader {
 
 impl RecordingReader {
     /// Opens a recording: an `.mcap` or `.db3` file, either of them compressed by zstd as a whole, or a rosbag2 folder
-    /// with its `metadata.yaml`, whose files are read in the order named there. Files are told by their content.
+    /// with its `metadata.yaml`, whose files are read in the order named there; without it the .mcap files of the folder, in
+    /// the order of their names. Files are told by their content.
     ///
     /// # Errors
     /// [`RecordingError::MissingTopic`], [`RecordingError::WrongType`] and [`RecordingError::WrongEncoding`] when the
@@ -319,6 +321,13 @@ fn files_of(path: &Path) -> Result<VecDeque<PathBuf>, RecordingError> {
         return Ok(VecDeque::from([path.to_owned()]));
     }
     let metadata_path = path.join("metadata.yaml");
+    if !metadata_path.exists() {
+        // a recorder that was killed wrote none
+        let segments = segments_of(path).map_err(|source| RecordingError::Io { path: path.to_owned(), source })?;
+        if !segments.is_empty() {
+            return Ok(segments.into());
+        }
+    }
     let bad = |reason: String| RecordingError::Metadata { path: metadata_path.clone(), reason };
     let text = read_metadata(&metadata_path).map_err(|error| bad(error.to_string()))?;
     let metadata: Metadata = serde_saphyr::from_str(&text).map_err(|error| bad(error.to_string()))?;

@@ -103,12 +103,27 @@ impl<W: Write + Seek> RecordingWriter<W> {
                 (encode_markers(frame, &channel.frame)?, channel)
             }
         };
-        let stamp_ns = record.stamp_ns();
-        let time = u64::try_from(stamp_ns).map_err(|_| RecordingError::Stamp { stamp_ns })?;
-        let sequence = channel.sequence;
-        channel.sequence = sequence.wrapping_add(1);
-        let header = MessageHeader { channel_id: channel.id, sequence, log_time: time, publish_time: time };
-        Ok(self.mcap.write_to_known_channel(&header, &payload)?)
+        append(&mut self.mcap, channel, record.stamp_ns(), &payload)
+    }
+
+    /// Appends one message whose header names `frame`.
+    ///
+    /// # Errors
+    /// As [`Self::write`].
+    pub fn write_in(&mut self, message: &Message, frame: &str) -> Result<(), RecordingError> {
+        let (payload, channel) = match message {
+            Message::Pose(pose) => (encode_pose(pose, frame)?, &mut self.pose),
+            Message::Wrench(wrench) => (encode_wrench(wrench, frame)?, &mut self.wrench),
+        };
+        append(&mut self.mcap, channel, message.stamp_ns(), &payload)
+    }
+
+    /// Hands all that was written to the output, so that a reader gets up to here.
+    ///
+    /// # Errors
+    /// [`RecordingError::Write`].
+    pub fn flush(&mut self) -> Result<(), RecordingError> {
+        Ok(self.mcap.flush()?)
     }
 
     /// Writes the index and gives the output back. Without this call the file has no proper end.
@@ -119,6 +134,19 @@ impl<W: Write + Seek> RecordingWriter<W> {
         self.mcap.finish()?;
         Ok(self.mcap.into_inner())
     }
+}
+
+fn append<W: Write + Seek>(
+    mcap: &mut Writer<W>,
+    channel: &mut Channel,
+    stamp_ns: i64,
+    payload: &[u8],
+) -> Result<(), RecordingError> {
+    let time = u64::try_from(stamp_ns).map_err(|_| RecordingError::Stamp { stamp_ns })?;
+    let sequence = channel.sequence;
+    channel.sequence = sequence.wrapping_add(1);
+    let header = MessageHeader { channel_id: channel.id, sequence, log_time: time, publish_time: time };
+    Ok(mcap.write_to_known_channel(&header, payload)?)
 }
 
 fn add_channel<W: Write + Seek>(

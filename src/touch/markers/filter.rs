@@ -86,7 +86,7 @@ impl MarkerFilter {
     pub fn new(body: MarkerBody, params: MarkerParams) -> Result<Self, SettingError> {
         params.check(&body)?;
         let order = SyncParams { reorder_ns: params.reorder_ns, capacity: HELD_FRAMES, ..SyncParams::default() };
-        let frames = Stream::with_capacity(HELD_FRAMES);
+        let frames = Stream::new(HELD_FRAMES, params.reorder_ns.saturating_add(1));
         Ok(Self { body, params, order, frames, tracked: None, counts: MarkerCounts::default() })
     }
 

@@ -8,7 +8,7 @@ use crate::patch::{Knock, Knocks, Patched, Support};
 
 /// What `--json` prints of the uncertainty.
 #[derive(Debug, Serialize)]
-pub(super) struct UncertaintySummary {
+pub struct UncertaintySummary {
     /// median standard deviation of the vertices that were touched
     touched_sigma_mm: f64,
     /// contacts that contradicted their place and did not count
@@ -39,6 +39,7 @@ struct KnockFound {
 const TOLD: usize = 8;
 
 impl UncertaintySummary {
+    /// What a patcher says of its result.
     pub fn of(patched: &Patched, knocks: &Knocks) -> Self {
         let known = patched.sigma.iter().zip(&patched.support);
         let mut touched: Vec<f64> =

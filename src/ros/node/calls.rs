@@ -1,0 +1,315 @@
+//! What the node does when it is asked.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, TrySendError, sync_channel};
+use std::thread::Builder;
+use std::time::Duration;
+
+use nalgebra::Point3;
+use tracing::warn;
+
+use super::convert::{header, stamp_ns};
+use super::feature_messages::{KIND_NAMES, flagged};
+use super::haptic::Haptic;
+use super::replica::{Replica, Snapshot};
+use super::seeker::{Flag, SeekerInput};
+use super::sitting::Sitting;
+use super::view::ViewInput;
+use super::{NodeError, Setup};
+use crate::io::session_folder::SessionFolder;
+use crate::patch::Patcher;
+use crate::ros::messages::{
+    Feature as FeatureMsg, FlagFeatureRequest, FlagFeatureResponse, PointStamped, ProbeFeatureResponse, ProbeResponse,
+    ProbeResult, ResyncMeshResponse, SaveMeshRequest, SaveMeshResponse, SetBoolResponse, TriggerResponse, UndoRequest,
+    UndoResponse,
+};
+use crate::ros::parameters::ParameterValue;
+use crate::ros::port::{Call, Endpoint, Goal, GoalEnd, Reply};
+use crate::session::{OutcomePlaces, StrokeChange};
+
+/// A flag may reach so far, m.
+const LARGEST_RADIUS: f64 = 1.0;
+/// Strokes that are taken back by one call at most.
+const MOST_STROKES: u32 = 1000;
+/// How long mesh and patch may take to be handed out for a file.
+const COPY_WAIT: Duration = Duration::from_secs(30);
+/// The name of a file that nobody named.
+const DEFAULT_NAME: &str = "refined.ply";
+
+impl Haptic {
+    pub(super) fn call(&mut self, call: Call) {
+        match call {
+            Call::Flag(request, reply) => match self.flag_of(&request) {
+                Ok(flag) => self.send_flag(flag, Some(reply)),
+                Err(message) => reply.send(FlagFeatureResponse { success: false, message, id: 0 }),
+            },
+            Call::Unflag(request, reply) => self.ask_seeker(SeekerInput::Unflag(request.id, reply)),
+            Call::Detect(request, reply) => self.ask_seeker(SeekerInput::Detect(request, reply)),
+            Call::Save(request, reply) => self.save(request, reply),
+            Call::Resync(_, reply) => self.resync(reply),
+            Call::Undo(request, reply) => reply.send(self.change_strokes(&request, true)),
+            Call::Redo(request, reply) => reply.send(self.change_strokes(&request, false)),
+            Call::Reset(reply) => reply.send(self.reset()),
+            Call::Pause(request, reply) => {
+                self.is_paused = request.data;
+                let message = if request.data { "paused: samples are passed over" } else { "samples are taken" };
+                reply.send(SetBoolResponse { success: true, message: message.to_owned() });
+            }
+            Call::ProbeFeature(request, reply) => self.refuse_probe(request.id, reply),
+            Call::Probe(goal, handles) => self.refuse_goal(&goal.ids, handles),
+        }
+    }
+
+    fn ask_seeker(&self, input: SeekerInput) {
+        if let Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) = self.seeker.try_send(input) {
+            warn!("a call about features found no room: its caller gets no answer");
+        }
+    }
+
+    fn flag_of(&self, request: &FlagFeatureRequest) -> Result<Flag, String> {
+        let given = if request.search_radius == 0.0 { self.flag_radius() } else { request.search_radius };
+        if !(given > 0.0 && given <= LARGEST_RADIUS) {
+            return Err(format!(
+                "search_radius is {given} m: it may be up to {LARGEST_RADIUS} m, or 0 for flag_radius_mm"
+            ));
+        }
+        Ok(Flag { kind: request.kind, point: self.point_in_object(&request.point)?, radius: given })
+    }
+
+    fn flag_radius(&self) -> f64 {
+        self.setup.shared.parameters().double("flag_radius_mm") / 1e3
+    }
+
+    fn point_in_object(&self, told: &PointStamped) -> Result<Point3<f64>, String> {
+        let stamp_ns = match stamp_ns(&told.header.stamp).ok_or("the stamp of the point is no time")? {
+            0 => self.last_ns.unwrap_or_else(|| self.setup.port.now_ns()),
+            stamp_ns => stamp_ns,
+        };
+        let frame = self.placer.object_from(&told.header.frame_id, stamp_ns).map_err(|why| why.to_string())?;
+        let point = frame * Point3::new(told.point.x, told.point.y, told.point.z);
+        let is_sound = point.coords.iter().all(|x| x.abs() <= crate::touch::LARGEST_POSITION);
+        is_sound.then_some(point).ok_or_else(|| "the point is not finite, or absurdly far".to_owned())
+    }
+
+    fn send_flag(&self, flag: Flag, reply: Option<Reply<FlagFeatureResponse>>) {
+        self.ask_seeker(SeekerInput::Flag(flag, reply));
+    }
+
+    /// RViz's Publish Point.
+    pub(super) fn flag_clicked(&mut self, clicked: &PointStamped) {
+        let parameters = self.setup.shared.parameters();
+        let kind = KIND_NAMES.iter().position(|name| *name == parameters.string("flag_kind")).unwrap_or(0);
+        match self.point_in_object(clicked) {
+            Ok(point) => self.send_flag(Flag { kind: kind as u8, point, radius: self.flag_radius() }, None),
+            Err(why) => {
+                warn!(why, "a clicked point was not taken");
+                self.tally.refuse("clicked_point");
+            }
+        }
+    }
+
+    fn resync(&mut self, reply: Reply<ResyncMeshResponse>) {
+        let sent = self.view.try_send(ViewInput::Resync).is_ok();
+        let message = if sent { "it comes on mesh_patch" } else { "the view is behind: ask again" };
+        reply.send(ResyncMeshResponse {
+            success: sent,
+            message: message.to_owned(),
+            session: self.sitting.folder.name().to_owned(),
+            version: self.version,
+        });
+    }
+
+    fn change_strokes(&mut self, request: &UndoRequest, is_undo: bool) -> UndoResponse {
+        let wanted = request.strokes.clamp(1, MOST_STROKES);
+        let (mut strokes, mut why) = (0, None);
+        while strokes < wanted {
+            match self.sitting.engine.change_strokes(is_undo) {
+                Ok(true) => strokes += 1,
+                Ok(false) => break,
+                Err(error) => {
+                    (why, self.fault) = (Some(error.to_string()), Some(error.to_string()));
+                    break;
+                }
+            }
+            let change = StrokeChange { after_ns: self.last_ns.unwrap_or(i64::MIN), is_undo };
+            if let Err(error) = self.sitting.recorder.write_stroke(change) {
+                warn!(%error, "after a crash this stroke would be as it was");
+            }
+        }
+        self.version += u64::from(strokes > 0);
+        let verb = if is_undo { "took back" } else { "did again" };
+        let message = match (strokes, why) {
+            (_, Some(why)) => why,
+            (0, None) => format!("there is no stroke to be {}", if is_undo { "taken back" } else { "done again" }),
+            (1, None) => format!("{verb} 1 stroke"),
+            (count, None) => format!("{verb} {count} strokes"),
+        };
+        UndoResponse { success: strokes > 0, message, strokes, mesh_version: self.version }
+    }
+
+    fn reset(&mut self) -> TriggerResponse {
+        match self.begin_again() {
+            Ok(name) => TriggerResponse { success: true, message: format!("begun again: session {name}") },
+            Err(error) => TriggerResponse { success: false, message: error.to_string() },
+        }
+    }
+
+    /// Ends the session beside the next one.
+    fn begin_again(&mut self) -> Result<String, NodeError> {
+        let next = Sitting::begin(&self.setup)?;
+        self.finish_samples();
+        let report = self.report();
+        let name = next.folder.name().to_owned();
+        let before = std::mem::replace(&mut self.sitting, next);
+        let setup = Arc::clone(&self.setup);
+        let end = move || {
+            if let Err(error) = before.end(&setup, report) {
+                warn!(%error, "the session before was not written whole");
+            }
+        };
+        self.ending.retain(|thread| !thread.is_finished());
+        self.ending.push(Builder::new().name("ending".to_owned()).spawn(end).map_err(NodeError::no_thread)?);
+        self.fault = None;
+        self.begin_counting()?;
+        let replica = Box::new(Replica::of(&self.setup.scan.0, &name));
+        // both take these however much they have to do
+        let _ = self.view.send(ViewInput::Session(replica));
+        let _ = self.seeker.send(SeekerInput::Session(name.clone()));
+        Ok(name)
+    }
+
+    /// The samples that only waited for more to come.
+    pub(super) fn finish_samples(&mut self) {
+        self.sync.finish();
+        while let Some(sample) = self.sync.next_sample() {
+            self.sample(&sample);
+        }
+    }
+
+    fn save(&mut self, request: SaveMeshRequest, reply: Reply<SaveMeshResponse>) {
+        self.ending.retain(|thread| !thread.is_finished());
+        let places = match Places::of(&self.sitting.folder, &request) {
+            Ok(places) => places,
+            Err(message) => return reply.send(SaveMeshResponse { message, ..Default::default() }),
+        };
+        let patcher = match self.sitting.engine.copy_patcher() {
+            Ok(patcher) => patcher,
+            Err(error) => return reply.send(SaveMeshResponse { message: error.to_string(), ..Default::default() }),
+        };
+        self.show_edits();
+        let (to, snapshot) = sync_channel(1);
+        let has_asked = self.view.try_send(ViewInput::Snapshot(to)).is_ok();
+        let (setup, version) = (Arc::clone(&self.setup), self.version);
+        let work = move || {
+            let written = match has_asked {
+                true => places.write(&setup, &snapshot, patcher),
+                false => Err("the view is behind: save again".to_owned()),
+            };
+            reply.send(match written {
+                Ok(counts) => places.answer(version, counts),
+                Err(message) => SaveMeshResponse { message, ..Default::default() },
+            });
+        };
+        match Builder::new().name("save".to_owned()).spawn(work) {
+            Ok(thread) => self.ending.push(thread),
+            Err(error) => warn!(%error, "no thread to save on: the caller gets no answer"),
+        }
+    }
+
+    fn refuse_probe(&self, id: u32, reply: Reply<ProbeFeatureResponse>) {
+        let header = header(self.setup.port.now_ns(), &self.setup.shared.frame);
+        reply.send(ProbeFeatureResponse { header, result: no_arm(id) });
+    }
+
+    fn refuse_goal(&self, ids: &[u32], goal: Goal) {
+        goal.accept.send(true);
+        let response = ProbeResponse {
+            header: header(self.setup.port.now_ns(), &self.setup.shared.frame),
+            code: ProbeResult::NO_ARM,
+            message: NO_ARM.to_owned(),
+            results: ids.first().map(|&id| no_arm(id)).into_iter().collect(),
+        };
+        goal.result.send((GoalEnd::Aborted, response));
+    }
+
+    pub(super) fn set_parameter(&mut self, name: &str, value: &ParameterValue) -> Result<(), String> {
+        let mut parameters = (*self.setup.shared.parameters()).clone();
+        parameters.set_live(name, value).map_err(|why| why.to_string())?;
+        self.mismatch_rate_hz = parameters.double("mismatch_rate_hz");
+        self.setup.shared.set_parameters(parameters);
+        self.setup.shared.show(&self.view, ViewInput::Parameters);
+        Ok(())
+    }
+
+    pub(super) fn note_endpoint(&mut self, endpoint: Endpoint) {
+        if let Some(why) = &endpoint.mismatch {
+            warn!(topic = endpoint.topic, why, "somebody on this topic cannot be heard");
+        }
+        self.endpoints.insert(endpoint.topic.clone(), endpoint);
+    }
+}
+
+const NO_ARM: &str = "no arm configured: start the node with robot:=sim or robot:=ur";
+
+fn no_arm(id: u32) -> ProbeResult {
+    let nowhere = Point3::new(f64::NAN, f64::NAN, f64::NAN);
+    ProbeResult {
+        id,
+        code: ProbeResult::NO_ARM,
+        message: NO_ARM.to_owned(),
+        feature: flagged(id, FeatureMsg::KIND_UNKNOWN, &nowhere, f64::NAN),
+        uncertainty: f64::NAN,
+        ..ProbeResult::default()
+    }
+}
+
+/// The files of one call of `~/save_mesh`.
+struct Places {
+    mesh: PathBuf,
+    features: Option<PathBuf>,
+    touches: Option<PathBuf>,
+}
+
+impl Places {
+    fn of(folder: &SessionFolder, request: &SaveMeshRequest) -> Result<Self, String> {
+        let name = if request.name.is_empty() { DEFAULT_NAME } else { &request.name };
+        let place = |name: &str| folder.place(name, request.overwrite).map_err(|why| why.to_string());
+        let mesh = place(name)?;
+        crate::io::mesh_file::check_target(&mesh).map_err(|why| why.to_string())?;
+        let stem = mesh.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        let beside = |ending: &str| request.with_features.then(|| place(&format!("{stem}.{ending}"))).transpose();
+        Ok(Self { features: beside("features.json")?, touches: beside("touches.csv")?, mesh })
+    }
+
+    /// What `touchup refine` would write of the samples so far.
+    fn write(
+        &self,
+        setup: &Setup,
+        snapshot: &Receiver<Snapshot>,
+        patcher: Option<Receiver<Patcher>>,
+    ) -> Result<[usize; 2], String> {
+        let late = |_| "the mesh was not handed out in time: save again".to_owned();
+        let patcher = patcher.map(|patcher| patcher.recv_timeout(COPY_WAIT)).transpose().map_err(late)?;
+        let refined = match patcher {
+            // all of it comes from scan and patch
+            Some(_) => None,
+            None => Some(snapshot.recv_timeout(COPY_WAIT).map_err(late)?.mesh().map_err(|why| why.to_string())?),
+        };
+        let [features, touches] = [&self.features, &self.touches].map(|place| place.as_deref());
+        let places = OutcomePlaces { mesh: &self.mesh, unit: setup.mesh_unit, features, touches };
+        let refined = refined.as_ref().unwrap_or(&setup.scan.0);
+        places.write(&setup.scan.0, refined, patcher).map(|outcome| outcome.counts).map_err(|why| why.to_string())
+    }
+
+    fn answer(&self, mesh_version: u64, [vertices, faces]: [usize; 2]) -> SaveMeshResponse {
+        SaveMeshResponse {
+            success: true,
+            message: format!("wrote {}", self.mesh.display()),
+            path: self.mesh.display().to_string(),
+            mesh_version,
+            vertex_count: vertices as u32,
+            face_count: faces as u32,
+        }
+    }
+}

@@ -1,0 +1,58 @@
+//! Between messages and the rooms' own types.
+
+use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
+
+use crate::ros::messages::{Header, Point, Pose, Time, Transform, Vector3 as Vector3Msg};
+use crate::touch::measured_rotation;
+
+const NS_PER_S: i64 = 1_000_000_000;
+
+/// ns; `None` for what no message may have: before 1970, or nanoseconds that are a second or more.
+pub fn stamp_ns(time: &Time) -> Option<i64> {
+    let nanosec = i64::from(time.nanosec);
+    (time.sec >= 0 && nanosec < NS_PER_S).then(|| i64::from(time.sec) * NS_PER_S + nanosec)
+}
+
+/// The nearest that a message can have.
+pub fn time(stamp_ns: i64) -> Time {
+    let sec = stamp_ns.div_euclid(NS_PER_S).clamp(0, i64::from(i32::MAX));
+    Time { sec: sec as i32, nanosec: stamp_ns.rem_euclid(NS_PER_S) as u32 }
+}
+
+/// Header of what is told in `frame`.
+pub fn header(stamp_ns: i64, frame: &str) -> Header {
+    Header { stamp: time(stamp_ns), frame_id: frame.to_owned() }
+}
+
+/// A pose as it was measured; `None` when its orientation is no rotation. The position may be anything.
+pub fn isometry(pose: &Pose) -> Option<Isometry3<f64>> {
+    let (p, q) = (&pose.position, &pose.orientation);
+    let rotation = measured_rotation(Quaternion::new(q.w, q.x, q.y, q.z))?;
+    Some(Isometry3::from_parts(Translation3::new(p.x, p.y, p.z), rotation))
+}
+
+/// A transform; `None` for one that is none.
+pub fn transform(transform: &Transform) -> Option<Isometry3<f64>> {
+    let (p, q) = (&transform.translation, &transform.rotation);
+    let rotation: UnitQuaternion<f64> = measured_rotation(Quaternion::new(q.w, q.x, q.y, q.z))?;
+    let translation = Translation3::new(p.x, p.y, p.z);
+    translation.vector.iter().all(|x| x.is_finite()).then(|| Isometry3::from_parts(translation, rotation))
+}
+
+/// As a message has it.
+pub fn point(p: &Point3<f64>) -> Point {
+    Point { x: p.x, y: p.y, z: p.z }
+}
+
+/// As a message has it.
+pub fn vector(v: &Vector3<f64>) -> Vector3Msg {
+    Vector3Msg { x: v.x, y: v.y, z: v.z }
+}
+
+/// Of a message.
+pub fn vector_of(v: &Vector3Msg) -> Vector3<f64> {
+    Vector3::new(v.x, v.y, v.z)
+}
+
+/// What has no meaning.
+pub const NO_VECTOR: Vector3Msg = Vector3Msg { x: f64::NAN, y: f64::NAN, z: f64::NAN };

@@ -1,0 +1,171 @@
+//! How the node says how it is: in words, and in numbers once a second.
+
+use std::time::{Duration, Instant};
+
+use tracing::{info, warn};
+
+use super::convert::header;
+use super::haptic::Haptic;
+use super::sitting::Report;
+use super::view::ViewInput;
+use super::{NodeEnd, NodeError};
+use crate::live::Quantiles;
+use crate::ros::messages::{DiagnosticArray, DiagnosticStatus, KeyValue};
+
+/// What a state means to who watches.
+struct State {
+    level: u8,
+    words: String,
+}
+
+impl Haptic {
+    /// Looks whether the streams come; says so when that changed.
+    pub(super) fn watch_streams(&mut self) {
+        let state = self.state();
+        // ages in it grow: what is said once is said until something else is
+        let name = state.words.split(':').next().unwrap_or_default().to_owned();
+        if name != self.last_state {
+            match state.level {
+                DiagnosticStatus::OK => info!("{}", state.words),
+                _ => warn!("{}", state.words),
+            }
+            self.last_state = name;
+        }
+    }
+
+    fn state(&mut self) -> State {
+        let now = Instant::now();
+        let stale = Duration::from_secs_f64(self.setup.shared.parameters().double("stale_ms") / 1e3);
+        let is_stale = self.streams.each_mut().map(|stream| stream.check(now, stale));
+        let said = |level, words: String| State { level, words };
+        if let Some(fault) = &self.fault {
+            return said(DiagnosticStatus::ERROR, format!("stopped: {fault}"));
+        }
+        if self.is_paused {
+            return said(DiagnosticStatus::OK, "paused: samples are passed over".to_owned());
+        }
+        if let Some((_, why)) = self.lost_transform.as_ref().filter(|(at, _)| at.elapsed() < stale) {
+            return said(DiagnosticStatus::WARN, format!("holds, frames are not connected: {why}"));
+        }
+        if self.streams.iter().all(|stream| stream.arrived() == 0) {
+            return said(DiagnosticStatus::STALE, "waits: neither pose nor wrench has come yet".to_owned());
+        }
+        let late: Vec<_> =
+            ["pose", "wrench"].iter().zip(&self.streams).zip(is_stale).filter(|(_, late)| *late).collect();
+        let ages: Vec<_> = late
+            .iter()
+            .map(|((name, stream), _)| match stream.age(now) {
+                Some(age) => format!("the last {name} came {} ms ago", age.as_millis()),
+                None => format!("no {name} has come yet"),
+            })
+            .collect();
+        match ages.is_empty() {
+            false => said(DiagnosticStatus::WARN, format!("holds, a stream is stale: {}", ages.join(", "))),
+            true => said(DiagnosticStatus::OK, "runs: samples are taken".to_owned()),
+        }
+    }
+
+    /// What the session says of itself so far.
+    pub(super) fn report(&self) -> Report {
+        Report {
+            refused: self.refused(),
+            gaps: self.streams.each_ref().map(|stream| stream.gaps),
+            clock_jumps: self.clock_jumps(),
+            push_ns: self.pushes.quantiles(),
+            latency_ns: self.latencies.quantiles(),
+            ..self.sitting.report(&self.setup, &self.tally)
+        }
+    }
+
+    pub(super) fn tell_diagnostics(&mut self) {
+        let State { level, words } = self.state();
+        let report = self.report();
+        let stamp_ns = self.setup.port.now_ns();
+        let status = DiagnosticStatus {
+            level,
+            name: "touchup: session".to_owned(),
+            message: words,
+            hardware_id: self.setup.source.to_owned(),
+            values: self.numbers(&report),
+        };
+        let streams = DiagnosticStatus {
+            level: if level == DiagnosticStatus::OK { DiagnosticStatus::OK } else { level },
+            name: "touchup: streams".to_owned(),
+            message: "how poses and wrenches come, and what was refused".to_owned(),
+            hardware_id: self.setup.source.to_owned(),
+            values: self.stream_numbers(&report),
+        };
+        let message = DiagnosticArray { header: header(stamp_ns, ""), status: vec![status, streams] };
+        self.setup.shared.show(&self.view, ViewInput::Diagnostics(Box::new(message)));
+    }
+
+    fn numbers(&self, report: &Report) -> Vec<KeyValue> {
+        let Quantiles { median, p99, max, .. } = report.push_ns;
+        let latency = report.latency_ns;
+        let us = |ns: u64| format!("{:.1}", ns as f64 * 1e-3);
+        let (unrecorded, fault) = self.sitting.recorder.lost();
+        let shared = &self.setup.shared;
+        let mut values = vec![
+            value("session", report.session.clone()),
+            value("mesh_version", self.version),
+            value("accepted", report.accepted),
+            value("contacts", report.contacts),
+            value("push_p50_us", us(median)),
+            value("push_p99_us", us(p99)),
+            value("push_max_us", us(max)),
+            value("latency_p50_us", us(latency.median)),
+            value("latency_p99_us", us(latency.p99)),
+            value("latency_max_us", us(latency.max)),
+            value("patch_waits", report.waits),
+            value("tiles_waiting", shared.waiting_tiles()),
+            value("versions_behind", self.version.saturating_sub(shared.version_shown())),
+            value("dropped_view_frames", report.dropped_view_frames),
+            value("unrecorded", unrecorded),
+        ];
+        values.extend(fault.map(|fault| value("recording", fault)));
+        values
+    }
+
+    fn stream_numbers(&self, report: &Report) -> Vec<KeyValue> {
+        let now = Instant::now();
+        let mut values = Vec::new();
+        for (name, stream) in ["pose", "wrench"].iter().zip(&self.streams) {
+            values.push(value(&format!("{name}_rate_hz"), format!("{:.1}", stream.rate_hz())));
+            let age = stream.age(now).map_or_else(|| "none came".to_owned(), |age| age.as_millis().to_string());
+            values.push(value(&format!("{name}_age_ms"), age));
+            values.push(value(&format!("{name}_gaps"), stream.gaps));
+        }
+        let [dropped, others] = report.dropped;
+        let [tiles, unsent] = self.setup.port.unsent();
+        values.push(value("dropped", dropped));
+        values.push(value("dropped_others", others));
+        values.push(value("unsent_tiles", tiles));
+        values.push(value("unsent", unsent));
+        values.push(value("paused", report.paused));
+        values.push(value("clock_jumps", report.clock_jumps));
+        values.extend(report.refused.iter().map(|(reason, count)| value(&format!("refused_{reason}"), count)));
+        values.extend(self.endpoints.values().map(|endpoint| {
+            let why = endpoint.mismatch.as_ref().map_or(String::new(), |why| format!(", {why}"));
+            value(&format!("on {}", endpoint.topic), format!("{}{why}", endpoint.count))
+        }));
+        values
+    }
+
+    /// Ends the session and what still ends of those before.
+    pub(super) fn end(mut self) -> Result<NodeEnd, NodeError> {
+        self.finish_samples();
+        self.show_edits();
+        let report = self.report();
+        let folder = self.sitting.folder.path().to_owned();
+        let Self { setup, sitting, ending, .. } = self;
+        for thread in ending {
+            // a thread that ended by a fault has said so
+            let _ = thread.join();
+        }
+        Ok(NodeEnd { folder, report: sitting.end(&setup, report)? })
+    }
+}
+
+fn value(key: &str, value: impl ToString) -> KeyValue {
+    KeyValue { key: key.to_owned(), value: value.to_string() }
+}

@@ -1,0 +1,148 @@
+//! What moves the mesh: the haptic update, with the patch beside it where the scene has one.
+
+use std::sync::Arc;
+use std::sync::mpsc::Receiver;
+
+use super::NodeError;
+use crate::live::{LiveError, LiveRefiner, Pace, ProbedNews};
+use crate::mesh::{Changes, FaceTree, TriMesh, VertexId};
+use crate::patch::{Patcher, Support};
+use crate::refine::{RefineError, Refiner, Update};
+use crate::scene::Scene;
+use crate::touch::{Sample, WrenchFrame};
+
+/// Room for new faces that is made ahead.
+const ROOM: usize = 1 << 18;
+
+/// The scan as it came, and the tree over its faces.
+pub type Scan = Arc<(TriMesh, FaceTree)>;
+
+/// One of the two ways.
+pub enum Engine {
+    /// the haptic update alone
+    Alone(Box<Refiner>),
+    /// with the patch
+    Live(Box<LiveRefiner>),
+}
+
+impl Engine {
+    /// Nothing touched yet.
+    ///
+    /// - `axes`: those of the wrenches.
+    ///
+    /// # Errors
+    /// [`NodeError::NothingMoves`], [`NodeError::Refine`], [`NodeError::Live`].
+    pub fn new(scan: &Scan, scene: &Scene, axes: WrenchFrame) -> Result<Self, NodeError> {
+        let params = scene.refine_params(axes).ok_or(NodeError::NothingMoves)?;
+        let mut refiner = Refiner::new(scan.0.clone(), params)?;
+        refiner.watch();
+        let Some(patcher) = scene.patcher_params(axes) else {
+            refiner.keep_strokes();
+            return Ok(Self::Alone(Box::new(refiner)));
+        };
+        let patcher = Patcher::new(patcher).map_err(RefineError::from)?;
+        let live = LiveRefiner::new(Arc::clone(scan), refiner, patcher, Pace::default(), ROOM)?;
+        Ok(Self::Live(Box::new(live)))
+    }
+
+    /// The haptic update, with the mesh as it stands.
+    pub fn refiner(&self) -> &Refiner {
+        match self {
+            Self::Alone(refiner) => refiner,
+            Self::Live(live) => live.refiner(),
+        }
+    }
+
+    /// Takes the next sample.
+    ///
+    /// # Errors
+    /// As [`LiveRefiner::push`].
+    pub fn push(&mut self, sample: &Sample) -> Result<Update, LiveError> {
+        match self {
+            Self::Alone(refiner) => Ok(refiner.push(sample)?),
+            Self::Live(live) => live.push(sample),
+        }
+    }
+
+    /// Takes the last stroke back, or does it again; returns whether there was one.
+    ///
+    /// # Errors
+    /// [`LiveError::Stopped`].
+    pub fn change_strokes(&mut self, is_undo: bool) -> Result<bool, LiveError> {
+        match self {
+            Self::Alone(refiner) if is_undo => Ok(refiner.undo()),
+            Self::Alone(refiner) => Ok(refiner.redo()),
+            Self::Live(live) if is_undo => live.undo(),
+            Self::Live(live) => live.redo(),
+        }
+    }
+
+    /// What changed in the mesh since this was last asked; whether that was all.
+    pub fn take_changes(&mut self, most: usize, into: &mut Changes) -> bool {
+        match self {
+            Self::Alone(refiner) => refiner.take_changes(most, into),
+            Self::Live(live) => live.take_changes(most, into),
+        }
+    }
+
+    /// Whether the mesh is one skin, and not in the middle of a change.
+    pub fn is_whole(&self) -> bool {
+        match self {
+            Self::Alone(_) => true,
+            Self::Live(live) => live.is_whole(),
+        }
+    }
+
+    /// What a vertex rests on. Where there is no patch, or it does not know yet, a vertex that is not where the scan has it
+    /// rests on a touch, or is guessed from touches.
+    pub fn support(&self, scan: &TriMesh, vertex: VertexId) -> Support {
+        let refiner = self.refiner();
+        let is_moved = || {
+            let was = scan.positions().get(vertex.0 as usize);
+            was.is_none_or(|was| *was != refiner.mesh().position(vertex))
+        };
+        match refiner.support(vertex) {
+            None if is_moved() => Support::Touched,
+            Some(Support::Scan) if is_moved() => Support::Guessed,
+            support => support.unwrap_or(Support::Scan),
+        }
+    }
+
+    /// Touches that were found, or lost, since this was last asked.
+    pub fn take_probed(&mut self) -> Option<ProbedNews> {
+        match self {
+            Self::Alone(_) => None,
+            Self::Live(live) => live.take_probed(),
+        }
+    }
+
+    /// A copy of what the patch knows, when its thread has made it; `None` without a patch, or where nothing was touched.
+    ///
+    /// # Errors
+    /// [`LiveError::Stopped`].
+    pub fn copy_patcher(&self) -> Result<Option<Receiver<Patcher>>, LiveError> {
+        match self {
+            Self::Live(live) if live.refiner().counts().contacts > 0 => live.copy_patcher().map(Some),
+            _ => Ok(None),
+        }
+    }
+
+    /// Renewals for which a sample had to wait.
+    pub fn waits(&self) -> u64 {
+        match self {
+            Self::Alone(_) => 0,
+            Self::Live(live) => live.counts().waits,
+        }
+    }
+
+    /// Ends the thread of the patch.
+    ///
+    /// # Errors
+    /// [`LiveError::Stopped`].
+    pub fn finish(self) -> Result<(Refiner, Option<Patcher>), LiveError> {
+        match self {
+            Self::Alone(refiner) => Ok((*refiner, None)),
+            Self::Live(live) => live.finish().map(|(refiner, patcher)| (refiner, Some(patcher))),
+        }
+    }
+}

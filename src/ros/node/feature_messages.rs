@@ -1,0 +1,249 @@
+//! Features as messages, as labels, and as something to look at.
+
+use nalgebra::{Point3, Rotation3, UnitQuaternion, Vector3};
+
+use super::convert::{NO_VECTOR, header, point, vector};
+use crate::features::{Feature, FittedTo, Kind, Measured};
+use crate::ros::messages::{
+    ColorRGBA, Feature as FeatureMsg, FeatureArray, Marker, MarkerArray, Point, Pose, Quaternion, Vector3 as Vector3Msg,
+};
+
+/// Half of the interval that holds 95 % of a normal distribution, in standard deviations.
+const AT_95_PERCENT: f64 = 1.96;
+/// Height of the labels, m.
+const LETTERS: f64 = 4e-3;
+/// Width of lines, m.
+const LINE: f64 = 0.6e-3;
+
+/// Number of a kind in messages.
+pub fn number_of(kind: Kind) -> u8 {
+    match kind {
+        Kind::Hole => FeatureMsg::KIND_HOLE,
+        Kind::Slot => FeatureMsg::KIND_SLOT,
+        Kind::Pocket => FeatureMsg::KIND_POCKET,
+        Kind::Boss => FeatureMsg::KIND_BOSS,
+        Kind::Edge => FeatureMsg::KIND_EDGE,
+        Kind::Corner => FeatureMsg::KIND_CORNER,
+        Kind::Plane => FeatureMsg::KIND_PLANE,
+    }
+}
+
+/// Names of the kinds by their numbers.
+pub const KIND_NAMES: [&str; 8] = ["unknown", "hole", "slot", "pocket", "boss", "edge", "corner", "plane"];
+
+/// A feature that was found.
+///
+/// - `id`: the number by which it is known.
+/// - `search_radius`: how far around it was looked when somebody flagged it, m.
+pub fn found(feature: &Feature, id: u32, search_radius: Option<f64>) -> FeatureMsg {
+    let number = |measured: &Option<Measured<f64>>| measured.as_ref().map_or(f64::NAN, |m| m.value);
+    let std = |measured: &Option<Measured<f64>>| measured.as_ref().and_then(|m| m.std).unwrap_or(f64::NAN);
+    let yes_no = |known: Option<bool>| match known {
+        None => FeatureMsg::UNKNOWN,
+        Some(false) => FeatureMsg::NO,
+        Some(true) => FeatureMsg::YES,
+    };
+    let sized = feature.diameter.as_ref().or(feature.width.as_ref()).map(|m| m.touches.len());
+    FeatureMsg {
+        id,
+        kind: number_of(feature.kind),
+        status: FeatureMsg::STATUS_FOUND,
+        fitted_to: match feature.fitted_to {
+            FittedTo::Touches => FeatureMsg::FITTED_TO_TOUCHES,
+            FittedTo::Mesh => FeatureMsg::FITTED_TO_MESH,
+        },
+        touched: feature.touched,
+        touch_count: sized.unwrap_or(feature.centre.touches.len()) as u32,
+        search_radius: search_radius.unwrap_or(f64::NAN),
+        center: point(&feature.centre.value),
+        center_std: feature.centre.std.unwrap_or(f64::NAN),
+        axis: feature.axis.as_ref().map_or(NO_VECTOR, |axis| vector(&axis.value)),
+        axis_std: feature.axis.as_ref().and_then(|axis| axis.std).unwrap_or(f64::NAN),
+        direction: feature.direction.as_ref().map_or(NO_VECTOR, vector),
+        diameter: number(&feature.diameter),
+        diameter_std: std(&feature.diameter),
+        length: number(&feature.length),
+        length_std: std(&feature.length),
+        width: number(&feature.width),
+        width_std: std(&feature.width),
+        depth: number(&feature.depth),
+        depth_std: std(&feature.depth),
+        cone_angle: number(&feature.cone_angle),
+        cone_angle_std: std(&feature.cone_angle),
+        through: yes_no(feature.through),
+        convex: yes_no(feature.is_convex),
+        group: feature.group.and_then(|group| i32::try_from(group).ok()).unwrap_or(FeatureMsg::NO_GROUP),
+        points: feature.points.iter().map(point).collect(),
+    }
+}
+
+/// A place that somebody pointed at, where nothing was found yet.
+pub fn flagged(id: u32, kind: u8, centre: &Point3<f64>, search_radius: f64) -> FeatureMsg {
+    let nan = f64::NAN;
+    FeatureMsg {
+        id,
+        kind,
+        status: FeatureMsg::STATUS_FLAGGED,
+        fitted_to: FeatureMsg::FITTED_TO_NOTHING,
+        touched: 0.0,
+        touch_count: 0,
+        search_radius,
+        center: point(centre),
+        center_std: nan,
+        axis: NO_VECTOR,
+        axis_std: nan,
+        direction: NO_VECTOR,
+        diameter: nan,
+        diameter_std: nan,
+        length: nan,
+        length_std: nan,
+        width: nan,
+        width_std: nan,
+        depth: nan,
+        depth_std: nan,
+        cone_angle: nan,
+        cone_angle_std: nan,
+        through: FeatureMsg::UNKNOWN,
+        convex: FeatureMsg::UNKNOWN,
+        group: FeatureMsg::NO_GROUP,
+        points: Vec::new(),
+    }
+}
+
+/// What it is and its size at 95 %, mm: "hole Ø8.02 ± 0.04".
+pub fn label(feature: &FeatureMsg) -> String {
+    let kind = KIND_NAMES.get(usize::from(feature.kind)).unwrap_or(&"unknown");
+    if feature.status == FeatureMsg::STATUS_FLAGGED {
+        return format!("{kind}?");
+    }
+    let size = |value: f64, std: f64| match std.is_nan() {
+        true => format!("{:.2}", value * 1e3),
+        false => format!("{:.2} ± {:.2}", value * 1e3, AT_95_PERCENT * std * 1e3),
+    };
+    if !feature.diameter.is_nan() {
+        return format!("{kind} Ø{}", size(feature.diameter, feature.diameter_std));
+    }
+    let sizes = [(feature.width, feature.width_std), (feature.length, feature.length_std)];
+    let sizes: Vec<_> = sizes.iter().filter(|(value, _)| !value.is_nan()).map(|&(v, std)| size(v, std)).collect();
+    if sizes.is_empty() { (*kind).to_owned() } else { format!("{kind} {}", sizes.join(" × ")) }
+}
+
+/// All features to look at; what was shown before goes.
+pub fn markers(features: &FeatureArray) -> MarkerArray {
+    let frame = &features.header;
+    let mut markers = vec![Marker { header: frame.clone(), action: Marker::DELETEALL, ..Marker::default() }];
+    for feature in &features.features {
+        let base = Marker { header: frame.clone(), id: feature.id as i32, color: colour(feature), ..Marker::default() };
+        markers.extend(body(feature, &base));
+        if has_label(feature) {
+            let mut place = feature.center;
+            let up = if feature.axis.x.is_nan() { Vector3Msg { x: 0.0, y: 0.0, z: 1.0 } } else { feature.axis };
+            (place.x, place.y, place.z) =
+                (place.x + up.x * LETTERS, place.y + up.y * LETTERS, place.z + up.z * LETTERS);
+            markers.push(Marker {
+                ns: "labels".to_owned(),
+                r#type: Marker::TEXT_VIEW_FACING,
+                pose: Pose { position: place, ..Pose::default() },
+                scale: Vector3Msg { z: LETTERS, ..Vector3Msg::default() },
+                color: ColorRGBA { r: 1.0, g: 1.0, b: 1.0, a: 1.0 },
+                text: label(feature),
+                ..base
+            });
+        }
+    }
+    MarkerArray { markers }
+}
+
+/// A part has dozens of edges and planes: those speak for themselves.
+fn has_label(feature: &FeatureMsg) -> bool {
+    !matches!(feature.kind, FeatureMsg::KIND_EDGE | FeatureMsg::KIND_CORNER | FeatureMsg::KIND_PLANE)
+        || feature.status == FeatureMsg::STATUS_FLAGGED
+}
+
+fn colour(feature: &FeatureMsg) -> ColorRGBA {
+    let [r, g, b] = match (feature.status, feature.fitted_to) {
+        (FeatureMsg::STATUS_FLAGGED, _) => [1.0, 0.85, 0.1],
+        (_, FeatureMsg::FITTED_TO_TOUCHES) => [0.1, 0.8, 0.3],
+        _ => [0.2, 0.5, 1.0],
+    };
+    ColorRGBA { r, g, b, a: 0.6 }
+}
+
+fn body(feature: &FeatureMsg, base: &Marker) -> Option<Marker> {
+    let sphere = |diameter: f64| Marker {
+        ns: "features".to_owned(),
+        r#type: Marker::SPHERE,
+        pose: Pose { position: feature.center, ..Pose::default() },
+        scale: Vector3Msg { x: diameter, y: diameter, z: diameter },
+        ..base.clone()
+    };
+    if feature.status == FeatureMsg::STATUS_FLAGGED {
+        return Some(sphere(2.0 * feature.search_radius));
+    }
+    match feature.kind {
+        FeatureMsg::KIND_HOLE | FeatureMsg::KIND_BOSS => Some(cylinder(feature, base)),
+        FeatureMsg::KIND_CORNER => Some(sphere(3.0 * LINE)),
+        FeatureMsg::KIND_EDGE | FeatureMsg::KIND_SLOT | FeatureMsg::KIND_POCKET => Some(Marker {
+            ns: "features".to_owned(),
+            r#type: Marker::LINE_STRIP,
+            scale: Vector3Msg { x: LINE, ..Vector3Msg::default() },
+            points: feature.points.clone(),
+            ..base.clone()
+        })
+        .filter(|line| line.points.len() > 1),
+        _ => None,
+    }
+}
+
+fn cylinder(feature: &FeatureMsg, base: &Marker) -> Marker {
+    let axis = Vector3::new(feature.axis.x, feature.axis.y, feature.axis.z);
+    let axis = if axis.iter().all(|x| x.is_finite()) { axis } else { Vector3::z() };
+    let height = if feature.depth.is_nan() { LINE } else { feature.depth };
+    // a hole goes down from its opening, a boss up from its foot
+    let up = if feature.kind == FeatureMsg::KIND_BOSS { 0.5 } else { -0.5 };
+    let middle = Vector3::new(feature.center.x, feature.center.y, feature.center.z) + axis * (up * height);
+    let turn = Rotation3::rotation_between(&Vector3::z(), &axis)
+        .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
+    let q = UnitQuaternion::from_rotation_matrix(&turn);
+    Marker {
+        ns: "features".to_owned(),
+        r#type: Marker::CYLINDER,
+        pose: Pose {
+            position: Point { x: middle.x, y: middle.y, z: middle.z },
+            orientation: Quaternion { x: q.i, y: q.j, z: q.k, w: q.w },
+        },
+        scale: Vector3Msg { x: feature.diameter, y: feature.diameter, z: height },
+        ..base.clone()
+    }
+}
+
+/// An array of nothing yet.
+pub fn no_features(stamp_ns: i64, frame: &str, session: &str) -> FeatureArray {
+    FeatureArray {
+        header: header(stamp_ns, frame),
+        session: session.to_owned(),
+        mesh_version: 1,
+        features: Vec::new(),
+        unexplained: f64::NAN,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn labels_read_as_on_a_drawing() {
+        let mut hole = flagged(3, FeatureMsg::KIND_HOLE, &Point3::origin(), 5e-3);
+        assert_eq!(label(&hole), "hole?");
+        hole.status = FeatureMsg::STATUS_FOUND;
+        (hole.diameter, hole.diameter_std) = (8.02e-3, 0.02e-3);
+        assert_eq!(label(&hole), "hole Ø8.02 ± 0.04");
+        hole.diameter_std = f64::NAN;
+        assert_eq!(label(&hole), "hole Ø8.02");
+        let mut slot = flagged(4, FeatureMsg::KIND_SLOT, &Point3::origin(), 5e-3);
+        slot.status = FeatureMsg::STATUS_FOUND;
+        (slot.width, slot.length, slot.length_std) = (6e-3, 20e-3, 0.1e-3);
+        assert_eq!(label(&slot), "slot 6.00 × 20.00 ± 0.20");
+    }
+}

@@ -1,0 +1,241 @@
+//! Where frames are, as `/tf` and `/tf_static` tell it, at any moment of the last seconds.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use nalgebra::{Isometry3, UnitQuaternion};
+
+use super::convert::{stamp_ns, transform};
+use crate::ros::messages::TransformStamped;
+
+/// So much of what moves is kept, ns.
+const KEPT_NS: i64 = 10_000_000_000;
+/// A moving frame has so many poses at most: 10 s at 1 kHz.
+const MOST_POSES: usize = 10_000;
+/// Frames are so many at most: a cell has dozens.
+const MOST_FRAMES: usize = 1000;
+/// A longer name is none.
+const LONGEST_NAME: usize = 256;
+
+/// Why two frames are not connected.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum FrameError {
+    /// Nobody has told of this frame.
+    #[error("frame \"{0}\" is not known: is its transform published?")]
+    Unknown(String),
+    /// Both are known, and nothing joins them.
+    #[error("frames \"{0}\" and \"{1}\" are not connected: a transform between their trees is missing")]
+    NotConnected(String, String),
+    /// Its parents lead back to it.
+    #[error("frame \"{0}\" is its own ancestor: two nodes publish transforms that contradict each other")]
+    Cycle(String),
+    /// The moment is before what is kept.
+    #[error("frame \"{0}\" is known from {1} ns on, {2} ns was asked for")]
+    TooEarly(String, i64, i64),
+    /// The moment is after what has come so far; it may still come.
+    #[error("frame \"{0}\" is known up to {1} ns, {2} ns was asked for")]
+    NotYet(String, i64, i64),
+}
+
+/// Where a frame is in its parent.
+#[derive(Clone, Debug)]
+enum Motion {
+    Static(Isometry3<f64>),
+    /// in order of time
+    Moving(VecDeque<(i64, Isometry3<f64>)>),
+}
+
+#[derive(Clone, Debug)]
+struct Link {
+    parent: String,
+    motion: Motion,
+}
+
+/// All frames, and where they were lately.
+#[derive(Clone, Debug, Default)]
+pub struct FrameBuffer {
+    links: BTreeMap<String, Link>,
+}
+
+/// A name as tf has it: without the slash that ROS 1 put in front.
+pub fn plain_name(name: &str) -> &str {
+    name.strip_prefix('/').unwrap_or(name)
+}
+
+impl FrameBuffer {
+    /// Takes a transform; whether it was one that can be.
+    pub fn insert(&mut self, told: &TransformStamped, is_static: bool) -> bool {
+        let (parent, child) = (plain_name(&told.header.frame_id), plain_name(&told.child_frame_id));
+        let is_name = |name: &str| !name.is_empty() && name.len() <= LONGEST_NAME;
+        let is_room = self.links.len() < MOST_FRAMES || self.links.contains_key(child);
+        let (Some(pose), Some(stamp)) = (transform(&told.transform), stamp_ns(&told.header.stamp)) else {
+            return false;
+        };
+        if !is_name(parent) || !is_name(child) || parent == child || !is_room {
+            return false;
+        }
+        let fresh = || Link { parent: parent.to_owned(), motion: Motion::Moving(VecDeque::new()) };
+        let link = self.links.entry(child.to_owned()).or_insert_with(fresh);
+        if link.parent != parent {
+            *link = fresh();
+        }
+        match &mut link.motion {
+            motion if is_static => *motion = Motion::Static(pose),
+            Motion::Static(_) => link.motion = Motion::Moving(VecDeque::from([(stamp, pose)])),
+            Motion::Moving(poses) => keep(poses, stamp, pose),
+        }
+        true
+    }
+
+    /// Forgets all that moves, as after a jump of the clock.
+    pub fn forget_moving(&mut self) {
+        self.links.retain(|_, link| matches!(link.motion, Motion::Static(_)));
+    }
+
+    /// The pose of `of` in `in_frame` at a moment: maps points of `of` to `in_frame`.
+    ///
+    /// # Errors
+    /// [`FrameError`]
+    pub fn pose(&self, in_frame: &str, of: &str, stamp_ns: i64) -> Result<Isometry3<f64>, FrameError> {
+        let (target, source) = (self.ancestors(in_frame)?, self.ancestors(of)?);
+        let Some(up) = source.iter().position(|name| target.contains(name)) else {
+            let unknown = [in_frame, of].into_iter().find(|name| !self.is_known(name));
+            return Err(match unknown {
+                Some(name) => FrameError::Unknown(name.to_owned()),
+                None => FrameError::NotConnected(in_frame.to_owned(), of.to_owned()),
+            });
+        };
+        let down = target.iter().position(|name| *name == source[up]).unwrap_or(0);
+        Ok(self.climbed(&target[..down], stamp_ns)?.inv_mul(&self.climbed(&source[..up], stamp_ns)?))
+    }
+
+    /// A frame that is told of, as a child or as a parent.
+    fn is_known(&self, name: &str) -> bool {
+        self.links.contains_key(name) || self.links.values().any(|link| link.parent == name)
+    }
+
+    /// The frame itself and all above it.
+    fn ancestors<'a>(&'a self, name: &'a str) -> Result<Vec<&'a str>, FrameError> {
+        let mut names = vec![name];
+        let mut at = name;
+        while let Some(link) = self.links.get(at) {
+            at = &link.parent;
+            if names.len() > self.links.len() {
+                return Err(FrameError::Cycle(name.to_owned()));
+            }
+            names.push(at);
+        }
+        Ok(names)
+    }
+
+    /// The pose of the first of these frames in the parent of the last.
+    fn climbed(&self, names: &[&str], stamp_ns: i64) -> Result<Isometry3<f64>, FrameError> {
+        names.iter().try_fold(Isometry3::identity(), |below, name| {
+            Ok(self.links.get(*name).map_or(Ok(Isometry3::identity()), |link| link.motion.at(name, stamp_ns))? * below)
+        })
+    }
+}
+
+fn keep(poses: &mut VecDeque<(i64, Isometry3<f64>)>, stamp: i64, pose: Isometry3<f64>) {
+    let at = poses.partition_point(|(before, _)| *before < stamp);
+    match poses.get_mut(at) {
+        Some(there) if there.0 == stamp => there.1 = pose,
+        _ => poses.insert(at, (stamp, pose)),
+    }
+    let newest = poses.back().map_or(stamp, |last| last.0);
+    while poses.len() > MOST_POSES || poses.front().is_some_and(|first| newest.saturating_sub(first.0) > KEPT_NS) {
+        poses.pop_front();
+    }
+}
+
+impl Motion {
+    /// Straight between two poses, at constant angular velocity the shorter way.
+    fn at(&self, name: &str, stamp_ns: i64) -> Result<Isometry3<f64>, FrameError> {
+        let poses = match self {
+            Self::Static(pose) => return Ok(*pose),
+            Self::Moving(poses) => poses,
+        };
+        let next = poses.partition_point(|(stamp, _)| *stamp < stamp_ns);
+        let (first, last) = (poses.front().map_or(i64::MAX, |p| p.0), poses.back().map_or(i64::MIN, |p| p.0));
+        match (poses.get(next), next.checked_sub(1).and_then(|before| poses.get(before))) {
+            (Some((stamp, pose)), _) if *stamp == stamp_ns => Ok(*pose),
+            (Some((end, after)), Some((start, before))) => {
+                let t = (stamp_ns - start) as f64 / (end - start) as f64;
+                let position = before.translation.vector.lerp(&after.translation.vector, t);
+                let turn: UnitQuaternion<f64> = before.rotation.inverse() * after.rotation;
+                Ok(Isometry3::from_parts(position.into(), before.rotation * turn.powf(t)))
+            }
+            (Some(_), None) => Err(FrameError::TooEarly(name.to_owned(), first, stamp_ns)),
+            (None, _) => Err(FrameError::NotYet(name.to_owned(), last, stamp_ns)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::ros::messages::{Header, Quaternion, Time, Transform, Vector3 as Vector3Msg};
+
+    fn told(parent: &str, child: &str, sec: i32, x: f64, quarter_turns: f64) -> TransformStamped {
+        let half = quarter_turns * std::f64::consts::FRAC_PI_4;
+        TransformStamped {
+            header: Header { stamp: Time { sec, nanosec: 0 }, frame_id: parent.to_owned() },
+            child_frame_id: child.to_owned(),
+            transform: Transform {
+                translation: Vector3Msg { x, y: 0.0, z: 0.0 },
+                rotation: Quaternion { x: 0.0, y: 0.0, z: half.sin(), w: half.cos() },
+            },
+        }
+    }
+
+    /// Worked by hand: the arm goes from 0 to 2 m in two seconds and turns by 90° about z; the tool is 1 m along its x.
+    #[test]
+    fn a_moving_frame_is_between_its_poses() {
+        let mut frames = FrameBuffer::default();
+        assert!(frames.insert(&told("cell", "arm", 10, 0.0, 0.0), false));
+        assert!(frames.insert(&told("/cell", "/arm", 12, 2.0, 1.0), false));
+        assert!(frames.insert(&told("arm", "tool", 0, 1.0, 0.0), true));
+        assert!(frames.insert(&told("cell", "object", 0, 5.0, 0.0), true));
+        let pose = frames.pose("object", "tool", 11_000_000_000).unwrap();
+        let diagonal = std::f64::consts::FRAC_1_SQRT_2;
+        assert!((pose.translation.vector - Vector3::new(1.0 + diagonal - 5.0, diagonal, 0.0)).norm() < 1e-12);
+        let back = frames.pose("tool", "object", 11_000_000_000).unwrap();
+        assert!((back * pose).translation.vector.norm() < 1e-12);
+        assert!(
+            matches!(frames.pose("object", "tool", 13_000_000_000), Err(FrameError::NotYet(name, ..)) if name == "arm")
+        );
+        assert!(
+            matches!(frames.pose("object", "tool", 9_000_000_000), Err(FrameError::TooEarly(name, ..)) if name == "arm")
+        );
+        assert_eq!(frames.pose("cell", "cell", 0).unwrap(), Isometry3::identity());
+    }
+
+    #[test]
+    fn what_does_not_connect_is_told() {
+        let mut frames = FrameBuffer::default();
+        frames.insert(&told("a", "b", 0, 0.0, 0.0), true);
+        frames.insert(&told("c", "d", 0, 0.0, 0.0), true);
+        assert_eq!(frames.pose("a", "x", 0), Err(FrameError::Unknown("x".into())));
+        assert_eq!(frames.pose("b", "d", 0), Err(FrameError::NotConnected("b".into(), "d".into())));
+        frames.insert(&told("b", "a", 0, 0.0, 0.0), true);
+        assert!(matches!(frames.pose("c", "a", 0), Err(FrameError::Cycle(_))));
+        for bad in [told("a", "a", 0, 0.0, 0.0), told("", "a", 0, 0.0, 0.0), told("a", "b", -1, 0.0, 0.0)] {
+            assert!(!frames.insert(&bad, false));
+        }
+        assert!(!frames.insert(&told("a", "b", 0, f64::NAN, 0.0), false));
+    }
+
+    #[test]
+    fn memory_is_bounded() {
+        let mut frames = FrameBuffer::default();
+        for sec in 0..100 {
+            frames.insert(&told("a", "b", sec, f64::from(sec), 0.0), false);
+        }
+        assert!(matches!(frames.pose("a", "b", 88_000_000_000), Err(FrameError::TooEarly(_, 89_000_000_000, _))));
+        for number in 0..5000 {
+            frames.insert(&told("a", &format!("f{number}"), 0, 0.0, 0.0), true);
+        }
+        assert_eq!(frames.links.len(), MOST_FRAMES);
+    }
+}

@@ -1,0 +1,510 @@
+//! The thread of the samples: frames, pairing, haptic update. It alone has the refiner, and does little else.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use nalgebra::Vector3;
+use tracing::warn;
+
+use super::convert::{NO_VECTOR, header, point, vector};
+use super::edits::Edits;
+use super::placing::{Placer, Refusal};
+use super::seeker::SeekerInput;
+use super::sitting::Sitting;
+use super::streams::{Epoch, StreamWatch};
+use super::tip::TipPlace;
+use super::view::ViewInput;
+use super::{NodeEnd, NodeError, Setup};
+use crate::live::{Latencies, LiveError, ProbedNews};
+use crate::refine::{Case, RefineError, Update};
+use crate::ros::clock::steady_ns;
+use crate::ros::messages::{HapticMismatch, PoseStamped, TFMessage, WrenchStamped};
+use crate::ros::port::{Arrival, Endpoint};
+use crate::touch::{Compensator, Message, Sample, SyncCounts, Synchroniser, WrenchFrame};
+
+/// The loop looks at the streams so often when nothing comes.
+const IDLE: Duration = Duration::from_millis(10);
+/// Changes of the mesh go to the view so often.
+const SHOW_EVERY: Duration = Duration::from_millis(5);
+/// The distance at the tip is looked up so often.
+const TIP_EVERY: Duration = Duration::from_millis(25);
+/// … up to here, m.
+const TIP_REACH: f64 = 0.02;
+/// A mesh torn by a change that goes on with the next sample is shown all the same when none has come for so long.
+const TORN_AFTER: Duration = Duration::from_millis(200);
+/// Messages of a stream that wait for a transform at most.
+const MOST_WAITING: usize = 4096;
+
+/// A message and when it came.
+#[derive(Debug)]
+enum Told {
+    Pose(PoseStamped),
+    Wrench(WrenchStamped),
+}
+
+impl Told {
+    fn stream(&self) -> usize {
+        usize::from(matches!(self, Self::Wrench(_)))
+    }
+}
+
+/// What was refused and lost, and how long things took.
+#[derive(Debug, Default)]
+pub struct Tally {
+    /// samples that the refiner took
+    pub accepted: u64,
+    /// messages and samples that were not taken, by reason
+    pub refused: BTreeMap<String, u64>,
+    /// messages that came while the node was paused
+    pub paused: u64,
+}
+
+impl Tally {
+    /// One more of `count`.
+    pub fn refuse(&mut self, reason: &str) {
+        match self.refused.get_mut(reason) {
+            Some(count) => *count += 1,
+            None => drop(self.refused.insert(reason.to_owned(), 1)),
+        }
+    }
+}
+
+/// The thread's own.
+pub struct Haptic {
+    pub(super) setup: Arc<Setup>,
+    pub(super) view: SyncSender<ViewInput>,
+    pub(super) seeker: SyncSender<SeekerInput>,
+    pub(super) spare: Receiver<Box<Edits>>,
+    /// filled, and the view had no room for it
+    unsent: Option<Box<Edits>>,
+    /// to be filled again
+    kept: Option<Box<Edits>>,
+    pub(super) placer: Placer,
+    pub(super) sitting: Sitting,
+    pub(super) sync: Synchroniser,
+    compensator: Compensator,
+    epoch: Epoch,
+    /// poses and wrenches that wait for a transform, with when they came, ns
+    waiting: [VecDeque<(Told, i64)>; 2],
+    /// touches that the thread of the features had no room for
+    probed: ProbedNews,
+    pub(super) streams: [StreamWatch; 2],
+    pub(super) is_paused: bool,
+    pub(super) fault: Option<String>,
+    /// when a message was refused because its frames are not connected, and why
+    pub(super) lost_transform: Option<(Instant, String)>,
+    pub(super) last_state: String,
+    /// who else is on the topics
+    pub(super) endpoints: BTreeMap<String, Endpoint>,
+    /// sessions that are being ended, and files that are being written
+    pub(super) ending: Vec<JoinHandle<()>>,
+    pub(super) tally: Tally,
+    pub(super) pushes: Latencies,
+    /// from the arrival of what completed a sample to the mesh
+    pub(super) latencies: Latencies,
+    /// state of the mesh, as in `MeshPatch`
+    pub(super) version: u64,
+    edits: u64,
+    pub(super) last_ns: Option<i64>,
+    sampled: Instant,
+    shown: Instant,
+    tip_shown: Instant,
+    mismatch_ns: i64,
+    pub(super) mismatch_rate_hz: f64,
+    told: Instant,
+}
+
+impl Haptic {
+    /// Ready to take samples.
+    ///
+    /// # Errors
+    /// [`NodeError`], for settings of the scene.
+    pub fn new(
+        setup: Arc<Setup>,
+        sitting: Sitting,
+        view: SyncSender<ViewInput>,
+        seeker: SyncSender<SeekerInput>,
+        spare: Receiver<Box<Edits>>,
+    ) -> Result<Self, NodeError> {
+        let now = Instant::now();
+        let mismatch_rate_hz = setup.shared.parameters().double("mismatch_rate_hz");
+        let placer = Placer::new(setup.frame_names(), setup.scene.placement());
+        let compensator = setup.compensator(WrenchFrame::default())?;
+        Ok(Self {
+            sync: Synchroniser::in_order(setup.scene.sync_params())?,
+            placer,
+            compensator,
+            setup,
+            view,
+            seeker,
+            spare,
+            unsent: None,
+            kept: None,
+            sitting,
+            epoch: Epoch::default(),
+            waiting: Default::default(),
+            probed: ProbedNews::default(),
+            streams: [StreamWatch::new(now), StreamWatch::new(now)],
+            is_paused: false,
+            fault: None,
+            lost_transform: None,
+            last_state: String::new(),
+            endpoints: BTreeMap::new(),
+            ending: Vec::new(),
+            tally: Tally::default(),
+            pushes: Latencies::new(),
+            latencies: Latencies::new(),
+            version: 1,
+            edits: 0,
+            last_ns: None,
+            sampled: now,
+            shown: now,
+            tip_shown: now,
+            mismatch_ns: i64::MIN,
+            mismatch_rate_hz,
+            told: now,
+        })
+    }
+
+    /// Runs until it is asked to end, or nobody can ask any more; ends the session.
+    ///
+    /// # Errors
+    /// [`NodeError`] when the result could not be written.
+    pub fn run(mut self, inbox: &Receiver<Arrival>) -> Result<NodeEnd, NodeError> {
+        loop {
+            let flow = match inbox.recv_timeout(IDLE) {
+                Ok(arrival) => self.take(arrival),
+                Err(RecvTimeoutError::Timeout) => ControlFlow::Continue(()),
+                Err(RecvTimeoutError::Disconnected) => ControlFlow::Break(()),
+            };
+            if flow.is_break() {
+                break;
+            }
+            self.tick();
+        }
+        self.end()
+    }
+
+    fn take(&mut self, arrival: Arrival) -> ControlFlow<()> {
+        match arrival {
+            Arrival::Wrench(wrench, at_ns) => self.message(Told::Wrench(wrench), at_ns),
+            Arrival::Pose(pose, at_ns) => self.message(Told::Pose(pose), at_ns),
+            Arrival::Tf(transforms) => self.transforms(&transforms, false),
+            Arrival::TfStatic(transforms) => self.transforms(&transforms, true),
+            Arrival::ClickedPoint(clicked) => self.flag_clicked(&clicked),
+            // stamps tell the time of samples; the port has this one
+            Arrival::Clock(_) => {}
+            Arrival::Unreadable(topic, why) => {
+                warn!(topic, why, "a message could not be read");
+                self.tally.refuse("unreadable");
+            }
+            Arrival::Call(call) => self.call(call),
+            Arrival::SetParameter(name, value, reply) => reply.send(self.set_parameter(&name, &value)),
+            Arrival::Matched(endpoint) => self.note_endpoint(endpoint),
+            Arrival::Shutdown => return ControlFlow::Break(()),
+        }
+        ControlFlow::Continue(())
+    }
+
+    fn transforms(&mut self, told: &TFMessage, is_static: bool) {
+        for transform in &told.transforms {
+            if !self.placer.frames.insert(transform, is_static) {
+                self.tally.refuse("bad_transform");
+            }
+        }
+        self.retry_waiting();
+    }
+
+    fn message(&mut self, told: Told, at_ns: i64) {
+        let stream = told.stream();
+        self.streams[stream].arrive(Instant::now());
+        if self.is_paused || self.fault.is_some() {
+            self.tally.paused += 1;
+            return;
+        }
+        if self.waiting[stream].is_empty() {
+            if let Some(told) = self.place(told, at_ns) {
+                self.waiting[stream].push_back((told, at_ns));
+            }
+            return;
+        }
+        // behind those that wait already, so that the order stays
+        if self.waiting[stream].len() >= MOST_WAITING {
+            self.tally.refuse("transform");
+            return;
+        }
+        self.waiting[stream].push_back((told, at_ns));
+        self.retry_waiting();
+    }
+
+    /// Tries again what waits for a transform; gives up what has waited for too long.
+    fn retry_waiting(&mut self) {
+        let longest_ns = (self.setup.shared.parameters().double("stale_ms") * 1e6) as i64;
+        for stream in 0..2 {
+            while let Some((told, at_ns)) = self.waiting[stream].pop_front() {
+                let Some(told) = self.place(told, at_ns) else { continue };
+                if steady_ns().saturating_sub(at_ns) <= longest_ns {
+                    self.waiting[stream].push_front((told, at_ns));
+                    break;
+                }
+                self.tally.refuse("transform");
+                self.lost_transform =
+                    Some((Instant::now(), "a moving frame is not told of up to the stamps of the messages".to_owned()));
+            }
+        }
+    }
+
+    /// Brings a message into its frame and on; gives it back where a transform has to come first.
+    fn place(&mut self, told: Told, at_ns: i64) -> Option<Told> {
+        let placed = match &told {
+            Told::Pose(pose) => self.placer.pose(pose),
+            Told::Wrench(wrench) => self.placer.wrench(wrench),
+        };
+        match placed {
+            Ok(message) => self.pair(message, told.stream(), at_ns),
+            Err(refusal) if refusal.may_pass() => return Some(told),
+            Err(refusal) => self.refuse(&refusal),
+        }
+        None
+    }
+
+    fn refuse(&mut self, refusal: &Refusal) {
+        self.tally.refuse(refusal.name());
+        if let Refusal::Frame(error) = refusal {
+            self.lost_transform = Some((Instant::now(), error.to_string()));
+        }
+    }
+
+    /// A message in its frame goes to the recording and to the synchroniser, and what that lets out to the refiner.
+    fn pair(&mut self, message: Message, stream: usize, at_ns: i64) {
+        if self.placer.axes() == Some(WrenchFrame::Object) && self.sitting.axes == WrenchFrame::Sensor {
+            self.turn_to_object_axes();
+        }
+        let message = shifted(message, self.epoch.shift_ns);
+        let is_taken = message.stamp_ns() >= 0 && self.sync.push(self.placer.placed(message));
+        if self.epoch.note(stream, message.stamp_ns(), is_taken) {
+            warn!("the clock of both streams was set back: they are taken up where they are now");
+            self.placer.frames.forget_moving();
+        }
+        if is_taken {
+            let frame = match (stream, self.sitting.axes) {
+                (1, WrenchFrame::Sensor) => self.setup.source,
+                _ => self.placer.recorded_frame(),
+            };
+            self.sitting.recorder.write(message, frame);
+        }
+        while let Some(sample) = self.sync.next_sample() {
+            self.sample(&sample);
+            let ns = u64::try_from(steady_ns().saturating_sub(at_ns)).unwrap_or(0);
+            self.latencies.record(Duration::from_nanos(ns));
+        }
+    }
+
+    /// The first wrench says that its axes are those of the object: nothing was pushed yet, so all is begun anew.
+    fn turn_to_object_axes(&mut self) {
+        let made = self.sitting.turn_axes(&self.setup, WrenchFrame::Object);
+        match made.and_then(|()| self.setup.compensator(WrenchFrame::Object)) {
+            Ok(compensator) => self.compensator = compensator,
+            Err(error) => self.fault = Some(error.to_string()),
+        }
+    }
+
+    pub(super) fn sample(&mut self, sample: &Sample) {
+        let pushing = Instant::now();
+        let pushed = self.sitting.engine.push(sample);
+        self.pushes.record(pushing.elapsed());
+        self.sampled = pushing;
+        match pushed {
+            Ok(update) => {
+                self.tally.accepted += 1;
+                self.last_ns = Some(sample.stamp_ns);
+                self.show_mismatch(sample, &update);
+                let edits = self.sitting.engine.refiner().mesh().edits();
+                self.version += u64::from(std::mem::replace(&mut self.edits, edits) != edits);
+                if let Some(news) = self.sitting.engine.take_probed() {
+                    self.probed.extend(news);
+                    self.send_probed();
+                }
+            }
+            Err(LiveError::Refine(error)) => self.tally.refuse(reason_of(&error)),
+            Err(error) => {
+                warn!(%error, "no samples are taken any more");
+                self.fault = Some(error.to_string());
+            }
+        }
+    }
+
+    fn send_probed(&mut self) {
+        if self.probed.is_empty() {
+            return;
+        }
+        if let Err(
+            TrySendError::Full(SeekerInput::Probed(news)) | TrySendError::Disconnected(SeekerInput::Probed(news)),
+        ) = self.seeker.try_send(SeekerInput::Probed(std::mem::take(&mut self.probed)))
+        {
+            self.probed = news;
+        }
+    }
+
+    fn show_mismatch(&mut self, sample: &Sample, update: &Update) {
+        let rate_hz = self.mismatch_rate_hz;
+        let is_due = rate_hz <= 0.0 || sample.stamp_ns.saturating_sub(self.mismatch_ns) as f64 * 1e-9 >= 1.0 / rate_hz;
+        if !is_due {
+            return;
+        }
+        self.mismatch_ns = sample.stamp_ns;
+        let tip = self.compensator.compensate(sample);
+        let centre = tip.pose_ot.translation.vector.into();
+        let base = HapticMismatch {
+            header: header(sample.stamp_ns, &self.setup.shared.frame),
+            contact_case: number_of(update.case),
+            face: HapticMismatch::NO_FACE,
+            mesh_version: self.version,
+            tip: point(&centre),
+            actual_force: vector(&tip.force_o),
+            expected_force: NO_VECTOR,
+            linear: NO_VECTOR,
+            rotational: NO_VECTOR,
+            signed_distance: f64::NAN,
+        };
+        let message = match &update.mismatch {
+            None => base,
+            Some(mismatch) => HapticMismatch {
+                face: mismatch.face.0,
+                actual_force: vector(&(mismatch.expected_force_o + mismatch.linear)),
+                expected_force: vector(&mismatch.expected_force_o),
+                linear: vector(&mismatch.linear),
+                rotational: vector(&mismatch.rotational),
+                signed_distance: mismatch.distance,
+                ..base
+            },
+        };
+        self.setup.shared.show(&self.view, ViewInput::Mismatch(message));
+        if self.tip_shown.elapsed() >= TIP_EVERY {
+            self.tip_shown = Instant::now();
+            self.show_tip(sample, centre);
+        }
+    }
+
+    fn show_tip(&self, sample: &Sample, centre: nalgebra::Point3<f64>) {
+        let refiner = self.sitting.engine.refiner();
+        let radius = self.setup.scene.tip_params().radius;
+        let closest = refiner.closest_face(&centre, TIP_REACH).map(|hit| {
+            let off: Vector3<f64> = centre - hit.point;
+            let side = if off.dot(&refiner.mesh().normal(hit.face)) < 0.0 { -1.0 } else { 1.0 };
+            (hit.point, side * off.norm() - radius)
+        });
+        let tip = TipPlace { stamp_ns: sample.stamp_ns, centre, radius, closest };
+        self.setup.shared.show(&self.view, ViewInput::Tip(tip));
+    }
+
+    /// What is due now and then.
+    fn tick(&mut self) {
+        if self.shown.elapsed() >= SHOW_EVERY {
+            self.shown = Instant::now();
+            self.show_edits();
+            self.send_probed();
+            self.retry_waiting();
+            self.watch_streams();
+        }
+        if self.told.elapsed() >= Duration::from_secs(1) {
+            self.told = Instant::now();
+            self.tell_diagnostics();
+        }
+    }
+
+    /// Sends what changed in the mesh, as far as the view has taken up what was sent before.
+    pub(super) fn show_edits(&mut self) {
+        let is_idle = self.sampled.elapsed() >= TORN_AFTER;
+        while let Some(edits) = self.unsent.take().or_else(|| self.filled(is_idle)) {
+            if let Err(TrySendError::Full(ViewInput::Edits(back))) = self.view.try_send(ViewInput::Edits(edits)) {
+                self.unsent = Some(back);
+                return;
+            }
+        }
+    }
+
+    /// The next changes, when one of those that go round is here and there is anything to tell.
+    fn filled(&mut self, is_idle: bool) -> Option<Box<Edits>> {
+        let mesh = self.sitting.engine.refiner().mesh();
+        let is_told = self.sitting.told_version == self.version && self.sitting.told_edits == mesh.edits();
+        if is_told {
+            return None;
+        }
+        let mut edits = self.kept.take().or_else(|| self.spare.try_recv().ok())?;
+        let told_edits = mesh.edits();
+        let stamp_ns = self.last_ns.unwrap_or(0);
+        edits.fill(&mut self.sitting.engine, &self.setup.scan, self.version, stamp_ns, is_idle);
+        if edits.is_empty() && !edits.is_complete {
+            self.kept = Some(edits);
+            return None;
+        }
+        if edits.is_complete {
+            (self.sitting.told_version, self.sitting.told_edits) = (self.version, told_edits);
+        }
+        Some(edits)
+    }
+
+    /// What a session counts from its beginning.
+    pub(super) fn begin_counting(&mut self) -> Result<(), NodeError> {
+        self.sync = Synchroniser::in_order(self.setup.scene.sync_params())?;
+        self.compensator = self.setup.compensator(WrenchFrame::default())?;
+        self.placer.forget_axes();
+        (self.epoch, self.waiting, self.probed) = (Epoch::default(), Default::default(), ProbedNews::default());
+        (self.tally, self.pushes, self.latencies) = (Tally::default(), Latencies::new(), Latencies::new());
+        (self.version, self.edits, self.last_ns, self.mismatch_ns) = (1, 0, None, i64::MIN);
+        // a change of the session before means nothing in this one
+        if let Some(unsent) = self.unsent.take() {
+            self.kept = Some(unsent);
+        }
+        Ok(())
+    }
+
+    /// Times that the clock was set back.
+    pub(super) fn clock_jumps(&self) -> u64 {
+        self.epoch.jumps + self.sync.counts().jump + self.sync.pose_counts().jump
+    }
+
+    /// Everything that was not taken, by reason; those of poses begin with `pose_`.
+    pub(super) fn refused(&self) -> BTreeMap<String, u64> {
+        let mut refused = self.tally.refused.clone();
+        let mut add = |counts: &SyncCounts, prefix: &str| {
+            for (reason, count) in counts.reasons().into_iter().filter(|(_, count)| *count > 0) {
+                *refused.entry(format!("{prefix}{reason}")).or_default() += count;
+            }
+        };
+        add(self.sync.counts(), "");
+        add(self.sync.pose_counts(), "pose_");
+        refused
+    }
+}
+
+fn shifted(mut message: Message, shift_ns: i64) -> Message {
+    match &mut message {
+        Message::Pose(pose) => pose.stamp_ns = pose.stamp_ns.saturating_add(shift_ns),
+        Message::Wrench(wrench) => wrench.stamp_ns = wrench.stamp_ns.saturating_add(shift_ns),
+    }
+    message
+}
+
+/// The synchroniser lets only checked samples out, in order of time: what is left is a step whose result is no number.
+fn reason_of(error: &RefineError) -> &'static str {
+    match error {
+        RefineError::Sample(_) => "sample",
+        RefineError::Setting(_) | RefineError::Dynamics(_) => "dynamics",
+        RefineError::Mesh(_) | RefineError::NoSuchFace { .. } => "mesh",
+    }
+}
+
+fn number_of(case: Case) -> u8 {
+    match case {
+        Case::Free => HapticMismatch::FREE,
+        Case::MeshOnly => HapticMismatch::MESH_ONLY,
+        Case::SurfaceOnly => HapticMismatch::SURFACE_ONLY,
+        Case::Both => HapticMismatch::BOTH,
+    }
+}

@@ -1,0 +1,290 @@
+//! The thread that knows the features: found on the mesh, measured by touches, or pointed at.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::time::{Duration, Instant};
+
+use nalgebra::Point3;
+
+use super::convert::header;
+use super::feature_messages::{self, KIND_NAMES, flagged, found};
+use super::replica::Snapshot;
+use super::shared::Shared;
+use super::view::ViewInput;
+use crate::features::{Feature, Tracker};
+use crate::live::ProbedNews;
+use crate::mesh::{FaceTree, MeshError};
+use crate::ros::messages::{
+    DetectFeaturesRequest, DetectFeaturesResponse, Feature as FeatureMsg, FeatureArray, FlagFeatureResponse,
+    UnflagFeatureResponse,
+};
+use crate::ros::port::Reply;
+use crate::touch::ProbedPoint;
+
+/// The mesh is looked at again when it has not changed for so long …
+const QUIET: Duration = Duration::from_secs(1);
+/// … or, while it is touched all the time, when so many times the last look have passed.
+const LOOKS_APART: u32 = 10;
+/// Flags are so many at most.
+const MOST_FLAGS: usize = 1000;
+/// How long the view may take to hand out the mesh.
+const SNAPSHOT_WAIT: Duration = Duration::from_secs(10);
+
+/// What the thread is told.
+pub enum SeekerInput {
+    /// touches came or went
+    Probed(ProbedNews),
+    /// a new session
+    Session(String),
+    /// somebody points at a place, m, in O
+    Flag(Flag, Option<Reply<FlagFeatureResponse>>),
+    /// takes that back
+    Unflag(u32, Reply<UnflagFeatureResponse>),
+    /// looks at the mesh now
+    Detect(DetectFeaturesRequest, Reply<DetectFeaturesResponse>),
+}
+
+/// A place that somebody pointed at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Flag {
+    /// as in messages; 0: a region to be explored
+    pub kind: u8,
+    /// m, in O
+    pub point: Point3<f64>,
+    /// how far around it, m
+    pub radius: f64,
+}
+
+/// The thread's own.
+pub struct Seeker {
+    shared: Arc<Shared>,
+    view: SyncSender<ViewInput>,
+    session: String,
+    tracker: Tracker,
+    touches: Vec<ProbedPoint>,
+    /// by number; those at which nothing was found yet
+    flags: BTreeMap<u32, Flag>,
+    /// how far around a feature that was found somebody wants it looked for, m, by its number
+    radii: BTreeMap<u32, f64>,
+    /// number under which a feature is known, where that is the number of its flag
+    names: BTreeMap<u32, u32>,
+    /// version of the mesh and its newest stamp at the last look
+    looked: Option<(u64, i64)>,
+    look_took: Duration,
+    looked_at: Instant,
+    changed_at: Instant,
+    seen_version: u64,
+    has_news: bool,
+    published_at: Option<Instant>,
+}
+
+impl Seeker {
+    /// Knows nothing yet.
+    pub fn new(shared: Arc<Shared>, view: SyncSender<ViewInput>, session: String) -> Self {
+        let now = Instant::now();
+        Self {
+            shared,
+            view,
+            session,
+            tracker: Tracker::new(),
+            touches: Vec::new(),
+            flags: BTreeMap::new(),
+            radii: BTreeMap::new(),
+            names: BTreeMap::new(),
+            looked: None,
+            look_took: Duration::ZERO,
+            looked_at: now,
+            changed_at: now,
+            seen_version: 0,
+            has_news: true,
+            published_at: None,
+        }
+    }
+
+    /// Runs until nobody tells anything any more.
+    pub fn run(mut self, inputs: &Receiver<SeekerInput>) {
+        loop {
+            let period = Duration::from_secs_f64(1.0 / self.shared.parameters().double("features_rate_hz"));
+            match inputs.recv_timeout(period) {
+                Ok(input) => {
+                    self.take(input);
+                    // what came at the same time is in the next look too
+                    inputs.try_iter().take(1000).for_each(|input| self.take(input));
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return,
+            }
+            if self.is_due() {
+                // a mesh that cannot be had now is asked for again
+                let _ = self.look();
+            }
+            if self.has_news && self.published_at.is_none_or(|at| at.elapsed() >= period) {
+                (self.has_news, self.published_at) = (false, Some(Instant::now()));
+                self.publish();
+            }
+        }
+    }
+
+    fn take(&mut self, input: SeekerInput) {
+        match input {
+            SeekerInput::Probed(news) => {
+                news.apply_to(&mut self.touches);
+                self.has_news |= !self.tracker.update(&self.touches).is_empty();
+            }
+            SeekerInput::Session(session) => {
+                *self = Self::new(Arc::clone(&self.shared), self.view.clone(), session);
+            }
+            SeekerInput::Flag(flag, reply) => {
+                let answer = self.flag(flag);
+                if let Some(reply) = reply {
+                    reply.send(answer);
+                }
+            }
+            SeekerInput::Unflag(id, reply) => {
+                let (success, message) = self.unflag(id);
+                reply.send(UnflagFeatureResponse { success, message });
+            }
+            SeekerInput::Detect(request, reply) => {
+                let looked = self.look();
+                reply.send(self.answer(&request, looked));
+            }
+        }
+    }
+
+    /// Whether the mesh is another one than at the last look, and now is the time.
+    fn is_due(&mut self) -> bool {
+        let version = self.shared.version_shown();
+        if std::mem::replace(&mut self.seen_version, version) != version {
+            self.changed_at = Instant::now();
+        }
+        match self.looked {
+            None => true,
+            Some((looked, _)) if looked == version => false,
+            Some(_) => {
+                let since_look = self.looked_at.elapsed();
+                let is_quiet = self.changed_at.elapsed() >= QUIET;
+                (is_quiet && since_look >= QUIET) || since_look >= QUIET.max(self.look_took) * LOOKS_APART
+            }
+        }
+    }
+
+    fn look(&mut self) -> Result<(), String> {
+        let started = Instant::now();
+        let snapshot = self.snapshot().ok_or("the mesh was not handed out: is it changing all the time?")?;
+        let mesh = snapshot.mesh().map_err(|error: MeshError| error.to_string())?;
+        self.tracker.renew(&mesh, &FaceTree::new(&mesh), &self.touches);
+        self.looked = Some((snapshot.version, snapshot.stamp_ns));
+        self.name_found_flags();
+        (self.look_took, self.looked_at, self.has_news) = (started.elapsed(), Instant::now(), true);
+        Ok(())
+    }
+
+    fn snapshot(&self) -> Option<Snapshot> {
+        let (reply, snapshot) = sync_channel(1);
+        self.view.send(ViewInput::Snapshot(reply)).ok()?;
+        snapshot.recv_timeout(SNAPSHOT_WAIT).ok().filter(|snapshot| snapshot.session == self.session)
+    }
+
+    /// The number under which a feature is known.
+    fn name_of(&self, feature: &Feature) -> u32 {
+        self.names.get(&feature.id).copied().unwrap_or(feature.id)
+    }
+
+    fn fits(flag: &Flag, feature: &Feature) -> bool {
+        let is_kind = flag.kind == FeatureMsg::KIND_UNKNOWN || flag.kind == feature_messages::number_of(feature.kind);
+        is_kind && (feature.centre.value - flag.point).norm() <= flag.radius
+    }
+
+    /// A feature that appears where somebody pointed goes by the number of that flag.
+    fn name_found_flags(&mut self) {
+        for (id, flag) in std::mem::take(&mut self.flags) {
+            let far = |feature: &&Feature| (feature.centre.value - flag.point).norm();
+            let is_new = |feature: &&Feature| !self.names.contains_key(&feature.id) && Self::fits(&flag, feature);
+            // a region to be explored stays one: a plane in it is no answer
+            let wanted = self.tracker.features().iter().filter(|_| flag.kind != FeatureMsg::KIND_UNKNOWN);
+            match wanted.filter(is_new).min_by(|a, b| far(a).total_cmp(&far(b))).map(|feature| feature.id) {
+                Some(found) => {
+                    self.names.insert(found, id);
+                    self.radii.insert(id, flag.radius);
+                }
+                None => drop(self.flags.insert(id, flag)),
+            }
+        }
+    }
+
+    fn flag(&mut self, flag: Flag) -> FlagFeatureResponse {
+        let Some(kind) = KIND_NAMES.get(usize::from(flag.kind)) else {
+            let message = format!("there is no kind {}: 0 to {} are", flag.kind, KIND_NAMES.len() - 1);
+            return FlagFeatureResponse { success: false, message, id: 0 };
+        };
+        if self.flags.len() >= MOST_FLAGS {
+            let message = format!("{MOST_FLAGS} places are flagged already: take some back");
+            return FlagFeatureResponse { success: false, message, id: 0 };
+        }
+        let far = |feature: &&Feature| (feature.centre.value - flag.point).norm();
+        let wanted = self.tracker.features().iter().filter(|_| flag.kind != FeatureMsg::KIND_UNKNOWN);
+        let known = wanted.filter(|feature| Self::fits(&flag, feature)).min_by(|a, b| far(a).total_cmp(&far(b)));
+        self.has_news = true;
+        if let Some(id) = known.map(|feature| self.name_of(feature)) {
+            self.radii.insert(id, flag.radius);
+            return FlagFeatureResponse { success: true, message: format!("flagged {kind} {id}, known before"), id };
+        }
+        let same = |other: &Flag| other.kind == flag.kind && (other.point - flag.point).norm() <= flag.radius;
+        let again = self.flags.iter().find(|(_, other)| same(other)).map(|(id, _)| *id);
+        let id = again.unwrap_or_else(|| self.tracker.fresh_id());
+        self.flags.insert(id, flag);
+        FlagFeatureResponse { success: true, message: format!("flagged a place for a {kind}: number {id}"), id }
+    }
+
+    fn unflag(&mut self, id: u32) -> (bool, String) {
+        let (was_place, was_found) = (self.flags.remove(&id).is_some(), self.radii.remove(&id).is_some());
+        self.has_news |= was_place || was_found;
+        match (was_place, was_found) {
+            (true, _) => (true, format!("took flag {id} back")),
+            (_, true) => (true, format!("took the flag of {id} back; the feature stays")),
+            _ => (false, format!("nothing with the number {id} is flagged")),
+        }
+    }
+
+    fn answer(&self, request: &DetectFeaturesRequest, looked: Result<(), String>) -> DetectFeaturesResponse {
+        let mut features = self.features();
+        if let Err(why) = looked {
+            features.features.clear();
+            return DetectFeaturesResponse { success: false, message: why, features };
+        }
+        features.features.retain(|feature| request.kinds.is_empty() || request.kinds.contains(&feature.kind));
+        let told = KIND_NAMES.iter().zip(0u8..).filter_map(|(name, kind)| {
+            let is_such = |f: &&FeatureMsg| f.kind == kind && f.status != FeatureMsg::STATUS_FLAGGED;
+            let count = features.features.iter().filter(is_such).count();
+            (count > 0).then(|| format!("{count} {name}{}", if count == 1 { "" } else { "s" }))
+        });
+        let told: Vec<_> = told.collect();
+        let message = if told.is_empty() { "nothing found".to_owned() } else { told.join(", ") };
+        DetectFeaturesResponse { success: true, message, features }
+    }
+
+    fn features(&self) -> FeatureArray {
+        let (version, stamp_ns) = self.looked.unwrap_or((1, 0));
+        let stamp_ns = self.touches.last().map_or(stamp_ns, |last| last.stamp_ns.max(stamp_ns));
+        let known = self.tracker.features().iter().map(|feature| {
+            let id = self.name_of(feature);
+            found(feature, id, self.radii.get(&id).copied())
+        });
+        let places = self.flags.iter().map(|(&id, flag)| flagged(id, flag.kind, &flag.point, flag.radius));
+        let mut features: Vec<_> = known.chain(places).collect();
+        features.sort_by_key(|feature| feature.id);
+        FeatureArray {
+            header: header(stamp_ns, &self.shared.frame),
+            session: self.session.clone(),
+            mesh_version: version,
+            features,
+            unexplained: self.tracker.unexplained().unwrap_or(f64::NAN),
+        }
+    }
+
+    fn publish(&self) {
+        // the view holds nothing back for long, and shows them even when it is late
+        let _ = self.view.send(ViewInput::Features(Arc::new(self.features())));
+    }
+}

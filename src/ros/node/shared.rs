@@ -1,0 +1,82 @@
+//! What the threads of the node know of each other.
+
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::mpsc::{SyncSender, TrySendError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use super::view::ViewInput;
+use crate::ros::parameters::Parameters;
+
+/// Read by all threads.
+#[derive(Debug)]
+pub struct Shared {
+    /// frame of all that is published
+    pub frame: String,
+    /// standard deviation of the scan, m, when the scene says it
+    pub scan_sigma: Option<f64>,
+    parameters: Mutex<Arc<Parameters>>,
+    shown_version: AtomicU64,
+    tiles_waiting: AtomicUsize,
+    dropped_frames: AtomicU64,
+}
+
+impl Shared {
+    /// Nothing shown yet.
+    pub fn new(parameters: Parameters, scan_sigma: Option<f64>) -> Self {
+        Self {
+            frame: parameters.string("object_frame").to_owned(),
+            scan_sigma,
+            parameters: Mutex::new(Arc::new(parameters)),
+            shown_version: AtomicU64::new(1),
+            tiles_waiting: AtomicUsize::new(0),
+            dropped_frames: AtomicU64::new(0),
+        }
+    }
+
+    /// As they are now.
+    pub fn parameters(&self) -> Arc<Parameters> {
+        Arc::clone(&self.lock())
+    }
+
+    /// Sets them.
+    pub fn set_parameters(&self, parameters: Parameters) {
+        *self.lock() = Arc::new(parameters);
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Arc<Parameters>> {
+        // what is in it is whole whoever held it
+        self.parameters.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The view has got this far.
+    pub fn shown_version(&self, version: u64) {
+        self.shown_version.store(version, Ordering::Relaxed);
+    }
+
+    /// How far the view is.
+    pub fn version_shown(&self) -> u64 {
+        self.shown_version.load(Ordering::Relaxed)
+    }
+
+    /// So many tiles are still to be sent.
+    pub fn tiles_waiting(&self, count: usize) {
+        self.tiles_waiting.store(count, Ordering::Relaxed);
+    }
+
+    /// Tiles that are still to be sent.
+    pub fn waiting_tiles(&self) -> usize {
+        self.tiles_waiting.load(Ordering::Relaxed)
+    }
+
+    /// Tells the view something that it can do without: where it has no time, that is dropped and counted.
+    pub fn show(&self, view: &SyncSender<ViewInput>, input: ViewInput) {
+        if let Err(TrySendError::Full(_)) = view.try_send(input) {
+            self.dropped_frames.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// Frames of the view that were dropped.
+    pub fn dropped_frames(&self) -> u64 {
+        self.dropped_frames.load(Ordering::Relaxed)
+    }
+}

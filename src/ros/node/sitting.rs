@@ -1,0 +1,192 @@
+//! One session of the node: its folder, its recording, and the mesh that is refined in it.
+
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use serde::Serialize;
+
+use super::engine::Engine;
+use super::haptic::Tally;
+use super::{NodeError, Setup};
+use crate::io::session_folder::SessionFolder;
+use crate::live::Quantiles;
+use crate::mesh::TriMesh;
+use crate::patch::Patcher;
+use crate::session::{Outcome, OutcomePlaces, SessionRecord, SessionRecorder};
+use crate::touch::WrenchFrame;
+
+/// What belongs to a session and goes with it.
+pub struct Sitting {
+    /// where all of it is kept
+    pub folder: SessionFolder,
+    /// takes down what is accepted
+    pub recorder: SessionRecorder,
+    /// moves the mesh
+    pub engine: Engine,
+    /// axes of the wrenches that the engine expects
+    pub axes: WrenchFrame,
+    /// state of the mesh that the view was told of completely
+    pub told_version: u64,
+    /// … and edits at that time
+    pub told_edits: u64,
+}
+
+/// What a session says of itself when it is over.
+#[derive(Debug, Serialize)]
+pub struct Report {
+    /// name of the session
+    pub session: String,
+    /// samples that the refiner took
+    pub accepted: u64,
+    /// messages and samples that were not taken, by reason; `pose_…` are poses
+    pub refused: std::collections::BTreeMap<String, u64>,
+    /// arrivals that the node had no time for: wrenches and poses, others
+    pub dropped: [u64; 2],
+    /// messages that came while it was paused
+    pub paused: u64,
+    /// messages that are not in the recording
+    pub unrecorded: u64,
+    /// frames of the view that were dropped
+    pub dropped_view_frames: u64,
+    /// times that a stream was stale: poses, wrenches
+    pub gaps: [u64; 2],
+    /// times that a clock jumped
+    pub clock_jumps: u64,
+    /// times that the tip came into contact
+    pub contacts: u64,
+    /// updates made smaller because a face would have folded
+    pub cut_back: u64,
+    /// of one sample through the haptic update, ns
+    pub push_ns: Quantiles,
+    /// from the arrival of what completed a sample to the mesh, ns
+    pub latency_ns: Quantiles,
+    /// renewals of the patch for which a sample had to wait
+    pub waits: u64,
+    /// what was written
+    pub result: Option<Outcome>,
+}
+
+impl Sitting {
+    /// Begins a session in a new folder.
+    ///
+    /// # Errors
+    /// [`NodeError`]
+    pub fn begin(setup: &Setup) -> Result<Self, NodeError> {
+        let parameters = setup.shared.parameters();
+        let parent = std::path::PathBuf::from(parameters.string("session_folder"));
+        let folder = SessionFolder::create(&parent, &name_of(SystemTime::now()))
+            .map_err(|source| NodeError::Folder { path: parent, source })?;
+        SessionRecord::begin(&folder, &setup.scan_path, setup.mesh_unit, &setup.scene_yaml, &setup.topics)?;
+        let recorder = SessionRecorder::start(&folder, &setup.topics)?;
+        let axes = WrenchFrame::default();
+        let engine = Engine::new(&setup.scan, &setup.scene, axes)?;
+        Ok(Self { folder, recorder, engine, axes, told_version: 1, told_edits: 0 })
+    }
+
+    /// Wrenches come in other axes than was thought; nothing was touched yet.
+    ///
+    /// # Errors
+    /// [`NodeError`]
+    pub fn turn_axes(&mut self, setup: &Setup, axes: WrenchFrame) -> Result<(), NodeError> {
+        self.engine = Engine::new(&setup.scan, &setup.scene, axes)?;
+        self.axes = axes;
+        Ok(())
+    }
+
+    /// Ends the session: writes the result into its folder, as `touchup refine` does, and a report beside it.
+    ///
+    /// # Errors
+    /// [`NodeError`] when the result could not be written; the recording is ended all the same.
+    pub fn end(self, setup: &Setup, mut report: Report) -> Result<Report, NodeError> {
+        let Self { folder, recorder, engine, .. } = self;
+        let (unrecorded, fault) = recorder.finish();
+        report.unrecorded = unrecorded;
+        let (refiner, patcher) = engine.finish()?;
+        let patcher = patcher.filter(|_| refiner.counts().contacts > 0);
+        let outcome = write_result(setup, &folder, refiner.mesh(), patcher)?;
+        report.result = Some(outcome);
+        let text = serde_json::to_string_pretty(&report).expect("numbers and names alone cannot fail");
+        folder
+            .write_text("report.json", &text)
+            .map_err(|source| NodeError::Folder { path: folder.path().to_owned(), source })?;
+        fault.map_or(Ok(report), |reason| Err(NodeError::Unrecorded { count: unrecorded, reason }))
+    }
+
+    /// What is known of it so far.
+    pub fn report(&self, setup: &Setup, tally: &Tally) -> Report {
+        let counts = self.engine.refiner().counts();
+        let nothing = Quantiles { median: 0, p99: 0, p999: 0, max: 0 };
+        Report {
+            session: self.folder.name().to_owned(),
+            accepted: tally.accepted,
+            refused: Default::default(),
+            dropped: setup.port.dropped(),
+            paused: tally.paused,
+            unrecorded: self.recorder.lost().0,
+            dropped_view_frames: setup.shared.dropped_frames(),
+            gaps: [0; 2],
+            clock_jumps: 0,
+            contacts: counts.contacts,
+            cut_back: counts.cut_back,
+            push_ns: nothing,
+            latency_ns: nothing,
+            waits: self.engine.waits(),
+            result: None,
+        }
+    }
+}
+
+fn write_result(
+    setup: &Setup,
+    folder: &SessionFolder,
+    refined: &TriMesh,
+    patcher: Option<Patcher>,
+) -> Result<Outcome, NodeError> {
+    let [mesh, features, touches] =
+        ["refined.ply", "features.json", "touches.csv"].map(|name| folder.path().join(name));
+    let places =
+        OutcomePlaces { mesh: &mesh, unit: setup.mesh_unit, features: Some(&features), touches: Some(&touches) };
+    Ok(places.write(&setup.scan.0, refined, patcher)?)
+}
+
+/// "2026-11-20T22-14-10Z": sorts by time, and is a file name everywhere.
+fn name_of(time: SystemTime) -> String {
+    let seconds = time.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
+    let (days, second) = (seconds / 86_400, seconds % 86_400);
+    let (year, month, day) = civil(days);
+    let [hour, minute, second] = [second / 3600, second / 60 % 60, second % 60];
+    format!("{year:04}-{month:02}-{day:02}T{hour:02}-{minute:02}-{second:02}Z")
+}
+
+/// Year, month and day of a day counted from 1970-01-01, by the rules of leap years.
+fn civil(mut days: u64) -> (u64, u64, u64) {
+    let is_leap = |year: u64| year.is_multiple_of(4) && (!year.is_multiple_of(100) || year.is_multiple_of(400));
+    let mut year = 1970;
+    while days >= 365 + u64::from(is_leap(year)) {
+        days -= 365 + u64::from(is_leap(year));
+        year += 1;
+    }
+    let lengths = [31, 28 + u64::from(is_leap(year)), 31, 30, 31, 30, 31, 31, 30, 31, 30, 31];
+    let mut month = 0;
+    while days >= lengths[month] {
+        days -= lengths[month];
+        month += 1;
+    }
+    (year, month as u64 + 1, days + 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    /// As `date -u` has them.
+    #[test]
+    fn a_session_is_named_by_the_time_it_began() {
+        let named = |seconds| name_of(UNIX_EPOCH + Duration::from_secs(seconds));
+        assert_eq!(named(0), "1970-01-01T00-00-00Z");
+        assert_eq!(named(951_782_400), "2000-02-29T00-00-00Z");
+        assert_eq!(named(1_795_212_850), "2026-11-20T22-14-10Z");
+        assert_eq!(named(4_107_542_399), "2100-02-28T23-59-59Z");
+    }
+}

@@ -1,0 +1,101 @@
+//! Whether the two streams come, and how.
+
+use std::time::{Duration, Instant};
+
+/// Rates are those of so long, at least.
+const RATE_OVER: Duration = Duration::from_secs(1);
+
+/// One stream as it arrives.
+#[derive(Clone, Debug)]
+pub struct StreamWatch {
+    last: Option<Instant>,
+    arrived: u64,
+    /// times that it was stale
+    pub gaps: u64,
+    is_stale: bool,
+    since: Instant,
+    arrived_since: u64,
+    rate_hz: f64,
+}
+
+impl StreamWatch {
+    /// Nothing came yet.
+    pub fn new(now: Instant) -> Self {
+        Self { last: None, arrived: 0, gaps: 0, is_stale: true, since: now, arrived_since: 0, rate_hz: 0.0 }
+    }
+
+    /// A message came.
+    pub fn arrive(&mut self, now: Instant) {
+        self.last = Some(now);
+        self.is_stale = false;
+        self.arrived += 1;
+    }
+
+    /// To be called from time to time; whether the stream is stale.
+    pub fn check(&mut self, now: Instant, stale: Duration) -> bool {
+        let is_stale = self.last.is_none_or(|last| now.saturating_duration_since(last) > stale);
+        self.gaps += u64::from(is_stale && !self.is_stale);
+        self.is_stale = is_stale;
+        let over = now.saturating_duration_since(self.since);
+        if over >= RATE_OVER {
+            self.rate_hz = (self.arrived - self.arrived_since) as f64 / over.as_secs_f64();
+            (self.since, self.arrived_since) = (now, self.arrived);
+        }
+        is_stale
+    }
+
+    /// Messages so far.
+    pub fn arrived(&self) -> u64 {
+        self.arrived
+    }
+
+    /// How many come in a second.
+    pub fn rate_hz(&self) -> f64 {
+        self.rate_hz
+    }
+
+    /// How long ago the last one came; `None` before the first.
+    pub fn age(&self, now: Instant) -> Option<Duration> {
+        self.last.map(|last| now.saturating_duration_since(last))
+    }
+}
+
+/// A clock that was set back: both streams come with stamps before those that came already, one message after the other.
+///
+/// Time in a session only goes forward: from then on a second is added beyond what had come, so that nothing pairs across.
+#[derive(Clone, Debug, Default)]
+pub struct Epoch {
+    /// what is added to stamps, ns
+    pub shift_ns: i64,
+    newest_ns: i64,
+    late: [u32; 2],
+    /// times that the clock was set back
+    pub jumps: u64,
+}
+
+/// So many of both streams one after the other are no mistake of single messages.
+const MOST_LATE: u32 = 50;
+/// Between two epochs, ns: longer than any gap between poses that is bridged.
+const BETWEEN_NS: i64 = 61_000_000_000;
+
+impl Epoch {
+    /// What became of a message of stream 0 or 1 with this stamp, as shifted. Returns whether a new epoch begins: then the
+    /// message after it is to be shifted by another amount.
+    pub fn note(&mut self, stream: usize, stamp_ns: i64, is_taken: bool) -> bool {
+        if is_taken {
+            self.late = [0; 2];
+            self.newest_ns = self.newest_ns.max(stamp_ns);
+            return false;
+        }
+        let is_behind = stamp_ns < self.newest_ns;
+        self.late[stream] = if is_behind { self.late[stream] + 1 } else { self.late[stream] };
+        if self.late.iter().any(|&late| late < MOST_LATE) {
+            return false;
+        }
+        let shift_ns = self.newest_ns.saturating_add(BETWEEN_NS).saturating_sub(stamp_ns);
+        self.shift_ns = self.shift_ns.saturating_add(shift_ns);
+        self.late = [0; 2];
+        self.jumps += 1;
+        true
+    }
+}

@@ -1,0 +1,201 @@
+//! The thread that shows: it follows the mesh, and sends tiles, changes, markers and diagnostics at its own pace.
+
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError};
+use std::time::{Duration, Instant};
+
+use super::edits::Edits;
+use super::feature_messages;
+use super::mesh_patches::MeshPatches;
+use super::replica::{Replica, Snapshot};
+use super::shared::Shared;
+use super::tiles::{ColourBy, Tiles};
+use super::tip::{self, TipPlace};
+use crate::ros::messages::{DiagnosticArray, FeatureArray, HapticMismatch, MeshPatch};
+use crate::ros::port::{Port, Publication};
+
+/// Tiles that are sent at once: 4 MB.
+const TILES_AT_ONCE: usize = 64;
+/// Parts of the whole state that are sent at once: 2.4 MB.
+const PARTS_AT_ONCE: usize = 64;
+/// While there is more to send than that, it goes on after so long.
+const CATCH_UP: Duration = Duration::from_millis(10);
+
+/// What the view is told.
+pub enum ViewInput {
+    /// the mesh changed
+    Edits(Box<Edits>),
+    /// a new session
+    Session(Box<Replica>),
+    /// one sample
+    Mismatch(HapticMismatch),
+    /// where the tip is
+    Tip(TipPlace),
+    /// all features
+    Features(Arc<FeatureArray>),
+    /// somebody wants the mesh as it is
+    Snapshot(SyncSender<Snapshot>),
+    /// somebody wants the whole state on the topic
+    Resync,
+    /// once a second
+    Diagnostics(Box<DiagnosticArray>),
+    /// a parameter was set
+    Parameters,
+}
+
+/// The thread's own.
+pub struct View {
+    port: Arc<dyn Port>,
+    shared: Arc<Shared>,
+    /// where changes go to be filled again
+    spare: SyncSender<Box<Edits>>,
+    replica: Replica,
+    is_complete: bool,
+    tiles: Tiles,
+    patches: MeshPatches,
+    colour_by: ColourBy,
+    whole: Option<Box<dyn Iterator<Item = MeshPatch> + Send>>,
+    asked_whole: bool,
+    snapshots: Vec<SyncSender<Snapshot>>,
+    tip: Option<TipPlace>,
+    features: Arc<FeatureArray>,
+}
+
+impl View {
+    /// Shows nothing yet.
+    pub fn new(port: Arc<dyn Port>, shared: Arc<Shared>, spare: SyncSender<Box<Edits>>, replica: Replica) -> Self {
+        let features = feature_messages::no_features(0, &shared.frame, &replica.session);
+        Self {
+            tiles: Tiles::all_of(&replica),
+            patches: MeshPatches::of(&replica, shared.scan_sigma),
+            colour_by: colour_by(&shared),
+            is_complete: true,
+            whole: None,
+            asked_whole: false,
+            snapshots: Vec::new(),
+            tip: None,
+            features: Arc::new(features),
+            port,
+            shared,
+            spare,
+            replica,
+        }
+    }
+
+    /// Runs until nobody tells anything any more, then shows what is left.
+    pub fn run(mut self, inputs: &Receiver<ViewInput>) {
+        let mut due = Instant::now();
+        loop {
+            match inputs.recv_timeout(due.saturating_duration_since(Instant::now())) {
+                Ok(input) => self.take(input),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => break,
+            }
+            if Instant::now() >= due {
+                // ids fit each other only when all of a change has come
+                let period = Duration::from_secs_f64(1.0 / self.shared.parameters().double("view_rate_hz"));
+                due = Instant::now() + if self.tick(TILES_AT_ONCE) { period.min(CATCH_UP) } else { period };
+            }
+        }
+        self.tick(usize::MAX);
+    }
+
+    fn take(&mut self, input: ViewInput) {
+        match input {
+            ViewInput::Edits(edits) => {
+                self.replica.apply(&edits);
+                self.patches.note(&edits);
+                edits.tiles.iter().for_each(|&tile| self.tiles.note(tile));
+                edits.faces.iter().for_each(|(face, _)| self.tiles.forget_mismatch(*face));
+                self.is_complete = edits.is_complete;
+                self.shared.shown_version(self.replica.version);
+                match self.spare.try_send(edits) {
+                    // as many come back as went out
+                    Ok(()) | Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => {}
+                }
+                self.answer_snapshots();
+            }
+            ViewInput::Session(replica) => {
+                self.replica = *replica;
+                self.is_complete = true;
+                self.tiles.restart(&self.replica);
+                self.patches = MeshPatches::of(&self.replica, self.shared.scan_sigma);
+                // who follows sees another session and asks; it would see that only at the next change
+                (self.whole, self.asked_whole) = (None, true);
+            }
+            ViewInput::Mismatch(mismatch) => {
+                if self.colour_by == ColourBy::Mismatch && !mismatch.signed_distance.is_nan() {
+                    self.tiles.note_mismatch(mismatch.face, mismatch.signed_distance, &self.replica);
+                }
+                self.port.publish(Publication::Mismatch(mismatch));
+            }
+            ViewInput::Tip(tip) => self.tip = Some(tip),
+            ViewInput::Features(features) => {
+                self.port.publish(Publication::Features((*features).clone()));
+                self.port.publish(Publication::FeatureMarkers(feature_messages::markers(&features)));
+                self.features = features;
+            }
+            ViewInput::Snapshot(reply) => {
+                self.snapshots.push(reply);
+                self.answer_snapshots();
+            }
+            ViewInput::Resync => self.asked_whole = true,
+            ViewInput::Diagnostics(diagnostics) => self.port.publish(Publication::Diagnostics(*diagnostics)),
+            ViewInput::Parameters => {
+                let by = colour_by(&self.shared);
+                if std::mem::replace(&mut self.colour_by, by) != by {
+                    self.tiles.renew(&self.replica);
+                }
+            }
+        }
+    }
+
+    fn answer_snapshots(&mut self) {
+        if self.is_complete && !self.snapshots.is_empty() {
+            let snapshot = Arc::new(self.replica.clone());
+            // who asked may have gone
+            self.snapshots.drain(..).for_each(|reply| drop(reply.try_send(Arc::clone(&snapshot))));
+        }
+    }
+
+    /// Sends what is due; whether there is more.
+    fn tick(&mut self, most: usize) -> bool {
+        let frame = self.shared.frame.as_str();
+        if let Some(tip) = self.tip.take() {
+            self.port.publish(Publication::Tip(tip::markers(&tip, &self.features, frame)));
+        }
+        if !self.is_complete {
+            return true;
+        }
+        for part in self.patches.change(&self.replica, frame) {
+            self.port.publish(Publication::MeshPatch(part));
+        }
+        if self.whole.is_none() && std::mem::take(&mut self.asked_whole) {
+            // the next change leads from what was sent last
+            let mut snapshot = self.replica.clone();
+            snapshot.version = self.patches.version();
+            self.whole = Some(Box::new(self.patches.whole(Arc::new(snapshot), frame.to_owned())));
+        }
+        if let Some(whole) = &mut self.whole {
+            let mut sent = 0;
+            for part in whole.by_ref().take(PARTS_AT_ONCE.min(most)) {
+                self.port.publish(Publication::MeshPatch(part));
+                sent += 1;
+            }
+            if sent < PARTS_AT_ONCE.min(most) {
+                self.whole = None;
+            }
+        }
+        let Self { tiles, replica, colour_by, port, .. } = self;
+        tiles.take(most, replica, *colour_by, frame, |tile| port.publish(Publication::Tile(tile)));
+        self.shared.tiles_waiting(self.tiles.waiting());
+        self.tiles.waiting() > 0 || self.whole.is_some() || self.asked_whole
+    }
+}
+
+fn colour_by(shared: &Shared) -> ColourBy {
+    match shared.parameters().string("colour_by") {
+        "mismatch" => ColourBy::Mismatch,
+        _ => ColourBy::Touched,
+    }
+}

@@ -1,0 +1,202 @@
+//! A node with the world around it in process, and the demo plate to be touched.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::mpsc::sync_channel;
+use std::time::{Duration, Instant};
+
+use tempfile::TempDir;
+use touchup::io::mesh_file::{MeshUnit, write_mesh};
+use touchup::io::recording::{Topics, write_recording};
+use touchup::mesh::TriMesh;
+use touchup::ros::clock::steady_ns;
+use touchup::ros::in_process::{World, start};
+use touchup::ros::messages::{
+    Header, MeshPatch, Point, Pose, PoseStamped, Quaternion, SetBoolRequest, Time, Vector3, Wrench, WrenchStamped,
+};
+use touchup::ros::node::{INBOX, Node, NodeEnd};
+use touchup::ros::parameters::{ParameterValue, Parameters};
+use touchup::ros::port::{Arrival, Call, Publication};
+use touchup::sim::StylusParams;
+use touchup::touch::Message;
+
+use crate::plate_stream::plate_stream;
+
+/// Scan and recording of the demo plate, or the first share of it.
+pub struct Plate {
+    pub folder: TempDir,
+    pub scan: TriMesh,
+    pub messages: Vec<Message>,
+}
+
+impl Plate {
+    /// The first share: long strokes over its top.
+    pub fn touched(share: f64) -> Self {
+        Self::of(|count| 0..(count as f64 * share) as usize)
+    }
+
+    /// The last share: short strokes in holes and slots.
+    pub fn touched_last(share: f64) -> Self {
+        Self::of(|count| (count as f64 * (1.0 - share)) as usize..count)
+    }
+
+    fn of(share: impl Fn(usize) -> std::ops::Range<usize>) -> Self {
+        let (stream, touch) = plate_stream(&StylusParams::default(), 1);
+        let mut messages = touch.messages;
+        messages.sort_by_key(Message::stamp_ns);
+        let messages = messages[share(messages.len())].to_vec();
+        let plate = Self { folder: tempfile::tempdir().unwrap(), scan: stream.scan, messages };
+        write_mesh(&plate.path("scan.ply"), &plate.scan, MeshUnit::Millimetre).unwrap();
+        plate.record("touch.mcap", &plate.messages);
+        plate
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    pub fn record(&self, name: &str, messages: &[Message]) {
+        write_recording(&self.path(name), &Topics::default(), "object", "stylus", messages.iter().copied()).unwrap();
+    }
+
+    /// What `touchup refine` makes of a recording.
+    pub fn refined(&self, recording: &str) -> Vec<u8> {
+        let (scan, bag, out) = (self.path("scan.ply"), self.path(recording), self.path("refined.ply"));
+        refine(&[
+            "--scan".as_ref(),
+            scan.as_os_str(),
+            "--bag".as_ref(),
+            bag.as_os_str(),
+            "--out".as_ref(),
+            out.as_os_str(),
+        ]);
+        std::fs::read(out).unwrap()
+    }
+}
+
+/// Runs `touchup refine`; a recording that has lost its end is no failure.
+pub fn refine(arguments: &[&std::ffi::OsStr]) {
+    let done = Command::new(env!("CARGO_BIN_EXE_touchup")).arg("refine").args(arguments).output().unwrap();
+    let told = String::from_utf8_lossy(&done.stderr);
+    assert!(matches!(done.status.code(), Some(0 | 4)), "{told}");
+}
+
+/// As a port delivers it.
+pub fn arrival(message: &Message) -> Arrival {
+    match message {
+        Message::Pose(_) => Arrival::Pose(pose(message, "object"), steady_ns()),
+        Message::Wrench(_) => Arrival::Wrench(wrench(message, "stylus"), steady_ns()),
+    }
+}
+
+fn header(message: &Message, frame: &str) -> Header {
+    let (sec, nanosec) = (message.stamp_ns() / 1_000_000_000, message.stamp_ns() % 1_000_000_000);
+    Header { stamp: Time { sec: sec as i32, nanosec: nanosec as u32 }, frame_id: frame.to_owned() }
+}
+
+pub fn pose(message: &Message, frame: &str) -> PoseStamped {
+    let Message::Pose(pose) = message else { panic!("no pose") };
+    let (p, q) = (pose.pose_ot.translation.vector, pose.pose_ot.rotation);
+    let orientation = Quaternion { x: q.i, y: q.j, z: q.k, w: q.w };
+    PoseStamped {
+        header: header(message, frame),
+        pose: Pose { position: Point { x: p.x, y: p.y, z: p.z }, orientation },
+    }
+}
+
+pub fn wrench(message: &Message, frame: &str) -> WrenchStamped {
+    let Message::Wrench(wrench) = message else { panic!("no wrench") };
+    let (f, t) = (wrench.wrench.force, wrench.wrench.torque);
+    let wrench = Wrench { force: Vector3 { x: f.x, y: f.y, z: f.z }, torque: Vector3 { x: t.x, y: t.y, z: t.z } };
+    WrenchStamped { header: header(message, frame), wrench }
+}
+
+/// A node that runs, and the world around it.
+pub struct Bench {
+    pub node: Node,
+    pub world: World,
+    published: Vec<Publication>,
+}
+
+impl Bench {
+    pub fn start(plate: &Plate) -> Self {
+        Self::with(plate, &[])
+    }
+
+    pub fn with(plate: &Plate, set: &[(&str, ParameterValue)]) -> Self {
+        let mut parameters = Parameters::default();
+        let text = |path: PathBuf| ParameterValue::String(path.to_str().unwrap().to_owned());
+        parameters.set("scan", &text(plate.path("scan.ply"))).unwrap();
+        parameters.set("session_folder", &text(plate.path("sessions"))).unwrap();
+        for (name, value) in set {
+            parameters.set(name, value).unwrap();
+        }
+        let (inbox, arrivals) = sync_channel(INBOX);
+        let (port, world) = start(inbox);
+        let node = Node::start(parameters, port, arrivals).unwrap();
+        Self { node, world, published: Vec::new() }
+    }
+
+    pub fn feed<'a>(&self, messages: impl IntoIterator<Item = &'a Message>) {
+        messages.into_iter().for_each(|message| assert!(self.world.arrive_patiently(arrival(message))));
+    }
+
+    /// Everything published so far.
+    pub fn published(&mut self) -> &[Publication] {
+        self.published.extend(self.world.published());
+        &self.published
+    }
+
+    /// Waits until something was published that `wanted` is true of.
+    pub fn wait_for<T>(&mut self, what: &str, wanted: impl Fn(&Publication) -> Option<T>) -> T {
+        let deadline = Instant::now() + Duration::from_secs(60);
+        loop {
+            if let Some(found) = self.published().iter().rev().find_map(&wanted) {
+                return found;
+            }
+            assert!(Instant::now() < deadline, "{what} never came");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    /// Value of a key of the diagnostics, once all arrivals before are in it.
+    pub fn diagnostic(&mut self, key: &str) -> Option<String> {
+        // the answer comes when all that arrived before was taken
+        let pause = SetBoolRequest { data: false };
+        self.world.call(|reply| Call::Pause(pause, reply)).recv().unwrap();
+        self.world.published();
+        // the first may have been on its way already
+        for _ in 0..2 {
+            self.published.clear();
+            self.wait_for("diagnostics", |published| matches!(published, Publication::Diagnostics(_)).then_some(()));
+        }
+        let Some(Publication::Diagnostics(told)) =
+            self.published.iter().rev().find(|published| matches!(published, Publication::Diagnostics(_)))
+        else {
+            panic!("it was there")
+        };
+        let values = told.status.iter().flat_map(|status| &status.values);
+        values.filter(|value| value.key == key).map(|value| value.value.clone()).next()
+    }
+
+    /// Ends it; what was published comes too.
+    pub fn end(mut self) -> (NodeEnd, Vec<Publication>) {
+        self.world.arrive_patiently(Arrival::Shutdown);
+        let end = self.node.join().unwrap();
+        self.published.extend(self.world.published());
+        (end, self.published)
+    }
+}
+
+pub fn read(folder: &Path, name: &str) -> Vec<u8> {
+    std::fs::read(folder.join(name)).unwrap()
+}
+
+/// The changes among what was published.
+pub fn patches(published: &[Publication]) -> Vec<MeshPatch> {
+    let of = |publication: &Publication| match publication {
+        Publication::MeshPatch(patch) => Some(patch.clone()),
+        _ => None,
+    };
+    published.iter().filter_map(of).collect()
+}
