@@ -4,9 +4,12 @@
 
 pub mod arguments;
 pub mod clock;
+#[cfg(feature = "ros")]
 pub mod dds;
 pub mod in_process;
 pub mod messages;
 pub mod names;
 pub mod parameters;
 pub mod port;
+#[cfg(feature = "r2r")]
+pub mod r2r;
