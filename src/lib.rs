@@ -20,7 +20,7 @@
 //! | [`sim`] | known surfaces, a scanner and a stylus to test against |
 //! | [`io`] | mesh files and recordings; with [`scene`] the only file access |
 //! | [`scene`] | the YAML that names the parts of a scene |
-//! | `ros` | the node's side of ROS 2 (feature `ros`): messages, parameters, and the port to what is behind them |
+//! | `ros` | the node's side of ROS 2 (features `ros` and `r2r`): messages, parameters, and the port to what is behind them |
 //! | [`session`] | one run of touching: what comes of it, and what it takes to get the same again |
 //! | [`cli`] | one file for each verb of the command line |
 //!
@@ -55,7 +55,7 @@ pub mod live;
 pub mod mesh;
 pub mod patch;
 pub mod refine;
-#[cfg(feature = "ros")]
+#[cfg(any(feature = "ros", feature = "r2r"))]
 pub mod ros;
 pub mod scene;
 pub mod session;

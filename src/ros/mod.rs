@@ -4,6 +4,7 @@
 
 pub mod arguments;
 pub mod clock;
+#[cfg(feature = "ros")]
 pub mod dds;
 pub mod in_process;
 pub mod messages;
@@ -11,3 +12,5 @@ pub mod names;
 pub mod node;
 pub mod parameters;
 pub mod port;
+#[cfg(feature = "r2r")]
+pub mod r2r;

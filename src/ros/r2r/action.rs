@@ -1,0 +1,130 @@
+//! The action `~/probe`: goals, their feedback, and that somebody wants them stopped.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use futures::{FutureExt, Stream, StreamExt};
+use r2r::{ActionServerCancelRequest, ActionServerGoal, ActionServerGoalRequest, Node};
+
+use super::convert::Convert;
+use super::touchup_msgs::action::Probe::Action;
+use super::{During, RosError, Shared, Source, source};
+use crate::ros::messages::{ProbeFeedback, ProbeResponse};
+use crate::ros::port::{Arrival, Call, Feedback, Goal, GoalEnd};
+
+/// Its name.
+pub(super) const NAME: &str = "~/probe";
+
+/// A goal from the first question to the result.
+enum State {
+    Asked(ActionServerGoalRequest<Action>),
+    Running(ActionServerGoal<Action>),
+    Over,
+}
+
+/// What the closures of one goal share.
+struct Handle {
+    state: Mutex<State>,
+    is_cancelled: Arc<AtomicBool>,
+    is_over: AtomicBool,
+}
+
+impl Handle {
+    /// Goes over to another state; the one that it was in.
+    fn change(&self, state: State) -> State {
+        std::mem::replace(&mut *locked(&self.state), state)
+    }
+}
+
+/// A running goal, and who wants it stopped.
+struct Cancels {
+    handle: Arc<Handle>,
+    requests: Box<dyn Stream<Item = ActionServerCancelRequest> + Send + Unpin>,
+}
+
+type Running = Arc<Mutex<Vec<Cancels>>>;
+
+/// The server of the action: one source of goals, one of what is asked of those that run.
+pub(super) fn server(node: &mut Node, shared: &Arc<Shared>) -> Result<[Source; 2], RosError> {
+    let requests = node.create_action_server::<Action>(NAME).during("offering an action")?;
+    let running = Running::default();
+    let cancels = running.clone();
+    let shared = shared.clone();
+    let goals = source(requests, move |request: ActionServerGoalRequest<Action>| {
+        let wanted = request.goal.clone().convert();
+        shared.arrive(Arrival::Call(Call::Probe(wanted, goal(request, &shared, &running))));
+    });
+    Ok([goals, Box::new(move || take_cancels(&mut locked(&cancels)))])
+}
+
+/// What the node answers with: it goes out from the thread that sends, so the answers keep their order.
+fn goal(request: ActionServerGoalRequest<Action>, shared: &Arc<Shared>, running: &Running) -> Goal {
+    let is_cancelled = Arc::new(AtomicBool::new(false));
+    let handle = Arc::new(Handle {
+        state: Mutex::new(State::Asked(request)),
+        is_cancelled: is_cancelled.clone(),
+        is_over: AtomicBool::new(false),
+    });
+    let [for_accept, for_feedback, for_result] = [handle.clone(), handle.clone(), handle];
+    let (running, sending) = (running.clone(), shared.clone());
+    Goal {
+        accept: shared.reply(NAME, move |is_accepted| accept(&for_accept, is_accepted, &running)),
+        feedback: Feedback(Box::new(move |feedback| {
+            let handle = for_feedback.clone();
+            sending.urgent.answer(Box::new(move || tell(&handle, feedback)));
+        })),
+        result: shared.reply(NAME, move |(end, response)| finish(&for_result, end, response)),
+        is_cancelled,
+    }
+}
+
+fn accept(handle: &Arc<Handle>, is_accepted: bool, running: &Running) -> r2r::Result<()> {
+    let State::Asked(request) = handle.change(State::Over) else { return Ok(()) };
+    if !is_accepted {
+        return request.reject();
+    }
+    let (goal, requests) = request.accept()?;
+    handle.change(State::Running(goal));
+    locked(running).push(Cancels { handle: handle.clone(), requests: Box::new(requests) });
+    Ok(())
+}
+
+fn tell(handle: &Handle, feedback: ProbeFeedback) {
+    if let State::Running(goal) = &*locked(&handle.state)
+        && let Err(error) = goal.publish_feedback(feedback.convert())
+    {
+        // nobody waits for it who misses it
+        tracing::debug!(%error, "feedback is not sent");
+    }
+}
+
+fn finish(handle: &Handle, end: GoalEnd, response: ProbeResponse) -> r2r::Result<()> {
+    let State::Running(mut goal) = handle.change(State::Over) else { return Ok(()) };
+    handle.is_over.store(true, Ordering::Relaxed);
+    let cancelled = response.clone().convert();
+    // r2r lets go of a goal once its cancelling is confirmed: from then on no other end reaches who waits
+    match end {
+        GoalEnd::Canceled => goal.cancel(cancelled),
+        GoalEnd::Succeeded => goal.succeed(response.convert()).or_else(|_| goal.cancel(cancelled)),
+        GoalEnd::Aborted => goal.abort(response.convert()).or_else(|_| goal.cancel(cancelled)),
+    }
+}
+
+/// Confirms what is asked for and tells the node, which stops when it can; forgets goals that are over.
+fn take_cancels(running: &mut Vec<Cancels>) -> bool {
+    let mut has_come = false;
+    for cancels in running.iter_mut() {
+        while let Some(Some(request)) = cancels.requests.next().now_or_never() {
+            cancels.handle.is_cancelled.store(true, Ordering::Relaxed);
+            request.accept();
+            has_come = true;
+        }
+    }
+    running.retain(|cancels| !cancels.handle.is_over.load(Ordering::Relaxed));
+    has_come
+}
+
+fn locked<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
+    // nothing of ours panics while it holds it
+    of.lock().unwrap_or_else(PoisonError::into_inner)
+}

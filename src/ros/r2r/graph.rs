@@ -1,0 +1,137 @@
+//! Who else is on our topics, and why somebody who is does not fit. r2r tells of nothing by itself, so it is asked once in a
+//! second; of those who listen it knows the number alone.
+
+use std::time::{Duration, Instant};
+
+use r2r::qos::{DurabilityPolicy, QosProfile, ReliabilityPolicy};
+use r2r::{Context, Node, Publisher, WrappedTypesupport};
+
+use super::Shared;
+use crate::ros::port::{Arrival, Endpoint};
+
+/// How often it is asked.
+const PERIOD: Duration = Duration::from_secs(1);
+
+/// How many there are that fit, and why one does not.
+type Seen = (usize, Option<String>);
+
+type Look = Box<dyn Fn(&Node) -> r2r::Result<Seen> + Send>;
+
+struct Watched {
+    topic: String,
+    look: Look,
+    told: Seen,
+}
+
+pub(super) struct Graph {
+    context: Context,
+    watched: Vec<Watched>,
+    looked: Instant,
+}
+
+impl Graph {
+    pub fn new(context: Context) -> Self {
+        Self { context, watched: Vec::new(), looked: Instant::now() }
+    }
+
+    /// A topic that we publish.
+    ///
+    /// - `topic`: absolute, remapped.
+    pub fn watch_listeners<T: WrappedTypesupport + 'static>(&mut self, topic: String, publisher: Publisher<T>) {
+        self.watch(topic, move |_| Ok((publisher.get_inter_process_subscription_count()?, None)));
+    }
+
+    /// A topic that we listen to.
+    ///
+    /// - `topic`: absolute, remapped.
+    pub fn watch_senders(&mut self, topic: String, type_name: &'static str, wanted: QosProfile) {
+        self.watch(topic.clone(), move |node| {
+            let senders = node.get_publishers_info_by_topic(&topic, false)?;
+            let misfits = senders.iter().map(|sender| {
+                misfit(type_name, &wanted, &sender.topic_type, &sender.qos_profile)
+                    .map(|reason| format!("what {} sends does not fit: {reason}", sender.node_name))
+            });
+            let misfits: Vec<String> = misfits.flatten().collect();
+            Ok((senders.len() - misfits.len(), misfits.into_iter().next()))
+        });
+    }
+
+    fn watch(&mut self, topic: String, look: impl Fn(&Node) -> r2r::Result<Seen> + Send + 'static) {
+        self.watched.push(Watched { topic, look: Box::new(look), told: (0, None) });
+    }
+
+    /// Tells what has changed, when it is time to look again; whether ROS is still there.
+    pub fn look(&mut self, node: &Node, shared: &Shared) -> bool {
+        if self.looked.elapsed() < PERIOD {
+            return true;
+        }
+        self.looked = Instant::now();
+        for watched in &mut self.watched {
+            match (watched.look)(node) {
+                Ok(seen) if seen != watched.told => watched.tell(seen, shared),
+                Ok(_) => {}
+                Err(error) => tracing::debug!(topic = watched.topic, %error, "nobody knows who is on a topic"),
+            }
+        }
+        self.context.is_valid()
+    }
+}
+
+impl Watched {
+    fn tell(&mut self, seen: Seen, shared: &Shared) {
+        let topic = self.topic.clone();
+        self.told = seen.clone();
+        let (count, mismatch) = seen;
+        match &mismatch {
+            Some(reason) => tracing::warn!(topic, "{reason}"),
+            None => tracing::info!(topic, others = count, "who is on a topic has changed"),
+        }
+        shared.arrive(Arrival::Matched(Endpoint { topic, count, mismatch }));
+    }
+}
+
+/// Why what is sent does not reach who listens.
+fn misfit(wanted_type: &str, wanted: &QosProfile, type_name: &str, offered: &QosProfile) -> Option<String> {
+    if type_name != wanted_type {
+        return Some(format!("it has the type {type_name}, here it is {wanted_type}"));
+    }
+    let best_effort = ReliabilityPolicy::BestEffort;
+    if wanted.reliability == ReliabilityPolicy::Reliable && offered.reliability == best_effort {
+        return Some("reliable is wanted here, it offers best effort".to_owned());
+    }
+    let volatile = DurabilityPolicy::Volatile;
+    if wanted.durability == DurabilityPolicy::TransientLocal && offered.durability == volatile {
+        return Some("transient local is wanted here, it offers volatile".to_owned());
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn senders_fit_as_the_rules_of_dds_say() {
+        let [best_effort, reliable] = [QosProfile::sensor_data(), QosProfile::default()];
+        let latched = QosProfile::default().transient_local();
+        let wrench = "geometry_msgs/msg/WrenchStamped";
+        let cases = [
+            (wrench, &best_effort, &best_effort, None),
+            (wrench, &best_effort, &reliable, None),
+            (wrench, &best_effort, &latched, None),
+            (wrench, &reliable, &latched, None),
+            (wrench, &latched, &latched, None),
+            (wrench, &reliable, &best_effort, Some("reliable is wanted here, it offers best effort")),
+            (wrench, &latched, &reliable, Some("transient local is wanted here, it offers volatile")),
+            (
+                "geometry_msgs/msg/Wrench",
+                &best_effort,
+                &reliable,
+                Some("it has the type geometry_msgs/msg/Wrench, here it is geometry_msgs/msg/WrenchStamped"),
+            ),
+        ];
+        for (sent, wanted, offered, reason) in cases {
+            assert_eq!(misfit(wrench, wanted, sent, offered).as_deref(), reason, "{wanted:?} {offered:?}");
+        }
+    }
+}

@@ -1,0 +1,205 @@
+//! The topics of docs/ros.md, each with its quality of service.
+
+use std::sync::Arc;
+
+use r2r::qos::QosProfile;
+use r2r::{
+    Node, Publisher, WrappedTypesupport, diagnostic_msgs, geometry_msgs, nav_msgs, rosgraph_msgs, tf2_msgs,
+    visualization_msgs,
+};
+
+use super::convert::Convert;
+use super::graph::Graph;
+use super::{During, RosError, Shared, Source, source, touchup_msgs};
+use crate::ros::arguments::NodeConfig;
+use crate::ros::clock::steady_ns;
+use crate::ros::messages::{Clock, Message, PointStamped, PoseStamped, TFMessage, WrenchStamped};
+use crate::ros::port::{Arrival, Publication};
+
+/// What is small and urgent.
+pub(super) struct UrgentPublishers {
+    features: Publisher<touchup_msgs::msg::FeatureArray>,
+    feature_markers: Publisher<visualization_msgs::msg::MarkerArray>,
+    tip: Publisher<visualization_msgs::msg::MarkerArray>,
+    path: Publisher<nav_msgs::msg::Path>,
+    mismatch: Publisher<touchup_msgs::msg::HapticMismatch>,
+    diagnostics: Publisher<diagnostic_msgs::msg::DiagnosticArray>,
+}
+
+/// What is large and may wait.
+pub(super) struct MeshPublishers {
+    tiles: Publisher<visualization_msgs::msg::Marker>,
+    patches: Publisher<touchup_msgs::msg::MeshPatch>,
+}
+
+const fn reliable(depth: usize) -> QosProfile {
+    QosProfile::default().reliable().keep_last(depth)
+}
+
+const fn latched(depth: usize) -> QosProfile {
+    reliable(depth).transient_local()
+}
+
+const fn best_effort(depth: usize) -> QosProfile {
+    QosProfile::sensor_data().keep_last(depth)
+}
+
+const MESH: (&str, QosProfile) = ("mesh", latched(4096));
+const MESH_PATCH: (&str, QosProfile) = ("mesh_patch", reliable(4096));
+const FEATURES: (&str, QosProfile) = ("features", latched(1));
+const FEATURE_MARKERS: (&str, QosProfile) = ("feature_markers", latched(1));
+const TIP: (&str, QosProfile) = ("tip", reliable(1));
+const PATH: (&str, QosProfile) = ("path", latched(1));
+const MISMATCH: (&str, QosProfile) = ("mismatch", best_effort(100));
+const DIAGNOSTICS: (&str, QosProfile) = ("/diagnostics", reliable(10));
+
+/// Samples are the last that may be lost: two tenths of a second at 10 kHz. What is kept is no matter of matching.
+const SAMPLES: usize = 2048;
+
+impl MeshPublishers {
+    pub fn new(config: &NodeConfig, node: &mut Node, graph: &mut Graph) -> Result<Self, RosError> {
+        let mut made = Topics { config, node, graph };
+        Ok(Self { tiles: made.publisher(MESH)?, patches: made.publisher(MESH_PATCH)? })
+    }
+
+    pub fn send(&self, publication: Publication) -> r2r::Result<()> {
+        match publication {
+            Publication::Tile(message) => self.tiles.publish(&message.convert()),
+            Publication::MeshPatch(message) => self.patches.publish(&message.convert()),
+            // the others have an outbox of their own
+            _ => Ok(()),
+        }
+    }
+}
+
+impl UrgentPublishers {
+    pub fn new(config: &NodeConfig, node: &mut Node, graph: &mut Graph) -> Result<Self, RosError> {
+        let mut made = Topics { config, node, graph };
+        Ok(Self {
+            features: made.publisher(FEATURES)?,
+            feature_markers: made.publisher(FEATURE_MARKERS)?,
+            tip: made.publisher(TIP)?,
+            path: made.publisher(PATH)?,
+            mismatch: made.publisher(MISMATCH)?,
+            diagnostics: made.publisher(DIAGNOSTICS)?,
+        })
+    }
+
+    pub fn send(&self, publication: Publication) -> r2r::Result<()> {
+        match publication {
+            Publication::Features(message) => self.features.publish(&message.convert()),
+            Publication::FeatureMarkers(message) => self.feature_markers.publish(&message.convert()),
+            Publication::Tip(message) => self.tip.publish(&message.convert()),
+            Publication::Path(message) => self.path.publish(&message.convert()),
+            Publication::Mismatch(message) => self.mismatch.publish(&message.convert()),
+            Publication::Diagnostics(message) => self.diagnostics.publish(&message.convert()),
+            // the mesh has an outbox of its own
+            Publication::Tile(_) | Publication::MeshPatch(_) => Ok(()),
+        }
+    }
+}
+
+/// Everything that is listened to.
+pub(super) fn subscriptions(
+    config: &NodeConfig,
+    node: &mut Node,
+    graph: &mut Graph,
+    shared: &Arc<Shared>,
+) -> Result<Vec<Source>, RosError> {
+    use geometry_msgs::msg as geometry;
+    use tf2_msgs::msg as tf2;
+    let is_probe = config.parameters.string("source") == "probe";
+    let [wrench, pose] = if is_probe { ["probe/wrench", "probe/pose"] } else { ["stylus/wrench", "stylus/pose"] };
+    let samples = best_effort(SAMPLES);
+    let mut made = Topics { config, node, graph };
+    let mut sources = vec![
+        made.source::<geometry::WrenchStamped, WrenchStamped>(wrench, samples.clone(), shared, |_, message| {
+            Arrival::Wrench(message, steady_ns())
+        })?,
+        made.source::<geometry::PoseStamped, PoseStamped>(pose, samples.clone(), shared, |_, message| {
+            Arrival::Pose(message, steady_ns())
+        })?,
+        made.source::<tf2::TFMessage, TFMessage>("/tf", samples, shared, |_, m| Arrival::Tf(m))?,
+        made.source::<tf2::TFMessage, TFMessage>("/tf_static", latched(100), shared, |_, m| Arrival::TfStatic(m))?,
+        made.source::<geometry::PointStamped, PointStamped>("/clicked_point", reliable(10), shared, |_, message| {
+            Arrival::ClickedPoint(message)
+        })?,
+    ];
+    if config.parameters.bool("use_sim_time") {
+        let set = |shared: &Shared, now: Clock| {
+            shared.clock.set(now.clock);
+            Arrival::Clock(now)
+        };
+        sources.push(made.source::<rosgraph_msgs::msg::Clock, _>("/clock", best_effort(1), shared, set)?);
+    }
+    Ok(sources)
+}
+
+struct Topics<'a> {
+    config: &'a NodeConfig,
+    node: &'a mut Node,
+    graph: &'a mut Graph,
+}
+
+impl Topics<'_> {
+    fn publisher<T>(&mut self, (name, qos): (&str, QosProfile)) -> Result<Publisher<T>, RosError>
+    where
+        T: WrappedTypesupport + 'static,
+    {
+        let publisher = self.node.create_publisher::<T>(name, qos).during("publishing a topic")?;
+        self.graph.watch_listeners(self.config.resolve(name)?, publisher.clone());
+        Ok(publisher)
+    }
+
+    fn source<T, M>(
+        &mut self,
+        name: &str,
+        qos: QosProfile,
+        shared: &Arc<Shared>,
+        arrival: fn(&Shared, M) -> Arrival,
+    ) -> Result<Source, RosError>
+    where
+        T: WrappedTypesupport + Convert<M> + Send + 'static,
+        M: Message,
+    {
+        let messages = self.node.subscribe::<T>(name, qos.clone()).during("subscribing to a topic")?;
+        self.graph.watch_senders(self.config.resolve(name)?, M::TYPE_NAME, qos);
+        let shared = shared.clone();
+        Ok(source(messages, move |message| shared.arrive(arrival(&shared, message.convert()))))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use r2r::qos::{DurabilityPolicy, HistoryPolicy, ReliabilityPolicy};
+
+    use super::*;
+
+    #[test]
+    fn the_quality_of_service_is_that_of_the_documentation() {
+        let text = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/ros.md")).unwrap();
+        let (_, table) = text.split_once("| topic | type | reliability |").unwrap();
+        let documented = table.lines().skip(2).take_while(|line| line.starts_with('|')).map(|line| {
+            let cells: Vec<_> =
+                line.trim_matches('|').split('|').map(|cell| cell.replace('`', "").trim().into()).collect();
+            let [name, _, reliability, durability, depth, _]: [String; 6] = cells.try_into().unwrap();
+            [name, reliability, durability, depth]
+        });
+        let published = [MESH, MESH_PATCH, FEATURES, FEATURE_MARKERS, TIP, PATH, MISMATCH, DIAGNOSTICS];
+        let here = published.map(|(name, qos)| {
+            assert_eq!(qos.history, HistoryPolicy::KeepLast, "{name}");
+            let reliability = match qos.reliability {
+                ReliabilityPolicy::Reliable => "reliable",
+                ReliabilityPolicy::BestEffort => "best effort",
+                other => panic!("{name}: {other:?}"),
+            };
+            let durability = match qos.durability {
+                DurabilityPolicy::TransientLocal => "transient local",
+                DurabilityPolicy::Volatile => "volatile",
+                other => panic!("{name}: {other:?}"),
+            };
+            [name.to_owned(), reliability.to_owned(), durability.to_owned(), qos.depth.to_string()]
+        });
+        assert_eq!(here.to_vec(), documented.collect::<Vec<_>>());
+    }
+}
