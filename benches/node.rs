@@ -74,13 +74,14 @@ fn run(faces: usize) {
     let report = node.join().expect("the result can be written").report;
     println!(
         "{:>8} faces, {fed_s:.1} s: accepted {} dropped {:?}; push {:?}; from arrival to mesh {:?} ns; {published} messages out, \
-         {} view frames dropped",
+         {} view frames dropped, {} renewals waited for",
         mesh.face_count(),
         report.accepted,
         report.dropped,
         report.push_ns,
         report.latency_ns,
-        report.dropped_view_frames
+        report.dropped_view_frames,
+        report.waits
     );
 }
 
