@@ -251,13 +251,7 @@ impl Patcher {
     /// A copy of what was felt, without what was made of it for a mesh that follows.
     pub fn copy(&self) -> Self {
         let Self { params, compensator, finder, felt, .. } = self;
-        Self {
-            params: *params,
-            compensator: compensator.clone(),
-            finder: finder.clone(),
-            felt: felt.clone(),
-            live: None,
-        }
+        Self { params: *params, compensator: *compensator, finder: finder.clone(), felt: felt.clone(), live: None }
     }
 
     /// The settings.

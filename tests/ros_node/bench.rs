@@ -42,6 +42,7 @@ impl Plate {
 
     fn of(share: impl Fn(usize) -> std::ops::Range<usize>) -> Self {
         let (stream, touch) = plate_stream(&StylusParams::default(), 1);
+        assert!(stream.noise > 0.0 && !stream.samples.is_empty(), "a bad scan, and a touch that pairs");
         let mut messages = touch.messages;
         messages.sort_by_key(Message::stamp_ns);
         let messages = messages[share(messages.len())].to_vec();

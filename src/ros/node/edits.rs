@@ -13,6 +13,9 @@ use crate::patch::Support;
 /// Vertices, and faces, that go at once: some 50 µs.
 const AT_ONCE: usize = 1000;
 
+/// Where a vertex is, m, in O, and what it rests on.
+pub type VertexPlace = (Point3<f64>, Support);
+
 /// Some changes.
 #[derive(Clone, Debug, Default)]
 pub struct Edits {
@@ -23,7 +26,7 @@ pub struct Edits {
     /// stamp of the newest sample in it, ns
     pub stamp_ns: i64,
     /// place and support; `None`: gone
-    pub vertices: Vec<(u32, Option<(Point3<f64>, Support)>)>,
+    pub vertices: Vec<(u32, Option<VertexPlace>)>,
     /// corners; `None`: gone
     pub faces: Vec<(u32, Option<[u32; 3]>)>,
     /// tiles in which something is to be drawn anew

@@ -41,7 +41,9 @@ impl Engine {
             return Ok(Self::Alone(Box::new(refiner)));
         };
         let patcher = Patcher::new(patcher).map_err(RefineError::from)?;
-        let live = LiveRefiner::new(Arc::clone(scan), refiner, patcher, Pace::default(), ROOM)?;
+        let mut live = LiveRefiner::new(Arc::clone(scan), refiner, patcher, Pace::default(), ROOM)?;
+        // what the first renewal has to look up in the scan takes a second on a large one: no sample is to wait for it
+        live.catch_up()?;
         Ok(Self::Live(Box::new(live)))
     }
 

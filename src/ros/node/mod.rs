@@ -70,13 +70,13 @@ pub enum NodeError {
     NoScan,
     /// The scene cannot be used.
     #[error(transparent)]
-    Scene(#[from] SceneError),
+    Scene(Box<SceneError>),
     /// The scene has no `refine`.
     #[error("the scene names no `refine`, so nothing would move the mesh: add `refine:` to it")]
     NothingMoves,
     /// The scan cannot be read.
     #[error("{0}")]
-    Scan(MeshFileError),
+    Scan(Box<MeshFileError>),
     /// A setting of the scene.
     #[error(transparent)]
     Setting(#[from] SettingError),
@@ -99,7 +99,7 @@ pub enum NodeError {
     Session(#[from] SessionError),
     /// The result cannot be written.
     #[error(transparent)]
-    Outcome(#[from] OutcomeError),
+    Outcome(Box<OutcomeError>),
     /// The result is written, the recording is not whole.
     #[error("{count} messages are not in the session's recording: {reason}")]
     Unrecorded {
@@ -114,6 +114,18 @@ pub enum NodeError {
     /// A thread ended by a fault.
     #[error("a thread of the node ended by a fault of touchup: please report it with the session's folder")]
     Stopped,
+}
+
+impl From<SceneError> for NodeError {
+    fn from(error: SceneError) -> Self {
+        Self::Scene(Box::new(error))
+    }
+}
+
+impl From<OutcomeError> for NodeError {
+    fn from(error: OutcomeError) -> Self {
+        Self::Outcome(Box::new(error))
+    }
 }
 
 impl NodeError {
@@ -151,7 +163,8 @@ impl Setup {
             "inch" => MeshUnit::Inch,
             _ => MeshUnit::Millimetre,
         };
-        let MeshFile { mesh, .. } = read_mesh(&scan_path, mesh_unit).map_err(NodeError::Scan)?;
+        let MeshFile { mesh, .. } =
+            read_mesh(&scan_path, mesh_unit).map_err(|error| NodeError::Scan(Box::new(error)))?;
         let tree = FaceTree::new(&mesh);
         let source = if parameters.string("source") == "probe" { "probe" } else { "stylus" };
         let tool = match parameters.string("tool_frame") {
