@@ -265,7 +265,14 @@ fn a_folder_is_read_in_the_order_of_its_metadata() {
     assert!(text.contains("gone.mcap") && text.contains("metadata.yaml"), "{text}");
     fs::write(folder.path().join("metadata.yaml"), "rosbag2_bagfile_information: [").unwrap();
     assert!(matches!(RecordingReader::open(folder.path(), &Topics::default()), Err(RecordingError::Metadata { .. })));
+    // a recorder that was killed leaves none: then the order is that of the names
     fs::remove_file(folder.path().join("metadata.yaml")).unwrap();
+    fs::rename(folder.path().join("a.mcap"), folder.path().join("c.mcap")).unwrap();
+    let reader = RecordingReader::open(folder.path(), &Topics::default()).unwrap();
+    assert!(reader.map(Result::unwrap).eq([&messages[..300], &poses].concat()));
+    for name in ["b.mcap", "c.mcap"] {
+        fs::remove_file(folder.path().join(name)).unwrap();
+    }
     assert!(matches!(RecordingReader::open(folder.path(), &Topics::default()), Err(RecordingError::Metadata { .. })));
 }
 
