@@ -71,7 +71,7 @@ fn cone_beyond(parted: &Parted, wall: &Wall, end: f64, out: f64) -> Option<Segme
         let better = [moved, drawn, Some(start)].into_iter().flatten();
         let better = better.min_by(|a, b| misfit(a).total_cmp(&misfit(b)))?;
         let faces = flood(parted, faces, &better, tolerance);
-        let area = faces.iter().map(|&face| parted.facets.area(face)).sum();
+        let area = parted.facets.area_of(&faces);
         (!faces.is_empty()).then_some(Segment { primitive: better, faces, area, tolerance, is_exact })
     })
 }

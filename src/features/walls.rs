@@ -90,7 +90,7 @@ impl Wall {
             Primitive::Cylinder { radius, .. } => radius,
             Primitive::Plane { .. } => return None,
         };
-        let area: f64 = faces.iter().map(|&face| facets.area(face)).sum();
+        let area = facets.area_of(faces);
         let whole = std::f64::consts::TAU * radius * (high - low) * coverage;
         let filled = if whole > 0.0 { area / whole } else { 0.0 };
         Some(Self { primitive, segments, origin, axis, ends, coverage, filled })

@@ -3,6 +3,7 @@
 //! The node knows [`port`] alone. What is behind it is chosen when the process starts.
 
 pub mod arguments;
+mod arrivals;
 pub mod clock;
 #[cfg(feature = "ros")]
 pub mod dds;

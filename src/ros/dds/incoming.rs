@@ -47,7 +47,7 @@ pub(super) fn listen(
         let mut events = Events::with_capacity(128);
         // what came before the registration wakes nobody
         listeners.iter_mut().for_each(|listener| listener.take());
-        while !shared.arrivals.is_over.load(Ordering::Relaxed) {
+        while !shared.arrivals.is_over() {
             if let Err(error) = poll.poll(&mut events, None) {
                 if error.kind() == std::io::ErrorKind::Interrupted {
                     continue;
@@ -109,7 +109,7 @@ impl<M: Message> Listener for Topic<M> {
                 Ok(Some((message, info))) => {
                     if let Some(counter) = self.counter {
                         let lost = self.numbers.missing(info.publisher_gid(), info.sequence_number());
-                        self.shared.arrivals.lost[counter].fetch_add(lost, Ordering::Relaxed);
+                        self.shared.lost[counter].fetch_add(lost, Ordering::Relaxed);
                     }
                     if let Some(arrival) = (self.arrival)(&self.shared, message) {
                         self.shared.arrivals.put(arrival);

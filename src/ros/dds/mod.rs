@@ -12,8 +12,7 @@ mod services;
 mod topics;
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc::TrySendError;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::JoinHandle;
 
 use ros2_client::dds::rustdds;
@@ -21,9 +20,10 @@ use ros2_client::{Context, Node, NodeName, NodeOptions, ServiceMapping};
 use thiserror::Error;
 
 use super::arguments::NodeConfig;
+use super::arrivals::Arrivals;
 use super::clock::RosClock;
 use super::names::NameError;
-use super::port::{Arrival, Inbox, Port, Publication};
+use super::port::{Inbox, Port, Publication};
 use outgoing::Outgoing;
 
 /// Why the node cannot speak to others.
@@ -53,35 +53,11 @@ impl RosError {
     }
 }
 
-/// Where arrivals go, and how many could not.
-struct Arrivals {
-    inbox: Inbox,
-    dropped_samples: AtomicU64,
-    dropped_others: AtomicU64,
-    /// wrenches, poses that did not come
-    lost: [AtomicU64; 2],
-    is_over: AtomicBool,
-}
-
-impl Arrivals {
-    /// Hands it to the node, or counts it.
-    fn put(&self, arrival: Arrival) {
-        match self.inbox.try_send(arrival) {
-            Ok(()) => {}
-            Err(TrySendError::Full(Arrival::Wrench(..) | Arrival::Pose(..))) => {
-                self.dropped_samples.fetch_add(1, Ordering::Relaxed);
-            }
-            Err(TrySendError::Full(_)) => {
-                self.dropped_others.fetch_add(1, Ordering::Relaxed);
-            }
-            Err(TrySendError::Disconnected(_)) => self.is_over.store(true, Ordering::Relaxed),
-        }
-    }
-}
-
 /// What the parts of the port share.
 struct Shared {
     arrivals: Arrivals,
+    /// wrenches, poses that did not come
+    lost: [AtomicU64; 2],
     clock: RosClock,
     outgoing: Outgoing,
 }
@@ -104,12 +80,11 @@ impl Port for DdsPort {
     }
 
     fn dropped(&self) -> [u64; 2] {
-        let arrivals = &self.shared.arrivals;
-        [arrivals.dropped_samples.load(Ordering::Relaxed), arrivals.dropped_others.load(Ordering::Relaxed)]
+        self.shared.arrivals.dropped()
     }
 
     fn lost(&self) -> [u64; 2] {
-        self.shared.arrivals.lost.each_ref().map(|count| count.load(Ordering::Relaxed))
+        self.shared.lost.each_ref().map(|count| count.load(Ordering::Relaxed))
     }
 
     fn unsent(&self) -> [u64; 2] {
@@ -119,7 +94,7 @@ impl Port for DdsPort {
 
 impl Drop for DdsPort {
     fn drop(&mut self) {
-        self.shared.arrivals.is_over.store(true, Ordering::Relaxed);
+        self.shared.arrivals.end();
         self.shared.outgoing.close();
         // without it the thread stays until the next message: nothing worse
         let _ = self.waker.wake();
@@ -137,13 +112,8 @@ impl Drop for DdsPort {
 pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosError> {
     let is_simulated = config.parameters.bool("use_sim_time");
     let shared = Arc::new(Shared {
-        arrivals: Arrivals {
-            inbox,
-            dropped_samples: AtomicU64::new(0),
-            dropped_others: AtomicU64::new(0),
-            lost: [const { AtomicU64::new(0) }; 2],
-            is_over: AtomicBool::new(false),
-        },
+        arrivals: Arrivals::new(inbox),
+        lost: [const { AtomicU64::new(0) }; 2],
         clock: RosClock::new(is_simulated),
         outgoing: Outgoing::default(),
     });

@@ -52,7 +52,7 @@ pub(super) fn server(node: &mut Node, shared: &Arc<Shared>) -> Result<[Source; 2
     let shared = shared.clone();
     let goals = source(requests, move |request: ActionServerGoalRequest<Action>| {
         let wanted = request.goal.clone().convert();
-        shared.arrive(Arrival::Call(Call::Probe(wanted, goal(request, &shared, &running))));
+        shared.arrivals.put(Arrival::Call(Call::Probe(wanted, goal(request, &shared, &running))));
     });
     Ok([goals, Box::new(move || take_cancels(&mut locked(&cancels)))])
 }

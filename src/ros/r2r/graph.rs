@@ -86,7 +86,7 @@ impl Watched {
             Some(reason) => tracing::warn!(topic, "{reason}"),
             None => tracing::info!(topic, others = count, "who is on a topic has changed"),
         }
-        shared.arrive(Arrival::Matched(Endpoint { topic, count, mismatch }));
+        shared.arrivals.put(Arrival::Matched(Endpoint { topic, count, mismatch }));
     }
 }
 

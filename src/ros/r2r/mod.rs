@@ -17,8 +17,6 @@ mod stand_in;
 mod topics;
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc::TrySendError;
 use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -30,6 +28,7 @@ use stand_in::{std_srvs, touchup_msgs};
 use thiserror::Error;
 
 use super::arguments::NodeConfig;
+use super::arrivals::Arrivals;
 use super::clock::RosClock;
 use super::names::NameError;
 use super::port::{Arrival, Inbox, Port, Publication, Reply};
@@ -70,10 +69,7 @@ impl<T> During<T> for r2r::Result<T> {
 
 /// What the parts of the port share.
 struct Shared {
-    inbox: Inbox,
-    dropped_samples: AtomicU64,
-    dropped_others: AtomicU64,
-    is_over: AtomicBool,
+    arrivals: Arrivals,
     clock: RosClock,
     urgent: Outbox,
     mesh: Outbox,
@@ -81,29 +77,7 @@ struct Shared {
 
 impl Shared {
     fn new(inbox: Inbox, clock: RosClock) -> Self {
-        Self {
-            inbox,
-            dropped_samples: AtomicU64::new(0),
-            dropped_others: AtomicU64::new(0),
-            is_over: AtomicBool::new(false),
-            clock,
-            urgent: Outbox::default(),
-            mesh: Outbox::default(),
-        }
-    }
-
-    /// Hands it to the node, or counts it.
-    fn arrive(&self, arrival: Arrival) {
-        match self.inbox.try_send(arrival) {
-            Ok(()) => {}
-            Err(TrySendError::Full(Arrival::Wrench(..) | Arrival::Pose(..))) => {
-                self.dropped_samples.fetch_add(1, Ordering::Relaxed);
-            }
-            Err(TrySendError::Full(_)) => {
-                self.dropped_others.fetch_add(1, Ordering::Relaxed);
-            }
-            Err(TrySendError::Disconnected(_)) => self.is_over.store(true, Ordering::Relaxed),
-        }
+        Self { arrivals: Arrivals::new(inbox), clock, urgent: Outbox::default(), mesh: Outbox::default() }
     }
 
     /// An answer that goes out from the thread that sends.
@@ -160,7 +134,7 @@ impl Port for R2rPort {
     }
 
     fn dropped(&self) -> [u64; 2] {
-        [&self.shared.dropped_samples, &self.shared.dropped_others].map(|count| count.load(Ordering::Relaxed))
+        self.shared.arrivals.dropped()
     }
 
     /// r2r does not tell the numbers of senders.
@@ -184,7 +158,7 @@ impl Drop for R2rPort {
             // one that panicked has said so
             let _ = thread.join();
         }
-        self.shared.is_over.store(true, Ordering::Relaxed);
+        self.shared.arrivals.end();
         if let Some(thread) = self.spinning.take() {
             let _ = thread.join();
         }
@@ -245,7 +219,7 @@ const PAUSE: Duration = Duration::from_millis(2);
 fn spin(mut node: r2r::Node, mut sources: Vec<Source>, mut graph: graph::Graph, shared: &Arc<Shared>) {
     let _told = ToldWhenOver(shared);
     let mut in_vain = 0;
-    while !shared.is_over.load(Ordering::Relaxed) {
+    while !shared.arrivals.is_over() {
         let began = Instant::now();
         node.spin_once(NOTHING_CAME);
         let has_come = sources.iter_mut().fold(false, |any, take| take() | any);
@@ -265,9 +239,9 @@ struct ToldWhenOver<'a>(&'a Shared);
 
 impl Drop for ToldWhenOver<'_> {
     fn drop(&mut self) {
-        if !self.0.is_over.load(Ordering::Relaxed) {
+        if !self.0.arrivals.is_over() {
             tracing::error!("the node hears nothing any more: ROS has ended");
-            self.0.arrive(Arrival::Shutdown);
+            self.0.arrivals.put(Arrival::Shutdown);
         }
     }
 }

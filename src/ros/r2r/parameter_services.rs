@@ -135,7 +135,7 @@ impl Held {
             results.push(result);
             self.set_next(wanted, results, answer);
         });
-        shared.arrive(Arrival::SetParameter(name, value, reply));
+        shared.arrivals.put(Arrival::SetParameter(name, value, reply));
     }
 
     /// All or none, as far as the table of parameters can tell before any is set.

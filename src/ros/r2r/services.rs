@@ -43,7 +43,7 @@ impl Services<'_> {
         A: Convert<T::Response> + Send + 'static,
     {
         let shared = self.shared.clone();
-        let take = move |request, reply| shared.arrive(Arrival::Call(call(request, reply)));
+        let take = move |request, reply| shared.arrivals.put(Arrival::Call(call(request, reply)));
         self.sources.push(server::<T, A>(self.node, name, self.shared, take)?);
         Ok(())
     }

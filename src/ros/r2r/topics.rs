@@ -165,7 +165,7 @@ impl Topics<'_> {
         let messages = self.node.subscribe::<T>(name, qos.clone()).during("subscribing to a topic")?;
         self.graph.watch_senders(self.config.resolve(name)?, M::TYPE_NAME, qos);
         let shared = shared.clone();
-        Ok(source(messages, move |message| shared.arrive(arrival(&shared, message.convert()))))
+        Ok(source(messages, move |message| shared.arrivals.put(arrival(&shared, message.convert()))))
     }
 }
 
