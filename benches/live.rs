@@ -2,8 +2,8 @@
 //! patch has a thread of its own.
 //!
 //! A ball slides over a wavy plate in a raster, felt a little deeper than the scan says. One line for each minute: times of
-//! [`LiveRefiner::push`], how old the touches are that the patch shows (in time of the samples), how often a push had to
-//! wait for it, faces, and memory of the process.
+//! [`LiveRefiner::push`], how old the touches are that the patch shows (in time of the samples), how many renewals of it
+//! were late, faces, and memory of the process.
 //!
 //! `cargo bench --bench live [-- FACES [SECONDS [fast]]]`; `fast` does not wait for real time, so that each push waits for
 //! the patch and pushes are not timed.
@@ -70,9 +70,10 @@ fn main() {
     let params = PatcherParams::new(RADIUS, Some(STIFFNESS), SCAN_NOISE);
     let patcher = Patcher::new(params).expect("the settings are in range");
     let scan = Arc::new((mesh.clone(), FaceTree::new(&mesh)));
-    let mut live = LiveRefiner::new(scan, refiner, patcher, Pace::default(), 1 << 18).expect("there is memory");
+    let pace = Pace { is_patient: is_fast, ..Pace::default() };
+    let mut live = LiveRefiner::new(scan, refiner, patcher, pace, 1 << 18).expect("there is memory");
     println!("{} faces, {:.0} MB; {seconds} s at 1 kHz", mesh.face_count(), resident());
-    let (mut times, mut ages, mut waits, begun) = (Vec::new(), Vec::new(), 0, Instant::now());
+    let (mut times, mut ages, mut late, begun) = (Vec::new(), Vec::new(), 0, Instant::now());
     for i in 0..seconds * 1000 {
         let sample = noisy(i);
         let due = Duration::from_millis(if is_fast { 0 } else { i as u64 });
@@ -90,17 +91,17 @@ fn main() {
             let [median, p99, p999] = [0.5, 0.99, 0.999].map(|share| percentile(&times, share));
             println!(
                 "{:5.1} min: push median {median:6.2} us p99 {p99:7.2} p99.9 {p999:7.1} max {:8.0}; patch behind {:4.1} ms, \
-                 p99 {:4.1}; waited {:4}; {} faces, {:.0} MB, {:.0} s",
+                 p99 {:4.1}; late {:4}; {} faces, {:.0} MB, {:.0} s",
                 (i + 1) as f64 * STEP_NS as f64 * 1e-9 / 60.0,
                 percentile(&times, 1.0),
                 percentile(&ages, 0.5),
                 percentile(&ages, 0.99),
-                live.counts().waits - waits,
+                live.counts().late - late,
                 live.refiner().mesh().face_count(),
                 resident(),
                 begun.elapsed().as_secs_f64(),
             );
-            waits = live.counts().waits;
+            late = live.counts().late;
             times.clear();
             ages.clear();
         }

@@ -1,92 +1,206 @@
 //! What a sample costs in the node: from the arrival of what completes it to the mesh, with view, features and recording
 //! beside it. A ball slides over a wavy plate in real time, wrench and pose each at 1 kHz.
 //!
-//! `cargo bench --bench node [-- FACES…]`
+//! - `cargo bench --bench node [-- FACES…]`: alone, what arrives is put in by hand.
+//! - `cargo bench --bench node -- dds [FACES [SECONDS]]`: sensors and viewer are another process, over DDS on the loopback
+//!   interface; before and after it a bare echo over the same. 600 s is the soak; memory is told each minute.
 
+#[path = "node/peer.rs"]
+mod peer;
 #[path = "common/slide.rs"]
 mod slide;
 #[path = "../tests/common/wavy.rs"]
 mod wavy;
 
+use std::path::Path;
+use std::process::{Child, Command};
 use std::sync::mpsc::sync_channel;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use slide::sample;
 use touchup::io::mesh_file::{MeshUnit, write_mesh};
+use touchup::live::Quantiles;
+use touchup::ros::arguments::NodeConfig;
 use touchup::ros::clock::steady_ns;
-use touchup::ros::in_process::start;
-use touchup::ros::messages::{Header, Point, Pose, PoseStamped, Quaternion, Time, Vector3, Wrench, WrenchStamped};
-use touchup::ros::node::{INBOX, Node};
+use touchup::ros::messages::{
+    HapticMismatch, Header, Point, Pose, PoseStamped, Quaternion, Time, Vector3, Wrench, WrenchStamped,
+};
+use touchup::ros::node::{INBOX, Prepared, Report};
 use touchup::ros::parameters::{ParameterValue, Parameters};
-use touchup::ros::port::Arrival;
+use touchup::ros::port::{Arrival, Publication};
+use touchup::ros::{dds, in_process};
 use touchup::touch::Sample;
 use wavy::wavy_plate;
 
-/// Width of the raster, m.
-const WIDTH: f64 = 0.8 * wavy::SIDE;
-/// So long it slides.
+/// Width of the raster, m: 2.3 minutes each time, so that a soak comes to the same places again and again.
+const WIDTH: f64 = 20e-3;
+/// So long it slides in process.
 const SECONDS: usize = 20;
+/// So long the echo is asked.
+const ECHO_SECONDS: usize = 10;
 
 fn header(stamp_ns: i64, frame: &str) -> Header {
     let (sec, nanosec) = (stamp_ns / 1_000_000_000, stamp_ns % 1_000_000_000);
     Header { stamp: Time { sec: sec as i32, nanosec: nanosec as u32 }, frame_id: frame.to_owned() }
 }
 
-fn arrivals(sample: &Sample) -> [Arrival; 2] {
+fn messages(sample: &Sample) -> (WrenchStamped, PoseStamped) {
     let (p, q) = (sample.pose_ot.translation.vector, sample.pose_ot.rotation);
     let pose =
         Pose { position: Point { x: p.x, y: p.y, z: p.z }, orientation: Quaternion { x: q.i, y: q.j, z: q.k, w: q.w } };
     let force = sample.wrench.force;
     let wrench = Wrench { force: Vector3 { x: force.x, y: force.y, z: force.z }, torque: Vector3::default() };
-    [
-        Arrival::Wrench(WrenchStamped { header: header(sample.stamp_ns, "stylus"), wrench }, steady_ns()),
-        Arrival::Pose(PoseStamped { header: header(sample.stamp_ns, "object"), pose }, steady_ns()),
-    ]
+    (
+        WrenchStamped { header: header(sample.stamp_ns, "stylus"), wrench },
+        PoseStamped { header: header(sample.stamp_ns, "object"), pose },
+    )
 }
 
-fn run(faces: usize) {
-    let folder = tempfile::tempdir().expect("there is room in the folder for temporary files");
+fn shown(Quantiles { median, p99, p999, max }: Quantiles) -> String {
+    let us = |ns: u64| ns as f64 * 1e-3;
+    format!("p50 {:.1} us p99 {:.0} p99.9 {:.0} max {:.0}", us(median), us(p99), us(p999), us(max))
+}
+
+fn told(report: &Report) {
+    println!(
+        "accepted {} dropped {:?} refused {:?} unrecorded {}; push {}; from arrival to mesh {}; {} view frames dropped, {} \
+         renewals late",
+        report.accepted,
+        report.dropped,
+        report.refused,
+        report.unrecorded,
+        shown(report.push_ns),
+        shown(report.latency_ns),
+        report.dropped_view_frames,
+        report.late_renewals
+    );
+}
+
+fn parameters(folder: &Path, faces: usize) -> Parameters {
     let mesh = wavy_plate(faces);
-    let scan = folder.path().join("scan.ply");
+    let scan = folder.join("scan.ply");
     write_mesh(&scan, &mesh, MeshUnit::Millimetre).expect("the folder is there");
-    let text = |path: &std::path::Path| ParameterValue::String(path.display().to_string());
+    println!("{} faces", mesh.face_count());
+    let text = |path: &Path| ParameterValue::String(path.display().to_string());
     let mut parameters = Parameters::default();
     parameters.set("scan", &text(&scan)).expect("a path is text");
-    parameters.set("session_folder", &text(folder.path())).expect("a path is text");
+    parameters.set("session_folder", &text(folder)).expect("a path is text");
+    parameters
+}
+
+fn alone(faces: usize) {
+    let folder = tempfile::tempdir().expect("there is room in the folder for temporary files");
     let (inbox, received) = sync_channel(INBOX);
-    let (port, world) = start(inbox);
-    let node = Node::start(parameters, port, received).expect("the scan is sound");
+    let (port, world) = in_process::start(inbox);
+    let ready = Prepared::new(parameters(folder.path(), faces)).expect("the scan is sound");
+    let node = ready.start(port, received, None).expect("there are threads");
     let mut published = 0;
     let begun = Instant::now();
     for i in 0..1000 * SECONDS {
         sleep(Duration::from_millis(i as u64).saturating_sub(begun.elapsed()));
-        for arrival in arrivals(&sample(i, WIDTH)) {
-            // what finds no room is in the report
-            let _ = world.arrive(arrival);
-        }
+        let (wrench, pose) = messages(&sample(i, WIDTH));
+        // what finds no room is in the report
+        let _ = world.arrive(Arrival::Wrench(wrench, steady_ns()));
+        let _ = world.arrive(Arrival::Pose(pose, steady_ns()));
         if i % 20 == 0 {
             published += world.published().len();
         }
     }
-    let fed_s = begun.elapsed().as_secs_f64();
+    println!("{:.1} s, {published} messages out", begun.elapsed().as_secs_f64());
     world.arrive_patiently(Arrival::Shutdown);
-    let report = node.join().expect("the result can be written").report;
-    println!(
-        "{:>8} faces, {fed_s:.1} s: accepted {} dropped {:?}; push {:?}; from arrival to mesh {:?} ns; {published} messages out, \
-         {} view frames dropped, {} renewals waited for",
-        mesh.face_count(),
-        report.accepted,
-        report.dropped,
-        report.push_ns,
-        report.latency_ns,
-        report.dropped_view_frames,
-        report.waits
-    );
+    told(&node.join().expect("the result can be written").report);
+}
+
+/// This program again, as the other end.
+fn other(role: &str, domain: u16, seconds: usize) -> Child {
+    let program = std::env::current_exe().expect("a program knows where it is");
+    let arguments = [role.to_owned(), domain.to_string(), seconds.to_string()];
+    Command::new(program).args(arguments).spawn().expect("what runs can be started again")
+}
+
+fn config(domain: u16, parameters: Parameters) -> NodeConfig {
+    let variable = |name: &str| match name {
+        "ROS_DOMAIN_ID" => Some(domain.to_string()),
+        "ROS_LOCALHOST_ONLY" => Some("1".to_owned()),
+        _ => None,
+    };
+    NodeConfig { parameters, ..NodeConfig::new(&[], variable).expect("the domain is in its range") }
+}
+
+/// Answers wrenches over DDS, and does nothing else.
+fn echo(domain: u16) {
+    let (inbox, arrivals) = sync_channel(INBOX);
+    let port = dds::start(&config(domain, Parameters::default()), inbox.clone()).expect("the loopback interface is up");
+    let mut asking = other("echo", domain, ECHO_SECONDS);
+    let waiting = std::thread::spawn(move || {
+        let is_well = asking.wait().is_ok_and(|status| status.success());
+        inbox.send(Arrival::Shutdown).expect("the echo listens");
+        assert!(is_well, "the other process failed");
+    });
+    for arrival in arrivals {
+        match arrival {
+            Arrival::Wrench(WrenchStamped { header, .. }, _) => {
+                port.publish(Publication::Mismatch(HapticMismatch { header, ..HapticMismatch::default() }));
+            }
+            Arrival::Shutdown => break,
+            _ => {}
+        }
+    }
+    waiting.join().expect("the other process ends well");
+}
+
+/// Memory of the process, MB.
+fn resident() -> f64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let kilobytes =
+        status.lines().find_map(|line| line.strip_prefix("VmRSS:")?.trim().strip_suffix(" kB")?.parse().ok());
+    kilobytes.map_or(f64::NAN, |kilobytes: f64| kilobytes / 1e3)
+}
+
+fn over_dds(faces: usize, seconds: usize) {
+    // a domain that nobody else is likely to have: those above 101 take ports that Linux gives away
+    let domain = 1 + (std::process::id() % 100) as u16;
+    echo(domain);
+    let folder = tempfile::tempdir().expect("there is room in the folder for temporary files");
+    let parameters = parameters(folder.path(), faces);
+    let (inbox, received) = sync_channel(INBOX);
+    let ready = Prepared::new(parameters.clone()).expect("the scan is sound");
+    let port = dds::start(&config(domain, parameters), inbox.clone()).expect("the loopback interface is up");
+    let node = ready.start(port.clone(), received, None).expect("there are threads");
+    let mut peer = other("sensors", domain, seconds);
+    let (begun, mut minute) = (Instant::now(), 0);
+    let is_well = loop {
+        if begun.elapsed().as_secs() >= 60 * minute {
+            println!("{minute:3} min: {:.0} MB", resident());
+            minute += 1;
+        }
+        if let Some(status) = peer.try_wait().expect("it is ours") {
+            break status.success();
+        }
+        sleep(Duration::from_millis(100));
+    };
+    assert!(is_well, "the other process failed");
+    println!("at the end {:.0} MB", resident());
+    let joined = other("late", domain, 0).wait();
+    assert!(joined.is_ok_and(|status| status.success()), "the late joiner failed");
+    println!("lost on the way {:?}, unsent {:?}", port.lost(), port.unsent());
+    inbox.send(Arrival::Shutdown).expect("the node listens");
+    told(&node.join().expect("the result can be written").report);
+    drop(port);
+    echo(domain);
 }
 
 fn main() {
-    let wanted: Vec<usize> = std::env::args().filter_map(|argument| argument.parse().ok()).collect();
-    let wanted = if wanted.is_empty() { vec![100_000, 1_000_000] } else { wanted };
-    wanted.into_iter().for_each(run);
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
+    let numbers: Vec<usize> = arguments.iter().filter_map(|argument| argument.parse().ok()).collect();
+    let number = |at: usize, default: usize| numbers.get(at).copied().unwrap_or(default);
+    match arguments.first().map(String::as_str) {
+        Some("dds") => over_dds(number(0, 1_000_000), number(1, 30)),
+        Some("echo") => peer::run(number(0, 0) as u16, number(1, 0), false),
+        Some("sensors") => peer::run(number(0, 0) as u16, number(1, 0), true),
+        Some("late") => peer::join_late(number(0, 0) as u16),
+        _ if numbers.is_empty() => [100_000, 1_000_000].into_iter().for_each(alone),
+        _ => numbers.into_iter().for_each(alone),
+    }
 }

@@ -45,8 +45,9 @@ fn main() -> anyhow::Result<()> {
                 ..HapticMismatch::default()
             })),
             Arrival::Call(Call::Undo(request, reply)) => {
-                let answer =
-                    UndoResponse { success: true, message: "echo".into(), mesh_version: 1 << 40, ..Default::default() };
+                // as long as it is asked for: above 1.4 kB it goes out in fragments
+                let message = "echo".repeat(request.strokes as usize);
+                let answer = UndoResponse { success: true, message, mesh_version: 1 << 40, ..Default::default() };
                 reply.send(UndoResponse { strokes: request.strokes, ..answer });
             }
             Arrival::Call(Call::Pause(request, reply)) => {

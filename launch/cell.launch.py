@@ -61,6 +61,10 @@ def actions(context):
         parameters["scan"] = text(absolute(given("scan")))
     if given("mesh_unit"):
         parameters["mesh_unit"] = text(given("mesh_unit"))
+    if given("sim_part"):
+        parameters["sim_part"] = text(absolute(given("sim_part")))
+    if given("allow_motion"):
+        parameters["allow_motion"] = given("allow_motion") == "true"
     started = [
         Node(
             package="touchup",
@@ -104,6 +108,10 @@ def generate_launch_description():
     return LaunchDescription(
         [
             argument("robot", default_value="none", choices=["none", "sim", "ur"], description="Who moves the probe."),
+            argument("sim_part", default_value="", description="With robot:=sim: the part as it is, a mesh."),
+            argument(
+                "allow_motion", default_value="", choices=["", *yes_no], description="Whether the arm may move; empty: as in params."
+            ),
             argument("source", default_value="stylus", choices=["stylus", "probe"], description="Who touches."),
             argument("scan", default_value="", description="The mesh to refine: PLY, STL or OBJ."),
             argument("mesh_unit", default_value="", choices=["", "m", "mm", "inch"], description="Unit of its file."),

@@ -26,7 +26,7 @@ def player(context):
             executable="touchup",
             name="replay",
             namespace=given("namespace") or None,
-            arguments=["replay", recording, *speed],
+            arguments=["replay", recording, "--source", given("source"), *speed],
             output="screen",
         )
     ]

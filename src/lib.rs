@@ -17,6 +17,9 @@
 //! | [`align`] | where one shape lies on another: rigid motions of pairs and of surfaces |
 //! | [`compare`] | how far a mesh is from the true part, in numbers and as a picture |
 //! | [`calibrate`] | what hangs on the sensor, and where the ball is |
+//! | [`explore`] | where to touch next |
+//! | [`robot`] | an arm that holds a probe: kinematics, and where a touch began; `robot::ur` (feature `ur`): a UR |
+//! | [`probe`] | flag to feature with an arm: wishes become ways that keep clear, touches, and a reason for every ending |
 //! | [`sim`] | known surfaces, a scanner and a stylus to test against |
 //! | [`io`] | mesh files and recordings; with [`scene`] the only file access |
 //! | [`scene`] | the YAML that names the parts of a scene |
@@ -49,12 +52,15 @@ pub mod align;
 pub mod calibrate;
 pub mod cli;
 pub mod compare;
+pub mod explore;
 pub mod features;
 pub mod io;
 pub mod live;
 pub mod mesh;
 pub mod patch;
+pub mod probe;
 pub mod refine;
+pub mod robot;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 pub mod ros;
 pub mod scene;

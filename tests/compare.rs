@@ -252,9 +252,9 @@ proptest! {
 
 /// A square in one colour on each half.
 fn picture_of(deviations: &[f64], mesh: &TriMesh, panels: usize) -> Picture {
-    let panel = Panel { mesh, deviations, classes: None, title: "a panel", note: "its note" };
+    let panel = Panel { mesh, deviations, classes: None, paint: None, title: "a panel", note: "its note" };
     let from = Some(Vector3::z());
-    let params = PictureParams { title: "a title", width: 800, range: 1e-3, from, weights: None };
+    let params = PictureParams { title: "a title", width: 800, range: 1e-3, from, weights: None, legend: &[] };
     draw_picture(&vec![panel; panels], &params)
 }
 

@@ -11,13 +11,16 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("patch", &["touch", "mesh"]),
     ("refine", &["touch", "mesh", "patch"]),
     ("live", &["touch", "mesh", "patch", "refine"]),
-    ("sim", &["touch", "mesh"]),
+    ("explore", &["touch", "mesh", "features"]),
+    ("robot", &["touch", "explore"]),
+    ("probe", &["touch", "mesh", "features", "explore", "robot"]),
+    ("sim", &["touch", "mesh", "robot"]),
     ("features", &["touch", "mesh"]),
     ("align", &["mesh", "features"]),
     ("compare", &["touch", "mesh", "align", "features"]),
     ("calibrate", &["touch", "align"]),
-    ("io", &["touch", "mesh", "features", "align"]),
-    ("scene", &["touch", "mesh", "patch", "refine", "sim", "io"]),
+    ("io", &["touch", "mesh", "features", "align", "robot", "probe"]),
+    ("scene", &["touch", "mesh", "patch", "refine", "explore", "robot", "probe", "sim", "io"]),
     ("session", &["touch", "mesh", "patch", "refine", "live", "features", "io"]),
     (
         "ros",
@@ -28,6 +31,9 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "refine",
             "live",
             "features",
+            "explore",
+            "robot",
+            "probe",
             "sim",
             "align",
             "calibrate",
@@ -46,6 +52,9 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "refine",
             "live",
             "features",
+            "explore",
+            "robot",
+            "probe",
             "sim",
             "align",
             "calibrate",
@@ -54,16 +63,36 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "scene",
             "session",
             "ros",
+            "robot",
         ],
     ),
 ];
 
 /// Same input, same bytes out: nothing of the world outside comes in.
-const PURE: &[&str] = &["touch", "mesh", "patch", "features", "refine", "align", "compare", "calibrate", "sim"];
+const PURE: &[&str] = &[
+    "touch",
+    "mesh",
+    "patch",
+    "features",
+    "refine",
+    "align",
+    "compare",
+    "calibrate",
+    "explore",
+    "robot",
+    "probe",
+    "sim",
+];
+
+/// The parts of them that are the way to a device, with its processes, sockets and deadlines; by how their files begin.
+const DEVICES: &[&str] = &["robot/ur/"];
+
+/// The only places with Python.
+const MAY_USE_PYTHON: &[&str] = &["robot/ur/child/"];
 
 /// What a pure room may not name.
 const IMPURE_PATHS: &[&str] = &["std::fs", "std::thread", "std::env", "std::io", "std::net", "std::process"];
-const IMPURE_NAMES: &[&str] = &["Instant", "SystemTime", "pyo3", "println", "eprintln", "print", "eprint", "dbg"];
+const IMPURE_NAMES: &[&str] = &["Instant", "SystemTime", "println", "eprintln", "print", "eprint", "dbg"];
 
 /// The only rooms with file access.
 const MAY_OPEN_FILES: &[&str] = &["io", "scene"];
@@ -264,6 +293,8 @@ fn breaches(file: &str, source: &str) -> Vec<String> {
     };
     let code = code_of(source);
     let tokens = tokens(&code);
+    let is_pure = PURE.contains(&room) && !DEVICES.iter().any(|start| file.starts_with(start));
+    let may_use_python = MAY_USE_PYTHON.iter().any(|start| file.starts_with(start));
     let is_room = |name: &&str| MAY_USE.iter().any(|(room, _)| room == name);
     let mut found: Vec<String> = rooms_reached(&tokens, depth)
         .into_iter()
@@ -274,13 +305,16 @@ fn breaches(file: &str, source: &str) -> Vec<String> {
         let is_std = tokens[at] == "std" && tokens.get(at + 1) == Some(&"::");
         for name in if is_std { names_at(&tokens, at + 2) } else { Vec::new() } {
             let path = format!("std::{name}");
-            let is_impure = PURE.contains(&room) && IMPURE_PATHS.contains(&path.as_str());
+            let is_impure = is_pure && IMPURE_PATHS.contains(&path.as_str());
             if is_impure || (name == "fs" && !MAY_OPEN_FILES.contains(&room)) {
                 found.push(format!("{file}: {room} may not use {path}"));
             }
         }
-        if PURE.contains(&room) && IMPURE_NAMES.contains(&tokens[at]) {
+        if is_pure && IMPURE_NAMES.contains(&tokens[at]) {
             found.push(format!("{file}: {room} is pure and may not use {}", tokens[at]));
+        }
+        if tokens[at] == "pyo3" && !may_use_python {
+            found.push(format!("{file}: Python is in {} alone", MAY_USE_PYTHON.join(", ")));
         }
     }
     found
@@ -338,6 +372,11 @@ fn a_breach_is_found_however_it_is_written() {
         ("mesh/mod.rs", "fn f<'a>(x: &'a str) { dbg!(x) }"),
         ("mesh/mod.rs", "#[cfg(test)] mod tests { fn f() { { } } } use crate::io;"),
         ("cli/demo.rs", "std::fs::write(path, text)"),
+        ("robot/touching.rs", "use std::thread;"),
+        ("robot/ur/client.rs", "use pyo3::Python;"),
+        ("cli/ur.rs", "pyo3::Python::attach(f)"),
+        ("robot/ur/setup.rs", "std::fs::read(path)"),
+        ("robot/ur/arm.rs", "use crate::sim::Plate;"),
         ("cellar/mod.rs", ""),
     ];
     for (file, source) in bad {
@@ -355,6 +394,8 @@ fn what_is_allowed_is_let_through() {
         ("mesh/mod.rs", "#[cfg(test)] mod tests { use crate::io; fn f() { println!(\"}\"); } } fn g() {}"),
         ("io/mod.rs", "use std::fs; use std::io::Read;"),
         ("cli/refine.rs", "let t = std::time::Instant::now(); println!(\"x\");"),
+        ("robot/ur/client.rs", "use std::{thread, process}; use std::time::Instant; use crate::robot::ArmError;"),
+        ("robot/ur/child/library.rs", "use pyo3::Python;"),
         ("main.rs", "use std::fs; fn main() { println!() }"),
     ];
     for (file, source) in good {

@@ -20,6 +20,8 @@ use soundness::{intersections, rim_length, soundness};
 
 /// Parts of the patch that are taken up at one sample.
 const AT_ONCE: usize = 40;
+/// The same on every machine.
+const PATIENT: Pace = Pace { every_ns: 8_000_000, after_ns: 10_000_000, is_patient: true };
 /// Time between renewals, ns.
 const EVERY: i64 = 10_000_000;
 
@@ -158,7 +160,7 @@ fn assert_same(a: &TriMesh, b: &TriMesh) {
 #[test]
 fn two_threads_do_what_one_does_and_leave_the_scan_where_it_was() {
     let stream = stream(2, 0.1);
-    let pace = Pace::default();
+    let pace = PATIENT;
     let (touching, at_the_end) = one_after_the_other(&stream, pace);
     let scan = Arc::new((stream.scan.clone(), FaceTree::new(&stream.scan)));
     let mut live = LiveRefiner::new(scan, refiner(&stream.scan), patcher(&stream), pace, 1000).unwrap();
@@ -173,6 +175,30 @@ fn two_threads_do_what_one_does_and_leave_the_scan_where_it_was() {
     let (refiner, _) = live.finish().unwrap();
     assert_same(refiner.mesh(), &at_the_end);
     assert_eq!(moved(refiner.mesh()), 0);
+}
+
+/// Samples come as fast as they can, and the patch cannot keep up: it is renewed more rarely, and what is known at the end is
+/// the same.
+#[test]
+fn a_late_patch_holds_no_sample_up_and_changes_nothing_of_the_result() {
+    let stream = stream(5, 0.1);
+    let scan = Arc::new((stream.scan.clone(), FaceTree::new(&stream.scan)));
+    let renewals = [true, false].map(|is_patient| {
+        let pace = Pace { is_patient, ..PATIENT };
+        let mut live =
+            LiveRefiner::new(Arc::clone(&scan), refiner(&stream.scan), patcher(&stream), pace, 1000).unwrap();
+        stream.samples.iter().for_each(|sample| assert!(live.push(sample).is_ok()));
+        let renewals = live.counts().renewals;
+        let (_, mut told) = live.finish().unwrap();
+        told.flush();
+        let mut all_at_once = patcher(&stream);
+        stream.samples.iter().for_each(|sample| all_at_once.push(sample));
+        all_at_once.flush();
+        assert!(whole(&stream, &told) == whole(&stream, &all_at_once));
+        renewals
+    });
+    println!("renewals: {renewals:?}");
+    assert!(0 < renewals[1] && renewals[1] < renewals[0]);
 }
 
 /// A touch counts at once for the haptic update, and within 50 ms for the patch.
@@ -201,7 +227,7 @@ fn a_touch_moves_the_mesh_at_once_and_is_in_the_patch_within_50_ms() {
     let refiner = Refiner::new(scan.clone(), RefineParams::robust(tip)).unwrap();
     let patcher = Patcher::new(PatcherParams::new(tip.radius, None, 0.3e-3)).unwrap();
     let both = Arc::new((scan.clone(), FaceTree::new(&scan)));
-    let mut live = LiveRefiner::new(both, refiner, patcher, Pace::default(), 1000).unwrap();
+    let mut live = LiveRefiner::new(both, refiner, patcher, PATIENT, 1000).unwrap();
     let (mut at_once, mut late) = (0, 0);
     for i in 0..6000 {
         let before = live.refiner().closest_face(&(sample(i).pose_ot.translation.vector.into()), 1.0).unwrap();

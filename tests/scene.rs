@@ -4,11 +4,12 @@ use std::collections::BTreeSet;
 
 use nalgebra::vector;
 use proptest::prelude::*;
+use touchup::io::mesh_file::MeshUnit;
 use touchup::patch::PatcherParams;
 use touchup::refine::{Along, ContactModel, DynamicsParams, GuardParams, RefineParams, RoiSize, StepRule, TipParams};
 use touchup::scene::{
     BiasSection, BiasTrackingSection, CompensationSection, GravityAxes, MarkersSection, Mode, PayloadSection,
-    ScanToSpaceSection, Scene, SceneError, Setting,
+    RobotSection, ScanToSpaceSection, Scene, SceneError, Setting,
 };
 use touchup::touch::{BiasParams, SyncParams, TipShape, WrenchFrame};
 
@@ -37,6 +38,19 @@ fn the_shipped_file_is_the_default() {
     assert_eq!(plain, CompensationSection::default());
 }
 
+#[test]
+fn the_scene_of_the_demo_is_the_default_with_a_scan() {
+    let path = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/config/demo.yaml"));
+    let mut demo = Scene::read(path).unwrap();
+    let (scan, unit) = demo.scan_file(path).unwrap();
+    assert_eq!((scan, unit), (path.parent().unwrap().join("../out/scan.ply"), MeshUnit::Millimetre));
+    demo.scan.as_mut().unwrap().file = None;
+    assert_eq!(demo, Scene::default());
+    assert_eq!(demo.scan_file(path), None);
+    let inches = Scene::from_yaml("scan: { file: /parts/a.stl, unit: inch }").unwrap();
+    assert_eq!(inches.scan_file(path).unwrap(), ("/parts/a.stl".into(), MeshUnit::Inch));
+}
+
 /// Every key that the code knows, asked by giving each section a key that none has: the refusal lists the known ones.
 #[test]
 fn every_key_of_the_code_is_in_the_shipped_file_and_documented() {
@@ -57,6 +71,7 @@ fn every_key_of_the_code_is_in_the_shipped_file_and_documented() {
         "guard",
         "patch",
         "uncertainty",
+        "robot",
         "refine",
     ];
     let sections = [&outer[..], &inner].concat();
@@ -146,12 +161,13 @@ fn a_header_alone_takes_the_defaults() {
             "scan_to_space" => expected.scan_to_space = Some(ScanToSpaceSection::default()),
             "compensation" => expected.compensation = Some(CompensationSection::default()),
             "bias_tracking" => expected.bias_tracking = Some(BiasTrackingSection::default()),
+            "robot" => expected.robot = Some(RobotSection::default()),
             _ => {}
         }
         assert_eq!(scene, expected, "{name}");
         sections += 1;
     }
-    assert_eq!(sections, 15);
+    assert_eq!(sections, 16);
     let inner = Scene::from_yaml("compensation:\n  payload:\n  bias:\n").unwrap().compensation.unwrap();
     assert_eq!((inner.payload, inner.bias), (Some(PayloadSection::default()), Some(BiasSection::default())));
 }

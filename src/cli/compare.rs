@@ -252,6 +252,7 @@ impl CompareArguments {
                 mesh: &placed.mesh,
                 deviations: &compared.vertex_deviations,
                 classes: None,
+                paint: None,
                 title: if scan.is_some() { title } else { "" },
                 note,
             })
@@ -266,6 +267,7 @@ impl CompareArguments {
             range: measured.after.range,
             from,
             weights: weights.as_deref(),
+            legend: &[],
         };
         let picture = draw_picture(&panels, &params);
         let write = |source| CliError::Write { path: path.clone(), source };

@@ -8,7 +8,9 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 
+use super::arm::RobotName;
 use super::compare::{CompareArguments, compared};
+use super::demo_robot::demo_robot;
 use super::found::FoundTable;
 use super::progress::Progress;
 use super::refine::{RefineArguments, Refined, Summary};
@@ -28,10 +30,13 @@ pub(super) struct DemoArguments {
     /// Folder for truth.ply, scan.ply, touch.mcap, refined.ply, features.json, touches.csv, deviation.png (all in mm) and
     /// summary.json
     #[arg(long, value_name = "DIR", default_value = "out")]
-    out: PathBuf,
+    pub(super) out: PathBuf,
     /// Another seed makes another scan and another hand
     #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u64,
+    pub(super) seed: u64,
+    /// An arm touches instead of a hand: it probes what is flagged by itself (probed.json, plan.png, touches.png)
+    #[arg(long, value_name = "ARM")]
+    robot: Option<RobotName>,
 }
 
 /// What `summary.json` holds; lengths in mm.
@@ -60,6 +65,12 @@ struct ScanBadness {
 }
 
 pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
+    match arguments.robot {
+        None => {}
+        Some(RobotName::Sim) => return demo_robot(arguments),
+        #[cfg(feature = "ur")]
+        Some(RobotName::Ur) => return Err(CliError::Usage("the demo has a simulated arm: --robot sim".to_owned())),
+    }
     let plate = Plate::default();
     let path = plan_demo(&plate, &PathParams::default())?;
     let scanner = ScannerParams { seed: arguments.seed, ..ScannerParams::default() };

@@ -211,7 +211,14 @@ impl DisagreeArguments {
         let is_felt = |class: &Class| !matches!(class, Class::NeverTouched | Class::Unreachable);
         let weights: Vec<f64> = map.classes.iter().map(|class| if is_felt(class) { 1.0 } else { 0.0 }).collect();
         let range = found.scanner.map_or(1e-3, |scanner| (4.0 * scanner.noise + scanner.offset.abs()).max(1e-6));
-        let panel = |classes, title| Panel { mesh: refined, deviations: &map.disagreement, classes, title, note: "" };
+        let panel = |classes, title| Panel {
+            mesh: refined,
+            deviations: &map.disagreement,
+            classes,
+            paint: None,
+            title,
+            note: "",
+        };
         let panels = [panel(Some(&map.classes[..]), "why"), panel(None, "touch - scan")];
         let file = |path: &Path| path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned());
         let params = PictureParams {
@@ -220,6 +227,7 @@ impl DisagreeArguments {
             range,
             from: self.view.as_ref().map(|view| Vector3::from_column_slice(view)),
             weights: Some(&weights),
+            legend: &[],
         };
         let picture = draw_picture(&panels, &params);
         let write = |source| CliError::Write { path: path.clone(), source };

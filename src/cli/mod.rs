@@ -3,21 +3,32 @@
 //! Results go to stdout, everything else to stderr. Exit codes, which other tools rely on: 0 done, 1 the result could
 //! not be written, 2 wrong usage, 3 bad input file, 4 done with losses, which are named.
 
+mod arm;
 mod calibrate;
+mod check;
 mod compare;
 mod demo;
+mod demo_robot;
 mod disagree;
 mod features;
 mod found;
+#[cfg(any(feature = "ros", feature = "r2r"))]
+mod node;
 mod offsets;
+mod probe;
+mod probing;
 mod progress;
 mod rates;
 mod refine;
+#[cfg(any(feature = "ros", feature = "r2r"))]
 mod replay;
+mod samples;
 mod simulate;
 mod step;
 mod threads;
 mod touched;
+#[cfg(feature = "ur")]
+mod ur;
 
 pub use threads::Threads;
 
@@ -31,6 +42,7 @@ use clap::{Parser, Subcommand};
 use crate::align::{FeaturesError, IcpError, PairsError};
 use crate::calibrate::{PayloadError, TipError};
 use crate::compare::CompareError;
+use crate::explore::ExploreError;
 use crate::io::atomic::is_same_file;
 use crate::io::features_file::FeaturesFileError;
 use crate::io::mesh_file::MeshFileError;
@@ -40,6 +52,10 @@ use crate::io::touches_file::TouchesFileError;
 use crate::live::LiveError;
 use crate::mesh::MeshError;
 use crate::refine::RefineError;
+#[cfg(any(feature = "ros", feature = "r2r"))]
+use crate::ros::arguments::{ArgumentError, log_level, split};
+#[cfg(any(feature = "ros", feature = "r2r"))]
+use crate::ros::node::NodeError;
 use crate::scene::SceneError;
 use crate::session::{OutcomeError, SessionError};
 use crate::sim::SimError;
@@ -61,6 +77,11 @@ In, one object per line: p_m, force_n, b_m, n (arrays of three), dt_s, h_min_m, 
 beta_per_n2_s, step: lie|corrected|dp5, along: normal0|force. k_n_per_m instead of h_min_m, delta and f_max_n takes the
 linear spring. Out, in the same order: {\"b_m\",\"n\"} with 17 digits, or {\"error\"}.";
 
+#[cfg(any(feature = "ros", feature = "r2r"))]
+const ROS_ARGUMENTS: &str = "\
+Behind --ros-args: -p NAME:=VALUE, --params-file FILE, -r FROM:=TO, -r __ns:=/NAMESPACE, --log-level LEVEL. ROS_DOMAIN_ID and
+ROS_AUTOMATIC_DISCOVERY_RANGE are heeded. Topics, services and parameters: docs/ros.md.";
+
 #[derive(Debug, Subcommand)]
 enum Verb {
     /// Finds what the scene must know: where the scan lies, what hangs on the sensor, where the ball is
@@ -76,11 +97,27 @@ enum Verb {
     Refine(refine::RefineArguments),
     /// Finds holes, slots, pockets, bosses, edges, corners and planes on a mesh, and measures them
     Features(features::FeaturesArguments),
+    /// Has an arm probe flagged features by itself
+    Probe(probe::ProbeArguments),
+    /// Has an arm touch one spot again and again, and tells whether it can be trusted
+    Check(check::CheckArguments),
     /// Scans and touches a known part: makes the input of refine
     Simulate(simulate::SimulateArguments),
+    /// Refines a scan live, as a ROS 2 node
+    #[cfg(any(feature = "ros", feature = "r2r"))]
+    #[command(after_help = ROS_ARGUMENTS)]
+    Node(node::NodeArguments),
+    /// Plays a recording onto the topics of a node, as if it were touched now
+    #[cfg(any(feature = "ros", feature = "r2r"))]
+    #[command(after_help = ROS_ARGUMENTS)]
+    Replay(replay::ReplayArguments),
     /// Answers one held sample per JSON line on stdin, so that other implementations can be compared
     #[command(after_help = STEP_FIELDS)]
     Step,
+    /// Prepares this machine for a UR arm
+    #[cfg(feature = "ur")]
+    #[command(subcommand)]
+    Ur(ur::UrArguments),
 }
 
 /// Why a verb gave up.
@@ -137,8 +174,27 @@ enum CliError {
     Align(#[from] IcpError),
     #[error(transparent)]
     AlignFeatures(#[from] FeaturesError),
+    #[error("{0}")]
+    Arm(String),
+    #[error("feature {0}: {1}")]
+    Explore(u32, ExploreError),
     #[error("the two cannot be compared: {0}")]
     Compare(#[from] CompareError),
+    #[cfg(any(feature = "ros", feature = "r2r"))]
+    #[error(transparent)]
+    RosArguments(#[from] ArgumentError),
+    #[cfg(any(feature = "ros", feature = "r2r"))]
+    #[error(transparent)]
+    Node(#[from] NodeError),
+    #[cfg(any(feature = "ros", feature = "r2r"))]
+    #[error(transparent)]
+    Ros(#[from] crate::ros::RosError),
+    #[cfg(feature = "ur")]
+    #[error(transparent)]
+    UrSetup(#[from] crate::robot::ur::SetupError),
+    #[cfg(feature = "ur")]
+    #[error(transparent)]
+    UrChild(#[from] crate::robot::ur::child::ChildError),
 }
 
 impl From<OutcomeError> for CliError {
@@ -158,7 +214,21 @@ impl CliError {
         match self {
             Self::WriteMesh(_) | Self::WriteRecording(_) | Self::Write { .. } | Self::Stream(_) => 1,
             Self::Touches(TouchesFileError::Write { .. }) | Self::Features(FeaturesFileError::Write { .. }) => 1,
-            Self::Usage(_) => 2,
+            Self::Usage(_) | Self::Explore(..) => 2,
+            Self::Arm(_) => 1,
+            #[cfg(any(feature = "ros", feature = "r2r"))]
+            Self::RosArguments(_) => 2,
+            #[cfg(any(feature = "ros", feature = "r2r"))]
+            Self::Ros(_) => 1,
+            #[cfg(feature = "ur")]
+            Self::UrSetup(_) | Self::UrChild(_) => 1,
+            #[cfg(any(feature = "ros", feature = "r2r"))]
+            Self::Node(error) => match error {
+                NodeError::NoScan => 2,
+                NodeError::Scene(_) | NodeError::Scan(_) | NodeError::NothingMoves => 3,
+                NodeError::Setting(_) | NodeError::Refine(_) | NodeError::Live(_) => 3,
+                _ => 1,
+            },
             Self::Simulate(SimError::BadParameter { .. } | SimError::TooFine { .. } | SimError::TooCoarse { .. }) => 2,
             // settings come from a scene file: its flags are checked before
             Self::Scene(_) | Self::ReadMesh(_) | Self::ReadTruth(_) | Self::ReadRecording(_) | Self::Simulate(_) => 3,
@@ -175,6 +245,7 @@ type Losses = Vec<String>;
 
 /// Runs the verb that `arguments` name, the program's own name first.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let (arguments, ros) = split(arguments);
     let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
         Err(told) => {
@@ -183,16 +254,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
             return ExitCode::from(told.exit_code() as u8);
         }
     };
-    let ended = match arguments.verb {
-        Verb::Calibrate(arguments) => calibrate::calibrate(&arguments),
-        Verb::Compare(arguments) => compare::compare(&arguments),
-        Verb::Demo(arguments) => demo::demo(&arguments),
-        Verb::Disagree(arguments) => disagree::disagree(&arguments),
-        Verb::Refine(arguments) => refine::refine(&arguments),
-        Verb::Features(arguments) => features::features(&arguments),
-        Verb::Simulate(arguments) => simulate::simulate(&arguments),
-        Verb::Step => answer_steps(),
-    };
+    let ended = ros_arguments(&arguments.verb, ros).and_then(|ros| arguments.verb.run(&ros));
     match ended {
         Ok(losses) if losses.is_empty() => ExitCode::SUCCESS,
         Ok(losses) => {
@@ -204,6 +266,71 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
             ExitCode::from(error.exit_code())
         }
     }
+}
+
+impl Verb {
+    fn run(&self, _ros: &[String]) -> Result<Losses, CliError> {
+        match self {
+            Self::Calibrate(arguments) => calibrate::calibrate(arguments),
+            Self::Compare(arguments) => compare::compare(arguments),
+            Self::Demo(arguments) => demo::demo(arguments),
+            Self::Disagree(arguments) => disagree::disagree(arguments),
+            Self::Refine(arguments) => refine::refine(arguments),
+            Self::Features(arguments) => features::features(arguments),
+            Self::Probe(arguments) => probe::probe(arguments),
+            Self::Check(arguments) => check::check(arguments),
+            Self::Simulate(arguments) => simulate::simulate(arguments),
+            #[cfg(any(feature = "ros", feature = "r2r"))]
+            Self::Node(arguments) => node::node(arguments, _ros),
+            #[cfg(any(feature = "ros", feature = "r2r"))]
+            Self::Replay(arguments) => replay::replay(arguments, _ros),
+            Self::Step => answer_steps(),
+            #[cfg(feature = "ur")]
+            Self::Ur(arguments) => ur::ur(arguments),
+        }
+    }
+
+    /// Whether it is a node.
+    fn takes_ros_arguments(&self) -> bool {
+        #[cfg(any(feature = "ros", feature = "r2r"))]
+        return matches!(self, Self::Node(_) | Self::Replay(_));
+        #[cfg(not(any(feature = "ros", feature = "r2r")))]
+        false
+    }
+}
+
+/// What stands behind `--ros-args`, for the verbs that take it.
+fn ros_arguments(verb: &Verb, given: Vec<OsString>) -> Result<Vec<String>, CliError> {
+    if !given.is_empty() && !verb.takes_ros_arguments() {
+        return Err(CliError::Usage("--ros-args is for the verbs node and replay".to_owned()));
+    }
+    let text = |word: OsString| {
+        word.into_string()
+            .map_err(|word| CliError::Usage(format!("--ros-args … {}: arguments of ROS are UTF-8", word.display())))
+    };
+    given.into_iter().map(text).collect()
+}
+
+/// What is logged by default: that of `--log-level` behind `--ros-args`, else warnings.
+pub fn log_filter(arguments: &[OsString]) -> String {
+    let (_, ros) = split(arguments);
+    // the last one counts
+    let level = ros.iter().rposition(|word| *word == "--log-level").and_then(|at| ros.get(at + 1)?.to_str());
+    let level = level.and_then(|level| log_level(level).ok()).unwrap_or("warn");
+    // the libraries below say what is no matter of the user; the last one complains, whenever a node ends, about writers that
+    // have left the graph already
+    format!("{level},ros2_client=error,rustdds=error,rustdds::dds::pubsub=off")
+}
+
+/// Without ROS `--ros-args` is an argument like any other: nobody knows it.
+#[cfg(not(any(feature = "ros", feature = "r2r")))]
+fn split<T>(arguments: impl IntoIterator<Item = T>) -> (Vec<T>, Vec<T>) {
+    (arguments.into_iter().collect(), Vec::new())
+}
+
+#[cfg(not(any(feature = "ros", feature = "r2r")))]
+fn log_level(_: &str) -> Result<&'static str, ()> {
+    Err(())
 }
 
 fn answer_steps() -> Result<Losses, CliError> {

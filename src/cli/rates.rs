@@ -21,8 +21,8 @@ pub(super) struct LiveSummary {
     /// how old the touches are that the mesh shows, in time of the samples
     behind_ns: Quantiles,
     renewals: u64,
-    /// renewals for which a sample had to wait
-    waits: u64,
+    /// renewals that were not done when they were due
+    pub(super) late: u64,
 }
 
 /// The refiner and what keeps what it feels.
@@ -110,9 +110,9 @@ impl Rates {
                 if let Some(stopped) = stopped {
                     return Err(stopped);
                 }
-                let LiveCounts { renewals, waits } = refiner.counts();
+                let LiveCounts { renewals, late } = refiner.counts();
                 let (refiner, patcher) = refiner.finish()?;
-                let live = LiveSummary { behind_ns: behind.quantiles(), renewals, waits };
+                let live = LiveSummary { behind_ns: behind.quantiles(), renewals, late };
                 Ok(Ended { refiner, patcher: Some(patcher), live: Some(live) })
             }
         }
@@ -134,8 +134,10 @@ impl Live {
         let pushing = Instant::now();
         let pushed = self.refiner.push(sample);
         let time = pushing.elapsed();
-        let behind_ns = sample.stamp_ns.saturating_sub(self.refiner.delta().until_ns);
-        if let (Ok(behind_ns), true) = (u64::try_from(behind_ns), self.refiner.counts().renewals > 0) {
+        // the least there is before the patch has seen a touch
+        let until_ns = Some(self.refiner.delta().until_ns).filter(|&until_ns| until_ns > i64::MIN);
+        let behind_ns = until_ns.and_then(|until_ns| u64::try_from(sample.stamp_ns.saturating_sub(until_ns)).ok());
+        if let (Some(behind_ns), true) = (behind_ns, self.refiner.counts().renewals > 0) {
             self.behind.record(Duration::from_nanos(behind_ns));
         }
         match pushed {
@@ -154,7 +156,7 @@ impl std::fmt::Display for LiveSummary {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Quantiles { median, p99, .. } = self.behind_ns;
         let [median, p99] = [median, p99].map(|ns| ns as f64 * 1e-6);
-        let Self { renewals, waits, .. } = self;
-        write!(f, "live: patch {median:.0} ms behind, p99 {p99:.0} ms; {renewals} renewals, {waits} waited for")
+        let Self { renewals, late, .. } = self;
+        write!(f, "live: patch {median:.0} ms behind, p99 {p99:.0} ms; {renewals} renewals, {late} of them late")
     }
 }

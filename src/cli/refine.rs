@@ -14,7 +14,7 @@ use tracing::{debug, warn};
 use super::offsets::{ContactPoints, ScanOffset, WrenchOffset};
 use super::progress::Progress;
 use super::rates::{Ended, LiveSummary, Rates};
-use super::replay::{Recording, Replayed, marker_filter, replay};
+use super::samples::{Recording, Replayed, each_sample, marker_filter};
 use super::{CliError, Losses, check_kept_by, tell};
 use crate::io::atomic::{AtomicFile, is_same_file};
 use crate::io::mesh_file::{MeshFile, MeshFileError, MeshUnit, check_target, read_mesh};
@@ -29,8 +29,8 @@ use crate::touch::{ClockEstimator, Compensator, MarkerCounts, Sample};
 
 #[derive(Clone, Debug, Args)]
 pub(super) struct RefineArguments {
-    /// The scan: PLY, STL or OBJ
-    #[arg(long, value_name = "MESH", required_unless_present = "resume", default_value = "", value_parser = PathOrNone)]
+    /// The scan: PLY, STL or OBJ; not needed when the scene names its file
+    #[arg(long, value_name = "MESH", required_unless_present_any = ["resume", "scene"], default_value = "", value_parser = PathOrNone)]
     scan: PathBuf,
     /// The touches: a ROS 2 recording, MCAP or SQLite, a file or a folder
     #[arg(long, value_name = "RECORDING", required_unless_present = "resume", default_value = "", value_parser = PathOrNone)]
@@ -91,7 +91,7 @@ pub(super) struct RefineArguments {
     json: bool,
 }
 
-/// Takes a path that may be left out with `--resume`; empty: left out.
+/// Takes a path that may be left out; empty: left out.
 #[derive(Clone)]
 struct PathOrNone;
 
@@ -163,12 +163,17 @@ pub(super) struct Refined {
 
 const NOTHING_MOVES: &str = "the scene names no `refine`, so nothing would move the mesh: add `refine:` to it";
 
+const NO_SCAN: &str = "there is no scan to refine: name it by --scan, or as `scan: { file: … }` in the scene";
+
 const NO_PATCH: &str = "--live lets the patch follow, and the scene has none: add `patch:` to it";
 
 /// The verb: refines and tells.
 pub(super) fn refine(arguments: &RefineArguments) -> Result<Losses, CliError> {
-    let resumed = arguments.resume.as_deref().map(|session| arguments.resumed(session)).transpose()?;
-    let arguments = resumed.as_ref().unwrap_or(arguments);
+    let completed = match arguments.resume.as_deref() {
+        Some(session) => arguments.resumed(session)?,
+        None => arguments.with_scan()?,
+    };
+    let arguments = &completed;
     let Refined { repair, summary, losses } = arguments.refined()?;
     if arguments.json {
         tell(&serde_json::to_string(&summary).expect("numbers and names alone cannot fail"));
@@ -293,6 +298,25 @@ impl RefineArguments {
         Self { features_out: Some(features), touches_out: Some(touches), ..self }
     }
 
+    /// With a scene, and other topics.
+    pub(super) fn with_scene(self, scene: PathBuf, topics: Topics) -> Self {
+        let Topics { pose, wrench, markers } = topics;
+        Self { scene: Some(scene), pose_topic: pose, wrench_topic: wrench, markers_topic: markers, ..self }
+    }
+
+    /// With the scan that the scene names, where the flags name none.
+    fn with_scan(&self) -> Result<Self, CliError> {
+        let named = match &self.scene {
+            Some(path) if self.scan.as_os_str().is_empty() => {
+                let scan = Scene::read(path)?.scan_file(path);
+                Some(scan.ok_or_else(|| CliError::Usage(NO_SCAN.to_owned()))?)
+            }
+            _ => None,
+        };
+        let (scan, mesh_unit) = named.unwrap_or((self.scan.clone(), self.mesh_unit));
+        Ok(Self { scan, mesh_unit, ..self.clone() })
+    }
+
     /// What refines a session again.
     fn resumed(&self, session: &Path) -> Result<Self, CliError> {
         let SessionRecord { scan, mesh_unit, scene, recording, topics, strokes } = SessionRecord::open(session)?;
@@ -339,7 +363,7 @@ impl RefineArguments {
         let compensator = Compensator::new(params.compensator)?;
         let mut clock = scene.clock_params().map(ClockEstimator::new).transpose()?;
         let mut contacts = self.registration.then(|| ContactPoints::new(&params)).transpose()?;
-        let mut replayed = replay(recording, scene.placement(), scene.sync_params(), markers, |sample| {
+        let mut replayed = each_sample(recording, scene.placement(), scene.sync_params(), markers, |sample| {
             strokes.apply_until(sample.stamp_ns, &mut rates);
             pushes.push(&mut rates, sample);
             let tip = compensator.compensate(sample);
@@ -364,7 +388,9 @@ impl RefineArguments {
         debug!(?counts, "replayed");
         replayed.losses.extend(lost_samples(&replayed, pushes.accepted));
         replayed.losses.extend(lost_contacts(&params, counts));
-        if let Some(misfit) = misfit(&params, counts) {
+        // a mesh that waits for its patch folds more often
+        let was_late = live.as_ref().is_some_and(|live| live.late > 0);
+        if let Some(misfit) = misfit(&params, counts).filter(|_| !was_late) {
             warn!("{misfit}");
         }
         if params.gate.is_some() && pushes.accepted > 0 && counts.contacts == 0 {

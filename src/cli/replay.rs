@@ -1,178 +1,264 @@
-//! A recording from its first message to its last, as samples.
+//! `touchup replay`: a recording onto the topics, as if it were touched now.
 
-use std::collections::{BTreeMap, VecDeque};
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
 
-use super::progress::Progress;
-use super::{CliError, Losses};
-use crate::io::recording::{Record, RecordingError, RecordingReader, Topics};
+use clap::Args;
+use serde::Serialize;
+
+use super::samples::{Recording, each_message, marker_filter};
+use super::{CliError, Losses, complain, tell};
+use crate::io::recording::Topics;
+use crate::ros;
+use crate::ros::arguments::NodeConfig;
+use crate::ros::node::{CELL, as_pose, as_wrench};
+use crate::ros::parameters::ParameterValue;
+use crate::ros::port::SamplePort;
 use crate::scene::Scene;
-use crate::touch::{MarkerCounts, MarkerFilter, Message, Placement, Sample, SyncParams, Synchroniser, WrenchFrame};
+use crate::touch::{Message, SyncParams, WrenchFrame};
 
-/// Reasons that are gaps in the recording itself; every other one is a message lost on the way.
-const NOT_A_LOSS: [&str; 4] = ["gap", "no_pose_before", "no_pose_after", "duplicate"];
+/// Who listens has told us; whether he has heard of us he does not tell.
+const SETTLE: Duration = Duration::from_secs(1);
+/// How often it is looked who listens.
+const LOOK: Duration = Duration::from_millis(50);
+/// Someone who waits for longer is told for what.
+const TELL_AFTER: Duration = Duration::from_secs(2);
+/// What was sent last is on its way for so long at most.
+const LINGER: Duration = Duration::from_millis(300);
+/// A rest in the recording is shortened to this: nothing happens in it.
+const LONGEST_REST_NS: i64 = 2_000_000_000;
 
-/// What a replay found besides its samples.
-#[derive(Debug, Default)]
-pub struct Replayed {
-    /// Wrenches of the recording: each could have been a sample.
-    pub wrenches: u64,
-    /// Wrenches that became none, by reason; reasons of lost poses begin with `pose_`.
-    pub refused: BTreeMap<String, u64>,
-    /// What a better recording would not lack.
-    pub losses: Losses,
-    /// What became of the markers, where they tell the pose.
-    pub markers: Option<MarkerCounts>,
+#[derive(Debug, Args)]
+pub(super) struct ReplayArguments {
+    /// A ROS 2 recording, MCAP or SQLite, a file or a folder
+    #[arg(value_name = "RECORDING")]
+    recording: PathBuf,
+    /// Times its own pace
+    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = speed)]
+    speed: f64,
+    /// Who touched: on whose topics it is played
+    #[arg(long, value_name = "WHO", default_value = "stylus", value_parser = ["stylus", "probe"])]
+    source: String,
+    /// geometry_msgs/WrenchStamped in the recording
+    #[arg(long, value_name = "TOPIC", default_value = "/stylus/wrench")]
+    wrench_topic: String,
+    /// geometry_msgs/PoseStamped in the recording
+    #[arg(long, value_name = "TOPIC", default_value = "/stylus/pose")]
+    pose_topic: String,
+    /// sensor_msgs/PointCloud2: the markers on the stylus, from which the pose is made; needs a scene that says where they sit
+    #[arg(long, value_name = "TOPIC", conflicts_with = "pose_topic", requires = "scene")]
+    markers_topic: Option<String>,
+    /// The scene that says where the markers sit
+    #[arg(long, value_name = "YAML")]
+    scene: Option<PathBuf>,
+    /// Prints what was played as one JSON object
+    #[arg(long)]
+    json: bool,
 }
 
-/// Messages that are kept at most while the frames are looked for: a minute of both topics, 20 MB; 60 MB with markers.
-const MOST_AHEAD: usize = 100_000;
-
-/// A recording that has been read until the frames of both topics are known, and keeps what it has read.
-pub struct Recording {
-    reader: RecordingReader,
-    ahead: VecDeque<Result<Record, RecordingError>>,
-    /// In which axes the wrenches are: a header that names the frame of the pose means O, any other the stylus' own.
-    pub wrench_frame: WrenchFrame,
+fn speed(text: &str) -> Result<f64, String> {
+    let speed: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    (0.01..=100.0).contains(&speed).then_some(speed).ok_or_else(|| "it must be 0.01 to 100".to_owned())
 }
 
-impl Recording {
-    /// Opens a recording and reads up to the first message of both topics; one that has only one of them is told by the
-    /// replay.
-    ///
-    /// # Errors
-    /// [`RecordingError`] of opening it.
-    pub fn open(path: &Path, topics: &Topics) -> Result<Self, RecordingError> {
-        let mut reader = RecordingReader::open(path, topics)?;
-        let mut ahead = VecDeque::new();
-        while !knows_frames(&reader) && ahead.len() < MOST_AHEAD {
-            let Some(record) = reader.next_record() else { break };
-            ahead.push_back(record);
-        }
-        let wrench_frame =
-            if ahead.len() < MOST_AHEAD { wrench_frame(&reader) } else { find_wrench_frame(path, topics)? };
-        Ok(Self { reader, ahead, wrench_frame })
-    }
-
-    fn next(&mut self) -> Option<Result<Record, RecordingError>> {
-        self.ahead.pop_front().or_else(|| self.reader.next_record())
-    }
+/// What `--json` prints.
+#[derive(Debug, Default, Serialize)]
+struct Played {
+    wrenches: u64,
+    poses: u64,
+    /// that the network did not take
+    unsent: u64,
+    played_s: f64,
 }
 
-fn knows_frames(reader: &RecordingReader) -> bool {
-    reader.pose_frame().is_some() && reader.wrench_frame().is_some()
-}
-
-fn wrench_frame(reader: &RecordingReader) -> WrenchFrame {
-    if reader.wrench_frame() == reader.pose_frame() { WrenchFrame::Object } else { WrenchFrame::Sensor }
-}
-
-/// Where one topic begins long after the other: by a reader of its own, which keeps nothing.
-fn find_wrench_frame(path: &Path, topics: &Topics) -> Result<WrenchFrame, RecordingError> {
-    let mut reader = RecordingReader::open(path, topics)?;
-    while !knows_frames(&reader) && reader.next_record().is_some() {}
-    Ok(wrench_frame(&reader))
-}
-
-const NO_MARKERS: &str = "--markers-topic needs a scene that says where the markers sit: add `markers:` to it";
-
-/// What makes poses of markers, when the recording has those on `topic`.
-///
-/// # Errors
-/// [`CliError::Usage`] when the scene does not say where they sit.
-pub fn marker_filter(scene: &Scene, topic: Option<&str>) -> Result<Option<MarkerFilter>, CliError> {
-    if topic.is_none() {
-        return Ok(None);
-    }
-    let filter = scene.marker_filter().map_err(|error| CliError::Usage(error.to_string()))?;
-    filter.map(Some).ok_or_else(|| CliError::Usage(NO_MARKERS.to_owned()))
-}
-
-/// Gives each sample of `recording` to `each`, in order of time.
-///
-/// - `placement`: brings each message into the frames of the scene.
-/// - `markers`: makes the poses of a recording that holds markers.
-///
-/// # Errors
-/// [`CliError::ReadRecording`] when the recording is damaged before its first message; later damage is a loss.
-pub fn replay(
-    mut recording: Recording,
-    placement: Option<Placement>,
-    sync: SyncParams,
-    mut markers: Option<MarkerFilter>,
-    mut each: impl FnMut(&Sample),
-) -> Result<Replayed, CliError> {
-    let mut sync = Synchroniser::new(sync)?;
-    placement.iter().try_for_each(Placement::check)?;
-    let wrench_frame = recording.wrench_frame;
-    let mut replayed = Replayed::default();
-    let mut progress = Progress::new("replay", recording.reader.message_count());
-    let mut has_begun = false;
-    let mut take = |sync: &mut Synchroniser, message| {
-        sync.push(placement.map_or(message, |placement| placement.place(message, wrench_frame)));
-        std::iter::from_fn(|| sync.next_sample()).for_each(|sample| each(&sample));
+/// - `ros`: what stands behind `--ros-args`.
+pub(super) fn replay(arguments: &ReplayArguments, ros: &[String]) -> Result<Losses, CliError> {
+    let mut config = NodeConfig::named("touchup_replay", ros, |name| std::env::var(name).ok())?;
+    let source = config.parameters.set("source", &ParameterValue::String(arguments.source.clone()));
+    source.map_err(|error| CliError::Usage(error.to_string()))?;
+    let markers = match &arguments.scene {
+        Some(scene) => marker_filter(&Scene::read(scene)?, arguments.markers_topic.as_deref())?,
+        None => None,
     };
-    while let Some(record) = recording.next() {
-        match record {
-            Ok(Record::Message(message)) => {
-                replayed.wrenches += u64::from(matches!(message, Message::Wrench(_)));
-                take(&mut sync, message);
+    let recording = Recording::open(&arguments.recording, &arguments.topics()).map_err(CliError::ReadRecording)?;
+    let mut port = ros::samples(&config)?;
+    wait_for_listeners(&mut *port, &config, &arguments.recording);
+
+    let wrench_frame = match recording.wrench_frame {
+        WrenchFrame::Object => CELL.to_owned(),
+        WrenchFrame::Sensor => format!("{}_sensor", arguments.source),
+    };
+    let (mut played, mut pace, began) = (Played::default(), Pace::new(arguments.speed), Instant::now());
+    let mut publish = |message: Message| {
+        pace.wait_for(message.stamp_ns());
+        let is_sent = match &message {
+            Message::Wrench(wrench) => {
+                played.wrenches += 1;
+                port.publish_wrench(as_wrench(wrench, &wrench_frame))
             }
-            Ok(Record::Markers(frame)) => {
-                if let Some(filter) = &mut markers {
-                    filter.push(&frame, |pose| take(&mut sync, Message::Pose(pose)));
-                }
+            Message::Pose(pose) => {
+                played.poses += 1;
+                port.publish_pose(as_pose(pose, CELL))
             }
-            Err(damage) if !has_begun => return Err(CliError::ReadRecording(damage)),
-            Err(damage) => replayed.losses.push(damage.to_string()),
-        }
-        has_begun = true;
-        progress.step();
+        };
+        played.unsent += u64::from(!is_sent);
+    };
+    let mut order = Order::default();
+    let replayed = each_message(recording, markers, |message| order.push(message, &mut publish))?;
+    order.finish(&mut publish);
+    played.played_s = began.elapsed().as_secs_f64();
+    let listeners = port.listeners();
+    sleep(LINGER);
+
+    let mut losses = replayed.losses;
+    if played.unsent > 0 {
+        losses.push(format!("{} messages not taken by the network", played.unsent));
     }
-    if let Some(filter) = &mut markers {
-        filter.finish(|pose| take(&mut sync, Message::Pose(pose)));
-        replayed.account_markers(filter);
+    if listeners.contains(&0) {
+        losses.push("who listened has left before the end".to_owned());
     }
-    sync.finish();
-    std::iter::from_fn(|| sync.next_sample()).for_each(|sample| each(&sample));
-    replayed.account(&recording.reader, &sync);
-    Ok(replayed)
+    if arguments.json {
+        tell(&serde_json::to_string(&played).expect("numbers alone cannot fail"));
+    } else {
+        let Played { wrenches, poses, played_s, .. } = played;
+        tell(&format!("played {wrenches} wrenches and {poses} poses in {played_s:.1} s"));
+    }
+    Ok(losses)
 }
 
-impl Replayed {
-    /// Takes over what the filter of the markers dropped.
-    fn account_markers(&mut self, filter: &MarkerFilter) {
-        for (reason, count) in filter.frame_counts().reasons().into_iter().filter(|(_, count)| *count > 0) {
-            if !NOT_A_LOSS.contains(&reason) {
-                self.losses.push(format!("{count} marker frames {reason}"));
-            }
-            self.refused.insert(format!("markers_{reason}"), count);
+impl ReplayArguments {
+    fn topics(&self) -> Topics {
+        let (pose, wrench) = (self.pose_topic.clone(), self.wrench_topic.clone());
+        Topics { pose, wrench, markers: self.markers_topic.clone() }
+    }
+}
+
+/// Nothing is played to nobody: a recording begins with what must not be lost either.
+fn wait_for_listeners(port: &mut dyn SamplePort, config: &NodeConfig, recording: &Path) {
+    let began = Instant::now();
+    let mut is_told = false;
+    while port.listeners().contains(&0) {
+        if !is_told && began.elapsed() > TELL_AFTER {
+            let topics = config.sample_topics().map(|name| config.resolve(name).unwrap_or_else(|_| name.to_owned()));
+            let (recording, topics) = (recording.display(), topics.join(" and "));
+            complain(&format!("{recording} waits for a node that listens to {topics} (touchup node); Ctrl-C gives up"));
+            is_told = true;
         }
-        self.markers = Some(*filter.counts());
+        sleep(LOOK);
+    }
+    sleep(SETTLE);
+}
+
+/// Puts each stream in the order of its stamps, in which a sensor sends and the node takes it: what came into the recording
+/// later than what was measured after it.
+#[derive(Default)]
+struct Order {
+    /// poses and wrenches
+    streams: [Stream; 2],
+    count: u64,
+}
+
+#[derive(Default)]
+struct Stream {
+    /// by stamp, those of one stamp as they came
+    held: BTreeMap<(i64, u64), Message>,
+    newest_ns: Option<i64>,
+}
+
+impl Order {
+    /// Hands on what cannot be overtaken any more: `touchup refine` waits as long.
+    fn push(&mut self, message: Message, mut each: impl FnMut(Message)) {
+        let stamp_ns = message.stamp_ns();
+        let stream = &mut self.streams[usize::from(matches!(message, Message::Wrench(_)))];
+        self.count += 1;
+        stream.held.insert((stamp_ns, self.count), message);
+        let newest_ns = stream.newest_ns.map_or(stamp_ns, |newest_ns| newest_ns.max(stamp_ns));
+        stream.newest_ns = Some(newest_ns);
+        while let Some(first) = stream.held.first_entry()
+            && first.key().0 <= newest_ns.saturating_sub(SyncParams::default().reorder_ns)
+        {
+            each(first.remove());
+        }
     }
 
-    /// Takes over what reader and synchroniser dropped.
-    fn account(&mut self, recording: &RecordingReader, sync: &Synchroniser) {
-        let of_wrenches = sync.counts().reasons().map(|(reason, count)| (reason, reason.to_owned(), count));
-        let of_poses = sync.pose_counts().reasons().map(|(reason, count)| (reason, format!("pose_{reason}"), count));
-        for (reason, name, count) in of_wrenches.into_iter().chain(of_poses).filter(|(.., count)| *count > 0) {
-            if !NOT_A_LOSS.contains(&reason) {
-                self.losses.push(format!("{count} messages {name}"));
-            }
-            self.refused.insert(name, count);
+    /// Hands on the rest.
+    fn finish(self, each: impl FnMut(Message)) {
+        let [mut poses, wrenches] = self.streams.map(|stream| stream.held);
+        poses.extend(wrenches);
+        poses.into_values().for_each(each);
+    }
+}
+
+/// When what was measured at a stamp is due.
+struct Pace {
+    speed: f64,
+    /// time since the first message by the stamps, rests taken out, ns
+    passed_ns: i64,
+    last_ns: Option<i64>,
+    began: Instant,
+}
+
+impl Pace {
+    fn new(speed: f64) -> Self {
+        Self { speed, passed_ns: 0, last_ns: None, began: Instant::now() }
+    }
+
+    /// Time since the beginning at which it is due. A stamp that goes back is due at once.
+    fn due(&mut self, stamp_ns: i64) -> Duration {
+        let last_ns = *self.last_ns.get_or_insert(stamp_ns);
+        let step_ns = stamp_ns.saturating_sub(last_ns);
+        if step_ns > 0 {
+            self.passed_ns = self.passed_ns.saturating_add(step_ns.min(LONGEST_REST_NS));
         }
-        for (reason, bad) in recording.bad_messages() {
-            let (path, place, count) = (bad.path.display(), &bad.place, bad.poses + bad.wrenches);
-            self.losses.push(format!("{count} messages {reason}, the first in {path} at {place}"));
-            self.wrenches += bad.wrenches;
-            for (name, count) in [(reason.name().to_owned(), bad.wrenches), (format!("pose_{reason}"), bad.poses)] {
-                if count > 0 {
-                    *self.refused.entry(name).or_default() += count;
-                }
-            }
+        // a clock that was set back goes on from there
+        if !(-LONGEST_REST_NS..=0).contains(&step_ns) {
+            self.last_ns = Some(stamp_ns);
         }
-        if recording.truncated() {
-            self.losses.push("the recording has lost its end; what is there was read".to_owned());
+        Duration::from_secs_f64(self.passed_ns as f64 * 1e-9 / self.speed)
+    }
+
+    fn wait_for(&mut self, stamp_ns: i64) {
+        let due = self.due(stamp_ns);
+        sleep(due.saturating_sub(self.began.elapsed()));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Isometry3;
+
+    use super::*;
+    use crate::touch::{StampedPose, StampedWrench, Wrench};
+
+    #[test]
+    fn each_stream_comes_in_the_order_of_its_stamps() {
+        let ms = 1_000_000;
+        let message = |stamp_ms: i64, is_wrench| match is_wrench {
+            true => Message::Wrench(StampedWrench { stamp_ns: stamp_ms * ms, wrench: Wrench::default() }),
+            false => Message::Pose(StampedPose { stamp_ns: stamp_ms * ms, pose_ot: Isometry3::identity() }),
+        };
+        let recorded =
+            [(0, true), (5, false), (12, true), (9, true), (9, true), (30, true), (2, false), (3, true), (40, false)];
+        let (mut order, mut told) = (Order::default(), Vec::new());
+        let mut each = |message: Message| told.push((message.stamp_ns() / ms, matches!(message, Message::Wrench(_))));
+        for (stamp_ms, is_wrench) in recorded {
+            order.push(message(stamp_ms, is_wrench), &mut each);
         }
+        order.finish(&mut each);
+        let of = |wanted| told.iter().filter(move |(_, is_wrench)| *is_wrench == wanted).map(|(stamp_ms, _)| *stamp_ms);
+        // 3 is more than 20 ms behind: it comes where it came
+        assert_eq!(of(true).collect::<Vec<_>>(), [0, 9, 9, 3, 12, 30]);
+        assert_eq!(of(false).collect::<Vec<_>>(), [2, 5, 40]);
+    }
+
+    #[test]
+    fn messages_are_due_by_their_stamps_and_rests_are_shortened() {
+        let s = 1_000_000_000;
+        let mut pace = Pace::new(2.0);
+        let stamps = [100 * s, 101 * s, 101 * s - 5, 101 * s, 103 * s, 3000 * s, 3001 * s, 7 * s, 9 * s, i64::MAX];
+        let due = stamps.map(|stamp| pace.due(stamp).as_secs_f64());
+        assert_eq!(due, [0.0, 0.5, 0.5, 0.5, 1.5, 2.5, 3.0, 3.0, 4.0, 5.0]);
     }
 }

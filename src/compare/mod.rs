@@ -8,6 +8,7 @@ mod colour;
 mod comparison;
 mod deviation;
 mod disagreement;
+mod lines;
 mod normals;
 mod picture;
 mod sampling;
@@ -21,6 +22,7 @@ pub use disagreement::{
     BadTouches, Class, ClassMap, Disagreement, DisagreementRegion, Evidence, Known, Misplaced, RefinedShape, Scanner,
     disagreement,
 };
+pub use lines::Drawing;
 pub use normals::{Tilt, TiltSummary, angle_between, tilts};
 pub use picture::{Panel, Picture, PictureParams, draw_picture};
 pub use sampling::{Sample, sample_surface, surface_area};

@@ -24,6 +24,10 @@ pub enum Kind {
 }
 
 impl Kind {
+    /// Every one.
+    pub const ALL: [Kind; 7] =
+        [Self::Hole, Self::Slot, Self::Pocket, Self::Boss, Self::Edge, Self::Corner, Self::Plane];
+
     /// As files name it.
     pub fn name(self) -> &'static str {
         match self {
@@ -109,7 +113,52 @@ pub(super) enum Surface {
     Other,
 }
 
+/// The walls of a feature.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Walls<'a> {
+    /// of a hole or boss
+    Round(&'a Cylinder),
+    /// of a slot or pocket
+    Slot(&'a Stadium),
+}
+
 impl Feature {
+    /// The walls that its sizes are of, where it has some.
+    pub fn walls(&self) -> Option<Walls<'_>> {
+        match &self.surface {
+            Surface::Round(wall) => Some(Walls::Round(wall)),
+            Surface::Slot(walls) => Some(Walls::Slot(walls)),
+            Surface::Other => None,
+        }
+    }
+
+    /// Numbers of the touches that its sizes come from; one may come again.
+    pub fn touch_numbers(&self) -> impl Iterator<Item = u32> {
+        let sizes = [&self.diameter, &self.width, &self.length].into_iter().flatten();
+        sizes.flat_map(|size| size.touches.iter().copied())
+    }
+
+    /// A hole of which the wall is known.
+    ///
+    /// - `opening`, `axis`: where the axis goes through it, m in O, and out of it; `touches`: numbers of those of the wall.
+    #[cfg(test)]
+    pub(crate) fn round_hole(
+        opening: Point3<f64>,
+        axis: Vector3<f64>,
+        depth: f64,
+        wall: Cylinder,
+        touches: Vec<u32>,
+    ) -> Self {
+        let diameter = Measured { value: 2.0 * wall.radius, std: Some(1e-5), touches };
+        Self {
+            axis: Some(Measured { value: axis, ..Measured::default() }),
+            diameter: Some(diameter),
+            depth: Some(Measured { value: depth, ..Measured::default() }),
+            surface: Surface::Round(wall),
+            ..Self::new(Kind::Hole, Measured { value: opening, ..Measured::default() }, 1.0, FittedTo::Touches)
+        }
+    }
+
     /// A feature without numbers but its place.
     pub(super) fn new(kind: Kind, centre: Measured<Point3<f64>>, touched: f64, fitted_to: FittedTo) -> Self {
         Self {

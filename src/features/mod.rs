@@ -21,6 +21,7 @@ mod k_means;
 mod marks;
 mod measure;
 mod observe;
+mod of_fits;
 mod primitive;
 mod rays;
 mod rims;
@@ -31,6 +32,7 @@ mod track;
 mod walls;
 
 pub use detect::{Detection, detect};
-pub use feature::{Feature, FittedTo, Kind, Measured};
+pub use feature::{Feature, FittedTo, Kind, Measured, Walls};
 pub use k_means::{KMeans, k_means};
+pub use of_fits::End;
 pub use track::Tracker;

@@ -6,6 +6,7 @@ pub mod mesh_file;
 pub mod pairs_file;
 pub mod parameters_file;
 pub mod png;
+pub mod probed_touches_file;
 pub mod recording;
 pub mod session_folder;
 pub mod static_poses;

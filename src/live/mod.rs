@@ -1,7 +1,9 @@
 //! Two rates: the haptic update answers every sample at once, the patch follows beside it on a thread of its own.
 //!
-//! When the patch is renewed, and at which sample its change is taken up, follows from the stamps alone. So the result
-//! never depends on how fast the machine is: where the patch is late, [`LiveRefiner::push`] waits for it.
+//! When the patch is renewed, and at which sample its change is taken up, follows from the stamps alone, as long as its thread
+//! keeps up. Where that is late the samples go on, and the next renewal takes in all that came meanwhile: the mesh shows a
+//! touch later, and what comes out at the end is the same, as it is made of all touches at once. With [`Pace::is_patient`]
+//! [`LiveRefiner::push`] waits instead, and the mesh at each sample is the same on every machine.
 
 mod latency;
 mod probed;
@@ -43,12 +45,14 @@ pub struct Pace {
     pub every_ns: i64,
     /// … and from a renewal until its change is taken up, ns: what the thread of the patch has for it
     pub after_ns: i64,
+    /// whether samples wait for a change that is late
+    pub is_patient: bool,
 }
 
 impl Default for Pace {
-    /// 8 ms and 10 ms: with a smoothing window of 32 ms to either side, a touch is in the mesh after 50 ms.
+    /// 8 ms and 10 ms: with a smoothing window of 32 ms to either side, a touch is in the mesh after 50 ms. No sample waits.
     fn default() -> Self {
-        Self { every_ns: 8_000_000, after_ns: 10_000_000 }
+        Self { every_ns: 8_000_000, after_ns: 10_000_000, is_patient: false }
     }
 }
 
@@ -63,13 +67,17 @@ impl Pace {
 /// Parts of a change of the patch that are taken up at one sample: some 50 µs on a mesh of a million faces.
 const AT_ONCE: usize = 40;
 
+/// Renewals that are asked for and not taken up at most, where samples do not wait: one that the thread works at, and one for
+/// it to go on with.
+const MOST_OPEN: usize = 2;
+
 /// How far the patch was behind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LiveCounts {
     /// renewals taken up
     pub renewals: u64,
-    /// those for which a push had to wait
-    pub waits: u64,
+    /// those that were not done when they were due
+    pub late: u64,
 }
 
 /// Refines a scan by touch, sample by sample, with the patch beside it.
@@ -88,6 +96,8 @@ pub struct LiveRefiner {
     delta: PatchDelta,
     /// … and whether all of it is in the mesh
     is_done: bool,
+    /// whether the change that is due is known to be late
+    is_late: bool,
     /// touches that nobody asked for yet
     probed: ProbedNews,
     counts: LiveCounts,
@@ -119,6 +129,7 @@ impl LiveRefiner {
             due_ns: VecDeque::new(),
             delta: PatchDelta::default(),
             is_done: true,
+            is_late: false,
             probed: ProbedNews::default(),
             counts: LiveCounts::default(),
         })
@@ -131,17 +142,31 @@ impl LiveRefiner {
     pub fn push(&mut self, sample: &Sample) -> Result<Update, LiveError> {
         let update = self.refiner.push(sample)?;
         let slot = sample.stamp_ns.div_euclid(self.pace.every_ns);
-        if self.slot.replace(slot).is_some_and(|before| slot > before) {
+        let has_begun = self.slot.replace(slot).is_some_and(|before| slot > before);
+        if has_begun && (self.pace.is_patient || self.due_ns.len() < MOST_OPEN) {
             self.ask(slot.saturating_mul(self.pace.every_ns).saturating_add(self.pace.after_ns))?;
         }
         self.batch.push(*sample);
-        if !self.is_done {
-            self.go_on(AT_ONCE)?;
-        } else if self.due_ns.front().is_some_and(|&due_ns| due_ns <= sample.stamp_ns) {
-            self.take_up()?;
-            self.go_on(AT_ONCE)?;
+        if self.is_done && self.due_ns.front().is_some_and(|&due_ns| due_ns <= sample.stamp_ns) {
+            self.take_up_due()?;
         }
+        self.go_on(AT_ONCE)?;
         Ok(update)
+    }
+
+    /// Takes up the change that is due, if it is there or samples wait for it.
+    fn take_up_due(&mut self) -> Result<(), LiveError> {
+        let there = self.worker.answer_if_there()?;
+        if there.is_none() && !std::mem::replace(&mut self.is_late, true) {
+            self.counts.late += 1;
+        }
+        let answer = match there {
+            None if self.pace.is_patient => self.worker.answer()?,
+            None => return Ok(()),
+            Some(answer) => answer,
+        };
+        self.take_up(answer);
+        Ok(())
     }
 
     /// Takes up some more of the change at hand.
@@ -204,22 +229,22 @@ impl LiveRefiner {
         self.go_on(usize::MAX)?;
         let mut has_changed_strokes = false;
         while !self.due_ns.is_empty() {
-            has_changed_strokes = self.take_up()?;
+            let answer = self.worker.answer()?;
+            has_changed_strokes = answer.has_changed_strokes;
+            self.take_up(answer);
             self.go_on(usize::MAX)?;
         }
         Ok(has_changed_strokes)
     }
 
-    fn take_up(&mut self) -> Result<bool, LiveError> {
+    fn take_up(&mut self, Answer { delta, probed, .. }: Answer) {
         self.due_ns.pop_front();
-        let (Answer { delta, probed, has_changed_strokes, .. }, has_waited) = self.worker.answer()?;
         self.delta = delta;
         self.probed.extend(probed);
         self.counts.renewals += 1;
-        self.counts.waits += u64::from(has_waited);
+        self.is_late = false;
         self.is_done = false;
         self.refiner.begin_to_follow(&self.delta);
-        Ok(has_changed_strokes)
     }
 
     /// A copy of what the patch knows of all samples so far, and of nothing that it has made of it: it comes when the thread

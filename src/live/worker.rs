@@ -33,8 +33,7 @@ pub(super) struct Answer {
     batch: Vec<Sample>,
 }
 
-/// A patcher on a thread of its own. Each question but that for a copy has one answer, in the same order; no more questions
-/// are open than renewals fit into the time that one of them has.
+/// A patcher on a thread of its own. Each question but that for a copy has one answer, in the same order.
 #[derive(Debug)]
 pub(super) struct Worker {
     questions: Sender<Question>,
@@ -90,15 +89,24 @@ impl Worker {
         self.questions.send(question).map_err(|_| LiveError::Stopped)
     }
 
-    /// The next answer, and whether it had to be waited for.
-    pub fn answer(&mut self) -> Result<(Answer, bool), LiveError> {
-        let (mut answer, has_waited) = match self.answers.try_recv() {
-            Ok(answer) => (answer, false),
-            Err(TryRecvError::Empty) => (self.answers.recv().map_err(|_| LiveError::Stopped)?, true),
-            Err(TryRecvError::Disconnected) => return Err(LiveError::Stopped),
-        };
+    /// The next answer, when it is there.
+    pub fn answer(&mut self) -> Result<Answer, LiveError> {
+        let answer = self.answers.recv().map_err(|_| LiveError::Stopped)?;
+        Ok(self.emptied(answer))
+    }
+
+    /// The next answer, if it is there.
+    pub fn answer_if_there(&mut self) -> Result<Option<Answer>, LiveError> {
+        match self.answers.try_recv() {
+            Ok(answer) => Ok(Some(self.emptied(answer))),
+            Err(TryRecvError::Empty) => Ok(None),
+            Err(TryRecvError::Disconnected) => Err(LiveError::Stopped),
+        }
+    }
+
+    fn emptied(&mut self, mut answer: Answer) -> Answer {
         self.batches.push(std::mem::take(&mut answer.batch));
-        Ok((answer, has_waited))
+        answer
     }
 
     pub fn finish(self) -> Result<Patcher, LiveError> {

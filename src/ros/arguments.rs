@@ -2,6 +2,7 @@
 //!
 //! The later of two values counts, be it from `-p` or from a file.
 
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
@@ -25,8 +26,6 @@ pub struct NodeConfig {
     pub remaps: Vec<Remap>,
     /// all of them, checked
     pub parameters: Parameters,
-    /// `--log-level`: debug, info, warn, error
-    pub log_level: Option<&'static str>,
     /// parameters in files that this node does not have: they may be meant for another
     pub unused: Vec<String>,
 }
@@ -146,22 +145,26 @@ struct Override {
 }
 
 /// Takes what stands between `--ros-args` and `--` (or the end) out of a command line: what remains, what was taken.
-pub fn split(arguments: impl IntoIterator<Item = String>) -> (Vec<String>, Vec<String>) {
+pub fn split<T: AsRef<OsStr>>(arguments: impl IntoIterator<Item = T>) -> (Vec<T>, Vec<T>) {
     let (mut others, mut ros) = (Vec::new(), Vec::new());
     let mut is_ros = false;
     for argument in arguments {
-        match argument.as_str() {
-            "--ros-args" => is_ros = true,
-            "--" if is_ros => is_ros = false,
-            _ if is_ros => ros.push(argument),
-            _ => others.push(argument),
+        let word = argument.as_ref();
+        if word == "--ros-args" {
+            is_ros = true;
+        } else if is_ros && word == "--" {
+            is_ros = false;
+        } else if is_ros {
+            ros.push(argument);
+        } else {
+            others.push(argument);
         }
     }
     (others, ros)
 }
 
 impl NodeConfig {
-    /// The configuration that the arguments and the environment give.
+    /// The configuration that the arguments and the environment give to the node `touchup`.
     ///
     /// - `ros`: what [`split`] took out.
     /// - `variable`: a variable of the environment.
@@ -169,13 +172,20 @@ impl NodeConfig {
     /// # Errors
     /// [`ArgumentError`]: the first thing that is wrong.
     pub fn new(ros: &[String], variable: impl Fn(&str) -> Option<String>) -> Result<Self, ArgumentError> {
+        Self::named("touchup", ros, variable)
+    }
+
+    /// The same for a node that has another name unless the arguments give it one.
+    ///
+    /// # Errors
+    /// [`ArgumentError`]: the first thing that is wrong.
+    pub fn named(name: &str, ros: &[String], variable: impl Fn(&str) -> Option<String>) -> Result<Self, ArgumentError> {
         let mut config = Self {
-            place: Place { namespace: String::new(), node: "touchup".to_owned() },
+            place: Place { namespace: String::new(), node: name.to_owned() },
             domain_id: domain_id(variable("ROS_DOMAIN_ID"))?,
             localhost_only: localhost_only(&variable)?,
             remaps: Vec::new(),
             parameters: Parameters::default(),
-            log_level: None,
             unused: Vec::new(),
         };
         let mut overrides = Vec::new();
@@ -187,7 +197,8 @@ impl NodeConfig {
                 "-r" | "--remap" => config.remap(next("FROM:=TO")?)?,
                 "-p" | "--param" => overrides.push(parameter(next("NAME:=VALUE")?)?),
                 "--params-file" => overrides.extend(from_file(Path::new(next("a file")?))?),
-                "--log-level" => config.log_level = Some(level(next("a level")?)?),
+                // logging has begun by then: it is only checked here
+                "--log-level" => drop(log_level(next("a level")?)?),
                 "-e" | "--enclave" | "--log-config-file" => {
                     next("a name")?;
                 }
@@ -206,6 +217,21 @@ impl NodeConfig {
     /// [`NameError`] when it is none.
     pub fn resolve(&self, name: &str) -> Result<String, NameError> {
         self.place.resolve(name, &self.remaps)
+    }
+
+    /// The same for a second node of this program, whose name goes on so.
+    pub fn beside(&self, ending: &str) -> Self {
+        let mut config = self.clone();
+        config.place.node.push_str(ending);
+        config
+    }
+
+    /// Topics of wrenches and poses, not yet remapped.
+    pub fn sample_topics(&self) -> [&'static str; 2] {
+        match self.parameters.string("source") {
+            "probe" => ["probe/wrench", "probe/pose"],
+            _ => ["stylus/wrench", "stylus/pose"],
+        }
     }
 
     fn remap(&mut self, text: &str) -> Result<(), ArgumentError> {
@@ -296,7 +322,11 @@ fn from_file(path: &Path) -> Result<Vec<Override>, ArgumentError> {
     Ok(overrides.collect())
 }
 
-fn level(text: &str) -> Result<&'static str, ArgumentError> {
+/// What the value of `--log-level` means here: debug, info, warn or error.
+///
+/// # Errors
+/// [`ArgumentError::Form`] for a level that ROS does not have.
+pub fn log_level(text: &str) -> Result<&'static str, ArgumentError> {
     let word = text.rsplit_once(":=").map_or(text, |(_, level)| level).to_lowercase();
     LEVELS.iter().find(|(name, _)| *name == word).map(|(_, level)| *level).ok_or_else(|| ArgumentError::Form {
         argument: "--log-level",

@@ -4,7 +4,9 @@ use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::port::{Arrival, Call, Inbox, Port, Publication, Reply};
+use super::clock::steady_ns;
+use super::messages::{PoseStamped, WrenchStamped};
+use super::port::{Arrival, Call, Inbox, Port, Publication, Reply, SamplePort};
 
 /// Publications that are kept for reading; the oldest go first.
 const MOST_KEPT: usize = 1 << 16;
@@ -41,6 +43,10 @@ impl Port for InProcess {
 
     fn unsent(&self) -> [u64; 2] {
         [0, self.unsent.load(Ordering::Relaxed)]
+    }
+
+    fn tiles_waiting(&self) -> usize {
+        0
     }
 }
 
@@ -103,6 +109,20 @@ impl World {
     /// Sets the time of ROS, ns.
     pub fn set_now_ns(&self, now_ns: i64) {
         self.port.now_ns.store(now_ns, Ordering::Relaxed);
+    }
+}
+
+impl SamplePort for World {
+    fn publish_wrench(&self, wrench: WrenchStamped) -> bool {
+        self.arrive(Arrival::Wrench(wrench, steady_ns()))
+    }
+
+    fn publish_pose(&self, pose: PoseStamped) -> bool {
+        self.arrive(Arrival::Pose(pose, steady_ns()))
+    }
+
+    fn listeners(&mut self) -> [usize; 2] {
+        [1, 1]
     }
 }
 

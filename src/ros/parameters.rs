@@ -103,7 +103,7 @@ pub const PARAMETERS: &[ParameterDescriptor] = {
     }
     &[
         fixed("scene", String(""), "the scene; empty: that of config/default.yaml"),
-        fixed("scan", String(""), "the mesh to be refined"),
+        fixed("scan", String(""), "the mesh to be refined; empty: the one that the scene names"),
         fixed("mesh_unit", OneOf("mm", &["m", "mm", "inch"]), "unit of its coordinates"),
         fixed("source", OneOf("stylus", &["stylus", "probe"]), "who touches"),
         fixed("session_folder", String("sessions"), "where sessions go, each in a folder of its own"),
@@ -121,6 +121,7 @@ pub const PARAMETERS: &[ParameterDescriptor] = {
         ),
         live("flag_radius_mm", Double(5.0, 0.1, 1_000.0), "how far around it is looked for"),
         fixed("robot", OneOf("none", &["none", "sim", "ur"]), "the arm"),
+        fixed("sim_part", String(""), "the part as it is, which a simulated arm touches"),
         live("allow_motion", Bool(false), "whether it may move"),
         fixed(
             "service_mapping",

@@ -15,6 +15,9 @@ use super::messages::{
 };
 use super::parameters::ParameterValue;
 
+/// Tiles that a port keeps for who joins late, the latest, and that are on their way at most: 4 MB.
+pub const TILES_KEPT: usize = 64;
+
 /// Something that came in.
 #[derive(Debug)]
 pub enum Arrival {
@@ -38,6 +41,8 @@ pub enum Arrival {
     SetParameter(String, ParameterValue, Reply<Result<(), String>>),
     /// other software that listens or sends came or went on a topic: for the diagnostics
     Matched(Endpoint),
+    /// somebody new listens to `mesh`
+    Viewer,
     /// the process is asked to end
     Shutdown,
 }
@@ -63,6 +68,12 @@ pub enum Call {
     Reset(Reply<TriggerResponse>),
     /// `~/pause`
     Pause(SetBoolRequest, Reply<SetBoolResponse>),
+    /// `~/probe_all`
+    ProbeAll(Reply<TriggerResponse>),
+    /// `~/recover`
+    Recover(Reply<TriggerResponse>),
+    /// `~/arm_state`
+    ArmState(Reply<TriggerResponse>),
     /// `~/probe_feature`
     ProbeFeature(ProbeFeatureRequest, Reply<ProbeFeatureResponse>),
     /// `~/probe`
@@ -172,6 +183,21 @@ pub trait Port: Send + Sync {
 
     /// Publications not sent so far because nobody took them fast enough: tiles, others.
     fn unsent(&self) -> [u64; 2];
+
+    /// Tiles that wait to be sent, as somebody listens slowly.
+    fn tiles_waiting(&self) -> usize;
+}
+
+/// Where a stylus or a probe publishes what it measures: for what stands in for one.
+pub trait SamplePort: Send {
+    /// On `SOURCE/wrench`, best effort; whether it was sent.
+    fn publish_wrench(&self, wrench: WrenchStamped) -> bool;
+
+    /// On `SOURCE/pose`, best effort; whether it was sent.
+    fn publish_pose(&self, pose: PoseStamped) -> bool;
+
+    /// How many listen now: to wrenches, to poses.
+    fn listeners(&mut self) -> [usize; 2];
 }
 
 /// Where arrivals go.

@@ -31,6 +31,16 @@ pub enum SceneError {
         /// the range, in the same unit
         allowed: &'static str,
     },
+    /// A name that means nothing.
+    #[error("{key} is {value}; it must be {allowed}")]
+    NoSuch {
+        /// section and key
+        key: &'static str,
+        /// as given
+        value: String,
+        /// the names
+        allowed: &'static str,
+    },
     /// A key that another one needs is not there.
     #[error("{key} needs {needs}: name both or neither")]
     Incomplete {

@@ -8,19 +8,23 @@ mod error;
 mod params;
 mod sections;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
 pub use edit::Setting;
 pub use error::SceneError;
 use error::yaml_error;
+pub use params::simulated_arm;
 use sections::named;
 pub use sections::{
     AlongName, BiasSection, BiasTrackingSection, CarveSection, ClockSection, CompensationSection, ContactSection,
     GravityAxes, GuardSection, MarkersSection, Mode, ModelName, PatchSection, PayloadSection, RefineSection,
-    ScanSection, ScanToSpaceSection, ShapeName, SlidingSection, StepName, SyncSection, TipSection, UncertaintySection,
+    RobotSection, ScanSection, ScanToSpaceSection, ShapeName, SlidingSection, StepName, SyncSection, TipSection,
+    UncertaintySection,
 };
+
+use crate::io::mesh_file::MeshUnit;
 
 /// The parts of a scene. `None`: not built.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -50,7 +54,7 @@ pub struct Scene {
     /// The ball that touches; without it a rigid point does.
     #[serde(default, deserialize_with = "named")]
     pub tip: Option<TipSection>,
-    /// How good the scan is; without it the scan counts as free of noise.
+    /// The scan, and how good it is; without it the scan counts as free of noise.
     #[serde(default, deserialize_with = "named")]
     pub scan: Option<ScanSection>,
     /// Takes friction out of the felt normal, in the haptic update and in the patch; without it the force is the normal.
@@ -68,6 +72,9 @@ pub struct Scene {
     /// Says how well the surface that was meshed anew is known and holds knocks apart; without it every touch counts.
     #[serde(default, deserialize_with = "named")]
     pub uncertainty: Option<UncertaintySection>,
+    /// The arm that holds a probe; without it nothing is probed.
+    #[serde(default, deserialize_with = "named")]
+    pub robot: Option<RobotSection>,
     /// Moves the mesh; without it nothing does.
     #[serde(default, deserialize_with = "named")]
     pub refine: Option<RefineSection>,
@@ -91,6 +98,7 @@ impl Default for Scene {
             guard: Some(GuardSection::default()),
             patch: Some(PatchSection::default()),
             uncertainty: Some(UncertaintySection::default()),
+            robot: None,
             refine: Some(RefineSection::default()),
         }
     }
@@ -114,6 +122,15 @@ impl Scene {
             std::fs::read_to_string(path).map_err(|source| SceneError::Read { path: path.to_owned(), source })?;
         let in_file = |error| SceneError::In { path: path.to_owned(), error: Box::new(error) };
         Ok((Self::from_yaml(&yaml).map_err(in_file)?, yaml))
+    }
+
+    /// The scan that the scene names, and the unit of its coordinates.
+    ///
+    /// - `path`: of the scene.
+    pub fn scan_file(&self, path: &Path) -> Option<(PathBuf, MeshUnit)> {
+        let scan = self.scan.as_ref()?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        Some((folder.join(scan.file.as_ref()?), scan.unit))
     }
 
     /// Parses and checks a scene.
@@ -154,6 +171,7 @@ impl Scene {
         self.guard.iter().try_for_each(GuardSection::check)?;
         self.patch.iter().try_for_each(PatchSection::check)?;
         self.uncertainty.iter().try_for_each(UncertaintySection::check)?;
+        self.robot.iter().try_for_each(RobotSection::check)?;
         self.refine.iter().try_for_each(RefineSection::check)?;
         let asks_for_spring =
             self.refine.as_ref().is_some_and(|refine| refine.contact_model == Some(ModelName::Spring));
@@ -162,6 +180,11 @@ impl Scene {
                 key: "refine.contact_model: spring",
                 needs: "tip.stiffness_n_per_mm",
             });
+        }
+        if self.robot.is_some()
+            && self.tip.as_ref().is_none_or(|tip| tip.radius_mm <= 0.0 || tip.shape != ShapeName::Ball)
+        {
+            return Err(SceneError::Incomplete { key: "robot", needs: "tip.shape: ball and tip.radius_mm above 0" });
         }
         if self.patch.is_some() {
             if self.tip.as_ref().is_none_or(|tip| tip.radius_mm <= 0.0 && tip.shape != ShapeName::Cone) {

@@ -6,11 +6,15 @@ use super::{
     AlongName, CarveSection, GravityAxes, GuardSection, Mode, ModelName, PayloadSection, RefineSection, Scene,
     SlidingSection, StepName, TipSection, UncertaintySection,
 };
+use crate::explore::{PatternParams, sigma_of};
 use crate::patch::{CalibrationParams, PatcherParams, UncertaintyParams};
+use crate::probe::{Cell, ProbeParams, Tool};
 use crate::refine::{
     Along, CarveParams, ContactModel, GuardParams, RefineParams, RoiSize, SlidingParams, StepRule, TipParams,
     relaxing_alpha,
 };
+use crate::robot::{Limits, OnsetParams, TouchParams, UrGeometry};
+use crate::sim::ArmParams;
 use crate::touch::{
     BiasParams, ClockParams, CompensatorParams, ContactGateParams, MarkerBody, MarkerFilter, MarkerParams, Payload,
     Placement, SettingError, SpringParams, SyncParams, TipBody, TipShape, Wrench, WrenchFrame,
@@ -38,6 +42,62 @@ impl Scene {
         });
         let p_ht = self.tip.as_ref().and_then(|tip| tip.offset_mm).map(metres);
         (pose_wo.is_some() || p_ht.is_some()).then_some(Placement { pose_wo, p_ht })
+    }
+
+    /// The robot cell, and how is probed in it; `None` without `robot`.
+    pub fn probing(&self) -> Option<(Cell, ProbeParams)> {
+        let (robot, tip) = (self.robot.as_ref()?, self.tip.as_ref()?);
+        let ball_radius = tip.radius_mm / 1e3;
+        let stiffness = tip.stiffness_n_per_mm.map_or(TouchParams::default().stiffness, |k| k * 1e3);
+        let tool = Tool {
+            ball_radius,
+            shaft_radius: robot.shaft_radius_mm / 1e3,
+            shaft_length: robot.shaft_length_mm / 1e3,
+            margin: robot.margin_mm / 1e3,
+        };
+        let pose_bo = self.placement().and_then(|placement| placement.pose_wo).unwrap_or_else(Isometry3::identity);
+        let cell = Cell {
+            geometry: UrGeometry::of(&robot.model)?,
+            pose_bo,
+            pose_ft: Isometry3::from_parts(
+                metres(robot.tip_position_mm).into(),
+                unit_quaternion(robot.tip_orientation_xyzw),
+            ),
+            tool,
+        };
+        let limits = Limits {
+            lowest: metres(robot.workspace_low_mm).into(),
+            highest: metres(robot.workspace_high_mm).into(),
+            force: robot.largest_force_n,
+            speed: robot.largest_mm_per_s / 1e3,
+            acceleration: robot.acceleration_mm_per_s2 / 1e3,
+            search: robot.search_mm / 1e3,
+            time: robot.time_s,
+            dexterity: robot.least_dexterity,
+        };
+        let touch = TouchParams {
+            force: robot.touch_force_n,
+            trigger: robot.trigger_n,
+            link_speed: robot.link_mm_per_s / 1e3,
+            search_speed: robot.search_mm_per_s / 1e3,
+            measure_speed: robot.measure_mm_per_s / 1e3,
+            slide_speed: robot.slide_mm_per_s / 1e3,
+            acceleration: robot.acceleration_mm_per_s2 / 1e3,
+            stiffness,
+            latency: robot.latency_ms / 1e3,
+            onset: OnsetParams { force_noise: robot.force_noise_n, ..OnsetParams::default() },
+            ..TouchParams::default()
+        };
+        let pattern = PatternParams {
+            ball_radius,
+            clearance: robot.clearance_mm / 1e3,
+            depth: robot.depth_mm / 1e3,
+            sigma: sigma_of(robot.tolerance_mm / 1e3, robot.confidence),
+            budget: robot.touches,
+            touch_sigma: robot.touch_sigma_mm / 1e3,
+            ..PatternParams::default()
+        };
+        Some((cell, ProbeParams { touch, pattern, slides: false, limits }))
     }
 
     /// Settings of the estimate of the clock, if there is one.
@@ -259,4 +319,17 @@ fn unit_quaternion([x, y, z, w]: [f64; 4]) -> UnitQuaternion<f64> {
 
 fn metres(mm: [f64; 3]) -> Vector3<f64> {
     Vector3::from(mm) / 1e3
+}
+
+/// A simulated arm of a cell; all that a scene does not name is as in [`ArmParams::default`].
+pub fn simulated_arm(cell: &Cell, params: &ProbeParams) -> ArmParams {
+    ArmParams {
+        geometry: cell.geometry,
+        pose_bo: cell.pose_bo,
+        pose_ft: cell.pose_ft,
+        radius: cell.tool.ball_radius,
+        stiffness: params.touch.stiffness,
+        force_noise: params.touch.onset.force_noise,
+        ..ArmParams::default()
+    }
 }

@@ -9,4 +9,4 @@ mod record;
 
 pub use knocks::UncertaintySummary;
 pub use outcome::{Outcome, OutcomeError, OutcomePlaces, PatchSummary, found, moved_faces};
-pub use record::{SessionError, SessionRecord, SessionRecorder, StrokeChange};
+pub use record::{SessionError, SessionRecord, SessionRecorder, StrokeChange, Unrecorded};

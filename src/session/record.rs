@@ -2,10 +2,9 @@
 
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
-use std::sync::{Arc, Mutex};
-use std::thread::{Builder, JoinHandle};
+use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::{Builder, JoinHandle, park_timeout};
 use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
@@ -22,6 +21,8 @@ const RECORDING: &str = "recording";
 
 /// What was written reaches the system at least so often: a crash loses no more.
 const FLUSH_EVERY: Duration = Duration::from_millis(50);
+/// A disk that refused is asked again after this time.
+const ASK_AGAIN: Duration = Duration::from_secs(1);
 /// Messages that wait for the disk at most: several seconds of both streams.
 const MOST_WAITING: usize = 1 << 14;
 
@@ -145,14 +146,24 @@ fn read_strokes(path: &Path) -> Result<Vec<StrokeChange>, SessionError> {
     whole.lines().map(read).collect()
 }
 
+/// What is not in the recording of a session.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Unrecorded {
+    /// how many messages
+    pub messages: u64,
+    /// what the disk said last, if it refused any
+    pub reason: Option<String>,
+    /// it still refuses
+    pub is_refused: bool,
+}
+
 /// Takes messages down on a thread of its own.
 #[derive(Debug)]
 pub struct SessionRecorder {
     folder: SessionFolder,
     sender: SyncSender<(Message, &'static str)>,
     thread: JoinHandle<()>,
-    lost: Arc<AtomicU64>,
-    fault: Arc<Mutex<Option<String>>>,
+    unrecorded: Arc<Mutex<Unrecorded>>,
 }
 
 impl SessionRecorder {
@@ -164,26 +175,17 @@ impl SessionRecorder {
         let io = |source| SessionError::Io { path: folder.path().to_owned(), source };
         let writer = SegmentedWriter::new(&folder.create_folder(RECORDING).map_err(io)?, topics);
         let (sender, messages) = sync_channel(MOST_WAITING);
-        let (lost, fault) = (Arc::new(AtomicU64::new(0)), Arc::new(Mutex::new(None)));
-        let told = (Arc::clone(&lost), Arc::clone(&fault));
-        let work = move || {
-            if let Err(error) = take_down(writer, &messages) {
-                if let Ok(mut fault) = told.1.lock() {
-                    *fault = Some(error.to_string());
-                }
-                // what comes now is lost, and counted
-                let lost = messages.iter().count() as u64;
-                told.0.fetch_add(lost, Ordering::Relaxed);
-            }
-        };
+        let unrecorded = Arc::new(Mutex::new(Unrecorded::default()));
+        let told = Arc::clone(&unrecorded);
+        let work = move || Taker { writer, told, refused_at: None }.take_down(&messages);
         let thread = Builder::new().name("recorder".to_owned()).spawn(work).map_err(io)?;
-        Ok(Self { folder: folder.clone(), sender, thread, lost, fault })
+        Ok(Self { folder: folder.clone(), sender, thread, unrecorded })
     }
 
     /// Takes a message down whose header names `frame`; never waits. What finds no room is lost, and counted.
     pub fn write(&self, message: Message, frame: &'static str) {
         if self.sender.try_send((message, frame)).is_err() {
-            self.lost.fetch_add(1, Ordering::Relaxed);
+            locked(&self.unrecorded).messages += 1;
         }
     }
 
@@ -197,34 +199,148 @@ impl SessionRecorder {
         self.folder.append_line(STROKES, &line).map_err(io)
     }
 
-    /// Messages that were not taken down, and why the disk took none, if so.
-    pub fn lost(&self) -> (u64, Option<String>) {
-        let fault = self.fault.lock().ok().and_then(|fault| fault.clone());
-        (self.lost.load(Ordering::Relaxed), fault)
+    /// What is not in the recording so far.
+    pub fn unrecorded(&self) -> Unrecorded {
+        locked(&self.unrecorded).clone()
     }
 
-    /// Waits until all is taken down and ends the recording; returns as [`Self::lost`].
-    pub fn finish(self) -> (u64, Option<String>) {
-        let Self { sender, thread, lost, fault, .. } = self;
+    /// Waits until all is taken down and ends the recording; returns as [`Self::unrecorded`].
+    pub fn finish(self) -> Unrecorded {
+        let Self { sender, thread, unrecorded, .. } = self;
         drop(sender);
+        thread.thread().unpark();
         let ended = thread.join();
-        let fault = fault.lock().ok().and_then(|fault| fault.clone());
-        let fault = fault.or_else(|| ended.is_err().then(|| "the thread of the recorder ended by a fault".to_owned()));
-        (lost.load(Ordering::Relaxed), fault)
+        let mut unrecorded = locked(&unrecorded).clone();
+        if ended.is_err() {
+            unrecorded.reason = Some("the thread of the recorder ended by a fault".to_owned());
+        }
+        unrecorded
     }
 }
 
-fn take_down(mut writer: SegmentedWriter, messages: &Receiver<(Message, &'static str)>) -> Result<(), RecordingError> {
-    let mut flushed = Instant::now();
-    loop {
-        match messages.recv_timeout(FLUSH_EVERY.saturating_sub(flushed.elapsed())) {
-            Ok((message, frame)) => writer.write(&message, frame)?,
-            Err(RecvTimeoutError::Timeout) => {}
-            Err(RecvTimeoutError::Disconnected) => return writer.finish(),
+/// A count and words are whole whoever held them.
+fn locked(unrecorded: &Mutex<Unrecorded>) -> MutexGuard<'_, Unrecorded> {
+    unrecorded.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+struct Taker {
+    writer: SegmentedWriter,
+    told: Arc<Mutex<Unrecorded>>,
+    refused_at: Option<Instant>,
+}
+
+impl Taker {
+    /// Looks by itself for what has come: to be woken for each message would cost who hands it over more than the message.
+    ///
+    /// What the disk does not take is lost; a moment later it is asked again, for somebody may have made room.
+    fn take_down(mut self, messages: &Receiver<(Message, &'static str)>) {
+        loop {
+            park_timeout(FLUSH_EVERY);
+            let is_over = loop {
+                match messages.try_recv() {
+                    Ok((message, frame)) => self.take(&message, frame),
+                    Err(why) => break why == TryRecvError::Disconnected,
+                }
+            };
+            match self.writer.flush() {
+                Ok(0) => {}
+                Ok(_) => self.accept(),
+                Err(error) => self.refuse(0, &error),
+            }
+            if is_over {
+                break;
+            }
         }
-        if flushed.elapsed() >= FLUSH_EVERY {
-            writer.flush()?;
-            flushed = Instant::now();
+        let Self { writer, told, .. } = self;
+        if let Err(error) = writer.finish() {
+            locked(&told).reason = Some(error.to_string());
         }
+    }
+
+    fn take(&mut self, message: &Message, frame: &str) {
+        if !self.is_asked() {
+            locked(&self.told).messages += 1;
+        } else if let Err(error) = self.writer.write(message, frame) {
+            self.refuse(1, &error);
+        }
+    }
+
+    /// Whether the disk is tried: it has not refused, or long enough ago.
+    fn is_asked(&self) -> bool {
+        self.refused_at.is_none_or(|at| at.elapsed() >= ASK_AGAIN)
+    }
+
+    fn accept(&mut self) {
+        if self.refused_at.take().is_some() {
+            locked(&self.told).is_refused = false;
+        }
+    }
+
+    fn refuse(&mut self, messages: u64, error: &RecordingError) {
+        self.refused_at = Some(Instant::now());
+        let messages = messages + self.writer.give_up_segment();
+        let mut told = locked(&self.told);
+        told.messages += messages;
+        (told.reason, told.is_refused) = (Some(error.to_string()), true);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs::remove_dir;
+    use std::thread::sleep;
+
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::io::recording::RecordingReader;
+    use crate::touch::{StampedWrench, Wrench};
+
+    fn wrench(number: u32) -> Message {
+        let wrench = Wrench { force: Vector3::z() * f64::from(number), torque: Vector3::zeros() };
+        Message::Wrench(StampedWrench { stamp_ns: i64::from(number) * 1_000_000, wrench })
+    }
+
+    fn wait(recorder: &SessionRecorder, mut is_there: impl FnMut(&Unrecorded) -> bool) -> Unrecorded {
+        let began = Instant::now();
+        loop {
+            let unrecorded = recorder.unrecorded();
+            if is_there(&unrecorded) {
+                return unrecorded;
+            }
+            assert!(began.elapsed() < Duration::from_secs(60), "{unrecorded:?}");
+            sleep(Duration::from_millis(10));
+        }
+    }
+
+    /// The folder goes away and comes back, as a disk does that is full for a time.
+    #[test]
+    fn it_records_on_when_the_disk_takes_again() {
+        let parent = tempfile::tempdir().unwrap();
+        let folder = SessionFolder::create(parent.path(), "session").unwrap();
+        let topics = Topics::default();
+        let recorder = SessionRecorder::start(&folder, &topics).unwrap();
+        let recording = folder.path().join(RECORDING);
+        remove_dir(&recording).unwrap();
+        for number in 1..=5 {
+            recorder.write(wrench(number), "tip");
+        }
+        let refused = wait(&recorder, |unrecorded| unrecorded.messages == 5);
+        assert!(refused.is_refused && refused.reason.unwrap().contains("touch_0000.mcap"));
+
+        folder.create_folder(RECORDING).unwrap();
+        let mut last = 5;
+        let accepted = wait(&recorder, |unrecorded| {
+            last += 1;
+            recorder.write(wrench(last), "tip");
+            !unrecorded.is_refused
+        });
+        recorder.write(wrench(last + 1), "tip");
+        let lost = recorder.finish();
+        assert_eq!(lost, accepted);
+        let read: Vec<_> = RecordingReader::open(&recording, &topics).unwrap().map(Result::unwrap).collect();
+        let kept: Vec<_> = (lost.messages as u32 + 1..=last + 1).map(wrench).collect();
+        assert_eq!(read, kept);
+        assert!(recording.join("metadata.yaml").exists());
     }
 }

@@ -23,6 +23,9 @@ pub enum SimError {
         /// m
         radius_m: f64,
     },
+    /// The arm cannot be there.
+    #[error("the arm does not reach its start: bring the part nearer, or take a longer arm")]
+    OutOfReach,
     /// A tip that cannot be.
     #[error(transparent)]
     Tip(#[from] crate::touch::SettingError),

@@ -3,6 +3,7 @@
 //! A [`Surface`] knows how far every point is from it. The scanner makes a bad mesh of one, the stylus slides a ball
 //! over it and says what it felt ([`touch`]). All randomness comes from a seed.
 
+mod arm;
 mod ball;
 mod contour;
 pub mod coupled;
@@ -22,6 +23,7 @@ mod tip;
 mod triangulate;
 mod wander;
 
+pub use arm::{ArmFault, ArmParams, SimArm, WEIGHTLESS};
 pub use ball::{BallContact, push_ball};
 pub use error::SimError;
 pub use markers::{CameraParams, see_markers};

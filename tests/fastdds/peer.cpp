@@ -1,7 +1,7 @@
 // A ROS 2 node as rmw_fastrtps puts it on the wire, by Fast DDS alone: messages are passed through as bytes.
 //
 //   peer tiles DOMAIN COUNT     listens to rt/mesh as a late joiner until COUNT different tiles have come
-//   peer undo DOMAIN COUNT      calls rq/touchup/undo COUNT times with 1, 2, ..., and checks each answer
+//   peer undo DOMAIN COUNT STEP calls rq/touchup/undo COUNT times with STEP, 2 STEP, ..., and checks each answer: so often "echo"
 //   peer echo DOMAIN COUNT      sends COUNT wrenches at 1 kHz, and times the mismatches that come back
 //
 // Prints "ok" with what it measured, or what is wrong; ends with 0 or 1.
@@ -167,13 +167,15 @@ int tiles(int domain, size_t count) {
   return 0;
 }
 
-int undo(int domain, uint32_t count) {
+int undo(int domain, uint32_t count, uint32_t step) {
   Listener listener;
   Node node(domain);
   auto* reader = node.reader("rr/touchup/undoReply", "touchup_msgs::srv::dds_::Undo_Response_", false, listener);
   auto* writer = node.writer("rq/touchup/undoRequest", "touchup_msgs::srv::dds_::Undo_Request_");
   std::vector<double> times;
-  for (uint32_t strokes = 1; strokes <= count; ++strokes) {
+  for (uint32_t strokes = step; strokes <= count * step; strokes += step) {
+    std::string expected;
+    for (uint32_t i = 0; i < strokes; ++i) expected += "echo";
     const auto until = Clock::now() + std::chrono::seconds(20);
     bool answered = false;
     while (!answered && Clock::now() < until) {
@@ -192,7 +194,7 @@ int undo(int domain, uint32_t count) {
         if (info.related_sample_identity.sequence_number() != wanted) continue;
         Cdr cdr{bytes};
         const bool success = cdr.number<uint8_t>();
-        const bool is_right = success && cdr.text() == "echo" && cdr.number<uint32_t>() == strokes &&
+        const bool is_right = success && cdr.text() == expected && cdr.number<uint32_t>() == strokes &&
                               cdr.number<uint64_t>() == uint64_t(1) << 40;
         if (!is_right || info.related_sample_identity.writer_guid() != reader->guid()) {
           std::printf("call %u has a wrong answer\n", strokes);
@@ -264,8 +266,10 @@ int echo(int domain, uint32_t count) {
 
 int main(int argc, char** argv) {
   if (argc == 4 && std::string(argv[1]) == "tiles") return tiles(std::stoi(argv[2]), std::stoul(argv[3]));
-  if (argc == 4 && std::string(argv[1]) == "undo") return undo(std::stoi(argv[2]), std::stoul(argv[3]));
+  if (argc == 5 && std::string(argv[1]) == "undo") {
+    return undo(std::stoi(argv[2]), std::stoul(argv[3]), std::stoul(argv[4]));
+  }
   if (argc == 4 && std::string(argv[1]) == "echo") return echo(std::stoi(argv[2]), std::stoul(argv[3]));
-  std::printf("usage: peer tiles|undo|echo DOMAIN COUNT\n");
+  std::printf("usage: peer tiles|undo|echo DOMAIN COUNT [STEP]\n");
   return 1;
 }

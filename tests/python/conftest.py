@@ -33,6 +33,15 @@ def touchup(touchup_bin):
 
 
 @pytest.fixture(scope="session")
+def demo_folder(touchup, tmp_path_factory):
+    """What `touchup demo` writes: truth, scan and 74 s of touches, and what refine makes of them. Nobody writes there."""
+    out = tmp_path_factory.mktemp("demo")
+    done = touchup("demo", "--out", out)
+    assert done.returncode == 0, done.stderr
+    return out
+
+
+@pytest.fixture(scope="session")
 def shared():
     """Path of ../shared."""
     path = ROOT.parent / "shared"

@@ -174,6 +174,11 @@ class Marker:
     mesh_use_embedded_materials: bool
 
 
+@message("visualization_msgs/msg/MarkerArray")
+class MarkerArray:
+    markers: sequence[Marker]
+
+
 # services: rmw_cyclonedds puts the caller's id and the number of the call before each message
 @message("touchup_msgs/srv/Undo_Request")
 class UndoRequest:
@@ -190,6 +195,48 @@ class UndoResponse:
     message: str
     strokes: uint32
     mesh_version: uint64
+
+
+@message("touchup_msgs/srv/SaveMesh_Request")
+class SaveMeshRequest:
+    guid: uint64
+    seq: int64
+    name: str
+    overwrite: bool
+    with_features: bool
+
+
+@message("touchup_msgs/srv/SaveMesh_Response")
+class SaveMeshResponse:
+    guid: uint64
+    seq: int64
+    success: bool
+    message: str
+    path: str
+    mesh_version: uint64
+    vertex_count: uint32
+    face_count: uint32
+
+
+@message("diagnostic_msgs/msg/KeyValue")
+class KeyValue:
+    key: str
+    value: str
+
+
+@message("diagnostic_msgs/msg/DiagnosticStatus")
+class DiagnosticStatus:
+    level: uint8
+    name: str
+    message: str
+    hardware_id: str
+    values: sequence[KeyValue]
+
+
+@message("diagnostic_msgs/msg/DiagnosticArray")
+class DiagnosticArray:
+    header: Header
+    status: sequence[DiagnosticStatus]
 
 
 @message("rcl_interfaces/msg/ParameterValue")
@@ -261,6 +308,127 @@ class ProbeSettings:
     dry_run: bool
 
 
+@message("geometry_msgs/msg/PointStamped")
+class PointStamped:
+    header: Header
+    point: Point
+
+
+@message("touchup_msgs/msg/Feature")
+class Feature:
+    id: uint32
+    kind: uint8
+    status: uint8
+    fitted_to: uint8
+    touched: float64
+    touch_count: uint32
+    search_radius: float64
+    center: Point
+    center_std: float64
+    axis: Vector3
+    axis_std: float64
+    direction: Vector3
+    diameter: float64
+    diameter_std: float64
+    length: float64
+    length_std: float64
+    width: float64
+    width_std: float64
+    depth: float64
+    depth_std: float64
+    cone_angle: float64
+    cone_angle_std: float64
+    through: uint8
+    convex: uint8
+    group: int32
+    points: sequence[Point]
+
+
+@message("touchup_msgs/msg/ProbeTouch")
+class ProbeTouch:
+    stamp: Time
+    index: uint32
+    verdict: uint8
+    accepted: bool
+    reason: str
+    pose: Pose
+    contact: Point
+    contact_std: float64
+    normal: Vector3
+    approach: Vector3
+    deviation: float64
+    speed: float64
+    tip_radius: float64
+    calibration: str
+    peak_wrench: Wrench
+    curve_time: sequence[float32]
+    curve_travel: sequence[float32]
+    curve_force: sequence[float32]
+    curve_lateral_force: sequence[float32]
+
+
+@message("touchup_msgs/msg/ProbeResult")
+class ProbeResult:
+    id: uint32
+    code: uint8
+    message: str
+    feature: Feature
+    uncertainty: float64
+    duration: float64
+    max_force: float64
+    touches: sequence[ProbeTouch]
+
+
+@message("touchup_msgs/srv/FlagFeature_Request")
+class FlagFeatureRequest:
+    guid: uint64
+    seq: int64
+    kind: uint8
+    point: PointStamped
+    search_radius: float64
+
+
+@message("touchup_msgs/srv/FlagFeature_Response")
+class FlagFeatureResponse:
+    guid: uint64
+    seq: int64
+    success: bool
+    message: str
+    id: uint32
+
+
+@message("touchup_msgs/srv/ProbeFeature_Request")
+class ProbeFeatureRequest:
+    guid: uint64
+    seq: int64
+    id: uint32
+    settings: ProbeSettings
+
+
+@message("touchup_msgs/srv/ProbeFeature_Response")
+class ProbeFeatureResponse:
+    guid: uint64
+    seq: int64
+    header: Header
+    result: ProbeResult
+
+
+# an empty message has one byte on the wire
+@message("std_srvs/srv/Trigger_Request")
+class TriggerRequest:
+    guid: uint64
+    seq: int64
+    structure_needs_at_least_one_member: uint8
+
+
+@message("std_srvs/srv/Trigger_Response")
+class TriggerResponse:
+    guid: uint64
+    seq: int64
+    success: bool
+    message: str
+
+
 @message("touchup_msgs/action/Probe_SendGoal_Request")
 class SendGoalRequest:
     guid: uint64
@@ -285,7 +453,6 @@ class GetResultRequest:
     goal_id: array[uint8, 16]
 
 
-# of the results only how many there are: the tests send none
 @message("touchup_msgs/action/Probe_GetResult_Response")
 class GetResultResponse:
     guid: uint64
@@ -294,7 +461,7 @@ class GetResultResponse:
     header: Header
     code: uint8
     message: str
-    results: sequence[uint8]
+    results: sequence[ProbeResult]
 
 
 @message("touchup_msgs/action/Probe_FeedbackMessage")

@@ -23,11 +23,9 @@ Demo = namedtuple("Demo", "features touches stamps")
 
 
 @pytest.fixture(scope="module")
-def demo(touchup, tmp_path_factory):
+def demo(demo_folder):
     """Features and touches of the demo, and the stamps of all its wrenches."""
-    out = tmp_path_factory.mktemp("demo")
-    done = touchup("demo", "--out", out)
-    assert done.returncode == 0, done.stderr
+    out = demo_folder
     with (out / "touches.csv").open() as file:
         touches = list(csv.DictReader(file))
     assert [int(touch["touch"]) for touch in touches] == list(range(len(touches)))

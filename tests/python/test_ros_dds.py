@@ -141,9 +141,14 @@ def test_who_comes_late_gets_every_tile(domain):
 def test_a_service_answers_in_the_mapping_of_cyclone(domain):
     with Echo(domain, "--ros-args", "-p", "service_mapping:=cyclone") as echo:
         client = Peer(domain).client("/touchup/undo", UndoRequest, UndoResponse)
-        answer = call(echo, client, UndoRequest(0x1122334455667788, 0, 42))
-        assert (answer.guid, answer.success, answer.message) == (0x1122334455667788, True, "echo")
-        assert (answer.strokes, answer.mesh_version) == (42, 1 << 40)
+        # the last in fragments
+        for strokes in [1, 42, 12_000]:
+            answer = call(echo, client, UndoRequest(0x1122334455667788, 0, strokes))
+            assert (answer.guid, answer.success, answer.message) == (0x1122334455667788, True, "echo" * strokes)
+            assert (answer.strokes, answer.mesh_version) == (strokes, 1 << 40)
+            # those that were asked for again
+            time.sleep(0.5)
+            client[1].take(100)
 
 
 def test_parameters_are_read_and_set_and_refused(domain):

@@ -17,7 +17,7 @@ TIMEOUT_S = 120
 
 @pytest.fixture(scope="module")
 def peer(tmp_path_factory):
-    """Runs the peer: peer("undo", domain, 10) -> what it printed."""
+    """Runs the peer: peer("undo", domain, 10, 1) -> what it printed."""
     root = Path(os.environ.get("FASTDDS_ROOT", "/"))
     if not (root / "usr/include/fastdds").is_dir() or not shutil.which("g++"):
         pytest.skip("needs Fast DDS and a C++ compiler: apt-get install libfastrtps-dev g++")
@@ -50,7 +50,13 @@ def test_who_comes_late_gets_every_tile_at_default_buffers(peer, domain):
 
 def test_a_service_answers_in_the_mapping_of_fast_dds(peer, domain):
     with Echo(domain):
-        assert "ok 100 calls" in peer("undo", domain, 100)
+        assert "ok 100 calls" in peer("undo", domain, 100, 1)
+
+
+def test_an_answer_in_fragments_is_whole(peer, domain):
+    """Up to 48 kB: what is kept below that is in src/ros/node/arm/answer.rs."""
+    with Echo(domain):
+        assert "ok 12 calls" in peer("undo", domain, 12, 1000)
 
 
 def test_no_wrench_of_a_kilohertz_is_lost(peer, domain):
@@ -62,7 +68,7 @@ def test_no_wrench_of_a_kilohertz_is_lost(peer, domain):
 def test_the_wrong_mapping_is_told(peer, domain):
     with Echo(domain, "--ros-args", "-p", "service_mapping:=cyclone") as echo:
         with pytest.raises((AssertionError, subprocess.TimeoutExpired)):
-            peer("undo", domain, 1)
+            peer("undo", domain, 1, 1)
         echo.wait_for(lambda: echo.has("WARN", "/touchup/undo", "-p service_mapping:=enhanced"))
 
 
@@ -73,4 +79,4 @@ def test_loopback_is_network_enough(peer, domain):
         pytest.skip("needs network namespaces: sysctl kernel.unprivileged_userns_clone=1, or root")
     with Echo(domain, wrapper=[*inside, "sh", "-c", 'ip link set lo up && exec "$0" "$@"']) as echo:
         joined = ["nsenter", "--target", str(echo.process.pid), "--user", "--preserve-credentials", "--net"]
-        assert "ok 10 calls" in peer("undo", domain, 10, wrapper=joined)
+        assert "ok 10 calls" in peer("undo", domain, 10, 1, wrapper=joined)

@@ -169,13 +169,21 @@ def test_text_stays_text(tmp_path):
 def test_a_replay_starts_the_same_and_the_player():
     nodes = launched("replay.launch.py", recording="touch.mcap", scan="scan.ply", source="stylus")
     assert set(nodes) == {"touchup", "cell_state_publisher", "stylus_state_publisher", "rviz", "replay"}
-    assert nodes["replay"].arguments == ["replay", str(Path("touch.mcap").absolute())]
+    assert nodes["replay"].arguments == ["replay", str(Path("touch.mcap").absolute()), "--source", "stylus"]
     # the result is looked at after the recording has ended
     assert nodes["replay"].on_exit is None
     fast = launched("replay.launch.py", recording="touch.mcap", scan="scan.ply", speed="10")
-    assert fast["replay"].arguments[2:] == ["--speed", "10"]
+    assert fast["replay"].arguments[4:] == ["--speed", "10"]
     with pytest.raises(RuntimeError, match="recording"):
         launched("replay.launch.py", scan="scan.ply")
+
+
+def test_a_simulated_arm_has_its_part_and_may_move_only_when_told():
+    nodes = launched("cell.launch.py", robot="sim", source="probe", sim_part="truth.ply", allow_motion="true")
+    parameters = nodes["touchup"].parameters
+    assert (parameters["sim_part"], parameters["allow_motion"]) == (str(Path("truth.ply").absolute()), True)
+    assert launched("cell.launch.py", robot="sim", source="probe", allow_motion="false")["touchup"].parameters["allow_motion"] is False
+    assert not {"sim_part", "allow_motion"} & set(launched("cell.launch.py", robot="sim", source="probe")["touchup"].parameters)
 
 
 def test_a_misspelled_keyword_is_refused():

@@ -69,3 +69,9 @@ def test_it_looks_at_a_frame_that_is_always_there():
     classes = [display["Class"] for display in manager["Displays"]]
     assert classes[:2] == ["rviz_default_plugins/Grid", "rviz_default_plugins/TF"] and len(classes) == 7
     assert all(re.fullmatch(r"rviz_(default_plugins|common)/\w+", name) for name in classes)
+
+
+def test_each_panel_has_its_place():
+    # without it they lie one above the other, and squeeze the picture out of the window
+    state = bytes.fromhex(config()["Window Geometry"]["QMainWindow State"])
+    assert all(panel["Name"].encode("utf-16-be") in state for panel in config()["Panels"])

@@ -5,6 +5,7 @@ use std::process::Command;
 use std::sync::mpsc::sync_channel;
 use std::time::{Duration, Instant};
 
+use nalgebra::Isometry3;
 use tempfile::TempDir;
 use touchup::io::mesh_file::{MeshUnit, write_mesh};
 use touchup::io::recording::{Topics, write_recording};
@@ -12,13 +13,14 @@ use touchup::mesh::TriMesh;
 use touchup::ros::clock::steady_ns;
 use touchup::ros::in_process::{World, start};
 use touchup::ros::messages::{
-    Header, MeshPatch, Point, Pose, PoseStamped, Quaternion, SetBoolRequest, Time, Vector3, Wrench, WrenchStamped,
+    Header, MeshPatch, Point, Pose, PoseStamped, Quaternion, SetBoolRequest, Time, Transform, TransformStamped,
+    Vector3, Wrench, WrenchStamped,
 };
-use touchup::ros::node::{INBOX, Node, NodeEnd};
+use touchup::ros::node::{INBOX, Node, NodeEnd, Prepared};
 use touchup::ros::parameters::{ParameterValue, Parameters};
 use touchup::ros::port::{Arrival, Call, Publication};
 use touchup::sim::StylusParams;
-use touchup::touch::Message;
+use touchup::touch::{Message, StampedPose};
 
 use crate::plate_stream::plate_stream;
 
@@ -90,8 +92,8 @@ pub fn arrival(message: &Message) -> Arrival {
     }
 }
 
-fn header(message: &Message, frame: &str) -> Header {
-    let (sec, nanosec) = (message.stamp_ns() / 1_000_000_000, message.stamp_ns() % 1_000_000_000);
+fn header(stamp_ns: i64, frame: &str) -> Header {
+    let (sec, nanosec) = (stamp_ns / 1_000_000_000, stamp_ns % 1_000_000_000);
     Header { stamp: Time { sec: sec as i32, nanosec: nanosec as u32 }, frame_id: frame.to_owned() }
 }
 
@@ -100,7 +102,7 @@ pub fn pose(message: &Message, frame: &str) -> PoseStamped {
     let (p, q) = (pose.pose_ot.translation.vector, pose.pose_ot.rotation);
     let orientation = Quaternion { x: q.i, y: q.j, z: q.k, w: q.w };
     PoseStamped {
-        header: header(message, frame),
+        header: header(message.stamp_ns(), frame),
         pose: Pose { position: Point { x: p.x, y: p.y, z: p.z }, orientation },
     }
 }
@@ -109,7 +111,21 @@ pub fn wrench(message: &Message, frame: &str) -> WrenchStamped {
     let Message::Wrench(wrench) = message else { panic!("no wrench") };
     let (f, t) = (wrench.wrench.force, wrench.wrench.torque);
     let wrench = Wrench { force: Vector3 { x: f.x, y: f.y, z: f.z }, torque: Vector3 { x: t.x, y: t.y, z: t.z } };
-    WrenchStamped { header: header(message, frame), wrench }
+    WrenchStamped { header: header(message.stamp_ns(), frame), wrench }
+}
+
+/// A pose as somebody at `place` (in O) tells it.
+pub fn seen_from(message: &Message, place: &Isometry3<f64>, frame: &str) -> PoseStamped {
+    let Message::Pose(told) = message else { panic!("no pose") };
+    let pose_ot = place.inv_mul(&told.pose_ot);
+    pose(&Message::Pose(StampedPose { pose_ot, ..*told }), frame)
+}
+
+pub fn transform(stamp_ns: i64, parent: &str, child: &str, pose: &Isometry3<f64>) -> TransformStamped {
+    let header = header(stamp_ns, parent);
+    let (p, q) = (pose.translation.vector, pose.rotation);
+    let (translation, rotation) = (Vector3 { x: p.x, y: p.y, z: p.z }, Quaternion { x: q.i, y: q.j, z: q.k, w: q.w });
+    TransformStamped { header, child_frame_id: child.to_owned(), transform: Transform { translation, rotation } }
 }
 
 /// A node that runs, and the world around it.
@@ -134,7 +150,7 @@ impl Bench {
         }
         let (inbox, arrivals) = sync_channel(INBOX);
         let (port, world) = start(inbox);
-        let node = Node::start(parameters, port, arrivals).unwrap();
+        let node = Prepared::new(parameters).unwrap().start(port, arrivals, None).unwrap();
         Self { node, world, published: Vec::new() }
     }
 

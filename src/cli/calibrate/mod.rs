@@ -1,8 +1,11 @@
 //! `touchup calibrate`: what the scene must know of scan, sensor and tip, found and written into it.
 
 mod payload;
+mod payload_by_arm;
 mod scan;
+mod stiffness;
 mod tip;
+mod tip_by_arm;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -10,7 +13,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Subcommand};
 use serde::Serialize;
 
-use super::replay::{Recording, Replayed, marker_filter, replay};
+use super::samples::{Recording, Replayed, each_sample, marker_filter};
 use super::{CliError, Losses, check_kept, tell};
 use crate::calibrate::Known;
 use crate::io::atomic::write_atomically;
@@ -22,10 +25,12 @@ use crate::touch::{Placement, Sample};
 pub(super) enum CalibrateArguments {
     /// Where the scan lies in the frame of the recorded poses, from points picked on both
     Scan(scan::ScanArguments),
-    /// Weight, centre of mass and bias of the sensor, from still poses in free air
+    /// Weight, centre of mass and bias of the sensor, from still poses in free air: of a recording, or of an arm
     Payload(payload::PayloadArguments),
-    /// The centre of the ball in the tracked stylus, from a swing about it
+    /// The centre of the ball: in the tracked stylus, from a swing about it; in the flange of an arm, from touches of one spot
     Tip(tip::TipArguments),
+    /// How far arm and probe give way, from presses of an arm on one spot
+    Stiffness(stiffness::StiffnessArguments),
 }
 
 /// The verb.
@@ -34,8 +39,12 @@ pub(super) fn calibrate(arguments: &CalibrateArguments) -> Result<Losses, CliErr
         CalibrateArguments::Scan(arguments) => scan::scan(arguments),
         CalibrateArguments::Payload(arguments) => payload::payload(arguments),
         CalibrateArguments::Tip(arguments) => tip::tip(arguments),
+        CalibrateArguments::Stiffness(arguments) => stiffness::stiffness(arguments),
     }
 }
+
+/// Why a calibration with an arm has no scene to begin with.
+const NO_SCENE: &str = "--scene is needed: it says where the arm stands and what it must never leave";
 
 /// What is written, and how it is told.
 #[derive(Debug, Args)]
@@ -69,6 +78,11 @@ impl Target {
     /// Refuses to write over `input`, and reads the scene.
     fn open(&self, flag: &str, input: &Path) -> Result<Draft, CliError> {
         check_kept(flag, input, &self.out)?;
+        self.open_scene()
+    }
+
+    /// Reads the scene.
+    fn open_scene(&self) -> Result<Draft, CliError> {
         let Some(path) = &self.scene else {
             return Ok(Draft { text: String::new(), scene: Scene::from_yaml("{}")? });
         };
@@ -141,14 +155,14 @@ impl Source {
     fn replay(&self, recording: Recording, scene: &Scene, each: impl FnMut(&Sample)) -> Result<Replayed, CliError> {
         let markers = marker_filter(scene, self.markers_topic.as_deref())?;
         let placement = scene.placement().map(|placement| Placement { pose_wo: None, ..placement });
-        replay(recording, placement, scene.sync_params(), markers, each)
+        each_sample(recording, placement, scene.sync_params(), markers, each)
     }
 }
 
 /// A value of three components as JSON has it, and its standard uncertainty.
 #[derive(Clone, Copy, Debug, Serialize)]
 struct Vector {
-    value: [f64; 3],
+    pub value: [f64; 3],
     std: [f64; 3],
 }
 

@@ -1,4 +1,4 @@
-//! `touchup calibrate payload`: what hangs on the sensor, from still poses.
+//! `touchup calibrate payload`: what hangs on the sensor, from still poses of a recording; with an arm: `payload_by_arm`.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -8,32 +8,40 @@ use nalgebra::Vector3;
 use serde::Serialize;
 use tracing::warn;
 
+use super::super::arm::{CellArguments, RobotName, TruePayload};
 use super::super::{CliError, Losses};
-use super::{Change, Draft, Source, Target, Vector, rounded};
+use super::{Change, Draft, Source, Target, Vector, payload_by_arm, rounded};
 use crate::calibrate::{PayloadFit, PayloadParams, StaticPose, StillFinder, StillParams, fit_payload};
 use crate::io::static_poses::read_static_poses;
 use crate::scene::{BiasSection, GravityAxes, PayloadSection, Scene, Setting};
 use crate::touch::WrenchFrame;
 
 #[derive(Debug, Args)]
-#[group(id = "poses", required = true, multiple = false, args = ["bag", "samples"])]
+#[group(id = "poses", required = true, multiple = false, args = ["bag", "samples", "robot"])]
 pub(in crate::cli) struct PayloadArguments {
     /// A recording in which the stylus is held still in free air in several orientations
-    #[arg(long, value_name = "RECORDING")]
+    #[arg(long, value_name = "RECORDING", conflicts_with_all = ["cell", "true_payload"])]
     bag: Option<PathBuf>,
     /// Static poses, CSV: qx,qy,qz,qw,fx_n,fy_n,fz_n,tx_nm,ty_nm,tz_nm
-    #[arg(long, value_name = "CSV")]
+    #[arg(long, value_name = "CSV", conflicts_with_all = ["cell", "true_payload"])]
     samples: Option<PathBuf>,
+    /// An arm that turns its probe in free air by itself; it needs --scene
+    #[arg(long, value_name = "ARM")]
+    pub(super) robot: Option<RobotName>,
+    #[command(flatten)]
+    pub(super) cell: CellArguments,
+    #[command(flatten)]
+    pub(super) truth_payload: TruePayload,
     /// In whose axes the wrench is; left out: as the recording says, or the sensor's for --samples
-    #[arg(long, value_name = "AXES")]
+    #[arg(long, value_name = "AXES", conflicts_with = "robot")]
     wrench_axes: Option<Axes>,
     /// Acceleration of gravity, by which the weight is divided
     #[arg(long, value_name = "G", default_value = "9.81")]
-    gravity_m_per_s2: f64,
+    pub(super) gravity_m_per_s2: f64,
     #[command(flatten)]
     source: Source,
     #[command(flatten)]
-    target: Target,
+    pub(super) target: Target,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -53,6 +61,9 @@ pub(super) fn payload(arguments: &PayloadArguments) -> Result<Losses, CliError> 
     if !(1.0..=100.0).contains(&gravity) {
         return Err(CliError::Usage(format!("--gravity-m-per-s2 is {gravity}; it must be 1 to 100 m/s²")));
     }
+    if let Some(robot) = arguments.robot {
+        return payload_by_arm::payload(arguments, robot);
+    }
     let (flag, path) = match (&arguments.bag, &arguments.samples) {
         (Some(bag), _) => ("--bag", bag),
         (None, Some(samples)) => ("--samples", samples),
@@ -63,16 +74,21 @@ pub(super) fn payload(arguments: &PayloadArguments) -> Result<Losses, CliError> 
     let mounted = draft.scene.compensator_params(wrench_frame).pose_ts.rotation;
     let params = PayloadParams { wrench_frame, r_ts: mounted, gravity };
     let fit = fit_payload(&poses, &params).map_err(|error| CliError::Payload { path: path.clone(), error })?;
+    warn_of_residuals(&fit, "is the sensor mounted as compensation.sensor_orientation_xyzw says, ");
+    let found = PayloadFound::of(&fit, ["sensor", "poses"]);
+    arguments.target.write(&draft, &found.change(&draft), &found)?;
+    Ok(losses)
+}
+
+/// - `besides`: what else may be the cause.
+pub(super) fn warn_of_residuals(fit: &PayloadFit, besides: &str) {
     if let Some(expected) = fit.expected_force.filter(|expected| fit.rms_force > UNEXPLAINED * expected) {
         warn!(
-            "the residuals of {:.3} N are more than the noise explains ({expected:.3} N): does a cable pull, is the sensor \
-             mounted as compensation.sensor_orientation_xyzw says, had it settled?",
+            "the residuals of {:.3} N are more than the noise explains ({expected:.3} N): does a cable pull, {besides}had it \
+             settled?",
             fit.rms_force
         );
     }
-    let found = PayloadFound::of(&fit);
-    arguments.target.write(&draft, &found.change(&draft), &found)?;
-    Ok(losses)
 }
 
 impl PayloadArguments {
@@ -97,32 +113,37 @@ impl PayloadArguments {
 
 /// What `--json` prints.
 #[derive(Debug, Serialize)]
-struct PayloadFound {
-    still_phases: usize,
+pub(super) struct PayloadFound {
+    /// whose axes are those of the sensor, and whose those of the poses
+    #[serde(skip)]
+    axes: [&'static str; 2],
+    pub still_phases: usize,
     /// those that did not fit, from 0 on
     left_out: Vec<usize>,
     tilt_deg: f64,
     weight_n: f64,
     weight_std_n: f64,
-    mass_kg: f64,
+    pub mass_kg: f64,
     mass_std_kg: f64,
-    /// in the axes of the sensor
-    centre_mm: Vector,
-    /// in the axes of the recorded poses
+    /// in the axes of the sensor, which of an arm are those of its flange
+    pub centre_mm: Vector,
+    /// in the axes of the poses, which of an arm are those of its base
     gravity_m_per_s2: [f64; 3],
     bias_force_n: Vector,
     bias_torque_nm: Vector,
-    residual_force_n: f64,
-    residual_torque_nm: f64,
+    pub residual_force_n: f64,
+    pub residual_torque_nm: f64,
     /// what the noise of the sensor lets expect
     expected_residual_n: Option<f64>,
 }
 
 impl PayloadFound {
-    fn of(fit: &PayloadFit) -> Self {
+    /// - `axes`: whose are those of the sensor, and whose those of the poses.
+    pub fn of(fit: &PayloadFit, axes: [&'static str; 2]) -> Self {
         let payload = fit.payload();
         let [weight, sigma] = fit.weight;
         Self {
+            axes,
             still_phases: fit.poses,
             left_out: fit.rejected.clone(),
             tilt_deg: fit.tilt.to_degrees(),
@@ -180,8 +201,9 @@ impl fmt::Display for PayloadFound {
         writeln!(f, "still phases: {phases}, left out: {left_out}; tilted by {tilt:.0}° or more about every axis")?;
         writeln!(f, "weight      {:.4} ± {:.4} N", self.weight_n, self.weight_std_n)?;
         writeln!(f, "mass        {:.5} ± {:.5} kg", self.mass_kg, self.mass_std_kg)?;
-        writeln!(f, "centre      {} mm, in the axes of the sensor", self.centre_mm)?;
-        writeln!(f, "down        ({x:+.4}, {y:+.4}, {z:+.4}), in the axes of the poses")?;
+        let [of_sensor, of_poses] = self.axes;
+        writeln!(f, "centre      {} mm, in the axes of the {of_sensor}", self.centre_mm)?;
+        writeln!(f, "down        ({x:+.4}, {y:+.4}, {z:+.4}), in the axes of the {of_poses}")?;
         writeln!(f, "bias        {} N", self.bias_force_n)?;
         writeln!(f, "            {:.5} N·m", self.bias_torque_nm)?;
         write!(f, "residuals   {:.4} N, {:.5} N·m rms", self.residual_force_n, self.residual_torque_nm)?;

@@ -1,4 +1,4 @@
-//! `touchup calibrate tip`: where the ball is in the tracked stylus, from a swing about it.
+//! `touchup calibrate tip`: where the ball is in the tracked stylus, from a swing about it; with an arm: `tip_by_arm`.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -6,20 +6,33 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 
+use super::super::arm::{CellArguments, RobotName};
 use super::super::{CliError, Losses};
-use super::{Change, Draft, Source, Target, Vector, rounded};
+use super::{Change, Draft, Source, Target, Vector, rounded, tip_by_arm};
 use crate::calibrate::{SwingPose, TipFit, TipFitParams, fit_tip};
 use crate::scene::{Scene, Setting};
 
 #[derive(Debug, Args)]
+#[group(id = "swing", required = true, multiple = false, args = ["bag", "robot"])]
 pub(in crate::cli) struct TipArguments {
     /// A recording in which the ball rests in a cone or divot while the stylus is swung to all sides
-    #[arg(long, value_name = "RECORDING")]
-    bag: PathBuf,
+    #[arg(long, value_name = "RECORDING", conflicts_with_all = ["cell", "spot", "truth_tip_mm"])]
+    bag: Option<PathBuf>,
+    /// An arm that touches --spot with its probe leaning to all sides; it needs --scene
+    #[arg(long, value_name = "ARM", requires = "spot")]
+    pub(super) robot: Option<RobotName>,
+    #[command(flatten)]
+    pub(super) cell: CellArguments,
+    /// With --robot: a flat place of the part with nothing within 20 mm, in the frame of the scan, mm
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    pub(super) spot: Option<String>,
+    /// Where the ball of a simulated arm really is in the flange, mm; left out: robot.tip_position_mm of the scene
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    pub(super) truth_tip_mm: Option<String>,
     #[command(flatten)]
     source: Source,
     #[command(flatten)]
-    target: Target,
+    pub(super) target: Target,
 }
 
 /// Poses that are held at most: three minutes at 1 kHz. Of a longer swing every second one is dropped.
@@ -51,7 +64,11 @@ impl Swing {
 
 /// The verb.
 pub(super) fn tip(arguments: &TipArguments) -> Result<Losses, CliError> {
-    let TipArguments { bag, source, target } = arguments;
+    let TipArguments { bag, robot, spot, source, target, .. } = arguments;
+    if let (Some(robot), Some(spot)) = (robot, spot) {
+        return tip_by_arm::tip(arguments, *robot, spot);
+    }
+    let bag = bag.as_ref().expect("one of --bag and --robot is there");
     let draft = target.open("--bag", bag)?;
     let mut swing = Swing { poses: Vec::new(), stride: 1, seen: 0 };
     let mut scene = draft.reading();

@@ -24,6 +24,8 @@ pub struct Panel<'a> {
     pub deviations: &'a [f64],
     /// of each vertex slot; drawn in their colours where they are given
     pub classes: Option<&'a [Class]>,
+    /// of each vertex slot, instead of all that; what it means is said in the legend
+    pub paint: Option<&'a [Rgb]>,
     /// stands above it; ASCII
     pub title: &'a str,
     /// stands below it; ASCII
@@ -43,6 +45,8 @@ pub struct PictureParams<'a> {
     pub from: Option<Vector3<f64>>,
     /// how much each vertex of the last panel matters, by slot; without: by its deviation
     pub weights: Option<&'a [f64]>,
+    /// colours and what they mean, ASCII: instead of the bar of deviations where panels are painted
+    pub legend: &'a [(Rgb, &'a str)],
 }
 
 const WIDTHS: [u32; 2] = [400, 8000];
@@ -87,11 +91,15 @@ pub fn draw_picture(panels: &[Panel<'_>], params: &PictureParams<'_>) -> Picture
         picture.write([left, top + panel_height + 10], NOTE, SOFT_INK, &fitted(panel.note, NOTE, panel_width));
     }
     if has_classes {
-        draw_legend(&mut picture, foot);
+        draw_legend(&mut picture, foot, &Class::ALL.map(|class| (colour_of_class(class), class.name())));
     }
     let foot = foot + legend;
     let label = if has_classes { OF_TOUCHES } else { OF_TRUTH };
-    draw_scale(&mut picture, foot, params.range, label);
+    if params.legend.is_empty() {
+        draw_scale(&mut picture, foot, params.range, label);
+    } else {
+        draw_legend(&mut picture, foot, params.legend);
+    }
     draw_length(&mut picture, foot + NOTE.height() + 8, &frame);
     picture
 }
@@ -122,18 +130,19 @@ fn frame_for(panels: &[Panel<'_>], camera: &Camera, width: i32) -> Frame {
     Frame { middle, scale, size: size.map(|side| side as u32) }
 }
 
-/// The classes with their colours in one line.
-fn draw_legend(picture: &mut Picture, top: i32) {
+/// Colours and what they mean in one line.
+fn draw_legend(picture: &mut Picture, top: i32, legend: &[(Rgb, &str)]) {
     let side = NOTE.height();
     let width = picture.size[0] as i32 - 2 * MARGIN;
-    let lengths = Class::ALL.map(|class| side + 8 + NOTE.width(class.name()));
-    let gap = ((width - lengths.iter().sum::<i32>()) / (lengths.len() as i32 - 1)).max(8);
+    let length = |text: &str| side + 8 + NOTE.width(text);
+    let all = legend.iter().map(|(_, text)| length(text)).sum::<i32>();
+    let gap = ((width - all) / (legend.len() as i32 - 1).max(1)).clamp(8, 8 * GAP);
     let mut left = MARGIN;
-    for (class, length) in Class::ALL.into_iter().zip(lengths) {
+    for (colour, text) in legend {
         picture.fill([left, top], [side, side], SOFT_INK);
-        picture.fill([left + 1, top + 1], [side - 2, side - 2], colour_of_class(class));
-        picture.write([left + side + 8, top], NOTE, INK, class.name());
-        left += length + gap;
+        picture.fill([left + 1, top + 1], [side - 2, side - 2], *colour);
+        picture.write([left + side + 8, top], NOTE, INK, text);
+        left += length(text) + gap;
     }
 }
 

@@ -64,12 +64,16 @@ pub(super) fn draw(panel: &Panel<'_>, camera: &Camera, frame: &Frame, range: f64
         let places = panel.mesh.triangle(face).map(|p| place(&camera.project(&p)));
         let values = corners.map(|vertex| panel.deviations.get(vertex.0 as usize).map_or(0.0, |d| d / range));
         let light = light_on(panel, camera, face);
-        match panel.classes {
-            Some(classes) => {
+        match (panel.paint, panel.classes) {
+            (Some(paint), _) => {
+                let colours = corners.map(|v| paint.get(v.0 as usize).copied().unwrap_or(BACKGROUND));
+                samples.fill(&places, |shares| lit(colours[largest(&shares)], light));
+            }
+            (None, Some(classes)) => {
                 let colours = corners.map(|v| classes.get(v.0 as usize).map_or(BACKGROUND, |&c| colour_of_class(c)));
                 samples.fill(&places, |shares| lit(colours[largest(&shares)], light));
             }
-            None => {
+            (None, None) => {
                 samples
                     .fill(&places, |shares| shade(&shades, shares.iter().zip(values).map(|(s, v)| s * v).sum(), light));
             }

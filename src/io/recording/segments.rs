@@ -20,6 +20,10 @@ pub struct SegmentedWriter {
     topics: Topics,
     current: Option<RecordingWriter<BufWriter<File>>>,
     segments: Vec<Segment>,
+    /// messages that [`Self::flush`] has not handed over yet
+    unflushed: u64,
+    /// length of the file after the last flush, bytes
+    flushed_length: u64,
 }
 
 /// What `metadata.yaml` tells of one file.
@@ -30,6 +34,8 @@ struct Segment {
     wrenches: u64,
     first_ns: i64,
     last_ns: i64,
+    /// it has its index, and a proper end
+    is_whole: bool,
 }
 
 impl SegmentedWriter {
@@ -37,7 +43,8 @@ impl SegmentedWriter {
     ///
     /// - `folder`: is there and holds no segments.
     pub fn new(folder: &Path, topics: &Topics) -> Self {
-        Self { folder: folder.to_owned(), topics: topics.clone(), current: None, segments: Vec::new() }
+        let (folder, topics) = (folder.to_owned(), topics.clone());
+        Self { folder, topics, current: None, segments: Vec::new(), unflushed: 0, flushed_length: 0 }
     }
 
     /// Appends a message whose header names `frame`.
@@ -45,11 +52,13 @@ impl SegmentedWriter {
     /// # Errors
     /// As [`RecordingWriter::write`].
     pub fn write(&mut self, message: &Message, frame: &str) -> Result<(), RecordingError> {
-        if self.segments.last().is_none_or(|segment| segment.poses + segment.wrenches >= MOST_IN_A_SEGMENT) {
+        let is_full = |segment: &Segment| segment.poses + segment.wrenches >= MOST_IN_A_SEGMENT;
+        if self.current.is_none() || self.segments.last().is_none_or(is_full) {
             self.begin_segment(message.stamp_ns())?;
         }
         let (Some(writer), Some(segment)) = (&mut self.current, self.segments.last_mut()) else { return Ok(()) };
         writer.write_in(message, frame)?;
+        self.unflushed += 1;
         match message {
             Message::Pose(_) => segment.poses += 1,
             Message::Wrench(_) => segment.wrenches += 1,
@@ -66,32 +75,63 @@ impl SegmentedWriter {
         let file = File::create_new(&path).map_err(|source| RecordingError::Io { path, source })?;
         // each message names its own frame
         self.current = Some(RecordingWriter::new(BufWriter::new(file), &self.topics, "", "")?);
-        self.segments.push(Segment { name, poses: 0, wrenches: 0, first_ns: stamp_ns, last_ns: stamp_ns });
+        let (first_ns, last_ns) = (stamp_ns, stamp_ns);
+        self.segments.push(Segment { name, poses: 0, wrenches: 0, first_ns, last_ns, is_whole: false });
         Ok(())
     }
 
     fn end_segment(&mut self) -> Result<(), RecordingError> {
-        let Some(writer) = self.current.take() else { return Ok(()) };
+        self.flush()?;
+        let (Some(writer), Some(segment)) = (self.current.take(), self.segments.last_mut()) else { return Ok(()) };
+        self.flushed_length = 0;
         let io = |source| RecordingError::Io { path: self.folder.clone(), source };
         let file = writer.finish()?.into_inner().map_err(|error| io(error.into_error()))?;
-        file.sync_all().map_err(io)
+        file.sync_all().map_err(io)?;
+        segment.is_whole = true;
+        Ok(())
     }
 
-    /// Hands all that was written to the system.
+    /// Hands all that was written to the system; returns how many messages these are.
     ///
     /// # Errors
-    /// [`RecordingError::Write`].
-    pub fn flush(&mut self) -> Result<(), RecordingError> {
-        self.current.as_mut().map_or(Ok(()), RecordingWriter::flush)
+    /// [`RecordingError::Write`], [`RecordingError::Io`].
+    pub fn flush(&mut self) -> Result<u64, RecordingError> {
+        let (Some(writer), Some(segment)) = (&mut self.current, self.segments.last()) else { return Ok(0) };
+        if self.unflushed == 0 {
+            return Ok(0);
+        }
+        writer.flush()?;
+        let path = self.folder.join(&segment.name);
+        self.flushed_length = path.metadata().map_err(|source| RecordingError::Io { path, source })?.len();
+        Ok(std::mem::take(&mut self.unflushed))
     }
 
-    /// Ends the last file and writes `metadata.yaml`; nothing when nothing was written.
+    /// After an error: leaves of the file what was flushed, and nothing of one that was not. What is written next begins
+    /// another. Returns how many messages are lost.
+    pub fn give_up_segment(&mut self) -> u64 {
+        // tries once more to write what it holds
+        let Some(segment) = self.current.take().and(self.segments.pop()) else { return 0 };
+        let path = self.folder.join(&segment.name);
+        let flushed = std::mem::take(&mut self.flushed_length);
+        // where even that is refused, the file's end is one that a reader passes over
+        let _ = match flushed {
+            0 => std::fs::remove_file(path),
+            _ => File::options().write(true).open(path).and_then(|file| file.set_len(flushed)),
+        };
+        if flushed > 0 {
+            self.segments.push(segment);
+        }
+        std::mem::take(&mut self.unflushed)
+    }
+
+    /// Ends the last file and writes `metadata.yaml`; nothing when nothing was written. A recording of which a file has no
+    /// proper end gets none: touchup reads it by its files, as after a crash.
     ///
     /// # Errors
     /// [`RecordingError::Write`], [`RecordingError::Io`].
     pub fn finish(mut self) -> Result<(), RecordingError> {
         self.end_segment()?;
-        if self.segments.is_empty() {
+        if self.segments.is_empty() || !self.segments.iter().all(|segment| segment.is_whole) {
             return Ok(());
         }
         let (path, text) = (self.folder.join("metadata.yaml"), self.metadata());
@@ -126,7 +166,7 @@ impl SegmentedWriter {
             let _ = writeln!(text, "    - {}", segment.name);
         }
         text.push_str("  files:\n");
-        for Segment { name, poses, wrenches, first_ns, last_ns } in all {
+        for Segment { name, poses, wrenches, first_ns, last_ns, .. } in all {
             let _ = write!(
                 text,
                 "    - path: {name}\n      starting_time:\n        nanoseconds_since_epoch: {first_ns}\n      duration:\n        \

@@ -132,7 +132,7 @@ impl Probe {
     /// Does it in the thread that sends.
     fn later(self: &Arc<Self>, send: impl FnOnce(&Self) + Send + 'static) {
         let probe = self.clone();
-        self.shared.outgoing.answer(Box::new(move || send(&probe)));
+        self.shared.urgent.answer(Box::new(move || send(&probe)));
     }
 
     /// A new goal: the node decides.

@@ -2,17 +2,20 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
+use std::time::Duration;
 
 use ros2_client::dds::rustdds::mio1::event::Source;
 use ros2_client::dds::rustdds::policy::Durability;
 use ros2_client::dds::rustdds::{
-    DomainParticipantStatusEvent as Event, DomainParticipantStatusListener, GUID, QosPolicies, RTPSEntity,
+    DomainParticipantStatusEvent as Event, DomainParticipantStatusListener, GUID, LostReason, QosPolicies, RTPSEntity,
     StatusEvented, Topic, TopicDescription,
 };
 use ros2_client::{Context, ServiceMapping};
 
-use super::Shared;
 use super::incoming::Listener;
+use super::keep_alive::{KeepAlive, LOOK_EVERY};
+use super::{Shared, mapping};
+use crate::ros::arguments::NodeConfig;
 use crate::ros::port::{Arrival, Endpoint};
 
 /// Vendors by their number on the wire: who knows one mapping of services alone.
@@ -23,6 +26,8 @@ const MOST_PARTICIPANTS: usize = 1024;
 
 pub(super) struct Graph {
     listener: DomainParticipantStatusListener,
+    /// `None` on this computer alone, where nobody is out of reach
+    keep_alive: Option<KeepAlive>,
     shared: Arc<Shared>,
     mapping: ServiceMapping,
     own: GUID,
@@ -36,21 +41,30 @@ pub(super) struct Graph {
     vendors: BTreeMap<GUID, [u8; 2]>,
     /// said once for each
     told: BTreeSet<GUID>,
+    /// what sends tiles
+    tiles: Option<GUID>,
 }
 
 impl Graph {
-    pub fn new(context: &Context, shared: &Arc<Shared>, mapping: ServiceMapping) -> Self {
+    pub fn new(context: &Context, shared: &Arc<Shared>, config: &NodeConfig) -> Self {
         let participant = context.domain_participant();
+        let keep_alive = (!config.localhost_only).then(|| {
+            KeepAlive::new(config.domain_id, participant.participant_id()).inspect_err(
+                |error| tracing::warn!(%error, "who is out of reach for some seconds may not be met again"),
+            )
+        });
         Self {
             listener: participant.status_listener(),
+            keep_alive: keep_alive.and_then(Result::ok),
             shared: shared.clone(),
-            mapping,
+            mapping: mapping(config),
             own: participant.guid(),
             names: BTreeMap::new(),
             services: Vec::new(),
             matched: BTreeMap::new(),
             vendors: BTreeMap::new(),
             told: BTreeSet::new(),
+            tiles: None,
         }
     }
 
@@ -64,6 +78,11 @@ impl Graph {
         self.services.push(whole);
     }
 
+    /// The writer of ours that sends tiles.
+    pub fn add_tiles(&mut self, guid: GUID) {
+        self.tiles = Some(guid);
+    }
+
     /// A reader or writer of ours.
     pub fn add(&mut self, guid: GUID, topic: &Topic) {
         self.matched.insert(guid, (topic.name(), BTreeSet::new()));
@@ -74,9 +93,15 @@ impl Graph {
             Event::ParticipantDiscovered { dpd } if self.vendors.len() < MOST_PARTICIPANTS => {
                 self.vendors.insert(dpd.guid, dpd.vendor_id.as_bytes());
             }
-            Event::ParticipantLost { id, .. } => {
+            Event::ParticipantLost { id, reason } => {
+                match (&mut self.keep_alive, reason) {
+                    (Some(keep_alive), LostReason::Timeout { .. }) => keep_alive.lost(id.as_ref()),
+                    (Some(keep_alive), LostReason::Disposed) => keep_alive.left(id.as_ref()),
+                    (None, _) => {}
+                }
                 self.vendors.retain(|guid, _| guid.prefix != id);
                 self.told.retain(|guid| guid.prefix != id);
+                self.unmatch(|guid| guid.prefix == id);
             }
             Event::ReaderDetected { reader: other } | Event::WriterDetected { writer: other } => {
                 self.seen(other.guid, &other.topic_name, &other.type_name);
@@ -86,6 +111,9 @@ impl Graph {
                 let is_new = self.matched.get_mut(&local).is_some_and(|(_, others)| others.insert(remote));
                 if is_new {
                     self.tell(local, None);
+                }
+                if is_new && self.tiles == Some(local) {
+                    self.shared.arrivals.put(Arrival::Viewer);
                 }
             }
             Event::ReaderLost { guid, .. } | Event::WriterLost { guid, .. } => self.lost(guid),
@@ -101,12 +129,19 @@ impl Graph {
 
     fn lost(&mut self, guid: GUID) {
         self.told.remove(&guid);
-        let locals: Vec<GUID> = self.matched.keys().copied().collect();
-        for local in locals {
-            if self.matched.get_mut(&local).is_some_and(|(_, others)| others.remove(&guid)) {
-                self.tell(local, None);
+        self.unmatch(|other| *other == guid);
+    }
+
+    fn unmatch(&mut self, is_gone: impl Fn(&GUID) -> bool) {
+        let mut fewer = Vec::new();
+        for (local, (_, others)) in &mut self.matched {
+            let count = others.len();
+            others.retain(|other| !is_gone(other));
+            if others.len() < count {
+                fewer.push(*local);
             }
         }
+        fewer.into_iter().for_each(|local| self.tell(local, None));
     }
 
     fn misfit(&mut self, local: GUID, remote: GUID, wanted: &QosPolicies, offered: &QosPolicies, who: &str) {
@@ -179,13 +214,26 @@ fn difference(wanted: &QosPolicies, offered: &QosPolicies) -> String {
 }
 
 impl Listener for Graph {
-    fn source(&mut self, _: usize) -> &mut dyn Source {
-        self.listener.as_status_source_mio1()
+    fn source(&mut self, number: usize) -> &mut dyn Source {
+        match &mut self.keep_alive {
+            Some(keep_alive) if number > 0 => keep_alive.source(),
+            _ => self.listener.as_status_source_mio1(),
+        }
+    }
+
+    fn sources(&self) -> usize {
+        1 + usize::from(self.keep_alive.is_some())
     }
 
     fn take(&mut self) {
         while let Some(event) = self.listener.try_recv_status() {
             self.on(event);
         }
+        if let Some(keep_alive) = &mut self.keep_alive {
+            keep_alive.take();
+        }
+    }
+    fn look_every(&self) -> Option<Duration> {
+        self.keep_alive.as_ref().map(|_| LOOK_EVERY)
     }
 }

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::thread::{Builder, JoinHandle};
+use std::time::{Duration, Instant};
 
 use ros2_client::dds::rustdds::mio1::event::Source;
 use ros2_client::dds::rustdds::mio1::{Events, Interest, Poll, Token, Waker};
@@ -26,6 +27,11 @@ pub(super) trait Listener: Send {
 
     /// Takes all that is there.
     fn take(&mut self);
+
+    /// How long it may go without being asked for what is there; `None` where only what comes counts.
+    fn look_every(&self) -> Option<Duration> {
+        None
+    }
 }
 
 /// Not the number of any listener.
@@ -47,8 +53,10 @@ pub(super) fn listen(
         let mut events = Events::with_capacity(128);
         // what came before the registration wakes nobody
         listeners.iter_mut().for_each(|listener| listener.take());
+        let look_every = listeners.iter().filter_map(|listener| listener.look_every()).min();
+        let mut looked = Instant::now();
         while !shared.arrivals.is_over() {
-            if let Err(error) = poll.poll(&mut events, None) {
+            if let Err(error) = poll.poll(&mut events, look_every) {
                 if error.kind() == std::io::ErrorKind::Interrupted {
                     continue;
                 }
@@ -60,6 +68,13 @@ pub(super) fn listen(
                 if let Some(listener) = listeners.get_mut(event.token().0) {
                     listener.take();
                 }
+            }
+            if look_every.is_some_and(|every| looked.elapsed() >= every) {
+                looked = Instant::now();
+                listeners
+                    .iter_mut()
+                    .filter(|listener| listener.look_every().is_some())
+                    .for_each(|listener| listener.take());
             }
         }
     })?;

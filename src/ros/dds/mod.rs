@@ -6,14 +6,15 @@
 mod action;
 mod graph;
 mod incoming;
-mod outgoing;
+mod keep_alive;
 mod parameter_services;
+mod samples;
 mod services;
 mod topics;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::thread::JoinHandle;
+use std::thread::{Builder, JoinHandle};
 
 use ros2_client::dds::rustdds;
 use ros2_client::{Context, Node, NodeName, NodeOptions, ServiceMapping};
@@ -23,8 +24,9 @@ use super::arguments::NodeConfig;
 use super::arrivals::Arrivals;
 use super::clock::RosClock;
 use super::names::NameError;
+use super::outbox::Outbox;
 use super::port::{Inbox, Port, Publication};
-use outgoing::Outgoing;
+pub use samples::samples;
 
 /// Why the node cannot speak to others.
 #[derive(Debug, Error)]
@@ -59,7 +61,8 @@ struct Shared {
     /// wrenches, poses that did not come
     lost: [AtomicU64; 2],
     clock: RosClock,
-    outgoing: Outgoing,
+    urgent: Outbox,
+    mesh: Outbox,
 }
 
 struct DdsPort {
@@ -72,7 +75,10 @@ struct DdsPort {
 
 impl Port for DdsPort {
     fn publish(&self, publication: Publication) {
-        self.shared.outgoing.publish(publication);
+        match publication {
+            Publication::Tile(_) | Publication::MeshPatch(_) => self.shared.mesh.put(publication),
+            _ => self.shared.urgent.put(publication),
+        }
     }
 
     fn now_ns(&self) -> i64 {
@@ -88,14 +94,21 @@ impl Port for DdsPort {
     }
 
     fn unsent(&self) -> [u64; 2] {
-        self.shared.outgoing.unsent()
+        let [tiles, patches] = self.shared.mesh.unsent();
+        let [_, others] = self.shared.urgent.unsent();
+        [tiles, patches + others]
+    }
+
+    fn tiles_waiting(&self) -> usize {
+        self.shared.mesh.tiles_waiting()
     }
 }
 
 impl Drop for DdsPort {
     fn drop(&mut self) {
         self.shared.arrivals.end();
-        self.shared.outgoing.close();
+        self.shared.urgent.close();
+        self.shared.mesh.close();
         // without it the thread stays until the next message: nothing worse
         let _ = self.waker.wake();
         for thread in self.threads.drain(..) {
@@ -115,10 +128,13 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
         arrivals: Arrivals::new(inbox),
         lost: [const { AtomicU64::new(0) }; 2],
         clock: RosClock::new(is_simulated),
-        outgoing: Outgoing::default(),
+        urgent: Outbox::default(),
+        mesh: Outbox::default(),
     });
-    let (context, mut node) = join(config)?;
-    let mut graph = graph::Graph::new(&context, &shared, mapping(config));
+    // its own parameter services know one mapping alone, and nothing of ranges
+    let options = parameter_services::declare(NodeOptions::new().start_parameter_services(false), &config.parameters);
+    let (context, mut node) = join(config, options)?;
+    let mut graph = graph::Graph::new(&context, &shared, config);
     let (urgent, mesh) = topics::writers(config, &mut node, &mut graph)?;
     let mut listeners = topics::readers(config, &mut node, &mut graph, &shared)?;
     listeners.extend(services::servers(config, &mut node, &mut graph, &shared)?);
@@ -130,10 +146,19 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
     let (waker, listening) = incoming::listen(listeners, shared.clone())?;
     let threads = vec![
         listening,
-        outgoing::spawn("touchup-send", &shared, move |shared| shared.outgoing.send_urgent(&urgent))?,
-        outgoing::spawn("touchup-mesh", &shared, move |shared| shared.outgoing.send_mesh(&mesh))?,
+        thread("touchup-send", &shared, move |shared| shared.urgent.send(|one| urgent.send(one)))?,
+        thread("touchup-mesh", &shared, move |shared| shared.mesh.send(|one| mesh.send(one)))?,
     ];
     Ok(Arc::new(DdsPort { shared, waker, threads, _node: node }))
+}
+
+fn thread(
+    name: &str,
+    shared: &Arc<Shared>,
+    send: impl FnOnce(&Shared) + Send + 'static,
+) -> Result<JoinHandle<()>, RosError> {
+    let shared = Arc::clone(shared);
+    Ok(Builder::new().name(name.to_owned()).spawn(move || send(&shared))?)
 }
 
 fn mapping(config: &NodeConfig) -> ServiceMapping {
@@ -143,7 +168,7 @@ fn mapping(config: &NodeConfig) -> ServiceMapping {
     }
 }
 
-fn join(config: &NodeConfig) -> Result<(Context, Node), RosError> {
+fn join(config: &NodeConfig, options: NodeOptions) -> Result<(Context, Node), RosError> {
     let mut builder = rustdds::DomainParticipantBuilder::new(config.domain_id);
     if config.localhost_only {
         builder = builder.with_only_networks([std::net::Ipv4Addr::LOCALHOST]);
@@ -154,8 +179,6 @@ fn join(config: &NodeConfig) -> Result<(Context, Node), RosError> {
     let namespace = if config.place.namespace.is_empty() { "/" } else { &config.place.namespace };
     let name =
         NodeName::new(namespace, &config.place.node).map_err(|error| RosError::dds("naming the node", &error))?;
-    // its own parameter services know one mapping alone, and nothing of ranges
-    let options = parameter_services::declare(NodeOptions::new().start_parameter_services(false), &config.parameters);
     let node = context.new_node(name, options).map_err(|error| RosError::dds("making the node", &error))?;
     Ok((context, node))
 }

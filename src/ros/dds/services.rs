@@ -86,7 +86,7 @@ where
 {
     let (server, shared) = (server.clone(), shared.clone());
     Reply::new(move |answer| {
-        shared.outgoing.answer(Box::new(move || {
+        shared.urgent.answer(Box::new(move || {
             if let Err(error) = server.send_response(id, answer) {
                 tracing::warn!(service = name, %error, "an answer is not sent");
             }
@@ -129,6 +129,9 @@ pub(super) fn servers(
     made.add("~/redo", "touchup_msgs", "Undo", Call::Redo)?;
     made.add("~/reset", "std_srvs", "Trigger", |_: TriggerRequest, reply| Call::Reset(reply))?;
     made.add("~/pause", "std_srvs", "SetBool", Call::Pause)?;
+    made.add("~/probe_all", "std_srvs", "Trigger", |_: TriggerRequest, reply| Call::ProbeAll(reply))?;
+    made.add("~/recover", "std_srvs", "Trigger", |_: TriggerRequest, reply| Call::Recover(reply))?;
+    made.add("~/arm_state", "std_srvs", "Trigger", |_: TriggerRequest, reply| Call::ArmState(reply))?;
     made.add("~/probe_feature", "touchup_msgs", "ProbeFeature", Call::ProbeFeature)?;
     Ok(made.listeners)
 }

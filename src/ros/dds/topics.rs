@@ -2,8 +2,11 @@
 
 use std::sync::Arc;
 
+use ros2_client::dds::rustdds::policy::ResourceLimits;
+use ros2_client::dds::rustdds::qos::HasQoSPolicy;
+use ros2_client::dds::rustdds::{QosPolicyBuilder, TopicDescription, TopicKind};
 use ros2_client::qos::{Durability, History, QosProfile, WhenFull};
-use ros2_client::{MessageTypeName, Name, Node, Publisher};
+use ros2_client::{MessageTypeName, Name, Node, Publisher, WriteError};
 
 use super::graph::Graph;
 use super::incoming::{Listener, Numbers, Topic};
@@ -14,7 +17,8 @@ use crate::ros::messages::{
     Clock, DiagnosticArray, FeatureArray, HapticMismatch, Marker, MarkerArray, MeshPatch, Message, Path, PointStamped,
     PoseStamped, TFMessage, WrenchStamped,
 };
-use crate::ros::port::Arrival;
+use crate::ros::outbox::Sent;
+use crate::ros::port::{Arrival, Publication, TILES_KEPT};
 
 /// What is small and urgent.
 pub(super) struct UrgentWriters {
@@ -32,13 +36,59 @@ pub(super) struct MeshWriters {
     pub patches: Publisher<MeshPatch>,
 }
 
-const BEST_EFFORT: QosProfile = QosProfile::subscription_default();
+impl UrgentWriters {
+    pub fn send(&self, publication: Publication) -> Sent {
+        match publication {
+            Publication::Features(message) => sent(self.features.publish(message)),
+            Publication::FeatureMarkers(message) => sent(self.feature_markers.publish(message)),
+            Publication::Tip(message) => sent(self.tip.publish(message)),
+            Publication::Path(message) => sent(self.path.publish(message)),
+            Publication::Mismatch(message) => sent(self.mismatch.publish(message)),
+            Publication::Diagnostics(message) => sent(self.diagnostics.publish(message)),
+            // the mesh has an outbox of its own
+            Publication::Tile(_) | Publication::MeshPatch(_) => Sent::Done,
+        }
+    }
+}
+
+impl MeshWriters {
+    pub fn send(&self, publication: Publication) -> Sent {
+        match publication {
+            Publication::Tile(message) => later(self.tiles.publish(message), Publication::Tile),
+            Publication::MeshPatch(message) => later(self.patches.publish(message), Publication::MeshPatch),
+            // the others have an outbox of their own
+            _ => Sent::Done,
+        }
+    }
+}
+
+/// What is urgent waits for nobody.
+fn sent<M: Message>(result: Result<(), WriteError<M>>) -> Sent {
+    match result {
+        Ok(()) => Sent::Done,
+        Err(WriteError::WouldBlock { .. }) => Sent::Refused,
+        Err(error) => {
+            tracing::warn!(topic_type = M::TYPE_NAME, %error, "a message is not sent");
+            Sent::Refused
+        }
+    }
+}
+
+/// The mesh waits for who listens slowly.
+fn later<M: Message>(result: Result<(), WriteError<M>>, publication: fn(M) -> Publication) -> Sent {
+    match result {
+        Err(WriteError::WouldBlock { data }) => Sent::Later(Box::new(publication(data))),
+        other => sent(other),
+    }
+}
+
+pub(super) const BEST_EFFORT: QosProfile = QosProfile::subscription_default();
 /// The thread that sends what is urgent is not held up by who does not listen for longer than this.
 const URGENT: QosProfile = BEST_EFFORT.reliability_reliable(WhenFull::Wait(std::time::Duration::from_millis(10)));
 /// The mesh waits for who listens slowly, then tries again.
 const PATIENT: QosProfile = BEST_EFFORT.reliability_reliable(WhenFull::Wait(std::time::Duration::from_millis(100)));
 
-const fn keep(profile: QosProfile, depth: usize) -> QosProfile {
+pub(super) const fn keep(profile: QosProfile, depth: usize) -> QosProfile {
     profile.history(History::KeepLast { depth })
 }
 
@@ -56,9 +106,10 @@ pub(super) fn writers(
     graph: &mut Graph,
 ) -> Result<(UrgentWriters, MeshWriters), RosError> {
     let mesh = MeshWriters {
-        tiles: writer(config, node, graph, "mesh", latched(keep(PATIENT, 4096)))?,
+        tiles: tile_writer(config, node, graph)?,
         patches: writer(config, node, graph, "mesh_patch", keep(PATIENT, 4096))?,
     };
+    graph.add_tiles(mesh.tiles.guid());
     let urgent = UrgentWriters {
         features: writer(config, node, graph, "features", latched(keep(URGENT, 1)))?,
         feature_markers: writer(config, node, graph, "feature_markers", latched(keep(URGENT, 1)))?,
@@ -77,8 +128,7 @@ pub(super) fn readers(
     graph: &mut Graph,
     shared: &Arc<Shared>,
 ) -> Result<Vec<Box<dyn Listener>>, RosError> {
-    let is_probe = config.parameters.string("source") == "probe";
-    let [wrench, pose] = if is_probe { ["probe/wrench", "probe/pose"] } else { ["stylus/wrench", "stylus/pose"] };
+    let [wrench, pose] = config.sample_topics();
     let mut made = Readers { config, node, graph, shared, listeners: Vec::new() };
     made.add::<WrenchStamped>(wrench, keep(BEST_EFFORT, SAMPLES), |_, m| Some(Arrival::Wrench(m, steady_ns())))?;
     made.add::<PoseStamped>(pose, keep(BEST_EFFORT, SAMPLES), |_, m| Some(Arrival::Pose(m, steady_ns())))?;
@@ -134,6 +184,25 @@ fn writer<M: Message>(
     Ok(publisher)
 }
 
+/// That of the mesh. No more tiles are on their way than [`TILES_KEPT`]: RustDDS keeps each until everybody has it, and who
+/// listens slowly or is silent would see the mesh as it was long ago.
+fn tile_writer(config: &NodeConfig, node: &mut Node, graph: &mut Graph) -> Result<Publisher<Marker>, RosError> {
+    let profile = latched(keep(PATIENT, TILES_KEPT));
+    let topic = topic::<Marker>(config, node, graph, "mesh", &profile)?;
+    // a profile of ROS has no such limit, a topic of DDS has
+    let most = TILES_KEPT as i32;
+    let limits = ResourceLimits { max_samples: most, max_instances: 1, max_samples_per_instance: most };
+    let qos = topic.qos().modify_by(&QosPolicyBuilder::new().resource_limits(limits).build());
+    let participant = topic.participant().ok_or_else(|| RosError::dds("making a topic", &"the participant is gone"))?;
+    let type_name = topic.get_type().name().to_owned();
+    let limited = participant.create_topic(topic.name(), type_name, &qos, TopicKind::NoKey);
+    let limited = limited.map_err(|error| RosError::dds("making a topic", &error))?;
+    let publisher = node.create_publisher(&limited, Some(profile));
+    let publisher = publisher.map_err(|error| RosError::dds("publishing a topic", &error))?;
+    graph.add(publisher.guid(), &limited);
+    Ok(publisher)
+}
+
 fn topic<M: Message>(
     config: &NodeConfig,
     node: &Node,
@@ -142,12 +211,21 @@ fn topic<M: Message>(
     qos: &QosProfile,
 ) -> Result<ros2_client::dds::rustdds::Topic, RosError> {
     let whole = config.resolve(name)?;
-    let mut parts = M::TYPE_NAME.split('/');
-    let (package, type_name) = (parts.next().unwrap_or_default(), parts.next_back().unwrap_or_default());
-    let topic = node.create_topic(&dds_name(&whole)?, MessageTypeName::new(package, type_name), qos);
-    let topic = topic.map_err(|error| RosError::dds("making a topic", &error))?;
+    let topic = make_topic::<M>(node, &whole, qos)?;
     graph.name(&topic, whole);
     Ok(topic)
+}
+
+/// - `whole`: absolute, remapped.
+pub(super) fn make_topic<M: Message>(
+    node: &Node,
+    whole: &str,
+    qos: &QosProfile,
+) -> Result<ros2_client::dds::rustdds::Topic, RosError> {
+    let mut parts = M::TYPE_NAME.split('/');
+    let (package, type_name) = (parts.next().unwrap_or_default(), parts.next_back().unwrap_or_default());
+    let topic = node.create_topic(&dds_name(whole)?, MessageTypeName::new(package, type_name), qos);
+    topic.map_err(|error| RosError::dds("making a topic", &error))
 }
 
 /// The name as ros2-client has it.

@@ -57,7 +57,7 @@ impl ProbeSettings {
 /// The record of one touch by the arm.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ProbeTouch {
-    /// onset of the contact; of a miss the end of the search
+    /// onset of the contact; where there is none, the end of the touch
     pub stamp: Time,
     /// number in the probing of this feature
     pub index: u32,
@@ -73,7 +73,7 @@ pub struct ProbeTouch {
     pub contact: Point,
     /// along the normal, m
     pub contact_std: f64,
-    /// outward, unit vector
+    /// outward, unit vector: the way the part pushed, which friction leaves aslant
     pub normal: Vector3,
     /// the way of the search, unit vector
     pub approach: Vector3,
@@ -83,7 +83,7 @@ pub struct ProbeTouch {
     pub speed: f64,
     /// that was used, m
     pub tip_radius: f64,
-    /// name of the calibration that was used
+    /// name of the calibration that was used; empty: none was named
     pub calibration: String,
     /// largest force, N, and torque about the tip's centre, N·m
     pub peak_wrench: Wrench,
@@ -110,6 +110,10 @@ impl ProbeTouch {
     pub const KNOCK: u8 = 5;
     /// no contact within the search travel
     pub const MISS: u8 = 6;
+    /// not touched: the way to it was not clear, or beyond the limits
+    pub const HELD_BACK: u8 = 7;
+    /// something was felt whose curve says nothing
+    pub const UNCLEAR: u8 = 8;
 }
 
 /// How the probing of one feature ended, and all that was measured.

@@ -3,14 +3,14 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TrySendError, sync_channel};
-use std::thread::Builder;
 use std::time::Duration;
 
 use nalgebra::Point3;
 use tracing::warn;
 
+use super::arm::ArmInput;
 use super::convert::{header, stamp_ns};
-use super::feature_messages::{KIND_NAMES, flagged};
+use super::feature_messages::KIND_NAMES;
 use super::haptic::Haptic;
 use super::replica::{Replica, Snapshot};
 use super::seeker::{Flag, SeekerInput};
@@ -20,12 +20,11 @@ use super::{NodeError, Setup};
 use crate::io::session_folder::SessionFolder;
 use crate::patch::Patcher;
 use crate::ros::messages::{
-    Feature as FeatureMsg, FlagFeatureRequest, FlagFeatureResponse, PointStamped, ProbeFeatureResponse, ProbeResponse,
-    ProbeResult, ResyncMeshResponse, SaveMeshRequest, SaveMeshResponse, SetBoolResponse, TriggerResponse, UndoRequest,
-    UndoResponse,
+    FlagFeatureRequest, FlagFeatureResponse, PointStamped, ProbeResult, ResyncMeshResponse, SaveMeshRequest,
+    SaveMeshResponse, SetBoolResponse, TriggerResponse, UndoRequest, UndoResponse,
 };
 use crate::ros::parameters::ParameterValue;
-use crate::ros::port::{Call, Endpoint, Goal, GoalEnd, Reply};
+use crate::ros::port::{Call, Endpoint, Reply};
 use crate::session::{OutcomePlaces, StrokeChange};
 
 /// A flag may reach so far, m.
@@ -36,6 +35,8 @@ const MOST_STROKES: u32 = 1000;
 const COPY_WAIT: Duration = Duration::from_secs(30);
 /// The name of a file that nobody named.
 const DEFAULT_NAME: &str = "refined.ply";
+/// Meshes that are saved at a time at most: each has a copy of all touches.
+const MOST_SAVING: usize = 4;
 
 impl Haptic {
     pub(super) fn call(&mut self, call: Call) {
@@ -53,11 +54,18 @@ impl Haptic {
             Call::Reset(reply) => reply.send(self.reset()),
             Call::Pause(request, reply) => {
                 self.is_paused = request.data;
+                self.arm.iter().for_each(|arm| arm.pause(request.data));
                 let message = if request.data { "paused: samples are passed over" } else { "samples are taken" };
                 reply.send(SetBoolResponse { success: true, message: message.to_owned() });
             }
-            Call::ProbeFeature(request, reply) => self.refuse_probe(request.id, reply),
-            Call::Probe(goal, handles) => self.refuse_goal(&goal.ids, handles),
+            Call::ProbeFeature(request, reply) => self.order_arm(ArmInput::Feature(request, reply)),
+            Call::Probe(goal, handles) => self.order_arm(ArmInput::Goal(goal, handles)),
+            Call::ProbeAll(reply) => self.order_arm(ArmInput::All(reply)),
+            Call::Recover(reply) => self.order_arm(ArmInput::Recover(reply)),
+            Call::ArmState(reply) => reply.send(match &self.arm {
+                Some(arm) => arm.state(),
+                None => TriggerResponse { success: false, message: NO_ARM.to_owned() },
+            }),
         }
     }
 
@@ -83,7 +91,7 @@ impl Haptic {
 
     fn point_in_object(&self, told: &PointStamped) -> Result<Point3<f64>, String> {
         let stamp_ns = match stamp_ns(&told.header.stamp).ok_or("the stamp of the point is no time")? {
-            0 => self.last_ns.unwrap_or_else(|| self.setup.port.now_ns()),
+            0 => self.last_ns.unwrap_or_else(|| self.port.now_ns()),
             stamp_ns => stamp_ns,
         };
         let frame = self.placer.object_from(&told.header.frame_id, stamp_ns).map_err(|why| why.to_string())?;
@@ -168,8 +176,7 @@ impl Haptic {
                 warn!(%error, "the session before was not written whole");
             }
         };
-        self.ending.retain(|thread| !thread.is_finished());
-        self.ending.push(Builder::new().name("ending".to_owned()).spawn(end).map_err(NodeError::no_thread)?);
+        self.side_work.begin("ending", end).map_err(NodeError::no_thread)?;
         self.fault = None;
         self.begin_counting()?;
         let replica = Box::new(Replica::of(&self.setup.scan.0, &name));
@@ -183,12 +190,15 @@ impl Haptic {
     pub(super) fn finish_samples(&mut self) {
         self.sync.finish();
         while let Some(sample) = self.sync.next_sample() {
-            self.sample(&sample);
+            self.sample(&sample, None);
         }
     }
 
     fn save(&mut self, request: SaveMeshRequest, reply: Reply<SaveMeshResponse>) {
-        self.ending.retain(|thread| !thread.is_finished());
+        if self.side_work.count() >= MOST_SAVING {
+            let message = format!("{MOST_SAVING} meshes are being saved: save again when they are done");
+            return reply.send(SaveMeshResponse { message, ..Default::default() });
+        }
         let places = match Places::of(&self.sitting.folder, &request) {
             Ok(places) => places,
             Err(message) => return reply.send(SaveMeshResponse { message, ..Default::default() }),
@@ -211,32 +221,28 @@ impl Haptic {
                 Err(message) => SaveMeshResponse { message, ..Default::default() },
             });
         };
-        match Builder::new().name("save".to_owned()).spawn(work) {
-            Ok(thread) => self.ending.push(thread),
-            Err(error) => warn!(%error, "no thread to save on: the caller gets no answer"),
+        if let Err(error) = self.side_work.begin("save", work) {
+            warn!(%error, "no thread to save on: the caller gets no answer");
         }
     }
 
-    fn refuse_probe(&self, id: u32, reply: Reply<ProbeFeatureResponse>) {
-        let header = header(self.setup.port.now_ns(), &self.setup.shared.frame);
-        reply.send(ProbeFeatureResponse { header, result: no_arm(id) });
-    }
-
-    fn refuse_goal(&self, ids: &[u32], goal: Goal) {
-        goal.accept.send(true);
-        let response = ProbeResponse {
-            header: header(self.setup.port.now_ns(), &self.setup.shared.frame),
-            code: ProbeResult::NO_ARM,
-            message: NO_ARM.to_owned(),
-            results: ids.first().map(|&id| no_arm(id)).into_iter().collect(),
+    /// Hands an order on to the arm, or answers why it is not taken up.
+    fn order_arm(&self, input: ArmInput) {
+        let (code, why, input) = match &self.arm {
+            None => (ProbeResult::NO_ARM, NO_ARM.to_owned(), input),
+            Some(arm) => match arm.order(input, self.sitting.folder.path()) {
+                Ok(()) => return,
+                Err((input, code, why)) => (code, why, *input),
+            },
         };
-        goal.result.send((GoalEnd::Aborted, response));
+        input.refuse(header(self.port.now_ns(), &self.setup.shared.frame), code, &why);
     }
 
     pub(super) fn set_parameter(&mut self, name: &str, value: &ParameterValue) -> Result<(), String> {
         let mut parameters = (*self.setup.shared.parameters()).clone();
         parameters.set_live(name, value).map_err(|why| why.to_string())?;
         self.mismatch_rate_hz = parameters.double("mismatch_rate_hz");
+        self.arm.iter().for_each(|arm| arm.allow_motion(parameters.bool("allow_motion")));
         self.setup.shared.set_parameters(parameters);
         self.setup.shared.show(&self.view, ViewInput::Parameters);
         Ok(())
@@ -251,18 +257,6 @@ impl Haptic {
 }
 
 const NO_ARM: &str = "no arm configured: start the node with robot:=sim or robot:=ur";
-
-fn no_arm(id: u32) -> ProbeResult {
-    let nowhere = Point3::new(f64::NAN, f64::NAN, f64::NAN);
-    ProbeResult {
-        id,
-        code: ProbeResult::NO_ARM,
-        message: NO_ARM.to_owned(),
-        feature: flagged(id, FeatureMsg::KIND_UNKNOWN, &nowhere, f64::NAN),
-        uncertainty: f64::NAN,
-        ..ProbeResult::default()
-    }
-}
 
 /// The files of one call of `~/save_mesh`.
 struct Places {

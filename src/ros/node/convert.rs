@@ -2,8 +2,11 @@
 
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
-use crate::ros::messages::{Header, Point, Pose, Time, Transform, Vector3 as Vector3Msg};
-use crate::touch::measured_rotation;
+use crate::ros::messages::{
+    Header, Point, Pose, PoseStamped, Quaternion as QuaternionMsg, Time, Transform, Vector3 as Vector3Msg,
+    Wrench as WrenchMsg, WrenchStamped,
+};
+use crate::touch::{StampedPose, StampedWrench, Wrench, measured_rotation};
 
 const NS_PER_S: i64 = 1_000_000_000;
 
@@ -52,6 +55,21 @@ pub fn vector(v: &Vector3<f64>) -> Vector3Msg {
 /// Of a message.
 pub fn vector_of(v: &Vector3Msg) -> Vector3<f64> {
     Vector3::new(v.x, v.y, v.z)
+}
+
+/// A pose of a recording as a message in `frame`.
+pub fn as_pose(pose: &StampedPose, frame: &str) -> PoseStamped {
+    let Isometry3 { rotation, translation } = pose.pose_ot;
+    let orientation = QuaternionMsg { x: rotation.i, y: rotation.j, z: rotation.k, w: rotation.w };
+    let pose_msg = Pose { position: point(&translation.vector.into()), orientation };
+    PoseStamped { header: header(pose.stamp_ns, frame), pose: pose_msg }
+}
+
+/// A wrench of a recording as a message in the axes of `frame`.
+pub fn as_wrench(wrench: &StampedWrench, frame: &str) -> WrenchStamped {
+    let Wrench { force, torque } = &wrench.wrench;
+    let wrench_msg = WrenchMsg { force: vector(force), torque: vector(torque) };
+    WrenchStamped { header: header(wrench.stamp_ns, frame), wrench: wrench_msg }
 }
 
 /// What has no meaning.

@@ -11,6 +11,7 @@ use super::view::ViewInput;
 use super::{NodeEnd, NodeError};
 use crate::live::Quantiles;
 use crate::ros::messages::{DiagnosticArray, DiagnosticStatus, KeyValue};
+use crate::session::Unrecorded;
 
 /// What a state means to who watches.
 struct State {
@@ -40,6 +41,10 @@ impl Haptic {
         let said = |level, words: String| State { level, words };
         if let Some(fault) = &self.fault {
             return said(DiagnosticStatus::ERROR, format!("stopped: {fault}"));
+        }
+        if let Unrecorded { reason: Some(reason), is_refused: true, .. } = self.sitting.recorder.unrecorded() {
+            let words = format!("does not record, make room on the disk and it goes on: {reason}");
+            return said(DiagnosticStatus::ERROR, words);
         }
         if self.is_paused {
             return said(DiagnosticStatus::OK, "paused: samples are passed over".to_owned());
@@ -73,14 +78,14 @@ impl Haptic {
             clock_jumps: self.clock_jumps(),
             push_ns: self.pushes.quantiles(),
             latency_ns: self.latencies.quantiles(),
-            ..self.sitting.report(&self.setup, &self.tally)
+            ..self.sitting.report(&self.setup, &*self.port, &self.tally)
         }
     }
 
     pub(super) fn tell_diagnostics(&mut self) {
         let State { level, words } = self.state();
         let report = self.report();
-        let stamp_ns = self.setup.port.now_ns();
+        let stamp_ns = self.port.now_ns();
         let status = DiagnosticStatus {
             level,
             name: "touchup: session".to_owned(),
@@ -103,7 +108,7 @@ impl Haptic {
         let Quantiles { median, p99, max, .. } = report.push_ns;
         let latency = report.latency_ns;
         let us = |ns: u64| format!("{:.1}", ns as f64 * 1e-3);
-        let (unrecorded, fault) = self.sitting.recorder.lost();
+        let unrecorded = self.sitting.recorder.unrecorded();
         let shared = &self.setup.shared;
         let mut values = vec![
             value("session", report.session.clone()),
@@ -116,13 +121,13 @@ impl Haptic {
             value("latency_p50_us", us(latency.median)),
             value("latency_p99_us", us(latency.p99)),
             value("latency_max_us", us(latency.max)),
-            value("patch_waits", report.waits),
+            value("late_renewals", report.late_renewals),
             value("tiles_waiting", shared.waiting_tiles()),
             value("versions_behind", self.version.saturating_sub(shared.version_shown())),
             value("dropped_view_frames", report.dropped_view_frames),
-            value("unrecorded", unrecorded),
+            value("unrecorded", unrecorded.messages),
         ];
-        values.extend(fault.map(|fault| value("recording", fault)));
+        values.extend(unrecorded.reason.map(|reason| value("recording", reason)));
         values
     }
 
@@ -135,8 +140,9 @@ impl Haptic {
             values.push(value(&format!("{name}_age_ms"), age));
             values.push(value(&format!("{name}_gaps"), stream.gaps));
         }
-        let [dropped, others] = report.dropped;
-        let [tiles, unsent] = self.setup.port.unsent();
+        let ([wrenches, poses], [dropped, others], [tiles, unsent]) = (report.lost, report.dropped, report.unsent);
+        values.push(value("lost_poses", poses));
+        values.push(value("lost_wrenches", wrenches));
         values.push(value("dropped", dropped));
         values.push(value("dropped_others", others));
         values.push(value("unsent_tiles", tiles));
@@ -157,11 +163,8 @@ impl Haptic {
         self.show_edits();
         let report = self.report();
         let folder = self.sitting.folder.path().to_owned();
-        let Self { setup, sitting, ending, .. } = self;
-        for thread in ending {
-            // a thread that ended by a fault has said so
-            let _ = thread.join();
-        }
+        let Self { setup, sitting, side_work, .. } = self;
+        side_work.finish();
         Ok(NodeEnd { folder, report: sitting.end(&setup, report)? })
     }
 }

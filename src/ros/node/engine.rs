@@ -42,7 +42,7 @@ impl Engine {
         };
         let patcher = Patcher::new(patcher).map_err(RefineError::from)?;
         let mut live = LiveRefiner::new(Arc::clone(scan), refiner, patcher, Pace::default(), ROOM)?;
-        // what the first renewal has to look up in the scan takes a second on a large one: no sample is to wait for it
+        // bounds of the scan, which the first renewal looks up, take some ms on a large one: no sample is to wait for that
         live.catch_up()?;
         Ok(Self::Live(Box::new(live)))
     }
@@ -129,11 +129,11 @@ impl Engine {
         }
     }
 
-    /// Renewals for which a sample had to wait.
-    pub fn waits(&self) -> u64 {
+    /// Renewals that were not done when they were due.
+    pub fn late_renewals(&self) -> u64 {
         match self {
             Self::Alone(_) => 0,
-            Self::Live(live) => live.counts().waits,
+            Self::Live(live) => live.counts().late,
         }
     }
 

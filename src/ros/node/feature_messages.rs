@@ -11,9 +11,11 @@ use crate::ros::messages::{
 /// Half of the interval that holds 95 % of a normal distribution, in standard deviations.
 const AT_95_PERCENT: f64 = 1.96;
 /// Height of the labels, m.
-const LETTERS: f64 = 4e-3;
+pub const LETTERS: f64 = 3e-3;
 /// Width of lines, m.
 const LINE: f64 = 0.6e-3;
+/// So far off the surface it does not show through in spots, m.
+const CLEAR: f64 = 0.1e-3;
 
 /// Number of a kind in messages.
 pub fn number_of(kind: Kind) -> u8 {
@@ -26,6 +28,11 @@ pub fn number_of(kind: Kind) -> u8 {
         Kind::Corner => FeatureMsg::KIND_CORNER,
         Kind::Plane => FeatureMsg::KIND_PLANE,
     }
+}
+
+/// Kind of a number in messages; `None` for a region of which nobody knows what it is.
+pub fn kind_of(number: u8) -> Option<Kind> {
+    Kind::ALL.into_iter().find(|kind| number_of(*kind) == number)
 }
 
 /// Names of the kinds by their numbers.
@@ -136,14 +143,14 @@ pub fn markers(features: &FeatureArray) -> MarkerArray {
         let base = Marker { header: frame.clone(), id: feature.id as i32, color: colour(feature), ..Marker::default() };
         markers.extend(body(feature, &base));
         if has_label(feature) {
-            let mut place = feature.center;
-            let up = if feature.axis.x.is_nan() { Vector3Msg { x: 0.0, y: 0.0, z: 1.0 } } else { feature.axis };
-            (place.x, place.y, place.z) =
-                (place.x + up.x * LETTERS, place.y + up.y * LETTERS, place.z + up.z * LETTERS);
+            let up = axis_of(feature);
+            // the center of a boss is at its foot, and the label would be inside
+            let is_boss = feature.kind == FeatureMsg::KIND_BOSS && !feature.depth.is_nan();
+            let place = centre_of(feature) + up * (LETTERS + if is_boss { feature.depth } else { 0.0 });
             markers.push(Marker {
                 ns: "labels".to_owned(),
                 r#type: Marker::TEXT_VIEW_FACING,
-                pose: Pose { position: place, ..Pose::default() },
+                pose: Pose { position: point(&place), ..Pose::default() },
                 scale: Vector3Msg { z: LETTERS, ..Vector3Msg::default() },
                 color: ColorRGBA { r: 1.0, g: 1.0, b: 1.0, a: 1.0 },
                 text: label(feature),
@@ -160,11 +167,12 @@ fn has_label(feature: &FeatureMsg) -> bool {
         || feature.status == FeatureMsg::STATUS_FLAGGED
 }
 
+/// None of them is a colour of the mesh, in front of which they are.
 fn colour(feature: &FeatureMsg) -> ColorRGBA {
     let [r, g, b] = match (feature.status, feature.fitted_to) {
-        (FeatureMsg::STATUS_FLAGGED, _) => [1.0, 0.85, 0.1],
-        (_, FeatureMsg::FITTED_TO_TOUCHES) => [0.1, 0.8, 0.3],
-        _ => [0.2, 0.5, 1.0],
+        (FeatureMsg::STATUS_FLAGGED, _) => [1.0, 0.2, 0.8],
+        (_, FeatureMsg::FITTED_TO_TOUCHES) => [0.1, 0.3, 1.0],
+        _ => [0.1, 0.85, 0.95],
     };
     ColorRGBA { r, g, b, a: 0.6 }
 }
@@ -183,36 +191,51 @@ fn body(feature: &FeatureMsg, base: &Marker) -> Option<Marker> {
     match feature.kind {
         FeatureMsg::KIND_HOLE | FeatureMsg::KIND_BOSS => Some(cylinder(feature, base)),
         FeatureMsg::KIND_CORNER => Some(sphere(3.0 * LINE)),
-        FeatureMsg::KIND_EDGE | FeatureMsg::KIND_SLOT | FeatureMsg::KIND_POCKET => Some(Marker {
-            ns: "features".to_owned(),
-            r#type: Marker::LINE_STRIP,
-            scale: Vector3Msg { x: LINE, ..Vector3Msg::default() },
-            points: feature.points.clone(),
-            ..base.clone()
-        })
-        .filter(|line| line.points.len() > 1),
+        FeatureMsg::KIND_EDGE | FeatureMsg::KIND_SLOT | FeatureMsg::KIND_POCKET => {
+            Some(outline(feature, base)).filter(|line| line.points.len() > 1)
+        }
         _ => None,
     }
 }
 
-fn cylinder(feature: &FeatureMsg, base: &Marker) -> Marker {
+fn outline(feature: &FeatureMsg, base: &Marker) -> Marker {
+    // an edge has the surface on two sides, of an opening it is all below
+    let up = if feature.kind == FeatureMsg::KIND_EDGE { Vector3::zeros() } else { axis_of(feature) * (0.5 * LINE) };
+    let raised = |p: &Point| Point { x: p.x + up.x, y: p.y + up.y, z: p.z + up.z };
+    Marker {
+        ns: "features".to_owned(),
+        r#type: Marker::LINE_STRIP,
+        scale: Vector3Msg { x: LINE, ..Vector3Msg::default() },
+        points: feature.points.iter().map(raised).collect(),
+        ..base.clone()
+    }
+}
+
+fn centre_of(feature: &FeatureMsg) -> Point3<f64> {
+    Point3::new(feature.center.x, feature.center.y, feature.center.z)
+}
+
+/// Up, where it has none.
+fn axis_of(feature: &FeatureMsg) -> Vector3<f64> {
     let axis = Vector3::new(feature.axis.x, feature.axis.y, feature.axis.z);
-    let axis = if axis.iter().all(|x| x.is_finite()) { axis } else { Vector3::z() };
+    if axis.iter().all(|x| x.is_finite()) { axis } else { Vector3::z() }
+}
+
+fn cylinder(feature: &FeatureMsg, base: &Marker) -> Marker {
+    let axis = axis_of(feature);
     let height = if feature.depth.is_nan() { LINE } else { feature.depth };
-    // a hole goes down from its opening, a boss up from its foot
-    let up = if feature.kind == FeatureMsg::KIND_BOSS { 0.5 } else { -0.5 };
-    let middle = Vector3::new(feature.center.x, feature.center.y, feature.center.z) + axis * (up * height);
+    // a hole goes down from its opening and is seen inside of it, a boss up from its foot and is seen around it
+    let (side, up) = if feature.kind == FeatureMsg::KIND_BOSS { (1.0, 0.5) } else { (-1.0, -0.5) };
+    let middle = centre_of(feature) + axis * (up * height + 0.5 * CLEAR);
+    let diameter = feature.diameter + 2.0 * side * CLEAR;
     let turn = Rotation3::rotation_between(&Vector3::z(), &axis)
         .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
     let q = UnitQuaternion::from_rotation_matrix(&turn);
     Marker {
         ns: "features".to_owned(),
         r#type: Marker::CYLINDER,
-        pose: Pose {
-            position: Point { x: middle.x, y: middle.y, z: middle.z },
-            orientation: Quaternion { x: q.i, y: q.j, z: q.k, w: q.w },
-        },
-        scale: Vector3Msg { x: feature.diameter, y: feature.diameter, z: height },
+        pose: Pose { position: point(&middle), orientation: Quaternion { x: q.i, y: q.j, z: q.k, w: q.w } },
+        scale: Vector3Msg { x: diameter, y: diameter, z: height + CLEAR },
         ..base.clone()
     }
 }

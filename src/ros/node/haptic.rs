@@ -1,41 +1,34 @@
-//! The thread of the samples: frames, pairing, haptic update. It alone has the refiner, and does little else.
+//! The thread of the samples: frames, pairing, haptic update. It alone has the refiner, and does little else; what it tells
+//! the other threads is in `showing`.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError};
-use std::thread::JoinHandle;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender};
 use std::time::{Duration, Instant};
 
-use nalgebra::Vector3;
 use tracing::warn;
 
-use super::convert::{NO_VECTOR, header, point, vector};
+use super::arm::ArmHandle;
 use super::edits::Edits;
 use super::placing::{Placer, Refusal};
 use super::seeker::SeekerInput;
+use super::side_work::SideWork;
 use super::sitting::Sitting;
 use super::streams::{Epoch, StreamWatch};
-use super::tip::TipPlace;
 use super::view::ViewInput;
 use super::{NodeEnd, NodeError, Setup};
 use crate::live::{Latencies, LiveError, ProbedNews};
-use crate::refine::{Case, RefineError, Update};
+use crate::refine::RefineError;
 use crate::ros::clock::steady_ns;
-use crate::ros::messages::{HapticMismatch, PoseStamped, TFMessage, WrenchStamped};
-use crate::ros::port::{Arrival, Endpoint};
+use crate::ros::messages::{PoseStamped, TFMessage, WrenchStamped};
+use crate::ros::port::{Arrival, Endpoint, Port};
 use crate::touch::{Compensator, Message, Sample, SyncCounts, Synchroniser, WrenchFrame};
 
 /// The loop looks at the streams so often when nothing comes.
 const IDLE: Duration = Duration::from_millis(10);
 /// Changes of the mesh go to the view so often.
 const SHOW_EVERY: Duration = Duration::from_millis(5);
-/// The distance at the tip is looked up so often.
-const TIP_EVERY: Duration = Duration::from_millis(25);
-/// … up to here, m.
-const TIP_REACH: f64 = 0.02;
-/// A mesh torn by a change that goes on with the next sample is shown all the same when none has come for so long.
-const TORN_AFTER: Duration = Duration::from_millis(200);
 /// Messages of a stream that wait for a transform at most.
 const MOST_WAITING: usize = 4096;
 
@@ -76,22 +69,25 @@ impl Tally {
 /// The thread's own.
 pub struct Haptic {
     pub(super) setup: Arc<Setup>,
+    pub(super) port: Arc<dyn Port>,
     pub(super) view: SyncSender<ViewInput>,
     pub(super) seeker: SyncSender<SeekerInput>,
     pub(super) spare: Receiver<Box<Edits>>,
+    /// probes what it is asked for, where there is one
+    pub(super) arm: Option<ArmHandle>,
     /// filled, and the view had no room for it
-    unsent: Option<Box<Edits>>,
+    pub(super) unsent: Option<Box<Edits>>,
     /// to be filled again
-    kept: Option<Box<Edits>>,
+    pub(super) kept: Option<Box<Edits>>,
     pub(super) placer: Placer,
     pub(super) sitting: Sitting,
     pub(super) sync: Synchroniser,
-    compensator: Compensator,
+    pub(super) compensator: Compensator,
     epoch: Epoch,
     /// poses and wrenches that wait for a transform, with when they came, ns
     waiting: [VecDeque<(Told, i64)>; 2],
     /// touches that the thread of the features had no room for
-    probed: ProbedNews,
+    pub(super) probed: ProbedNews,
     pub(super) streams: [StreamWatch; 2],
     pub(super) is_paused: bool,
     pub(super) fault: Option<String>,
@@ -101,7 +97,7 @@ pub struct Haptic {
     /// who else is on the topics
     pub(super) endpoints: BTreeMap<String, Endpoint>,
     /// sessions that are being ended, and files that are being written
-    pub(super) ending: Vec<JoinHandle<()>>,
+    pub(super) side_work: SideWork,
     pub(super) tally: Tally,
     pub(super) pushes: Latencies,
     /// from the arrival of what completed a sample to the mesh
@@ -110,10 +106,10 @@ pub struct Haptic {
     pub(super) version: u64,
     edits: u64,
     pub(super) last_ns: Option<i64>,
-    sampled: Instant,
+    pub(super) sampled: Instant,
     shown: Instant,
-    tip_shown: Instant,
-    mismatch_ns: i64,
+    pub(super) tip_shown: Instant,
+    pub(super) mismatch_ns: i64,
     pub(super) mismatch_rate_hz: f64,
     told: Instant,
 }
@@ -125,10 +121,12 @@ impl Haptic {
     /// [`NodeError`], for settings of the scene.
     pub fn new(
         setup: Arc<Setup>,
+        port: Arc<dyn Port>,
         sitting: Sitting,
         view: SyncSender<ViewInput>,
         seeker: SyncSender<SeekerInput>,
         spare: Receiver<Box<Edits>>,
+        arm: Option<ArmHandle>,
     ) -> Result<Self, NodeError> {
         let now = Instant::now();
         let mismatch_rate_hz = setup.shared.parameters().double("mismatch_rate_hz");
@@ -139,9 +137,11 @@ impl Haptic {
             placer,
             compensator,
             setup,
+            port,
             view,
             seeker,
             spare,
+            arm,
             unsent: None,
             kept: None,
             sitting,
@@ -154,7 +154,7 @@ impl Haptic {
             lost_transform: None,
             last_state: String::new(),
             endpoints: BTreeMap::new(),
-            ending: Vec::new(),
+            side_work: SideWork::default(),
             tally: Tally::default(),
             pushes: Latencies::new(),
             latencies: Latencies::new(),
@@ -205,7 +205,12 @@ impl Haptic {
             Arrival::Call(call) => self.call(call),
             Arrival::SetParameter(name, value, reply) => reply.send(self.set_parameter(&name, &value)),
             Arrival::Matched(endpoint) => self.note_endpoint(endpoint),
-            Arrival::Shutdown => return ControlFlow::Break(()),
+            Arrival::Viewer => self.setup.shared.note_viewer(),
+            Arrival::Shutdown => {
+                // it stops, retracts and ends while the session is written
+                self.arm = None;
+                return ControlFlow::Break(());
+            }
         }
         ControlFlow::Continue(())
     }
@@ -279,7 +284,7 @@ impl Haptic {
         }
     }
 
-    /// A message in its frame goes to the recording and to the synchroniser, and what that lets out to the refiner.
+    /// A message in its frame goes to the synchroniser and to the recording, and what the first lets out to the refiner.
     fn pair(&mut self, message: Message, stream: usize, at_ns: i64) {
         if self.placer.axes() == Some(WrenchFrame::Object) && self.sitting.axes == WrenchFrame::Sensor {
             self.turn_to_object_axes();
@@ -298,9 +303,7 @@ impl Haptic {
             self.sitting.recorder.write(message, frame);
         }
         while let Some(sample) = self.sync.next_sample() {
-            self.sample(&sample);
-            let ns = u64::try_from(steady_ns().saturating_sub(at_ns)).unwrap_or(0);
-            self.latencies.record(Duration::from_nanos(ns));
+            self.sample(&sample, Some(at_ns));
         }
     }
 
@@ -313,10 +316,16 @@ impl Haptic {
         }
     }
 
-    pub(super) fn sample(&mut self, sample: &Sample) {
+    /// Moves the mesh, then tells the others.
+    ///
+    /// - `at_ns`: when the message came that completed the sample, where one did.
+    pub(super) fn sample(&mut self, sample: &Sample, at_ns: Option<i64>) {
         let pushing = Instant::now();
         let pushed = self.sitting.engine.push(sample);
         self.pushes.record(pushing.elapsed());
+        if let Some(at_ns) = at_ns {
+            self.latencies.record(Duration::from_nanos(steady_ns().saturating_sub(at_ns).max(0) as u64));
+        }
         self.sampled = pushing;
         match pushed {
             Ok(update) => {
@@ -338,70 +347,6 @@ impl Haptic {
         }
     }
 
-    fn send_probed(&mut self) {
-        if self.probed.is_empty() {
-            return;
-        }
-        if let Err(
-            TrySendError::Full(SeekerInput::Probed(news)) | TrySendError::Disconnected(SeekerInput::Probed(news)),
-        ) = self.seeker.try_send(SeekerInput::Probed(std::mem::take(&mut self.probed)))
-        {
-            self.probed = news;
-        }
-    }
-
-    fn show_mismatch(&mut self, sample: &Sample, update: &Update) {
-        let rate_hz = self.mismatch_rate_hz;
-        let is_due = rate_hz <= 0.0 || sample.stamp_ns.saturating_sub(self.mismatch_ns) as f64 * 1e-9 >= 1.0 / rate_hz;
-        if !is_due {
-            return;
-        }
-        self.mismatch_ns = sample.stamp_ns;
-        let tip = self.compensator.compensate(sample);
-        let centre = tip.pose_ot.translation.vector.into();
-        let base = HapticMismatch {
-            header: header(sample.stamp_ns, &self.setup.shared.frame),
-            contact_case: number_of(update.case),
-            face: HapticMismatch::NO_FACE,
-            mesh_version: self.version,
-            tip: point(&centre),
-            actual_force: vector(&tip.force_o),
-            expected_force: NO_VECTOR,
-            linear: NO_VECTOR,
-            rotational: NO_VECTOR,
-            signed_distance: f64::NAN,
-        };
-        let message = match &update.mismatch {
-            None => base,
-            Some(mismatch) => HapticMismatch {
-                face: mismatch.face.0,
-                actual_force: vector(&(mismatch.expected_force_o + mismatch.linear)),
-                expected_force: vector(&mismatch.expected_force_o),
-                linear: vector(&mismatch.linear),
-                rotational: vector(&mismatch.rotational),
-                signed_distance: mismatch.distance,
-                ..base
-            },
-        };
-        self.setup.shared.show(&self.view, ViewInput::Mismatch(message));
-        if self.tip_shown.elapsed() >= TIP_EVERY {
-            self.tip_shown = Instant::now();
-            self.show_tip(sample, centre);
-        }
-    }
-
-    fn show_tip(&self, sample: &Sample, centre: nalgebra::Point3<f64>) {
-        let refiner = self.sitting.engine.refiner();
-        let radius = self.setup.scene.tip_params().radius;
-        let closest = refiner.closest_face(&centre, TIP_REACH).map(|hit| {
-            let off: Vector3<f64> = centre - hit.point;
-            let side = if off.dot(&refiner.mesh().normal(hit.face)) < 0.0 { -1.0 } else { 1.0 };
-            (hit.point, side * off.norm() - radius)
-        });
-        let tip = TipPlace { stamp_ns: sample.stamp_ns, centre, radius, closest };
-        self.setup.shared.show(&self.view, ViewInput::Tip(tip));
-    }
-
     /// What is due now and then.
     fn tick(&mut self) {
         if self.shown.elapsed() >= SHOW_EVERY {
@@ -415,38 +360,6 @@ impl Haptic {
             self.told = Instant::now();
             self.tell_diagnostics();
         }
-    }
-
-    /// Sends what changed in the mesh, as far as the view has taken up what was sent before.
-    pub(super) fn show_edits(&mut self) {
-        let is_idle = self.sampled.elapsed() >= TORN_AFTER;
-        while let Some(edits) = self.unsent.take().or_else(|| self.filled(is_idle)) {
-            if let Err(TrySendError::Full(ViewInput::Edits(back))) = self.view.try_send(ViewInput::Edits(edits)) {
-                self.unsent = Some(back);
-                return;
-            }
-        }
-    }
-
-    /// The next changes, when one of those that go round is here and there is anything to tell.
-    fn filled(&mut self, is_idle: bool) -> Option<Box<Edits>> {
-        let mesh = self.sitting.engine.refiner().mesh();
-        let is_told = self.sitting.told_version == self.version && self.sitting.told_edits == mesh.edits();
-        if is_told {
-            return None;
-        }
-        let mut edits = self.kept.take().or_else(|| self.spare.try_recv().ok())?;
-        let told_edits = mesh.edits();
-        let stamp_ns = self.last_ns.unwrap_or(0);
-        edits.fill(&mut self.sitting.engine, &self.setup.scan, self.version, stamp_ns, is_idle);
-        if edits.is_empty() && !edits.is_complete {
-            self.kept = Some(edits);
-            return None;
-        }
-        if edits.is_complete {
-            (self.sitting.told_version, self.sitting.told_edits) = (self.version, told_edits);
-        }
-        Some(edits)
     }
 
     /// What a session counts from its beginning.
@@ -497,14 +410,5 @@ fn reason_of(error: &RefineError) -> &'static str {
         RefineError::Sample(_) => "sample",
         RefineError::Setting(_) | RefineError::Dynamics(_) => "dynamics",
         RefineError::Mesh(_) | RefineError::NoSuchFace { .. } => "mesh",
-    }
-}
-
-fn number_of(case: Case) -> u8 {
-    match case {
-        Case::Free => HapticMismatch::FREE,
-        Case::MeshOnly => HapticMismatch::MESH_ONLY,
-        Case::SurfaceOnly => HapticMismatch::SURFACE_ONLY,
-        Case::Both => HapticMismatch::BOTH,
     }
 }

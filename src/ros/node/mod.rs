@@ -1,9 +1,10 @@
 //! The node: wrench and pose in, the refined mesh and its features out.
 //!
-//! Four threads. `haptic` has the refiner and takes samples, `view` shows the mesh, `seeker` knows the features, `recorder`
-//! takes down what was accepted. Between them go bounded queues; where something must give, it is what is only for viewing,
+//! Five threads. `haptic` has the refiner and takes samples, `view` shows the mesh, `seeker` knows the features, `recorder`
+//! takes down what was accepted, `arm` moves one where there is one. Between them go bounded queues; where something must give, it is what is only for viewing,
 //! and it is counted.
 
+mod arm;
 mod calls;
 mod convert;
 mod diagnostics;
@@ -17,6 +18,8 @@ mod placing;
 mod replica;
 mod seeker;
 mod shared;
+mod showing;
+mod side_work;
 mod sitting;
 mod streams;
 mod tiles;
@@ -28,7 +31,10 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::thread::{Builder, JoinHandle};
 
+pub use arm::{ArmKind, ArmOfNode};
+pub use convert::{as_pose, as_wrench};
 pub use frames::{FrameBuffer, FrameError};
+pub use placing::CELL;
 pub use sitting::Report;
 
 use self::edits::Edits;
@@ -65,8 +71,8 @@ const DEFAULT_SCENE: &str = include_str!("../../../config/default.yaml");
 /// Why the node does not start, or its session was not kept.
 #[derive(Debug, thiserror::Error)]
 pub enum NodeError {
-    /// The parameter `scan` is empty.
-    #[error("there is no scan to refine: name one by -p scan:=FILE")]
+    /// Neither the parameter `scan` nor the scene names one.
+    #[error("there is no scan to refine: name one by -p scan:=FILE, or as `scan: {{ file: … }}` in the scene")]
     NoScan,
     /// The scene cannot be used.
     #[error(transparent)]
@@ -74,6 +80,11 @@ pub enum NodeError {
     /// The scene has no `refine`.
     #[error("the scene names no `refine`, so nothing would move the mesh: add `refine:` to it")]
     NothingMoves,
+    /// The scene has no `robot`.
+    #[error(
+        "robot:= needs `robot:` in the scene: nobody knows where the arm stands and what it must never leave (config/probe.yaml is an example)"
+    )]
+    NoRobot,
     /// The scan cannot be read.
     #[error("{0}")]
     Scan(Box<MeshFileError>),
@@ -136,7 +147,6 @@ impl NodeError {
 
 /// All that does not change while the node runs.
 pub(crate) struct Setup {
-    port: Arc<dyn Port>,
     shared: Arc<Shared>,
     scan: Scan,
     scan_path: PathBuf,
@@ -149,19 +159,15 @@ pub(crate) struct Setup {
 }
 
 impl Setup {
-    fn new(parameters: Parameters, port: Arc<dyn Port>) -> Result<Self, NodeError> {
-        let scan_path = PathBuf::from(parameters.string("scan"));
-        if scan_path.as_os_str().is_empty() {
-            return Err(NodeError::NoScan);
-        }
-        let (scene, scene_yaml) = match parameters.string("scene") {
-            "" => (Scene::from_yaml(DEFAULT_SCENE)?, DEFAULT_SCENE.to_owned()),
-            path => Scene::read_with_text(Path::new(path))?,
+    fn new(parameters: Parameters) -> Result<Self, NodeError> {
+        let scene_path = Path::new(parameters.string("scene"));
+        let (scene, scene_yaml) = match scene_path.as_os_str().is_empty() {
+            true => (Scene::from_yaml(DEFAULT_SCENE)?, DEFAULT_SCENE.to_owned()),
+            false => Scene::read_with_text(scene_path)?,
         };
-        let mesh_unit = match parameters.string("mesh_unit") {
-            "m" => MeshUnit::Metre,
-            "inch" => MeshUnit::Inch,
-            _ => MeshUnit::Millimetre,
+        let (scan_path, mesh_unit) = match parameters.string("scan") {
+            "" => scene.scan_file(scene_path).ok_or(NodeError::NoScan)?,
+            path => (PathBuf::from(path), mesh_unit(&parameters)),
         };
         let MeshFile { mesh, .. } =
             read_mesh(&scan_path, mesh_unit).map_err(|error| NodeError::Scan(Box::new(error)))?;
@@ -174,7 +180,6 @@ impl Setup {
         let known = scene.patcher_params(WrenchFrame::default()).and_then(|params| params.uncertainty);
         let scan_sigma = known.map(|known| known.scan).filter(|sigma| *sigma > 0.0);
         Ok(Self {
-            port,
             shared: Arc::new(Shared::new(parameters, scan_sigma)),
             scan: Arc::new((mesh, tree)),
             scan_path,
@@ -200,6 +205,15 @@ impl Setup {
     }
 }
 
+/// The unit of the files, of the parameter `mesh_unit`.
+pub fn mesh_unit(parameters: &Parameters) -> MeshUnit {
+    match parameters.string("mesh_unit") {
+        "m" => MeshUnit::Metre,
+        "inch" => MeshUnit::Inch,
+        _ => MeshUnit::Millimetre,
+    }
+}
+
 /// What is left of a node.
 #[derive(Debug)]
 pub struct NodeEnd {
@@ -215,20 +229,58 @@ pub struct Node {
     haptic: JoinHandle<Result<NodeEnd, NodeError>>,
     view: JoinHandle<()>,
     seeker: JoinHandle<()>,
+    arm: Option<JoinHandle<()>>,
     folder: PathBuf,
 }
 
-impl Node {
-    /// Reads scene and scan, begins a session, and starts the threads.
+/// A node that has read scene and scan and begun a session, and hears nothing yet: loading a large scan takes seconds, in
+/// which nothing that is sent to the node may be lost.
+pub struct Prepared {
+    setup: Arc<Setup>,
+    sitting: Sitting,
+}
+
+impl Prepared {
+    /// Reads scene and scan and begins a session.
     ///
+    /// # Errors
+    /// [`NodeError`]
+    pub fn new(parameters: Parameters) -> Result<Self, NodeError> {
+        let setup = Arc::new(Setup::new(parameters)?);
+        let sitting = Sitting::begin(&setup)?;
+        Ok(Self { setup, sitting })
+    }
+
+    /// Folder of the session.
+    pub fn folder(&self) -> &Path {
+        self.sitting.folder.path()
+    }
+
+    /// The scan: where it was read from, and how many faces it has.
+    pub fn scan(&self) -> (&Path, usize) {
+        (&self.setup.scan_path, self.setup.scan.0.face_count())
+    }
+
+    /// The scene as it was read.
+    pub fn scene(&self) -> &Scene {
+        &self.setup.scene
+    }
+
+    /// Starts the threads.
+    ///
+    /// - `arm`: that probes what is flagged; without one orders are answered so.
     /// - `inbox`: where the port puts what arrives; the node ends with [`Arrival::Shutdown`], or when nothing can arrive any
     ///   more.
     ///
     /// # Errors
     /// [`NodeError`]
-    pub fn start(parameters: Parameters, port: Arc<dyn Port>, inbox: Receiver<Arrival>) -> Result<Self, NodeError> {
-        let setup = Arc::new(Setup::new(parameters, port)?);
-        let sitting = Sitting::begin(&setup)?;
+    pub fn start(
+        self,
+        port: Arc<dyn Port>,
+        inbox: Receiver<Arrival>,
+        arm: Option<ArmOfNode>,
+    ) -> Result<Node, NodeError> {
+        let Self { setup, sitting } = self;
         let (folder, session) = (sitting.folder.path().to_owned(), sitting.folder.name().to_owned());
         let (to_view, view_inputs) = sync_channel(VIEW_QUEUE);
         let (to_seeker, seeker_inputs) = sync_channel(SEEKER_QUEUE);
@@ -237,16 +289,20 @@ impl Node {
             to_spare.send(Box::<Edits>::default()).map_err(|_| NodeError::Stopped)?;
         }
         let replica = Replica::of(&setup.scan.0, &session);
-        let view = View::new(Arc::clone(&setup.port), Arc::clone(&setup.shared), to_spare, replica);
+        let view = View::new(Arc::clone(&port), Arc::clone(&setup.shared), to_spare, replica);
         let seeker = Seeker::new(Arc::clone(&setup.shared), to_view.clone(), session);
-        let haptic = Haptic::new(setup, sitting, to_view, to_seeker, spare)?;
+        let arm = arm.map(|arm| arm::start(&setup, &port, arm, to_view.clone(), to_seeker.clone())).transpose()?;
+        let (handle, arm) = arm.unzip();
+        let haptic = Haptic::new(setup, port, sitting, to_view, to_seeker, spare, handle)?;
         let thread = |name: &str| Builder::new().name(name.to_owned());
         let view = thread("view").spawn(move || view.run(&view_inputs)).map_err(NodeError::no_thread)?;
         let seeker = thread("seeker").spawn(move || seeker.run(&seeker_inputs)).map_err(NodeError::no_thread)?;
         let haptic = thread("haptic").spawn(move || haptic.run(&inbox)).map_err(NodeError::no_thread)?;
-        Ok(Self { haptic, view, seeker, folder })
+        Ok(Node { haptic, view, seeker, arm, folder })
     }
+}
 
+impl Node {
     /// Folder of the session that it began with.
     pub fn folder(&self) -> &Path {
         &self.folder
@@ -257,9 +313,9 @@ impl Node {
     /// # Errors
     /// [`NodeError`] when the result was not written, or a thread ended by a fault.
     pub fn join(self) -> Result<NodeEnd, NodeError> {
-        let Self { haptic, view, seeker, .. } = self;
+        let Self { haptic, view, seeker, arm, .. } = self;
         let ended = haptic.join().map_err(|_| NodeError::Stopped)?;
-        for thread in [seeker, view] {
+        for thread in arm.into_iter().chain([seeker, view]) {
             thread.join().map_err(|_| NodeError::Stopped)?;
         }
         ended

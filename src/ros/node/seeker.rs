@@ -5,14 +5,15 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 use super::convert::header;
 use super::feature_messages::{self, KIND_NAMES, flagged, found};
 use super::replica::Snapshot;
 use super::shared::Shared;
 use super::view::ViewInput;
-use crate::features::{Feature, Tracker};
+use crate::explore::{NextTouch, next_by_hand};
+use crate::features::{Feature, Kind, Tracker};
 use crate::live::ProbedNews;
 use crate::mesh::{FaceTree, MeshError};
 use crate::ros::messages::{
@@ -41,6 +42,10 @@ pub enum SeekerInput {
     Flag(Flag, Option<Reply<FlagFeatureResponse>>),
     /// takes that back
     Unflag(u32, Reply<UnflagFeatureResponse>),
+    /// asks what is to be probed; no numbers: all that is flagged
+    Targets(Vec<u32>, SyncSender<Vec<Target>>),
+    /// an arm has measured something
+    Measured(Box<Measured>),
     /// looks at the mesh now
     Detect(DetectFeaturesRequest, Reply<DetectFeaturesResponse>),
 }
@@ -56,6 +61,35 @@ pub struct Flag {
     pub radius: f64,
 }
 
+/// What an arm can be sent to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Target {
+    /// by which it is known
+    pub id: u32,
+    /// `None`: nobody knows
+    pub kind: Option<Kind>,
+    /// m, in O
+    pub place: Point3<f64>,
+    /// how far around it, m
+    pub radius: f64,
+}
+
+/// What an arm has measured.
+#[derive(Clone, Debug)]
+pub struct Measured {
+    /// in which it was flagged
+    pub session: String,
+    /// number of the flag
+    pub id: u32,
+    /// what it is
+    pub feature: Feature,
+    /// it is known as well as was wanted
+    pub is_done: bool,
+}
+
+/// Where a hand should touch next, by the number of the feature.
+pub type NextTouches = BTreeMap<u32, NextTouch>;
+
 /// The thread's own.
 pub struct Seeker {
     shared: Arc<Shared>,
@@ -69,6 +103,8 @@ pub struct Seeker {
     radii: BTreeMap<u32, f64>,
     /// number under which a feature is known, where that is the number of its flag
     names: BTreeMap<u32, u32>,
+    /// measured by an arm, by the number of the flag
+    measured: BTreeMap<u32, Measured>,
     /// version of the mesh and its newest stamp at the last look
     looked: Option<(u64, i64)>,
     look_took: Duration,
@@ -92,6 +128,7 @@ impl Seeker {
             flags: BTreeMap::new(),
             radii: BTreeMap::new(),
             names: BTreeMap::new(),
+            measured: BTreeMap::new(),
             looked: None,
             look_took: Duration::ZERO,
             looked_at: now,
@@ -144,6 +181,17 @@ impl Seeker {
             SeekerInput::Unflag(id, reply) => {
                 let (success, message) = self.unflag(id);
                 reply.send(UnflagFeatureResponse { success, message });
+            }
+            SeekerInput::Targets(ids, reply) => {
+                // who asked may have gone
+                let _ = reply.try_send(self.targets(&ids));
+            }
+            SeekerInput::Measured(measured) => {
+                // another session knows nothing of it
+                if measured.session == self.session {
+                    self.measured.insert(measured.id, *measured);
+                    self.has_news = true;
+                }
             }
             SeekerInput::Detect(request, reply) => {
                 let looked = self.look();
@@ -247,6 +295,33 @@ impl Seeker {
         }
     }
 
+    /// What is flagged, or has one of these numbers.
+    fn targets(&self, ids: &[u32]) -> Vec<Target> {
+        let default = self.shared.parameters().double("flag_radius_mm") / 1e3;
+        let places = self.flags.iter().map(|(&id, flag)| Target {
+            id,
+            kind: feature_messages::kind_of(flag.kind),
+            place: flag.point,
+            radius: flag.radius,
+        });
+        let found = self.tracker.features().iter().map(|feature| {
+            let id = self.name_of(feature);
+            let radius = self.radii.get(&id).copied();
+            (
+                radius.is_some(),
+                Target { id, kind: Some(feature.kind), place: feature.centre.value, radius: radius.unwrap_or(default) },
+            )
+        });
+        let is_wanted = |target: &Target, is_flagged: bool| match ids.is_empty() {
+            true => is_flagged && !self.measured.get(&target.id).is_some_and(|measured| measured.is_done),
+            false => ids.contains(&target.id),
+        };
+        let all = places.map(|target| (true, target)).chain(found);
+        let mut targets: Vec<_> = all.filter(|(flagged, target)| is_wanted(target, *flagged)).map(|(_, t)| t).collect();
+        targets.sort_by_key(|target| ids.iter().position(|id| *id == target.id));
+        targets
+    }
+
     fn answer(&self, request: &DetectFeaturesRequest, looked: Result<(), String>) -> DetectFeaturesResponse {
         let mut features = self.features();
         if let Err(why) = looked {
@@ -272,7 +347,17 @@ impl Seeker {
             found(feature, id, self.radii.get(&id).copied())
         });
         let places = self.flags.iter().map(|(&id, flag)| flagged(id, flag.kind, &flag.point, flag.radius));
-        let mut features: Vec<_> = known.chain(places).collect();
+        let measured = |id: u32| {
+            let feature = &self.measured.get(&id)?.feature;
+            let radius = self.radii.get(&id).copied().or_else(|| self.flags.get(&id).map(|flag| flag.radius));
+            Some(FeatureMsg { status: FeatureMsg::STATUS_PROBED, ..found(feature, id, radius) })
+        };
+        // what an arm has measured is better than what the mesh shows
+        let mut features: Vec<_> = known.chain(places).map(|told| measured(told.id).unwrap_or(told)).collect();
+        // also one that is flagged no longer
+        let is_told = |id: &&u32| features.iter().any(|told| told.id == **id);
+        let others: Vec<_> = self.measured.keys().filter(|id| !is_told(id)).filter_map(|&id| measured(id)).collect();
+        features.extend(others);
         features.sort_by_key(|feature| feature.id);
         FeatureArray {
             header: header(stamp_ns, &self.shared.frame),
@@ -285,6 +370,19 @@ impl Seeker {
 
     fn publish(&self) {
         // the view holds nothing back for long, and shows them even when it is late
-        let _ = self.view.send(ViewInput::Features(Arc::new(self.features())));
+        let _ = self.view.send(ViewInput::Features(Arc::new(self.features()), self.next_touches()));
+    }
+
+    /// For each feature where a hand should touch next; of a flag its place.
+    fn next_touches(&self) -> NextTouches {
+        let found = self.tracker.features().iter().filter_map(|feature| {
+            let next = next_by_hand(feature, &self.touches)?;
+            Some((self.name_of(feature), next))
+        });
+        let flagged =
+            self.flags.iter().map(|(&id, flag)| (id, NextTouch { place: flag.point, normal: Vector3::zeros() }));
+        // what an arm has measured well enough needs no hand
+        let is_open = |id: &u32| !self.measured.get(id).is_some_and(|measured| measured.is_done);
+        flagged.chain(found).filter(|(id, _)| is_open(id)).collect()
     }
 }

@@ -1,6 +1,6 @@
 //! What the threads of the node know of each other.
 
-use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{SyncSender, TrySendError};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -18,6 +18,7 @@ pub struct Shared {
     shown_version: AtomicU64,
     tiles_waiting: AtomicUsize,
     dropped_frames: AtomicU64,
+    has_new_viewer: AtomicBool,
 }
 
 impl Shared {
@@ -30,6 +31,7 @@ impl Shared {
             shown_version: AtomicU64::new(1),
             tiles_waiting: AtomicUsize::new(0),
             dropped_frames: AtomicU64::new(0),
+            has_new_viewer: AtomicBool::new(false),
         }
     }
 
@@ -66,6 +68,16 @@ impl Shared {
     /// Tiles that are still to be sent.
     pub fn waiting_tiles(&self) -> usize {
         self.tiles_waiting.load(Ordering::Relaxed)
+    }
+
+    /// Somebody joined who has no tiles yet.
+    pub fn note_viewer(&self) {
+        self.has_new_viewer.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether somebody joined since this was last asked.
+    pub fn take_viewer(&self) -> bool {
+        self.has_new_viewer.swap(false, Ordering::Relaxed)
     }
 
     /// Tells the view something that it can do without: where it has no time, that is dropped and counted.

@@ -11,7 +11,8 @@ use crate::io::session_folder::SessionFolder;
 use crate::live::Quantiles;
 use crate::mesh::TriMesh;
 use crate::patch::Patcher;
-use crate::session::{Outcome, OutcomePlaces, SessionRecord, SessionRecorder};
+use crate::ros::port::Port;
+use crate::session::{Outcome, OutcomePlaces, SessionRecord, SessionRecorder, Unrecorded};
 use crate::touch::WrenchFrame;
 
 /// What belongs to a session and goes with it.
@@ -39,8 +40,12 @@ pub struct Report {
     pub accepted: u64,
     /// messages and samples that were not taken, by reason; `pose_…` are poses
     pub refused: std::collections::BTreeMap<String, u64>,
+    /// samples that were sent and did not come: wrenches, poses
+    pub lost: [u64; 2],
     /// arrivals that the node had no time for: wrenches and poses, others
     pub dropped: [u64; 2],
+    /// publications that nobody took fast enough: tiles, others
+    pub unsent: [u64; 2],
     /// messages that came while it was paused
     pub paused: u64,
     /// messages that are not in the recording
@@ -59,8 +64,8 @@ pub struct Report {
     pub push_ns: Quantiles,
     /// from the arrival of what completed a sample to the mesh, ns
     pub latency_ns: Quantiles,
-    /// renewals of the patch for which a sample had to wait
-    pub waits: u64,
+    /// renewals of the patch that were not done when they were due: the mesh showed a touch later
+    pub late_renewals: u64,
     /// what was written
     pub result: Option<Outcome>,
 }
@@ -98,30 +103,36 @@ impl Sitting {
     /// [`NodeError`] when the result could not be written; the recording is ended all the same.
     pub fn end(self, setup: &Setup, mut report: Report) -> Result<Report, NodeError> {
         let Self { folder, recorder, engine, .. } = self;
-        let (unrecorded, fault) = recorder.finish();
-        report.unrecorded = unrecorded;
+        let Unrecorded { messages, reason, .. } = recorder.finish();
+        report.unrecorded = messages;
         let (refiner, patcher) = engine.finish()?;
         let patcher = patcher.filter(|_| refiner.counts().contacts > 0);
-        let outcome = write_result(setup, &folder, refiner.mesh(), patcher)?;
+        let outcome = write_result(setup, &folder, refiner.mesh(), patcher).inspect_err(|_| {
+            if let Some(reason) = &reason {
+                tracing::error!("{messages} messages are not in the session's recording: {reason}");
+            }
+        })?;
         report.result = Some(outcome);
         let text = serde_json::to_string_pretty(&report).expect("numbers and names alone cannot fail");
         folder
             .write_text("report.json", &text)
             .map_err(|source| NodeError::Folder { path: folder.path().to_owned(), source })?;
-        fault.map_or(Ok(report), |reason| Err(NodeError::Unrecorded { count: unrecorded, reason }))
+        reason.map_or(Ok(report), |reason| Err(NodeError::Unrecorded { count: messages, reason }))
     }
 
     /// What is known of it so far.
-    pub fn report(&self, setup: &Setup, tally: &Tally) -> Report {
+    pub fn report(&self, setup: &Setup, port: &dyn Port, tally: &Tally) -> Report {
         let counts = self.engine.refiner().counts();
         let nothing = Quantiles { median: 0, p99: 0, p999: 0, max: 0 };
         Report {
             session: self.folder.name().to_owned(),
             accepted: tally.accepted,
             refused: Default::default(),
-            dropped: setup.port.dropped(),
+            lost: port.lost(),
+            dropped: port.dropped(),
+            unsent: port.unsent(),
             paused: tally.paused,
-            unrecorded: self.recorder.lost().0,
+            unrecorded: self.recorder.unrecorded().messages,
             dropped_view_frames: setup.shared.dropped_frames(),
             gaps: [0; 2],
             clock_jumps: 0,
@@ -129,7 +140,7 @@ impl Sitting {
             cut_back: counts.cut_back,
             push_ns: nothing,
             latency_ns: nothing,
-            waits: self.engine.waits(),
+            late_renewals: self.engine.late_renewals(),
             result: None,
         }
     }

@@ -1,15 +1,19 @@
 //! The mesh to look at: in tiles, of which only those that changed are sent again.
 
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
 use nalgebra::{Point3, Vector3};
 
 use super::convert::{header, point};
 use super::replica::Replica;
-use crate::mesh::IdSet;
 use crate::patch::Support;
 use crate::ros::messages::{ColorRGBA, Marker, Vector3 as Vector3Msg};
 
 /// Faces of a tile, by number: 1500 points are 60 kB with their colours, below the 64 kB of a datagram.
 pub const FACES_OF_A_TILE: u32 = 500;
+/// A tile is sent once more when it has not changed for so long: a network that was away for less has kept nothing from anybody.
+const ONCE_MORE_AFTER: Duration = Duration::from_secs(10);
 /// Namespace of the markers.
 const NAMESPACE: &str = "mesh";
 /// Light comes from above, a little from the side.
@@ -28,12 +32,45 @@ pub enum ColourBy {
     Mismatch,
 }
 
+/// Tiles that wait for their turn, each once.
+#[derive(Clone, Debug, Default)]
+struct Turns {
+    order: VecDeque<u32>,
+    is_in: Vec<bool>,
+}
+
+impl Turns {
+    fn push(&mut self, tile: u32) {
+        let at = tile as usize;
+        if self.is_in.len() <= at {
+            self.is_in.resize(at + 1, false);
+        }
+        if !std::mem::replace(&mut self.is_in[at], true) {
+            self.order.push_back(tile);
+        }
+    }
+
+    fn pop(&mut self) -> Option<u32> {
+        let tile = self.order.pop_front()?;
+        self.is_in[tile as usize] = false;
+        Some(tile)
+    }
+}
+
 /// Which tiles are to be sent.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Tiles {
-    dirty: IdSet,
+    /// what has changed goes first …
+    changed: Turns,
+    /// … then what is sent because of somebody new, or of other colours
+    again: Turns,
     /// for each tile, whether something is drawn
     is_drawn: Vec<bool>,
+    /// … and which it was, in the order in which all were sent
+    sent_as: Vec<u64>,
+    sent: u64,
+    /// tiles that are to be sent once more, if they are not sent before for a change: when they were sent, and as which
+    once_more: VecDeque<(Instant, u32, u64)>,
     /// for each face, the last signed distance at which it was touched, m; NaN where it was not
     mismatch: Vec<f32>,
 }
@@ -48,21 +85,39 @@ impl Tiles {
 
     /// Everything is to be sent again.
     pub fn renew(&mut self, replica: &Replica) {
-        // the last comes first: what is taken out is what was put in last
         (0..replica.slots()[1].div_ceil(FACES_OF_A_TILE).max(self.is_drawn.len() as u32))
-            .rev()
-            .for_each(|tile| self.dirty.insert(tile));
+            .for_each(|tile| self.again.push(tile));
+    }
+
+    /// What was sent before the last `kept` is to be sent again: nobody keeps it for who comes now.
+    pub fn renew_older_than(&mut self, kept: u64) {
+        let is_older = |sent_as: u64| sent_as > 0 && self.sent - sent_as >= kept;
+        let older = (0..self.sent_as.len()).filter(|&tile| is_older(self.sent_as[tile]));
+        older.for_each(|tile| self.again.push(tile as u32));
+    }
+
+    /// What has not changed for a while is to be sent once more: for who missed it.
+    pub fn renew_settled(&mut self, now: Instant) {
+        while let Some(&(sent_at, tile, sent_as)) = self.once_more.front()
+            && now.saturating_duration_since(sent_at) >= ONCE_MORE_AFTER
+        {
+            self.once_more.pop_front();
+            if self.sent_as[tile as usize] == sent_as {
+                self.again.push(tile);
+            }
+        }
     }
 
     /// Another mesh: everything is to be sent, and nothing was touched.
     pub fn restart(&mut self, replica: &Replica) {
         self.mismatch.clear();
+        self.sent_as.fill(0);
         self.renew(replica);
     }
 
     /// A tile is to be sent.
     pub fn note(&mut self, tile: u32) {
-        self.dirty.insert(tile);
+        self.changed.push(tile);
     }
 
     /// A face is another one now.
@@ -81,29 +136,49 @@ impl Tiles {
             self.mismatch.resize(replica.slots()[1] as usize, f32::NAN);
         }
         self.mismatch[face as usize] = distance as f32;
-        self.dirty.insert(face / FACES_OF_A_TILE);
+        self.note(face / FACES_OF_A_TILE);
     }
 
     /// How many are to be sent.
     pub fn waiting(&self) -> usize {
-        self.dirty.len()
+        self.changed.order.len() + self.again.order.len()
     }
 
-    /// Makes up to `most` of those that are to be sent.
-    pub fn take(&mut self, most: usize, replica: &Replica, by: ColourBy, frame: &str, mut each: impl FnMut(Marker)) {
-        let Self { dirty, is_drawn, mismatch } = self;
-        dirty.take(most, |tile| {
+    /// Makes up to `most` of those that are to be sent now.
+    pub fn take(
+        &mut self,
+        most: usize,
+        now: Instant,
+        replica: &Replica,
+        (by, frame): (ColourBy, &str),
+        mut each: impl FnMut(Marker),
+    ) {
+        for _ in 0..most {
+            let (tile, has_changed) = match (self.changed.pop(), &mut self.again) {
+                (Some(tile), _) => (tile, true),
+                (None, again) => match again.pop() {
+                    Some(tile) => (tile, false),
+                    None => return,
+                },
+            };
             let at = tile as usize;
-            if at >= is_drawn.len() {
-                is_drawn.resize(at + 1, false);
+            if at >= self.is_drawn.len() {
+                self.is_drawn.resize(at + 1, false);
+                self.sent_as.resize(at + 1, 0);
             }
-            let marker = drawn(tile, replica, by, mismatch, frame);
+            let marker = drawn(tile, replica, by, &self.mismatch, frame);
             let is_empty = marker.points.is_empty();
-            if !is_empty || is_drawn[at] {
-                is_drawn[at] = !is_empty;
+            let is_repeated = !has_changed && self.sent_as[at] > 0;
+            if !is_empty || self.is_drawn[at] || is_repeated {
+                self.is_drawn[at] = !is_empty;
+                self.sent += 1;
+                self.sent_as[at] = self.sent;
+                if !is_repeated {
+                    self.once_more.push_back((now, tile, self.sent));
+                }
                 each(marker);
             }
-        });
+        }
     }
 }
 
@@ -144,12 +219,13 @@ fn light([a, b, c]: &[Point3<f64>; 3]) -> f64 {
     AMBIENT + (1.0 - AMBIENT) * normal.dot(&LIGHT).abs().min(1.0)
 }
 
+/// Dark enough for white labels in front of it.
 fn of_support(support: Support) -> [f64; 3] {
     match support {
-        Support::Scan => [0.72, 0.74, 0.78],
-        Support::Touched => [0.25, 0.75, 0.35],
-        Support::Guessed => [0.95, 0.80, 0.35],
-        Support::Unreachable => [0.85, 0.45, 0.35],
+        Support::Scan => [0.50, 0.52, 0.56],
+        Support::Touched => [0.16, 0.58, 0.26],
+        Support::Guessed => [0.78, 0.62, 0.20],
+        Support::Unreachable => [0.72, 0.33, 0.24],
     }
 }
 
@@ -161,4 +237,75 @@ fn of_mismatch(distance: f32) -> [f64; 3] {
     let share = (f64::from(distance) / FULL_MISMATCH).clamp(-1.0, 1.0);
     let faded = 1.0 - share.abs();
     if share > 0.0 { [1.0, faded, faded] } else { [faded, faded, 1.0] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::TriMesh;
+
+    /// What a port keeps is the end of the list of all that was sent.
+    #[test]
+    fn who_joins_late_is_sent_what_is_not_kept() {
+        let corner = |i: u32| Point3::new(f64::from(i), f64::from(i % 2), 0.0);
+        let strip = (0..4 * FACES_OF_A_TILE).map(|i| if i % 2 == 0 { [i, i + 1, i + 2] } else { [i + 1, i, i + 2] });
+        let mesh = TriMesh::new((0..4 * FACES_OF_A_TILE + 2).map(corner).collect(), strip.collect()).unwrap();
+        let replica = Replica::of(&mesh, "test");
+        let mut tiles = Tiles::all_of(&replica);
+        let mut sent = Vec::new();
+        let take = |tiles: &mut Tiles, sent: &mut Vec<u32>| {
+            let how = (ColourBy::Touched, "object");
+            tiles.take(usize::MAX, Instant::now(), &replica, how, |tile| sent.push(tile.id as u32));
+        };
+        take(&mut tiles, &mut sent);
+        for tile in [2, 2, 0] {
+            tiles.note(tile);
+            take(&mut tiles, &mut sent);
+        }
+        assert_eq!(sent.len(), 7);
+        for kept in 1..=8 {
+            let lost: Vec<u32> =
+                (0..4).filter(|tile| !sent.iter().rev().take(kept).any(|other| other == tile)).collect();
+            let mut again = Vec::new();
+            let mut joined = tiles.clone();
+            joined.renew_older_than(kept as u64);
+            take(&mut joined, &mut again);
+            assert_eq!(again, lost, "the last {kept} are kept");
+        }
+        // what changes meanwhile does not wait for that
+        tiles.renew_older_than(1);
+        [3, 1, 3].into_iter().for_each(|tile| tiles.note(tile));
+        sent.clear();
+        take(&mut tiles, &mut sent);
+        assert_eq!(sent, [3, 1, 1, 2, 3]);
+    }
+
+    #[test]
+    fn what_has_settled_is_sent_once_more_also_when_it_is_gone() {
+        let corner = |i: u32| Point3::new(f64::from(i), f64::from(i % 2), 0.0);
+        let strip = (0..3 * FACES_OF_A_TILE).map(|i| if i % 2 == 0 { [i, i + 1, i + 2] } else { [i + 1, i, i + 2] });
+        let mesh = TriMesh::new((0..3 * FACES_OF_A_TILE + 2).map(corner).collect(), strip.collect()).unwrap();
+        let first = TriMesh::new(vec![corner(0), corner(1), corner(2)], vec![[0, 1, 2]]).unwrap();
+        let [whole, none] = [Replica::of(&mesh, "test"), Replica::of(&first, "test")];
+        let mut tiles = Tiles::all_of(&whole);
+        let begun = Instant::now();
+        let mut at = |seconds: u64, replica: &Replica, changed: &[u32]| {
+            let now = begun + Duration::from_secs(seconds);
+            changed.iter().for_each(|&tile| tiles.note(tile));
+            tiles.renew_settled(now);
+            let mut sent = Vec::new();
+            let how = (ColourBy::Touched, "object");
+            tiles.take(usize::MAX, now, replica, how, |tile| sent.push((tile.id, tile.action)));
+            sent.sort_unstable();
+            sent
+        };
+        let (add, delete) = (Marker::ADD, Marker::DELETE);
+        assert_eq!(at(0, &whole, &[]), [(0, add), (1, add), (2, add)]);
+        assert_eq!(at(5, &whole, &[1]), [(1, add)]);
+        assert_eq!(at(9, &none, &[2]), [(2, delete)]);
+        assert_eq!(at(10, &whole, &[]), [(0, add)]);
+        assert_eq!(at(15, &whole, &[]), [(1, add)]);
+        assert_eq!(at(19, &none, &[]), [(2, delete)]);
+        assert_eq!(at(99, &whole, &[]), []);
+    }
 }

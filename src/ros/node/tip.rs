@@ -3,8 +3,10 @@
 use nalgebra::Point3;
 
 use super::convert::{header, point};
-use super::feature_messages::label;
-use crate::ros::messages::{ColorRGBA, FeatureArray, Marker, MarkerArray, Pose, Vector3};
+use super::feature_messages::{LETTERS, label};
+use super::seeker::NextTouches;
+use crate::explore::NextTouch;
+use crate::ros::messages::{ColorRGBA, Feature, FeatureArray, Marker, MarkerArray, Pose, Vector3};
 
 /// Where the tip was last.
 #[derive(Clone, Copy, Debug)]
@@ -22,8 +24,12 @@ pub struct TipPlace {
 /// Farther from a feature than this nobody asks for it, m.
 const NEAR: f64 = 0.05;
 
-/// Text, ball and arrow.
-pub fn markers(tip: &TipPlace, features: &FeatureArray, frame: &str) -> MarkerArray {
+/// Above the labels of features, m.
+const TEXT_HEIGHT: f64 = 12e-3;
+
+/// Ball, text, the arrow to the mesh, and the one onto where to touch next.
+pub fn markers(tip: &TipPlace, features: &FeatureArray, next: &NextTouches, frame: &str) -> MarkerArray {
+    let nearest = nearest(tip, features);
     let base = Marker { header: header(tip.stamp_ns, frame), ns: "tip".to_owned(), ..Marker::default() };
     let diameter = 2.0 * tip.radius.max(0.5e-3);
     let ball = Marker {
@@ -35,17 +41,17 @@ pub fn markers(tip: &TipPlace, features: &FeatureArray, frame: &str) -> MarkerAr
         ..base.clone()
     };
     let mut place = point(&tip.centre);
-    place.z += 10e-3;
+    place.z += TEXT_HEIGHT;
     let text = Marker {
         id: 1,
         r#type: Marker::TEXT_VIEW_FACING,
         pose: Pose { position: place, ..Pose::default() },
-        scale: Vector3 { z: 4e-3, ..Vector3::default() },
-        color: ColorRGBA { r: 1.0, g: 1.0, b: 1.0, a: 1.0 },
-        text: text(tip, features),
+        scale: Vector3 { z: LETTERS, ..Vector3::default() },
+        color: ColorRGBA { r: 1.0, g: 0.95, b: 0.4, a: 1.0 },
+        text: text(tip, nearest, nearest.is_some_and(|feature| next.contains_key(&feature.id))),
         ..base.clone()
     };
-    let arrow = Marker { id: 2, r#type: Marker::ARROW, ..base };
+    let arrow = Marker { id: 2, r#type: Marker::ARROW, ..base.clone() };
     let arrow = match &tip.closest {
         Some((closest, distance)) if *distance > tip.radius => Marker {
             scale: Vector3 { x: 0.5e-3, y: 1.2e-3, z: 0.0 },
@@ -56,20 +62,45 @@ pub fn markers(tip: &TipPlace, features: &FeatureArray, frame: &str) -> MarkerAr
         // at the surface it would hide what it points at
         _ => Marker { action: Marker::DELETE, ..arrow },
     };
-    MarkerArray { markers: vec![ball, text, arrow] }
+    let there = Marker { id: 3, r#type: Marker::ARROW, ..base };
+    let there = match nearest.and_then(|feature| next.get(&feature.id)) {
+        // onto the place, from outside; where nobody knows what is outside, from the tip
+        Some(NextTouch { place, normal }) => Marker {
+            scale: Vector3 { x: 1.2e-3, y: 3e-3, z: 0.0 },
+            color: ColorRGBA { r: 0.2, g: 0.9, b: 0.4, a: 1.0 },
+            points: vec![
+                point(&if *normal == nalgebra::Vector3::zeros() { tip.centre } else { place + normal * NEXT_LENGTH }),
+                point(place),
+            ],
+            ..there
+        },
+        None => Marker { action: Marker::DELETE, ..there },
+    };
+    MarkerArray { markers: vec![ball, text, arrow, there] }
 }
 
-/// "0.12 mm; hole Ø8.02 ± 0.04".
-fn text(tip: &TipPlace, features: &FeatureArray) -> String {
+/// Length of the arrow onto the next place, m.
+const NEXT_LENGTH: f64 = 10e-3;
+
+/// The feature that who holds the tip is asking about.
+fn nearest<'a>(tip: &TipPlace, features: &'a FeatureArray) -> Option<&'a Feature> {
+    let far = |feature: &&Feature| {
+        let p = &feature.center;
+        (Point3::new(p.x, p.y, p.z) - tip.centre).norm()
+    };
+    let is_asked = |feature: &&Feature| {
+        !feature.diameter.is_nan() || !feature.width.is_nan() || feature.status == Feature::STATUS_FLAGGED
+    };
+    let asked = features.features.iter().filter(is_asked);
+    asked.min_by(|a, b| far(a).total_cmp(&far(b))).filter(|feature| far(feature) < NEAR)
+}
+
+/// "0.12 mm; hole Ø8.02 ± 0.04; next: green arrow": RViz puts lines 10 mm apart, however small the letters.
+fn text(tip: &TipPlace, nearest: Option<&Feature>, has_next: bool) -> String {
     let distance = match tip.closest {
         Some((_, distance)) => format!("{:.2} mm", distance * 1e3),
         None => "far from the mesh".to_owned(),
     };
-    let far = |feature: &&crate::ros::messages::Feature| {
-        let p = &feature.center;
-        (Point3::new(p.x, p.y, p.z) - tip.centre).norm()
-    };
-    let sized = features.features.iter().filter(|feature| !feature.diameter.is_nan() || !feature.width.is_nan());
-    let nearest = sized.min_by(|a, b| far(a).total_cmp(&far(b))).filter(|feature| far(feature) < NEAR);
-    nearest.map_or(distance.clone(), |feature| format!("{distance}\n{}", label(feature)))
+    let next = if has_next { "; next: green arrow" } else { "" };
+    nearest.map_or(distance.clone(), |feature| format!("{distance}; {}{next}", label(feature)))
 }

@@ -8,14 +8,15 @@ use super::edits::Edits;
 use super::feature_messages;
 use super::mesh_patches::MeshPatches;
 use super::replica::{Replica, Snapshot};
+use super::seeker::NextTouches;
 use super::shared::Shared;
 use super::tiles::{ColourBy, Tiles};
 use super::tip::{self, TipPlace};
 use crate::ros::messages::{DiagnosticArray, FeatureArray, HapticMismatch, MeshPatch};
-use crate::ros::port::{Port, Publication};
+use crate::ros::port::{Port, Publication, TILES_KEPT};
 
-/// Tiles that are sent at once: 4 MB.
-const TILES_AT_ONCE: usize = 64;
+/// Tiles that wait in the port at most: what waits here is sent as it is then, and what has changed goes first.
+const TILES_AHEAD: usize = 32;
 /// Parts of the whole state that are sent at once: 2.4 MB.
 const PARTS_AT_ONCE: usize = 64;
 /// While there is more to send than that, it goes on after so long.
@@ -31,8 +32,8 @@ pub enum ViewInput {
     Mismatch(HapticMismatch),
     /// where the tip is
     Tip(TipPlace),
-    /// all features
-    Features(Arc<FeatureArray>),
+    /// all features, and where a hand should touch them next
+    Features(Arc<FeatureArray>, NextTouches),
     /// somebody wants the mesh as it is
     Snapshot(SyncSender<Snapshot>),
     /// somebody wants the whole state on the topic
@@ -59,6 +60,7 @@ pub struct View {
     snapshots: Vec<SyncSender<Snapshot>>,
     tip: Option<TipPlace>,
     features: Arc<FeatureArray>,
+    next: NextTouches,
 }
 
 impl View {
@@ -75,6 +77,7 @@ impl View {
             snapshots: Vec::new(),
             tip: None,
             features: Arc::new(features),
+            next: NextTouches::new(),
             port,
             shared,
             spare,
@@ -94,10 +97,10 @@ impl View {
             if Instant::now() >= due {
                 // ids fit each other only when all of a change has come
                 let period = Duration::from_secs_f64(1.0 / self.shared.parameters().double("view_rate_hz"));
-                due = Instant::now() + if self.tick(TILES_AT_ONCE) { period.min(CATCH_UP) } else { period };
+                due = Instant::now() + if self.tick(false) { period.min(CATCH_UP) } else { period };
             }
         }
-        self.tick(usize::MAX);
+        self.tick(true);
     }
 
     fn take(&mut self, input: ViewInput) {
@@ -130,10 +133,10 @@ impl View {
                 self.port.publish(Publication::Mismatch(mismatch));
             }
             ViewInput::Tip(tip) => self.tip = Some(tip),
-            ViewInput::Features(features) => {
+            ViewInput::Features(features, next) => {
                 self.port.publish(Publication::Features((*features).clone()));
                 self.port.publish(Publication::FeatureMarkers(feature_messages::markers(&features)));
-                self.features = features;
+                (self.features, self.next) = (features, next);
             }
             ViewInput::Snapshot(reply) => {
                 self.snapshots.push(reply);
@@ -159,10 +162,12 @@ impl View {
     }
 
     /// Sends what is due; whether there is more.
-    fn tick(&mut self, most: usize) -> bool {
+    ///
+    /// - `is_last`: all tiles are left to the port.
+    fn tick(&mut self, is_last: bool) -> bool {
         let frame = self.shared.frame.as_str();
         if let Some(tip) = self.tip.take() {
-            self.port.publish(Publication::Tip(tip::markers(&tip, &self.features, frame)));
+            self.port.publish(Publication::Tip(tip::markers(&tip, &self.features, &self.next, frame)));
         }
         if !self.is_complete {
             return true;
@@ -178,16 +183,22 @@ impl View {
         }
         if let Some(whole) = &mut self.whole {
             let mut sent = 0;
-            for part in whole.by_ref().take(PARTS_AT_ONCE.min(most)) {
+            for part in whole.by_ref().take(PARTS_AT_ONCE) {
                 self.port.publish(Publication::MeshPatch(part));
                 sent += 1;
             }
-            if sent < PARTS_AT_ONCE.min(most) {
+            if sent < PARTS_AT_ONCE {
                 self.whole = None;
             }
         }
+        if self.shared.take_viewer() {
+            self.tiles.renew_older_than(TILES_KEPT as u64);
+        }
+        let now = Instant::now();
+        self.tiles.renew_settled(now);
         let Self { tiles, replica, colour_by, port, .. } = self;
-        tiles.take(most, replica, *colour_by, frame, |tile| port.publish(Publication::Tile(tile)));
+        let most = if is_last { usize::MAX } else { TILES_AHEAD.saturating_sub(port.tiles_waiting()) };
+        tiles.take(most, now, replica, (*colour_by, frame), |tile| port.publish(Publication::Tile(tile)));
         self.shared.tiles_waiting(self.tiles.waiting());
         self.tiles.waiting() > 0 || self.whole.is_some() || self.asked_whole
     }

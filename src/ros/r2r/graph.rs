@@ -19,6 +19,8 @@ type Look = Box<dyn Fn(&Node) -> r2r::Result<Seen> + Send>;
 
 struct Watched {
     topic: String,
+    /// who listens is a viewer
+    is_mesh: bool,
     look: Look,
     told: Seen,
 }
@@ -37,15 +39,19 @@ impl Graph {
     /// A topic that we publish.
     ///
     /// - `topic`: absolute, remapped.
-    pub fn watch_listeners<T: WrappedTypesupport + 'static>(&mut self, topic: String, publisher: Publisher<T>) {
-        self.watch(topic, move |_| Ok((publisher.get_inter_process_subscription_count()?, None)));
+    /// - `is_mesh`: tiles go out on it.
+    pub fn watch_listeners<T>(&mut self, topic: String, is_mesh: bool, publisher: Publisher<T>)
+    where
+        T: WrappedTypesupport + 'static,
+    {
+        self.watch(topic, is_mesh, move |_| Ok((publisher.get_inter_process_subscription_count()?, None)));
     }
 
     /// A topic that we listen to.
     ///
     /// - `topic`: absolute, remapped.
     pub fn watch_senders(&mut self, topic: String, type_name: &'static str, wanted: QosProfile) {
-        self.watch(topic.clone(), move |node| {
+        self.watch(topic.clone(), false, move |node| {
             let senders = node.get_publishers_info_by_topic(&topic, false)?;
             let misfits = senders.iter().map(|sender| {
                 misfit(type_name, &wanted, &sender.topic_type, &sender.qos_profile)
@@ -56,8 +62,8 @@ impl Graph {
         });
     }
 
-    fn watch(&mut self, topic: String, look: impl Fn(&Node) -> r2r::Result<Seen> + Send + 'static) {
-        self.watched.push(Watched { topic, look: Box::new(look), told: (0, None) });
+    fn watch(&mut self, topic: String, is_mesh: bool, look: impl Fn(&Node) -> r2r::Result<Seen> + Send + 'static) {
+        self.watched.push(Watched { topic, is_mesh, look: Box::new(look), told: (0, None) });
     }
 
     /// Tells what has changed, when it is time to look again; whether ROS is still there.
@@ -80,6 +86,9 @@ impl Graph {
 impl Watched {
     fn tell(&mut self, seen: Seen, shared: &Shared) {
         let topic = self.topic.clone();
+        if self.is_mesh && seen.0 > self.told.0 {
+            shared.arrivals.put(Arrival::Viewer);
+        }
         self.told = seen.clone();
         let (count, mismatch) = seen;
         match &mismatch {

@@ -9,8 +9,8 @@ mod convert;
 #[cfg(test)]
 mod filled;
 mod graph;
-mod outbox;
 mod parameter_services;
+mod samples;
 mod services;
 #[cfg(feature = "r2r-check")]
 mod stand_in;
@@ -31,8 +31,9 @@ use super::arguments::NodeConfig;
 use super::arrivals::Arrivals;
 use super::clock::RosClock;
 use super::names::NameError;
+use super::outbox::Outbox;
 use super::port::{Arrival, Inbox, Port, Publication, Reply};
-use outbox::Outbox;
+pub use samples::samples;
 
 /// Why the node cannot speak to others.
 #[derive(Debug, Error)]
@@ -146,6 +147,10 @@ impl Port for R2rPort {
         let [tiles, patches] = self.shared.mesh.unsent();
         let [_, others] = self.shared.urgent.unsent();
         [tiles, patches + others]
+    }
+
+    fn tiles_waiting(&self) -> usize {
+        self.shared.mesh.tiles_waiting()
     }
 }
 

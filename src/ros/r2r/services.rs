@@ -23,6 +23,9 @@ pub(super) fn servers(node: &mut Node, shared: &Arc<Shared>) -> Result<Vec<Sourc
     made.add::<Undo::Service, _>("~/undo", |request, reply| Call::Undo(request.convert(), reply))?;
     made.add::<Undo::Service, _>("~/redo", |request, reply| Call::Redo(request.convert(), reply))?;
     made.add::<std_srvs::srv::Trigger::Service, _>("~/reset", |_, reply| Call::Reset(reply))?;
+    made.add::<std_srvs::srv::Trigger::Service, _>("~/probe_all", |_, reply| Call::ProbeAll(reply))?;
+    made.add::<std_srvs::srv::Trigger::Service, _>("~/recover", |_, reply| Call::Recover(reply))?;
+    made.add::<std_srvs::srv::Trigger::Service, _>("~/arm_state", |_, reply| Call::ArmState(reply))?;
     made.add::<std_srvs::srv::SetBool::Service, _>("~/pause", |request, reply| Call::Pause(request.convert(), reply))?;
     made.add::<ProbeFeature::Service, _>("~/probe_feature", |request, reply| {
         Call::ProbeFeature(request.convert(), reply)

@@ -14,6 +14,7 @@ use super::{During, RosError, Shared, Source, source, touchup_msgs};
 use crate::ros::arguments::NodeConfig;
 use crate::ros::clock::steady_ns;
 use crate::ros::messages::{Clock, Message, PointStamped, PoseStamped, TFMessage, WrenchStamped};
+use crate::ros::outbox::Sent;
 use crate::ros::port::{Arrival, Publication};
 
 /// What is small and urgent.
@@ -40,7 +41,7 @@ const fn latched(depth: usize) -> QosProfile {
     reliable(depth).transient_local()
 }
 
-const fn best_effort(depth: usize) -> QosProfile {
+pub(super) const fn best_effort(depth: usize) -> QosProfile {
     QosProfile::sensor_data().keep_last(depth)
 }
 
@@ -62,13 +63,13 @@ impl MeshPublishers {
         Ok(Self { tiles: made.publisher(MESH)?, patches: made.publisher(MESH_PATCH)? })
     }
 
-    pub fn send(&self, publication: Publication) -> r2r::Result<()> {
-        match publication {
+    pub fn send(&self, publication: Publication) -> Sent {
+        sent(match publication {
             Publication::Tile(message) => self.tiles.publish(&message.convert()),
             Publication::MeshPatch(message) => self.patches.publish(&message.convert()),
             // the others have an outbox of their own
             _ => Ok(()),
-        }
+        })
     }
 }
 
@@ -85,8 +86,8 @@ impl UrgentPublishers {
         })
     }
 
-    pub fn send(&self, publication: Publication) -> r2r::Result<()> {
-        match publication {
+    pub fn send(&self, publication: Publication) -> Sent {
+        sent(match publication {
             Publication::Features(message) => self.features.publish(&message.convert()),
             Publication::FeatureMarkers(message) => self.feature_markers.publish(&message.convert()),
             Publication::Tip(message) => self.tip.publish(&message.convert()),
@@ -95,6 +96,16 @@ impl UrgentPublishers {
             Publication::Diagnostics(message) => self.diagnostics.publish(&message.convert()),
             // the mesh has an outbox of its own
             Publication::Tile(_) | Publication::MeshPatch(_) => Ok(()),
+        })
+    }
+}
+
+fn sent(result: r2r::Result<()>) -> Sent {
+    match result {
+        Ok(()) => Sent::Done,
+        Err(error) => {
+            tracing::warn!(%error, "a message is not sent");
+            Sent::Refused
         }
     }
 }
@@ -108,8 +119,7 @@ pub(super) fn subscriptions(
 ) -> Result<Vec<Source>, RosError> {
     use geometry_msgs::msg as geometry;
     use tf2_msgs::msg as tf2;
-    let is_probe = config.parameters.string("source") == "probe";
-    let [wrench, pose] = if is_probe { ["probe/wrench", "probe/pose"] } else { ["stylus/wrench", "stylus/pose"] };
+    let [wrench, pose] = config.sample_topics();
     let samples = best_effort(SAMPLES);
     let mut made = Topics { config, node, graph };
     let mut sources = vec![
@@ -147,7 +157,7 @@ impl Topics<'_> {
         T: WrappedTypesupport + 'static,
     {
         let publisher = self.node.create_publisher::<T>(name, qos).during("publishing a topic")?;
-        self.graph.watch_listeners(self.config.resolve(name)?, publisher.clone());
+        self.graph.watch_listeners(self.config.resolve(name)?, name == MESH.0, publisher.clone());
         Ok(publisher)
     }
 

@@ -1,6 +1,7 @@
 //! The sections of the YAML, each with its units in the keys, its defaults and its ranges.
 
 mod evidence;
+mod robot;
 mod stream;
 mod tip;
 mod update;
@@ -9,6 +10,7 @@ use serde::{Deserialize, Deserializer};
 
 use super::SceneError;
 pub use evidence::{CarveSection, PatchSection, SlidingSection, UncertaintySection};
+pub use robot::RobotSection;
 pub use stream::{
     BiasSection, BiasTrackingSection, ClockSection, CompensationSection, GravityAxes, MarkersSection, PayloadSection,
     ScanToSpaceSection, SyncSection,

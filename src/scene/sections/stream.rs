@@ -218,7 +218,7 @@ impl ScanToSpaceSection {
 }
 
 /// Refuses a quaternion that is no rotation.
-fn is_unit(key: &'static str, xyzw: &[f64; 4]) -> Result<(), SceneError> {
+pub(super) fn is_unit(key: &'static str, xyzw: &[f64; 4]) -> Result<(), SceneError> {
     let norm = xyzw.iter().map(|c| c * c).sum::<f64>().sqrt();
     in_range(key, norm, 0.999, 1.001, "a quaternion of length 1 within 0.001 (this is its length)")
 }

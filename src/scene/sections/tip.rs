@@ -1,8 +1,11 @@
 //! What touches and what is touched: the gate, the tip, the scan.
 
+use std::path::PathBuf;
+
 use serde::Deserialize;
 
 use super::in_range;
+use crate::io::mesh_file::MeshUnit;
 use crate::scene::SceneError;
 use crate::touch::{ContactGateParams, TipShape};
 
@@ -132,6 +135,10 @@ impl TipSection {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ScanSection {
+    /// The scan itself, where none is named otherwise; relative to the folder of the scene.
+    pub file: Option<PathBuf>,
+    /// Unit of the coordinates in that file.
+    pub unit: MeshUnit,
     /// Standard deviation of the scan from the true surface, mm.
     pub noise_mm: f64,
 }
@@ -139,7 +146,7 @@ pub struct ScanSection {
 impl Default for ScanSection {
     /// A consumer depth camera at half a metre.
     fn default() -> Self {
-        Self { noise_mm: 0.6 }
+        Self { file: None, unit: MeshUnit::Millimetre, noise_mm: 0.6 }
     }
 }
 

@@ -1,21 +1,36 @@
 //! What waits to be sent, so that nobody who publishes or answers waits for the network.
 //!
-//! Tiles of the mesh give way first: they go when nothing else waits, and of several states of one tile the newest alone.
+//! A port has two: one for what is small and urgent, answers among it, one for the mesh, which whoever listens slowly may hold
+//! up. Tiles of the mesh give way first: they go when nothing else waits.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
-use crate::ros::messages::Marker;
-use crate::ros::port::Publication;
+use super::messages::Marker;
+use super::port::Publication;
 
 /// Messages that wait at most, beside tiles: 0.4 s of mismatches at 10 kHz; a follower of the mesh sees the gap.
 const MOST: usize = 4096;
-/// Tiles that wait at most, each once: more than the depth of the topic.
+/// Tiles that wait at most: those of 4 million faces, as at the end all are left here.
 const MOST_TILES: usize = 8192;
 
 /// Sends an answer.
 pub(super) type Answer = Box<dyn FnOnce() + Send>;
+
+/// What became of a publication.
+pub(super) enum Sent {
+    /// it is on its way
+    Done,
+    /// never: it is counted
+    Refused,
+    /// somebody listens too slowly: here it is again, for later
+    #[cfg_attr(
+        not(any(feature = "ros", test)),
+        expect(dead_code, reason = "ROS keeps what is on its way, or drops it")
+    )]
+    Later(Box<Publication>),
+}
 
 enum Message {
     Answer(Answer),
@@ -25,18 +40,21 @@ enum Message {
 #[derive(Default)]
 struct Waiting {
     messages: VecDeque<Message>,
-    tiles: BTreeMap<(String, i32), Marker>,
-    order: VecDeque<(String, i32)>,
+    tiles: VecDeque<Marker>,
     is_closed: bool,
 }
 
 impl Waiting {
     fn next(&mut self) -> Option<Message> {
-        if let Some(message) = self.messages.pop_front() {
-            return Some(message);
+        let tile = || self.tiles.pop_front().map(|tile| Message::Publication(Box::new(Publication::Tile(tile))));
+        self.messages.pop_front().or_else(tile)
+    }
+
+    fn put_back(&mut self, publication: Publication) {
+        match publication {
+            Publication::Tile(tile) => self.tiles.push_front(tile),
+            other => self.messages.push_front(Message::Publication(Box::new(other))),
         }
-        let tile = self.tiles.remove(&self.order.pop_front()?)?;
-        Some(Message::Publication(Box::new(Publication::Tile(tile))))
     }
 }
 
@@ -51,7 +69,7 @@ pub(super) struct Outbox {
 
 impl Outbox {
     /// Puts a publication in.
-    pub(super) fn put(&self, publication: Publication) {
+    pub fn put(&self, publication: Publication) {
         match publication {
             Publication::Tile(tile) => self.put_tile(tile),
             other => self.put_message(Message::Publication(Box::new(other))),
@@ -59,25 +77,40 @@ impl Outbox {
     }
 
     /// Puts an answer in.
-    pub(super) fn answer(&self, answer: Answer) {
+    pub fn answer(&self, answer: Answer) {
         self.put_message(Message::Answer(answer));
     }
 
     /// Not sent because nobody took them fast enough, or because ROS refused them: tiles, others.
-    pub(super) fn unsent(&self) -> [u64; 2] {
+    pub fn unsent(&self) -> [u64; 2] {
         [&self.unsent_tiles, &self.unsent_others].map(|count| count.load(Ordering::Relaxed))
     }
 
-    /// Sends until it is closed and empty.
-    pub(super) fn send(&self, publish: impl Fn(Publication) -> r2r::Result<()>) {
+    /// Tiles that wait now.
+    pub fn tiles_waiting(&self) -> usize {
+        self.waiting().tiles.len()
+    }
+
+    /// Sends until it is closed and empty, or closed and somebody listens too slowly.
+    pub fn send(&self, publish: impl Fn(Publication) -> Sent) {
         while let Some(message) = self.take() {
-            match message {
-                Message::Answer(send) => send(),
-                Message::Publication(publication) => {
-                    let count = self.count_of(&publication);
-                    if let Err(error) = publish(*publication) {
-                        tracing::warn!(%error, "a message is not sent");
-                        count.fetch_add(1, Ordering::Relaxed);
+            let publication = match message {
+                Message::Answer(send) => {
+                    send();
+                    continue;
+                }
+                Message::Publication(publication) => *publication,
+            };
+            let count = self.count_of(&publication);
+            match publish(publication) {
+                Sent::Done => {}
+                Sent::Refused => _ = count.fetch_add(1, Ordering::Relaxed),
+                Sent::Later(publication) => {
+                    let mut waiting = self.waiting();
+                    waiting.put_back(*publication);
+                    // who leaves does not wait for who listens slowly
+                    if waiting.is_closed {
+                        return;
                     }
                 }
             }
@@ -85,7 +118,7 @@ impl Outbox {
     }
 
     /// Has [`Self::send`] end when all is sent.
-    pub(super) fn close(&self) {
+    pub fn close(&self) {
         self.waiting().is_closed = true;
         self.more.notify_all();
     }
@@ -107,18 +140,9 @@ impl Outbox {
 
     fn put_tile(&self, tile: Marker) {
         let mut waiting = self.waiting();
-        if tile.action == Marker::DELETEALL {
-            waiting.tiles.clear();
-            waiting.order.clear();
-        }
-        let key = (tile.ns.clone(), tile.id);
-        if waiting.tiles.insert(key.clone(), tile).is_none() {
-            waiting.order.push_back(key);
-        }
-        if waiting.order.len() > MOST_TILES
-            && let Some(oldest) = waiting.order.pop_front()
-        {
-            waiting.tiles.remove(&oldest);
+        waiting.tiles.push_back(tile);
+        if waiting.tiles.len() > MOST_TILES {
+            waiting.tiles.pop_front();
             self.unsent_tiles.fetch_add(1, Ordering::Relaxed);
         }
         drop(waiting);
@@ -151,8 +175,8 @@ mod tests {
     use super::*;
     use crate::ros::messages::{HapticMismatch, MeshPatch};
 
-    fn tile(id: i32, action: i32, x: f64) -> Publication {
-        let mut marker = Marker { id, action, ..Marker::default() };
+    fn tile(id: i32, x: f64) -> Publication {
+        let mut marker = Marker { id, ..Marker::default() };
         marker.pose.position.x = x;
         Publication::Tile(marker)
     }
@@ -163,7 +187,6 @@ mod tests {
 
     fn name(publication: &Publication) -> String {
         match publication {
-            Publication::Tile(tile) if tile.action == Marker::DELETEALL => "all go".to_owned(),
             Publication::Tile(tile) => format!("tile {} at {}", tile.id, tile.pose.position.x),
             Publication::MeshPatch(patch) => format!("patch {}", patch.version),
             Publication::Mismatch(mismatch) => format!("mismatch {}", mismatch.face),
@@ -177,27 +200,43 @@ mod tests {
         outbox.close();
         outbox.send(|publication| {
             sent.lock().unwrap().push(name(&publication));
-            Ok(())
+            Sent::Done
         });
         sent.into_inner().unwrap()
     }
 
     #[test]
-    fn tiles_wait_for_the_others_and_only_their_newest_state_goes() {
+    fn tiles_wait_for_the_others() {
         let outbox = Outbox::default();
-        for publication in [tile(7, 0, 1.0), tile(3, 0, 2.0), tile(7, 0, 3.0), patch(1), patch(2)] {
+        for publication in [tile(7, 1.0), tile(3, 2.0), patch(1), tile(7, 3.0), patch(2)] {
             outbox.put(publication);
         }
-        assert_eq!(sent(&outbox), ["patch 1", "patch 2", "tile 7 at 3", "tile 3 at 2"]);
+        assert_eq!(outbox.tiles_waiting(), 3);
+        assert_eq!(sent(&outbox), ["patch 1", "patch 2", "tile 7 at 1", "tile 3 at 2", "tile 7 at 3"]);
     }
 
     #[test]
-    fn deleting_all_makes_what_waits_needless() {
+    fn what_is_to_be_sent_later_goes_before_what_came_after_it() {
         let outbox = Outbox::default();
-        for publication in [tile(1, Marker::ADD, 1.0), tile(0, Marker::DELETEALL, 0.0), tile(2, Marker::ADD, 2.0)] {
-            outbox.put(publication);
-        }
-        assert_eq!(sent(&outbox), ["all go", "tile 2 at 2"]);
+        [patch(1), patch(2), tile(1, 0.0), tile(2, 0.0)].into_iter().for_each(|publication| outbox.put(publication));
+        let tried = Mutex::new(Vec::new());
+        let reaches_the_end =
+            |publication: &Publication| matches!(publication, Publication::Tile(tile) if tile.id == 2);
+        outbox.send(|publication| {
+            let mut tried = tried.lock().unwrap();
+            tried.push(name(&publication));
+            if reaches_the_end(&publication) {
+                outbox.close();
+            }
+            // each is taken at the second time
+            if tried.len() % 2 == 1 { Sent::Later(Box::new(publication)) } else { Sent::Done }
+        });
+        let tried = tried.into_inner().unwrap();
+        let both = |name: &'static str| [name, name];
+        let expected = [both("patch 1"), both("patch 2"), both("tile 1 at 0")].concat();
+        assert_eq!(tried[..6], expected);
+        assert_eq!(tried[6..], ["tile 2 at 0"], "it was closed, and somebody listens too slowly");
+        assert_eq!(outbox.unsent(), [0, 0]);
     }
 
     #[test]
@@ -206,7 +245,7 @@ mod tests {
         (0..MOST as u32 + 3).for_each(|face| {
             outbox.put(Publication::Mismatch(HapticMismatch { face, ..HapticMismatch::default() }));
         });
-        (0..MOST_TILES as i32 + 2).for_each(|id| outbox.put(tile(id, Marker::ADD, 0.0)));
+        (0..MOST_TILES as i32 + 2).for_each(|id| outbox.put(tile(id, 0.0)));
         assert_eq!(outbox.unsent(), [2, 3]);
         let sent = sent(&outbox);
         assert_eq!(
@@ -218,11 +257,11 @@ mod tests {
     #[test]
     fn what_ros_refuses_is_counted_and_the_rest_goes() {
         let outbox = Outbox::default();
-        [patch(1), patch(2), tile(1, Marker::ADD, 0.0)].into_iter().for_each(|publication| outbox.put(publication));
+        [patch(1), patch(2), tile(1, 0.0)].into_iter().for_each(|publication| outbox.put(publication));
         outbox.close();
         outbox.send(|publication| match publication {
-            Publication::MeshPatch(patch) if patch.version == 2 => Ok(()),
-            _ => Err(r2r::Error::RCL_RET_PUBLISHER_INVALID),
+            Publication::MeshPatch(patch) if patch.version == 2 => Sent::Done,
+            _ => Sent::Refused,
         });
         assert_eq!(outbox.unsent(), [1, 1]);
     }
@@ -233,7 +272,7 @@ mod tests {
         let (told, heard) = mpsc::channel();
         let sending = std::thread::spawn({
             let outbox = outbox.clone();
-            move || outbox.send(|_| Ok(()))
+            move || outbox.send(|_| Sent::Done)
         });
         for number in [1, 2] {
             let told = told.clone();

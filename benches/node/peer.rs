@@ -1,0 +1,302 @@
+//! The other process of the bench over DDS: it sends what sensors send, and sees what a viewer sees.
+
+use std::collections::{BTreeMap, HashMap};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicI64, Ordering};
+use std::thread::{sleep, spawn};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use ros2_client::dds::rustdds::mio1::{Events, Interest, Poll, Token};
+use ros2_client::dds::rustdds::{DomainParticipantBuilder, DomainParticipantStatusEvent, StatusEvented};
+use ros2_client::qos::{Durability, History, QosProfile, WhenFull};
+use ros2_client::{Context, MessageTypeName, Name, Node, NodeName, NodeOptions, Publisher, Subscription};
+use touchup::live::Latencies;
+use touchup::ros::clock::{stamp_ns, steady_ns};
+use touchup::ros::messages::{HapticMismatch, Header, Marker, MeshPatch, Message, Point, PoseStamped, WrenchStamped};
+
+use crate::slide::{STEP_NS, sample};
+use crate::{WIDTH, messages, shown};
+
+/// All tiles are there when none has come for so long.
+const QUIET: Duration = Duration::from_secs(1);
+/// Nobody is there after so long.
+const PATIENCE: Duration = Duration::from_secs(60);
+/// What is under way when the last sample is sent comes within this.
+const REST: Duration = Duration::from_secs(2);
+
+const SAMPLES: QosProfile = QosProfile::subscription_default().history(History::KeepLast { depth: 2048 });
+const MESH: QosProfile = QosProfile::subscription_default()
+    .history(History::KeepLast { depth: 4096 })
+    .reliability_reliable(WhenFull::Wait(Duration::from_millis(100)))
+    .durability(Durability::TransientLocal);
+
+const CHANGES: QosProfile = SAMPLES.reliability_reliable(WhenFull::Wait(Duration::from_millis(100)));
+
+fn wall_ns() -> i64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos() as i64)
+}
+
+fn joined(domain: u16, name: &str) -> (Context, Node) {
+    let participant = DomainParticipantBuilder::new(domain).with_only_networks([std::net::Ipv4Addr::LOCALHOST]);
+    let participant = participant.build().expect("the loopback interface is up");
+    let context = Context::from_domain_participant(participant).expect("a participant has a graph");
+    let name = NodeName::new("/", name).expect("it is a name");
+    let node = context.new_node(name, NodeOptions::new()).expect("a context makes nodes");
+    (context, node)
+}
+
+fn topic<M: Message>(node: &Node, name: &str, qos: &QosProfile) -> ros2_client::dds::rustdds::Topic {
+    let mut parts = M::TYPE_NAME.split('/');
+    let (package, kind) = (parts.next().unwrap_or_default(), parts.next_back().unwrap_or_default());
+    let name = Name::parse(name).expect("it is a name");
+    node.create_topic(&name, MessageTypeName::new(package, kind), qos).expect("a node makes topics")
+}
+
+fn reader<M: Message>(node: &mut Node, name: &str, qos: QosProfile) -> Subscription<M> {
+    let topic = topic::<M>(node, name, &qos);
+    node.create_subscription(&topic, Some(qos)).expect("a node subscribes")
+}
+
+fn writer<M: Message>(node: &mut Node, name: &str) -> Publisher<M> {
+    let topic = topic::<M>(node, name, &SAMPLES);
+    node.create_publisher(&topic, Some(SAMPLES)).expect("a node publishes")
+}
+
+/// Returns when all of `wanted` readers and writers have somebody at the other end.
+fn wait_for_matches(context: &Context, wanted: usize) {
+    let events = context.domain_participant().status_listener();
+    let (begun, mut matched) = (Instant::now(), 0);
+    while matched < wanted {
+        match events.try_recv_status() {
+            Some(
+                DomainParticipantStatusEvent::RemoteReaderMatched { .. }
+                | DomainParticipantStatusEvent::RemoteWriterMatched { .. },
+            ) => matched += 1,
+            Some(_) => {}
+            None => sleep(Duration::from_millis(10)),
+        }
+        assert!(begun.elapsed() < PATIENCE, "nobody is there");
+    }
+    // the other end learns of it a little later
+    sleep(QUIET);
+}
+
+/// Where a vertex is, as a change of the mesh names it: x y z in single precision, as bits.
+type Place = [u32; 3];
+
+fn place(point: &Point) -> Place {
+    [point.x, point.y, point.z].map(|coordinate| (coordinate as f32).to_bits())
+}
+
+/// The mesh as a viewer has it.
+#[derive(Default)]
+struct Tiles {
+    /// corners of what is drawn
+    seen: BTreeMap<i32, Vec<Place>>,
+    changed: Option<Instant>,
+    received: u64,
+}
+
+impl Tiles {
+    /// Returns which came.
+    fn take(&mut self, mesh: &mut Subscription<Marker>) -> Vec<i32> {
+        let mut came = Vec::new();
+        while let Ok(Some((tile, _))) = mesh.take() {
+            (self.changed, self.received) = (Some(Instant::now()), self.received + 1);
+            if tile.action == Marker::DELETE {
+                self.seen.remove(&tile.id);
+            } else {
+                self.seen.insert(tile.id, tile.points.iter().map(place).collect());
+                came.push(tile.id);
+            }
+        }
+        came
+    }
+
+    fn is_quiet(&self) -> bool {
+        self.changed.is_some_and(|changed| changed.elapsed() >= QUIET)
+    }
+}
+
+/// Joins, and tells how many tiles the mesh has and how long they took to come.
+pub fn join_late(domain: u16) {
+    let begun = Instant::now();
+    let (_context, mut node) = joined(domain, "late");
+    let mut mesh = reader::<Marker>(&mut node, "/mesh", MESH);
+    let mut tiles = Tiles::default();
+    while !tiles.is_quiet() && begun.elapsed() < PATIENCE {
+        tiles.take(&mut mesh);
+        sleep(Duration::from_millis(1));
+    }
+    let took = tiles.changed.map_or(f64::NAN, |changed| (changed - begun).as_secs_f64());
+    println!("a late joiner has {} tiles after {took:.1} s", tiles.seen.len());
+}
+
+/// What comes back.
+struct Seen {
+    sent_ns: Arc<Vec<AtomicI64>>,
+    begin_ns: i64,
+    answered: u64,
+    round_trips: Latencies,
+    /// when a vertex was first drawn here, ns
+    drawn: HashMap<Place, i64>,
+    /// vertices that are told to be here and are not drawn here
+    told: HashMap<Place, u32>,
+    /// of each of these vertices the samples that moved it, and where to, in their order
+    moves: HashMap<u32, Vec<(usize, Place)>>,
+    visible: Latencies,
+}
+
+impl Seen {
+    fn sent(&self, number: usize) -> i64 {
+        self.sent_ns.get(number).map_or(0, |sent| sent.load(Ordering::Relaxed))
+    }
+
+    fn number(&self, header: &Header) -> Option<usize> {
+        usize::try_from((stamp_ns(header.stamp) - self.begin_ns) / STEP_NS).ok()
+    }
+
+    fn answer(&mut self, mismatch: &HapticMismatch) {
+        let Some(number) = self.number(&mismatch.header) else { return };
+        self.answered += 1;
+        self.round_trips.record(Duration::from_nanos((steady_ns() - self.sent(number)).max(0) as u64));
+    }
+
+    /// Vertices were moved; a tile that came before it was told may show it.
+    fn note(&mut self, patch: &MeshPatch) {
+        let Some(number) = self.number(&patch.header) else { return };
+        for (&vertex, position) in patch.vertices.iter().zip(patch.positions.chunks_exact(3)) {
+            let place = [0, 1, 2].map(|axis| position[axis].to_bits());
+            match self.drawn.get(&place) {
+                // it went back to where it was before: what is drawn there does not tell when
+                Some(&at_ns) if at_ns < self.sent(number) => self.forget(vertex),
+                Some(&at_ns) => self.record(number, at_ns),
+                None => {
+                    self.told.insert(place, vertex);
+                    self.moves.entry(vertex).or_default().push((number, place));
+                }
+            }
+        }
+        patch.removed_vertices.iter().for_each(|&vertex| self.forget(vertex));
+    }
+
+    fn forget(&mut self, vertex: u32) {
+        for (_, place) in self.moves.remove(&vertex).unwrap_or_default() {
+            self.told.remove(&place);
+        }
+    }
+
+    /// Who shows where a vertex is now need not show where it was before.
+    fn look(&mut self, corners: &[Place], at_ns: i64) {
+        for &place in corners {
+            self.drawn.entry(place).or_insert(at_ns);
+            let Some(vertex) = self.told.remove(&place) else { continue };
+            let moves = self.moves.remove(&vertex).unwrap_or_default();
+            let until = moves.iter().rposition(|&(_, to)| to == place).map_or(0, |last| last + 1);
+            let (shown, open) = moves.split_at(until);
+            for &(number, to) in shown {
+                self.told.remove(&to);
+                self.record(number, at_ns);
+            }
+            if !open.is_empty() {
+                self.moves.insert(vertex, open.to_vec());
+            }
+        }
+    }
+
+    fn record(&mut self, number: usize, at_ns: i64) {
+        self.visible.record(Duration::from_nanos((at_ns - self.sent(number)).max(0) as u64));
+    }
+}
+
+/// Sends wrenches at 1 kHz, and poses and looks at tiles where the other end is the node; tells how long answers took.
+pub fn run(domain: u16, seconds: usize, is_node: bool) {
+    let (context, mut node) = joined(domain, "sensors");
+    let mut mismatches = reader::<HapticMismatch>(&mut node, "/mismatch", SAMPLES);
+    let wrenches = writer::<WrenchStamped>(&mut node, "/stylus/wrench");
+    let poses = is_node.then(|| writer::<PoseStamped>(&mut node, "/stylus/pose"));
+    let mut mesh = is_node.then(|| reader::<Marker>(&mut node, "/mesh", MESH));
+    let mut changes = is_node.then(|| reader::<MeshPatch>(&mut node, "/mesh_patch", CHANGES));
+    let (begun, mut tiles) = (Instant::now(), Tiles::default());
+    wait_for_matches(&context, 2 + 3 * usize::from(is_node));
+    if let Some(mesh) = &mut mesh {
+        while !tiles.is_quiet() && begun.elapsed() < PATIENCE {
+            tiles.take(mesh);
+            sleep(Duration::from_millis(1));
+        }
+        let took = tiles.changed.map_or(f64::NAN, |changed| (changed - begun).as_secs_f64());
+        println!("the viewer has {} tiles after {took:.1} s", tiles.seen.len());
+    }
+    let drawn: HashMap<Place, i64> = tiles.seen.values().flatten().map(|&place| (place, 0)).collect();
+    let count = seconds * 1000;
+    let sent_ns: Arc<Vec<AtomicI64>> = Arc::new((0..count).map(|_| AtomicI64::new(0)).collect());
+    let (begin, begin_ns) = (Instant::now(), wall_ns());
+    let sending = spawn({
+        let sent_ns = Arc::clone(&sent_ns);
+        move || {
+            for (number, sent) in sent_ns.iter().enumerate() {
+                sleep(Duration::from_millis(number as u64).saturating_sub(begin.elapsed()));
+                let mut sample = sample(number, WIDTH);
+                sample.stamp_ns += begin_ns;
+                let (wrench, pose) = messages(&sample);
+                if let Some(poses) = &poses {
+                    wrenches.publish(wrench).expect("best effort never waits");
+                    sent.store(steady_ns(), Ordering::Relaxed);
+                    poses.publish(pose).expect("best effort never waits");
+                } else {
+                    sent.store(steady_ns(), Ordering::Relaxed);
+                    wrenches.publish(wrench).expect("best effort never waits");
+                }
+            }
+        }
+    });
+    let mut seen = Seen {
+        sent_ns,
+        begin_ns,
+        answered: 0,
+        round_trips: Latencies::new(),
+        drawn,
+        told: HashMap::new(),
+        moves: HashMap::new(),
+        visible: Latencies::new(),
+    };
+    let mut poll = Poll::new().expect("the system polls");
+    let registry = poll.registry();
+    registry.register(&mut mismatches, Token(0), Interest::READABLE).expect("it can be polled");
+    if let Some(mesh) = &mut mesh {
+        registry.register(mesh, Token(1), Interest::READABLE).expect("it can be polled");
+    }
+    let mut events = Events::with_capacity(8);
+    let end = begin + Duration::from_secs(seconds as u64) + REST;
+    while Instant::now() < end {
+        // an interrupted wait is one that is over
+        let _ = poll.poll(&mut events, Some(Duration::from_millis(100)));
+        while let Ok(Some((mismatch, _))) = mismatches.take() {
+            seen.answer(&mismatch);
+        }
+        if let Some(changes) = &mut changes {
+            while let Ok(Some((patch, _))) = changes.take() {
+                seen.note(&patch);
+            }
+        }
+        if let Some(mesh) = &mut mesh {
+            let (came, now) = (tiles.take(mesh), steady_ns());
+            came.iter().for_each(|tile| seen.look(&tiles.seen[tile], now));
+        }
+    }
+    sending.join().expect("it sends to the end");
+    println!(
+        "{} of {count} answered; from the sensors and back {}",
+        seen.answered,
+        shown(seen.round_trips.quantiles())
+    );
+    if mesh.is_some() {
+        let unseen: usize = seen.moves.values().map(Vec::len).sum();
+        println!(
+            "from a sample that moves a vertex to where the viewer has it {}, {unseen} never; {} tiles, {} received",
+            shown(seen.visible.quantiles()),
+            tiles.seen.len(),
+            tiles.received
+        );
+    }
+}

@@ -1,0 +1,265 @@
+//! The arm itself: it follows a velocity with a limited acceleration, bends against the part, and feels it.
+//!
+//! The encoders say where the tip would be if nothing bent, x_c; the ball is at x, where the part lets it be, and the part
+//! pushes with K (x − x_c). Across the normal friction holds the ball back. In force mode the velocity along one axis comes
+//! from the force: v = (F − f) / (4 K τ), which settles without ringing for a delay τ.
+
+use std::collections::VecDeque;
+
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use rand::SeedableRng;
+use rand_distr::{Distribution, Normal};
+use rand_pcg::Pcg64;
+use touchup::robot::{Joints, UrGeometry};
+use touchup::sim::{ArmParams, Surface, push_ball};
+use touchup::touch::Payload;
+
+/// Time between two states, s.
+pub const PERIOD: f64 = 2e-3;
+/// Steps of the motion in it.
+const STEPS: usize = 4;
+const STEP: f64 = PERIOD / STEPS as f64;
+/// Of a turning flange, rad/s².
+const TURN_ACCELERATION: f64 = 10.0;
+/// With which it stops when it has to, m/s².
+pub const HARD_STOP: f64 = 8.0;
+/// States that a spike lasts.
+const SPIKE: u32 = 3;
+
+/// What the tip is told: a velocity, m/s and rad/s in B, and how fast it may change, m/s².
+#[derive(Clone, Copy, Debug)]
+pub struct Motion {
+    pub linear: Vector3<f64>,
+    pub angular: Vector3<f64>,
+    pub acceleration: f64,
+}
+
+impl Motion {
+    pub fn rest(acceleration: f64) -> Self {
+        Self { linear: Vector3::zeros(), angular: Vector3::zeros(), acceleration }
+    }
+}
+
+/// Pressing along one axis of B.
+#[derive(Clone, Copy, Debug)]
+pub struct Force {
+    pub axis: Vector3<f64>,
+    /// N
+    pub force: f64,
+    /// m/s
+    pub speed: f64,
+}
+
+pub struct Body<'a> {
+    surface: &'a (dyn Surface + Sync),
+    params: ArmParams,
+    rng: Pcg64,
+    pub time: f64,
+    /// of the tip if nothing bent, in B
+    nominal: Isometry3<f64>,
+    linear: Vector3<f64>,
+    angular: Vector3<f64>,
+    pub joints: Joints,
+    /// in O
+    ball: Point3<f64>,
+    /// of the part on the tip, N in B; newest last
+    forces: VecDeque<Vector3<f64>>,
+    /// N in the flange
+    tare: Vector3<f64>,
+    /// what the controller takes off for the payload
+    pub told_payload: Payload,
+    waiting: VecDeque<(f64, Motion, Option<Force>)>,
+    motion: Motion,
+    force: Option<Force>,
+    spike: u32,
+    spike_force: f64,
+    /// of the tool that it was told, in the flange
+    pub tcp: Isometry3<f64>,
+}
+
+impl<'a> Body<'a> {
+    /// At rest, upright, with its ball at a place of O.
+    pub fn new(surface: &'a (dyn Surface + Sync), params: ArmParams, start: Point3<f64>) -> anyhow::Result<Self> {
+        let place = params.pose_bo * start;
+        let nominal = Isometry3::from_parts(place.coords.into(), UnitQuaternion::identity());
+        let solutions = params.geometry.inverse(&(nominal * params.pose_ft.inverse()), &[0.0; 6]);
+        let room = |joints: &Joints| params.geometry.dexterity(joints);
+        let joints = solutions.into_iter().max_by(|a, b| room(a).total_cmp(&room(b)));
+        let late = (params.force_latency / STEP).round() as usize;
+        Ok(Self {
+            surface,
+            rng: Pcg64::seed_from_u64(params.seed),
+            time: 0.0,
+            nominal,
+            linear: Vector3::zeros(),
+            angular: Vector3::zeros(),
+            joints: joints.ok_or_else(|| anyhow::anyhow!("the arm does not reach its start"))?,
+            ball: start,
+            forces: VecDeque::from(vec![Vector3::zeros(); late + 1]),
+            tare: Vector3::zeros(),
+            told_payload: params.told_payload,
+            waiting: VecDeque::new(),
+            motion: Motion::rest(HARD_STOP),
+            force: None,
+            spike: 0,
+            spike_force: 0.0,
+            tcp: Isometry3::identity(),
+            params,
+        })
+    }
+
+    /// Told by the program; it moves some milliseconds later.
+    pub fn follow(&mut self, motion: Motion, force: Option<Force>) {
+        self.waiting.push_back((self.time + self.params.command_latency, motion, force));
+    }
+
+    /// Told by what needs no program: at once.
+    pub fn brake(&mut self) {
+        self.waiting.clear();
+        (self.motion, self.force) = (Motion::rest(HARD_STOP), None);
+    }
+
+    /// Hits the probe along its shaft, N.
+    pub fn hit(&mut self, force: f64) {
+        (self.spike, self.spike_force) = (SPIKE, force);
+    }
+
+    pub fn zero_sensor(&mut self) {
+        // a mean of many readings: the noise of one does not stay
+        self.tare = self.unweighed();
+    }
+
+    /// What of the force is not taken for weight, N in the flange: contact, bias, and what the payload weighs more than was told.
+    fn unweighed(&self) -> Vector3<f64> {
+        let r_bf = self.flange().rotation;
+        let weight = |payload: &Payload| payload.weight_o(&r_bf).force;
+        let load = weight(&self.params.payload) - weight(&self.told_payload);
+        r_bf.inverse() * (self.felt() + load) + self.params.force_bias
+    }
+
+    /// What is taken for the part's, N in B.
+    fn compensated(&self) -> Vector3<f64> {
+        self.flange().rotation * (self.unweighed() - self.tare)
+    }
+
+    /// One period.
+    pub fn tick(&mut self) {
+        (0..STEPS).for_each(|_| self.step());
+        self.spike = self.spike.saturating_sub(1);
+        let flange = self.flange();
+        let turn = |a: f64, b: f64| (a - b + 3.0 * std::f64::consts::PI).rem_euclid(std::f64::consts::TAU);
+        let far = |joints: &Joints| {
+            let ways = joints.iter().zip(&self.joints).map(|(a, b)| (turn(*a, *b) - std::f64::consts::PI).abs());
+            ways.fold(0.0, f64::max)
+        };
+        let solutions = self.geometry().inverse(&flange, &self.joints);
+        if let Some(next) = solutions.into_iter().min_by(|a, b| far(a).total_cmp(&far(b))) {
+            self.joints = next;
+        }
+    }
+
+    fn geometry(&self) -> UrGeometry {
+        self.params.geometry
+    }
+
+    fn step(&mut self) {
+        self.time += STEP;
+        while let Some(&(at, motion, force)) = self.waiting.front()
+            && at <= self.time
+        {
+            self.waiting.pop_front();
+            (self.motion, self.force) = (motion, force);
+        }
+        let (mut wanted, mut acceleration) = (self.motion.linear, self.motion.acceleration);
+        if let Some(Force { axis, force, speed }) = self.force {
+            let late = self.params.command_latency + self.params.force_latency + PERIOD;
+            let gain = 1.0 / (4.0 * self.params.stiffness * late);
+            let pressed = force + self.compensated().dot(&axis);
+            wanted += axis * ((pressed * gain).clamp(-speed, speed) - wanted.dot(&axis));
+            acceleration = self.params.top_acceleration;
+        }
+        self.linear += (wanted.cap_magnitude(self.params.top_speed) - self.linear).cap_magnitude(acceleration * STEP);
+        self.angular += (self.motion.angular - self.angular).cap_magnitude(TURN_ACCELERATION * STEP);
+        // the velocity is that of the tool it was told
+        let mut tool = self.flange() * self.tcp;
+        let turn = UnitQuaternion::from_scaled_axis(self.angular * STEP);
+        tool = Isometry3::from_parts(
+            Translation3::from(tool.translation.vector + self.linear * STEP),
+            turn * tool.rotation,
+        );
+        self.nominal = tool * self.tcp.inverse() * self.params.pose_ft;
+        self.bend();
+    }
+
+    fn bend(&mut self) {
+        let params = &self.params;
+        let nominal = params.pose_bo.inverse_transform_point(&Point3::from(self.nominal.translation.vector));
+        let (rest, contacts) = push_ball(self.surface, &self.ball, &nominal, params.radius);
+        let normal = contacts.iter().map(|c| c.normal * c.held_back).sum::<Vector3<f64>>();
+        let mut next = rest;
+        if let Some(out) = normal.try_normalize(0.0) {
+            let behind = self.ball - rest;
+            let kept = (behind - out * behind.dot(&out)).cap_magnitude(params.friction * normal.norm());
+            next = push_ball(self.surface, &rest, &(rest + kept), params.radius).0;
+        }
+        self.ball = next;
+        let force = if contacts.is_empty() { Vector3::zeros() } else { (next - nominal) * params.stiffness };
+        self.forces.push_back(params.pose_bo.rotation * force);
+        self.forces.pop_front();
+    }
+
+    fn felt(&self) -> Vector3<f64> {
+        self.forces.front().copied().unwrap_or_default()
+    }
+
+    /// N, of the part on the tip, without what the sensor adds.
+    pub fn true_force(&self) -> f64 {
+        self.forces.back().map_or(0.0, Vector3::norm)
+    }
+
+    /// Of the tip in B, m.
+    pub fn place(&self) -> Vector3<f64> {
+        self.nominal.translation.vector
+    }
+
+    /// Velocity of the tool, m/s and rad/s in B.
+    pub fn velocity(&self) -> [Vector3<f64>; 2] {
+        [self.linear, self.angular]
+    }
+
+    pub fn is_over_its_force(&self) -> bool {
+        self.true_force() > self.params.safety_force
+    }
+
+    fn flange(&self) -> Isometry3<f64> {
+        self.nominal * self.params.pose_ft.inverse()
+    }
+
+    /// Of the tool as the encoders have it, in B.
+    pub fn read_pose(&mut self) -> Isometry3<f64> {
+        let mut pose = self.flange() * self.tcp;
+        pose.translation.vector += self.noise(self.params.pose_noise);
+        pose
+    }
+
+    /// `actual_TCP_force`, N in B; and `ft_raw_wrench`, N and N m in the flange about its origin.
+    pub fn read_wrenches(&mut self) -> (Vector3<f64>, [Vector3<f64>; 2]) {
+        let shaft = self.nominal.rotation * Vector3::z();
+        let spike = if self.spike > 0 { shaft * self.spike_force } else { Vector3::zeros() };
+        let (noise, torque_noise) = (self.noise(self.params.force_noise), self.noise(self.params.torque_noise));
+        let ArmParams { payload, pose_ft, force_bias, torque_bias, .. } = &self.params;
+        let r_bf = self.flange().rotation;
+        let (weight, contact) = (payload.weight_o(&r_bf), r_bf.inverse() * (self.felt() + spike));
+        let force = contact + r_bf.inverse() * (weight.force + noise) + force_bias;
+        let lever = pose_ft.translation.vector;
+        let torque = lever.cross(&contact) + r_bf.inverse() * weight.torque + torque_bias + torque_noise;
+        (self.compensated() + spike + noise, [force, torque])
+    }
+
+    fn noise(&mut self, deviation: f64) -> Vector3<f64> {
+        match Normal::new(0.0, deviation) {
+            Ok(normal) => Vector3::from_fn(|_, _| normal.sample(&mut self.rng)),
+            Err(_) => Vector3::zeros(),
+        }
+    }
+}

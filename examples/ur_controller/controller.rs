@@ -1,0 +1,296 @@
+//! What of a UR's controller the client sees: registers, the program that it uploads, the safety system, and what goes wrong.
+
+use std::net::{Shutdown, TcpStream};
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+
+use touchup::touch::Payload;
+
+use crate::body::{Body, Force, HARD_STOP, Motion};
+use crate::record::Record;
+use crate::rtde::Stream;
+
+/// From the end of an upload to the first cycle of the program, s.
+const START: f64 = 20e-3;
+
+/// What the safety system says.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Safety {
+    Normal,
+    Protective,
+    Emergency,
+}
+
+/// What of the connections does not work.
+#[derive(Clone, Copy, Default)]
+pub struct Faults {
+    /// no states go out
+    pub is_silent: bool,
+    /// nothing that comes in arrives
+    pub is_deaf: bool,
+    /// neither, and the dashboard does not answer
+    pub is_unplugged: bool,
+    /// the program hangs
+    pub is_stuck: bool,
+    /// the controller has lost its power
+    pub is_dead: bool,
+}
+
+/// The program of the client, as far as it is looked at.
+#[derive(Default)]
+struct Program {
+    is_running: bool,
+    /// s
+    starts_at: Option<f64>,
+    /// a command was run to its end and its number is still in the register
+    is_handled: bool,
+    /// s; from `setWatchdog`
+    watchdog: Option<f64>,
+    force: Option<Force>,
+    /// a motion that has to end before its command has: m/s² of braking
+    braking: Option<f64>,
+    velocity: Option<Motion>,
+    /// what the thread of `speedL` is at: the velocity, and when it takes the next, s; without a time it does so when it has
+    /// reached that
+    speeding: Option<(Motion, Option<f64>)>,
+    /// how long it stays at one, s
+    speed_time: f64,
+}
+
+pub struct Controller<'a> {
+    pub body: Body<'a>,
+    pub version: [u32; 3],
+    pub safety: Safety,
+    /// brakes open
+    pub is_powered: bool,
+    /// the panel lets others command
+    pub is_remote: bool,
+    pub faults: Faults,
+    pub record: Record,
+    pub ints_in: [i32; 48],
+    pub doubles_in: [f64; 48],
+    pub ints_out: [i32; 48],
+    pub doubles_out: [f64; 48],
+    /// when a command last came, s
+    pub heard_at: f64,
+    /// the connection whose inputs count
+    pub owner: Option<u64>,
+    pub streams: Vec<Stream>,
+    /// all connections, of all ports
+    pub sockets: Vec<TcpStream>,
+    program: Program,
+}
+
+impl<'a> Controller<'a> {
+    pub fn new(body: Body<'a>, version: [u32; 3], record: Record) -> Self {
+        Self {
+            body,
+            version,
+            safety: Safety::Normal,
+            is_powered: true,
+            is_remote: true,
+            faults: Faults::default(),
+            record,
+            ints_in: [0; 48],
+            doubles_in: [0.0; 48],
+            ints_out: [0; 48],
+            doubles_out: [0.0; 48],
+            heard_at: 0.0,
+            owner: None,
+            streams: Vec::new(),
+            sockets: Vec::new(),
+            program: Program::default(),
+        }
+    }
+
+    pub fn is_playing(&self) -> bool {
+        self.program.is_running
+    }
+
+    /// One period: program, arm, states, record.
+    pub fn tick(&mut self) {
+        if self.safety == Safety::Normal && self.body.is_over_its_force() {
+            self.stop_for(Safety::Protective, "force over the limit of the safety system");
+        }
+        self.start_program();
+        if self.program.is_running {
+            self.cycle();
+        }
+        self.body.tick();
+        self.send_states();
+        self.record.line(&self.body);
+    }
+
+    /// What is in the registers then is done at once, also what an earlier program was told.
+    fn start_program(&mut self) {
+        if self.program.starts_at.is_some_and(|at| at <= self.body.time) && self.safety == Safety::Normal {
+            self.program = Program { is_running: true, ..Program::default() };
+            (self.ints_out[0], self.ints_out[2]) = (1, 0);
+            self.record.event("program starts");
+        }
+    }
+
+    /// A program has come on the script port.
+    pub fn load(&mut self, program: &str) {
+        if program.contains("def rtde_control") && !self.faults.is_dead {
+            self.stop_program("a new program");
+            self.program.starts_at = Some(self.body.time + START);
+        }
+    }
+
+    /// Ends the program, and with it the motion.
+    pub fn stop_program(&mut self, why: &str) {
+        if self.program.is_running {
+            self.record.event(&format!("program stops: {why}"));
+        }
+        self.program = Program::default();
+        self.body.brake();
+    }
+
+    /// The safety system stops the arm.
+    pub fn stop_for(&mut self, safety: Safety, why: &str) {
+        self.safety = safety;
+        self.stop_program(why);
+    }
+
+    fn cycle(&mut self) {
+        if self.program.watchdog.is_some_and(|after| self.body.time - self.heard_at > after) {
+            self.stop_program("watchdog");
+            return;
+        }
+        if self.faults.is_stuck {
+            self.ints_out[0] = 0;
+            return;
+        }
+        if let Some(deceleration) = self.program.braking {
+            let [linear, angular] = self.body.velocity();
+            if linear.norm() + angular.norm() > 1e-9 {
+                self.body.follow(Motion::rest(deceleration), None);
+                self.program.speeding = None;
+                return;
+            }
+            self.program.braking = None;
+            self.ints_out[0] = 2;
+        }
+        let id = self.ints_in[0];
+        match id {
+            // the motion of a realtime command goes on
+            0 => {
+                self.program.is_handled = false;
+                self.ints_out[0] = 1;
+            }
+            6 | 10 => self.realtime(id),
+            255 => self.stop_program("told by the client"),
+            _ if self.program.is_handled => {}
+            _ => {
+                self.program.is_handled = true;
+                self.ints_out[0] = 2;
+                self.regular(id);
+            }
+        }
+        if self.program.is_running && self.program.braking.is_none() {
+            self.speed();
+        }
+    }
+
+    /// The thread that `speedL` starts: it takes a new velocity only when it is done with the one before.
+    fn speed(&mut self) {
+        let (now, body) = (self.body.time, &mut self.body);
+        let Some(wanted) = self.program.velocity else {
+            if self.program.force.is_some() {
+                body.follow(Motion::rest(HARD_STOP), self.program.force);
+            }
+            return;
+        };
+        let [linear, angular] = body.velocity();
+        let is_done = self.program.speeding.is_none_or(|(motion, until)| match until {
+            Some(until) => until <= now,
+            None => (motion.linear - linear).norm() + (motion.angular - angular).norm() < 1e-6,
+        });
+        if is_done {
+            let until = (self.program.speed_time > 0.0).then_some(now + self.program.speed_time);
+            self.program.speeding = Some((wanted, until));
+        }
+        if let Some((motion, _)) = self.program.speeding {
+            body.follow(motion, self.program.force);
+        }
+    }
+
+    fn realtime(&mut self, id: i32) {
+        self.ints_out[0] = 1;
+        if id == 10 {
+            let acceleration = self.doubles_in[6];
+            self.program.speed_time = self.doubles_in[7];
+            self.program.velocity = Some(Motion { linear: self.vector(0), angular: self.vector(3), acceleration });
+            return;
+        }
+        let frame = UnitQuaternion::from_scaled_axis(self.vector(3));
+        let selected: Vec<usize> = (0..6).filter(|i| self.ints_in[2 + i] != 0).collect();
+        let [axis @ 0..3] = selected[..] else {
+            self.stop_program("force mode along other than one axis is not simulated");
+            return;
+        };
+        let (force, speed) = (self.doubles_in[6 + axis], self.doubles_in[12 + axis]);
+        let along = frame * Vector3::ith(axis, force.signum());
+        self.program.force = Some(Force { axis: along, force: force.abs(), speed });
+    }
+
+    fn regular(&mut self, id: i32) {
+        match id {
+            // the thread of `speedL` goes on after it
+            7 => (self.program.force, self.program.braking) = (None, Some(10.0)),
+            15 => {
+                (self.program.velocity, self.program.speeding) = (None, None);
+                self.program.braking = Some(self.doubles_in[0]);
+            }
+            8 => self.body.zero_sensor(),
+            29 => {
+                let turn = UnitQuaternion::from_scaled_axis(self.vector(3));
+                self.body.tcp = Isometry3::from_parts(Translation3::from(self.vector(0)), turn);
+            }
+            40 => {
+                let (place, turn) = (self.body.tcp.translation.vector, self.body.tcp.rotation.scaled_axis());
+                self.doubles_out[..3].copy_from_slice(place.as_slice());
+                self.doubles_out[3..6].copy_from_slice(turn.as_slice());
+            }
+            17 => {
+                let told = Payload { mass: self.doubles_in[0], p_sc: self.vector(1), ..self.body.told_payload };
+                self.body.told_payload = told;
+                self.record.event(&format!("payload {} kg", told.mass));
+            }
+            // how force mode is tuned is not simulated
+            20 | 21 => self.record.event(&format!("set {id}: {:?}", &self.doubles_in[..4])),
+            35 => self.program.watchdog = Some(1.0 / self.doubles_in[0]),
+            31 => self.stop_for(Safety::Protective, "told by the client"),
+            _ => self.stop_program(&format!("command {id} is not simulated")),
+        }
+        if self.program.braking.is_some() {
+            // done when it stands
+            self.ints_out[0] = 1;
+        }
+    }
+
+    fn vector(&self, at: usize) -> Vector3<f64> {
+        Vector3::from_column_slice(&self.doubles_in[at..at + 3])
+    }
+
+    fn send_states(&mut self) {
+        let Faults { is_silent, is_unplugged, is_dead, .. } = self.faults;
+        if is_silent || is_unplugged || is_dead {
+            return;
+        }
+        let mut streams = std::mem::take(&mut self.streams);
+        let states = crate::rtde::States::read(self);
+        streams.retain_mut(|stream| stream.send(&states));
+        self.streams = streams;
+    }
+
+    /// Ends all connections that are there now.
+    pub fn cut(&mut self, ports: &[u16]) {
+        let is_cut = |socket: &TcpStream| socket.local_addr().is_ok_and(|own| ports.contains(&own.port()));
+        for socket in self.sockets.extract_if(.., |socket| is_cut(socket)) {
+            // one that has ended already is as good
+            let _ = socket.shutdown(Shutdown::Both);
+        }
+    }
+}

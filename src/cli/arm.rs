@@ -1,0 +1,151 @@
+//! The arm that a verb works with: a simulated one, or a UR.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use nalgebra::Vector3;
+
+use super::CliError;
+use super::probing::Ready;
+#[cfg(feature = "ur")]
+use super::probing::ur_params;
+use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
+use crate::mesh::TriMesh;
+use crate::robot::Arm;
+#[cfg(feature = "ur")]
+use crate::robot::ur::UrArm;
+use crate::scene::Scene;
+use crate::sim::{ArmParams, MeshSurface, SimArm, WEIGHTLESS};
+use crate::touch::Payload;
+
+/// Which arm.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum RobotName {
+    /// A simulated one, against the part of --truth
+    Sim,
+    /// A UR, at robot.host of the scene (docs/ur.md)
+    #[cfg(feature = "ur")]
+    Ur,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct ArmArguments {
+    /// Which arm
+    #[arg(long, value_name = "ARM")]
+    pub robot: RobotName,
+    #[command(flatten)]
+    pub cell: CellArguments,
+}
+
+/// What an arm stands before; a verb that has other sources than an arm takes these without the arm.
+#[derive(Debug, Args)]
+#[group(id = "cell")]
+pub(super) struct CellArguments {
+    /// The scan: PLY, STL or OBJ; not needed when the scene names its file
+    #[arg(long, value_name = "MESH")]
+    scan: Option<PathBuf>,
+    /// Unit of the coordinates in the scan's file, and in the part's
+    #[arg(long, value_name = "U", default_value = "mm")]
+    mesh_unit: MeshUnit,
+    /// The part as it is, for a simulated arm: a closed mesh
+    #[arg(long, value_name = "MESH")]
+    truth: Option<PathBuf>,
+    /// Noise of the simulated arm comes from it
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+}
+
+/// What hangs on the flange of a simulated arm, where the scene is wrong about it.
+#[derive(Debug, Args)]
+#[group(id = "true_payload")]
+pub(super) struct TruePayload {
+    /// What really hangs on the flange of a simulated arm, kg; left out: robot.payload_kg of the scene
+    #[arg(long, value_name = "M")]
+    truth_payload_kg: Option<f64>,
+    /// Its centre of mass in the flange, mm; left out: robot.payload_centre_mm of the scene
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    truth_payload_centre_mm: Option<String>,
+}
+
+impl TruePayload {
+    /// The simulated arm of a scene with it.
+    pub fn held_by(&self, arm: ArmParams, scene: &Scene) -> Result<ArmParams, CliError> {
+        let robot = scene.robot.clone().unwrap_or_default();
+        let centre = Vector3::from(robot.payload_centre_mm) / 1e3;
+        let told_payload = Payload { mass: robot.payload_kg, p_sc: centre, ..WEIGHTLESS };
+        let written = |text: &String| millimetres("--truth-payload-centre-mm", text);
+        let p_sc = self.truth_payload_centre_mm.as_ref().map(written).transpose()?.unwrap_or(centre);
+        let payload = Payload { mass: self.truth_payload_kg.unwrap_or(robot.payload_kg), p_sc, ..WEIGHTLESS };
+        Ok(ArmParams { payload, told_payload, ..arm })
+    }
+}
+
+/// A place that was written X,Y,Z in mm, m.
+pub(super) fn millimetres(flag: &str, text: &str) -> Result<Vector3<f64>, CliError> {
+    let wrong = || CliError::Usage(format!("{flag} {text} is not X,Y,Z in mm"));
+    let numbers = text.split(',').map(|mm| mm.parse().ok().filter(|mm: &f64| mm.is_finite()));
+    let numbers = numbers.collect::<Option<Vec<f64>>>().ok_or_else(wrong)?;
+    let place: [f64; 3] = numbers.try_into().map_err(|_| wrong())?;
+    Ok(Vector3::from(place) / 1e3)
+}
+
+impl ArmArguments {
+    /// As [`CellArguments::scan`].
+    pub fn scan(&self, scene: &Path) -> Result<(PathBuf, MeshUnit), CliError> {
+        self.cell.scan(scene)
+    }
+
+    /// Does something with the arm.
+    pub fn with<T>(
+        &self,
+        ready: &Ready,
+        work: impl FnOnce(&mut dyn Arm) -> Result<T, CliError>,
+    ) -> Result<T, CliError> {
+        self.cell.with(self.robot, ready, Ok, work)
+    }
+}
+
+impl CellArguments {
+    /// The scan and the unit of its file.
+    pub fn scan(&self, scene: &Path) -> Result<(PathBuf, MeshUnit), CliError> {
+        match &self.scan {
+            Some(scan) => Ok((scan.clone(), self.mesh_unit)),
+            None => Scene::read(scene)?
+                .scan_file(scene)
+                .ok_or_else(|| CliError::Usage("there is no scan: name it by --scan, or in the scene".to_owned())),
+        }
+    }
+
+    /// Does something with an arm.
+    ///
+    /// - `truth`: makes of the simulated arm of the scene the one that there is.
+    pub fn with<T>(
+        &self,
+        robot: RobotName,
+        ready: &Ready,
+        truth: impl FnOnce(ArmParams) -> Result<ArmParams, CliError>,
+        work: impl FnOnce(&mut dyn Arm) -> Result<T, CliError>,
+    ) -> Result<T, CliError> {
+        match robot {
+            #[cfg(feature = "ur")]
+            RobotName::Ur => {
+                let arm = UrArm::connect(&ur_params(&ready.scene)?);
+                work(&mut arm.map_err(|error| CliError::Arm(error.to_string()))?)
+            }
+            RobotName::Sim => {
+                let part = self.part()?;
+                let surface = MeshSurface::new(&part)?;
+                let params = truth(ready.simulated_arm(self.seed))?;
+                work(&mut SimArm::new(&surface, params, &ready.cell.above(&part))?)
+            }
+        }
+    }
+
+    fn part(&self) -> Result<TriMesh, CliError> {
+        let Some(truth) = &self.truth else {
+            return Err(CliError::Usage("--robot sim needs the part that it touches: --truth MESH".to_owned()));
+        };
+        let MeshFile { mesh, .. } = read_mesh(truth, self.mesh_unit).map_err(CliError::ReadTruth)?;
+        Ok(mesh)
+    }
+}

@@ -1,0 +1,105 @@
+//! `touchup calibrate payload --robot`: what hangs on the flange, weighed by the arm itself.
+//!
+//! The controller of an arm takes the weight off by itself, by the payload that it was told. So what is found goes where that is told:
+//! `robot.payload_kg` and `robot.payload_centre_mm`. The bias is told only: a sensor is zeroed before each touch.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::super::arm::RobotName;
+use super::super::probing::Ready;
+use super::super::progress::Progress;
+use super::super::{CliError, Losses};
+use super::payload::{PayloadArguments, PayloadFound, warn_of_residuals};
+use super::{Change, Draft, NO_SCENE, rounded};
+use crate::calibrate::{PayloadError, PayloadParams, StaticPose, fit_payload};
+use crate::probe::{NotReached, Prober, Weighed, WeighedRest};
+use crate::scene::Setting;
+
+/// The verb.
+pub(super) fn payload(arguments: &PayloadArguments, robot: RobotName) -> Result<Losses, CliError> {
+    let PayloadArguments { cell, truth_payload, target, .. } = arguments;
+    let scene = target.scene.as_ref().ok_or_else(|| CliError::Usage(NO_SCENE.to_owned()))?;
+    let draft = target.open_scene()?;
+    let (scan, unit) = cell.scan(scene)?;
+    let ready = Ready::read(scene, &scan, unit)?;
+    ready.may_move()?;
+    let weighing = Progress::stage("weigh");
+    let truth = |arm| truth_payload.held_by(arm, &ready.scene);
+    let Weighed { rests, not_reached } = cell.with(robot, &ready, truth, |arm| {
+        let mut world = ready.still_world();
+        let mut prober = Prober::new(arm, &ready.cell, &ready.params, &mut world);
+        prober.weigh().map_err(|error| CliError::Arm(error.to_string()))
+    })?;
+    drop(weighing);
+    let poses: Vec<StaticPose> = rests.iter().map(static_pose).collect();
+    let params = PayloadParams { gravity: arguments.gravity_m_per_s2, ..PayloadParams::default() };
+    let fit = fit_payload(&poses, &params).map_err(|error| CliError::Arm(told(&error)))?;
+    warn_of_residuals(&fit, "does a hose pull, ");
+    let payload = PayloadFound::of(&fit, ["flange", "base"]);
+    let found = WeighedFound { payload, not_reached: not_reached.iter().map(NotReached::to_string).collect() };
+    target.write(&draft, &found.change(&draft), &found)?;
+    Ok(Losses::new())
+}
+
+/// The raw wrench is in the axes of the flange, and so is the orientation.
+fn static_pose(rest: &WeighedRest) -> StaticPose {
+    let WeighedRest { r_bf, wrench_f, noise, readings } = *rest;
+    StaticPose { r_wt: r_bf, wrench: wrench_f, noise: Some(noise), samples: readings }
+}
+
+/// Why the rests of an arm do not tell its payload.
+fn told(error: &PayloadError) -> String {
+    match error {
+        PayloadError::WrongAxes { rms_n, other_rms_n, .. } => format!(
+            "the raw wrench of this arm is not in the axes of its flange: residuals are {rms_n:.3} N, and {other_rms_n:.3} N in \
+             those of its base; its payload has to be weighed another way"
+        ),
+        PayloadError::NoWeight { weight_n, sigma_n } => format!(
+            "the weight is {weight_n:.3} N, no more than three times its uncertainty of {sigma_n:.3} N: nothing hangs on the \
+             flange, or the arm tells no raw wrench"
+        ),
+        PayloadError::Inconsistent { rejected, poses } => format!(
+            "{rejected} of {poses} rests do not fit the others: the probe must touch nothing, and no hose or cable may pull it"
+        ),
+        error => error.to_string(),
+    }
+}
+
+/// What `--json` prints.
+#[derive(Debug, Serialize)]
+struct WeighedFound {
+    #[serde(flatten)]
+    payload: PayloadFound,
+    /// orientations that the arm does not get to, and why
+    not_reached: Vec<String>,
+}
+
+impl WeighedFound {
+    fn change(&self, draft: &Draft) -> Change {
+        let PayloadFound { still_phases, residual_force_n, residual_torque_nm, .. } = self.payload;
+        let payload_kg = rounded(self.payload.mass_kg, 10);
+        let payload_centre_mm = self.payload.centre_mm.value.map(|mm| rounded(mm, 7));
+        let mut expected = draft.scene.clone();
+        let robot = expected.robot.get_or_insert_default();
+        (robot.payload_kg, robot.payload_centre_mm) = (payload_kg, payload_centre_mm);
+        Change {
+            settings: vec![
+                Setting::scalar(&["robot", "payload_kg"], payload_kg),
+                Setting::list(&["robot", "payload_centre_mm"], &payload_centre_mm),
+            ],
+            remark: format!(
+                "payload: {still_phases} orientations, residuals {residual_force_n:.3} N and {residual_torque_nm:.4} N·m rms"
+            ),
+            expected,
+        }
+    }
+}
+
+impl fmt::Display for WeighedFound {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.not_reached.iter().try_for_each(|line| writeln!(f, "left out    {line}"))?;
+        write!(f, "{}", self.payload)
+    }
+}

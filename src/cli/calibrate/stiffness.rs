@@ -1,0 +1,76 @@
+//! `touchup calibrate stiffness`: how far arm and probe give way, from presses on one spot.
+
+use std::fmt;
+
+use clap::Args;
+use serde::Serialize;
+
+use super::super::arm::ArmArguments;
+use super::super::check::repeated;
+use super::super::{CliError, Losses};
+use super::{Change, NO_SCENE, Target, rounded};
+use crate::probe::Repeatability;
+use crate::scene::Setting;
+
+#[derive(Debug, Args)]
+pub(in crate::cli) struct StiffnessArguments {
+    #[command(flatten)]
+    arm: ArmArguments,
+    /// A flat place of a stiff part with nothing within 15 mm, in the frame of the scan, mm
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    spot: String,
+    /// How often it is pressed
+    #[arg(long, value_name = "N", default_value_t = 10)]
+    touches: usize,
+    #[command(flatten)]
+    target: Target,
+}
+
+/// The verb.
+pub(super) fn stiffness(arguments: &StiffnessArguments) -> Result<Losses, CliError> {
+    let StiffnessArguments { arm, spot, touches, target } = arguments;
+    let needed = || CliError::Usage(NO_SCENE.to_owned());
+    let scene = target.scene.as_ref().ok_or_else(needed)?;
+    let draft = target.open_scene()?;
+    let found = StiffnessFound::of(&repeated(arm, scene, spot, *touches)?);
+    let stiffness_n_per_mm = rounded(found.stiffness_n_per_mm, 3);
+    let mut expected = draft.scene.clone();
+    expected.tip.get_or_insert_default().stiffness_n_per_mm = Some(stiffness_n_per_mm);
+    let change = Change {
+        settings: vec![Setting::scalar(&["tip", "stiffness_n_per_mm"], stiffness_n_per_mm)],
+        remark: format!("stiffness: {} presses, ± {:.3} N/mm", found.touches, found.std_n_per_mm),
+        expected,
+    };
+    target.write(&draft, &change, &found)?;
+    Ok(Losses::new())
+}
+
+/// What `--json` prints.
+#[derive(Debug, Serialize)]
+struct StiffnessFound {
+    touches: usize,
+    stiffness_n_per_mm: f64,
+    std_n_per_mm: f64,
+    /// of the places where the spot was felt
+    range_um: f64,
+}
+
+impl StiffnessFound {
+    fn of(found: &Repeatability) -> Self {
+        let [stiffness, std] = found.stiffness();
+        Self {
+            touches: found.touches.len(),
+            stiffness_n_per_mm: stiffness / 1e3,
+            std_n_per_mm: std / 1e3,
+            range_um: found.range() * 1e6,
+        }
+    }
+}
+
+impl fmt::Display for StiffnessFound {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { touches, stiffness_n_per_mm, std_n_per_mm, range_um } = self;
+        writeln!(f, "presses: {touches}, felt within {range_um:.1} µm")?;
+        write!(f, "stiffness   {stiffness_n_per_mm:.3} ± {std_n_per_mm:.3} N/mm, of arm and probe together")
+    }
+}

@@ -1,0 +1,95 @@
+//! `touchup calibrate tip --robot`: where the ball is in the flange, from touches of one flat spot with a probe that leans.
+
+use std::fmt;
+
+use nalgebra::Point3;
+use serde::Serialize;
+
+use super::super::arm::{RobotName, millimetres};
+use super::super::probing::Ready;
+use super::super::progress::Progress;
+use super::super::{CliError, Losses};
+use super::tip::TipArguments;
+use super::{Change, Draft, NO_SCENE, Vector, rounded};
+use crate::calibrate::{Known, PlaneTipFit, fit_tip_by_plane};
+use crate::probe::{Cell, NotReached, Pivoted, Prober};
+use crate::scene::Setting;
+use crate::sim::ArmParams;
+
+/// The verb.
+///
+/// - `spot`: as it was written, X,Y,Z in mm.
+pub(super) fn tip(arguments: &TipArguments, robot: RobotName, spot: &str) -> Result<Losses, CliError> {
+    let TipArguments { cell, truth_tip_mm, target, .. } = arguments;
+    let place = Point3::from(millimetres("--spot", spot)?);
+    let scene = target.scene.as_ref().ok_or_else(|| CliError::Usage(NO_SCENE.to_owned()))?;
+    let draft = target.open_scene()?;
+    let (scan, unit) = cell.scan(scene)?;
+    let ready = Ready::read(scene, &scan, unit)?;
+    ready.may_move()?;
+    let touching = Progress::stage("touch");
+    let truth = |arm: ArmParams| {
+        let Some(text) = truth_tip_mm else { return Ok(arm) };
+        let off = millimetres("--truth-tip-mm", text)? - arm.pose_ft.translation.vector;
+        Ok(ArmParams { ball_offset: arm.pose_ft.rotation.inverse() * off, ..arm })
+    };
+    let Pivoted { poses_bf, normal_b, not_reached } = cell.with(robot, &ready, truth, |arm| {
+        let mut world = ready.still_world();
+        let mut prober = Prober::new(arm, &ready.cell, &ready.params, &mut world);
+        prober.pivot(&place).map_err(|error| CliError::Arm(error.to_string()))
+    })?;
+    drop(touching);
+    let fit = fit_tip_by_plane(&poses_bf, &normal_b).map_err(|error| CliError::Arm(error.to_string()))?;
+    let found = PivotFound::of(&fit, &ready.cell, &not_reached);
+    target.write(&draft, &found.change(&draft), &found)?;
+    Ok(Losses::new())
+}
+
+/// What `--json` prints.
+#[derive(Debug, Serialize)]
+struct PivotFound {
+    touches: usize,
+    /// centre of the ball in the flange
+    tip_position_mm: Vector,
+    /// from where the scene had it, in the flange
+    moved_mm: [f64; 3],
+    residual_mm: f64,
+    /// orientations that the arm does not get to, and why
+    not_reached: Vec<String>,
+}
+
+impl PivotFound {
+    fn of(fit: &PlaneTipFit, cell: &Cell, not_reached: &[NotReached]) -> Self {
+        let Known { value, sigma } = &fit.offset;
+        let tip = Known { value: cell.pose_ft.translation.vector + value, sigma: *sigma };
+        Self {
+            touches: fit.touches,
+            tip_position_mm: Vector::of(&tip, 1e3),
+            moved_mm: (value * 1e3).into(),
+            residual_mm: fit.rms * 1e3,
+            not_reached: not_reached.iter().map(ToString::to_string).collect(),
+        }
+    }
+
+    fn change(&self, draft: &Draft) -> Change {
+        let tip_position_mm = self.tip_position_mm.value.map(|mm| rounded(mm, 7));
+        let mut expected = draft.scene.clone();
+        expected.robot.get_or_insert_default().tip_position_mm = tip_position_mm;
+        Change {
+            settings: vec![Setting::list(&["robot", "tip_position_mm"], &tip_position_mm)],
+            remark: format!("tip: {} touches, residuals {:.4} mm rms", self.touches, self.residual_mm),
+            expected,
+        }
+    }
+}
+
+impl fmt::Display for PivotFound {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.not_reached.iter().try_for_each(|line| writeln!(f, "left out    {line}"))?;
+        let [x, y, z] = self.moved_mm;
+        writeln!(f, "touches: {}", self.touches)?;
+        writeln!(f, "tip         {} mm, in the flange", self.tip_position_mm)?;
+        writeln!(f, "that is     {x:+.4}, {y:+.4}, {z:+.4} mm from where the scene had it")?;
+        write!(f, "residuals   {:.4} mm rms off one plane", self.residual_mm)
+    }
+}

@@ -1,0 +1,152 @@
+//! `touchup check`: whether an arm feels one spot in one place, before it is trusted with a part.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use nalgebra::Point3;
+use serde::Serialize;
+
+use super::arm::{ArmArguments, millimetres};
+use super::probing::Ready;
+use super::progress::Progress;
+use super::{CliError, Losses, tell};
+use crate::probe::{Prober, Repeatability};
+
+/// Touches that a spot may have; with three each side has been come from, and one says how far they scatter.
+const TOUCHES: std::ops::RangeInclusive<usize> = 3..=100;
+
+#[derive(Debug, Args)]
+pub(super) struct CheckArguments {
+    #[command(flatten)]
+    arm: ArmArguments,
+    /// The scene, with `robot` (config/probe.yaml is an example)
+    #[arg(long, value_name = "YAML")]
+    scene: PathBuf,
+    /// A flat place of the part with nothing within 15 mm, in the frame of the scan, mm
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    spot: String,
+    /// How often it is touched, every second time from the other side
+    #[arg(long, value_name = "N", default_value_t = 10)]
+    touches: usize,
+    /// All touches have to be within this, µm
+    #[arg(long, value_name = "G", default_value_t = 25.0)]
+    gate_um: f64,
+    /// Prints the result as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn check(arguments: &CheckArguments) -> Result<Losses, CliError> {
+    let CheckArguments { arm, scene, spot, touches, gate_um, json } = arguments;
+    if !(*gate_um > 0.0 && gate_um.is_finite()) {
+        return Err(CliError::Usage(format!("--gate-um {gate_um} must be above 0")));
+    }
+    let found = repeated(arm, scene, spot, *touches)?;
+    let checked = Checked::of(&found, *gate_um);
+    if *json {
+        tell(&serde_json::to_string(&checked).expect("numbers and names alone cannot fail"));
+    } else {
+        tell(&checked.to_string());
+    }
+    let why = format!(
+        "the touches of one spot are {:.1} µm apart, the gate is {gate_um} µm: look for play in probe, flange and joints",
+        checked.range_um
+    );
+    Ok(if checked.passed { Losses::new() } else { vec![why] })
+}
+
+/// Touches one spot again and again.
+///
+/// - `spot`: as it was written, X,Y,Z in mm.
+pub(super) fn repeated(
+    arm: &ArmArguments,
+    scene: &Path,
+    spot: &str,
+    touches: usize,
+) -> Result<Repeatability, CliError> {
+    let place = Point3::from(millimetres("--spot", spot)?);
+    if !TOUCHES.contains(&touches) {
+        let (least, most) = (TOUCHES.start(), TOUCHES.end());
+        return Err(CliError::Usage(format!("--touches {touches} must be {least} to {most}")));
+    }
+    let (scan, unit) = arm.scan(scene)?;
+    let ready = Ready::read(scene, &scan, unit)?;
+    ready.may_move()?;
+    let _touching = Progress::stage("touch");
+    arm.with(&ready, |arm| {
+        let mut world = ready.still_world();
+        let mut prober = Prober::new(arm, &ready.cell, &ready.params, &mut world);
+        prober.repeat(&place, touches).map_err(|error| CliError::Arm(error.to_string()))
+    })
+}
+
+/// What `--json` prints.
+#[derive(Debug, Serialize)]
+struct Checked {
+    spot_mm: [f64; 3],
+    normal: [f64; 3],
+    touches: Vec<CheckedTouch>,
+    range_um: f64,
+    std_um: f64,
+    /// first side less the other
+    reversal_um: f64,
+    stiffness_n_per_mm: f64,
+    stiffness_std_n_per_mm: f64,
+    gate_um: f64,
+    passed: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct CheckedTouch {
+    side: i8,
+    /// outward from the mean of all
+    deviation_um: f64,
+    std_um: f64,
+    stiffness_n_per_mm: f64,
+    verdict: &'static str,
+}
+
+impl Checked {
+    fn of(found: &Repeatability, gate_um: f64) -> Self {
+        let touch = |(touch, deviation): (&crate::probe::SpotTouch, f64)| CheckedTouch {
+            side: touch.side,
+            deviation_um: deviation * 1e6,
+            std_um: touch.sigma * 1e6,
+            stiffness_n_per_mm: touch.stiffness[0] / 1e3,
+            verdict: touch.verdict.name(),
+        };
+        let [stiffness, stiffness_std] = found.stiffness();
+        let range_um = found.range() * 1e6;
+        Self {
+            spot_mm: (found.place * 1e3).coords.into(),
+            normal: found.normal.into_inner().into(),
+            touches: found.touches.iter().zip(found.deviations()).map(touch).collect(),
+            range_um,
+            std_um: found.deviation() * 1e6,
+            reversal_um: found.reversal() * 1e6,
+            stiffness_n_per_mm: stiffness / 1e3,
+            stiffness_std_n_per_mm: stiffness_std / 1e3,
+            gate_um,
+            passed: range_um <= gate_um,
+        }
+    }
+}
+
+impl fmt::Display for Checked {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (number, touch) in (1..).zip(&self.touches) {
+            let CheckedTouch { side, deviation_um, std_um, verdict, .. } = touch;
+            let side = if *side > 0 { "one side" } else { "the other" };
+            writeln!(f, "touch {number:3} from {side}: {deviation_um:+6.1} µm ± {std_um:.1}, {verdict}")?;
+        }
+        let Self { spot_mm: [x, y, z], range_um, std_um, reversal_um, stiffness_n_per_mm, gate_um, .. } = self;
+        let count = self.touches.len();
+        writeln!(
+            f,
+            "{count} touches of ({x:.1} {y:.1} {z:.1}) mm: {range_um:.1} µm apart, standard deviation {std_um:.1} µm"
+        )?;
+        writeln!(f, "the sides differ by {reversal_um:+.1} µm; arm and probe have {stiffness_n_per_mm:.1} N/mm")?;
+        write!(f, "{}: the gate is {gate_um} µm", if self.passed { "passed" } else { "FAILED" })
+    }
+}

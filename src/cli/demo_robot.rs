@@ -1,0 +1,176 @@
+//! `touchup demo --robot sim`: a plate whose scan has lost its holes is probed by a simulated arm, from one click for each feature.
+
+use std::f64::consts::TAU;
+use std::fmt;
+use std::io::Write;
+
+use nalgebra::{Point3, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use serde::Serialize;
+
+use super::compare::{CompareArguments, compared};
+use super::demo::DemoArguments;
+use super::probing::{Done, Probing, ProbingSummary};
+use super::progress::Progress;
+use super::{CliError, Losses, tell};
+use crate::features::{Feature, Kind};
+use crate::io::atomic::{create_folder, write_atomically};
+use crate::io::mesh_file::{MeshUnit, write_mesh};
+use crate::probe::{Flag, Probed};
+use crate::sim::{Plate, ScannerParams, SimArm, TruthFeature, TruthShape, scan};
+
+/// The scene of it, which is written beside the rest.
+const SCENE: &str = include_str!("../../config/probe.yaml");
+/// The triangles of the part are this near to it, m: what is probed on them differs from the drawing by no more than a touch does.
+const CHORD_ERROR: f64 = 0.5e-6;
+/// A click is off by no more than this, m.
+const CLICK: f64 = 3e-3;
+
+/// What `summary.json` holds; lengths in mm.
+#[derive(Debug, Serialize)]
+struct RobotSummary {
+    probing: ProbingSummary,
+    errors: Vec<ProbedError>,
+}
+
+/// How far what was probed is from the part.
+#[derive(Debug, Serialize)]
+struct ProbedError {
+    name: &'static str,
+    /// how far the click was off
+    click_mm: f64,
+    touches: usize,
+    duration_s: f64,
+    largest_force_n: f64,
+    /// across the axis, of an edge across itself
+    place_mm: Option<f64>,
+    /// of the diameter, or of the width and the length
+    sizes_mm: Vec<f64>,
+}
+
+pub(super) fn demo_robot(arguments: &DemoArguments) -> Result<Losses, CliError> {
+    let plate = Plate::default();
+    let out = &arguments.out;
+    create_folder(out).map_err(|source| CliError::Write { path: out.clone(), source })?;
+    let [truth_path, scan_path, scene_path] = ["truth.ply", "scan.ply", "scene.yaml"].map(|name| out.join(name));
+    let truth = plate.mesh(CHORD_ERROR)?;
+    let scanning = Progress::stage("scan");
+    let scanner = ScannerParams { seed: arguments.seed, ..ScannerParams::default() };
+    let scanned = scan(&plate, &scanner)?;
+    drop(scanning);
+    for (path, mesh) in [(&truth_path, &truth), (&scan_path, &scanned)] {
+        write_mesh(path, mesh, MeshUnit::Millimetre).map_err(CliError::WriteMesh)?;
+    }
+    write_atomically(&scene_path, |file| file.write_all(SCENE.as_bytes()))
+        .map_err(|source| CliError::Write { path: scene_path.clone(), source })?;
+
+    let features = plate.features();
+    let mut rng = Pcg64::seed_from_u64(arguments.seed);
+    let flags: Vec<Flag> = (1..).zip(&features).map(|(id, feature)| clicked(id, feature, &mut rng)).collect();
+    let probing = Probing {
+        scene: &scene_path,
+        scan: &scan_path,
+        unit: MeshUnit::Millimetre,
+        flags: &flags,
+        is_simulated: true,
+        out,
+    };
+    let ready = probing.ready()?;
+    let start = ready.cell.above(&truth);
+    let mut arm = SimArm::new(&plate, ready.simulated_arm(arguments.seed), &start)?;
+    probing.planned(&ready, &mut arm)?;
+    let Done { summary, probed, losses } = probing.done(&ready, &mut arm)?;
+
+    let picture = [out.join("refined.ply"), truth_path, scan_path, out.join("deviation.png")];
+    compared(&CompareArguments::of_picture(picture))?;
+    let errors = flags.iter().zip(&features).map(|(flag, truth)| {
+        let probed = probed.iter().find(|probed| probed.flag == flag.id);
+        ProbedError::of(flag, truth, probed)
+    });
+    let demo = RobotSummary { probing: summary, errors: errors.collect() };
+    let path = out.join("summary.json");
+    let text = serde_json::to_string_pretty(&demo).expect("numbers and names alone cannot fail");
+    write_atomically(&path, |file| writeln!(file, "{text}")).map_err(|source| CliError::Write { path, source })?;
+    tell(&format!(
+        "{demo}\nwrote {}: plan.png is what the arm would do, touches.png what it did, deviation.png what is right now",
+        out.display()
+    ));
+    Ok(losses)
+}
+
+/// One click near a feature, as a person makes it: a kind, and no size.
+fn clicked(id: u32, feature: &TruthFeature, rng: &mut Pcg64) -> Flag {
+    let (angle, off) = (rng.random_range(0.0..TAU), rng.random_range(0.0..CLICK));
+    let (kind, top) = match feature.shape {
+        TruthShape::Hole { .. } => (Kind::Hole, 0.0),
+        TruthShape::Slot { .. } => (Kind::Slot, 0.0),
+        TruthShape::Boss { height, .. } => (Kind::Boss, height),
+        TruthShape::Step { .. } => (Kind::Edge, 0.0),
+    };
+    let place: Point3<f64> = feature.centre + Vector3::new(off * angle.cos(), off * angle.sin(), top);
+    Flag { id, kind: Some(kind), place, radius: CLICK }
+}
+
+impl ProbedError {
+    fn of(flag: &Flag, truth: &TruthFeature, probed: Option<&Probed>) -> Self {
+        let found = probed.and_then(|probed| probed.found.as_ref()?.feature.as_ref());
+        let (place, sizes) = found.map_or((None, Vec::new()), |found| {
+            let (place, sizes) = errors(found, truth);
+            (Some(place), sizes)
+        });
+        Self {
+            name: truth.name,
+            click_mm: (flag.place - truth.centre).xy().norm() * 1e3,
+            touches: probed.map_or(0, |probed| probed.touches.len()),
+            duration_s: probed.map_or(0.0, |probed| probed.seconds),
+            largest_force_n: probed.map_or(0.0, |probed| probed.peak_force),
+            place_mm: place.map(|error| error * 1e3),
+            sizes_mm: sizes.iter().map(|error| error * 1e3).collect(),
+        }
+    }
+}
+
+/// Place and sizes against the drawing, m.
+fn errors(found: &Feature, truth: &TruthFeature) -> (f64, Vec<f64>) {
+    let off = found.centre.value - truth.centre;
+    let value = |measured: &Option<crate::features::Measured<f64>>| measured.as_ref().map_or(f64::NAN, |m| m.value);
+    match truth.shape {
+        TruthShape::Hole { diameter, .. } | TruthShape::Boss { diameter, .. } => {
+            (off.norm(), vec![value(&found.diameter) - diameter])
+        }
+        TruthShape::Slot { width, length, .. } => {
+            (off.norm(), vec![value(&found.width) - width, value(&found.length) - length])
+        }
+        // where along it the edge was touched is no error
+        TruthShape::Step { direction, .. } => ((off - direction * off.dot(&direction)).norm(), Vec::new()),
+    }
+}
+
+impl fmt::Display for RobotSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}", self.probing)?;
+        writeln!(f, "against the drawing:")?;
+        writeln!(
+            f,
+            "  {:<13} {:>9} {:>8} {:>6} {:>7} {:>10}  size mm",
+            "", "click mm", "touches", "s", "N", "place mm"
+        )?;
+        for error in &self.errors {
+            let place = error.place_mm.map_or_else(|| "-".to_owned(), |mm| format!("{mm:.4}"));
+            let sizes: Vec<String> = error.sizes_mm.iter().map(|mm| format!("{mm:+.4}")).collect();
+            writeln!(
+                f,
+                "  {:<13} {:>9.1} {:>8} {:>6.0} {:>7.1} {:>10}  {}",
+                error.name,
+                error.click_mm,
+                error.touches,
+                error.duration_s,
+                error.largest_force_n,
+                place,
+                sizes.join(" ")
+            )?;
+        }
+        Ok(())
+    }
+}

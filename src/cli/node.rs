@@ -1,0 +1,174 @@
+//! `touchup node`: the ROS 2 node, until it is told to end.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{SyncSender, sync_channel};
+use std::thread::Builder;
+
+use clap::Args;
+use tokio::signal::unix::{SignalKind, signal};
+
+use super::{CliError, Losses, complain, tell};
+use crate::io::mesh_file::{MeshFile, read_mesh};
+use crate::live::Quantiles;
+#[cfg(feature = "ur")]
+use crate::robot::ur::UrArm;
+use crate::ros;
+use crate::ros::arguments::NodeConfig;
+use crate::ros::node::{ArmKind, ArmOfNode, INBOX, NodeEnd, NodeError, Prepared, Report, mesh_unit};
+use crate::ros::parameters::ParameterValue;
+use crate::ros::port::Arrival;
+use crate::scene::Scene;
+
+#[derive(Debug, Args)]
+pub(super) struct NodeArguments {
+    /// Names the parts and their parameters, and the scan unless -p scan:=FILE does
+    #[arg(long, value_name = "YAML")]
+    scene: Option<PathBuf>,
+    /// Prints the report of the session as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// - `ros`: what stands behind `--ros-args`.
+pub(super) fn node(arguments: &NodeArguments, ros: &[String]) -> Result<Losses, CliError> {
+    let mut config = NodeConfig::new(ros, |name| std::env::var(name).ok())?;
+    arguments.set_scene(&mut config)?;
+    if !config.unused.is_empty() {
+        tracing::warn!("the parameter files name what this node does not have: {}", config.unused.join(", "));
+    }
+    let ready = Prepared::new(config.parameters.clone())?;
+    let (scan, faces) = ready.scan();
+    tell(&format!("scan: {} with {faces} faces; session: {}", scan.display(), ready.folder().display()));
+    let (inbox, arrivals) = sync_channel(INBOX);
+    end_on_signals(inbox.clone()).map_err(|error| NodeError::NoThread(error.to_string()))?;
+    let port = ros::start(&config, inbox)?;
+    let arm = arm_of(&config, ready.scene())?;
+    let running = ready.start(port, arrivals, arm)?;
+    let topics: Vec<_> = config.sample_topics().iter().filter_map(|name| config.resolve(name).ok()).collect();
+    tell(&format!("{} listens to {}; Ctrl-C saves and ends it", config.place.full_name(), topics.join(" and ")));
+    let NodeEnd { folder, report } = running.join()?;
+    if arguments.json {
+        tell(&serde_json::to_string(&report).expect("numbers and names alone cannot fail"));
+    } else {
+        tell(&format!("{report}\nwrote {}", folder.join("refined.ply").display()));
+    }
+    Ok(losses(&report))
+}
+
+/// The arm that the parameter `robot` asks for, with its own place on the network.
+fn arm_of(config: &NodeConfig, scene: &Scene) -> Result<Option<ArmOfNode>, CliError> {
+    let robot = config.parameters.string("robot");
+    if robot == "none" {
+        return Ok(None);
+    }
+    if config.parameters.string("source") != "probe" {
+        return Err(CliError::Usage(format!("robot:={robot} touches with a probe: say source:=probe as well")));
+    }
+    let kind = match robot {
+        "sim" => {
+            let part = config.parameters.string("sim_part");
+            if part.is_empty() {
+                return Err(CliError::Usage("robot:=sim needs the part that it touches: -p sim_part:=MESH".to_owned()));
+            }
+            let unit = mesh_unit(&config.parameters);
+            let MeshFile { mesh, .. } = read_mesh(Path::new(part), unit).map_err(CliError::ReadTruth)?;
+            ArmKind::Sim(Box::new(mesh))
+        }
+        _ => real_arm(scene)?,
+    };
+    Ok(Some(ArmOfNode { kind, samples: ros::samples(&config.beside("_arm"))? }))
+}
+
+#[cfg(feature = "ur")]
+fn real_arm(scene: &Scene) -> Result<ArmKind, CliError> {
+    let arm = UrArm::connect(&super::probing::ur_params(scene)?).map_err(|error| CliError::Arm(error.to_string()))?;
+    Ok(ArmKind::Real(Box::new(arm)))
+}
+
+#[cfg(not(feature = "ur"))]
+fn real_arm(_: &Scene) -> Result<ArmKind, CliError> {
+    Err(CliError::Usage("robot:=ur needs touchup built with --features ur (docs/ur.md)".to_owned()))
+}
+
+impl NodeArguments {
+    /// The flag stands above files of parameters, which may name a scene for every node.
+    fn set_scene(&self, config: &mut NodeConfig) -> Result<(), CliError> {
+        let Some(scene) = &self.scene else { return Ok(()) };
+        let path = scene.to_str().ok_or_else(|| {
+            CliError::Usage(format!("--scene {}: parameters of ROS are UTF-8, rename the file", scene.display()))
+        })?;
+        let set = config.parameters.set("scene", &ParameterValue::String(path.to_owned()));
+        set.map_err(|error| CliError::Usage(error.to_string()))
+    }
+}
+
+/// The first signal ends the node, which saves; the second one does not wait for that.
+fn end_on_signals(inbox: SyncSender<Arrival>) -> std::io::Result<()> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_io().build()?;
+    let mut signals = {
+        let _entered = runtime.enter();
+        [SignalKind::interrupt(), SignalKind::terminate(), SignalKind::hangup()]
+            .map(signal)
+            .into_iter()
+            .collect::<Result<Vec<_>, _>>()?
+    };
+    let listen = move || {
+        runtime.block_on(any(&mut signals));
+        complain("ends and saves; a second signal ends it at once");
+        // a node that has ended already needs none
+        let _ = inbox.send(Arrival::Shutdown);
+        runtime.block_on(any(&mut signals));
+        std::process::exit(1);
+    };
+    Builder::new().name("signals".to_owned()).spawn(listen).map(drop)
+}
+
+/// Waits for any of them.
+async fn any(signals: &mut [tokio::signal::unix::Signal]) {
+    std::future::poll_fn(|context| match signals.iter_mut().any(|signal| signal.poll_recv(context).is_ready()) {
+        true => std::task::Poll::Ready(()),
+        false => std::task::Poll::Pending,
+    })
+    .await;
+}
+
+fn losses(report: &Report) -> Losses {
+    let ([wrenches, poses], [samples, others]) = (report.lost, report.dropped);
+    let told = [
+        (wrenches, "wrenches lost on the way"),
+        (poses, "poses lost on the way"),
+        (samples, "wrenches and poses dropped: the computer is too slow"),
+        (others, "other messages dropped"),
+        (report.unrecorded, "messages not in the session's recording"),
+    ];
+    let told = told.into_iter().filter(|(count, _)| *count > 0);
+    told.map(|(count, what)| format!("{count} {what}")).collect()
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let refused: Vec<_> = self.refused.iter().map(|(reason, count)| format!("{count} {reason}")).collect();
+        let refused = if refused.is_empty() { "none".to_owned() } else { refused.join(", ") };
+        let ([wrenches, poses], [poses_stale, wrenches_stale]) = (self.lost, self.gaps);
+        writeln!(f, "samples: {} accepted; refused: {refused}", self.accepted)?;
+        writeln!(
+            f,
+            "lost on the way: {wrenches} wrenches, {poses} poses; streams stale: {wrenches_stale} times wrenches, \
+             {poses_stale} times poses"
+        )?;
+        writeln!(f, "contacts: {}; updates cut back: {}", self.contacts, self.cut_back)?;
+        let us = |ns: u64| ns as f64 * 1e-3;
+        let line = |f: &mut fmt::Formatter<'_>, what: &str, Quantiles { median, p99, p999, max }: Quantiles| {
+            let [median, p99, p999, max] = [median, p99, p999, max].map(us);
+            write!(f, "{what}: median {median:.1} us, p99 {p99:.1} us, p99.9 {p999:.1} us, max {max:.1} us")
+        };
+        line(f, "push", self.push_ns)?;
+        writeln!(f)?;
+        line(f, "arrival to mesh", self.latency_ns)?;
+        if let Some(patch) = self.result.as_ref().and_then(|result| result.patch.as_ref()) {
+            write!(f, "\n{patch}")?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,129 @@
+//! `touchup probe`: an arm probes flagged features by itself, without ROS.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::arm::{ArmArguments, RobotName};
+use super::probing::{Done, Probing, Ready, flag_of, told_files};
+use super::{CliError, Losses, tell};
+use crate::probe::Flag;
+use crate::robot::{Arm, Narrower};
+
+#[derive(Debug, Args)]
+pub(super) struct ProbeArguments {
+    #[command(flatten)]
+    arm: ArmArguments,
+    /// The scene, with `robot` (config/probe.yaml is an example)
+    #[arg(long, value_name = "YAML")]
+    scene: PathBuf,
+    /// What is probed, in the frame of the scan: KIND@X,Y,Z or KIND@X,Y,Z,RADIUS in mm; again for each
+    #[arg(long = "feature", value_name = "FLAG", required = true, allow_hyphen_values = true)]
+    features: Vec<String>,
+    /// How far a feature may be from its flag, mm, where the flag does not say
+    #[arg(long, value_name = "R", default_value_t = 3.0)]
+    search_radius_mm: f64,
+    /// Half width within which the numbers are to be known, with the confidence of the scene, mm
+    #[arg(long, value_name = "T")]
+    tolerance_mm: Option<f64>,
+    /// Touches of a feature at most
+    #[arg(long, value_name = "N")]
+    max_touches: Option<usize>,
+    /// Force at the tip at most, N: less than the scene allows
+    #[arg(long, value_name = "F")]
+    max_force_n: Option<f64>,
+    /// Time of a feature at most, s: less than the scene allows
+    #[arg(long, value_name = "T")]
+    max_duration_s: Option<f64>,
+    /// Slides over all of what was found, with constant force, so that the mesh follows it: along walls and across rims
+    #[arg(long)]
+    slide: bool,
+    /// Plans, checks reach and ways, draws the plan, and moves nothing
+    #[arg(long)]
+    dry_run: bool,
+    /// Folder for plan.png, touches.png, probed.json, probed_touches.jsonl, touch.mcap, refined.ply, features.json, touches.csv
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Prints the result as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn probe(arguments: &ProbeArguments) -> Result<Losses, CliError> {
+    let flags = arguments.flags()?;
+    let (scan, unit) = arguments.arm.scan(&arguments.scene)?;
+    let probing = Probing {
+        scene: &arguments.scene,
+        scan: &scan,
+        unit,
+        flags: &flags,
+        is_simulated: arguments.arm.robot == RobotName::Sim,
+        out: &arguments.out,
+    };
+    let mut ready = probing.ready()?;
+    arguments.narrow(&mut ready)?;
+    arguments.arm.with(&ready, |arm| arguments.run(&probing, &ready, arm))
+}
+
+impl ProbeArguments {
+    fn flags(&self) -> Result<Vec<Flag>, CliError> {
+        let radius = self.search_radius_mm / 1e3;
+        if !(radius > 0.0 && radius.is_finite()) {
+            return Err(CliError::Usage(format!("--search-radius-mm {} must be above 0", self.search_radius_mm)));
+        }
+        (1..).zip(&self.features).map(|(id, text)| flag_of(id, text, radius)).collect()
+    }
+
+    /// A request can ask for less than the scene allows.
+    fn narrow(&self, ready: &mut Ready) -> Result<(), CliError> {
+        let by = Narrower { force: self.max_force_n, time: self.max_duration_s, ..Narrower::default() };
+        let wanted_mm = ready.tolerance_mm();
+        ready.params = ready.params.narrowed(&by).map_err(|error| CliError::Usage(error.to_string()))?;
+        let params = &mut ready.params;
+        params.slides = self.slide;
+        if let Some(touches) = self.max_touches {
+            if touches == 0 || touches > params.pattern.budget {
+                let most = params.pattern.budget;
+                return Err(CliError::Usage(format!(
+                    "--max-touches {touches} must be 1 to {most}, as the scene has it"
+                )));
+            }
+            params.pattern.budget = touches;
+        }
+        if let Some(tolerance_mm) = self.tolerance_mm {
+            if !(tolerance_mm > 0.0 && tolerance_mm.is_finite()) {
+                return Err(CliError::Usage(format!("--tolerance-mm {tolerance_mm} must be above 0")));
+            }
+            params.pattern.sigma *= tolerance_mm / wanted_mm;
+        }
+        Ok(())
+    }
+
+    fn run(&self, probing: &Probing<'_>, ready: &Ready, arm: &mut dyn Arm) -> Result<Losses, CliError> {
+        let plans = probing.planned(ready, arm)?;
+        if self.dry_run {
+            for (flag, plan) in probing.flags.iter().zip(&plans) {
+                let slides =
+                    if plan.slides.is_empty() { String::new() } else { format!(" and {} slides", plan.slides.len()) };
+                tell(&format!(
+                    "feature {}: {} touches{slides} planned, {} cannot be made",
+                    flag.id,
+                    plan.wishes.len(),
+                    plan.held_back.len()
+                ));
+                plan.held_back.iter().for_each(|(touch, why)| tell(&format!("  touch {touch}: {why}")));
+            }
+            tell(&format!("nothing moved; wrote {}", self.out.join("plan.png").display()));
+            return Ok(Losses::new());
+        }
+        ready.may_move()?;
+        let Done { summary, losses, .. } = probing.done(ready, arm)?;
+        if self.json {
+            tell(&serde_json::to_string(&summary).expect("numbers and names alone cannot fail"));
+        } else {
+            let files: Vec<String> = told_files(&self.out).iter().map(|path| path.display().to_string()).collect();
+            tell(&format!("{summary}\nwrote {}", files.join(", ")));
+        }
+        Ok(losses)
+    }
+}

@@ -1,0 +1,218 @@
+//! What `touchup probe` and `touchup demo --robot sim` share: features are probed while the mesh follows, and all is written down.
+
+mod picture;
+mod report;
+mod world;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use nalgebra::Point3;
+use tracing::info;
+
+use super::progress::Progress;
+use super::refine::{RefineArguments, Refined};
+use super::{CliError, Losses};
+use crate::features::Kind;
+use crate::io::atomic::create_folder;
+use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
+use crate::io::probed_touches_file::write_probed_touches;
+use crate::io::recording::{Topics, write_recording};
+use crate::mesh::{FaceTree, TriMesh};
+use crate::probe::{Cell, Ending, Flag, Plan, ProbeParams, Probed, Prober, StillWorld, plan};
+use crate::robot::Arm;
+#[cfg(feature = "ur")]
+use crate::robot::ur::UrParams;
+#[cfg(feature = "ur")]
+use crate::scene::RobotSection;
+use crate::scene::{Scene, simulated_arm};
+use crate::sim::ArmParams;
+use picture::{draw_plan, draw_touches};
+pub(super) use report::{ProbedFile, ProbingSummary};
+use world::LiveWorld;
+
+/// Frame of the poses in the recording: the base of the arm.
+const BASE_FRAME: &str = "base";
+/// Frame of the wrenches: the probe's own.
+const PROBE_FRAME: &str = "probe";
+
+/// What is probed, where, and where it is written down.
+pub(super) struct Probing<'a> {
+    /// with `robot`
+    pub scene: &'a Path,
+    pub scan: &'a Path,
+    pub unit: MeshUnit,
+    pub flags: &'a [Flag],
+    /// the arm waits for whoever looks on; one that exists does not
+    pub is_simulated: bool,
+    pub out: &'a Path,
+}
+
+/// A probing that is ready to begin.
+pub(super) struct Ready {
+    pub cell: Cell,
+    pub params: ProbeParams,
+    pub scene: Scene,
+    mesh: TriMesh,
+}
+
+/// What became of it.
+pub(super) struct Done {
+    pub summary: ProbingSummary,
+    pub probed: Vec<Probed>,
+    pub losses: Losses,
+}
+
+const NO_ROBOT: &str = "the scene names no `robot`, so nobody knows where the arm stands and what it must never leave: add \
+                        `robot:` to it (config/probe.yaml is an example)";
+
+#[cfg(feature = "ur")]
+const NO_HOST: &str = "--robot ur needs robot.host and robot.site_packages in the scene (docs/ur.md)";
+const NO_MOTION: &str =
+    "the scene does not allow the arm to move: look at plan.png first, then put `allow_motion: true` under `robot`";
+
+/// The UR that a scene has.
+///
+/// # Errors
+/// [`CliError::Usage`] where it names no controller, or no packages.
+#[cfg(feature = "ur")]
+pub(super) fn ur_params(scene: &Scene) -> Result<UrParams, CliError> {
+    let named = |robot: &&RobotSection| !robot.host.is_empty() && !robot.site_packages.is_empty();
+    let robot = scene.robot.as_ref().filter(named).zip(scene.probing());
+    let (robot, (cell, _)) = robot.ok_or_else(|| CliError::Usage(NO_HOST.to_owned()))?;
+    Ok(UrParams {
+        pose_ft: cell.pose_ft,
+        mass: robot.payload_kg,
+        centre: nalgebra::Vector3::from(robot.payload_centre_mm) / 1e3,
+        ..UrParams::new(&robot.host, &robot.site_packages)
+    })
+}
+
+fn probe_topics() -> Topics {
+    Topics { pose: "/probe/pose".to_owned(), wrench: "/probe/wrench".to_owned(), markers: None }
+}
+
+impl Ready {
+    /// Reads scene and scan.
+    pub fn read(scene: &Path, scan: &Path, unit: MeshUnit) -> Result<Self, CliError> {
+        let scene = Scene::read(scene)?;
+        let (cell, params) = scene.probing().ok_or_else(|| CliError::Usage(NO_ROBOT.to_owned()))?;
+        let MeshFile { mesh, repair } = read_mesh(scan, unit).map_err(CliError::ReadMesh)?;
+        info!(%repair, "scan");
+        Ok(Self { cell, params, scene, mesh })
+    }
+
+    /// A simulated arm of this cell.
+    pub fn simulated_arm(&self, seed: u64) -> ArmParams {
+        ArmParams { seed, ..simulated_arm(&self.cell, &self.params) }
+    }
+
+    /// The scan as it is.
+    pub fn still_world(&self) -> StillWorld {
+        StillWorld::new(self.mesh.clone())
+    }
+
+    /// Half width within which the scene wants numbers to be known, mm.
+    pub fn tolerance_mm(&self) -> f64 {
+        self.scene.robot.as_ref().map_or(f64::NAN, |robot| robot.tolerance_mm)
+    }
+
+    /// Whether the scene allows motion.
+    ///
+    /// # Errors
+    /// [`CliError::Usage`]
+    pub fn may_move(&self) -> Result<(), CliError> {
+        match self.scene.robot.as_ref().is_some_and(|robot| robot.allow_motion) {
+            true => Ok(()),
+            false => Err(CliError::Usage(NO_MOTION.to_owned())),
+        }
+    }
+}
+
+impl Probing<'_> {
+    /// Reads scene and scan.
+    pub fn ready(&self) -> Result<Ready, CliError> {
+        let ready = Ready::read(self.scene, self.scan, self.unit)?;
+        create_folder(self.out).map_err(|source| CliError::Write { path: self.out.to_owned(), source })?;
+        Ok(ready)
+    }
+
+    /// Plans all, and draws the plan; nothing moves.
+    pub fn planned(&self, ready: &Ready, arm: &mut dyn Arm) -> Result<Vec<Plan>, CliError> {
+        let _planning = Progress::stage("plan");
+        let now = arm.next_state().map_err(|error| CliError::Arm(error.to_string()))?;
+        let world = ready.still_world();
+        let plan_of = |flag: &Flag| {
+            plan(&ready.cell, &ready.params, &world, flag, &now).map_err(|error| CliError::Explore(flag.id, error))
+        };
+        let plans = self.flags.iter().map(plan_of).collect::<Result<Vec<_>, _>>()?;
+        draw_plan(&ready.mesh, &plans, self.flags, &self.out.join("plan.png"))?;
+        Ok(plans)
+    }
+
+    /// Probes all flags, in their order, and writes everything down. A stop of the arm ends it; what was measured until then is
+    /// written.
+    pub fn done(&self, ready: &Ready, arm: &mut dyn Arm) -> Result<Done, CliError> {
+        let scan = Arc::new((ready.mesh.clone(), FaceTree::new(&ready.mesh)));
+        let mut world = LiveWorld::new(scan, &ready.scene, &ready.cell, self.is_simulated)?;
+        let mut probed = Vec::new();
+        for flag in self.flags {
+            let one = Prober::new(arm, &ready.cell, &ready.params, &mut world).probe(flag);
+            let stopped = matches!(one.ending, Ending::Stopped(_) | Ending::Cancelled);
+            probed.push(one);
+            if stopped {
+                break;
+            }
+        }
+        // whatever becomes of the mesh, what was measured is kept
+        ProbedFile::of(&probed, self.flags).write(self.out)?;
+        let path = self.out.join("probed_touches.jsonl");
+        write_probed_touches(&probed, ready.params.pattern.ball_radius, &path)
+            .map_err(|source| CliError::Write { path, source })?;
+        let messages = world.finish()?;
+        let bag = self.out.join("touch.mcap");
+        write_recording(&bag, &probe_topics(), BASE_FRAME, PROBE_FRAME, messages).map_err(CliError::WriteRecording)?;
+        let [refined, features, touches] =
+            ["refined.ply", "features.json", "touches.csv"].map(|name| self.out.join(name));
+        let arguments = RefineArguments::of_files(self.scan.to_owned(), bag, refined.clone(), self.unit)
+            .with_features(features, touches)
+            .with_scene(self.scene.to_owned(), probe_topics());
+        let Refined { summary, mut losses, .. } = arguments.refined()?;
+        let is_found =
+            |one: &&Probed| matches!(one.ending, Ending::ToleranceReached | Ending::TouchesSpent | Ending::TimeSpent);
+        losses.extend(
+            probed.iter().filter(|one| !is_found(one)).map(|one| format!("feature {}: {}", one.flag, one.ending)),
+        );
+        let not_begun = self.flags.len() - probed.len();
+        if not_begun > 0 {
+            losses.push(format!("{not_begun} of {} flags were not begun", self.flags.len()));
+        }
+        let MeshFile { mesh, .. } = read_mesh(&refined, self.unit).map_err(CliError::ReadMesh)?;
+        draw_touches(&mesh, &probed, self.flags, &self.out.join("touches.png"))?;
+        Ok(Done { summary: ProbingSummary::of(&probed, self.flags, summary), probed, losses })
+    }
+}
+
+/// A flag of a command line.
+///
+/// - `radius`: m, where it names none.
+pub(super) fn flag_of(id: u32, text: &str, radius: f64) -> Result<Flag, CliError> {
+    const FORM: &str =
+        "KIND@X,Y,Z or KIND@X,Y,Z,RADIUS in mm, with KIND hole, slot, pocket, boss, edge, plane or unknown";
+    let wrong = || CliError::Usage(format!("--feature {text} is not {FORM}"));
+    let (name, numbers) = text.split_once('@').ok_or_else(wrong)?;
+    let kind = Kind::ALL.into_iter().find(|kind| kind.name() == name);
+    let metre = |mm: &str| mm.parse().ok().filter(|mm: &f64| mm.is_finite()).map(|mm| mm / 1e3);
+    let metres = numbers.split(',').map(metre).collect::<Option<Vec<f64>>>().ok_or_else(wrong)?;
+    match metres[..] {
+        _ if kind.is_none() && name != "unknown" => Err(wrong()),
+        [x, y, z] => Ok(Flag { id, kind, place: Point3::new(x, y, z), radius }),
+        [x, y, z, radius] if radius > 0.0 => Ok(Flag { id, kind, place: Point3::new(x, y, z), radius }),
+        _ => Err(wrong()),
+    }
+}
+
+/// Where a file goes, for what is told at the end.
+pub(super) fn told_files(out: &Path) -> Vec<PathBuf> {
+    ["plan.png", "touches.png", "probed.json"].map(|name| out.join(name)).to_vec()
+}

@@ -1,0 +1,123 @@
+//! Pictures of the way that an arm would go, and of the touches that it made.
+
+use std::path::Path;
+
+use nalgebra::{Point3, Vector3};
+
+use crate::cli::CliError;
+use crate::compare::{Drawing, Panel, PictureParams, Rgb, draw_picture};
+use crate::io::png::write_png;
+use crate::mesh::TriMesh;
+use crate::probe::{Flag, Plan, Probed};
+
+const PART: Rgb = [206, 209, 214];
+const FLAG: Rgb = [214, 40, 40];
+const WAY: Rgb = [120, 150, 205];
+const SEARCH: Rgb = [28, 78, 160];
+const HELD_BACK: Rgb = [150, 40, 150];
+const FELT: Rgb = [20, 130, 60];
+const MISS: Rgb = [28, 78, 160];
+const REFUSED: Rgb = [230, 140, 20];
+/// Lines and places, over the diagonal of the part.
+const LINE: f64 = 0.0012;
+const PLACE: f64 = 0.005;
+/// A flag is a pin of this height, over the same.
+const PIN: f64 = 0.13;
+/// From where it is seen.
+const FROM: [f64; 3] = [-0.45, -0.75, 1.0];
+const WIDTH: u32 = 1600;
+
+fn diagonal(mesh: &TriMesh) -> f64 {
+    let [low, high] = mesh.bounds();
+    (high - low).norm()
+}
+
+fn write(panels: &[(Drawing, &str, String)], title: &str, legend: &[(Rgb, &str)], path: &Path) -> Result<(), CliError> {
+    let mut drawn = Vec::new();
+    for (drawing, title, note) in panels {
+        let (mesh, paint) = drawing.clone().finish()?;
+        drawn.push((mesh, paint, *title, note.as_str()));
+    }
+    let panels: Vec<Panel<'_>> = drawn
+        .iter()
+        .map(|(mesh, paint, title, note)| Panel {
+            mesh,
+            deviations: &[],
+            classes: None,
+            paint: Some(paint),
+            title,
+            note,
+        })
+        .collect();
+    let params =
+        PictureParams { title, width: WIDTH, range: 1e-3, from: Some(Vector3::from(FROM)), weights: None, legend };
+    let picture = draw_picture(&panels, &params);
+    write_png(path, picture.size, &picture.pixels).map_err(|source| CliError::Write { path: path.to_owned(), source })
+}
+
+fn flagged(drawing: &mut Drawing, flags: &[Flag], size: f64) {
+    for flag in flags {
+        let head = flag.place + Vector3::z() * (PIN * size);
+        drawing.line(&flag.place, &head, 2.0 * LINE * size, FLAG);
+        drawing.place(&head, 2.0 * PLACE * size, FLAG);
+    }
+}
+
+/// The scan with the way that the arm would go.
+pub(super) fn draw_plan(scan: &TriMesh, plans: &[Plan], flags: &[Flag], path: &Path) -> Result<(), CliError> {
+    let size = diagonal(scan);
+    let mut drawing = Drawing::of(scan, PART);
+    for plan in plans {
+        for pair in plan.path.windows(2) {
+            drawing.line(&pair[0], &pair[1], LINE * size, WAY);
+        }
+        for (number, wish) in plan.wishes.iter().enumerate() {
+            let is_held_back = plan.held_back.iter().any(|(at, _)| *at == number);
+            let colour = if is_held_back { HELD_BACK } else { SEARCH };
+            let end: Point3<f64> = wish.from + wish.direction.into_inner() * wish.search;
+            drawing.line(&wish.from, &end, LINE * size, colour);
+        }
+    }
+    flagged(&mut drawing, flags, size);
+    let touches: usize = plans.iter().map(|plan| plan.wishes.len()).sum();
+    let note = format!("{touches} touches if the part is as the scan has it");
+    let legend = [
+        (FLAG, "flag"),
+        (WAY, "way through free air"),
+        (SEARCH, "search for the surface"),
+        (HELD_BACK, "cannot be reached"),
+    ];
+    write(&[(drawing, "the scan", note)], "what the arm would do", &legend, path)
+}
+
+/// The refined mesh with the touches that were made.
+pub(super) fn draw_touches(mesh: &TriMesh, probed: &[Probed], flags: &[Flag], path: &Path) -> Result<(), CliError> {
+    let size = diagonal(mesh);
+    let mut drawing = Drawing::of(mesh, PART);
+    let (mut felt, mut missed, mut refused) = (0, 0, 0);
+    for touch in probed.iter().flat_map(|one| &one.touches) {
+        let along = touch.wish.direction.into_inner();
+        let (end, colour) = match (&touch.centre, &touch.refused) {
+            (Some(centre), None) => (*centre, FELT),
+            (_, Some(_)) => (touch.wish.from, REFUSED),
+            (None, None) => (touch.wish.from + along * touch.wish.search, MISS),
+        };
+        match colour {
+            FELT => felt += 1,
+            MISS => missed += 1,
+            _ => refused += 1,
+        }
+        drawing.line(&touch.wish.from, &end, LINE * size, colour);
+        drawing.place(&end, 0.5 * PLACE * size, colour);
+    }
+    for probed in probed.iter().flat_map(|one| &one.slides) {
+        let reached = probed.record.as_ref().map_or(0, |record| record.reached);
+        for pair in probed.slide.stations[..=reached].windows(2) {
+            drawing.line(&pair[0].centre, &pair[1].centre, LINE * size, FELT);
+        }
+    }
+    flagged(&mut drawing, flags, size);
+    let note = format!("{felt} touches felt the part, {missed} missed it, {refused} do not count");
+    let legend = [(FLAG, "flag"), (FELT, "felt"), (MISS, "nothing there"), (REFUSED, "does not count")];
+    write(&[(drawing, "the refined mesh", note)], "what the arm touched", &legend, path)
+}

@@ -1,0 +1,125 @@
+//! The mesh that follows while an arm probes.
+
+use std::sync::Arc;
+
+use nalgebra::Point3;
+
+use crate::cli::CliError;
+use crate::cli::progress::Progress as Bar;
+use crate::live::{LiveError, LiveRefiner, Pace};
+use crate::mesh::{FaceHit, FaceTree, TriMesh};
+use crate::patch::Patcher;
+use crate::probe::{Cell, Progress, World};
+use crate::refine::{RefineError, Refiner};
+use crate::robot::{ArmState, Witness};
+use crate::scene::Scene;
+use crate::touch::{Message, Sample, StampedPose, StampedWrench, Wrench, WrenchFrame};
+
+/// Room for new faces that is made ahead.
+const ROOM: usize = 1 << 16;
+
+/// The mesh is wanted as it is now before each touch, and nobody looks at it in between: a renewal each 200 ms, ns.
+const EVERY_NS: i64 = 200_000_000;
+
+/// Takes each state of the arm for a sample, and keeps it.
+pub(super) struct LiveWorld<'a> {
+    engine: Engine,
+    cell: &'a Cell,
+    messages: Vec<Message>,
+    failed: Option<LiveError>,
+    bar: Bar,
+}
+
+/// With or without a patch.
+enum Engine {
+    Alone(Box<Refiner>),
+    Live(Box<LiveRefiner>),
+}
+
+impl<'a> LiveWorld<'a> {
+    pub fn new(
+        scan: Arc<(TriMesh, FaceTree)>,
+        scene: &Scene,
+        cell: &'a Cell,
+        is_simulated: bool,
+    ) -> Result<Self, CliError> {
+        let nothing = || CliError::Usage("the scene names no `refine`, so nothing would move the mesh".to_owned());
+        let params = scene.refine_params(WrenchFrame::Sensor).ok_or_else(nothing)?;
+        let refiner = Refiner::new(scan.0.clone(), params)?;
+        let engine = match scene.patcher_params(WrenchFrame::Sensor) {
+            None => Engine::Alone(Box::new(refiner)),
+            Some(patcher) => {
+                let patcher = Patcher::new(patcher).map_err(RefineError::from)?;
+                // what a simulated arm is told does not depend on how fast this computer is; one that exists goes on meanwhile
+                let pace = Pace { is_patient: is_simulated, every_ns: EVERY_NS, ..Pace::default() };
+                Engine::Live(Box::new(LiveRefiner::new(scan, refiner, patcher, pace, ROOM)?))
+            }
+        };
+        Ok(Self { engine, cell, messages: Vec::new(), failed: None, bar: Bar::new("probe", None) })
+    }
+
+    fn refiner(&self) -> &Refiner {
+        match &self.engine {
+            Engine::Alone(refiner) => refiner,
+            Engine::Live(live) => live.refiner(),
+        }
+    }
+
+    /// All that was felt.
+    pub fn finish(self) -> Result<Vec<Message>, CliError> {
+        match self.failed {
+            Some(error) => Err(error.into()),
+            None => Ok(self.messages),
+        }
+    }
+}
+
+impl Witness for LiveWorld<'_> {
+    fn see(&mut self, state: &ArmState) {
+        self.bar.step();
+        let turned = |v| state.pose_bt.rotation.inverse() * v;
+        // in the axes of the probe, as its sensor would have it
+        let wrench = Wrench { force: turned(state.wrench_b.force), torque: turned(state.wrench_b.torque) };
+        let (stamp_ns, pose_ot) = (state.stamp_ns, self.cell.pose_bo.inverse() * state.pose_bt);
+        if self.messages.last().is_some_and(|last| last.stamp_ns() >= stamp_ns) {
+            return;
+        }
+        // recorded where the arm has it: the scene says where the part is
+        self.messages.push(Message::Pose(StampedPose { stamp_ns, pose_ot: state.pose_bt }));
+        self.messages.push(Message::Wrench(StampedWrench { stamp_ns, wrench }));
+        let sample = Sample { stamp_ns, pose_ot, wrench };
+        let pushed = match &mut self.engine {
+            Engine::Alone(refiner) => refiner.push(&sample).map(drop).map_err(LiveError::from),
+            Engine::Live(live) => live.push(&sample).map(drop),
+        };
+        match pushed {
+            Ok(()) | Err(LiveError::Refine(_)) => {}
+            Err(error) => self.failed = Some(error),
+        }
+    }
+
+    fn is_cancelled(&self) -> bool {
+        self.failed.is_some()
+    }
+}
+
+impl World for LiveWorld<'_> {
+    fn mesh(&self) -> &TriMesh {
+        self.refiner().mesh()
+    }
+
+    fn closest_face(&self, place: &Point3<f64>, reach: f64) -> Option<FaceHit> {
+        self.refiner().closest_face(place, reach)
+    }
+
+    fn tell(&mut self, progress: &Progress) {
+        let uncertainty_um = progress.uncertainty.map(|sigma| sigma * 1e6);
+        tracing::debug!(
+            feature = progress.flag,
+            touch = progress.touch,
+            of = progress.budget,
+            uncertainty_um,
+            "touching"
+        );
+    }
+}

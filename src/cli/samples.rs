@@ -1,0 +1,197 @@
+//! A recording from its first message to its last, as messages or as samples.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::path::Path;
+
+use super::progress::Progress;
+use super::{CliError, Losses};
+use crate::io::recording::{Record, RecordingError, RecordingReader, Topics};
+use crate::scene::Scene;
+use crate::touch::{MarkerCounts, MarkerFilter, Message, Placement, Sample, SyncParams, Synchroniser, WrenchFrame};
+
+/// Reasons that are gaps in the recording itself; every other one is a message lost on the way.
+const NOT_A_LOSS: [&str; 4] = ["gap", "no_pose_before", "no_pose_after", "duplicate"];
+
+/// What a replay found besides its samples.
+#[derive(Debug, Default)]
+pub struct Replayed {
+    /// Wrenches of the recording: each could have been a sample.
+    pub wrenches: u64,
+    /// Wrenches that became none, by reason; reasons of lost poses begin with `pose_`.
+    pub refused: BTreeMap<String, u64>,
+    /// What a better recording would not lack.
+    pub losses: Losses,
+    /// What became of the markers, where they tell the pose.
+    pub markers: Option<MarkerCounts>,
+}
+
+/// Messages that are kept at most while the frames are looked for: a minute of both topics, 20 MB; 60 MB with markers.
+const MOST_AHEAD: usize = 100_000;
+
+/// A recording that has been read until the frames of both topics are known, and keeps what it has read.
+pub struct Recording {
+    reader: RecordingReader,
+    ahead: VecDeque<Result<Record, RecordingError>>,
+    /// In which axes the wrenches are: a header that names the frame of the pose means O, any other the stylus' own.
+    pub wrench_frame: WrenchFrame,
+}
+
+impl Recording {
+    /// Opens a recording and reads up to the first message of both topics; one that has only one of them is told by the
+    /// replay.
+    ///
+    /// # Errors
+    /// [`RecordingError`] of opening it.
+    pub fn open(path: &Path, topics: &Topics) -> Result<Self, RecordingError> {
+        let mut reader = RecordingReader::open(path, topics)?;
+        let mut ahead = VecDeque::new();
+        while !knows_frames(&reader) && ahead.len() < MOST_AHEAD {
+            let Some(record) = reader.next_record() else { break };
+            ahead.push_back(record);
+        }
+        let wrench_frame =
+            if ahead.len() < MOST_AHEAD { wrench_frame(&reader) } else { find_wrench_frame(path, topics)? };
+        Ok(Self { reader, ahead, wrench_frame })
+    }
+
+    fn next(&mut self) -> Option<Result<Record, RecordingError>> {
+        self.ahead.pop_front().or_else(|| self.reader.next_record())
+    }
+}
+
+fn knows_frames(reader: &RecordingReader) -> bool {
+    reader.pose_frame().is_some() && reader.wrench_frame().is_some()
+}
+
+fn wrench_frame(reader: &RecordingReader) -> WrenchFrame {
+    if reader.wrench_frame() == reader.pose_frame() { WrenchFrame::Object } else { WrenchFrame::Sensor }
+}
+
+/// Where one topic begins long after the other: by a reader of its own, which keeps nothing.
+fn find_wrench_frame(path: &Path, topics: &Topics) -> Result<WrenchFrame, RecordingError> {
+    let mut reader = RecordingReader::open(path, topics)?;
+    while !knows_frames(&reader) && reader.next_record().is_some() {}
+    Ok(wrench_frame(&reader))
+}
+
+const NO_MARKERS: &str = "--markers-topic needs a scene that says where the markers sit: add `markers:` to it";
+
+/// What makes poses of markers, when the recording has those on `topic`.
+///
+/// # Errors
+/// [`CliError::Usage`] when the scene does not say where they sit.
+pub fn marker_filter(scene: &Scene, topic: Option<&str>) -> Result<Option<MarkerFilter>, CliError> {
+    if topic.is_none() {
+        return Ok(None);
+    }
+    let filter = scene.marker_filter().map_err(|error| CliError::Usage(error.to_string()))?;
+    filter.map(Some).ok_or_else(|| CliError::Usage(NO_MARKERS.to_owned()))
+}
+
+/// Gives each message of `recording` to `each`, in its order.
+///
+/// - `markers`: makes the poses of a recording that holds markers.
+///
+/// # Errors
+/// [`CliError::ReadRecording`] when the recording is damaged before its first message; later damage is a loss.
+pub fn each_message(
+    mut recording: Recording,
+    mut markers: Option<MarkerFilter>,
+    mut each: impl FnMut(Message),
+) -> Result<Replayed, CliError> {
+    let mut replayed = Replayed::default();
+    let mut progress = Progress::new("replay", recording.reader.message_count());
+    let mut has_begun = false;
+    while let Some(record) = recording.next() {
+        match record {
+            Ok(Record::Message(message)) => {
+                replayed.wrenches += u64::from(matches!(message, Message::Wrench(_)));
+                each(message);
+            }
+            Ok(Record::Markers(frame)) => {
+                if let Some(filter) = &mut markers {
+                    filter.push(&frame, |pose| each(Message::Pose(pose)));
+                }
+            }
+            Err(damage) if !has_begun => return Err(CliError::ReadRecording(damage)),
+            Err(damage) => replayed.losses.push(damage.to_string()),
+        }
+        has_begun = true;
+        progress.step();
+    }
+    if let Some(filter) = &mut markers {
+        filter.finish(|pose| each(Message::Pose(pose)));
+        replayed.account_markers(filter);
+    }
+    replayed.account_reader(&recording.reader);
+    Ok(replayed)
+}
+
+/// Gives each sample of `recording` to `each`, in order of time.
+///
+/// - `placement`: brings each message into the frames of the scene.
+/// - `markers`: makes the poses of a recording that holds markers.
+///
+/// # Errors
+/// As [`each_message`].
+pub fn each_sample(
+    recording: Recording,
+    placement: Option<Placement>,
+    sync: SyncParams,
+    markers: Option<MarkerFilter>,
+    mut each: impl FnMut(&Sample),
+) -> Result<Replayed, CliError> {
+    let mut sync = Synchroniser::new(sync)?;
+    placement.iter().try_for_each(Placement::check)?;
+    let wrench_frame = recording.wrench_frame;
+    let mut replayed = each_message(recording, markers, |message| {
+        sync.push(placement.map_or(message, |placement| placement.place(message, wrench_frame)));
+        std::iter::from_fn(|| sync.next_sample()).for_each(|sample| each(&sample));
+    })?;
+    sync.finish();
+    std::iter::from_fn(|| sync.next_sample()).for_each(|sample| each(&sample));
+    replayed.account_sync(&sync);
+    Ok(replayed)
+}
+
+impl Replayed {
+    /// Takes over what the filter of the markers dropped.
+    fn account_markers(&mut self, filter: &MarkerFilter) {
+        for (reason, count) in filter.frame_counts().reasons().into_iter().filter(|(_, count)| *count > 0) {
+            if !NOT_A_LOSS.contains(&reason) {
+                self.losses.push(format!("{count} marker frames {reason}"));
+            }
+            self.refused.insert(format!("markers_{reason}"), count);
+        }
+        self.markers = Some(*filter.counts());
+    }
+
+    /// Takes over what the synchroniser dropped.
+    fn account_sync(&mut self, sync: &Synchroniser) {
+        let of_wrenches = sync.counts().reasons().map(|(reason, count)| (reason, reason.to_owned(), count));
+        let of_poses = sync.pose_counts().reasons().map(|(reason, count)| (reason, format!("pose_{reason}"), count));
+        for (reason, name, count) in of_wrenches.into_iter().chain(of_poses).filter(|(.., count)| *count > 0) {
+            if !NOT_A_LOSS.contains(&reason) {
+                self.losses.push(format!("{count} messages {name}"));
+            }
+            self.refused.insert(name, count);
+        }
+    }
+
+    /// Takes over what the reader left out.
+    fn account_reader(&mut self, recording: &RecordingReader) {
+        for (reason, bad) in recording.bad_messages() {
+            let (path, place, count) = (bad.path.display(), &bad.place, bad.poses + bad.wrenches);
+            self.losses.push(format!("{count} messages {reason}, the first in {path} at {place}"));
+            self.wrenches += bad.wrenches;
+            for (name, count) in [(reason.name().to_owned(), bad.wrenches), (format!("pose_{reason}"), bad.poses)] {
+                if count > 0 {
+                    *self.refused.entry(name).or_default() += count;
+                }
+            }
+        }
+        if recording.truncated() {
+            self.losses.push("the recording has lost its end; what is there was read".to_owned());
+        }
+    }
+}

@@ -1,0 +1,34 @@
+//! `touchup ur`: what a UR arm needs on this machine.
+
+use std::path::PathBuf;
+
+use clap::Subcommand;
+
+use super::{CliError, Losses, tell};
+use crate::robot::ur::{child, setup};
+
+#[derive(Debug, Subcommand)]
+pub(super) enum UrArguments {
+    /// Makes a virtual environment with ur-rtde and prints the folder that the parameter site_packages has to name
+    Setup {
+        /// Folder of the environment
+        folder: PathBuf,
+        /// Interpreter to make it with [default: that of the version touchup was built with]
+        #[arg(long)]
+        python: Option<String>,
+    },
+    /// Speaks to an arm; started by touchup itself
+    #[command(hide = true)]
+    Child,
+}
+
+pub(super) fn ur(arguments: &UrArguments) -> Result<Losses, CliError> {
+    match arguments {
+        UrArguments::Setup { folder, python } => {
+            let site_packages = setup(folder, python.as_deref())?;
+            tell(&format!("site_packages: {}", site_packages.display()));
+        }
+        UrArguments::Child => child::run()?,
+    }
+    Ok(Losses::new())
+}

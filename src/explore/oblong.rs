@@ -1,0 +1,143 @@
+//! The slot through few touches: where the ball's centre was stopped lies at one distance from a segment.
+
+use nalgebra::{Matrix5, Point2, Vector2, Vector5};
+
+/// All points at a distance from a segment of a plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Oblong {
+    /// of the segment, m
+    pub middle: Point2<f64>,
+    /// of the segment, from x, rad
+    pub angle: f64,
+    /// half its length, m
+    pub half: f64,
+    /// distance from it, m
+    pub radius: f64,
+}
+
+/// Directions that are tried as first guesses.
+const WAYS: usize = 24;
+/// Half lengths that are tried as first guesses, over the farthest point.
+const HALVES: [f64; 4] = [0.3, 0.6, 0.9, 1.2];
+/// Places that are free may be this much beyond it, m.
+const BESIDE: f64 = 0.2e-3;
+/// Where along it the place is that the ball fell in, over its half length.
+const SHIFTS: [f64; 3] = [-0.9, 0.0, 0.9];
+/// Steps of a fit.
+const STEPS: usize = 60;
+/// What no touch tells stays where it is: weight of the guess against one touch.
+const HELD: f64 = 1e-9;
+
+impl Oblong {
+    /// Unit vector along it.
+    pub fn along(&self) -> Vector2<f64> {
+        Vector2::new(self.angle.cos(), self.angle.sin())
+    }
+
+    /// How far a point is from where it should be, m, and the derivatives by middle, angle, half length and radius.
+    fn residual(&self, p: &Point2<f64>) -> (f64, Vector5<f64>) {
+        let (u, v) = (p - self.middle, self.along());
+        let w = Vector2::new(-v.y, v.x);
+        let (x, y) = (u.dot(&v), u.dot(&w));
+        let beyond = (x.abs() - self.half).max(0.0).copysign(x);
+        let distance = beyond.hypot(y);
+        let n = if distance > 0.0 { Vector2::new(beyond, y) / distance } else { Vector2::y() };
+        let by_middle = -(v * n.x + w * n.y);
+        // turning the segment by a moves the point to (x + a y, y − a x) of its axes
+        let by_angle = n.x * y - n.y * x;
+        (distance - self.radius, Vector5::new(by_middle.x, by_middle.y, by_angle, -n.x.abs(), -1.0))
+    }
+
+    fn rms(&self, points: &[Point2<f64>]) -> f64 {
+        (points.iter().map(|p| self.residual(p).0.powi(2)).sum::<f64>() / points.len().max(1) as f64).sqrt()
+    }
+
+    /// By least squares from a first guess \[Levenberg 1944, Marquardt 1963\].
+    pub fn fitted(mut self, points: &[Point2<f64>]) -> Self {
+        let scale = points.iter().map(|p| (p - self.middle).norm()).fold(1e-6, f64::max);
+        // in units of the size, an angle is as large as a length
+        let units = Vector5::new(scale, scale, 1.0, scale, scale);
+        let mut damping = 1e-3;
+        for _ in 0..STEPS {
+            let (mut square, mut right) = (Matrix5::identity() * (HELD + damping), Vector5::zeros());
+            for p in points {
+                let (r, by) = self.residual(p);
+                let g = by.component_mul(&units) / scale;
+                square += g * g.transpose();
+                right -= g * (r / scale);
+            }
+            let Some(solved) = square.cholesky() else { break };
+            let step = solved.solve(&right).component_mul(&units);
+            let next = Self {
+                middle: self.middle + step.fixed_rows::<2>(0),
+                angle: self.angle + step[2],
+                half: (self.half + step[3]).max(0.0),
+                radius: (self.radius + step[4]).abs(),
+            };
+            if next.rms(points) < self.rms(points) {
+                (self, damping) = (next, damping * 0.2);
+            } else {
+                damping *= 5.0;
+            }
+        }
+        self
+    }
+
+    /// The best one through points around a place, whatever way it runs, among those with the free places inside.
+    pub fn through(points: &[Point2<f64>], free: &[Point2<f64>], place: &Point2<f64>) -> Option<Self> {
+        let distance = |p: &Point2<f64>| (p - place).norm();
+        let near = points.iter().map(distance).fold(f64::INFINITY, f64::min);
+        let far = points.iter().chain(free).map(distance).fold(0.0, f64::max);
+        // a point beside the segment tells nothing of its ends: one of them has to be near where it really is
+        let guess = |angle: f64, half: f64, shift: f64| {
+            let way = Vector2::new(angle.cos(), angle.sin());
+            Self { middle: place + way * (shift * half), angle, half, radius: near }
+        };
+        let angles = (0..WAYS).map(|way| way as f64 / WAYS as f64 * std::f64::consts::PI);
+        let sized = angles.flat_map(|angle| HALVES.map(|half| (angle, half * far)));
+        let guesses = sized.flat_map(|(angle, half)| SHIFTS.map(|shift| guess(angle, half, shift)));
+        let beside = |fit: &Self| free.iter().filter(|p| fit.residual(p).0 > BESIDE).count();
+        let fits = guesses.map(|guess| guess.fitted(points)).map(|fit| (beside(&fit), fit.rms(points), fit));
+        fits.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))).map(|(.., fit)| fit)
+    }
+
+    /// The same, with its direction as that of another rather than against it.
+    pub fn along_as(self, other: &Self) -> Self {
+        let turn = if self.along().dot(&other.along()) < 0.0 { std::f64::consts::PI } else { 0.0 };
+        Self { angle: self.angle + turn, ..self }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Places of a slot from (−9, 0) to (5, 0) with a distance of 1.5 around its segment, by hand.
+    #[test]
+    fn eight_touches_tell_a_slot() {
+        let points =
+            [[6.5, 0.0], [4.0, 1.5], [0.0, 1.5], [-3.0, 1.5], [-10.5, 0.0], [-2.0, -1.5], [0.0, -1.5], [2.0, -1.5]];
+        let turn = nalgebra::Rotation2::new(0.7);
+        let points = points.map(|p| {
+            let p = turn * Point2::new(p[0] * 1e-3, p[1] * 1e-3);
+            Point2::from(p.coords)
+        });
+        let found = Oblong::through(&points, &[], &Point2::origin()).unwrap();
+        let middle = turn * Point2::new(-2e-3, 0.0);
+        assert!((found.middle - middle).norm() < 1e-8, "{found:?}");
+        assert!((found.half - 7e-3).abs() < 1e-8 && (found.radius - 1.5e-3).abs() < 1e-8, "{found:?}");
+        assert!((found.along().perp(&Vector2::new(0.7f64.cos(), 0.7f64.sin()))).abs() < 1e-6, "{found:?}");
+    }
+
+    /// Near one end, seven touches leave open which way a slot of 20 × 6 runs; where the ball went freely tells.
+    #[test]
+    fn a_free_place_tells_which_way_a_slot_runs() {
+        // the ball's centre 0.35 mm before the centre of the right end, as if by hand
+        let points = [[1.15, 0.0], [0.85, 1.08], [0.0, 1.46], [-1.5, 1.5], [-1.5, -1.5], [0.0, -1.46], [0.85, -1.08]];
+        let points = points.map(|[x, y]| Point2::new(x * 1e-3, y * 1e-3));
+        let free = [Point2::new(-12e-3, 0.0)];
+        let found = Oblong::through(&points, &free, &Point2::origin()).unwrap();
+        assert!(found.along().y.abs() < 0.05 && (found.radius - 1.5e-3).abs() < 0.1e-3, "{found:?}");
+        assert!(found.half > 5e-3, "{found:?}");
+    }
+}

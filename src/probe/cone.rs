@@ -1,0 +1,43 @@
+//! Orientations of a probe that leans to all sides of where it was at first.
+
+use nalgebra::{Unit, UnitQuaternion, Vector3};
+
+/// How far the shaft leans from where it was at first, rad, and towards where about it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Orientation {
+    /// from 0 to 60°
+    pub lean: f64,
+    /// from x towards y of the tip at first
+    pub towards: f64,
+}
+
+/// An orientation that the arm does not get to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NotReached {
+    /// which
+    pub orientation: Orientation,
+    /// in words
+    pub why: String,
+}
+
+impl std::fmt::Display for NotReached {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Orientation { lean, towards } = self.orientation;
+        write!(f, "{:.0}° towards {:.0}°: {}", lean.to_degrees(), towards.to_degrees(), self.why)
+    }
+}
+
+/// Orientations of some leans (°), each with so many around it.
+pub(super) fn rings<const N: usize>(rings: [(f64, usize); N]) -> impl Iterator<Item = Orientation> {
+    rings.into_iter().flat_map(|(lean_deg, count)| {
+        let towards = move |at: usize| std::f64::consts::TAU * at as f64 / count as f64;
+        (0..count).map(move |at| Orientation { lean: lean_deg.to_radians(), towards: towards(at) })
+    })
+}
+
+/// The shaft leans to one side, without turning about itself.
+pub(super) fn leaned(rotation: &UnitQuaternion<f64>, orientation: &Orientation) -> UnitQuaternion<f64> {
+    let (sin, cos) = orientation.towards.sin_cos();
+    let axis = Unit::new_unchecked(Vector3::new(-sin, cos, 0.0));
+    rotation * UnitQuaternion::from_axis_angle(&axis, orientation.lean)
+}

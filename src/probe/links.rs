@@ -1,0 +1,230 @@
+//! Ways through free air that keep clear of the mesh.
+//!
+//! A way goes straight, or up, over and down at the lowest height at which all three keep clear. A straight line is clear when the
+//! ball, and the shaft above it, stay farther from the mesh than their radii and a margin: walked in steps of what is left, which
+//! misses nothing, as the distance changes no faster than the place.
+
+use nalgebra::{Point3, Unit, Vector3};
+
+/// What the arm holds, as far as it must keep clear.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tool {
+    /// of the ball, m
+    pub ball_radius: f64,
+    /// of the shaft, m
+    pub shaft_radius: f64,
+    /// how much of the shaft, and of the hand behind it, is looked at, m
+    pub shaft_length: f64,
+    /// of both, m: what the scan may be wrong by
+    pub margin: f64,
+}
+
+impl Default for Tool {
+    /// A probe of 3 mm on a shaft of 2 mm.
+    fn default() -> Self {
+        Self { ball_radius: 1.5e-3, shaft_radius: 1e-3, shaft_length: 60e-3, margin: 0.5e-3 }
+    }
+}
+
+/// Why there is no way.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum LinkError {
+    /// It would begin in the part.
+    #[error(
+        "the probe is in or at the mesh at ({:.1} {:.1} {:.1}) mm: bring it into free air by hand, where its sensor can be zeroed",
+        place_mm[0], place_mm[1], place_mm[2]
+    )]
+    InPart {
+        /// in O, mm
+        place_mm: [f64; 3],
+    },
+    /// No room to turn.
+    #[error(
+        "the probe cannot be turned by {angle_deg:.0}° near ({:.1} {:.1} {:.1}) mm and keep clear of the mesh: bring it farther away",
+        place_mm[0], place_mm[1], place_mm[2]
+    )]
+    NoTurn {
+        /// in O, mm
+        place_mm: [f64; 3],
+        /// °
+        angle_deg: f64,
+    },
+    /// Nothing is clear.
+    #[error(
+        "no way to ({:.1} {:.1} {:.1}) mm keeps {margin_mm:.1} mm clear of the mesh: turn the part, or probe it by hand",
+        place_mm[0], place_mm[1], place_mm[2]
+    )]
+    NoWay {
+        /// in O, mm
+        place_mm: [f64; 3],
+        /// mm
+        margin_mm: f64,
+    },
+}
+
+/// Heights that are tried between a straight line and one above all.
+const HEIGHTS: usize = 6;
+/// Least step along a line, m.
+const LEAST_STEP: f64 = 20e-6;
+
+impl Tool {
+    /// At most as much room as there is around the tool at a place, m; negative: it is in the mesh, or nearer than the margin, and
+    /// how deep is not told.
+    ///
+    /// - `reach`: no more room than that is looked for, m; `shaft`: from the ball to the hand; `distance`: of a place from the mesh, as far as a reach.
+    pub fn room(
+        &self,
+        centre: &Point3<f64>,
+        shaft: &Unit<Vector3<f64>>,
+        distance: &dyn Fn(&Point3<f64>, f64) -> f64,
+        reach: f64,
+    ) -> f64 {
+        let reach = reach.max(LEAST_STEP);
+        let around = |p: &Point3<f64>, radius: f64| distance(p, radius + self.margin + reach) - radius - self.margin;
+        let mut room = around(centre, self.ball_radius);
+        // balls of a little more than the shaft's radius hide all of it
+        let spacing = self.shaft_radius;
+        let radius = self.shaft_radius * 1.25f64.sqrt();
+        let count = (self.shaft_length / spacing).ceil() as usize;
+        let mut at = 1;
+        while at <= count && room >= 0.0 {
+            let here = around(&(centre + shaft.into_inner() * (at as f64 * spacing)), radius);
+            // those within half of the room here have the other half at the least
+            let skipped = (here / 2.0 / spacing).max(0.0) as usize;
+            room = room.min(if skipped > 0 { here / 2.0 } else { here });
+            at += 1 + skipped;
+        }
+        room
+    }
+
+    /// Whether a straight line is clear.
+    fn is_clear(
+        &self,
+        from: &Point3<f64>,
+        to: &Point3<f64>,
+        shaft: &Unit<Vector3<f64>>,
+        distance: &dyn Fn(&Point3<f64>, f64) -> f64,
+    ) -> bool {
+        let length = (to - from).norm();
+        let way = (to - from).try_normalize(0.0).unwrap_or_else(Vector3::zeros);
+        let mut gone = 0.0;
+        loop {
+            let room = self.room(&(from + way * gone), shaft, distance, length - gone);
+            if room < 0.0 {
+                return false;
+            }
+            if gone >= length {
+                return true;
+            }
+            gone = (gone + room.max(LEAST_STEP)).min(length);
+        }
+    }
+}
+
+/// Least step of a turn, rad: by it the far end of a shaft of 60 mm moves by 0.06 mm.
+const LEAST_TURN: f64 = 1e-3;
+
+impl Tool {
+    /// Whether the tool keeps clear while it turns about the ball.
+    ///
+    /// - `angle`: of the turn, rad; `shaft`: after a share of it.
+    fn can_turn(
+        &self,
+        centre: &Point3<f64>,
+        angle: f64,
+        shaft: &dyn Fn(f64) -> Unit<Vector3<f64>>,
+        distance: &dyn Fn(&Point3<f64>, f64) -> f64,
+    ) -> bool {
+        let length = self.shaft_length + self.shaft_radius;
+        let mut turned = 0.0;
+        loop {
+            // nothing of it moves farther than its far end
+            let room = self.room(centre, &shaft(turned / angle), distance, length * (angle - turned));
+            if room < 0.0 {
+                return false;
+            }
+            if turned >= angle {
+                return true;
+            }
+            turned = (turned + (room / length).max(LEAST_TURN)).min(angle);
+        }
+    }
+}
+
+/// The place where a tool can turn about its ball and keeps clear: where it is, or as little as can be out along its shaft.
+///
+/// - `angle`: of the turn, rad; `shaft`: after a share of it, from the ball to the hand.
+///
+/// # Errors
+/// [`LinkError::NoTurn`].
+pub fn turning_place(
+    tool: &Tool,
+    from: &Point3<f64>,
+    angle: f64,
+    shaft: &dyn Fn(f64) -> Unit<Vector3<f64>>,
+    distance: &dyn Fn(&Point3<f64>, f64) -> f64,
+) -> Result<Point3<f64>, LinkError> {
+    let out = shaft(0.0);
+    let places = (0..TURN_PLACES).map(|times| from + out.into_inner() * (TURN_RAISE * times as f64));
+    let is_free = |place: &Point3<f64>| tool.is_clear(from, place, &out, distance);
+    let no_turn = LinkError::NoTurn { place_mm: (from * 1e3).coords.into(), angle_deg: angle.to_degrees() };
+    let mut reached = places.take_while(is_free);
+    reached.find(|place| tool.can_turn(place, angle, shaft, distance)).ok_or(no_turn)
+}
+
+/// Where it cannot turn it is tried this much farther out, m …
+const TURN_RAISE: f64 = 5e-3;
+/// … at so many places.
+const TURN_PLACES: usize = 20;
+
+/// An entry that is not clear is raised by this, m …
+const RAISE: f64 = 2e-3;
+/// … so often at most.
+const RAISES: usize = 30;
+
+/// The place at or above an entry that is clear: from there on down nothing is fast.
+///
+/// # Errors
+/// [`LinkError::NoWay`].
+pub(super) fn clear_entry(
+    tool: &Tool,
+    entry: &Point3<f64>,
+    shaft: &Unit<Vector3<f64>>,
+    distance: &dyn Fn(&Point3<f64>, f64) -> f64,
+) -> Result<Point3<f64>, LinkError> {
+    let mut raised = (0..RAISES).map(|times| entry + shaft.into_inner() * (RAISE * times as f64));
+    let no_way = LinkError::NoWay { place_mm: (entry * 1e3).coords.into(), margin_mm: tool.margin * 1e3 };
+    raised.find(|entry| tool.room(entry, shaft, distance, 0.0) >= 0.0).ok_or(no_way)
+}
+
+/// The places that a tool goes through from one place to another, without the first; both are in free air.
+///
+/// - `shaft`: from the ball to the hand: up is along it; `highest`: of the mesh along it, m from the origin of O.
+///
+/// # Errors
+/// [`LinkError::NoWay`].
+pub fn way(
+    tool: &Tool,
+    from: &Point3<f64>,
+    to: &Point3<f64>,
+    shaft: &Unit<Vector3<f64>>,
+    highest: f64,
+    distance: &dyn Fn(&Point3<f64>, f64) -> f64,
+) -> Result<Vec<Point3<f64>>, LinkError> {
+    if tool.is_clear(from, to, shaft, distance) {
+        return Ok(vec![*to]);
+    }
+    let height = |p: &Point3<f64>| p.coords.dot(shaft);
+    let lowest = height(from).max(height(to));
+    // above all: the ball clears the highest place
+    let top = (highest + tool.ball_radius + 2.0 * tool.margin).max(lowest);
+    let lifted = |p: &Point3<f64>, to: f64| p + shaft.into_inner() * (to - height(p));
+    for step in 1..=HEIGHTS {
+        let at = lowest + (top - lowest) * step as f64 / HEIGHTS as f64;
+        let places = [*from, lifted(from, at), lifted(to, at), *to];
+        if places.windows(2).all(|pair| tool.is_clear(&pair[0], &pair[1], shaft, distance)) {
+            return Ok(places[1..].to_vec());
+        }
+    }
+    Err(LinkError::NoWay { place_mm: (to * 1e3).coords.into(), margin_mm: tool.margin * 1e3 })
+}

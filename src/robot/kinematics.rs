@@ -1,0 +1,183 @@
+//! Where the flange of a six-axis UR arm is, and which joint angles bring it somewhere.
+//!
+//! T_B6 = Π A_i, A_i = Rz(θ_i) Tz(d_i) Tx(a_i) Rx(α_i), α = (π/2, 0, 0, π/2, −π/2, 0)      \[Denavit Hartenberg 1955\]
+//!
+//! Axes 2, 3 and 4 are parallel and the last three do not meet in a point, so the inverse goes through axis 1 (the wrist
+//! lies on a line at distance d₄ beside it), then 5 and 6, then the triangle of upper arm and forearm
+//! \[Hawkins 2013\].
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector3};
+
+/// Joint angles from the base to the wrist, rad.
+pub type Joints = [f64; 6];
+
+/// Lengths of an arm; those that the DH parameters of a UR do not name are zero.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UrGeometry {
+    /// m
+    pub d1: f64,
+    /// upper arm, m; negative, as the maker has it
+    pub a2: f64,
+    /// forearm, m; negative, as the maker has it
+    pub a3: f64,
+    /// m
+    pub d4: f64,
+    /// m
+    pub d5: f64,
+    /// m
+    pub d6: f64,
+}
+
+impl UrGeometry {
+    /// As the maker states them.
+    pub const UR3E: Self = Self { d1: 0.15185, a2: -0.24355, a3: -0.2132, d4: 0.13105, d5: 0.08535, d6: 0.0921 };
+    /// As the maker states them.
+    pub const UR5E: Self = Self { d1: 0.1625, a2: -0.425, a3: -0.3922, d4: 0.1333, d5: 0.0997, d6: 0.0996 };
+    /// As the maker states them.
+    pub const UR10E: Self = Self { d1: 0.1807, a2: -0.6127, a3: -0.57155, d4: 0.17415, d5: 0.11985, d6: 0.11655 };
+    /// As the maker states them.
+    pub const UR16E: Self = Self { d1: 0.1807, a2: -0.4784, a3: -0.36, d4: 0.17415, d5: 0.11985, d6: 0.11655 };
+
+    /// Of a model, by the name that `ur_type` has in ROS.
+    pub fn of(name: &str) -> Option<Self> {
+        match name {
+            "ur3e" => Some(Self::UR3E),
+            "ur5e" => Some(Self::UR5E),
+            "ur10e" => Some(Self::UR10E),
+            "ur16e" => Some(Self::UR16E),
+            _ => None,
+        }
+    }
+
+    fn links(&self) -> [(f64, f64, f64); 6] {
+        let Self { d1, a2, a3, d4, d5, d6 } = *self;
+        [
+            (d1, 0.0, FRAC_PI_2),
+            (0.0, a2, 0.0),
+            (0.0, a3, 0.0),
+            (d4, 0.0, FRAC_PI_2),
+            (d5, 0.0, -FRAC_PI_2),
+            (d6, 0.0, 0.0),
+        ]
+    }
+
+    /// Pose of the flange in the base B.
+    pub fn flange(&self, joints: &Joints) -> Isometry3<f64> {
+        self.links().iter().zip(joints).fold(Isometry3::identity(), |pose, (link, angle)| pose * step(link, *angle))
+    }
+
+    /// Velocity of the flange by those of the joints: three rows of m/s, three of rad/s, in B.
+    pub fn jacobian(&self, joints: &Joints) -> Matrix6<f64> {
+        let end = self.flange(joints).translation.vector;
+        let (mut jacobian, mut pose) = (Matrix6::zeros(), Isometry3::identity());
+        for (column, (link, angle)) in self.links().iter().zip(joints).enumerate() {
+            let axis = pose.rotation * Vector3::z();
+            let linear = axis.cross(&(end - pose.translation.vector));
+            jacobian.fixed_view_mut::<3, 1>(0, column).copy_from(&linear);
+            jacobian.fixed_view_mut::<3, 1>(3, column).copy_from(&axis);
+            pose *= step(link, *angle);
+        }
+        jacobian
+    }
+
+    /// How far the arm is from where it cannot move some way: the smallest singular value of its Jacobian, with lengths in
+    /// units of upper arm and forearm together. Zero where it is stretched, where the hand is above the shoulder, and where
+    /// axes 4 and 6 are parallel.
+    pub fn dexterity(&self, joints: &Joints) -> f64 {
+        let mut jacobian = self.jacobian(joints);
+        jacobian.rows_mut(0, 3).scale_mut(1.0 / (self.a2.abs() + self.a3.abs()));
+        jacobian.singular_values().min()
+    }
+
+    /// All joint angles, within (−π, π], that bring the flange to a pose in B: eight at most, none out of reach.
+    ///
+    /// Where axes 4 and 6 are parallel only their sum is told; there the sixth joint stays where `near` has it.
+    pub fn inverse(&self, pose_bf: &Isometry3<f64>, near: &Joints) -> Vec<Joints> {
+        let mut found = Vec::with_capacity(8);
+        for q1 in self.shoulders(pose_bf) {
+            for (q5, q6) in self.wrists(pose_bf, q1, near[5]) {
+                self.elbows(pose_bf, [q1, q5, q6], &mut found);
+            }
+        }
+        found
+    }
+
+    /// The wrist's centre is d₄ beside the plane of the arm.
+    fn shoulders(&self, pose_bf: &Isometry3<f64>) -> Vec<f64> {
+        let wrist = pose_bf * nalgebra::Point3::new(0.0, 0.0, -self.d6);
+        let distance = wrist.x.hypot(wrist.y);
+        let share = self.d4 / distance;
+        if share.is_nan() || share.abs() > 1.0 {
+            return Vec::new();
+        }
+        let (direction, beside) = (wrist.y.atan2(wrist.x), share.acos());
+        [beside, -beside].map(|by| wrapped(direction + by + FRAC_PI_2)).to_vec()
+    }
+
+    /// Fifth and sixth joint.
+    fn wrists(&self, pose_bf: &Isometry3<f64>, q1: f64, q6_near: f64) -> Vec<(f64, f64)> {
+        let (sin, cos) = q1.sin_cos();
+        // across the plane of the arm
+        let across = Vector3::new(sin, -cos, 0.0);
+        let cos_q5 = (across.dot(&pose_bf.translation.vector) - self.d4) / self.d6;
+        if cos_q5.is_nan() || cos_q5.abs() > 1.0 + ROUNDING {
+            return Vec::new();
+        }
+        let bend = cos_q5.clamp(-1.0, 1.0).acos();
+        let [x, y] = [Vector3::x(), Vector3::y()].map(|axis| across.dot(&(pose_bf.rotation * axis)));
+        let at = |q5: f64| {
+            let sign = q5.sin();
+            // axes 4 and 6 are parallel: their sum alone is told
+            let q6 = if sign.abs() < PARALLEL { q6_near } else { (-y / sign).atan2(x / sign) };
+            (q5, wrapped(q6))
+        };
+        if bend < PARALLEL { vec![at(bend)] } else { vec![at(bend), at(-bend)] }
+    }
+
+    /// Second to fourth joint: the triangle of upper arm and forearm.
+    fn elbows(&self, pose_bf: &Isometry3<f64>, [q1, q5, q6]: [f64; 3], found: &mut Vec<Joints>) {
+        let links = self.links();
+        let first = step(&links[0], q1);
+        let last = step(&links[4], q5) * step(&links[5], q6);
+        // of joint 4 as seen from joint 1
+        let pose = first.inverse() * pose_bf * last.inverse();
+        let target = pose * nalgebra::Point3::new(0.0, -self.d4, 0.0);
+        let reach = target.x.hypot(target.y);
+        let cos_q3 = (reach * reach - self.a2 * self.a2 - self.a3 * self.a3) / (2.0 * self.a2 * self.a3);
+        if cos_q3.is_nan() || cos_q3.abs() > 1.0 + ROUNDING {
+            return;
+        }
+        let bend = cos_q3.clamp(-1.0, 1.0).acos();
+        for q3 in [bend, -bend] {
+            let forearm = (self.a3 * q3.sin()).atan2(self.a2 + self.a3 * q3.cos());
+            let q2 = target.y.atan2(target.x) - forearm;
+            let before = step(&links[1], q2) * step(&links[2], q3);
+            let turn = (before.rotation.inverse() * pose.rotation) * Vector3::x();
+            let q4 = turn.y.atan2(turn.x);
+            found.push([q1, q2, q3, q4, q5, q6].map(wrapped));
+            if bend < PARALLEL {
+                return;
+            }
+        }
+    }
+}
+
+/// Two axes count as parallel below this angle, rad.
+const PARALLEL: f64 = 1e-9;
+/// A cosine may be beyond one by this much rounding: sixteen roundings, and those of lengths.
+const ROUNDING: f64 = 1e-12;
+
+/// One link: turned by `angle`, d along z, a along x, α about x.
+fn step(&(d, a, alpha): &(f64, f64, f64), angle: f64) -> Isometry3<f64> {
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
+    let tilt = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), alpha);
+    Isometry3::from_parts(Translation3::from(turn * Vector3::new(a, 0.0, d)), turn * tilt)
+}
+
+/// The same angle within (−π, π].
+fn wrapped(angle: f64) -> f64 {
+    let turned = angle.rem_euclid(2.0 * PI);
+    if turned > PI { turned - 2.0 * PI } else { turned }
+}

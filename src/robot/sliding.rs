@@ -1,0 +1,295 @@
+//! A slide: the ball is pressed on the surface with a constant force and goes along a way.
+//!
+//! The arm gives way along the normal of the station at hand alone; along the way it is driven, and beside it it is held. The way
+//! says where to go, the force how deep: a surface that lies elsewhere than was thought by less than a ball is followed.
+
+use nalgebra::{Isometry3, Unit, UnitQuaternion, Vector3};
+
+use super::arm::{ArmState, Command};
+use super::touching::TouchParams;
+use super::watched::{ProbeError, TRIGGERS, Watched};
+
+/// A place on the way, in B.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SlideStation {
+    /// of the ball's centre, where it touches without pressing, m
+    pub place: Vector3<f64>,
+    /// out of the part
+    pub normal: Unit<Vector3<f64>>,
+}
+
+/// A slide that is wanted, in B.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SlideTarget {
+    /// of the tip
+    pub rotation: UnitQuaternion<f64>,
+    /// in their order, two at least
+    pub stations: Vec<SlideStation>,
+    /// the ball is clear when it is so far from a station along its normal, m
+    pub lift: f64,
+    /// the surface may be so far from where it was thought, m
+    pub give: f64,
+}
+
+impl SlideTarget {
+    fn lifted(&self, station: usize) -> Isometry3<f64> {
+        let SlideStation { place, normal } = self.stations[station];
+        Isometry3::from_parts((place + normal.into_inner() * self.lift).into(), self.rotation)
+    }
+}
+
+/// How a slide ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SlideEnding {
+    /// at the last station
+    Arrived,
+    /// nothing was felt at the first station
+    NoSurface,
+    /// the surface was lost
+    Lost,
+    /// something stood in the way
+    Blocked,
+}
+
+impl std::fmt::Display for SlideEnding {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Arrived => "arrived",
+            Self::NoSurface => "no surface where it begins",
+            Self::Lost => "lost the surface",
+            Self::Blocked => "something stood in the way",
+        })
+    }
+}
+
+/// A slide that was made.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SlideRecord {
+    /// how it ended
+    pub ending: SlideEnding,
+    /// when the ball began to move along and when it ended, by the arm's clock, ns
+    pub stamps_ns: [i64; 2],
+    /// the station that it came to
+    pub reached: usize,
+    /// mean force along the normal, N
+    pub mean_force: f64,
+    /// largest difference from what was set of the mean over a tenth of a second, N
+    pub worst_force: f64,
+    /// of all, N
+    pub peak_force: f64,
+}
+
+/// The force is looked at over this, s.
+const WINDOW: f64 = 0.1;
+/// The ball goes along once the force has been within this share of what is set for a window …
+const SETTLED: f64 = 0.2;
+/// … or after this, s.
+const SETTLING: f64 = 1.0;
+/// The normal turns no faster, rad/s: the force follows it.
+const TURNING: f64 = 2.0;
+/// The normal that is pressed along is no farther ahead than so many stations.
+const MOST_AHEAD: f64 = 2.0;
+/// Beside the way it is brought back with this rate, 1/s.
+const BACK_TO_WAY: f64 = 5.0;
+/// Less than this share of the force for two windows is none.
+const NONE: f64 = 0.25;
+/// More than this share of the force against the way is something that stands in it: friction is less …
+const AGAINST: f64 = 0.8;
+/// … in so many states in a row: noise is not.
+const BLOCKED: usize = 4;
+/// A slide may take so many times as long as it should, and so much longer, s.
+const PATIENCE: (f64, f64) = (3.0, 2.0);
+
+const SLIDING: &str = "sliding over the surface";
+
+/// How far a slide has got, and what was felt.
+struct Slid<'a> {
+    target: &'a SlideTarget,
+    params: &'a TouchParams,
+    station: usize,
+    /// of each state
+    forces: Vec<f64>,
+    /// states in a row without a surface, and with something in the way
+    none: usize,
+    against: usize,
+    /// states of a window
+    window: usize,
+}
+
+impl Slid<'_> {
+    /// The direction of the way at the station at hand, unit vector, and the length to the next one, m.
+    fn ahead(&self) -> (Vector3<f64>, f64) {
+        let stations = &self.target.stations;
+        let way = stations[self.station + 1].place - stations[self.station].place;
+        (way.try_normalize(0.0).unwrap_or_else(Vector3::zeros), way.norm())
+    }
+
+    /// Goes on to the station that the ball has passed; whether there are more.
+    fn advance(&mut self, place: &Vector3<f64>) -> bool {
+        while self.station + 1 < self.target.stations.len() {
+            let (way, length) = self.ahead();
+            if (place - self.target.stations[self.station].place).dot(&way) < length {
+                return true;
+            }
+            self.station += 1;
+        }
+        false
+    }
+
+    fn press(&self, normal: &Unit<Vector3<f64>>, feed: Vector3<f64>) -> Command {
+        let speed = self.params.slide_speed.min(self.params.search_speed);
+        Command::Press { axis: -normal.into_inner(), force: self.params.force, feed, speed }
+    }
+
+    /// On along the way, and back to it where the ball is beside it.
+    fn command(&self, place: &Vector3<f64>) -> Command {
+        let SlideStation { place: station, normal: here } = self.target.stations[self.station];
+        let next = self.target.stations[self.station + 1].normal;
+        let (way, length) = self.ahead();
+        let speed = self.params.slide_speed.min(TURNING * length / here.angle(&next).max(f64::MIN_POSITIVE));
+        // where the ball is when it does as it is told: half of the latency is on the way there
+        let gone = (place - station).dot(&way) + speed * self.params.latency / 2.0;
+        let share = (gone / length.max(f64::MIN_POSITIVE)).clamp(0.0, MOST_AHEAD);
+        let normal = Unit::new_normalize(here.into_inner() + (next.into_inner() - here.into_inner()) * share);
+        let side = normal.cross(&way);
+        let beside = (place - station).dot(&side);
+        let along = way - normal.into_inner() * way.dot(&normal);
+        self.press(&normal, along * speed - side * (beside * BACK_TO_WAY).clamp(-speed, speed))
+    }
+
+    /// Keeps what was felt; how it ended, if it has.
+    fn see(&mut self, state: &ArmState) -> Option<SlideEnding> {
+        let SlideStation { place, normal } = self.target.stations[self.station];
+        let force = state.wrench_b.force.dot(&normal);
+        let (way, _) = self.ahead();
+        let off = (state.pose_bt.translation.vector - place).dot(&normal);
+        self.forces.push(force);
+        self.none = if force < NONE * self.params.force { self.none + 1 } else { 0 };
+        let is_against = -state.wrench_b.force.dot(&way) > AGAINST * self.params.force;
+        self.against = if is_against { self.against + 1 } else { 0 };
+        if self.none > 2 * self.window || off.abs() > self.target.give + self.params.force / self.params.stiffness {
+            Some(SlideEnding::Lost)
+        } else if self.against >= BLOCKED {
+            Some(SlideEnding::Blocked)
+        } else {
+            None
+        }
+    }
+
+    fn seconds(&self) -> f64 {
+        let pairs = self.target.stations.windows(2);
+        let seconds = |pair: &[SlideStation]| {
+            let turn = pair[0].normal.angle(&pair[1].normal);
+            ((pair[1].place - pair[0].place).norm() / self.params.slide_speed).max(turn / TURNING)
+        };
+        pairs.map(seconds).sum()
+    }
+}
+
+impl Watched<'_> {
+    /// Slides once. The ball ends clear of the surface, beside the station that it came to.
+    ///
+    /// - `reached`: the station that the ball is at, also where this breaks off; `None` while it is not at the first.
+    ///
+    /// # Errors
+    /// [`ProbeError`]; a surface that is not there, or ends, is none.
+    pub fn slide(
+        &mut self,
+        target: &SlideTarget,
+        params: &TouchParams,
+        reached: &mut Option<usize>,
+    ) -> Result<SlideRecord, ProbeError> {
+        self.forget_peak();
+        self.line("going to where a slide begins", &target.lifted(0), params.safe_speed(), params, params.trigger)?;
+        *reached = Some(0);
+        let begun_ns = self.next(SLIDING)?.stamp_ns;
+        let window = (WINDOW / self.period()).ceil() as usize;
+        let mut slid = Slid { target, params, station: 0, forces: Vec::new(), none: 0, against: 0, window };
+        let is_felt = self.find_surface(target, params)?;
+        let mut stamps_ns = [begun_ns; 2];
+        let ending = match is_felt {
+            false => SlideEnding::NoSurface,
+            true => {
+                self.settle(&slid)?;
+                self.go_along(&mut slid, reached, &mut stamps_ns)?
+            }
+        };
+        self.leave(target, slid.station, params)?;
+        let mean = |forces: &[f64]| forces.iter().sum::<f64>() / forces.len().max(1) as f64;
+        let worst = slid.forces.windows(window).map(|forces| (mean(forces) - params.force).abs()).fold(0.0, f64::max);
+        Ok(SlideRecord {
+            ending,
+            stamps_ns,
+            reached: slid.station,
+            mean_force: mean(&slid.forces),
+            worst_force: worst,
+            peak_force: self.peak_force(),
+        })
+    }
+
+    /// Down to the surface at the first station; whether it is there.
+    fn find_surface(&mut self, target: &SlideTarget, params: &TouchParams) -> Result<bool, ProbeError> {
+        let normal = target.stations[0].normal.into_inner();
+        let mut felt = 0;
+        self.search(
+            "looking for the surface of a slide",
+            -normal * params.safe_speed(),
+            target.lift + target.give,
+            &mut |_| {},
+            &mut |state| {
+                felt = if state.wrench_b.force.norm() > params.trigger { felt + 1 } else { 0 };
+                felt >= TRIGGERS
+            },
+        )
+    }
+
+    /// Presses until the force is what was set.
+    fn settle(&mut self, slid: &Slid<'_>) -> Result<(), ProbeError> {
+        let doing = "pressing before a slide";
+        let normal = slid.target.stations[0].normal;
+        let begun_ns = self.next(doing)?.stamp_ns;
+        let mut settled = 0;
+        while settled < slid.window {
+            self.tell(doing, &slid.press(&normal, Vector3::zeros()))?;
+            let state = self.next(doing)?;
+            let off = state.wrench_b.force.dot(&normal) - slid.params.force;
+            settled = if off.abs() < SETTLED * slid.params.force { settled + 1 } else { 0 };
+            if (state.stamp_ns - begun_ns) as f64 * 1e-9 > SETTLING {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn go_along(
+        &mut self,
+        slid: &mut Slid<'_>,
+        reached: &mut Option<usize>,
+        stamps_ns: &mut [i64; 2],
+    ) -> Result<SlideEnding, ProbeError> {
+        let limit_s = PATIENCE.0 * slid.seconds() + PATIENCE.1;
+        let mut state = self.next(SLIDING)?;
+        *stamps_ns = [state.stamp_ns; 2];
+        while slid.advance(&state.pose_bt.translation.vector) {
+            *reached = Some(slid.station);
+            if let Some(ending) = slid.see(&state) {
+                return Ok(ending);
+            }
+            if (state.stamp_ns - stamps_ns[0]) as f64 * 1e-9 > limit_s {
+                return self.too_long(SLIDING, limit_s);
+            }
+            self.tell(SLIDING, &slid.command(&state.pose_bt.translation.vector))?;
+            state = self.next(SLIDING)?;
+            stamps_ns[1] = state.stamp_ns;
+        }
+        *reached = Some(slid.station);
+        Ok(SlideEnding::Arrived)
+    }
+
+    /// Off the surface along its normal.
+    fn leave(&mut self, target: &SlideTarget, station: usize, params: &TouchParams) -> Result<(), ProbeError> {
+        let doing = "leaving the surface after a slide";
+        self.rest(doing, &mut |_| {})?;
+        self.line(doing, &target.lifted(station), params.safe_speed(), params, self.limits().force)
+    }
+}

@@ -1,0 +1,265 @@
+//! A UR behind the trait [`Arm`]: what it is told becomes velocities, and what it says becomes states.
+//!
+//! Every motion is a velocity that is said anew with each state (`speedL`), lines too: v = min(v_max, √(2 η a d), d/T) towards
+//! the end, d away. So there is one kind of motion, no thread of the controller's program that would have to be ended before the next
+//! one begins, and an arm that hears nothing any more has nothing left to finish.
+
+use nalgebra::{Isometry3, Rotation3, UnitQuaternion, Vector3};
+
+use super::client::Client;
+use super::dashboard::Dashboard;
+use super::error::UrError;
+use super::guard::Halt;
+use super::params::UrParams;
+use super::probe::probe;
+use super::protocol::{State, What, pose_of, vector_of};
+use crate::robot::{Arm, ArmError, ArmState, Command, Safety};
+use crate::touch::Wrench;
+
+/// Time between two states, s: an e-Series sends them at 500 Hz.
+const PERIOD: f64 = 2e-3;
+/// `actual_TCP_force` times this is what the part does to the tip, and `ft_raw_wrench` likewise. Taken for granted and not yet seen
+/// on a robot: docs/ur.md says how to look.
+const FORCE_SIGN: f64 = 1.0;
+/// Share of the acceleration that a line counts on when it brakes: the arm follows some milliseconds late.
+const BRAKE: f64 = 0.7;
+/// A line comes to its end with this time constant, s: four times what passes from a state to the motion that answers it.
+const SETTLE: f64 = 60e-3;
+/// Most that a line turns the tip, rad/s.
+const TURN: f64 = 0.5;
+/// Of the feed while pressing, m/s².
+const FEED_ACCELERATION: f64 = 0.5;
+/// Most that anything may ask for, m/s².
+const TOP_ACCELERATION: f64 = 10.0;
+/// A UR arm that holds a probe.
+///
+/// Its client lives in a process of its own. Whatever becomes of that, the arm is stopped by the dashboard, and where that does
+/// not answer by the watchdog of the controller. After such a fault every call says what it was, until [`Arm::recover`].
+pub struct UrArm {
+    params: UrParams,
+    client: Client,
+    last: State,
+}
+
+impl UrArm {
+    /// Connects to a controller and sets tool, payload and watchdog. Nothing moves.
+    ///
+    /// # Errors
+    /// [`UrError`]
+    pub fn connect(params: &UrParams) -> Result<Self, UrError> {
+        params.check()?;
+        probe(&params.host, params.deadlines.dashboard)?;
+        let mut dashboard = Dashboard::connect(&params.host, params.deadlines.dashboard)?;
+        dashboard.check_remote()?;
+        dashboard.check_power()?;
+        let safety = dashboard.safety()?;
+        if safety != Safety::Normal {
+            return Err(UrError::Stopped(safety));
+        }
+        let client = Client::start(params, dashboard)?;
+        let last = client.next_state(params.deadlines.connect).map_err(|error| UrError::Client(error.to_string()))?;
+        Ok(Self { params: params.clone(), client, last })
+    }
+
+    /// How the arm was stopped at the last fault of its connection or of its client; `None`: there was none.
+    pub fn halt(&mut self) -> Option<Halt> {
+        self.client.halt()
+    }
+
+    /// Number of the process that speaks to the arm.
+    pub fn client_id(&self) -> u32 {
+        self.client.id()
+    }
+
+    fn refused(what: &'static str, reason: impl Into<String>) -> ArmError {
+        ArmError::Refused { what, reason: reason.into() }
+    }
+
+    /// The order that a command is, now.
+    fn order(&self, command: &Command) -> Result<What, ArmError> {
+        match *command {
+            Command::Line { to, speed, acceleration } => {
+                self.check("a line", speed, acceleration)?;
+                let is_pose = vector_of(&to).iter().all(|part| part.is_finite());
+                if !is_pose {
+                    return Err(Self::refused("a line", "its end is no pose"));
+                }
+                Ok(What::Move { twist: towards(&pose_of(self.last.pose), &to, speed, acceleration), acceleration })
+            }
+            Command::Velocity { linear, acceleration } => {
+                self.check("a velocity", linear.norm(), acceleration)?;
+                Ok(What::Move { twist: [linear.x, linear.y, linear.z, 0.0, 0.0, 0.0], acceleration })
+            }
+            Command::Press { axis, force, feed, speed } => {
+                self.check("a press", feed.norm().max(speed), FEED_ACCELERATION)?;
+                if !(0.0..=self.params.top_force).contains(&force) {
+                    let most = self.params.top_force;
+                    return Err(Self::refused("a press", format!("{force} N is not from 0 to {most} N")));
+                }
+                let Some(frame) = frame_along(&axis) else {
+                    return Err(Self::refused("a press", "its axis is no direction"));
+                };
+                let place = pose_of(self.last.pose).translation.vector;
+                let frame = Isometry3::from_parts(place.into(), frame);
+                let across = feed - axis * feed.dot(&axis);
+                Ok(What::Press {
+                    frame: vector_of(&frame),
+                    force_n: force,
+                    speed,
+                    feed: across.into(),
+                    acceleration: FEED_ACCELERATION,
+                })
+            }
+            Command::Stop { deceleration } => {
+                self.check("a stop", 0.0, deceleration)?;
+                Ok(What::Stop { deceleration })
+            }
+        }
+    }
+
+    fn check(&self, what: &'static str, speed: f64, acceleration: f64) -> Result<(), ArmError> {
+        let most = self.params.top_speed;
+        if !(0.0..=most).contains(&speed) {
+            return Err(Self::refused(what, format!("{speed} m/s is not from 0 to {most} m/s")));
+        }
+        if acceleration.is_nan() || acceleration <= 0.0 || acceleration > TOP_ACCELERATION {
+            return Err(Self::refused(
+                what,
+                format!("{acceleration} m/s² is not above 0 and up to {TOP_ACCELERATION} m/s²"),
+            ));
+        }
+        Ok(())
+    }
+
+    /// Ends what stops the arm, as far as a call can.
+    fn unlock(&self) -> Result<(), ArmError> {
+        let silent_ms = self.params.deadlines.dashboard.as_millis() as u64;
+        let lost = |_: UrError| ArmError::Lost { silent_ms };
+        let mut dashboard = Dashboard::connect(&self.params.host, self.params.deadlines.dashboard).map_err(lost)?;
+        let begun = std::time::Instant::now();
+        loop {
+            match dashboard.safety().map_err(lost)? {
+                Safety::Normal => break,
+                // the controller lets itself be unlocked some seconds after the stop, not before
+                Safety::ProtectiveStop if begun.elapsed() < self.params.deadlines.connect => {
+                    if !dashboard.unlock().map_err(lost)? {
+                        std::thread::sleep(self.params.deadlines.dashboard);
+                    }
+                }
+                safety => return Err(ArmError::Stopped { safety }),
+            }
+        }
+        dashboard.stop().map_err(lost)
+    }
+}
+
+impl Arm for UrArm {
+    fn next_state(&mut self) -> Result<ArmState, ArmError> {
+        self.last = self.client.next_state(self.params.deadlines.connect)?;
+        let state = &self.last;
+        let wrench = |[x, y, z, a, b, c]: [f64; 6]| Wrench {
+            force: Vector3::new(x, y, z) * FORCE_SIGN,
+            torque: Vector3::new(a, b, c) * FORCE_SIGN,
+        };
+        Ok(ArmState {
+            stamp_ns: (state.stamp_s * 1e9).round() as i64,
+            pose_bt: pose_of(state.pose),
+            wrench_b: wrench(state.wrench),
+            raw_wrench_f: wrench(state.raw_wrench),
+            joints: state.joints,
+            safety: state.safety(),
+        })
+    }
+
+    fn command(&mut self, command: &Command) -> Result<(), ArmError> {
+        let safety = self.last.safety();
+        if safety != Safety::Normal && !matches!(command, Command::Stop { .. }) {
+            return Err(ArmError::Stopped { safety });
+        }
+        let order = self.order(command)?;
+        self.client.order(order).map(drop)
+    }
+
+    fn zero_sensor(&mut self) -> Result<(), ArmError> {
+        let safety = self.last.safety();
+        if safety != Safety::Normal {
+            return Err(ArmError::Stopped { safety });
+        }
+        self.client.ask(What::Zero)?;
+        self.client.forget_states();
+        Ok(())
+    }
+
+    /// With a new client in any case: the program of the controller does at once what the registers hold from before, and only a new
+    /// client clears them first. Tool, payload and watchdog are set anew. The sensor is not zeroed, for the probe may still be
+    /// pressed: back off, then [`crate::robot::Watched::zero`].
+    fn recover(&mut self) -> Result<(), ArmError> {
+        self.unlock()?;
+        self.client.close("was ended to be started anew, and that failed");
+        *self = Self::connect(&self.params).map_err(|error| Self::refused("to recover", error.to_string()))?;
+        Ok(())
+    }
+
+    fn period(&self) -> f64 {
+        PERIOD
+    }
+}
+
+/// Velocity of the tip towards a pose, m/s and rad/s in B; both come to their end together.
+fn towards(from: &Isometry3<f64>, to: &Isometry3<f64>, speed: f64, acceleration: f64) -> [f64; 6] {
+    let left = to.translation.vector - from.translation.vector;
+    let turn = (to.rotation * from.rotation.inverse()).scaled_axis();
+    let distance = left.norm();
+    // share of the way in a second; at the end itself all but the settling is without bound
+    let share = (1.0 / SETTLE)
+        .min(speed / distance)
+        .min((2.0 * BRAKE * acceleration / distance).sqrt())
+        .min(TURN / turn.norm());
+    let (linear, angular) = (left * share, turn * share);
+    [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z]
+}
+
+/// Some orientation in B whose z is a direction; `None`: it is none.
+fn frame_along(axis: &Vector3<f64>) -> Option<UnitQuaternion<f64>> {
+    let axis = axis.try_normalize(0.5).filter(|axis| axis.iter().all(|part| part.is_finite()))?;
+    let aside = if axis.x.abs() < 0.7 { Vector3::x() } else { Vector3::y() };
+    let across = aside.cross(&axis).normalize();
+    let turn = nalgebra::Matrix3::from_columns(&[axis.cross(&across) * -1.0, across, axis]);
+    Some(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_is_slower_near_its_end_and_straight() {
+        let at = |x: f64, angle: f64| {
+            Isometry3::from_parts(
+                Vector3::new(x, 0.0, 0.0).into(),
+                UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle),
+            )
+        };
+        let far = towards(&at(0.0, 0.0), &at(0.4, 0.0), 0.1, 0.5);
+        assert_eq!(far, [0.1, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        // 10 mm before the end: by √(2 · 0.7 · 0.5 · 0.01) = 83.7 mm/s it can still stop
+        let near = towards(&at(0.39, 0.0), &at(0.4, 0.0), 0.1, 0.5)[0];
+        assert!((near - 0.083_666).abs() < 1e-6, "{near}");
+        // half a millimetre: 0.5 / 60 ms
+        assert!((towards(&at(0.3995, 0.0), &at(0.4, 0.0), 0.1, 0.5)[0] - 8.333e-3).abs() < 1e-6);
+        assert_eq!(towards(&at(0.4, 0.0), &at(0.4, 0.0), 0.1, 0.5), [0.0; 6]);
+        // one radian at 0.5 rad/s takes 2 s, and so do the 20 mm
+        let turning = towards(&at(0.0, 0.0), &at(0.02, 1.0), 0.1, 0.5);
+        assert!((turning[0] - 0.01).abs() < 1e-12 && (turning[5] - 0.5).abs() < 1e-12, "{turning:?}");
+    }
+
+    #[test]
+    fn the_frame_of_a_press_has_its_z_along_the_axis() {
+        for axis in [-Vector3::z(), Vector3::x(), -Vector3::y(), Vector3::new(0.6, 0.0, -0.8)] {
+            let frame = frame_along(&axis).unwrap();
+            assert!((frame * Vector3::z() - axis).norm() < 1e-12, "{axis}");
+        }
+        assert!(frame_along(&Vector3::zeros()).is_none());
+        assert!(frame_along(&Vector3::new(f64::NAN, 0.0, 1.0)).is_none());
+    }
+}

@@ -1,0 +1,127 @@
+//! The dashboard of a UR, on a connection of its own: the way to stop the arm that needs neither Python nor a program.
+
+use std::io::{BufRead, BufReader, Write};
+use std::net::{TcpStream, ToSocketAddrs};
+use std::time::Duration;
+
+use super::error::UrError;
+use crate::robot::Safety;
+
+/// TCP port of the dashboard.
+const PORT: u16 = 29999;
+
+/// A connection to a dashboard.
+pub(super) struct Dashboard {
+    host: String,
+    replies: BufReader<TcpStream>,
+}
+
+impl Dashboard {
+    /// Connects and waits for the greeting.
+    ///
+    /// - `deadline`: of this and of each answer.
+    pub fn connect(host: &str, deadline: Duration) -> Result<Self, UrError> {
+        let socket = socket(host, PORT, "dashboard", deadline)?;
+        let mut dashboard = Self { host: host.to_owned(), replies: BufReader::new(socket) };
+        dashboard.line()?;
+        Ok(dashboard)
+    }
+
+    fn unreachable(&self, reason: impl ToString) -> UrError {
+        UrError::Unreachable { host: self.host.clone(), port: PORT, service: "dashboard", reason: reason.to_string() }
+    }
+
+    fn line(&mut self) -> Result<String, UrError> {
+        let mut line = String::new();
+        match self.replies.read_line(&mut line) {
+            Ok(0) => Err(self.unreachable("it closed the connection")),
+            Ok(_) => Ok(line.trim().to_owned()),
+            Err(error) => Err(self.unreachable(error)),
+        }
+    }
+
+    fn ask(&mut self, what: &str) -> Result<String, UrError> {
+        let sent = self.replies.get_mut().write_all(format!("{what}\n").as_bytes());
+        sent.map_err(|error| self.unreachable(error))?;
+        self.line()
+    }
+
+    /// Whether nobody has closed it; a silent one counts as open.
+    pub fn is_open(&mut self) -> bool {
+        let socket = self.replies.get_ref();
+        let look = || {
+            socket.set_nonblocking(true)?;
+            let seen = socket.peek(&mut [0]);
+            socket.set_nonblocking(false)?;
+            seen
+        };
+        match look() {
+            Ok(count) => count > 0,
+            Err(error) => error.kind() == std::io::ErrorKind::WouldBlock,
+        }
+    }
+
+    /// Stops the program of the controller, and the arm with it.
+    pub fn stop(&mut self) -> Result<(), UrError> {
+        let answer = self.ask("stop")?;
+        if answer == "Stopped" { Ok(()) } else { Err(self.unreachable(format!("`stop` was answered by `{answer}`"))) }
+    }
+
+    /// Whether the controller takes orders from outside.
+    pub fn check_remote(&mut self) -> Result<(), UrError> {
+        let answer = self.ask("is in remote control")?;
+        if answer == "true" { Ok(()) } else { Err(UrError::Local { host: self.host.clone() }) }
+    }
+
+    /// Whether the arm has power and its brakes are open.
+    pub fn check_power(&mut self) -> Result<(), UrError> {
+        let mode = self.ask("robotmode")?;
+        let is_running = mode.ends_with("RUNNING");
+        if is_running { Ok(()) } else { Err(UrError::Off { host: self.host.clone(), mode }) }
+    }
+
+    /// What the safety system says.
+    pub fn safety(&mut self) -> Result<Safety, UrError> {
+        let answer = self.ask("safetystatus")?;
+        let status = answer.rsplit(' ').next().unwrap_or_default();
+        Ok(match status {
+            "NORMAL" | "REDUCED" => Safety::Normal,
+            "PROTECTIVE_STOP" => Safety::ProtectiveStop,
+            "ROBOT_EMERGENCY_STOP" | "SYSTEM_EMERGENCY_STOP" | "SAFEGUARD_STOP" => Safety::OperatorStop,
+            _ if status.contains("SAFEGUARD") => Safety::OperatorStop,
+            _ => Safety::Fault,
+        })
+    }
+
+    /// Ends a protective stop; returns whether the controller let itself.
+    pub fn unlock(&mut self) -> Result<bool, UrError> {
+        // with its message open the panel keeps the stop
+        self.ask("close safety popup")?;
+        Ok(self.ask("unlock protective stop")? == "Protective stop releasing")
+    }
+}
+
+/// A connection whose reads and writes end after the deadline.
+pub(super) fn socket(host: &str, port: u16, service: &'static str, deadline: Duration) -> Result<TcpStream, UrError> {
+    let connect = || {
+        let mut last = std::io::Error::other("the name has no address");
+        for address in (host, port).to_socket_addrs()? {
+            match TcpStream::connect_timeout(&address, deadline) {
+                Ok(socket) => {
+                    socket.set_read_timeout(Some(deadline))?;
+                    socket.set_write_timeout(Some(deadline))?;
+                    socket.set_nodelay(true)?;
+                    return Ok(socket);
+                }
+                Err(error) => last = error,
+            }
+        }
+        Err(last)
+    };
+    connect().map_err(|error: std::io::Error| UrError::Unreachable {
+        host: host.to_owned(),
+        port,
+        service,
+        reason: error.to_string(),
+    })
+}

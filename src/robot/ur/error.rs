@@ -1,0 +1,73 @@
+//! Why a UR is not at hand.
+
+use std::path::PathBuf;
+
+/// Why no arm is connected. Nothing has moved.
+#[derive(Debug, thiserror::Error)]
+pub enum UrError {
+    /// A parameter outside its range.
+    #[error("{what} is {value} {unit}: it has to be from {lowest} to {highest}")]
+    BadParameter {
+        /// which
+        what: &'static str,
+        /// in the unit
+        value: f64,
+        /// in the unit
+        lowest: f64,
+        /// in the unit
+        highest: f64,
+        /// of all
+        unit: &'static str,
+    },
+    /// Nobody listens there, or answers.
+    #[error("{host}:{port} ({service}): {reason}; look whether the controller is on, and at the cable and the address")]
+    Unreachable {
+        /// of the controller
+        host: String,
+        /// TCP
+        port: u16,
+        /// what is there
+        service: &'static str,
+        /// what happened
+        reason: String,
+    },
+    /// A controller that this was not made for.
+    #[error("the controller at {host} runs version {found}; an e-Series with PolyScope 5.9 or a later 5 is needed")]
+    Version {
+        /// of the controller
+        host: String,
+        /// what it runs
+        found: String,
+    },
+    /// Somebody else has the say.
+    #[error("the controller at {host} is in local control: set it to remote control at its panel")]
+    Local {
+        /// of the controller
+        host: String,
+    },
+    /// It cannot move.
+    #[error("the arm at {host} is not running ({mode}): power it on and release its brakes at its panel")]
+    Off {
+        /// of the controller
+        host: String,
+        /// as it says it
+        mode: String,
+    },
+    /// It stands for its own safety.
+    #[error("the arm stands: {0}")]
+    Stopped(crate::robot::Safety),
+    /// No ur-rtde, or another one.
+    #[error("{}: {reason}; make it with `touchup ur setup`", site_packages.display())]
+    Wheel {
+        /// where it was looked for
+        site_packages: PathBuf,
+        /// what is wrong
+        reason: String,
+    },
+    /// The program that speaks to the arm does not start, or not in time.
+    #[error("the program that speaks to the arm {0}")]
+    Client(String),
+    /// It was set, and something else is there.
+    #[error("the controller has another tool than it was told: {0}")]
+    Tool(String),
+}

@@ -1,0 +1,347 @@
+//! An arm that is watched while it moves: each state is looked at before the next is waited for; what is wrong stops the arm first
+//! and is told second.
+
+use std::collections::VecDeque;
+
+use nalgebra::{Isometry3, Vector3};
+
+use super::arm::{Arm, ArmError, ArmState, Command, Safety};
+use super::limits::{LimitError, Limits};
+use super::touching::TouchParams;
+
+/// Why probing was broken off. The arm was told to stop before this was made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ProbeError {
+    /// The arm.
+    #[error("while {doing}: {error}")]
+    Arm {
+        /// what was being done
+        doing: &'static str,
+        /// what it said
+        error: ArmError,
+    },
+    /// A limit.
+    #[error("while {doing}: {error}")]
+    Limit {
+        /// what was being done
+        doing: &'static str,
+        /// which
+        error: LimitError,
+    },
+    /// Something was in the way where nothing should be.
+    #[error("while {doing}: {force_n:.1} N at ({:.1} {:.1} {:.1}) mm, where the way is clear by the mesh; look what is there",
+            place_mm[0], place_mm[1], place_mm[2])]
+    InTheWay {
+        /// what was being done
+        doing: &'static str,
+        /// N
+        force_n: f64,
+        /// of the tip in B, mm
+        place_mm: [f64; 3],
+        /// whether that was in a fast move through free air
+        is_link: bool,
+    },
+    /// States come too seldom to stop in time.
+    #[error("while {doing}: the arm's states came {gap_ms:.0} ms apart; they have to come each {period_ms:.0} ms")]
+    LowRate {
+        /// what was being done
+        doing: &'static str,
+        /// ms
+        gap_ms: f64,
+        /// ms
+        period_ms: f64,
+    },
+    /// A motion does not come to its end.
+    #[error("while {doing}: the arm did not arrive within {limit_s:.1} s")]
+    TooLong {
+        /// what was being done
+        doing: &'static str,
+        /// s
+        limit_s: f64,
+    },
+    /// Somebody wanted it.
+    #[error("cancelled while {doing}")]
+    Cancelled {
+        /// what was being done
+        doing: &'static str,
+    },
+}
+
+/// What is done first in a touch.
+pub(super) const GOING: &str = "going to the stand-off";
+
+impl ProbeError {
+    /// What was being done.
+    pub fn doing(&self) -> &'static str {
+        match self {
+            Self::Arm { doing, .. }
+            | Self::Limit { doing, .. }
+            | Self::InTheWay { doing, .. }
+            | Self::LowRate { doing, .. }
+            | Self::TooLong { doing, .. }
+            | Self::Cancelled { doing } => doing,
+        }
+    }
+
+    /// Whether a touch that ended so had come to its stand-off.
+    pub fn was_at_standoff(&self) -> bool {
+        self.doing() != GOING
+    }
+}
+
+/// States whose stamps stand still before that is a fault.
+const STILL: u32 = 5;
+/// States may come this many periods apart.
+const LATE: f64 = 10.0;
+/// An arm is at rest when it is not farther than this from where it was [`REST_STATES`] before, m: above the noise of what is
+/// reported. At 500 Hz that is 3 mm/s, from which 0.5 m/s² stop within 9 µm.
+const REST: f64 = 60e-6;
+/// States that rest is looked at over.
+const REST_STATES: usize = 10;
+/// A line has ended within this of its end, m.
+const THERE: f64 = 80e-6;
+/// … and this, rad.
+const TURNED: f64 = 2e-3;
+/// A line also takes as long as its turn at this speed, rad/s.
+const TURN_SPEED: f64 = 0.2;
+/// Longer than it should take by this factor, and by this time (s), is too long.
+const PATIENCE: (f64, f64) = (3.0, 2.0);
+/// Forces above the trigger in a row that are contact; one alone is noise.
+pub(super) const TRIGGERS: u32 = 2;
+
+/// Who is there while an arm moves.
+pub trait Witness {
+    /// Is shown each state, in their order.
+    fn see(&mut self, state: &ArmState);
+
+    /// Is asked after each state whether somebody wants it to end.
+    fn is_cancelled(&self) -> bool {
+        false
+    }
+}
+
+/// An arm that is watched while it moves.
+pub struct Watched<'a> {
+    arm: &'a mut dyn Arm,
+    limits: Limits,
+    witness: &'a mut dyn Witness,
+    last: Option<ArmState>,
+    still: u32,
+    peak_force: f64,
+}
+
+impl<'a> Watched<'a> {
+    /// - `witness`: is shown each state, and may have it stop.
+    pub fn new(arm: &'a mut dyn Arm, limits: Limits, witness: &'a mut dyn Witness) -> Self {
+        Self { arm, limits, witness, last: None, still: 0, peak_force: 0.0 }
+    }
+
+    /// The largest force of the touch at hand, or of all lines where there was none, N.
+    pub fn peak_force(&self) -> f64 {
+        self.peak_force
+    }
+
+    /// When the arm was seen last, by its clock, ns; `None` where it was not, or not since the sensor was zeroed.
+    pub fn seen_ns(&self) -> Option<i64> {
+        self.last.map(|state| state.stamp_ns)
+    }
+
+    /// Has the largest force begin anew.
+    pub(super) fn forget_peak(&mut self) {
+        self.peak_force = 0.0;
+    }
+
+    pub(super) fn last(&self) -> Option<ArmState> {
+        self.last
+    }
+
+    pub(super) fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    /// Of the arm, s.
+    pub(super) fn period(&self) -> f64 {
+        self.arm.period()
+    }
+
+    /// The next state, when nothing is wrong with it.
+    pub(super) fn next(&mut self, doing: &'static str) -> Result<ArmState, ProbeError> {
+        let result = self.look(doing);
+        if result.is_err() {
+            // stop first, report second; where it cannot be told, its watchdog stops it
+            let _ = self.arm.command(&Command::Stop { deceleration: self.limits.acceleration });
+        }
+        result
+    }
+
+    fn look(&mut self, doing: &'static str) -> Result<ArmState, ProbeError> {
+        let arm = |error| ProbeError::Arm { doing, error };
+        let state = self.arm.next_state().map_err(arm)?;
+        self.witness.see(&state);
+        if let Some(last) = self.last.replace(state) {
+            let gap = (state.stamp_ns - last.stamp_ns) as f64 * 1e-9;
+            self.still = if gap > 0.0 { 0 } else { self.still + 1 };
+            if self.still >= STILL {
+                return Err(arm(ArmError::Stale));
+            }
+            if gap > LATE * self.arm.period() {
+                return Err(ProbeError::LowRate { doing, gap_ms: gap * 1e3, period_ms: self.arm.period() * 1e3 });
+            }
+        }
+        if state.safety != Safety::Normal {
+            return Err(arm(ArmError::Stopped { safety: state.safety }));
+        }
+        self.peak_force = self.peak_force.max(state.wrench_b.force.norm());
+        self.limits.check_state(&state).map_err(|error| ProbeError::Limit { doing, error })?;
+        if self.witness.is_cancelled() {
+            return Err(ProbeError::Cancelled { doing });
+        }
+        Ok(state)
+    }
+
+    pub(super) fn tell(&mut self, doing: &'static str, command: &Command) -> Result<(), ProbeError> {
+        self.arm.command(command).map_err(|error| ProbeError::Arm { doing, error })
+    }
+
+    /// Goes straight to a pose through what should be free air.
+    ///
+    /// # Errors
+    /// [`ProbeError`]; [`ProbeError::InTheWay`] when more than `trigger` (N) is felt.
+    ///
+    /// - `speed`: m/s; near the part not above [`TouchParams::safe_speed`].
+    pub fn line(
+        &mut self,
+        doing: &'static str,
+        to: &Isometry3<f64>,
+        speed: f64,
+        params: &TouchParams,
+        trigger: f64,
+    ) -> Result<(), ProbeError> {
+        let place = to.translation.vector;
+        self.limits.check_place(&place).map_err(|error| ProbeError::Limit { doing, error })?;
+        let begun = self.next(doing)?;
+        let speed = speed.min(self.limits.speed);
+        let acceleration = params.acceleration.min(self.limits.acceleration);
+        let distance = (place - begun.pose_bt.translation.vector).norm();
+        let turn = begun.pose_bt.rotation.angle_to(&to.rotation);
+        let limit_s = PATIENCE.0 * (distance / speed + speed / acceleration + turn / TURN_SPEED) + PATIENCE.1;
+        let command = Command::Line { to: *to, speed, acceleration };
+        self.tell(doing, &command)?;
+        let mut felt = 0;
+        loop {
+            let state = self.next(doing)?;
+            let force_n = state.wrench_b.force.norm();
+            felt = if force_n > trigger { felt + 1 } else { 0 };
+            if felt >= TRIGGERS {
+                self.tell(doing, &Command::Stop { deceleration: self.limits.acceleration })?;
+                let place_mm = (state.pose_bt.translation.vector * 1e3).into();
+                let is_link = speed > params.safe_speed();
+                return Err(ProbeError::InTheWay { doing, force_n, place_mm, is_link });
+            }
+            let turn = state.pose_bt.rotation.angle_to(&to.rotation);
+            if (state.pose_bt.translation.vector - place).norm() < THERE && turn < TURNED {
+                return Ok(());
+            }
+            if (state.stamp_ns - begun.stamp_ns) as f64 * 1e-9 > limit_s {
+                return self.too_long(doing, limit_s);
+            }
+            // the watchdog of the arm wants to hear it again and again
+            self.tell(doing, &command)?;
+        }
+    }
+
+    /// Stops, waits until the arm stands, and takes what it feels for nothing.
+    ///
+    /// # Errors
+    /// [`ProbeError`]
+    pub fn zero(&mut self) -> Result<(), ProbeError> {
+        let doing = "zeroing the sensor in free air";
+        self.rest(doing, &mut |_| {})?;
+        self.arm.zero_sensor().map_err(|error| ProbeError::Arm { doing, error })?;
+        // that took its time
+        self.last = None;
+        Ok(())
+    }
+
+    /// Stops, waits until the arm stands, and shows the states of some time (s) after that.
+    ///
+    /// # Errors
+    /// [`ProbeError`]
+    pub fn stand(
+        &mut self,
+        doing: &'static str,
+        seconds: f64,
+        each: &mut dyn FnMut(&ArmState),
+    ) -> Result<(), ProbeError> {
+        self.rest(doing, &mut |_| {})?;
+        let command = Command::Stop { deceleration: self.limits.acceleration };
+        let mut begun_ns = None;
+        loop {
+            self.tell(doing, &command)?;
+            let state = self.next(doing)?;
+            let begun_ns = *begun_ns.get_or_insert(state.stamp_ns);
+            if (state.stamp_ns - begun_ns) as f64 * 1e-9 >= seconds {
+                return Ok(());
+            }
+            each(&state);
+        }
+    }
+
+    /// Stops, and waits until it stands.
+    pub(super) fn rest(&mut self, doing: &'static str, each: &mut dyn FnMut(&ArmState)) -> Result<(), ProbeError> {
+        let command = Command::Stop { deceleration: self.limits.acceleration };
+        let limit_s = PATIENCE.0 * self.limits.speed / self.limits.acceleration + PATIENCE.1;
+        let (mut places, mut begun_ns) = (VecDeque::new(), None);
+        loop {
+            self.tell(doing, &command)?;
+            let state = self.next(doing)?;
+            each(&state);
+            let place = state.pose_bt.translation.vector;
+            places.push_back(place);
+            if places.len() > REST_STATES {
+                let before: Option<Vector3<f64>> = places.pop_front();
+                if before.is_some_and(|before| (place - before).norm() < REST) {
+                    return Ok(());
+                }
+            }
+            let begun_ns = *begun_ns.get_or_insert(state.stamp_ns);
+            if (state.stamp_ns - begun_ns) as f64 * 1e-9 > limit_s {
+                return self.too_long(doing, limit_s);
+            }
+        }
+    }
+
+    /// Goes on and on until `until` says so; returns whether it did before the travel was over.
+    pub(super) fn search(
+        &mut self,
+        doing: &'static str,
+        velocity: Vector3<f64>,
+        travel: f64,
+        each: &mut dyn FnMut(&ArmState),
+        until: &mut dyn FnMut(&ArmState) -> bool,
+    ) -> Result<bool, ProbeError> {
+        let command = Command::Velocity { linear: velocity, acceleration: self.limits.acceleration };
+        let begun = self.next(doing)?;
+        let limit_s = PATIENCE.0 * travel / velocity.norm() + PATIENCE.1;
+        loop {
+            self.tell(doing, &command)?;
+            let state = self.next(doing)?;
+            each(&state);
+            if until(&state) {
+                return Ok(true);
+            }
+            let gone = state.pose_bt.translation.vector - begun.pose_bt.translation.vector;
+            if gone.dot(&velocity) / velocity.norm() >= travel {
+                return Ok(false);
+            }
+            if (state.stamp_ns - begun.stamp_ns) as f64 * 1e-9 > limit_s {
+                return self.too_long(doing, limit_s);
+            }
+        }
+    }
+
+    pub(super) fn too_long<T>(&mut self, doing: &'static str, limit_s: f64) -> Result<T, ProbeError> {
+        self.tell(doing, &Command::Stop { deceleration: self.limits.acceleration })?;
+        Err(ProbeError::TooLong { doing, limit_s })
+    }
+}

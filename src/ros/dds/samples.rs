@@ -1,0 +1,79 @@
+//! Publishes what a stylus or a probe measures.
+
+use std::collections::BTreeSet;
+
+use ros2_client::dds::rustdds::{
+    DomainParticipantStatusEvent as Event, DomainParticipantStatusListener, GUID, StatusEvented,
+};
+use ros2_client::{Node, NodeOptions, Publisher};
+
+use super::topics::{BEST_EFFORT, keep, make_topic};
+use super::{RosError, join};
+use crate::ros::arguments::NodeConfig;
+use crate::ros::messages::{Message, PoseStamped, WrenchStamped};
+use crate::ros::port::SamplePort;
+
+/// Nothing is sent twice: what is kept is for who takes it at once.
+const DEPTH: usize = 100;
+
+struct Samples {
+    wrench: Publisher<WrenchStamped>,
+    pose: Publisher<PoseStamped>,
+    listener: DomainParticipantStatusListener,
+    /// to wrenches, to poses
+    listeners: [BTreeSet<GUID>; 2],
+    // its entities leave the graph when it goes
+    _node: Node,
+}
+
+/// Joins the network as a stylus or probe: the topics are those of the parameter `source`.
+///
+/// # Errors
+/// [`RosError`]: a name that is none, no network.
+pub fn samples(config: &NodeConfig) -> Result<Box<dyn SamplePort>, RosError> {
+    let (context, mut node) = join(config, NodeOptions::new().start_parameter_services(false))?;
+    let listener = context.domain_participant().status_listener();
+    let [wrench, pose] = config.sample_topics();
+    let (wrench, pose) = (publisher(config, &mut node, wrench)?, publisher(config, &mut node, pose)?);
+    Ok(Box::new(Samples { wrench, pose, listener, listeners: Default::default(), _node: node }))
+}
+
+fn publisher<M: Message>(config: &NodeConfig, node: &mut Node, name: &str) -> Result<Publisher<M>, RosError> {
+    let qos = keep(BEST_EFFORT, DEPTH);
+    let topic = make_topic::<M>(node, &config.resolve(name)?, &qos)?;
+    node.create_publisher(&topic, Some(qos)).map_err(|error| RosError::dds("publishing a topic", &error))
+}
+
+fn send<M: Message>(publisher: &Publisher<M>, message: M) -> bool {
+    publisher
+        .publish(message)
+        .inspect_err(|error| tracing::debug!(topic_type = M::TYPE_NAME, %error, "not sent"))
+        .is_ok()
+}
+
+impl SamplePort for Samples {
+    fn publish_wrench(&self, wrench: WrenchStamped) -> bool {
+        send(&self.wrench, wrench)
+    }
+
+    fn publish_pose(&self, pose: PoseStamped) -> bool {
+        send(&self.pose, pose)
+    }
+
+    fn listeners(&mut self) -> [usize; 2] {
+        let writers = [self.wrench.guid(), self.pose.guid()];
+        while let Some(event) = self.listener.try_recv_status() {
+            match event {
+                Event::RemoteReaderMatched { local_writer, remote_reader } => {
+                    let of = writers.iter().position(|writer| *writer == local_writer);
+                    of.map(|stream| self.listeners[stream].insert(remote_reader));
+                }
+                Event::ReaderLost { guid, .. } => self.listeners.iter_mut().for_each(|listeners| {
+                    listeners.remove(&guid);
+                }),
+                _ => {}
+            }
+        }
+        self.listeners.each_ref().map(BTreeSet::len)
+    }
+}

@@ -1,0 +1,130 @@
+//! What the thread of the samples tells the others: each mismatch, the place of the tip, changes of the mesh, touches.
+
+use std::sync::mpsc::TrySendError;
+use std::time::{Duration, Instant};
+
+use nalgebra::{Point3, Vector3};
+
+use super::convert::{NO_VECTOR, header, point, vector};
+use super::edits::Edits;
+use super::haptic::Haptic;
+use super::seeker::SeekerInput;
+use super::tip::TipPlace;
+use super::view::ViewInput;
+use crate::refine::{Case, Update};
+use crate::ros::messages::HapticMismatch;
+use crate::touch::Sample;
+
+/// The distance at the tip is looked up so often.
+const TIP_EVERY: Duration = Duration::from_millis(25);
+/// … up to here, m.
+const TIP_REACH: f64 = 0.02;
+/// A mesh torn by a change that goes on with the next sample is shown all the same when none has come for so long.
+const TORN_AFTER: Duration = Duration::from_millis(200);
+
+impl Haptic {
+    pub(super) fn send_probed(&mut self) {
+        if self.probed.is_empty() {
+            return;
+        }
+        if let Err(
+            TrySendError::Full(SeekerInput::Probed(news)) | TrySendError::Disconnected(SeekerInput::Probed(news)),
+        ) = self.seeker.try_send(SeekerInput::Probed(std::mem::take(&mut self.probed)))
+        {
+            self.probed = news;
+        }
+    }
+
+    pub(super) fn show_mismatch(&mut self, sample: &Sample, update: &Update) {
+        let rate_hz = self.mismatch_rate_hz;
+        let is_due = rate_hz <= 0.0 || sample.stamp_ns.saturating_sub(self.mismatch_ns) as f64 * 1e-9 >= 1.0 / rate_hz;
+        if !is_due {
+            return;
+        }
+        self.mismatch_ns = sample.stamp_ns;
+        let tip = self.compensator.compensate(sample);
+        let centre = tip.pose_ot.translation.vector.into();
+        let base = HapticMismatch {
+            header: header(sample.stamp_ns, &self.setup.shared.frame),
+            contact_case: number_of(update.case),
+            face: HapticMismatch::NO_FACE,
+            mesh_version: self.version,
+            tip: point(&centre),
+            actual_force: vector(&tip.force_o),
+            expected_force: NO_VECTOR,
+            linear: NO_VECTOR,
+            rotational: NO_VECTOR,
+            signed_distance: f64::NAN,
+        };
+        let message = match &update.mismatch {
+            None => base,
+            Some(mismatch) => HapticMismatch {
+                face: mismatch.face.0,
+                actual_force: vector(&(mismatch.expected_force_o + mismatch.linear)),
+                expected_force: vector(&mismatch.expected_force_o),
+                linear: vector(&mismatch.linear),
+                rotational: vector(&mismatch.rotational),
+                signed_distance: mismatch.distance,
+                ..base
+            },
+        };
+        self.setup.shared.show(&self.view, ViewInput::Mismatch(message));
+        if self.tip_shown.elapsed() >= TIP_EVERY {
+            self.tip_shown = Instant::now();
+            self.show_tip(sample, centre);
+        }
+    }
+
+    fn show_tip(&self, sample: &Sample, centre: Point3<f64>) {
+        let refiner = self.sitting.engine.refiner();
+        let radius = self.setup.scene.tip_params().radius;
+        let closest = refiner.closest_face(&centre, TIP_REACH).map(|hit| {
+            let off: Vector3<f64> = centre - hit.point;
+            let side = if off.dot(&refiner.mesh().normal(hit.face)) < 0.0 { -1.0 } else { 1.0 };
+            (hit.point, side * off.norm() - radius)
+        });
+        let tip = TipPlace { stamp_ns: sample.stamp_ns, centre, radius, closest };
+        self.setup.shared.show(&self.view, ViewInput::Tip(tip));
+    }
+
+    /// Sends what changed in the mesh, as far as the view has taken up what was sent before.
+    pub(super) fn show_edits(&mut self) {
+        let is_idle = self.sampled.elapsed() >= TORN_AFTER;
+        while let Some(edits) = self.unsent.take().or_else(|| self.filled(is_idle)) {
+            if let Err(TrySendError::Full(ViewInput::Edits(back))) = self.view.try_send(ViewInput::Edits(edits)) {
+                self.unsent = Some(back);
+                return;
+            }
+        }
+    }
+
+    /// The next changes, when one of those that go round is here and there is anything to tell.
+    fn filled(&mut self, is_idle: bool) -> Option<Box<Edits>> {
+        let mesh = self.sitting.engine.refiner().mesh();
+        let is_told = self.sitting.told_version == self.version && self.sitting.told_edits == mesh.edits();
+        if is_told {
+            return None;
+        }
+        let mut edits = self.kept.take().or_else(|| self.spare.try_recv().ok())?;
+        let told_edits = mesh.edits();
+        let stamp_ns = self.last_ns.unwrap_or(0);
+        edits.fill(&mut self.sitting.engine, &self.setup.scan, self.version, stamp_ns, is_idle);
+        if edits.is_empty() && !edits.is_complete {
+            self.kept = Some(edits);
+            return None;
+        }
+        if edits.is_complete {
+            (self.sitting.told_version, self.sitting.told_edits) = (self.version, told_edits);
+        }
+        Some(edits)
+    }
+}
+
+fn number_of(case: Case) -> u8 {
+    match case {
+        Case::Free => HapticMismatch::FREE,
+        Case::MeshOnly => HapticMismatch::MESH_ONLY,
+        Case::SurfaceOnly => HapticMismatch::SURFACE_ONLY,
+        Case::Both => HapticMismatch::BOTH,
+    }
+}

@@ -1,0 +1,72 @@
+//! Threads beside the haptic one that write sessions and files: counted, and none is left behind.
+
+use std::io;
+use std::thread::{Builder, JoinHandle};
+
+/// What is under way.
+#[derive(Debug, Default)]
+pub struct SideWork {
+    threads: Vec<JoinHandle<()>>,
+}
+
+impl SideWork {
+    /// How much is under way now.
+    pub fn count(&mut self) -> usize {
+        self.threads.retain(|thread| !thread.is_finished());
+        self.threads.len()
+    }
+
+    /// Begins one more.
+    ///
+    /// # Errors
+    /// Of the operating system, when there is no thread for it.
+    pub fn begin(&mut self, name: &str, work: impl FnOnce() + Send + 'static) -> io::Result<()> {
+        self.threads.push(Builder::new().name(name.to_owned()).spawn(work)?);
+        Ok(())
+    }
+
+    /// Waits for all of it.
+    pub fn finish(self) {
+        for thread in self.threads {
+            // one that ended by a fault has said so
+            let _ = thread.join();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::sync::mpsc::channel;
+    use std::sync::{Arc, mpsc};
+    use std::time::{Duration, Instant};
+
+    use super::SideWork;
+
+    #[test]
+    fn what_has_ended_is_not_counted_and_the_rest_is_waited_for() {
+        let (mut work, done) = (SideWork::default(), Arc::new(AtomicUsize::new(0)));
+        let begin = |work: &mut SideWork, gate: mpsc::Receiver<()>| {
+            let done = Arc::clone(&done);
+            let until_told = move || {
+                let _ = gate.recv();
+                done.fetch_add(1, Ordering::SeqCst);
+            };
+            work.begin("test", until_told).unwrap();
+        };
+        let (gates, held): (Vec<_>, Vec<_>) = (0..4).map(|_| channel()).unzip();
+        held.into_iter().for_each(|gate| begin(&mut work, gate));
+        assert_eq!(work.count(), 4);
+        let mut gates = gates.into_iter();
+        drop(gates.next());
+        let deadline = Instant::now() + Duration::from_secs(60);
+        while work.count() == 4 {
+            assert!(Instant::now() < deadline, "the one that ended is counted");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        assert_eq!((work.count(), done.load(Ordering::SeqCst)), (3, 1));
+        drop(gates);
+        work.finish();
+        assert_eq!(done.load(Ordering::SeqCst), 4);
+    }
+}

@@ -1,0 +1,52 @@
+//! Publishes what a stylus or a probe measures.
+
+use r2r::{Publisher, WrappedTypesupport, geometry_msgs::msg as geometry};
+
+use super::convert::Convert;
+use super::topics::best_effort;
+use super::{During, RosError, context};
+use crate::ros::arguments::NodeConfig;
+use crate::ros::messages::{PoseStamped, WrenchStamped};
+use crate::ros::port::SamplePort;
+
+/// Nothing is sent twice: what is kept is for who takes it at once.
+const DEPTH: usize = 100;
+
+struct Samples {
+    wrench: Publisher<geometry::WrenchStamped>,
+    pose: Publisher<geometry::PoseStamped>,
+    // its publishers leave the graph when it goes
+    _node: r2r::Node,
+}
+
+/// Joins ROS as a stylus or probe: the topics are those of the parameter `source`. Once in a process.
+///
+/// # Errors
+/// [`RosError`]: ROS does not start.
+pub fn samples(config: &NodeConfig) -> Result<Box<dyn SamplePort>, RosError> {
+    let node = r2r::Node::create(context()?, &config.place.node, &config.place.namespace);
+    let mut node = node.during("making the node")?;
+    let [wrench, pose] = config.sample_topics();
+    let wrench = node.create_publisher(wrench, best_effort(DEPTH)).during("publishing a topic")?;
+    let pose = node.create_publisher(pose, best_effort(DEPTH)).during("publishing a topic")?;
+    Ok(Box::new(Samples { wrench, pose, _node: node }))
+}
+
+/// None where rcl does not tell.
+fn count<T: WrappedTypesupport + 'static>(publisher: &Publisher<T>) -> usize {
+    publisher.get_inter_process_subscription_count().unwrap_or_default()
+}
+
+impl SamplePort for Samples {
+    fn publish_wrench(&self, wrench: WrenchStamped) -> bool {
+        self.wrench.publish(&wrench.convert()).is_ok()
+    }
+
+    fn publish_pose(&self, pose: PoseStamped) -> bool {
+        self.pose.publish(&pose.convert()).is_ok()
+    }
+
+    fn listeners(&mut self) -> [usize; 2] {
+        [count(&self.wrench), count(&self.pose)]
+    }
+}

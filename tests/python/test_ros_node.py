@@ -1,0 +1,212 @@
+"""`touchup node` and `touchup replay` as two processes: the same result as `touchup refine`, whatever happens to them."""
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import time
+
+import numpy
+import pytest
+import trimesh
+from mcap.exceptions import EndOfFile
+from mcap.records import Channel, Message, Schema
+from mcap.stream_reader import StreamReader
+from mcap_ros2.decoder import DecoderFactory
+from ros_cyclone import (
+    BEST_EFFORT,
+    LATCHED,
+    HapticMismatch,
+    Marker,
+    Peer,
+    SaveMeshRequest,
+    SaveMeshResponse,
+    UndoRequest,
+    UndoResponse,
+)
+from ros_echo import domains
+from ros_process import Node, Process, play
+from scipy.spatial import KDTree
+
+
+@pytest.fixture
+def domain():
+    return next(domains)
+
+
+def scene_for(demo_folder, folder):
+    """A scene that names the scan of the demo, as config/demo.yaml does."""
+    parts = ["sync", "clock", "contact", "tip", "sliding", "carve", "guard", "patch", "uncertainty", "refine"]
+    scene = folder / "scene.yaml"
+    scene.write_text("".join(f"{part}:\n" for part in parts) + f"scan:\n  file: {demo_folder / 'scan.ply'}\n  unit: mm\n")
+    return scene
+
+
+def stamps(recording, topic):
+    """Stamps of the headers of a recording, ns; of a folder all files in the order of their names, also without their ends."""
+    found, decoders = [], {}
+    for path in sorted(recording.glob("*.mcap")) if recording.is_dir() else [recording]:
+        with path.open("rb") as file, contextlib.suppress(EndOfFile):
+            schemas, channels = {}, {}
+            for record in StreamReader(file).records:
+                if isinstance(record, Schema):
+                    schemas[record.id] = record
+                elif isinstance(record, Channel):
+                    channels[record.id] = record
+                elif isinstance(record, Message) and channels[record.channel_id].topic == topic:
+                    schema = schemas[channels[record.channel_id].schema_id]
+                    if schema.name not in decoders:
+                        decoders[schema.name] = DecoderFactory().decoder_for("cdr", schema)
+                    stamp = decoders[schema.name](record.data).header.stamp
+                    found.append(stamp.sec * 10**9 + stamp.nanosec)
+    return found
+
+
+def test_a_played_recording_gives_the_files_of_refine(demo_folder, tmp_path, touchup_bin, domain):
+    with Node(touchup_bin, tmp_path, "--scene", scene_for(demo_folder, tmp_path), domain=domain) as node:
+        played = play(touchup_bin, demo_folder / "touch.mcap", domain=domain)
+        assert node.end() == 0, node.text()
+        report = node.report()
+    assert played["wrenches"] == len(stamps(demo_folder / "touch.mcap", "/stylus/wrench")) and played["unsent"] == 0
+    assert report["lost"] == report["dropped"] == [0, 0] and report["unrecorded"] == 0
+    for name in ["refined.ply", "features.json", "touches.csv"]:
+        assert (node.session / name).read_bytes() == (demo_folder / name).read_bytes(), name
+    assert stamps(node.session / "recording", "/stylus/pose") == sorted(stamps(demo_folder / "touch.mcap", "/stylus/pose"))
+
+
+def test_a_killed_node_has_lost_a_tenth_of_a_second(demo_folder, tmp_path, touchup, touchup_bin, domain):
+    with Node(touchup_bin, tmp_path, "--scene", scene_for(demo_folder, tmp_path), domain=domain) as node:
+        reader = Peer(domain).reader("/mismatch", HapticMismatch, BEST_EFFORT)
+        heard = []
+        with Process(touchup_bin, "replay", demo_folder / "touch.mcap", domain=domain):
+
+            def is_in_a_stroke():
+                heard.extend(message for message in reader.take(1000))
+                touching = [message.contact_case != 0 for message in heard[-200:]]
+                return len(heard) > 4000 and all(touching)
+
+            node.wait_for(is_in_a_stroke, 60)
+            node.process.send_signal(signal.SIGKILL)
+            node.wait()
+    heard.extend(reader.take(1000))
+    last_ns = max(message.header.stamp.sec * 10**9 + message.header.stamp.nanosec for message in heard)
+    taken = stamps(node.session / "recording", "/stylus/wrench")
+    assert last_ns - max(taken) <= 100e6
+    resumed, again = tmp_path / "resumed.ply", tmp_path / "again.ply"
+    done = touchup("refine", "--resume", node.session, "--out", resumed)
+    assert done.returncode in (0, 4), done.stderr
+    whole = ["--scan", demo_folder / "scan.ply", "--bag", node.session / "recording", "--scene", node.session / "scene.yaml"]
+    done = touchup("refine", *whole, "--out", again)
+    assert done.returncode in (0, 4), done.stderr
+    assert resumed.read_bytes() == again.read_bytes()
+    # and it is all that was played up to there
+    assert taken == sorted(stamps(demo_folder / "touch.mcap", "/stylus/wrench"))[: len(taken)]
+
+
+def test_a_stroke_is_taken_back_while_it_runs(demo_folder, tmp_path, touchup, touchup_bin, domain):
+    scene = scene_for(demo_folder, tmp_path)
+    with Node(touchup_bin, tmp_path, "--scene", scene, domain=domain, ros=["-p", "service_mapping:=cyclone"]) as node:
+        undo = Peer(domain).client("/touchup/undo", UndoRequest, UndoResponse)
+        play(touchup_bin, demo_folder / "touch.mcap", "--speed", 4, domain=domain)
+        writer, answers = undo
+        answered = []
+
+        def is_answered():
+            writer.write(UndoRequest(1, len(answered), 1))
+            time.sleep(0.1)
+            answered.extend(answers.take(10))
+            return answered
+
+        node.wait_for(is_answered)
+        assert answered[0].success, answered[0].message
+        assert node.end(signal.SIGTERM) in (0, 4), node.text()
+    done = touchup("refine", "--resume", node.session, "--out", tmp_path / "resumed.ply")
+    assert done.returncode in (0, 4), done.stderr
+    refined = (node.session / "refined.ply").read_bytes()
+    assert refined == (tmp_path / "resumed.ply").read_bytes() != (demo_folder / "refined.ply").read_bytes()
+
+
+def test_who_comes_late_sees_what_is_saved(demo_folder, tmp_path, touchup_bin, domain):
+    scene = scene_for(demo_folder, tmp_path)
+    with Node(touchup_bin, tmp_path, "--scene", scene, domain=domain, ros=["-p", "service_mapping:=cyclone"]) as node:
+        play(touchup_bin, demo_folder / "touch.mcap", "--speed", 4, domain=domain)
+        peer = Peer(domain)
+        reader = peer.reader("/mesh", Marker, LATCHED)
+        writer, answers = peer.client("/touchup/save_mesh", SaveMeshRequest, SaveMeshResponse)
+        tiles, answered, asked, heard = {}, [], [], [time.monotonic()]
+
+        def is_answered():
+            # a request that is sent before both know each other is lost
+            if not asked or time.monotonic() - asked[-1] > 10:
+                asked.append(time.monotonic())
+                writer.write(SaveMeshRequest(1, len(asked), f"now{len(asked)}.ply", False, False))
+            for marker in reader.take(100):
+                tiles[marker.id] = marker
+                heard.append(time.monotonic())
+            answered.extend(answers.take(10))
+            return answered
+
+        def is_quiet():
+            is_answered()
+            return tiles and time.monotonic() - heard[-1] > 12
+
+        node.wait_for(is_answered, 60)
+        # a tile that has settled comes once more after 10 s
+        node.wait_for(is_quiet, 60)
+        assert answered[0].success, answered[0].message
+        saved = trimesh.load(answered[0].path, process=False)
+        assert node.end() in (0, 4), node.text()
+    corners = numpy.array([(point.x, point.y, point.z) for tile in tiles.values() for point in tile.points]) * 1e3
+    assert (len(saved.vertices), len(saved.faces)) == (answered[0].vertex_count, answered[0].face_count)
+    assert abs(len(corners) / 3 - len(saved.faces)) < 0.01 * len(saved.faces)
+    # live, the skin is made bit by bit, saved all at once
+    shown, kept = KDTree(corners), KDTree(saved.vertices)
+    assert (shown.query(saved.vertices)[0] < 0.01).mean() > 0.95
+    assert (kept.query(corners)[0] < 0.01).mean() > 0.95
+
+
+def test_a_full_disk_is_told_and_the_recording_goes_on_when_there_is_room(demo_folder, tmp_path, touchup, touchup_bin, domain):
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=300k", "none", disk], capture_output=True).returncode != 0:
+        pytest.skip("needs root, for a disk of its own that is full")
+    try:
+        scene = scene_for(demo_folder, tmp_path)
+        with Node(touchup_bin, disk, "--scene", scene, domain=domain) as node:
+            with Process(touchup_bin, "replay", demo_folder / "touch.mcap", "--speed", 4, domain=domain) as player:
+                node.wait_for(lambda: "does not record, make room on the disk" in node.text())
+                subprocess.run(["mount", "-o", "remount,size=64m", disk], check=True)
+                assert player.wait() == 0, player.text()
+            code = node.end()
+        assert code == 1 and "are not in the session's recording" in node.told[-1], node.text()
+        report = json.loads((node.session / "report.json").read_text())
+        taken = stamps(node.session / "recording", "/stylus/wrench") + stamps(node.session / "recording", "/stylus/pose")
+        played = [stamp for topic in ["wrench", "pose"] for stamp in stamps(demo_folder / "touch.mcap", f"/stylus/{topic}")]
+        came = len(played) - sum(report["lost"]) - report["dropped"][0]  # a machine that is busy otherwise drops some
+        assert report["unrecorded"] > 0 and len(taken) + report["unrecorded"] == came
+        assert max(taken) == max(played)
+        done = touchup("refine", "--resume", node.session, "--out", tmp_path / "resumed.ply")
+        assert done.returncode in (0, 4), done.stderr
+    finally:
+        subprocess.run(["umount", disk], check=True)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["node"], 2, ["no scan", "-p scan:=FILE"]),
+        (["node", "--scene", "nowhere.yaml"], 3, ["nowhere.yaml"]),
+        (["node", "--ros-args", "-p", "scan:=nowhere.ply"], 3, ["nowhere.ply"]),
+        (["node", "--ros-args", "-p", "view_rate_hz:=1000"], 2, ["view_rate_hz", "0.1 to 100"]),
+        (["node", "--ros-args", "--remap", "x"], 2, ["FROM:=TO"]),
+        (["replay", "nowhere.mcap"], 3, ["nowhere.mcap"]),
+        (["replay", "nowhere.mcap", "--speed", "0"], 2, ["0.01 to 100"]),
+        (["step", "--ros-args", "-p", "a:=b"], 2, ["--ros-args", "node"]),
+    ],
+)
+def test_what_cannot_be_is_told(arguments, code, words, touchup, tmp_path):
+    done = touchup(*arguments, cwd=tmp_path, env={**os.environ, "ROS_DOMAIN_ID": str(next(domains))})
+    assert done.returncode == code, done.stderr
+    assert all(word in done.stderr for word in words), done.stderr
+    assert not (tmp_path / "sessions").exists()

@@ -1,0 +1,224 @@
+//! Lines, velocities and presses, and how they end when they are told to.
+
+use crate::Onlooker;
+use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
+use touchup::robot::{Arm, Command, ProbeError, SlideEnding, SlideStation, SlideTarget, TouchParams, Watched};
+use touchup::sim::ArmParams;
+
+use crate::stand_in::{StandIn, limits};
+use crate::{PLACE, TOP, at, error_of, patiently};
+
+/// A line turns the tip on its way, and ends where and how it was asked to.
+#[test]
+fn a_line_ends_at_its_place_and_turn() {
+    patiently("a_line_ends_at_its_place_and_turn", |packages| {
+        let mut stand_in = StandIn::start(&[]);
+        let mut arm = stand_in.connect(packages);
+        let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.2, -0.1, 0.15));
+        let [x, y] = PLACE;
+        let place = at([x - 20e-3, y + 10e-3, 40e-3]).translation;
+        let to = Isometry3::from_parts(place, turn);
+        let begun = arm.next_state().unwrap();
+        let mut onlooker = Onlooker { seen: |_: &_| {}, is_cancelled: || false };
+        stand_in.tell("mark begin");
+        let mut watched = Watched::new(&mut arm, limits(), &mut onlooker);
+        watched.line("going there", &to, 50e-3, &TouchParams::default(), 5.0)?;
+        watched.zero()?;
+        let state = arm.next_state().unwrap();
+        let off = (state.pose_bt.translation.vector - place.vector).norm();
+        let turned = state.pose_bt.rotation.angle_to(&turn);
+        assert!(off < 0.15e-3 && turned < 2e-3, "{off} m, {turned} rad");
+        // straight: by the record, no place of the tip is far from the line between the ends
+        let from = begun.pose_bt.translation.vector;
+        let along = (place.vector - from).normalize();
+        let record = stand_in.record_after("mark begin", 1.0);
+        let aside = record.iter().map(|line| (line.place - from).cross(&along).norm()).fold(0.0, f64::max);
+        let top = record.iter().map(|line| line.speed).fold(0.0, f64::max);
+        println!("{:.0} um off, {:.0} um aside, {:.1} mm/s at most", off * 1e6, aside * 1e6, top * 1e3);
+        assert!(aside < 0.3e-3, "{aside}");
+        assert!(top < 52e-3, "{top}");
+        Ok(())
+    });
+}
+
+/// Over the top of the plate, around the rim of its step at x = 60 mm and down its side: 3 N along a normal that turns by 90°.
+#[test]
+fn a_slide_goes_over_a_rim() {
+    patiently("a_slide_goes_over_a_rim", |packages| {
+        let stand_in = StandIn::start(&["--start-mm", "50,8,20"]);
+        let mut arm = stand_in.connect(packages);
+        let ball = ArmParams::default().radius;
+        let pose_bo = ArmParams::default().pose_bo;
+        let station = |x: f64, z: f64, angle: f64| {
+            let normal = Vector3::new(angle.sin(), 0.0, angle.cos());
+            let centre = Point3::new(x, 8e-3, z) + normal * ball;
+            let normal = Unit::new_normalize(pose_bo.rotation * normal);
+            SlideStation { place: (pose_bo * centre).coords, normal }
+        };
+        let share = |at: u32, count: u32| f64::from(at) / f64::from(count);
+        let top = (0..=80).map(|at| station(52e-3 + 8e-3 * share(at, 80), TOP, 0.0));
+        let rim = (1..=30).map(|at| station(60e-3, TOP, std::f64::consts::FRAC_PI_2 * share(at, 30)));
+        let side = (1..=10).map(|at| station(60e-3, TOP - 1e-3 * share(at, 10), std::f64::consts::FRAC_PI_2));
+        let stations: Vec<_> = top.chain(rim).chain(side).collect();
+        let last = stations.len() - 1;
+        let target = SlideTarget { rotation: UnitQuaternion::identity(), stations, lift: 3e-3, give: 1.5e-3 };
+        let mut onlooker = Onlooker { seen: |_: &_| {}, is_cancelled: || false };
+        let mut watched = Watched::new(&mut arm, limits(), &mut onlooker);
+        watched.zero()?;
+        let mut reached = None;
+        let record = watched.slide(&target, &TouchParams::default(), &mut reached)?;
+        println!("mean {:.2} N, {:.2} N off at most", record.mean_force, record.worst_force);
+        assert_eq!((record.ending, record.reached, reached), (SlideEnding::Arrived, last, Some(last)));
+        assert!((record.mean_force - 3.0).abs() < 0.1 && record.worst_force < 0.3, "{record:?}");
+        Ok(())
+    });
+}
+
+/// 5 N within 0.3 N over 40 mm.
+#[test]
+fn a_slide_keeps_its_force() {
+    patiently("a_slide_keeps_its_force", |packages| {
+        let mut stand_in = StandIn::start(&["--start-mm", "10,5,14"]);
+        let mut arm = stand_in.connect(packages);
+        arm.zero_sensor().unwrap();
+        let press = |feed: f64| Command::Press {
+            axis: -Vector3::z(),
+            force: 5.0,
+            feed: Vector3::new(feed, 0.0, 0.0),
+            speed: 5e-3,
+        };
+        let begun = arm.next_state().unwrap();
+        let (mut forces, mut start) = (Vec::new(), None);
+        loop {
+            let state = arm.next_state().unwrap();
+            let passed = (state.stamp_ns - begun.stamp_ns) as f64 * 1e-9;
+            assert!(passed < 20.0, "40 mm at 10 mm/s take longer");
+            arm.command(&press(if passed < 2.0 { 0.0 } else { 10e-3 })).unwrap();
+            if passed > 2.2 {
+                let from = *start.get_or_insert(state.pose_bt.translation.x);
+                forces.push(state.wrench_b.force.z);
+                if state.pose_bt.translation.x - from > 40e-3 {
+                    break;
+                }
+            }
+        }
+        stand_in.tell("mark over");
+        arm.command(&Command::Stop { deceleration: 1.0 }).unwrap();
+        let mean = forces.iter().sum::<f64>() / forces.len() as f64;
+        // the sensor's noise of 0.15 N is in each: over a tenth of a second it is 0.02 N
+        let worst = forces.windows(50).map(|w| (w.iter().sum::<f64>() / 50.0 - 5.0).abs()).fold(0.0, f64::max);
+        println!("{} states, mean {mean:.3} N, worst tenth of a second {worst:.3} N off", forces.len());
+        assert!((mean - 5.0).abs() < 0.1 && worst < 0.3, "{mean} {worst}");
+        // neither the feed nor the force goes on, whatever is said after it
+        let stood = stand_in.stood_after("mark over");
+        assert!(stood < 0.1, "{stood}");
+        Ok(())
+    });
+}
+
+/// The controller reads one command in a cycle: a velocity right behind a press would take its place, one time in twenty.
+#[test]
+fn a_press_is_never_lost() {
+    patiently("a_press_is_never_lost", |packages| {
+        let stand_in = StandIn::start(&["--start-mm", "10,5,13.6"]);
+        let mut arm = stand_in.connect(packages);
+        arm.zero_sensor().unwrap();
+        let press = Command::Press { axis: -Vector3::z(), force: 5.0, feed: Vector3::zeros(), speed: 5e-3 };
+        let up = Command::Velocity { linear: Vector3::new(0.0, 0.0, 5e-3), acceleration: 1.0 };
+        for round in 0..20 {
+            let mut force = 0.0;
+            // half a second of pressing, a fifth of going up
+            for order in std::iter::repeat_n(press, 250).chain(std::iter::repeat_n(up, 100)) {
+                let state = arm.next_state().unwrap();
+                arm.command(&order).unwrap();
+                if order == press {
+                    force = state.wrench_b.force.z;
+                }
+            }
+            assert!(force > 3.5, "round {round}: {force} N");
+        }
+        Ok(())
+    });
+}
+
+/// 500 velocities in a second come through, each with its state.
+#[test]
+fn motion_is_streamed_at_500_hz() {
+    patiently("motion_is_streamed_at_500_hz", |packages| {
+        let mut stand_in = StandIn::start(&["--start-mm", "45,8,80"]);
+        let mut arm = stand_in.connect(packages);
+        stand_in.tell("mark begin");
+        let mut states = Vec::new();
+        let begun = arm.next_state().unwrap();
+        let mut last = begun;
+        while last.stamp_ns - begun.stamp_ns < 2_000_000_000 {
+            // a swing of 1 Hz, which a stream that stalls would not follow
+            let t = (last.stamp_ns - begun.stamp_ns) as f64 * 1e-9;
+            let linear = Vector3::x() * 20e-3 * (std::f64::consts::TAU * t).sin();
+            arm.command(&Command::Velocity { linear, acceleration: 1.0 }).unwrap();
+            last = arm.next_state().unwrap();
+            states.push(last);
+        }
+        let gaps = states.windows(2).map(|w| (w[1].stamp_ns - w[0].stamp_ns) as f64 * 1e-6);
+        let worst = gaps.fold(0.0, f64::max);
+        println!("{} states in 2 s, {worst:.0} ms between two at most", states.len());
+        if states.len() < 900 {
+            return Err(ProbeError::LowRate { doing: "streaming", gap_ms: worst, period_ms: 2.0 });
+        }
+        let record = stand_in.record_after("mark begin", 2.0);
+        // the way of half a swing: 20 mm/s / pi
+        let xs: Vec<f64> = record.iter().map(|line| line.place.x).collect();
+        let way = xs.iter().fold(f64::MIN, |a, b| a.max(*b)) - xs.iter().fold(f64::MAX, |a, b| a.min(*b));
+        assert!((way - 20e-3 / std::f64::consts::PI).abs() < 0.3e-3, "{way}");
+        Ok(())
+    });
+}
+
+#[test]
+fn a_cancelled_move_stands_within_a_tenth_of_a_second() {
+    patiently("a_cancelled_move_stands_within_a_tenth_of_a_second", |packages| {
+        let mut stand_in = StandIn::start(&["--start-mm", "45,8,80"]);
+        let mut arm = stand_in.connect(packages);
+        let [x, y] = PLACE;
+        let is_cancelled = std::cell::Cell::new(false);
+        let asked = || is_cancelled.get();
+        let from = arm.next_state().unwrap().pose_bt.translation.z;
+        let mut seen = |state: &touchup::robot::ArmState| {
+            if !is_cancelled.get() && from - state.pose_bt.translation.z > 20e-3 {
+                stand_in.tell("mark cancelled");
+                is_cancelled.set(true);
+            }
+        };
+        let mut onlooker = Onlooker { seen: &mut seen, is_cancelled: asked };
+        let mut watched = Watched::new(&mut arm, limits(), &mut onlooker);
+        let error = error_of(watched.line("going down", &at([x, y, 30e-3]), 50e-3, &TouchParams::default(), 5.0))?;
+        assert!(matches!(error, ProbeError::Cancelled { .. }), "{error}");
+        let stood = stand_in.stood_after("mark cancelled");
+        println!("cancelled at 50 mm/s: stands after {:.0} ms", stood * 1e3);
+        assert!(stood < 0.1, "{stood}");
+        Ok(())
+    });
+}
+
+/// While it is still getting faster; the controller would else first reach the speed and then look for what it is told next.
+#[test]
+fn a_stop_while_it_accelerates_is_not_put_off() {
+    patiently("a_stop_while_it_accelerates_is_not_put_off", |packages| {
+        let mut stand_in = StandIn::start(&["--start-mm", "45,8,80"]);
+        let mut arm = stand_in.connect(packages);
+        let begun = arm.next_state().unwrap();
+        let mut last = begun;
+        while last.stamp_ns - begun.stamp_ns < 200_000_000 {
+            let linear = Vector3::new(0.0, 0.0, 0.2);
+            arm.command(&Command::Velocity { linear, acceleration: 0.2 }).unwrap();
+            last = arm.next_state().unwrap();
+        }
+        stand_in.tell("mark stop");
+        arm.command(&Command::Stop { deceleration: 2.0 }).unwrap();
+        let stood = stand_in.stood_after("mark stop");
+        println!("stopped while it accelerated: stands after {:.0} ms", stood * 1e3);
+        // 40 mm/s at 2 m/s² are 20 ms
+        assert!(stood < 0.1, "{stood}");
+        Ok(())
+    });
+}

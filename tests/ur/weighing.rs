@@ -1,0 +1,43 @@
+//! `touchup calibrate payload --robot ur`: what hangs on the flange, through the real client.
+
+use std::fs;
+use std::process::Command;
+
+use serde_json::Value;
+
+use super::patiently;
+use super::probing::cell;
+use super::stand_in::StandIn;
+
+/// 1.17 kg off the axis, where the scene says 0.25 kg: the controller takes off what it was told, and the sensor has all of it.
+#[test]
+fn a_ur_weighs_what_hangs_on_its_flange() {
+    patiently("a_ur_weighs_what_hangs_on_its_flange", |packages| {
+        let stand_in = StandIn::start(&["--start-mm", "30,25,60", "--payload", "1.17,3,-2,42"]);
+        let folder = cell(&stand_in, packages);
+        let path = |name: &str| folder.path().join(name);
+        let done = Command::new(env!("CARGO_BIN_EXE_touchup"))
+            .args(["calibrate", "payload", "--robot", "ur", "--json"])
+            .arg("--scene")
+            .arg(path("scene.yaml"))
+            .arg("--out")
+            .arg(path("calibrated.yaml"))
+            .output()
+            .unwrap();
+        assert_eq!(done.status.code(), Some(0), "{}", String::from_utf8_lossy(&done.stderr));
+        let found: Value = serde_json::from_slice(&done.stdout).unwrap();
+        println!("{found}");
+        let (mass, std) = (found["mass_kg"].as_f64().unwrap(), found["mass_std_kg"].as_f64().unwrap());
+        assert!((mass - 1.17).abs() < 3.0 * std && std < 1e-3, "{mass} ± {std} kg");
+        for (axis, expected) in [3.0, -2.0, 42.0].into_iter().enumerate() {
+            let [value, std] = ["value", "std"].map(|part| found["centre_mm"][part][axis].as_f64().unwrap());
+            assert!((value - expected).abs() < 3.0 * std, "{axis}: {value} ± {std} mm");
+        }
+        assert!(fs::read_to_string(path("calibrated.yaml")).unwrap().contains("payload_kg: 1.1"));
+        // the controller was told the payload of the scene when the client came, and never anything else
+        let events: Vec<String> = stand_in.record().into_iter().map(|line| line.event).collect();
+        let payloads: Vec<&str> = events.iter().map(String::as_str).filter(|event| event.contains("payload")).collect();
+        assert!(matches!(payloads[..], [only] if only.contains("payload 0.25 kg")), "{payloads:?}");
+        Ok(())
+    });
+}
