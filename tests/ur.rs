@@ -19,6 +19,7 @@ mod weighing;
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use lateness::Lateness;
@@ -29,7 +30,7 @@ use touchup::robot::{ProbeError, TouchOutcome, TouchParams, TouchRecord, TouchTa
 use touchup::sim::ArmParams;
 
 /// Of a test on a machine that is busy.
-const TRIES: usize = 6;
+const TRIES: usize = 3;
 /// Five periods of the arm.
 const TOO_LATE: Duration = Duration::from_millis(10);
 /// Top of the plate, m in O.
@@ -68,6 +69,9 @@ fn above(height: f64) -> TouchTarget {
 /// stands in time is none where nobody runs in time. What fails while this machine was late says nothing: it is tried again.
 fn patiently(test: &str, body: impl Fn(&Path) -> Result<(), ProbeError>) {
     let Some(packages) = packages(test) else { return };
+    // one arm at a time: they would make each other late
+    static ARM: Mutex<()> = Mutex::new(());
+    let _arm = ARM.lock().unwrap_or_else(PoisonError::into_inner);
     for left in (0..TRIES).rev() {
         let lateness = Lateness::watch();
         let ended = catch_unwind(AssertUnwindSafe(|| body(&packages)));
