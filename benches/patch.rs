@@ -5,7 +5,9 @@ use divan::counter::ItemsCount;
 use nalgebra::{Point3, Vector3};
 use touchup::mesh::{FaceTree, TriMesh, signed_distance};
 use touchup::patch::{ContourParams, Crossing, Cut, Edge, Lattice, NodeValues, Patch, Region, contour};
-use touchup::sim::wavy;
+
+#[path = "../tests/common/wavy.rs"]
+mod wavy;
 
 /// Pitch of the lattice, m.
 const PITCH: f64 = 0.75e-3;
@@ -30,7 +32,7 @@ struct Case {
 
 impl Case {
     fn new(faces: usize) -> Self {
-        let scan = wavy::wavy_plate(faces).expect("it can be counted");
+        let scan = wavy::wavy_plate(faces);
         let tree = FaceTree::new(&scan);
         let lattice = Lattice { origin: Point3::new(0.137, -0.0931, 0.2713) * PITCH, pitch: PITCH };
         let middle = wavy::SIDE / 2.0;

@@ -23,10 +23,6 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("scene", &["touch", "mesh", "patch", "refine", "explore", "robot", "probe", "sim", "io"]),
     ("session", &["touch", "mesh", "patch", "refine", "live", "features", "io"]),
     (
-        "report",
-        &["touch", "mesh", "patch", "refine", "live", "features", "align", "sim", "compare", "io", "scene", "session"],
-    ),
-    (
         "ros",
         &[
             "touch",
@@ -66,7 +62,6 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "io",
             "scene",
             "session",
-            "report",
             "ros",
             "robot",
         ],

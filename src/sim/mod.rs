@@ -22,7 +22,6 @@ mod surface;
 mod tip;
 mod triangulate;
 mod wander;
-pub mod wavy;
 
 pub use arm::{ArmFault, ArmParams, SimArm, WEIGHTLESS};
 pub use ball::{BallContact, push_ball};
