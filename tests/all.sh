@@ -84,16 +84,16 @@ failed_tests() {
 # watch_time FILE: how late this machine is from now on, until end_watch: one that sleeps a millisecond for each of two
 # processors, and sees when it wakes
 watch_time() {
+  rm -f "$1".*
   python3 - "$1" <<'PYTHON' &
 import os, signal, sys, time
-children = []
+is_over, worst, children = False, 0.0, []
+def end(*_):
+    global is_over
+    is_over = True
+signal.signal(signal.SIGTERM, end)
 for k in range(2):
     if (child := os.fork()) == 0:
-        is_over, worst = False, 0.0
-        def end(*_):
-            global is_over
-            is_over = True
-        signal.signal(signal.SIGTERM, end)
         while not is_over:
             begun = time.perf_counter()
             time.sleep(1e-3)
@@ -102,11 +102,15 @@ for k in range(2):
             print(round(1e3 * worst), file=told)
         os._exit(0)
     children.append(child)
-signal.signal(signal.SIGTERM, lambda *_: [os.kill(child, signal.SIGTERM) for child in children])
+open(f"{sys.argv[1]}.begun", "w").close()
+while not is_over:
+    time.sleep(0.01)
 for child in children:
+    os.kill(child, signal.SIGTERM)
     os.waitpid(child, 0)
 PYTHON
   watcher=$!
+  until [ -e "$1.begun" ] || ! kill -0 "$watcher" 2> /dev/null; do sleep 0.02; done
 }
 
 # end_watch FILE: sets late_ms, the longest that one of them overslept
