@@ -9,9 +9,7 @@ use touchup::align::{IcpParams, icp};
 use touchup::cli::Threads;
 use touchup::compare::deviations;
 use touchup::mesh::{Alone, FaceTree, TriMesh, Workers};
-
-#[path = "../tests/common/wavy.rs"]
-mod wavy;
+use touchup::sim::wavy;
 
 /// Standard deviation of a point on each axis, m.
 const NOISE: f64 = 0.05e-3;
@@ -23,7 +21,7 @@ fn main() {
 /// The vertices of a wavy plate of about `count`, noisy, in an order without rhyme.
 fn points(count: usize) -> Vec<Point3<f64>> {
     let mut rng = Pcg64::new(1, 1);
-    let mesh = wavy::wavy_plate(2 * count);
+    let mesh = wavy::wavy_plate(2 * count).expect("it can be counted");
     let mut points: Vec<_> = mesh
         .positions()
         .iter()
@@ -38,7 +36,7 @@ fn points(count: usize) -> Vec<Point3<f64>> {
 }
 
 fn truth(faces: usize) -> (TriMesh, FaceTree) {
-    let mesh = wavy::wavy_plate(faces);
+    let mesh = wavy::wavy_plate(faces).expect("it can be counted");
     let tree = FaceTree::new(&mesh);
     (mesh, tree)
 }

@@ -7,15 +7,12 @@
 //!
 //! `cargo bench --bench edit [-- FACES…]`
 
-#[path = "../tests/common/wavy.rs"]
-mod wavy;
-
 use std::hint::black_box;
 use std::time::Instant;
 
 use nalgebra::Point3;
 use touchup::mesh::{BoxQuery, FaceId, FaceTree, TriMesh, VertexId};
-use wavy::{SIDE, height, wavy_plate};
+use touchup::sim::wavy::{SIDE, height, wavy_plate};
 
 /// Half the side of the spot, m.
 const HALF_SPOT: f64 = 2.5e-3;
@@ -167,7 +164,7 @@ fn session(mesh: &mut TriMesh, tree: &mut FaceTree) -> Times {
 }
 
 fn bench(faces: usize) {
-    let plate = wavy_plate(faces);
+    let plate = wavy_plate(faces).expect("it can be counted");
     let built = FaceTree::new(&plate);
     // a copy takes no more than it needs
     let bytes = (plate.clone().bytes(), built.clone().bytes());

@@ -8,22 +8,16 @@
 //! `cargo bench --bench live [-- FACES [SECONDS [fast]]]`; `fast` does not wait for real time, so that each push waits for
 //! the patch and pushes are not timed.
 
-#[path = "common/slide.rs"]
-mod slide;
-#[path = "../tests/common/wavy.rs"]
-mod wavy;
-
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use nalgebra::Vector3;
-use slide::{RADIUS, STEP_NS, STIFFNESS, sample};
 use touchup::live::{LiveRefiner, Pace};
 use touchup::mesh::FaceTree;
 use touchup::patch::{Patcher, PatcherParams};
 use touchup::refine::{RefineParams, Refiner, TipParams};
+use touchup::sim::wavy::{RADIUS, STEP_NS, STIFFNESS, slide, wavy_plate};
 use touchup::touch::Sample;
-use wavy::wavy_plate;
 
 /// Width of the raster, m: passed over each 4.6 minutes.
 const WIDTH: f64 = 40e-3;
@@ -40,7 +34,7 @@ fn percentile(sorted: &[u64], share: f64) -> f64 {
 
 /// Evenly spread noise of the wanted standard deviation, the same each time.
 fn noisy(i: usize) -> Sample {
-    let mut sample = sample(i, WIDTH);
+    let mut sample = slide(i, WIDTH);
     let mut state = i as u64;
     let mut draw = || {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -63,7 +57,7 @@ fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
     let number = |at: usize, default: usize| arguments.get(at).map_or(default, |x| x.parse().expect("a whole number"));
     let (faces, seconds, is_fast) = (number(0, 1_000_000), number(1, 60), arguments.len() > 2);
-    let mesh = wavy_plate(faces);
+    let mesh = wavy_plate(faces).expect("it can be counted");
     let tip = TipParams { radius: RADIUS, stiffness: Some(STIFFNESS) };
     let refiner = Refiner::new(mesh.clone(), RefineParams::robust(tip)).expect("the settings are in range");
     // its uncertainty is asked for, too

@@ -7,10 +7,6 @@
 
 #[path = "node/peer.rs"]
 mod peer;
-#[path = "common/slide.rs"]
-mod slide;
-#[path = "../tests/common/wavy.rs"]
-mod wavy;
 
 use std::path::Path;
 use std::process::{Child, Command};
@@ -18,7 +14,6 @@ use std::sync::mpsc::sync_channel;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use slide::sample;
 use touchup::io::mesh_file::{MeshUnit, write_mesh};
 use touchup::live::Quantiles;
 use touchup::ros::arguments::NodeConfig;
@@ -30,8 +25,8 @@ use touchup::ros::node::{INBOX, Prepared, Report};
 use touchup::ros::parameters::{ParameterValue, Parameters};
 use touchup::ros::port::{Arrival, Publication};
 use touchup::ros::{dds, in_process};
+use touchup::sim::wavy::{slide, wavy_plate};
 use touchup::touch::Sample;
-use wavy::wavy_plate;
 
 /// Width of the raster, m: 2.3 minutes each time, so that a soak comes to the same places again and again.
 const WIDTH: f64 = 20e-3;
@@ -78,7 +73,7 @@ fn told(report: &Report) {
 }
 
 fn parameters(folder: &Path, faces: usize) -> Parameters {
-    let mesh = wavy_plate(faces);
+    let mesh = wavy_plate(faces).expect("it can be counted");
     let scan = folder.join("scan.ply");
     write_mesh(&scan, &mesh, MeshUnit::Millimetre).expect("the folder is there");
     println!("{} faces", mesh.face_count());
@@ -99,7 +94,7 @@ fn alone(faces: usize) {
     let begun = Instant::now();
     for i in 0..1000 * SECONDS {
         sleep(Duration::from_millis(i as u64).saturating_sub(begun.elapsed()));
-        let (wrench, pose) = messages(&sample(i, WIDTH));
+        let (wrench, pose) = messages(&slide(i, WIDTH));
         // what finds no room is in the report
         let _ = world.arrive(Arrival::Wrench(wrench, steady_ns()));
         let _ = world.arrive(Arrival::Pose(pose, steady_ns()));

@@ -5,9 +5,7 @@ use divan::counter::ItemsCount;
 use nalgebra::{Point3, Vector3};
 use touchup::mesh::{FaceTree, TriMesh, signed_distance};
 use touchup::patch::{ContourParams, Crossing, Cut, Edge, Lattice, NodeValues, Patch, Region, contour};
-
-#[path = "../tests/common/wavy.rs"]
-mod wavy;
+use touchup::sim::wavy;
 
 /// Pitch of the lattice, m.
 const PITCH: f64 = 0.75e-3;
@@ -32,7 +30,7 @@ struct Case {
 
 impl Case {
     fn new(faces: usize) -> Self {
-        let scan = wavy::wavy_plate(faces);
+        let scan = wavy::wavy_plate(faces).expect("it can be counted");
         let tree = FaceTree::new(&scan);
         let lattice = Lattice { origin: Point3::new(0.137, -0.0931, 0.2713) * PITCH, pitch: PITCH };
         let middle = wavy::SIDE / 2.0;

@@ -6,22 +6,17 @@
 //!
 //! `cargo bench --bench push [-- FACES…]`
 
-#[path = "common/slide.rs"]
-mod slide;
-#[path = "../tests/common/wavy.rs"]
-mod wavy;
-
 use std::hint::black_box;
 use std::time::Instant;
 
 use nalgebra::{Point3, Vector3};
-use slide::{FORCE_N, RADIUS, STIFFNESS, sample};
-use touchup::mesh::{FaceTree, TriMesh, VertexId, triangle};
+use touchup::mesh::{FaceTree, TriMesh, triangle};
 use touchup::refine::{RefineParams, Refiner, RoiSize, TipParams};
-use wavy::wavy_plate;
+use touchup::report::cost::MinimalLoop;
+use touchup::sim::wavy::{RADIUS, SIDE, STIFFNESS, slide, wavy_plate};
 
 /// Width of the raster, m.
-const WIDTH: f64 = 0.8 * wavy::SIDE;
+const WIDTH: f64 = 0.8 * SIDE;
 const WARM: usize = 20_000;
 const TIMED: usize = 100_000;
 
@@ -50,7 +45,7 @@ fn push(name: &str, mesh: &TriMesh, roi: RoiSize, carve: bool) {
     let mut times = Vec::with_capacity(TIMED);
     let mut vertices = 0;
     for i in 0..WARM + TIMED {
-        let sample = sample(i, WIDTH);
+        let sample = slide(i, WIDTH);
         let start = Instant::now();
         let update = black_box(refiner.push(black_box(&sample))).expect("the sample is sound");
         let time = start.elapsed().as_nanos() as u64;
@@ -69,7 +64,7 @@ fn push(name: &str, mesh: &TriMesh, roi: RoiSize, carve: bool) {
 fn check_index(refiner: &Refiner) {
     let mesh = refiner.mesh();
     for i in 0..1_000 {
-        let at = sample(WARM + i * TIMED / 1_000, WIDTH).pose_ot.translation.vector;
+        let at = slide(WARM + i * TIMED / 1_000, WIDTH).pose_ot.translation.vector;
         let p = Point3::from(at + Vector3::new(0.3e-3, -0.2e-3, 0.1e-3));
         let hit = refiner.closest_face(&p, 0.1).expect("there is a face");
         let nearest = mesh
@@ -90,32 +85,19 @@ fn check_against_new_tree(refiner: &Refiner) {
     let mesh = refiner.mesh();
     let tree = FaceTree::new(mesh);
     for i in 0..1_000 {
-        let p = Point3::from(sample(WARM + i * TIMED / 1_000, WIDTH).pose_ot.translation.vector);
+        let p = Point3::from(slide(WARM + i * TIMED / 1_000, WIDTH).pose_ot.translation.vector);
         assert_eq!(refiner.closest_face(&p, 0.1), tree.closest(mesh, &p, 0.1), "query {i}");
     }
 }
 
-/// The least that any refiner must do, written by hand: closest face, move its corners, update the tree.
+/// The least that any refiner must do.
 fn minimal(mesh: &TriMesh) {
-    let mut mesh = mesh.clone();
-    let mut tree = FaceTree::new(&mesh);
-    let gain = -(-25.0f64 * 1e-3).exp_m1();
+    let mut minimal = MinimalLoop::new(mesh.clone());
     let mut times = Vec::with_capacity(TIMED);
-    let mut faces = Vec::new();
     for i in 0..WARM + TIMED {
-        let sample = sample(i, WIDTH);
+        let sample = slide(i, WIDTH);
         let start = Instant::now();
-        let normal = sample.wrench.force / FORCE_N;
-        let p = Point3::from(sample.pose_ot.translation.vector) + sample.wrench.force / STIFFNESS - normal * RADIUS;
-        if let Some(hit) = tree.closest(&mesh, &p, 0.01) {
-            let step = normal * (gain * (p - hit.point).dot(&normal));
-            faces.clear();
-            for VertexId(vertex) in mesh.corners(hit.face) {
-                mesh.set_position(VertexId(vertex), mesh.position(VertexId(vertex)) + step);
-                faces.extend_from_slice(mesh.star(VertexId(vertex)));
-            }
-            tree.refit(&mesh, &faces);
-        }
+        black_box(minimal.push(black_box(&sample)));
         if i >= WARM {
             times.push(start.elapsed().as_nanos() as u64);
         }
@@ -129,7 +111,7 @@ fn main() {
         sizes = vec![10_000, 100_000, 1_000_000, 5_000_000];
     }
     for faces in sizes {
-        let mesh = wavy_plate(faces);
+        let mesh = wavy_plate(faces).expect("it can be counted");
         let start = Instant::now();
         black_box(FaceTree::new(&mesh));
         println!("tree built in {:.0} ms", start.elapsed().as_secs_f64() * 1e3);

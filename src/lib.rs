@@ -25,6 +25,7 @@
 //! | [`scene`] | the YAML that names the parts of a scene |
 //! | `ros` | the node's side of ROS 2 (features `ros` and `r2r`): messages, parameters, and the port to what is behind them |
 //! | [`session`] | one run of touching: what comes of it, and what it takes to get the same again |
+//! | [`report`] | error against run time, stability, and what each part costs |
 //! | [`cli`] | one file for each verb of the command line |
 //!
 //! # Frames
@@ -60,6 +61,7 @@ pub mod mesh;
 pub mod patch;
 pub mod probe;
 pub mod refine;
+pub mod report;
 pub mod robot;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 pub mod ros;

@@ -1,13 +1,11 @@
 //! No sample costs an allocation once the refiner is warm: counted by the allocator itself.
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
-
 use nalgebra::{Isometry3, Point3, Vector3};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 use touchup::mesh::TriMesh;
 use touchup::refine::{GuardParams, RefineParams, Refiner, RoiSize, TipParams};
+use touchup::report::allocations::{CountingAllocator, asked};
 use touchup::touch::{
     BiasParams, MarkerBody, MarkerFilter, MarkerFrame, MarkerParams, Sample, SeenMarker, StampedPose, Wrench,
 };
@@ -16,36 +14,13 @@ use touchup::touch::{
 mod common;
 use common::{grid, within};
 
-/// Counts the requests of each thread.
-struct Counter;
-
-thread_local! {
-    static REQUESTS: Cell<u64> = const { Cell::new(0) };
-}
-
-fn note() {
-    let _ = REQUESTS.try_with(|requests| requests.set(requests.get() + 1));
-}
-
-// SAFETY: hands every call to the system's allocator unchanged
-unsafe impl GlobalAlloc for Counter {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        note();
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
-        unsafe { System.dealloc(memory, layout) }
-    }
-
-    unsafe fn realloc(&self, memory: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        note();
-        unsafe { System.realloc(memory, layout, size) }
-    }
-}
-
 #[global_allocator]
-static COUNTER: Counter = Counter;
+static COUNTER: CountingAllocator = CountingAllocator;
+
+/// Requests of this thread so far; to ask is one more.
+fn requests() -> u64 {
+    asked().unwrap().requests
+}
 
 /// Samples of the path, at 1 kHz.
 const PATH: i64 = 2_000;
@@ -76,11 +51,11 @@ fn allocations(params: RefineParams) -> u64 {
         refiner.push(&sample(tick)).unwrap();
     });
     let moved = refiner.counts().moved;
-    let before = REQUESTS.get();
+    let before = requests() + 1;
     for tick in PATH..PATH * (1 + ROUNDS) {
         refiner.push(&sample(tick)).unwrap();
     }
-    let requests = REQUESTS.get() - before;
+    let requests = requests() - before;
     let moved = refiner.counts().moved - moved;
     assert!(moved > 7_000, "the samples move the mesh: {moved}");
     requests
@@ -88,9 +63,9 @@ fn allocations(params: RefineParams) -> u64 {
 
 #[test]
 fn the_counter_counts() {
-    let before = REQUESTS.get();
+    let before = requests() + 1;
     let list = std::hint::black_box(vec![1u8; 100]);
-    assert_eq!((REQUESTS.get() - before, list.len()), (1, 100));
+    assert_eq!((requests() - before, list.len()), (1, 100));
 }
 
 #[test]
@@ -112,7 +87,7 @@ fn no_marker_frame_allocates() {
     let body = MarkerBody::new(markers_t.map(|p| Point3::from(p.map(|x| f64::from(x) * 1e-3))).to_vec()).unwrap();
     let mut filter = MarkerFilter::new(body.clone(), MarkerParams::default()).unwrap();
     let (mut poses, mut last) = (0_u64, None::<StampedPose>);
-    let before = REQUESTS.get();
+    let before = requests() + 1;
     for i in 0..2000_i64 {
         let mut frame = MarkerFrame::new(i * 5_000_000);
         let pose_ot = Isometry3::translation(0.05 * (i as f64 * 0.01).sin(), 0.0, 0.0);
@@ -127,6 +102,6 @@ fn no_marker_frame_allocates() {
             last = Some(pose);
         });
     }
-    assert_eq!(REQUESTS.get() - before, 0);
+    assert_eq!(requests() - before, 0);
     assert!(poses > 5000 && filter.counts().lost > 100 && filter.counts().rejected > 100, "{:?}", filter.counts());
 }

@@ -164,6 +164,7 @@ fn refine_json_is_one_object_with_the_documented_keys() {
     assert_eq!((code(&output), text(&output.stderr)), (0, ""));
     let summary = json(&output);
     let mut documented = [
+        "scene",
         "samples",
         "accepted",
         "refused",
@@ -179,6 +180,9 @@ fn refine_json_is_one_object_with_the_documented_keys() {
     ];
     documented.sort_unstable();
     assert_eq!(keys(&summary), documented);
+    let mut scene = ["built", "left_out", "mesh_mb", "tree_mb", "scan_mb", "patch_mb"];
+    scene.sort_unstable();
+    assert_eq!(keys(&summary["scene"]), scene);
     let mut tails = ["median", "p99", "p999", "max"];
     tails.sort_unstable();
     assert_eq!(keys(&summary["push_ns"]), tails);

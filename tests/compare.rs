@@ -14,9 +14,7 @@ use touchup::compare::{
 use touchup::io::mesh_file::{MeshUnit, VertexColumn, read_mesh, read_vertex_columns, write_mesh, write_mesh_with};
 use touchup::io::png::write_png;
 use touchup::mesh::{Alone, FaceTree, Job, TriMesh, Workers};
-
-#[path = "common/wavy.rs"]
-mod wavy;
+use touchup::sim::wavy;
 
 /// A square of 20 mm at a height, in 2 × `cells`² triangles, normals up.
 fn square(cells: u32, height: f64) -> TriMesh {
@@ -488,7 +486,7 @@ impl Workers for SoMany {
 
 #[test]
 fn any_number_of_threads_finds_the_same_to_the_last_bit() {
-    let mesh = wavy::wavy_plate(20_000);
+    let mesh = wavy::wavy_plate(20_000).unwrap();
     let tree = FaceTree::new(&mesh);
     let shape = Shape { mesh: &mesh, tree: &tree };
     let points: Vec<Point3<f64>> = sample_surface(&mesh, 3e5, 1)

@@ -7,9 +7,7 @@ use std::process::{Command, Output};
 use serde_json::Value;
 use touchup::io::mesh_file::{MeshUnit, write_mesh};
 use touchup::io::touches_file::HEADER;
-
-#[path = "common/wavy.rs"]
-mod wavy;
+use touchup::sim::wavy;
 
 fn touchup(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_touchup")).args(arguments).env_remove("RUST_LOG").output().unwrap()
@@ -109,7 +107,7 @@ fn outputs_over_inputs_are_refused() {
 #[test]
 fn a_mesh_with_nothing_on_it_gives_an_empty_list() {
     let folder = Folder::new();
-    write_mesh(&folder.path("wavy.ply"), &wavy::wavy_plate(20_000), MeshUnit::Millimetre).unwrap();
+    write_mesh(&folder.path("wavy.ply"), &wavy::wavy_plate(20_000).unwrap(), MeshUnit::Millimetre).unwrap();
     let features = ["features", &folder.name("wavy.ply"), "--out", &folder.name("out.json")];
     let words = done(&touchup(&features)).to_owned();
     assert!(words.contains("no features") && words.contains("out.json"), "{words}");

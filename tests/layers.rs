@@ -23,6 +23,10 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("scene", &["touch", "mesh", "patch", "refine", "explore", "robot", "probe", "sim", "io"]),
     ("session", &["touch", "mesh", "patch", "refine", "live", "features", "io"]),
     (
+        "report",
+        &["touch", "mesh", "patch", "refine", "live", "features", "align", "sim", "compare", "io", "scene", "session"],
+    ),
+    (
         "ros",
         &[
             "touch",
@@ -62,6 +66,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "io",
             "scene",
             "session",
+            "report",
             "ros",
             "robot",
         ],

@@ -494,3 +494,28 @@ fn gravity_in_the_axes_of_space_turns_with_the_scan() {
     }
     assert_eq!(Scene::default().placement(), None);
 }
+
+/// Names as they stand in the YAML, in its order, listed here by hand.
+#[test]
+fn a_scene_tells_what_is_built_of_it_and_what_is_left_out() {
+    let told = |yaml: &str| {
+        let mut built = Scene::from_yaml(yaml).unwrap().built(&["robot"]);
+        // what the program was compiled with differs from one to the other
+        for names in [&mut built.built, &mut built.left_out] {
+            names.retain(|name| !name.starts_with("feature "));
+        }
+        built.to_string()
+    };
+    let all_but_refine = "sync, clock, markers, scan_to_space, compensation, bias_tracking, contact, tip, scan, \
+                          scan.region, sliding, carve, guard, patch, uncertainty, robot";
+    assert_eq!(told("refine:"), format!("built: refine; left out: {all_but_refine}"));
+    assert_eq!(told("sync:\nrefine:\ncontact:"), {
+        let left_out = "clock, markers, scan_to_space, compensation, bias_tracking, tip, scan, scan.region, sliding, carve, guard, \
+                        patch, uncertainty, robot";
+        format!("built: sync, contact, refine; left out: {left_out}")
+    });
+    // the mode of the paper takes neither contact, sliding, carving nor a patch, whatever is named
+    let paper = told("contact:\ntip:\nsliding:\ncarve:\npatch:\nuncertainty:\nguard:\nrefine: { mode: paper }");
+    assert!(paper.starts_with("built: tip, guard, refine; left out: sync"), "{paper}");
+    assert!(paper.ends_with("sliding, carve, patch, uncertainty, robot"), "{paper}");
+}

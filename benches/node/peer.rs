@@ -13,8 +13,8 @@ use ros2_client::{Context, MessageTypeName, Name, Node, NodeName, NodeOptions, P
 use touchup::live::Latencies;
 use touchup::ros::clock::{stamp_ns, steady_ns};
 use touchup::ros::messages::{HapticMismatch, Header, Marker, MeshPatch, Message, Point, PoseStamped, WrenchStamped};
+use touchup::sim::wavy::{STEP_NS, slide};
 
-use crate::slide::{STEP_NS, sample};
 use crate::{WIDTH, messages, shown};
 
 /// All tiles are there when none has come for so long.
@@ -236,7 +236,7 @@ pub fn run(domain: u16, seconds: usize, is_node: bool) {
         move || {
             for (number, sent) in sent_ns.iter().enumerate() {
                 sleep(Duration::from_millis(number as u64).saturating_sub(begin.elapsed()));
-                let mut sample = sample(number, WIDTH);
+                let mut sample = slide(number, WIDTH);
                 sample.stamp_ns += begin_ns;
                 let (wrench, pose) = messages(&sample);
                 if let Some(poses) = &poses {

@@ -84,7 +84,7 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
     let bag = arguments.out.join("touch.mcap");
     let files = RefineArguments::of_files(scan_path.clone(), bag, refined_path.clone(), MeshUnit::Millimetre)
         .with_features(features_path.clone(), touches_path);
-    let Refined { summary, losses, .. } = files.refined()?;
+    let Refined { summary, losses, .. } = files.refined(|_| ())?;
     // measured is what was written
     let MeshFile { mesh: refined, .. } = read_mesh(&refined_path, MeshUnit::Millimetre).map_err(CliError::ReadMesh)?;
 

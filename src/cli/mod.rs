@@ -15,6 +15,7 @@ mod found;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 mod node;
 mod offsets;
+mod peers;
 mod probe;
 mod probing;
 mod progress;
@@ -22,6 +23,7 @@ mod rates;
 mod refine;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 mod replay;
+mod report;
 mod samples;
 mod simulate;
 mod step;
@@ -52,6 +54,7 @@ use crate::io::touches_file::TouchesFileError;
 use crate::live::LiveError;
 use crate::mesh::MeshError;
 use crate::refine::RefineError;
+use crate::report::ReportError;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use crate::ros::arguments::{ArgumentError, log_level, split};
 #[cfg(any(feature = "ros", feature = "r2r"))]
@@ -103,6 +106,8 @@ enum Verb {
     Check(check::CheckArguments),
     /// Scans and touches a known part: makes the input of refine
     Simulate(simulate::SimulateArguments),
+    /// Measures error against run time, stability and cost on this machine, and writes page, plots and tables
+    Report(report::ReportArguments),
     /// Refines a scan live, as a ROS 2 node
     #[cfg(any(feature = "ros", feature = "r2r"))]
     #[command(after_help = ROS_ARGUMENTS)]
@@ -150,6 +155,12 @@ enum CliError {
     #[error(transparent)]
     Simulate(#[from] SimError),
     #[error(transparent)]
+    Peers(#[from] peers::PeersError),
+    #[error(transparent)]
+    WholeScan(#[from] crate::report::WholeScanError),
+    #[error(transparent)]
+    Cost(#[from] crate::report::cost::CostError),
+    #[error(transparent)]
     Mesh(#[from] MeshError),
     #[error(transparent)]
     Setting(#[from] SettingError),
@@ -178,6 +189,8 @@ enum CliError {
     Arm(String),
     #[error("feature {0}: {1}")]
     Explore(u32, ExploreError),
+    #[error(transparent)]
+    Report(#[from] ReportError),
     #[error("the two cannot be compared: {0}")]
     Compare(#[from] CompareError),
     #[cfg(any(feature = "ros", feature = "r2r"))]
@@ -215,7 +228,7 @@ impl CliError {
             Self::WriteMesh(_) | Self::WriteRecording(_) | Self::Write { .. } | Self::Stream(_) => 1,
             Self::Touches(TouchesFileError::Write { .. }) | Self::Features(FeaturesFileError::Write { .. }) => 1,
             Self::Usage(_) | Self::Explore(..) => 2,
-            Self::Arm(_) => 1,
+            Self::Arm(_) | Self::Report(_) | Self::Peers(_) | Self::Cost(_) => 1,
             #[cfg(any(feature = "ros", feature = "r2r"))]
             Self::RosArguments(_) => 2,
             #[cfg(any(feature = "ros", feature = "r2r"))]
@@ -224,7 +237,7 @@ impl CliError {
             Self::UrSetup(_) | Self::UrChild(_) => 1,
             #[cfg(any(feature = "ros", feature = "r2r"))]
             Self::Node(error) => match error {
-                NodeError::NoScan => 2,
+                NodeError::NoScan | NodeError::RegionWithRobot => 2,
                 NodeError::Scene(_) | NodeError::Scan(_) | NodeError::NothingMoves => 3,
                 NodeError::Setting(_) | NodeError::Refine(_) | NodeError::Live(_) => 3,
                 _ => 1,
@@ -235,7 +248,7 @@ impl CliError {
             Self::Touches(_) | Self::Features(_) | Self::Session(_) => 3,
             Self::Table(_) | Self::Pairs { .. } | Self::Payload { .. } | Self::Tip { .. } | Self::Rests { .. } => 3,
             Self::Mesh(_) | Self::Setting(_) | Self::Refine(_) | Self::Live(_) => 3,
-            Self::Align(_) | Self::AlignFeatures(_) | Self::Compare(_) => 3,
+            Self::Align(_) | Self::AlignFeatures(_) | Self::Compare(_) | Self::WholeScan(_) => 3,
         }
     }
 }
@@ -280,6 +293,7 @@ impl Verb {
             Self::Probe(arguments) => probe::probe(arguments),
             Self::Check(arguments) => check::check(arguments),
             Self::Simulate(arguments) => simulate::simulate(arguments),
+            Self::Report(arguments) => report::report(arguments),
             #[cfg(any(feature = "ros", feature = "r2r"))]
             Self::Node(arguments) => node::node(arguments, _ros),
             #[cfg(any(feature = "ros", feature = "r2r"))]

@@ -40,6 +40,7 @@ pub(super) fn node(arguments: &NodeArguments, ros: &[String]) -> Result<Losses, 
     let ready = Prepared::new(config.parameters.clone())?;
     let (scan, faces) = ready.scan();
     tell(&format!("scan: {} with {faces} faces; session: {}", scan.display(), ready.folder().display()));
+    tell(&ready.cost(config.parameters.string("robot") != "none").to_string());
     let (inbox, arrivals) = sync_channel(INBOX);
     end_on_signals(inbox.clone()).map_err(|error| NodeError::NoThread(error.to_string()))?;
     let port = ros::start(&config, inbox)?;

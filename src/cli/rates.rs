@@ -34,6 +34,8 @@ pub(super) enum Rates {
 }
 
 pub(super) struct Live {
+    /// what the patch is made from
+    scan: Arc<(TriMesh, FaceTree)>,
     refiner: LiveRefiner,
     /// when the first sample came, and its stamp, ns
     begun: Option<(Instant, i64)>,
@@ -55,8 +57,24 @@ impl Rates {
     /// As [`LiveRefiner::new`].
     pub fn live(scan: &TriMesh, refiner: Refiner, patcher: Patcher) -> Result<Self, LiveError> {
         let scan = Arc::new((scan.clone(), FaceTree::new(scan)));
-        let refiner = LiveRefiner::new(scan, refiner, patcher, Pace::default(), ROOM)?;
-        Ok(Self::Live(Box::new(Live { refiner, begun: None, behind: Latencies::new(), stopped: None })))
+        let refiner = LiveRefiner::new(Arc::clone(&scan), refiner, patcher, Pace::default(), ROOM)?;
+        Ok(Self::Live(Box::new(Live { scan, refiner, begun: None, behind: Latencies::new(), stopped: None })))
+    }
+
+    /// The haptic update.
+    pub fn refiner(&self) -> &Refiner {
+        match self {
+            Self::AtOnce { refiner, .. } => refiner,
+            Self::Live(live) => live.refiner.refiner(),
+        }
+    }
+
+    /// Memory of the scan and its tree that the patch has for itself, bytes.
+    pub fn scan_bytes(&self) -> usize {
+        match self {
+            Self::AtOnce { .. } => 0,
+            Self::Live(live) => live.scan.0.bytes() + live.scan.1.bytes(),
+        }
     }
 
     /// Takes the next sample, in real time when it is due; returns how long that took.

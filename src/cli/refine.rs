@@ -23,7 +23,7 @@ use crate::live::{Latencies, Quantiles};
 use crate::mesh::{FaceTree, RepairReport, TriMesh};
 use crate::patch::Patcher;
 use crate::refine::{RefineCounts, RefineError, RefineParams, Refiner};
-use crate::scene::{Mode, Scene};
+use crate::scene::{CutScan, Memory, Mode, Scene, SceneCost};
 use crate::session::{Outcome, OutcomePlaces, PatchSummary, SessionRecord, StrokeChange, UncertaintySummary};
 use crate::touch::{ClockEstimator, Compensator, MarkerCounts, Sample};
 
@@ -109,6 +109,8 @@ impl TypedValueParser for PathOrNone {
 /// What `--json` prints; times in s, `push_ns` in ns.
 #[derive(Debug, Serialize)]
 pub(super) struct Summary {
+    /// what was built of the scene, what was left out, and the memory that it took at start
+    scene: SceneCost,
     /// wrenches of the recording: each could be a sample
     samples: u64,
     /// those that the refiner took
@@ -174,7 +176,12 @@ pub(super) fn refine(arguments: &RefineArguments) -> Result<Losses, CliError> {
         None => arguments.with_scan()?,
     };
     let arguments = &completed;
-    let Refined { repair, summary, losses } = arguments.refined()?;
+    let at_start = |cost: &SceneCost| {
+        if !arguments.json {
+            tell(&cost.to_string());
+        }
+    };
+    let Refined { repair, summary, losses } = arguments.refined(at_start)?;
     if arguments.json {
         tell(&serde_json::to_string(&summary).expect("numbers and names alone cannot fail"));
     } else {
@@ -338,24 +345,31 @@ impl RefineArguments {
     }
 
     /// Reads, replays and writes.
-    pub(super) fn refined(&self) -> Result<Refined, CliError> {
+    ///
+    /// - `at_start`: is told what was built, before the first sample.
+    pub(super) fn refined(&self, at_start: impl FnOnce(&SceneCost)) -> Result<Refined, CliError> {
         let scene = self.scene()?;
         self.check_out()?;
         let started = Instant::now();
         let MeshFile { mesh, repair } = read_mesh(&self.scan, self.mesh_unit).map_err(CliError::ReadMesh)?;
+        let CutScan { mesh, cut } = scene.cut(mesh)?;
         let as_scanned = mesh.clone();
         let markers = marker_filter(&scene, self.markers_topic.as_deref())?;
         let topics = self.topics();
         let recording = Recording::open(&self.bag, &topics).map_err(CliError::ReadRecording)?;
         let params =
             scene.refine_params(recording.wrench_frame).ok_or_else(|| CliError::Usage(NOTHING_MOVES.to_owned()))?;
+        let params = cut.refine_params(params);
         let mut refiner = Refiner::new(mesh, params)?;
         if !self.strokes.is_empty() {
             refiner.keep_strokes();
         }
-        let patcher = scene.patcher_params(recording.wrench_frame).map(Patcher::new).transpose()?;
+        let patcher = scene.patcher_params(recording.wrench_frame).map(|params| cut.patcher_params(params));
+        let patcher = patcher.map(Patcher::new).transpose()?;
         let mut rates = self.rates(refiner, patcher, &as_scanned)?;
         let load_s = started.elapsed().as_secs_f64();
+        let cost = self.cost(&scene, &rates, as_scanned.bytes() + cut.bytes());
+        at_start(&cost);
 
         let started = Instant::now();
         let mut pushes = Pushes::new();
@@ -383,7 +397,11 @@ impl RefineArguments {
         let stage = Progress::stage("mesh anew");
         let patcher = patcher.filter(|_| counts.contacts > 0);
         let Outcome { moved_faces, patch, uncertainty, .. } =
-            self.places().write(&as_scanned, refiner.mesh(), patcher)?;
+            OutcomePlaces { outside: cut.outside.as_ref(), ..self.places() }.write(
+                &as_scanned,
+                refiner.mesh(),
+                patcher,
+            )?;
         drop(stage);
         debug!(?counts, "replayed");
         replayed.losses.extend(lost_samples(&replayed, pushes.accepted));
@@ -398,9 +416,13 @@ impl RefineArguments {
         }
         let mut refused = pushes.refused;
         refused.extend(replayed.refused);
+        if counts.outside_region > 0 {
+            refused.insert("outside_region".to_owned(), counts.outside_region);
+        }
         let summary = Summary {
+            scene: cost,
             samples: replayed.wrenches,
-            accepted: pushes.accepted,
+            accepted: pushes.accepted - counts.outside_region,
             refused,
             contacts: counts.contacts,
             markers: replayed.markers,
@@ -421,6 +443,14 @@ impl RefineArguments {
         Ok(Refined { repair, summary, losses: replayed.losses })
     }
 
+    /// What was built of the scene for these samples.
+    fn cost(&self, scene: &Scene, rates: &Rates, scan_bytes: usize) -> SceneCost {
+        // no arm moves while a recording is replayed
+        let unused = if self.markers_topic.is_some() { &["robot"][..] } else { &["robot", "markers"] };
+        let memory = Memory::of(rates.refiner().footprint(), scan_bytes + rates.scan_bytes());
+        SceneCost { parts: scene.built(unused), memory }
+    }
+
     /// Which way the samples go.
     fn rates(&self, refiner: Refiner, patcher: Option<Patcher>, scan: &TriMesh) -> Result<Rates, CliError> {
         match patcher {
@@ -432,7 +462,7 @@ impl RefineArguments {
 
     fn places(&self) -> OutcomePlaces<'_> {
         let [features, touches] = [&self.features_out, &self.touches_out].map(|out| out.as_deref());
-        OutcomePlaces { mesh: &self.out, unit: self.mesh_unit, features, touches }
+        OutcomePlaces { mesh: &self.out, unit: self.mesh_unit, features, touches, outside: None }
     }
 
     fn topics(&self) -> Topics {

@@ -13,6 +13,7 @@ mod normals;
 mod picture;
 mod sampling;
 mod summary;
+mod touched;
 
 pub use cloud::cloud_distances;
 pub use colour::{Rgb, colour_of, colour_of_class};
@@ -27,6 +28,7 @@ pub use normals::{Tilt, TiltSummary, angle_between, tilts};
 pub use picture::{Panel, Picture, PictureParams, draw_picture};
 pub use sampling::{Sample, sample_surface, surface_area};
 pub use summary::{BINS, Histogram, Summary, quantile};
+pub use touched::TouchedRegion;
 
 /// Why two shapes cannot be compared.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -2,6 +2,7 @@
 
 pub mod atomic;
 pub mod features_file;
+pub mod machine;
 pub mod mesh_file;
 pub mod pairs_file;
 pub mod parameters_file;

@@ -24,6 +24,12 @@ pub enum MeshError {
     /// No face is left to touch.
     #[error("the mesh has no face of non-zero area")]
     Empty,
+    /// A part that was cut out and does not fit into the rest any more.
+    #[error(
+        "what was touched reaches the rim of the part that may be: make scan.region_low_mm and scan.region_high_mm wider, \
+         and refine the recording again"
+    )]
+    TornRim,
     /// An index beyond the vertices.
     #[error("face {face} uses vertex {vertex}, but there are only {vertices} vertices")]
     VertexOutOfRange {

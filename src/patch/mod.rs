@@ -67,7 +67,7 @@ pub use history::History;
 pub use knocks::{Knock, Knocks};
 pub use lattice::{Edge, Lattice, Node, Owner, PatchFace, Square, VertexKey};
 pub use patched::{Patched, Support};
-pub use patcher::{Patcher, PatcherParams, UncertaintyParams};
+pub use patcher::{PatchRegion, Patcher, PatcherParams, UncertaintyParams};
 pub use probed_log::ProbedLog;
 pub use scan_value::ScanValue;
 pub use splice::{Patch, Splice};

@@ -15,10 +15,10 @@ use super::remesh::{Remesh, Renewed};
 use super::restore::{News, NodeState, Restored, node_at};
 use super::splice::Patch;
 use super::swept::SweptSpace;
-use super::touches::{TouchFinder, TouchFinderParams};
+use super::touches::{Touch, TouchFinder, TouchFinderParams};
 use super::unreachable::mark_unreachable;
 use super::vertex_sigma::vertex_sigma;
-use crate::mesh::{FaceTree, MeshError, TriMesh};
+use crate::mesh::{FaceTree, MeshError, Region, TriMesh};
 use crate::touch::{Compensator, CompensatorParams, ProbedPoint, Sample, SettingError, TipBody, TipShape};
 
 /// Settings of a [`Patcher`].
@@ -38,6 +38,17 @@ pub struct PatcherParams {
     pub most_faces: f64,
     /// how well things are known; `None`: nobody asks, and nothing is held apart
     pub uncertainty: Option<UncertaintyParams>,
+    /// `None`: the mesh is the whole scan, and may be touched anywhere
+    pub region: Option<PatchRegion>,
+}
+
+/// The part of a scan that a patcher has, and where in it may be touched.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PatchRegion {
+    /// what the tip does elsewhere is not looked at
+    pub region: Region,
+    /// faces of the whole scan
+    pub faces: usize,
 }
 
 /// What is said of how well the mesh is known.
@@ -82,6 +93,7 @@ impl PatcherParams {
             pitch: radius / 2.0,
             most_faces: 10.0,
             uncertainty: Some(UncertaintyParams::new(noise)),
+            region: None,
         }
     }
 
@@ -263,8 +275,8 @@ impl Patcher {
     /// is complete.
     pub fn push(&mut self, sample: &Sample) {
         let tip = self.compensator.compensate(sample);
-        let Self { finder, felt, .. } = self;
-        finder.push(&tip, |touch| felt.keep(&touch));
+        let Self { finder, felt, params, .. } = self;
+        finder.push(&tip, |touch| keep(felt, params, &touch));
     }
 
     /// The touches themselves, in order of time.
@@ -279,8 +291,8 @@ impl Patcher {
 
     /// Takes in what is still in the smoothing window: the stream has ended or pauses.
     pub fn flush(&mut self) {
-        let Self { finder, felt, .. } = self;
-        finder.flush(|touch| felt.keep(&touch));
+        let Self { finder, felt, params, .. } = self;
+        finder.flush(|touch| keep(felt, params, &touch));
     }
 
     /// How many strokes can be undone. A stroke is what was touched without a pause of a tenth of a second, and where the
@@ -374,7 +386,7 @@ impl Patcher {
             is_outdated: false,
         });
         let (news, late) = live.take_news();
-        let faces = scan.face_count() as f64 + live.shown.faces_more();
+        let faces = self.whole(scan) + live.shown.faces_more();
         let renewed = if live.is_outdated || faces > self.budget(scan) {
             let (remesh, mut renewed) = self.meshed_anew(scan, tree);
             (live.remesh, live.is_outdated) = (remesh, false);
@@ -410,7 +422,12 @@ impl Patcher {
     }
 
     fn budget(&self, scan: &TriMesh) -> f64 {
-        (self.params.most_faces * scan.face_count() as f64).max(LEAST_BUDGET)
+        (self.params.most_faces * self.whole(scan)).max(LEAST_BUDGET)
+    }
+
+    /// Faces of the whole scan.
+    fn whole(&self, scan: &TriMesh) -> f64 {
+        self.params.region.map_or(scan.face_count(), |touched| touched.faces) as f64
     }
 
     /// The patch of everything, within the budget.
@@ -424,7 +441,7 @@ impl Patcher {
         let mut made = meshed(self.params.pitch);
         for _ in 0..COARSER {
             let Patch { faces, removed, .. } = &made.1.patch;
-            let faces = (scan.face_count() + faces.len() - removed.len()) as f64;
+            let faces = self.whole(scan) + faces.len() as f64 - removed.len() as f64;
             if faces <= budget {
                 break;
             }
@@ -432,6 +449,15 @@ impl Patcher {
             made = meshed(made.0.lattice().pitch * 1.02 * (faces / budget).sqrt());
         }
         made
+    }
+}
+
+/// What the tip does outside the region is not looked at.
+fn keep(felt: &mut Felt, params: &PatcherParams, touch: &Touch) {
+    if params.region.is_none_or(|touched| touched.region.contains(&touch.centre)) {
+        felt.keep(touch);
+    } else {
+        felt.until_ns = touch.stamp_ns;
     }
 }
 

@@ -4,9 +4,10 @@ use nalgebra::{Point3, Vector3};
 
 use super::followed::FollowedPatch;
 use super::guard::{GuardParams, Verdict};
+use super::params::TouchedRegion;
 use super::roi::{Roi, RoiSize};
 use super::strokes::Strokes;
-use crate::mesh::{FaceHit, FaceId, FaceTree, MeshError, RefitPlan, TriMesh, VertexId};
+use crate::mesh::{FaceHit, FaceId, FaceTree, MeshError, RefitPlan, Region, TriMesh, VertexId};
 use crate::patch::{PatchDelta, Support};
 
 /// An update that would break the mesh is tried again at this share of its length …
@@ -27,6 +28,17 @@ pub enum Fit {
     CutBack,
 }
 
+/// Memory of a mesh under refinement, bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Footprint {
+    /// positions, faces, adjacency, where each vertex was scanned, the normal felt on each face
+    pub mesh: usize,
+    /// the tree over the faces
+    pub tree: usize,
+    /// what is kept of a patch that is followed
+    pub patch: usize,
+}
+
 /// A mesh under refinement: the triangles, the tree over them, and what was scanned or felt where.
 #[derive(Clone, Debug)]
 pub(super) struct DeformableMesh {
@@ -41,6 +53,8 @@ pub(super) struct DeformableMesh {
     pub mean_edge: f64,
     /// vertices stay within this distance of where they were scanned, m
     pub largest_move: f64,
+    /// vertices that were scanned outside of it stay; `None`: all may move
+    movable: Option<Region>,
     /// stamp of the sample at hand, ns
     pub now_ns: i64,
     /// counts the edits, so that a region knows whether others came between
@@ -78,19 +92,20 @@ impl HandleRegion {
 }
 
 impl DeformableMesh {
-    pub fn new(mesh: TriMesh, guard: Option<GuardParams>) -> Self {
+    pub fn new(mesh: TriMesh, guard: Option<GuardParams>, touched: Option<&TouchedRegion>) -> Self {
         let tree = FaceTree::new(&mesh);
         let mut evidence = vec![[0.0; 3]; mesh.face_slots()];
         for (face, _) in mesh.faces() {
             evidence[face.0 as usize] = mesh.normal(face).cast::<f32>().into();
         }
-        let mean_edge = mean_edge(&mesh);
+        let mean_edge = touched.map_or_else(|| mean_edge(&mesh), |touched| touched.mean_edge);
         Self {
             scanned: mesh.positions().to_vec(),
             evidence,
             guard,
             mean_edge,
             largest_move: f64::INFINITY,
+            movable: touched.map(|touched| touched.region.grown(touched.margin)),
             now_ns: i64::MIN,
             edits: 0,
             displacements: Vec::new(),
@@ -99,6 +114,17 @@ impl DeformableMesh {
             strokes: None,
             mesh,
             tree,
+        }
+    }
+
+    /// Memory, bytes.
+    pub fn footprint(&self) -> Footprint {
+        let scanned = self.scanned.capacity() * size_of::<Point3<f64>>();
+        let evidence = self.evidence.capacity() * size_of::<[f32; 3]>();
+        Footprint {
+            mesh: self.mesh.bytes() + scanned + evidence,
+            tree: self.tree.bytes(),
+            patch: self.patch.as_ref().map_or(0, FollowedPatch::bytes),
         }
     }
 
@@ -277,7 +303,8 @@ impl DeformableMesh {
         let mut longest = 0.0f64;
         for (&vertex, weights) in roi.vertices.iter().zip(&roi.weights) {
             let here = self.mesh.position(vertex);
-            let is_stiff = self.patch.as_ref().is_some_and(|patch| patch.is_touched(vertex));
+            let is_outside = self.movable.is_some_and(|movable| !movable.contains(&self.scanned[vertex.0 as usize]));
+            let is_stiff = is_outside || self.patch.as_ref().is_some_and(|patch| patch.is_touched(vertex));
             let mut step = steps[0] * weights[0] + steps[1] * weights[1] + steps[2] * weights[2];
             let (way, next) = (here - self.scanned[vertex.0 as usize], here + step - self.scanned[vertex.0 as usize]);
             if is_stiff || next.norm_squared() > self.largest_move * self.largest_move && next.norm() > way.norm() {
@@ -298,8 +325,8 @@ impl DeformableMesh {
     }
 }
 
-/// Mean edge length, m, of up to [`EDGE_SAMPLE`] faces spread over the mesh.
-fn mean_edge(mesh: &TriMesh) -> f64 {
+/// Mean edge length, m, of up to 20,000 faces spread over the mesh.
+pub fn mean_edge(mesh: &TriMesh) -> f64 {
     let step = (mesh.face_count() / EDGE_SAMPLE).max(1);
     let (mut sum, mut count) = (0.0, 0.0);
     for (face, _) in mesh.faces().step_by(step) {

@@ -34,6 +34,13 @@ impl FollowedPatch {
         Self { splice: Splice::default(), support, moved: Vec::new(), moved_ns, refit: Vec::new() }
     }
 
+    /// Memory of what is kept for each vertex, bytes.
+    pub fn bytes(&self) -> usize {
+        self.support.capacity() * size_of::<Support>()
+            + self.moved_ns.capacity() * size_of::<i64>()
+            + self.moved.capacity() * size_of::<VertexId>()
+    }
+
     #[inline]
     pub fn is_touched(&self, vertex: VertexId) -> bool {
         self.support(vertex) == Support::Touched

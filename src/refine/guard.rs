@@ -257,7 +257,8 @@ impl Neighbourhood {
 
     /// Judges the mesh as it stands now against what it was before the update.
     ///
-    /// - `evidence`: for each face the last normal scanned or felt there.
+    /// - `evidence`: for each face the last normal scanned or felt there; zero where it was scanned without area and never
+    ///   felt: it has no side to keep then, and must not hold the others.
     /// - `gap`: faces nearer than this touch, m.
     /// - `way`: the longest way of a vertex in the update, m.
     /// - `before`: the position of a vertex before the update, m.
@@ -299,7 +300,7 @@ impl Neighbourhood {
     fn look(&self, params: &GuardParams, evidence: &[[f32; 3]]) -> Look {
         match self.look_at_faces(params, evidence) {
             Look::Broken => Look::Broken,
-            look => look.and(self.look_at_edges(params)),
+            look => look.and(self.look_at_edges(params, evidence)),
         }
     }
 
@@ -307,6 +308,9 @@ impl Neighbourhood {
         let mut look = Look::Safe;
         for ((&face, old), new) in self.ring.faces.iter().zip(&self.before).zip(&self.after) {
             let seen = Vector3::from(evidence[face.0 as usize].map(f64::from));
+            if seen == Vector3::zeros() {
+                continue;
+            }
             let worse = |new: f64, old: f64, limit: f64| new < limit && new < old;
             let cosine = new.normal.dot(&seen);
             let broken = worse(new.quality, old.quality, params.smallest_quality)
@@ -322,9 +326,13 @@ impl Neighbourhood {
         look
     }
 
-    fn look_at_edges(&self, params: &GuardParams) -> Look {
+    fn look_at_edges(&self, params: &GuardParams, evidence: &[[f32; 3]]) -> Look {
         let mut look = Look::Safe;
+        let has_side = |index: u32| evidence[self.ring.faces[index as usize].0 as usize] != [0.0; 3];
         for &(a, b) in &self.ring.edges {
+            if !(has_side(a) && has_side(b)) {
+                continue;
+            }
             let (old_a, old_b) = (&self.before[a as usize], &self.before[b as usize]);
             let new_b = self.after.get(b as usize).unwrap_or(old_b);
             let cosine = self.after[a as usize].normal.dot(&new_b.normal);

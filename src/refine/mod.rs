@@ -21,10 +21,10 @@ mod strokes;
 use nalgebra::{Point3, Vector3};
 use serde::Serialize;
 
-pub use deform::Fit;
+pub use deform::{Fit, Footprint, mean_edge};
 pub use dynamics::{Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, StepRule};
 pub use guard::GuardParams;
-pub use params::{CarveParams, ClosestBy, RefineParams, TipParams, TouchPoint, relaxing_alpha};
+pub use params::{CarveParams, ClosestBy, RefineParams, TipParams, TouchPoint, TouchedRegion, relaxing_alpha};
 pub use registration::{Registrar, Registration, RegistrationError, RegistrationParams};
 pub use roi::RoiSize;
 pub use sliding::{Ball, SlidingParams, TipMotion};
@@ -134,6 +134,8 @@ pub struct RefineCounts {
     pub cut_back: u64,
     /// contacts beyond the reach of any face
     pub out_of_reach: u64,
+    /// contacts outside the region that may be touched
+    pub outside_region: u64,
     /// contacts with a force beyond what the contact model can answer; clamped where the rigid offset is taken out
     pub clamped: u64,
 }
@@ -201,17 +203,14 @@ impl Refiner {
             return Err(MeshError::Empty.into());
         }
         params.check()?;
-        let mut deformable = DeformableMesh::new(mesh, params.guard);
+        let mut deformable = DeformableMesh::new(mesh, params.guard, params.region.as_ref());
         deformable.largest_move =
             (params.largest_move_edges * deformable.mean_edge).max(params.largest_move_noises * params.scan_noise);
         Ok(Self {
             compensator: Compensator::new(params.compensator)?,
             bias: params.bias.map(BiasTracker::new).transpose()?,
             gate: params.gate.map(ContactGate::new).transpose()?,
-            motion: TipMotion::new(
-                params.sliding.unwrap_or(SlidingParams { smoothing: 0.0, ..Default::default() }),
-                params.tip,
-            ),
+            motion: TipMotion::new(params.sliding.unwrap_or_default(), params.tip),
             dynamics: FaceDynamics::new(params.dynamics)?,
             contact_region: deformable.region(params.roi),
             carve_region: deformable.region(RoiSize::Handle),
@@ -256,12 +255,18 @@ impl Refiner {
         if let Some(bias) = &mut self.bias {
             tip.force_o = bias.compensate(&tip);
         }
-        let ball = self.motion.update(&tip, dt, LONGEST_HOLD);
+        let ball = match self.params.sliding {
+            Some(_) => self.motion.update(&tip, dt, LONGEST_HOLD),
+            None => self.motion.still(&tip),
+        };
         if !self.body.is_ball() {
             self.axis = TipPlace::from(&tip.pose_ot).axis;
         }
         let dt = dt.min(LONGEST_HOLD);
         let felt = self.felt_normal(sample.stamp_ns, &ball, dt);
+        if self.params.region.is_some_and(|touched| !touched.region.contains(&ball.centre)) {
+            return Ok(self.pass(felt));
+        }
         let update = match felt {
             Felt::Nothing => Update::FREE,
             _ => {
@@ -273,6 +278,18 @@ impl Refiner {
         match self.params.carve {
             Some(carve) => Ok(self.carve(&carve, &ball, felt, dt, update)),
             None => Ok(update),
+        }
+    }
+
+    /// A sample outside the region that may be touched moves nothing.
+    fn pass(&mut self, felt: Felt) -> Update {
+        self.counts.accepted += 1;
+        match felt {
+            Felt::Nothing => Update::FREE,
+            _ => {
+                self.counts.outside_region += 1;
+                Update { case: Case::SurfaceOnly, mismatch: None, fit: None }
+            }
         }
     }
 
@@ -495,6 +512,11 @@ impl Refiner {
     /// Gives the mesh back.
     pub fn into_mesh(self) -> TriMesh {
         self.deformable.mesh
+    }
+
+    /// Memory of mesh and tree as they stand.
+    pub fn footprint(&self) -> Footprint {
+        self.deformable.footprint()
     }
 
     /// The closest face of the mesh as it stands, by true surface distance, nearer than `reach` (m).

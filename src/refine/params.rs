@@ -4,6 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::guard::GuardParams;
 use super::{Along, ContactModel, DynamicsParams, RoiSize, SlidingParams, StepRule};
+use crate::mesh::Region;
 use crate::touch::{BiasParams, CompensatorParams, ContactGateParams, SettingError, TipBody, TipShape};
 
 /// The ball at the end of stylus or probe.
@@ -58,6 +59,17 @@ impl Default for CarveParams {
     }
 }
 
+/// The part of a scan that a refiner has, and where in it may be touched.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TouchedRegion {
+    /// a contact whose ball is centred elsewhere moves nothing
+    pub region: Region,
+    /// vertices farther from the region than this stay, m
+    pub margin: f64,
+    /// mean edge of the whole scan, m
+    pub mean_edge: f64,
+}
+
 /// All settings of a [`super::Refiner`]. What is `None` is not built.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RefineParams {
@@ -99,6 +111,8 @@ pub struct RefineParams {
     pub largest_move_noises: f64,
     /// Standard deviation of the scan's vertices, m. Default 0.6 mm.
     pub scan_noise: f64,
+    /// `None`: the mesh is all there is, and may be touched anywhere.
+    pub region: Option<TouchedRegion>,
 }
 
 /// Relaxation of a touched face in [`RefineParams::robust`], 1/s: within 40 ms, twenty poses at 500 Hz, so that their
@@ -158,6 +172,7 @@ impl RefineParams {
             largest_move_edges: 2.6,
             largest_move_noises: 5.0,
             scan_noise: 0.6e-3,
+            region: None,
         }
     }
 

@@ -82,16 +82,22 @@ impl TipMotion {
                 let force_with_velocity = last.force_with_velocity + (force_o - last.force_with_velocity) * slow_gain;
                 Ball { reported, centre, force_o, force_with_velocity, velocity }
             }
-            _ => Ball {
-                reported: here,
-                centre: self.tip.centre(&here, &force),
-                force_o: force,
-                force_with_velocity: force,
-                velocity: Vector3::zeros(),
-            },
+            _ => self.still(tip),
         };
         self.last = Some(ball);
         ball
+    }
+
+    /// The ball of a tip by itself, where nobody asks how it slides: nothing is smoothed and nothing kept.
+    pub fn still(&self, tip: &Tip) -> Ball {
+        let (here, force_o) = (Point3::from(tip.pose_ot.translation.vector), tip.force_o);
+        Ball {
+            reported: here,
+            centre: self.tip.centre(&here, &force_o),
+            force_o,
+            force_with_velocity: force_o,
+            velocity: Vector3::zeros(),
+        }
     }
 
     /// Outward normal of the surface under the ball, which has been in contact for the last `dt` (s); zero without a force.

@@ -31,6 +31,9 @@ pub enum SceneError {
         /// the range, in the same unit
         allowed: &'static str,
     },
+    /// No face of the scan is near the region that is touched.
+    #[error("no face of the scan is in or near scan.region_low_mm to scan.region_high_mm; is scan.unit right?")]
+    EmptyRegion,
     /// A name that means nothing.
     #[error("{key} is {value}; it must be {allowed}")]
     NoSuch {

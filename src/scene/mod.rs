@@ -3,19 +3,23 @@
 //! A part that is not named is not built: a scene that names only `refine` is the bare loop. A part that is named
 //! without keys takes its defaults. `config/default.yaml` is [`Scene::default`] written out, with every key explained.
 
+mod built;
 mod edit;
 mod error;
 mod params;
+mod region;
 mod sections;
 
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
+pub use built::{Built, Memory, SceneCost};
 pub use edit::Setting;
 pub use error::SceneError;
 use error::yaml_error;
 pub use params::simulated_arm;
+pub use region::{Cut, CutScan};
 use sections::named;
 pub use sections::{
     AlongName, BiasSection, BiasTrackingSection, CarveSection, ClockSection, CompensationSection, ContactSection,

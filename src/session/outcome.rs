@@ -12,7 +12,7 @@ use crate::features::{Detection, detect};
 use crate::io::features_file::{FeatureFile, FeaturesFileError, write_features};
 use crate::io::mesh_file::{MeshFile, MeshFileError, MeshUnit, VertexColumn, read_mesh, write_mesh, write_mesh_with};
 use crate::io::touches_file::{TouchesFileError, as_written, write_touches};
-use crate::mesh::{FaceId, FaceTree, MeshError, TriMesh, VertexId};
+use crate::mesh::{FaceId, FaceTree, MeshError, Outside, TriMesh, VertexId};
 use crate::patch::{Patched, Patcher, Support};
 use crate::touch::ProbedPoint;
 
@@ -47,6 +47,8 @@ pub struct OutcomePlaces<'a> {
     pub features: Option<&'a Path>,
     /// the touches that features name
     pub touches: Option<&'a Path>,
+    /// the rest of a scan of which a part was refined
+    pub outside: Option<&'a Outside>,
 }
 
 /// What became of the touched part.
@@ -94,6 +96,16 @@ pub fn moved_faces(before: &TriMesh, after: &TriMesh) -> u64 {
     after.faces().filter(|&(face, corners)| !is_as_scanned(face, corners)).count() as u64
 }
 
+/// A part that was meshed anew, with the rest of its scan.
+///
+/// - `of_scan`: standard deviation of a vertex that was not touched, m.
+fn sewn(part: Patched, outside: &Outside, of_scan: f64) -> Result<Patched, MeshError> {
+    let sewn = outside.sew_to(&part.mesh)?;
+    let support = sewn.column(&part.support, Support::Scan);
+    let sigma = if part.sigma.is_empty() { Vec::new() } else { sewn.column(&part.sigma, of_scan) };
+    Ok(Patched { mesh: sewn.mesh, support, sigma, ..part })
+}
+
 /// Vertices and faces in a file of the mesh: a vertex that no face uses is not in it.
 fn written_counts(mesh: &TriMesh) -> [usize; 2] {
     let is_used = |vertex: &u32| mesh.has_vertex(VertexId(*vertex)) && !mesh.star(VertexId(*vertex)).is_empty();
@@ -111,10 +123,12 @@ impl OutcomePlaces<'_> {
     /// [`OutcomeError`]; no file is left half written.
     pub fn write(&self, scan: &TriMesh, refined: &TriMesh, patcher: Option<Patcher>) -> Result<Outcome, OutcomeError> {
         let Some(patcher) = patcher else {
+            let moved_faces = moved_faces(scan, refined);
+            let sewn = self.outside.map(|outside| outside.sew_to(refined)).transpose()?;
+            let refined = sewn.as_ref().map_or(refined, |sewn| &sewn.mesh);
             write_mesh(self.mesh, refined, self.unit).map_err(OutcomeError::WriteMesh)?;
             self.write_features(&[])?;
-            let counts = written_counts(refined);
-            return Ok(Outcome { moved_faces: moved_faces(scan, refined), patch: None, uncertainty: None, counts });
+            return Ok(Outcome { moved_faces, patch: None, uncertainty: None, counts: written_counts(refined) });
         };
         self.write_patched(scan, patcher)
     }
@@ -132,13 +146,19 @@ impl OutcomePlaces<'_> {
         }
         let build_s = started.elapsed().as_secs_f64();
         let uncertainty = patcher.params().uncertainty.map(|_| UncertaintySummary::of(&patched, patcher.knocks()));
+        let moved_faces = moved_faces(scan, &patched.mesh);
+        let of_scan = patcher.params().uncertainty.map_or(0.0, |known| known.scan);
+        let patched = match self.outside {
+            Some(outside) => sewn(patched, outside, of_scan)?,
+            None => patched,
+        };
         let columns = patched.columns().into_iter();
         let columns: Vec<_> = columns.map(|(name, values)| VertexColumn { name, values: values.into() }).collect();
         write_mesh_with(self.mesh, &patched.mesh, &columns, self.unit).map_err(OutcomeError::WriteMesh)?;
         debug!(open_squares = patched.open_squares, "patched");
         self.write_features(patcher.probed())?;
         Ok(Outcome {
-            moved_faces: moved_faces(scan, &patched.mesh),
+            moved_faces,
             patch: Some(PatchSummary::of(&patched, build_s)),
             uncertainty,
             counts: written_counts(&patched.mesh),

@@ -22,6 +22,7 @@ mod surface;
 mod tip;
 mod triangulate;
 mod wander;
+pub mod wavy;
 
 pub use arm::{ArmFault, ArmParams, SimArm, WEIGHTLESS};
 pub use ball::{BallContact, push_ball};

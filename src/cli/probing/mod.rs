@@ -177,7 +177,7 @@ impl Probing<'_> {
         let arguments = RefineArguments::of_files(self.scan.to_owned(), bag, refined.clone(), self.unit)
             .with_features(features, touches)
             .with_scene(self.scene.to_owned(), probe_topics());
-        let Refined { summary, mut losses, .. } = arguments.refined()?;
+        let Refined { summary, mut losses, .. } = arguments.refined(|_| ())?;
         let is_found =
             |one: &&Probed| matches!(one.ending, Ending::ToleranceReached | Ending::TouchesSpent | Ending::TimeSpent);
         losses.extend(

@@ -8,8 +8,8 @@ use super::spring_flow;
 pub const LARGEST_SHARE: f64 = 0.99;
 /// Below this scaled time one rounding of u is more than what happens.
 const NO_TIME: f64 = 1e-200;
-/// Scaled times beyond it leave too little room below the largest number.
-const LONGEST: f64 = 1e300;
+/// Scaled times beyond it leave too little room below the largest number: they are divided by e^u, at u = −40 at least.
+const LONGEST: f64 = 1e280;
 
 /// The expected force f over the signed distance h of the tip from the face (positive outside).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -97,7 +97,12 @@ impl ContactModel {
         match *self {
             Self::Sigmoid { f_max_n, .. } if force_n <= 0.0 => f_max_n * f64::INFINITY,
             Self::Sigmoid { f_max_n, .. } if force_n >= f_max_n => f64::NEG_INFINITY,
-            Self::Sigmoid { f_max_n, h_min_m, delta } => h_min_m * (((f_max_n - force_n) / force_n).ln() - delta),
+            Self::Sigmoid { f_max_n, h_min_m, delta } => {
+                let (rest, quotient) = (f_max_n - force_n, (f_max_n - force_n) / force_n);
+                // a force so small that the quotient overflows is still reached
+                let log = if quotient.is_finite() { quotient.ln() } else { rest.ln() - force_n.ln() };
+                h_min_m * (log - delta)
+            }
             Self::Spring { stiffness_n_per_m } => -force_n / stiffness_n_per_m,
         }
     }
@@ -134,10 +139,22 @@ impl ContactModel {
     }
 }
 
+/// a b c, also where a b underflows or overflows and a b c does not; none is negative.
+#[inline]
+fn product(a: f64, b: f64, c: f64) -> f64 {
+    let first = a * b;
+    if first.is_normal() {
+        return first * c;
+    }
+    let mut factors = [a, b, c];
+    factors.sort_by(f64::total_cmp);
+    factors[0] * factors[2] * factors[1]
+}
+
 #[inline]
 fn sigmoid(hold: &Hold, f_max: f64, h_min: f64, delta: f64) -> Shift {
     let u = hold.h / h_min + delta;
-    let reach = hold.alpha * f_max * hold.dt;
+    let reach = product(hold.alpha, f_max, hold.dt);
     let t = reach * hold.cosine / h_min;
     let drift = if hold.drift == 0.0 { 0.0 } else { hold.drift / (hold.alpha * hold.cosine) };
     let c = (hold.force - drift) / f_max;

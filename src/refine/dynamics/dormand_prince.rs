@@ -2,10 +2,10 @@
 
 use super::DynamicsError;
 
-/// Error per step relative to the size of each component.
-const RELATIVE: f64 = 1e-11;
+/// Error per step, relative to the size of each component, of [`super::StepRule::DormandPrince`].
+pub const RELATIVE: f64 = 1e-11;
 /// Steps, accepted or not, after which the problem is called stiff: some ten milliseconds.
-const MAX_STEPS: usize = 20_000;
+pub const MAX_STEPS: usize = 20_000;
 /// A step may shrink to a fifth and grow fivefold.
 const CHANGE: (f64, f64) = (0.2, 5.0);
 /// Aim below the tolerance, so that most steps are accepted.
@@ -24,17 +24,19 @@ const A: [[f64; 6]; 6] = [
 const E: [f64; 7] =
     [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0];
 
-/// Way along a, and the normal.
-pub(super) type State = [f64; 4];
+/// Way along a, m, and the normal.
+pub type State = [f64; 4];
 
-/// Integrates dy/dt = `rate`(y) from 0 to `end`; `scale` is the size of each component that counts.
+/// Integrates dy/dt = `rate`(y) from 0 to `end`, s; `scale` is the size of each component that counts, and `relative` the error
+/// per step in units of it.
 ///
 /// # Errors
 /// [`DynamicsError::Stiff`] when [`MAX_STEPS`] do not suffice, [`DynamicsError::NotFinite`] when the rate is not.
-pub(super) fn integrate(
+pub fn integrate(
     start: State,
     end: f64,
     scale: State,
+    relative: f64,
     rate: impl Fn(&State) -> State,
 ) -> Result<State, DynamicsError> {
     let (mut y, mut time, mut step) = (start, 0.0, end);
@@ -47,7 +49,7 @@ pub(super) fn integrate(
         let last = step >= end - time;
         let dt = if last { end - time } else { step };
         let next = stages(&y, dt, &mut k, &rate);
-        let error = error_of(&y, &next, dt, &k, &scale);
+        let error = error_of(&y, &next, dt, &k, &scale) / relative;
         if error <= 1.0 {
             (y, k[0]) = (next, k[6]);
             time = if last { end } else { time + dt };
@@ -75,13 +77,13 @@ fn stages(y: &State, dt: f64, k: &mut [State; 7], rate: impl Fn(&State) -> State
     next
 }
 
-/// Largest error of a component over its tolerance; NaN becomes infinite.
+/// Largest error of a component over its size; NaN becomes infinite.
 fn error_of(y: &State, next: &State, dt: f64, k: &[State; 7], scale: &State) -> f64 {
     let mut largest: f64 = 0.0;
     for i in 0..y.len() {
         let error: f64 = dt * E.iter().zip(k).map(|(weight, slope)| weight * slope[i]).sum::<f64>();
-        let tolerance = RELATIVE * scale[i].max(y[i].abs()).max(next[i].abs());
-        let ratio = error.abs() / tolerance;
+        let size = scale[i].max(y[i].abs()).max(next[i].abs());
+        let ratio = error.abs() / size;
         largest = largest.max(if ratio.is_nan() { f64::INFINITY } else { ratio });
     }
     largest

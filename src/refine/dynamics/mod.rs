@@ -14,7 +14,7 @@
 //! [`StepRule::Lie`] does one after the other. Where F is parallel to n that is the exact solution, whatever dt.
 
 mod contact_model;
-mod dormand_prince;
+pub mod dormand_prince;
 mod rotation;
 mod sigmoid_flow;
 mod spring_flow;
@@ -339,8 +339,8 @@ impl FaceDynamics {
             }
         };
         let start = [0.0, n.x, n.y, n.z];
-        let [way, x, y, z] =
-            dormand_prince::integrate(start, touch.dt, [scale.max(f64::MIN_POSITIVE), 1.0, 1.0, 1.0], rate)?;
+        let scale = [scale.max(f64::MIN_POSITIVE), 1.0, 1.0, 1.0];
+        let [way, x, y, z] = dormand_prince::integrate(start, touch.dt, scale, dormand_prince::RELATIVE, rate)?;
         Ok((way, Vector3::new(x, y, z).normalize()))
     }
 }

@@ -2,6 +2,9 @@
 
 use nalgebra::Vector3;
 
+/// 1 + n·to below which the two are opposite: half the square of a rounding of a unit vector.
+const OPPOSITE: f64 = 1e-33;
+
 /// Turns `n` towards the unit vector `to` until tan(θ/2) has fallen by e^−`exponent`; away from it where negative.
 ///
 /// With e = e^−exponent, m = n + to and p = |m|²/2 = 1 + n·to,
@@ -18,10 +21,10 @@ pub fn turn(n: &Vector3<f64>, to: &Vector3<f64>, exponent: f64) -> Vector3<f64> 
     let e = (-exponent.abs()).exp();
     let m = n + to;
     let p = 0.5 * m.norm_squared();
-    if p == 0.0 {
+    if p < OPPOSITE {
         return *n;
     }
     let turned = 2.0 * e * m + ((1.0 - e) * (1.0 - e) * p - 2.0 * e * e) * to;
-    // its length is 2e² + p (1 − e²): far above the smallest number, since p is 0 or at least 1e-33
+    // its length is 2e² + p (1 − e²): far above the smallest number, since p is at least that of `OPPOSITE`
     turned / turned.norm()
 }

@@ -291,7 +291,13 @@ impl Places {
             None => Some(snapshot.recv_timeout(COPY_WAIT).map_err(late)?.mesh().map_err(|why| why.to_string())?),
         };
         let [features, touches] = [&self.features, &self.touches].map(|place| place.as_deref());
-        let places = OutcomePlaces { mesh: &self.mesh, unit: setup.mesh_unit, features, touches };
+        let places = OutcomePlaces {
+            mesh: &self.mesh,
+            unit: setup.mesh_unit,
+            features,
+            touches,
+            outside: setup.cut.outside.as_ref(),
+        };
         let refined = refined.as_ref().unwrap_or(&setup.scan.0);
         places.write(&setup.scan.0, refined, patcher).map(|outcome| outcome.counts).map_err(|why| why.to_string())
     }

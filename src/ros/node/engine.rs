@@ -3,12 +3,11 @@
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 
-use super::NodeError;
+use super::{NodeError, Setup};
 use crate::live::{LiveError, LiveRefiner, Pace, ProbedNews};
 use crate::mesh::{Changes, FaceTree, TriMesh, VertexId};
 use crate::patch::{Patcher, Support};
 use crate::refine::{RefineError, Refiner, Update};
-use crate::scene::Scene;
 use crate::touch::{Sample, WrenchFrame};
 
 /// Room for new faces that is made ahead.
@@ -32,11 +31,12 @@ impl Engine {
     ///
     /// # Errors
     /// [`NodeError::NothingMoves`], [`NodeError::Refine`], [`NodeError::Live`].
-    pub fn new(scan: &Scan, scene: &Scene, axes: WrenchFrame) -> Result<Self, NodeError> {
-        let params = scene.refine_params(axes).ok_or(NodeError::NothingMoves)?;
+    pub fn new(setup: &Setup, axes: WrenchFrame) -> Result<Self, NodeError> {
+        let Setup { scan, scene, cut, .. } = setup;
+        let params = cut.refine_params(scene.refine_params(axes).ok_or(NodeError::NothingMoves)?);
         let mut refiner = Refiner::new(scan.0.clone(), params)?;
         refiner.watch();
-        let Some(patcher) = scene.patcher_params(axes) else {
+        let Some(patcher) = scene.patcher_params(axes).map(|params| cut.patcher_params(params)) else {
             refiner.keep_strokes();
             return Ok(Self::Alone(Box::new(refiner)));
         };

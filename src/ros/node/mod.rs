@@ -53,7 +53,7 @@ use crate::io::recording::Topics;
 use crate::live::LiveError;
 use crate::mesh::FaceTree;
 use crate::refine::RefineError;
-use crate::scene::{Scene, SceneError};
+use crate::scene::{Cut, CutScan, Memory, Scene, SceneCost, SceneError};
 use crate::session::{OutcomeError, SessionError};
 use crate::touch::{Compensator, SettingError, WrenchFrame};
 
@@ -74,6 +74,12 @@ pub enum NodeError {
     /// Neither the parameter `scan` nor the scene names one.
     #[error("there is no scan to refine: name one by -p scan:=FILE, or as `scan: {{ file: … }}` in the scene")]
     NoScan,
+    /// An arm must keep clear of the whole scan.
+    #[error(
+        "an arm keeps clear of the whole scan, of which scan.region_low_mm and scan.region_high_mm leave only a part: take \
+         them out of the scene, or start without robot"
+    )]
+    RegionWithRobot,
     /// The scene cannot be used.
     #[error(transparent)]
     Scene(Box<SceneError>),
@@ -152,6 +158,7 @@ pub(crate) struct Setup {
     scan_path: PathBuf,
     mesh_unit: MeshUnit,
     scene: Scene,
+    cut: Cut,
     scene_yaml: String,
     topics: Topics,
     source: &'static str,
@@ -171,6 +178,10 @@ impl Setup {
         };
         let MeshFile { mesh, .. } =
             read_mesh(&scan_path, mesh_unit).map_err(|error| NodeError::Scan(Box::new(error)))?;
+        if scene.region().is_some() && parameters.string("robot") != "none" {
+            return Err(NodeError::RegionWithRobot);
+        }
+        let CutScan { mesh, cut } = scene.cut(mesh)?;
         let tree = FaceTree::new(&mesh);
         let source = if parameters.string("source") == "probe" { "probe" } else { "stylus" };
         let tool = match parameters.string("tool_frame") {
@@ -185,6 +196,7 @@ impl Setup {
             scan_path,
             mesh_unit,
             scene,
+            cut,
             scene_yaml,
             topics: Topics { pose: format!("/{source}/pose"), wrench: format!("/{source}/wrench"), markers: None },
             source,
@@ -264,6 +276,18 @@ impl Prepared {
     /// The scene as it was read.
     pub fn scene(&self) -> &Scene {
         &self.setup.scene
+    }
+
+    /// What was built of the scene, and the memory that it took.
+    ///
+    /// - `has_arm`: whether an arm probes.
+    pub fn cost(&self, has_arm: bool) -> SceneCost {
+        let Self { setup, sitting } = self;
+        // the node looks for no clock, and poses come as such
+        let unused = if has_arm { &["clock", "markers"][..] } else { &["clock", "markers", "robot"] };
+        let (scan, tree) = &*setup.scan;
+        let memory = Memory::of(sitting.engine.refiner().footprint(), scan.bytes() + tree.bytes() + setup.cut.bytes());
+        SceneCost { parts: setup.scene.built(unused), memory }
     }
 
     /// Starts the threads.

@@ -83,7 +83,7 @@ impl Sitting {
         SessionRecord::begin(&folder, &setup.scan_path, setup.mesh_unit, &setup.scene_yaml, &setup.topics)?;
         let recorder = SessionRecorder::start(&folder, &setup.topics)?;
         let axes = WrenchFrame::default();
-        let engine = Engine::new(&setup.scan, &setup.scene, axes)?;
+        let engine = Engine::new(setup, axes)?;
         Ok(Self { folder, recorder, engine, axes, told_version: 1, told_edits: 0 })
     }
 
@@ -92,7 +92,7 @@ impl Sitting {
     /// # Errors
     /// [`NodeError`]
     pub fn turn_axes(&mut self, setup: &Setup, axes: WrenchFrame) -> Result<(), NodeError> {
-        self.engine = Engine::new(&setup.scan, &setup.scene, axes)?;
+        self.engine = Engine::new(setup, axes)?;
         self.axes = axes;
         Ok(())
     }
@@ -154,8 +154,8 @@ fn write_result(
 ) -> Result<Outcome, NodeError> {
     let [mesh, features, touches] =
         ["refined.ply", "features.json", "touches.csv"].map(|name| folder.path().join(name));
-    let places =
-        OutcomePlaces { mesh: &mesh, unit: setup.mesh_unit, features: Some(&features), touches: Some(&touches) };
+    let (features, touches, outside) = (Some(features.as_path()), Some(touches.as_path()), setup.cut.outside.as_ref());
+    let places = OutcomePlaces { mesh: &mesh, unit: setup.mesh_unit, features, touches, outside };
     Ok(places.write(&setup.scan.0, refined, patcher)?)
 }
 

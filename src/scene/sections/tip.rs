@@ -141,17 +141,40 @@ pub struct ScanSection {
     pub unit: MeshUnit,
     /// Standard deviation of the scan from the true surface, mm.
     pub noise_mm: f64,
+    /// Lowest corner of the box that the ball's centre is in when it touches, in the frame of the scan, mm; none: anywhere.
+    pub region_low_mm: Option<[f64; 3]>,
+    /// … and its highest corner, mm.
+    pub region_high_mm: Option<[f64; 3]>,
 }
 
 impl Default for ScanSection {
     /// A consumer depth camera at half a metre.
     fn default() -> Self {
-        Self { file: None, unit: MeshUnit::Millimetre, noise_mm: 0.6 }
+        Self { file: None, unit: MeshUnit::Millimetre, noise_mm: 0.6, region_low_mm: None, region_high_mm: None }
     }
 }
 
 impl ScanSection {
     pub(in crate::scene) fn check(&self) -> Result<(), SceneError> {
-        in_range("scan.noise_mm", self.noise_mm, 0.0, 1e3, "0 to 1000 mm")
+        in_range("scan.noise_mm", self.noise_mm, 0.0, 1e3, "0 to 1000 mm")?;
+        let (low, high) = match (self.region_low_mm, self.region_high_mm) {
+            (None, None) => return Ok(()),
+            (Some(low), Some(high)) => (low, high),
+            (Some(_), None) => {
+                return Err(SceneError::Incomplete { key: "scan.region_low_mm", needs: "scan.region_high_mm" });
+            }
+            (None, Some(_)) => {
+                return Err(SceneError::Incomplete { key: "scan.region_high_mm", needs: "scan.region_low_mm" });
+            }
+        };
+        for (low, high) in low.into_iter().zip(high) {
+            in_range("scan.region_low_mm", low, -1e6, 1e6, "-1e6 to 1e6 mm")?;
+            in_range("scan.region_high_mm", high, -1e6, 1e6, "-1e6 to 1e6 mm")?;
+            if low >= high {
+                let allowed = "more than scan.region_low_mm along each axis";
+                return Err(SceneError::OutOfRange { key: "scan.region_high_mm", value: high, allowed });
+            }
+        }
+        Ok(())
     }
 }

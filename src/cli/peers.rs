@@ -1,0 +1,127 @@
+//! The peers of the report: a virtual environment with libraries from PyPI, and one process in it.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use super::CliError;
+use crate::io::atomic::AtomicFile;
+use crate::refine::RefineError;
+use crate::report::Effort;
+use crate::report::peers::{PACKAGES, Peers, PeersAtSize, PeersInput, SCRIPT, UnknownLine};
+
+/// Threads of the libraries, as each of them asks for it.
+const ONE_THREAD: [&str; 4] = ["OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "TBB_NUM_THREADS"];
+
+/// Why the peers could not be measured.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum PeersError {
+    /// The interpreter, the environment or the packages.
+    #[error("{command}: {reason}; --peers needs python3 with venv, and PyPI the first time")]
+    Setup { command: String, reason: String },
+    /// The script ended without having measured.
+    #[error("the peers' script failed: {0}")]
+    Script(String),
+    #[error(transparent)]
+    UnknownLine(#[from] UnknownLine),
+    #[error("cannot write {}: {source}", path.display())]
+    Write { path: PathBuf, source: std::io::Error },
+    #[error("touchup itself: {0}")]
+    Touchup(#[from] RefineError),
+}
+
+/// Measures touchup and the peers in turns, on 100k faces and, unless it is to be quick, on 1M.
+///
+/// `environment`: folder of the virtual environment; made and filled where it is not yet.
+pub(super) fn peers(effort: Effort, environment: &Path, progress: &mut dyn FnMut(&str)) -> Result<Peers, CliError> {
+    Ok(measure(effort, environment, progress)?)
+}
+
+fn measure(effort: Effort, environment: &Path, progress: &mut dyn FnMut(&str)) -> Result<Peers, PeersError> {
+    progress("peers: virtual environment");
+    let python = make_environment(environment)?;
+    let sizes: &[usize] = effort.choose(&[100_000], &[100_000, 1_000_000]);
+    let at_size = |&faces: &usize| {
+        progress(&format!("peers: touchup at {faces} faces"));
+        let input = PeersInput::new(faces, effort);
+        let before = input.measure()?;
+        progress(&format!("peers: libraries at {faces} faces"));
+        let printed = run_script(&python, &input)?;
+        progress(&format!("peers: touchup again at {faces} faces"));
+        Ok(PeersAtSize::read(&input, [before, input.measure()?], &printed)?)
+    };
+    Ok(Peers { sizes: sizes.iter().map(at_size).collect::<Result<_, PeersError>>()? })
+}
+
+/// The interpreter of an environment that has the packages.
+fn make_environment(folder: &Path) -> Result<PathBuf, PeersError> {
+    let python = folder.join("bin/python");
+    if !python.exists() {
+        set_up(Command::new("python3").arg("-m").arg("venv").arg(folder))?;
+    }
+    let install = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--only-binary=:all:"];
+    set_up(Command::new(&python).args(install).args(PACKAGES))?;
+    Ok(python)
+}
+
+fn set_up(command: &mut Command) -> Result<(), PeersError> {
+    let failed = |command: &Command, reason: String| {
+        let words = std::iter::once(command.get_program()).chain(command.get_args());
+        let command: Vec<String> = words.map(|word| word.to_string_lossy().into_owned()).collect();
+        PeersError::Setup { command: command.join(" "), reason }
+    };
+    let output = command.output();
+    match output {
+        Ok(output) if output.status.success() => Ok(()),
+        Ok(output) => Err(failed(command, last_words(&output))),
+        Err(error) => Err(failed(command, error.to_string())),
+    }
+}
+
+/// The last line that a program said before it failed.
+fn last_words(output: &Output) -> String {
+    let said = [output.stdout.as_slice(), output.stderr.as_slice()].concat();
+    let said = String::from_utf8_lossy(&said);
+    let line = said.lines().rev().find(|line| !line.trim().is_empty());
+    line.map_or_else(|| format!("it ended with {}", output.status), str::to_owned)
+}
+
+fn run_script(python: &Path, input: &PeersInput) -> Result<String, PeersError> {
+    let nowhere = std::env::temp_dir();
+    let folder = tempfile::tempdir().map_err(|source| PeersError::Write { path: nowhere, source })?;
+    let files =
+        [("positions.f64", input.positions()), ("faces.i32", input.triangles()), ("queries.f64", input.queries())];
+    for (name, bytes) in files {
+        let path = folder.path().join(name);
+        write(&path, &bytes).map_err(|source| PeersError::Write { path, source })?;
+    }
+    let mut command = Command::new(python);
+    command.args(["-c", SCRIPT]).arg(folder.path()).arg(input.distances().len().to_string());
+    command.envs(ONE_THREAD.map(|name| (name, "1")));
+    let output = command.output().map_err(|error| PeersError::Script(error.to_string()))?;
+    if output.status.success() {
+        Ok(String::from_utf8_lossy(&output.stdout).into_owned())
+    } else {
+        Err(PeersError::Script(last_words(&output)))
+    }
+}
+
+fn write(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let mut file = AtomicFile::create(path)?;
+    file.write_all(bytes)?;
+    file.commit()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_environment_that_cannot_be_made_is_told_with_what_it_needs() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("taken");
+        std::fs::write(&file, "no folder").unwrap();
+        let error = make_environment(&file.join("env")).unwrap_err().to_string();
+        assert!(error.contains("python3 -m venv") && error.contains("PyPI"), "{error}");
+    }
+}

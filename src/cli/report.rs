@@ -1,0 +1,253 @@
+//! `touchup report`: measures error against run time, stability and cost on this machine, and writes page, plots and tables.
+
+use std::io::{Write, stderr};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use clap::{Args, ValueEnum};
+
+use super::peers::peers;
+use super::samples::{Recording, each_sample};
+use super::{CliError, Losses, tell};
+use crate::io::atomic::{create_folder, write_atomically};
+use crate::io::machine::describe_machine;
+use crate::io::mesh_file::{MeshUnit, read_mesh};
+use crate::io::recording::Topics;
+use crate::report::cost::cost;
+use crate::report::{
+    Chapter, Effort, Given, Report, WorkPrecision, convergence, extremes, stability, verdict, whole_scan,
+};
+use crate::scene::Scene;
+
+#[derive(Debug, Args)]
+pub(super) struct ReportArguments {
+    /// Folder for report.html, report.json, and the SVG and CSV of each figure and table
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Measures less: under a minute
+    #[arg(long)]
+    quick: bool,
+    /// Prints report.json instead of the verdict
+    #[arg(long)]
+    json: bool,
+    /// Measures against Open3D, libigl, SciPy, trimesh and scikit-learn too, which are installed from PyPI; takes some minutes
+    #[arg(long)]
+    peers: bool,
+    /// Virtual environment for them; made where it is not there [default: peers-env in the folder of --out]
+    #[arg(long, value_name = "DIR", requires = "peers")]
+    peers_env: Option<PathBuf>,
+    /// A scan to measure on beside the simulated ones: PLY, STL or OBJ
+    #[arg(long, value_name = "MESH", requires_all = ["truth", "bag"])]
+    scan: Option<PathBuf>,
+    /// Its true part, in the frame of the scan
+    #[arg(long, value_name = "MESH", requires = "scan")]
+    truth: Option<PathBuf>,
+    /// The touches on it: a ROS 2 recording with the usual topics
+    #[arg(long, value_name = "RECORDING", requires = "scan")]
+    bag: Option<PathBuf>,
+    /// Unit of the coordinates of scan and truth
+    #[arg(long, value_name = "U", default_value = "mm")]
+    mesh_unit: MeshUnit,
+    /// Tip, sensor and frames of the recording
+    #[arg(long, value_name = "YAML", requires = "scan")]
+    scene: Option<PathBuf>,
+    /// Only these chapters
+    #[arg(long, value_name = "CHAPTER", num_args = 1..)]
+    only: Vec<Part>,
+}
+
+/// A chapter that can be asked for by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Part {
+    /// Error against time and evaluations of each integrator, for one face
+    WorkPrecision,
+    /// Error against time of each way to refine whole scans, with two baselines
+    WholeScan,
+    /// Error from sweep to sweep
+    Convergence,
+    /// Where each integrator stays stable, and what becomes of extremes
+    Stability,
+    /// Time, allocations and memory of each stage and part
+    Cost,
+}
+
+/// A chapter, and what it adds to the verdict.
+struct Told {
+    chapter: Chapter,
+    verdict: Vec<String>,
+}
+
+/// The verb: measures what is asked for, writes it, and tells the verdict.
+pub(super) fn report(arguments: &ReportArguments) -> Result<Losses, CliError> {
+    let ReportArguments { out, json, .. } = arguments;
+    let write_error = |path: &Path| {
+        let path = path.to_owned();
+        move |source| CliError::Write { path, source }
+    };
+    if out.exists() && !out.is_dir() {
+        return Err(CliError::Usage(format!("--out {} is a file: name a folder", out.display())));
+    }
+    // before minutes of measuring
+    create_folder(out).map_err(write_error(out))?;
+    let told = chapters(arguments, &mut lines_on_stderr())?;
+    let (chapters, verdict): (Vec<_>, Vec<_>) = told.into_iter().map(|told| (told.chapter, told.verdict)).unzip();
+    let report = Report {
+        machine: describe_machine(),
+        commit: env!("TOUCHUP_COMMIT").to_owned(),
+        command: command(arguments),
+        date: date_of(SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default()),
+        verdict: verdict.concat(),
+        chapters,
+    };
+    for file in report.files()? {
+        let path = out.join(&file.name);
+        write_atomically(&path, |to| to.write_all(&file.bytes)).map_err(write_error(&path))?;
+    }
+    if *json {
+        tell(&serde_json::to_string(&report).map_err(crate::report::ReportError::from)?);
+    } else {
+        tell(&format!("{}\n\nwrote {}", report.verdict.join("\n\n"), out.join("report.html").display()));
+    }
+    Ok(Losses::new())
+}
+
+/// Every chapter that is asked for, in the order of the page.
+fn chapters(arguments: &ReportArguments, progress: &mut dyn FnMut(&str)) -> Result<Vec<Told>, CliError> {
+    let effort = Effort { is_quick: arguments.quick };
+    let is_wanted = |part| arguments.only.is_empty() || arguments.only.contains(&part);
+    let given = arguments.given()?;
+    let mut told = Vec::new();
+    let mut tell = |chapter, verdict| told.push(Told { chapter, verdict });
+    if is_wanted(Part::WorkPrecision) {
+        let measured = WorkPrecision::measure(effort, progress);
+        tell(measured.chapter(), measured.verdict());
+    }
+    if is_wanted(Part::WholeScan) {
+        let measured = whole_scan(effort, given.as_ref(), progress)?;
+        tell(measured.chapter(), verdict::of_whole_scans(&measured));
+    }
+    if is_wanted(Part::Convergence) {
+        let measured = convergence(effort, progress);
+        tell(measured.chapter(), verdict::of_convergence(&measured));
+    }
+    if is_wanted(Part::Stability) {
+        let measured = stability(effort, progress);
+        tell(measured.chapter(), verdict::of_stability(&measured));
+        progress("extremes");
+        let measured = extremes();
+        tell(measured.chapter(), verdict::of_extremes(&measured));
+    }
+    if is_wanted(Part::Cost) {
+        let measured = cost(effort, progress)?;
+        tell(measured.chapter(), verdict::of_cost(&measured));
+    }
+    if arguments.peers {
+        let environment = arguments.peers_env.clone().unwrap_or_else(|| arguments.out.join("peers-env"));
+        let measured = peers(effort, &environment, progress)?;
+        tell(measured.chapter(), verdict::of_peers(&measured));
+    }
+    Ok(told)
+}
+
+impl ReportArguments {
+    /// The case that is given by files.
+    fn given(&self) -> Result<Option<Given>, CliError> {
+        let (Some(scan), Some(truth), Some(bag)) = (&self.scan, &self.truth, &self.bag) else { return Ok(None) };
+        let scene = self.scene.as_deref().map_or_else(|| Ok(Scene::default()), Scene::read)?;
+        let recording = Recording::open(bag, &Topics::default()).map_err(CliError::ReadRecording)?;
+        let params = scene.refine_params(recording.wrench_frame);
+        let params =
+            params.ok_or_else(|| CliError::Usage("the scene names no `refine`: add `refine:` to it".to_owned()))?;
+        let mut samples = Vec::new();
+        each_sample(recording, scene.placement(), scene.sync_params(), None, |sample| samples.push(*sample))?;
+        Ok(Some(Given {
+            name: scan.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+            scan: read_mesh(scan, self.mesh_unit).map_err(CliError::ReadMesh)?.mesh,
+            truth: read_mesh(truth, self.mesh_unit).map_err(CliError::ReadMesh)?.mesh,
+            samples,
+            tip: params.tip,
+            compensator: params.compensator,
+            scan_noise: params.scan_noise,
+        }))
+    }
+}
+
+/// A line with the time that has passed, for each longer piece of work.
+fn lines_on_stderr() -> impl FnMut(&str) {
+    let started = Instant::now();
+    move |what| {
+        let _ = writeln!(stderr(), "{:>6.1} s  {what}", started.elapsed().as_secs_f64());
+    }
+}
+
+/// As it could be called again.
+fn command(arguments: &ReportArguments) -> String {
+    let mut command = format!("touchup report --out {}", arguments.out.display());
+    if arguments.quick {
+        command += " --quick";
+    }
+    let paths = [
+        ("scan", &arguments.scan),
+        ("truth", &arguments.truth),
+        ("bag", &arguments.bag),
+        ("scene", &arguments.scene),
+        ("peers-env", &arguments.peers_env),
+    ];
+    for (flag, path) in paths.into_iter().filter_map(|(flag, path)| Some((flag, path.as_ref()?))) {
+        command += &format!(" --{flag} {}", path.display());
+    }
+    if arguments.scan.is_some() {
+        command += &format!(" --mesh-unit {}", arguments.mesh_unit);
+    }
+    if arguments.peers {
+        command += " --peers";
+    }
+    if !arguments.only.is_empty() {
+        command += " --only";
+        for part in &arguments.only {
+            command += &part.to_possible_value().map_or_else(String::new, |value| format!(" {}", value.get_name()));
+        }
+    }
+    command
+}
+
+/// Day and time in UTC: "2026-03-01 09:05 UTC".
+fn date_of(since_1970: Duration) -> String {
+    let seconds = since_1970.as_secs();
+    let (mut day, mut year) = (seconds / 86_400, 1970);
+    let is_leap = |year: u64| year.is_multiple_of(4) && (!year.is_multiple_of(100) || year.is_multiple_of(400));
+    let days_of = |year| if is_leap(year) { 366 } else { 365 };
+    while day >= days_of(year) {
+        day -= days_of(year);
+        year += 1;
+    }
+    let february = if is_leap(year) { 29 } else { 28 };
+    let mut month = 1;
+    for days in [31, february, 31, 30, 31, 30, 31, 31, 30, 31, 30] {
+        if day < days {
+            break;
+        }
+        day -= days;
+        month += 1;
+    }
+    let (hour, minute) = (seconds / 3600 % 24, seconds / 60 % 60);
+    format!("{year}-{month:02}-{:02} {hour:02}:{minute:02} UTC", day + 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn days_are_those_of_the_calendar() {
+        for (seconds, date) in [
+            (0, "1970-01-01 00:00 UTC"),
+            (951_825_540, "2000-02-29 11:59 UTC"),
+            (1_709_251_199, "2024-02-29 23:59 UTC"),
+            (1_709_251_200, "2024-03-01 00:00 UTC"),
+            (1_767_225_599, "2025-12-31 23:59 UTC"),
+        ] {
+            assert_eq!(date_of(Duration::from_secs(seconds)), date);
+        }
+    }
+}

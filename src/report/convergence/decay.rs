@@ -1,0 +1,68 @@
+//! The two laws by which an error may fall from sweep to sweep, fitted by least squares to its logarithm.
+
+use serde::Serialize;
+
+/// A line through points by least squares.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Line {
+    /// y at x = 0
+    pub offset: f64,
+    /// y over x
+    pub slope: f64,
+    /// root mean square of what it leaves in y
+    pub left: f64,
+    /// 1 − (what it leaves in y)² / (what there is about its mean)²; `None` where y does not vary
+    pub r_squared: Option<f64>,
+}
+
+/// The line through (x, y); `None` for less than two points, all at one x, or what is not finite.
+pub fn straight_line(points: &[(f64, f64)]) -> Option<Line> {
+    let n = points.len() as f64;
+    let (x, y) = points.iter().fold((0.0, 0.0), |sum, p| (sum.0 + p.0 / n, sum.1 + p.1 / n));
+    let (xy, xx) = points.iter().fold((0.0, 0.0), |s, p| (s.0 + (p.0 - x) * (p.1 - y), s.1 + (p.0 - x).powi(2)));
+    let slope = Some(xy / xx).filter(|slope| points.len() > 1 && slope.is_finite())?;
+    let left: f64 = points.iter().map(|p| (p.1 - y - slope * (p.0 - x)).powi(2)).sum();
+    let there: f64 = points.iter().map(|p| (p.1 - y).powi(2)).sum();
+    let r_squared = (there > 0.0).then(|| 1.0 - left / there);
+    Some(Line { offset: y - slope * x, slope, left: (left / n).sqrt(), r_squared })
+}
+
+/// One law: e(sweep) = start · exp(−rate · x), x the sweep or its logarithm.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Law {
+    /// of an exponential law for each sweep; of a power law the exponent
+    pub rate: f64,
+    /// of an exponential law the error at sweep 0, of a power law that at sweep 1, in the unit of the errors
+    pub start: f64,
+    /// root mean square of what the law leaves in the logarithm
+    pub left: f64,
+    /// share of the variance of the logarithm that it explains; `None` where that does not vary
+    pub r_squared: Option<f64>,
+}
+
+/// Both laws of the same errors.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Decay {
+    /// e ∝ exp(−rate · sweep) \[paper, Fig 11\]
+    pub exponential: Law,
+    /// e ∝ sweep^−rate
+    pub power: Law,
+}
+
+/// Fits both laws to the errors after sweep 1, 2, 3, …; `None` for less than two, and for one that is not above 0.
+pub fn fit_decay(errors: &[f64]) -> Option<Decay> {
+    let fit = |x: fn(f64) -> f64| {
+        let points: Vec<_> = errors.iter().enumerate().map(|(i, e)| (x(i as f64 + 1.0), e.ln())).collect();
+        let Line { offset, slope, left, r_squared } = straight_line(&points)?;
+        Some(Law { rate: -slope, start: offset.exp(), left, r_squared })
+    };
+    Some(Decay { exponential: fit(|sweep| sweep)?, power: fit(f64::ln)? })
+}
+
+impl Decay {
+    /// The error after `sweep` (1 or later) by the exponential and by the power law.
+    pub fn at(&self, sweep: f64) -> [f64; 2] {
+        let Self { exponential, power } = self;
+        [exponential.start * (-exponential.rate * sweep).exp(), power.start * sweep.powf(-power.rate)]
+    }
+}

@@ -1,0 +1,52 @@
+//! Does the time of a push grow with the logarithm of the scan? t = a + b ln F.
+
+use serde::Serialize;
+
+/// The law, fitted by least squares.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct LogLaw {
+    /// ns
+    pub a_ns: f64,
+    /// ns for e times the faces; not negative
+    pub b_ns: f64,
+}
+
+impl LogLaw {
+    /// Of faces and times (ns); `None` for fewer than two sizes.
+    ///
+    /// A time that falls with the size is taken for constant: noise is no law.
+    pub fn fit(points: &[(usize, f64)]) -> Option<Self> {
+        let count = points.len() as f64;
+        let x = |faces: usize| (faces as f64).ln();
+        let x_mean = points.iter().map(|&(faces, _)| x(faces)).sum::<f64>() / count;
+        let t_mean = points.iter().map(|&(_, time)| time).sum::<f64>() / count;
+        let (mut xx, mut xt) = (0.0, 0.0);
+        for &(faces, time) in points {
+            xx += (x(faces) - x_mean).powi(2);
+            xt += (x(faces) - x_mean) * (time - t_mean);
+        }
+        let b_ns = (xx > 0.0).then(|| (xt / xx).max(0.0))?;
+        Some(Self { a_ns: t_mean - b_ns * x_mean, b_ns })
+    }
+
+    /// Time at so many faces, ns.
+    pub fn at(&self, faces: usize) -> f64 {
+        self.a_ns + self.b_ns * (faces as f64).ln()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_law_is_found_again_and_a_fall_is_none() {
+        // t = 100 + 10 ln F
+        let points = [10_000, 30_000, 100_000].map(|faces: usize| (faces, 100.0 + 10.0 * (faces as f64).ln()));
+        let law = LogLaw::fit(&points).unwrap();
+        assert!((law.b_ns - 10.0).abs() < 1e-9 && (law.at(1_000_000) - 238.155_105_579_642_7).abs() < 1e-8, "{law:?}");
+        let flat = LogLaw::fit(&[(10, 300.0), (1000, 100.0)]).unwrap();
+        assert_eq!((flat.b_ns, flat.a_ns), (0.0, 200.0));
+        assert_eq!(LogLaw::fit(&[(10, 300.0)]), None);
+    }
+}

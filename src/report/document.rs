@@ -1,0 +1,99 @@
+//! The whole report, and the files it is handed over as.
+
+use std::collections::BTreeSet;
+
+use serde::Serialize;
+
+use super::figure::Chapter;
+use super::{csv, page, plot};
+
+/// Why a report cannot be written down.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// Two figures or tables would take one file.
+    #[error("two figures or tables are called {0}")]
+    SameName(String),
+    /// A name that is no plain file name.
+    #[error("{0:?} cannot be the name of a file: small letters, digits and _ alone")]
+    BadName(String),
+    /// What was measured has no JSON form.
+    #[error("the report cannot be written as JSON: {0}")]
+    Json(#[from] serde_json::Error),
+}
+
+/// What was measured, where and by what.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Report {
+    /// processor, cores, memory, system
+    pub machine: String,
+    /// of the program that measured; "unknown" where it was built without its repository
+    pub commit: String,
+    /// as it was called
+    pub command: String,
+    /// day and time in UTC
+    pub date: String,
+    /// what a practitioner should take from it, a paragraph each
+    pub verdict: Vec<String>,
+    /// its parts, in order
+    pub chapters: Vec<Chapter>,
+}
+
+/// One file of a report.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct OutputFile {
+    /// without folder
+    pub name: String,
+    /// what is in it
+    pub bytes: Vec<u8>,
+}
+
+impl Report {
+    /// `report.html`, `report.json`, and of each figure its SVG and CSV, of each table its CSV.
+    ///
+    /// # Errors
+    /// [`ReportError`]: names that are not plain, or there twice.
+    pub fn files(&self) -> Result<Vec<OutputFile>, ReportError> {
+        self.check_names()?;
+        let provenance = self.provenance();
+        let mut files = vec![
+            OutputFile::new("report.html".to_owned(), page::html(self)),
+            OutputFile::new("report.json".to_owned(), serde_json::to_string_pretty(self)? + "\n"),
+        ];
+        for chapter in &self.chapters {
+            for figure in &chapter.figures {
+                files.push(OutputFile::new(format!("{}.svg", figure.id), plot::svg(figure, &provenance)));
+                files.push(OutputFile::new(format!("{}.csv", figure.id), csv::of_figure(figure)));
+            }
+            for table in &chapter.tables {
+                files.push(OutputFile::new(format!("{}.csv", table.id), csv::of_table(table)));
+            }
+        }
+        Ok(files)
+    }
+
+    /// What every picture says about where it is from.
+    pub(super) fn provenance(&self) -> String {
+        format!("{} · commit {} · {}", self.machine, self.commit, self.command)
+    }
+
+    fn check_names(&self) -> Result<(), ReportError> {
+        let figures = self.chapters.iter().flat_map(|chapter| chapter.figures.iter().map(|figure| &figure.id));
+        let tables = self.chapters.iter().flat_map(|chapter| chapter.tables.iter().map(|table| &table.id));
+        let mut seen = BTreeSet::from(["report"]);
+        for id in figures.chain(tables) {
+            if id.is_empty() || !id.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_') {
+                return Err(ReportError::BadName(id.clone()));
+            }
+            if !seen.insert(id) {
+                return Err(ReportError::SameName(id.clone()));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl OutputFile {
+    fn new(name: String, text: String) -> Self {
+        Self { name, bytes: text.into_bytes() }
+    }
+}

@@ -1,0 +1,68 @@
+//! Numbers as a person reads them.
+
+/// Digits of a power of ten.
+const RAISED: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
+/// Between them a number is written out; beyond, as a multiple of a power of ten.
+const WRITTEN_OUT: std::ops::Range<f64> = 1e-4..1e6;
+
+/// A number with three significant digits: 0.0123, 12300, 1.23·10⁻⁷; without the zeros that say nothing.
+pub fn three_digits(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    if !value.is_finite() {
+        return if value.is_nan() { "none" } else { "infinite" }.to_owned();
+    }
+    // rounded first: 999.7 is a number of four digits before the point
+    let rounded = format!("{value:.2e}");
+    let (digits, exponent) = rounded.split_once('e').unwrap_or((&rounded, "0"));
+    let exponent: i32 = exponent.parse().unwrap_or(0);
+    let magnitude: f64 = rounded.parse::<f64>().unwrap_or(value).abs();
+    if WRITTEN_OUT.contains(&magnitude) {
+        let decimals = usize::try_from(2 - exponent).unwrap_or(0);
+        return trimmed(&format!("{:.decimals$}", rounded.parse::<f64>().unwrap_or(value)));
+    }
+    format!("{}·{}", trimmed(digits), power_of_ten(exponent))
+}
+
+/// 10 with a raised exponent: 10⁻⁷.
+pub fn power_of_ten(exponent: i32) -> String {
+    let digits = exponent.unsigned_abs().to_string();
+    let raised = digits.bytes().map(|digit| RAISED[usize::from(digit - b'0')]);
+    let sign = if exponent < 0 { "⁻" } else { "" };
+    format!("10{sign}{}", raised.collect::<String>())
+}
+
+fn trimmed(digits: &str) -> String {
+    if digits.contains('.') { digits.trim_end_matches('0').trim_end_matches('.').to_owned() } else { digits.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn three_digits_and_no_more() {
+        for (value, text) in [
+            (0.0, "0"),
+            (-0.0, "0"),
+            (1.0, "1"),
+            (12.0, "12"),
+            (0.012345, "0.0123"),
+            (-1.2355, "-1.24"),
+            (999.7, "1000"),
+            (99.96, "100"),
+            (12345.0, "12300"),
+            (999_400.0, "999000"),
+            (999_600.0, "1·10⁶"),
+            (5e6, "5·10⁶"),
+            (1.234e-7, "1.23·10⁻⁷"),
+            (-2.5e12, "-2.5·10¹²"),
+            (0.000_1, "0.0001"),
+            (f64::INFINITY, "infinite"),
+            (f64::NAN, "none"),
+        ] {
+            assert_eq!(three_digits(value), text);
+        }
+    }
+}

@@ -1,0 +1,83 @@
+//! A rectangle with axes along its lower and left side.
+
+use super::axis::{Extent, Tick};
+use super::style::text_width;
+use super::writer::{Anchor, Svg};
+
+/// A label closer than this to the one before it is left out, pixels.
+const LEAST_GAP: f64 = 8.0;
+
+/// Where values become pixels.
+#[derive(Clone, Debug)]
+pub(super) struct Frame {
+    pub left: f64,
+    pub top: f64,
+    pub width: f64,
+    pub height: f64,
+}
+
+impl Frame {
+    pub fn right(&self) -> f64 {
+        self.left + self.width
+    }
+
+    pub fn bottom(&self) -> f64 {
+        self.top + self.height
+    }
+
+    /// The pixel of a place along both axes, each 0 to 1.
+    pub fn pixel(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        [self.left + x * self.width, self.bottom() - y * self.height]
+    }
+
+    /// Gridlines, their numbers, and the border.
+    pub fn draw_grid(&self, svg: &mut Svg, x: &Extent, y: &Extent) {
+        let (xs, ys) = (x.ticks(), y.ticks());
+        for tick in &xs {
+            svg.line(self.pixel([tick.at, 0.0]), self.pixel([tick.at, 1.0]), grid(tick));
+        }
+        for tick in &ys {
+            svg.line(self.pixel([0.0, tick.at]), self.pixel([1.0, tick.at]), grid(tick));
+        }
+        self.draw_x_labels(svg, &xs);
+        self.draw_y_labels(svg, &ys);
+        self.draw_border(svg);
+    }
+
+    pub fn draw_border(&self, svg: &mut Svg) {
+        svg.rectangle([self.left, self.top], [self.width, self.height], "fill=\"none\" stroke=\"#444\"", "");
+    }
+
+    /// Numbers below the frame, as many as have room.
+    pub fn draw_x_labels(&self, svg: &mut Svg, ticks: &[Tick]) {
+        let mut free_from = f64::NEG_INFINITY;
+        for tick in ticks.iter().filter(|tick| !tick.label.is_empty()) {
+            let [x, y] = self.pixel([tick.at, 0.0]);
+            let half = 0.5 * text_width(&tick.label, 12.0);
+            if x - half < free_from {
+                continue;
+            }
+            free_from = x + half + LEAST_GAP;
+            svg.text([x, y + 17.0], Anchor::Middle, "font-size=\"12\"", &tick.label);
+        }
+    }
+
+    /// Numbers on the left of the frame.
+    pub fn draw_y_labels(&self, svg: &mut Svg, ticks: &[Tick]) {
+        for tick in ticks {
+            let [x, y] = self.pixel([0.0, tick.at]);
+            svg.text([x - 7.0, y + 4.0], Anchor::End, "font-size=\"12\"", &tick.label);
+        }
+    }
+
+    /// What the axes are, below and on the left.
+    pub fn name_axes(&self, svg: &mut Svg, x: &str, y: &str) {
+        svg.text([self.left + 0.5 * self.width, self.bottom() + 38.0], Anchor::Middle, "", x);
+        svg.upward_text([self.left - 56.0, self.top + 0.5 * self.height], y);
+    }
+}
+
+/// A line without a number is fainter.
+fn grid(tick: &Tick) -> &'static str {
+    if tick.label.is_empty() { "stroke=\"#efefef\"" } else { "stroke=\"#d6d6d6\"" }
+}

@@ -1,0 +1,53 @@
+//! Figures as SVG, on white, 900 pixels wide.
+
+mod axis;
+mod curves;
+mod frame;
+mod maps;
+mod style;
+mod writer;
+
+use style::text_width;
+pub(super) use writer::escaped;
+use writer::{Anchor, Svg};
+
+use super::figure::{Drawing, Figure};
+
+/// Width of every picture, pixels.
+const WIDTH: f64 = 900.0;
+/// Size of the letters that say where it was measured.
+const SMALL: f64 = 10.5;
+/// From the upper edge to what is drawn: the title is between.
+const TOP: f64 = 38.0;
+
+/// The figure as a picture of its own. `provenance`, in small letters below it: where and by what it was measured.
+pub fn svg(figure: &Figure, provenance: &str) -> String {
+    let mut svg = Svg::new();
+    svg.text([14.0, 22.0], Anchor::Start, "font-size=\"15\" font-weight=\"600\"", &figure.title);
+    let bottom = match &figure.drawing {
+        Drawing::Curves(series) => curves::draw(&mut svg, figure, series),
+        Drawing::Maps { share_of, panels } => maps::draw(&mut svg, figure, share_of, panels),
+    };
+    let mut y = bottom + 20.0;
+    for line in lines_of(provenance, SMALL, WIDTH - 28.0) {
+        svg.text([14.0, y], Anchor::Start, &format!("font-size=\"{SMALL}\" fill=\"#666\""), &line);
+        y += 14.0;
+    }
+    svg.finish([WIDTH, y - 4.0], &figure.title)
+}
+
+/// Parted between words so that no line is wider than `width`, as far as words allow.
+fn lines_of(text: &str, size: f64, width: f64) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for word in text.split_whitespace() {
+        let line = lines.last().map_or("", String::as_str);
+        let longer = if line.is_empty() { word.to_owned() } else { format!("{line} {word}") };
+        if line.is_empty() || text_width(&longer, size) <= width {
+            lines.pop();
+            lines.push(longer);
+        } else {
+            lines.push(word.to_owned());
+        }
+    }
+    lines
+}

@@ -1,0 +1,81 @@
+//! How one series is told from another: by colour, and without it by mark and dashes.
+
+use super::writer::Svg;
+
+/// Colours that colour-blind readers tell apart too (Okabe and Ito), dark enough on white.
+const COLOURS: [&str; 8] = ["#0072b2", "#d55e00", "#009e73", "#b5559b", "#3a9bd9", "#b87d00", "#000000", "#7a7a7a"];
+/// Of the lines between marks.
+const DASHES: [&str; 4] = ["", "7 3", "2 3", "9 3 2 3"];
+/// Of lines without marks.
+const MODEL_DASHES: [&str; 4] = ["4 4", "10 4", "1 3", "10 3 1 3"];
+/// Half the size of a mark, pixels.
+const HALF: f64 = 4.5;
+
+/// The look of the series at `index`, the same in frame and legend.
+#[derive(Clone, Copy)]
+pub(super) struct Look {
+    index: usize,
+}
+
+impl Look {
+    pub fn of(index: usize) -> Self {
+        Self { index }
+    }
+
+    pub fn colour(self) -> &'static str {
+        COLOURS[self.index % COLOURS.len()]
+    }
+
+    /// Attributes of the line that joins marks.
+    pub fn line(self) -> String {
+        let dashes = DASHES[(self.index / 2) % DASHES.len()];
+        format!("stroke=\"{}\" stroke-width=\"1.6\" stroke-dasharray=\"{dashes}\"", self.colour())
+            .replace(" stroke-dasharray=\"\"", "")
+    }
+
+    /// Attributes of a line without marks.
+    pub fn dashed(self) -> String {
+        let dashes = MODEL_DASHES[self.index % MODEL_DASHES.len()];
+        format!("stroke=\"{}\" stroke-width=\"1.2\" stroke-dasharray=\"{dashes}\"", self.colour())
+    }
+
+    /// Attributes of an error bar.
+    pub fn bar(self) -> String {
+        format!("stroke=\"{}\" stroke-width=\"1\" stroke-opacity=\"0.7\"", self.colour())
+    }
+
+    /// Its mark: one of eight shapes.
+    pub fn mark(self, svg: &mut Svg, [x, y]: [f64; 2]) {
+        let colour = self.colour();
+        let filled = format!("fill=\"{colour}\" stroke=\"#fff\" stroke-width=\"0.6\"");
+        let hollow = format!("fill=\"#fff\" stroke=\"{colour}\" stroke-width=\"1.6\"");
+        let stroke = format!("stroke=\"{colour}\" stroke-width=\"1.8\"");
+        let shape = |corners: &[[f64; 2]]| -> Vec<[f64; 2]> {
+            corners.iter().map(|[dx, dy]| [x + HALF * dx, y + HALF * dy]).collect()
+        };
+        let square = [[-0.85, -0.85], [0.85, -0.85], [0.85, 0.85], [-0.85, 0.85]];
+        let up = [[0.0, -1.1], [1.05, 0.8], [-1.05, 0.8]];
+        let diamond = [[0.0, -1.2], [1.2, 0.0], [0.0, 1.2], [-1.2, 0.0]];
+        // beyond eight, where colours come again, other shapes go with them
+        match (self.index + self.index / 8) % 8 {
+            0 => svg.circle([x, y], HALF * 0.95, &filled),
+            1 => svg.polygon(&shape(&square), &filled),
+            2 => svg.polygon(&shape(&up), &filled),
+            3 => svg.polygon(&shape(&diamond), &filled),
+            4 => svg.circle([x, y], HALF * 0.85, &hollow),
+            5 => svg.polygon(&shape(&square), &hollow),
+            6 => {
+                for [a, b] in [[[-0.8, -0.8], [0.8, 0.8]], [[-0.8, 0.8], [0.8, -0.8]]] {
+                    let ends = shape(&[a, b]);
+                    svg.line(ends[0], ends[1], &stroke);
+                }
+            }
+            _ => svg.polygon(&shape(&diamond), &hollow),
+        }
+    }
+}
+
+/// Width of a text, pixels, a little more than it takes.
+pub(super) fn text_width(text: &str, size: f64) -> f64 {
+    0.58 * size * text.chars().count() as f64
+}

@@ -1,0 +1,31 @@
+//! The stability part of the report: what is promised of the default integrator holds, and what is known to fail is seen to.
+
+use touchup::report::{Effort, Ending, Integrator, stability};
+
+#[test]
+fn the_default_is_stable_everywhere_and_explicit_euler_is_not() {
+    let measured = stability(Effort { is_quick: true }, &mut |_| {});
+    for flow in &measured.sub_flows {
+        println!("{}: {} cases, {:e} at {}", flow.name, flow.cases, flow.largest_error, flow.worst);
+        assert!(flow.cases > 100 && flow.largest_error > 0.0, "{}: it was compared", flow.name);
+        assert!(flow.largest_error <= 1e-10, "{}: {:e} at {}", flow.name, flow.largest_error, flow.worst);
+    }
+    for shares in &measured.faces {
+        println!("{:?} {} {:?} unit {}", shares.integrator, shares.stable_share, shares.endings, shares.unit_share);
+    }
+    for shares in &measured.meshes {
+        println!("{:?} {} {:?}", shares.shape, shares.stable_share, shares.endings);
+    }
+    let of = |integrator| measured.faces.iter().find(|shares| shares.integrator == integrator).unwrap();
+    assert_eq!(of(Integrator::Lie).endings, [(Ending::Stable, of(Integrator::Lie).runs)]);
+    // one step of explicit Euler goes over the rest point from dt > 1/(alpha slope) on: about half of the runs are stiffer
+    let euler = of(Integrator::ExplicitEuler);
+    assert!((0.2..0.8).contains(&euler.stable_share), "{:?}", euler.endings);
+    assert!(of(Integrator::DormandPrince).endings.iter().any(|(ending, _)| *ending == Ending::GaveUp));
+    println!("default on meshes: stable from {:?}", measured.default_stable_from_quality());
+    // equal triangles no worse than a scan's are stable; the guard holds what is below its limit of 0.15
+    assert!(measured.default_stable_from_quality().is_some_and(|quality| quality < 0.4));
+    for text in measured.chapter().text {
+        println!("{text}");
+    }
+}
