@@ -2,8 +2,9 @@
 
 use std::io::{Write, stderr};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Instant, SystemTime};
 
+use chrono::{DateTime, Utc};
 use clap::{Args, ValueEnum};
 
 use super::peers::peers;
@@ -95,7 +96,7 @@ pub(super) fn report(arguments: &ReportArguments) -> Result<Losses, CliError> {
         machine: describe_machine(),
         commit: env!("TOUCHUP_COMMIT").to_owned(),
         command: command(arguments),
-        date: date_of(SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default()),
+        date: DateTime::<Utc>::from(SystemTime::now()).format("%Y-%m-%d %H:%M UTC").to_string(),
         verdict: verdict.concat(),
         chapters,
     };
@@ -209,45 +210,4 @@ fn command(arguments: &ReportArguments) -> String {
         }
     }
     command
-}
-
-/// Day and time in UTC: "2026-03-01 09:05 UTC".
-fn date_of(since_1970: Duration) -> String {
-    let seconds = since_1970.as_secs();
-    let (mut day, mut year) = (seconds / 86_400, 1970);
-    let is_leap = |year: u64| year.is_multiple_of(4) && (!year.is_multiple_of(100) || year.is_multiple_of(400));
-    let days_of = |year| if is_leap(year) { 366 } else { 365 };
-    while day >= days_of(year) {
-        day -= days_of(year);
-        year += 1;
-    }
-    let february = if is_leap(year) { 29 } else { 28 };
-    let mut month = 1;
-    for days in [31, february, 31, 30, 31, 30, 31, 31, 30, 31, 30] {
-        if day < days {
-            break;
-        }
-        day -= days;
-        month += 1;
-    }
-    let (hour, minute) = (seconds / 3600 % 24, seconds / 60 % 60);
-    format!("{year}-{month:02}-{:02} {hour:02}:{minute:02} UTC", day + 1)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn days_are_those_of_the_calendar() {
-        for (seconds, date) in [
-            (0, "1970-01-01 00:00 UTC"),
-            (951_825_540, "2000-02-29 11:59 UTC"),
-            (1_709_251_199, "2024-02-29 23:59 UTC"),
-            (1_709_251_200, "2024-03-01 00:00 UTC"),
-            (1_767_225_599, "2025-12-31 23:59 UTC"),
-        ] {
-            assert_eq!(date_of(Duration::from_secs(seconds)), date);
-        }
-    }
 }

@@ -330,13 +330,10 @@ impl Neighbourhood {
         let mut look = Look::Safe;
         let has_side = |index: u32| evidence[self.ring.faces[index as usize].0 as usize] != [0.0; 3];
         for &(a, b) in &self.ring.edges {
-            if !(has_side(a) && has_side(b)) {
-                continue;
-            }
             let (old_a, old_b) = (&self.before[a as usize], &self.before[b as usize]);
             let new_b = self.after.get(b as usize).unwrap_or(old_b);
             let cosine = self.after[a as usize].normal.dot(&new_b.normal);
-            if cosine < params.smallest_fold_cosine + FOLD_MARGIN {
+            if cosine < params.smallest_fold_cosine + FOLD_MARGIN && has_side(a) && has_side(b) {
                 let broken = cosine < params.smallest_fold_cosine && cosine < old_a.normal.dot(&old_b.normal);
                 look = look.and(Look::of(broken, true));
             }

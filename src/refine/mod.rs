@@ -396,14 +396,15 @@ impl Refiner {
         let bend = 1.0 / (1.0 + face.n.dot(&next.n)).max(f64::EPSILON);
         let longest = self.params.longest_step_edges * self.deformable.mean_edge;
         let along = self.params.dynamics.along == Along::Force;
-        self.deformable.mesh.triangle(*handle).map(|corner| {
+        let steps = self.deformable.mesh.triangle(*handle).map(|corner| {
             let arm = corner - face.b;
             let across = axis.cross(&arm);
             let step = across + axis.cross(&across) * bend + (next.b - face.b);
-            let step = if along { normal * step.dot(normal) } else { step };
-            let length = step.norm();
-            if length > longest { step * (longest / length) } else { step }
-        })
+            if along { normal * step.dot(normal) } else { step }
+        });
+        // by one share: corners shortened each by itself would turn the face
+        let farthest = steps.iter().map(Vector3::norm).fold(0.0, f64::max);
+        if farthest > longest { steps.map(|step| step * (longest / farthest)) } else { steps }
     }
 
     /// Keeps what it takes to undo strokes from here on; with a patch that is followed, it is the patch's strokes that are
