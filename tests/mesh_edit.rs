@@ -282,7 +282,16 @@ impl Edited {
             && self.mesh.star(vertex) == faces
         {
             self.move_vertex(vertex, rng);
-            self.tree.refit_planned(&self.mesh, &mut self.plan);
+            // once far, then a little, within the margin and beyond it
+            let margin = within(rng, 0.0, 0.02) * self.scale;
+            self.tree.refit_planned(&self.mesh, &mut self.plan, f64::INFINITY, margin);
+            for _ in 0..4 {
+                let step = point(rng, 0.5 * margin).coords;
+                let there = self.mesh.position(vertex) + step;
+                self.mesh.set_position(vertex, there);
+                self.ledger.vertices.insert(vertex.0, there);
+                self.tree.refit_planned(&self.mesh, &mut self.plan, step.norm() * (1.0 + f64::EPSILON), margin);
+            }
         }
         let vertex = VertexId(within(rng, 0.0, self.mesh.vertex_slots() as f64) as u32);
         self.tree.plan(self.mesh.star(vertex), &mut self.plan);

@@ -72,7 +72,7 @@ fn the_text_tells_hits_and_misses_as_they_were_measured() {
     let mut cost = made_up();
     let text = cost.chapter().text.join("\n");
     // 180 ns where the law says 160
-    assert!(text.contains("0.18 us instead of 0.10 us (1.12 times what the logarithmic law"), "{text}");
+    assert!(text.contains("0.18 µs instead of 0.10 µs (1.12 times what the logarithmic law"), "{text}");
     assert!(text.contains("at most 1.020 times as long") && text.contains("within the 1.05"), "{text}");
     assert!(text.contains("guard +120 ns, contact +1 ns (within the noise)"), "{text}");
     assert!(text.contains("800000 samples per second, scene cheapest, edges of 1.00 mm (holds 500000)"), "{text}");
@@ -93,7 +93,7 @@ fn the_law_is_drawn_dashed_beside_what_was_measured() {
     let law = &curves[4];
     assert_eq!(law.stroke, Stroke::Dashed);
     let at: Vec<_> = law.marks.iter().map(|mark| (mark.x.median, (mark.y.median * 1e6).round())).collect();
-    assert_eq!(at, [(1e4, 100e3), (1e5, 130e3), (1e6, 160e3)], "0.10, 0.13 and 0.16 us");
+    assert_eq!(at, [(1e4, 100e3), (1e5, 130e3), (1e6, 160e3)], "0.10, 0.13 and 0.16 µs");
     for table in &chapter.tables {
         assert!(table.rows.iter().all(|row| row.len() == table.heads.len()), "{}", table.id);
     }

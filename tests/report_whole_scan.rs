@@ -207,7 +207,7 @@ fn whole_scans_are_measured_and_told() {
         }
         for result in case.scans.iter().flat_map(|scan| &scan.ways) {
             println!(
-                "{:8} {:35} {:7.3} mm {:7.3} mm {:6.1} deg {:9.3} us {:8.3} s {:?}",
+                "{:8} {:35} {:7.3} mm {:7.3} mm {:6.1} deg {:9.3} µs {:8.3} s {:?}",
                 case.name,
                 result.name,
                 result.mean_mm(),

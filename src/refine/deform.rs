@@ -16,6 +16,9 @@ const CUT: f64 = 0.35;
 const TRIES: usize = 3;
 /// Faces within this many mean edges of a region are what it could run into.
 const MARGIN_EDGES: f64 = 0.2;
+/// By how much of the mean edge the boxes of what moves are made wider: a touch moves vertices by less while it stays on a
+/// face.
+const BOX_MARGIN_EDGES: f64 = 0.02;
 /// Faces looked at to find the mean edge.
 const EDGE_SAMPLE: usize = 20_000;
 
@@ -181,7 +184,9 @@ impl DeformableMesh {
                 Fit::Whole
             }
         };
-        self.tree.refit_planned(&self.mesh, &mut region.refit);
+        // where others moved the same vertices, their boxes do not count on it
+        let way = if region.seen == Some(self.edits) { longest } else { f64::INFINITY };
+        self.tree.refit_planned(&self.mesh, &mut region.refit, way, BOX_MARGIN_EDGES * self.mean_edge);
         self.edits += 1;
         region.seen = Some(self.edits);
         if let Some(patch) = &mut self.patch {

@@ -15,7 +15,7 @@ pub enum Scale {
 /// One axis of a figure.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Axis {
-    /// quantity and unit, as a person reads them: "time per sample, us"
+    /// quantity and unit, as a person reads them: "time per sample, µs"
     pub label: String,
     /// the same as the head of a column: `time_per_sample_us`
     pub column: String,
@@ -192,7 +192,7 @@ pub struct Table {
     pub title: String,
     /// below it
     pub caption: String,
-    /// one a column, with the unit: "push, us"
+    /// one a column, with the unit: "push, µs"
     pub heads: Vec<String>,
     /// one a line, each as long as `heads`
     pub rows: Vec<Vec<Cell>>,

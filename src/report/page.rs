@@ -56,7 +56,7 @@ fn contents(chapters: &[Chapter]) -> String {
         format!("<li><a href=\"#{}\">{}</a></li>\n", anchor(number), escaped(&chapter.title))
     };
     let lines: String = chapters.iter().enumerate().map(line).collect();
-    format!("<h2>Contents</h2>\n<ul>\n{lines}</ul>\n")
+    format!("<h2>Contents</h2>\n<ol>\n{lines}</ol>\n")
 }
 
 fn anchor(number: usize) -> String {
@@ -64,7 +64,7 @@ fn anchor(number: usize) -> String {
 }
 
 fn chapter(number: usize, chapter: &Chapter, provenance: &str) -> String {
-    let title = format!("<h2 id=\"{}\">{}</h2>\n", anchor(number), escaped(&chapter.title));
+    let title = format!("<h2 id=\"{}\">{}. {}</h2>\n", anchor(number), number + 1, escaped(&chapter.title));
     let figures: String = chapter.figures.iter().map(|figure| self::figure(figure, provenance)).collect();
     let tables: String = chapter.tables.iter().map(table).collect();
     title + &text(&chapter.text) + &figures + &tables

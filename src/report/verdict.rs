@@ -14,7 +14,7 @@ fn of_case(case: &CaseResult) -> Option<String> {
     let scan = case.main()?;
     let told = |result: &WayResult| {
         format!(
-            "{} ({} mm, {} us per sample)",
+            "{} ({} mm, {} µs per sample)",
             result.name,
             three_digits(result.mean_mm()),
             three_digits(result.per_sample_us.median)
@@ -94,7 +94,7 @@ pub fn of_cost(measured: &Cost) -> Vec<String> {
     let Some(size) = measured.sizes.last() else { return Vec::new() };
     let push = size.default_larger.time_ns;
     let mut text = format!(
-        "Rate: on {} faces one push of the default scene, its patch aside, takes {} us (p90 {} us); at 1 kHz that is {} % of one \
+        "Rate: on {} faces one push of the default scene, its patch aside, takes {} µs (p90 {} µs); at 1 kHz that is {} % of one \
          core.",
         size.faces,
         three_digits(push.median * 1e-3),

@@ -40,6 +40,13 @@ impl Aabb {
         Self { lo: self.lo.map(|x| x - unit(x)), hi: self.hi.map(|x| x + unit(x)) }
     }
 
+    /// At least `margin` (m) wider on each side.
+    #[inline]
+    pub fn grown(&self, margin: f64) -> Self {
+        let grown = |x: f32, margin: f64| (f64::from(x) + margin) as f32;
+        Self { lo: self.lo.map(|x| grown(x, -margin)), hi: self.hi.map(|x| grown(x, margin)) }.rounded_outward()
+    }
+
     /// Half of the surface, m²; what a query pays for a box grows with it.
     #[inline]
     pub fn half_area(&self) -> f32 {

@@ -1,10 +1,10 @@
-//! Closest face of a mesh that changes: a bounding volume tree that is exact and tight after every edit.
+//! Closest face of a mesh that changes: a bounding volume tree that is exact after every edit, and never far from tight.
 //!
 //! A binary tree over the faces. Boxes are kept in single precision relative to the middle of the mesh and rounded
 //! outward, so a query that prunes by them never misses a face; distances to faces are computed in double precision.
 //! [`FaceTree::refit`] recomputes the boxes of the leaves that hold moved faces and all boxes above them;
-//! [`FaceTree::insert`] and [`FaceTree::remove`] do the same on one way to the root. Boxes never only grow, so nothing is
-//! left to be tightened later.
+//! [`FaceTree::insert`] and [`FaceTree::remove`] do the same on one way to the root. [`FaceTree::refit_planned`] may leave a
+//! margin, so that small motions inside of it cost nothing. Boxes never only grow, so nothing is left to be tightened later.
 
 mod aabb;
 mod build;

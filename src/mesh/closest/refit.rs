@@ -12,6 +12,8 @@ pub struct RefitPlan {
     faces: Vec<FaceId>,
     leaves: Vec<u32>,
     pairs: Vec<u32>,
+    /// how far corners of the faces may still move before one could leave its box, m
+    room: f64,
     /// the tree's count of edits when it was made
     edits: u64,
 }
@@ -21,7 +23,7 @@ impl RefitPlan {
     pub fn with_room(faces: usize) -> Self {
         // the way from the leaves to the root adds a level or so for each halving of the mesh
         let pairs = Vec::with_capacity(2 * faces + STACK);
-        Self { faces: Vec::with_capacity(faces), leaves: Vec::with_capacity(faces), pairs, edits: 0 }
+        Self { faces: Vec::with_capacity(faces), leaves: Vec::with_capacity(faces), pairs, room: 0.0, edits: 0 }
     }
 }
 
@@ -30,7 +32,7 @@ impl FaceTree {
     pub fn refit(&mut self, mesh: &TriMesh, faces: &[FaceId]) {
         let mut plan = RefitPlan::default();
         self.plan(faces, &mut plan);
-        self.refit_planned(mesh, &mut plan);
+        self.refit_planned(mesh, &mut plan, f64::INFINITY, 0.0);
     }
 
     /// Notes which boxes depend on `faces`, for [`Self::refit_planned`]; faces that the tree does not hold are skipped.
@@ -42,24 +44,39 @@ impl FaceTree {
 
     /// Makes the tree exact again after the corners of the planned faces moved; a plan made before faces were inserted
     /// or removed is made anew.
-    pub fn refit_planned(&mut self, mesh: &TriMesh, plan: &mut RefitPlan) {
+    ///
+    /// - `way`: how far a corner moved at most since the last call with this plan, m; infinite where that is not known.
+    /// - `margin`: by how much the boxes are made wider than they need be, m. They are left as they are until corners may
+    ///   have left them: a query stays exact and looks at little more.
+    #[inline]
+    pub fn refit_planned(&mut self, mesh: &TriMesh, plan: &mut RefitPlan, way: f64, margin: f64) {
+        if way <= plan.room && plan.edits == self.edits {
+            plan.room -= way;
+        } else {
+            self.fit(mesh, plan, margin);
+        }
+    }
+
+    fn fit(&mut self, mesh: &TriMesh, plan: &mut RefitPlan, margin: f64) {
         if plan.edits != self.edits {
             self.renew(plan);
         }
         for &leaf in &plan.leaves {
             let node = *self.node(leaf);
-            self.node_mut(leaf).bounds = self.bounds_of(mesh, self.faces_of(&node));
+            let bounds = self.bounds_of(mesh, self.faces_of(&node));
+            self.node_mut(leaf).bounds = if margin > 0.0 { bounds.grown(margin) } else { bounds };
         }
         for &pair in plan.pairs.iter().rev() {
             let [left, right] = &self.pairs[pair as usize].0;
             let bounds = left.bounds.union(&right.bounds);
             self.node_mut(self.parents[pair as usize]).bounds = bounds;
         }
+        plan.room = margin;
     }
 
     fn renew(&mut self, plan: &mut RefitPlan) {
-        let RefitPlan { faces, leaves, pairs, edits } = plan;
-        *edits = self.edits;
+        let RefitPlan { faces, leaves, pairs, room, edits } = plan;
+        (*room, *edits) = (0.0, self.edits);
         leaves.clear();
         leaves.extend(faces.iter().filter_map(|face| self.leaf_of_face.get(face.0 as usize)));
         leaves.dedup();

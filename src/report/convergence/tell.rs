@@ -22,7 +22,7 @@ impl Convergence {
         text.extend([Rule::Paper, Rule::Robust].into_iter().map(|rule| self.verdict(rule)));
         text.extend(self.failed.iter().map(|reason| format!("Not run: {reason}.")));
         Chapter {
-            title: "3. Convergence from sweep to sweep".to_owned(),
+            title: "Convergence from sweep to sweep".to_owned(),
             text,
             figures: vec![self.figure(Rule::Paper), self.figure(Rule::Robust)],
             tables: vec![self.table()],

@@ -15,7 +15,7 @@ impl Cost {
     /// As it is told.
     pub fn chapter(&self) -> Chapter {
         Chapter {
-            title: "5. Cost of each stage".to_owned(),
+            title: "Cost of each stage".to_owned(),
             text: [self.size_text(), self.ratio_text(), self.part_text(), self.replay_text(), self.count_text()]
                 .into_iter()
                 .flatten()
@@ -62,7 +62,7 @@ impl Cost {
                  vertices move with each touch.",
             ),
             x: Axis::log("faces of the scan", "faces"),
-            y: Axis::log("time of one push, us", "push_us"),
+            y: Axis::log("time of one push, µs", "push_us"),
             drawing: Drawing::Curves(curves),
         }
     }
@@ -75,18 +75,18 @@ impl Cost {
             let expected = law.map_or(String::new(), |law| {
                 let times = to / law.at(last.faces);
                 let verdict = if times <= NO_MORE {
-                    "no more than the logarithm says"
+                    "no more than the logarithm says".to_owned()
                 } else {
-                    "the part beyond the logarithm is what the caches no longer hold"
+                    format!("beyond the logarithm, with {:.0} MB of mesh and tree", last.bytes() * 1e-6)
                 };
                 format!(" ({times:.2} times what the logarithmic law of the small scans foretells: {verdict})")
             });
-            format!("{name} {:.2} us instead of {:.2} us{expected}", to * 1e-3, from * 1e-3)
+            format!("{name} {:.2} µs instead of {:.2} µs{expected}", to * 1e-3, from * 1e-3)
         };
         Some(format!(
             "On a scan of {more:.0} times the faces ({} instead of {}) the cheapest scene takes {}; {}. A scan that grows \
              finer and not larger is another matter: the region that follows the ball then holds {:.0} vertices instead of \
-             {:.0}, and the default scene takes {:.1} us instead of {:.1} us.",
+             {:.0}, and the default scene takes {:.1} µs instead of {:.1} µs.",
             last.faces,
             first.faces,
             told("", self.barest_law, |size| &size.barest).trim_start(),
@@ -110,8 +110,8 @@ impl Cost {
         Some(format!(
             "What a scene does not name costs nothing: the cheapest scene takes at most {worst:.3} times as long as the loop \
              that is written by hand, on the same samples in turns; {} the {LARGEST_RATIO} that is allowed. Against the same \
-             loop made to look up the boxes of the tree once for each face, as the refiner does, it is {planning:.3} times: \
-             what is more is the check of each sample, the frames of its wrench, and the dynamics of the face.",
+             loop made to look up the boxes of the tree once for each face and to leave them a margin, as the refiner does, it is \
+             {planning:.3} times.",
             if is_within { "within" } else { "this misses" }
         ))
     }

@@ -10,6 +10,8 @@ use crate::touch::Sample;
 const RELAXATION: f64 = 25.0;
 /// Between two samples, s.
 const STEP: f64 = 1e-3;
+/// By which boxes are made wider where they are planned: far more than a sample moves, m.
+const MARGIN: f64 = 2e-5;
 /// Farther than this nothing is touched, m.
 const REACH: f64 = 0.01;
 
@@ -63,7 +65,7 @@ impl MinimalLoop {
                     *face = Some(hit.face);
                     tree.plan(faces, plan);
                 }
-                tree.refit_planned(mesh, plan);
+                tree.refit_planned(mesh, plan, step.norm(), MARGIN);
             }
         }
         true

@@ -45,6 +45,13 @@ pub struct SizeCost {
     pub tree_build_ms: f64,
 }
 
+impl SizeCost {
+    /// Memory of mesh and tree, bytes.
+    pub fn bytes(&self) -> f64 {
+        (self.mesh_bytes_per_face + self.tree_bytes_per_face) * self.faces as f64
+    }
+}
+
 /// Side of the plate whose edges are [`EDGE`] long, m.
 pub(super) fn side_of(faces: usize) -> f64 {
     EDGE * (faces as f64 / 2.0).sqrt()

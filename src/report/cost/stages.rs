@@ -185,7 +185,7 @@ impl Moving {
             let faces: Vec<FaceId> = corners.flat_map(|vertex| mesh.star(vertex)).copied().collect();
             tree.plan(&faces, plan);
         }
-        tree.refit_planned(mesh, plan);
+        tree.refit_planned(mesh, plan, f64::INFINITY, 0.0);
     }
 }
 

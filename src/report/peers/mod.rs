@@ -30,7 +30,7 @@ pub const WANTED_FACTOR: f64 = 100.0;
 /// A distance that differs by more than this share is another answer.
 pub const AGREEMENT: f64 = 1e-9;
 
-/// Times of touchup itself on the same input, us.
+/// Times of touchup itself on the same input, µs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TouchupTimes {
     /// one closest face, nothing known
@@ -52,11 +52,11 @@ pub struct PeerTimes {
     pub update: String,
     /// to build its index, ms
     pub build_ms: f64,
-    /// one closest face per call, us
+    /// one closest face per call, µs
     pub query_us: SpreadOf,
-    /// the same in one call for all, us for each; where it can
+    /// the same in one call for all, µs for each; where it can
     pub batched_query_us: Option<SpreadOf>,
-    /// closest face, ring moved, index true again, us
+    /// closest face, ring moved, index true again, µs
     pub pipeline_us: SpreadOf,
     /// how many samples that was measured over
     pub pipeline_samples: usize,
@@ -148,7 +148,7 @@ impl PeersAtSize {
         Ok(all)
     }
 
-    /// Whole pushes, the slower of both turns, us.
+    /// Whole pushes, the slower of both turns, µs.
     pub fn push_us(&self) -> f64 {
         self.touchup.iter().map(|times| times.push_us.median).fold(0.0, f64::max)
     }

@@ -18,7 +18,7 @@ fn verdicts(size: &PeersAtSize) -> Vec<String> {
     if let (Some(peer), Some(factor)) = (size.fastest_pipeline(), size.pipeline_factor()) {
         let verdict = if factor >= WANTED_FACTOR { "holds" } else { "MISSES" };
         text.push(format!(
-            "{} faces: a push is {factor:.0} times faster than the fastest pipeline with an exact index ({}, {:.0} us): {verdict} the \
+            "{} faces: a push is {factor:.0} times faster than the fastest pipeline with an exact index ({}, {:.0} µs): {verdict} the \
              wanted {WANTED_FACTOR:.0}.",
             size.faces, peer.peer, peer.pipeline_us.median
         ));
@@ -26,7 +26,7 @@ fn verdicts(size: &PeersAtSize) -> Vec<String> {
     if let (Some(peer), Some(factor)) = (size.fastest_query(), size.query_factor()) {
         let verdict = if factor > 1.0 { "holds" } else { "MISSES" };
         text.push(format!(
-            "{} faces: a whole push takes {:.2} us, the fastest closest-face query alone {:.2} us ({}), {factor:.1} times as long: {verdict}.",
+            "{} faces: a whole push takes {:.2} µs, the fastest closest-face query alone {:.2} µs ({}), {factor:.1} times as long: {verdict}.",
             size.faces,
             size.push_us(),
             peer.query_us.median,
@@ -85,9 +85,9 @@ fn table(peers: &Peers) -> Table {
         "faces",
         "who",
         "how the index is kept true",
-        "closest face per call, us",
-        "closest face in one call for all (touchup: near the last), us",
-        "whole sample, us",
+        "closest face per call, µs",
+        "closest face in one call for all (touchup: near the last), µs",
+        "whole sample, µs",
         "sample over touchup's push",
         "largest relative difference of a distance",
     ];
@@ -120,7 +120,7 @@ fn figure(peers: &Peers) -> Figure {
         title: "Time per sample with an index that stays exact".to_owned(),
         caption: "Medians with p10 to p90, one thread; touchup: whole push, before the peers.".to_owned(),
         x: Axis::log("faces", "faces"),
-        y: Axis::log("time per sample, us", "sample_us"),
+        y: Axis::log("time per sample, µs", "sample_us"),
         drawing: Drawing::Curves(series),
     }
 }

@@ -16,7 +16,7 @@ struct Plan<'a> {
 }
 
 fn time_axis() -> Axis {
-    Axis::log("time per sample, us", "time_per_sample_us")
+    Axis::log("time per sample, µs", "time_per_sample_us")
 }
 
 impl WholeScan {
@@ -178,7 +178,7 @@ impl WholeScan {
                       sample of two other ways."
                 .to_owned(),
             x: Axis::log("touches kept", "touches"),
-            y: Axis::log("time for one more touch, us", "time_per_touch_us"),
+            y: Axis::log("time for one more touch, µs", "time_per_touch_us"),
             drawing: Drawing::Curves(series),
         })
     }
@@ -195,7 +195,7 @@ impl WholeScan {
             "mean normal error, deg",
             "p95 normal error, deg",
             "total, s",
-            "per sample, us",
+            "per sample, µs",
             "after the last sample, ms",
             "samples",
             "runs",

@@ -71,7 +71,7 @@ pub struct WayResult {
     pub error: Option<TouchedError>,
     /// from the scan to the result, s
     pub total_s: Spread,
-    /// for each sample (or touch) that it was given, with the end's work shared out, us
+    /// for each sample (or touch) that it was given, with the end's work shared out, µs
     pub per_sample_us: Spread,
     /// of that the work after the last sample, ms in all
     pub end_ms: Spread,
@@ -105,13 +105,13 @@ pub struct ScanResult {
 /// What a touch costs the Gaussian process.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct GaussianCost {
-    /// touches kept so far, and the time to take in one more, us; the medians of groups
+    /// touches kept so far, and the time to take in one more, µs; the medians of groups
     pub marks: Vec<(f64, Spread)>,
     /// of the power law through the larger half of them
     pub exponent: f64,
     /// contacts that there were
     pub contacts: usize,
-    /// by that law, the time to take in the last one if all were kept, us
+    /// by that law, the time to take in the last one if all were kept, µs
     pub at_all_contacts_us: f64,
 }
 

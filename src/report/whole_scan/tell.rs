@@ -24,7 +24,7 @@ impl WholeScan {
             text.extend(case.gaussian.as_ref().map(|cost| case.gaussian_text(cost)));
         }
         Chapter {
-            title: "2. Error against run time, whole scan".to_owned(),
+            title: "Error against run time, whole scan".to_owned(),
             text,
             figures: self.figures(),
             tables: vec![self.table()],
@@ -35,7 +35,7 @@ impl WholeScan {
 /// Name, error and time of one way.
 fn told(result: &WayResult) -> String {
     format!(
-        "{} ({}{:.3} mm, {:.2} us per sample)",
+        "{} ({}{:.3} mm, {:.2} µs per sample)",
         result.name,
         result.error.map_or_else(String::new, |error| format!("normals {:.1} deg, ", error.normal_mean_deg)),
         result.mean_mm(),
@@ -89,7 +89,7 @@ impl CaseResult {
             let each = |&(edge, result): &(f64, &WayResult)| {
                 let worse = if result.is_worse { ", worse than the scan" } else { "" };
                 format!(
-                    "{:.3} mm in {:.2} us per sample at {edge:.1} mm{worse}",
+                    "{:.3} mm in {:.2} µs per sample at {edge:.1} mm{worse}",
                     result.mean_mm(),
                     result.per_sample_us.median
                 )
@@ -142,7 +142,7 @@ fn against_contact_points(haptic: &WayResult, points: Option<&WayResult>) -> Str
         _ => "loses to",
     };
     format!(
-        " There the haptic update {verdict} contact points alone: {:.3} against {:.3} mm in {:.2} against {:.2} us per \
+        " There the haptic update {verdict} contact points alone: {:.3} against {:.3} mm in {:.2} against {:.2} µs per \
          sample{normals}.",
         haptic.mean_mm(),
         points.mean_mm(),

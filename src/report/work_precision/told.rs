@@ -7,7 +7,7 @@ use crate::report::{Axis, Cell, Chapter, Drawing, Figure, Mark, Series, Spread, 
 /// What is asked for, m: what a sensor can tell, a thousandth of that, and as good as exact.
 const LEVELS_M: [(f64, &str); 3] = [(1e-6, "1 µm"), (1e-9, "1 nm"), (1e-12, "1 pm")];
 /// Stiffnesses with figures of their own.
-const SHOWN_H_MINS_M: [f64; 3] = [PAPER_H_MIN_M, 1e-6, 1e-9];
+const SHOWN_H_MINS_M: [f64; 2] = [PAPER_H_MIN_M, 1e-9];
 
 impl WorkPrecision {
     /// Chapter 1 of the report.
