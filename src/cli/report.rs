@@ -117,6 +117,12 @@ fn chapters(arguments: &ReportArguments, progress: &mut dyn FnMut(&str)) -> Resu
     let effort = Effort { is_quick: arguments.quick };
     let is_wanted = |part| arguments.only.is_empty() || arguments.only.contains(&part);
     let given = arguments.given()?;
+    // first, for they need what may not be there, and nothing measured is lost by that
+    let peers = arguments.peers.then(|| {
+        let environment = arguments.peers_env.clone().unwrap_or_else(|| arguments.out.join("peers-env"));
+        peers(effort, &environment, progress)
+    });
+    let peers = peers.transpose()?;
     let mut told = Vec::new();
     let mut tell = |chapter, verdict| told.push(Told { chapter, verdict });
     if is_wanted(Part::WorkPrecision) {
@@ -142,9 +148,7 @@ fn chapters(arguments: &ReportArguments, progress: &mut dyn FnMut(&str)) -> Resu
         let measured = cost(effort, progress)?;
         tell(measured.chapter(), verdict::of_cost(&measured));
     }
-    if arguments.peers {
-        let environment = arguments.peers_env.clone().unwrap_or_else(|| arguments.out.join("peers-env"));
-        let measured = peers(effort, &environment, progress)?;
+    if let Some(measured) = peers {
         tell(measured.chapter(), verdict::of_peers(&measured));
     }
     Ok(told)

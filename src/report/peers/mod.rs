@@ -227,7 +227,11 @@ mod tests {
         assert!(size.peers[0].agrees() && !size.peers[1].agrees());
         assert_eq!(size.pipeline_factor(), Some(150.0));
         assert_eq!(size.query_factor(), Some(4.5));
-        assert!(Peers { sizes: vec![size] }.holds());
+        let peers = Peers { sizes: vec![size] };
+        assert!(peers.holds());
+        // a picture and a table, under two names
+        let Chapter { figures, tables, .. } = peers.chapter();
+        assert!(figures.len() == 1 && tables.len() == 1 && figures[0].id != tables[0].id);
         assert!(PeersAtSize::read(&input, [times(1.0); 2], "Segmentation fault").is_err());
     }
 

@@ -116,7 +116,7 @@ fn figure(peers: &Peers) -> Figure {
         }
     }
     Figure {
-        id: "peers".to_owned(),
+        id: "peers_sample".to_owned(),
         title: "Time per sample with an index that stays exact".to_owned(),
         caption: "Medians with p10 to p90, one thread; touchup: whole push, before the peers.".to_owned(),
         x: Axis::log("faces", "faces"),
