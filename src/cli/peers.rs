@@ -43,7 +43,7 @@ fn measure(effort: Effort, environment: &Path, progress: &mut dyn FnMut(&str)) -
     let sizes: &[usize] = effort.choose(&[100_000], &[100_000, 1_000_000]);
     let at_size = |&faces: &usize| {
         progress(&format!("peers: touchup at {faces} faces"));
-        let input = PeersInput::new(faces, effort);
+        let input = PeersInput::new(faces, effort).map_err(RefineError::from)?;
         let before = input.measure()?;
         progress(&format!("peers: libraries at {faces} faces"));
         let printed = run_script(&python, &input)?;

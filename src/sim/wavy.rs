@@ -62,6 +62,14 @@ pub fn slide(i: usize, width: f64) -> Sample {
 
 /// As [`slide`], on a plate of `side` (m).
 pub fn slide_on(side: f64, i: usize, width: f64) -> Sample {
+    let (contact, normal) = contact_on(side, i, width);
+    let reported = contact + normal * (RADIUS - FORCE / STIFFNESS);
+    let wrench = Wrench { force: normal * FORCE, torque: Vector3::zeros() };
+    Sample { stamp_ns: i as i64 * STEP_NS, pose_ot: Isometry3::translation(reported.x, reported.y, reported.z), wrench }
+}
+
+/// Where the ball touches the part at sample `i` of [`slide_on`], m, and the outward normal there.
+pub fn contact_on(side: f64, i: usize, width: f64) -> (Point3<f64>, Vector3<f64>) {
     let length = 0.8 * side;
     let way = SPEED * i as f64 * STEP_NS as f64 * 1e-9;
     let (line, along) = ((way / length).floor(), way % length);
@@ -74,8 +82,5 @@ pub fn slide_on(side: f64, i: usize, width: f64) -> Sample {
         1.0,
     )
     .normalize();
-    let contact = Point3::new(x, y, height(x, y)) - normal * DEPTH;
-    let reported = contact + normal * (RADIUS - FORCE / STIFFNESS);
-    let wrench = Wrench { force: normal * FORCE, torque: Vector3::zeros() };
-    Sample { stamp_ns: i as i64 * STEP_NS, pose_ot: Isometry3::translation(reported.x, reported.y, reported.z), wrench }
+    (Point3::new(x, y, height(x, y)) - normal * DEPTH, normal)
 }
