@@ -6,7 +6,7 @@ use nalgebra::{Point3, Vector3, vector};
 use proptest::prelude::*;
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
-use touchup::mesh::{BoxQuery, FaceId, FaceTree, RefitPlan, TriMesh, VertexId, triangle};
+use touchup::mesh::{BoxQuery, FaceId, FaceTree, Nearby, RefitPlan, TriMesh, VertexId, triangle};
 
 #[path = "common/mod.rs"]
 mod common;
@@ -130,7 +130,7 @@ fn squareness(mesh: &TriMesh, p: &Point3<f64>, face: FaceId) -> f64 {
 }
 
 /// Every kind of query against brute force.
-fn check_queries(mesh: &TriMesh, tree: &FaceTree, p: &Point3<f64>, rng: &mut Pcg64) {
+fn check_queries(mesh: &TriMesh, tree: &FaceTree, p: &Point3<f64>, nearby: &mut Nearby, rng: &mut Pcg64) {
     let near = distances(mesh, p);
     let wanted = near.iter().map(|(distance, _)| *distance).fold(f64::INFINITY, f64::min);
     let Some(hit) = tree.closest(mesh, p, f64::INFINITY) else { return assert!(near.is_empty()) };
@@ -145,7 +145,9 @@ fn check_queries(mesh: &TriMesh, tree: &FaceTree, p: &Point3<f64>, rng: &mut Pcg
         assert!(other <= square && (other < square || hit.face <= *face), "{p}: {face:?} before {:?}", hit.face);
     }
     let hint = near[within(rng, 0.0, near.len() as f64) as usize].1;
-    assert_eq!(tree.closest_from(mesh, p, hint, f64::INFINITY), Some(hit));
+    for hint in [hint, hit.face, hit.face] {
+        assert_eq!(tree.closest_nearby(mesh, p, hint, f64::INFINITY, nearby), Some(hit));
+    }
 
     let middle = tree.closest_barycentre(mesh, p, f64::INFINITY).expect("a face is there");
     let nearest = mesh.faces().map(|(f, _)| (mesh.barycentre(f) - p).norm()).fold(f64::INFINITY, f64::min);
@@ -202,6 +204,7 @@ struct Edited {
     plan: RefitPlan,
     /// the vertex of the plan and the number of its faces then
     planned: Option<(VertexId, Vec<FaceId>)>,
+    nearby: Nearby,
 }
 
 impl Edited {
@@ -209,7 +212,8 @@ impl Edited {
         let edge = 2.0 * scale / f64::from(cells);
         let mesh = grid(cells, edge, |_, _| within(rng, -0.2 * scale, 0.2 * scale));
         let (tree, ledger) = (FaceTree::new(&mesh), Ledger::of(&mesh));
-        Self { mesh, tree, ledger, scale, plan: RefitPlan::default(), planned: None }
+        let (plan, nearby) = (RefitPlan::default(), Nearby::default());
+        Self { mesh, tree, ledger, scale, plan, planned: None, nearby }
     }
 
     fn insert(&mut self, corners: [u32; 3]) {
@@ -298,10 +302,10 @@ impl Edited {
         self.planned = Some((vertex, self.mesh.star(vertex).to_vec()));
     }
 
-    fn check(&self, rng: &mut Pcg64, query: &mut BoxQuery) {
+    fn check(&mut self, rng: &mut Pcg64, query: &mut BoxQuery) {
         let at_vertex = self.mesh.position(VertexId(within(rng, 0.0, self.mesh.vertex_slots() as f64) as u32));
         for p in [point(rng, self.scale), point(rng, 20.0 * self.scale), at_vertex] {
-            check_queries(&self.mesh, &self.tree, &p, rng);
+            check_queries(&self.mesh, &self.tree, &p, &mut self.nearby, rng);
         }
         let (a, b) = (point(rng, self.scale), point(rng, self.scale));
         check_box(&self.mesh, &self.tree, &a, &b, query);
@@ -341,6 +345,64 @@ proptest! {
         }
         edited.ledger.check(&edited.mesh);
         edited.check(&mut rng, &mut query);
+    }
+}
+
+/// A face that is pushed by small steps, and the boxes that are brought up to date after it.
+#[derive(Default)]
+struct Pushed {
+    face: Option<FaceId>,
+    plan: RefitPlan,
+}
+
+impl Pushed {
+    fn push(&mut self, face: FaceId, mesh: &mut TriMesh, tree: &mut FaceTree, step: Vector3<f64>, margin: f64) {
+        let corners = mesh.corners(face);
+        if self.face.replace(face) != Some(face) {
+            let faces: Vec<_> = corners.iter().flat_map(|&vertex| mesh.star(vertex)).copied().collect();
+            tree.plan(&faces, &mut self.plan);
+        }
+        corners.into_iter().for_each(|vertex| mesh.set_position(vertex, mesh.position(vertex) + step));
+        tree.refit_planned(mesh, &mut self.plan, step.norm() * (1.0 + 1e-9), margin);
+    }
+}
+
+/// What is kept nearby must hold while the mesh moves below the point and beside it, and faces come and go.
+#[test]
+fn a_walk_over_a_mesh_that_moves_finds_what_a_search_from_the_root_finds() {
+    const EDGE: f64 = 1e-3;
+    for seed in 0..20 {
+        let mut rng = Pcg64::seed_from_u64(seed);
+        // of the order of margins, so that neither holds for ever nor never
+        let stride = EDGE * 10f64.powf(within(&mut rng, -3.0, 0.3));
+        let push = EDGE * 10f64.powf(within(&mut rng, -4.0, -0.5));
+        let margin = EDGE * [0.0, 0.05, 0.3][seed as usize % 3];
+        let mut mesh = grid(40, EDGE, |_, _| within(&mut rng, -0.2 * EDGE, 0.2 * EDGE));
+        let (mut tree, mut nearby) = (FaceTree::new(&mesh), Nearby::default());
+        let (mut below, mut beside) = (Pushed::default(), Pushed::default());
+        let (mut p, mut last) = (Point3::new(20.0 * EDGE, 20.0 * EDGE, 0.1 * EDGE), FaceId(0));
+        for step in 0..600 {
+            let wanted = tree.closest(&mesh, &p, f64::INFINITY);
+            assert_eq!(tree.closest_nearby(&mesh, &p, last, f64::INFINITY, &mut nearby), wanted, "step {step} at {p}");
+            last = wanted.expect("there are faces").face;
+            below.push(last, &mut mesh, &mut tree, point(&mut rng, push).coords, margin);
+            if step % 3 == 0 {
+                let side = p + point(&mut rng, 4.0 * EDGE).coords;
+                let face = tree.closest(&mesh, &side, f64::INFINITY).expect("there are faces").face;
+                // towards the point, so that boxes come to it that were away
+                let step = (p - mesh.barycentre(face)) * within(&mut rng, 0.0, 0.3);
+                beside.plan.spend();
+                beside.push(face, &mut mesh, &mut tree, step, margin);
+                below.plan.spend();
+            }
+            if step % 50 == 49 {
+                let corners = mesh.corners(last);
+                assert!(tree.remove(&mesh, last) && mesh.remove_face(last));
+                last = mesh.add_face(corners).expect("it was there");
+                assert!(tree.insert(&mesh, last));
+            }
+            p += point(&mut rng, stride).coords;
+        }
     }
 }
 

@@ -29,8 +29,8 @@ fn made_up() -> Cost {
         minimal: ns(push / ratio),
         barest: ns(push),
         barest_to_minimal: ratio.into(),
-        planning: ns(push / 1.3),
-        barest_to_planning: 1.3.into(),
+        keeping: ns(push / 1.3),
+        barest_to_keeping: 1.3.into(),
         default_finer: ns(10.0 * push),
         moved_finer: faces as f64 / 1e3,
         default_larger: ns(4.0 * push),
@@ -106,10 +106,10 @@ fn the_cheapest_scene_moves_the_mesh_as_the_hand_written_loop_does() {
     let scan = wavy_plate(20_000).unwrap();
     let params = Scene::from_yaml(BAREST).unwrap().refine_params(WrenchFrame::Object).unwrap();
     let mut refiner = Refiner::new(scan.clone(), params).unwrap();
-    let (mut minimal, mut planning) = (MinimalLoop::new(scan.clone()), MinimalLoop::planning(scan.clone()));
+    let (mut minimal, mut keeping) = (MinimalLoop::new(scan.clone()), MinimalLoop::keeping(scan.clone()));
     for i in 0..3_000 {
         let sample = slide(i, 0.2);
-        assert!(minimal.push(&sample) && planning.push(&sample));
+        assert!(minimal.push(&sample) && keeping.push(&sample));
         refiner.push(&sample).unwrap();
         assert_eq!(refiner.moved_vertices().len(), 3);
     }
@@ -121,7 +121,7 @@ fn the_cheapest_scene_moves_the_mesh_as_the_hand_written_loop_does() {
     println!("vertices moved by {by_loop:.3e} m and {by_scene:.3e} m in all");
     assert!(by_loop > 1e-3 && (0.8..1.25).contains(&(by_scene / by_loop)), "{by_scene} and {by_loop}");
     // the two loops differ in how they find the boxes alone
-    assert_eq!(minimal.mesh().positions(), planning.mesh().positions());
+    assert_eq!(minimal.mesh().positions(), keeping.mesh().positions());
     let p = slide(1_500, 0.2).pose_ot.translation.vector.into();
     assert_eq!(refiner.closest_face(&p, 0.01), FaceTree::new(refiner.mesh()).closest(refiner.mesh(), &p, 0.01));
 }

@@ -12,7 +12,7 @@ mod tri_mesh;
 pub mod triangle;
 mod workers;
 
-pub use closest::{BoxQuery, FaceHit, FaceTree, RefitPlan};
+pub use closest::{BoxQuery, FaceHit, FaceTree, Nearby, RefitPlan};
 pub use coherent::coherent_order;
 pub use journal::{Changes, IdSet};
 pub use median::median;

@@ -49,7 +49,8 @@ impl Refiner {
         };
         let place = TipPlace { centre: ball.centre, axis: self.axis };
         let (height, bound) = self.body.bound();
-        let Some(hit) = self.deformable.closest(&(place.centre + place.axis * height), hint, bound - tolerance) else {
+        let (middle, reach) = (place.centre + place.axis * height, bound - tolerance);
+        let Some(hit) = self.deformable.closest(&middle, hint, reach, &mut self.near_tip) else {
             return update;
         };
         let counts = self.body.is_ball() && !self.deformable.is_stiff(hit.face);

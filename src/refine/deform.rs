@@ -7,7 +7,7 @@ use super::guard::{GuardParams, Verdict};
 use super::params::TouchedRegion;
 use super::roi::{Roi, RoiSize};
 use super::strokes::Strokes;
-use crate::mesh::{FaceHit, FaceId, FaceTree, MeshError, RefitPlan, Region, TriMesh, VertexId};
+use crate::mesh::{FaceHit, FaceId, FaceTree, MeshError, Nearby, RefitPlan, Region, TriMesh, VertexId};
 use crate::patch::{PatchDelta, Support};
 
 /// An update that would break the mesh is tried again at this share of its length …
@@ -18,7 +18,7 @@ const TRIES: usize = 3;
 const MARGIN_EDGES: f64 = 0.2;
 /// By how much of the mean edge the boxes of what moves are made wider: a touch moves vertices by less while it stays on a
 /// face.
-const BOX_MARGIN_EDGES: f64 = 0.02;
+const BOX_MARGIN_EDGES: f64 = 0.05;
 /// Faces looked at to find the mean edge.
 const EDGE_SAMPLE: usize = 20_000;
 
@@ -131,10 +131,10 @@ impl DeformableMesh {
         }
     }
 
-    /// The closest face nearer than `reach` (m), sooner if it is near `hint`.
-    pub fn closest(&self, p: &Point3<f64>, hint: Option<FaceId>, reach: f64) -> Option<FaceHit> {
+    /// The closest face nearer than `reach` (m), sooner if it is near `hint`, and `p` near what was asked for last with `nearby`.
+    pub fn closest(&self, p: &Point3<f64>, hint: Option<FaceId>, reach: f64, nearby: &mut Nearby) -> Option<FaceHit> {
         match hint {
-            Some(hint) => self.tree.closest_from(&self.mesh, p, hint, reach),
+            Some(hint) => self.tree.closest_nearby(&self.mesh, p, hint, reach, nearby),
             None => self.tree.closest(&self.mesh, p, reach),
         }
     }
@@ -169,7 +169,7 @@ impl DeformableMesh {
         steps: &[Vector3<f64>; 3],
     ) -> Fit {
         if !region.roi.is_for(handle) {
-            region.roi.rebuild(&self.mesh, handle, size);
+            region.roi.rebuild(&self.mesh, handle, size, self.guard.is_some());
             self.tree.plan(region.roi.neighbourhood.ring.moving(), &mut region.refit);
             region.seen = None;
         }
@@ -184,9 +184,10 @@ impl DeformableMesh {
                 Fit::Whole
             }
         };
-        // where others moved the same vertices, their boxes do not count on it
-        let way = if region.seen == Some(self.edits) { longest } else { f64::INFINITY };
-        self.tree.refit_planned(&self.mesh, &mut region.refit, way, BOX_MARGIN_EDGES * self.mean_edge);
+        if region.seen != Some(self.edits) {
+            region.refit.spend();
+        }
+        self.tree.refit_planned(&self.mesh, &mut region.refit, longest, BOX_MARGIN_EDGES * self.mean_edge);
         self.edits += 1;
         region.seen = Some(self.edits);
         if let Some(patch) = &mut self.patch {

@@ -29,7 +29,7 @@ pub use registration::{Registrar, Registration, RegistrationError, RegistrationP
 pub use roi::RoiSize;
 pub use sliding::{Ball, SlidingParams, TipMotion};
 
-use crate::mesh::{Changes, FaceHit, FaceId, MeshError, TriMesh, VertexId};
+use crate::mesh::{Changes, FaceHit, FaceId, MeshError, Nearby, TriMesh, VertexId};
 use crate::patch::{PatchDelta, Support};
 use crate::touch::{
     BiasTracker, Compensator, ContactGate, FrictionCoefficient, Sample, SampleError, SettingError, TipBody, TipPlace,
@@ -170,6 +170,10 @@ pub struct Refiner {
     deformable: DeformableMesh,
     contact_region: HandleRegion,
     carve_region: HandleRegion,
+    /// leaves around the point of the tip that touches …
+    near_contact: Nearby,
+    /// … and around its middle
+    near_tip: Nearby,
     body: TipBody,
     /// from the tip to the handle, unit, in O; a ball needs none
     axis: Vector3<f64>,
@@ -214,6 +218,8 @@ impl Refiner {
             dynamics: FaceDynamics::new(params.dynamics)?,
             contact_region: deformable.region(params.roi),
             carve_region: deformable.region(RoiSize::Handle),
+            near_contact: Nearby::default(),
+            near_tip: Nearby::default(),
             deformable,
             body: TipBody::new(params.shape, params.tip.radius)?,
             axis: Vector3::z(),
@@ -340,8 +346,7 @@ impl Refiner {
     }
 
     /// The ball against `handle`, else against the face that it touches; `None` beyond the reach.
-    fn pressing(&self, ball: &Ball, felt: Felt, handle: Option<FaceId>) -> Option<Pressing> {
-        let mesh = &self.deformable.mesh;
+    fn pressing(&mut self, ball: &Ball, felt: Felt, handle: Option<FaceId>) -> Option<Pressing> {
         let reach = self.deformable.largest_move + self.params.tip.radius;
         // the spring expects the deflection F/k of the tip, a rigid contact does not
         let centre = if self.params.dynamics.take_out_rigid_offset { ball.centre } else { ball.reported };
@@ -349,11 +354,14 @@ impl Refiner {
             Felt::Surface(normal) => self.touching_point(centre, &normal),
             _ => centre,
         };
-        let closest = || match self.params.closest {
-            ClosestBy::Surface => self.deformable.closest(&seek, self.contact_region.handle(), reach),
-            ClosestBy::Barycentre => self.deformable.tree.closest_barycentre(mesh, &seek, reach),
+        let last = self.contact_region.handle();
+        let hit = match self.params.closest {
+            _ if handle.is_some() => None,
+            ClosestBy::Surface => self.deformable.closest(&seek, last, reach, &mut self.near_contact),
+            ClosestBy::Barycentre => self.deformable.tree.closest_barycentre(&self.deformable.mesh, &seek, reach),
         };
-        let handle = handle.or_else(|| closest().map(|hit| hit.face))?;
+        let handle = handle.or(hit.map(|hit| hit.face))?;
+        let mesh = &self.deformable.mesh;
         let face = FaceState { b: mesh.barycentre(handle), n: mesh.normal(handle) };
         Some(match felt {
             Felt::Surface(normal) => {

@@ -74,9 +74,27 @@ impl Ring {
         &self.neighbours[self.starts[vertex]..self.starts[vertex + 1]]
     }
 
-    /// Finds all this for the moving vertices, which have the first numbers in `marks`; their neighbours get the next.
-    pub fn rebuild(&mut self, mesh: &TriMesh, vertices: &[VertexId], marks: &mut Marks) {
-        self.gather(mesh, vertices, marks);
+    /// Numbers the faces around the moving vertices.
+    pub fn gather(&mut self, mesh: &TriMesh, vertices: &[VertexId]) {
+        self.known.clear();
+        self.faces.clear();
+        self.stars.clear();
+        for &face in vertices.iter().flat_map(|&vertex| mesh.star(vertex)) {
+            let [number] = self.known.number([face.0]);
+            self.stars.push(number);
+            // no branches: which face was met before cannot be foretold
+            self.faces.push(face);
+            self.faces[number as usize] = face;
+            self.faces.truncate(self.known.len());
+        }
+        self.moving = self.faces.len();
+    }
+
+    /// Finds how they hang together, for the same vertices, which have the first numbers in `marks`; their neighbours get the
+    /// next.
+    pub fn link(&mut self, mesh: &TriMesh, vertices: &[VertexId], marks: &mut Marks) {
+        self.corners.clear();
+        self.corners.extend(self.faces.iter().map(|&face| marks.number(mesh.corners(face).map(|corner| corner.0))));
         self.met.clear();
         self.met.resize(marks.len(), (NONE, NONE, 0));
         self.edges.clear();
@@ -96,24 +114,6 @@ impl Ring {
             self.link_crowded(mesh, vertices);
         }
         self.link_outside(mesh, vertices.len() as u32);
-    }
-
-    /// Numbers the faces around the moving vertices, and their corners.
-    fn gather(&mut self, mesh: &TriMesh, vertices: &[VertexId], marks: &mut Marks) {
-        self.known.clear();
-        self.faces.clear();
-        self.stars.clear();
-        for &face in vertices.iter().flat_map(|&vertex| mesh.star(vertex)) {
-            let [number] = self.known.number([face.0]);
-            self.stars.push(number);
-            // no branches: which face was met before cannot be foretold
-            self.faces.push(face);
-            self.faces[number as usize] = face;
-            self.faces.truncate(self.known.len());
-        }
-        self.moving = self.faces.len();
-        self.corners.clear();
-        self.corners.extend(self.faces.iter().map(|&face| marks.number(mesh.corners(face).map(|corner| corner.0))));
     }
 
     /// Finds the neighbours of a vertex, and the edges from it to later ones.
@@ -165,13 +165,13 @@ impl Ring {
             for &face in mesh.star(corners[side]) {
                 let [a, b, c] = mesh.corners(face);
                 if (a == end) | (b == end) | (c == end) {
-                    self.link(index as u32, face);
+                    self.link_pair(index as u32, face);
                 }
             }
         }
     }
 
-    fn link(&mut self, index: u32, face: FaceId) {
+    fn link_pair(&mut self, index: u32, face: FaceId) {
         let [other] = self.known.number([face.0]);
         if other as usize == self.faces.len() {
             self.faces.push(face);

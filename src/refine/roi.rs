@@ -84,8 +84,8 @@ impl Roi {
         self.handle = None;
     }
 
-    /// Makes the region of `handle`.
-    pub fn rebuild(&mut self, mesh: &TriMesh, handle: FaceId, size: RoiSize) {
+    /// Makes the region of `handle`; how its faces hang together is looked up only for free vertices or a guard.
+    pub fn rebuild(&mut self, mesh: &TriMesh, handle: FaceId, size: RoiSize, is_guarded: bool) {
         self.handle = Some(handle);
         self.marks.clear();
         self.vertices.clear();
@@ -93,7 +93,11 @@ impl Roi {
             self.add(vertex);
         }
         self.spread(mesh, mesh.barycentre(handle), size);
-        self.neighbourhood.ring.rebuild(mesh, &self.vertices, &mut self.marks);
+        let ring = &mut self.neighbourhood.ring;
+        ring.gather(mesh, &self.vertices);
+        if is_guarded || self.vertices.len() > 3 {
+            ring.link(mesh, &self.vertices, &mut self.marks);
+        }
         self.solver.solve(&self.neighbourhood.ring, self.vertices.len(), &mut self.weights);
     }
 
@@ -253,7 +257,7 @@ mod tests {
         }
         let mesh = TriMesh::new(positions, faces).unwrap();
         let mut roi = Roi::with_room(16);
-        roi.rebuild(&mesh, FaceId(0), RoiSize::OneRing);
+        roi.rebuild(&mesh, FaceId(0), RoiSize::OneRing, false);
         assert_eq!(roi.vertices.len(), 10, "the handle, four more of the inner ring, three of the outer");
         for (vertex, weights) in roi.vertices.iter().zip(&roi.weights).skip(3) {
             let mut around: Vec<_> = mesh.star(*vertex).iter().flat_map(|&face| mesh.corners(face)).collect();

@@ -2,7 +2,7 @@
 
 use super::*;
 use nalgebra::Isometry3;
-use touchup::mesh::{BoxQuery, FaceHit};
+use touchup::mesh::{BoxQuery, FaceHit, Nearby};
 
 fn brute_distance(mesh: &TriMesh, p: &Point3<f64>) -> f64 {
     mesh.faces().map(|(face, _)| distance(p, &mesh.triangle(face))).fold(f64::INFINITY, f64::min)
@@ -307,7 +307,7 @@ fn a_corner_of_a_needle_is_found_from_its_own_face() {
         let mesh = TriMesh::new(corners.into(), vec![[0, 1, 2]]).unwrap();
         let tree = FaceTree::new(&mesh);
         for corner in corners {
-            let hit = tree.closest_from(&mesh, &corner, FaceId(0), f64::INFINITY);
+            let hit = tree.closest_nearby(&mesh, &corner, FaceId(0), f64::INFINITY, &mut Nearby::default());
             assert_eq!(hit.map(|hit| hit.distance_squared), Some(0.0), "{corners:?} from {corner}");
         }
     }

@@ -81,14 +81,14 @@ impl Aabb {
     }
 }
 
-/// The lesser of two numbers, neither of which is NaN; one instruction, unlike `f32::min`.
+/// The lesser of two numbers, neither of which is NaN; one instruction, unlike `min`.
 #[inline]
-pub(super) fn lesser(a: f32, b: f32) -> f32 {
+pub(super) fn lesser<T: PartialOrd>(a: T, b: T) -> T {
     if a < b { a } else { b }
 }
 
 /// The greater of two numbers, neither of which is NaN.
 #[inline]
-pub(super) fn greater(a: f32, b: f32) -> f32 {
+pub(super) fn greater<T: PartialOrd>(a: T, b: T) -> T {
     if a > b { a } else { b }
 }

@@ -33,6 +33,8 @@ impl FaceTree {
             free_leaf: NONE,
             items: Vec::new(),
             edits: 0,
+            changes: 0,
+            widened: 0.0,
         };
         let mut items: Vec<Item> = mesh.faces().map(|(face, _)| tree.item(mesh, face)).collect();
         tree.root = tree.build(mesh, &mut items, ROOT);

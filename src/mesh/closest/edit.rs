@@ -111,6 +111,7 @@ impl FaceTree {
     /// Brings the nodes above `at` up to date after what is below it changed.
     fn settle(&mut self, mesh: &TriMesh, mut at: u32) {
         self.edits += 1;
+        self.changes += 1;
         // kept at hand: to write a node and read it again at once is slow
         let mut node = *self.node(at);
         while at != ROOT {

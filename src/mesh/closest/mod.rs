@@ -9,6 +9,7 @@
 mod aabb;
 mod build;
 mod edit;
+mod nearby;
 mod query;
 mod refit;
 
@@ -16,6 +17,7 @@ use nalgebra::Point3;
 
 use super::{FaceId, TriMesh};
 use aabb::Aabb;
+pub use nearby::Nearby;
 pub use query::{BoxQuery, FaceHit};
 pub use refit::RefitPlan;
 
@@ -67,6 +69,11 @@ pub struct FaceTree {
     items: Vec<build::Item>,
     /// counts insertions and removals, so that a plan knows whether it still holds
     edits: u64,
+    /// counts those and the refits after motions of unknown length …
+    changes: u64,
+    /// … and sums by how much boxes became wider at most in the other refits, m, so that leaves that are kept know whether
+    /// they still hold
+    widened: f64,
 }
 
 impl FaceTree {

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::aabb::Aabb;
+use super::aabb::{Aabb, greater, lesser};
 use super::{FaceTree, LEAF_FACES, STACK};
 use crate::mesh::triangle::closest_point;
 use crate::mesh::{FaceId, TriMesh};
@@ -18,15 +18,8 @@ const TIE_COORDINATE: f64 = 4.0 * f64::EPSILON;
 const TIE_DIAGONAL: f64 = 2.0 * f64::EPSILON;
 /// The same for the distance, see [`TIE_COORDINATE`].
 const TIE_DISTANCE: f64 = 3.0 * f64::EPSILON;
-/// By how much the triple product (ab × ac)·ap is rounded, as a share of |ab| |ac| |ap|: 2 ε for each component of the
-/// cross product and 3 ε for the sum, √3 of it in length; 16 ε to be sure.
-const HEIGHT_ROUNDING: f64 = 16.0 * f64::EPSILON;
-/// What the quotient of two squares may lose beside that.
-const PLANE_MARGIN: f64 = 1e-6;
-/// Squared sine of the least angle at which a normal is trusted: 0.06°.
-const NEEDLE: f64 = 1e-6;
-/// The reach of a query with a hint over the distance to the hinted face.
-const HINT_WIDTH: f64 = 1.0 + 1e-6;
+/// What the squared distance to a box is rounded by, as a share of it: differences, squares and sums, 4 ε; 8 ε to be sure.
+const BOX_ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 /// The face that was asked for, and the point of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,33 +53,74 @@ impl BoxQuery {
     }
 }
 
+/// What a search has found so far, and how far it still has to look.
+pub(super) struct Found {
+    pub best: Option<FaceHit>,
+    /// the point, relative to the tree's origin
+    pub q: [f32; 3],
+    /// squared distance to a box beyond which nothing is left to be found
+    pub far: f32,
+    /// least squared distance so far, m²
+    limit: f64,
+    /// by how much squared distances about that may differ for one point, m²
+    width: f64,
+    tie: f64,
+    slack: f64,
+}
+
+impl Found {
+    #[inline]
+    pub fn new(tree: &FaceTree, p: &Point3<f64>, reach: f64) -> Self {
+        let (q, tie, reach) = (p - tree.origin, tree.tie(), reach.max(0.0));
+        let slack = tree.slack(&q) + tie;
+        let q = [q.x as f32, q.y as f32, q.z as f32];
+        let mut found = Self { best: None, q, far: 0.0, limit: 0.0, width: 0.0, tie, slack };
+        found.shorten(reach * reach);
+        found
+    }
+
+    #[inline]
+    fn shorten(&mut self, limit: f64) {
+        self.limit = limit;
+        self.width = tie_squared(limit, self.tie);
+        self.far = beyond(limit, self.slack);
+    }
+
+    /// Looks at the faces of a leaf; see [`FaceTree::search`].
+    #[inline]
+    pub fn take(
+        &mut self,
+        faces: &[FaceId],
+        measure: impl Fn(FaceId, f64) -> Option<FaceHit>,
+        yields: impl Fn(&FaceHit, &FaceHit) -> bool,
+    ) {
+        for &face in faces {
+            let (limit, width) = (self.limit, self.width);
+            let Some(hit) = measure(face, limit + width) else { continue };
+            let nearer = match &self.best {
+                _ if hit.distance_squared > limit + width => false,
+                None => hit.distance_squared < limit,
+                Some(best) if hit.distance_squared < best.distance_squared - width => true,
+                Some(best) => yields(best, &hit) || (!yields(&hit, best) && hit.face < best.face),
+            };
+            // also where the other face is named, which then is no farther than this one and a tie
+            if hit.distance_squared < limit {
+                self.shorten(hit.distance_squared);
+            }
+            if nearer {
+                self.best = Some(hit);
+            }
+        }
+    }
+}
+
 impl FaceTree {
     /// The face whose surface is closest to `p`, among those nearer than `reach` (m); `None` when there is none.
     ///
     /// Where faces meet at the closest point (an edge or a corner), the one that `p` lies most squarely above or below
     /// is named, so that the sign of (p − point)·n tells inside from outside; among equals the smallest id.
     pub fn closest(&self, mesh: &TriMesh, p: &Point3<f64>, reach: f64) -> Option<FaceHit> {
-        self.search(
-            p,
-            reach,
-            |face, limit| {
-                let triangle = mesh.triangle(face);
-                if is_plane_beyond(p, &triangle, limit) {
-                    return None;
-                }
-                let (point, barycentric) = closest_point(p, &triangle);
-                Some(FaceHit { face, point, barycentric, distance_squared: (p - point).norm_squared() })
-            },
-            |a, b| squareness(mesh, p, a) < squareness(mesh, p, b),
-        )
-    }
-
-    /// [`Self::closest`] of a point that is likely near `hint`: the same answer, sooner.
-    pub fn closest_from(&self, mesh: &TriMesh, p: &Point3<f64>, hint: FaceId, reach: f64) -> Option<FaceHit> {
-        let (point, _) = closest_point(p, &mesh.triangle(hint));
-        // a little farther, so that the hint itself is found too; a touching point still has some reach
-        let known = (p - point).norm() * HINT_WIDTH + f64::MIN_POSITIVE.sqrt();
-        self.closest(mesh, p, reach.min(known))
+        self.search(p, reach, |face, limit| surface_hit(mesh, p, face, limit), |a, b| is_less_square(mesh, p, a, b))
     }
 
     /// The face whose barycentre is closest to `p` (Eq 12), among those nearer than `reach` (m).
@@ -113,58 +147,33 @@ impl FaceTree {
         measure: impl Fn(FaceId, f64) -> Option<FaceHit>,
         yields: impl Fn(&FaceHit, &FaceHit) -> bool,
     ) -> Option<FaceHit> {
-        let q = p - self.origin;
-        let tie = self.tie();
-        let slack = self.slack(&q) + tie;
-        let q = [q.x as f32, q.y as f32, q.z as f32];
-        let mut best: Option<FaceHit> = None;
-        let reach = reach.max(0.0);
-        let mut limit = reach * reach;
-        let mut width = tie_squared(limit, tie);
-        let mut far = beyond(limit, slack);
+        let mut found = Found::new(self, p, reach);
         let mut stack = [(0.0f32, 0u32); STACK];
         let mut depth = 0;
         let mut node = &self.root;
         loop {
             if node.is_leaf() {
-                for &face in self.faces_of(node) {
-                    let Some(hit) = measure(face, limit + width) else { continue };
-                    let nearer = match &best {
-                        _ if hit.distance_squared > limit + width => false,
-                        None => hit.distance_squared < limit,
-                        Some(best) if hit.distance_squared < best.distance_squared - width => true,
-                        Some(best) => yields(best, &hit) || (!yields(&hit, best) && hit.face < best.face),
-                    };
-                    // also where the other face is named, which then is no farther than this one and a tie
-                    if hit.distance_squared < limit {
-                        limit = hit.distance_squared;
-                        width = tie_squared(limit, tie);
-                        far = beyond(limit, slack);
-                    }
-                    if nearer {
-                        best = Some(hit);
-                    }
-                }
+                found.take(self.faces_of(node), &measure, &yields);
             } else {
                 let pair = &self.pairs[node.first as usize];
-                let d = [pair.0[0].bounds.distance_squared(&q), pair.0[1].bounds.distance_squared(&q)];
+                let d = [&pair.0[0], &pair.0[1]].map(|node| node.bounds.distance_squared(&found.q));
                 let near = usize::from(d[1] < d[0]);
-                if d[1 - near] <= far {
+                if d[1 - near] <= found.far {
                     stack[depth] = (d[1 - near], 2 * node.first + (1 - near) as u32);
                     depth += 1;
                 }
-                if d[near] <= far {
+                if d[near] <= found.far {
                     node = &pair.0[near];
                     continue;
                 }
             }
             node = loop {
                 if depth == 0 {
-                    return best;
+                    return found.best;
                 }
                 depth -= 1;
                 let (distance, at) = stack[depth];
-                if distance <= far {
+                if distance <= found.far {
                     break self.node(at);
                 }
             };
@@ -173,14 +182,14 @@ impl FaceTree {
 
     /// How much a distance between `q` and a box may be off in single precision, m: three roundings of the largest
     /// coordinate that enters it.
-    fn slack(&self, q: &Vector3<f64>) -> f64 {
+    pub(super) fn slack(&self, q: &Vector3<f64>) -> f64 {
         let bounds = &self.root.bounds;
         let largest = (0..3).map(|i| f64::from(bounds.hi[i].max(-bounds.lo[i])).max(q[i].abs())).fold(0.0, f64::max);
         4.0 * f64::from(f32::EPSILON) * largest
     }
 
     /// How much the distances of faces that meet at the closest point may differ, without the part of the distance, m.
-    fn tie(&self) -> f64 {
+    pub(super) fn tie(&self) -> f64 {
         let Aabb { lo, hi } = self.root.bounds;
         let largest = |i: usize| self.origin[i].abs() + f64::from(hi[i].max(-lo[i]));
         let diagonal = Vector3::from_fn(|i, _| f64::from(hi[i] - lo[i])).norm();
@@ -255,27 +264,38 @@ fn tie_squared(limit: f64, tie: f64) -> f64 {
 /// The single-precision squared distance to a box beyond which no face of it can be nearer than √`limit`, nor equally
 /// near within the tie that `slack` holds; [`TIE_DISTANCE`] is far below the roundings of single precision.
 #[inline]
-fn beyond(limit: f64, slack: f64) -> f32 {
+pub(super) fn beyond(limit: f64, slack: f64) -> f32 {
     let distance = limit.sqrt() + slack;
     // 8 roundings: the squares, their sum, and this conversion; the smallest normal number for where they underflow
     (distance * distance * (1.0 + 8.0 * f64::from(f32::EPSILON))) as f32 + f32::MIN_POSITIVE
 }
 
-/// Whether the plane of a triangle is farther from `p` than √`limit`: cheaper than its closest point, and decides for
+/// Whether the box around a triangle is farther from `p` than √`limit`: cheaper than its closest point, and decides for
 /// most faces that a query meets.
 #[inline]
-fn is_plane_beyond(p: &Point3<f64>, [a, b, c]: &[Point3<f64>; 3], limit: f64) -> bool {
-    let (ab, ac, ap) = (b - a, c - a, p - a);
-    let normal = ab.cross(&ac);
-    let (height, size) = (normal.dot(&ap), normal.norm_squared());
-    let sides = ab.norm_squared() * ac.norm_squared();
-    // (√l + e)² ≤ l (1 + m) + e² (1 + 1/m)
-    let rounding = HEIGHT_ROUNDING * HEIGHT_ROUNDING * sides * ap.norm_squared() * (1.0 + 1.0 / PLANE_MARGIN);
-    // the normal of a needle is mostly rounding
-    size > NEEDLE * sides && height * height > limit * size * (1.0 + PLANE_MARGIN) + rounding
+fn is_box_beyond(p: &Point3<f64>, [a, b, c]: [&Point3<f64>; 3], limit: f64) -> bool {
+    let outside = |i: usize| {
+        let (x, y, z) = (a[i] - p[i], b[i] - p[i], c[i] - p[i]);
+        let (lo, hi) = (lesser(lesser(x, y), z), greater(greater(x, y), z));
+        greater(greater(lo, -hi), 0.0)
+    };
+    let [x, y, z] = [0, 1, 2].map(outside);
+    x * x + y * y + z * z > limit * (1.0 + BOX_ROUNDING)
 }
 
-/// |(p − point)·n|: how squarely `p` lies above or below the face that was hit.
-fn squareness(mesh: &TriMesh, p: &Point3<f64>, hit: &FaceHit) -> f64 {
-    (p - hit.point).dot(&mesh.normal(hit.face)).abs()
+/// The point of a face closest to `p`; nothing where its squared distance is surely above a limit.
+#[inline]
+pub(super) fn surface_hit(mesh: &TriMesh, p: &Point3<f64>, face: FaceId, limit: f64) -> Option<FaceHit> {
+    if is_box_beyond(p, mesh.corners(face).map(|vertex| &mesh.positions()[vertex.0 as usize]), limit) {
+        return None;
+    }
+    let triangle = mesh.triangle(face);
+    let (point, barycentric) = closest_point(p, &triangle);
+    Some(FaceHit { face, point, barycentric, distance_squared: (p - point).norm_squared() })
+}
+
+/// Whether `p` lies less squarely above or below the first face that was hit than the second.
+pub(super) fn is_less_square(mesh: &TriMesh, p: &Point3<f64>, a: &FaceHit, b: &FaceHit) -> bool {
+    let squareness = |hit: &FaceHit| (p - hit.point).dot(&mesh.normal(hit.face)).abs();
+    squareness(a) < squareness(b)
 }

@@ -25,6 +25,12 @@ impl RefitPlan {
         let pairs = Vec::with_capacity(2 * faces + STACK);
         Self { faces: Vec::with_capacity(faces), leaves: Vec::with_capacity(faces), pairs, room: 0.0, edits: 0 }
     }
+
+    /// Counts on no room in the boxes: others may have moved the faces.
+    #[inline]
+    pub fn spend(&mut self) {
+        self.room = 0.0;
+    }
 }
 
 impl FaceTree {
@@ -45,7 +51,8 @@ impl FaceTree {
     /// Makes the tree exact again after the corners of the planned faces moved; a plan made before faces were inserted
     /// or removed is made anew.
     ///
-    /// - `way`: how far a corner moved at most since the last call with this plan, m; infinite where that is not known.
+    /// - `way`: how far a corner moved at most since the last call with this plan, m; infinite where that is not known. Where
+    ///   others moved corners in between, and told the tree, [`RefitPlan::spend`] comes before.
     /// - `margin`: by how much the boxes are made wider than they need be, m. They are left as they are until corners may
     ///   have left them: a query stays exact and looks at little more.
     #[inline]
@@ -54,6 +61,10 @@ impl FaceTree {
             plan.room -= way;
         } else {
             self.fit(mesh, plan, margin);
+            match way + margin {
+                wider if wider.is_finite() => self.widened += wider,
+                _ => self.changes += 1,
+            }
         }
     }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 
-use crate::mesh::{FaceId, FaceTree, RefitPlan, TriMesh, VertexId};
+use crate::mesh::{FaceId, FaceTree, Nearby, RefitPlan, TriMesh, VertexId};
 use crate::sim::wavy::{FORCE, RADIUS, STIFFNESS};
 use crate::touch::Sample;
 
@@ -25,11 +25,12 @@ pub struct MinimalLoop {
     plan: Option<Kept>,
 }
 
-/// Which boxes are to be brought up to date, as long as the face stays.
+/// Which boxes are to be brought up to date, as long as the face stays, and which leaves are near.
 #[derive(Clone, Debug, Default)]
 struct Kept {
     face: Option<FaceId>,
     plan: RefitPlan,
+    nearby: Nearby,
 }
 
 impl MinimalLoop {
@@ -39,8 +40,8 @@ impl MinimalLoop {
         Self { mesh, tree, gain: -(-RELAXATION * STEP).exp_m1(), faces: Vec::new(), plan: None }
     }
 
-    /// As [`Self::new`], and looks up which boxes to bring up to date once for each face, as the refiner does.
-    pub fn planning(mesh: TriMesh) -> Self {
+    /// As [`Self::new`], and keeps what it looked up, as the refiner does: which boxes to bring up to date, and what is near.
+    pub fn keeping(mesh: TriMesh) -> Self {
         Self { plan: Some(Kept::default()), ..Self::new(mesh) }
     }
 
@@ -49,7 +50,11 @@ impl MinimalLoop {
         let Self { mesh, tree, gain, faces, plan } = self;
         let normal = sample.wrench.force / FORCE;
         let p = Point3::from(sample.pose_ot.translation.vector) + sample.wrench.force / STIFFNESS - normal * RADIUS;
-        let Some(hit) = tree.closest(mesh, &p, REACH) else { return false };
+        let hit = match plan {
+            Some(Kept { face: Some(last), nearby, .. }) => tree.closest_nearby(mesh, &p, *last, REACH, nearby),
+            _ => tree.closest(mesh, &p, REACH),
+        };
+        let Some(hit) = hit else { return false };
         let step = normal * (*gain * (p - hit.point).dot(&normal));
         let corners = mesh.corners(hit.face);
         corners.into_iter().for_each(|vertex: VertexId| mesh.set_position(vertex, mesh.position(vertex) + step));
@@ -60,7 +65,7 @@ impl MinimalLoop {
         }
         match plan {
             None => tree.refit(mesh, faces),
-            Some(Kept { face, plan }) => {
+            Some(Kept { face, plan, .. }) => {
                 if !is_known {
                     *face = Some(hit.face);
                     tree.plan(faces, plan);

@@ -23,14 +23,14 @@ pub struct SizeCost {
     pub faces: usize,
     /// the hand-written loop, on a plate of 0.3 m
     pub minimal: PerSample,
-    /// the same loop, which looks up once for each face what is to be brought up to date
-    pub planning: PerSample,
+    /// the same loop, which keeps what it looked up
+    pub keeping: PerSample,
     /// the cheapest scene that moves a mesh, on the same
     pub barest: PerSample,
     /// block by block, how many times as long the cheapest scene takes as the loop
     pub barest_to_minimal: Spread,
-    /// … and as the loop that plans
-    pub barest_to_planning: Spread,
+    /// … and as the loop that keeps
+    pub barest_to_keeping: Spread,
     /// the default scene without its patch, on the same: the finer the scan, the more vertices move with a touch
     pub default_finer: PerSample,
     /// vertices that a touch moves there, mean
@@ -112,12 +112,12 @@ pub(super) fn size_cost(faces: usize, timing: Timing) -> Result<SizeCost, CostEr
     let mut barest = refiner_of(&Scene::from_yaml(BAREST)?, mesh.clone())?;
     let footprint = barest.footprint();
     let mut default = refiner_of(&Scene::default(), mesh.clone())?;
-    let mut planning = MinimalLoop::planning(mesh.clone());
+    let mut keeping = MinimalLoop::keeping(mesh.clone());
     let mut minimal = MinimalLoop::new(mesh);
     let (mut moved_barest, mut moved_finer) = (0, 0);
     let mut ways = [
         looping("hand-written loop", &mut minimal, &samples),
-        looping("the loop, planning", &mut planning, &samples),
+        looping("the loop, keeping", &mut keeping, &samples),
         pushing("cheapest scene", &mut barest, &samples, &mut moved_barest),
         pushing("default scene", &mut default, &samples, &mut moved_finer),
     ];
@@ -128,10 +128,10 @@ pub(super) fn size_cost(faces: usize, timing: Timing) -> Result<SizeCost, CostEr
     Ok(SizeCost {
         faces,
         minimal: timed[0].per_sample()?,
-        planning: timed[1].per_sample()?,
+        keeping: timed[1].per_sample()?,
         barest: timed[2].per_sample()?,
         barest_to_minimal: ratio(&timed[2], &timed[0])?,
-        barest_to_planning: ratio(&timed[2], &timed[1])?,
+        barest_to_keeping: ratio(&timed[2], &timed[1])?,
         default_finer: timed[3].per_sample()?,
         moved_finer: moved_finer as f64 / timing.samples() as f64,
         default_larger: larger,

@@ -13,7 +13,7 @@ use super::sizes::{samples_on, side_of};
 use super::turns::{PerSample, Timing, Way, in_turns};
 use crate::features::detect;
 use crate::io::recording::{RecordingWriter, Topics};
-use crate::mesh::{FaceId, FaceTree, RefitPlan, TriMesh};
+use crate::mesh::{FaceId, FaceTree, Nearby, RefitPlan, TriMesh};
 use crate::patch::Patcher;
 use crate::refine::{FaceDynamics, FaceState, TipMotion};
 use crate::report::Spread;
@@ -78,7 +78,7 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> Result<Vec<StageCost>
     let dynamics = FaceDynamics::new(params.dynamics).map_err(crate::refine::RefineError::from)?;
     let mut writer = RecordingWriter::new(Cursor::new(Vec::new()), &Topics::default(), "object", "stylus")?;
     let mut patcher = Patcher::new(scene.patcher_params(WrenchFrame::Sensor).ok_or(CostError::NothingMoves)?)?;
-    let (mut last, mut moving) = (None, Moving::new(&mesh));
+    let (mut last, mut nearby, mut moving) = (None, Nearby::default(), Moving::new(&mesh));
     let face = FaceState { b: Point3::origin(), n: Vector3::z() };
 
     let mut ways = [
@@ -125,7 +125,7 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> Result<Vec<StageCost>
         Way::new("closest face, from the last one", |block| {
             for p in &points[block] {
                 let hit = match last {
-                    Some(hint) => tree.closest_from(&mesh, p, hint, RADIUS),
+                    Some(hint) => tree.closest_nearby(&mesh, p, hint, RADIUS, &mut nearby),
                     None => tree.closest(&mesh, p, RADIUS),
                 };
                 last = hit.map(|hit| hit.face).or(last);

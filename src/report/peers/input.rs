@@ -5,7 +5,7 @@ use std::time::Instant;
 use nalgebra::Point3;
 
 use super::TouchupTimes;
-use crate::mesh::{FaceTree, MeshError, TriMesh};
+use crate::mesh::{FaceTree, MeshError, Nearby, TriMesh};
 use crate::refine::{RefineError, RefineParams, Refiner, TipParams};
 use crate::report::{Effort, Spread};
 use crate::sim::wavy::{RADIUS, SIDE, STIFFNESS, contact_on, slide, wavy_plate};
@@ -75,14 +75,15 @@ impl PeersInput {
     pub fn measure(&self) -> Result<TouchupTimes, RefineError> {
         let tree = FaceTree::new(&self.mesh);
         let (mut queries, mut next) = (Vec::new(), Vec::new());
-        let mut last = None;
+        let (mut last, mut nearby) = (None, Nearby::default());
         for p in &self.queries {
             let start = Instant::now();
             let hit = std::hint::black_box(tree.closest(&self.mesh, p, REACH));
             queries.push(microseconds(start));
             let hint = last.or(hit.map(|hit| hit.face));
             let start = Instant::now();
-            let hit = std::hint::black_box(hint.and_then(|hint| tree.closest_from(&self.mesh, p, hint, REACH)));
+            let hit = hint.and_then(|hint| tree.closest_nearby(&self.mesh, p, hint, REACH, &mut nearby));
+            let hit = std::hint::black_box(hit);
             next.push(microseconds(start));
             last = hit.map(|hit| hit.face);
         }
