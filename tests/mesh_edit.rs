@@ -380,7 +380,7 @@ fn a_walk_over_a_mesh_that_moves_finds_what_a_search_from_the_root_finds() {
         let mut mesh = grid(40, EDGE, |_, _| within(&mut rng, -0.2 * EDGE, 0.2 * EDGE));
         let (mut tree, mut nearby) = (FaceTree::new(&mesh), Nearby::default());
         let (mut below, mut beside) = (Pushed::default(), Pushed::default());
-        let (mut p, mut last) = (Point3::new(20.0 * EDGE, 20.0 * EDGE, 0.1 * EDGE), FaceId(0));
+        let (mut p, mut last) = (Point3::new(0.0, 0.0, 0.1 * EDGE), FaceId(0));
         for step in 0..600 {
             let wanted = tree.closest(&mesh, &p, f64::INFINITY);
             assert_eq!(tree.closest_nearby(&mesh, &p, last, f64::INFINITY, &mut nearby), wanted, "step {step} at {p}");

@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::followed::FollowedPatch;
-use super::guard::{GuardParams, Verdict};
+use super::guard::{Evidence, GuardParams, Verdict};
 use super::params::TouchedRegion;
 use super::roi::{Roi, RoiSize};
 use super::strokes::Strokes;
@@ -266,7 +266,8 @@ impl DeformableMesh {
     fn place_soundly(&mut self, region: &mut HandleRegion, longest: f64, guard: &GuardParams) -> Fit {
         let margin = MARGIN_EDGES * self.mean_edge;
         if region.seen != Some(self.edits) {
-            region.roi.neighbourhood.refresh(&self.mesh, &self.tree, margin, guard, &self.evidence);
+            let evidence = Evidence { scanned: &self.scanned, normals: &self.evidence };
+            region.roi.neighbourhood.refresh(&self.mesh, &self.tree, margin, guard, &evidence);
         } else if region.roi.neighbourhood.is_outdated(longest) {
             region.roi.neighbourhood.collect(&self.mesh, &self.tree, margin);
         }
@@ -299,7 +300,8 @@ impl DeformableMesh {
         let (mesh, before, marks) = (&self.mesh, &self.before, &region.roi.marks);
         let moved = |v: VertexId| marks.of(v.0).and_then(|i| before.get(i as usize));
         let was = |v: VertexId| moved(v).copied().unwrap_or_else(|| mesh.position(v));
-        region.roi.neighbourhood.judge(mesh, guard, &self.evidence, gap, share * longest, was)
+        let evidence = Evidence { scanned: &self.scanned, normals: &self.evidence };
+        region.roi.neighbourhood.judge(mesh, guard, &evidence, gap, share * longest, was)
     }
 
     /// The displacement of each vertex of the region; returns the longest, m.

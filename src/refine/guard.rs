@@ -12,7 +12,8 @@ use crate::mesh::{BoxQuery, FaceId, FaceTree, TriMesh, VertexId, triangle};
 /// Limits that keep a mesh sound.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GuardParams {
-    /// Smallest twice area over longest edge squared. Default 0.15: a triangle stretched sixfold.
+    /// Smallest twice area over longest edge squared. Default 0.15: a triangle stretched sixfold. Of a triangle that was
+    /// scanned thin [`Self::SCANNED_SHARE`] of what it had, where that is less: it must not hold all around it.
     pub smallest_quality: f64,
     /// Smallest cosine between normals before and after one update. Default 0.5: 60°.
     pub smallest_turn_cosine: f64,
@@ -23,6 +24,12 @@ pub struct GuardParams {
     pub smallest_fold_cosine: f64,
     /// Faces nearer than this share of the mean edge count as touching. Default 0.01.
     pub gap_share: f64,
+}
+
+impl GuardParams {
+    /// See [`Self::smallest_quality`]. To follow a touch a thin triangle needs to lose little. With a share of 0.8 a vertex of a
+    /// crumpled scan strayed, with 0.3 one more face was the wrong way round on another.
+    pub const SCANNED_SHARE: f64 = 0.9;
 }
 
 impl Default for GuardParams {
@@ -52,6 +59,25 @@ const COSINE_MARGIN: f64 = 0.05;
 const FOLD_MARGIN: f64 = 0.1;
 /// Margin on the quality.
 const QUALITY_MARGIN: f64 = 1.15;
+
+/// What was scanned or felt, against which an update is held.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Evidence<'a> {
+    /// positions as scanned, m
+    pub scanned: &'a [Point3<f64>],
+    /// for each face the last normal scanned or felt there; zero where it was scanned without area and never felt: it has no
+    /// side to keep then, and must not hold the others
+    pub normals: &'a [[f32; 3]],
+}
+
+impl Evidence<'_> {
+    /// Twice the area over the longest edge squared that a face may not fall below.
+    fn smallest_quality(&self, mesh: &TriMesh, face: FaceId, params: &GuardParams) -> f64 {
+        let corners = mesh.corners(face).map(|vertex| self.scanned[vertex.0 as usize]);
+        let double_area = (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).norm();
+        params.smallest_quality.min(GuardParams::SCANNED_SHARE * triangle::shape_quality(&corners, double_area))
+    }
+}
 
 /// A face of the region, or of the rim around it.
 #[derive(Clone, Copy, Debug)]
@@ -152,14 +178,7 @@ impl Neighbourhood {
     }
 
     /// Looks at the region anew after the mesh was changed elsewhere; arguments as in [`Self::judge`].
-    pub fn refresh(
-        &mut self,
-        mesh: &TriMesh,
-        tree: &FaceTree,
-        margin: f64,
-        params: &GuardParams,
-        evidence: &[[f32; 3]],
-    ) {
+    pub fn refresh(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64, params: &GuardParams, evidence: &Evidence) {
         self.before.clear();
         self.before.extend(self.ring.faces.iter().map(|&face| shape_of(mesh, face)));
         self.collect(mesh, tree, margin);
@@ -168,7 +187,7 @@ impl Neighbourhood {
             self.after.clear();
             self.after.extend_from_slice(&self.before[..self.ring.moving]);
             let lowest = self.after.iter().map(|shape| shape.normal.dot(&mean)).fold(1.0, f64::min);
-            self.allow_unseen(self.look(params, evidence), lowest);
+            self.allow_unseen(self.look(mesh, params, evidence), lowest);
         }
     }
 
@@ -257,8 +276,6 @@ impl Neighbourhood {
 
     /// Judges the mesh as it stands now against what it was before the update.
     ///
-    /// - `evidence`: for each face the last normal scanned or felt there; zero where it was scanned without area and never
-    ///   felt: it has no side to keep then, and must not hold the others.
     /// - `gap`: faces nearer than this touch, m.
     /// - `way`: the longest way of a vertex in the update, m.
     /// - `before`: the position of a vertex before the update, m.
@@ -266,14 +283,14 @@ impl Neighbourhood {
         &mut self,
         mesh: &TriMesh,
         params: &GuardParams,
-        evidence: &[[f32; 3]],
+        evidence: &Evidence,
         gap: f64,
         way: f64,
         before: impl Fn(VertexId) -> Point3<f64>,
     ) -> Verdict {
         self.after.clear();
         self.after.extend(self.ring.faces[..self.ring.moving].iter().map(|&face| shape_of(mesh, face)));
-        let look = self.look(params, evidence);
+        let look = self.look(mesh, params, evidence);
         self.unseen = 0.0;
         if look == Look::Broken {
             return Verdict::Broken;
@@ -297,26 +314,28 @@ impl Neighbourhood {
         }
     }
 
-    fn look(&self, params: &GuardParams, evidence: &[[f32; 3]]) -> Look {
-        match self.look_at_faces(params, evidence) {
+    fn look(&self, mesh: &TriMesh, params: &GuardParams, evidence: &Evidence) -> Look {
+        match self.look_at_faces(mesh, params, evidence) {
             Look::Broken => Look::Broken,
-            look => look.and(self.look_at_edges(params, evidence)),
+            look => look.and(self.look_at_edges(params, evidence.normals)),
         }
     }
 
-    fn look_at_faces(&self, params: &GuardParams, evidence: &[[f32; 3]]) -> Look {
+    fn look_at_faces(&self, mesh: &TriMesh, params: &GuardParams, evidence: &Evidence) -> Look {
         let mut look = Look::Safe;
         for ((&face, old), new) in self.ring.faces.iter().zip(&self.before).zip(&self.after) {
-            let seen = Vector3::from(evidence[face.0 as usize].map(f64::from));
+            let seen = Vector3::from(evidence.normals[face.0 as usize].map(f64::from));
             if seen == Vector3::zeros() {
                 continue;
             }
             let worse = |new: f64, old: f64, limit: f64| new < limit && new < old;
             let cosine = new.normal.dot(&seen);
-            let broken = worse(new.quality, old.quality, params.smallest_quality)
+            let is_thin = new.quality < params.smallest_quality * QUALITY_MARGIN;
+            let smallest_quality = if is_thin { evidence.smallest_quality(mesh, face, params) } else { 0.0 };
+            let broken = worse(new.quality, old.quality, smallest_quality)
                 || worse(cosine, old.normal.dot(&seen), params.smallest_evidence_cosine)
                 || new.normal.dot(&old.normal) < params.smallest_turn_cosine;
-            let at_limit = new.quality < params.smallest_quality * QUALITY_MARGIN
+            let at_limit = new.quality < smallest_quality * QUALITY_MARGIN
                 || cosine < params.smallest_evidence_cosine + COSINE_MARGIN;
             look = look.and(Look::of(broken, at_limit));
             if look == Look::Broken {
@@ -326,9 +345,9 @@ impl Neighbourhood {
         look
     }
 
-    fn look_at_edges(&self, params: &GuardParams, evidence: &[[f32; 3]]) -> Look {
+    fn look_at_edges(&self, params: &GuardParams, normals: &[[f32; 3]]) -> Look {
         let mut look = Look::Safe;
-        let has_side = |index: u32| evidence[self.ring.faces[index as usize].0 as usize] != [0.0; 3];
+        let has_side = |index: u32| normals[self.ring.faces[index as usize].0 as usize] != [0.0; 3];
         for &(a, b) in &self.ring.edges {
             let (old_a, old_b) = (&self.before[a as usize], &self.before[b as usize]);
             let new_b = self.after.get(b as usize).unwrap_or(old_b);

@@ -162,27 +162,31 @@ impl Adversary {
     }
 }
 
-/// What was promised of every update, checked face by face. `before`: shapes before the push.
-fn check_update(before: &[(f64, Vector3<f64>)], after: &[(f64, Vector3<f64>)], hinges: &[(FaceId, FaceId)], at: &str) {
+/// Quality and normal of each face.
+type Shapes = Vec<(f64, Vector3<f64>)>;
+
+/// What was promised of every update, checked face by face: shapes as scanned, and before and after the push.
+fn check_update(scanned: &Shapes, before: &Shapes, after: &Shapes, hinges: &[(FaceId, FaceId)], at: &str) {
     let GuardParams { smallest_quality, smallest_turn_cosine, smallest_fold_cosine, .. } = GuardParams::default();
     let slack = 1e-9;
     for (face, (was, is)) in before.iter().zip(after).enumerate() {
         if was == is {
             continue;
         }
-        assert!(is.0 >= smallest_quality.min(was.0) - slack, "{at}: face {face} starves, {} to {}", was.0, is.0);
+        let least = smallest_quality.min(GuardParams::SCANNED_SHARE * scanned[face].0).min(was.0);
+        assert!(is.0 >= least - slack, "{at}: face {face} starves, {} to {}", was.0, is.0);
         // two edits at most in one push: by contact, then by carving
         let turned = was.1.angle(&is.1);
         assert!(turned <= 2.0 * smallest_turn_cosine.acos() + 1e-6, "{at}: face {face} turns by {turned} rad");
     }
     for &(a, b) in hinges {
-        let cosine = |shapes: &[(f64, Vector3<f64>)]| shapes[a.0 as usize].1.dot(&shapes[b.0 as usize].1);
+        let cosine = |shapes: &Shapes| shapes[a.0 as usize].1.dot(&shapes[b.0 as usize].1);
         let (was, is) = (cosine(before), cosine(after));
         assert!(is >= smallest_fold_cosine.min(was) - slack, "{at}: {a:?} folds over {b:?}, {was} to {is}");
     }
 }
 
-fn shapes(mesh: &TriMesh) -> Vec<(f64, Vector3<f64>)> {
+fn shapes(mesh: &TriMesh) -> Shapes {
     mesh.faces().map(|(face, _)| shape(&mesh.triangle(face))).collect()
 }
 
@@ -195,19 +199,19 @@ fn torment(scan: &TriMesh, params: RefineParams, seeds: std::ops::Range<u64>) ->
     });
     let mean_edge = edges.sum::<f64>() / (3 * scan.face_count()) as f64;
     let most = (params.largest_move_edges * mean_edge).max(params.largest_move_noises * params.scan_noise);
-    let (mut moved, mut cut_back) = (0, 0);
+    let (scanned, mut moved, mut cut_back) = (shapes(scan), 0, 0);
     for seed in seeds {
         let mut refiner = Refiner::new(scan.clone(), params).unwrap();
         let mut adversary = Adversary::new(seed);
         let mut told = 0;
-        let mut before = shapes(scan);
+        let mut before = scanned.clone();
         for i in 0..SAMPLES {
             let update = refiner.push(&adversary.sample()).unwrap();
             told += u64::from(update.fit == Some(Fit::CutBack));
             let at = format!("seed {seed}, sample {i}");
             assert!(refiner.mesh().positions().iter().all(|p| p.coords.iter().all(|x| x.is_finite())), "{at}");
             let after = shapes(refiner.mesh());
-            check_update(&before, &after, &hinges, &at);
+            check_update(&scanned, &before, &after, &hinges, &at);
             before = after;
             if i % LOOK_EVERY == LOOK_EVERY - 1 {
                 assert_eq!(intersections(refiner.mesh()), [], "{at}");

@@ -63,7 +63,7 @@ fn verdicts(stability: &Stability) -> Vec<String> {
 }
 
 fn of_default_on_meshes(stability: &Stability) -> String {
-    let limit = GuardParams::default().smallest_quality;
+    let (limit, share) = (GuardParams::default().smallest_quality, GuardParams::SCANNED_SHARE);
     if stability.meshes.iter().all(|shares| shares.stable_share == 1.0) {
         return "On meshes of any quality that was tried, the default was stable in every press.".to_owned();
     }
@@ -77,8 +77,9 @@ fn of_default_on_meshes(stability: &Stability) -> String {
         None => "there are faults at every quality".to_owned(),
     };
     format!(
-        "MISSED on bad triangles: {from}. Of {runs} presses {cut_back} were cut back, because the guard lets no triangle below a \
-         quality of {limit} become any worse: the mesh stays sound there, but does not follow the touch; remesh such a scan first. \
+        "MISSED on bad triangles: {from}. Of {runs} presses {cut_back} were cut back, because the guard lets no triangle become \
+         thinner than {limit}, or than {share} of what it was scanned with where that is less, nor turn too far or fold: the mesh \
+         stays sound there, but does not follow the touch; remesh such a scan first. \
          In {} the face went over its rest point.",
         count(Ending::Overshot)
     )
