@@ -72,7 +72,7 @@ pub fn of_stability(measured: &Stability) -> Vec<String> {
     );
     text += &match measured.default_stable_from_quality() {
         Some(quality) => format!(
-            " It fails on bad triangles: below an altitude of {} of the longest side, updates are cut back or overshoot.",
+            " It fails on bad triangles: below an altitude of {} of the longest side, some updates are cut back or overshoot.",
             three_digits(quality)
         ),
         None => " On bad triangles it fails: presses were at fault at every quality that was tried.".to_owned(),
