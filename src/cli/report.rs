@@ -72,10 +72,18 @@ enum Part {
     Cost,
 }
 
-/// A chapter, and what it adds to the verdict.
-struct Told {
-    chapter: Chapter,
+/// What is on the page.
+#[derive(Default)]
+struct Measured {
+    chapters: Vec<Chapter>,
     verdict: Vec<String>,
+}
+
+impl Measured {
+    fn tell(&mut self, chapter: Chapter, verdict: Vec<String>) {
+        self.chapters.push(chapter);
+        self.verdict.extend(verdict);
+    }
 }
 
 /// The verb: measures what is asked for, writes it, and tells the verdict.
@@ -90,14 +98,13 @@ pub(super) fn report(arguments: &ReportArguments) -> Result<Losses, CliError> {
     }
     // before minutes of measuring
     create_folder(out).map_err(write_error(out))?;
-    let told = chapters(arguments, &mut lines_on_stderr())?;
-    let (chapters, verdict): (Vec<_>, Vec<_>) = told.into_iter().map(|told| (told.chapter, told.verdict)).unzip();
+    let Measured { chapters, verdict } = measure(arguments, &mut lines_on_stderr())?;
     let report = Report {
         machine: describe_machine(),
         commit: env!("TOUCHUP_COMMIT").to_owned(),
         command: command(arguments),
         date: DateTime::<Utc>::from(SystemTime::now()).format("%Y-%m-%d %H:%M UTC").to_string(),
-        verdict: verdict.concat(),
+        verdict,
         chapters,
     };
     for file in report.files()? {
@@ -113,7 +120,7 @@ pub(super) fn report(arguments: &ReportArguments) -> Result<Losses, CliError> {
 }
 
 /// Every chapter that is asked for, in the order of the page.
-fn chapters(arguments: &ReportArguments, progress: &mut dyn FnMut(&str)) -> Result<Vec<Told>, CliError> {
+fn measure(arguments: &ReportArguments, progress: &mut dyn FnMut(&str)) -> Result<Measured, CliError> {
     let effort = Effort { is_quick: arguments.quick };
     let is_wanted = |part| arguments.only.is_empty() || arguments.only.contains(&part);
     let given = arguments.given()?;
@@ -123,35 +130,36 @@ fn chapters(arguments: &ReportArguments, progress: &mut dyn FnMut(&str)) -> Resu
         peers(effort, &environment, progress)
     });
     let peers = peers.transpose()?;
-    let mut told = Vec::new();
-    let mut tell = |chapter, verdict| told.push(Told { chapter, verdict });
+    let mut all = Measured::default();
     if is_wanted(Part::WorkPrecision) {
         let measured = WorkPrecision::measure(effort, progress);
-        tell(measured.chapter(), measured.verdict());
+        all.tell(measured.chapter(), measured.verdict());
     }
-    if is_wanted(Part::WholeScan) {
-        let measured = whole_scan(effort, given.as_ref(), progress)?;
-        tell(measured.chapter(), verdict::of_whole_scans(&measured));
+    let scans = is_wanted(Part::WholeScan).then(|| whole_scan(effort, given.as_ref(), progress)).transpose()?;
+    if let Some(measured) = &scans {
+        all.tell(measured.chapter(), verdict::of_whole_scans(measured));
     }
     if is_wanted(Part::Convergence) {
         let measured = convergence(effort, progress);
-        tell(measured.chapter(), verdict::of_convergence(&measured));
+        all.tell(measured.chapter(), verdict::of_convergence(&measured));
     }
-    if is_wanted(Part::Stability) {
-        let measured = stability(effort, progress);
-        tell(measured.chapter(), verdict::of_stability(&measured));
+    let stability = is_wanted(Part::Stability).then(|| stability(effort, progress));
+    if let Some(measured) = &stability {
+        all.tell(measured.chapter(), verdict::of_stability(measured));
         progress("extremes");
         let measured = extremes();
-        tell(measured.chapter(), verdict::of_extremes(&measured));
+        all.tell(measured.chapter(), verdict::of_extremes(&measured));
     }
-    if is_wanted(Part::Cost) {
-        let measured = cost(effort, progress)?;
-        tell(measured.chapter(), verdict::of_cost(&measured));
+    let cost = is_wanted(Part::Cost).then(|| cost(effort, progress)).transpose()?;
+    if let Some(measured) = &cost {
+        all.tell(measured.chapter(), verdict::of_cost(measured));
     }
     if let Some(measured) = peers {
-        tell(measured.chapter(), verdict::of_peers(&measured));
+        all.tell(measured.chapter(), verdict::of_peers(&measured));
     }
-    Ok(told)
+    let short = scans.and_then(|scans| verdict::in_short(&scans, stability.as_ref(), cost.as_ref()));
+    all.verdict.splice(..0, short);
+    Ok(all)
 }
 
 impl ReportArguments {
