@@ -25,7 +25,7 @@ pub fn in_short(scans: &WholeScan, stability: Option<&Stability>, cost: Option<&
     );
     if let Some(size) = cost.and_then(|cost| cost.sizes.last()) {
         let answer_us = size.default_larger.time_ns.median * 1e-3;
-        text += &format!(" The haptic update answers it within {} µs, the patch follows.", three_digits(answer_us));
+        text += &format!(" The haptic update answers it in {} µs, the patch follows.", three_digits(answer_us));
     }
     let mut fails = Vec::new();
     if let Some(quality) = stability.and_then(Stability::default_stable_from_quality).filter(|quality| *quality > 0.0) {
