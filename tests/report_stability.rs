@@ -23,8 +23,8 @@ fn the_default_is_stable_everywhere_and_explicit_euler_is_not() {
     assert!((0.2..0.8).contains(&euler.stable_share), "{:?}", euler.endings);
     assert!(of(Integrator::DormandPrince).endings.iter().any(|(ending, _)| *ending == Ending::GaveUp));
     println!("default on meshes: stable from {:?}", measured.default_stable_from_quality());
-    // equal triangles no worse than a scan's are stable; the guard holds what is below its limit of 0.15
-    assert!(measured.default_stable_from_quality().is_some_and(|quality| quality < 0.4));
+    // triangles thinner than the guard's limit of 0.15 follow a touch, too, if they were scanned so
+    assert!(measured.default_stable_from_quality().is_some_and(|quality| quality < 0.1));
     for text in measured.chapter().text {
         println!("{text}");
     }

@@ -143,9 +143,15 @@ pub fn intersect(t: &[Point3<f64>; 3], u: &[Point3<f64>; 3], gap: f64) -> bool {
     (0..3).any(|i| segment_crosses(&t[i], &t[(i + 1) % 3], u, gap) || segment_crosses(&u[i], &u[(i + 1) % 3], t, gap))
 }
 
+/// The square of the longest edge, m².
+#[inline]
+pub fn longest_edge_squared(t: &[Point3<f64>; 3]) -> f64 {
+    (t[1] - t[0]).norm_squared().max((t[2] - t[1]).norm_squared()).max((t[0] - t[2]).norm_squared())
+}
+
 /// Twice the area over the square of the longest edge: 0.87 for an equilateral triangle, 0 for one without area.
 #[inline]
 pub fn shape_quality(t: &[Point3<f64>; 3], double_area: f64) -> f64 {
-    let longest = (t[1] - t[0]).norm_squared().max((t[2] - t[1]).norm_squared()).max((t[0] - t[2]).norm_squared());
+    let longest = longest_edge_squared(t);
     if longest > 0.0 { double_area / longest } else { 0.0 }
 }

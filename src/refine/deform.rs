@@ -262,12 +262,15 @@ impl DeformableMesh {
         Ok(is_done)
     }
 
+    fn evidence(&self) -> Evidence<'_> {
+        Evidence { scanned: &self.scanned, normals: &self.evidence }
+    }
+
     /// Puts the region at the largest share of its displacement that leaves the mesh sound.
     fn place_soundly(&mut self, region: &mut HandleRegion, longest: f64, guard: &GuardParams) -> Fit {
         let margin = MARGIN_EDGES * self.mean_edge;
         if region.seen != Some(self.edits) {
-            let evidence = Evidence { scanned: &self.scanned, normals: &self.evidence };
-            region.roi.neighbourhood.refresh(&self.mesh, &self.tree, margin, guard, &evidence);
+            region.roi.neighbourhood.refresh(&self.mesh, &self.tree, margin, guard, &self.evidence());
         } else if region.roi.neighbourhood.is_outdated(longest) {
             region.roi.neighbourhood.collect(&self.mesh, &self.tree, margin);
         }
@@ -300,8 +303,7 @@ impl DeformableMesh {
         let (mesh, before, marks) = (&self.mesh, &self.before, &region.roi.marks);
         let moved = |v: VertexId| marks.of(v.0).and_then(|i| before.get(i as usize));
         let was = |v: VertexId| moved(v).copied().unwrap_or_else(|| mesh.position(v));
-        let evidence = Evidence { scanned: &self.scanned, normals: &self.evidence };
-        region.roi.neighbourhood.judge(mesh, guard, &evidence, gap, share * longest, was)
+        region.roi.neighbourhood.judge(mesh, guard, &self.evidence(), gap, share * longest, was)
     }
 
     /// The displacement of each vertex of the region; returns the longest, m.

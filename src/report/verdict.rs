@@ -55,7 +55,7 @@ fn by_part<'a>(
 fn one_or_each(ways: &[(&str, &WayResult)]) -> String {
     match ways {
         [(_, first), others @ ..] if others.iter().all(|(_, way)| way.way == first.way) => first.name.clone(),
-        _ => ways.iter().map(|(part, way)| format!("{} on {part}", way.name)).collect::<Vec<_>>().join(", "),
+        _ => ways.iter().map(|(part, way)| format!("{} on {part}", way.name)).collect::<Vec<_>>().join("; "),
     }
 }
 
@@ -248,7 +248,7 @@ mod tests {
         let patch = || way(Way::Patch, "patch", 0.01, 40.0, false);
         let paper = || way(Way::Robust(Reach::TipRadii(1.0)), "one radius", 0.005, 8.0, false);
         let text = of(vec![case("peaks", vec![vec![patch()]]), case("plate", vec![vec![patch(), paper()]])]).unwrap();
-        assert!(text.starts_with("In short: take patch on peaks, one radius on plate."), "{text}");
+        assert!(text.starts_with("In short: take patch on peaks; one radius on plate."), "{text}");
         assert!(!text.contains("fails"), "{text}");
         assert_eq!(of(vec![case("peaks", vec![vec![way(Way::Patch, "patch", 3.0, 1.0, true)]])]), None);
     }

@@ -173,7 +173,7 @@ fn check_update(scanned: &Shapes, before: &Shapes, after: &Shapes, hinges: &[(Fa
         if was == is {
             continue;
         }
-        let least = smallest_quality.min(GuardParams::SCANNED_SHARE * scanned[face].0).min(was.0);
+        let least = smallest_quality.min(0.9 * scanned[face].0).min(was.0);
         assert!(is.0 >= least - slack, "{at}: face {face} starves, {} to {}", was.0, is.0);
         // two edits at most in one push: by contact, then by carving
         let turned = was.1.angle(&is.1);

@@ -4,14 +4,14 @@ use nalgebra::Point3;
 
 use super::query::{Found, is_less_square, surface_hit};
 use super::{FaceHit, FaceTree, ROOT, STACK};
-use crate::mesh::triangle::closest_point;
+use crate::mesh::triangle::{closest_point, longest_edge_squared};
 use crate::mesh::{FaceId, TriMesh};
 
 /// The reach of a query with a hint over the distance to the hinted face.
 const HINT_WIDTH: f64 = 1.0 + 1e-6;
 /// Leaves that are kept at most: to look at the boxes of more takes as long as the way from the root.
 const MOST_LEAVES: usize = 64;
-/// How far beyond a query leaves are kept, in longest edges of the face last found.
+/// How far beyond a query leaves are kept, in longest edges of the hinted face.
 const EDGES_BEYOND: f64 = 0.7;
 
 /// The leaves of one tree that meet a ball, for [`FaceTree::closest_nearby`].
@@ -57,9 +57,8 @@ impl FaceTree {
         let is_kept = nearby.changes == self.changes && away + reach <= nearby.radius;
         if !is_kept {
             let is_crowded = nearby.crowded == Some(hint);
-            let [a, b, c] = triangle;
-            let longest = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared()).sqrt();
-            if is_crowded || !self.keep_near(p, reach + EDGES_BEYOND * longest, nearby) {
+            let beyond = EDGES_BEYOND * longest_edge_squared(&triangle).sqrt();
+            if is_crowded || !self.keep_near(p, reach + beyond, nearby) {
                 nearby.crowded = Some(hint);
                 return self.closest(mesh, p, reach);
             }

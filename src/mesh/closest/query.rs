@@ -182,14 +182,14 @@ impl FaceTree {
 
     /// How much a distance between `q` and a box may be off in single precision, m: three roundings of the largest
     /// coordinate that enters it.
-    pub(super) fn slack(&self, q: &Vector3<f64>) -> f64 {
+    fn slack(&self, q: &Vector3<f64>) -> f64 {
         let bounds = &self.root.bounds;
         let largest = (0..3).map(|i| f64::from(bounds.hi[i].max(-bounds.lo[i])).max(q[i].abs())).fold(0.0, f64::max);
         4.0 * f64::from(f32::EPSILON) * largest
     }
 
     /// How much the distances of faces that meet at the closest point may differ, without the part of the distance, m.
-    pub(super) fn tie(&self) -> f64 {
+    fn tie(&self) -> f64 {
         let Aabb { lo, hi } = self.root.bounds;
         let largest = |i: usize| self.origin[i].abs() + f64::from(hi[i].max(-lo[i]));
         let diagonal = Vector3::from_fn(|i, _| f64::from(hi[i] - lo[i])).norm();
@@ -264,7 +264,7 @@ fn tie_squared(limit: f64, tie: f64) -> f64 {
 /// The single-precision squared distance to a box beyond which no face of it can be nearer than √`limit`, nor equally
 /// near within the tie that `slack` holds; [`TIE_DISTANCE`] is far below the roundings of single precision.
 #[inline]
-pub(super) fn beyond(limit: f64, slack: f64) -> f32 {
+fn beyond(limit: f64, slack: f64) -> f32 {
     let distance = limit.sqrt() + slack;
     // 8 roundings: the squares, their sum, and this conversion; the smallest normal number for where they underflow
     (distance * distance * (1.0 + 8.0 * f64::from(f32::EPSILON))) as f32 + f32::MIN_POSITIVE

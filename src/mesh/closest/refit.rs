@@ -61,9 +61,10 @@ impl FaceTree {
             plan.room -= way;
         } else {
             self.fit(mesh, plan, margin);
-            match way + margin {
-                wider if wider.is_finite() => self.widened += wider,
-                _ => self.changes += 1,
+            if way.is_finite() {
+                self.widened += way + margin;
+            } else {
+                self.changes += 1;
             }
         }
     }

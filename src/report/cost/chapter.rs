@@ -111,7 +111,7 @@ impl Cost {
             "What a scene does not name costs nothing: the cheapest scene takes at most {worst:.3} times as long as the loop \
              that is written by hand, on the same samples in turns; {} the {LARGEST_RATIO} that is allowed. Against the same \
              loop made to keep what it looked up, as the refiner does (which boxes to bring up to date, with a margin, and what \
-             is near), it is {keeping:.3} times: that is what checks, compensation and dynamics cost.",
+             is near), it is {keeping:.3} times.",
             if is_within { "within" } else { "this misses" }
         ))
     }

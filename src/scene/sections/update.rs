@@ -10,7 +10,7 @@ use crate::scene::SceneError;
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct GuardSection {
-    /// Smallest twice area over longest edge squared.
+    /// Smallest twice area over longest edge squared; nine tenths of what a thin triangle was scanned with.
     pub smallest_quality: f64,
     /// Smallest cosine between normals before and after one update.
     pub smallest_turn_cosine: f64,
