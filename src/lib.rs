@@ -8,6 +8,7 @@
 //!
 //! | room | what happens there |
 //! |---|---|
+//! | [`clock`] | steady time, of the machine or of a test that moves it |
 //! | [`touch`] | pose and wrench become one [`touch::Sample`]; weight and bias come off; is there contact? |
 //! | [`mesh`] | the triangle mesh, its closest face, its Laplacian |
 //! | [`patch`] | the scan meshed anew where it was touched |
@@ -52,6 +53,7 @@ struct Readme;
 pub mod align;
 pub mod calibrate;
 pub mod cli;
+pub mod clock;
 pub mod compare;
 pub mod explore;
 pub mod features;

@@ -1,0 +1,225 @@
+//! Steady time, of this machine or of a test that moves it by hand.
+//!
+//! Whoever keeps a deadline asks a [`Clock`]. With [`Clock::manual`] time stands still until [`ManualClock::advance`], so a
+//! deadline passes when a test says so, however busy the machine is.
+
+use std::collections::BTreeMap;
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// How long a wait on a manual clock sleeps before it looks at its channel or condition again. No result depends on it.
+const LOOK: Duration = Duration::from_micros(500);
+
+/// Where time comes from. Clones show the same time.
+#[derive(Clone, Debug, Default)]
+pub struct Clock {
+    /// `None`: the steady clock of this machine
+    manual: Option<Arc<Manual>>,
+}
+
+/// The hand that moves a [`Clock::manual`].
+#[derive(Debug)]
+pub struct ManualClock(Arc<Manual>);
+
+#[derive(Debug)]
+struct Manual {
+    begun: Instant,
+    waits: Mutex<Waits>,
+    changed: Condvar,
+}
+
+#[derive(Debug, Default)]
+struct Waits {
+    elapsed: Duration,
+    next: u64,
+    /// deadlines of the waits under way, since `begun`
+    deadlines: BTreeMap<u64, Duration>,
+}
+
+impl Clock {
+    /// The steady clock of this machine.
+    pub fn system() -> Self {
+        Self::default()
+    }
+
+    /// A clock that stands still until its hand moves it.
+    pub fn manual() -> (Self, ManualClock) {
+        let manual = Arc::new(Manual { begun: Instant::now(), waits: Mutex::default(), changed: Condvar::new() });
+        (Self { manual: Some(manual.clone()) }, ManualClock(manual))
+    }
+
+    /// Now.
+    pub fn now(&self) -> Instant {
+        self.manual.as_ref().map_or_else(Instant::now, |manual| manual.begun + manual.waits().elapsed)
+    }
+
+    /// Time since `then`; zero where that is still to come.
+    pub fn since(&self, then: Instant) -> Duration {
+        self.now().saturating_duration_since(then)
+    }
+
+    /// Returns after `duration`.
+    pub fn sleep(&self, duration: Duration) {
+        let Some(manual) = &self.manual else { return thread::sleep(duration) };
+        let wait = manual.begin(duration);
+        let waits = manual.waits();
+        drop(manual.changed.wait_while(waits, |waits| waits.elapsed < wait.deadline));
+    }
+
+    /// As [`Receiver::recv_timeout`]: what was sent before the deadline passed is received.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn recv_timeout<T>(&self, receiver: &Receiver<T>, timeout: Duration) -> Result<T, RecvTimeoutError> {
+        let Some(manual) = &self.manual else { return receiver.recv_timeout(timeout) };
+        let wait = manual.begin(timeout);
+        loop {
+            let is_over = manual.waits().elapsed >= wait.deadline;
+            let patience = if is_over { Duration::ZERO } else { LOOK };
+            match receiver.recv_timeout(patience) {
+                Err(RecvTimeoutError::Timeout) if !is_over => {}
+                ended => return ended,
+            }
+        }
+    }
+
+    /// As [`Condvar::wait_timeout_while`], without telling whether the time ran out: the caller looks at the value.
+    pub fn wait_while<'a, T>(
+        &self,
+        condvar: &Condvar,
+        guard: MutexGuard<'a, T>,
+        timeout: Duration,
+        mut condition: impl FnMut(&mut T) -> bool,
+    ) -> MutexGuard<'a, T> {
+        let Some(manual) = &self.manual else {
+            return condvar.wait_timeout_while(guard, timeout, condition).unwrap_or_else(PoisonError::into_inner).0;
+        };
+        let wait = manual.begin(timeout);
+        let mut guard = guard;
+        loop {
+            let is_over = manual.waits().elapsed >= wait.deadline;
+            if !condition(&mut guard) || is_over {
+                return guard;
+            }
+            guard = condvar.wait_timeout(guard, LOOK).unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+}
+
+impl ManualClock {
+    /// Moves time on, and returns when no wait of before is left whose deadline has passed.
+    pub fn advance(&self, by: Duration) {
+        let mut waits = self.0.waits();
+        waits.elapsed += by;
+        self.0.changed.notify_all();
+        let is_overdue = |waits: &mut Waits| waits.deadlines.values().any(|deadline| *deadline <= waits.elapsed);
+        drop(self.0.changed.wait_while(waits, is_overdue));
+    }
+
+    /// Waits under way.
+    pub fn waiting(&self) -> usize {
+        self.0.waits().deadlines.len()
+    }
+}
+
+/// A wait under way; over when dropped.
+struct Wait<'a> {
+    manual: &'a Manual,
+    number: u64,
+    deadline: Duration,
+}
+
+impl Manual {
+    fn waits(&self) -> MutexGuard<'_, Waits> {
+        self.waits.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn begin(&self, timeout: Duration) -> Wait<'_> {
+        let mut waits = self.waits();
+        let (number, deadline) = (waits.next, waits.elapsed.saturating_add(timeout));
+        waits.next += 1;
+        waits.deadlines.insert(number, deadline);
+        Wait { manual: self, number, deadline }
+    }
+}
+
+impl Drop for Wait<'_> {
+    fn drop(&mut self) {
+        self.manual.waits().deadlines.remove(&self.number);
+        self.manual.changed.notify_all();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc::channel;
+
+    use super::*;
+
+    const SECOND: Duration = Duration::from_secs(1);
+
+    #[test]
+    fn a_manual_clock_shows_what_it_was_moved_by() {
+        let (clock, hand) = Clock::manual();
+        let begun = clock.now();
+        assert_eq!(clock.since(begun), Duration::ZERO);
+        hand.advance(3 * SECOND);
+        assert_eq!((clock.since(begun), clock.clone().since(begun)), (3 * SECOND, 3 * SECOND));
+    }
+
+    #[test]
+    fn a_wait_ends_when_its_deadline_has_passed_and_not_before() {
+        let (clock, hand) = Clock::manual();
+        let (ended, ends) = channel();
+        thread::scope(|scope| {
+            scope.spawn(|| {
+                clock.sleep(2 * SECOND);
+                ended.send(clock.now()).unwrap();
+            });
+            while hand.waiting() == 0 {
+                thread::yield_now();
+            }
+            hand.advance(SECOND);
+            assert_eq!(hand.waiting(), 1);
+            assert!(ends.try_recv().is_err());
+            hand.advance(SECOND);
+            assert_eq!(hand.waiting(), 0);
+            assert_eq!(ends.recv().unwrap(), clock.now());
+        });
+    }
+
+    #[test]
+    fn what_was_sent_in_time_is_received_and_what_was_not_is_a_timeout() {
+        let (clock, hand) = Clock::manual();
+        let (sender, receiver) = channel();
+        sender.send(7).unwrap();
+        assert_eq!(clock.recv_timeout(&receiver, Duration::ZERO), Ok(7));
+        let (timeout, receiver) = thread::scope(|scope| {
+            let clock = clock.clone();
+            let waiting = scope.spawn(move || (clock.recv_timeout(&receiver, SECOND), receiver));
+            while hand.waiting() == 0 {
+                thread::yield_now();
+            }
+            hand.advance(SECOND);
+            waiting.join().unwrap()
+        });
+        assert_eq!(timeout, Err(RecvTimeoutError::Timeout));
+        drop(sender);
+        assert_eq!(clock.recv_timeout(&receiver, SECOND), Err(RecvTimeoutError::Disconnected));
+    }
+
+    #[test]
+    fn a_condition_ends_a_wait_before_its_deadline() {
+        let (clock, _hand) = Clock::manual();
+        let (value, changed) = (Mutex::new(0), Condvar::new());
+        thread::scope(|scope| {
+            let waiting =
+                scope.spawn(|| *clock.wait_while(&changed, value.lock().unwrap(), SECOND, |value| *value == 0));
+            *value.lock().unwrap() = 5;
+            changed.notify_all();
+            assert_eq!(waiting.join().unwrap(), 5);
+        });
+    }
+}

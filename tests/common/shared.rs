@@ -1,0 +1,19 @@
+//! Files of `../shared/data`, and how a test says that it did not run.
+
+use std::path::{Path, PathBuf};
+
+/// A file or folder below `../shared/data`; `None`, with [`skip`], where it is not there.
+pub fn shared(below: &str) -> Option<PathBuf> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data").join(below);
+    if path.exists() {
+        return Some(path);
+    }
+    skip(&format!("../shared/data/{below} is missing"));
+    None
+}
+
+/// Says that this test did not run: `tests/all.sh` counts the line as a skipped test, not as a passed one.
+pub fn skip(reason: &str) {
+    let thread = std::thread::current();
+    println!("SKIPPED: {}: {reason}", thread.name().unwrap_or("a thread of a test"));
+}

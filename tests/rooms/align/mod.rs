@@ -1,0 +1,3 @@
+mod by_features;
+mod pairs;
+mod surfaces;

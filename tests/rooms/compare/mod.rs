@@ -1,0 +1,2 @@
+mod deviation;
+mod disagreement;

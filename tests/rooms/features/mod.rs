@@ -1,0 +1,7 @@
+mod command;
+mod curvature;
+mod detection;
+mod files;
+mod fit;
+mod touched;
+mod track;

@@ -1,0 +1,199 @@
+//! Features of the simulated plate, measured by what was touched, against the drawing: what they are off by, and whether
+//! that is what they say.
+//!
+//! `TOUCHUP_FULL=1` runs all seeds; `--nocapture` or `--show-output` shows the numbers.
+
+use nalgebra::Vector3;
+use touchup::features::{Feature, FittedTo, Kind, Measured, detect};
+use touchup::mesh::FaceTree;
+use touchup::patch::{CalibrationParams, Patcher, PatcherParams};
+use touchup::sim::{Plate, StylusParams, TruthFeature, TruthShape};
+
+use crate::plate_stream::{PlateStream, plate_stream};
+
+const MM: f64 = 1e3;
+
+fn seeds() -> u64 {
+    if std::env::var_os("TOUCHUP_FULL").is_some() { 50 } else { 6 }
+}
+
+/// What is on the plate of one seed, scanned and touched as in the demo. Radius and stiffness are told as they are: the
+/// calibration leaves nothing.
+fn found(seed: u64) -> Vec<Feature> {
+    let stylus = StylusParams::default();
+    assert_eq!((stylus.friction, stylus.sensor.pose_noise), (0.15, 0.05e-3), "the demo has changed");
+    let (PlateStream { scan, noise, samples }, _) = plate_stream(&stylus, seed);
+    let mut params = PatcherParams::new(stylus.radius, Some(stylus.stiffness), noise);
+    let known = params.uncertainty.as_mut().unwrap();
+    known.calibration = CalibrationParams { position: 0.0, stiffness_share: 0.0 };
+    let mut patcher = Patcher::new(params).unwrap();
+    samples.iter().for_each(|sample| patcher.push(sample));
+    patcher.flush();
+    let mesh = patcher.patched(&scan, &FaceTree::new(&scan)).unwrap().mesh;
+    detect(&mesh, &FaceTree::new(&mesh), patcher.probed()).features
+}
+
+/// What one number of one feature was off by, and its standard uncertainty, seed by seed; mm or degrees.
+struct Row {
+    name: String,
+    /// at most, by the issue
+    bound: Option<f64>,
+    errors: Vec<f64>,
+    stds: Vec<f64>,
+}
+
+impl Row {
+    fn normalised(&self) -> impl Iterator<Item = f64> {
+        self.errors.iter().zip(&self.stds).map(|(error, std)| error / std)
+    }
+
+    fn worst(&self) -> f64 {
+        self.errors.iter().map(|error| error.abs()).fold(0.0, f64::max)
+    }
+}
+
+fn rms(values: impl Iterator<Item = f64>) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    values.for_each(|x| (sum, count) = (sum + x * x, count + 1.0));
+    f64::sqrt(sum / count)
+}
+
+/// All numbers of all features.
+#[derive(Default)]
+struct Table {
+    rows: Vec<Row>,
+    /// holes said to go through that are blind, or the other way round
+    wrongly_through: usize,
+}
+
+impl Table {
+    fn add(&mut self, name: String, bound: Option<f64>, error: f64, std: Option<f64>) {
+        let std = std.unwrap_or_else(|| panic!("{name}: it does not say how well it is known"));
+        assert!(std > 0.0 && std.is_finite(), "{name}: {std}");
+        if self.rows.iter().all(|row| row.name != name) {
+            self.rows.push(Row { name: name.clone(), bound, errors: Vec::new(), stds: Vec::new() });
+        }
+        let row = self.rows.iter_mut().find(|row| row.name == name).unwrap();
+        row.errors.push(error);
+        row.stds.push(std);
+    }
+
+    fn print(&self) {
+        println!(
+            "{:22} {:>8} {:>8} {:>8} {:>10} {:>10}   mm, degrees",
+            "", "mean", "rms", "max", "median std", "rms of z"
+        );
+        for row in &self.rows {
+            let Row { name, errors, stds, .. } = row;
+            let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+            let mut stds = stds.clone();
+            stds.sort_by(f64::total_cmp);
+            println!(
+                "{name:22} {mean:8.4} {:8.4} {:8.4} {:10.4} {:10.2}",
+                rms(errors.iter().copied()),
+                row.worst(),
+                stds[stds.len() / 2],
+                rms(row.normalised())
+            );
+        }
+    }
+}
+
+/// Distance across `axis`, m.
+fn across(off: &Vector3<f64>, axis: &Vector3<f64>) -> f64 {
+    off.cross(axis).norm()
+}
+
+fn kind_of(truth: &TruthFeature) -> Option<Kind> {
+    match truth.shape {
+        TruthShape::Hole { .. } => Some(Kind::Hole),
+        TruthShape::Slot { .. } => Some(Kind::Slot),
+        TruthShape::Boss { .. } => Some(Kind::Boss),
+        TruthShape::Step { .. } => None,
+    }
+}
+
+/// Compares one feature with the drawing.
+fn compare(table: &mut Table, truth: &TruthFeature, feature: &Feature) {
+    let name = truth.name;
+    assert_eq!(feature.fitted_to, FittedTo::Touches, "{name}");
+    let mut number = |what: &str, truth: f64, measured: &Option<Measured<f64>>, bound: Option<f64>| {
+        let measured = measured.as_ref().unwrap_or_else(|| panic!("{name} has no {what}"));
+        let std = measured.std.map(|std| std * MM);
+        table.add(format!("{name}, {what}"), bound, (measured.value - truth) * MM, std);
+    };
+    const BOUND: Option<f64> = Some(0.05);
+    match truth.shape {
+        TruthShape::Hole { diameter, depth, through } => {
+            number("diameter", diameter, &feature.diameter, BOUND);
+            // where the ball came down to a floor
+            if feature.depth.as_ref().is_some_and(|depth| depth.std.is_some()) {
+                number("depth", depth, &feature.depth, None);
+                assert_eq!(feature.through, Some(through), "{name}");
+            }
+            table.wrongly_through += usize::from(feature.through == Some(!through));
+        }
+        TruthShape::Boss { diameter, height } => {
+            number("diameter", diameter, &feature.diameter, BOUND);
+            number("height", height, &feature.depth, None);
+        }
+        TruthShape::Slot { width, length, depth, direction } => {
+            number("width", width, &feature.width, BOUND);
+            number("length", length, &feature.length, None);
+            number("depth", depth, &feature.depth, None);
+            assert_eq!(feature.through, Some(false), "{name}");
+            let off = feature.direction.unwrap().cross(&direction).norm().asin().to_degrees();
+            assert!(off < 0.5, "{name}: its direction is off by {off}°");
+        }
+        TruthShape::Step { .. } => unreachable!("a step is an edge"),
+    }
+    let off = across(&(feature.centre.value - truth.centre), &truth.axis) * MM;
+    table.add(format!("{name}, centre"), BOUND, off, feature.centre.std.map(|std| std * MM));
+    let axis = feature.axis.as_ref().unwrap();
+    assert!(axis.value.dot(&truth.axis) > 0.0, "{name}: it opens to the other side");
+    let off = axis.value.cross(&truth.axis).norm().asin().to_degrees();
+    table.add(format!("{name}, axis"), Some(0.5), off, axis.std.map(f64::to_degrees));
+}
+
+/// The one feature of a true one's kind near it.
+fn of_truth<'a>(truth: &TruthFeature, kind: Kind, features: &'a [Feature]) -> &'a Feature {
+    let near = |feature: &&Feature| across(&(feature.centre.value - truth.centre), &truth.axis) < 1.5e-3;
+    let mut found = features.iter().filter(|feature| feature.kind == kind).filter(near);
+    found.next().unwrap_or_else(|| panic!("the {} was not found", truth.name))
+}
+
+/// Between what the root mean square of `count` normalised errors of standard deviation 1 is in 99.8 % of cases: quantiles of
+/// χ² by Wilson and Hilferty's cube (six have 0.05 and 3.78 as mean squares; Abramowitz & Stegun, table 26.8, 0.06 and 3.74).
+fn told_by(count: usize) -> [f64; 2] {
+    let spread = 2.0 / (9.0 * count as f64);
+    [-3.09, 3.09].map(|z| (1.0 - spread + z * spread.sqrt()).max(0.0).powf(1.5))
+}
+
+#[test]
+fn what_was_touched_is_found_and_as_good_as_it_says() {
+    let truths = Plate::default().features();
+    let mut table = Table::default();
+    for seed in 1..=seeds() {
+        let features = found(seed);
+        let count = |kind: Kind| features.iter().filter(|feature| feature.kind == kind).count();
+        let counts = [Kind::Hole, Kind::Slot, Kind::Pocket, Kind::Boss].map(count);
+        assert_eq!(counts, [2, 1, 0, 1], "seed {seed}: holes, slots, pockets, bosses");
+        for (truth, kind) in truths.iter().filter_map(|truth| Some((truth, kind_of(truth)?))) {
+            compare(&mut table, truth, of_truth(truth, kind, &features));
+        }
+    }
+    table.print();
+    for row in &table.rows {
+        let (name, z) = (&row.name, rms(row.normalised()));
+        assert!(row.bound.is_none_or(|bound| row.worst() < bound), "{name} is off by {}", row.worst());
+        // few errors tell a standard deviation no better than χ² says; a floor was felt in few seeds
+        let count = row.errors.len();
+        let [low, high] = if count < 50 { told_by(count) } else { [1.0; 2] };
+        assert!((0.5 * low..=2.0 * high).contains(&z), "{name}: rms of error over uncertainty {z}");
+    }
+    let all = rms(table.rows.iter().flat_map(Row::normalised));
+    println!("all: {all:.2}; wrongly through or blind: {} of {} holes", table.wrongly_through, 2 * seeds());
+    assert!((0.5..=2.0).contains(&all), "rms of error over uncertainty {all}");
+    // where no floor was felt it is not known
+    assert_eq!(table.wrongly_through, 0);
+}

@@ -1,0 +1,3 @@
+mod mesh_files;
+mod pipeline;
+mod recordings;

@@ -1,0 +1,340 @@
+//! The patch beside the haptic update: the same skin as all at once, sound at every moment, whatever the machine does.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use nalgebra::Point3;
+use touchup::live::{LiveRefiner, Pace};
+use touchup::mesh::{FaceId, FaceTree, TriMesh, VertexId};
+use touchup::patch::{PatchDelta, Patcher, PatcherParams, Splice};
+use touchup::refine::{RefineParams, Refiner, TipParams};
+use touchup::sim::StylusParams;
+use touchup::touch::{ProbedPoint, Sample};
+
+use crate::plate_stream::{PlateStream, plate_stream};
+use crate::soundness::{intersections, rim_length, soundness};
+
+/// Parts of the patch that are taken up at one sample.
+const AT_ONCE: usize = 40;
+/// The same on every machine.
+const PATIENT: Pace = Pace { every_ns: 8_000_000, after_ns: 10_000_000, is_patient: true };
+/// Time between renewals, ns.
+const EVERY: i64 = 10_000_000;
+
+fn stream(seed: u64, share: f64) -> PlateStream {
+    let (mut stream, _) = plate_stream(&StylusParams::default(), seed);
+    stream.samples.truncate((stream.samples.len() as f64 * share) as usize);
+    stream
+}
+
+/// The last share of a stream: short strokes in holes and slots.
+fn last_strokes(seed: u64, share: f64) -> PlateStream {
+    let (mut stream, _) = plate_stream(&StylusParams::default(), seed);
+    stream.samples.drain(..(stream.samples.len() as f64 * (1.0 - share)) as usize);
+    stream
+}
+
+fn patcher(stream: &PlateStream) -> Patcher {
+    let StylusParams { radius, stiffness, .. } = StylusParams::default();
+    Patcher::new(PatcherParams::new(radius, Some(stiffness), stream.noise)).unwrap()
+}
+
+fn refiner(scan: &TriMesh) -> Refiner {
+    let StylusParams { radius, stiffness, .. } = StylusParams::default();
+    Refiner::new(scan.clone(), RefineParams::robust(TipParams { radius, stiffness: Some(stiffness) })).unwrap()
+}
+
+/// Calls `each` with the change of each renewal, and at the end once more for what is left.
+fn renew(stream: &PlateStream, patcher: &mut Patcher, tree: &FaceTree, mut each: impl FnMut(PatchDelta)) {
+    let mut slot = None;
+    for sample in &stream.samples {
+        let here = sample.stamp_ns.div_euclid(EVERY);
+        if slot.replace(here).is_some_and(|before| here > before) {
+            each(patcher.renewed(&stream.scan, tree));
+        }
+        patcher.push(sample);
+    }
+    patcher.flush();
+    for _ in 0..2 {
+        each(patcher.renewed(&stream.scan, tree));
+    }
+}
+
+/// Distances of all corners of faces of one mesh from another, m, in order of size.
+fn distances(from: &TriMesh, to: &TriMesh) -> Vec<f64> {
+    let tree = FaceTree::new(to);
+    let corners = from.faces().flat_map(|(_, corners)| corners);
+    let mut distances: Vec<f64> =
+        corners.map(|v| tree.closest(to, &from.position(v), f64::INFINITY).unwrap().distance_squared.sqrt()).collect();
+    distances.sort_unstable_by(f64::total_cmp);
+    distances
+}
+
+#[test]
+fn renewed_bit_by_bit_it_is_the_skin_of_all_at_once_and_sound_all_along() {
+    let stream = stream(1, 0.25);
+    let (scan, tree) = (&stream.scan, FaceTree::new(&stream.scan));
+    let mut patcher = patcher(&stream);
+    let (mut mesh, mut mesh_tree, mut splice) = (scan.clone(), FaceTree::new(scan), Splice::default());
+    let was = soundness(scan);
+    let mut renewals = 0;
+    renew(&stream, &mut patcher, &tree, |delta| {
+        splice.apply(&delta, &mut mesh, &mut mesh_tree).unwrap();
+        renewals += 1;
+        if renewals % 200 == 0 {
+            let is = soundness(&mesh);
+            assert!(is.bad_edges <= was.bad_edges, "{} bad edges after {renewals} renewals", is.bad_edges);
+            let is_new = |face| !scan.has_face(face) || scan.corners(face) != mesh.corners(face);
+            assert_eq!(intersections(&mesh, 1e-3, is_new), Vec::<[FaceId; 2]>::new(), "after {renewals} renewals");
+        }
+    });
+    let whole = patcher.patched(scan, &tree).unwrap().mesh;
+    let faces = [&mesh, &whole].map(|mesh| mesh.face_count() as f64);
+    println!("{renewals} renewals, {faces:?} faces bit by bit and at once");
+    assert!((faces[0] / faces[1] - 1.0).abs() < 0.01);
+    for (name, distances) in [("there", distances(&mesh, &whole)), ("back", distances(&whole, &mesh))] {
+        let at = |share: f64| distances[((distances.len() - 1) as f64 * share) as usize] * 1e3;
+        println!("{name}: median {:.1e}, 95 % {:.1e}, 99 % {:.1e} mm", at(0.5), at(0.95), at(0.99));
+        assert!(at(0.5) < 0.002 && at(0.95) < 0.01 && at(0.99) < 0.1);
+    }
+    let rims = [&mesh, &whole].map(|mesh| rim_length(mesh, &soundness(mesh).rims) * 1e3);
+    println!("rims {rims:.1?} mm");
+    assert!((rims[0] - rims[1]).abs() < 3.0);
+    // the tree followed
+    let anew = FaceTree::new(&mesh);
+    for corner in whole.positions().iter().step_by(7) {
+        let x = corner + nalgebra::Vector3::new(0.3e-3, -0.2e-3, 0.4e-3);
+        let [a, b] = [&mesh_tree, &anew].map(|tree| tree.closest(&mesh, &x, 1.0).unwrap().distance_squared);
+        assert_eq!(a, b);
+    }
+    // and what no touch came near stayed
+    for (face, corners) in
+        scan.faces().filter(|(face, _)| whole.has_face(*face) && whole.corners(*face) == scan.corners(*face))
+    {
+        assert_eq!(mesh.corners(face), corners);
+    }
+}
+
+/// The same by hand, on one thread.
+fn one_after_the_other(stream: &PlateStream, pace: Pace) -> (TriMesh, TriMesh) {
+    let tree = FaceTree::new(&stream.scan);
+    let (mut patcher, mut refiner) = (patcher(stream), refiner(&stream.scan));
+    refiner.expect_patch(0).unwrap();
+    let mut due: VecDeque<(i64, PatchDelta)> = VecDeque::new();
+    let (mut slot, mut at_hand) = (None, None::<PatchDelta>);
+    for sample in &stream.samples {
+        refiner.push(sample).unwrap();
+        let here = sample.stamp_ns.div_euclid(pace.every_ns);
+        if slot.replace(here).is_some_and(|before| here > before) {
+            due.push_back((here * pace.every_ns + pace.after_ns, patcher.renewed(&stream.scan, &tree)));
+        }
+        patcher.push(sample);
+        if at_hand.is_none() && due.front().is_some_and(|(due_ns, _)| *due_ns <= sample.stamp_ns) {
+            at_hand = due.pop_front().map(|(_, delta)| delta);
+            at_hand.iter().for_each(|delta| refiner.begin_to_follow(delta));
+        }
+        if at_hand.as_ref().is_some_and(|delta| refiner.go_on_following(delta, AT_ONCE).unwrap()) {
+            at_hand = None;
+        }
+    }
+    let touching = refiner.mesh().clone();
+    at_hand.iter().for_each(|delta| assert!(refiner.go_on_following(delta, usize::MAX).unwrap()));
+    due.into_iter().for_each(|(_, delta)| refiner.follow(&delta).unwrap());
+    refiner.follow(&patcher.renewed(&stream.scan, &tree)).unwrap();
+    patcher.flush();
+    for _ in 0..2 {
+        refiner.follow(&patcher.renewed(&stream.scan, &tree)).unwrap();
+    }
+    (touching, refiner.into_mesh())
+}
+
+fn assert_same(a: &TriMesh, b: &TriMesh) {
+    assert_eq!(a.positions(), b.positions());
+    assert!(a.faces().eq(b.faces()));
+}
+
+#[test]
+fn two_threads_do_what_one_does_and_leave_the_scan_where_it_was() {
+    let stream = stream(2, 0.1);
+    let pace = PATIENT;
+    let (touching, at_the_end) = one_after_the_other(&stream, pace);
+    let scan = Arc::new((stream.scan.clone(), FaceTree::new(&stream.scan)));
+    let mut live = LiveRefiner::new(scan, refiner(&stream.scan), patcher(&stream), pace, 1000).unwrap();
+    stream.samples.iter().for_each(|sample| assert!(live.push(sample).is_ok()));
+    assert_same(live.refiner().mesh(), &touching);
+    let moved = |mesh: &TriMesh| {
+        (0..stream.scan.vertex_slots() as u32)
+            .filter(|&v| mesh.position(VertexId(v)) != stream.scan.position(VertexId(v)))
+            .count()
+    };
+    println!("{} vertices of the scan moved for the moment", moved(&touching));
+    let (refiner, _) = live.finish().unwrap();
+    assert_same(refiner.mesh(), &at_the_end);
+    assert_eq!(moved(refiner.mesh()), 0);
+}
+
+/// Samples come as fast as they can, and the patch cannot keep up: it is renewed more rarely, and what is known at the end is
+/// the same.
+#[test]
+fn a_late_patch_holds_no_sample_up_and_changes_nothing_of_the_result() {
+    let stream = stream(5, 0.1);
+    let scan = Arc::new((stream.scan.clone(), FaceTree::new(&stream.scan)));
+    let renewals = [true, false].map(|is_patient| {
+        let pace = Pace { is_patient, ..PATIENT };
+        let mut live =
+            LiveRefiner::new(Arc::clone(&scan), refiner(&stream.scan), patcher(&stream), pace, 1000).unwrap();
+        stream.samples.iter().for_each(|sample| assert!(live.push(sample).is_ok()));
+        let renewals = live.counts().renewals;
+        let (_, mut told) = live.finish().unwrap();
+        told.flush();
+        let mut all_at_once = patcher(&stream);
+        stream.samples.iter().for_each(|sample| all_at_once.push(sample));
+        all_at_once.flush();
+        assert!(whole(&stream, &told) == whole(&stream, &all_at_once));
+        renewals
+    });
+    println!("renewals: {renewals:?}");
+    assert!(0 < renewals[1] && renewals[1] < renewals[0]);
+}
+
+/// A touch counts at once for the haptic update, and within 50 ms for the patch.
+#[test]
+fn a_touch_moves_the_mesh_at_once_and_is_in_the_patch_within_50_ms() {
+    let p = |x: f64, y: f64| Point3::new(x * 2.5e-3, y * 2.5e-3, 0.0);
+    let side = 17;
+    let positions = (0..side * side).map(|i| p(f64::from(i % side), f64::from(i / side))).collect();
+    let cells = (0..side - 1).flat_map(|x| (0..side - 1).map(move |y| (x + side * y) as u32));
+    let side = side as u32;
+    let faces = cells.flat_map(|a| [[a, a + 1, a + side + 1], [a, a + side + 1, a + side]]).collect();
+    let scan = TriMesh::new(positions, faces).unwrap();
+    // the real surface is 0.3 mm lower; a ball of 1.5 mm slides over it in lines
+    let sample = |i: i64| {
+        let (line, along) = ((i / 600) as f64, (i % 600) as f64 * 0.025e-3);
+        let x = if line % 2.0 == 0.0 { 12.5e-3 + along } else { 27.5e-3 - along };
+        let pose_ot = nalgebra::Isometry3::translation(x, 15e-3 + 0.7e-3 * line, 1.2e-3);
+        let force = nalgebra::Vector3::new(0.0, 0.0, 2.0);
+        Sample {
+            stamp_ns: i * 1_000_000,
+            pose_ot,
+            wrench: touchup::touch::Wrench { force, torque: nalgebra::Vector3::zeros() },
+        }
+    };
+    let tip = TipParams { radius: 1.5e-3, stiffness: None };
+    let refiner = Refiner::new(scan.clone(), RefineParams::robust(tip)).unwrap();
+    let patcher = Patcher::new(PatcherParams::new(tip.radius, None, 0.3e-3)).unwrap();
+    let both = Arc::new((scan.clone(), FaceTree::new(&scan)));
+    let mut live = LiveRefiner::new(both, refiner, patcher, PATIENT, 1000).unwrap();
+    let (mut at_once, mut late) = (0, 0);
+    for i in 0..6000 {
+        let before = live.refiner().closest_face(&(sample(i).pose_ot.translation.vector.into()), 1.0).unwrap();
+        live.push(&sample(i)).unwrap();
+        let after = live.refiner().closest_face(&(sample(i).pose_ot.translation.vector.into()), 1.0).unwrap();
+        at_once += i32::from(i < 100 && after.distance_squared > before.distance_squared);
+        // once a patch is there at all, which takes some touches, it follows
+        if i > 2000 {
+            let then = Point3::from(sample(i - 50).pose_ot.translation.vector);
+            let found = live.refiner().closest_face(&then, 1.0).unwrap();
+            late += i32::from((found.distance_squared.sqrt() - 1.5e-3).abs() > 0.05e-3);
+        }
+    }
+    println!("moved at once {at_once} of 100, farther than 0.05 mm after 50 ms {late} of 4000");
+    assert!(at_once > 50 && late < 40);
+}
+
+/// Triangles by the positions of their corners, in order, whatever their ids.
+fn triangles(mesh: &TriMesh) -> Vec<[[u64; 3]; 3]> {
+    let mut triangles: Vec<_> = mesh
+        .faces()
+        .map(|(face, _)| {
+            let mut corners = mesh.triangle(face).map(|p| [p.x, p.y, p.z].map(f64::to_bits));
+            let first = (0..3).min_by_key(|&i| corners[i]).unwrap();
+            corners.rotate_left(first);
+            corners
+        })
+        .collect();
+    triangles.sort_unstable();
+    triangles
+}
+
+/// What the patcher makes of all that counts now, to the last bit: triangles, and how well vertices are known; and the
+/// touches of which features are measured.
+fn whole(stream: &PlateStream, patcher: &Patcher) -> (Vec<[[u64; 3]; 3]>, Vec<u64>, Vec<ProbedPoint>) {
+    let patched = patcher.clone().patched(&stream.scan, &FaceTree::new(&stream.scan)).unwrap();
+    let sigma = patched.sigma.iter().map(|sigma| sigma.to_bits()).collect();
+    (triangles(&patched.mesh), sigma, patcher.probed().to_vec())
+}
+
+#[test]
+fn strokes_are_undone_and_redone_bit_for_bit() {
+    let stream = last_strokes(3, 0.2);
+    let mut patcher = patcher(&stream);
+    let mut again = patcher.clone();
+    // the samples with which a stroke begins to count …
+    let mut begun = Vec::new();
+    for (i, sample) in stream.samples.iter().enumerate() {
+        let strokes = patcher.strokes();
+        patcher.push(sample);
+        begun.extend((patcher.strokes() > strokes).then_some(i));
+    }
+    patcher.flush();
+    println!("{} strokes", begun.len());
+    assert!(begun.len() >= 3);
+    // … and what was known just before each of them, and at the end
+    let mut states = Vec::new();
+    for (i, sample) in stream.samples.iter().enumerate() {
+        if begun.contains(&i) {
+            states.push(whole(&stream, &again));
+        }
+        again.push(sample);
+    }
+    again.flush();
+    states.push(whole(&stream, &again));
+    assert!(states.windows(2).all(|pair| pair[0].2.len() < pair[1].2.len()), "each stroke has touches of its own");
+    for expected in states.iter().rev().skip(1) {
+        assert!(patcher.undo());
+        assert!(whole(&stream, &patcher) == *expected);
+    }
+    assert!(!patcher.undo(), "nothing is left");
+    for expected in &states[1..] {
+        assert!(patcher.redo());
+        assert!(whole(&stream, &patcher) == *expected);
+    }
+    assert!(!patcher.redo());
+}
+
+#[test]
+fn undoing_while_touching_brings_the_mesh_back() {
+    let stream = last_strokes(4, 0.15);
+    let scan = Arc::new((stream.scan.clone(), FaceTree::new(&stream.scan)));
+    let mut live = LiveRefiner::new(scan, refiner(&stream.scan), patcher(&stream), Pace::default(), 1000).unwrap();
+    // the same without the last stroke: what came before it
+    let mut before = patcher(&stream);
+    let mut counted = patcher(&stream);
+    let mut last_stroke = 0;
+    for (i, sample) in stream.samples.iter().enumerate() {
+        let strokes = counted.strokes();
+        counted.push(sample);
+        if counted.strokes() > strokes {
+            last_stroke = i;
+        }
+        live.push(sample).unwrap();
+    }
+    assert!(last_stroke > 1000);
+    live.catch_up().unwrap();
+    assert!(live.is_whole());
+    let touched = triangles(live.refiner().mesh());
+    assert!(live.undo().unwrap());
+    let undone = triangles(live.refiner().mesh());
+    assert!(live.redo().unwrap());
+    let redone = triangles(live.refiner().mesh());
+    assert!(undone != touched && undone != redone);
+    // what was undone is what all strokes but the last make at once …
+    stream.samples[..last_stroke].iter().for_each(|sample| before.push(sample));
+    before.flush();
+    let (mesh, anew) = (live.refiner().mesh().clone(), live.finish().unwrap().1);
+    assert!(redone == triangles(&mesh));
+    assert!(redone == whole(&stream, &anew).0, "and redone what all of them make");
+    let close = |a: usize, b: usize| (a as f64 / b as f64 - 1.0).abs() < 0.01;
+    assert!(close(undone.len(), whole(&stream, &before).0.len()));
+    assert!(close(touched.len(), redone.len()));
+}

@@ -1,0 +1,37 @@
+//! All tests that need no device: one module a room, linked once.
+
+#[path = "../common/mod.rs"]
+mod common;
+#[path = "../common/plate_stream.rs"]
+mod plate_stream;
+#[path = "../common/shapes.rs"]
+mod shapes;
+#[path = "../common/shared.rs"]
+mod shared;
+#[path = "../common/soundness.rs"]
+mod soundness;
+
+mod align;
+mod allocation;
+mod allocations;
+mod calibrate;
+mod cli;
+mod compare;
+mod explore;
+mod features;
+mod io;
+mod layers;
+mod live;
+mod mesh;
+#[cfg(any(feature = "ros", feature = "r2r"))]
+mod node;
+mod patch;
+mod probe;
+mod refine;
+mod report;
+mod robot;
+#[cfg(feature = "ros")]
+mod ros;
+mod scene;
+mod sim;
+mod touch;

@@ -1,0 +1,3 @@
+mod edit;
+mod journal;
+mod queries;

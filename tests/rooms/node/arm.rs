@@ -1,0 +1,379 @@
+//! The node with an arm, without any network: flagged, probed, shown, cancelled, refused.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::time::{Duration, Instant};
+
+use nalgebra::Isometry3;
+use tempfile::TempDir;
+use touchup::io::mesh_file::{MeshUnit, write_mesh};
+use touchup::robot::{Arm, ArmError, ArmState, Command, Safety};
+use touchup::ros::in_process::{World, start};
+use touchup::ros::messages::{
+    Feature, FlagFeatureRequest, Header, Point, PointStamped, ProbeFeatureRequest, ProbeGoal, ProbeResponse,
+    ProbeResult, ProbeSettings, SetBoolRequest,
+};
+use touchup::ros::node::{ArmKind, ArmOfNode, INBOX, Node, NodeEnd, Prepared};
+use touchup::ros::parameters::{ParameterValue, Parameters};
+use touchup::ros::port::{Arrival, Call, Feedback, Goal, GoalEnd, Publication, Reply};
+use touchup::sim::{ArmParams, Plate, ScannerParams, SimArm, scan};
+
+struct Cell {
+    node: Node,
+    world: World,
+    published: Vec<Publication>,
+    _folder: TempDir,
+}
+
+impl Cell {
+    /// The plate of the demo, its scan, a simulated arm.
+    fn start(may_move: bool) -> Self {
+        Self::with(may_move, ArmKind::Sim(Box::new(Plate::default().mesh(1e-5).unwrap())))
+    }
+
+    fn with(may_move: bool, kind: ArmKind) -> Self {
+        let (folder, plate) = (tempfile::tempdir().unwrap(), Plate::default());
+        let path = |name: &str| folder.path().join(name);
+        let scanned = scan(&plate, &ScannerParams::default()).unwrap();
+        write_mesh(&path("scan.ply"), &scanned, MeshUnit::Millimetre).unwrap();
+        std::fs::write(path("scene.yaml"), include_str!("../../../config/probe.yaml")).unwrap();
+        let mut parameters = Parameters::default();
+        let text = |value: &std::path::Path| ParameterValue::String(value.to_str().unwrap().to_owned());
+        parameters.set("scene", &text(&path("scene.yaml"))).unwrap();
+        parameters.set("session_folder", &text(&path("sessions"))).unwrap();
+        parameters.set("source", &ParameterValue::String("probe".to_owned())).unwrap();
+        parameters.set("allow_motion", &ParameterValue::Bool(may_move)).unwrap();
+        let (inbox, arrivals) = sync_channel(INBOX);
+        let (port, world) = start(inbox);
+        let arm = ArmOfNode { kind, samples: Box::new(world.clone()) };
+        // the time of ROS goes on
+        let (clock, begun) = (world.clone(), Instant::now());
+        std::thread::spawn(move || {
+            while begun.elapsed() < Duration::from_secs(600) {
+                clock.set_now_ns(1_000_000_000_000 + begun.elapsed().as_nanos() as i64);
+                std::thread::sleep(Duration::from_millis(1));
+            }
+        });
+        let node = Prepared::new(parameters).unwrap().start(port, arrivals, Some(arm)).unwrap();
+        let cell = Self { node, world, published: Vec::new(), _folder: folder };
+        let deadline = Instant::now() + Duration::from_secs(20);
+        while !cell.state().0 {
+            assert!(Instant::now() < deadline, "{}", cell.state().1);
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        cell
+    }
+
+    fn state(&self) -> (bool, String) {
+        let answer = self.world.call(Call::ArmState).recv().unwrap();
+        (answer.success, answer.message)
+    }
+
+    /// Of the tip over the object's origin, mm.
+    fn height(&self) -> f64 {
+        let state = self.state().1;
+        let numbers: Vec<f64> = state.split([' ', '(', ')']).filter_map(|word| word.parse().ok()).collect();
+        *numbers.last().unwrap()
+    }
+
+    fn flag(&self, kind: u8, [x, y, z]: [f64; 3]) -> u32 {
+        let header = Header { frame_id: "object".to_owned(), ..Header::default() };
+        let request = FlagFeatureRequest {
+            kind,
+            point: PointStamped { header, point: Point { x: x / 1e3, y: y / 1e3, z: z / 1e3 } },
+            search_radius: 3e-3,
+        };
+        let answer = self.world.call(|reply| Call::Flag(request, reply)).recv().unwrap();
+        assert!(answer.success, "{}", answer.message);
+        answer.id
+    }
+
+    fn probe(&self, id: u32, settings: ProbeSettings) -> ProbeResult {
+        let request = ProbeFeatureRequest { id, settings };
+        self.world.call(|reply| Call::ProbeFeature(request, reply)).recv().unwrap().result
+    }
+
+    /// Sends a goal; its feedback is counted.
+    fn goal(&self, ids: &[u32]) -> (Arc<AtomicBool>, Arc<AtomicU32>, Receiver<(GoalEnd, ProbeResponse)>) {
+        let (to, result) = sync_channel(1);
+        let (cancel, touches) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU32::new(0)));
+        let seen = Arc::clone(&touches);
+        let goal = Goal {
+            accept: Reply::new(|accepted: bool| assert!(accepted)),
+            feedback: Feedback(Box::new(move |feedback| seen.store(feedback.touch, Ordering::Release))),
+            result: Reply::new(move |ended| drop(to.send(ended))),
+            is_cancelled: Arc::clone(&cancel),
+        };
+        let asked = ProbeGoal { ids: ids.to_vec(), settings: ProbeSettings::default() };
+        assert!(self.world.arrive_patiently(Arrival::Call(Call::Probe(asked, goal))));
+        (cancel, touches, result)
+    }
+
+    fn end(mut self) -> (NodeEnd, Vec<Publication>) {
+        self.world.arrive_patiently(Arrival::Shutdown);
+        let end = self.node.join().unwrap();
+        self.published.extend(self.world.published());
+        (end, self.published)
+    }
+}
+
+/// Of a plane one raster: planned, made, and told.
+#[test]
+fn what_was_found_is_slid_over_where_that_is_asked_for() {
+    let cell = Cell::start(true);
+    let id = cell.flag(Feature::KIND_PLANE, [45.0, 9.0, 12.0]);
+    let slide = ProbeSettings { pattern: ProbeSettings::PATTERN_SLIDE, ..ProbeSettings::default() };
+    let planned = cell.probe(id, ProbeSettings { dry_run: true, ..slide.clone() });
+    assert!(planned.code == ProbeResult::PLANNED && planned.message.contains("and 1 slides"), "{}", planned.message);
+    let result = cell.probe(id, slide);
+    assert_eq!(result.code, ProbeResult::TOLERANCE_REACHED, "{}", result.message);
+    assert!(result.message.ends_with("1 of 1 slides arrived"), "{}", result.message);
+    // to and fro over a disc with a radius of 3 mm, 1.5 mm apart, at 10 mm/s
+    assert!(result.duration > 2.0 && result.max_force < 4.5, "{} s, {} N", result.duration, result.max_force);
+    cell.end();
+}
+
+/// The through hole of the plate, Ø 8 mm at (16, 36, 12), of which the scan shows nothing; the mesh follows by the topics.
+#[test]
+fn a_flagged_hole_is_probed_and_shown() {
+    let cell = Cell::start(true);
+    let id = cell.flag(Feature::KIND_HOLE, [17.5, 34.8, 12.0]);
+    let planned = cell.probe(id, ProbeSettings { dry_run: true, ..ProbeSettings::default() });
+    assert_eq!(planned.code, ProbeResult::PLANNED, "{}", planned.message);
+    let result = cell.probe(id, ProbeSettings::default());
+    assert_eq!(result.code, ProbeResult::TOLERANCE_REACHED, "{}", result.message);
+    let hole = &result.feature;
+    assert_eq!((hole.id, hole.kind, hole.status), (id, Feature::KIND_HOLE, Feature::STATUS_PROBED));
+    let off = (hole.center.x - 16e-3).hypot(hole.center.y - 36e-3);
+    println!(
+        "{} touches, {:.0} s, {:.1} N, place {:.1} um, diameter {:+.1} um",
+        result.touches.len(),
+        result.duration,
+        result.max_force,
+        off * 1e6,
+        (hole.diameter - 8e-3) * 1e6
+    );
+    assert!(off < 50e-6 && (hole.diameter - 8e-3).abs() < 50e-6);
+    assert!(result.touches.len() < 40 && result.max_force < 4.5);
+    let felt = result.touches.iter().filter(|touch| touch.contact.x.is_finite());
+    assert!(felt.clone().count() > 8 && felt.clone().all(|touch| !touch.curve_force.is_empty()));
+    // a touch of the wall lies on it: 4 mm from the axis
+    let wall = felt.filter(|touch| touch.approach.z.abs() < 0.5);
+    assert!(wall.clone().count() >= 8);
+    let far = |touch: &touchup::ros::messages::ProbeTouch| (touch.contact.x - 16e-3).hypot(touch.contact.y - 36e-3);
+    assert!(wall.clone().all(|touch| (far(touch) - 4e-3).abs() < 0.3e-3), "{:?}", wall.map(far).collect::<Vec<_>>());
+
+    let (end, published) = cell.end();
+    assert!(end.report.accepted > 5000, "{:?}", end.report);
+    let last = published.iter().rev().find_map(|publication| match publication {
+        Publication::Features(features) => features.features.iter().find(|feature| feature.id == id).cloned(),
+        _ => None,
+    });
+    assert_eq!(last.unwrap().status, Feature::STATUS_PROBED);
+    assert!(
+        published.iter().any(|publication| matches!(publication, Publication::Path(path) if path.poses.len() > 10))
+    );
+}
+
+#[test]
+fn a_cancelled_goal_stops_and_retracts_and_the_node_goes_on() {
+    let cell = Cell::start(true);
+    let ids = [cell.flag(Feature::KIND_HOLE, [16.5, 36.0, 12.0]), cell.flag(Feature::KIND_HOLE, [32.0, 34.5, 12.0])];
+    let (cancel, touch, result) = cell.goal(&ids);
+    while touch.load(Ordering::Acquire) < 3 {
+        assert!(result.try_recv().is_err());
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let busy = cell.probe(ids[1], ProbeSettings::default());
+    assert_eq!(busy.code, ProbeResult::BUSY, "{}", busy.message);
+    cancel.store(true, Ordering::Release);
+    let (end, response) = result.recv_timeout(Duration::from_secs(20)).unwrap();
+    assert_eq!((end, response.code), (GoalEnd::Canceled, ProbeResult::CANCELLED), "{}", response.message);
+    assert_eq!(response.results.len(), 1, "the other is not begun");
+    let (can_move, state) = cell.state();
+    assert!(can_move, "{state}");
+    assert!(cell.height() > 14.0, "it retracted: {state}");
+    cell.end();
+}
+
+#[test]
+fn orders_that_must_not_be_are_refused_and_nothing_moves() {
+    let cell = Cell::start(false);
+    let id = cell.flag(Feature::KIND_HOLE, [16.5, 36.0, 12.0]);
+    let at = cell.state().1;
+    let refused = |id: u32, settings: ProbeSettings| cell.probe(id, settings).code;
+    assert_eq!(refused(id, ProbeSettings::default()), ProbeResult::MOTION_NOT_ALLOWED);
+    assert_eq!(refused(id + 100, ProbeSettings::default()), ProbeResult::NO_SUCH_FEATURE);
+    for bad in [
+        ProbeSettings { max_force: 1e3, ..ProbeSettings::default() },
+        ProbeSettings { max_force: -1.0, ..ProbeSettings::default() },
+        ProbeSettings { max_link_speed: f64::NAN, ..ProbeSettings::default() },
+        ProbeSettings { quantity: ProbeSettings::QUANTITY_WIDTH, ..ProbeSettings::default() },
+        ProbeSettings { quantity: 77, ..ProbeSettings::default() },
+        ProbeSettings { max_touches: 1000, ..ProbeSettings::default() },
+        ProbeSettings { tolerance: -1.0, ..ProbeSettings::default() },
+        ProbeSettings { confidence: 2.0, ..ProbeSettings::default() },
+    ] {
+        let result = cell.probe(id, bad.clone());
+        assert_eq!(result.code, ProbeResult::BAD_REQUEST, "{bad:?}: {}", result.message);
+    }
+    let all = cell.world.call(Call::ProbeAll).recv().unwrap();
+    assert!(!all.success && all.message.contains("allow_motion"), "{}", all.message);
+    assert!(cell.world.call(Call::Recover).recv().unwrap().success);
+    let numbers =
+        |told: &str| -> Vec<f64> { told.split([' ', '(', ')']).filter_map(|word| word.parse().ok()).collect() };
+    let (before, after) = (numbers(&at), numbers(&cell.state().1));
+    assert_eq!((before.len(), after.len()), (3, 3), "{at}");
+    assert!(before.iter().zip(&after).all(|(a, b)| (a - b).abs() < 0.2), "it moved: {before:?} {after:?}");
+    cell.end();
+}
+
+/// A pause, and motion that is no longer allowed, end what moves; it goes on only when asked anew.
+#[test]
+fn a_pause_and_the_leave_that_is_taken_away_stop_and_retract() {
+    let cell = Cell::start(true);
+    let id = cell.flag(Feature::KIND_HOLE, [16.5, 36.0, 12.0]);
+    let pause = |data| cell.world.call(|reply| Call::Pause(SetBoolRequest { data }, reply)).recv().unwrap();
+    let allow = |may: bool| {
+        let set = |reply| Arrival::SetParameter("allow_motion".to_owned(), ParameterValue::Bool(may), reply);
+        cell.world.ask(set).recv().unwrap().unwrap();
+    };
+    for (stop, why, code) in [
+        (&(|| drop(pause(true))) as &dyn Fn(), "the node is paused", ProbeResult::PAUSED),
+        (&|| allow(false), "allow_motion is off", ProbeResult::MOTION_NOT_ALLOWED),
+    ] {
+        let (_, touch, result) = cell.goal(&[id]);
+        while touch.load(Ordering::Acquire) < 3 {
+            assert!(result.try_recv().is_err());
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        stop();
+        let (end, response) = result.recv_timeout(Duration::from_secs(20)).unwrap();
+        // no client cancelled it
+        assert_eq!((end, response.code), (GoalEnd::Aborted, ProbeResult::CANCELLED), "{}", response.message);
+        assert!(response.message.contains(why), "{}", response.message);
+        assert!(cell.height() > 14.0, "it retracted: {}", cell.state().1);
+        assert_eq!(cell.probe(id, ProbeSettings::default()).code, code);
+        let all = cell.world.call(Call::ProbeAll).recv().unwrap();
+        assert!(!all.success, "{}", all.message);
+        pause(false);
+        allow(true);
+    }
+    cell.end();
+}
+
+/// An arm that stops by itself, also when nobody moved it, stands until somebody has looked and says so.
+#[test]
+fn a_stop_stands_until_it_is_recovered() {
+    let stop = Arc::new(AtomicU32::new(0));
+    let cell = Cell::with(true, ArmKind::Real(Box::new(Stopping::new(Arc::clone(&stop)))));
+    let id = cell.flag(Feature::KIND_HOLE, [16.5, 36.0, 12.0]);
+    let (_, touch, result) = cell.goal(&[id]);
+    while touch.load(Ordering::Acquire) < 3 {
+        if let Ok((_, response)) = result.try_recv() {
+            panic!("{}", response.message);
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    stop.store(1, Ordering::Release);
+    let (end, response) = result.recv_timeout(Duration::from_secs(20)).unwrap();
+    assert_eq!((end, response.code), (GoalEnd::Aborted, ProbeResult::PROTECTIVE_STOP), "{}", response.message);
+    // somebody frees it at its panel, and does not say so
+    stop.store(2, Ordering::Release);
+    let ready = |wanted: bool| {
+        let deadline = Instant::now() + Duration::from_secs(10);
+        while cell.state().0 != wanted {
+            assert!(Instant::now() < deadline, "{}", cell.state().1);
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    };
+    std::thread::sleep(Duration::from_millis(100));
+    let (can_move, why) = cell.state();
+    assert!(!can_move && why.contains("~/recover"), "{why}");
+    assert_eq!(cell.probe(id, ProbeSettings::default()).code, ProbeResult::ARM_NOT_READY);
+    assert!(cell.world.call(Call::Recover).recv().unwrap().success);
+    ready(true);
+    // the same when it stood still
+    stop.store(1, Ordering::Release);
+    ready(false);
+    stop.store(2, Ordering::Release);
+    std::thread::sleep(Duration::from_millis(100));
+    assert_eq!(cell.probe(id, ProbeSettings::default()).code, ProbeResult::ARM_NOT_READY);
+    assert!(cell.world.call(Call::Recover).recv().unwrap().success);
+    ready(true);
+    cell.end();
+}
+
+/// What is asked of the thread of an arm, and where the answer goes.
+type Asked = (Option<Command>, SyncSender<Result<(), ArmError>>);
+
+/// A simulated arm on a thread of its own, whose safety system says what it is told: 1 protective stop, else nothing.
+struct Stopping {
+    states: Receiver<ArmState>,
+    commands: SyncSender<Asked>,
+    stop: Arc<AtomicU32>,
+}
+
+impl Stopping {
+    fn new(stop: Arc<AtomicU32>) -> Self {
+        let (to, states) = sync_channel(1);
+        let (commands, told) = sync_channel::<Asked>(1);
+        std::thread::spawn(move || {
+            let (plate, params) = (Plate::default(), ArmParams::default());
+            let start = params.pose_bo * Isometry3::translation(30e-3, 25e-3, 52e-3);
+            let mut arm = SimArm::new(&plate, params, &start).unwrap();
+            loop {
+                while let Ok((command, done)) = told.try_recv() {
+                    // without a command the sensor is zeroed
+                    let answer = match command {
+                        Some(command) => arm.command(&command),
+                        None => arm.zero_sensor(),
+                    };
+                    let _ = done.send(answer);
+                }
+                let Ok(state) = arm.next_state() else { return };
+                std::thread::sleep(Duration::from_millis(1));
+                if to.send(state).is_err() {
+                    return;
+                }
+            }
+        });
+        Self { states, commands, stop }
+    }
+
+    fn ask(&self, command: Option<Command>) -> Result<(), ArmError> {
+        let (done, answer) = sync_channel(1);
+        self.commands.send((command, done)).unwrap();
+        // its thread may wait to hand over a state
+        let _ = self.states.try_recv();
+        let answered = answer.recv().unwrap();
+        // and the one that waits may be from before
+        let _ = self.states.try_recv();
+        answered
+    }
+}
+
+impl Arm for Stopping {
+    fn next_state(&mut self) -> Result<ArmState, ArmError> {
+        let state = self.states.recv().unwrap();
+        let is_stopped = self.stop.load(Ordering::Acquire) == 1;
+        Ok(ArmState { safety: if is_stopped { Safety::ProtectiveStop } else { state.safety }, ..state })
+    }
+
+    fn command(&mut self, command: &Command) -> Result<(), ArmError> {
+        self.ask(Some(*command))
+    }
+
+    fn zero_sensor(&mut self) -> Result<(), ArmError> {
+        self.ask(None)
+    }
+
+    fn recover(&mut self) -> Result<(), ArmError> {
+        Ok(())
+    }
+
+    fn period(&self) -> f64 {
+        2e-3
+    }
+}

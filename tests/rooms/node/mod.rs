@@ -1,0 +1,2 @@
+mod arm;
+mod samples;

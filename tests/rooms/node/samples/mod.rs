@@ -1,0 +1,584 @@
+//! The node without any network: what it makes of what arrives, in whatever order, and what others see of it.
+
+mod bench;
+mod follower;
+
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
+
+use bench::{Bench, Plate, arrival, patches, pose, read, refine, seen_from, transform, wrench};
+use follower::Follower;
+use nalgebra::{Isometry3, Vector3};
+use rand::{Rng, RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use touchup::io::recording::{RecordingReader, Topics};
+use touchup::ros::clock::steady_ns;
+use touchup::ros::messages::{
+    DetectFeaturesRequest, Feature, FlagFeatureRequest, Header, Marker, Point, PointStamped, ProbeFeatureRequest,
+    ProbeResult, ResyncMeshRequest, SaveMeshRequest, SetBoolRequest, TFMessage, TransformStamped, UndoRequest,
+    UnflagFeatureRequest,
+};
+use touchup::ros::parameters::ParameterValue;
+use touchup::ros::port::{Arrival, Call, Publication};
+use touchup::touch::{Message, StampedPose};
+
+/// Poses and wrenches each in their order, mixed at random: one stream can be far ahead of the other.
+fn interleaved(messages: &[Message], seed: u64) -> Vec<Message> {
+    let is_pose = |message: &&Message| matches!(message, Message::Pose(_));
+    let (poses, wrenches): (Vec<&Message>, Vec<&Message>) = messages.iter().partition(is_pose);
+    let (mut poses, mut wrenches) = (poses.into_iter().peekable(), wrenches.into_iter().peekable());
+    let mut rng = Pcg64Mcg::seed_from_u64(seed);
+    let (mut mixed, mut left, mut is_pose) = (Vec::new(), 0u32, true);
+    while poses.peek().is_some() || wrenches.peek().is_some() {
+        if left == 0 {
+            (left, is_pose) = (rng.next_u32() % 400, !is_pose);
+            // neither gets further ahead than is held
+            if let (Some(pose), Some(wrench)) = (poses.peek(), wrenches.peek())
+                && (pose.stamp_ns() - wrench.stamp_ns()).abs() > 1_000_000_000
+            {
+                is_pose = pose.stamp_ns() < wrench.stamp_ns();
+            }
+        }
+        left = left.saturating_sub(1);
+        mixed.extend(if is_pose { poses.next() } else { wrenches.next() }.copied());
+        if poses.peek().is_none() || wrenches.peek().is_none() {
+            is_pose = wrenches.peek().is_none();
+        }
+    }
+    mixed
+}
+
+#[test]
+fn the_result_is_that_of_refine_byte_for_byte_however_messages_interleave() {
+    let plate = Plate::touched(0.3);
+    let expected = plate.refined("touch.mcap");
+    for seed in 0..3 {
+        let messages = if seed == 0 { plate.messages.clone() } else { interleaved(&plate.messages, seed) };
+        assert_eq!(messages.len(), plate.messages.len());
+        let bench = Bench::start(&plate);
+        bench.feed(&messages);
+        let (end, _) = bench.end();
+        assert_eq!(end.report.unrecorded, 0);
+        assert!(end.report.contacts > 0 && end.report.accepted > 1000);
+        assert!(read(&end.folder, "refined.ply") == expected, "interleaving {seed}");
+        // and what was recorded makes the same again
+        refine(&["--resume".as_ref(), end.folder.as_os_str(), "--out".as_ref(), plate.path("again.ply").as_os_str()]);
+        assert!(std::fs::read(plate.path("again.ply")).unwrap() == expected);
+    }
+}
+
+/// Features of the result, and the touches, are those of refine too.
+#[test]
+fn features_and_touches_are_written_beside_it() {
+    let plate = Plate::touched(0.1);
+    let bench = Bench::start(&plate);
+    bench.feed(&plate.messages);
+    let (end, _) = bench.end();
+    let [features, touches] = ["features.json", "touches.csv"].map(|name| read(&end.folder, name));
+    refine(&["--resume".as_ref(), end.folder.as_os_str()]);
+    assert!(read(&end.folder, "features.json") == features && read(&end.folder, "touches.csv") == touches);
+    let report: serde_json::Value = serde_json::from_slice(&read(&end.folder, "report.json")).unwrap();
+    assert_eq!(report["accepted"], end.report.accepted);
+}
+
+#[test]
+fn a_follower_that_loses_messages_ends_with_the_mesh() {
+    let plate = Plate::touched(0.15);
+    let mut bench = Bench::start(&plate);
+    let mut follower = Follower::default();
+    let mut rng = Pcg64Mcg::seed_from_u64(7);
+    let (mut seen, mut lost) = (0, 0);
+    let mut strict = Follower::of(&plate.scan);
+    let mut take = |bench: &mut Bench, is_lossy: bool, follower: &mut Follower, strict: &mut Follower| {
+        let told = patches(bench.published());
+        for (k, patch) in told.iter().enumerate().skip(seen) {
+            strict.take(patch);
+            // where they come late, all at once, some are lost all the same; never the last, whose loss nothing tells
+            if (is_lossy || lost < 5) && k + 1 < told.len() && rng.random_range(0..20) == 0 {
+                lost += 1;
+            } else {
+                follower.take(patch);
+            }
+        }
+        seen = told.len();
+        if std::mem::take(&mut follower.asks) {
+            let request = ResyncMeshRequest::default();
+            let answer = bench.world.call(|reply| Call::Resync(request, reply)).recv().unwrap();
+            if !answer.success {
+                assert!(answer.message.contains("ask again"), "{}", answer.message);
+                follower.asks = true;
+            }
+        }
+    };
+    for chunk in plate.messages.chunks(400) {
+        bench.feed(chunk);
+        std::thread::sleep(std::time::Duration::from_millis(10));
+        take(&mut bench, true, &mut follower, &mut strict);
+    }
+    // from here on nothing is lost: what is begun comes to its end
+    let deadline = std::time::Instant::now() + std::time::Duration::from_secs(60);
+    let mut quiet = 0;
+    while quiet < 30 {
+        let before = patches(bench.published()).len();
+        std::thread::sleep(std::time::Duration::from_millis(50));
+        take(&mut bench, false, &mut follower, &mut strict);
+        follower.tick();
+        let is_quiet = patches(bench.published()).len() == before && !follower.is_waiting();
+        quiet = if is_quiet { quiet + 1 } else { 0 };
+        assert!(std::time::Instant::now() < deadline, "the follower does not catch up");
+    }
+    assert!(lost > 0 && strict.version > 50, "{lost} lost, version {}", strict.version);
+    assert_eq!((&follower.session, follower.version), (&strict.session, strict.version));
+    assert!(follower.vertices == strict.vertices && follower.faces == strict.faces);
+    // the tiles show the same triangles
+    let mut tiles = BTreeMap::new();
+    for publication in bench.published() {
+        if let Publication::Tile(tile) = publication {
+            match tile.action {
+                Marker::DELETE => drop(tiles.remove(&tile.id)),
+                _ => drop(tiles.insert(tile.id, tile.clone())),
+            }
+        }
+    }
+    let mut drawn: Vec<_> = tiles.values().flat_map(|tile| tile.points.chunks(3)).map(triangle).collect();
+    let mut kept: Vec<_> = strict.faces.values().map(|corners| corners.map(|v| strict.vertices[&v])).collect();
+    drawn.sort_by(|a, b| a.partial_cmp(b).unwrap());
+    kept.sort_by(|a, b| a.partial_cmp(b).unwrap());
+    assert!(drawn == kept, "{} triangles drawn, {} there", drawn.len(), kept.len());
+    assert!(tiles.values().all(|tile| tile.points.len() <= 1500 && tile.colors.len() == tile.points.len()));
+    bench.end();
+}
+
+fn triangle(points: &[Point]) -> [[f32; 3]; 3] {
+    [0, 1, 2].map(|at| [points[at].x as f32, points[at].y as f32, points[at].z as f32])
+}
+
+#[test]
+fn what_cannot_be_is_refused_and_counted_and_the_rest_goes_on() {
+    let plate = Plate::touched(0.05);
+    let mut bench = Bench::start(&plate);
+    let is_pose = |message: &&Message| matches!(message, Message::Pose(_));
+    let some_pose = plate.messages.iter().find(is_pose).unwrap();
+    let some_wrench = plate.messages.iter().find(|message| !is_pose(message)).unwrap();
+    for (at, message) in plate.messages.iter().enumerate() {
+        if at % 100 == 50 {
+            let mut nan = pose(some_pose, "object");
+            nan.pose.position.x = f64::NAN;
+            let mut zero = pose(some_pose, "object");
+            zero.pose.orientation = touchup::ros::messages::Quaternion { x: 0.0, y: 0.0, z: 0.0, w: 0.0 };
+            let mut no_time = wrench(some_wrench, "stylus");
+            no_time.header.stamp.sec = -5;
+            let mut far = wrench(some_wrench, "stylus");
+            far.wrench.force.z = 1e9;
+            for bad in [nan, zero, pose(some_pose, "nowhere"), pose(some_pose, ""), pose(some_pose, "object")] {
+                bench.world.arrive_patiently(Arrival::Pose(bad, steady_ns()));
+            }
+            for bad in [no_time, far, wrench(some_wrench, "nowhere"), wrench(some_wrench, "object")] {
+                bench.world.arrive_patiently(Arrival::Wrench(bad, steady_ns()));
+            }
+            bench.world.arrive_patiently(Arrival::Unreadable("stylus/pose", "too short".to_owned()));
+            let loose = TransformStamped { child_frame_id: "x".repeat(100_000), ..TransformStamped::default() };
+            bench.world.arrive_patiently(Arrival::Tf(TFMessage { transforms: vec![loose] }));
+        }
+        bench.feed([message]);
+    }
+    let times = plate.messages.len() / 100;
+    for (reason, share) in [
+        ("pose_not_finite", 1),
+        ("quaternion", 1),
+        ("unknown_frame", 2),
+        ("no_frame", 1),
+        ("pose_late", 1),
+        ("stamp", 1),
+        ("absurd", 1),
+        ("axes_changed", 1),
+        ("unreadable", 1),
+        ("bad_transform", 1),
+    ] {
+        let count: usize = bench.diagnostic(&format!("refused_{reason}")).map_or(0, |count| count.parse().unwrap());
+        assert!(count.abs_diff(times * share) <= share, "{reason}: {count} of {}", times * share);
+    }
+    let (end, _) = bench.end();
+    assert!(read(&end.folder, "refined.ply") == plate.refined("touch.mcap"), "the rest is as if nothing had been");
+}
+
+/// A rig that carries the tracker moves while it looks: its transforms come after the poses that need them.
+#[test]
+fn poses_wait_for_the_transform_of_a_moving_frame_and_not_for_ever() {
+    let plate = Plate::touched(0.05);
+    // long enough for a computer that does other things
+    let mut bench = Bench::with(&plate, &[("stale_ms", ParameterValue::Double(2000.0))]);
+    let begin_ns = plate.messages[0].stamp_ns();
+    // turns once in 20 s and goes away with 50 mm/s
+    let rig = |stamp_ns: i64| {
+        let t = (stamp_ns - begin_ns) as f64 * 1e-9;
+        Isometry3::new(Vector3::new(0.05 * t, 0.2, 0.3), Vector3::z() * (0.1 * PI * t))
+    };
+    let told = |stamp_ns: i64| {
+        Arrival::Tf(TFMessage { transforms: vec![transform(stamp_ns, "object", "rig", &rig(stamp_ns))] })
+    };
+    bench.world.arrive_patiently(told(begin_ns));
+    // between two transforms the rig is taken to move evenly, which it does
+    let parts: Vec<_> =
+        plate.messages.chunk_by(|a, b| a.stamp_ns() / 20_000_000 == b.stamp_ns() / 20_000_000).collect();
+    let (waited, given_up) = parts.split_at(parts.len() - 3);
+    let give = |part: &[Message]| {
+        for message in part {
+            bench.world.arrive_patiently(match message {
+                Message::Pose(of) => Arrival::Pose(seen_from(message, &rig(of.stamp_ns), "rig"), steady_ns()),
+                Message::Wrench(_) => arrival(message),
+            });
+        }
+    };
+    let until = |part: &[Message]| part.iter().map(Message::stamp_ns).max().unwrap();
+    for part in waited {
+        give(part);
+        bench.world.arrive_patiently(told(until(part)));
+        // no faster than the node takes them: time counts here
+        bench.world.call(|reply| Call::Pause(SetBoolRequest { data: false }, reply)).recv().unwrap();
+    }
+    given_up.iter().for_each(|part| give(part));
+    let is_refused = || bench.diagnostic("refused_transform").is_some_and(|count| count != "0");
+    wait_until("what waits is given up", is_refused);
+    let (end, _) = bench.end();
+    let poses = |messages: &[Message]| -> Vec<StampedPose> {
+        messages.iter().filter_map(|m| if let Message::Pose(pose) = m { Some(*pose) } else { None }).collect()
+    };
+    let topics = Topics { markers: None, ..Topics::default() };
+    let read = RecordingReader::open(&end.folder.join("recording"), &topics).unwrap();
+    let kept = poses(&read.map(Result::unwrap).collect::<Vec<_>>());
+    let expected = poses(&plate.messages);
+    let expected: Vec<_> = expected.iter().filter(|pose| pose.stamp_ns <= until(waited.last().unwrap())).collect();
+    assert_eq!(kept.len(), expected.len(), "{:?}", end.report);
+    assert_eq!(end.report.refused["transform"] as usize, poses(&given_up.concat()).len());
+    for (kept, expected) in kept.iter().zip(expected) {
+        let error = kept.pose_ot.inv_mul(&expected.pose_ot);
+        assert!(
+            kept.stamp_ns == expected.stamp_ns
+                && error.translation.vector.norm() < 1e-9
+                && error.rotation.angle() < 1e-9
+        );
+    }
+}
+
+fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
+    let begun = std::time::Instant::now();
+    while !holds() {
+        assert!(begun.elapsed() < std::time::Duration::from_secs(60), "{what} never came");
+    }
+}
+
+#[test]
+fn a_burst_is_dropped_where_there_is_no_room_and_the_recording_tells_what_was_taken() {
+    let plate = Plate::touched(0.1);
+    let bench = Bench::start(&plate);
+    let mut dropped = 0;
+    for message in &plate.messages {
+        dropped += u64::from(!bench.world.arrive(arrival(message)));
+    }
+    let (end, _) = bench.end();
+    assert_eq!(end.report.dropped[0], dropped);
+    refine(&["--resume".as_ref(), end.folder.as_os_str(), "--out".as_ref(), plate.path("again.ply").as_os_str()]);
+    assert!(std::fs::read(plate.path("again.ply")).unwrap() == read(&end.folder, "refined.ply"));
+}
+
+#[test]
+fn pause_undo_redo_and_reset() {
+    let plate = Plate::touched_last(0.1);
+    let half = plate.messages.len() / 2;
+    let bench = Bench::start(&plate);
+    let call = |strokes, is_undo: bool| {
+        let request = UndoRequest { strokes };
+        let of = |reply| if is_undo { Call::Undo(request, reply) } else { Call::Redo(request, reply) };
+        bench.world.call(of).recv().unwrap()
+    };
+    assert!(!call(1, true).success, "nothing was touched yet");
+    bench.feed(&plate.messages[..half]);
+    let undone = call(2, true);
+    assert!(undone.success && undone.strokes == 2, "{}", undone.message);
+    let redone = call(1, false);
+    assert!(redone.strokes == 1 && redone.mesh_version > undone.mesh_version);
+    bench.feed(&plate.messages[half..]);
+    let pause = |data| bench.world.call(|reply| Call::Pause(SetBoolRequest { data }, reply)).recv().unwrap();
+    assert!(pause(true).success);
+    bench.feed(&plate.messages[..100]);
+    assert!(pause(false).success);
+    let first = bench.node.folder().to_owned();
+    let reset = bench.world.call(Call::Reset).recv().unwrap();
+    assert!(reset.success, "{}", reset.message);
+    bench.feed(&plate.messages);
+    let (end, _) = bench.end();
+    assert_ne!(end.folder, first);
+    assert!(read(&end.folder, "refined.ply") == plate.refined("touch.mcap"), "as if it were the first session");
+    // with its strokes the first one comes again as it was
+    let report: serde_json::Value = serde_json::from_slice(&read(&first, "report.json")).unwrap();
+    assert_eq!(report["paused"], 100);
+    let was = read(&first, "refined.ply");
+    refine(&["--resume".as_ref(), first.as_os_str()]);
+    assert!(read(&first, "refined.ply") == was, "two strokes taken back, one done again");
+}
+
+#[test]
+fn a_mesh_is_saved_into_the_folder_of_the_session_and_nowhere_else() {
+    let plate = Plate::touched(0.1);
+    let bench = Bench::start(&plate);
+    bench.feed(&plate.messages);
+    let folder = bench.node.folder().to_owned();
+    let save = |name: &str, overwrite| {
+        loop {
+            let request = SaveMeshRequest { name: name.to_owned(), overwrite, with_features: true };
+            let answer = bench.world.call(|reply| Call::Save(request, reply)).recv().unwrap();
+            // the node was fed as fast as it goes: its view may be behind, and it says what to do then
+            if answer.success || !answer.message.contains("save again") {
+                return answer;
+            }
+            std::thread::sleep(std::time::Duration::from_millis(50));
+        }
+    };
+    std::os::unix::fs::symlink(plate.path("stolen.ply"), folder.join("link.ply")).unwrap();
+    std::os::unix::fs::symlink("/tmp", folder.join("out")).unwrap();
+    std::fs::create_dir(folder.join("folder.ply")).unwrap();
+    for name in [
+        "../stolen.ply",
+        "/tmp/stolen.ply",
+        "out/stolen.ply",
+        "link.ply",
+        "folder.ply",
+        "..",
+        ".",
+        ".hidden.ply",
+        "a/../../stolen.ply",
+        "./b.ply",
+        "recording/touch_0000.ply",
+        "part.txt",
+        "part",
+        "a\0b.ply",
+        "..\\stolen.ply",
+    ] {
+        let answer = save(name, true);
+        assert!(!answer.success && !answer.message.is_empty(), "{name:?}: {}", answer.message);
+    }
+    assert!(!plate.path("stolen.ply").exists() && !plate.path("sessions/stolen.ply").exists());
+    let saved = save("part.ply", false);
+    assert!(saved.success, "{}", saved.message);
+    let file = read(&folder, "part.ply");
+    let head = String::from_utf8_lossy(&file[..500]).into_owned();
+    for count in [format!("element vertex {}\n", saved.vertex_count), format!("element face {}\n", saved.face_count)] {
+        assert!(head.contains(&count), "{count} in {head}");
+    }
+    assert!(folder.join("part.features.json").exists() && folder.join("part.touches.csv").exists());
+    assert!(!save("part.ply", false).success, "it is there");
+    assert!(save("part.ply", true).success);
+    // what is saved is what the end writes of the same samples
+    let (end, _) = bench.end();
+    assert!(read(&end.folder, "part.ply") == read(&end.folder, "refined.ply"));
+}
+
+/// Each save has a copy of all touches: a caller that is in a hurry gets an answer, not the memory.
+#[test]
+fn no_more_than_a_few_meshes_are_saved_at_a_time() {
+    let plate = Plate::touched(0.1);
+    let bench = Bench::start(&plate);
+    bench.feed(&plate.messages);
+    let calls: Vec<_> = (0..64)
+        .map(|number| {
+            let request = SaveMeshRequest { name: format!("part{number}.ply"), ..SaveMeshRequest::default() };
+            bench.world.call(|reply| Call::Save(request, reply))
+        })
+        .collect();
+    let answers: Vec<_> = calls.into_iter().map(|call| call.recv().unwrap()).collect();
+    // how many are refused depends on how fast files are written: the bound itself is tested where the threads are
+    let (saved, refused): (Vec<_>, Vec<_>) = answers.iter().partition(|answer| answer.success);
+    println!("{} saved, {} refused", saved.len(), refused.len());
+    assert!(!saved.is_empty());
+    for answer in refused {
+        assert!(answer.message.contains("save again"), "{}", answer.message);
+    }
+    let (end, _) = bench.end();
+    let refined = read(&end.folder, "refined.ply");
+    assert!(saved.iter().all(|answer| std::fs::read(&answer.path).unwrap() == refined));
+}
+
+/// The arrow goes from outside onto the place; onto a flag, of which nobody knows more, from the tip.
+#[test]
+fn the_tip_shows_where_to_touch_next() {
+    let plate = Plate::touched(0.1);
+    let mut bench = Bench::start(&plate);
+    let (first, rest) = plate.messages.split_at(plate.messages.len() / 4);
+    bench.feed(first);
+    let Some(Message::Pose(last)) = first.iter().rev().find(|message| matches!(message, Message::Pose(_))) else {
+        panic!("it has poses")
+    };
+    let at = last.pose_ot.translation.vector;
+    let header = Header { frame_id: "object".to_owned(), ..Header::default() };
+    let point = Point { x: at.x, y: at.y, z: at.z };
+    let request =
+        FlagFeatureRequest { kind: Feature::KIND_BOSS, point: PointStamped { header, point }, search_radius: 0.0 };
+    assert!(bench.world.call(|reply| Call::Flag(request, reply)).recv().unwrap().success);
+    let is_flagged = |published: &Publication| match published {
+        Publication::Features(array) => {
+            array.features.iter().any(|f| f.status == Feature::STATUS_FLAGGED).then_some(())
+        }
+        _ => None,
+    };
+    bench.wait_for("the flag", is_flagged);
+    for messages in rest.chunks(500) {
+        bench.feed(messages);
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    let tip_to_flag = bench.wait_for("the arrow onto the flag", |published| match published {
+        Publication::Tip(markers) => {
+            let arrow = markers.markers.iter().find(|marker| marker.id == 3 && marker.action == Marker::ADD)?;
+            let [ball, text] = [0, 1].map(|id| markers.markers.iter().find(|marker| marker.id == id).unwrap());
+            let onto = arrow.points.last().unwrap();
+            let is_flag = text.text.contains("boss?") && (onto.x, onto.y, onto.z) == (at.x, at.y, at.z);
+            is_flag.then(|| (arrow.points[0], ball.pose.position))
+        }
+        _ => None,
+    });
+    assert_eq!(tip_to_flag.0, tip_to_flag.1);
+    bench.end();
+}
+
+#[test]
+fn features_are_found_flagged_and_labelled() {
+    let plate = Plate::touched(0.02);
+    let mut bench = Bench::start(&plate);
+    let found = bench.world.call(|reply| Call::Detect(DetectFeaturesRequest::default(), reply)).recv().unwrap();
+    assert!(found.success, "{}", found.message);
+    let holes = DetectFeaturesRequest { kinds: vec![Feature::KIND_HOLE] };
+    let holes = bench.world.call(|reply| Call::Detect(holes, reply)).recv().unwrap().features.features;
+    assert!(holes.iter().all(|hole| hole.kind == Feature::KIND_HOLE && hole.status == Feature::STATUS_FOUND));
+    let header = Header { frame_id: "object".to_owned(), ..Header::default() };
+    let flag = |kind, point, search_radius| {
+        let request = FlagFeatureRequest { kind, point: PointStamped { header: header.clone(), point }, search_radius };
+        bench.world.call(|reply| Call::Flag(request, reply)).recv().unwrap()
+    };
+    if let Some(hole) = holes.first() {
+        let known = flag(Feature::KIND_HOLE, hole.center, 2e-3);
+        assert!(known.success && known.id == hole.id, "{}", known.message);
+    }
+    let free = Point { x: 0.5, y: 0.5, z: 0.0 };
+    let fresh = flag(Feature::KIND_BOSS, free, 0.0);
+    assert!(fresh.success && found.features.features.iter().all(|feature| feature.id != fresh.id));
+    assert_eq!(flag(Feature::KIND_BOSS, free, 0.0).id, fresh.id, "the same place");
+    assert!(!flag(200, free, 0.0).success && !flag(0, free, -1.0).success && !flag(0, free, f64::NAN).success);
+    bench.world.arrive_patiently(Arrival::ClickedPoint(PointStamped {
+        header: header.clone(),
+        point: Point { x: 0.9, y: 0.5, z: 0.0 },
+    }));
+    let array = bench.wait_for("the flags", |published| match published {
+        Publication::Features(array) => {
+            let flagged = array.features.iter().filter(|f| f.status == Feature::STATUS_FLAGGED).count();
+            (flagged == 2).then(|| array.clone())
+        }
+        _ => None,
+    });
+    assert!(array.features.is_sorted_by_key(|feature| feature.id));
+    let clicked = array.features.iter().find(|feature| feature.center.x == 0.9).unwrap();
+    assert_eq!((clicked.kind, clicked.search_radius), (Feature::KIND_HOLE, 5e-3), "flag_kind, flag_radius_mm");
+    let unflag = |id| bench.world.call(|reply| Call::Unflag(UnflagFeatureRequest { id }, reply)).recv().unwrap();
+    assert!(unflag(fresh.id).success && !unflag(fresh.id).success);
+    let labels = bench.wait_for("labels", |published| match published {
+        Publication::FeatureMarkers(array) => {
+            Some(array.markers.iter().map(|marker| marker.text.clone()).filter(|text| !text.is_empty()).collect())
+        }
+        _ => None,
+    });
+    let labels: Vec<String> = labels;
+    assert!(labels.iter().any(|label| label == "hole?"), "{labels:?}");
+    bench.end();
+}
+
+#[test]
+fn without_an_arm_probing_says_so() {
+    let plate = Plate::touched(0.001);
+    let bench = Bench::start(&plate);
+    let request = ProbeFeatureRequest { id: 3, ..ProbeFeatureRequest::default() };
+    let answer = bench.world.call(|reply| Call::ProbeFeature(request, reply)).recv().unwrap();
+    assert_eq!((answer.result.code, answer.result.id), (ProbeResult::NO_ARM, 3));
+    assert!(answer.result.message.starts_with("no arm configured"));
+    bench.end();
+}
+
+#[test]
+fn parameters_change_while_it_runs_or_say_why_not() {
+    let plate = Plate::touched(0.001);
+    let bench = Bench::start(&plate);
+    let set = |name: &str, value: ParameterValue| {
+        bench.world.ask(|reply| Arrival::SetParameter(name.to_owned(), value, reply)).recv().unwrap()
+    };
+    set("colour_by", ParameterValue::String("mismatch".to_owned())).unwrap();
+    set("view_rate_hz", ParameterValue::Integer(50)).unwrap();
+    assert!(set("view_rate_hz", ParameterValue::Double(0.0)).unwrap_err().contains("0.1 to 100"));
+    assert!(set("scan", ParameterValue::String("other.ply".to_owned())).unwrap_err().contains("while the node runs"));
+    bench.end();
+}
+
+#[test]
+fn it_holds_while_a_stream_is_away_and_after_the_clock_was_set_back_and_goes_on() {
+    let plate = Plate::touched(0.1);
+    let mut bench = Bench::start(&plate);
+    let words = |published: &Publication| match published {
+        Publication::Diagnostics(told) => Some(told.status[0].message.clone()),
+        _ => None,
+    };
+    assert!(bench.wait_for("a state", words).starts_with("waits"));
+    bench.feed(&plate.messages);
+    bench.wait_for("the hold", |published| {
+        words(published).filter(|words| words.starts_with("holds, a stream is stale"))
+    });
+    // the recording is played again: every stamp is before the last
+    bench.feed(&plate.messages);
+    let jumps: u64 = bench.diagnostic("clock_jumps").unwrap().parse().unwrap();
+    assert!(jumps >= 1, "{jumps} jumps");
+    let (end, _) = bench.end();
+    let once = plate.messages.iter().filter(|message| matches!(message, Message::Wrench(_))).count() as u64;
+    assert!(end.report.accepted > once * 3 / 2, "{} of twice {once}", end.report.accepted);
+    refine(&["--resume".as_ref(), end.folder.as_os_str(), "--out".as_ref(), plate.path("again.ply").as_os_str()]);
+    assert!(std::fs::read(plate.path("again.ply")).unwrap() == read(&end.folder, "refined.ply"));
+}
+
+/// What kill -9 leaves is what the system has at that moment: a copy of the folder.
+#[test]
+fn what_is_on_the_disk_while_it_runs_can_be_refined_and_lacks_a_tenth_of_a_second() {
+    let plate = Plate::touched(0.1);
+    let bench = Bench::start(&plate);
+    let begun = std::time::Instant::now();
+    let first_ns = plate.messages[0].stamp_ns();
+    // in the time of the touch, for a second and a half
+    let mut fed = 0;
+    for message in &plate.messages {
+        let due = std::time::Duration::from_nanos((message.stamp_ns() - first_ns) as u64);
+        if due > std::time::Duration::from_millis(1500) {
+            break;
+        }
+        std::thread::sleep(due.saturating_sub(begun.elapsed()));
+        bench.feed([message]);
+        fed += 1;
+    }
+    let killed = plate.path("killed");
+    std::fs::create_dir_all(killed.join("recording")).unwrap();
+    // a machine that is busy otherwise is asked again: nothing more arrives, so what is written is written by itself
+    let deadline = std::time::Instant::now() + std::time::Duration::from_secs(10);
+    let on_disk: Vec<Message> = loop {
+        let late = std::time::Instant::now() > deadline;
+        for name in ["session.json", "scene.yaml", "recording/touch_0000.mcap"] {
+            std::fs::copy(bench.node.folder().join(name), killed.join(name)).unwrap();
+        }
+        let reader = RecordingReader::open(&killed.join("recording"), &Topics::default()).unwrap();
+        let on_disk: Vec<Message> = reader.map_while(Result::ok).collect();
+        let lost_ns = plate.messages[fed - 1].stamp_ns() - on_disk.last().map_or(first_ns, Message::stamp_ns);
+        if lost_ns < 100_000_000 {
+            break on_disk;
+        }
+        assert!(!late, "{} ms lost", lost_ns / 1_000_000);
+        std::thread::sleep(std::time::Duration::from_millis(50));
+    };
+    bench.end();
+    let was: Vec<Message> = plate.messages[..on_disk.len()].to_vec();
+    assert_eq!(on_disk, was, "in the order in which they came");
+    plate.record("was.mcap", &was);
+    refine(&["--resume".as_ref(), killed.as_os_str()]);
+    assert!(read(&killed, "refined.ply") == plate.refined("was.mcap"));
+}

@@ -1,0 +1,5 @@
+mod dynamics;
+mod formulas;
+mod push;
+mod registration;
+mod sweeps;

@@ -1,0 +1,7 @@
+mod command;
+mod cost;
+mod extremes;
+mod page;
+mod stability;
+mod whole_scan;
+mod work_precision;

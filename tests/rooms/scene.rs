@@ -1,0 +1,521 @@
+//! The scene file from outside: the file that is shipped, what is refused, and what reaches the rooms.
+
+use std::collections::BTreeSet;
+
+use nalgebra::vector;
+use proptest::prelude::*;
+use touchup::io::mesh_file::MeshUnit;
+use touchup::patch::PatcherParams;
+use touchup::refine::{Along, ContactModel, DynamicsParams, GuardParams, RefineParams, RoiSize, StepRule, TipParams};
+use touchup::scene::{
+    BiasSection, BiasTrackingSection, CompensationSection, GravityAxes, MarkersSection, Mode, PayloadSection,
+    RobotSection, ScanToSpaceSection, Scene, SceneError, Setting,
+};
+use touchup::touch::{BiasParams, SyncParams, TipShape, WrenchFrame};
+
+const DEFAULT_YAML: &str = include_str!("../../config/default.yaml");
+
+/// The file with its settings that are off taken in: `#key` is one, `# prose` is not.
+fn with_all_settings() -> String {
+    let taken_in = |line: &str| {
+        let (indent, rest) = line.split_at(line.len() - line.trim_start().len());
+        let setting = rest.strip_prefix('#').filter(|after| !after.starts_with(' ') || after.starts_with("  "));
+        setting.map_or_else(|| line.to_owned(), |setting| format!("{indent}{setting}"))
+    };
+    DEFAULT_YAML.lines().map(taken_in).collect::<Vec<_>>().join("\n")
+}
+
+#[test]
+fn the_shipped_file_is_the_default() {
+    assert_eq!(Scene::from_yaml(DEFAULT_YAML).unwrap(), Scene::default());
+    let whole = Scene::from_yaml(&with_all_settings()).unwrap();
+    assert_eq!(whole.markers, Some(MarkersSection::default()));
+    assert_eq!(whole.bias_tracking, Some(BiasTrackingSection::default()));
+    let compensation = whole.compensation.clone().unwrap();
+    assert_eq!(compensation.payload, Some(PayloadSection::default()));
+    assert_eq!(whole.compensator_params(WrenchFrame::Sensor).pose_ts, nalgebra::Isometry3::identity());
+    let plain = CompensationSection { payload: None, bias: None, sensor_orientation_xyzw: None, ..compensation };
+    assert_eq!(plain, CompensationSection::default());
+}
+
+#[test]
+fn the_scene_of_the_demo_is_the_default_with_a_scan() {
+    let path = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/config/demo.yaml"));
+    let mut demo = Scene::read(path).unwrap();
+    let (scan, unit) = demo.scan_file(path).unwrap();
+    assert_eq!((scan, unit), (path.parent().unwrap().join("../out/scan.ply"), MeshUnit::Millimetre));
+    demo.scan.as_mut().unwrap().file = None;
+    assert_eq!(demo, Scene::default());
+    assert_eq!(demo.scan_file(path), None);
+    let inches = Scene::from_yaml("scan: { file: /parts/a.stl, unit: inch }").unwrap();
+    assert_eq!(inches.scan_file(path).unwrap(), ("/parts/a.stl".into(), MeshUnit::Inch));
+}
+
+/// Every key that the code knows, asked by giving each section a key that none has: the refusal lists the known ones.
+#[test]
+fn every_key_of_the_code_is_in_the_shipped_file_and_documented() {
+    let mut known = BTreeSet::new();
+    let inner = ["compensation.payload", "compensation.bias"];
+    let outer = [
+        "",
+        "sync",
+        "markers",
+        "scan_to_space",
+        "compensation",
+        "bias_tracking",
+        "contact",
+        "tip",
+        "scan",
+        "sliding",
+        "carve",
+        "guard",
+        "patch",
+        "uncertainty",
+        "robot",
+        "refine",
+    ];
+    let sections = [&outer[..], &inner].concat();
+    for section in sections {
+        let path: Vec<_> = section.split('.').filter(|name| !name.is_empty()).collect();
+        let yaml =
+            path.iter().rev().fold("{ no_such_key: 1 }".to_owned(), |inner, name| format!("{{ {name}: {inner} }}"));
+        let error = Scene::from_yaml(&yaml).unwrap_err().to_string();
+        let list = error.split("expected one of").nth(1).unwrap_or_else(|| panic!("{section}: {error}"));
+        let list = list.split(" at line").next().unwrap();
+        known.extend(
+            list.split([',', ' ', '`', ';']).filter(|key| key.contains(|c: char| c.is_alphabetic())).map(str::to_owned),
+        );
+    }
+    let whole = with_all_settings();
+    let mut in_file = BTreeSet::new();
+    for line in whole.lines().filter(|line| !line.trim_start().starts_with('#')) {
+        in_file.extend(line.split_once(':').map(|(key, _)| key.trim().to_owned()));
+    }
+    assert_eq!(in_file, known);
+    assert!(known.len() >= 35, "{known:?}");
+}
+
+/// The presets of the room are the ones that a user gets who changes nothing.
+#[test]
+fn the_default_scene_is_the_preset_of_each_mode() {
+    let tip = TipParams { radius: 1.5e-3, stiffness: Some(2e4) };
+    let mut scene = Scene::default();
+    assert_eq!(scene.refine_params(WrenchFrame::Sensor), Some(RefineParams::robust(tip)));
+    scene.refine.as_mut().unwrap().mode = Mode::Paper;
+    let guard = Some(GuardParams::default());
+    assert_eq!(scene.refine_params(WrenchFrame::Sensor), Some(RefineParams { guard, ..RefineParams::paper(tip) }));
+    scene.guard = None;
+    assert_eq!(scene.refine_params(WrenchFrame::Sensor), Some(RefineParams::paper(tip)));
+    let mut scene = Scene::default();
+    scene.tip.as_mut().unwrap().stiffness_n_per_mm = None;
+    let rigid = RefineParams::robust(TipParams { stiffness: None, ..tip });
+    assert_eq!(scene.refine_params(WrenchFrame::Sensor), Some(rigid));
+}
+
+#[test]
+fn a_part_is_built_only_when_named() {
+    let none = Scene::from_yaml("{}").unwrap();
+    assert!(none.refine_params(WrenchFrame::Sensor).is_none() && none.contact_params().is_none());
+    assert!(none.patcher_params(WrenchFrame::Sensor).is_none());
+    let SyncParams { reorder_ns, largest_gap_ns, .. } = none.sync_params();
+    assert_eq!((reorder_ns, largest_gap_ns), (0, 0));
+    assert_eq!(none.compensator_params(WrenchFrame::Object).payload, None);
+    assert_eq!(none.clock_params(), None);
+    let clock = Scene::from_yaml("{ clock: , tip: , contact: { on_n: 1 } }").unwrap().clock_params().unwrap();
+    assert_eq!((clock.stiffness, clock.gate.on), (Some(2e4), 1.0));
+
+    let loop_alone = Scene::from_yaml("refine:").unwrap().refine_params(WrenchFrame::Object).unwrap();
+    assert_eq!((loop_alone.gate, loop_alone.sliding, loop_alone.carve, loop_alone.guard), (None, None, None, None));
+    assert_eq!((loop_alone.tip, loop_alone.scan_noise), (TipParams { radius: 0.0, stiffness: None }, 0.0));
+    assert_eq!(loop_alone.compensator.wrench_frame, WrenchFrame::Object);
+
+    let bare = Scene::from_yaml(
+        "sync:\nclock:\ncontact: {}\ntip:\nscan:\nsliding:\ncarve:\nguard:\npatch:\nuncertainty:\nrefine:\n",
+    )
+    .unwrap();
+    assert_eq!(bare, Scene::default(), "a part named without keys takes its defaults");
+}
+
+/// Each section of the shipped file by its header alone: the keys below it are off.
+#[test]
+fn a_header_alone_takes_the_defaults() {
+    let lines: Vec<_> = DEFAULT_YAML.lines().collect();
+    let name_of = |line: &str| {
+        let name = line.strip_prefix('#').unwrap_or(line).strip_suffix(':')?;
+        name.chars().all(|c| c.is_ascii_lowercase() || c == '_').then(|| name.to_owned())
+    };
+    let mut sections = 0;
+    for at in 0..lines.len() {
+        let Some(name) = name_of(lines[at]) else { continue };
+        let end = lines[at..].iter().position(|line| line.is_empty()).map_or(lines.len(), |length| at + length);
+        let edited = |(i, line): (usize, &&str)| match i {
+            _ if i == at => format!("{name}:"),
+            _ if (at..end).contains(&i) && line.starts_with(' ') => format!("#{line}"),
+            _ => (*line).to_owned(),
+        };
+        let yaml = lines.iter().enumerate().map(edited).collect::<Vec<_>>().join("\n");
+        let scene = Scene::from_yaml(&yaml).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let mut expected = Scene::default();
+        match name.as_str() {
+            "markers" => expected.markers = Some(MarkersSection::default()),
+            "scan_to_space" => expected.scan_to_space = Some(ScanToSpaceSection::default()),
+            "compensation" => expected.compensation = Some(CompensationSection::default()),
+            "bias_tracking" => expected.bias_tracking = Some(BiasTrackingSection::default()),
+            "robot" => expected.robot = Some(RobotSection::default()),
+            _ => {}
+        }
+        assert_eq!(scene, expected, "{name}");
+        sections += 1;
+    }
+    assert_eq!(sections, 16);
+    let inner = Scene::from_yaml("compensation:\n  payload:\n  bias:\n").unwrap().compensation.unwrap();
+    assert_eq!((inner.payload, inner.bias), (Some(PayloadSection::default()), Some(BiasSection::default())));
+}
+
+#[test]
+fn friction_and_free_space_are_parts_of_the_update_and_of_the_patch_or_of_neither() {
+    let parts = |yaml: &str| {
+        let scene = Scene::from_yaml(&format!("{{ contact: , tip: , patch: , refine: , {yaml} }}")).unwrap();
+        let refiner = scene.refine_params(WrenchFrame::Sensor).unwrap();
+        let patcher = scene.patcher_params(WrenchFrame::Sensor).unwrap();
+        assert_eq!(refiner.sliding.map(|sliding| sliding.cone_cosine), patcher.touches.cone_cosine);
+        assert_eq!(refiner.carve.is_some(), patcher.free_space);
+        (patcher.touches.cone_cosine, patcher.free_space)
+    };
+    assert_eq!(parts(""), (None, false));
+    assert_eq!(parts("sliding: "), (Some(0.9135), false));
+    assert_eq!(parts("sliding: { cone_cosine: 0.8 }, carve: "), (Some(0.8), true));
+    assert_eq!(parts("carve: "), (None, true));
+}
+
+#[test]
+fn the_patch_needs_a_ball_and_a_gate_and_is_no_part_of_the_paper() {
+    for yaml in ["contact:\npatch:\nrefine:\n", "tip: { radius_mm: 0 }\ncontact:\npatch:\n", "tip:\npatch:\n"] {
+        let error = Scene::from_yaml(yaml).unwrap_err().to_string();
+        assert!(error.starts_with("patch needs "), "{yaml}: {error}");
+    }
+    let yaml = "tip: { radius_mm: 2 }\ncontact: { on_n: 1, off_n: 0.5 }\nscan: { noise_mm: 2 }\n\
+                patch: { pitch_mm: 0.4, most_faces: 3 }";
+    let params = Scene::from_yaml(yaml).unwrap().patcher_params(WrenchFrame::Object).unwrap();
+    assert_eq!((params.pitch, params.most_faces), (0.4e-3, 3.0));
+    assert_eq!((params.touches.gate.on, params.touches.stiffness), (1.0, Some(2e4)));
+    assert_eq!((params.evidence.radius, params.evidence.scan_reach), (2e-3, 6e-3));
+    assert_eq!(params.compensator.wrench_frame, WrenchFrame::Object);
+    let default = Scene::default().patcher_params(WrenchFrame::Sensor);
+    assert_eq!(default, Some(PatcherParams::new(1.5e-3, Some(2e4), 0.6e-3)));
+    let paper = Scene::from_yaml("tip:\ncontact:\npatch:\nrefine: { mode: paper }").unwrap();
+    assert!(paper.patcher_params(WrenchFrame::Sensor).is_none());
+}
+
+#[test]
+fn what_refine_says_goes_over_its_mode() {
+    let yaml = "tip: { radius_mm: 2, stiffness_n_per_mm: 0.1 }
+refine: { mode: paper, contact_model: spring, alpha_m_per_n_s: 0.5, beta_per_n2_s: 0, step: corrected, along: force, roi_mm: 4 }";
+    let params = Scene::from_yaml(yaml).unwrap().refine_params(WrenchFrame::Sensor).unwrap();
+    let DynamicsParams { model, alpha_m_per_n_s, beta_per_n2_s, rule, along, take_out_rigid_offset } = params.dynamics;
+    assert_eq!(model, ContactModel::Spring { stiffness_n_per_m: 100.0 });
+    assert_eq!((alpha_m_per_n_s, beta_per_n2_s), (0.5, 0.0));
+    assert_eq!((rule, along, take_out_rigid_offset), (StepRule::DriftCorrected, Along::Force, false));
+    assert_eq!((params.roi, params.gate), (RoiSize::Radius(0.004), None));
+
+    let yaml =
+        "tip: { stiffness_n_per_mm: 20 }\nrefine: { contact_model: sigmoid, f_max_n: 20, h_min_mm: 2, delta: 3 }";
+    let params = Scene::from_yaml(yaml).unwrap().refine_params(WrenchFrame::Sensor).unwrap();
+    assert_eq!(params.dynamics.model, ContactModel::Sigmoid { f_max_n: 20.0, h_min_m: 0.002, delta: 3.0 });
+    assert!(params.dynamics.take_out_rigid_offset);
+}
+
+#[test]
+fn units_are_turned_into_si_once() {
+    let scene = Scene::from_yaml(
+        "sync: { reorder_ms: 1.5, largest_gap_ms: 0, largest_jump_s: 2, wrench_offset_ms: -1.8, capacity: 10 }
+compensation:
+  sensor_position_mm: [0, 0, 120]
+  sensor_orientation_xyzw: [0, 0, 1, 0]
+  payload: { mass_kg: 0.2, centre_mm: [1, 2, 3], gravity_m_per_s2: [0, 9.8, 0] }
+  bias: { force_n: [1, 2, 3], torque_nm: [4, 5, 6] }",
+    )
+    .unwrap();
+    let expected = SyncParams {
+        reorder_ns: 1_500_000,
+        largest_gap_ns: 0,
+        largest_jump_ns: 2_000_000_000,
+        wrench_offset_ns: -1_800_000,
+        capacity: 10,
+    };
+    assert_eq!(scene.sync_params(), expected);
+    let params = scene.compensator_params(WrenchFrame::Object);
+    assert_eq!(params.wrench_frame, WrenchFrame::Object);
+    assert_eq!(params.pose_ts.translation.vector, vector![0.0, 0.0, 0.12]);
+    assert_eq!(params.pose_ts.rotation * vector![1.0, 0.0, 0.0], vector![-1.0, 0.0, 0.0], "half a turn about z");
+    let payload = params.payload.unwrap();
+    assert_eq!((payload.mass, payload.p_sc), (0.2, vector![0.001, 0.002, 0.003]));
+    assert_eq!(params.bias_s.unwrap().torque, vector![4.0, 5.0, 6.0]);
+}
+
+#[test]
+fn each_mistake_is_refused_in_one_line_that_says_where_and_what() {
+    let bad = [
+        ("sync:\n  reordr_ms: 3\n", &["reordr_ms", "did you mean `reorder_ms`", "line 2"][..]),
+        ("contcat: {}", &["contcat", "did you mean `contact`", "line 1"]),
+        ("refine: { moed: paper }", &["moed", "did you mean `mode`", "line 1"]),
+        ("contact:\n  on_n: much\n", &["line 2", "column 9"]),
+        ("contact: { on_n: 1 }\ncontact: {}", &["duplicate", "line 2"]),
+        ("contact: { on_n: 0.1 }", &["contact.on_n is 0.1", "contact.off_n to"]),
+        ("contact: { off_n: .nan }", &["contact.off_n is NaN", "0 to 1000 N"]),
+        ("tip: { radius_mm: -1 }", &["tip.radius_mm is -1", "0 to 1000 mm"]),
+        ("tip: { stiffness_n_per_mm: 0 }", &["tip.stiffness_n_per_mm is 0", "leave it out for rigid"]),
+        ("tip: { shape: cube }", &["cube", "ball", "flat", "cone"]),
+        ("tip: { shape: cone }", &["tip.shape: cone needs tip.half_angle_deg"]),
+        ("tip: { shape: cone, half_angle_deg: 85 }", &["tip.half_angle_deg is 85", "1 to 80 degrees", "flat"]),
+        ("tip: { shape: flat, edge_radius_mm: 2 }", &["tip.edge_radius_mm is 2", "0 mm to tip.radius_mm"]),
+        ("tip: { shape: flat, radius_mm: 0 }", &["tip.radius_mm is 0", "for a flat tip"]),
+        ("tip: { shape: flat, length_mm: 0 }", &["tip.length_mm is 0", "1000 mm"]),
+        ("scan: { noise_mm: .inf }", &["scan.noise_mm is inf"]),
+        ("sync: { largest_gap_ms: -3 }", &["sync.largest_gap_ms is -3", "0 to 60000 ms"]),
+        ("sync: { capacity: 1 }", &["sync.capacity is 1"]),
+        (
+            "tip: {stiffness_n_per_mm: null}\nrefine: { contact_model: spring }",
+            &["spring needs tip.stiffness_n_per_mm"],
+        ),
+        ("refine: { mode: rough }", &["rough", "robust", "line 1"]),
+        ("refine: { h_min_mm: 0 }", &["refine.h_min_mm is 0"]),
+        ("carve: { contact_tolerance_mm: -1 }", &["carve.contact_tolerance_mm is -1", "0 to 1000"]),
+        ("sliding: { cone_cosine: -1 }", &["sliding.cone_cosine is -1", "0 to 1"]),
+        ("compensation: { payload: { mass_kg: -2 } }", &["compensation.payload.mass_kg is -2"]),
+        ("compensation: { sensor_orientation_xyzw: [0, 0, 0, 0] }", &["sensor_orientation_xyzw is 0", "length"]),
+        ("compensation: { bias: { force_n: [1, 2] } }", &["line 1"]),
+        ("[", &["line"]),
+    ];
+    for (yaml, parts) in bad {
+        let error = Scene::from_yaml(yaml).unwrap_err().to_string();
+        assert!(!error.contains('\n'), "{error}");
+        assert!(parts.iter().all(|part| error.contains(part)), "{yaml:?}: {error}");
+    }
+}
+
+#[test]
+fn the_shape_of_the_tip_reaches_refiner_and_patcher() {
+    let shapes = |yaml: &str| {
+        let scene = Scene::from_yaml(&format!("{{ contact: , refine: , patch: , tip: {{ {yaml} }} }}")).unwrap();
+        let refiner = scene.refine_params(WrenchFrame::Sensor).unwrap();
+        let patcher = scene.patcher_params(WrenchFrame::Sensor).unwrap();
+        assert_eq!((refiner.shape, refiner.tip.radius), (patcher.touches.shape, patcher.touches.radius));
+        assert!(refiner.check().is_ok() && touchup::patch::Patcher::new(patcher).is_ok());
+        (refiner.shape, patcher.evidence.radius)
+    };
+    assert_eq!(shapes("radius_mm: 1.5"), (TipShape::Ball, 1.5e-3));
+    let flat = TipShape::Flat { edge_radius: 0.25e-3, length: 8e-3 };
+    assert_eq!(shapes("shape: flat, radius_mm: 2, edge_radius_mm: 0.25"), (flat, 2e-3));
+    let cone = TipShape::Cone { half_angle: 20f64.to_radians(), length: 6e-3 };
+    // what a sharp nose can show is limited by the hand
+    assert_eq!(shapes("shape: cone, radius_mm: 0.25, half_angle_deg: 20, length_mm: 6"), (cone, 1e-3));
+}
+
+#[test]
+fn a_missing_file_is_named() {
+    let error = Scene::read(std::path::Path::new("no/such/scene.yaml")).unwrap_err().to_string();
+    assert!(error.contains("no/such/scene.yaml"), "{error}");
+}
+
+#[test]
+fn bias_tracking_is_built_only_when_named_and_not_in_the_paper() {
+    let bias = |yaml: &str| Scene::from_yaml(yaml).unwrap().refine_params(WrenchFrame::Sensor).unwrap().bias;
+    assert_eq!(bias("refine:"), None);
+    assert_eq!(bias("{ refine: , bias_tracking: }"), Some(BiasParams::default()));
+    let named = bias("{ refine: , bias_tracking: { free_n: 0.5, settle_ms: 20, time_s: 2 } }");
+    assert_eq!(named, Some(BiasParams { free: 0.5, settle_ns: 20_000_000, time: 2.0 }));
+    assert_eq!(bias("{ refine: { mode: paper }, bias_tracking: }"), None);
+    let text = Scene::from_yaml("bias_tracking: { time_s: 0 }").unwrap_err().to_string();
+    assert!(text.contains("bias_tracking.time_s is 0"), "{text}");
+}
+
+// ---- settings put into the text ---------------------------------------------------------------------------------
+
+/// A scene as a user wrote it, with what each calibration sets.
+fn calibrated(yaml: &str) -> Result<String, SceneError> {
+    let mut expected = if yaml.trim().is_empty() { Scene::from_yaml("{}") } else { Scene::from_yaml(yaml) }.unwrap();
+    let section = ScanToSpaceSection { position_mm: [1.5, -2.0, 3.25], orientation_xyzw: [0.0, 0.6, 0.0, 0.8] };
+    expected.scan_to_space = Some(section);
+    expected.tip.get_or_insert_default().offset_mm = Some([0.5, 0.0, -142.0]);
+    let compensation = expected.compensation.get_or_insert_default();
+    let payload = compensation.payload.get_or_insert_default();
+    (payload.mass_kg, payload.gravity_axes) = (0.25, GravityAxes::Space);
+    compensation.bias.get_or_insert_default().force_n = [1.0, 2.0, 3.0];
+    let settings = [
+        Setting::list(&["scan_to_space", "position_mm"], &[1.5, -2.0, 3.25]),
+        Setting::list(&["scan_to_space", "orientation_xyzw"], &[0.0, 0.6, 0.0, 0.8]),
+        Setting::list(&["tip", "offset_mm"], &[0.5, 0.0, -142.0]),
+        Setting::scalar(&["compensation", "payload", "mass_kg"], 0.25),
+        Setting::scalar(&["compensation", "payload", "gravity_axes"], "space"),
+        Setting::list(&["compensation", "bias", "force_n"], &[1.0, 2.0, 3.0]),
+    ];
+    Scene::edited(yaml, &settings, "by a test", &expected)
+}
+
+/// The lines of `before` that are not in `after`, in order.
+fn lost<'a>(before: &'a str, after: &str) -> Vec<&'a str> {
+    let mut rest = after.lines();
+    before
+        .lines()
+        .filter(|line| !rest.clone().any(|other| other == *line) || !rest.any(|other| other == *line))
+        .collect()
+}
+
+#[test]
+fn what_the_user_wrote_survives_a_calibration() {
+    let after = calibrated(DEFAULT_YAML).unwrap();
+    assert_eq!(lost(DEFAULT_YAML, &after), Vec::<&str>::new(), "{after}");
+    assert_eq!(calibrated(&after).unwrap(), after, "done twice is done once");
+    assert_eq!(after.matches("# touchup calibrate by a test").count(), 1);
+
+    let written = "\
+# my cell
+refine:            # all defaults
+tip:
+    # measured on Tuesday
+    radius_mm: 1.0  # ruby
+    offset_mm:
+      # by hand
+      - 1
+      - 2
+      - 3
+    stiffness_n_per_mm: 20
+
+compensation: { payload: { mass_kg: 1, centre_mm: [1, 2, 3] }, # the new sensor
+  sensor_position_mm: [0, 0, 9] }
+# the end
+";
+    let after = calibrated(written).unwrap();
+    let gone = [
+        "    offset_mm:",
+        "      - 1",
+        "      - 2",
+        "      - 3",
+        "compensation: { payload: { mass_kg: 1, centre_mm: [1, 2, 3] }, # the new sensor",
+        "  sensor_position_mm: [0, 0, 9] }",
+    ];
+    assert_eq!(lost(written, &after), gone, "{after}");
+    for kept in ["      # by hand", "# the new sensor", "sensor_position_mm: [0, 0, 9]", "# all defaults"] {
+        assert!(after.contains(kept), "{kept}: {after}");
+    }
+}
+
+/// However a scene is written, the result is right (which `edited` checks itself), or it is refused with what to do.
+#[test]
+fn every_way_of_writing_is_edited_or_refused() {
+    let ways = [
+        "",
+        "# only a comment",
+        "tip:",
+        "tip: ~",
+        "tip: null # none\nscan:",
+        "{}",
+        "{ tip: , contact: { on_n: 3 } }",
+        "{\n  tip: { radius_mm: 2, }, # a ball, of 2: { mm }\n}\n",
+        "---\ntip:\n  radius_mm: 2",
+        "---\ntip:\n  radius_mm: 2\n...\n",
+        "  tip:\n    radius_mm: 2\n  contact: { on_n: 1 }\n",
+        "\"tip\":\n  'offset_mm' : [1, 2, 3] # old\ncontact:\r\n  on_n: 1\r\n",
+        "compensation:\n  bias:\n  payload: {mass_kg: 3}\n  # last\n\n\n\ntip: {offset_mm: [1,\n 2, 3]}",
+        "compensation:\n  bias: {}\n  payload: ~\n",
+        "scan_to_space: {}\ntip:\n  # nothing\n#tail\n",
+    ];
+    for way in ways {
+        let after = calibrated(way).unwrap_or_else(|error| panic!("{way:?}: {error}"));
+        assert_eq!(calibrated(&after).unwrap(), after, "{way:?} twice");
+        let comments = |text: &str| text.lines().filter(|line| line.trim_start().starts_with('#')).count();
+        assert!(comments(&after) >= comments(way), "{way:?}: {after}");
+    }
+    for way in ["tip: &t { radius_mm: 2 }\n", "tip: !!map\n  radius_mm: 2\n", "? tip\n: { radius_mm: 2 }\n"] {
+        if Scene::from_yaml(way).is_err() {
+            continue;
+        }
+        match calibrated(way) {
+            Ok(_) => {}
+            Err(error) => {
+                assert!(error.to_string().contains("by hand: scan_to_space.position_mm: [1.5, -2, 3.25]"), "{error}")
+            }
+        }
+    }
+}
+
+proptest! {
+    /// Sections in any order, in lines or in braces, set in by two or four, with comments and empty lines anywhere.
+    #[test]
+    fn any_plain_scene_is_edited_and_keeps_its_comments(
+        order in Just(vec![0usize, 1, 2, 3]).prop_shuffle(),
+        in_braces in prop::array::uniform4(any::<bool>()),
+        deep in any::<bool>(),
+        remarks in prop::array::uniform8(any::<bool>()),
+    ) {
+        let sections: [(&str, &[&str]); 4] = [
+            ("tip", &["radius_mm: 2", "offset_mm: [1, 2, 3]"]),
+            ("compensation", &["sensor_position_mm: [0, 0, 9]", "payload: { mass_kg: 3 }"]),
+            ("contact", &["on_n: 1"]),
+            ("scan_to_space", &["position_mm: [9, 9, 9]"]),
+        ];
+        let indent = if deep { "    " } else { "  " };
+        let mut yaml = String::new();
+        for &i in &order {
+            let (name, keys) = sections[i];
+            if remarks[i] {
+                yaml += &format!("\n# about {name}\n\n");
+            }
+            if in_braces[i] {
+                yaml += &format!("{name}: {{ {} }} # in braces: {{ {name}\n", keys.join(", "));
+                continue;
+            }
+            yaml += &format!("{name}:{}\n", if remarks[i + 4] { "  # named" } else { "" });
+            for key in keys {
+                yaml += &format!("{indent}# about {key}\n{indent}{key}   # why\n");
+            }
+        }
+        let after = calibrated(&yaml).unwrap();
+        let remarks = |text: &str| text.matches('#').count();
+        prop_assert!(remarks(&after) >= remarks(&yaml), "{yaml}\n{after}");
+        prop_assert_eq!(calibrated(&after).unwrap(), after);
+    }
+}
+
+#[test]
+fn gravity_in_the_axes_of_space_turns_with_the_scan() {
+    let scene = |axes: &str, space: &str| {
+        let yaml = format!("{{ compensation: {{ payload: {{ mass_kg: 1, gravity_axes: {axes} }} }}, {space} }}");
+        Scene::from_yaml(&yaml).unwrap().compensator_params(WrenchFrame::Sensor).payload.unwrap().gravity_o
+    };
+    // the scan is turned by 90° about x of space: its y points up
+    let turned = "scan_to_space: { orientation_xyzw: [0.7071068, 0, 0, 0.7071068] }";
+    assert!((scene("space", turned) - vector![0.0, -9.81, 0.0]).norm() < 1e-6, "{}", scene("space", turned));
+    assert_eq!(scene("object", turned), vector![0.0, 0.0, -9.81]);
+    assert_eq!(scene("space", "tip: "), vector![0.0, 0.0, -9.81]);
+    for bad in ["scan_to_space: { orientation_xyzw: [0, 0, 0, 0.9] }", "tip: { offset_mm: [0, 0, 1e9] }"] {
+        assert!(matches!(Scene::from_yaml(bad), Err(SceneError::OutOfRange { .. })), "{bad}");
+    }
+    assert_eq!(Scene::default().placement(), None);
+}
+
+/// Names as they stand in the YAML, in its order, listed here by hand.
+#[test]
+fn a_scene_tells_what_is_built_of_it_and_what_is_left_out() {
+    let told = |yaml: &str| {
+        let mut built = Scene::from_yaml(yaml).unwrap().built(&["robot"]);
+        // what the program was compiled with differs from one to the other
+        for names in [&mut built.built, &mut built.left_out] {
+            names.retain(|name| !name.starts_with("feature "));
+        }
+        built.to_string()
+    };
+    let all_but_refine = "sync, clock, markers, scan_to_space, compensation, bias_tracking, contact, tip, scan, \
+                          scan.region, sliding, carve, guard, patch, uncertainty, robot";
+    assert_eq!(told("refine:"), format!("built: refine; left out: {all_but_refine}"));
+    assert_eq!(told("sync:\nrefine:\ncontact:"), {
+        let left_out = "clock, markers, scan_to_space, compensation, bias_tracking, tip, scan, scan.region, sliding, carve, guard, \
+                        patch, uncertainty, robot";
+        format!("built: sync, contact, refine; left out: {left_out}")
+    });
+    // the mode of the paper takes neither contact, sliding, carving nor a patch, whatever is named
+    let paper = told("contact:\ntip:\nsliding:\ncarve:\npatch:\nuncertainty:\nguard:\nrefine: { mode: paper }");
+    assert!(paper.starts_with("built: tip, guard, refine; left out: sync"), "{paper}");
+    assert!(paper.ends_with("sliding, carve, patch, uncertainty, robot"), "{paper}");
+}

@@ -1,0 +1,5 @@
+mod friction;
+mod latency;
+mod markers;
+mod samples;
+mod sync_in_order;
