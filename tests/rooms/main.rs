@@ -2,6 +2,8 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../common/full.rs"]
+mod full;
 #[path = "../common/plate_stream.rs"]
 mod plate_stream;
 #[path = "../common/shapes.rs"]

@@ -11,6 +11,8 @@ use touchup::mesh::{TriMesh, VertexId, repair};
 use touchup::sim::{MeshSurface, PathParams, Plate, ScannerParams, StylusParams, plan_mesh, scan, touch};
 use touchup::touch::Message;
 
+use crate::full::either;
+
 /// A scanner of the better kind; it still closes holes, rounds edges, is too fat and out of place.
 fn scanner(seed: u64) -> ScannerParams {
     let closes = 6e-3;
@@ -142,7 +144,7 @@ fn ears(outline: &[[f64; 2]]) -> Vec<[u32; 3]> {
 
 #[test]
 fn a_part_that_was_not_changed_is_not_called_changed() {
-    for seed in [1, 2, 3] {
+    for seed in 1..=either(1, 3) {
         // the demo's poor scanner, and a better one
         for scanner in [ScannerParams { seed, ..Default::default() }, scanner(seed)] {
             let told = Case::new(&plate(), &plate(), &scanner, |_| ()).disagree();
@@ -162,7 +164,7 @@ fn a_part_that_was_not_changed_is_not_called_changed() {
 
 #[test]
 fn a_boss_that_was_milled_off_by_a_millimetre_is_found() {
-    for seed in [1, 2, 3] {
+    for seed in 1..=either(1, 3) {
         let now = moved(&plate(), |p| if p.z > 15e-3 { p - Vector3::z() * 1e-3 } else { p });
         let told = Case::new(&plate(), &now, &scanner(seed), |_| ()).disagree();
         let found = regions(&told, "changed part");
@@ -179,7 +181,7 @@ fn a_boss_that_was_milled_off_by_a_millimetre_is_found() {
 fn a_groove_that_was_cut_is_found() {
     let before = block(&[[0.0, 12.0], [60.0, 12.0]]);
     let now = block(&[[0.0, 12.0], [22.0, 12.0], [22.0, 10.5], [38.0, 10.5], [38.0, 12.0], [60.0, 12.0]]);
-    for seed in [1, 2, 3] {
+    for seed in 1..=either(1, 3) {
         let told = Case::new(&before, &now, &scanner(seed), |_| ()).disagree();
         let found = regions(&told, "changed part");
         assert!(!found.is_empty(), "{seed}: {told}");
@@ -195,7 +197,7 @@ fn a_groove_that_was_cut_is_found() {
 
 #[test]
 fn spikes_of_the_pose_are_bad_touches() {
-    for seed in [1, 2] {
+    for seed in 1..=either(1, 2) {
         // 12 times for 30 ms the tracker says 1.2 mm too high
         let shake = |messages: &mut [Message]| {
             let last = messages.len();
@@ -247,7 +249,7 @@ fn what_is_written_is_what_was_told() {
 #[test]
 fn a_scan_is_told_to_be_turned_only_as_far_as_that_is_known() {
     let mut told_turned = 0;
-    for seed in [1, 2, 3] {
+    for seed in 1..=either(1, 3) {
         let poor = ScannerParams { seed, ..Default::default() };
         let told = Case::new(&plate(), &plate(), &poor, |_| ()).disagree();
         let vector = |name: &str| Vector3::from_fn(|i, _| told["misplaced"][name][i].as_f64().unwrap());
@@ -259,5 +261,5 @@ fn a_scan_is_told_to_be_turned_only_as_far_as_that_is_known() {
         let told = Case::new(&plate(), &plate(), &turned, |_| ()).disagree();
         told_turned += usize::from(!told["misplaced"].is_null());
     }
-    assert!(told_turned >= 2, "{told_turned} of 3");
+    assert!(told_turned >= either(1, 2), "{told_turned} of {}", either(1, 3));
 }
