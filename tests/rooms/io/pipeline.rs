@@ -18,6 +18,7 @@ use touchup::refine::{RefineParams, Refiner, TipParams};
 use touchup::touch::{Message, StampedPose, StampedWrench, SyncParams, Synchroniser, Wrench};
 
 use crate::common::{grid, within};
+use crate::full::either;
 use crate::shared::shared;
 
 /// `touchup refine` with `flags`.
@@ -394,7 +395,7 @@ fn nasty_scans_are_refused_in_one_line_or_refined() {
     assert!(files.len() > 50, "{}", files.len());
     let mut codes = [0; 5];
     for scan in &files {
-        for unit in [MeshUnit::Millimetre, MeshUnit::Metre, MeshUnit::Inch] {
+        for &unit in &[MeshUnit::Millimetre, MeshUnit::Metre, MeshUnit::Inch][..either(1, 3)] {
             let what = format!("{} in {unit}", scan.display());
             let flags = ["--json", "--mesh-unit", &unit.to_string()];
             let output = refine(scan, &plate.at("touch.mcap"), &out, &flags);
@@ -404,6 +405,6 @@ fn nasty_scans_are_refused_in_one_line_or_refined() {
             codes[code(&output) as usize] += 1;
         }
     }
-    println!("{} scans in three units: {} refined, {} refused", files.len(), codes[0] + codes[4], codes[3]);
+    println!("{} scans: {} refined, {} refused", files.len(), codes[0] + codes[4], codes[3]);
     assert!(codes[0] > 0 && codes[3] > 0, "{codes:?}");
 }
