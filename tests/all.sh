@@ -77,8 +77,12 @@ failed_tests() {
        END { for (program in begun) if (!(program in counted)) print program ": ended before the end of its tests" }' "$1"
 }
 
+# unit tests are quick: without optimisation the crate is built for them in a seventh of the time
+unoptimised=(--config 'profile.dev.package.touchup.opt-level=0')
+
+# the program, the stand-in for a controller and what tests them
 build_tests() {
-  cargo test --no-run "${ur[@]}" || fail "the tests do not build"
+  cargo build "${ur[@]}" --bins --examples && cargo test --no-run "${ur[@]}" "${programs[@]}" || fail "the tests do not build"
 }
 
 # cargo_tests LOG ARGUMENT...
@@ -100,8 +104,7 @@ cargo_tests() {
 
 # the node on r2r has its own build, of which without ROS only the tests of its parts can run
 r2r_tests() {
-  cargo_tests "$logs/rust_r2r.log" --config 'profile.dev.package.touchup.opt-level=0' \
-    --no-default-features --features r2r-check --lib ros::r2r
+  cargo_tests "$logs/rust_r2r.log" "${unoptimised[@]}" --no-default-features --features r2r-check --lib ros::r2r
 }
 
 python_tests() {
@@ -140,8 +143,12 @@ PYTHON
 }
 
 ur_feature || skip "$(cat tests/ur/*.rs | grep -c '^#\[test\]')" "a UR arm needs the shared library of Python (Debian: apt-get install python3-dev)"
+programs=(--test rooms)
+[ "${#ur[@]}" -eq 0 ] || programs+=(--test ur)
 stage "build of the Rust tests" build_tests
-stage "Rust tests" cargo_tests "$logs/rust.log" "${ur[@]}"
+stage "Rust tests" cargo_tests "$logs/rust.log" "${ur[@]}" "${programs[@]}"
+stage "Rust unit tests" cargo_tests "$logs/rust_unit.log" "${unoptimised[@]}" "${ur[@]}" --lib
+stage "Rust documentation tests" cargo_tests "$logs/rust_doc.log" "${ur[@]}" --doc
 stage "r2r" r2r_tests
 if [ ! -x "$target/debug/touchup" ]; then
   fail "cargo test built no $target/debug/touchup"
