@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
+# proofs that take minutes: tests/all.sh --full alone collects them
+collect_ignore = [] if os.environ.get("TOUCHUP_FULL") else ["test_ros_fastdds_network.py"]
 
 
 @pytest.fixture(scope="session")
