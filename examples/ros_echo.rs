@@ -10,7 +10,8 @@ use std::thread;
 use touchup::ros::arguments::{NodeConfig, split};
 use touchup::ros::dds;
 use touchup::ros::messages::{
-    ColorRGBA, HapticMismatch, Marker, Point, ProbeFeedback, ProbeResponse, SetBoolResponse, UndoResponse, Vector3,
+    ColorRGBA, DetectFeaturesResponse, Feature, FeatureArray, HapticMismatch, Marker, Point, ProbeFeatureResponse,
+    ProbeFeedback, ProbeResponse, ProbeResult, ProbeTouch, SetBoolResponse, UndoResponse, Vector3,
 };
 use touchup::ros::port::{Arrival, Call, GoalEnd, Publication};
 
@@ -23,8 +24,26 @@ fn tile(id: i32) -> Marker {
     Marker { ns: "mesh".into(), id, r#type: Marker::TRIANGLE_LIST, scale, points, colors, ..Marker::default() }
 }
 
+/// Features that are found, more than an answer can name.
+const FEATURES: u32 = 300;
+/// As many as an answer of the node names at most.
+const MOST_NAMED: u32 = 128;
+/// Of one probing.
+const TOUCHES: u32 = 20;
+
+fn outline() -> Feature {
+    Feature { kind: Feature::KIND_SLOT, points: vec![Point::default(); 2], ..Feature::default() }
+}
+
+/// One with as long a curve as the node publishes.
+fn touch(id: u32, index: u32) -> ProbeTouch {
+    let row = || (0..2000).map(|i| i as f32).collect();
+    let (curve_time, curve_travel, curve_force, curve_lateral_force) = (row(), row(), row(), row());
+    ProbeTouch { id, index, curve_time, curve_travel, curve_force, curve_lateral_force, ..ProbeTouch::default() }
+}
+
 fn main() -> anyhow::Result<()> {
-    tracing_subscriber::fmt().with_writer(std::io::stderr).with_max_level(tracing::Level::WARN).init();
+    tracing_subscriber::fmt().with_writer(std::io::stderr).with_env_filter("warn,touchup=info").init();
     let (own, ros) = split(std::env::args().skip(1));
     let tiles: i32 = own.first().map_or(Ok(0), |count| count.parse())?;
     let config = NodeConfig::new(&ros, |name| std::env::var(name).ok())?;
@@ -45,7 +64,7 @@ fn main() -> anyhow::Result<()> {
                 ..HapticMismatch::default()
             })),
             Arrival::Call(Call::Undo(request, reply)) => {
-                // as long as it is asked for: above 1.4 kB it goes out in fragments
+                // as long as it is asked for: in the enhanced mapping it is cut where it fits into no packet
                 let message = "echo".repeat(request.strokes as usize);
                 let answer = UndoResponse { success: true, message, mesh_version: 1 << 40, ..Default::default() };
                 reply.send(UndoResponse { strokes: request.strokes, ..answer });
@@ -53,10 +72,33 @@ fn main() -> anyhow::Result<()> {
             Arrival::Call(Call::Pause(request, reply)) => {
                 reply.send(SetBoolResponse { success: request.data, message: "echo".into() });
             }
+            Arrival::Call(Call::Detect(_, reply)) => {
+                let features = (0..FEATURES).map(|id| Feature { id, ..outline() }).collect();
+                let array = FeatureArray { mesh_version: 7, features, ..FeatureArray::default() };
+                port.publish(Publication::Features(array));
+                reply.send(DetectFeaturesResponse {
+                    success: true,
+                    message: "300 slots".to_owned(),
+                    mesh_version: 7,
+                    count: FEATURES,
+                    ids: (0..MOST_NAMED).collect(),
+                });
+            }
+            Arrival::Call(Call::ProbeFeature(request, reply)) => {
+                for index in 0..TOUCHES {
+                    port.publish(Publication::ProbeTouch(Box::new(touch(request.id, index))));
+                }
+                let result = ProbeResult { id: request.id, code: 1, feature: outline(), ..ProbeResult::default() };
+                let result = ProbeResult { message: "reached".to_owned(), touch_count: TOUCHES, ..result };
+                port.publish(Publication::ProbeResult(Box::new(result.clone())));
+                reply.send(ProbeFeatureResponse { result });
+            }
             Arrival::Call(Call::Probe(request, goal)) => {
                 goal.accept.send(!request.ids.is_empty());
                 (0..3).for_each(|touch| (goal.feedback.0)(ProbeFeedback { touch, ..ProbeFeedback::default() }));
-                goal.result.send((GoalEnd::Succeeded, ProbeResponse { code: 4, ..ProbeResponse::default() }));
+                let (ids, codes) = ((0..MOST_NAMED).collect(), vec![4; MOST_NAMED as usize]);
+                let result = ProbeResponse { code: 4, ids, codes, ..ProbeResponse::default() };
+                goal.result.send((GoalEnd::Succeeded, result));
             }
             Arrival::SetParameter(_, _, reply) => reply.send(Ok(())),
             Arrival::Shutdown => break,

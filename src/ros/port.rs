@@ -9,9 +9,9 @@ use std::sync::mpsc::SyncSender;
 use super::messages::{
     Clock, DetectFeaturesRequest, DetectFeaturesResponse, DiagnosticArray, FeatureArray, FlagFeatureRequest,
     FlagFeatureResponse, HapticMismatch, Marker, MarkerArray, MeshPatch, Path, PointStamped, PoseStamped,
-    ProbeFeatureRequest, ProbeFeatureResponse, ProbeFeedback, ProbeGoal, ProbeResponse, ResyncMeshRequest,
-    ResyncMeshResponse, SaveMeshRequest, SaveMeshResponse, SetBoolRequest, SetBoolResponse, TFMessage, TriggerResponse,
-    UndoRequest, UndoResponse, UnflagFeatureRequest, UnflagFeatureResponse, WrenchStamped,
+    ProbeFeatureRequest, ProbeFeatureResponse, ProbeFeedback, ProbeGoal, ProbeResponse, ProbeResult, ProbeTouch,
+    ResyncMeshRequest, ResyncMeshResponse, SaveMeshRequest, SaveMeshResponse, SetBoolRequest, SetBoolResponse,
+    TFMessage, TriggerResponse, UndoRequest, UndoResponse, UnflagFeatureRequest, UnflagFeatureResponse, WrenchStamped,
 };
 use super::parameters::ParameterValue;
 
@@ -149,10 +149,21 @@ pub enum Publication {
     Tip(MarkerArray),
     /// `path`
     Path(Path),
+    /// `probe_results`
+    ProbeResult(Box<ProbeResult>),
+    /// `probe_touches`
+    ProbeTouch(Box<ProbeTouch>),
     /// `mismatch`
     Mismatch(HapticMismatch),
     /// `/diagnostics`
     Diagnostics(DiagnosticArray),
+}
+
+impl Publication {
+    /// Whether it is large and may wait: the mesh, and touches with their curves.
+    pub(super) fn may_wait(&self) -> bool {
+        matches!(self, Self::Tile(_) | Self::MeshPatch(_) | Self::ProbeTouch(_))
+    }
 }
 
 /// Who else is on a topic.

@@ -1,10 +1,12 @@
 // A ROS 2 node as rmw_fastrtps puts it on the wire, by Fast DDS alone: messages are passed through as bytes.
 //
-//   peer tiles DOMAIN COUNT     listens to rt/mesh as a late joiner until COUNT different tiles have come
-//   peer undo DOMAIN COUNT STEP calls rq/touchup/undo COUNT times with STEP, 2 STEP, ..., and checks each answer: so often "echo"
-//   peer echo DOMAIN COUNT      sends COUNT wrenches at 1 kHz, and times the mismatches that come back
+//   peer tiles DOMAIN COUNT          listens to rt/mesh as a late joiner until COUNT different tiles have come
+//   peer echo DOMAIN COUNT           sends COUNT wrenches, up to 32 ahead of the mismatches that come back, and times those
+//   peer listen DOMAIN TOPIC TYPE    listens; writes each message as a line "message HEXADECIMAL"
+//   peer call DOMAIN SERVICE TYPE    sends each line of standard input, hexadecimal, as a request; "answer HEXADECIMAL" comes back
 //
-// Prints "ok" with what it measured, or what is wrong; ends with 0 or 1.
+// Writes "matched" once its readers and writers have met those of others; echo and call go on with the next line of standard input,
+// as the others may know nothing of it yet. Ends with 0, listen and call at the end of standard input; with 1 after words of what is wrong.
 
 #include <algorithm>
 #include <chrono>
@@ -12,6 +14,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
+#include <iostream>
 #include <mutex>
 #include <set>
 #include <string>
@@ -21,6 +24,7 @@
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/publisher/DataWriter.hpp>
+#include <fastdds/dds/publisher/DataWriterListener.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
 #include <fastdds/dds/subscriber/DataReader.hpp>
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
@@ -83,7 +87,39 @@ struct Cdr {
   }
 };
 
-struct Listener : DataReaderListener {
+// how many endpoints of others have been met
+struct Met {
+  std::mutex mutex;
+  std::condition_variable more;
+  int count = 0;
+  void add(int change) {
+    std::lock_guard<std::mutex> lock(mutex);
+    count += change;
+    more.notify_all();
+  }
+  bool all(int wanted) {
+    std::unique_lock<std::mutex> lock(mutex);
+    if (!more.wait_for(lock, std::chrono::seconds(60), [&] { return count >= wanted; })) {
+      std::printf("nobody was met\n");
+      return false;
+    }
+    std::printf("matched\n");
+    std::fflush(stdout);
+    return true;
+  }
+};
+Met met;
+
+struct WriterListener : DataWriterListener {
+  void on_publication_matched(DataWriter*, const PublicationMatchedStatus& status) override { met.add(status.current_count_change); }
+};
+WriterListener writer_listener;
+
+struct ReaderListener : DataReaderListener {
+  void on_subscription_matched(DataReader*, const SubscriptionMatchedStatus& status) override { met.add(status.current_count_change); }
+};
+
+struct Listener : ReaderListener {
   std::mutex mutex;
   std::condition_variable more;
   std::vector<std::pair<Bytes, SampleInfo>> got;
@@ -133,7 +169,7 @@ struct Node {
     qos.reliability().kind = reliable ? RELIABLE_RELIABILITY_QOS : BEST_EFFORT_RELIABILITY_QOS;
     qos.endpoint().history_memory_policy = eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
     auto* publisher = participant->create_publisher(PUBLISHER_QOS_DEFAULT);
-    return publisher->create_datawriter(topic(name, type_name), qos);
+    return publisher->create_datawriter(topic(name, type_name), qos, &writer_listener);
   }
 };
 
@@ -147,7 +183,7 @@ int tiles(int domain, size_t count) {
   Bytes bytes;
   SampleInfo info;
   while (ids.size() < count) {
-    if (!listener.next(bytes, info, std::chrono::seconds(20))) {
+    if (!listener.next(bytes, info, std::chrono::seconds(60))) {
       std::printf("only %zu of %zu tiles came\n", ids.size(), count);
       return 1;
     }
@@ -167,56 +203,72 @@ int tiles(int domain, size_t count) {
   return 0;
 }
 
-int undo(int domain, uint32_t count, uint32_t step) {
+Bytes from_hexadecimal(const std::string& digits) {
+  Bytes bytes;
+  for (size_t i = 0; i + 1 < digits.size(); i += 2) bytes.push_back(std::stoul(digits.substr(i, 2), nullptr, 16));
+  return bytes;
+}
+
+void write(const char* what, const Bytes& bytes) {
+  std::printf("%s ", what);
+  for (const auto byte : bytes) std::printf("%02x", byte);
+  std::printf("\n");
+  std::fflush(stdout);
+}
+
+int call(int domain, const std::string& service, const std::string& type) {
   Listener listener;
   Node node(domain);
-  auto* reader = node.reader("rr/touchup/undoReply", "touchup_msgs::srv::dds_::Undo_Response_", false, listener);
-  auto* writer = node.writer("rq/touchup/undoRequest", "touchup_msgs::srv::dds_::Undo_Request_");
-  std::vector<double> times;
-  for (uint32_t strokes = step; strokes <= count * step; strokes += step) {
-    std::string expected;
-    for (uint32_t i = 0; i < strokes; ++i) expected += "echo";
-    const auto until = Clock::now() + std::chrono::seconds(20);
-    bool answered = false;
-    while (!answered && Clock::now() < until) {
-      Bytes request = {0, 1, 0, 0, 0, 0, 0, 0};
-      std::memcpy(&request[4], &strokes, 4);
-      WriteParams params;
-      // as rmw_fastrtps: the answer is for this reader
-      params.related_sample_identity().writer_guid(reader->guid());
-      const auto begin = Clock::now();
-      writer->write(&request, params);
-      const auto wanted = params.sample_identity().sequence_number();
-      Bytes bytes;
-      SampleInfo info;
-      // before both sides know each other an answer may be lost: ask again
-      while (!answered && listener.next(bytes, info, std::chrono::milliseconds(500))) {
-        if (info.related_sample_identity.sequence_number() != wanted) continue;
-        Cdr cdr{bytes};
-        const bool success = cdr.number<uint8_t>();
-        const bool is_right = success && cdr.text() == expected && cdr.number<uint32_t>() == strokes &&
-                              cdr.number<uint64_t>() == uint64_t(1) << 40;
-        if (!is_right || info.related_sample_identity.writer_guid() != reader->guid()) {
-          std::printf("call %u has a wrong answer\n", strokes);
-          return 1;
-        }
-        times.push_back(std::chrono::duration<double, std::micro>(Clock::now() - begin).count());
-        answered = true;
-      }
-    }
-    if (!answered) {
-      std::printf("call %u has no answer\n", strokes);
+  const auto answers = "rr" + service + "Reply", requests = "rq" + service + "Request";
+  auto* reader = node.reader(answers.c_str(), (type + "_Response_").c_str(), false, listener);
+  auto* writer = node.writer(requests.c_str(), (type + "_Request_").c_str());
+  if (!met.all(2)) return 1;
+  for (std::string line; std::getline(std::cin, line);) {
+    Bytes request = from_hexadecimal(line);
+    WriteParams params;
+    // as rmw_fastrtps: the answer is for this reader
+    params.related_sample_identity().writer_guid(reader->guid());
+    writer->write(&request, params);
+    const auto wanted = params.sample_identity().sequence_number();
+    Bytes bytes;
+    SampleInfo info;
+    if (!listener.next(bytes, info, std::chrono::seconds(60))) {
+      std::printf("no answer\n");
       return 1;
     }
+    const auto& named = info.related_sample_identity;
+    if (named.sequence_number() != wanted || named.writer_guid() != reader->guid()) {
+      std::printf("the answer names another request\n");
+      return 1;
+    }
+    write("answer", bytes);
   }
-  std::sort(times.begin(), times.end());
-  std::printf("ok %u calls p50 %.0f us max %.0f us\n", count, times[times.size() / 2], times.back());
   return 0;
 }
 
+int listen(int domain, const char* topic, const char* type) {
+  Listener listener;
+  Node node(domain);
+  node.reader(topic, type, false, listener);
+  if (!met.all(1)) return 1;
+  std::thread writing([&] {
+    Bytes bytes;
+    SampleInfo info;
+    while (listener.next(bytes, info, std::chrono::hours(1))) write("message", bytes);
+  });
+  writing.detach();
+  for (std::string line; std::getline(std::cin, line);) {
+  }
+  std::quick_exit(0);
+}
+
 // when each of the messages came back
-struct Times : DataReaderListener {
+struct Times : ReaderListener {
+  std::mutex mutex;
+  std::condition_variable more;
   std::vector<Clock::time_point> came;
+  size_t count = 0;
+  bool in_order = true;
   explicit Times(size_t count) : came(count) {}
   void on_data_available(DataReader* reader) override {
     Bytes bytes;
@@ -225,7 +277,11 @@ struct Times : DataReaderListener {
       if (!info.valid_data) continue;
       Cdr cdr{bytes};
       const auto number = cdr.number<uint32_t>();
+      std::lock_guard<std::mutex> lock(mutex);
+      in_order = in_order && number == count;
       if (number < came.size()) came[number] = Clock::now();
+      ++count;
+      more.notify_one();
     }
   }
 };
@@ -235,21 +291,29 @@ int echo(int domain, uint32_t count) {
   Node node(domain);
   node.reader("rt/mismatch", "touchup_msgs::msg::dds_::HapticMismatch_", false, times, false);
   auto* writer = node.writer("rt/stylus/wrench", "geometry_msgs::msg::dds_::WrenchStamped_", false);
-  std::this_thread::sleep_for(std::chrono::seconds(3));
+  std::string line;
+  if (!met.all(2) || !std::getline(std::cin, line)) return 1;
   std::vector<Clock::time_point> sent(count);
-  auto next = Clock::now();
+  const auto until_behind = [&](size_t wanted) {
+    std::unique_lock<std::mutex> lock(times.mutex);
+    return times.more.wait_for(lock, std::chrono::seconds(60), [&] { return times.count >= wanted || !times.in_order; });
+  };
+  constexpr uint32_t AHEAD = 32;
   for (uint32_t number = 0; number < count; ++number) {
     Bytes wrench(4 + 16 + 48, 0);
     wrench[1] = 1;
     std::memcpy(&wrench[4], &number, 4);
     wrench[12] = 2;
     wrench[16] = 's';
+    if (number >= AHEAD && !until_behind(number - AHEAD + 1)) break;
     sent[number] = Clock::now();
     writer->write(&wrench);
-    next += std::chrono::milliseconds(1);
-    std::this_thread::sleep_until(next);
   }
-  std::this_thread::sleep_for(std::chrono::seconds(1));
+  until_behind(count);
+  if (!times.in_order) {
+    std::printf("wrench %zu or the one before it did not come back in its turn\n", times.count);
+    return 1;
+  }
   std::vector<double> took;
   for (uint32_t number = 0; number < count; ++number)
     if (times.came[number] != Clock::time_point{})
@@ -265,11 +329,11 @@ int echo(int domain, uint32_t count) {
 }
 
 int main(int argc, char** argv) {
-  if (argc == 4 && std::string(argv[1]) == "tiles") return tiles(std::stoi(argv[2]), std::stoul(argv[3]));
-  if (argc == 5 && std::string(argv[1]) == "undo") {
-    return undo(std::stoi(argv[2]), std::stoul(argv[3]), std::stoul(argv[4]));
-  }
-  if (argc == 4 && std::string(argv[1]) == "echo") return echo(std::stoi(argv[2]), std::stoul(argv[3]));
-  std::printf("usage: peer tiles|undo|echo DOMAIN COUNT [STEP]\n");
+  const std::string what = argc > 1 ? argv[1] : "";
+  if (argc == 4 && what == "tiles") return tiles(std::stoi(argv[2]), std::stoul(argv[3]));
+  if (argc == 4 && what == "echo") return echo(std::stoi(argv[2]), std::stoul(argv[3]));
+  if (argc == 5 && what == "call") return call(std::stoi(argv[2]), argv[3], argv[4]);
+  if (argc == 5 && what == "listen") return listen(std::stoi(argv[2]), argv[3], argv[4]);
+  std::printf("usage: peer tiles|echo|call|listen DOMAIN ...\n");
   return 1;
 }

@@ -13,7 +13,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 IS_FULL = bool(os.environ.get("TOUCHUP_FULL"))
-collect_ignore = [] if IS_FULL else ["test_ros_rviz.py", "test_ros_fastdds.py", "test_ros_network.py"]
+collect_ignore = [] if IS_FULL else ["test_ros_rviz.py", "test_ros_fastdds_network.py", "test_ros_network.py"]
 
 
 def pytest_configure(config):

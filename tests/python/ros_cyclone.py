@@ -293,6 +293,81 @@ class GetParametersResponse:
     values: sequence[ParameterValue]
 
 
+@message("rcl_interfaces/srv/GetParameterTypes_Request")
+class GetParameterTypesRequest:
+    guid: uint64
+    seq: int64
+    names: sequence[str]
+
+
+@message("rcl_interfaces/srv/GetParameterTypes_Response")
+class GetParameterTypesResponse:
+    guid: uint64
+    seq: int64
+    types: sequence[uint8]
+
+
+@message("rcl_interfaces/srv/ListParameters_Request")
+class ListParametersRequest:
+    guid: uint64
+    seq: int64
+    prefixes: sequence[str]
+    depth: uint64
+
+
+@message("rcl_interfaces/msg/ListParametersResult")
+class ListParametersResult:
+    names: sequence[str]
+    prefixes: sequence[str]
+
+
+@message("rcl_interfaces/srv/ListParameters_Response")
+class ListParametersResponse:
+    guid: uint64
+    seq: int64
+    result: ListParametersResult
+
+
+@message("rcl_interfaces/msg/FloatingPointRange")
+class FloatingPointRange:
+    from_value: float64
+    to_value: float64
+    step: float64
+
+
+@message("rcl_interfaces/msg/IntegerRange")
+class IntegerRange:
+    from_value: int64
+    to_value: int64
+    step: uint64
+
+
+@message("rcl_interfaces/msg/ParameterDescriptor")
+class ParameterDescriptor:
+    name: str
+    type: uint8
+    description: str
+    additional_constraints: str
+    read_only: bool
+    dynamic_typing: bool
+    floating_point_range: sequence[FloatingPointRange]
+    integer_range: sequence[IntegerRange]
+
+
+@message("rcl_interfaces/srv/DescribeParameters_Request")
+class DescribeParametersRequest:
+    guid: uint64
+    seq: int64
+    names: sequence[str]
+
+
+@message("rcl_interfaces/srv/DescribeParameters_Response")
+class DescribeParametersResponse:
+    guid: uint64
+    seq: int64
+    descriptors: sequence[ParameterDescriptor]
+
+
 @message("touchup_msgs/msg/ProbeSettings")
 class ProbeSettings:
     quantity: uint8
@@ -344,9 +419,37 @@ class Feature:
     points: sequence[Point]
 
 
+@message("touchup_msgs/msg/FeatureArray")
+class FeatureArray:
+    header: Header
+    session: str
+    mesh_version: uint64
+    features: sequence[Feature]
+    unexplained: float64
+
+
+@message("touchup_msgs/srv/DetectFeatures_Request")
+class DetectFeaturesRequest:
+    guid: uint64
+    seq: int64
+    kinds: sequence[uint8]
+
+
+@message("touchup_msgs/srv/DetectFeatures_Response")
+class DetectFeaturesResponse:
+    guid: uint64
+    seq: int64
+    success: bool
+    message: str
+    mesh_version: uint64
+    count: uint32
+    ids: sequence[uint32]
+
+
 @message("touchup_msgs/msg/ProbeTouch")
 class ProbeTouch:
-    stamp: Time
+    header: Header
+    id: uint32
     index: uint32
     verdict: uint8
     accepted: bool
@@ -369,6 +472,7 @@ class ProbeTouch:
 
 @message("touchup_msgs/msg/ProbeResult")
 class ProbeResult:
+    header: Header
     id: uint32
     code: uint8
     message: str
@@ -376,7 +480,7 @@ class ProbeResult:
     uncertainty: float64
     duration: float64
     max_force: float64
-    touches: sequence[ProbeTouch]
+    touch_count: uint32
 
 
 @message("touchup_msgs/srv/FlagFeature_Request")
@@ -409,7 +513,6 @@ class ProbeFeatureRequest:
 class ProbeFeatureResponse:
     guid: uint64
     seq: int64
-    header: Header
     result: ProbeResult
 
 
@@ -461,7 +564,8 @@ class GetResultResponse:
     header: Header
     code: uint8
     message: str
-    results: sequence[ProbeResult]
+    ids: sequence[uint32]
+    codes: sequence[uint8]
 
 
 @message("touchup_msgs/action/Probe_FeedbackMessage")

@@ -1,6 +1,6 @@
 """Computers of their own, as network namespaces, and the network between them: a hub that loses packets and breaks down.
 
-Each computer has one interface of 1500 bytes, a TAP device whose other end is a thread here. What one sends goes to all
+Each computer has one interface, a TAP device whose other end is a thread here. What one sends goes to all
 others, as on a hub: addresses and multicast need nothing else. Needs root (or user namespaces), iproute2 and /dev/net/tun.
 """
 
@@ -17,7 +17,7 @@ import pytest
 
 CLONE_NEWNET = 0x40000000
 TUNSETIFF, IFF_TAP, IFF_NO_PI = 0x400454CA, 0x0002, 0x1000
-MTU = 1500
+ETHERNET, IP = 1500, b"\x08\x00"
 libc = ctypes.CDLL(None, use_errno=True)
 
 
@@ -41,11 +41,14 @@ def enter(path):
 class Hub:
     """A network of computers with these names; `wrapper(name)` runs a command on one."""
 
-    def __init__(self, names, loss, seed=1):
+    def __init__(self, names, loss, seed=1, packet=ETHERNET):
         needed()
+        self.packet = packet
         self.loss, self.random, self.is_down, self.is_over = loss, random.Random(seed), False, False
         self.names = {name: f"touchup-{name}-{os.getpid()}" for name in names}
         self.passed = self.dropped = 0
+        # by who sent them, the packets that are part of a larger one
+        self.parted = dict.fromkeys(names, 0)
         self.taps = []
         for number, namespace in enumerate(self.names.values()):
             ip("netns", "add", namespace)
@@ -57,8 +60,7 @@ class Hub:
         self.thread = threading.Thread(target=self.forward, daemon=True)
         self.thread.start()
 
-    @staticmethod
-    def tap(namespace):
+    def tap(self, namespace):
         """A new interface `cell` there, as a file that is open here."""
         made = []
 
@@ -73,7 +75,7 @@ class Hub:
         thread.start()
         thread.join()
         assert made, f"no interface in {namespace}"
-        ip("-n", namespace, "link", "set", "cell", "mtu", str(MTU))
+        ip("-n", namespace, "link", "set", "cell", "mtu", str(self.packet))
         return made[0]
 
     def forward(self):
@@ -89,7 +91,10 @@ class Hub:
                 frame = os.read(tap, 2048)
             except BlockingIOError:
                 return
-            assert len(frame) <= MTU + 14
+            assert len(frame) <= self.packet + 14
+            # more of it comes, or it begins somewhere in the larger one
+            if frame[12:14] == IP and struct.unpack("!H", frame[20:22])[0] & 0x3FFF:
+                self.parted[list(self.names)[self.taps.index(tap)]] += 1
             for other in self.taps:
                 if other == tap:
                     continue

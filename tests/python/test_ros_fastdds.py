@@ -1,41 +1,20 @@
-"""The port on DDS against Fast DDS at its default buffers: what ROS 2 nodes with rmw_fastrtps put on the wire.
+"""The port on DDS against Fast DDS at its default buffers: what ROS 2 nodes with rmw_fastrtps put on the wire."""
 
-tests/fastdds/peer.cpp is built by this test with Debian's Fast DDS, or with the one below FASTDDS_ROOT.
-"""
-
-import os
-import shutil
 import subprocess
-from pathlib import Path
 
+import numpy
 import pytest
-from conftest import ROOT
 from ros_echo import Echo, domains
+from ros_fastdds import FastDds
+from ros_tables import code, table
 
-TIMEOUT_S = 120
+PARAMETERS = {code(row["name"])[0]: row for row in table("name", "type", "default")}
+TOO_LARGE = "an answer does not fit into one packet"
 
 
 @pytest.fixture(scope="module")
-def peer(tmp_path_factory):
-    """Runs the peer: peer("undo", domain, 10, 1) -> what it printed."""
-    root = Path(os.environ.get("FASTDDS_ROOT", "/"))
-    if not (root / "usr/include/fastdds").is_dir() or not shutil.which("g++"):
-        pytest.skip("needs Fast DDS and a C++ compiler: apt-get install libfastrtps-dev g++")
-    binary = tmp_path_factory.mktemp("fastdds") / "peer"
-    multiarch = next((root / "usr/lib").glob("*/libfastrtps.so")).parent
-    includes = [f"-I{root}/usr/include", f"-I{root}/usr/include/{multiarch.name}"]
-    link = [f"-L{multiarch}", "-lfastrtps", "-lfastcdr", f"-Wl,-rpath-link,{multiarch}"]
-    command = ["g++", "-std=c++17", "-O1", *includes, ROOT / "tests/fastdds/peer.cpp", "-o", binary, *link]
-    subprocess.run(command, check=True, timeout=TIMEOUT_S)
-    environment = {**os.environ, "LD_LIBRARY_PATH": str(multiarch)}
-
-    def run(*arguments, wrapper=()):
-        command = [*wrapper, binary, *map(str, arguments)]
-        ran = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=TIMEOUT_S)
-        assert ran.returncode == 0, ran.stdout + ran.stderr
-        return ran.stdout
-
-    return run
+def fast_dds(tmp_path_factory):
+    return FastDds(tmp_path_factory.mktemp("fastdds"))
 
 
 @pytest.fixture
@@ -43,40 +22,182 @@ def domain():
     return next(domains)
 
 
-def test_who_comes_late_gets_every_tile_at_default_buffers(peer, domain):
-    with Echo(domain, "400"):
-        assert "ok 400 tiles" in peer("tiles", domain, 400)
+class Services:
+    """Clients of the services of parameters, made when they are asked."""
+
+    def __init__(self, fast_dds, echo, domain, wrapper=()):
+        self.make = lambda name, kind: fast_dds.client(echo, domain, f"/touchup/{name}", f"rcl_interfaces/srv/{kind}", wrapper)
+        self.clients = {}
+
+    def __getattr__(self, name):
+        if name not in self.clients:
+            self.clients[name] = self.make(name, "".join(word.title() for word in name.split("_")))
+        return self.clients[name]
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        for client in self.clients.values():
+            client.__exit__()
 
 
-def test_a_service_answers_in_the_mapping_of_fast_dds(peer, domain):
-    with Echo(domain):
-        assert "ok 100 calls" in peer("undo", domain, 100, 1)
+def parameters_are_listed_dumped_and_described(fast_dds, echo, domain, wrapper=()):
+    """As `ros2 param list`, `dump` and `describe` ask, of all at once; what does not fit fails with words."""
+    with Services(fast_dds, echo, domain, wrapper) as services:
+        names = services.list_parameters(prefixes=[], depth=0).result.names
+        assert set(names) == {*PARAMETERS, "use_sim_time"}
+        kinds = {"bool": 1, "double": 3, "string": 4}
+        types = dict(zip(names, services.get_parameter_types(names=names).types, strict=True))
+        assert {name: types[name] for name in PARAMETERS} == {name: kinds[row["type"]] for name, row in PARAMETERS.items()}
+        values = dict(zip(names, services.get_parameters(names=names).values, strict=True))
+        print("get_parameters of all:", services.get_parameters.bytes, "bytes")
+        assert values["flag_kind"].string_value == "hole" and values["view_rate_hz"].double_value == 20.0
+        assert not echo.has(TOO_LARGE)
+
+        # one by one with its description
+        for name, row in PARAMETERS.items():
+            (described,) = services.describe_parameters(names=[name]).descriptors
+            assert (described.name, described.description) == (name, row["what"].replace("`", ""))
+        assert not echo.has(TOO_LARGE)
+        # all at once without
+        described = {one.name: one for one in services.describe_parameters(names=names).descriptors}
+        print("describe_parameters of all:", services.describe_parameters.bytes, "bytes")
+        assert list(described) == names and not any(one.description for one in described.values())
+        assert (described["stale_ms"].floating_point_range[0].to_value, described["robot"].additional_constraints) == (
+            10_000.0,
+            "one of none, sim, ur",
+        )
+        assert described["scan"].read_only and not described["stale_ms"].read_only
+        echo.wait_for(lambda: echo.has(TOO_LARGE, '"~/describe_parameters"', "bytes", "service_mapping:=cyclone", "r2r"))
+
+        # more than fits: well formed, empty, and told
+        assert not echo.has(TOO_LARGE, '"~/get_parameters"')
+        assert len(services.get_parameters(names=2 * names).values) == 0
+        echo.wait_for(lambda: echo.has(TOO_LARGE, '"~/get_parameters"', "fewer names"))
+        # and the next is answered as ever
+        assert len(services.get_parameters(names=names).values) == len(names)
+
+        # what is set is told even where the reasons do not fit
+        store = fast_dds.store
+        lists = [numpy.array([], dtype=kind) for kind in ("uint8", "bool", "int64", "float64")]
+        value = store.types["rcl_interfaces/msg/ParameterValue"](4, False, 0, 0.0, "a" * 500, *lists, [])
+        wrong = store.types["rcl_interfaces/msg/Parameter"]("flag_kind", value)
+        results = services.set_parameters(parameters=[wrong] * 5).results
+        assert [(result.successful, result.reason) for result in results] == [(False, "")] * 5
+        (result,) = services.set_parameters(parameters=[wrong]).results
+        assert not result.successful and result.reason.startswith('flag_kind is "aaa')
 
 
-def test_an_answer_in_fragments_is_whole(peer, domain):
-    """Up to 48 kB: what is kept below that is in src/ros/node/arm/answer.rs."""
-    with Echo(domain):
-        assert "ok 12 calls" in peer("undo", domain, 12, 1000)
+def features_are_on_the_topic(fast_dds, echo, domain, wrapper=()):
+    features = fast_dds.listener(echo, domain, "/features", "touchup_msgs/msg/FeatureArray", wrapper)
+    detect = fast_dds.client(echo, domain, "/touchup/detect_features", "touchup_msgs/srv/DetectFeatures", wrapper)
+    with features, detect:
+        answer = detect(kinds=numpy.array([], dtype="uint8"))
+        print("detect_features:", detect.bytes, "bytes")
+        assert (answer.success, answer.message, answer.count, list(answer.ids)) == (True, "300 slots", 300, list(range(128)))
+        published = features.next()
+        assert published.mesh_version >= answer.mesh_version
+        assert [feature.id for feature in published.features] == list(range(300))
 
 
-def test_no_wrench_of_a_kilohertz_is_lost(peer, domain):
+def what_was_probed_is_on_topics(fast_dds, echo, domain, wrapper=()):
+    results = fast_dds.listener(echo, domain, "/probe_results", "touchup_msgs/msg/ProbeResult", wrapper)
+    touches = fast_dds.listener(echo, domain, "/probe_touches", "touchup_msgs/msg/ProbeTouch", wrapper)
+    probe = fast_dds.client(echo, domain, "/touchup/probe_feature", "touchup_msgs/srv/ProbeFeature", wrapper)
+    with results, touches, probe:
+        settings = fast_dds.store.types["touchup_msgs/msg/ProbeSettings"](1, 0.1, 0.95, 0, 9, 60.0, 2.0, 0.01, 0.1, 0.02, True)
+        result = probe(id=9, settings=settings).result
+        print("probe_feature:", probe.bytes, "bytes")
+        assert (result.id, result.message, result.touch_count, len(result.feature.points)) == (9, "reached", 20, 2)
+        assert results.next().message == "reached"
+        felt = [touches.next() for _ in range(20)]
+        assert [(touch.id, touch.index, len(touch.curve_force)) for touch in felt] == [(9, index, 2000) for index in range(20)]
+
+
+def the_result_of_a_goal_comes(fast_dds, echo, domain, wrapper=()):
+    types = fast_dds.store.types
+    goal = types["unique_identifier_msgs/msg/UUID"](numpy.arange(16, dtype="uint8"))
+    settings = types["touchup_msgs/msg/ProbeSettings"](1, 0.1, 0.95, 0, 9, 60.0, 2.0, 0.01, 0.1, 0.02, True)
+    action = "/touchup/probe/_action"
+    send = fast_dds.client(echo, domain, f"{action}/send_goal", "touchup_msgs/action/Probe_SendGoal", wrapper)
+    get = fast_dds.client(echo, domain, f"{action}/get_result", "touchup_msgs/action/Probe_GetResult", wrapper)
+    with send, get:
+        wanted = types["touchup_msgs/action/Probe_Goal"](numpy.array([7, 8], dtype="uint32"), settings)
+        assert send(goal_id=goal, goal=wanted).accepted
+        answer = get(goal_id=goal)
+        print("get_result:", get.bytes, "bytes")
+        assert (answer.status, answer.result.code, list(answer.result.ids)) == (4, 4, list(range(128)))
+        assert list(answer.result.codes) == [4] * 128
+
+
+def a_long_text_is_cut_and_told(fast_dds, echo, domain, wrapper=()):
+    with fast_dds.client(echo, domain, "/touchup/undo", "touchup_msgs/srv/Undo", wrapper) as undo:
+        for strokes in range(1, 101):
+            answer = undo(strokes=strokes)
+            assert (answer.success, answer.message, answer.strokes) == (True, "echo" * strokes, strokes)
+            assert answer.mesh_version == 1 << 40
+        assert not echo.has(TOO_LARGE)
+        for strokes in [1000, 12_000]:
+            answer = undo(strokes=strokes)
+            assert (answer.success, answer.strokes, answer.mesh_version) == (True, strokes, 1 << 40)
+            assert answer.message.startswith("echo" * 200) and answer.message.endswith(" …")
+        echo.wait_for(lambda: echo.has(TOO_LARGE, '"~/undo"', "4028"))
+
+
+def test_who_comes_late_gets_every_tile_at_default_buffers(fast_dds, domain):
+    with Echo(domain, "400"), fast_dds.start("tiles", domain, 400) as peer:
+        assert "ok 400 tiles" in peer.wait()
+
+
+def test_parameters_are_listed_dumped_and_described(fast_dds, domain):
     with Echo(domain) as echo:
-        assert "ok 3000 echoes" in peer("echo", domain, 3000)
+        parameters_are_listed_dumped_and_described(fast_dds, echo, domain)
+
+
+def test_features_are_on_the_topic_that_the_answer_names(fast_dds, domain):
+    with Echo(domain) as echo:
+        features_are_on_the_topic(fast_dds, echo, domain)
+
+
+def test_what_was_probed_is_on_topics(fast_dds, domain):
+    with Echo(domain) as echo:
+        what_was_probed_is_on_topics(fast_dds, echo, domain)
+
+
+def test_the_result_of_a_goal_comes(fast_dds, domain):
+    with Echo(domain) as echo:
+        the_result_of_a_goal_comes(fast_dds, echo, domain)
+
+
+def test_a_long_text_is_cut_and_told(fast_dds, domain):
+    with Echo(domain) as echo:
+        a_long_text_is_cut_and_told(fast_dds, echo, domain)
+
+
+def test_every_wrench_comes_back_in_its_turn(fast_dds, domain):
+    with Echo(domain) as echo:
+        with fast_dds.start("echo", domain, 3000) as peer:
+            peer.wait_for(lambda: "matched" in peer.lines)
+            for topic in ["/stylus/wrench", "/mismatch"]:
+                echo.wait_for(lambda topic=topic: echo.has("Matched", f'"{topic}"', "count: 1"))
+            peer.write()
+            assert "ok 3000 echoes" in peer.wait()
     assert echo.has("dropped [0, 0] lost [0, 0] unsent [0, 0]")
 
 
-def test_the_wrong_mapping_is_told(peer, domain):
+def test_the_wrong_mapping_is_told(fast_dds, domain):
     with Echo(domain, "--ros-args", "-p", "service_mapping:=cyclone") as echo:
-        with pytest.raises((AssertionError, subprocess.TimeoutExpired)):
-            peer("undo", domain, 1, 1)
-        echo.wait_for(lambda: echo.has("WARN", "/touchup/undo", "-p service_mapping:=enhanced"))
+        with fast_dds.start("call", domain, "/touchup/undo", "touchup_msgs::srv::dds_::Undo"):
+            echo.wait_for(lambda: echo.has("WARN", "/touchup/undo", "-p service_mapping:=enhanced"))
 
 
-def test_loopback_is_network_enough(peer, domain):
+def test_loopback_is_network_enough(fast_dds, domain):
     """In a network namespace of its own, where there is nothing but lo."""
     inside = ["unshare", "--user", "--map-root-user", "--net"]
     if subprocess.run([*inside, "true"], capture_output=True).returncode:
         pytest.skip("needs network namespaces: sysctl kernel.unprivileged_userns_clone=1, or root")
     with Echo(domain, wrapper=[*inside, "sh", "-c", 'ip link set lo up && exec "$0" "$@"']) as echo:
         joined = ["nsenter", "--target", str(echo.process.pid), "--user", "--preserve-credentials", "--net"]
-        assert "ok 10 calls" in peer("undo", domain, 10, 1, wrapper=joined)
+        with fast_dds.client(echo, domain, "/touchup/undo", "touchup_msgs/srv/Undo", joined) as undo:
+            assert undo(strokes=3).message == "echo" * 3

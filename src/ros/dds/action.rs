@@ -17,7 +17,8 @@ use ros2_client::qos::{Durability, History};
 use ros2_client::{ActionServer, ActionTypeName, Node, RmwRequestId};
 
 use super::incoming::Listener;
-use super::services::{SERVICE, unreadable};
+use super::server::SERVICE;
+use super::services::unreadable;
 use super::topics::dds_name;
 use super::{RosError, Shared, mapping};
 use crate::ros::arguments::NodeConfig;
@@ -212,7 +213,8 @@ impl Probe {
     }
 
     fn send_result(&self, request_id: RmwRequestId, status: GoalStatusEnum, result: ProbeResponse) {
-        report("get_result", self.server.send_result(request_id, GetResultResponse { status, result }));
+        let answer = self.shared.room.fit_packet("~/probe/_action/get_result", GetResultResponse { status, result });
+        report("get_result", self.server.send_result(request_id, answer));
     }
 
     /// Somebody wants goals stopped; the node does it when it can.

@@ -23,6 +23,8 @@ const FAST_DDS: [u8; 2] = [0x01, 0x0f];
 const CYCLONE_DDS: [u8; 2] = [0x01, 0x10];
 /// Participants that are remembered; a domain holds 120.
 const MOST_PARTICIPANTS: usize = 1024;
+/// Callers of services that are remembered.
+const MOST_CALLERS: usize = 4096;
 
 pub(super) struct Graph {
     listener: DomainParticipantStatusListener,
@@ -37,6 +39,8 @@ pub(super) struct Graph {
     services: Vec<String>,
     /// our readers and writers: name in DDS, and who is matched
     matched: BTreeMap<GUID, (String, BTreeSet<GUID>)>,
+    /// what others call services with: the service in ROS, and what is so once both sides know each other
+    callers: BTreeMap<GUID, (String, &'static str)>,
     /// of the other participants
     vendors: BTreeMap<GUID, [u8; 2]>,
     /// said once for each
@@ -62,6 +66,7 @@ impl Graph {
             names: BTreeMap::new(),
             services: Vec::new(),
             matched: BTreeMap::new(),
+            callers: BTreeMap::new(),
             vendors: BTreeMap::new(),
             told: BTreeSet::new(),
             tiles: None,
@@ -100,6 +105,7 @@ impl Graph {
                     (None, _) => {}
                 }
                 self.vendors.retain(|guid, _| guid.prefix != id);
+                self.callers.retain(|guid, _| guid.prefix != id);
                 self.told.retain(|guid| guid.prefix != id);
                 self.unmatch(|guid| guid.prefix == id);
             }
@@ -115,6 +121,9 @@ impl Graph {
                 if is_new && self.tiles == Some(local) {
                     self.shared.arrivals.put(Arrival::Viewer);
                 }
+                if let Some((service, what)) = self.callers.get(&remote) {
+                    tracing::info!(service, "{what}");
+                }
             }
             Event::ReaderLost { guid, .. } | Event::WriterLost { guid, .. } => self.lost(guid),
             Event::RemoteReaderQosIncompatible { local_writer, requested_qos, offered_qos, remote_reader } => {
@@ -129,6 +138,7 @@ impl Graph {
 
     fn lost(&mut self, guid: GUID) {
         self.told.remove(&guid);
+        self.callers.remove(&guid);
         self.unmatch(|other| *other == guid);
     }
 
@@ -154,6 +164,15 @@ impl Graph {
     fn seen(&mut self, guid: GUID, topic: &str, type_name: &str) {
         if guid.prefix == self.own.prefix {
             return;
+        }
+        if self.callers.len() < MOST_CALLERS {
+            for (before, after, what) in
+                [("rq", "Request", "a caller is heard"), ("rr", "Reply", "a caller can be answered")]
+            {
+                if let Some(service) = topic.strip_prefix(before).and_then(|topic| topic.strip_suffix(after)) {
+                    self.callers.insert(guid, (service.to_owned(), what));
+                }
+            }
         }
         if let Some((name, ours)) = self.names.get(topic) {
             if ours != type_name && self.told.insert(guid) {

@@ -4,11 +4,13 @@
 //! small and urgent, answers among it; one the mesh, where a slow listener may hold things up.
 
 mod action;
+mod answers;
 mod graph;
 mod incoming;
 mod keep_alive;
 mod parameter_services;
 mod samples;
+mod server;
 mod services;
 mod topics;
 
@@ -20,6 +22,7 @@ use ros2_client::dds::rustdds;
 use ros2_client::{Context, Node, NodeName, NodeOptions, ServiceMapping};
 use thiserror::Error;
 
+use self::answers::Room;
 use super::arguments::NodeConfig;
 use super::arrivals::Arrivals;
 use super::clock::RosClock;
@@ -63,6 +66,7 @@ struct Shared {
     clock: RosClock,
     urgent: Outbox,
     mesh: Outbox,
+    room: Room,
 }
 
 struct DdsPort {
@@ -75,10 +79,8 @@ struct DdsPort {
 
 impl Port for DdsPort {
     fn publish(&self, publication: Publication) {
-        match publication {
-            Publication::Tile(_) | Publication::MeshPatch(_) => self.shared.mesh.put(publication),
-            _ => self.shared.urgent.put(publication),
-        }
+        let outbox = if publication.may_wait() { &self.shared.mesh } else { &self.shared.urgent };
+        outbox.put(publication);
     }
 
     fn now_ns(&self) -> i64 {
@@ -130,6 +132,7 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
         clock: RosClock::new(is_simulated),
         urgent: Outbox::default(),
         mesh: Outbox::default(),
+        room: Room::new(&mapping(config)),
     });
     // its own parameter services know one mapping alone, and nothing of ranges
     let options = parameter_services::declare(NodeOptions::new().start_parameter_services(false), &config.parameters);
@@ -137,9 +140,9 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
     let mut graph = graph::Graph::new(&context, &shared, config);
     let (urgent, mesh) = topics::writers(config, &mut node, &mut graph)?;
     let mut listeners = topics::readers(config, &mut node, &mut graph, &shared)?;
-    listeners.extend(services::servers(config, &mut node, &mut graph, &shared)?);
+    listeners.extend(services::servers(config, &context, &mut node, &mut graph, &shared)?);
     listeners.push(action::server(config, &mut node, &shared)?);
-    let parameters = parameter_services::servers(config, &mut node, &shared)?;
+    let parameters = parameter_services::servers(config, &context, &mut node, &shared)?;
     let node = Arc::new(node);
     listeners.extend(parameters.listeners(&node));
     listeners.push(Box::new(graph));

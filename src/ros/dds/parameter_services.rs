@@ -10,16 +10,18 @@ use ros2_client::rcl_interfaces::{
     GetParametersRequest, GetParametersResponse, ListParametersRequest, ListParametersResponse, ListParametersResult,
     SetParametersAtomicallyResponse, SetParametersRequest, SetParametersResponse,
 };
-use ros2_client::{Node, NodeOptions, Server};
+use ros2_client::{Context, Node, NodeOptions};
 
+use super::answers::Answer;
 use super::incoming::Listener;
-use super::services::{Service, server};
+use super::server::Server;
+use super::services::Service;
 use super::{RosError, Shared};
 use crate::ros::arguments::NodeConfig;
 use crate::ros::parameters::{Allowed, PARAMETERS, ParameterDescriptor, ParameterValue, Parameters, descriptor};
 use crate::ros::port::{Arrival, Reply};
 
-/// Parameters that one call may name; beyond that it is answered empty.
+/// Parameters that one call may name; those after them are passed over.
 const MOST_NAMES: usize = 1024;
 
 /// Tells ros2-client the values, so that it announces their changes on `/parameter_events`.
@@ -45,6 +47,7 @@ pub(super) struct ParameterServers {
 /// Makes the servers.
 pub(super) fn servers(
     config: &NodeConfig,
+    context: &Context,
     node: &mut Node,
     shared: &Arc<Shared>,
 ) -> Result<ParameterServers, RosError> {
@@ -52,12 +55,19 @@ pub(super) fn servers(
     Ok(ParameterServers {
         shared: shared.clone(),
         values: config.parameters.clone(),
-        get: server(config, node, "~/get_parameters", package, "GetParameters")?,
-        get_types: server(config, node, "~/get_parameter_types", package, "GetParameterTypes")?,
-        list: server(config, node, "~/list_parameters", package, "ListParameters")?,
-        describe: server(config, node, "~/describe_parameters", package, "DescribeParameters")?,
-        set: server(config, node, "~/set_parameters", package, "SetParameters")?,
-        set_atomically: server(config, node, "~/set_parameters_atomically", package, "SetParametersAtomically")?,
+        get: Arc::new(Server::new(config, context, node, "~/get_parameters", package, "GetParameters")?),
+        get_types: Arc::new(Server::new(config, context, node, "~/get_parameter_types", package, "GetParameterTypes")?),
+        list: Arc::new(Server::new(config, context, node, "~/list_parameters", package, "ListParameters")?),
+        describe: Arc::new(Server::new(config, context, node, "~/describe_parameters", package, "DescribeParameters")?),
+        set: Arc::new(Server::new(config, context, node, "~/set_parameters", package, "SetParameters")?),
+        set_atomically: Arc::new(Server::new(
+            config,
+            context,
+            node,
+            "~/set_parameters_atomically",
+            package,
+            "SetParametersAtomically",
+        )?),
     })
 }
 
@@ -118,7 +128,7 @@ fn answered<Q, A>(
 ) -> Box<dyn Listener>
 where
     Q: ros2_client::Message + Send + Sync + 'static,
-    A: ros2_client::Message + Send + Sync + 'static,
+    A: Answer + Send + Sync + 'static,
 {
     let call = Box::new(move |request, reply: Reply<A>| reply.send(answer(request)));
     Box::new(Service { name, server, shared: shared.clone(), call })
@@ -140,7 +150,7 @@ impl Held {
     }
 
     fn raw(&self, name: &str) -> raw::ParameterValue {
-        self.values().value(name).cloned().map_or(ros2_client::ParameterValue::NotSet, native).into()
+        raw_value(&self.values(), name)
     }
 
     /// Asks the node for one after the other, and answers when all are done.
@@ -204,6 +214,10 @@ impl Held {
     }
 }
 
+fn raw_value(values: &Parameters, name: &str) -> raw::ParameterValue {
+    values.value(name).cloned().map_or(ros2_client::ParameterValue::NotSet, native).into()
+}
+
 fn few(names: &[String]) -> &[String] {
     &names[..names.len().min(MOST_NAMES)]
 }
@@ -264,5 +278,75 @@ fn ours(value: raw::ParameterValue) -> Option<ParameterValue> {
         ros2_client::ParameterValue::Double(number) => Some(ParameterValue::Double(number)),
         ros2_client::ParameterValue::String(word) => Some(ParameterValue::String(word)),
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::answers::{Answer, ETHERNET, room, size};
+    use super::*;
+
+    fn names() -> Vec<String> {
+        PARAMETERS.iter().map(|declared| declared.name.to_owned()).collect()
+    }
+
+    /// What `ros2 param dump` asks for.
+    fn all_values(values: &Parameters) -> GetParametersResponse {
+        GetParametersResponse { values: names().iter().map(|name| raw_value(values, name)).collect() }
+    }
+
+    fn described() -> DescribeParametersResponse {
+        DescribeParametersResponse { values: names().iter().map(|name| describe(name)).collect() }
+    }
+
+    /// As a launch file starts it: paths where there are some.
+    fn launched() -> Parameters {
+        let mut values = Parameters::default();
+        let share = "/home/somebody/ws/install/touchup/share/touchup/config/probe.yaml";
+        for (name, path) in [("scene", share), ("scan", "/home/somebody/scans/part.ply"), ("tool_frame", "probe_tip")] {
+            values.set(name, &ParameterValue::String(path.to_owned())).unwrap();
+        }
+        values
+    }
+
+    #[test]
+    fn what_is_asked_of_all_parameters_fits_into_one_packet() {
+        let mut described_briefly = described();
+        described_briefly.reduce(room(ETHERNET));
+        let types = GetParameterTypesResponse { values: vec![0; PARAMETERS.len()] };
+        let live = PARAMETERS.iter().filter(|declared| declared.live);
+        let refused =
+            |one: &ParameterDescriptor| Parameters::default().set_live(one.name, &ParameterValue::Integer(-1));
+        let results = live.map(|one| result(refused(one).map_err(|why| why.to_string()))).collect();
+        let sizes = [
+            ("list_parameters", size(&list(&ListParametersRequest { prefixes: Vec::new(), depth: 0 }))),
+            ("get_parameters of all, as they are declared", size(&all_values(&Parameters::default()))),
+            ("get_parameters of all, with paths", size(&all_values(&launched()))),
+            ("get_parameter_types of all", size(&types)),
+            ("describe_parameters of all, without descriptions", size(&described_briefly)),
+            ("set_parameters of all that are live, refused", size(&SetParametersResponse { results })),
+        ];
+        println!("{} parameters; described in full: {} bytes", PARAMETERS.len(), size(&described()));
+        for (service, bytes) in sizes {
+            println!("{bytes:5} bytes of {} {service}", room(ETHERNET));
+            assert!(bytes <= room(ETHERNET), "{service}: {bytes} bytes");
+        }
+        // nothing but the descriptions is left out
+        let of = |one: &raw::ParameterDescriptor| (one.name.clone(), one.r#type, one.additional_constraints.clone());
+        assert_eq!(
+            described_briefly.values.iter().map(of).collect::<Vec<_>>(),
+            described().values.iter().map(of).collect::<Vec<_>>()
+        );
+        assert!(described_briefly.values.iter().all(|one| one.description.is_empty()));
+    }
+
+    #[test]
+    fn a_few_parameters_are_described_in_full() {
+        let described = |few: &[String]| few.iter().map(|name| describe(name)).collect();
+        let names = names();
+        let largest = names.windows(8).map(|few| size(&DescribeParametersResponse { values: described(few) }));
+        let largest = largest.max().unwrap();
+        println!("{largest} bytes of {}", room(ETHERNET));
+        assert!(largest <= room(ETHERNET));
     }
 }

@@ -3,13 +3,13 @@
 use std::sync::Arc;
 
 use ros2_client::dds::rustdds::mio1::event::Source;
-use ros2_client::qos::{History, QosProfile};
-use ros2_client::{Node, ReadError, RmwRequestId, Server, ServiceTypeName};
+use ros2_client::{Context, Node, ReadError};
 
+use super::answers::Answer;
 use super::graph::Graph;
 use super::incoming::Listener;
-use super::topics::dds_name;
-use super::{RosError, Shared, mapping};
+use super::server::{CallId, Server};
+use super::{RosError, Shared};
 use crate::ros::arguments::NodeConfig;
 use crate::ros::messages::*;
 use crate::ros::port::{Arrival, Call, Reply};
@@ -38,9 +38,6 @@ carried!(
     ProbeFeatureResponse,
 );
 
-/// As ROS 2 has it for services: nothing is lost, calls wait for each other.
-pub(super) const SERVICE: QosProfile = QosProfile::publisher_default().history(History::KeepLast { depth: 10 });
-
 /// One service: what it is called, and what is done with a request.
 pub(super) struct Service<Q: ros2_client::Message + 'static, A: ros2_client::Message + 'static> {
     pub name: &'static str,
@@ -52,15 +49,15 @@ pub(super) struct Service<Q: ros2_client::Message + 'static, A: ros2_client::Mes
 impl<Q, A> Listener for Service<Q, A>
 where
     Q: ros2_client::Message + Send + Sync + 'static,
-    A: ros2_client::Message + Send + Sync + 'static,
+    A: Answer + Send + Sync + 'static,
 {
     fn source(&mut self, _: usize) -> &mut dyn Source {
-        Arc::get_mut(&mut self.server).expect("sources are asked for before any request is answered")
+        Arc::get_mut(&mut self.server).expect("sources are asked for before any request is answered").source()
     }
 
     fn take(&mut self) {
         loop {
-            match self.server.receive_request() {
+            match self.server.take() {
                 Ok(Some((id, request))) => {
                     let reply = reply(self.name, &self.server, &self.shared, id);
                     (self.call)(request, reply);
@@ -79,47 +76,31 @@ pub(super) fn unreadable(name: &'static str, shared: &Shared, error: &ReadError)
 }
 
 /// Answers a request from the thread that sends.
-fn reply<Q, A>(name: &'static str, server: &Arc<Server<Q, A>>, shared: &Arc<Shared>, id: RmwRequestId) -> Reply<A>
+fn reply<Q, A>(name: &'static str, server: &Arc<Server<Q, A>>, shared: &Arc<Shared>, id: CallId) -> Reply<A>
 where
     Q: ros2_client::Message + Send + Sync + 'static,
-    A: ros2_client::Message + Send + Sync + 'static,
+    A: Answer + Send + Sync + 'static,
 {
     let (server, shared) = (server.clone(), shared.clone());
     Reply::new(move |answer| {
+        let answer = shared.room.fit(name, answer);
         shared.urgent.answer(Box::new(move || {
-            if let Err(error) = server.send_response(id, answer) {
+            if let Err(error) = server.send(id, answer) {
                 tracing::warn!(service = name, %error, "an answer is not sent");
             }
         }));
     })
 }
 
-/// Makes a server.
-pub(super) fn server<Q, A>(
-    config: &NodeConfig,
-    node: &mut Node,
-    name: &str,
-    package: &str,
-    type_name: &str,
-) -> Result<Arc<Server<Q, A>>, RosError>
-where
-    Q: ros2_client::Message + Clone + 'static,
-    A: ros2_client::Message + 'static,
-{
-    let name = dds_name(&config.resolve(name)?)?;
-    let type_name = ServiceTypeName::new(package, type_name);
-    let server = node.create_server(mapping(config), &name, &type_name, SERVICE, SERVICE);
-    server.map(Arc::new).map_err(|error| RosError::dds("offering a service", &error))
-}
-
 /// All services but those of parameters and the action.
 pub(super) fn servers(
     config: &NodeConfig,
+    context: &Context,
     node: &mut Node,
     graph: &mut Graph,
     shared: &Arc<Shared>,
 ) -> Result<Vec<Box<dyn Listener>>, RosError> {
-    let mut made = Services { config, node, graph, shared, listeners: Vec::new() };
+    let mut made = Services { config, context, node, graph, shared, listeners: Vec::new() };
     made.add("~/flag_feature", "touchup_msgs", "FlagFeature", Call::Flag)?;
     made.add("~/unflag_feature", "touchup_msgs", "UnflagFeature", Call::Unflag)?;
     made.add("~/detect_features", "touchup_msgs", "DetectFeatures", Call::Detect)?;
@@ -138,6 +119,7 @@ pub(super) fn servers(
 
 struct Services<'a> {
     config: &'a NodeConfig,
+    context: &'a Context,
     node: &'a mut Node,
     shared: &'a Arc<Shared>,
     graph: &'a mut Graph,
@@ -154,10 +136,10 @@ impl Services<'_> {
     ) -> Result<(), RosError>
     where
         Q: ros2_client::Message + Clone + Send + Sync + 'static,
-        A: ros2_client::Message + Send + Sync + 'static,
+        A: Answer + Send + Sync + 'static,
     {
         self.graph.serve(self.config.resolve(name)?);
-        let server = server(self.config, self.node, name, package, type_name)?;
+        let server = Arc::new(Server::new(self.config, self.context, self.node, name, package, type_name)?);
         let arrivals = self.shared.clone();
         let call = Box::new(move |request, reply| arrivals.arrivals.put(Arrival::Call(call(request, reply))));
         self.listeners.push(Box::new(Service { name, server, shared: self.shared.clone(), call }));

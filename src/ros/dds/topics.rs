@@ -15,7 +15,7 @@ use crate::ros::arguments::NodeConfig;
 use crate::ros::clock::steady_ns;
 use crate::ros::messages::{
     Clock, DiagnosticArray, FeatureArray, HapticMismatch, Marker, MarkerArray, MeshPatch, Message, Path, PointStamped,
-    PoseStamped, TFMessage, WrenchStamped,
+    PoseStamped, ProbeResult, ProbeTouch, TFMessage, WrenchStamped,
 };
 use crate::ros::outbox::Sent;
 use crate::ros::port::{Arrival, Publication, TILES_KEPT};
@@ -26,6 +26,7 @@ pub(super) struct UrgentWriters {
     pub feature_markers: Publisher<MarkerArray>,
     pub tip: Publisher<MarkerArray>,
     pub path: Publisher<Path>,
+    pub probe_results: Publisher<ProbeResult>,
     pub mismatch: Publisher<HapticMismatch>,
     pub diagnostics: Publisher<DiagnosticArray>,
 }
@@ -34,6 +35,7 @@ pub(super) struct UrgentWriters {
 pub(super) struct MeshWriters {
     pub tiles: Publisher<Marker>,
     pub patches: Publisher<MeshPatch>,
+    pub probe_touches: Publisher<ProbeTouch>,
 }
 
 impl UrgentWriters {
@@ -43,10 +45,11 @@ impl UrgentWriters {
             Publication::FeatureMarkers(message) => sent(self.feature_markers.publish(message)),
             Publication::Tip(message) => sent(self.tip.publish(message)),
             Publication::Path(message) => sent(self.path.publish(message)),
+            Publication::ProbeResult(message) => sent(self.probe_results.publish(*message)),
             Publication::Mismatch(message) => sent(self.mismatch.publish(message)),
             Publication::Diagnostics(message) => sent(self.diagnostics.publish(message)),
-            // the mesh has an outbox of its own
-            Publication::Tile(_) | Publication::MeshPatch(_) => Sent::Done,
+            // what may wait has an outbox of its own
+            Publication::Tile(_) | Publication::MeshPatch(_) | Publication::ProbeTouch(_) => Sent::Done,
         }
     }
 }
@@ -56,6 +59,9 @@ impl MeshWriters {
         match publication {
             Publication::Tile(message) => later(self.tiles.publish(message), Publication::Tile),
             Publication::MeshPatch(message) => later(self.patches.publish(message), Publication::MeshPatch),
+            Publication::ProbeTouch(message) => {
+                later(self.probe_touches.publish(*message), |message| Publication::ProbeTouch(Box::new(message)))
+            }
             // the others have an outbox of their own
             _ => Sent::Done,
         }
@@ -96,6 +102,8 @@ const fn latched(profile: QosProfile) -> QosProfile {
     profile.durability(Durability::TransientLocal)
 }
 
+/// Touches on their way at most, of 33 kB each: together they fit into the buffer that Linux gives a socket (212 kB).
+const TOUCHES_SENT: usize = 4;
 /// Samples are the last that may be lost: two tenths of a second at 10 kHz. What is kept is no matter of matching.
 const SAMPLES: usize = 2048;
 
@@ -106,8 +114,9 @@ pub(super) fn writers(
     graph: &mut Graph,
 ) -> Result<(UrgentWriters, MeshWriters), RosError> {
     let mesh = MeshWriters {
-        tiles: tile_writer(config, node, graph)?,
+        tiles: limited_writer(config, node, graph, "mesh", latched(PATIENT), TILES_KEPT)?,
         patches: writer(config, node, graph, "mesh_patch", keep(PATIENT, 4096))?,
+        probe_touches: limited_writer(config, node, graph, "probe_touches", PATIENT, TOUCHES_SENT)?,
     };
     graph.add_tiles(mesh.tiles.guid());
     let urgent = UrgentWriters {
@@ -115,6 +124,7 @@ pub(super) fn writers(
         feature_markers: writer(config, node, graph, "feature_markers", latched(keep(URGENT, 1)))?,
         tip: writer(config, node, graph, "tip", keep(URGENT, 1))?,
         path: writer(config, node, graph, "path", latched(keep(URGENT, 1)))?,
+        probe_results: writer(config, node, graph, "probe_results", keep(URGENT, 100))?,
         mismatch: writer(config, node, graph, "mismatch", keep(BEST_EFFORT, 100))?,
         diagnostics: writer(config, node, graph, "/diagnostics", keep(URGENT, 10))?,
     };
@@ -184,13 +194,20 @@ fn writer<M: Message>(
     Ok(publisher)
 }
 
-/// That of the mesh. No more tiles are on their way than [`TILES_KEPT`]: RustDDS keeps each until everybody has it, and who
-/// listens slowly or is silent would see the mesh as it was long ago.
-fn tile_writer(config: &NodeConfig, node: &mut Node, graph: &mut Graph) -> Result<Publisher<Marker>, RosError> {
-    let profile = latched(keep(PATIENT, TILES_KEPT));
-    let topic = topic::<Marker>(config, node, graph, "mesh", &profile)?;
+/// One of large messages. No more of them are on their way than it keeps: RustDDS keeps each until everybody has it, and who
+/// listens slowly or is silent would see what was long ago, or lose some of many at once.
+fn limited_writer<M: Message>(
+    config: &NodeConfig,
+    node: &mut Node,
+    graph: &mut Graph,
+    name: &'static str,
+    profile: QosProfile,
+    most: usize,
+) -> Result<Publisher<M>, RosError> {
+    let profile = keep(profile, most);
+    let topic = topic::<M>(config, node, graph, name, &profile)?;
     // a profile of ROS has no such limit, a topic of DDS has
-    let most = TILES_KEPT as i32;
+    let most = most as i32;
     let limits = ResourceLimits { max_samples: most, max_instances: 1, max_samples_per_instance: most };
     let qos = topic.qos().modify_by(&QosPolicyBuilder::new().resource_limits(limits).build());
     let participant = topic.participant().ok_or_else(|| RosError::dds("making a topic", &"the participant is gone"))?;

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Feature, Header, Message, Point, Pose, Time, Vector3, Wrench, named};
+use super::{Feature, Header, Message, Point, Pose, Vector3, Wrench, named};
 
 /// What is wanted of a probing, and how far the arm may go for it. 0: as the node is configured.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -57,8 +57,10 @@ impl ProbeSettings {
 /// The record of one touch by the arm.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ProbeTouch {
-    /// onset of the contact; where there is none, the end of the touch
-    pub stamp: Time,
+    /// onset of the contact; where there is none, the end of the touch; frame of the object
+    pub header: Header,
+    /// number of the feature
+    pub id: u32,
     /// number in the probing of this feature
     pub index: u32,
     /// what the curve of force over travel looks like: one of the constants
@@ -116,9 +118,11 @@ impl ProbeTouch {
     pub const UNCLEAR: u8 = 8;
 }
 
-/// How the probing of one feature ended, and all that was measured.
+/// How the probing of one feature ended.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ProbeResult {
+    /// when it was done; frame of the object
+    pub header: Header,
     /// number of the feature
     pub id: u32,
     /// how it ended: below 20 done, 20 to 39 refused, 40 to 59 stopped
@@ -133,8 +137,8 @@ pub struct ProbeResult {
     pub duration: f64,
     /// on the tip, N
     pub max_force: f64,
-    /// in their order
-    pub touches: Vec<ProbeTouch>,
+    /// that were tried
+    pub touch_count: u32,
 }
 
 impl ProbeResult {
@@ -215,8 +219,10 @@ pub struct ProbeResponse {
     pub code: u8,
     /// the same in words
     pub message: String,
-    /// of each feature that was begun
-    pub results: Vec<ProbeResult>,
+    /// of each feature that was begun, the last 128
+    pub ids: Vec<u32>,
+    /// how each of them ended, as in [`ProbeResult`]
+    pub codes: Vec<u8>,
 }
 
 /// Feedback of the action `Probe`.

@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{FeatureArray, Header, Message, PointStamped, ProbeResult, ProbeSettings};
+use super::{Message, PointStamped, ProbeResult, ProbeSettings};
 
 /// Flags a place to be looked at.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -46,19 +46,23 @@ pub struct UnflagFeatureResponse {
 /// Looks for features in the mesh as it is.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DetectFeaturesRequest {
-    /// wanted in the answer, as in [`super::Feature`]; empty: all
+    /// counted and named in the answer, as in [`super::Feature`]; empty: all
     pub kinds: Vec<u8>,
 }
 
 /// What was found.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DetectFeaturesResponse {
     /// whether it was done
     pub success: bool,
     /// why not, or what was found
     pub message: String,
+    /// state of the mesh that was looked at
+    pub mesh_version: u64,
     /// of the kinds that were asked for
-    pub features: FeatureArray,
+    pub count: u32,
+    /// their numbers, ascending
+    pub ids: Vec<u32>,
 }
 
 /// Writes the mesh into the folder of the session.
@@ -143,9 +147,7 @@ pub struct ProbeFeatureRequest {
 /// How it ended.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ProbeFeatureResponse {
-    /// when it was done; frame of the object
-    pub header: Header,
-    /// all that was measured
+    /// and what was measured
     pub result: ProbeResult,
 }
 

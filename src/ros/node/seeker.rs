@@ -29,6 +29,8 @@ const QUIET: Duration = Duration::from_secs(1);
 const LOOKS_APART: u32 = 10;
 /// Flags are so many at most.
 const MOST_FLAGS: usize = 1000;
+/// Numbers of features in one answer at most, so that it goes out in one packet.
+const MOST_NAMED: usize = 128;
 /// How long the view may take to hand out the mesh.
 const SNAPSHOT_WAIT: Duration = Duration::from_secs(10);
 
@@ -195,6 +197,9 @@ impl Seeker {
             }
             SeekerInput::Detect(request, reply) => {
                 let looked = self.look();
+                // on its way before who asked is told to look there
+                (self.has_news, self.published_at) = (false, Some(Instant::now()));
+                self.publish();
                 reply.send(self.answer(&request, looked));
             }
         }
@@ -323,20 +328,25 @@ impl Seeker {
     }
 
     fn answer(&self, request: &DetectFeaturesRequest, looked: Result<(), String>) -> DetectFeaturesResponse {
-        let mut features = self.features();
-        if let Err(why) = looked {
-            features.features.clear();
-            return DetectFeaturesResponse { success: false, message: why, features };
+        let FeatureArray { mut features, mesh_version, .. } = self.features();
+        if let Err(message) = looked {
+            return DetectFeaturesResponse { message, mesh_version, ..Default::default() };
         }
-        features.features.retain(|feature| request.kinds.is_empty() || request.kinds.contains(&feature.kind));
+        features.retain(|feature| request.kinds.is_empty() || request.kinds.contains(&feature.kind));
         let told = KIND_NAMES.iter().zip(0u8..).filter_map(|(name, kind)| {
             let is_such = |f: &&FeatureMsg| f.kind == kind && f.status != FeatureMsg::STATUS_FLAGGED;
-            let count = features.features.iter().filter(is_such).count();
+            let count = features.iter().filter(is_such).count();
             (count > 0).then(|| format!("{count} {name}{}", if count == 1 { "" } else { "s" }))
         });
         let told: Vec<_> = told.collect();
         let message = if told.is_empty() { "nothing found".to_owned() } else { told.join(", ") };
-        DetectFeaturesResponse { success: true, message, features }
+        DetectFeaturesResponse {
+            success: true,
+            message,
+            mesh_version,
+            count: features.len() as u32,
+            ids: features.iter().map(|feature| feature.id).take(MOST_NAMED).collect(),
+        }
     }
 
     fn features(&self) -> FeatureArray {

@@ -109,14 +109,14 @@ both_ways! {
         max_search_travel, dry_run
     }
     ProbeTouch = touchup_msgs::msg::ProbeTouch {
-        stamp, index, verdict, accepted, reason, pose, contact, contact_std, normal, approach, deviation, speed,
+        header, id, index, verdict, accepted, reason, pose, contact, contact_std, normal, approach, deviation, speed,
         tip_radius, calibration, peak_wrench, curve_time, curve_travel, curve_force, curve_lateral_force
     }
     ProbeResult = touchup_msgs::msg::ProbeResult {
-        id, code, message, feature, uncertainty, duration, max_force, touches
+        header, id, code, message, feature, uncertainty, duration, max_force, touch_count
     }
     ProbeGoal = touchup_msgs::action::Probe::Goal { ids, settings }
-    ProbeResponse = touchup_msgs::action::Probe::Result { header, code, message, results }
+    ProbeResponse = touchup_msgs::action::Probe::Result { header, code, message, ids, codes }
     ProbeFeedback = touchup_msgs::action::Probe::Feedback {
         id, feature, feature_count, phase, touch, touch_count, force, uncertainty, elapsed
     }
@@ -128,7 +128,7 @@ both_ways! {
     UnflagFeatureRequest = touchup_msgs::srv::UnflagFeature::Request { id }
     UnflagFeatureResponse = touchup_msgs::srv::UnflagFeature::Response { success, message }
     DetectFeaturesRequest = touchup_msgs::srv::DetectFeatures::Request { kinds }
-    DetectFeaturesResponse = touchup_msgs::srv::DetectFeatures::Response { success, message, features }
+    DetectFeaturesResponse = touchup_msgs::srv::DetectFeatures::Response { success, message, mesh_version, count, ids }
     SaveMeshRequest = touchup_msgs::srv::SaveMesh::Request { name, overwrite, with_features }
     SaveMeshResponse = touchup_msgs::srv::SaveMesh::Response {
         success, message, path, mesh_version, vertex_count, face_count
@@ -138,7 +138,7 @@ both_ways! {
     UndoRequest = touchup_msgs::srv::Undo::Request { strokes }
     UndoResponse = touchup_msgs::srv::Undo::Response { success, message, strokes, mesh_version }
     ProbeFeatureRequest = touchup_msgs::srv::ProbeFeature::Request { id, settings }
-    ProbeFeatureResponse = touchup_msgs::srv::ProbeFeature::Response { header, result }
+    ProbeFeatureResponse = touchup_msgs::srv::ProbeFeature::Response { result }
     TriggerResponse = std_srvs::srv::Trigger::Response { success, message }
     SetBoolRequest = std_srvs::srv::SetBool::Request { data }
     SetBoolResponse = std_srvs::srv::SetBool::Response { success, message }
@@ -195,6 +195,8 @@ mod tests {
             FeatureArray = msg::FeatureArray,
             MeshPatch = msg::MeshPatch,
             HapticMismatch = msg::HapticMismatch,
+            ProbeResult = msg::ProbeResult,
+            ProbeTouch = msg::ProbeTouch,
             ProbeGoal = Probe::Goal,
             ProbeResponse = Probe::Result,
             ProbeFeedback = Probe::Feedback,

@@ -124,10 +124,8 @@ struct R2rPort {
 
 impl Port for R2rPort {
     fn publish(&self, publication: Publication) {
-        match publication {
-            Publication::Tile(_) | Publication::MeshPatch(_) => self.shared.mesh.put(publication),
-            _ => self.shared.urgent.put(publication),
-        }
+        let outbox = if publication.may_wait() { &self.shared.mesh } else { &self.shared.urgent };
+        outbox.put(publication);
     }
 
     fn now_ns(&self) -> i64 {

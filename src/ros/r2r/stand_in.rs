@@ -79,7 +79,6 @@ pub mod std_srvs {
 
 pub mod touchup_msgs {
     pub mod msg {
-        use r2r::builtin_interfaces::msg::Time;
         use r2r::geometry_msgs::msg::{Point, Pose, Vector3, Wrench};
         use r2r::std_msgs::msg::Header;
 
@@ -153,6 +152,7 @@ pub mod touchup_msgs {
         });
 
         message!(ProbeResult {
+            header: Header,
             id: u32,
             code: u8,
             message: String,
@@ -160,7 +160,7 @@ pub mod touchup_msgs {
             uncertainty: f64,
             duration: f64,
             max_force: f64,
-            touches: Vec<ProbeTouch>,
+            touch_count: u32,
         });
 
         message!(ProbeSettings {
@@ -178,7 +178,8 @@ pub mod touchup_msgs {
         });
 
         message!(ProbeTouch {
-            stamp: Time,
+            header: Header,
+            id: u32,
             index: u32,
             verdict: u8,
             accepted: bool,
@@ -201,7 +202,13 @@ pub mod touchup_msgs {
     }
 
     pub mod srv {
-        service!(DetectFeatures { kinds: Vec<u8> } { success: bool, message: String, features: super::super::msg::FeatureArray });
+        service!(DetectFeatures { kinds: Vec<u8> } {
+            success: bool,
+            message: String,
+            mesh_version: u64,
+            count: u32,
+            ids: Vec<u32>,
+        });
         service!(FlagFeature {
             kind: u8,
             point: r2r::geometry_msgs::msg::PointStamped,
@@ -212,7 +219,6 @@ pub mod touchup_msgs {
             id: u32,
         });
         service!(ProbeFeature { id: u32, settings: super::super::msg::ProbeSettings } {
-            header: r2r::std_msgs::msg::Header,
             result: super::super::msg::ProbeResult,
         });
         service!(ResyncMesh { session: String, version: u64 } {
@@ -239,12 +245,12 @@ pub mod touchup_msgs {
             use r2r::std_msgs::msg::Header;
             use r2r::unique_identifier_msgs::msg::UUID;
 
-            use super::super::msg::{ProbeResult, ProbeSettings};
+            use super::super::msg::ProbeSettings;
             // what carries a goal and a result on the wire: any service will do here
             use super::super::srv::Undo as Wire;
 
             message!(Goal { ids: Vec<u32>, settings: ProbeSettings });
-            message!(Result { header: Header, code: u8, message: String, results: Vec<ProbeResult> });
+            message!(Result { header: Header, code: u8, message: String, ids: Vec<u32>, codes: Vec<u8> });
             message!(Feedback {
                 id: u32,
                 feature: u32,

@@ -23,6 +23,7 @@ pub(super) struct UrgentPublishers {
     feature_markers: Publisher<visualization_msgs::msg::MarkerArray>,
     tip: Publisher<visualization_msgs::msg::MarkerArray>,
     path: Publisher<nav_msgs::msg::Path>,
+    probe_results: Publisher<touchup_msgs::msg::ProbeResult>,
     mismatch: Publisher<touchup_msgs::msg::HapticMismatch>,
     diagnostics: Publisher<diagnostic_msgs::msg::DiagnosticArray>,
 }
@@ -31,6 +32,7 @@ pub(super) struct UrgentPublishers {
 pub(super) struct MeshPublishers {
     tiles: Publisher<visualization_msgs::msg::Marker>,
     patches: Publisher<touchup_msgs::msg::MeshPatch>,
+    probe_touches: Publisher<touchup_msgs::msg::ProbeTouch>,
 }
 
 const fn reliable(depth: usize) -> QosProfile {
@@ -51,6 +53,8 @@ const FEATURES: (&str, QosProfile) = ("features", latched(1));
 const FEATURE_MARKERS: (&str, QosProfile) = ("feature_markers", latched(1));
 const TIP: (&str, QosProfile) = ("tip", reliable(1));
 const PATH: (&str, QosProfile) = ("path", latched(1));
+const PROBE_RESULTS: (&str, QosProfile) = ("probe_results", reliable(100));
+const PROBE_TOUCHES: (&str, QosProfile) = ("probe_touches", reliable(4096));
 const MISMATCH: (&str, QosProfile) = ("mismatch", best_effort(100));
 const DIAGNOSTICS: (&str, QosProfile) = ("/diagnostics", reliable(10));
 
@@ -60,13 +64,18 @@ const SAMPLES: usize = 2048;
 impl MeshPublishers {
     pub fn new(config: &NodeConfig, node: &mut Node, graph: &mut Graph) -> Result<Self, RosError> {
         let mut made = Topics { config, node, graph };
-        Ok(Self { tiles: made.publisher(MESH)?, patches: made.publisher(MESH_PATCH)? })
+        Ok(Self {
+            tiles: made.publisher(MESH)?,
+            patches: made.publisher(MESH_PATCH)?,
+            probe_touches: made.publisher(PROBE_TOUCHES)?,
+        })
     }
 
     pub fn send(&self, publication: Publication) -> Sent {
         sent(match publication {
             Publication::Tile(message) => self.tiles.publish(&message.convert()),
             Publication::MeshPatch(message) => self.patches.publish(&message.convert()),
+            Publication::ProbeTouch(message) => self.probe_touches.publish(&message.convert()),
             // the others have an outbox of their own
             _ => Ok(()),
         })
@@ -81,6 +90,7 @@ impl UrgentPublishers {
             feature_markers: made.publisher(FEATURE_MARKERS)?,
             tip: made.publisher(TIP)?,
             path: made.publisher(PATH)?,
+            probe_results: made.publisher(PROBE_RESULTS)?,
             mismatch: made.publisher(MISMATCH)?,
             diagnostics: made.publisher(DIAGNOSTICS)?,
         })
@@ -92,10 +102,11 @@ impl UrgentPublishers {
             Publication::FeatureMarkers(message) => self.feature_markers.publish(&message.convert()),
             Publication::Tip(message) => self.tip.publish(&message.convert()),
             Publication::Path(message) => self.path.publish(&message.convert()),
+            Publication::ProbeResult(message) => self.probe_results.publish(&message.convert()),
             Publication::Mismatch(message) => self.mismatch.publish(&message.convert()),
             Publication::Diagnostics(message) => self.diagnostics.publish(&message.convert()),
-            // the mesh has an outbox of its own
-            Publication::Tile(_) | Publication::MeshPatch(_) => Ok(()),
+            // what may wait has an outbox of its own
+            Publication::Tile(_) | Publication::MeshPatch(_) | Publication::ProbeTouch(_) => Ok(()),
         })
     }
 }
@@ -195,7 +206,18 @@ mod tests {
             let [name, _, reliability, durability, depth, _]: [String; 6] = cells.try_into().unwrap();
             [name, reliability, durability, depth]
         });
-        let published = [MESH, MESH_PATCH, FEATURES, FEATURE_MARKERS, TIP, PATH, MISMATCH, DIAGNOSTICS];
+        let published = [
+            MESH,
+            MESH_PATCH,
+            FEATURES,
+            FEATURE_MARKERS,
+            TIP,
+            PATH,
+            PROBE_RESULTS,
+            PROBE_TOUCHES,
+            MISMATCH,
+            DIAGNOSTICS,
+        ];
         let here = published.map(|(name, qos)| {
             assert_eq!(qos.history, HistoryPolicy::KeepLast, "{name}");
             let reliability = match qos.reliability {

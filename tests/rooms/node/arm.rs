@@ -12,7 +12,7 @@ use touchup::robot::{Arm, ArmError, ArmState, Command, Safety};
 use touchup::ros::in_process::{World, start};
 use touchup::ros::messages::{
     Feature, FlagFeatureRequest, Header, Point, PointStamped, ProbeFeatureRequest, ProbeGoal, ProbeResponse,
-    ProbeResult, ProbeSettings, SetBoolRequest,
+    ProbeResult, ProbeSettings, ProbeTouch, SetBoolRequest,
 };
 use touchup::ros::node::{ArmKind, ArmOfNode, INBOX, Node, NodeEnd, Prepared};
 use touchup::ros::parameters::{ParameterValue, Parameters};
@@ -146,25 +146,40 @@ fn a_flagged_hole_is_probed_and_shown() {
     let hole = &result.feature;
     assert_eq!((hole.id, hole.kind, hole.status), (id, Feature::KIND_HOLE, Feature::STATUS_PROBED));
     let off = (hole.center.x - 16e-3).hypot(hole.center.y - 36e-3);
+    let (end, published) = cell.end();
+    let touches = published.iter().filter_map(|publication| match publication {
+        Publication::ProbeTouch(touch) => Some(&**touch),
+        _ => None,
+    });
+    let touches: Vec<_> = touches.collect();
+    let told = published.iter().filter_map(|publication| match publication {
+        Publication::ProbeResult(told) => Some((told.code, told.touch_count as usize)),
+        _ => None,
+    });
+    // of the dry run and of what was measured, as in the answers
+    assert_eq!(told.collect::<Vec<_>>(), [(planned.code, 0), (result.code, touches.len())]);
+    assert_eq!(result.touch_count as usize, touches.len());
+    let numbered = |(index, touch): (usize, &&ProbeTouch)| (touch.id, touch.index as usize) == (id, index);
+    assert!(touches.iter().enumerate().all(numbered));
+    assert!(touches.iter().all(|touch| touch.header.frame_id == "object"));
     println!(
         "{} touches, {:.0} s, {:.1} N, place {:.1} um, diameter {:+.1} um",
-        result.touches.len(),
+        touches.len(),
         result.duration,
         result.max_force,
         off * 1e6,
         (hole.diameter - 8e-3) * 1e6
     );
     assert!(off < 50e-6 && (hole.diameter - 8e-3).abs() < 50e-6);
-    assert!(result.touches.len() < 40 && result.max_force < 4.5);
-    let felt = result.touches.iter().filter(|touch| touch.contact.x.is_finite());
+    assert!(touches.len() < 40 && result.max_force < 4.5);
+    let felt = touches.iter().filter(|touch| touch.contact.x.is_finite());
     assert!(felt.clone().count() > 8 && felt.clone().all(|touch| !touch.curve_force.is_empty()));
     // a touch of the wall lies on it: 4 mm from the axis
     let wall = felt.filter(|touch| touch.approach.z.abs() < 0.5);
     assert!(wall.clone().count() >= 8);
-    let far = |touch: &touchup::ros::messages::ProbeTouch| (touch.contact.x - 16e-3).hypot(touch.contact.y - 36e-3);
+    let far = |touch: &&ProbeTouch| (touch.contact.x - 16e-3).hypot(touch.contact.y - 36e-3);
     assert!(wall.clone().all(|touch| (far(touch) - 4e-3).abs() < 0.3e-3), "{:?}", wall.map(far).collect::<Vec<_>>());
 
-    let (end, published) = cell.end();
     assert!(end.report.accepted > 5000, "{:?}", end.report);
     let last = published.iter().rev().find_map(|publication| match publication {
         Publication::Features(features) => features.features.iter().find(|feature| feature.id == id).cloned(),
@@ -190,7 +205,7 @@ fn a_cancelled_goal_stops_and_retracts_and_the_node_goes_on() {
     cancel.store(true, Ordering::Release);
     let (end, response) = result.recv_timeout(Duration::from_secs(20)).unwrap();
     assert_eq!((end, response.code), (GoalEnd::Canceled, ProbeResult::CANCELLED), "{}", response.message);
-    assert_eq!(response.results.len(), 1, "the other is not begun");
+    assert_eq!((response.ids, response.codes), (vec![ids[0]], vec![ProbeResult::CANCELLED]), "the other is not begun");
     let (can_move, state) = cell.state();
     assert!(can_move, "{state}");
     assert!(cell.height() > 14.0, "it retracted: {state}");

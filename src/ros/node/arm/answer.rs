@@ -5,12 +5,15 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use crate::probe::{Cell, Ending, Plan, ProbeParams, Probed, ProbedSlide, ProbedTouch};
 use crate::robot::{ArmError, LimitError, ProbeError, Safety, SlideEnding, TouchOutcome, TouchRecord, Verdict};
 use crate::ros::messages::{
-    Feature, Point, Pose, ProbeResult, ProbeTouch, Quaternion, Vector3 as Vector3Msg, Wrench as WrenchMsg,
+    Feature, Header, Point, Pose, ProbeResponse, ProbeResult, ProbeTouch, Quaternion, Time, Vector3 as Vector3Msg,
+    Wrench as WrenchMsg,
 };
 use crate::ros::node::convert::{NO_VECTOR, point, time, vector};
 use crate::ros::node::feature_messages::{flagged, found, number_of};
 use crate::ros::node::seeker::Target;
 
+/// Why nothing is probed where all that is flagged was asked for.
+pub const NOTHING_FLAGGED: &str = "nothing is flagged that was not probed already";
 const NOWHERE: Point = Point { x: f64::NAN, y: f64::NAN, z: f64::NAN };
 
 /// Not begun, and nothing is known of it.
@@ -54,10 +57,9 @@ pub fn planned(target: &Target, plan: &Plan) -> ProbeResult {
 }
 
 /// What was measured.
-pub fn result_of(target: &Target, probed: &Probed, params: &ProbeParams, cell: &Cell, offset_ns: i64) -> ProbeResult {
+pub fn result_of(target: &Target, probed: &Probed) -> ProbeResult {
     let feature = probed.found.as_ref().and_then(|found| found.feature.as_ref());
     let unknown = refused(target, 0, String::new());
-    let touches = probed.touches.iter().enumerate();
     ProbeResult {
         code: code_of(&probed.ending),
         message: probed.ending.to_string() + &slid(&probed.slides),
@@ -72,7 +74,7 @@ pub fn result_of(target: &Target, probed: &Probed, params: &ProbeParams, cell: &
         uncertainty: probed.found.as_ref().and_then(|found| found.uncertainty).unwrap_or(f64::NAN),
         duration: probed.seconds,
         max_force: probed.peak_force,
-        touches: touches.map(|(index, touch)| touch_of(index, touch, params, cell, offset_ns)).collect(),
+        touch_count: probed.touches.len() as u32,
         ..unknown
     }
 }
@@ -93,45 +95,67 @@ fn slid(slides: &[ProbedSlide]) -> String {
     format!("; {arrived} of {} slides arrived{others}", slides.len())
 }
 
-/// An answer above 64 kB goes out in fragments, of which readers with default buffers lose some: it is kept below this.
-const MOST_BYTES: usize = 48_000;
-/// A touch without its curve, and a feature without its points, in bytes, rounded up.
-const TOUCH_BYTES: usize = 480;
-const RESULT_BYTES: usize = 600;
-/// A row of a curve, in bytes.
-const ROW_BYTES: usize = 16;
-const LEFT_OUT: &str = "; its touches are in probed_touches.jsonl of the session";
+/// Features that the result of a goal names at most, so that it goes out in one packet.
+const MOST_NAMED: usize = 128;
 
-/// Thins out the curves of an answer, and leaves touches out where that is not enough: all of it is in the file of the session.
-pub fn fit(results: &mut [ProbeResult]) {
-    let bytes_of = |one: &ProbeResult| {
-        RESULT_BYTES
-            + one.message.len()
-            + 24 * one.feature.points.len()
-            + one.touches.iter().map(|t| TOUCH_BYTES + t.reason.len()).sum::<usize>()
+/// How a goal ended, of the features that were begun.
+pub fn response_of(results: &[ProbeResult], header: Header) -> ProbeResponse {
+    let (code, message) = match results.iter().max_by_key(|one| one.code) {
+        Some(worst) => (worst.code, worst.message.clone()),
+        None => (ProbeResult::NO_SUCH_FEATURE, NOTHING_FLAGGED.to_owned()),
     };
-    let mut bytes: usize = results.iter().map(bytes_of).sum();
-    for one in results.iter_mut().filter(|one| !one.touches.is_empty()) {
-        if bytes <= MOST_BYTES {
-            break;
+    let named = &results[results.len().saturating_sub(MOST_NAMED)..];
+    let (ids, codes) = named.iter().map(|one| (one.id, one.code)).unzip();
+    ProbeResponse { header, code, message, ids, codes }
+}
+
+/// How all that is flagged ended, in words: each where they are few, else how many and the worst.
+pub fn summary_of(results: &[ProbeResult]) -> String {
+    const FEW: usize = 4;
+    let told = |one: &ProbeResult| format!("{}: {}", one.id, one.message);
+    match results.iter().max_by_key(|one| one.code) {
+        None => NOTHING_FLAGGED.to_owned(),
+        Some(_) if results.len() <= FEW => results.iter().map(told).collect::<Vec<_>>().join("; "),
+        Some(worst) => {
+            let done = results.iter().filter(|one| one.code < ProbeResult::CANCELLED).count();
+            let count = results.len();
+            format!("{done} of {count} done, each is on probe_results; the worst: {}", told(worst))
         }
-        bytes -= bytes_of(one);
-        one.touches.clear();
-        one.message += LEFT_OUT;
-        bytes += bytes_of(one);
     }
-    let touches = results.iter().map(|one| one.touches.len()).sum::<usize>().max(1);
-    let rows = MOST_BYTES.saturating_sub(bytes) / ROW_BYTES / touches;
+}
+
+/// What came of the touches of a feature, one message each.
+pub fn touches_of(
+    target: &Target,
+    probed: &Probed,
+    params: &ProbeParams,
+    cell: &Cell,
+    offset_ns: i64,
+    frame: &str,
+) -> Vec<ProbeTouch> {
+    let touches = probed.touches.iter().enumerate();
+    let made = touches.map(|(index, touch)| {
+        let (stamp, made) = touch_of(index, touch, params, cell, offset_ns);
+        ProbeTouch { header: Header { stamp, frame_id: frame.to_owned() }, id: target.id, ..thinned(made) }
+    });
+    made.collect()
+}
+
+/// A message above 64 kB goes out in fragments, of which readers with default buffers lose some: a curve has no more rows, 16 bytes
+/// each.
+const MOST_ROWS: usize = 2000;
+
+/// Every so many rows where there are more, the first and the last among them.
+fn thinned(mut touch: ProbeTouch) -> ProbeTouch {
     let thin = |row: &mut Vec<f32>| {
-        if row.len() > rows {
+        if row.len() > MOST_ROWS {
             let last = row.len() - 1;
-            *row = (0..rows).map(|i| row[i * last / (rows - 1).max(1)]).collect();
+            *row = (0..MOST_ROWS).map(|i| row[i * last / (MOST_ROWS - 1)]).collect();
         }
     };
-    for touch in results.iter_mut().flat_map(|one| &mut one.touches) {
-        let ProbeTouch { curve_time, curve_travel, curve_force, curve_lateral_force, .. } = touch;
-        [curve_time, curve_travel, curve_force, curve_lateral_force].into_iter().for_each(thin);
-    }
+    let ProbeTouch { curve_time, curve_travel, curve_force, curve_lateral_force, .. } = &mut touch;
+    [curve_time, curve_travel, curve_force, curve_lateral_force].into_iter().for_each(thin);
+    touch
 }
 
 fn code_of(ending: &Ending) -> u8 {
@@ -167,7 +191,14 @@ fn stopped(error: &ProbeError) -> u8 {
     }
 }
 
-fn touch_of(index: usize, touch: &ProbedTouch, params: &ProbeParams, cell: &Cell, offset_ns: i64) -> ProbeTouch {
+/// The touch, and the stamp that goes into its header.
+fn touch_of(
+    index: usize,
+    touch: &ProbedTouch,
+    params: &ProbeParams,
+    cell: &Cell,
+    offset_ns: i64,
+) -> (Time, ProbeTouch) {
     let radius = params.pattern.ball_radius;
     let way = touch.wish.direction.into_inner();
     let base = ProbeTouch {
@@ -183,7 +214,7 @@ fn touch_of(index: usize, touch: &ProbedTouch, params: &ProbeParams, cell: &Cell
         tip_radius: radius,
         ..ProbeTouch::default()
     };
-    let Some(record) = &touch.record else { return base };
+    let Some(record) = &touch.record else { return (Time::default(), base) };
     let pose_ot = cell.pose_bo.inverse() * record.target.standoff_bt;
     let with = curve_of(base, record);
     let with = ProbeTouch { verdict: verdict_of(&record.outcome), ..with };
@@ -192,24 +223,23 @@ fn touch_of(index: usize, touch: &ProbedTouch, params: &ProbeParams, cell: &Cell
             // the part pushes along its normal, but for friction
             let normal = (cell.pose_bo.rotation.inverse() * force_b).try_normalize(0.0).unwrap_or(-way);
             let measured_ns = record.curve_ns + (onset_at(record, onset.travel) * 1e9) as i64;
-            ProbeTouch {
-                stamp: time(measured_ns + offset_ns),
+            let touch = ProbeTouch {
                 pose: pose_at(&centre, &pose_ot),
                 contact: point(&(centre - normal * radius)),
                 contact_std: onset.sigma,
                 normal: vector(&normal),
                 ..with
-            }
+            };
+            (time(measured_ns + offset_ns), touch)
         }
         (TouchOutcome::Miss { travel }, _) => {
             let end = touch.wish.from + way * *travel;
-            ProbeTouch { stamp: time(record.stamps_ns[1] + offset_ns), pose: pose_at(&end, &pose_ot), ..with }
+            (time(record.stamps_ns[1] + offset_ns), ProbeTouch { pose: pose_at(&end, &pose_ot), ..with })
         }
-        _ => ProbeTouch {
-            stamp: time(record.stamps_ns[1] + offset_ns),
-            pose: pose_at(&touch.wish.from, &pose_ot),
-            ..with
-        },
+        _ => {
+            let touch = ProbeTouch { pose: pose_at(&touch.wish.from, &pose_ot), ..with };
+            (time(record.stamps_ns[1] + offset_ns), touch)
+        }
     }
 }
 
@@ -258,55 +288,46 @@ fn curve_of(touch: ProbeTouch, record: &TouchRecord) -> ProbeTouch {
 mod tests {
     use super::*;
 
-    fn result(touches: usize, rows: usize) -> ProbeResult {
+    fn touch(rows: usize) -> ProbeTouch {
         let curve: Vec<f32> = (0..rows).map(|i| i as f32).collect();
-        let touch = ProbeTouch {
+        ProbeTouch {
             curve_time: curve.clone(),
             curve_travel: curve.clone(),
             curve_force: curve.clone(),
             curve_lateral_force: curve,
             reason: "far".repeat(30),
             ..ProbeTouch::default()
-        };
-        ProbeResult {
-            touches: vec![touch; touches],
-            message: "known as well as was asked".to_owned(),
+        }
+    }
+
+    #[test]
+    fn a_touch_fits_into_a_datagram_and_a_thinned_curve_keeps_its_ends() {
+        let long = thinned(touch(60_000));
+        assert!(cdr_encoding::to_vec::<_, byteorder::LittleEndian>(&long).unwrap().len() < 48_000);
+        assert!(long.curve_time.len() == MOST_ROWS && long.curve_time.is_sorted());
+        assert_eq!((long.curve_time[0], long.curve_time.last()), (0.0, Some(&59_999.0)));
+        assert_eq!(long.curve_time, long.curve_lateral_force);
+        assert_eq!(thinned(touch(20)), touch(20));
+    }
+
+    #[test]
+    fn a_goal_ends_as_the_worst_of_its_features_and_names_the_last() {
+        let result = |id: u32| ProbeResult {
+            id,
+            code: if id == 7 { ProbeResult::BAD_REQUEST } else { ProbeResult::TOLERANCE_REACHED },
+            message: format!("message {id}"),
             ..ProbeResult::default()
-        }
-    }
+        };
+        let results: Vec<_> = (0..200).map(result).collect();
+        let response = response_of(&results, Header::default());
+        assert_eq!((response.code, response.message.as_str()), (ProbeResult::BAD_REQUEST, "message 7"));
+        assert_eq!((response.ids, response.codes.len()), ((72..200).collect(), 128));
+        let few = response_of(&results[6..8], Header::default());
+        assert_eq!((few.ids, few.codes), (vec![6, 7], vec![ProbeResult::TOLERANCE_REACHED, ProbeResult::BAD_REQUEST]));
+        assert_eq!(response_of(&[], Header::default()).code, ProbeResult::NO_SUCH_FEATURE);
 
-    fn bytes(results: &[ProbeResult]) -> usize {
-        cdr_encoding::to_vec::<_, byteorder::LittleEndian>(&results.to_vec()).unwrap().len()
-    }
-
-    #[test]
-    fn an_answer_fits_into_a_datagram_whatever_was_touched() {
-        for (features, touches, rows) in [(1, 15, 900), (1, 60, 2000), (5, 15, 900), (20, 20, 500), (20, 40, 0)] {
-            let mut results = vec![result(touches, rows); features];
-            fit(&mut results);
-            assert!(bytes(&results) < 60_000, "{features} {touches} {rows}: {} bytes", bytes(&results));
-            let told = results.iter().filter(|one| !one.touches.is_empty()).count();
-            assert!(told > 0, "{features} {touches} {rows}");
-            assert!(results.iter().all(|one| one.touches.is_empty() == one.message.contains("probed_touches.jsonl")));
-        }
-        // who was not begun has none to be left out
-        let mut results = [result(0, 0), result(60, 0), result(60, 0)];
-        fit(&mut results);
-        assert_eq!(results[0], result(0, 0));
-        assert!(results[1].touches.is_empty() && results[2].touches.len() == 60 && bytes(&results) < 60_000);
-    }
-
-    #[test]
-    fn a_thinned_curve_keeps_its_ends_and_a_short_one_all() {
-        let mut results = [result(15, 900)];
-        fit(&mut results);
-        for touch in &results[0].touches {
-            assert!(touch.curve_time.len() > 100 && touch.curve_time.is_sorted());
-            assert_eq!((touch.curve_time[0], touch.curve_time.last()), (0.0, Some(&899.0)));
-            assert_eq!(touch.curve_time, touch.curve_lateral_force);
-        }
-        let mut short = [result(3, 20)];
-        fit(&mut short);
-        assert_eq!(short[0], result(3, 20));
+        assert_eq!(summary_of(&results[6..8]), "6: message 6; 7: message 7");
+        assert_eq!(summary_of(&results), "199 of 200 done, each is on probe_results; the worst: 7: message 7");
+        assert_eq!(summary_of(&[]), NOTHING_FLAGGED);
     }
 }

@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 
 use tracing::{info, warn};
 
-use self::answer::{not_probed, refused, result_of};
+use self::answer::{not_probed, refused, response_of, result_of, summary_of, touches_of};
 use self::common::Common;
 use self::pace::Paced;
 use self::request::Wanted;
@@ -68,12 +68,14 @@ impl ArmInput {
     pub fn refuse(self, header: Header, code: u8, why: &str) {
         match self {
             Self::Feature(request, reply) => {
-                reply.send(ProbeFeatureResponse { header, result: not_probed(request.id, code, why) });
+                let result = ProbeResult { header, ..not_probed(request.id, code, why) };
+                reply.send(ProbeFeatureResponse { result });
             }
             Self::Goal(goal, Goal { accept, result, .. }) => {
                 accept.send(true);
-                let results = goal.ids.first().map(|&id| not_probed(id, code, why)).into_iter().collect();
-                result.send((GoalEnd::Aborted, ProbeResponse { header, code, message: why.to_owned(), results }));
+                let first = goal.ids.first().copied();
+                let (ids, codes) = first.map(|id| (id, code)).into_iter().unzip();
+                result.send((GoalEnd::Aborted, ProbeResponse { header, code, message: why.to_owned(), ids, codes }));
             }
             Self::All(reply) | Self::Recover(reply) => {
                 reply.send(TriggerResponse { success: false, message: why.to_owned() });
@@ -316,21 +318,17 @@ impl Hands {
             }
             ArmInput::All(reply) => {
                 let results = self.probe(&folder, &[], &ProbeSettings::default(), arm, None);
-                let told: Vec<_> = results.iter().map(|one| format!("{}: {}", one.id, one.message)).collect();
                 self.common.done();
                 reply.send(TriggerResponse {
                     success: !results.is_empty() && results.iter().all(|one| one.code < ProbeResult::CANCELLED),
-                    message: if told.is_empty() { NOTHING_FLAGGED.to_owned() } else { told.join("; ") },
+                    message: summary_of(&results),
                 });
             }
             ArmInput::Feature(request, reply) => {
                 let results = self.probe(&folder, &[request.id], &request.settings, arm, None);
-                let none = || not_probed(request.id, ProbeResult::ARM_NOT_READY, NOT_TOLD);
+                let none = || self.done(not_probed(request.id, ProbeResult::ARM_NOT_READY, NOT_TOLD));
                 self.common.done();
-                reply.send(ProbeFeatureResponse {
-                    header: self.header(),
-                    result: results.into_iter().next().unwrap_or_else(none),
-                });
+                reply.send(ProbeFeatureResponse { result: results.into_iter().next().unwrap_or_else(none) });
             }
             ArmInput::Goal(goal, handles) => self.goal(&folder, &goal, handles, arm),
         }
@@ -340,19 +338,23 @@ impl Hands {
         let Goal { accept, feedback, result, is_cancelled } = handles;
         accept.send(true);
         let results = self.probe(folder, &goal.ids, &goal.settings, arm, Some((&feedback, &is_cancelled)));
-        let (code, message) = match results.iter().max_by_key(|one| one.code) {
-            Some(worst) => (worst.code, worst.message.clone()),
-            None => (ProbeResult::NO_SUCH_FEATURE, NOTHING_FLAGGED.to_owned()),
-        };
+        let response = response_of(&results, self.header());
         let was_broken_off = results.last().is_some_and(|last| last.code == ProbeResult::CANCELLED);
-        let end = match code {
+        let end = match response.code {
             // by who gave it, and by nobody else: a pause ends it too
             _ if was_broken_off && is_cancelled.load(Ordering::Acquire) => GoalEnd::Canceled,
             code if code < ProbeResult::CANCELLED => GoalEnd::Succeeded,
             _ => GoalEnd::Aborted,
         };
         self.common.done();
-        result.send((end, ProbeResponse { header: self.header(), code, message, results }));
+        result.send((end, response));
+    }
+
+    /// A result as it is now, for who follows and for who asked.
+    fn done(&self, result: ProbeResult) -> ProbeResult {
+        let result = ProbeResult { header: self.header(), ..result };
+        self.port.publish(Publication::ProbeResult(Box::new(result.clone())));
+        result
     }
 
     fn header(&self) -> Header {
@@ -380,7 +382,7 @@ impl Hands {
     ) -> Vec<ProbeResult> {
         let targets = match self.targets(ids, arm) {
             Ok(targets) => targets,
-            Err(refusal) => return vec![*refusal],
+            Err(refusal) => return vec![self.done(*refusal)],
         };
         let count = targets.len();
         let mut results: Vec<ProbeResult> = Vec::new();
@@ -399,12 +401,11 @@ impl Hands {
                     result.code,
                     ProbeResult::OUT_OF_LIMITS | ProbeResult::NO_CLEAR_PATH | ProbeResult::BAD_REQUEST
                 );
-            results.push(result);
+            results.push(self.done(result));
             if !goes_on {
                 break;
             }
         }
-        answer::fit(&mut results);
         results
     }
 
@@ -486,7 +487,7 @@ impl Hands {
         if let Err(error) =
             append_probed_touches(&probed, ball_radius, self.offset_ns.unwrap_or(0), &folder.join(TOUCHES))
         {
-            warn!(%error, "the touches of a feature are in the answer alone");
+            warn!(%error, "the touches of a feature are on the topic alone");
         }
         let is_whole = matches!(probed.ending, Ending::ToleranceReached | Ending::TouchesSpent | Ending::TimeSpent);
         if let Some(feature) = probed.found.as_ref().and_then(|found| found.feature.clone()).filter(|_| is_whole) {
@@ -498,7 +499,11 @@ impl Hands {
                 warn!(feature = target.id, "what was measured is in the answer, and not among the features");
             }
         }
-        let mut result = result_of(target, &probed, &wanted.params, &self.cell, self.offset_ns.unwrap_or(0));
+        let offset_ns = self.offset_ns.unwrap_or(0);
+        for touch in touches_of(target, &probed, &wanted.params, &self.cell, offset_ns, &self.shared.frame) {
+            self.port.publish(Publication::ProbeTouch(Box::new(touch)));
+        }
+        let mut result = result_of(target, &probed);
         if let (ProbeResult::CANCELLED, Some((code, why))) = (result.code, self.common.why_not()) {
             result.message = format!("{why}: {}", result.message);
             // the others are refused before they begin
@@ -513,5 +518,4 @@ impl Hands {
 /// Beside the recording of a session.
 const TOUCHES: &str = "probed_touches.jsonl";
 const BUSY: &str = "the arm works at an order: wait, or cancel that";
-const NOTHING_FLAGGED: &str = "nothing is flagged that was not probed already";
 const NOT_TOLD: &str = "the features were not told in time: ask again";

@@ -446,9 +446,18 @@ fn features_are_found_flagged_and_labelled() {
     let mut bench = Bench::start(&plate);
     let found = bench.world.call(|reply| Call::Detect(DetectFeaturesRequest::default(), reply)).recv().unwrap();
     assert!(found.success, "{}", found.message);
+    assert_eq!(found.count as usize, found.ids.len());
     let holes = DetectFeaturesRequest { kinds: vec![Feature::KIND_HOLE] };
-    let holes = bench.world.call(|reply| Call::Detect(holes, reply)).recv().unwrap().features.features;
-    assert!(holes.iter().all(|hole| hole.kind == Feature::KIND_HOLE && hole.status == Feature::STATUS_FOUND));
+    let named = bench.world.call(|reply| Call::Detect(holes, reply)).recv().unwrap();
+    // the topic has what the answer names
+    let shown = bench.wait_for("what was found", |published| match published {
+        Publication::Features(array) if array.mesh_version >= named.mesh_version => Some(array.features.clone()),
+        _ => None,
+    });
+    assert_eq!(shown.iter().map(|feature| feature.id).collect::<Vec<_>>(), found.ids);
+    let holes: Vec<_> = shown.into_iter().filter(|feature| feature.kind == Feature::KIND_HOLE).collect();
+    assert_eq!(holes.iter().map(|hole| hole.id).collect::<Vec<_>>(), named.ids);
+    assert!(holes.iter().all(|hole| hole.status == Feature::STATUS_FOUND));
     let header = Header { frame_id: "object".to_owned(), ..Header::default() };
     let flag = |kind, point, search_radius| {
         let request = FlagFeatureRequest { kind, point: PointStamped { header: header.clone(), point }, search_radius };
@@ -460,7 +469,7 @@ fn features_are_found_flagged_and_labelled() {
     }
     let free = Point { x: 0.5, y: 0.5, z: 0.0 };
     let fresh = flag(Feature::KIND_BOSS, free, 0.0);
-    assert!(fresh.success && found.features.features.iter().all(|feature| feature.id != fresh.id));
+    assert!(fresh.success && !found.ids.contains(&fresh.id));
     assert_eq!(flag(Feature::KIND_BOSS, free, 0.0).id, fresh.id, "the same place");
     assert!(!flag(200, free, 0.0).success && !flag(0, free, -1.0).success && !flag(0, free, f64::NAN).success);
     bench.world.arrive_patiently(Arrival::ClickedPoint(PointStamped {

@@ -1,0 +1,320 @@
+//! Answers that go out whole.
+//!
+//! RustDDS 0.15.1 writes the inline QoS of a fragment so that nobody can read it, and ros2-client names the request of an answer
+//! there: one that goes out in fragments is lost. So where ros2-client answers, which is the enhanced mapping (Fast DDS) and the
+//! action in either, an answer is made to fit into one packet: our own do by design but for long texts, and of parameters the caller
+//! asks for fewer at a time. What does not fit goes out as the same message with less in it, and the log says so. The services in the
+//! mapping of CycloneDDS are our own ([`super::server`]) and have no such limit.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::sync::{Mutex, PoisonError};
+
+use byteorder::LittleEndian;
+use ros2_client::ServiceMapping;
+use ros2_client::action::GetResultResponse;
+use ros2_client::rcl_interfaces::{
+    DescribeParametersResponse, GetParameterTypesResponse, GetParametersResponse, ListParametersResponse,
+    SetParametersAtomicallyResponse, SetParametersResponse,
+};
+
+use crate::ros::messages::{
+    DetectFeaturesResponse, FlagFeatureResponse, ProbeFeatureResponse, ProbeResponse, ResyncMeshResponse,
+    SaveMeshResponse, SetBoolResponse, TriggerResponse, UndoResponse, UnflagFeatureResponse,
+};
+
+/// Largest packet of a network, in bytes: that of Ethernet, which RustDDS too assumes where it knows no smaller one.
+pub(super) const ETHERNET: usize = 1500;
+/// Of a packet not the answer: headers of IP (20), UDP (8) and RTPS (20), INFO_DST (16), INFO_TS (12), DATA (24), the two
+/// parameters that name the request and the end of their list (60), HEARTBEAT (32). RustDDS counts 128 of them and makes fragments
+/// of what is larger; with all of them a packet is not parted by IP either.
+const HEADERS: usize = 192;
+/// The four bytes before a message that say how it is written.
+const ENCAPSULATION: usize = 4;
+
+/// An answer that can be made smaller.
+pub(super) trait Answer: ros2_client::Message {
+    /// Leaves out what does not fit into so many bytes, what matters least first. The rest stays true.
+    fn reduce(&mut self, most: usize);
+}
+
+/// How large an answer may be.
+pub(super) struct Room {
+    /// in one packet
+    most: usize,
+    /// whether answers of services have to fit into one
+    is_for_services: bool,
+    /// services of which the log has it
+    told: Mutex<BTreeSet<&'static str>>,
+}
+
+impl Room {
+    /// That of the networks of this computer.
+    pub fn new(mapping: &ServiceMapping) -> Self {
+        let is_for_services = *mapping != ServiceMapping::Cyclone;
+        Self { most: room(smallest_packet()), is_for_services, told: Mutex::default() }
+    }
+
+    /// The answer of a service, or what of it there is room for.
+    pub fn fit<A: Answer>(&self, service: &'static str, answer: A) -> A {
+        if self.is_for_services { self.fit_packet(service, answer) } else { answer }
+    }
+
+    /// The answer, or what of it fits into one packet.
+    pub fn fit_packet<A: Answer>(&self, service: &'static str, mut answer: A) -> A {
+        let bytes = size(&answer);
+        if bytes <= self.most {
+            return answer;
+        }
+        // nothing of ours panics while it holds it
+        if self.told.lock().unwrap_or_else(PoisonError::into_inner).insert(service) {
+            tracing::warn!(service, bytes, most = self.most, "{TOO_LARGE}");
+        }
+        answer.reduce(self.most);
+        answer
+    }
+}
+
+const TOO_LARGE: &str = "an answer does not fit into one packet, and RustDDS loses larger ones with service_mapping enhanced: it goes \
+                         out with less in it; ask for fewer names at a time, or start the node with service_mapping:=cyclone \
+                         (RMW_IMPLEMENTATION=rmw_cyclonedds_cpp for all), or build it with the feature r2r";
+
+/// Of a packet what an answer has.
+pub(super) fn room(packet: usize) -> usize {
+    packet.saturating_sub(HEADERS)
+}
+
+/// Of all networks that are up now, as Linux tells it; elsewhere that of Ethernet.
+fn smallest_packet() -> usize {
+    let read = |path: std::path::PathBuf| fs::read_to_string(path).map(|text| text.trim().to_owned()).ok();
+    let devices = fs::read_dir("/sys/class/net").into_iter().flatten().flatten();
+    let up = devices.filter(|device| read(device.path().join("operstate")).is_some_and(|state| state != "down"));
+    let packets = up.filter_map(|device| read(device.path().join("mtu"))?.parse().ok());
+    packets.fold(ETHERNET, usize::min)
+}
+
+/// On the wire.
+pub(super) fn size(answer: &impl ros2_client::Message) -> usize {
+    // what cannot be written is not sent, and the log says so there
+    cdr_encoding::to_vec::<_, LittleEndian>(answer).map_or(0, |bytes| bytes.len() + ENCAPSULATION)
+}
+
+/// Shortens a text by so many bytes at least, as far as it has them.
+fn cut(text: &mut String, by: usize) {
+    const MORE: &str = " …";
+    let mut end = text.len().saturating_sub(by + MORE.len());
+    while !text.is_char_boundary(end) {
+        end -= 1;
+    }
+    text.truncate(end);
+    if end > 0 {
+        text.push_str(MORE);
+    }
+}
+
+/// Bytes that are too many, and those that may be added behind the text to align what follows.
+fn excess(answer: &impl ros2_client::Message, most: usize) -> usize {
+    let too_many = size(answer).saturating_sub(most);
+    if too_many > 0 { too_many + 8 } else { 0 }
+}
+
+/// Answers of which the texts alone have no limit: `texts!(Answer: text, text)`, what matters least first.
+macro_rules! texts {
+    ($($answer:ty: $($field:ident).+ $(, $($then:ident).+)*;)+) => {
+        $(impl Answer for $answer {
+            fn reduce(&mut self, most: usize) {
+                texts!(@cut self, most, $($field).+);
+                $(texts!(@cut self, most, $($then).+);)*
+            }
+        })+
+    };
+    (@cut $self:ident, $most:ident, $($field:ident).+) => {
+        let excess = excess($self, $most);
+        if excess > 0 {
+            cut(&mut $self.$($field).+, excess);
+        }
+    };
+}
+
+texts! {
+    FlagFeatureResponse: message;
+    UnflagFeatureResponse: message;
+    DetectFeaturesResponse: message;
+    // the path is in the message too, of which what is left is what went wrong
+    SaveMeshResponse: message, path;
+    ResyncMeshResponse: message, session;
+    UndoResponse: message;
+    TriggerResponse: message;
+    SetBoolResponse: message;
+    ProbeFeatureResponse: result.message, result.header.frame_id;
+    GetResultResponse<ProbeResponse>: result.message, result.header.frame_id;
+    SetParametersAtomicallyResponse: result.reason;
+}
+
+impl Answer for GetParametersResponse {
+    fn reduce(&mut self, _: usize) {
+        // a value for each name, or none
+        self.values.clear();
+    }
+}
+
+impl Answer for GetParameterTypesResponse {
+    fn reduce(&mut self, _: usize) {
+        self.values.clear();
+    }
+}
+
+impl Answer for ListParametersResponse {
+    fn reduce(&mut self, _: usize) {
+        self.result.names.clear();
+    }
+}
+
+impl Answer for DescribeParametersResponse {
+    fn reduce(&mut self, most: usize) {
+        // types, ranges and words to choose from are what programs need
+        self.values.iter_mut().for_each(|one| one.description.clear());
+        if size(self) > most {
+            self.values.clear();
+        }
+    }
+}
+
+impl Answer for SetParametersResponse {
+    fn reduce(&mut self, most: usize) {
+        // whether each is set comes before why not
+        self.results.iter_mut().for_each(|one| one.reason.clear());
+        if size(self) > most {
+            self.results.clear();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ros2_client::action::{GoalId, GoalInfo, GoalStatusEnum, SendGoalResponse};
+    use ros2_client::action_msgs::CancelGoalResponseEnum;
+    use ros2_client::builtin_interfaces::Time;
+    use ros2_client::parameters::raw;
+    use ros2_client::rcl_interfaces::ListParametersResult;
+
+    use super::*;
+    use crate::ros::messages::{Feature, Header, Point, ProbeResult};
+
+    /// The smallest packet that a network of today has: what IPv6 asks for, and tunnels have.
+    const TUNNEL: usize = 1280;
+
+    fn long() -> String {
+        "Ø 8.02 is not to be had: ".repeat(400)
+    }
+
+    /// Whatever its texts, it fits, and says that it was cut.
+    fn fits<A: Answer>(mut answer: A) -> A {
+        assert!(size(&answer) > ETHERNET, "{}", size(&answer));
+        answer.reduce(room(TUNNEL));
+        assert!(size(&answer) <= room(TUNNEL), "{} bytes", size(&answer));
+        answer
+    }
+
+    fn result(message: String) -> ProbeResult {
+        ProbeResult {
+            header: Header { frame_id: "object".to_owned(), ..Header::default() },
+            message,
+            feature: Feature { points: vec![Point::default(); 2], ..Feature::default() },
+            ..ProbeResult::default()
+        }
+    }
+
+    #[test]
+    fn the_largest_answers_of_our_own_services_fit_into_one_packet() {
+        // as long as the node makes a text of its own; a path may be longer
+        let message = || "a text of 300 letters, which is longer than what the node says by itself. ".repeat(4);
+        let header = Header { frame_id: "object".to_owned(), ..Header::default() };
+        let (ids, codes) = ((0..128).collect::<Vec<u32>>(), vec![1; 128]);
+        let detected =
+            DetectFeaturesResponse { message: message(), ids: ids.clone(), ..DetectFeaturesResponse::default() };
+        let ended = ProbeResponse { header, code: 1, message: message(), ids, codes };
+        let goal = GoalInfo { goal_id: GoalId::new_random(), stamp: Time::ZERO };
+        let cancelled = ros2_client::action_msgs::CancelGoalResponse {
+            return_code: CancelGoalResponseEnum::None,
+            goals_canceling: vec![goal; 32],
+        };
+        let path = "/home/somebody/sessions/2026-01-31T12-00-00/refined.ply".repeat(2);
+        let saved = SaveMeshResponse { message: message(), path, ..SaveMeshResponse::default() };
+        let sizes = [
+            ("detect_features", size(&detected)),
+            ("probe_feature", size(&ProbeFeatureResponse { result: result(message()) })),
+            ("probe: get_result", size(&GetResultResponse { status: GoalStatusEnum::Succeeded, result: ended })),
+            ("probe: cancel_goal", size(&cancelled)),
+            ("probe: send_goal", size(&SendGoalResponse { accepted: true, stamp: Time::ZERO })),
+            ("save_mesh", size(&saved)),
+            ("probe_all, arm_state, recover, reset", size(&TriggerResponse { success: true, message: message() })),
+        ];
+        for (service, bytes) in sizes {
+            println!("{bytes:5} bytes of {} {service}", room(TUNNEL));
+            assert!(bytes <= room(TUNNEL), "{service}: {bytes} bytes");
+        }
+    }
+
+    #[test]
+    fn a_text_that_is_too_long_is_cut_and_the_rest_of_the_answer_stays() {
+        let answer = fits(TriggerResponse { success: true, message: long() });
+        assert!(answer.success && answer.message.ends_with(" …") && answer.message.len() > 1000);
+        assert!(long().starts_with(answer.message.trim_end_matches(" …")));
+        let answer = fits(SaveMeshResponse {
+            success: true,
+            message: long(),
+            path: "a/path".to_owned(),
+            face_count: 7,
+            ..SaveMeshResponse::default()
+        });
+        assert_eq!((answer.success, answer.path.as_str(), answer.face_count), (true, "a/path", 7));
+        let answer = fits(SaveMeshResponse { message: long(), path: long(), ..SaveMeshResponse::default() });
+        assert!(answer.message.is_empty() && answer.path.ends_with(" …"));
+        let answer = fits(ProbeFeatureResponse { result: ProbeResult { id: 3, code: 40, ..result(long()) } });
+        assert_eq!((answer.result.id, answer.result.code, answer.result.feature.points.len()), (3, 40, 2));
+        let answer = fits(GetResultResponse {
+            status: GoalStatusEnum::Aborted,
+            result: ProbeResponse { message: long(), ids: vec![5], codes: vec![40], ..ProbeResponse::default() },
+        });
+        assert_eq!((answer.result.ids, answer.result.codes), (vec![5], vec![40]));
+        fits(DetectFeaturesResponse { message: long(), ids: (0..128).collect(), ..DetectFeaturesResponse::default() });
+        fits(ResyncMeshResponse { message: long(), ..ResyncMeshResponse::default() });
+        fits(UndoResponse { message: long(), ..UndoResponse::default() });
+        fits(FlagFeatureResponse { message: long(), ..FlagFeatureResponse::default() });
+        fits(UnflagFeatureResponse { message: long(), success: true });
+        fits(SetBoolResponse { message: long(), success: true });
+        let refused = raw::SetParametersResult { successful: false, reason: long() };
+        assert!(fits(SetParametersAtomicallyResponse { result: refused }).result.reason.ends_with(" …"));
+    }
+
+    #[test]
+    fn of_too_many_parameters_the_answer_is_empty_and_keeps_what_was_set() {
+        let value = || raw::ParameterValue::from(ros2_client::ParameterValue::String("a".repeat(100)));
+        assert!(fits(GetParametersResponse { values: vec![value(); 20] }).values.is_empty());
+        assert!(fits(GetParameterTypesResponse { values: vec![0; 2000] }).values.is_empty());
+        let names = vec!["a name of a parameter".to_owned(); 100];
+        let list = ListParametersResponse { result: ListParametersResult { names, prefixes: Vec::new() } };
+        assert!(fits(list).result.names.is_empty());
+        let set = |successful| raw::SetParametersResult { successful, reason: "a".repeat(100) };
+        let results = fits(SetParametersResponse { results: (0..20).map(|i| set(i % 2 == 0)).collect() }).results;
+        assert_eq!(results.iter().map(|one| one.successful).collect::<Vec<_>>(), [true, false].repeat(10));
+        assert!(fits(SetParametersResponse { results: vec![set(true); 1000] }).results.is_empty());
+    }
+
+    #[test]
+    fn the_mapping_of_cyclone_has_no_limit() {
+        let whole = GetParameterTypesResponse { values: vec![0; 100_000] };
+        let fit = |mapping| Room::new(&mapping).fit("~/get_parameter_types", whole.clone()).values.len();
+        assert_eq!([ServiceMapping::Cyclone, ServiceMapping::Enhanced].map(fit), [100_000, 0]);
+    }
+
+    #[test]
+    fn a_text_is_cut_between_its_letters() {
+        for by in 0..40 {
+            let mut text = "ØØØØØØØØØØ".to_owned();
+            cut(&mut text, by);
+            assert!(text.len() <= 20usize.saturating_sub(by), "{by}: {text}");
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! The server of one service, in the mapping of either RMW.
+//!
+//! In the enhanced mapping it is that of ros2-client. In the mapping of CycloneDDS it is our own: that of ros2-client puts the
+//! identity of the request into the inline QoS there too, which nobody reads, and which RustDDS 0.15.1 writes wrongly in fragments.
+
+use ros2_client::dds::rustdds::mio1::event::Source;
+use ros2_client::dds::rustdds::{QosPolicies, TopicKind};
+use ros2_client::qos::{History, QosProfile};
+use ros2_client::{Context, Node, Publisher, ReadResult, RmwRequestId, ServiceMapping, ServiceTypeName, Subscription};
+use serde::{Deserialize, Serialize};
+
+use super::topics::dds_name;
+use super::{RosError, mapping};
+use crate::ros::arguments::NodeConfig;
+
+/// As ROS 2 has it for services: nothing is lost, calls wait for each other.
+pub(super) const SERVICE: QosProfile = QosProfile::publisher_default().history(History::KeepLast { depth: 10 });
+
+/// A request or an answer as rmw_cyclonedds has it: whose call it is, and its number, stand before the message.
+#[derive(Clone, Serialize, Deserialize)]
+pub(super) struct Headed<M> {
+    caller: u64,
+    number: i64,
+    message: M,
+}
+
+impl<M: ros2_client::Message> ros2_client::Message for Headed<M> {}
+
+/// Which call is answered.
+#[derive(Clone, Copy)]
+pub(super) enum CallId {
+    Enhanced(RmwRequestId),
+    Cyclone { caller: u64, number: i64 },
+}
+
+/// Takes requests and sends answers.
+pub(super) enum Server<Q: ros2_client::Message + 'static, A: ros2_client::Message + 'static> {
+    Enhanced(ros2_client::Server<Q, A>),
+    Cyclone(Subscription<Headed<Q>>, Publisher<Headed<A>>),
+}
+
+impl<Q, A> Server<Q, A>
+where
+    Q: ros2_client::Message + Clone + 'static,
+    A: ros2_client::Message + 'static,
+{
+    /// - `name`: as in docs/ros.md
+    pub fn new(
+        config: &NodeConfig,
+        context: &Context,
+        node: &mut Node,
+        name: &str,
+        package: &str,
+        type_name: &str,
+    ) -> Result<Self, RosError> {
+        let (whole, mapping) = (config.resolve(name)?, mapping(config));
+        if mapping != ServiceMapping::Cyclone {
+            let type_name = ServiceTypeName::new(package, type_name);
+            let server = node.create_server(mapping, &dds_name(&whole)?, &type_name, SERVICE, SERVICE);
+            return server.map(Self::Enhanced).map_err(|error| RosError::dds("offering a service", &error));
+        }
+        let topic = |name: String, part: &str| {
+            let type_name = format!("{package}::srv::dds_::{type_name}_{part}_");
+            let qos = QosPolicies::from(&SERVICE);
+            let topic = context.domain_participant().create_topic(name, type_name, &qos, TopicKind::NoKey);
+            topic.map_err(|error| RosError::dds("making a topic", &error))
+        };
+        let requests = topic(format!("rq{whole}Request"), "Request")?;
+        let answers = topic(format!("rr{whole}Reply"), "Response")?;
+        let requests = node.create_subscription(&requests, Some(SERVICE));
+        let requests = requests.map_err(|error| RosError::dds("offering a service", &error))?;
+        let answers = node.create_publisher(&answers, Some(SERVICE));
+        let answers = answers.map_err(|error| RosError::dds("offering a service", &error))?;
+        Ok(Self::Cyclone(requests, answers))
+    }
+}
+
+impl<Q: ros2_client::Message + 'static, A: ros2_client::Message + 'static> Server<Q, A> {
+    pub fn source(&mut self) -> &mut dyn Source {
+        match self {
+            Self::Enhanced(server) => server,
+            Self::Cyclone(requests, _) => requests,
+        }
+    }
+
+    /// The next request that has come.
+    pub fn take(&self) -> ReadResult<Option<(CallId, Q)>> {
+        Ok(match self {
+            Self::Enhanced(server) => server.receive_request()?.map(|(id, request)| (CallId::Enhanced(id), request)),
+            Self::Cyclone(requests, _) => requests
+                .take()?
+                .map(|(Headed { caller, number, message }, _)| (CallId::Cyclone { caller, number }, message)),
+        })
+    }
+
+    /// Answers one; an id of the other mapping there is none.
+    pub fn send(&self, id: CallId, message: A) -> Result<(), String> {
+        match (self, id) {
+            (Self::Enhanced(server), CallId::Enhanced(id)) => {
+                server.send_response(id, message).map_err(|error| error.to_string())
+            }
+            (Self::Cyclone(_, answers), CallId::Cyclone { caller, number }) => {
+                answers.publish(Headed { caller, number, message }).map_err(|error| error.to_string())
+            }
+            _ => Err("it was asked in another mapping".to_owned()),
+        }
+    }
+}

@@ -1,0 +1,172 @@
+"""The peer of tests/fastdds/peer.cpp as processes: a ROS 2 node with rmw_fastrtps, by Fast DDS alone.
+
+It is built here with Debian's Fast DDS, or with the one below FASTDDS_ROOT. Messages are written and read by rosbags.
+"""
+
+import os
+import shutil
+import subprocess
+import threading
+import time
+from pathlib import Path
+
+import make_ros_cdr
+import pytest
+from conftest import ROOT
+from ros_echo import DEADLINE_S
+from rosbags.typesys import get_types_from_msg
+
+# rcl_interfaces as its files say, which rosbags has without the services
+SERVICES = {
+    "ListParameters_Request": "string[] prefixes\nuint64 depth",
+    "ListParameters_Response": "rcl_interfaces/msg/ListParametersResult result",
+    "GetParameters_Request": "string[] names",
+    "GetParameters_Response": "rcl_interfaces/msg/ParameterValue[] values",
+    "GetParameterTypes_Request": "string[] names",
+    "GetParameterTypes_Response": "uint8[] types",
+    "DescribeParameters_Request": "string[] names",
+    "DescribeParameters_Response": "rcl_interfaces/msg/ParameterDescriptor[] descriptors",
+    "SetParameters_Request": "rcl_interfaces/msg/Parameter[] parameters",
+    "SetParameters_Response": "rcl_interfaces/msg/SetParametersResult[] results",
+}
+GET_RESULT = {
+    "GetResult_Request": "unique_identifier_msgs/msg/UUID goal_id",
+    "GetResult_Response": "int8 status\ntouchup_msgs/action/Probe_Result result",
+    "SendGoal_Request": "unique_identifier_msgs/msg/UUID goal_id\ntouchup_msgs/action/Probe_Goal goal",
+    "SendGoal_Response": "bool accepted\nbuiltin_interfaces/msg/Time stamp",
+}
+
+
+def build(folder):
+    """Compiles the peer; its path, and the folder of the libraries that it loads."""
+    root = Path(os.environ.get("FASTDDS_ROOT", "/"))
+    if not (root / "usr/include/fastdds").is_dir() or not shutil.which("g++"):
+        pytest.skip("needs Fast DDS and a C++ compiler: apt-get install libfastrtps-dev g++")
+    binary = folder / "peer"
+    multiarch = next((root / "usr/lib").glob("*/libfastrtps.so")).parent
+    includes = [f"-I{root}/usr/include", f"-I{root}/usr/include/{multiarch.name}"]
+    link = [f"-L{multiarch}", "-lfastrtps", "-lfastcdr", f"-Wl,-rpath-link,{multiarch}"]
+    subprocess.run(
+        ["g++", "-std=c++17", "-O1", *includes, ROOT / "tests/fastdds/peer.cpp", "-o", binary, *link], check=True, timeout=600
+    )
+    return binary, multiarch
+
+
+class FastDds:
+    """The peer, built; starts processes of it."""
+
+    def __init__(self, folder):
+        self.binary, self.libraries = build(folder)
+        self.store = make_ros_cdr.types()
+        known = {}
+        for package, services in {"rcl_interfaces/srv": SERVICES, "touchup_msgs/action": GET_RESULT}.items():
+            for name, text in services.items():
+                name = f"{package}/{name}" if "action" not in package else f"{package}/Probe_{name}"
+                known.update(get_types_from_msg(text, name))
+        self.store.register(known)
+
+    def start(self, *arguments, wrapper=()):
+        return Peer(self, [*wrapper, self.binary, *map(str, arguments)])
+
+    def client(self, echo, domain, service, type_name, wrapper=()):
+        """A caller of a service, met by the node."""
+        package, kind, short = type_name.split("/")
+        prefix = f"{package}::{kind}::dds_::{short}"
+        made = Client(self, [*wrapper, self.binary, "call", str(domain), service, prefix])
+        made.type_name = type_name
+        made.wait_for(lambda: "matched" in made.lines)
+        for what in ("a caller is heard", "a caller can be answered"):
+            echo.wait_for(lambda what=what: echo.has(what, f'"{service}"'))
+        return made
+
+    def listener(self, echo, domain, topic, type_name, wrapper=()):
+        """A listener on a topic, met by the node."""
+        package, kind, short = type_name.split("/")
+        made = Listener(
+            self, [*wrapper, self.binary, "listen", str(domain), f"rt{topic}", f"{package}::{kind}::dds_::{short}_"]
+        )
+        made.type_name = type_name
+        made.wait_for(lambda: "matched" in made.lines)
+        echo.wait_for(lambda: echo.has("Matched", f'"{topic}"', "count: 1"))
+        return made
+
+    def read(self, digits, type_name):
+        return self.store.deserialize_cdr(bytes.fromhex(digits), make_ros_cdr.known(type_name))
+
+
+class Peer:
+    """A process of it, and the lines that it writes."""
+
+    def __init__(self, fast_dds, command):
+        self.fast_dds, self.lines = fast_dds, []
+        environment = {**os.environ, "LD_LIBRARY_PATH": str(fast_dds.libraries)}
+        pipe = subprocess.PIPE
+        self.process = subprocess.Popen(
+            command, env=environment, stdin=pipe, stdout=pipe, stderr=subprocess.STDOUT, text=True
+        )
+        self.reader = threading.Thread(target=self.read, daemon=True)
+        self.reader.start()
+
+    def read(self):
+        for line in self.process.stdout:
+            self.lines.append(line.rstrip())
+
+    def wait_for(self, condition):
+        until = time.monotonic() + 2 * DEADLINE_S
+        while not condition():
+            assert time.monotonic() < until and self.process.poll() in (None, 0), self.text()
+            time.sleep(0.01)
+
+    def write(self, line=""):
+        self.process.stdin.write(line + "\n")
+        self.process.stdin.flush()
+
+    def wait(self):
+        """Waits for its end; what it wrote."""
+        assert self.process.wait(2 * DEADLINE_S) == 0, self.text()
+        self.reader.join()
+        return self.text()
+
+    def text(self):
+        return "\n".join(line[:200] for line in self.lines)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.stdin.close()
+        try:
+            self.process.wait(10)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+        self.reader.join()
+
+
+class Client(Peer):
+    """Calls a service, each time once."""
+
+    def __call__(self, **fields):
+        name, store = make_ros_cdr.known(f"{self.type_name}_Request"), self.fast_dds.store
+        before = len(self.lines)
+        self.write(bytes(store.serialize_cdr(store.types[name](**fields), name)).hex())
+        self.wait_for(lambda: len(self.lines) > before)
+        word, digits = self.lines[before].split(" ", 1)
+        assert word == "answer", self.text()
+        # one packet of Ethernet has no more
+        self.bytes = len(digits) // 2
+        assert self.bytes <= 1308
+        return self.fast_dds.read(digits, f"{self.type_name}_Response")
+
+
+class Listener(Peer):
+    """Takes messages."""
+
+    taken = 0
+
+    def next(self):
+        has_come = lambda: [line for line in self.lines if line.startswith("message ")][self.taken :]  # noqa: E731
+        self.wait_for(has_come)
+        line = has_come()[0]
+        self.taken += 1
+        return self.fast_dds.read(line.split(" ", 1)[1], self.type_name)

@@ -1,0 +1,38 @@
+"""The answers of the node to Fast DDS on another computer: a network of Ethernet's packets, and a tunnel of smaller ones.
+
+A heavy proof: tests/all.sh --full runs it, without that it is not collected (conftest.py).
+"""
+
+import pytest
+from ros_echo import Echo, domains
+from ros_network import Hub
+from test_ros_fastdds import (
+    a_long_text_is_cut_and_told,
+    fast_dds,  # noqa: F401
+    features_are_on_the_topic,
+    parameters_are_listed_dumped_and_described,
+    the_result_of_a_goal_comes,
+    what_was_probed_is_on_topics,
+)
+
+ETHERNET, TUNNEL = 1500, 1280
+
+
+@pytest.mark.parametrize("packet", [ETHERNET, TUNNEL])
+def test_the_largest_answers_reach_another_computer(fast_dds, packet):  # noqa: F811
+    domain = next(domains)
+    with Hub(["node", "caller"], 0, packet=packet) as hub:
+        caller = hub.wrapper("caller")
+        # a node for each, so that its log has each answer that does not fit
+        for proof in [
+            parameters_are_listed_dumped_and_described,
+            features_are_on_the_topic,
+            what_was_probed_is_on_topics,
+            the_result_of_a_goal_comes,
+            a_long_text_is_cut_and_told,
+        ]:
+            with Echo(domain, wrapper=hub.wrapper("node")) as echo:
+                proof(fast_dds, echo, domain, caller)
+    assert hub.passed > 0 and hub.dropped == 0
+    # each answer is one packet
+    assert hub.parted["node"] == 0
