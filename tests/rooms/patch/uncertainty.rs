@@ -70,10 +70,6 @@ impl Normalised {
         }
     }
 
-    fn mean(&self) -> f64 {
-        self.all.iter().sum::<f64>() / self.all.len() as f64
-    }
-
     fn rms(&self) -> f64 {
         (self.all.iter().map(|z| z * z).sum::<f64>() / self.all.len() as f64).sqrt()
     }
