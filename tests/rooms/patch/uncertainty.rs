@@ -1,4 +1,5 @@
-//! How well the patched mesh says it is known, against the part that the simulator knows; knocks, and places that move.
+//! How well the patched mesh says it is known, against the part that the simulator knows: where the errors are those of its
+//! model, which shows that it is consistent, and where they are not, which shows what it does not know; knocks, and places that move.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use rand::SeedableRng;
@@ -79,8 +80,9 @@ impl Normalised {
     }
 }
 
+/// Consistency, not truth: noise, friction and what the calibration leaves are drawn as the model has them.
 #[test]
-fn what_was_touched_is_as_well_known_as_it_says() {
+fn what_was_touched_is_as_well_known_as_it_says_where_errors_are_as_the_model_has_them() {
     let seeds = if full() { 20 } else { 2 };
     let noisy = SensorParams { pose_noise: 0.2e-3, orientation_noise: 0.3f64.to_radians(), ..SensorParams::default() };
     let styli = [
@@ -115,6 +117,108 @@ fn what_was_touched_is_as_well_known_as_it_says() {
         assert!((0.8..=1.25).contains(&touched.rms()), "{name}: {}", touched.rms());
         assert!((least..=0.97).contains(&two), "{name}: {two}");
     }
+}
+
+/// What the sensors add to the pose besides what the model knows, at 500 Hz.
+#[derive(Clone, Copy, Debug)]
+enum Foreign {
+    Nothing,
+    /// Student's t with 3 degrees of freedom: one in 25 is beyond three times its root mean square
+    HeavyTails,
+    /// what is left of it after 50 ms is e⁻¹: nothing averages out in a window
+    Wandering,
+}
+
+/// Adds noise with a root mean square of 0.05 mm on each axis.
+fn disturbed(messages: &[Message], foreign: Foreign, seed: u64) -> Vec<Message> {
+    let mut rng = Pcg64::seed_from_u64(seed);
+    let rms = 0.05e-3;
+    let mut wander = Vector3::zeros();
+    let mut add = |rng: &mut Pcg64| match foreign {
+        Foreign::Nothing => Vector3::zeros(),
+        Foreign::HeavyTails => Vector3::from_fn(|_, _| {
+            let chi_squared: f64 = (0..3).map(|_| normal(rng).powi(2)).sum();
+            // its variance is 3
+            rms / 3f64.sqrt() * normal(rng) / (chi_squared / 3.0).sqrt()
+        }),
+        Foreign::Wandering => {
+            let kept = (-2e-3f64 / 50e-3).exp();
+            wander = wander * kept + Vector3::from_fn(|_, _| normal(rng) * rms * (1.0 - kept * kept).sqrt());
+            wander
+        }
+    };
+    let mut messages = messages.to_vec();
+    for message in &mut messages {
+        if let Message::Pose(pose) = message {
+            pose.pose_ot.translation.vector += add(&mut rng);
+        }
+    }
+    messages
+}
+
+/// Touched vertices of a plate over which told values and noise are others than the model has: normalised errors, errors in
+/// m, and standard deviations.
+fn foreign(told: [f64; 2], noise: Foreign, seed: u64) -> (Normalised, Vec<f64>, Vec<f64>) {
+    let scanner = ScannerParams { seed, ..ScannerParams::default() };
+    let own = if matches!(noise, Foreign::Nothing) { SensorParams::default().pose_noise } else { 0.0 };
+    let stylus =
+        StylusParams { sensor: SensorParams { pose_noise: own, ..SensorParams::default() }, ..StylusParams::default() };
+    let plate = Plate::default();
+    let scan = scan(&plate, &scanner).unwrap();
+    let touch = touch(&plate, &plan_demo(&plate, &PathParams::default()).unwrap(), &stylus, seed).unwrap();
+    let params = PatcherParams::new(stylus.radius * told[0], Some(stylus.stiffness * told[1]), scanner.noise);
+    let made = patched(&mut patcher_of(&disturbed(&touch.messages, noise, seed), params), &scan);
+    let mut normalised = Normalised::default();
+    normalised.add(&made, &plate, Support::Touched);
+    let touched =
+        || made.support.iter().enumerate().filter(|(_, support)| **support == Support::Touched).map(|(at, _)| at);
+    let errors = touched().map(|at| plate.signed_distance(&made.mesh.positions()[at])).collect();
+    (normalised, errors, touched().map(|at| made.sigma[at]).collect())
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+#[test]
+fn what_the_model_does_not_know_is_not_in_what_it_says() {
+    let told = |name: &str, told, noise| {
+        let (z, errors, sigmas) = foreign(told, noise, 201);
+        let shares = [1.0, 1.96, 3.0].map(|sigmas| z.within(sigmas));
+        let off = mean(&errors);
+        println!(
+            "{name:22} {:5} vertices, off by {:5.1} µm, rms z {:.2}, {shares:.3?}",
+            z.all.len(),
+            off * 1e6,
+            z.rms()
+        );
+        assert!(z.all.len() > 4000, "{name}: {}", z.all.len());
+        let by = |shift: f64| mean(&sigmas.iter().map(|sigma| (shift / sigma).powi(2)).collect::<Vec<_>>());
+        (off, z.rms(), shares[1], [by(20e-6), by(11.4e-6)])
+    };
+    let (off, rms, within, shifted) = told("as told", [1.0, 1.0], Foreign::Nothing);
+    assert!((0.8..=1.25).contains(&rms) && within > 0.93 && off.abs() < 3e-6, "{off} {rms} {within}");
+
+    // the centre is where it is: a ball that is told 20 µm too small leaves the surface 20 µm too high, and the mean square of what
+    // is normalised grows by that of the shift
+    let small = told("radius 20 µm small", [1.48 / 1.5, 1.0], Foreign::Nothing);
+    assert!((small.0 - off - 20e-6).abs() < 2e-6, "{}", small.0);
+    assert!((small.1 / rms.hypot(shifted[0].sqrt()) - 1.0).abs() < 0.15, "{} {rms} {shifted:?}", small.1);
+    assert!(small.2 < 0.75, "95 % are {}", small.2);
+
+    // 2.5 N bend it by 125 µm, of which a stiffness told 10 % too large leaves 11.4 µm
+    let stiff = told("stiffness 10 % large", [1.0, 1.1], Foreign::Nothing);
+    assert!((stiff.0 - off + 11.4e-6).abs() < 2e-6, "{}", stiff.0);
+    assert!((stiff.1 / rms.hypot(shifted[1].sqrt()) - 1.0).abs() < 0.15, "{} {rms} {shifted:?}", stiff.1);
+    assert!(stiff.2 < 0.93, "95 % are {}", stiff.2);
+
+    // the same root mean square in other ways: single outliers are averaged and rejected …
+    let tails = told("heavy tails", [1.0, 1.0], Foreign::HeavyTails);
+    assert!((0.8..=1.25).contains(&tails.1) && tails.2 > 0.93, "{tails:?}");
+    // … and what does not average out in a window is not told: of its 50 ms a smoothing of some milliseconds leaves all of the
+    // 50 µm, and 20 times as many errors are beyond two deviations as ought to be, if this is half as much as it says
+    let wander = told("wandering poses", [1.0, 1.0], Foreign::Wandering);
+    assert!((1.5..=3.5).contains(&wander.1) && (0.5..0.85).contains(&wander.2), "{wander:?}");
 }
 
 #[test]

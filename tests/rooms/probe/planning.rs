@@ -390,13 +390,72 @@ fn in_reach(mesh: &TriMesh) -> TriMesh {
     TriMesh::new(mesh.positions().iter().map(|p| p * scale).collect(), kept).unwrap()
 }
 
-/// For any part: no plan leaves the box, and no move through free air comes nearer to the mesh than the tool is thick. Distances
-/// are those of another way than the tree's: all triangles, one after the other.
+/// All triangles of a mesh, each in a ball, so that most are passed over.
+struct Triangles(Vec<([Point3<f64>; 3], Point3<f64>, f64)>);
+
+impl Triangles {
+    fn new(mesh: &TriMesh) -> Self {
+        let ball = |corners: [Point3<f64>; 3]| {
+            let middle = Point3::from((corners[0].coords + corners[1].coords + corners[2].coords) / 3.0);
+            (corners, middle, corners.iter().map(|p| (p - middle).norm()).fold(0.0, f64::max))
+        };
+        Self(mesh.faces().map(|(face, _)| ball(mesh.triangle(face))).collect())
+    }
+
+    /// Distance of a place, as far as `reach`, m.
+    fn distance(&self, p: &Point3<f64>, reach: f64) -> f64 {
+        self.0.iter().fold(reach, |nearest, (corners, middle, radius)| {
+            let is_far = (p - middle).norm_squared() >= (nearest + radius).powi(2);
+            if is_far { nearest } else { nearest.min(distance_to_triangle(p, corners)) }
+        })
+    }
+}
+
+/// What the moves of all plans could show.
+#[derive(Clone, Copy, Debug, Default)]
+struct Moves {
+    parts: usize,
+    plans: usize,
+    touches: usize,
+    links: usize,
+    /// with the shaft along z, so that it can be looked at
+    upright: usize,
+    /// that pass within two millimetres of what they must keep
+    close: usize,
+    /// that go where the straight way from the last place in free air is barred
+    around: usize,
+}
+
+/// Ball and shaft keep their radii and the margin all along a move; `shaft`: where its direction is known.
+fn check_move(
+    triangles: &Triangles,
+    tool: &Tool,
+    [from, to]: [Point3<f64>; 2],
+    shaft: Option<Vector3<f64>>,
+    step: f64,
+) -> f64 {
+    let steps = ((to - from).norm() / step).ceil().max(1.0) as usize;
+    let mut least = f64::INFINITY;
+    for at in (0..=steps).map(|at| from + (to - from) * (at as f64 / steps as f64)) {
+        let ball = triangles.distance(&at, 10e-3) - tool.ball_radius - tool.margin;
+        assert!(ball >= -1e-9, "the ball comes nearer by {:.3} mm at {at}", -ball * 1e3);
+        least = least.min(ball);
+        let along = (1..=12).map(|part| f64::from(part) / 12.0 * tool.shaft_length);
+        for place in shaft.iter().flat_map(|shaft| along.clone().map(move |length| at + shaft * length)) {
+            let room = triangles.distance(&place, 10e-3) - tool.shaft_radius - tool.margin;
+            assert!(room >= -1e-9, "the shaft comes nearer by {:.3} mm at {place}", -room * 1e3);
+        }
+    }
+    least
+}
+
+/// For any part: no plan leaves the box, and no move through free air brings ball or shaft nearer to the mesh than their radii and the
+/// margin. Distances are those of another way than the tree's: all triangles, one after the other.
 #[test]
 fn no_plan_leaves_the_limits_or_passes_through_the_mesh() {
     let is_full = std::env::var_os("TOUCHUP_FULL").is_some();
     let mut rng = Pcg64::seed_from_u64(3);
-    let (mut plans, mut links, mut touches) = (0, 0, 0);
+    let mut moves = Moves::default();
     let Some(parts) = parts() else { return };
     for path in parts {
         // whatever unit it has
@@ -408,6 +467,7 @@ fn no_plan_leaves_the_limits_or_passes_through_the_mesh() {
         if mesh.face_count() > if is_full { 200_000 } else { 20_000 } {
             continue;
         }
+        moves.parts += 1;
         let [low, high] = mesh.bounds();
         // wherever the part is, in the middle of what the arm reaches
         let middle = nalgebra::center(&low, &high);
@@ -417,7 +477,7 @@ fn no_plan_leaves_the_limits_or_passes_through_the_mesh() {
         let params = ProbeParams { pattern: PatternParams { budget: 12, ..params().pattern }, ..params() };
         let start = above(&cell, [middle.x, middle.y, high.z + 60e-3]);
         let faces: Vec<_> = mesh.faces().map(|(face, _)| mesh.triangle(face)).collect();
-        let world = Still::new(mesh.clone());
+        let (triangles, world) = (Triangles::new(&mesh), Still::new(mesh.clone()));
         let flange = start * cell.pose_ft.inverse();
         let joints = cell.geometry.inverse(&flange, &[0.0; 6])[0];
         let now = ArmState {
@@ -433,12 +493,12 @@ fn no_plan_leaves_the_limits_or_passes_through_the_mesh() {
             let place = Point3::from((a.coords + b.coords + c.coords) / 3.0);
             let flag = Flag { id: 1, kind, place, radius: 4e-3 };
             let planned = plan(&cell, &params, &world, &flag, &now).unwrap();
-            plans += 1;
+            moves.plans += 1;
             for (number, wish) in planned.wishes.iter().enumerate() {
                 if planned.held_back.iter().any(|(at, _)| *at == number) {
                     continue;
                 }
-                touches += 1;
+                moves.touches += 1;
                 for place in [wish.entry, wish.from, wish.from + wish.direction.into_inner() * wish.search] {
                     let p = cell.pose_bo * place;
                     let is_in = (0..3)
@@ -446,19 +506,31 @@ fn no_plan_leaves_the_limits_or_passes_through_the_mesh() {
                     assert!(is_in, "{}: {kind:?} at {p}", path.display());
                 }
             }
-            for [from, to] in &planned.links {
-                links += 1;
-                let steps = ((to - from).norm() / 1e-3).ceil().max(1.0) as usize;
-                for step in (0..=steps).step_by(if is_full { 1 } else { 3 }) {
-                    let at = from + (to - from) * (step as f64 / steps as f64);
-                    let near = faces.iter().map(|face| distance_to_triangle(&at, face)).fold(f64::INFINITY, f64::min);
-                    assert!(near >= cell.tool.ball_radius, "{}: {:.2} mm at {at}", path.display(), near * 1e3);
-                }
+            // a turn is a move that goes nowhere; with none the shaft is as it was, along z
+            let has_turned = planned.links.iter().any(|[from, to]| from == to);
+            let shaft = (!has_turned).then(Vector3::z);
+            for pair in &planned.links {
+                moves.links += 1;
+                moves.upright += usize::from(!has_turned);
+                let step = if is_full { 0.25e-3 } else { 1e-3 };
+                moves.close += usize::from(check_move(&triangles, &cell.tool, *pair, shaft, step) < 2e-3);
             }
+            // up, over, and down again
+            moves.around += planned
+                .links
+                .windows(3)
+                .filter(|way| {
+                    let [from, to] = [way[0][0], way[2][1]];
+                    let mut straight = (0..=100).map(|at| from + (to - from) * (f64::from(at) / 100.0));
+                    straight.any(|p| triangles.distance(&p, 10e-3) < cell.tool.ball_radius)
+                })
+                .count();
         }
     }
-    println!("{plans} plans, {links} links, {touches} touches");
-    assert!(plans >= 20 && links >= 40, "{plans} {links}");
+    println!("{moves:?}");
+    let Moves { parts, plans, touches, links, upright, close, around } = moves;
+    assert!(parts >= 5 && plans == 4 * parts && touches >= 40 && links >= 40, "{moves:?}");
+    assert!(upright >= 20 && close >= 20 && around >= 10, "{moves:?}");
 }
 
 /// The shaft stands where the normal is, when it leans.

@@ -8,6 +8,8 @@ use proptest::prelude::*;
 use touchup::refine::{Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, StepRule};
 use touchup::sim::coupled::GuidedStylus;
 
+use super::counted::{Shown, tried};
+
 const H_MIN: f64 = 0.5e-3;
 const F_MAX: f64 = 10.0;
 const SIGMOID: ContactModel = ContactModel::Sigmoid { f_max_n: F_MAX, h_min_m: H_MIN, delta: 5.0 };
@@ -289,35 +291,112 @@ proptest! {
         prop_assert!(after.b.coords.norm() <= (5.0 * 5.0 + 4.0 / (c * (1.0 - c))) * H_MIN * f64::EPSILON);
         prop_assert!((after.n - n).norm() <= 4.0 * f64::EPSILON);
     }
+}
 
-    #[test]
-    fn extremes_give_a_unit_normal_or_an_error(
-        exponents in [-308.0..300.0, -308.0..300.0, -308.0..300.0, -308.0..300.0, -308.0..300.0, -308.0..300.0, -308.0..300.0f64],
-        delta in -1e9..1e9, n in unit(), f in unit(), side in unit(), params in params(), spring in any::<bool>(),
-    ) {
-        let [h_min_m, f_max_n, alpha_m_per_n_s, beta_per_n2_s, dt, size, far] = exponents.map(|x| 10f64.powf(x));
-        let model = if spring { ContactModel::Spring { stiffness_n_per_m: h_min_m } } else { ContactModel::Sigmoid { f_max_n, h_min_m, delta } };
-        let params = DynamicsParams { model, alpha_m_per_n_s, beta_per_n2_s, ..params };
-        let face = FaceState { b: Point3::origin(), n };
-        for force in [size * f, f_max_n * f, f_max_n * n, -size * n, Vector3::zeros()] {
-            for p in [Point3::from(far * side), Point3::origin()] {
-                if let Ok(after) = FaceDynamics::new(params).unwrap().step(&face, &p, &force, dt) {
-                    prop_assert!(after.b.coords.iter().all(|x| x.is_finite()));
-                    prop_assert!((after.n.norm() - 1.0).abs() <= 2.0 * f64::EPSILON);
-                }
-            }
+/// Sizes of what a step is made of: all numbers, by their powers of ten.
+#[derive(Clone, Copy, Debug)]
+struct Sizes {
+    /// h_min or the stiffness, f_max, α, β, time, force, distance
+    exponents: [f64; 7],
+    delta: f64,
+    spring: bool,
+}
+
+fn sizes(reach: f64) -> impl Strategy<Value = Sizes> {
+    let powers = prop::array::uniform7(-1.0..1.0f64).prop_map(move |shares| shares.map(|x| (reach * x).min(300.0)));
+    (powers, -1e9..1e9, any::<bool>()).prop_map(|(exponents, delta, spring)| Sizes { exponents, delta, spring })
+}
+
+/// Finite and of length 1, turned in the plane of n and F, and no farther than α (|F| + f_max) t where a sigmoid expects f_max at the
+/// most.
+fn check_extremes(sizes: &Sizes, [n, f, side]: [Vector3<f64>; 3], params: DynamicsParams, may_overflow: bool) -> Shown {
+    let Sizes { exponents, delta, spring } = *sizes;
+    let [h_min_m, f_max_n, alpha_m_per_n_s, beta_per_n2_s, dt, size, far] = exponents.map(|x| 10f64.powf(x));
+    let model = if spring {
+        ContactModel::Spring { stiffness_n_per_m: h_min_m }
+    } else {
+        ContactModel::Sigmoid { f_max_n, h_min_m, delta }
+    };
+    let params = DynamicsParams { model, alpha_m_per_n_s, beta_per_n2_s, ..params };
+    let face = FaceState { b: Point3::origin(), n };
+    let (mut shown, mut refused) = (false, false);
+    for force in [size * f, f_max_n * f, f_max_n * n, -size * n, Vector3::zeros()] {
+        for p in [Point3::from(far * side), Point3::origin()] {
+            let Ok(after) = FaceDynamics::new(params).unwrap().step(&face, &p, &force, dt) else {
+                // a spring that is drawn away from its rest goes there as e^αkt: only that is beyond the largest number
+                let is_away = spring && alpha_m_per_n_s * h_min_m * dt > 300.0;
+                assert!(is_away || may_overflow, "{sizes:?} with {params:?} is refused");
+                refused = true;
+                continue;
+            };
+            assert!(after.b.coords.iter().all(|x| x.is_finite()));
+            assert!((after.n.norm() - 1.0).abs() <= 2.0 * f64::EPSILON);
+            // it turns towards F, in the plane of both
+            let towards = force.try_normalize(0.0).unwrap_or(n);
+            assert!(after.n.dot(&n.cross(&towards)).abs() <= 8.0 * f64::EPSILON);
+            let farthest = alpha_m_per_n_s * (force.norm() + f_max_n) * dt * (1.0 + 1e-9);
+            // of sizes of which nothing underflows
+            let is_bounded = !spring && params.rule == StepRule::Lie && !may_overflow;
+            assert!(!is_bounded || after.b.coords.norm() <= farthest, "{:?} farther than {farthest:e}", after.b);
+            shown |= after.b != face.b || after.n != face.n;
         }
     }
-
-    #[test]
-    fn saturated_depths_and_long_times_are_never_refused(u in -1e9..1e9, c in -3.0..3.0f64, scaled in -12.0..15.0f64, rule in prop_oneof![Just(StepRule::Lie), Just(StepRule::DriftCorrected)]) {
-        let scaled = 10f64.powf(scaled);
-        let params = DynamicsParams { rule, ..paper(0.1, 0.1) };
-        let after = step(params, &UP, above(u), press(c * F_MAX), scaled * H_MIN / (0.1 * F_MAX));
-        // the rate lies between −c and 1 − c
-        let rate = after.b.z / -H_MIN / scaled;
-        prop_assert!(rate >= -c - 1e-9 * (1.0 + 1e9 / scaled) && rate <= 1.0 - c + 1e-9 * (1.0 + 1e9 / scaled), "{rate}");
+    match (refused, shown) {
+        (true, _) => Shown::Refused,
+        (false, true) => Shown::Value,
+        (false, false) => Shown::Little,
     }
+}
+
+#[test]
+fn extremes_give_a_unit_normal_or_an_error() {
+    let cases = |reach| (sizes(reach), [unit(), unit(), unit()], params());
+    // the largest product is (α f_max t / h_min) of 10^120
+    let told = tried("sizes of 1e-25 to 1e25", 2048, cases(25.0), |(sizes, directions, params)| {
+        check_extremes(&sizes, directions, params, false)
+    });
+    assert!(told.values > 1500, "{told:?}");
+    // as far as numbers go: a product of four sizes may be as far from 1 as 10^100, and what is refused is one of those
+    let told = tried("sizes of 1e-300 to 1e300", 2048, cases(300.0), |(sizes, directions, params)| {
+        let mut powers = sizes.exponents.map(f64::abs);
+        powers.sort_by(f64::total_cmp);
+        check_extremes(&sizes, directions, params, powers[3..].iter().sum::<f64>() > 100.0)
+    });
+    assert!(told.values > 200, "{told:?}");
+}
+
+/// A face in a saturated model goes at one of two speeds, −c where nothing is expected (u > 0) and 1 − c where f_max is (u < 0),
+/// until it is at u = 0, or for ever: by as much as the bend is wide, |ln| of the smallest number of c and 1 − c, it is not there.
+fn check_saturated(u: f64, c: f64, scaled: f64, rule: StepRule) -> Shown {
+    let params = DynamicsParams { rule, ..paper(0.1, 0.1) };
+    let after = step(params, &UP, above(u), press(c * F_MAX), scaled * H_MIN / (0.1 * F_MAX));
+    let speed = |u: f64| if u > 0.0 { -c } else { 1.0 - c };
+    let to_bend = -u / speed(u);
+    let free = speed(u) * scaled;
+    let moved = if to_bend < 0.0 || to_bend > scaled {
+        free
+    } else {
+        // at the bend it rests, or goes on at the other speed
+        let beyond = speed(-u);
+        -u + if (beyond > 0.0) == (speed(u) > 0.0) { beyond * (scaled - to_bend) } else { 0.0 }
+    };
+    let width = 40.0 + c.abs().min((1.0 - c).abs()).ln().abs();
+    // where it goes on, the bend also costs time: as much as it is wide at the slower of both speeds
+    let delay = width * (1.0 + speed(-u).abs().max(speed(u).abs()) / speed(-u).abs().min(speed(u).abs()));
+    let tolerance = delay + 1e-12 * (u.abs() + moved.abs());
+    let found = after.b.z / -H_MIN;
+    assert!((found - moved).abs() <= tolerance, "{found} {moved} ± {tolerance} from {u} at {c} after {scaled}");
+    if tolerance < 1e-2 * moved.abs() { Shown::Value } else { Shown::Little }
+}
+
+#[test]
+fn saturated_depths_and_long_times_go_at_the_speeds_of_both_ends() {
+    let rule = prop_oneof![Just(StepRule::Lie), Just(StepRule::DriftCorrected)];
+    let scaled = (3.0..15.0f64).prop_map(|x| 10f64.powf(x));
+    let told = tried("saturated", 4096, (-1e9..1e9, -3.0..3.0f64, scaled, rule), |(u, c, scaled, rule)| {
+        check_saturated(u, c, scaled, rule)
+    });
+    assert!(told.values > 3000, "{told:?}");
 }
 
 /// c = F·n/f_max on both sides of every special value.
@@ -332,32 +411,54 @@ fn shares() -> impl Strategy<Value = f64> {
     ]
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 20_000, failure_persistence: None, ..ProptestConfig::default() })]
+/// Two flows of a share of the time each are the one of all of it; and each way lies between the rates of its ends, f by
+/// f_max e^(−u/2) / (2 cosh(u/2)), as h moves one way and f falls with h.
+fn check_sum(u: f64, c: f64, t: f64, first: f64, tilted: bool) -> Shown {
+    let model = ContactModel::Sigmoid { f_max_n: 1.0, h_min_m: 1.0, delta: 0.0 };
+    let along = if tilted { Along::Force } else { Along::InitialNormal };
+    let params = DynamicsParams { model, along, ..paper(1.0, 0.0) };
+    let flow = |face: &FaceState, u, grow: f64, t: f64| {
+        let force = grow * Vector3::new(if tilted { c.abs() } else { 0.0 }, 0.0, c);
+        step(params, face, Point3::new(0.0, 0.0, u), force, t)
+    };
+    let ulps = 1.0 + 8e-16;
+    let once = flow(&UP, u, 1.0, t);
+    let half = flow(&UP, u, 1.0, first * t);
+    let twice = flow(&half, u, 1.0, (1.0 - first) * t);
+    // what four roundings of u, F, t, and of u half-way, do to the result
+    let moved = [
+        flow(&UP, u * ulps + 1e-15, 1.0, t).b - once.b,
+        flow(&UP, u, ulps, t).b - once.b,
+        flow(&UP, u, 1.0, ulps * t).b - once.b,
+        flow(&half, u * ulps + 1e-15 + 8e-16 * half.b.z.abs(), 1.0, (1.0 - first) * t).b - twice.b,
+    ];
+    let rounding: f64 = moved.iter().map(|v| v.norm()).sum();
+    assert!((twice.b - once.b).norm() <= 1e-12 * once.b.coords.norm() + 4.0 * rounding);
+    let rate = |u: f64| {
+        let half = 0.5 * u.clamp(-1400.0, 1400.0);
+        c - (-half).exp() / (2.0 * half.cosh())
+    };
+    // along a, which leans by 45° where it is tilted, and looks down where F does
+    let up = once.b.z.signum() * once.b.coords.norm();
+    let way = if tilted { up * c.signum() } else { up };
+    let ends = [rate(u) * t, rate(u - once.b.z) * t];
+    let [least, most] = [ends[0].min(ends[1]), ends[0].max(ends[1])];
+    let slack =
+        1e-12 * (least.abs() + most.abs()) + 64.0 * f64::EPSILON * (t * (1.0 + c.abs()) + u.abs()) + 4.0 * rounding;
+    assert!(way >= least - slack && way <= most + slack, "{way} not in {least} … {most} from {u} at {c}, {t}");
+    let is_told =
+        slack + rounding < 1e-3 * way.abs() && least.abs().min(most.abs()) > 0.05 * least.abs().max(most.abs());
+    if is_told { Shown::Value } else { Shown::Little }
+}
 
-    #[test]
-    fn position_flows_add_up_in_every_regime(u in prop_oneof![-45.0..45.0, -700.0..700.0], c in shares(), scaled in -6.0..6.0f64, first in 0.05..0.95, tilted in any::<bool>()) {
-        let model = ContactModel::Sigmoid { f_max_n: 1.0, h_min_m: 1.0, delta: 0.0 };
-        let along = if tilted { Along::Force } else { Along::InitialNormal };
-        let params = DynamicsParams { model, along, ..paper(1.0, 0.0) };
-        let flow = |face: &FaceState, u, grow: f64, t: f64| {
-            let force = grow * Vector3::new(if tilted { c.abs() } else { 0.0 }, 0.0, c);
-            step(params, face, Point3::new(0.0, 0.0, u), force, t)
-        };
-        let (t, ulps) = (10f64.powf(scaled), 1.0 + 8e-16);
-        let once = flow(&UP, u, 1.0, t);
-        let half = flow(&UP, u, 1.0, first * t);
-        let twice = flow(&half, u, 1.0, (1.0 - first) * t);
-        // what four roundings of u, F, t, and of u half-way, do to the result
-        let moved = [
-            flow(&UP, u * ulps + 1e-15, 1.0, t).b - once.b,
-            flow(&UP, u, ulps, t).b - once.b,
-            flow(&UP, u, 1.0, ulps * t).b - once.b,
-            flow(&half, u * ulps + 1e-15 + 8e-16 * half.b.z.abs(), 1.0, (1.0 - first) * t).b - twice.b,
-        ];
-        let rounding: f64 = moved.iter().map(|v| v.norm()).sum();
-        prop_assert!((twice.b - once.b).norm() <= 1e-12 * once.b.coords.norm() + 4.0 * rounding);
-    }
+#[test]
+fn position_flows_add_up_in_every_regime() {
+    let depth = prop_oneof![-45.0..45.0, -700.0..700.0];
+    let cases = (depth, shares(), -6.0..6.0f64, 0.05..0.95, any::<bool>());
+    let told = tried("sums of flows", 20_000, cases, |(u, c, scaled, first, tilted)| {
+        check_sum(u, c, 10f64.powf(scaled), first, tilted)
+    });
+    assert!(told.values > 8_000, "{told:?}");
 }
 
 /// Distance of the planes at the true barycentre, m, and angle between the normals, rad, before each millisecond.

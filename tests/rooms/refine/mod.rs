@@ -1,3 +1,4 @@
+mod counted;
 mod dynamics;
 mod formulas;
 mod push;
