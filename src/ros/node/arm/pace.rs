@@ -1,8 +1,8 @@
-//! A simulated arm in real time.
+//! A simulated arm in the time of a clock.
 
-use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+use crate::clock::Clock;
 use crate::robot::{Arm, ArmError, ArmState, Command};
 use crate::sim::SimArm;
 
@@ -11,25 +11,26 @@ const LATE: Duration = Duration::from_millis(100);
 
 /// Hands states out when they are due.
 pub struct Paced<'a> {
+    clock: Clock,
     arm: SimArm<'a>,
     due: Instant,
 }
 
 impl<'a> Paced<'a> {
     /// From now on.
-    pub fn new(arm: SimArm<'a>) -> Self {
-        Self { arm, due: Instant::now() }
+    pub fn new(clock: Clock, arm: SimArm<'a>) -> Self {
+        Self { arm, due: clock.now(), clock }
     }
 }
 
 impl Arm for Paced<'_> {
     fn next_state(&mut self) -> Result<ArmState, ArmError> {
         self.due += Duration::from_secs_f64(self.arm.period());
-        let now = Instant::now();
+        let now = self.clock.now();
         if now > self.due + LATE {
             self.due = now;
         }
-        sleep(self.due.saturating_duration_since(now));
+        self.clock.sleep(self.due.saturating_duration_since(now));
         self.arm.next_state()
     }
 
