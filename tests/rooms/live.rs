@@ -90,16 +90,16 @@ fn renewed_bit_by_bit_it_is_the_skin_of_all_at_once_and_sound_all_along() {
     });
     let whole = patcher.patched(scan, &tree).unwrap().mesh;
     let faces = [&mesh, &whole].map(|mesh| mesh.face_count() as f64);
-    println!("{renewals} renewals, {faces:?} faces bit by bit and at once");
-    assert!((faces[0] / faces[1] - 1.0).abs() < 0.01);
+    // 13868 of 13900
+    assert!((faces[0] / faces[1] - 1.0).abs() < 0.004, "{faces:?} faces bit by bit and at once");
     for (name, distances) in [("there", distances(&mesh, &whole)), ("back", distances(&whole, &mesh))] {
         let at = |share: f64| distances[((distances.len() - 1) as f64 * share) as usize] * 1e3;
-        println!("{name}: median {:.1e}, 95 % {:.1e}, 99 % {:.1e} mm", at(0.5), at(0.95), at(0.99));
-        assert!(at(0.5) < 0.002 && at(0.95) < 0.01 && at(0.99) < 0.1);
+        let told = format!("{name}: median {:.1e}, 95 % {:.1e}, 99 % {:.1e} mm", at(0.5), at(0.95), at(0.99));
+        // what was taken in only nearby differs: 0.0004, 0.006 and 0.09 mm
+        assert!(at(0.5) < 0.0006 && at(0.95) < 0.008 && at(0.99) < 0.1, "{told}");
     }
     let rims = [&mesh, &whole].map(|mesh| rim_length(mesh, &soundness(mesh).rims) * 1e3);
-    println!("rims {rims:.1?} mm");
-    assert!((rims[0] - rims[1]).abs() < 3.0);
+    assert!((rims[0] - rims[1]).abs() < 0.2, "rims {rims:.1?} mm");
     // the tree followed
     let anew = FaceTree::new(&mesh);
     for corner in whole.positions().iter().step_by(7) {

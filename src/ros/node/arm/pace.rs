@@ -53,3 +53,33 @@ impl Arm for Paced<'_> {
         self.arm.period()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Isometry3;
+
+    use super::*;
+    use crate::sim::{ArmParams, Plate};
+
+    #[test]
+    fn states_come_when_they_are_due_and_late_ones_at_once_up_to_100_ms() {
+        let (clock, hand) = Clock::lock_step();
+        let (plate, params) = (Plate::default(), ArmParams::default());
+        let start = params.pose_bo * Isometry3::translation(30e-3, 25e-3, 52e-3);
+        let mut paced = Paced::new(clock.clone(), SimArm::new(&plate, params, &start).unwrap());
+        let (begun, period) = (clock.now(), Duration::from_secs_f64(paced.period()));
+        let mut next_at = || {
+            paced.next_state().unwrap();
+            clock.since(begun)
+        };
+        (1..=50u32).for_each(|k| assert_eq!(next_at(), k * period));
+        // ten of them are late: they come at once, then it goes on as if nothing had been
+        hand.advance(10 * period);
+        (51..=60).for_each(|_| assert_eq!(next_at(), 60 * period));
+        assert_eq!(next_at(), 61 * period);
+        // so late that it begins to count anew
+        let late = LATE + 2 * period;
+        hand.advance(late);
+        (0..2u32).for_each(|k| assert_eq!(next_at(), 61 * period + late + k * period));
+    }
+}

@@ -155,9 +155,14 @@ impl Bench {
         Self { node, world, clock, hand, published: Vec::new() }
     }
 
-    /// All at once; none is dropped.
+    /// All at once; none is dropped. Of many some time passes in between, in which they are taken down.
     pub fn feed<'a>(&self, messages: impl IntoIterator<Item = &'a Message>) {
-        messages.into_iter().for_each(|message| assert!(self.world.arrive_patiently(self.arrival(message))));
+        for (number, message) in (1..).zip(messages) {
+            assert!(self.world.arrive_patiently(self.arrival(message)));
+            if number % INBOX == 0 {
+                self.pass(Duration::from_millis(50));
+            }
+        }
     }
 
     /// As they came: between them as much time passes as their stamps say.
