@@ -17,7 +17,6 @@ use std::time::{Duration, Instant};
 use touchup::io::mesh_file::{MeshUnit, write_mesh};
 use touchup::live::Quantiles;
 use touchup::ros::arguments::NodeConfig;
-use touchup::ros::clock::steady_ns;
 use touchup::ros::messages::{
     HapticMismatch, Header, Point, Pose, PoseStamped, Quaternion, Time, Vector3, Wrench, WrenchStamped,
 };
@@ -87,7 +86,7 @@ fn parameters(folder: &Path, faces: usize) -> Parameters {
 fn alone(faces: usize) {
     let folder = tempfile::tempdir().expect("there is room in the folder for temporary files");
     let (inbox, received) = sync_channel(INBOX);
-    let (port, world) = in_process::start(inbox);
+    let (port, world) = in_process::start(inbox, &touchup::clock::Clock::system());
     let ready = Prepared::new(parameters(folder.path(), faces)).expect("the scan is sound");
     let node = ready.start(port, received, None).expect("there are threads");
     let mut published = 0;
@@ -96,8 +95,8 @@ fn alone(faces: usize) {
         sleep(Duration::from_millis(i as u64).saturating_sub(begun.elapsed()));
         let (wrench, pose) = messages(&slide(i, WIDTH));
         // what finds no room is in the report
-        let _ = world.arrive(Arrival::Wrench(wrench, steady_ns()));
-        let _ = world.arrive(Arrival::Pose(pose, steady_ns()));
+        let _ = world.arrive(Arrival::Wrench(wrench, Instant::now()));
+        let _ = world.arrive(Arrival::Pose(pose, Instant::now()));
         if i % 20 == 0 {
             published += world.published().len();
         }

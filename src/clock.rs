@@ -1,7 +1,8 @@
 //! Steady time, of this machine or of a test that moves it by hand.
 //!
 //! Whoever keeps a deadline asks a [`Clock`]. With [`Clock::manual`] time stands still until [`ManualClock::advance`], so a
-//! deadline passes when a test says so, however busy the machine is.
+//! deadline passes when a test says so, however busy the machine is. Threads that say so by [`Clock::begin_work`] are waited for:
+//! time then passes only while all of them wait, so none of them is late, however slow it is.
 
 use std::collections::BTreeMap;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
@@ -11,6 +12,8 @@ use std::time::{Duration, Instant};
 
 /// How long a wait on a manual clock sleeps before it looks at its channel or condition again. No result depends on it.
 const LOOK: Duration = Duration::from_micros(500);
+/// Who does not come to wait for so long hangs: a test fails then. No result depends on it.
+const HUNG: Duration = Duration::from_secs(120);
 
 /// Where time comes from. Clones show the same time.
 #[derive(Clone, Debug, Default)]
@@ -26,6 +29,7 @@ pub struct ManualClock(Arc<Manual>);
 #[derive(Debug)]
 struct Manual {
     begun: Instant,
+    is_lock_step: bool,
     waits: Mutex<Waits>,
     changed: Condvar,
 }
@@ -36,7 +40,13 @@ struct Waits {
     next: u64,
     /// deadlines of the waits under way, since `begun`
     deadlines: BTreeMap<u64, Duration>,
+    /// threads, and pieces of work, that time waits for until they wait themselves
+    workers: usize,
 }
+
+/// Time of a manual clock stands still until this is dropped, or who has it waits on that clock.
+#[derive(Debug)]
+pub struct Working(Option<Arc<Manual>>);
 
 impl Clock {
     /// The steady clock of this machine.
@@ -46,8 +56,28 @@ impl Clock {
 
     /// A clock that stands still until its hand moves it.
     pub fn manual() -> (Self, ManualClock) {
-        let manual = Arc::new(Manual { begun: Instant::now(), waits: Mutex::default(), changed: Condvar::new() });
+        Self::moved_by_hand(false)
+    }
+
+    /// A clock that also who sleeps moves, by as long as it sleeps: what a simulated device does in its time is done as fast as
+    /// the others keep up. One thread may sleep.
+    pub fn lock_step() -> (Self, ManualClock) {
+        Self::moved_by_hand(true)
+    }
+
+    fn moved_by_hand(is_lock_step: bool) -> (Self, ManualClock) {
+        let (waits, changed) = (Mutex::default(), Condvar::new());
+        let manual = Arc::new(Manual { begun: Instant::now(), is_lock_step, waits, changed });
         (Self { manual: Some(manual.clone()) }, ManualClock(manual))
+    }
+
+    /// From here on time waits for the thread, or the piece of work, that this is handed to. A thread that waits on the clock
+    /// has to have one.
+    pub fn begin_work(&self) -> Working {
+        if let Some(manual) = &self.manual {
+            manual.waits().workers += 1;
+        }
+        Working(self.manual.clone())
     }
 
     /// Now.
@@ -64,6 +94,9 @@ impl Clock {
     pub fn sleep(&self, duration: Duration) {
         let Some(manual) = &self.manual else { return thread::sleep(duration) };
         let wait = manual.begin(duration);
+        if manual.is_lock_step {
+            return manual.move_to(wait.deadline, wait.number);
+        }
         let waits = manual.waits();
         drop(manual.changed.wait_while(waits, |waits| waits.elapsed < wait.deadline));
     }
@@ -109,13 +142,15 @@ impl Clock {
 }
 
 impl ManualClock {
-    /// Moves time on, and returns when no wait of before is left whose deadline has passed.
+    /// Moves time on as soon as all who work wait, and returns when no wait of before is left whose deadline has passed, and all
+    /// who work wait again.
+    ///
+    /// # Panics
+    /// When somebody hangs.
     pub fn advance(&self, by: Duration) {
-        let mut waits = self.0.waits();
-        waits.elapsed += by;
-        self.0.changed.notify_all();
-        let is_overdue = |waits: &mut Waits| waits.deadlines.values().any(|deadline| *deadline <= waits.elapsed);
-        drop(self.0.changed.wait_while(waits, is_overdue));
+        let to = self.0.waits().elapsed.saturating_add(by);
+        self.0.move_to(to, u64::MAX);
+        drop(self.0.wait_until_idle(self.0.waits()));
     }
 
     /// Waits under way.
@@ -136,11 +171,35 @@ impl Manual {
         self.waits.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Waits until all who work wait.
+    fn wait_until_idle<'a>(&'a self, waits: MutexGuard<'a, Waits>) -> MutexGuard<'a, Waits> {
+        self.wait_while(waits, |waits| waits.deadlines.len() < waits.workers)
+    }
+
+    fn wait_while<'a>(&'a self, waits: MutexGuard<'a, Waits>, holds: impl Fn(&Waits) -> bool) -> MutexGuard<'a, Waits> {
+        let waited = self.changed.wait_timeout_while(waits, HUNG, |waits| holds(waits));
+        let (waits, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        assert!(!holds(&waits), "{} wait of {} that work: one hangs", waits.deadlines.len(), waits.workers);
+        waits
+    }
+
+    /// Moves time on and waits for who waited for that, but not for the wait `own`.
+    fn move_to(&self, to: Duration, own: u64) {
+        let mut waits = self.wait_until_idle(self.waits());
+        waits.elapsed = waits.elapsed.max(to);
+        self.changed.notify_all();
+        let is_overdue = |waits: &Waits| {
+            waits.deadlines.iter().any(|(number, deadline)| *number != own && *deadline <= waits.elapsed)
+        };
+        drop(self.wait_while(waits, is_overdue));
+    }
+
     fn begin(&self, timeout: Duration) -> Wait<'_> {
         let mut waits = self.waits();
         let (number, deadline) = (waits.next, waits.elapsed.saturating_add(timeout));
         waits.next += 1;
         waits.deadlines.insert(number, deadline);
+        self.changed.notify_all();
         Wait { manual: self, number, deadline }
     }
 }
@@ -149,6 +208,15 @@ impl Drop for Wait<'_> {
     fn drop(&mut self) {
         self.manual.waits().deadlines.remove(&self.number);
         self.manual.changed.notify_all();
+    }
+}
+
+impl Drop for Working {
+    fn drop(&mut self) {
+        if let Some(manual) = &self.0 {
+            manual.waits().workers -= 1;
+            manual.changed.notify_all();
+        }
     }
 }
 
@@ -221,5 +289,58 @@ mod tests {
             changed.notify_all();
             assert_eq!(waiting.join().unwrap(), 5);
         });
+    }
+
+    /// However slow it is, a thread that works is not late: both loops do what they do in the same order every time.
+    #[test]
+    fn time_waits_for_who_works_and_passes_while_they_wait() {
+        let (clock, hand) = Clock::manual();
+        let (sender, receiver) = channel::<Duration>();
+        let begun = clock.now();
+        let work = clock.begin_work();
+        let thread = thread::spawn({
+            let clock = clock.clone();
+            move || {
+                let _work = work;
+                for _ in 0..3 {
+                    clock.sleep(SECOND);
+                    // time stands, so however long this takes is nothing
+                    thread::sleep(Duration::from_millis(20));
+                    sender.send(clock.since(begun)).unwrap();
+                }
+            }
+        });
+        (0..3).for_each(|_| hand.advance(SECOND));
+        thread.join().unwrap();
+        assert_eq!(receiver.try_iter().collect::<Vec<_>>(), [SECOND, 2 * SECOND, 3 * SECOND]);
+        // nobody is left to be waited for
+        hand.advance(SECOND);
+    }
+
+    #[test]
+    fn who_sleeps_moves_a_clock_in_lock_step_past_the_deadlines_of_others() {
+        let (clock, _hand) = Clock::lock_step();
+        let begun = clock.now();
+        let work = [clock.begin_work(), clock.begin_work()];
+        let ticks = thread::scope(|scope| {
+            let [sleeps, ticks] = work;
+            let (over, is_over) = channel::<()>();
+            let clock = &clock;
+            let ticking = scope.spawn(move || {
+                let _work = ticks;
+                let mut ticks = Vec::new();
+                while clock.recv_timeout(&is_over, 3 * SECOND) == Err(RecvTimeoutError::Timeout) {
+                    ticks.push(clock.since(begun).as_secs());
+                }
+                ticks
+            });
+            scope.spawn(move || {
+                let _work = sleeps;
+                (0..10).for_each(|_| clock.sleep(SECOND));
+                drop(over);
+            });
+            ticking.join().unwrap()
+        });
+        assert_eq!((ticks, clock.since(begun)), (vec![3, 6, 9], 10 * SECOND));
     }
 }

@@ -1,8 +1,8 @@
 //! The other process of the bench over DDS: it sends what sensors send, and sees what a viewer sees.
 
 use std::collections::{BTreeMap, HashMap};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::thread::{sleep, spawn};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -11,7 +11,7 @@ use ros2_client::dds::rustdds::{DomainParticipantBuilder, DomainParticipantStatu
 use ros2_client::qos::{Durability, History, QosProfile, WhenFull};
 use ros2_client::{Context, MessageTypeName, Name, Node, NodeName, NodeOptions, Publisher, Subscription};
 use touchup::live::Latencies;
-use touchup::ros::clock::{stamp_ns, steady_ns};
+use touchup::ros::clock::stamp_ns;
 use touchup::ros::messages::{HapticMismatch, Header, Marker, MeshPatch, Message, Point, PoseStamped, WrenchStamped};
 use touchup::sim::wavy::{STEP_NS, slide};
 
@@ -31,6 +31,12 @@ const MESH: QosProfile = QosProfile::subscription_default()
     .durability(Durability::TransientLocal);
 
 const CHANGES: QosProfile = SAMPLES.reliability_reliable(WhenFull::Wait(Duration::from_millis(100)));
+
+/// Time of this process, ns.
+fn steady_ns() -> i64 {
+    static START: OnceLock<Instant> = OnceLock::new();
+    START.get_or_init(Instant::now).elapsed().as_nanos() as i64
+}
 
 fn wall_ns() -> i64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos() as i64)

@@ -5,6 +5,7 @@
 //! touch later, and what comes out at the end is the same, as it is made of all touches at once. With [`Pace::is_patient`]
 //! [`LiveRefiner::push`] waits instead, and the mesh at each sample is the same on every machine.
 
+mod gate;
 mod latency;
 mod probed;
 mod worker;
@@ -17,6 +18,7 @@ use crate::mesh::{Changes, FaceTree, TriMesh};
 use crate::patch::{PatchDelta, Patcher};
 use crate::refine::{RefineError, Refiner, Update};
 use crate::touch::{Sample, SettingError};
+pub use gate::{Gate, GateKeeper};
 pub use latency::{Latencies, Quantiles};
 pub use probed::ProbedNews;
 use worker::{Answer, Question, Worker};
@@ -113,6 +115,21 @@ impl LiveRefiner {
     /// [`LiveError::Setting`], [`LiveError::Refine`] where memory is short, [`LiveError::NoThread`].
     pub fn new(
         scan: Arc<(TriMesh, FaceTree)>,
+        refiner: Refiner,
+        patcher: Patcher,
+        pace: Pace,
+        room: usize,
+    ) -> Result<Self, LiveError> {
+        Self::behind(Gate::default(), scan, refiner, patcher, pace, room)
+    }
+
+    /// As [`Self::new`], where each renewal passes a gate.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn behind(
+        gate: Gate,
+        scan: Arc<(TriMesh, FaceTree)>,
         mut refiner: Refiner,
         patcher: Patcher,
         pace: Pace,
@@ -122,7 +139,7 @@ impl LiveRefiner {
         refiner.expect_patch(room)?;
         Ok(Self {
             refiner,
-            worker: Worker::new(scan, patcher)?,
+            worker: Worker::new(scan, patcher, gate)?,
             pace,
             batch: Vec::new(),
             slot: None,

@@ -5,7 +5,9 @@ use std::sync::mpsc::{Receiver, Sender, SyncSender, TryRecvError, channel};
 use std::thread::{Builder, JoinHandle};
 
 use super::LiveError;
+use super::gate::Gate;
 use super::probed::{ProbedNews, Told};
+use crate::clock::Working;
 use crate::mesh::{FaceTree, TriMesh};
 use crate::patch::{PatchDelta, Patcher};
 use crate::touch::Sample;
@@ -36,22 +38,27 @@ pub(super) struct Answer {
 /// A patcher on a thread of its own. Each question but that for a copy has one answer, in the same order.
 #[derive(Debug)]
 pub(super) struct Worker {
-    questions: Sender<Question>,
+    gate: Gate,
+    questions: Sender<(Question, Working)>,
     answers: Receiver<Answer>,
     thread: JoinHandle<Patcher>,
     batches: Vec<Vec<Sample>>,
 }
 
 impl Worker {
-    pub fn new(scan: Arc<(TriMesh, FaceTree)>, mut patcher: Patcher) -> Result<Self, LiveError> {
-        let (questions, inbox) = channel::<Question>();
+    pub fn new(scan: Arc<(TriMesh, FaceTree)>, mut patcher: Patcher, gate: Gate) -> Result<Self, LiveError> {
+        let (questions, inbox) = channel::<(Question, Working)>();
         let (outbox, answers) = channel();
+        let gate_of_thread = gate.clone();
         let work = move || {
+            let gate = gate_of_thread;
             let mut told = Told::default();
-            for question in inbox {
+            for (question, _working) in inbox {
                 let (mut batch, mut has_changed_strokes) = (Vec::new(), false);
+                let is_renewal = matches!(question, Question::Renew(_));
                 match question {
                     Question::Renew(samples) => {
+                        gate.pass();
                         samples.iter().for_each(|sample| patcher.push(sample));
                         batch = samples;
                         batch.clear();
@@ -72,12 +79,15 @@ impl Worker {
                 if outbox.send(Answer { delta, probed, has_changed_strokes, batch }).is_err() {
                     break;
                 }
+                if is_renewal {
+                    gate.note_done();
+                }
             }
             patcher
         };
         let thread = Builder::new().name("patch".to_owned()).spawn(work);
         let thread = thread.map_err(|error| LiveError::NoThread(error.to_string()))?;
-        Ok(Self { questions, answers, thread, batches: Vec::new() })
+        Ok(Self { gate, questions, answers, thread, batches: Vec::new() })
     }
 
     pub fn empty_batch(&mut self) -> Vec<Sample> {
@@ -86,7 +96,7 @@ impl Worker {
 
     /// Asks; there will be one answer more.
     pub fn ask(&self, question: Question) -> Result<(), LiveError> {
-        self.questions.send(question).map_err(|_| LiveError::Stopped)
+        self.questions.send((question, self.gate.begin_work())).map_err(|_| LiveError::Stopped)
     }
 
     /// The next answer, when it is there.

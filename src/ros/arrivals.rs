@@ -48,6 +48,7 @@ impl Arrivals {
 #[cfg(test)]
 mod tests {
     use std::sync::mpsc::sync_channel;
+    use std::time::Instant;
 
     use super::*;
     use crate::ros::messages::{PoseStamped, TFMessage};
@@ -57,7 +58,7 @@ mod tests {
         let (inbox, node) = sync_channel(1);
         let arrivals = Arrivals::new(inbox);
         for _ in 0..3 {
-            arrivals.put(Arrival::Pose(PoseStamped::default(), 0));
+            arrivals.put(Arrival::Pose(PoseStamped::default(), Instant::now()));
         }
         arrivals.put(Arrival::Tf(TFMessage::default()));
         assert_eq!((arrivals.dropped(), arrivals.is_over()), ([2, 1], false));

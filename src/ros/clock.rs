@@ -1,17 +1,9 @@
-//! The two times of a node: one that is steady, and that of ROS.
+//! The time of ROS, of which stamps are; deadlines are kept on [`crate::clock::Clock`].
 
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicI64, Ordering};
-use std::time::{Instant, SystemTime, UNIX_EPOCH};
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use super::messages::Time;
-
-/// Time since the process first asked, ns: never jumps, never goes back.
-pub fn steady_ns() -> i64 {
-    static START: OnceLock<Instant> = OnceLock::new();
-    // 292 years fit
-    START.get_or_init(Instant::now).elapsed().as_nanos() as i64
-}
 
 /// A stamp as one number, ns.
 pub fn stamp_ns(time: Time) -> i64 {
@@ -57,11 +49,5 @@ mod tests {
         assert_eq!(clock.now_ns(), 2_000_000_005);
         clock.set(Time { sec: 1, nanosec: 0 });
         assert_eq!(clock.now_ns(), 1_000_000_000, "a recording that is played again");
-    }
-
-    #[test]
-    fn steady_time_does_not_go_back() {
-        let before = steady_ns();
-        assert!(steady_ns() >= before);
     }
 }

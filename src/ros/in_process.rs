@@ -1,27 +1,31 @@
 //! The port without any network: what is to arrive is put in by hand, what is published is read back.
 
-use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 
-use super::clock::steady_ns;
 use super::messages::{PoseStamped, WrenchStamped};
 use super::port::{Arrival, Call, Inbox, Port, Publication, Reply, SamplePort};
+use crate::clock::Clock;
 
 /// Publications that are kept for reading; the oldest go first.
 const MOST_KEPT: usize = 1 << 16;
 
 #[derive(Debug)]
 struct InProcess {
-    published: Mutex<std::collections::VecDeque<Publication>>,
-    now_ns: AtomicI64,
+    published: Mutex<VecDeque<Publication>>,
+    clock: Clock,
+    /// the time of ROS, ns, and when it was that
+    now_ns: Mutex<(i64, Instant)>,
     dropped: [AtomicU64; 2],
     unsent: AtomicU64,
 }
 
 impl Port for InProcess {
     fn publish(&self, publication: Publication) {
-        let mut published = self.published.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut published = locked(&self.published);
         if published.len() == MOST_KEPT {
             published.pop_front();
             self.unsent.fetch_add(1, Ordering::Relaxed);
@@ -30,7 +34,8 @@ impl Port for InProcess {
     }
 
     fn now_ns(&self) -> i64 {
-        self.now_ns.load(Ordering::Relaxed)
+        let (now_ns, at) = *locked(&self.now_ns);
+        now_ns + self.clock.since(at).as_nanos() as i64
     }
 
     fn dropped(&self) -> [u64; 2] {
@@ -57,11 +62,18 @@ pub struct World {
     inbox: Inbox,
 }
 
-/// A port, and the world around it. What is put into the world goes to `inbox`.
-pub fn start(inbox: Inbox) -> (Arc<dyn Port>, World) {
+/// What is in it is whole whoever held it.
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A port, and the world around it. What is put into the world goes to `inbox`. The time of ROS is 0 now, and passes as that of
+/// `clock`.
+pub fn start(inbox: Inbox, clock: &Clock) -> (Arc<dyn Port>, World) {
     let port = Arc::new(InProcess {
         published: Mutex::default(),
-        now_ns: AtomicI64::new(0),
+        now_ns: Mutex::new((0, clock.now())),
+        clock: clock.clone(),
         dropped: [const { AtomicU64::new(0) }; 2],
         unsent: AtomicU64::new(0),
     });
@@ -106,19 +118,20 @@ impl World {
         self.port.published.lock().unwrap_or_else(PoisonError::into_inner).drain(..).collect()
     }
 
-    /// Sets the time of ROS, ns.
+    /// Sets the time of ROS now, ns.
     pub fn set_now_ns(&self, now_ns: i64) {
-        self.port.now_ns.store(now_ns, Ordering::Relaxed);
+        *locked(&self.port.now_ns) = (now_ns, self.port.clock.now());
     }
 }
 
+/// What an arm feels arrives as soon as the node has room for it.
 impl SamplePort for World {
     fn publish_wrench(&self, wrench: WrenchStamped) -> bool {
-        self.arrive(Arrival::Wrench(wrench, steady_ns()))
+        self.arrive_patiently(Arrival::Wrench(wrench, self.port.clock.now()))
     }
 
     fn publish_pose(&self, pose: PoseStamped) -> bool {
-        self.arrive(Arrival::Pose(pose, steady_ns()))
+        self.arrive_patiently(Arrival::Pose(pose, self.port.clock.now()))
     }
 
     fn listeners(&mut self) -> [usize; 2] {
@@ -129,12 +142,12 @@ impl SamplePort for World {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ros::messages::{Clock, UndoRequest, UndoResponse, WrenchStamped};
+    use crate::ros::messages::{Clock as ClockMessage, UndoRequest, UndoResponse, WrenchStamped};
 
     #[test]
     fn a_call_is_answered_by_who_reads_the_inbox() {
         let (inbox, arrivals) = sync_channel(8);
-        let (_port, world) = start(inbox);
+        let (_port, world) = start(inbox, &Clock::system());
         let answers = world.call(|reply| Call::Undo(UndoRequest { strokes: 2 }, reply));
         match arrivals.recv().unwrap() {
             Arrival::Call(Call::Undo(request, reply)) => {
@@ -148,18 +161,31 @@ mod tests {
     #[test]
     fn what_finds_no_room_is_counted_by_kind() {
         let (inbox, _arrivals) = sync_channel(1);
-        let (port, world) = start(inbox);
-        assert!(world.arrive(Arrival::Wrench(WrenchStamped::default(), 1)));
-        assert!(!world.arrive(Arrival::Wrench(WrenchStamped::default(), 2)));
-        assert!(!world.arrive(Arrival::Clock(Clock::default())));
-        assert!(!world.arrive(Arrival::Clock(Clock::default())));
+        let (port, world) = start(inbox, &Clock::system());
+        let now = Instant::now();
+        assert!(world.arrive(Arrival::Wrench(WrenchStamped::default(), now)));
+        assert!(!world.arrive(Arrival::Wrench(WrenchStamped::default(), now)));
+        assert!(!world.arrive(Arrival::Clock(ClockMessage::default())));
+        assert!(!world.arrive(Arrival::Clock(ClockMessage::default())));
         assert_eq!(port.dropped(), [1, 2]);
+    }
+
+    #[test]
+    fn the_time_of_ros_passes_as_that_of_the_clock() {
+        let (clock, hand) = Clock::manual();
+        let (port, world) = start(sync_channel(1).0, &clock);
+        assert_eq!(port.now_ns(), 0);
+        hand.advance(std::time::Duration::from_millis(5));
+        assert_eq!(port.now_ns(), 5_000_000);
+        world.set_now_ns(1_000_000_000_000);
+        hand.advance(std::time::Duration::from_nanos(7));
+        assert_eq!(port.now_ns(), 1_000_000_000_007);
     }
 
     #[test]
     fn publications_come_back_in_their_order() {
         let (inbox, _arrivals) = sync_channel(1);
-        let (port, world) = start(inbox);
+        let (port, world) = start(inbox, &Clock::system());
         for strokes in 0..3 {
             port.publish(Publication::Mismatch(crate::ros::messages::HapticMismatch {
                 mesh_version: strokes,

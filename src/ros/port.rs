@@ -5,6 +5,7 @@
 
 use std::fmt;
 use std::sync::mpsc::SyncSender;
+use std::time::Instant;
 
 use super::messages::{
     Clock, DetectFeaturesRequest, DetectFeaturesResponse, DiagnosticArray, FeatureArray, FlagFeatureRequest,
@@ -21,10 +22,10 @@ pub const TILES_KEPT: usize = 64;
 /// Something that came in.
 #[derive(Debug)]
 pub enum Arrival {
-    /// `SOURCE/wrench`, and when it came, ns of a steady clock
-    Wrench(WrenchStamped, i64),
-    /// `SOURCE/pose`, and when it came, ns of a steady clock
-    Pose(PoseStamped, i64),
+    /// `SOURCE/wrench`, and when it came
+    Wrench(WrenchStamped, Instant),
+    /// `SOURCE/pose`, and when it came
+    Pose(PoseStamped, Instant),
     /// `/tf`
     Tf(TFMessage),
     /// `/tf_static`

@@ -3,12 +3,13 @@
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::thread::{Builder, JoinHandle, park_timeout};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
+use crate::clock::Clock;
 use crate::io::mesh_file::MeshUnit;
 use crate::io::recording::{RecordingError, SegmentedWriter, Topics};
 use crate::io::session_folder::{SessionFolder, fingerprint, read_text};
@@ -164,22 +165,41 @@ pub struct SessionRecorder {
     sender: SyncSender<(Message, &'static str)>,
     thread: JoinHandle<()>,
     unrecorded: Arc<Mutex<Unrecorded>>,
+    end: Arc<End>,
+}
+
+/// Whether the recording is to end.
+#[derive(Debug, Default)]
+struct End {
+    has_come: Mutex<bool>,
+    changed: Condvar,
 }
 
 impl SessionRecorder {
-    /// Starts the thread.
+    /// Starts the thread, which writes when `clock` says so.
     ///
     /// # Errors
     /// [`SessionError::Io`].
-    pub fn start(folder: &SessionFolder, topics: &Topics) -> Result<Self, SessionError> {
+    pub fn start(folder: &SessionFolder, topics: &Topics, clock: &Clock) -> Result<Self, SessionError> {
         let io = |source| SessionError::Io { path: folder.path().to_owned(), source };
         let writer = SegmentedWriter::new(&folder.create_folder(RECORDING).map_err(io)?, topics);
         let (sender, messages) = sync_channel(MOST_WAITING);
         let unrecorded = Arc::new(Mutex::new(Unrecorded::default()));
-        let told = Arc::clone(&unrecorded);
-        let work = move || Taker { writer, told, refused_at: None }.take_down(&messages);
+        let end = Arc::new(End::default());
+        let taker = Taker {
+            writer,
+            told: Arc::clone(&unrecorded),
+            refused_at: None,
+            clock: clock.clone(),
+            end: Arc::clone(&end),
+        };
+        let working = clock.begin_work();
+        let work = move || {
+            taker.take_down(&messages);
+            drop(working);
+        };
         let thread = Builder::new().name("recorder".to_owned()).spawn(work).map_err(io)?;
-        Ok(Self { folder: folder.clone(), sender, thread, unrecorded })
+        Ok(Self { folder: folder.clone(), sender, thread, unrecorded, end })
     }
 
     /// Takes a message down whose header names `frame`; never waits. What finds no room is lost, and counted.
@@ -206,9 +226,10 @@ impl SessionRecorder {
 
     /// Waits until all is taken down and ends the recording; returns as [`Self::unrecorded`].
     pub fn finish(self) -> Unrecorded {
-        let Self { sender, thread, unrecorded, .. } = self;
+        let Self { sender, thread, unrecorded, end, .. } = self;
         drop(sender);
-        thread.thread().unpark();
+        *end.lock() = true;
+        end.changed.notify_all();
         let ended = thread.join();
         let mut unrecorded = locked(&unrecorded).clone();
         if ended.is_err() {
@@ -223,10 +244,19 @@ fn locked(unrecorded: &Mutex<Unrecorded>) -> MutexGuard<'_, Unrecorded> {
     unrecorded.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+impl End {
+    /// A truth value is whole whoever held it.
+    fn lock(&self) -> MutexGuard<'_, bool> {
+        self.has_come.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
 struct Taker {
     writer: SegmentedWriter,
     told: Arc<Mutex<Unrecorded>>,
     refused_at: Option<Instant>,
+    clock: Clock,
+    end: Arc<End>,
 }
 
 impl Taker {
@@ -235,7 +265,7 @@ impl Taker {
     /// What the disk does not take is lost; a moment later it is asked again, for somebody may have made room.
     fn take_down(mut self, messages: &Receiver<(Message, &'static str)>) {
         loop {
-            park_timeout(FLUSH_EVERY);
+            drop(self.clock.wait_while(&self.end.changed, self.end.lock(), FLUSH_EVERY, |has_come| !*has_come));
             let is_over = loop {
                 match messages.try_recv() {
                     Ok((message, frame)) => self.take(&message, frame),
@@ -267,7 +297,7 @@ impl Taker {
 
     /// Whether the disk is tried: it has not refused, or long enough ago.
     fn is_asked(&self) -> bool {
-        self.refused_at.is_none_or(|at| at.elapsed() >= ASK_AGAIN)
+        self.refused_at.is_none_or(|at| self.clock.since(at) >= ASK_AGAIN)
     }
 
     fn accept(&mut self) {
@@ -277,7 +307,7 @@ impl Taker {
     }
 
     fn refuse(&mut self, messages: u64, error: &RecordingError) {
-        self.refused_at = Some(Instant::now());
+        self.refused_at = Some(self.clock.now());
         let messages = messages + self.writer.give_up_segment();
         let mut told = locked(&self.told);
         told.messages += messages;
@@ -288,9 +318,9 @@ impl Taker {
 #[cfg(test)]
 mod tests {
     use std::fs::remove_dir;
-    use std::thread::sleep;
 
     use nalgebra::Vector3;
+    use tempfile::{TempDir, tempdir};
 
     use super::*;
     use crate::io::recording::RecordingReader;
@@ -301,46 +331,80 @@ mod tests {
         Message::Wrench(StampedWrench { stamp_ns: i64::from(number) * 1_000_000, wrench })
     }
 
-    fn wait(recorder: &SessionRecorder, mut is_there: impl FnMut(&Unrecorded) -> bool) -> Unrecorded {
-        let began = Instant::now();
-        loop {
-            let unrecorded = recorder.unrecorded();
-            if is_there(&unrecorded) {
-                return unrecorded;
+    fn folder() -> (TempDir, SessionFolder) {
+        let parent = tempdir().unwrap();
+        let folder = SessionFolder::create(parent.path(), "session").unwrap();
+        (parent, folder)
+    }
+
+    fn on_disk(folder: &SessionFolder) -> Vec<Message> {
+        let reader = RecordingReader::open(&folder.path().join(RECORDING), &Topics::default()).unwrap();
+        reader.map_while(Result::ok).collect()
+    }
+
+    /// What came in between two of its looks is on the disk after the second, and not before.
+    #[test]
+    fn what_was_written_is_on_the_disk_50_ms_later() {
+        let ((_parent, folder), (clock, hand)) = (folder(), Clock::manual());
+        let recorder = SessionRecorder::start(&folder, &Topics::default(), &clock).unwrap();
+        let mut written = Vec::new();
+        for look in 0..40 {
+            for number in 1..=look % 3 {
+                written.push(wrench(10 * look + number));
+                recorder.write(wrench(10 * look + number), "tip");
             }
-            assert!(began.elapsed() < Duration::from_secs(60), "{unrecorded:?}");
-            sleep(Duration::from_millis(10));
+            hand.advance(FLUSH_EVERY - Duration::from_nanos(1));
+            let before = written.len() - look as usize % 3;
+            assert_eq!(if before == 0 { Vec::new() } else { on_disk(&folder) }, written[..before], "look {look}");
+            hand.advance(Duration::from_nanos(1));
+            assert_eq!(if written.is_empty() { Vec::new() } else { on_disk(&folder) }, written, "look {look}");
         }
+        assert_eq!(recorder.finish(), Unrecorded::default());
+        assert_eq!(on_disk(&folder), written);
+    }
+
+    /// The machine stands still for as long as the queue holds, and nothing is lost; what comes after that is counted.
+    #[test]
+    fn what_waits_for_the_disk_is_not_lost_and_what_finds_no_room_is_counted() {
+        let ((_parent, folder), (clock, hand)) = (folder(), Clock::manual());
+        let recorder = SessionRecorder::start(&folder, &Topics::default(), &clock).unwrap();
+        // it waits from here on
+        hand.advance(Duration::ZERO);
+        let count = MOST_WAITING as u32;
+        (1..=count + 7).for_each(|number| recorder.write(wrench(number), "tip"));
+        assert_eq!(recorder.unrecorded(), Unrecorded { messages: 7, ..Unrecorded::default() });
+        hand.advance(FLUSH_EVERY);
+        recorder.write(wrench(count + 8), "tip");
+        assert_eq!(recorder.finish(), Unrecorded { messages: 7, ..Unrecorded::default() });
+        let kept: Vec<_> = (1..=count).chain([count + 8]).map(wrench).collect();
+        assert!(on_disk(&folder) == kept);
     }
 
     /// The folder goes away and comes back, as a disk does that is full for a time.
     #[test]
     fn it_records_on_when_the_disk_takes_again() {
-        let parent = tempfile::tempdir().unwrap();
-        let folder = SessionFolder::create(parent.path(), "session").unwrap();
-        let topics = Topics::default();
-        let recorder = SessionRecorder::start(&folder, &topics).unwrap();
-        let recording = folder.path().join(RECORDING);
-        remove_dir(&recording).unwrap();
-        for number in 1..=5 {
-            recorder.write(wrench(number), "tip");
-        }
-        let refused = wait(&recorder, |unrecorded| unrecorded.messages == 5);
-        assert!(refused.is_refused && refused.reason.unwrap().contains("touch_0000.mcap"));
+        let ((_parent, folder), (clock, hand)) = (folder(), Clock::manual());
+        let recorder = SessionRecorder::start(&folder, &Topics::default(), &clock).unwrap();
+        remove_dir(folder.path().join(RECORDING)).unwrap();
+        (1..=5).for_each(|number| recorder.write(wrench(number), "tip"));
+        hand.advance(FLUSH_EVERY);
+        let refused = recorder.unrecorded();
+        assert!(refused.messages == 5 && refused.is_refused && refused.reason.unwrap().contains("touch_0000.mcap"));
 
         folder.create_folder(RECORDING).unwrap();
-        let mut last = 5;
-        let accepted = wait(&recorder, |unrecorded| {
-            last += 1;
-            recorder.write(wrench(last), "tip");
-            !unrecorded.is_refused
-        });
-        recorder.write(wrench(last + 1), "tip");
-        let lost = recorder.finish();
-        assert_eq!(lost, accepted);
-        let read: Vec<_> = RecordingReader::open(&recording, &topics).unwrap().map(Result::unwrap).collect();
-        let kept: Vec<_> = (lost.messages as u32 + 1..=last + 1).map(wrench).collect();
-        assert_eq!(read, kept);
-        assert!(recording.join("metadata.yaml").exists());
+        // it does not ask before its time …
+        recorder.write(wrench(6), "tip");
+        hand.advance(ASK_AGAIN - FLUSH_EVERY);
+        let refused = recorder.unrecorded();
+        assert!(refused.messages == 6 && refused.is_refused);
+        // … and then it does
+        recorder.write(wrench(7), "tip");
+        hand.advance(FLUSH_EVERY);
+        let accepted = recorder.unrecorded();
+        assert!(accepted.messages == 6 && !accepted.is_refused);
+        recorder.write(wrench(8), "tip");
+        assert_eq!(recorder.finish(), accepted);
+        assert_eq!(on_disk(&folder), [7, 8].map(wrench));
+        assert!(folder.path().join(RECORDING).join("metadata.yaml").exists());
     }
 }

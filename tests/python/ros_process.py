@@ -1,5 +1,6 @@
 """touchup as processes on a network: the node, and recordings that are played to it."""
 
+import itertools
 import json
 import os
 import signal
@@ -7,7 +8,10 @@ import subprocess
 import threading
 import time
 
-from ros_echo import DEADLINE_S
+from ros_cyclone import Peer
+
+# who has not come by then hangs
+HUNG_S = 120
 
 
 class Process:
@@ -31,14 +35,14 @@ class Process:
         for line in stream:
             lines.append(line.rstrip())
 
-    def wait_for(self, condition, deadline_s=DEADLINE_S):
+    def wait_for(self, condition, deadline_s=HUNG_S):
         """Waits until it holds."""
         until = time.monotonic() + deadline_s
         while not condition():
             assert self.process.poll() is None and time.monotonic() < until, self.text()
             time.sleep(0.01)
 
-    def wait(self, deadline_s=120):
+    def wait(self, deadline_s=HUNG_S):
         """Waits for its end; returns the exit code."""
         code = self.process.wait(deadline_s)
         for reader in self.readers:
@@ -68,12 +72,46 @@ class Node(Process):
     def __init__(self, program, folder, *arguments, domain, ros=(), **options):
         ros = ["-p", f"session_folder:={folder / 'sessions'}", *ros]
         super().__init__(program, "node", "--json", *arguments, "--ros-args", *ros, domain=domain, **options)
-        self.wait_for(lambda: any("listens to" in line for line in self.out), 60)
+        self.wait_for(lambda: any("listens to" in line for line in self.out))
         (self.session,) = (folder / "sessions").iterdir()
 
     def report(self):
         """What it said at its end."""
         return json.loads(self.out[-1])
+
+
+class Client:
+    """A caller of one service of a node, which has `service_mapping:=cyclone`."""
+
+    def __init__(self, node, domain, name, request, response):
+        self.node, self.request, self.numbers = node, request, itertools.count(1)
+        self.peer = Peer(domain)
+        self.writer, self.reader = self.peer.client(f"/touchup/{name}", request, response)
+
+    def introduce(self, *harmless):
+        """Asks what changes nothing until it is answered: from then on both sides know each other, and nothing is lost."""
+        answers = []
+
+        def is_answered():
+            self.writer.write(self.request(1, next(self.numbers), *harmless))
+            time.sleep(0.1)
+            answers.extend(self.reader.take(10))
+            return answers
+
+        self.node.wait_for(is_answered)
+        return answers[0]
+
+    def ask(self, *fields):
+        """Asks once; the answer to that."""
+        number, answers = next(self.numbers), []
+        self.writer.write(self.request(1, number, *fields))
+
+        def is_answered():
+            answers.extend(answer for answer in self.reader.take(10) if answer.seq == number)
+            return answers
+
+        self.node.wait_for(is_answered)
+        return answers[0]
 
 
 def play(program, recording, *arguments, domain, **options):

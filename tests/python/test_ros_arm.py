@@ -47,19 +47,14 @@ from ros_process import Node
 
 HOLE, SLOT = 1, 2
 # of ProbeResult
-REACHED, CANCELLED, NO_SUCH_FEATURE, BUSY, ARM_NOT_READY = 1, 6, 22, 24, 25
-LINK_LOST, DATA_LOST, DRIVER_LOST = 46, 47, 48
-# states came too late or not for 80 ms, the process that speaks to the arm rested as long, or did so before it was asked
-LATE = (LINK_LOST, DATA_LOST, DRIVER_LOST, ARM_NOT_READY)
+REACHED, CANCELLED, NO_SUCH_FEATURE, BUSY = 1, 6, 22, 24
 # of the plate of the demo, mm: centre of the through hole in its top, and its diameter; the blind one
 THROUGH, BLIND = ((16.0, 36.0, 12.0), 8.0), ((32.0, 34.0, 12.0), 6.0)
 CONFIGURED = ProbeSettings(0, 0.0, 0.0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, False)
 DRY = ProbeSettings(0, 0.0, 0.0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, True)
 PLANNED = 4
-# a UR stops when a state of it comes 20 ms late, and half a minute of 500 Hz is long on a machine that is busy
-ATTEMPTS = 8
-# a probing takes half a minute
-DEADLINE_S = 180
+# a probing takes half a minute; what has not come by then hangs
+DEADLINE_S = 300
 
 
 def free_address():
@@ -95,10 +90,6 @@ def site_packages(program):
     return done.stdout.strip().removeprefix("site_packages: ")
 
 
-class TooLateError(Exception):
-    """A machine that is busy handed states of a UR over too late, and the arm stopped for it, as it should."""
-
-
 @contextlib.contextmanager
 def running(robot, demo_folder, folder, program):
     """A running node whose arm may move."""
@@ -122,29 +113,17 @@ def running(robot, demo_folder, folder, program):
             assert report["dropped"] == [0, 0] and report["unrecorded"] == 0, report
 
 
-# node, stand-in, client and this program on two cores: a UR is driven so where it is asked for (tests/all.sh --full), as a machine
-# that rests for 20 ms in a minute stops it, and says so
+# a UR stops where a state of it comes 20 ms late: it is driven where the machine has nothing else to do (tests/all.sh --full)
 ROBOTS = ["sim", "ur"] if os.environ.get("TOUCHUP_FULL") else ["sim"]
 
 
 @pytest.fixture(params=ROBOTS)
-def in_cell(request, demo_folder, tmp_path, touchup_bin):
-    """Does something with a running node; where the machine was too late, again with another one."""
+def cell(request, demo_folder, tmp_path, touchup_bin):
+    """A running node."""
     if request.param == "ur" and "TOUCHUP_UR_BIN" not in os.environ:
         pytest.skip("a UR arm needs touchup built with --features ur, which needs the shared library of Python")
-
-    def tried(work):
-        for attempt in range(ATTEMPTS):
-            folder = tmp_path / str(attempt)
-            folder.mkdir()
-            try:
-                with running(request.param, demo_folder, folder, touchup_bin) as cell:
-                    return work(cell)
-            except TooLateError as late:
-                print("too late:", late)
-        raise AssertionError(f"{ATTEMPTS} times too late")
-
-    return tried
+    with running(request.param, demo_folder, tmp_path, touchup_bin) as cell:
+        yield cell
 
 
 class Cell:
@@ -154,18 +133,7 @@ class Cell:
         self.robot = robot
         self.node, self.peer, self.numbers = node, Peer(domain), itertools.count(1)
         self.clients = {}
-
-        def is_ready():
-            state = self.trigger("arm_state")
-            self.was_too_late(not state.success and "look, then" in state.message, state.message)
-            return state.success
-
-        self.wait_for(is_ready)
-
-    def was_too_late(self, is_so, message):
-        """Of a UR alone: the states of a simulated arm come when they are asked for."""
-        if is_so and self.robot == "ur":
-            raise TooLateError(message)
+        self.wait_for(lambda: self.trigger("arm_state").success)
 
     def wait_for(self, condition, deadline_s=DEADLINE_S):
         self.node.wait_for(condition, deadline_s)
@@ -200,9 +168,6 @@ class Cell:
             return found
 
         self.wait_for(once)
-        # the answers to those that were asked in vain
-        time.sleep(0.5)
-        reader.take(100)
 
     def trigger(self, name):
         return self.ask(name, (TriggerRequest, TriggerResponse), 0)
@@ -217,9 +182,7 @@ class Cell:
 
     def probe(self, number, settings=CONFIGURED):
         kinds = (ProbeFeatureRequest, ProbeFeatureResponse)
-        result = self.ask("probe_feature", kinds, number, settings, harmless=(999, CONFIGURED)).result
-        self.was_too_late(result.code in LATE, result.message)
-        return result
+        return self.ask("probe_feature", kinds, number, settings, harmless=(999, CONFIGURED)).result
 
     def send_goal(self, name, ids):
         kinds = (SendGoalRequest, SendGoalResponse)
@@ -228,9 +191,7 @@ class Cell:
 
     def result(self, name):
         kinds = (GetResultRequest, GetResultResponse)
-        response = self.ask("probe/_action/get_result", kinds, name, harmless=([7] * 16,))
-        self.was_too_late(response.code in LATE, response.message)
-        return response
+        return self.ask("probe/_action/get_result", kinds, name, harmless=([7] * 16,))
 
     def cancel(self, name):
         kinds, nobody = (CancelGoalRequest, CancelGoalResponse), GoalInfo([7] * 16, Time(0, 0))
@@ -248,17 +209,13 @@ def assert_is(result, hole):
     assert result.touch_count < 40 and result.max_force < 4.5, told
 
 
-def test_flagged_holes_are_probed_by_service_and_action(in_cell):
-    in_cell(probed_by_service_and_action)
-
-
-def probed_by_service_and_action(cell):
+def test_flagged_holes_are_probed_by_service_and_action(cell):
     (x, y, z), _ = THROUGH
     through, blind = cell.flag(HOLE, (x + 1.5, y - 1.2, z)), cell.flag(HOLE, (31.0, 35.5, 12.0))
     assert cell.probe(999).code == NO_SUCH_FEATURE
     dry = cell.probe(through, DRY)
     assert dry.code == PLANNED and dry.touch_count == 0, dry.message
-    # of a UR the service is tested in the other test: the shorter each, the less often a machine is too late
+    # of a UR the service is tested in the other test
     if cell.robot == "sim":
         assert_is(cell.probe(through), THROUGH)
 
@@ -303,14 +260,10 @@ def probed_by_service_and_action(cell):
         wanted = (8.0, 6.0) if cell.robot == "sim" else (6.0,)
         return all(any(abs(shown - diameter) < 0.05 for shown in diameters) for diameter in wanted)
 
-    cell.wait_for(is_shown, 20)
+    cell.wait_for(is_shown)
 
 
-def test_a_cancelled_goal_stops_and_the_next_is_taken_up(in_cell):
-    in_cell(cancelled_and_probed_again)
-
-
-def cancelled_and_probed_again(cell):
+def test_a_cancelled_goal_stops_and_the_next_is_taken_up(cell):
     (x, y, z), _ = THROUGH
     through, blind = cell.flag(HOLE, (x + 0.5, y, z)), cell.flag(HOLE, (32.0, 33.0, 12.0))
     feedback = cell.peer.reader("/touchup/probe/_action/feedback", FeedbackMessage, RELIABLE)
@@ -323,8 +276,6 @@ def cancelled_and_probed_again(cell):
 
     def has_begun():
         told.extend(feedback.take(100))
-        state = cell.trigger("arm_state")
-        cell.was_too_late(not state.success, state.message)
         return any(message.touch >= 3 for message in told)
 
     cell.wait_for(has_begun)

@@ -5,7 +5,6 @@ import json
 import os
 import signal
 import subprocess
-import time
 
 import numpy
 import pytest
@@ -26,7 +25,7 @@ from ros_cyclone import (
     UndoResponse,
 )
 from ros_echo import domains
-from ros_process import Node, Process, play
+from ros_process import Client, Node, Process, play
 from scipy.spatial import KDTree
 
 
@@ -75,7 +74,8 @@ def test_a_played_recording_gives_the_files_of_refine(demo_folder, tmp_path, tou
     assert stamps(node.session / "recording", "/stylus/pose") == sorted(stamps(demo_folder / "touch.mcap", "/stylus/pose"))
 
 
-def test_a_killed_node_has_lost_a_tenth_of_a_second(demo_folder, tmp_path, touchup, touchup_bin, domain):
+def test_a_killed_node_leaves_all_that_was_on_the_disk(demo_folder, tmp_path, touchup, touchup_bin, domain):
+    """In the midst of a stroke, by kill -9. How soon it is on the disk is tested where a test moves the clock."""
     with Node(touchup_bin, tmp_path, "--scene", scene_for(demo_folder, tmp_path), domain=domain) as node:
         reader = Peer(domain).reader("/mismatch", HapticMismatch, BEST_EFFORT)
         heard = []
@@ -86,13 +86,12 @@ def test_a_killed_node_has_lost_a_tenth_of_a_second(demo_folder, tmp_path, touch
                 touching = [message.contact_case != 0 for message in heard[-200:]]
                 return len(heard) > 4000 and all(touching)
 
-            node.wait_for(is_in_a_stroke, 60)
+            node.wait_for(is_in_a_stroke)
+            on_disk = stamps(node.session / "recording", "/stylus/wrench")
             node.process.send_signal(signal.SIGKILL)
             node.wait()
-    heard.extend(reader.take(1000))
-    last_ns = max(message.header.stamp.sec * 10**9 + message.header.stamp.nanosec for message in heard)
     taken = stamps(node.session / "recording", "/stylus/wrench")
-    assert last_ns - max(taken) <= 100e6
+    assert len(on_disk) > 1000 and taken[: len(on_disk)] == on_disk
     resumed, again = tmp_path / "resumed.ply", tmp_path / "again.ply"
     done = touchup("refine", "--resume", node.session, "--out", resumed)
     assert done.returncode in (0, 4), done.stderr
@@ -107,19 +106,12 @@ def test_a_killed_node_has_lost_a_tenth_of_a_second(demo_folder, tmp_path, touch
 def test_a_stroke_is_taken_back_while_it_runs(demo_folder, tmp_path, touchup, touchup_bin, domain):
     scene = scene_for(demo_folder, tmp_path)
     with Node(touchup_bin, tmp_path, "--scene", scene, domain=domain, ros=["-p", "service_mapping:=cyclone"]) as node:
-        undo = Peer(domain).client("/touchup/undo", UndoRequest, UndoResponse)
+        undo = Client(node, domain, "undo", UndoRequest, UndoResponse)
+        # nothing was touched yet
+        assert not undo.introduce(1).success
         play(touchup_bin, demo_folder / "touch.mcap", "--speed", 4, domain=domain)
-        writer, answers = undo
-        answered = []
-
-        def is_answered():
-            writer.write(UndoRequest(1, len(answered), 1))
-            time.sleep(0.1)
-            answered.extend(answers.take(10))
-            return answered
-
-        node.wait_for(is_answered)
-        assert answered[0].success, answered[0].message
+        undone = undo.ask(1)
+        assert undone.success, undone.message
         assert node.end(signal.SIGTERM) in (0, 4), node.text()
     done = touchup("refine", "--resume", node.session, "--out", tmp_path / "resumed.ply")
     assert done.returncode in (0, 4), done.stderr
@@ -130,40 +122,28 @@ def test_a_stroke_is_taken_back_while_it_runs(demo_folder, tmp_path, touchup, to
 def test_who_comes_late_sees_what_is_saved(demo_folder, tmp_path, touchup_bin, domain):
     scene = scene_for(demo_folder, tmp_path)
     with Node(touchup_bin, tmp_path, "--scene", scene, domain=domain, ros=["-p", "service_mapping:=cyclone"]) as node:
+        save = Client(node, domain, "save_mesh", SaveMeshRequest, SaveMeshResponse)
+        assert not save.introduce("../nowhere.ply", False, False).success
         play(touchup_bin, demo_folder / "touch.mcap", "--speed", 4, domain=domain)
-        peer = Peer(domain)
-        reader = peer.reader("/mesh", Marker, LATCHED)
-        writer, answers = peer.client("/touchup/save_mesh", SaveMeshRequest, SaveMeshResponse)
-        tiles, answered, asked, heard = {}, [], [], [time.monotonic()]
+        reader = Peer(domain).reader("/mesh", Marker, LATCHED)
+        answer = save.ask("now.ply", False, False)
+        assert answer.success, answer.message
+        saved = trimesh.load(answer.path, process=False)
+        assert (len(saved.vertices), len(saved.faces)) == (answer.vertex_count, answer.face_count)
+        kept, tiles = KDTree(saved.vertices), {}
 
-        def is_answered():
-            # a request that is sent before both know each other is lost
-            if not asked or time.monotonic() - asked[-1] > 10:
-                asked.append(time.monotonic())
-                writer.write(SaveMeshRequest(1, len(asked), f"now{len(asked)}.ply", False, False))
-            for marker in reader.take(100):
-                tiles[marker.id] = marker
-                heard.append(time.monotonic())
-            answered.extend(answers.take(10))
-            return answered
+        def is_what_was_saved():
+            came = reader.take(100)
+            tiles.update((tile.id, tile) for tile in came)
+            corners = numpy.array([(point.x, point.y, point.z) for tile in tiles.values() for point in tile.points]) * 1e3
+            if not came or abs(len(corners) / 3 - len(saved.faces)) >= 0.01 * len(saved.faces):
+                return False
+            # live, the skin is made bit by bit, saved all at once
+            shares = [(one.query(other)[0] < 0.01).mean() for one, other in [(KDTree(corners), saved.vertices), (kept, corners)]]
+            return min(shares) > 0.95
 
-        def is_quiet():
-            is_answered()
-            return tiles and time.monotonic() - heard[-1] > 12
-
-        node.wait_for(is_answered, 60)
-        # a tile that has settled comes once more after 10 s
-        node.wait_for(is_quiet, 60)
-        assert answered[0].success, answered[0].message
-        saved = trimesh.load(answered[0].path, process=False)
+        node.wait_for(is_what_was_saved)
         assert node.end() in (0, 4), node.text()
-    corners = numpy.array([(point.x, point.y, point.z) for tile in tiles.values() for point in tile.points]) * 1e3
-    assert (len(saved.vertices), len(saved.faces)) == (answered[0].vertex_count, answered[0].face_count)
-    assert abs(len(corners) / 3 - len(saved.faces)) < 0.01 * len(saved.faces)
-    # live, the skin is made bit by bit, saved all at once
-    shown, kept = KDTree(corners), KDTree(saved.vertices)
-    assert (shown.query(saved.vertices)[0] < 0.01).mean() > 0.95
-    assert (kept.query(corners)[0] < 0.01).mean() > 0.95
 
 
 def test_a_full_disk_is_told_and_the_recording_goes_on_when_there_is_room(demo_folder, tmp_path, touchup, touchup_bin, domain):
@@ -183,7 +163,7 @@ def test_a_full_disk_is_told_and_the_recording_goes_on_when_there_is_room(demo_f
         report = json.loads((node.session / "report.json").read_text())
         taken = stamps(node.session / "recording", "/stylus/wrench") + stamps(node.session / "recording", "/stylus/pose")
         played = [stamp for topic in ["wrench", "pose"] for stamp in stamps(demo_folder / "touch.mcap", f"/stylus/{topic}")]
-        came = len(played) - sum(report["lost"]) - report["dropped"][0]  # a machine that is busy otherwise drops some
+        came = len(played) - sum(report["lost"]) - report["dropped"][0]
         assert report["unrecorded"] > 0 and len(taken) + report["unrecorded"] == came
         assert max(taken) == max(played)
         done = touchup("refine", "--resume", node.session, "--out", tmp_path / "resumed.ply")

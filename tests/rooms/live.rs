@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use nalgebra::Point3;
-use touchup::live::{LiveRefiner, Pace};
+use touchup::live::{Gate, GateKeeper, LiveCounts, LiveRefiner, Pace};
 use touchup::mesh::{FaceId, FaceTree, TriMesh, VertexId};
 use touchup::patch::{PatchDelta, Patcher, PatcherParams, Splice};
 use touchup::refine::{RefineParams, Refiner, TipParams};
@@ -90,16 +90,16 @@ fn renewed_bit_by_bit_it_is_the_skin_of_all_at_once_and_sound_all_along() {
     });
     let whole = patcher.patched(scan, &tree).unwrap().mesh;
     let faces = [&mesh, &whole].map(|mesh| mesh.face_count() as f64);
-    println!("{renewals} renewals, {faces:?} faces bit by bit and at once");
-    assert!((faces[0] / faces[1] - 1.0).abs() < 0.01);
+    // 13868 of 13900
+    assert!((faces[0] / faces[1] - 1.0).abs() < 0.004, "{faces:?} faces bit by bit and at once");
     for (name, distances) in [("there", distances(&mesh, &whole)), ("back", distances(&whole, &mesh))] {
         let at = |share: f64| distances[((distances.len() - 1) as f64 * share) as usize] * 1e3;
-        println!("{name}: median {:.1e}, 95 % {:.1e}, 99 % {:.1e} mm", at(0.5), at(0.95), at(0.99));
-        assert!(at(0.5) < 0.002 && at(0.95) < 0.01 && at(0.99) < 0.1);
+        let told = format!("{name}: median {:.1e}, 95 % {:.1e}, 99 % {:.1e} mm", at(0.5), at(0.95), at(0.99));
+        // what was taken in only nearby differs: 0.0004, 0.006 and 0.09 mm
+        assert!(at(0.5) < 0.0006 && at(0.95) < 0.008 && at(0.99) < 0.1, "{told}");
     }
     let rims = [&mesh, &whole].map(|mesh| rim_length(mesh, &soundness(mesh).rims) * 1e3);
-    println!("rims {rims:.1?} mm");
-    assert!((rims[0] - rims[1]).abs() < 3.0);
+    assert!((rims[0] - rims[1]).abs() < 0.2, "rims {rims:.1?} mm");
     // the tree followed
     let anew = FaceTree::new(&mesh);
     for corner in whole.positions().iter().step_by(7) {
@@ -173,28 +173,110 @@ fn two_threads_do_what_one_does_and_leave_the_scan_where_it_was() {
     assert_eq!(moved(refiner.mesh()), 0);
 }
 
-/// Samples come as fast as they can, and the patch cannot keep up: it is renewed more rarely, and what is known at the end is
-/// the same.
+/// Samples that do not wait, with what the thread of the patch is let do at each of them.
+struct Kept {
+    live: LiveRefiner,
+    keeper: GateKeeper,
+    /// when the renewals that were asked for are due, ns; the thread has done so many of them
+    open: VecDeque<i64>,
+    done: usize,
+    slot: Option<i64>,
+    is_late: bool,
+    expected: LiveCounts,
+}
+
+impl Kept {
+    fn new(stream: &PlateStream) -> Self {
+        let scan = Arc::new((stream.scan.clone(), FaceTree::new(&stream.scan)));
+        let (gate, keeper) = Gate::kept();
+        let pace = Pace { is_patient: false, ..PATIENT };
+        let live = LiveRefiner::behind(gate, scan, refiner(&stream.scan), patcher(stream), pace, 1000).unwrap();
+        let expected = LiveCounts::default();
+        Self { live, keeper, open: VecDeque::new(), done: 0, slot: None, is_late: false, expected }
+    }
+
+    fn let_one_through(&mut self) {
+        self.keeper.let_one_through();
+        self.done += 1;
+    }
+
+    /// Pushes a sample and counts by the words of the documentation what has to come of it.
+    fn push(&mut self, sample: &Sample) {
+        let can_take_up = self.live.is_whole();
+        self.live.push(sample).unwrap();
+        let slot = sample.stamp_ns.div_euclid(PATIENT.every_ns);
+        if self.slot.replace(slot).is_some_and(|before| slot > before) && self.open.len() < 2 {
+            self.open.push_back(slot * PATIENT.every_ns + PATIENT.after_ns);
+        }
+        if can_take_up && self.open.front().is_some_and(|due_ns| *due_ns <= sample.stamp_ns) {
+            if self.done > 0 {
+                (self.done, self.is_late) = (self.done - 1, false);
+                self.open.pop_front();
+                self.expected.renewals += 1;
+            } else if !std::mem::replace(&mut self.is_late, true) {
+                self.expected.late += 1;
+            }
+        }
+        assert_eq!(self.live.counts(), self.expected, "{} ns", sample.stamp_ns);
+    }
+}
+
+/// What is known at the end is what all samples at once make.
+fn assert_knows_all(stream: &PlateStream, live: LiveRefiner) {
+    let (_, mut told) = live.finish().unwrap();
+    told.flush();
+    let mut all_at_once = patcher(stream);
+    stream.samples.iter().for_each(|sample| all_at_once.push(sample));
+    all_at_once.flush();
+    assert!(whole(stream, &told) == whole(stream, &all_at_once));
+}
+
+/// The patch gets a permit for each 100 ms alone: every sample is taken all the same, the patch is renewed as often as it may
+/// be, each time late, and what is known at the end is the same.
 #[test]
 fn a_late_patch_holds_no_sample_up_and_changes_nothing_of_the_result() {
     let stream = stream(5, 0.1);
+    let mut kept = Kept::new(&stream);
+    let begin_ns = stream.samples[0].stamp_ns;
+    let mut permits = 0;
+    for sample in &stream.samples {
+        if (sample.stamp_ns - begin_ns) / 100_000_000 > permits {
+            permits += 1;
+            kept.let_one_through();
+        }
+        kept.push(sample);
+    }
+    // the first permit lets the renewal through that is due since 18 ms after the first sample at most, and so on
+    let renewals = permits as u64;
+    assert!(renewals > 50);
+    assert_eq!(kept.live.counts(), LiveCounts { renewals, late: renewals + 1 });
+    let Kept { live, keeper, .. } = kept;
+    drop(keeper);
+    assert_knows_all(&stream, live);
+}
+
+/// Where the thread is done in time, no sample that waits would find another mesh.
+#[test]
+fn a_patch_in_time_is_that_of_who_waits_for_it_at_every_sample() {
+    let stream = stream(5, 0.1);
     let scan = Arc::new((stream.scan.clone(), FaceTree::new(&stream.scan)));
-    let renewals = [true, false].map(|is_patient| {
-        let pace = Pace { is_patient, ..PATIENT };
-        let mut live =
-            LiveRefiner::new(Arc::clone(&scan), refiner(&stream.scan), patcher(&stream), pace, 1000).unwrap();
-        stream.samples.iter().for_each(|sample| assert!(live.push(sample).is_ok()));
-        let renewals = live.counts().renewals;
-        let (_, mut told) = live.finish().unwrap();
-        told.flush();
-        let mut all_at_once = patcher(&stream);
-        stream.samples.iter().for_each(|sample| all_at_once.push(sample));
-        all_at_once.flush();
-        assert!(whole(&stream, &told) == whole(&stream, &all_at_once));
-        renewals
-    });
-    println!("renewals: {renewals:?}");
-    assert!(0 < renewals[1] && renewals[1] < renewals[0]);
+    let mut patient = LiveRefiner::new(scan, refiner(&stream.scan), patcher(&stream), PATIENT, 1000).unwrap();
+    let mut kept = Kept::new(&stream);
+    for (i, sample) in stream.samples.iter().enumerate() {
+        kept.push(sample);
+        while kept.done < kept.open.len() {
+            kept.let_one_through();
+        }
+        patient.push(sample).unwrap();
+        if i % 500 == 0 {
+            assert_same(kept.live.refiner().mesh(), patient.refiner().mesh());
+        }
+    }
+    let LiveCounts { renewals, late } = kept.live.counts();
+    let span_ns = stream.samples.last().unwrap().stamp_ns - stream.samples[0].stamp_ns;
+    assert!((renewals as i64 - span_ns / PATIENT.every_ns).abs() <= 2, "{renewals} in {span_ns} ns");
+    assert_eq!((late, renewals), (0, patient.counts().renewals));
+    assert_same(kept.live.refiner().mesh(), patient.refiner().mesh());
 }
 
 /// A touch counts at once for the haptic update, and within 50 ms for the patch.

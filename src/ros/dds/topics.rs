@@ -1,6 +1,7 @@
 //! The topics of docs/ros.md, each with its quality of service.
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use ros2_client::dds::rustdds::policy::ResourceLimits;
 use ros2_client::dds::rustdds::qos::HasQoSPolicy;
@@ -12,7 +13,6 @@ use super::graph::Graph;
 use super::incoming::{Listener, Numbers, Topic};
 use super::{RosError, Shared};
 use crate::ros::arguments::NodeConfig;
-use crate::ros::clock::steady_ns;
 use crate::ros::messages::{
     Clock, DiagnosticArray, FeatureArray, HapticMismatch, Marker, MarkerArray, MeshPatch, Message, Path, PointStamped,
     PoseStamped, ProbeResult, ProbeTouch, TFMessage, WrenchStamped,
@@ -140,8 +140,8 @@ pub(super) fn readers(
 ) -> Result<Vec<Box<dyn Listener>>, RosError> {
     let [wrench, pose] = config.sample_topics();
     let mut made = Readers { config, node, graph, shared, listeners: Vec::new() };
-    made.add::<WrenchStamped>(wrench, keep(BEST_EFFORT, SAMPLES), |_, m| Some(Arrival::Wrench(m, steady_ns())))?;
-    made.add::<PoseStamped>(pose, keep(BEST_EFFORT, SAMPLES), |_, m| Some(Arrival::Pose(m, steady_ns())))?;
+    made.add::<WrenchStamped>(wrench, keep(BEST_EFFORT, SAMPLES), |_, m| Some(Arrival::Wrench(m, Instant::now())))?;
+    made.add::<PoseStamped>(pose, keep(BEST_EFFORT, SAMPLES), |_, m| Some(Arrival::Pose(m, Instant::now())))?;
     made.add::<TFMessage>("/tf", keep(BEST_EFFORT, SAMPLES), |_, m| Some(Arrival::Tf(m)))?;
     made.add::<TFMessage>("/tf_static", latched(keep(PATIENT, 100)), |_, m| Some(Arrival::TfStatic(m)))?;
     made.add::<PointStamped>("/clicked_point", keep(PATIENT, 10), |_, m| Some(Arrival::ClickedPoint(m)))?;

@@ -284,11 +284,13 @@ impl Places {
         patcher: Option<Receiver<Patcher>>,
     ) -> Result<[usize; 2], String> {
         let late = |_| "the mesh was not handed out in time: save again".to_owned();
-        let patcher = patcher.map(|patcher| patcher.recv_timeout(COPY_WAIT)).transpose().map_err(late)?;
+        let patcher = patcher.map(|patcher| setup.clock.recv_timeout(&patcher, COPY_WAIT)).transpose().map_err(late)?;
         let refined = match patcher {
             // all of it comes from scan and patch
             Some(_) => None,
-            None => Some(snapshot.recv_timeout(COPY_WAIT).map_err(late)?.mesh().map_err(|why| why.to_string())?),
+            None => Some(
+                setup.clock.recv_timeout(snapshot, COPY_WAIT).map_err(late)?.mesh().map_err(|why| why.to_string())?,
+            ),
         };
         let [features, touches] = [&self.features, &self.touches].map(|place| place.as_deref());
         let places = OutcomePlaces {

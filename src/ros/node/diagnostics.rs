@@ -1,6 +1,6 @@
 //! How the node says how it is: in words, and in numbers once a second.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use tracing::{info, warn};
 
@@ -35,7 +35,7 @@ impl Haptic {
     }
 
     fn state(&mut self) -> State {
-        let now = Instant::now();
+        let now = self.setup.clock.now();
         let stale = Duration::from_secs_f64(self.setup.shared.parameters().double("stale_ms") / 1e3);
         let is_stale = self.streams.each_mut().map(|stream| stream.check(now, stale));
         let said = |level, words: String| State { level, words };
@@ -49,7 +49,9 @@ impl Haptic {
         if self.is_paused {
             return said(DiagnosticStatus::OK, "paused: samples are passed over".to_owned());
         }
-        if let Some((_, why)) = self.lost_transform.as_ref().filter(|(at, _)| at.elapsed() < stale) {
+        if let Some((_, why)) =
+            self.lost_transform.as_ref().filter(|(at, _)| now.saturating_duration_since(*at) < stale)
+        {
             return said(DiagnosticStatus::WARN, format!("holds, frames are not connected: {why}"));
         }
         if self.streams.iter().all(|stream| stream.arrived() == 0) {
@@ -132,7 +134,7 @@ impl Haptic {
     }
 
     fn stream_numbers(&self, report: &Report) -> Vec<KeyValue> {
-        let now = Instant::now();
+        let now = self.setup.clock.now();
         let mut values = Vec::new();
         for (name, stream) in ["pose", "wrench"].iter().zip(&self.streams) {
             values.push(value(&format!("{name}_rate_hz"), format!("{:.1}", stream.rate_hz())));

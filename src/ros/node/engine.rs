@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 
 use super::{NodeError, Setup};
-use crate::live::{LiveError, LiveRefiner, Pace, ProbedNews};
+use crate::live::{Gate, LiveError, LiveRefiner, Pace, ProbedNews};
 use crate::mesh::{Changes, FaceTree, TriMesh, VertexId};
 use crate::patch::{Patcher, Support};
 use crate::refine::{RefineError, Refiner, Update};
@@ -41,7 +41,8 @@ impl Engine {
             return Ok(Self::Alone(Box::new(refiner)));
         };
         let patcher = Patcher::new(patcher).map_err(RefineError::from)?;
-        let mut live = LiveRefiner::new(Arc::clone(scan), refiner, patcher, Pace::default(), ROOM)?;
+        let mut live =
+            LiveRefiner::behind(Gate::open(&setup.clock), Arc::clone(scan), refiner, patcher, Pace::default(), ROOM)?;
         // bounds of the scan, which the first renewal looks up, take some ms on a large one: no sample is to wait for that
         live.catch_up()?;
         Ok(Self::Live(Box::new(live)))

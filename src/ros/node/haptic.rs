@@ -20,7 +20,6 @@ use super::view::ViewInput;
 use super::{NodeEnd, NodeError, Setup};
 use crate::live::{Latencies, LiveError, ProbedNews};
 use crate::refine::RefineError;
-use crate::ros::clock::steady_ns;
 use crate::ros::messages::{PoseStamped, TFMessage, WrenchStamped};
 use crate::ros::port::{Arrival, Endpoint, Port};
 use crate::touch::{Compensator, Message, Sample, SyncCounts, Synchroniser, WrenchFrame};
@@ -29,6 +28,8 @@ use crate::touch::{Compensator, Message, Sample, SyncCounts, Synchroniser, Wrenc
 const IDLE: Duration = Duration::from_millis(10);
 /// Changes of the mesh go to the view so often.
 const SHOW_EVERY: Duration = Duration::from_millis(5);
+/// Diagnostics come so often.
+const TELL_EVERY: Duration = Duration::from_secs(1);
 /// Messages of a stream that wait for a transform at most.
 const MOST_WAITING: usize = 4096;
 
@@ -84,8 +85,8 @@ pub struct Haptic {
     pub(super) sync: Synchroniser,
     pub(super) compensator: Compensator,
     epoch: Epoch,
-    /// poses and wrenches that wait for a transform, with when they came, ns
-    waiting: [VecDeque<(Told, i64)>; 2],
+    /// poses and wrenches that wait for a transform, with when they came
+    waiting: [VecDeque<(Told, Instant)>; 2],
     /// touches that the thread of the features had no room for
     pub(super) probed: ProbedNews,
     pub(super) streams: [StreamWatch; 2],
@@ -128,8 +129,9 @@ impl Haptic {
         spare: Receiver<Box<Edits>>,
         arm: Option<ArmHandle>,
     ) -> Result<Self, NodeError> {
-        let now = Instant::now();
+        let now = setup.clock.now();
         let mismatch_rate_hz = setup.shared.parameters().double("mismatch_rate_hz");
+        let side_work = SideWork::on(setup.clock.clone());
         let placer = Placer::new(setup.frame_names(), setup.scene.placement());
         let compensator = setup.compensator(WrenchFrame::default())?;
         Ok(Self {
@@ -154,7 +156,7 @@ impl Haptic {
             lost_transform: None,
             last_state: String::new(),
             endpoints: BTreeMap::new(),
-            side_work: SideWork::default(),
+            side_work,
             tally: Tally::default(),
             pushes: Latencies::new(),
             latencies: Latencies::new(),
@@ -176,7 +178,7 @@ impl Haptic {
     /// [`NodeError`] when the result could not be written.
     pub fn run(mut self, inbox: &Receiver<Arrival>) -> Result<NodeEnd, NodeError> {
         loop {
-            let flow = match inbox.recv_timeout(IDLE) {
+            let flow = match self.setup.clock.recv_timeout(inbox, IDLE) {
                 Ok(arrival) => self.take(arrival),
                 Err(RecvTimeoutError::Timeout) => ControlFlow::Continue(()),
                 Err(RecvTimeoutError::Disconnected) => ControlFlow::Break(()),
@@ -191,8 +193,8 @@ impl Haptic {
 
     fn take(&mut self, arrival: Arrival) -> ControlFlow<()> {
         match arrival {
-            Arrival::Wrench(wrench, at_ns) => self.message(Told::Wrench(wrench), at_ns),
-            Arrival::Pose(pose, at_ns) => self.message(Told::Pose(pose), at_ns),
+            Arrival::Wrench(wrench, at) => self.message(Told::Wrench(wrench), at),
+            Arrival::Pose(pose, at) => self.message(Told::Pose(pose), at),
             Arrival::Tf(transforms) => self.transforms(&transforms, false),
             Arrival::TfStatic(transforms) => self.transforms(&transforms, true),
             Arrival::ClickedPoint(clicked) => self.flag_clicked(&clicked),
@@ -224,16 +226,16 @@ impl Haptic {
         self.retry_waiting();
     }
 
-    fn message(&mut self, told: Told, at_ns: i64) {
+    fn message(&mut self, told: Told, at: Instant) {
         let stream = told.stream();
-        self.streams[stream].arrive(Instant::now());
+        self.streams[stream].arrive(self.setup.clock.now());
         if self.is_paused || self.fault.is_some() {
             self.tally.paused += 1;
             return;
         }
         if self.waiting[stream].is_empty() {
-            if let Some(told) = self.place(told, at_ns) {
-                self.waiting[stream].push_back((told, at_ns));
+            if let Some(told) = self.place(told, at) {
+                self.waiting[stream].push_back((told, at));
             }
             return;
         }
@@ -242,35 +244,36 @@ impl Haptic {
             self.tally.refuse("transform");
             return;
         }
-        self.waiting[stream].push_back((told, at_ns));
+        self.waiting[stream].push_back((told, at));
         self.retry_waiting();
     }
 
     /// Tries again what waits for a transform; gives up what has waited for too long.
     fn retry_waiting(&mut self) {
-        let longest_ns = (self.setup.shared.parameters().double("stale_ms") * 1e6) as i64;
+        let now = self.setup.clock.now();
+        let longest = Duration::from_secs_f64(self.setup.shared.parameters().double("stale_ms") / 1e3);
         for stream in 0..2 {
-            while let Some((told, at_ns)) = self.waiting[stream].pop_front() {
-                let Some(told) = self.place(told, at_ns) else { continue };
-                if steady_ns().saturating_sub(at_ns) <= longest_ns {
-                    self.waiting[stream].push_front((told, at_ns));
+            while let Some((told, at)) = self.waiting[stream].pop_front() {
+                let Some(told) = self.place(told, at) else { continue };
+                if now.saturating_duration_since(at) <= longest {
+                    self.waiting[stream].push_front((told, at));
                     break;
                 }
                 self.tally.refuse("transform");
                 self.lost_transform =
-                    Some((Instant::now(), "a moving frame is not told of up to the stamps of the messages".to_owned()));
+                    Some((now, "a moving frame is not told of up to the stamps of the messages".to_owned()));
             }
         }
     }
 
     /// Brings a message into its frame and on; gives it back where a transform has to come first.
-    fn place(&mut self, told: Told, at_ns: i64) -> Option<Told> {
+    fn place(&mut self, told: Told, at: Instant) -> Option<Told> {
         let placed = match &told {
             Told::Pose(pose) => self.placer.pose(pose),
             Told::Wrench(wrench) => self.placer.wrench(wrench),
         };
         match placed {
-            Ok(message) => self.pair(message, told.stream(), at_ns),
+            Ok(message) => self.pair(message, told.stream(), at),
             Err(refusal) if refusal.may_pass() => return Some(told),
             Err(refusal) => self.refuse(&refusal),
         }
@@ -280,12 +283,12 @@ impl Haptic {
     fn refuse(&mut self, refusal: &Refusal) {
         self.tally.refuse(refusal.name());
         if let Refusal::Frame(error) = refusal {
-            self.lost_transform = Some((Instant::now(), error.to_string()));
+            self.lost_transform = Some((self.setup.clock.now(), error.to_string()));
         }
     }
 
     /// A message in its frame goes to the synchroniser and to the recording, and what the first lets out to the refiner.
-    fn pair(&mut self, message: Message, stream: usize, at_ns: i64) {
+    fn pair(&mut self, message: Message, stream: usize, at: Instant) {
         if self.placer.axes() == Some(WrenchFrame::Object) && self.sitting.axes == WrenchFrame::Sensor {
             self.turn_to_object_axes();
         }
@@ -303,7 +306,7 @@ impl Haptic {
             self.sitting.recorder.write(message, frame);
         }
         while let Some(sample) = self.sync.next_sample() {
-            self.sample(&sample, Some(at_ns));
+            self.sample(&sample, Some(at));
         }
     }
 
@@ -318,13 +321,14 @@ impl Haptic {
 
     /// Moves the mesh, then tells the others.
     ///
-    /// - `at_ns`: when the message came that completed the sample, where one did.
-    pub(super) fn sample(&mut self, sample: &Sample, at_ns: Option<i64>) {
-        let pushing = Instant::now();
+    /// - `at`: when the message came that completed the sample, where one did.
+    pub(super) fn sample(&mut self, sample: &Sample, at: Option<Instant>) {
+        let pushing = self.setup.clock.now();
         let pushed = self.sitting.engine.push(sample);
-        self.pushes.record(pushing.elapsed());
-        if let Some(at_ns) = at_ns {
-            self.latencies.record(Duration::from_nanos(steady_ns().saturating_sub(at_ns).max(0) as u64));
+        let pushed_at = self.setup.clock.now();
+        self.pushes.record(pushed_at.saturating_duration_since(pushing));
+        if let Some(at) = at {
+            self.latencies.record(pushed_at.saturating_duration_since(at));
         }
         self.sampled = pushing;
         match pushed {
@@ -349,15 +353,16 @@ impl Haptic {
 
     /// What is due now and then.
     fn tick(&mut self) {
-        if self.shown.elapsed() >= SHOW_EVERY {
-            self.shown = Instant::now();
+        let now = self.setup.clock.now();
+        if now.saturating_duration_since(self.shown) >= SHOW_EVERY {
+            self.shown = now;
             self.show_edits();
             self.send_probed();
             self.retry_waiting();
             self.watch_streams();
         }
-        if self.told.elapsed() >= Duration::from_secs(1) {
-            self.told = Instant::now();
+        if now.saturating_duration_since(self.told) >= TELL_EVERY {
+            self.told = now;
             self.tell_diagnostics();
         }
     }

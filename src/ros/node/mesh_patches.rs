@@ -1,8 +1,10 @@
 //! The mesh for programs: changes from version to version, and the whole state for who has none.
 
+use std::sync::Arc;
+
 use super::convert::header;
 use super::edits::Edits;
-use super::replica::{Replica, Snapshot};
+use super::replica::Replica;
 use crate::mesh::IdSet;
 use crate::patch::Support;
 use crate::ros::messages::MeshPatch;
@@ -84,7 +86,11 @@ impl MeshPatches {
     }
 
     /// The whole state, part by part.
-    pub fn whole(&self, snapshot: Snapshot, frame: String) -> impl Iterator<Item = MeshPatch> + Send + 'static + use<> {
+    pub fn whole(
+        &self,
+        snapshot: Arc<Replica>,
+        frame: String,
+    ) -> impl Iterator<Item = MeshPatch> + Send + 'static + use<> {
         let [vertices, faces] = snapshot.slots();
         let draft = Draft {
             set: (0..vertices).filter(|&vertex| snapshot.vertex(vertex).is_some()).collect(),

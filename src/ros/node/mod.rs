@@ -48,6 +48,7 @@ use self::sitting::Sitting;
 use self::view::View;
 use super::parameters::Parameters;
 use super::port::{Arrival, Port};
+use crate::clock::Clock;
 use crate::io::mesh_file::{MeshFile, MeshFileError, MeshUnit, read_mesh};
 use crate::io::recording::Topics;
 use crate::live::LiveError;
@@ -153,6 +154,7 @@ impl NodeError {
 
 /// All that does not change while the node runs.
 pub(crate) struct Setup {
+    clock: Clock,
     shared: Arc<Shared>,
     scan: Scan,
     scan_path: PathBuf,
@@ -166,7 +168,7 @@ pub(crate) struct Setup {
 }
 
 impl Setup {
-    fn new(parameters: Parameters) -> Result<Self, NodeError> {
+    fn new(parameters: Parameters, clock: Clock) -> Result<Self, NodeError> {
         let scene_path = Path::new(parameters.string("scene"));
         let (scene, scene_yaml) = match scene_path.as_os_str().is_empty() {
             true => (Scene::from_yaml(DEFAULT_SCENE)?, DEFAULT_SCENE.to_owned()),
@@ -191,6 +193,7 @@ impl Setup {
         let known = scene.patcher_params(WrenchFrame::default()).and_then(|params| params.uncertainty);
         let scan_sigma = known.map(|known| known.scan).filter(|sigma| *sigma > 0.0);
         Ok(Self {
+            clock,
             shared: Arc::new(Shared::new(parameters, scan_sigma)),
             scan: Arc::new((mesh, tree)),
             scan_path,
@@ -258,7 +261,15 @@ impl Prepared {
     /// # Errors
     /// [`NodeError`]
     pub fn new(parameters: Parameters) -> Result<Self, NodeError> {
-        let setup = Arc::new(Setup::new(parameters)?);
+        Self::on(Clock::system(), parameters)
+    }
+
+    /// As [`Self::new`]; all that is due at a time is so on `clock`.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn on(clock: Clock, parameters: Parameters) -> Result<Self, NodeError> {
+        let setup = Arc::new(Setup::new(parameters, clock)?);
         let sitting = Sitting::begin(&setup)?;
         Ok(Self { setup, sitting })
     }
@@ -313,17 +324,32 @@ impl Prepared {
             to_spare.send(Box::<Edits>::default()).map_err(|_| NodeError::Stopped)?;
         }
         let replica = Replica::of(&setup.scan.0, &session);
-        let view = View::new(Arc::clone(&port), Arc::clone(&setup.shared), to_spare, replica);
-        let seeker = Seeker::new(Arc::clone(&setup.shared), to_view.clone(), session);
+        let clock = setup.clock.clone();
+        let view = View::new(clock.clone(), Arc::clone(&port), Arc::clone(&setup.shared), to_spare, replica);
+        let seeker = Seeker::new(clock.clone(), Arc::clone(&setup.shared), to_view.clone(), session);
         let arm = arm.map(|arm| arm::start(&setup, &port, arm, to_view.clone(), to_seeker.clone())).transpose()?;
         let (handle, arm) = arm.unzip();
         let haptic = Haptic::new(setup, port, sitting, to_view, to_seeker, spare, handle)?;
-        let thread = |name: &str| Builder::new().name(name.to_owned());
-        let view = thread("view").spawn(move || view.run(&view_inputs)).map_err(NodeError::no_thread)?;
-        let seeker = thread("seeker").spawn(move || seeker.run(&seeker_inputs)).map_err(NodeError::no_thread)?;
-        let haptic = thread("haptic").spawn(move || haptic.run(&inbox)).map_err(NodeError::no_thread)?;
+        let view = begin(&clock, "view", move || view.run(&view_inputs))?;
+        let seeker = begin(&clock, "seeker", move || seeker.run(&seeker_inputs))?;
+        let haptic = begin(&clock, "haptic", move || haptic.run(&inbox))?;
         Ok(Node { haptic, view, seeker, arm, folder })
     }
+}
+
+/// Starts a thread that waits on `clock`.
+fn begin<T: Send + 'static>(
+    clock: &Clock,
+    name: &str,
+    run: impl FnOnce() -> T + Send + 'static,
+) -> Result<JoinHandle<T>, NodeError> {
+    let working = clock.begin_work();
+    let work = move || {
+        let ended = run();
+        drop(working);
+        ended
+    };
+    Builder::new().name(name.to_owned()).spawn(work).map_err(NodeError::no_thread)
 }
 
 impl Node {

@@ -1,10 +1,12 @@
 //! The mesh as the view knows it: plain arrays by id, brought up to date by what it is told.
 
+use std::ops::Deref;
 use std::sync::Arc;
 
 use nalgebra::Point3;
 
 use super::edits::Edits;
+use crate::clock::Working;
 use crate::mesh::{MeshError, TriMesh, VertexId};
 use crate::patch::Support;
 
@@ -106,5 +108,24 @@ impl Replica {
     }
 }
 
-/// A replica that no longer changes.
-pub type Snapshot = Arc<Replica>;
+/// A replica that no longer changes. Time waits for who does something with it.
+#[derive(Debug)]
+pub struct Snapshot {
+    replica: Arc<Replica>,
+    _working: Working,
+}
+
+impl Snapshot {
+    /// For one who asked.
+    pub fn new(replica: Arc<Replica>, working: Working) -> Self {
+        Self { replica, _working: working }
+    }
+}
+
+impl Deref for Snapshot {
+    type Target = Replica;
+
+    fn deref(&self) -> &Replica {
+        &self.replica
+    }
+}

@@ -12,6 +12,7 @@ use super::feature_messages::{self, KIND_NAMES, flagged, found};
 use super::replica::Snapshot;
 use super::shared::Shared;
 use super::view::ViewInput;
+use crate::clock::Clock;
 use crate::explore::{NextTouch, next_by_hand};
 use crate::features::{Feature, Kind, Tracker};
 use crate::live::ProbedNews;
@@ -94,6 +95,7 @@ pub type NextTouches = BTreeMap<u32, NextTouch>;
 
 /// The thread's own.
 pub struct Seeker {
+    clock: Clock,
     shared: Arc<Shared>,
     view: SyncSender<ViewInput>,
     session: String,
@@ -119,9 +121,10 @@ pub struct Seeker {
 
 impl Seeker {
     /// Knows nothing yet.
-    pub fn new(shared: Arc<Shared>, view: SyncSender<ViewInput>, session: String) -> Self {
-        let now = Instant::now();
+    pub fn new(clock: Clock, shared: Arc<Shared>, view: SyncSender<ViewInput>, session: String) -> Self {
+        let now = clock.now();
         Self {
+            clock,
             shared,
             view,
             session,
@@ -145,7 +148,7 @@ impl Seeker {
     pub fn run(mut self, inputs: &Receiver<SeekerInput>) {
         loop {
             let period = Duration::from_secs_f64(1.0 / self.shared.parameters().double("features_rate_hz"));
-            match inputs.recv_timeout(period) {
+            match self.clock.recv_timeout(inputs, period) {
                 Ok(input) => {
                     self.take(input);
                     // what came at the same time is in the next look too
@@ -158,8 +161,8 @@ impl Seeker {
                 // a mesh that cannot be had now is asked for again
                 let _ = self.look();
             }
-            if self.has_news && self.published_at.is_none_or(|at| at.elapsed() >= period) {
-                (self.has_news, self.published_at) = (false, Some(Instant::now()));
+            if self.has_news && self.published_at.is_none_or(|at| self.clock.since(at) >= period) {
+                (self.has_news, self.published_at) = (false, Some(self.clock.now()));
                 self.publish();
             }
         }
@@ -172,7 +175,7 @@ impl Seeker {
                 self.has_news |= !self.tracker.update(&self.touches).is_empty();
             }
             SeekerInput::Session(session) => {
-                *self = Self::new(Arc::clone(&self.shared), self.view.clone(), session);
+                *self = Self::new(self.clock.clone(), Arc::clone(&self.shared), self.view.clone(), session);
             }
             SeekerInput::Flag(flag, reply) => {
                 let answer = self.flag(flag);
@@ -209,34 +212,35 @@ impl Seeker {
     fn is_due(&mut self) -> bool {
         let version = self.shared.version_shown();
         if std::mem::replace(&mut self.seen_version, version) != version {
-            self.changed_at = Instant::now();
+            self.changed_at = self.clock.now();
         }
         match self.looked {
             None => true,
             Some((looked, _)) if looked == version => false,
             Some(_) => {
-                let since_look = self.looked_at.elapsed();
-                let is_quiet = self.changed_at.elapsed() >= QUIET;
+                let since_look = self.clock.since(self.looked_at);
+                let is_quiet = self.clock.since(self.changed_at) >= QUIET;
                 (is_quiet && since_look >= QUIET) || since_look >= QUIET.max(self.look_took) * LOOKS_APART
             }
         }
     }
 
     fn look(&mut self) -> Result<(), String> {
-        let started = Instant::now();
+        let started = self.clock.now();
         let snapshot = self.snapshot().ok_or("the mesh was not handed out: is it changing all the time?")?;
         let mesh = snapshot.mesh().map_err(|error: MeshError| error.to_string())?;
         self.tracker.renew(&mesh, &FaceTree::new(&mesh), &self.touches);
         self.looked = Some((snapshot.version, snapshot.stamp_ns));
         self.name_found_flags();
-        (self.look_took, self.looked_at, self.has_news) = (started.elapsed(), Instant::now(), true);
+        let now = self.clock.now();
+        (self.look_took, self.looked_at, self.has_news) = (now.saturating_duration_since(started), now, true);
         Ok(())
     }
 
     fn snapshot(&self) -> Option<Snapshot> {
         let (reply, snapshot) = sync_channel(1);
         self.view.send(ViewInput::Snapshot(reply)).ok()?;
-        snapshot.recv_timeout(SNAPSHOT_WAIT).ok().filter(|snapshot| snapshot.session == self.session)
+        self.clock.recv_timeout(&snapshot, SNAPSHOT_WAIT).ok().filter(|snapshot| snapshot.session == self.session)
     }
 
     /// The number under which a feature is known.

@@ -1,7 +1,7 @@
 //! What the thread of the samples tells the others: each mismatch, the place of the tip, changes of the mesh, touches.
 
 use std::sync::mpsc::TrySendError;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use nalgebra::{Point3, Vector3};
 
@@ -69,8 +69,9 @@ impl Haptic {
             },
         };
         self.setup.shared.show(&self.view, ViewInput::Mismatch(message));
-        if self.tip_shown.elapsed() >= TIP_EVERY {
-            self.tip_shown = Instant::now();
+        let now = self.setup.clock.now();
+        if now.saturating_duration_since(self.tip_shown) >= TIP_EVERY {
+            self.tip_shown = now;
             self.show_tip(sample, centre);
         }
     }
@@ -89,7 +90,7 @@ impl Haptic {
 
     /// Sends what changed in the mesh, as far as the view has taken up what was sent before.
     pub(super) fn show_edits(&mut self) {
-        let is_idle = self.sampled.elapsed() >= TORN_AFTER;
+        let is_idle = self.setup.clock.since(self.sampled) >= TORN_AFTER;
         while let Some(edits) = self.unsent.take().or_else(|| self.filled(is_idle)) {
             if let Err(TrySendError::Full(ViewInput::Edits(back))) = self.view.try_send(ViewInput::Edits(edits)) {
                 self.unsent = Some(back);

@@ -3,13 +3,21 @@
 use std::io;
 use std::thread::{Builder, JoinHandle};
 
+use crate::clock::Clock;
+
 /// What is under way.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct SideWork {
+    clock: Clock,
     threads: Vec<JoinHandle<()>>,
 }
 
 impl SideWork {
+    /// Nothing yet. Whatever waits does so on `clock`.
+    pub fn on(clock: Clock) -> Self {
+        Self { clock, threads: Vec::new() }
+    }
+
     /// How much is under way now.
     pub fn count(&mut self) -> usize {
         self.threads.retain(|thread| !thread.is_finished());
@@ -21,6 +29,11 @@ impl SideWork {
     /// # Errors
     /// Of the operating system, when there is no thread for it.
     pub fn begin(&mut self, name: &str, work: impl FnOnce() + Send + 'static) -> io::Result<()> {
+        let working = self.clock.begin_work();
+        let work = move || {
+            work();
+            drop(working);
+        };
         self.threads.push(Builder::new().name(name.to_owned()).spawn(work)?);
         Ok(())
     }
@@ -42,10 +55,11 @@ mod tests {
     use std::time::{Duration, Instant};
 
     use super::SideWork;
+    use crate::clock::Clock;
 
     #[test]
     fn what_has_ended_is_not_counted_and_the_rest_is_waited_for() {
-        let (mut work, done) = (SideWork::default(), Arc::new(AtomicUsize::new(0)));
+        let (mut work, done) = (SideWork::on(Clock::system()), Arc::new(AtomicUsize::new(0)));
         let begin = |work: &mut SideWork, gate: mpsc::Receiver<()>| {
             let done = Arc::clone(&done);
             let until_told = move || {

@@ -82,7 +82,7 @@ impl Sitting {
         let folder = SessionFolder::create(&parent, &name_of(SystemTime::now()))
             .map_err(|source| NodeError::Folder { path: parent, source })?;
         SessionRecord::begin(&folder, &setup.scan_path, setup.mesh_unit, &setup.scene_yaml, &setup.topics)?;
-        let recorder = SessionRecorder::start(&folder, &setup.topics)?;
+        let recorder = SessionRecorder::start(&folder, &setup.topics, &setup.clock)?;
         let axes = WrenchFrame::default();
         let engine = Engine::new(setup, axes)?;
         Ok(Self { folder, recorder, engine, axes, told_version: 1, told_edits: 0 })

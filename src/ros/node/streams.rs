@@ -99,3 +99,43 @@ impl Epoch {
         true
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: Duration = Duration::from_millis(1);
+
+    #[test]
+    fn a_stream_is_stale_after_its_time_and_that_counts_once() {
+        let (begun, stale) = (Instant::now(), 100 * MS);
+        let mut stream = StreamWatch::new(begun);
+        assert!(stream.check(begun, stale) && stream.gaps == 0, "what never came is no gap");
+        for round in 1..=3u32 {
+            let came = begun + round * 1000 * MS;
+            stream.arrive(came);
+            assert!(!stream.check(came, stale) && !stream.check(came + stale, stale));
+            assert_eq!((stream.gaps, stream.age(came + stale)), (u64::from(round) - 1, Some(stale)));
+            assert!(stream.check(came + stale + MS, stale) && stream.check(came + 3 * stale, stale));
+            assert_eq!(stream.gaps, u64::from(round));
+        }
+    }
+
+    #[test]
+    fn a_rate_is_that_of_the_last_second() {
+        let begun = Instant::now();
+        let mut stream = StreamWatch::new(begun);
+        let mut rates = Vec::new();
+        for ms in 1..=3000u32 {
+            // 1000 Hz, then 250 Hz, then nothing
+            if ms <= 1000 || (ms <= 2000 && ms % 4 == 0) {
+                stream.arrive(begun + ms * MS);
+            }
+            stream.check(begun + ms * MS, 100 * MS);
+            if ms % 1000 == 0 {
+                rates.push(stream.rate_hz());
+            }
+        }
+        assert_eq!(rates, [1000.0, 250.0, 0.0]);
+    }
+}

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::edits::Edits;
 use super::feature_messages;
@@ -12,6 +12,7 @@ use super::seeker::NextTouches;
 use super::shared::Shared;
 use super::tiles::{ColourBy, Tiles};
 use super::tip::{self, TipPlace};
+use crate::clock::Clock;
 use crate::ros::messages::{DiagnosticArray, FeatureArray, HapticMismatch, MeshPatch};
 use crate::ros::port::{Port, Publication, TILES_KEPT};
 
@@ -46,6 +47,7 @@ pub enum ViewInput {
 
 /// The thread's own.
 pub struct View {
+    clock: Clock,
     port: Arc<dyn Port>,
     shared: Arc<Shared>,
     /// where changes go to be filled again
@@ -65,9 +67,16 @@ pub struct View {
 
 impl View {
     /// Shows nothing yet.
-    pub fn new(port: Arc<dyn Port>, shared: Arc<Shared>, spare: SyncSender<Box<Edits>>, replica: Replica) -> Self {
+    pub fn new(
+        clock: Clock,
+        port: Arc<dyn Port>,
+        shared: Arc<Shared>,
+        spare: SyncSender<Box<Edits>>,
+        replica: Replica,
+    ) -> Self {
         let features = feature_messages::no_features(0, &shared.frame, &replica.session);
         Self {
+            clock,
             tiles: Tiles::all_of(&replica),
             patches: MeshPatches::of(&replica, shared.scan_sigma),
             colour_by: colour_by(&shared),
@@ -87,17 +96,17 @@ impl View {
 
     /// Runs until nobody tells anything any more, then shows what is left.
     pub fn run(mut self, inputs: &Receiver<ViewInput>) {
-        let mut due = Instant::now();
+        let mut due = self.clock.now();
         loop {
-            match inputs.recv_timeout(due.saturating_duration_since(Instant::now())) {
+            match self.clock.recv_timeout(inputs, due.saturating_duration_since(self.clock.now())) {
                 Ok(input) => self.take(input),
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => break,
             }
-            if Instant::now() >= due {
+            if self.clock.now() >= due {
                 // ids fit each other only when all of a change has come
                 let period = Duration::from_secs_f64(1.0 / self.shared.parameters().double("view_rate_hz"));
-                due = Instant::now() + if self.tick(false) { period.min(CATCH_UP) } else { period };
+                due = self.clock.now() + if self.tick(false) { period.min(CATCH_UP) } else { period };
             }
         }
         self.tick(true);
@@ -155,9 +164,10 @@ impl View {
 
     fn answer_snapshots(&mut self) {
         if self.is_complete && !self.snapshots.is_empty() {
-            let snapshot = Arc::new(self.replica.clone());
+            let replica = Arc::new(self.replica.clone());
+            let snapshot = || Snapshot::new(Arc::clone(&replica), self.clock.begin_work());
             // who asked may have gone
-            self.snapshots.drain(..).for_each(|reply| drop(reply.try_send(Arc::clone(&snapshot))));
+            self.snapshots.drain(..).for_each(|reply| drop(reply.try_send(snapshot())));
         }
     }
 
@@ -194,7 +204,7 @@ impl View {
         if self.shared.take_viewer() {
             self.tiles.renew_older_than(TILES_KEPT as u64);
         }
-        let now = Instant::now();
+        let now = self.clock.now();
         self.tiles.renew_settled(now);
         let Self { tiles, replica, colour_by, port, .. } = self;
         let most = if is_last { usize::MAX } else { TILES_AHEAD.saturating_sub(port.tiles_waiting()) };

@@ -1,6 +1,7 @@
 //! The topics of docs/ros.md, each with its quality of service.
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use r2r::qos::QosProfile;
 use r2r::{
@@ -12,7 +13,6 @@ use super::convert::Convert;
 use super::graph::Graph;
 use super::{During, RosError, Shared, Source, source, touchup_msgs};
 use crate::ros::arguments::NodeConfig;
-use crate::ros::clock::steady_ns;
 use crate::ros::messages::{Clock, Message, PointStamped, PoseStamped, TFMessage, WrenchStamped};
 use crate::ros::outbox::Sent;
 use crate::ros::port::{Arrival, Publication};
@@ -135,10 +135,10 @@ pub(super) fn subscriptions(
     let mut made = Topics { config, node, graph };
     let mut sources = vec![
         made.source::<geometry::WrenchStamped, WrenchStamped>(wrench, samples.clone(), shared, |_, message| {
-            Arrival::Wrench(message, steady_ns())
+            Arrival::Wrench(message, Instant::now())
         })?,
         made.source::<geometry::PoseStamped, PoseStamped>(pose, samples.clone(), shared, |_, message| {
-            Arrival::Pose(message, steady_ns())
+            Arrival::Pose(message, Instant::now())
         })?,
         made.source::<tf2::TFMessage, TFMessage>("/tf", samples, shared, |_, m| Arrival::Tf(m))?,
         made.source::<tf2::TFMessage, TFMessage>("/tf_static", latched(100), shared, |_, m| Arrival::TfStatic(m))?,

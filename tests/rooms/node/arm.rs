@@ -1,12 +1,13 @@
 //! The node with an arm, without any network: flagged, probed, shown, cancelled, refused.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use nalgebra::Isometry3;
 use tempfile::TempDir;
+use touchup::clock::{Clock, ManualClock};
 use touchup::io::mesh_file::{MeshUnit, write_mesh};
 use touchup::robot::{Arm, ArmError, ArmState, Command, Safety};
 use touchup::ros::in_process::{World, start};
@@ -14,14 +15,23 @@ use touchup::ros::messages::{
     Feature, FlagFeatureRequest, Header, Point, PointStamped, ProbeFeatureRequest, ProbeGoal, ProbeResponse,
     ProbeResult, ProbeSettings, ProbeTouch, SetBoolRequest,
 };
-use touchup::ros::node::{ArmKind, ArmOfNode, INBOX, Node, NodeEnd, Prepared};
+use touchup::ros::node::{ArmKind, ArmOfNode, Node, NodeEnd, Prepared};
 use touchup::ros::parameters::{ParameterValue, Parameters};
 use touchup::ros::port::{Arrival, Call, Feedback, Goal, GoalEnd, Publication, Reply};
 use touchup::sim::{ArmParams, Plate, ScannerParams, SimArm, scan};
 
+use super::samples::bench::join;
+
+/// Nothing takes so long: what has not come by then hangs.
+const HUNG: Duration = Duration::from_secs(120);
+/// Arrivals that wait for the node at most: an arm in lock step is not ahead of it by more.
+const FEW: usize = 8;
+
+/// A node with an arm whose states pass the time: as fast as the node keeps up, and no faster.
 struct Cell {
     node: Node,
     world: World,
+    hand: ManualClock,
     published: Vec<Publication>,
     _folder: TempDir,
 }
@@ -29,10 +39,10 @@ struct Cell {
 impl Cell {
     /// The plate of the demo, its scan, a simulated arm.
     fn start(may_move: bool) -> Self {
-        Self::with(may_move, ArmKind::Sim(Box::new(Plate::default().mesh(1e-5).unwrap())))
+        Self::with(may_move, |_| ArmKind::Sim(Box::new(Plate::default().mesh(1e-5).unwrap())))
     }
 
-    fn with(may_move: bool, kind: ArmKind) -> Self {
+    fn with(may_move: bool, kind: impl FnOnce(&Clock) -> ArmKind) -> Self {
         let (folder, plate) = (tempfile::tempdir().unwrap(), Plate::default());
         let path = |name: &str| folder.path().join(name);
         let scanned = scan(&plate, &ScannerParams::default()).unwrap();
@@ -44,23 +54,17 @@ impl Cell {
         parameters.set("session_folder", &text(&path("sessions"))).unwrap();
         parameters.set("source", &ParameterValue::String("probe".to_owned())).unwrap();
         parameters.set("allow_motion", &ParameterValue::Bool(may_move)).unwrap();
-        let (inbox, arrivals) = sync_channel(INBOX);
-        let (port, world) = start(inbox);
-        let arm = ArmOfNode { kind, samples: Box::new(world.clone()) };
-        // the time of ROS goes on
-        let (clock, begun) = (world.clone(), Instant::now());
-        std::thread::spawn(move || {
-            while begun.elapsed() < Duration::from_secs(600) {
-                clock.set_now_ns(1_000_000_000_000 + begun.elapsed().as_nanos() as i64);
-                std::thread::sleep(Duration::from_millis(1));
-            }
-        });
-        let node = Prepared::new(parameters).unwrap().start(port, arrivals, Some(arm)).unwrap();
-        let cell = Self { node, world, published: Vec::new(), _folder: folder };
-        let deadline = Instant::now() + Duration::from_secs(20);
+        let (inbox, arrivals) = sync_channel(FEW);
+        let (clock, hand) = Clock::lock_step();
+        let (port, world) = start(inbox, &clock);
+        world.set_now_ns(1_000_000_000_000);
+        let arm = ArmOfNode { kind: kind(&clock), samples: Box::new(world.clone()) };
+        let node = Prepared::on(clock, parameters).unwrap().start(port, arrivals, Some(arm)).unwrap();
+        let cell = Self { node, world, hand, published: Vec::new(), _folder: folder };
+        let begun = Instant::now();
         while !cell.state().0 {
-            assert!(Instant::now() < deadline, "{}", cell.state().1);
-            std::thread::sleep(Duration::from_millis(20));
+            assert!(begun.elapsed() < HUNG, "{}", cell.state().1);
+            std::thread::yield_now();
         }
         cell
     }
@@ -94,25 +98,34 @@ impl Cell {
         self.world.call(|reply| Call::ProbeFeature(request, reply)).recv().unwrap().result
     }
 
-    /// Sends a goal; its feedback is counted.
-    fn goal(&self, ids: &[u32]) -> (Arc<AtomicBool>, Arc<AtomicU32>, Receiver<(GoalEnd, ProbeResponse)>) {
+    /// Sends a goal, and does something at its third touch, while the arm waits for that; how it ended.
+    ///
+    /// - `at_third`: gets what cancels the goal
+    fn goal(&self, ids: &[u32], at_third: impl FnOnce(&AtomicBool) + Send + 'static) -> (GoalEnd, ProbeResponse) {
         let (to, result) = sync_channel(1);
-        let (cancel, touches) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU32::new(0)));
-        let seen = Arc::clone(&touches);
+        let (cancel, at_third) = (Arc::new(AtomicBool::new(false)), Mutex::new(Some(at_third)));
+        let cancelled = Arc::clone(&cancel);
+        let feedback = move |feedback: touchup::ros::messages::ProbeFeedback| {
+            if feedback.touch >= 3
+                && let Some(at_third) = at_third.lock().unwrap().take()
+            {
+                at_third(&cancel);
+            }
+        };
         let goal = Goal {
             accept: Reply::new(|accepted: bool| assert!(accepted)),
-            feedback: Feedback(Box::new(move |feedback| seen.store(feedback.touch, Ordering::Release))),
+            feedback: Feedback(Box::new(feedback)),
             result: Reply::new(move |ended| drop(to.send(ended))),
-            is_cancelled: Arc::clone(&cancel),
+            is_cancelled: cancelled,
         };
         let asked = ProbeGoal { ids: ids.to_vec(), settings: ProbeSettings::default() };
         assert!(self.world.arrive_patiently(Arrival::Call(Call::Probe(asked, goal))));
-        (cancel, touches, result)
+        result.recv_timeout(HUNG).unwrap()
     }
 
     fn end(mut self) -> (NodeEnd, Vec<Publication>) {
         self.world.arrive_patiently(Arrival::Shutdown);
-        let end = self.node.join().unwrap();
+        let end = join(self.node, &self.hand);
         self.published.extend(self.world.published());
         (end, self.published)
     }
@@ -195,15 +208,14 @@ fn a_flagged_hole_is_probed_and_shown() {
 fn a_cancelled_goal_stops_and_retracts_and_the_node_goes_on() {
     let cell = Cell::start(true);
     let ids = [cell.flag(Feature::KIND_HOLE, [16.5, 36.0, 12.0]), cell.flag(Feature::KIND_HOLE, [32.0, 34.5, 12.0])];
-    let (cancel, touch, result) = cell.goal(&ids);
-    while touch.load(Ordering::Acquire) < 3 {
-        assert!(result.try_recv().is_err());
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    let busy = cell.probe(ids[1], ProbeSettings::default());
+    let (world, (to, busy)) = (cell.world.clone(), sync_channel(1));
+    let (end, response) = cell.goal(&ids, move |cancel| {
+        let request = ProbeFeatureRequest { id: ids[1], settings: ProbeSettings::default() };
+        to.send(world.call(|reply| Call::ProbeFeature(request, reply)).recv().unwrap().result).unwrap();
+        cancel.store(true, Ordering::Release);
+    });
+    let busy = busy.recv().unwrap();
     assert_eq!(busy.code, ProbeResult::BUSY, "{}", busy.message);
-    cancel.store(true, Ordering::Release);
-    let (end, response) = result.recv_timeout(Duration::from_secs(20)).unwrap();
     assert_eq!((end, response.code), (GoalEnd::Canceled, ProbeResult::CANCELLED), "{}", response.message);
     assert_eq!((response.ids, response.codes), (vec![ids[0]], vec![ProbeResult::CANCELLED]), "the other is not begun");
     let (can_move, state) = cell.state();
@@ -249,22 +261,20 @@ fn orders_that_must_not_be_are_refused_and_nothing_moves() {
 fn a_pause_and_the_leave_that_is_taken_away_stop_and_retract() {
     let cell = Cell::start(true);
     let id = cell.flag(Feature::KIND_HOLE, [16.5, 36.0, 12.0]);
-    let pause = |data| cell.world.call(|reply| Call::Pause(SetBoolRequest { data }, reply)).recv().unwrap();
-    let allow = |may: bool| {
-        let set = |reply| Arrival::SetParameter("allow_motion".to_owned(), ParameterValue::Bool(may), reply);
-        cell.world.ask(set).recv().unwrap().unwrap();
+    let pause = |world: &World, data| {
+        world.call(|reply| Call::Pause(SetBoolRequest { data }, reply)).recv().unwrap();
     };
-    for (stop, why, code) in [
-        (&(|| drop(pause(true))) as &dyn Fn(), "the node is paused", ProbeResult::PAUSED),
-        (&|| allow(false), "allow_motion is off", ProbeResult::MOTION_NOT_ALLOWED),
+    let allow = |world: &World, may: bool| {
+        let set = |reply| Arrival::SetParameter("allow_motion".to_owned(), ParameterValue::Bool(may), reply);
+        world.ask(set).recv().unwrap().unwrap();
+    };
+    for (is_pause, why, code) in [
+        (true, "the node is paused", ProbeResult::PAUSED),
+        (false, "allow_motion is off", ProbeResult::MOTION_NOT_ALLOWED),
     ] {
-        let (_, touch, result) = cell.goal(&[id]);
-        while touch.load(Ordering::Acquire) < 3 {
-            assert!(result.try_recv().is_err());
-            std::thread::sleep(Duration::from_millis(5));
-        }
-        stop();
-        let (end, response) = result.recv_timeout(Duration::from_secs(20)).unwrap();
+        let world = cell.world.clone();
+        let stop = move |_: &AtomicBool| if is_pause { pause(&world, true) } else { allow(&world, false) };
+        let (end, response) = cell.goal(&[id], stop);
         // no client cancelled it
         assert_eq!((end, response.code), (GoalEnd::Aborted, ProbeResult::CANCELLED), "{}", response.message);
         assert!(response.message.contains(why), "{}", response.message);
@@ -272,8 +282,8 @@ fn a_pause_and_the_leave_that_is_taken_away_stop_and_retract() {
         assert_eq!(cell.probe(id, ProbeSettings::default()).code, code);
         let all = cell.world.call(Call::ProbeAll).recv().unwrap();
         assert!(!all.success, "{}", all.message);
-        pause(false);
-        allow(true);
+        pause(&cell.world, false);
+        allow(&cell.world, true);
     }
     cell.end();
 }
@@ -281,107 +291,97 @@ fn a_pause_and_the_leave_that_is_taken_away_stop_and_retract() {
 /// An arm that stops by itself, also when nobody moved it, stands until somebody has looked and says so.
 #[test]
 fn a_stop_stands_until_it_is_recovered() {
-    let stop = Arc::new(AtomicU32::new(0));
-    let cell = Cell::with(true, ArmKind::Real(Box::new(Stopping::new(Arc::clone(&stop)))));
+    let (says, said) = sync_channel(1);
+    let cell = Cell::with(true, |clock| ArmKind::Real(Box::new(Stopping::new(said, clock.clone()))));
     let id = cell.flag(Feature::KIND_HOLE, [16.5, 36.0, 12.0]);
-    let (_, touch, result) = cell.goal(&[id]);
-    while touch.load(Ordering::Acquire) < 3 {
-        if let Ok((_, response)) = result.try_recv() {
-            panic!("{}", response.message);
-        }
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    stop.store(1, Ordering::Release);
-    let (end, response) = result.recv_timeout(Duration::from_secs(20)).unwrap();
-    assert_eq!((end, response.code), (GoalEnd::Aborted, ProbeResult::PROTECTIVE_STOP), "{}", response.message);
-    // somebody frees it at its panel, and does not say so
-    stop.store(2, Ordering::Release);
-    let ready = |wanted: bool| {
-        let deadline = Instant::now() + Duration::from_secs(10);
-        while cell.state().0 != wanted {
-            assert!(Instant::now() < deadline, "{}", cell.state().1);
-            std::thread::sleep(Duration::from_millis(5));
-        }
+    // returns when the node has seen a state of it
+    let say = |safety| {
+        let (seen, is_seen) = sync_channel(1);
+        says.send((safety, seen)).unwrap();
+        is_seen.recv_timeout(HUNG).unwrap();
     };
-    std::thread::sleep(Duration::from_millis(100));
-    let (can_move, why) = cell.state();
-    assert!(!can_move && why.contains("~/recover"), "{why}");
-    assert_eq!(cell.probe(id, ProbeSettings::default()).code, ProbeResult::ARM_NOT_READY);
-    assert!(cell.world.call(Call::Recover).recv().unwrap().success);
-    ready(true);
-    // the same when it stood still
-    stop.store(1, Ordering::Release);
-    ready(false);
-    stop.store(2, Ordering::Release);
-    std::thread::sleep(Duration::from_millis(100));
-    assert_eq!(cell.probe(id, ProbeSettings::default()).code, ProbeResult::ARM_NOT_READY);
-    assert!(cell.world.call(Call::Recover).recv().unwrap().success);
-    ready(true);
+    let stop = says.clone();
+    let (end, response) = cell.goal(&[id], move |_| stop.send((Safety::ProtectiveStop, sync_channel(1).0)).unwrap());
+    assert_eq!((end, response.code), (GoalEnd::Aborted, ProbeResult::PROTECTIVE_STOP), "{}", response.message);
+    for _ in 0..2 {
+        // somebody frees it at its panel, and does not say so
+        say(Safety::Normal);
+        let (can_move, why) = cell.state();
+        assert!(!can_move && why.contains("~/recover"), "{why}");
+        assert_eq!(cell.probe(id, ProbeSettings::default()).code, ProbeResult::ARM_NOT_READY);
+        assert!(cell.world.call(Call::Recover).recv().unwrap().success);
+        say(Safety::Normal);
+        let (can_move, why) = cell.state();
+        assert!(can_move, "{why}");
+        // the same when it stood still
+        say(Safety::ProtectiveStop);
+        assert!(!cell.state().0);
+    }
     cell.end();
 }
 
 /// What is asked of the thread of an arm, and where the answer goes.
-type Asked = (Option<Command>, SyncSender<Result<(), ArmError>>);
+enum Asked {
+    State(SyncSender<Result<ArmState, ArmError>>),
+    Command(Command, SyncSender<Result<(), ArmError>>),
+    Zero(SyncSender<Result<(), ArmError>>),
+}
 
-/// A simulated arm on a thread of its own, whose safety system says what it is told: 1 protective stop, else nothing.
+/// A simulated arm on a thread of its own, whose safety system says what it is told.
 struct Stopping {
-    states: Receiver<ArmState>,
-    commands: SyncSender<Asked>,
-    stop: Arc<AtomicU32>,
+    asks: SyncSender<Asked>,
+    said: Receiver<(Safety, SyncSender<()>)>,
+    safety: Safety,
+    /// to be told when the node has taken the last state
+    seen: Option<SyncSender<()>>,
+    clock: Clock,
 }
 
 impl Stopping {
-    fn new(stop: Arc<AtomicU32>) -> Self {
-        let (to, states) = sync_channel(1);
-        let (commands, told) = sync_channel::<Asked>(1);
+    fn new(said: Receiver<(Safety, SyncSender<()>)>, clock: Clock) -> Self {
+        let (asks, asked) = sync_channel::<Asked>(1);
         std::thread::spawn(move || {
             let (plate, params) = (Plate::default(), ArmParams::default());
             let start = params.pose_bo * Isometry3::translation(30e-3, 25e-3, 52e-3);
             let mut arm = SimArm::new(&plate, params, &start).unwrap();
-            loop {
-                while let Ok((command, done)) = told.try_recv() {
-                    // without a command the sensor is zeroed
-                    let answer = match command {
-                        Some(command) => arm.command(&command),
-                        None => arm.zero_sensor(),
-                    };
-                    let _ = done.send(answer);
-                }
-                let Ok(state) = arm.next_state() else { return };
-                std::thread::sleep(Duration::from_millis(1));
-                if to.send(state).is_err() {
-                    return;
+            for asked in asked {
+                match asked {
+                    Asked::State(to) => drop(to.send(arm.next_state())),
+                    Asked::Command(command, to) => drop(to.send(arm.command(&command))),
+                    Asked::Zero(to) => drop(to.send(arm.zero_sensor())),
                 }
             }
         });
-        Self { states, commands, stop }
+        Self { asks, said, safety: Safety::Normal, seen: None, clock }
     }
 
-    fn ask(&self, command: Option<Command>) -> Result<(), ArmError> {
-        let (done, answer) = sync_channel(1);
-        self.commands.send((command, done)).unwrap();
-        // its thread may wait to hand over a state
-        let _ = self.states.try_recv();
-        let answered = answer.recv().unwrap();
-        // and the one that waits may be from before
-        let _ = self.states.try_recv();
-        answered
+    fn ask<T>(&self, what: impl FnOnce(SyncSender<T>) -> Asked) -> T {
+        let (to, answer) = sync_channel(1);
+        self.asks.send(what(to)).unwrap();
+        answer.recv().unwrap()
     }
 }
 
 impl Arm for Stopping {
     fn next_state(&mut self) -> Result<ArmState, ArmError> {
-        let state = self.states.recv().unwrap();
-        let is_stopped = self.stop.load(Ordering::Acquire) == 1;
-        Ok(ArmState { safety: if is_stopped { Safety::ProtectiveStop } else { state.safety }, ..state })
+        if let Some(seen) = self.seen.take() {
+            // who said it need not wait
+            let _ = seen.send(());
+        }
+        if let Ok((safety, seen)) = self.said.try_recv() {
+            (self.safety, self.seen) = (safety, Some(seen));
+        }
+        self.clock.sleep(Duration::from_millis(2));
+        let state = self.ask(Asked::State)?;
+        Ok(ArmState { safety: if self.safety == Safety::Normal { state.safety } else { self.safety }, ..state })
     }
 
     fn command(&mut self, command: &Command) -> Result<(), ArmError> {
-        self.ask(Some(*command))
+        self.ask(|to| Asked::Command(*command, to))
     }
 
     fn zero_sensor(&mut self) -> Result<(), ArmError> {
-        self.ask(None)
+        self.ask(Asked::Zero)
     }
 
     fn recover(&mut self) -> Result<(), ArmError> {

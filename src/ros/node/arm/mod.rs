@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, TrySendError, sync_channel};
-use std::thread::{Builder, JoinHandle};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use tracing::{info, warn};
@@ -215,7 +215,7 @@ pub(super) fn start(
         common,
         offset_ns: None,
         told_ns: i64::MIN,
-        begun: Instant::now(),
+        begun: setup.clock.now(),
     };
     let run = move || {
         match kind {
@@ -224,7 +224,7 @@ pub(super) fn start(
         }
         hands.refuse_the_rest();
     };
-    let thread = Builder::new().name("arm".to_owned()).spawn(run).map_err(NodeError::no_thread)?;
+    let thread = super::begin(&setup.clock, "arm", run)?;
     Ok((handle, thread))
 }
 
@@ -235,7 +235,7 @@ impl Hands {
             Err(error) => return self.fail(&format!("the simulated arm has no part to touch: {error}")),
         };
         match SimArm::new(&surface, simulated_arm(&self.cell, &self.params), &self.cell.above(part)) {
-            Ok(arm) => self.run(&mut Paced::new(arm)),
+            Ok(arm) => self.run(&mut Paced::new(self.setup.clock.clone(), arm)),
             Err(error) => self.fail(&format!("the simulated arm cannot begin: {error}")),
         }
     }
@@ -277,7 +277,7 @@ impl Hands {
                 if self.common.miss(&error) {
                     warn!(%error, "the arm");
                 }
-                return std::thread::sleep(LOST);
+                return self.setup.clock.sleep(LOST);
             }
         };
         self.common.see(&state);
@@ -296,12 +296,14 @@ impl Hands {
 
     /// Waits for what another thread makes ready, while the arm's states go on.
     fn wait<T>(&mut self, arm: &mut dyn Arm, ready: &Receiver<T>) -> Option<T> {
-        let deadline = Instant::now() + WAIT;
+        let deadline = self.setup.clock.now() + WAIT;
         loop {
             match ready.try_recv() {
                 Ok(made) => return Some(made),
                 Err(TryRecvError::Disconnected) => return None,
-                Err(TryRecvError::Empty) if Instant::now() > deadline || self.common.is_ending() => return None,
+                Err(TryRecvError::Empty) if self.setup.clock.now() > deadline || self.common.is_ending() => {
+                    return None;
+                }
                 Err(TryRecvError::Empty) => self.see_next(arm),
             }
         }
@@ -309,7 +311,7 @@ impl Hands {
 
     /// Works at an order. Who has the answer may give the next, so it is done before that is sent.
     fn take(&mut self, Order { input, folder }: Order, arm: &mut dyn Arm) {
-        self.begun = Instant::now();
+        self.begun = self.setup.clock.now();
         match input {
             ArmInput::Recover(reply) => {
                 let recovered = self.recover(arm);
@@ -459,7 +461,7 @@ impl Hands {
         let Some(state) = self.common.last() else { return not_ready("nothing has come from the arm yet") };
         let flag = Flag { id: target.id, kind: target.kind, place: target.place, radius: target.radius };
         let (cell, params) = (self.cell.clone(), wanted.params.clone());
-        let ready = ask_mesh(&self.view, move |still| {
+        let ready = ask_mesh(&self.setup.clock, &self.view, move |still| {
             let planned = plan(&cell, &params, &still, &flag, &state);
             (still, planned)
         });

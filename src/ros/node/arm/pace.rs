@@ -1,8 +1,8 @@
-//! A simulated arm in real time.
+//! A simulated arm in the time of a clock.
 
-use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+use crate::clock::Clock;
 use crate::robot::{Arm, ArmError, ArmState, Command};
 use crate::sim::SimArm;
 
@@ -11,25 +11,26 @@ const LATE: Duration = Duration::from_millis(100);
 
 /// Hands states out when they are due.
 pub struct Paced<'a> {
+    clock: Clock,
     arm: SimArm<'a>,
     due: Instant,
 }
 
 impl<'a> Paced<'a> {
     /// From now on.
-    pub fn new(arm: SimArm<'a>) -> Self {
-        Self { arm, due: Instant::now() }
+    pub fn new(clock: Clock, arm: SimArm<'a>) -> Self {
+        Self { arm, due: clock.now(), clock }
     }
 }
 
 impl Arm for Paced<'_> {
     fn next_state(&mut self) -> Result<ArmState, ArmError> {
         self.due += Duration::from_secs_f64(self.arm.period());
-        let now = Instant::now();
+        let now = self.clock.now();
         if now > self.due + LATE {
             self.due = now;
         }
-        sleep(self.due.saturating_duration_since(now));
+        self.clock.sleep(self.due.saturating_duration_since(now));
         self.arm.next_state()
     }
 
@@ -50,5 +51,35 @@ impl Arm for Paced<'_> {
 
     fn period(&self) -> f64 {
         self.arm.period()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Isometry3;
+
+    use super::*;
+    use crate::sim::{ArmParams, Plate};
+
+    #[test]
+    fn states_come_when_they_are_due_and_late_ones_at_once_up_to_100_ms() {
+        let (clock, hand) = Clock::lock_step();
+        let (plate, params) = (Plate::default(), ArmParams::default());
+        let start = params.pose_bo * Isometry3::translation(30e-3, 25e-3, 52e-3);
+        let mut paced = Paced::new(clock.clone(), SimArm::new(&plate, params, &start).unwrap());
+        let (begun, period) = (clock.now(), Duration::from_secs_f64(paced.period()));
+        let mut next_at = || {
+            paced.next_state().unwrap();
+            clock.since(begun)
+        };
+        (1..=50u32).for_each(|k| assert_eq!(next_at(), k * period));
+        // ten of them are late: they come at once, then it goes on as if nothing had been
+        hand.advance(10 * period);
+        (51..=60).for_each(|_| assert_eq!(next_at(), 60 * period));
+        assert_eq!(next_at(), 61 * period);
+        // so late that it begins to count anew
+        let late = LATE + 2 * period;
+        hand.advance(late);
+        (0..2u32).for_each(|k| assert_eq!(next_at(), 61 * period + late + k * period));
     }
 }

@@ -10,6 +10,7 @@ use nalgebra::{Isometry3, Point3};
 
 use super::Hands;
 use super::common::Common;
+use crate::clock::Clock;
 use crate::mesh::{FaceHit, TriMesh};
 use crate::probe::{Phase, Progress, StillWorld, World};
 use crate::robot::{ArmState, Witness};
@@ -28,17 +29,20 @@ const COPY_WAIT: Duration = Duration::from_secs(15);
 /// Has something made of the mesh as it is now, beside the loop of the arm, which must not wait for it. Nothing comes where the
 /// view or the memory has no room.
 pub fn ask_mesh<T: Send + 'static>(
+    clock: &Clock,
     view: &SyncSender<ViewInput>,
     make_of: impl FnOnce(StillWorld) -> T + Send + 'static,
 ) -> Receiver<T> {
     let (to, ready) = sync_channel(1);
     let (ask, snapshot) = sync_channel(1);
+    let (working, clock) = (clock.begin_work(), clock.clone());
     let make = move || {
-        let taken = snapshot.recv_timeout(COPY_WAIT).ok().and_then(|replica: Snapshot| replica.mesh().ok());
-        if let Some(mesh) = taken {
+        let snapshot: Option<Snapshot> = clock.recv_timeout(&snapshot, COPY_WAIT).ok();
+        if let Some(mesh) = snapshot.as_ref().and_then(|snapshot| snapshot.mesh().ok()) {
             // who asked may have gone
             let _ = to.send(make_of(StillWorld::new(mesh)));
         }
+        drop(working);
     };
     if view.try_send(ViewInput::Snapshot(ask)).is_ok() {
         // without a thread the receiver finds its sender gone, as it does where nothing comes
@@ -58,6 +62,7 @@ pub fn publish(samples: &dyn SamplePort, base: &str, tool: &str, state: &ArmStat
 
 /// The world during one probing.
 pub struct ArmWorld<'a> {
+    clock: &'a Clock,
     still: StillWorld,
     /// as it will be
     next: Option<Receiver<StillWorld>>,
@@ -88,6 +93,7 @@ impl<'a> ArmWorld<'a> {
         [number, count]: [usize; 2],
     ) -> Self {
         Self {
+            clock: &hands.setup.clock,
             still,
             next: None,
             view: &hands.view,
@@ -115,11 +121,11 @@ impl<'a> ArmWorld<'a> {
             Some(Err(TryRecvError::Empty)) => return,
             Some(Err(TryRecvError::Disconnected)) | None => {}
         }
-        self.next = Some(ask_mesh(self.view, |still| still));
+        self.next = Some(ask_mesh(self.clock, self.view, |still| still));
     }
 
     fn send_feedback(&mut self) {
-        self.told = Instant::now();
+        self.told = self.clock.now();
         let (Some(Feedback(send)), Some(progress)) = (self.feedback, &self.progress) else { return };
         send(ProbeFeedback {
             id: progress.flag,
@@ -138,7 +144,7 @@ impl<'a> ArmWorld<'a> {
             touch_count: progress.budget as u32,
             force: self.last.map_or(f64::NAN, |last| last.wrench_b.force.norm()),
             uncertainty: progress.uncertainty.unwrap_or(f64::NAN),
-            elapsed: self.begun.elapsed().as_secs_f64(),
+            elapsed: self.clock.since(self.begun).as_secs_f64(),
         });
     }
 
@@ -157,7 +163,7 @@ impl Witness for ArmWorld<'_> {
         self.last = Some(*state);
         self.common.see(state);
         publish(self.samples, self.base, self.tool, state, self.offset_ns);
-        if self.told.elapsed() >= TELL_EVERY {
+        if self.clock.since(self.told) >= TELL_EVERY {
             self.send_feedback();
         }
     }

@@ -3,14 +3,15 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::mpsc::sync_channel;
+use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::{Duration, Instant};
 
 use nalgebra::Isometry3;
 use tempfile::TempDir;
+use touchup::clock::{Clock, ManualClock};
 use touchup::io::mesh_file::{MeshUnit, write_mesh};
 use touchup::io::recording::{Topics, write_recording};
 use touchup::mesh::TriMesh;
-use touchup::ros::clock::steady_ns;
 use touchup::ros::in_process::{World, start};
 use touchup::ros::messages::{
     Header, MeshPatch, Point, Pose, PoseStamped, Quaternion, SetBoolRequest, Time, Transform, TransformStamped,
@@ -18,7 +19,7 @@ use touchup::ros::messages::{
 };
 use touchup::ros::node::{INBOX, Node, NodeEnd, Prepared};
 use touchup::ros::parameters::{ParameterValue, Parameters};
-use touchup::ros::port::{Arrival, Call, Publication};
+use touchup::ros::port::{Arrival, Call, Publication, Reply};
 use touchup::sim::StylusParams;
 use touchup::touch::{Message, StampedPose};
 
@@ -84,14 +85,6 @@ pub fn refine(arguments: &[&std::ffi::OsStr]) {
     assert!(matches!(done.status.code(), Some(0 | 4)), "{told}");
 }
 
-/// As a port delivers it.
-pub fn arrival(message: &Message) -> Arrival {
-    match message {
-        Message::Pose(_) => Arrival::Pose(pose(message, "object"), steady_ns()),
-        Message::Wrench(_) => Arrival::Wrench(wrench(message, "stylus"), steady_ns()),
-    }
-}
-
 fn header(stamp_ns: i64, frame: &str) -> Header {
     let (sec, nanosec) = (stamp_ns / 1_000_000_000, stamp_ns % 1_000_000_000);
     Header { stamp: Time { sec: sec as i32, nanosec: nanosec as u32 }, frame_id: frame.to_owned() }
@@ -128,10 +121,17 @@ pub fn transform(stamp_ns: i64, parent: &str, child: &str, pose: &Isometry3<f64>
     TransformStamped { header, child_frame_id: child.to_owned(), transform: Transform { translation, rotation } }
 }
 
-/// A node that runs, and the world around it.
+/// Time passes in steps of this.
+const STEP: Duration = Duration::from_millis(5);
+/// What has not come by then never comes. It is time of the clock, which waits for all threads of the node.
+const NEVER: Duration = Duration::from_secs(60);
+
+/// A node that runs, and the world around it. Its time stands still but for [`Self::pass`], and while somebody waits here.
 pub struct Bench {
     pub node: Node,
     pub world: World,
+    clock: Clock,
+    hand: ManualClock,
     published: Vec<Publication>,
 }
 
@@ -149,13 +149,88 @@ impl Bench {
             parameters.set(name, value).unwrap();
         }
         let (inbox, arrivals) = sync_channel(INBOX);
-        let (port, world) = start(inbox);
-        let node = Prepared::new(parameters).unwrap().start(port, arrivals, None).unwrap();
-        Self { node, world, published: Vec::new() }
+        let (clock, hand) = Clock::manual();
+        let (port, world) = start(inbox, &clock);
+        let node = Prepared::on(clock.clone(), parameters).unwrap().start(port, arrivals, None).unwrap();
+        Self { node, world, clock, hand, published: Vec::new() }
     }
 
+    /// All at once; none is dropped. Of many some time passes in between, in which they are taken down.
     pub fn feed<'a>(&self, messages: impl IntoIterator<Item = &'a Message>) {
-        messages.into_iter().for_each(|message| assert!(self.world.arrive_patiently(arrival(message))));
+        for (number, message) in (1..).zip(messages) {
+            assert!(self.world.arrive_patiently(self.arrival(message)));
+            if number % INBOX == 0 {
+                self.pass(Duration::from_millis(50));
+            }
+        }
+    }
+
+    /// As they came: between them as much time passes as their stamps say.
+    pub fn play<'a>(&self, messages: impl IntoIterator<Item = &'a Message>) {
+        let mut due_ns = None;
+        for message in messages {
+            let due_ns = due_ns.get_or_insert(message.stamp_ns());
+            while *due_ns + STEP.as_nanos() as i64 <= message.stamp_ns() {
+                self.taken();
+                self.hand.advance(STEP);
+                *due_ns += STEP.as_nanos() as i64;
+            }
+            assert!(self.world.arrive_patiently(self.arrival(message)));
+        }
+        self.taken();
+    }
+
+    /// As a port delivers it now.
+    pub fn arrival(&self, message: &Message) -> Arrival {
+        match message {
+            Message::Pose(_) => Arrival::Pose(pose(message, "object"), self.now()),
+            Message::Wrench(_) => Arrival::Wrench(wrench(message, "stylus"), self.now()),
+        }
+    }
+
+    /// Time of the node.
+    pub fn now(&self) -> Instant {
+        self.clock.now()
+    }
+
+    /// Returns when all that arrived was taken.
+    pub fn taken(&self) {
+        let pause = SetBoolRequest { data: false };
+        self.world.call(|reply| Call::Pause(pause, reply)).recv().unwrap();
+    }
+
+    /// Time passes.
+    pub fn pass(&self, time: Duration) {
+        let until = self.now() + time;
+        while self.now() < until {
+            self.hand.advance(STEP.min(until - self.now()));
+        }
+    }
+
+    /// Time passes until there is something.
+    pub fn until<T>(&self, what: &str, mut found: impl FnMut() -> Option<T>) -> T {
+        let begun = self.now();
+        loop {
+            if let Some(found) = found() {
+                return found;
+            }
+            assert!(self.clock.since(begun) < NEVER, "{what} never came");
+            self.hand.advance(STEP);
+        }
+    }
+
+    /// The answer of a service.
+    pub fn call<A: Send + 'static>(&self, call: impl FnOnce(Reply<A>) -> Call) -> A {
+        self.answer(&self.world.call(call))
+    }
+
+    /// An answer that was asked for.
+    pub fn answer<A>(&self, answers: &Receiver<A>) -> A {
+        self.until("the answer", || match answers.try_recv() {
+            Ok(answer) => Some(answer),
+            Err(TryRecvError::Empty) => None,
+            Err(TryRecvError::Disconnected) => panic!("there is no answer"),
+        })
     }
 
     /// Everything published so far.
@@ -166,27 +241,23 @@ impl Bench {
 
     /// Waits until something was published that `wanted` is true of.
     pub fn wait_for<T>(&mut self, what: &str, wanted: impl Fn(&Publication) -> Option<T>) -> T {
-        let deadline = Instant::now() + Duration::from_secs(60);
-        loop {
-            if let Some(found) = self.published().iter().rev().find_map(&wanted) {
-                return found;
-            }
-            assert!(Instant::now() < deadline, "{what} never came");
-            std::thread::sleep(Duration::from_millis(5));
-        }
+        let mut published = std::mem::take(&mut self.published);
+        let found = self.until(what, || {
+            published.extend(self.world.published());
+            published.iter().rev().find_map(&wanted)
+        });
+        self.published = published;
+        found
     }
 
     /// Value of a key of the diagnostics, once all arrivals before are in it.
     pub fn diagnostic(&mut self, key: &str) -> Option<String> {
-        // the answer comes when all that arrived before was taken
-        let pause = SetBoolRequest { data: false };
-        self.world.call(|reply| Call::Pause(pause, reply)).recv().unwrap();
-        self.world.published();
-        // the first may have been on its way already
-        for _ in 0..2 {
-            self.published.clear();
-            self.wait_for("diagnostics", |published| matches!(published, Publication::Diagnostics(_)).then_some(()));
-        }
+        self.taken();
+        self.published();
+        self.published.clear();
+        // they come once a second
+        self.pass(Duration::from_secs(1) + 2 * STEP);
+        self.published();
         let Some(Publication::Diagnostics(told)) =
             self.published.iter().rev().find(|published| matches!(published, Publication::Diagnostics(_)))
         else {
@@ -199,10 +270,21 @@ impl Bench {
     /// Ends it; what was published comes too.
     pub fn end(mut self) -> (NodeEnd, Vec<Publication>) {
         self.world.arrive_patiently(Arrival::Shutdown);
-        let end = self.node.join().unwrap();
+        let Self { node, hand, .. } = self;
+        let end = join(node, &hand);
         self.published.extend(self.world.published());
         (end, self.published)
     }
+}
+
+/// The end of a node; what its threads wait for until then passes.
+pub fn join(node: Node, hand: &ManualClock) -> NodeEnd {
+    let joins = std::thread::spawn(move || node.join());
+    while !joins.is_finished() {
+        hand.advance(STEP);
+        std::thread::yield_now();
+    }
+    joins.join().unwrap().unwrap()
 }
 
 pub fn read(folder: &Path, name: &str) -> Vec<u8> {
