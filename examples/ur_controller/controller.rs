@@ -145,8 +145,9 @@ impl<'a> Controller<'a> {
             return true;
         }
         self.quiet_looks += 1;
-        // where nobody is there any more, time passes all the same
-        self.quiet_looks >= QUIET_LOOKS && (self.owner.is_none() || self.body.time - self.heard_at < AHEAD)
+        // where nobody is there any more, or waits for a program that hangs, time passes all the same
+        let is_in_vain = self.owner.is_none() || self.faults.is_stuck;
+        self.quiet_looks >= QUIET_LOOKS && (is_in_vain || self.body.time - self.heard_at < AHEAD)
     }
 
     /// One period: program, arm, states, record.

@@ -507,8 +507,19 @@ mod tests {
             assert!(self.shared.known().broken.is_none() && self.asked.try_recv().is_err());
         }
 
+        /// After some time the guard waits no longer.
+        fn acts_after(&self, time: Duration) {
+            self.hand.advance(time);
+            assert_eq!(self.hand.waiting(), 0, "it waits on");
+        }
+
         /// How the guard ended, what was wrong, and what the dashboard was asked.
         fn end(self) -> (Option<Halt>, Option<Broken>, Vec<String>) {
+            let begun = Instant::now();
+            while !self.guard.is_finished() {
+                assert!(begun.elapsed() < Duration::from_secs(60), "it never ends");
+                thread::sleep(MS);
+            }
             let halt = self.guard.join().unwrap();
             let client = format!("/proc/{}", self.client);
             assert!(!std::path::Path::new(&client).exists(), "the client is gone");
@@ -526,7 +537,7 @@ mod tests {
         watch.is_calm_after(79 * MS);
         watch.say(Report::Beat { served: 0 });
         watch.is_calm_after(79 * MS);
-        watch.hand.advance(MS);
+        watch.acts_after(MS);
         let (halt, broken, asked) = watch.end();
         assert_eq!((halt, asked), (STOPPED, vec!["stop".to_owned()]));
         assert_eq!(broken, Some(Broken::client("hangs: nothing from it for 80 ms".to_owned())));
@@ -551,7 +562,7 @@ mod tests {
     fn a_client_that_is_never_ready_is_killed_and_nobody_elses_program_stopped() {
         let watch = Watch::begin(1);
         watch.is_calm_after(9_999 * MS);
-        watch.hand.advance(MS);
+        watch.acts_after(MS);
         let (halt, broken, asked) = watch.end();
         assert_eq!((halt, asked), (None, Vec::new()));
         assert_eq!(broken, Some(Broken::client("hangs: it is not ready for 10000 ms".to_owned())));
@@ -564,7 +575,7 @@ mod tests {
         watch.shared.known().close(watch.shared.clock.now());
         watch.say(Report::Beat { served: 0 });
         watch.is_calm_after(1_499 * MS);
-        watch.hand.advance(MS);
+        watch.acts_after(MS);
         let (halt, broken, asked) = watch.end();
         assert_eq!((halt, asked), (STOPPED, vec!["stop".to_owned()]));
         assert_eq!(broken, Some(Broken::client("hangs: it does not end for 1500 ms".to_owned())));
