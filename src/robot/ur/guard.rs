@@ -302,7 +302,7 @@ impl Guard {
 mod tests {
     use std::io::{BufRead, BufReader, Write};
     use std::net::TcpListener;
-    use std::process::Command;
+    use std::process::{Command, Stdio};
     use std::sync::mpsc::{Sender, channel};
     use std::thread::{self, JoinHandle};
 
@@ -480,7 +480,8 @@ mod tests {
             let deadlines = Deadlines { dashboard: Duration::from_secs(60), ..Deadlines::default() };
             let dashboard = Dashboard::connect(&host, deadlines.dashboard).unwrap();
             let shared = Arc::new(Shared::new(deadlines, clock));
-            let child = Command::new("sleep").arg("1000").spawn().unwrap();
+            let mut command = Command::new("sleep");
+            let child = command.arg("1000").stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
             let client = child.id();
             let (reports, lines) = channel();
             let guard = Guard { child, host, dashboard, shared: shared.clone(), hand: None };
