@@ -80,6 +80,11 @@ impl Clock {
         Working(self.manual.clone())
     }
 
+    /// Whether it is moved by hand.
+    pub fn is_manual(&self) -> bool {
+        self.manual.is_some()
+    }
+
     /// Now.
     pub fn now(&self) -> Instant {
         self.manual.as_ref().map_or_else(Instant::now, |manual| manual.begun + manual.waits().elapsed)
@@ -156,6 +161,11 @@ impl ManualClock {
     /// Waits under way.
     pub fn waiting(&self) -> usize {
         self.0.waits().deadlines.len()
+    }
+
+    /// Waits that have begun so far: whoever waits anew has seen the time as it was then.
+    pub fn begun(&self) -> u64 {
+        self.0.waits().next
     }
 }
 

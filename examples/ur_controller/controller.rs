@@ -12,6 +12,11 @@ use crate::rtde::Stream;
 
 /// From the end of an upload to the first cycle of the program, s.
 const START: f64 = 20e-3;
+/// While a program plays and the client says nothing, the clock is asked this often for a period that it may not give.
+const QUIET_LOOKS: u32 = 40;
+/// The clock goes at most this far beyond the last word of the client, s: farther than to where the client brakes because it hears no
+/// order, and not as far as to where the watchdog stops the program.
+const AHEAD: f64 = 80e-3;
 
 /// What the safety system says.
 #[derive(Clone, Copy, PartialEq)]
@@ -72,7 +77,13 @@ pub struct Controller<'a> {
     pub ints_out: [i32; 48],
     pub doubles_out: [f64; 48],
     /// when a command last came, s
-    pub heard_at: f64,
+    heard_at: f64,
+    /// one has come since the last period
+    is_heard: bool,
+    /// looks at the clock since the last period, for want of a word of the client
+    quiet_looks: u32,
+    /// until when the clock goes on whatever comes, s
+    granted_until: f64,
     /// the connection whose inputs count
     pub owner: Option<u64>,
     pub streams: Vec<Stream>,
@@ -96,6 +107,9 @@ impl<'a> Controller<'a> {
             ints_out: [0; 48],
             doubles_out: [0.0; 48],
             heard_at: 0.0,
+            is_heard: false,
+            quiet_looks: 0,
+            granted_until: 0.0,
             owner: None,
             streams: Vec::new(),
             sockets: Vec::new(),
@@ -107,8 +121,38 @@ impl<'a> Controller<'a> {
         self.program.is_running
     }
 
+    /// The client has written the register of commands.
+    pub fn hear(&mut self, id: i32) {
+        // what it was told to do before and has not yet read it never does
+        if self.is_heard && matches!(self.ints_in[0], 6 | 10) && self.ints_in[0] != id {
+            self.record.event(&format!("command {} is never read", self.ints_in[0]));
+        }
+        self.ints_in[0] = id;
+        (self.heard_at, self.is_heard) = (self.body.time, true);
+    }
+
+    /// Some time passes whatever comes, s.
+    pub fn grant(&mut self, seconds: f64) {
+        self.granted_until = self.granted_until.max(self.body.time) + seconds;
+    }
+
+    /// Whether another period may pass. While a program of the client plays, one passes when the client has answered the last.
+    /// While a command is run it says nothing, and now and then it waits for another state before it does.
+    pub fn may_tick(&mut self) -> bool {
+        let id = self.ints_in[0];
+        let is_at_work = self.program.braking.is_some() || !matches!(id, 0 | 6 | 10) && !self.program.is_handled;
+        if !self.program.is_running || self.is_heard || is_at_work || self.body.time < self.granted_until {
+            return true;
+        }
+        self.quiet_looks += 1;
+        // where nobody is there any more, or waits for a program that hangs, time passes all the same
+        let is_in_vain = self.owner.is_none() || self.faults.is_stuck;
+        self.quiet_looks >= QUIET_LOOKS && (is_in_vain || self.body.time - self.heard_at < AHEAD)
+    }
+
     /// One period: program, arm, states, record.
     pub fn tick(&mut self) {
+        (self.is_heard, self.quiet_looks) = (false, 0);
         if self.safety == Safety::Normal && self.body.is_over_its_force() {
             self.stop_for(Safety::Protective, "force over the limit of the safety system");
         }
@@ -125,6 +169,7 @@ impl<'a> Controller<'a> {
     fn start_program(&mut self) {
         if self.program.starts_at.is_some_and(|at| at <= self.body.time) && self.safety == Safety::Normal {
             self.program = Program { is_running: true, ..Program::default() };
+            self.heard_at = self.body.time;
             (self.ints_out[0], self.ints_out[2]) = (1, 0);
             self.record.event("program starts");
         }
@@ -154,8 +199,9 @@ impl<'a> Controller<'a> {
     }
 
     fn cycle(&mut self) {
-        if self.program.watchdog.is_some_and(|after| self.body.time - self.heard_at > after) {
-            self.stop_program("watchdog");
+        let silent = self.body.time - self.heard_at;
+        if self.program.watchdog.is_some_and(|after| silent > after) {
+            self.stop_program(&format!("watchdog after {:.0} ms", silent * 1e3));
             return;
         }
         if self.faults.is_stuck {
@@ -220,8 +266,13 @@ impl<'a> Controller<'a> {
         self.ints_out[0] = 1;
         if id == 10 {
             let acceleration = self.doubles_in[6];
+            let motion = Motion { linear: self.vector(0), angular: self.vector(3), acceleration };
+            let goes = |motion: &Motion| motion.linear.norm() + motion.angular.norm() > 0.0;
+            if !goes(&motion) && self.program.velocity.as_ref().is_none_or(goes) {
+                self.record.event(&format!("told to stop with {acceleration} m/s²"));
+            }
             self.program.speed_time = self.doubles_in[7];
-            self.program.velocity = Some(Motion { linear: self.vector(0), angular: self.vector(3), acceleration });
+            self.program.velocity = Some(motion);
             return;
         }
         let frame = UnitQuaternion::from_scaled_axis(self.vector(3));

@@ -9,7 +9,7 @@ use crate::controller::{Controller, Safety};
 /// One client, until it goes.
 pub fn serve(mut socket: TcpStream, controller: &Mutex<Controller>) -> anyhow::Result<()> {
     let lines = BufReader::new(socket.try_clone()?).lines();
-    writeln!(socket, "Connected: Universal Robots Dashboard Server")?;
+    writeln!(socket, "Connected: stand-in for a Universal Robots Dashboard Server, in lock step")?;
     for line in lines {
         let line = line?;
         let mut controller = controller.lock().map_err(|_| anyhow::anyhow!("the controller has ended"))?;

@@ -7,6 +7,11 @@
 //! copied. Lines on stdin make faults: drop, undash, silent, deaf, stuck, unplug, die, protective, operator, release,
 //! halt, off, local, spike N, mend, mark TEXT. It
 //! ends when stdin does.
+//!
+//! It has a clock of its own, in lock step with its client: while a program of the client plays, a period passes when the client has
+//! sent its next order, so a machine that is late changes nothing. No period is shorter than on a robot; without a program the clock
+//! is that of the machine. A line `run MS` lets so much time pass whatever the client says. States, motion, safety, watchdog and
+//! record go by this clock. Each line is repeated on stdout when it has been done.
 
 mod body;
 mod controller;
@@ -32,8 +37,8 @@ use controller::{Controller, Safety};
 const DASHBOARD: u16 = 29999;
 const SCRIPT: u16 = 30003;
 const RTDE: u16 = 30004;
-/// Later than this its clock stands still for the rest: who runs late is the machine, not the controller.
-const LATE: Duration = Duration::from_millis(4);
+/// How often it looks whether a period may pass.
+const LOOK: Duration = Duration::from_micros(500);
 /// The holes of the part are polygons within this of their circles, m.
 const CHORD: f64 = 2e-6;
 
@@ -100,20 +105,20 @@ fn main() -> anyhow::Result<()> {
                 if let Ok(mut controller) = controller.lock() {
                     fail(&mut controller, &line);
                 }
+                println!("{line}");
             }
             // every other thread waits for somebody
             eprintln!("ur_controller: {address} ends");
             std::process::exit(0);
         });
-        let mut next = Instant::now();
+        let period = Duration::from_secs_f64(PERIOD);
+        let mut last = Instant::now();
         loop {
-            next += Duration::from_secs_f64(PERIOD);
-            let now = Instant::now();
-            if now > next + LATE {
-                next = now;
-            }
-            thread::sleep(next - now.min(next));
-            if let Ok(mut controller) = controller.lock() {
+            // a machine that was late is late for good: a period is never made up for
+            thread::sleep((last + period).saturating_duration_since(Instant::now()).max(LOOK));
+            let Ok(mut controller) = controller.lock() else { continue };
+            if controller.may_tick() {
+                last = Instant::now();
                 controller.tick();
             }
         }
@@ -178,6 +183,7 @@ fn fail(controller: &mut Controller, line: &str) {
         ["off"] => controller.is_powered = false,
         ["local"] => controller.is_remote = false,
         ["halt"] => controller.stop_program("at the panel"),
+        ["run", ms] => controller.grant(ms.parse().unwrap_or(0.0) * 1e-3),
         ["spike", force] => controller.body.hit(force.parse().unwrap_or(0.0)),
         ["mend", ..] => controller.faults = Default::default(),
         ["mark", ..] => {}

@@ -1,27 +1,24 @@
 //! What the arm did, by its own clock: one line for each period, and the events between.
 
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::Write;
 use std::path::Path;
 
 use crate::body::Body;
 
-/// Lines between two flushes: who reads it while the arm runs is at most 20 ms behind.
-const FLUSH: u64 = 10;
-
+/// Each line is there to be read when its period has passed.
 pub struct Record {
-    out: Option<BufWriter<File>>,
-    lines: u64,
+    out: Option<File>,
     event: String,
 }
 
 impl Record {
     pub fn new(path: Option<&Path>) -> std::io::Result<Self> {
-        let mut out = path.map(File::create).transpose()?.map(BufWriter::new);
+        let mut out = path.map(File::create).transpose()?;
         if let Some(out) = &mut out {
             writeln!(out, "time_s,x_m,y_m,z_m,speed_m_per_s,turn_rad_per_s,force_n,event")?;
         }
-        Ok(Self { out, lines: 0, event: String::new() })
+        Ok(Self { out, event: String::new() })
     }
 
     /// Goes into the next line.
@@ -35,15 +32,9 @@ impl Record {
         let Some(out) = &mut self.out else { return };
         let ([linear, angular], place) = (body.velocity(), body.place());
         let (speed, turn, force, time) = (linear.norm(), angular.norm(), body.true_force(), body.time);
+        let line =
+            format!("{time:.4},{:.7},{:.7},{:.7},{speed:.7},{turn:.7},{force:.3},{event}\n", place.x, place.y, place.z);
         // a record that cannot be written ends the run of who reads it, by its deadline
-        let _ = writeln!(
-            out,
-            "{time:.4},{:.7},{:.7},{:.7},{speed:.7},{turn:.7},{force:.3},{event}",
-            place.x, place.y, place.z
-        );
-        self.lines += 1;
-        if self.lines.is_multiple_of(FLUSH) {
-            let _ = out.flush();
-        }
+        let _ = out.write_all(line.as_bytes());
     }
 }

@@ -193,12 +193,8 @@ fn write(controller: &mut Controller, recipes: &[Vec<Input>], body: &[u8]) {
         let Some((bytes, after)) = rest.split_at_checked(size) else { return };
         rest = after;
         match (*input, bytes.try_into(), bytes.try_into()) {
-            (Input::Int(at), Ok(bytes), _) => {
-                controller.ints_in[at] = i32::from_be_bytes(bytes);
-                if at == 0 {
-                    controller.heard_at = controller.body.time;
-                }
-            }
+            (Input::Int(0), Ok(bytes), _) => controller.hear(i32::from_be_bytes(bytes)),
+            (Input::Int(at), Ok(bytes), _) => controller.ints_in[at] = i32::from_be_bytes(bytes),
             (Input::Double(at), _, Ok(bytes)) => controller.doubles_in[at] = f64::from_be_bytes(bytes),
             _ => {}
         }

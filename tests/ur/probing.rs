@@ -8,8 +8,8 @@ use tempfile::TempDir;
 use touchup::io::mesh_file::{MeshUnit, write_mesh};
 use touchup::sim::{Plate, ScannerParams, scan};
 
-use super::patiently;
 use super::stand_in::StandIn;
+use super::with_library;
 
 /// A folder with the scan of the demo, and with its scene, which has the controller on a loopback address.
 pub fn cell(stand_in: &StandIn, packages: &Path) -> TempDir {
@@ -25,7 +25,7 @@ pub fn cell(stand_in: &StandIn, packages: &Path) -> TempDir {
 /// The through hole of the plate, Ø 8 mm at (16, 36), of which the scan shows nothing.
 #[test]
 fn a_ur_probes_a_hole_from_one_click() {
-    patiently("a_ur_probes_a_hole_from_one_click", |packages| {
+    with_library(|packages| {
         let stand_in = StandIn::start(&["--start-mm", "20,30,60"]);
         let folder = cell(&stand_in, packages);
         let out = folder.path().join("out");

@@ -3,9 +3,9 @@
 use std::io::{BufRead, BufReader, Write};
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdin, Command, Stdio};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU8, Ordering};
-use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use nalgebra::{Point3, Vector3};
@@ -14,15 +14,15 @@ use touchup::robot::ur::{UrArm, UrParams};
 
 /// Ports that the library has fixed.
 const PORTS: [u16; 3] = [30004, 29999, 30003];
-/// The record is read again until it holds what is waited for, or this is over.
-const PATIENCE: Duration = Duration::from_secs(10);
+/// The record is read again until it holds what is waited for; longer than this is never.
+const NEVER: Duration = Duration::from_secs(60);
+/// Periods without motion after which the arm stands.
+const STANDING: usize = 20;
 
-/// One arm at a time: what is tested is time.
-static ONE_ARM: Mutex<()> = Mutex::new(());
 static NEXT: AtomicU8 = AtomicU8::new(2);
 
-/// The folder of packages with ur-rtde, made once by `touchup ur setup`; `None` is said, as a test that could not run.
-pub fn packages(test: &str) -> Option<PathBuf> {
+/// The folder of packages with ur-rtde, made once by `touchup ur setup`, or why there is none.
+pub fn packages() -> Result<&'static Path, &'static str> {
     static PACKAGES: LazyLock<Result<PathBuf, String>> = LazyLock::new(|| {
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("ur");
         let setup = Command::new(env!("CARGO_BIN_EXE_touchup")).args(["ur", "setup"]).arg(folder).output().unwrap();
@@ -32,16 +32,7 @@ pub fn packages(test: &str) -> Option<PathBuf> {
             _ => Err(String::from_utf8_lossy(&setup.stderr).trim().to_owned()),
         }
     });
-    static TOLD: Mutex<Vec<String>> = Mutex::new(Vec::new());
-    let say = |reason: &String| {
-        let mut told = TOLD.lock().unwrap_or_else(PoisonError::into_inner);
-        // once for a test, which may ask again
-        if !told.iter().any(|told| told == test) {
-            println!("SKIPPED: {test}: no ur-rtde: {reason}");
-            told.push(test.to_owned());
-        }
-    };
-    PACKAGES.as_ref().inspect_err(|reason| say(reason)).ok().cloned()
+    PACKAGES.as_deref().map_err(String::as_str)
 }
 
 /// One period of the arm, as the stand-in wrote it down.
@@ -64,16 +55,15 @@ pub struct Line {
 /// A stand-in on an address of its own.
 pub struct StandIn {
     child: Child,
-    faults: Option<ChildStdin>,
+    orders: ChildStdin,
+    answers: BufReader<ChildStdout>,
     record: tempfile::NamedTempFile,
     pub address: String,
-    _one: MutexGuard<'static, ()>,
 }
 
 impl StandIn {
     /// - `arguments`: further ones.
     pub fn start(arguments: &[&str]) -> Self {
-        let one = ONE_ARM.lock().unwrap_or_else(PoisonError::into_inner);
         let program = std::env::current_exe().unwrap().parent().unwrap().join("../examples/ur_controller");
         assert!(
             program.exists(),
@@ -90,16 +80,27 @@ impl StandIn {
             .stdout(Stdio::piped())
             .spawn()
             .unwrap();
-        let mut ready = String::new();
-        BufReader::new(child.stdout.take().unwrap()).read_line(&mut ready).unwrap();
-        assert_eq!(ready, "ready\n");
-        let faults = child.stdin.take();
-        Self { child, faults, record, address, _one: one }
+        let (orders, answers) = (child.stdin.take().unwrap(), BufReader::new(child.stdout.take().unwrap()));
+        let mut stand_in = Self { child, orders, answers, record, address };
+        assert_eq!(stand_in.answer(), "ready");
+        stand_in
     }
 
-    /// Makes a fault; `mark …` only writes a line into the record.
+    fn answer(&mut self) -> String {
+        let mut answer = String::new();
+        self.answers.read_line(&mut answer).unwrap();
+        answer.trim_end().to_owned()
+    }
+
+    /// Makes a fault, and returns when it is there; `mark …` only writes a line into the record.
     pub fn tell(&mut self, fault: &str) {
-        writeln!(self.faults.as_mut().unwrap(), "{fault}").unwrap();
+        writeln!(self.orders, "{fault}").unwrap();
+        assert_eq!(self.answer(), fault);
+    }
+
+    /// Lets some time of the controller pass, whatever the client says, ms.
+    pub fn run(&mut self, ms: u32) {
+        self.tell(&format!("run {ms}"));
     }
 
     /// Ends it as a power cut would.
@@ -134,28 +135,56 @@ impl StandIn {
             .collect()
     }
 
-    /// The record from an event on, once it reaches some seconds beyond.
-    pub fn record_after(&self, event: &str, seconds: f64) -> Vec<Line> {
+    /// What is found in the record, once it is there.
+    fn wait<T>(&self, what: &str, find: impl Fn(&[Line]) -> Option<T>) -> T {
         let begun = Instant::now();
-        while begun.elapsed() < PATIENCE {
-            let record = self.record();
-            if let Some(at) = record.iter().position(|line| line.event.contains(event))
-                && record[record.len() - 1].time > record[at].time + seconds
-            {
-                return record[at..].to_vec();
+        while begun.elapsed() < NEVER {
+            if let Some(found) = find(&self.record()) {
+                return found;
             }
             std::thread::sleep(Duration::from_millis(20));
         }
-        panic!("{event} is not in the record, or not {seconds} s of what came then");
+        let record = self.record();
+        let events: Vec<_> = record.iter().filter(|line| !line.event.is_empty()).collect();
+        panic!("{what} is never in the record, which ends at {:?}: {events:#?}", record.last());
     }
 
-    /// From an event to the last motion, s; and it moved before.
-    pub fn stood_after(&self, event: &str) -> f64 {
-        let record = self.record_after(event, 0.6);
-        assert!(record[0].speed > 1e-3, "{event} in mid-move: {:?}", record[0]);
-        let moves = |line: &&Line| line.speed > 0.0 || line.turn > 0.0;
-        record.iter().rev().find(moves).map_or(0.0, |line| line.time - record[0].time)
+    /// Waits for an event; the record from there on.
+    pub fn record_after(&self, event: &str) -> Vec<Line> {
+        self.wait(event, |record| Some(record[position(record, event)?..].to_vec()))
     }
+
+    /// The record from one event up to another that comes after it.
+    pub fn record_between(&self, event: &str, end: &str) -> Vec<Line> {
+        self.wait(end, |record| {
+            let from = &record[position(record, event)?..];
+            Some(from[..=position(from, end)?].to_vec())
+        })
+    }
+
+    /// From the last such event, which is in mid-move, to the last motion before the arm stands, s.
+    pub fn stood_after(&self, event: &str) -> f64 {
+        let moves = |line: &Line| line.speed > 0.0 || line.turn > 0.0;
+        let (at_event, stood) = self.wait(&format!("an arm that stands after `{event}`"), |record| {
+            let at = record.iter().rposition(|line| line.event.contains(event))?;
+            let still = record[at..].windows(STANDING).position(|lines| !lines.iter().any(moves))?;
+            let last = record[at + still.saturating_sub(1)].time;
+            Some((record[at].clone(), last - record[at].time))
+        });
+        assert!(at_event.speed > 1e-3, "{event} in mid-move: {at_event:?}");
+        stood
+    }
+
+    /// As [`Self::stood_after`], which has to be within some seconds.
+    pub fn stands_in(&self, event: &str, seconds: f64) {
+        let stood = self.stood_after(event);
+        println!("{event}: stands after {:.0} ms of at most {:.0}", stood * 1e3, seconds * 1e3);
+        assert!(stood < seconds, "{event}: stands after {stood} s");
+    }
+}
+
+fn position(record: &[Line], event: &str) -> Option<usize> {
+    record.iter().position(|line| line.event.contains(event))
 }
 
 impl Drop for StandIn {
@@ -177,12 +206,7 @@ fn free_address() -> String {
     panic!("no loopback address has the ports of a controller free");
 }
 
-/// Around the plate of the stand-in.
+/// Around the plate of the stand-in; all else as it is shipped.
 pub fn limits() -> Limits {
-    Limits {
-        lowest: Point3::new(-0.6, -0.3, 0.0),
-        highest: Point3::new(-0.2, 0.2, 0.4),
-        acceleration: 1.5,
-        ..Limits::default()
-    }
+    Limits { lowest: Point3::new(-0.6, -0.3, 0.0), highest: Point3::new(-0.2, 0.2, 0.4), ..Limits::default() }
 }

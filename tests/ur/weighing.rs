@@ -5,14 +5,14 @@ use std::process::Command;
 
 use serde_json::Value;
 
-use super::patiently;
 use super::probing::cell;
 use super::stand_in::StandIn;
+use super::with_library;
 
 /// 1.17 kg off the axis, where the scene says 0.25 kg: the controller takes off what it was told, and the sensor has all of it.
 #[test]
 fn a_ur_weighs_what_hangs_on_its_flange() {
-    patiently("a_ur_weighs_what_hangs_on_its_flange", |packages| {
+    with_library(|packages| {
         let stand_in = StandIn::start(&["--start-mm", "30,25,60", "--payload", "1.17,3,-2,42"]);
         let folder = cell(&stand_in, packages);
         let path = |name: &str| folder.path().join(name);

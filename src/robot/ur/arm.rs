@@ -136,14 +136,15 @@ impl UrArm {
         let silent_ms = self.params.deadlines.dashboard.as_millis() as u64;
         let lost = |_: UrError| ArmError::Lost { silent_ms };
         let mut dashboard = Dashboard::connect(&self.params.host, self.params.deadlines.dashboard).map_err(lost)?;
-        let begun = std::time::Instant::now();
+        let clock = &self.params.clock;
+        let begun = clock.now();
         loop {
             match dashboard.safety().map_err(lost)? {
                 Safety::Normal => break,
                 // the controller lets itself be unlocked some seconds after the stop, not before
-                Safety::ProtectiveStop if begun.elapsed() < self.params.deadlines.connect => {
+                Safety::ProtectiveStop if clock.since(begun) < self.params.deadlines.connect => {
                     if !dashboard.unlock().map_err(lost)? {
-                        std::thread::sleep(self.params.deadlines.dashboard);
+                        clock.sleep(self.params.deadlines.dashboard);
                     }
                 }
                 safety => return Err(ArmError::Stopped { safety }),

@@ -4,15 +4,16 @@ use std::io::{BufRead, BufReader, Write};
 use std::os::unix::process::CommandExt;
 use std::process::{ChildStdin, Command, Stdio};
 use std::sync::mpsc::channel;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, MutexGuard};
 use std::thread::{self, JoinHandle};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::dashboard::Dashboard;
 use super::error::UrError;
-use super::guard::{Broken, ENDED, FAREWELL, Guard, Halt, Known, Shared, ZEROING};
+use super::guard::{Broken, FAREWELL, Guard, Halt, Known, Shared, ZEROING};
 use super::params::UrParams;
 use super::protocol::{Begin, Order, Report, State, What, vector_of};
+use crate::clock::Clock;
 use crate::robot::ArmError;
 
 /// The process and its guard.
@@ -51,6 +52,7 @@ impl Client {
             centre_m: params.centre.into(),
             damping: params.damping,
             gain: params.gain,
+            is_lock_step: dashboard.is_lock_step(),
         };
         let told = line_of(&begin).and_then(|line| orders.write_all(&line));
         let (sender, reports) = channel();
@@ -70,10 +72,15 @@ impl Client {
                 tracing::debug!(line, "from ur-rtde");
             }
         });
-        let shared = Arc::new(Shared { known: Mutex::default(), changed: Condvar::new() });
+        let (clock, hand) = if dashboard.is_lock_step() && !params.clock.is_manual() {
+            let (clock, hand) = Clock::manual();
+            (clock, Some(hand))
+        } else {
+            (params.clock.clone(), None)
+        };
+        let shared = Arc::new(Shared::new(params.deadlines, clock));
         let id = child.id();
-        let (host, deadlines) = (params.host.clone(), params.deadlines);
-        let guard = Guard { child, host, dashboard, deadlines, shared: shared.clone() };
+        let guard = Guard { child, host: params.host.clone(), dashboard, shared: shared.clone(), hand };
         let guard = thread::spawn(move || guard.watch(&reports));
         let client = Self { shared, orders: Some(orders), guard: Some(guard), halt: None, id };
         told.map_err(|error| UrError::Client(format!("does not listen: {error}")))?;
@@ -94,15 +101,13 @@ impl Client {
 
     /// Waits until something is so, or the client is broken, or the time is over.
     fn wait(&self, deadline: Duration, is_so: impl Fn(&Known) -> bool) -> MutexGuard<'_, Known> {
-        let known = self.shared.known();
-        let waited =
-            self.shared.changed.wait_timeout_while(known, deadline, |known| known.broken.is_none() && !is_so(known));
-        waited.unwrap_or_else(PoisonError::into_inner).0
+        let Shared { changed, clock, .. } = &*self.shared;
+        clock.wait_while(changed, self.shared.known(), deadline, |known| known.broken.is_none() && !is_so(known))
     }
 
     /// The next state, the oldest that has not been given yet.
     pub fn next_state(&self, deadline: Duration) -> Result<State, ArmError> {
-        let has_ended = |known: &Known| known.ended_since.is_some_and(|since| since.elapsed() > ENDED);
+        let has_ended = |known: &Known| known.has_ended(self.shared.clock.now());
         let mut known = self.wait(deadline, |known| !known.states.is_empty() || has_ended(known));
         if let Some(broken) = &known.broken {
             return Err(broken.error());
@@ -125,12 +130,7 @@ impl Client {
         if let Some(broken) = &known.broken {
             return Err(broken.error());
         }
-        known.sent += 1;
-        let number = known.sent;
-        known.waiting_since.get_or_insert_with(Instant::now);
-        if what == What::Zero {
-            known.asked = Some(number);
-        }
+        let number = known.send(what == What::Zero, self.shared.clock.now());
         drop(known);
         let sent = match &mut self.orders {
             Some(orders) => line_of(&Order { number, what }).and_then(|line| orders.write_all(&line)),
@@ -158,7 +158,7 @@ impl Client {
 
     /// Ends it, and with it the program of the controller; from here on it says why it is not there.
     pub fn close(&mut self, reason: &str) {
-        self.shared.known().closing_since = Some(Instant::now());
+        self.shared.known().close(self.shared.clock.now());
         // at the end of its stdin it brakes, ends the program of the controller and itself
         self.orders = None;
         if let Some(guard) = self.guard.take() {

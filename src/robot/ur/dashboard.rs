@@ -1,6 +1,6 @@
 //! The dashboard of a UR, on a connection of its own: the way to stop the arm that needs neither Python nor a program.
 
-use std::io::{BufRead, BufReader, Write};
+use std::io::{BufRead, BufReader, ErrorKind, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
@@ -9,11 +9,15 @@ use crate::robot::Safety;
 
 /// TCP port of the dashboard.
 const PORT: u16 = 29999;
+/// In the greeting of a simulated controller whose clock waits for its client. No robot says so.
+const LOCK_STEP: &str = "in lock step";
 
 /// A connection to a dashboard.
 pub(super) struct Dashboard {
     host: String,
     replies: BufReader<TcpStream>,
+    is_lock_step: bool,
+    is_silent: bool,
 }
 
 impl Dashboard {
@@ -22,9 +26,20 @@ impl Dashboard {
     /// - `deadline`: of this and of each answer.
     pub fn connect(host: &str, deadline: Duration) -> Result<Self, UrError> {
         let socket = socket(host, PORT, "dashboard", deadline)?;
-        let mut dashboard = Self { host: host.to_owned(), replies: BufReader::new(socket) };
-        dashboard.line()?;
+        let mut dashboard =
+            Self { host: host.to_owned(), replies: BufReader::new(socket), is_lock_step: false, is_silent: false };
+        dashboard.is_lock_step = dashboard.line()?.ends_with(LOCK_STEP);
         Ok(dashboard)
+    }
+
+    /// Whether this is a simulated controller whose clock waits for its client.
+    pub fn is_lock_step(&self) -> bool {
+        self.is_lock_step
+    }
+
+    /// Whether it did not answer in time; not that it has closed the connection.
+    pub fn is_silent(&self) -> bool {
+        self.is_silent
     }
 
     fn unreachable(&self, reason: impl ToString) -> UrError {
@@ -36,7 +51,10 @@ impl Dashboard {
         match self.replies.read_line(&mut line) {
             Ok(0) => Err(self.unreachable("it closed the connection")),
             Ok(_) => Ok(line.trim().to_owned()),
-            Err(error) => Err(self.unreachable(error)),
+            Err(error) => {
+                self.is_silent = matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut);
+                Err(self.unreachable(error))
+            }
         }
     }
 
@@ -57,7 +75,7 @@ impl Dashboard {
         };
         match look() {
             Ok(count) => count > 0,
-            Err(error) => error.kind() == std::io::ErrorKind::WouldBlock,
+            Err(error) => error.kind() == ErrorKind::WouldBlock,
         }
     }
 

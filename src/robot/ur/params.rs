@@ -6,9 +6,10 @@ use std::time::Duration;
 use nalgebra::{Isometry3, Vector3};
 
 use super::error::UrError;
+use crate::clock::Clock;
 
 /// One UR arm with a probe.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct UrParams {
     /// Name or address of the controller.
     pub host: String,
@@ -32,6 +33,8 @@ pub struct UrParams {
     pub gain: f64,
     /// How long what may take.
     pub deadlines: Deadlines,
+    /// On which the deadlines are kept. With that of the machine, a simulated controller in lock step is waited for by its own.
+    pub clock: Clock,
 }
 
 impl UrParams {
@@ -52,6 +55,7 @@ impl UrParams {
             damping: 0.025,
             gain: 0.5,
             deadlines: Deadlines::default(),
+            clock: Clock::system(),
         }
     }
 

@@ -25,6 +25,8 @@ pub struct Begin {
     pub centre_m: [f64; 3],
     pub damping: f64,
     pub gain: f64,
+    /// the clock of the controller waits for its client
+    pub is_lock_step: bool,
 }
 
 /// A line down.
@@ -130,7 +132,7 @@ pub fn pose_of([x, y, z, rx, ry, rz]: [f64; 6]) -> Isometry3<f64> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
     #[test]
@@ -145,7 +147,7 @@ mod tests {
         assert!((turned - Vector3::y()).norm() < 1e-15, "{turned}");
     }
 
-    const STATE: State = State {
+    pub const STATE: State = State {
         stamp_s: 12.345_678_901_234_5,
         pose: [0.1; 6],
         velocity: [-1e-17; 6],

@@ -8,7 +8,7 @@ use std::path::Path;
 use pyo3::call::PyCallArgs;
 use pyo3::prelude::*;
 
-use super::ChildError;
+use super::{ChildError, control};
 use crate::robot::ur::protocol::{State, WHEEL};
 
 /// Rate of the states and of the control, Hz.
@@ -119,7 +119,7 @@ impl Receive {
     }
 }
 
-/// `rtde_control`, for one thread alone.
+/// `rtde_control`.
 pub struct Control(Py<PyAny>);
 
 impl Control {
@@ -132,81 +132,6 @@ impl Control {
         })
     }
 
-    /// Whether the library has a connection.
-    pub fn is_connected(&self) -> bool {
-        self.call("isConnected", ()).unwrap_or(false)
-    }
-
-    /// Whether the uploaded program runs; an old answer when the connection is lost.
-    pub fn is_running(&self) -> bool {
-        self.call("isProgramRunning", ()).unwrap_or(false)
-    }
-
-    /// Goes with a velocity, m/s and rad/s in B, reached with an acceleration, m/s², until it is told otherwise.
-    pub fn speed(&self, twist: [f64; 6], acceleration: f64) -> Result<(), ChildError> {
-        // the time does not end the motion: it is how soon the program on the controller looks for the next velocity, and without
-        // one it first reaches this
-        self.done("speedL", (twist.to_vec(), acceleration, 1.0 / RATE_HZ))
-    }
-
-    /// Presses along z of a frame of B with a force, N; `limits`: speed along z, m/s, how far off across, m and rad.
-    pub fn press(&self, frame: [f64; 6], force: f64, kind: i32, limits: [f64; 6]) -> Result<(), ChildError> {
-        let (along_z, wrench) = (vec![0, 0, 1, 0, 0, 0], vec![0.0, 0.0, force, 0.0, 0.0, 0.0]);
-        self.done("forceMode", (frame.to_vec(), along_z, wrench, kind, limits.to_vec()))
-    }
-
-    /// Ends pressing. A velocity that was not stopped before goes on.
-    pub fn end_press(&self) -> Result<(), ChildError> {
-        self.done("forceModeStop", ())
-    }
-
-    /// Stops what `speed` began, with a deceleration, m/s²; returns when the arm stands.
-    pub fn hard_stop(&self, deceleration: f64) -> Result<(), ChildError> {
-        self.done("speedStop", (deceleration,))
-    }
-
-    /// Takes what the sensor reads for nothing.
-    pub fn zero(&self) -> Result<(), ChildError> {
-        self.done("zeroFtSensor", ())
-    }
-
-    /// kg, and m in the flange.
-    pub fn set_payload(&self, mass: f64, centre: [f64; 3]) -> Result<(), ChildError> {
-        self.done("setPayload", (mass, centre.to_vec()))
-    }
-
-    /// The tip in the flange.
-    pub fn set_tool(&self, tool: [f64; 6]) -> Result<(), ChildError> {
-        self.done("setTcp", (tool.to_vec(),))
-    }
-
-    /// The tip in the flange, as the controller has it.
-    pub fn tool(&self) -> Result<[f64; 6], ChildError> {
-        let call = "getTCPOffset";
-        Python::attach(|py| self.0.call_method0(py, call)?.extract(py)).map_err(failed(call))
-    }
-
-    /// How force mode gives way.
-    pub fn set_force_mode(&self, damping: f64, gain: f64) -> Result<(), ChildError> {
-        self.done("forceModeSetDamping", (damping,))?;
-        self.done("forceModeSetGainScaling", (gain,))
-    }
-
-    /// Has the controller stop when it hears less often.
-    pub fn set_watchdog(&self, least_hz: f64) -> Result<(), ChildError> {
-        self.done("setWatchdog", (least_hz,))
-    }
-
-    /// Lets the watchdog hear something.
-    pub fn feed(&self) -> Result<(), ChildError> {
-        self.done("kickWatchdog", ())
-    }
-
-    /// Ends the program of the controller.
-    pub fn end_program(&self) -> Result<(), ChildError> {
-        self.call("stopScript", ()).map(drop)
-    }
-
     fn done(&self, call: &'static str, arguments: impl for<'py> PyCallArgs<'py>) -> Result<(), ChildError> {
         if self.call(call, arguments)? {
             return Ok(());
@@ -216,6 +141,69 @@ impl Control {
 
     fn call(&self, name: &'static str, arguments: impl for<'py> PyCallArgs<'py>) -> Result<bool, ChildError> {
         Python::attach(|py| truth(self.0.call_method1(py, name, arguments), py)).map_err(failed(name))
+    }
+}
+
+impl control::Control for Control {
+    fn is_connected(&self) -> bool {
+        self.call("isConnected", ()).unwrap_or(false)
+    }
+
+    fn is_running(&self) -> bool {
+        self.call("isProgramRunning", ()).unwrap_or(false)
+    }
+
+    fn speed(&self, twist: [f64; 6], acceleration: f64) -> Result<(), ChildError> {
+        // the time does not end the motion: it is how soon the program on the controller looks for the next velocity, and without
+        // one it first reaches this
+        self.done("speedL", (twist.to_vec(), acceleration, 1.0 / RATE_HZ))
+    }
+
+    fn press(&self, frame: [f64; 6], force: f64, kind: i32, limits: [f64; 6]) -> Result<(), ChildError> {
+        let (along_z, wrench) = (vec![0, 0, 1, 0, 0, 0], vec![0.0, 0.0, force, 0.0, 0.0, 0.0]);
+        self.done("forceMode", (frame.to_vec(), along_z, wrench, kind, limits.to_vec()))
+    }
+
+    fn end_press(&self) -> Result<(), ChildError> {
+        self.done("forceModeStop", ())
+    }
+
+    fn hard_stop(&self, deceleration: f64) -> Result<(), ChildError> {
+        self.done("speedStop", (deceleration,))
+    }
+
+    fn zero(&self) -> Result<(), ChildError> {
+        self.done("zeroFtSensor", ())
+    }
+
+    fn set_payload(&self, mass: f64, centre: [f64; 3]) -> Result<(), ChildError> {
+        self.done("setPayload", (mass, centre.to_vec()))
+    }
+
+    fn set_tool(&self, tool: [f64; 6]) -> Result<(), ChildError> {
+        self.done("setTcp", (tool.to_vec(),))
+    }
+
+    fn tool(&self) -> Result<[f64; 6], ChildError> {
+        let call = "getTCPOffset";
+        Python::attach(|py| self.0.call_method0(py, call)?.extract(py)).map_err(failed(call))
+    }
+
+    fn set_force_mode(&self, damping: f64, gain: f64) -> Result<(), ChildError> {
+        self.done("forceModeSetDamping", (damping,))?;
+        self.done("forceModeSetGainScaling", (gain,))
+    }
+
+    fn set_watchdog(&self, least_hz: f64) -> Result<(), ChildError> {
+        self.done("setWatchdog", (least_hz,))
+    }
+
+    fn feed(&self) -> Result<(), ChildError> {
+        self.done("kickWatchdog", ())
+    }
+
+    fn end_program(&self) -> Result<(), ChildError> {
+        self.call("stopScript", ()).map(drop)
     }
 }
 

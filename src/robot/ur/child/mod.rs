@@ -17,9 +17,10 @@ use std::thread;
 
 use pyo3::prelude::*;
 
-use self::control::Driver;
+use self::control::{Driver, End};
 use self::library::{Control, Receive, leave};
 use super::protocol::{Begin, Link, Order, Report, State};
+use crate::clock::Clock;
 
 /// Why the process gives up before it has begun.
 #[derive(Debug, thiserror::Error)]
@@ -86,8 +87,14 @@ pub fn run() -> Result<(), ChildError> {
     let connected = Receive::connect(&begin.host).and_then(|receive| Ok((receive, Control::connect(&begin.host)?)));
     let (receive, control) = connected.inspect_err(|error| shared.report(&failure(error)))?;
     let (sender, orders) = channel();
+    let (clock, hand) = if begin.is_lock_step {
+        let (clock, hand) = Clock::manual();
+        (clock, Some(hand))
+    } else {
+        (Clock::system(), None)
+    };
     thread::scope(|scope| {
-        scope.spawn(|| states::hand_on(&receive, &shared));
+        scope.spawn(|| states::hand_on(&receive, &shared, hand.as_ref()));
         scope.spawn(move || {
             for line in lines {
                 let Ok(order) = serde_json::from_str::<Order>(&line) else { continue };
@@ -96,8 +103,18 @@ pub fn run() -> Result<(), ChildError> {
                 }
             }
         });
-        Driver::new(&control, &shared, &begin).run(&orders);
-        leave(0)
+        match Driver::new(&control, &shared, &begin, clock).run(&orders) {
+            Ok(()) => leave(0),
+            Err(End::Lost(which)) => shared.lost(which),
+            Err(End::BadTool(reason)) => {
+                shared.report(&Report::BadTool { reason });
+                leave(4)
+            }
+            Err(End::NotReady(error)) => {
+                shared.report(&failure(&error));
+                leave(5)
+            }
+        }
     })
 }
 

@@ -6,7 +6,8 @@ use std::time::{Duration, Instant};
 
 use super::Shared;
 use super::library::Receive;
-use crate::robot::ur::protocol::{Link, Report};
+use crate::clock::{Clock, ManualClock};
+use crate::robot::ur::protocol::{Link, Report, State};
 
 /// Between two looks: a fifth of the time between two states.
 const LOOK: Duration = Duration::from_micros(400);
@@ -14,26 +15,74 @@ const LOOK: Duration = Duration::from_micros(400);
 const BEAT: Duration = Duration::from_millis(10);
 
 /// Until the connection is lost.
-pub fn hand_on(receive: &Receive, shared: &Shared) -> ! {
-    let mut last_stamp = f64::NEG_INFINITY;
-    let mut said = Instant::now();
+///
+/// - `hand`: of the clock that follows the controller.
+pub fn hand_on(receive: &Receive, shared: &Shared, hand: Option<&ManualClock>) -> ! {
+    // that this process lives is told by the time of this machine
+    let clock = Clock::system();
+    let mut said = Said { stamp_s: f64::INFINITY, at: clock.now() };
     loop {
         if !receive.is_connected() {
             shared.lost(Link::States);
         }
-        match receive.stamp().filter(|stamp| *stamp != last_stamp).and_then(|_| receive.state(shared.number())) {
-            Some(state) => {
-                last_stamp = state.stamp_s;
-                *shared.latest.lock().unwrap_or_else(PoisonError::into_inner) = Some(state);
-                shared.report(&Report::State(Box::new(state)));
-                said = Instant::now();
+        let state = receive.stamp().filter(|stamp| said.is_new(*stamp)).and_then(|_| receive.state(shared.number()));
+        if let Some(state) = state {
+            *shared.latest.lock().unwrap_or_else(PoisonError::into_inner) = Some(state);
+            if let Some(hand) = hand {
+                hand.advance(Duration::try_from_secs_f64(state.stamp_s - said.stamp_s).unwrap_or_default());
             }
-            None if said.elapsed() > BEAT => {
-                shared.report(&Report::Beat { served: shared.number() });
-                said = Instant::now();
-            }
-            None => {}
+        }
+        if let Some(report) = said.next(state, shared.number(), clock.now()) {
+            shared.report(&report);
         }
         thread::sleep(LOOK);
+    }
+}
+
+/// What was handed on last, and when.
+struct Said {
+    stamp_s: f64,
+    at: Instant,
+}
+
+impl Said {
+    fn is_new(&self, stamp_s: f64) -> bool {
+        stamp_s != self.stamp_s
+    }
+
+    /// What is to be said now.
+    fn next(&mut self, state: Option<State>, served: u64, now: Instant) -> Option<Report> {
+        let report = match state {
+            Some(state) => {
+                self.stamp_s = state.stamp_s;
+                Report::State(Box::new(state))
+            }
+            None if now.saturating_duration_since(self.at) > BEAT => Report::Beat { served },
+            None => return None,
+        };
+        self.at = now;
+        Some(report)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::ur::protocol::tests::STATE;
+
+    #[test]
+    fn a_state_is_said_at_once_and_where_none_comes_a_beat_each_10_ms() {
+        let (clock, hand) = Clock::manual();
+        let mut said = Said { stamp_s: f64::INFINITY, at: clock.now() };
+        assert!(said.is_new(0.0));
+        let state = said.next(Some(STATE), 7, clock.now());
+        assert_eq!(state, Some(Report::State(Box::new(STATE))));
+        assert!(!said.is_new(STATE.stamp_s));
+        let mut beats = Vec::new();
+        for ms in 1..=35 {
+            hand.advance(Duration::from_millis(1));
+            beats.extend(said.next(None, 7, clock.now()).map(|report| (ms, report)));
+        }
+        assert_eq!(beats, [11, 22, 33].map(|ms| (ms, Report::Beat { served: 7 })));
     }
 }
