@@ -14,6 +14,8 @@ use crate::rtde::Stream;
 const START: f64 = 20e-3;
 /// While a program plays and the client says nothing, the clock is asked this often for a period that it may not give.
 const QUIET_LOOKS: u32 = 40;
+/// The same while the arm moves, where its next order may be late.
+const QUIET_LOOKS_MOVING: u32 = 200;
 /// The clock goes at most this far beyond the last word of the client, s: farther than to where the client brakes because it hears no
 /// order, and not as far as to where the watchdog stops the program.
 const AHEAD: f64 = 80e-3;
@@ -147,7 +149,10 @@ impl<'a> Controller<'a> {
         self.quiet_looks += 1;
         // where nobody is there any more, or waits for a program that hangs, time passes all the same
         let is_in_vain = self.owner.is_none() || self.faults.is_stuck;
-        self.quiet_looks >= QUIET_LOOKS && (is_in_vain || self.body.time - self.heard_at < AHEAD)
+        let [linear, angular] = self.body.velocity();
+        let moves = linear.norm() + angular.norm() > 0.0;
+        let patience = if moves && !is_in_vain { QUIET_LOOKS_MOVING } else { QUIET_LOOKS };
+        self.quiet_looks >= patience && (is_in_vain || self.body.time - self.heard_at < AHEAD)
     }
 
     /// One period: program, arm, states, record.
