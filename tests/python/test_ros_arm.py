@@ -73,8 +73,9 @@ def free_address():
 
 @contextlib.contextmanager
 def controller():
-    """The stand-in for a controller; its address."""
+    """The stand-in for a controller; its address. Its clock waits for the client, who is told that this is so."""
     address = free_address()
+    os.environ["TOUCHUP_UR_LOCK_STEP"] = "1"
     command = [os.environ["TOUCHUP_UR_CONTROLLER"], address, "--start-mm", "20,30,60"]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout.readline() == "ready\n"
@@ -113,7 +114,7 @@ def running(robot, demo_folder, folder, program):
             assert report["dropped"] == [0, 0] and report["unrecorded"] == 0, report
 
 
-# a UR stops where a state of it comes 20 ms late: it is driven where the machine has nothing else to do (tests/all.sh --full)
+# ur-rtde is installed for it: tests/all.sh --full
 ROBOTS = ["sim", "ur"] if os.environ.get("TOUCHUP_FULL") else ["sim"]
 
 

@@ -30,6 +30,7 @@ fn a_ur_probes_a_hole_from_one_click() {
         let folder = cell(&stand_in, packages);
         let out = folder.path().join("out");
         let done = Command::new(env!("CARGO_BIN_EXE_touchup"))
+            .env("TOUCHUP_UR_LOCK_STEP", "1")
             .args(["probe", "--robot", "ur", "--feature", "hole@17.5,34.8,12", "--json"])
             .arg("--scene")
             .arg(folder.path().join("scene.yaml"))

@@ -110,7 +110,11 @@ impl StandIn {
     }
 
     pub fn params(&self, packages: &Path) -> UrParams {
-        UrParams { program: env!("CARGO_BIN_EXE_touchup").into(), ..UrParams::new(&self.address, packages) }
+        UrParams {
+            program: env!("CARGO_BIN_EXE_touchup").into(),
+            is_lock_step: true,
+            ..UrParams::new(&self.address, packages)
+        }
     }
 
     pub fn connect(&self, packages: &Path) -> UrArm {

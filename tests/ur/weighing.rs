@@ -17,6 +17,7 @@ fn a_ur_weighs_what_hangs_on_its_flange() {
         let folder = cell(&stand_in, packages);
         let path = |name: &str| folder.path().join(name);
         let done = Command::new(env!("CARGO_BIN_EXE_touchup"))
+            .env("TOUCHUP_UR_LOCK_STEP", "1")
             .args(["calibrate", "payload", "--robot", "ur", "--json"])
             .arg("--scene")
             .arg(path("scene.yaml"))

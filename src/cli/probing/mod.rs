@@ -66,6 +66,10 @@ pub(super) struct Done {
 const NO_ROBOT: &str = "the scene names no `robot`, so nobody knows where the arm stands and what it must never leave: add \
                         `robot:` to it (config/probe.yaml is an example)";
 
+/// Set where the controller is a simulation whose clock waits for its client: docs/ur.md.
+#[cfg(feature = "ur")]
+const LOCK_STEP: &str = "TOUCHUP_UR_LOCK_STEP";
+
 #[cfg(feature = "ur")]
 const NO_HOST: &str = "--robot ur needs robot.host and robot.site_packages in the scene (docs/ur.md)";
 const NO_MOTION: &str =
@@ -84,6 +88,7 @@ pub(super) fn ur_params(scene: &Scene) -> Result<UrParams, CliError> {
         pose_ft: cell.pose_ft,
         mass: robot.payload_kg,
         centre: nalgebra::Vector3::from(robot.payload_centre_mm) / 1e3,
+        is_lock_step: std::env::var_os(LOCK_STEP).is_some(),
         ..UrParams::new(&robot.host, &robot.site_packages)
     })
 }

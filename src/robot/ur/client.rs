@@ -44,6 +44,7 @@ impl Client {
         else {
             return Err(UrError::Client("has no pipes".to_owned()));
         };
+        let is_lock_step = params.is_lock_step && dashboard.is_lock_step();
         let begin = Begin {
             host: params.host.clone(),
             site_packages: params.site_packages.clone(),
@@ -52,7 +53,7 @@ impl Client {
             centre_m: params.centre.into(),
             damping: params.damping,
             gain: params.gain,
-            is_lock_step: dashboard.is_lock_step(),
+            is_lock_step,
         };
         let told = line_of(&begin).and_then(|line| orders.write_all(&line));
         let (sender, reports) = channel();
@@ -72,7 +73,7 @@ impl Client {
                 tracing::debug!(line, "from ur-rtde");
             }
         });
-        let (clock, hand) = if dashboard.is_lock_step() && !params.clock.is_manual() {
+        let (clock, hand) = if is_lock_step && !params.clock.is_manual() {
             let (clock, hand) = Clock::manual();
             (clock, Some(hand))
         } else {

@@ -33,8 +33,11 @@ pub struct UrParams {
     pub gain: f64,
     /// How long what may take.
     pub deadlines: Deadlines,
-    /// On which the deadlines are kept. With that of the machine, a simulated controller in lock step is waited for by its own.
+    /// On which the deadlines are kept.
     pub clock: Clock,
+    /// Whether a controller that greets as a simulation in lock step is believed: its stamps then take the place of the machine's
+    /// clock. Both have to say so, for a deadline that a controller could lift would be none.
+    pub is_lock_step: bool,
 }
 
 impl UrParams {
@@ -56,6 +59,7 @@ impl UrParams {
             gain: 0.5,
             deadlines: Deadlines::default(),
             clock: Clock::system(),
+            is_lock_step: false,
         }
     }
 
