@@ -163,6 +163,6 @@ echo
 printf '%s\n' "${stages[@]}"
 [ "${#reasons[@]}" -eq 0 ] || printf '%s\n' "${reasons[@]}"
 count="$passed passed, $failed failed, $skipped skipped"
-[ -z "$is_full" ] || tests/results.sh "$logs/results" "$count" > docs/results.md || fail "docs/results.md could not be written"
+[ -z "$is_full" ] || tests/results.sh "$logs/rust.log" "$logs/results" "$count" > docs/results.md || fail "docs/results.md could not be written"
 echo "$passed passed, $failed failed, $skipped skipped"
 [ "$failed" -eq 0 ]

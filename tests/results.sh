@@ -1,15 +1,17 @@
 #!/usr/bin/env bash
-# tests/results.sh FOLDER COUNT: what `tests/all.sh --full` measured, as Markdown on stdout: a heading for each file of FOLDER.
+# tests/results.sh LOG FOLDER COUNT: what `tests/all.sh --full` measured, as Markdown on stdout: what the proofs below printed into
+# the log of the Rust tests, then each file of FOLDER, which the Python tests wrote.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-folder=$1 count=$2
+log=$1 folder=$2 count=$3
 
 commit=$(git rev-parse --short=12 HEAD)
 git diff --quiet HEAD -- . ':!docs/results.md' || commit="$commit, with changes"
 cat <<HEAD
 # Results
 
-Written by \`tests/all.sh --full\`; do not edit.
+Written by \`tests/all.sh --full\`; do not edit. What the program's own simulator made shows consistency, not truth: the judged cases
+come from another one.
 
 | | |
 |---|---|
@@ -19,9 +21,31 @@ Written by \`tests/all.sh --full\`; do not edit.
 | compiler | $(rustc --version) |
 | tests | $count |
 HEAD
+
+# printed TEST: what it printed
+printed() {
+  awk -v test="$1" '$0 == "---- " test " stdout ----" { is_in = 1; next } /^---- .* ----$|^successes:$/ { is_in = 0 } is_in' "$log" \
+    | sed -e '/./,$!d'
+}
+
 for file in "$folder"/*.md; do
   [ -e "$file" ] || continue
   name=$(basename "$file" .md)
   printf '\n## %s\n\n' "${name//_/ }"
   cat "$file"
 done
+while IFS='|' read -r test heading; do
+  text=$(printed "$test")
+  [ -n "$text" ] || { echo "$test printed nothing into $log" >&2; exit 1; }
+  printf '\n## %s\n\n`%s`\n\n```text\n%s\n```\n' "$heading" "$test" "$text"
+done <<'PROOFS'
+features::touched::what_was_touched_is_found_and_as_good_as_it_says|Features of the touched plate, fifty seeds
+patch::accuracy::other_tips_hands_and_friction|Other tips, hands and friction, twenty seeds
+patch::uncertainty::what_was_touched_is_as_well_known_as_it_says_where_errors_are_as_the_model_has_them|Stated uncertainty where errors are as the model has them
+patch::uncertainty::what_the_model_does_not_know_is_not_in_what_it_says|Stated uncertainty where errors are others
+patch::tips::a_tip_says_where_it_touched|Where a tip touched
+refine::sweeps::the_published_rule_converges_where_no_face_leans_out_of_its_basin_and_only_there|Where the published rule converges
+refine::sweeps::the_guard_lets_the_published_rule_starve_no_face|Sweeps of the published rule, throttled by the guard's longest step
+refine::sweeps::the_robust_mode_never_blows_up_with_noise_larger_than_half_an_edge|Sweeps of the robust mode
+robot::touching::a_hole_is_found_from_one_click_and_measured|A hole from one click, by a simulated arm
+PROOFS

@@ -9,12 +9,13 @@ use touchup::mesh::FaceTree;
 use touchup::patch::{CalibrationParams, Patcher, PatcherParams};
 use touchup::sim::{Plate, StylusParams, TruthFeature, TruthShape};
 
+use crate::full::either;
 use crate::plate_stream::{PlateStream, plate_stream};
 
 const MM: f64 = 1e3;
 
 fn seeds() -> u64 {
-    if std::env::var_os("TOUCHUP_FULL").is_some() { 50 } else { 6 }
+    either(4, 50)
 }
 
 /// What the program is told is off by this: the radius, m, and the stiffness, as a share. The calibration says 2 µm and 2 %.

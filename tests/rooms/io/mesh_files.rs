@@ -417,3 +417,9 @@ proptest! {
         }
     }
 }
+
+/// By the definitions of 1959: an inch is 25.4 mm.
+#[test]
+fn units_are_as_long_as_they_are_defined() {
+    assert_eq!([Metre, Millimetre, Inch].map(|unit| unit.metres()), [1.0, 0.001, 0.0254]);
+}

@@ -114,3 +114,18 @@ fn nobody_is_told_who_does_not_watch() {
     let mut changes = Changes::default();
     assert!(mesh.take_changes(usize::MAX, &mut changes) && changes == Changes::default());
 }
+
+/// As many vertices as are taken at once, and more faces than that: it is not all until those are told, too.
+#[test]
+fn it_is_not_all_while_faces_are_left() {
+    let mut mesh = square();
+    mesh.watch();
+    mesh.set_position(VertexId(0), Point3::origin());
+    mesh.flip_face(FaceId(0));
+    mesh.flip_face(FaceId(1));
+    let mut changes = Changes::default();
+    assert!(!mesh.take_changes(1, &mut changes), "a face is left: {changes:?}");
+    assert_eq!((changes.vertices.len(), changes.faces.len()), (1, 1));
+    assert!(mesh.take_changes(1, &mut changes));
+    assert_eq!((changes.vertices.len(), changes.faces.len()), (1, 2));
+}

@@ -453,7 +453,7 @@ fn check_move(
 /// margin. Distances are those of another way than the tree's: all triangles, one after the other.
 #[test]
 fn no_plan_leaves_the_limits_or_passes_through_the_mesh() {
-    let is_full = std::env::var_os("TOUCHUP_FULL").is_some();
+    let is_full = crate::full::is_full();
     let mut rng = Pcg64::seed_from_u64(3);
     let mut moves = Moves::default();
     let Some(parts) = parts() else { return };

@@ -160,7 +160,7 @@ fn a_hole_is_found_from_one_click_and_measured() {
     let mut rng = Pcg64::seed_from_u64(11);
     let (mut worst, mut counts) = ([0.0f64; 2], Vec::new());
     // twenty seeds are the slow proof
-    let seeds = if std::env::var_os("TOUCHUP_FULL").is_some() { 20 } else { 6 };
+    let seeds = crate::full::either(2, 20);
     for seed in 0..seeds {
         let ([x, y], radius) = if seed % 2 == 0 { HOLE } else { ([32e-3, 34e-3], 3e-3) };
         let params = ArmParams { seed, ..ArmParams::default() };

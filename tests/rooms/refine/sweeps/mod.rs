@@ -14,6 +14,8 @@ mod qualities;
 
 use qualities::qualities;
 
+use crate::full::is_full;
+
 /// Time between two samples, ns.
 const PERIOD_NS: i64 = 5_000_000;
 
@@ -21,10 +23,6 @@ const PERIOD_NS: i64 = 5_000_000;
 fn since(before: &RefineCounts, refiner: &Refiner) -> (u64, u64) {
     let now = refiner.counts();
     (now.cut_back - before.cut_back, now.moved - before.moved)
-}
-
-fn full() -> bool {
-    std::env::var_os("TOUCHUP_FULL").is_some()
 }
 
 /// Errors after 0, 1, 2, … sweeps, as far as it does not blow up.
@@ -84,7 +82,7 @@ const BASIN: [f64; 2] = [80.0 / 180.0 * std::f64::consts::PI, 100.0 / 180.0 * st
 /// comes back.
 #[test]
 fn the_published_rule_converges_where_no_face_leans_out_of_its_basin_and_only_there() {
-    let seeds = if full() { 1..=20 } else { 1..=7 };
+    let seeds = if is_full() { 1..=20 } else { 1..=7 };
     let truth = Peaks::default().mesh(10e-3).unwrap();
     let (mut inside, mut converged, mut blown_up) = (0, Vec::new(), 0);
     for seed in seeds {
@@ -141,7 +139,7 @@ fn the_published_rule_converges_where_no_face_leans_out_of_its_basin_and_only_th
 
 #[test]
 fn the_guard_lets_the_published_rule_starve_no_face() {
-    let (seeds, counts) = if full() { (1..=5, [10, 3]) } else { (3..=3, [2, 1]) };
+    let (seeds, counts) = if is_full() { (1..=5, [10, 3]) } else { (3..=3, [2, 1]) };
     for (edge, count) in [10e-3, 5e-3].into_iter().zip(counts) {
         for seed in seeds.clone() {
             for guard in [Some(GuardParams::default()), None] {
@@ -212,7 +210,7 @@ const STRAY_MM: f64 = 0.5;
 fn the_robust_mode_never_blows_up_with_noise_larger_than_half_an_edge() {
     let peaks = Peaks::default();
     println!("true mesh, 5 mm edges: {}", MeshErrors::by_surface(&peaks.mesh(5e-3).unwrap(), &peaks).row());
-    let (frictions, sweeps): (&[f64], _) = if full() { (&[0.0, 0.15], 10) } else { (&[0.15], 3) };
+    let (frictions, sweeps): (&[f64], _) = if is_full() { (&[0.0, 0.15], 10) } else { (&[0.15], 3) };
     for &friction in frictions {
         let samples = raster_samples(&peaks, friction).unwrap();
         println!("robust mode, 5 mm edges, friction {friction}, {} samples a sweep", samples.len());
