@@ -194,6 +194,24 @@ impl LiveRefiner {
         Ok(())
     }
 
+    /// To be called now and then while no sample comes: takes up some more of what the patch has made, and hands it the samples that
+    /// it does not know yet. Never waits.
+    ///
+    /// # Errors
+    /// [`LiveError::Stopped`], [`LiveError::Refine`].
+    pub fn rest(&mut self) -> Result<(), LiveError> {
+        self.go_on(AT_ONCE)?;
+        if !self.is_done {
+            return Ok(());
+        }
+        if let Some(answer) = self.worker.answer_if_there()? {
+            self.take_up(answer);
+        } else if !self.batch.is_empty() && self.due_ns.len() < MOST_OPEN {
+            self.ask(i64::MIN)?;
+        }
+        Ok(())
+    }
+
     /// Waits until the patch knows all samples so far, as after a pause.
     ///
     /// # Errors

@@ -279,6 +279,45 @@ fn a_patch_in_time_is_that_of_who_waits_for_it_at_every_sample() {
     assert_same(kept.live.refiner().mesh(), patient.refiner().mesh());
 }
 
+/// The patch is late by two renewals and all that came since when the samples end: while none comes the mesh goes on to what the
+/// patch knows of all of them, as it does by hand.
+#[test]
+fn while_no_sample_comes_the_mesh_goes_on_to_what_the_patch_knows() {
+    let stream = stream(6, 0.05);
+    let (samples, pace) = (&stream.samples, Pace::default());
+    let (scan, tree) = (Arc::new((stream.scan.clone(), FaceTree::new(&stream.scan))), FaceTree::new(&stream.scan));
+    let (gate, keeper) = Gate::kept();
+    let mut live = LiveRefiner::behind(gate, scan, refiner(&stream.scan), patcher(&stream), pace, 1000).unwrap();
+    let (mut by_hand, mut patcher) = (refiner(&stream.scan), patcher(&stream));
+    by_hand.expect_patch(1000).unwrap();
+    for sample in samples {
+        assert_eq!(live.push(sample).unwrap(), by_hand.push(sample).unwrap());
+    }
+    assert_eq!(live.counts().renewals, 0);
+    let slot = |i: usize| samples[i].stamp_ns.div_euclid(pace.every_ns);
+    let begins: Vec<usize> = (1..samples.len()).filter(|&i| slot(i) > slot(i - 1)).take(2).collect();
+    for (k, batch) in [0..begins[0], begins[0]..begins[1], begins[1]..samples.len()].into_iter().enumerate() {
+        samples[batch].iter().for_each(|sample| patcher.push(sample));
+        let delta = patcher.renewed(&stream.scan, &tree);
+        by_hand.begin_to_follow(&delta);
+        while !by_hand.go_on_following(&delta, AT_ONCE).unwrap() {}
+        // nothing is done without a permit, and the third is asked for when the first two are taken up
+        live.rest().unwrap();
+        assert_eq!(live.counts().renewals, k as u64);
+        keeper.let_one_through();
+        live.rest().unwrap();
+        while !live.is_whole() {
+            live.rest().unwrap();
+        }
+        assert_eq!(live.counts().renewals, k as u64 + 1);
+        assert_same(live.refiner().mesh(), by_hand.mesh());
+    }
+    assert!(by_hand.mesh().face_count() > stream.scan.face_count(), "something was touched");
+    // and then there is nothing left to do
+    live.rest().unwrap();
+    assert_eq!(live.counts().renewals, 3);
+}
+
 /// A touch counts at once for the haptic update, and within 50 ms for the patch.
 #[test]
 fn a_touch_moves_the_mesh_at_once_and_is_in_the_patch_within_50_ms() {

@@ -67,6 +67,17 @@ impl Engine {
         }
     }
 
+    /// To be called now and then while no sample comes, as [`LiveRefiner::rest`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn rest(&mut self) -> Result<(), LiveError> {
+        match self {
+            Self::Alone(_) => Ok(()),
+            Self::Live(live) => live.rest(),
+        }
+    }
+
     /// Takes the last stroke back, or does it again; returns whether there was one.
     ///
     /// # Errors

@@ -30,6 +30,8 @@ const IDLE: Duration = Duration::from_millis(10);
 const SHOW_EVERY: Duration = Duration::from_millis(5);
 /// Diagnostics come so often.
 const TELL_EVERY: Duration = Duration::from_secs(1);
+/// Without a sample for so long the streams rest: longer than a renewal is given, and than usual gaps between poses.
+const RESTS_AFTER: Duration = Duration::from_millis(50);
 /// Messages of a stream that wait for a transform at most.
 const MOST_WAITING: usize = 4096;
 
@@ -336,18 +338,33 @@ impl Haptic {
                 self.tally.accepted += 1;
                 self.last_ns = Some(sample.stamp_ns);
                 self.show_mismatch(sample, &update);
-                let edits = self.sitting.engine.refiner().mesh().edits();
-                self.version += u64::from(std::mem::replace(&mut self.edits, edits) != edits);
-                if let Some(news) = self.sitting.engine.take_probed() {
-                    self.probed.extend(news);
-                    self.send_probed();
-                }
+                self.note_changes();
             }
             Err(LiveError::Refine(error)) => self.tally.refuse(reason_of(&error)),
-            Err(error) => {
-                warn!(%error, "no samples are taken any more");
-                self.fault = Some(error.to_string());
-            }
+            Err(error) => self.fail(&error),
+        }
+    }
+
+    /// While no sample comes the mesh goes on to what the patch knows by then: what is shown is not left behind.
+    fn rest(&mut self) {
+        match self.sitting.engine.rest() {
+            Ok(()) => self.note_changes(),
+            Err(error) => self.fail(&error),
+        }
+    }
+
+    fn fail(&mut self, error: &LiveError) {
+        warn!(%error, "no samples are taken any more");
+        self.fault = Some(error.to_string());
+    }
+
+    /// Another state of the mesh has another version; touches that are new go to the features.
+    fn note_changes(&mut self) {
+        let edits = self.sitting.engine.refiner().mesh().edits();
+        self.version += u64::from(std::mem::replace(&mut self.edits, edits) != edits);
+        if let Some(news) = self.sitting.engine.take_probed() {
+            self.probed.extend(news);
+            self.send_probed();
         }
     }
 
@@ -356,6 +373,9 @@ impl Haptic {
         let now = self.setup.clock.now();
         if now.saturating_duration_since(self.shown) >= SHOW_EVERY {
             self.shown = now;
+            if self.fault.is_none() && now.saturating_duration_since(self.sampled) >= RESTS_AFTER {
+                self.rest();
+            }
             self.show_edits();
             self.send_probed();
             self.retry_waiting();
