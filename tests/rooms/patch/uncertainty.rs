@@ -81,7 +81,8 @@ impl Normalised {
 /// Consistency, not truth: noise, friction and what the calibration leaves are drawn as the model has them.
 #[test]
 fn what_was_touched_is_as_well_known_as_it_says_where_errors_are_as_the_model_has_them() {
-    let seeds = either(1, 20);
+    // one draw of the stiffness says nothing of how often it is within what it says
+    let seeds = either(2, 20);
     let noisy = SensorParams { pose_noise: 0.2e-3, orientation_noise: 0.3f64.to_radians(), ..SensorParams::default() };
     let styli = [
         ("usual", StylusParams::default(), 0.93),
