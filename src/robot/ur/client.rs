@@ -197,3 +197,42 @@ fn line_of(what: &impl serde::Serialize) -> std::io::Result<Vec<u8>> {
     line.push(b'\n');
     Ok(line)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::os::unix::fs::PermissionsExt;
+
+    use super::*;
+    use crate::robot::ur::dashboard::tests::listen;
+
+    /// Time is the controller's only where both say so: a controller that could lift the deadlines by its greeting alone would be
+    /// watched by nobody.
+    #[test]
+    fn a_greeting_alone_puts_nobody_in_lock_step() {
+        let folder = tempfile::tempdir().unwrap();
+        let (program, told) = (folder.path().join("client"), folder.path().join("told"));
+        fs::write(&program, format!("#!/bin/sh\nhead -n 1 > {}\n", told.display())).unwrap();
+        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
+        for (is_allowed, greeting) in
+            [(false, "in lock step"), (true, "Universal Robots Dashboard Server"), (true, "a test in lock step")]
+        {
+            let (host, listener) = listen();
+            let greets = thread::spawn(move || {
+                let (mut socket, _) = listener.accept().unwrap();
+                writeln!(socket, "Connected: {greeting}").unwrap();
+                socket
+            });
+            let deadline = Duration::from_secs(60);
+            let dashboard = Dashboard::connect(&host, deadline).unwrap();
+            let params =
+                UrParams { program: program.clone(), is_lock_step: is_allowed, ..UrParams::new(&host, "none") };
+            let ended = Client::start(&params, dashboard).err().unwrap();
+            assert!(matches!(&ended, UrError::Client(reason) if reason.contains("has ended")), "{ended}");
+            let begin: serde_json::Value = serde_json::from_slice(&fs::read(&told).unwrap()).unwrap();
+            let is_both = is_allowed && greeting.ends_with("in lock step");
+            assert_eq!(begin["is_lock_step"], is_both, "allowed: {is_allowed}, greeted: {greeting}");
+            drop(greets.join().unwrap());
+        }
+    }
+}

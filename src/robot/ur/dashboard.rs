@@ -143,3 +143,17 @@ pub(super) fn socket(host: &str, port: u16, service: &'static str, deadline: Dur
         reason: error.to_string(),
     })
 }
+
+#[cfg(test)]
+pub(super) mod tests {
+    use std::net::TcpListener;
+
+    use super::PORT;
+
+    /// Where a dashboard may be that the test plays, on an address of its own.
+    pub fn listen() -> (String, TcpListener) {
+        let host = |number: u8| format!("127.9.{}.{number}", std::process::id() % 250 + 1);
+        let free = |host: String| TcpListener::bind((host.as_str(), PORT)).ok().map(|listener| (host, listener));
+        (1..250).map(host).find_map(free).unwrap()
+    }
+}
