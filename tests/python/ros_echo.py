@@ -2,15 +2,11 @@
 
 import itertools
 import os
-import subprocess
-import threading
-import time
 
 import pytest
 from conftest import ROOT
+from running import Running
 
-# nothing is waited for longer; nothing is expected to take as long
-DEADLINE_S = 60
 # a domain of its own for each test, whose ports the system hands to nobody else (DDS gives each domain 250 from 7400 on; Linux
 # takes those of connections from 32768 to 60999); those of users are low
 FREE = [*range(60, 102), *range(215, 233)]
@@ -28,40 +24,18 @@ def echo_binary():
     return str(max(built, key=lambda place: place.stat().st_mtime))
 
 
-class Echo:
-    """A running ros_echo and the lines that it writes."""
+class Echo(Running):
+    """A running ros_echo."""
 
     def __init__(self, domain, *arguments, wrapper=()):
-        command = [*wrapper, echo_binary(), *arguments]
-        environment = {**os.environ, "ROS_DOMAIN_ID": str(domain)}
-        pipe = subprocess.PIPE
-        self.process = subprocess.Popen(
-            command, env=environment, stdin=pipe, stdout=pipe, stderr=subprocess.STDOUT, text=True
-        )
-        self.lines = []
-        threading.Thread(target=self.read, daemon=True).start()
-        self.wait_for(lambda: "ready" in self.lines)
-
-    def read(self):
-        for line in self.process.stdout:
-            self.lines.append(line.rstrip())
-
-    def wait_for(self, condition):
-        until = time.monotonic() + DEADLINE_S
-        while not condition():
-            assert time.monotonic() < until, "\n".join(self.lines)
-            time.sleep(0.01)
+        super().__init__([*wrapper, echo_binary(), *arguments], {"ROS_DOMAIN_ID": str(domain)})
+        self.wait_for(lambda: "ready" in self.out)
 
     def has(self, *words):
-        return any(all(word in line for word in words) for line in self.lines)
-
-    def __enter__(self):
-        return self
+        """Whether a line has all of them."""
+        return any(all(word in line for word in words) for line in [*self.out, *self.told])
 
     def __exit__(self, *_):
+        # it ends with its stdin
         self.process.stdin.close()
-        try:
-            self.process.wait(10)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            raise
+        self.wait()

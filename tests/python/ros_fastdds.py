@@ -6,15 +6,13 @@ It is built here with Debian's Fast DDS, or with the one below FASTDDS_ROOT. Mes
 import os
 import shutil
 import subprocess
-import threading
-import time
 from pathlib import Path
 
 import make_ros_cdr
 import pytest
 from conftest import ROOT
-from ros_echo import DEADLINE_S
 from rosbags.typesys import get_types_from_msg
+from running import Running
 
 # rcl_interfaces as its files say, which rosbags has without the services
 SERVICES = {
@@ -74,7 +72,7 @@ class FastDds:
         prefix = f"{package}::{kind}::dds_::{short}"
         made = Client(self, [*wrapper, self.binary, "call", str(domain), service, prefix])
         made.type_name = type_name
-        made.wait_for(lambda: "matched" in made.lines)
+        made.wait_for(lambda: "matched" in made.out)
         for what in ("a caller is heard", "a caller can be answered"):
             echo.wait_for(lambda what=what: echo.has(what, f'"{service}"'))
         return made
@@ -86,7 +84,7 @@ class FastDds:
             self, [*wrapper, self.binary, "listen", str(domain), f"rt{topic}", f"{package}::{kind}::dds_::{short}_"]
         )
         made.type_name = type_name
-        made.wait_for(lambda: "matched" in made.lines)
+        made.wait_for(lambda: "matched" in made.out)
         echo.wait_for(lambda: echo.has("Matched", f'"{topic}"', "count: 1"))
         return made
 
@@ -94,53 +92,27 @@ class FastDds:
         return self.store.deserialize_cdr(bytes.fromhex(digits), make_ros_cdr.known(type_name))
 
 
-class Peer:
-    """A process of it, and the lines that it writes."""
+class Peer(Running):
+    """A process of it."""
+
+    may_end_with = (0,)
 
     def __init__(self, fast_dds, command):
-        self.fast_dds, self.lines = fast_dds, []
-        environment = {**os.environ, "LD_LIBRARY_PATH": str(fast_dds.libraries)}
-        pipe = subprocess.PIPE
-        self.process = subprocess.Popen(
-            command, env=environment, stdin=pipe, stdout=pipe, stderr=subprocess.STDOUT, text=True
-        )
-        self.reader = threading.Thread(target=self.read, daemon=True)
-        self.reader.start()
+        self.fast_dds = fast_dds
+        super().__init__(command, {"LD_LIBRARY_PATH": str(fast_dds.libraries)})
 
-    def read(self):
-        for line in self.process.stdout:
-            self.lines.append(line.rstrip())
-
-    def wait_for(self, condition):
-        until = time.monotonic() + 2 * DEADLINE_S
-        while not condition():
-            assert time.monotonic() < until and self.process.poll() in (None, 0), self.text()
-            time.sleep(0.01)
-
-    def write(self, line=""):
-        self.process.stdin.write(line + "\n")
-        self.process.stdin.flush()
-
-    def wait(self):
+    def finish(self):
         """Waits for its end; what it wrote."""
-        assert self.process.wait(2 * DEADLINE_S) == 0, self.text()
-        self.reader.join()
+        assert self.wait() == 0, self.text()
         return self.text()
 
     def text(self):
-        return "\n".join(line[:200] for line in self.lines)
-
-    def __enter__(self):
-        return self
+        return "\n".join(line[:200] for line in super().text().splitlines())
 
     def __exit__(self, *_):
+        # it ends with its stdin
         self.process.stdin.close()
-        try:
-            self.process.wait(10)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.wait()
-        self.reader.join()
+        self.wait()
 
 
 class Client(Peer):
@@ -148,10 +120,10 @@ class Client(Peer):
 
     def __call__(self, **fields):
         name, store = make_ros_cdr.known(f"{self.type_name}_Request"), self.fast_dds.store
-        before = len(self.lines)
+        before = len(self.out)
         self.write(bytes(store.serialize_cdr(store.types[name](**fields), name)).hex())
-        self.wait_for(lambda: len(self.lines) > before)
-        word, digits = self.lines[before].split(" ", 1)
+        self.wait_for(lambda: len(self.out) > before)
+        word, digits = self.out[before].split(" ", 1)
         assert word == "answer", self.text()
         # one packet of Ethernet has no more
         self.bytes = len(digits) // 2
@@ -165,7 +137,7 @@ class Listener(Peer):
     taken = 0
 
     def next(self):
-        has_come = lambda: [line for line in self.lines if line.startswith("message ")][self.taken :]  # noqa: E731
+        has_come = lambda: [line for line in self.out if line.startswith("message ")][self.taken :]  # noqa: E731
         self.wait_for(has_come)
         line = has_come()[0]
         self.taken += 1

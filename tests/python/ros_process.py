@@ -2,68 +2,24 @@
 
 import itertools
 import json
-import os
 import signal
-import subprocess
-import threading
 import time
 
 from ros_cyclone import Peer
-
-# who has not come by then hangs
-HUNG_S = 120
+from running import Running
 
 
-class Process:
-    """A running touchup and the lines that it writes."""
+class Process(Running):
+    """A running touchup."""
 
-    def __init__(self, program, *arguments, domain, wrapper=(), folder=None):
-        command = [*wrapper, str(program), *map(str, arguments)]
-        environment = {**os.environ, "ROS_DOMAIN_ID": str(domain)}
-        pipe = subprocess.PIPE
-        self.process = subprocess.Popen(command, env=environment, cwd=folder, stdin=pipe, stdout=pipe, stderr=pipe, text=True)
-        self.out, self.told = [], []
-        self.readers = [
-            threading.Thread(target=self.read, args=(stream, lines), daemon=True)
-            for stream, lines in [(self.process.stdout, self.out), (self.process.stderr, self.told)]
-        ]
-        for reader in self.readers:
-            reader.start()
-
-    @staticmethod
-    def read(stream, lines):
-        for line in stream:
-            lines.append(line.rstrip())
-
-    def wait_for(self, condition, deadline_s=HUNG_S):
-        """Waits until it holds."""
-        until = time.monotonic() + deadline_s
-        while not condition():
-            assert self.process.poll() is None and time.monotonic() < until, self.text()
-            time.sleep(0.01)
-
-    def wait(self, deadline_s=HUNG_S):
-        """Waits for its end; returns the exit code."""
-        code = self.process.wait(deadline_s)
-        for reader in self.readers:
-            reader.join()
-        return code
+    def __init__(self, program, *arguments, domain, wrapper=(), folder=None, environment=()):
+        environment = {"ROS_DOMAIN_ID": str(domain), **dict(environment)}
+        super().__init__([*wrapper, program, *arguments], environment, folder)
 
     def end(self, number=signal.SIGINT):
         """Has it end; returns the exit code."""
         self.process.send_signal(number)
         return self.wait()
-
-    def text(self):
-        return "\n".join([*self.out, *self.told])
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        if self.process.poll() is None:
-            self.process.kill()
-        self.wait()
 
 
 class Node(Process):

@@ -44,6 +44,7 @@ from ros_cyclone import (
 )
 from ros_echo import domains
 from ros_process import Node
+from running import Running
 
 HOLE, SLOT = 1, 2
 # of ProbeResult
@@ -73,15 +74,15 @@ def free_address():
 
 @contextlib.contextmanager
 def controller():
-    """The stand-in for a controller; its address. Its clock waits for the client, who is told that this is so."""
+    """The stand-in for a controller; its address. Its clock waits for the client, who has to be told that this is so."""
     address = free_address()
-    os.environ["TOUCHUP_UR_LOCK_STEP"] = "1"
     command = [os.environ["TOUCHUP_UR_CONTROLLER"], address, "--start-mm", "20,30,60"]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout.readline() == "ready\n"
+    with Running(command) as process:
+        process.wait_for(lambda: "ready" in process.out)
         yield address
-        process.stdin.close()
-        process.wait(10)
+        # it ends with its stdin
+        process.process.stdin.close()
+        process.wait()
 
 
 def site_packages(program):
@@ -107,7 +108,8 @@ def running(robot, demo_folder, folder, program):
         path.write_text(scene)
         domain = next(domains)
         parameters = [word for parameter in ros for word in ("-p", parameter)]
-        with Node(program, folder, "--scene", path, domain=domain, ros=parameters) as node:
+        told = {"TOUCHUP_UR_LOCK_STEP": "1"}
+        with Node(program, folder, "--scene", path, domain=domain, ros=parameters, environment=told) as node:
             yield Cell(node, domain, robot)
             assert node.end() in (0, 4), node.text()
             report = node.report()

@@ -147,7 +147,7 @@ def a_long_text_is_cut_and_told(fast_dds, echo, domain, wrapper=()):
 
 def test_who_comes_late_gets_every_tile_at_default_buffers(fast_dds, domain):
     with Echo(domain, "400"), fast_dds.start("tiles", domain, 400) as peer:
-        assert "ok 400 tiles" in peer.wait()
+        assert "ok 400 tiles" in peer.finish()
 
 
 def test_parameters_are_listed_dumped_and_described(fast_dds, domain):
@@ -178,11 +178,11 @@ def test_a_long_text_is_cut_and_told(fast_dds, domain):
 def test_every_wrench_comes_back_in_its_turn(fast_dds, domain):
     with Echo(domain) as echo:
         with fast_dds.start("echo", domain, 3000) as peer:
-            peer.wait_for(lambda: "matched" in peer.lines)
+            peer.wait_for(lambda: "matched" in peer.out)
             for topic in ["/stylus/wrench", "/mismatch"]:
                 echo.wait_for(lambda topic=topic: echo.has("Matched", f'"{topic}"', "count: 1"))
             peer.write()
-            assert "ok 3000 echoes" in peer.wait()
+            assert "ok 3000 echoes" in peer.finish()
     assert echo.has("dropped [0, 0] lost [0, 0] unsent [0, 0]")
 
 
