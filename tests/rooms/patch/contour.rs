@@ -207,11 +207,15 @@ fn region_around(lattice: &Lattice, scan: &TriMesh, points: &[Point3<f64>], radi
     region
 }
 
-/// Adds what is beyond open squares that the scan crosses, a few times over.
+/// Adds what is beyond open squares that the scan crosses, until there are none: no region grows by more rounds than this.
 fn settle(lattice: &Lattice, region: &mut Region, scan: &TriMesh, tree: &FaceTree, field: Field) {
-    for _ in 0..6 {
+    for _ in 0..60 {
         let open = Cut::new(lattice, region, scan, tree).open_squares(region, &node_values(lattice, region, field));
-        open.iter().filter(|open| open.is_scanned).for_each(|open| region.insert(open.beyond, ()));
+        let beyond: Vec<Node> = open.iter().filter(|open| open.is_scanned).map(|open| open.beyond).collect();
+        if beyond.is_empty() {
+            return;
+        }
+        beyond.into_iter().for_each(|cell| region.insert(cell, ()));
     }
 }
 
