@@ -112,4 +112,22 @@ mod tests {
         assert!((990..=1000).contains(&p99) && (999..=1000).contains(&p999), "{p99} {p999}");
         assert_eq!(max, 1000);
     }
+
+    /// So many of a thousand are short that one more or less makes the quantile long.
+    #[test]
+    fn a_quantile_is_exceeded_by_its_share_and_no_more() {
+        let quantiles = |short: usize| {
+            let mut latencies = Latencies::new();
+            (0..1000).for_each(|at| latencies.record(Duration::from_micros(if at < short { 1 } else { 1000 })));
+            let Quantiles { median, p99, p999, .. } = latencies.quantiles();
+            [median, p99, p999].map(|ns| ns > 500_000)
+        };
+        assert_eq!(quantiles(1000), [false, false, false]);
+        assert_eq!(quantiles(999), [false, false, false]);
+        assert_eq!(quantiles(998), [false, false, true]);
+        assert_eq!(quantiles(990), [false, false, true]);
+        assert_eq!(quantiles(989), [false, true, true]);
+        assert_eq!(quantiles(500), [false, true, true]);
+        assert_eq!(quantiles(499), [true, true, true]);
+    }
 }

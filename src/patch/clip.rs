@@ -248,6 +248,40 @@ mod tests {
         TriMesh::new(positions, vec![[0, 1, 2], [2, 1, 3]]).unwrap()
     }
 
+    /// Each side between two pieces of a face lies on a plane of the lattice, and is a wall of both: on one square, each beyond
+    /// the other.
+    #[test]
+    fn a_wall_between_two_pieces_is_the_same_from_both() {
+        let mut rng = rand_pcg::Pcg64::seed_from_u64(5);
+        let lattice = Lattice { origin: Point3::new(0.1, 0.2, 0.3), pitch: 0.7 };
+        let mut pieces = Pieces::default();
+        let mut walls = 0;
+        for _ in 0..100 {
+            pieces.cut(&pair(&mut rng), FaceId(0), &lattice, [-1; 3], [7; 3]);
+            let mut sides = Vec::new();
+            for (cell, corners) in pieces.iter() {
+                for (at, corner) in corners.iter().enumerate() {
+                    let ends = [corner.point, corners[(at + 1) % corners.len()].point];
+                    let Some((square, beyond)) = wall(cell, corner.side) else { continue };
+                    let axis = square.axis as usize;
+                    let height = lattice.coordinate(axis, square.node[axis]);
+                    assert!(ends.iter().all(|&end| (pieces.position(end)[axis] - height).abs() < 1e-12));
+                    let across = (0..3).filter(|&i| i != axis).all(|i| square.node[i] == cell[i]);
+                    assert!(across && cell.into_iter().zip(beyond).map(|(a, b)| a.abs_diff(b)).sum::<u32>() == 1);
+                    sides.push(([ends[0].min(ends[1]), ends[0].max(ends[1])], square, [cell, beyond]));
+                }
+            }
+            for (ends, square, [cell, beyond]) in &sides {
+                let is_other = |other: &&([u32; 2], Square, [Node; 2])| other.0 == *ends && other.2 == [*beyond, *cell];
+                let others: Vec<_> = sides.iter().filter(is_other).collect();
+                assert_eq!(others.len(), 1, "{square:?} is a wall of {cell:?} alone");
+                assert_eq!(others[0].1, *square);
+            }
+            walls += sides.len();
+        }
+        assert!(walls > 1000, "{walls}");
+    }
+
     #[test]
     fn pieces_cover_a_face_each_in_its_cell_and_meet_the_neighbours() {
         let mut rng = rand_pcg::Pcg64::seed_from_u64(3);

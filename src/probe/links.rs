@@ -228,3 +228,33 @@ pub fn way(
     }
     Err(LinkError::NoWay { place_mm: (to * 1e3).coords.into(), margin_mm: tool.margin * 1e3 })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The part is what lies below z = 0.
+    fn above_a_plate(place: &Point3<f64>, reach: f64) -> f64 {
+        place.z.min(reach)
+    }
+
+    #[test]
+    fn an_entry_too_near_is_raised_until_it_is_clear() {
+        let (tool, up) = (Tool::default(), Vector3::z_axis());
+        let needed = tool.ball_radius + tool.margin;
+        for height in [-5e-3, 0.0, 1e-3, needed - 1e-6, needed + 1e-6, 20e-3] {
+            let entry = Point3::new(3e-3, -2e-3, height);
+            let clear = clear_entry(&tool, &entry, &up, &above_a_plate).unwrap();
+            let raises = ((needed - height).max(0.0) / RAISE).ceil();
+            assert!((clear - entry - up.into_inner() * (raises * RAISE)).norm() < 1e-12, "from {height}: {clear}");
+            assert!(clear.z >= needed);
+        }
+    }
+
+    #[test]
+    fn an_entry_that_is_never_clear_is_refused() {
+        let deep = Point3::new(0.0, 0.0, -1.0);
+        let refused = clear_entry(&Tool::default(), &deep, &Vector3::z_axis(), &above_a_plate);
+        assert_eq!(refused, Err(LinkError::NoWay { place_mm: [0.0, 0.0, -1e3], margin_mm: 0.5 }));
+    }
+}

@@ -49,3 +49,22 @@ pub fn torus(radius: f64, tube: f64, [around, across]: [u32; 2]) -> TriMesh {
     });
     TriMesh::new(positions.collect(), faces.collect()).unwrap()
 }
+
+/// A tube or a solid of revolution about z: `outline` in (radius, z), `sides` facets.
+pub fn revolved(outline: &[(f64, f64)], sides: u32) -> TriMesh {
+    let rows = outline.len() as u32;
+    let positions = (0..sides)
+        .flat_map(|i| {
+            let angle = TAU * f64::from(i) / f64::from(sides);
+            outline.iter().map(move |&(r, z)| Point3::new(r * angle.cos(), r * angle.sin(), z))
+        })
+        .collect();
+    let id = |i: u32, row: u32| i % sides * rows + row;
+    let faces = (0..sides).flat_map(|i| {
+        (1..rows).flat_map(move |row| {
+            let [a, b, c, d] = [id(i, row - 1), id(i + 1, row - 1), id(i + 1, row), id(i, row)];
+            [[a, b, c], [a, c, d]]
+        })
+    });
+    touchup::mesh::repair(positions, faces.collect()).unwrap().0
+}

@@ -129,3 +129,49 @@ impl Deref for Snapshot {
         &self.replica
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ros::node::edits::VertexPlace;
+
+    /// A strip of triangles between two rows of `columns` vertices.
+    fn strip(columns: u32) -> TriMesh {
+        let at = |i: u32| Point3::new(f64::from(i / 2), f64::from(i % 2), 0.0);
+        let faces = (0..2 * columns - 2).map(|i| if i % 2 == 0 { [i, i + 2, i + 1] } else { [i, i + 1, i + 2] });
+        TriMesh::new((0..2 * columns).map(at).collect(), faces.collect()).unwrap()
+    }
+
+    fn edits(vertices: &[(u32, Option<VertexPlace>)], faces: &[(u32, Option<[u32; 3]>)]) -> Edits {
+        let mut edits = Edits::default();
+        edits.vertices.extend(vertices);
+        edits.faces.extend(faces);
+        edits
+    }
+
+    #[test]
+    fn every_change_of_the_mesh_is_in_it() {
+        let scan = strip(1000);
+        let mut replica = Replica::of(&scan, "some");
+        let moved = |i: u32, step: u32| Point3::new(f64::from(i), f64::from(step), f64::from(i * step) * 0.1);
+        for step in 1..=3 {
+            let place = |i: u32| Some((moved(i, step), Support::Touched));
+            let vertices: Vec<_> = (0..2000).map(|i| (i, place(i))).collect();
+            let mut edits = edits(&vertices, &[]);
+            (edits.version, edits.is_complete) = (u64::from(step), step == 3);
+            replica.apply(&edits);
+            assert!((0..2000).all(|i| replica.vertex(i) == place(i)), "step {step}");
+            // what is not complete is no version
+            assert_eq!(replica.version, if step == 3 { 3 } else { 1 });
+        }
+        let faces: Vec<_> = scan.faces().map(|(_, corners)| corners.map(|v| v.0)).collect();
+        assert!((0..1998).all(|face| replica.face(face) == Some(faces[face as usize])));
+        assert_eq!((replica.counts(), replica.slots()), ([2000, 1998], [2000, 1998]));
+        // the first vertex goes with its face, and one comes far beyond the last
+        let new = (Point3::new(7.0, 8.0, 9.0), Support::Scan);
+        replica.apply(&edits(&[(0, None), (2500, Some(new))], &[(0, None), (2100, Some([1, 2, 2500]))]));
+        assert_eq!((replica.vertex(0), replica.vertex(2400), replica.vertex(2500)), (None, None, Some(new)));
+        assert_eq!((replica.face(0), replica.face(2050), replica.face(2100)), (None, None, Some([1, 2, 2500])));
+        assert_eq!((replica.counts(), replica.slots()), ([2000, 1998], [2501, 2101]));
+    }
+}

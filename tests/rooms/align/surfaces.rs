@@ -11,6 +11,8 @@ use touchup::compare::{sample_surface, surface_area};
 use touchup::io::mesh_file::{MeshUnit, read_mesh};
 use touchup::mesh::{Alone, FaceTree, TriMesh};
 
+use crate::shapes::revolved;
+
 fn fitted(points: &[Point3<f64>], target: &TriMesh) -> Result<IcpFit, IcpError> {
     icp(points, target, &FaceTree::new(target), &Isometry3::identity(), &IcpParams::default(), &Alone)
 }
@@ -44,25 +46,6 @@ fn square(cells: u32, edge: f64) -> TriMesh {
         [[a, a + 1, a + row], [a + 1, a + row + 1, a + row]]
     });
     TriMesh::new(positions, faces.collect()).unwrap()
-}
-
-/// A tube or a solid of revolution about z: `outline` in (radius, z), `sides` facets.
-fn revolved(outline: &[(f64, f64)], sides: u32) -> TriMesh {
-    let rows = outline.len() as u32;
-    let positions = (0..sides)
-        .flat_map(|i| {
-            let angle = TAU * f64::from(i) / f64::from(sides);
-            outline.iter().map(move |&(r, z)| Point3::new(r * angle.cos(), r * angle.sin(), z))
-        })
-        .collect();
-    let id = |i: u32, row: u32| i % sides * rows + row;
-    let faces = (0..sides).flat_map(|i| {
-        (1..rows).flat_map(move |row| {
-            let [a, b, c, d] = [id(i, row - 1), id(i + 1, row - 1), id(i + 1, row), id(i, row)];
-            [[a, b, c], [a, c, d]]
-        })
-    });
-    touchup::mesh::repair(positions, faces.collect()).unwrap().0
 }
 
 #[test]

@@ -95,6 +95,22 @@ fn uncertainties_of_the_payload_hold() {
     assert!(normalised.iter().all(|x| (0.75..1.3).contains(x)), "{normalised:?}");
 }
 
+/// Torques told exactly: the centre is as well known as the weight that pulls at it, and no better.
+#[test]
+fn the_centre_is_known_no_better_than_the_weight() {
+    let (mut square, mut shares) = (0.0, Vec::new());
+    for seed in 0..100 {
+        let poses = static_poses(12, [0.2, 1e-7], WrenchFrame::Sensor, seed);
+        let found = fit_payload(&poses, &params(WrenchFrame::Sensor)).unwrap();
+        square += (found.p_sc.value - CENTRE).component_div(&found.p_sc.sigma).norm_squared() / 3.0 / 100.0;
+        // p × w stays what it is where p shrinks as w grows
+        shares.push(found.p_sc.sigma.norm() / CENTRE.norm() / (found.weight[1] / found.weight[0]));
+    }
+    println!("normalised error {:.2}, shares of p over those of w {:.2?}", f64::sqrt(square), &shares[..5]);
+    assert!((0.75..1.3).contains(&f64::sqrt(square)), "{}", f64::sqrt(square));
+    assert!(shares.iter().all(|share| *share > 0.9), "{shares:?}");
+}
+
 /// Of 20 poses the stylus leant on something in three.
 #[test]
 fn poses_in_contact_are_left_out() {

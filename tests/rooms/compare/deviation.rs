@@ -63,6 +63,32 @@ fn compared(mesh: &TriMesh, truth: &TriMesh, params: &CompareParams) -> Comparis
     compare(shapes[0], shapes[1], Regions::Unknown, params, &Alone).unwrap()
 }
 
+/// A tetrahedron is so sharp that a place beside an edge or a corner may be behind one of its faces: it is outside all the same.
+#[test]
+fn beside_sharp_edges_and_corners_outside_is_outside() {
+    let corners = [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]];
+    let positions: Vec<_> = corners.iter().map(|&corner| Point3::from(corner) * 10e-3).collect();
+    let mesh = TriMesh::new(positions.clone(), vec![[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]).unwrap();
+    let tree = FaceTree::new(&mesh);
+    let normal = |face: usize| -Vector3::from(corners[[3, 2, 1, 0][face]]).normalize();
+    assert!(mesh.faces().enumerate().all(|(at, (face, _))| (mesh.normal(face) - normal(at)).norm() < 1e-12));
+    let mut places = Vec::new();
+    for (a, b) in (0..4).flat_map(|a| (0..a).map(move |b| (a, b))) {
+        let middle = nalgebra::center(&positions[a], &positions[b]);
+        // the two faces at that edge are those that lack one of the other corners
+        let beside: Vec<_> = (0..4).filter(|&face| [3, 2, 1, 0][face] != a && [3, 2, 1, 0][face] != b).collect();
+        for share in [0.1, 0.5, 0.9] {
+            let out = normal(beside[0]) * share + normal(beside[1]) * (1.0 - share);
+            places.push((middle + out * 1e-3, out.norm() * 1e-3));
+        }
+    }
+    places.extend(positions.iter().map(|corner| (corner * 1.1, corner.coords.norm() * 0.1)));
+    let points: Vec<_> = places.iter().map(|(place, _)| *place).collect();
+    for (found, (place, expected)) in deviations(&points, &mesh, &tree, &Alone).unwrap().iter().zip(&places) {
+        assert!((found - expected).abs() < 1e-12, "{found} and not {expected} m at {place}");
+    }
+}
+
 fn few() -> CompareParams {
     CompareParams { samples: 5_000, ..Default::default() }
 }

@@ -6,11 +6,11 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use touchup::mesh::{FaceTree, TriMesh};
-use touchup::patch::{CalibrationParams, Patched, Patcher, PatcherParams, Support};
+use touchup::patch::{CalibrationParams, Patched, Patcher, PatcherParams, Support, TouchFinder, TouchFinderParams};
 use touchup::sim::{
     PathParams, Plate, ScannerParams, SensorParams, StylusParams, Surface, Touch, plan_demo, scan, touch,
 };
-use touchup::touch::{Message, Sample, SyncParams, Synchroniser, Wrench};
+use touchup::touch::{Message, Sample, SyncParams, Synchroniser, Tip, Wrench};
 
 use crate::full::either;
 
@@ -306,7 +306,7 @@ fn knocked_places(touch: &Touch) -> Vec<Point3<f64>> {
 
 #[test]
 fn knocks_are_counted_and_do_not_dent_the_mesh() {
-    let (mut places, mut listed, mut errors) = (0, 0, [const { Vec::new() }; 3]);
+    let (mut places, mut listed, mut all, mut errors) = (0, 0, [0; 2], [const { Vec::new() }; 3]);
     for seed in 1..=either(2, 20) {
         let (scan, touch, params) = touched_plate(&StylusParams::default(), seed);
         let shaken = knocked(&touch.messages);
@@ -331,8 +331,11 @@ fn knocks_are_counted_and_do_not_dent_the_mesh() {
         listed += patchers[1].knocks().last().filter(|knock| near(knock.stamp_ns)).count();
         let [held, calm] = [1, 0].map(|i| patchers[i].knocks().held_apart);
         println!("seed {seed}: {held} contacts held apart, {calm} when calm");
-        assert!(held > 5 * calm, "{held} {calm}");
+        // of one hand that slips by itself it may be little more than three times as many
+        assert!(held > 3 * calm, "seed {seed}: {held} {calm}");
+        all = [all[0] + held, all[1] + calm];
     }
+    assert!(all[0] > 5 * all[1], "{all:?}");
     let [calm, gated, open] = errors.map(|mut errors| {
         errors.sort_by(f64::total_cmp);
         [0.5, 0.8, 0.95].map(|share| errors[(errors.len() as f64 * share) as usize])
@@ -392,4 +395,41 @@ fn a_place_moves_when_a_second_pass_insists() {
         assert!((found - moved).abs() < 0.02e-3, "{found} after {} insisted", patcher.knocks().insisted);
         assert!(patcher.knocks().insisted > 50);
     }
+}
+
+/// A ball slides over the plane z = 0, its poses come with white noise at half of the rate of the force and are interpolated: the
+/// points felt lie about the plane as far as their stated noise. With as many poses as forces that is too large by two thirds, with
+/// a third of them too small by as much.
+#[test]
+fn contacts_lie_about_the_plane_as_their_stated_noise_says() {
+    let (radius, pose_noise) = (1.5e-3, 20e-6);
+    let mut rng = Pcg64::seed_from_u64(17);
+    let calibration = Some(CalibrationParams { position: 0.0, stiffness_share: 0.0 });
+    let mut finder =
+        TouchFinder::new(TouchFinderParams { calibration, ..TouchFinderParams::new(radius, Some(20_000.0)) }).unwrap();
+    let (mut over, mut before, mut next) = (Vec::new(), Vector3::zeros(), Vector3::zeros());
+    for i in 0..60_000_i64 {
+        if i % 2 == 0 {
+            (before, next) = (next, Vector3::from_fn(|_, _| normal(&mut rng) * pose_noise));
+        }
+        let t = i as f64 / 1000.0;
+        let (force_o, noise) = (Vector3::z() * 4.0, before.lerp(&next, (i % 2) as f64 / 2.0));
+        // the stylus gives way: its pose goes on by as much
+        let centre = Vector3::new(0.02 * t.sin(), 0.02 * (0.7 * t).cos(), radius - 4.0 / 20_000.0) + noise;
+        let tip = Tip {
+            stamp_ns: 1_000_000_000 + i * 1_000_000,
+            pose_ot: Isometry3::translation(centre.x, centre.y, centre.z),
+            force_o,
+            torque_o: Vector3::zeros(),
+        };
+        finder.push(&tip, |touch| {
+            // the noise is known after some hundred samples
+            if let Some(contact) = touch.contact.filter(|_| i > 5_000) {
+                over.push(contact.point.z / contact.sigma.noise);
+            }
+        });
+    }
+    let rms = (over.iter().map(|z| z * z).sum::<f64>() / over.len() as f64).sqrt();
+    println!("rms of height over stated noise {rms:.3} of {}", over.len());
+    assert!(over.len() > 50_000 && (0.8..1.25).contains(&rms), "{rms}, {}", over.len());
 }

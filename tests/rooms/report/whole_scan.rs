@@ -114,6 +114,29 @@ fn an_even_offset_is_the_error_in_both_directions() {
     assert!(error.normal_mean_deg < 1e-6 && error.normal_p95_deg < 1e-6);
 }
 
+/// Each raised line of vertices makes two of fifty strips lean: 4 % of the area are no part of the 95th percentile, 8 % are.
+#[test]
+fn the_95th_percentile_of_the_normals_is_that_of_the_area() {
+    let (cells, edge, slope) = (50, 1e-3, 0.05f64);
+    let (truth, lean_deg) = (sheet(cells, 0.0), slope.atan().to_degrees());
+    let at = |i: u32| f64::from(i) * edge / 2.0;
+    let everywhere = (0..=2 * cells).flat_map(|i| (0..=2 * cells).map(move |j| Point3::new(at(i), at(j), 0.0)));
+    let region = TouchedRegion::of(everywhere);
+    for (raised, expected_deg) in [(vec![12], 0.0), (vec![12, 30], lean_deg)] {
+        let mut mesh = truth.clone();
+        for vertex in
+            (0..(cells + 1) * (cells + 1)).filter(|vertex| raised.contains(&(vertex % (cells + 1)))).map(VertexId)
+        {
+            mesh.set_position(vertex, mesh.position(vertex) + Vector3::z() * (slope * edge));
+        }
+        let error = TouchedError::of(&mesh, &truth, &FaceTree::new(&truth), &region).unwrap();
+        assert!((error.normal_p95_deg - expected_deg).abs() < 1e-6, "{error:?}");
+        // points of the mesh are spread at random over it
+        let mean_deg = lean_deg * 2.0 * raised.len() as f64 / f64::from(cells);
+        assert!((error.normal_mean_deg / mean_deg - 1.0).abs() < 0.1, "{error:?}");
+    }
+}
+
 /// z = 0.01 x over the truth z = 0: from mesh to part the distance at x is 0.01 x, the tilt is atan 0.01 everywhere.
 #[test]
 fn a_tilt_is_measured_where_it_was_touched() {

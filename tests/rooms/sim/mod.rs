@@ -1,5 +1,6 @@
 //! The simulation from outside: known surfaces, scanner and stylus.
 
+mod arm;
 mod scanner;
 mod stylus;
 mod surface;

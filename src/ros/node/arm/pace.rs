@@ -56,10 +56,32 @@ impl Arm for Paced<'_> {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Isometry3;
+    use nalgebra::{Isometry3, Vector3};
 
     use super::*;
     use crate::sim::{ArmParams, Plate};
+
+    /// What it is told it does, each order of it: as the arm does without a clock.
+    #[test]
+    fn every_order_reaches_the_arm() {
+        let (clock, _hand) = Clock::lock_step();
+        let (plate, params) = (Plate::default(), ArmParams::default());
+        let start = params.pose_bo * Isometry3::translation(30e-3, 25e-3, 52e-3);
+        let arm = || SimArm::new(&plate, params, &start).unwrap();
+        let (mut paced, mut free) = (Paced::new(clock, arm()), arm());
+        for order in 0..500 {
+            // one that is lost leaves the arm on a way of its own
+            let linear = Vector3::new(0.02 * f64::from(order).sin(), 0.02 * f64::from(order).cos(), 0.01);
+            let command = Command::Velocity { linear, acceleration: 2.0 };
+            paced.command(&command).unwrap();
+            free.command(&command).unwrap();
+            assert_eq!(paced.next_state().unwrap(), free.next_state().unwrap(), "order {order}");
+        }
+        let stop = Command::Stop { deceleration: 2.0 };
+        paced.command(&stop).unwrap();
+        free.command(&stop).unwrap();
+        (0..100).for_each(|_| assert_eq!(paced.next_state().unwrap(), free.next_state().unwrap()));
+    }
 
     #[test]
     fn states_come_when_they_are_due_and_late_ones_at_once_up_to_100_ms() {

@@ -1,11 +1,12 @@
-//! The simulated plate as its drawing has it, its arcs divided coarsely and finely. Sizes and places are those it is made
-//! from.
+//! The simulated plate as its drawing has it, its arcs divided coarsely and finely, and a hole of which the edge is broken.
+//! Sizes and places are those they are made from.
 
 use nalgebra::Point3;
 use touchup::features::{Feature, Kind};
 use touchup::sim::{Plate, TruthShape};
 
 use crate::features::detection::{found, of_kind};
+use crate::shapes::revolved;
 
 /// (depth, width, length or diameter) of the one feature at a place, mm.
 fn sizes(features: &[Feature], kind: Kind, at: &Point3<f64>) -> Vec<f64> {
@@ -35,5 +36,25 @@ fn everything_on_the_plate_is_found_however_finely_it_is_divided() {
             let off = measured.iter().zip(&expected).map(|(is, should)| (is - should * 1e3).abs());
             assert!(measured.len() == expected.len() && off.fold(0.0, f64::max) < 1e-3, "{}: {measured:?}", truth.name);
         }
+    }
+}
+
+/// An edge is broken by what is no countersink: the hole begins at the plane all the same, and not where its wall does.
+#[test]
+fn a_hole_with_a_broken_edge_is_as_deep_as_from_its_plane() {
+    // with a flat floor, and with the tip of a drill of 118°
+    for (broken, tip) in [0.0, 0.2e-3, 0.4e-3].into_iter().flat_map(|broken| [(broken, 0.0), (broken, 2.4e-3)]) {
+        let (r, depth, below) = (4e-3, 10e-3, -15e-3);
+        let mut outline = vec![(0.0, below), (20e-3, below), (20e-3, 0.0), (r + broken, 0.0), (r, -broken)];
+        outline.extend([(r, -depth), (0.0, -depth - tip)]);
+        outline.dedup();
+        let features = found(&revolved(&outline, 128));
+        let holes = of_kind(&features, Kind::Hole);
+        assert_eq!(holes.len(), 1, "broken by {broken}");
+        let hole = holes[0];
+        let value = |size: &Option<touchup::features::Measured<f64>>| size.as_ref().unwrap().value;
+        assert!((value(&hole.depth) - depth).abs() < 1e-6, "broken by {broken}: {:?}", hole.depth);
+        assert!((value(&hole.diameter) - 2.0 * r).abs() < 5e-6, "broken by {broken}: {:?}", hole.diameter);
+        assert!((hole.centre.value - Point3::origin()).norm() < 1e-6 && hole.through == Some(false), "{hole:?}");
     }
 }

@@ -64,6 +64,21 @@ fn ball_centres_give_what_the_touched_points_give() {
     }
 }
 
+/// A number that is twice the radius is known half as well; one of two freedoms, as their covariance has it.
+#[test]
+fn an_estimate_has_the_uncertainty_of_what_it_is_made_of() {
+    let fit = fit(&hole_near(&Isometry3::identity(), 5.0 * MM), &touched_hole(3, 40), &FitParams::default()).unwrap();
+    let known = |by: &[(Freedom, f64)]| fit.estimate(7.0, by).unwrap();
+    let (radius, diameter) = (fit.std(Freedom::Size).unwrap(), known(&[(Freedom::Size, 2.0)]));
+    assert_eq!(diameter.value, 7.0);
+    assert!(radius > 0.0 && (diameter.std / radius - 2.0).abs() < 1e-12, "{diameter:?} of {radius}");
+    let [x, size] = [Freedom::X as usize, Freedom::Size as usize];
+    let covariance = |i: usize, j: usize| fit.covariance[(i, j)];
+    let variance = covariance(x, x) + 9.0 * covariance(size, size) - 6.0 * covariance(x, size);
+    let both = known(&[(Freedom::X, 1.0), (Freedom::Size, -3.0)]);
+    assert!((both.std / variance.sqrt() - 1.0).abs() < 1e-9, "{both:?}");
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 

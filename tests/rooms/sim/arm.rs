@@ -1,0 +1,50 @@
+//! The simulated arm against the laws that it is made by.
+
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use touchup::robot::{Arm, Command};
+use touchup::sim::{ArmParams, Plate, SimArm};
+
+/// Where the top of the plate is flat for 20 mm, and how high it is, m.
+const START: [f64; 3] = [40e-3, 8e-3, 12e-3];
+
+/// An arm without noise and bias, whose ball is `height` over the top of a plate.
+fn quiet(height: f64) -> (ArmParams, Isometry3<f64>) {
+    let nothing = Vector3::zeros();
+    let params = ArmParams {
+        pose_noise: 0.0,
+        force_noise: 0.0,
+        torque_noise: 0.0,
+        force_bias: nothing,
+        torque_bias: nothing,
+        ..ArmParams::default()
+    };
+    let place = params.pose_bo * (Point3::from(START) + Vector3::z() * (params.radius + height));
+    (params, Isometry3::from_parts(place.coords.into(), UnitQuaternion::identity()))
+}
+
+/// Pressed into the top and drawn along it, the tip is pulled back by μ times what it presses with (Coulomb), and it presses with
+/// the stiffness times what it is pushed in (Hooke).
+#[test]
+fn a_ball_that_slides_is_held_back_by_friction_and_presses_by_stiffness() {
+    for friction in [0.0, 0.15, 0.4] {
+        let plate = Plate::default();
+        let (params, start) = quiet(0.1e-3);
+        let params = ArmParams { friction, ..params };
+        let mut arm = SimArm::new(&plate, params, &start).unwrap();
+        let mut go = |linear: Vector3<f64>, seconds: f64| {
+            let mut state = arm.next_state().unwrap();
+            for _ in 0..(seconds / arm.period()) as usize {
+                arm.command(&Command::Velocity { linear, acceleration: 1.0 }).unwrap();
+                state = arm.next_state().unwrap();
+            }
+            state
+        };
+        go(-Vector3::z() * 2e-3, 0.15);
+        let state = go(Vector3::x() * 5e-3, 1.0);
+        let (force, top) = (state.wrench_b.force, (params.pose_bo * Point3::from(START)).z);
+        let depth = top + params.radius - state.pose_bt.translation.z;
+        assert!(depth > 0.1e-3 && (force.z - params.stiffness * depth).abs() < 1e-6, "{depth} m, {force}");
+        let pulled = force.xy().norm() / force.z;
+        assert!((pulled - friction).abs() < 1e-3 && (friction == 0.0 || force.x < 0.0), "{friction}: {force}");
+    }
+}
