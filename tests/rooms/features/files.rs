@@ -71,9 +71,24 @@ proptest! {
         prop_assert_eq!(read, as_written(&touches));
     }
 
+    /// Whatever stands in some fields of a good line: it is a touch of finite numbers, or the line is named with what is wrong.
     #[test]
-    fn nothing_in_a_line_makes_it_panic(fields in prop::collection::vec("[-+0-9.eE,naif ]{0,9}", 17)) {
-        let _ = read(&format!("{HEADER}\n{}\n", fields.join(",")));
+    fn what_stands_in_a_line_is_a_touch_or_is_named(
+        changed in prop::collection::vec((0..17usize, "-?[0-9]{1,4}|[-+0-9.eE,naif ]{0,9}"), 1..4),
+    ) {
+        let changed: Vec<_> = changed.iter().map(|(at, text)| (*at, text.as_str())).collect();
+        match read(&format!("{HEADER}\n{}\n", line(&changed))) {
+            Ok(touches) => {
+                let [touch] = touches.as_slice() else { panic!("{touches:?}") };
+                let places = [touch.centre.coords, touch.point.coords, touch.normal];
+                prop_assert!(places.iter().flatten().all(|x| x.is_finite()), "{touch:?}");
+                prop_assert!((touch.normal.norm() - 1.0).abs() < 1e-15, "{touch:?}");
+                let sizes = [touch.radius, touch.sigma, touch.calibration, touch.weight];
+                prop_assert!(sizes.iter().all(|x| x.is_finite() && *x >= 0.0), "{touch:?}");
+            }
+            Err(TouchesFileError::BadLine { line, what, .. }) => prop_assert!(line == 2 && !what.is_empty(), "{what}"),
+            Err(error) => prop_assert!(false, "{error}"),
+        }
     }
 }
 

@@ -1,0 +1,78 @@
+#!/usr/bin/env python3
+"""Runs a command on a machine that is made busy: its tests have to give the same count.
+
+    tests/beside.py [--busy N] [--stops] COMMAND...
+
+--busy N: beside so many endless loops of ordinary priority. --stops: all processes of the command stand still for 200 ms every few
+seconds (SIGSTOP, SIGCONT), as on a machine whose host has something else to do. Ends with the exit code of the command.
+"""
+
+import argparse
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+STOPPED_S = 0.2
+# between two stops, s
+GOING_S = (1, 8)
+
+
+def processes_of(session):
+    """Those of a session that run: one that a test has stopped stays as it is."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            # state and session come after the name, which may have spaces
+            state, _, _, its_session = path.read_text().rpartition(")")[2].split()[:4]
+        except OSError:
+            continue
+        if int(its_session) == session and state not in "TtZ":
+            found.append(int(path.parent.name))
+    return found
+
+
+def signal_all(processes, number):
+    for process in processes:
+        try:
+            os.kill(process, number)
+        except ProcessLookupError:
+            pass
+
+
+def main():
+    parser = argparse.ArgumentParser(usage=__doc__)
+    parser.add_argument("--busy", type=int, default=0)
+    parser.add_argument("--stops", action="store_true")
+    parser.add_argument("command", nargs=argparse.REMAINDER)
+    told = parser.parse_args()
+    if not told.command:
+        parser.error("no command")
+    process = subprocess.Popen(told.command, start_new_session=True)
+    loops = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(told.busy)]
+    rng, stops = random.Random(1), 0
+    try:
+        while process.poll() is None:
+            try:
+                process.wait(rng.uniform(*GOING_S))
+            except subprocess.TimeoutExpired:
+                if told.stops:
+                    stopped = processes_of(process.pid)
+                    signal_all(stopped, signal.SIGSTOP)
+                    time.sleep(STOPPED_S)
+                    signal_all(stopped, signal.SIGCONT)
+                    stops += 1
+    finally:
+        # those of the command that are left where this was interrupted
+        signal_all(processes_of(process.pid), signal.SIGTERM)
+        for loop in loops:
+            loop.kill()
+    print(f"beside {told.busy} busy loops, stopped {stops} times: exit code {process.returncode}", file=sys.stderr)
+    sys.exit(process.returncode)
+
+
+if __name__ == "__main__":
+    main()
