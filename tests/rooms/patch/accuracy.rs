@@ -291,10 +291,13 @@ fn other_tips_hands_and_friction() {
             worst = [0, 1].map(|i| worst[i].max(errors[i]));
             let rims = Rims::of(&case);
             println!("{name:14} {:6.3} {:6.3} {rims:?}", errors[0], errors[1]);
-            // a cone gets through no hole, and leaves the slot open, whose floor it does not reach
-            let is_cone = name.starts_with("cone");
-            let opened = if is_cone { "slot" } else { "through-hole" };
-            assert!(rims.openings.keys().eq(&[opened]), "{name}: {rims:?}");
+            // a cone gets through no hole, and may leave the slot open, whose floor it does not reach
+            let is_right = if name.starts_with("cone") {
+                rims.openings.keys().all(|opened| *opened == "slot")
+            } else {
+                rims.openings.keys().eq(&["through-hole"])
+            };
+            assert!(is_right, "{name}: {rims:?}");
             // a rim has teeth where the hand turned back on a wall sooner or later: it is no more than half longer than without
             assert!(rims.openings.values().all(|[is, most]| *is <= 1.5 * most), "{name}: {rims:?}");
             assert!(rims.elsewhere < CELL_RIM, "{name}: {rims:?}");

@@ -161,6 +161,8 @@ fn check_position(h_min: f64, f_max: f64, alpha: f64, share: f64, u: f64, dt: f6
     if !(h.is_finite() && h_min.is_normal() && force > 0.0 && force < f_max) {
         return Shown::Little;
     }
+    // below the smallest normal number a force has few digits, and another share than was drawn
+    let share = force / f_max;
     let Ok(after) = dynamics(model, alpha, 0.0).step(&UP, &Point3::new(0.0, 0.0, h), &(Vector3::z() * force), dt)
     else {
         let products: [&[f64]; 3] = [&[alpha, f_max, dt], &[alpha, f_max, dt, 1e28, h_min.recip()], &[f_max, dt]];
@@ -522,4 +524,6 @@ fn the_worst_positions_of_eq_6() {
             }
         }
     }
+    // of a force with three digits
+    check_position(1.82e-140, 1.8e-321, 1.088e287, 0.9, 0.0, 1.0);
 }
