@@ -115,8 +115,7 @@ python_tests() {
     export TOUCHUP_UR_BIN=$target/debug/touchup TOUCHUP_UR_CONTROLLER=$target/debug/examples/ur_controller
   fi
   local status summary line passed_here
-  # two files at a time: most of them wait for processes
-  "$venv/bin/python" -m pytest tests/python -n 2 --dist loadfile --no-loadscope-reorder -rs --tb=short --no-header -o "cache_dir=$logs/pytest_cache" --durations=20 \
+  "$venv/bin/python" -m pytest tests/python -rs --tb=short --no-header -o "cache_dir=$logs/pytest_cache" --durations=20 \
     --junitxml="$logs/python.xml" 2>&1 | tee "$logs/python.log"
   status=${PIPESTATUS[0]}
   summary=$(counted_by_pytest "$logs/python.xml") || { fail "pytest ended with $status, see $logs/python.log"; return; }

@@ -13,7 +13,6 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 IS_FULL = bool(os.environ.get("TOUCHUP_FULL"))
-LONGEST = ["test_ros_arm.py", "test_ros_node.py", "test_ros_rviz.py", "test_ros_network.py"]
 collect_ignore = [] if IS_FULL else ["test_ros_rviz.py", "test_ros_fastdds_network.py", "test_ros_network.py"]
 
 
@@ -22,8 +21,6 @@ def pytest_configure(config):
 
 
 def pytest_collection_modifyitems(config, items):
-    # the longest files first, so that none is left for the end
-    items.sort(key=lambda item: LONGEST.index(item.path.name) if item.path.name in LONGEST else len(LONGEST))
     if IS_FULL:
         return
     slow = [item for item in items if item.get_closest_marker("full")]

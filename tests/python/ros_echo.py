@@ -10,10 +10,7 @@ from running import Running
 # a domain of its own for each test, whose ports the system hands to nobody else (DDS gives each domain 250 from 7400 on; Linux
 # takes those of connections from 32768 to 60999); those of users are low
 FREE = [*range(60, 102), *range(215, 233)]
-# who runs tests side by side takes turns; another run on the machine begins elsewhere, most likely
-WORKER, WORKERS = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:]), int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
-BEGIN = os.getppid() if WORKERS > 1 else os.getpid()
-domains = (FREE[(WORKERS * number + WORKER) % len(FREE)] for number in itertools.count(BEGIN))
+domains = (FREE[(os.getpid() + number) % len(FREE)] for number in itertools.count())
 
 
 def echo_binary():
