@@ -40,7 +40,7 @@ while IFS='|' read -r test heading; do
   printf '\n## %s\n\n`%s`\n\n```text\n%s\n```\n' "$heading" "$test" "$text"
 done <<'PROOFS'
 features::touched::what_was_touched_is_found_and_as_good_as_it_says|Features of the touched plate, fifty seeds
-patch::accuracy::other_tips_hands_and_friction|Other tips, hands and friction, five seeds of each
+patch::accuracy::other_tips_hands_and_friction|Other tips, hands and friction, twenty seeds
 patch::uncertainty::what_was_touched_is_as_well_known_as_it_says_where_errors_are_as_the_model_has_them|Stated uncertainty where errors are as the model has them
 patch::uncertainty::what_the_model_does_not_know_is_not_in_what_it_says|Stated uncertainty where errors are others
 patch::tips::a_tip_says_where_it_touched|Where a tip touched

@@ -267,7 +267,7 @@ fn the_same_samples_make_the_same_mesh() {
 
 #[test]
 fn other_tips_hands_and_friction() {
-    let seeds = either(1, 5);
+    let seeds = either(1, 20);
     let styli = [
         ("1.5 mm", StylusParams::default()),
         ("1 mm", StylusParams { radius: 1e-3, ..StylusParams::default() }),
@@ -284,27 +284,24 @@ fn other_tips_hands_and_friction() {
     ];
     println!("mean distances, mm, from the part to the mesh and back; rims, m");
     for &(name, ref stylus) in &styli[..either(4, styli.len())] {
-        let mut astray = 0;
+        let mut worst = [0.0f64; 2];
         for seed in 1..=seeds {
             let case = case(stylus, seed);
             let errors = case.errors(&case.patched.mesh);
+            worst = [0, 1].map(|i| worst[i].max(errors[i]));
             let rims = Rims::of(&case);
             println!("{name:14} {:6.3} {:6.3} {rims:?}", errors[0], errors[1]);
-            // a cone gets through no hole and not to the floor of the slot: it may leave either open, or closed as in the scan
+            // a cone gets through no hole, and leaves the slot open, whose floor it does not reach
             let is_cone = name.starts_with("cone");
-            let is_opened = if is_cone {
-                rims.openings.keys().all(|opened| ["slot", "through-hole"].contains(opened))
-            } else {
-                rims.openings.keys().eq(&["through-hole"])
-            };
-            // a rim has teeth where the hand turned back on a wall sooner or later, that of a cone also between its walls
-            let teeth = if is_cone { 2.0 } else { 1.5 };
-            let is_short = rims.openings.values().all(|[is, most]| *is <= teeth * most) && rims.elsewhere < CELL_RIM;
-            let back = if name == "1 mm" { 0.1 } else { 0.05 };
-            astray += u64::from(!(is_opened && is_short && errors[0] < 0.04 && errors[1] < back));
+            let opened = if is_cone { "slot" } else { "through-hole" };
+            assert!(rims.openings.keys().eq(&[opened]), "{name}: {rims:?}");
+            // the lines of the hand are as far apart as this ball is wide: its rim has teeth, and is half longer than it may be;
+            // that of a cone goes up and down its walls
+            let teeth = if name == "1 mm" || is_cone { 1.5 } else { 1.0 };
+            assert!(rims.openings.values().all(|[is, most]| *is <= teeth * most), "{name}: {rims:?}");
+            assert!(rims.elsewhere < CELL_RIM, "{name}: {rims:?}");
         }
-        // a flat end that leans so far touches with its edge alone: once it left a floor open, and both errors were twice as large
-        let allowed = u64::from(name == "flat, tilt 15°");
-        assert!(astray <= allowed, "{name}: {astray} of {seeds}");
+        let back = if name == "1 mm" { 0.1 } else { 0.05 };
+        assert!(worst[0] < 0.04 && worst[1] < back, "{name}: {worst:?}");
     }
 }

@@ -306,7 +306,7 @@ fn knocked_places(touch: &Touch) -> Vec<Point3<f64>> {
 
 #[test]
 fn knocks_are_counted_and_do_not_dent_the_mesh() {
-    let (mut places, mut listed, mut all, mut errors) = (0, 0, [0; 2], [const { Vec::new() }; 3]);
+    let (mut places, mut listed, mut errors) = (0, 0, [const { Vec::new() }; 3]);
     for seed in 1..=either(2, 20) {
         let (scan, touch, params) = touched_plate(&StylusParams::default(), seed);
         let shaken = knocked(&touch.messages);
@@ -331,11 +331,8 @@ fn knocks_are_counted_and_do_not_dent_the_mesh() {
         listed += patchers[1].knocks().last().filter(|knock| near(knock.stamp_ns)).count();
         let [held, calm] = [1, 0].map(|i| patchers[i].knocks().held_apart);
         println!("seed {seed}: {held} contacts held apart, {calm} when calm");
-        // of one hand that slips by itself it may be little more than three times as many
-        assert!(held > 3 * calm, "seed {seed}: {held} {calm}");
-        all = [all[0] + held, all[1] + calm];
+        assert!(held > 5 * calm, "{held} {calm}");
     }
-    assert!(all[0] > 5 * all[1], "{all:?}");
     let [calm, gated, open] = errors.map(|mut errors| {
         errors.sort_by(f64::total_cmp);
         [0.5, 0.8, 0.95].map(|share| errors[(errors.len() as f64 * share) as usize])
@@ -398,8 +395,7 @@ fn a_place_moves_when_a_second_pass_insists() {
 }
 
 /// A ball slides over the plane z = 0, its poses come with white noise at half of the rate of the force and are interpolated: the
-/// points felt lie about the plane as far as their stated noise. With as many poses as forces that is too large by two thirds, with
-/// a third of them too small by as much.
+/// points felt lie about the plane as far as their stated noise. Of other rates this says nothing.
 #[test]
 fn contacts_lie_about_the_plane_as_their_stated_noise_says() {
     let (radius, pose_noise) = (1.5e-3, 20e-6);
