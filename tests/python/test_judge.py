@@ -292,18 +292,32 @@ def test_nothing_intersects_itself(judged, moved, case):
 
 @pytest.mark.full
 def test_the_quick_judge_says_what_the_judge_says(judge, judged):
-    """libigl in place of open3d: every distance, share and count."""
+    """libigl in place of open3d: every distance, share and count, and the face that a normal is taken of.
+
+    Where a place is as near to two faces, as beside an edge, either of them is right, and angles between normals are as far apart
+    as those faces are: so it is looked whether the faces that they name are the nearest, not which one of those it is.
+    """
     folder, mesh = str(judged["plate"].folder), str(judged["plate"].mesh)
-    quick = loaded(ON_LIBIGL, judge.parent).judge(folder, mesh)
+    whole, quick = loaded(judge.parent), loaded(ON_LIBIGL, judge.parent)
+    verdict = quick.judge(folder, mesh)
     for part in ("touched", "missing", "holes", "damage"):
-        for ours, theirs in zip(numbers(quick[part]), numbers(judged["plate"].refined[part]), strict=True):
+        for ours, theirs in zip(numbers(verdict[part]), numbers(judged["plate"].refined[part]), strict=True):
             assert ours == pytest.approx(theirs, rel=1e-3, abs=SAME_MM), part
+
+    truth, refined = (trimesh.load(path, process=False) for path in (judged["plate"].folder / "truth.ply", mesh))
+    places = whole.sample(truth.vertices, truth.faces, 120_000, 1)[0]
+    named = [module.closest(module.scene_of(refined.vertices, refined.faces), places) for module in (whole, quick)]
+    assert (named[0][1] == named[1][1]).mean() > 0.9
+    nearest = np.linalg.norm(named[1][0] - places, axis=1)
+    for _, faces in named:
+        points = trimesh.triangles.closest_point(refined.triangles[faces], places)
+        assert np.abs(np.linalg.norm(points - places, axis=1) - nearest).max() < SAME_MM
 
 
 def numbers(verdict):
-    """All numbers of a verdict, in order."""
+    """All numbers of a verdict but angles, in order."""
     if isinstance(verdict, dict):
-        verdict = list(verdict.values())
+        verdict = [value for name, value in verdict.items() if name != "normal_deg"]
     if isinstance(verdict, list):
         return [number for value in verdict for number in numbers(value)]
     return [verdict] if isinstance(verdict, (int, float)) else []
