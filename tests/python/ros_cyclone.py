@@ -532,6 +532,21 @@ class TriggerResponse:
     message: str
 
 
+@message("std_srvs/srv/SetBool_Request")
+class SetBoolRequest:
+    guid: uint64
+    seq: int64
+    data: bool
+
+
+@message("std_srvs/srv/SetBool_Response")
+class SetBoolResponse:
+    guid: uint64
+    seq: int64
+    success: bool
+    message: str
+
+
 @message("touchup_msgs/action/Probe_SendGoal_Request")
 class SendGoalRequest:
     guid: uint64

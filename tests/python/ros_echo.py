@@ -1,16 +1,10 @@
 """The example ros_echo as a process: a node whose other end tests play."""
 
-import itertools
 import os
 
 import pytest
 from conftest import ROOT
 from running import Running
-
-# a domain of its own for each test, whose ports the system hands to nobody else (DDS gives each domain 250 from 7400 on; Linux
-# takes those of connections from 32768 to 60999); those of users are low
-FREE = [*range(60, 102), *range(215, 233)]
-domains = (FREE[(os.getpid() + number) % len(FREE)] for number in itertools.count())
 
 
 def echo_binary():

@@ -39,9 +39,9 @@ class Node(Process):
 class Client:
     """A caller of one service of a node, which has `service_mapping:=cyclone`."""
 
-    def __init__(self, node, domain, name, request, response):
+    def __init__(self, node, domain, name, request, response, peer=None):
         self.node, self.request, self.numbers = node, request, itertools.count(1)
-        self.peer = Peer(domain)
+        self.peer = peer or Peer(domain)
         self.writer, self.reader = self.peer.client(f"/touchup/{name}", request, response)
 
     def introduce(self, *harmless):
@@ -66,7 +66,7 @@ class Client:
             answers.extend(answer for answer in self.reader.take(10) if answer.seq == number)
             return answers
 
-        self.node.wait_for(is_answered)
+        self.node.wait_for(is_answered, every_s=0.0005)
         return answers[0]
 
 

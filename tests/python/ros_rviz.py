@@ -299,7 +299,7 @@ def projected(view, size, points):
 def main(out):
     """Plays the recording of the demo to a node, and takes RViz's picture of what the node shows."""
     import open3d
-    from ros_echo import domains
+    from ros_domains import domains
     from ros_shown import show
 
     touchup = ROOT / "target/release/touchup"

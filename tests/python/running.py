@@ -44,12 +44,12 @@ class Running:
         self.process.stdin.write(line + "\n")
         self.process.stdin.flush()
 
-    def wait_for(self, condition, deadline_s=DEADLINE_S):
+    def wait_for(self, condition, deadline_s=DEADLINE_S, every_s=0.01):
         """Waits until it holds."""
         until = time.monotonic() + deadline_s
         while not condition():
             assert self.process.poll() in (None, *self.may_end_with) and time.monotonic() < until, self.text()
-            time.sleep(0.01)
+            time.sleep(every_s)
 
     def wait(self, deadline_s=DEADLINE_S):
         """Waits for its end; returns the exit code."""

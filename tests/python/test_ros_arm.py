@@ -42,7 +42,7 @@ from ros_cyclone import (
     TriggerRequest,
     TriggerResponse,
 )
-from ros_echo import domains
+from ros_domains import domains
 from ros_process import Node
 from running import Running
 

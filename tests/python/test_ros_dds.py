@@ -54,7 +54,8 @@ from ros_cyclone import (
     WrenchStamped,
     parameter_value,
 )
-from ros_echo import Echo, domains
+from ros_domains import domains
+from ros_echo import Echo
 from ros_tables import code, table
 
 CALLER = 0x1122334455667788

@@ -4,7 +4,8 @@ import subprocess
 
 import numpy
 import pytest
-from ros_echo import Echo, domains
+from ros_domains import domains
+from ros_echo import Echo
 from ros_fastdds import FastDds
 from ros_tables import code, table
 

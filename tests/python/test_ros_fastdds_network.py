@@ -4,7 +4,8 @@ A heavy proof: tests/all.sh --full runs it, without that it is not collected (co
 """
 
 import pytest
-from ros_echo import Echo, domains
+from ros_domains import domains
+from ros_echo import Echo
 from ros_network import Hub
 from test_ros_fastdds import (
     a_long_text_is_cut_and_told,

@@ -5,7 +5,7 @@ import sys
 import time
 from pathlib import Path
 
-from ros_echo import domains
+from ros_domains import domains
 from ros_network import Hub
 from ros_process import Node, Process
 from test_ros_node import scene_for, stamps

@@ -24,8 +24,9 @@ from ros_cyclone import (
     UndoRequest,
     UndoResponse,
 )
-from ros_echo import domains
-from ros_process import Client, Node, Process, play
+from ros_domains import domains
+from ros_player import in_step, play_in_step
+from ros_process import Client, Node, Process
 from scipy.spatial import KDTree
 
 
@@ -62,36 +63,38 @@ def stamps(recording, topic):
     return found
 
 
+CYCLONE = ["-p", "service_mapping:=cyclone"]
+
+
 def test_a_played_recording_gives_the_files_of_refine(demo_folder, tmp_path, touchup_bin, domain):
-    with Node(touchup_bin, tmp_path, "--scene", scene_for(demo_folder, tmp_path), domain=domain) as node:
-        played = play(touchup_bin, demo_folder / "touch.mcap", domain=domain)
+    recording = demo_folder / "touch.mcap"
+    with Node(touchup_bin, tmp_path, "--scene", scene_for(demo_folder, tmp_path), domain=domain, ros=CYCLONE) as node:
+        play_in_step(node, recording, domain)
         assert node.end() == 0, node.text()
         report = node.report()
-    assert played["wrenches"] == len(stamps(demo_folder / "touch.mcap", "/stylus/wrench")) and played["unsent"] == 0
     assert report["lost"] == report["dropped"] == [0, 0] and report["unrecorded"] == 0
     for name in ["refined.ply", "features.json", "touches.csv"]:
         assert (node.session / name).read_bytes() == (demo_folder / name).read_bytes(), name
-    assert stamps(node.session / "recording", "/stylus/pose") == sorted(stamps(demo_folder / "touch.mcap", "/stylus/pose"))
+    assert stamps(node.session / "recording", "/stylus/pose") == sorted(stamps(recording, "/stylus/pose"))
 
 
 def test_a_killed_node_leaves_all_that_was_on_the_disk(demo_folder, tmp_path, touchup, touchup_bin, domain):
     """In the midst of a stroke, by kill -9. How soon it is on the disk is tested where a test moves the clock."""
-    with Node(touchup_bin, tmp_path, "--scene", scene_for(demo_folder, tmp_path), domain=domain) as node:
+    recording = demo_folder / "touch.mcap"
+    with Node(touchup_bin, tmp_path, "--scene", scene_for(demo_folder, tmp_path), domain=domain, ros=CYCLONE) as node:
         reader = Peer(domain).reader("/mismatch", HapticMismatch, BEST_EFFORT)
         heard = []
-        with Process(touchup_bin, "replay", demo_folder / "touch.mcap", domain=domain):
-
-            def is_in_a_stroke():
-                heard.extend(message for message in reader.take(1000))
-                touching = [message.contact_case != 0 for message in heard[-200:]]
-                return len(heard) > 4000 and all(touching)
-
-            node.wait_for(is_in_a_stroke)
-            on_disk = stamps(node.session / "recording", "/stylus/wrench")
-            node.process.send_signal(signal.SIGKILL)
-            node.wait()
+        for _ in in_step(node, recording, domain):
+            heard.extend(reader.take(1000))
+            touching = [message.contact_case != 0 for message in heard[-200:]]
+            if len(heard) > 4000 and all(touching):
+                on_disk = stamps(node.session / "recording", "/stylus/wrench")
+                if len(on_disk) > 1000:
+                    break
+        node.process.send_signal(signal.SIGKILL)
+        node.wait()
     taken = stamps(node.session / "recording", "/stylus/wrench")
-    assert len(on_disk) > 1000 and taken[: len(on_disk)] == on_disk
+    assert taken[: len(on_disk)] == on_disk
     resumed, again = tmp_path / "resumed.ply", tmp_path / "again.ply"
     done = touchup("refine", "--resume", node.session, "--out", resumed)
     assert done.returncode in (0, 4), done.stderr
@@ -100,16 +103,16 @@ def test_a_killed_node_leaves_all_that_was_on_the_disk(demo_folder, tmp_path, to
     assert done.returncode in (0, 4), done.stderr
     assert resumed.read_bytes() == again.read_bytes()
     # and it is all that was played up to there
-    assert taken == sorted(stamps(demo_folder / "touch.mcap", "/stylus/wrench"))[: len(taken)]
+    assert taken == sorted(stamps(recording, "/stylus/wrench"))[: len(taken)]
 
 
 def test_a_stroke_is_taken_back_while_it_runs(demo_folder, tmp_path, touchup, touchup_bin, domain):
     scene = scene_for(demo_folder, tmp_path)
-    with Node(touchup_bin, tmp_path, "--scene", scene, domain=domain, ros=["-p", "service_mapping:=cyclone"]) as node:
+    with Node(touchup_bin, tmp_path, "--scene", scene, domain=domain, ros=CYCLONE) as node:
         undo = Client(node, domain, "undo", UndoRequest, UndoResponse)
         # nothing was touched yet
         assert not undo.introduce(1).success
-        play(touchup_bin, demo_folder / "touch.mcap", "--speed", 4, domain=domain)
+        play_in_step(node, demo_folder / "touch.mcap", domain)
         undone = undo.ask(1)
         assert undone.success, undone.message
         assert node.end(signal.SIGTERM) in (0, 4), node.text()
@@ -121,10 +124,10 @@ def test_a_stroke_is_taken_back_while_it_runs(demo_folder, tmp_path, touchup, to
 
 def test_who_comes_late_sees_what_is_saved(demo_folder, tmp_path, touchup_bin, domain):
     scene = scene_for(demo_folder, tmp_path)
-    with Node(touchup_bin, tmp_path, "--scene", scene, domain=domain, ros=["-p", "service_mapping:=cyclone"]) as node:
+    with Node(touchup_bin, tmp_path, "--scene", scene, domain=domain, ros=CYCLONE) as node:
         save = Client(node, domain, "save_mesh", SaveMeshRequest, SaveMeshResponse)
         assert not save.introduce("../nowhere.ply", False, False).success
-        play(touchup_bin, demo_folder / "touch.mcap", "--speed", 4, domain=domain)
+        play_in_step(node, demo_folder / "touch.mcap", domain)
         reader = Peer(domain).reader("/mesh", Marker, LATCHED)
         answer = save.ask("now.ply", False, False)
         assert answer.success, answer.message
@@ -154,15 +157,18 @@ def test_a_full_disk_is_told_and_the_recording_goes_on_when_there_is_room(demo_f
     try:
         scene = scene_for(demo_folder, tmp_path)
         with Node(touchup_bin, disk, "--scene", scene, domain=domain) as node:
-            with Process(touchup_bin, "replay", demo_folder / "touch.mcap", "--speed", 4, domain=domain) as player:
+            recording = demo_folder / "touch.mcap"
+            with Process(touchup_bin, "replay", recording, "--json", "--speed", 4, domain=domain) as player:
                 node.wait_for(lambda: "does not record, make room on the disk" in node.text())
                 subprocess.run(["mount", "-o", "remount,size=64m", disk], check=True)
                 assert player.wait() == 0, player.text()
+            replayed = json.loads(player.out[-1])
             code = node.end()
         assert code == 1 and "are not in the session's recording" in node.told[-1], node.text()
         report = json.loads((node.session / "report.json").read_text())
         taken = stamps(node.session / "recording", "/stylus/wrench") + stamps(node.session / "recording", "/stylus/pose")
-        played = [stamp for topic in ["wrench", "pose"] for stamp in stamps(demo_folder / "touch.mcap", f"/stylus/{topic}")]
+        played = [stamp for topic in ["wrench", "pose"] for stamp in stamps(recording, f"/stylus/{topic}")]
+        assert replayed["wrenches"] + replayed["poses"] == len(played) and replayed["unsent"] == 0
         came = len(played) - sum(report["lost"]) - report["dropped"][0]
         assert report["unrecorded"] > 0 and len(taken) + report["unrecorded"] == came
         assert max(taken) == max(played)

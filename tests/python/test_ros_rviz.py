@@ -11,7 +11,7 @@ import ros_rviz
 import trimesh
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
-from ros_echo import domains
+from ros_domains import domains
 from ros_rviz import Desk, config, projected, rays
 from ros_shown import show
 
