@@ -1,6 +1,8 @@
 //! How well the patched mesh says it is known, against the part that the simulator knows: where the errors are those of its
 //! model, which shows that it is consistent, and where they are not, which shows what it does not know; knocks, and places that move.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{Isometry3, Point3, Vector3};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -10,7 +12,7 @@ use touchup::patch::{CalibrationParams, Patched, Patcher, PatcherParams, Support
 use touchup::sim::{
     PathParams, Plate, ScannerParams, SensorParams, StylusParams, Surface, Touch, plan_demo, scan, touch,
 };
-use touchup::touch::{Message, Sample, SyncParams, Synchroniser, Tip, Wrench};
+use touchup::touch::{Message, ProbedPoint, Sample, SyncParams, Synchroniser, Tip, Wrench};
 
 use crate::full::either;
 
@@ -329,9 +331,23 @@ fn knocks_are_counted_and_do_not_dent_the_mesh() {
         };
         places += hit.len();
         listed += patchers[1].knocks().last().filter(|knock| near(knock.stamp_ns)).count();
-        let [held, calm] = [1, 0].map(|i| patchers[i].knocks().held_apart);
-        println!("seed {seed}: {held} contacts held apart, {calm} when calm");
-        assert!(held > 5 * calm, "{held} {calm}");
+        // of the same hand where it was knocked and where it was not, calm and shaken
+        let [[calm, calm_elsewhere], [held, held_elsewhere]] = [0, 1].map(|i| {
+            let apart = || patchers[i].probed().iter().filter(|touch| touch.is_held_apart);
+            let at_knocks = apart().filter(|touch| near(touch.stamp_ns)).count();
+            [at_knocks, apart().count() - at_knocks]
+        });
+        let second =
+            |touch: &ProbedPoint| (touch.stamp_ns - SensorParams::default().start_ns + PERIOD_NS / 2) / PERIOD_NS;
+        let apart = patchers[1].probed().iter().filter(|touch| touch.is_held_apart && near(touch.stamp_ns));
+        let noticed = apart.map(second).collect::<BTreeSet<i64>>().len();
+        let touches = patchers[1].probed().len();
+        println!(
+            "seed {seed}: {held} of {touches} touches held apart at {noticed} knocks, {calm} there when calm; elsewhere \
+             {held_elsewhere}, when calm {calm_elsewhere}"
+        );
+        assert!(held > 5 * calm && noticed >= hit.len(), "seed {seed}: {held} {calm}, {noticed} of {}", hit.len());
+        assert!(500 * calm_elsewhere.max(held_elsewhere) < touches, "seed {seed}: {calm_elsewhere} {held_elsewhere}");
     }
     let [calm, gated, open] = errors.map(|mut errors| {
         errors.sort_by(f64::total_cmp);
