@@ -265,11 +265,6 @@ fn the_same_samples_make_the_same_mesh() {
     assert!(a.faces().eq(b.faces()));
 }
 
-/// Recordings that go astray today, by stylus and seed: a flat end that leans by 15° touches with its rim, and which place of the
-/// rim that is the force alone says. One leaves the blind hole open that it touched, one makes half a millimetre of skin where the
-/// part has none, one is 0.001 mm worse than it may be.
-const ASTRAY: [(&str, u64); 3] = [("flat, tilt 15°", 3), ("flat, tilt 15°", 6), ("flat, tilt 15°", 12)];
-
 #[test]
 fn other_tips_hands_and_friction() {
     let seeds = either(1, 20);
@@ -287,41 +282,26 @@ fn other_tips_hands_and_friction() {
         ("flat, upright", StylusParams { shape: FLAT, tilt: 0.0, ..StylusParams::default() }),
         ("flat, tilt 15°", StylusParams { shape: FLAT, tilt: 15f64.to_radians(), ..StylusParams::default() }),
     ];
-    let styli = &styli[..either(4, styli.len())];
-    println!(
-        "mean distances, mm, from the part to the mesh and back; rims at openings and the most that they may have, m"
-    );
-    let mut astray = Vec::new();
-    for &(name, ref stylus) in styli {
-        let (is_cone, is_small) = (name.starts_with("cone"), name == "1 mm");
+    println!("mean distances, mm, from the part to the mesh and back; rims, m");
+    for &(name, ref stylus) in &styli[..either(4, styli.len())] {
+        let mut worst = [0.0f64; 2];
         for seed in 1..=seeds {
             let case = case(stylus, seed);
-            let [forth, back] = case.errors(&case.patched.mesh);
+            let errors = case.errors(&case.patched.mesh);
+            worst = [0, 1].map(|i| worst[i].max(errors[i]));
             let rims = Rims::of(&case);
-            // a cone gets through no hole and to no floor: it opens those that it sinks into far enough, of seed 1 the slot
-            let is_open = match (is_cone, seed) {
-                (false, _) => rims.openings.keys().eq(&["through-hole"]),
-                (true, 1) => rims.openings.keys().eq(&["slot"]),
-                (true, _) => true,
-            };
-            // of seed 1 the lines of the hand are as far apart as the small ball is wide: its rim has teeth; that of the cone goes up
-            // and down its walls. Other hands leave out places of a wall, and each has a rim of its own: together no longer than
-            // that of the opening
-            let most = match seed {
-                1 if is_small || is_cone => 1.5,
-                1 => 1.0,
-                _ => 2.0,
-            };
-            let is_bounded = rims.openings.values().all(|[is, opening]| *is <= most * opening);
-            let is_right = forth < 0.04 && back < if is_small { 0.1 } else { 0.05 };
-            let is_all = is_open && is_bounded && rims.elsewhere < CELL_RIM && is_right;
-            let remark = if is_all { "" } else { "astray" };
-            println!("{name:14} {seed:2} {forth:6.3} {back:6.3} {:.4?} {:.4} {remark}", rims.openings, rims.elsewhere);
-            if !is_all {
-                astray.push((name, seed));
-            }
+            println!("{name:14} {:6.3} {:6.3} {rims:?}", errors[0], errors[1]);
+            // a cone gets through no hole, and leaves the slot open, whose floor it does not reach
+            let is_cone = name.starts_with("cone");
+            let opened = if is_cone { "slot" } else { "through-hole" };
+            assert!(rims.openings.keys().eq(&[opened]), "{name}: {rims:?}");
+            // the lines of the hand are as far apart as this ball is wide: its rim has teeth, and is half longer than it may be;
+            // that of a cone goes up and down its walls
+            let teeth = if name == "1 mm" || is_cone { 1.5 } else { 1.0 };
+            assert!(rims.openings.values().all(|[is, most]| *is <= teeth * most), "{name}: {rims:?}");
+            assert!(rims.elsewhere < CELL_RIM, "{name}: {rims:?}");
         }
+        let back = if name == "1 mm" { 0.1 } else { 0.05 };
+        assert!(worst[0] < 0.04 && worst[1] < back, "{name}: {worst:?}");
     }
-    let is_tried = |(name, seed): &(&str, u64)| *seed <= seeds && styli.iter().any(|stylus| stylus.0 == *name);
-    assert_eq!(astray, ASTRAY.into_iter().filter(is_tried).collect::<Vec<_>>());
 }

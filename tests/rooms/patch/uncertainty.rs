@@ -331,6 +331,9 @@ fn knocks_are_counted_and_do_not_dent_the_mesh() {
         };
         places += hit.len();
         listed += patchers[1].knocks().last().filter(|knock| near(knock.stamp_ns)).count();
+        let [shaken_contacts, calm_contacts] = [1, 0].map(|i| patchers[i].knocks().held_apart);
+        println!("seed {seed}: {shaken_contacts} contacts held apart, {calm_contacts} when calm");
+        assert!(shaken_contacts > 5 * calm_contacts, "seed {seed}: {shaken_contacts} {calm_contacts}");
         // of the same hand where it was knocked and where it was not, calm and shaken
         let [[calm, calm_elsewhere], [held, held_elsewhere]] = [0, 1].map(|i| {
             let apart = || patchers[i].probed().iter().filter(|touch| touch.is_held_apart);
