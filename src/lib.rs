@@ -45,10 +45,10 @@
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 #![warn(missing_docs)]
 
-/// The README; its code is tested.
+/// The method as docs/method.md has it; its code is tested.
 #[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-struct Readme;
+#[doc = include_str!("../docs/method.md")]
+struct Method;
 
 pub mod align;
 pub mod calibrate;
