@@ -100,14 +100,19 @@ impl<'a> Problem<'a> {
     }
 
     /// What the axis known before adds: seen from F it leans by −a, a its own x and y.
+    ///
+    /// Turning F by ω takes a from a to a + a × ω, ω as in [`Surface::derivatives`].
     pub fn prior<M: Surface>(&self, surface: &M) -> Quadratic {
         let mut sum = Quadratic { information: Square::zeros(), gradient: Steps::zeros(), cost: 0.0 };
         if let Some((axis, sigma)) = self.known_axis {
             let known = surface.pose_of().inverse_transform_vector(&axis);
             let weight = sigma.powi(-2);
-            for (i, lean) in [(3, -known.x), (4, -known.y)] {
-                sum.information[(i, i)] = weight;
-                sum.gradient[i] = weight * lean;
+            for (lean, tilt, turn) in [(-known.x, 3, -known.y), (-known.y, 4, known.x)] {
+                let mut by = Steps::zeros();
+                by[tilt] = known.z;
+                by[5] = if M::FREE[5] { turn } else { 0.0 };
+                sum.information.ger(weight, &by, &by, 1.0);
+                sum.gradient.axpy(weight * lean, &by, 1.0);
                 sum.cost += weight * lean * lean;
             }
         }

@@ -79,6 +79,31 @@ fn an_estimate_has_the_uncertainty_of_what_it_is_made_of() {
     assert!((both.std / variance.sqrt() - 1.0).abs() < 1e-9, "{both:?}");
 }
 
+fn fit_follows(motion: &Isometry3<f64>, seed: u64) {
+    let touched = touched_hole(seed, 40);
+    let moved: Vec<_> = touched.iter().map(|o| Observation { point: motion * o.point, ..*o }).collect();
+    let params = FitParams { common_sigma: 0.01 * MM, axis_sigma: Some(0.05), ..FitParams::default() };
+    let here = hole_near(&Isometry3::identity(), 5.0 * MM);
+    let there = fit(&hole_near(motion, 5.0 * MM), &moved, &params).unwrap();
+    let here = fit(&here, &touched, &params).unwrap();
+    assert!((there.surface.center() - motion * here.surface.center()).norm() < 1e-9);
+    assert!((there.surface.axis() - motion * here.surface.axis()).norm() < 1e-7);
+    assert!((there.surface.radius - here.surface.radius).abs() < 1e-9);
+    let r = motion.rotation.to_rotation_matrix();
+    let turned = r * here.center_covariance(3.0 * MM).unwrap() * r.transpose();
+    let difference = there.center_covariance(3.0 * MM).unwrap() - turned;
+    assert!(difference.norm() < 1e-5 * turned.norm(), "{difference}");
+    assert_eq!(there.used, here.used);
+}
+
+/// Its axis leans by so much from the one known before that a gradient of small leans, which is not that of the cost, stops the solver
+/// beside the least cost: 1.03e-7 rad from where it stops in another frame.
+#[test]
+fn a_turn_about_the_axis_moves_a_fit_that_is_hardly_known() {
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -0.8008609993554514);
+    fit_follows(&Isometry3::from_parts(Vector3::zeros().into(), turn), 818);
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
@@ -88,23 +113,7 @@ proptest! {
         shift in proptest::array::uniform3(-1.0..1.0f64),
         seed in 0..1000u64,
     ) {
-        let motion = Isometry3::from_parts(
-            Vector3::from(shift).into(),
-            UnitQuaternion::from_scaled_axis(Vector3::from(turn)),
-        );
-        let touched = touched_hole(seed, 40);
-        let moved: Vec<_> = touched.iter().map(|o| Observation { point: motion * o.point, ..*o }).collect();
-        let params = FitParams { common_sigma: 0.01 * MM, axis_sigma: Some(0.05), ..FitParams::default() };
-        let here = hole_near(&Isometry3::identity(), 5.0 * MM);
-        let there = fit(&hole_near(&motion, 5.0 * MM), &moved, &params).unwrap();
-        let here = fit(&here, &touched, &params).unwrap();
-        prop_assert!((there.surface.center() - motion * here.surface.center()).norm() < 1e-9);
-        prop_assert!((there.surface.axis() - motion * here.surface.axis()).norm() < 1e-7);
-        prop_assert!((there.surface.radius - here.surface.radius).abs() < 1e-9);
-        let r = motion.rotation.to_rotation_matrix();
-        let turned = r * here.center_covariance(3.0 * MM).unwrap() * r.transpose();
-        let difference = there.center_covariance(3.0 * MM).unwrap() - turned;
-        prop_assert!(difference.norm() < 1e-5 * turned.norm(), "{difference}");
-        prop_assert_eq!(there.used, here.used);
+        let turn = UnitQuaternion::from_scaled_axis(Vector3::from(turn));
+        fit_follows(&Isometry3::from_parts(Vector3::from(shift).into(), turn), seed);
     }
 }
