@@ -20,10 +20,19 @@ fn commit() -> Option<String> {
         // a path that is not there would be asked for at every build
         git(&["rev-parse", "--git-path", name]).filter(|path| Path::new(path).exists()).into_iter().for_each(watch);
     }
-    ["src", "Cargo.toml", "Cargo.lock"].map(str::to_owned).into_iter().for_each(watch);
+    ["src", "crates", "Cargo.toml", "Cargo.lock"].map(str::to_owned).into_iter().for_each(watch);
     let hash = git(&["rev-parse", "--short=12", "HEAD"])?;
-    let changed =
-        git(&["status", "--porcelain", "--untracked-files=no", "--", "src", "Cargo.toml", "Cargo.lock", "build.rs"])?;
+    let changed = git(&[
+        "status",
+        "--porcelain",
+        "--untracked-files=no",
+        "--",
+        "src",
+        "crates",
+        "Cargo.toml",
+        "Cargo.lock",
+        "build.rs",
+    ])?;
     Some(if changed.is_empty() { hash } else { format!("{hash}, with changes") })
 }
 

@@ -20,7 +20,7 @@ use touchup::ros::arguments::NodeConfig;
 use touchup::ros::messages::{
     HapticMismatch, Header, Point, Pose, PoseStamped, Quaternion, Time, Vector3, Wrench, WrenchStamped,
 };
-use touchup::ros::node::{INBOX, Prepared, Report};
+use touchup::ros::node::{INBOX, Prepared, SessionReport};
 use touchup::ros::parameters::{ParameterValue, Parameters};
 use touchup::ros::port::{Arrival, Publication};
 use touchup::ros::{dds, in_process};
@@ -56,7 +56,7 @@ fn shown(Quantiles { median, p99, p999, max }: Quantiles) -> String {
     format!("p50 {:.1} us p99 {:.0} p99.9 {:.0} max {:.0}", us(median), us(p99), us(p999), us(max))
 }
 
-fn told(report: &Report) {
+fn told(report: &SessionReport) {
     println!(
         "accepted {} dropped {:?} refused {:?} unrecorded {}; push {}; from arrival to mesh {}; {} view frames dropped, {} \
          renewals late",

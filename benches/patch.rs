@@ -4,7 +4,7 @@ use divan::Bencher;
 use divan::counter::ItemsCount;
 use nalgebra::{Point3, Vector3};
 use touchup::mesh::{FaceTree, TriMesh, signed_distance};
-use touchup::patch::{ContourParams, Crossing, Cut, Edge, Lattice, NodeValues, Patch, Region, contour};
+use touchup::patch::{ContourParams, Crossing, Cut, Edge, Lattice, LatticeRegion, NodeValues, Patch, contour};
 use touchup::sim::wavy;
 
 /// Pitch of the lattice, m.
@@ -22,7 +22,7 @@ struct Case {
     scan: TriMesh,
     tree: FaceTree,
     lattice: Lattice,
-    region: Region,
+    region: LatticeRegion,
     values: NodeValues,
     /// cells that the surface passes through
     surface_cells: usize,
@@ -36,7 +36,7 @@ impl Case {
         let middle = wavy::SIDE / 2.0;
         let lo = lattice.cell_of(&Point3::new(middle - REACH, middle - REACH, -4e-3));
         let hi = lattice.cell_of(&Point3::new(middle + REACH, middle + REACH, 4e-3));
-        let (mut region, mut values, mut surface_cells) = (Region::default(), NodeValues::default(), 0);
+        let (mut region, mut values, mut surface_cells) = (LatticeRegion::default(), NodeValues::default(), 0);
         let cells =
             (lo[0]..hi[0]).flat_map(|x| (lo[1]..hi[1]).flat_map(move |y| (lo[2]..hi[2]).map(move |z| [x, y, z])));
         for cell in cells {

@@ -78,8 +78,8 @@ failed_tests() {
        END { for (program in begun) if (!(program in counted)) print program ": ended before the end of its tests" }' "$1"
 }
 
-# unit tests are quick: without optimisation the crate is built for them in a seventh of the time
-unoptimised=(--config 'profile.dev.package.touchup.opt-level=0')
+# unit tests are quick: without optimisation the crates are built for them in a seventh of the time
+unoptimised=(--config profile.dev.opt-level=0 --config 'profile.dev.package."*".opt-level=2')
 
 # the program, the stand-in for a controller and what tests them
 build_tests() {
@@ -148,8 +148,8 @@ programs=(--test rooms)
 [ "${#ur[@]}" -eq 0 ] || programs+=(--test ur)
 stage "build of the Rust tests" build_tests
 stage "Rust tests" cargo_tests "$logs/rust.log" "${ur[@]}" "${programs[@]}"
-stage "Rust unit tests" cargo_tests "$logs/rust_unit.log" "${unoptimised[@]}" "${ur[@]}" --lib
-stage "Rust documentation tests" cargo_tests "$logs/rust_doc.log" "${ur[@]}" --doc
+stage "Rust unit tests" cargo_tests "$logs/rust_unit.log" --workspace "${unoptimised[@]}" "${ur[@]}" --lib
+stage "Rust documentation tests" cargo_tests "$logs/rust_doc.log" --workspace "${ur[@]}" --doc
 stage "r2r" r2r_tests
 if [ ! -x "$target/debug/touchup" ]; then
   fail "cargo test built no $target/debug/touchup"

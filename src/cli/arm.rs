@@ -12,11 +12,11 @@ use super::probing::ur_params;
 use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
 use crate::mesh::TriMesh;
 use crate::robot::Arm;
-#[cfg(feature = "ur")]
-use crate::robot::ur::UrArm;
 use crate::scene::Scene;
 use crate::sim::{ArmParams, MeshSurface, SimArm, WEIGHTLESS};
 use crate::touch::Payload;
+#[cfg(feature = "ur")]
+use crate::ur::UrArm;
 
 /// Which arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

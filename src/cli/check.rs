@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::arm::{ArmArguments, millimetres};
 use super::probing::Ready;
-use super::progress::Progress;
+use super::progress::WorkProgress;
 use super::{CliError, Losses, tell};
 use crate::probe::{Prober, Repeatability};
 
@@ -73,7 +73,7 @@ pub(super) fn repeated(
     let (scan, unit) = arm.scan(scene)?;
     let ready = Ready::read(scene, &scan, unit)?;
     ready.may_move()?;
-    let _touching = Progress::stage("touch");
+    let _touching = WorkProgress::stage("touch");
     arm.with(&ready, |arm| {
         let mut world = ready.still_world();
         let mut prober = Prober::new(arm, &ready.cell, &ready.params, &mut world);

@@ -12,11 +12,11 @@ use tracing::warn;
 
 use self::alignment::{Alignment, aligned_by_features, aligned_by_icp, aligned_by_pairs, moved};
 use self::table::ComparisonTold;
-use super::progress::Progress;
+use super::progress::WorkProgress;
 use super::{CliError, Losses, Threads, tell};
 use crate::compare::{
-    CompareParams, Comparison, Panel, PictureParams, Region, Regions, Shape, colour_of, compare as compare_shapes,
-    draw_picture,
+    CompareParams, Comparison, IndexedMesh, PicturePanel, PictureParams, Regions, SupportRegion, colour_of,
+    compare as compare_shapes, draw_picture,
 };
 use crate::io::atomic::{AtomicFile, is_same_file};
 use crate::io::mesh_file::{MeshFile, MeshUnit, VertexColumn, read_mesh, read_vertex_columns, write_mesh_with};
@@ -85,7 +85,7 @@ enum Align {
 
 /// What `--json` prints.
 #[derive(Debug, Serialize)]
-pub(super) struct Told {
+pub(super) struct CompareReport {
     mesh: ShapeTold,
     truth: ShapeTold,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -107,18 +107,18 @@ struct ShapeTold {
 }
 
 /// A mesh that was read, brought into the frame of the truth.
-struct Placed {
+struct PlacedMesh {
     mesh: TriMesh,
     tree: FaceTree,
 }
 
-impl Placed {
+impl PlacedMesh {
     fn new(mesh: TriMesh) -> Self {
         Self { tree: FaceTree::new(&mesh), mesh }
     }
 
-    fn shape(&self) -> Shape<'_> {
-        Shape { mesh: &self.mesh, tree: &self.tree }
+    fn shape(&self) -> IndexedMesh<'_> {
+        IndexedMesh { mesh: &self.mesh, tree: &self.tree }
     }
 }
 
@@ -134,10 +134,10 @@ pub(super) fn compare(arguments: &CompareArguments) -> Result<Losses, CliError> 
 }
 
 /// Compares, and writes what is asked for.
-pub(super) fn compared(arguments: &CompareArguments) -> Result<Told, CliError> {
+pub(super) fn compared(arguments: &CompareArguments) -> Result<CompareReport, CliError> {
     arguments.check_alignment()?;
     arguments.check_outputs()?;
-    let reading = Progress::stage("read");
+    let reading = WorkProgress::stage("read");
     let MeshFile { mesh: as_read, .. } = read_mesh(&arguments.mesh, arguments.mesh_unit).map_err(CliError::ReadMesh)?;
     let MeshFile { mesh: truth, .. } =
         read_mesh(&arguments.truth, arguments.truth_unit).map_err(CliError::ReadTruth)?;
@@ -147,7 +147,7 @@ pub(super) fn compared(arguments: &CompareArguments) -> Result<Told, CliError> {
     if let Some(hint) = unit_hint([&as_read, &truth], [arguments.mesh_unit, arguments.truth_unit]) {
         warn!("{hint}");
     }
-    let truth = Placed::new(truth);
+    let truth = PlacedMesh::new(truth);
     drop(reading);
 
     let with_told = |(pose, told)| (pose, Some(told));
@@ -160,14 +160,14 @@ pub(super) fn compared(arguments: &CompareArguments) -> Result<Told, CliError> {
         }
         Align::Pairs => aligned_by_pairs(arguments.pairs()?).map(with_told)?,
     };
-    let mesh = Placed::new(moved(&as_read, &pose));
-    let before = before.map(|scan| Placed::new(moved(&scan, &pose)));
+    let mesh = PlacedMesh::new(moved(&as_read, &pose));
+    let before = before.map(|scan| PlacedMesh::new(moved(&scan, &pose)));
     let measured = arguments.measure(&mesh, &truth, before.as_ref(), regions.as_deref())?;
     arguments.draw(&mesh, before.as_ref(), &measured, regions.as_deref())?;
     if let Some(path) = &arguments.coloured {
         write_coloured(path, &as_read, arguments.mesh_unit, &measured.after)?;
     }
-    Ok(Told {
+    Ok(CompareReport {
         mesh: ShapeTold::of(&arguments.mesh, &as_read),
         truth: ShapeTold::of(&arguments.truth, &truth.mesh),
         alignment,
@@ -206,12 +206,12 @@ impl CompareArguments {
 
     fn measure(
         &self,
-        mesh: &Placed,
-        truth: &Placed,
-        before: Option<&Placed>,
-        regions: Option<&[Region]>,
+        mesh: &PlacedMesh,
+        truth: &PlacedMesh,
+        before: Option<&PlacedMesh>,
+        regions: Option<&[SupportRegion]>,
     ) -> Result<MeasuredBoth, CliError> {
-        let _measuring = Progress::stage("measure");
+        let _measuring = WorkProgress::stage("measure");
         let range = self.range_mm.map(|range| range * 1e-3);
         let params = CompareParams { samples: self.samples as usize, seed: self.seed, range, ..Default::default() };
         let own = regions.map_or(Regions::Unknown, Regions::Own);
@@ -232,23 +232,23 @@ impl CompareArguments {
     /// Draws what was measured, where that is asked for.
     fn draw(
         &self,
-        mesh: &Placed,
-        before: Option<&Placed>,
+        mesh: &PlacedMesh,
+        before: Option<&PlacedMesh>,
         measured: &MeasuredBoth,
-        regions: Option<&[Region]>,
+        regions: Option<&[SupportRegion]>,
     ) -> Result<(), CliError> {
         let Some(path) = &self.picture else { return Ok(()) };
-        let _drawing = Progress::stage("draw");
+        let _drawing = WorkProgress::stage("draw");
         let name = |path: &Path| path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned());
         let title = format!("{} against {}", name(&self.mesh), name(&self.truth));
         let scan = before.zip(measured.before.as_ref()).zip(self.before.as_ref()).map(|((placed, compared), path)| {
             (placed, compared, format!("before: {}", name(path)), table::note(compared))
         });
         let now = (mesh, &measured.after, format!("after: {}", name(&self.mesh)), table::note(&measured.after));
-        let panels: Vec<Panel<'_>> = scan
+        let panels: Vec<PicturePanel<'_>> = scan
             .iter()
             .chain([&now])
-            .map(|(placed, compared, title, note)| Panel {
+            .map(|(placed, compared, title, note)| PicturePanel {
                 mesh: &placed.mesh,
                 deviations: &compared.vertex_deviations,
                 classes: None,
@@ -257,8 +257,8 @@ impl CompareArguments {
                 note,
             })
             .collect();
-        let weights = regions.filter(|regions| regions.contains(&Region::Touched)).map(|regions| {
-            regions.iter().map(|region| if *region == Region::Touched { 1.0 } else { 0.0 }).collect::<Vec<f64>>()
+        let weights = regions.filter(|regions| regions.contains(&SupportRegion::Touched)).map(|regions| {
+            regions.iter().map(|region| if *region == SupportRegion::Touched { 1.0 } else { 0.0 }).collect::<Vec<f64>>()
         });
         let from = self.view.as_ref().map(|view| Vector3::from_column_slice(view));
         let params = PictureParams {
@@ -331,17 +331,17 @@ fn positive(text: &str) -> Result<f64, String> {
 }
 
 /// What each vertex of a refined PLY rests on; `None` for a mesh that does not say.
-fn read_regions(path: &Path, unit: MeshUnit, mesh: &TriMesh) -> Result<Option<Vec<Region>>, CliError> {
+fn read_regions(path: &Path, unit: MeshUnit, mesh: &TriMesh) -> Result<Option<Vec<SupportRegion>>, CliError> {
     let columns = read_vertex_columns(path, unit, mesh, ["support", "touched"]).map_err(CliError::ReadMesh)?;
     let of_support = |support: &f32| match *support {
-        0.0 => Region::Untouched,
-        1.0 => Region::Touched,
-        _ => Region::Guessed,
+        0.0 => SupportRegion::Untouched,
+        1.0 => SupportRegion::Touched,
+        _ => SupportRegion::Guessed,
     };
     let of_touched = |touched: &f32| match *touched {
-        ..=0.0 => Region::Untouched,
-        1.0.. => Region::Touched,
-        _ => Region::Guessed,
+        ..=0.0 => SupportRegion::Untouched,
+        1.0.. => SupportRegion::Touched,
+        _ => SupportRegion::Guessed,
     };
     let regions = match columns {
         [Some(support), _] => support.iter().map(of_support).collect::<Vec<_>>(),

@@ -12,10 +12,10 @@ use super::arm::RobotName;
 use super::compare::{CompareArguments, compared};
 use super::demo_robot::demo_robot;
 use super::found::FoundTable;
-use super::progress::Progress;
-use super::refine::{RefineArguments, Refined, Summary};
+use super::progress::WorkProgress;
+use super::refine::{RefineArguments, RefineSummary, Refined};
 use super::simulate::{Feel, Simulated, write_simulation};
-use super::touched::{RegionError, Touched};
+use super::touched::{RegionError, TouchedTruth};
 use super::{CliError, Losses, tell};
 use crate::io::atomic::write_atomically;
 use crate::io::features_file::read_features;
@@ -48,7 +48,7 @@ struct DemoSummary {
     before: RegionError,
     /// and of the refined mesh
     after: RegionError,
-    refine: Summary,
+    refine: RefineSummary,
     /// true features beside what was found of them
     found: FoundTable,
 }
@@ -92,8 +92,8 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
     let picture = [refined_path, arguments.out.join("truth.ply"), scan_path, arguments.out.join("deviation.png")];
     compared(&CompareArguments::of_picture(picture))?;
 
-    let _measuring = Progress::stage("measure");
-    let touched = Touched::of(&touch.moments);
+    let _measuring = WorkProgress::stage("measure");
+    let touched = TouchedTruth::of(&touch.moments);
     let demo = DemoSummary {
         scan: ScanBadness::of(&plate, &scan)?,
         touched_s: touch.moments.last().map_or(0.0, |moment| moment.t),

@@ -12,7 +12,7 @@ use serde::Serialize;
 use super::compare::{CompareArguments, compared};
 use super::demo::DemoArguments;
 use super::probing::{Done, Probing, ProbingSummary};
-use super::progress::Progress;
+use super::progress::WorkProgress;
 use super::{CliError, Losses, tell};
 use crate::features::{Feature, Kind};
 use crate::io::atomic::{create_folder, write_atomically};
@@ -55,7 +55,7 @@ pub(super) fn demo_robot(arguments: &DemoArguments) -> Result<Losses, CliError> 
     create_folder(out).map_err(|source| CliError::Write { path: out.clone(), source })?;
     let [truth_path, scan_path, scene_path] = ["truth.ply", "scan.ply", "scene.yaml"].map(|name| out.join(name));
     let truth = plate.mesh(CHORD_ERROR)?;
-    let scanning = Progress::stage("scan");
+    let scanning = WorkProgress::stage("scan");
     let scanner = ScannerParams { seed: arguments.seed, ..ScannerParams::default() };
     let scanned = scan(&plate, &scanner)?;
     drop(scanning);

@@ -7,11 +7,11 @@ use clap::Args;
 use nalgebra::{Point3, Vector3};
 use serde::Serialize;
 
-use super::progress::Progress;
+use super::progress::WorkProgress;
 use super::{CliError, Losses, tell};
 use crate::compare::{
-    BadTouches, Class, ClassMap, Disagreement, DisagreementRegion, Known, Panel, PictureParams, RefinedShape, Scanner,
-    Shape, colour_of_class, disagreement, draw_picture,
+    BadTouches, Class, ClassMap, Disagreement, DisagreementRegion, IndexedMesh, PicturePanel, PictureParams,
+    RefinedShape, Scanner, VertexBasis, colour_of_class, disagreement, draw_picture,
 };
 use crate::io::atomic::{AtomicFile, is_same_file};
 use crate::io::mesh_file::{MeshUnit, VertexColumn, read_mesh, read_vertex_columns, write_mesh_with};
@@ -50,13 +50,13 @@ pub(super) struct DisagreeArguments {
 
 /// What `--json` prints.
 #[derive(Debug, Serialize)]
-struct Told {
+struct DisagreeReport {
     /// `null` where too little was touched to tell how the scanner errs
     scanner: Option<ScannerTold>,
     /// of the scan as a whole, taken off before places are judged
     misplaced: Option<MisplacedTold>,
     classes: Vec<ClassTold>,
-    regions: Vec<RegionTold>,
+    regions: Vec<DisagreementRow>,
     bad_touches: Vec<BadTold>,
 }
 
@@ -94,7 +94,7 @@ struct ClassTold {
 }
 
 #[derive(Debug, Serialize)]
-struct RegionTold {
+struct DisagreementRow {
     class: &'static str,
     center_mm: [f64; 3],
     area_mm2: f64,
@@ -119,7 +119,7 @@ struct BadTold {
 /// The verb: finds and tells.
 pub(super) fn disagree(arguments: &DisagreeArguments) -> Result<Losses, CliError> {
     arguments.check_outputs()?;
-    let reading = Progress::stage("read");
+    let reading = WorkProgress::stage("read");
     let unit = arguments.mesh_unit;
     let [scan, refined] = [&arguments.scan, &arguments.refined].map(|path| read_mesh(path, unit));
     let scan = scan.map_err(CliError::ReadMesh)?.mesh;
@@ -128,11 +128,11 @@ pub(super) fn disagree(arguments: &DisagreeArguments) -> Result<Losses, CliError
     let touches = read_touches(&arguments.touches)?;
     drop(reading);
 
-    let measuring = Progress::stage("compare");
+    let measuring = WorkProgress::stage("compare");
     let [scan_tree, refined_tree] = [&scan, &refined].map(FaceTree::new);
-    let shape = Shape { mesh: &refined, tree: &refined_tree };
+    let shape = IndexedMesh { mesh: &refined, tree: &refined_tree };
     let found =
-        disagreement(Shape { mesh: &scan, tree: &scan_tree }, &RefinedShape { shape, known: &known }, &touches)?;
+        disagreement(IndexedMesh { mesh: &scan, tree: &scan_tree }, &RefinedShape { shape, known: &known }, &touches)?;
     drop(measuring);
     arguments.draw(&refined, &found)?;
     for (path, mesh, map) in
@@ -142,22 +142,22 @@ pub(super) fn disagree(arguments: &DisagreeArguments) -> Result<Losses, CliError
             write_coloured(path, mesh, map, unit)?;
         }
     }
-    let told = Told::of(&found);
+    let told = DisagreeReport::of(&found);
     let json = || serde_json::to_string(&told).expect("finite numbers and names alone cannot fail");
     tell(&if arguments.json { json() } else { told.to_string() });
     Ok(Losses::new())
 }
 
 /// What each vertex rests on.
-fn read_known(path: &Path, unit: MeshUnit, mesh: &TriMesh) -> Result<Vec<Known>, CliError> {
+fn read_known(path: &Path, unit: MeshUnit, mesh: &TriMesh) -> Result<Vec<VertexBasis>, CliError> {
     let [support] = read_vertex_columns(path, unit, mesh, ["support"]).map_err(CliError::ReadMesh)?;
     let support = support.filter(|support| support.len() == mesh.vertex_slots()).ok_or_else(|| {
         CliError::Usage(format!("{} does not say what was touched: give the PLY that refine wrote", path.display()))
     })?;
     let known = |support: &f32| match *support {
-        1.0 => Known::Touched,
-        3.0 => Known::Unreachable,
-        _ => Known::NotTouched,
+        1.0 => VertexBasis::Touched,
+        3.0 => VertexBasis::Unreachable,
+        _ => VertexBasis::NotTouched,
     };
     Ok(support.iter().map(known).collect())
 }
@@ -206,12 +206,12 @@ impl DisagreeArguments {
 
     fn draw(&self, refined: &TriMesh, found: &Disagreement) -> Result<(), CliError> {
         let Some(path) = &self.picture else { return Ok(()) };
-        let _drawing = Progress::stage("draw");
+        let _drawing = WorkProgress::stage("draw");
         let map = &found.refined;
         let is_felt = |class: &Class| !matches!(class, Class::NeverTouched | Class::Unreachable);
         let weights: Vec<f64> = map.classes.iter().map(|class| if is_felt(class) { 1.0 } else { 0.0 }).collect();
         let range = found.scanner.map_or(1e-3, |scanner| (4.0 * scanner.noise + scanner.offset.abs()).max(1e-6));
-        let panel = |classes, title| Panel {
+        let panel = |classes, title| PicturePanel {
             mesh: refined,
             deviations: &map.disagreement,
             classes,
@@ -239,7 +239,7 @@ fn mm(p: &Point3<f64>) -> [f64; 3] {
     [p.x, p.y, p.z].map(|x| x * 1e3)
 }
 
-impl Told {
+impl DisagreeReport {
     fn of(found: &Disagreement) -> Self {
         let class = |(number, class): (usize, Class)| ClassTold {
             class: class.name(),
@@ -257,7 +257,7 @@ impl Told {
                 center_mm: mm(&misplaced.centre),
             }),
             classes: Class::ALL.into_iter().enumerate().map(class).collect(),
-            regions: found.regions.iter().map(RegionTold::of).collect(),
+            regions: found.regions.iter().map(DisagreementRow::of).collect(),
             bad_touches: found.bad_touches.iter().map(BadTold::of).collect(),
         }
     }
@@ -276,7 +276,7 @@ impl ScannerTold {
     }
 }
 
-impl RegionTold {
+impl DisagreementRow {
     fn of(region: &DisagreementRegion) -> Self {
         let evidence = &region.evidence;
         Self {
@@ -310,7 +310,7 @@ impl BadTold {
 /// So many regions and bad touches are told; `--json` has all.
 const MOST_TOLD: usize = 12;
 
-impl fmt::Display for Told {
+impl fmt::Display for DisagreeReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.scanner {
             Some(ScannerTold { offset_mm, noise_mm, correlation_mm, edge_mm, sees_from_mm, places }) => writeln!(

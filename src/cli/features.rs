@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 
-use super::progress::Progress;
+use super::progress::WorkProgress;
 use super::{CliError, Losses, check_kept, tell};
 use crate::features::clusters::{Cluster, ClusterParams, PaperParams, clusters, paper_clusters};
 use crate::features::curvature::curvature;
@@ -109,7 +109,7 @@ impl FeaturesArguments {
     }
 
     fn find_clusters(&self, mesh: &TriMesh) -> Vec<Cluster> {
-        let _finding = Progress::stage("find clusters");
+        let _finding = WorkProgress::stage("find clusters");
         let curvature = curvature(mesh);
         match self.clusters {
             Some(k) => {
@@ -143,7 +143,7 @@ impl fmt::Display for ClusterTable<'_> {
 
 /// What is on a mesh, and the file of it.
 pub(super) fn find(mesh: &TriMesh, touches: &[ProbedPoint]) -> (Detection, FeatureFile) {
-    let _finding = Progress::stage("find features");
+    let _finding = WorkProgress::stage("find features");
     found(mesh, touches)
 }
 
@@ -160,7 +160,7 @@ impl fmt::Display for FeatureTable<'_> {
             writeln!(f, "features: {}", counts.join(", "))?;
             write!(f, "{:>4}  {:<7} {:>28}  {:<44} fitted to", "id", "kind", "center, mm", "size, mm")?;
             for feature in features.iter().filter(|feature| feature.kind != Kind::Plane) {
-                write!(f, "\n{}", Row(feature))?;
+                write!(f, "\n{}", FeatureRow(feature))?;
             }
         }
         if *unexplained > TOLD {
@@ -185,9 +185,9 @@ fn count(features: &[Feature], kind: Kind) -> Option<String> {
     (count > 0).then(|| format!("{count} {}{ending}", kind.name()))
 }
 
-struct Row<'a>(&'a Feature);
+struct FeatureRow<'a>(&'a Feature);
 
-impl fmt::Display for Row<'_> {
+impl fmt::Display for FeatureRow<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let feature = self.0;
         let c = feature.centre.value.coords * 1e3;

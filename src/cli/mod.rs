@@ -204,10 +204,10 @@ enum CliError {
     Ros(#[from] crate::ros::RosError),
     #[cfg(feature = "ur")]
     #[error(transparent)]
-    UrSetup(#[from] crate::robot::ur::SetupError),
+    UrSetup(#[from] crate::ur::SetupError),
     #[cfg(feature = "ur")]
     #[error(transparent)]
-    UrChild(#[from] crate::robot::ur::child::ChildError),
+    UrChild(#[from] crate::ur::child::ChildError),
 }
 
 impl From<OutcomeError> for CliError {

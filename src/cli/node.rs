@@ -11,14 +11,14 @@ use tokio::signal::unix::{SignalKind, signal};
 use super::{CliError, Losses, complain, tell};
 use crate::io::mesh_file::{MeshFile, read_mesh};
 use crate::live::Quantiles;
-#[cfg(feature = "ur")]
-use crate::robot::ur::UrArm;
 use crate::ros;
 use crate::ros::arguments::NodeConfig;
-use crate::ros::node::{ArmKind, ArmOfNode, INBOX, NodeEnd, NodeError, Prepared, Report, mesh_unit};
+use crate::ros::node::{ArmKind, ArmOfNode, INBOX, NodeEnd, NodeError, Prepared, SessionReport, mesh_unit};
 use crate::ros::parameters::ParameterValue;
 use crate::ros::port::Arrival;
 use crate::scene::Scene;
+#[cfg(feature = "ur")]
+use crate::ur::UrArm;
 
 #[derive(Debug, Args)]
 pub(super) struct NodeArguments {
@@ -134,7 +134,7 @@ async fn any(signals: &mut [tokio::signal::unix::Signal]) {
     .await;
 }
 
-fn losses(report: &Report) -> Losses {
+fn losses(report: &SessionReport) -> Losses {
     let ([wrenches, poses], [samples, others]) = (report.lost, report.dropped);
     let told = [
         (wrenches, "wrenches lost on the way"),
@@ -147,7 +147,7 @@ fn losses(report: &Report) -> Losses {
     told.map(|(count, what)| format!("{count} {what}")).collect()
 }
 
-impl fmt::Display for Report {
+impl fmt::Display for SessionReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let refused: Vec<_> = self.refused.iter().map(|(reason, count)| format!("{count} {reason}")).collect();
         let refused = if refused.is_empty() { "none".to_owned() } else { refused.join(", ") };

@@ -12,14 +12,14 @@ const STEPS_PER_LOOK: u64 = 1024;
 
 /// Counts steps; shows them once the work has taken a second. The bar vanishes when dropped.
 #[derive(Debug)]
-pub struct Progress {
+pub struct WorkProgress {
     bar: ProgressBar,
     started: Instant,
     steps: u64,
     waiting: bool,
 }
 
-impl Progress {
+impl WorkProgress {
     /// `steps`: how many there will be, where that is known.
     pub fn new(what: &'static str, steps: Option<u64>) -> Self {
         let bar = ProgressBar::with_draw_target(steps, ProgressDrawTarget::hidden());
@@ -63,7 +63,7 @@ impl Progress {
     }
 }
 
-impl Drop for Progress {
+impl Drop for WorkProgress {
     fn drop(&mut self) {
         self.bar.finish_and_clear();
     }

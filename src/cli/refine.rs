@@ -12,7 +12,7 @@ use serde::Serialize;
 use tracing::{debug, warn};
 
 use super::offsets::{ContactPoints, ScanOffset, WrenchOffset};
-use super::progress::Progress;
+use super::progress::WorkProgress;
 use super::rates::{Ended, LiveSummary, Rates};
 use super::samples::{Recording, Replayed, each_sample, marker_filter};
 use super::{CliError, Losses, check_kept_by, tell};
@@ -108,7 +108,7 @@ impl TypedValueParser for PathOrNone {
 
 /// What `--json` prints; times in s, `push_ns` in ns.
 #[derive(Debug, Serialize)]
-pub(super) struct Summary {
+pub(super) struct RefineSummary {
     /// what was built of the scene, what was left out, and the memory that it took at start
     scene: SceneCost,
     /// wrenches of the recording: each could be a sample
@@ -159,7 +159,7 @@ struct FrictionFound {
 pub(super) struct Refined {
     /// what had to be repaired in the file
     repair: RepairReport,
-    pub summary: Summary,
+    pub summary: RefineSummary,
     pub losses: Losses,
 }
 
@@ -216,9 +216,9 @@ impl Pushes {
 }
 
 /// Strokes that are still to be taken back or done again.
-struct Strokes<'a>(&'a [StrokeChange]);
+struct UndoSteps<'a>(&'a [StrokeChange]);
 
-impl Strokes<'_> {
+impl UndoSteps<'_> {
     /// Changes those that were changed before the sample of this stamp came.
     fn apply_until(&mut self, stamp_ns: i64, rates: &mut Rates) {
         while let Some((first, rest)) = self.0.split_first().filter(|(first, _)| first.after_ns < stamp_ns) {
@@ -373,7 +373,7 @@ impl RefineArguments {
 
         let started = Instant::now();
         let mut pushes = Pushes::new();
-        let mut strokes = Strokes(&self.strokes);
+        let mut strokes = UndoSteps(&self.strokes);
         let compensator = Compensator::new(params.compensator)?;
         let mut clock = scene.clock_params().map(ClockEstimator::new).transpose()?;
         let mut contacts = self.registration.then(|| ContactPoints::new(&params)).transpose()?;
@@ -394,7 +394,7 @@ impl RefineArguments {
         let Ended { refiner, patcher, live } = rates.finish()?;
         let replay_s = started.elapsed().as_secs_f64();
         let counts = refiner.counts();
-        let stage = Progress::stage("mesh anew");
+        let stage = WorkProgress::stage("mesh anew");
         let patcher = patcher.filter(|_| counts.contacts > 0);
         let Outcome { moved_faces, patch, uncertainty, .. } =
             OutcomePlaces { outside: cut.outside.as_ref(), ..self.places() }.write(
@@ -419,7 +419,7 @@ impl RefineArguments {
         if counts.outside_region > 0 {
             refused.insert("outside_region".to_owned(), counts.outside_region);
         }
-        let summary = Summary {
+        let summary = RefineSummary {
             scene: cost,
             samples: replayed.wrenches,
             accepted: pushes.accepted - counts.outside_region,
@@ -448,7 +448,7 @@ impl RefineArguments {
         // no arm moves while a recording is replayed
         let unused = if self.markers_topic.is_some() { &["robot"][..] } else { &["robot", "markers"] };
         let memory = Memory::of(rates.refiner().footprint(), scan_bytes + rates.scan_bytes());
-        SceneCost { parts: scene.built(unused), memory }
+        SceneCost { parts: scene.built(unused, &crate::FEATURES), memory }
     }
 
     /// Which way the samples go.
@@ -523,7 +523,7 @@ impl RefineArguments {
     }
 }
 
-impl fmt::Display for Summary {
+impl fmt::Display for RefineSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let refused: Vec<_> = self.refused.iter().map(|(reason, count)| format!("{count} {reason}")).collect();
         if let Some(FrictionFound { mu, sigma }) = &self.friction {

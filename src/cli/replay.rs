@@ -90,7 +90,7 @@ pub(super) fn replay(arguments: &ReplayArguments, ros: &[String]) -> Result<Loss
         WrenchFrame::Object => CELL.to_owned(),
         WrenchFrame::Sensor => format!("{}_sensor", arguments.source),
     };
-    let (mut played, mut pace, began) = (Played::default(), Pace::new(arguments.speed), Instant::now());
+    let (mut played, mut pace, began) = (Played::default(), ReplayPace::new(arguments.speed), Instant::now());
     let mut publish = |message: Message| {
         pace.wait_for(message.stamp_ns());
         let is_sent = match &message {
@@ -105,7 +105,7 @@ pub(super) fn replay(arguments: &ReplayArguments, ros: &[String]) -> Result<Loss
         };
         played.unsent += u64::from(!is_sent);
     };
-    let mut order = Order::default();
+    let mut order = StampOrder::default();
     let replayed = each_message(recording, markers, |message| order.push(message, &mut publish))?;
     order.finish(&mut publish);
     played.played_s = began.elapsed().as_secs_f64();
@@ -154,20 +154,20 @@ fn wait_for_listeners(port: &mut dyn SamplePort, config: &NodeConfig, recording:
 /// Puts each stream in the order of its stamps, in which a sensor sends and the node takes it: what came into the recording
 /// later than what was measured after it.
 #[derive(Default)]
-struct Order {
+struct StampOrder {
     /// poses and wrenches
-    streams: [Stream; 2],
+    streams: [ReplayStream; 2],
     count: u64,
 }
 
 #[derive(Default)]
-struct Stream {
+struct ReplayStream {
     /// by stamp, those of one stamp as they came
     held: BTreeMap<(i64, u64), Message>,
     newest_ns: Option<i64>,
 }
 
-impl Order {
+impl StampOrder {
     /// Hands on what cannot be overtaken any more: `touchup refine` waits as long.
     fn push(&mut self, message: Message, mut each: impl FnMut(Message)) {
         let stamp_ns = message.stamp_ns();
@@ -192,7 +192,7 @@ impl Order {
 }
 
 /// When what was measured at a stamp is due.
-struct Pace {
+struct ReplayPace {
     speed: f64,
     /// time since the first message by the stamps, rests taken out, ns
     passed_ns: i64,
@@ -200,7 +200,7 @@ struct Pace {
     began: Instant,
 }
 
-impl Pace {
+impl ReplayPace {
     fn new(speed: f64) -> Self {
         Self { speed, passed_ns: 0, last_ns: None, began: Instant::now() }
     }
@@ -241,7 +241,7 @@ mod tests {
         };
         let recorded =
             [(0, true), (5, false), (12, true), (9, true), (9, true), (30, true), (2, false), (3, true), (40, false)];
-        let (mut order, mut told) = (Order::default(), Vec::new());
+        let (mut order, mut told) = (StampOrder::default(), Vec::new());
         let mut each = |message: Message| told.push((message.stamp_ns() / ms, matches!(message, Message::Wrench(_))));
         for (stamp_ms, is_wrench) in recorded {
             order.push(message(stamp_ms, is_wrench), &mut each);
@@ -256,7 +256,7 @@ mod tests {
     #[test]
     fn messages_are_due_by_their_stamps_and_rests_are_shortened() {
         let s = 1_000_000_000;
-        let mut pace = Pace::new(2.0);
+        let mut pace = ReplayPace::new(2.0);
         let stamps = [100 * s, 101 * s, 101 * s - 5, 101 * s, 103 * s, 3000 * s, 3001 * s, 7 * s, 9 * s, i64::MAX];
         let due = stamps.map(|stamp| pace.due(stamp).as_secs_f64());
         assert_eq!(due, [0.0, 0.5, 0.5, 0.5, 1.5, 2.5, 3.0, 3.0, 4.0, 5.0]);

@@ -54,12 +54,12 @@ pub(super) struct ReportArguments {
     scene: Option<PathBuf>,
     /// Only these chapters
     #[arg(long, value_name = "CHAPTER", num_args = 1..)]
-    only: Vec<Part>,
+    only: Vec<ReportChapter>,
 }
 
 /// A chapter that can be asked for by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Part {
+enum ReportChapter {
     /// Error against time and evaluations of each integrator, for one face
     WorkPrecision,
     /// Error against time of each way to refine whole scans, with two baselines
@@ -74,12 +74,12 @@ enum Part {
 
 /// What is on the page.
 #[derive(Default)]
-struct Measured {
+struct MeasuredChapters {
     chapters: Vec<Chapter>,
     verdict: Vec<String>,
 }
 
-impl Measured {
+impl MeasuredChapters {
     fn tell(&mut self, chapter: Chapter, verdict: Vec<String>) {
         self.chapters.push(chapter);
         self.verdict.extend(verdict);
@@ -98,7 +98,7 @@ pub(super) fn report(arguments: &ReportArguments) -> Result<Losses, CliError> {
     }
     // before minutes of measuring
     create_folder(out).map_err(write_error(out))?;
-    let Measured { chapters, verdict } = measure(arguments, &mut lines_on_stderr())?;
+    let MeasuredChapters { chapters, verdict } = measure(arguments, &mut lines_on_stderr())?;
     let report = Report {
         machine: describe_machine(),
         commit: env!("TOUCHUP_COMMIT").to_owned(),
@@ -120,7 +120,7 @@ pub(super) fn report(arguments: &ReportArguments) -> Result<Losses, CliError> {
 }
 
 /// Every chapter that is asked for, in the order of the page.
-fn measure(arguments: &ReportArguments, progress: &mut dyn FnMut(&str)) -> Result<Measured, CliError> {
+fn measure(arguments: &ReportArguments, progress: &mut dyn FnMut(&str)) -> Result<MeasuredChapters, CliError> {
     let effort = Effort { is_quick: arguments.quick };
     let is_wanted = |part| arguments.only.is_empty() || arguments.only.contains(&part);
     let given = arguments.given()?;
@@ -130,27 +130,28 @@ fn measure(arguments: &ReportArguments, progress: &mut dyn FnMut(&str)) -> Resul
         peers(effort, &environment, progress)
     });
     let peers = peers.transpose()?;
-    let mut all = Measured::default();
-    if is_wanted(Part::WorkPrecision) {
+    let mut all = MeasuredChapters::default();
+    if is_wanted(ReportChapter::WorkPrecision) {
         let measured = WorkPrecision::measure(effort, progress);
         all.tell(measured.chapter(), measured.verdict());
     }
-    let scans = is_wanted(Part::WholeScan).then(|| whole_scan(effort, given.as_ref(), progress)).transpose()?;
+    let scans =
+        is_wanted(ReportChapter::WholeScan).then(|| whole_scan(effort, given.as_ref(), progress)).transpose()?;
     if let Some(measured) = &scans {
         all.tell(measured.chapter(), verdict::of_whole_scans(measured));
     }
-    if is_wanted(Part::Convergence) {
+    if is_wanted(ReportChapter::Convergence) {
         let measured = convergence(effort, progress);
         all.tell(measured.chapter(), verdict::of_convergence(&measured));
     }
-    let stability = is_wanted(Part::Stability).then(|| stability(effort, progress));
+    let stability = is_wanted(ReportChapter::Stability).then(|| stability(effort, progress));
     if let Some(measured) = &stability {
         all.tell(measured.chapter(), verdict::of_stability(measured));
         progress("extremes");
         let measured = extremes();
         all.tell(measured.chapter(), verdict::of_extremes(&measured));
     }
-    let cost = is_wanted(Part::Cost).then(|| cost(effort, progress)).transpose()?;
+    let cost = is_wanted(ReportChapter::Cost).then(|| cost(effort, progress)).transpose()?;
     if let Some(measured) = &cost {
         all.tell(measured.chapter(), verdict::of_cost(measured));
     }

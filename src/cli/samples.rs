@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::path::Path;
 
-use super::progress::Progress;
+use super::progress::WorkProgress;
 use super::{CliError, Losses};
 use crate::io::recording::{Record, RecordingError, RecordingReader, Topics};
 use crate::scene::Scene;
@@ -100,7 +100,7 @@ pub fn each_message(
     mut each: impl FnMut(Message),
 ) -> Result<Replayed, CliError> {
     let mut replayed = Replayed::default();
-    let mut progress = Progress::new("replay", recording.reader.message_count());
+    let mut progress = WorkProgress::new("replay", recording.reader.message_count());
     let mut has_begun = false;
     while let Some(record) = recording.next() {
         match record {

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use tracing::warn;
 
-use super::progress::Progress;
+use super::progress::WorkProgress;
 use super::{CliError, Losses, check_kept, tell};
 use crate::io::atomic::create_folder;
 use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh, write_mesh};
@@ -129,10 +129,10 @@ pub(super) fn write_simulation(
     folder: &Path,
 ) -> Result<Simulated, CliError> {
     create_folder(folder).map_err(|source| CliError::Write { path: folder.to_owned(), source })?;
-    let stage = Progress::stage("scan");
+    let stage = WorkProgress::stage("scan");
     let scan = scan(surface, scanner)?;
     drop(stage);
-    let _stage = Progress::stage("touch");
+    let _stage = WorkProgress::stage("touch");
     let Feel { stylus, camera, seed } = feel;
     let touch = touch(surface, path, stylus, *seed)?;
     let see = |camera: &CameraParams| see_markers(&touch.moments, stylus.stiffness, camera, *seed);

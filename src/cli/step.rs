@@ -18,7 +18,7 @@ const LONGEST_LINE: u64 = 64 * 1024;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Question {
+struct StepQuestion {
     p_m: [f64; 3],
     force_n: [f64; 3],
     b_m: [f64; 3],
@@ -30,13 +30,13 @@ struct Question {
     k_n_per_m: Option<f64>,
     alpha_m_per_n_s: f64,
     beta_per_n2_s: f64,
-    step: Rule,
+    step: StepName,
     along: Direction,
 }
 
 #[derive(Deserialize)]
 #[serde(rename_all = "lowercase")]
-enum Rule {
+enum StepName {
     Lie,
     Corrected,
     Dp5,
@@ -89,15 +89,15 @@ pub fn run(mut input: impl BufRead, mut output: impl Write) -> io::Result<()> {
 }
 
 fn answer(line: &[u8]) -> Result<FaceState, StepError> {
-    let question: Question = serde_json::from_slice(line)?;
+    let question: StepQuestion = serde_json::from_slice(line)?;
     let dynamics = FaceDynamics::new(DynamicsParams {
         model: model_of(&question)?,
         alpha_m_per_n_s: question.alpha_m_per_n_s,
         beta_per_n2_s: question.beta_per_n2_s,
         rule: match question.step {
-            Rule::Lie => StepRule::Lie,
-            Rule::Corrected => StepRule::DriftCorrected,
-            Rule::Dp5 => StepRule::DormandPrince,
+            StepName::Lie => StepRule::Lie,
+            StepName::Corrected => StepRule::DriftCorrected,
+            StepName::Dp5 => StepRule::DormandPrince,
         },
         along: match question.along {
             Direction::Normal0 => Along::InitialNormal,
@@ -109,7 +109,7 @@ fn answer(line: &[u8]) -> Result<FaceState, StepError> {
     Ok(dynamics.step(&face, &Point3::from(question.p_m), &Vector3::from(question.force_n), question.dt_s)?)
 }
 
-fn model_of(question: &Question) -> Result<ContactModel, StepError> {
+fn model_of(question: &StepQuestion) -> Result<ContactModel, StepError> {
     let sigmoid = [("h_min_m", question.h_min_m), ("delta", question.delta), ("f_max_n", question.f_max_n)];
     if let Some(stiffness_n_per_m) = question.k_n_per_m {
         return match sigmoid.iter().find(|(_, value)| value.is_some()) {

@@ -9,7 +9,7 @@ use crate::sim::{Moment, Surface, measure_badness};
 
 /// Where the ball really touched the part.
 #[derive(Debug)]
-pub(super) struct Touched(TouchedRegion);
+pub(super) struct TouchedTruth(TouchedRegion);
 
 /// Distances between part and mesh in the touched region, mean and 95th percentile, mm.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -20,7 +20,7 @@ pub(super) struct RegionError {
     pub mesh_to_part_mm: [f64; 2],
 }
 
-impl Touched {
+impl TouchedTruth {
     /// The true contacts of a simulated touch.
     pub fn of(moments: &[Moment]) -> Self {
         Self(TouchedRegion::of(moments.iter().flat_map(|moment| &moment.contacts).map(|contact| contact.point)))

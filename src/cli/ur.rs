@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Subcommand;
 
 use super::{CliError, Losses, tell};
-use crate::robot::ur::{child, setup};
+use crate::ur::{child, setup};
 
 #[derive(Debug, Subcommand)]
 pub(super) enum UrArguments {

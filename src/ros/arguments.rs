@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-use super::names::{NameError, Place, Remap, checked, matches};
+use super::names::{GraphPlace, NameError, Remap, checked, matches};
 use super::parameters::{ParameterError, ParameterValue, Parameters, nearest};
 use crate::io::parameters_file;
 
@@ -17,7 +17,7 @@ mod yaml;
 #[derive(Clone, Debug, PartialEq)]
 pub struct NodeConfig {
     /// name and namespace
-    pub place: Place,
+    pub place: GraphPlace,
     /// 0 to 232: nodes of other domains are not seen
     pub domain_id: u16,
     /// other computers are not seen
@@ -181,7 +181,7 @@ impl NodeConfig {
     /// [`ArgumentError`]: the first thing that is wrong.
     pub fn named(name: &str, ros: &[String], variable: impl Fn(&str) -> Option<String>) -> Result<Self, ArgumentError> {
         let mut config = Self {
-            place: Place { namespace: String::new(), node: name.to_owned() },
+            place: GraphPlace { namespace: String::new(), node: name.to_owned() },
             domain_id: domain_id(variable("ROS_DOMAIN_ID"))?,
             localhost_only: localhost_only(&variable)?,
             remaps: Vec::new(),

@@ -29,14 +29,14 @@ pub struct Remap {
 
 /// A node's place in the graph: what its names are relative to.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Place {
+pub struct GraphPlace {
     /// absolute, without a slash at its end; empty for the root
     pub namespace: String,
     /// one word
     pub node: String,
 }
 
-impl Place {
+impl GraphPlace {
     /// The node's own full name.
     pub fn full_name(&self) -> String {
         format!("{}/{}", self.namespace, self.node)
@@ -109,8 +109,8 @@ pub(super) fn matches(pattern: &str, full_name: &str) -> bool {
 mod tests {
     use super::*;
 
-    fn place(namespace: &str) -> Place {
-        Place { namespace: namespace.into(), node: "touchup".into() }
+    fn place(namespace: &str) -> GraphPlace {
+        GraphPlace { namespace: namespace.into(), node: "touchup".into() }
     }
 
     #[test]

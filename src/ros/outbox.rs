@@ -32,28 +32,28 @@ pub(super) enum Sent {
     Later(Box<Publication>),
 }
 
-enum Message {
+enum Outgoing {
     Answer(Answer),
     Publication(Box<Publication>),
 }
 
 #[derive(Default)]
 struct Waiting {
-    messages: VecDeque<Message>,
+    messages: VecDeque<Outgoing>,
     tiles: VecDeque<Marker>,
     is_closed: bool,
 }
 
 impl Waiting {
-    fn next(&mut self) -> Option<Message> {
-        let tile = || self.tiles.pop_front().map(|tile| Message::Publication(Box::new(Publication::Tile(tile))));
+    fn next(&mut self) -> Option<Outgoing> {
+        let tile = || self.tiles.pop_front().map(|tile| Outgoing::Publication(Box::new(Publication::Tile(tile))));
         self.messages.pop_front().or_else(tile)
     }
 
     fn put_back(&mut self, publication: Publication) {
         match publication {
             Publication::Tile(tile) => self.tiles.push_front(tile),
-            other => self.messages.push_front(Message::Publication(Box::new(other))),
+            other => self.messages.push_front(Outgoing::Publication(Box::new(other))),
         }
     }
 }
@@ -72,13 +72,13 @@ impl Outbox {
     pub fn put(&self, publication: Publication) {
         match publication {
             Publication::Tile(tile) => self.put_tile(tile),
-            other => self.put_message(Message::Publication(Box::new(other))),
+            other => self.put_message(Outgoing::Publication(Box::new(other))),
         }
     }
 
     /// Puts an answer in.
     pub fn answer(&self, answer: Answer) {
-        self.put_message(Message::Answer(answer));
+        self.put_message(Outgoing::Answer(answer));
     }
 
     /// Not sent because nobody took them fast enough, or because ROS refused them: tiles, others.
@@ -95,11 +95,11 @@ impl Outbox {
     pub fn send(&self, publish: impl Fn(Publication) -> Sent) {
         while let Some(message) = self.take() {
             let publication = match message {
-                Message::Answer(send) => {
+                Outgoing::Answer(send) => {
                     send();
                     continue;
                 }
-                Message::Publication(publication) => *publication,
+                Outgoing::Publication(publication) => *publication,
             };
             let count = self.count_of(&publication);
             match publish(publication) {
@@ -127,7 +127,7 @@ impl Outbox {
         if matches!(publication, Publication::Tile(_)) { &self.unsent_tiles } else { &self.unsent_others }
     }
 
-    fn put_message(&self, message: Message) {
+    fn put_message(&self, message: Outgoing) {
         let mut waiting = self.waiting();
         if waiting.messages.len() < MOST {
             waiting.messages.push_back(message);
@@ -149,7 +149,7 @@ impl Outbox {
         self.more.notify_one();
     }
 
-    fn take(&self) -> Option<Message> {
+    fn take(&self) -> Option<Outgoing> {
         let mut waiting = self.waiting();
         loop {
             if let Some(message) = waiting.next() {

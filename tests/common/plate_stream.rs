@@ -3,7 +3,7 @@
 use nalgebra::Isometry3;
 use touchup::mesh::TriMesh;
 use touchup::sim::{
-    Lines, PathParams, Plate, Region, ScannerParams, Stroke, StylusParams, Touch, plan_demo, raster, scan, touch,
+    Lines, PathParams, Plate, RasterRegion, ScannerParams, Stroke, StylusParams, Touch, plan_demo, raster, scan, touch,
 };
 use touchup::touch::{Sample, SyncParams, Synchroniser, TipShape};
 
@@ -24,7 +24,7 @@ fn path(stylus: &StylusParams) -> Vec<Stroke> {
         return plan_demo(&plate, &hand).unwrap();
     }
     let (low, high, frame_ov) = ([0.009, 0.008].into(), [0.065, 0.042].into(), Isometry3::identity());
-    let region = Region { frame_ov, low, high, floor: 8e-3, clear: 20e-3 };
+    let region = RasterRegion { frame_ov, low, high, floor: 8e-3, clear: 20e-3 };
     let hand = PathParams { pitch: 1e-3, ..hand };
     [Lines::AlongX, Lines::AlongY].iter().flat_map(|lines| raster(&region, *lines, &hand).unwrap()).collect()
 }

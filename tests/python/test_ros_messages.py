@@ -143,7 +143,7 @@ def test_lengths_angles_and_forces_are_si():
 
 
 def test_a_feature_mirrors_the_file_of_features():
-    source = (ROOT / "src/io/features_file.rs").read_text()
+    source = (ROOT / "crates/touchup-io/src/features_file.rs").read_text()
     record = re.search(r"pub struct FeatureRecord \{(.*?)\n\}", source, re.DOTALL)[1]
     in_file = {re.sub(r"_(mm|deg)$", "", name) for name in re.findall(r"^    pub (\w+):", record, re.MULTILINE)}
     mine = {name for _, name, _ in fields(sections("msg/Feature.msg")[0])}
@@ -156,7 +156,7 @@ def test_a_feature_mirrors_the_file_of_features():
 
 
 def test_kinds_are_those_of_the_program():
-    source = (ROOT / "src/features/feature.rs").read_text()
+    source = (ROOT / "crates/touchup-core/src/features/feature.rs").read_text()
     kinds = re.findall(r"Self::\w+ => \"(\w+)\"", source)
     constants = re.findall(r"^uint8 KIND_(\w+)=(\d+)$", sections("msg/Feature.msg")[0], re.MULTILINE)
     assert constants == [("UNKNOWN", "0")] + [(kind.upper(), str(i + 1)) for i, kind in enumerate(kinds)]

@@ -39,7 +39,8 @@ def test_format_and_licence(package):
 
 
 def test_both_agree_with_cargo():
-    cargo = tomllib.loads((ROOT / "Cargo.toml").read_text())["package"]
+    manifest = tomllib.loads((ROOT / "Cargo.toml").read_text())
+    cargo = manifest["workspace"]["package"] | {"name": manifest["package"]["name"]}
     node, messages = (parse_package(str(ROOT / folder / "package.xml")) for folder in (".", "msg"))
     assert (node.name, node.version, str(node.licenses[0])) == (cargo["name"], cargo["version"], cargo["license"])
     assert node.get_build_type() == "ament_cargo"

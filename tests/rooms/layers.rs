@@ -1,112 +1,50 @@
-//! Who may use whom: reads `src/` and fails on a reference against the flow of data, and on files, threads, clock,
-//! environment or printing in a room that is pure. Comments, strings and inline tests do not count.
+//! What the order of the crates cannot say: reads the sources and fails on a reference against the flow of data inside a crate, and on
+//! files, threads, clock, environment or printing in a crate that is pure. Comments, strings and inline tests do not count.
 
 use std::fs;
 use std::path::Path;
 
-/// Each room and the rooms it may use; itself always. A room that is missing here fails the check.
-const MAY_USE: &[(&str, &[&str])] = &[
-    ("clock", &[]),
-    ("touch", &[]),
-    ("mesh", &[]),
-    ("patch", &["touch", "mesh"]),
-    ("refine", &["touch", "mesh", "patch"]),
-    ("live", &["clock", "touch", "mesh", "patch", "refine"]),
-    ("explore", &["touch", "mesh", "features"]),
-    ("robot", &["clock", "touch", "explore"]),
-    ("probe", &["touch", "mesh", "features", "explore", "robot"]),
-    ("sim", &["touch", "mesh", "robot"]),
-    ("features", &["touch", "mesh"]),
-    ("align", &["mesh", "features"]),
-    ("compare", &["touch", "mesh", "align", "features"]),
-    ("calibrate", &["touch", "align"]),
-    ("io", &["touch", "mesh", "features", "align", "robot", "probe"]),
-    ("scene", &["touch", "mesh", "patch", "refine", "explore", "robot", "probe", "sim", "io"]),
-    ("session", &["clock", "touch", "mesh", "patch", "refine", "live", "features", "io"]),
+/// A module, and those that it may use.
+type MayUse = (&'static str, &'static [&'static str]);
+
+/// In each crate that has an order of its own: each module and those it may use; itself always. Which crate may use which says
+/// its Cargo.toml.
+const MAY_USE: &[(&str, &[MayUse])] = &[
     (
-        "report",
-        &["touch", "mesh", "patch", "refine", "live", "features", "align", "sim", "compare", "io", "scene", "session"],
-    ),
-    (
-        "ros",
+        "touchup-core",
         &[
-            "clock",
-            "touch",
-            "mesh",
-            "patch",
-            "refine",
-            "live",
-            "features",
-            "explore",
-            "robot",
-            "probe",
-            "sim",
-            "align",
-            "calibrate",
-            "compare",
-            "io",
-            "scene",
-            "session",
+            ("touch", &[]),
+            ("mesh", &[]),
+            ("patch", &["touch", "mesh"]),
+            ("refine", &["touch", "mesh", "patch"]),
+            ("features", &["touch", "mesh"]),
+            ("align", &["mesh", "features"]),
+            ("compare", &["touch", "mesh", "align", "features"]),
+            ("calibrate", &["touch", "align"]),
+            ("explore", &["touch", "mesh", "features"]),
+            ("robot", &["touch", "explore"]),
+            ("probe", &["touch", "mesh", "features", "explore", "robot"]),
         ],
     ),
-    (
-        "cli",
-        &[
-            "clock",
-            "touch",
-            "mesh",
-            "patch",
-            "refine",
-            "live",
-            "features",
-            "explore",
-            "robot",
-            "probe",
-            "sim",
-            "align",
-            "calibrate",
-            "compare",
-            "io",
-            "scene",
-            "session",
-            "report",
-            "ros",
-            "robot",
-        ],
-    ),
+    ("touchup-session", &[("clock", &[]), ("live", &["clock"]), ("scene", &[]), ("session", &["clock", "live"])]),
+    ("touchup", &[("ur", &[]), ("ros", &["ur"]), ("cli", &["ur", "ros"])]),
 ];
 
 /// Same input, same bytes out: nothing of the world outside comes in.
-const PURE: &[&str] = &[
-    "touch",
-    "mesh",
-    "patch",
-    "features",
-    "refine",
-    "align",
-    "compare",
-    "calibrate",
-    "explore",
-    "robot",
-    "probe",
-    "sim",
-];
-
-/// The parts of them that are the way to a device, with its processes, sockets and deadlines; by how their files begin.
-const DEVICES: &[&str] = &["robot/ur/"];
+const PURE: &[&str] = &["touchup-core", "touchup-sim"];
 
 /// The only places with Python.
-const MAY_USE_PYTHON: &[&str] = &["robot/ur/child/"];
+const MAY_USE_PYTHON: &[&str] = &["src/ur/child/"];
 
-/// What a pure room may not name.
+/// What a pure crate may not name.
 const IMPURE_PATHS: &[&str] = &["std::fs", "std::thread", "std::env", "std::io", "std::net", "std::process"];
 const IMPURE_NAMES: &[&str] = &["Instant", "SystemTime", "println", "eprintln", "print", "eprint", "dbg"];
 
-/// The only rooms with file access.
-const MAY_OPEN_FILES: &[&str] = &["io", "scene"];
+/// The only places with file access.
+const MAY_OPEN_FILES: &[&str] = &["crates/touchup-io/", "crates/touchup-session/src/scene/"];
 
 /// The files that ask the system about itself, which answers by files: the packet sizes of its networks.
-const MAY_ASK_THE_SYSTEM: &[&str] = &["ros/dds/answers.rs"];
+const MAY_ASK_THE_SYSTEM: &[&str] = &["src/ros/dds/answers.rs"];
 
 /// The code alone: comments, the insides of strings and characters, and `#[cfg(test)] mod … { … }` are blanked.
 fn code_of(source: &str) -> String {
@@ -271,60 +209,79 @@ fn names_at<'a>(tokens: &[&'a str], at: usize) -> Vec<&'a str> {
     names
 }
 
-/// The room of a file below `src/`, and how many modules deep it is; `None` for `lib.rs` and `main.rs`.
-fn room_of(file: &str) -> Option<(&str, usize)> {
-    let path = file.strip_suffix(".rs")?;
-    let path = path.strip_suffix("/mod").unwrap_or(path);
-    let room = path.split('/').next()?;
-    (room != "lib" && room != "main").then(|| (room, path.split('/').count()))
+/// Where a file is: its crate, its module, and how many modules deep it is; the module of a crate's root is empty.
+struct Place<'a> {
+    package: &'a str,
+    module: &'a str,
+    depth: usize,
 }
 
-/// The rooms that `tokens` reach, from the root of the crate or by enough `super`.
-fn rooms_reached<'a>(tokens: &[&'a str], depth: usize) -> Vec<&'a str> {
-    let mut rooms = Vec::new();
+impl<'a> Place<'a> {
+    /// Of a file's path in the repository.
+    fn of(file: &'a str) -> Self {
+        let (package, path) = match file.strip_prefix("crates/") {
+            Some(file) => file.split_once("/src/").unwrap(),
+            None => ("touchup", file.strip_prefix("src/").unwrap()),
+        };
+        let path = path.strip_suffix(".rs").unwrap();
+        let path = path.strip_suffix("/mod").unwrap_or(path);
+        if path == "lib" || path == "main" {
+            return Self { package, module: "", depth: 0 };
+        }
+        Self { package, module: path.split('/').next().unwrap(), depth: path.split('/').count() }
+    }
+}
+
+/// The modules that `tokens` reach, from the root of the crate or by enough `super`.
+fn modules_reached<'a>(tokens: &[&'a str], depth: usize) -> Vec<&'a str> {
+    let mut modules = Vec::new();
     for at in 0..tokens.len() {
         if at >= 2 && tokens[at - 1] == "::" && (tokens[at - 2] == "super" || tokens[at] == "crate") {
             continue;
         }
         let supers = tokens[at..].chunks(2).take_while(|pair| *pair == ["super", "::"]).count();
         if tokens[at] == "crate" && tokens.get(at + 1) == Some(&"::") {
-            rooms.extend(names_at(tokens, at + 2));
-        } else if supers > 0 && supers >= depth {
-            rooms.extend(names_at(tokens, at + 2 * supers));
+            modules.extend(names_at(tokens, at + 2));
+        } else if supers > 0 && depth > 0 && supers >= depth {
+            modules.extend(names_at(tokens, at + 2 * supers));
         }
     }
-    rooms
+    modules
 }
 
 /// Every breach in one file, each as one line.
 fn breaches(file: &str, source: &str) -> Vec<String> {
-    let Some((room, depth)) = room_of(file) else { return Vec::new() };
-    let Some((_, allowed)) = MAY_USE.iter().find(|(name, _)| *name == room) else {
-        return vec![format!("{file}: the room {room} is not in the table of tests/layers.rs")];
-    };
+    let place = Place::of(file);
     let code = code_of(source);
     let tokens = tokens(&code);
-    let is_pure = PURE.contains(&room) && !DEVICES.iter().any(|start| file.starts_with(start));
-    let may_use_python = MAY_USE_PYTHON.iter().any(|start| file.starts_with(start));
-    let is_room = |name: &&str| MAY_USE.iter().any(|(room, _)| room == name);
-    let mut found: Vec<String> = rooms_reached(&tokens, depth)
-        .into_iter()
-        .filter(|name| is_room(name) && *name != room && !allowed.contains(name))
-        .map(|name| format!("{file}: {room} may not use crate::{name}"))
-        .collect();
+    let mut found = Vec::new();
+    if let Some((_, modules)) = MAY_USE.iter().find(|(package, _)| *package == place.package)
+        && !place.module.is_empty()
+    {
+        let Some((module, allowed)) = modules.iter().find(|(module, _)| *module == place.module) else {
+            return vec![format!("{file}: the module {} is not in the table of tests/rooms/layers.rs", place.module)];
+        };
+        let is_module = |name: &&str| modules.iter().any(|(module, _)| module == name);
+        let reached = modules_reached(&tokens, place.depth).into_iter();
+        let wrong = reached.filter(|name| is_module(name) && name != module && !allowed.contains(name));
+        found.extend(wrong.map(|name| format!("{file}: {module} may not use crate::{name}")));
+    }
+    let is_pure = PURE.contains(&place.package);
+    let is_in = |starts: &[&str]| starts.iter().any(|start| file.starts_with(start));
     for at in 0..tokens.len() {
         let is_std = tokens[at] == "std" && tokens.get(at + 1) == Some(&"::");
         for name in if is_std { names_at(&tokens, at + 2) } else { Vec::new() } {
             let path = format!("std::{name}");
             let is_impure = is_pure && IMPURE_PATHS.contains(&path.as_str());
-            if is_impure || (name == "fs" && !MAY_OPEN_FILES.contains(&room) && !MAY_ASK_THE_SYSTEM.contains(&file)) {
-                found.push(format!("{file}: {room} may not use {path}"));
+            let is_entry = file == "src/main.rs";
+            if is_impure || (name == "fs" && !is_in(MAY_OPEN_FILES) && !is_in(MAY_ASK_THE_SYSTEM) && !is_entry) {
+                found.push(format!("{file} may not use {path}"));
             }
         }
         if is_pure && IMPURE_NAMES.contains(&tokens[at]) {
-            found.push(format!("{file}: {room} is pure and may not use {}", tokens[at]));
+            found.push(format!("{file}: {} is pure and may not use {}", place.package, tokens[at]));
         }
-        if tokens[at] == "pyo3" && !may_use_python {
+        if tokens[at] == "pyo3" && !is_in(MAY_USE_PYTHON) {
             found.push(format!("{file}: Python is in {} alone", MAY_USE_PYTHON.join(", ")));
         }
     }
@@ -343,22 +300,29 @@ fn rust_files(folder: &Path, into: &mut Vec<std::path::PathBuf>) {
 }
 
 #[test]
-fn every_room_keeps_to_the_flow_of_data() {
-    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+fn every_module_keeps_to_the_flow_of_data() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut files = Vec::new();
-    rust_files(&src, &mut files);
-    for room in MAY_USE.iter().map(|(room, _)| room) {
-        let is_there = files.iter().any(|f| f.starts_with(src.join(room)) || *f == src.join(format!("{room}.rs")));
-        assert!(is_there, "the room {room} of the table is not in src/");
+    ["src", "crates"].iter().for_each(|folder| rust_files(&root.join(folder), &mut files));
+    let names: Vec<&str> = files.iter().map(|path| path.strip_prefix(root).unwrap().to_str().unwrap()).collect();
+    let names: Vec<&str> =
+        names.into_iter().filter(|name| name.starts_with("src/") || name.contains("/src/")).collect();
+    for (package, modules) in MAY_USE {
+        for (module, _) in *modules {
+            let is_there = |name: &&str| Place::of(name).package == *package && Place::of(name).module == *module;
+            assert!(names.iter().any(is_there), "the module {module} of the table is not in {package}");
+        }
     }
-    let found: Vec<_> = files
-        .iter()
-        .flat_map(|path| {
-            let file = path.strip_prefix(&src).unwrap().to_str().unwrap();
-            breaches(file, &fs::read_to_string(path).unwrap())
-        })
-        .collect();
+    let found: Vec<_> =
+        names.iter().flat_map(|name| breaches(name, &fs::read_to_string(root.join(name)).unwrap())).collect();
     assert!(found.is_empty(), "\n{}", found.join("\n"));
+}
+
+const CORE: &str = "crates/touchup-core/src";
+
+/// A file of the core below its `src`, or a path from the root of the repository.
+fn path_of(file: &str) -> String {
+    if file.starts_with("src/") || file.starts_with("crates/") { file.to_owned() } else { format!("{CORE}/{file}") }
 }
 
 #[test]
@@ -366,32 +330,33 @@ fn a_breach_is_found_however_it_is_written() {
     let bad = [
         ("touch/sync.rs", "use crate::mesh::TriMesh;"),
         ("touch/sync.rs", "use crate::{mesh::{TriMesh, FaceId}, touch::Sample};"),
-        ("touch/sync.rs", "fn f() -> crate :: io::Error {}"),
+        ("touch/sync.rs", "fn f() -> crate :: patch::Error {}"),
         ("touch/sync.rs", "use super::super::mesh;"),
         ("touch/mod.rs", "use super::{touch, mesh};"),
         ("mesh.rs", "use super::refine;"),
         ("mesh/repair/weld.rs", "use super::super::super::touch;"),
-        ("io/mod.rs", "use crate::cli;"),
-        ("scene.rs", "use crate::cli;"),
+        ("crates/touchup-session/src/scene/mod.rs", "use crate::live;"),
+        ("src/ros/node/mod.rs", "use crate::cli;"),
         ("refine/mod.rs", "use std::fs::File;"),
         ("refine/mod.rs", "use std::{collections::HashMap, thread};"),
         ("refine/mod.rs", "let t = std::time::Instant::now();"),
-        ("sim/mod.rs", "let t = SystemTime::now();"),
-        ("sim/mod.rs", "let home = std::env::var(\"HOME\");"),
+        ("crates/touchup-sim/src/lib.rs", "let t = SystemTime::now();"),
+        ("crates/touchup-sim/src/arm.rs", "let home = std::env::var(\"HOME\");"),
         ("mesh/mod.rs", "/* a */ println!(\"{x}\");"),
         ("mesh/mod.rs", "let c = '\"'; println!(\"{c}\");"),
         ("mesh/mod.rs", "fn f<'a>(x: &'a str) { dbg!(x) }"),
-        ("mesh/mod.rs", "#[cfg(test)] mod tests { fn f() { { } } } use crate::io;"),
-        ("cli/demo.rs", "std::fs::write(path, text)"),
+        ("mesh/mod.rs", "#[cfg(test)] mod tests { fn f() { { } } } use crate::patch;"),
+        ("src/cli/demo.rs", "std::fs::write(path, text)"),
         ("robot/touching.rs", "use std::thread;"),
-        ("robot/ur/client.rs", "use pyo3::Python;"),
-        ("cli/ur.rs", "pyo3::Python::attach(f)"),
-        ("robot/ur/setup.rs", "std::fs::read(path)"),
-        ("robot/ur/arm.rs", "use crate::sim::Plate;"),
+        ("src/ur/client.rs", "use pyo3::Python;"),
+        ("src/cli/ur.rs", "pyo3::Python::attach(f)"),
+        ("src/ur/setup.rs", "std::fs::read(path)"),
+        ("src/ur/arm.rs", "use crate::cli::demo;"),
         ("cellar/mod.rs", ""),
     ];
     for (file, source) in bad {
-        assert_eq!(breaches(file, source).len(), 1, "{file}: {source}: {:?}", breaches(file, source));
+        let found = breaches(&path_of(file), source);
+        assert_eq!(found.len(), 1, "{file}: {source}: {found:?}");
     }
 }
 
@@ -400,16 +365,16 @@ fn what_is_allowed_is_let_through() {
     let good = [
         ("refine/mod.rs", "use crate::touch::Sample; use crate::{mesh::TriMesh, refine::Update}; use super::mesh;"),
         ("touch/sync.rs", "// use crate::mesh\n/* std::fs /* nested */ crate::io */ /// [`crate::refine::Refiner`]\n"),
-        ("touch/sync.rs", "let s = \"crate::io println! \\\" std::fs\"; let r = r#\"std::fs \" crate::mesh\"#;"),
+        ("touch/sync.rs", "let s = \"crate::mesh println! \\\" std::fs\"; let r = r#\"std::fs \" crate::mesh\"#;"),
         ("touch/sync.rs", "use super::mesh_like; use super::super::touch::sync;"),
-        ("mesh/mod.rs", "#[cfg(test)] mod tests { use crate::io; fn f() { println!(\"}\"); } } fn g() {}"),
-        ("io/mod.rs", "use std::fs; use std::io::Read;"),
-        ("cli/refine.rs", "let t = std::time::Instant::now(); println!(\"x\");"),
-        ("robot/ur/client.rs", "use std::{thread, process}; use std::time::Instant; use crate::robot::ArmError;"),
-        ("robot/ur/child/library.rs", "use pyo3::Python;"),
-        ("main.rs", "use std::fs; fn main() { println!() }"),
+        ("mesh/mod.rs", "#[cfg(test)] mod tests { use crate::patch; fn f() { println!(\"}\"); } } fn g() {}"),
+        ("crates/touchup-io/src/lib.rs", "use std::fs; use std::io::Read;"),
+        ("src/cli/refine.rs", "let t = std::time::Instant::now(); println!(\"x\");"),
+        ("src/ur/client.rs", "use std::{thread, process}; use std::time::Instant; use crate::robot::ArmError;"),
+        ("src/ur/child/library.rs", "use pyo3::Python;"),
+        ("src/main.rs", "use std::fs; fn main() { println!() }"),
     ];
     for (file, source) in good {
-        assert_eq!(breaches(file, source), Vec::<String>::new(), "{file}: {source}");
+        assert_eq!(breaches(&path_of(file), source), Vec::<String>::new(), "{file}: {source}");
     }
 }

@@ -499,7 +499,7 @@ fn gravity_in_the_axes_of_space_turns_with_the_scan() {
 #[test]
 fn a_scene_tells_what_is_built_of_it_and_what_is_left_out() {
     let told = |yaml: &str| {
-        let mut built = Scene::from_yaml(yaml).unwrap().built(&["robot"]);
+        let mut built = Scene::from_yaml(yaml).unwrap().built(&["robot"], &touchup::FEATURES);
         // what the program was compiled with differs from one to the other
         for names in [&mut built.built, &mut built.left_out] {
             names.retain(|name| !name.starts_with("feature "));

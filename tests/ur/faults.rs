@@ -8,8 +8,8 @@ use std::time::Duration;
 
 use nalgebra::Vector3;
 use touchup::clock::{Clock, ManualClock};
-use touchup::robot::ur::{Halt, UrArm, UrError};
 use touchup::robot::{Arm, ArmError, Command, LimitError, ProbeError, Safety, TouchOutcome, TouchParams, Watched};
+use touchup::ur::{Halt, UrArm, UrError};
 
 use crate::stand_in::{Line, StandIn, limits};
 use crate::{LATENCY, Onlooker, PLACE, above, at, touched, with_library};

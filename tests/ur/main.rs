@@ -2,7 +2,7 @@
 //!
 //! Whether the arm stands is read in the record of the stand-in, by its own clock. That waits for the client, and so do the deadlines of
 //! client and guard: how busy this machine is changes nothing. When a fault is noticed is a test of the guard and of the driver
-//! (`src/robot/ur`), on clocks that are moved by hand.
+//! (`src/ur`), on clocks that are moved by hand.
 
 mod faults;
 mod motion;
@@ -18,9 +18,9 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use stand_in::{StandIn, limits, packages};
-use touchup::robot::ur::UrArm;
-use touchup::robot::{ProbeError, TouchOutcome, TouchParams, TouchRecord, TouchTarget, Verdict, Watched};
+use touchup::robot::{OnsetVerdict, ProbeError, TouchOutcome, TouchParams, TouchRecord, TouchTarget, Watched};
 use touchup::sim::ArmParams;
+use touchup::ur::UrArm;
 
 /// From an order to the arm that follows it, and from a stop to the last of the motion, s: some periods of the controller.
 const LATENCY: f64 = 20e-3;
@@ -81,7 +81,7 @@ fn a_touch_finds_the_surface() {
         let found = ArmParams::default().pose_bo.inverse_transform_point(centre);
         let error = found.z - (TOP + ArmParams::default().radius);
         println!("{:.1} um off, {:.1} N at most, {onset:?}", error * 1e6, record.peak_force);
-        assert_eq!(onset.verdict, Verdict::Clean, "{onset:?}");
+        assert_eq!(onset.verdict, OnsetVerdict::Clean, "{onset:?}");
         assert!(error.abs() < 25e-6, "{error}");
         assert!(force_b.normalize().z > 0.95, "the part pushes back: {force_b}");
         assert!(record.peak_force < 2.0 * TouchParams::default().force, "{}", record.peak_force);

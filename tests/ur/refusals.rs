@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use nalgebra::Vector3;
 use touchup::clock::Clock;
-use touchup::robot::ur::{UrArm, UrError, UrParams};
 use touchup::robot::{Arm, ArmError, Command};
+use touchup::ur::{UrArm, UrError, UrParams};
 
 use crate::faults::rest_for;
 use crate::stand_in::StandIn;

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use nalgebra::{Point3, Vector3};
 use touchup::robot::Limits;
-use touchup::robot::ur::{UrArm, UrParams};
+use touchup::ur::{UrArm, UrParams};
 
 /// Ports that the library has fixed.
 const PORTS: [u16; 3] = [30004, 29999, 30003];

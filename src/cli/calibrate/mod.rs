@@ -48,7 +48,7 @@ const NO_SCENE: &str = "--scene is needed: it says where the arm stands and what
 
 /// What is written, and how it is told.
 #[derive(Debug, Args)]
-struct Target {
+struct CalibrationTarget {
     /// The scene to put the result into: all else in it stays as it was written. Left out: a new file
     #[arg(long, value_name = "YAML")]
     scene: Option<PathBuf>,
@@ -61,39 +61,39 @@ struct Target {
 }
 
 /// A scene with its text.
-struct Draft {
+struct DraftScene {
     text: String,
     /// what the text says
     scene: Scene,
 }
 
-impl Draft {
+impl DraftScene {
     /// The settings by which a recording is read: those of the scene, or the default ones where there is none.
     fn reading(&self) -> Scene {
         if self.text.is_empty() { Scene::default() } else { self.scene.clone() }
     }
 }
 
-impl Target {
+impl CalibrationTarget {
     /// Refuses to write over `input`, and reads the scene.
-    fn open(&self, flag: &str, input: &Path) -> Result<Draft, CliError> {
+    fn open(&self, flag: &str, input: &Path) -> Result<DraftScene, CliError> {
         check_kept(flag, input, &self.out)?;
         self.open_scene()
     }
 
     /// Reads the scene.
-    fn open_scene(&self) -> Result<Draft, CliError> {
+    fn open_scene(&self) -> Result<DraftScene, CliError> {
         let Some(path) = &self.scene else {
-            return Ok(Draft { text: String::new(), scene: Scene::from_yaml("{}")? });
+            return Ok(DraftScene { text: String::new(), scene: Scene::from_yaml("{}")? });
         };
         let (scene, text) = Scene::read_with_text(path)?;
-        Ok(Draft { text, scene })
+        Ok(DraftScene { text, scene })
     }
 
     /// Puts `found` into the scene and tells what it was.
     fn write<T: Serialize + std::fmt::Display>(
         &self,
-        draft: &Draft,
+        draft: &DraftScene,
         change: &Change,
         found: &T,
     ) -> Result<(), CliError> {
@@ -131,7 +131,7 @@ struct Change {
 
 /// A recording made for a calibration.
 #[derive(Debug, Args)]
-struct Source {
+struct CalibrationRecording {
     /// geometry_msgs/WrenchStamped
     #[arg(long, value_name = "TOPIC", default_value = "/stylus/wrench")]
     wrench_topic: String,
@@ -143,7 +143,7 @@ struct Source {
     markers_topic: Option<String>,
 }
 
-impl Source {
+impl CalibrationRecording {
     fn open(&self, bag: &Path) -> Result<Recording, CliError> {
         let (pose, wrench) = (self.pose_topic.clone(), self.wrench_topic.clone());
         let topics = Topics { pose, wrench, markers: self.markers_topic.clone() };

@@ -10,7 +10,7 @@ use tracing::warn;
 
 use super::super::arm::{CellArguments, RobotName, TruePayload};
 use super::super::{CliError, Losses};
-use super::{Change, Draft, Source, Target, Vector, payload_by_arm, rounded};
+use super::{CalibrationRecording, CalibrationTarget, Change, DraftScene, Vector, payload_by_arm, rounded};
 use crate::calibrate::{PayloadFit, PayloadParams, StaticPose, StillFinder, StillParams, fit_payload};
 use crate::io::static_poses::read_static_poses;
 use crate::scene::{BiasSection, GravityAxes, PayloadSection, Scene, Setting};
@@ -39,9 +39,9 @@ pub(in crate::cli) struct PayloadArguments {
     #[arg(long, value_name = "G", default_value = "9.81")]
     pub(super) gravity_m_per_s2: f64,
     #[command(flatten)]
-    source: Source,
+    source: CalibrationRecording,
     #[command(flatten)]
-    pub(super) target: Target,
+    pub(super) target: CalibrationTarget,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -92,7 +92,7 @@ pub(super) fn warn_of_residuals(fit: &PayloadFit, besides: &str) {
 }
 
 impl PayloadArguments {
-    fn poses(&self, draft: &Draft) -> Result<(Vec<StaticPose>, WrenchFrame, Losses), CliError> {
+    fn poses(&self, draft: &DraftScene) -> Result<(Vec<StaticPose>, WrenchFrame, Losses), CliError> {
         let told = self.wrench_axes.map(|axes| match axes {
             Axes::Sensor => WrenchFrame::Sensor,
             Axes::Pose => WrenchFrame::Object,
@@ -161,7 +161,7 @@ impl PayloadFound {
         }
     }
 
-    fn change(&self, draft: &Draft) -> Change {
+    fn change(&self, draft: &DraftScene) -> Change {
         let digits = |values: &[f64; 3], digits| values.map(|x| rounded(x, digits));
         let payload = PayloadSection {
             mass_kg: rounded(self.mass_kg, 10),

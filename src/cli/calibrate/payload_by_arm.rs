@@ -9,10 +9,10 @@ use serde::Serialize;
 
 use super::super::arm::RobotName;
 use super::super::probing::Ready;
-use super::super::progress::Progress;
+use super::super::progress::WorkProgress;
 use super::super::{CliError, Losses};
 use super::payload::{PayloadArguments, PayloadFound, warn_of_residuals};
-use super::{Change, Draft, NO_SCENE, rounded};
+use super::{Change, DraftScene, NO_SCENE, rounded};
 use crate::calibrate::{PayloadError, PayloadParams, StaticPose, fit_payload};
 use crate::probe::{NotReached, Prober, Weighed, WeighedRest};
 use crate::scene::Setting;
@@ -25,7 +25,7 @@ pub(super) fn payload(arguments: &PayloadArguments, robot: RobotName) -> Result<
     let (scan, unit) = cell.scan(scene)?;
     let ready = Ready::read(scene, &scan, unit)?;
     ready.may_move()?;
-    let weighing = Progress::stage("weigh");
+    let weighing = WorkProgress::stage("weigh");
     let truth = |arm| truth_payload.held_by(arm, &ready.scene);
     let Weighed { rests, not_reached } = cell.with(robot, &ready, truth, |arm| {
         let mut world = ready.still_world();
@@ -77,7 +77,7 @@ struct WeighedFound {
 }
 
 impl WeighedFound {
-    fn change(&self, draft: &Draft) -> Change {
+    fn change(&self, draft: &DraftScene) -> Change {
         let PayloadFound { still_phases, residual_force_n, residual_torque_nm, .. } = self.payload;
         let payload_kg = rounded(self.payload.mass_kg, 10);
         let payload_centre_mm = self.payload.centre_mm.value.map(|mm| rounded(mm, 7));

@@ -9,7 +9,7 @@ use serde::Serialize;
 use tracing::warn;
 
 use super::super::{CliError, Losses, check_kept};
-use super::{Change, Draft, Source, Target, rounded};
+use super::{CalibrationRecording, CalibrationTarget, Change, DraftScene, rounded};
 use crate::align::{PairsFit, PairsParams, PointPair, fit_pairs};
 use crate::calibrate::{RestFinder, RestParams};
 use crate::io::pairs_file::{PairsFile, read_pairs, read_scan_points};
@@ -30,9 +30,9 @@ pub(in crate::cli) struct ScanArguments {
     #[arg(long, value_name = "S")]
     sigma_mm: Option<f64>,
     #[command(flatten)]
-    source: Source,
+    source: CalibrationRecording,
     #[command(flatten)]
-    target: Target,
+    target: CalibrationTarget,
 }
 
 /// The verb.
@@ -56,7 +56,7 @@ pub(super) fn scan(arguments: &ScanArguments) -> Result<Losses, CliError> {
 
 impl ScanArguments {
     /// The points of the file, each with the place where the stylus rested.
-    fn touched_pairs(&self, bag: &Path, draft: &Draft) -> Result<(PairsFile, Losses), CliError> {
+    fn touched_pairs(&self, bag: &Path, draft: &DraftScene) -> Result<(PairsFile, Losses), CliError> {
         check_kept("--bag", bag, &self.target.out)?;
         let mut file = read_scan_points(&self.pairs)?;
         // the poses stay in space: that is what is looked for
@@ -103,7 +103,7 @@ struct ScanFound {
     /// of a pair of unit weight, per axis
     sigma_mm: f64,
     /// p_space = R p_scan + t
-    scan_to_space: Motion,
+    scan_to_space: ScanMotion,
     /// middle of the pairs in space, for which the shift is told
     centroid_mm: [f64; 3],
     shift_std_mm: [f64; 3],
@@ -119,7 +119,7 @@ struct PairFound {
 }
 
 #[derive(Clone, Copy, Debug, Serialize)]
-struct Motion {
+struct ScanMotion {
     position_mm: [f64; 3],
     orientation_xyzw: [f64; 4],
 }
@@ -140,15 +140,15 @@ impl ScanFound {
             pairs: found.collect(),
             rms_mm: fit.rms * 1e3,
             sigma_mm: fit.sigma * 1e3,
-            scan_to_space: Motion { position_mm: [x, y, z], orientation_xyzw: q.into() },
+            scan_to_space: ScanMotion { position_mm: [x, y, z], orientation_xyzw: q.into() },
             centroid_mm: (fit.centroid.coords * 1e3).into(),
             shift_std_mm: three(&sigma, 0, 1e3),
             turn_std_deg: three(&sigma, 3, 1f64.to_degrees()),
         }
     }
 
-    fn change(&self, draft: &Draft) -> Change {
-        let Motion { position_mm, orientation_xyzw } = self.scan_to_space;
+    fn change(&self, draft: &DraftScene) -> Change {
+        let ScanMotion { position_mm, orientation_xyzw } = self.scan_to_space;
         let section = ScanToSpaceSection { position_mm, orientation_xyzw };
         Change {
             settings: vec![

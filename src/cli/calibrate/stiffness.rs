@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::super::arm::ArmArguments;
 use super::super::check::repeated;
 use super::super::{CliError, Losses};
-use super::{Change, NO_SCENE, Target, rounded};
+use super::{CalibrationTarget, Change, NO_SCENE, rounded};
 use crate::probe::Repeatability;
 use crate::scene::Setting;
 
@@ -23,7 +23,7 @@ pub(in crate::cli) struct StiffnessArguments {
     #[arg(long, value_name = "N", default_value_t = 10)]
     touches: usize,
     #[command(flatten)]
-    target: Target,
+    target: CalibrationTarget,
 }
 
 /// The verb.

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::super::arm::{CellArguments, RobotName};
 use super::super::{CliError, Losses};
-use super::{Change, Draft, Source, Target, Vector, rounded, tip_by_arm};
+use super::{CalibrationRecording, CalibrationTarget, Change, DraftScene, Vector, rounded, tip_by_arm};
 use crate::calibrate::{SwingPose, TipFit, TipFitParams, fit_tip};
 use crate::scene::{Scene, Setting};
 
@@ -30,9 +30,9 @@ pub(in crate::cli) struct TipArguments {
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub(super) truth_tip_mm: Option<String>,
     #[command(flatten)]
-    source: Source,
+    source: CalibrationRecording,
     #[command(flatten)]
-    pub(super) target: Target,
+    pub(super) target: CalibrationTarget,
 }
 
 /// Poses that are held at most: three minutes at 1 kHz. Of a longer swing every second one is dropped.
@@ -110,7 +110,7 @@ impl TipFound {
         }
     }
 
-    fn change(&self, draft: &Draft) -> Change {
+    fn change(&self, draft: &DraftScene) -> Change {
         let offset_mm = self.offset_mm.value.map(|x| rounded(x, 7));
         let mut expected: Scene = draft.scene.clone();
         expected.tip.get_or_insert_default().offset_mm = Some(offset_mm);

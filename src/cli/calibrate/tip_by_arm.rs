@@ -7,10 +7,10 @@ use serde::Serialize;
 
 use super::super::arm::{RobotName, millimetres};
 use super::super::probing::Ready;
-use super::super::progress::Progress;
+use super::super::progress::WorkProgress;
 use super::super::{CliError, Losses};
 use super::tip::TipArguments;
-use super::{Change, Draft, NO_SCENE, Vector, rounded};
+use super::{Change, DraftScene, NO_SCENE, Vector, rounded};
 use crate::calibrate::{Known, PlaneTipFit, fit_tip_by_plane};
 use crate::probe::{Cell, NotReached, Pivoted, Prober};
 use crate::scene::Setting;
@@ -27,7 +27,7 @@ pub(super) fn tip(arguments: &TipArguments, robot: RobotName, spot: &str) -> Res
     let (scan, unit) = cell.scan(scene)?;
     let ready = Ready::read(scene, &scan, unit)?;
     ready.may_move()?;
-    let touching = Progress::stage("touch");
+    let touching = WorkProgress::stage("touch");
     let truth = |arm: ArmParams| {
         let Some(text) = truth_tip_mm else { return Ok(arm) };
         let off = millimetres("--truth-tip-mm", text)? - arm.pose_ft.translation.vector;
@@ -71,7 +71,7 @@ impl PivotFound {
         }
     }
 
-    fn change(&self, draft: &Draft) -> Change {
+    fn change(&self, draft: &DraftScene) -> Change {
         let tip_position_mm = self.tip_position_mm.value.map(|mm| rounded(mm, 7));
         let mut expected = draft.scene.clone();
         expected.robot.get_or_insert_default().tip_position_mm = tip_position_mm;

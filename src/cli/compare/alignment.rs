@@ -8,12 +8,12 @@ use serde::Serialize;
 use tracing::warn;
 
 use crate::align::{
-    Alternative, FeaturesError, FeaturesParams, IcpFit, IcpParams, Motion, OrientedPoint, PairsParams, Surfaces,
+    Alternative, FeaturesError, FeaturesParams, IcpFit, IcpParams, Motion, PairsParams, SurfacePoint, Surfaces,
     align_features, fit_pairs, icp,
 };
-use crate::cli::progress::Progress;
+use crate::cli::progress::WorkProgress;
 use crate::cli::{CliError, Threads, tell};
-use crate::compare::{Shape, sample_surface, surface_area};
+use crate::compare::{IndexedMesh, sample_surface, surface_area};
 use crate::features::detect;
 use crate::io::pairs_file::read_pairs;
 use crate::mesh::{FaceTree, TriMesh, VertexId};
@@ -126,8 +126,8 @@ type Aligned = Result<(Isometry3<f64>, Alignment), CliError>;
 ///
 /// # Errors
 /// [`CliError::Align`].
-pub(super) fn aligned_by_icp(mesh: &TriMesh, truth: Shape<'_>, seed: u64) -> Aligned {
-    let _aligning = Progress::stage("align");
+pub(super) fn aligned_by_icp(mesh: &TriMesh, truth: IndexedMesh<'_>, seed: u64) -> Aligned {
+    let _aligning = WorkProgress::stage("align");
     let points: Vec<_> = spread(mesh, POINTS, seed).iter().map(|p| p.point).collect();
     let fit = icp(&points, truth.mesh, truth.tree, &Isometry3::identity(), &IcpParams::default(), &Threads)?;
     let told = Alignment { fit: Some(FitTold::of(&fit, points.len())), ..Alignment::of_icp("icp", &fit) };
@@ -143,12 +143,12 @@ pub(super) fn aligned_by_icp(mesh: &TriMesh, truth: Shape<'_>, seed: u64) -> Ali
 /// [`CliError::AlignFeatures`], after the alternatives went to stdout; [`CliError::Usage`] where there are fewer.
 pub(super) fn aligned_by_features(
     mesh: &TriMesh,
-    truth: Shape<'_>,
+    truth: IndexedMesh<'_>,
     seed: u64,
     alternative: Option<usize>,
     json: bool,
 ) -> Aligned {
-    let _aligning = Progress::stage("align by features");
+    let _aligning = WorkProgress::stage("align by features");
     let own = detect(mesh, &FaceTree::new(mesh), &[]).features;
     let theirs = detect(truth.mesh, truth.tree, &[]).features;
     let points = spread(mesh, POINTS_EACH, seed);
@@ -205,9 +205,9 @@ pub(super) fn aligned_by_pairs(path: &Path) -> Aligned {
     Ok((fit.motion, told))
 }
 
-fn spread(mesh: &TriMesh, count: f64, seed: u64) -> Vec<OrientedPoint> {
+fn spread(mesh: &TriMesh, count: f64, seed: u64) -> Vec<SurfacePoint> {
     let samples = sample_surface(mesh, count / surface_area(mesh).max(f64::MIN_POSITIVE), seed);
-    samples.iter().map(|sample| OrientedPoint { point: sample.point, normal: mesh.normal(sample.face) }).collect()
+    samples.iter().map(|sample| SurfacePoint { point: sample.point, normal: mesh.normal(sample.face) }).collect()
 }
 
 /// The mesh after a motion.

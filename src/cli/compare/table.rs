@@ -4,8 +4,8 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::Told;
-use crate::compare::{Comparison, Histogram, Region, RegionComparison, Summary, TiltSummary};
+use super::CompareReport;
+use crate::compare::{Comparison, Histogram, RegionComparison, Summary, SupportRegion, TiltSummary};
 
 /// What `--json` prints of one mesh.
 #[derive(Debug, Serialize)]
@@ -15,11 +15,11 @@ pub(super) struct ComparisonTold {
     /// of the true surface, which the mesh does not show: never scanned, or missing
     unseen_share: f64,
     /// all, touched, guessed, untouched, as far as they are there
-    regions: Vec<RegionTold>,
+    regions: Vec<DeviationRow>,
 }
 
 #[derive(Debug, Serialize)]
-struct RegionTold {
+struct DeviationRow {
     region: &'static str,
     mesh_to_truth: Option<SummaryTold>,
     truth_to_mesh: Option<SummaryTold>,
@@ -65,12 +65,12 @@ struct HistogramTold {
 
 impl ComparisonTold {
     pub fn of(comparison: &Comparison) -> Self {
-        let regions = comparison.regions.iter().map(RegionTold::of).collect();
+        let regions = comparison.regions.iter().map(DeviationRow::of).collect();
         Self { density_per_mm2: comparison.density * 1e-6, unseen_share: comparison.unseen, regions }
     }
 }
 
-impl RegionTold {
+impl DeviationRow {
     fn of(part: &RegionComparison) -> Self {
         let told = |summary: &Option<Summary>| summary.as_ref().map(SummaryTold::of);
         let unsigned = |summary| told(summary).map(|told| SummaryTold { bias_mm: None, ..told });
@@ -107,18 +107,18 @@ impl SummaryTold {
     }
 }
 
-fn name_of(region: Option<Region>) -> &'static str {
+fn name_of(region: Option<SupportRegion>) -> &'static str {
     match region {
         None => "all",
-        Some(Region::Touched) => "touched",
-        Some(Region::Guessed) => "guessed",
-        Some(Region::Untouched) => "untouched",
+        Some(SupportRegion::Touched) => "touched",
+        Some(SupportRegion::Guessed) => "guessed",
+        Some(SupportRegion::Untouched) => "untouched",
     }
 }
 
 /// What stands below a picture: how far the touched part is off where there is one, else all, and what the colours clip.
 pub(super) fn note(comparison: &Comparison) -> String {
-    let touched = comparison.regions.iter().find(|part| part.region == Some(Region::Touched));
+    let touched = comparison.regions.iter().find(|part| part.region == Some(SupportRegion::Touched));
     let Some(part) = touched.or(comparison.regions.first()) else { return String::new() };
     let Some(Summary { mean, p95, .. }) = part.mesh_to_truth else { return String::new() };
     let Histogram { counts, below, above, .. } = &comparison.regions[0].histogram;
@@ -129,7 +129,7 @@ pub(super) fn note(comparison: &Comparison) -> String {
 
 const HEAD: &str = "                            mean      rms   median      p95      p99      max     bias    points";
 
-impl fmt::Display for Told {
+impl fmt::Display for CompareReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (what, shape) in [("mesh", &self.mesh), ("truth", &self.truth)] {
             let [x, y, z] = shape.size_mm;
@@ -160,7 +160,7 @@ impl fmt::Display for ComparisonTold {
     }
 }
 
-impl fmt::Display for RegionTold {
+impl fmt::Display for DeviationRow {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let rows = [
             ("mesh to truth", &self.mesh_to_truth),

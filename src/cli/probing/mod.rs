@@ -10,7 +10,7 @@ use std::sync::Arc;
 use nalgebra::Point3;
 use tracing::info;
 
-use super::progress::Progress;
+use super::progress::WorkProgress;
 use super::refine::{RefineArguments, Refined};
 use super::{CliError, Losses};
 use crate::features::Kind;
@@ -22,11 +22,11 @@ use crate::mesh::{FaceTree, TriMesh};
 use crate::probe::{Cell, Ending, Flag, Plan, ProbeParams, Probed, Prober, StillWorld, plan};
 use crate::robot::Arm;
 #[cfg(feature = "ur")]
-use crate::robot::ur::UrParams;
-#[cfg(feature = "ur")]
 use crate::scene::RobotSection;
 use crate::scene::{Scene, simulated_arm};
 use crate::sim::ArmParams;
+#[cfg(feature = "ur")]
+use crate::ur::UrParams;
 use picture::{draw_plan, draw_touches};
 pub(super) use report::{ProbedFile, ProbingSummary};
 use world::LiveWorld;
@@ -144,7 +144,7 @@ impl Probing<'_> {
 
     /// Plans all, and draws the plan; nothing moves.
     pub fn planned(&self, ready: &Ready, arm: &mut dyn Arm) -> Result<Vec<Plan>, CliError> {
-        let _planning = Progress::stage("plan");
+        let _planning = WorkProgress::stage("plan");
         let now = arm.next_state().map_err(|error| CliError::Arm(error.to_string()))?;
         let world = ready.still_world();
         let plan_of = |flag: &Flag| {

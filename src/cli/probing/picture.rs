@@ -5,7 +5,7 @@ use std::path::Path;
 use nalgebra::{Point3, Vector3};
 
 use crate::cli::CliError;
-use crate::compare::{Drawing, Panel, PictureParams, Rgb, draw_picture};
+use crate::compare::{DrawnMesh, PicturePanel, PictureParams, Rgb, draw_picture};
 use crate::io::png::write_png;
 use crate::mesh::TriMesh;
 use crate::probe::{Flag, Plan, Probed};
@@ -32,15 +32,20 @@ fn diagonal(mesh: &TriMesh) -> f64 {
     (high - low).norm()
 }
 
-fn write(panels: &[(Drawing, &str, String)], title: &str, legend: &[(Rgb, &str)], path: &Path) -> Result<(), CliError> {
+fn write(
+    panels: &[(DrawnMesh, &str, String)],
+    title: &str,
+    legend: &[(Rgb, &str)],
+    path: &Path,
+) -> Result<(), CliError> {
     let mut drawn = Vec::new();
     for (drawing, title, note) in panels {
         let (mesh, paint) = drawing.clone().finish()?;
         drawn.push((mesh, paint, *title, note.as_str()));
     }
-    let panels: Vec<Panel<'_>> = drawn
+    let panels: Vec<PicturePanel<'_>> = drawn
         .iter()
-        .map(|(mesh, paint, title, note)| Panel {
+        .map(|(mesh, paint, title, note)| PicturePanel {
             mesh,
             deviations: &[],
             classes: None,
@@ -55,7 +60,7 @@ fn write(panels: &[(Drawing, &str, String)], title: &str, legend: &[(Rgb, &str)]
     write_png(path, picture.size, &picture.pixels).map_err(|source| CliError::Write { path: path.to_owned(), source })
 }
 
-fn flagged(drawing: &mut Drawing, flags: &[Flag], size: f64) {
+fn flagged(drawing: &mut DrawnMesh, flags: &[Flag], size: f64) {
     for flag in flags {
         let head = flag.place + Vector3::z() * (PIN * size);
         drawing.line(&flag.place, &head, 2.0 * LINE * size, FLAG);
@@ -66,7 +71,7 @@ fn flagged(drawing: &mut Drawing, flags: &[Flag], size: f64) {
 /// The scan with the way that the arm would go.
 pub(super) fn draw_plan(scan: &TriMesh, plans: &[Plan], flags: &[Flag], path: &Path) -> Result<(), CliError> {
     let size = diagonal(scan);
-    let mut drawing = Drawing::of(scan, PART);
+    let mut drawing = DrawnMesh::of(scan, PART);
     for plan in plans {
         for pair in plan.path.windows(2) {
             drawing.line(&pair[0], &pair[1], LINE * size, WAY);
@@ -93,7 +98,7 @@ pub(super) fn draw_plan(scan: &TriMesh, plans: &[Plan], flags: &[Flag], path: &P
 /// The refined mesh with the touches that were made.
 pub(super) fn draw_touches(mesh: &TriMesh, probed: &[Probed], flags: &[Flag], path: &Path) -> Result<(), CliError> {
     let size = diagonal(mesh);
-    let mut drawing = Drawing::of(mesh, PART);
+    let mut drawing = DrawnMesh::of(mesh, PART);
     let (mut felt, mut missed, mut refused) = (0, 0, 0);
     for touch in probed.iter().flat_map(|one| &one.touches) {
         let along = touch.wish.direction.into_inner();

@@ -7,7 +7,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::cli::CliError;
-use crate::cli::refine::Summary;
+use crate::cli::refine::RefineSummary;
 use crate::features::Kind;
 use crate::io::atomic::write_atomically;
 use crate::io::features_file::FeatureRecord;
@@ -80,7 +80,7 @@ impl SlideRecordOfFile {
 #[derive(Debug, Serialize)]
 pub(in crate::cli) struct ProbingSummary {
     features: Vec<ProbedRecord>,
-    refine: Summary,
+    refine: RefineSummary,
 }
 
 fn code(ending: &Ending) -> &'static str {
@@ -129,7 +129,7 @@ impl ProbedFile {
 }
 
 impl ProbingSummary {
-    pub fn of(probed: &[Probed], flags: &[Flag], refine: Summary) -> Self {
+    pub fn of(probed: &[Probed], flags: &[Flag], refine: RefineSummary) -> Self {
         Self { features: ProbedFile::of(probed, flags).features, refine }
     }
 }

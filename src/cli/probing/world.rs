@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::Point3;
 
 use crate::cli::CliError;
-use crate::cli::progress::Progress as Bar;
+use crate::cli::progress::WorkProgress as Bar;
 use crate::live::{LiveError, LiveRefiner, Pace};
 use crate::mesh::{FaceHit, FaceTree, TriMesh};
 use crate::patch::Patcher;
@@ -23,7 +23,7 @@ const EVERY_NS: i64 = 200_000_000;
 
 /// Takes each state of the arm for a sample, and keeps it.
 pub(super) struct LiveWorld<'a> {
-    engine: Engine,
+    engine: ProbingEngine,
     cell: &'a Cell,
     messages: Vec<Message>,
     failed: Option<LiveError>,
@@ -31,7 +31,7 @@ pub(super) struct LiveWorld<'a> {
 }
 
 /// With or without a patch.
-enum Engine {
+enum ProbingEngine {
     Alone(Box<Refiner>),
     Live(Box<LiveRefiner>),
 }
@@ -47,12 +47,12 @@ impl<'a> LiveWorld<'a> {
         let params = scene.refine_params(WrenchFrame::Sensor).ok_or_else(nothing)?;
         let refiner = Refiner::new(scan.0.clone(), params)?;
         let engine = match scene.patcher_params(WrenchFrame::Sensor) {
-            None => Engine::Alone(Box::new(refiner)),
+            None => ProbingEngine::Alone(Box::new(refiner)),
             Some(patcher) => {
                 let patcher = Patcher::new(patcher).map_err(RefineError::from)?;
                 // what a simulated arm is told does not depend on how fast this computer is; one that exists goes on meanwhile
                 let pace = Pace { is_patient: is_simulated, every_ns: EVERY_NS, ..Pace::default() };
-                Engine::Live(Box::new(LiveRefiner::new(scan, refiner, patcher, pace, ROOM)?))
+                ProbingEngine::Live(Box::new(LiveRefiner::new(scan, refiner, patcher, pace, ROOM)?))
             }
         };
         Ok(Self { engine, cell, messages: Vec::new(), failed: None, bar: Bar::new("probe", None) })
@@ -60,8 +60,8 @@ impl<'a> LiveWorld<'a> {
 
     fn refiner(&self) -> &Refiner {
         match &self.engine {
-            Engine::Alone(refiner) => refiner,
-            Engine::Live(live) => live.refiner(),
+            ProbingEngine::Alone(refiner) => refiner,
+            ProbingEngine::Live(live) => live.refiner(),
         }
     }
 
@@ -89,8 +89,8 @@ impl Witness for LiveWorld<'_> {
         self.messages.push(Message::Wrench(StampedWrench { stamp_ns, wrench }));
         let sample = Sample { stamp_ns, pose_ot, wrench };
         let pushed = match &mut self.engine {
-            Engine::Alone(refiner) => refiner.push(&sample).map(drop).map_err(LiveError::from),
-            Engine::Live(live) => live.push(&sample).map(drop),
+            ProbingEngine::Alone(refiner) => refiner.push(&sample).map(drop).map_err(LiveError::from),
+            ProbingEngine::Live(live) => live.push(&sample).map(drop),
         };
         match pushed {
             Ok(()) | Err(LiveError::Refine(_)) => {}

@@ -7,9 +7,9 @@ use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 use crate::ros::parameters::ParameterValue;
 
 /// A piece of YAML, in the order of the file.
-enum Piece {
+enum YamlPiece {
     Value(ParameterValue),
-    Map(Vec<(String, Piece)>),
+    Map(Vec<(String, YamlPiece)>),
     List,
     Nothing,
 }
@@ -19,11 +19,11 @@ const INNER: &str = "ros__parameters";
 /// Pattern of the nodes, name and value of every parameter in a file. Names of nested parameters are joined by dots.
 pub(super) fn entries(text: &str) -> Result<Vec<(String, String, ParameterValue)>, String> {
     // an empty file says nothing
-    let piece: Option<Piece> = serde_saphyr::from_str(text).map_err(|error| error.to_string())?;
+    let piece: Option<YamlPiece> = serde_saphyr::from_str(text).map_err(|error| error.to_string())?;
     let mut found = Vec::new();
     match piece {
-        None | Some(Piece::Nothing) => {}
-        Some(Piece::Map(nodes)) => {
+        None | Some(YamlPiece::Nothing) => {}
+        Some(YamlPiece::Map(nodes)) => {
             for (key, below) in nodes {
                 nodes_below(&key, below, &mut found)?;
             }
@@ -33,8 +33,8 @@ pub(super) fn entries(text: &str) -> Result<Vec<(String, String, ParameterValue)
     Ok(found)
 }
 
-fn nodes_below(path: &str, piece: Piece, found: &mut Vec<(String, String, ParameterValue)>) -> Result<(), String> {
-    let Piece::Map(entries) = piece else {
+fn nodes_below(path: &str, piece: YamlPiece, found: &mut Vec<(String, String, ParameterValue)>) -> Result<(), String> {
+    let YamlPiece::Map(entries) = piece else {
         return Err(format!("\"{path}\" is no node: below it must be {INNER}, or a node"));
     };
     for (key, below) in entries {
@@ -47,22 +47,24 @@ fn nodes_below(path: &str, piece: Piece, found: &mut Vec<(String, String, Parame
     Ok(())
 }
 
-fn parameters_below(nodes: &str, prefix: &str, piece: Piece, found: &mut Vec<(String, String, ParameterValue)>) {
+fn parameters_below(nodes: &str, prefix: &str, piece: YamlPiece, found: &mut Vec<(String, String, ParameterValue)>) {
     match piece {
-        Piece::Map(entries) => {
+        YamlPiece::Map(entries) => {
             for (key, below) in entries {
                 let name = if prefix.is_empty() { key } else { format!("{prefix}.{key}") };
                 parameters_below(nodes, &name, below, found);
             }
         }
-        Piece::Value(value) => found.push((nodes.to_owned(), prefix.to_owned(), value)),
+        YamlPiece::Value(value) => found.push((nodes.to_owned(), prefix.to_owned(), value)),
         // no parameter of this node is a list: it is refused as a wrong word, or is for another node
-        Piece::List => found.push((nodes.to_owned(), prefix.to_owned(), ParameterValue::String("[...]".to_owned()))),
-        Piece::Nothing => {}
+        YamlPiece::List => {
+            found.push((nodes.to_owned(), prefix.to_owned(), ParameterValue::String("[...]".to_owned())))
+        }
+        YamlPiece::Nothing => {}
     }
 }
 
-impl<'de> Deserialize<'de> for Piece {
+impl<'de> Deserialize<'de> for YamlPiece {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         deserializer.deserialize_any(PieceVisitor)
     }
@@ -71,54 +73,54 @@ impl<'de> Deserialize<'de> for Piece {
 struct PieceVisitor;
 
 impl<'de> Visitor<'de> for PieceVisitor {
-    type Value = Piece;
+    type Value = YamlPiece;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("a value, a list or keys with values")
     }
 
-    fn visit_bool<E>(self, value: bool) -> Result<Piece, E> {
-        Ok(Piece::Value(ParameterValue::Bool(value)))
+    fn visit_bool<E>(self, value: bool) -> Result<YamlPiece, E> {
+        Ok(YamlPiece::Value(ParameterValue::Bool(value)))
     }
 
-    fn visit_i64<E>(self, value: i64) -> Result<Piece, E> {
-        Ok(Piece::Value(ParameterValue::Integer(value)))
+    fn visit_i64<E>(self, value: i64) -> Result<YamlPiece, E> {
+        Ok(YamlPiece::Value(ParameterValue::Integer(value)))
     }
 
-    fn visit_u64<E>(self, value: u64) -> Result<Piece, E> {
-        Ok(Piece::Value(i64::try_from(value).map_or(ParameterValue::Double(value as f64), ParameterValue::Integer)))
+    fn visit_u64<E>(self, value: u64) -> Result<YamlPiece, E> {
+        Ok(YamlPiece::Value(i64::try_from(value).map_or(ParameterValue::Double(value as f64), ParameterValue::Integer)))
     }
 
-    fn visit_f64<E>(self, value: f64) -> Result<Piece, E> {
-        Ok(Piece::Value(ParameterValue::Double(value)))
+    fn visit_f64<E>(self, value: f64) -> Result<YamlPiece, E> {
+        Ok(YamlPiece::Value(ParameterValue::Double(value)))
     }
 
-    fn visit_str<E>(self, value: &str) -> Result<Piece, E> {
-        Ok(Piece::Value(ParameterValue::String(value.to_owned())))
+    fn visit_str<E>(self, value: &str) -> Result<YamlPiece, E> {
+        Ok(YamlPiece::Value(ParameterValue::String(value.to_owned())))
     }
 
-    fn visit_unit<E>(self) -> Result<Piece, E> {
-        Ok(Piece::Nothing)
+    fn visit_unit<E>(self) -> Result<YamlPiece, E> {
+        Ok(YamlPiece::Nothing)
     }
 
-    fn visit_none<E>(self) -> Result<Piece, E> {
-        Ok(Piece::Nothing)
+    fn visit_none<E>(self) -> Result<YamlPiece, E> {
+        Ok(YamlPiece::Nothing)
     }
 
-    fn visit_some<D: Deserializer<'de>>(self, deserializer: D) -> Result<Piece, D::Error> {
+    fn visit_some<D: Deserializer<'de>>(self, deserializer: D) -> Result<YamlPiece, D::Error> {
         deserializer.deserialize_any(self)
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Piece, A::Error> {
-        while items.next_element::<Piece>()?.is_some() {}
-        Ok(Piece::List)
+    fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<YamlPiece, A::Error> {
+        while items.next_element::<YamlPiece>()?.is_some() {}
+        Ok(YamlPiece::List)
     }
 
-    fn visit_map<A: MapAccess<'de>>(self, mut entries: A) -> Result<Piece, A::Error> {
+    fn visit_map<A: MapAccess<'de>>(self, mut entries: A) -> Result<YamlPiece, A::Error> {
         let mut map = Vec::new();
         while let Some(entry) = entries.next_entry()? {
             map.push(entry);
         }
-        Ok(Piece::Map(map))
+        Ok(YamlPiece::Map(map))
     }
 }

@@ -20,7 +20,7 @@ use super::incoming::Listener;
 use super::server::SERVICE;
 use super::services::unreadable;
 use super::topics::dds_name;
-use super::{RosError, Shared, mapping};
+use super::{DdsShared, RosError, mapping};
 use crate::ros::arguments::NodeConfig;
 use crate::ros::messages::{ProbeFeedback, ProbeGoal, ProbeResponse};
 use crate::ros::port::{Arrival, Call, Feedback, Goal, GoalEnd, Reply};
@@ -35,9 +35,9 @@ const MOST_GOALS: usize = 32;
 /// Calls that wait for the result of one goal.
 const MOST_WAITING: usize = 16;
 
-type Server = ActionServer<ProbeGoal, ProbeResponse, ProbeFeedback>;
+type ProbeServer = ActionServer<ProbeGoal, ProbeResponse, ProbeFeedback>;
 
-struct Known {
+struct KnownGoal {
     status: GoalStatusEnum,
     accepted: Time,
     number: u64,
@@ -46,7 +46,7 @@ struct Known {
     waiting: Vec<RmwRequestId>,
 }
 
-impl Known {
+impl KnownGoal {
     fn is_over(&self) -> bool {
         self.result.is_some()
     }
@@ -54,23 +54,23 @@ impl Known {
 
 #[derive(Default)]
 struct Goals {
-    known: BTreeMap<GoalId, Known>,
+    known: BTreeMap<GoalId, KnownGoal>,
     next: u64,
 }
 
-struct Probe {
-    server: Server,
-    shared: Arc<Shared>,
+struct ProbeAction {
+    server: ProbeServer,
+    shared: Arc<DdsShared>,
     goals: Mutex<Goals>,
 }
 
-struct ProbeListener(Arc<Probe>);
+struct ProbeListener(Arc<ProbeAction>);
 
 /// The server of the action.
 pub(super) fn server(
     config: &NodeConfig,
     node: &mut Node,
-    shared: &Arc<Shared>,
+    shared: &Arc<DdsShared>,
 ) -> Result<Box<dyn Listener>, RosError> {
     let latched = SERVICE.durability(Durability::TransientLocal).history(History::KeepLast { depth: 1 });
     let qos = ActionServerQosPolicies {
@@ -84,7 +84,7 @@ pub(super) fn server(
     let type_name = ActionTypeName::new("touchup_msgs", "Probe");
     let server = node.create_action_server(mapping(config), &name, &type_name, qos);
     let server = server.map_err(|error| RosError::dds("offering an action", &error))?;
-    let probe = Probe { server, shared: shared.clone(), goals: Mutex::default() };
+    let probe = ProbeAction { server, shared: shared.clone(), goals: Mutex::default() };
     Ok(Box::new(ProbeListener(Arc::new(probe))))
 }
 
@@ -111,7 +111,7 @@ impl Listener for ProbeListener {
 }
 
 fn drain<T>(
-    shared: &Shared,
+    shared: &DdsShared,
     receive: impl Fn() -> ros2_client::ReadResult<Option<(RmwRequestId, T)>>,
     take: impl Fn(RmwRequestId, T),
 ) {
@@ -124,7 +124,7 @@ fn drain<T>(
     }
 }
 
-impl Probe {
+impl ProbeAction {
     fn goals(&self) -> MutexGuard<'_, Goals> {
         // no code of ours panics while it holds it
         self.goals.lock().unwrap_or_else(PoisonError::into_inner)
@@ -202,11 +202,11 @@ impl Probe {
     /// Somebody waits for the result of a goal.
     fn wait_for(self: &Arc<Self>, request_id: RmwRequestId, id: GoalId) {
         let (status, response) = match self.goals().known.get_mut(&id) {
-            Some(Known { result: None, waiting, .. }) if waiting.len() < MOST_WAITING => {
+            Some(KnownGoal { result: None, waiting, .. }) if waiting.len() < MOST_WAITING => {
                 waiting.push(request_id);
                 return;
             }
-            Some(Known { result: Some(response), status, .. }) => (*status, response.clone()),
+            Some(KnownGoal { result: Some(response), status, .. }) => (*status, response.clone()),
             _ => (GoalStatusEnum::Unknown, ProbeResponse::default()),
         };
         self.later(move |probe| probe.send_result(request_id, status, response));
@@ -227,7 +227,7 @@ impl Probe {
     }
 
     fn tell_status(&self) {
-        let status = |(id, known): (&GoalId, &Known)| GoalStatus {
+        let status = |(id, known): (&GoalId, &KnownGoal)| GoalStatus {
             goal_info: GoalInfo { goal_id: *id, stamp: known.accepted },
             status: known.status,
         };
@@ -264,7 +264,7 @@ impl Goals {
             self.known.remove(&oldest);
         }
         let Entry::Vacant(place) = self.known.entry(id) else { return false };
-        place.insert(Known {
+        place.insert(KnownGoal {
             status: GoalStatusEnum::Accepted,
             accepted: Time::ZERO,
             number: self.next,

@@ -33,7 +33,7 @@ const HEADERS: usize = 192;
 const ENCAPSULATION: usize = 4;
 
 /// An answer that can be made smaller.
-pub(super) trait Answer: ros2_client::Message {
+pub(super) trait Shrinkable: ros2_client::Message {
     /// Leaves out what does not fit into so many bytes, what matters least first. The rest stays true.
     fn reduce(&mut self, most: usize);
 }
@@ -56,12 +56,12 @@ impl Room {
     }
 
     /// The answer of a service, or what of it there is room for.
-    pub fn fit<A: Answer>(&self, service: &'static str, answer: A) -> A {
+    pub fn fit<A: Shrinkable>(&self, service: &'static str, answer: A) -> A {
         if self.is_for_services { self.fit_packet(service, answer) } else { answer }
     }
 
     /// The answer, or what of it fits into one packet.
-    pub fn fit_packet<A: Answer>(&self, service: &'static str, mut answer: A) -> A {
+    pub fn fit_packet<A: Shrinkable>(&self, service: &'static str, mut answer: A) -> A {
         let bytes = size(&answer);
         if bytes <= self.most {
             return answer;
@@ -121,7 +121,7 @@ fn excess(answer: &impl ros2_client::Message, most: usize) -> usize {
 /// Answers of which the texts alone have no limit: `texts!(Answer: text, text)`, what matters least first.
 macro_rules! texts {
     ($($answer:ty: $($field:ident).+ $(, $($then:ident).+)*;)+) => {
-        $(impl Answer for $answer {
+        $(impl Shrinkable for $answer {
             fn reduce(&mut self, most: usize) {
                 texts!(@cut self, most, $($field).+);
                 $(texts!(@cut self, most, $($then).+);)*
@@ -151,26 +151,26 @@ texts! {
     SetParametersAtomicallyResponse: result.reason;
 }
 
-impl Answer for GetParametersResponse {
+impl Shrinkable for GetParametersResponse {
     fn reduce(&mut self, _: usize) {
         // a value for each name, or none
         self.values.clear();
     }
 }
 
-impl Answer for GetParameterTypesResponse {
+impl Shrinkable for GetParameterTypesResponse {
     fn reduce(&mut self, _: usize) {
         self.values.clear();
     }
 }
 
-impl Answer for ListParametersResponse {
+impl Shrinkable for ListParametersResponse {
     fn reduce(&mut self, _: usize) {
         self.result.names.clear();
     }
 }
 
-impl Answer for DescribeParametersResponse {
+impl Shrinkable for DescribeParametersResponse {
     fn reduce(&mut self, most: usize) {
         // types, ranges and words to choose from are what programs need
         self.values.iter_mut().for_each(|one| one.description.clear());
@@ -180,7 +180,7 @@ impl Answer for DescribeParametersResponse {
     }
 }
 
-impl Answer for SetParametersResponse {
+impl Shrinkable for SetParametersResponse {
     fn reduce(&mut self, most: usize) {
         // whether each is set comes before why not
         self.results.iter_mut().for_each(|one| one.reason.clear());
@@ -209,7 +209,7 @@ mod tests {
     }
 
     /// Whatever its texts, it fits, and says that it was cut.
-    fn fits<A: Answer>(mut answer: A) -> A {
+    fn fits<A: Shrinkable>(mut answer: A) -> A {
         assert!(size(&answer) > ETHERNET, "{}", size(&answer));
         answer.reduce(room(TUNNEL));
         assert!(size(&answer) <= room(TUNNEL), "{} bytes", size(&answer));

@@ -14,7 +14,7 @@ use ros2_client::{Context, ServiceMapping};
 
 use super::incoming::Listener;
 use super::keep_alive::{KeepAlive, LOOK_EVERY};
-use super::{Shared, mapping};
+use super::{DdsShared, mapping};
 use crate::ros::arguments::NodeConfig;
 use crate::ros::port::{Arrival, Endpoint};
 
@@ -26,11 +26,11 @@ const MOST_PARTICIPANTS: usize = 1024;
 /// Callers of services that are remembered.
 const MOST_CALLERS: usize = 4096;
 
-pub(super) struct Graph {
+pub(super) struct DdsGraph {
     listener: DomainParticipantStatusListener,
     /// `None` on this computer alone, where nobody is out of reach
     keep_alive: Option<KeepAlive>,
-    shared: Arc<Shared>,
+    shared: Arc<DdsShared>,
     mapping: ServiceMapping,
     own: GUID,
     /// ROS name and type of our topics, by their name in DDS
@@ -49,8 +49,8 @@ pub(super) struct Graph {
     tiles: Option<GUID>,
 }
 
-impl Graph {
-    pub fn new(context: &Context, shared: &Arc<Shared>, config: &NodeConfig) -> Self {
+impl DdsGraph {
+    pub fn new(context: &Context, shared: &Arc<DdsShared>, config: &NodeConfig) -> Self {
         let participant = context.domain_participant();
         let keep_alive = (!config.localhost_only).then(|| {
             KeepAlive::new(config.domain_id, participant.participant_id()).inspect_err(
@@ -232,7 +232,7 @@ fn difference(wanted: &QosPolicies, offered: &QosPolicies) -> String {
     }
 }
 
-impl Listener for Graph {
+impl Listener for DdsGraph {
     fn source(&mut self, number: usize) -> &mut dyn Source {
         match &mut self.keep_alive {
             Some(keep_alive) if number > 0 => keep_alive.source(),

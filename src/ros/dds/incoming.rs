@@ -10,7 +10,7 @@ use ros2_client::dds::rustdds::mio1::event::Source;
 use ros2_client::dds::rustdds::mio1::{Events, Interest, Poll, Token, Waker};
 use ros2_client::{Gid, Subscription};
 
-use super::{RosError, Shared};
+use super::{DdsShared, RosError};
 use crate::ros::messages::Message;
 use crate::ros::port::Arrival;
 
@@ -40,7 +40,7 @@ const WAKE: Token = Token(usize::MAX);
 /// Starts the thread; the waker lets it look whether all is over.
 pub(super) fn listen(
     mut listeners: Vec<Box<dyn Listener>>,
-    shared: Arc<Shared>,
+    shared: Arc<DdsShared>,
 ) -> Result<(Arc<Waker>, JoinHandle<()>), RosError> {
     let mut poll = Poll::new()?;
     for (token, listener) in listeners.iter_mut().enumerate() {
@@ -83,9 +83,9 @@ pub(super) fn listen(
 
 /// The last number of each sender.
 #[derive(Default)]
-pub(super) struct Numbers(BTreeMap<Gid, i64>);
+pub(super) struct LastNumbers(BTreeMap<Gid, i64>);
 
-impl Numbers {
+impl LastNumbers {
     /// Senders that are followed.
     const MOST: usize = 64;
     /// A gap that is larger is no loss: 100 s at 10 kHz.
@@ -106,11 +106,11 @@ impl Numbers {
 pub(super) struct Topic<M: Message> {
     pub name: &'static str,
     pub subscription: Subscription<M>,
-    pub shared: Arc<Shared>,
-    pub arrival: fn(&Shared, M) -> Option<Arrival>,
+    pub shared: Arc<DdsShared>,
+    pub arrival: fn(&DdsShared, M) -> Option<Arrival>,
     /// which of the two counters of what was lost on the way
     pub counter: Option<usize>,
-    pub numbers: Numbers,
+    pub numbers: LastNumbers,
 }
 
 impl<M: Message> Listener for Topic<M> {
@@ -143,7 +143,7 @@ mod tests {
 
     #[test]
     fn gaps_are_counted_for_each_sender_alone() {
-        let mut numbers = Numbers::default();
+        let mut numbers = LastNumbers::default();
         let [a, b] = [Gid::default(), Gid::from([1; 16])];
         let missing: Vec<u64> = [(a, 7), (a, 8), (b, 1), (a, 12), (b, 2), (a, 3), (a, 4), (b, i64::MAX), (b, i64::MIN)]
             .map(|(sender, number)| numbers.missing(sender, number))

@@ -42,11 +42,11 @@ pub(super) struct KeepAlive {
     socket: MioSocket,
     /// where our own participant listens
     own_port: u16,
-    known: BTreeMap<Prefix, Known>,
+    known: BTreeMap<Prefix, KnownParticipant>,
     datagram: Vec<u8>,
 }
 
-struct Known {
+struct KnownParticipant {
     /// the last announcement
     datagram: Vec<u8>,
     from: SocketAddr,
@@ -55,10 +55,10 @@ struct Known {
     lease: Duration,
     /// when RustDDS heard the last announcement, here or from the participant
     renewed: Instant,
-    state: State,
+    state: PeerState,
 }
 
-enum State {
+enum PeerState {
     Heard,
     /// silent for long: its computer was asked whether the program still has its port, where there is a way to it
     Asked(Option<UdpSocket>),
@@ -68,12 +68,12 @@ enum State {
     Lost,
 }
 
-impl Known {
+impl KnownParticipant {
     /// Whether RustDDS has to hear of it soon.
     fn is_due(&self, now: Instant) -> bool {
         let early = (self.lease / 2).min(3 * LOOK_EVERY);
         let silent = now.saturating_duration_since(self.heard);
-        !matches!(self.state, State::Ended | State::Lost)
+        !matches!(self.state, PeerState::Ended | PeerState::Lost)
             && now.saturating_duration_since(self.renewed) >= self.lease - early
             && silent + self.lease <= PATIENCE
     }
@@ -112,7 +112,7 @@ impl KeepAlive {
     /// RustDDS has waited for it in vain.
     pub fn lost(&mut self, prefix: &[u8]) {
         if let Some(known) = Prefix::try_from(prefix).ok().and_then(|prefix| self.known.get_mut(&prefix)) {
-            known.state = State::Lost;
+            known.state = PeerState::Lost;
         }
     }
 
@@ -143,7 +143,7 @@ impl KeepAlive {
         if datagram.len() > LARGEST_ANNOUNCEMENT {
             return;
         }
-        if self.known.get(&prefix).is_some_and(|known| matches!(known.state, State::Lost)) {
+        if self.known.get(&prefix).is_some_and(|known| matches!(known.state, PeerState::Lost)) {
             tracing::warn!(
                 address = %from.ip(),
                 "a program there was out of reach for too long and is not met again: start it anew, or this node"
@@ -152,20 +152,23 @@ impl KeepAlive {
             self.known.pop_first();
         }
         let datagram = datagram.to_vec();
-        self.known.insert(prefix, Known { datagram, from, heard: now, lease, renewed: now, state: State::Heard });
+        self.known.insert(
+            prefix,
+            KnownParticipant { datagram, from, heard: now, lease, renewed: now, state: PeerState::Heard },
+        );
     }
 
     fn look(&mut self, now: Instant) {
         for known in self.known.values_mut().filter(|known| known.is_due(now)) {
-            let State::Asked(asked) = &known.state else {
-                known.state = State::Asked(ask(known.from).ok());
+            let PeerState::Asked(asked) = &known.state else {
+                known.state = PeerState::Asked(ask(known.from).ok());
                 continue;
             };
             if asked.as_ref().is_some_and(is_refused) {
-                known.state = State::Ended;
+                known.state = PeerState::Ended;
                 continue;
             }
-            known.state = State::Heard;
+            known.state = PeerState::Heard;
             known.renewed = now;
             if let Err(error) = hand_over(&known.datagram, known.from, self.own_port) {
                 tracing::debug!(%error, "a silent participant may be forgotten too early");
@@ -333,7 +336,7 @@ mod tests {
     }
 
     /// One that is looked at twice a second, and the port that it hands over to.
-    struct Watched {
+    struct WatchedPeer {
         keep_alive: KeepAlive,
         own: UdpSocket,
         /// what the participant sends from; `None` when it has ended
@@ -342,7 +345,7 @@ mod tests {
         begun: Instant,
     }
 
-    impl Watched {
+    impl WatchedPeer {
         fn new() -> Self {
             let own = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
             own.set_nonblocking(true).unwrap();
@@ -376,7 +379,7 @@ mod tests {
 
     #[test]
     fn who_announces_itself_in_time_needs_no_help() {
-        let mut watched = Watched::new();
+        let mut watched = WatchedPeer::new();
         for at in 0..10 {
             let at_s = 8.0 * f64::from(at);
             watched.hear(10, at_s);
@@ -386,7 +389,7 @@ mod tests {
 
     #[test]
     fn who_is_silent_is_spoken_for_before_each_end_of_its_lease_until_patience_ends() {
-        let mut watched = Watched::new();
+        let mut watched = WatchedPeer::new();
         watched.hear(10, 0.0);
         // asked 1.5 s before the end, handed over 0.5 s later; what begins at 27 s ends at 37 s, and 46 s would be too late
         assert_eq!(watched.handed_over(0.0, 100.0), [9.0, 18.0, 27.0]);
@@ -396,7 +399,7 @@ mod tests {
 
     #[test]
     fn who_has_ended_without_a_word_is_not_spoken_for() {
-        let mut watched = Watched::new();
+        let mut watched = WatchedPeer::new();
         watched.hear(10, 0.0);
         assert_eq!(watched.handed_over(0.0, 10.0), [9.0]);
         watched.sender = None;
@@ -405,7 +408,7 @@ mod tests {
 
     #[test]
     fn who_waits_for_longer_has_left_or_is_lost_is_not_spoken_for() {
-        let mut watched = Watched::new();
+        let mut watched = WatchedPeer::new();
         watched.hear(60, 0.0);
         assert!(watched.handed_over(0.0, 100.0).is_empty());
         watched.hear(10, 100.0);

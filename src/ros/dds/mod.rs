@@ -59,7 +59,7 @@ impl RosError {
 }
 
 /// What the parts of the port share.
-struct Shared {
+struct DdsShared {
     arrivals: Arrivals,
     /// wrenches, poses that did not come
     lost: [AtomicU64; 2],
@@ -70,7 +70,7 @@ struct Shared {
 }
 
 struct DdsPort {
-    shared: Arc<Shared>,
+    shared: Arc<DdsShared>,
     waker: Arc<rustdds::mio1::Waker>,
     threads: Vec<JoinHandle<()>>,
     // its entities leave the graph when it goes
@@ -126,7 +126,7 @@ impl Drop for DdsPort {
 /// [`RosError`]: a name that is none, no network, no thread.
 pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosError> {
     let is_simulated = config.parameters.bool("use_sim_time");
-    let shared = Arc::new(Shared {
+    let shared = Arc::new(DdsShared {
         arrivals: Arrivals::new(inbox),
         lost: [const { AtomicU64::new(0) }; 2],
         clock: RosClock::new(is_simulated),
@@ -137,7 +137,7 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
     // its own parameter services know one mapping alone, and nothing of ranges
     let options = parameter_services::declare(NodeOptions::new().start_parameter_services(false), &config.parameters);
     let (context, mut node) = join(config, options)?;
-    let mut graph = graph::Graph::new(&context, &shared, config);
+    let mut graph = graph::DdsGraph::new(&context, &shared, config);
     let (urgent, mesh) = topics::writers(config, &mut node, &mut graph)?;
     let mut listeners = topics::readers(config, &mut node, &mut graph, &shared)?;
     listeners.extend(services::servers(config, &context, &mut node, &mut graph, &shared)?);
@@ -157,8 +157,8 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
 
 fn thread(
     name: &str,
-    shared: &Arc<Shared>,
-    send: impl FnOnce(&Shared) + Send + 'static,
+    shared: &Arc<DdsShared>,
+    send: impl FnOnce(&DdsShared) + Send + 'static,
 ) -> Result<JoinHandle<()>, RosError> {
     let shared = Arc::clone(shared);
     Ok(Builder::new().name(name.to_owned()).spawn(move || send(&shared))?)

@@ -12,11 +12,11 @@ use ros2_client::rcl_interfaces::{
 };
 use ros2_client::{Context, Node, NodeOptions};
 
-use super::answers::Answer;
+use super::answers::Shrinkable;
 use super::incoming::Listener;
 use super::server::Server;
 use super::services::Service;
-use super::{RosError, Shared};
+use super::{DdsShared, RosError};
 use crate::ros::arguments::NodeConfig;
 use crate::ros::parameters::{Allowed, PARAMETERS, ParameterDescriptor, ParameterValue, Parameters, descriptor};
 use crate::ros::port::{Arrival, Reply};
@@ -34,7 +34,7 @@ pub(super) fn declare(options: NodeOptions, parameters: &Parameters) -> NodeOpti
 
 /// The servers, not yet at work.
 pub(super) struct ParameterServers {
-    shared: Arc<Shared>,
+    shared: Arc<DdsShared>,
     values: Parameters,
     get: Arc<Server<GetParametersRequest, GetParametersResponse>>,
     get_types: Arc<Server<GetParameterTypesRequest, GetParameterTypesResponse>>,
@@ -49,7 +49,7 @@ pub(super) fn servers(
     config: &NodeConfig,
     context: &Context,
     node: &mut Node,
-    shared: &Arc<Shared>,
+    shared: &Arc<DdsShared>,
 ) -> Result<ParameterServers, RosError> {
     let package = "rcl_interfaces";
     Ok(ParameterServers {
@@ -75,7 +75,8 @@ impl ParameterServers {
     /// Sets them to work.
     pub fn listeners(self, node: &Arc<Node>) -> Vec<Box<dyn Listener>> {
         let shared = self.shared;
-        let held = Arc::new(Held { shared: shared.clone(), node: node.clone(), values: Mutex::new(self.values) });
+        let held =
+            Arc::new(DdsParameters { shared: shared.clone(), node: node.clone(), values: Mutex::new(self.values) });
         let [for_get, for_types, for_set, for_all] = std::array::from_fn(|_| held.clone());
         let get = move |request: GetParametersRequest| {
             let values = few(&request.names).iter().map(|name| for_get.raw(name)).collect();
@@ -122,28 +123,28 @@ impl ParameterServers {
 /// A service that needs nobody to answer.
 fn answered<Q, A>(
     name: &'static str,
-    shared: &Arc<Shared>,
+    shared: &Arc<DdsShared>,
     server: Arc<Server<Q, A>>,
     mut answer: impl FnMut(Q) -> A + Send + 'static,
 ) -> Box<dyn Listener>
 where
     Q: ros2_client::Message + Send + Sync + 'static,
-    A: Answer + Send + Sync + 'static,
+    A: Shrinkable + Send + Sync + 'static,
 {
     let call = Box::new(move |request, reply: Reply<A>| reply.send(answer(request)));
     Box::new(Service { name, server, shared: shared.clone(), call })
 }
 
 /// The values as others see them.
-struct Held {
-    shared: Arc<Shared>,
+struct DdsParameters {
+    shared: Arc<DdsShared>,
     node: Arc<Node>,
     values: Mutex<Parameters>,
 }
 
 type Results = Vec<Result<(), String>>;
 
-impl Held {
+impl DdsParameters {
     fn values(&self) -> MutexGuard<'_, Parameters> {
         // no code of ours panics while it holds it
         self.values.lock().unwrap_or_else(PoisonError::into_inner)
@@ -283,7 +284,7 @@ fn ours(value: raw::ParameterValue) -> Option<ParameterValue> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::answers::{Answer, ETHERNET, room, size};
+    use super::super::answers::{ETHERNET, Shrinkable, room, size};
     use super::*;
 
     fn names() -> Vec<String> {

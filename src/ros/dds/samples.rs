@@ -16,7 +16,7 @@ use crate::ros::port::SamplePort;
 /// Nothing is sent twice: what is kept is for who takes it at once.
 const DEPTH: usize = 100;
 
-struct Samples {
+struct DdsSamples {
     wrench: Publisher<WrenchStamped>,
     pose: Publisher<PoseStamped>,
     listener: DomainParticipantStatusListener,
@@ -35,7 +35,7 @@ pub fn samples(config: &NodeConfig) -> Result<Box<dyn SamplePort>, RosError> {
     let listener = context.domain_participant().status_listener();
     let [wrench, pose] = config.sample_topics();
     let (wrench, pose) = (publisher(config, &mut node, wrench)?, publisher(config, &mut node, pose)?);
-    Ok(Box::new(Samples { wrench, pose, listener, listeners: Default::default(), _node: node }))
+    Ok(Box::new(DdsSamples { wrench, pose, listener, listeners: Default::default(), _node: node }))
 }
 
 fn publisher<M: Message>(config: &NodeConfig, node: &mut Node, name: &str) -> Result<Publisher<M>, RosError> {
@@ -51,7 +51,7 @@ fn send<M: Message>(publisher: &Publisher<M>, message: M) -> bool {
         .is_ok()
 }
 
-impl SamplePort for Samples {
+impl SamplePort for DdsSamples {
     fn publish_wrench(&self, wrench: WrenchStamped) -> bool {
         send(&self.wrench, wrench)
     }

@@ -5,11 +5,11 @@ use std::sync::Arc;
 use ros2_client::dds::rustdds::mio1::event::Source;
 use ros2_client::{Context, Node, ReadError};
 
-use super::answers::Answer;
-use super::graph::Graph;
+use super::answers::Shrinkable;
+use super::graph::DdsGraph;
 use super::incoming::Listener;
 use super::server::{CallId, Server};
-use super::{RosError, Shared};
+use super::{DdsShared, RosError};
 use crate::ros::arguments::NodeConfig;
 use crate::ros::messages::*;
 use crate::ros::port::{Arrival, Call, Reply};
@@ -42,14 +42,14 @@ carried!(
 pub(super) struct Service<Q: ros2_client::Message + 'static, A: ros2_client::Message + 'static> {
     pub name: &'static str,
     pub server: Arc<Server<Q, A>>,
-    pub shared: Arc<Shared>,
+    pub shared: Arc<DdsShared>,
     pub call: Box<dyn FnMut(Q, Reply<A>) + Send>,
 }
 
 impl<Q, A> Listener for Service<Q, A>
 where
     Q: ros2_client::Message + Send + Sync + 'static,
-    A: Answer + Send + Sync + 'static,
+    A: Shrinkable + Send + Sync + 'static,
 {
     fn source(&mut self, _: usize) -> &mut dyn Source {
         Arc::get_mut(&mut self.server).expect("sources are asked for before any request is answered").source()
@@ -70,16 +70,16 @@ where
 }
 
 /// A request that cannot be read is most often one with another header.
-pub(super) fn unreadable(name: &'static str, shared: &Shared, error: &ReadError) {
+pub(super) fn unreadable(name: &'static str, shared: &DdsShared, error: &ReadError) {
     let reason = format!("{error}; has the caller another service_mapping?");
     shared.arrivals.put(Arrival::Unreadable(name, reason));
 }
 
 /// Answers a request from the thread that sends.
-fn reply<Q, A>(name: &'static str, server: &Arc<Server<Q, A>>, shared: &Arc<Shared>, id: CallId) -> Reply<A>
+fn reply<Q, A>(name: &'static str, server: &Arc<Server<Q, A>>, shared: &Arc<DdsShared>, id: CallId) -> Reply<A>
 where
     Q: ros2_client::Message + Send + Sync + 'static,
-    A: Answer + Send + Sync + 'static,
+    A: Shrinkable + Send + Sync + 'static,
 {
     let (server, shared) = (server.clone(), shared.clone());
     Reply::new(move |answer| {
@@ -97,8 +97,8 @@ pub(super) fn servers(
     config: &NodeConfig,
     context: &Context,
     node: &mut Node,
-    graph: &mut Graph,
-    shared: &Arc<Shared>,
+    graph: &mut DdsGraph,
+    shared: &Arc<DdsShared>,
 ) -> Result<Vec<Box<dyn Listener>>, RosError> {
     let mut made = Services { config, context, node, graph, shared, listeners: Vec::new() };
     made.add("~/flag_feature", "touchup_msgs", "FlagFeature", Call::Flag)?;
@@ -121,8 +121,8 @@ struct Services<'a> {
     config: &'a NodeConfig,
     context: &'a Context,
     node: &'a mut Node,
-    shared: &'a Arc<Shared>,
-    graph: &'a mut Graph,
+    shared: &'a Arc<DdsShared>,
+    graph: &'a mut DdsGraph,
     listeners: Vec<Box<dyn Listener>>,
 }
 
@@ -136,7 +136,7 @@ impl Services<'_> {
     ) -> Result<(), RosError>
     where
         Q: ros2_client::Message + Clone + Send + Sync + 'static,
-        A: Answer + Send + Sync + 'static,
+        A: Shrinkable + Send + Sync + 'static,
     {
         self.graph.serve(self.config.resolve(name)?);
         let server = Arc::new(Server::new(self.config, self.context, self.node, name, package, type_name)?);

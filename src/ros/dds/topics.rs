@@ -9,9 +9,9 @@ use ros2_client::dds::rustdds::{QosPolicyBuilder, TopicDescription, TopicKind};
 use ros2_client::qos::{Durability, History, QosProfile, WhenFull};
 use ros2_client::{MessageTypeName, Name, Node, Publisher, WriteError};
 
-use super::graph::Graph;
-use super::incoming::{Listener, Numbers, Topic};
-use super::{RosError, Shared};
+use super::graph::DdsGraph;
+use super::incoming::{LastNumbers, Listener, Topic};
+use super::{DdsShared, RosError};
 use crate::ros::arguments::NodeConfig;
 use crate::ros::messages::{
     Clock, DiagnosticArray, FeatureArray, HapticMismatch, Marker, MarkerArray, MeshPatch, Message, Path, PointStamped,
@@ -111,7 +111,7 @@ const SAMPLES: usize = 2048;
 pub(super) fn writers(
     config: &NodeConfig,
     node: &mut Node,
-    graph: &mut Graph,
+    graph: &mut DdsGraph,
 ) -> Result<(UrgentWriters, MeshWriters), RosError> {
     let mesh = MeshWriters {
         tiles: limited_writer(config, node, graph, "mesh", latched(PATIENT), TILES_KEPT)?,
@@ -135,8 +135,8 @@ pub(super) fn writers(
 pub(super) fn readers(
     config: &NodeConfig,
     node: &mut Node,
-    graph: &mut Graph,
-    shared: &Arc<Shared>,
+    graph: &mut DdsGraph,
+    shared: &Arc<DdsShared>,
 ) -> Result<Vec<Box<dyn Listener>>, RosError> {
     let [wrench, pose] = config.sample_topics();
     let mut made = Readers { config, node, graph, shared, listeners: Vec::new() };
@@ -157,8 +157,8 @@ pub(super) fn readers(
 struct Readers<'a> {
     config: &'a NodeConfig,
     node: &'a mut Node,
-    graph: &'a mut Graph,
-    shared: &'a Arc<Shared>,
+    graph: &'a mut DdsGraph,
+    shared: &'a Arc<DdsShared>,
     listeners: Vec<Box<dyn Listener>>,
 }
 
@@ -167,14 +167,14 @@ impl Readers<'_> {
         &mut self,
         name: &'static str,
         qos: QosProfile,
-        arrival: fn(&Shared, M) -> Option<Arrival>,
+        arrival: fn(&DdsShared, M) -> Option<Arrival>,
     ) -> Result<(), RosError> {
         let topic = topic::<M>(self.config, self.node, self.graph, name, &qos)?;
         let subscription = self.node.create_subscription::<M>(&topic, Some(qos));
         let subscription = subscription.map_err(|error| RosError::dds("subscribing to a topic", &error))?;
         self.graph.add(subscription.guid(), &topic);
         let counter = ["wrench", "pose"].iter().position(|sample| name.ends_with(sample));
-        let (shared, numbers) = (self.shared.clone(), Numbers::default());
+        let (shared, numbers) = (self.shared.clone(), LastNumbers::default());
         self.listeners.push(Box::new(Topic { name, subscription, shared, arrival, counter, numbers }));
         Ok(())
     }
@@ -183,7 +183,7 @@ impl Readers<'_> {
 fn writer<M: Message>(
     config: &NodeConfig,
     node: &mut Node,
-    graph: &mut Graph,
+    graph: &mut DdsGraph,
     name: &'static str,
     qos: QosProfile,
 ) -> Result<Publisher<M>, RosError> {
@@ -199,7 +199,7 @@ fn writer<M: Message>(
 fn limited_writer<M: Message>(
     config: &NodeConfig,
     node: &mut Node,
-    graph: &mut Graph,
+    graph: &mut DdsGraph,
     name: &'static str,
     profile: QosProfile,
     most: usize,
@@ -223,7 +223,7 @@ fn limited_writer<M: Message>(
 fn topic<M: Message>(
     config: &NodeConfig,
     node: &Node,
-    graph: &mut Graph,
+    graph: &mut DdsGraph,
     name: &'static str,
     qos: &QosProfile,
 ) -> Result<ros2_client::dds::rustdds::Topic, RosError> {

@@ -13,7 +13,7 @@ use super::convert::{header, stamp_ns};
 use super::feature_messages::KIND_NAMES;
 use super::haptic::Haptic;
 use super::replica::{Replica, Snapshot};
-use super::seeker::{Flag, SeekerInput};
+use super::seeker::{FlaggedPlace, SeekerInput};
 use super::sitting::Sitting;
 use super::view::ViewInput;
 use super::{NodeError, Setup};
@@ -75,14 +75,14 @@ impl Haptic {
         }
     }
 
-    fn flag_of(&self, request: &FlagFeatureRequest) -> Result<Flag, String> {
+    fn flag_of(&self, request: &FlagFeatureRequest) -> Result<FlaggedPlace, String> {
         let given = if request.search_radius == 0.0 { self.flag_radius() } else { request.search_radius };
         if !(given > 0.0 && given <= LARGEST_RADIUS) {
             return Err(format!(
                 "search_radius is {given} m: it may be up to {LARGEST_RADIUS} m, or 0 for flag_radius_mm"
             ));
         }
-        Ok(Flag { kind: request.kind, point: self.point_in_object(&request.point)?, radius: given })
+        Ok(FlaggedPlace { kind: request.kind, point: self.point_in_object(&request.point)?, radius: given })
     }
 
     fn flag_radius(&self) -> f64 {
@@ -100,7 +100,7 @@ impl Haptic {
         is_sound.then_some(point).ok_or_else(|| "the point is not finite, or absurdly far".to_owned())
     }
 
-    fn send_flag(&self, flag: Flag, reply: Option<Reply<FlagFeatureResponse>>) {
+    fn send_flag(&self, flag: FlaggedPlace, reply: Option<Reply<FlagFeatureResponse>>) {
         self.ask_seeker(SeekerInput::Flag(flag, reply));
     }
 
@@ -109,7 +109,7 @@ impl Haptic {
         let parameters = self.setup.shared.parameters();
         let kind = KIND_NAMES.iter().position(|name| *name == parameters.string("flag_kind")).unwrap_or(0);
         match self.point_in_object(clicked) {
-            Ok(point) => self.send_flag(Flag { kind: kind as u8, point, radius: self.flag_radius() }, None),
+            Ok(point) => self.send_flag(FlaggedPlace { kind: kind as u8, point, radius: self.flag_radius() }, None),
             Err(why) => {
                 warn!(why, "a clicked point was not taken");
                 self.tally.refuse("clicked_point");
@@ -199,7 +199,7 @@ impl Haptic {
             let message = format!("{MOST_SAVING} meshes are being saved: save again when they are done");
             return reply.send(SaveMeshResponse { message, ..Default::default() });
         }
-        let places = match Places::of(&self.sitting.folder, &request) {
+        let places = match SavedFiles::of(&self.sitting.folder, &request) {
             Ok(places) => places,
             Err(message) => return reply.send(SaveMeshResponse { message, ..Default::default() }),
         };
@@ -259,13 +259,13 @@ impl Haptic {
 const NO_ARM: &str = "no arm configured: start the node with robot:=sim or robot:=ur";
 
 /// The files of one call of `~/save_mesh`.
-struct Places {
+struct SavedFiles {
     mesh: PathBuf,
     features: Option<PathBuf>,
     touches: Option<PathBuf>,
 }
 
-impl Places {
+impl SavedFiles {
     fn of(folder: &SessionFolder, request: &SaveMeshRequest) -> Result<Self, String> {
         let name = if request.name.is_empty() { DEFAULT_NAME } else { &request.name };
         let place = |name: &str| folder.place(name, request.overwrite).map_err(|why| why.to_string());

@@ -6,7 +6,7 @@ use tracing::{info, warn};
 
 use super::convert::header;
 use super::haptic::Haptic;
-use super::sitting::Report;
+use super::sitting::SessionReport;
 use super::view::ViewInput;
 use super::{NodeEnd, NodeError};
 use crate::live::Quantiles;
@@ -14,7 +14,7 @@ use crate::ros::messages::{DiagnosticArray, DiagnosticStatus, KeyValue};
 use crate::session::Unrecorded;
 
 /// What a state means to who watches.
-struct State {
+struct StreamState {
     level: u8,
     words: String,
 }
@@ -34,11 +34,11 @@ impl Haptic {
         }
     }
 
-    fn state(&mut self) -> State {
+    fn state(&mut self) -> StreamState {
         let now = self.setup.clock.now();
         let stale = Duration::from_secs_f64(self.setup.shared.parameters().double("stale_ms") / 1e3);
         let is_stale = self.streams.each_mut().map(|stream| stream.check(now, stale));
-        let said = |level, words: String| State { level, words };
+        let said = |level, words: String| StreamState { level, words };
         if let Some(fault) = &self.fault {
             return said(DiagnosticStatus::ERROR, format!("stopped: {fault}"));
         }
@@ -73,8 +73,8 @@ impl Haptic {
     }
 
     /// What the session says of itself so far.
-    pub(super) fn report(&self) -> Report {
-        Report {
+    pub(super) fn report(&self) -> SessionReport {
+        SessionReport {
             refused: self.refused(),
             gaps: self.streams.each_ref().map(|stream| stream.gaps),
             clock_jumps: self.clock_jumps(),
@@ -85,7 +85,7 @@ impl Haptic {
     }
 
     pub(super) fn tell_diagnostics(&mut self) {
-        let State { level, words } = self.state();
+        let StreamState { level, words } = self.state();
         let report = self.report();
         let stamp_ns = self.port.now_ns();
         let status = DiagnosticStatus {
@@ -106,7 +106,7 @@ impl Haptic {
         self.setup.shared.show(&self.view, ViewInput::Diagnostics(Box::new(message)));
     }
 
-    fn numbers(&self, report: &Report) -> Vec<KeyValue> {
+    fn numbers(&self, report: &SessionReport) -> Vec<KeyValue> {
         let Quantiles { median, p99, max, .. } = report.push_ns;
         let latency = report.latency_ns;
         let us = |ns: u64| format!("{:.1}", ns as f64 * 1e-3);
@@ -133,7 +133,7 @@ impl Haptic {
         values
     }
 
-    fn stream_numbers(&self, report: &Report) -> Vec<KeyValue> {
+    fn stream_numbers(&self, report: &SessionReport) -> Vec<KeyValue> {
         let now = self.setup.clock.now();
         let mut values = Vec::new();
         for (name, stream) in ["pose", "wrench"].iter().zip(&self.streams) {

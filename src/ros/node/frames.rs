@@ -38,22 +38,22 @@ pub enum FrameError {
 
 /// Where a frame is in its parent.
 #[derive(Clone, Debug)]
-enum Motion {
+enum FrameMotion {
     Static(Isometry3<f64>),
     /// in order of time
     Moving(VecDeque<(i64, Isometry3<f64>)>),
 }
 
 #[derive(Clone, Debug)]
-struct Link {
+struct FrameLink {
     parent: String,
-    motion: Motion,
+    motion: FrameMotion,
 }
 
 /// All frames, and where they were lately.
 #[derive(Clone, Debug, Default)]
 pub struct FrameBuffer {
-    links: BTreeMap<String, Link>,
+    links: BTreeMap<String, FrameLink>,
 }
 
 /// A name as tf has it: without the slash that ROS 1 put in front.
@@ -73,22 +73,22 @@ impl FrameBuffer {
         if !is_name(parent) || !is_name(child) || parent == child || !is_room {
             return false;
         }
-        let fresh = || Link { parent: parent.to_owned(), motion: Motion::Moving(VecDeque::new()) };
+        let fresh = || FrameLink { parent: parent.to_owned(), motion: FrameMotion::Moving(VecDeque::new()) };
         let link = self.links.entry(child.to_owned()).or_insert_with(fresh);
         if link.parent != parent {
             *link = fresh();
         }
         match &mut link.motion {
-            motion if is_static => *motion = Motion::Static(pose),
-            Motion::Static(_) => link.motion = Motion::Moving(VecDeque::from([(stamp, pose)])),
-            Motion::Moving(poses) => keep(poses, stamp, pose),
+            motion if is_static => *motion = FrameMotion::Static(pose),
+            FrameMotion::Static(_) => link.motion = FrameMotion::Moving(VecDeque::from([(stamp, pose)])),
+            FrameMotion::Moving(poses) => keep(poses, stamp, pose),
         }
         true
     }
 
     /// Forgets all that moves, as after a jump of the clock.
     pub fn forget_moving(&mut self) {
-        self.links.retain(|_, link| matches!(link.motion, Motion::Static(_)));
+        self.links.retain(|_, link| matches!(link.motion, FrameMotion::Static(_)));
     }
 
     /// The pose of `of` in `in_frame` at a moment: maps points of `of` to `in_frame`.
@@ -147,7 +147,7 @@ fn keep(poses: &mut VecDeque<(i64, Isometry3<f64>)>, stamp: i64, pose: Isometry3
     }
 }
 
-impl Motion {
+impl FrameMotion {
     /// Straight between two poses, at constant angular velocity the shorter way.
     fn at(&self, name: &str, stamp_ns: i64) -> Result<Isometry3<f64>, FrameError> {
         let poses = match self {

@@ -37,12 +37,12 @@ const MOST_WAITING: usize = 4096;
 
 /// A message and when it came.
 #[derive(Debug)]
-enum Told {
+enum ArrivedMessage {
     Pose(PoseStamped),
     Wrench(WrenchStamped),
 }
 
-impl Told {
+impl ArrivedMessage {
     fn stream(&self) -> usize {
         usize::from(matches!(self, Self::Wrench(_)))
     }
@@ -88,7 +88,7 @@ pub struct Haptic {
     pub(super) compensator: Compensator,
     epoch: Epoch,
     /// poses and wrenches that wait for a transform, with when they came
-    waiting: [VecDeque<(Told, Instant)>; 2],
+    waiting: [VecDeque<(ArrivedMessage, Instant)>; 2],
     /// touches that the thread of the features had no room for
     pub(super) probed: ProbedNews,
     pub(super) streams: [StreamWatch; 2],
@@ -195,8 +195,8 @@ impl Haptic {
 
     fn take(&mut self, arrival: Arrival) -> ControlFlow<()> {
         match arrival {
-            Arrival::Wrench(wrench, at) => self.message(Told::Wrench(wrench), at),
-            Arrival::Pose(pose, at) => self.message(Told::Pose(pose), at),
+            Arrival::Wrench(wrench, at) => self.message(ArrivedMessage::Wrench(wrench), at),
+            Arrival::Pose(pose, at) => self.message(ArrivedMessage::Pose(pose), at),
             Arrival::Tf(transforms) => self.transforms(&transforms, false),
             Arrival::TfStatic(transforms) => self.transforms(&transforms, true),
             Arrival::ClickedPoint(clicked) => self.flag_clicked(&clicked),
@@ -228,7 +228,7 @@ impl Haptic {
         self.retry_waiting();
     }
 
-    fn message(&mut self, told: Told, at: Instant) {
+    fn message(&mut self, told: ArrivedMessage, at: Instant) {
         let stream = told.stream();
         self.streams[stream].arrive(self.setup.clock.now());
         if self.is_paused || self.fault.is_some() {
@@ -269,10 +269,10 @@ impl Haptic {
     }
 
     /// Brings a message into its frame and on; gives it back where a transform has to come first.
-    fn place(&mut self, told: Told, at: Instant) -> Option<Told> {
+    fn place(&mut self, told: ArrivedMessage, at: Instant) -> Option<ArrivedMessage> {
         let placed = match &told {
-            Told::Pose(pose) => self.placer.pose(pose),
-            Told::Wrench(wrench) => self.placer.wrench(wrench),
+            ArrivedMessage::Pose(pose) => self.placer.pose(pose),
+            ArrivedMessage::Wrench(wrench) => self.placer.wrench(wrench),
         };
         match placed {
             Ok(message) => self.pair(message, told.stream(), at),

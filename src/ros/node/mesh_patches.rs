@@ -57,7 +57,7 @@ impl MeshPatches {
         if self.version == replica.version || (self.vertices.is_empty() && self.faces.is_empty()) {
             return Vec::new();
         }
-        let mut draft = Draft::default();
+        let mut draft = DraftPatch::default();
         let Self { vertices, faces, has_vertex, has_face, .. } = self;
         vertices.take(usize::MAX, |vertex| match (replica.vertex(vertex).is_some(), remembered(has_vertex, vertex)) {
             (true, had) => {
@@ -92,10 +92,10 @@ impl MeshPatches {
         frame: String,
     ) -> impl Iterator<Item = MeshPatch> + Send + 'static + use<> {
         let [vertices, faces] = snapshot.slots();
-        let draft = Draft {
+        let draft = DraftPatch {
             set: (0..vertices).filter(|&vertex| snapshot.vertex(vertex).is_some()).collect(),
             faces: (0..faces).filter(|&face| snapshot.face(face).is_some()).collect(),
-            ..Draft::default()
+            ..DraftPatch::default()
         };
         let (count, variance) = (draft.part_count(), self.scan_variance);
         (0..count).map(move |part| draft.part(part, count, &snapshot, 0, &frame, variance))
@@ -112,14 +112,14 @@ fn remembered(list: &mut Vec<bool>, id: u32) -> &mut bool {
 
 /// A change before it is cut into parts.
 #[derive(Default)]
-struct Draft {
+struct DraftPatch {
     removed_faces: Vec<u32>,
     set: Vec<u32>,
     faces: Vec<u32>,
     removed_vertices: Vec<u32>,
 }
 
-impl Draft {
+impl DraftPatch {
     fn lengths(&self) -> [usize; 4] {
         [&self.removed_faces, &self.set, &self.faces, &self.removed_vertices].map(Vec::len)
     }

@@ -35,7 +35,7 @@ pub use arm::{ArmKind, ArmOfNode};
 pub use convert::{as_pose, as_wrench};
 pub use frames::{FrameBuffer, FrameError};
 pub use placing::CELL;
-pub use sitting::Report;
+pub use sitting::SessionReport;
 
 use self::edits::Edits;
 use self::engine::Scan;
@@ -54,7 +54,7 @@ use crate::io::recording::Topics;
 use crate::live::LiveError;
 use crate::mesh::FaceTree;
 use crate::refine::RefineError;
-use crate::scene::{Cut, CutScan, Memory, Scene, SceneCost, SceneError};
+use crate::scene::{CutScan, Memory, RegionCut, Scene, SceneCost, SceneError};
 use crate::session::{OutcomeError, SessionError};
 use crate::touch::{Compensator, SettingError, WrenchFrame};
 
@@ -160,7 +160,7 @@ pub(crate) struct Setup {
     scan_path: PathBuf,
     mesh_unit: MeshUnit,
     scene: Scene,
-    cut: Cut,
+    cut: RegionCut,
     scene_yaml: String,
     topics: Topics,
     source: &'static str,
@@ -235,7 +235,7 @@ pub struct NodeEnd {
     /// folder of the last session, with the refined mesh in it
     pub folder: PathBuf,
     /// what became of it
-    pub report: Report,
+    pub report: SessionReport,
 }
 
 /// A node that runs.
@@ -298,7 +298,7 @@ impl Prepared {
         let unused = if has_arm { &["clock", "markers"][..] } else { &["clock", "markers", "robot"] };
         let (scan, tree) = &*setup.scan;
         let memory = Memory::of(sitting.engine.refiner().footprint(), scan.bytes() + tree.bytes() + setup.cut.bytes());
-        SceneCost { parts: setup.scene.built(unused), memory }
+        SceneCost { parts: setup.scene.built(unused, &crate::FEATURES), memory }
     }
 
     /// Starts the threads.

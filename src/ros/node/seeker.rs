@@ -42,20 +42,20 @@ pub enum SeekerInput {
     /// a new session
     Session(String),
     /// somebody points at a place, m, in O
-    Flag(Flag, Option<Reply<FlagFeatureResponse>>),
+    Flag(FlaggedPlace, Option<Reply<FlagFeatureResponse>>),
     /// takes that back
     Unflag(u32, Reply<UnflagFeatureResponse>),
     /// asks what is to be probed; no numbers: all that is flagged
-    Targets(Vec<u32>, SyncSender<Vec<Target>>),
+    Targets(Vec<u32>, SyncSender<Vec<ProbeTarget>>),
     /// an arm has measured something
-    Measured(Box<Measured>),
+    Measured(Box<ArmMeasurement>),
     /// looks at the mesh now
     Detect(DetectFeaturesRequest, Reply<DetectFeaturesResponse>),
 }
 
 /// A place that somebody pointed at.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Flag {
+pub struct FlaggedPlace {
     /// as in messages; 0: a region to be explored
     pub kind: u8,
     /// m, in O
@@ -66,7 +66,7 @@ pub struct Flag {
 
 /// What an arm can be sent to.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Target {
+pub struct ProbeTarget {
     /// by which it is known
     pub id: u32,
     /// `None`: nobody knows
@@ -79,7 +79,7 @@ pub struct Target {
 
 /// What an arm has measured.
 #[derive(Clone, Debug)]
-pub struct Measured {
+pub struct ArmMeasurement {
     /// in which it was flagged
     pub session: String,
     /// number of the flag
@@ -102,13 +102,13 @@ pub struct Seeker {
     tracker: Tracker,
     touches: Vec<ProbedPoint>,
     /// by number; those at which nothing was found yet
-    flags: BTreeMap<u32, Flag>,
+    flags: BTreeMap<u32, FlaggedPlace>,
     /// how far around a feature that was found somebody wants it looked for, m, by its number
     radii: BTreeMap<u32, f64>,
     /// number under which a feature is known, where that is the number of its flag
     names: BTreeMap<u32, u32>,
     /// measured by an arm, by the number of the flag
-    measured: BTreeMap<u32, Measured>,
+    measured: BTreeMap<u32, ArmMeasurement>,
     /// version of the mesh and its newest stamp at the last look
     looked: Option<(u64, i64)>,
     look_took: Duration,
@@ -248,7 +248,7 @@ impl Seeker {
         self.names.get(&feature.id).copied().unwrap_or(feature.id)
     }
 
-    fn fits(flag: &Flag, feature: &Feature) -> bool {
+    fn fits(flag: &FlaggedPlace, feature: &Feature) -> bool {
         let is_kind = flag.kind == FeatureMsg::KIND_UNKNOWN || flag.kind == feature_messages::number_of(feature.kind);
         is_kind && (feature.centre.value - flag.point).norm() <= flag.radius
     }
@@ -270,7 +270,7 @@ impl Seeker {
         }
     }
 
-    fn flag(&mut self, flag: Flag) -> FlagFeatureResponse {
+    fn flag(&mut self, flag: FlaggedPlace) -> FlagFeatureResponse {
         let Some(kind) = KIND_NAMES.get(usize::from(flag.kind)) else {
             let message = format!("there is no kind {}: 0 to {} are", flag.kind, KIND_NAMES.len() - 1);
             return FlagFeatureResponse { success: false, message, id: 0 };
@@ -287,7 +287,7 @@ impl Seeker {
             self.radii.insert(id, flag.radius);
             return FlagFeatureResponse { success: true, message: format!("flagged {kind} {id}, known before"), id };
         }
-        let same = |other: &Flag| other.kind == flag.kind && (other.point - flag.point).norm() <= flag.radius;
+        let same = |other: &FlaggedPlace| other.kind == flag.kind && (other.point - flag.point).norm() <= flag.radius;
         let again = self.flags.iter().find(|(_, other)| same(other)).map(|(id, _)| *id);
         let id = again.unwrap_or_else(|| self.tracker.fresh_id());
         self.flags.insert(id, flag);
@@ -305,9 +305,9 @@ impl Seeker {
     }
 
     /// What is flagged, or has one of these numbers.
-    fn targets(&self, ids: &[u32]) -> Vec<Target> {
+    fn targets(&self, ids: &[u32]) -> Vec<ProbeTarget> {
         let default = self.shared.parameters().double("flag_radius_mm") / 1e3;
-        let places = self.flags.iter().map(|(&id, flag)| Target {
+        let places = self.flags.iter().map(|(&id, flag)| ProbeTarget {
             id,
             kind: feature_messages::kind_of(flag.kind),
             place: flag.point,
@@ -318,10 +318,15 @@ impl Seeker {
             let radius = self.radii.get(&id).copied();
             (
                 radius.is_some(),
-                Target { id, kind: Some(feature.kind), place: feature.centre.value, radius: radius.unwrap_or(default) },
+                ProbeTarget {
+                    id,
+                    kind: Some(feature.kind),
+                    place: feature.centre.value,
+                    radius: radius.unwrap_or(default),
+                },
             )
         });
-        let is_wanted = |target: &Target, is_flagged: bool| match ids.is_empty() {
+        let is_wanted = |target: &ProbeTarget, is_flagged: bool| match ids.is_empty() {
             true => is_flagged && !self.measured.get(&target.id).is_some_and(|measured| measured.is_done),
             false => ids.contains(&target.id),
         };

@@ -9,7 +9,7 @@ use super::convert::{NO_VECTOR, header, point, vector};
 use super::edits::Edits;
 use super::haptic::Haptic;
 use super::seeker::SeekerInput;
-use super::tip::TipPlace;
+use super::tip::LastTip;
 use super::view::ViewInput;
 use crate::refine::{Case, Update};
 use crate::ros::messages::HapticMismatch;
@@ -84,7 +84,7 @@ impl Haptic {
             let side = if off.dot(&refiner.mesh().normal(hit.face)) < 0.0 { -1.0 } else { 1.0 };
             (hit.point, side * off.norm() - radius)
         });
-        let tip = TipPlace { stamp_ns: sample.stamp_ns, centre, radius, closest };
+        let tip = LastTip { stamp_ns: sample.stamp_ns, centre, radius, closest };
         self.setup.shared.show(&self.view, ViewInput::Tip(tip));
     }
 

@@ -34,7 +34,7 @@ pub struct Sitting {
 
 /// What a session says of itself when it is over.
 #[derive(Debug, Serialize)]
-pub struct Report {
+pub struct SessionReport {
     /// name of the session
     pub session: String,
     /// samples that the refiner took
@@ -102,7 +102,7 @@ impl Sitting {
     ///
     /// # Errors
     /// [`NodeError`] when the result could not be written; the recording is ended all the same.
-    pub fn end(self, setup: &Setup, mut report: Report) -> Result<Report, NodeError> {
+    pub fn end(self, setup: &Setup, mut report: SessionReport) -> Result<SessionReport, NodeError> {
         let Self { folder, recorder, engine, .. } = self;
         let Unrecorded { messages, reason, .. } = recorder.finish();
         report.unrecorded = messages;
@@ -122,10 +122,10 @@ impl Sitting {
     }
 
     /// What is known of it so far.
-    pub fn report(&self, setup: &Setup, port: &dyn Port, tally: &Tally) -> Report {
+    pub fn report(&self, setup: &Setup, port: &dyn Port, tally: &Tally) -> SessionReport {
         let counts = self.engine.refiner().counts();
         let nothing = Quantiles { median: 0, p99: 0, p999: 0, max: 0 };
-        Report {
+        SessionReport {
             session: self.folder.name().to_owned(),
             accepted: tally.accepted,
             refused: Default::default(),

@@ -10,7 +10,7 @@ use crate::ros::messages::{ColorRGBA, Feature, FeatureArray, Marker, MarkerArray
 
 /// Where the tip was last.
 #[derive(Clone, Copy, Debug)]
-pub struct TipPlace {
+pub struct LastTip {
     /// of the sample, ns
     pub stamp_ns: i64,
     /// centre of the ball, m, in O
@@ -28,7 +28,7 @@ const NEAR: f64 = 0.05;
 const TEXT_HEIGHT: f64 = 12e-3;
 
 /// Ball, text, the arrow to the mesh, and the one onto where to touch next.
-pub fn markers(tip: &TipPlace, features: &FeatureArray, next: &NextTouches, frame: &str) -> MarkerArray {
+pub fn markers(tip: &LastTip, features: &FeatureArray, next: &NextTouches, frame: &str) -> MarkerArray {
     let nearest = nearest(tip, features);
     let base = Marker { header: header(tip.stamp_ns, frame), ns: "tip".to_owned(), ..Marker::default() };
     let diameter = 2.0 * tip.radius.max(0.5e-3);
@@ -83,7 +83,7 @@ pub fn markers(tip: &TipPlace, features: &FeatureArray, next: &NextTouches, fram
 const NEXT_LENGTH: f64 = 10e-3;
 
 /// The feature that who holds the tip is asking about.
-fn nearest<'a>(tip: &TipPlace, features: &'a FeatureArray) -> Option<&'a Feature> {
+fn nearest<'a>(tip: &LastTip, features: &'a FeatureArray) -> Option<&'a Feature> {
     let far = |feature: &&Feature| {
         let p = &feature.center;
         (Point3::new(p.x, p.y, p.z) - tip.centre).norm()
@@ -96,7 +96,7 @@ fn nearest<'a>(tip: &TipPlace, features: &'a FeatureArray) -> Option<&'a Feature
 }
 
 /// "0.12 mm; hole Ø8.02 ± 0.04; next: green arrow": RViz puts lines 10 mm apart, however small the letters.
-fn text(tip: &TipPlace, nearest: Option<&Feature>, has_next: bool) -> String {
+fn text(tip: &LastTip, nearest: Option<&Feature>, has_next: bool) -> String {
     let distance = match tip.closest {
         Some((_, distance)) => format!("{:.2} mm", distance * 1e3),
         None => "far from the mesh".to_owned(),

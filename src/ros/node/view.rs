@@ -11,7 +11,7 @@ use super::replica::{Replica, Snapshot};
 use super::seeker::NextTouches;
 use super::shared::Shared;
 use super::tiles::{ColourBy, Tiles};
-use super::tip::{self, TipPlace};
+use super::tip::{self, LastTip};
 use crate::clock::Clock;
 use crate::ros::messages::{DiagnosticArray, FeatureArray, HapticMismatch, MeshPatch};
 use crate::ros::port::{Port, Publication, TILES_KEPT};
@@ -32,7 +32,7 @@ pub enum ViewInput {
     /// one sample
     Mismatch(HapticMismatch),
     /// where the tip is
-    Tip(TipPlace),
+    Tip(LastTip),
     /// all features, and where a hand should touch them next
     Features(Arc<FeatureArray>, NextTouches),
     /// somebody wants the mesh as it is
@@ -60,7 +60,7 @@ pub struct View {
     whole: Option<Box<dyn Iterator<Item = MeshPatch> + Send>>,
     asked_whole: bool,
     snapshots: Vec<SyncSender<Snapshot>>,
-    tip: Option<TipPlace>,
+    tip: Option<LastTip>,
     features: Arc<FeatureArray>,
     next: NextTouches,
 }

@@ -8,7 +8,7 @@ use r2r::{ActionServerCancelRequest, ActionServerGoal, ActionServerGoalRequest, 
 
 use super::convert::Convert;
 use super::touchup_msgs::action::Probe::Action;
-use super::{During, RosError, Shared, Source, source};
+use super::{During, R2rShared, RosError, Source, source};
 use crate::ros::messages::{ProbeFeedback, ProbeResponse};
 use crate::ros::port::{Arrival, Call, Feedback, Goal, GoalEnd};
 
@@ -16,36 +16,36 @@ use crate::ros::port::{Arrival, Call, Feedback, Goal, GoalEnd};
 pub(super) const NAME: &str = "~/probe";
 
 /// A goal from the first question to the result.
-enum State {
+enum GoalState {
     Asked(ActionServerGoalRequest<Action>),
     Running(ActionServerGoal<Action>),
     Over,
 }
 
 /// What the closures of one goal share.
-struct Handle {
-    state: Mutex<State>,
+struct GoalHandle {
+    state: Mutex<GoalState>,
     is_cancelled: Arc<AtomicBool>,
     is_over: AtomicBool,
 }
 
-impl Handle {
+impl GoalHandle {
     /// Goes over to another state; the one that it was in.
-    fn change(&self, state: State) -> State {
+    fn change(&self, state: GoalState) -> GoalState {
         std::mem::replace(&mut *locked(&self.state), state)
     }
 }
 
 /// A running goal, and who wants it stopped.
 struct Cancels {
-    handle: Arc<Handle>,
+    handle: Arc<GoalHandle>,
     requests: Box<dyn Stream<Item = ActionServerCancelRequest> + Send + Unpin>,
 }
 
 type Running = Arc<Mutex<Vec<Cancels>>>;
 
 /// The server of the action: one source of goals, one of what is asked of those that run.
-pub(super) fn server(node: &mut Node, shared: &Arc<Shared>) -> Result<[Source; 2], RosError> {
+pub(super) fn server(node: &mut Node, shared: &Arc<R2rShared>) -> Result<[Source; 2], RosError> {
     let requests = node.create_action_server::<Action>(NAME).during("offering an action")?;
     let running = Running::default();
     let cancels = running.clone();
@@ -58,10 +58,10 @@ pub(super) fn server(node: &mut Node, shared: &Arc<Shared>) -> Result<[Source; 2
 }
 
 /// What the node answers with: it goes out from the thread that sends, so the answers keep their order.
-fn goal(request: ActionServerGoalRequest<Action>, shared: &Arc<Shared>, running: &Running) -> Goal {
+fn goal(request: ActionServerGoalRequest<Action>, shared: &Arc<R2rShared>, running: &Running) -> Goal {
     let is_cancelled = Arc::new(AtomicBool::new(false));
-    let handle = Arc::new(Handle {
-        state: Mutex::new(State::Asked(request)),
+    let handle = Arc::new(GoalHandle {
+        state: Mutex::new(GoalState::Asked(request)),
         is_cancelled: is_cancelled.clone(),
         is_over: AtomicBool::new(false),
     });
@@ -78,19 +78,19 @@ fn goal(request: ActionServerGoalRequest<Action>, shared: &Arc<Shared>, running:
     }
 }
 
-fn accept(handle: &Arc<Handle>, is_accepted: bool, running: &Running) -> r2r::Result<()> {
-    let State::Asked(request) = handle.change(State::Over) else { return Ok(()) };
+fn accept(handle: &Arc<GoalHandle>, is_accepted: bool, running: &Running) -> r2r::Result<()> {
+    let GoalState::Asked(request) = handle.change(GoalState::Over) else { return Ok(()) };
     if !is_accepted {
         return request.reject();
     }
     let (goal, requests) = request.accept()?;
-    handle.change(State::Running(goal));
+    handle.change(GoalState::Running(goal));
     locked(running).push(Cancels { handle: handle.clone(), requests: Box::new(requests) });
     Ok(())
 }
 
-fn tell(handle: &Handle, feedback: ProbeFeedback) {
-    if let State::Running(goal) = &*locked(&handle.state)
+fn tell(handle: &GoalHandle, feedback: ProbeFeedback) {
+    if let GoalState::Running(goal) = &*locked(&handle.state)
         && let Err(error) = goal.publish_feedback(feedback.convert())
     {
         // nobody waits for it who misses it
@@ -98,8 +98,8 @@ fn tell(handle: &Handle, feedback: ProbeFeedback) {
     }
 }
 
-fn finish(handle: &Handle, end: GoalEnd, response: ProbeResponse) -> r2r::Result<()> {
-    let State::Running(mut goal) = handle.change(State::Over) else { return Ok(()) };
+fn finish(handle: &GoalHandle, end: GoalEnd, response: ProbeResponse) -> r2r::Result<()> {
+    let GoalState::Running(mut goal) = handle.change(GoalState::Over) else { return Ok(()) };
     handle.is_over.store(true, Ordering::Relaxed);
     let cancelled = response.clone().convert();
     // r2r lets go of a goal once its cancelling is confirmed: from then on no other end reaches who waits

@@ -6,32 +6,32 @@ use std::time::{Duration, Instant};
 use r2r::qos::{DurabilityPolicy, QosProfile, ReliabilityPolicy};
 use r2r::{Context, Node, Publisher, WrappedTypesupport};
 
-use super::Shared;
+use super::R2rShared;
 use crate::ros::port::{Arrival, Endpoint};
 
 /// How often it is asked.
 const PERIOD: Duration = Duration::from_secs(1);
 
 /// How many there are that fit, and why one does not.
-type Seen = (usize, Option<String>);
+type Matching = (usize, Option<String>);
 
-type Look = Box<dyn Fn(&Node) -> r2r::Result<Seen> + Send>;
+type GraphQuery = Box<dyn Fn(&Node) -> r2r::Result<Matching> + Send>;
 
-struct Watched {
+struct WatchedTopic {
     topic: String,
     /// who listens is a viewer
     is_mesh: bool,
-    look: Look,
-    told: Seen,
+    look: GraphQuery,
+    told: Matching,
 }
 
-pub(super) struct Graph {
+pub(super) struct R2rGraph {
     context: Context,
-    watched: Vec<Watched>,
+    watched: Vec<WatchedTopic>,
     looked: Instant,
 }
 
-impl Graph {
+impl R2rGraph {
     pub fn new(context: Context) -> Self {
         Self { context, watched: Vec::new(), looked: Instant::now() }
     }
@@ -62,12 +62,12 @@ impl Graph {
         });
     }
 
-    fn watch(&mut self, topic: String, is_mesh: bool, look: impl Fn(&Node) -> r2r::Result<Seen> + Send + 'static) {
-        self.watched.push(Watched { topic, is_mesh, look: Box::new(look), told: (0, None) });
+    fn watch(&mut self, topic: String, is_mesh: bool, look: impl Fn(&Node) -> r2r::Result<Matching> + Send + 'static) {
+        self.watched.push(WatchedTopic { topic, is_mesh, look: Box::new(look), told: (0, None) });
     }
 
     /// Tells what has changed, when it is time to look again; whether ROS is still there.
-    pub fn look(&mut self, node: &Node, shared: &Shared) -> bool {
+    pub fn look(&mut self, node: &Node, shared: &R2rShared) -> bool {
         if self.looked.elapsed() < PERIOD {
             return true;
         }
@@ -83,8 +83,8 @@ impl Graph {
     }
 }
 
-impl Watched {
-    fn tell(&mut self, seen: Seen, shared: &Shared) {
+impl WatchedTopic {
+    fn tell(&mut self, seen: Matching, shared: &R2rShared) {
         let topic = self.topic.clone();
         if self.is_mesh && seen.0 > self.told.0 {
             shared.arrivals.put(Arrival::Viewer);

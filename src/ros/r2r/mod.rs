@@ -69,14 +69,14 @@ impl<T> During<T> for r2r::Result<T> {
 }
 
 /// What the parts of the port share.
-struct Shared {
+struct R2rShared {
     arrivals: Arrivals,
     clock: RosClock,
     urgent: Outbox,
     mesh: Outbox,
 }
 
-impl Shared {
+impl R2rShared {
     fn new(inbox: Inbox, clock: RosClock) -> Self {
         Self { arrivals: Arrivals::new(inbox), clock, urgent: Outbox::default(), mesh: Outbox::default() }
     }
@@ -99,10 +99,10 @@ impl Shared {
 }
 
 /// Takes all that has come from one topic, service or action since it was called last; whether anything had.
-type Source = Box<dyn FnMut() -> bool + Send>;
+type PollSource = Box<dyn FnMut() -> bool + Send>;
 
 /// A stream of r2r as a source. r2r reads one message of each at a time and keeps ten, so none is lost between two spins.
-fn source<S>(mut stream: S, mut take: impl FnMut(S::Item) + Send + 'static) -> Source
+fn source<S>(mut stream: S, mut take: impl FnMut(S::Item) + Send + 'static) -> PollSource
 where
     S: Stream + Unpin + Send + 'static,
 {
@@ -117,7 +117,7 @@ where
 }
 
 struct R2rPort {
-    shared: Arc<Shared>,
+    shared: Arc<R2rShared>,
     sending: Vec<JoinHandle<()>>,
     spinning: Option<JoinHandle<()>>,
 }
@@ -173,11 +173,11 @@ impl Drop for R2rPort {
 /// # Errors
 /// [`RosError`]: a name that is none, ROS does not start, no thread.
 pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosError> {
-    let shared = Arc::new(Shared::new(inbox, RosClock::new(config.parameters.bool("use_sim_time"))));
+    let shared = Arc::new(R2rShared::new(inbox, RosClock::new(config.parameters.bool("use_sim_time"))));
     let context = context()?;
     let node = r2r::Node::create(context.clone(), &config.place.node, &config.place.namespace);
     let mut node = node.during("making the node")?;
-    let mut graph = graph::Graph::new(context);
+    let mut graph = graph::R2rGraph::new(context);
     let urgent = topics::UrgentPublishers::new(config, &mut node, &mut graph)?;
     let mesh = topics::MeshPublishers::new(config, &mut node, &mut graph)?;
     let mut sources = topics::subscriptions(config, &mut node, &mut graph, &shared)?;
@@ -204,8 +204,8 @@ fn context() -> Result<r2r::Context, RosError> {
 
 fn thread(
     name: &str,
-    shared: &Arc<Shared>,
-    work: impl FnOnce(&Arc<Shared>) + Send + 'static,
+    shared: &Arc<R2rShared>,
+    work: impl FnOnce(&Arc<R2rShared>) + Send + 'static,
 ) -> std::io::Result<JoinHandle<()>> {
     let shared = shared.clone();
     Builder::new().name(name.to_owned()).spawn(move || work(&shared))
@@ -219,7 +219,7 @@ const MOST_IN_VAIN: u32 = 160;
 const PAUSE: Duration = Duration::from_millis(2);
 
 /// The thread that takes what comes. There is always a subscription, or rcl would not wait at all (r2r issue 93).
-fn spin(mut node: r2r::Node, mut sources: Vec<Source>, mut graph: graph::Graph, shared: &Arc<Shared>) {
+fn spin(mut node: r2r::Node, mut sources: Vec<PollSource>, mut graph: graph::R2rGraph, shared: &Arc<R2rShared>) {
     let _told = ToldWhenOver(shared);
     let mut in_vain = 0;
     while !shared.arrivals.is_over() {
@@ -238,7 +238,7 @@ fn spin(mut node: r2r::Node, mut sources: Vec<Source>, mut graph: graph::Graph, 
 }
 
 /// The node ends too, and saves, when nothing can come any more.
-struct ToldWhenOver<'a>(&'a Shared);
+struct ToldWhenOver<'a>(&'a R2rShared);
 
 impl Drop for ToldWhenOver<'_> {
     fn drop(&mut self) {

@@ -13,7 +13,7 @@ use r2r::{Node, Publisher, WrappedServiceTypeSupport, builtin_interfaces};
 
 use super::convert::Convert;
 use super::services::server;
-use super::{During, RosError, Shared, Source};
+use super::{During, R2rShared, RosError, Source};
 use crate::ros::arguments::NodeConfig;
 use crate::ros::parameters::{Allowed, PARAMETERS, ParameterValue, Parameters, descriptor};
 use crate::ros::port::{Arrival, Reply};
@@ -29,20 +29,20 @@ const DOUBLE: u8 = 3;
 const STRING: u8 = 4;
 
 /// The values as others see them.
-struct Held {
-    shared: Arc<Shared>,
+struct R2rParameters {
+    shared: Arc<R2rShared>,
     node_name: String,
     values: Mutex<Parameters>,
     events: Mutex<Publisher<rcl::ParameterEvent>>,
 }
 
-type Results = Vec<Result<(), String>>;
-type Answer = Box<dyn FnOnce(Results) + Send>;
+type SetResults = Vec<Result<(), String>>;
+type SetReply = Box<dyn FnOnce(SetResults) + Send>;
 
 /// The servers.
-pub(super) fn servers(config: &NodeConfig, node: &mut Node, shared: &Arc<Shared>) -> Result<Vec<Source>, RosError> {
+pub(super) fn servers(config: &NodeConfig, node: &mut Node, shared: &Arc<R2rShared>) -> Result<Vec<Source>, RosError> {
     let events = node.create_publisher("/parameter_events", QosProfile::parameter_events());
-    let held = Arc::new(Held {
+    let held = Arc::new(R2rParameters {
         shared: shared.clone(),
         node_name: config.place.full_name(),
         values: Mutex::new(config.parameters.clone()),
@@ -50,7 +50,7 @@ pub(super) fn servers(config: &NodeConfig, node: &mut Node, shared: &Arc<Shared>
     });
     let [for_get, for_types, for_set, for_all] = std::array::from_fn(|_| held.clone());
     let set = move |request: SetParameters::Request, reply: Reply<SetParameters::Response>| {
-        let answer = move |results: Results| {
+        let answer = move |results: SetResults| {
             reply.send(SetParameters::Response { results: results.into_iter().map(result).collect() });
         };
         for_set.set(request.parameters, Box::new(answer));
@@ -79,7 +79,7 @@ pub(super) fn servers(config: &NodeConfig, node: &mut Node, shared: &Arc<Shared>
 fn answered<T>(
     node: &mut Node,
     name: &'static str,
-    shared: &Arc<Shared>,
+    shared: &Arc<R2rShared>,
     answer: impl Fn(T::Request) -> T::Response + Send + 'static,
 ) -> Result<Source, RosError>
 where
@@ -100,7 +100,7 @@ macro_rules! as_it_is {
 }
 as_it_is!(GetParameters, GetParameterTypes, ListParameters, DescribeParameters, SetParameters, SetParametersAtomically);
 
-impl Held {
+impl R2rParameters {
     fn values(&self) -> MutexGuard<'_, Parameters> {
         // nothing of ours panics while it holds it
         self.values.lock().unwrap_or_else(PoisonError::into_inner)
@@ -111,12 +111,17 @@ impl Held {
     }
 
     /// Asks the node for one after the other, and answers when all are done.
-    fn set(self: &Arc<Self>, wanted: Vec<rcl::Parameter>, answer: Answer) {
+    fn set(self: &Arc<Self>, wanted: Vec<rcl::Parameter>, answer: SetReply) {
         let wanted: Vec<_> = wanted.into_iter().take(MOST_NAMES).collect();
         self.clone().set_next(wanted.into_iter(), Vec::new(), answer);
     }
 
-    fn set_next(self: Arc<Self>, mut wanted: std::vec::IntoIter<rcl::Parameter>, mut results: Results, answer: Answer) {
+    fn set_next(
+        self: Arc<Self>,
+        mut wanted: std::vec::IntoIter<rcl::Parameter>,
+        mut results: SetResults,
+        answer: SetReply,
+    ) {
         // what is refused here needs no answer of the node
         let (name, value) = loop {
             let Some(next) = wanted.next() else { return answer(results) };
@@ -140,7 +145,7 @@ impl Held {
 
     /// All or none, as far as the table of parameters can tell before any is set.
     fn set_all(self: &Arc<Self>, wanted: Vec<rcl::Parameter>, reply: Reply<SetParametersAtomically::Response>) {
-        let answer = move |results: Results| {
+        let answer = move |results: SetResults| {
             let first = results.into_iter().find(Result::is_err).unwrap_or(Ok(()));
             reply.send(SetParametersAtomically::Response { result: result(first) });
         };

@@ -12,7 +12,7 @@ use crate::ros::port::SamplePort;
 /// Nothing is sent twice: what is kept is for who takes it at once.
 const DEPTH: usize = 100;
 
-struct Samples {
+struct R2rSamples {
     wrench: Publisher<geometry::WrenchStamped>,
     pose: Publisher<geometry::PoseStamped>,
     // its publishers leave the graph when it goes
@@ -29,7 +29,7 @@ pub fn samples(config: &NodeConfig) -> Result<Box<dyn SamplePort>, RosError> {
     let [wrench, pose] = config.sample_topics();
     let wrench = node.create_publisher(wrench, best_effort(DEPTH)).during("publishing a topic")?;
     let pose = node.create_publisher(pose, best_effort(DEPTH)).during("publishing a topic")?;
-    Ok(Box::new(Samples { wrench, pose, _node: node }))
+    Ok(Box::new(R2rSamples { wrench, pose, _node: node }))
 }
 
 /// None where rcl does not tell.
@@ -37,7 +37,7 @@ fn count<T: WrappedTypesupport + 'static>(publisher: &Publisher<T>) -> usize {
     publisher.get_inter_process_subscription_count().unwrap_or_default()
 }
 
-impl SamplePort for Samples {
+impl SamplePort for R2rSamples {
     fn publish_wrench(&self, wrench: WrenchStamped) -> bool {
         self.wrench.publish(&wrench.convert()).is_ok()
     }

@@ -7,12 +7,12 @@ use r2r::{Node, WrappedServiceTypeSupport};
 
 use super::convert::Convert;
 use super::touchup_msgs::srv::{DetectFeatures, FlagFeature, ProbeFeature, ResyncMesh, SaveMesh, Undo, UnflagFeature};
-use super::{During, RosError, Shared, Source, source, std_srvs};
+use super::{During, R2rShared, RosError, Source, source, std_srvs};
 use crate::ros::port::{Arrival, Call, Reply};
 
 /// All services but those of parameters and the action.
-pub(super) fn servers(node: &mut Node, shared: &Arc<Shared>) -> Result<Vec<Source>, RosError> {
-    let mut made = Services { node, shared, sources: Vec::new() };
+pub(super) fn servers(node: &mut Node, shared: &Arc<R2rShared>) -> Result<Vec<Source>, RosError> {
+    let mut made = R2rServices { node, shared, sources: Vec::new() };
     made.add::<FlagFeature::Service, _>("~/flag_feature", |request, reply| Call::Flag(request.convert(), reply))?;
     made.add::<UnflagFeature::Service, _>("~/unflag_feature", |request, reply| Call::Unflag(request.convert(), reply))?;
     made.add::<DetectFeatures::Service, _>("~/detect_features", |request, reply| {
@@ -33,13 +33,13 @@ pub(super) fn servers(node: &mut Node, shared: &Arc<Shared>) -> Result<Vec<Sourc
     Ok(made.sources)
 }
 
-struct Services<'a> {
+struct R2rServices<'a> {
     node: &'a mut Node,
-    shared: &'a Arc<Shared>,
+    shared: &'a Arc<R2rShared>,
     sources: Vec<Source>,
 }
 
-impl Services<'_> {
+impl R2rServices<'_> {
     fn add<T, A>(&mut self, name: &'static str, call: fn(T::Request, Reply<A>) -> Call) -> Result<(), RosError>
     where
         T: WrappedServiceTypeSupport + 'static,
@@ -56,7 +56,7 @@ impl Services<'_> {
 pub(super) fn server<T, A>(
     node: &mut Node,
     name: &'static str,
-    shared: &Arc<Shared>,
+    shared: &Arc<R2rShared>,
     mut take: impl FnMut(T::Request, Reply<A>) + Send + 'static,
 ) -> Result<Source, RosError>
 where

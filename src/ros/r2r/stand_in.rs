@@ -56,9 +56,9 @@ macro_rules! service {
             message!(Response { $($answered)* });
 
             #[derive(Clone, Debug)]
-            pub struct Service();
+            pub struct StandInService();
 
-            impl r2r::WrappedServiceTypeSupport for Service {
+            impl r2r::WrappedServiceTypeSupport for StandInService {
                 type Request = Request;
                 type Response = Response;
 
@@ -327,7 +327,7 @@ mod tests {
     use super::std_srvs::srv::{SetBool, Trigger};
     use super::touchup_msgs::{action::Probe, msg, srv};
 
-    type Fields = [(&'static str, &'static str)];
+    type FieldTypes = [(&'static str, &'static str)];
 
     /// Type and name of the fields in one part of a file of `msg/`, as Rust has them.
     fn fields(part: &str) -> Vec<(String, String)> {
@@ -354,7 +354,7 @@ mod tests {
 
     #[test]
     fn the_fields_are_those_of_msg() {
-        let files: [(&str, &str, &[&Fields]); 15] = [
+        let files: [(&str, &str, &[&FieldTypes]); 15] = [
             ("msg", "Feature.msg", &[msg::Feature::FIELDS]),
             ("msg", "FeatureArray.msg", &[msg::FeatureArray::FIELDS]),
             ("msg", "HapticMismatch.msg", &[msg::HapticMismatch::FIELDS]),

@@ -10,8 +10,8 @@ use r2r::{
 };
 
 use super::convert::Convert;
-use super::graph::Graph;
-use super::{During, RosError, Shared, Source, source, touchup_msgs};
+use super::graph::R2rGraph;
+use super::{During, R2rShared, RosError, Source, source, touchup_msgs};
 use crate::ros::arguments::NodeConfig;
 use crate::ros::messages::{Clock, Message, PointStamped, PoseStamped, TFMessage, WrenchStamped};
 use crate::ros::outbox::Sent;
@@ -62,8 +62,8 @@ const DIAGNOSTICS: (&str, QosProfile) = ("/diagnostics", reliable(10));
 const SAMPLES: usize = 2048;
 
 impl MeshPublishers {
-    pub fn new(config: &NodeConfig, node: &mut Node, graph: &mut Graph) -> Result<Self, RosError> {
-        let mut made = Topics { config, node, graph };
+    pub fn new(config: &NodeConfig, node: &mut Node, graph: &mut R2rGraph) -> Result<Self, RosError> {
+        let mut made = R2rTopics { config, node, graph };
         Ok(Self {
             tiles: made.publisher(MESH)?,
             patches: made.publisher(MESH_PATCH)?,
@@ -83,8 +83,8 @@ impl MeshPublishers {
 }
 
 impl UrgentPublishers {
-    pub fn new(config: &NodeConfig, node: &mut Node, graph: &mut Graph) -> Result<Self, RosError> {
-        let mut made = Topics { config, node, graph };
+    pub fn new(config: &NodeConfig, node: &mut Node, graph: &mut R2rGraph) -> Result<Self, RosError> {
+        let mut made = R2rTopics { config, node, graph };
         Ok(Self {
             features: made.publisher(FEATURES)?,
             feature_markers: made.publisher(FEATURE_MARKERS)?,
@@ -125,14 +125,14 @@ fn sent(result: r2r::Result<()>) -> Sent {
 pub(super) fn subscriptions(
     config: &NodeConfig,
     node: &mut Node,
-    graph: &mut Graph,
-    shared: &Arc<Shared>,
+    graph: &mut R2rGraph,
+    shared: &Arc<R2rShared>,
 ) -> Result<Vec<Source>, RosError> {
     use geometry_msgs::msg as geometry;
     use tf2_msgs::msg as tf2;
     let [wrench, pose] = config.sample_topics();
     let samples = best_effort(SAMPLES);
-    let mut made = Topics { config, node, graph };
+    let mut made = R2rTopics { config, node, graph };
     let mut sources = vec![
         made.source::<geometry::WrenchStamped, WrenchStamped>(wrench, samples.clone(), shared, |_, message| {
             Arrival::Wrench(message, Instant::now())
@@ -147,7 +147,7 @@ pub(super) fn subscriptions(
         })?,
     ];
     if config.parameters.bool("use_sim_time") {
-        let set = |shared: &Shared, now: Clock| {
+        let set = |shared: &R2rShared, now: Clock| {
             shared.clock.set(now.clock);
             Arrival::Clock(now)
         };
@@ -156,13 +156,13 @@ pub(super) fn subscriptions(
     Ok(sources)
 }
 
-struct Topics<'a> {
+struct R2rTopics<'a> {
     config: &'a NodeConfig,
     node: &'a mut Node,
-    graph: &'a mut Graph,
+    graph: &'a mut R2rGraph,
 }
 
-impl Topics<'_> {
+impl R2rTopics<'_> {
     fn publisher<T>(&mut self, (name, qos): (&str, QosProfile)) -> Result<Publisher<T>, RosError>
     where
         T: WrappedTypesupport + 'static,
@@ -176,8 +176,8 @@ impl Topics<'_> {
         &mut self,
         name: &str,
         qos: QosProfile,
-        shared: &Arc<Shared>,
-        arrival: fn(&Shared, M) -> Arrival,
+        shared: &Arc<R2rShared>,
+        arrival: fn(&R2rShared, M) -> Arrival,
     ) -> Result<Source, RosError>
     where
         T: WrappedTypesupport + Convert<M> + Send + 'static,

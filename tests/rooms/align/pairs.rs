@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64Mcg;
-use touchup::align::{PairsError, PairsFit, PairsParams, PointPair, Side, fit_pairs};
+use touchup::align::{PairSide, PairsError, PairsFit, PairsParams, PointPair, fit_pairs};
 
 /// Corners and marks of a part of 120 × 80 × 30 mm.
 const PICKS: [[f64; 3]; 7] = [
@@ -140,16 +140,16 @@ fn what_determines_no_motion_is_refused() {
     assert_eq!(fit(&good[..2]).unwrap_err(), PairsError::TooFew { count: 2 });
     let mut bad = good.clone();
     bad[3].to.y = f64::NAN;
-    assert_eq!(fit(&bad).unwrap_err(), PairsError::BadPoint { pair: 4, side: Side::To });
+    assert_eq!(fit(&bad).unwrap_err(), PairsError::BadPoint { pair: 4, side: PairSide::To });
     bad[3].to.y = 1e300;
-    assert_eq!(fit(&bad).unwrap_err(), PairsError::BadPoint { pair: 4, side: Side::To });
+    assert_eq!(fit(&bad).unwrap_err(), PairsError::BadPoint { pair: 4, side: PairSide::To });
     let mut bad = good.clone();
     bad[1].sigma = Some(-1e-3);
     assert_eq!(fit(&bad).unwrap_err(), PairsError::BadSigma { pair: 2, sigma_mm: -1.0 });
     let nothing = PairsParams { sigma: Some(0.0), ..PairsParams::default() };
     assert_eq!(fit_pairs(&good, &nothing).unwrap_err(), PairsError::BadGivenSigma { sigma_mm: 0.0 });
     let twice = [good[0], good[1], good[1]];
-    assert!(matches!(fit(&twice), Err(PairsError::Coincident { first: 2, second: 3, side: Side::From, .. })));
+    assert!(matches!(fit(&twice), Err(PairsError::Coincident { first: 2, second: 3, side: PairSide::From, .. })));
     let line: Vec<_> = (0..6)
         .map(|i| {
             let from = Point3::new(0.02 * f64::from(i), 0.0, 0.3e-3 * f64::from(i % 2));

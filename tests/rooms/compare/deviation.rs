@@ -8,8 +8,8 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use proptest::prelude::*;
 use touchup::align::{IcpParams, icp};
 use touchup::compare::{
-    CompareError, CompareParams, Comparison, Panel, Picture, PictureParams, Region, Regions, Shape, Summary,
-    cloud_distances, colour_of, compare, deviations, draw_picture, sample_surface, surface_area, tilts,
+    CompareError, CompareParams, Comparison, IndexedMesh, Picture, PicturePanel, PictureParams, Regions, Summary,
+    SupportRegion, cloud_distances, colour_of, compare, deviations, draw_picture, sample_surface, surface_area, tilts,
 };
 use touchup::io::mesh_file::{MeshUnit, VertexColumn, read_mesh, read_vertex_columns, write_mesh, write_mesh_with};
 use touchup::io::png::write_png;
@@ -59,7 +59,7 @@ fn icosahedron(radius: f64) -> TriMesh {
 
 fn compared(mesh: &TriMesh, truth: &TriMesh, params: &CompareParams) -> Comparison {
     let trees = [mesh, truth].map(FaceTree::new);
-    let shapes = [Shape { mesh, tree: &trees[0] }, Shape { mesh: truth, tree: &trees[1] }];
+    let shapes = [IndexedMesh { mesh, tree: &trees[0] }, IndexedMesh { mesh: truth, tree: &trees[1] }];
     compare(shapes[0], shapes[1], Regions::Unknown, params, &Alone).unwrap()
 }
 
@@ -195,24 +195,24 @@ fn regions_are_told_apart_and_looked_up_for_the_scan() {
     let truth = square(1, 0.0);
     // as after a touch: the left half fits, the right half is 0.5 mm too high
     let mut mesh = square(20, 0.0);
-    let mut regions = vec![Region::Touched; mesh.vertex_slots()];
+    let mut regions = vec![SupportRegion::Touched; mesh.vertex_slots()];
     for (at, region) in regions.iter_mut().enumerate() {
         let vertex = touchup::mesh::VertexId(at as u32);
         let p = mesh.position(vertex);
         if p.x > 10.5e-3 {
             mesh.set_position(vertex, Point3::new(p.x, p.y, 0.5e-3));
-            *region = Region::Untouched;
+            *region = SupportRegion::Untouched;
         }
     }
     let scan = square(20, 0.5e-3);
     let trees = [&mesh, &truth, &scan].map(FaceTree::new);
     let [after, part, before] =
-        [(&mesh, 0), (&truth, 1), (&scan, 2)].map(|(mesh, at)| Shape { mesh, tree: &trees[at] });
+        [(&mesh, 0), (&truth, 1), (&scan, 2)].map(|(mesh, at)| IndexedMesh { mesh, tree: &trees[at] });
     let own = compare(after, part, Regions::Own(&regions), &few(), &Alone).unwrap();
     let through = compare(before, part, Regions::Of(after, &regions), &few(), &Alone).unwrap();
     for found in [&own, &through] {
         let names: Vec<_> = found.regions.iter().map(|part| part.region).collect();
-        assert_eq!(names, [None, Some(Region::Touched), Some(Region::Untouched)]);
+        assert_eq!(names, [None, Some(SupportRegion::Touched), Some(SupportRegion::Untouched)]);
         let points = |at: usize| found.regions[at].mesh_to_truth.clone().unwrap().points;
         assert_eq!(points(0), points(1) + points(2));
         // the border lies between the columns at 10 and 11 mm
@@ -237,7 +237,7 @@ fn what_is_no_number_or_no_mesh_is_refused() {
     let nothing = FaceTree::new(&empty);
     assert_eq!(deviations(&bad[..1], &empty, &nothing, &Alone), Err(CompareError::NoFaces));
     assert_eq!(tilts(&mesh, &empty, &nothing), Err(CompareError::NoFaces));
-    let shapes = [Shape { mesh: &mesh, tree: &tree }, Shape { mesh: &empty, tree: &nothing }];
+    let shapes = [IndexedMesh { mesh: &mesh, tree: &tree }, IndexedMesh { mesh: &empty, tree: &nothing }];
     for (mesh, truth) in [(shapes[0], shapes[1]), (shapes[1], shapes[0]), (shapes[1], shapes[1])] {
         assert_eq!(compare(mesh, truth, Regions::Unknown, &few(), &Alone), Err(CompareError::NoFaces));
     }
@@ -276,7 +276,7 @@ proptest! {
 
 /// A square in one colour on each half.
 fn picture_of(deviations: &[f64], mesh: &TriMesh, panels: usize) -> Picture {
-    let panel = Panel { mesh, deviations, classes: None, paint: None, title: "a panel", note: "its note" };
+    let panel = PicturePanel { mesh, deviations, classes: None, paint: None, title: "a panel", note: "its note" };
     let from = Some(Vector3::z());
     let params = PictureParams { title: "a title", width: 800, range: 1e-3, from, weights: None, legend: &[] };
     draw_picture(&vec![panel; panels], &params)
@@ -514,7 +514,7 @@ impl Workers for SoMany {
 fn any_number_of_threads_finds_the_same_to_the_last_bit() {
     let mesh = wavy::wavy_plate(20_000).unwrap();
     let tree = FaceTree::new(&mesh);
-    let shape = Shape { mesh: &mesh, tree: &tree };
+    let shape = IndexedMesh { mesh: &mesh, tree: &tree };
     let points: Vec<Point3<f64>> = sample_surface(&mesh, 3e5, 1)
         .iter()
         .enumerate()

@@ -10,7 +10,8 @@ use touchup::io::mesh_file::{MeshUnit, read_mesh};
 use touchup::mesh::triangle::shape_quality;
 use touchup::mesh::{FaceId, FaceTree, TriMesh, VertexId, signed_distance};
 use touchup::patch::{
-    ContourParams, Crossing, Cut, Edge, Lattice, Node, NodeValues, OpenSquare, Owner, Patch, Region, contour,
+    ContourParams, Crossing, Cut, Edge, Lattice, LatticeNode, LatticeRegion, NodeValues, OpenSquare, Owner, Patch,
+    contour,
 };
 
 use crate::common::{grid, within};
@@ -26,16 +27,16 @@ fn lattice(pitch: f64) -> Lattice {
 }
 
 /// All cells from `-n` to `n` on each axis.
-fn cube(n: i32) -> Region {
+fn cube(n: i32) -> LatticeRegion {
     let side = || -n..=n;
     side().flat_map(|x| side().flat_map(move |y| side().map(move |z| [x, y, z]))).collect()
 }
 
-fn node_values(lattice: &Lattice, region: &Region, field: Field) -> NodeValues {
+fn node_values(lattice: &Lattice, region: &LatticeRegion, field: Field) -> NodeValues {
     let mut values = NodeValues::default();
     for (cell, ()) in region.iter() {
         for corner in 0..8 {
-            let node: Node = std::array::from_fn(|i| cell[i] + (corner >> i & 1));
+            let node: LatticeNode = std::array::from_fn(|i| cell[i] + (corner >> i & 1));
             values.insert_with(node, || field(&lattice.position(node)));
         }
     }
@@ -55,7 +56,7 @@ fn crossing(lattice: &Lattice, field: Field, edge: &Edge) -> Crossing {
     Crossing { point: a, normal: vector![slope(0), slope(1), slope(2)].normalize() }
 }
 
-fn patch_of(lattice: &Lattice, region: &Region, scan: &TriMesh, tree: &FaceTree, field: Field) -> Patch {
+fn patch_of(lattice: &Lattice, region: &LatticeRegion, scan: &TriMesh, tree: &FaceTree, field: Field) -> Patch {
     let values = node_values(lattice, region, field);
     let cut = Cut::new(lattice, region, scan, tree);
     assert!(cut.lost.is_empty());
@@ -67,7 +68,7 @@ fn nothing() -> TriMesh {
 }
 
 /// The zero set of a field in a region, without a scan.
-fn surface(lattice: &Lattice, region: &Region, field: Field) -> TriMesh {
+fn surface(lattice: &Lattice, region: &LatticeRegion, field: Field) -> TriMesh {
     let scan = nothing();
     patch_of(lattice, region, &scan, &FaceTree::new(&scan), field).applied_to(&scan).unwrap().0
 }
@@ -189,14 +190,14 @@ fn random_waves_give_closed_skins_without_intersections() {
 // ---- in a scan --------------------------------------------------------------------------------------------------
 
 /// Cells that come within `radius` of one of `points`, none within `margin` of a rim of the scan.
-fn region_around(lattice: &Lattice, scan: &TriMesh, points: &[Point3<f64>], radius: f64, margin: f64) -> Region {
+fn region_around(lattice: &Lattice, scan: &TriMesh, points: &[Point3<f64>], radius: f64, margin: f64) -> LatticeRegion {
     let rims: Vec<Point3<f64>> = soundness(scan).rims.iter().flatten().map(|&v| scan.positions()[v as usize]).collect();
     let steps = (radius / lattice.pitch).ceil() as i32 + 1;
-    let mut region = Region::default();
+    let mut region = LatticeRegion::default();
     for p in points {
         let middle = lattice.cell_of(p);
         for (step, ()) in cube(steps).iter() {
-            let cell: Node = std::array::from_fn(|i| middle[i] + step[i]);
+            let cell: LatticeNode = std::array::from_fn(|i| middle[i] + step[i]);
             let centre = lattice.position(cell) + Vector3::repeat(lattice.pitch / 2.0);
             let is_near = |q: &Point3<f64>, limit: f64| (q - centre).norm() < limit;
             if is_near(p, radius) && !rims.iter().any(|q| is_near(q, margin)) {
@@ -208,10 +209,10 @@ fn region_around(lattice: &Lattice, scan: &TriMesh, points: &[Point3<f64>], radi
 }
 
 /// Adds what is beyond open squares that the scan crosses, until there are none: no region grows by more rounds than this.
-fn settle(lattice: &Lattice, region: &mut Region, scan: &TriMesh, tree: &FaceTree, field: Field) {
+fn settle(lattice: &Lattice, region: &mut LatticeRegion, scan: &TriMesh, tree: &FaceTree, field: Field) {
     for _ in 0..60 {
         let open = Cut::new(lattice, region, scan, tree).open_squares(region, &node_values(lattice, region, field));
-        let beyond: Vec<Node> = open.iter().filter(|open| open.is_scanned).map(|open| open.beyond).collect();
+        let beyond: Vec<LatticeNode> = open.iter().filter(|open| open.is_scanned).map(|open| open.beyond).collect();
         if beyond.is_empty() {
             return;
         }
@@ -281,7 +282,7 @@ fn some_points(scan: &TriMesh, count: usize, seed: u64) -> Vec<Point3<f64>> {
 }
 
 /// Settles and splices a region; the field is the scan's own distance.
-fn splice_own(lattice: &Lattice, region: &mut Region, scan: &TriMesh) -> (Patch, TriMesh) {
+fn splice_own(lattice: &Lattice, region: &mut LatticeRegion, scan: &TriMesh) -> (Patch, TriMesh) {
     let tree = FaceTree::new(scan);
     let field = |p: &Point3<f64>| signed_distance(scan, &tree, p, 1.0).unwrap();
     settle(lattice, region, scan, &tree, &field);
@@ -349,9 +350,9 @@ fn a_dent_is_pressed_into_a_scan() {
 }
 
 /// Random cells at the surface of a scan, in clumps: single ones, rows, and cells that meet at an edge or a corner only.
-fn crumbs(lattice: &Lattice, scan: &TriMesh, seed: u64, count: usize) -> Region {
+fn crumbs(lattice: &Lattice, scan: &TriMesh, seed: u64, count: usize) -> LatticeRegion {
     let mut rng = Pcg64::seed_from_u64(seed);
-    let mut region = Region::default();
+    let mut region = LatticeRegion::default();
     for p in some_points(scan, count, seed) {
         let mut cell = lattice.cell_of(&p);
         for _ in 0..within(&mut rng, 1.0, 9.0) as u32 {
@@ -383,7 +384,7 @@ fn what_is_done_far_away_changes_no_face_here() {
     let mut both = region_around(&lattice, &scan, &far, 3e-3, 0.0);
     here.iter().for_each(|(cell, ())| both.insert(cell, ()));
     // owner, names and places of the corners
-    let faces = |region: &Region| -> BTreeMap<_, Vec<_>> {
+    let faces = |region: &LatticeRegion| -> BTreeMap<_, Vec<_>> {
         let patch = patch_of(&lattice, region, &scan, &tree, &field);
         let mut faces: BTreeMap<_, Vec<_>> = BTreeMap::new();
         for face in &patch.faces {

@@ -1,8 +1,10 @@
 //! Flat and cone tips led over the plate that the simulator knows: where they say that they touched, against where they did.
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use touchup::patch::{Touch, TouchFinder, TouchFinderParams};
-use touchup::sim::{Lines, Moment, PathParams, Plate, Region, Stroke, StylusParams, Surface, plan_demo, raster, touch};
+use touchup::patch::{TipTouch, TouchFinder, TouchFinderParams};
+use touchup::sim::{
+    Lines, Moment, PathParams, Plate, RasterRegion, Stroke, StylusParams, Surface, plan_demo, raster, touch,
+};
 use touchup::touch::{Compensator, CompensatorParams, SyncParams, Synchroniser, TipShape};
 
 use crate::full::either;
@@ -16,7 +18,7 @@ fn path(stylus: &StylusParams, hand: &PathParams) -> Vec<Stroke> {
     if !matches!(stylus.shape, TipShape::Cone { .. }) {
         return plan_demo(&plate, hand).unwrap();
     }
-    let region = Region {
+    let region = RasterRegion {
         frame_ov: Isometry3::identity(),
         low: [0.009, 0.008].into(),
         high: [0.065, 0.042].into(),
@@ -27,7 +29,7 @@ fn path(stylus: &StylusParams, hand: &PathParams) -> Vec<Stroke> {
 }
 
 /// What was felt, with what really was at that time.
-fn felt(stylus: &StylusParams, seed: u64) -> Vec<(Touch, Moment)> {
+fn felt(stylus: &StylusParams, seed: u64) -> Vec<(TipTouch, Moment)> {
     let plate = Plate::default();
     let hand = PathParams { radius: stylus.radius, ..PathParams::default() };
     let recording = touch(&plate, &path(stylus, &hand), stylus, seed).unwrap();
@@ -43,7 +45,7 @@ fn felt(stylus: &StylusParams, seed: u64) -> Vec<(Touch, Moment)> {
             .for_each(|sample| finder.push(&compensator.compensate(&sample), |touch| touches.push(touch)));
     }
     finder.flush(|touch| touches.push(touch));
-    let truth = |touch: Touch| {
+    let truth = |touch: TipTouch| {
         let tick = (touch.stamp_ns - stylus.sensor.start_ns + 500_000) / 1_000_000;
         Some((touch, recording.moments.get(usize::try_from(tick).ok()?)?.clone()))
     };
@@ -52,7 +54,7 @@ fn felt(stylus: &StylusParams, seed: u64) -> Vec<(Touch, Moment)> {
 
 /// Share of the samples in contact that say where, and median and 90th percentile of the distance of their points from the
 /// part, mm, and of the error of their normals, degrees, where one place alone touched.
-fn quality(felt: &[(Touch, Moment)]) -> [f64; 5] {
+fn quality(felt: &[(TipTouch, Moment)]) -> [f64; 5] {
     let plate = Plate::default();
     let (mut distances, mut angles, mut touching) = (Vec::new(), Vec::new(), 0);
     for (touch, moment) in felt {

@@ -6,7 +6,7 @@ use touchup::report::allocations::asked;
 use touchup::report::cost::{
     BAREST, Cost, LogLaw, MinimalLoop, PartCost, PerSample, ReplaySpeed, SizeCost, StageCost, cost,
 };
-use touchup::report::{Cell, Drawing, Effort, Spread, Stroke};
+use touchup::report::{Drawing, Effort, LineStroke, Spread, TableCell};
 use touchup::scene::Scene;
 use touchup::sim::wavy::{slide, wavy_plate};
 use touchup::touch::WrenchFrame;
@@ -88,13 +88,13 @@ fn the_law_is_drawn_dashed_beside_what_was_measured() {
     let Drawing::Curves(curves) = &chapter.figures[0].drawing else { panic!("curves are drawn") };
     assert_eq!(curves.len(), 6);
     let law = &curves[4];
-    assert_eq!(law.stroke, Stroke::Dashed);
+    assert_eq!(law.stroke, LineStroke::Dashed);
     let at: Vec<_> = law.marks.iter().map(|mark| (mark.x.median, (mark.y.median * 1e6).round())).collect();
     assert_eq!(at, [(1e4, 100e3), (1e5, 130e3), (1e6, 160e3)], "0.10, 0.13 and 0.16 µs");
     for table in &chapter.tables {
         assert!(table.rows.iter().all(|row| row.len() == table.heads.len()), "{}", table.id);
     }
-    assert_eq!(chapter.tables[1].rows[0][0], Cell::Text("guard".to_owned()));
+    assert_eq!(chapter.tables[1].rows[0][0], TableCell::Text("guard".to_owned()));
 }
 
 /// The ratio of two that do different work would say nothing: both move three corners with each sample, and about as far.

@@ -2,7 +2,8 @@
 
 use serde_json::Value;
 use touchup::report::{
-    Axis, Cell, Chapter, Drawing, Figure, Mark, OutputFile, Panel, Report, ReportError, Series, Spread, Stroke, Table,
+    Axis, Chapter, Drawing, Figure, LineStroke, Mark, OutputFile, Panel, Report, ReportError, Series, Spread, Table,
+    TableCell,
 };
 
 const HOSTILE: &str = "a < b & \"c\" > 'd' \u{1}";
@@ -24,7 +25,11 @@ fn curves(id: &str, log: bool, series: Vec<Series>) -> Figure {
 }
 
 fn series(name: &str, marks: &[(f64, f64)]) -> Series {
-    Series { name: name.to_owned(), stroke: Stroke::Joined, marks: marks.iter().map(|(x, y)| mark(*x, *y)).collect() }
+    Series {
+        name: name.to_owned(),
+        stroke: LineStroke::Joined,
+        marks: marks.iter().map(|(x, y)| mark(*x, *y)).collect(),
+    }
 }
 
 /// Everything that a figure or table may hold, sane and not.
@@ -57,7 +62,7 @@ fn report() -> Report {
         heads: ["name".to_owned(), "push, µs".to_owned(), "error, mm".to_owned()].to_vec(),
         rows: vec![
             vec!["a,\"b\"".into(), Spread { median: 0.1 + 0.2, p10: 1e-7, p90: 5e22 }.into(), (1.0 / 3.0).into()],
-            vec![Cell::Empty, Cell::Empty, f64::NAN.into()],
+            vec![TableCell::Empty, TableCell::Empty, f64::NAN.into()],
         ],
     };
     Report {

@@ -1,6 +1,6 @@
 //! The stability part of the report: what is promised of the default integrator holds, and what is known to fail is seen to.
 
-use touchup::report::{Effort, Ending, Integrator, stability};
+use touchup::report::{Effort, Integrator, RunEnding, stability};
 
 #[test]
 fn the_default_is_stable_everywhere_and_explicit_euler_is_not() {
@@ -17,11 +17,11 @@ fn the_default_is_stable_everywhere_and_explicit_euler_is_not() {
         println!("{:?} {} {:?}", shares.shape, shares.stable_share, shares.endings);
     }
     let of = |integrator| measured.faces.iter().find(|shares| shares.integrator == integrator).unwrap();
-    assert_eq!(of(Integrator::Lie).endings, [(Ending::Stable, of(Integrator::Lie).runs)]);
+    assert_eq!(of(Integrator::Lie).endings, [(RunEnding::Stable, of(Integrator::Lie).runs)]);
     // one step of explicit Euler goes over the rest point from dt > 1/(alpha slope) on: about half of the runs are stiffer
     let euler = of(Integrator::ExplicitEuler);
     assert!((0.2..0.8).contains(&euler.stable_share), "{:?}", euler.endings);
-    assert!(of(Integrator::DormandPrince).endings.iter().any(|(ending, _)| *ending == Ending::GaveUp));
+    assert!(of(Integrator::DormandPrince).endings.iter().any(|(ending, _)| *ending == RunEnding::GaveUp));
     println!("default on meshes: stable from {:?}", measured.default_stable_from_quality());
     // triangles thinner than the guard's limit of 0.15 follow a touch, too, if they were scanned so
     assert!(measured.default_stable_from_quality().is_some_and(|quality| quality < 0.1));

@@ -6,7 +6,7 @@ use touchup::compare::TouchedRegion;
 use touchup::mesh::{FaceTree, TriMesh, VertexId};
 use touchup::refine::TipParams;
 use touchup::report::{
-    Cell, ContactSculptor, Drawing, Effort, GaussianParams, GaussianProcess, GaussianSurface, Given, Rule,
+    ContactSculptor, Drawing, Effort, GaussianParams, GaussianProcess, GaussianSurface, Given, Rule, TableCell,
     TouchedError, Way, WholeScanError, convergence, fit_decay, straight_line, whole_scan,
 };
 use touchup::touch::{CompensatorParams, Sample, Wrench};
@@ -290,8 +290,8 @@ fn check_chapter(chapter: &touchup::report::Chapter) {
     for table in &chapter.tables {
         assert!(table.rows.iter().all(|row| row.len() == table.heads.len()), "{}", table.id);
         let numbers = table.rows.iter().flatten().filter_map(|cell| match cell {
-            Cell::Number(number) => Some(*number),
-            Cell::Spread(spread) => Some(spread.median),
+            TableCell::Number(number) => Some(*number),
+            TableCell::Spread(spread) => Some(spread.median),
             _ => None,
         });
         assert!(numbers.into_iter().all(f64::is_finite), "{}", table.id);

@@ -2,8 +2,8 @@
 //! forms.
 
 use nalgebra::Vector3;
-use touchup::report::work_precision::{Method, PAPER_H_MIN_M, Problem, Setting, WorkPrecision, reference};
-use touchup::report::{Cell, Drawing, Effort, Report};
+use touchup::report::work_precision::{Method, PAPER_H_MIN_M, Problem, SolverSetting, WorkPrecision, reference};
+use touchup::report::{Drawing, Effort, Report, TableCell};
 
 /// A sample without friction at about half of f_max, so that u = h/h_min + δ has an elementary solution at exactly half.
 fn at_half_of_f_max(h_min_m: f64, from: f64) -> Problem {
@@ -58,7 +58,7 @@ fn the_reference_turns_the_normal_by_the_impulse_it_has_felt() {
 fn order(method: Method, problem: &Problem, steps: usize) -> f64 {
     let right = reference(problem).unwrap();
     let error = |steps| {
-        let end = method.solve(problem, Setting::Steps(steps)).unwrap().face;
+        let end = method.solve(problem, SolverSetting::Steps(steps)).unwrap().face;
         (end.b - right.b).norm() / problem.h_min_m + (end.n - right.n).norm()
     };
     (error(steps) / error(2 * steps)).log2()
@@ -85,7 +85,7 @@ fn an_adaptive_solver_gets_a_digit_for_its_evaluations() {
     let right = reference(&mild).unwrap();
     for (method, low, high) in [(Method::DormandPrince, 4.3, 6.2), (Method::Rodas, 3.3, 5.0)] {
         let [coarse, fine] = [1e-5, 1e-11].map(|relative| {
-            let solved = method.solve(&mild, Setting::RelativeTolerance(relative)).unwrap();
+            let solved = method.solve(&mild, SolverSetting::RelativeTolerance(relative)).unwrap();
             ((solved.face.b - right.b).norm(), solved.evaluations as f64)
         });
         let order = (coarse.0 / fine.0).ln() / (fine.1 / coarse.1).ln();
@@ -99,7 +99,7 @@ fn without_friction_one_exact_step_is_the_solution_and_no_explicit_one_is() {
         let problem = at_half_of_f_max(h_min_m, 3.0);
         let right = way_at_half(&problem, 3.0);
         for method in [Method::Lie, Method::DriftCorrected] {
-            let end = method.solve(&problem, Setting::Steps(1)).unwrap().face;
+            let end = method.solve(&problem, SolverSetting::Steps(1)).unwrap().face;
             assert!((end.b.z - right).abs() < 1e-13 * h_min_m && end.n == Vector3::z());
         }
         let euler = method_error(Method::Euler, &problem, right);
@@ -110,16 +110,16 @@ fn without_friction_one_exact_step_is_the_solution_and_no_explicit_one_is() {
 }
 
 fn method_error(method: Method, problem: &Problem, right: f64) -> f64 {
-    (method.solve(problem, Setting::Steps(1)).unwrap().face.b.z - right).abs()
+    (method.solve(problem, SolverSetting::Steps(1)).unwrap().face.b.z - right).abs()
 }
 
 #[test]
 fn an_implicit_solver_crosses_nine_decades_of_stiffness_and_an_explicit_one_gives_up() {
     let stiff = Problem::of(1e-9, 0.35);
     let right = reference(&stiff).unwrap();
-    let solved = Method::Rodas.solve(&stiff, Setting::RelativeTolerance(1e-6)).unwrap();
+    let solved = Method::Rodas.solve(&stiff, SolverSetting::RelativeTolerance(1e-6)).unwrap();
     assert!((solved.face.b - right.b).norm() < 1e-8 && solved.evaluations < 5000, "{}", solved.evaluations);
-    assert!(Method::DormandPrince.solve(&stiff, Setting::RelativeTolerance(1e-6)).is_none());
+    assert!(Method::DormandPrince.solve(&stiff, SolverSetting::RelativeTolerance(1e-6)).is_none());
 }
 
 #[test]
@@ -133,12 +133,12 @@ fn evaluations_are_counted_as_by_hand() {
         (Method::DriftCorrected, 3, &tilted, 9),
         (Method::DriftCorrected, 3, &straight, 3),
     ] {
-        assert_eq!(method.solve(problem, Setting::Steps(steps)).unwrap().evaluations, count, "{method:?}");
+        assert_eq!(method.solve(problem, SolverSetting::Steps(steps)).unwrap().evaluations, count, "{method:?}");
     }
     // a tolerance that everything meets: one step. Dormand–Prince has seven stages, the first of them from before; RODAS six and
     // one Jacobian of four columns
     for (method, count) in [(Method::DormandPrince, 7), (Method::Rodas, 10)] {
-        let solved = method.solve(&tilted, Setting::RelativeTolerance(1e9)).unwrap();
+        let solved = method.solve(&tilted, SolverSetting::RelativeTolerance(1e9)).unwrap();
         assert_eq!(solved.evaluations, count, "{method:?}");
     }
 }
@@ -172,7 +172,7 @@ fn what_is_measured_becomes_a_chapter_with_the_same_numbers() {
         assert!(table.rows.iter().all(|row| row.len() == table.heads.len()), "{}", table.id);
     }
     let fastest = &chapter.tables[0].rows[0][3];
-    assert_eq!(*fastest, Cell::from(measured.cases[0].ranking(1e-6)[0].0.name()));
+    assert_eq!(*fastest, TableCell::from(measured.cases[0].ranking(1e-6)[0].0.name()));
     let report = Report {
         machine: String::new(),
         commit: String::new(),

@@ -7,7 +7,9 @@ use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
-use touchup::robot::{Arm, Command, Joints, OnsetError, OnsetParams, TouchMoment, UrGeometry, Verdict, find_onset};
+use touchup::robot::{
+    Arm, Command, Joints, OnsetError, OnsetParams, OnsetVerdict, TouchMoment, UrGeometry, find_onset,
+};
 use touchup::sim::{ArmParams, Plate, SimArm, WEIGHTLESS};
 use touchup::touch::Payload;
 
@@ -146,12 +148,12 @@ fn what_is_no_clean_touch_is_told() {
     let params = OnsetParams::default();
     let verdict = |moments: &[TouchMoment]| find_onset(moments, &params).unwrap().verdict;
     let clean = made(&MAKING, 1);
-    assert_eq!(verdict(&clean), Verdict::Clean);
-    assert_eq!(verdict(&made(&Making { lateral: 0.9, ..MAKING }, 1)), Verdict::Edge);
+    assert_eq!(verdict(&clean), OnsetVerdict::Clean);
+    assert_eq!(verdict(&made(&Making { lateral: 0.9, ..MAKING }, 1)), OnsetVerdict::Edge);
     // pushed for 6 ms on its way, in free air
     let mut knocked = clean.clone();
     knocked[40..43].iter_mut().for_each(|m| m.force += 3.0);
-    assert_eq!(verdict(&knocked), Verdict::Knock);
+    assert_eq!(verdict(&knocked), OnsetVerdict::Knock);
     // lost for 20 ms when it had just come
     let mut bounced = clean.clone();
     let first = bounced.iter().position(|m| m.force > 1.8).unwrap();
@@ -159,7 +161,7 @@ fn what_is_no_clean_touch_is_told() {
     bounced.iter_mut().enumerate().for_each(|(at, m)| m.t = at as f64 * 2e-3);
     let held: Vec<_> = bounced.iter().map(|m| m.force).collect();
     assert!(held[first - 1] > 0.8 && held[first] < 0.5);
-    assert_eq!(verdict(&bounced), Verdict::Bounce);
+    assert_eq!(verdict(&bounced), OnsetVerdict::Bounce);
     // on its way out a third of the force is gone
     let mut slipped = clean.clone();
     let deepest = clean.iter().map(|m| m.travel).fold(0.0, f64::max);
@@ -167,8 +169,8 @@ fn what_is_no_clean_touch_is_told() {
     slipped[top..].iter_mut().for_each(|m| m.force -= (m.force - MAKING.bias) * 0.33);
     // with a delay that nobody knows it could be that
     let known = OnsetParams { delay: MAKING.delay, delay_sigma: 0.3e-3, ..params };
-    assert_eq!(find_onset(&clean, &known).unwrap().verdict, Verdict::Clean);
-    assert_eq!(find_onset(&slipped, &known).unwrap().verdict, Verdict::Slip);
+    assert_eq!(find_onset(&clean, &known).unwrap().verdict, OnsetVerdict::Clean);
+    assert_eq!(find_onset(&slipped, &known).unwrap().verdict, OnsetVerdict::Slip);
 }
 
 #[test]

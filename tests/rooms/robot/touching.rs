@@ -6,8 +6,8 @@ use rand_pcg::Pcg64;
 use touchup::explore::{ExploreError, Explorer, Felt, PatternParams};
 use touchup::features::{Feature, Kind, Measured};
 use touchup::robot::{
-    Arm, ArmError, ArmState, Command, LimitError, Limits, Narrower, ProbeError, Safety, TouchOutcome, TouchParams,
-    TouchRecord, TouchTarget, UrGeometry, Verdict, Watched, Witness,
+    Arm, ArmError, ArmState, Command, LimitError, Limits, Narrower, OnsetVerdict, ProbeError, Safety, TouchOutcome,
+    TouchParams, TouchRecord, TouchTarget, UrGeometry, Watched, Witness,
 };
 use touchup::sim::{ArmFault, ArmParams, Plate, SimArm};
 use touchup::touch::Wrench;
@@ -86,7 +86,7 @@ fn the_contact_is_where_the_ball_touches_and_not_where_the_arm_rests() {
         }
         let record = touched(&mut arm, &touching, &target).unwrap();
         let TouchOutcome::Contact { onset, centre, force_b } = &record.outcome else { panic!("{:?}", record.outcome) };
-        assert_eq!(onset.verdict, Verdict::Clean, "{onset:?}");
+        assert_eq!(onset.verdict, OnsetVerdict::Clean, "{onset:?}");
         assert!(
             record.peak_force < 1.5 * touching.force && arm.peak_force() < 1.5 * touching.force,
             "{}",
@@ -143,7 +143,7 @@ fn explored(arm: &mut SimArm, params: &ArmParams, touching: &TouchParams, search
         };
         peak = peak.max(record.peak_force);
         search.take(&match record.outcome {
-            TouchOutcome::Contact { onset, centre, .. } if onset.verdict != Verdict::Knock => {
+            TouchOutcome::Contact { onset, centre, .. } if onset.verdict != OnsetVerdict::Knock => {
                 Felt::At { centre: params.pose_bo.inverse_transform_point(&centre), sigma: onset.sigma }
             }
             TouchOutcome::Miss { .. } => Felt::Nothing,

@@ -2,8 +2,8 @@
 
 use super::*;
 use touchup::sim::{
-    Lines, Moment, PathParams, Region, SensorParams, Stroke, StylusParams, Touch, plan_demo, plan_mesh, push_ball,
-    raster, touch,
+    Lines, Moment, PathParams, RasterRegion, SensorParams, Stroke, StylusParams, Touch, plan_demo, plan_mesh,
+    push_ball, raster, touch,
 };
 use touchup::touch::{Message, StampedPose, StampedWrench};
 
@@ -224,7 +224,7 @@ fn senseless_stylus_settings_are_refused() {
 fn senseless_paths_are_refused() {
     let plate = Plate::default();
     let base = PathParams::default();
-    let far = |x: f64| Region {
+    let far = |x: f64| RasterRegion {
         frame_ov: nalgebra::Isometry3::identity(),
         low: nalgebra::Point2::origin(),
         high: nalgebra::Point2::new(x, 0.01),

@@ -3,14 +3,14 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::probe::{Cell, Ending, Plan, ProbeParams, Probed, ProbedSlide, ProbedTouch};
-use crate::robot::{ArmError, LimitError, ProbeError, Safety, SlideEnding, TouchOutcome, TouchRecord, Verdict};
+use crate::robot::{ArmError, LimitError, OnsetVerdict, ProbeError, Safety, SlideEnding, TouchOutcome, TouchRecord};
 use crate::ros::messages::{
     Feature, Header, Point, Pose, ProbeResponse, ProbeResult, ProbeTouch, Quaternion, Time, Vector3 as Vector3Msg,
     Wrench as WrenchMsg,
 };
 use crate::ros::node::convert::{NO_VECTOR, point, time, vector};
 use crate::ros::node::feature_messages::{flagged, found, number_of};
-use crate::ros::node::seeker::Target;
+use crate::ros::node::seeker::ProbeTarget;
 
 /// Why nothing is probed where all that is flagged was asked for.
 pub const NOTHING_FLAGGED: &str = "nothing is flagged that was not probed already";
@@ -30,7 +30,7 @@ pub fn not_probed(id: u32, code: u8, why: &str) -> ProbeResult {
 }
 
 /// Not begun.
-pub fn refused(target: &Target, code: u8, message: String) -> ProbeResult {
+pub fn refused(target: &ProbeTarget, code: u8, message: String) -> ProbeResult {
     let kind = target.kind.map_or(0, number_of);
     ProbeResult {
         id: target.id,
@@ -43,7 +43,7 @@ pub fn refused(target: &Target, code: u8, message: String) -> ProbeResult {
 }
 
 /// A dry run.
-pub fn planned(target: &Target, plan: &Plan) -> ProbeResult {
+pub fn planned(target: &ProbeTarget, plan: &Plan) -> ProbeResult {
     let told = plan.held_back.iter().map(|(touch, why)| format!("touch {touch}: {why}"));
     let (code, message) = match plan.held_back.len() {
         0 => {
@@ -57,7 +57,7 @@ pub fn planned(target: &Target, plan: &Plan) -> ProbeResult {
 }
 
 /// What was measured.
-pub fn result_of(target: &Target, probed: &Probed) -> ProbeResult {
+pub fn result_of(target: &ProbeTarget, probed: &Probed) -> ProbeResult {
     let feature = probed.found.as_ref().and_then(|found| found.feature.as_ref());
     let unknown = refused(target, 0, String::new());
     ProbeResult {
@@ -126,7 +126,7 @@ pub fn summary_of(results: &[ProbeResult]) -> String {
 
 /// What came of the touches of a feature, one message each.
 pub fn touches_of(
-    target: &Target,
+    target: &ProbeTarget,
     probed: &Probed,
     params: &ProbeParams,
     cell: &Cell,
@@ -246,11 +246,11 @@ fn touch_of(
 fn verdict_of(outcome: &TouchOutcome) -> u8 {
     match outcome {
         TouchOutcome::Contact { onset, .. } => match onset.verdict {
-            Verdict::Clean => ProbeTouch::CLEAN,
-            Verdict::Slip => ProbeTouch::SLIP,
-            Verdict::Edge => ProbeTouch::EDGE,
-            Verdict::Bounce => ProbeTouch::BOUNCE,
-            Verdict::Knock => ProbeTouch::KNOCK,
+            OnsetVerdict::Clean => ProbeTouch::CLEAN,
+            OnsetVerdict::Slip => ProbeTouch::SLIP,
+            OnsetVerdict::Edge => ProbeTouch::EDGE,
+            OnsetVerdict::Bounce => ProbeTouch::BOUNCE,
+            OnsetVerdict::Knock => ProbeTouch::KNOCK,
         },
         TouchOutcome::Miss { .. } => ProbeTouch::MISS,
         TouchOutcome::Unclear(_) => ProbeTouch::UNCLEAR,

@@ -14,11 +14,11 @@ pub struct Common {
     is_ending: AtomicBool,
     is_paused: AtomicBool,
     has_motion: AtomicBool,
-    seen: Mutex<Seen>,
+    seen: Mutex<StateSeen>,
 }
 
 #[derive(Clone, Debug, Default)]
-struct Seen {
+struct StateSeen {
     last: Option<ArmState>,
     fault: Option<String>,
     /// what it was stopped by, until somebody has looked and says so
@@ -69,7 +69,7 @@ impl Common {
         }
     }
 
-    fn lock(&self) -> MutexGuard<'_, Seen> {
+    fn lock(&self) -> MutexGuard<'_, StateSeen> {
         // what is in it is whole whoever held it
         self.seen.lock().unwrap_or_else(PoisonError::into_inner)
     }

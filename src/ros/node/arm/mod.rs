@@ -22,7 +22,7 @@ use self::request::Wanted;
 use self::world::{ArmWorld, ask_mesh};
 use super::convert::header;
 use super::placing::CELL;
-use super::seeker::{Measured, SeekerInput, Target};
+use super::seeker::{ArmMeasurement, ProbeTarget, SeekerInput};
 use super::shared::Shared;
 use super::view::ViewInput;
 use super::{NodeError, Setup};
@@ -85,7 +85,7 @@ impl ArmInput {
 }
 
 /// What the thread works at.
-struct Order {
+struct ArmOrder {
     input: ArmInput,
     folder: PathBuf,
 }
@@ -109,7 +109,7 @@ pub struct ArmOfNode {
 /// The arm's thread, as the others see it. Dropped, it has the arm stop, retract and end.
 #[derive(Debug)]
 pub struct ArmHandle {
-    inputs: SyncSender<Order>,
+    inputs: SyncSender<ArmOrder>,
     common: Arc<Common>,
     cell: Cell,
 }
@@ -132,7 +132,7 @@ impl ArmHandle {
         if !self.common.begin() {
             return Err(busy(input));
         }
-        let order = Order { input, folder: folder.to_owned() };
+        let order = ArmOrder { input, folder: folder.to_owned() };
         self.inputs.try_send(order).map_err(|error| {
             self.common.done();
             match error {
@@ -172,7 +172,7 @@ struct Hands {
     seeker: SyncSender<SeekerInput>,
     cell: Cell,
     params: ProbeParams,
-    inputs: Receiver<Order>,
+    inputs: Receiver<ArmOrder>,
     common: Arc<Common>,
     /// from the arm's clock to that of ROS, ns
     offset_ns: Option<i64>,
@@ -183,7 +183,7 @@ struct Hands {
 }
 
 /// Who follows a goal: what is told, and whether it is to end.
-type Watched<'a> = (&'a Feedback, &'a Arc<AtomicBool>);
+type GoalWatcher<'a> = (&'a Feedback, &'a Arc<AtomicBool>);
 
 /// Starts the thread of an arm.
 ///
@@ -310,7 +310,7 @@ impl Hands {
     }
 
     /// Works at an order. Who has the answer may give the next, so it is done before that is sent.
-    fn take(&mut self, Order { input, folder }: Order, arm: &mut dyn Arm) {
+    fn take(&mut self, ArmOrder { input, folder }: ArmOrder, arm: &mut dyn Arm) {
         self.begun = self.setup.clock.now();
         match input {
             ArmInput::Recover(reply) => {
@@ -380,7 +380,7 @@ impl Hands {
         ids: &[u32],
         settings: &ProbeSettings,
         arm: &mut dyn Arm,
-        watched: Option<Watched<'_>>,
+        watched: Option<GoalWatcher<'_>>,
     ) -> Vec<ProbeResult> {
         let targets = match self.targets(ids, arm) {
             Ok(targets) => targets,
@@ -412,7 +412,7 @@ impl Hands {
     }
 
     /// What is flagged, in the order that was asked for, or nearest first.
-    fn targets(&mut self, ids: &[u32], arm: &mut dyn Arm) -> Result<Vec<Target>, Box<ProbeResult>> {
+    fn targets(&mut self, ids: &[u32], arm: &mut dyn Arm) -> Result<Vec<ProbeTarget>, Box<ProbeResult>> {
         let (to, told) = sync_channel(1);
         let asked = self.seeker.try_send(SeekerInput::Targets(ids.to_vec(), to));
         let answer = asked.ok().and_then(|()| self.wait(arm, &told));
@@ -424,13 +424,13 @@ impl Hands {
         }
         if ids.is_empty() {
             let tip = self.common.last().map(|state| self.cell.place(&state.pose_bt)).unwrap_or_default();
-            let far = |target: &Target| (target.place - tip).norm();
+            let far = |target: &ProbeTarget| (target.place - tip).norm();
             told.sort_by(|a, b| far(a).total_cmp(&far(b)));
         }
         Ok(told)
     }
 
-    fn wanted(&self, settings: &ProbeSettings, target: &Target) -> Result<Wanted, (u8, String)> {
+    fn wanted(&self, settings: &ProbeSettings, target: &ProbeTarget) -> Result<Wanted, (u8, String)> {
         let wanted = Wanted::of(settings, &self.params, target.kind)?;
         if !wanted.is_dry_run {
             let scene_allows = self.setup.scene.robot.as_ref().is_some_and(|robot| robot.allow_motion);
@@ -451,10 +451,10 @@ impl Hands {
     fn probe_one(
         &mut self,
         folder: &Path,
-        target: &Target,
+        target: &ProbeTarget,
         wanted: &Wanted,
         arm: &mut dyn Arm,
-        watched: Option<Watched<'_>>,
+        watched: Option<GoalWatcher<'_>>,
         counts: [usize; 2],
     ) -> ProbeResult {
         let not_ready = |why: &str| refused(target, ProbeResult::ARM_NOT_READY, why.to_owned());
@@ -496,7 +496,7 @@ impl Hands {
             // the number that was wanted is still wanted, where it is not known well enough
             let is_done = matches!(probed.ending, Ending::ToleranceReached);
             let session = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            let measured = Measured { session, id: target.id, feature, is_done };
+            let measured = ArmMeasurement { session, id: target.id, feature, is_done };
             if self.seeker.try_send(SeekerInput::Measured(Box::new(measured))).is_err() {
                 warn!(feature = target.id, "what was measured is in the answer, and not among the features");
             }

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::*;
 use touchup::mesh::FaceId;
-use touchup::refine::{Fit, GuardParams, RoiSize};
+use touchup::refine::{GuardParams, RegionFit, RoiSize};
 
 type Triangle = [Point3<f64>; 3];
 
@@ -207,7 +207,7 @@ fn torment(scan: &TriMesh, params: RefineParams, seeds: std::ops::Range<u64>) ->
         let mut before = scanned.clone();
         for i in 0..SAMPLES {
             let update = refiner.push(&adversary.sample()).unwrap();
-            told += u64::from(update.fit == Some(Fit::CutBack));
+            told += u64::from(update.fit == Some(RegionFit::CutBack));
             let at = format!("seed {seed}, sample {i}");
             assert!(refiner.mesh().positions().iter().all(|p| p.coords.iter().all(|x| x.is_finite())), "{at}");
             let after = shapes(refiner.mesh());

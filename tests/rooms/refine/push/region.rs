@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::*;
 use touchup::mesh::FaceId;
-use touchup::refine::{Case, Fit, RoiSize};
+use touchup::refine::{Case, RegionFit, RoiSize};
 
 fn neighbours(mesh: &TriMesh, vertex: VertexId) -> BTreeSet<VertexId> {
     let around = mesh.star(vertex).iter().flat_map(|&face| mesh.corners(face));
@@ -89,7 +89,7 @@ fn one_push(scan: TriMesh, size: RoiSize, at: Point3<f64>) -> (Vec<Vector3<f64>>
     refiner.push(&sample(0, at, Vector3::z() * 2.0)).unwrap();
     assert!(bits(refiner.mesh()) == bits(&scan), "no time has passed");
     let update = refiner.push(&sample(1, at, Vector3::z() * 2.0)).unwrap();
-    assert_eq!(update.fit, Some(Fit::Whole));
+    assert_eq!(update.fit, Some(RegionFit::Whole));
     let ways = refiner.mesh().positions().iter().zip(scan.positions()).map(|(is, was)| is - was).collect();
     (ways, update.mismatch.unwrap().face, scan)
 }

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Vector3};
-use touchup::patch::{Touch, TouchFinder, TouchFinderParams};
+use touchup::patch::{TipTouch, TouchFinder, TouchFinderParams};
 use touchup::touch::{ContactGateParams, Tip};
 
 use super::Errors;
@@ -53,9 +53,9 @@ fn tips(path: &Path) -> Vec<Tip> {
 
 /// Normal at `at` of the surface through the centres around it, on the side of `force`; `None` where other passes are too
 /// few or all in line.
-fn reference(touches: &[Touch], at: usize, force: &Vector3<f64>) -> Option<Vector3<f64>> {
+fn reference(touches: &[TipTouch], at: usize, force: &Vector3<f64>) -> Option<Vector3<f64>> {
     let here = touches[at];
-    let near = |touch: &&Touch| {
+    let near = |touch: &&TipTouch| {
         (touch.centre - here.centre).norm() < NEAR && (touch.stamp_ns - here.stamp_ns).abs() > SAME_PASS_NS
     };
     let arms: Vec<Vector3<f64>> = touches.iter().filter(near).map(|touch| touch.centre - here.centre).collect();

@@ -1,0 +1,195 @@
+//! Small sets of features that tell a motion: a frame each, and what of it a rigid motion leaves as it is.
+
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
+
+use super::landmark::{ALIKE, Landmark};
+use crate::features::Kind;
+
+/// What kind of set it is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum SetClass {
+    /// two features with a place and an axis
+    Pair(Kind, Kind),
+    /// one such feature and a plane that its axis is not square to
+    Beside(Kind),
+    /// a slot with its direction
+    Slot,
+    /// three planes that meet
+    Corner,
+    /// two features about one axis, or one and a plane square to it: the turn is open
+    Axis(Kind, Kind),
+}
+
+/// A frame that features make.
+#[derive(Clone, Debug)]
+pub(super) struct Base {
+    class: SetClass,
+    /// lengths, m: the first is what it is looked up by
+    lengths: [f64; 2],
+    /// cosines and volumes of directions
+    cosines: [f64; 4],
+    origin: Point3<f64>,
+    axes: Matrix3<f64>,
+    /// landmarks that have sizes to be compared
+    pub of: [usize; 2],
+}
+
+/// Sine of the least angle between two directions that make a frame: 15°.
+const LEAST_SINE: f64 = 0.26;
+/// Cosines of the same set differ by no more than this: 4° where it tells most.
+const COSINES: f64 = 0.07;
+/// Features with a place and an axis that make pairs, at most; the first of the list, which are the largest of their kind.
+const MOST_LOCATED: usize = 150;
+
+fn frame(first: &Vector3<f64>, second: &Vector3<f64>) -> Option<Matrix3<f64>> {
+    let third = first.cross(second);
+    if third.norm() < LEAST_SINE * first.norm() * second.norm() {
+        return None;
+    }
+    let (x, z) = (first.try_normalize(0.0)?, third.try_normalize(0.0)?);
+    Some(Matrix3::from_columns(&[x, z.cross(&x), z]))
+}
+
+/// All sets.
+///
+/// - `all_ways`: also from the other end of what goes through, and each turn of a corner: of one side of a match alone.
+pub(super) fn bases(landmarks: &[Landmark], all_ways: bool) -> Vec<Base> {
+    let located = landmarks.iter().enumerate().filter(|(_, landmark)| landmark.is_located()).take(MOST_LOCATED);
+    let ends: Vec<(usize, Landmark)> =
+        located.flat_map(|(at, landmark)| landmark.ends().map(move |end| (at, end))).collect();
+    let mut bases = Vec::new();
+    for (i, first) in &ends {
+        bases.extend(ends.iter().filter(|(j, _)| i != j).filter_map(|(j, second)| pair([*i, *j], first, second)));
+        let planes = landmarks.iter().filter(|landmark| landmark.kind == Kind::Plane);
+        bases.extend(planes.filter_map(|plane| beside(*i, first, plane)));
+        bases.extend(slot(*i, first, 1.0));
+        bases.extend(slot(*i, first, -1.0).filter(|_| all_ways));
+    }
+    for (at, landmark) in landmarks.iter().enumerate() {
+        let ways = if all_ways { 3 } else { 1 };
+        bases.extend((0..ways).filter_map(|way| corner(at, landmark, way)));
+    }
+    bases
+}
+
+fn pair(of: [usize; 2], first: &Landmark, second: &Landmark) -> Option<Base> {
+    let (a, b) = (first.axis?, second.axis?);
+    let between = second.place - first.place;
+    let way = between.try_normalize(0.0)?;
+    // the way from one to the other is known best
+    let axes = frame(&way, &a).or_else(|| frame(&way, &b))?;
+    Some(Base {
+        class: SetClass::Pair(first.class(), second.class()),
+        lengths: [between.norm(), 0.0],
+        cosines: [a.dot(&way), b.dot(&way), a.dot(&b), a.cross(&b).dot(&way)],
+        origin: first.place,
+        axes,
+        of,
+    })
+}
+
+fn beside(at: usize, landmark: &Landmark, plane: &Landmark) -> Option<Base> {
+    let (axis, normal) = (landmark.axis?, plane.axis?);
+    Some(Base {
+        class: SetClass::Beside(landmark.class()),
+        lengths: [(landmark.place - plane.place).dot(&normal), 0.0],
+        cosines: [axis.dot(&normal), 0.0, 0.0, 0.0],
+        origin: landmark.place,
+        axes: frame(&axis, &normal)?,
+        of: [at, at],
+    })
+}
+
+fn slot(at: usize, landmark: &Landmark, sign: f64) -> Option<Base> {
+    let axes = frame(&landmark.axis?, &(landmark.direction? * sign))?;
+    Some(Base {
+        class: SetClass::Slot,
+        lengths: [0.0; 2],
+        cosines: [0.0; 4],
+        origin: landmark.place,
+        axes,
+        of: [at, at],
+    })
+}
+
+fn corner(at: usize, landmark: &Landmark, way: usize) -> Option<Base> {
+    let normals = landmark.normals?;
+    let [a, b, c] = [0, 1, 2].map(|i| normals[(way + i) % 3]);
+    Some(Base {
+        class: SetClass::Corner,
+        lengths: [0.0; 2],
+        cosines: [a.dot(&b), b.dot(&c), c.dot(&a), 0.0],
+        origin: landmark.place,
+        axes: frame(&a, &b)?,
+        of: [at, at],
+    })
+}
+
+/// Sets that leave the turn about an axis open, each with one turn of many.
+///
+/// - `all_ways`: as in [`bases`].
+pub(super) fn axial_bases(landmarks: &[Landmark], all_ways: bool) -> Vec<Base> {
+    let located = landmarks.iter().enumerate().filter(|(_, landmark)| landmark.is_located()).take(MOST_LOCATED);
+    let mut found = Vec::new();
+    for (at, landmark) in located {
+        for end in landmark.ends().take(if all_ways { 2 } else { 1 }) {
+            let others = landmarks.iter().enumerate().filter(|(other, _)| *other != at);
+            found.extend(others.filter_map(|(other, second)| about([at, other], &end, second)));
+        }
+    }
+    found
+}
+
+fn about(of: [usize; 2], first: &Landmark, second: &Landmark) -> Option<Base> {
+    let (axis, other) = (first.axis?, second.axis?);
+    let between = second.place - first.place;
+    let is_about = second.kind == Kind::Plane
+        || (second.is_located() && axis.cross(&between).norm() <= LEAST_SINE * between.norm());
+    let aside = Vector3::ith(axis.iamin(), 1.0);
+    (is_about && axis.dot(&other).abs() >= ALIKE).then_some(Base {
+        class: SetClass::Axis(first.class(), second.class()),
+        lengths: [between.dot(&axis), 0.0],
+        cosines: [axis.dot(&other), 0.0, 0.0, 0.0],
+        origin: first.place,
+        axes: frame(&axis, &aside)?,
+        of,
+    })
+}
+
+impl Base {
+    /// The motion that brings this onto `other`.
+    pub fn onto(&self, other: &Self) -> Isometry3<f64> {
+        let turn = Rotation3::from_matrix_unchecked(other.axes * self.axes.transpose());
+        let mut turn = UnitQuaternion::from_rotation_matrix(&turn);
+        turn.renormalize();
+        Isometry3::from_parts((other.origin - turn * self.origin.coords).coords.into(), turn)
+    }
+
+    /// - `play`: by which lengths may differ, m
+    fn is_like(&self, other: &Self, play: f64) -> bool {
+        let lengths = self.lengths.iter().zip(&other.lengths).all(|(a, b)| (a - b).abs() <= play);
+        let cosines = self.cosines.iter().zip(&other.cosines).all(|(a, b)| (a - b).abs() <= COSINES);
+        lengths && cosines
+    }
+}
+
+/// Sets in order, so that those like another are found without looking at all.
+pub(super) struct SortedSets(Vec<Base>);
+
+impl SortedSets {
+    pub fn new(mut bases: Vec<Base>) -> Self {
+        bases.sort_by(|a, b| a.class.cmp(&b.class).then(a.lengths[0].total_cmp(&b.lengths[0])));
+        Self(bases)
+    }
+
+    /// Those that may be `base`, by lengths and angles.
+    pub fn like<'a>(&'a self, base: &'a Base, play: f64) -> impl Iterator<Item = &'a Base> {
+        let least = base.lengths[0] - play;
+        let is_before = |other: &Base| (other.class, other.lengths[0]) < (base.class, least);
+        let from = self.0.partition_point(is_before);
+        self.0[from..]
+            .iter()
+            .take_while(move |other| other.class == base.class && other.lengths[0] <= base.lengths[0] + play)
+            .filter(move |other| base.is_like(other, play))
+    }
+}

@@ -1,0 +1,218 @@
+//! What speaks for a motion, by features and by surface, and whether it speaks against another.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use super::matching::Matching;
+use super::{Alternative, SAME, SurfacePoint, Surfaces};
+use crate::align::icp::{IcpFit, IcpParams, icp};
+use crate::mesh::Alone;
+
+/// Points that bring each motion to rest, at most; all judge it, and bring the last ones to rest.
+const MOST_POINTS: usize = 5_000;
+/// Points farther than so many tolerances have no part in a fit: lids on holes, what is not there.
+const REACH: f64 = 5.0;
+/// A point agrees within so many scatters of the best fit.
+const SCATTERS: f64 = 4.0;
+/// … or this share of a tolerance: below it nothing is told apart.
+const LEAST_NEAR: f64 = 0.05;
+/// Cosine between normals that face the same way: 45°, as noise turns the small faces of a scan.
+const FACING: f64 = 0.7;
+/// A point belongs to the target at all within so many tolerances: a scan that is noisy and too fat still does.
+const COARSE: f64 = 1.5;
+/// What a motion explains alone outweighs so many times what the other explains alone.
+const CLEARLY: f64 = 3.0;
+/// Points that decide, at least …
+const POINTS: f64 = 8.0;
+/// … and over the points that the better motion leaves over: where it fits all but the noise, noise decides nothing.
+const LEFT_OVER: f64 = 0.05;
+/// Share of the points that a part of revolution may lose when it is turned: at the rim of its ends, where facets of one turn
+/// stand proud of those of another.
+const AT_RIMS: f64 = 0.003;
+/// Weight of features that decides: one opening, or what else is as much.
+const FEATURES: f64 = 1.0;
+/// A feature is not there when it is off by so many times what half of those that are there are off …
+const ABSENT: f64 = 3.0;
+/// … but at least, and at most, by so much of what it may be.
+const ABSENT_BETWEEN: [f64; 2] = [0.3, 2.0];
+
+/// A motion with what it explains.
+#[derive(Clone, Debug)]
+pub(super) struct Judged {
+    motion: Isometry3<f64>,
+    fit: Option<IcpFit>,
+    /// of each feature of the source: its best partner, and how far that is off over what it may be
+    partners: Vec<Option<(usize, f64)>>,
+    /// of each point: how far it is from the target that faces the same way, m; infinite beyond the coarse bound. Empty
+    /// without surfaces
+    distances: Vec<f64>,
+}
+
+impl Judged {
+    /// Features that are brought together: of the source, of the target.
+    pub fn explained(&self) -> impl Iterator<Item = [usize; 2]> + '_ {
+        let is_there = |(own, partner): (usize, &Option<(usize, f64)>)| {
+            partner.filter(|(_, misfit)| *misfit <= 1.0).map(|(theirs, _)| [own, theirs])
+        };
+        self.partners.iter().enumerate().filter_map(is_there)
+    }
+
+    /// Share of the points that agree.
+    pub fn agreeing(&self) -> Option<f64> {
+        let count = self.distances.iter().filter(|distance| distance.is_finite()).count();
+        (!self.distances.is_empty()).then(|| count as f64 / self.distances.len() as f64)
+    }
+
+    /// Of what is explained.
+    pub fn weight(&self, matching: &Matching) -> f64 {
+        self.explained().map(|[own, _]| matching.source[own].weight()).sum()
+    }
+
+    /// From which misfit on a feature is not there, by how well others fit.
+    fn absent(&self) -> f64 {
+        let mut misfits: Vec<f64> = self.explained().map(|[own, _]| self.misfit(own)).collect();
+        misfits.sort_by(f64::total_cmp);
+        let middle = misfits.get(misfits.len() / 2).copied().unwrap_or(1.0);
+        (ABSENT * middle).clamp(ABSENT_BETWEEN[0], ABSENT_BETWEEN[1])
+    }
+
+    fn misfit(&self, own: usize) -> f64 {
+        self.partners[own].map_or(f64::INFINITY, |(_, misfit)| misfit)
+    }
+}
+
+/// Tries motions.
+pub(super) struct Judge<'a> {
+    pub matching: Matching,
+    surfaces: Option<&'a Surfaces<'a>>,
+    /// in the mirror where that is asked for
+    points: Vec<SurfacePoint>,
+}
+
+impl<'a> Judge<'a> {
+    pub fn new(matching: Matching, surfaces: Option<&'a Surfaces<'a>>, in_mirror: bool) -> Self {
+        let points = surfaces.map_or(&[][..], |surfaces| surfaces.points);
+        let flip = |v: Vector3<f64>| if in_mirror { Vector3::new(-v.x, v.y, v.z) } else { v };
+        let point = |p: &SurfacePoint| SurfacePoint { point: flip(p.point.coords).into(), normal: flip(p.normal) };
+        let points = points.iter().map(point).collect();
+        Self { matching, surfaces, points }
+    }
+
+    /// Brings each motion to rest and judges it; the best first, no two alike.
+    pub fn all(&self, motions: &[Isometry3<f64>]) -> Vec<Judged> {
+        let step = self.points.len().div_ceil(MOST_POINTS).max(1);
+        let points: Vec<Point3<f64>> = self.points.iter().step_by(step).map(|p| p.point).collect();
+        let mut rested: Vec<(Isometry3<f64>, Option<IcpFit>)> = Vec::new();
+        for coarse in motions {
+            let fit = self.rest(&points, coarse);
+            let motion = fit.as_ref().map_or(*coarse, |fit| fit.source_to_target);
+            let is_new = |(other, _): &(_, _)| self.matching.apart(&motion, other) > SAME * self.matching.tolerance;
+            if rested.iter().all(is_new) {
+                rested.push((motion, fit));
+            }
+        }
+        let mut judged: Vec<_> = rested.into_iter().map(|(motion, fit)| self.judged(motion, fit)).collect();
+        let all = self.matching.source.iter().map(|own| own.weight()).sum::<f64>();
+        let merit = |judged: &Judged| judged.weight(&self.matching) / all + judged.agreeing().unwrap_or(0.0);
+        judged.sort_by(|a, b| merit(b).total_cmp(&merit(a)));
+        judged
+    }
+
+    fn rest(&self, points: &[Point3<f64>], coarse: &Isometry3<f64>) -> Option<IcpFit> {
+        let Surfaces { target, tree, .. } = self.surfaces?;
+        let params = IcpParams { reach: REACH * self.matching.tolerance, ..IcpParams::default() };
+        icp(points, target, tree, coarse, &params, &Alone).ok()
+    }
+
+    fn judged(&self, motion: Isometry3<f64>, fit: Option<IcpFit>) -> Judged {
+        let coarse = COARSE * self.matching.tolerance;
+        let distance = |p: &SurfacePoint| {
+            let Surfaces { target, tree, .. } = self.surfaces?;
+            let hit = tree.closest(target, &(motion * p.point), coarse)?;
+            let faces = target.normal(hit.face).dot(&(motion * p.normal)) > FACING;
+            faces.then(|| hit.distance_squared.sqrt())
+        };
+        let distances = self.points.iter().map(|p| distance(p).unwrap_or(f64::INFINITY)).collect();
+        Judged { motion, fit, partners: self.matching.partners(&motion), distances }
+    }
+
+    /// Whether the evidence decides for `a` against `b`: the surface, and where that does not tell, the features, which were
+    /// found on it.
+    fn rules_out(&self, a: &Judged, b: &Judged) -> bool {
+        match (self.by_surface(a, b), self.by_surface(b, a)) {
+            (true, false) => true,
+            (false, true) => false,
+            _ => self.by_features(a, b) && !self.by_features(b, a),
+        }
+    }
+
+    /// Those that no other rules out; all where each is ruled out by one.
+    pub fn left_over(&self, judged: Vec<Judged>) -> Vec<Judged> {
+        let is_ruled_out = |b: &Judged| judged.iter().any(|a| self.rules_out(a, b));
+        let left: Vec<Judged> = judged.iter().filter(|b| !is_ruled_out(b)).cloned().collect();
+        if left.is_empty() { judged } else { left }
+    }
+
+    /// Whether all evidence decides for `a` against `b`.
+    pub fn is_better_throughout(&self, a: &Judged, b: &Judged) -> bool {
+        self.by_features(a, b) && (self.surfaces.is_none() || self.by_surface(a, b))
+    }
+
+    /// Among all points that belong to the target at all, or among those that lie on it as well as the best fit lets them.
+    fn by_surface(&self, a: &Judged, b: &Judged) -> bool {
+        let alone = |a: &Judged, b: &Judged, near: f64| {
+            a.distances.iter().zip(&b.distances).filter(|(a, b)| **a <= near && **b > near).count() as f64
+        };
+        [self.near(a), COARSE * self.matching.tolerance].into_iter().any(|near| {
+            let (own, other) = (alone(a, b, near), alone(b, a, near));
+            let left_over = a.distances.iter().filter(|distance| **distance > near).count() as f64;
+            own - other >= POINTS.max(LEFT_OVER * left_over) && own > CLEARLY * other
+        })
+    }
+
+    /// Within which a point lies on the target as well as the fit lets it, m.
+    fn near(&self, judged: &Judged) -> f64 {
+        let (tolerance, scatter) = (self.matching.tolerance, judged.fit.as_ref().map_or(0.0, |fit| fit.scatter));
+        (SCATTERS * scatter).clamp(LEAST_NEAR * tolerance, COARSE * tolerance)
+    }
+
+    fn by_features(&self, a: &Judged, b: &Judged) -> bool {
+        let alone = |a: &Judged, b: &Judged| -> f64 {
+            let absent = a.absent();
+            let own = self.matching.source.iter().enumerate();
+            own.filter(|(i, _)| a.misfit(*i) <= 1.0 && b.misfit(*i) > absent.max(a.misfit(*i)))
+                .map(|(_, own)| own.weight())
+                .sum()
+        };
+        let (own, other) = (alone(a, b), alone(b, a));
+        own >= FEATURES && own > CLEARLY * other
+    }
+
+    /// Whether the surface is as much on the target after `turn`, facets of a round part taken for round.
+    pub fn stays(&self, best: &Judged, turn: &Isometry3<f64>) -> bool {
+        let turned = self.judged(turn * best.motion, None);
+        let is_lost = |(own, turned): &(&f64, &f64)| own.is_finite() && !turned.is_finite();
+        let lost = best.distances.iter().zip(&turned.distances).filter(is_lost).count() as f64;
+        lost <= POINTS.max(AT_RIMS * self.points.len() as f64)
+    }
+
+    /// The motions as they are told, brought to rest with all points.
+    pub fn settled(&self, judged: Vec<Judged>) -> Vec<Alternative> {
+        let points: Vec<Point3<f64>> = self.points.iter().map(|p| p.point).collect();
+        let mut alternatives: Vec<Alternative> = Vec::new();
+        for judged in judged {
+            let fit = self.rest(&points, &judged.motion).or_else(|| judged.fit.clone());
+            let motion = fit.as_ref().map_or(judged.motion, |fit| fit.source_to_target);
+            let first = alternatives.first().map_or(motion, |first| first.source_to_target);
+            let turn = (motion.rotation * first.rotation.inverse()).scaled_axis();
+            let shift = motion * self.matching.middle - first * self.matching.middle;
+            alternatives.push(Alternative {
+                source_to_target: motion,
+                explained: judged.explained().collect(),
+                agreeing: judged.agreeing(),
+                icp: fit,
+                differs: [turn, shift],
+            });
+        }
+        alternatives
+    }
+}

@@ -1,0 +1,259 @@
+//! The rigid motion that brings the features of one shape onto those of another, from anywhere.
+//!
+//! Pairs of features, slots, corners and features beside a plane are frames; each frame of the one that is like a frame of
+//! the other in what a motion leaves alone (kinds, sizes, distances, angles, handedness) is a hypothesis. It counts what it
+//! explains of all features, so some may be missing or false on either side; the best are brought to rest by least squares
+//! and point to plane, and judged by how much of the surface then agrees. Two that the evidence does not tell apart are both
+//! told. Features about one axis alone leave the turn about it open: where the surface does not tell it either, that is told.
+//! All is exhaustive and in one order, so nothing is drawn.
+
+mod bases;
+mod error;
+mod free_turn;
+mod judge;
+mod landmark;
+mod matching;
+
+pub use error::{FeaturesError, FeaturesSide};
+pub use free_turn::FreeTurn;
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use self::bases::{Base, SortedSets, axial_bases, bases};
+use self::judge::{Judge, Judged};
+use self::landmark::{Landmark, landmarks};
+use self::matching::Matching;
+use super::icp::IcpFit;
+use crate::features::Feature;
+use crate::mesh::{FaceTree, TriMesh};
+
+/// Settings of [`align_features`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FeaturesParams {
+    /// By how much features may be out of place beyond three standard uncertainties, over the size of the target. Default
+    /// 0.01: 1 mm on a part of 100 mm, as a poor scan has them.
+    pub tolerance: f64,
+    /// By how much diameters and widths may differ beyond three standard uncertainties, over their size. Default 0.05:
+    /// the flats of a hole of 12 sides lie 3.4 % inside.
+    pub size_tolerance: f64,
+}
+
+impl Default for FeaturesParams {
+    fn default() -> Self {
+        Self { tolerance: 0.01, size_tolerance: 0.05 }
+    }
+}
+
+/// A point of a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfacePoint {
+    /// m
+    pub point: Point3<f64>,
+    /// outward unit normal
+    pub normal: Vector3<f64>,
+}
+
+/// What is known beside the features.
+#[derive(Clone, Copy, Debug)]
+pub struct Surfaces<'a> {
+    /// spread evenly over the source; 20 000 do
+    pub points: &'a [SurfacePoint],
+    /// what they are brought onto
+    pub target: &'a TriMesh,
+    /// over its faces
+    pub tree: &'a FaceTree,
+}
+
+/// One motion, and what speaks for it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Alternative {
+    /// Moves the source onto the target.
+    pub source_to_target: Isometry3<f64>,
+    /// Features that it brings together: numbers in the lists of source and target.
+    pub explained: Vec<[usize; 2]>,
+    /// Share of the points that lie on the target, within three times the tolerance, and face the same way; `None` without
+    /// surfaces.
+    pub agreeing: Option<f64>,
+    /// How the surfaces fit; `None` without surfaces, or where they came to no rest.
+    pub icp: Option<IcpFit>,
+    /// Against the first alternative: rotation vector, rad, and shift of the middle of the features, m; in the frame of the
+    /// target.
+    pub differs: [Vector3<f64>; 2],
+}
+
+/// Frames of the source that are tried, at most; spread evenly over all.
+const MOST_BASES: usize = 3_000;
+/// Hypotheses that are counted out, at most.
+const MOST_HYPOTHESES: usize = 30_000;
+/// Comparisons of two features, at most: where features are very many, fewer hypotheses are counted out.
+const MOST_COMPARISONS: usize = 60_000_000;
+/// Motions that go on to the surfaces, at most.
+const MOST_CANDIDATES: usize = 64;
+/// They explain at least this share of what the best does: without it a feature that is false could not hide the truth.
+const CANDIDATE: f64 = 0.5;
+/// Mirror images that are looked at.
+const MOST_MIRRORED: usize = 8;
+/// Share of the surface that must agree.
+const LEAST_AGREEING: f64 = 0.5;
+/// Where there are no surfaces, what must be explained: two openings, the planes about them, and more.
+const LEAST_EXPLAINED: f64 = 2.5;
+
+/// The one motion that brings `source` onto `target`, or why there is none or more than one.
+///
+/// Work is bounded: at most 30 000 hypotheses, of 3 000 frames of the source (among its 150 largest openings), 64 of which
+/// are tried on the surfaces.
+///
+/// - `source`, `target`: as [`crate::features::detect`] finds them, each in its own frame.
+/// - `surfaces`: where they are at hand they decide, and make the motion as exact as they are.
+///
+/// # Errors
+/// [`FeaturesError`]; [`FeaturesError::Ambiguous`] has all motions among which the evidence does not decide,
+/// [`FeaturesError::FreeTurn`] those of a part of revolution, each with one turn of many.
+pub fn align_features(
+    source: &[Feature],
+    target: &[Feature],
+    surfaces: Option<&Surfaces<'_>>,
+    params: &FeaturesParams,
+) -> Result<Alternative, FeaturesError> {
+    for (side, features) in [(FeaturesSide::Source, source), (FeaturesSide::Target, target)] {
+        if features.is_empty() {
+            return Err(FeaturesError::NoFeatures { side });
+        }
+    }
+    let size = surfaces.map_or_else(
+        || size_of(target.iter().map(|feature| feature.centre.value)),
+        |surfaces| size_of(surfaces.target.positions().iter().copied()),
+    );
+    let [own, theirs] = [source, target].map(|features| landmarks(features, params, size));
+    let mirror = own.iter().map(Landmark::mirrored).collect();
+    let judge = Judge::new(Matching::new(own, theirs.clone(), params, size), surfaces, false);
+    let frames = Frames::of(&judge.matching)?;
+    let judged = judge.left_over(judge.all(&candidates(&judge.matching, &frames, MOST_CANDIDATES)));
+    let mirror = Judge::new(Matching::new(mirror, theirs, params, size), surfaces, true);
+    let mirrored_frames = Frames::of(&mirror.matching)?;
+    let mirrored = mirror.all(&candidates(&mirror.matching, &mirrored_frames, MOST_MIRRORED)).into_iter().next();
+    let is_clear = |best: &Judged| match best.agreeing() {
+        Some(share) => share >= LEAST_AGREEING,
+        None if frames.is_axial => best.explained().count() == source.len(),
+        None => best.weight(&judge.matching) >= LEAST_EXPLAINED,
+    };
+    if let Some(error) = refusal(&judge, judged.first(), mirrored.as_ref(), source.len(), is_clear) {
+        return Err(error);
+    }
+    let free = judged.first().and_then(|best| judge.free_turn(best));
+    if frames.is_axial && free.is_none() {
+        // the surface breaks the symmetry, but from which turn on is not known
+        return Err(FeaturesError::TooFew { side: frames.poor, found: frames.found });
+    }
+    let mut alternatives = judge.settled(judged);
+    if let Some(turn) = free {
+        let alternatives = turn.ways(alternatives, SAME * judge.matching.tolerance);
+        return Err(FeaturesError::FreeTurn { turn, alternatives });
+    }
+    match alternatives.len() {
+        1 => Ok(alternatives.remove(0)),
+        _ => Err(FeaturesError::Ambiguous { alternatives }),
+    }
+}
+
+/// Why the best motion is not to be believed.
+fn refusal(
+    judge: &Judge<'_>,
+    best: Option<&Judged>,
+    mirrored: Option<&Judged>,
+    of: usize,
+    is_clear: impl Fn(&Judged) -> bool,
+) -> Option<FeaturesError> {
+    let explained = best.map_or(0, |best| best.explained().count());
+    if let Some(mirrored) = mirrored.filter(|mirrored| is_clear(mirrored))
+        && best.is_none_or(|best| judge.is_better_throughout(mirrored, best))
+    {
+        return Some(FeaturesError::Mirrored { explained, mirrored: mirrored.explained().count(), of });
+    }
+    let is_believed = best.is_some_and(is_clear);
+    (!is_believed).then(|| FeaturesError::NoMatch { explained, of, agreeing: best.and_then(Judged::agreeing) })
+}
+
+/// Twice the largest distance from the mean, m: the same wherever the shape lies.
+fn size_of(points: impl Iterator<Item = Point3<f64>> + Clone) -> f64 {
+    let (mut sum, mut count) = (Vector3::zeros(), 0.0_f64);
+    for p in points.clone() {
+        sum += p.coords;
+        count += 1.0;
+    }
+    let middle = Point3::from(sum / count.max(1.0));
+    2.0 * points.map(|p| (p - middle).norm()).fold(f64::MIN_POSITIVE, f64::max)
+}
+
+/// The motions that explain most, the best first, no two alike.
+fn candidates(matching: &Matching, frames: &Frames, most: usize) -> Vec<Isometry3<f64>> {
+    let mut found = hypotheses(matching, &frames.own, &frames.theirs);
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut kept: Vec<(f64, Isometry3<f64>)> = Vec::new();
+    let is_new = |kept: &[(f64, Isometry3<f64>)], motion: &Isometry3<f64>| {
+        kept.iter().all(|(_, other)| matching.apart(motion, other) > SAME * matching.tolerance)
+    };
+    for (score, coarse) in found {
+        let is_worth = kept.first().is_none_or(|(best, _)| score >= 0.8 * CANDIDATE * best);
+        if kept.len() >= 2 * most || !is_worth {
+            break;
+        }
+        if !is_new(&kept, &coarse) {
+            continue;
+        }
+        let motion = matching.refined(&coarse);
+        if is_new(&kept, &motion) {
+            kept.push((matching.score(&motion), motion));
+        }
+    }
+    kept.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let least = kept.first().map_or(0.0, |(best, _)| CANDIDATE * best);
+    kept.into_iter().take(most).filter(|(score, _)| *score >= least).map(|(_, motion)| motion).collect()
+}
+
+/// The frames that the features of both sides make.
+struct Frames {
+    own: Vec<Base>,
+    theirs: SortedSets,
+    /// whether they leave a turn open, for the features of one side tell none
+    is_axial: bool,
+    /// which side, and how many features it has
+    poor: FeaturesSide,
+    found: usize,
+}
+
+impl Frames {
+    fn of(matching: &Matching) -> Result<Self, FeaturesError> {
+        let sides = [(FeaturesSide::Source, &matching.source), (FeaturesSide::Target, &matching.target)];
+        let [own, theirs] = [bases(&matching.source, false), bases(&matching.target, true)];
+        let (poor, landmarks) = if own.is_empty() { sides[0] } else { sides[1] };
+        let found = landmarks.len();
+        if !own.is_empty() && !theirs.is_empty() {
+            return Ok(Self { own, theirs: SortedSets::new(theirs), is_axial: false, poor, found });
+        }
+        let [own, theirs] = [axial_bases(&matching.source, false), axial_bases(&matching.target, true)];
+        if own.is_empty() || theirs.is_empty() {
+            return Err(FeaturesError::TooFew { side: poor, found });
+        }
+        Ok(Self { own, theirs: SortedSets::new(theirs), is_axial: true, poor, found })
+    }
+}
+
+/// Two motions are one when they bring features no farther apart than so many tolerances.
+const SAME: f64 = 2.0;
+
+/// Every motion that brings a frame onto one like it, with what it explains.
+fn hypotheses(matching: &Matching, own: &[Base], theirs: &SortedSets) -> Vec<(f64, Isometry3<f64>)> {
+    let play = 2.0 * matching.tolerance;
+    let like = |base| -> Vec<&Base> {
+        let base: &Base = base;
+        let is_like = |other: &&Base| (0..2).all(|i| matching.is_like(base.of[i], other.of[i]));
+        theirs.like(base, play).filter(is_like).collect()
+    };
+    let tried = own.iter().step_by(own.len().div_ceil(MOST_BASES));
+    let mut matches: Vec<(&Base, Vec<&Base>)> = tried.map(|base| (base, like(base))).collect();
+    // what few can be tells most
+    matches.sort_by_key(|(_, others)| others.len());
+    let most = (MOST_COMPARISONS / matching.cost().max(1)).min(MOST_HYPOTHESES);
+    let pairs = matches.iter().flat_map(|(base, others)| others.iter().map(|other| base.onto(other)));
+    pairs.take(most).map(|motion| (matching.score(&motion), motion)).collect()
+}

@@ -1,0 +1,11 @@
+//! Where one thing lies relative to another: rigid motions with their uncertainty.
+
+mod by_features;
+mod icp;
+mod pairs;
+
+pub use by_features::{
+    Alternative, FeaturesError, FeaturesParams, FeaturesSide, FreeTurn, SurfacePoint, Surfaces, align_features,
+};
+pub use icp::{IcpError, IcpFit, IcpParams, Motion, icp};
+pub use pairs::{PairSide, PairsError, PairsFit, PairsParams, PointPair, fit_pairs};

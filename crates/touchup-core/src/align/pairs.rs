@@ -1,0 +1,261 @@
+//! The rigid motion that takes picked points onto the same points picked elsewhere.
+//!
+//! R, t minimise Σ wᵢ |bᵢ − (R aᵢ + t)|²: with the weighted centroids taken off, R = U diag(1, 1, det U Vᵀ) Vᵀ of the
+//! singular value decomposition Σ wᵢ b′ᵢ a′ᵢᵀ = U S Vᵀ [Kabsch 1976, Umeyama 1991]. About the centroid shift and turn
+//! are independent: cov = σ² diag(I / Σ wᵢ, (Σ wᵢ (|qᵢ|² I − qᵢ qᵢᵀ))⁻¹), qᵢ = R a′ᵢ.
+//!
+//! People pick wrong points, in wrong units and wrong axes. What is told from the pairs alone: one pair against all the
+//! others (leave one out, with an F test), distances that differ by a known factor, a mirror image that fits better.
+
+mod error;
+mod misfit;
+
+use std::ops::RangeInclusive;
+
+pub use error::{PairSide, PairsError};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Rotation3, SVD, UnitQuaternion, Vector3};
+
+/// Farther from the origin than this, a point is a fault, m.
+const LARGEST_COORDINATE: f64 = 1e6;
+/// Standard deviations of a pick that are believed, m: far outside, their squares are no numbers.
+const BELIEVABLE_SIGMA: RangeInclusive<f64> = 1e-12..=1e3;
+/// A given standard deviation is believed unless the residuals say so many times more: with three pairs once in 130.
+const LARGEST_SIGMA_RATIO: f64 = 2.0;
+/// Points count as on one line when they scatter across it by less than this share of their scatter along it: 1°.
+const LINE_SHARE: f64 = 0.02;
+/// … or by less than so many standard deviations of a pick: the turn about the line is then anything.
+const LINE_SIGMAS: f64 = 3.0;
+/// Picks closer together than this share of their scatter are one point.
+const SAME_SHARE: f64 = 1e-6;
+
+/// One point seen twice, m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointPair {
+    /// Where it is before the motion: on the scan, in O.
+    pub from: Point3<f64>,
+    /// Where it is after: in space, in W.
+    pub to: Point3<f64>,
+    /// Standard deviation of the two together, per axis, m; `None`: as good as the others.
+    pub sigma: Option<f64>,
+}
+
+/// Settings of [`fit_pairs`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PairsParams {
+    /// Standard deviation of a pair that names none, per axis, m; `None`: found from the residuals.
+    pub sigma: Option<f64>,
+    /// Largest rms residual that is believed, m; never more than a tenth of the points' scatter. Default 3 mm: a pick
+    /// on a scan of a consumer camera is good to one or two.
+    pub largest_rms: f64,
+    /// A pair that is off by less than this is kept, however well the others agree, m. Default 0.2 mm: nobody picks
+    /// better. Where a sigma is known, four times that is taken instead.
+    pub least_misfit: f64,
+}
+
+impl Default for PairsParams {
+    fn default() -> Self {
+        Self { sigma: None, largest_rms: 3e-3, least_misfit: 0.2e-3 }
+    }
+}
+
+/// A motion found from pairs, and how well it is known.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PairsFit {
+    /// Maps `from` to `to`.
+    pub motion: Isometry3<f64>,
+    /// `to` − motion · `from` of each pair, m.
+    pub residuals: Vec<Vector3<f64>>,
+    /// √(mean |residual|²), m.
+    pub rms: f64,
+    /// Standard deviation of a pair of unit weight, per axis, m: as given, or from the residuals with 3 n − 6 degrees
+    /// of freedom where none is given or they say more than twice as much.
+    pub sigma: f64,
+    /// Middle of the pairs, in the frame of `to`, m.
+    pub centroid: Point3<f64>,
+    /// Of (shift of the centroid, rotation vector about it), both in the frame of `to`; m², m·rad, rad².
+    pub covariance: Matrix6<f64>,
+}
+
+/// The motion, or why there is none.
+///
+/// # Errors
+/// [`PairsError`]: too few, coincident or collinear points, points that are no numbers, another unit, a mirror image, a
+/// pair that does not fit the others (named with 5 pairs or more), pairs that disagree.
+///
+/// # Example
+/// ```
+/// # use touchup::align::{PairsParams, PointPair, fit_pairs};
+/// # use nalgebra::{Point3, Vector3};
+/// let corners = [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]].map(Point3::from);
+/// let pairs = corners.map(|from| PointPair { from, to: from + Vector3::new(0.0, 0.0, 0.5), sigma: None });
+/// let fit = fit_pairs(&pairs, &PairsParams::default())?;
+/// assert!((fit.motion.translation.z - 0.5).abs() < 1e-12 && fit.motion.rotation.angle() < 1e-12);
+/// # Ok::<(), touchup::align::PairsError>(())
+/// ```
+pub fn fit_pairs(pairs: &[PointPair], params: &PairsParams) -> Result<PairsFit, PairsError> {
+    if let Some(sigma) = params.sigma.filter(|sigma| !BELIEVABLE_SIGMA.contains(sigma)) {
+        return Err(PairsError::BadGivenSigma { sigma_mm: sigma * 1e3 });
+    }
+    check(pairs)?;
+    check_extent(pairs, params)?;
+    let weights = weights(pairs, params);
+    let solved = SolvedMotion::of(pairs, &weights, None).ok_or(PairsError::NoRotation)?;
+    misfit::check(pairs, &weights, params, &solved)?;
+    let fit = solved.fit(pairs, &weights, given_sigma(pairs, params));
+    check_lines(pairs, fit.sigma)?;
+    Ok(fit)
+}
+
+/// A best motion with what tells how good it is.
+struct SolvedMotion {
+    motion: Isometry3<f64>,
+    /// Weighted middle of `from`.
+    middle: Point3<f64>,
+    /// Σ w |residual|².
+    squares: f64,
+    /// The same of the best mirror image or motion.
+    mirrored_squares: f64,
+}
+
+impl SolvedMotion {
+    /// - `without`: a pair that is left out.
+    fn of(pairs: &[PointPair], weights: &[f64], without: Option<usize>) -> Option<Self> {
+        let kept = || pairs.iter().zip(weights).enumerate().filter(|(i, _)| Some(*i) != without).map(|(_, pair)| pair);
+        let total: f64 = kept().map(|(_, w)| w).sum();
+        let mean = |side: fn(&PointPair) -> Point3<f64>| {
+            Point3::from(kept().map(|(pair, w)| side(pair).coords * *w).sum::<Vector3<f64>>() / total)
+        };
+        let (a, b) = (mean(|pair| pair.from), mean(|pair| pair.to));
+        let cross: Matrix3<f64> = kept().map(|(p, w)| (p.to - b) * (p.from - a).transpose() * *w).sum();
+        let svd = SVD::try_new(cross, true, true, f64::EPSILON, 1000)?;
+        let (u, v_t) = (svd.u?, svd.v_t?);
+        let smallest = svd.singular_values.imin();
+        let mut signs = Vector3::repeat(1.0);
+        signs[smallest] = (u.determinant() * v_t.determinant()).signum();
+        let turn = u * Matrix3::from_diagonal(&signs) * v_t;
+        let mut rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn));
+        rotation.renormalize();
+        let motion = Isometry3::from_parts((b - rotation * a.coords).into(), rotation);
+        let mut squares = [motion.rotation.to_rotation_matrix().into_inner(), u * v_t]
+            .into_iter()
+            .map(|turn| kept().map(|(p, w)| w * ((p.to - b) - turn * (p.from - a)).norm_squared()).sum::<f64>());
+        let (squares, mirrored_squares) = (squares.next()?, squares.next()?);
+        squares.is_finite().then_some(Self { motion, middle: a, squares, mirrored_squares })
+    }
+
+    fn fit(&self, pairs: &[PointPair], weights: &[f64], given: Option<f64>) -> PairsFit {
+        let residuals: Vec<_> = pairs.iter().map(|p| p.to - self.motion * p.from).collect();
+        let n = pairs.len() as f64;
+        let rms = (residuals.iter().map(Vector3::norm_squared).sum::<f64>() / n).sqrt();
+        let seen = (self.squares / (3.0 * n - 6.0)).sqrt();
+        let sigma = given.filter(|given| seen <= LARGEST_SIGMA_RATIO * given).unwrap_or(seen);
+        let inertia: Matrix3<f64> = pairs
+            .iter()
+            .zip(weights)
+            .map(|(pair, w)| {
+                let q = self.motion.rotation * (pair.from - self.middle);
+                (Matrix3::identity() * q.norm_squared() - q * q.transpose()) * *w
+            })
+            .sum();
+        let mut covariance = Matrix6::zeros();
+        let shift = Matrix3::identity() / weights.iter().sum::<f64>();
+        covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&shift);
+        // not singular: the points are on no line
+        covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&inertia.try_inverse().unwrap_or_default());
+        let centroid = self.motion * self.middle;
+        PairsFit { motion: self.motion, residuals, rms, sigma, centroid, covariance: covariance * (sigma * sigma) }
+    }
+}
+
+/// σ of a pair of unit weight, where it is known beforehand.
+fn given_sigma(pairs: &[PointPair], params: &PairsParams) -> Option<f64> {
+    params.sigma.or_else(|| pairs.iter().all(|pair| pair.sigma.is_some()).then(|| pairs[0].sigma).flatten())
+}
+
+/// (σ₀ / σᵢ)², so that a pair of σ₀ weighs 1. A pair that names no sigma weighs as the median of those that do.
+fn weights(pairs: &[PointPair], params: &PairsParams) -> Vec<f64> {
+    let mut named: Vec<f64> = pairs.iter().filter_map(|pair| pair.sigma).collect();
+    named.sort_by(f64::total_cmp);
+    let usual = params.sigma.or(named.get(named.len() / 2).copied()).unwrap_or(1.0);
+    let unit = given_sigma(pairs, params).unwrap_or(usual);
+    pairs.iter().map(|pair| (unit / pair.sigma.unwrap_or(usual)).powi(2)).collect()
+}
+
+fn check(pairs: &[PointPair]) -> Result<(), PairsError> {
+    if pairs.len() < 3 {
+        return Err(PairsError::TooFew { count: pairs.len() });
+    }
+    for (i, pair) in pairs.iter().enumerate() {
+        for (side, point) in [(PairSide::From, &pair.from), (PairSide::To, &pair.to)] {
+            if !point.iter().all(|x| x.abs() <= LARGEST_COORDINATE) {
+                return Err(PairsError::BadPoint { pair: i + 1, side });
+            }
+        }
+        if let Some(sigma) = pair.sigma.filter(|sigma| !BELIEVABLE_SIGMA.contains(sigma)) {
+            return Err(PairsError::BadSigma { pair: i + 1, sigma_mm: sigma * 1e3 });
+        }
+    }
+    Ok(())
+}
+
+/// Points that are too few or too close together on either side.
+fn check_extent(pairs: &[PointPair], params: &PairsParams) -> Result<(), PairsError> {
+    for side in [PairSide::From, PairSide::To] {
+        let points: Vec<_> = pairs.iter().map(|pair| pair.on(side)).collect();
+        let scatter = Scatter::of(&points);
+        let apart = SAME_SHARE * scatter.along;
+        let mut distinct: Vec<usize> = Vec::new();
+        let mut same = None;
+        for (i, point) in points.iter().enumerate() {
+            match distinct.iter().find(|&&j| (points[j] - point).norm() <= apart) {
+                Some(&j) => same = same.or(Some((j, i, (points[j] - point).norm()))),
+                None if distinct.len() < 3 => distinct.push(i),
+                None => {}
+            }
+        }
+        if let (Some((first, second, distance)), 0..3) = (same, distinct.len()) {
+            let (first, second) = (first + 1, second + 1);
+            return Err(PairsError::Coincident { first, second, side, distance_mm: distance * 1e3 });
+        }
+    }
+    check_lines(pairs, params.sigma.unwrap_or(0.0))
+}
+
+/// - `sigma`: of a pick, m.
+fn check_lines(pairs: &[PointPair], sigma: f64) -> Result<(), PairsError> {
+    for side in [PairSide::From, PairSide::To] {
+        let points: Vec<_> = pairs.iter().map(|pair| pair.on(side)).collect();
+        let Scatter { along, across } = Scatter::of(&points);
+        if across <= (LINE_SHARE * along).max(LINE_SIGMAS * sigma) {
+            return Err(PairsError::Collinear { side, along_mm: along * 1e3, across_mm: across * 1e3 });
+        }
+    }
+    Ok(())
+}
+
+impl PointPair {
+    fn on(&self, side: PairSide) -> Point3<f64> {
+        match side {
+            PairSide::From => self.from,
+            PairSide::To => self.to,
+        }
+    }
+}
+
+/// Rms distance from the middle along the longest axis and along the next, m.
+struct Scatter {
+    along: f64,
+    across: f64,
+}
+
+impl Scatter {
+    fn of(points: &[Point3<f64>]) -> Self {
+        let n = points.len() as f64;
+        let mean = points.iter().map(|p| p.coords / n).sum::<Vector3<f64>>();
+        let covariance: Matrix3<f64> =
+            points.iter().map(|p| (p.coords - mean) * (p.coords - mean).transpose() / n).sum();
+        let mut axes = covariance.symmetric_eigenvalues();
+        axes.as_mut_slice().sort_by(f64::total_cmp);
+        Self { along: axes[2].max(0.0).sqrt(), across: axes[1].max(0.0).sqrt() }
+    }
+}

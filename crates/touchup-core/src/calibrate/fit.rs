@@ -1,0 +1,163 @@
+//! Robust least squares of zᵢ = Aᵢ x + y for vectors x and y of three, with Aᵢ a known 3 × 3 matrix.
+//!
+//! With the means taken off, N = Σ (Aᵢ − Ā)ᵀ (Aᵢ − Ā) and N x = Σ (Aᵢ − Ā)ᵀ (zᵢ − z̄), y = z̄ − Ā x; cov x = σ² N⁻¹,
+//! cov y = σ² (I / n + Ā N⁻¹ Āᵀ), σ² = Σ |r|² / (3 n − 6). What N does not determine is a direction along which Aᵢ x is
+//! the same for all i.
+//!
+//! Observations that do not belong are found from the fit of least Σ |r| (by reweighting), whose scale is the median of
+//! |r|, and left out; what is left is fitted by least squares, until the choice no longer changes.
+
+use nalgebra::{Matrix3, SymmetricEigen, Vector3};
+
+/// One observation of three equations.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Equation {
+    pub a: Matrix3<f64>,
+    pub z: Vector3<f64>,
+}
+
+/// What was found.
+#[derive(Clone, Debug)]
+pub(super) struct CalibrationFit {
+    pub x: Vector3<f64>,
+    pub y: Vector3<f64>,
+    pub covariance_x: Matrix3<f64>,
+    pub covariance_y: Matrix3<f64>,
+    /// of one component of z
+    pub sigma: f64,
+    /// √(mean |r|²) of those that were kept
+    pub rms: f64,
+    /// which observations were kept
+    pub kept: Vec<bool>,
+}
+
+impl CalibrationFit {
+    pub fn residual(&self, equation: &Equation) -> Vector3<f64> {
+        equation.z - equation.a * self.x - self.y
+    }
+
+    pub fn rejected(&self) -> usize {
+        self.kept.iter().filter(|kept| !**kept).count()
+    }
+}
+
+/// Fewer observations cannot say which of them is wrong.
+const FEWEST_TO_REJECT: usize = 8;
+/// |r| of three normal components exceeds 5 σ once in 65 000.
+const GATE_SIGMAS: f64 = 5.0;
+/// The median of |r| of three normal components, in σ.
+const MEDIAN_NORM: f64 = 1.5382;
+/// A reweighted fit has settled by then; more would not change which observations are kept.
+const ROBUST_ROUNDS: usize = 30;
+/// Choices that still change after so many rounds go back and forth between two that are equally good.
+const CHOICE_ROUNDS: usize = 30;
+/// Residuals below this share of the largest z are rounding, and no reason to leave anything out.
+const ROUNDING: f64 = 1e-12;
+
+/// A direction of x that the equations do not determine.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Undetermined {
+    /// how well it is seen, as [`spread`] tells
+    pub spread: f64,
+    pub axis: Vector3<f64>,
+}
+
+impl Undetermined {
+    /// By how much the poses turn to either side across the axis, where A is a rotation, rad.
+    pub fn angle(&self) -> f64 {
+        self.spread.clamp(0.0, 1.0).sqrt().asin()
+    }
+}
+
+/// The direction that is seen worst, over the observations that are kept.
+pub(super) fn least_seen(equations: &[Equation], kept: &[bool]) -> Undetermined {
+    let weights: Vec<f64> = kept.iter().map(|&kept| f64::from(u8::from(kept))).collect();
+    let (n, mean, _) = means(equations, &weights);
+    let eigen = SymmetricEigen::new(normal(equations, &weights, &mean) / n);
+    let i = eigen.eigenvalues.imin();
+    Undetermined { spread: eigen.eigenvalues[i], axis: eigen.eigenvectors.column(i).into_owned() }
+}
+
+/// The fit, or the direction that it cannot tell.
+///
+/// - `equations`: at least three.
+/// - `smallest_spread`: a direction seen less than this, as [`least_seen`] tells, is not determined.
+pub(super) fn fit(equations: &[Equation], smallest_spread: f64) -> Result<CalibrationFit, Undetermined> {
+    let fitted = |kept: Vec<bool>| {
+        let least = least_seen(equations, &kept);
+        if least.spread < smallest_spread { None } else { least_squares(equations, kept) }.ok_or(least)
+    };
+    let mut found = fitted(vec![true; equations.len()])?;
+    if equations.len() < FEWEST_TO_REJECT {
+        return Ok(found);
+    }
+    let Some(mut norms) = robust_norms(equations) else { return Ok(found) };
+    let mut sorted = norms.clone();
+    sorted.sort_by(f64::total_cmp);
+    let largest = equations.iter().map(|equation| equation.z.amax()).fold(0.0, f64::max);
+    let mut sigma = sorted[sorted.len() / 2] / MEDIAN_NORM;
+    for _ in 0..CHOICE_ROUNDS {
+        let gate = GATE_SIGMAS * sigma.max(ROUNDING * largest);
+        let kept: Vec<bool> = norms.iter().map(|norm| *norm <= gate).collect();
+        if kept == found.kept {
+            break;
+        }
+        found = fitted(kept)?;
+        sigma = found.sigma;
+        norms = equations.iter().map(|equation| found.residual(equation).norm()).collect();
+    }
+    Ok(found)
+}
+
+/// |r| of each observation at the x and y of least Σ |r|.
+fn robust_norms(equations: &[Equation]) -> Option<Vec<f64>> {
+    let mut weights = vec![1.0; equations.len()];
+    let mut norms = Vec::new();
+    for _ in 0..ROBUST_ROUNDS {
+        let (x, y) = solve(equations, &weights)?;
+        norms = equations.iter().map(|e| (e.z - e.a * x - y).norm()).collect();
+        let mean = norms.iter().sum::<f64>() / norms.len() as f64;
+        if mean <= 0.0 {
+            break;
+        }
+        // a residual of nothing would weigh without end
+        weights = norms.iter().map(|norm| 1.0 / norm.max(1e-3 * mean)).collect();
+    }
+    Some(norms)
+}
+
+fn least_squares(equations: &[Equation], kept: Vec<bool>) -> Option<CalibrationFit> {
+    let weights: Vec<f64> = kept.iter().map(|&kept| f64::from(u8::from(kept))).collect();
+    let (x, y) = solve(equations, &weights)?;
+    let (n, mean, _) = means(equations, &weights);
+    let inverse = normal(equations, &weights, &mean).try_inverse()?;
+    let mut found = CalibrationFit { x, y, covariance_x: inverse, covariance_y: inverse, sigma: 0.0, rms: 0.0, kept };
+    let kept = equations.iter().zip(&found.kept).filter(|(_, kept)| **kept);
+    let squares: f64 = kept.map(|(equation, _)| found.residual(equation).norm_squared()).sum();
+    found.rms = (squares / n).sqrt();
+    found.sigma = (squares / (3.0 * n - 6.0).max(1.0)).sqrt();
+    let variance = found.sigma * found.sigma;
+    found.covariance_x = inverse * variance;
+    found.covariance_y = (Matrix3::identity() / n + mean * inverse * mean.transpose()) * variance;
+    (x.iter().chain(&y).all(|c| c.is_finite()) && variance.is_finite()).then_some(found)
+}
+
+fn solve(equations: &[Equation], weights: &[f64]) -> Option<(Vector3<f64>, Vector3<f64>)> {
+    let (_, a, z) = means(equations, weights);
+    let right: Vector3<f64> = equations.iter().zip(weights).map(|(e, w)| (e.a - a).transpose() * (e.z - z) * *w).sum();
+    let x = normal(equations, weights, &a).cholesky()?.solve(&right);
+    Some((x, z - a * x))
+}
+
+/// Σ w, and the weighted means of A and z.
+fn means(equations: &[Equation], weights: &[f64]) -> (f64, Matrix3<f64>, Vector3<f64>) {
+    let total: f64 = weights.iter().sum();
+    let a: Matrix3<f64> = equations.iter().zip(weights).map(|(e, w)| e.a * *w).sum();
+    let z: Vector3<f64> = equations.iter().zip(weights).map(|(e, w)| e.z * *w).sum();
+    (total, a / total, z / total)
+}
+
+/// Σ w (A − Ā)ᵀ (A − Ā)
+fn normal(equations: &[Equation], weights: &[f64], mean: &Matrix3<f64>) -> Matrix3<f64> {
+    equations.iter().zip(weights).map(|(e, w)| (e.a - mean).transpose() * (e.a - mean) * *w).sum()
+}

@@ -1,0 +1,285 @@
+//! Weight, centre of mass and bias of what hangs on the sensor, from static poses.
+//!
+//! At rest and in free air the sensor feels f_S = R_WSᵀ w + b_f and τ_S = p_SC × R_WSᵀ w + b_τ with the weight w = m g
+//! in the frame of the poses. The first is linear in w and b_f: the direction of gravity is found, not assumed. With w
+//! known the second is linear in p_SC and b_τ.
+
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+
+use super::StaticPose;
+use super::fit::{CalibrationFit, Equation, Undetermined, fit, least_seen};
+use crate::touch::{Payload, Wrench, WrenchFrame};
+
+/// Settings of [`fit_payload`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PayloadParams {
+    /// In which axes the wrench is: the sensor's own, or those of the poses.
+    pub wrench_frame: WrenchFrame,
+    /// Orientation of the sensor in the frame of the tip.
+    pub r_ts: UnitQuaternion<f64>,
+    /// Acceleration of gravity, m/s²: the weight divided by it is the mass. Default 9.81.
+    pub gravity: f64,
+}
+
+impl Default for PayloadParams {
+    fn default() -> Self {
+        Self { wrench_frame: WrenchFrame::Sensor, r_ts: UnitQuaternion::identity(), gravity: 9.81 }
+    }
+}
+
+/// A vector and the standard uncertainty of each component.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Known {
+    /// what it is
+    pub value: Vector3<f64>,
+    /// its standard uncertainty
+    pub sigma: Vector3<f64>,
+}
+
+impl Known {
+    pub(super) fn new(value: Vector3<f64>, covariance: &Matrix3<f64>) -> Self {
+        Self { value, sigma: covariance.diagonal().map(|variance| variance.max(0.0).sqrt()) }
+    }
+}
+
+/// What hangs on the sensor, and how well that is known.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PayloadFit {
+    /// m |g|, and its standard uncertainty, N.
+    pub weight: [f64; 2],
+    /// Weight in the frame of the poses, N.
+    pub weight_w: Known,
+    /// Centre of mass from So, expressed in S, m.
+    pub p_sc: Known,
+    /// Bias of the force, expressed in S, N.
+    pub bias_force: Known,
+    /// Bias of the torque, expressed in S, N·m.
+    pub bias_torque: Known,
+    /// √(mean |residual|²) of the force over the poses that were kept, N.
+    pub rms_force: f64,
+    /// … of the torque, N·m.
+    pub rms_torque: f64,
+    /// What the noise of the sensor lets expect for `rms_force`, N; `None` when no noise is known. Much less than
+    /// `rms_force` means that something else pulls: a cable, a contact, a sensor that is turned otherwise.
+    pub expected_force: Option<f64>,
+    /// Static poses.
+    pub poses: usize,
+    /// Indices of those that did not fit and were left out.
+    pub rejected: Vec<usize>,
+    /// Least angle that the poses differ by about any axis, rms to either side, rad.
+    pub tilt: f64,
+    gravity: f64,
+}
+
+impl PayloadFit {
+    /// As the compensator takes it off, with gravity in the frame of the poses.
+    pub fn payload(&self) -> Payload {
+        let gravity_w = self.weight_w.value * (self.gravity / self.weight[0]);
+        Payload { mass: self.weight[0] / self.gravity, p_sc: self.p_sc.value, gravity_o: gravity_w }
+    }
+
+    /// As the compensator takes it off.
+    pub fn bias_s(&self) -> Wrench {
+        Wrench { force: self.bias_force.value, torque: self.bias_torque.value }
+    }
+}
+
+/// Why static poses do not tell the payload.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PayloadError {
+    /// Too few static poses.
+    #[error(
+        "{count} still phases do not determine weight and bias: hold the stylus still in free air for a second in each of at \
+         least {FEWEST_POSES} orientations, better 12"
+    )]
+    TooFew {
+        /// how many there are
+        count: usize,
+    },
+    /// Poses that differ too little.
+    #[error(
+        "besides turning about ({:.2}, {:.2}, {:.2}) of the poses' frame the stylus was tilted by {tilt_deg:.1}° only, so the \
+         weight along that axis is not told from the bias: tilt it by 30° or more about axes across that one too",
+        axis[0],
+        axis[1],
+        axis[2]
+    )]
+    TooAlike {
+        /// rms to either side, degrees
+        tilt_deg: f64,
+        /// along this the weight is not determined, in W
+        axis: [f64; 3],
+    },
+    /// Gravity always pulls the same way through the sensor.
+    #[error(
+        "the centre of mass along ({:.2}, {:.2}, {:.2}) of the sensor is not determined: gravity pulls along it in most poses; \
+         lay the stylus down to the other side too", axis[0], axis[1], axis[2]
+    )]
+    CentreUndetermined {
+        /// along this the centre is not determined, in S
+        axis: [f64; 3],
+    },
+    /// No weight.
+    #[error(
+        "the weight is {weight_n:.3} N, no more than three times its uncertainty of {sigma_n:.3} N: the driver takes it off \
+         already, or nothing hangs on the sensor; leave compensation.payload out"
+    )]
+    NoWeight {
+        /// N
+        weight_n: f64,
+        /// N
+        sigma_n: f64,
+    },
+    /// The other axes explain the wrench far better.
+    #[error(
+        "the wrench is in the axes of the {other} and not of the {told}: residuals are {other_rms_n:.3} N instead of {rms_n:.3} N; \
+         say --wrench-axes {other}, and where they are recorded mend the frame_id of the wrench"
+    )]
+    WrongAxes {
+        /// as given
+        told: &'static str,
+        /// what fits
+        other: &'static str,
+        /// as given, N
+        rms_n: f64,
+        /// of the other, N
+        other_rms_n: f64,
+    },
+    /// Too many poses that do not belong.
+    #[error(
+        "{rejected} of {poses} still phases do not fit the others: the stylus must touch nothing, and nothing may touch it"
+    )]
+    Inconsistent {
+        /// how many
+        rejected: usize,
+        /// of how many
+        poses: usize,
+    },
+}
+
+/// Six unknowns of the force, three equations for each pose, and something left to tell how good it is.
+const FEWEST_POSES: usize = 4;
+/// sin² of the smallest tilt to either side: 5°. The uncertainty is then ten times that of a wide tilt.
+const SMALLEST_SPREAD: f64 = 0.0076;
+/// The same for the centre of mass, by how much gravity turns in the sensor: 2°. What is known worse for it is told by
+/// its uncertainty, and harms little: the force does not need it.
+const SMALLEST_CENTRE_SPREAD: f64 = 0.0012;
+/// The axes of the wrench are believed wrong when the other ones fit so many times better.
+const AXES_RATIO: f64 = 2.0;
+/// … and there are equations enough to tell.
+const FEWEST_TO_TELL_AXES: usize = 6;
+/// More of the poses may not be wrong.
+const LARGEST_REJECTED: f64 = 0.4;
+
+/// Weight, centre of mass and bias.
+///
+/// # Errors
+/// [`PayloadError`]: too few poses or too alike (which direction is not determined), no weight, wrong axes, too many
+/// poses that do not fit.
+pub fn fit_payload(poses: &[StaticPose], params: &PayloadParams) -> Result<PayloadFit, PayloadError> {
+    if poses.len() < FEWEST_POSES {
+        return Err(PayloadError::TooFew { count: poses.len() });
+    }
+    let forces = equations(poses, params);
+    let force = fit(&forces, SMALLEST_SPREAD).map_err(too_alike)?;
+    check_axes(poses, params, &force)?;
+    if force.rejected() as f64 > LARGEST_REJECTED * poses.len() as f64 {
+        return Err(PayloadError::Inconsistent { rejected: force.rejected(), poses: poses.len() });
+    }
+    let weight = force.x.norm();
+    let direction = force.x / weight.max(f64::MIN_POSITIVE);
+    let sigma = direction.dot(&(force.covariance_x * direction)).max(0.0).sqrt();
+    // NaN is no weight either
+    if !(weight > 3.0 * sigma && weight > f64::MIN_POSITIVE) {
+        return Err(PayloadError::NoWeight { weight_n: weight, sigma_n: sigma });
+    }
+    let (torque, covariance_p, covariance_b) = fit_torque(poses, params, &force)?;
+    let variance = |pose: &StaticPose| pose.noise.map(|noise| 3.0 * noise * noise / pose.samples as f64);
+    let expected: Option<f64> = poses.iter().map(variance).sum();
+    Ok(PayloadFit {
+        weight: [weight, sigma],
+        weight_w: Known::new(force.x, &force.covariance_x),
+        p_sc: Known::new(torque.x, &covariance_p),
+        bias_force: Known::new(force.y, &force.covariance_y),
+        bias_torque: Known::new(torque.y, &covariance_b),
+        rms_force: force.rms,
+        rms_torque: torque.rms,
+        expected_force: expected.map(|sum| (sum / poses.len() as f64).sqrt()),
+        poses: poses.len(),
+        rejected: (0..poses.len()).filter(|&i| !force.kept[i]).collect(),
+        tilt: least_seen(&forces, &force.kept).angle(),
+        gravity: params.gravity,
+    })
+}
+
+/// R_WSᵀ w + b = f, in the axes of S whatever the wrench came in.
+fn equations(poses: &[StaticPose], params: &PayloadParams) -> Vec<Equation> {
+    let equation = |pose: &StaticPose| {
+        let turn = (pose.r_wt * params.r_ts).inverse();
+        Equation { a: turn.to_rotation_matrix().into_inner(), z: in_sensor(params, &turn, pose.wrench.force) }
+    };
+    poses.iter().map(equation).collect()
+}
+
+fn in_sensor(params: &PayloadParams, turn: &UnitQuaternion<f64>, vector: Vector3<f64>) -> Vector3<f64> {
+    match params.wrench_frame {
+        WrenchFrame::Sensor => vector,
+        WrenchFrame::Object => turn * vector,
+    }
+}
+
+/// −[R_WSᵀ w]× p + b = τ over the poses that the force kept, with covariances that count how well w is known.
+fn fit_torque(
+    poses: &[StaticPose],
+    params: &PayloadParams,
+    force: &CalibrationFit,
+) -> Result<(CalibrationFit, Matrix3<f64>, Matrix3<f64>), PayloadError> {
+    let kept = || poses.iter().zip(&force.kept).filter(|(_, kept)| **kept).map(|(pose, _)| pose);
+    let torques = |weight: &Vector3<f64>| -> Vec<Equation> {
+        let equation = |pose: &StaticPose| {
+            let turn = (pose.r_wt * params.r_ts).inverse();
+            Equation { a: -(turn * weight).cross_matrix(), z: in_sensor(params, &turn, pose.wrench.torque) }
+        };
+        kept().map(equation).collect()
+    };
+    let smallest = SMALLEST_CENTRE_SPREAD * force.x.norm_squared();
+    let equations = torques(&force.x);
+    let undetermined = |least: Undetermined| PayloadError::CentreUndetermined { axis: least.axis.into() };
+    let found = fit(&equations, smallest).map_err(undetermined)?;
+    // a step as large as the uncertainty of w: the change is nearly linear over it
+    let step = force.covariance_x.trace().sqrt().max(1e-6 * force.x.norm());
+    let (mut by_p, mut by_b) = (Matrix3::zeros(), Matrix3::zeros());
+    for axis in 0..3 {
+        let mut weight = force.x;
+        weight[axis] += step;
+        let moved = fit(&torques(&weight), smallest).map_err(undetermined)?;
+        by_p.set_column(axis, &((moved.x - found.x) / step));
+        by_b.set_column(axis, &((moved.y - found.y) / step));
+    }
+    let carried = |by: Matrix3<f64>| by * force.covariance_x * by.transpose();
+    let (covariance_p, covariance_b) = (found.covariance_x + carried(by_p), found.covariance_y + carried(by_b));
+    Ok((found, covariance_p, covariance_b))
+}
+
+fn too_alike(least: Undetermined) -> PayloadError {
+    PayloadError::TooAlike { tilt_deg: least.angle().to_degrees(), axis: least.axis.into() }
+}
+
+/// Refuses axes when the other ones fit far better.
+fn check_axes(poses: &[StaticPose], params: &PayloadParams, told: &CalibrationFit) -> Result<(), PayloadError> {
+    let (name, other, other_name) = match params.wrench_frame {
+        WrenchFrame::Sensor => ("sensor", WrenchFrame::Object, "pose"),
+        WrenchFrame::Object => ("pose", WrenchFrame::Sensor, "sensor"),
+    };
+    if poses.len() < FEWEST_TO_TELL_AXES {
+        return Ok(());
+    }
+    let other = equations(poses, &PayloadParams { wrench_frame: other, ..*params });
+    let few = poses.len() / 5;
+    match fit(&other, SMALLEST_SPREAD) {
+        Ok(better) if better.rejected() <= few.max(told.rejected()) && AXES_RATIO * better.rms < told.rms => {
+            Err(PayloadError::WrongAxes { told: name, other: other_name, rms_n: told.rms, other_rms_n: better.rms })
+        }
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,329 @@
+//! All of it for two shapes, region by region.
+
+use nalgebra::Point3;
+
+use super::deviation::{at_closest_places, signed};
+use super::normals::{Tilt, TiltSummary, tilts};
+use super::sampling::{SampledPoint, nearest_corner, sample_surface, surface_area};
+use super::summary::{Histogram, Summary, quantile};
+use super::{CompareError, cloud_distances};
+use crate::mesh::{FaceId, FaceTree, TriMesh, VertexId, Workers};
+
+/// A mesh and the tree over its faces.
+#[derive(Clone, Copy, Debug)]
+pub struct IndexedMesh<'a> {
+    /// m
+    pub mesh: &'a TriMesh,
+    /// over its faces
+    pub tree: &'a FaceTree,
+}
+
+/// A part of a refined mesh, by what it rests on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum SupportRegion {
+    /// as scanned
+    Untouched,
+    /// what touches nearby suggest
+    Guessed,
+    /// felt
+    Touched,
+}
+
+/// Where the regions of a mesh come from.
+#[derive(Clone, Copy, Debug)]
+pub enum Regions<'a> {
+    /// nobody knows: there is only the whole
+    Unknown,
+    /// one for each vertex slot of the mesh itself
+    Own(&'a [SupportRegion]),
+    /// those of another mesh of the same part, looked up through the truth: where that mesh is closest to the true place
+    Of(IndexedMesh<'a>, &'a [SupportRegion]),
+}
+
+/// Settings of [`compare`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CompareParams {
+    /// Points on the true surface, about; as dense on the mesh. Default 200 000: percentiles to a few tenths of a per cent.
+    pub samples: usize,
+    /// Another seed spreads them anew.
+    pub seed: u64,
+    /// Half the range of the histogram, m. Default: from the 95th percentile.
+    pub range: Option<f64>,
+    /// How far a true place may be from the mesh and yet be one that it shows, m. Default 2 mm: three times the noise of a
+    /// poor scan.
+    pub reach: f64,
+}
+
+impl Default for CompareParams {
+    fn default() -> Self {
+        Self { samples: 200_000, seed: 1, range: None, reach: 2e-3 }
+    }
+}
+
+/// A mesh of more than so many times the area of the truth is sampled less densely: its unit is probably wrong.
+const MOST_AREA: f64 = 10.0;
+
+/// Narrowest range chosen, m: nothing that is scanned or felt is known better.
+const SMALLEST_RANGE: f64 = 1e-6;
+
+/// How far one region is from the truth.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RegionComparison {
+    /// `None`: all of it
+    pub region: Option<SupportRegion>,
+    /// points spread over the mesh, to the true surface
+    pub mesh_to_truth: Option<Summary>,
+    /// the same in bins
+    pub histogram: Histogram,
+    /// points spread over the true surface, to the mesh: what is missing. A region has those that the mesh shows; all of it
+    /// has also what was never scanned.
+    pub truth_to_mesh: Option<Summary>,
+    /// the mesh's vertices, to the true surface
+    pub vertices_to_truth: Option<Summary>,
+    /// points spread over the mesh, to the nearest of those spread over the truth; without sign, `bias` is the mean
+    pub cloud_to_truth: Option<Summary>,
+    /// and the other way
+    pub truth_to_cloud: Option<Summary>,
+    /// of the faces
+    pub tilt: Option<TiltSummary>,
+}
+
+/// How far a mesh is from the truth.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Comparison {
+    /// points for each m²
+    pub density: f64,
+    /// half the range of the histograms, m
+    pub range: f64,
+    /// share of the true surface that the mesh, or the one that has the regions, does not show: never scanned, or missing
+    pub unseen: f64,
+    /// all of it, then the regions that there are
+    pub regions: Vec<RegionComparison>,
+    /// of each vertex slot, m, + outside; 0 where no vertex is
+    pub vertex_deviations: Vec<f64>,
+}
+
+/// Deviations, m, with the region of each; `None`: in no region.
+struct Sorted {
+    values: Vec<f64>,
+    regions: Vec<Option<SupportRegion>>,
+}
+
+impl Sorted {
+    fn within(&self, region: Option<SupportRegion>) -> Vec<f64> {
+        let both = self.values.iter().zip(&self.regions);
+        both.filter(|(_, at)| region.is_none() || region == **at).map(|(value, _)| *value).collect()
+    }
+
+    fn summary(&self, region: Option<SupportRegion>) -> Option<Summary> {
+        Summary::of(&self.within(region))
+    }
+}
+
+/// Where a point meets a mesh.
+#[derive(Clone, Copy)]
+struct Foot {
+    deviation: f64,
+    point: Point3<f64>,
+    face: FaceId,
+    corner: VertexId,
+}
+
+/// Everything measured, before it is told by region.
+struct MeasuredDeviations {
+    to_truth: Sorted,
+    to_mesh: Sorted,
+    vertices: Sorted,
+    cloud_to_truth: Sorted,
+    truth_to_cloud: Sorted,
+    tilts: Vec<(Tilt, SupportRegion)>,
+    vertex_deviations: Vec<f64>,
+}
+
+/// Compares a mesh with the truth; both lie in one frame.
+///
+/// - `workers`: who looks for the closest places; what comes out is the same to the last bit.
+///
+/// # Errors
+/// [`CompareError::NoFaces`] of either; [`CompareError::TooManyPoints`].
+pub fn compare(
+    mesh: IndexedMesh<'_>,
+    truth: IndexedMesh<'_>,
+    regions: Regions<'_>,
+    params: &CompareParams,
+    workers: &dyn Workers,
+) -> Result<Comparison, CompareError> {
+    // by the truth alone, so that a scan and what became of it are held against the same places
+    let area = surface_area(truth.mesh).max(surface_area(mesh.mesh) / MOST_AREA);
+    let density = params.samples.max(1) as f64 / area;
+    if !density.is_normal() {
+        return Err(CompareError::NoFaces);
+    }
+    // a mesh that is the truth must not meet its own points
+    let [seed, other] = [params.seed, params.seed.wrapping_add(1)];
+    let samples = [sample_surface(mesh.mesh, density, seed), sample_surface(truth.mesh, density, other)];
+    let measured = measure(mesh, truth, regions, &samples, params.reach, workers)?;
+    let range = params.range.unwrap_or_else(|| fitting_range(&measured.to_truth.values));
+    let parts = match regions {
+        Regions::Unknown => Vec::new(),
+        _ => [SupportRegion::Touched, SupportRegion::Guessed, SupportRegion::Untouched]
+            .map(|region| measured.told(Some(region), range))
+            .into(),
+    };
+    let is_there = |part: &RegionComparison| part.mesh_to_truth.is_some() || part.truth_to_mesh.is_some();
+    let whole = measured.told(None, range);
+    let regions = std::iter::once(whole).chain(parts.into_iter().filter(is_there)).collect();
+    let unseen = measured.to_mesh.regions.iter().filter(|region| region.is_none()).count() as f64;
+    let unseen = unseen / measured.to_mesh.regions.len().max(1) as f64;
+    Ok(Comparison { density, range, unseen, regions, vertex_deviations: measured.vertex_deviations })
+}
+
+/// - `samples`: of the mesh and of the truth.
+fn measure(
+    mesh: IndexedMesh<'_>,
+    truth: IndexedMesh<'_>,
+    regions: Regions<'_>,
+    samples: &[Vec<SampledPoint>; 2],
+    reach: f64,
+    workers: &dyn Workers,
+) -> Result<MeasuredDeviations, CompareError> {
+    let [on_mesh, on_truth] = samples;
+    let [mesh_points, truth_points] =
+        [on_mesh, on_truth].map(|samples| samples.iter().map(|s| s.point).collect::<Vec<_>>());
+    let there: Vec<VertexId> =
+        (0..mesh.mesh.vertex_slots() as u32).map(VertexId).filter(|&vertex| mesh.mesh.has_vertex(vertex)).collect();
+    let vertex_points: Vec<_> = there.iter().map(|&vertex| mesh.mesh.position(vertex)).collect();
+
+    let (mesh_feet, vertex_feet) = (feet(&mesh_points, truth, workers)?, feet(&vertex_points, truth, workers)?);
+    let truth_feet = feet(&truth_points, mesh, workers)?;
+    let deviations = |feet: &[Foot]| feet.iter().map(|foot| foot.deviation).collect::<Vec<f64>>();
+    let on_true_part = |feet: &[Foot]| feet.iter().map(|foot| foot.point).collect::<Vec<_>>();
+    let to_truth = Sorted {
+        values: deviations(&mesh_feet),
+        regions: regions_of(regions, on_mesh.iter().map(|sample| sample.corner), &on_true_part(&mesh_feet), workers)?,
+    };
+    let vertices = Sorted {
+        values: deviations(&vertex_feet),
+        regions: regions_of(regions, there.iter().copied(), &on_true_part(&vertex_feet), workers)?,
+    };
+    let to_mesh = Sorted {
+        // a true point outside of the mesh is material that the mesh lacks
+        values: truth_feet.iter().map(|foot| -foot.deviation).collect(),
+        regions: regions_of_truth(regions, truth, on_truth, &truth_feet, mesh, reach, workers)?,
+    };
+    let cloud = |points: &[_], cloud: &[_], like: &Sorted| -> Result<Sorted, CompareError> {
+        Ok(Sorted { values: cloud_distances(points, cloud)?, regions: like.regions.clone() })
+    };
+    let cloud_to_truth = cloud(&mesh_points, &truth_points, &to_truth)?;
+    let truth_to_cloud = cloud(&truth_points, &mesh_points, &to_mesh)?;
+    let (mut of_slot, mut vertex_deviations) =
+        (vec![SupportRegion::Untouched; mesh.mesh.vertex_slots()], vec![0.0; mesh.mesh.vertex_slots()]);
+    for ((vertex, region), deviation) in there.iter().zip(&vertices.regions).zip(&vertices.values) {
+        of_slot[vertex.0 as usize] = region.unwrap_or(SupportRegion::Untouched);
+        vertex_deviations[vertex.0 as usize] = *deviation;
+    }
+    let tilts = tilts(mesh.mesh, truth.mesh, truth.tree)?;
+    let tilts = tilts.into_iter().map(|tilt| (tilt, most_common(mesh.mesh.corners(tilt.face), &of_slot))).collect();
+    Ok(MeasuredDeviations { to_truth, to_mesh, vertices, cloud_to_truth, truth_to_cloud, tilts, vertex_deviations })
+}
+
+impl MeasuredDeviations {
+    fn told(&self, region: Option<SupportRegion>, range: f64) -> RegionComparison {
+        let tilts =
+            self.tilts.iter().filter(|(_, at)| region.is_none_or(|region| region == *at)).map(|(tilt, _)| *tilt);
+        RegionComparison {
+            region,
+            mesh_to_truth: self.to_truth.summary(region),
+            histogram: Histogram::of(&self.to_truth.within(region), range),
+            truth_to_mesh: self.to_mesh.summary(region),
+            vertices_to_truth: self.vertices.summary(region),
+            cloud_to_truth: self.cloud_to_truth.summary(region),
+            truth_to_cloud: self.truth_to_cloud.summary(region),
+            tilt: TiltSummary::of(tilts.collect()),
+        }
+    }
+}
+
+/// The feet of `points` on a shape, in their order.
+fn feet(points: &[Point3<f64>], shape: IndexedMesh<'_>, workers: &dyn Workers) -> Result<Vec<Foot>, CompareError> {
+    at_closest_places(points, shape.mesh, shape.tree, workers, |p, hit| {
+        let corner = nearest_corner(shape.mesh.corners(hit.face), &hit.barycentric);
+        Foot { deviation: signed(p, shape.mesh, hit), point: hit.point, face: hit.face, corner }
+    })
+}
+
+/// The region of each point.
+///
+/// - `own`: the vertex of the mesh that each belongs to.
+/// - `places`: where each is on the true part.
+fn regions_of(
+    regions: Regions<'_>,
+    own: impl Iterator<Item = VertexId>,
+    places: &[Point3<f64>],
+    workers: &dyn Workers,
+) -> Result<Vec<Option<SupportRegion>>, CompareError> {
+    Ok(match regions {
+        Regions::Unknown => vec![Some(SupportRegion::Untouched); places.len()],
+        Regions::Own(of_vertex) => own.map(|vertex| Some(of_vertex[vertex.0 as usize])).collect(),
+        Regions::Of(other, of_vertex) => {
+            feet(places, other, workers)?.iter().map(|foot| Some(of_vertex[foot.corner.0 as usize])).collect()
+        }
+    })
+}
+
+/// The region of each point of the truth: that of the closest place of the mesh that has the regions, where this is within
+/// `reach` (m) and faces the same way. A scan from above says nothing of the underside.
+///
+/// - `feet`: of the points on `mesh`.
+fn regions_of_truth(
+    regions: Regions<'_>,
+    truth: IndexedMesh<'_>,
+    points: &[SampledPoint],
+    feet_on_mesh: &[Foot],
+    mesh: IndexedMesh<'_>,
+    reach: f64,
+    workers: &dyn Workers,
+) -> Result<Vec<Option<SupportRegion>>, CompareError> {
+    let (shape, looked_up) = match regions {
+        Regions::Of(other, _) => {
+            (other, feet(&points.iter().map(|sample| sample.point).collect::<Vec<_>>(), other, workers)?)
+        }
+        _ => (mesh, feet_on_mesh.to_vec()),
+    };
+    let region_at = |corner: VertexId| match regions {
+        Regions::Unknown => SupportRegion::Untouched,
+        Regions::Own(of_vertex) | Regions::Of(_, of_vertex) => of_vertex[corner.0 as usize],
+    };
+    let region = |(sample, foot): (&SampledPoint, &Foot)| {
+        let faces = truth.mesh.double_area_normal(sample.face).dot(&shape.mesh.double_area_normal(foot.face));
+        (foot.deviation.abs() <= reach && faces > 0.0).then(|| region_at(foot.corner))
+    };
+    Ok(points.iter().zip(&looked_up).map(region).collect())
+}
+
+/// A quantile of the sizes of what is in no order.
+fn sorted_quantile(deviations: &[f64], share: f64) -> f64 {
+    let mut sizes: Vec<f64> = deviations.iter().map(|d| d.abs()).collect();
+    sizes.sort_unstable_by(f64::total_cmp);
+    quantile(&sizes, share)
+}
+
+/// The region of two corners of three, the one between where all differ.
+fn most_common(corners: [VertexId; 3], of_vertex: &[SupportRegion]) -> SupportRegion {
+    let mut regions = corners.map(|vertex| of_vertex[vertex.0 as usize]);
+    regions.sort_unstable();
+    regions[1]
+}
+
+/// A round number just above the 95th percentile of the sizes: 1, 1.5, 2, 3, 5 or 7 times a power of ten, m.
+fn fitting_range(deviations: &[f64]) -> f64 {
+    // a perfect mesh has rounding alone
+    round_up(sorted_quantile(deviations, 0.95).max(SMALLEST_RANGE))
+}
+
+/// The next of the round numbers above `x` > 0.
+pub(super) fn round_up(x: f64) -> f64 {
+    let power = 10.0_f64.powi(x.log10().floor() as i32);
+    let fits = |step: &&f64| **step * power >= x * (1.0 - 1e-9);
+    [1.0, 1.5, 2.0, 3.0, 5.0, 7.0].iter().find(fits).map_or(10.0 * power, |step| step * power)
+}

@@ -1,0 +1,143 @@
+//! How far the scan as a whole lies off the touches: a small rigid motion, and what it is too fat everywhere.
+//!
+//! At a place x with the normal n touch − scan is b + n·s + ((x − c) × n)·θ; b, s and θ by least squares with Tukey's
+//! weights, s and θ held back a little, so that what nothing tells goes to b. Noise that stays alike over a distance tilts a
+//! scan too: of n independent places the motion is told when it explains more than that does once in a thousand times.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Matrix6, Point3, SMatrix, SVector, Vector3, Vector6};
+
+use super::{Places, Scanner};
+
+/// The scan against the touches, of small angles.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Misplaced {
+    /// shift that would bring the scan onto the touches, m, at `centre`
+    pub shift: Vector3<f64>,
+    /// and rotation vector, rad
+    pub turn: Vector3<f64>,
+    /// middle of the touched places, m
+    pub centre: Point3<f64>,
+    /// standard deviation of `shift` on each axis, m
+    pub shift_sigma: Vector3<f64>,
+    /// standard deviation of `turn` about each axis, rad
+    pub turn_sigma: Vector3<f64>,
+}
+
+/// Rounds of weights.
+const ROUNDS: usize = 10;
+/// Width of Tukey's weights in standard deviations.
+const WIDTH: f64 = 4.685;
+/// Standard deviation of normal errors over their median.
+const SIGMA_OF_MEDIAN: f64 = 1.4826;
+/// By which share of the weight of all places shift and turn are held back.
+const HELD_BACK: f64 = 0.03;
+/// Squares of normal numbers, one to six of them, sum up to more than this once in a thousand times.
+const ONCE_IN_1000: [f64; 6] = [10.83, 13.82, 16.27, 18.47, 20.52, 22.46];
+/// Where the noise is known from m places more than there are unknowns, the bound is 1 + 12/m times as high: within 3 % of the
+/// F distribution from 13 on.
+const FEW_PLACES: f64 = 12.0;
+/// Unknowns: an offset, a shift, a turn.
+const UNKNOWNS: f64 = 7.0;
+/// A direction in which the motion is known so much better than in the best one is held back, not known.
+const HELD: f64 = 1e-9;
+
+/// A motion that fits, which noise alone may have made.
+pub(super) struct OffsetFit {
+    shift: Vector3<f64>,
+    turn: Vector3<f64>,
+    centre: Point3<f64>,
+    lever: f64,
+    /// covariance of shift and turn times `lever` for noise of 1 m that is independent from m² to m², m²·m²
+    spread: Matrix6<f64>,
+    /// m²
+    area: f64,
+}
+
+impl OffsetFit {
+    /// Of the open places; `None` where they tell nothing.
+    pub fn of(places: &Places) -> Option<Self> {
+        let open: Vec<usize> = (0..places.off.len()).filter(|&at| places.is_open[at]).collect();
+        let count = open.len() as f64;
+        let sum: Vector3<f64> = open.iter().map(|&at| places.positions[at].coords).sum();
+        let centre = Point3::from(sum / count);
+        let square: f64 = open.iter().map(|&at| (places.positions[at] - centre).norm_squared()).sum();
+        let lever = (square / count).sqrt();
+        let row = |at: usize| {
+            let (n, arm) = (places.normals[at], (places.positions[at] - centre) / lever);
+            let turn = arm.cross(&n);
+            SVector::<f64, 7>::from([1.0, n.x, n.y, n.z, turn.x, turn.y, turn.z])
+        };
+        let mut x = SVector::<f64, 7>::zeros();
+        let mut width = f64::INFINITY;
+        let mut spread = SMatrix::<f64, 7, 7>::zeros();
+        for _ in 0..ROUNDS {
+            let (mut normal, mut right, mut weights) = (SMatrix::<f64, 7, 7>::zeros(), SVector::<f64, 7>::zeros(), 0.0);
+            let mut sizes = Vec::with_capacity(open.len());
+            for &at in &open {
+                let row = row(at);
+                let left = places.off[at] - row.dot(&x);
+                sizes.push(left.abs());
+                let weight = (1.0 - (left / width).powi(2)).max(0.0).powi(2) * places.areas[at];
+                normal += row * row.transpose() * weight;
+                right += row * (places.off[at] * weight);
+                weights += weight;
+            }
+            let told = normal;
+            (1..7).for_each(|i| normal[(i, i)] += HELD_BACK * weights);
+            let inverse = normal.cholesky()?.inverse();
+            x = inverse * right;
+            spread = inverse * told * inverse;
+            let middle = sizes.len() / 2;
+            width = WIDTH * SIGMA_OF_MEDIAN * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+            if width <= 0.0 {
+                break;
+            }
+        }
+        let is_finite = x.iter().chain(&spread).all(|x| x.is_finite());
+        let (shift, turn) = (Vector3::new(x[1], x[2], x[3]), Vector3::new(x[4], x[5], x[6]) / lever);
+        let area = open.iter().map(|&at| places.areas[at]).sum();
+        let spread = spread.fixed_view::<6, 6>(1, 1).into_owned();
+        is_finite.then_some(Self { shift, turn, centre, lever, spread, area })
+    }
+
+    /// What of touch − scan it explains at a place, m.
+    pub fn at(&self, p: &Point3<f64>, normal: &Vector3<f64>) -> f64 {
+        normal.dot(&(self.shift + self.turn.cross(&(p - self.centre))))
+    }
+
+    /// The motion where it is more than noise.
+    ///
+    /// - `scanner`: without the motion.
+    pub fn told(&self, scanner: &Scanner) -> Option<Misplaced> {
+        let alike = TAU * scanner.correlation.powi(2);
+        let more = self.area / alike - UNKNOWNS;
+        if more <= 0.0 {
+            return None;
+        }
+        // the fit took its share of the noise with it
+        let variance = scanner.noise.powi(2) * (1.0 + UNKNOWNS / more);
+        let covariance = self.spread * (variance * alike);
+        let turn = self.turn * self.lever;
+        let motion = Vector6::new(self.shift.x, self.shift.y, self.shift.z, turn.x, turn.y, turn.z);
+        let eigen = covariance.symmetric_eigen();
+        let least = HELD * eigen.eigenvalues.max();
+        let (mut square, mut directions) = (0.0, 0);
+        for (value, direction) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+            if *value > least {
+                square += direction.dot(&motion).powi(2) / value;
+                directions += 1;
+            }
+        }
+        let bound = ONCE_IN_1000[usize::max(directions, 1) - 1] * (1.0 + FEW_PLACES / more);
+        let sigmas = covariance.diagonal().map(f64::sqrt);
+        (square > bound).then(|| Misplaced {
+            shift: self.shift,
+            turn: self.turn,
+            centre: self.centre,
+            shift_sigma: sigmas.fixed_rows::<3>(0).into_owned(),
+            turn_sigma: sigmas.fixed_rows::<3>(3) / self.lever,
+        })
+    }
+}

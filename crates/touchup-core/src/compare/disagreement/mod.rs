@@ -1,0 +1,296 @@
+//! Where touch and scan disagree, without a true part: what of it looks like this scanner, what like a part that is no longer
+//! what was scanned, and what like a bad touch.
+//!
+//! What the scan is misplaced as a whole, where that is more than noise, comes off first. How the scanner errs is then found
+//! where it should see well, on touched places away from edges: its offset b, its noise σ and the distance ℓ over which that
+//! stays alike, Cov = σ² exp(−r²/2ℓ²). The mean over a region of area A then has the variance σ²/(1 + A/2πℓ²), and a region
+//! that is off by many times its root was changed. In what is narrower than a few edges of the scan's triangles the scan lacks
+//! what it could not see, and it rounds edges: of one that stands out it takes off, and one that turns in it fills. Near an
+//! edge a disagreement the other way is not the scanner's rounding, but too near to be sure of.
+
+mod bad_touches;
+mod cells;
+mod misplaced;
+mod regions;
+mod scanner;
+
+use nalgebra::Point3;
+
+pub use self::bad_touches::BadTouches;
+pub use self::misplaced::Misplaced;
+pub use self::regions::{DisagreementRegion, RegionEvidence};
+pub use self::scanner::Scanner;
+use super::deviation::{closest_places, signed};
+use super::{CompareError, IndexedMesh};
+use crate::mesh::{FaceHit, TriMesh, VertexId};
+use crate::touch::ProbedPoint;
+
+/// What a vertex of a refined mesh rests on, as `refine` writes it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum VertexBasis {
+    /// the scan, or what is near touches suggests
+    NotTouched,
+    /// touches
+    Touched,
+    /// nothing can be felt here
+    Unreachable,
+}
+
+/// A refined mesh.
+#[derive(Clone, Copy, Debug)]
+pub struct RefinedShape<'a> {
+    /// in the frame of the scan
+    pub shape: IndexedMesh<'a>,
+    /// by vertex slot
+    pub known: &'a [VertexBasis],
+}
+
+/// What a place is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Class {
+    /// scan and touch agree within the noise of the scan
+    Agrees,
+    /// they do not, and it looks like this scanner: its noise, a rounded edge, a closed hole
+    ScannerError,
+    /// the part is not what was scanned
+    ChangedPart,
+    /// the touch is wrong
+    BadTouch,
+    /// may be changed as well as the scanner's error
+    Unsure,
+    /// nothing is known but the scan
+    NeverTouched,
+    /// the ball does not get there
+    Unreachable,
+}
+
+impl Class {
+    /// All, in the order in which they are told.
+    pub const ALL: [Self; 7] = [
+        Self::Agrees,
+        Self::ScannerError,
+        Self::ChangedPart,
+        Self::BadTouch,
+        Self::Unsure,
+        Self::NeverTouched,
+        Self::Unreachable,
+    ];
+
+    /// As it is told.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Agrees => "agrees",
+            Self::ScannerError => "scanner error",
+            Self::ChangedPart => "changed part",
+            Self::BadTouch => "bad touch",
+            Self::Unsure => "unsure",
+            Self::NeverTouched => "never touched",
+            Self::Unreachable => "unreachable",
+        }
+    }
+}
+
+/// A mesh with its classes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ClassMap {
+    /// by vertex slot, m: how far the touched surface lies outside of the scan; 0 where nothing was touched
+    pub disagreement: Vec<f64>,
+    /// by vertex slot
+    pub classes: Vec<Class>,
+    /// of each of [`Class::ALL`], m²
+    pub areas: [f64; 7],
+}
+
+/// Where touch and scan disagree.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Disagreement {
+    /// how the scan lies off as a whole, which is taken off before the rest is looked at; `None` where it is no more than the
+    /// noise of the scan may make of itself
+    pub misplaced: Option<Misplaced>,
+    /// how the scanner errs; `None` where too little was touched to tell, and then nothing is called changed
+    pub scanner: Option<Scanner>,
+    /// the refined mesh
+    pub refined: ClassMap,
+    /// the scan
+    pub scan: ClassMap,
+    /// what hangs together, the largest first: changed, unsure, and scanner errors beyond its noise
+    pub regions: Vec<DisagreementRegion>,
+    /// touches that others contradict, in order of time
+    pub bad_touches: Vec<BadTouches>,
+}
+
+/// Standard deviations of the scan within which it agrees.
+const AGREES: f64 = 2.0;
+
+/// Scan and touch speak of the same side of the part when their normals are within 60°.
+const FACING: f64 = 0.5;
+
+/// Tells where touch and scan disagree, and why, as far as the data can tell.
+///
+/// - `scan`: as it was.
+/// - `refined`: what came of it.
+/// - `touches`: of which it came.
+///
+/// # Errors
+/// [`CompareError::NoFaces`] where either mesh has none.
+pub fn disagreement(
+    scan: IndexedMesh<'_>,
+    refined: &RefinedShape<'_>,
+    touches: &[ProbedPoint],
+) -> Result<Disagreement, CompareError> {
+    if refined.shape.mesh.face_count() == 0 {
+        return Err(CompareError::NoFaces);
+    }
+    let mut places = Places::of(scan, refined)?;
+    let off = places.off.clone();
+    let mut scanner = Scanner::of(scan.mesh, &places);
+    let mut misplaced = None;
+    if let Some(fit) = misplaced::OffsetFit::of(&places) {
+        places.take_off(&fit);
+        let placed = Scanner::of(scan.mesh, &places);
+        misplaced = placed.as_ref().and_then(|placed| fit.told(placed));
+        if misplaced.is_some() {
+            scanner = placed;
+        } else {
+            places.off.copy_from_slice(&off);
+        }
+    }
+    let bad_touches = bad_touches::find(refined, touches)?;
+    let mut classes = places.first_classes(refined, scanner.as_ref());
+    let regions = scanner.as_ref().map_or_else(Vec::new, |scanner| {
+        regions::find(&regions::RegionInput { refined, places: &places, scanner, touches }, &mut classes)
+    });
+    bad_touches::mark(refined, touches, &bad_touches, &mut classes);
+    let mut off = off;
+    let is_felt = |class: &Class| !matches!(class, Class::NeverTouched | Class::Unreachable);
+    off.iter_mut().zip(&classes).filter(|(_, class)| !is_felt(class)).for_each(|(off, _)| *off = 0.0);
+    let on_scan = carried(scan, refined, &classes)?;
+    Ok(Disagreement {
+        misplaced,
+        scanner,
+        refined: ClassMap::of(refined.shape.mesh, off, classes),
+        scan: on_scan,
+        regions,
+        bad_touches,
+    })
+}
+
+/// What is known of each vertex of the refined mesh beside its class.
+struct Places {
+    /// m, by slot
+    pub positions: Vec<Point3<f64>>,
+    /// how far it lies outside of the scan, m, by slot; without what the scan is misplaced, once that is known
+    pub off: Vec<f64>,
+    /// whether it was touched, and the scan is there at all
+    pub is_seen: Vec<bool>,
+    /// whether a scanner of this resolution sees it at all: no narrow place
+    pub is_wide: Vec<bool>,
+    /// whether a scanner of this resolution sees it well: no edge near, and no narrow place
+    pub is_open: Vec<bool>,
+    /// whether an edge near that the scanner rounds may leave it too low, and too high
+    pub may_be: Vec<[bool; 2]>,
+    /// normals, by slot; zero where there are none
+    pub normals: Vec<nalgebra::Vector3<f64>>,
+    /// a third of the faces at it, m²
+    pub areas: Vec<f64>,
+}
+
+impl Places {
+    fn of(scan: IndexedMesh<'_>, refined: &RefinedShape<'_>) -> Result<Self, CompareError> {
+        let mesh = refined.shape.mesh;
+        let mut off = vec![0.0; mesh.vertex_slots()];
+        let mut is_seen = vec![false; mesh.vertex_slots()];
+        let mut faces_alike = vec![false; mesh.vertex_slots()];
+        let (normals, areas) = vertex_normals(mesh);
+        closest_places(mesh.positions(), scan.mesh, scan.tree, |at, hit| {
+            let p = mesh.position(VertexId(at as u32));
+            off[at] = signed(&p, scan.mesh, hit);
+            is_seen[at] = !is_on_rim(scan.mesh, hit) && refined.known[at] == VertexBasis::Touched;
+            faces_alike[at] = scan.mesh.normal(hit.face).dot(&normals[at]) > FACING;
+        })?;
+        let may_be = scanner::rounded_at(scan.mesh, refined, &is_seen, &normals);
+        let [mut is_wide, mut is_open] = scanner::wide_and_open(scan.mesh, refined, &is_seen, &normals);
+        for flags in [&mut is_wide, &mut is_open] {
+            flags.iter_mut().zip(&faces_alike).for_each(|(flag, alike)| *flag &= alike);
+        }
+        Ok(Self { positions: mesh.positions().to_vec(), off, is_seen, is_wide, is_open, may_be, normals, areas })
+    }
+
+    fn take_off(&mut self, misplaced: &misplaced::OffsetFit) {
+        let both = self.positions.iter().zip(&self.normals);
+        self.off.iter_mut().zip(both).for_each(|(off, (p, normal))| *off -= misplaced.at(p, normal));
+    }
+
+    fn first_classes(&self, refined: &RefinedShape<'_>, scanner: Option<&Scanner>) -> Vec<Class> {
+        let class = |(at, known): (usize, &VertexBasis)| match (known, scanner) {
+            (VertexBasis::NotTouched, _) => Class::NeverTouched,
+            (VertexBasis::Unreachable, _) => Class::Unreachable,
+            (VertexBasis::Touched, None) => Class::Unsure,
+            (VertexBasis::Touched, Some(scanner)) if self.is_seen[at] => match scanner.is_noise(self.off[at], AGREES) {
+                true => Class::Agrees,
+                // at an edge, and yet by more than a rounded edge
+                false if self.is_wide[at] && !scanner.may_round(self.off[at], AGREES) => Class::Unsure,
+                false => Class::ScannerError,
+            },
+            // the scan has nothing there
+            (VertexBasis::Touched, Some(_)) => Class::ScannerError,
+        };
+        refined.known.iter().enumerate().map(class).collect()
+    }
+}
+
+impl ClassMap {
+    fn of(mesh: &TriMesh, disagreement: Vec<f64>, classes: Vec<Class>) -> Self {
+        let mut areas = [0.0; 7];
+        for (face, corners) in mesh.faces() {
+            let third = mesh.double_area_normal(face).norm() / 6.0;
+            corners.into_iter().for_each(|v| areas[classes[v.0 as usize] as usize] += third);
+        }
+        Self { disagreement, classes, areas }
+    }
+}
+
+/// Whether the surface ends where `hit` is.
+fn is_on_rim(mesh: &TriMesh, hit: &FaceHit) -> bool {
+    let corners = mesh.corners(hit.face);
+    let is_rim = |a: VertexId, b: VertexId| mesh.faces_at_edge(a, b).count() < 2;
+    let on: Vec<VertexId> = (0..3).filter(|&i| hit.barycentric[i] > 0.0).map(|i| corners[i]).collect();
+    match on[..] {
+        [vertex] => {
+            let around = mesh.star(vertex).iter().flat_map(|&face| mesh.corners(face));
+            around.into_iter().any(|other| other != vertex && is_rim(vertex, other))
+        }
+        [a, b] => is_rim(a, b),
+        _ => false,
+    }
+}
+
+fn vertex_normals(mesh: &TriMesh) -> (Vec<nalgebra::Vector3<f64>>, Vec<f64>) {
+    let mut normals = vec![nalgebra::Vector3::zeros(); mesh.vertex_slots()];
+    let mut areas = vec![0.0; mesh.vertex_slots()];
+    for (face, corners) in mesh.faces() {
+        let double = mesh.double_area_normal(face);
+        for vertex in corners {
+            normals[vertex.0 as usize] += double;
+            areas[vertex.0 as usize] += double.norm() / 6.0;
+        }
+    }
+    normals.iter_mut().for_each(|n| *n = n.try_normalize(0.0).unwrap_or_default());
+    (normals, areas)
+}
+
+/// The classes at the closest places of the refined mesh, for each vertex of the scan.
+fn carried(scan: IndexedMesh<'_>, refined: &RefinedShape<'_>, classes: &[Class]) -> Result<ClassMap, CompareError> {
+    let mesh = scan.mesh;
+    let mut off = vec![0.0; mesh.vertex_slots()];
+    let mut carried = vec![Class::NeverTouched; mesh.vertex_slots()];
+    closest_places(mesh.positions(), refined.shape.mesh, refined.shape.tree, |at, hit| {
+        let p: Point3<f64> = mesh.position(VertexId(at as u32));
+        let corner = super::sampling::nearest_corner(refined.shape.mesh.corners(hit.face), &hit.barycentric);
+        carried[at] = classes[corner.0 as usize];
+        if !matches!(carried[at], Class::NeverTouched | Class::Unreachable) {
+            off[at] = -signed(&p, refined.shape.mesh, hit);
+        }
+    })?;
+    Ok(ClassMap::of(mesh, off, carried))
+}

@@ -1,0 +1,56 @@
+//! How far a mesh is from the part as it is: deviation point to surface and cloud to cloud, normals, and pictures of them.
+//!
+//! All distances are in m. A deviation is positive where the mesh stands proud of the true part and negative where it lies
+//! in its material, whichever of the two the points were taken from.
+
+mod cloud;
+mod colour;
+mod comparison;
+mod deviation;
+mod disagreement;
+mod lines;
+mod normals;
+mod picture;
+mod sampling;
+mod summary;
+mod touched;
+
+pub use cloud::cloud_distances;
+pub use colour::{Rgb, colour_of, colour_of_class};
+pub use comparison::{CompareParams, Comparison, IndexedMesh, RegionComparison, Regions, SupportRegion, compare};
+pub use deviation::{closest_places, deviations};
+pub use disagreement::{
+    BadTouches, Class, ClassMap, Disagreement, DisagreementRegion, Misplaced, RefinedShape, RegionEvidence, Scanner,
+    VertexBasis, disagreement,
+};
+pub use lines::DrawnMesh;
+pub use normals::{Tilt, TiltSummary, angle_between, tilts};
+pub use picture::{Picture, PicturePanel, PictureParams, draw_picture};
+pub use sampling::{SampledPoint, sample_surface, surface_area};
+pub use summary::{BINS, Histogram, Summary, quantile};
+pub use touched::TouchedRegion;
+
+/// Why two shapes cannot be compared.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CompareError {
+    /// NaN or infinity.
+    #[error("point {point} has a coordinate that is not finite")]
+    NotFinite {
+        /// which, counted from 0
+        point: usize,
+    },
+    /// Nothing to measure to.
+    #[error("the mesh to compare with has no faces")]
+    NoFaces,
+    /// Nothing to measure to.
+    #[error("the cloud to compare with has no points")]
+    NoPoints,
+    /// More than can be counted.
+    #[error("{points} points are more than {most}: take fewer samples")]
+    TooManyPoints {
+        /// how many
+        points: usize,
+        /// at most
+        most: usize,
+    },
+}

@@ -1,0 +1,188 @@
+//! Triangles to pixels: a depth buffer, several samples for each pixel, light from over the shoulder.
+
+use nalgebra::{Vector2, Vector3};
+
+use super::camera::Camera;
+use super::canvas::Picture;
+use super::{BACKGROUND, PicturePanel};
+use crate::compare::colour::{Rgb, colour_of, colour_of_class};
+use crate::mesh::FaceId;
+
+/// Samples on each axis of a pixel.
+const FINE: u32 = 3;
+/// Colours of the scale that are worked out beforehand.
+const SHADES: usize = 512;
+/// Light that is everywhere; the rest comes from the lamp.
+const AMBIENT: f64 = 0.55;
+/// Where the lamp is: right, up, towards the viewer.
+const LAMP: [f64; 3] = [-0.3, 0.45, 0.85];
+/// What the inside of a surface shows of its colour; the rest is grey.
+const INSIDE: f64 = 0.35;
+/// Grey of the inside.
+const INSIDE_GREY: f64 = 120.0;
+/// Share of the light at an outline.
+const OUTLINE: f64 = 0.45;
+/// A step in depth is an outline from this share of the picture's height on.
+const STEP: f64 = 0.012;
+
+/// Where a picture lies in the plane of the view.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PictureFrame {
+    /// middle of the picture, m
+    pub middle: Vector2<f64>,
+    /// pixels for each m
+    pub scale: f64,
+    /// pixels
+    pub size: [u32; 2],
+}
+
+/// Samples of a picture.
+struct Samples {
+    width: usize,
+    height: usize,
+    /// towards the viewer, m; −∞ where nothing is
+    depth: Vec<f32>,
+    colour: Vec<Rgb>,
+}
+
+/// Draws one mesh in the colours of its deviations.
+pub(super) fn draw(panel: &PicturePanel<'_>, camera: &Camera, frame: &PictureFrame, range: f64) -> Picture {
+    let [width, height] = frame.size.map(|side| (side * FINE) as usize);
+    let mut samples = Samples {
+        width,
+        height,
+        depth: vec![f32::NEG_INFINITY; width * height],
+        colour: vec![BACKGROUND; width * height],
+    };
+    let shades: Vec<Rgb> = (0..SHADES).map(|i| colour_of(2.0 * i as f64 / (SHADES - 1) as f64 - 1.0, 1.0)).collect();
+    let scale = frame.scale * f64::from(FINE);
+    let place = |p: &Vector3<f64>| {
+        let x = (p.x - frame.middle.x) * scale + width as f64 / 2.0;
+        Vector3::new(x, height as f64 / 2.0 - (p.y - frame.middle.y) * scale, p.z)
+    };
+    for (face, corners) in panel.mesh.faces() {
+        let places = panel.mesh.triangle(face).map(|p| place(&camera.project(&p)));
+        let values = corners.map(|vertex| panel.deviations.get(vertex.0 as usize).map_or(0.0, |d| d / range));
+        let light = light_on(panel, camera, face);
+        match (panel.paint, panel.classes) {
+            (Some(paint), _) => {
+                let colours = corners.map(|v| paint.get(v.0 as usize).copied().unwrap_or(BACKGROUND));
+                samples.fill(&places, |shares| lit(colours[largest(&shares)], light));
+            }
+            (None, Some(classes)) => {
+                let colours = corners.map(|v| classes.get(v.0 as usize).map_or(BACKGROUND, |&c| colour_of_class(c)));
+                samples.fill(&places, |shares| lit(colours[largest(&shares)], light));
+            }
+            (None, None) => {
+                samples
+                    .fill(&places, |shares| shade(&shades, shares.iter().zip(values).map(|(s, v)| s * v).sum(), light));
+            }
+        }
+    }
+    samples.outline((STEP * height as f64 / scale) as f32);
+    samples.averaged(frame.size)
+}
+
+/// Share of the light that a face gets, negative where its inside is seen.
+fn light_on(panel: &PicturePanel<'_>, camera: &Camera, face: FaceId) -> f64 {
+    let normal = panel.mesh.normal(face);
+    let [x, y, z] = LAMP;
+    let lamp = (camera.right * x + camera.up * y + camera.out * z).normalize();
+    let facing = normal.dot(&camera.out);
+    let lit = AMBIENT + (1.0 - AMBIENT) * (normal.dot(&lamp) * facing.signum()).max(0.0);
+    lit.min(1.0).copysign(facing)
+}
+
+/// - `value`: deviation over the range.
+/// - `light`: as of [`light_on`].
+fn shade(shades: &[Rgb], value: f64, light: f64) -> Rgb {
+    let at = (value.clamp(-1.0, 1.0) + 1.0) / 2.0 * (SHADES - 1) as f64;
+    lit(shades[(at.round() as usize).min(SHADES - 1)], light)
+}
+
+/// A colour in the light of [`light_on`].
+fn lit(colour: Rgb, light: f64) -> Rgb {
+    let inside = |c: f64| if light < 0.0 { INSIDE_GREY + (c - INSIDE_GREY) * INSIDE } else { c };
+    colour.map(|c| (inside(f64::from(c)) * light.abs()).round() as u8)
+}
+
+/// The corner with the largest share.
+fn largest(shares: &[f64; 3]) -> usize {
+    (1..3).fold(0, |at, i| if shares[i] > shares[at] { i } else { at })
+}
+
+impl Samples {
+    /// Colours the samples inside a triangle that nothing hides.
+    ///
+    /// - `places`: corners, samples to the right and downwards, and m towards the viewer.
+    /// - `colour`: from the barycentric coordinates.
+    fn fill(&mut self, places: &[Vector3<f64>; 3], colour: impl Fn([f64; 3]) -> Rgb) {
+        let [a, b, c] = places;
+        let double_area = (b - a).xy().perp(&(c - a).xy());
+        let (lo, hi) = (a.inf(b).inf(c), a.sup(b).sup(c));
+        if double_area == 0.0 || !double_area.is_finite() {
+            return;
+        }
+        let columns = covered(lo.x, hi.x, self.width);
+        for y in covered(lo.y, hi.y, self.height) {
+            for x in columns.clone() {
+                let p = Vector2::new(x as f64 + 0.5, y as f64 + 0.5);
+                let share = |s: &Vector3<f64>, e: &Vector3<f64>| (e - s).xy().perp(&(p - s.xy())) / double_area;
+                let shares = [share(b, c), share(c, a), share(a, b)];
+                if shares.iter().any(|&share| share < 0.0) {
+                    continue;
+                }
+                let depth = (shares[0] * a.z + shares[1] * b.z + shares[2] * c.z) as f32;
+                let at = y * self.width + x;
+                if depth > self.depth[at] {
+                    self.depth[at] = depth;
+                    self.colour[at] = colour(shares);
+                }
+            }
+        }
+    }
+
+    /// Darkens samples beside which the surface ends or falls back by more than `step` (m).
+    fn outline(&mut self, step: f32) {
+        for y in 0..self.height {
+            for x in 0..self.width {
+                let at = y * self.width + x;
+                let beside = [
+                    (x > 0).then(|| at - 1),
+                    (x + 1 < self.width).then(|| at + 1),
+                    (y > 0).then(|| at - self.width),
+                    (y + 1 < self.height).then(|| at + self.width),
+                ];
+                let is_rim = |other: usize| self.depth[at] - self.depth[other] > step;
+                if self.depth[at] > f32::NEG_INFINITY && beside.into_iter().flatten().any(is_rim) {
+                    self.colour[at] = self.colour[at].map(|c| (f64::from(c) * OUTLINE) as u8);
+                }
+            }
+        }
+    }
+
+    /// The mean of the samples of each pixel.
+    fn averaged(&self, size: [u32; 2]) -> Picture {
+        let fine = FINE as usize;
+        let mut pixels = Vec::with_capacity(3 * size[0] as usize * size[1] as usize);
+        for y in 0..size[1] as usize {
+            for x in 0..size[0] as usize {
+                let mut sum = [0u32; 3];
+                for row in 0..fine {
+                    let from = (y * fine + row) * self.width + x * fine;
+                    for colour in &self.colour[from..from + fine] {
+                        sum.iter_mut().zip(colour).for_each(|(sum, c)| *sum += u32::from(*c));
+                    }
+                }
+                pixels.extend(sum.map(|sum| (sum / (FINE * FINE)) as u8));
+            }
+        }
+        Picture { size, pixels }
+    }
+}
+
+/// The samples whose middles may lie between `lo` and `hi`.
+fn covered(lo: f64, hi: f64, count: usize) -> std::ops::Range<usize> {
+    // casts end at 0 and at the largest number
+    (lo - 0.5).ceil().max(0.0) as usize..((hi + 0.5).floor().max(0.0) as usize).min(count)
+}

@@ -1,0 +1,172 @@
+//! The touch that tells most of the number that is asked for.
+//!
+//! With the covariance C of a surface's freedoms, a touch with derivatives g of its distance and deviation σ leaves
+//! C' = C − C g gᵀ C / (σ² + gᵀ C g), so a number that changes with the freedoms as c loses (cᵀ C g)² / (σ² + gᵀ C g) of its
+//! variance \[Atkinson Donev 1992, c-optimality\]. Touches are chosen one after the other, each as if those before had been made.
+
+use nalgebra::{Point3, SMatrix};
+
+use crate::features::fit::{FREEDOMS, Fit, Freedom, Steps, Surface};
+
+type InformationMatrix = SMatrix<f64, FREEDOMS, FREEDOMS>;
+
+/// A touch that could be made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Candidate {
+    /// Where the surface would be felt, m in O.
+    pub point: Point3<f64>,
+    /// Standard deviation along the normal, m.
+    pub sigma: f64,
+}
+
+/// The numbers of a surface that are asked for.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Asked {
+    /// For each number how it changes with the freedoms, over the deviation that is wanted of it.
+    by: Vec<Steps>,
+    /// the same for what is not asked for and must not stay unknown
+    rest: Vec<Steps>,
+}
+
+/// What is not asked for is known well enough with so many times the deviation that is wanted.
+const REST: f64 = 8.0;
+
+impl Asked {
+    /// One more number, that is to be known with a standard deviation of `sigma` (m or rad).
+    pub fn and(mut self, by: &[(Freedom, f64)], sigma: f64) -> Self {
+        let mut steps = Steps::zeros();
+        by.iter().for_each(|(freedom, x)| steps[*freedom as usize] += x / sigma);
+        self.by.push(steps);
+        self
+    }
+
+    /// Whether a fit fixes all numbers that are asked for.
+    pub(super) fn is_fixed_by<M: Surface>(&self, fit: &Fit<M>) -> bool {
+        self.by.iter().all(|by| fit.std_of(by).is_some())
+    }
+
+    /// With all freedoms of a surface to be known roughly: a number comes of a fit, and a fit in which another one is open goes
+    /// astray by its curvature.
+    ///
+    /// - `sigma`: wanted of the numbers, m; `size`: of the surface, m, by which a lean counts.
+    pub fn and_the_rest<M: Surface>(mut self, sigma: f64, size: f64) -> Self {
+        for freedom in Freedom::ALL.into_iter().filter(|freedom| M::FREE[*freedom as usize]) {
+            let is_angle = matches!(freedom, Freedom::TiltX | Freedom::TiltY | Freedom::Turn);
+            let lever = if is_angle { size } else { 1.0 };
+            self.rest.push(Steps::ith(freedom as usize, lever / (REST * sigma)));
+        }
+        self
+    }
+}
+
+/// What is known of a surface's freedoms.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Knowledge {
+    covariance: InformationMatrix,
+}
+
+impl Knowledge {
+    /// Before any touch: each freedom of the surface is known within `length` (m) or `angle` (rad), standard deviations.
+    pub fn before<M: Surface>(length: f64, angle: f64) -> Self {
+        let sigma = Freedom::ALL.map(|freedom| match freedom {
+            _ if !M::FREE[freedom as usize] => 0.0,
+            Freedom::TiltX | Freedom::TiltY | Freedom::Turn => angle,
+            Freedom::Second if !M::SECOND_IS_LENGTH => angle,
+            _ => length,
+        });
+        Self { covariance: InformationMatrix::from_diagonal(&Steps::from(sigma.map(|sigma| sigma * sigma))) }
+    }
+
+    /// With one more touch of the surface.
+    pub fn with<M: Surface>(&self, surface: &M, touch: &Candidate) -> Self {
+        let (_, g) = surface.derivatives(&touch.point);
+        let cg = self.covariance * g;
+        let covariance = self.covariance - cg * cg.transpose() / (touch.sigma.powi(2) + g.dot(&cg));
+        // rounding must not make it lopsided
+        Self { covariance: (covariance + covariance.transpose()) / 2.0 }
+    }
+
+    /// Standard deviation of a number that changes with the freedoms as `by` says, m or rad.
+    pub fn sigma_of(&self, by: &[(Freedom, f64)]) -> f64 {
+        let mut steps = Steps::zeros();
+        by.iter().for_each(|(freedom, x)| steps[*freedom as usize] += x);
+        steps.dot(&(self.covariance * steps)).max(0.0).sqrt()
+    }
+
+    /// Standard deviation of the surface along its normal at a place of it, m.
+    pub fn sigma_at<M: Surface>(&self, surface: &M, point: &Point3<f64>) -> f64 {
+        let (_, g) = surface.derivatives(point);
+        g.dot(&(self.covariance * g)).max(0.0).sqrt()
+    }
+
+    /// Sum over the numbers asked for of (deviation / wanted deviation)²; below their count when all are known well enough
+    /// on average.
+    pub fn open(&self, asked: &Asked) -> f64 {
+        asked.by.iter().chain(&asked.rest).map(|c| c.dot(&(self.covariance * c))).sum()
+    }
+
+    /// The largest of the deviations over what is wanted; at most 1 when all is known.
+    pub fn worst(&self, asked: &Asked) -> f64 {
+        let shares = asked.by.iter().map(|c| c.dot(&(self.covariance * c)).max(0.0).sqrt());
+        shares.fold(0.0, f64::max)
+    }
+
+    /// How much a touch would take from [`Self::open`].
+    pub fn gain<M: Surface>(&self, surface: &M, touch: &Candidate, asked: &Asked) -> f64 {
+        let (_, g) = surface.derivatives(&touch.point);
+        let cg = self.covariance * g;
+        let told: f64 = asked.by.iter().chain(&asked.rest).map(|c| c.dot(&cg).powi(2)).sum();
+        told / (touch.sigma.powi(2) + g.dot(&cg))
+    }
+
+    /// The candidate that tells most, the first among equals; `None` when none tells anything.
+    pub fn best<M: Surface>(&self, surface: &M, candidates: &[Candidate], asked: &Asked) -> Option<usize> {
+        let gains = candidates.iter().map(|touch| self.gain(surface, touch, asked)).enumerate();
+        let best = gains.fold(None, |best: Option<(usize, f64)>, (index, gain)| match best {
+            Some((_, most)) if gain <= most => best,
+            _ if gain > 0.0 => Some((index, gain)),
+            _ => best,
+        });
+        best.map(|(index, _)| index)
+    }
+
+    /// Up to `count` touches that together tell most; fewer when all is known as well as was asked.
+    ///
+    /// Each is chosen as if those before had been made; then each is exchanged for a better one as long as there is one
+    /// \[Fedorov 1972\]. The derivatives are those of `surface`: it should be known to a small share of its size.
+    pub fn plan<M: Surface>(
+        &self,
+        surface: &M,
+        candidates: &[Candidate],
+        asked: &Asked,
+        count: usize,
+    ) -> (Vec<usize>, Self) {
+        let (mut chosen, mut known) = (Vec::new(), self.clone());
+        while chosen.len() < count && known.worst(asked) > 1.0 {
+            let Some(best) = known.best(surface, candidates, asked) else { break };
+            known = known.with(surface, &candidates[best]);
+            chosen.push(best);
+        }
+        let all =
+            |chosen: &[usize]| chosen.iter().fold(self.clone(), |known, &at| known.with(surface, &candidates[at]));
+        for _ in 0..EXCHANGES {
+            let before = known.open(asked);
+            for place in 0..chosen.len() {
+                let others: Vec<usize> = (0..chosen.len()).filter(|&at| at != place).map(|at| chosen[at]).collect();
+                if let Some(best) = all(&others).best(surface, candidates, asked) {
+                    chosen[place] = best;
+                }
+            }
+            known = all(&chosen);
+            if known.open(asked) >= before * (1.0 - SETTLED) {
+                break;
+            }
+        }
+        (chosen, known)
+    }
+}
+
+/// Rounds of exchanges; three are usual.
+const EXCHANGES: usize = 20;
+/// Exchanges go on while they take more than this share of what is open.
+const SETTLED: f64 = 1e-6;

@@ -1,0 +1,78 @@
+//! Where the surface around a flag really lies: until it was touched, only the scan says how it looks out.
+
+use nalgebra::{Isometry3, Matrix3, Point3, Unit, UnitQuaternion, Vector3};
+
+use super::pattern::SearchContext;
+use crate::features::fit::Observation;
+
+/// Touches within this of a plane are of it, m.
+const OF_PLANE: f64 = 60e-6;
+/// Three touches tell a plane when the triangle between them is at least this high, over the ball's radius.
+const SPREAD: f64 = 1.0;
+
+/// The scan is not wrong by more than this about how the surface looks out (cosine): 25°.
+const ALIKE: f64 = 0.9;
+
+impl SearchContext {
+    /// Turns and lifts the frame so that its z = 0 is the plane that most touches lie on; whether there is one.
+    ///
+    /// - `is_top`: none may lie above it.
+    /// - `places`: of the frame as it was, in its plane of the surface: they stay where they are.
+    pub fn level(&mut self, felt: &mut Vec<Observation>, is_top: bool, places: &mut [&mut Point3<f64>]) -> bool {
+        let Some((normal, inliers)) = self.most_plane(felt, is_top) else { return false };
+        felt.clone_from(&inliers);
+        let count = inliers.len() as f64;
+        let mean = Point3::from(inliers.iter().map(|o| o.point.coords).sum::<Vector3<f64>>() / count);
+        let before = self.pose_of;
+        let turn = UnitQuaternion::rotation_between(&self.out(), &normal).unwrap_or_else(UnitQuaternion::identity);
+        let rotation = turn * before.rotation;
+        // the flag as it is seen along the normal
+        let flag = Point3::from(before.translation.vector);
+        let ball = self.params.ball_radius;
+        let origin = flag + normal.into_inner() * ((mean - flag).dot(&normal) - ball);
+        let height = self.height;
+        self.pose_of = Isometry3::from_parts(origin.coords.into(), rotation);
+        self.height = 0.0;
+        for place in places {
+            let moved = self.in_f(&(before * Point3::new(place.x, place.y, height)));
+            **place = Point3::new(moved.x, moved.y, 0.0);
+        }
+        true
+    }
+
+    /// Normal of the plane that most touches lie on, and those touches.
+    fn most_plane(&self, felt: &[Observation], is_top: bool) -> Option<(Unit<Vector3<f64>>, Vec<Observation>)> {
+        let least = SPREAD * self.params.ball_radius;
+        let (mut best, mut most) = (Vec::new(), (0, 0.0));
+        for (i, a) in felt.iter().enumerate() {
+            for (j, b) in felt.iter().enumerate().skip(i + 1) {
+                for c in &felt[j + 1..] {
+                    let (u, v) = (b.point - a.point, c.point - a.point);
+                    let area = u.cross(&v);
+                    let longest = u.norm().max(v.norm()).max((u - v).norm());
+                    if area.norm() < least * longest {
+                        continue;
+                    }
+                    let normal = area.normalize() * area.dot(&self.out()).signum();
+                    let off = |o: &Observation| (o.point - a.point).dot(&normal);
+                    let inliers = || felt.iter().filter(|o| off(o).abs() < OF_PLANE);
+                    let is_allowed = !is_top || felt.iter().all(|o| off(o) < OF_PLANE);
+                    // among equals the one that is most as the scan has it
+                    let score = (inliers().count(), normal.dot(&self.out()));
+                    let is_better = score.0 > most.0 || score.0 == most.0 && score.1 > most.1;
+                    if is_allowed && score.1 > ALIKE && is_better {
+                        most = score;
+                        best = inliers().copied().collect();
+                    }
+                }
+            }
+        }
+        let count = best.len() as f64;
+        let mean = best.iter().map(|o| o.point.coords).sum::<Vector3<f64>>() / count;
+        let spread = best.iter().map(|o| (o.point.coords - mean) * (o.point.coords - mean).transpose());
+        let spread = spread.sum::<Matrix3<f64>>().symmetric_eigen();
+        let normal = spread.eigenvectors.column(spread.eigenvalues.imin()).into_owned();
+        let normal = Unit::try_new(normal * normal.dot(&self.out()).signum(), 0.0)?;
+        (best.len() >= 3).then_some((normal, best))
+    }
+}

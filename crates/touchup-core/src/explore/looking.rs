@@ -1,0 +1,116 @@
+//! Where a ball falls in, near a flag that says little more than "about here".
+//!
+//! Down from above at the flag, then around it, next to where the ball sank deepest: a ball that rests on a rim sinks, so the
+//! way leads towards the opening.
+
+use nalgebra::Point3;
+
+use super::error::ExploreError;
+use super::pattern::{Felt, PatternParams, SearchContext, Touched, Wish};
+use crate::features::fit::Observation;
+
+/// Distance of the places where it is looked for, over the ball's radius: the ball falls into a hole of 2.2 radii at least.
+const STEP: f64 = 1.0;
+/// So deep below the surface a ball is in, over its radius: the whole ball and a chamfer.
+pub(super) const SHALLOW: f64 = 1.6;
+/// A ball that is this much lower than the surface sinks into something, m.
+const SUNK: f64 = 50e-6;
+/// Touches within this of the highest are of one surface, m.
+const FLAT: f64 = 30e-6;
+/// What the scan says of the height may be off by this, m.
+pub(super) const ROUGH: f64 = 1.5e-3;
+
+/// Looks for an opening.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Looking {
+    /// places that were tried from above in F, and how deep the ball came
+    tried: Vec<(Point3<f64>, f64)>,
+    /// of the surface
+    pub top: Vec<Observation>,
+}
+
+impl Looking {
+    pub fn not_found(params: &PatternParams) -> ExploreError {
+        ExploreError::NotFound { radius_mm: params.flag_radius * 1e3, ball_mm: params.ball_radius * 2e3 }
+    }
+
+    /// So far from the flag it is looked for, m: no farther than all touches lead, each a step from the last.
+    fn farthest(params: &PatternParams) -> f64 {
+        let step = STEP * params.ball_radius;
+        (params.flag_radius + step).min(step * params.budget as f64)
+    }
+
+    /// Where it is looked for next: the place not tried yet that is nearest to where the ball sank deepest, and to the flag.
+    pub fn next(&self, course: &SearchContext) -> Option<Wish> {
+        let PatternParams { ball_radius, clearance, .. } = course.params;
+        let step = STEP * ball_radius;
+        let is_new =
+            |place: &&Point3<f64>| self.tried.iter().all(|(tried, _)| (tried - **place).xy().norm() > step / 2.0);
+        let deepest = self.tried.iter().max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, depth)| *depth > SUNK);
+        let centre = deepest.map_or(Point3::origin(), |(place, _)| *place);
+        let near = |place: &Point3<f64>| (place - centre).xy().norm() + 1e-3 * place.coords.xy().norm();
+        let places = hexagonal(step, Self::farthest(&course.params));
+        let best = places.iter().filter(is_new).min_by(|a, b| near(a).total_cmp(&near(b)))?;
+        Some(course.down(best, clearance + SHALLOW * ball_radius + ROUGH))
+    }
+
+    /// Takes what was felt; the place where the ball fell in, if it did.
+    pub fn take(&mut self, course: &mut SearchContext, touch: &Touched) -> Option<Point3<f64>> {
+        let wanted = course.in_f(&touch.wish.from);
+        let wanted = Point3::new(wanted.x, wanted.y, 0.0);
+        match (touch.felt, touch.place, touch.observation) {
+            (Felt::Nothing, ..) => return Some(wanted),
+            (_, Some(place), Some(observation)) => {
+                let surface = course.below(&place);
+                // the highest is the surface; what is lower is a rim, or lower ground
+                if self.tried.is_empty() || surface > course.height + SUNK {
+                    let lower = surface - course.height;
+                    self.tried.iter_mut().for_each(|(_, depth)| *depth += lower);
+                    course.height = surface;
+                    self.top.clear();
+                }
+                let depth = course.height - surface;
+                if depth < FLAT {
+                    self.top.push(observation);
+                }
+                self.tried.push((Point3::new(place.x, place.y, 0.0), depth));
+            }
+            _ => self.tried.push((wanted, 0.0)),
+        }
+        None
+    }
+
+    /// The ball slid in over a rim, and cannot be let down there again: it is looked for beside it.
+    pub fn slid_in(&mut self, place: Point3<f64>, course: &SearchContext) {
+        self.tried.push((place, 2.0 * course.params.ball_radius));
+    }
+
+    /// Of what was felt from above only that counts where the ball lay on the surface, and not on the rim.
+    pub fn forget(&mut self, is_on_rim: impl Fn(&Point3<f64>) -> bool, course: &SearchContext) {
+        self.top.retain(|o| !is_on_rim(&course.in_f(&o.point)));
+    }
+}
+
+/// Places of the plane z = 0 within a radius, in rows of a hexagonal grid about the origin, m.
+pub(super) fn hexagonal(step: f64, radius: f64) -> Vec<Point3<f64>> {
+    let rings = (radius / step).ceil() as i32 + 1;
+    let place = |row: i32, column: i32| {
+        let x = step * (f64::from(column) + 0.5 * f64::from(row));
+        Point3::new(x, step * 0.75f64.sqrt() * f64::from(row), 0.0)
+    };
+    let places = (-rings..=rings).flat_map(|row| (-2 * rings..=2 * rings).map(move |column| place(row, column)));
+    places.filter(|place| place.coords.norm() <= radius).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A hexagonal grid has 2π/√3 (R/s)² places within R: with 39 touches within 39 steps that is 5518, and 1.6 million within 1 m.
+    #[test]
+    fn a_flag_that_may_be_a_metre_off_makes_no_millions_of_places() {
+        let params = PatternParams { flag_radius: 1.0, ..PatternParams::default() };
+        let places = hexagonal(STEP * params.ball_radius, Looking::farthest(&params)).len();
+        assert!((5000..6000).contains(&places), "{places}");
+    }
+}

@@ -1,0 +1,73 @@
+//! A region of which nobody knows what it is: touched in a spiral from the flag outward, for the mesh to tell.
+
+use nalgebra::Point3;
+
+use super::error::ExploreError;
+use super::looking::{ROUGH, hexagonal};
+use super::pattern::{Next, PatternParams, SearchContext, Stage, Touched};
+use super::slide::Slide;
+use crate::features::Feature;
+
+#[derive(Clone, Debug)]
+pub(super) struct RegionPattern {
+    /// in F, the next one last
+    places: Vec<Point3<f64>>,
+    /// the surface at those that were touched, in F; `None` where nothing was felt
+    felt: Vec<Option<Point3<f64>>>,
+    /// from one to the next, m
+    step: f64,
+}
+
+/// From place to place of the spiral the ball slides where they are no farther apart than this, over their step: across the surface, and up
+/// or down.
+const NEXT: f64 = 1.5;
+const STEEP: f64 = 0.6;
+
+impl RegionPattern {
+    /// As dense as the budget allows.
+    pub fn new(params: &PatternParams) -> Self {
+        let area = std::f64::consts::PI * params.flag_radius.powi(2);
+        // each place of a hexagonal grid has √3/2 of the square of its step
+        let step = (area / params.budget.max(1) as f64 / 0.75f64.sqrt()).sqrt();
+        let mut places = hexagonal(step, params.flag_radius);
+        let ring = |p: &Point3<f64>| (p.coords.norm() / step).round();
+        let turn = |p: &Point3<f64>| p.y.atan2(p.x);
+        places.sort_by(|a, b| ring(b).total_cmp(&ring(a)).then(turn(b).total_cmp(&turn(a))));
+        Self { places, felt: Vec::new(), step }
+    }
+}
+
+impl Stage for RegionPattern {
+    fn next(&mut self, course: &SearchContext) -> Next {
+        let PatternParams { clearance, ball_radius, depth, .. } = course.params;
+        let wish = |place: &Point3<f64>| course.down(place, clearance + ball_radius + depth.max(ROUGH));
+        self.places.last().map_or(Next::Done { is_as_asked: false }, |place| Next::Touch(wish(place)))
+    }
+
+    fn take(&mut self, course: &mut SearchContext, touch: &Touched) {
+        self.places.pop();
+        self.felt.push(touch.place.map(|place| Point3::new(place.x, place.y, course.below(&place))));
+        if let Some(place) = touch.place {
+            // the next one begins clear of the highest
+            course.height = course.height.max(course.below(&place));
+        }
+    }
+
+    fn feature(&self, _: &SearchContext) -> Result<Option<Feature>, ExploreError> {
+        Ok(None)
+    }
+
+    fn uncertainty(&self, _: &SearchContext) -> Option<f64> {
+        None
+    }
+
+    fn slides(&self, course: &SearchContext) -> Vec<Slide> {
+        let is_next = |pair: &[Option<Point3<f64>>]| {
+            let [Some(a), Some(b)] = pair else { return false };
+            (b - a).xy().norm() <= NEXT * self.step && (b.z - a.z).abs() <= STEEP * self.step
+        };
+        let felt = self.felt.chunk_by(|a, b| is_next(&[*a, *b]));
+        let chains = felt.map(|chain| chain.iter().flatten().copied().collect::<Vec<_>>());
+        chains.filter(|chain| chain.len() > 1).map(|chain| course.along(&chain)).collect()
+    }
+}

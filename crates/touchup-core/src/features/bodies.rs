@@ -1,0 +1,123 @@
+//! Bodies of a mesh of several: a screw in a hole does not close the hole.
+//!
+//! A body is a piece of the mesh without a border. What is asked about the surroundings of one is answered from its own
+//! faces alone. Pieces with a border are parts of one another, as in a scan: they see the whole mesh.
+
+use nalgebra::Point3;
+
+use super::facets::{Facets, NONE};
+use super::rays::Rays;
+use crate::mesh::{FaceId, FaceTree, TriMesh};
+
+/// The closed pieces of a mesh, where there is more than one piece.
+pub(super) struct Bodies {
+    /// number of the piece of each face; empty where there is one alone
+    piece_of: Vec<u32>,
+    /// number of the body of each face, [`NONE`] where a piece has a border; empty where there is one piece alone
+    of_face: Vec<u32>,
+    bodies: Vec<ClosedBody>,
+}
+
+struct ClosedBody {
+    mesh: TriMesh,
+    tree: FaceTree,
+    /// their ids in the whole mesh
+    faces: Vec<u32>,
+}
+
+/// What a place sees around it: its body, or the whole mesh.
+#[derive(Clone, Copy)]
+pub(super) struct Surroundings<'a> {
+    mesh: &'a TriMesh,
+    tree: &'a FaceTree,
+    /// ids in the whole mesh, where this is a body
+    faces: Option<&'a [u32]>,
+}
+
+impl Bodies {
+    pub fn of(facets: &Facets) -> Self {
+        let (piece_of, pieces) = pieces(facets);
+        if pieces.len() < 2 {
+            return Self { piece_of: Vec::new(), of_face: Vec::new(), bodies: Vec::new() };
+        }
+        let mut of_face = vec![NONE; piece_of.len()];
+        let mut bodies = Vec::new();
+        let closed =
+            pieces.into_iter().filter(|faces| faces.iter().all(|&f| !facets.beside[f as usize].contains(&NONE)));
+        for faces in closed {
+            let Some(mesh) = part(facets.mesh, &faces) else { continue };
+            faces.iter().for_each(|&face| of_face[face as usize] = bodies.len() as u32);
+            bodies.push(ClosedBody { tree: FaceTree::new(&mesh), mesh, faces });
+        }
+        Self { piece_of, of_face, bodies }
+    }
+
+    /// Number of the piece that a face belongs to.
+    pub fn piece_of(&self, face: u32) -> u32 {
+        self.piece_of.get(face as usize).copied().unwrap_or(0)
+    }
+
+    /// What a face sees.
+    pub fn around<'a>(&'a self, face: Option<u32>, mesh: &'a TriMesh, tree: &'a FaceTree) -> Surroundings<'a> {
+        let number = face.and_then(|face| self.of_face.get(face as usize)).copied().unwrap_or(NONE);
+        match self.bodies.get(number as usize) {
+            Some(ClosedBody { mesh, tree, faces }) => Surroundings { mesh, tree, faces: Some(faces) },
+            None => Surroundings { mesh, tree, faces: None },
+        }
+    }
+}
+
+impl<'a> Surroundings<'a> {
+    /// The face closest to `p` when one is within `reach`, m.
+    pub fn closest(&self, p: &Point3<f64>, reach: f64) -> Option<u32> {
+        let face = self.tree.closest(self.mesh, p, reach)?.face.0;
+        Some(self.faces.map_or(face, |faces| faces[face as usize]))
+    }
+
+    /// - `piece`: as [`Rays::new`] wants it, m.
+    pub fn rays(&self, piece: f64) -> Rays<'a> {
+        Rays::new(self.mesh, self.tree, piece, self.faces)
+    }
+}
+
+/// The piece of each face, and the faces of each piece: those that hang together over edges of two faces.
+fn pieces(facets: &Facets) -> (Vec<u32>, Vec<Vec<u32>>) {
+    let mut piece_of = vec![NONE; facets.slots()];
+    let mut pieces = 0;
+    let mut found = Vec::new();
+    for (FaceId(first), _) in facets.mesh.faces() {
+        if piece_of[first as usize] != NONE {
+            continue;
+        }
+        piece_of[first as usize] = pieces;
+        found.push(first);
+        while let Some(face) = found.pop() {
+            for other in facets.beside[face as usize] {
+                if other != NONE && piece_of[other as usize] == NONE {
+                    piece_of[other as usize] = pieces;
+                    found.push(other);
+                }
+            }
+        }
+        pieces += 1;
+    }
+    let mut faces = vec![Vec::new(); pieces as usize];
+    for (face, &piece) in piece_of.iter().enumerate().filter(|&(_, &piece)| pieces > 1 && piece != NONE) {
+        faces[piece as usize].push(face as u32);
+    }
+    (piece_of, faces)
+}
+
+/// Some faces of a mesh as a mesh of their own.
+fn part(mesh: &TriMesh, faces: &[u32]) -> Option<TriMesh> {
+    let mut vertices: Vec<_> = faces.iter().flat_map(|&face| mesh.corners(FaceId(face))).collect();
+    vertices.sort_unstable();
+    vertices.dedup();
+    let number = |vertex| vertices.binary_search(&vertex).map(|at| at as u32).ok();
+    let renumbered = faces.iter().map(|&face| {
+        let [a, b, c] = mesh.corners(FaceId(face)).map(number);
+        Some([a?, b?, c?])
+    });
+    let positions = vertices.iter().map(|&vertex| mesh.position(vertex)).collect();
+    TriMesh::new(positions, renumbered.collect::<Option<_>>()?).ok()
+}

@@ -1,0 +1,139 @@
+//! Edges at which a mesh turns sharply, and how they hang together.
+
+use nalgebra::{Point3, Vector3};
+
+use super::clusters::{Bend, ClusterParams};
+use super::curvature::{VertexCurvature, VertexKind};
+use crate::mesh::{FaceId, TriMesh, VertexId};
+
+/// Points put on all creases together at most, beside one for each: bounds the work on meshes that are all noise.
+const MOST_POINTS: f64 = 1e6;
+
+/// A sharp edge, or a sharp vertex as an edge without length.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Crease {
+    pub ends: [VertexId; 2],
+    pub bend: Bend,
+}
+
+/// All creases of a mesh, in order of their faces; single vertices last.
+#[derive(Clone, Debug)]
+pub(super) struct Creases {
+    pub list: Vec<Crease>,
+}
+
+impl Creases {
+    pub fn find(mesh: &TriMesh, curvature: &[VertexCurvature], params: &ClusterParams) -> Self {
+        let normals: Vec<_> = (0..mesh.face_slots() as u32)
+            .map(|f| if mesh.has_face(FaceId(f)) { mesh.normal(FaceId(f)) } else { Vector3::zeros() })
+            .collect();
+        let (mut list, mut has_crease) = (Vec::new(), vec![false; mesh.vertex_slots()]);
+        let cos_sharp = params.sharp_angle.cos();
+        for (face, corners) in mesh.faces() {
+            for i in 0..3 {
+                let ends = [corners[i], corners[(i + 1) % 3]];
+                // once for each edge: the other face runs along it the other way
+                let Some(other) = (ends[0] < ends[1]).then(|| neighbour(mesh, face, ends)).flatten() else { continue };
+                let (n, m) = (normals[face.0 as usize], normals[other.0 as usize]);
+                if n.dot(&m) < cos_sharp && n != Vector3::zeros() && m != Vector3::zeros() {
+                    let along = mesh.position(ends[1]) - mesh.position(ends[0]);
+                    let bend = if n.cross(&m).dot(&along) > 0.0 { Bend::Convex } else { Bend::Concave };
+                    ends.iter().for_each(|v| has_crease[v.0 as usize] = true);
+                    list.push(Crease { ends, bend });
+                }
+            }
+        }
+        let is_sharp = |c: &VertexCurvature| c.kind == VertexKind::Inner && c.defect.abs() > params.sharp_defect;
+        for (v, c) in curvature.iter().enumerate().filter(|(v, c)| is_sharp(c) && !has_crease[*v]) {
+            let bend = if c.integrated_mean >= 0.0 { Bend::Convex } else { Bend::Concave };
+            list.push(Crease { ends: [VertexId(v as u32); 2], bend });
+        }
+        Self { list }
+    }
+}
+
+/// The one other face at an edge; `None` on the rim, where there are several, and where it is turned over.
+fn neighbour(mesh: &TriMesh, face: FaceId, [a, b]: [VertexId; 2]) -> Option<FaceId> {
+    let (from, to) = if mesh.star(a).len() <= mesh.star(b).len() { (a, b) } else { (b, a) };
+    let mut others = mesh.faces_at_edge(from, to).filter(|other| *other != face);
+    let (Some(other), None) = (others.next(), others.next()) else { return None };
+    let corners = mesh.corners(other);
+    let is_opposite = (0..3).any(|i| corners[i] == b && corners[(i + 1) % 3] == a);
+    is_opposite.then_some(other)
+}
+
+/// Which creases are one region: a forest whose roots name the regions.
+#[derive(Clone, Debug)]
+pub(super) struct CreaseRegions {
+    parents: Vec<u32>,
+}
+
+impl CreaseRegions {
+    /// Creases of one kind that share a vertex.
+    pub fn connected(creases: &Creases) -> Self {
+        let mut regions = Self { parents: (0..creases.list.len() as u32).collect() };
+        let ends = |(i, crease): (usize, &Crease)| crease.ends.map(|v| ((crease.bend, v), i as u32));
+        let mut at_vertex: Vec<_> = creases.list.iter().enumerate().flat_map(ends).collect();
+        regions.join_equal(&mut at_vertex);
+        regions
+    }
+
+    /// Creases of one kind of which points are in one cell of a grid of size `near`, or in cells that touch: all that are
+    /// closer than `near`, none that are farther than 2√3 times that.
+    pub fn merge(&mut self, mesh: &TriMesh, creases: &Creases, near: f64) {
+        let lengths = |crease: &Crease| (mesh.position(crease.ends[1]) - mesh.position(crease.ends[0])).norm();
+        let spacing = (near / 2.0).max(creases.list.iter().map(lengths).sum::<f64>() / MOST_POINTS);
+        if !(spacing > 0.0 && spacing.is_finite()) {
+            return;
+        }
+        let [low, _] = mesh.bounds();
+        let mut in_cell = Vec::new();
+        for (i, crease) in creases.list.iter().enumerate() {
+            let [a, b] = crease.ends.map(|v| mesh.position(v));
+            let parts = ((b - a).norm() / spacing).ceil().max(1.0) as u32;
+            in_cell.extend((0..=parts).map(|part| {
+                let p = a + (b - a) * (f64::from(part) / f64::from(parts));
+                ((crease.bend, cell(&(p - low), near)), i as u32)
+            }));
+        }
+        self.join_equal(&mut in_cell);
+        in_cell.dedup_by_key(|(key, _)| *key);
+        for &((bend, [x, y, z]), crease) in &in_cell {
+            // half of the 26 around; the others see this one
+            for (dx, dy, dz) in (0..27).map(|n| (n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1)).filter(|d| *d > (0, 0, 0)) {
+                let key = (bend, [x + dx, y + dy, z + dz]);
+                if let Ok(at) = in_cell.binary_search_by_key(&key, |(key, _)| *key) {
+                    self.join(crease, in_cell[at].1);
+                }
+            }
+        }
+    }
+
+    /// Sorts by key and joins what has the same.
+    fn join_equal<K: Ord + Copy>(&mut self, keyed: &mut [(K, u32)]) {
+        keyed.sort_unstable();
+        for pair in keyed.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
+            self.join(pair[0].1, pair[1].1);
+        }
+    }
+
+    /// The crease that names the region of another.
+    pub fn root(&mut self, mut crease: u32) -> u32 {
+        while self.parents[crease as usize] != crease {
+            let above = self.parents[self.parents[crease as usize] as usize];
+            self.parents[crease as usize] = above;
+            crease = above;
+        }
+        crease
+    }
+
+    fn join(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.root(a), self.root(b));
+        self.parents[a.max(b) as usize] = a.min(b);
+    }
+}
+
+/// The cell of a grid from the lowest corner of the box, where all coordinates are ≥ 0.
+fn cell(p: &Vector3<f64>, size: f64) -> [i64; 3] {
+    (Point3::from(p / size)).coords.map(|x| x.floor() as i64).into()
+}

@@ -1,0 +1,360 @@
+//! From a mesh and touches to features.
+
+use nalgebra::{Point3, Vector3};
+
+use super::borders::{StraightEdge, borders, on_both, straight_edges, without_seams};
+use super::cones::add_cones;
+use super::feature::{Feature, FittedTo, Kind, Measured, SizedSurface};
+use super::fit::{Cylinder, Ends, Fit, Freedom, Plane, Stadium};
+use super::holes::{Boss, Hole, bosses, groups, holes};
+use super::measure::{Fitted, Measure};
+use super::observe::Observed;
+use super::primitive::Primitive;
+use super::rims::{RoundOpening, rims};
+use super::scene::Parted;
+use super::slots::{Slot, slots};
+use super::walls::Wall;
+use crate::mesh::{FaceTree, TriMesh};
+use crate::touch::ProbedPoint;
+
+/// What was found on a mesh.
+#[derive(Clone, Debug)]
+pub struct Detection {
+    /// by kind, the largest first; numbered from 0 on
+    pub features: Vec<Feature>,
+    /// share of the area that no plane, cylinder or cone explains
+    pub unexplained: f64,
+}
+
+/// A plane is worth telling when it is so many tolerances wide.
+const SURE_WIDTH: f64 = 25.0;
+/// A plane is worth telling from this area on, in squared diagonals.
+const LEAST_PLANE: f64 = 1e-3;
+
+/// Finds the features of a mesh, measured by touches where there are any.
+///
+/// - `touches`: as [`crate::patch::Patcher::probed`] has them; features name them by their place in it.
+pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detection {
+    let mut parted = Parted::of(mesh, tree);
+    let mut walls = Wall::all(&parted.facets, &parted.segmentation);
+    add_cones(&mut parted, &mut walls);
+    let of_face = without_seams(&parted);
+    let borders = borders(&parted, &of_face);
+    let holes = holes(&parted, &walls);
+    let (slots, pockets) = slots(&parted, &of_face, &borders);
+    let edges: Vec<_> = straight_edges(&parted, &borders).into_iter().filter(|edge| is_sure(&parted, edge)).collect();
+    let holes: Vec<_> = holes.into_iter().filter(|hole| !is_slot_end(&walls[hole.wall], &slots)).collect();
+    let observed = Observed::of(&parted, &of_face, touches);
+    let measure = Measure::new(&observed);
+
+    let mut features = Vec::new();
+    for (hole, group) in holes.iter().zip(groups(&walls, &holes)) {
+        let group = group.map(|number| number as u32);
+        features.push(Feature { group, ..hole_feature(&measure, &walls, hole) });
+    }
+    let is_new = |rim: &RoundOpening| holes.iter().all(|hole| !is_rim_of(&walls[hole.wall], rim));
+    features.extend(rims(&parted).iter().filter(|rim| is_new(rim)).map(|rim| rim_feature(&measure, rim)));
+    features.extend(slots.iter().map(|slot| slot_feature(&measure, slot, Kind::Slot)));
+    features.extend(pockets.iter().map(|pocket| slot_feature(&measure, pocket, Kind::Pocket)));
+    features.extend(bosses(&parted, &walls).iter().map(|boss| boss_feature(&measure, &walls, boss)));
+    features.extend(edges.iter().filter_map(|edge| edge_feature(&measure, edge)));
+    features.extend(corners(&parted, &measure, &edges));
+    let is_worth = |number: usize| {
+        let area = parted.segment(number).area;
+        is_sure_plane(&parted, number) && area > LEAST_PLANE * parted.diagonal * parted.diagonal
+    };
+    let planes = parted.planes().filter(|&(number, ..)| is_worth(number));
+    features.extend(planes.filter_map(|(number, ..)| plane_feature(&measure, number)));
+    features.iter_mut().enumerate().for_each(|(id, feature)| feature.id = id as u32);
+    Detection { features, unexplained: unexplained(&parted) }
+}
+
+/// Whether a wall is the half-round end of a slot: with its corners it may look like more than half a turn.
+fn is_slot_end(wall: &Wall, slots: &[Slot]) -> bool {
+    slots.iter().any(|slot| {
+        let is_wide = (2.0 * wall.radius() - slot.width).abs() < ALIKE * slot.width;
+        let v = wall.at(wall.middle()) - slot.centre;
+        let across = slot.out.cross(&slot.direction);
+        let is_inside = v.dot(&across).abs() < ALIKE * slot.width && v.dot(&slot.direction).abs() < slot.length / 2.0;
+        is_wide && is_inside
+    })
+}
+
+/// A wall is an end of a slot when width and place agree within this share of the width.
+const ALIKE: f64 = 0.2;
+
+fn unexplained(parted: &Parted) -> f64 {
+    let all: f64 = parted.facets.areas.iter().sum();
+    let explained: f64 = parted.segmentation.segments.iter().map(|segment| segment.area).sum();
+    if all > 0.0 { (1.0 - explained / all).max(0.0) } else { 0.0 }
+}
+
+fn is_sure_plane(parted: &Parted, number: usize) -> bool {
+    let segment = parted.segment(number);
+    segment.is_exact || segment.area > (SURE_WIDTH * segment.tolerance).powi(2)
+}
+
+fn is_sure(parted: &Parted, edge: &StraightEdge) -> bool {
+    edge.planes.iter().all(|&number| is_sure_plane(parted, number))
+}
+
+fn together(touches: [&[u32]; 2]) -> Vec<u32> {
+    let mut all = touches.concat();
+    all.sort_unstable();
+    all.dedup();
+    all
+}
+
+/// Distance of two places along `way`, each known by so much.
+fn between(from: &AxisEnd, to: &AxisEnd, way: &Vector3<f64>) -> Measured<f64> {
+    let std = from.std.zip(to.std).map(|(a, b)| a.hypot(b));
+    let touches = together([&from.touches, &to.touches]);
+    Measured { value: (from.point - to.point).dot(way).abs(), std, touches }
+}
+
+/// Where an axis meets a plane, or ends.
+struct AxisEnd {
+    point: Point3<f64>,
+    /// along the axis, m
+    std: Option<f64>,
+    touches: Vec<u32>,
+}
+
+impl AxisEnd {
+    /// Where the axis meets plane number `plane`; else `point`.
+    fn on(measure: &Measure, plane: Option<usize>, point: &Point3<f64>, axis: &Vector3<f64>) -> Self {
+        let met = plane.and_then(|number| measure.plane(number)).and_then(|fitted| {
+            let (point, std) = fitted.met(point, axis)?;
+            Some(Self { point, std, touches: fitted.touches })
+        });
+        met.unwrap_or_else(|| Self { point: *point, std: None, touches: Vec::new() })
+    }
+
+    /// Beside numbers that were touched, how well the mesh is known is not: nobody felt whether it is true.
+    fn known_as(self, to: FittedTo) -> Self {
+        let is_known = to == FittedTo::Mesh || !self.touches.is_empty();
+        Self { std: self.std.filter(|_| is_known), ..self }
+    }
+}
+
+/// The place of a round feature on its axis.
+fn on_axis(fitted: &Fitted<Cylinder>, near: &Point3<f64>) -> Point3<f64> {
+    let (start, axis) = (fitted.surface.center(), fitted.surface.pose_of.rotation * Vector3::z());
+    start + axis * (near - start).dot(&axis)
+}
+
+/// Root mean square distance across the axis by which a place on it may be off, m.
+pub(super) fn lateral_std(fit: &Fit<Cylinder>, at: &Point3<f64>) -> Option<f64> {
+    let height = fit.surface.pose_of.inverse_transform_point(at).z;
+    fit.center_covariance(height).map(|covariance| covariance.trace().max(0.0).sqrt())
+}
+
+fn hole_feature(measure: &Measure, walls: &[Wall], hole: &Hole) -> Feature {
+    let wall = &walls[hole.wall];
+    let fitted = measure.cylinder(wall, hole.rim);
+    let axis = fitted.axis(&hole.out);
+    let opening = AxisEnd::on(measure, hole.rim, &on_axis(&fitted, &hole.opening), &axis.value);
+    let bottom = on_axis(&fitted, &(hole.opening - hole.out * hole.depth));
+    let floor = AxisEnd::on(measure, hole.floor, &bottom, &axis.value).known_as(fitted.to);
+    // beside a wall that was touched, a floor that was not may be a guess
+    let is_told = hole.floor.is_none() || fitted.to == FittedTo::Mesh || !floor.touches.is_empty();
+    let std = fitted.fit.as_ref().and_then(|fit| lateral_std(fit, &opening.point));
+    let touches = together([&fitted.touches, &opening.touches]);
+    let centre = Measured { value: opening.point, std, touches };
+    let touched = measure.observed.touched_share(&wall.segments);
+    let cone = hole.countersink.and_then(|cone| measure.cone(&walls[cone]));
+    Feature {
+        diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),
+        depth: Some(between(&opening, &floor, &axis.value)),
+        axis: Some(axis),
+        through: hole.through.filter(|_| is_told),
+        surface: SizedSurface::Round(fitted.surface.clone()),
+        cone_angle: cone.map(|cone| cone.number(2.0 * cone.surface.half_angle.abs(), &[(Freedom::Second, 2.0)])),
+        ..Feature::new(Kind::Hole, centre, touched, fitted.to)
+    }
+}
+
+/// A rim is of a wall when it is no farther from its axis, and from its ends, than this many radii.
+const OF_WALL: f64 = 0.5;
+
+/// Whether a round opening is an end of a hole that has a wall.
+fn is_rim_of(wall: &Wall, rim: &RoundOpening) -> bool {
+    let (v, near) = (rim.centre - wall.origin, OF_WALL * wall.radius());
+    let along = v.dot(&wall.axis);
+    let is_between = along > wall.ends[0] - near && along < wall.ends[1] + near;
+    is_between && (v - wall.axis * along).norm() < near
+}
+
+/// A hole of which there is no wall: how deep it is and whether it goes through is not known.
+fn rim_feature(measure: &Measure, rim: &RoundOpening) -> Feature {
+    let fitted = Fitted {
+        surface: rim.fit.surface.clone(),
+        fit: Some(rim.fit.clone()),
+        touches: Vec::new(),
+        to: FittedTo::Mesh,
+    };
+    let centre = Measured { value: rim.centre, std: lateral_std(&rim.fit, &rim.centre), touches: Vec::new() };
+    Feature {
+        diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),
+        axis: Some(fitted.axis(&rim.out)),
+        ..Feature::new(Kind::Hole, centre, measure.observed.touched_at(&rim.corners), FittedTo::Mesh)
+    }
+}
+
+fn boss_feature(measure: &Measure, walls: &[Wall], boss: &Boss) -> Feature {
+    let wall = &walls[boss.wall];
+    let fitted = measure.cylinder(wall, Some(boss.base));
+    let axis = fitted.axis(&boss.out);
+    let foot = AxisEnd::on(measure, Some(boss.base), &on_axis(&fitted, &boss.foot), &axis.value);
+    let top = on_axis(&fitted, &(boss.foot + boss.out * boss.height));
+    let top = AxisEnd::on(measure, boss.top, &top, &axis.value).known_as(fitted.to);
+    let std = fitted.fit.as_ref().and_then(|fit| lateral_std(fit, &foot.point));
+    let centre = Measured { value: foot.point, std, touches: together([&fitted.touches, &foot.touches]) };
+    Feature {
+        diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),
+        depth: Some(between(&top, &foot, &axis.value)),
+        axis: Some(axis),
+        surface: SizedSurface::Round(fitted.surface.clone()),
+        ..Feature::new(Kind::Boss, centre, measure.observed.touched_share(&wall.segments), fitted.to)
+    }
+}
+
+/// By how much the middle of a slot may be off, m: across it, and along it where its ends tell that.
+pub(super) fn middle_std(fit: &Fit<Stadium>) -> Option<f64> {
+    let across = fit.std(Freedom::Y)?;
+    Some(fit.std(Freedom::X).map_or(across, |along| across.hypot(along)))
+}
+
+fn slot_feature(measure: &Measure, slot: &Slot, kind: Kind) -> Feature {
+    let is_round =
+        |&number: &usize| matches!(measure.observed.parted.segment(number).primitive, Primitive::Cylinder { .. });
+    let ends = if slot.ends.iter().flatten().any(is_round) { Ends::Round } else { Ends::Straight };
+    let fitted = measure.stadium(slot, ends);
+    let axis = fitted.axis(&slot.out);
+    let Stadium { width, length, .. } = fitted.surface;
+    let is_fixed = |freedom: Freedom| fitted.fit.as_ref().is_some_and(|fit| fit.std(freedom).is_some());
+    let direction = fitted.surface.direction() * fitted.surface.direction().dot(&slot.direction).signum();
+    // along the slot only what ends it tells where it is
+    let start = fitted.surface.center();
+    let along = if is_fixed(Freedom::X) { 0.0 } else { (slot.centre - start).dot(&direction) };
+    let near = start + direction * along + axis.value * (slot.centre - start).dot(&axis.value);
+    let opening = AxisEnd::on(measure, Some(slot.land), &near, &axis.value);
+    let floor = AxisEnd::on(measure, slot.floor, &(near - axis.value * slot.depth), &axis.value).known_as(fitted.to);
+    let centre = Measured {
+        value: opening.point,
+        std: fitted.fit.as_ref().and_then(middle_std),
+        touches: together([&fitted.touches, &opening.touches]),
+    };
+    let length = if is_fixed(Freedom::Second) { length } else { slot.length };
+    let half = direction * (length / 2.0);
+    let touched = measure.observed.touched_share(&slot.walls);
+    let depth = if slot.through {
+        Measured { value: slot.depth, ..Measured::default() }
+    } else {
+        between(&opening, &floor, &axis.value)
+    };
+    Feature {
+        direction: Some(direction),
+        width: Some(fitted.number(width, &[(Freedom::Size, 1.0)])),
+        length: Some(fitted.number(length, &[(Freedom::Second, 1.0)])),
+        depth: Some(depth),
+        axis: Some(axis),
+        through: Some(slot.through),
+        surface: SizedSurface::Slot(fitted.surface.clone()),
+        points: vec![opening.point - half, opening.point + half],
+        ..Feature::new(kind, centre, touched, fitted.to)
+    }
+}
+
+/// Whether both planes were measured by touch.
+fn fitted_to(planes: &[&Fitted<Plane>]) -> FittedTo {
+    let is_touched = planes.iter().all(|plane| plane.to == FittedTo::Touches);
+    if is_touched { FittedTo::Touches } else { FittedTo::Mesh }
+}
+
+fn edge_feature(measure: &Measure, edge: &StraightEdge) -> Option<Feature> {
+    let [a, b] = edge.planes.map(|number| measure.plane(number));
+    let (a, b) = (a?, b?);
+    let normals = [a.surface.normal(), b.surface.normal()];
+    let way = normals[0].cross(&normals[1]);
+    let sine = way.norm();
+    let way = way.try_normalize(0.0)? * (edge.ends[1] - edge.ends[0]).dot(&way).signum();
+    let ends = edge.ends.map(|end| on_both([a.surface.point(), b.surface.point()], normals, &end));
+    let middle = nalgebra::center(&ends[0], &ends[1]);
+    let stds = [&a, &b].map(|plane| plane.fit.as_ref().and_then(|fit| fit.std_at(&middle)));
+    // two planes that may be shifted by s and t let their line wander by √(s² + t²) / sin of the angle between them
+    let std = stds[0].zip(stds[1]).map(|(s, t)| s.hypot(t) / sine);
+    let touches = together([&a.touches, &b.touches]);
+    let touched = measure.observed.touched_along(&ends);
+    let length = Measured { value: (ends[1] - ends[0]).norm(), ..Measured::default() };
+    Some(Feature {
+        axis: Some(Measured { value: way, std: None, touches: touches.clone() }),
+        length: Some(length),
+        points: ends.to_vec(),
+        is_convex: Some(edge.is_convex),
+        ..Feature::new(Kind::Edge, Measured { value: middle, std, touches }, touched, fitted_to(&[&a, &b]))
+    })
+}
+
+/// Ends of edges closer together than this are one corner, in diagonals; of exact planes: what is farther off is round.
+const SAME_CORNER: f64 = 0.02;
+const SAME_EXACT_CORNER: f64 = 1e-4;
+
+fn corners(parted: &Parted, measure: &Measure, edges: &[StraightEdge]) -> Vec<Feature> {
+    let mut found: Vec<([usize; 3], Feature)> = Vec::new();
+    for (at, first) in edges.iter().enumerate() {
+        for second in &edges[..at] {
+            let mut planes = [first.planes, second.planes].concat();
+            planes.sort_unstable();
+            planes.dedup();
+            let &[i, j, k] = planes.as_slice() else { continue };
+            let Some(corner) = corner_of(measure, [i, j, k]) else { continue };
+            let is_exact = planes.iter().all(|&number| parted.segment(number).is_exact);
+            let near = if is_exact { SAME_EXACT_CORNER } else { SAME_CORNER } * parted.diagonal;
+            let ends = |edge: &StraightEdge| edge.ends.iter().any(|end| (end - corner.centre.value).norm() < near);
+            let is_new = found.iter().all(|(planes, _)| *planes != [i, j, k]);
+            if is_new && ends(first) && ends(second) {
+                found.push(([i, j, k], corner));
+            }
+        }
+    }
+    found.into_iter().map(|(_, corner)| corner).collect()
+}
+
+/// Volume that three unit normals span, at least: 10° from a common plane.
+const SPATIAL: f64 = 0.17;
+
+fn corner_of(measure: &Measure, planes: [usize; 3]) -> Option<Feature> {
+    let [a, b, c] = planes.map(|number| measure.plane(number));
+    let planes = [a?, b?, c?];
+    let normals = nalgebra::Matrix3::from_rows(&[0, 1, 2].map(|i| planes[i].surface.normal().transpose()));
+    if normals.determinant().abs() < SPATIAL {
+        return None;
+    }
+    let inverse = normals.try_inverse()?;
+    let heights = Vector3::from_fn(|i, _| planes[i].surface.normal().dot(&planes[i].surface.point().coords));
+    let point = Point3::from(inverse * heights);
+    let stds = [0, 1, 2].map(|i| planes[i].fit.as_ref().and_then(|fit| fit.std_at(&point)));
+    let std = match stds {
+        [Some(s), Some(t), Some(u)] => {
+            let covariance =
+                inverse * nalgebra::Matrix3::from_diagonal(&Vector3::new(s * s, t * t, u * u)) * inverse.transpose();
+            Some(covariance.trace().sqrt())
+        }
+        _ => None,
+    };
+    let touches = together([&together([&planes[0].touches, &planes[1].touches]), &planes[2].touches]);
+    let touched = measure.observed.touched_along(&[point, point]);
+    let to = fitted_to(&[&planes[0], &planes[1], &planes[2]]);
+    Some(Feature::new(Kind::Corner, Measured { value: point, std, touches }, touched, to))
+}
+
+fn plane_feature(measure: &Measure, number: usize) -> Option<Feature> {
+    let fitted = measure.plane(number)?;
+    let Primitive::Plane { point, normal } = measure.observed.parted.segment(number).primitive else { return None };
+    let axis = fitted.axis(&normal);
+    let (value, std) = fitted.met(&point, &normal)?;
+    let touched = measure.observed.touched_share(&[number]);
+    let centre = Measured { value, std, touches: fitted.touches.clone() };
+    Some(Feature { axis: Some(axis), ..Feature::new(Kind::Plane, centre, touched, fitted.to) })
+}

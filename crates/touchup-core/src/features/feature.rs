@@ -1,0 +1,184 @@
+//! What is found: one feature, its numbers, and what they rest on.
+
+use nalgebra::{Point3, Vector3};
+
+use super::fit::{Cylinder, Stadium};
+
+/// What a feature is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Kind {
+    /// round, through or blind; a stepped one is several of one group
+    Hole,
+    /// between two parallel walls
+    Slot,
+    /// closed all around, with a floor
+    Pocket,
+    /// round, standing on a plane
+    Boss,
+    /// straight, between two planes
+    Edge,
+    /// where three planes meet
+    Corner,
+    /// flat
+    Plane,
+}
+
+impl Kind {
+    /// Every one.
+    pub const ALL: [Kind; 7] =
+        [Self::Hole, Self::Slot, Self::Pocket, Self::Boss, Self::Edge, Self::Corner, Self::Plane];
+
+    /// As files name it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Hole => "hole",
+            Self::Slot => "slot",
+            Self::Pocket => "pocket",
+            Self::Boss => "boss",
+            Self::Edge => "edge",
+            Self::Corner => "corner",
+            Self::Plane => "plane",
+        }
+    }
+}
+
+/// What the numbers of a feature were fitted to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FittedTo {
+    /// touches
+    Touches,
+    /// the mesh: too little of it was touched
+    Mesh,
+}
+
+/// A number, how well it is known, and the touches that it comes from.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Measured<T> {
+    /// m, rad, or a point, m
+    pub value: T,
+    /// standard uncertainty, m or rad; `None` where nothing tells it
+    pub std: Option<f64>,
+    /// numbers of the touches, in ascending order; none where it was fitted to the mesh
+    pub touches: Vec<u32>,
+}
+
+/// A feature of the part, in O.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Feature {
+    /// stays the same while the feature is refined
+    pub id: u32,
+    /// what it is
+    pub kind: Kind,
+    /// where the axis goes through the opening, the middle of a boss' foot, of an edge, of a plane; the corner. Its
+    /// uncertainty is the root mean square distance across the axis, of a plane along its normal.
+    pub centre: Measured<Point3<f64>>,
+    /// out of the opening, along an edge, the outward normal of a plane; unit vector. Its uncertainty is an angle, rad.
+    pub axis: Option<Measured<Vector3<f64>>>,
+    /// along a slot, unit vector
+    pub direction: Option<Vector3<f64>>,
+    /// of a hole or boss, m
+    pub diameter: Option<Measured<f64>>,
+    /// of a slot, pocket or edge, m
+    pub length: Option<Measured<f64>>,
+    /// of a slot or pocket, m
+    pub width: Option<Measured<f64>>,
+    /// from opening to floor, or the height of a boss, m
+    pub depth: Option<Measured<f64>>,
+    /// whether a hole or slot goes through; `None` where the mesh ends before the hole does, or nobody touched its floor
+    pub through: Option<bool>,
+    /// full angle of the countersink, rad
+    pub cone_angle: Option<Measured<f64>>,
+    /// holes of one number belong together: steps on one axis
+    pub group: Option<u32>,
+    /// both ends of an edge or slot, m
+    pub points: Vec<Point3<f64>>,
+    /// whether the material is inside of an edge
+    pub is_convex: Option<bool>,
+    /// share of its surface that was touched
+    pub touched: f64,
+    /// what its numbers were fitted to
+    pub fitted_to: FittedTo,
+    /// the surface that its sizes are of
+    pub(super) surface: SizedSurface,
+}
+
+/// The surface that the sizes of a feature are of.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum SizedSurface {
+    /// of a hole or boss
+    Round(Cylinder),
+    /// of a slot or pocket
+    Slot(Stadium),
+    /// none alone
+    Other,
+}
+
+/// The walls of a feature.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Walls<'a> {
+    /// of a hole or boss
+    Round(&'a Cylinder),
+    /// of a slot or pocket
+    Slot(&'a Stadium),
+}
+
+impl Feature {
+    /// The walls that its sizes are of, where it has some.
+    pub fn walls(&self) -> Option<Walls<'_>> {
+        match &self.surface {
+            SizedSurface::Round(wall) => Some(Walls::Round(wall)),
+            SizedSurface::Slot(walls) => Some(Walls::Slot(walls)),
+            SizedSurface::Other => None,
+        }
+    }
+
+    /// Numbers of the touches that its sizes come from; one may come again.
+    pub fn touch_numbers(&self) -> impl Iterator<Item = u32> {
+        let sizes = [&self.diameter, &self.width, &self.length].into_iter().flatten();
+        sizes.flat_map(|size| size.touches.iter().copied())
+    }
+
+    /// A hole of which the wall is known.
+    ///
+    /// - `opening`, `axis`: where the axis goes through it, m in O, and out of it; `touches`: numbers of those of the wall.
+    #[cfg(test)]
+    pub(crate) fn round_hole(
+        opening: Point3<f64>,
+        axis: Vector3<f64>,
+        depth: f64,
+        wall: Cylinder,
+        touches: Vec<u32>,
+    ) -> Self {
+        let diameter = Measured { value: 2.0 * wall.radius, std: Some(1e-5), touches };
+        Self {
+            axis: Some(Measured { value: axis, ..Measured::default() }),
+            diameter: Some(diameter),
+            depth: Some(Measured { value: depth, ..Measured::default() }),
+            surface: SizedSurface::Round(wall),
+            ..Self::new(Kind::Hole, Measured { value: opening, ..Measured::default() }, 1.0, FittedTo::Touches)
+        }
+    }
+
+    /// A feature without numbers but its place.
+    pub(super) fn new(kind: Kind, centre: Measured<Point3<f64>>, touched: f64, fitted_to: FittedTo) -> Self {
+        Self {
+            id: 0,
+            kind,
+            centre,
+            axis: None,
+            direction: None,
+            diameter: None,
+            length: None,
+            width: None,
+            depth: None,
+            through: None,
+            cone_angle: None,
+            group: None,
+            points: Vec::new(),
+            is_convex: None,
+            touched,
+            fitted_to,
+            surface: SizedSurface::Other,
+        }
+    }
+}

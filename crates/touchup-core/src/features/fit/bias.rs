@@ -1,0 +1,41 @@
+//! What curvature does to the mean of a fit, and its removal.
+//!
+//! Expand the residual of one point to second order in its error ε (isotropic, variance σ²) and in the error δ of the
+//! fitted freedoms: f = n·ε + J·δ + ½ εᵀHε + εᵀMδ + ½ δᵀGδ. To first order δ is linear in the n·ε alone, with covariance
+//! C. Taking the mean of the normal equations Σ w (∂f/∂δ) f = 0 to second order: nᵀM = 0, since the derivative of a
+//! distance is constant along the normal, and tangential errors do not reach δ, so all terms with M vanish; the terms
+//! with Gδ times the residual cancel, since residuals and estimates of least squares are uncorrelated. There remains
+//!
+//! E δ = −(Σ w JᵀJ)⁻¹ Σ w Jᵀ b,   b = ½ (σ² tr H + tr G C):
+//!
+//! the same as if every distance were too large by b. So b is taken off. For a circle of radius r, σ² tr H / 2 is
+//! σ²/(2r): the essential bias of the geometric fit \[Al-Sharadqah and Chernov 2009\], which does not fall with the number
+//! of points; the second term falls with it and matters on short arcs. Both are taken as second differences over one
+//! standard deviation, so no second derivatives are needed.
+
+use super::Surface;
+use super::solver::FitProblem;
+use super::uncertainty::{Uncertainty, along_axes};
+
+impl Uncertainty {
+    /// b of each observation, m, for errors as large as the residuals say.
+    pub fn bias<M: Surface>(&self, problem: &FitProblem, surface: &M) -> Vec<f64> {
+        let excess = self.excess();
+        let step = excess.sqrt();
+        let moved: Vec<M> = self
+            .deviations
+            .column_iter()
+            .filter(|c| c.norm_squared() > 0.0)
+            .flat_map(|c| [surface.moved(&(c * step)), surface.moved(&(c * -step))])
+            .collect();
+        let of_point = |i: usize| {
+            let o = &problem.observations[i];
+            let here = surface.distance(&o.point);
+            let around = along_axes(o.sigma * step).into_iter().flat_map(|e| [o.point + e, o.point - e]);
+            let by_point: f64 = around.map(|p| surface.distance(&p) - here).sum();
+            let by_surface: f64 = moved.iter().map(|m| m.distance(&o.point) - here).sum();
+            0.5 * (by_point + by_surface)
+        };
+        (0..problem.observations.len()).map(of_point).collect()
+    }
+}

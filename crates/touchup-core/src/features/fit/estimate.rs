@@ -1,0 +1,103 @@
+//! The result of a fit: a surface, and how well each of its numbers is known.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::solver::FreedomMatrix;
+use super::{Freedom, Steps, Surface};
+
+/// A direction is free of what is unknown when less than this share of it lies there; roundings of the eigenvectors stay
+/// far below.
+const KNOWN: f64 = 1e-6;
+
+/// A number with its standard deviation, in the same unit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate {
+    /// The number.
+    pub value: f64,
+    /// Its standard deviation.
+    pub std: f64,
+}
+
+/// What the standard deviations of a fit rest on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SigmaFrom {
+    /// The stated ones: the residuals are not larger, or there are too few groups to ask them. In that case they are
+    /// only stretched by √(χ²/degrees) where that is above 1.
+    Stated,
+    /// The residuals, which are larger than the stated ones explain, at least in some direction.
+    Residuals,
+}
+
+/// A fitted surface.
+#[derive(Clone, Debug)]
+pub struct Fit<M> {
+    /// The surface of least squares, without the bias of curvature.
+    pub surface: M,
+    /// Covariance of its freedoms in their order, m and rad; without those that are undetermined.
+    pub covariance: FreedomMatrix,
+    /// For each observation whether it was kept.
+    pub used: Vec<bool>,
+    /// Root mean square distance of what was kept, m.
+    pub rms: f64,
+    /// Σ w r² of what was kept, where groups count once.
+    pub chi_squared: f64,
+    /// Groups less unknowns: what χ² should be about.
+    pub degrees: usize,
+    /// Groups of which something was kept.
+    pub groups: usize,
+    /// What the covariance rests on.
+    pub sigma_from: SigmaFrom,
+    pub(super) unknown: FreedomMatrix,
+    pub(super) alone: Steps,
+}
+
+impl<M: Surface> Fit<M> {
+    /// Standard deviation of one freedom, m or rad; `None` where the observations do not fix it.
+    pub fn std(&self, freedom: Freedom) -> Option<f64> {
+        self.std_of(&Steps::ith(freedom as usize, 1.0))
+    }
+
+    /// Standard deviation of a number that changes with the freedoms as `by` says; `None` where it is not fixed.
+    pub fn std_of(&self, by: &Steps) -> Option<f64> {
+        let has_all = (0..by.len()).all(|i| by[i] == 0.0 || M::FREE[i]);
+        let scaled = by.component_mul(&self.alone);
+        let is_fixed = (self.unknown * scaled).norm() <= KNOWN * scaled.norm();
+        (has_all && is_fixed).then(|| by.dot(&(self.covariance * by)).max(0.0).sqrt())
+    }
+
+    /// A number with its standard deviation, from its derivatives by the freedoms.
+    pub fn estimate(&self, value: f64, by: &[(Freedom, f64)]) -> Option<Estimate> {
+        let mut steps = Steps::zeros();
+        by.iter().for_each(|(freedom, x)| steps[*freedom as usize] += x);
+        self.std_of(&steps).map(|std| Estimate { value, std })
+    }
+
+    /// The freedoms that the observations do not fix.
+    pub fn undetermined(&self) -> Vec<Freedom> {
+        let is_open = |f: &Freedom| M::FREE[*f as usize] && self.std(*f).is_none();
+        Freedom::ALL.into_iter().filter(is_open).collect()
+    }
+
+    /// Angle by which the axis may be off, rad: root of the sum of both variances.
+    pub fn axis_std(&self) -> Option<f64> {
+        Some(self.std(Freedom::TiltX)?.hypot(self.std(Freedom::TiltY)?))
+    }
+
+    /// Covariance in O of the place where the axis is `height` above the origin of F, m²; none along the axis. `None` where
+    /// it is not fixed.
+    pub fn center_covariance(&self, height: f64) -> Option<Matrix3<f64>> {
+        let lever = |shift: Freedom, tilt: Freedom| {
+            let mut by = Steps::ith(shift as usize, 1.0);
+            if height != 0.0 {
+                by[tilt as usize] = height;
+            }
+            by
+        };
+        let by = [lever(Freedom::X, Freedom::TiltX), lever(Freedom::Y, Freedom::TiltY)];
+        by.iter().try_for_each(|by| self.std_of(by).map(|_| ()))?;
+        let r = self.surface.pose_of().rotation;
+        let axes = [r * Vector3::x(), r * Vector3::y()];
+        let entry = |i: usize, j: usize| axes[i] * axes[j].transpose() * by[i].dot(&(self.covariance * by[j]));
+        Some(entry(0, 0) + entry(0, 1) + entry(1, 0) + entry(1, 1))
+    }
+}

@@ -1,0 +1,112 @@
+//! The fit itself: three rounds that know better and better which observations belong to the surface.
+
+use super::solver::FitProblem;
+use super::uncertainty::Uncertainty;
+use super::{Fit, FitError, FitParams, Observation, Surface};
+
+/// Weight updates in one round; the weights settle long before.
+const MOST_UPDATES: usize = 50;
+/// Weights that change by less than this have settled; the rounds after them need no more.
+const SETTLED_WEIGHT: f64 = 1e-2;
+/// Rounds of rejection; what is kept repeats after two or three.
+const MOST_REJECTIONS: usize = 10;
+/// Median of |x| to standard deviation, for the normal distribution: 1/Φ⁻¹(3/4).
+const MEDIAN_TO_SIGMA: f64 = 1.482_602_218_505_602;
+/// Efficiency of 95 % on normal errors, both.
+const HUBER: f64 = 1.345;
+const TUKEY: f64 = 4.685;
+/// Corrections of the bias by curvature; the second one changes it in the fourth order.
+const DEBIASINGS: usize = 2;
+
+/// Fits a surface to observations, from a first guess.
+///
+/// Huber's weights bring the guess near without being held by outliers, Tukey's biweights drop them; then what lies
+/// beyond `rejection` scaled standard deviations is taken out and the rest is fitted by plain least squares, corrected
+/// for the bias that curvature brings. The scale is the median of the normalised residuals, and never below 1: groups
+/// share errors, so residuals may look smaller than the errors are.
+///
+/// # Errors
+/// [`FitError`]; on NaN, too few observations, and where a needed number is not fixed by them.
+pub fn fit<M: Surface>(guess: &M, observations: &[Observation], params: &FitParams) -> Result<Fit<M>, FitError> {
+    params.check()?;
+    guess.check()?;
+    Observation::check_all(observations)?;
+    let mut problem = FitProblem::new(observations, guess.axis(), params);
+    let all = vec![1.0; observations.len()];
+    enough::<M>(&problem, &all)?;
+    let near = reweighted(&problem, problem.described(guess, &all), huber);
+    let near = reweighted(&problem, near, tukey);
+    let (surface, kept) = rejected(&problem, near, params.rejection)?;
+    let weights = problem.weights(&kept);
+    let mut surface = surface;
+    for _ in 0..DEBIASINGS {
+        problem.shift = Uncertainty::of(&problem, &surface, &kept, params).bias(&problem, &surface);
+        surface = problem.solve(surface, &weights)?;
+    }
+    Uncertainty::of(&problem, &surface, &kept, params).into_fit(&problem, surface, &kept)
+}
+
+/// Refuses fewer observations than unknowns, and those of one group alone.
+fn enough<M: Surface>(problem: &FitProblem, kept: &[f64]) -> Result<(), FitError> {
+    let have = kept.iter().filter(|k| **k > 0.0).count();
+    let known = if problem.known_axis.is_some() { 2 } else { 0 };
+    let unknowns = M::freedom_count() - known;
+    if have < unknowns {
+        return Err(FitError::TooFewObservations { have, given: kept.len(), need: unknowns });
+    }
+    let mut groups = (0..kept.len()).filter(|&i| kept[i] > 0.0).map(|i| problem.group[i]);
+    let first = groups.next();
+    if groups.all(|group| Some(group) == first) { Err(FitError::OneGroup) } else { Ok(()) }
+}
+
+fn huber(z: f64) -> f64 {
+    (HUBER / z.abs().max(HUBER)).min(1.0)
+}
+
+fn tukey(z: f64) -> f64 {
+    (1.0 - (z / TUKEY).powi(2)).max(0.0).powi(2)
+}
+
+/// Scale of normalised residuals, at least 1: from the median of all, as half of them are good.
+fn scale<M: Surface>(z: &[f64]) -> f64 {
+    let mut sizes: Vec<f64> = z.iter().map(|z| z.abs()).collect();
+    let middle = sizes.len() / 2;
+    let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
+    let freedom = z.len() as f64 / (z.len().saturating_sub(M::freedom_count())).max(1) as f64;
+    (MEDIAN_TO_SIGMA * *median * freedom.sqrt()).max(1.0)
+}
+
+/// Steps and weights by turns until both settle. A round that does not is no error: the next one goes on from there.
+fn reweighted<M: Surface>(problem: &FitProblem, mut surface: M, weight: fn(f64) -> f64) -> M {
+    let mut before = vec![0.0; problem.observations.len()];
+    for _ in 0..MOST_UPDATES {
+        let z = problem.normalised(&surface);
+        let scale = scale::<M>(&z);
+        let kept: Vec<f64> = z.iter().map(|z| weight(z / scale)).collect();
+        let change = kept.iter().zip(&before).map(|(a, b): (&f64, &f64)| (a - b).abs()).fold(0.0, f64::max);
+        let Some((next, ..)) = problem.step(&surface, &problem.weights(&kept), 1e-6) else { break };
+        surface = next;
+        if change < SETTLED_WEIGHT {
+            break;
+        }
+        before = kept;
+    }
+    surface
+}
+
+/// Least squares without what lies too far, until the same are kept twice; and which those are (1, others 0).
+fn rejected<M: Surface>(problem: &FitProblem, mut surface: M, rejection: f64) -> Result<(M, Vec<f64>), FitError> {
+    let mut kept = Vec::new();
+    for _ in 0..MOST_REJECTIONS {
+        let z = problem.normalised(&surface);
+        let limit = rejection * scale::<M>(&z);
+        let now: Vec<f64> = z.iter().map(|z| if z.abs() <= limit { 1.0 } else { 0.0 }).collect();
+        if now == kept {
+            break;
+        }
+        enough::<M>(problem, &now)?;
+        surface = problem.solve(problem.described(&surface, &now), &problem.weights(&now))?;
+        kept = now;
+    }
+    Ok((surface, kept))
+}

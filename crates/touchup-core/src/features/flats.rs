@@ -1,0 +1,80 @@
+//! The flat pieces of a drawing: faces that lie in one plane and hang together.
+
+use super::facets::Facets;
+use super::grow::SMOOTH;
+use super::segment::Segmentation;
+
+/// A mesh is a drawing when this share of its faces lies in one plane with a neighbour …
+const DRAWN_SHARE: f64 = 0.2;
+/// … within this, 1 − cos: 0.01°, what single precision makes of small faces.
+const COPLANAR: f64 = 1.5e-8;
+
+/// Flat pieces, each found when it is asked for.
+#[derive(Clone, Debug)]
+pub(super) struct Flats {
+    /// number of the piece of each face, as far as they are known
+    of_face: Vec<u32>,
+    flats: Vec<FlatPiece>,
+}
+
+/// A flat piece.
+#[derive(Clone, Debug)]
+pub(super) struct FlatPiece {
+    pub faces: Vec<u32>,
+    /// m²
+    pub area: f64,
+}
+
+impl Flats {
+    /// `None` for a mesh that is no drawing.
+    pub fn of(facets: &Facets) -> Option<Self> {
+        let of_face = || vec![Segmentation::NONE; facets.slots()];
+        is_drawn(facets).then(|| Self { of_face: of_face(), flats: Vec::new() })
+    }
+
+    /// That of a face.
+    pub fn at(&mut self, facets: &Facets, face: u32) -> &FlatPiece {
+        let known = self.of_face[face as usize];
+        let number = if known == Segmentation::NONE { self.add(facets, face) } else { known };
+        &self.flats[number as usize]
+    }
+
+    fn add(&mut self, facets: &Facets, seed: u32) -> u32 {
+        let (normal, number) = (facets.normal(seed), self.flats.len() as u32);
+        self.of_face[seed as usize] = number;
+        let (mut faces, mut at) = (vec![seed], 0);
+        while at < faces.len() {
+            for (_, other) in facets.beside(faces[at]) {
+                let is_new = self.of_face[other as usize] == Segmentation::NONE;
+                if is_new && 1.0 - normal.dot(&facets.normal(other)) < COPLANAR {
+                    self.of_face[other as usize] = number;
+                    faces.push(other);
+                }
+            }
+            at += 1;
+        }
+        self.flats.push(FlatPiece { area: facets.area_of(&faces), faces });
+        number
+    }
+}
+
+impl FlatPiece {
+    /// The faces in which it goes on without an edge.
+    pub fn beside<'a>(&'a self, facets: &'a Facets) -> impl Iterator<Item = u32> + 'a {
+        let normal = facets.normal(self.faces[0]);
+        let beside = self.faces.iter().flat_map(|&face| facets.beside(face)).map(|(_, other)| other);
+        beside.filter(move |&other| (COPLANAR..1.0 - SMOOTH).contains(&(1.0 - normal.dot(&facets.normal(other)))))
+    }
+}
+
+/// Whether neighbours lie in one plane as they do in a drawing, and in no measurement.
+fn is_drawn(facets: &Facets) -> bool {
+    let all = facets.areas.iter().filter(|&&area| area > 0.0).count();
+    let is_coplanar = |&face: &u32| {
+        let is_alike = |other: u32| 1.0 - facets.normal(face).dot(&facets.normal(other)) < COPLANAR;
+        facets.area(face) > 0.0 && facets.beside(face).any(|(_, other)| is_alike(other))
+    };
+    // no more are looked at than it takes
+    let enough = (DRAWN_SHARE * all as f64) as usize + 1;
+    (0..facets.slots() as u32).filter(is_coplanar).take(enough).count() == enough
+}

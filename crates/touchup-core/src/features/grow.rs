@@ -1,0 +1,551 @@
+//! Parts a mesh into planes and cylinders; cones are found beside holes, once those are known.
+//!
+//! From the flattest faces on, each free face is the seed of a region: a plane or a cylinder is fitted to the faces around
+//! it and grows over neighbours whose corners lie on it and which face as it does. Where a plane ends without an edge it may
+//! be a strip of something round: then whatever explains more of the surface is taken.
+
+use nalgebra::{Point3, Vector3};
+
+use super::facets::{Facets, NONE};
+use super::flats::{FlatPiece, Flats};
+use super::marks::sort;
+use super::primitive::{Moments, NormalSpread, Primitive, cylinder_of, refined};
+use super::segment::{Segment, Segmentation};
+use crate::mesh::{FaceId, VertexId, median};
+
+/// Lengths that come with the mesh.
+#[derive(Clone, Copy, Debug)]
+struct MeshScale {
+    /// m
+    diagonal: f64,
+    /// median, m
+    edge: f64,
+}
+
+/// Rounding of coordinates that were stored in single precision, in diagonals.
+const ROUNDING: f64 = 1e-6;
+/// Waves of a surface that is good otherwise, in median edges.
+const WAVES: f64 = 0.05;
+/// The same, at most, in diagonals of the mesh.
+const WAVES_OF_ALL: f64 = 3e-4;
+/// From one tolerance to the next.
+const WIDER: f64 = 3.0;
+/// How often.
+const RUNGS: i32 = 3;
+/// A corner is off by at most so many root mean squares of the faces around the seed.
+const SPREAD: f64 = 4.0;
+/// Largest tolerance of a round surface, in its radii.
+const SHARPNESS: f64 = 0.08;
+/// So many faces tell a plane while it grows.
+const MOST_OF_PLANE: usize = 20_000;
+/// A primitive has settled when it moves by less than this share of the tolerance …
+const SETTLED: f64 = 0.1;
+/// … at so many faces.
+const SAMPLE: usize = 64;
+/// A region is at least so many tolerances wide.
+const LEAST_WIDTH: f64 = 12.0;
+/// Across a sharper edge than this no region grows, and a normal may be off by no more: half of a polygon of 9 sides. 40°.
+pub(super) const SMOOTH: f64 = 0.766;
+/// A face's normal may be off that of the primitive by this much: 25°.
+const ALIKE: f64 = 0.906;
+/// A segment of which stronger ones leave less than this is none.
+const LEAST_LEFT: f64 = 0.3;
+/// Faces around a seed, to begin with.
+const NEAR: usize = 16;
+/// Root mean square of the normals' sines around a flat seed: 5°.
+const FLAT: f64 = 0.09;
+/// A flat piece that goes on in round ones is so many times larger than their facets.
+const FLAT_AMONG_ROUND: f64 = 20.0;
+/// … and than the flat pieces of which those may be made.
+const FLAT_BESIDE_FLAT: f64 = 5.0;
+/// The same around the seed of a cylinder, at least: 5° is what 17° of its turn have.
+const BENT: f64 = 0.09;
+/// A region is a plane without asking further when less than this share of its border goes on smoothly.
+const BOUNDED: f64 = 0.2;
+/// A curved surface must explain so much more than the plane in its place.
+const MORE: f64 = 1.3;
+/// Faces around the seed of a curved surface, in turn.
+const CURVED_NEAR: [usize; 3] = [12, 32, 90];
+/// Room for as many is made at once.
+const USUAL_NEAR: usize = 100;
+/// Beyond a plane it is looked at so many faces …
+const MOST_NEAR: usize = 50_000;
+/// … and so many of them are fitted.
+const MOST_FITTED: usize = 300;
+
+impl Segmentation {
+    /// Parts `mesh`.
+    pub(super) fn of(facets: &Facets) -> Self {
+        let mut growing = Growing::of(facets);
+        let mut seeds = growing.seeds();
+        let mut flats = Flats::of(facets);
+        for (closeness, tolerance) in growing.scale.tolerances(flats.is_some()) {
+            (growing.closeness, growing.tolerance) = (closeness, tolerance);
+            seeds.retain(|&face| growing.is_free(face) && facets.area(face) > 0.0);
+            for &face in &seeds {
+                if growing.is_free(face) && growing.needs[face as usize] <= closeness {
+                    growing.grow_from(face, flats.as_mut());
+                }
+            }
+            if let Some(flats) = flats.as_mut().filter(|_| growing.is_exact()) {
+                growing.take_flat(&seeds, flats);
+            }
+        }
+        growing.finish()
+    }
+}
+
+struct Growing<'a> {
+    facets: &'a Facets<'a>,
+    scale: MeshScale,
+    of_face: Vec<u32>,
+    segments: Vec<Segment>,
+    /// the round in which a face was last looked at
+    seen: Vec<u32>,
+    round: u32,
+    /// what a region from here would need, as far as that is known, m
+    needs: Vec<f64>,
+    /// how near the faces around a seed have to be in this round, m
+    closeness: f64,
+    /// how near the others, m
+    tolerance: f64,
+}
+
+/// A region before it is accepted.
+struct DraftRegion {
+    primitive: Primitive,
+    faces: Vec<u32>,
+    area: f64,
+    tolerance: f64,
+}
+
+impl<'a> Growing<'a> {
+    fn of(facets: &'a Facets<'a>) -> Self {
+        let slots = facets.slots();
+        Self {
+            facets,
+            scale: MeshScale::of(facets),
+            of_face: vec![Segmentation::NONE; slots],
+            segments: Vec::new(),
+            seen: vec![0; slots],
+            round: 0,
+            needs: vec![0.0; slots],
+            closeness: 0.0,
+            tolerance: 0.0,
+        }
+    }
+
+    /// Faces by how flat their surroundings are, in order of id where they are alike.
+    fn seeds(&self) -> Vec<u32> {
+        const BUCKETS: usize = 16;
+        let (mut bucket_of, mut ends) = (Vec::with_capacity(self.facets.slots()), [0; BUCKETS]);
+        for (face, normal) in self.facets.normals.iter().enumerate() {
+            let turns = self.facets.beside(face as u32).map(|(_, other)| 1.0 - normal.dot(&self.facets.normal(other)));
+            let sharpest = turns.fold(0.0, f64::max);
+            // 1 − cos: a bucket for each power of two above a thousandth of a degree
+            let at = power_of_two((sharpest / 1.5e-10).max(1.0)) / 2;
+            bucket_of.push(at.min(BUCKETS - 1) as u8);
+            ends[at.min(BUCKETS - 1)] += 1;
+        }
+        let mut starts = ends.iter().scan(0, |end, count| Some(std::mem::replace(end, *end + count)));
+        let mut places: [usize; BUCKETS] = std::array::from_fn(|_| starts.next().unwrap_or(0));
+        let mut seeds = vec![0; bucket_of.len()];
+        for (face, &bucket) in bucket_of.iter().enumerate() {
+            seeds[places[bucket as usize]] = face as u32;
+            places[bucket as usize] += 1;
+        }
+        seeds
+    }
+
+    /// Free faces around `seed` that are reached over smooth edges, the nearest first.
+    fn near(&mut self, seed: u32, most: usize) -> Vec<u32> {
+        self.round += 1;
+        // of the last face all neighbours may come
+        let mut found = Vec::with_capacity(most.min(USUAL_NEAR) + 2);
+        found.push(seed);
+        self.seen[seed as usize] = self.round;
+        let mut at = 0;
+        while at < found.len() && found.len() < most {
+            let face = found[at];
+            at += 1;
+            for (_, other) in self.facets.beside(face) {
+                let is_new = self.seen[other as usize] != self.round && self.is_free(other);
+                if is_new && self.facets.normal(face).dot(&self.facets.normal(other)) > SMOOTH {
+                    self.seen[other as usize] = self.round;
+                    found.push(other);
+                }
+            }
+        }
+        found
+    }
+
+    fn is_free(&self, face: u32) -> bool {
+        self.of_face[face as usize] == Segmentation::NONE
+    }
+
+    fn grow_from(&mut self, seed: u32, flats: Option<&mut Flats>) {
+        let near = self.near(seed, NEAR);
+        let Some(bend) = NormalSpread::of(self.facets, &near) else { return };
+        let mut needs = f64::INFINITY;
+        let mut best = None;
+        if bend.spread < FLAT {
+            best = self.plane_from(seed, &near, &mut needs);
+        }
+        if let Some(flats) = flats.filter(|_| best.is_none() && self.is_exact()) {
+            best = self.flat_from(flats.at(self.facets, seed));
+        }
+        let is_bounded = best.as_ref().is_some_and(|plane| self.smooth_share(plane) < BOUNDED);
+        if !is_bounded {
+            let enough = best.as_ref().map_or(0.0, |plane| MORE * plane.area);
+            let faces = best.as_ref().map_or(0, |plane| plane.faces.len());
+            let is_more = |curved: &DraftRegion| curved.area > enough;
+            let mut curved = self.cylinder_from(seed, faces, &mut needs).filter(is_more);
+            if curved.is_none() && faces > 0 && self.is_exact() {
+                // facets of a drawing that were divided further lie off the circle
+                let exact = (self.closeness, self.tolerance);
+                (self.closeness, self.tolerance) = self.scale.divided();
+                curved = self.cylinder_from(seed, faces, &mut needs).filter(is_more);
+                (self.closeness, self.tolerance) = exact;
+            }
+            best = curved.or(best);
+        }
+        match best.filter(|best| self.is_wide(best)) {
+            Some(region) => self.accept(region),
+            // what was tried in vain is tried again with more tolerance
+            None => {
+                let needs = needs.max(self.closeness * (1.0 + f64::EPSILON));
+                near.iter().for_each(|&face| self.needs[face as usize] = needs);
+            }
+        }
+    }
+
+    fn accept(&mut self, region: DraftRegion) {
+        let DraftRegion { primitive, mut faces, area, tolerance } = region;
+        sort(&mut faces, self.of_face.len());
+        for &face in &faces {
+            self.of_face[face as usize] = self.segments.len() as u32;
+        }
+        let is_exact = tolerance <= self.scale.exact();
+        self.segments.push(Segment { primitive, faces, area, tolerance, is_exact });
+    }
+
+    fn plane_from(&mut self, seed: u32, near: &[u32], needs: &mut f64) -> Option<DraftRegion> {
+        let mut moments = Moments::about(self.facets.triangle(seed)[0]);
+        near.iter().for_each(|&face| moments.add(self.facets, face));
+        let start = moments.plane()?;
+        self.is_close(&start, near, needs).then_some(())?;
+        self.grown(seed, start, near.len())
+    }
+
+    /// Whether only what a drawing has is taken in this round.
+    fn is_exact(&self) -> bool {
+        self.tolerance <= self.scale.exact()
+    }
+
+    /// A flat piece of a drawing, where it goes on in round ones, of facets much smaller than it is.
+    fn flat_from(&mut self, flat: &FlatPiece) -> Option<DraftRegion> {
+        let (facets, seed) = (self.facets, flat.faces[0]);
+        let largest = flat.beside(facets).map(|face| facets.area(face)).fold(0.0, f64::max);
+        let mut moments = Moments::about(facets.triangle(seed)[0]);
+        moments.add(facets, seed);
+        if flat.area > FLAT_AMONG_ROUND * largest { self.grown(seed, moments.plane()?, flat.faces.len()) } else { None }
+    }
+
+    /// Takes the flat pieces of a drawing that are left between its round ones: what is beside may have kept a seed from
+    /// being tried.
+    fn take_flat(&mut self, seeds: &[u32], flats: &mut Flats) {
+        for &seed in seeds {
+            if !self.is_free(seed) {
+                continue;
+            }
+            let flat = flats.at(self.facets, seed);
+            // each once
+            if flat.faces.len() < 2 || flat.faces[0] != seed {
+                continue;
+            }
+            let flat = flat.clone();
+            // of something round that was divided further, what is beside is as large
+            let is_large = |face: u32| FLAT_BESIDE_FLAT * flats.at(self.facets, face).area > flat.area;
+            if flat.beside(self.facets).any(is_large) {
+                continue;
+            }
+            if let Some(region) = self.flat_from(&flat).filter(|region| self.is_wide(region)) {
+                self.accept(region);
+            }
+        }
+    }
+
+    fn is_wide(&self, region: &DraftRegion) -> bool {
+        region.area > (LEAST_WIDTH * self.tolerance).powi(2)
+    }
+
+    /// The largest cylinder through the faces around a seed.
+    ///
+    /// - `plane`: number of faces of the plane that was found there.
+    fn cylinder_from(&mut self, seed: u32, plane: usize, needs: &mut f64) -> Option<DraftRegion> {
+        let mut best: Option<DraftRegion> = None;
+        let (mut before, mut is_all) = (0, false);
+        for most in CURVED_NEAR.into_iter().chain([(3 * plane + 24).min(MOST_NEAR)]) {
+            if is_all || most <= before {
+                continue;
+            }
+            let mut near = self.near(seed, most);
+            is_all = near.len() < most;
+            if near.len() <= before {
+                continue;
+            }
+            before = near.len();
+            let step = before.div_ceil(MOST_FITTED);
+            if step > 1 {
+                near = near.into_iter().step_by(step).collect();
+            }
+            let bend = NormalSpread::of(self.facets, &near).filter(|bend| bend.spread > BENT);
+            let Some(axis) = bend.and_then(|bend| bend.cylinder_axis()) else { continue };
+            let start = cylinder_of(self.facets, &near, &axis);
+            let Some(start) = start.and_then(|start| refined(&start, self.facets, &near)) else { continue };
+            if !self.is_close(&start, &near, needs) {
+                continue;
+            }
+            let Some(region) = self.grown(seed, start, before) else { continue };
+            // any facet lies on some cylinder
+            if NormalSpread::of(self.facets, &region.faces).is_none_or(|bend| bend.spread < BENT) {
+                continue;
+            }
+            if best.as_ref().is_none_or(|best| region.area > best.area) {
+                best = Some(region);
+            }
+        }
+        best
+    }
+
+    /// Whether corners of `near` are as near as the tolerance wants them; else tells what they need.
+    fn is_close(&self, primitive: &Primitive, near: &[u32], needs: &mut f64) -> bool {
+        let squares = near.iter().flat_map(|&face| self.facets.triangle(face)).map(|p| primitive.distance(&p).powi(2));
+        let needed = SPREAD * (squares.sum::<f64>() / (3 * near.len()) as f64).sqrt();
+        *needs = needs.min(needed);
+        needed <= self.closeness
+    }
+
+    /// The region around `seed` that a primitive explains, and the primitive through all of it.
+    ///
+    /// - `near`: from how many faces around the primitive comes.
+    fn grown(&mut self, seed: u32, start: Primitive, near: usize) -> Option<DraftRegion> {
+        let mut primitive = start;
+        let mut faces = Vec::new();
+        for _ in 0..2 {
+            if !self.belongs(seed, &primitive) {
+                return None;
+            }
+            faces = self.flood(vec![seed], &mut primitive, near);
+            let used = primitive;
+            primitive = self.fitted(&used, &faces)?;
+            if matches!(used, Primitive::Plane { .. }) && self.is_settled(&used, &primitive, &faces) {
+                break;
+            }
+        }
+        if matches!(primitive, Primitive::Cylinder { radius, .. } if self.closeness > SHARPNESS * radius) {
+            return None;
+        }
+        let area = self.facets.area_of(&faces);
+        Some(DraftRegion { primitive, faces, area, tolerance: self.tolerance })
+    }
+
+    /// Goes from the faces of `found` over all that belong to the primitive, which follows them each time their number has
+    /// doubled.
+    ///
+    /// - `fitted`: how many faces tell the primitive already; fewer of them may be flat by themselves.
+    fn flood(&mut self, mut found: Vec<u32>, primitive: &mut Primitive, fitted: usize) -> Vec<u32> {
+        self.round += 1;
+        found.iter().for_each(|&face| self.seen[face as usize] = self.round);
+        let (mut at, mut refit_at) = (0, 2 * found.len().max(fitted));
+        while at < found.len() {
+            let face = found[at];
+            at += 1;
+            for (_, other) in self.facets.beside(face) {
+                if self.seen[other as usize] == self.round || !self.is_free(other) {
+                    continue;
+                }
+                self.seen[other as usize] = self.round;
+                if self.belongs(other, primitive) {
+                    found.push(other);
+                }
+            }
+            if found.len() >= refit_at {
+                refit_at *= 2;
+                if let Some(better) = self.fitted(primitive, &found) {
+                    *primitive = better;
+                }
+            }
+        }
+        found
+    }
+
+    /// Whether two primitives are the same on a sample of faces, as far as the tolerance goes.
+    fn is_settled(&self, one: &Primitive, other: &Primitive, faces: &[u32]) -> bool {
+        faces.iter().step_by(faces.len().div_ceil(SAMPLE)).all(|&face| {
+            let p = self.facets.triangle(face)[0];
+            (one.distance(&p) - other.distance(&p)).abs() < SETTLED * self.tolerance
+        })
+    }
+
+    fn belongs(&self, face: u32, primitive: &Primitive) -> bool {
+        belongs(self.facets, face, primitive, self.tolerance)
+    }
+
+    fn fitted(&self, primitive: &Primitive, faces: &[u32]) -> Option<Primitive> {
+        if let Primitive::Plane { point, .. } = primitive {
+            let mut moments = Moments::about(*point);
+            let step = faces.len().div_ceil(MOST_OF_PLANE);
+            faces.iter().step_by(step).for_each(|&face| moments.add(self.facets, face));
+            return moments.plane();
+        }
+        refined(primitive, self.facets, faces)
+    }
+
+    /// How much of a region's border goes on without an edge.
+    fn smooth_share(&mut self, region: &DraftRegion) -> f64 {
+        self.round += 1;
+        region.faces.iter().for_each(|&face| self.seen[face as usize] = self.round);
+        let (mut smooth, mut all) = (0.0, f64::MIN_POSITIVE);
+        for &face in &region.faces {
+            for edge in 0..3 {
+                let other = self.facets.beside[face as usize][edge];
+                if other != NONE && self.seen[other as usize] == self.round {
+                    continue;
+                }
+                let [a, b] = self.facets.edge(face, edge);
+                let length = (a - b).norm();
+                all += length;
+                let goes_on = |other: u32| self.facets.normal(face).dot(&self.facets.normal(other)) > SMOOTH;
+                if other != NONE && goes_on(other) {
+                    smooth += length;
+                }
+            }
+        }
+        smooth / all
+    }
+
+    /// Parts the mesh once more: tight and large segments take what they explain of loose and small ones.
+    fn claim(&mut self) {
+        let mut order = std::mem::take(&mut self.segments);
+        order.sort_by(|a, b| a.tolerance.total_cmp(&b.tolerance).then(b.area.total_cmp(&a.area)));
+        self.of_face.fill(Segmentation::NONE);
+        for segment in order {
+            self.tolerance = segment.tolerance;
+            let mut left: Vec<u32> = segment.faces.iter().copied().filter(|&face| self.is_free(face)).collect();
+            if left.is_empty() {
+                continue;
+            }
+            let mut primitive = segment.primitive;
+            if left.len() < segment.faces.len() {
+                match self.fitted(&primitive, &left) {
+                    Some(fitted) => primitive = fitted,
+                    None => continue,
+                }
+            }
+            left.retain(|&face| self.belongs(face, &primitive));
+            let fitted = left.len();
+            let faces = self.flood(left, &mut primitive, fitted);
+            let area = self.facets.area_of(&faces);
+            if area < LEAST_LEFT * segment.area || area < (LEAST_WIDTH * self.tolerance).powi(2) {
+                continue;
+            }
+            let primitive = self.fitted(&primitive, &faces).unwrap_or(primitive);
+            self.accept(DraftRegion { primitive, faces, area, tolerance: segment.tolerance });
+        }
+    }
+
+    fn finish(mut self) -> Segmentation {
+        self.claim();
+        let Self { mut segments, mut of_face, .. } = self;
+        segments.sort_by(|a, b| b.area.total_cmp(&a.area));
+        for (number, segment) in segments.iter().enumerate() {
+            segment.faces.iter().for_each(|&face| of_face[face as usize] = number as u32);
+        }
+        Segmentation { segments, of_face }
+    }
+}
+
+/// Whether a face lies on the primitive within `tolerance` (m) and faces as it does.
+pub(super) fn belongs(facets: &Facets, face: u32, primitive: &Primitive, tolerance: f64) -> bool {
+    let normal = match primitive {
+        // most are planes: no more is loaded and reckoned than they need
+        Primitive::Plane { point, normal } => {
+            let off = |&vertex: &VertexId| (facets.mesh.position(vertex) - point).dot(normal).abs();
+            if facets.mesh.corners(FaceId(face)).iter().any(|vertex| off(vertex) > tolerance) {
+                return false;
+            }
+            *normal
+        }
+        curved => {
+            let [a, b, c] = facets.triangle(face);
+            if [a, b, c].iter().any(|p| curved.distance(p).abs() > tolerance) {
+                return false;
+            }
+            curved.normal_at(&Point3::from((a.coords + b.coords + c.coords) / 3.0))
+        }
+    };
+    if facets.normal(face).dot(&normal) > ALIKE {
+        return true;
+    }
+    let corners = facets.triangle(face);
+    // the normal of a sliver says nothing
+    let longest = (0..3).map(|i| (corners[i] - corners[(i + 1) % 3]).norm()).fold(0.0, f64::max);
+    2.0 * facets.area(face) < tolerance * longest
+}
+
+/// The largest power of two, as its exponent, that is not above `x`, from 1 on.
+fn power_of_two(x: f64) -> usize {
+    (x.to_bits() >> (f64::MANTISSA_DIGITS - 1)) as usize - (f64::MAX_EXP - 1) as usize
+}
+
+impl MeshScale {
+    fn of(facets: &Facets) -> Self {
+        let [lo, hi] = facets.mesh.bounds();
+        Self { diagonal: (hi - lo).norm(), edge: median_edge(facets) }
+    }
+
+    /// How near the faces around a seed have to be, and how near the rest. Tight ones first: what they explain is not left
+    /// to loose ones.
+    ///
+    /// - `is_drawn`: whether neighbours lie in one plane as they do in a drawing.
+    fn tolerances(&self, is_drawn: bool) -> Vec<(f64, f64)> {
+        let (exact, (closeness, tolerance)) = (self.exact(), self.waves());
+        let wider = |rung| f64::powi(WIDER, rung);
+        let loose = (0..RUNGS).map(|rung| (closeness * wider(rung), tolerance * wider(rung)));
+        is_drawn.then_some((exact, exact)).into_iter().chain(loose).collect()
+    }
+
+    /// What a drawing needs, m.
+    fn exact(&self) -> f64 {
+        ROUNDING * self.diagonal
+    }
+
+    /// What the facets of a drawing need that were divided further.
+    fn divided(&self) -> (f64, f64) {
+        let closeness = WAVES_OF_ALL * self.diagonal;
+        (closeness, WIDER * closeness)
+    }
+
+    /// What surfaces that are good but no drawing need.
+    fn waves(&self) -> (f64, f64) {
+        let closeness = (WAVES * self.edge).min(WAVES_OF_ALL * self.diagonal).max(self.exact());
+        (closeness, WIDER * closeness)
+    }
+}
+
+/// Median over a sample of the first edges of faces, m.
+pub(super) fn median_edge(facets: &Facets) -> f64 {
+    let count = facets.slots();
+    let step = (count / 10_000).max(1);
+    let mut lengths: Vec<f64> = (0..count)
+        .step_by(step)
+        .filter(|&face| facets.areas[face] > 0.0)
+        .map(|face| facets.edge(face as u32, 0))
+        .map(|[a, b]: [Point3<f64>; 2]| -> f64 {
+            let v: Vector3<f64> = b - a;
+            v.norm()
+        })
+        .collect();
+    median(&mut lengths).unwrap_or(0.0)
+}

@@ -1,0 +1,323 @@
+//! Round holes and bosses: round walls that have nothing, or material, inside.
+
+use nalgebra::{Point3, Vector3};
+
+use super::primitive::{Primitive, Side, square_to};
+use super::scene::{Parted, along_to_plane};
+use super::walls::Wall;
+use crate::mesh::{BoxQuery, FaceId};
+
+/// A round hole.
+#[derive(Clone, Debug)]
+pub(super) struct Hole {
+    /// number of its wall
+    pub wall: usize,
+    /// where the axis leaves through the opening, m, in O
+    pub opening: Point3<f64>,
+    /// unit vector out of the opening
+    pub out: Vector3<f64>,
+    /// m
+    pub depth: f64,
+    /// `None`: what closes it is neither a floor nor the tip of a drill, or the mesh ends there
+    pub through: Option<bool>,
+    /// number of the plane around the opening
+    pub rim: Option<usize>,
+    /// number of the plane that is its floor
+    pub floor: Option<usize>,
+    /// number of the wall that is its countersink
+    pub countersink: Option<usize>,
+}
+
+/// A round boss.
+#[derive(Clone, Debug)]
+pub(super) struct Boss {
+    pub wall: usize,
+    /// middle of the foot, m, in O
+    pub foot: Point3<f64>,
+    /// unit vector from foot to top
+    pub out: Vector3<f64>,
+    /// m
+    pub height: f64,
+    /// numbers of the planes
+    pub base: usize,
+    pub top: Option<usize>,
+}
+
+/// A wall around a hole covers at least this share of a turn: with a keyway or a slit it is a hole still.
+const HOLE_COVERAGE: f64 = 0.6;
+/// That of a boss.
+const BOSS_COVERAGE: f64 = 0.75;
+/// Faces cover at least this share of what a wall is between its ends.
+const FILLED: f64 = 0.4;
+/// A wall is the rest of another when it is so much smaller …
+const SMALLER: f64 = 0.5;
+/// … place and radius agree within this share of the radius …
+const REST: f64 = 0.3;
+/// … and its axis is off by more than 6°, or its radius by nothing.
+const STRAIGHT: f64 = 0.9945;
+/// Least height of a wall, in radii: a rim rounded by noise is lower.
+const LEAST_HEIGHT: f64 = 0.08;
+/// So much of the radius around the axis is free in a hole.
+const FREE: f64 = 0.5;
+/// Points of the axis that are looked at.
+const PROBES: usize = 7;
+/// What closes a hole is no farther from the end of its wall than this many radii.
+const CLOSED: f64 = 1.0;
+/// Where no plane is around an end and something is met within this many radii, the wall may go on to there unseen.
+const MAYBE_CLOSED: f64 = 3.0;
+/// Lines that look for what closes a hole are this share of the radius beside its axis.
+const ASIDE: f64 = 0.05;
+/// Rings around an opening, in its radii: the land beside a hole may be narrow.
+const RINGS: [f64; 3] = [1.06, 1.15, 1.3];
+/// Those around a foot that was scanned or touched: a ball does not reach into its corner.
+const FOOT_RINGS: [f64; 3] = [1.2, 1.35, 1.5];
+/// A plane around an opening is within this many radii of the end of the wall.
+const NEAR_END: f64 = 0.4;
+/// Share of the rings that a plane has to have.
+const RIM: f64 = 0.2;
+/// A floor is square to the axis within 20°.
+const SQUARE: f64 = 0.94;
+/// An end is torn by borders of the mesh from so many radii before it to so many behind it, and as far around it.
+const TORN: [f64; 2] = [0.5, 1.5];
+/// Directions in which an end is looked at.
+const AROUND: usize = 24;
+/// Walls of one hole are no farther apart along the axis than this many radii.
+const SAME_HOLE: f64 = 0.5;
+/// Axes of one stepped hole are no farther apart than this share of the radius.
+const SAME_AXIS: f64 = 0.15;
+/// Heads of countersunk screws are 1.8 to 2 times as wide as their holes, broken edges seldom more than 1.1 times.
+const HEAD: f64 = 1.25;
+
+/// One end of a wall.
+#[derive(Clone, Copy, Debug)]
+struct WallEnd {
+    /// along the axis of the wall, m
+    t: f64,
+    /// out of the hole, ±1 times the axis
+    out: f64,
+    /// what closes it, along the axis, m
+    closed_at: Option<f64>,
+    /// whether nothing closes it, or may do so farther away
+    is_open: bool,
+    /// the plane around it and its share of the ring
+    rim: Option<(usize, f64)>,
+}
+
+/// All round holes.
+pub(super) fn holes(parted: &Parted, walls: &[Wall]) -> Vec<Hole> {
+    let is_hole = |wall: &Wall| wall.side() == Side::Hole && !wall.is_cone();
+    let found: Vec<Hole> =
+        (0..walls.len()).filter(|&at| is_hole(&walls[at])).filter_map(|at| hole(parted, walls, at)).collect();
+    let is_rest = |hole: &Hole| found.iter().any(|other| is_rest_of(parted, &walls[hole.wall], &walls[other.wall]));
+    found.iter().filter(|hole| !is_rest(hole)).cloned().collect()
+}
+
+/// Whether a wall is what a better one leaves of the same hole: where it was hardly touched it is crooked.
+fn is_rest_of(parted: &Parted, wall: &Wall, better: &Wall) -> bool {
+    let (rest, whole) = (parted.segment(wall.segments[0]), parted.segment(better.segments[0]));
+    let v = wall.at(wall.middle()) - better.origin;
+    let along = v.dot(&better.axis);
+    let aside = (v - better.axis * along).norm();
+    let beyond = (better.ends[0] - along).max(along - better.ends[1]);
+    let wider = (wall.radius() - better.radius()).abs();
+    // a step of the hole would be straight, and of another radius
+    let is_crooked = wall.axis.dot(&better.axis).abs() < STRAIGHT;
+    !rest.is_exact
+        && rest.area < SMALLER * whole.area
+        && (is_crooked || wider < rest.tolerance)
+        && wider.max(aside) < REST * better.radius()
+        && beyond < better.radius() + wall.height()
+}
+
+fn hole(parted: &Parted, walls: &[Wall], at: usize) -> Option<Hole> {
+    let wall = &walls[at];
+    let radius = wall.radius();
+    let is_whole = wall.coverage >= HOLE_COVERAGE && wall.filled >= FILLED;
+    if !is_whole || wall.height() < LEAST_HEIGHT * radius || !is_free(parted, wall) {
+        return None;
+    }
+    let ends = [end(parted, wall, 0), end(parted, wall, 1)];
+    let open = match ends.map(|end| end.closed_at.is_none()) {
+        [false, false] => return None,
+        [true, false] => 0,
+        [false, true] => 1,
+        [true, true] => usize::from(openness(walls, at, &ends[1]) > openness(walls, at, &ends[0])),
+    };
+    let (open, other) = (ends[open], ends[1 - open]);
+    let on_plane = |end: &WallEnd| {
+        let (number, _) = end.rim?;
+        let t = along_to_plane(&parted.segment(number).primitive, &wall.origin, &wall.axis)?;
+        ((t - end.t).abs() < NEAR_END * radius).then_some((number, t))
+    };
+    let rim = on_plane(&open);
+    let top = rim.map_or(open.t, |(_, t)| t);
+    let tip = cone_beside(walls, at, &other).filter(|&cone| walls[cone].axis.dot(&wall.axis) * other.out < 0.0);
+    let (bottom, floor) = match other.closed_at {
+        // the tip of a drill: the depth is that of the cylinder
+        Some(_) if tip.is_some() => (other.t, None),
+        Some(t) => match floor_at(parted, wall, t) {
+            Some(floor) => (t, Some(floor)),
+            None => (other.t, None),
+        },
+        None => (on_plane(&other).map_or(other.t, |(_, t)| t), None),
+    };
+    Some(Hole {
+        wall: at,
+        opening: wall.at(top),
+        out: wall.axis * open.out,
+        depth: (top - bottom).abs(),
+        through: match other.closed_at {
+            None => (other.is_open && !is_torn(parted, wall, &other)).then_some(true),
+            Some(_) => (floor.is_some() || tip.is_some()).then_some(false),
+        },
+        rim: rim.map(|(number, _)| number),
+        floor,
+        countersink: cone_beside(walls, at, &open).filter(|&cone| is_countersink(&walls[cone], wall, open.out)),
+    })
+}
+
+/// Whether there is nothing around the axis.
+fn is_free(parted: &Parted, wall: &Wall) -> bool {
+    let around = parted.around(wall.segments[0]);
+    let free = (1..PROBES).filter(|&i| {
+        let p = wall.at(wall.ends[0] + wall.height() * i as f64 / PROBES as f64);
+        around.closest(&p, FREE * wall.radius()).is_none()
+    });
+    // a lid that the scanner saw, or a chip, may close a part of it
+    2 * free.count() >= PROBES
+}
+
+fn end(parted: &Parted, wall: &Wall, which: usize) -> WallEnd {
+    let (t, out) = (wall.ends[which], if which == 0 { -1.0 } else { 1.0 });
+    let radius = wall.radius();
+    let middle = wall.middle();
+    let around = parted.around(wall.segments[0]);
+    let rings = RINGS.map(|ring| ring * radius);
+    let rim = parted.plane_around(&around, &wall.at(t), &(wall.axis * out), &rings, NEAR_END * radius);
+    let rim = rim.filter(|&(_, share)| share > RIM);
+    let reach = [CLOSED, MAYBE_CLOSED].map(|radii| wall.height() / 2.0 + radii * radius);
+    // beside the axis: on it lie the tips of cones and the edges of floors, which a line may slip through
+    let [e, g] = square_to(&wall.axis);
+    let mut rays = around.rays(radius);
+    let mut met = [0.4f64, 2.5, 4.6].map(|turn| {
+        let aside = (e * turn.cos() + g * turn.sin()) * (ASIDE * radius);
+        rays.first(&(wall.at(middle) + aside), &(wall.axis * out), reach[1]).map_or(f64::INFINITY, |met| met.distance)
+    });
+    met.sort_by(f64::total_cmp);
+    let closed_at = (met[1] <= reach[0]).then(|| middle + out * met[1]);
+    let is_open = closed_at.is_none() && (rim.is_some() || met[1].is_infinite());
+    WallEnd { t, out, closed_at, is_open, rim }
+}
+
+/// Whether the mesh ends there: what the wall goes on in was not seen and not felt. Where a plane is around the end, the
+/// border has to be as long as half of the turn.
+fn is_torn(parted: &Parted, wall: &Wall, end: &WallEnd) -> bool {
+    let (middle, [e, g]) = (wall.at(end.t), square_to(&wall.axis));
+    let near = TORN.map(|radii| radii * wall.radius());
+    // of a box that holds all of them, however the axis lies
+    let reach = Vector3::repeat(near[1] * f64::sqrt(2.0));
+    let mut found = BoxQuery::default();
+    parted.tree.faces_in_box(&(middle - reach), &(middle + reach), &mut found);
+    let mut torn = [false; AROUND];
+    for &FaceId(face) in &found.faces {
+        for [from, to] in parted.facets.open_edges(face) {
+            let v = from + (to - from) / 2.0 - middle;
+            let (along, aside) = (v.dot(&wall.axis) * end.out, v.cross(&wall.axis).norm());
+            if along > -near[0] && along < near[1] && aside < near[1] {
+                let turn = v.dot(&g).atan2(v.dot(&e)).rem_euclid(std::f64::consts::TAU);
+                torn[(turn / std::f64::consts::TAU * AROUND as f64) as usize % AROUND] = true;
+            }
+        }
+    }
+    let torn = torn.iter().filter(|torn| **torn).count();
+    2 * torn >= if end.rim.is_some() { AROUND } else { 1 }
+}
+
+/// How much of an opening an end is, beside the other end.
+fn openness(walls: &[Wall], at: usize, end: &WallEnd) -> f64 {
+    let wall = &walls[at];
+    let is_next = |other: &&Wall| {
+        let beyond = (other.at(other.middle()) - wall.at(end.t)).dot(&wall.axis) * end.out;
+        other.side() == Side::Hole
+            && other.coverage >= HOLE_COVERAGE
+            && other.is_coaxial(wall, SAME_AXIS)
+            && other.gap(wall) < SAME_HOLE * wall.radius()
+            && beyond > 0.0
+    };
+    let next = walls.iter().enumerate().filter(|&(number, _)| number != at).map(|(_, other)| other).find(is_next);
+    let stepped = next.map_or(0.0, |next| 2.0 * (next.radius() - wall.radius()).signum());
+    stepped + end.rim.map_or(0.0, |(_, share)| share)
+}
+
+/// The cone that goes on from an end.
+fn cone_beside(walls: &[Wall], at: usize, end: &WallEnd) -> Option<usize> {
+    let wall = &walls[at];
+    (0..walls.len()).find(|&other| {
+        let cone = &walls[other];
+        let beyond = (cone.at(cone.middle()) - wall.at(end.t)).dot(&wall.axis) * end.out;
+        cone.is_cone()
+            && cone.side() == Side::Hole
+            && cone.coverage > HOLE_COVERAGE
+            && cone.is_coaxial(wall, SAME_AXIS)
+            && cone.gap(wall).abs() < SAME_HOLE * wall.radius()
+            && beyond > 0.0
+    })
+}
+
+/// Whether a cone at the opening of a hole is wide enough for the head of a screw, not the edge of the hole broken.
+fn is_countersink(cone: &Wall, wall: &Wall, out: f64) -> bool {
+    cone.axis.dot(&wall.axis) * out > 0.0 && cone.radius_at(cone.ends[1]) > HEAD * wall.radius()
+}
+
+/// The plane square to the axis that closes a wall at `t`.
+fn floor_at(parted: &Parted, wall: &Wall, t: f64) -> Option<usize> {
+    let number = parted.segment_at(&parted.around(wall.segments[0]), &wall.at(t), NEAR_END * wall.radius())?;
+    match parted.segment(number).primitive {
+        Primitive::Plane { normal, .. } if normal.dot(&wall.axis).abs() > SQUARE => Some(number),
+        _ => None,
+    }
+}
+
+/// Holes that follow each other on one axis: the group of each, where it has company.
+pub(super) fn groups(walls: &[Wall], holes: &[Hole]) -> Vec<Option<usize>> {
+    let mut group: Vec<Option<usize>> = vec![None; holes.len()];
+    for i in 0..holes.len() {
+        for j in 0..i {
+            let (a, b) = (&walls[holes[i].wall], &walls[holes[j].wall]);
+            let is_next = a.is_coaxial(b, SAME_AXIS) && a.gap(b) < SAME_HOLE * a.radius().max(b.radius());
+            if is_next {
+                let number = group[j].unwrap_or(j);
+                (group[i], group[j]) = (Some(number), Some(number));
+            }
+        }
+    }
+    group
+}
+
+/// All round bosses: walls with material inside that stand on a plane.
+pub(super) fn bosses(parted: &Parted, walls: &[Wall]) -> Vec<Boss> {
+    let is_boss = |wall: &Wall| wall.side() == Side::Boss && !wall.is_cone() && wall.coverage >= BOSS_COVERAGE;
+    (0..walls.len()).filter(|&at| is_boss(&walls[at])).filter_map(|at| boss(parted, walls, at)).collect()
+}
+
+fn boss(parted: &Parted, walls: &[Wall], at: usize) -> Option<Boss> {
+    let wall = &walls[at];
+    let (radius, around) = (wall.radius(), parted.around(wall.segments[0]));
+    let rings = if parted.rounding.is_some() { RINGS } else { FOOT_RINGS }.map(|ring| ring * radius);
+    [(0, 1.0), (1, -1.0)].into_iter().find_map(|(which, out)| {
+        let (foot, top) = (wall.ends[which], wall.ends[1 - which]);
+        let way = wall.axis * out;
+        let (base, share) = parted.plane_around(&around, &wall.at(foot), &way, &rings, NEAR_END * radius)?;
+        if share < 2.0 * RIM || wall.height() < LEAST_HEIGHT * radius {
+            return None;
+        }
+        let to_plane = |number: usize| along_to_plane(&parted.segment(number).primitive, &wall.origin, &wall.axis);
+        let foot = to_plane(base)?;
+        let lid = parted
+            .plane_around(&around, &wall.at(top), &way, &[FREE * radius], NEAR_END * radius)
+            .map(|(number, _)| number);
+        let top = lid.and_then(to_plane).unwrap_or(top);
+        let height = (top - foot) * out;
+        (height > 0.0).then(|| Boss { wall: at, foot: wall.at(foot), out: way, height, base, top: lid })
+    })
+}

@@ -1,0 +1,252 @@
+//! Which touches are of which segment, and what a fit is given of both.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Point3, Vector3};
+
+use super::fit::Observation;
+use super::marks::NumberSet;
+use super::primitive::Primitive;
+use super::scene::Parted;
+use super::segment::Segmentation;
+use crate::mesh::{FaceId, TriMesh, VertexId};
+use crate::touch::ProbedPoint;
+
+/// The touches on a parted mesh.
+pub(super) struct Observed<'a> {
+    pub parted: &'a Parted<'a>,
+    touches: &'a [ProbedPoint],
+    /// numbers of the touches of each segment
+    of_segment: Vec<Vec<u32>>,
+    /// what shares its error, by touch
+    group: Vec<u32>,
+    /// numbers of the touches by cells of [`Observed::reach`]
+    cells: BTreeMap<[i64; 3], Vec<u32>>,
+    /// a place is touched when a touch is within this, m
+    reach: f64,
+}
+
+/// Touches of one stroke within this time share their error: the window in which they are smoothed, and half of it again.
+const SHARED_NS: i64 = 100_000_000;
+/// A touch is of a segment when it is off it by no more than so many tolerances …
+const NEAR_TOLERANCES: f64 = 3.0;
+/// … or this share of the radius of the ball: what the scan and the noise leave.
+const NEAR_RADII: f64 = 0.15;
+/// Its normal is no farther off than this: 40°, friction and edges.
+const ALIKE: f64 = 0.77;
+/// Where the tip is no ball a place is touched within this, m.
+const REACH: f64 = 1e-3;
+/// Least standard deviation, m: where none is stated the residuals tell.
+const LEAST_SIGMA: f64 = 1e-6;
+/// A touch counts at least this much.
+const LEAST_WEIGHT: f64 = 0.01;
+/// Vertices of which a surface is fitted, at most.
+const MOST_VERTICES: usize = 1500;
+/// Fewer vertices than this are not picked out.
+const LEAST_ON: usize = 8;
+/// Faces around a vertex, at most, where it is asked whether it is on a chord.
+const MOST_AROUND: usize = 32;
+/// A line is along the straight lines of a round surface when it is within 25° of them.
+const STRAIGHT: f64 = 0.9;
+/// Faces that are asked whether they were touched, at most.
+const MOST_FACES: usize = 400;
+/// Of a measured mesh the vertices within this many edges share their error.
+const SHARED_EDGES: f64 = 3.0;
+
+impl<'a> Observed<'a> {
+    /// - `of_face`: the segment of each face, seams included.
+    pub fn of(parted: &'a Parted<'a>, of_face: &[u32], touches: &'a [ProbedPoint]) -> Self {
+        let reach = touches.iter().map(|touch| touch.radius).fold(0.0, f64::max);
+        let reach = if reach > 0.0 { reach } else { REACH };
+        let mut observed = Self {
+            parted,
+            touches,
+            of_segment: vec![Vec::new(); parted.segmentation.segments.len()],
+            group: groups(touches),
+            cells: BTreeMap::new(),
+            reach,
+        };
+        for (number, touch) in touches.iter().enumerate().filter(|(_, touch)| !touch.is_held_apart) {
+            if let Some(segment) = observed.segment_of(of_face, touch) {
+                observed.of_segment[segment].push(number as u32);
+                observed.cells.entry(observed.cell(&touch.point)).or_default().push(number as u32);
+            }
+        }
+        observed
+    }
+
+    fn segment_of(&self, of_face: &[u32], touch: &ProbedPoint) -> Option<usize> {
+        let hit = self.parted.tree.closest(self.parted.facets.mesh, &touch.point, self.reach)?;
+        let number = of_face[hit.face.0 as usize];
+        if number == Segmentation::NONE {
+            return None;
+        }
+        let segment = self.parted.segment(number as usize);
+        let near = (NEAR_TOLERANCES * segment.tolerance).max(NEAR_RADII * self.reach);
+        let off = segment.primitive.distance(&touch.centre) - touch.radius;
+        let is_alike = segment.primitive.normal_at(&touch.centre).dot(&touch.normal) > ALIKE;
+        (off.abs() < near && is_alike).then_some(number as usize)
+    }
+
+    fn cell(&self, p: &Point3<f64>) -> [i64; 3] {
+        [p.x, p.y, p.z].map(|x| (x / self.reach).floor() as i64)
+    }
+
+    /// Numbers of the touches of some segments, in ascending order.
+    pub fn touches_of(&self, segments: &[usize]) -> Vec<u32> {
+        let mut touches: Vec<u32> = segments.iter().flat_map(|&number| &self.of_segment[number]).copied().collect();
+        touches.sort_unstable();
+        touches
+    }
+
+    /// What touches say to a fit.
+    pub fn of_touches(&self, numbers: &[u32]) -> Vec<Observation> {
+        let observation = |&number: &u32| observation(&self.touches[number as usize], self.group[number as usize]);
+        numbers.iter().map(observation).collect()
+    }
+
+    /// What all touches have in common that no number of them averages out, m.
+    pub fn common_sigma(&self, numbers: &[u32]) -> f64 {
+        let sum: f64 = numbers.iter().map(|&number| self.touches[number as usize].calibration).sum();
+        sum / numbers.len().max(1) as f64
+    }
+
+    pub fn touch(&self, number: u32) -> &ProbedPoint {
+        &self.touches[number as usize]
+    }
+
+    /// What the mesh says to a fit.
+    pub fn of_mesh(&self, segments: &[usize]) -> Vec<Observation> {
+        let mesh = self.parted.facets.mesh;
+        let vertices = self.vertices_of(segments);
+        let step = vertices.len().div_ceil(MOST_VERTICES).max(1);
+        let segment = self.parted.segment(segments[0]);
+        // of a drawing the residuals tell what is more than rounding
+        let sigma = self.parted.rounding.unwrap_or(segment.tolerance) / 6.0;
+        let cell = SHARED_EDGES * self.parted.edge;
+        let mut cells: BTreeMap<[i64; 3], u32> = BTreeMap::new();
+        let mut observations = Vec::new();
+        for vertex in vertices.into_iter().step_by(step) {
+            let point = mesh.position(vertex);
+            let own = observations.len() as u32;
+            let group = match self.parted.rounding {
+                Some(_) => own,
+                None => *cells.entry([point.x, point.y, point.z].map(|x| (x / cell).floor() as i64)).or_insert(own),
+            };
+            observations.push(Observation { point, offset: 0.0, sigma, group });
+        }
+        observations
+    }
+
+    /// The vertices of some segments, in ascending order; of round ones in a drawing without those on chords: a tessellation
+    /// has them where a neighbour needed a corner, and they are not on the surface.
+    fn vertices_of(&self, segments: &[usize]) -> Vec<VertexId> {
+        let Parted { facets, segmentation, rounding, .. } = self.parted;
+        let mesh = facets.mesh;
+        let mut vertices = NumberSet::below(mesh.vertex_slots());
+        for &face in segments.iter().flat_map(|&number| &self.parted.segment(number).faces) {
+            mesh.corners(FaceId(face)).iter().for_each(|vertex| vertices.add(vertex.0));
+        }
+        let vertices: Vec<VertexId> = vertices.iter().map(VertexId).collect();
+        let primitive = self.parted.segment(segments[0]).primitive;
+        let is_flat = matches!(primitive, Primitive::Plane { .. });
+        let Some(rounding) = rounding.filter(|_| !is_flat) else { return vertices };
+        let is_of = |face: &FaceId| segments.contains(&(segmentation.of_face[face.0 as usize] as usize));
+        let is_on = |&vertex: &VertexId| {
+            let faces: Vec<FaceId> = mesh.star(vertex).iter().copied().filter(is_of).collect();
+            !is_on_chord(mesh, vertex, &faces, &primitive, rounding)
+        };
+        let on: Vec<VertexId> = vertices.iter().copied().filter(is_on).collect();
+        if on.len() < LEAST_ON { vertices } else { on }
+    }
+
+    /// Share of the area of some segments that was touched.
+    pub fn touched_share(&self, segments: &[usize]) -> f64 {
+        if self.touches.is_empty() {
+            return 0.0;
+        }
+        let (mut touched, mut all) = (0.0, f64::MIN_POSITIVE);
+        for &number in segments {
+            let faces = &self.parted.segment(number).faces;
+            for &face in faces.iter().step_by(faces.len().div_ceil(MOST_FACES).max(1)) {
+                let area = self.parted.facets.area(face);
+                let middle = self.parted.facets.mesh.barycentre(FaceId(face));
+                all += area;
+                if self.is_touched(&middle) {
+                    touched += area;
+                }
+            }
+        }
+        touched / all
+    }
+
+    /// Share of a line between two places that was touched.
+    pub fn touched_along(&self, [from, to]: &[Point3<f64>; 2]) -> f64 {
+        let count = (((to - from).norm() / self.reach).ceil() as usize).clamp(1, MOST_FACES);
+        let at = |i: usize| from + (to - from) * ((i as f64 + 0.5) / count as f64);
+        (0..count).filter(|&i| self.is_touched(&at(i))).count() as f64 / count as f64
+    }
+
+    /// Share of some places that was touched.
+    pub fn touched_at(&self, places: &[Point3<f64>]) -> f64 {
+        places.iter().filter(|p| self.is_touched(p)).count() as f64 / places.len().max(1) as f64
+    }
+
+    fn is_touched(&self, p: &Point3<f64>) -> bool {
+        let [x, y, z] = self.cell(p);
+        let near = |&number: &u32| (self.touches[number as usize].point - p).norm() <= self.reach;
+        (0..27).any(|at| {
+            let cell = [x + at % 3 - 1, y + at / 3 % 3 - 1, z + at / 9 - 1];
+            self.cells.get(&cell).is_some_and(|some| some.iter().any(near))
+        })
+    }
+}
+
+/// What a touch says to a fit.
+pub(super) fn observation(touch: &ProbedPoint, group: u32) -> Observation {
+    let ProbedPoint { centre, radius, sigma, weight, .. } = *touch;
+    let sigma = (sigma / weight.max(LEAST_WEIGHT).sqrt()).max(LEAST_SIGMA);
+    Observation { point: centre, offset: radius, sigma, group }
+}
+
+/// Whether a vertex is between two others of its faces on a line that is not one of the straight lines of the surface.
+fn is_on_chord(mesh: &TriMesh, vertex: VertexId, faces: &[FaceId], primitive: &Primitive, rounding: f64) -> bool {
+    if faces.len() > MOST_AROUND {
+        return false;
+    }
+    let p = mesh.position(vertex);
+    let straight = match primitive {
+        Primitive::Plane { .. } => return false,
+        Primitive::Cylinder { axis, .. } => *axis,
+        Primitive::Cone { apex, .. } => (p - apex).try_normalize(0.0).unwrap_or_else(Vector3::zeros),
+    };
+    let mut around: Vec<VertexId> = faces.iter().flat_map(|&face| mesh.corners(face)).collect();
+    around.sort_unstable();
+    around.dedup();
+    let around: Vec<Point3<f64>> = around.into_iter().map(|other| mesh.position(other)).filter(|q| *q != p).collect();
+    let is_between = |a: &Point3<f64>, b: &Point3<f64>| {
+        if (p - a).dot(&(p - b)) >= 0.0 {
+            return false;
+        }
+        let Some(way) = (b - a).try_normalize(0.0) else { return false };
+        let v = p - a;
+        let off = (v - way * v.dot(&way)).norm();
+        off < rounding && way.dot(&straight).abs() < STRAIGHT
+    };
+    around.iter().any(|a| around.iter().any(|b| is_between(a, b)))
+}
+
+/// Numbers of the groups of touches that share their error.
+pub(super) fn groups(touches: &[ProbedPoint]) -> Vec<u32> {
+    let mut last: Option<(u32, i64)> = None;
+    let mut group = 0;
+    let mut number = |touch: &ProbedPoint| {
+        let is_same = last.is_some_and(|(stroke, begun)| touch.stroke == stroke && touch.stamp_ns - begun < SHARED_NS);
+        if !is_same {
+            group += u32::from(last.is_some());
+            last = Some((touch.stroke, touch.stamp_ns));
+        }
+        group
+    };
+    touches.iter().map(&mut number).collect()
+}

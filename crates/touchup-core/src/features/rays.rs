@@ -1,0 +1,87 @@
+//! Where a straight line first meets the mesh.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::mesh::{BoxQuery, FaceId, FaceTree, TriMesh};
+
+/// Looks along lines through one mesh.
+pub(super) struct Rays<'a> {
+    mesh: &'a TriMesh,
+    tree: &'a FaceTree,
+    /// length of the pieces in which a line is followed, m: a box around a long one holds too many faces
+    piece: f64,
+    /// what the faces are called, where the mesh is a part of another
+    names: Option<&'a [u32]>,
+    query: BoxQuery,
+}
+
+/// The first face on a line.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RayHit {
+    /// from the start, m
+    pub distance: f64,
+    pub face: FaceId,
+}
+
+impl<'a> Rays<'a> {
+    pub fn new(mesh: &'a TriMesh, tree: &'a FaceTree, piece: f64, names: Option<&'a [u32]>) -> Self {
+        Self { mesh, tree, piece, names, query: BoxQuery::default() }
+    }
+
+    /// The first face between `from` and the point `reach` (m) away along the unit vector `way`.
+    pub fn first(&mut self, from: &Point3<f64>, way: &Vector3<f64>, reach: f64) -> Option<RayHit> {
+        let count = (reach / self.piece).ceil().max(1.0);
+        let piece = reach / count;
+        for i in 0..count as usize {
+            let (a, b) = (from + way * (piece * i as f64), from + way * (piece * (i + 1) as f64));
+            self.tree.faces_in_box(&a.inf(&b), &a.sup(&b), &mut self.query);
+            let found = self.query.faces.iter().filter_map(|&face| {
+                let distance = crossing(&self.mesh.triangle(face), from, way)?;
+                (distance >= 0.0 && distance <= reach).then_some(RayHit { distance, face })
+            });
+            // a face of this box may be crossed in a later one, behind a nearer face that is not here
+            let nearest = found.min_by(|a, b| a.distance.total_cmp(&b.distance).then(a.face.cmp(&b.face)));
+            if let Some(nearest) = nearest.filter(|nearest| nearest.distance <= piece * (i + 1) as f64) {
+                let face = self.names.map_or(nearest.face, |names| FaceId(names[nearest.face.0 as usize]));
+                return Some(RayHit { face, ..nearest });
+            }
+        }
+        None
+    }
+
+    /// How far the line is free, at most `reach`, m.
+    pub fn free(&mut self, from: &Point3<f64>, way: &Vector3<f64>, reach: f64) -> f64 {
+        self.first(from, way, reach).map_or(reach, |crossing| crossing.distance)
+    }
+}
+
+/// Where a line meets the plane of a triangle, if inside of it; edges belong to it.
+fn crossing([a, b, c]: &[Point3<f64>; 3], from: &Point3<f64>, way: &Vector3<f64>) -> Option<f64> {
+    let (ab, ac) = (b - a, c - a);
+    let across = way.cross(&ac);
+    let volume = ab.dot(&across);
+    let start = from - a;
+    let v = start.dot(&across) / volume;
+    let along = start.cross(&ab);
+    let w = way.dot(&along) / volume;
+    // a triangle seen edge-on has no volume: all of this is NaN or infinite, and outside
+    (v >= 0.0 && w >= 0.0 && v + w <= 1.0).then(|| ac.dot(&along) / volume)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_of_two_floors_is_met() {
+        let floor = |z: f64| [[0.0, 0.0, z], [4.0, 0.0, z], [0.0, 4.0, z]].map(Point3::from);
+        let positions = [floor(1.0), floor(2.5)].concat();
+        let mesh = TriMesh::new(positions, vec![[0, 1, 2], [3, 4, 5]]).unwrap();
+        let tree = FaceTree::new(&mesh);
+        let mut rays = Rays::new(&mesh, &tree, 0.7, None);
+        let met = rays.first(&Point3::new(1.0, 1.0, 5.0), &-Vector3::z(), 10.0).unwrap();
+        assert_eq!((met.face, met.distance), (FaceId(1), 2.5));
+        assert_eq!(rays.free(&Point3::new(1.0, 1.0, 5.0), &-Vector3::z(), 2.0), 2.0, "too short");
+        assert_eq!(rays.free(&Point3::new(3.0, 3.0, 5.0), &-Vector3::z(), 9.0), 9.0, "beside both");
+    }
+}

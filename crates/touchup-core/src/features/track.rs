@@ -1,0 +1,231 @@
+//! Features followed while they are touched: the same number for the same feature, and new touches in its numbers at once.
+//!
+//! [`Tracker::renew`] looks at the whole mesh; between two such looks [`Tracker::update`] takes new touches into the features
+//! that they are on, and leaves all others as they are.
+
+use nalgebra::{Point3, Vector3};
+
+use super::detect::{Detection, detect, lateral_std, middle_std};
+use super::feature::{Feature, FittedTo, Kind, Measured, SizedSurface};
+use super::fit::{self, Cylinder, Fit, FitParams, Freedom, Stadium, fit};
+use super::observe::{groups, observation};
+use crate::mesh::{FaceTree, TriMesh};
+use crate::touch::ProbedPoint;
+
+/// Follows the features of one part.
+#[derive(Clone, Debug, Default)]
+pub struct Tracker {
+    features: Vec<Feature>,
+    /// share of the area that belonged to no primitive at the last look
+    unexplained: Option<f64>,
+    next_id: u32,
+    /// touches that were looked at
+    seen: usize,
+    /// stamp of the last of them, ns
+    until_ns: Option<i64>,
+}
+
+/// Features are the same when their places are nearer than this share of their size …
+const SAME_PLACE: f64 = 0.5;
+/// … and their axes within 30°.
+const SAME_AXIS: f64 = 0.866;
+/// A touch is of a feature when it is off its surface by no more than this share of the ball's radius …
+const NEAR_RADII: f64 = 0.15;
+/// … and its normal by no more than 40°.
+const ALIKE: f64 = 0.77;
+/// So many touches of a feature are fitted between two looks at the mesh, spread over all of them.
+const MOST_FITTED: usize = 240;
+/// Where the tip is no ball, this counts as its radius, m.
+const RADIUS: f64 = 1e-3;
+
+impl Tracker {
+    /// Nothing found yet.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// What is known now, in order of id.
+    pub fn features(&self) -> &[Feature] {
+        &self.features
+    }
+
+    /// Looks at the whole mesh again; features that were known keep their ids.
+    pub fn renew(&mut self, mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> &[Feature] {
+        let Detection { mut features, unexplained } = detect(mesh, tree, touches);
+        self.unexplained = Some(unexplained);
+        let mut known = std::mem::take(&mut self.features);
+        for feature in &mut features {
+            let same = known.iter().position(|before| is_same(before, feature));
+            feature.id = same.map_or_else(|| self.fresh_id(), |at| known.swap_remove(at).id);
+        }
+        features.sort_by_key(|feature| feature.id);
+        self.features = features;
+        self.note(touches);
+        &self.features
+    }
+
+    fn note(&mut self, touches: &[ProbedPoint]) {
+        self.seen = touches.len();
+        self.until_ns = touches.last().map(|last| last.stamp_ns);
+    }
+
+    /// Share of the mesh's area in which nothing was looked for, at the last look at the whole mesh; `None` before the first.
+    pub fn unexplained(&self) -> Option<f64> {
+        self.unexplained
+    }
+
+    /// A number that no feature has, had or will get: for what is known before it is found.
+    pub fn fresh_id(&mut self) -> u32 {
+        self.next_id += 1;
+        self.next_id - 1
+    }
+
+    /// Takes the touches that came since into the holes, bosses, slots and pockets that they are on; returns the ids of
+    /// those.
+    ///
+    /// - `touches`: all of them, as for [`Self::renew`]. When some that were there are gone, as after an undone stroke,
+    ///   nothing changes until the whole mesh is looked at again: features name touches by number.
+    pub fn update(&mut self, touches: &[ProbedPoint]) -> Vec<u32> {
+        let last = self.seen.checked_sub(1).map(|last| touches.get(last).map(|touch| touch.stamp_ns));
+        if last.unwrap_or_default() != self.until_ns {
+            return Vec::new();
+        }
+        let news = self.seen..touches.len();
+        self.note(touches);
+        let mut changed = Vec::new();
+        for feature in &mut self.features {
+            let is_on = |&number: &usize| is_on(feature, &touches[number]);
+            let new: Vec<u32> = news.clone().filter(is_on).map(|number| number as u32).collect();
+            if !new.is_empty() && feature.take(&new, touches) {
+                changed.push(feature.id);
+            }
+        }
+        changed
+    }
+}
+
+/// The size that a feature's place is compared with, m.
+fn size(feature: &Feature) -> f64 {
+    let value = |measured: &Option<Measured<f64>>| measured.as_ref().map(|measured| measured.value);
+    value(&feature.diameter)
+        .or_else(|| value(&feature.width))
+        .or_else(|| value(&feature.length))
+        .unwrap_or(2.0 * RADIUS)
+}
+
+fn is_same(one: &Feature, other: &Feature) -> bool {
+    let axes = one.axis.as_ref().zip(other.axis.as_ref());
+    let is_alike = axes.is_none_or(|(a, b)| a.value.dot(&b.value).abs() > SAME_AXIS);
+    let off = one.centre.value - other.centre.value;
+    // a hole is the same however deep it has become
+    let off = match (one.kind, &one.axis) {
+        (Kind::Hole | Kind::Boss, Some(axis)) => off - axis.value * off.dot(&axis.value),
+        _ => off,
+    };
+    let (a, b) = (size(one), size(other));
+    let is_as_large = one.kind == Kind::Plane || (a - b).abs() < SAME_PLACE * a.max(b);
+    one.kind == other.kind && is_alike && is_as_large && off.norm() < SAME_PLACE * a.max(b)
+}
+
+/// Whether a touch is on the surface of a feature.
+fn is_on(feature: &Feature, touch: &ProbedPoint) -> bool {
+    let reach = if touch.radius > 0.0 { touch.radius } else { RADIUS };
+    let Some(axis) = feature.axis.as_ref().filter(|_| !touch.is_held_apart) else { return false };
+    let height = feature.depth.as_ref().map_or(0.0, |depth| depth.value);
+    let along = (touch.point - feature.centre.value).dot(&axis.value);
+    // a hole lies below its opening, a boss stands on its foot
+    let is_between = match feature.kind {
+        Kind::Boss => along > 0.0 && along < height + reach,
+        _ => along < 0.0 && along > -height - reach,
+    };
+    let far = size(feature) + feature.length.as_ref().map_or(0.0, |length| length.value) + height + reach;
+    if !is_between || (touch.point - feature.centre.value).norm() > far {
+        return false;
+    }
+    let (distance, normal) = match &feature.surface {
+        SizedSurface::Round(cylinder) => off(cylinder, &touch.centre),
+        SizedSurface::Slot(stadium) => off(stadium, &touch.centre),
+        SizedSurface::Other => return false,
+    };
+    (distance - touch.radius).abs() < NEAR_RADII * reach && normal.dot(&touch.normal) > ALIKE
+}
+
+/// Signed distance and outward normal, in O.
+fn off<S: fit::Surface>(surface: &S, p: &Point3<f64>) -> (f64, Vector3<f64>) {
+    let pose = surface.pose_of();
+    let distance = surface.distance_at(&pose.inverse_transform_point(p).coords);
+    (distance.value, pose.rotation * distance.normal)
+}
+
+impl Feature {
+    /// Fits the feature to its touches and the new ones; returns whether that held.
+    fn take(&mut self, new: &[u32], touches: &[ProbedPoint]) -> bool {
+        let sized = self.diameter.as_ref().or(self.width.as_ref());
+        let mut all = sized.map_or_else(Vec::new, |sized| sized.touches.clone());
+        all.extend(new);
+        all.sort_unstable();
+        all.dedup();
+        let step = all.len().div_ceil(MOST_FITTED).max(1);
+        let fitted: Vec<u32> = all.iter().copied().rev().step_by(step).collect();
+        let chosen: Vec<ProbedPoint> = fitted.iter().rev().map(|&number| touches[number as usize]).collect();
+        let observations: Vec<_> =
+            chosen.iter().zip(groups(&chosen)).map(|(touch, group)| observation(touch, group)).collect();
+        let common_sigma = chosen.iter().map(|touch| touch.calibration).sum::<f64>() / chosen.len() as f64;
+        let params = FitParams { common_sigma, axis_sigma: Some(AXIS_KNOWN), ..FitParams::default() };
+        match self.surface.clone() {
+            SizedSurface::Round(cylinder) => match fit(&cylinder, &observations, &params) {
+                Ok(found) => self.is_round(&found, all),
+                Err(_) => return false,
+            },
+            SizedSurface::Slot(stadium) => match fit(&stadium, &observations, &params) {
+                Ok(found) => self.is_slot(&found, all),
+                Err(_) => return false,
+            },
+            SizedSurface::Other => return false,
+        }
+        self.fitted_to = FittedTo::Touches;
+        true
+    }
+
+    fn is_round(&mut self, found: &Fit<Cylinder>, touches: Vec<u32>) {
+        let start = found.surface.center();
+        let axis = self.turned(found.surface.pose_of.rotation * Vector3::z());
+        let centre = start + axis * (self.centre.value - start).dot(&axis);
+        self.centre = Measured { value: centre, std: lateral_std(found, &centre), touches: touches.clone() };
+        self.axis = Some(Measured { value: axis, std: found.axis_std(), touches: touches.clone() });
+        let diameter = found.diameter();
+        let value = 2.0 * found.surface.radius;
+        self.diameter = Some(Measured { value, std: diameter.map(|diameter| diameter.std), touches });
+        self.surface = SizedSurface::Round(found.surface.clone());
+    }
+
+    fn is_slot(&mut self, found: &Fit<Stadium>, touches: Vec<u32>) {
+        let axis = self.turned(found.surface.pose_of.rotation * Vector3::z());
+        let estimate = |value: f64, freedom: Freedom| {
+            let std = found.std(freedom);
+            Measured { value, std, touches: touches.clone() }
+        };
+        self.width = Some(estimate(found.surface.width, Freedom::Size));
+        if found.std(Freedom::Second).is_some() {
+            self.length = Some(estimate(found.surface.length, Freedom::Second));
+        }
+        let start = found.surface.center();
+        let direction = found.surface.direction();
+        let off = self.centre.value - start;
+        // along the slot only what ends it tells where it is
+        let along = if found.std(Freedom::X).is_some() { 0.0 } else { off.dot(&direction) };
+        let value = start + axis * off.dot(&axis) + direction * along;
+        self.centre = Measured { value, std: middle_std(found), touches: touches.clone() };
+        self.axis = Some(Measured { value: axis, std: found.axis_std(), touches: touches.clone() });
+        self.surface = SizedSurface::Slot(found.surface.clone());
+    }
+
+    /// A direction turned the way the axis goes.
+    fn turned(&self, way: Vector3<f64>) -> Vector3<f64> {
+        let before = self.axis.as_ref().map_or(way, |axis| axis.value);
+        if way.dot(&before) < 0.0 { -way } else { way }
+    }
+}
+
+/// How well the axis is known from the last look at the mesh, rad: 1°, so that touches at one height are enough.
+const AXIS_KNOWN: f64 = 0.0175;

@@ -1,0 +1,45 @@
+//! The method: samples to mesh, features, registration and probing.
+//!
+//! Nothing here opens a file, reads a clock, starts a thread or speaks ROS: the same samples give the same bytes. The modules, in the order
+//! in which data flows through them and in which they may use one another:
+//!
+//! | module | what it does |
+//! |---|---|
+//! | [`touch`] | pose and wrench become one [`touch::Sample`]: pairing, compensation, contact, friction |
+//! | [`mesh`] | the triangle mesh, its repair, its exact closest-face tree, its Laplacian |
+//! | [`patch`] | the touched part of the scan reconstructed |
+//! | [`refine`] | [`refine::Refiner::push`]: face dynamics, region, guard; one sample moves the mesh |
+//! | [`features`] | holes, slots, planes, … of a mesh and its touches, with their uncertainty |
+//! | [`align`] | rigid registration: of pairs, of features, of surfaces |
+//! | [`compare`] | deviation from the true part, discrepancy of scan and touch, as numbers and as a picture |
+//! | [`calibrate`] | payload and tip calibration, registration of the scan |
+//! | [`explore`] | next-touch planning |
+//! | [`robot`] | an arm that holds a probe: kinematics, limits, onset of a contact |
+//! | [`probe`] | from a flag to a feature with an arm |
+//!
+//! # Frames
+//!
+//! O object (the mesh) · T stylus tip (origin: centre of the ball; z: along the shaft, from tip to handle) · S force
+//! sensor · H the stylus as it is tracked (axes of T; the scene says where the ball is in it) · W world or space, in which
+//! it is tracked (the scene says where O is in it; in the simulator z is up) · V view (in the simulator alone; z: towards the scanner
+//! or the hand) · F fitted surface (in [`features`] alone; z: its axis or normal). `pose_ot` maps T to O, `p_ot` is the tip in
+//! O, `force_o` is a force expressed in O. A wrench is what the object does to the stylus and normals point out of the
+//! object, so a stylus that presses has `force_o · normal > 0`.
+//!
+//! # Units
+//!
+//! SI throughout: m, N, N·m, kg, s, rad. A bare number that leaves the code carries its unit in its name
+//! (`mass_kg`, `stamp_ns`). Stamps are `i64` nanoseconds.
+#![cfg_attr(not(test), warn(clippy::unwrap_used))]
+
+pub mod align;
+pub mod calibrate;
+pub mod compare;
+pub mod explore;
+pub mod features;
+pub mod mesh;
+pub mod patch;
+pub mod probe;
+pub mod refine;
+pub mod robot;
+pub mod touch;

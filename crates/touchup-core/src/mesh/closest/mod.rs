@@ -1,0 +1,122 @@
+//! Closest face of a mesh that changes: a bounding volume tree that is exact after every edit, and never far from tight.
+//!
+//! A binary tree over the faces. Boxes are kept in single precision relative to the middle of the mesh and rounded
+//! outward, so a query that prunes by them never misses a face; distances to faces are computed in double precision.
+//! [`FaceTree::refit`] recomputes the boxes of the leaves that hold moved faces and all boxes above them;
+//! [`FaceTree::insert`] and [`FaceTree::remove`] do the same on one way to the root. [`FaceTree::refit_planned`] may leave a
+//! margin, so that small motions inside of it cost nothing. Boxes never only grow, so nothing is left to be tightened later.
+
+mod aabb;
+mod build;
+mod edit;
+mod nearby;
+mod query;
+mod refit;
+
+use nalgebra::Point3;
+
+use super::{FaceId, TriMesh};
+use aabb::Aabb;
+pub use nearby::Nearby;
+pub use query::{BoxQuery, FaceHit};
+pub use refit::RefitPlan;
+
+/// Faces in a leaf at most. Two to four are equally fast within noise; four makes the smallest tree.
+const LEAF_FACES: usize = 4;
+/// Slots of the traversal stack: one for each level, see [`edit`].
+const STACK: usize = 96;
+/// No node.
+const NONE: u32 = u32::MAX;
+/// The node above all others, which is in no pair.
+const ROOT: u32 = u32::MAX >> 1;
+
+/// One node over `count` faces: a leaf of the faces in place `first` if these fit there, else an inner node whose
+/// children are the pair `first`.
+#[derive(Clone, Copy, Debug)]
+struct TreeNode {
+    bounds: Aabb,
+    first: u32,
+    count: u32,
+}
+
+impl TreeNode {
+    #[inline]
+    fn is_leaf(&self) -> bool {
+        self.count <= LEAF_FACES as u32
+    }
+}
+
+/// Two siblings share a cache line.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+struct SiblingNodes([TreeNode; 2]);
+
+/// Bounding volume tree over the faces of one [`TriMesh`].
+#[derive(Clone, Debug)]
+pub struct FaceTree {
+    origin: Point3<f64>,
+    root: TreeNode,
+    pairs: Vec<SiblingNodes>,
+    /// for each pair: the node above it (2 · pair + side), or [`ROOT`]; for a free one the next free one
+    parents: Vec<u32>,
+    /// faces of the leaves; in a free place the next free one
+    leaf_faces: Vec<[FaceId; LEAF_FACES]>,
+    /// leaf (2 · pair + side, or [`ROOT`]) of each face, [`NONE`] for faces that are not in the tree
+    leaf_of_face: Vec<u32>,
+    free_pair: u32,
+    free_leaf: u32,
+    /// room for what is built anew
+    items: Vec<build::Item>,
+    /// counts insertions and removals, so that a plan knows whether it still holds
+    edits: u64,
+    /// counts those and the refits after motions of unknown length …
+    changes: u64,
+    /// … and sums by how much boxes became wider at most in the other refits, m, so that leaves that are kept know whether
+    /// they still hold
+    widened: f64,
+}
+
+impl FaceTree {
+    /// Number of levels; looks at every node.
+    pub fn depth(&self) -> usize {
+        let (mut deepest, mut stack) = (1, vec![(&self.root, 1)]);
+        while let Some((node, level)) = stack.pop() {
+            deepest = deepest.max(level);
+            if !node.is_leaf() {
+                stack.extend(self.pairs[node.first as usize].0.iter().map(|child| (child, level + 1)));
+            }
+        }
+        deepest
+    }
+
+    /// Memory, bytes.
+    pub fn bytes(&self) -> usize {
+        self.pairs.capacity() * size_of::<SiblingNodes>()
+            + (self.parents.capacity() + self.leaf_of_face.capacity()) * size_of::<u32>()
+            + self.leaf_faces.capacity() * size_of::<[FaceId; LEAF_FACES]>()
+            + self.items.capacity() * size_of::<build::Item>()
+    }
+
+    #[inline]
+    fn node(&self, at: u32) -> &TreeNode {
+        if at == ROOT { &self.root } else { &self.pairs[at as usize / 2].0[at as usize % 2] }
+    }
+
+    #[inline]
+    fn node_mut(&mut self, at: u32) -> &mut TreeNode {
+        if at == ROOT { &mut self.root } else { &mut self.pairs[at as usize / 2].0[at as usize % 2] }
+    }
+
+    #[inline]
+    fn faces_of(&self, leaf: &TreeNode) -> &[FaceId] {
+        &self.leaf_faces[leaf.first as usize][..leaf.count as usize]
+    }
+
+    /// The box around some faces.
+    #[inline]
+    fn bounds_of(&self, mesh: &TriMesh, faces: &[FaceId]) -> Aabb {
+        let mut bounds = Aabb::EMPTY;
+        faces.iter().for_each(|&face| bounds.take(mesh, face, &self.origin));
+        if faces.is_empty() { bounds } else { bounds.rounded_outward() }
+    }
+}

@@ -1,0 +1,210 @@
+//! Faces that could come to meet: each pair is looked at exactly, and then left alone for as long as it cannot.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::mesh::{FaceId, TriMesh, VertexId, triangle};
+
+type TrianglePoints = [Point3<f64>; 3];
+
+/// A share of the altitude below which the bound on a turning normal in [`margin_at_corner`] holds.
+const SMALL_TURN: f64 = 0.1;
+
+/// Pairs to make room for.
+const PAIRS_PER_FACE: usize = 16;
+
+/// Two faces that share no edge.
+#[derive(Clone, Copy, Debug)]
+struct FacePair {
+    faces: [FaceId; 2],
+    /// index of the common corner in either face
+    common: Option<[u8; 2]>,
+    /// the pair cannot meet before vertices have moved this far in all, m
+    safe_until: f64,
+}
+
+/// All pairs of a region that could come to meet.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Pairs {
+    list: Vec<FacePair>,
+    /// what the fastest vertex has moved since the list was made, m
+    travel: f64,
+}
+
+impl Pairs {
+    /// Forgets all pairs.
+    pub fn clear(&mut self) {
+        self.list.clear();
+        self.travel = 0.0;
+    }
+
+    /// Finds the pairs of `face` and each of `others` that are no farther apart than `margin` (m) and that `is_wanted`,
+    /// unless they share an edge: neighbours fold, they do not pierce.
+    pub fn add_near(
+        &mut self,
+        mesh: &TriMesh,
+        face: FaceId,
+        others: &[(FaceId, Aabb)],
+        margin: f64,
+        is_wanted: impl Fn(FaceId) -> bool,
+    ) {
+        let here = bounds(&mesh.triangle(face));
+        for &(other, _) in others.iter().filter(|(_, there)| !apart(&here, there, margin)) {
+            if is_wanted(other) {
+                self.add(mesh, face, other);
+            }
+        }
+    }
+
+    fn add(&mut self, mesh: &TriMesh, a: FaceId, b: FaceId) {
+        let (corners, others) = (mesh.corners(a), mesh.corners(b));
+        let mut common = (0..3).filter_map(|i| {
+            let at = others.iter().position(|other| *other == corners[i])?;
+            Some([i as u8, at as u8])
+        });
+        let first = common.next();
+        if common.next().is_none() {
+            self.list.push(FacePair { faces: [a, b], common: first, safe_until: 0.0 });
+        }
+    }
+
+    /// Makes room for the pairs of `faces` moving faces: a dozen neighbours over a corner each, and some more.
+    pub fn reserve(&mut self, faces: usize) {
+        self.list.reserve(PAIRS_PER_FACE * faces);
+    }
+
+    /// Whether no pair has come to meet by an update whose longest way is `way` (m).
+    ///
+    /// - `gap`: faces nearer than this meet, m.
+    /// - `before`: the position of a vertex before the update, m; a pair that met then may go on.
+    pub fn are_clear(&mut self, mesh: &TriMesh, gap: f64, way: f64, before: impl Fn(VertexId) -> Point3<f64>) -> bool {
+        let travel = self.travel;
+        self.list.iter_mut().all(|pair| {
+            if travel + way <= pair.safe_until {
+                return true;
+            }
+            let [t, u] = pair.faces.map(|face| mesh.triangle(face));
+            if meet(&t, &u, pair.common, gap) {
+                let [t, u] = pair.faces.map(|face| mesh.corners(face).map(&before));
+                return meet(&t, &u, pair.common, gap);
+            }
+            // should the update be taken back after all, the pair is `way` away from where it was looked at
+            pair.safe_until = travel + margin(&t, &u, pair.common, gap) - way;
+            true
+        })
+    }
+
+    /// Takes an update whose longest way is `way` (m).
+    pub fn accept(&mut self, way: f64) {
+        self.travel += way;
+    }
+}
+
+/// Lowest and highest coordinates, m.
+pub(super) type Aabb = (Vector3<f64>, Vector3<f64>);
+
+#[inline]
+pub(super) fn bounds([a, b, c]: &TrianglePoints) -> Aabb {
+    (a.coords.inf(&b.coords).inf(&c.coords), a.coords.sup(&b.coords).sup(&c.coords))
+}
+
+#[inline]
+fn apart(a: &Aabb, b: &Aabb, gap: f64) -> bool {
+    (0..3).any(|i| a.0[i] > b.1[i] + gap || b.0[i] > a.1[i] + gap)
+}
+
+/// Whether two faces that share no edge meet, other than in their common corner.
+fn meet(t: &TrianglePoints, u: &TrianglePoints, common: Option<[u8; 2]>, gap: f64) -> bool {
+    if apart(&bounds(t), &bounds(u), gap) {
+        return false;
+    }
+    let Some([i, j]) = common.map(|pair| pair.map(usize::from)) else { return triangle::intersect(t, u, gap) };
+    triangle::segment_crosses(&t[(i + 1) % 3], &t[(i + 2) % 3], u, 0.0)
+        || triangle::segment_crosses(&u[(j + 1) % 3], &u[(j + 2) % 3], t, 0.0)
+}
+
+/// How far every vertex may move before two faces can meet, m; 0 when that cannot be told simply.
+fn margin(t: &TrianglePoints, u: &TrianglePoints, common: Option<[u8; 2]>, gap: f64) -> f64 {
+    match common.map(|pair| pair.map(usize::from)) {
+        Some([i, j]) => margin_at_corner(t, i, u, j).max(margin_at_corner(u, j, t, i)),
+        None => {
+            let (a, b) = (bounds(t), bounds(u));
+            let boxes = (0..3).map(|i| (a.0[i] - b.1[i]).max(b.0[i] - a.1[i])).fold(f64::NEG_INFINITY, f64::max);
+            let widest = boxes.max(height_above(t, u)).max(height_above(u, t));
+            // both faces may come closer
+            (0.5 * (widest - gap)).max(0.0)
+        }
+    }
+}
+
+/// How far all of `u` stands on one side of the plane of `t`, m; negative when it does not.
+fn height_above(t: &TrianglePoints, u: &TrianglePoints) -> f64 {
+    let Some(normal) = (t[1] - t[0]).cross(&(t[2] - t[0])).try_normalize(0.0) else { return f64::NEG_INFINITY };
+    let heights = u.map(|p| normal.dot(&(p - t[0])));
+    let (low, high) = heights.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &h| (a.min(h), b.max(h)));
+    low.max(-high)
+}
+
+/// How far every vertex may move before the edge of `u` across its corner `j`, the same as corner `i` of `t`, can reach
+/// the plane of `t`, m.
+///
+/// The height of a point at distance r from the corner changes by no more than 2 m + r |Δn| when all vertices move by
+/// m, and |Δn| ≤ 3 m / altitude while m is small.
+fn margin_at_corner(t: &TrianglePoints, i: usize, u: &TrianglePoints, j: usize) -> f64 {
+    let double = (t[1] - t[0]).cross(&(t[2] - t[0]));
+    let area = double.norm();
+    if area == 0.0 {
+        return 0.0;
+    }
+    let altitude = (triangle::shape_quality(t, area) * area).sqrt();
+    let arms = [u[(j + 1) % 3] - t[i], u[(j + 2) % 3] - t[i]];
+    let [a, b] = arms.map(|arm| double.dot(&arm) / area);
+    if a * b <= 0.0 {
+        return 0.0;
+    }
+    let reach = arms[0].norm().max(arms[1].norm());
+    (a.abs().min(b.abs()) / (2.0 + 4.0 * reach / altitude)).min(SMALL_TURN * altitude)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(x: f64, y: f64, z: f64) -> Point3<f64> {
+        Point3::new(x, y, z)
+    }
+
+    #[test]
+    fn a_pair_is_safe_for_half_its_distance_and_no_longer() {
+        let t = [at(0.0, 0.0, 0.0), at(1.0, 0.0, 0.0), at(0.0, 1.0, 0.0)];
+        let u = t.map(|p| p + Vector3::new(0.1, 0.1, 0.3));
+        assert!((margin(&t, &u, None, 0.1) - 0.1).abs() < 1e-15);
+        let through = [at(0.2, 0.2, -1.0), at(0.3, 0.2, 1.0), at(0.2, 0.3, 1.0)];
+        assert!(meet(&t, &through, None, 0.0));
+        assert_eq!(margin(&t, &through, None, 0.0), 0.0);
+    }
+
+    #[test]
+    fn no_motion_within_the_margin_makes_faces_at_a_corner_meet() {
+        // an own small generator: 2,000 pairs with a common corner, moved by the margin in random directions
+        let mut state = 1u64;
+        let mut next = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+        };
+        let mut tried = 0;
+        while tried < 2_000 {
+            let mut point = || at(next(), next(), next());
+            let corner = point();
+            let (t, u) = ([corner, point(), point()], [point(), corner, point()]);
+            let margin = margin(&t, &u, Some([0, 1]), 0.0);
+            if meet(&t, &u, Some([0, 1]), 0.0) || margin == 0.0 {
+                continue;
+            }
+            tried += 1;
+            let mut step = || Vector3::new(next(), next(), next()).normalize() * margin;
+            let moved = corner + step();
+            let (t, u) = ([moved, t[1] + step(), t[2] + step()], [u[0] + step(), moved, u[2] + step()]);
+            assert!(!meet(&t, &u, Some([0, 1]), 0.0), "{t:?} {u:?}");
+        }
+    }
+}

@@ -1,0 +1,417 @@
+//! What an update may not do to the faces around it: flip, fold, starve or pierce one.
+//!
+//! A scan may come with such faithless faces; an update may not make one worse.
+
+use nalgebra::{Point3, Vector3};
+
+use super::collision::{Aabb, Pairs, bounds};
+use super::marks::ScratchMap;
+use super::ring::Ring;
+use crate::mesh::{BoxQuery, FaceId, FaceTree, TriMesh, VertexId, triangle};
+
+/// Limits that keep a mesh sound.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GuardParams {
+    /// Smallest twice area over longest edge squared. Default 0.15: a triangle stretched sixfold. Of a triangle that was
+    /// scanned thin [`Self::SCANNED_SHARE`] of what it had, where that is less: it must not hold all around it.
+    pub smallest_quality: f64,
+    /// Smallest cosine between normals before and after one update. Default 0.5: 60°.
+    pub smallest_turn_cosine: f64,
+    /// Smallest cosine between a face's normal and the last that was scanned or felt there. Default 0: a lid may become
+    /// a wall, but not an overhang.
+    pub smallest_evidence_cosine: f64,
+    /// Smallest cosine between neighbours. Default −0.85: 148° apart is a knife's edge, beyond it is a fold.
+    pub smallest_fold_cosine: f64,
+    /// Faces nearer than this share of the mean edge count as touching. Default 0.01.
+    pub gap_share: f64,
+}
+
+impl GuardParams {
+    /// See [`Self::smallest_quality`]. To follow a touch a thin triangle needs to lose little. With a share of 0.8 a vertex of a
+    /// crumpled scan strayed, with 0.3 one more face was the wrong way round on another.
+    pub const SCANNED_SHARE: f64 = 0.9;
+}
+
+impl Default for GuardParams {
+    fn default() -> Self {
+        Self {
+            smallest_quality: 0.15,
+            smallest_turn_cosine: 0.5,
+            smallest_evidence_cosine: 0.0,
+            smallest_fold_cosine: -0.85,
+            gap_share: 0.01,
+        }
+    }
+}
+
+/// Normals of a smooth region are within this cosine of their mean: 70°. Such a region is a height field over the plane
+/// across its mean normal and cannot meet itself.
+const SMOOTH_COSINE: f64 = 0.35;
+/// While each normal stays within this cosine (75°), the region remains a height field.
+const STILL_SMOOTH_COSINE: f64 = 0.25;
+/// Vertices of a smooth region that each moved by less than this share of the smallest altitude since the last look turn
+/// a normal by less than 0.04 rad and change a quality by less than 12 %, so that what passed with the margins below
+/// need not be looked at again. Proof: a normal turns by at most the sum of two corner motions over the altitude.
+const UNSEEN_SHARE: f64 = 0.02;
+/// Margin on the cosine of a normal with a fixed direction; 0.04 rad change it by no more than 0.04.
+const COSINE_MARGIN: f64 = 0.05;
+/// Margin on the cosine between two normals, both of which turn.
+const FOLD_MARGIN: f64 = 0.1;
+/// Margin on the quality.
+const QUALITY_MARGIN: f64 = 1.15;
+
+/// What was scanned or felt, against which an update is held.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct GuardEvidence<'a> {
+    /// positions as scanned, m
+    pub scanned: &'a [Point3<f64>],
+    /// for each face the last normal scanned or felt there; zero where it was scanned without area and never felt: it has no
+    /// side to keep then, and must not hold the others
+    pub normals: &'a [[f32; 3]],
+}
+
+impl GuardEvidence<'_> {
+    /// Twice the area over the longest edge squared that a face may not fall below.
+    fn smallest_quality(&self, mesh: &TriMesh, face: FaceId, params: &GuardParams) -> f64 {
+        let corners = mesh.corners(face).map(|vertex| self.scanned[vertex.0 as usize]);
+        let double_area = (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).norm();
+        params.smallest_quality.min(GuardParams::SCANNED_SHARE * triangle::shape_quality(&corners, double_area))
+    }
+}
+
+/// A face of the region, or of the rim around it.
+#[derive(Clone, Copy, Debug)]
+struct FaceShape {
+    normal: Vector3<f64>,
+    quality: f64,
+    /// smallest altitude, m
+    altitude: f64,
+}
+
+/// What [`Neighbourhood::judge`] says of an update.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum GuardVerdict {
+    /// The mesh is no worse than before.
+    Sound,
+    /// A face would flip, fold, starve or meet another.
+    Broken,
+    /// The region ceases to be smooth: [`Neighbourhood::roughen`] it and ask again.
+    Rough,
+}
+
+/// How a look at the region ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum LookEnding {
+    Broken,
+    /// sound, but something is at its limit
+    Sound,
+    /// sound with margins
+    Safe,
+}
+
+impl LookEnding {
+    fn of(broken: bool, at_limit: bool) -> Self {
+        if broken {
+            Self::Broken
+        } else if at_limit {
+            Self::Sound
+        } else {
+            Self::Safe
+        }
+    }
+
+    fn and(self, other: Self) -> Self {
+        match (self, other) {
+            (Self::Broken, _) | (_, Self::Broken) => Self::Broken,
+            (Self::Safe, Self::Safe) => Self::Safe,
+            _ => Self::Sound,
+        }
+    }
+}
+
+/// The faces that change when the vertices of a region move, and what they could run into.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Neighbourhood {
+    pub ring: Ring,
+    /// state at the last look, for each face of the ring
+    before: Vec<FaceShape>,
+    /// state after the update, for the moving ones
+    after: Vec<FaceShape>,
+    /// mean normal of a smooth region; without one, the pairs in `suspects` are looked at
+    smooth: Option<Vector3<f64>>,
+    suspects: Pairs,
+    /// how far vertices may still move before `suspects` or `smooth` must be found again, m
+    allowance: f64,
+    /// how far vertices may still move before the region must be looked at again, m
+    unseen: f64,
+    near: BoxQuery,
+    /// the faces nearby with their boxes
+    boxes: Vec<(FaceId, Aabb)>,
+    /// corners that hang together with the region
+    reached: ScratchMap,
+}
+
+/// Normal and proportions of a face.
+#[inline]
+fn shape_of(mesh: &TriMesh, face: FaceId) -> FaceShape {
+    let corners = mesh.triangle(face);
+    let double = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
+    let double_area = double.norm();
+    let quality = triangle::shape_quality(&corners, double_area);
+    let normal = if double_area > 0.0 { double / double_area } else { Vector3::zeros() };
+    // 2A / L from 2A / L² and 2A
+    FaceShape { normal, quality, altitude: (quality * double_area).sqrt() }
+}
+
+impl Neighbourhood {
+    /// Makes room for a region of so many vertices: two to three faces each, three edges for two faces.
+    pub fn reserve(&mut self, vertices: usize) {
+        let faces = 3 * vertices;
+        for list in [&mut self.before, &mut self.after] {
+            list.reserve(faces);
+        }
+        self.ring.reserve(vertices);
+        self.near = BoxQuery::with_room(2 * faces);
+        self.boxes.reserve(2 * faces);
+        self.suspects.reserve(faces);
+        self.reached.reserve(4 * faces);
+    }
+
+    /// Looks at the region anew after the mesh was changed elsewhere; arguments as in [`Self::judge`].
+    pub fn refresh(
+        &mut self,
+        mesh: &TriMesh,
+        tree: &FaceTree,
+        margin: f64,
+        params: &GuardParams,
+        evidence: &GuardEvidence,
+    ) {
+        self.before.clear();
+        self.before.extend(self.ring.faces.iter().map(|&face| shape_of(mesh, face)));
+        self.collect(mesh, tree, margin);
+        self.unseen = 0.0;
+        if let Some(mean) = self.smooth {
+            self.after.clear();
+            self.after.extend_from_slice(&self.before[..self.ring.moving]);
+            let lowest = self.after.iter().map(|shape| shape.normal.dot(&mean)).fold(1.0, f64::min);
+            self.allow_unseen(self.look(mesh, params, evidence), lowest);
+        }
+    }
+
+    /// Looks for faces that could be met within `margin` (m) of motion.
+    pub fn collect(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64) {
+        self.allowance = 0.5 * margin;
+        self.find_near(mesh, tree, margin);
+        self.smooth = self.smooth_normal(mesh);
+        if self.smooth.is_none() {
+            self.roughen(mesh, tree, margin);
+        }
+    }
+
+    /// Gives up the claim to be smooth: pairs of faces are looked at from now on.
+    pub fn roughen(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64) {
+        self.allowance = 0.5 * margin;
+        self.smooth = None;
+        self.find_near(mesh, tree, margin);
+        self.collect_suspects(mesh, margin);
+    }
+
+    fn find_near(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64) {
+        let (mut lo, mut hi) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+        for &face in self.ring.moving() {
+            for p in mesh.triangle(face) {
+                (lo, hi) = (lo.inf(&p.coords), hi.sup(&p.coords));
+            }
+        }
+        let margin_box = Vector3::repeat(margin);
+        tree.faces_in_box(&Point3::from(lo - margin_box), &Point3::from(hi + margin_box), &mut self.near);
+    }
+
+    /// The mean normal, if all faces nearby are within [`SMOOTH_COSINE`] of it and hang together.
+    fn smooth_normal(&mut self, mesh: &TriMesh) -> Option<Vector3<f64>> {
+        let sum: Vector3<f64> = self.before[..self.ring.moving].iter().map(|shape| shape.normal).sum();
+        let mean = sum.try_normalize(0.0)?;
+        if self.before.iter().any(|shape| shape.normal.dot(&mean) <= SMOOTH_COSINE) {
+            return None;
+        }
+        let ring = &self.ring;
+        retain(&mut self.near.faces, |face| ring.number_of(face).is_none());
+        let within = |face: &FaceId| {
+            let double = mesh.double_area_normal(*face);
+            double.dot(&mean) > SMOOTH_COSINE * double.norm()
+        };
+        if !self.near.faces.iter().all(within) {
+            return None;
+        }
+        // nearly always the rim's other corners reach all; at a border some are reached from the moving faces
+        self.reached.clear();
+        let (moving, rim) = self.ring.faces.split_at(self.ring.moving);
+        for faces in [rim, moving] {
+            for &face in faces {
+                self.reached.number(mesh.corners(face).map(|corner| corner.0));
+            }
+            if reach_all(mesh, &mut self.near.faces, &mut self.reached) {
+                return Some(mean);
+            }
+        }
+        None
+    }
+
+    fn collect_suspects(&mut self, mesh: &TriMesh, margin: f64) {
+        self.suspects.clear();
+        self.boxes.clear();
+        self.boxes.extend(self.near.faces.iter().map(|&face| (face, bounds(&mesh.triangle(face)))));
+        for (moving, &face) in self.ring.moving().iter().enumerate() {
+            // two moving faces are one pair
+            let is_wanted = |other| self.ring.number_of(other).is_none_or(|index| index as usize > moving);
+            self.suspects.add_near(mesh, face, &self.boxes, margin, is_wanted);
+        }
+    }
+
+    /// Whether the vertices may move by `way` (m) without a look.
+    #[inline]
+    pub fn may_pass_unseen(&self, way: f64) -> bool {
+        way <= self.unseen
+    }
+
+    /// Takes a motion of `way` (m) that [`Self::may_pass_unseen`].
+    #[inline]
+    pub fn pass_unseen(&mut self, way: f64) {
+        self.unseen -= way;
+        self.allowance -= way;
+    }
+
+    /// Judges the mesh as it stands now against what it was before the update.
+    ///
+    /// - `gap`: faces nearer than this touch, m.
+    /// - `way`: the longest way of a vertex in the update, m.
+    /// - `before`: the position of a vertex before the update, m.
+    pub fn judge(
+        &mut self,
+        mesh: &TriMesh,
+        params: &GuardParams,
+        evidence: &GuardEvidence,
+        gap: f64,
+        way: f64,
+        before: impl Fn(VertexId) -> Point3<f64>,
+    ) -> GuardVerdict {
+        self.after.clear();
+        self.after.extend(self.ring.faces[..self.ring.moving].iter().map(|&face| shape_of(mesh, face)));
+        let look = self.look(mesh, params, evidence);
+        self.unseen = 0.0;
+        if look == LookEnding::Broken {
+            return GuardVerdict::Broken;
+        }
+        let Some(mean) = self.smooth else {
+            return if self.suspects.are_clear(mesh, gap, way, before) {
+                GuardVerdict::Sound
+            } else {
+                GuardVerdict::Broken
+            };
+        };
+        let lowest = self.after.iter().map(|shape| shape.normal.dot(&mean)).fold(1.0, f64::min);
+        if lowest <= STILL_SMOOTH_COSINE {
+            return GuardVerdict::Rough;
+        }
+        self.allow_unseen(look, lowest);
+        GuardVerdict::Sound
+    }
+
+    /// How far vertices may move without a look, after one at a smooth region.
+    fn allow_unseen(&mut self, look: LookEnding, lowest_cosine: f64) {
+        if look == LookEnding::Safe && lowest_cosine > STILL_SMOOTH_COSINE + COSINE_MARGIN {
+            let altitude = self.after.iter().map(|shape| shape.altitude).fold(f64::INFINITY, f64::min);
+            self.unseen = UNSEEN_SHARE * altitude;
+        }
+    }
+
+    fn look(&self, mesh: &TriMesh, params: &GuardParams, evidence: &GuardEvidence) -> LookEnding {
+        match self.look_at_faces(mesh, params, evidence) {
+            LookEnding::Broken => LookEnding::Broken,
+            look => look.and(self.look_at_edges(params, evidence.normals)),
+        }
+    }
+
+    fn look_at_faces(&self, mesh: &TriMesh, params: &GuardParams, evidence: &GuardEvidence) -> LookEnding {
+        let mut look = LookEnding::Safe;
+        for ((&face, old), new) in self.ring.faces.iter().zip(&self.before).zip(&self.after) {
+            let seen = Vector3::from(evidence.normals[face.0 as usize].map(f64::from));
+            if seen == Vector3::zeros() {
+                continue;
+            }
+            let worse = |new: f64, old: f64, limit: f64| new < limit && new < old;
+            let cosine = new.normal.dot(&seen);
+            let is_thin = new.quality < params.smallest_quality * QUALITY_MARGIN;
+            let smallest_quality = if is_thin { evidence.smallest_quality(mesh, face, params) } else { 0.0 };
+            let broken = worse(new.quality, old.quality, smallest_quality)
+                || worse(cosine, old.normal.dot(&seen), params.smallest_evidence_cosine)
+                || new.normal.dot(&old.normal) < params.smallest_turn_cosine;
+            let at_limit = new.quality < smallest_quality * QUALITY_MARGIN
+                || cosine < params.smallest_evidence_cosine + COSINE_MARGIN;
+            look = look.and(LookEnding::of(broken, at_limit));
+            if look == LookEnding::Broken {
+                break;
+            }
+        }
+        look
+    }
+
+    fn look_at_edges(&self, params: &GuardParams, normals: &[[f32; 3]]) -> LookEnding {
+        let mut look = LookEnding::Safe;
+        let has_side = |index: u32| normals[self.ring.faces[index as usize].0 as usize] != [0.0; 3];
+        for &(a, b) in &self.ring.edges {
+            let (old_a, old_b) = (&self.before[a as usize], &self.before[b as usize]);
+            let new_b = self.after.get(b as usize).unwrap_or(old_b);
+            let cosine = self.after[a as usize].normal.dot(&new_b.normal);
+            if cosine < params.smallest_fold_cosine + FOLD_MARGIN && has_side(a) && has_side(b) {
+                let broken = cosine < params.smallest_fold_cosine && cosine < old_a.normal.dot(&old_b.normal);
+                look = look.and(LookEnding::of(broken, true));
+            }
+        }
+        look
+    }
+
+    /// Takes the state just looked at as the new state before; `way` is the longest of a vertex, m.
+    pub fn accept(&mut self, way: f64) {
+        self.before[..self.ring.moving].copy_from_slice(&self.after);
+        self.suspects.accept(way);
+        self.allowance -= way;
+    }
+
+    /// Whether the faces nearby must be collected again before a motion of `way` (m).
+    #[inline]
+    pub fn is_outdated(&self, way: f64) -> bool {
+        self.allowance < way
+    }
+}
+
+/// Whether `faces` reach the corners already `reached`, over common corners among themselves; takes out those that do.
+fn reach_all(mesh: &TriMesh, faces: &mut Vec<FaceId>, reached: &mut ScratchMap) -> bool {
+    loop {
+        let before = faces.len();
+        retain(faces, |face| {
+            let (corners, known) = (mesh.corners(face).map(|corner| corner.0), reached.len());
+            reached.number(corners);
+            let is_reached = reached.len() < known + 3;
+            if !is_reached {
+                reached.take_back(corners);
+            }
+            !is_reached
+        });
+        if faces.is_empty() || faces.len() == before {
+            return faces.is_empty();
+        }
+    }
+}
+
+/// As [`Vec::retain`], without a branch on the answer: it cannot be foretold.
+#[inline]
+fn retain(faces: &mut Vec<FaceId>, mut stays: impl FnMut(FaceId) -> bool) {
+    let mut kept = 0;
+    for at in 0..faces.len() {
+        let face = faces[at];
+        faces[kept] = face;
+        kept += usize::from(stays(face));
+    }
+    faces.truncate(kept);
+}

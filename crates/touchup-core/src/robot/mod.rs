@@ -1,0 +1,21 @@
+//! An arm that holds a probe, and how it touches.
+//!
+//! [`Arm`] is what is needed of one, [`Limits`] what it must never leave. [`Watched::touch`] makes one touch and says where the part
+//! was felt: where the curve of force over travel bends ([`find_onset`]), not where the arm came to rest. [`Watched::slide`] presses with a
+//! constant force and goes along a way.
+
+mod arm;
+mod kinematics;
+mod limits;
+mod onset;
+mod sliding;
+mod touching;
+mod watched;
+
+pub use arm::{Arm, ArmError, ArmState, Command, Safety};
+pub use kinematics::{Joints, UrGeometry};
+pub use limits::{LimitError, Limits, Narrower};
+pub use onset::{Onset, OnsetError, OnsetParams, OnsetVerdict, TouchMoment, find_onset};
+pub use sliding::{SlideEnding, SlideRecord, SlideStation, SlideTarget};
+pub use touching::{CRAWL, TouchOutcome, TouchParams, TouchRecord, TouchTarget};
+pub use watched::{ProbeError, Watched, Witness};

@@ -1,0 +1,253 @@
+//! How late the clock of the wrench reads, from the samples themselves.
+//!
+//! A ball that comes down onto a surface is stopped at the instant at which the force leaves zero. Along the force, its
+//! centre p + F/k goes as c + v₋ min(t − t₀, 0) + v₊ max(t − t₀, 0), and the force rises as A (1 − e^(−(t − t₁)/T)). The
+//! delay is δ = t₁ − t₀. Each onset gives the profile of its least squares over δ; all of them together give δ, and how
+//! much they differ gives its uncertainty.
+
+use std::collections::VecDeque;
+
+use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+use serde::Serialize;
+
+use super::{ContactGate, ContactGateParams, SettingError, Tip};
+
+/// Settings of a [`ClockEstimator`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ClockParams {
+    /// What stylus and probe give way under force, N/m; `None`: rigid.
+    pub stiffness: Option<f64>,
+    /// Tells contact from free motion.
+    pub gate: ContactGateParams,
+}
+
+/// What the clock of the wrench reads beyond that of the pose.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ClockOffset {
+    /// s; to be added to [`super::SyncParams::wrench_offset_ns`]
+    pub offset: f64,
+    /// standard uncertainty, s
+    pub sigma: f64,
+    /// onsets of contact that it comes from
+    pub onsets: usize,
+}
+
+/// Of an onset, on each side of the instant at which the gate opens, ns.
+const BEFORE_NS: i64 = 25_000_000;
+const AFTER_NS: i64 = 15_000_000;
+/// The force's rise is fitted from this long before the gate opens, s …
+const RISE_BEFORE: f64 = 8e-3;
+/// … to this long after, s: later the hand changes its mind.
+const RISE_AFTER: f64 = 8e-3;
+/// Delays that are tried: ± [`REACH`] steps of [`STEP`] s.
+const REACH: usize = 48;
+const STEP: f64 = 0.25e-3;
+const DELAYS: usize = 2 * REACH + 1;
+/// Samples of an onset: 1 kHz has 40, 4 kHz would have 160.
+const MOST_SAMPLES: usize = 256;
+/// With fewer there is no line to fit.
+const LEAST_SAMPLES: usize = 16;
+/// An onset at which the ball loses less speed than this tells nothing, m/s.
+const LEAST_STOP: f64 = 15e-3;
+/// Onsets that are kept; later ones take the place of the first.
+const MOST_ONSETS: usize = 512;
+/// Fewer say nothing about how much they differ.
+const LEAST_ONSETS: usize = 8;
+/// A force that does not rise exponentially is taken to begin too early or too late by about this, s. Half a period of
+/// the wrench comes to it: nobody knows over which part of it a sensor takes its mean.
+const SHAPE: f64 = 0.3e-3;
+/// A wider uncertainty is no estimate, s.
+const LARGEST_SIGMA: f64 = 3e-3;
+
+/// Collects onsets of contact. Memory is bounded.
+#[derive(Clone, Debug)]
+pub struct ClockEstimator {
+    params: ClockParams,
+    gate: ContactGate,
+    held: VecDeque<OnsetEntry>,
+    /// stamp at which contact began or ended last, and the onset that waits for its samples
+    turned_ns: Option<i64>,
+    onset_ns: Option<i64>,
+    /// between two samples, at the last onset, s
+    period: f64,
+    onsets: VecDeque<Profile>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct OnsetEntry {
+    stamp_ns: i64,
+    position: Vector3<f64>,
+    force_o: Vector3<f64>,
+}
+
+/// −log likelihood of one onset at each delay.
+type Profile = [f64; DELAYS];
+
+impl ClockEstimator {
+    /// # Errors
+    /// [`SettingError`] of the gate, and for a stiffness of no use.
+    pub fn new(params: ClockParams) -> Result<Self, SettingError> {
+        let stiffness = params.stiffness.unwrap_or(1.0);
+        SettingError::check("tip stiffness (N/m)", stiffness, stiffness > 0.0, "more than 0")?;
+        let gate = ContactGate::new(params.gate)?;
+        let held = VecDeque::with_capacity(MOST_SAMPLES);
+        Ok(Self { params, gate, held, turned_ns: None, onset_ns: None, period: 0.0, onsets: VecDeque::new() })
+    }
+
+    /// Takes the next tip, which is later than the one before.
+    pub fn push(&mut self, tip: &Tip) {
+        let was_in_contact = self.gate.is_in_contact();
+        let is_in_contact = self.gate.update(tip.stamp_ns, &tip.force_o).is_some();
+        if self.held.len() == MOST_SAMPLES {
+            self.held.pop_front();
+        }
+        let position = tip.pose_ot.translation.vector;
+        self.held.push_back(OnsetEntry { stamp_ns: tip.stamp_ns, position, force_o: tip.force_o });
+        if self.onset_ns.is_some_and(|onset_ns| tip.stamp_ns - onset_ns >= AFTER_NS)
+            && let Some(onset_ns) = self.onset_ns.take()
+            && let Some(profile) = self.profile(onset_ns)
+        {
+            if self.onsets.len() == MOST_ONSETS {
+                self.onsets.pop_front();
+            }
+            self.onsets.push_back(profile);
+            self.period = self.mean_period();
+        }
+        if was_in_contact != is_in_contact {
+            let was_calm = self.turned_ns.is_none_or(|turned_ns| tip.stamp_ns - turned_ns >= BEFORE_NS);
+            self.onset_ns = (is_in_contact && was_calm).then_some(tip.stamp_ns);
+            self.turned_ns = Some(tip.stamp_ns);
+        }
+    }
+
+    /// The delay of all onsets so far; `None` when they do not tell it.
+    pub fn offset(&self) -> Option<ClockOffset> {
+        if self.onsets.len() < LEAST_ONSETS {
+            return None;
+        }
+        let mut sum = [0.0; DELAYS];
+        for profile in &self.onsets {
+            sum.iter_mut().zip(profile).for_each(|(sum, x)| *sum += x);
+        }
+        let best = (0..DELAYS).min_by(|&a, &b| sum[a].total_cmp(&sum[b]))?;
+        // slopes over ±3 steps: the rounding of single samples is smoother than that
+        const SPAN: usize = 3;
+        if best < 2 * SPAN || best + 2 * SPAN >= DELAYS {
+            return None;
+        }
+        let width = SPAN as f64 * STEP;
+        let slope = |x: &Profile| (x[best + SPAN] - x[best - SPAN]) / (2.0 * width);
+        let bend = (sum[best + SPAN] - 2.0 * sum[best] + sum[best - SPAN]) / (width * width);
+        if bend <= 0.0 {
+            return None;
+        }
+        let shift = -slope(&sum) / bend;
+        let mean_slope = slope(&sum) / self.onsets.len() as f64;
+        let scatter: f64 = self.onsets.iter().map(|x| (slope(x) - mean_slope).powi(2)).sum();
+        let sigma = (scatter / (bend * bend) + SHAPE * SHAPE + (self.period / 2.0).powi(2)).sqrt();
+        let offset = (best as f64 - REACH as f64) * STEP + shift.clamp(-width, width);
+        (sigma <= LARGEST_SIGMA).then_some(ClockOffset { offset, sigma, onsets: self.onsets.len() })
+    }
+
+    /// Between the samples that are held, s.
+    fn mean_period(&self) -> f64 {
+        let ends = self.held.front().zip(self.held.back());
+        let span = ends.map_or(0.0, |(first, last)| (last.stamp_ns - first.stamp_ns) as f64 * 1e-9);
+        span / (self.held.len().max(2) - 1) as f64
+    }
+
+    /// `None` when the samples around the onset do not show one.
+    fn profile(&self, onset_ns: i64) -> Option<Profile> {
+        let around = self.held.iter().filter(|x| (-BEFORE_NS..=AFTER_NS).contains(&(x.stamp_ns - onset_ns)));
+        let pressed: Vector3<f64> = around.clone().filter(|x| x.stamp_ns > onset_ns).map(|x| x.force_o).sum();
+        let along = pressed.try_normalize(0.0)?;
+        let mut samples = [OnsetSample { t: 0.0, centre: 0.0, force: 0.0 }; MOST_SAMPLES];
+        let mut count = 0;
+        for entry in around {
+            let (force, t) = (entry.force_o.dot(&along), (entry.stamp_ns - onset_ns) as f64 * 1e-9);
+            samples[count] = OnsetSample { t, centre: entry.position.dot(&along), force };
+            count += 1;
+        }
+        let samples = &mut samples[..count];
+        if count < LEAST_SAMPLES || samples[0].t > -0.6e-9 * BEFORE_NS as f64 {
+            return None;
+        }
+        // far-off numbers do not lose the digits of a micrometre
+        let middle = samples[count / 2].centre;
+        samples.iter_mut().for_each(|x| x.centre -= middle);
+        let begun = force_begins(samples)?;
+        let bend = 1.0 / self.params.stiffness.unwrap_or(f64::INFINITY);
+        let mut profile = [0.0; DELAYS];
+        let mut stop: f64 = 0.0;
+        let mut least = f64::INFINITY;
+        for (at, out) in profile.iter_mut().enumerate() {
+            let delay = (at as f64 - REACH as f64) * STEP;
+            let (left, speeds) = kink(samples, begun, delay, bend)?;
+            *out = 0.5 * count as f64 * left.max(f64::MIN_POSITIVE).ln();
+            if left < least {
+                (least, stop) = (left, speeds[1] - speeds[0]);
+            }
+        }
+        (stop >= LEAST_STOP).then_some(profile)
+    }
+}
+
+/// A sample of an onset along the force.
+#[derive(Clone, Copy)]
+struct OnsetSample {
+    /// s after the gate opened
+    t: f64,
+    /// of the reported ball, m
+    centre: f64,
+    /// N
+    force: f64,
+}
+
+/// When the force leaves zero: least squares of offset and A (1 − e^(−(t − t₁)/T)) over t₁ and T.
+fn force_begins(samples: &[OnsetSample]) -> Option<f64> {
+    let rise = || samples.iter().filter(|x| (-2.0 * RISE_BEFORE..=RISE_AFTER).contains(&x.t));
+    let mut best: Option<(f64, f64)> = None;
+    for time in [2e-3, 4e-3, 7e-3, 10e-3, 15e-3, 30e-3] {
+        for step in 0..=90 {
+            let begun = 1e-3 - f64::from(step) * 1e-4;
+            let (mut normal, mut right, mut squares) = (Matrix2::zeros(), Vector2::zeros(), 0.0);
+            for x in rise() {
+                let row = Vector2::new(1.0, -(-(x.t - begun).max(0.0) / time).exp_m1());
+                normal += row * row.transpose();
+                right += row * x.force;
+                squares += x.force * x.force;
+            }
+            let Some(solved) = normal.cholesky().map(|c| c.solve(&right)) else { continue };
+            let left = squares - solved.dot(&right);
+            if best.is_none_or(|(least, _)| left < least) {
+                best = Some((left, begun));
+            }
+        }
+    }
+    best.map(|(_, begun)| begun)
+}
+
+/// What is left of the centre's way after a bent line is taken off, and the speeds before and after the bend.
+fn kink(samples: &[OnsetSample], begun: f64, delay: f64, bend: f64) -> Option<(f64, [f64; 2])> {
+    let (mut normal, mut right, mut squares) = (Matrix3::zeros(), Vector3::zeros(), 0.0);
+    for x in samples {
+        let centre = x.centre + force_at(samples, x.t + delay) * bend;
+        let t = x.t - (begun - delay);
+        let row = Vector3::new(1.0, t.min(0.0), t.max(0.0));
+        normal += row * row.transpose();
+        right += row * centre;
+        squares += centre * centre;
+    }
+    let solved = normal.cholesky()?.solve(&right);
+    Some((squares - solved.dot(&right), [solved.y, solved.z]))
+}
+
+/// Between samples straight, beyond them as the nearest.
+fn force_at(samples: &[OnsetSample], t: f64) -> f64 {
+    let after = samples.partition_point(|x| x.t <= t);
+    match (after.checked_sub(1).and_then(|i| samples.get(i)), samples.get(after)) {
+        (Some(a), Some(b)) => a.force + (b.force - a.force) * (t - a.t) / (b.t - a.t),
+        (Some(only), None) | (None, Some(only)) => only.force,
+        (None, None) => 0.0,
+    }
+}

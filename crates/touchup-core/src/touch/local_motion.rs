@@ -1,0 +1,83 @@
+//! Where the ball is and how fast, from the positions around one instant.
+//!
+//! A parabola in time through the positions of a window, by least squares: unlike a mean it does not cut corners. Its
+//! window is as long as the path looks like a parabola, give or take the noise of the positions.
+
+use nalgebra::{Matrix3, Point3, Vector3};
+
+/// Sums over a window, about an instant: all that the parabola needs. A longer window goes on where a shorter one ended.
+#[derive(Clone, Debug)]
+pub struct LocalMotion {
+    /// unit of time of the sums, s
+    scale: f64,
+    middle: Point3<f64>,
+    /// Σ uⁱ
+    powers: [f64; 5],
+    /// Σ uⁱ (x − x₀)
+    moments: [Vector3<f64>; 3],
+    /// Σ |x − x₀|²
+    squares: f64,
+}
+
+/// Where the ball is at the instant, and how fast it moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SmoothedMotion {
+    /// m, in O
+    pub centre: Point3<f64>,
+    /// m/s, in O
+    pub velocity: Vector3<f64>,
+    /// variance of a component of the centre for positions off by 1 m, m²
+    pub centre_gain: f64,
+    /// standard deviation of a component of the velocity for positions off by 1 m, 1/s
+    pub velocity_gain: f64,
+    /// standard deviation of a component of a position from the parabola, m
+    pub residual: f64,
+}
+
+impl LocalMotion {
+    /// An empty window.
+    ///
+    /// - `middle`: the position at the instant, m, in O.
+    /// - `scale`: a time about as long as half the longest window, s; more than 0.
+    pub fn new(middle: Point3<f64>, scale: f64) -> Self {
+        Self { scale, middle, powers: [0.0; 5], moments: [Vector3::zeros(); 3], squares: 0.0 }
+    }
+
+    /// Adds the position `after` (s) the instant.
+    #[inline]
+    pub fn add(&mut self, after: f64, position: &Point3<f64>) {
+        let u = after / self.scale;
+        let arm = position - self.middle;
+        let mut power = 1.0;
+        for (i, sum) in self.powers.iter_mut().enumerate() {
+            *sum += power;
+            if let Some(moment) = self.moments.get_mut(i) {
+                *moment += arm * power;
+            }
+            power *= u;
+        }
+        self.squares += arm.norm_squared();
+    }
+
+    /// The parabola at the instant; the mean, at rest and with no bound on its error, of too few positions.
+    pub fn motion(&self) -> SmoothedMotion {
+        let [n, u, u2, u3, u4] = self.powers;
+        let parabola = (n > 3.0).then(|| Matrix3::new(n, u, u2, u, u2, u3, u2, u3, u4).try_inverse()).flatten();
+        let Some(inverse) = parabola else {
+            let centre = self.middle + self.moments[0] / n.max(1.0);
+            let velocity = Vector3::zeros();
+            let (centre_gain, residual) = (1.0 / n.max(1.0), f64::INFINITY);
+            return SmoothedMotion { centre, velocity, centre_gain, velocity_gain: f64::INFINITY, residual };
+        };
+        let [m0, m1, m2] = &self.moments;
+        let [a, b, c] = [0, 1, 2].map(|row| m0 * inverse[(row, 0)] + m1 * inverse[(row, 1)] + m2 * inverse[(row, 2)]);
+        let explained = a.dot(m0) + b.dot(m1) + c.dot(m2);
+        SmoothedMotion {
+            centre: self.middle + a,
+            velocity: b / self.scale,
+            centre_gain: inverse[(0, 0)].max(0.0),
+            velocity_gain: inverse[(1, 1)].max(0.0).sqrt() / self.scale,
+            residual: ((self.squares - explained).max(0.0) / (3.0 * (n - 3.0))).sqrt(),
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! What can be wrong inside a mesh file, and where.
+
+use std::fmt;
+
+/// Where in a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FilePlace {
+    /// counted from 1
+    Line(usize),
+    /// counted from 0
+    Byte(usize),
+}
+
+impl fmt::Display for FilePlace {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Line(line) => write!(f, "line {line}"),
+            Self::Byte(byte) => write!(f, "byte {byte}"),
+        }
+    }
+}
+
+/// What is wrong there.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Defect {
+    /// Something else stands there.
+    #[error("expected {expected}, found {found}")]
+    Unexpected {
+        /// what could have been read
+        expected: &'static str,
+        /// what stands there, shortened
+        found: String,
+    },
+    /// Fewer bytes than the header asks for.
+    #[error(
+        "the header announces {count} {what}, which take {needed} bytes, but {left} follow: the file is damaged or cut short, export it again"
+    )]
+    TooShort {
+        /// what is counted
+        what: String,
+        /// how many there should be
+        count: u64,
+        /// bytes they take at least
+        needed: u128,
+        /// bytes there are
+        left: usize,
+    },
+    /// More bytes than the header asks for.
+    #[error(
+        "the header announces {count} triangles, which take {needed} bytes, but {left} follow: the count or the end is wrong, export it again"
+    )]
+    TooLong {
+        /// triangles announced
+        count: u64,
+        /// bytes they take
+        needed: u128,
+        /// bytes there are
+        left: usize,
+    },
+    /// A vertex number that names no vertex.
+    #[error("a face uses vertex {vertex}, but there are only {vertices} vertices")]
+    NoSuchVertex {
+        /// as it stands in the file
+        vertex: i64,
+        /// how many there are
+        vertices: usize,
+    },
+}
+
+/// A [`Defect`] with its [`FilePlace`].
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Syntax {
+    pub place: FilePlace,
+    pub defect: Defect,
+}
+
+impl Syntax {
+    /// `found` is shown on one line and shortened.
+    pub fn unexpected(place: FilePlace, expected: &'static str, found: impl fmt::Display) -> Self {
+        /// Enough to find it again.
+        const SHOWN: usize = 40;
+        let found = found.to_string();
+        let shown: String = found.chars().take(SHOWN).flat_map(char::escape_debug).collect();
+        let more = if found.chars().count() > SHOWN { "…" } else { "" };
+        Self { place, defect: Defect::Unexpected { expected, found: format!("'{shown}{more}'") } }
+    }
+
+    /// The file ends here.
+    pub fn ends(place: FilePlace, expected: &'static str) -> Self {
+        Self { place, defect: Defect::Unexpected { expected, found: "the end of the file".into() } }
+    }
+}

@@ -1,0 +1,322 @@
+//! Triangle mesh files: PLY, STL and OBJ in, repaired on the way; the same three out.
+
+mod defect;
+mod obj;
+mod ply;
+mod stl;
+mod text;
+mod unit;
+
+use std::borrow::Cow;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use nalgebra::{Point3, Vector3};
+
+use super::atomic::{AtomicFile, write_atomically};
+use defect::Syntax;
+pub use defect::{Defect, FilePlace};
+use touchup_core::mesh::{MeshError, RepairReport, TriMesh, repair};
+pub use unit::{Implausible, LARGEST_M, MeshUnit, SMALLEST_M};
+
+/// Why a mesh file could not be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum MeshFileError {
+    /// The disk says no.
+    #[error("cannot read {}: {source}", path.display())]
+    Read {
+        /// the file
+        path: PathBuf,
+        /// what the system reports
+        source: io::Error,
+    },
+    /// The disk says no.
+    #[error("cannot write {}: {source}", path.display())]
+    Write {
+        /// the file
+        path: PathBuf,
+        /// what the system reports
+        source: io::Error,
+    },
+    /// Neither the name nor the content is known.
+    #[error("{}: not a kind of mesh file known here: convert it to .ply, .stl or .obj", path.display())]
+    UnknownFormat {
+        /// the file
+        path: PathBuf,
+    },
+    /// The content breaks the rules of its format.
+    #[error("{}, {place}: {defect}", path.display())]
+    Syntax {
+        /// the file
+        path: PathBuf,
+        /// where
+        place: FilePlace,
+        /// what
+        defect: Defect,
+    },
+    /// Points without a surface.
+    #[error("{}: no face in it, only {vertices} vertices: make a triangle mesh of it first", path.display())]
+    NoFaces {
+        /// the file
+        path: PathBuf,
+        /// how many points
+        vertices: usize,
+    },
+    /// The triangles make no mesh.
+    #[error("{}: {source}", path.display())]
+    Mesh {
+        /// the file
+        path: PathBuf,
+        /// why
+        source: MeshError,
+    },
+    /// The unit cannot be right.
+    #[error("{}: {size}", path.display())]
+    Implausible {
+        /// the file
+        path: PathBuf,
+        /// the size and what it suggests
+        size: Implausible,
+    },
+}
+
+/// A mesh as read, and what had to be repaired.
+#[derive(Clone, Debug)]
+pub struct MeshFile {
+    /// vertices in m, in the file's own frame, which becomes O
+    pub mesh: TriMesh,
+    /// what was wrong with the file
+    pub repair: RepairReport,
+}
+
+/// Triangles as they stand in a file.
+#[derive(Debug, Default)]
+struct Soup {
+    positions: Vec<Point3<f64>>,
+    faces: Vec<[u32; 3]>,
+    /// vertices in the file that did not even get into `positions`
+    unused: usize,
+}
+
+impl Soup {
+    /// Three positions for each triangle.
+    fn of_triangles(positions: Vec<Point3<f64>>) -> Self {
+        // beyond 32 bits `repair` refuses by the number of positions
+        let faces = (0..positions.len() as u32 / 3).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
+        Self { positions, faces, unused: 0 }
+    }
+}
+
+#[derive(Clone, Copy)]
+enum Format {
+    Ply,
+    Stl,
+    Obj,
+}
+
+impl Format {
+    fn of_name(path: &Path) -> Option<Self> {
+        match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
+            "ply" => Some(Self::Ply),
+            "stl" => Some(Self::Stl),
+            "obj" => Some(Self::Obj),
+            _ => None,
+        }
+    }
+
+    /// By what stands in the file, where that leaves no doubt.
+    fn of_content(bytes: &[u8]) -> Option<Self> {
+        match bytes {
+            [b'p', b'l', b'y', b'\r' | b'\n', ..] => Some(Self::Ply),
+            _ if stl::is_binary(bytes) || stl::looks_ascii(bytes) => Some(Self::Stl),
+            _ => None,
+        }
+    }
+}
+
+/// Reads a PLY, STL or OBJ file and repairs it ([`repair`]).
+///
+/// The content decides about the format where it is unmistakable, the extension otherwise.
+///
+/// - `unit`: the unit of the coordinates in the file; the mesh comes out in m.
+///
+/// # Errors
+/// [`MeshFileError`]: one line that names the file, the place in it, and what to do.
+pub fn read_mesh(path: &Path, unit: MeshUnit) -> Result<MeshFile, MeshFileError> {
+    let bytes = std::fs::read(path).map_err(|source| MeshFileError::Read { path: path.into(), source })?;
+    let format = Format::of_content(&bytes)
+        .or_else(|| Format::of_name(path))
+        .ok_or_else(|| MeshFileError::UnknownFormat { path: path.into() })?;
+    let scale = unit.metres();
+    let soup = match format {
+        _ if bytes.is_empty() => Err(Syntax::ends(FilePlace::Byte(0), "a mesh")),
+        Format::Ply => ply::read(&bytes, scale),
+        Format::Stl => stl::read(&bytes, scale),
+        Format::Obj => obj::read(&bytes, scale),
+    };
+    drop(bytes);
+    let Soup { positions, faces, unused } =
+        soup.map_err(|Syntax { place, defect }| MeshFileError::Syntax { path: path.into(), place, defect })?;
+    if faces.is_empty() {
+        return Err(MeshFileError::NoFaces { path: path.into(), vertices: positions.len() + unused });
+    }
+    let (mesh, mut report) =
+        repair(positions, faces).map_err(|source| MeshFileError::Mesh { path: path.into(), source })?;
+    report.unused_vertices += unused;
+    Implausible::check(sides(&mesh), unit).map_err(|size| MeshFileError::Implausible { path: path.into(), size })?;
+    Ok(MeshFile { mesh, repair: report })
+}
+
+/// The scalar properties `names` of the vertices of a PLY file, as far as it has them, for each vertex of the `mesh` that
+/// [`read_mesh`] makes of it; nothing of a file of another kind.
+///
+/// - `mesh`: of that file, in `unit`.
+/// - returns: for each name the numbers by vertex id, or `None`.
+///
+/// # Errors
+/// [`MeshFileError::Read`], [`MeshFileError::Syntax`].
+pub fn read_vertex_columns<const N: usize>(
+    path: &Path,
+    unit: MeshUnit,
+    mesh: &TriMesh,
+    names: [&str; N],
+) -> Result<[Option<Vec<f32>>; N], MeshFileError> {
+    let bytes = std::fs::read(path).map_err(|source| MeshFileError::Read { path: path.into(), source })?;
+    if !matches!(Format::of_content(&bytes), Some(Format::Ply)) {
+        return Ok([const { None }; N]);
+    }
+    let syntax = |Syntax { place, defect }| MeshFileError::Syntax { path: path.into(), place, defect };
+    let (positions, columns) = ply::read_columns(&bytes, unit.metres(), names).map_err(syntax)?;
+    let rows = rows_of(mesh, &positions);
+    Ok(columns.map(|column| column.map(|values| rows.iter().map(|&row| values[row]).collect())))
+}
+
+/// For each vertex the row of the file that it comes from: repair keeps the order, and of equal positions the first.
+fn rows_of(mesh: &TriMesh, positions: &[Point3<f64>]) -> Vec<usize> {
+    let mut rows = positions.iter().enumerate();
+    let mut row_of = |wanted: &Point3<f64>| rows.find(|(_, p)| p.coords == wanted.coords).map(|(row, _)| row);
+    mesh.positions().iter().map_while(&mut row_of).collect()
+}
+
+/// Sides of the bounding box, m.
+fn sides(mesh: &TriMesh) -> Vector3<f64> {
+    let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+    for p in mesh.positions() {
+        for axis in 0..3 {
+            // plain comparisons: a mesh has no NaN, for which `min` and `max` would take several instructions more
+            low[axis] = if p[axis] < low[axis] { p[axis] } else { low[axis] };
+            high[axis] = if p[axis] > high[axis] { p[axis] } else { high[axis] };
+        }
+    }
+    high - low
+}
+
+/// Whether [`write_mesh`] can write there: to be asked before long work.
+///
+/// # Errors
+/// As [`write_mesh`].
+pub fn check_target(path: &Path) -> Result<(), MeshFileError> {
+    Format::of_name(path).ok_or_else(|| MeshFileError::UnknownFormat { path: path.into() })?;
+    AtomicFile::create(path).map(drop).map_err(|source| MeshFileError::Write { path: path.into(), source })
+}
+
+/// Writes a mesh as PLY (binary, double), STL (binary, which is single) or OBJ, by the extension of `path`.
+///
+/// Removed faces and vertices without a face are left out; the rest keeps its order. Same mesh, same bytes. The file
+/// appears whole or not at all ([`super::atomic`]).
+///
+/// - `unit`: the unit of the coordinates in the file; PLY and OBJ in m give back the mesh bit for bit.
+///
+/// # Errors
+/// [`MeshFileError::UnknownFormat`], [`MeshFileError::Write`].
+pub fn write_mesh(path: &Path, mesh: &TriMesh, unit: MeshUnit) -> Result<(), MeshFileError> {
+    write_mesh_with(path, mesh, &[], unit)
+}
+
+/// One number for each vertex of a mesh, by id; a property of the vertices in a PLY file.
+#[derive(Clone, Debug)]
+pub struct VertexColumn<'a> {
+    /// name of the property, with its unit
+    pub name: &'static str,
+    /// as many as the mesh has vertices
+    pub values: ColumnValues<'a>,
+}
+
+/// The numbers of a [`VertexColumn`], with their type in the file.
+#[derive(Clone, Debug)]
+pub enum ColumnValues<'a> {
+    /// `float`
+    Single(Cow<'a, [f32]>),
+    /// `uchar`, as colours are
+    Byte(Cow<'a, [u8]>),
+}
+
+impl From<Vec<f32>> for ColumnValues<'_> {
+    fn from(values: Vec<f32>) -> Self {
+        Self::Single(values.into())
+    }
+}
+
+impl From<Vec<u8>> for ColumnValues<'_> {
+    fn from(values: Vec<u8>) -> Self {
+        Self::Byte(values.into())
+    }
+}
+
+impl ColumnValues<'_> {
+    /// Those of the vertices that are used.
+    fn of_used(&self, is_used: &[bool]) -> ColumnValues<'static> {
+        fn kept<T: Copy>(values: &[T], is_used: &[bool]) -> Vec<T> {
+            values.iter().zip(is_used).filter(|(_, is_used)| **is_used).map(|(value, _)| *value).collect()
+        }
+        match self {
+            Self::Single(values) => kept(values, is_used).into(),
+            Self::Byte(values) => kept(values, is_used).into(),
+        }
+    }
+}
+
+/// [`write_mesh`] with `columns`, which STL and OBJ have no place for.
+///
+/// # Errors
+/// As [`write_mesh`].
+pub fn write_mesh_with(
+    path: &Path,
+    mesh: &TriMesh,
+    columns: &[VertexColumn<'_>],
+    unit: MeshUnit,
+) -> Result<(), MeshFileError> {
+    let format = Format::of_name(path).ok_or_else(|| MeshFileError::UnknownFormat { path: path.into() })?;
+    let is_used = used_vertices(mesh);
+    let (soup, unit) = (used_part(mesh, &is_used, unit.metres()), unit.to_string());
+    let of_used =
+        |column: &VertexColumn<'_>| VertexColumn { name: column.name, values: column.values.of_used(&is_used) };
+    let columns: Vec<_> = columns.iter().map(of_used).collect();
+    write_atomically(path, |out| match format {
+        Format::Ply => ply::write(&soup, &columns, &unit, out),
+        Format::Stl => stl::write(&soup, &unit, out),
+        Format::Obj => obj::write(&soup, &unit, out),
+    })
+    .map_err(|source| MeshFileError::Write { path: path.into(), source })
+}
+
+/// For each vertex, whether a face uses it.
+fn used_vertices(mesh: &TriMesh) -> Vec<bool> {
+    let mut is_used = vec![false; mesh.vertex_slots()];
+    for (_, corners) in mesh.faces() {
+        corners.iter().for_each(|v| is_used[v.0 as usize] = true);
+    }
+    is_used
+}
+
+/// Faces that are there and the vertices they use; coordinates divided by `scale`.
+fn used_part(mesh: &TriMesh, is_used: &[bool], scale: f64) -> Soup {
+    let mut soup = Soup::default();
+    let mut renamed = vec![u32::MAX; mesh.vertex_slots()];
+    for ((name, p), _) in renamed.iter_mut().zip(mesh.positions()).zip(is_used).filter(|(_, is_used)| **is_used) {
+        *name = soup.positions.len() as u32;
+        soup.positions.push(p / scale);
+    }
+    soup.faces = mesh.faces().map(|(_, corners)| corners.map(|v| renamed[v.0 as usize])).collect();
+    soup
+}

@@ -1,0 +1,215 @@
+//! The rows of a PLY file.
+
+use nalgebra::Point3;
+
+use super::super::defect::{Defect, FilePlace, Syntax};
+use super::super::text::{NumberedLines, number};
+use super::header::{Element, Encoding, PlyHeader, PlyKind, Scalar};
+
+/// What is left of the body.
+pub(super) struct Body<'a> {
+    bytes: &'a [u8],
+    encoding: Encoding,
+    end_of_line: u8,
+    /// next byte
+    at: usize,
+    /// lines before it, in ASCII
+    lines: usize,
+}
+
+impl<'a> Body<'a> {
+    pub fn new(bytes: &'a [u8], header: &PlyHeader) -> Self {
+        let PlyHeader { encoding, end_of_line, lines, len, .. } = *header;
+        Self { bytes, encoding, end_of_line, at: len, lines }
+    }
+
+    /// Refuses an element for whose rows there are not enough bytes: after this its count may be trusted for memory.
+    pub fn check_count(&self, element: &Element) -> Result<(), Syntax> {
+        let place = FilePlace::Line(element.line);
+        if element.count > 0 && element.properties.is_empty() {
+            return Err(Syntax::unexpected(place, "properties of the element", "none"));
+        }
+        let left = self.bytes.len().saturating_sub(self.at);
+        let needed = element.count as u128 * element.shortest_row(self.encoding) as u128;
+        // the last line of a text may lack its end
+        if needed <= left as u128 + 1 {
+            return Ok(());
+        }
+        let defect =
+            Defect::TooShort { what: element.name.clone() + " rows", count: element.count as u64, needed, left };
+        Err(Syntax { place, defect })
+    }
+
+    /// Reads `count` rows. `take` gets the items of the list in column `list`, or else one value for each column (0 for
+    /// a list), and the place of the row.
+    pub fn rows(
+        &mut self,
+        element: &Element,
+        count: usize,
+        list: Option<usize>,
+        take: impl FnMut(&[f64], FilePlace) -> Result<(), Syntax>,
+    ) -> Result<(), Syntax> {
+        match self.encoding {
+            Encoding::Ascii => self.ascii_rows(element, count, list, take),
+            Encoding::Little | Encoding::Big => self.binary_rows(element, count, list, take),
+        }
+    }
+
+    /// One line for each row; empty lines are passed over.
+    fn ascii_rows(
+        &mut self,
+        element: &Element,
+        count: usize,
+        list: Option<usize>,
+        mut take: impl FnMut(&[f64], FilePlace) -> Result<(), Syntax>,
+    ) -> Result<(), Syntax> {
+        let mut lines = NumberedLines::new(&self.bytes[self.at..], self.end_of_line);
+        let mut row = Vec::new();
+        for _ in 0..count {
+            let line = loop {
+                match lines.next() {
+                    Some(line) if line.is_empty() => {}
+                    Some(line) => break line,
+                    None => {
+                        return Err(Syntax::ends(FilePlace::Line(self.lines + lines.number() + 1), "a row of numbers"));
+                    }
+                }
+            };
+            let place = FilePlace::Line(self.lines + lines.number());
+            let mut words = line.split_ascii_whitespace();
+            read_row(element, list, place, &mut row, |_| number(words.next(), place))?;
+            if let Some(word) = words.next() {
+                return Err(Syntax::unexpected(place, "the end of the line", word));
+            }
+            take(&row, place)?;
+        }
+        self.lines += lines.number();
+        self.at += lines.offset();
+        Ok(())
+    }
+
+    fn binary_rows(
+        &mut self,
+        element: &Element,
+        count: usize,
+        list: Option<usize>,
+        mut take: impl FnMut(&[f64], FilePlace) -> Result<(), Syntax>,
+    ) -> Result<(), Syntax> {
+        let (bytes, big) = (self.bytes, self.encoding == Encoding::Big);
+        let mut row = Vec::new();
+        for _ in 0..count {
+            let place = FilePlace::Byte(self.at);
+            read_row(element, list, place, &mut row, |scalar| {
+                let value = bytes.get(self.at..).and_then(|rest| value(rest, scalar, big));
+                self.at += scalar.size();
+                value.ok_or_else(|| Syntax::ends(FilePlace::Byte(bytes.len()), "the rest of a row"))
+            })?;
+            take(&row, place)?;
+        }
+        Ok(())
+    }
+
+    /// Three columns, multiplied by `scale`, of all rows of a binary element without lists; `None`, and nothing read, when it has lists, is
+    /// ASCII, or the file ends before its last row.
+    pub fn fixed_rows(&mut self, element: &Element, columns: [usize; 3], scale: f64) -> Option<Vec<Point3<f64>>> {
+        let (mut offsets, mut len) = (Vec::new(), 0);
+        for property in &element.properties {
+            let PlyKind::Scalar(scalar) = property.kind else { return None };
+            offsets.push((len, scalar));
+            len += scalar.size();
+        }
+        let end = self.at.checked_add(len.checked_mul(element.count)?)?;
+        let rows = self.bytes.get(self.at..end).filter(|_| self.encoding != Encoding::Ascii)?.chunks_exact(len);
+        self.at = end;
+        let [x, y, z] = columns.map(|column| offsets[column]);
+        let big = self.encoding == Encoding::Big;
+        let column = |row: &[u8], (at, scalar)| scale * value(&row[at..], scalar, big).unwrap_or(f64::NAN);
+        // the types are known to the compiler in the two usual cases
+        let point = |row, x, y, z| Point3::new(column(row, x), column(row, y), column(row, z));
+        let of_type = |row, t| point(row, (x.0, t), (y.0, t), (z.0, t));
+        Some(match [x.1, y.1, z.1] {
+            [Scalar::F32, Scalar::F32, Scalar::F32] => rows.map(|row| of_type(row, Scalar::F32)).collect(),
+            [Scalar::F64, Scalar::F64, Scalar::F64] => rows.map(|row| of_type(row, Scalar::F64)).collect(),
+            _ => rows.map(|row| point(row, x, y, z)).collect(),
+        })
+    }
+
+    /// The rows that are triangles in the usual layout (a list of three 32-bit numbers and nothing else, little endian),
+    /// up to the first row that is not. Strips look the same and are left alone.
+    pub fn triangles(&mut self, element: &Element) -> Vec<[u32; 3]> {
+        const ROW: usize = 13;
+        let usual = |kind| matches!(kind, PlyKind::List { count: Scalar::U8, item: Scalar::I32 | Scalar::U32 });
+        let layout_is_usual = element.name == "face" && matches!(&element.properties[..], [only] if usual(only.kind));
+        if self.encoding != Encoding::Little || !layout_is_usual {
+            return Vec::new();
+        }
+        let rows = self.bytes[self.at..].as_chunks::<ROW>().0;
+        let rows = &rows[..element.count.min(rows.len())];
+        let rows = &rows[..rows.iter().position(|row| row[0] != 3).unwrap_or(rows.len())];
+        self.at += rows.len() * ROW;
+        let number = |row: &[u8; ROW], i| u32::from_le_bytes([row[i], row[i + 1], row[i + 2], row[i + 3]]);
+        rows.iter().map(|row| [number(row, 1), number(row, 5), number(row, 9)]).collect()
+    }
+}
+
+/// Fills `row` from `next`: the items of the list in column `list`, or else one value for each column.
+fn read_row(
+    element: &Element,
+    list: Option<usize>,
+    place: FilePlace,
+    row: &mut Vec<f64>,
+    mut next: impl FnMut(Scalar) -> Result<f64, Syntax>,
+) -> Result<(), Syntax> {
+    row.clear();
+    for (column, property) in element.properties.iter().enumerate() {
+        match property.kind {
+            PlyKind::Scalar(scalar) => {
+                let value = next(scalar)?;
+                if list.is_none() {
+                    row.push(value);
+                }
+            }
+            PlyKind::List { count, item } => {
+                let items = next(count)?;
+                if items < 0.0 || items.fract() != 0.0 {
+                    return Err(Syntax::unexpected(place, "the length of a list", items));
+                }
+                // a length that is too large runs into the end of the file; nothing is reserved for it
+                for _ in 0..items as u64 {
+                    let value = next(item)?;
+                    if list == Some(column) {
+                        row.push(value);
+                    }
+                }
+                if list.is_none() {
+                    row.push(0.0);
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The number at the start of `bytes`; every PLY type fits into `f64`.
+#[inline]
+fn value(bytes: &[u8], scalar: Scalar, big: bool) -> Option<f64> {
+    /// The first N bytes, least significant first.
+    #[inline]
+    fn little<const N: usize>(bytes: &[u8], big: bool) -> Option<[u8; N]> {
+        let mut first = *bytes.first_chunk::<N>()?;
+        if big {
+            first.reverse();
+        }
+        Some(first)
+    }
+    Some(match scalar {
+        Scalar::I8 => f64::from(i8::from_le_bytes(little(bytes, big)?)),
+        Scalar::U8 => f64::from(u8::from_le_bytes(little(bytes, big)?)),
+        Scalar::I16 => f64::from(i16::from_le_bytes(little(bytes, big)?)),
+        Scalar::U16 => f64::from(u16::from_le_bytes(little(bytes, big)?)),
+        Scalar::I32 => f64::from(i32::from_le_bytes(little(bytes, big)?)),
+        Scalar::U32 => f64::from(u32::from_le_bytes(little(bytes, big)?)),
+        Scalar::F32 => f64::from(f32::from_le_bytes(little(bytes, big)?)),
+        Scalar::F64 => f64::from_le_bytes(little(bytes, big)?),
+    })
+}

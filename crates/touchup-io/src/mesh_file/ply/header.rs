@@ -1,0 +1,166 @@
+//! The text at the head of a PLY file: elements and their properties.
+
+use super::super::defect::{FilePlace, Syntax};
+use super::super::text::NumberedLines;
+
+/// How the body is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Encoding {
+    Ascii,
+    Little,
+    Big,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Scalar {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    F32,
+    F64,
+}
+
+impl Scalar {
+    fn of_name(name: &str) -> Option<Self> {
+        Some(match name {
+            "char" | "int8" => Self::I8,
+            "uchar" | "uint8" => Self::U8,
+            "short" | "int16" => Self::I16,
+            "ushort" | "uint16" => Self::U16,
+            "int" | "int32" => Self::I32,
+            "uint" | "uint32" => Self::U32,
+            "float" | "float32" => Self::F32,
+            "double" | "float64" => Self::F64,
+            _ => return None,
+        })
+    }
+
+    /// Bytes in a binary file.
+    pub fn size(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::F64 => 8,
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum PlyKind {
+    Scalar(Scalar),
+    List { count: Scalar, item: Scalar },
+}
+
+#[derive(Debug)]
+pub(super) struct Property {
+    pub name: String,
+    pub kind: PlyKind,
+}
+
+#[derive(Debug)]
+pub(super) struct Element {
+    pub name: String,
+    pub count: usize,
+    pub properties: Vec<Property>,
+    /// where it is announced
+    pub line: usize,
+}
+
+impl Element {
+    /// Column of a scalar property.
+    pub fn scalar(&self, name: &str) -> Option<usize> {
+        self.properties.iter().position(|p| p.name == name && matches!(p.kind, PlyKind::Scalar(_)))
+    }
+
+    /// Column of a list property.
+    pub fn list(&self, name: &str) -> Option<usize> {
+        self.properties.iter().position(|p| p.name == name && matches!(p.kind, PlyKind::List { .. }))
+    }
+
+    /// Bytes of the shortest row: every list empty; in ASCII a digit and a blank for each value.
+    pub fn shortest_row(&self, encoding: Encoding) -> usize {
+        let size = |property: &Property| match (encoding, property.kind) {
+            (Encoding::Ascii, _) => 2,
+            (_, PlyKind::Scalar(scalar)) => scalar.size(),
+            (_, PlyKind::List { count, .. }) => count.size(),
+        };
+        self.properties.iter().map(size).sum()
+    }
+}
+
+pub(super) struct PlyHeader {
+    pub encoding: Encoding,
+    pub elements: Vec<Element>,
+    pub end_of_line: u8,
+    /// lines of the header
+    pub lines: usize,
+    /// bytes of the header
+    pub len: usize,
+}
+
+impl PlyHeader {
+    pub fn read(bytes: &[u8]) -> Result<Self, Syntax> {
+        // the first line shows how lines end here: the body may begin with any byte
+        let end_of_line = match bytes {
+            [b'p', b'l', b'y', b'\r', rest @ ..] if rest.first() != Some(&b'\n') => b'\r',
+            _ => b'\n',
+        };
+        let mut lines = NumberedLines::new(bytes, end_of_line);
+        let (mut encoding, mut elements) = (None, Vec::<Element>::new());
+        while let Some(line) = lines.next() {
+            let place = FilePlace::Line(lines.number());
+            let words: Vec<&str> = line.split_ascii_whitespace().collect();
+            match words[..] {
+                _ if lines.number() == 1 && line != "ply" => return Err(Syntax::unexpected(place, "'ply'", &line)),
+                [] | ["ply" | "comment" | "obj_info", ..] => {}
+                ["format", name, _] => encoding = Some(encoding_of(name, place)?),
+                ["element", name, _] if elements.iter().any(|e| e.name == name) => {
+                    return Err(Syntax::unexpected(place, "each element once", name));
+                }
+                ["element", name, count] => elements.push(element(name, count, lines.number())?),
+                ["property", ref words @ ..] => {
+                    let owner = elements.last_mut();
+                    let owner = owner.ok_or_else(|| Syntax::unexpected(place, "an element before it", &line))?;
+                    owner.properties.push(property(words, place)?);
+                }
+                ["end_header"] => {
+                    let encoding =
+                        encoding.ok_or_else(|| Syntax::unexpected(place, "a line 'format' before it", &line))?;
+                    return Ok(Self { encoding, elements, end_of_line, lines: lines.number(), len: lines.offset() });
+                }
+                _ => return Err(Syntax::unexpected(place, "format, comment, element, property or end_header", &line)),
+            }
+        }
+        Err(Syntax::ends(FilePlace::Line(lines.number() + 1), "'ply' or the rest of the header up to 'end_header'"))
+    }
+}
+
+fn encoding_of(name: &str, place: FilePlace) -> Result<Encoding, Syntax> {
+    match name {
+        "ascii" => Ok(Encoding::Ascii),
+        "binary_little_endian" => Ok(Encoding::Little),
+        "binary_big_endian" => Ok(Encoding::Big),
+        _ => Err(Syntax::unexpected(place, "ascii, binary_little_endian or binary_big_endian", name)),
+    }
+}
+
+fn element(name: &str, count: &str, line: usize) -> Result<Element, Syntax> {
+    let count = count.parse().map_err(|_| Syntax::unexpected(FilePlace::Line(line), "how many there are", count))?;
+    Ok(Element { name: name.into(), count, properties: Vec::new(), line })
+}
+
+fn property(words: &[&str], place: FilePlace) -> Result<Property, Syntax> {
+    let scalar = |name: &str| {
+        Scalar::of_name(name).ok_or_else(|| Syntax::unexpected(place, "a type such as float or int", name))
+    };
+    let (kind, name) = match *words {
+        ["list", count, item, name] => (PlyKind::List { count: scalar(count)?, item: scalar(item)? }, name),
+        [kind, name] => (PlyKind::Scalar(scalar(kind)?), name),
+        _ => return Err(Syntax::unexpected(place, "type and name of a property", words.join(" "))),
+    };
+    Ok(Property { name: name.into(), kind })
+}

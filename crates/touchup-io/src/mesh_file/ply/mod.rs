@@ -1,0 +1,171 @@
+//! PLY: ASCII and binary of both byte orders, any scalar type, any further elements and properties.
+
+mod body;
+mod header;
+
+use std::io::{self, Write};
+
+use nalgebra::Point3;
+
+use super::defect::{FilePlace, Syntax};
+use super::{ColumnValues, Soup, VertexColumn};
+use body::Body;
+use header::{Element, PlyHeader};
+
+/// Names of the list of a face's vertices; both are common.
+const VERTEX_LISTS: [&str; 2] = ["vertex_indices", "vertex_index"];
+
+/// Reads `vertex`, and `face` or `tristrips`; coordinates are multiplied by `scale`, polygons are cut into fans.
+pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
+    let header = PlyHeader::read(bytes)?;
+    let mut body = Body::new(bytes, &header);
+    let mut soup = Soup::default();
+    for element in &header.elements {
+        body.check_count(element)?;
+        match element.name.as_str() {
+            "vertex" => read_vertices(&mut body, element, scale, &mut soup)?,
+            "face" => read_polygons(&mut body, element, &mut soup, fan)?,
+            "tristrips" => read_polygons(&mut body, element, &mut soup, strips)?,
+            _ => body.rows(element, element.count, None, |_, _| Ok(()))?,
+        }
+    }
+    Ok(soup)
+}
+
+/// For each name the numbers of the rows, where the file has them.
+type Columns<const N: usize> = [Option<Vec<f32>>; N];
+
+/// The positions of the vertices, multiplied by `scale`, and the scalar properties `names` of them, where they are there.
+pub(super) fn read_columns<const N: usize>(
+    bytes: &[u8],
+    scale: f64,
+    names: [&str; N],
+) -> Result<(Vec<Point3<f64>>, Columns<N>), Syntax> {
+    let header = PlyHeader::read(bytes)?;
+    let mut body = Body::new(bytes, &header);
+    let (mut positions, mut columns) = (Vec::new(), [const { None }; N]);
+    for element in &header.elements {
+        body.check_count(element)?;
+        if element.name != "vertex" {
+            body.rows(element, element.count, None, |_, _| Ok(()))?;
+            continue;
+        }
+        let place = position_columns(element)?;
+        let found = names.map(|name| element.scalar(name));
+        columns = found.map(|column| column.map(|_| Vec::with_capacity(element.count)));
+        positions.reserve_exact(element.count);
+        body.rows(element, element.count, None, |row, _| {
+            positions.push(Point3::from(place.map(|column| scale * row[column])));
+            for (values, column) in columns.iter_mut().zip(found) {
+                if let (Some(values), Some(column)) = (values, column) {
+                    values.push(row[column] as f32);
+                }
+            }
+            Ok(())
+        })?;
+        break;
+    }
+    Ok((positions, columns))
+}
+
+/// Adds the triangles of one row to the faces.
+type Triangulate = fn(&[f64], FilePlace, &mut Vec<[u32; 3]>) -> Result<(), Syntax>;
+
+fn read_vertices(body: &mut Body, element: &Element, scale: f64, soup: &mut Soup) -> Result<(), Syntax> {
+    let columns = position_columns(element)?;
+    if let Some(positions) = body.fixed_rows(element, columns, scale) {
+        soup.positions = positions;
+        return Ok(());
+    }
+    soup.positions.reserve_exact(element.count);
+    body.rows(element, element.count, None, |row, _| {
+        soup.positions.push(Point3::from(columns.map(|column| scale * row[column])));
+        Ok(())
+    })
+}
+
+/// The columns of x, y and z.
+fn position_columns(element: &Element) -> Result<[usize; 3], Syntax> {
+    let mut columns = [0; 3];
+    for (column, name) in columns.iter_mut().zip(["x", "y", "z"]) {
+        *column = element.scalar(name).ok_or_else(|| {
+            Syntax::unexpected(FilePlace::Line(element.line), "a vertex with x, y and z", format!("no property {name}"))
+        })?;
+    }
+    Ok(columns)
+}
+
+fn read_polygons(body: &mut Body, element: &Element, soup: &mut Soup, cut: Triangulate) -> Result<(), Syntax> {
+    let list = VERTEX_LISTS
+        .iter()
+        .find_map(|name| element.list(name))
+        .ok_or_else(|| Syntax::unexpected(FilePlace::Line(element.line), "faces with a list vertex_indices", "none"))?;
+    let triangles = body.triangles(element);
+    let rest = element.count - triangles.len();
+    if soup.faces.is_empty() {
+        soup.faces = triangles;
+    } else {
+        soup.faces.extend(triangles);
+    }
+    body.rows(element, rest, Some(list), |row, place| cut(row, place, &mut soup.faces))
+}
+
+fn vertex_number(value: f64, place: FilePlace) -> Result<u32, Syntax> {
+    let whole = value as u32;
+    if f64::from(whole) == value { Ok(whole) } else { Err(Syntax::unexpected(place, "a vertex number", value)) }
+}
+
+/// Triangles from the first corner of a polygon to its sides; fewer than three corners make none.
+fn fan(polygon: &[f64], place: FilePlace, faces: &mut Vec<[u32; 3]>) -> Result<(), Syntax> {
+    for pair in polygon.get(1..).unwrap_or_default().windows(2) {
+        faces.push([vertex_number(polygon[0], place)?, vertex_number(pair[0], place)?, vertex_number(pair[1], place)?]);
+    }
+    Ok(())
+}
+
+/// Strips end with −1; every second triangle of a strip runs the other way round.
+fn strips(numbers: &[f64], place: FilePlace, faces: &mut Vec<[u32; 3]>) -> Result<(), Syntax> {
+    for strip in numbers.split(|&n| n == -1.0) {
+        for (i, corners) in strip.windows(3).enumerate() {
+            let (a, b) = if i % 2 == 0 { (0, 1) } else { (1, 0) };
+            faces.push([
+                vertex_number(corners[a], place)?,
+                vertex_number(corners[b], place)?,
+                vertex_number(corners[2], place)?,
+            ]);
+        }
+    }
+    Ok(())
+}
+
+/// Binary little endian, coordinates as double: nothing is rounded. Each column is a property of the vertices.
+pub(super) fn write(soup: &Soup, columns: &[VertexColumn<'_>], unit: &str, out: &mut impl Write) -> io::Result<()> {
+    let kind = |values: &ColumnValues<'_>| match values {
+        ColumnValues::Single(_) => "float",
+        ColumnValues::Byte(_) => "uchar",
+    };
+    let properties: String =
+        columns.iter().map(|column| format!("property {} {}\n", kind(&column.values), column.name)).collect();
+    write!(
+        out,
+        "ply\nformat binary_little_endian 1.0\ncomment touchup, unit {unit}, frame O\nelement vertex {}\n\
+         property double x\nproperty double y\nproperty double z\n{properties}element face {}\n\
+         property list uchar uint vertex_indices\nend_header\n",
+        soup.positions.len(),
+        soup.faces.len()
+    )?;
+    for (row, p) in soup.positions.iter().enumerate() {
+        p.coords.iter().try_for_each(|x| out.write_all(&x.to_le_bytes()))?;
+        columns.iter().try_for_each(|column| match &column.values {
+            ColumnValues::Single(values) => out.write_all(&values[row].to_le_bytes()),
+            ColumnValues::Byte(values) => out.write_all(&[values[row]]),
+        })?;
+    }
+    for corners in &soup.faces {
+        out.write_all(&[3])?;
+        for vertex in corners {
+            out.write_all(&vertex.to_le_bytes())?;
+        }
+    }
+    Ok(())
+}

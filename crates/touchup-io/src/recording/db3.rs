@@ -1,0 +1,221 @@
+//! Reads rosbag2's SQLite files (`.db3`): tables `topics` and `messages`.
+//!
+//! The file is opened read-only and as immutable, so nothing is created beside it, not even when it was left in
+//! write-ahead mode; then its last part may sit in a `-wal` file that is not read, and the file counts as truncated.
+
+use std::collections::VecDeque;
+use std::ffi::OsString;
+use std::fs;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+use rusqlite::{Connection, OpenFlags, Row, params};
+use tempfile::NamedTempFile;
+
+use super::cdr::MAX_MESSAGE_BYTES;
+use super::{Damage, RawMessage, RecordingError, RecordingPlace, TopicInfo, TopicKind, Topics};
+
+pub(super) const MAGIC: [u8; 16] = *b"SQLite format 3\0";
+/// Rows fetched at a time.
+const BATCH_ROWS: usize = 1024;
+/// Largest file that a `.db3.zstd` may unpack to, so that a small file cannot fill the disk.
+const MAX_UNPACKED_BYTES: u64 = 16 << 30;
+
+/// Longer payloads are not loaded; they come as NULL and count as malformed.
+const FETCH: &str = "SELECT id, timestamp, topic_id, CASE WHEN length(data) <= ?1 THEN data END FROM messages \
+                     WHERE topic_id IN (?2, ?3) AND (timestamp, id) > (?4, ?5) ORDER BY timestamp, id LIMIT ?6";
+
+/// Messages of the two topics of one SQLite file, by time of reception, then by row.
+pub(super) struct Db3Reader {
+    path: PathBuf,
+    db: Connection,
+    /// Holds the unpacked file while it is read.
+    _unpacked: Option<NamedTempFile>,
+    topics: Vec<TopicInfo>,
+    /// What is read.
+    kinds: [TopicKind; 2],
+    /// Row of each of them in the table `topics`.
+    ids: [Option<i64>; 2],
+    rows: VecDeque<Db3Message>,
+    current: Vec<u8>,
+    /// Time and row of the last message fetched.
+    last: (i64, i64),
+    /// What ended the fetching, or that the last page is cut; handed out after the rows before it.
+    failed: Option<Damage>,
+    done: bool,
+    truncated: bool,
+}
+
+struct Db3Message {
+    id: i64,
+    timestamp: i64,
+    kind: TopicKind,
+    payload: Vec<u8>,
+}
+
+impl Db3Reader {
+    /// Opens a file (`packed`: compressed as a whole by zstd) and reads its table of topics.
+    pub fn open(path: &Path, topics: &Topics, packed: bool) -> Result<Self, RecordingError> {
+        let unpacked = if packed { Some(unpack(path)?) } else { None };
+        let db_path = unpacked.as_ref().map_or(path, |file| file.path());
+        let damaged = |damage| RecordingError::Damaged { path: path.to_owned(), place: RecordingPlace::Row(0), damage };
+        let db = connect(db_path).map_err(|error| damaged(error.into()))?;
+        if !has_tables(&db).map_err(|error| damaged(error.into()))? {
+            let reason = "a SQLite file without rosbag2's tables `topics` and `messages`".to_owned();
+            return Err(RecordingError::NotARecording { path: path.to_owned(), reason });
+        }
+        let rows = read_topics(&db).map_err(|error| damaged(error.into()))?;
+        let failed = find_cut(&db, db_path).err();
+        let id_of = |kind| rows.iter().find(|(_, info)| info.name == topics.name(kind)).map(|(id, _)| *id);
+        Ok(Self {
+            path: path.to_owned(),
+            truncated: failed.is_some() || has_unmerged_part(path),
+            kinds: topics.kinds(),
+            ids: topics.kinds().map(id_of),
+            db,
+            _unpacked: unpacked,
+            topics: rows.into_iter().map(|(_, info)| info).collect(),
+            rows: VecDeque::new(),
+            current: Vec::new(),
+            last: (i64::MIN, i64::MIN),
+            failed,
+            done: false,
+        })
+    }
+
+    /// Topics of the file.
+    pub fn topics(&self) -> Vec<TopicInfo> {
+        self.topics.clone()
+    }
+
+    /// Messages on the two topics; reads through the table once.
+    pub fn promised(&self) -> Option<u64> {
+        let count = "SELECT count(*) FROM messages WHERE topic_id IN (?1, ?2)";
+        let found: rusqlite::Result<i64> =
+            self.db.query_row(count, params![self.ids[0], self.ids[1]], |row| row.get(0));
+        found.ok().and_then(|n| u64::try_from(n).ok())
+    }
+
+    /// A `-wal` or `-journal` file beside it holds what was not merged.
+    pub fn truncated(&self) -> bool {
+        self.truncated
+    }
+
+    /// The next message of the two topics; `None` at the end.
+    pub fn next_message(&mut self) -> Result<Option<RawMessage<'_>>, RecordingError> {
+        if self.rows.is_empty()
+            && !self.done
+            && let Err(damage) = self.fetch()
+        {
+            self.failed = Some(damage);
+            self.done = true;
+        }
+        let Some(message) = self.rows.pop_front() else {
+            return match self.failed.take() {
+                Some(damage) => Err(self.damaged(damage)),
+                None => Ok(None),
+            };
+        };
+        self.current = message.payload;
+        Ok(Some(RawMessage { kind: message.kind, payload: &self.current, place: RecordingPlace::Row(message.id) }))
+    }
+
+    fn damaged(&self, damage: Damage) -> RecordingError {
+        let row = if self.last.1 == i64::MIN { 0 } else { self.last.1 };
+        RecordingError::Damaged { path: self.path.clone(), place: RecordingPlace::Row(row), damage }
+    }
+
+    /// Fetches the next rows; those before an error stay.
+    fn fetch(&mut self) -> Result<(), Damage> {
+        let mut statement = self.db.prepare_cached(FETCH)?;
+        let [pose, wrench] = self.ids;
+        let (time, id) = self.last;
+        let mut rows = statement.query(params![MAX_MESSAGE_BYTES as i64, pose, wrench, time, id, BATCH_ROWS as i64])?;
+        while let Some(row) = rows.next()? {
+            let message = read_message(row, pose, self.kinds)?;
+            let key = (message.timestamp, message.id);
+            if key <= self.last {
+                return Err(Damage::RowOrder);
+            }
+            self.last = key;
+            self.rows.push_back(message);
+        }
+        self.done = self.rows.len() < BATCH_ROWS;
+        Ok(())
+    }
+}
+
+fn read_message(row: &Row, first: Option<i64>, kinds: [TopicKind; 2]) -> rusqlite::Result<Db3Message> {
+    let kind = if Some(row.get(2)?) == first { kinds[0] } else { kinds[1] };
+    // text, a number or NULL in place of the blob: an empty payload, which counts as malformed
+    let payload = row.get_ref(3)?.as_blob().unwrap_or_default().to_vec();
+    Ok(Db3Message { id: row.get(0)?, timestamp: row.get(1)?, kind, payload })
+}
+
+fn connect(path: &Path) -> rusqlite::Result<Connection> {
+    let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+    let db = Connection::open_with_flags(immutable_uri(path), flags)?;
+    // the file is not trusted: no functions from its schema, no cells that leave their page
+    db.pragma_update(None, "trusted_schema", false)?;
+    db.pragma_update(None, "cell_size_check", true)?;
+    Ok(db)
+}
+
+/// `file:` URI with every byte escaped that is not plain.
+fn immutable_uri(path: &Path) -> String {
+    let mut uri = String::from("file:");
+    for byte in path.as_os_str().as_encoded_bytes() {
+        match byte {
+            b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'/' | b'.' | b'_' | b'-' => uri.push(char::from(*byte)),
+            _ => uri.push_str(&format!("%{byte:02X}")),
+        }
+    }
+    uri.push_str("?immutable=1");
+    uri
+}
+
+fn has_tables(db: &Connection) -> rusqlite::Result<bool> {
+    let count = "SELECT count(*) FROM sqlite_schema WHERE type = 'table' AND name IN ('topics', 'messages')";
+    db.query_row(count, [], |row| row.get::<_, i64>(0)).map(|tables| tables == 2)
+}
+
+fn read_topics(db: &Connection) -> rusqlite::Result<Vec<(i64, TopicInfo)>> {
+    let mut statement =
+        db.prepare("SELECT id, name, type, serialization_format FROM topics ORDER BY id LIMIT 65536")?;
+    let rows = statement.query_map([], |row| {
+        Ok((row.get(0)?, TopicInfo { name: row.get(1)?, type_name: row.get(2)?, encoding: row.get(3)? }))
+    })?;
+    rows.collect()
+}
+
+/// SQLite reads a last page that is cut as if it ended in zeros (whole missing pages it refuses itself).
+fn find_cut(db: &Connection, path: &Path) -> Result<(), Damage> {
+    let page_bytes = db.pragma_query_value(None, "page_size", |row| row.get::<_, u32>(0))?;
+    match fs::metadata(path)?.len() % u64::from(page_bytes) {
+        0 => Ok(()),
+        left => Err(Damage::Cut { wanted: page_bytes.into(), left }),
+    }
+}
+
+fn has_unmerged_part(path: &Path) -> bool {
+    ["-wal", "-journal"].iter().any(|suffix| {
+        let mut beside = OsString::from(path);
+        beside.push(suffix);
+        fs::metadata(beside).is_ok_and(|file| file.len() > 0)
+    })
+}
+
+/// Unpacks a whole file into the folder for temporary files.
+fn unpack(path: &Path) -> Result<NamedTempFile, RecordingError> {
+    let unpack = || -> io::Result<(u64, NamedTempFile)> {
+        let mut plain = NamedTempFile::new()?;
+        let mut packed = zstd::Decoder::new(fs::File::open(path)?)?.take(MAX_UNPACKED_BYTES + 1);
+        Ok((io::copy(&mut packed, &mut plain)?, plain))
+    };
+    let (bytes, plain) = unpack().map_err(|source| RecordingError::Io { path: path.to_owned(), source })?;
+    if bytes > MAX_UNPACKED_BYTES {
+        let damage = Damage::TooLong { what: "unpacked file", bytes, limit: MAX_UNPACKED_BYTES };
+        return Err(RecordingError::Damaged { path: path.to_owned(), place: RecordingPlace::Row(0), damage });
+    }
+    Ok(plain)
+}

@@ -1,0 +1,285 @@
+//! What can be wrong with a recording, and where.
+
+use std::fmt;
+use std::io;
+use std::path::PathBuf;
+
+use super::{TopicInfo, TopicKind};
+
+/// Why a recording cannot be opened, read to its end, or written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RecordingError {
+    /// The operating system refused.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// file or folder
+        path: PathBuf,
+        /// its reason
+        source: io::Error,
+    },
+    /// Neither MCAP nor SQLite, plain or zstd-compressed.
+    #[error("{}: not a ROS 2 recording: {reason}", path.display())]
+    NotARecording {
+        /// file or folder
+        path: PathBuf,
+        /// what was found instead and what to do
+        reason: String,
+    },
+    /// `metadata.yaml` of a recording folder cannot be used.
+    #[error("{}: {reason}; the .mcap or .db3 file itself can be given instead", path.display())]
+    Metadata {
+        /// the metadata file
+        path: PathBuf,
+        /// what is wrong, with line and column where known
+        reason: String,
+    },
+    /// The recording has no topic of that name.
+    #[error("{}: no topic {topic:?} in the recording; choose one with {flag}. It has: {found}", path.display())]
+    MissingTopic {
+        /// the recording
+        path: PathBuf,
+        /// the name asked for
+        topic: String,
+        /// the flag that names it
+        flag: &'static str,
+        /// topics of the recording with their types
+        found: TopicList,
+    },
+    /// The topic carries another type of message.
+    #[error("{}: topic {topic:?} is {found}, not {wanted}; choose another with {flag}", path.display())]
+    WrongType {
+        /// the recording
+        path: PathBuf,
+        /// the topic
+        topic: String,
+        /// its type
+        found: String,
+        /// the type that is needed
+        wanted: &'static str,
+        /// the flag that names the topic
+        flag: &'static str,
+    },
+    /// The topic's messages are not CDR.
+    #[error("{}: topic {topic:?} is encoded as {found:?}; only ROS 2's \"cdr\" can be read", path.display())]
+    WrongEncoding {
+        /// the recording
+        path: PathBuf,
+        /// the topic
+        topic: String,
+        /// its encoding
+        found: String,
+    },
+    /// The file is damaged; everything before that place has been handed out.
+    #[error("{}: damaged at {place}: {damage}", path.display())]
+    Damaged {
+        /// the file
+        path: PathBuf,
+        /// where reading stopped
+        place: RecordingPlace,
+        /// what is wrong there
+        damage: Damage,
+    },
+    /// A ROS 2 stamp holds 0 <= s < 2^31, so this one cannot be written.
+    #[error("stamp {stamp_ns} ns cannot be written: a ROS 2 recording holds 0 s to 2147483647 s")]
+    Stamp {
+        /// ns
+        stamp_ns: i64,
+    },
+    /// The container could not be written.
+    #[error("writing the recording: {0}")]
+    Write(#[from] ::mcap::McapError),
+    /// A message could not be encoded.
+    #[error("encoding a message: {0}")]
+    Encode(#[from] cdr_encoding::Error),
+}
+
+/// Topics of a recording, shown as `/name (type)`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TopicList(pub(super) Vec<TopicInfo>);
+
+impl fmt::Display for TopicList {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.0.is_empty() {
+            return f.write_str("no topics");
+        }
+        for (i, topic) in self.0.iter().enumerate() {
+            write!(f, "{}{} ({})", if i == 0 { "" } else { ", " }, topic.name, topic.type_name)?;
+        }
+        Ok(())
+    }
+}
+
+/// A place in a recording.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum RecordingPlace {
+    /// Offset of the record (for a chunk: of the whole chunk) in the MCAP stream, bytes.
+    Byte(u64),
+    /// `id` in the table `messages`; what fails inside SQLite is placed at the last row that could be read.
+    Row(i64),
+}
+
+impl fmt::Display for RecordingPlace {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Byte(offset) => write!(f, "byte {offset}"),
+            Self::Row(id) => write!(f, "row {id}"),
+        }
+    }
+}
+
+/// What is wrong at a place of a file.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Damage {
+    /// The stream cannot be read on: the disk, or a broken zstd frame.
+    #[error("cannot be read: {0}")]
+    Unreadable(#[from] io::Error),
+    /// The file ends inside a record or a page.
+    #[error("cut off: {wanted} bytes are announced here, {left} are there")]
+    Cut {
+        /// announced, bytes
+        wanted: u64,
+        /// present, bytes
+        left: u64,
+    },
+    /// A length that no sane recording has.
+    #[error("{what} of {bytes} bytes, over the limit of {limit} bytes")]
+    TooLong {
+        /// of what
+        what: &'static str,
+        /// announced, bytes
+        bytes: u64,
+        /// bytes
+        limit: u64,
+    },
+    /// A field runs out of its record.
+    #[error("{0} runs out of its record")]
+    Field(&'static str),
+    /// A checksum does not match.
+    #[error("checksum of {what}: stored {stored:08x}, computed {computed:08x}")]
+    Checksum {
+        /// of what
+        what: &'static str,
+        /// in the file
+        stored: u32,
+        /// of the bytes read
+        computed: u32,
+    },
+    /// Chunks are plain, `zstd` or `lz4`.
+    #[error("chunk compressed as {0:?}, which is unknown")]
+    Compression(String),
+    /// A chunk does not unpack to its announced size.
+    #[error("chunk unpacks to {found} bytes, {announced} are announced")]
+    ChunkSize {
+        /// bytes
+        announced: u64,
+        /// bytes
+        found: u64,
+    },
+    /// A message of a channel, or a channel with a schema, that was not described before.
+    #[error("{what} {id} is used but not described")]
+    Undescribed {
+        /// channel or schema
+        what: &'static str,
+        /// its number
+        id: u16,
+    },
+    /// The index at the end of the file promises another number of messages on the two topics.
+    #[error("the file's index promises {promised} messages on the two topics, {found} were found")]
+    MessageCount {
+        /// by the index
+        promised: u64,
+        /// handed out or counted as bad
+        found: u64,
+    },
+    /// SQLite's own words.
+    #[error("SQLite: {0}")]
+    Sqlite(#[from] rusqlite::Error),
+    /// The index of a SQLite file leads backwards.
+    #[error("rows do not follow in time")]
+    RowOrder,
+}
+
+/// Why a single message was left out. Reading goes on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
+pub enum BadMessage {
+    /// Payload that is not CDR of the topic's type.
+    Malformed,
+    /// Nanoseconds of the stamp reach a second.
+    Stamp,
+    /// A quaternion whose norm is not finite or not within 1 ± 0.01.
+    Quaternion,
+    /// A point cloud without x, y and z, or whose sizes do not fit its data.
+    Cloud,
+    /// The header names another frame than the first message of the topic did.
+    FrameChanged,
+}
+
+impl BadMessage {
+    /// Name for tables and JSON.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Malformed => "malformed_message",
+            Self::Stamp => "bad_stamp",
+            Self::Quaternion => "bad_quaternion",
+            Self::Cloud => "bad_cloud",
+            Self::FrameChanged => "frame_changed",
+        }
+    }
+}
+
+impl fmt::Display for BadMessage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// How many messages were left out for one reason.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BadCount {
+    /// on the topic of poses or markers
+    pub poses: u64,
+    /// on the wrench topic
+    pub wrenches: u64,
+    /// file of the first
+    pub path: PathBuf,
+    /// where in that file the first is
+    pub place: RecordingPlace,
+}
+
+/// The two topics exist, with the right types.
+pub(super) fn check_topics(
+    path: &std::path::Path,
+    topics: &super::Topics,
+    found: &[TopicInfo],
+) -> Result<(), RecordingError> {
+    for kind in topics.kinds() {
+        let topic = topics.name(kind);
+        let Some(info) = found.iter().find(|info| info.name == topic) else {
+            return Err(RecordingError::MissingTopic {
+                path: path.to_owned(),
+                topic: topic.to_owned(),
+                flag: kind.flag(),
+                found: TopicList(found.to_vec()),
+            });
+        };
+        check_topic(path, kind, info)?;
+    }
+    Ok(())
+}
+
+/// One topic has the type and encoding of its kind.
+pub(super) fn check_topic(path: &std::path::Path, kind: TopicKind, info: &TopicInfo) -> Result<(), RecordingError> {
+    let (path, topic) = (path.to_owned(), info.name.clone());
+    if info.type_name != kind.type_name() {
+        let found = info.type_name.clone();
+        return Err(RecordingError::WrongType { path, topic, found, wanted: kind.type_name(), flag: kind.flag() });
+    }
+    if info.encoding != "cdr" {
+        return Err(RecordingError::WrongEncoding { path, topic, found: info.encoding.clone() });
+    }
+    Ok(())
+}

@@ -1,0 +1,146 @@
+//! MCAP's framing: records of opcode and length, fields in little endian, every length checked before it is used.
+
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::Path;
+
+use super::Damage;
+use super::mcap::op;
+
+/// Longest record, packed or unpacked: far above the 1 MiB chunks of recorders, a small part of a machine's memory.
+const MAX_RECORD_BYTES: u64 = 256 << 20;
+/// Longest name of a topic or type: the names of all channels are kept, and packed bytes can pretend to be long ones.
+const MAX_TEXT_BYTES: u64 = 64 << 10;
+/// Opcode and length in front of every record.
+pub(super) const HEAD_BYTES: usize = 9;
+/// Piece in which records that nobody needs are passed over.
+const SKIP_BYTES: u64 = 1 << 20;
+
+/// A stored checksum of 0 means that none was computed.
+pub(super) fn check_crc(what: &'static str, stored: u32, computed: u32) -> Result<(), Damage> {
+    if stored == 0 || stored == computed { Ok(()) } else { Err(Damage::Checksum { what, stored, computed }) }
+}
+
+pub(super) fn check_length(what: &'static str, bytes: u64) -> Result<(), Damage> {
+    if bytes <= MAX_RECORD_BYTES { Ok(()) } else { Err(Damage::TooLong { what, bytes, limit: MAX_RECORD_BYTES }) }
+}
+
+/// The bytes of a file from front to end, with position and checksum.
+pub(super) struct ByteStream {
+    input: Box<dyn Read>,
+    pub at: u64,
+    /// Of the file; unknown while it is unpacked on the way.
+    size: Option<u64>,
+    /// Of everything so far, without the head of the data end.
+    pub crc: crc32fast::Hasher,
+}
+
+impl ByteStream {
+    pub fn open(path: &Path, packed: bool) -> std::io::Result<Self> {
+        let file = File::open(path)?;
+        let size = if packed { None } else { Some(file.metadata()?.len()) };
+        let input: Box<dyn Read> =
+            if packed { Box::new(BufReader::new(zstd::Decoder::new(file)?)) } else { Box::new(BufReader::new(file)) };
+        Ok(Self { input, at: 0, size, crc: crc32fast::Hasher::new() })
+    }
+
+    /// Opcode and length of the next record; `None` where the file ends between two records.
+    pub fn head(&mut self) -> Result<Option<(u8, u64)>, Damage> {
+        let mut head = Vec::with_capacity(HEAD_BYTES);
+        let left = self.input.by_ref().take(HEAD_BYTES as u64).read_to_end(&mut head)? as u64;
+        if left == 0 {
+            return Ok(None);
+        }
+        let mut fields = Fields(&head);
+        let cut = |_| Damage::Cut { wanted: HEAD_BYTES as u64, left };
+        let (opcode, len) = (fields.u8("opcode").map_err(cut)?, fields.u64("length").map_err(cut)?);
+        self.at += left;
+        if opcode != op::DATA_END {
+            self.crc.update(&head);
+        }
+        Ok(Some((opcode, len)))
+    }
+
+    /// Appends the next `len` bytes to `into`.
+    pub fn load(&mut self, len: u64, into: &mut Vec<u8>) -> Result<(), Damage> {
+        self.check_left(len)?;
+        check_length("record", len)?;
+        let start = into.len();
+        let left = self.input.by_ref().take(len).read_to_end(into)? as u64;
+        if left < len {
+            return Err(Damage::Cut { wanted: len, left });
+        }
+        self.at += len;
+        self.crc.update(&into[start..]);
+        Ok(())
+    }
+
+    pub fn skip(&mut self, len: u64, scratch: &mut Vec<u8>) -> Result<(), Damage> {
+        self.check_left(len)?;
+        let mut left = len;
+        while left > 0 {
+            let piece = left.min(SKIP_BYTES);
+            scratch.clear();
+            self.load(piece, scratch)?;
+            left -= piece;
+        }
+        Ok(())
+    }
+
+    fn check_left(&self, wanted: u64) -> Result<(), Damage> {
+        match self.size.map(|size| size.saturating_sub(self.at)) {
+            Some(left) if left < wanted => Err(Damage::Cut { wanted, left }),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Opcode and body of the record at the front of `bytes`.
+pub(super) fn split_record(bytes: &[u8]) -> Result<(u8, &[u8]), Damage> {
+    let mut fields = Fields(bytes);
+    let (opcode, len) = (fields.u8("record")?, fields.u64("record")?);
+    Ok((opcode, fields.bytes(len, "record")?))
+}
+
+/// The rest of a record; each call takes one little-endian field off its front.
+pub(super) struct Fields<'a>(pub &'a [u8]);
+
+impl<'a> Fields<'a> {
+    pub fn bytes(&mut self, len: u64, what: &'static str) -> Result<&'a [u8], Damage> {
+        let split = usize::try_from(len).ok().and_then(|len| self.0.split_at_checked(len));
+        let (front, rest) = split.ok_or(Damage::Field(what))?;
+        self.0 = rest;
+        Ok(front)
+    }
+
+    fn array<const N: usize>(&mut self, what: &'static str) -> Result<[u8; N], Damage> {
+        let (front, rest) = self.0.split_first_chunk().ok_or(Damage::Field(what))?;
+        self.0 = rest;
+        Ok(*front)
+    }
+
+    pub fn u8(&mut self, what: &'static str) -> Result<u8, Damage> {
+        self.array::<1>(what).map(|[byte]| byte)
+    }
+
+    pub fn u16(&mut self, what: &'static str) -> Result<u16, Damage> {
+        self.array(what).map(u16::from_le_bytes)
+    }
+
+    pub fn u32(&mut self, what: &'static str) -> Result<u32, Damage> {
+        self.array(what).map(u32::from_le_bytes)
+    }
+
+    pub fn u64(&mut self, what: &'static str) -> Result<u64, Damage> {
+        self.array(what).map(u64::from_le_bytes)
+    }
+
+    /// Bytes that are no UTF-8 are replaced: names only have to compare and print.
+    pub fn text(&mut self, what: &'static str) -> Result<String, Damage> {
+        let bytes = u64::from(self.u32(what)?);
+        if bytes > MAX_TEXT_BYTES {
+            return Err(Damage::TooLong { what, bytes, limit: MAX_TEXT_BYTES });
+        }
+        Ok(String::from_utf8_lossy(self.bytes(bytes, what)?).into_owned())
+    }
+}

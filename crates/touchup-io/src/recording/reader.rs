@@ -1,0 +1,352 @@
+//! A recording as one sequence of messages, whatever it is kept in.
+
+use std::borrow::Cow;
+use std::collections::{BTreeMap, VecDeque};
+use std::fs::{self, File};
+use std::io::{self, Read};
+use std::iter::FusedIterator;
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use super::cdr::{decode_pose, decode_wrench, unpack};
+use super::db3::{self, Db3Reader};
+use super::error::{BadCount, check_topics};
+use super::mcap::{self, McapReader};
+use super::point_cloud::decode_markers;
+use super::segments::segments_of;
+use super::{BadMessage, RawMessage, Record, RecordingError, TopicInfo, TopicKind, Topics, ZSTD_MAGIC};
+use touchup_core::touch::Message;
+
+const ROS1_MAGIC: &[u8] = b"#ROSBAG V";
+/// Longest `metadata.yaml`: thousands of files and topics.
+const MAX_METADATA_BYTES: u64 = 16 << 20;
+
+/// Poses and wrenches of a recording, one after another.
+///
+/// The order is that of the recording: MCAP files as written (rosbag2 writes as it receives), SQLite files by time of
+/// reception and row. It is not the order of the header stamps: whoever pairs the two topics sorts by stamp within a
+/// bounded buffer.
+///
+/// Positions, forces and torques may be NaN or absurd; rotations are unit quaternions. A message that cannot be used is
+/// left out and counted in [`Self::bad_messages`]. A file that is damaged is read up to the damage; then comes one last
+/// item, the error. The iterator gives poses and wrenches; [`Self::next_record`] also markers. Memory is bounded by the largest chunk, at most 256 MiB packed and as much unpacked.
+///
+/// ```no_run
+/// use touchup::io::recording::{RecordingReader, Topics};
+/// use touchup::touch::Message;
+/// let mut reader = RecordingReader::open("touch.mcap".as_ref(), &Topics::default())?;
+/// let poses = reader.by_ref().filter(|message| matches!(message, Ok(Message::Pose(_)))).count();
+/// println!("{poses} poses in {:?}", reader.pose_frame());
+/// # Ok::<(), touchup::io::recording::RecordingError>(())
+/// ```
+pub struct RecordingReader {
+    topics: Topics,
+    path: PathBuf,
+    source: Option<RecordingFile>,
+    rest: VecDeque<PathBuf>,
+    intake: Intake,
+    message_count: Option<u64>,
+    truncated: bool,
+}
+
+impl RecordingReader {
+    /// Opens a recording: an `.mcap` or `.db3` file, either of them compressed by zstd as a whole, or a rosbag2 folder
+    /// with its `metadata.yaml`, whose files are read in the order named there; without it the .mcap files of the folder, in
+    /// the order of their names. Files are told by their content.
+    ///
+    /// # Errors
+    /// [`RecordingError::MissingTopic`], [`RecordingError::WrongType`] and [`RecordingError::WrongEncoding`] when the
+    /// recording does not have the two topics; [`RecordingError::Damaged`] when damage hides whether it has them;
+    /// [`RecordingError::NotARecording`], [`RecordingError::Metadata`], [`RecordingError::Io`].
+    pub fn open(path: &Path, topics: &Topics) -> Result<Self, RecordingError> {
+        let mut rest = files_of(path)?;
+        let mut reader = Self {
+            topics: topics.clone(),
+            path: path.to_owned(),
+            source: None,
+            rest: VecDeque::new(),
+            intake: Intake::default(),
+            message_count: Some(0),
+            truncated: false,
+        };
+        reader.source = reader.survey(path, &rest)?;
+        if let Some(first) = rest.pop_front() {
+            reader.path = first;
+        }
+        reader.rest = rest;
+        Ok(reader)
+    }
+
+    /// Messages on the two topics, for a progress bar; `None` when a file does not tell (MCAP without its end).
+    pub fn message_count(&self) -> Option<u64> {
+        self.message_count
+    }
+
+    /// Frame of the poses, or of the markers: the object frame O. `None` before the first.
+    pub fn pose_frame(&self) -> Option<&str> {
+        self.intake.pose_frame.as_deref()
+    }
+
+    /// Frame in which the wrenches are expressed. `None` before the first wrench.
+    pub fn wrench_frame(&self) -> Option<&str> {
+        self.intake.wrench_frame.as_deref()
+    }
+
+    /// Messages left out so far, and where the first of each reason is.
+    pub fn bad_messages(&self) -> &BTreeMap<BadMessage, BadCount> {
+        &self.intake.bad
+    }
+
+    /// A file has lost its end (the recorder was killed, or a copy was cut); what is there is read all the same.
+    pub fn truncated(&self) -> bool {
+        self.truncated
+    }
+
+    /// Looks into every file once: topics, counts, missing ends. Returns the first, still open: it may be a packed one.
+    fn survey(&mut self, path: &Path, files: &VecDeque<PathBuf>) -> Result<Option<RecordingFile>, RecordingError> {
+        let mut first = None;
+        let mut found: Vec<TopicInfo> = Vec::new();
+        let mut first_damage = None;
+        for file in files {
+            let (source, damage) = RecordingFile::open(file, &self.topics)?;
+            first_damage = first_damage.or(damage);
+            self.truncated |= source.truncated();
+            self.message_count = self.message_count.zip(source.promised()).map(|(a, b)| a.saturating_add(b));
+            found.extend(source.topics());
+            found.sort_unstable();
+            found.dedup();
+            first = first.or(Some(source));
+        }
+        match (check_topics(path, &self.topics, &found), first_damage) {
+            (Err(RecordingError::MissingTopic { .. }), Some(damage)) => Err(damage),
+            (checked, _) => checked.map(|()| first),
+        }
+    }
+
+    /// Turns to the next file; `false` after the last.
+    fn turn(&mut self) -> Result<bool, RecordingError> {
+        let Some(path) = self.rest.pop_front() else { return Ok(false) };
+        self.source = Some(RecordingFile::open(&path, &self.topics)?.0);
+        self.path = path;
+        Ok(true)
+    }
+
+    fn stop(&mut self) {
+        self.source = None;
+        self.rest.clear();
+    }
+
+    /// The next pose, wrench or frame of markers; after damage the error, then `None`.
+    pub fn next_record(&mut self) -> Option<Result<Record, RecordingError>> {
+        let next = self.advance();
+        if next.is_err() {
+            self.stop();
+        }
+        next.transpose()
+    }
+
+    fn advance(&mut self) -> Result<Option<Record>, RecordingError> {
+        loop {
+            let Some(source) = &mut self.source else { return Ok(None) };
+            if let Some(raw) = source.next_message()? {
+                if let Some(record) = self.intake.accept(&raw, &self.path) {
+                    return Ok(Some(record));
+                }
+                continue;
+            }
+            self.truncated |= source.truncated();
+            self.source = None;
+            if !self.turn()? {
+                return Ok(None);
+            }
+        }
+    }
+}
+
+impl Iterator for RecordingReader {
+    type Item = Result<Message, RecordingError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            match self.next_record()? {
+                Ok(Record::Message(message)) => return Some(Ok(message)),
+                Ok(Record::Markers(_)) => {}
+                Err(error) => return Some(Err(error)),
+            }
+        }
+    }
+}
+
+impl FusedIterator for RecordingReader {}
+
+/// Decodes messages and keeps account of frames and of what cannot be used.
+#[derive(Default)]
+struct Intake {
+    pose_frame: Option<String>,
+    wrench_frame: Option<String>,
+    bad: BTreeMap<BadMessage, BadCount>,
+}
+
+impl Intake {
+    fn accept(&mut self, raw: &RawMessage, path: &Path) -> Option<Record> {
+        match self.decode(raw) {
+            Ok(record) => Some(record),
+            Err(reason) => {
+                let first = BadCount { poses: 0, wrenches: 0, path: path.to_owned(), place: raw.place };
+                let bad = self.bad.entry(reason).or_insert(first);
+                match raw.kind {
+                    TopicKind::Pose | TopicKind::Markers => bad.poses += 1,
+                    TopicKind::Wrench => bad.wrenches += 1,
+                }
+                None
+            }
+        }
+    }
+
+    fn decode(&mut self, raw: &RawMessage) -> Result<Record, BadMessage> {
+        let payload = unpack(raw.payload)?;
+        match raw.kind {
+            TopicKind::Pose => {
+                let (frame, pose) = decode_pose(&payload)?;
+                same_frame(&mut self.pose_frame, frame).map(|()| Message::Pose(pose).into())
+            }
+            TopicKind::Wrench => {
+                let (frame, wrench) = decode_wrench(&payload)?;
+                same_frame(&mut self.wrench_frame, frame).map(|()| Message::Wrench(wrench).into())
+            }
+            TopicKind::Markers => {
+                let (frame, markers) = decode_markers(&payload)?;
+                same_frame(&mut self.pose_frame, frame).map(|()| Record::Markers(Box::new(markers)))
+            }
+        }
+    }
+}
+
+fn same_frame(first: &mut Option<String>, frame: Cow<'_, str>) -> Result<(), BadMessage> {
+    match first {
+        Some(first) if *first != frame => Err(BadMessage::FrameChanged),
+        Some(_) => Ok(()),
+        None => {
+            *first = Some(frame.into_owned());
+            Ok(())
+        }
+    }
+}
+
+/// One file of a recording.
+enum RecordingFile {
+    Mcap(Box<McapReader>),
+    Db3(Box<Db3Reader>),
+}
+
+impl RecordingFile {
+    fn open(path: &Path, topics: &Topics) -> Result<(Self, Option<RecordingError>), RecordingError> {
+        let io = |source| RecordingError::Io { path: path.to_owned(), source };
+        let mut front = read_front(File::open(path).map_err(io)?).map_err(io)?;
+        let packed = front.starts_with(&ZSTD_MAGIC);
+        if packed {
+            let unpacked = zstd::Decoder::new(File::open(path).map_err(io)?).and_then(read_front);
+            front = unpacked.map_err(io)?;
+        }
+        if front.starts_with(&mcap::MAGIC) {
+            let (reader, damage) = McapReader::open(path, topics, packed)?;
+            Ok((Self::Mcap(Box::new(reader)), damage))
+        } else if front == db3::MAGIC {
+            Ok((Self::Db3(Box::new(Db3Reader::open(path, topics, packed)?)), None))
+        } else {
+            Err(RecordingError::NotARecording { path: path.to_owned(), reason: describe_front(&front) })
+        }
+    }
+
+    fn next_message(&mut self) -> Result<Option<RawMessage<'_>>, RecordingError> {
+        match self {
+            Self::Mcap(reader) => reader.next_message(),
+            Self::Db3(reader) => reader.next_message(),
+        }
+    }
+
+    fn topics(&self) -> Vec<TopicInfo> {
+        match self {
+            Self::Mcap(reader) => reader.topics(),
+            Self::Db3(reader) => reader.topics(),
+        }
+    }
+
+    fn promised(&self) -> Option<u64> {
+        match self {
+            Self::Mcap(reader) => reader.promised(),
+            Self::Db3(reader) => reader.promised(),
+        }
+    }
+
+    fn truncated(&self) -> bool {
+        match self {
+            Self::Mcap(reader) => reader.truncated(),
+            Self::Db3(reader) => reader.truncated(),
+        }
+    }
+}
+
+fn read_front(input: impl Read) -> io::Result<Vec<u8>> {
+    let mut front = Vec::new();
+    input.take(db3::MAGIC.len() as u64).read_to_end(&mut front)?;
+    Ok(front)
+}
+
+fn describe_front(front: &[u8]) -> String {
+    if front.is_empty() {
+        "the file is empty".to_owned()
+    } else if front.starts_with(ROS1_MAGIC) {
+        "it is a ROS 1 bag; convert it with `rosbags-convert`".to_owned()
+    } else {
+        format!("it begins with \"{}\", neither MCAP nor rosbag2's SQLite", front.escape_ascii())
+    }
+}
+
+/// The part of rosbag2's `metadata.yaml` that is used.
+#[derive(Deserialize)]
+struct Metadata {
+    rosbag2_bagfile_information: BagInformation,
+}
+
+#[derive(Deserialize)]
+struct BagInformation {
+    relative_file_paths: Vec<String>,
+}
+
+/// The files of a recording, in order.
+fn files_of(path: &Path) -> Result<VecDeque<PathBuf>, RecordingError> {
+    if !path.is_dir() {
+        return Ok(VecDeque::from([path.to_owned()]));
+    }
+    let metadata_path = path.join("metadata.yaml");
+    if !metadata_path.exists() {
+        // a recorder that was killed wrote none
+        let segments = segments_of(path).map_err(|source| RecordingError::Io { path: path.to_owned(), source })?;
+        if !segments.is_empty() {
+            return Ok(segments.into());
+        }
+    }
+    let bad = |reason: String| RecordingError::Metadata { path: metadata_path.clone(), reason };
+    let text = read_metadata(&metadata_path).map_err(|error| bad(error.to_string()))?;
+    let metadata: Metadata = serde_saphyr::from_str(&text).map_err(|error| bad(error.to_string()))?;
+    let names = metadata.rosbag2_bagfile_information.relative_file_paths;
+    if names.is_empty() {
+        return Err(bad("it names no files".to_owned()));
+    }
+    names.iter().map(|name| find_file(path, name).ok_or_else(|| bad(format!("{name:?} is not there")))).collect()
+}
+
+fn read_metadata(path: &Path) -> io::Result<String> {
+    let mut text = String::new();
+    File::open(path)?.take(MAX_METADATA_BYTES).read_to_string(&mut text)?;
+    Ok(text)
+}
+
+/// A file named in the metadata; early versions of rosbag2 put the folder's own name in front.
+fn find_file(folder: &Path, name: &str) -> Option<PathBuf> {
+    let in_folder = folder.join(name);
+    let by_last_part = folder.join(Path::new(name).file_name()?);
+    [in_folder, by_last_part].into_iter().find(|path| fs::metadata(path).is_ok_and(|file| file.is_file()))
+}

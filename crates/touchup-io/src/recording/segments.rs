@@ -1,0 +1,195 @@
+//! A recording that grows while somebody touches, and of which a crash takes only the last moment.
+
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io::{self, BufWriter, Write as _};
+use std::path::{Path, PathBuf};
+
+use super::{RecordingError, RecordingWriter, TopicKind, Topics};
+use crate::atomic::write_atomically;
+use touchup_core::touch::Message;
+
+/// Messages of one file: a quarter of an hour of a stylus, 60 MB.
+const MOST_IN_A_SEGMENT: u64 = 1_000_000;
+
+/// Writes poses and wrenches into files `touch_0000.mcap`, `touch_0001.mcap`, … of one folder, each of which is opened by
+/// what opens MCAP. What was written before [`Self::flush`] is with the system after it, whatever becomes of the process.
+/// [`Self::finish`] makes the folder a recording of rosbag2.
+pub struct SegmentedWriter {
+    folder: PathBuf,
+    topics: Topics,
+    current: Option<RecordingWriter<BufWriter<File>>>,
+    segments: Vec<FileSegment>,
+    /// messages that [`Self::flush`] has not handed over yet
+    unflushed: u64,
+    /// length of the file after the last flush, bytes
+    flushed_length: u64,
+}
+
+/// What `metadata.yaml` tells of one file.
+#[derive(Clone, Debug)]
+struct FileSegment {
+    name: String,
+    poses: u64,
+    wrenches: u64,
+    first_ns: i64,
+    last_ns: i64,
+    /// it has its index, and a proper end
+    is_whole: bool,
+}
+
+impl SegmentedWriter {
+    /// Nothing is written yet.
+    ///
+    /// - `folder`: is there and holds no segments.
+    pub fn new(folder: &Path, topics: &Topics) -> Self {
+        let (folder, topics) = (folder.to_owned(), topics.clone());
+        Self { folder, topics, current: None, segments: Vec::new(), unflushed: 0, flushed_length: 0 }
+    }
+
+    /// Appends a message whose header names `frame`.
+    ///
+    /// # Errors
+    /// As [`RecordingWriter::write`].
+    pub fn write(&mut self, message: &Message, frame: &str) -> Result<(), RecordingError> {
+        let is_full = |segment: &FileSegment| segment.poses + segment.wrenches >= MOST_IN_A_SEGMENT;
+        if self.current.is_none() || self.segments.last().is_none_or(is_full) {
+            self.begin_segment(message.stamp_ns())?;
+        }
+        let (Some(writer), Some(segment)) = (&mut self.current, self.segments.last_mut()) else { return Ok(()) };
+        writer.write_in(message, frame)?;
+        self.unflushed += 1;
+        match message {
+            Message::Pose(_) => segment.poses += 1,
+            Message::Wrench(_) => segment.wrenches += 1,
+        }
+        segment.first_ns = segment.first_ns.min(message.stamp_ns());
+        segment.last_ns = segment.last_ns.max(message.stamp_ns());
+        Ok(())
+    }
+
+    fn begin_segment(&mut self, stamp_ns: i64) -> Result<(), RecordingError> {
+        self.end_segment()?;
+        let name = format!("touch_{:04}.mcap", self.segments.len());
+        let path = self.folder.join(&name);
+        let file = File::create_new(&path).map_err(|source| RecordingError::Io { path, source })?;
+        // each message names its own frame
+        self.current = Some(RecordingWriter::new(BufWriter::new(file), &self.topics, "", "")?);
+        let (first_ns, last_ns) = (stamp_ns, stamp_ns);
+        self.segments.push(FileSegment { name, poses: 0, wrenches: 0, first_ns, last_ns, is_whole: false });
+        Ok(())
+    }
+
+    fn end_segment(&mut self) -> Result<(), RecordingError> {
+        self.flush()?;
+        let (Some(writer), Some(segment)) = (self.current.take(), self.segments.last_mut()) else { return Ok(()) };
+        self.flushed_length = 0;
+        let io = |source| RecordingError::Io { path: self.folder.clone(), source };
+        let file = writer.finish()?.into_inner().map_err(|error| io(error.into_error()))?;
+        file.sync_all().map_err(io)?;
+        segment.is_whole = true;
+        Ok(())
+    }
+
+    /// Hands all that was written to the system; returns how many messages these are.
+    ///
+    /// # Errors
+    /// [`RecordingError::Write`], [`RecordingError::Io`].
+    pub fn flush(&mut self) -> Result<u64, RecordingError> {
+        let (Some(writer), Some(segment)) = (&mut self.current, self.segments.last()) else { return Ok(0) };
+        if self.unflushed == 0 {
+            return Ok(0);
+        }
+        writer.flush()?;
+        let path = self.folder.join(&segment.name);
+        self.flushed_length = path.metadata().map_err(|source| RecordingError::Io { path, source })?.len();
+        Ok(std::mem::take(&mut self.unflushed))
+    }
+
+    /// After an error: leaves of the file what was flushed, and nothing of one that was not. What is written next begins
+    /// another. Returns how many messages are lost.
+    pub fn give_up_segment(&mut self) -> u64 {
+        // tries once more to write what it holds
+        let Some(segment) = self.current.take().and(self.segments.pop()) else { return 0 };
+        let path = self.folder.join(&segment.name);
+        let flushed = std::mem::take(&mut self.flushed_length);
+        // where even that is refused, the file's end is one that a reader passes over
+        let _ = match flushed {
+            0 => std::fs::remove_file(path),
+            _ => File::options().write(true).open(path).and_then(|file| file.set_len(flushed)),
+        };
+        if flushed > 0 {
+            self.segments.push(segment);
+        }
+        std::mem::take(&mut self.unflushed)
+    }
+
+    /// Ends the last file and writes `metadata.yaml`; nothing when nothing was written. A recording of which a file has no
+    /// proper end gets none: touchup reads it by its files, as after a crash.
+    ///
+    /// # Errors
+    /// [`RecordingError::Write`], [`RecordingError::Io`].
+    pub fn finish(mut self) -> Result<(), RecordingError> {
+        self.end_segment()?;
+        if self.segments.is_empty() || !self.segments.iter().all(|segment| segment.is_whole) {
+            return Ok(());
+        }
+        let (path, text) = (self.folder.join("metadata.yaml"), self.metadata());
+        write_atomically(&path, |out| out.write_all(text.as_bytes()))
+            .map_err(|source| RecordingError::Io { path, source })
+    }
+
+    /// As rosbag2 writes it, version 5: every release reads that.
+    fn metadata(&self) -> String {
+        let all = &self.segments;
+        let [poses, wrenches] =
+            [|s: &FileSegment| s.poses, |s: &FileSegment| s.wrenches].map(|of| all.iter().map(of).sum::<u64>());
+        let first_ns = all.iter().map(|segment| segment.first_ns).min().unwrap_or(0);
+        let last_ns = all.iter().map(|segment| segment.last_ns).max().unwrap_or(0);
+        let mut text = format!(
+            "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: mcap\n  duration:\n    nanoseconds: {}\n  \
+             starting_time:\n    nanoseconds_since_epoch: {first_ns}\n  message_count: {}\n  topics_with_message_count:\n",
+            last_ns - first_ns,
+            poses + wrenches
+        );
+        // writing to a string cannot fail
+        for (kind, count) in [(TopicKind::Pose, poses), (TopicKind::Wrench, wrenches)] {
+            let (name, type_name) = (self.topics.name(kind), kind.type_name());
+            let _ = write!(
+                text,
+                "    - topic_metadata:\n        name: {name:?}\n        type: {type_name}\n        serialization_format: \
+                 cdr\n        offered_qos_profiles: \"\"\n      message_count: {count}\n"
+            );
+        }
+        text.push_str("  compression_format: \"\"\n  compression_mode: \"\"\n  relative_file_paths:\n");
+        for segment in all {
+            let _ = writeln!(text, "    - {}", segment.name);
+        }
+        text.push_str("  files:\n");
+        for FileSegment { name, poses, wrenches, first_ns, last_ns, .. } in all {
+            let _ = write!(
+                text,
+                "    - path: {name}\n      starting_time:\n        nanoseconds_since_epoch: {first_ns}\n      duration:\n        \
+                 nanoseconds: {}\n      message_count: {}\n",
+                last_ns - first_ns,
+                poses + wrenches
+            );
+        }
+        text
+    }
+}
+
+/// The segments of a folder that has no `metadata.yaml`, as a crash leaves it, in their order; one in which nothing stands
+/// is left out.
+pub(super) fn segments_of(folder: &Path) -> io::Result<Vec<PathBuf>> {
+    let mut found = Vec::new();
+    for entry in folder.read_dir()? {
+        let path = entry?.path();
+        let is_segment = path.extension().is_some_and(|ending| ending == "mcap");
+        if is_segment && path.metadata()?.len() > super::mcap::MAGIC.len() as u64 {
+            found.push(path);
+        }
+    }
+    found.sort();
+    Ok(found)
+}

@@ -1,0 +1,188 @@
+//! Writes a touch as MCAP with profile `ros2`.
+
+use std::collections::BTreeMap;
+use std::io::{Seek, Write};
+use std::path::Path;
+
+use ::mcap::records::MessageHeader;
+use ::mcap::write::Writer;
+use ::mcap::{Compression, McapError, WriteOptions};
+
+use super::cdr::{encode_pose, encode_wrench};
+use super::point_cloud::{POINT_CLOUD, POINT_FIELD, encode_markers};
+use super::{Record, RecordingError, TopicKind, Topics};
+use crate::atomic::AtomicFile;
+use touchup_core::touch::Message;
+
+/// Message definitions in the form rosbag2 stores: the type, then each type it uses behind a line of 80 equals signs.
+const RULE: &str = "================================================================================";
+const POSE_STAMPED: &str = "std_msgs/Header header\ngeometry_msgs/Pose pose\n";
+const WRENCH_STAMPED: &str = "std_msgs/Header header\ngeometry_msgs/Wrench wrench\n";
+const HEADER: (&str, &str) = ("std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id\n");
+const TIME: (&str, &str) = ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n");
+const POSE: (&str, &str) =
+    ("geometry_msgs/Pose", "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n");
+const POINT: (&str, &str) = ("geometry_msgs/Point", "float64 x\nfloat64 y\nfloat64 z\n");
+const QUATERNION: (&str, &str) = ("geometry_msgs/Quaternion", "float64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1\n");
+const WRENCH: (&str, &str) = ("geometry_msgs/Wrench", "geometry_msgs/Vector3 force\ngeometry_msgs/Vector3 torque\n");
+const VECTOR3: (&str, &str) = ("geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z\n");
+
+/// rosbag2 keeps the publishers' quality of service as YAML whose words changed between releases; the empty list
+/// reads in all of them and means that players use their default.
+const NO_QOS_PROFILES: &str = "[]";
+
+fn definition(kind: TopicKind) -> String {
+    let (mut text, parts) = match kind {
+        TopicKind::Pose => (POSE_STAMPED.to_owned(), [HEADER, TIME, POSE, POINT, QUATERNION].as_slice()),
+        TopicKind::Wrench => (WRENCH_STAMPED.to_owned(), [HEADER, TIME, WRENCH, VECTOR3].as_slice()),
+        TopicKind::Markers => (POINT_CLOUD.to_owned(), [HEADER, TIME, POINT_FIELD].as_slice()),
+    };
+    for (name, fields) in parts {
+        text.push_str(&format!("{RULE}\nMSG: {name}\n{fields}"));
+    }
+    text
+}
+
+/// Writes poses, wrenches and, when [`Topics::markers`] is named, markers into an MCAP file: zstd chunks, CDR messages, index at the end.
+///
+/// Log and publish time are the stamp of the message, so messages should come in the order of their stamps. The same
+/// messages give the same bytes.
+pub struct RecordingWriter<W: Write + Seek> {
+    mcap: Writer<W>,
+    pose: Channel,
+    wrench: Channel,
+    markers: Option<Channel>,
+}
+
+struct Channel {
+    id: u16,
+    frame: String,
+    sequence: u32,
+}
+
+impl<W: Write + Seek> RecordingWriter<W> {
+    /// Begins a recording.
+    ///
+    /// - `pose_frame`: name of the object frame O, which poses and markers are in; `wrench_frame`: name of the frame the wrenches are expressed in.
+    ///
+    /// # Errors
+    /// [`RecordingError::Write`] when `out` cannot be written.
+    pub fn new(out: W, topics: &Topics, pose_frame: &str, wrench_frame: &str) -> Result<Self, RecordingError> {
+        let options = WriteOptions::new()
+            .profile("ros2")
+            .library(concat!("touchup ", env!("CARGO_PKG_VERSION")))
+            .compression(Some(Compression::Zstd))
+            // several threads cut the stream elsewhere on another machine
+            .compression_threads(0);
+        let mut mcap = options.create(out)?;
+        let pose = add_channel(&mut mcap, topics, TopicKind::Pose, pose_frame)?;
+        let wrench = add_channel(&mut mcap, topics, TopicKind::Wrench, wrench_frame)?;
+        let wanted = topics.markers.iter();
+        let markers =
+            wanted.map(|_| add_channel(&mut mcap, topics, TopicKind::Markers, pose_frame)).next().transpose()?;
+        Ok(Self { mcap, pose, wrench, markers })
+    }
+
+    /// Appends one message.
+    ///
+    /// # Errors
+    /// [`RecordingError::Stamp`] when its stamp does not fit a ROS 2 message; [`RecordingError::Write`].
+    pub fn write(&mut self, message: &Message) -> Result<(), RecordingError> {
+        self.write_record(&Record::Message(*message))
+    }
+
+    /// Appends one message or frame of markers; markers without a topic are left out.
+    ///
+    /// # Errors
+    /// As [`Self::write`].
+    pub fn write_record(&mut self, record: &Record) -> Result<(), RecordingError> {
+        let (payload, channel) = match record {
+            Record::Message(Message::Pose(pose)) => (encode_pose(pose, &self.pose.frame)?, &mut self.pose),
+            Record::Message(Message::Wrench(wrench)) => (encode_wrench(wrench, &self.wrench.frame)?, &mut self.wrench),
+            Record::Markers(frame) => {
+                let Some(channel) = &mut self.markers else { return Ok(()) };
+                (encode_markers(frame, &channel.frame)?, channel)
+            }
+        };
+        append(&mut self.mcap, channel, record.stamp_ns(), &payload)
+    }
+
+    /// Appends one message whose header names `frame`.
+    ///
+    /// # Errors
+    /// As [`Self::write`].
+    pub fn write_in(&mut self, message: &Message, frame: &str) -> Result<(), RecordingError> {
+        let (payload, channel) = match message {
+            Message::Pose(pose) => (encode_pose(pose, frame)?, &mut self.pose),
+            Message::Wrench(wrench) => (encode_wrench(wrench, frame)?, &mut self.wrench),
+        };
+        append(&mut self.mcap, channel, message.stamp_ns(), &payload)
+    }
+
+    /// Hands all that was written to the output, so that a reader gets up to here.
+    ///
+    /// # Errors
+    /// [`RecordingError::Write`].
+    pub fn flush(&mut self) -> Result<(), RecordingError> {
+        Ok(self.mcap.flush()?)
+    }
+
+    /// Writes the index and gives the output back. Without this call the file has no proper end.
+    ///
+    /// # Errors
+    /// [`RecordingError::Write`].
+    pub fn finish(mut self) -> Result<W, RecordingError> {
+        self.mcap.finish()?;
+        Ok(self.mcap.into_inner())
+    }
+}
+
+fn append<W: Write + Seek>(
+    mcap: &mut Writer<W>,
+    channel: &mut Channel,
+    stamp_ns: i64,
+    payload: &[u8],
+) -> Result<(), RecordingError> {
+    let time = u64::try_from(stamp_ns).map_err(|_| RecordingError::Stamp { stamp_ns })?;
+    let sequence = channel.sequence;
+    channel.sequence = sequence.wrapping_add(1);
+    let header = MessageHeader { channel_id: channel.id, sequence, log_time: time, publish_time: time };
+    Ok(mcap.write_to_known_channel(&header, payload)?)
+}
+
+fn add_channel<W: Write + Seek>(
+    mcap: &mut Writer<W>,
+    topics: &Topics,
+    kind: TopicKind,
+    frame: &str,
+) -> Result<Channel, RecordingError> {
+    let schema = mcap.add_schema(kind.type_name(), "ros2msg", definition(kind).as_bytes())?;
+    let metadata = BTreeMap::from([("offered_qos_profiles".to_owned(), NO_QOS_PROFILES.to_owned())]);
+    let id = mcap.add_channel(schema, topics.name(kind), "cdr", &metadata)?;
+    Ok(Channel { id, frame: frame.to_owned(), sequence: 0 })
+}
+
+/// Writes a whole recording to `path`, which is never half a file ([`AtomicFile`]).
+///
+/// # Errors
+/// As [`RecordingWriter`], and [`RecordingError::Io`] with the path for whatever the system refuses.
+pub fn write_recording(
+    path: &Path,
+    topics: &Topics,
+    pose_frame: &str,
+    wrench_frame: &str,
+    records: impl IntoIterator<Item = impl Into<Record>>,
+) -> Result<(), RecordingError> {
+    let io = |source| RecordingError::Io { path: path.to_owned(), source };
+    let mut file = AtomicFile::create(path).map_err(io)?;
+    let write = || {
+        let mut writer = RecordingWriter::new(&mut file, topics, pose_frame, wrench_frame)?;
+        records.into_iter().try_for_each(|record| writer.write_record(&record.into()))?;
+        writer.finish().map(drop)
+    };
+    write().map_err(|error| match error {
+        RecordingError::Write(McapError::Io(source)) => io(source),
+        error => error,
+    })?;
+    file.commit().map_err(io)
+}

@@ -1,0 +1,136 @@
+//! Tables of numbers as comma-separated values, whose first line names the columns, in any order.
+//!
+//! Empty lines and lines that begin with `#` are passed over. No value holds a comma.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+/// Longest file: more than a hundred thousand rows.
+const MAX_BYTES: u64 = 16 << 20;
+
+/// Why a table is refused.
+#[derive(Debug, thiserror::Error)]
+pub enum TableError {
+    /// It cannot be read.
+    #[error("cannot read {}: {source}", path.display())]
+    Io {
+        /// which file
+        path: PathBuf,
+        /// what the system says
+        source: std::io::Error,
+    },
+    /// It is too long, or no text.
+    #[error("{}: {why}", path.display())]
+    NotText {
+        /// which file
+        path: PathBuf,
+        /// what is wrong
+        why: &'static str,
+    },
+    /// A line that is wrong.
+    #[error("{}, line {line}: {why}", path.display())]
+    Line {
+        /// which file
+        path: PathBuf,
+        /// from 1 on
+        line: usize,
+        /// what is wrong, and what to do
+        why: String,
+    },
+}
+
+/// One line.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Row {
+    pub line: usize,
+    /// of the columns that must be there, in the order asked for; finite
+    pub numbers: Vec<f64>,
+    /// of those that may be there; `None` where it is not or is empty
+    pub more: Vec<Option<String>>,
+}
+
+impl Row {
+    /// A number of those that may be there.
+    pub fn number(&self, which: usize, column: &str) -> Result<Option<f64>, String> {
+        self.more[which].as_deref().map(|value| number(value, column)).transpose()
+    }
+}
+
+/// - `columns`: numbers that must be there.
+/// - `more`: columns that may be there.
+pub(super) fn read_table(path: &Path, columns: &[&str], more: &[&str]) -> Result<Vec<Row>, TableError> {
+    let text = read_text(path)?;
+    parse(&text, columns, more).map_err(|(line, why)| TableError::Line { path: path.to_owned(), line, why })
+}
+
+fn read_text(path: &Path) -> Result<String, TableError> {
+    let io = |source| TableError::Io { path: path.to_owned(), source };
+    let not_text = |why| TableError::NotText { path: path.to_owned(), why };
+    let mut bytes = Vec::new();
+    File::open(path).map_err(io)?.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(io)?;
+    if bytes.len() as u64 > MAX_BYTES {
+        return Err(not_text("longer than 16 MiB; that is no list made by hand"));
+    }
+    String::from_utf8(bytes).map_err(|_| not_text("not UTF-8 text; save it as comma-separated values in UTF-8"))
+}
+
+/// `Err`: the line, and what is wrong in it.
+pub(super) fn parse(text: &str, columns: &[&str], more: &[&str]) -> Result<Vec<Row>, (usize, String)> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let lines = text.lines().enumerate().map(|(i, line)| (i + 1, line.trim()));
+    let mut lines = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
+    let Some((at, first)) = lines.next() else {
+        return Err((1, format!("there is nothing in it; its first line must be {}", columns.join(","))));
+    };
+    let header = TableHeader::parse(first, columns, more).map_err(|why| (at, why))?;
+    lines.map(|(at, line)| header.row(at, line).map_err(|why| (at, why))).collect()
+}
+
+/// Which value of a line is which.
+struct TableHeader<'a> {
+    count: usize,
+    columns: Vec<(&'a str, usize)>,
+    more: Vec<Option<usize>>,
+}
+
+impl<'a> TableHeader<'a> {
+    fn parse(line: &str, columns: &[&'a str], more: &[&'a str]) -> Result<Self, String> {
+        let names = split(line);
+        let (known, wanted) = (columns.join(","), more.join(" and "));
+        if let Some(unknown) = names.iter().find(|name| !columns.contains(name) && !more.contains(name)) {
+            let wanted = if more.is_empty() { String::new() } else { format!(", where wanted {wanted}") };
+            return Err(format!("no column is called {unknown:?}; there are {known}{wanted}, set apart by commas"));
+        }
+        if let Some((_, twice)) = names.iter().enumerate().find(|(i, name)| names[..*i].contains(name)) {
+            return Err(format!("the column {twice} is there twice"));
+        }
+        let place = |column: &str| names.iter().position(|name| *name == column);
+        let required =
+            |column: &&'a str| place(column).map(|at| (*column, at)).ok_or(format!("the column {column} is missing"));
+        let more = more.iter().map(|column| place(column)).collect();
+        Ok(Self { count: names.len(), columns: columns.iter().map(required).collect::<Result<_, _>>()?, more })
+    }
+
+    fn row(&self, line: usize, text: &str) -> Result<Row, String> {
+        let values = split(text);
+        let (there, named) = (values.len(), self.count);
+        if there != named {
+            return Err(format!(
+                "{there} values for {named} columns; commas stand between values alone, decimals have a point"
+            ));
+        }
+        let numbers = self.columns.iter().map(|(name, at)| number(values[*at], name)).collect::<Result<_, _>>()?;
+        let more = self.more.iter().map(|at| at.map(|at| values[at]).filter(|value| !value.is_empty()));
+        Ok(Row { line, numbers, more: more.map(|value| value.map(str::to_owned)).collect() })
+    }
+}
+
+fn number(value: &str, column: &str) -> Result<f64, String> {
+    let parsed = value.parse::<f64>().ok().filter(|x| x.is_finite());
+    parsed.ok_or_else(|| format!("{column} is {value:?} and must be a number"))
+}
+
+fn split(line: &str) -> Vec<&str> {
+    line.split(',').map(|value| value.trim().trim_matches('"')).collect()
+}

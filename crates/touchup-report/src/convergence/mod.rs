@@ -1,0 +1,157 @@
+//! How the error falls from sweep to sweep \[paper, Sec 4.3 and Fig 11\]: the published rule on a guided stylus, and the
+//! robust mode on a raster, each with an exponential and a power law fitted to it.
+
+mod decay;
+mod errors;
+mod sweeps;
+mod tell;
+
+use serde::Serialize;
+
+pub use decay::{Decay, Law, Line, fit_decay, straight_line};
+pub use errors::MeshErrors;
+pub use sweeps::{BLOWN_UP, PaperSweeps, RobustSweeps, SweepError, noisy, raster_samples};
+
+use super::Effort;
+use touchup_sim::Peaks;
+
+/// Which rule made the sweeps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Rule {
+    /// the published one, 20 s on each face, faces compared by index
+    Paper,
+    /// the repaired one, one raster a sweep, compared with the surface
+    Robust,
+}
+
+/// The sweeps over one scan.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SweepRun {
+    /// which rule
+    pub rule: Rule,
+    /// of the scan's noise
+    pub seed: u64,
+    /// edge of the scan's squares, mm
+    pub edge_mm: f64,
+    /// before the first sweep and after each one, as far as it came
+    pub errors: Vec<MeshErrors>,
+    /// the error grew to twice its start
+    pub has_blown_up: bool,
+    /// why it ended early, in words
+    pub ended: Option<String>,
+    /// both laws from sweep 1 on; `None` for less than three sweeps, or one that blew up
+    pub decay: Option<Decay>,
+}
+
+/// Error from sweep to sweep.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Convergence {
+    /// sweeps that were asked for
+    pub sweeps: usize,
+    /// each scan with each rule
+    pub runs: Vec<SweepRun>,
+    /// a rule that could not be set up, in words
+    pub failed: Vec<String>,
+}
+
+/// Edges of the scans, m: as the paper's figure shows, and as the robust mode is tested.
+const PAPER_EDGE: f64 = 10e-3;
+const ROBUST_EDGE: f64 = 5e-3;
+/// Seed of the first scan: its error at the start is the paper's.
+const FIRST_SEED: u64 = 3;
+/// Friction of the raster.
+const FRICTION: f64 = 0.15;
+/// A law is not fitted to less sweeps.
+const FEWEST_SWEEPS: usize = 3;
+
+impl SweepRun {
+    /// Makes up to `count` sweeps by `sweep`, from the error `start`.
+    fn of(
+        (rule, seed, edge): (Rule, u64, f64),
+        start: MeshErrors,
+        count: usize,
+        mut sweep: impl FnMut(&MeshErrors) -> Result<MeshErrors, SweepError>,
+    ) -> Self {
+        let (mut errors, mut ended, mut has_blown_up) = (vec![start], None, false);
+        for number in 1..=count {
+            match sweep(&start) {
+                Ok(now) => {
+                    errors.push(now);
+                    has_blown_up = now.distance_mm > BLOWN_UP * start.distance_mm;
+                }
+                Err(error) => ended = Some(format!("sweep {number}: {error}")),
+            }
+            if has_blown_up {
+                ended = Some(format!("blew up in sweep {number}"));
+            }
+            if ended.is_some() {
+                break;
+            }
+        }
+        let distances: Vec<f64> = errors[1..].iter().map(|error| error.distance_mm).collect();
+        let is_whole = ended.is_none() && distances.len() >= FEWEST_SWEEPS;
+        let decay = if is_whole { fit_decay(&distances) } else { None };
+        Self { rule, seed, edge_mm: edge * 1e3, errors, has_blown_up, ended, decay }
+    }
+
+    /// Whether all sweeps were made and the last left less error than there was.
+    pub fn has_converged(&self) -> bool {
+        let (first, last) = (self.errors.first(), self.errors.last());
+        self.ended.is_none() && first.zip(last).is_some_and(|(first, last)| last.distance_mm < first.distance_mm)
+    }
+}
+
+/// Sweeps over several noisy scans of `peaks` by both rules.
+pub fn convergence(effort: Effort, progress: &mut dyn FnMut(&str)) -> Convergence {
+    let (scans, sweeps) = (effort.choose(2, 6), effort.choose(4, 10));
+    let seeds = FIRST_SEED..FIRST_SEED + scans;
+    let mut found = Convergence { sweeps, runs: Vec::new(), failed: Vec::new() };
+    for seed in seeds.clone() {
+        progress(&format!("convergence: published rule, scan {seed}"));
+        found.take(paper_run(seed, sweeps));
+    }
+    let peaks = Peaks::default();
+    progress("convergence: touching peaks");
+    match raster_samples(&peaks, FRICTION) {
+        Err(error) => found.failed.push(error.to_string()),
+        Ok(samples) => {
+            for seed in seeds {
+                progress(&format!("convergence: robust mode, scan {seed}"));
+                let scan = peaks.mesh(ROBUST_EDGE).map(|truth| noisy(&truth, seed)).map_err(SweepError::from);
+                let run = scan.and_then(|scan| RobustSweeps::new(&peaks, scan, &samples)).map(|mut run| {
+                    SweepRun::of((Rule::Robust, seed, ROBUST_EDGE), run.errors(), sweeps, |_| run.sweep())
+                });
+                found.take(run);
+            }
+        }
+    }
+    found
+}
+
+fn paper_run(seed: u64, sweeps: usize) -> Result<SweepRun, SweepError> {
+    let mut run = PaperSweeps::new(PAPER_EDGE, None, seed)?;
+    let start = run.errors();
+    Ok(SweepRun::of((Rule::Paper, seed, PAPER_EDGE), start, sweeps, |start| run.sweep(start.distance_mm)))
+}
+
+impl Convergence {
+    fn take(&mut self, run: Result<SweepRun, SweepError>) {
+        match run {
+            Ok(run) => self.runs.push(run),
+            Err(error) => self.failed.push(error.to_string()),
+        }
+    }
+
+    /// The runs of one rule.
+    pub fn of(&self, rule: Rule) -> impl Iterator<Item = &SweepRun> {
+        self.runs.iter().filter(move |run| run.rule == rule)
+    }
+
+    /// Among the runs of a rule that have fits: in how many the power law explains more than the exponential, and how many
+    /// there are.
+    pub fn power_wins(&self, rule: Rule) -> (usize, usize) {
+        let fits: Vec<&Decay> = self.of(rule).filter_map(|run| run.decay.as_ref()).collect();
+        (fits.iter().filter(|fit| fit.power.left < fit.exponential.left).count(), fits.len())
+    }
+}

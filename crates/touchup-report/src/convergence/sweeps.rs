@@ -1,0 +1,174 @@
+//! The paper's sweep experiment (Sec 4.3) on `peaks`, and a raster of the robust mode over the same square.
+
+use nalgebra::{Isometry3, Point2, Point3, Vector3};
+
+use super::errors::MeshErrors;
+use touchup_core::mesh::TriMesh;
+use touchup_core::refine::{GuardParams, RefineError, RefineParams, Refiner, TipParams};
+use touchup_core::touch::{Sample, Wrench};
+use touchup_sim::coupled::GuidedStylus;
+use touchup_sim::{
+    Lines, Moment, PathParams, Peaks, RasterRegion, SensorParams, SimError, StylusParams, Surface, add_vertex_noise,
+    raster, touch,
+};
+
+/// Time between two samples of the paper, ns and s.
+const PERIOD_NS: i64 = 5_000_000;
+const PERIOD: f64 = 5e-3;
+/// Samples on each face: 20 s.
+const SAMPLES_PER_FACE: usize = 4000;
+/// A mean error that has grown to so many times its start does not come back.
+pub const BLOWN_UP: f64 = 2.0;
+/// The raster's ball, m, and its stiffness, N/m.
+const TIP: TipParams = TipParams { radius: 1.5e-3, stiffness: Some(20e3) };
+
+/// Why a sweep was not made.
+#[derive(Debug, thiserror::Error)]
+pub enum SweepError {
+    /// The simulated surface or stylus.
+    #[error(transparent)]
+    Sim(#[from] SimError),
+    /// The refiner.
+    #[error(transparent)]
+    Refine(#[from] RefineError),
+}
+
+/// The true mesh with 3 mm of noise on each coordinate, 2 mm too high \[paper\].
+pub fn noisy(truth: &TriMesh, seed: u64) -> TriMesh {
+    let mut scan = truth.clone();
+    add_vertex_noise(&mut scan, 3e-3, &Vector3::new(0.0, 0.0, 2e-3), seed);
+    scan
+}
+
+/// The paper's rule with a point for a tip, and a clock.
+#[derive(Clone, Debug)]
+pub struct PaperSweeps {
+    truth: TriMesh,
+    /// the scan under refinement
+    pub refiner: Refiner,
+    params: RefineParams,
+    stamp_ns: i64,
+}
+
+impl PaperSweeps {
+    /// Sweeps over a noisy scan of `peaks` with legs of `edge` (m).
+    ///
+    /// # Errors
+    /// [`SweepError`] for an edge that is no length.
+    pub fn new(edge: f64, guard: Option<GuardParams>, seed: u64) -> Result<Self, SweepError> {
+        let truth = Peaks::default().mesh(edge)?;
+        let params = RefineParams { guard, ..RefineParams::paper(TipParams { radius: 0.0, stiffness: None }) };
+        let refiner = Refiner::new(noisy(&truth, seed), params)?;
+        Ok(Self { truth, refiner, params, stamp_ns: 0 })
+    }
+
+    /// Sets the stylus to each face in turn and lets both go where Eq 8–11 and Eq 6–7 take them. The true face feels as
+    /// its plane does in the paper's contact model.
+    ///
+    /// Stops when the mean distance error is beyond [`BLOWN_UP`] times `start_mm`.
+    ///
+    /// # Errors
+    /// [`SweepError::Refine`] for a step that was refused.
+    pub fn sweep(&mut self, start_mm: f64) -> Result<MeshErrors, SweepError> {
+        let faces: Vec<_> = self.truth.faces().map(|(face, _)| face).collect();
+        let (model, stylus) = (self.params.dynamics.model, GuidedStylus::default());
+        for face in faces {
+            let (b, n) = (self.truth.barycentre(face), self.truth.normal(face));
+            let force = |p: &Point3<f64>| model.force((p - b).dot(&n)) * n;
+            let mut p = self.refiner.mesh().barycentre(face);
+            for _ in 0..SAMPLES_PER_FACE {
+                let mesh = self.refiner.mesh();
+                let (b, n) = (mesh.barycentre(face), mesh.normal(face));
+                let wrench = Wrench { force: force(&p), torque: Vector3::zeros() };
+                self.stamp_ns += PERIOD_NS;
+                let pose_ot = Isometry3::translation(p.x, p.y, p.z);
+                self.refiner.push_on(face, &Sample { stamp_ns: self.stamp_ns, pose_ot, wrench })?;
+                p = stylus.step(&p, &b, &n, force, PERIOD);
+            }
+            if self.errors().distance_mm > BLOWN_UP * start_mm {
+                break;
+            }
+        }
+        Ok(self.errors())
+    }
+
+    /// Face by face, as the paper measures.
+    pub fn errors(&self) -> MeshErrors {
+        MeshErrors::by_index(self.refiner.mesh(), &self.truth)
+    }
+}
+
+/// One raster of a ball over the whole square: what a perfect sensor reports every millisecond.
+///
+/// # Errors
+/// [`SweepError::Sim`] for a friction that is none.
+pub fn raster_samples(peaks: &Peaks, friction: f64) -> Result<Vec<Sample>, SweepError> {
+    let TipParams { radius, stiffness } = TIP;
+    let stiffness = stiffness.unwrap_or(f64::INFINITY);
+    let (bounds, half) = (peaks.bounds(), 0.5 * 50e-3);
+    let region = RasterRegion {
+        frame_ov: Isometry3::identity(),
+        low: Point2::new(-half, -half),
+        high: Point2::new(half, half),
+        floor: bounds.min.z,
+        clear: bounds.max.z + 2.0 * radius,
+    };
+    let path = raster(&region, Lines::AlongX, &PathParams { radius, ..PathParams::default() })?;
+    let stylus = StylusParams {
+        radius,
+        stiffness,
+        friction,
+        force_variation: 0.0,
+        tilt: 0.0,
+        stray: 0.0,
+        sensor: SensorParams::ideal(),
+        ..StylusParams::default()
+    };
+    let moments = touch(peaks, &path, &stylus, 1)?.moments;
+    let sample = |(i, moment): (usize, &Moment)| {
+        let mut pose_ot = moment.pose_ot;
+        pose_ot.translation.vector -= moment.force_o / stiffness;
+        let force = moment.pose_ot.rotation.inverse() * moment.force_o;
+        Sample { stamp_ns: (i as i64 + 1) * 1_000_000, pose_ot, wrench: Wrench { force, torque: Vector3::zeros() } }
+    };
+    Ok(moments.iter().enumerate().map(sample).collect())
+}
+
+/// Rasters of the robust mode over a noisy scan.
+#[derive(Clone, Debug)]
+pub struct RobustSweeps<'a> {
+    peaks: &'a Peaks,
+    samples: &'a [Sample],
+    /// the scan under refinement
+    pub refiner: Refiner,
+    last_ns: i64,
+}
+
+impl<'a> RobustSweeps<'a> {
+    /// - `scan`: with the noise of [`noisy`]; `samples`: of [`raster_samples`].
+    ///
+    /// # Errors
+    /// [`SweepError::Refine`] for a scan without faces.
+    pub fn new(peaks: &'a Peaks, scan: TriMesh, samples: &'a [Sample]) -> Result<Self, SweepError> {
+        let params = RefineParams { scan_noise: 3e-3, ..RefineParams::robust(TIP) };
+        Ok(Self { peaks, samples, refiner: Refiner::new(scan, params)?, last_ns: 0 })
+    }
+
+    /// Goes over the square once.
+    ///
+    /// # Errors
+    /// [`SweepError::Refine`] for a sample that was refused.
+    pub fn sweep(&mut self) -> Result<MeshErrors, SweepError> {
+        let start_ns = self.last_ns;
+        for sample in self.samples {
+            self.last_ns = start_ns + sample.stamp_ns;
+            self.refiner.push(&Sample { stamp_ns: self.last_ns, ..*sample })?;
+        }
+        Ok(self.errors())
+    }
+
+    /// Against the surface: where a raster ends, faces have no index in common with the truth.
+    pub fn errors(&self) -> MeshErrors {
+        MeshErrors::by_surface(self.refiner.mesh(), self.peaks)
+    }
+}

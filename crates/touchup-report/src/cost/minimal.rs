@@ -1,0 +1,83 @@
+//! The least that any refiner must do, written by hand: closest face, move its corners, update the tree.
+
+use nalgebra::Point3;
+
+use touchup_core::mesh::{FaceId, FaceTree, Nearby, RefitPlan, TriMesh, VertexId};
+use touchup_core::touch::Sample;
+use touchup_sim::wavy::{FORCE, RADIUS, STIFFNESS};
+
+/// Share of the mismatch that goes in a second, 1/s: as in the refiner.
+const RELAXATION: f64 = 25.0;
+/// Between two samples, s.
+const STEP: f64 = 1e-3;
+/// By which boxes are made wider where they are planned: far more than a sample moves, m.
+const MARGIN: f64 = 2e-5;
+/// Farther than this nothing is touched, m.
+const REACH: f64 = 0.01;
+
+/// A mesh that follows the ball of [`touchup_sim::wavy`], and nothing else.
+#[derive(Clone, Debug)]
+pub struct MinimalLoop {
+    mesh: TriMesh,
+    tree: FaceTree,
+    gain: f64,
+    faces: Vec<FaceId>,
+    plan: Option<StaleBoxes>,
+}
+
+/// Which boxes are to be brought up to date, as long as the face stays, and which leaves are near.
+#[derive(Clone, Debug, Default)]
+struct StaleBoxes {
+    face: Option<FaceId>,
+    plan: RefitPlan,
+    nearby: Nearby,
+}
+
+impl MinimalLoop {
+    /// Builds the tree.
+    pub fn new(mesh: TriMesh) -> Self {
+        let tree = FaceTree::new(&mesh);
+        Self { mesh, tree, gain: -(-RELAXATION * STEP).exp_m1(), faces: Vec::new(), plan: None }
+    }
+
+    /// As [`Self::new`], and keeps what it looked up, as the refiner does: which boxes to bring up to date, and what is near.
+    pub fn keeping(mesh: TriMesh) -> Self {
+        Self { plan: Some(StaleBoxes::default()), ..Self::new(mesh) }
+    }
+
+    /// Takes one sample of known force; returns whether it moved anything.
+    pub fn push(&mut self, sample: &Sample) -> bool {
+        let Self { mesh, tree, gain, faces, plan } = self;
+        let normal = sample.wrench.force / FORCE;
+        let p = Point3::from(sample.pose_ot.translation.vector) + sample.wrench.force / STIFFNESS - normal * RADIUS;
+        let hit = match plan {
+            Some(StaleBoxes { face: Some(last), nearby, .. }) => tree.closest_nearby(mesh, &p, *last, REACH, nearby),
+            _ => tree.closest(mesh, &p, REACH),
+        };
+        let Some(hit) = hit else { return false };
+        let step = normal * (*gain * (p - hit.point).dot(&normal));
+        let corners = mesh.corners(hit.face);
+        corners.into_iter().for_each(|vertex: VertexId| mesh.set_position(vertex, mesh.position(vertex) + step));
+        let is_known = plan.as_ref().is_some_and(|kept| kept.face == Some(hit.face));
+        if !is_known {
+            faces.clear();
+            corners.into_iter().for_each(|vertex| faces.extend_from_slice(mesh.star(vertex)));
+        }
+        match plan {
+            None => tree.refit(mesh, faces),
+            Some(StaleBoxes { face, plan, .. }) => {
+                if !is_known {
+                    *face = Some(hit.face);
+                    tree.plan(faces, plan);
+                }
+                tree.refit_planned(mesh, plan, step.norm(), MARGIN);
+            }
+        }
+        true
+    }
+
+    /// The mesh as it stands.
+    pub fn mesh(&self) -> &TriMesh {
+        &self.mesh
+    }
+}

@@ -1,0 +1,138 @@
+//! What each stage costs, with and without each optional part, and for scans of every size.
+
+mod chapter;
+mod log_law;
+mod minimal;
+mod parts;
+mod replay;
+mod sizes;
+mod stages;
+mod turns;
+
+use serde::Serialize;
+
+use super::Effort;
+pub use log_law::LogLaw;
+pub use minimal::MinimalLoop;
+pub use parts::PartCost;
+pub use replay::{READING, ReplaySpeed};
+pub use sizes::SizeCost;
+pub use stages::{SeldomCost, StageCost};
+use touchup_core::mesh::MeshError;
+use touchup_core::refine::RefineError;
+use touchup_core::touch::SettingError;
+use touchup_io::recording::RecordingError;
+use touchup_session::scene::SceneError;
+pub use turns::PerSample;
+use turns::Timing;
+
+/// The cheapest scene that moves a mesh: the touched face follows the ball, and nothing else is asked for.
+pub const BAREST: &str = "tip:\nrefine: { roi_mm: 0, beta_per_n2_s: 0 }\n";
+
+/// The cheapest scene takes at most this many times as long as the loop that is written by hand.
+pub const LARGEST_RATIO: f64 = 1.05;
+
+/// A recording is replayed at least so fast, samples/s.
+pub const LEAST_REPLAY_PER_S: f64 = 500_000.0;
+
+/// Sizes up to this one give the law that the larger ones are held against, faces.
+pub const LAW_UP_TO: usize = 105_000;
+
+/// Why costs could not be measured.
+#[derive(Debug, thiserror::Error)]
+pub enum CostError {
+    /// The plate.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// A push.
+    #[error(transparent)]
+    Refine(#[from] RefineError),
+    /// A setting of a stage.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    /// A scene.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The recording that is replayed.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// Nowhere to put it.
+    #[error("no temporary folder for a recording: {0}; name one with room by TMPDIR")]
+    Folder(std::io::Error),
+    /// A scene without `refine`.
+    #[error("a scene that moves nothing has no cost of a push: it needs `refine`, and `patch` for the patch")]
+    NothingMoves,
+    /// No block of samples.
+    #[error("nothing was timed: the raster of the ball is not on the plate, or has no samples")]
+    NothingTimed,
+}
+
+/// Everything that was measured.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Cost {
+    /// whole pushes, by size of the scan, rising
+    pub sizes: Vec<SizeCost>,
+    /// t = a + b ln F of the cheapest scene, of scans of 10k to 100k faces
+    pub barest_law: Option<LogLaw>,
+    /// … and of the default scene on scans of equal density
+    pub default_law: Option<LogLaw>,
+    /// whole pushes with and without each optional part
+    pub parts: Vec<PartCost>,
+    /// stages by themselves
+    pub stages: Vec<StageCost>,
+    /// what is not done at each sample
+    pub seldom: Vec<SeldomCost>,
+    /// recordings read and refined
+    pub replays: Vec<ReplaySpeed>,
+    /// whether the program counts what it asks of the allocator
+    pub counts_allocations: bool,
+}
+
+/// Measures all of it.
+///
+/// # Errors
+/// [`CostError`].
+pub fn cost(effort: Effort, progress: &mut dyn FnMut(&str)) -> Result<Cost, CostError> {
+    let sizes: &[usize] = effort.choose(
+        &[10_000, 30_000, 100_000],
+        &[10_000, 20_000, 50_000, 100_000, 200_000, 500_000, 1_000_000, 2_000_000, 5_000_000],
+    );
+    let timing = effort
+        .choose(Timing { warm: 3_000, blocks: 15, block: 400 }, Timing { warm: 20_000, blocks: 40, block: 1_000 });
+    let mut sizes_cost = Vec::new();
+    for &faces in sizes {
+        progress(&format!("cost: a push on {faces} faces"));
+        sizes_cost.push(sizes::size_cost(faces, timing)?);
+    }
+    let (mut parts, mut stages, mut seldom) = (Vec::new(), Vec::new(), Vec::new());
+    for &faces in effort.choose(&[10_000, 100_000][..], &[10_000, 100_000, 1_000_000, 5_000_000]) {
+        progress(&format!("cost: parts and stages on {faces} faces"));
+        // eight refiners at once: on the largest scans they would take 5 GB
+        if faces <= 1_000_000 {
+            parts.extend(parts::part_costs(faces, timing)?);
+        }
+        stages.extend(stages::stage_costs(faces, timing)?);
+    }
+    for &faces in effort.choose(&[10_000][..], &[10_000, 100_000, 1_000_000]) {
+        progress(&format!("cost: patch and features on {faces} faces"));
+        seldom.extend(stages::seldom_costs(faces, effort.choose(20, 100))?);
+    }
+    let (count, repeats) = effort.choose((30_000, 3), (300_000, 7));
+    progress("cost: replay on 1,000,000 faces");
+    let mut replays = replay::replay_speeds((1_000_000, sizes::side_of(1_000_000)), count, repeats)?;
+    replays.extend(replay::replay_speeds((1_000_000, touchup_sim::wavy::SIDE), count, repeats)?);
+    let law = |time: fn(&SizeCost) -> &PerSample| {
+        let known = sizes_cost.iter().filter(|size| size.faces <= LAW_UP_TO);
+        LogLaw::fit(&known.map(|size| (size.faces, time(size).time_ns.median)).collect::<Vec<_>>())
+    };
+    Ok(Cost {
+        barest_law: law(|size| &size.barest),
+        default_law: law(|size| &size.default_larger),
+        sizes: sizes_cost,
+        parts,
+        stages,
+        seldom,
+        replays,
+        counts_allocations: super::allocations::asked().is_some(),
+    })
+}

@@ -1,0 +1,114 @@
+//! How fast a recording is read and refined by one thread.
+
+use std::path::Path;
+use std::time::Instant;
+
+use serde::Serialize;
+
+use super::sizes::{refiner_of, samples_on};
+use super::{BAREST, CostError};
+use crate::Spread;
+use touchup_core::touch::{Message, Sample, StampedPose, StampedWrench, SyncParams, Synchroniser};
+use touchup_io::recording::{Record, RecordingReader, Topics, write_recording};
+use touchup_session::scene::Scene;
+use touchup_sim::wavy::plate;
+
+/// What reads and pairs, and moves nothing.
+pub const READING: &str = "none: read and paired alone";
+
+/// One scene over the whole recording.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ReplaySpeed {
+    /// which
+    pub scene: String,
+    /// faces of the scan
+    pub faces: usize,
+    /// length of its short edges, mm
+    pub edge_mm: f64,
+    /// samples of the recording
+    pub samples: usize,
+    /// read, synchronised and pushed
+    pub samples_per_s: Spread,
+}
+
+/// Writes the recording of a slide and replays it, reading alone and through each scene.
+pub(super) fn replay_speeds(
+    (faces, side): (usize, f64),
+    count: usize,
+    repeats: usize,
+) -> Result<Vec<ReplaySpeed>, CostError> {
+    let folder = tempfile::tempdir().map_err(CostError::Folder)?;
+    let path = folder.path().join("slide.mcap");
+    let samples = samples_on(side, count);
+    let topics = Topics::default();
+    write_recording(&path, &topics, "object", "stylus", samples.iter().flat_map(messages))?;
+    let mesh = plate(faces, side)?;
+    let edge_mm = side / (mesh.face_count() as f64 / 2.0).sqrt() * 1e3;
+    // one after the other: each refiner of a million faces takes its part of the cache
+    let of = |scene: &Scene| refiner_of(scene, mesh.clone()).map(|refiner| (scene.sync_params(), refiner));
+    let scenes = [("cheapest", Scene::from_yaml(BAREST)?), ("default, without patch", Scene::default())];
+    let built = scenes.iter().map(|(_, scene)| of(scene)).collect::<Result<Vec<_>, _>>()?;
+    let mut rates = vec![Vec::new(); built.len() + 1];
+    for _ in 0..repeats {
+        rates[0].push(rate(|| replay(&path, &topics, SyncParams::default(), |_| Ok(())))?);
+        for ((sync, refiner), rates) in built.iter().zip(&mut rates[1..]) {
+            let mut refiner = refiner.clone();
+            rates.push(rate(|| replay(&path, &topics, *sync, |sample| Ok(refiner.push(sample).map(drop)?)))?);
+        }
+    }
+    let names = [READING].into_iter().chain(scenes.iter().map(|(name, _)| *name));
+    let speed = |(name, rates): (&str, Vec<f64>)| {
+        Ok(ReplaySpeed {
+            scene: name.to_owned(),
+            faces: mesh.face_count(),
+            edge_mm,
+            samples: count,
+            samples_per_s: Spread::of(rates).ok_or(CostError::NothingTimed)?,
+        })
+    };
+    names.zip(rates).map(speed).collect()
+}
+
+fn messages(sample: &Sample) -> [Message; 2] {
+    let &Sample { stamp_ns, pose_ot, wrench } = sample;
+    [Message::Pose(StampedPose { stamp_ns, pose_ot }), Message::Wrench(StampedWrench { stamp_ns, wrench })]
+}
+
+/// Samples per second of work that tells how many it did.
+fn rate(work: impl FnOnce() -> Result<usize, CostError>) -> Result<f64, CostError> {
+    let started = Instant::now();
+    let count = work()?;
+    Ok(count as f64 / started.elapsed().as_secs_f64())
+}
+
+/// Reads and pairs all, and gives each sample to `push`; returns how many there were.
+fn replay(
+    path: &Path,
+    topics: &Topics,
+    sync: SyncParams,
+    mut push: impl FnMut(&Sample) -> Result<(), CostError>,
+) -> Result<usize, CostError> {
+    let mut reader = RecordingReader::open(path, topics)?;
+    let mut sync = Synchroniser::new(sync)?;
+    let mut pushed = 0;
+    while let Some(record) = reader.next_record() {
+        if let Record::Message(message) = record? {
+            sync.push(message);
+        }
+        pushed += push_all(&mut sync, &mut push)?;
+    }
+    sync.finish();
+    Ok(pushed + push_all(&mut sync, &mut push)?)
+}
+
+fn push_all(
+    sync: &mut Synchroniser,
+    push: &mut impl FnMut(&Sample) -> Result<(), CostError>,
+) -> Result<usize, CostError> {
+    let mut pushed = 0;
+    while let Some(sample) = sync.next_sample() {
+        push(&sample)?;
+        pushed += 1;
+    }
+    Ok(pushed)
+}

@@ -1,0 +1,151 @@
+//! What a push costs on scans of different size: the hand-written loop, the cheapest scene, the default scene.
+
+use nalgebra::Point3;
+use serde::Serialize;
+
+use super::minimal::MinimalLoop;
+use super::turns::{PerSample, TimedWay, Timing, in_turns, ratio};
+use super::{BAREST, CostError};
+use crate::Spread;
+use touchup_core::mesh::{FaceTree, TriMesh};
+use touchup_core::refine::Refiner;
+use touchup_core::touch::{Sample, WrenchFrame};
+use touchup_session::scene::Scene;
+use touchup_sim::wavy::{SIDE, plate, slide_on};
+
+/// Length of the short edges of a scan that grows with its faces, m.
+const EDGE: f64 = 1e-3;
+
+/// On a scan of so many faces.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SizeCost {
+    /// faces
+    pub faces: usize,
+    /// the hand-written loop, on a plate of 0.3 m
+    pub minimal: PerSample,
+    /// the same loop, which keeps what it looked up
+    pub keeping: PerSample,
+    /// the cheapest scene that moves a mesh, on the same
+    pub barest: PerSample,
+    /// block by block, how many times as long the cheapest scene takes as the loop
+    pub barest_to_minimal: Spread,
+    /// … and as the loop that keeps
+    pub barest_to_keeping: Spread,
+    /// the default scene without its patch, on the same: the finer the scan, the more vertices move with a touch
+    pub default_finer: PerSample,
+    /// vertices that a touch moves there, mean
+    pub moved_finer: f64,
+    /// the default scene without its patch on a plate of edges of 1 mm, as large as the faces make it
+    pub default_larger: PerSample,
+    /// memory of the mesh of the cheapest scene, bytes per face
+    pub mesh_bytes_per_face: f64,
+    /// … and of its tree
+    pub tree_bytes_per_face: f64,
+    /// time of building that tree, ms
+    pub tree_build_ms: f64,
+}
+
+impl SizeCost {
+    /// Memory of mesh and tree, bytes.
+    pub fn bytes(&self) -> f64 {
+        (self.mesh_bytes_per_face + self.tree_bytes_per_face) * self.faces as f64
+    }
+}
+
+/// Side of the plate whose edges are [`EDGE`] long, m.
+pub(super) fn side_of(faces: usize) -> f64 {
+    EDGE * (faces as f64 / 2.0).sqrt()
+}
+
+/// The samples of a raster on a plate of `side` (m).
+pub(super) fn samples_on(side: f64, count: usize) -> Vec<Sample> {
+    (0..count).map(|i| slide_on(side, i, 0.8 * side)).collect()
+}
+
+/// A refiner as a scene names it.
+pub(super) fn refiner_of(scene: &Scene, mesh: TriMesh) -> Result<Refiner, CostError> {
+    // the force of the slide is in the axes of the scan
+    let params = scene.refine_params(WrenchFrame::Object).ok_or(CostError::NothingMoves)?;
+    Ok(Refiner::new(mesh, params)?)
+}
+
+/// Pushes samples into a refiner.
+pub(super) fn pushing<'a>(
+    name: &'a str,
+    refiner: &'a mut Refiner,
+    samples: &'a [Sample],
+    moved: &'a mut u64,
+) -> TimedWay<'a> {
+    TimedWay::new(name, move |block| {
+        for sample in &samples[block] {
+            refiner.push(sample)?;
+            *moved += refiner.moved_vertices().len() as u64;
+        }
+        Ok(())
+    })
+}
+
+fn looping<'a>(name: &'a str, minimal: &'a mut MinimalLoop, samples: &'a [Sample]) -> TimedWay<'a> {
+    TimedWay::new(name, |block| {
+        samples[block].iter().for_each(|sample| {
+            std::hint::black_box(minimal.push(sample));
+        });
+        Ok(())
+    })
+}
+
+/// Measures one size.
+pub(super) fn size_cost(faces: usize, timing: Timing) -> Result<SizeCost, CostError> {
+    let mesh = plate(faces, SIDE)?;
+    let faces = mesh.face_count();
+    let samples = samples_on(SIDE, timing.samples());
+    let started = std::time::Instant::now();
+    let tree = FaceTree::new(&mesh);
+    let tree_build_ms = started.elapsed().as_secs_f64() * 1e3;
+    let touched = samples
+        .last()
+        .is_some_and(|last| tree.closest(&mesh, &Point3::from(last.pose_ot.translation.vector), 0.01).is_some());
+    if !touched {
+        return Err(CostError::NothingTimed);
+    }
+    drop(tree);
+    let mut barest = refiner_of(&Scene::from_yaml(BAREST)?, mesh.clone())?;
+    let footprint = barest.footprint();
+    let mut default = refiner_of(&Scene::default(), mesh.clone())?;
+    let mut keeping = MinimalLoop::keeping(mesh.clone());
+    let mut minimal = MinimalLoop::new(mesh);
+    let (mut moved_barest, mut moved_finer) = (0, 0);
+    let mut ways = [
+        looping("hand-written loop", &mut minimal, &samples),
+        looping("the loop, keeping", &mut keeping, &samples),
+        pushing("cheapest scene", &mut barest, &samples, &mut moved_barest),
+        pushing("default scene", &mut default, &samples, &mut moved_finer),
+    ];
+    let timed = in_turns(&mut ways, timing)?;
+    drop(ways);
+    let larger = default_larger(faces, timing)?;
+    let per_face = |bytes: usize| bytes as f64 / faces.max(1) as f64;
+    Ok(SizeCost {
+        faces,
+        minimal: timed[0].per_sample()?,
+        keeping: timed[1].per_sample()?,
+        barest: timed[2].per_sample()?,
+        barest_to_minimal: ratio(&timed[2], &timed[0])?,
+        barest_to_keeping: ratio(&timed[2], &timed[1])?,
+        default_finer: timed[3].per_sample()?,
+        moved_finer: moved_finer as f64 / timing.samples() as f64,
+        default_larger: larger,
+        mesh_bytes_per_face: per_face(footprint.mesh),
+        tree_bytes_per_face: per_face(footprint.tree),
+        tree_build_ms,
+    })
+}
+
+fn default_larger(faces: usize, timing: Timing) -> Result<PerSample, CostError> {
+    let side = side_of(faces);
+    let samples = samples_on(side, timing.samples());
+    let mut refiner = refiner_of(&Scene::default(), plate(faces, side)?)?;
+    let mut moved = 0;
+    let timed = in_turns(&mut [pushing("default scene", &mut refiner, &samples, &mut moved)], timing)?;
+    timed[0].per_sample()
+}

@@ -1,0 +1,224 @@
+//! Each stage by itself, over the same samples.
+
+use std::cell::RefCell;
+use std::hint::black_box;
+use std::io::Cursor;
+use std::time::Instant;
+
+use nalgebra::{Point3, Vector3};
+use serde::Serialize;
+
+use super::CostError;
+use super::sizes::{samples_on, side_of};
+use super::turns::{PerSample, TimedWay, Timing, in_turns};
+use crate::Spread;
+use touchup_core::features::detect;
+use touchup_core::mesh::{FaceId, FaceTree, Nearby, RefitPlan, TriMesh};
+use touchup_core::patch::Patcher;
+use touchup_core::refine::{FaceDynamics, FaceState, TipMotion};
+use touchup_core::touch::{
+    BiasTracker, Compensator, ContactGate, Message, Sample, StampedPose, StampedWrench, Synchroniser, Tip, WrenchFrame,
+};
+use touchup_io::recording::{RecordingWriter, Topics};
+use touchup_session::scene::Scene;
+use touchup_sim::wavy::{RADIUS, STIFFNESS, plate};
+
+/// One stage on one scan.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct StageCost {
+    /// what it does
+    pub stage: String,
+    /// faces of the scan
+    pub faces: usize,
+    /// of one sample
+    pub per_sample: PerSample,
+}
+
+/// What is done now and then, not at each sample.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SeldomCost {
+    /// what it does
+    pub work: String,
+    /// faces of the scan
+    pub faces: usize,
+    /// once, ms
+    pub time_ms: Spread,
+}
+
+/// Samples between two renewals of the patch: 8 ms at 1 kHz, as beside a stylus.
+const RENEWAL: usize = 8;
+
+/// The point that the ball touches with.
+fn touching(sample: &Sample) -> Point3<f64> {
+    let force = &sample.wrench.force;
+    Point3::from(sample.pose_ot.translation.vector) + force / STIFFNESS - force.normalize() * RADIUS
+}
+
+fn messages(sample: &Sample) -> [Message; 2] {
+    let &Sample { stamp_ns, pose_ot, wrench } = sample;
+    [Message::Pose(StampedPose { stamp_ns, pose_ot }), Message::Wrench(StampedWrench { stamp_ns, wrench })]
+}
+
+/// Times every stage that can be called by itself, on a scan of edges of 1 mm.
+pub(super) fn stage_costs(faces: usize, timing: Timing) -> Result<Vec<StageCost>, CostError> {
+    let side = side_of(faces);
+    let mesh = plate(faces, side)?;
+    let tree = FaceTree::new(&mesh);
+    let samples = samples_on(side, timing.samples());
+    let scene = Scene::default();
+    let params = scene.refine_params(WrenchFrame::Sensor).ok_or(CostError::NothingMoves)?;
+
+    let plain = Compensator::new(params.compensator)?;
+    let tips: Vec<Tip> = samples.iter().map(|sample| plain.compensate(sample)).collect();
+    let points: Vec<_> = samples.iter().map(touching).collect();
+    let mut sync = Synchroniser::new(scene.sync_params())?;
+    let mut bias = BiasTracker::new(Default::default())?;
+    let mut gate = ContactGate::new(scene.contact_params().unwrap_or_default())?;
+    let mut motion = TipMotion::new(params.sliding.unwrap_or_default(), params.tip);
+    let dynamics = FaceDynamics::new(params.dynamics).map_err(touchup_core::refine::RefineError::from)?;
+    let mut writer = RecordingWriter::new(Cursor::new(Vec::new()), &Topics::default(), "object", "stylus")?;
+    let mut patcher = Patcher::new(scene.patcher_params(WrenchFrame::Sensor).ok_or(CostError::NothingMoves)?)?;
+    let (mut last, mut nearby, mut moving) = (None, Nearby::default(), Moving::new(&mesh));
+    let face = FaceState { b: Point3::origin(), n: Vector3::z() };
+
+    let mut ways = [
+        TimedWay::new("sync", |block| {
+            for sample in &samples[block] {
+                messages(sample).into_iter().for_each(|message| {
+                    sync.push(message);
+                });
+                black_box(sync.next_sample());
+            }
+            Ok(())
+        }),
+        TimedWay::new("compensation (nothing to take off)", |block| {
+            samples[block].iter().for_each(|sample| {
+                black_box(plain.compensate(black_box(sample)));
+            });
+            Ok(())
+        }),
+        TimedWay::new("bias tracking", |block| {
+            tips[block].iter().for_each(|tip| {
+                black_box(bias.compensate(tip));
+            });
+            Ok(())
+        }),
+        TimedWay::new("contact gate", |block| {
+            tips[block].iter().for_each(|tip| {
+                black_box(gate.update(tip.stamp_ns, &tip.force_o));
+            });
+            Ok(())
+        }),
+        TimedWay::new("sliding and friction", |block| {
+            for tip in &tips[block] {
+                let ball = motion.update(tip, 1e-3, 0.03);
+                black_box(motion.surface_normal(&ball, 1e-3));
+            }
+            Ok(())
+        }),
+        TimedWay::new("closest face, from the root", |block| {
+            points[block].iter().for_each(|p| {
+                black_box(tree.closest(&mesh, p, RADIUS));
+            });
+            Ok(())
+        }),
+        TimedWay::new("closest face, from the last one", |block| {
+            for p in &points[block] {
+                let hit = match last {
+                    Some(hint) => tree.closest_nearby(&mesh, p, hint, RADIUS, &mut nearby),
+                    None => tree.closest(&mesh, p, RADIUS),
+                };
+                last = hit.map(|hit| hit.face).or(last);
+            }
+            Ok(())
+        }),
+        TimedWay::new("face dynamics", |block| {
+            for sample in &samples[block] {
+                let p = Point3::new(0.0, 0.0, -0.05e-3);
+                black_box(dynamics.step(black_box(&face), &p, &sample.wrench.force, 1e-3))
+                    .map_err(touchup_core::refine::RefineError::from)?;
+            }
+            Ok(())
+        }),
+        TimedWay::new("tree update around one face", |block| {
+            points[block].iter().for_each(|p| moving.follow(p));
+            Ok(())
+        }),
+        TimedWay::new("recording (on a thread of its own)", |block| {
+            samples[block].iter().flat_map(messages).try_for_each(|message| writer.write(&message))?;
+            Ok(())
+        }),
+        TimedWay::new("patch: touches found and kept", |block| {
+            samples[block].iter().for_each(|sample| patcher.push(sample));
+            Ok(())
+        }),
+    ];
+    let timed = in_turns(&mut ways, timing)?;
+    let faces = mesh.face_count();
+    ways.iter()
+        .zip(&timed)
+        .map(|(way, timed)| Ok(StageCost { stage: way.name.to_owned(), faces, per_sample: timed.per_sample()? }))
+        .collect()
+}
+
+/// A mesh of its own whose boxes are brought up to date.
+struct Moving {
+    mesh: TriMesh,
+    tree: FaceTree,
+    plan: RefitPlan,
+    at: Option<FaceId>,
+}
+
+impl Moving {
+    fn new(mesh: &TriMesh) -> Self {
+        Self { mesh: mesh.clone(), tree: FaceTree::new(mesh), plan: RefitPlan::default(), at: None }
+    }
+
+    /// Brings the boxes around the face under the tip up to date. Which face that is, and which boxes, is looked up
+    /// once for a millimetre of the way, as the refiner does it once for each face.
+    fn follow(&mut self, p: &Point3<f64>) {
+        let Self { mesh, tree, plan, at } = self;
+        let is_far = at.is_none_or(|face| (mesh.barycentre(face) - p).norm_squared() > 1e-6);
+        if is_far {
+            *at = tree.closest(mesh, p, RADIUS).map(|hit| hit.face);
+            let corners = at.iter().flat_map(|&face| mesh.corners(face));
+            let faces: Vec<FaceId> = corners.flat_map(|vertex| mesh.star(vertex)).copied().collect();
+            tree.plan(&faces, plan);
+        }
+        tree.refit_planned(mesh, plan, f64::INFINITY, 0.0);
+    }
+}
+
+/// Times what is not done at each sample.
+pub(super) fn seldom_costs(faces: usize, repeats: usize) -> Result<Vec<SeldomCost>, CostError> {
+    let side = side_of(faces);
+    let mesh = plate(faces, side)?;
+    let tree = FaceTree::new(&mesh);
+    let faces = mesh.face_count();
+    let scene = Scene::default();
+    let samples = samples_on(side, 1000 + RENEWAL * repeats);
+    let patcher = Patcher::new(scene.patcher_params(WrenchFrame::Sensor).ok_or(CostError::NothingMoves)?)?;
+    let patcher = RefCell::new(patcher);
+    // the first renewal takes in all that came before
+    samples[..1000].iter().for_each(|sample| patcher.borrow_mut().push(sample));
+    black_box(patcher.borrow_mut().renewed(&mesh, &tree));
+    let renewals = (0..repeats).map(|i| {
+        let first = 1000 + i * RENEWAL;
+        samples[first..first + RENEWAL].iter().for_each(|sample| patcher.borrow_mut().push(sample));
+        let started = Instant::now();
+        black_box(patcher.borrow_mut().renewed(&mesh, &tree));
+        started.elapsed().as_secs_f64() * 1e3
+    });
+    let renewals = Spread::of(renewals.collect()).ok_or(CostError::NothingTimed)?;
+    let looks = (0..repeats.clamp(1, 3)).map(|_| {
+        let started = Instant::now();
+        black_box(detect(&mesh, &tree, &[]));
+        started.elapsed().as_secs_f64() * 1e3
+    });
+    let looks = Spread::of(looks.collect()).ok_or(CostError::NothingTimed)?;
+    let cost = |work: &str, time_ms| SeldomCost { work: work.to_owned(), faces, time_ms };
+    Ok(vec![
+        cost("one renewal of the patch, each 8 ms, on a thread of its own", renewals),
+        cost("one look for features, on a thread of its own", looks),
+    ])
+}

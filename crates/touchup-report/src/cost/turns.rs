@@ -1,0 +1,157 @@
+//! Ways to do the same work, timed in turns, so that what disturbs the machine disturbs all of them.
+
+use std::ops::Range;
+use std::time::Instant;
+
+use serde::Serialize;
+
+use super::CostError;
+use crate::Spread;
+use crate::allocations::asked;
+
+/// One way: does the work of these samples, by number.
+pub(super) struct TimedWay<'a> {
+    pub name: &'a str,
+    pub run: Box<dyn FnMut(Range<usize>) -> Result<(), CostError> + 'a>,
+}
+
+impl<'a> TimedWay<'a> {
+    pub fn new(name: &'a str, run: impl FnMut(Range<usize>) -> Result<(), CostError> + 'a) -> Self {
+        Self { name, run: Box::new(run) }
+    }
+}
+
+/// How much is timed: samples to warm up, blocks, and samples in a block.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Timing {
+    pub warm: usize,
+    pub blocks: usize,
+    pub block: usize,
+}
+
+impl Timing {
+    /// Samples that are needed in all.
+    pub fn samples(&self) -> usize {
+        self.warm + self.blocks * self.block
+    }
+}
+
+/// Of one sample.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PerSample {
+    /// time, ns
+    pub time_ns: Spread,
+    /// requests to the allocator; `None` where the program does not count them
+    pub allocations: Option<f64>,
+    /// what they asked for, bytes
+    pub allocated_bytes: Option<f64>,
+}
+
+/// What was timed of one way, block by block.
+pub(super) struct Timed {
+    /// of one sample, ns
+    pub blocks_ns: Vec<f64>,
+    requests: u64,
+    bytes: u64,
+    samples: usize,
+    counts: bool,
+}
+
+impl Timed {
+    fn new(blocks: usize) -> Self {
+        Self { blocks_ns: Vec::with_capacity(blocks), requests: 0, bytes: 0, samples: 0, counts: asked().is_some() }
+    }
+
+    fn add(&mut self, way: &mut TimedWay, samples: Range<usize>) -> Result<(), CostError> {
+        let count = samples.len();
+        let before = asked();
+        let started = Instant::now();
+        (way.run)(samples)?;
+        let time_ns = started.elapsed().as_nanos() as f64;
+        // asking is a request of its own
+        if let (Some(before), Some(after)) = (before, asked()) {
+            self.requests += (after.requests - before.requests).saturating_sub(1);
+            self.bytes += (after.bytes - before.bytes).saturating_sub(1);
+        }
+        self.blocks_ns.push(time_ns / count.max(1) as f64);
+        self.samples += count;
+        Ok(())
+    }
+
+    pub fn per_sample(&self) -> Result<PerSample, CostError> {
+        let share = |count: u64| self.counts.then(|| count as f64 / self.samples.max(1) as f64);
+        Ok(PerSample {
+            time_ns: Spread::of(self.blocks_ns.clone()).ok_or(CostError::NothingTimed)?,
+            allocations: share(self.requests),
+            allocated_bytes: share(self.bytes),
+        })
+    }
+}
+
+/// Runs all ways over the same samples: first to warm up, then block by block, another one first each time.
+pub(super) fn in_turns(ways: &mut [TimedWay], timing: Timing) -> Result<Vec<Timed>, CostError> {
+    let mut timed: Vec<_> = ways.iter().map(|_| Timed::new(timing.blocks)).collect();
+    for way in ways.iter_mut() {
+        (way.run)(0..timing.warm)?;
+    }
+    for block in 0..timing.blocks {
+        let first = timing.warm + block * timing.block;
+        for turn in 0..ways.len() {
+            let at = (turn + block) % ways.len();
+            timed[at].add(&mut ways[at], first..first + timing.block)?;
+        }
+    }
+    Ok(timed)
+}
+
+/// Block by block, how many times as long the first took as the second.
+pub(super) fn ratio(of: &Timed, to: &Timed) -> Result<Spread, CostError> {
+    let ratios = of.blocks_ns.iter().zip(&to.blocks_ns).map(|(of, to)| of / to).collect();
+    Spread::of(ratios).ok_or(CostError::NothingTimed)
+}
+
+/// Block by block, how much longer the first took than the second, ns.
+pub(super) fn difference(of: &Timed, to: &Timed) -> Result<Spread, CostError> {
+    let more = of.blocks_ns.iter().zip(&to.blocks_ns).map(|(of, to)| of - to).collect();
+    Spread::of(more).ok_or(CostError::NothingTimed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_way_gets_every_sample_once_and_in_order() {
+        let (mut first, mut second) = (Vec::new(), Vec::new());
+        let mut ways = [
+            TimedWay::new("first", |samples| {
+                first.extend(samples);
+                Ok(())
+            }),
+            TimedWay::new("second", |samples| {
+                second.extend(samples);
+                Ok(())
+            }),
+        ];
+        let timing = Timing { warm: 3, blocks: 4, block: 2 };
+        let timed = in_turns(&mut ways, timing).unwrap();
+        assert_eq!(timed.iter().map(|timed| (timed.blocks_ns.len(), timed.samples)).collect::<Vec<_>>(), [(4, 8); 2]);
+        drop(ways);
+        assert_eq!((first, second), ((0..11).collect(), (0..11).collect::<Vec<_>>()));
+    }
+
+    #[test]
+    fn ratios_and_differences_are_of_blocks_side_by_side() {
+        let of = |blocks_ns: &[f64]| Timed {
+            blocks_ns: blocks_ns.to_vec(),
+            requests: 0,
+            bytes: 0,
+            samples: 1,
+            counts: false,
+        };
+        let (slow, fast) = (of(&[300.0, 20.0, 100.0]), of(&[100.0, 10.0, 100.0]));
+        assert_eq!(ratio(&slow, &fast).unwrap(), Spread { median: 2.0, p10: 1.0, p90: 3.0 });
+        assert_eq!(difference(&slow, &fast).unwrap(), Spread { median: 10.0, p10: 0.0, p90: 200.0 });
+        assert_eq!(slow.per_sample().unwrap().allocations, None);
+    }
+}

@@ -1,0 +1,79 @@
+//! Input that no careful hand would send: what came out, and what the right answer is, from another reason than the code.
+
+mod face;
+mod mesh;
+
+use serde::Serialize;
+
+use super::{Chapter, Table};
+
+/// One extreme.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Extreme {
+    /// what was fed
+    pub fed: String,
+    /// what came out
+    pub came_out: String,
+    /// the right answer, and why
+    pub right_answer: String,
+    /// what came out is the right answer
+    pub is_right: bool,
+}
+
+/// All of them.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Extremes {
+    /// on one face, then on meshes
+    pub rows: Vec<Extreme>,
+}
+
+/// What came out, in words, and whether it is right.
+type CaseOutcome = (String, bool);
+
+fn extreme(fed: &str, right_answer: &str, (came_out, is_right): CaseOutcome) -> Extreme {
+    Extreme { fed: fed.to_owned(), came_out, right_answer: right_answer.to_owned(), is_right }
+}
+
+/// Feeds all extremes.
+pub fn extremes() -> Extremes {
+    Extremes { rows: [face::rows(), mesh::rows()].concat() }
+}
+
+impl Extremes {
+    /// Those with a wrong answer.
+    pub fn wrong(&self) -> impl Iterator<Item = &Extreme> {
+        self.rows.iter().filter(|row| !row.is_right)
+    }
+
+    /// The table and what it says.
+    pub fn chapter(&self) -> Chapter {
+        let wrong: Vec<&str> = self.wrong().map(|row| row.fed.as_str()).collect();
+        let verdict = if wrong.is_empty() {
+            format!("All {} extremes got the right answer.", self.rows.len())
+        } else {
+            format!("MISSED: {} of {} extremes got a wrong answer: {}.", wrong.len(), self.rows.len(), wrong.join("; "))
+        };
+        Chapter { title: "Extremes".to_owned(), text: vec![verdict], figures: vec![], tables: vec![self.table()] }
+    }
+
+    /// One line for each.
+    pub fn table(&self) -> Table {
+        let line = |row: &Extreme| {
+            let verdict = if row.is_right { "right" } else { "WRONG" };
+            [&row.fed, &row.came_out, &row.right_answer]
+                .map(|text| text.as_str().into())
+                .into_iter()
+                .chain([verdict.into()])
+                .collect()
+        };
+        Table {
+            id: "extremes".to_owned(),
+            title: "Extremes".to_owned(),
+            caption: "Each answer was checked by the program that made this report. f_max 10 N, h_min 0.5 mm, delta 5, alpha 0.1 m/(N s) unless \
+                      told otherwise; a ball of 1.5 mm on triangles of 2 mm."
+                .to_owned(),
+            heads: ["fed", "came out", "right answer, and why", "verdict"].map(str::to_owned).to_vec(),
+            rows: self.rows.iter().map(line).collect(),
+        }
+    }
+}

@@ -1,0 +1,53 @@
+//! Error against run time, stability, and what each part costs: everything that `touchup report` measures and shows.
+//!
+//! Each part measures into a type of its own, tells it as a [`Chapter`], and hands on what the verdict needs.
+#![cfg_attr(not(test), warn(clippy::unwrap_used))]
+
+pub mod allocations;
+mod convergence;
+pub mod cost;
+mod csv;
+mod document;
+mod extremes;
+mod figure;
+mod number;
+mod page;
+pub mod peers;
+mod plot;
+mod stability;
+pub mod verdict;
+mod whole_scan;
+pub mod work_precision;
+
+pub use convergence::{
+    BLOWN_UP, Convergence, Decay, Law, Line, MeshErrors, PaperSweeps, RobustSweeps, Rule, SweepError, SweepRun,
+    convergence, fit_decay, noisy, raster_samples, straight_line,
+};
+pub use document::{OutputFile, Report, ReportError};
+pub use extremes::{Extreme, Extremes, extremes};
+pub use figure::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Panel, Scale, Series, Spread, Table, TableCell};
+pub use number::three_digits;
+pub use peers::Peers;
+pub use plot::svg;
+pub use stability::{
+    BadShape, FaceShares, Integrator, MeshShares, RunEnding, ShareMap, Stability, SubFlowError, stability,
+};
+pub use whole_scan::{
+    CaseResult, ContactSculptor, GaussianCost, GaussianParams, GaussianProcess, GaussianSurface, Given, Reach,
+    ScanResult, TouchedError, Way, WayResult, WholeScan, WholeScanError, whole_scan,
+};
+pub use work_precision::WorkPrecision;
+
+/// How much is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Effort {
+    /// the small report: under a minute where the whole one takes up to fifteen
+    pub is_quick: bool,
+}
+
+impl Effort {
+    /// One of two, by how much is measured.
+    pub fn choose<T>(self, quick: T, full: T) -> T {
+        if self.is_quick { quick } else { full }
+    }
+}

@@ -1,0 +1,109 @@
+//! The wavy plate and the point that slides over it, for the peers and for touchup.
+
+use std::time::Instant;
+
+use nalgebra::Point3;
+
+use super::TouchupTimes;
+use crate::{Effort, Spread};
+use touchup_core::mesh::{FaceTree, MeshError, Nearby, TriMesh};
+use touchup_core::refine::{RefineError, RefineParams, Refiner, TipParams};
+use touchup_sim::wavy::{RADIUS, SIDE, STIFFNESS, contact_on, slide, wavy_plate};
+
+/// Farther than any query from the plate, m.
+const REACH: f64 = 0.01;
+/// Pushes before those that count.
+const WARM: usize = 2_000;
+/// Of the raster, m.
+const WIDTH: f64 = 0.8 * SIDE;
+
+/// Mesh, queries and samples of one size.
+#[derive(Clone, Debug)]
+pub struct PeersInput {
+    mesh: TriMesh,
+    queries: Vec<Point3<f64>>,
+    distances: Vec<f64>,
+}
+
+fn microseconds(since: Instant) -> f64 {
+    since.elapsed().as_secs_f64() * 1e6
+}
+
+impl PeersInput {
+    /// About so many faces, and the queries with their distances.
+    ///
+    /// # Errors
+    /// Those of [`wavy_plate`].
+    pub fn new(faces: usize, effort: Effort) -> Result<Self, MeshError> {
+        let mesh = wavy_plate(faces)?;
+        let queries: Vec<_> = (0..effort.choose(1_000, 4_000)).map(|i| contact_on(SIDE, i, WIDTH).0).collect();
+        let tree = FaceTree::new(&mesh);
+        let distance = |p| tree.closest(&mesh, p, REACH).map_or(f64::INFINITY, |hit| hit.distance_squared.sqrt());
+        let distances = queries.iter().map(distance).collect();
+        Ok(Self { mesh, queries, distances })
+    }
+
+    /// The plate.
+    pub fn mesh(&self) -> &TriMesh {
+        &self.mesh
+    }
+
+    /// Distance of each query from the plate, m.
+    pub fn distances(&self) -> &[f64] {
+        &self.distances
+    }
+
+    /// The file `positions.f64`: V × 3, m, little-endian doubles.
+    pub fn positions(&self) -> Vec<u8> {
+        bytes(self.mesh.positions())
+    }
+
+    /// The file `queries.f64`: Q × 3, m, little-endian doubles.
+    pub fn queries(&self) -> Vec<u8> {
+        bytes(&self.queries)
+    }
+
+    /// The file `faces.i32`: F × 3, little-endian.
+    pub fn triangles(&self) -> Vec<u8> {
+        self.mesh.faces().flat_map(|(_, corners)| corners).flat_map(|vertex| vertex.0.to_le_bytes()).collect()
+    }
+
+    /// Measures touchup: each query and each push by itself.
+    ///
+    /// # Errors
+    /// Those of [`Refiner::new`] and [`Refiner::push`]: none is expected.
+    pub fn measure(&self) -> Result<TouchupTimes, RefineError> {
+        let tree = FaceTree::new(&self.mesh);
+        let (mut queries, mut next) = (Vec::new(), Vec::new());
+        let (mut last, mut nearby) = (None, Nearby::default());
+        for p in &self.queries {
+            let start = Instant::now();
+            let hit = std::hint::black_box(tree.closest(&self.mesh, p, REACH));
+            queries.push(microseconds(start));
+            let hint = last.or(hit.map(|hit| hit.face));
+            let start = Instant::now();
+            let hit = hint.and_then(|hint| tree.closest_nearby(&self.mesh, p, hint, REACH, &mut nearby));
+            let hit = std::hint::black_box(hit);
+            next.push(microseconds(start));
+            last = hit.map(|hit| hit.face);
+        }
+        let tip = TipParams { radius: RADIUS, stiffness: Some(STIFFNESS) };
+        let mut refiner = Refiner::new(self.mesh.clone(), RefineParams::robust(tip))?;
+        let mut pushes = Vec::new();
+        for i in 0..WARM + 5 * self.queries.len() {
+            let sample = slide(i, WIDTH);
+            let start = Instant::now();
+            std::hint::black_box(refiner.push(&sample))?;
+            let time = microseconds(start);
+            if i >= WARM {
+                pushes.push(time);
+            }
+        }
+        let spread = |times| Spread::of(times).unwrap_or(f64::NAN.into());
+        Ok(TouchupTimes { query_us: spread(queries), next_query_us: spread(next), push_us: spread(pushes) })
+    }
+}
+
+fn bytes(points: &[Point3<f64>]) -> Vec<u8> {
+    points.iter().flat_map(|p| [p.x, p.y, p.z]).flat_map(f64::to_le_bytes).collect()
+}

@@ -1,0 +1,250 @@
+//! Against what a user would take instead: libraries from PyPI, on the same mesh, with the same queries, on one thread.
+//!
+//! Here are the input, touchup's own times, the script that measures the peers, and what comes of both. Files and processes
+//! are the matter of the command line.
+
+mod input;
+mod text;
+
+use serde::{Deserialize, Serialize};
+
+pub use input::PeersInput;
+
+use super::{Chapter, Spread};
+
+/// Measures the peers; prints a [`PeerTimes`] or a [`PeerError`] as JSON on each line.
+pub const SCRIPT: &str = include_str!("peers.py");
+/// What it needs, in the versions with which it is known to work.
+pub const PACKAGES: [&str; 7] = [
+    "numpy==2.4.6",
+    "scipy==1.17.1",
+    "scikit-learn==1.9.1",
+    "open3d==0.20.0",
+    "libigl==2.6.3",
+    "trimesh==5.2.0",
+    // without it trimesh has no tree
+    "rtree==1.4.1",
+];
+/// The factor that is aimed at, per sample.
+pub const WANTED_FACTOR: f64 = 100.0;
+/// A distance that differs by more than this share is another answer.
+pub const AGREEMENT: f64 = 1e-9;
+
+/// Times of touchup itself on the same input, µs.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct TouchupTimes {
+    /// one closest face, nothing known
+    pub query_us: Spread,
+    /// one closest face, near the last
+    pub next_query_us: Spread,
+    /// a whole push: filter, gate, closest face, dynamics, deformation, guard, tree
+    pub push_us: Spread,
+}
+
+/// One peer as the script tells it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PeerTimes {
+    /// which
+    pub peer: String,
+    /// of what it is made of
+    pub versions: String,
+    /// how its index is kept true
+    pub update: String,
+    /// to build its index, ms
+    pub build_ms: f64,
+    /// one closest face per call, µs
+    pub query_us: SpreadOf,
+    /// the same in one call for all, µs for each; where it can
+    pub batched_query_us: Option<SpreadOf>,
+    /// closest face, ring moved, index true again, µs
+    pub pipeline_us: SpreadOf,
+    /// how many samples that was measured over
+    pub pipeline_samples: usize,
+    /// what it found, m; none where it does not look for the closest face
+    #[serde(skip_serializing)]
+    distances_m: Vec<Option<f64>>,
+    /// largest difference from touchup's distance, relative; `None` where it does not look for the closest face
+    #[serde(skip_deserializing)]
+    pub largest_difference: Option<f64>,
+}
+
+/// A spread as the script tells it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SpreadOf {
+    median: f64,
+    p10: f64,
+    p90: f64,
+}
+
+impl From<SpreadOf> for Spread {
+    fn from(SpreadOf { median, p10, p90 }: SpreadOf) -> Self {
+        Self { median, p10, p90 }
+    }
+}
+
+/// A peer that could not be measured.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PeerError {
+    /// which
+    pub peer: String,
+    /// what it said
+    pub error: String,
+}
+
+/// All peers on one mesh.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PeersAtSize {
+    /// of the mesh
+    pub faces: usize,
+    /// touchup before the peers and after them
+    pub touchup: [TouchupTimes; 2],
+    /// as measured
+    pub peers: Vec<PeerTimes>,
+    /// those that were not
+    pub failed: Vec<PeerError>,
+}
+
+/// The comparison.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Peers {
+    /// the smallest mesh first
+    pub sizes: Vec<PeersAtSize>,
+}
+
+/// One line of the script that is neither times nor a failure.
+#[derive(Debug, thiserror::Error)]
+#[error("the peers' script said {line:?}: {error}")]
+pub struct UnknownLine {
+    /// as it came
+    pub line: String,
+    /// what is wrong with it
+    pub error: serde_json::Error,
+}
+
+impl PeerTimes {
+    /// Whether it found touchup's distances, to [`AGREEMENT`].
+    pub fn agrees(&self) -> bool {
+        self.largest_difference.is_some_and(|difference| difference <= AGREEMENT)
+    }
+}
+
+impl PeersAtSize {
+    /// Reads what the script printed, and compares its distances with those of `input`.
+    ///
+    /// # Errors
+    /// [`UnknownLine`]
+    pub fn read(input: &PeersInput, touchup: [TouchupTimes; 2], printed: &str) -> Result<Self, UnknownLine> {
+        let mut all = Self { faces: input.mesh().face_count(), touchup, peers: vec![], failed: vec![] };
+        for line in printed.lines().filter(|line| !line.trim().is_empty()) {
+            if let Ok(failed) = serde_json::from_str(line) {
+                all.failed.push(failed);
+                continue;
+            }
+            let read = serde_json::from_str::<PeerTimes>(line);
+            let mut times = read.map_err(|error| UnknownLine { line: line.chars().take(200).collect(), error })?;
+            times.largest_difference = largest_difference(&times.distances_m, input.distances());
+            all.peers.push(times);
+        }
+        Ok(all)
+    }
+
+    /// Whole pushes, the slower of both turns, µs.
+    pub fn push_us(&self) -> f64 {
+        self.touchup.iter().map(|times| times.push_us.median).fold(0.0, f64::max)
+    }
+
+    /// The fastest pipeline whose index is exact. Of Open3D single precision is taken for exact, and so is the nearest barycentre for
+    /// what it asks: the strictest comparison.
+    pub fn fastest_pipeline(&self) -> Option<&PeerTimes> {
+        let is_sound = |times: &&PeerTimes| times.largest_difference.is_none_or(|difference| difference < 1e-2);
+        let sound = self.peers.iter().filter(is_sound);
+        sound.min_by(|a, b| a.pipeline_us.median.total_cmp(&b.pipeline_us.median))
+    }
+
+    /// The fastest query alone, one per call.
+    pub fn fastest_query(&self) -> Option<&PeerTimes> {
+        self.peers.iter().min_by(|a, b| a.query_us.median.total_cmp(&b.query_us.median))
+    }
+
+    /// How many times faster a push is than the fastest pipeline.
+    pub fn pipeline_factor(&self) -> Option<f64> {
+        Some(self.fastest_pipeline()?.pipeline_us.median / self.push_us())
+    }
+
+    /// How many times faster a whole push is than the fastest query alone.
+    pub fn query_factor(&self) -> Option<f64> {
+        Some(self.fastest_query()?.query_us.median / self.push_us())
+    }
+}
+
+impl Peers {
+    /// Whether both promises hold at every size: [`WANTED_FACTOR`] per sample, and a push faster than a query alone.
+    pub fn holds(&self) -> bool {
+        let beyond = |factor: Option<f64>, wanted| factor.is_some_and(|factor| factor >= wanted);
+        self.sizes.iter().all(|size| beyond(size.pipeline_factor(), WANTED_FACTOR) && beyond(size.query_factor(), 1.0))
+    }
+
+    /// The table and what it says.
+    pub fn chapter(&self) -> Chapter {
+        text::chapter(self)
+    }
+}
+
+fn largest_difference(found: &[Option<f64>], ours: &[f64]) -> Option<f64> {
+    let pairs = found.iter().zip(ours);
+    let mut differences = pairs.map(|(found, ours)| found.map(|found| (found - ours).abs() / ours));
+    differences.try_fold(0.0, |largest: f64, difference| Some(largest.max(difference?)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Effort;
+
+    fn line(peer: &str, query: f64, pipeline: f64, distance: f64) -> String {
+        let spread = |median: f64| format!(r#"{{"median": {median}, "p10": {median}, "p90": {median}}}"#);
+        format!(
+            r#"{{"peer": "{peer}", "versions": "x 1", "update": "none", "build_ms": 1.0, "query_us": {}, "batched_query_us": null,
+                "pipeline_us": {}, "pipeline_samples": 3, "distances_m": [{distance:e}]}}"#,
+            spread(query),
+            spread(pipeline)
+        )
+        .replace('\n', " ")
+    }
+
+    #[test]
+    fn the_fastest_that_is_right_is_compared() {
+        let input = PeersInput::new(200, Effort { is_quick: true }).unwrap();
+        let times = |push: f64| TouchupTimes { query_us: 0.5.into(), next_query_us: 0.2.into(), push_us: push.into() };
+        let truth = input.distances()[0];
+        let printed = [
+            line("right", 9.0, 300.0, truth),
+            line("wrong", 20.0, 3.0, 1.5 * truth),
+            r#"{"peer": "broken", "error": "ImportError: no"}"#.to_owned(),
+        ];
+        let size = PeersAtSize::read(&input, [times(1.0), times(2.0)], &printed.join("\n")).unwrap();
+        assert_eq!((size.peers.len(), size.failed.len()), (2, 1));
+        assert!(size.peers[0].agrees() && !size.peers[1].agrees());
+        assert_eq!(size.pipeline_factor(), Some(150.0));
+        assert_eq!(size.query_factor(), Some(4.5));
+        let peers = Peers { sizes: vec![size] };
+        assert!(peers.holds());
+        // a picture and a table, under two names
+        let Chapter { figures, tables, .. } = peers.chapter();
+        assert!(figures.len() == 1 && tables.len() == 1 && figures[0].id != tables[0].id);
+        assert!(PeersAtSize::read(&input, [times(1.0); 2], "Segmentation fault").is_err());
+    }
+
+    /// The queries lie 0.05 mm below the wavy plate along its normal, and a chord of it is off by d² κ / 8 at most: edges of
+    /// 1.342 mm make diagonals d of 1.90 mm, and waves of 2 mm over 40 mm curve by 49.3 /m at most.
+    #[test]
+    fn distances_are_those_of_the_plate() {
+        let input = PeersInput::new(100_000, Effort { is_quick: true }).unwrap();
+        let chord = 1.90e-3f64.powi(2) * 49.3 / 8.0;
+        assert!(input.distances().iter().all(|d| (d - 0.05e-3).abs() < chord), "{:?}", input.distances());
+        assert!(input.distances().iter().any(|d| (d - 0.05e-3).abs() > 0.5 * chord), "no edge is met");
+        assert_eq!(input.queries().len() % 24, 0);
+        assert_eq!(input.positions().len(), 24 * input.mesh().vertex_count());
+        assert_eq!(input.triangles().len(), 12 * input.mesh().face_count());
+    }
+}

@@ -1,0 +1,124 @@
+//! Curves and marks in one frame, with a legend beside or below it.
+
+use super::super::figure::{Figure, LineStroke, Mark, Series, Spread};
+use super::axis::Extent;
+use super::frame::Frame;
+use super::style::{Look, text_width};
+use super::writer::{Anchor, Svg};
+use super::{TOP, WIDTH};
+
+/// Room on the left for the numbers and the name of the axis, pixels.
+const LEFT: f64 = 82.0;
+/// Height of the frame, pixels.
+const HEIGHT: f64 = 400.0;
+/// Below the frame: numbers and name of the axis.
+const BELOW: f64 = 50.0;
+/// A legend is beside the frame where its names are no longer.
+const WIDEST_BESIDE: f64 = 230.0;
+/// The sample of line and mark in front of a name.
+const SAMPLE: f64 = 34.0;
+/// From line to line of the legend.
+const LINE: f64 = 21.0;
+
+/// Draws below the title, and returns how far down it reaches.
+pub(super) fn draw(svg: &mut Svg, figure: &Figure, series: &[Series]) -> f64 {
+    let name_width = series.iter().map(|series| text_width(&series.name, 12.5)).fold(0.0, f64::max);
+    let is_beside = name_width <= WIDEST_BESIDE && series.len() as f64 * LINE <= HEIGHT;
+    let right = if is_beside { name_width + SAMPLE + 24.0 } else { 24.0 };
+    let frame = Frame { left: LEFT, top: TOP, width: WIDTH - LEFT - right, height: HEIGHT };
+    let x = Extent::around(figure.x.scale, series.iter().flat_map(|s| s.marks.iter().flat_map(|m| ends(m.x))));
+    let y = Extent::around(figure.y.scale, series.iter().flat_map(|s| s.marks.iter().flat_map(|m| ends(m.y))));
+    frame.draw_grid(svg, &x, &y);
+    frame.name_axes(svg, &figure.x.label, &figure.y.label);
+    let mut hidden = 0;
+    for (index, series) in series.iter().enumerate() {
+        hidden += draw_series(svg, &frame, [&x, &y], Look::of(index), series);
+    }
+    frame.draw_border(svg);
+    let below = frame.bottom() + BELOW;
+    let bottom = if is_beside {
+        draw_legend(svg, series, [frame.right() + 14.0, TOP + 12.0], 1, 0.0);
+        below
+    } else {
+        let columns = (((WIDTH - LEFT) / (name_width + SAMPLE + 20.0)) as usize).max(1);
+        let lines = draw_legend(svg, series, [LEFT, below + 12.0], columns, (WIDTH - LEFT) / columns as f64);
+        below + lines as f64 * LINE
+    };
+    if hidden == 0 {
+        return bottom;
+    }
+    let note = format!("{hidden} marks are not shown: they have no place on these axes (0, or not finite)");
+    svg.text([LEFT, bottom + 14.0], Anchor::Start, "font-size=\"11.5\" fill=\"#a33\"", &note);
+    bottom + 18.0
+}
+
+fn ends(spread: Spread) -> [f64; 3] {
+    [spread.median, spread.p10, spread.p90]
+}
+
+/// Returns how many marks have no place.
+fn draw_series(svg: &mut Svg, frame: &Frame, extents: [&Extent; 2], look: Look, series: &Series) -> usize {
+    let places: Vec<Option<[f64; 2]>> = series.marks.iter().map(|mark| place(frame, extents, mark)).collect();
+    if series.stroke != LineStroke::Marks {
+        let style = if series.stroke == LineStroke::Joined { look.line() } else { look.dashed() };
+        // a mark without a place parts the line
+        for stretch in places.split(Option::is_none).filter(|stretch| stretch.len() > 1) {
+            svg.polyline(&stretch.iter().flatten().copied().collect::<Vec<_>>(), &style);
+        }
+    }
+    if series.stroke != LineStroke::Dashed {
+        for (mark, place) in series.marks.iter().zip(&places) {
+            let Some(place) = place else { continue };
+            draw_bars(svg, frame, extents, look, mark, *place);
+            look.mark(svg, *place);
+        }
+    }
+    places.iter().filter(|place| place.is_none()).count()
+}
+
+fn place(frame: &Frame, [x, y]: [&Extent; 2], mark: &Mark) -> Option<[f64; 2]> {
+    Some(frame.pixel([x.place(mark.x.median)?, y.place(mark.y.median)?]))
+}
+
+/// From the 10th to the 90th percentile, where they are apart.
+fn draw_bars(svg: &mut Svg, frame: &Frame, [x, y]: [&Extent; 2], look: Look, mark: &Mark, [px, py]: [f64; 2]) {
+    let ends = |extent: &Extent, spread: Spread| extent.place(spread.p10).zip(extent.place(spread.p90));
+    let style = look.bar();
+    if let Some((low, high)) = ends(x, mark.x) {
+        let (low, high) = (frame.pixel([low, 0.0])[0], frame.pixel([high, 0.0])[0]);
+        bar(svg, [low, py], [high, py], [0.0, 3.0], &style);
+    }
+    if let Some((low, high)) = ends(y, mark.y) {
+        let (low, high) = (frame.pixel([0.0, low])[1], frame.pixel([0.0, high])[1]);
+        bar(svg, [px, low], [px, high], [3.0, 0.0], &style);
+    }
+}
+
+/// A line with a short stroke across each end.
+fn bar(svg: &mut Svg, from: [f64; 2], to: [f64; 2], [dx, dy]: [f64; 2], style: &str) {
+    if (from[0] - to[0]).abs() + (from[1] - to[1]).abs() < 1.0 {
+        return;
+    }
+    svg.line(from, to, style);
+    for [x, y] in [from, to] {
+        svg.line([x - dx, y - dy], [x + dx, y + dy], style);
+    }
+}
+
+/// Returns how many lines it has.
+fn draw_legend(svg: &mut Svg, series: &[Series], corner: [f64; 2], columns: usize, width: f64) -> usize {
+    for (index, series) in series.iter().enumerate() {
+        let look = Look::of(index);
+        let (column, line) = (index % columns, index / columns);
+        let [x, y] = [corner[0] + column as f64 * width, corner[1] + line as f64 * LINE];
+        let style = if series.stroke == LineStroke::Dashed { look.dashed() } else { look.line() };
+        if series.stroke != LineStroke::Marks {
+            svg.line([x, y], [x + SAMPLE - 8.0, y], &style);
+        }
+        if series.stroke != LineStroke::Dashed {
+            look.mark(svg, [x + 0.5 * (SAMPLE - 8.0), y]);
+        }
+        svg.text([x + SAMPLE, y + 4.5], Anchor::Start, "font-size=\"12.5\"", &series.name);
+    }
+    series.len().div_ceil(columns)
+}

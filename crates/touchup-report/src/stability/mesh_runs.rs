@@ -1,0 +1,191 @@
+//! Runs of a whole refiner: a ball presses on a face of a sheet, from equilateral triangles to needles and slivers.
+
+use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, Vector3};
+use rand::RngExt;
+use rand_pcg::Pcg64;
+use serde::Serialize;
+
+use super::face_runs::RunEnding;
+use touchup_core::mesh::{FaceId, TriMesh, VertexId};
+use touchup_core::refine::{RefineParams, Refiner, RegionFit, TipParams};
+use touchup_core::touch::{Sample, Wrench};
+
+/// Cells along each side of the sheet.
+const CELLS: u32 = 12;
+/// Samples in each run.
+const SAMPLES: i64 = 30;
+/// Of the ball, m.
+const RADIUS: f64 = 1.5e-3;
+/// Of the probe, N/m.
+const STIFFNESS: f64 = 2e4;
+/// Crossing of the rest point that counts, m.
+const CROSSING: f64 = 1e-9;
+/// Decades of the quality: from one in a thousand to one.
+pub(super) const QUALITY: std::ops::Range<f64> = -3.0..0.0;
+
+/// Which way a triangle is bad.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BadShape {
+    /// two long sides and a short one
+    Needle,
+    /// one long side and two that lie on it nearly
+    Sliver,
+}
+
+impl BadShape {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Needle, Self::Sliver];
+
+    /// As a person reads it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Needle => "needles",
+            Self::Sliver => "slivers",
+        }
+    }
+}
+
+/// One press on one sheet.
+#[derive(Clone, Debug)]
+pub(super) struct MeshRun {
+    /// altitude over longest side of all triangles; 0.87 where they are equilateral
+    pub quality: f64,
+    /// relaxation over one step: α k dt
+    pub stiffness: f64,
+    pub shape: BadShape,
+    edge: f64,
+    dt_s: f64,
+    alpha: f64,
+    face: u32,
+    tilt: Vector3<f64>,
+    depth: f64,
+}
+
+impl MeshRun {
+    /// Draws a press on a sheet of such triangles.
+    pub fn draw(rng: &mut Pcg64, shape: BadShape) -> Self {
+        let power = |x: f64| 10f64.powf(x);
+        // a sample acts for 30 ms at most
+        let dt_s = power(rng.random_range(-6.0..-1.5));
+        let stiffness = power(rng.random_range(-6.0..6.0));
+        let equilateral = 0.75f64.sqrt();
+        Self {
+            quality: equilateral * power(rng.random_range(QUALITY)),
+            stiffness,
+            shape,
+            edge: power(rng.random_range(-3.5..-2.0)),
+            dt_s,
+            alpha: stiffness / (STIFFNESS * dt_s),
+            // in the middle of the sheet
+            face: (CELLS * CELLS / 2 + CELLS / 2) * 2 + rng.random_range(0..2),
+            tilt: 0.2 * Vector3::new(rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0), 0.0),
+            depth: 1e-4 * rng.random_range(-1.0..1.0),
+        }
+    }
+
+    /// A flat sheet of equal triangles with sides of `edge` at most, curled a little: no two normals are the same.
+    fn sheet(&self) -> TriMesh {
+        let height = self.quality * self.edge;
+        let lean = match self.shape {
+            // the top over the end of the base, or over its middle
+            BadShape::Needle => 0.0,
+            BadShape::Sliver => 0.5,
+        };
+        let turn = Rotation3::from_euler_angles(0.3, -0.2, 0.7);
+        let at = |i: u32, j: u32| {
+            let (x, y) = (f64::from(i) + lean * f64::from(j % 2), f64::from(j));
+            let bent = 0.02 * height * ((f64::from(i) * 1.3).sin() + (f64::from(j) * 0.7).cos());
+            turn * Point3::new(x * self.edge, y * height, bent)
+        };
+        let id = |i: u32, j: u32| j * (CELLS + 1) + i;
+        let positions = (0..=CELLS).flat_map(|j| (0..=CELLS).map(move |i| (i, j))).map(|(i, j)| at(i, j)).collect();
+        let cells = (0..CELLS).flat_map(|j| (0..CELLS).map(move |i| (i, j)));
+        let faces = cells.flat_map(|(i, j)| {
+            let [a, b, c, d] = [id(i, j), id(i + 1, j), id(i + 1, j + 1), id(i, j + 1)];
+            if j % 2 == 1 && self.shape == BadShape::Sliver { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] }
+        });
+        TriMesh::new(positions, faces.collect()).unwrap_or_else(|error| unreachable!("the sheet is sound: {error}"))
+    }
+
+    /// Presses, and watches the mesh.
+    pub fn judge(&self) -> RunEnding {
+        let mesh = self.sheet();
+        let mut params = RefineParams::robust(TipParams { radius: RADIUS, stiffness: Some(STIFFNESS) });
+        params.dynamics.alpha_m_per_n_s = self.alpha;
+        let before: Vec<Vector3<f64>> = mesh.faces().map(|(face, _)| mesh.normal(face)).collect();
+        let (barycentre, normal) = (mesh.barycentre(FaceId(self.face)), mesh.normal(FaceId(self.face)));
+        let Ok(mut refiner) = Refiner::new(mesh, params) else { return RunEnding::GaveUp };
+        let felt = (normal + self.tilt).normalize();
+        let force = 2.0 * felt;
+        let centre = barycentre + felt * (RADIUS + self.depth) - force / STIFFNESS;
+        let wrench = Wrench { force, torque: Vector3::zeros() };
+        let pose_ot = Isometry3::from_parts(centre.coords.into(), UnitQuaternion::identity());
+        let point = centre - felt * RADIUS;
+        let mut last: Option<PressedFace> = None;
+        for i in 1..=SAMPLES {
+            let stamp_ns = (i as f64 * self.dt_s * 1e9) as i64;
+            let Ok(update) = refiner.push(&Sample { stamp_ns, pose_ot, wrench }) else { return RunEnding::GaveUp };
+            if update.fit == Some(RegionFit::CutBack) {
+                return RunEnding::CutBack;
+            }
+            let Some(mismatch) = update.mismatch else { continue };
+            let handle = PressedFace::of(refiner.mesh(), mismatch.face);
+            if last.is_some_and(|last| last.crosses(&handle, &point, &force)) {
+                return RunEnding::Overshot;
+            }
+            last = Some(handle);
+        }
+        if refiner.counts().cut_back > 0 { RunEnding::CutBack } else { sound(refiner.mesh(), &before) }
+    }
+}
+
+/// The face that is pressed, as one sample left it.
+#[derive(Clone, Copy)]
+struct PressedFace {
+    face: FaceId,
+    barycentre: Point3<f64>,
+    normal: Vector3<f64>,
+}
+
+impl PressedFace {
+    fn of(mesh: &TriMesh, face: FaceId) -> Self {
+        Self { face, barycentre: mesh.barycentre(face), normal: mesh.normal(face) }
+    }
+
+    /// Whether the face went over its rest point to be at `next`: for the normal before and for that after.
+    fn crosses(&self, next: &Self, point: &Point3<f64>, force: &Vector3<f64>) -> bool {
+        let (from, to) = self.left(next, point, force);
+        let over = |sign: f64| from.iter().all(|x| sign * x >= 0.0) && to.iter().all(|x| sign * x < -CROSSING);
+        self.face == next.face && (over(1.0) || over(-1.0))
+    }
+
+    /// How far from rest it was and is, for both normals, m.
+    fn left(&self, next: &Self, point: &Point3<f64>, force: &Vector3<f64>) -> ([f64; 2], [f64; 2]) {
+        let left =
+            |at: &Self| [self.normal, next.normal].map(|n| (point - at.barycentre).dot(&n) + force.dot(&n) / STIFFNESS);
+        (left(self), left(next))
+    }
+}
+
+/// Finite, with unit normals that point where they did.
+fn sound(mesh: &TriMesh, before: &[Vector3<f64>]) -> RunEnding {
+    if !mesh.positions().iter().all(|p| p.iter().all(|x| x.is_finite())) {
+        return RunEnding::NotFinite;
+    }
+    for (face, corners) in mesh.faces() {
+        let normal = mesh.normal(face);
+        if (normal.norm() - 1.0).abs() > 1e-9 && !is_flat(mesh, corners) {
+            return RunEnding::NotUnit;
+        }
+        if normal.dot(&before[face.0 as usize]) <= 0.0 {
+            return RunEnding::Flipped;
+        }
+    }
+    RunEnding::Stable
+}
+
+fn is_flat(mesh: &TriMesh, corners: [VertexId; 3]) -> bool {
+    let [a, b, c] = corners.map(|v| mesh.position(v));
+    (b - a).cross(&(c - a)) == Vector3::zeros()
+}

@@ -1,0 +1,168 @@
+//! Numerical stability: maps over twelve decades of every parameter, and the exact sub-flows against 32 digits.
+
+mod double_double;
+mod face_runs;
+mod integrators;
+mod mesh_runs;
+mod shares;
+mod sub_flows;
+mod text;
+
+use rand::SeedableRng;
+use rand_pcg::Pcg64;
+use serde::Serialize;
+
+pub use face_runs::RunEnding;
+pub use integrators::Integrator;
+pub use mesh_runs::BadShape;
+pub use shares::ShareMap;
+pub use sub_flows::SubFlowError;
+
+use super::{Chapter, Effort};
+use face_runs::FaceRun;
+use mesh_runs::MeshRun;
+use shares::{Counts, Grid};
+
+/// An exact sub-flow may be off by this share of its scale.
+pub const LARGEST_SUB_FLOW_ERROR: f64 = 1e-10;
+/// Same report on every machine.
+const SEED: u64 = 4;
+
+/// How the runs of one integrator on one face ended.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FaceShares {
+    /// which
+    pub integrator: Integrator,
+    /// how many runs
+    pub runs: usize,
+    /// of them, how they ended: the first fault counts
+    pub endings: Vec<(RunEnding, usize)>,
+    /// share of the stable ones
+    pub stable_share: f64,
+    /// share in which the integrator itself kept |n| = 1, before it was set to 1
+    pub unit_share: f64,
+    /// largest α f_max dt / h_min below which all runs are stable, in the columns of the map; `None` where not even the first is
+    pub stable_up_to: Option<f64>,
+    /// x: α f_max dt / h_min, y: β f_max² dt; for the sigmoid and for the spring
+    pub by_stiffness: [ShareMap; 2],
+    /// x: step length, s; y: h_min, m
+    pub by_step: ShareMap,
+}
+
+/// How the runs of the default, Lie in the robust mode, on whole meshes ended. The mode turns the normal by itself, so that the
+/// drift-corrected step is the same there.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MeshShares {
+    /// of the triangles
+    pub shape: BadShape,
+    /// how many runs
+    pub runs: usize,
+    /// of them, how they ended: the first fault counts
+    pub endings: Vec<(RunEnding, usize)>,
+    /// share of the stable ones
+    pub stable_share: f64,
+    /// smallest altitude over longest side from which on all runs are stable, in the rows of the map; `None` where not even the
+    /// last is
+    pub stable_from_quality: Option<f64>,
+    /// x: α k dt, y: altitude over longest side
+    pub by_quality: ShareMap,
+}
+
+/// What was measured of stability.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Stability {
+    /// one for each integrator
+    pub faces: Vec<FaceShares>,
+    /// one for each shape of triangles
+    pub meshes: Vec<MeshShares>,
+    /// one for each sub-flow and regime
+    pub sub_flows: Vec<SubFlowError>,
+}
+
+/// Runs all of it; the same numbers on every machine.
+pub fn stability(effort: Effort, progress: &mut dyn FnMut(&str)) -> Stability {
+    let runs = effort.choose(12_000, 150_000);
+    let faces = Integrator::ALL.map(|integrator| {
+        progress(&format!("stability map, {}", integrator.name()));
+        // where it is stiff this one takes ten milliseconds for nothing
+        let runs = if integrator == Integrator::DormandPrince { effort.choose(400, 4_000) } else { runs };
+        face_shares(integrator, runs)
+    });
+    progress("stability map, mesh quality");
+    let meshes = BadShape::ALL.map(|shape| mesh_shares(shape, effort.choose(600, 8_000))).into();
+    progress("exact sub-flows against 32 digits");
+    let sub_flows = sub_flows::sub_flows(&mut Pcg64::seed_from_u64(SEED), effort.choose(300, 2_000));
+    Stability { faces: faces.into(), meshes, sub_flows }
+}
+
+fn face_shares(integrator: Integrator, runs: usize) -> FaceShares {
+    let mut rng = Pcg64::seed_from_u64(SEED);
+    let mut counts = Counts::default();
+    let mut kept_unit = 0;
+    let mut stiffness = [Grid::new(-12.0..12.0, -12.0..12.0), Grid::new(-12.0..12.0, -12.0..12.0)];
+    let mut steps = Grid::new(face_runs::STEP, face_runs::H_MIN);
+    for i in 0..runs {
+        let run = FaceRun::draw(&mut rng, i % 2 == 1);
+        let judged = run.judge(integrator);
+        let is_stable = judged.ending == RunEnding::Stable;
+        counts.add(judged.ending);
+        kept_unit += usize::from(judged.kept_unit);
+        stiffness[i % 2].add(run.position_stiffness(), run.turning_stiffness(), is_stable);
+        steps.add(run.dt(), run.h_min, is_stable);
+    }
+    let by_stiffness = stiffness.map(Grid::shares);
+    let stable_up_to = by_stiffness.iter().map(ShareMap::stable_up_to).reduce(|a, b| Some(a?.min(b?))).flatten();
+    FaceShares {
+        integrator,
+        runs,
+        stable_share: counts.stable_share(),
+        endings: counts.endings(),
+        unit_share: kept_unit as f64 / runs as f64,
+        stable_up_to,
+        by_stiffness,
+        by_step: steps.shares(),
+    }
+}
+
+fn mesh_shares(shape: BadShape, runs: usize) -> MeshShares {
+    let mut rng = Pcg64::seed_from_u64(SEED);
+    let mut counts = Counts::default();
+    let mut quality = Grid::new(-6.0..6.0, mesh_runs::QUALITY);
+    for _ in 0..runs {
+        let run = MeshRun::draw(&mut rng, shape);
+        let ending = run.judge();
+        counts.add(ending);
+        quality.add(run.stiffness, run.quality, ending == RunEnding::Stable);
+    }
+    let by_quality = quality.shares();
+    MeshShares {
+        shape,
+        runs,
+        stable_share: counts.stable_share(),
+        endings: counts.endings(),
+        stable_from_quality: by_quality.stable_from(),
+        by_quality,
+    }
+}
+
+impl Stability {
+    /// Whether the default integrator, Lie, was stable in every run of one face.
+    pub fn is_default_stable(&self) -> bool {
+        self.faces.iter().filter(|shares| shares.integrator == Integrator::Lie).all(|shares| shares.stable_share == 1.0)
+    }
+
+    /// The smallest altitude over longest side from which on no press of the default was at fault; `None` where all shapes are.
+    pub fn default_stable_from_quality(&self) -> Option<f64> {
+        self.meshes.iter().map(|shares| shares.stable_from_quality).reduce(|a, b| Some(a?.max(b?))).flatten()
+    }
+
+    /// The largest error of all sub-flows, over the scale.
+    pub fn largest_sub_flow_error(&self) -> f64 {
+        self.sub_flows.iter().map(|flow| flow.largest_error).fold(0.0, f64::max)
+    }
+
+    /// The maps, the tables and what they say.
+    pub fn chapter(&self) -> Chapter {
+        text::chapter(self)
+    }
+}

@@ -1,0 +1,227 @@
+//! The exact sub-flows against another way: the implicit closed form, solved by bisection in numbers of 32 digits.
+
+use nalgebra::{Point3, Vector3};
+use rand::RngExt;
+use rand_pcg::Pcg64;
+use serde::Serialize;
+
+use super::double_double::Double2;
+use touchup_core::refine::{Along, ContactModel, DynamicsParams, FaceDynamics, FaceState, StepRule};
+
+/// Halvings of the bracket: from 1e9 to below a rounding of what is left.
+const BISECTIONS: usize = 140;
+/// Exponentials of more are too near to the largest number.
+const LARGEST_EXPONENT: f64 = 690.0;
+/// Nearer to the opposite of the force than this a normal is not compared, rad: the force as it was given is off by a rounding,
+/// and turning away from it makes 1e-11 of that.
+const NEAREST_OPPOSITE: std::ops::Range<f64> = -5.0..-1.0;
+/// Without rounding of the input: lengths in units of h_min, forces of f_max, times of h_min/(α f_max).
+const UNIT_MODEL: ContactModel = ContactModel::Sigmoid { f_max_n: 1.0, h_min_m: 1.0, delta: 0.0 };
+
+/// How far one sub-flow was from the truth at worst.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SubFlowError {
+    /// which, and in which regime
+    pub name: String,
+    /// compared
+    pub cases: usize,
+    /// largest error over the scale: of a position the way and h_min, of a normal 1
+    pub largest_error: f64,
+    /// where that was
+    pub worst: String,
+}
+
+/// What the force is in a regime of the sigmoid, in units of f_max.
+type ForceShare = fn(&mut Pcg64) -> f64;
+
+fn power(rng: &mut Pcg64, decades: std::ops::Range<f64>) -> f64 {
+    10f64.powf(rng.random_range(decades))
+}
+
+/// Each regime with its own closed form or its own cancellation.
+const REGIMES: [(&str, ForceShare); 7] = [
+    ("position, 0 < F < f_max", |rng| rng.random_range(0.0..1.0)),
+    ("position, F = 0", |_| 0.0),
+    ("position, F = f_max", |_| 1.0),
+    ("position, F near 0", |rng| power(rng, -12.0..-2.0) * if rng.random_bool(0.5) { 1.0 } else { -1.0 }),
+    ("position, F near f_max", |rng| 1.0 + power(rng, -12.0..-2.0) * if rng.random_bool(0.5) { 1.0 } else { -1.0 }),
+    ("position, F against the normal", |rng| -power(rng, -2.0..4.0)),
+    ("position, F above f_max", |rng| 1.0 + power(rng, -2.0..4.0)),
+];
+
+/// All of them, `cases` of each.
+pub(super) fn sub_flows(rng: &mut Pcg64, cases: usize) -> Vec<SubFlowError> {
+    let mut errors: Vec<_> = REGIMES.iter().map(|(name, share)| of_sigmoid(rng, name, *share, cases)).collect();
+    errors.push(of_spring(rng, cases));
+    errors.push(of_rotation(rng, cases));
+    errors
+}
+
+/// Keeps the worst.
+struct Worst {
+    error: SubFlowError,
+}
+
+impl Worst {
+    fn new(name: &str) -> Self {
+        Self { error: SubFlowError { name: name.to_owned(), cases: 0, largest_error: 0.0, worst: String::new() } }
+    }
+
+    fn take(&mut self, error: f64, at: impl FnOnce() -> String) {
+        self.error.cases += 1;
+        // a NaN is the worst there is
+        if error.is_nan() || error > self.error.largest_error {
+            self.error.largest_error = if error.is_nan() { f64::INFINITY } else { error };
+            self.error.worst = at();
+        }
+    }
+}
+
+fn dynamics(model: ContactModel, alpha: f64, beta: f64) -> Option<FaceDynamics> {
+    let params = DynamicsParams {
+        model,
+        alpha_m_per_n_s: alpha,
+        beta_per_n2_s: beta,
+        rule: StepRule::Lie,
+        along: Along::InitialNormal,
+        take_out_rigid_offset: false,
+    };
+    FaceDynamics::new(params).ok()
+}
+
+const FACE: FaceState = FaceState { b: Point3::new(0.0, 0.0, 0.0), n: Vector3::new(0.0, 0.0, 1.0) };
+
+/// The way of a face at the origin that looks up, in units of h_min.
+fn way(model: ContactModel, h: f64, force: f64, t: f64) -> f64 {
+    let after = dynamics(model, 1.0, 0.0)
+        .and_then(|dynamics| dynamics.step(&FACE, &Point3::new(0.0, 0.0, h), &(Vector3::z() * force), t).ok());
+    after.map_or(f64::NAN, |face| face.b.z)
+}
+
+fn of_sigmoid(rng: &mut Pcg64, name: &str, share: ForceShare, cases: usize) -> SubFlowError {
+    let mut worst = Worst::new(name);
+    for case in 0..cases {
+        // half of them where the logistic bends, half of them anywhere an exponential is finite
+        let u = if case % 2 == 0 { rng.random_range(-12.0..12.0) } else { rng.random_range(-600.0..600.0) };
+        let (c, t) = (share(rng), power(rng, -6.0..6.0));
+        let Some(exact) = exact_way(u, c, t) else { continue };
+        let found = way(UNIT_MODEL, u, c, t);
+        worst.take((found - exact).abs() / (1.0 + exact.abs()), || format!("u {u}, F/f_max {c}, T {t}"));
+    }
+    worst.error
+}
+
+/// −Δu of du/dT = 1/(1+eᵘ) − c after T: the root of ∫ du / (1/(1+eᵘ) − c) = T between the start and the farthest it can be.
+/// `None` where it ends beyond the largest exponential without having been beyond the bend from the start.
+fn exact_way(u: f64, c: f64, t: f64) -> Option<f64> {
+    let rate = share(u.into()) - c.into();
+    if rate.high == 0.0 {
+        return Some(0.0);
+    }
+    // u moves one way, towards the rest point where there is one, and no faster than the larger of the rates at both ends
+    let up = rate.high > 0.0;
+    let fastest = if up { (1.0 - c).abs() } else { c.abs() }.max(rate.high.abs());
+    let farthest = u + if up { fastest * t } else { -fastest * t };
+    let rest = (0.0 < c && c < 1.0).then(|| ((1.0 - c) / c).ln());
+    let far = match rest {
+        Some(rest) if up => farthest.min(rest + 1e-9),
+        Some(rest) => farthest.max(rest - 1e-9),
+        None => farthest,
+    };
+    let start = primitive(u.into(), c)?;
+    let within = far.clamp(-LARGEST_EXPONENT, LARGEST_EXPONENT);
+    if far != within && primitive(within.into(), c).is_none_or(|there| (there - start - t.into()).high < 0.0) {
+        return straight(u, c, t, far);
+    }
+    let (mut near, mut far) = (Double2::from(u), Double2::from(within));
+    for _ in 0..BISECTIONS {
+        let middle = (near + far) * 0.5.into();
+        // beyond the rest point there is no time at all
+        let is_before = primitive(middle, c)
+            .filter(|_| ((share(middle) - c.into()).high > 0.0) == up)
+            .is_some_and(|there| (there - start - t.into()).high < 0.0);
+        if is_before { near = middle } else { far = middle }
+    }
+    Some((Double2::from(u) - near).value())
+}
+
+/// Where u runs so far that the exponential has no say: the rate is −c or 1 − c all the way but for the tail of the bend.
+fn straight(u: f64, c: f64, t: f64, far: f64) -> Option<f64> {
+    let is_flat = |low: f64, high: f64| low > 60.0 || high < -60.0;
+    let (low, high) = (u.min(far), u.max(far));
+    is_flat(low, high).then_some(if low > 60.0 { c * t } else { (c - 1.0) * t })
+}
+
+/// 1/(1 + eᵘ)
+fn share(u: Double2) -> Double2 {
+    let one = Double2::from(1.0);
+    if u.high > 0.0 {
+        let e = (-u).exp();
+        e / (one + e)
+    } else {
+        one / (one + u.exp())
+    }
+}
+
+/// ∫ (1 + E) / (1 − c (1 + E)) du, E = eᵘ, by partial fractions.
+fn primitive(u: Double2, c: f64) -> Option<Double2> {
+    let (one, share) = (Double2::from(1.0), Double2::from(c));
+    if c == 0.0 {
+        return Some(u + u.exp());
+    }
+    if c == 1.0 {
+        return Some((-u).exp() - u);
+    }
+    // u − ln|1 − c − c E| / c, over 1 − c
+    let inside = one - share - share * u.exp();
+    (inside.high != 0.0).then(|| (u - inside.abs().ln() / share) / (one - share))
+}
+
+fn of_spring(rng: &mut Pcg64, cases: usize) -> SubFlowError {
+    let mut worst = Worst::new("position, linear spring");
+    let model = ContactModel::Spring { stiffness_n_per_m: 1.0 };
+    for _ in 0..cases {
+        let sign = if rng.random_bool(0.5) { 1.0 } else { -1.0 };
+        let (h, force, t) = (sign * power(rng, -6.0..3.0), rng.random_range(-3.0..3.0), power(rng, -6.0..6.0));
+        // h + F falls to e^−t of itself
+        let fallen = Double2::from(1.0) - Double2::from(-t.min(300.0)).exp();
+        let exact = ((Double2::from(h) + force.into()) * fallen).value();
+        let found = way(model, h, force, t);
+        worst.take((found - exact).abs() / (1.0 + exact.abs()), || format!("h {h}, F {force}, T {t}"));
+    }
+    worst.error
+}
+
+/// tan(θ/2) falls as e^(−β |F| f t); with the tip held at h = 0, f is half of f_max.
+fn of_rotation(rng: &mut Pcg64, cases: usize) -> SubFlowError {
+    let mut worst = Worst::new("normal");
+    for case in 0..cases {
+        let angle = match case % 3 {
+            0 => power(rng, -12.0..-1.0),
+            1 => std::f64::consts::PI - power(rng, NEAREST_OPPOSITE),
+            _ => rng.random_range(0.0..std::f64::consts::PI),
+        };
+        let exponent = power(rng, -6.0..2.5);
+        let force = Vector3::new(angle.sin(), 0.0, angle.cos());
+        let after = dynamics(UNIT_MODEL, 0.0, 1.0)
+            .and_then(|dynamics| dynamics.step(&FACE, &Point3::origin(), &force, 2.0 * exponent).ok());
+        let found = after.map_or(Vector3::repeat(f64::NAN), |face| face.n);
+        let error = (found - exact_normal(&force, exponent)).norm();
+        worst.take(error, || format!("angle {angle}, exponent {exponent}"));
+    }
+    worst.error
+}
+
+/// n = z turned towards `force` in the plane y = 0, in numbers of 32 digits.
+fn exact_normal(force: &Vector3<f64>, exponent: f64) -> Vector3<f64> {
+    let (x, z) = (Double2::from(force.x), Double2::from(force.z));
+    let one = Double2::from(1.0);
+    let length = ((x * x + z * z).ln() * 0.5.into()).exp();
+    // tan(θ/2) = sin / (1 + cos) or (1 − cos) / sin, whichever does not cancel
+    let tangent = if force.z > 0.0 { x / (length + z) } else { (length - z) / x };
+    let left = tangent * (-length * exponent.into()).exp();
+    // the normal lies at the angle θ − θ′ from z: as the force turned back by θ′
+    let (cosine, sine) = ((one - left * left) / (one + left * left), (left + left) / (one + left * left));
+    let (fx, fz) = (x / length, z / length);
+    Vector3::new((fx * cosine - fz * sine).value(), 0.0, (fz * cosine + fx * sine).value())
+}

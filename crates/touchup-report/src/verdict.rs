@@ -1,0 +1,255 @@
+//! What a practitioner asks, answered by what was measured: which mode, step and region, at which rate, what it costs, and where
+//! it fails.
+
+use super::cost::Cost;
+use super::whole_scan::{CaseResult, ScanResult, Way, WayResult};
+use super::{Convergence, Extremes, Integrator, Peers, Rule, Stability, WholeScan, three_digits};
+
+/// Mode, region, step, rate, cost and limits in one paragraph; `None` where no way made any scan better.
+pub fn in_short(scans: &WholeScan, stability: Option<&Stability>, cost: Option<&Cost>) -> Option<String> {
+    let best = by_part(scans, ScanResult::best);
+    let slowest_us = best.iter().map(|(_, way)| way.per_sample_us.median).reduce(f64::max)?;
+    let mut text = format!("In short: take {}.", one_or_each(&best));
+    let haptic = by_part(scans, ScanResult::best_haptic);
+    if !haptic.is_empty() {
+        text += &format!(" Where the haptic update runs alone take {}.", one_or_each(&haptic));
+    }
+    if stability.is_some_and(Stability::is_default_stable) {
+        text += " Leave the step at lie: it was stable in every run.";
+    }
+    text += &format!(
+        " With all of it a sample takes up to {} µs: at 1 kHz {} % of one core, which keeps up with {} samples per second.",
+        three_digits(slowest_us),
+        three_digits(0.1 * slowest_us),
+        three_digits(1e6 / slowest_us)
+    );
+    if let Some(size) = cost.and_then(|cost| cost.sizes.last()) {
+        let answer_us = size.default_larger.time_ns.median * 1e-3;
+        text += &format!(" The haptic update answers it in {} µs, the patch follows.", three_digits(answer_us));
+    }
+    let mut fails = Vec::new();
+    if let Some(quality) = stability.and_then(Stability::default_stable_from_quality).filter(|quality| *quality > 0.0) {
+        fails.push(format!("on some triangles narrower than {} of their length", three_digits(quality)));
+    }
+    let of_patch = |scan: &ScanResult| scan.of(Way::Patch).is_some_and(|patch| !patch.is_sound());
+    for case in &scans.cases {
+        fails.extend(case.scans.iter().filter(|scan| of_patch(scan)).map(|scan| {
+            format!("on {} in edges of {} mm, where the patch made it worse", case.name, three_digits(scan.edge_mm))
+        }));
+    }
+    if !fails.is_empty() {
+        text += &format!(" It fails {}.", fails.join("; "));
+    }
+    Some(text)
+}
+
+/// A way on each part where there is one, with the part's name.
+fn by_part<'a>(
+    scans: &'a WholeScan,
+    way: impl Fn(&'a ScanResult) -> Option<&'a WayResult>,
+) -> Vec<(&'a str, &'a WayResult)> {
+    scans.cases.iter().filter_map(|case| Some((case.name.as_str(), way(case.main()?)?))).collect()
+}
+
+/// The way, where it is the same on every part, else each with its part.
+fn one_or_each(ways: &[(&str, &WayResult)]) -> String {
+    match ways {
+        [(_, first), others @ ..] if others.iter().all(|(_, way)| way.way == first.way) => first.name.clone(),
+        _ => ways.iter().map(|(part, way)| format!("{} on {part}", way.name)).collect::<Vec<_>>().join("; "),
+    }
+}
+
+/// Which way, and which region, on each part; and what failed there.
+pub fn of_whole_scans(measured: &WholeScan) -> Vec<String> {
+    measured.cases.iter().filter_map(of_case).collect()
+}
+
+fn of_case(case: &CaseResult) -> Option<String> {
+    let scan = case.main()?;
+    let told = |result: &WayResult| {
+        format!(
+            "{} ({} mm, {} µs per sample)",
+            result.name,
+            three_digits(result.mean_mm()),
+            three_digits(result.per_sample_us.median)
+        )
+    };
+    let mut text = format!("On {}, scanned {} mm off in the mean, ", case.name, three_digits(scan.before.mean_mm()));
+    match scan.best() {
+        Some(best) => text += &format!("take {}.", told(best)),
+        None => text += "no way made the scan better.",
+    }
+    if let Some(haptic) = scan.best_haptic() {
+        text += &format!(" Of the regions of the haptic update alone take {}.", told(haptic));
+    }
+    let failed: Vec<&str> = scan.ways.iter().filter(|way| !way.is_sound()).map(|way| way.name.as_str()).collect();
+    if !failed.is_empty() {
+        text += &format!(" Fails here (worse than the scan, or not at the end in time): {}.", failed.join("; "));
+    }
+    if let (Some(patch), true) = (scan.of(Way::Patch), case.duration_s > 0.0) {
+        let rate = case.samples as f64 / case.duration_s;
+        text += &format!(
+            " At {} samples per second the patch takes {} % of one core.",
+            three_digits(rate),
+            three_digits(100.0 * rate * patch.per_sample_us.median * 1e-6)
+        );
+    }
+    Some(text)
+}
+
+/// How many sweeps it takes, and how often the published rule blows up.
+pub fn of_convergence(measured: &Convergence) -> Vec<String> {
+    let of = |rule| {
+        let runs: Vec<_> = measured.of(rule).collect();
+        let blown_up = runs.iter().filter(|run| run.has_blown_up).count();
+        (runs.len(), blown_up)
+    };
+    let ((paper, paper_up), (robust, robust_up)) = (of(Rule::Paper), of(Rule::Robust));
+    vec![format!(
+        "Swept over and over, the published rule blew up on {paper_up} of {paper} scans, the robust mode on {robust_up} of {robust}."
+    )]
+}
+
+/// Which step to take, and where even that fails.
+pub fn of_stability(measured: &Stability) -> Vec<String> {
+    let share = |integrator| {
+        let shares = measured.faces.iter().find(|shares| shares.integrator == integrator)?;
+        Some(format!("{} {} % of {}", integrator.name(), three_digits(100.0 * shares.stable_share), shares.runs))
+    };
+    let others = Integrator::ALL.into_iter().filter(|&integrator| integrator != Integrator::Lie).filter_map(share);
+    let mut text = format!(
+        "Step: lie, the default, {} over twelve decades of every parameter; stable were {}. Its exact sub-flows are within {} of \
+         their scale.",
+        if measured.is_default_stable() { "was stable in every run" } else { "was NOT stable in every run" },
+        share(Integrator::Lie).into_iter().chain(others).collect::<Vec<_>>().join(", "),
+        three_digits(measured.largest_sub_flow_error())
+    );
+    text += &match measured.default_stable_from_quality() {
+        Some(quality) => format!(
+            " It fails on bad triangles: below an altitude of {} of the longest side, some updates are cut back or overshoot.",
+            three_digits(quality)
+        ),
+        None => " On bad triangles it fails: presses were at fault at every quality that was tried.".to_owned(),
+    };
+    vec![text]
+}
+
+/// Whether what should not happen is met as it should be.
+pub fn of_extremes(measured: &Extremes) -> Vec<String> {
+    let wrong: Vec<&str> = measured.wrong().map(|extreme| extreme.fed.as_str()).collect();
+    vec![match wrong.as_slice() {
+        [] => "Every extreme that was fed came out right.".to_owned(),
+        wrong => format!("Extremes that came out WRONG: {}.", wrong.join("; ")),
+    }]
+}
+
+/// The sensor rate that one core keeps up with.
+pub fn of_cost(measured: &Cost) -> Vec<String> {
+    let Some(size) = measured.sizes.last() else { return Vec::new() };
+    let push = size.default_larger.time_ns;
+    let mut text = format!(
+        "Rate: on {} faces one push of the default scene, its patch aside, takes {} µs (p90 {} µs); at 1 kHz that is {} % of one \
+         core.",
+        size.faces,
+        three_digits(push.median * 1e-3),
+        three_digits(push.p90 * 1e-3),
+        three_digits(push.median * 1e-4)
+    );
+    if let Some(speed) = measured.slowest_replay_per_s() {
+        text += &format!(" A recording is replayed with at least {} samples per second.", three_digits(speed));
+    }
+    vec![text]
+}
+
+/// How it stands against the libraries that others would use.
+pub fn of_peers(measured: &Peers) -> Vec<String> {
+    let at_size = |size: &super::peers::PeersAtSize| {
+        Some(format!(
+            "at {} faces a push is {} times faster than the fastest pipeline with an exact index, and {} times as fast as the \
+             fastest closest-face query alone",
+            size.faces,
+            three_digits(size.pipeline_factor()?),
+            three_digits(size.query_factor()?)
+        ))
+    };
+    let told: Vec<String> = measured.sizes.iter().filter_map(at_size).collect();
+    let promise = if measured.holds() { "Both promises hold" } else { "A promise is MISSED" };
+    vec![format!("Against peers: {}. {promise}: 100 times, and faster than a query.", told.join("; "))]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Reach, TouchedError};
+
+    fn way(way: Way, name: &str, mean_mm: f64, per_sample_us: f64, is_worse: bool) -> WayResult {
+        let error = TouchedError {
+            part_to_mesh_mean_mm: mean_mm,
+            part_to_mesh_p95_mm: mean_mm,
+            mesh_to_part_mean_mm: mean_mm,
+            mesh_to_part_p95_mm: mean_mm,
+            normal_mean_deg: 1.0,
+            normal_p95_deg: 1.0,
+        };
+        WayResult {
+            way,
+            name: name.to_owned(),
+            error: Some(error),
+            total_s: 1.0.into(),
+            per_sample_us: per_sample_us.into(),
+            end_ms: 0.0.into(),
+            runs: 1,
+            samples: 1000,
+            cut_back_share: 0.0,
+            is_worse,
+            is_stopped: false,
+            remarks: vec![],
+        }
+    }
+
+    fn case(name: &str, scans: Vec<Vec<WayResult>>) -> CaseResult {
+        let before = TouchedError { part_to_mesh_mean_mm: 1.0, ..way(Way::Patch, "", 1.0, 1.0, false).error.unwrap() };
+        let scans = scans.into_iter().zip([3.0, 1.5]);
+        let scans = scans.map(|(ways, edge_mm)| ScanResult { edge_mm, faces: 100, before, ways }).collect();
+        CaseResult {
+            name: name.to_owned(),
+            samples: 1000,
+            duration_s: 1.0,
+            tip_radius_mm: 1.5,
+            scan_noise_mm: 0.2,
+            scans,
+            gaussian: None,
+        }
+    }
+
+    fn of(cases: Vec<CaseResult>) -> Option<String> {
+        in_short(&WholeScan { cases, repeats: 1, slow_s: 1.0 }, None, None)
+    }
+
+    #[test]
+    fn what_is_best_everywhere_is_named_once_and_what_fails_is_told() {
+        let good = |us| way(Way::Patch, "patch", 0.01, us, false);
+        let text = of(vec![
+            case("peaks", vec![vec![good(40.0)], vec![way(Way::Patch, "patch", 2.0, 50.0, true)]]),
+            case(
+                "plate",
+                vec![vec![good(50.0), way(Way::Robust(Reach::TipRadii(2.0)), "two radii", 0.3, 10.0, false)]],
+            ),
+        ]);
+        let text = text.unwrap();
+        assert!(text.starts_with("In short: take patch. Where the haptic update runs alone take two radii."), "{text}");
+        // the slower of the two: 50 µs are a twentieth of a millisecond
+        assert!(text.contains("up to 50 µs: at 1 kHz 5 % of one core, which keeps up with 20000 samples"), "{text}");
+        assert!(text.contains("It fails on peaks in edges of 1.5 mm, where the patch made it worse."), "{text}");
+    }
+
+    #[test]
+    fn where_the_parts_differ_each_is_named_and_without_anything_good_nothing_is_said() {
+        let patch = || way(Way::Patch, "patch", 0.01, 40.0, false);
+        let paper = || way(Way::Robust(Reach::TipRadii(1.0)), "one radius", 0.005, 8.0, false);
+        let text = of(vec![case("peaks", vec![vec![patch()]]), case("plate", vec![vec![patch(), paper()]])]).unwrap();
+        assert!(text.starts_with("In short: take patch on peaks; one radius on plate."), "{text}");
+        assert!(!text.contains("fails"), "{text}");
+        assert_eq!(of(vec![case("peaks", vec![vec![way(Way::Patch, "patch", 3.0, 1.0, true)]])]), None);
+    }
+}

@@ -1,0 +1,358 @@
+//! Error against run time on whole scans: each way to refine a scan by touch, on the same scans and samples, with the
+//! alternatives that the paper names as baselines.
+//!
+//! The surface error is measured where the part was touched, in both directions; the worse of the two counts. Runs are made
+//! in turns, so that a machine that becomes slower does so for all.
+
+mod contact_points;
+mod error;
+mod figures;
+mod gaussian;
+mod part;
+mod tell;
+mod way;
+
+use std::time::Duration;
+
+use serde::Serialize;
+
+pub use contact_points::ContactSculptor;
+pub use error::TouchedError;
+pub use gaussian::{GaussianParams, GaussianProcess, GaussianSurface};
+pub use part::Given;
+use part::{Part, parts};
+pub use way::{Reach, Way};
+use way::{Run, RunLimits, run};
+
+use super::convergence::straight_line;
+use super::{Effort, Spread};
+use touchup_core::compare::CompareError;
+use touchup_core::mesh::{MeshError, TriMesh};
+use touchup_core::refine::RefineError;
+use touchup_core::touch::SettingError;
+use touchup_sim::SimError;
+
+/// Why whole scans were not measured.
+#[derive(Debug, thiserror::Error)]
+pub enum WholeScanError {
+    /// A simulated part.
+    #[error(transparent)]
+    Sim(#[from] SimError),
+    /// A setting of what was given.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    /// A refiner that could not be built.
+    #[error(transparent)]
+    Refine(#[from] RefineError),
+    /// A patch that is too large.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// A scan that cannot be compared with the part.
+    #[error(transparent)]
+    Compare(#[from] CompareError),
+    /// Nothing to measure.
+    #[error("none of the {samples} samples of {name} touches the part: are they in its frame?")]
+    NothingTouched {
+        /// of the case
+        name: String,
+        /// how many there are
+        samples: usize,
+    },
+}
+
+/// How one way did on one scan.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct WayResult {
+    /// which
+    pub way: Way,
+    /// as the report calls it
+    pub name: String,
+    /// against the part; `None` where the result has nothing near what was touched
+    pub error: Option<TouchedError>,
+    /// from the scan to the result, s
+    pub total_s: Spread,
+    /// for each sample (or touch) that it was given, with the end's work shared out, µs
+    pub per_sample_us: Spread,
+    /// of that the work after the last sample, ms in all
+    pub end_ms: Spread,
+    /// how often it was run
+    pub runs: usize,
+    /// samples or touches that it was given
+    pub samples: usize,
+    /// share of the updates that were cut back to keep the mesh sound
+    pub cut_back_share: f64,
+    /// the result is worse than the scan
+    pub is_worse: bool,
+    /// it did not come to the end of the samples
+    pub is_stopped: bool,
+    /// what went wrong, in words
+    pub remarks: Vec<String>,
+}
+
+/// All ways on one scan.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ScanResult {
+    /// mean edge length of the scan, mm
+    pub edge_mm: f64,
+    /// its faces
+    pub faces: usize,
+    /// of the scan as it came
+    pub before: TouchedError,
+    /// in the order in which they were tried
+    pub ways: Vec<WayResult>,
+}
+
+/// What a touch costs the Gaussian process.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct GaussianCost {
+    /// touches kept so far, and the time to take in one more, µs; the medians of groups
+    pub marks: Vec<(f64, Spread)>,
+    /// of the power law through the larger half of them
+    pub exponent: f64,
+    /// contacts that there were
+    pub contacts: usize,
+    /// by that law, the time to take in the last one if all were kept, µs
+    pub at_all_contacts_us: f64,
+}
+
+/// One part with its scans.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CaseResult {
+    /// of the part
+    pub name: String,
+    /// samples that there are
+    pub samples: usize,
+    /// time from the first to the last of them, s
+    pub duration_s: f64,
+    /// radius of the ball, mm
+    pub tip_radius_mm: f64,
+    /// of the scan's vertices, mm
+    pub scan_noise_mm: f64,
+    /// the first is the one on which all ways were tried
+    pub scans: Vec<ScanResult>,
+    /// where it was tried
+    pub gaussian: Option<GaussianCost>,
+}
+
+/// Error against run time on whole scans.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct WholeScan {
+    /// peaks, plate, and what was given
+    pub cases: Vec<CaseResult>,
+    /// how often each way was run that is not slow
+    pub repeats: usize,
+    /// a run that takes longer than this is made only once, s
+    pub slow_s: f64,
+}
+
+/// Touches in a group of [`GaussianCost::marks`].
+const GROUP: usize = 25;
+
+impl WayResult {
+    /// Whether it came to the end with a result that is no worse than the scan.
+    pub fn is_sound(&self) -> bool {
+        self.error.is_some() && !self.is_worse && !self.is_stopped
+    }
+
+    /// Mean surface error, mm; infinite without a result.
+    pub fn mean_mm(&self) -> f64 {
+        self.error.map_or(f64::INFINITY, |error| error.mean_mm())
+    }
+}
+
+impl ScanResult {
+    /// How one way did.
+    pub fn of(&self, way: Way) -> Option<&WayResult> {
+        self.ways.iter().find(|result| result.way == way)
+    }
+
+    fn least<'a>(ways: impl Iterator<Item = &'a WayResult>) -> Option<&'a WayResult> {
+        ways.filter(|result| result.is_sound()).min_by(|a, b| a.mean_mm().total_cmp(&b.mean_mm()))
+    }
+
+    /// The way with the least mean error.
+    pub fn best(&self) -> Option<&WayResult> {
+        Self::least(self.ways.iter())
+    }
+
+    /// The region of the haptic update alone with the least mean error.
+    pub fn best_haptic(&self) -> Option<&WayResult> {
+        Self::least(self.ways.iter().filter(|result| matches!(result.way, Way::Robust(_))))
+    }
+
+    /// The ways that no other beats in both mean error and time per sample, the fastest first.
+    pub fn front(&self) -> Vec<&WayResult> {
+        let mut ways: Vec<_> = self.ways.iter().filter(|result| result.is_sound()).collect();
+        ways.sort_by(|a, b| a.per_sample_us.median.total_cmp(&b.per_sample_us.median));
+        let mut least = f64::INFINITY;
+        ways.retain(|result| {
+            let is_better = result.mean_mm() < least;
+            least = least.min(result.mean_mm());
+            is_better
+        });
+        ways
+    }
+}
+
+impl CaseResult {
+    /// The scan on which all ways were tried.
+    pub fn main(&self) -> Option<&ScanResult> {
+        self.scans.first()
+    }
+}
+
+/// One way on one scan, with the runs so far.
+struct Trial<'a> {
+    part: &'a Part,
+    scan: &'a TriMesh,
+    way: Way,
+    totals_s: Vec<f64>,
+    per_sample_us: Vec<f64>,
+    ends_ms: Vec<f64>,
+    first: Option<First>,
+}
+
+/// What is the same in each run, and the times of touches in the first.
+struct First {
+    error: Result<TouchedError, CompareError>,
+    run: Run,
+}
+
+impl<'a> Trial<'a> {
+    fn new(part: &'a Part, scan: &'a TriMesh, way: Way) -> Self {
+        let (totals_s, per_sample_us, ends_ms) = (Vec::new(), Vec::new(), Vec::new());
+        Self { part, scan, way, totals_s, per_sample_us, ends_ms, first: None }
+    }
+
+    fn is_slow(&self, slow_s: f64) -> bool {
+        self.totals_s.first().is_some_and(|&total| total > slow_s)
+    }
+
+    fn run(&mut self, bounds: &RunLimits) -> Result<(), WholeScanError> {
+        let run = run(self.way, self.part, self.scan, bounds)?;
+        self.totals_s.push((run.build + run.samples + run.end).as_secs_f64());
+        self.per_sample_us.push((run.samples + run.end).as_secs_f64() * 1e6 / run.given.max(1) as f64);
+        self.ends_ms.push(run.end.as_secs_f64() * 1e3);
+        if self.first.is_none() {
+            let Part { truth, tree, region, .. } = self.part;
+            let error = TouchedError::of(&run.mesh, truth, tree, region);
+            self.first = Some(First { error, run });
+        }
+        Ok(())
+    }
+
+    fn result(&self, before: &TouchedError) -> Option<WayResult> {
+        let First { error, run } = self.first.as_ref()?;
+        let mut remarks = Vec::new();
+        let is_stopped = run.refused + run.given < run.offered && self.way != Way::GaussianProcess;
+        if is_stopped {
+            remarks.push(format!("stopped for its time after {} of {} samples", run.given, run.offered));
+        }
+        if self.way == Way::GaussianProcess && run.given < run.offered {
+            remarks.push(format!("given {} of {} contacts", run.given, run.offered));
+        }
+        if let Some(why) = &run.why {
+            remarks.push(format!("{} of {} samples refused: {why}", run.refused, run.given));
+        }
+        if let Err(why) = error {
+            remarks.push(format!("no error can be told: {why}"));
+        }
+        let error = error.as_ref().ok().copied();
+        let is_worse = error.is_none_or(|error| error.mean_mm() > before.mean_mm());
+        if let Some(error) = error.filter(|_| is_worse) {
+            remarks.push(format!("worse than the scan ({:.3} to {:.3} mm)", before.mean_mm(), error.mean_mm()));
+        }
+        Some(WayResult {
+            way: self.way,
+            name: self.way.name(),
+            error,
+            total_s: Spread::of(self.totals_s.clone())?,
+            per_sample_us: Spread::of(self.per_sample_us.clone())?,
+            end_ms: Spread::of(self.ends_ms.clone())?,
+            runs: self.totals_s.len(),
+            samples: run.given,
+            cut_back_share: run.cut_back as f64 / run.moved.max(1) as f64,
+            is_worse,
+            is_stopped,
+            remarks,
+        })
+    }
+}
+
+/// Measures every way on peaks, on the plate, and on what is given.
+///
+/// # Errors
+/// [`WholeScanError`], of what is given above all: a way that fails on its own is told in its result.
+pub fn whole_scan(
+    effort: Effort,
+    given: Option<&Given>,
+    progress: &mut dyn FnMut(&str),
+) -> Result<WholeScan, WholeScanError> {
+    let (repeats, slow_s) = (effort.choose(3, 7), effort.choose(0.25, 2.0));
+    let bounds = RunLimits { longest: Duration::from_secs(effort.choose(2, 20)), touches: effort.choose(150, 300) };
+    let parts = parts(effort, given, progress)?;
+    let mut trials: Vec<Trial> = Vec::new();
+    for part in &parts {
+        for (number, scan) in part.scans.iter().enumerate() {
+            let ways: &[Way] = if number == 0 { &Way::ALL } else { &Way::BY_DENSITY };
+            trials.extend(ways.iter().map(|&way| Trial::new(part, scan, way)));
+        }
+    }
+    for repeat in 0..repeats {
+        for trial in trials.iter_mut().filter(|trial| !trial.is_slow(slow_s)) {
+            let (name, way) = (&trial.part.name, trial.way.name());
+            progress(&format!("whole scan: {name}, {way}, {} of {repeats}", repeat + 1));
+            trial.run(&bounds)?;
+        }
+    }
+    let cases = parts.iter().map(|part| case(part, &trials)).collect::<Result<_, _>>()?;
+    Ok(WholeScan { cases, repeats, slow_s })
+}
+
+fn case(part: &Part, trials: &[Trial]) -> Result<CaseResult, WholeScanError> {
+    let mut scans = Vec::new();
+    for scan in &part.scans {
+        let before = TouchedError::of(scan, &part.truth, &part.tree, &part.region)?;
+        let own = trials.iter().filter(|trial| std::ptr::eq(trial.scan, scan));
+        let ways = own.filter_map(|trial| trial.result(&before)).collect();
+        scans.push(ScanResult { edge_mm: mean_edge(scan) * 1e3, faces: scan.face_count(), before, ways });
+    }
+    let gaussian = trials.iter().find(|trial| std::ptr::eq(trial.part, part) && trial.way == Way::GaussianProcess);
+    let each = gaussian.and_then(|trial| trial.first.as_ref()).map_or(&[][..], |first| &first.run.each);
+    let span_ns = match (part.samples.first(), part.samples.last()) {
+        (Some(first), Some(last)) => last.stamp_ns.saturating_sub(first.stamp_ns),
+        _ => 0,
+    };
+    Ok(CaseResult {
+        name: part.name.clone(),
+        samples: part.samples.len(),
+        duration_s: span_ns as f64 * 1e-9,
+        tip_radius_mm: part.tip.radius * 1e3,
+        scan_noise_mm: part.scan_noise * 1e3,
+        scans,
+        gaussian: GaussianCost::of(each, part.contacts.len()),
+    })
+}
+
+impl GaussianCost {
+    /// - `each`: s, for one touch after the other.
+    fn of(each: &[f64], contacts: usize) -> Option<Self> {
+        let groups = each.chunks_exact(GROUP).enumerate();
+        let mark = |(number, group): (usize, &[f64])| {
+            let spread = Spread::of(group.iter().map(|time| time * 1e6).collect())?;
+            Some(((number as f64 + 0.5) * GROUP as f64, spread))
+        };
+        let marks: Vec<(f64, Spread)> = groups.filter_map(mark).collect();
+        let logs: Vec<(f64, f64)> =
+            marks[marks.len() / 2..].iter().map(|(count, time)| (count.ln(), time.median.ln())).collect();
+        let line = straight_line(&logs)?;
+        let at_all_contacts_us = (line.offset + line.slope * (contacts.max(1) as f64).ln()).exp();
+        Some(Self { marks, exponent: line.slope, contacts, at_all_contacts_us })
+    }
+}
+
+fn mean_edge(mesh: &TriMesh) -> f64 {
+    let perimeter = |[a, b, c]: [nalgebra::Point3<f64>; 3]| (b - a).norm() + (c - b).norm() + (a - c).norm();
+    let sum: f64 = mesh.faces().map(|(face, _)| perimeter(mesh.triangle(face))).sum();
+    sum / (3 * mesh.face_count()).max(1) as f64
+}

@@ -1,0 +1,170 @@
+//! What whole scans say, in words.
+
+use super::{CaseResult, GaussianCost, Reach, ScanResult, Way, WayResult, WholeScan};
+use crate::Chapter;
+
+/// A difference below this share is none.
+const ALIKE: f64 = 0.02;
+
+impl WholeScan {
+    /// As a part of the report.
+    pub fn chapter(&self) -> Chapter {
+        let mut text = vec![
+            "Each way gets the same scan and the same samples, one thread. The surface error is measured where the part was \
+             touched, from the part to the mesh and from the mesh to the part; the worse of the two counts. Two of the ways \
+             are baselines of our own for what the paper names as alternatives: contact points alone pull the mesh through \
+             the point under the ball, knowing of the force only that there is contact, and the Gaussian process is an exact \
+             implicit surface over the scan that is refitted from nothing at each touch it keeps."
+                .to_owned(),
+        ];
+        for case in &self.cases {
+            text.extend(case.main().map(|scan| case.verdict(scan)));
+            text.extend(case.main().map(failures).filter(|failed| !failed.is_empty()));
+            text.extend(case.densities());
+            text.extend(case.gaussian.as_ref().map(|cost| case.gaussian_text(cost)));
+        }
+        Chapter {
+            title: "Error against run time, whole scan".to_owned(),
+            text,
+            figures: self.figures(),
+            tables: vec![self.table()],
+        }
+    }
+}
+
+/// Name, error and time of one way.
+fn told(result: &WayResult) -> String {
+    format!(
+        "{} ({}{:.3} mm, {:.2} µs per sample)",
+        result.name,
+        result.error.map_or_else(String::new, |error| format!("normals {:.1} deg, ", error.normal_mean_deg)),
+        result.mean_mm(),
+        result.per_sample_us.median
+    )
+}
+
+impl CaseResult {
+    /// Which way is the best for its time.
+    fn verdict(&self, scan: &ScanResult) -> String {
+        let mut text = format!(
+            "{}: {} faces with edges of {:.1} mm, {} samples in {:.0} s of touching; the scan as it came is off by {:.3} mm \
+             (p95 {:.3} mm, normals {:.1} deg).",
+            self.name,
+            scan.faces,
+            scan.edge_mm,
+            self.samples,
+            self.duration_s,
+            scan.before.mean_mm(),
+            scan.before.p95_mm(),
+            scan.before.normal_mean_deg
+        );
+        match scan.best() {
+            None => text += " No way made it better.",
+            Some(best) => {
+                text += &format!(
+                    " The least mean error has {}: {:.1} times less than the scan.",
+                    told(best),
+                    scan.before.mean_mm() / best.mean_mm()
+                );
+            }
+        }
+        let front: Vec<String> = scan.front().into_iter().map(told).collect();
+        if front.len() > 1 {
+            text += &format!(" No other way is both faster and better than one of these: {}.", front.join(", "));
+        }
+        if let Some(haptic) = scan.best_haptic() {
+            text += &format!(" Of the regions of the haptic update alone the best is {}.", told(haptic));
+            text += &same_regions(scan);
+            text += &against_contact_points(haptic, scan.of(Way::ContactPoints));
+        }
+        text
+    }
+
+    /// What finer and coarser scans change.
+    fn densities(&self) -> Option<String> {
+        let tell = |way: Way| {
+            let mut of_scans: Vec<(f64, &WayResult)> =
+                self.scans.iter().filter_map(|scan| Some((scan.edge_mm, scan.of(way)?))).collect();
+            of_scans.sort_by(|a, b| b.0.total_cmp(&a.0));
+            let each = |&(edge, result): &(f64, &WayResult)| {
+                let worse = if result.is_worse { ", worse than the scan" } else { "" };
+                format!(
+                    "{:.3} mm in {:.2} µs per sample at {edge:.1} mm{worse}",
+                    result.mean_mm(),
+                    result.per_sample_us.median
+                )
+            };
+            format!("{}: {}", way.name(), of_scans.iter().map(each).collect::<Vec<_>>().join(", "))
+        };
+        let all = Way::BY_DENSITY.map(tell).join("; ");
+        (self.scans.len() > 1).then(|| format!("{} over the edge length of the scan. {all}.", self.name))
+    }
+
+    fn gaussian_text(&self, cost: &GaussianCost) -> String {
+        let GaussianCost { marks, exponent, contacts, at_all_contacts_us } = cost;
+        let (count, time) = marks.last().map_or((0.0, 0.0), |(count, time)| (*count, time.median));
+        format!(
+            "{}: one more touch costs the Gaussian process {:.2} ms at {count:.0} touches, and that grows as n^{exponent:.2}. \
+             With all {contacts} contacts it would be {} for each touch by the same law.",
+            self.name,
+            time * 1e-3,
+            long_time(at_all_contacts_us * 1e-6)
+        )
+    }
+}
+
+/// Seconds, minutes or hours.
+fn long_time(seconds: f64) -> String {
+    match seconds {
+        ..1.0 => format!("{:.0} ms", seconds * 1e3),
+        ..120.0 => format!("{seconds:.0} s"),
+        ..7200.0 => format!("{:.0} min", seconds / 60.0),
+        _ => format!("{:.0} h", seconds / 3600.0),
+    }
+}
+
+/// Whether force and normals are worth it.
+fn against_contact_points(haptic: &WayResult, points: Option<&WayResult>) -> String {
+    let Some(points) = points else { return String::new() };
+    if !points.is_sound() {
+        return format!(" Contact points alone did not do: {}.", points.remarks.join("; "));
+    }
+    let share = haptic.mean_mm() / points.mean_mm();
+    let normals = match (haptic.error, points.error) {
+        (Some(haptic), Some(points)) => {
+            format!("; normals {:.1} against {:.1} deg", haptic.normal_mean_deg, points.normal_mean_deg)
+        }
+        _ => String::new(),
+    };
+    let verdict = match share {
+        _ if (share - 1.0).abs() < ALIKE => "is as good as",
+        ..1.0 => "beats",
+        _ => "loses to",
+    };
+    format!(
+        " There the haptic update {verdict} contact points alone: {:.3} against {:.3} mm in {:.2} against {:.2} µs per \
+         sample{normals}.",
+        haptic.mean_mm(),
+        points.mean_mm(),
+        haptic.per_sample_us.median,
+        points.per_sample_us.median
+    )
+}
+
+/// Regions so small that they have nothing but the handle.
+fn same_regions(scan: &ScanResult) -> String {
+    let Some(handle) = scan.of(Way::Robust(Reach::Handle)) else { return String::new() };
+    let is_same = |result: &&WayResult| result.way != handle.way && result.error == handle.error;
+    let same: Vec<&str> = scan.ways.iter().filter(is_same).map(|result| result.name.as_str()).collect();
+    if same.is_empty() {
+        return String::new();
+    }
+    format!(" With edges of {:.1} mm nothing but the handle moves with: {}.", scan.edge_mm, same.join(", "))
+}
+
+/// Ways that did not come to the end, or made the scan worse.
+fn failures(scan: &ScanResult) -> String {
+    let failed = scan.ways.iter().filter(|result| !result.is_sound());
+    let told: Vec<String> = failed.map(|result| format!("{}: {}", result.name, result.remarks.join("; "))).collect();
+    if told.is_empty() { String::new() } else { format!("What did not do: {}.", told.join(". ")) }
+}

@@ -1,0 +1,135 @@
+//! The integrators that are compared, each with the settings it is swept over.
+
+use std::cell::Cell;
+
+use nalgebra::{Point3, Vector3};
+use serde::Serialize;
+
+use super::problem::{Problem, State};
+use super::{explicit, rosenbrock};
+use crate::Effort;
+use touchup_core::refine::dynamics::dormand_prince;
+use touchup_core::refine::{FaceDynamics, FaceState, StepRule};
+
+/// A Jacobian has four columns: what it would cost by differences.
+const JACOBIAN_COUNTS: u64 = 4;
+/// The flow, and twice the flow with drift.
+const FLOWS_CORRECTED: u64 = 3;
+
+/// An integrator.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// explicit Euler, fixed step
+    Euler,
+    /// classical Runge–Kutta of order 4, fixed step
+    RungeKutta,
+    /// Dormand–Prince 5(4), adaptive: ode45's pair
+    DormandPrince,
+    /// RODAS 4(3), adaptive: implicit, L-stable
+    Rodas,
+    /// touchup's exact position flow, then its exact rotation
+    Lie,
+    /// the same with the drift that the rotation causes
+    DriftCorrected,
+}
+
+/// What is turned to make it more exact.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SolverSetting {
+    /// equal steps over the sample
+    Steps(usize),
+    /// error per step over the size of each unknown
+    RelativeTolerance(f64),
+}
+
+/// Where an integrator left the face, and what it took.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Solved {
+    /// at the end of the sample
+    pub face: FaceState,
+    /// of the right-hand side; a Jacobian counts as four, a flow that is solved exactly as one
+    pub evaluations: u64,
+}
+
+impl Method {
+    /// In the order of legends.
+    pub const ALL: [Self; 6] =
+        [Self::Euler, Self::RungeKutta, Self::DormandPrince, Self::Rodas, Self::Lie, Self::DriftCorrected];
+
+    /// As in legends.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Euler => "explicit Euler",
+            Self::RungeKutta => "RK4",
+            Self::DormandPrince => "Dormand–Prince 5(4)",
+            Self::Rodas => "RODAS 4(3), implicit",
+            Self::Lie => "Lie, exact flows",
+            Self::DriftCorrected => "drift-corrected",
+        }
+    }
+
+    /// Whether it is one of touchup's own.
+    pub fn is_exact(self) -> bool {
+        matches!(self, Self::Lie | Self::DriftCorrected)
+    }
+
+    /// From coarse to fine.
+    pub fn settings(self, effort: Effort) -> Vec<SolverSetting> {
+        let doublings = |most: u32| (0..=most).map(|k| SolverSetting::Steps(1 << k)).collect();
+        let tolerances = || (1..=12).map(|k| SolverSetting::RelativeTolerance(10f64.powi(-k))).collect();
+        match self {
+            Self::Euler => doublings(effort.choose(12, 14)),
+            Self::RungeKutta => doublings(effort.choose(11, 13)),
+            Self::DormandPrince | Self::Rodas => tolerances(),
+            Self::Lie | Self::DriftCorrected => doublings(effort.choose(8, 10)),
+        }
+    }
+
+    /// The face at the end of the sample; `None`: it gave up, or what it found is not finite.
+    pub fn solve(self, problem: &Problem, setting: SolverSetting) -> Option<Solved> {
+        let (start, end, scale) = (problem.start(), problem.dt_s, problem.scale());
+        let count = Cell::new(0u64);
+        let rate = |y: &State| {
+            count.set(count.get() + 1);
+            problem.rate(y)
+        };
+        let state = match (self, setting) {
+            (Self::Euler, SolverSetting::Steps(steps)) => explicit::euler(start, end, steps, rate),
+            (Self::RungeKutta, SolverSetting::Steps(steps)) => explicit::runge_kutta(start, end, steps, rate),
+            (Self::DormandPrince, SolverSetting::RelativeTolerance(relative)) => {
+                dormand_prince::integrate(start, end, scale, relative, rate).ok()?
+            }
+            (Self::Rodas, SolverSetting::RelativeTolerance(relative)) => {
+                let jacobian = |y: &State| {
+                    count.set(count.get() + JACOBIAN_COUNTS);
+                    problem.jacobian(y)
+                };
+                rosenbrock::integrate(start, end, scale, relative, rate, jacobian)?
+            }
+            (Self::Lie, SolverSetting::Steps(steps)) => return exact_steps(problem, StepRule::Lie, steps),
+            (Self::DriftCorrected, SolverSetting::Steps(steps)) => {
+                return exact_steps(problem, StepRule::DriftCorrected, steps);
+            }
+            _ => return None,
+        };
+        let face =
+            FaceState { b: Point3::from(state[0] * problem.normal), n: Vector3::new(state[1], state[2], state[3]) };
+        let is_finite = state.iter().all(|x| x.is_finite());
+        is_finite.then_some(Solved { face, evaluations: count.get() })
+    }
+}
+
+fn exact_steps(problem: &Problem, rule: StepRule, steps: usize) -> Option<Solved> {
+    let dynamics = FaceDynamics::new(problem.params(rule)).ok()?;
+    let (tip, dt) = (Point3::from(problem.arm), problem.dt_s / steps as f64);
+    let (mut face, mut evaluations) = (problem.face(), 0);
+    for _ in 0..steps {
+        let next = dynamics.step_from(&problem.normal, &face, &tip, &problem.force, dt).ok()?;
+        // a normal that does not turn needs no correction
+        evaluations += if rule == StepRule::Lie || next.n == face.n { 1 } else { FLOWS_CORRECTED };
+        face = next;
+    }
+    Some(Solved { face, evaluations })
+}

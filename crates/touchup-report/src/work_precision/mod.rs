@@ -1,0 +1,185 @@
+//! Work-precision of one face held against one sample: error at the end against run time and against evaluations of the
+//! right-hand side, for explicit, implicit and exact integrators, from the paper's stiffness to h_min = 1 nm.
+
+mod explicit;
+mod method;
+mod problem;
+mod reference;
+mod rosenbrock;
+mod told;
+
+use std::hint::black_box;
+use std::time::Instant;
+
+use serde::Serialize;
+
+pub use method::{Method, Solved, SolverSetting};
+pub use problem::Problem;
+pub use reference::reference;
+
+use super::number::three_digits;
+use super::{Effort, Spread};
+
+/// The paper's h_min, m.
+pub const PAPER_H_MIN_M: f64 = 0.5e-3;
+/// From the mildest to the stiffest, m.
+const H_MINS_M: [f64; 8] = [1e-3, PAPER_H_MIN_M, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9];
+const H_MINS_QUICK_M: [f64; 4] = [1e-3, PAPER_H_MIN_M, 1e-6, 1e-9];
+/// Without friction, and as real force streams lean: 4 to 28° were seen.
+const TILTS_DEG: [f64; 2] = [0.0, 20.0];
+/// What the reference knows: to this share of h_min, or to a few roundings of the way.
+const REFERENCE_SHARE: f64 = 1e-12;
+const REFERENCE_ROUNDINGS: f64 = 4.0;
+
+/// Everything that was measured.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct WorkPrecision {
+    /// one for each stiffness and tilt
+    pub cases: Vec<FaceCase>,
+    /// of each time
+    pub repeats: usize,
+    /// where no reference was found, so that nothing could be said
+    pub without_reference: Vec<String>,
+}
+
+/// One face, one sample, every integrator.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FaceCase {
+    /// m
+    pub h_min_m: f64,
+    /// between force and normal, degrees
+    pub tilt_deg: f64,
+    /// how far the face really moves, m
+    pub way_m: f64,
+    /// errors below it are shown as it: the reference knows no better, m
+    pub floor_m: f64,
+    /// one for each of [`Method::ALL`]
+    pub curves: Vec<Curve>,
+}
+
+/// One integrator over its settings.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Curve {
+    /// which
+    pub method: Method,
+    /// from coarse to fine, without those at which it gave up
+    pub points: Vec<IntegratorRun>,
+    /// at which it gave up
+    pub gave_up: Vec<SolverSetting>,
+}
+
+/// One integrator with one setting.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct IntegratorRun {
+    /// steps, or tolerance
+    pub setting: SolverSetting,
+    /// of the barycentre at the end, m
+    pub error_m: f64,
+    /// |n − n_ref| at the end: the angle, rad, and what the length is off
+    pub normal_error: f64,
+    /// as in [`Solved`]
+    pub evaluations: u64,
+    /// for the whole sample, s
+    pub time_s: Spread,
+}
+
+impl WorkPrecision {
+    /// Measures all of it.
+    pub fn measure(effort: Effort, progress: &mut dyn FnMut(&str)) -> Self {
+        let clock = Timing { repeats: effort.choose(9, 31), batch_s: effort.choose(1e-4, 5e-4) };
+        let h_mins = effort.choose(&H_MINS_QUICK_M[..], &H_MINS_M[..]);
+        let mut measured = Self { cases: Vec::new(), repeats: clock.repeats, without_reference: Vec::new() };
+        for (h_min_m, tilt_deg) in h_mins.iter().flat_map(|h_min| TILTS_DEG.map(|tilt| (*h_min, tilt))) {
+            let name = format!("h_min {} mm, force tilted by {tilt_deg}°", three_digits(1e3 * h_min_m));
+            progress(&format!("work-precision: {name}"));
+            match case(h_min_m, tilt_deg, effort, &clock) {
+                Some(case) => measured.cases.push(case),
+                None => measured.without_reference.push(name),
+            }
+        }
+        measured
+    }
+}
+
+/// `None` where there is nothing to compare with.
+fn case(h_min_m: f64, tilt_deg: f64, effort: Effort, clock: &Timing) -> Option<FaceCase> {
+    let problem = Problem::of(h_min_m, tilt_deg.to_radians());
+    let right = reference(&problem)?;
+    let way_m = right.b.coords.norm();
+    let floor_m = (REFERENCE_SHARE * h_min_m).max(REFERENCE_ROUNDINGS * f64::EPSILON * way_m);
+    let curve = |method: Method| {
+        let (mut points, mut gave_up) = (Vec::new(), Vec::new());
+        for setting in method.settings(effort) {
+            let Some(solved) = method.solve(&problem, setting) else {
+                gave_up.push(setting);
+                continue;
+            };
+            let time_s = clock.time(|| method.solve(black_box(&problem), black_box(setting)));
+            points.push(IntegratorRun {
+                setting,
+                error_m: (solved.face.b - right.b).norm().max(floor_m),
+                normal_error: (solved.face.n - right.n).norm(),
+                evaluations: solved.evaluations,
+                time_s,
+            });
+        }
+        Curve { method, points, gave_up }
+    };
+    Some(FaceCase { h_min_m, tilt_deg, way_m, floor_m, curves: Method::ALL.map(curve).to_vec() })
+}
+
+/// How times are taken.
+struct Timing {
+    repeats: usize,
+    /// a single reading spans so many seconds, or one solve
+    batch_s: f64,
+}
+
+impl Timing {
+    /// Seconds for one call.
+    fn time<T>(&self, mut solve: impl FnMut() -> T) -> Spread {
+        let mut seconds = |calls: usize| {
+            let started = Instant::now();
+            for _ in 0..calls {
+                black_box(solve());
+            }
+            started.elapsed().as_secs_f64()
+        };
+        seconds(1);
+        let mut calls = 1;
+        // also warms up
+        while calls < 1 << 20 && seconds(calls) < self.batch_s {
+            calls *= 2;
+        }
+        let times = (0..self.repeats).map(|_| seconds(calls) / calls as f64).collect();
+        Spread::of(times).unwrap_or(Spread::from(f64::NAN))
+    }
+}
+
+impl FaceCase {
+    /// The curve of one integrator.
+    pub fn curve(&self, method: Method) -> Option<&Curve> {
+        self.curves.iter().find(|curve| curve.method == method)
+    }
+
+    /// The integrators that reach `error_m`, the fastest first.
+    pub fn ranking(&self, error_m: f64) -> Vec<(Method, IntegratorRun)> {
+        let reaching = self.curves.iter().filter_map(|curve| Some((curve.method, curve.cheapest(error_m)?)));
+        let mut ranking: Vec<_> = reaching.collect();
+        ranking.sort_by(|a, b| a.1.time_s.median.total_cmp(&b.1.time_s.median));
+        ranking
+    }
+}
+
+impl Curve {
+    /// The fastest point that reaches `error_m` with every finer one: a hit by luck does not count.
+    pub fn cheapest(&self, error_m: f64) -> Option<IntegratorRun> {
+        let reaching = self.points.iter().rev().take_while(|point| point.error_m <= error_m);
+        reaching.min_by(|a, b| a.time_s.median.total_cmp(&b.time_s.median)).copied()
+    }
+
+    /// With the whole sample in a single step.
+    pub fn one_step(&self) -> Option<&IntegratorRun> {
+        self.points.iter().find(|point| point.setting == SolverSetting::Steps(1))
+    }
+}

@@ -1,0 +1,376 @@
+//! What was measured as a chapter, and what it says.
+
+use super::{Curve, FaceCase, IntegratorRun, Method, PAPER_H_MIN_M, TILTS_DEG, WorkPrecision};
+use crate::number::three_digits;
+use crate::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Series, Spread, Table, TableCell};
+
+/// What is asked for, m: what a sensor can tell, a thousandth of that, and as good as exact.
+const LEVELS_M: [(f64, &str); 3] = [(1e-6, "1 µm"), (1e-9, "1 nm"), (1e-12, "1 pm")];
+/// Stiffnesses with figures of their own.
+const SHOWN_H_MINS_M: [f64; 2] = [PAPER_H_MIN_M, 1e-9];
+
+impl WorkPrecision {
+    /// Chapter 1 of the report.
+    pub fn chapter(&self) -> Chapter {
+        let shown = self.cases.iter().filter(|case| SHOWN_H_MINS_M.contains(&case.h_min_m));
+        let mut figures: Vec<_> = shown.flat_map(|case| [self.time_figure(case), evaluations_figure(case)]).collect();
+        figures.extend(TILTS_DEG.map(|tilt| self.stiffness_figure(tilt)));
+        Chapter {
+            title: "Work-precision of one face".to_owned(),
+            text: self.text(),
+            figures,
+            tables: vec![self.ranking_table(), self.one_step_table()],
+        }
+    }
+
+    /// What a practitioner should take from it.
+    pub fn verdict(&self) -> Vec<String> {
+        let steps = [Method::Lie, Method::DriftCorrected].into_iter().filter_map(|method| self.worst_step(method));
+        vec![format!("Integrator. {} {}", steps.collect::<Vec<_>>().join(" "), self.wins_and_losses(LEVELS_M[0]))]
+    }
+
+    fn text(&self) -> Vec<String> {
+        let mut text = vec![
+            format!(
+                "One face is held against one sample: 2 N for 5 ms, the tip 0.5 mm above the plane of the face and 0.5 mm beside \
+                 its barycentre, with the paper's α, β and δ and f_max 10 N. The smaller h_min, the stiffer the equations. The \
+                 error is the distance of the barycentre at the end from a reference of another kind (Radau IIA of order 5 in \
+                 the plane of normal and force, halved until it agrees with itself to {}). A time is that of the whole sample, \
+                 the median of {} repeats of many solves. One Jacobian counts as four evaluations, one flow that is solved \
+                 exactly as one.",
+                three_digits(1e-13),
+                self.repeats
+            ),
+            "The implicit solver is RODAS 4(3), L-stable, written for this report: the crate diffsol would bring a hundred more \
+             crates along for four unknowns. Every integrator gets the same right-hand side and the same compiler."
+                .to_owned(),
+        ];
+        text.extend([Method::Lie, Method::DriftCorrected].into_iter().filter_map(|method| self.worst_step(method)));
+        text.extend(LEVELS_M.map(|level| self.wins_and_losses(level)));
+        text.extend(self.explicit_limits());
+        text.extend(self.flow_cost());
+        text.extend(
+            self.without_reference.iter().map(|name| format!("No reference was found for {name}: not measured.")),
+        );
+        text
+    }
+
+    /// Time and largest error of a single step over all cases, with and without tilt.
+    fn worst_step(&self, method: Method) -> Option<String> {
+        let steps = self.cases.iter().filter_map(|case| Some((case, *case.curve(method)?.one_step()?)));
+        let steps: Vec<(&FaceCase, IntegratorRun)> = steps.collect();
+        let slowest = steps.iter().max_by(|a, b| a.1.time_s.median.total_cmp(&b.1.time_s.median))?;
+        let [straight, tilted] = TILTS_DEG.map(|tilt| {
+            let tilted = steps.iter().filter(move |(case, _)| case.tilt_deg == tilt);
+            tilted.max_by(|a, b| a.1.error_m.total_cmp(&b.1.error_m))
+        });
+        let ((straight_case, straight), (case, tilted)) = (straight?, tilted?);
+        let without_friction = if straight.error_m <= straight_case.floor_m {
+            "without friction it is as exact as the reference can tell, whatever h_min".to_owned()
+        } else {
+            format!("without friction it is off by at most {}", length(straight.error_m))
+        };
+        Some(format!(
+            "One step \"{}\" over the whole sample takes at most {}; {without_friction}; with the force tilted by {}° it is off \
+             by at most {} (at h_min {}).",
+            method.name(),
+            time(slowest.1.time_s),
+            TILTS_DEG[1],
+            length(tilted.error_m),
+            length(case.h_min_m),
+        ))
+    }
+
+    /// Who is fastest to an error: where it is an exact step, and where it is not, by how much.
+    fn wins_and_losses(&self, (error_m, name): (f64, &str)) -> String {
+        let outcomes: Vec<FastestSolvers> = self.cases.iter().map(|case| FastestSolvers::of(case, error_m)).collect();
+        let won: Vec<&FastestSolvers> = outcomes.iter().filter(|outcome| outcome.is_won()).collect();
+        let lost: Vec<&FastestSolvers> =
+            outcomes.iter().filter(|outcome| !outcome.is_won() && outcome.other.is_some()).collect();
+        let mut text =
+            format!("To be within {name}, an exact step is the fastest in {} of {} cases", won.len(), outcomes.len());
+        let factors: Vec<f64> = won.iter().filter_map(|outcome| outcome.factor()).collect();
+        if let (Some(least), Some(most)) = (smallest(&factors), largest(&factors)) {
+            let (least, most) = (three_digits(least), three_digits(most));
+            text += &format!(", {least} to {most} times as fast as the best solver ({})", h_mins(&won));
+        }
+        let alone = won.iter().filter(|outcome| outcome.other.is_none()).count();
+        if alone > 0 {
+            text += &format!("; in {alone} of them nothing else gets there");
+        }
+        text += ".";
+        if !lost.is_empty() {
+            let mut names: Vec<&str> = lost.iter().filter_map(|outcome| Some(outcome.other?.0.name())).collect();
+            names.sort_unstable();
+            names.dedup();
+            text += &format!(" In {} it is not ({}): {} wins", lost.len(), h_mins(&lost), names.join(" or "));
+            let factors: Vec<f64> = lost.iter().filter_map(|outcome| Some(1.0 / outcome.factor()?)).collect();
+            text += &largest(&factors)
+                .map_or_else(String::new, |most| format!(", by at most {} times", three_digits(most)));
+            let never = lost.iter().filter(|outcome| outcome.exact.is_none()).count();
+            text += &if never > 0 { format!("; in {never} of them no exact step gets there.") } else { ".".to_owned() };
+        }
+        let unreached = outcomes.iter().filter(|outcome| outcome.exact.is_none() && outcome.other.is_none()).count();
+        if unreached > 0 {
+            text += &format!(" In {unreached} nothing gets there.");
+        }
+        text
+    }
+
+    /// Up to which stiffness the explicit solvers are of use.
+    fn explicit_limits(&self) -> Vec<String> {
+        let explicit = [Method::Euler, Method::RungeKutta, Method::DormandPrince];
+        let tell = |method: Method, error_m: f64| {
+            let fails = |case: &&FaceCase| case.curve(method).is_none_or(|curve| curve.cheapest(error_m).is_none());
+            let failing: Vec<f64> = self.cases.iter().filter(fails).map(|case| case.h_min_m).collect();
+            largest(&failing).map_or_else(
+                || format!("{} gets there everywhere", method.name()),
+                |mildest| {
+                    format!(
+                        "{} misses {} cases, the mildest at h_min {}",
+                        method.name(),
+                        failing.len(),
+                        length(mildest)
+                    )
+                },
+            )
+        };
+        let levels = LEVELS_M[..2].iter();
+        let told =
+            levels.map(|(error_m, name)| format!("{}: {}", name, explicit.map(|m| tell(m, *error_m)).join(", ")));
+        let first = self.cases.iter().filter_map(|case| case.curve(Method::Euler)?.points.last());
+        let Some(steps) = first.map(|point| point.evaluations).max() else { return Vec::new() };
+        vec![format!(
+            "Explicit solvers, with up to {steps} steps a sample. Within {}. The expected force is bounded, so \
+             steps that are too coarse do not run away: they rattle around the answer.",
+            told.collect::<Vec<_>>().join(". Within ")
+        )]
+    }
+
+    /// What a flow costs in evaluations.
+    fn flow_cost(&self) -> Option<String> {
+        let case = self.cases.iter().find(|case| case.h_min_m == PAPER_H_MIN_M && case.tilt_deg == TILTS_DEG[1])?;
+        let per_count = |method| {
+            let last = case.curve(method)?.points.last()?;
+            Some(last.time_s.times(1.0 / last.evaluations as f64))
+        };
+        let (flow, evaluation) = (per_count(Method::Lie)?, per_count(Method::RungeKutta)?);
+        let ratio = flow.median / evaluation.median;
+        let which = if ratio > 1.0 { "flatters" } else { "wrongs" };
+        Some(format!(
+            "One exact flow with its rotation takes {}, one evaluation of the right-hand side within RK4 {}: {} times as much. By \
+             so much the picture over evaluations {which} the exact steps; the one over time does not.",
+            time(flow),
+            time(evaluation),
+            three_digits(ratio),
+        ))
+    }
+
+    fn time_figure(&self, case: &FaceCase) -> Figure {
+        let mark = |point: &IntegratorRun| Mark { x: point.time_s.times(1e6), y: (1e3 * point.error_m).into() };
+        let mut figure = case.figure("time", Axis::log("time for the sample, µs", "time_us"), mark);
+        figure.caption = format!(
+            "Lower left is better. Bars: p10–p90 of {} repeats. Errors at the lower edge are as small as the reference can tell.{}",
+            self.repeats,
+            case.gave_up()
+        );
+        figure
+    }
+
+    /// Time to the first level over h_min.
+    fn stiffness_figure(&self, tilt_deg: f64) -> Figure {
+        let (error_m, name) = LEVELS_M[0];
+        let series = Method::ALL.map(|method| {
+            let cases = self.cases.iter().filter(|case| case.tilt_deg == tilt_deg);
+            let marks = cases.filter_map(|case| {
+                let point = case.curve(method)?.cheapest(error_m)?;
+                Some(Mark { x: (1e3 * case.h_min_m).into(), y: point.time_s.times(1e6) })
+            });
+            Series { name: method.name().to_owned(), stroke: LineStroke::Joined, marks: marks.collect() }
+        });
+        Figure {
+            id: format!("work_precision_stiffness_{}", force_id(tilt_deg)),
+            title: format!("Time to be within {name}, {}", force_name(tilt_deg)),
+            caption: format!(
+                "The cheapest setting from which on every finer one is within {name} too; a curve ends where there is none among \
+                 those tried. The paper's h_min is {} mm.",
+                three_digits(1e3 * PAPER_H_MIN_M)
+            ),
+            x: Axis::log("h_min, mm", "h_min_mm"),
+            y: Axis::log("time for the sample, µs", "time_us"),
+            drawing: Drawing::Curves(series.to_vec()),
+        }
+    }
+
+    fn ranking_table(&self) -> Table {
+        let mut rows = Vec::new();
+        for case in &self.cases {
+            for (error_m, name) in LEVELS_M {
+                let ranking = case.ranking(error_m);
+                let mut row = vec![
+                    TableCell::Number(1e3 * case.h_min_m),
+                    TableCell::Number(case.tilt_deg),
+                    TableCell::from(name),
+                ];
+                row.push(ranking.first().map_or(TableCell::from("none"), |(method, _)| TableCell::from(method.name())));
+                row.extend(Method::ALL.map(|method| {
+                    let point = ranking.iter().find(|(ranked, _)| *ranked == method);
+                    point.map_or(TableCell::Empty, |(_, point)| TableCell::Spread(point.time_s.times(1e6)))
+                }));
+                rows.push(row);
+            }
+        }
+        let heads = ["h_min, mm", "tilt, °", "within", "fastest"].map(str::to_owned).into_iter();
+        Table {
+            id: "work_precision_fastest".to_owned(),
+            title: "Fastest way to an error".to_owned(),
+            caption: "Time for the sample; empty: not reached with any setting that was tried.".to_owned(),
+            heads: heads.chain(Method::ALL.map(|method| format!("{}, µs", method.name()))).collect(),
+            rows,
+        }
+    }
+
+    fn one_step_table(&self) -> Table {
+        let cells = |curve: Option<&Curve>| match curve.and_then(Curve::one_step) {
+            Some(point) => [
+                TableCell::Number(1e3 * point.error_m),
+                TableCell::Number(point.normal_error.to_degrees()),
+                TableCell::Spread(point.time_s.times(1e6)),
+            ],
+            None => [TableCell::Empty, TableCell::Empty, TableCell::Empty],
+        };
+        let row = |case: &FaceCase| {
+            let way = [1e3 * case.h_min_m, case.tilt_deg, 1e3 * case.way_m].map(TableCell::Number);
+            let steps = [Method::Lie, Method::DriftCorrected].map(|method| cells(case.curve(method)));
+            way.into_iter().chain(steps.into_iter().flatten()).collect()
+        };
+        let heads = [
+            "h_min, mm",
+            "tilt, °",
+            "way, mm",
+            "Lie: error, mm",
+            "Lie: normal, °",
+            "Lie: time, µs",
+            "drift-corrected: error, mm",
+            "drift-corrected: normal, °",
+            "drift-corrected: time, µs",
+        ];
+        Table {
+            id: "work_precision_one_step".to_owned(),
+            title: "The whole sample in one exact step".to_owned(),
+            caption: "Way: how far the face really moves. Without tilt the one step is the exact solution.".to_owned(),
+            heads: heads.map(str::to_owned).to_vec(),
+            rows: self.cases.iter().map(row).collect(),
+        }
+    }
+}
+
+/// The fastest exact step and the fastest other solver that reach an error.
+struct FastestSolvers {
+    h_min_m: f64,
+    exact: Option<(Method, IntegratorRun)>,
+    other: Option<(Method, IntegratorRun)>,
+}
+
+impl FastestSolvers {
+    fn of(case: &FaceCase, error_m: f64) -> Self {
+        let ranking = case.ranking(error_m);
+        let first = |is_exact| ranking.iter().find(|(method, _)| method.is_exact() == is_exact).copied();
+        Self { h_min_m: case.h_min_m, exact: first(true), other: first(false) }
+    }
+
+    /// How many times as long the other takes; `None` where one of them does not get there.
+    fn factor(&self) -> Option<f64> {
+        Some(self.other?.1.time_s.median / self.exact?.1.time_s.median)
+    }
+
+    fn is_won(&self) -> bool {
+        self.exact.is_some() && self.factor().is_none_or(|factor| factor >= 1.0)
+    }
+}
+
+/// "h_min 1 nm to 1 µm".
+fn h_mins(outcomes: &[&FastestSolvers]) -> String {
+    let all: Vec<f64> = outcomes.iter().map(|outcome| outcome.h_min_m).collect();
+    match (smallest(&all), largest(&all)) {
+        (Some(low), Some(high)) if low < high => format!("h_min {} to {}", length(low), length(high)),
+        (Some(low), _) => format!("h_min {}", length(low)),
+        _ => String::new(),
+    }
+}
+
+fn smallest(values: &[f64]) -> Option<f64> {
+    values.iter().copied().min_by(f64::total_cmp)
+}
+
+fn largest(values: &[f64]) -> Option<f64> {
+    values.iter().copied().max_by(f64::total_cmp)
+}
+
+/// In the unit that leaves few zeros.
+fn length(metres: f64) -> String {
+    let units = [(1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"), (1e-12, "pm")];
+    let (unit, name) = units.into_iter().find(|(unit, _)| metres >= 0.1 * unit).unwrap_or((1e-12, "pm"));
+    format!("{} {name}", three_digits(metres / unit))
+}
+
+/// Median and ends, in the unit that leaves few zeros.
+fn time(seconds: Spread) -> String {
+    let (unit, name) = if seconds.median < 1e-7 { (1e-9, "ns") } else { (1e-6, "µs") };
+    let [median, p10, p90] = [seconds.median, seconds.p10, seconds.p90].map(|value| three_digits(value / unit));
+    format!("{median} {name} ({p10}–{p90})")
+}
+
+fn evaluations_figure(case: &FaceCase) -> Figure {
+    let mark = |point: &IntegratorRun| Mark { x: (point.evaluations as f64).into(), y: (1e3 * point.error_m).into() };
+    let axis = Axis::log("evaluations of the right-hand side, or exact flows", "evaluations");
+    let mut figure = case.figure("evaluations", axis, mark);
+    figure.caption = format!(
+        "The same runs by what is counted instead of timed: no spread, the counts repeat exactly.{}",
+        case.gave_up()
+    );
+    figure
+}
+
+impl FaceCase {
+    fn name(&self) -> String {
+        format!("h_min {}, {}", length(self.h_min_m), force_name(self.tilt_deg))
+    }
+
+    fn figure(&self, over: &str, x: Axis, mark: impl Fn(&IntegratorRun) -> Mark) -> Figure {
+        let series = self.curves.iter().map(|curve| Series {
+            name: curve.method.name().to_owned(),
+            stroke: LineStroke::Joined,
+            marks: curve.points.iter().map(&mark).collect(),
+        });
+        let exponent = (self.h_min_m * 1e9).round();
+        Figure {
+            id: format!("work_precision_{over}_{exponent}nm_{}", force_id(self.tilt_deg)),
+            title: format!("Error at the end of one sample: {}", self.name()),
+            caption: String::new(),
+            x,
+            y: Axis::log("error of the barycentre, mm", "error_mm"),
+            drawing: Drawing::Curves(series.collect()),
+        }
+    }
+
+    /// Which integrators gave up, and how often; empty where none did.
+    fn gave_up(&self) -> String {
+        let giving_up = self.curves.iter().filter(|curve| !curve.gave_up.is_empty());
+        let told: Vec<String> = giving_up
+            .map(|curve| {
+                let all = curve.gave_up.len() + curve.points.len();
+                format!("{} gave up at {} of {all} settings", curve.method.name(), curve.gave_up.len())
+            })
+            .collect();
+        if told.is_empty() { String::new() } else { format!(" {}.", told.join("; ")) }
+    }
+}
+
+fn force_name(tilt_deg: f64) -> String {
+    if tilt_deg == 0.0 { "no friction".to_owned() } else { format!("force tilted by {}°", three_digits(tilt_deg)) }
+}
+
+fn force_id(tilt_deg: f64) -> &'static str {
+    if tilt_deg == 0.0 { "straight" } else { "tilted" }
+}

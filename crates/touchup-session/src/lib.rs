@@ -1,0 +1,14 @@
+//! One session: what the scene file says, both rates side by side, and what comes of it.
+//!
+//! | module | what it does |
+//! |---|---|
+//! | [`clock`] | steady time, of the machine or of a test that moves it |
+//! | [`scene`] | the YAML that names the parts of a scene and their parameters |
+//! | [`live`] | the haptic update at every sample, the patch beside it on a thread of its own |
+//! | [`session`] | one run: its recording, its result, and what it takes to get the same again |
+#![cfg_attr(not(test), warn(clippy::unwrap_used))]
+
+pub mod clock;
+pub mod live;
+pub mod scene;
+pub mod session;

@@ -1,0 +1,89 @@
+//! What the thread of the patch asks before it renews: in a program nothing, in a test the test.
+
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+
+use crate::clock::{Clock, Working};
+
+/// Where each renewal of the patch needs a permit, and whose time waits for the patch. The default lets everything through.
+#[derive(Clone, Debug, Default)]
+pub struct Gate {
+    permits: Option<Arc<Permits>>,
+    clock: Clock,
+}
+
+/// Gives permits; dropped, it leaves the gate open.
+#[derive(Debug)]
+pub struct GateKeeper(Arc<Permits>);
+
+#[derive(Debug, Default)]
+struct Permits {
+    state: Mutex<GateState>,
+    changed: Condvar,
+}
+
+#[derive(Debug, Default)]
+struct GateState {
+    is_open: bool,
+    given: u64,
+    /// renewals that were done with a permit, and whose change can be taken up
+    done: u64,
+}
+
+impl Gate {
+    /// Lets everything through. The time of `clock` waits for what the patch was asked.
+    pub fn open(clock: &Clock) -> Self {
+        Self { permits: None, clock: clock.clone() }
+    }
+
+    /// Lets nothing through without a permit.
+    pub fn kept() -> (Self, GateKeeper) {
+        let permits = Arc::new(Permits::default());
+        (Self { permits: Some(Arc::clone(&permits)), clock: Clock::system() }, GateKeeper(permits))
+    }
+
+    /// To be held from a question until its answer is there.
+    pub(super) fn begin_work(&self) -> Working {
+        self.clock.begin_work()
+    }
+
+    /// Returns when a renewal may be worked at.
+    pub(super) fn pass(&self) {
+        if let Some(permits) = &self.permits {
+            let is_shut = |state: &mut GateState| !state.is_open && state.done == state.given;
+            drop(permits.changed.wait_while(permits.lock(), is_shut).unwrap_or_else(PoisonError::into_inner));
+        }
+    }
+
+    /// The change of a renewal can be taken up.
+    pub(super) fn note_done(&self) {
+        if let Some(permits) = &self.permits {
+            permits.lock().done += 1;
+            permits.changed.notify_all();
+        }
+    }
+}
+
+impl GateKeeper {
+    /// Lets one renewal through, and returns when its change can be taken up: one has to be asked for.
+    pub fn let_one_through(&self) {
+        let mut state = self.0.lock();
+        state.given = state.done + 1;
+        self.0.changed.notify_all();
+        let is_under_way = |state: &mut GateState| state.done < state.given;
+        drop(self.0.changed.wait_while(state, is_under_way).unwrap_or_else(PoisonError::into_inner));
+    }
+}
+
+impl Drop for GateKeeper {
+    fn drop(&mut self) {
+        self.0.lock().is_open = true;
+        self.0.changed.notify_all();
+    }
+}
+
+impl Permits {
+    /// Counts are whole whoever held them.
+    fn lock(&self) -> MutexGuard<'_, GateState> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

@@ -1,0 +1,73 @@
+//! The touches that features are measured by, as they come from the thread of the patch.
+
+use touchup_core::touch::ProbedPoint;
+
+/// Touches that came or went: of the list that somebody keeps the first `kept` stay, then come `new`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ProbedNews {
+    /// so many of the touches before stay
+    pub kept: usize,
+    /// … and these come after them
+    pub new: Vec<ProbedPoint>,
+}
+
+impl Default for ProbedNews {
+    /// All stay and none comes.
+    fn default() -> Self {
+        Self { kept: usize::MAX, new: Vec::new() }
+    }
+}
+
+impl ProbedNews {
+    /// Whether nothing came or went.
+    pub fn is_empty(&self) -> bool {
+        self.kept == usize::MAX && self.new.is_empty()
+    }
+
+    /// Adds what came after it.
+    pub fn extend(&mut self, next: Self) {
+        if next.is_empty() {
+            return;
+        }
+        let ours = self.new.len();
+        // `next` counts from what was there before, with ours behind it
+        match self.kept {
+            usize::MAX if ours == 0 => self.kept = next.kept,
+            kept if next.kept >= kept => self.new.truncate(next.kept - kept),
+            _ => {
+                self.kept = next.kept;
+                self.new.clear();
+            }
+        }
+        self.new.extend(next.new);
+    }
+
+    /// Brings a list up to date.
+    pub fn apply_to(self, touches: &mut Vec<ProbedPoint>) {
+        touches.truncate(self.kept);
+        touches.extend(self.new);
+    }
+}
+
+/// What of a list was told.
+#[derive(Debug, Default)]
+pub(super) struct PublishedList {
+    count: usize,
+    /// stamp and stroke of the last that was told
+    last: Option<(i64, u32)>,
+}
+
+impl PublishedList {
+    /// What is to be told of the list as it is now: what was added, or the whole list where it is another one.
+    pub fn news(&mut self, touches: &[ProbedPoint]) -> ProbedNews {
+        let name = |touch: &ProbedPoint| (touch.stamp_ns, touch.stroke);
+        let is_longer = self.count.checked_sub(1).and_then(|last| touches.get(last)).map(name) == self.last;
+        let kept = if is_longer { self.count } else { 0 };
+        self.count = touches.len();
+        self.last = touches.last().map(name);
+        if kept == touches.len() && is_longer {
+            return ProbedNews::default();
+        }
+        ProbedNews { kept, new: touches[kept..].to_vec() }
+    }
+}

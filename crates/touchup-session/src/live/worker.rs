@@ -1,0 +1,126 @@
+//! The thread of the patch.
+
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender, SyncSender, TryRecvError, channel};
+use std::thread::{Builder, JoinHandle};
+
+use super::LiveError;
+use super::gate::Gate;
+use super::probed::{ProbedNews, PublishedList};
+use crate::clock::Working;
+use touchup_core::mesh::{FaceTree, TriMesh};
+use touchup_core::patch::{PatchDelta, Patcher};
+use touchup_core::touch::Sample;
+
+/// What the thread is asked for.
+pub(super) enum Question {
+    /// take these in, and tell what changed
+    Renew(Vec<Sample>),
+    /// take in what is still in the smoothing window, and tell what changed
+    Flush,
+    /// copy what is known, with these samples more
+    Copy(Vec<Sample>, SyncSender<Patcher>),
+    /// take the last stroke back, or do it again, and tell what changed
+    Undo,
+    Redo,
+}
+
+/// What the thread found.
+pub(super) struct WorkerAnswer {
+    pub delta: PatchDelta,
+    pub probed: ProbedNews,
+    /// whether there was a stroke to take back, or to do again
+    pub has_changed_strokes: bool,
+    /// to be filled again
+    batch: Vec<Sample>,
+}
+
+/// A patcher on a thread of its own. Each question but that for a copy has one answer, in the same order.
+#[derive(Debug)]
+pub(super) struct Worker {
+    gate: Gate,
+    questions: Sender<(Question, Working)>,
+    answers: Receiver<WorkerAnswer>,
+    thread: JoinHandle<Patcher>,
+    batches: Vec<Vec<Sample>>,
+}
+
+impl Worker {
+    pub fn new(scan: Arc<(TriMesh, FaceTree)>, mut patcher: Patcher, gate: Gate) -> Result<Self, LiveError> {
+        let (questions, inbox) = channel::<(Question, Working)>();
+        let (outbox, answers) = channel();
+        let gate_of_thread = gate.clone();
+        let work = move || {
+            let gate = gate_of_thread;
+            let mut told = PublishedList::default();
+            for (question, _working) in inbox {
+                let (mut batch, mut has_changed_strokes) = (Vec::new(), false);
+                let is_renewal = matches!(question, Question::Renew(_));
+                match question {
+                    Question::Renew(samples) => {
+                        gate.pass();
+                        samples.iter().for_each(|sample| patcher.push(sample));
+                        batch = samples;
+                        batch.clear();
+                    }
+                    Question::Copy(samples, to) => {
+                        let mut copy = patcher.copy();
+                        samples.iter().for_each(|sample| copy.push(sample));
+                        // who asked may want it no more
+                        let _ = to.send(copy);
+                        continue;
+                    }
+                    Question::Flush => patcher.flush(),
+                    Question::Undo => has_changed_strokes = patcher.undo(),
+                    Question::Redo => has_changed_strokes = patcher.redo(),
+                }
+                let delta = patcher.renewed(&scan.0, &scan.1);
+                let probed = told.news(patcher.probed());
+                if outbox.send(WorkerAnswer { delta, probed, has_changed_strokes, batch }).is_err() {
+                    break;
+                }
+                if is_renewal {
+                    gate.note_done();
+                }
+            }
+            patcher
+        };
+        let thread = Builder::new().name("patch".to_owned()).spawn(work);
+        let thread = thread.map_err(|error| LiveError::NoThread(error.to_string()))?;
+        Ok(Self { gate, questions, answers, thread, batches: Vec::new() })
+    }
+
+    pub fn empty_batch(&mut self) -> Vec<Sample> {
+        self.batches.pop().unwrap_or_default()
+    }
+
+    /// Asks; there will be one answer more.
+    pub fn ask(&self, question: Question) -> Result<(), LiveError> {
+        self.questions.send((question, self.gate.begin_work())).map_err(|_| LiveError::Stopped)
+    }
+
+    /// The next answer, when it is there.
+    pub fn answer(&mut self) -> Result<WorkerAnswer, LiveError> {
+        let answer = self.answers.recv().map_err(|_| LiveError::Stopped)?;
+        Ok(self.emptied(answer))
+    }
+
+    /// The next answer, if it is there.
+    pub fn answer_if_there(&mut self) -> Result<Option<WorkerAnswer>, LiveError> {
+        match self.answers.try_recv() {
+            Ok(answer) => Ok(Some(self.emptied(answer))),
+            Err(TryRecvError::Empty) => Ok(None),
+            Err(TryRecvError::Disconnected) => Err(LiveError::Stopped),
+        }
+    }
+
+    fn emptied(&mut self, mut answer: WorkerAnswer) -> WorkerAnswer {
+        self.batches.push(std::mem::take(&mut answer.batch));
+        answer
+    }
+
+    pub fn finish(self) -> Result<Patcher, LiveError> {
+        drop(self.questions);
+        self.thread.join().map_err(|_| LiveError::Stopped)
+    }
+}

@@ -1,0 +1,206 @@
+//! The result as files: mesh, features, touches.
+
+use std::fmt;
+use std::path::Path;
+use std::time::Instant;
+
+use serde::Serialize;
+use tracing::{debug, warn};
+
+use super::knocks::UncertaintySummary;
+use touchup_core::features::{Detection, detect};
+use touchup_core::mesh::{FaceId, FaceTree, MeshError, Outside, TriMesh, VertexId};
+use touchup_core::patch::{Patched, Patcher, Support};
+use touchup_core::touch::ProbedPoint;
+use touchup_io::features_file::{FeatureFile, FeaturesFileError, write_features};
+use touchup_io::mesh_file::{MeshFile, MeshFileError, MeshUnit, VertexColumn, read_mesh, write_mesh, write_mesh_with};
+use touchup_io::touches_file::{TouchesFileError, as_written, write_touches};
+
+/// Why a result was not written.
+#[derive(Debug, thiserror::Error)]
+pub enum OutcomeError {
+    /// The mesh.
+    #[error("{0}")]
+    WriteMesh(MeshFileError),
+    /// The mesh that was just written.
+    #[error("{0}")]
+    ReadMesh(MeshFileError),
+    /// The touches.
+    #[error(transparent)]
+    Touches(#[from] TouchesFileError),
+    /// The features.
+    #[error(transparent)]
+    Features(#[from] FeaturesFileError),
+    /// The patch is too large.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+}
+
+/// Where a result goes.
+#[derive(Clone, Copy, Debug)]
+pub struct OutcomePlaces<'a> {
+    /// the refined mesh
+    pub mesh: &'a Path,
+    /// unit of its coordinates
+    pub unit: MeshUnit,
+    /// features of the refined mesh, measured by the touches
+    pub features: Option<&'a Path>,
+    /// the touches that features name
+    pub touches: Option<&'a Path>,
+    /// the rest of a scan of which a part was refined
+    pub outside: Option<&'a Outside>,
+}
+
+/// What became of the touched part.
+#[derive(Debug, Serialize)]
+pub struct Outcome {
+    /// faces that are not where the scan had them
+    pub moved_faces: u64,
+    /// what was meshed anew; `null` when the scene has no `patch`, or nothing was touched
+    pub patch: Option<PatchSummary>,
+    /// how well that is known; not there when the scene has no `uncertainty`
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub uncertainty: Option<UncertaintySummary>,
+    /// vertices and faces of the mesh that was written
+    #[serde(skip)]
+    pub counts: [usize; 2],
+}
+
+/// What is told of the patch.
+#[derive(Debug, Serialize)]
+pub struct PatchSummary {
+    /// edge length of the new faces
+    pitch_mm: f64,
+    /// faces of the scan that went
+    removed_faces: usize,
+    /// faces that came
+    added_faces: usize,
+    /// share of the new vertices that rest on what was felt nearby, not there
+    guessed_share: f64,
+    build_s: f64,
+}
+
+/// Features of a mesh and the touches on it, also as a file has them.
+pub fn found(mesh: &TriMesh, touches: &[ProbedPoint]) -> (Detection, FeatureFile) {
+    let detection = detect(mesh, &FaceTree::new(mesh), touches);
+    let file = FeatureFile::of(&detection.features, detection.unexplained);
+    (detection, file)
+}
+
+/// Faces that are new, or of which a corner is not where it was.
+pub fn moved_faces(before: &TriMesh, after: &TriMesh) -> u64 {
+    let is_moved = |v: VertexId| before.position(v) != after.position(v);
+    let is_as_scanned = |face: FaceId, corners: [VertexId; 3]| {
+        before.has_face(face) && before.corners(face) == corners && !corners.into_iter().any(is_moved)
+    };
+    after.faces().filter(|&(face, corners)| !is_as_scanned(face, corners)).count() as u64
+}
+
+/// A part that was meshed anew, with the rest of its scan.
+///
+/// - `of_scan`: standard deviation of a vertex that was not touched, m.
+fn sewn(part: Patched, outside: &Outside, of_scan: f64) -> Result<Patched, MeshError> {
+    let sewn = outside.sew_to(&part.mesh)?;
+    let support = sewn.column(&part.support, Support::Scan);
+    let sigma = if part.sigma.is_empty() { Vec::new() } else { sewn.column(&part.sigma, of_scan) };
+    Ok(Patched { mesh: sewn.mesh, support, sigma, ..part })
+}
+
+/// Vertices and faces in a file of the mesh: a vertex that no face uses is not in it.
+fn written_counts(mesh: &TriMesh) -> [usize; 2] {
+    let is_used = |vertex: &u32| mesh.has_vertex(VertexId(*vertex)) && !mesh.star(VertexId(*vertex)).is_empty();
+    [(0..mesh.vertex_slots() as u32).filter(is_used).count(), mesh.face_count()]
+}
+
+impl OutcomePlaces<'_> {
+    /// Writes what was refined.
+    ///
+    /// - `scan`: as it came.
+    /// - `refined`: as the haptic update left it; written where there is no patch.
+    /// - `patcher`: what meshes the touched part anew; `None` without `patch` in the scene, or when nothing was touched.
+    ///
+    /// # Errors
+    /// [`OutcomeError`]; no file is left half written.
+    pub fn write(&self, scan: &TriMesh, refined: &TriMesh, patcher: Option<Patcher>) -> Result<Outcome, OutcomeError> {
+        let Some(patcher) = patcher else {
+            let moved_faces = moved_faces(scan, refined);
+            let sewn = self.outside.map(|outside| outside.sew_to(refined)).transpose()?;
+            let refined = sewn.as_ref().map_or(refined, |sewn| &sewn.mesh);
+            write_mesh(self.mesh, refined, self.unit).map_err(OutcomeError::WriteMesh)?;
+            self.write_features(&[])?;
+            return Ok(Outcome { moved_faces, patch: None, uncertainty: None, counts: written_counts(refined) });
+        };
+        self.write_patched(scan, patcher)
+    }
+
+    /// Meshes the touched part of the scan anew and writes the result.
+    fn write_patched(&self, scan: &TriMesh, mut patcher: Patcher) -> Result<Outcome, OutcomeError> {
+        let (started, wanted) = (Instant::now(), patcher.params().pitch);
+        patcher.flush();
+        let patched = patcher.patched(scan, &FaceTree::new(scan))?;
+        if patched.pitch > wanted {
+            let (pitch_mm, wanted_mm) = (patched.pitch * 1e3, wanted * 1e3);
+            warn!(
+                "new faces of {pitch_mm:.2} mm instead of {wanted_mm:.2}: finer ones would be more than patch.most_faces"
+            );
+        }
+        let build_s = started.elapsed().as_secs_f64();
+        let uncertainty = patcher.params().uncertainty.map(|_| UncertaintySummary::of(&patched, patcher.knocks()));
+        let moved_faces = moved_faces(scan, &patched.mesh);
+        let of_scan = patcher.params().uncertainty.map_or(0.0, |known| known.scan);
+        let patched = match self.outside {
+            Some(outside) => sewn(patched, outside, of_scan)?,
+            None => patched,
+        };
+        let columns = patched.columns().into_iter();
+        let columns: Vec<_> = columns.map(|(name, values)| VertexColumn { name, values: values.into() }).collect();
+        write_mesh_with(self.mesh, &patched.mesh, &columns, self.unit).map_err(OutcomeError::WriteMesh)?;
+        debug!(open_squares = patched.open_squares, "patched");
+        self.write_features(patcher.probed())?;
+        Ok(Outcome {
+            moved_faces,
+            patch: Some(PatchSummary::of(&patched, build_s)),
+            uncertainty,
+            counts: written_counts(&patched.mesh),
+        })
+    }
+
+    /// Writes what was touched, and the features of the result, where that was asked for: of the mesh and by the touches as
+    /// they are written, so that `touchup features` finds the same to the last bit.
+    fn write_features(&self, touches: &[ProbedPoint]) -> Result<(), OutcomeError> {
+        if let Some(out) = self.touches {
+            write_touches(out, touches)?;
+        }
+        if let Some(out) = self.features {
+            let MeshFile { mesh, .. } = read_mesh(self.mesh, self.unit).map_err(OutcomeError::ReadMesh)?;
+            write_features(out, &found(&mesh, &as_written(touches)).1)?;
+        }
+        Ok(())
+    }
+}
+
+impl PatchSummary {
+    fn of(patched: &Patched, build_s: f64) -> Self {
+        let count = |wanted: Support| patched.support.iter().filter(|&&support| support == wanted).count() as f64;
+        let (touched, guessed) = (count(Support::Touched), count(Support::Guessed) + count(Support::Unreachable));
+        Self {
+            pitch_mm: patched.pitch * 1e3,
+            removed_faces: patched.removed_faces,
+            added_faces: patched.added_faces,
+            guessed_share: guessed / (touched + guessed).max(1.0),
+            build_s,
+        }
+    }
+}
+
+impl fmt::Display for PatchSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { pitch_mm, removed_faces, added_faces, guessed_share, build_s } = self;
+        write!(
+            f,
+            "meshed anew: {added_faces} faces of {pitch_mm:.2} mm for {removed_faces} of the scan, {:.0} % of their \
+             vertices guessed, in {build_s:.2} s",
+            guessed_share * 100.0
+        )
+    }
+}

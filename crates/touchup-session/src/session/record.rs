@@ -1,0 +1,410 @@
+//! All that it takes to get a session's result again: scene, scan, what was touched, and which strokes were taken back.
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::{Builder, JoinHandle};
+use std::time::{Duration, Instant};
+
+use serde::{Deserialize, Serialize};
+
+use crate::clock::Clock;
+use touchup_core::touch::Message;
+use touchup_io::mesh_file::MeshUnit;
+use touchup_io::recording::{RecordingError, SegmentedWriter, Topics};
+use touchup_io::session_folder::{SessionFolder, fingerprint, read_text};
+
+const DESCRIPTION: &str = "session.json";
+const SCENE: &str = "scene.yaml";
+const STROKES: &str = "strokes.jsonl";
+const RECORDING: &str = "recording";
+
+/// What was written reaches the system at least so often: a crash loses no more.
+const FLUSH_EVERY: Duration = Duration::from_millis(50);
+/// A disk that refused is asked again after this time.
+const ASK_AGAIN: Duration = Duration::from_secs(1);
+/// Messages that wait for the disk at most: several seconds of both streams.
+const MOST_WAITING: usize = 1 << 14;
+
+/// Why a session was not begun, or cannot be resumed.
+#[derive(Debug, thiserror::Error)]
+pub enum SessionError {
+    /// The system refused.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// file or folder
+        path: PathBuf,
+        /// its reason
+        source: io::Error,
+    },
+    /// A file of the session is not as the session wrote it.
+    #[error("{}: {reason}; is that the folder of a session?", path.display())]
+    Damaged {
+        /// the file
+        path: PathBuf,
+        /// what is wrong
+        reason: String,
+    },
+    /// The scan is another one now.
+    #[error("{}: it changed since the session began: bring the scan back as it was", path.display())]
+    ScanChanged {
+        /// the scan
+        path: PathBuf,
+    },
+}
+
+/// A stroke taken back, or done again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StrokeChange {
+    /// after the sample of this stamp, ns
+    pub after_ns: i64,
+    /// taken back; else done again
+    pub is_undo: bool,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+struct Description {
+    scan: PathBuf,
+    scan_crc32: u32,
+    mesh_unit: MeshUnit,
+    wrench_topic: String,
+    pose_topic: String,
+}
+
+/// A session as it is on the disk.
+#[derive(Debug)]
+pub struct SessionRecord {
+    /// the scan, as it was
+    pub scan: PathBuf,
+    /// unit of its coordinates
+    pub mesh_unit: MeshUnit,
+    /// the scene
+    pub scene: PathBuf,
+    /// what was touched
+    pub recording: PathBuf,
+    /// its topics
+    pub topics: Topics,
+    /// in order of time
+    pub strokes: Vec<StrokeChange>,
+}
+
+impl SessionRecord {
+    /// Writes scene and reference of the scan into a new folder.
+    ///
+    /// # Errors
+    /// [`SessionError::Io`].
+    pub fn begin(
+        folder: &SessionFolder,
+        scan: &Path,
+        mesh_unit: MeshUnit,
+        scene_yaml: &str,
+        topics: &Topics,
+    ) -> Result<(), SessionError> {
+        let (scan, scan_crc32) =
+            fingerprint(scan).map_err(|source| SessionError::Io { path: scan.to_owned(), source })?;
+        let (wrench_topic, pose_topic) = (topics.wrench.clone(), topics.pose.clone());
+        let description = Description { scan, scan_crc32, mesh_unit, wrench_topic, pose_topic };
+        let text = serde_json::to_string_pretty(&description).expect("paths that were read are text, or are refused");
+        let io = |source| SessionError::Io { path: folder.path().to_owned(), source };
+        folder.write_text(SCENE, scene_yaml).map_err(io)?;
+        folder.write_text(DESCRIPTION, &text).map_err(io)
+    }
+
+    /// Reads what the folder of a session holds, whether or not it was ended.
+    ///
+    /// # Errors
+    /// [`SessionError`].
+    pub fn open(folder: &Path) -> Result<Self, SessionError> {
+        let path = folder.join(DESCRIPTION);
+        let text = read_text(&path).map_err(|source| SessionError::Io { path: path.clone(), source })?;
+        let description: Description = serde_json::from_str(&text)
+            .map_err(|error| SessionError::Damaged { path: path.clone(), reason: error.to_string() })?;
+        let Description { scan, scan_crc32, mesh_unit, wrench_topic, pose_topic } = description;
+        let now = fingerprint(&scan).map_err(|source| SessionError::Io { path: scan.clone(), source })?;
+        if now.1 != scan_crc32 {
+            return Err(SessionError::ScanChanged { path: scan });
+        }
+        Ok(Self {
+            scan,
+            mesh_unit,
+            scene: folder.join(SCENE),
+            recording: folder.join(RECORDING),
+            topics: Topics { pose: pose_topic, wrench: wrench_topic, markers: None },
+            strokes: read_strokes(&folder.join(STROKES))?,
+        })
+    }
+}
+
+/// A last line that a crash cut off was not done either.
+fn read_strokes(path: &Path) -> Result<Vec<StrokeChange>, SessionError> {
+    let text = read_text(path).map_err(|source| SessionError::Io { path: path.to_owned(), source })?;
+    let whole = text.rfind('\n').map_or("", |end| &text[..end]);
+    let read = |line: &str| {
+        serde_json::from_str(line)
+            .map_err(|error| SessionError::Damaged { path: path.to_owned(), reason: error.to_string() })
+    };
+    whole.lines().map(read).collect()
+}
+
+/// What is not in the recording of a session.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Unrecorded {
+    /// how many messages
+    pub messages: u64,
+    /// what the disk said last, if it refused any
+    pub reason: Option<String>,
+    /// it still refuses
+    pub is_refused: bool,
+}
+
+/// Takes messages down on a thread of its own.
+#[derive(Debug)]
+pub struct SessionRecorder {
+    folder: SessionFolder,
+    sender: SyncSender<(Message, &'static str)>,
+    thread: JoinHandle<()>,
+    unrecorded: Arc<Mutex<Unrecorded>>,
+    end: Arc<RecordingEnd>,
+}
+
+/// Whether the recording is to end.
+#[derive(Debug, Default)]
+struct RecordingEnd {
+    has_come: Mutex<bool>,
+    changed: Condvar,
+}
+
+impl SessionRecorder {
+    /// Starts the thread, which writes when `clock` says so.
+    ///
+    /// # Errors
+    /// [`SessionError::Io`].
+    pub fn start(folder: &SessionFolder, topics: &Topics, clock: &Clock) -> Result<Self, SessionError> {
+        let io = |source| SessionError::Io { path: folder.path().to_owned(), source };
+        let writer = SegmentedWriter::new(&folder.create_folder(RECORDING).map_err(io)?, topics);
+        let (sender, messages) = sync_channel(MOST_WAITING);
+        let unrecorded = Arc::new(Mutex::new(Unrecorded::default()));
+        let end = Arc::new(RecordingEnd::default());
+        let taker = Taker {
+            writer,
+            told: Arc::clone(&unrecorded),
+            refused_at: None,
+            clock: clock.clone(),
+            end: Arc::clone(&end),
+        };
+        let working = clock.begin_work();
+        let work = move || {
+            taker.take_down(&messages);
+            drop(working);
+        };
+        let thread = Builder::new().name("recorder".to_owned()).spawn(work).map_err(io)?;
+        Ok(Self { folder: folder.clone(), sender, thread, unrecorded, end })
+    }
+
+    /// Takes a message down whose header names `frame`; never waits. What finds no room is lost, and counted.
+    pub fn write(&self, message: Message, frame: &'static str) {
+        if self.sender.try_send((message, frame)).is_err() {
+            locked(&self.unrecorded).messages += 1;
+        }
+    }
+
+    /// Takes down that a stroke was taken back or done again.
+    ///
+    /// # Errors
+    /// [`SessionError::Io`].
+    pub fn write_stroke(&self, change: StrokeChange) -> Result<(), SessionError> {
+        let line = serde_json::to_string(&change).expect("a number and a truth value cannot fail");
+        let io = |source| SessionError::Io { path: self.folder.path().join(STROKES), source };
+        self.folder.append_line(STROKES, &line).map_err(io)
+    }
+
+    /// What is not in the recording so far.
+    pub fn unrecorded(&self) -> Unrecorded {
+        locked(&self.unrecorded).clone()
+    }
+
+    /// Waits until all is taken down and ends the recording; returns as [`Self::unrecorded`].
+    pub fn finish(self) -> Unrecorded {
+        let Self { sender, thread, unrecorded, end, .. } = self;
+        drop(sender);
+        *end.lock() = true;
+        end.changed.notify_all();
+        let ended = thread.join();
+        let mut unrecorded = locked(&unrecorded).clone();
+        if ended.is_err() {
+            unrecorded.reason = Some("the thread of the recorder ended by a fault".to_owned());
+        }
+        unrecorded
+    }
+}
+
+/// A count and words are whole whoever held them.
+fn locked(unrecorded: &Mutex<Unrecorded>) -> MutexGuard<'_, Unrecorded> {
+    unrecorded.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl RecordingEnd {
+    /// A truth value is whole whoever held it.
+    fn lock(&self) -> MutexGuard<'_, bool> {
+        self.has_come.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+struct Taker {
+    writer: SegmentedWriter,
+    told: Arc<Mutex<Unrecorded>>,
+    refused_at: Option<Instant>,
+    clock: Clock,
+    end: Arc<RecordingEnd>,
+}
+
+impl Taker {
+    /// Looks by itself for what has come: to be woken for each message would cost who hands it over more than the message.
+    ///
+    /// What the disk does not take is lost; a moment later it is asked again, for somebody may have made room.
+    fn take_down(mut self, messages: &Receiver<(Message, &'static str)>) {
+        loop {
+            drop(self.clock.wait_while(&self.end.changed, self.end.lock(), FLUSH_EVERY, |has_come| !*has_come));
+            let is_over = loop {
+                match messages.try_recv() {
+                    Ok((message, frame)) => self.take(&message, frame),
+                    Err(why) => break why == TryRecvError::Disconnected,
+                }
+            };
+            match self.writer.flush() {
+                Ok(0) => {}
+                Ok(_) => self.accept(),
+                Err(error) => self.refuse(0, &error),
+            }
+            if is_over {
+                break;
+            }
+        }
+        let Self { writer, told, .. } = self;
+        if let Err(error) = writer.finish() {
+            locked(&told).reason = Some(error.to_string());
+        }
+    }
+
+    fn take(&mut self, message: &Message, frame: &str) {
+        if !self.is_asked() {
+            locked(&self.told).messages += 1;
+        } else if let Err(error) = self.writer.write(message, frame) {
+            self.refuse(1, &error);
+        }
+    }
+
+    /// Whether the disk is tried: it has not refused, or long enough ago.
+    fn is_asked(&self) -> bool {
+        self.refused_at.is_none_or(|at| self.clock.since(at) >= ASK_AGAIN)
+    }
+
+    fn accept(&mut self) {
+        if self.refused_at.take().is_some() {
+            locked(&self.told).is_refused = false;
+        }
+    }
+
+    fn refuse(&mut self, messages: u64, error: &RecordingError) {
+        self.refused_at = Some(self.clock.now());
+        let messages = messages + self.writer.give_up_segment();
+        let mut told = locked(&self.told);
+        told.messages += messages;
+        (told.reason, told.is_refused) = (Some(error.to_string()), true);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs::remove_dir;
+
+    use nalgebra::Vector3;
+    use tempfile::{TempDir, tempdir};
+
+    use super::*;
+    use touchup_core::touch::{StampedWrench, Wrench};
+    use touchup_io::recording::RecordingReader;
+
+    fn wrench(number: u32) -> Message {
+        let wrench = Wrench { force: Vector3::z() * f64::from(number), torque: Vector3::zeros() };
+        Message::Wrench(StampedWrench { stamp_ns: i64::from(number) * 1_000_000, wrench })
+    }
+
+    fn folder() -> (TempDir, SessionFolder) {
+        let parent = tempdir().unwrap();
+        let folder = SessionFolder::create(parent.path(), "session").unwrap();
+        (parent, folder)
+    }
+
+    fn on_disk(folder: &SessionFolder) -> Vec<Message> {
+        let reader = RecordingReader::open(&folder.path().join(RECORDING), &Topics::default()).unwrap();
+        reader.map_while(Result::ok).collect()
+    }
+
+    /// What came in between two of its looks is on the disk after the second, and not before.
+    #[test]
+    fn what_was_written_is_on_the_disk_50_ms_later() {
+        let ((_parent, folder), (clock, hand)) = (folder(), Clock::manual());
+        let recorder = SessionRecorder::start(&folder, &Topics::default(), &clock).unwrap();
+        let mut written = Vec::new();
+        for look in 0..40 {
+            for number in 1..=look % 3 {
+                written.push(wrench(10 * look + number));
+                recorder.write(wrench(10 * look + number), "tip");
+            }
+            hand.advance(FLUSH_EVERY - Duration::from_nanos(1));
+            let before = written.len() - look as usize % 3;
+            assert_eq!(if before == 0 { Vec::new() } else { on_disk(&folder) }, written[..before], "look {look}");
+            hand.advance(Duration::from_nanos(1));
+            assert_eq!(if written.is_empty() { Vec::new() } else { on_disk(&folder) }, written, "look {look}");
+        }
+        assert_eq!(recorder.finish(), Unrecorded::default());
+        assert_eq!(on_disk(&folder), written);
+    }
+
+    /// The machine stands still for as long as the queue holds, and nothing is lost; what comes after that is counted.
+    #[test]
+    fn what_waits_for_the_disk_is_not_lost_and_what_finds_no_room_is_counted() {
+        let ((_parent, folder), (clock, hand)) = (folder(), Clock::manual());
+        let recorder = SessionRecorder::start(&folder, &Topics::default(), &clock).unwrap();
+        // it waits from here on
+        hand.advance(Duration::ZERO);
+        let count = MOST_WAITING as u32;
+        (1..=count + 7).for_each(|number| recorder.write(wrench(number), "tip"));
+        assert_eq!(recorder.unrecorded(), Unrecorded { messages: 7, ..Unrecorded::default() });
+        hand.advance(FLUSH_EVERY);
+        recorder.write(wrench(count + 8), "tip");
+        assert_eq!(recorder.finish(), Unrecorded { messages: 7, ..Unrecorded::default() });
+        let kept: Vec<_> = (1..=count).chain([count + 8]).map(wrench).collect();
+        assert!(on_disk(&folder) == kept);
+    }
+
+    /// The folder goes away and comes back, as a disk does that is full for a time.
+    #[test]
+    fn it_records_on_when_the_disk_takes_again() {
+        let ((_parent, folder), (clock, hand)) = (folder(), Clock::manual());
+        let recorder = SessionRecorder::start(&folder, &Topics::default(), &clock).unwrap();
+        remove_dir(folder.path().join(RECORDING)).unwrap();
+        (1..=5).for_each(|number| recorder.write(wrench(number), "tip"));
+        hand.advance(FLUSH_EVERY);
+        let refused = recorder.unrecorded();
+        assert!(refused.messages == 5 && refused.is_refused && refused.reason.unwrap().contains("touch_0000.mcap"));
+
+        folder.create_folder(RECORDING).unwrap();
+        // it does not ask before its time …
+        recorder.write(wrench(6), "tip");
+        hand.advance(ASK_AGAIN - FLUSH_EVERY);
+        let refused = recorder.unrecorded();
+        assert!(refused.messages == 6 && refused.is_refused);
+        // … and then it does
+        recorder.write(wrench(7), "tip");
+        hand.advance(FLUSH_EVERY);
+        let accepted = recorder.unrecorded();
+        assert!(accepted.messages == 6 && !accepted.is_refused);
+        recorder.write(wrench(8), "tip");
+        assert_eq!(recorder.finish(), accepted);
+        assert_eq!(on_disk(&folder), [7, 8].map(wrench));
+        assert!(folder.path().join(RECORDING).join("metadata.yaml").exists());
+    }
+}

@@ -1,0 +1,493 @@
+//! A UR arm with a probe that bends, against a known surface, in its own time.
+//!
+//! The arm follows its command with a limited acceleration, some milliseconds late. Its encoders say where its tip would be
+//! if nothing bent: x_c. The ball is at x, where the part lets it be, and arm and probe pull it back with K (x_c − x), so the
+//! part pushes with K (x − x_c). While that is inside the cone of friction the ball stays where it is; else it slides until
+//! the force lies on the cone.
+
+use std::collections::VecDeque;
+
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use rand::SeedableRng;
+use rand_pcg::Pcg64;
+
+use super::ball::push_ball;
+use super::error::{SimError, not_negative, positive, up_to};
+use super::surface::Surface;
+use super::wander::gauss;
+use touchup_core::robot::{Arm, ArmError, ArmState, Command, Joints, Safety, UrGeometry};
+use touchup_core::touch::{Payload, Wrench};
+
+/// The arm, how it is mounted, and what is not ideal about it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ArmParams {
+    /// Lengths.
+    pub geometry: UrGeometry,
+    /// The part in the base.
+    pub pose_bo: Isometry3<f64>,
+    /// The tip (centre of its ball, z from tip to handle) in the flange.
+    pub pose_ft: Isometry3<f64>,
+    /// How far the centre of its ball really is from there, in the axes of the tip, m.
+    pub ball_offset: Vector3<f64>,
+    /// Of the ball, m.
+    pub radius: f64,
+    /// Of arm and probe in series, N/m.
+    pub stiffness: f64,
+    /// Coefficient of friction.
+    pub friction: f64,
+    /// Of what the encoders say, per axis, root mean square, m.
+    pub pose_noise: f64,
+    /// Of the force, per axis, root mean square, N.
+    pub force_noise: f64,
+    /// Of the torque about the flange's origin, per axis, root mean square, N·m.
+    pub torque_noise: f64,
+    /// What the sensor reads before it is zeroed, N in the flange.
+    pub force_bias: Vector3<f64>,
+    /// … of the torque, N·m in the flange.
+    pub torque_bias: Vector3<f64>,
+    /// What hangs on the flange: its centre in the flange, gravity in B.
+    pub payload: Payload,
+    /// What its controller takes off for that.
+    pub told_payload: Payload,
+    /// From a command to the motion, s.
+    pub command_latency: f64,
+    /// How much older than its stamp the force is, s.
+    pub force_latency: f64,
+    /// Largest speed of the tip, m/s.
+    pub top_speed: f64,
+    /// Largest acceleration of the tip, m/s².
+    pub top_acceleration: f64,
+    /// Largest speed at which the tip turns, rad/s.
+    pub top_turn_speed: f64,
+    /// Largest speed of a joint, rad/s.
+    pub top_joint_speed: f64,
+    /// The arm stops by itself beyond this force, N.
+    pub safety_force: f64,
+    /// Noise comes from it.
+    pub seed: u64,
+}
+
+/// Nothing hangs on the flange; the base stands upright.
+pub const WEIGHTLESS: Payload =
+    Payload { mass: 0.0, p_sc: Vector3::new(0.0, 0.0, 0.0), gravity_o: Vector3::new(0.0, 0.0, -9.81) };
+
+impl Default for ArmParams {
+    /// A UR5e, the part on a table before it; a probe of 150 mm with a 3 mm ball, held upright.
+    fn default() -> Self {
+        let upright = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+        Self {
+            geometry: UrGeometry::UR5E,
+            pose_bo: Isometry3::translation(-0.4, -0.1, 0.05),
+            pose_ft: Isometry3::from_parts(Vector3::new(0.0, 0.0, 0.15).into(), upright),
+            ball_offset: Vector3::zeros(),
+            radius: 1.5e-3,
+            stiffness: 15e3,
+            friction: 0.15,
+            // repeatability of a UR5e is 0.03 mm; what encoders add to one reading is less
+            pose_noise: 10e-6,
+            force_noise: 0.15,
+            torque_noise: 5e-3,
+            force_bias: Vector3::new(0.4, -0.3, 1.1),
+            torque_bias: Vector3::new(0.05, -0.08, 0.02),
+            payload: WEIGHTLESS,
+            told_payload: WEIGHTLESS,
+            command_latency: 6e-3,
+            force_latency: 4e-3,
+            top_speed: 0.5,
+            top_acceleration: 2.0,
+            top_turn_speed: 0.5,
+            top_joint_speed: 3.1,
+            safety_force: 150.0,
+            seed: 1,
+        }
+    }
+}
+
+impl ArmParams {
+    fn check(&self) -> Result<(), SimError> {
+        positive("the ball's radius", self.radius, "m")?;
+        up_to("the offset of the ball", self.ball_offset.norm(), "m", 0.1, "from zero to 0.1 m")?;
+        positive("the stiffness of the arm", self.stiffness, "N/m")?;
+        up_to("the friction", self.friction, "", 10.0, "from zero to ten")?;
+        up_to("the pose noise", self.pose_noise, "m", 1.0, "from zero to 1 m")?;
+        up_to("the force noise", self.force_noise, "N", 1e3, "from zero to 1 kN")?;
+        up_to("the torque noise", self.torque_noise, "N·m", 100.0, "from zero to 100 N·m")?;
+        not_negative("the bias of the force", self.force_bias.norm(), "N")?;
+        not_negative("the bias of the torque", self.torque_bias.norm(), "N·m")?;
+        for payload in [&self.payload, &self.told_payload] {
+            up_to("the payload", payload.mass, "kg", 100.0, "from zero to 100 kg")?;
+            not_negative("the distance of the payload's centre", payload.p_sc.norm(), "m")?;
+            not_negative("gravity", payload.gravity_o.norm(), "m/s²")?;
+        }
+        up_to("the latency of commands", self.command_latency, "s", 1.0, "from zero to 1 s")?;
+        up_to("the latency of the force", self.force_latency, "s", 1.0, "from zero to 1 s")?;
+        positive("the largest speed", self.top_speed, "m/s")?;
+        positive("the largest acceleration", self.top_acceleration, "m/s²")?;
+        positive("the largest speed of a turn", self.top_turn_speed, "rad/s")?;
+        positive("the largest speed of a joint", self.top_joint_speed, "rad/s")?;
+        positive("the safety force", self.safety_force, "N")
+    }
+}
+
+/// What goes wrong, when it is asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ArmFault {
+    /// No state comes any more; the arm stops when nobody tells it anything.
+    LinkLost,
+    /// States come, and their stamps stand still; the arm stands.
+    ControllerKilled,
+    /// Somebody presses the button.
+    OperatorStop,
+    /// A safety plane, or too much force.
+    ProtectiveStop,
+    /// Something hits the probe for three states, N against the shaft.
+    ForceSpike(f64),
+}
+
+/// Time between two states, s.
+const PERIOD: f64 = 2e-3;
+/// Steps of the motion in it.
+const STEPS: usize = 4;
+const STEP: f64 = PERIOD / STEPS as f64;
+/// An arm that nobody tells anything stops after this time, s: the watchdog that is set in a UR.
+const WATCHDOG: f64 = 0.1;
+/// With which it stops when it has to, m/s².
+const HARD_STOP: f64 = 8.0;
+/// States that a spike lasts.
+const SPIKE: u32 = 3;
+/// The time that a force needs to settle is this many times its latencies.
+const CALM: f64 = 4.0;
+/// A line has ended when what is left is less than this, m.
+const ARRIVED: f64 = 1e-9;
+
+/// A simulated arm. Its base is B, the surface is in O.
+pub struct SimArm<'a> {
+    surface: &'a dyn Surface,
+    params: ArmParams,
+    rng: Pcg64,
+    torque_rng: Pcg64,
+    time: f64,
+    /// of the tip if nothing bent, in B
+    nominal: Isometry3<f64>,
+    velocity: Vector3<f64>,
+    joints: Joints,
+    /// where the ball is, in O
+    ball: Point3<f64>,
+    /// of the part on the tip, N in B; newest last
+    forces: VecDeque<Vector3<f64>>,
+    /// N in the flange
+    tare: Vector3<f64>,
+    safety: Safety,
+    waiting: VecDeque<(f64, Command)>,
+    doing: Command,
+    heard_at: f64,
+    faults: Vec<(f64, ArmFault)>,
+    spike: u32,
+    spike_force: f64,
+    is_lost: bool,
+    is_killed: bool,
+    last_stamp_ns: i64,
+    /// when it last moved, s
+    moved_at: f64,
+    /// largest force ever, N
+    peak_force: f64,
+}
+
+impl<'a> SimArm<'a> {
+    /// An arm at rest with its tip at a pose in B.
+    ///
+    /// # Errors
+    /// [`SimError::BadParameter`]; [`SimError::OutOfReach`]; [`SimError::StartsInside`] when the ball would be in the part.
+    pub fn new(surface: &'a dyn Surface, params: ArmParams, start_bt: &Isometry3<f64>) -> Result<Self, SimError> {
+        params.check()?;
+        let flange = start_bt * params.pose_ft.inverse();
+        let folded = [0.0, -1.6, 1.6, -1.6, -1.6, 0.0];
+        let solutions = params.geometry.inverse(&flange, &folded);
+        // the one with most room to move
+        let joints = solutions
+            .into_iter()
+            .max_by(|a, b| params.geometry.dexterity(a).total_cmp(&params.geometry.dexterity(b)))
+            .ok_or(SimError::OutOfReach)?;
+        let ball = params.pose_bo.inverse_transform_point(&(start_bt * Point3::from(params.ball_offset)));
+        let clearance_m = surface.signed_distance(&ball);
+        if clearance_m < params.radius {
+            return Err(SimError::StartsInside { clearance_m, radius_m: params.radius });
+        }
+        let late = (params.force_latency / STEP).round() as usize;
+        Ok(Self {
+            surface,
+            rng: Pcg64::seed_from_u64(params.seed ^ 0x0a5f_3d21_77c8_9be4),
+            torque_rng: Pcg64::seed_from_u64(params.seed ^ 0x51d3_90b7_2e64_fa08),
+            params,
+            time: 0.0,
+            nominal: *start_bt,
+            velocity: Vector3::zeros(),
+            joints,
+            ball,
+            forces: VecDeque::from(vec![Vector3::zeros(); late + 1]),
+            tare: Vector3::zeros(),
+            safety: Safety::Normal,
+            waiting: VecDeque::new(),
+            doing: Command::Stop { deceleration: HARD_STOP },
+            heard_at: 0.0,
+            faults: Vec::new(),
+            spike: 0,
+            spike_force: 0.0,
+            is_lost: false,
+            is_killed: false,
+            last_stamp_ns: 0,
+            moved_at: 0.0,
+            peak_force: 0.0,
+        })
+    }
+
+    /// Has something go wrong at a time of the arm, s.
+    pub fn fail_at(&mut self, time: f64, fault: ArmFault) {
+        self.faults.push((time, fault));
+    }
+
+    /// Its own time, s.
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// Since when it stands, s.
+    pub fn stands_since(&self) -> f64 {
+        self.moved_at
+    }
+
+    /// The largest force that the part has ever done to it, N.
+    pub fn peak_force(&self) -> f64 {
+        self.peak_force
+    }
+
+    /// Where the ball really is, m in O.
+    pub fn ball(&self) -> Point3<f64> {
+        self.ball
+    }
+
+    /// Lets time go by without anybody asking.
+    pub fn advance(&mut self, seconds: f64) {
+        (0..(seconds / PERIOD).round() as usize).for_each(|_| self.tick());
+    }
+
+    fn tick(&mut self) {
+        self.begin_faults();
+        (0..STEPS).for_each(|_| self.step());
+        self.spike = self.spike.saturating_sub(1);
+    }
+
+    fn begin_faults(&mut self) {
+        let now = self.time;
+        let due: Vec<_> = self.faults.extract_if(.., |(at, _)| *at <= now).map(|(_, fault)| fault).collect();
+        for fault in due {
+            match fault {
+                ArmFault::LinkLost => self.is_lost = true,
+                ArmFault::ControllerKilled => (self.is_killed, self.safety) = (true, Safety::Fault),
+                ArmFault::OperatorStop => self.safety = Safety::OperatorStop,
+                ArmFault::ProtectiveStop => self.safety = Safety::ProtectiveStop,
+                ArmFault::ForceSpike(force) => (self.spike, self.spike_force) = (SPIKE, force),
+            }
+        }
+    }
+
+    fn step(&mut self) {
+        self.time += STEP;
+        while let Some(&(at, command)) = self.waiting.front()
+            && at <= self.time
+        {
+            self.waiting.pop_front();
+            self.doing = command;
+        }
+        if self.time - self.heard_at > WATCHDOG || self.safety != Safety::Normal {
+            self.doing = Command::Stop { deceleration: HARD_STOP };
+            self.waiting.clear();
+        }
+        let (wanted, acceleration) = self.wanted();
+        let most =
+            acceleration.min(if self.safety == Safety::Normal { self.params.top_acceleration } else { HARD_STOP });
+        self.velocity += (wanted.cap_magnitude(self.params.top_speed) - self.velocity).cap_magnitude(most * STEP);
+        if self.velocity.norm() > 0.0 {
+            self.moved_at = self.time;
+        }
+        self.nominal.translation.vector += self.velocity * STEP;
+        self.bend();
+    }
+
+    /// Velocity that the command asks for now, and its acceleration.
+    fn wanted(&mut self) -> (Vector3<f64>, f64) {
+        match self.doing {
+            Command::Stop { deceleration } => (Vector3::zeros(), deceleration),
+            Command::Velocity { linear, acceleration } => (linear, acceleration),
+            Command::Line { to, speed, acceleration } => {
+                let left = to.translation.vector - self.nominal.translation.vector;
+                let distance = left.norm();
+                if distance < ARRIVED {
+                    self.turn(&to.rotation, 1.0);
+                    return (Vector3::zeros(), acceleration);
+                }
+                // as fast as it may, and so that it still comes to rest there, in whole steps
+                let brake = acceleration.min(self.params.top_acceleration);
+                let fast = (2.0 * brake * distance).sqrt() - brake * STEP;
+                let least = (distance / (2.0 * STEP)).min(brake * STEP);
+                let next = speed.min(fast.max(least)).min(distance / STEP);
+                let share = (self.velocity.norm() * STEP / distance).min(1.0);
+                self.turn(&to.rotation, share);
+                (left * (next / distance), acceleration)
+            }
+            Command::Press { axis, force, feed, speed } => {
+                let felt = -self.felt().dot(&axis);
+                let late = self.params.command_latency + self.params.force_latency + PERIOD;
+                let gain = 1.0 / (CALM * self.params.stiffness * late);
+                (axis * ((force - felt) * gain).clamp(-speed, speed) + feed, self.params.top_acceleration)
+            }
+        }
+    }
+
+    /// Turns by a share of what is left, no faster than it can.
+    fn turn(&mut self, to: &UnitQuaternion<f64>, share: f64) {
+        let left = self.nominal.rotation.rotation_to(to);
+        let most = self.params.top_turn_speed * STEP;
+        let by = (share * left.angle()).min(most);
+        if let Some(axis) = left.axis().filter(|_| by > 0.0) {
+            self.nominal.rotation = UnitQuaternion::from_axis_angle(&axis, by) * self.nominal.rotation;
+            self.moved_at = self.time;
+        }
+    }
+
+    /// The ball goes where the part lets it, and pulls.
+    fn bend(&mut self) {
+        let pose_bo = self.params.pose_bo;
+        let nominal = pose_bo.inverse_transform_point(&(self.nominal * Point3::from(self.params.ball_offset)));
+        let (rest, contacts) = push_ball(self.surface, &self.ball, &nominal, self.params.radius);
+        let normal = contacts.iter().map(|c| c.normal * c.held_back).sum::<Vector3<f64>>();
+        let mut next = rest;
+        if let Some(out) = normal.try_normalize(0.0) {
+            // friction keeps it where it was, as far as it can
+            let behind = self.ball - rest;
+            let across = behind - out * behind.dot(&out);
+            let most = self.params.friction * normal.norm();
+            let kept = across.cap_magnitude(most);
+            next = push_ball(self.surface, &rest, &(rest + kept), self.params.radius).0;
+        }
+        self.ball = next;
+        let force = if contacts.is_empty() { Vector3::zeros() } else { (next - nominal) * self.params.stiffness };
+        self.peak_force = self.peak_force.max(force.norm());
+        if force.norm() > self.params.safety_force && self.safety == Safety::Normal {
+            self.safety = Safety::ProtectiveStop;
+        }
+        self.forces.push_back(pose_bo.rotation * force);
+        self.forces.pop_front();
+    }
+
+    /// Force of the part as the sensor has it now, N in B.
+    fn felt(&self) -> Vector3<f64> {
+        self.forces.front().copied().unwrap_or_default()
+    }
+
+    /// Orientation of the flange in B.
+    fn flange(&self) -> UnitQuaternion<f64> {
+        self.nominal.rotation * self.params.pose_ft.rotation.inverse()
+    }
+
+    /// What the sensor has: contact, weight, bias and noise, in the axes of the flange about its origin.
+    fn read(&mut self) -> Wrench {
+        let noise = Vector3::from_fn(|_, _| gauss(&mut self.rng)) * self.params.force_noise;
+        let shaft = self.nominal.rotation * Vector3::z();
+        let spike = if self.spike > 0 { shaft * self.spike_force } else { Vector3::zeros() };
+        let torque_noise = Vector3::from_fn(|_, _| gauss(&mut self.torque_rng)) * self.params.torque_noise;
+        let ArmParams { payload, pose_ft, ball_offset, force_bias, torque_bias, .. } = &self.params;
+        let r_bf = self.flange();
+        let (weight, contact) = (payload.weight_o(&r_bf), r_bf.inverse() * (self.felt() + spike));
+        let ball = pose_ft * Point3::from(*ball_offset);
+        Wrench {
+            force: contact + r_bf.inverse() * (weight.force + noise) + force_bias,
+            torque: ball.coords.cross(&contact) + r_bf.inverse() * weight.torque + torque_bias + torque_noise,
+        }
+    }
+
+    /// What of a force the controller does not take for weight, N in the flange.
+    fn unweighed(&self, raw: &Wrench) -> Vector3<f64> {
+        let r_bf = self.flange();
+        raw.force - r_bf.inverse() * self.params.told_payload.weight_o(&r_bf).force
+    }
+
+    /// The joints that belong to the pose; the arm stops where there are none, or where they would have to jump.
+    fn follow_joints(&mut self) {
+        let flange = self.nominal * self.params.pose_ft.inverse();
+        let far = |a: &Joints, b: &Joints| {
+            let turn = |x: f64| (x + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI;
+            a.iter().zip(b).map(|(a, b)| turn(a - b).abs()).fold(0.0, f64::max)
+        };
+        let solutions = self.params.geometry.inverse(&flange, &self.joints);
+        let next = solutions.into_iter().min_by(|a, b| far(a, &self.joints).total_cmp(&far(b, &self.joints)));
+        match next {
+            Some(next) if far(&next, &self.joints) <= self.params.top_joint_speed * PERIOD => self.joints = next,
+            _ if self.safety == Safety::Normal => self.safety = Safety::ProtectiveStop,
+            _ => {}
+        }
+    }
+}
+
+impl Arm for SimArm<'_> {
+    fn next_state(&mut self) -> Result<ArmState, ArmError> {
+        self.tick();
+        if self.is_lost {
+            return Err(ArmError::Lost { silent_ms: (PERIOD * 1e3) as u64 });
+        }
+        self.follow_joints();
+        let raw_wrench_f = self.read();
+        let force = self.flange() * (self.unweighed(&raw_wrench_f) - self.tare);
+        let noise = Vector3::from_fn(|_, _| gauss(&mut self.rng)) * self.params.pose_noise;
+        let mut pose_bt = self.nominal;
+        pose_bt.translation.vector += noise;
+        let stamp_ns = if self.is_killed { self.last_stamp_ns } else { (self.time * 1e9).round() as i64 };
+        self.last_stamp_ns = stamp_ns;
+        let wrench_b = Wrench { force, torque: Vector3::zeros() };
+        Ok(ArmState { stamp_ns, pose_bt, wrench_b, raw_wrench_f, joints: self.joints, safety: self.safety })
+    }
+
+    fn command(&mut self, command: &Command) -> Result<(), ArmError> {
+        if self.is_lost {
+            return Err(ArmError::Lost { silent_ms: 0 });
+        }
+        self.heard_at = self.time;
+        if self.safety != Safety::Normal && !matches!(command, Command::Stop { .. }) {
+            return Err(ArmError::Stopped { safety: self.safety });
+        }
+        self.waiting.push_back((self.time + self.params.command_latency, *command));
+        Ok(())
+    }
+
+    fn zero_sensor(&mut self) -> Result<(), ArmError> {
+        if self.is_lost {
+            return Err(ArmError::Lost { silent_ms: 0 });
+        }
+        self.heard_at = self.time;
+        // a controller takes the mean of what it reads for a while
+        let readings = 64;
+        let mut sum = Vector3::zeros();
+        for _ in 0..readings {
+            self.heard_at = self.time;
+            self.tick();
+            let raw = self.read();
+            sum += self.unweighed(&raw);
+        }
+        self.tare = sum / f64::from(readings);
+        Ok(())
+    }
+
+    fn recover(&mut self) -> Result<(), ArmError> {
+        if self.is_killed {
+            return Err(ArmError::Stopped { safety: self.safety });
+        }
+        self.safety = Safety::Normal;
+        self.is_lost = false;
+        self.heard_at = self.time;
+        Ok(())
+    }
+
+    fn period(&self) -> f64 {
+        PERIOD
+    }
+}

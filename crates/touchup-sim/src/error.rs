@@ -1,0 +1,95 @@
+/// Why a simulation cannot be run as asked.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SimError {
+    /// A parameter outside its range.
+    #[error("{name} is {value:?} {unit}, but must be {allowed}")]
+    BadParameter {
+        /// which one
+        name: &'static str,
+        /// what was given
+        value: f64,
+        /// its unit
+        unit: &'static str,
+        /// the range
+        allowed: &'static str,
+    },
+    /// The path does not start in the open.
+    #[error(
+        "the path starts {clearance_m} m from the part, less than the {radius_m} m of the tip around it: start higher"
+    )]
+    StartsInside {
+        /// m, from the surface to the start
+        clearance_m: f64,
+        /// m
+        radius_m: f64,
+    },
+    /// The arm cannot be there.
+    #[error("the arm does not reach its start: bring the part nearer, or take a longer arm")]
+    OutOfReach,
+    /// A tip that cannot be.
+    #[error(transparent)]
+    Tip(#[from] touchup_core::touch::SettingError),
+    /// Nothing to follow.
+    #[error("the path has no point: give at least one stroke with two points")]
+    EmptyPath,
+    /// The scan would be larger than is sensible.
+    #[error(
+        "the part is {size_m:.3e} m long, with {margin_m:.3e} m around it for noise, bias and rounding: at edges of \
+         {edge_m:.3e} m that is more than {limit} cells; use {}",
+        if margin_m > size_m { "less of these three" } else { "longer edges" }
+    )]
+    TooFine {
+        /// longest side of the part, m
+        size_m: f64,
+        /// added on every side, m
+        margin_m: f64,
+        /// m
+        edge_m: f64,
+        /// cells at most
+        limit: usize,
+    },
+    /// The scan's triangles are so large that none is left.
+    #[error("edges of {edge_m:?} m leave nothing of a part that is {size_m:.3e} m long: use shorter ones")]
+    TooCoarse {
+        /// longest side of the part, m
+        size_m: f64,
+        /// m
+        edge_m: f64,
+    },
+    /// No surface was found in the part's bounds, or none that can be seen.
+    #[error("the scanner sees nothing of the part: check the view direction and the size of the holes it closes")]
+    NothingSeen,
+    /// The simulated scan is not a mesh.
+    #[error(transparent)]
+    Mesh(#[from] touchup_core::mesh::MeshError),
+}
+
+/// Refuses values that are not finite or not above zero.
+pub(super) fn positive(name: &'static str, value: f64, unit: &'static str) -> Result<(), SimError> {
+    if value.is_finite() && value > 0.0 {
+        return Ok(());
+    }
+    Err(SimError::BadParameter { name, value, unit, allowed: "greater than zero" })
+}
+
+/// Refuses values that are not finite or below zero.
+pub(super) fn not_negative(name: &'static str, value: f64, unit: &'static str) -> Result<(), SimError> {
+    if value.is_finite() && value >= 0.0 {
+        return Ok(());
+    }
+    Err(SimError::BadParameter { name, value, unit, allowed: "zero or more" })
+}
+
+/// Refuses values that are not finite, below zero or beyond `largest`, which `allowed` names.
+pub(super) fn up_to(
+    name: &'static str,
+    value: f64,
+    unit: &'static str,
+    largest: f64,
+    allowed: &'static str,
+) -> Result<(), SimError> {
+    if (0.0..=largest).contains(&value) {
+        return Ok(());
+    }
+    Err(SimError::BadParameter { name, value, unit, allowed })
+}

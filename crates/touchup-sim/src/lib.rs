@@ -1,0 +1,39 @@
+//! Known surfaces, a scanner and a stylus to test against.
+//!
+//! A [`Surface`] knows how far every point is from it. The scanner makes a bad mesh of one, the stylus slides a ball
+//! over it and says what it felt ([`touch`]). All randomness comes from a seed.
+#![cfg_attr(not(test), warn(clippy::unwrap_used))]
+
+mod arm;
+mod ball;
+mod contour;
+pub mod coupled;
+mod error;
+mod field;
+mod markers;
+mod mesh_surface;
+mod path;
+mod peaks;
+mod plate;
+mod plate_mesh;
+mod scanner;
+mod sensor;
+mod stylus;
+mod surface;
+mod tip;
+mod triangulate;
+mod wander;
+pub mod wavy;
+
+pub use arm::{ArmFault, ArmParams, SimArm, WEIGHTLESS};
+pub use ball::{BallContact, push_ball};
+pub use error::SimError;
+pub use markers::{CameraParams, see_markers};
+pub use mesh_surface::MeshSurface;
+pub use path::{Lines, PathParams, RasterRegion, Stroke, around_wall, plan_demo, plan_mesh, raster};
+pub use peaks::{Peaks, add_vertex_noise};
+pub use plate::{Plate, PlateStadium, TruthFeature, TruthShape};
+pub use scanner::{ScanQuality, ScannerParams, measure_badness, scan};
+pub use sensor::SensorParams;
+pub use stylus::{Moment, StylusParams, Touch, touch};
+pub use surface::{Bounds, Surface, SurfacePoint};

@@ -1,0 +1,337 @@
+//! A scanner that makes a bad mesh of a good surface.
+//!
+//! What it loses is lost on the signed distance, on a grid: a flat closing across the view fills holes that are too
+//! narrow, a blur rounds the edges, an offset makes the part too fat, a smooth random field makes it wavy. The level of
+//! such a field cannot cross itself, and its triangles keep to that. Then what cannot be seen goes, and the rest is
+//! misplaced.
+
+use nalgebra::{Isometry3, Point3, Rotation3, Translation3, Unit, Vector3};
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardUniform};
+use rand_pcg::Pcg64;
+
+use super::contour::{MeshDraft, contour};
+use super::error::{SimError, not_negative, positive};
+use super::field::Field;
+use super::path::looking_along;
+use super::surface::Surface;
+use super::wander::gauss;
+use touchup_core::mesh::TriMesh;
+
+/// How bad the scanner is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScannerParams {
+    /// Median length of the triangles' edges, m.
+    pub edge: f64,
+    /// Noise along the normals, root mean square, m.
+    pub noise: f64,
+    /// Distance over which the noise stays alike, m.
+    pub noise_correlation: f64,
+    /// Share of the noise's power that is independent from vertex to vertex.
+    pub white_share: f64,
+    /// How much too fat the part looks, m.
+    pub bias: f64,
+    /// Standard deviation of the blur that rounds the edges, m.
+    pub rounding: f64,
+    /// Holes and slots narrower than this are closed over, m; where only a little narrower the noise may open them.
+    pub closes_holes_below: f64,
+    /// How far the scan is misplaced, m.
+    pub misplaced: f64,
+    /// And by which angle, rad.
+    pub misplaced_angle: f64,
+    /// Direction in which the scanner looks, in O.
+    pub view: Unit<Vector3<f64>>,
+    /// Whether what cannot be seen from the view direction is missing; otherwise the scan is closed.
+    pub open_back: bool,
+    /// Of all randomness.
+    pub seed: u64,
+}
+
+impl Default for ScannerParams {
+    /// A hand-held structured-light scanner of the cheaper kind, looking down.
+    fn default() -> Self {
+        Self {
+            edge: 2.4e-3,
+            noise: 0.6e-3,
+            noise_correlation: 3.5e-3,
+            white_share: 0.02,
+            bias: 0.3e-3,
+            rounding: 0.8e-3,
+            closes_holes_below: 11e-3,
+            misplaced: 0.2e-3,
+            misplaced_angle: 0.15f64.to_radians(),
+            view: -Vector3::z_axis(),
+            open_back: true,
+            seed: 1,
+        }
+    }
+}
+
+/// Nodes of the grid to a wanted edge.
+const NODES_PER_EDGE: f64 = 3.0;
+/// Most nodes of the grid: 300 × 300 × 250 mm at 0.8 mm; 0.3 GB.
+const MAX_NODES: usize = 36_000_000;
+/// Side of the contour's cells over the median edge of the evened triangles, measured.
+const CELL_PER_EDGE: f64 = 1.065;
+/// Waves that make up the noise: with a hundred its distribution is Gaussian to the eye.
+const WAVES: usize = 96;
+/// Nodes along x for which the waves are summed at once.
+const RUN: usize = 64;
+/// Where the edges are longer than this share of the part, a scan without a face comes of them.
+const COARSE: f64 = 0.1;
+/// Faces that look away from the scanner by more than this (cosine of the angle to the view) are not seen. Walls that
+/// stand along the view are: the scanner is moved about.
+const SEEN: f64 = -0.35;
+/// Patches of fewer faces do not stand alone: seen ones are dirt, unseen ones in between are filled in.
+const FEWEST_FACES: usize = 30;
+
+/// Rounds of repair and evening out; the second finds little, the third next to nothing.
+const REPAIRS: usize = 2;
+/// Rims of so many edges at most are defects of the contour and filled.
+const LONGEST_FILLED: usize = 20;
+
+impl ScannerParams {
+    fn check(&self) -> Result<(), SimError> {
+        positive("the scan's edge length", self.edge, "m")?;
+        not_negative("the scan's noise", self.noise, "m")?;
+        positive("the correlation length of the noise", self.noise_correlation, "m")?;
+        not_negative("the white share of the noise", self.white_share, "")?;
+        not_negative("the coloured share of the noise", 1.0 - self.white_share, "")?;
+        not_negative("the rounding", self.rounding, "m")?;
+        not_negative("the width of closed holes", self.closes_holes_below, "m")?;
+        not_negative("the misplacement", self.misplaced, "m")?;
+        not_negative("the misplacement's angle", self.misplaced_angle, "rad")?;
+        not_negative("the size of the bias", self.bias.abs(), "m")
+    }
+
+    /// Distance (m) from the surface beyond which the field need not be known: blur, bias, noise and the gradient stay within.
+    fn band(&self) -> f64 {
+        3.0 * self.rounding + self.bias.abs() + 4.0 * self.noise + self.edge
+    }
+}
+
+/// Scans a surface as badly as asked; same parameters, same mesh.
+///
+/// # Errors
+/// [`SimError::BadParameter`]; [`SimError::TooFine`] when the grid would not fit; [`SimError::TooCoarse`] and
+/// [`SimError::NothingSeen`] when no face is left.
+pub fn scan(surface: &dyn Surface, params: &ScannerParams) -> Result<TriMesh, SimError> {
+    params.check()?;
+    let mut rng = Pcg64::seed_from_u64(params.seed);
+    let frame_ov = looking_along(&params.view, &surface.bounds());
+    let field = scanned_field(surface, params, &frame_ov, &mut rng)?;
+    let side = params.edge * CELL_PER_EDGE;
+    let mut soup = contour(&field, side);
+    // the lattice's own defects are filled first, then the folds that evening out leaves
+    for _ in 0..REPAIRS {
+        repair_mut(&mut soup, &field);
+        soup.even_out_mut(&field, side);
+    }
+    repair_mut(&mut soup, &field);
+    for p in &mut soup.positions {
+        let normal = field.gradient(p).try_normalize(0.0).unwrap_or_else(Vector3::z);
+        *p += normal * (gauss(&mut rng) * params.noise * params.white_share.sqrt());
+    }
+    soup.retain_mut(FEWEST_FACES, |corners| !params.open_back || is_seen(&field, corners));
+    soup.drop_crossings_mut()?;
+    soup.tidy_mut();
+    soup.drop_unused_mut();
+    if soup.faces.is_empty() {
+        return Err(why_empty(surface, params.edge));
+    }
+    let slip_v = slip(params, &mut rng);
+    soup.positions.iter_mut().for_each(|p| *p = frame_ov * (slip_v * *p));
+    Ok(TriMesh::new(soup.positions, soup.faces)?)
+}
+
+/// What to change where a scan has no face.
+fn why_empty(surface: &dyn Surface, edge_m: f64) -> SimError {
+    let size_m = surface.bounds().size().max();
+    if edge_m > COARSE * size_m { SimError::TooCoarse { size_m, edge_m } } else { SimError::NothingSeen }
+}
+
+/// Fills in for what is not a clean surface.
+fn repair_mut(soup: &mut MeshDraft, field: &Field) {
+    soup.drop_folds_mut(field);
+    soup.tidy_mut();
+    soup.fill_mut(LONGEST_FILLED);
+}
+
+/// The signed distance as the scanner's filters leave it, in V; zero where the scan will be.
+fn scanned_field(
+    surface: &dyn Surface,
+    params: &ScannerParams,
+    frame_ov: &Isometry3<f64>,
+    rng: &mut Pcg64,
+) -> Result<Field, SimError> {
+    let pitch = params.edge / NODES_PER_EDGE;
+    let band = params.band();
+    let bounds = surface.bounds().seen_from(frame_ov).grown(band);
+    let nodes: f64 = bounds.size().iter().map(|side| side / pitch + 2.0).product();
+    if !nodes.is_finite() || nodes > MAX_NODES as f64 {
+        let size_m = surface.bounds().size().max();
+        return Err(SimError::TooFine { size_m, margin_m: band, edge_m: params.edge, limit: MAX_NODES });
+    }
+    let mut field = Field::of_surface(surface, frame_ov, [bounds.min, bounds.max], pitch, band);
+    field.close_mut(params.closes_holes_below / 2.0);
+    field.blur_mut(params.rounding);
+    let waves = Waves::new(params, pitch, rng);
+    let (mean, deviation) = waves.spread(&mut field);
+    let amplitude = params.noise * (1.0 - params.white_share).sqrt() / deviation;
+    // far from the level the noise decides nothing
+    waves.visit(&mut field, band, |d, wave| *d -= params.bias + (wave - mean) * amplitude);
+    Ok(field)
+}
+
+/// A smooth random field: waves with random directions, so that values correlate as exp(−r²/2ℓ²).
+///
+/// Along x of the grid a wave turns by the same steps in every run of nodes: cos(α + β) = cos α cos β − sin α sin β,
+/// with α for the step, known beforehand, and β for the run's first node.
+struct Waves {
+    /// vector (1/m, in V) and phase
+    waves: Vec<(Vector3<f64>, f64)>,
+    /// cos α and sin α of each wave at the nodes of a run
+    turns: Vec<[[f64; RUN]; 2]>,
+}
+
+impl Waves {
+    fn new(params: &ScannerParams, pitch: f64, rng: &mut Pcg64) -> Self {
+        let mut wave = || {
+            let vector = Vector3::from_fn(|_, _| gauss(rng) / params.noise_correlation);
+            let phase: f64 = StandardUniform.sample(rng);
+            (vector, std::f64::consts::TAU * phase)
+        };
+        let waves: Vec<(Vector3<f64>, f64)> = (0..WAVES).map(|_| wave()).collect();
+        let alphas = |k: &Vector3<f64>| std::array::from_fn::<_, RUN, _>(|i| k.x * pitch * i as f64);
+        let turns = waves.iter().map(|(k, _)| [alphas(k).map(f64::cos), alphas(k).map(f64::sin)]).collect();
+        Self { waves, turns }
+    }
+
+    /// The sum of the waves at the nodes of a run that begins at `first` (m, in V).
+    fn along(&self, first: &Point3<f64>) -> [f64; RUN] {
+        let mut sums = [0.0; RUN];
+        for ((k, phase), [cos, sin]) in self.waves.iter().zip(&self.turns) {
+            let (sin_first, cos_first) = (k.dot(&first.coords) + phase).sin_cos();
+            for i in 0..RUN {
+                sums[i] += cos[i] * cos_first - sin[i] * sin_first;
+            }
+        }
+        sums
+    }
+
+    /// Mean and standard deviation over the nodes at the field's zero level: with them the noise of every seed is as
+    /// strong as asked, and the bias is the bias.
+    fn spread(&self, field: &mut Field) -> (f64, f64) {
+        let mut found = Vec::new();
+        let pitch = field.pitch;
+        self.visit(field, pitch, |_, wave| found.push(wave));
+        let count = found.len().max(1) as f64;
+        let mean = found.iter().sum::<f64>() / count;
+        let variance = found.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / count;
+        (mean, variance.sqrt().max(f64::MIN_POSITIVE))
+    }
+
+    /// Calls `f(value of the field, sum of the waves)` for every node whose value is less than `level` from zero.
+    fn visit(&self, field: &mut Field, level: f64, mut f: impl FnMut(&mut f64, f64)) {
+        for (first, values) in field.runs_mut(RUN) {
+            if values.iter().any(|value| value.abs() < level) {
+                let sums = self.along(&first);
+                values
+                    .iter_mut()
+                    .zip(sums)
+                    .filter(|(value, _)| value.abs() < level)
+                    .for_each(|(value, sum)| f(value, sum));
+            }
+        }
+    }
+}
+
+/// Whether a face looks towards the scanner and nothing stands in between.
+fn is_seen(field: &Field, [a, b, c]: &[Point3<f64>; 3]) -> bool {
+    let middle = Point3::from((a.coords + b.coords + c.coords) / 3.0);
+    let Some(normal) = field.gradient(&middle).try_normalize(0.0) else { return false };
+    // from a little off the face, so that it does not hide itself
+    let start = middle + normal * (2.0 * field.pitch);
+    let top = field.node(field.nodes.map(|n| n - 1)).z;
+    let steps = ((top - start.z) / field.pitch).max(0.0) as usize;
+    normal.z > SEEN && (0..steps).all(|i| field.at(&(start + Vector3::z() * (i as f64 * field.pitch))) > -field.pitch)
+}
+
+/// The motion by which the scan is misplaced, about the middle of the part.
+fn slip(params: &ScannerParams, rng: &mut Pcg64) -> Isometry3<f64> {
+    let mut direction = || Unit::new_normalize(Vector3::from_fn(|_, _| gauss(rng)));
+    let shift = Translation3::from(direction().into_inner() * params.misplaced);
+    let turn = Rotation3::from_axis_angle(&direction(), params.misplaced_angle);
+    Isometry3::from_parts(shift, turn.into())
+}
+
+/// How far a scan is from the surface it shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScanQuality {
+    /// how many triangles
+    pub faces: usize,
+    /// median length of the edges, m
+    pub edge_median: f64,
+    /// mean distance of the mesh's points from the surface, m
+    pub mean: f64,
+    /// root mean square of it, m
+    pub rms: f64,
+    /// exceeded by one in twenty points, m
+    pub p95: f64,
+    /// median signed distance, m; positive where the scan lies outside the part
+    pub bias: f64,
+}
+
+/// Points measured on each face: its middle and three points around it, each standing for a quarter of its area.
+const SAMPLES: [[f64; 3]; 4] = [
+    [1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0],
+    [2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0],
+    [1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0],
+    [1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0],
+];
+
+/// Measures a mesh against the surface it should show; every point counts by the area it stands for.
+///
+/// - `within`: which points count, e.g. those of a touched region; the edges are those of all faces.
+/// - returns `None` when no point counts.
+pub fn measure_badness(
+    mesh: &TriMesh,
+    surface: &dyn Surface,
+    within: impl Fn(&Point3<f64>) -> bool,
+) -> Option<ScanQuality> {
+    let mut edges = Vec::new();
+    let mut points: Vec<(f64, f64)> = Vec::new();
+    for (face, _) in mesh.faces() {
+        let corners @ [a, b, c] = mesh.triangle(face);
+        edges.extend([(b - a).norm(), (c - b).norm(), (a - c).norm()].map(|length| (length, 1.0)));
+        let area = mesh.double_area_normal(face).norm() / 8.0;
+        let at = |w: [f64; 3]| Point3::from((0..3).map(|i| corners[i].coords * w[i]).sum::<Vector3<f64>>());
+        points.extend(SAMPLES.map(at).iter().filter(|p| within(p)).map(|p| (surface.signed_distance(p), area)));
+    }
+    let area: f64 = points.iter().map(|p| p.1).sum();
+    let mean_of = |f: &dyn Fn(f64) -> f64| points.iter().map(|(d, w)| f(*d) * w).sum::<f64>() / area;
+    let (mean, rms) = (mean_of(&f64::abs), mean_of(&|d| d * d).sqrt());
+    let mut sizes: Vec<_> = points.iter().map(|(d, w)| (d.abs(), *w)).collect();
+    Some(ScanQuality {
+        faces: mesh.face_count(),
+        edge_median: quantile(&mut edges, 0.5)?,
+        mean,
+        rms,
+        p95: quantile(&mut sizes, 0.95)?,
+        bias: quantile(&mut points, 0.5)?,
+    })
+}
+
+/// The value below which the given share of the weight lies.
+fn quantile(values: &mut [(f64, f64)], share: f64) -> Option<f64> {
+    values.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let total: f64 = values.iter().map(|v| v.1).sum();
+    let mut below = 0.0;
+    values
+        .iter()
+        .find(|v| {
+            below += v.1;
+            below >= share * total
+        })
+        .map(|v| v.0)
+}

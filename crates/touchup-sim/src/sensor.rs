@@ -1,0 +1,199 @@
+//! From what really was to messages: noise, bias, clocks, and what goes wrong on the wire.
+
+use std::f64::consts::PI;
+
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use rand::SeedableRng;
+use rand_distr::{Distribution, Exp1, StandardUniform};
+use rand_pcg::Pcg64;
+
+use super::error::{SimError, not_negative, up_to};
+use super::stylus::{Moment, TICK};
+use super::wander::{Wander, gauss};
+use touchup_core::touch::{Message, StampedPose, StampedWrench, Wrench};
+
+/// What the sensors and the wire add. All noise is root mean square.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SensorParams {
+    /// Per axis, m.
+    pub pose_noise: f64,
+    /// Per axis, rad.
+    pub orientation_noise: f64,
+    /// Per axis, N.
+    pub force_noise: f64,
+    /// Per axis, N·m.
+    pub torque_noise: f64,
+    /// Slowly drifting, per axis, N.
+    pub force_bias: f64,
+    /// How much later the wrench's clock reads than the pose's, s.
+    pub wrench_clock: f64,
+    /// Of the pose's stamps, s; those of the wrench have half of it.
+    pub jitter: f64,
+    /// Share of messages that never arrive.
+    pub lost: f64,
+    /// Share of messages that arrive 5 to 15 ms late, after later ones.
+    pub late: f64,
+    /// Times per second that a topic falls silent for 5 to 60 ms.
+    pub gap_rate: f64,
+    /// Stamp of the first moment on the pose's clock, ns.
+    pub start_ns: i64,
+}
+
+impl Default for SensorParams {
+    /// Optical tracking and a small six-axis cell on a busy network.
+    fn default() -> Self {
+        Self {
+            pose_noise: 0.05e-3,
+            orientation_noise: 0.1f64.to_radians(),
+            force_noise: 0.05,
+            torque_noise: 1e-3,
+            force_bias: 0.05,
+            wrench_clock: 1.8e-3,
+            jitter: 0.1e-3,
+            lost: 0.005,
+            late: 0.006,
+            gap_rate: 0.1,
+            start_ns: 1_700_000_000_000_000_000,
+        }
+    }
+}
+
+impl SensorParams {
+    /// No noise, no bias, no clock error, every message in order.
+    pub fn ideal() -> Self {
+        Self {
+            pose_noise: 0.0,
+            orientation_noise: 0.0,
+            force_noise: 0.0,
+            torque_noise: 0.0,
+            force_bias: 0.0,
+            wrench_clock: 0.0,
+            jitter: 0.0,
+            lost: 0.0,
+            late: 0.0,
+            gap_rate: 0.0,
+            ..Self::default()
+        }
+    }
+
+    pub(super) fn check(&self) -> Result<(), SimError> {
+        up_to("the pose noise", self.pose_noise, "m", 1.0, "from zero to 1 m")?;
+        up_to("the orientation noise", self.orientation_noise, "rad", PI, "from zero to half a turn")?;
+        up_to("the force noise", self.force_noise, "N", 1e3, "from zero to 1 kN")?;
+        up_to("the torque noise", self.torque_noise, "N m", 1e3, "from zero to 1 kN m")?;
+        up_to("the force bias", self.force_bias, "N", 1e3, "from zero to 1 kN")?;
+        not_negative("the jitter", self.jitter, "s")?;
+        up_to("the share of lost messages", self.lost, "", 1.0, "from zero to one")?;
+        up_to("the share of late messages", self.late, "", 1.0, "from zero to one")?;
+        not_negative("the rate of gaps", self.gap_rate, "1/s")?;
+        if self.wrench_clock.is_finite() && self.wrench_clock.abs() <= LARGEST_CLOCK {
+            return Ok(());
+        }
+        let allowed = "within one second";
+        Err(SimError::BadParameter { name: "the wrench clock's offset", value: self.wrench_clock, unit: "s", allowed })
+    }
+}
+
+/// Largest clock offset that makes sense, s.
+const LARGEST_CLOCK: f64 = 1.0;
+/// Ticks between two poses.
+const POSE_EVERY: usize = 2;
+/// Jitter is cut off at this share of the period, so that stamps keep their order.
+const JITTER_LIMIT: f64 = 0.45;
+/// Time on the wire: at least, and on average beyond that, s.
+const LATENCY: [f64; 2] = [0.3e-3, 0.4e-3];
+/// Extra time of late messages, s.
+const LATE: [f64; 2] = [5e-3, 15e-3];
+/// Length of gaps, s.
+const GAP: [f64; 2] = [5e-3, 60e-3];
+/// Period of the bias' drift, s.
+const DRIFT: f64 = 40.0;
+
+pub(super) struct Sensor<'a> {
+    params: &'a SensorParams,
+    stiffness: f64,
+    bias: [Wander; 3],
+    rng: Pcg64,
+}
+
+/// Which messages of one topic arrive, and when.
+struct Wire {
+    period: f64,
+    jitter: f64,
+    clock: f64,
+    silent_until: f64,
+}
+
+impl<'a> Sensor<'a> {
+    pub(super) fn new(params: &'a SensorParams, stiffness: f64, seed: u64) -> Self {
+        // a stream of its own, so that the hand moves the same whatever the sensors do
+        let mut rng = Pcg64::seed_from_u64(seed ^ 0x5e75_0412_93ab_77c1);
+        let bias = [(); 3].map(|()| Wander::new(DRIFT, &mut rng));
+        Self { params, stiffness, bias, rng }
+    }
+
+    /// All messages, in order of arrival.
+    pub(super) fn record(mut self, moments: &[Moment]) -> Vec<Message> {
+        let p = self.params;
+        let mut poses = Wire { period: TICK * POSE_EVERY as f64, jitter: p.jitter, clock: 0.0, silent_until: f64::MIN };
+        let mut wrenches = Wire { period: TICK, jitter: p.jitter / 2.0, clock: p.wrench_clock, silent_until: f64::MIN };
+        let mut arrivals: Vec<(f64, Message)> = Vec::with_capacity(moments.len() * 2);
+        for (tick, moment) in moments.iter().enumerate() {
+            if tick % POSE_EVERY == 0 {
+                let pose_ot = self.pose(moment);
+                let sent = self.send(&mut poses, moment.t);
+                arrivals.extend(sent.map(|(at, stamp_ns)| (at, Message::Pose(StampedPose { stamp_ns, pose_ot }))));
+            }
+            let wrench = self.wrench(moment);
+            let sent = self.send(&mut wrenches, moment.t);
+            arrivals.extend(sent.map(|(at, stamp_ns)| (at, Message::Wrench(StampedWrench { stamp_ns, wrench }))));
+        }
+        arrivals.sort_by(|a, b| a.0.total_cmp(&b.0));
+        arrivals.into_iter().map(|(_, message)| message).collect()
+    }
+
+    fn shake(&mut self, rms: f64) -> Vector3<f64> {
+        Vector3::from_fn(|_, _| gauss(&mut self.rng) * rms)
+    }
+
+    fn uniform(&mut self, [low, high]: [f64; 2]) -> f64 {
+        let share: f64 = StandardUniform.sample(&mut self.rng);
+        low + (high - low) * share
+    }
+
+    /// The pose as reported: of a stylus that does not bend.
+    fn pose(&mut self, moment: &Moment) -> Isometry3<f64> {
+        let bent = moment.pose_ot.translation.vector - moment.force_o / self.stiffness;
+        let turn = UnitQuaternion::from_scaled_axis(self.shake(self.params.orientation_noise));
+        let centre = bent + self.shake(self.params.pose_noise);
+        Isometry3::from_parts(centre.into(), moment.pose_ot.rotation * turn)
+    }
+
+    /// The wrench as reported: in T, about the ball's centre, through which every contact force goes.
+    fn wrench(&mut self, moment: &Moment) -> Wrench {
+        let bias = Vector3::from_fn(|i, _| self.bias[i].at(moment.t)) * self.params.force_bias;
+        let force = moment.pose_ot.rotation.inverse() * moment.force_o + bias + self.shake(self.params.force_noise);
+        Wrench { force, torque: self.shake(self.params.torque_noise) }
+    }
+
+    /// When a message arrives (s) and what its stamp says (ns); `None` when it is lost.
+    fn send(&mut self, wire: &mut Wire, t: f64) -> Option<(f64, i64)> {
+        let p = self.params;
+        let limit = JITTER_LIMIT * wire.period;
+        let jitter = (gauss(&mut self.rng) * wire.jitter).clamp(-limit, limit);
+        let wait: f64 = Exp1.sample(&mut self.rng);
+        let [lost, late, gap] = [(); 3].map(|()| self.uniform([0.0, 1.0]));
+        let (extra, silence) = (self.uniform(LATE), self.uniform(GAP));
+        if gap < p.gap_rate * wire.period {
+            wire.silent_until = t + silence;
+        }
+        if lost < p.lost || t < wire.silent_until {
+            return None;
+        }
+        // an ideal wire keeps the order
+        let ideal = p.late == 0.0;
+        let delay = LATENCY[0] + if ideal { 0.0 } else { LATENCY[1] * wait } + if late < p.late { extra } else { 0.0 };
+        let seconds = t + wire.clock + jitter;
+        Some((t + delay, p.start_ns + (seconds * 1e9).round() as i64))
+    }
+}

@@ -1,0 +1,262 @@
+//! A hand-held stylus: a tip led over a rigid surface, and what its sensors say.
+//!
+//! The hand pulls the tip, a ball unless said otherwise, along [`Stroke`]s, presses, slows where it is blocked and climbs
+//! out of what it fell into. The tip does not enter the part ([`super::push_ball`]); what holds it back gives the direction of the force, the hand gives
+//! its size, friction is added against the motion: F = N Σ w_i (n_i − μ t_i), Σ w_i = 1. The reported pose is that of a
+//! rigid stylus, so a tip of stiffness k makes it read centre − F/k.
+
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use rand::SeedableRng;
+use rand_pcg::Pcg64;
+
+use super::ball::BallContact;
+use super::error::{SimError, not_negative, positive, up_to};
+use super::path::Stroke;
+use super::sensor::{Sensor, SensorParams};
+use super::surface::Surface;
+use super::tip::SimTip;
+use super::wander::Wander;
+use touchup_core::touch::{Message, TipShape};
+
+/// The stylus and the hand that leads it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StylusParams {
+    /// Radius of the ball, of the flat end, or of the nose of the cone, m.
+    pub radius: f64,
+    /// Which tip it is; its z points along the shaft. A sharp edge or nose is rounded by 0.05 mm.
+    pub shape: TipShape,
+    /// Stiffness of the tip, N/m.
+    pub stiffness: f64,
+    /// Coefficient of friction.
+    pub friction: f64,
+    /// How hard the hand presses on average, N.
+    pub force: f64,
+    /// How much that varies, root mean square, N.
+    pub force_variation: f64,
+    /// The hand presses no less and no more than this, N.
+    pub force_range: [f64; 2],
+    /// Root mean square of the shaft's tilt about each of two axes, rad.
+    pub tilt: f64,
+    /// Root mean square of how far the hand strays from its line, per axis, m.
+    pub stray: f64,
+    /// What the sensors and the wire add.
+    pub sensor: SensorParams,
+}
+
+impl Default for StylusParams {
+    /// A light aluminium stylus with a 3 mm ball on dry steel, led by a calm hand.
+    fn default() -> Self {
+        Self {
+            radius: 1.5e-3,
+            shape: TipShape::Ball,
+            stiffness: 20e3,
+            friction: 0.15,
+            force: 2.5,
+            force_variation: 0.5,
+            force_range: [1.0, 4.0],
+            tilt: 5f64.to_radians(),
+            stray: 0.15e-3,
+            sensor: SensorParams::default(),
+        }
+    }
+}
+
+impl StylusParams {
+    fn check(&self) -> Result<(), SimError> {
+        let [least, most] = self.force_range;
+        positive("the ball's radius", self.radius, "m")?;
+        up_to("the ball's radius", self.radius, "m", 1.0, "1 m or less")?;
+        positive("the tip's stiffness", self.stiffness, "N/m")?;
+        up_to("the friction", self.friction, "", 10.0, "from zero to ten")?;
+        up_to("the hand's force", self.force, "N", LARGEST_FORCE, "from zero to 1 kN")?;
+        up_to("the variation of force", self.force_variation, "N", LARGEST_FORCE, "from zero to 1 kN")?;
+        up_to("the smallest force", least, "N", LARGEST_FORCE, "from zero to 1 kN")?;
+        up_to("the largest force", most - least, "N above the smallest", LARGEST_FORCE, "from zero to 1 kN")?;
+        up_to("the bending of the tip", most / self.stiffness, "m", LARGEST_BEND, "1 m or less: take a stiffer one")?;
+        up_to("the tilt", self.tilt, "rad", std::f64::consts::PI, "from zero to half a turn")?;
+        up_to("the straying of the hand", self.stray, "m", 1.0, "from zero to 1 m")?;
+        self.sensor.check()
+    }
+}
+
+/// What really was, at one instant.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Moment {
+    /// Time since the start, s.
+    pub t: f64,
+    /// True centre of the ball and true orientation of the stylus.
+    pub pose_ot: Isometry3<f64>,
+    /// Force of the part on the stylus, N, in O.
+    pub force_o: Vector3<f64>,
+    /// Where the ball really touched; empty while it is free.
+    pub contacts: Vec<BallContact>,
+}
+
+/// A simulated recording with the truth behind it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Touch {
+    /// As they arrive: poses in O, wrenches in T.
+    pub messages: Vec<Message>,
+    /// One for each tick of 1 ms.
+    pub moments: Vec<Moment>,
+}
+
+/// No hand presses harder, N; a sample may hold a hundred times as much.
+const LARGEST_FORCE: f64 = 1e3;
+/// A tip that bends further is none, m; a sample may be a thousand times as far.
+const LARGEST_BEND: f64 = 1.0;
+/// Time between two moments, s: the wrench's period.
+pub(super) const TICK: f64 = 1e-3;
+/// The hand closes a distance with this rate, 1/s: a lag of 0.4 mm at 40 mm/s.
+const FOLLOW: f64 = 100.0;
+/// The hand is never faster than this, m/s.
+const TOP_SPEED: f64 = 0.08;
+/// It sinks and climbs at most this fast, m/s.
+const SINK_SPEED: f64 = 0.06;
+/// It slows down from this lag on and waits at three times as much, m.
+const LAG: f64 = 0.6e-3;
+/// It climbs from this lag on, m, until it is back at [`LAG`].
+const BLOCKED: f64 = 1.2e-3;
+/// The force comes and goes with this time constant, s.
+const FIRM: f64 = 0.01;
+/// Sliding slower than this leaves friction undecided, m/s.
+const CREEP: f64 = 1e-3;
+/// The hand gives up a line when it takes longer than this, s, beyond [`PATIENCE_FACTOR`] times what it should take.
+const PATIENCE: f64 = 0.5;
+const PATIENCE_FACTOR: f64 = 2.0;
+
+/// Slow motions of the hand.
+struct Hand {
+    force: Wander,
+    tilt: [Wander; 3],
+    stray: [Wander; 3],
+}
+
+impl Hand {
+    fn new(seed: u64) -> Self {
+        let mut rng = Pcg64::seed_from_u64(seed);
+        let mut wander = |period: f64| Wander::new(period, &mut rng);
+        Self { force: wander(1.0), tilt: [(); 3].map(|()| wander(4.0)), stray: [(); 3].map(|()| wander(1.5)) }
+    }
+
+    fn stray(&self, t: f64) -> Vector3<f64> {
+        Vector3::from_fn(|i, _| self.stray[i].at(t))
+    }
+}
+
+/// The ball in the hand, while it is led along.
+struct Leading<'a> {
+    surface: &'a dyn Surface,
+    params: &'a StylusParams,
+    hand: Hand,
+    upright: UnitQuaternion<f64>,
+    tip: SimTip,
+    centre: Point3<f64>,
+    climbing: bool,
+    firmness: f64,
+    moments: Vec<Moment>,
+}
+
+/// Leads a ball along `path` over `surface` and records what the stylus reports.
+///
+/// Starts at the path's first point. The shaft stands against the first direction of pressing (along z when there is
+/// none), give or take the tilt. Same surface, path, parameters and seed give the same messages.
+///
+/// # Errors
+/// [`SimError::BadParameter`], [`SimError::EmptyPath`], [`SimError::StartsInside`].
+pub fn touch(surface: &dyn Surface, path: &[Stroke], params: &StylusParams, seed: u64) -> Result<Touch, SimError> {
+    params.check()?;
+    path.iter().try_for_each(|stroke| positive("the speed of a stroke", stroke.speed, "m/s"))?;
+    let farthest = path.iter().flat_map(|s| &s.points).flat_map(|p| p.iter());
+    farthest.copied().try_for_each(|x| not_negative("the size of a path's coordinate", x.abs(), "m"))?;
+    let start = path.iter().flat_map(|s| &s.points).next().ok_or(SimError::EmptyPath)?;
+    let shaft = path.iter().find_map(|s| s.press).map_or_else(Vector3::z, |press| -press.into_inner());
+    let upright = UnitQuaternion::rotation_between(&Vector3::z(), &shaft)
+        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
+    let mut leading = Leading {
+        surface,
+        params,
+        hand: Hand::new(seed),
+        upright,
+        tip: SimTip::new(params.shape, params.radius, surface, start, upright)?,
+        centre: *start,
+        climbing: false,
+        firmness: 0.0,
+        moments: Vec::new(),
+    };
+    path.iter().for_each(|stroke| leading.follow(stroke));
+    let moments = leading.moments;
+    let messages = Sensor::new(&params.sensor, params.stiffness, seed).record(&moments);
+    Ok(Touch { messages, moments })
+}
+
+impl Leading<'_> {
+    /// Goes along one stroke, starting wherever the ball is.
+    fn follow(&mut self, stroke: &Stroke) {
+        let mut guide = self.centre;
+        if let Some(first) = stroke.points.first() {
+            // a pressed stroke starts sideways of where the ball is, and sinks from there
+            guide = if stroke.press.is_some() { *first } else { guide };
+        }
+        for target in &stroke.points {
+            let patience = PATIENCE + PATIENCE_FACTOR * (target - guide).norm() / stroke.speed;
+            let until = self.moments.len() + (patience / TICK) as usize;
+            while self.moments.len() < until {
+                let lag = self.step(stroke, &guide);
+                let left = target - guide;
+                let advance = stroke.speed * TICK * (1.0 - (lag / LAG - 1.0) / 2.0).clamp(0.0, 1.0);
+                if left.norm() > advance {
+                    guide += left.normalize() * advance;
+                } else {
+                    guide = *target;
+                    break;
+                }
+            }
+        }
+    }
+
+    /// One tick towards the guide; returns how far the ball lags behind it, m.
+    fn step(&mut self, stroke: &Stroke, guide: &Point3<f64>) -> f64 {
+        let t = self.moments.len() as f64 * TICK;
+        let mut error = guide + self.hand.stray(t) * self.params.stray - self.centre;
+        let mut sink = Vector3::zeros();
+        if let Some(press) = stroke.press {
+            let depth = error.dot(&press);
+            error -= *press * depth;
+            self.climbing = error.norm() > if self.climbing { LAG } else { BLOCKED };
+            let wanted = if self.climbing { -SINK_SPEED } else { (depth * FOLLOW).clamp(-SINK_SPEED, SINK_SPEED) };
+            sink = *press * wanted;
+        }
+        let velocity = sink + (error * FOLLOW).cap_magnitude(TOP_SPEED);
+        let to = self.centre + velocity * TICK;
+        let orientation = self.orientation(t);
+        let (centre, contacts) = self.tip.push(self.surface, &self.centre, &to, orientation);
+        let sliding = (centre - self.centre) / TICK;
+        self.centre = centre;
+        self.note(t, orientation, sliding, contacts);
+        error.norm()
+    }
+
+    /// The true orientation of the stylus.
+    fn orientation(&self, t: f64) -> UnitQuaternion<f64> {
+        let [x, y, z] = [0, 1, 2].map(|i| self.hand.tilt[i].at(t) * self.params.tilt);
+        self.upright * UnitQuaternion::from_scaled_axis(Vector3::new(x, y, z))
+    }
+
+    /// Adds the moment's force and orientation to the record.
+    fn note(&mut self, t: f64, orientation: UnitQuaternion<f64>, sliding: Vector3<f64>, contacts: Vec<BallContact>) {
+        let p = self.params;
+        let goal = if contacts.is_empty() { 0.0 } else { 1.0 };
+        self.firmness += (goal - self.firmness) * (TICK / FIRM);
+        let wanted = (p.force + p.force_variation * self.hand.force.at(t)).clamp(p.force_range[0], p.force_range[1]);
+        let total: f64 = contacts.iter().map(|c| c.held_back).sum();
+        let force = |c: &BallContact| {
+            let along = sliding - c.normal * sliding.dot(&c.normal);
+            let drag = along * (p.friction / (along.norm() + CREEP));
+            (c.normal - drag) * (c.held_back / total)
+        };
+        let force_o = contacts.iter().map(force).sum::<Vector3<f64>>() * (wanted * self.firmness);
+        let pose_ot = Isometry3::from_parts(self.centre.coords.into(), orientation);
+        self.moments.push(Moment { t, pose_ot, force_o, contacts });
+    }
+}

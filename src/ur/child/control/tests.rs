@@ -1,0 +1,380 @@
+//! The driver on a clock that the tests move, with a library that notes what it is told.
+
+use std::cell::{Cell, RefCell};
+use std::io::{PipeReader, Read, pipe};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicU64};
+use std::sync::mpsc::channel;
+use std::thread;
+
+use self::LibraryCall::{EndPress, EndProgram, Feed, HardStop, Press, Set, Speed, Zero};
+use super::*;
+use crate::clock::ManualClock;
+use crate::ur::protocol::State;
+use crate::ur::protocol::tests::STATE;
+
+const MS: Duration = Duration::from_millis(1);
+const UP: What = What::Move { twist: [0.0, 0.0, 20e-3, 0.0, 0.0, 0.0], acceleration: 1.0 };
+const GOING_UP: LibraryCall = Speed(20e-3, 1.0);
+
+/// What the library was called with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum LibraryCall {
+    /// along z, and how fast it is reached
+    Speed(f64, f64),
+    /// turn of the frame about x, and force
+    Press(f64, f64),
+    EndPress,
+    HardStop(f64),
+    Zero,
+    Set(&'static str, f64),
+    Feed,
+    EndProgram,
+}
+
+/// A library that writes down what it is called with and when, ms; and an arm that follows.
+struct Fake {
+    clock: Clock,
+    begun: Instant,
+    calls: RefCell<Vec<(u128, LibraryCall)>>,
+    is_connected: Cell<bool>,
+    is_running: Cell<bool>,
+    refuses: Cell<bool>,
+    /// of each call
+    takes: Cell<Duration>,
+    tool: Cell<[f64; 6]>,
+}
+
+impl Fake {
+    fn call(&self, call: LibraryCall) -> Result<(), ChildError> {
+        self.calls.borrow_mut().push((self.clock.since(self.begun).as_millis(), call));
+        if !self.takes.get().is_zero() {
+            self.clock.sleep(self.takes.get());
+        }
+        if self.refuses.get() {
+            return Err(ChildError::Python { call: "a call", reason: "it returned false".to_owned() });
+        }
+        Ok(())
+    }
+}
+
+impl Control for Fake {
+    fn is_connected(&self) -> bool {
+        self.is_connected.get()
+    }
+
+    fn is_running(&self) -> bool {
+        self.is_running.get()
+    }
+
+    fn speed(&self, twist: [f64; 6], acceleration: f64) -> Result<(), ChildError> {
+        self.call(Speed(twist[2], acceleration))
+    }
+
+    fn press(&self, frame: [f64; 6], force: f64, _kind: i32, _limits: [f64; 6]) -> Result<(), ChildError> {
+        self.call(Press(frame[3], force))
+    }
+
+    fn end_press(&self) -> Result<(), ChildError> {
+        self.call(EndPress)
+    }
+
+    fn hard_stop(&self, deceleration: f64) -> Result<(), ChildError> {
+        self.call(HardStop(deceleration))
+    }
+
+    fn zero(&self) -> Result<(), ChildError> {
+        self.call(Zero)
+    }
+
+    fn set_payload(&self, mass: f64, _centre: [f64; 3]) -> Result<(), ChildError> {
+        self.call(Set("payload", mass))
+    }
+
+    fn set_tool(&self, tool: [f64; 6]) -> Result<(), ChildError> {
+        self.call(Set("tool", tool[2]))
+    }
+
+    fn tool(&self) -> Result<[f64; 6], ChildError> {
+        Ok(self.tool.get())
+    }
+
+    fn set_force_mode(&self, damping: f64, _gain: f64) -> Result<(), ChildError> {
+        self.call(Set("damping", damping))
+    }
+
+    fn set_watchdog(&self, least_hz: f64) -> Result<(), ChildError> {
+        self.call(Set("watchdog", least_hz))
+    }
+
+    fn feed(&self) -> Result<(), ChildError> {
+        self.call(Feed)
+    }
+
+    fn end_program(&self) -> Result<(), ChildError> {
+        self.call(EndProgram)
+    }
+}
+
+struct ControlBench {
+    hand: ManualClock,
+    fake: Fake,
+    shared: ChildShared,
+    begin: Begin,
+    reports: PipeReader,
+}
+
+impl ControlBench {
+    fn new() -> Self {
+        let (clock, hand) = Clock::manual();
+        let tool = [0.0, 0.0, 0.15, 0.0, 0.0, 0.0];
+        let fake = Fake {
+            begun: clock.now(),
+            clock,
+            calls: RefCell::default(),
+            is_connected: Cell::new(true),
+            is_running: Cell::new(true),
+            refuses: Cell::new(false),
+            takes: Cell::default(),
+            tool: Cell::new(tool),
+        };
+        let (reports, writer) = pipe().unwrap();
+        let shared =
+            ChildShared { reports: Mutex::new(writer), served: AtomicU64::new(0), latest: Mutex::new(Some(STATE)) };
+        let begin = Begin {
+            host: String::new(),
+            site_packages: Default::default(),
+            tool,
+            mass_kg: 0.25,
+            centre_m: [0.0, 0.0, 0.05],
+            damping: 0.025,
+            gain: 0.5,
+            is_lock_step: false,
+        };
+        Self { hand, fake, shared, begin, reports }
+    }
+
+    fn driver(&self) -> Driver<'_, Fake> {
+        Driver::new(&self.fake, &self.shared, &self.begin, self.fake.clock.clone())
+    }
+
+    /// The state says that the tip goes up, m/s.
+    fn goes(&self, speed: f64, is_playing: bool) {
+        let velocity = [0.0, 0.0, speed, 0.0, 0.0, 0.0];
+        *self.shared.latest.lock().unwrap() = Some(State { velocity, is_playing, ..STATE });
+    }
+
+    /// Does something in which time passes as it is slept.
+    fn sleeping<T>(&self, work: impl FnOnce() -> T) -> T {
+        let (is_over, hand) = (AtomicBool::new(false), &self.hand);
+        thread::scope(|scope| {
+            scope.spawn(|| {
+                while !is_over.load(Ordering::Acquire) {
+                    if hand.waiting() > 0 {
+                        hand.advance(MS);
+                    }
+                    thread::yield_now();
+                }
+            });
+            let done = work();
+            is_over.store(true, Ordering::Release);
+            done
+        })
+    }
+
+    /// Some time without orders.
+    fn without_orders(&self, driver: &mut Driver<'_, Fake>, ms: u32) {
+        for _ in 0..ms / 5 {
+            self.hand.advance(TURN);
+            self.sleeping(|| driver.turn(None)).unwrap();
+        }
+    }
+
+    fn order(&self, driver: &mut Driver<'_, Fake>, number: u64, what: What) {
+        self.sleeping(|| driver.turn(Some(Order { number, what }))).unwrap();
+    }
+
+    fn calls(&self) -> Vec<(u128, LibraryCall)> {
+        self.fake.calls.take()
+    }
+
+    /// All that was reported.
+    fn reports(self) -> Vec<ClientReport> {
+        drop(self.shared);
+        let mut text = String::new();
+        let mut reports = self.reports;
+        reports.read_to_string(&mut text).unwrap();
+        text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    }
+}
+
+#[test]
+fn orders_that_stay_away_for_60_ms_leave_the_arm_to_brake_and_then_it_is_fed() {
+    let bench = ControlBench::new();
+    let mut driver = bench.driver();
+    bench.goes(20e-3, true);
+    bench.order(&mut driver, 1, UP);
+    assert_eq!(bench.shared.number(), 1);
+    assert_eq!(bench.calls(), [(0, GOING_UP)]);
+    bench.without_orders(&mut driver, 60);
+    assert_eq!(bench.calls(), [], "not a moment before");
+    bench.without_orders(&mut driver, 10);
+    assert_eq!(bench.calls(), [65, 70].map(|ms| (ms, Speed(0.0, 2.0))));
+    bench.goes(0.0, true);
+    bench.without_orders(&mut driver, 100);
+    let braking = [75, 80, 85, 90].map(|ms| (ms, Speed(0.0, 2.0)));
+    let resting = [(95, Feed), (115, Feed), (135, Feed), (155, Feed)];
+    assert_eq!(bench.calls(), [&braking[..], &[(90, HardStop(10.0))], &resting].concat());
+}
+
+#[test]
+fn an_arm_that_does_not_stand_is_braked_on_and_on_and_never_fed() {
+    let bench = ControlBench::new();
+    let mut driver = bench.driver();
+    bench.goes(20e-3, true);
+    bench.order(&mut driver, 1, UP);
+    bench.without_orders(&mut driver, 1000);
+    let calls = bench.calls();
+    assert!(calls[1..].iter().all(|(_, call)| *call == Speed(0.0, 2.0)), "{calls:?}");
+    assert_eq!(calls.len(), 1 + (1000 - 60) / 5);
+}
+
+#[test]
+fn orders_that_come_in_time_keep_it_going() {
+    let bench = ControlBench::new();
+    let mut driver = bench.driver();
+    bench.goes(20e-3, true);
+    for number in 0..10 {
+        bench.order(&mut driver, number, UP);
+        bench.without_orders(&mut driver, 60);
+    }
+    assert_eq!(bench.calls(), std::array::from_fn::<_, 10, _>(|at| (60 * at as u128, GOING_UP)));
+}
+
+#[test]
+fn at_rest_it_is_fed_each_20_ms_and_with_each_order_while_the_program_runs() {
+    let bench = ControlBench::new();
+    let mut driver = bench.driver();
+    bench.without_orders(&mut driver, 45);
+    assert_eq!(bench.calls(), [(20, Feed), (40, Feed)]);
+    bench.order(&mut driver, 1, What::Stop { deceleration: 1.0 });
+    bench.without_orders(&mut driver, 20);
+    assert_eq!(bench.calls(), [(45, Feed), (65, Feed)]);
+    bench.fake.is_running.set(false);
+    bench.without_orders(&mut driver, 100);
+    assert_eq!(bench.calls(), []);
+}
+
+#[test]
+fn a_call_that_hangs_feeds_nothing_and_is_not_served() {
+    let bench = ControlBench::new();
+    let mut driver = bench.driver();
+    bench.fake.takes.set(500 * MS);
+    bench.order(&mut driver, 1, What::Zero);
+    assert_eq!(bench.shared.number(), 1);
+    bench.fake.takes.set(Duration::ZERO);
+    bench.without_orders(&mut driver, 5);
+    assert_eq!(bench.calls(), [(0, Zero), (505, Feed)]);
+    assert_eq!(bench.reports(), [ClientReport::Done { number: 1 }]);
+}
+
+#[test]
+fn a_stop_brakes_as_it_is_told_and_ends_hard_when_the_state_shows_rest_20_ms_later() {
+    let bench = ControlBench::new();
+    let mut driver = bench.driver();
+    bench.order(&mut driver, 1, UP);
+    // the states do not show yet that it moves
+    bench.goes(0.0, true);
+    bench.order(&mut driver, 2, What::Stop { deceleration: 0.5 });
+    bench.without_orders(&mut driver, 30);
+    let braking = [0, 5, 10, 15, 20, 25].map(|ms| (ms, Speed(0.0, 0.5)));
+    assert_eq!(bench.calls(), [&[(0, GOING_UP)], &braking[..], &[(25, HardStop(10.0)), (30, Feed)]].concat());
+}
+
+#[test]
+fn a_press_has_two_cycles_for_itself_and_is_said_again_after_100_ms() {
+    let press = |angle: f64, force_n: f64| What::Press {
+        frame: [0.0, 0.0, 0.0, angle, 0.0, 0.0],
+        force_n,
+        speed: 5e-3,
+        feed: [0.0, 0.0, 1e-3],
+        acceleration: 0.5,
+    };
+    let feed = Speed(1e-3, 0.5);
+    let bench = ControlBench::new();
+    let mut driver = bench.driver();
+    bench.order(&mut driver, 1, press(0.0, 5.0));
+    assert_eq!(bench.calls(), [(0, Press(0.0, 5.0)), (4, feed)]);
+    for number in [2, 3] {
+        bench.hand.advance(50 * MS);
+        bench.order(&mut driver, number, press(0.0, 5.0));
+    }
+    // since the beginning 100 ms and the two cycles
+    assert_eq!(bench.calls(), [(54, feed), (104, Press(0.0, 5.0)), (108, feed)]);
+    // another axis, another force, another motion
+    bench.order(&mut driver, 4, press(0.1, 5.0));
+    bench.order(&mut driver, 5, press(0.1, 4.0));
+    bench.order(&mut driver, 6, UP);
+    let turned = [(108, Press(0.1, 5.0)), (112, feed), (112, Press(0.1, 4.0)), (116, feed)];
+    assert_eq!(bench.calls(), [&turned[..], &[(116, HardStop(10.0)), (116, EndPress), (116, GOING_UP)]].concat());
+}
+
+#[test]
+fn a_refused_call_is_reported_after_40_ms_in_which_no_state_says_that_the_program_has_ended() {
+    for (is_playing, ends_at, told) in [(true, 40, 1), (false, 0, 0)] {
+        let bench = ControlBench::new();
+        let mut driver = bench.driver();
+        bench.goes(0.0, is_playing);
+        bench.fake.refuses.set(true);
+        bench.order(&mut driver, 1, UP);
+        assert_eq!(bench.fake.clock.since(bench.fake.begun), ends_at * MS);
+        let reports = bench.reports();
+        assert_eq!(reports.len(), told);
+        assert!(reports.iter().all(|report| matches!(report, ClientReport::Failed { .. })), "{reports:?}");
+    }
+}
+
+#[test]
+fn a_program_has_five_seconds_to_start_and_the_watchdog_is_set_last() {
+    let bench = ControlBench::new();
+    let mut driver = bench.driver();
+    bench.fake.is_running.set(false);
+    bench.sleeping(|| driver.prepare()).unwrap();
+    let set = [("payload", 0.25), ("tool", 0.15), ("damping", 0.025), ("watchdog", 10.0)];
+    assert_eq!(bench.calls(), set.map(|(what, value)| (5_000, Set(what, value))));
+}
+
+#[test]
+fn another_tool_than_it_was_told_and_a_lost_connection_end_it() {
+    let (_sender, orders) = channel();
+    let bench = ControlBench::new();
+    bench.fake.tool.set([0.0; 6]);
+    assert!(matches!(bench.driver().run(&orders), Err(DriverEnd::BadTool(reason)) if reason.contains("0.15")));
+    assert!(!bench.calls().contains(&(0, Set("watchdog", 10.0))));
+    let bench = ControlBench::new();
+    bench.fake.is_connected.set(false);
+    assert!(matches!(bench.driver().run(&orders), Err(DriverEnd::Lost(Link::Control))));
+    assert_eq!(bench.reports(), [ClientReport::Ready]);
+}
+
+#[test]
+fn where_orders_end_it_brakes_and_ends_the_program() {
+    let bench = ControlBench::new();
+    let mut driver = bench.driver();
+    bench.order(&mut driver, 1, UP);
+    bench.goes(0.0, true);
+    bench.sleeping(|| driver.end());
+    let braking = [0, 5, 10, 15, 20, 25].map(|ms| (ms, Speed(0.0, 2.0)));
+    let end = [(25, HardStop(10.0)), (30, EndProgram)];
+    assert_eq!(bench.calls(), [&[(0, GOING_UP)], &braking[..], &end].concat());
+}
+
+#[test]
+fn of_orders_that_wait_the_newest_counts_and_no_zero_is_left_out() {
+    let (sender, orders) = channel();
+    for (number, what) in [(2, UP), (3, What::Zero), (4, UP), (5, What::Stop { deceleration: 1.0 })] {
+        sender.send(Order { number, what }).unwrap();
+    }
+    assert_eq!(newest(Order { number: 1, what: UP }, &orders).number, 3);
+    assert_eq!(newest(orders.recv().unwrap(), &orders).number, 5);
+}

@@ -1,0 +1,212 @@
+//! The calls of ur-rtde that are used, and nothing of Python beyond this file.
+//!
+//! Each call returns `true` or it failed; the library has no other words. Lengths of vectors are those of arrays here, for the
+//! library does not look at them.
+
+use std::path::Path;
+
+use pyo3::call::PyCallArgs;
+use pyo3::prelude::*;
+
+use super::{ChildError, control};
+use crate::ur::protocol::{State, WHEEL};
+
+/// Rate of the states and of the control, Hz.
+const RATE_HZ: f64 = 500.0;
+/// Uploads its program, and takes the force from the arm's own sensor: no upper registers, no cap, no external sensor.
+const FLAGS: u32 = 0x01 | 0x40;
+const CAP_PORT: u16 = 50002;
+/// The states that are asked for: the default are 58 of 1180 bytes.
+const VARIABLES: [&str; 9] = [
+    "timestamp",
+    "actual_q",
+    "actual_TCP_pose",
+    "actual_TCP_speed",
+    "actual_TCP_force",
+    "ft_raw_wrench",
+    "safety_status_bits",
+    "runtime_state",
+    "robot_status_bits",
+];
+/// Of `runtime_state`: the program runs.
+const PLAYING: u32 = 2;
+/// Readings of one state that may fall into the coming of the next.
+const TEARS: usize = 3;
+
+fn failed(call: &'static str) -> impl Fn(PyErr) -> ChildError {
+    move |error| ChildError::Python { call, reason: error.to_string() }
+}
+
+/// Finds the library in a folder of packages, and looks at its version.
+pub fn load(site_packages: &Path) -> Result<(), ChildError> {
+    Python::attach(|py| {
+        let os = py.import("os").map_err(failed("import os"))?;
+        // what the library prints goes to stderr: stdout is for reports alone
+        os.call_method1("dup2", (2, 1)).map_err(failed("os.dup2"))?;
+        let folder = site_packages.to_string_lossy();
+        let site = py.import("site").map_err(failed("import site"))?;
+        site.call_method1("addsitedir", (folder.as_ref(),)).map_err(failed("site.addsitedir"))?;
+        let metadata = py.import("importlib.metadata").map_err(failed("import importlib.metadata"))?;
+        let found = metadata.call_method1("version", ("ur_rtde",)).map_err(failed("the version of ur-rtde"))?;
+        let found: String = found.extract().map_err(failed("the version of ur-rtde"))?;
+        if found != WHEEL {
+            let reason = format!("{found} is there, {WHEEL} is wanted");
+            return Err(ChildError::Python { call: "the version of ur-rtde", reason });
+        }
+        py.import("rtde_receive").map_err(failed("import rtde_receive"))?;
+        py.import("rtde_control").map_err(failed("import rtde_control"))?;
+        Ok(())
+    })
+}
+
+/// Ends the process at once: the destructors of the library take a second, and after a lost link they crash.
+pub fn leave(code: i32) -> ! {
+    // a Python that cannot even do that is ended the hard way
+    let _ = Python::attach(|py| py.import("os").and_then(|os| os.call_method1("_exit", (code,)).map(drop)));
+    std::process::abort()
+}
+
+/// `rtde_receive`.
+pub struct Receive(Py<PyAny>);
+
+impl Receive {
+    /// Waits, without letting any other thread use Python, until the first state has come.
+    pub fn connect(host: &str) -> Result<Self, ChildError> {
+        Python::attach(|py| {
+            let module = py.import("rtde_receive").map_err(failed("import rtde_receive"))?;
+            let arguments = (host, RATE_HZ, VARIABLES.to_vec(), false, false, 0);
+            let made = module.call_method1("RTDEReceiveInterface", arguments);
+            made.map(|made| Self(made.unbind())).map_err(failed("RTDEReceiveInterface"))
+        })
+    }
+
+    /// Whether the library has a connection.
+    pub fn is_connected(&self) -> bool {
+        Python::attach(|py| truth(self.0.call_method0(py, "isConnected"), py)).unwrap_or(false)
+    }
+
+    /// Of the newest state, s of the controller.
+    pub fn stamp(&self) -> Option<f64> {
+        Python::attach(|py| self.0.call_method0(py, "getTimestamp")?.extract(py)).ok()
+    }
+
+    /// The newest state, all of one moment; `None`: it cannot be read.
+    pub fn state(&self, served: u64) -> Option<State> {
+        Python::attach(|py| -> PyResult<Option<State>> {
+            let read = |name: &str| self.0.call_method0(py, name);
+            for _ in 0..TEARS {
+                let stamp_s = read("getTimestamp")?.extract::<f64>(py)?;
+                let state = State {
+                    stamp_s,
+                    pose: read("getActualTCPPose")?.extract(py)?,
+                    velocity: read("getActualTCPSpeed")?.extract(py)?,
+                    wrench: read("getActualTCPForce")?.extract(py)?,
+                    raw_wrench: read("getFtRawWrench")?.extract(py)?,
+                    joints: read("getActualQ")?.extract(py)?,
+                    safety_bits: read("getSafetyStatusBits")?.extract(py)?,
+                    is_playing: read("getRuntimeState")?.extract::<u32>(py)? == PLAYING,
+                    served,
+                };
+                // the next one may have come between two of these calls
+                if read("getTimestamp")?.extract::<f64>(py)? == stamp_s {
+                    return Ok(Some(state));
+                }
+            }
+            Ok(None)
+        })
+        .ok()
+        .flatten()
+    }
+}
+
+/// `rtde_control`.
+pub struct RtdeControl(Py<PyAny>);
+
+impl RtdeControl {
+    /// Uploads the program and waits until it runs; no other thread can use Python meanwhile.
+    pub fn connect(host: &str) -> Result<Self, ChildError> {
+        Python::attach(|py| {
+            let module = py.import("rtde_control").map_err(failed("import rtde_control"))?;
+            let made = module.call_method1("RTDEControlInterface", (host, RATE_HZ, FLAGS, CAP_PORT, 0));
+            made.map(|made| Self(made.unbind())).map_err(failed("RTDEControlInterface"))
+        })
+    }
+
+    fn done(&self, call: &'static str, arguments: impl for<'py> PyCallArgs<'py>) -> Result<(), ChildError> {
+        if self.call(call, arguments)? {
+            return Ok(());
+        }
+        Err(ChildError::Python { call, reason: "it returned false".to_owned() })
+    }
+
+    fn call(&self, name: &'static str, arguments: impl for<'py> PyCallArgs<'py>) -> Result<bool, ChildError> {
+        Python::attach(|py| truth(self.0.call_method1(py, name, arguments), py)).map_err(failed(name))
+    }
+}
+
+impl control::Control for RtdeControl {
+    fn is_connected(&self) -> bool {
+        self.call("isConnected", ()).unwrap_or(false)
+    }
+
+    fn is_running(&self) -> bool {
+        self.call("isProgramRunning", ()).unwrap_or(false)
+    }
+
+    fn speed(&self, twist: [f64; 6], acceleration: f64) -> Result<(), ChildError> {
+        // the time does not end the motion: it is how soon the program on the controller looks for the next velocity, and without
+        // one it first reaches this
+        self.done("speedL", (twist.to_vec(), acceleration, 1.0 / RATE_HZ))
+    }
+
+    fn press(&self, frame: [f64; 6], force: f64, kind: i32, limits: [f64; 6]) -> Result<(), ChildError> {
+        let (along_z, wrench) = (vec![0, 0, 1, 0, 0, 0], vec![0.0, 0.0, force, 0.0, 0.0, 0.0]);
+        self.done("forceMode", (frame.to_vec(), along_z, wrench, kind, limits.to_vec()))
+    }
+
+    fn end_press(&self) -> Result<(), ChildError> {
+        self.done("forceModeStop", ())
+    }
+
+    fn hard_stop(&self, deceleration: f64) -> Result<(), ChildError> {
+        self.done("speedStop", (deceleration,))
+    }
+
+    fn zero(&self) -> Result<(), ChildError> {
+        self.done("zeroFtSensor", ())
+    }
+
+    fn set_payload(&self, mass: f64, centre: [f64; 3]) -> Result<(), ChildError> {
+        self.done("setPayload", (mass, centre.to_vec()))
+    }
+
+    fn set_tool(&self, tool: [f64; 6]) -> Result<(), ChildError> {
+        self.done("setTcp", (tool.to_vec(),))
+    }
+
+    fn tool(&self) -> Result<[f64; 6], ChildError> {
+        let call = "getTCPOffset";
+        Python::attach(|py| self.0.call_method0(py, call)?.extract(py)).map_err(failed(call))
+    }
+
+    fn set_force_mode(&self, damping: f64, gain: f64) -> Result<(), ChildError> {
+        self.done("forceModeSetDamping", (damping,))?;
+        self.done("forceModeSetGainScaling", (gain,))
+    }
+
+    fn set_watchdog(&self, least_hz: f64) -> Result<(), ChildError> {
+        self.done("setWatchdog", (least_hz,))
+    }
+
+    fn feed(&self) -> Result<(), ChildError> {
+        self.done("kickWatchdog", ())
+    }
+
+    fn end_program(&self) -> Result<(), ChildError> {
+        self.call("stopScript", ()).map(drop)
+    }
+}
+
+fn truth(answer: PyResult<Py<PyAny>>, py: Python<'_>) -> PyResult<bool> {
+    answer?.extract(py)
+}

@@ -1,0 +1,238 @@
+//! The process that speaks to the arm, as seen from here: how it is started, told and asked, and ended.
+
+use std::io::{BufRead, BufReader, Write};
+use std::os::unix::process::CommandExt;
+use std::process::{ChildStdin, Command, Stdio};
+use std::sync::mpsc::channel;
+use std::sync::{Arc, MutexGuard};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use super::dashboard::Dashboard;
+use super::error::UrError;
+use super::guard::{ClientLoss, FAREWELL, Guard, GuardState, Halt, SharedGuard, ZEROING};
+use super::params::UrParams;
+use super::protocol::{Begin, ClientReport, Order, State, What, vector_of};
+use crate::clock::Clock;
+use crate::robot::ArmError;
+
+/// The process and its guard.
+pub(super) struct Client {
+    shared: Arc<SharedGuard>,
+    orders: Option<ChildStdin>,
+    guard: Option<JoinHandle<Option<Halt>>>,
+    halt: Option<Halt>,
+    id: u32,
+}
+
+impl Client {
+    /// Starts the process; returns when the arm is at its command.
+    ///
+    /// - `dashboard`: for the guard alone.
+    pub fn start(params: &UrParams, dashboard: Dashboard) -> Result<Self, UrError> {
+        let mut child = Command::new(&params.program)
+            .args(["ur", "child"])
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            // an interrupt from the terminal is for the parent, who stops the arm first
+            .process_group(0)
+            .spawn()
+            .map_err(|error| UrError::Client(format!("does not start ({}): {error}", params.program.display())))?;
+        let (Some(mut orders), Some(lines), Some(words)) =
+            (child.stdin.take(), child.stdout.take(), child.stderr.take())
+        else {
+            return Err(UrError::Client("has no pipes".to_owned()));
+        };
+        let is_lock_step = params.is_lock_step && dashboard.is_lock_step();
+        let begin = Begin {
+            host: params.host.clone(),
+            site_packages: params.site_packages.clone(),
+            tool: vector_of(&params.pose_ft),
+            mass_kg: params.mass,
+            centre_m: params.centre.into(),
+            damping: params.damping,
+            gain: params.gain,
+            is_lock_step,
+        };
+        let told = line_of(&begin).and_then(|line| orders.write_all(&line));
+        let (sender, reports) = channel();
+        thread::spawn(move || {
+            for line in BufReader::new(lines).lines().map_while(Result::ok) {
+                let Ok(report) = serde_json::from_str::<ClientReport>(&line) else {
+                    tracing::warn!(line, "the program that speaks to the arm said what is no report");
+                    continue;
+                };
+                if sender.send(report).is_err() {
+                    break;
+                }
+            }
+        });
+        thread::spawn(move || {
+            for line in BufReader::new(words).lines().map_while(Result::ok) {
+                tracing::debug!(line, "from ur-rtde");
+            }
+        });
+        let (clock, hand) = if is_lock_step && !params.clock.is_manual() {
+            let (clock, hand) = Clock::manual();
+            (clock, Some(hand))
+        } else {
+            (params.clock.clone(), None)
+        };
+        let shared = Arc::new(SharedGuard::new(params.deadlines, clock));
+        let id = child.id();
+        let guard = Guard { child, host: params.host.clone(), dashboard, shared: shared.clone(), hand };
+        let guard = thread::spawn(move || guard.watch(&reports));
+        let client = Self { shared, orders: Some(orders), guard: Some(guard), halt: None, id };
+        told.map_err(|error| UrError::Client(format!("does not listen: {error}")))?;
+        let known = client.wait(params.deadlines.connect + params.deadlines.beat, |known| known.is_ready);
+        match known.broken.clone() {
+            None if known.is_ready => {}
+            Some(ClientLoss::Wheel(reason)) => {
+                return Err(UrError::Wheel { site_packages: params.site_packages.clone(), reason });
+            }
+            Some(ClientLoss::Tool(reason)) => return Err(UrError::Tool(reason)),
+            Some(ClientLoss::Arm(ArmError::Client { reason })) => return Err(UrError::Client(reason)),
+            Some(ClientLoss::Arm(error)) => return Err(UrError::Client(format!("lost the arm at once: {error}"))),
+            None => return Err(UrError::Client("says nothing".to_owned())),
+        }
+        drop(known);
+        Ok(client)
+    }
+
+    /// Waits until something is so, or the client is broken, or the time is over.
+    fn wait(&self, deadline: Duration, is_so: impl Fn(&GuardState) -> bool) -> MutexGuard<'_, GuardState> {
+        let SharedGuard { changed, clock, .. } = &*self.shared;
+        clock.wait_while(changed, self.shared.known(), deadline, |known| known.broken.is_none() && !is_so(known))
+    }
+
+    /// The next state, the oldest that has not been given yet.
+    pub fn next_state(&self, deadline: Duration) -> Result<State, ArmError> {
+        let has_ended = |known: &GuardState| known.has_ended(self.shared.clock.now());
+        let mut known = self.wait(deadline, |known| !known.states.is_empty() || has_ended(known));
+        if let Some(broken) = &known.broken {
+            return Err(broken.error());
+        }
+        if has_ended(&known) {
+            return Err(ArmError::ProgramEnded);
+        }
+        let silent_ms = deadline.as_millis() as u64;
+        known.states.pop_front().ok_or(ArmError::Lost { silent_ms })
+    }
+
+    /// Throws away the states that wait.
+    pub fn forget_states(&self) {
+        self.shared.known().states.clear();
+    }
+
+    /// Sends an order without waiting for it.
+    pub fn order(&mut self, what: What) -> Result<u64, ArmError> {
+        let mut known = self.shared.known();
+        if let Some(broken) = &known.broken {
+            return Err(broken.error());
+        }
+        let number = known.send(what == What::Zero, self.shared.clock.now());
+        drop(known);
+        let sent = match &mut self.orders {
+            Some(orders) => line_of(&Order { number, what }).and_then(|line| orders.write_all(&line)),
+            None => Err(std::io::ErrorKind::BrokenPipe.into()),
+        };
+        if sent.is_err() {
+            // its end is found by the guard, who knows the reason
+            let known = self.wait(ZEROING, |_| false);
+            return Err(known.broken.as_ref().map_or(ArmError::Lost { silent_ms: 0 }, ClientLoss::error));
+        }
+        Ok(number)
+    }
+
+    /// Sends an order and waits until it is done.
+    pub fn ask(&mut self, what: What) -> Result<(), ArmError> {
+        let number = self.order(what)?;
+        let known = self.wait(ZEROING + FAREWELL, |known| known.done >= number);
+        known.broken.as_ref().map_or(Ok(()), |broken| Err(broken.error()))
+    }
+
+    /// Whether it can be spoken to.
+    pub fn is_broken(&self) -> bool {
+        self.shared.known().broken.is_some()
+    }
+
+    /// Ends it, and with it the program of the controller; from here on it says why it is not there.
+    pub fn close(&mut self, reason: &str) {
+        self.shared.known().close(self.shared.clock.now());
+        // at the end of its stdin it brakes, ends the program of the controller and itself
+        self.orders = None;
+        if let Some(guard) = self.guard.take() {
+            // a guard that failed has nothing more to say
+            self.halt = guard.join().ok().flatten();
+        }
+        let closed = || ClientLoss::Arm(ArmError::Client { reason: reason.to_owned() });
+        self.shared.known().broken.get_or_insert_with(closed);
+    }
+
+    /// How the guard stopped the arm, when it had to.
+    pub fn halt(&mut self) -> Option<Halt> {
+        if self.is_broken()
+            && let Some(guard) = self.guard.take()
+        {
+            self.halt = guard.join().ok().flatten();
+        }
+        self.halt
+    }
+
+    /// Of the process.
+    pub fn id(&self) -> u32 {
+        self.id
+    }
+}
+
+impl Drop for Client {
+    fn drop(&mut self) {
+        self.close("was let go");
+    }
+}
+
+fn line_of(what: &impl serde::Serialize) -> std::io::Result<Vec<u8>> {
+    let mut line = serde_json::to_vec(what)?;
+    line.push(b'\n');
+    Ok(line)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::os::unix::fs::PermissionsExt;
+
+    use super::*;
+    use crate::ur::dashboard::tests::listen;
+
+    /// Time is the controller's only where both say so: a controller that could lift the deadlines by its greeting alone would be
+    /// watched by nobody.
+    #[test]
+    fn a_greeting_alone_puts_nobody_in_lock_step() {
+        let folder = tempfile::tempdir().unwrap();
+        let (program, told) = (folder.path().join("client"), folder.path().join("told"));
+        fs::write(&program, format!("#!/bin/sh\nhead -n 1 > {}\n", told.display())).unwrap();
+        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
+        for (is_allowed, greeting) in
+            [(false, "in lock step"), (true, "Universal Robots Dashboard Server"), (true, "a test in lock step")]
+        {
+            let (host, listener) = listen();
+            let greets = thread::spawn(move || {
+                let (mut socket, _) = listener.accept().unwrap();
+                writeln!(socket, "Connected: {greeting}").unwrap();
+                socket
+            });
+            let deadline = Duration::from_secs(60);
+            let dashboard = Dashboard::connect(&host, deadline).unwrap();
+            let params =
+                UrParams { program: program.clone(), is_lock_step: is_allowed, ..UrParams::new(&host, "none") };
+            let ended = Client::start(&params, dashboard).err().unwrap();
+            assert!(matches!(&ended, UrError::Client(reason) if reason.contains("has ended")), "{ended}");
+            let begin: serde_json::Value = serde_json::from_slice(&fs::read(&told).unwrap()).unwrap();
+            let is_both = is_allowed && greeting.ends_with("in lock step");
+            assert_eq!(begin["is_lock_step"], is_both, "allowed: {is_allowed}, greeted: {greeting}");
+            drop(greets.join().unwrap());
+        }
+    }
+}

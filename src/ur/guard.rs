@@ -1,0 +1,303 @@
+//! Who waits for each line of the client with a deadline.
+//!
+//! When one stays away the guard kills the client, so that nothing feeds the arm any more, and stops the arm by the dashboard; then it
+//! says why.
+
+use std::collections::VecDeque;
+use std::process::Child;
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use super::dashboard::Dashboard;
+use super::params::Deadlines;
+use super::protocol::{ClientReport, Link, State};
+use crate::clock::{Clock, ManualClock};
+use crate::robot::{ArmError, Safety};
+
+/// States that wait for a caller who is late, 128 ms of them; older ones are dropped.
+const WAITING: usize = 64;
+/// A program that has ended is told after this time: the reason, when it is one of safety, comes a little later.
+pub(super) const ENDED: Duration = Duration::from_millis(40);
+/// Zeroing, with the braking before it, has this much time.
+pub(super) const ZEROING: Duration = Duration::from_secs(3);
+/// The client ends by itself within this time of its stdin.
+pub(super) const FAREWELL: Duration = Duration::from_millis(1500);
+
+/// How the arm was stopped after a fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Halt {
+    /// The dashboard said so.
+    Dashboard {
+        /// from the fault being seen to the answer
+        took: Duration,
+    },
+    /// The dashboard does not answer; the watchdog of the controller stops the arm.
+    Watchdog,
+}
+
+/// What the guard knows. It decides by what is reported and by the time that it is given, and waits for nothing.
+pub(super) struct GuardState {
+    pub deadlines: Deadlines,
+    pub is_ready: bool,
+    pub states: VecDeque<State>,
+    pub done: u64,
+    pub sent: u64,
+    pub served: u64,
+    /// when the client was started
+    begun_at: Instant,
+    /// since when an order waits for its call to return
+    waiting_since: Option<Instant>,
+    /// an order that takes its time
+    asked: Option<u64>,
+    /// when the last new state came
+    fresh_at: Option<Instant>,
+    /// since when the program of the controller does not run
+    ended_since: Option<Instant>,
+    pub broken: Option<ClientLoss>,
+    /// since when it is told to end
+    closing_since: Option<Instant>,
+}
+
+/// Why there is no client any more.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum ClientLoss {
+    /// the arm or its client
+    Arm(ArmError),
+    /// no library, or another one
+    Wheel(String),
+    /// the tool that was set is not there
+    Tool(String),
+}
+
+/// What the guard knows, that it has changed, and the clock that all deadlines are kept on.
+pub(super) struct SharedGuard {
+    pub known: Mutex<GuardState>,
+    pub changed: Condvar,
+    pub clock: Clock,
+}
+
+impl SharedGuard {
+    pub fn new(deadlines: Deadlines, clock: Clock) -> Self {
+        Self { known: Mutex::new(GuardState::new(deadlines, clock.now())), changed: Condvar::new(), clock }
+    }
+
+    pub fn known(&self) -> MutexGuard<'_, GuardState> {
+        self.known.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl ClientLoss {
+    pub fn error(&self) -> ArmError {
+        match self {
+            Self::Arm(error) => error.clone(),
+            Self::Wheel(reason) | Self::Tool(reason) => ArmError::Client { reason: reason.clone() },
+        }
+    }
+
+    fn client(reason: String) -> Self {
+        Self::Arm(ArmError::Client { reason })
+    }
+}
+
+impl GuardState {
+    pub fn new(deadlines: Deadlines, now: Instant) -> Self {
+        Self {
+            deadlines,
+            is_ready: false,
+            states: VecDeque::new(),
+            done: 0,
+            sent: 0,
+            served: 0,
+            begun_at: now,
+            waiting_since: None,
+            asked: None,
+            fresh_at: None,
+            ended_since: None,
+            broken: None,
+            closing_since: None,
+        }
+    }
+
+    /// An order goes out; returns its number.
+    ///
+    /// - `takes_time`: it zeroes the sensor, after braking.
+    pub fn send(&mut self, takes_time: bool, now: Instant) -> u64 {
+        self.sent += 1;
+        self.waiting_since.get_or_insert(now);
+        if takes_time {
+            self.asked = Some(self.sent);
+        }
+        self.sent
+    }
+
+    /// The client is told to end.
+    pub fn close(&mut self, now: Instant) {
+        self.closing_since = Some(now);
+    }
+
+    pub fn is_closing(&self) -> bool {
+        self.closing_since.is_some()
+    }
+
+    /// Whether the program of the controller does not run, for long enough that the reason would have been told.
+    pub fn has_ended(&self, now: Instant) -> bool {
+        self.ended_since.is_some_and(|since| now.saturating_duration_since(since) > ENDED)
+    }
+
+    /// How long the next line may stay away from now on.
+    pub fn patience(&self, now: Instant) -> Duration {
+        let (since, deadline, _) = self.awaited();
+        deadline.saturating_sub(now.saturating_duration_since(since.unwrap_or(now)))
+    }
+
+    /// What is wrong when that time has passed without a line.
+    pub fn missed(&self) -> ClientLoss {
+        let (_, deadline, misses) = self.awaited();
+        ClientLoss::client(format!("hangs: {misses} for {} ms", deadline.as_millis()))
+    }
+
+    /// What is waited for: since when, where that was before now, how long, and what is said when it stays away.
+    fn awaited(&self) -> (Option<Instant>, Duration, &'static str) {
+        match (self.closing_since, self.is_ready) {
+            (Some(since), _) => (Some(since), FAREWELL, "it does not end"),
+            (_, true) => (None, self.deadlines.beat, "nothing from it"),
+            (_, false) => (Some(self.begun_at), self.deadlines.connect, "it is not ready"),
+        }
+    }
+
+    /// What a line tells; returns what is wrong.
+    pub fn take(&mut self, report: ClientReport, now: Instant) -> Option<ClientLoss> {
+        match report {
+            ClientReport::Ready => {
+                (self.is_ready, self.fresh_at) = (true, Some(now));
+                // those of before have the pose of another tool
+                self.states.clear();
+            }
+            ClientReport::State(state) => {
+                self.fresh_at = Some(now);
+                // where the safety system has ended it, the state says so by itself
+                let has_ended = !state.is_playing && state.safety() == Safety::Normal;
+                self.ended_since = has_ended.then(|| self.ended_since.unwrap_or(now));
+                if self.states.len() == WAITING {
+                    self.states.pop_front();
+                }
+                self.states.push_back(*state);
+                self.serve(state.served, now);
+            }
+            ClientReport::Beat { served } => self.serve(served, now),
+            ClientReport::Done { number } => {
+                self.done = number;
+                self.asked = self.asked.filter(|asked| *asked != number);
+                self.serve(number, now);
+            }
+            ClientReport::Lost { which } => {
+                let what = match which {
+                    Link::States => "its states",
+                    Link::Control => "orders to it",
+                };
+                return Some(ClientLoss::Arm(ArmError::Dropped { what }));
+            }
+            ClientReport::BadWheel { reason } => return Some(ClientLoss::Wheel(reason)),
+            ClientReport::BadTool { reason } => return Some(ClientLoss::Tool(reason)),
+            ClientReport::Failed { call, reason } => {
+                return Some(ClientLoss::client(format!("was refused a call: {call}: {reason}")));
+            }
+        }
+        let since = |at: Option<Instant>| at.map_or(Duration::ZERO, |at| now.saturating_duration_since(at));
+        let silent = since(self.fresh_at);
+        if self.is_ready && silent > self.deadlines.silent {
+            return Some(ClientLoss::Arm(ArmError::Lost { silent_ms: silent.as_millis() as u64 }));
+        }
+        let patience = if self.asked.is_some() { ZEROING } else { self.deadlines.order };
+        let waited = since(self.waiting_since);
+        (waited > patience).then(|| {
+            ClientLoss::client(format!("hangs: a call of ur-rtde has not returned for {} ms", waited.as_millis()))
+        })
+    }
+
+    fn serve(&mut self, served: u64, now: Instant) {
+        if served > self.served {
+            self.served = served;
+            self.waiting_since = (served < self.sent).then_some(now);
+        }
+    }
+}
+
+/// The thread that waits with deadlines, with a dashboard for itself.
+pub(super) struct Guard {
+    pub child: Child,
+    pub host: String,
+    pub dashboard: Dashboard,
+    pub shared: Arc<SharedGuard>,
+    /// of a controller in lock step: its states move the clock
+    pub hand: Option<ManualClock>,
+}
+
+impl Guard {
+    /// Until the client ends; returns how the arm was stopped when that was not wanted.
+    pub fn watch(mut self, reports: &Receiver<ClientReport>) -> Option<Halt> {
+        let clock = self.shared.clock.clone();
+        let mut stamp_s = f64::INFINITY;
+        let broken = loop {
+            let patience = self.shared.known().patience(clock.now());
+            // lines may come and come from a client that is never ready or never ends
+            let report =
+                if patience.is_zero() { Err(RecvTimeoutError::Timeout) } else { clock.recv_timeout(reports, patience) };
+            let broken = match report {
+                Ok(report) => {
+                    if let (Some(hand), ClientReport::State(state)) = (&self.hand, &report) {
+                        hand.advance(Duration::try_from_secs_f64(state.stamp_s - stamp_s).unwrap_or_default());
+                        stamp_s = state.stamp_s;
+                    }
+                    let broken = self.shared.known().take(report, clock.now());
+                    self.shared.changed.notify_all();
+                    broken
+                }
+                // it ended because it was told to
+                Err(RecvTimeoutError::Disconnected) if self.shared.known().is_closing() => break None,
+                Err(RecvTimeoutError::Timeout) => Some(self.shared.known().missed()),
+                Err(RecvTimeoutError::Disconnected) => {
+                    let end = self.child.wait().map_or_else(|error| error.to_string(), |status| status.to_string());
+                    Some(ClientLoss::client(format!("has ended ({end})")))
+                }
+            };
+            if broken.is_some() {
+                break broken;
+            }
+            if !self.dashboard.is_open() {
+                break Some(ClientLoss::Arm(ArmError::Dropped { what: "its dashboard" }));
+            }
+        };
+        // nothing feeds the arm any more from here on; one that has ended already is as good
+        let _ = self.child.kill();
+        // before it is ready nothing of ours moves, and what runs may be somebody else's
+        let halt = (broken.is_some() && self.shared.known().is_ready).then(|| self.halt());
+        let _ = self.child.wait();
+        if let Some(broken) = broken {
+            tracing::error!(reason = %broken.error(), ?halt, "the arm was stopped");
+            self.shared.known().broken = Some(broken);
+            self.shared.changed.notify_all();
+        }
+        halt
+    }
+
+    fn halt(&mut self) -> Halt {
+        let begun = self.shared.clock.now();
+        let (host, deadline) = (&self.host, self.shared.known().deadlines.dashboard);
+        let stopped = self.dashboard.stop().or_else(|error| {
+            // one that was closed, not one that is silent, may be there again
+            if self.dashboard.is_silent() { Err(error) } else { Dashboard::connect(host, deadline)?.stop() }
+        });
+        match stopped {
+            Ok(()) => Halt::Dashboard { took: self.shared.clock.since(begun) },
+            Err(error) => {
+                tracing::error!(%error, "the arm cannot be stopped by its dashboard: its watchdog does it");
+                Halt::Watchdog
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,302 @@
+//! The guard on a clock that the tests move.
+
+use std::io::{BufRead, BufReader, Write};
+use std::process::{Command, Stdio};
+use std::sync::mpsc::{Sender, channel};
+use std::thread::{self, JoinHandle};
+
+use super::*;
+use crate::ur::dashboard::tests::listen;
+use crate::ur::protocol::tests::STATE;
+
+const MS: Duration = Duration::from_millis(1);
+
+struct GuardBench {
+    known: GuardState,
+    clock: Clock,
+    hand: ManualClock,
+}
+
+impl GuardBench {
+    fn new() -> Self {
+        let (clock, hand) = Clock::manual();
+        Self { known: GuardState::new(Deadlines::default(), clock.now()), clock, hand }
+    }
+
+    fn ready() -> Self {
+        let mut bench = Self::new();
+        assert_eq!(bench.take(ClientReport::Ready), None);
+        bench
+    }
+
+    fn take(&mut self, report: ClientReport) -> Option<ClientLoss> {
+        self.known.take(report, self.clock.now())
+    }
+
+    /// Has the same line come each millisecond; returns after how many of them something is wrong, and what.
+    fn until_broken(&mut self, line: &ClientReport) -> (u64, ClientLoss) {
+        for ms in 1..10_000 {
+            self.hand.advance(MS);
+            if let Some(broken) = self.take(line.clone()) {
+                return (ms, broken);
+            }
+        }
+        panic!("nothing is ever wrong");
+    }
+}
+
+fn state(is_playing: bool, safety_bits: u32, served: u64) -> ClientReport {
+    ClientReport::State(Box::new(State { is_playing, safety_bits, served, ..STATE }))
+}
+
+#[test]
+fn a_client_has_ten_seconds_to_be_ready_and_from_then_on_80_ms_for_each_line() {
+    let mut bench = GuardBench::new();
+    bench.hand.advance(9_000 * MS);
+    // what it says meanwhile changes nothing
+    assert_eq!(bench.take(ClientReport::Beat { served: 0 }), None);
+    assert_eq!(bench.known.patience(bench.clock.now()), 1_000 * MS);
+    bench.hand.advance(999 * MS);
+    assert_eq!(bench.known.patience(bench.clock.now()), MS);
+    bench.hand.advance(MS);
+    assert_eq!(bench.known.patience(bench.clock.now()), Duration::ZERO);
+    assert_eq!(bench.known.missed(), ClientLoss::client("hangs: it is not ready for 10000 ms".to_owned()));
+    assert_eq!(bench.take(ClientReport::Ready), None);
+    assert_eq!(bench.known.patience(bench.clock.now()), 80 * MS);
+    assert_eq!(bench.known.missed(), ClientLoss::client("hangs: nothing from it for 80 ms".to_owned()));
+}
+
+#[test]
+fn states_that_stay_away_for_more_than_80_ms_are_a_lost_arm() {
+    let mut bench = GuardBench::ready();
+    bench.hand.advance(50 * MS);
+    assert_eq!(bench.take(state(true, 1, 0)), None);
+    let broken = bench.until_broken(&ClientReport::Beat { served: 0 });
+    assert_eq!(broken, (81, ClientLoss::Arm(ArmError::Lost { silent_ms: 81 })));
+}
+
+#[test]
+fn a_call_that_does_not_return_for_more_than_200_ms_is_a_hanging_client() {
+    let mut bench = GuardBench::ready();
+    assert_eq!(bench.known.send(false, bench.clock.now()), 1);
+    bench.hand.advance(150 * MS);
+    assert_eq!(bench.known.send(false, bench.clock.now()), 2);
+    // the first has returned: the time of the second begins
+    assert_eq!(bench.take(state(true, 1, 1)), None);
+    let broken = bench.until_broken(&state(true, 1, 1));
+    let hangs = |ms| ClientLoss::client(format!("hangs: a call of ur-rtde has not returned for {ms} ms"));
+    assert_eq!(broken, (201, hangs(201)));
+    // none under way, no deadline
+    assert_eq!(bench.take(state(true, 1, 2)), None);
+    bench.hand.advance(5_000 * MS);
+    assert_eq!(bench.take(state(true, 1, 2)), None);
+    // zeroing has three seconds, and what comes after it 200 ms again
+    assert_eq!(bench.known.send(true, bench.clock.now()), 3);
+    assert_eq!(bench.until_broken(&state(true, 1, 2)), (3_001, hangs(3_001)));
+    assert_eq!(bench.take(ClientReport::Done { number: 3 }), None);
+    assert_eq!(bench.known.done, 3);
+    bench.known.send(false, bench.clock.now());
+    assert_eq!(bench.until_broken(&state(true, 1, 3)), (201, hangs(201)));
+}
+
+#[test]
+fn a_program_that_has_ended_is_told_after_40_ms_unless_the_state_says_why() {
+    let mut bench = GuardBench::ready();
+    let has_ended = |bench: &GuardBench| bench.known.has_ended(bench.clock.now());
+    bench.take(state(false, 1, 0));
+    bench.hand.advance(40 * MS);
+    bench.take(state(false, 1, 0));
+    assert!(!has_ended(&bench));
+    bench.hand.advance(MS);
+    assert!(has_ended(&bench));
+    // a protective stop
+    bench.take(state(false, 1 << 2, 0));
+    assert!(!has_ended(&bench));
+    bench.take(state(false, 1, 0));
+    bench.hand.advance(30 * MS);
+    // it runs again
+    bench.take(state(true, 1, 0));
+    bench.hand.advance(30 * MS);
+    assert!(!has_ended(&bench));
+}
+
+#[test]
+fn a_client_that_is_told_to_end_has_a_second_and_a_half() {
+    let mut bench = GuardBench::ready();
+    bench.known.close(bench.clock.now());
+    bench.hand.advance(1_499 * MS);
+    bench.take(state(true, 1, 0));
+    assert_eq!(bench.known.patience(bench.clock.now()), MS);
+    bench.hand.advance(MS);
+    assert_eq!(bench.known.patience(bench.clock.now()), Duration::ZERO);
+    assert_eq!(bench.known.missed(), ClientLoss::client("hangs: it does not end for 1500 ms".to_owned()));
+}
+
+#[test]
+fn states_that_nobody_takes_are_the_newest_64() {
+    let mut bench = GuardBench::ready();
+    for served in 0..100 {
+        bench.take(state(true, 1, served));
+    }
+    let served: Vec<u64> = bench.known.states.iter().map(|state| state.served).collect();
+    assert_eq!(served, (36..100).collect::<Vec<_>>());
+}
+
+/// A dashboard that answers `stop`, with what it was asked, and a guard of a client that says what the test sends.
+struct Watch {
+    hand: ManualClock,
+    shared: Arc<SharedGuard>,
+    reports: Sender<ClientReport>,
+    asked: Receiver<String>,
+    guard: JoinHandle<Option<Halt>>,
+    client: u32,
+}
+
+impl Watch {
+    /// - `connections`: to the dashboard, each of which it serves; but the first it closes when there are two.
+    fn begin(connections: usize) -> Self {
+        let (host, listener) = listen();
+        let (ask, asked) = channel();
+        thread::spawn(move || {
+            for left in (0..connections).rev() {
+                let (mut socket, _) = listener.accept().unwrap();
+                writeln!(socket, "Connected: a test").unwrap();
+                if left > 0 {
+                    continue;
+                }
+                for line in BufReader::new(socket.try_clone().unwrap()).lines().map_while(Result::ok) {
+                    ask.send(line).unwrap();
+                    writeln!(socket, "Stopped").unwrap();
+                }
+            }
+        });
+        let (clock, hand) = Clock::manual();
+        // an answer of the dashboard is waited for in real time
+        let deadlines = Deadlines { dashboard: Duration::from_secs(60), ..Deadlines::default() };
+        let dashboard = Dashboard::connect(&host, deadlines.dashboard).unwrap();
+        let shared = Arc::new(SharedGuard::new(deadlines, clock));
+        let mut command = Command::new("sleep");
+        let child = command.arg("1000").stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        let client = child.id();
+        let (reports, lines) = channel();
+        let guard = Guard { child, host, dashboard, shared: shared.clone(), hand: None };
+        let guard = thread::spawn(move || guard.watch(&lines));
+        while hand.waiting() == 0 {
+            thread::yield_now();
+        }
+        Self { hand, shared, reports, asked, guard, client }
+    }
+
+    /// Has a line come, and returns when the guard waits for the next one.
+    fn say(&self, report: ClientReport) {
+        let begun = self.hand.begun();
+        self.reports.send(report).unwrap();
+        while self.hand.begun() == begun {
+            thread::yield_now();
+        }
+    }
+
+    /// Nothing is wrong after some time.
+    fn is_calm_after(&self, time: Duration) {
+        self.hand.advance(time);
+        assert_eq!(self.hand.waiting(), 1, "it waits on");
+        assert!(self.shared.known().broken.is_none() && self.asked.try_recv().is_err());
+    }
+
+    /// After some time the guard waits no longer.
+    fn acts_after(&self, time: Duration) {
+        self.hand.advance(time);
+        assert_eq!(self.hand.waiting(), 0, "it waits on");
+    }
+
+    /// How the guard ended, what was wrong, and what the dashboard was asked.
+    fn end(self) -> (Option<Halt>, Option<ClientLoss>, Vec<String>) {
+        let begun = Instant::now();
+        while !self.guard.is_finished() {
+            assert!(begun.elapsed() < Duration::from_secs(60), "it never ends");
+            thread::sleep(MS);
+        }
+        let halt = self.guard.join().unwrap();
+        let client = format!("/proc/{}", self.client);
+        assert!(!std::path::Path::new(&client).exists(), "the client is gone");
+        let broken = self.shared.known().broken.clone();
+        (halt, broken, self.asked.iter().collect())
+    }
+}
+
+const STOPPED: Option<Halt> = Some(Halt::Dashboard { took: Duration::ZERO });
+
+#[test]
+fn a_missed_line_kills_the_client_and_stops_the_arm() {
+    let watch = Watch::begin(1);
+    watch.say(ClientReport::Ready);
+    watch.is_calm_after(79 * MS);
+    watch.say(ClientReport::Beat { served: 0 });
+    watch.is_calm_after(79 * MS);
+    watch.acts_after(MS);
+    let (halt, broken, asked) = watch.end();
+    assert_eq!((halt, asked), (STOPPED, vec!["stop".to_owned()]));
+    assert_eq!(broken, Some(ClientLoss::client("hangs: nothing from it for 80 ms".to_owned())));
+}
+
+#[test]
+fn silent_states_stop_the_arm_though_lines_come() {
+    let watch = Watch::begin(1);
+    watch.say(ClientReport::Ready);
+    watch.is_calm_after(40 * MS);
+    watch.say(ClientReport::Beat { served: 0 });
+    watch.is_calm_after(40 * MS);
+    watch.say(ClientReport::Beat { served: 0 });
+    watch.is_calm_after(MS);
+    watch.reports.send(ClientReport::Beat { served: 0 }).unwrap();
+    let (halt, broken, asked) = watch.end();
+    assert_eq!((halt, asked), (STOPPED, vec!["stop".to_owned()]));
+    assert_eq!(broken, Some(ClientLoss::Arm(ArmError::Lost { silent_ms: 81 })));
+}
+
+#[test]
+fn a_client_that_is_never_ready_is_killed_and_nobody_elses_program_stopped() {
+    let watch = Watch::begin(1);
+    watch.is_calm_after(9_999 * MS);
+    watch.acts_after(MS);
+    let (halt, broken, asked) = watch.end();
+    assert_eq!((halt, asked), (None, Vec::new()));
+    assert_eq!(broken, Some(ClientLoss::client("hangs: it is not ready for 10000 ms".to_owned())));
+}
+
+#[test]
+fn a_client_that_does_not_end_is_killed_and_the_arm_stopped() {
+    let watch = Watch::begin(1);
+    watch.say(ClientReport::Ready);
+    watch.shared.known().close(watch.shared.clock.now());
+    watch.say(ClientReport::Beat { served: 0 });
+    watch.is_calm_after(1_499 * MS);
+    watch.acts_after(MS);
+    let (halt, broken, asked) = watch.end();
+    assert_eq!((halt, asked), (STOPPED, vec!["stop".to_owned()]));
+    assert_eq!(broken, Some(ClientLoss::client("hangs: it does not end for 1500 ms".to_owned())));
+}
+
+#[test]
+fn a_client_that_ends_as_it_was_told_is_no_fault() {
+    let watch = Watch::begin(1);
+    watch.say(ClientReport::Ready);
+    watch.shared.known().close(watch.shared.clock.now());
+    let Watch { guard, reports, shared, asked, .. } = watch;
+    drop(reports);
+    assert_eq!((guard.join().unwrap(), asked.iter().count()), (None, 0));
+    assert!(shared.known().broken.is_none());
+}
+
+#[test]
+fn a_dashboard_that_was_closed_is_connected_again_to_stop_the_arm() {
+    let watch = Watch::begin(2);
+    watch.reports.send(ClientReport::Ready).unwrap();
+    // that it is closed is seen with a line that comes after that
+    while watch.reports.send(ClientReport::Beat { served: 0 }).is_ok() {
+        thread::yield_now();
+    }
+    let (halt, broken, asked) = watch.end();
+    assert_eq!((halt, asked), (STOPPED, vec!["stop".to_owned()]));
+    assert_eq!(broken, Some(ClientLoss::Arm(ArmError::Dropped { what: "its dashboard" })));
+}

@@ -1,0 +1,183 @@
+//! What the two processes say to each other: one JSON object on each line.
+//!
+//! Orders go down the client's stdin, reports come up its stdout. Poses and velocities are those of ur_rtde: place and rotation
+//! vector in the base B, m and rad.
+
+use std::path::PathBuf;
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
+
+use crate::robot::Safety;
+
+/// The one version of ur-rtde that this was made and tested with.
+pub const WHEEL: &str = "1.6.5";
+
+/// The first line: whom to connect, and how.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Begin {
+    pub host: String,
+    pub site_packages: PathBuf,
+    /// the tip in the flange
+    pub tool: [f64; 6],
+    pub mass_kg: f64,
+    /// in the flange
+    pub centre_m: [f64; 3],
+    pub damping: f64,
+    pub gain: f64,
+    /// the clock of the controller waits for its client
+    pub is_lock_step: bool,
+}
+
+/// A line down.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Order {
+    /// one more for each
+    pub number: u64,
+    pub what: What,
+}
+
+/// What is to be done. The newest motion takes the place of those before; a zero is done whatever comes after it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum What {
+    /// Goes with a velocity, until the next order or until orders stay away.
+    Move { twist: [f64; 6], acceleration: f64 },
+    /// Presses along z of a frame of B and goes with a velocity.
+    Press { frame: [f64; 6], force_n: f64, speed: f64, feed: [f64; 3], acceleration: f64 },
+    /// To rest.
+    Stop { deceleration: f64 },
+    /// Zeroes the sensor, at rest.
+    Zero,
+}
+
+/// A line up.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum ClientReport {
+    /// The arm is at command.
+    Ready,
+    /// A new state.
+    State(Box<State>),
+    /// Nothing new from the arm; the client lives.
+    Beat { served: u64 },
+    /// `Zero` is done.
+    Done { number: u64 },
+    /// A connection of the library is gone. The last line of all: after that the library cannot be trusted.
+    Lost { which: Link },
+    /// No or another library.
+    BadWheel { reason: String },
+    /// The tool that was set is not there.
+    BadTool { reason: String },
+    /// A call of the library failed, though nothing on the arm forbids it.
+    Failed { call: String, reason: String },
+}
+
+/// Which connection of the library.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Link {
+    States,
+    Control,
+}
+
+/// What the arm says of itself.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct State {
+    /// of the controller
+    pub stamp_s: f64,
+    pub pose: [f64; 6],
+    /// of the tip, m/s and rad/s
+    pub velocity: [f64; 6],
+    /// N and N m, less payload and what it was zeroed by; in B about the tip
+    pub wrench: [f64; 6],
+    /// as the sensor has it; in the flange
+    pub raw_wrench: [f64; 6],
+    /// rad
+    pub joints: [f64; 6],
+    /// as the controller has them
+    pub safety_bits: u32,
+    /// whether the uploaded program runs
+    pub is_playing: bool,
+    /// number of the last order whose calls have returned
+    pub served: u64,
+}
+
+/// Bits of `safety_status_bits`, as the RTDE guide has them: violation, fault, and recovery, which takes a panel.
+const FAULT_BITS: u32 = 1 << 3 | 1 << 8 | 1 << 9;
+/// Safeguard, and the buttons.
+const OPERATOR_BITS: u32 = 1 << 4 | 1 << 5 | 1 << 6 | 1 << 7;
+/// Protective stop, and stopped for any reason of safety.
+const PROTECTIVE_BITS: u32 = 1 << 2 | 1 << 10;
+
+impl State {
+    /// What the bits of the safety system mean; the gravest counts.
+    pub fn safety(&self) -> Safety {
+        match self.safety_bits {
+            bits if bits & FAULT_BITS != 0 => Safety::Fault,
+            bits if bits & OPERATOR_BITS != 0 => Safety::OperatorStop,
+            bits if bits & PROTECTIVE_BITS != 0 => Safety::ProtectiveStop,
+            _ => Safety::Normal,
+        }
+    }
+}
+
+/// Pose of ur_rtde: place and rotation vector.
+pub fn vector_of(pose: &Isometry3<f64>) -> [f64; 6] {
+    let (place, turn) = (pose.translation.vector, pose.rotation.scaled_axis());
+    [place.x, place.y, place.z, turn.x, turn.y, turn.z]
+}
+
+/// The other way.
+pub fn pose_of([x, y, z, rx, ry, rz]: [f64; 6]) -> Isometry3<f64> {
+    let turn = UnitQuaternion::from_scaled_axis(Vector3::new(rx, ry, rz));
+    Isometry3::from_parts(Translation3::new(x, y, z), turn)
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pose_comes_back_from_its_vector() {
+        // half a turn about x, and one that a vector of roll, pitch and yaw would have otherwise
+        for vector in [[0.1, -0.2, 0.3, std::f64::consts::PI, 0.0, 0.0], [0.0, 0.0, 0.5, 0.7, -1.1, 0.4]] {
+            let back = vector_of(&pose_of(vector));
+            assert!(vector.iter().zip(back).all(|(a, b)| (a - b).abs() < 1e-12), "{vector:?} {back:?}");
+        }
+        // a quarter turn about z takes x to y
+        let turned = pose_of([0.0, 0.0, 0.0, 0.0, 0.0, std::f64::consts::FRAC_PI_2]).rotation * Vector3::x();
+        assert!((turned - Vector3::y()).norm() < 1e-15, "{turned}");
+    }
+
+    pub const STATE: State = State {
+        stamp_s: 12.345_678_901_234_5,
+        pose: [0.1; 6],
+        velocity: [-1e-17; 6],
+        wrench: [1.0 / 3.0; 6],
+        raw_wrench: [2.0 / 3.0; 6],
+        joints: [3.0; 6],
+        safety_bits: 1,
+        is_playing: true,
+        served: 7,
+    };
+
+    #[test]
+    fn the_gravest_of_the_bits_counts() {
+        let safety = |safety_bits| State { safety_bits, ..STATE }.safety();
+        assert_eq!(safety(1), Safety::Normal);
+        // reduced mode
+        assert_eq!(safety(0b10), Safety::Normal);
+        assert_eq!(safety(1 << 2 | 1 << 10), Safety::ProtectiveStop);
+        assert_eq!(safety(1 << 7 | 1 << 2), Safety::OperatorStop);
+        assert_eq!(safety(1 << 9 | 1 << 7), Safety::Fault);
+    }
+
+    #[test]
+    fn lines_come_back_as_they_went() {
+        let state = STATE;
+        let line = serde_json::to_string(&ClientReport::State(Box::new(state))).unwrap();
+        assert_eq!(serde_json::from_str::<ClientReport>(&line).unwrap(), ClientReport::State(Box::new(state)));
+        assert!(!line.contains('\n'));
+        let order = Order { number: 1, what: What::Move { twist: [0.1; 6], acceleration: 0.5 } };
+        let line = serde_json::to_string(&order).unwrap();
+        assert_eq!(line, r#"{"number":1,"what":{"Move":{"twist":[0.1,0.1,0.1,0.1,0.1,0.1],"acceleration":0.5}}}"#);
+    }
+}
