@@ -1,48 +1,7 @@
-//! Two things that only the build knows: the commit it is built from, for the report; and with feature `ur` the place of the
-//! Python that the program was built for, so that the loader finds it also where there are two.
-
-use std::path::Path;
-use std::process::Command;
+//! With feature `ur` the place of the Python that the program was built for, so that the loader finds it also where there are two.
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
-    println!("cargo::rustc-env=TOUCHUP_COMMIT={}", commit().unwrap_or_else(|| "unknown".to_owned()));
     #[cfg(feature = "ur")]
     pyo3_build_config::add_libpython_rpath_link_args();
-}
-
-/// `None` without git, and where this is no checkout of its own: a tarball, or inside another repository.
-fn commit() -> Option<String> {
-    git(&["ls-files", "--error-unmatch", "build.rs"])?;
-    // asked again when HEAD moves, and when a source changes, which is built again anyway
-    let branch = git(&["symbolic-ref", "--quiet", "HEAD"]);
-    for name in ["HEAD", "logs/HEAD", branch.as_deref().unwrap_or("HEAD")] {
-        // a path that is not there would be asked for at every build
-        git(&["rev-parse", "--git-path", name]).filter(|path| Path::new(path).exists()).into_iter().for_each(watch);
-    }
-    ["src", "crates", "Cargo.toml", "Cargo.lock"].map(str::to_owned).into_iter().for_each(watch);
-    let hash = git(&["rev-parse", "--short=12", "HEAD"])?;
-    let changed = git(&[
-        "status",
-        "--porcelain",
-        "--untracked-files=no",
-        "--",
-        "src",
-        "crates",
-        "Cargo.toml",
-        "Cargo.lock",
-        "build.rs",
-    ])?;
-    Some(if changed.is_empty() { hash } else { format!("{hash}, with changes") })
-}
-
-fn watch(path: String) {
-    println!("cargo::rerun-if-changed={path}");
-}
-
-/// What it prints; `None` where it fails.
-fn git(arguments: &[&str]) -> Option<String> {
-    let output = Command::new("git").args(arguments).output().ok()?;
-    let text = String::from_utf8(output.stdout).ok()?;
-    output.status.success().then(|| text.trim().to_owned())
 }

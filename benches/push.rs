@@ -12,8 +12,8 @@ use std::time::Instant;
 use nalgebra::{Point3, Vector3};
 use touchup::mesh::{FaceTree, TriMesh, triangle};
 use touchup::refine::{RefineParams, Refiner, RoiSize, TipParams};
-use touchup::report::cost::MinimalLoop;
 use touchup::sim::wavy::{RADIUS, SIDE, STIFFNESS, slide, wavy_plate};
+use touchup_report::cost::MinimalLoop;
 
 /// Width of the raster, m.
 const WIDTH: f64 = 0.8 * SIDE;

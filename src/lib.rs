@@ -11,8 +11,8 @@
 //! | [`touchup_core`] | the method: [`touch`] [`mesh`] [`patch`] [`refine`] [`features`] [`align`] [`compare`] [`calibrate`] [`explore`] [`robot`] [`probe`]; frames and units |
 //! | [`touchup_sim`] | [`sim`]: known surfaces, a scanner, a stylus and an arm to test against |
 //! | [`touchup_io`] | [`io`]: mesh files, recordings, tables, pictures |
-//! | [`touchup_session`] | [`clock`], [`scene`], [`live`], [`session`] |
-//! | [`touchup_report`] | [`report`]: error against run time, stability, and what each part costs |
+//! | [`touchup_session`] | [`clock`], [`scene`], [`replay`], [`live`], [`session`] |
+//! | `touchup-report` | a program of its own: error against run time, stability, and what each part costs |
 //! | this one | `ros`: the node (features `ros` and `r2r`); `ur` (feature `ur`): a UR; [`cli`]: one file for each verb |
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
@@ -22,8 +22,8 @@
 struct MethodPage;
 
 pub use touchup_core::{align, calibrate, compare, explore, features, mesh, patch, probe, refine, robot, touch};
-pub use touchup_session::{clock, live, scene, session};
-pub use {touchup_io as io, touchup_report as report, touchup_sim as sim};
+pub use touchup_session::{clock, live, replay, scene, session};
+pub use {touchup_io as io, touchup_sim as sim};
 
 pub mod cli;
 #[cfg(any(feature = "ros", feature = "r2r"))]

@@ -5,12 +5,7 @@ use std::io::{IsTerminal, stderr};
 use std::process::ExitCode;
 
 use touchup::cli::{log_filter, run};
-use touchup::report::allocations::CountingAllocator;
 use tracing_subscriber::EnvFilter;
-
-/// `touchup report` tells what is asked for memory; nothing else looks at the counts.
-#[global_allocator]
-static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 fn main() -> ExitCode {
     let arguments: Vec<OsString> = std::env::args_os().collect();

@@ -83,7 +83,7 @@ unoptimised=(--config profile.dev.opt-level=0 --config 'profile.dev.package."*".
 
 # the program, the stand-in for a controller and what tests them
 build_tests() {
-  cargo build "${ur[@]}" --bins --examples && cargo test --no-run "${ur[@]}" "${programs[@]}" || fail "the tests do not build"
+  cargo build "${ur[@]}" --bins --examples && cargo test --workspace --no-run "${ur[@]}" "${programs[@]}" || fail "the tests do not build"
 }
 
 # cargo_tests LOG ARGUMENT...
@@ -144,10 +144,10 @@ PYTHON
 }
 
 ur_feature || skip "$(cat tests/ur/*.rs | grep -c '^#\[test\]')" "a UR arm needs the shared library of Python (Debian: apt-get install python3-dev)"
-programs=(--test rooms)
+programs=(--test rooms --test report)
 [ "${#ur[@]}" -eq 0 ] || programs+=(--test ur)
 stage "build of the Rust tests" build_tests
-stage "Rust tests" cargo_tests "$logs/rust.log" "${ur[@]}" "${programs[@]}"
+stage "Rust tests" cargo_tests "$logs/rust.log" --workspace "${ur[@]}" "${programs[@]}"
 stage "Rust unit tests" cargo_tests "$logs/rust_unit.log" --workspace "${unoptimised[@]}" "${ur[@]}" --lib
 stage "Rust documentation tests" cargo_tests "$logs/rust_doc.log" --workspace "${ur[@]}" --doc
 stage "r2r" r2r_tests

@@ -15,7 +15,6 @@ mod found;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 mod node;
 mod offsets;
-mod peers;
 mod probe;
 mod probing;
 mod progress;
@@ -24,7 +23,6 @@ mod refine;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 mod replay;
 mod report;
-mod samples;
 mod simulate;
 mod step;
 mod threads;
@@ -54,7 +52,7 @@ use crate::io::touches_file::TouchesFileError;
 use crate::live::LiveError;
 use crate::mesh::MeshError;
 use crate::refine::RefineError;
-use crate::report::ReportError;
+use crate::replay::ReplayError;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use crate::ros::arguments::{ArgumentError, log_level, split};
 #[cfg(any(feature = "ros", feature = "r2r"))]
@@ -66,7 +64,7 @@ use crate::touch::SettingError;
 
 /// Repairs a 3D scan by touch.
 #[derive(Debug, Parser)]
-#[command(name = "touchup", version, after_help = EXIT_CODES)]
+#[command(name = "touchup", version = crate::io::machine::VERSION, after_help = EXIT_CODES)]
 struct Arguments {
     #[command(subcommand)]
     verb: Verb,
@@ -106,7 +104,8 @@ enum Verb {
     Check(check::CheckArguments),
     /// Scans and touches a known part: makes the input of refine
     Simulate(simulate::SimulateArguments),
-    /// Measures error against run time, stability and cost on this machine, and writes page, plots and tables
+    /// Measures error against run time, stability and cost on this machine: runs `touchup-report`, a program of its own
+    #[command(disable_help_flag = true)]
     Report(report::ReportArguments),
     /// Refines a scan live, as a ROS 2 node
     #[cfg(any(feature = "ros", feature = "r2r"))]
@@ -155,12 +154,6 @@ enum CliError {
     #[error(transparent)]
     Simulate(#[from] SimError),
     #[error(transparent)]
-    Peers(#[from] peers::PeersError),
-    #[error(transparent)]
-    WholeScan(#[from] crate::report::WholeScanError),
-    #[error(transparent)]
-    Cost(#[from] crate::report::cost::CostError),
-    #[error(transparent)]
     Mesh(#[from] MeshError),
     #[error(transparent)]
     Setting(#[from] SettingError),
@@ -190,7 +183,7 @@ enum CliError {
     #[error("feature {0}: {1}")]
     Explore(u32, ExploreError),
     #[error(transparent)]
-    Report(#[from] ReportError),
+    Report(#[from] report::NoReport),
     #[error("the two cannot be compared: {0}")]
     Compare(#[from] CompareError),
     #[cfg(any(feature = "ros", feature = "r2r"))]
@@ -208,6 +201,16 @@ enum CliError {
     #[cfg(feature = "ur")]
     #[error(transparent)]
     UrChild(#[from] crate::ur::child::ChildError),
+}
+
+impl From<ReplayError> for CliError {
+    fn from(error: ReplayError) -> Self {
+        match error {
+            ReplayError::Markers(what) => Self::Usage(what),
+            ReplayError::Read(error) => Self::ReadRecording(error),
+            ReplayError::Setting(error) => Self::Setting(error),
+        }
+    }
 }
 
 impl From<OutcomeError> for CliError {
@@ -228,7 +231,7 @@ impl CliError {
             Self::WriteMesh(_) | Self::WriteRecording(_) | Self::Write { .. } | Self::Stream(_) => 1,
             Self::Touches(TouchesFileError::Write { .. }) | Self::Features(FeaturesFileError::Write { .. }) => 1,
             Self::Usage(_) | Self::Explore(..) => 2,
-            Self::Arm(_) | Self::Report(_) | Self::Peers(_) | Self::Cost(_) => 1,
+            Self::Arm(_) | Self::Report(_) => 1,
             #[cfg(any(feature = "ros", feature = "r2r"))]
             Self::RosArguments(_) => 2,
             #[cfg(any(feature = "ros", feature = "r2r"))]
@@ -248,7 +251,7 @@ impl CliError {
             Self::Touches(_) | Self::Features(_) | Self::Session(_) => 3,
             Self::Table(_) | Self::Pairs { .. } | Self::Payload { .. } | Self::Tip { .. } | Self::Rests { .. } => 3,
             Self::Mesh(_) | Self::Setting(_) | Self::Refine(_) | Self::Live(_) => 3,
-            Self::Align(_) | Self::AlignFeatures(_) | Self::Compare(_) | Self::WholeScan(_) => 3,
+            Self::Align(_) | Self::AlignFeatures(_) | Self::Compare(_) => 3,
         }
     }
 }

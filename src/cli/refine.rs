@@ -14,7 +14,6 @@ use tracing::{debug, warn};
 use super::offsets::{ContactPoints, ScanOffset, WrenchOffset};
 use super::progress::WorkProgress;
 use super::rates::{Ended, LiveSummary, Rates};
-use super::samples::{Recording, Replayed, each_sample, marker_filter};
 use super::{CliError, Losses, check_kept_by, tell};
 use crate::io::atomic::{AtomicFile, is_same_file};
 use crate::io::mesh_file::{MeshFile, MeshFileError, MeshUnit, check_target, read_mesh};
@@ -23,6 +22,7 @@ use crate::live::{Latencies, Quantiles};
 use crate::mesh::{FaceTree, RepairReport, TriMesh};
 use crate::patch::Patcher;
 use crate::refine::{RefineCounts, RefineError, RefineParams, Refiner};
+use crate::replay::{Recording, Replayed, each_sample, marker_filter};
 use crate::scene::{CutScan, Memory, Mode, Scene, SceneCost};
 use crate::session::{Outcome, OutcomePlaces, PatchSummary, SessionRecord, StrokeChange, UncertaintySummary};
 use crate::touch::{ClockEstimator, Compensator, MarkerCounts, Sample};
@@ -377,17 +377,20 @@ impl RefineArguments {
         let compensator = Compensator::new(params.compensator)?;
         let mut clock = scene.clock_params().map(ClockEstimator::new).transpose()?;
         let mut contacts = self.registration.then(|| ContactPoints::new(&params)).transpose()?;
-        let mut replayed = each_sample(recording, scene.placement(), scene.sync_params(), markers, |sample| {
-            strokes.apply_until(sample.stamp_ns, &mut rates);
-            pushes.push(&mut rates, sample);
-            let tip = compensator.compensate(sample);
-            if let Some(clock) = &mut clock {
-                clock.push(&tip);
-            }
-            if let Some(contacts) = &mut contacts {
-                contacts.push(&tip);
-            }
-        })?;
+        let mut progress = WorkProgress::new("replay", recording.message_count());
+        let mut at_each = || progress.step();
+        let mut replayed =
+            each_sample(recording, scene.placement(), scene.sync_params(), markers, &mut at_each, |sample| {
+                strokes.apply_until(sample.stamp_ns, &mut rates);
+                pushes.push(&mut rates, sample);
+                let tip = compensator.compensate(sample);
+                if let Some(clock) = &mut clock {
+                    clock.push(&tip);
+                }
+                if let Some(contacts) = &mut contacts {
+                    contacts.push(&tip);
+                }
+            })?;
         strokes.apply_until(i64::MAX, &mut rates);
         let registration = contacts
             .map(|contacts| ScanOffset::of(contacts.registrar.estimate(&as_scanned, &FaceTree::new(&as_scanned))));

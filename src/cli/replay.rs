@@ -8,9 +8,10 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use serde::Serialize;
 
-use super::samples::{Recording, each_message, marker_filter};
+use super::progress::WorkProgress;
 use super::{CliError, Losses, complain, tell};
 use crate::io::recording::Topics;
+use crate::replay::{Recording, each_message, marker_filter};
 use crate::ros;
 use crate::ros::arguments::NodeConfig;
 use crate::ros::node::{CELL, as_pose, as_wrench};
@@ -106,7 +107,9 @@ pub(super) fn replay(arguments: &ReplayArguments, ros: &[String]) -> Result<Loss
         played.unsent += u64::from(!is_sent);
     };
     let mut order = StampOrder::default();
-    let replayed = each_message(recording, markers, |message| order.push(message, &mut publish))?;
+    let mut progress = WorkProgress::new("replay", recording.message_count());
+    let mut at_each = || progress.step();
+    let replayed = each_message(recording, markers, &mut at_each, |message| order.push(message, &mut publish))?;
     order.finish(&mut publish);
     played.played_s = began.elapsed().as_secs_f64();
     let listeners = port.listeners();

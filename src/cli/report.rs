@@ -1,226 +1,51 @@
-//! `touchup report`: measures error against run time, stability and cost on this machine, and writes page, plots and tables.
+//! `touchup report`: hands over to the program `touchup-report`, so that nothing of it is in this one.
 
-use std::io::{Write, stderr};
-use std::path::{Path, PathBuf};
-use std::time::{Instant, SystemTime};
+use std::ffi::OsString;
+use std::io::ErrorKind;
+use std::path::PathBuf;
+use std::process::Command;
 
-use chrono::{DateTime, Utc};
-use clap::{Args, ValueEnum};
+use clap::Args;
 
-use super::peers::peers;
-use super::samples::{Recording, each_sample};
-use super::{CliError, Losses, tell};
-use crate::io::atomic::{create_folder, write_atomically};
-use crate::io::machine::describe_machine;
-use crate::io::mesh_file::{MeshUnit, read_mesh};
-use crate::io::recording::Topics;
-use crate::report::cost::cost;
-use crate::report::{
-    Chapter, Effort, Given, Report, WorkPrecision, convergence, extremes, stability, verdict, whole_scan,
-};
-use crate::scene::Scene;
+use super::{CliError, Losses};
+
+/// The program, beside this one or on the path.
+const PROGRAM: &str = "touchup-report";
 
 #[derive(Debug, Args)]
 pub(super) struct ReportArguments {
-    /// Folder for report.html, report.json, and the SVG and CSV of each figure and table
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
-    /// Measures less: under a minute
-    #[arg(long)]
-    quick: bool,
-    /// Prints report.json instead of the verdict
-    #[arg(long)]
-    json: bool,
-    /// Measures against Open3D, libigl, SciPy, trimesh and scikit-learn too, which are installed from PyPI; takes some minutes
-    #[arg(long)]
-    peers: bool,
-    /// Virtual environment for them; made where it is not there [default: peers-env in the folder of --out]
-    #[arg(long, value_name = "DIR", requires = "peers")]
-    peers_env: Option<PathBuf>,
-    /// A scan to measure on beside the simulated ones: PLY, STL or OBJ
-    #[arg(long, value_name = "MESH", requires_all = ["truth", "bag"])]
-    scan: Option<PathBuf>,
-    /// Its true part, in the frame of the scan
-    #[arg(long, value_name = "MESH", requires = "scan")]
-    truth: Option<PathBuf>,
-    /// The touches on it: a ROS 2 recording with the usual topics
-    #[arg(long, value_name = "RECORDING", requires = "scan")]
-    bag: Option<PathBuf>,
-    /// Unit of the coordinates of scan and truth
-    #[arg(long, value_name = "U", default_value = "mm")]
-    mesh_unit: MeshUnit,
-    /// Tip, sensor and frames of the recording
-    #[arg(long, value_name = "YAML", requires = "scan")]
-    scene: Option<PathBuf>,
-    /// Only these chapters
-    #[arg(long, value_name = "CHAPTER", num_args = 1..)]
-    only: Vec<ReportChapter>,
+    /// Those of `touchup-report`; --help lists them
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+    arguments: Vec<OsString>,
 }
 
-/// A chapter that can be asked for by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum ReportChapter {
-    /// Error against time and evaluations of each integrator, for one face
-    WorkPrecision,
-    /// Error against time of each way to refine whole scans, with two baselines
-    WholeScan,
-    /// Error from sweep to sweep
-    Convergence,
-    /// Where each integrator stays stable, and what becomes of extremes
-    Stability,
-    /// Time, allocations and memory of each stage and part
-    Cost,
+/// Why there is no report.
+#[derive(Debug, thiserror::Error)]
+pub enum NoReport {
+    /// It is not installed.
+    #[error(
+        "touchup-report is neither beside this program nor on the path: `cargo install --locked --path crates/touchup-report` in \
+         touchup's folder puts it there, `cargo run --release -p touchup-report -- --out out` does without"
+    )]
+    Missing,
+    /// It does not start.
+    #[error("cannot start {}: {source}", path.display())]
+    Start {
+        /// the program
+        path: PathBuf,
+        /// why not
+        source: std::io::Error,
+    },
 }
 
-/// What is on the page.
-#[derive(Default)]
-struct MeasuredChapters {
-    chapters: Vec<Chapter>,
-    verdict: Vec<String>,
-}
-
-impl MeasuredChapters {
-    fn tell(&mut self, chapter: Chapter, verdict: Vec<String>) {
-        self.chapters.push(chapter);
-        self.verdict.extend(verdict);
-    }
-}
-
-/// The verb: measures what is asked for, writes it, and tells the verdict.
+/// The verb: ends with the exit code of that program.
 pub(super) fn report(arguments: &ReportArguments) -> Result<Losses, CliError> {
-    let ReportArguments { out, json, .. } = arguments;
-    let write_error = |path: &Path| {
-        let path = path.to_owned();
-        move |source| CliError::Write { path, source }
-    };
-    if out.exists() && !out.is_dir() {
-        return Err(CliError::Usage(format!("--out {} is a file: name a folder", out.display())));
-    }
-    // before minutes of measuring
-    create_folder(out).map_err(write_error(out))?;
-    let MeasuredChapters { chapters, verdict } = measure(arguments, &mut lines_on_stderr())?;
-    let report = Report {
-        machine: describe_machine(),
-        commit: env!("TOUCHUP_COMMIT").to_owned(),
-        command: command(arguments),
-        date: DateTime::<Utc>::from(SystemTime::now()).format("%Y-%m-%d %H:%M UTC").to_string(),
-        verdict,
-        chapters,
-    };
-    for file in report.files()? {
-        let path = out.join(&file.name);
-        write_atomically(&path, |to| to.write_all(&file.bytes)).map_err(write_error(&path))?;
-    }
-    if *json {
-        tell(&serde_json::to_string(&report).map_err(crate::report::ReportError::from)?);
-    } else {
-        tell(&format!("{}\n\nwrote {}", report.verdict.join("\n\n"), out.join("report.html").display()));
-    }
-    Ok(Losses::new())
-}
-
-/// Every chapter that is asked for, in the order of the page.
-fn measure(arguments: &ReportArguments, progress: &mut dyn FnMut(&str)) -> Result<MeasuredChapters, CliError> {
-    let effort = Effort { is_quick: arguments.quick };
-    let is_wanted = |part| arguments.only.is_empty() || arguments.only.contains(&part);
-    let given = arguments.given()?;
-    // first, for they need what may not be there, and nothing measured is lost by that
-    let peers = arguments.peers.then(|| {
-        let environment = arguments.peers_env.clone().unwrap_or_else(|| arguments.out.join("peers-env"));
-        peers(effort, &environment, progress)
-    });
-    let peers = peers.transpose()?;
-    let mut all = MeasuredChapters::default();
-    if is_wanted(ReportChapter::WorkPrecision) {
-        let measured = WorkPrecision::measure(effort, progress);
-        all.tell(measured.chapter(), measured.verdict());
-    }
-    let scans =
-        is_wanted(ReportChapter::WholeScan).then(|| whole_scan(effort, given.as_ref(), progress)).transpose()?;
-    if let Some(measured) = &scans {
-        all.tell(measured.chapter(), verdict::of_whole_scans(measured));
-    }
-    if is_wanted(ReportChapter::Convergence) {
-        let measured = convergence(effort, progress);
-        all.tell(measured.chapter(), verdict::of_convergence(&measured));
-    }
-    let stability = is_wanted(ReportChapter::Stability).then(|| stability(effort, progress));
-    if let Some(measured) = &stability {
-        all.tell(measured.chapter(), verdict::of_stability(measured));
-        progress("extremes");
-        let measured = extremes();
-        all.tell(measured.chapter(), verdict::of_extremes(&measured));
-    }
-    let cost = is_wanted(ReportChapter::Cost).then(|| cost(effort, progress)).transpose()?;
-    if let Some(measured) = &cost {
-        all.tell(measured.chapter(), verdict::of_cost(measured));
-    }
-    if let Some(measured) = peers {
-        all.tell(measured.chapter(), verdict::of_peers(&measured));
-    }
-    let short = scans.and_then(|scans| verdict::in_short(&scans, stability.as_ref(), cost.as_ref()));
-    all.verdict.splice(..0, short);
-    Ok(all)
-}
-
-impl ReportArguments {
-    /// The case that is given by files.
-    fn given(&self) -> Result<Option<Given>, CliError> {
-        let (Some(scan), Some(truth), Some(bag)) = (&self.scan, &self.truth, &self.bag) else { return Ok(None) };
-        let scene = self.scene.as_deref().map_or_else(|| Ok(Scene::default()), Scene::read)?;
-        let recording = Recording::open(bag, &Topics::default()).map_err(CliError::ReadRecording)?;
-        let params = scene.refine_params(recording.wrench_frame);
-        let params =
-            params.ok_or_else(|| CliError::Usage("the scene names no `refine`: add `refine:` to it".to_owned()))?;
-        let mut samples = Vec::new();
-        each_sample(recording, scene.placement(), scene.sync_params(), None, |sample| samples.push(*sample))?;
-        Ok(Some(Given {
-            name: scan.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
-            scan: read_mesh(scan, self.mesh_unit).map_err(CliError::ReadMesh)?.mesh,
-            truth: read_mesh(truth, self.mesh_unit).map_err(CliError::ReadMesh)?.mesh,
-            samples,
-            tip: params.tip,
-            compensator: params.compensator,
-            scan_noise: params.scan_noise,
-        }))
-    }
-}
-
-/// A line with the time that has passed, for each longer piece of work.
-fn lines_on_stderr() -> impl FnMut(&str) {
-    let started = Instant::now();
-    move |what| {
-        let _ = writeln!(stderr(), "{:>6.1} s  {what}", started.elapsed().as_secs_f64());
-    }
-}
-
-/// As it could be called again.
-fn command(arguments: &ReportArguments) -> String {
-    let mut command = format!("touchup report --out {}", arguments.out.display());
-    if arguments.quick {
-        command += " --quick";
-    }
-    let paths = [
-        ("scan", &arguments.scan),
-        ("truth", &arguments.truth),
-        ("bag", &arguments.bag),
-        ("scene", &arguments.scene),
-        ("peers-env", &arguments.peers_env),
-    ];
-    for (flag, path) in paths.into_iter().filter_map(|(flag, path)| Some((flag, path.as_ref()?))) {
-        command += &format!(" --{flag} {}", path.display());
-    }
-    if arguments.scan.is_some() {
-        command += &format!(" --mesh-unit {}", arguments.mesh_unit);
-    }
-    if arguments.peers {
-        command += " --peers";
-    }
-    if !arguments.only.is_empty() {
-        command += " --only";
-        for part in &arguments.only {
-            command += &part.to_possible_value().map_or_else(String::new, |value| format!(" {}", value.get_name()));
-        }
-    }
-    command
+    let beside = std::env::current_exe().ok().map(|this| this.with_file_name(PROGRAM)).filter(|path| path.is_file());
+    let path = beside.unwrap_or_else(|| PROGRAM.into());
+    let status = Command::new(&path).args(&arguments.arguments).status().map_err(|source| match source.kind() {
+        ErrorKind::NotFound => NoReport::Missing,
+        _ => NoReport::Start { path, source },
+    })?;
+    // what went wrong it has said itself
+    if status.success() { Ok(Losses::new()) } else { std::process::exit(status.code().unwrap_or(1)) }
 }

@@ -5,10 +5,10 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64;
 use touchup::mesh::TriMesh;
 use touchup::refine::{GuardParams, RefineParams, Refiner, RoiSize, TipParams};
-use touchup::report::allocations::asked;
 use touchup::touch::{
     BiasParams, MarkerBody, MarkerFilter, MarkerFrame, MarkerParams, Sample, SeenMarker, StampedPose, Wrench,
 };
+use touchup_report::allocations::asked;
 
 use crate::common::{grid, within};
 

@@ -4,7 +4,7 @@
 use std::alloc::{GlobalAlloc, Layout};
 use std::cell::Cell;
 
-use touchup::report::allocations::CountingAllocator;
+use touchup_report::allocations::CountingAllocator;
 
 thread_local! {
     static LARGEST: Cell<usize> = const { Cell::new(0) };

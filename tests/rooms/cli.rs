@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::io::Write;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
@@ -533,4 +534,35 @@ fn step_answers_each_line_in_order_and_goes_on_after_a_bad_one() {
     assert_eq!(answers[0], serde_json::json!({ "b_m": [0.0, 0.0, 0.0], "n": [0.0, 0.0, 1.0] }));
     assert!(answers[1]["error"].is_string());
     assert_eq!(answers[2], answers[0]);
+}
+
+// ---- report -----------------------------------------------------------------------------------------------------
+
+/// The program is copied into a folder of its own, with a script beside it that stands for `touchup-report`.
+#[test]
+fn report_hands_its_arguments_to_a_program_of_its_own_and_ends_with_its_code() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    fs::copy(env!("CARGO_BIN_EXE_touchup"), path("touchup")).unwrap();
+    let report =
+        || Command::new(path("touchup")).args(["report", "--quick", "--help"]).env("PATH", "").output().unwrap();
+
+    let missing = report();
+    assert_eq!((code(&missing), text(&missing.stdout)), (1, ""));
+    assert!(text(&missing.stderr).contains("cargo install --locked --path crates/touchup-report"), "{missing:?}");
+
+    fs::write(path("touchup-report"), "#!/bin/sh\necho \"$@\"\nexit 3\n").unwrap();
+    fs::set_permissions(path("touchup-report"), fs::Permissions::from_mode(0o755)).unwrap();
+    let there = report();
+    assert_eq!((code(&there), text(&there.stdout)), (3, "--quick --help\n"));
+}
+
+#[test]
+fn the_version_names_the_commit() {
+    let output = touchup(&["--version"], "");
+    let printed = text(&output.stdout);
+    let commit = printed.split_once('(').map(|(_, rest)| rest.trim_end_matches([')', '\n']));
+    assert!(printed.starts_with(concat!("touchup ", env!("CARGO_PKG_VERSION"))), "{printed}");
+    let hash = commit.unwrap_or_default().split(',').next().unwrap_or_default();
+    assert!(hash == "unknown" || hash.len() == 12 && hash.chars().all(|c| c.is_ascii_hexdigit()), "{printed}");
 }

@@ -26,7 +26,16 @@ const MAY_USE: &[(&str, &[MayUse])] = &[
             ("probe", &["touch", "mesh", "features", "explore", "robot"]),
         ],
     ),
-    ("touchup-session", &[("clock", &[]), ("live", &["clock"]), ("scene", &[]), ("session", &["clock", "live"])]),
+    (
+        "touchup-session",
+        &[
+            ("clock", &[]),
+            ("live", &["clock"]),
+            ("scene", &[]),
+            ("replay", &["scene"]),
+            ("session", &["clock", "live"]),
+        ],
+    ),
     ("touchup", &[("ur", &[]), ("ros", &["ur"]), ("cli", &["ur", "ros"])]),
 ];
 

@@ -30,7 +30,6 @@ mod node;
 mod patch;
 mod probe;
 mod refine;
-mod report;
 mod robot;
 #[cfg(feature = "ros")]
 mod ros;

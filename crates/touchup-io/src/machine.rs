@@ -3,6 +3,11 @@
 use std::fs;
 use std::thread::available_parallelism;
 
+/// The commit that the program is built from, and whether something was changed since; "unknown" where there is no checkout.
+pub const COMMIT: &str = env!("TOUCHUP_COMMIT");
+/// Version and commit.
+pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("TOUCHUP_COMMIT"), ")");
+
 /// Processor, threads that run at the same time, memory, and system, as far as they are known.
 pub fn describe_machine() -> String {
     let processor = fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| value_of(&text, "model name"));

@@ -1,4 +1,4 @@
-//! Error against run time, stability, and what each part costs: everything that `touchup report` measures and shows.
+//! Error against run time, stability, and what each part costs: everything that `touchup-report` measures and shows.
 //!
 //! Each part measures into a type of its own, tells it as a [`Chapter`], and hands on what the verdict needs.
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]

@@ -5,10 +5,12 @@
 //! | [`clock`] | steady time, of the machine or of a test that moves it |
 //! | [`scene`] | the YAML that names the parts of a scene and their parameters |
 //! | [`live`] | the haptic update at every sample, the patch beside it on a thread of its own |
+//! | [`replay`] | a recording from its first message to its last, as messages or as samples |
 //! | [`session`] | one run: its recording, its result, and what it takes to get the same again |
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
 pub mod clock;
 pub mod live;
+pub mod replay;
 pub mod scene;
 pub mod session;

@@ -13,11 +13,12 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Subcommand};
 use serde::Serialize;
 
-use super::samples::{Recording, Replayed, each_sample, marker_filter};
+use super::progress::WorkProgress;
 use super::{CliError, Losses, check_kept, tell};
 use crate::calibrate::Known;
 use crate::io::atomic::write_atomically;
 use crate::io::recording::Topics;
+use crate::replay::{Recording, Replayed, each_sample, marker_filter};
 use crate::scene::{Scene, Setting};
 use crate::touch::{Placement, Sample};
 
@@ -155,7 +156,9 @@ impl CalibrationRecording {
     fn replay(&self, recording: Recording, scene: &Scene, each: impl FnMut(&Sample)) -> Result<Replayed, CliError> {
         let markers = marker_filter(scene, self.markers_topic.as_deref())?;
         let placement = scene.placement().map(|placement| Placement { pose_wo: None, ..placement });
-        each_sample(recording, placement, scene.sync_params(), markers, each)
+        let mut progress = WorkProgress::new("replay", recording.message_count());
+        let mut at_each = || progress.step();
+        Ok(each_sample(recording, placement, scene.sync_params(), markers, &mut at_each, each)?)
     }
 }
 

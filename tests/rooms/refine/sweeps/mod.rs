@@ -5,10 +5,10 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 use touchup::mesh::{FaceId, TriMesh};
 use touchup::refine::{GuardParams, RefineCounts, RefineError, RefineParams, Refiner, TipParams};
-use touchup::report::{BLOWN_UP, MeshErrors, PaperSweeps, RobustSweeps, noisy, raster_samples};
 use touchup::sim::Peaks;
 use touchup::sim::coupled::GuidedStylus;
 use touchup::touch::{Sample, Wrench};
+use touchup_report::{BLOWN_UP, MeshErrors, PaperSweeps, RobustSweeps, noisy, raster_samples};
 
 mod qualities;
 

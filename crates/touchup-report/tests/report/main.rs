@@ -1,3 +1,5 @@
+//! The report from outside: its chapters, its page, and the program.
+
 mod command;
 mod cost;
 mod extremes;

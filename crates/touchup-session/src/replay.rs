@@ -3,11 +3,26 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::path::Path;
 
-use super::progress::WorkProgress;
-use super::{CliError, Losses};
-use crate::io::recording::{Record, RecordingError, RecordingReader, Topics};
+use touchup_core::touch::{
+    MarkerCounts, MarkerFilter, Message, Placement, Sample, SettingError, SyncParams, Synchroniser, WrenchFrame,
+};
+use touchup_io::recording::{Record, RecordingError, RecordingReader, Topics};
+
 use crate::scene::Scene;
-use crate::touch::{MarkerCounts, MarkerFilter, Message, Placement, Sample, SyncParams, Synchroniser, WrenchFrame};
+
+/// Why a recording was not replayed.
+#[derive(Debug, thiserror::Error)]
+pub enum ReplayError {
+    /// The markers, which the scene does not describe.
+    #[error("{0}")]
+    Markers(String),
+    /// The recording is damaged before its first message.
+    #[error(transparent)]
+    Read(#[from] RecordingError),
+    /// A parameter of the pairing or of the placement.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+}
 
 /// Reasons that are gaps in the recording itself; every other one is a message lost on the way.
 const NOT_A_LOSS: [&str; 4] = ["gap", "no_pose_before", "no_pose_after", "duplicate"];
@@ -20,7 +35,7 @@ pub struct Replayed {
     /// Wrenches that became none, by reason; reasons of lost poses begin with `pose_`.
     pub refused: BTreeMap<String, u64>,
     /// What a better recording would not lack.
-    pub losses: Losses,
+    pub losses: Vec<String>,
     /// What became of the markers, where they tell the pose.
     pub markers: Option<MarkerCounts>,
 }
@@ -54,6 +69,11 @@ impl Recording {
         Ok(Self { reader, ahead, wrench_frame })
     }
 
+    /// How many messages it has, where the recording says so.
+    pub fn message_count(&self) -> Option<u64> {
+        self.reader.message_count()
+    }
+
     fn next(&mut self) -> Option<Result<Record, RecordingError>> {
         self.ahead.pop_front().or_else(|| self.reader.next_record())
     }
@@ -79,28 +99,29 @@ const NO_MARKERS: &str = "--markers-topic needs a scene that says where the mark
 /// What makes poses of markers, when the recording has those on `topic`.
 ///
 /// # Errors
-/// [`CliError::Usage`] when the scene does not say where they sit.
-pub fn marker_filter(scene: &Scene, topic: Option<&str>) -> Result<Option<MarkerFilter>, CliError> {
+/// [`ReplayError::Markers`] when the scene does not say where they sit.
+pub fn marker_filter(scene: &Scene, topic: Option<&str>) -> Result<Option<MarkerFilter>, ReplayError> {
     if topic.is_none() {
         return Ok(None);
     }
-    let filter = scene.marker_filter().map_err(|error| CliError::Usage(error.to_string()))?;
-    filter.map(Some).ok_or_else(|| CliError::Usage(NO_MARKERS.to_owned()))
+    let filter = scene.marker_filter().map_err(|error| ReplayError::Markers(error.to_string()))?;
+    filter.map(Some).ok_or_else(|| ReplayError::Markers(NO_MARKERS.to_owned()))
 }
 
 /// Gives each message of `recording` to `each`, in its order.
 ///
 /// - `markers`: makes the poses of a recording that holds markers.
+/// - `at_each`: is called after each record, to show how far it is.
 ///
 /// # Errors
-/// [`CliError::ReadRecording`] when the recording is damaged before its first message; later damage is a loss.
+/// [`ReplayError::Read`] when the recording is damaged before its first message; later damage is a loss.
 pub fn each_message(
     mut recording: Recording,
     mut markers: Option<MarkerFilter>,
+    at_each: &mut dyn FnMut(),
     mut each: impl FnMut(Message),
-) -> Result<Replayed, CliError> {
+) -> Result<Replayed, ReplayError> {
     let mut replayed = Replayed::default();
-    let mut progress = WorkProgress::new("replay", recording.reader.message_count());
     let mut has_begun = false;
     while let Some(record) = recording.next() {
         match record {
@@ -113,11 +134,11 @@ pub fn each_message(
                     filter.push(&frame, |pose| each(Message::Pose(pose)));
                 }
             }
-            Err(damage) if !has_begun => return Err(CliError::ReadRecording(damage)),
+            Err(damage) if !has_begun => return Err(damage.into()),
             Err(damage) => replayed.losses.push(damage.to_string()),
         }
         has_begun = true;
-        progress.step();
+        at_each();
     }
     if let Some(filter) = &mut markers {
         filter.finish(|pose| each(Message::Pose(pose)));
@@ -139,12 +160,13 @@ pub fn each_sample(
     placement: Option<Placement>,
     sync: SyncParams,
     markers: Option<MarkerFilter>,
+    at_each: &mut dyn FnMut(),
     mut each: impl FnMut(&Sample),
-) -> Result<Replayed, CliError> {
+) -> Result<Replayed, ReplayError> {
     let mut sync = Synchroniser::new(sync)?;
     placement.iter().try_for_each(Placement::check)?;
     let wrench_frame = recording.wrench_frame;
-    let mut replayed = each_message(recording, markers, |message| {
+    let mut replayed = each_message(recording, markers, at_each, |message| {
         sync.push(placement.map_or(message, |placement| placement.place(message, wrench_frame)));
         std::iter::from_fn(|| sync.next_sample()).for_each(|sample| each(&sample));
     })?;

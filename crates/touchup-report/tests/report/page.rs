@@ -1,7 +1,7 @@
 //! The files of a report: well formed, without a number that is none, and with every digit in the CSV.
 
 use serde_json::Value;
-use touchup::report::{
+use touchup_report::{
     Axis, Chapter, Drawing, Figure, LineStroke, Mark, OutputFile, Panel, Report, ReportError, Series, Spread, Table,
     TableCell,
 };
@@ -68,7 +68,7 @@ fn report() -> Report {
     Report {
         machine: HOSTILE.to_owned(),
         commit: "0123456789ab".to_owned(),
-        command: "touchup report --out <x>".to_owned(),
+        command: "touchup-report --out <x>".to_owned(),
         date: "2026-01-01 00:00 UTC".to_owned(),
         verdict: vec![HOSTILE.to_owned()],
         chapters: vec![Chapter {

@@ -1,15 +1,15 @@
 //! What a push costs, as the report tells it: the text from the numbers, and that both sides of the ratio do the same work.
 
-use touchup::mesh::{FaceTree, TriMesh};
-use touchup::refine::Refiner;
-use touchup::report::allocations::asked;
-use touchup::report::cost::{
+use touchup_core::mesh::{FaceTree, TriMesh};
+use touchup_core::refine::Refiner;
+use touchup_core::touch::WrenchFrame;
+use touchup_report::allocations::asked;
+use touchup_report::cost::{
     BAREST, Cost, LogLaw, MinimalLoop, PartCost, PerSample, ReplaySpeed, SizeCost, StageCost, cost,
 };
-use touchup::report::{Drawing, Effort, LineStroke, Spread, TableCell};
-use touchup::scene::Scene;
-use touchup::sim::wavy::{slide, wavy_plate};
-use touchup::touch::WrenchFrame;
+use touchup_report::{Drawing, Effort, LineStroke, Spread, TableCell};
+use touchup_session::scene::Scene;
+use touchup_sim::wavy::{slide, wavy_plate};
 
 fn ns(median: f64) -> PerSample {
     PerSample {

@@ -4,18 +4,17 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use super::CliError;
-use crate::io::atomic::AtomicFile;
-use crate::refine::RefineError;
-use crate::report::Effort;
-use crate::report::peers::{PACKAGES, Peers, PeersAtSize, PeersInput, SCRIPT, UnknownLine};
+use touchup_core::refine::RefineError;
+use touchup_io::atomic::AtomicFile;
+use touchup_report::Effort;
+use touchup_report::peers::{PACKAGES, Peers, PeersAtSize, PeersInput, SCRIPT, UnknownLine};
 
 /// Threads of the libraries, as each of them asks for it.
 const ONE_THREAD: [&str; 4] = ["OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "TBB_NUM_THREADS"];
 
 /// Why the peers could not be measured.
 #[derive(Debug, thiserror::Error)]
-pub(super) enum PeersError {
+pub enum PeersError {
     /// The interpreter, the environment or the packages.
     #[error("{command}: {reason}; --peers needs python3 with venv, and PyPI the first time")]
     Setup { command: String, reason: String },
@@ -33,11 +32,7 @@ pub(super) enum PeersError {
 /// Measures touchup and the peers in turns, on 100k faces and, unless it is to be quick, on 1M.
 ///
 /// `environment`: folder of the virtual environment; made and filled where it is not yet.
-pub(super) fn peers(effort: Effort, environment: &Path, progress: &mut dyn FnMut(&str)) -> Result<Peers, CliError> {
-    Ok(measure(effort, environment, progress)?)
-}
-
-fn measure(effort: Effort, environment: &Path, progress: &mut dyn FnMut(&str)) -> Result<Peers, PeersError> {
+pub fn peers(effort: Effort, environment: &Path, progress: &mut dyn FnMut(&str)) -> Result<Peers, PeersError> {
     progress("peers: virtual environment");
     let python = make_environment(environment)?;
     let sizes: &[usize] = effort.choose(&[100_000], &[100_000, 1_000_000]);

@@ -2,14 +2,14 @@
 //! by hand, and one quick run from end to end.
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use touchup::compare::TouchedRegion;
-use touchup::mesh::{FaceTree, TriMesh, VertexId};
-use touchup::refine::TipParams;
-use touchup::report::{
+use touchup_core::compare::TouchedRegion;
+use touchup_core::mesh::{FaceTree, TriMesh, VertexId};
+use touchup_core::refine::TipParams;
+use touchup_core::touch::{CompensatorParams, Sample, Wrench};
+use touchup_report::{
     ContactSculptor, Drawing, Effort, GaussianParams, GaussianProcess, GaussianSurface, Given, Rule, TableCell,
     TouchedError, Way, WholeScanError, convergence, fit_decay, straight_line, whole_scan,
 };
-use touchup::touch::{CompensatorParams, Sample, Wrench};
 
 /// A square sheet of `cells` × `cells` squares of 1 mm at height `z` (m), looking up.
 fn sheet(cells: u32, z: f64) -> TriMesh {
@@ -286,7 +286,7 @@ fn convergence_is_measured_and_told() {
 }
 
 /// Tables are as wide as their heads, figures have marks, and no two have one name.
-fn check_chapter(chapter: &touchup::report::Chapter) {
+fn check_chapter(chapter: &touchup_report::Chapter) {
     for table in &chapter.tables {
         assert!(table.rows.iter().all(|row| row.len() == table.heads.len()), "{}", table.id);
         let numbers = table.rows.iter().flatten().filter_map(|cell| match cell {

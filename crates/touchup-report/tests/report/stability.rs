@@ -1,6 +1,6 @@
 //! The stability part of the report: what is promised of the default integrator holds, and what is known to fail is seen to.
 
-use touchup::report::{Effort, Integrator, RunEnding, stability};
+use touchup_report::{Effort, Integrator, RunEnding, stability};
 
 #[test]
 fn the_default_is_stable_everywhere_and_explicit_euler_is_not() {

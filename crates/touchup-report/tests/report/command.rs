@@ -1,4 +1,4 @@
-//! `touchup report` at the boundary of the process.
+//! `touchup-report` at the boundary of the process.
 
 use std::fs;
 use std::process::{Command, Output};
@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 use serde_json::Value;
 
 fn report(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_touchup")).arg("report").args(arguments).env_remove("RUST_LOG").output().unwrap()
+    Command::new(env!("CARGO_BIN_EXE_touchup-report")).args(arguments).env_remove("RUST_LOG").output().unwrap()
 }
 
 #[test]
