@@ -20,7 +20,7 @@ use super::{CliError, Losses, tell};
 use crate::io::atomic::write_atomically;
 use crate::io::features_file::read_features;
 use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
-use crate::sim::{PathParams, Plate, ScannerParams, StylusParams, measure_badness, plan_demo};
+use crate::sim::{PathParams, Plate, ScannerParams, StylusParams, measure_quality, plan_demo};
 
 /// Largest distance of the written plate's round walls from circles, m.
 const CHORD_ERROR: f64 = 10e-6;
@@ -42,7 +42,7 @@ pub(super) struct DemoArguments {
 /// What `summary.json` holds; lengths in mm.
 #[derive(Debug, Serialize)]
 struct DemoSummary {
-    scan: ScanBadness,
+    scan: ScanErrors,
     touched_s: f64,
     /// error inside the touched region of the scan
     before: RegionError,
@@ -55,7 +55,7 @@ struct DemoSummary {
 
 /// The scan as a whole against the part.
 #[derive(Debug, Serialize)]
-struct ScanBadness {
+struct ScanErrors {
     faces: usize,
     edge_median_mm: f64,
     mean_mm: f64,
@@ -95,7 +95,7 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
     let _measuring = WorkProgress::stage("measure");
     let touched = TouchedTruth::of(&touch.moments);
     let demo = DemoSummary {
-        scan: ScanBadness::of(&plate, &scan)?,
+        scan: ScanErrors::of(&plate, &scan)?,
         touched_s: touch.moments.last().map_or(0.0, |moment| moment.t),
         before: touched.error(&plate, &scan),
         after: touched.error(&plate, &refined),
@@ -108,16 +108,16 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
     Ok(losses)
 }
 
-impl ScanBadness {
+impl ScanErrors {
     fn of(plate: &Plate, scan: &crate::mesh::TriMesh) -> Result<Self, CliError> {
-        let badness = measure_badness(scan, plate, |_| true).ok_or(crate::mesh::MeshError::Empty)?;
+        let quality = measure_quality(scan, plate, |_| true).ok_or(crate::mesh::MeshError::Empty)?;
         Ok(Self {
-            faces: badness.faces,
-            edge_median_mm: badness.edge_median * 1e3,
-            mean_mm: badness.mean * 1e3,
-            rms_mm: badness.rms * 1e3,
-            p95_mm: badness.p95 * 1e3,
-            bias_mm: badness.bias * 1e3,
+            faces: quality.faces,
+            edge_median_mm: quality.edge_median * 1e3,
+            mean_mm: quality.mean * 1e3,
+            rms_mm: quality.rms * 1e3,
+            p95_mm: quality.p95 * 1e3,
+            bias_mm: quality.bias * 1e3,
         })
     }
 }
@@ -132,7 +132,7 @@ impl DemoSummary {
 
 impl fmt::Display for DemoSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let ScanBadness { faces, edge_median_mm, mean_mm, rms_mm, p95_mm, bias_mm } = &self.scan;
+        let ScanErrors { faces, edge_median_mm, mean_mm, rms_mm, p95_mm, bias_mm } = &self.scan;
         writeln!(
             f,
             "scan: {faces} faces of {edge_median_mm:.2} mm; distance from the part: mean {mean_mm:.2} mm, \

@@ -112,7 +112,7 @@ struct BadTold {
     touches: Vec<u32>,
     off_mm: f64,
     sigmas: f64,
-    held_apart: usize,
+    rejected: usize,
     against: usize,
 }
 
@@ -295,13 +295,13 @@ impl DisagreementRow {
 
 impl BadTold {
     fn of(bad: &BadTouches) -> Self {
-        let BadTouches { touches, centre, off, sigmas, held_apart, against } = bad;
+        let BadTouches { touches, centre, off, sigmas, rejected, against } = bad;
         Self {
             center_mm: mm(centre),
             touches: touches.clone(),
             off_mm: off * 1e3,
             sigmas: *sigmas,
-            held_apart: *held_apart,
+            rejected: *rejected,
             against: *against,
         }
     }
@@ -360,8 +360,8 @@ impl fmt::Display for DisagreeReport {
             write!(
                 f,
                 "\nbad touch at ({x:.1}, {y:.1}, {z:.1}) mm: {:+.3} mm or {:.0} standard deviations off, {count} touches from \
-                 {} on, {} held apart, against {} nearby",
-                bad.off_mm, bad.sigmas, bad.touches[0], bad.held_apart, bad.against
+                 {} on, {} rejected, against {} nearby",
+                bad.off_mm, bad.sigmas, bad.touches[0], bad.rejected, bad.against
             )?;
         }
         more(f, self.bad_touches.len(), "bad touches")

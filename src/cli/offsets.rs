@@ -55,8 +55,8 @@ pub(super) enum ScanOffset {
         turn_deg: [f64; 3],
         turn_sigma_deg: [f64; 3],
         /// by how much the scan is too fat
-        fatness_mm: f64,
-        fatness_sigma_mm: f64,
+        surface_offset_mm: f64,
+        surface_offset_sigma_mm: f64,
         /// the middle of the contacts
         centre_mm: [f64; 3],
     },
@@ -67,7 +67,7 @@ pub(super) enum ScanOffset {
 
 impl ScanOffset {
     pub fn of(found: Result<Registration, RegistrationError>) -> Self {
-        let Registration { twist, covariance, centre, fatness, .. } = match found {
+        let Registration { twist, covariance, centre, surface_offset, .. } = match found {
             Ok(found) => found,
             Err(refused) => return Self::Refused { refused: refused.to_string() },
         };
@@ -78,8 +78,8 @@ impl ScanOffset {
             shift_sigma_mm: three(&sigma, 0, 1e3),
             turn_deg: three(&twist, 3, 1f64.to_degrees()),
             turn_sigma_deg: three(&sigma, 3, 1f64.to_degrees()),
-            fatness_mm: fatness[0] * 1e3,
-            fatness_sigma_mm: fatness[1] * 1e3,
+            surface_offset_mm: surface_offset[0] * 1e3,
+            surface_offset_sigma_mm: surface_offset[1] * 1e3,
             centre_mm: [centre.x, centre.y, centre.z].map(|x| x * 1e3),
         }
     }
@@ -93,11 +93,17 @@ impl fmt::Display for ScanOffset {
         match self {
             Self::Refused { refused } => write!(f, "not told: {refused}"),
             Self::Found {
-                shift_mm, shift_sigma_mm, turn_deg, turn_sigma_deg, fatness_mm, fatness_sigma_mm, ..
+                shift_mm,
+                shift_sigma_mm,
+                turn_deg,
+                turn_sigma_deg,
+                surface_offset_mm,
+                surface_offset_sigma_mm,
+                ..
             } => {
                 write!(f, "shift ({}) mm, ", pairs(shift_mm, shift_sigma_mm))?;
                 write!(f, "turn ({})°, ", pairs(turn_deg, turn_sigma_deg))?;
-                write!(f, "too fat by {fatness_mm:+.3} ± {fatness_sigma_mm:.3} mm; not applied")
+                write!(f, "too fat by {surface_offset_mm:+.3} ± {surface_offset_sigma_mm:.3} mm; not applied")
             }
         }
     }

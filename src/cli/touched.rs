@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use crate::compare::TouchedRegion;
 use crate::mesh::{FaceTree, TriMesh};
-use crate::sim::{Moment, Surface, measure_badness};
+use crate::sim::{Moment, Surface, measure_quality};
 
 /// Where the ball really touched the part.
 #[derive(Debug)]
@@ -34,7 +34,7 @@ impl TouchedTruth {
         distances.sort_by(f64::total_cmp);
         let mean = distances.iter().sum::<f64>() / distances.len().max(1) as f64;
         let p95 = distances.get(distances.len() * 95 / 100).copied().unwrap_or_default();
-        let from_mesh = measure_badness(mesh, part, |p| self.0.is_near(&part.closest(p).point));
+        let from_mesh = measure_quality(mesh, part, |p| self.0.is_near(&part.closest(p).point));
         RegionError {
             part_to_mesh_mm: [mean * 1e3, p95 * 1e3],
             mesh_to_part_mm: from_mesh.map_or([0.0; 2], |quality| [quality.mean * 1e3, quality.p95 * 1e3]),

@@ -126,7 +126,7 @@ def test_every_touch_is_a_wrench_of_the_recording(demo):
     for feature, number in numbers:
         touches = named(demo, feature, number)
         assert all(int(touch["stamp_ns"]) in demo.stamps for touch in touches)
-        assert all(touch["held_apart"] == "0" for touch in touches), "a knock measures nothing"
+        assert all(touch["rejected"] == "0" for touch in touches), "an outlier measures nothing"
 
 
 def test_only_what_was_touched_names_touches(demo):

@@ -19,7 +19,7 @@ struct TouchLine<'a> {
     begun_ns: Option<i64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     ended_ns: Option<i64>,
-    /// `clean`, `slip`, `edge`, `bounce`, `knock`, `miss`, `unclear`, or `held_back` where it was not made
+    /// `clean`, `slip`, `edge`, `bounce`, `impact`, `miss`, `unclear`, or `held_back` where it was not made
     verdict: &'static str,
     accepted: bool,
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -12,9 +12,12 @@ use touchup_core::touch::ProbedPoint;
 ///
 /// `touch`: its number, from 0 on, which features name; `stamp_ns`: of the sample it came from; `stroke`; the centre of the
 /// ball and its radius (0 where the tip is none); the point of the surface and its outward normal; the standard deviations
-/// along the normal of what averages out and of what does not; what it counts; whether it was held apart as a knock.
+/// along the normal of what averages out and of what does not; what it counts; whether it was rejected as an outlier.
 pub const HEADER: &str = "touch,stamp_ns,stroke,center_x_mm,center_y_mm,center_z_mm,tip_radius_mm,point_x_mm,point_y_mm,\
-                          point_z_mm,normal_x,normal_y,normal_z,sigma_mm,calibration_mm,weight,held_apart";
+                          point_z_mm,normal_x,normal_y,normal_z,sigma_mm,calibration_mm,weight,rejected";
+
+/// What the last column was called once, and what it is called.
+const RENAMED: (&str, &str) = ("held_apart", "rejected");
 
 /// Why a file of touches could not be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -40,6 +43,16 @@ pub enum TouchesFileError {
     NoTouches {
         /// the file
         path: PathBuf,
+    },
+    /// The header that was written before a column had its present name.
+    #[error("{}: the column {old} is called {new} now: change that name in the first line", path.display())]
+    OldColumn {
+        /// the file
+        path: PathBuf,
+        /// what it was called
+        old: &'static str,
+        /// what it is called
+        new: &'static str,
     },
     /// A line that is no touch.
     #[error("{}, line {line}: {what}", path.display())]
@@ -90,7 +103,7 @@ fn line_of(touch: &ProbedPoint, number: usize) -> String {
         sigma * 1e3,
         calibration * 1e3,
         weight,
-        u8::from(touch.is_held_apart)
+        u8::from(touch.is_rejected)
     )
 }
 
@@ -103,8 +116,16 @@ pub fn read_touches(path: &Path) -> Result<Vec<ProbedPoint>, TouchesFileError> {
     let text = std::fs::read(path).map_err(|source| TouchesFileError::Read { path: own(), source })?;
     let text = String::from_utf8_lossy(&text);
     let mut lines = text.strip_prefix('\u{feff}').unwrap_or(&text).lines();
-    if lines.next().map(str::trim_end) != Some(HEADER) {
-        return Err(TouchesFileError::NoTouches { path: own() });
+    let header = lines.next().map(str::trim_end).unwrap_or_default();
+    if header != HEADER {
+        let (old, new) = RENAMED;
+        let is_old = header.strip_suffix(old).is_some_and(|rest| HEADER.strip_suffix(new) == Some(rest));
+        let path = own();
+        return Err(if is_old {
+            TouchesFileError::OldColumn { path, old, new }
+        } else {
+            TouchesFileError::NoTouches { path }
+        });
     }
     let mut touches: Vec<ProbedPoint> = Vec::new();
     for (at, line) in lines.enumerate().filter(|(_, line)| !line.trim().is_empty()) {
@@ -160,10 +181,10 @@ fn touch_of(line: &str, number: usize) -> Result<ProbedPoint, String> {
         sigma: not_negative(13)? * 1e-3,
         calibration: not_negative(14)? * 1e-3,
         weight: not_negative(15)?,
-        is_held_apart: match integer(16)? {
+        is_rejected: match integer(16)? {
             0 => false,
             1 => true,
-            other => return Err(format!("held_apart is {other}, neither 0 nor 1")),
+            other => return Err(format!("rejected is {other}, neither 0 nor 1")),
         },
     })
 }

@@ -33,7 +33,7 @@ pub use mesh_surface::MeshSurface;
 pub use path::{Lines, PathParams, RasterRegion, Stroke, around_wall, plan_demo, plan_mesh, raster};
 pub use peaks::{Peaks, add_vertex_noise};
 pub use plate::{Plate, PlateStadium, TruthFeature, TruthShape};
-pub use scanner::{ScanQuality, ScannerParams, measure_badness, scan};
+pub use scanner::{ScanQuality, ScannerParams, measure_quality, scan};
 pub use sensor::SensorParams;
 pub use stylus::{Moment, StylusParams, Touch, touch};
 pub use surface::{Bounds, Surface, SurfacePoint};

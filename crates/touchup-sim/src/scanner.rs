@@ -294,7 +294,7 @@ const SAMPLES: [[f64; 3]; 4] = [
 ///
 /// - `within`: which points count, e.g. those of a touched region; the edges are those of all faces.
 /// - returns `None` when no point counts.
-pub fn measure_badness(
+pub fn measure_quality(
     mesh: &TriMesh,
     surface: &dyn Surface,
     within: impl Fn(&Point3<f64>) -> bool,

@@ -108,8 +108,8 @@ impl ProbeTouch {
     pub const EDGE: u8 = 3;
     /// the tip came off again
     pub const BOUNCE: u8 = 4;
-    /// something knocked against the arm or the part
-    pub const KNOCK: u8 = 5;
+    /// something hit the arm or the part
+    pub const IMPACT: u8 = 5;
     /// no contact within the search travel
     pub const MISS: u8 = 6;
     /// not touched: the way to it was not clear, or beyond the limits

@@ -29,12 +29,12 @@ prop_compose! {
         radius in prop_oneof![Just(0.0), Just(1.5e-3), 1e-4..1e-2],
         sigmas in [0.0..1e-3f64, 0.0..1e-3],
         weight in 0.0..1.0,
-        is_held_apart: bool,
+        is_rejected: bool,
         later in 0..1_000_000_000_000i64,
         stroke in 0..2u32,
     ) -> ProbedPoint {
         let ((centre, point, normal), [sigma, calibration]) = (places, sigmas);
-        ProbedPoint { stamp_ns: later, stroke, centre, radius, point, normal, sigma, calibration, weight, is_held_apart }
+        ProbedPoint { stamp_ns: later, stroke, centre, radius, point, normal, sigma, calibration, weight, is_rejected }
     }
 }
 
@@ -60,7 +60,7 @@ proptest! {
         // half of the last digit, and what is lost on the way to millimetres and back
         let (length, share, weight) = (0.51e-9, 1.1e-6, 0.51e-4);
         for (a, b) in read.iter().zip(&touches) {
-            let of = |t: &ProbedPoint| (t.stamp_ns, t.stroke, t.is_held_apart);
+            let of = |t: &ProbedPoint| (t.stamp_ns, t.stroke, t.is_rejected);
             prop_assert_eq!(of(a), of(b));
             prop_assert!((a.centre - b.centre).amax() < length && (a.point - b.point).amax() < length);
             prop_assert!((a.radius - b.radius).abs() <= 1e-15 * b.radius, "a radius is written in full");
@@ -121,7 +121,7 @@ fn a_line_is_read_by_its_columns() {
         sigma: 1e-5,
         calibration: 2e-6,
         weight: 0.5,
-        is_held_apart: true,
+        is_rejected: true,
     };
     let [read] = touches.as_slice() else { panic!("{touches:?}") };
     assert!((read.centre - expected.centre).norm() < 1e-15 && (read.point - expected.point).norm() < 1e-15);
@@ -141,6 +141,13 @@ fn marks_of_other_programs_are_passed_over() {
         assert_eq!(read(&text).unwrap(), plain, "{text:?}");
     }
     assert!(read(&format!("{HEADER}\n")).unwrap().is_empty());
+}
+
+#[test]
+fn the_old_name_of_a_column_is_named_with_the_new_one() {
+    let old = HEADER.replace("rejected", "held_apart");
+    let error = read(&format!("{old}\n{}\n", line(&[]))).unwrap_err().to_string();
+    assert!(error.contains("the column held_apart is called rejected now"), "{error}");
 }
 
 #[test]
@@ -171,8 +178,8 @@ fn damaged_lines_are_named() {
         (later(&[(13, "-0.1")]), 3, "sigma_mm"),
         (later(&[(14, "-0.1")]), 3, "calibration_mm"),
         (later(&[(15, "-0.1")]), 3, "weight"),
-        (later(&[(16, "2")]), 3, "held_apart"),
-        (later(&[(16, "yes")]), 3, "held_apart"),
+        (later(&[(16, "2")]), 3, "rejected"),
+        (later(&[(16, "yes")]), 3, "rejected"),
     ];
     for (text, at, named) in &cases {
         match read(text) {

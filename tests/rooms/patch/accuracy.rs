@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{Isometry3, Point3, Vector3};
 use touchup::mesh::{FaceId, FaceTree, TriMesh, VertexId};
 use touchup::patch::{Patched, Patcher, PatcherParams, Support};
-use touchup::sim::{Moment, Plate, StylusParams, Surface, TruthFeature, TruthShape, measure_badness};
+use touchup::sim::{Moment, Plate, StylusParams, Surface, TruthFeature, TruthShape, measure_quality};
 use touchup::touch::{Sample, TipShape, Wrench};
 
 use crate::full::either;
@@ -50,7 +50,7 @@ impl Case {
         let cell = |p: &Point3<f64>| [p.x, p.y, p.z].map(|x| (x / 1e-3).floor() as i64);
         let touched: BTreeSet<[i64; 3]> = self.contacts.iter().map(cell).collect();
         let is_near = |p: &Point3<f64>| touched.contains(&cell(&plate.closest(p).point));
-        let back = measure_badness(mesh, &plate, is_near).unwrap().mean;
+        let back = measure_quality(mesh, &plate, is_near).unwrap().mean;
         [forth * 1e3, back * 1e3]
     }
 

@@ -1,5 +1,5 @@
 //! How well the patched mesh says it is known, against the part that the simulator knows: where the errors are those of its
-//! model, which shows that it is consistent, and where they are not, which shows what it does not know; knocks, and places that move.
+//! model, which shows that it is consistent, and where they are not, which shows what it does not know; outliers, and places that move.
 
 use std::collections::BTreeSet;
 
@@ -265,15 +265,15 @@ fn only_new_vertices_are_better_known_than_the_scan_and_nobody_pays_who_does_not
     assert!(10.0 * mean(Support::Touched) < mean(Support::Guessed));
     let mut silent = patcher_of(&touch.messages, PatcherParams { uncertainty: None, ..params });
     assert_eq!(patched(&mut silent, &scan).sigma, Vec::<f64>::new());
-    assert_eq!((silent.knocks().held_apart, silent.knocks().insisted), (0, 0));
+    assert_eq!((silent.outliers().rejected, silent.outliers().relocated), (0, 0));
 }
 
-/// Time between two knocks, ns.
+/// Time between two disturbances, ns.
 const PERIOD_NS: i64 = 1_000_000_000;
 
-/// Knocks `messages` every second: by turns a spike of force, which a shaken handle makes, and a jump of the pose, as when
+/// Disturbs `messages` every second: by turns a spike of force, which a shaken handle makes, and a jump of the pose, as when
 /// the stylus slips off, and its shaft still touches.
-fn knocked(messages: &[Message]) -> Vec<Message> {
+fn shaken_and_slipped(messages: &[Message]) -> Vec<Message> {
     let (spike_ns, slip_ns) = (8_000_000, 40_000_000);
     let is_in = |stamp_ns: i64, turn: i64, length_ns: i64| {
         let since_ns = stamp_ns - SensorParams::default().start_ns;
@@ -292,8 +292,8 @@ fn knocked(messages: &[Message]) -> Vec<Message> {
     messages
 }
 
-/// Where the ball was on a plane that looks up when it was knocked.
-fn knocked_places(touch: &Touch) -> Vec<Point3<f64>> {
+/// Where the ball was on a plane that looks up when it was disturbed.
+fn disturbed_places(touch: &Touch) -> Vec<Point3<f64>> {
     let plate = Plate::default();
     let looks_up = |p: &Point3<f64>| {
         (0..8).map(|i| f64::from(i) * std::f64::consts::FRAC_PI_4).all(|angle| {
@@ -302,25 +302,25 @@ fn knocked_places(touch: &Touch) -> Vec<Point3<f64>> {
             at.normal.z > 0.999 && (at.point - beside).norm() < 1e-6
         })
     };
-    let knocks = touch.moments.iter().step_by(1000).flat_map(|moment| &moment.contacts);
-    knocks.map(|contact| contact.point).filter(|p| looks_up(p)).collect()
+    let disturbed = touch.moments.iter().step_by(1000).flat_map(|moment| &moment.contacts);
+    disturbed.map(|contact| contact.point).filter(|p| looks_up(p)).collect()
 }
 
 #[test]
-fn knocks_are_counted_and_do_not_dent_the_mesh() {
+fn outliers_are_counted_and_do_not_dent_the_mesh() {
     let (mut places, mut listed, mut errors) = (0, 0, [const { Vec::new() }; 3]);
     for seed in 1..=either(2, 20) {
         let (scan, touch, params) = touched_plate(&StylusParams::default(), seed);
-        let shaken = knocked(&touch.messages);
+        let shaken = shaken_and_slipped(&touch.messages);
         let silent = PatcherParams { uncertainty: None, ..params };
         let mut patchers =
             [patcher_of(&touch.messages, params), patcher_of(&shaken, params), patcher_of(&shaken, silent)];
-        let hit = knocked_places(&touch);
+        let hit = disturbed_places(&touch);
         for (patcher, errors) in patchers.iter_mut().zip(&mut errors) {
             let made = patched(patcher, &scan);
             let tree = FaceTree::new(&made.mesh);
             let off = |p: &Point3<f64>| tree.closest(&made.mesh, p, 1e-2).unwrap().distance_squared.sqrt() * 1e3;
-            // a knock is felt over the millimetre that the ball slides in a window
+            // a disturbance is felt over the millimetre that the ball slides in a window
             let around =
                 |p: &Point3<f64>| (-2..=2).map(|i| p + Vector3::x() * (f64::from(i) * 0.5e-3)).collect::<Vec<_>>();
             errors.extend(hit.iter().map(|p| around(p).iter().map(off).fold(0.0, f64::max)));
@@ -330,23 +330,23 @@ fn knocks_are_counted_and_do_not_dent_the_mesh() {
             !(150_000_000..PERIOD_NS - 150_000_000).contains(&since_ns)
         };
         places += hit.len();
-        listed += patchers[1].knocks().last().filter(|knock| near(knock.stamp_ns)).count();
-        let [shaken_contacts, calm_contacts] = [1, 0].map(|i| patchers[i].knocks().held_apart);
-        println!("seed {seed}: {shaken_contacts} contacts held apart, {calm_contacts} when calm");
+        listed += patchers[1].outliers().last().filter(|outlier| near(outlier.stamp_ns)).count();
+        let [shaken_contacts, calm_contacts] = [1, 0].map(|i| patchers[i].outliers().rejected);
+        println!("seed {seed}: {shaken_contacts} contacts rejected, {calm_contacts} when calm");
         assert!(shaken_contacts > 5 * calm_contacts, "seed {seed}: {shaken_contacts} {calm_contacts}");
-        // of the same hand where it was knocked and where it was not, calm and shaken
+        // of the same hand where it was disturbed and where it was not, calm and shaken
         let [[calm, calm_elsewhere], [held, held_elsewhere]] = [0, 1].map(|i| {
-            let apart = || patchers[i].probed().iter().filter(|touch| touch.is_held_apart);
+            let apart = || patchers[i].probed().iter().filter(|touch| touch.is_rejected);
             let at_knocks = apart().filter(|touch| near(touch.stamp_ns)).count();
             [at_knocks, apart().count() - at_knocks]
         });
         let second =
             |touch: &ProbedPoint| (touch.stamp_ns - SensorParams::default().start_ns + PERIOD_NS / 2) / PERIOD_NS;
-        let apart = patchers[1].probed().iter().filter(|touch| touch.is_held_apart && near(touch.stamp_ns));
+        let apart = patchers[1].probed().iter().filter(|touch| touch.is_rejected && near(touch.stamp_ns));
         let noticed = apart.map(second).collect::<BTreeSet<i64>>().len();
         let touches = patchers[1].probed().len();
         println!(
-            "seed {seed}: {held} of {touches} touches held apart at {noticed} knocks, {calm} there when calm; elsewhere \
+            "seed {seed}: {held} of {touches} touches rejected at {noticed} disturbances, {calm} there when calm; elsewhere \
              {held_elsewhere}, when calm {calm_elsewhere}"
         );
         assert!(held > 5 * calm && noticed >= hit.len(), "seed {seed}: {held} {calm}, {noticed} of {}", hit.len());
@@ -357,7 +357,8 @@ fn knocks_are_counted_and_do_not_dent_the_mesh() {
         [0.5, 0.8, 0.95].map(|share| errors[(errors.len() as f64 * share) as usize])
     });
     println!(
-        "dents at {places} knocks on planes, mm, 50, 80, 95 %: calm {calm:.3?}, knocked {gated:.3?}, without          uncertainty {open:.3?}; {listed} knocks listed"
+        "dents at {places} disturbances of planes, mm, 50, 80, 95 %: calm {calm:.3?}, disturbed {gated:.3?}, without \
+         uncertainty {open:.3?}; {listed} outliers listed"
     );
     assert!(listed > places, "{listed}");
     assert!(gated[1] < 1.5 * calm[1] && gated[2] < 0.06, "{gated:?}");
@@ -382,7 +383,7 @@ fn pass(patcher: &mut Patcher, z: f64, start_ns: i64, rng: &mut Pcg64) -> i64 {
 }
 
 #[test]
-fn a_place_moves_when_a_second_pass_insists() {
+fn a_place_moves_when_a_second_pass_confirms_it() {
     let corner = |x: f64, y: f64| Point3::new(x * 1e-3, y * 1e-3, 0.2e-3);
     let corners = vec![corner(-12.0, -12.0), corner(12.0, -12.0), corner(12.0, 12.0), corner(-12.0, 12.0)];
     let scan = TriMesh::new(corners, vec![[0, 1, 2], [0, 2, 3]]).unwrap();
@@ -401,15 +402,15 @@ fn a_place_moves_when_a_second_pass_insists() {
         };
         let now = pass(&mut patcher, 0.0, 0, &mut rng);
         let now = pass(&mut patcher, 0.0, now, &mut rng);
-        assert!(height(&mut patcher).abs() < 0.01e-3 && patcher.knocks().held_apart == 0);
+        assert!(height(&mut patcher).abs() < 0.01e-3 && patcher.outliers().rejected == 0);
         let now = pass(&mut patcher, moved, now, &mut rng);
-        let (held, insisted) = (patcher.knocks().held_apart, patcher.knocks().insisted);
-        assert!(held > 3000 && insisted == 0, "{held} {insisted}");
-        assert!(height(&mut patcher).abs() < 0.01e-3, "one pass is a knock: {}", height(&mut patcher));
+        let (held, relocated) = (patcher.outliers().rejected, patcher.outliers().relocated);
+        assert!(held > 3000 && relocated == 0, "{held} {relocated}");
+        assert!(height(&mut patcher).abs() < 0.01e-3, "one pass is an outlier: {}", height(&mut patcher));
         pass(&mut patcher, moved, now, &mut rng);
         let found = height(&mut patcher);
-        assert!((found - moved).abs() < 0.02e-3, "{found} after {} insisted", patcher.knocks().insisted);
-        assert!(patcher.knocks().insisted > 50);
+        assert!((found - moved).abs() < 0.02e-3, "{found} after {} relocated", patcher.outliers().relocated);
+        assert!(patcher.outliers().relocated > 50);
     }
 }
 

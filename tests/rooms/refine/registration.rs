@@ -74,7 +74,7 @@ fn a_clean_scan_is_moved_back_exactly() {
             estimate(&touched(&sides(), RegistrationParams::default()), &scan(&sides(), &moved, |_| 0.0)).unwrap();
         let left = found.scan_to_part * moved;
         assert!(left.translation.vector.norm() < 1e-7 && left.rotation.angle() < 1e-5, "{left}");
-        assert!(found.fatness[0].abs() < 1e-7, "{:?}", found.fatness);
+        assert!(found.surface_offset[0].abs() < 1e-7, "{:?}", found.surface_offset);
     }
 }
 
@@ -85,12 +85,12 @@ fn a_fat_scan_is_told_from_a_shift_when_it_was_touched_from_all_sides() {
         &scan(&sides(), &Isometry3::identity(), |_| 0.2e-3),
     );
     let found = found.unwrap();
-    assert!((found.fatness[0] - 0.2e-3).abs() < 0.02e-3, "{:?}", found.fatness);
+    assert!((found.surface_offset[0] - 0.2e-3).abs() < 0.02e-3, "{:?}", found.surface_offset);
     // the rounds end at steps of 60 nm at 40 mm
     assert!(found.twist.norm() < 1e-5, "{}", found.twist);
 }
 
-/// From one side fatness is a shift for all that touches tell: its own uncertainty must show.
+/// From one side surface_offset is a shift for all that touches tell: its own uncertainty must show.
 #[test]
 fn touched_from_one_side_of_each_axis_the_shift_is_as_uncertain_as_the_fatness() {
     let three = [sides()[0], sides()[2], sides()[4]];

@@ -151,9 +151,9 @@ fn what_is_no_clean_touch_is_told() {
     assert_eq!(verdict(&clean), OnsetVerdict::Clean);
     assert_eq!(verdict(&made(&Making { lateral: 0.9, ..MAKING }, 1)), OnsetVerdict::Edge);
     // pushed for 6 ms on its way, in free air
-    let mut knocked = clean.clone();
-    knocked[40..43].iter_mut().for_each(|m| m.force += 3.0);
-    assert_eq!(verdict(&knocked), OnsetVerdict::Knock);
+    let mut hit = clean.clone();
+    hit[40..43].iter_mut().for_each(|m| m.force += 3.0);
+    assert_eq!(verdict(&hit), OnsetVerdict::Impact);
     // lost for 20 ms when it had just come
     let mut bounced = clean.clone();
     let first = bounced.iter().position(|m| m.force > 1.8).unwrap();

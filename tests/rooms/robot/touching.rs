@@ -143,7 +143,7 @@ fn explored(arm: &mut SimArm, params: &ArmParams, touching: &TouchParams, search
         };
         peak = peak.max(record.peak_force);
         search.take(&match record.outcome {
-            TouchOutcome::Contact { onset, centre, .. } if onset.verdict != OnsetVerdict::Knock => {
+            TouchOutcome::Contact { onset, centre, .. } if onset.verdict != OnsetVerdict::Impact => {
                 Felt::At { centre: params.pose_bo.inverse_transform_point(&centre), sigma: onset.sigma }
             }
             TouchOutcome::Miss { .. } => Felt::Nothing,

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::*;
-use touchup::sim::{ScannerParams, measure_badness, scan};
+use touchup::sim::{ScannerParams, measure_quality, scan};
 
 /// Directed edges with how many faces use them.
 fn directed_edges(mesh: &TriMesh) -> HashMap<(u32, u32), u32> {
@@ -20,7 +20,7 @@ fn scan_is_as_bad_as_those_of_an_independent_simulator() {
     let runs: Vec<_> = (1..=4)
         .map(|seed| {
             let mesh = scan(&plate, &ScannerParams { seed, ..ScannerParams::default() }).unwrap();
-            measure_badness(&mesh, &plate, |_| true).unwrap()
+            measure_quality(&mesh, &plate, |_| true).unwrap()
         })
         .collect();
     let mean = |f: &dyn Fn(usize) -> f64| (0..runs.len()).map(f).sum::<f64>() / runs.len() as f64;
@@ -114,7 +114,7 @@ fn scan_of_a_mesh_is_that_of_its_surface_and_the_seed_decides() {
     let mesh = plate.mesh(10e-6).unwrap();
     let params = ScannerParams { edge: 4e-3, ..ScannerParams::default() };
     let (a, b) = (scan(&plate, &params).unwrap(), scan(&MeshSurface::new(&mesh).unwrap(), &params).unwrap());
-    let [qa, qb] = [&a, &b].map(|m| measure_badness(m, &plate, |_| true).unwrap());
+    let [qa, qb] = [&a, &b].map(|m| measure_quality(m, &plate, |_| true).unwrap());
     assert!((qa.mean - qb.mean).abs() < 20e-6 && (qa.bias - qb.bias).abs() < 20e-6, "{qa:?} {qb:?}");
     let again = scan(&plate, &params).unwrap();
     assert!(a.positions() == again.positions() && a.faces().eq(again.faces()));
@@ -134,7 +134,7 @@ fn perfect_scanner_sees_the_surface() {
         misplaced_angle: 0.0,
         ..ScannerParams::default()
     };
-    let quality = measure_badness(&scan(&peaks, &params).unwrap(), &peaks, |_| true).unwrap();
+    let quality = measure_quality(&scan(&peaks, &params).unwrap(), &peaks, |_| true).unwrap();
     // chords of 1 mm on a radius of at least 1.57 mm are off by less than 1²/(8 · 1.57) mm
     assert!(quality.p95 < 0.08e-3 && quality.mean < 0.02e-3, "{quality:?}");
 }

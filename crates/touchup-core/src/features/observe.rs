@@ -66,7 +66,7 @@ impl<'a> Observed<'a> {
             cells: BTreeMap::new(),
             reach,
         };
-        for (number, touch) in touches.iter().enumerate().filter(|(_, touch)| !touch.is_held_apart) {
+        for (number, touch) in touches.iter().enumerate().filter(|(_, touch)| !touch.is_rejected) {
             if let Some(segment) = observed.segment_of(of_face, touch) {
                 observed.of_segment[segment].push(number as u32);
                 observed.cells.entry(observed.cell(&touch.point)).or_default().push(number as u32);

@@ -130,7 +130,7 @@ fn is_same(one: &Feature, other: &Feature) -> bool {
 /// Whether a touch is on the surface of a feature.
 fn is_on(feature: &Feature, touch: &ProbedPoint) -> bool {
     let reach = if touch.radius > 0.0 { touch.radius } else { RADIUS };
-    let Some(axis) = feature.axis.as_ref().filter(|_| !touch.is_held_apart) else { return false };
+    let Some(axis) = feature.axis.as_ref().filter(|_| !touch.is_rejected) else { return false };
     let height = feature.depth.as_ref().map_or(0.0, |depth| depth.value);
     let along = (touch.point - feature.centre.value).dot(&axis.value);
     // a hole lies below its opening, a boss stands on its foot

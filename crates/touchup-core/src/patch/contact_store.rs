@@ -4,15 +4,15 @@
 //!
 //! Contacts are independent from one pass to the next, not from sample to sample: [`Visits`] counts the passes. With a
 //! gate, a contact that contradicts the mean of its place (or of the place beside it, where it is the first) by more than
-//! both can be off is held apart. A second pass that says the same takes the place; one that confirms the mean forgets it.
+//! both can be off is rejected. A second pass that says the same takes the place; one that confirms the mean forgets it.
 
 use nalgebra::{Point3, Vector3};
 
 use super::contact_sigma::ContactSigma;
 use super::contact_sums::Sums;
 use super::history::History;
-use super::knocks::{Knock, Knocks};
 use super::lattice::LatticeNode;
+use super::outliers::{Outlier, Outliers};
 use super::table::CellTable;
 use super::touches::SurfaceContact;
 use super::visits::{Visit, Visits};
@@ -35,13 +35,13 @@ pub struct MeanContact {
 pub enum Verdict {
     /// it is in the mean of its place
     Taken,
-    /// it contradicts its place and is held apart
-    HeldApart,
+    /// it contradicts its place and is rejected
+    Rejected,
     /// the second pass that contradicts: the place has moved to it
-    Insisted,
+    Relocated,
 }
 
-/// When a contact is held apart.
+/// When a contact is rejected.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GateParams {
     /// a contact contradicts by more than this many standard deviations
@@ -77,7 +77,7 @@ struct Kept {
     next: u32,
     sums: Sums,
     visits: Visits,
-    /// number of what was held apart here, [`NONE`] where nothing is
+    /// number of what was rejected here, [`NONE`] where nothing is
     apart: u32,
     /// whether it stands in [`ContactStore::changed`]
     is_noted: bool,
@@ -102,7 +102,7 @@ enum Past {
     Apart(Option<Apart>),
 }
 
-/// Keys of means are their numbers, those of what was held apart have this bit too.
+/// Keys of means are their numbers, those of what was rejected have this bit too.
 const OF_APART: u32 = 1 << 31;
 
 /// Contacts that contradict a mean and agree with each other.
@@ -125,7 +125,7 @@ pub struct ContactStore {
     means: Vec<MeanContact>,
     nearby: CellTable<LatticeNode, Vec<u32>>,
     apart: Vec<Apart>,
-    knocks: Knocks,
+    outliers: Outliers,
     /// the mean that the last contact went into, and when, ns
     last: Option<(u32, i64)>,
     changed: Vec<u32>,
@@ -158,7 +158,7 @@ const PAUSE: i64 = 2;
 impl ContactStore {
     /// An empty store of cells of edge `cell` (m), for queries up to `reach` (m).
     ///
-    /// - `gate`: when contacts are held apart; `None`: never.
+    /// - `gate`: when contacts are rejected; `None`: never.
     pub fn new(cell: f64, reach: f64, gate: Option<GateParams>) -> Self {
         Self {
             cell,
@@ -169,7 +169,7 @@ impl ContactStore {
             means: Vec::new(),
             nearby: CellTable::default(),
             apart: Vec::new(),
-            knocks: Knocks::default(),
+            outliers: Outliers::default(),
             last: None,
             changed: Vec::new(),
             history: History::new(MOST_KEPT),
@@ -193,7 +193,7 @@ impl ContactStore {
             && kept.visits.note(contact.stamp_ns, contact.weight, gate.window_ns)
             && apart != NONE
         {
-            // a pass that confirms the mean: what is held apart was a knock
+            // a pass that confirms the mean: what is rejected was an outlier
             self.note_apart(apart);
             self.apart[apart as usize].sums = Sums::ZERO;
         }
@@ -204,7 +204,7 @@ impl ContactStore {
         Verdict::Taken
     }
 
-    /// Whether a contact contradicts what is known at its place, and would be held apart.
+    /// Whether a contact contradicts what is known at its place, and would be rejected.
     pub(super) fn contradicts(&self, contact: &SurfaceContact) -> bool {
         let bin = self.bin_of(contact);
         self.gate.is_some_and(|gate| self.rival(contact, bin.cell, self.find(&bin), &gate).is_some())
@@ -269,7 +269,7 @@ impl ContactStore {
         kept.sums.innovation(&kept.visits, contact, ROUGHNESS * self.cell)
     }
 
-    /// Holds a contact apart, or lets it take the place of the mean that it contradicts in a second pass.
+    /// Rejects a contact, or lets it take the place of the mean that it contradicts in a second pass.
     fn contest(&mut self, rival: &Rival, contact: &SurfaceContact, bin: &Bin, gate: &GateParams) -> Verdict {
         let roughness = ROUGHNESS * self.cell;
         let at = self.apart_of(rival.index, contact.stamp_ns);
@@ -286,15 +286,15 @@ impl ContactStore {
         if is_second {
             let Apart { sums, visits, .. } = std::mem::replace(apart, Apart { sums: Sums::ZERO, ..*apart });
             self.move_to(rival.index, (sums, visits), contact, bin, gate.sigmas);
-            return Verdict::Insisted;
+            return Verdict::Relocated;
         }
         let SurfaceContact { stamp_ns, point, normal, .. } = *contact;
         let Rival { innovation, sigmas, .. } = *rival;
-        self.knocks.note(Knock { stamp_ns, point, normal, innovation, sigmas, contacts: 1 }, gate.window_ns);
-        Verdict::HeldApart
+        self.outliers.note(Outlier { stamp_ns, point, normal, innovation, sigmas, contacts: 1 }, gate.window_ns);
+        Verdict::Rejected
     }
 
-    /// Number of what is held apart of a mean, about to change.
+    /// Number of what is rejected of a mean, about to change.
     fn apart_of(&mut self, index: u32, stamp_ns: i64) -> u32 {
         let at = self.kept[index as usize].apart;
         if at != NONE {
@@ -309,7 +309,7 @@ impl ContactStore {
         at
     }
 
-    /// Empties the means that a contact contradicts and puts what was held apart in the cell where it was felt.
+    /// Empties the means that a contact contradicts and puts what was rejected in the cell where it was felt.
     fn move_to(
         &mut self,
         rival: u32,
@@ -318,7 +318,7 @@ impl ContactStore {
         bin: &Bin,
         sigmas: f64,
     ) {
-        self.knocks.insisted += 1;
+        self.outliers.relocated += 1;
         let contradicts = |&index: &u32| {
             let is_alike = self.kept[index as usize].sums.weight > 0.0
                 && self.means[index as usize].normal.dot(&contact.normal) > ALIKE;
@@ -513,9 +513,9 @@ impl ContactStore {
         self.kept[index as usize].visits.iter()
     }
 
-    /// What was held apart.
-    pub fn knocks(&self) -> &Knocks {
-        &self.knocks
+    /// What was rejected.
+    pub fn outliers(&self) -> &Outliers {
+        &self.outliers
     }
 
     /// Takes a mean out of all queries, or back in; returns whether that is new.
@@ -682,7 +682,7 @@ mod tests {
     }
 
     #[test]
-    fn what_contradicts_is_held_apart_until_a_second_pass_insists() {
+    fn what_contradicts_is_rejected_until_a_second_pass_insists() {
         let gate = GateParams { sigmas: 4.0, window_ns: 64_000_000 };
         let second = 1_000_000_000;
         // within the cell, and in the one above
@@ -698,13 +698,13 @@ mod tests {
             assert_eq!(pass(&mut store, 0.0, second), Verdict::Taken);
             assert_eq!(pass(&mut store, 0.01e-3, 2 * second), Verdict::Taken);
             assert_eq!(near(&store), [105.0], "what agrees is averaged");
-            assert_eq!(pass(&mut store, moved, 3 * second), Verdict::HeldApart);
-            assert_eq!((near(&store), store.knocks().held_apart), (vec![105.0], 8));
+            assert_eq!(pass(&mut store, moved, 3 * second), Verdict::Rejected);
+            assert_eq!((near(&store), store.outliers().rejected), (vec![105.0], 8));
             // a pass that confirms the mean: the next that contradicts is the first again
             assert_eq!(pass(&mut store, 0.0, 4 * second), Verdict::Taken);
-            assert_eq!(pass(&mut store, moved, 5 * second), Verdict::HeldApart);
+            assert_eq!(pass(&mut store, moved, 5 * second), Verdict::Rejected);
             pass(&mut store, moved, 6 * second);
-            assert_eq!(store.knocks().insisted, 1);
+            assert_eq!(store.outliers().relocated, 1);
             assert_eq!(near(&store), [((100e-6 + moved) * 1e6).round()]);
         }
     }

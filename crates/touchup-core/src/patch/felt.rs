@@ -72,14 +72,14 @@ impl Felt {
         let two = self.ball.and_then(|radius| split(&self.contacts, radius, &touch.centre, contact));
         let mut is_believed = false;
         for contact in two.as_ref().map_or(std::slice::from_ref(contact), |two| two) {
-            // a wall that the ball would have to be nearer to is not touched: that is no knock
+            // a wall that the ball would have to be nearer to is not touched: that is no outlier
             if two.is_some() && self.contacts.contradicts(contact) {
                 continue;
             }
             let verdict = self.contacts.add(contact);
             self.probed.note(touch, contact, verdict);
-            is_believed |= verdict != Verdict::HeldApart;
-            if verdict == Verdict::Insisted {
+            is_believed |= verdict != Verdict::Rejected;
+            if verdict == Verdict::Relocated {
                 self.swept.forget(&contact.point, FORGOTTEN * self.radius);
             }
         }

@@ -8,8 +8,8 @@ use super::delta::{PatchDelta, Shown};
 use super::evidence::{Evidence, EvidenceParams, ScanPrior, Source};
 use super::felt::Felt;
 use super::field::FieldScratch;
-use super::knocks::Knocks;
 use super::lattice::{CellBox, Lattice, LatticeNode, VertexKey};
+use super::outliers::Outliers;
 use super::patched::{Patched, Support};
 use super::remesh::{Remesh, Renewed};
 use super::restore::{News, NodeState, Restored, node_at};
@@ -36,7 +36,7 @@ pub struct PatcherParams {
     pub pitch: f64,
     /// a patch may have this many times the faces of the scan: where it would have more, the lattice is made coarser
     pub most_faces: f64,
-    /// how well things are known; `None`: nobody asks, and nothing is held apart
+    /// how well things are known; `None`: nobody asks, and nothing is rejected
     pub uncertainty: Option<UncertaintyParams>,
     /// `None`: the mesh is the whole scan, and may be touched anywhere
     pub region: Option<PatchRegion>,
@@ -58,7 +58,7 @@ pub struct UncertaintyParams {
     pub scan: f64,
     /// what the calibration leaves
     pub calibration: CalibrationParams,
-    /// contacts that contradict by more standard deviations than this are held apart
+    /// contacts that contradict by more standard deviations than this are rejected
     pub gate_sigmas: f64,
 }
 
@@ -107,7 +107,7 @@ impl PatcherParams {
         (self.touches.shape == TipShape::Ball).then_some(self.touches.radius)
     }
 
-    /// When contacts are held apart.
+    /// When contacts are rejected.
     fn gate(&self) -> Option<GateParams> {
         self.uncertainty.map(|known| GateParams { sigmas: known.gate_sigmas, window_ns: self.window_ns() })
     }
@@ -255,9 +255,9 @@ impl Patcher {
         })
     }
 
-    /// What was held apart because it contradicted the place it was felt at.
-    pub fn knocks(&self) -> &Knocks {
-        self.felt.contacts.knocks()
+    /// What was rejected because it contradicted the place it was felt at.
+    pub fn outliers(&self) -> &Outliers {
+        self.felt.contacts.outliers()
     }
 
     /// A copy of what was felt, without what was made of it for a mesh that follows.

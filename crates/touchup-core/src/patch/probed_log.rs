@@ -65,7 +65,7 @@ impl ProbedLog {
             sigma: contact.sigma.noise,
             calibration: contact.sigma.calibration,
             weight: contact.weight,
-            is_held_apart: verdict == Verdict::HeldApart,
+            is_rejected: verdict == Verdict::Rejected,
         });
     }
 

@@ -216,7 +216,7 @@ impl TouchFinder {
         best
     }
 
-    /// Variance of the centre where even the shortest window is no parabola, as after a knock: as much as the path is off
+    /// Variance of the centre where even the shortest window is no parabola, as after an outlier: as much as the path is off
     /// it, in those of its noise. Such errors are alike in all of the window and do not average out in it.
     fn roughness(&self, motion: &SmoothedMotion) -> f64 {
         let noise = self.noise.sigma.max(LEAST_ROUGH * self.params.radius);

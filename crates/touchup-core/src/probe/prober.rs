@@ -349,8 +349,8 @@ impl<'a> Prober<'a> {
     /// What a record tells the explorer.
     fn told(&self, wish: Wish, record: TouchRecord, before: &Before) -> (Felt, ProbedTouch) {
         let (felt, refused) = match &record.outcome {
-            TouchOutcome::Contact { onset, .. } if onset.verdict == OnsetVerdict::Knock => {
-                (Felt::Unclear, Some("a knock: the force was over before the surface held".to_owned()))
+            TouchOutcome::Contact { onset, .. } if onset.verdict == OnsetVerdict::Impact => {
+                (Felt::Unclear, Some("an impact: the force was over before the surface held".to_owned()))
             }
             TouchOutcome::Contact { onset, centre, .. } => {
                 let centre = self.cell.pose_bo.inverse_transform_point(centre);

@@ -21,14 +21,14 @@ pub struct RegistrationParams {
     /// correlation. Default 9 mm, for waves smoothed by 3.5 mm.
     pub correlation: f64,
     /// How fat or thin a scan usually is, standard deviation, m. Default 0.3 mm.
-    pub fatness: f64,
+    pub surface_offset: f64,
     /// Contacts closer together than this become one, m. Default 1 mm.
     pub spacing: f64,
 }
 
 impl Default for RegistrationParams {
     fn default() -> Self {
-        Self { scan_noise: 0.6e-3, correlation: 9e-3, fatness: 0.3e-3, spacing: 1e-3 }
+        Self { scan_noise: 0.6e-3, correlation: 9e-3, surface_offset: 0.3e-3, spacing: 1e-3 }
     }
 }
 
@@ -44,7 +44,7 @@ pub struct Registration {
     /// What the rotation is about: the middle of the contacts, m, in O.
     pub centre: Point3<f64>,
     /// How much fatter the scan is than the part, m, and its standard uncertainty.
-    pub fatness: [f64; 2],
+    pub surface_offset: [f64; 2],
     /// Contacts, after thinning, that were used.
     pub contacts: usize,
 }
@@ -87,7 +87,7 @@ struct Mean {
     count: f64,
 }
 
-/// Twist and fatness.
+/// Twist and surface_offset.
 type Unknowns = SVector<f64, 7>;
 type Information = SMatrix<f64, 7, 7>;
 
@@ -123,11 +123,11 @@ impl Registrar {
     /// # Errors
     /// [`SettingError`] unless all settings are more than 0.
     pub fn new(params: RegistrationParams) -> Result<Self, SettingError> {
-        let RegistrationParams { scan_noise, correlation, fatness, spacing } = params;
+        let RegistrationParams { scan_noise, correlation, surface_offset, spacing } = params;
         for (name, value) in [
             ("scan noise (m)", scan_noise),
             ("correlation length of the scan (m)", correlation),
-            ("fatness of the scan (m)", fatness),
+            ("surface_offset of the scan (m)", surface_offset),
             ("spacing of contacts (m)", spacing),
         ] {
             SettingError::check(name, value, value > 0.0, "more than 0")?;
@@ -196,7 +196,7 @@ fn moved(pose: &Isometry3<f64>, centre: &Point3<f64>, step: &Unknowns) -> Isomet
 
 /// One round of least squares.
 struct RegistrationRound {
-    /// t, θ, and the fatness itself
+    /// t, θ, and the surface offset itself
     step: Unknowns,
     covariance: Information,
     lever: f64,
@@ -219,7 +219,7 @@ impl RegistrationRound {
         centre: &Point3<f64>,
         pose: &Isometry3<f64>,
     ) -> Result<Self, RegistrationError> {
-        let RegistrationParams { scan_noise, correlation, fatness, .. } = registrar.params;
+        let RegistrationParams { scan_noise, correlation, surface_offset, .. } = registrar.params;
         // the scan stays where it is: the contacts are moved back
         let rows: Vec<_> = contacts
             .iter()
@@ -240,7 +240,7 @@ impl RegistrationRound {
         let lever = (rows.iter().map(|(_, _, _, square, _)| square).sum::<f64>() / count).sqrt();
         check_directions(&rows.iter().map(|(_, row, ..)| *row).collect::<Vec<_>>(), lever)?;
 
-        let prior = 1.0 / (fatness * fatness);
+        let prior = 1.0 / (surface_offset * surface_offset);
         let unit = independent(rows.iter().map(|(_, _, _, _, p)| p), correlation) / count / (scan_noise * scan_noise);
         let mut step = Unknowns::zeros();
         let mut weights = vec![1.0; rows.len()];
@@ -270,7 +270,7 @@ impl RegistrationRound {
             rows.iter().zip(&weights).map(|((_, row, error, ..), w)| w * (error - row.dot(&step)).powi(2)).sum();
         let scale = (square / weights.iter().sum::<f64>() / (scan_noise * scan_noise)).max(LEAST_SCALE);
         let mut covariance = inverse * scale;
-        // what is known of the fatness beforehand does not depend on the errors
+        // what is known of the surface offset beforehand does not depend on the errors
         covariance += inverse.column(6) * inverse.column(6).transpose() * (prior * (1.0 - scale));
         Ok(Self { step, covariance, lever, contacts: rows.len() })
     }
@@ -282,7 +282,7 @@ impl RegistrationRound {
             twist: Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z),
             covariance: self.covariance.fixed_view::<6, 6>(0, 0).into_owned(),
             centre: *centre,
-            fatness: [self.step[6], self.covariance[(6, 6)].sqrt()],
+            surface_offset: [self.step[6], self.covariance[(6, 6)].sqrt()],
             contacts: self.contacts,
         }
     }

@@ -34,8 +34,8 @@ pub struct OnsetParams {
     pub force_noise: f64,
     /// The force that counts as contact for verdicts, N.
     pub contact_force: f64,
-    /// Shorter contacts are knocks, s.
-    pub knock: f64,
+    /// Shorter contacts are impacts, s.
+    pub shortest_contact: f64,
     /// Largest share of the force across the approach; more is an edge or a slope.
     pub lateral_share: f64,
 }
@@ -48,7 +48,7 @@ impl Default for OnsetParams {
             delay_sigma: 4e-3,
             force_noise: 0.05,
             contact_force: 0.5,
-            knock: 10e-3,
+            shortest_contact: 10e-3,
             // friction of a steel ball on metal is below 0.3; a slope of 20 degrees adds as much
             lateral_share: 0.65,
         }
@@ -67,7 +67,7 @@ pub enum OnsetVerdict {
     /// Contact was lost and found again going in.
     Bounce,
     /// A short push that was no contact: something hit the arm or the table.
-    Knock,
+    Impact,
 }
 
 impl OnsetVerdict {
@@ -78,7 +78,7 @@ impl OnsetVerdict {
             Self::Slip => "slip",
             Self::Edge => "edge",
             Self::Bounce => "bounce",
-            Self::Knock => "knock",
+            Self::Impact => "impact",
         }
     }
 }
@@ -461,8 +461,9 @@ impl ForceCurve<'_> {
 
     fn verdict(&self, line: &LineFit) -> OnsetVerdict {
         let contacts = self.contacts(line[B]);
-        let is_short =
-            |&(first, last): &(usize, usize)| self.moments[last].t - self.moments[first].t < self.params.knock;
+        let is_short = |&(first, last): &(usize, usize)| {
+            self.moments[last].t - self.moments[first].t < self.params.shortest_contact
+        };
         // the tip was clearly above the surface: what pushed it was something else
         let is_above = |&(first, _): &(usize, usize)| {
             let Smooth { travel, speed, .. } = self.path[first];
@@ -470,7 +471,7 @@ impl ForceCurve<'_> {
             travel < line[S0] - self.contact_force() / line[K] - speed.abs() * later
         };
         if contacts.iter().any(is_above) || contacts.iter().all(is_short) {
-            return OnsetVerdict::Knock;
+            return OnsetVerdict::Impact;
         }
         if contacts.len() > 1 {
             return OnsetVerdict::Bounce;

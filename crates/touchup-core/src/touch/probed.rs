@@ -26,6 +26,6 @@ pub struct ProbedPoint {
     pub calibration: f64,
     /// what it counts beside others, at most 1
     pub weight: f64,
-    /// it contradicts what was felt there before: a knock, a slip
-    pub is_held_apart: bool,
+    /// it contradicts what was felt there before: an outlier, a slip
+    pub is_rejected: bool,
 }

@@ -73,7 +73,7 @@ pub struct Scene {
     /// Meshes the surface anew where it was touched; without it the triangles of the scan stay.
     #[serde(default, deserialize_with = "named")]
     pub patch: Option<PatchSection>,
-    /// Says how well the surface that was meshed anew is known and holds knocks apart; without it every touch counts.
+    /// Says how well the surface that was meshed anew is known and rejects outliers; without it every touch counts.
     #[serde(default, deserialize_with = "named")]
     pub uncertainty: Option<UncertaintySection>,
     /// The arm that holds a probe; without it nothing is probed.

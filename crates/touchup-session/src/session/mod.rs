@@ -3,10 +3,10 @@
 //! [`Outcome`] is what `touchup refine` and the node write alike: the refined mesh, the features on it, the touches they rest
 //! on. [`SessionRecord`] keeps in a folder all that it takes to get the same again, up to the last moment before a crash.
 
-mod knocks;
 mod outcome;
+mod outliers;
 mod record;
 
-pub use knocks::UncertaintySummary;
 pub use outcome::{Outcome, OutcomeError, OutcomePlaces, PatchSummary, found, moved_faces};
+pub use outliers::UncertaintySummary;
 pub use record::{SessionError, SessionRecord, SessionRecorder, StrokeChange, Unrecorded};

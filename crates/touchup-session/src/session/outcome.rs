@@ -7,7 +7,7 @@ use std::time::Instant;
 use serde::Serialize;
 use tracing::{debug, warn};
 
-use super::knocks::UncertaintySummary;
+use super::outliers::UncertaintySummary;
 use touchup_core::features::{Detection, detect};
 use touchup_core::mesh::{FaceId, FaceTree, MeshError, Outside, TriMesh, VertexId};
 use touchup_core::patch::{Patched, Patcher, Support};
@@ -145,7 +145,7 @@ impl OutcomePlaces<'_> {
             );
         }
         let build_s = started.elapsed().as_secs_f64();
-        let uncertainty = patcher.params().uncertainty.map(|_| UncertaintySummary::of(&patched, patcher.knocks()));
+        let uncertainty = patcher.params().uncertainty.map(|_| UncertaintySummary::of(&patched, patcher.outliers()));
         let moved_faces = moved_faces(scan, &patched.mesh);
         let of_scan = patcher.params().uncertainty.map_or(0.0, |known| known.scan);
         let patched = match self.outside {

@@ -250,7 +250,7 @@ fn verdict_of(outcome: &TouchOutcome) -> u8 {
             OnsetVerdict::Slip => ProbeTouch::SLIP,
             OnsetVerdict::Edge => ProbeTouch::EDGE,
             OnsetVerdict::Bounce => ProbeTouch::BOUNCE,
-            OnsetVerdict::Knock => ProbeTouch::KNOCK,
+            OnsetVerdict::Impact => ProbeTouch::IMPACT,
         },
         TouchOutcome::Miss { .. } => ProbeTouch::MISS,
         TouchOutcome::Unclear(_) => ProbeTouch::UNCLEAR,

@@ -19,8 +19,8 @@ pub struct BadTouches {
     pub off: f64,
     /// … in standard deviations
     pub sigmas: f64,
-    /// how many were held apart while the mesh was refined
-    pub held_apart: usize,
+    /// how many were rejected while the mesh was refined
+    pub rejected: usize,
     /// good touches of other times that felt the same way there
     pub against: usize,
 }
@@ -42,15 +42,15 @@ const NEAR: f64 = 1e-3;
 /// A place is badly touched when this share of its touches is bad.
 const SHARE: f64 = 0.5;
 
-/// Those held apart, and those that lie off the surface and off what others felt there.
+/// Those rejected, and those that lie off the surface and off what others felt there.
 pub(super) fn find(refined: &RefinedShape<'_>, touches: &[ProbedPoint]) -> Result<Vec<BadTouches>, CompareError> {
     let (off, feet) = distances(refined, touches)?;
     let points: Vec<Point3<f64>> = touches.iter().map(|touch| touch.point).collect();
     let reach = reach(touches);
-    let taken = Cells::new(&points, (0..touches.len()).filter(|&at| !touches[at].is_held_apart), reach);
+    let taken = Cells::new(&points, (0..touches.len()).filter(|&at| !touches[at].is_rejected), reach);
     let is_bad = |at: usize| {
         let limit = limit(&touches[at]);
-        touches[at].is_held_apart
+        touches[at].is_rejected
             || (off[at].abs() > limit
                 && contradiction(touches, at, &taken, &feet[at], reach).is_some_and(|d| d > limit))
     };
@@ -99,7 +99,7 @@ fn told(numbers: &[usize], touches: &[ProbedPoint], off: &[f64], against: impl F
         centre: (sum / numbers.len() as f64).into(),
         off: off[worst],
         sigmas: sigmas(worst).abs(),
-        held_apart: numbers.iter().filter(|&&at| touches[at].is_held_apart).count(),
+        rejected: numbers.iter().filter(|&&at| touches[at].is_rejected).count(),
         against: against(worst),
     }
 }

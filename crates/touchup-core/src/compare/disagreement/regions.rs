@@ -206,7 +206,7 @@ fn judged(
 /// Largest number of times that any place of a region was passed.
 fn passes(touches: &[ProbedPoint], region: &Cells<'_>, reach: f64) -> usize {
     let (mut count, mut last) = (0, None);
-    for touch in touches.iter().filter(|touch| !touch.is_held_apart) {
+    for touch in touches.iter().filter(|touch| !touch.is_rejected) {
         if region.near(&touch.point, reach).next().is_some() {
             let is_new =
                 last.is_none_or(|(stroke, at)| stroke != touch.stroke || touch.stamp_ns.saturating_sub(at) > PASS_NS);

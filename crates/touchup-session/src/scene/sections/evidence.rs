@@ -100,7 +100,7 @@ pub struct UncertaintySection {
     pub calibration_mm: f64,
     /// … and the stiffness of the tip, %.
     pub stiffness_percent: f64,
-    /// A touch that contradicts its place by more than this many standard deviations is held apart.
+    /// A touch that contradicts its place by more than this many standard deviations is rejected.
     pub gate_sigmas: f64,
 }
 

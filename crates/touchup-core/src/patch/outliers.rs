@@ -4,9 +4,9 @@ use std::collections::VecDeque;
 
 use nalgebra::{Point3, Vector3};
 
-/// Contacts one after the other that were held apart.
+/// Contacts one after the other that were rejected.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Knock {
+pub struct Outlier {
     /// when it began, ns
     pub stamp_ns: i64,
     /// where the contact was that contradicted most, m, in O
@@ -21,42 +21,42 @@ pub struct Knock {
     pub contacts: u64,
 }
 
-/// All that was held apart.
+/// All that was rejected.
 #[derive(Clone, Debug, Default)]
-pub struct Knocks {
-    /// how many contacts were held apart
-    pub held_apart: u64,
+pub struct Outliers {
+    /// how many contacts were rejected
+    pub rejected: u64,
     /// how many places moved because a second pass said the same
-    pub insisted: u64,
-    last: VecDeque<Knock>,
+    pub relocated: u64,
+    last: VecDeque<Outlier>,
     last_ns: i64,
 }
 
 /// So many are kept.
 const KEPT: usize = 64;
 
-impl Knocks {
+impl Outliers {
     /// The last ones, in order of time.
-    pub fn last(&self) -> impl Iterator<Item = &Knock> + '_ {
+    pub fn last(&self) -> impl Iterator<Item = &Outlier> + '_ {
         self.last.iter()
     }
 
-    /// Counts a contact; those within `pause_ns` are one knock.
-    pub(super) fn note(&mut self, knock: Knock, pause_ns: i64) {
-        self.held_apart += 1;
-        let goes_on = knock.stamp_ns.saturating_sub(self.last_ns) <= pause_ns;
-        self.last_ns = knock.stamp_ns;
+    /// Counts a contact; those within `pause_ns` are one outlier.
+    pub(super) fn note(&mut self, outlier: Outlier, pause_ns: i64) {
+        self.rejected += 1;
+        let goes_on = outlier.stamp_ns.saturating_sub(self.last_ns) <= pause_ns;
+        self.last_ns = outlier.stamp_ns;
         match self.last.back_mut().filter(|_| goes_on) {
             Some(last) => {
                 let (stamp_ns, contacts) = (last.stamp_ns, last.contacts + 1);
-                let most = if knock.sigmas > last.sigmas { knock } else { *last };
-                *last = Knock { stamp_ns, contacts, ..most };
+                let most = if outlier.sigmas > last.sigmas { outlier } else { *last };
+                *last = Outlier { stamp_ns, contacts, ..most };
             }
             None => {
                 if self.last.len() == KEPT {
                     self.last.pop_front();
                 }
-                self.last.push_back(knock);
+                self.last.push_back(outlier);
             }
         }
     }
@@ -68,16 +68,16 @@ mod tests {
 
     #[test]
     fn contacts_in_a_row_are_one_knock_and_the_last_ones_are_kept() {
-        let mut knocks = Knocks::default();
+        let mut outliers = Outliers::default();
         for i in 0..100 {
             for (after_ns, sigmas) in [(0, 5.0), (10, 9.0), (20, 6.0)] {
                 let (point, normal) = (Point3::origin(), Vector3::z());
                 let stamp_ns = 1000 * (i + 1) + after_ns;
-                knocks.note(Knock { stamp_ns, point, normal, innovation: 1e-4, sigmas, contacts: 1 }, 64);
+                outliers.note(Outlier { stamp_ns, point, normal, innovation: 1e-4, sigmas, contacts: 1 }, 64);
             }
         }
-        assert_eq!((knocks.held_apart, knocks.last().count()), (300, KEPT));
-        let (first, last) = (knocks.last().next().unwrap(), knocks.last().last().unwrap());
+        assert_eq!((outliers.rejected, outliers.last().count()), (300, KEPT));
+        let (first, last) = (outliers.last().next().unwrap(), outliers.last().last().unwrap());
         assert_eq!((first.stamp_ns, last.stamp_ns, last.contacts, last.sigmas), (37_000, 100_000, 3, 9.0));
     }
 }

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use touchup_core::patch::{Knock, Knocks, Patched, Support};
+use touchup_core::patch::{Outlier, Outliers, Patched, Support};
 
 /// What `--json` prints of the uncertainty.
 #[derive(Debug, Serialize)]
@@ -12,16 +12,16 @@ pub struct UncertaintySummary {
     /// median standard deviation of the vertices that were touched
     touched_sigma_mm: f64,
     /// contacts that contradicted their place and did not count
-    held_apart: u64,
+    rejected: u64,
     /// places that moved because a second pass contradicted them in the same way
-    insisted: u64,
-    /// the last that were held apart, in order of time
-    knocks: Vec<KnockFound>,
+    relocated: u64,
+    /// the last that were rejected, in order of time
+    outliers: Vec<OutlierSummary>,
 }
 
-/// Contacts one after the other that were held apart.
+/// Contacts one after the other that were rejected.
 #[derive(Debug, Serialize)]
-struct KnockFound {
+struct OutlierSummary {
     /// stamp of the first
     stamp_s: f64,
     /// where the one was that contradicted most
@@ -40,24 +40,24 @@ const TOLD: usize = 8;
 
 impl UncertaintySummary {
     /// What a patcher says of its result.
-    pub fn of(patched: &Patched, knocks: &Knocks) -> Self {
+    pub fn of(patched: &Patched, outliers: &Outliers) -> Self {
         let known = patched.sigma.iter().zip(&patched.support);
         let mut touched: Vec<f64> =
             known.filter(|(_, support)| **support == Support::Touched).map(|(sigma, _)| sigma * 1e3).collect();
         touched.sort_by(f64::total_cmp);
-        let skipped = knocks.last().count().saturating_sub(TOLD);
+        let skipped = outliers.last().count().saturating_sub(TOLD);
         Self {
             touched_sigma_mm: touched.get(touched.len() / 2).copied().unwrap_or_default(),
-            held_apart: knocks.held_apart,
-            insisted: knocks.insisted,
-            knocks: knocks.last().skip(skipped).map(KnockFound::of).collect(),
+            rejected: outliers.rejected,
+            relocated: outliers.relocated,
+            outliers: outliers.last().skip(skipped).map(OutlierSummary::of).collect(),
         }
     }
 }
 
-impl KnockFound {
-    fn of(knock: &Knock) -> Self {
-        let Knock { stamp_ns, point, normal, innovation, sigmas, contacts } = *knock;
+impl OutlierSummary {
+    fn of(outlier: &Outlier) -> Self {
+        let Outlier { stamp_ns, point, normal, innovation, sigmas, contacts } = *outlier;
         Self {
             stamp_s: stamp_ns as f64 * 1e-9,
             point_mm: [point.x, point.y, point.z].map(|x| x * 1e3),
@@ -71,13 +71,16 @@ impl KnockFound {
 
 impl fmt::Display for UncertaintySummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { touched_sigma_mm, held_apart, insisted, knocks } = self;
+        let Self { touched_sigma_mm, rejected, relocated, outliers } = self;
         write!(
             f,
-            "known: within {touched_sigma_mm:.3} mm (median standard deviation) where touched; {held_apart} contacts held \
-             apart, {insisted} places moved by a second pass"
+            "known: within {touched_sigma_mm:.3} mm (median standard deviation) where touched; {rejected} contacts rejected \
+             as outliers, {relocated} places moved by a second pass"
         )?;
-        let Some(KnockFound { point_mm: [x, y, z], off_mm, sigmas, .. }) = knocks.last() else { return Ok(()) };
-        write!(f, "; last knock at ({x:.1}, {y:.1}, {z:.1}) mm, {off_mm:+.3} mm or {sigmas:.0} standard deviations off")
+        let Some(OutlierSummary { point_mm: [x, y, z], off_mm, sigmas, .. }) = outliers.last() else { return Ok(()) };
+        write!(
+            f,
+            "; last outlier at ({x:.1}, {y:.1}, {z:.1}) mm, {off_mm:+.3} mm or {sigmas:.0} standard deviations off"
+        )
     }
 }
