@@ -23,10 +23,28 @@ use crate::ur::UrArm;
 pub(super) enum RobotName {
     /// A simulated one, against the part of --truth
     Sim,
-    /// A UR, at robot.host of the scene (docs/ur.md)
-    #[cfg(feature = "ur")]
+    /// A UR, at robot.host of the scene (docs/ur.md); only where touchup was built with the feature `ur`
     Ur,
 }
+
+/// The UR of a scene.
+///
+/// # Errors
+/// [`CliError::Usage`] where the scene names none, or touchup was built without it; [`CliError::Arm`] where it does not answer.
+#[cfg(feature = "ur")]
+pub(super) fn connect_ur(scene: &Scene) -> Result<Box<dyn Arm + Send>, CliError> {
+    let arm = UrArm::connect(&ur_params(scene)?).map_err(|error| CliError::Arm(error.to_string()))?;
+    Ok(Box::new(arm))
+}
+
+#[cfg(not(feature = "ur"))]
+pub(super) fn connect_ur(_: &Scene) -> Result<Box<dyn Arm + Send>, CliError> {
+    Err(CliError::Usage(NO_UR.to_owned()))
+}
+
+#[cfg(not(feature = "ur"))]
+const NO_UR: &str = "this touchup was built without a UR: `cargo install --locked --path . --features ur` in its folder makes one with \
+                     it, which needs a Python with its shared library (docs/ur.md)";
 
 #[derive(Debug, Args)]
 pub(super) struct ArmArguments {
@@ -127,11 +145,7 @@ impl CellArguments {
         work: impl FnOnce(&mut dyn Arm) -> Result<T, CliError>,
     ) -> Result<T, CliError> {
         match robot {
-            #[cfg(feature = "ur")]
-            RobotName::Ur => {
-                let arm = UrArm::connect(&ur_params(&ready.scene)?);
-                work(&mut arm.map_err(|error| CliError::Arm(error.to_string()))?)
-            }
+            RobotName::Ur => work(&mut *connect_ur(&ready.scene)?),
             RobotName::Sim => {
                 let part = self.part()?;
                 let surface = MeshSurface::new(&part)?;

@@ -68,7 +68,6 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
     match arguments.robot {
         None => {}
         Some(RobotName::Sim) => return demo_robot(arguments),
-        #[cfg(feature = "ur")]
         Some(RobotName::Ur) => return Err(CliError::Usage("the demo has a simulated arm: --robot sim".to_owned())),
     }
     let plate = Plate::default();

@@ -37,7 +37,7 @@ use std::io::{ErrorKind, Write, stderr, stdin, stdout};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::align::{FeaturesError, IcpError, PairsError};
 use crate::calibrate::{PayloadError, TipError};
@@ -118,6 +118,13 @@ enum Verb {
     /// Answers one held sample per JSON line on stdin, so that other implementations can be compared
     #[command(after_help = STEP_FIELDS)]
     Step,
+    /// Prints what a shell needs to complete commands and flags: touchup completions bash > ~/.local/share/bash-completion/completions/touchup
+    Completions {
+        /// Which shell
+        shell: clap_complete::Shell,
+    },
+    /// Prints a man page: touchup man | man -l -
+    Man,
     /// Prepares this machine for a UR arm
     #[cfg(feature = "ur")]
     #[command(subcommand)]
@@ -302,6 +309,18 @@ impl Verb {
             #[cfg(any(feature = "ros", feature = "r2r"))]
             Self::Replay(arguments) => replay::replay(arguments, _ros),
             Self::Step => answer_steps(),
+            Self::Completions { shell } => {
+                let mut script = Vec::new();
+                clap_complete::generate(*shell, &mut Arguments::command(), "touchup", &mut script);
+                tell(String::from_utf8_lossy(&script).trim_end());
+                Ok(Losses::new())
+            }
+            Self::Man => {
+                let mut page = Vec::new();
+                clap_mangen::Man::new(Arguments::command()).render(&mut page)?;
+                tell(String::from_utf8_lossy(&page).trim_end());
+                Ok(Losses::new())
+            }
             #[cfg(feature = "ur")]
             Self::Ur(arguments) => ur::ur(arguments),
         }

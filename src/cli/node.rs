@@ -8,6 +8,7 @@ use std::thread::Builder;
 use clap::Args;
 use tokio::signal::unix::{SignalKind, signal};
 
+use super::arm::connect_ur;
 use super::{CliError, Losses, complain, tell};
 use crate::io::mesh_file::{MeshFile, read_mesh};
 use crate::live::Quantiles;
@@ -17,8 +18,6 @@ use crate::ros::node::{ArmKind, ArmOfNode, INBOX, NodeEnd, NodeError, Prepared, 
 use crate::ros::parameters::ParameterValue;
 use crate::ros::port::Arrival;
 use crate::scene::Scene;
-#[cfg(feature = "ur")]
-use crate::ur::UrArm;
 
 #[derive(Debug, Args)]
 pub(super) struct NodeArguments {
@@ -76,20 +75,9 @@ fn arm_of(config: &NodeConfig, scene: &Scene) -> Result<Option<ArmOfNode>, CliEr
             let MeshFile { mesh, .. } = read_mesh(Path::new(part), unit).map_err(CliError::ReadTruth)?;
             ArmKind::Sim(Box::new(mesh))
         }
-        _ => real_arm(scene)?,
+        _ => ArmKind::Real(connect_ur(scene)?),
     };
     Ok(Some(ArmOfNode { kind, samples: ros::samples(&config.beside("_arm"))? }))
-}
-
-#[cfg(feature = "ur")]
-fn real_arm(scene: &Scene) -> Result<ArmKind, CliError> {
-    let arm = UrArm::connect(&super::probing::ur_params(scene)?).map_err(|error| CliError::Arm(error.to_string()))?;
-    Ok(ArmKind::Real(Box::new(arm)))
-}
-
-#[cfg(not(feature = "ur"))]
-fn real_arm(_: &Scene) -> Result<ArmKind, CliError> {
-    Err(CliError::Usage("robot:=ur needs touchup built with --features ur (docs/ur.md)".to_owned()))
 }
 
 impl NodeArguments {

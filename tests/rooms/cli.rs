@@ -558,6 +558,20 @@ fn report_hands_its_arguments_to_a_program_of_its_own_and_ends_with_its_code() {
 }
 
 #[test]
+fn completions_and_man_page_know_the_verbs_and_their_flags() {
+    for (arguments, flag) in
+        [(&["completions", "bash"][..], "--tip-radius-mm"), (&["completions", "fish"], "tip-radius-mm")]
+    {
+        let output = touchup(arguments, "");
+        let printed = text(&output.stdout);
+        assert_eq!((code(&output), text(&output.stderr)), (0, ""));
+        assert!(["refine", "calibrate", "disagree", flag].iter().all(|word| printed.contains(word)), "{arguments:?}");
+    }
+    let output = touchup(&["man"], "");
+    assert!(text(&output.stdout).contains(".TH touchup 1") && text(&output.stdout).contains("disagree"), "{output:?}");
+}
+
+#[test]
 fn the_version_names_the_commit() {
     let output = touchup(&["--version"], "");
     let printed = text(&output.stdout);
