@@ -79,7 +79,8 @@ failed_tests() {
 }
 
 # unit tests are quick: without optimisation the crates are built for them in a seventh of the time
-unoptimised=(--config profile.dev.opt-level=0 --config 'profile.dev.package."*".opt-level=2')
+unoptimised=(--config profile.dev.package.touchup.opt-level=0)
+for crate in crates/*; do unoptimised+=(--config "profile.dev.package.$(basename "$crate").opt-level=0"); done
 
 # the program, the stand-in for a controller and what tests them
 build_tests() {
@@ -148,7 +149,7 @@ programs=(--test rooms --test report)
 [ "${#ur[@]}" -eq 0 ] || programs+=(--test ur)
 stage "build of the Rust tests" build_tests
 stage "Rust tests" cargo_tests "$logs/rust.log" --workspace "${ur[@]}" "${programs[@]}"
-stage "Rust unit tests" cargo_tests "$logs/rust_unit.log" --workspace "${unoptimised[@]}" "${ur[@]}" --lib
+stage "Rust unit tests" cargo_tests "$logs/rust_unit.log" --workspace "${unoptimised[@]}" "${ur[@]}" --lib --bins
 stage "Rust documentation tests" cargo_tests "$logs/rust_doc.log" --workspace "${ur[@]}" --doc
 stage "r2r" r2r_tests
 if [ ! -x "$target/debug/touchup" ]; then

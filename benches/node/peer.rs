@@ -12,7 +12,9 @@ use ros2_client::qos::{Durability, History, QosProfile, WhenFull};
 use ros2_client::{Context, MessageTypeName, Name, Node, NodeName, NodeOptions, Publisher, Subscription};
 use touchup::live::Latencies;
 use touchup::ros::clock::stamp_ns;
-use touchup::ros::messages::{HapticMismatch, Header, Marker, MeshPatch, Message, Point, PoseStamped, WrenchStamped};
+use touchup::ros::messages::{
+    HapticMismatch, Header, Marker, MeshPatch, Point, PoseStamped, RosMessage, WrenchStamped,
+};
 use touchup::sim::wavy::{STEP_NS, slide};
 
 use crate::{WIDTH, messages, shown};
@@ -51,19 +53,19 @@ fn joined(domain: u16, name: &str) -> (Context, Node) {
     (context, node)
 }
 
-fn topic<M: Message>(node: &Node, name: &str, qos: &QosProfile) -> ros2_client::dds::rustdds::Topic {
+fn topic<M: RosMessage>(node: &Node, name: &str, qos: &QosProfile) -> ros2_client::dds::rustdds::Topic {
     let mut parts = M::TYPE_NAME.split('/');
     let (package, kind) = (parts.next().unwrap_or_default(), parts.next_back().unwrap_or_default());
     let name = Name::parse(name).expect("it is a name");
     node.create_topic(&name, MessageTypeName::new(package, kind), qos).expect("a node makes topics")
 }
 
-fn reader<M: Message>(node: &mut Node, name: &str, qos: QosProfile) -> Subscription<M> {
+fn reader<M: RosMessage>(node: &mut Node, name: &str, qos: QosProfile) -> Subscription<M> {
     let topic = topic::<M>(node, name, &qos);
     node.create_subscription(&topic, Some(qos)).expect("a node subscribes")
 }
 
-fn writer<M: Message>(node: &mut Node, name: &str) -> Publisher<M> {
+fn writer<M: RosMessage>(node: &mut Node, name: &str) -> Publisher<M> {
     let topic = topic::<M>(node, name, &SAMPLES);
     node.create_publisher(&topic, Some(SAMPLES)).expect("a node publishes")
 }

@@ -30,13 +30,13 @@ struct StepQuestion {
     k_n_per_m: Option<f64>,
     alpha_m_per_n_s: f64,
     beta_per_n2_s: f64,
-    step: StepName,
+    step: StepWord,
     along: Direction,
 }
 
 #[derive(Deserialize)]
 #[serde(rename_all = "lowercase")]
-enum StepName {
+enum StepWord {
     Lie,
     Corrected,
     Dp5,
@@ -95,9 +95,9 @@ fn answer(line: &[u8]) -> Result<FaceState, StepError> {
         alpha_m_per_n_s: question.alpha_m_per_n_s,
         beta_per_n2_s: question.beta_per_n2_s,
         rule: match question.step {
-            StepName::Lie => StepRule::Lie,
-            StepName::Corrected => StepRule::DriftCorrected,
-            StepName::Dp5 => StepRule::DormandPrince,
+            StepWord::Lie => StepRule::Lie,
+            StepWord::Corrected => StepRule::DriftCorrected,
+            StepWord::Dp5 => StepRule::DormandPrince,
         },
         along: match question.along {
             Direction::Normal0 => Along::InitialNormal,

@@ -57,7 +57,7 @@ impl Port for InProcess {
 
 /// The other side of an in-process port: stands for everybody else in the graph.
 #[derive(Clone, Debug)]
-pub struct World {
+pub struct OtherParticipants {
     port: Arc<InProcess>,
     inbox: Inbox,
 }
@@ -69,7 +69,7 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 /// A port, and the world around it. What is put into the world goes to `inbox`. The time of ROS is 0 now, and passes as that of
 /// `clock`.
-pub fn start(inbox: Inbox, clock: &Clock) -> (Arc<dyn Port>, World) {
+pub fn start(inbox: Inbox, clock: &Clock) -> (Arc<dyn Port>, OtherParticipants) {
     let port = Arc::new(InProcess {
         published: Mutex::default(),
         now_ns: Mutex::new((0, clock.now())),
@@ -77,10 +77,10 @@ pub fn start(inbox: Inbox, clock: &Clock) -> (Arc<dyn Port>, World) {
         dropped: [const { AtomicU64::new(0) }; 2],
         unsent: AtomicU64::new(0),
     });
-    (port.clone(), World { port, inbox })
+    (port.clone(), OtherParticipants { port, inbox })
 }
 
-impl World {
+impl OtherParticipants {
     /// Something arrives; where the node is too slow it is dropped and counted, as on a network. Whether it got in.
     pub fn arrive(&self, arrival: Arrival) -> bool {
         match self.inbox.try_send(arrival) {
@@ -125,7 +125,7 @@ impl World {
 }
 
 /// What an arm feels arrives as soon as the node has room for it.
-impl SamplePort for World {
+impl SamplePort for OtherParticipants {
     fn publish_wrench(&self, wrench: WrenchStamped) -> bool {
         self.arrive_patiently(Arrival::Wrench(wrench, self.port.clock.now()))
     }

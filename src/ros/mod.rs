@@ -11,12 +11,12 @@ pub mod in_process;
 pub mod messages;
 pub mod names;
 pub mod node;
-#[cfg(any(feature = "ros", feature = "r2r"))]
-mod outbox;
 pub mod parameters;
 pub mod port;
 #[cfg(feature = "r2r")]
 pub mod r2r;
+#[cfg(any(feature = "ros", feature = "r2r"))]
+mod send_queue;
 
 #[cfg(all(feature = "ros", not(feature = "r2r")))]
 pub use dds::{RosError, samples, start};

@@ -7,7 +7,9 @@ use rand::seq::IteratorRandom;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
-use touchup::explore::{Asked, Candidate, ExploreError, Explorer, Felt, Found, Knowledge, PatternParams, Wish};
+use touchup::explore::{
+    Asked, Candidate, ExploreError, Explorer, Found, Knowledge, PatternParams, TouchPlan, TouchResult,
+};
 use touchup::features::fit::{
     Cylinder, Ends, FREEDOMS, FitParams, Freedom, Observation, Plane, Stadium, Steps, Surface, fit,
 };
@@ -366,7 +368,7 @@ fn planned_touches_beat_a_uniform_grid() {
 
 /// What a ball feels that is let down and then moved in a straight line until it meets the material, exactly, with noise along its
 /// way; a way that is blocked before tells nothing.
-fn feel(distance: &dyn Fn(&Point3<f64>) -> f64, wish: &Wish, ball: f64, noise: f64) -> Felt {
+fn feel(distance: &dyn Fn(&Point3<f64>) -> f64, wish: &TouchPlan, ball: f64, noise: f64) -> TouchResult {
     // the distance changes no faster than the place
     let free = |from: &Point3<f64>, way: &Vector3<f64>, length: f64| {
         let mut gone = 0.0;
@@ -381,9 +383,9 @@ fn feel(distance: &dyn Fn(&Point3<f64>) -> f64, wish: &Wish, ball: f64, noise: f
     };
     let down = wish.from - wish.entry;
     if down.norm() > 0.0 && free(&wish.entry, &down.normalize(), down.norm()).is_some() {
-        return Felt::Unclear;
+        return TouchResult::Unclear;
     }
-    free(&wish.from, &wish.direction, wish.search).map_or(Felt::Nothing, |gone| Felt::At {
+    free(&wish.from, &wish.direction, wish.search).map_or(TouchResult::Nothing, |gone| TouchResult::At {
         centre: wish.from + wish.direction.into_inner() * (gone + noise),
         sigma: SIGMA,
     })
@@ -518,7 +520,7 @@ fn a_boss_is_measured_from_three_walls_at_the_least() {
             walls += usize::from(is_wall);
             let noise: f64 = StandardNormal.sample(&mut rng);
             let felt = feel(&|p| plate.signed_distance(p), &wish, params.ball_radius, noise * SIGMA);
-            explorer.take(if is_wall && walls == missed + 1 { &Felt::Nothing } else { &felt });
+            explorer.take(if is_wall && walls == missed + 1 { &TouchResult::Nothing } else { &felt });
         }
         let found = explorer.found().unwrap();
         assert!(found.is_as_asked, "{found:?}");

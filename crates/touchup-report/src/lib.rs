@@ -34,7 +34,7 @@ pub use stability::{
 };
 pub use whole_scan::{
     CaseResult, ContactSculptor, GaussianCost, GaussianParams, GaussianProcess, GaussianSurface, Given, Reach,
-    ScanResult, TouchedError, Way, WayResult, WholeScan, WholeScanError, whole_scan,
+    RefineMethod, ScanResult, TouchedError, WayResult, WholeScan, WholeScanError, whole_scan,
 };
 pub use work_precision::WorkPrecision;
 

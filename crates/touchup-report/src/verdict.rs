@@ -2,7 +2,7 @@
 //! it fails.
 
 use super::cost::Cost;
-use super::whole_scan::{CaseResult, ScanResult, Way, WayResult};
+use super::whole_scan::{CaseResult, RefineMethod, ScanResult, WayResult};
 use super::{Convergence, Extremes, Integrator, Peers, Rule, Stability, WholeScan, three_digits};
 
 /// Mode, region, step, rate, cost and limits in one paragraph; `None` where no way made any scan better.
@@ -31,7 +31,7 @@ pub fn in_short(scans: &WholeScan, stability: Option<&Stability>, cost: Option<&
     if let Some(quality) = stability.and_then(Stability::default_stable_from_quality).filter(|quality| *quality > 0.0) {
         fails.push(format!("on some triangles narrower than {} of their length", three_digits(quality)));
     }
-    let of_patch = |scan: &ScanResult| scan.of(Way::Patch).is_some_and(|patch| !patch.is_sound());
+    let of_patch = |scan: &ScanResult| scan.of(RefineMethod::Patch).is_some_and(|patch| !patch.is_sound());
     for case in &scans.cases {
         fails.extend(case.scans.iter().filter(|scan| of_patch(scan)).map(|scan| {
             format!("on {} in edges of {} mm, where the patch made it worse", case.name, three_digits(scan.edge_mm))
@@ -86,7 +86,7 @@ fn of_case(case: &CaseResult) -> Option<String> {
     if !failed.is_empty() {
         text += &format!(" Fails here (worse than the scan, or not at the end in time): {}.", failed.join("; "));
     }
-    if let (Some(patch), true) = (scan.of(Way::Patch), case.duration_s > 0.0) {
+    if let (Some(patch), true) = (scan.of(RefineMethod::Patch), case.duration_s > 0.0) {
         let rate = case.samples as f64 / case.duration_s;
         text += &format!(
             " At {} samples per second the patch takes {} % of one core.",
@@ -182,7 +182,7 @@ mod tests {
     use super::*;
     use crate::{Reach, TouchedError};
 
-    fn way(way: Way, name: &str, mean_mm: f64, per_sample_us: f64, is_worse: bool) -> WayResult {
+    fn way(way: RefineMethod, name: &str, mean_mm: f64, per_sample_us: f64, is_worse: bool) -> WayResult {
         let error = TouchedError {
             part_to_mesh_mean_mm: mean_mm,
             part_to_mesh_p95_mm: mean_mm,
@@ -208,7 +208,8 @@ mod tests {
     }
 
     fn case(name: &str, scans: Vec<Vec<WayResult>>) -> CaseResult {
-        let before = TouchedError { part_to_mesh_mean_mm: 1.0, ..way(Way::Patch, "", 1.0, 1.0, false).error.unwrap() };
+        let before =
+            TouchedError { part_to_mesh_mean_mm: 1.0, ..way(RefineMethod::Patch, "", 1.0, 1.0, false).error.unwrap() };
         let scans = scans.into_iter().zip([3.0, 1.5]);
         let scans = scans.map(|(ways, edge_mm)| ScanResult { edge_mm, faces: 100, before, ways }).collect();
         CaseResult {
@@ -228,12 +229,12 @@ mod tests {
 
     #[test]
     fn what_is_best_everywhere_is_named_once_and_what_fails_is_told() {
-        let good = |us| way(Way::Patch, "patch", 0.01, us, false);
+        let good = |us| way(RefineMethod::Patch, "patch", 0.01, us, false);
         let text = of(vec![
-            case("peaks", vec![vec![good(40.0)], vec![way(Way::Patch, "patch", 2.0, 50.0, true)]]),
+            case("peaks", vec![vec![good(40.0)], vec![way(RefineMethod::Patch, "patch", 2.0, 50.0, true)]]),
             case(
                 "plate",
-                vec![vec![good(50.0), way(Way::Robust(Reach::TipRadii(2.0)), "two radii", 0.3, 10.0, false)]],
+                vec![vec![good(50.0), way(RefineMethod::Robust(Reach::TipRadii(2.0)), "two radii", 0.3, 10.0, false)]],
             ),
         ]);
         let text = text.unwrap();
@@ -245,11 +246,11 @@ mod tests {
 
     #[test]
     fn where_the_parts_differ_each_is_named_and_without_anything_good_nothing_is_said() {
-        let patch = || way(Way::Patch, "patch", 0.01, 40.0, false);
-        let paper = || way(Way::Robust(Reach::TipRadii(1.0)), "one radius", 0.005, 8.0, false);
+        let patch = || way(RefineMethod::Patch, "patch", 0.01, 40.0, false);
+        let paper = || way(RefineMethod::Robust(Reach::TipRadii(1.0)), "one radius", 0.005, 8.0, false);
         let text = of(vec![case("peaks", vec![vec![patch()]]), case("plate", vec![vec![patch(), paper()]])]).unwrap();
         assert!(text.starts_with("In short: take patch on peaks; one radius on plate."), "{text}");
         assert!(!text.contains("fails"), "{text}");
-        assert_eq!(of(vec![case("peaks", vec![vec![way(Way::Patch, "patch", 3.0, 1.0, true)]])]), None);
+        assert_eq!(of(vec![case("peaks", vec![vec![way(RefineMethod::Patch, "patch", 3.0, 1.0, true)]])]), None);
     }
 }

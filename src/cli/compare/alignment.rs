@@ -8,7 +8,7 @@ use serde::Serialize;
 use tracing::warn;
 
 use crate::align::{
-    Alternative, FeaturesError, FeaturesParams, IcpFit, IcpParams, Motion, PairsParams, SurfacePoint, Surfaces,
+    Alternative, FeaturesError, FeaturesParams, IcpFit, IcpParams, Motion, OrientedSample, PairsParams, Surfaces,
     align_features, fit_pairs, icp,
 };
 use crate::cli::progress::WorkProgress;
@@ -205,9 +205,9 @@ pub(super) fn aligned_by_pairs(path: &Path) -> Aligned {
     Ok((fit.motion, told))
 }
 
-fn spread(mesh: &TriMesh, count: f64, seed: u64) -> Vec<SurfacePoint> {
+fn spread(mesh: &TriMesh, count: f64, seed: u64) -> Vec<OrientedSample> {
     let samples = sample_surface(mesh, count / surface_area(mesh).max(f64::MIN_POSITIVE), seed);
-    samples.iter().map(|sample| SurfacePoint { point: sample.point, normal: mesh.normal(sample.face) }).collect()
+    samples.iter().map(|sample| OrientedSample { point: sample.point, normal: mesh.normal(sample.face) }).collect()
 }
 
 /// The mesh after a motion.

@@ -11,7 +11,7 @@ use ros2_client::dds::rustdds::mio1::{Events, Interest, Poll, Token, Waker};
 use ros2_client::{Gid, Subscription};
 
 use super::{DdsShared, RosError};
-use crate::ros::messages::Message;
+use crate::ros::messages::RosMessage;
 use crate::ros::port::Arrival;
 
 /// Something that messages come from.
@@ -103,7 +103,7 @@ impl LastNumbers {
 }
 
 /// A topic that is listened to.
-pub(super) struct Topic<M: Message> {
+pub(super) struct Topic<M: RosMessage> {
     pub name: &'static str,
     pub subscription: Subscription<M>,
     pub shared: Arc<DdsShared>,
@@ -113,7 +113,7 @@ pub(super) struct Topic<M: Message> {
     pub numbers: LastNumbers,
 }
 
-impl<M: Message> Listener for Topic<M> {
+impl<M: RosMessage> Listener for Topic<M> {
     fn source(&mut self, _: usize) -> &mut dyn Source {
         &mut self.subscription
     }

@@ -27,8 +27,8 @@ use super::arguments::NodeConfig;
 use super::arrivals::Arrivals;
 use super::clock::RosClock;
 use super::names::NameError;
-use super::outbox::Outbox;
 use super::port::{Inbox, Port, Publication};
+use super::send_queue::SendQueue;
 pub use samples::samples;
 
 /// Why the node cannot speak to others.
@@ -64,8 +64,8 @@ struct DdsShared {
     /// wrenches, poses that did not come
     lost: [AtomicU64; 2],
     clock: RosClock,
-    urgent: Outbox,
-    mesh: Outbox,
+    urgent: SendQueue,
+    mesh: SendQueue,
     room: Room,
 }
 
@@ -130,8 +130,8 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
         arrivals: Arrivals::new(inbox),
         lost: [const { AtomicU64::new(0) }; 2],
         clock: RosClock::new(is_simulated),
-        urgent: Outbox::default(),
-        mesh: Outbox::default(),
+        urgent: SendQueue::default(),
+        mesh: SendQueue::default(),
         room: Room::new(&mapping(config)),
     });
     // its own parameter services know one mapping alone, and nothing of ranges

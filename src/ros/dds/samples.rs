@@ -10,7 +10,7 @@ use ros2_client::{Node, NodeOptions, Publisher};
 use super::topics::{BEST_EFFORT, keep, make_topic};
 use super::{RosError, join};
 use crate::ros::arguments::NodeConfig;
-use crate::ros::messages::{Message, PoseStamped, WrenchStamped};
+use crate::ros::messages::{PoseStamped, RosMessage, WrenchStamped};
 use crate::ros::port::SamplePort;
 
 /// Nothing is sent twice: what is kept is for who takes it at once.
@@ -38,13 +38,13 @@ pub fn samples(config: &NodeConfig) -> Result<Box<dyn SamplePort>, RosError> {
     Ok(Box::new(DdsSamples { wrench, pose, listener, listeners: Default::default(), _node: node }))
 }
 
-fn publisher<M: Message>(config: &NodeConfig, node: &mut Node, name: &str) -> Result<Publisher<M>, RosError> {
+fn publisher<M: RosMessage>(config: &NodeConfig, node: &mut Node, name: &str) -> Result<Publisher<M>, RosError> {
     let qos = keep(BEST_EFFORT, DEPTH);
     let topic = make_topic::<M>(node, &config.resolve(name)?, &qos)?;
     node.create_publisher(&topic, Some(qos)).map_err(|error| RosError::dds("publishing a topic", &error))
 }
 
-fn send<M: Message>(publisher: &Publisher<M>, message: M) -> bool {
+fn send<M: RosMessage>(publisher: &Publisher<M>, message: M) -> bool {
     publisher
         .publish(message)
         .inspect_err(|error| tracing::debug!(topic_type = M::TYPE_NAME, %error, "not sent"))

@@ -14,11 +14,11 @@ use super::incoming::{LastNumbers, Listener, Topic};
 use super::{DdsShared, RosError};
 use crate::ros::arguments::NodeConfig;
 use crate::ros::messages::{
-    Clock, DiagnosticArray, FeatureArray, HapticMismatch, Marker, MarkerArray, MeshPatch, Message, Path, PointStamped,
-    PoseStamped, ProbeResult, ProbeTouch, TFMessage, WrenchStamped,
+    Clock, DiagnosticArray, FeatureArray, HapticMismatch, Marker, MarkerArray, MeshPatch, Path, PointStamped,
+    PoseStamped, ProbeResult, ProbeTouch, RosMessage, TFMessage, WrenchStamped,
 };
-use crate::ros::outbox::Sent;
 use crate::ros::port::{Arrival, Publication, TILES_KEPT};
+use crate::ros::send_queue::Sent;
 
 /// What is small and urgent.
 pub(super) struct UrgentWriters {
@@ -69,7 +69,7 @@ impl MeshWriters {
 }
 
 /// What is urgent waits for nobody.
-fn sent<M: Message>(result: Result<(), WriteError<M>>) -> Sent {
+fn sent<M: RosMessage>(result: Result<(), WriteError<M>>) -> Sent {
     match result {
         Ok(()) => Sent::Done,
         Err(WriteError::WouldBlock { .. }) => Sent::Refused,
@@ -81,7 +81,7 @@ fn sent<M: Message>(result: Result<(), WriteError<M>>) -> Sent {
 }
 
 /// The mesh waits for who listens slowly.
-fn later<M: Message>(result: Result<(), WriteError<M>>, publication: fn(M) -> Publication) -> Sent {
+fn later<M: RosMessage>(result: Result<(), WriteError<M>>, publication: fn(M) -> Publication) -> Sent {
     match result {
         Err(WriteError::WouldBlock { data }) => Sent::Later(Box::new(publication(data))),
         other => sent(other),
@@ -163,7 +163,7 @@ struct Readers<'a> {
 }
 
 impl Readers<'_> {
-    fn add<M: Message>(
+    fn add<M: RosMessage>(
         &mut self,
         name: &'static str,
         qos: QosProfile,
@@ -180,7 +180,7 @@ impl Readers<'_> {
     }
 }
 
-fn writer<M: Message>(
+fn writer<M: RosMessage>(
     config: &NodeConfig,
     node: &mut Node,
     graph: &mut DdsGraph,
@@ -196,7 +196,7 @@ fn writer<M: Message>(
 
 /// One of large messages. No more of them are on their way than it keeps: RustDDS keeps each until everybody has it, and who
 /// listens slowly or is silent would see what was long ago, or lose some of many at once.
-fn limited_writer<M: Message>(
+fn limited_writer<M: RosMessage>(
     config: &NodeConfig,
     node: &mut Node,
     graph: &mut DdsGraph,
@@ -220,7 +220,7 @@ fn limited_writer<M: Message>(
     Ok(publisher)
 }
 
-fn topic<M: Message>(
+fn topic<M: RosMessage>(
     config: &NodeConfig,
     node: &Node,
     graph: &mut DdsGraph,
@@ -234,7 +234,7 @@ fn topic<M: Message>(
 }
 
 /// - `whole`: absolute, remapped.
-pub(super) fn make_topic<M: Message>(
+pub(super) fn make_topic<M: RosMessage>(
     node: &Node,
     whole: &str,
     qos: &QosProfile,

@@ -29,7 +29,7 @@ pub use standard::{
 pub use visual::{ColorRGBA, CompressedImage, Marker, MarkerArray, MeshFile, UVCoordinate};
 
 /// A message with a name of its own.
-pub trait Message: Clone + PartialEq + std::fmt::Debug + Serialize + DeserializeOwned + Send + 'static {
+pub trait RosMessage: Clone + PartialEq + std::fmt::Debug + Serialize + DeserializeOwned + Send + 'static {
     /// as `ros2 interface show` takes it: package, kind, name
     const TYPE_NAME: &'static str;
 }
@@ -37,7 +37,7 @@ pub trait Message: Clone + PartialEq + std::fmt::Debug + Serialize + Deserialize
 /// Gives structs the name that they have in a package: `named!("std_msgs/msg": Header)`.
 macro_rules! named {
     ($package:literal: $($name:ident),+ $(,)?) => {
-        $(impl $crate::ros::messages::Message for $name {
+        $(impl $crate::ros::messages::RosMessage for $name {
             const TYPE_NAME: &'static str = concat!($package, "/", stringify!($name));
         })+
     };

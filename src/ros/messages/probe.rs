@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Feature, Header, Message, Point, Pose, Vector3, Wrench, named};
+use super::{Feature, Header, Point, Pose, RosMessage, Vector3, Wrench, named};
 
 /// What is wanted of a probing, and how far the arm may go for it. 0: as the node is configured.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -267,14 +267,14 @@ impl ProbeFeedback {
     pub const RETRACT: u8 = 8;
 }
 
-impl Message for ProbeGoal {
+impl RosMessage for ProbeGoal {
     const TYPE_NAME: &'static str = "touchup_msgs/action/Probe_Goal";
 }
 
-impl Message for ProbeResponse {
+impl RosMessage for ProbeResponse {
     const TYPE_NAME: &'static str = "touchup_msgs/action/Probe_Result";
 }
 
-impl Message for ProbeFeedback {
+impl RosMessage for ProbeFeedback {
     const TYPE_NAME: &'static str = "touchup_msgs/action/Probe_Feedback";
 }

@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Message, PointStamped, ProbeResult, ProbeSettings};
+use super::{PointStamped, ProbeResult, ProbeSettings, RosMessage};
 
 /// Flags a place to be looked at.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -186,10 +186,10 @@ pub struct SetBoolResponse {
 /// Names request and response of services: `services!("std_srvs": Trigger(TriggerRequest, TriggerResponse))`.
 macro_rules! services {
     ($package:literal: $($name:ident($request:ident, $response:ident)),+ $(,)?) => {
-        $(impl Message for $request {
+        $(impl RosMessage for $request {
             const TYPE_NAME: &'static str = concat!($package, "/srv/", stringify!($name), "_Request");
         }
-        impl Message for $response {
+        impl RosMessage for $response {
             const TYPE_NAME: &'static str = concat!($package, "/srv/", stringify!($name), "_Response");
         })+
     };

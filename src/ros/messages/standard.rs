@@ -219,6 +219,6 @@ pub struct GoalID {
     pub uuid: [u8; 16],
 }
 
-impl super::Message for GoalID {
+impl super::RosMessage for GoalID {
     const TYPE_NAME: &'static str = "unique_identifier_msgs/msg/UUID";
 }

@@ -11,10 +11,10 @@ use tracing::warn;
 use super::arm::ArmInput;
 use super::convert::{header, stamp_ns};
 use super::feature_messages::KIND_NAMES;
-use super::haptic::Haptic;
+use super::feature_worker::{FeatureInput, FlaggedPlace};
+use super::refinement::RefinementWorker;
 use super::replica::{Replica, Snapshot};
-use super::seeker::{FlaggedPlace, SeekerInput};
-use super::sitting::Sitting;
+use super::session::NodeSession;
 use super::view::ViewInput;
 use super::{NodeError, Setup};
 use crate::io::session_folder::SessionFolder;
@@ -38,15 +38,15 @@ const DEFAULT_NAME: &str = "refined.ply";
 /// Meshes that are saved at a time at most: each has a copy of all touches.
 const MOST_SAVING: usize = 4;
 
-impl Haptic {
+impl RefinementWorker {
     pub(super) fn call(&mut self, call: Call) {
         match call {
             Call::Flag(request, reply) => match self.flag_of(&request) {
                 Ok(flag) => self.send_flag(flag, Some(reply)),
                 Err(message) => reply.send(FlagFeatureResponse { success: false, message, id: 0 }),
             },
-            Call::Unflag(request, reply) => self.ask_seeker(SeekerInput::Unflag(request.id, reply)),
-            Call::Detect(request, reply) => self.ask_seeker(SeekerInput::Detect(request, reply)),
+            Call::Unflag(request, reply) => self.ask_seeker(FeatureInput::Unflag(request.id, reply)),
+            Call::Detect(request, reply) => self.ask_seeker(FeatureInput::Detect(request, reply)),
             Call::Save(request, reply) => self.save(request, reply),
             Call::Resync(_, reply) => self.resync(reply),
             Call::Undo(request, reply) => reply.send(self.change_strokes(&request, true)),
@@ -69,7 +69,7 @@ impl Haptic {
         }
     }
 
-    fn ask_seeker(&self, input: SeekerInput) {
+    fn ask_seeker(&self, input: FeatureInput) {
         if let Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) = self.seeker.try_send(input) {
             warn!("a call about features found no room: its caller gets no answer");
         }
@@ -101,7 +101,7 @@ impl Haptic {
     }
 
     fn send_flag(&self, flag: FlaggedPlace, reply: Option<Reply<FlagFeatureResponse>>) {
-        self.ask_seeker(SeekerInput::Flag(flag, reply));
+        self.ask_seeker(FeatureInput::Flag(flag, reply));
     }
 
     /// RViz's Publish Point.
@@ -165,7 +165,7 @@ impl Haptic {
 
     /// Ends the session beside the next one.
     fn begin_again(&mut self) -> Result<String, NodeError> {
-        let next = Sitting::begin(&self.setup)?;
+        let next = NodeSession::begin(&self.setup)?;
         self.finish_samples();
         let report = self.report();
         let name = next.folder.name().to_owned();
@@ -182,7 +182,7 @@ impl Haptic {
         let replica = Box::new(Replica::of(&self.setup.scan.0, &name));
         // both take these however much they have to do
         let _ = self.view.send(ViewInput::Session(replica));
-        let _ = self.seeker.send(SeekerInput::Session(name.clone()));
+        let _ = self.seeker.send(FeatureInput::Session(name.clone()));
         Ok(name)
     }
 

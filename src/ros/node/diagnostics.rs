@@ -5,8 +5,8 @@ use std::time::Duration;
 use tracing::{info, warn};
 
 use super::convert::header;
-use super::haptic::Haptic;
-use super::sitting::SessionReport;
+use super::refinement::RefinementWorker;
+use super::session::SessionReport;
 use super::view::ViewInput;
 use super::{NodeEnd, NodeError};
 use crate::live::Quantiles;
@@ -19,7 +19,7 @@ struct StreamState {
     words: String,
 }
 
-impl Haptic {
+impl RefinementWorker {
     /// Looks whether the streams come; says so when that changed.
     pub(super) fn watch_streams(&mut self) {
         let state = self.state();

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 
 use super::{NodeError, Setup};
-use crate::live::{Gate, LiveError, LiveRefiner, Pace, ProbedNews};
+use crate::live::{Gate, LiveError, LiveRefiner, Pace, TouchDelta};
 use crate::mesh::{Changes, FaceTree, TriMesh, VertexId};
 use crate::patch::{Patcher, Support};
 use crate::refine::{RefineError, Refiner, Update};
@@ -123,7 +123,7 @@ impl Engine {
     }
 
     /// Touches that were found, or lost, since this was last asked.
-    pub fn take_probed(&mut self) -> Option<ProbedNews> {
+    pub fn take_probed(&mut self) -> Option<TouchDelta> {
         match self {
             Self::Alone(_) => None,
             Self::Live(live) => live.take_probed(),

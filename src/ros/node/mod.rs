@@ -11,16 +11,16 @@ mod diagnostics;
 mod edits;
 mod engine;
 mod feature_messages;
+mod feature_worker;
+mod frame_resolver;
 mod frames;
-mod haptic;
 mod mesh_patches;
-mod placing;
+mod publishing;
+mod refinement;
 mod replica;
-mod seeker;
+mod session;
 mod shared;
-mod showing;
 mod side_work;
-mod sitting;
 mod streams;
 mod tiles;
 mod tip;
@@ -33,18 +33,18 @@ use std::thread::{Builder, JoinHandle};
 
 pub use arm::{ArmKind, ArmOfNode};
 pub use convert::{as_pose, as_wrench};
+pub use frame_resolver::CELL;
 pub use frames::{FrameBuffer, FrameError};
-pub use placing::CELL;
-pub use sitting::SessionReport;
+pub use session::SessionReport;
 
 use self::edits::Edits;
 use self::engine::Scan;
-use self::haptic::Haptic;
-use self::placing::FrameNames;
+use self::feature_worker::FeatureWorker;
+use self::frame_resolver::FrameNames;
+use self::refinement::RefinementWorker;
 use self::replica::Replica;
-use self::seeker::Seeker;
+use self::session::NodeSession;
 use self::shared::Shared;
-use self::sitting::Sitting;
 use self::view::View;
 use super::parameters::Parameters;
 use super::port::{Arrival, Port};
@@ -252,7 +252,7 @@ pub struct Node {
 /// which nothing that is sent to the node may be lost.
 pub struct Prepared {
     setup: Arc<Setup>,
-    sitting: Sitting,
+    sitting: NodeSession,
 }
 
 impl Prepared {
@@ -270,7 +270,7 @@ impl Prepared {
     /// As there.
     pub fn on(clock: Clock, parameters: Parameters) -> Result<Self, NodeError> {
         let setup = Arc::new(Setup::new(parameters, clock)?);
-        let sitting = Sitting::begin(&setup)?;
+        let sitting = NodeSession::begin(&setup)?;
         Ok(Self { setup, sitting })
     }
 
@@ -326,10 +326,10 @@ impl Prepared {
         let replica = Replica::of(&setup.scan.0, &session);
         let clock = setup.clock.clone();
         let view = View::new(clock.clone(), Arc::clone(&port), Arc::clone(&setup.shared), to_spare, replica);
-        let seeker = Seeker::new(clock.clone(), Arc::clone(&setup.shared), to_view.clone(), session);
+        let seeker = FeatureWorker::new(clock.clone(), Arc::clone(&setup.shared), to_view.clone(), session);
         let arm = arm.map(|arm| arm::start(&setup, &port, arm, to_view.clone(), to_seeker.clone())).transpose()?;
         let (handle, arm) = arm.unzip();
-        let haptic = Haptic::new(setup, port, sitting, to_view, to_seeker, spare, handle)?;
+        let haptic = RefinementWorker::new(setup, port, sitting, to_view, to_seeker, spare, handle)?;
         let view = begin(&clock, "view", move || view.run(&view_inputs))?;
         let seeker = begin(&clock, "seeker", move || seeker.run(&seeker_inputs))?;
         let haptic = begin(&clock, "haptic", move || haptic.run(&inbox))?;

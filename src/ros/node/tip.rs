@@ -4,7 +4,7 @@ use nalgebra::Point3;
 
 use super::convert::{header, point};
 use super::feature_messages::{LETTERS, label};
-use super::seeker::NextTouches;
+use super::feature_worker::NextTouches;
 use crate::explore::NextTouch;
 use crate::ros::messages::{ColorRGBA, Feature, FeatureArray, Marker, MarkerArray, Pose, Vector3};
 

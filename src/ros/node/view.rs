@@ -6,9 +6,9 @@ use std::time::Duration;
 
 use super::edits::Edits;
 use super::feature_messages;
+use super::feature_worker::NextTouches;
 use super::mesh_patches::MeshPatches;
 use super::replica::{Replica, Snapshot};
-use super::seeker::NextTouches;
 use super::shared::Shared;
 use super::tiles::{ColourBy, Tiles};
 use super::tip::{self, LastTip};

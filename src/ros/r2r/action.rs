@@ -8,7 +8,7 @@ use r2r::{ActionServerCancelRequest, ActionServerGoal, ActionServerGoalRequest, 
 
 use super::convert::Convert;
 use super::touchup_msgs::action::Probe::Action;
-use super::{During, R2rShared, RosError, Source, source};
+use super::{During, PollSource, R2rShared, RosError, source};
 use crate::ros::messages::{ProbeFeedback, ProbeResponse};
 use crate::ros::port::{Arrival, Call, Feedback, Goal, GoalEnd};
 
@@ -45,7 +45,7 @@ struct Cancels {
 type Running = Arc<Mutex<Vec<Cancels>>>;
 
 /// The server of the action: one source of goals, one of what is asked of those that run.
-pub(super) fn server(node: &mut Node, shared: &Arc<R2rShared>) -> Result<[Source; 2], RosError> {
+pub(super) fn server(node: &mut Node, shared: &Arc<R2rShared>) -> Result<[PollSource; 2], RosError> {
     let requests = node.create_action_server::<Action>(NAME).during("offering an action")?;
     let running = Running::default();
     let cancels = running.clone();

@@ -155,7 +155,7 @@ mod tests {
     /// message itself comes back.
     fn both_agree<M, T>()
     where
-        M: ours::Message + Convert<T>,
+        M: ours::RosMessage + Convert<T>,
         T: Clone + Serialize + Convert<M>,
     {
         let ours: M = filled();

@@ -13,16 +13,16 @@ use crate::ros::port::{Arrival, Endpoint};
 const PERIOD: Duration = Duration::from_secs(1);
 
 /// How many there are that fit, and why one does not.
-type Matching = (usize, Option<String>);
+type EndpointMatch = (usize, Option<String>);
 
-type GraphQuery = Box<dyn Fn(&Node) -> r2r::Result<Matching> + Send>;
+type GraphQuery = Box<dyn Fn(&Node) -> r2r::Result<EndpointMatch> + Send>;
 
 struct WatchedTopic {
     topic: String,
     /// who listens is a viewer
     is_mesh: bool,
     look: GraphQuery,
-    told: Matching,
+    told: EndpointMatch,
 }
 
 pub(super) struct R2rGraph {
@@ -62,7 +62,12 @@ impl R2rGraph {
         });
     }
 
-    fn watch(&mut self, topic: String, is_mesh: bool, look: impl Fn(&Node) -> r2r::Result<Matching> + Send + 'static) {
+    fn watch(
+        &mut self,
+        topic: String,
+        is_mesh: bool,
+        look: impl Fn(&Node) -> r2r::Result<EndpointMatch> + Send + 'static,
+    ) {
         self.watched.push(WatchedTopic { topic, is_mesh, look: Box::new(look), told: (0, None) });
     }
 
@@ -84,7 +89,7 @@ impl R2rGraph {
 }
 
 impl WatchedTopic {
-    fn tell(&mut self, seen: Matching, shared: &R2rShared) {
+    fn tell(&mut self, seen: EndpointMatch, shared: &R2rShared) {
         let topic = self.topic.clone();
         if self.is_mesh && seen.0 > self.told.0 {
             shared.arrivals.put(Arrival::Viewer);

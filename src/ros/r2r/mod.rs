@@ -31,8 +31,8 @@ use super::arguments::NodeConfig;
 use super::arrivals::Arrivals;
 use super::clock::RosClock;
 use super::names::NameError;
-use super::outbox::Outbox;
 use super::port::{Arrival, Inbox, Port, Publication, Reply};
+use super::send_queue::SendQueue;
 pub use samples::samples;
 
 /// Why the node cannot speak to others.
@@ -72,13 +72,13 @@ impl<T> During<T> for r2r::Result<T> {
 struct R2rShared {
     arrivals: Arrivals,
     clock: RosClock,
-    urgent: Outbox,
-    mesh: Outbox,
+    urgent: SendQueue,
+    mesh: SendQueue,
 }
 
 impl R2rShared {
     fn new(inbox: Inbox, clock: RosClock) -> Self {
-        Self { arrivals: Arrivals::new(inbox), clock, urgent: Outbox::default(), mesh: Outbox::default() }
+        Self { arrivals: Arrivals::new(inbox), clock, urgent: SendQueue::default(), mesh: SendQueue::default() }
     }
 
     /// An answer that goes out from the thread that sends.

@@ -13,7 +13,7 @@ use r2r::{Node, Publisher, WrappedServiceTypeSupport, builtin_interfaces};
 
 use super::convert::Convert;
 use super::services::server;
-use super::{During, R2rShared, RosError, Source};
+use super::{During, PollSource, R2rShared, RosError};
 use crate::ros::arguments::NodeConfig;
 use crate::ros::parameters::{Allowed, PARAMETERS, ParameterValue, Parameters, descriptor};
 use crate::ros::port::{Arrival, Reply};
@@ -40,7 +40,11 @@ type SetResults = Vec<Result<(), String>>;
 type SetReply = Box<dyn FnOnce(SetResults) + Send>;
 
 /// The servers.
-pub(super) fn servers(config: &NodeConfig, node: &mut Node, shared: &Arc<R2rShared>) -> Result<Vec<Source>, RosError> {
+pub(super) fn servers(
+    config: &NodeConfig,
+    node: &mut Node,
+    shared: &Arc<R2rShared>,
+) -> Result<Vec<PollSource>, RosError> {
     let events = node.create_publisher("/parameter_events", QosProfile::parameter_events());
     let held = Arc::new(R2rParameters {
         shared: shared.clone(),
@@ -81,7 +85,7 @@ fn answered<T>(
     name: &'static str,
     shared: &Arc<R2rShared>,
     answer: impl Fn(T::Request) -> T::Response + Send + 'static,
-) -> Result<Source, RosError>
+) -> Result<PollSource, RosError>
 where
     T: WrappedServiceTypeSupport + 'static,
     T::Response: Convert<T::Response> + Send,

@@ -7,11 +7,11 @@ use r2r::{Node, WrappedServiceTypeSupport};
 
 use super::convert::Convert;
 use super::touchup_msgs::srv::{DetectFeatures, FlagFeature, ProbeFeature, ResyncMesh, SaveMesh, Undo, UnflagFeature};
-use super::{During, R2rShared, RosError, Source, source, std_srvs};
+use super::{During, PollSource, R2rShared, RosError, source, std_srvs};
 use crate::ros::port::{Arrival, Call, Reply};
 
 /// All services but those of parameters and the action.
-pub(super) fn servers(node: &mut Node, shared: &Arc<R2rShared>) -> Result<Vec<Source>, RosError> {
+pub(super) fn servers(node: &mut Node, shared: &Arc<R2rShared>) -> Result<Vec<PollSource>, RosError> {
     let mut made = R2rServices { node, shared, sources: Vec::new() };
     made.add::<FlagFeature::Service, _>("~/flag_feature", |request, reply| Call::Flag(request.convert(), reply))?;
     made.add::<UnflagFeature::Service, _>("~/unflag_feature", |request, reply| Call::Unflag(request.convert(), reply))?;
@@ -36,7 +36,7 @@ pub(super) fn servers(node: &mut Node, shared: &Arc<R2rShared>) -> Result<Vec<So
 struct R2rServices<'a> {
     node: &'a mut Node,
     shared: &'a Arc<R2rShared>,
-    sources: Vec<Source>,
+    sources: Vec<PollSource>,
 }
 
 impl R2rServices<'_> {
@@ -58,7 +58,7 @@ pub(super) fn server<T, A>(
     name: &'static str,
     shared: &Arc<R2rShared>,
     mut take: impl FnMut(T::Request, Reply<A>) + Send + 'static,
-) -> Result<Source, RosError>
+) -> Result<PollSource, RosError>
 where
     T: WrappedServiceTypeSupport + 'static,
     A: Convert<T::Response> + Send + 'static,

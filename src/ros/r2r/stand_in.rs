@@ -56,9 +56,9 @@ macro_rules! service {
             message!(Response { $($answered)* });
 
             #[derive(Clone, Debug)]
-            pub struct StandInService();
+            pub struct Service();
 
-            impl r2r::WrappedServiceTypeSupport for StandInService {
+            impl r2r::WrappedServiceTypeSupport for Service {
                 type Request = Request;
                 type Response = Response;
 

@@ -11,11 +11,11 @@ use r2r::{
 
 use super::convert::Convert;
 use super::graph::R2rGraph;
-use super::{During, R2rShared, RosError, Source, source, touchup_msgs};
+use super::{During, PollSource, R2rShared, RosError, source, touchup_msgs};
 use crate::ros::arguments::NodeConfig;
-use crate::ros::messages::{Clock, Message, PointStamped, PoseStamped, TFMessage, WrenchStamped};
-use crate::ros::outbox::Sent;
+use crate::ros::messages::{Clock, PointStamped, PoseStamped, RosMessage, TFMessage, WrenchStamped};
 use crate::ros::port::{Arrival, Publication};
+use crate::ros::send_queue::Sent;
 
 /// What is small and urgent.
 pub(super) struct UrgentPublishers {
@@ -127,7 +127,7 @@ pub(super) fn subscriptions(
     node: &mut Node,
     graph: &mut R2rGraph,
     shared: &Arc<R2rShared>,
-) -> Result<Vec<Source>, RosError> {
+) -> Result<Vec<PollSource>, RosError> {
     use geometry_msgs::msg as geometry;
     use tf2_msgs::msg as tf2;
     let [wrench, pose] = config.sample_topics();
@@ -178,10 +178,10 @@ impl R2rTopics<'_> {
         qos: QosProfile,
         shared: &Arc<R2rShared>,
         arrival: fn(&R2rShared, M) -> Arrival,
-    ) -> Result<Source, RosError>
+    ) -> Result<PollSource, RosError>
     where
         T: WrappedTypesupport + Convert<M> + Send + 'static,
-        M: Message,
+        M: RosMessage,
     {
         let messages = self.node.subscribe::<T>(name, qos.clone()).during("subscribing to a topic")?;
         self.graph.watch_senders(self.config.resolve(name)?, M::TYPE_NAME, qos);

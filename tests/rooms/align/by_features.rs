@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use rand_pcg::Pcg64;
 use touchup::align::{
-    Alternative, FeaturesError, FeaturesParams, FeaturesSide, SurfacePoint, Surfaces, align_features,
+    Alternative, FeaturesError, FeaturesParams, FeaturesSide, OrientedSample, Surfaces, align_features,
 };
 use touchup::compare::{sample_surface, surface_area};
 use touchup::features::{Feature, Kind, detect};
@@ -42,9 +42,9 @@ impl Part {
         Self::new(moved(&self.mesh, |p| motion * p))
     }
 
-    fn points(&self) -> Vec<SurfacePoint> {
+    fn points(&self) -> Vec<OrientedSample> {
         let samples = sample_surface(&self.mesh, 20_000.0 / surface_area(&self.mesh), 5);
-        samples.iter().map(|s| SurfacePoint { point: s.point, normal: self.mesh.normal(s.face) }).collect()
+        samples.iter().map(|s| OrientedSample { point: s.point, normal: self.mesh.normal(s.face) }).collect()
     }
 
     /// Largest way of a corner of the box around it between two motions, m.

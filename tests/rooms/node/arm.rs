@@ -10,7 +10,7 @@ use tempfile::TempDir;
 use touchup::clock::{Clock, ManualClock};
 use touchup::io::mesh_file::{MeshUnit, write_mesh};
 use touchup::robot::{Arm, ArmError, ArmState, Command, Safety};
-use touchup::ros::in_process::{World, start};
+use touchup::ros::in_process::{OtherParticipants, start};
 use touchup::ros::messages::{
     Feature, FlagFeatureRequest, Header, Point, PointStamped, ProbeFeatureRequest, ProbeGoal, ProbeResponse,
     ProbeResult, ProbeSettings, ProbeTouch, SetBoolRequest,
@@ -30,7 +30,7 @@ const FEW: usize = 8;
 /// A node with an arm whose states pass the time: as fast as the node keeps up, and no faster.
 struct Cell {
     node: Node,
-    world: World,
+    world: OtherParticipants,
     hand: ManualClock,
     published: Vec<Publication>,
     _folder: TempDir,
@@ -261,10 +261,10 @@ fn orders_that_must_not_be_are_refused_and_nothing_moves() {
 fn a_pause_and_the_leave_that_is_taken_away_stop_and_retract() {
     let cell = Cell::start(true);
     let id = cell.flag(Feature::KIND_HOLE, [16.5, 36.0, 12.0]);
-    let pause = |world: &World, data| {
+    let pause = |world: &OtherParticipants, data| {
         world.call(|reply| Call::Pause(SetBoolRequest { data }, reply)).recv().unwrap();
     };
-    let allow = |world: &World, may: bool| {
+    let allow = |world: &OtherParticipants, may: bool| {
         let set = |reply| Arrival::SetParameter("allow_motion".to_owned(), ParameterValue::Bool(may), reply);
         world.ask(set).recv().unwrap().unwrap();
     };

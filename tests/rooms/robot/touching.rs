@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use touchup::explore::{ExploreError, Explorer, Felt, PatternParams};
+use touchup::explore::{ExploreError, Explorer, PatternParams, TouchResult};
 use touchup::features::{Feature, Kind, Measured};
 use touchup::robot::{
     Arm, ArmError, ArmState, Command, LimitError, Limits, Narrower, OnsetVerdict, ProbeError, Safety, TouchOutcome,
@@ -136,7 +136,7 @@ fn explored(arm: &mut SimArm, params: &ArmParams, touching: &TouchParams, search
         let record = match watched.touch(&target, touching) {
             Ok(record) => record,
             Err(ProbeError::InTheWay { .. }) => {
-                search.take(&Felt::Unclear);
+                search.take(&TouchResult::Unclear);
                 continue;
             }
             Err(error) => panic!("{error}"),
@@ -144,10 +144,10 @@ fn explored(arm: &mut SimArm, params: &ArmParams, touching: &TouchParams, search
         peak = peak.max(record.peak_force);
         search.take(&match record.outcome {
             TouchOutcome::Contact { onset, centre, .. } if onset.verdict != OnsetVerdict::Impact => {
-                Felt::At { centre: params.pose_bo.inverse_transform_point(&centre), sigma: onset.sigma }
+                TouchResult::At { centre: params.pose_bo.inverse_transform_point(&centre), sigma: onset.sigma }
             }
-            TouchOutcome::Miss { .. } => Felt::Nothing,
-            _ => Felt::Unclear,
+            TouchOutcome::Miss { .. } => TouchResult::Nothing,
+            _ => TouchResult::Unclear,
         });
     }
     peak

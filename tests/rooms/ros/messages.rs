@@ -18,7 +18,7 @@ fn bytes(hexadecimal: &str) -> Vec<u8> {
 }
 
 /// Bytes, fields, and the message are the same thing three times; cut off anywhere, the bytes are refused.
-fn check<M: Message>(golden: &Map<String, Value>) -> &'static str {
+fn check<M: RosMessage>(golden: &Map<String, Value>) -> &'static str {
     let entry = &golden[M::TYPE_NAME];
     let (wire, fields) = (bytes(entry["cdr"].as_str().unwrap()), &entry["fields"]);
     let (read, length) = cdr_encoding::from_bytes::<M, LittleEndian>(&wire).unwrap();

@@ -5,7 +5,7 @@ mod icp;
 mod pairs;
 
 pub use by_features::{
-    Alternative, FeaturesError, FeaturesParams, FeaturesSide, FreeTurn, SurfacePoint, Surfaces, align_features,
+    Alternative, FeaturesError, FeaturesParams, FeaturesSide, FreeTurn, OrientedSample, Surfaces, align_features,
 };
 pub use icp::{IcpError, IcpFit, IcpParams, Motion, icp};
 pub use pairs::{PairSide, PairsError, PairsFit, PairsParams, PointPair, fit_pairs};

@@ -4,11 +4,11 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Point3, Vector3};
 
+use super::cylinder_fit::{BELOW_RIM, RoundWall, surface_about};
 use super::error::ExploreError;
 use super::hole::numbers;
-use super::looking::{ROUGH, SHALLOW};
-use super::pattern::{Felt, Next, SearchContext, Stage, Touched};
-use super::round::{BELOW_RIM, RoundWall, surface_about};
+use super::pattern::{Next, SearchContext, Stage, TouchResult, Touched};
+use super::search::{ROUGH, SHALLOW};
 use super::slide::{RimStation, Slide, circle};
 use crate::features::fit::Observation;
 use crate::features::{End, Feature};
@@ -119,7 +119,7 @@ impl BossPattern {
         let ball = course.params.ball_radius;
         let lowest = course.height - GROUND * ball;
         let z = touch.place.map_or(lowest, |place| course.below(&place));
-        let is_beside = touch.felt != Felt::Unclear && course.height - z > BESIDE * ball;
+        let is_beside = touch.felt != TouchResult::Unclear && course.height - z > BESIDE * ball;
         if is_beside {
             self.ground_z = self.ground_z.max(z);
             self.phase = BossPhase::In(distance);
@@ -131,7 +131,7 @@ impl BossPattern {
     fn take_in(&mut self, course: &SearchContext, touch: &Touched, distance: f64) {
         let before = self.wall.measuring.felt.len();
         self.wall.measuring.take(touch);
-        if self.wall.measuring.felt.len() == before && touch.felt == Felt::Unclear {
+        if self.wall.measuring.felt.len() == before && touch.felt == TouchResult::Unclear {
             // something else was in the way
             self.phase = BossPhase::Out(distance * FARTHER);
             return;

@@ -4,13 +4,13 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, Vector3};
 
+use super::cylinder_fit::BELOW_RIM;
 use super::design::{Asked, Knowledge};
 use super::error::ExploreError;
 use super::hole::numbers;
-use super::looking::{ROUGH, SHALLOW};
 use super::measuring::{Measuring, Possible};
-use super::pattern::{Felt, Next, PatternParams, Quantity, SearchContext, Stage, Touched};
-use super::round::BELOW_RIM;
+use super::pattern::{Next, PatternParams, Quantity, SearchContext, Stage, TouchResult, Touched};
+use super::search::{ROUGH, SHALLOW};
 use super::slide::{RimStation, Slide};
 use crate::features::Feature;
 use crate::features::fit::{Fit, FitParams, Freedom, Observation, Plane, fit};
@@ -99,7 +99,7 @@ impl EdgePattern {
     fn see(&mut self, course: &SearchContext, touch: &Touched) {
         // as deep as it was looked for
         let lowest = || course.in_f(&(touch.wish.from + touch.wish.direction.into_inner() * touch.wish.search));
-        if touch.felt != Felt::Unclear {
+        if touch.felt != TouchResult::Unclear {
             self.seen.push((touch.place.unwrap_or_else(lowest), touch.observation));
         }
         self.tried += 1;
@@ -171,7 +171,7 @@ impl EdgePattern {
     }
 
     /// Inward from beyond the edge, at a place along it.
-    fn inward(&self, course: &SearchContext, along: f64, depth: f64) -> super::pattern::Wish {
+    fn inward(&self, course: &SearchContext, along: f64, depth: f64) -> super::pattern::TouchPlan {
         let beyond = Self::ring(&course.params) + course.params.ball_radius;
         let from = Point3::origin() + self.over * beyond + self.along() * along;
         course.sideways(&from, depth, &-self.over, 2.0 * beyond)

@@ -10,10 +10,10 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Point3, Vector3};
 
+use super::cylinder_fit::{BELOW_RIM, RoundWall, surface_about};
 use super::error::ExploreError;
-use super::looking::{Looking, ROUGH, SHALLOW};
-use super::pattern::{Felt, Next, PatternParams, SearchContext, Stage, Touched};
-use super::round::{BELOW_RIM, RoundWall, surface_about};
+use super::pattern::{Next, PatternParams, SearchContext, Stage, TouchResult, Touched};
+use super::search::{Looking, ROUGH, SHALLOW};
 use super::slide::{RimStation, Slide, circle};
 use crate::features::fit::Observation;
 use crate::features::{End, Feature};
@@ -72,7 +72,7 @@ impl HolePattern {
     }
 
     fn take_first(&mut self, course: &SearchContext, touch: &Touched) {
-        if self.wall.measuring.felt.is_empty() && touch.felt == Felt::Unclear {
+        if self.wall.measuring.felt.is_empty() && touch.felt == TouchResult::Unclear {
             self.looking.slid_in(self.wall.middle, course);
             self.phase = HolePhase::Looking;
             return;

@@ -3,7 +3,7 @@
 use nalgebra::Point3;
 
 use super::design::{Asked, Candidate, Knowledge};
-use super::pattern::{Expected, Felt, Touched, Wish};
+use super::pattern::{Expected, TouchPlan, TouchResult, Touched};
 use crate::features::fit::{FitParams, Observation, Surface, fit};
 
 /// A touch that could be made: where the surface would be felt, and how.
@@ -12,7 +12,7 @@ pub(super) struct Possible {
     pub point: Point3<f64>,
     /// with the ball's centre so far from where the search begins, m
     pub travel: f64,
-    pub wish: Wish,
+    pub wish: TouchPlan,
 }
 
 /// Touches of one surface.
@@ -34,7 +34,7 @@ impl Measuring {
     pub fn take(&mut self, touch: &Touched) {
         let aimed = self.aimed.take();
         match (touch.felt, aimed) {
-            (Felt::At { .. }, _) => self.felt.extend(touch.observation),
+            (TouchResult::At { .. }, _) => self.felt.extend(touch.observation),
             (_, Some(aimed)) => self.dead.push(aimed),
             (_, None) => {}
         }
@@ -98,7 +98,7 @@ impl Measuring {
     }
 
     /// The touch that is wished for is one of this surface.
-    pub fn aim(&mut self, possible: &Possible) -> Wish {
+    pub fn aim(&mut self, possible: &Possible) -> TouchPlan {
         self.aimed = Some(possible.point);
         possible.wish
     }

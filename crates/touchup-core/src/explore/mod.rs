@@ -4,28 +4,28 @@
 //! goes where it makes the number that was asked for known best. [`Explorer`] finds a feature from a flag and measures it so;
 //! a [`Slide`] leads over the whole of what was found, for the mesh.
 
+mod advice;
 mod boss;
-mod by_hand;
 mod circle;
+mod cylinder_fit;
 mod design;
 mod edge;
 mod error;
 mod hole;
 mod level;
-mod looking;
 mod measuring;
-mod oblong;
 mod pattern;
 mod plane;
 mod region;
-mod round;
+mod search;
 mod slide;
 mod slot;
+mod slot_fit;
 mod tolerance;
 
-pub use by_hand::{NextTouch, next_by_hand};
+pub use advice::{NextTouch, next_by_hand};
 pub use design::{Asked, Candidate, Knowledge};
 pub use error::ExploreError;
-pub use pattern::{Expected, Explorer, Felt, Found, PatternParams, Quantity, Wish};
+pub use pattern::{Expected, Explorer, Found, PatternParams, Quantity, TouchPlan, TouchResult};
 pub use slide::{Slide, Station};
 pub use tolerance::sigma_of;

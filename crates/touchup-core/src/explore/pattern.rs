@@ -90,7 +90,7 @@ impl Quantity {
 
 /// A touch that is wanted, in O.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Wish {
+pub struct TouchPlan {
     /// Above the part: from here the way to `from` is straight and free.
     pub entry: Point3<f64>,
     /// Centre of the ball where the search begins.
@@ -114,7 +114,7 @@ pub struct Expected {
 
 /// What came of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Felt {
+pub enum TouchResult {
     /// The ball was stopped.
     At {
         /// its centre, m in O
@@ -143,7 +143,7 @@ pub struct Found {
 
 /// What a stage wants.
 pub(super) enum Next {
-    Touch(Wish),
+    Touch(TouchPlan),
     /// all is known as well as was asked, or nothing more can be known
     Done {
         is_as_asked: bool,
@@ -153,8 +153,8 @@ pub(super) enum Next {
 
 /// A touch, as a stage is told of it.
 pub(super) struct Touched {
-    pub wish: Wish,
-    pub felt: Felt,
+    pub wish: TouchPlan,
+    pub felt: TouchResult,
     /// centre of the ball in F, where it was stopped
     pub place: Option<Point3<f64>>,
     pub observation: Option<Observation>,
@@ -203,16 +203,16 @@ impl SearchContext {
     }
 
     /// Down at a place of F.
-    pub fn down(&self, place: &Point3<f64>, search: f64) -> Wish {
+    pub fn down(&self, place: &Point3<f64>, search: f64) -> TouchPlan {
         let from = self.pose_of * Point3::new(place.x, place.y, self.clear());
-        Wish { entry: from, from, direction: Unit::new_unchecked(-self.out()), search, expected: None }
+        TouchPlan { entry: from, from, direction: Unit::new_unchecked(-self.out()), search, expected: None }
     }
 
     /// From a place of F, at a depth below the surface, along a direction of F.
-    pub fn sideways(&self, place: &Point3<f64>, depth: f64, way: &Vector3<f64>, search: f64) -> Wish {
+    pub fn sideways(&self, place: &Point3<f64>, depth: f64, way: &Vector3<f64>, search: f64) -> TouchPlan {
         let at = |z: f64| self.pose_of * Point3::new(place.x, place.y, z);
         let direction = Unit::new_normalize(self.pose_of.rotation * way);
-        Wish { entry: at(self.clear()), from: at(self.height - depth), direction, search, expected: None }
+        TouchPlan { entry: at(self.clear()), from: at(self.height - depth), direction, search, expected: None }
     }
 
     /// The place that a ball with its centre there touches below it.
@@ -227,7 +227,7 @@ impl SearchContext {
 pub struct Explorer {
     course: SearchContext,
     stage: Box<dyn Stage>,
-    asked: Option<Wish>,
+    asked: Option<TouchPlan>,
     ended: Option<Result<bool, ExploreError>>,
 }
 
@@ -275,7 +275,7 @@ impl Explorer {
     }
 
     /// The touch that is wanted next; `None` when it is done, or cannot be ([`Self::found`] says which).
-    pub fn wish(&mut self) -> Option<Wish> {
+    pub fn wish(&mut self) -> Option<TouchPlan> {
         self.asked = None;
         if self.ended.is_some() || self.course.touches >= self.course.params.budget {
             return None;
@@ -297,16 +297,16 @@ impl Explorer {
     }
 
     /// What came of the touch that was wanted.
-    pub fn take(&mut self, felt: &Felt) {
+    pub fn take(&mut self, felt: &TouchResult) {
         let Some(wish) = self.asked.take() else { return };
         self.course.touches += 1;
         let (place, observation) = match *felt {
-            Felt::At { centre, sigma } => {
+            TouchResult::At { centre, sigma } => {
                 let offset = self.course.params.ball_radius;
                 let observation = Observation { point: centre, offset, sigma, group: self.course.touches as u32 };
                 (Some(self.course.in_f(&centre)), Some(observation))
             }
-            Felt::Nothing | Felt::Unclear => (None, None),
+            TouchResult::Nothing | TouchResult::Unclear => (None, None),
         };
         self.stage.take(&mut self.course, &Touched { wish, felt: *felt, place, observation });
     }

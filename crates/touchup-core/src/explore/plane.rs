@@ -2,13 +2,13 @@
 
 use nalgebra::Point3;
 
+use super::cylinder_fit::surface_about;
 use super::design::{Asked, Knowledge};
 use super::error::ExploreError;
 use super::hole::numbers;
-use super::looking::{ROUGH, hexagonal};
 use super::measuring::{Measuring, Possible};
-use super::pattern::{Felt, Next, PatternParams, Quantity, SearchContext, Stage, Touched};
-use super::round::surface_about;
+use super::pattern::{Next, PatternParams, Quantity, SearchContext, Stage, TouchResult, Touched};
+use super::search::{ROUGH, hexagonal};
 use super::slide::Slide;
 use crate::features::Feature;
 use crate::features::fit::{FitParams, Freedom, Plane};
@@ -98,7 +98,7 @@ impl Stage for PlanePattern {
     fn take(&mut self, course: &mut SearchContext, touch: &Touched) {
         self.first += 1;
         self.measuring.take(touch);
-        let Some(place) = touch.place.filter(|_| matches!(touch.felt, Felt::At { .. })) else { return };
+        let Some(place) = touch.place.filter(|_| matches!(touch.felt, TouchResult::At { .. })) else { return };
         let surface = course.below(&place);
         if self.measuring.felt.len() == 1 {
             course.height = surface;

@@ -3,8 +3,8 @@
 use nalgebra::Point3;
 
 use super::error::ExploreError;
-use super::looking::{ROUGH, hexagonal};
 use super::pattern::{Next, PatternParams, SearchContext, Stage, Touched};
+use super::search::{ROUGH, hexagonal};
 use super::slide::Slide;
 use crate::features::Feature;
 

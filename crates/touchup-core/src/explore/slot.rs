@@ -10,15 +10,15 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Point3, Vector3};
 
+use super::cylinder_fit::{BELOW_RIM, SQUARE, surface_about};
 use super::design::{Asked, Knowledge};
 use super::error::ExploreError;
 use super::hole::{OFF_FLOOR, numbers};
-use super::looking::{Looking, ROUGH, SHALLOW};
 use super::measuring::{Measuring, Possible};
-use super::oblong::Oblong;
-use super::pattern::{Felt, Next, PatternParams, Quantity, SearchContext, Stage, Touched, Wish};
-use super::round::{BELOW_RIM, SQUARE, surface_about};
+use super::pattern::{Next, PatternParams, Quantity, SearchContext, Stage, TouchPlan, TouchResult, Touched};
+use super::search::{Looking, ROUGH, SHALLOW};
 use super::slide::{RimStation, Slide, oblong};
+use super::slot_fit::Oblong;
 use crate::features::fit::{Ends, FitParams, Freedom, Stadium, Surface, fit};
 use crate::features::{End, Feature};
 
@@ -204,7 +204,7 @@ impl SlotPattern {
     }
 
     fn take_first(&mut self, course: &SearchContext, touch: &Touched) {
-        if self.measuring.felt.is_empty() && touch.felt == Felt::Unclear {
+        if self.measuring.felt.is_empty() && touch.felt == TouchResult::Unclear {
             self.looking.slid_in(self.middle, course);
             self.phase = SlotPhase::Looking;
             return;
@@ -227,7 +227,7 @@ impl SlotPattern {
     /// Takes what was felt of walls that are looked for.
     fn take_wall(&mut self, touch: &Touched) {
         self.measuring.take(touch);
-        if touch.felt == Felt::Nothing {
+        if touch.felt == TouchResult::Nothing {
             self.free.push(end_of(&touch.wish));
         }
     }
@@ -254,13 +254,13 @@ impl SlotPattern {
         self.tried += 1;
         let ball = course.params.ball_radius;
         self.phase = match (touch.felt, sign > 0.0) {
-            (Felt::Nothing, _) => SlotPhase::End(sign, beyond + REACH),
+            (TouchResult::Nothing, _) => SlotPhase::End(sign, beyond + REACH),
             // again, from a little before
-            (Felt::Unclear, _) => SlotPhase::End(sign, beyond - ball),
-            (Felt::At { .. }, true) => SlotPhase::End(-1.0, 0.0),
-            (Felt::At { .. }, false) => SlotPhase::Floor,
+            (TouchResult::Unclear, _) => SlotPhase::End(sign, beyond - ball),
+            (TouchResult::At { .. }, true) => SlotPhase::End(-1.0, 0.0),
+            (TouchResult::At { .. }, false) => SlotPhase::Floor,
         };
-        if matches!(touch.felt, Felt::At { .. }) {
+        if matches!(touch.felt, TouchResult::At { .. }) {
             self.tried = 0;
             self.renew(course);
         }
@@ -292,7 +292,7 @@ impl SlotPattern {
 }
 
 /// Where a search ends that feels nothing: the ball's centre, m in O.
-fn end_of(wish: &Wish) -> Point3<f64> {
+fn end_of(wish: &TouchPlan) -> Point3<f64> {
     wish.from + wish.direction.into_inner() * wish.search
 }
 

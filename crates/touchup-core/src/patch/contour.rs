@@ -6,11 +6,11 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::cut::{Cut, TraceSegment};
 use super::dual::{bend, diagonal, passes, unfolded};
 use super::lattice::{CellBox, Edge, Lattice, LatticeNode, Owner, PatchFace, Square, VertexKey};
 use super::loops::{Loops, NONE, edge_corners, edge_of, number_in, ring_corners, ring_edges, segments, square_of};
 use super::qef::Planes;
+use super::scan_clipping::{Cut, TraceSegment};
 use super::splice::Patch;
 use super::table::CellTable;
 use super::trace::Trace;

@@ -5,8 +5,8 @@ use nalgebra::{Point3, Vector3};
 use super::contour::Crossing;
 use super::evidence::{Evidence, Source};
 use super::field::FieldScratch;
+use super::grid::ReconstructionGrid;
 use super::lattice::{Edge, Lattice, LatticeNode, stepped};
-use super::restore::Restored;
 use super::table::CellTable;
 
 /// Steps towards the zero of the touched field, at most: on a plane one is enough, at an edge it takes some more.
@@ -31,7 +31,13 @@ struct KnownCrossing {
 impl Crossings {
     /// The crossing of an edge whose ends differ in sign: by the touched field itself between touched nodes, else between
     /// the values at the ends.
-    pub fn at(&mut self, restored: &Restored, evidence: &Evidence<'_>, lattice: &Lattice, edge: &Edge) -> Crossing {
+    pub fn at(
+        &mut self,
+        restored: &ReconstructionGrid,
+        evidence: &Evidence<'_>,
+        lattice: &Lattice,
+        edge: &Edge,
+    ) -> Crossing {
         let ends = [edge.node, edge.end()];
         let [Some(a), Some(b)] = ends.map(|node| restored.nodes.get(&node)) else {
             return between(restored, lattice, edge, [0.0; 2]);
@@ -53,7 +59,7 @@ impl Crossings {
 }
 
 /// The crossing of an edge by the values at its ends.
-fn between(restored: &Restored, lattice: &Lattice, edge: &Edge, values: [f64; 2]) -> Crossing {
+fn between(restored: &ReconstructionGrid, lattice: &Lattice, edge: &Edge, values: [f64; 2]) -> Crossing {
     let ends = [edge.node, edge.end()];
     let [a, b] = ends.map(|node| lattice.position(node));
     let share = share_of(values);
@@ -103,7 +109,7 @@ fn of_touches(
 }
 
 /// Slope of the values at a node, of any length: by central differences, one-sided where a neighbour is missing.
-fn gradient(restored: &Restored, node: &LatticeNode) -> Vector3<f64> {
+fn gradient(restored: &ReconstructionGrid, node: &LatticeNode) -> Vector3<f64> {
     let value = |node: LatticeNode| {
         let state = restored.nodes.get(&node)?;
         (state.source != Source::Beyond).then_some(state.value)
@@ -121,14 +127,14 @@ fn gradient(restored: &Restored, node: &LatticeNode) -> Vector3<f64> {
 mod tests {
     use super::*;
     use crate::mesh::{FaceTree, TriMesh};
-    use crate::patch::{ContactSigma, ContactStore, EvidenceParams, SurfaceContact, SweptSpace};
+    use crate::patch::{ContactMap, ContactSigma, EvidenceParams, SurfaceContact, SweptSpace};
 
     const RADIUS: f64 = 1.5e-3;
 
     #[test]
     fn just_below_an_edge_the_crossing_is_that_of_the_wall() {
         // a step: the face z = 0 for y < 0, the wall y = 0 below it
-        let mut contacts = ContactStore::new(RADIUS / 3.0, 2.0 * RADIUS, None);
+        let mut contacts = ContactMap::new(RADIUS / 3.0, 2.0 * RADIUS, None);
         for (i, j) in (-12..=12).flat_map(|i| (1..=16).map(move |j| (f64::from(i) * 0.5e-3, f64::from(j) * 0.5e-3))) {
             for (point, normal) in [(Point3::new(i, -j, 0.0), Vector3::z()), (Point3::new(i, 0.0, -j), Vector3::y())] {
                 contacts.add(&SurfaceContact {

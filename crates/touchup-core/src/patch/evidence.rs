@@ -2,11 +2,11 @@
 
 use nalgebra::Point3;
 
-use super::contact_store::ContactStore;
+use super::contact_map::ContactMap;
 use super::field::{FieldParams, FieldScratch, FieldValue};
+use super::free_space::SweptSpace;
 use super::inner_corner::is_inner_corner;
 use super::scan_value::ScanValue;
-use super::swept::SweptSpace;
 use crate::mesh::{FaceTree, TriMesh};
 
 /// How far each kind of evidence is believed.
@@ -117,7 +117,7 @@ pub struct Evidence<'a> {
     /// how far it is believed
     pub params: &'a EvidenceParams,
     /// what was touched
-    pub contacts: &'a ContactStore,
+    pub contacts: &'a ContactMap,
     /// where the ball has been
     pub swept: &'a SweptSpace,
     /// the scan as it came

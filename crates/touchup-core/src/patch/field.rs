@@ -11,8 +11,8 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::contact_store::{ContactStore, MeanContact};
-use super::fit_sigma::PassShare;
+use super::contact_map::{ContactMap, MeanContact};
+use super::field_uncertainty::PassShare;
 
 /// How contacts are grouped and weighted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -139,7 +139,7 @@ const UNDER: f64 = 0.13;
 
 impl FieldParams {
     /// The field at `x` (m, in O); `None` where no contact is within reach.
-    pub fn at(&self, store: &ContactStore, x: &Point3<f64>, scratch: &mut FieldScratch) -> Option<FieldValue> {
+    pub fn at(&self, store: &ContactMap, x: &Point3<f64>, scratch: &mut FieldScratch) -> Option<FieldValue> {
         scratch.at = *x;
         let FieldScratch { near, pieces, angles, decides, .. } = scratch;
         near.clear();
@@ -402,8 +402,8 @@ mod tests {
     type ParametricSurface<'a> = &'a dyn Fn(f64, f64) -> Option<(Point3<f64>, Vector3<f64>)>;
 
     /// Contacts of a surface at the points of a grid of 0.5 mm, each weighing 5.
-    fn store_of(surfaces: &[ParametricSurface<'_>]) -> ContactStore {
-        let mut store = ContactStore::new(RADIUS / 3.0, 2.0 * RADIUS, None);
+    fn store_of(surfaces: &[ParametricSurface<'_>]) -> ContactMap {
+        let mut store = ContactMap::new(RADIUS / 3.0, 2.0 * RADIUS, None);
         for surface in surfaces {
             for (i, j) in (-16..=16).flat_map(|i| (-16..=16).map(move |j| (i, j))) {
                 if let Some((point, normal)) = surface(f64::from(i) * 0.5e-3, f64::from(j) * 0.5e-3) {
@@ -415,7 +415,7 @@ mod tests {
         store
     }
 
-    fn value(store: &ContactStore, x: f64, y: f64, z: f64) -> f64 {
+    fn value(store: &ContactMap, x: f64, y: f64, z: f64) -> f64 {
         let x = Point3::new(x, y, z) * 1e-3;
         FieldParams::for_ball(RADIUS).at(store, &x, &mut FieldScratch::default()).unwrap().value * 1e3
     }

@@ -5,7 +5,7 @@
 //! keep this distance; those beside an inner corner do, and the last of them have no more. Between these both surfaces go
 //! straight on to where they meet: nothing else can be felt there, and the scan sees corners worst.
 
-use super::contact_store::ContactStore;
+use super::contact_map::ContactMap;
 use super::field::{FieldParams, FieldScratch, Piece};
 
 /// Surfaces at less than 60° to each other let the ball in as far as the last contacts speak anyway, and at more than 120°
@@ -25,7 +25,7 @@ const MOST_ROOM: f64 = 1.3;
 /// Whether the surface that decides at the point last evaluated meets another one there in an inner corner that a ball of
 /// `radius` (m) does not get into.
 pub(super) fn is_inner_corner(
-    contacts: &ContactStore,
+    contacts: &ContactMap,
     params: &FieldParams,
     radius: f64,
     scratch: &FieldScratch,
@@ -46,7 +46,7 @@ pub(super) fn is_inner_corner(
 
 /// Whether a ball that touches the piece `at` where it ends near the point has room before `other`, and no more of it than
 /// one that lies in the corner.
-fn is_beside(contacts: &ContactStore, radius: f64, scratch: &FieldScratch, at: u32, other: &Piece) -> bool {
+fn is_beside(contacts: &ContactMap, radius: f64, scratch: &FieldScratch, at: u32, other: &Piece) -> bool {
     let piece = &scratch.pieces[at as usize];
     let limit = piece.nearest_squared.sqrt() + BESIDE * radius;
     let members = scratch.near.iter().filter(|member| member.piece == at);
@@ -68,8 +68,8 @@ mod tests {
     const RADIUS: f64 = 1.5e-3;
 
     /// Contacts every 0.5 mm along y at these places in x and z (mm) with these normals.
-    fn store_of(line: &[([f64; 2], [f64; 2])]) -> ContactStore {
-        let mut store = ContactStore::new(RADIUS / 3.0, 2.0 * RADIUS, None);
+    fn store_of(line: &[([f64; 2], [f64; 2])]) -> ContactMap {
+        let mut store = ContactMap::new(RADIUS / 3.0, 2.0 * RADIUS, None);
         for (([x, z], normal), j) in line.iter().flat_map(|place| (-8..=8).map(move |j| (place, f64::from(j)))) {
             let (point, normal) = (Point3::new(*x, 0.5 * j, *z) * 1e-3, Vector3::new(normal[0], 0.0, normal[1]));
             store.add(&SurfaceContact { point, normal, weight: 5.0, stamp_ns: 0, sigma: ContactSigma::default() });
@@ -78,14 +78,14 @@ mod tests {
     }
 
     /// Contacts of the floor z = 0 and of the wall x = 0, from this far from the corner on, mm.
-    fn corner(from: f64) -> ContactStore {
+    fn corner(from: f64) -> ContactMap {
         let from_corner = (0..6).map(|i| from + 0.5 * f64::from(i));
         let both = from_corner.flat_map(|a| [([a, 0.0], [0.0, 1.0]), ([0.0, a], [1.0, 0.0])]);
         store_of(&both.collect::<Vec<_>>())
     }
 
     /// Whether there is an inner corner, and the value of the field (mm), at a place in x and z, mm.
-    fn found(store: &ContactStore, x: f64, z: f64) -> (bool, f64) {
+    fn found(store: &ContactMap, x: f64, z: f64) -> (bool, f64) {
         let (params, mut scratch) = (FieldParams::for_ball(RADIUS), FieldScratch::default());
         let value = params.at(store, &(Point3::new(x, 0.1, z) * 1e-3), &mut scratch).unwrap().value;
         (is_inner_corner(store, &params, RADIUS, &scratch), value * 1e3)

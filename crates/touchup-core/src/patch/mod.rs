@@ -1,6 +1,6 @@
 //! The surface meshed anew where it was touched, as one closed skin by construction.
 //!
-//! [`TouchFinder`] makes touches of samples; [`ContactStore`] and [`SweptSpace`] keep what was touched and where the tip
+//! [`TouchFinder`] makes touches of samples; [`ContactMap`] and [`SweptSpace`] keep what was touched and where the tip
 //! went. [`Evidence`] says what these and the scan know about a point; that is held at the nodes of a regular [`Lattice`] and
 //! completed where nothing is known. [`Patcher`] is the whole way: everything at once, or what changed since the last time, as
 //! a [`PatchDelta`] for a mesh that follows by [`Splice`].
@@ -13,65 +13,65 @@
 //! Vertices are named by [`VertexKey`], so neighbours share them without a search and no crack can arise. Each face has an
 //! [`Owner`] whose faces depend on the field, the region and the scan nearby alone.
 
+mod boundary_loops;
 mod clip;
-mod complete;
-mod contact_sigma;
-mod contact_store;
-mod contact_sums;
+mod contact_map;
+mod contact_statistics;
+mod contact_uncertainty;
 mod contour;
 mod crossing;
-mod cut;
 mod delta;
+mod discontinuities;
+mod double_contact;
 mod dual;
 mod evidence;
-mod felt;
 mod field;
-mod fill;
-mod fit_sigma;
+mod field_uncertainty;
+mod floating_components;
+mod free_space;
+mod grid;
+mod harmonic_fill;
 mod history;
+mod incremental;
 mod inner_corner;
-mod jumps;
 mod lattice;
 mod loops;
-mod lumps;
 mod outliers;
-mod outline;
+mod passes;
 mod patched;
 mod patcher;
 mod probed_log;
 mod qef;
 mod remesh;
-mod restore;
+mod scan_clipping;
 mod scan_value;
-mod settle;
 mod splice;
-mod swept;
 mod table;
-mod thinned;
+mod touch_history;
 mod touches;
 mod trace;
-mod two_points;
+mod triangulation;
 mod unreachable;
-mod vertex_sigma;
-mod visits;
+mod vertex_uncertainty;
+mod voxel_set;
 
-pub use contact_sigma::{CalibrationParams, ContactSigma};
-pub use contact_store::{ContactStore, GateParams, MeanContact, Verdict};
+pub use contact_map::{ContactMap, GateParams, MeanContact, Verdict};
+pub use contact_uncertainty::{CalibrationParams, ContactSigma};
 pub use contour::{ContourParams, Crossing, contour};
-pub use cut::Cut;
 pub use delta::{PatchDelta, PatchVertex};
 pub use evidence::{Evidence, EvidenceParams, Finding, ScanPrior, Source};
 pub use field::{FieldParams, FieldScratch, FieldValue};
-pub use fit_sigma::FitSigma;
+pub use field_uncertainty::FitSigma;
+pub use free_space::SweptSpace;
 pub use history::History;
 pub use lattice::{Edge, Lattice, LatticeNode, Owner, PatchFace, Square, VertexKey};
 pub use outliers::{Outlier, Outliers};
 pub use patched::{Patched, Support};
 pub use patcher::{PatchRegion, Patcher, PatcherParams, UncertaintyParams};
 pub use probed_log::ProbedLog;
+pub use scan_clipping::Cut;
 pub use scan_value::ScanValue;
 pub use splice::{Patch, Splice};
-pub use swept::SweptSpace;
 pub use table::{CellTable, Key};
 pub use touches::{SurfaceContact, TipTouch, TouchFinder, TouchFinderParams};
 pub use trace::OpenSquare;

@@ -2,22 +2,22 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::contact_sigma::CalibrationParams;
-use super::contact_store::{ContactStore, GateParams};
+use super::contact_map::{ContactMap, GateParams};
+use super::contact_uncertainty::CalibrationParams;
 use super::delta::{PatchDelta, Shown};
 use super::evidence::{Evidence, EvidenceParams, ScanPrior, Source};
-use super::felt::Felt;
 use super::field::FieldScratch;
+use super::free_space::SweptSpace;
+use super::grid::{GridChanges, NodeState, ReconstructionGrid, node_at};
 use super::lattice::{CellBox, Lattice, LatticeNode, VertexKey};
 use super::outliers::Outliers;
 use super::patched::{Patched, Support};
 use super::remesh::{Remesh, Renewed};
-use super::restore::{News, NodeState, Restored, node_at};
 use super::splice::Patch;
-use super::swept::SweptSpace;
+use super::touch_history::TouchHistory;
 use super::touches::{TipTouch, TouchFinder, TouchFinderParams};
 use super::unreachable::mark_unreachable;
-use super::vertex_sigma::vertex_sigma;
+use super::vertex_uncertainty::vertex_sigma;
 use crate::mesh::{FaceTree, MeshError, Region, TriMesh};
 use crate::touch::{Compensator, CompensatorParams, ProbedPoint, Sample, SettingError, TipBody, TipShape};
 
@@ -179,7 +179,7 @@ pub struct Patcher {
     params: PatcherParams,
     compensator: Compensator,
     finder: TouchFinder,
-    felt: Felt,
+    felt: TouchHistory,
     live: Option<LivePatch>,
 }
 
@@ -189,9 +189,9 @@ struct LivePatch {
     remesh: Remesh,
     shown: Shown,
     /// what came to the stores since
-    news: News,
+    news: GridChanges,
     /// what came and was taken in only nearby
-    late: News,
+    late: GridChanges,
     /// times since that was taken in as a whole
     since_late: u32,
     /// strokes were undone: everything is to be meshed anew
@@ -203,12 +203,12 @@ const LATE_EVERY: u32 = 4;
 
 impl LivePatch {
     /// What is to be taken in nearby, and what as a whole.
-    fn take_news(&mut self) -> (News, News) {
+    fn take_news(&mut self) -> (GridChanges, GridChanges) {
         let news = std::mem::take(&mut self.news);
         self.since_late += 1;
         if self.since_late < LATE_EVERY && !news.is_empty() {
             self.late.extend(&news);
-            return (news, News::default());
+            return (news, GridChanges::default());
         }
         self.since_late = 0;
         let mut late = std::mem::take(&mut self.late);
@@ -239,8 +239,8 @@ impl Patcher {
         Ok(Self {
             compensator: Compensator::new(params.compensator)?,
             finder: TouchFinder::new(params.finder_params())?,
-            felt: Felt::new(
-                ContactStore::new(CONTACT_CELL * radius, params.evidence.field.reach, params.gate()),
+            felt: TouchHistory::new(
+                ContactMap::new(CONTACT_CELL * radius, params.evidence.field.reach, params.gate()),
                 SweptSpace::of_tip(
                     TipBody::new(params.touches.shape, params.touches.radius)?,
                     SWEPT_CELL * radius,
@@ -285,7 +285,7 @@ impl Patcher {
     }
 
     /// What was touched, as it was kept.
-    pub fn contacts(&self) -> &ContactStore {
+    pub fn contacts(&self) -> &ContactMap {
         &self.felt.contacts
     }
 
@@ -381,7 +381,7 @@ impl Patcher {
             remesh: Remesh::new(lattice_of(self.params.pitch)),
             shown: Shown::default(),
             news: self.all_news(),
-            late: News::default(),
+            late: GridChanges::default(),
             since_late: 0,
             is_outdated: false,
         });
@@ -409,15 +409,15 @@ impl Patcher {
         }
     }
 
-    fn all_news(&self) -> News {
+    fn all_news(&self) -> GridChanges {
         let means = self.felt.contacts.means().iter().map(|mean| mean.point).collect();
         let mut centres = Vec::new();
         self.felt.swept.cover(|centre| centres.push(*centre));
-        News { means, centres }
+        GridChanges { means, centres }
     }
 
     fn evidence<'a>(&'a self, scan: &'a TriMesh, tree: &'a FaceTree) -> Evidence<'a> {
-        let Self { felt: Felt { contacts, swept, .. }, params, .. } = self;
+        let Self { felt: TouchHistory { contacts, swept, .. }, params, .. } = self;
         Evidence { params: &params.evidence, contacts, swept, scan, tree, prior: params.scan_prior() }
     }
 
@@ -435,7 +435,7 @@ impl Patcher {
         let (evidence, news, budget) = (self.evidence(scan, tree), self.all_news(), self.budget(scan));
         let meshed = |pitch: f64| {
             let mut remesh = Remesh::new(lattice_of(pitch));
-            let renewed = remesh.renew(&evidence, &news, &News::default());
+            let renewed = remesh.renew(&evidence, &news, &GridChanges::default());
             (remesh, renewed)
         };
         let mut made = meshed(self.params.pitch);
@@ -453,7 +453,7 @@ impl Patcher {
 }
 
 /// What the tip does outside the region is not looked at.
-fn keep(felt: &mut Felt, params: &PatcherParams, touch: &TipTouch) {
+fn keep(felt: &mut TouchHistory, params: &PatcherParams, touch: &TipTouch) {
     if params.region.is_none_or(|touched| touched.region.contains(&touch.centre)) {
         felt.keep(touch);
     } else {
@@ -466,7 +466,7 @@ fn lattice_of(pitch: f64) -> Lattice {
 }
 
 /// A vertex is touched when most of the corners of its cell are near the surface that was; those on the scan are its own.
-fn support_of(key: &VertexKey, restored: &Restored) -> Support {
+fn support_of(key: &VertexKey, restored: &ReconstructionGrid) -> Support {
     let is_felt = |state: &NodeState| state.source == Source::Touch && !state.is_corner;
     let is_touched = |node: &LatticeNode| restored.nodes.get(node).is_some_and(is_felt);
     let touched = match *key {

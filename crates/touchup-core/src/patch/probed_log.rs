@@ -1,6 +1,6 @@
 //! The touches themselves, thinned in time, of which features are measured.
 
-use super::contact_store::Verdict;
+use super::contact_map::Verdict;
 use super::touches::{SurfaceContact, TipTouch};
 use crate::touch::ProbedPoint;
 

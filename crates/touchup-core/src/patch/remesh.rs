@@ -3,10 +3,10 @@
 use super::LatticeRegion;
 use super::contour::{ContourParams, contour_in};
 use super::crossing::Crossings;
-use super::cut::{Cut, cells_around, faces_near};
 use super::evidence::Evidence;
+use super::grid::{Changed, GridChanges, ReconstructionGrid, cells_of};
 use super::lattice::{CellBox, Lattice, LatticeNode};
-use super::restore::{Changed, News, Restored, cells_of};
+use super::scan_clipping::{Cut, cells_around, faces_near};
 use super::splice::Patch;
 use super::table::CellTable;
 use crate::mesh::FaceId;
@@ -20,7 +20,7 @@ const FURTHER: usize = 4;
 #[derive(Clone, Debug)]
 pub(super) struct Remesh {
     lattice: Lattice,
-    restored: Restored,
+    restored: ReconstructionGrid,
     region: LatticeRegion,
     /// cells that are in the region only because patch and scan cannot be joined at their squares
     grown: CellTable<LatticeNode, ()>,
@@ -47,7 +47,7 @@ impl Remesh {
     pub fn new(lattice: Lattice) -> Self {
         Self {
             lattice,
-            restored: Restored::default(),
+            restored: ReconstructionGrid::default(),
             region: LatticeRegion::default(),
             grown: CellTable::default(),
             wanted: CellTable::default(),
@@ -60,7 +60,7 @@ impl Remesh {
         &self.lattice
     }
 
-    pub fn restored(&self) -> &Restored {
+    pub fn restored(&self) -> &ReconstructionGrid {
         &self.restored
     }
 
@@ -68,8 +68,8 @@ impl Remesh {
         &self.region
     }
 
-    /// Brings everything up to date with what came to the stores of `evidence`: as [`Restored::renew`].
-    pub fn renew(&mut self, evidence: &Evidence<'_>, news: &News, late: &News) -> Renewed {
+    /// Brings everything up to date with what came to the stores of `evidence`: as [`ReconstructionGrid::renew`].
+    pub fn renew(&mut self, evidence: &Evidence<'_>, news: &GridChanges, late: &GridChanges) -> Renewed {
         let mut changed = self.restored.renew(evidence, &self.lattice, news, late);
         let (mut core, mut left) = (CellBox::EMPTY, Vec::new());
         for _ in 0..FURTHER {

@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 
 use nalgebra::{Point3, Vector3};
 
-use super::contact_sigma::{CalibrationParams, ContactSigma, ForceNoise};
+use super::contact_uncertainty::{CalibrationParams, ContactSigma, ForceNoise};
 use crate::touch::{
     BiasParams, BiasTracker, ContactGate, ContactGateParams, FeltNormal, Friction, FrictionCoefficient, LocalMotion,
     SettingError, Sliding, SmoothedMotion, Tip, TipBody, TipContact, TipPlace, TipShape,

@@ -2,8 +2,8 @@
 
 use nalgebra::{Point2, Point3};
 
-use super::cut::{Cut, TraceSegment};
 use super::lattice::{Edge, LatticeNode, Square, VertexKey, across};
+use super::scan_clipping::{Cut, TraceSegment};
 use super::{LatticeRegion, NodeValues};
 
 /// A square on the rim of the region on which scan and field disagree: unless the cell beyond is added to the region, both
@@ -87,7 +87,7 @@ impl Cut {
     }
 
     /// The crossing of an edge by the scan, where it is the only one and goes the way the field says.
-    pub(super) fn shared_crossing(&self, edge: &Edge, values: &NodeValues) -> Option<&super::cut::Pierced> {
+    pub(super) fn shared_crossing(&self, edge: &Edge, values: &NodeValues) -> Option<&super::scan_clipping::Pierced> {
         let pierced = self.pierced(edge).filter(|pierced| !pierced.is_repeated)?;
         let [start, end] = [edge.node, edge.end()].map(|node| values.get(&node).map(|f| *f < 0.0));
         let outward = pierced.normal[edge.axis as usize];

@@ -6,7 +6,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::Support;
-use super::swept::SweptSpace;
+use super::free_space::SweptSpace;
 use crate::mesh::{FaceTree, MeshError, TriMesh, VertexId};
 
 /// The ball may enter the surface by this share of its radius: what the lattice and noise leave of a flat face.

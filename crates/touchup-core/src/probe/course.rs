@@ -4,7 +4,7 @@ use nalgebra::{Point3, UnitQuaternion};
 
 use super::ending::{Ending, ProbedSlide, ProbedTouch};
 use super::links::LinkError;
-use super::route::{Barred, Stand};
+use super::route::{Barred, ToolState};
 use crate::explore::ExploreError;
 use crate::robot::{LimitError, ProbeError, Watched};
 
@@ -49,7 +49,7 @@ pub(super) struct FeatureProbing {
     /// that it is touched with, of the tip in B
     pub rotation: UnitQuaternion<f64>,
     /// where the tool was last in free air
-    pub out: Stand,
+    pub out: ToolState,
     /// whether it is still there
     pub is_out: bool,
     /// below that, where the touch is entered from, m in O; `None` where it is the same, or the ball was not there yet

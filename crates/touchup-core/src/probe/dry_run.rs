@@ -4,9 +4,9 @@ use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
 
 use super::cell::Cell;
 use super::prober::{Flag, ProbeParams};
-use super::route::{Barred, Route, Stand, may_slide, may_touch, route};
+use super::route::{Barred, Route, ToolState, may_slide, may_touch, route};
 use super::world::{World, distance, normal_about, on_mesh};
-use crate::explore::{ExploreError, Explorer, Felt, PatternParams, Slide, Wish};
+use crate::explore::{ExploreError, Explorer, PatternParams, Slide, TouchPlan, TouchResult};
 use crate::robot::ArmState;
 
 /// What would be done for a flag.
@@ -17,7 +17,7 @@ pub struct Plan {
     /// moves through free air, from and to, in O, m
     pub links: Vec<[Point3<f64>; 2]>,
     /// the touches, as they would come if the part were as the mesh has it
-    pub wishes: Vec<Wish>,
+    pub wishes: Vec<TouchPlan>,
     /// the slides after them
     pub slides: Vec<Slide>,
     /// what cannot be done, in words, with the number of the touch; slides are counted on
@@ -25,7 +25,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    fn go(&mut self, at: &mut Stand, stops: Vec<(Point3<f64>, UnitQuaternion<f64>)>) {
+    fn go(&mut self, at: &mut ToolState, stops: Vec<(Point3<f64>, UnitQuaternion<f64>)>) {
         for (place, turned) in stops {
             self.links.push([at.place, place]);
             self.path.push(place);
@@ -53,7 +53,7 @@ pub fn plan(
     let pattern = PatternParams { flag_radius: flag.radius, ..params.pattern };
     let mut explorer = Explorer::new(flag.kind, &place, &normal, pattern)?;
     let clear = |place: &Point3<f64>, reach: f64| distance(world, place, reach);
-    let mut at = Stand { place: cell.place(&now.pose_bt), rotation: now.pose_bt.rotation, joints: now.joints };
+    let mut at = ToolState { place: cell.place(&now.pose_bt), rotation: now.pose_bt.rotation, joints: now.joints };
     let mut plan = Plan { path: vec![at.place], ..Plan::default() };
     while let Some(wish) = explorer.wish() {
         let number = plan.wishes.len();
@@ -68,13 +68,13 @@ pub fn plan(
             }
             Err(error) => {
                 plan.held_back.push((number, error.to_string()));
-                explorer.take(&Felt::Unclear);
+                explorer.take(&TouchResult::Unclear);
                 continue;
             }
         };
         plan.go(&mut at, stops);
         let felt = felt_on_mesh(&wish, params.pattern.ball_radius, &clear, params.pattern.touch_sigma);
-        let end = if let Felt::At { centre, .. } = felt { centre } else { wish.from };
+        let end = if let TouchResult::At { centre, .. } = felt { centre } else { wish.from };
         // in again and out, slowly
         plan.path.extend([wish.from, end, wish.from, at.place]);
         explorer.take(&felt);
@@ -101,18 +101,23 @@ pub fn plan(
 }
 
 /// What a ball would feel of the mesh: it goes on in steps of what is left, until nothing is.
-fn felt_on_mesh(wish: &Wish, ball_radius: f64, distance: &dyn Fn(&Point3<f64>, f64) -> f64, sigma: f64) -> Felt {
+fn felt_on_mesh(
+    wish: &TouchPlan,
+    ball_radius: f64,
+    distance: &dyn Fn(&Point3<f64>, f64) -> f64,
+    sigma: f64,
+) -> TouchResult {
     let along: Unit<Vector3<f64>> = wish.direction;
     let mut gone = 0.0;
     while gone <= wish.search {
         let centre = wish.from + along.into_inner() * gone;
         let left = distance(&centre, ball_radius + wish.search) - ball_radius;
         if left < TOUCHES {
-            return Felt::At { centre, sigma };
+            return TouchResult::At { centre, sigma };
         }
         gone += left;
     }
-    Felt::Nothing
+    TouchResult::Nothing
 }
 
 /// Nearer than this is a touch, m.

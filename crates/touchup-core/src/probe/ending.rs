@@ -3,7 +3,7 @@
 use nalgebra::Point3;
 
 use super::links::LinkError;
-use crate::explore::{ExploreError, Found, Slide, Wish};
+use crate::explore::{ExploreError, Found, Slide, TouchPlan};
 use crate::robot::{LimitError, ProbeError, SlideRecord, TouchRecord};
 
 /// How it ended.
@@ -46,7 +46,7 @@ impl std::fmt::Display for Ending {
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProbedTouch {
     /// what was wanted, in O
-    pub wish: Wish,
+    pub wish: TouchPlan,
     /// what was seen; `None` when the arm was held back before
     pub record: Option<TouchRecord>,
     /// centre of the ball where it was felt, m in O

@@ -8,7 +8,7 @@ use super::ending::{Ending, ProbedTouch};
 use super::prober::{Flag, Prober};
 use super::repeat::{SpotError, some_other};
 use super::world::{normal_about, on_mesh};
-use crate::explore::Wish;
+use crate::explore::TouchPlan;
 use crate::features::Kind;
 
 /// What the touches of a spot say of the tip.
@@ -73,7 +73,7 @@ impl Prober<'_> {
             course.rotation = leaned(&upright, &orientation);
             let from = place + normal.into_inner() * (self.params.pattern.ball_radius + STANDOFF) + aside;
             let entry = from + normal.into_inner() * ABOVE;
-            let wish = Wish { entry, from, direction: -*normal, search: 2.0 * STANDOFF, expected: None };
+            let wish = TouchPlan { entry, from, direction: -*normal, search: 2.0 * STANDOFF, expected: None };
             let left_out = |why: String| NotReached { orientation, why };
             match self.touch_and_retract(&wish, course) {
                 Ok(ProbedTouch { centre: Some(centre), refused: None, .. }) => {

@@ -6,9 +6,9 @@ use super::cell::Cell;
 use super::course::{EarlyEnd, FeatureProbing};
 use super::ending::{Ending, Probed, ProbedTouch};
 use super::links::{LinkError, Tool};
-use super::route::{Stand, may_touch, route};
+use super::route::{ToolState, may_touch, route};
 use super::world::{Phase, Progress, World, distance, normal_about, on_mesh};
-use crate::explore::{ExploreError, Explorer, Felt, PatternParams, Wish};
+use crate::explore::{ExploreError, Explorer, PatternParams, TouchPlan, TouchResult};
 use crate::features::Kind;
 use crate::robot::{
     Arm, ArmState, LimitError, Limits, Narrower, OnsetVerdict, ProbeError, TouchOutcome, TouchParams, TouchRecord,
@@ -143,7 +143,7 @@ impl<'a> Prober<'a> {
         let course = FeatureProbing {
             flag: flag.id,
             rotation,
-            out: Stand {
+            out: ToolState {
                 place: self.cell.place(&state.pose_bt),
                 rotation: state.pose_bt.rotation,
                 joints: state.joints,
@@ -193,7 +193,7 @@ impl<'a> Prober<'a> {
     /// One touch by itself: there, and back into free air.
     pub(super) fn touch_and_retract(
         &mut self,
-        wish: &Wish,
+        wish: &TouchPlan,
         course: &mut FeatureProbing,
     ) -> Result<ProbedTouch, EarlyEnd> {
         let joints = may_touch(self.cell, &self.params.limits, &course.rotation, wish, &course.out.joints);
@@ -217,7 +217,7 @@ impl<'a> Prober<'a> {
                 // the first one is where the feature is
                 Err(error) if course.touches.is_empty() => return Err(EarlyEnd::Limit(error)),
                 Err(error) => {
-                    explorer.take(&Felt::Unclear);
+                    explorer.take(&TouchResult::Unclear);
                     course.touches.push(held_back(wish, error.to_string()));
                     continue;
                 }
@@ -226,13 +226,13 @@ impl<'a> Prober<'a> {
             let (felt, touch) = match touched {
                 Ok((felt, touch)) => (felt, touch),
                 Err(EarlyEnd::Arm(error @ ProbeError::InTheWay { is_link: false, .. })) => {
-                    (Felt::Unclear, held_back(wish, error.to_string()))
+                    (TouchResult::Unclear, held_back(wish, error.to_string()))
                 }
                 Err(EarlyEnd::Link(error)) if !course.touches.is_empty() => {
-                    (Felt::Unclear, held_back(wish, error.to_string()))
+                    (TouchResult::Unclear, held_back(wish, error.to_string()))
                 }
                 Err(EarlyEnd::Limit(error)) if !course.touches.is_empty() => {
-                    (Felt::Unclear, held_back(wish, error.to_string()))
+                    (TouchResult::Unclear, held_back(wish, error.to_string()))
                 }
                 Err(error) => return Err(error),
             };
@@ -280,7 +280,7 @@ impl<'a> Prober<'a> {
     }
 
     /// Brings the ball to where a touch is entered from.
-    fn go(&mut self, wish: &Wish, course: &mut FeatureProbing, is_zeroed: &mut bool) -> Result<(), EarlyEnd> {
+    fn go(&mut self, wish: &TouchPlan, course: &mut FeatureProbing, is_zeroed: &mut bool) -> Result<(), EarlyEnd> {
         let near = INSIDE * self.params.pattern.ball_radius;
         if course.from.is_some_and(|from| (from - wish.from).norm() < near) && wish.from != wish.entry {
             // stays inside of the feature
@@ -326,7 +326,7 @@ impl<'a> Prober<'a> {
         Ok(())
     }
 
-    fn touch(&mut self, wish: &Wish, course: &mut FeatureProbing) -> Result<(Felt, ProbedTouch), EarlyEnd> {
+    fn touch(&mut self, wish: &TouchPlan, course: &mut FeatureProbing) -> Result<(TouchResult, ProbedTouch), EarlyEnd> {
         let target = TouchTarget {
             standoff_bt: self.cell.pose(&course.rotation, &wish.from),
             direction: Unit::new_normalize(self.cell.pose_bo.rotation * wish.direction.into_inner()),
@@ -347,23 +347,23 @@ impl<'a> Prober<'a> {
     }
 
     /// What a record tells the explorer.
-    fn told(&self, wish: Wish, record: TouchRecord, before: &Before) -> (Felt, ProbedTouch) {
+    fn told(&self, wish: TouchPlan, record: TouchRecord, before: &Before) -> (TouchResult, ProbedTouch) {
         let (felt, refused) = match &record.outcome {
             TouchOutcome::Contact { onset, .. } if onset.verdict == OnsetVerdict::Impact => {
-                (Felt::Unclear, Some("an impact: the force was over before the surface held".to_owned()))
+                (TouchResult::Unclear, Some("an impact: the force was over before the surface held".to_owned()))
             }
             TouchOutcome::Contact { onset, centre, .. } => {
                 let centre = self.cell.pose_bo.inverse_transform_point(centre);
-                (Felt::At { centre, sigma: onset.sigma }, None)
+                (TouchResult::At { centre, sigma: onset.sigma }, None)
             }
             TouchOutcome::Miss { travel } if *travel < wish.search - SHORT => {
                 let why = format!("nothing within {:.1} mm, where the limit of a search ends", travel * 1e3);
-                (Felt::Unclear, Some(why))
+                (TouchResult::Unclear, Some(why))
             }
-            TouchOutcome::Miss { .. } => (Felt::Nothing, None),
-            TouchOutcome::Unclear(error) => (Felt::Unclear, Some(error.to_string())),
+            TouchOutcome::Miss { .. } => (TouchResult::Nothing, None),
+            TouchOutcome::Unclear(error) => (TouchResult::Unclear, Some(error.to_string())),
         };
-        let centre = if let Felt::At { centre, .. } = felt { Some(centre) } else { None };
+        let centre = if let TouchResult::At { centre, .. } = felt { Some(centre) } else { None };
         let deviation = centre.and_then(|centre| before.deviation(&wish, &centre));
         (felt, ProbedTouch { wish, record: Some(record), centre, deviation, refused })
     }
@@ -394,7 +394,7 @@ struct Before {
 }
 
 impl Before {
-    fn of(world: &dyn World, wish: &Wish, ball_radius: f64) -> Self {
+    fn of(world: &dyn World, wish: &TouchPlan, ball_radius: f64) -> Self {
         let count = (wish.search / SAMPLED).ceil() as usize + 1;
         let at = |sample: usize| {
             let centre = wish.from + wish.direction.into_inner() * (SAMPLED * sample as f64);
@@ -406,7 +406,7 @@ impl Before {
     }
 
     /// How far the surface that a ball touched is from the mesh, m, positive outside.
-    fn deviation(&self, wish: &Wish, centre: &Point3<f64>) -> Option<f64> {
+    fn deviation(&self, wish: &TouchPlan, centre: &Point3<f64>) -> Option<f64> {
         let at = ((centre - wish.from).dot(&wish.direction) / SAMPLED).max(0.0);
         let sample = at as usize;
         let (here, next) = ((*self.distances.get(sample)?)?, (*self.distances.get(sample + 1)?)?);
@@ -433,7 +433,7 @@ const LINK_TRIGGER: f64 = 1.5;
 /// The mesh is looked for this far from a contact, m.
 const DEVIATION_REACH: f64 = 20e-3;
 
-fn held_back(wish: Wish, refused: String) -> ProbedTouch {
+fn held_back(wish: TouchPlan, refused: String) -> ProbedTouch {
     ProbedTouch { wish, record: None, centre: None, deviation: None, refused: Some(refused) }
 }
 

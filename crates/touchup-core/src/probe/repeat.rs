@@ -5,7 +5,7 @@ use nalgebra::{Point3, Unit, Vector3};
 use super::ending::Ending;
 use super::prober::{Flag, Prober};
 use super::world::{normal_about, on_mesh};
-use crate::explore::Wish;
+use crate::explore::TouchPlan;
 use crate::features::Kind;
 use crate::robot::{OnsetVerdict, TouchOutcome};
 
@@ -77,7 +77,7 @@ impl Prober<'_> {
                 let side = if touch % 2 == 1 { 1 } else { -1 };
                 let aside = across.into_inner() * (f64::from(side) * ASIDE);
                 let entry = from + normal.into_inner() * ABOVE + aside;
-                let wish = Wish { entry, from, direction: -normal, search: 2.0 * STANDOFF, expected: None };
+                let wish = TouchPlan { entry, from, direction: -normal, search: 2.0 * STANDOFF, expected: None };
                 if course.seconds() > self.params.limits.time {
                     failed = Some(SpotError::Ended(Ending::TimeSpent));
                     break;

@@ -5,7 +5,7 @@ use nalgebra::{Point3, UnitQuaternion};
 use super::cell::Cell;
 use super::links::{LinkError, clear_entry, turning_place, way};
 use super::world::{World, distance, highest};
-use crate::explore::{Slide, Wish};
+use crate::explore::{Slide, TouchPlan};
 use crate::robot::{Joints, LimitError, Limits};
 
 /// Why the tool does not get there.
@@ -19,7 +19,7 @@ pub(super) enum Barred {
 
 /// Where the tool is, in free air.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Stand {
+pub(super) struct ToolState {
     /// centre of the ball, m in O
     pub place: Point3<f64>,
     /// of the tip in B
@@ -47,7 +47,7 @@ pub(super) fn may_touch(
     cell: &Cell,
     limits: &Limits,
     rotation: &UnitQuaternion<f64>,
-    wish: &Wish,
+    wish: &TouchPlan,
     near: &Joints,
 ) -> Result<Joints, LimitError> {
     let deepest = wish.from + wish.direction.into_inner() * wish.search.min(limits.search);
@@ -82,7 +82,7 @@ pub(super) fn route(
     cell: &Cell,
     limits: &Limits,
     world: &dyn World,
-    at: &Stand,
+    at: &ToolState,
     rotation: &UnitQuaternion<f64>,
     entry: &Point3<f64>,
 ) -> Result<Route, Barred> {

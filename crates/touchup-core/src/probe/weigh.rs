@@ -13,7 +13,7 @@ use super::course::EarlyEnd;
 use super::ending::Ending;
 use super::links::Tool;
 use super::prober::Prober;
-use super::route::{Route, Stand, route};
+use super::route::{Route, ToolState, route};
 use crate::robot::{ArmState, Watched};
 use crate::touch::Wrench;
 
@@ -117,8 +117,11 @@ impl Prober<'_> {
     pub fn weigh(&mut self) -> Result<Weighed, WeighError> {
         let ended = |broken: EarlyEnd| WeighError::Ended(broken.into());
         let state = self.in_free_air().map_err(ended)?;
-        let home =
-            Stand { place: self.cell.place(&state.pose_bt), rotation: state.pose_bt.rotation, joints: state.joints };
+        let home = ToolState {
+            place: self.cell.place(&state.pose_bt),
+            rotation: state.pose_bt.rotation,
+            joints: state.joints,
+        };
         // all of the probe up to the flange keeps clear
         let length = self.cell.pose_ft.translation.vector.norm();
         let cell = Cell { tool: Tool { shaft_length: length, ..self.cell.tool }, ..self.cell.clone() };
@@ -143,14 +146,14 @@ impl Prober<'_> {
     }
 
     /// The ways from one orientation to the next, those that there is none to, and where the last one ends.
-    fn planned(&self, cell: &Cell, home: &Stand) -> (Vec<Route>, Vec<NotReached>, Stand) {
+    fn planned(&self, cell: &Cell, home: &ToolState) -> (Vec<Route>, Vec<NotReached>, ToolState) {
         let (mut routes, mut not_reached, mut at) = (Vec::new(), Vec::new(), *home);
         for orientation in orientations() {
             let rotation = leaned(&home.rotation, &orientation);
             match route(cell, &self.params.limits, &*self.world, &at, &rotation, &home.place) {
                 Ok(route) => {
                     let place = route.stops.last().map_or(at.place, |(place, _)| *place);
-                    at = Stand { place, rotation, joints: route.joints };
+                    at = ToolState { place, rotation, joints: route.joints };
                     routes.push(route);
                 }
                 Err(barred) => not_reached.push(NotReached { orientation, why: barred.to_string() }),

@@ -5,7 +5,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::{Ball, CarveParams, Case, Felt, Refiner, RegionFit, RoiSize, Update};
+use super::{Ball, CarveParams, Case, ContactState, Refiner, RegionFit, RoiSize, Update};
 use crate::mesh::{BoxQuery, FaceHit, FaceId, triangle};
 use crate::touch::{TipBody, TipPlace};
 
@@ -41,10 +41,17 @@ struct Inside {
 
 impl Refiner {
     /// Moves what is inside the tip out of it.
-    pub(super) fn carve(&mut self, carve: &CarveParams, ball: &Ball, felt: Felt, dt: f64, update: Update) -> Update {
+    pub(super) fn carve(
+        &mut self,
+        carve: &CarveParams,
+        ball: &Ball,
+        felt: ContactState,
+        dt: f64,
+        update: Update,
+    ) -> Update {
         // a mesh that the tip does not enter by more than the tolerance is left alone
         let (tolerance, hint) = match felt {
-            Felt::Nothing => (carve.tolerance, self.carve_region.handle()),
+            ContactState::Nothing => (carve.tolerance, self.carve_region.handle()),
             _ => (carve.contact_tolerance.max(carve.tolerance), self.contact_region.handle()),
         };
         let place = TipPlace { centre: ball.centre, axis: self.axis };

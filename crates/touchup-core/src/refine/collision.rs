@@ -43,7 +43,7 @@ impl Pairs {
         &mut self,
         mesh: &TriMesh,
         face: FaceId,
-        others: &[(FaceId, Aabb)],
+        others: &[(FaceId, Corners)],
         margin: f64,
         is_wanted: impl Fn(FaceId) -> bool,
     ) {
@@ -100,15 +100,15 @@ impl Pairs {
 }
 
 /// Lowest and highest coordinates, m.
-pub(super) type Aabb = (Vector3<f64>, Vector3<f64>);
+pub(super) type Corners = (Vector3<f64>, Vector3<f64>);
 
 #[inline]
-pub(super) fn bounds([a, b, c]: &TrianglePoints) -> Aabb {
+pub(super) fn bounds([a, b, c]: &TrianglePoints) -> Corners {
     (a.coords.inf(&b.coords).inf(&c.coords), a.coords.sup(&b.coords).sup(&c.coords))
 }
 
 #[inline]
-fn apart(a: &Aabb, b: &Aabb, gap: f64) -> bool {
+fn apart(a: &Corners, b: &Corners, gap: f64) -> bool {
     (0..3).any(|i| a.0[i] > b.1[i] + gap || b.0[i] > a.1[i] + gap)
 }
 

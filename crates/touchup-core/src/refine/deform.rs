@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::followed::FollowedPatch;
 use super::guard::{GuardEvidence, GuardParams, GuardVerdict};
-use super::params::TouchedRegion;
+use super::params::ScanRegion;
 use super::roi::{Roi, RoiSize};
 use super::strokes::Strokes;
 use crate::mesh::{FaceHit, FaceId, FaceTree, MeshError, Nearby, RefitPlan, Region, TriMesh, VertexId};
@@ -95,7 +95,7 @@ impl HandleRegion {
 }
 
 impl DeformableMesh {
-    pub fn new(mesh: TriMesh, guard: Option<GuardParams>, touched: Option<&TouchedRegion>) -> Self {
+    pub fn new(mesh: TriMesh, guard: Option<GuardParams>, touched: Option<&ScanRegion>) -> Self {
         let tree = FaceTree::new(&mesh);
         let mut evidence = vec![[0.0; 3]; mesh.face_slots()];
         for (face, _) in mesh.faces() {

@@ -4,7 +4,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::collision::{Aabb, Pairs, bounds};
+use super::collision::{Corners, Pairs, bounds};
 use super::marks::ScratchMap;
 use super::ring::Ring;
 use crate::mesh::{BoxQuery, FaceId, FaceTree, TriMesh, VertexId, triangle};
@@ -146,7 +146,7 @@ pub(super) struct Neighbourhood {
     unseen: f64,
     near: BoxQuery,
     /// the faces nearby with their boxes
-    boxes: Vec<(FaceId, Aabb)>,
+    boxes: Vec<(FaceId, Corners)>,
     /// corners that hang together with the region
     reached: ScratchMap,
 }

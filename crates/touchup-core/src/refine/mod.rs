@@ -24,7 +24,7 @@ use serde::Serialize;
 pub use deform::{Footprint, RegionFit, mean_edge};
 pub use dynamics::{Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, StepRule};
 pub use guard::GuardParams;
-pub use params::{CarveParams, ClosestBy, RefineParams, TipParams, TouchPoint, TouchedRegion, relaxing_alpha};
+pub use params::{CarveParams, ClosestBy, RefineParams, ScanRegion, TipParams, TouchPoint, relaxing_alpha};
 pub use registration::{Registrar, Registration, RegistrationError, RegistrationParams};
 pub use roi::RoiSize;
 pub use sliding::{Ball, SlidingParams, TipMotion};
@@ -97,7 +97,7 @@ pub struct Mismatch {
 
 /// What the force says.
 #[derive(Clone, Copy, Debug)]
-enum Felt {
+enum ContactState {
     /// no contact
     Nothing,
     /// contact; which way the surface faces is not asked \[paper\]
@@ -274,7 +274,7 @@ impl Refiner {
             return Ok(self.pass(felt));
         }
         let update = match felt {
-            Felt::Nothing => Update::FREE,
+            ContactState::Nothing => Update::FREE,
             _ => {
                 self.deformable.touch();
                 self.press(&ball, felt, handle, dt)?
@@ -288,10 +288,10 @@ impl Refiner {
     }
 
     /// A sample outside the region that may be touched moves nothing.
-    fn pass(&mut self, felt: Felt) -> Update {
+    fn pass(&mut self, felt: ContactState) -> Update {
         self.counts.accepted += 1;
         match felt {
-            Felt::Nothing => Update::FREE,
+            ContactState::Nothing => Update::FREE,
             _ => {
                 self.counts.outside_region += 1;
                 Update { case: Case::SurfaceOnly, mismatch: None, fit: None }
@@ -299,25 +299,33 @@ impl Refiner {
         }
     }
 
-    fn felt_normal(&mut self, stamp_ns: i64, ball: &Ball, dt: f64) -> Felt {
+    fn felt_normal(&mut self, stamp_ns: i64, ball: &Ball, dt: f64) -> ContactState {
         if let Some(gate) = &mut self.gate {
             let contact = gate.update(stamp_ns, &ball.force_o).is_some();
             self.counts.contacts = gate.contacts();
             if !contact {
                 self.begun = None;
                 self.motion.lift();
-                return Felt::Nothing;
+                return ContactState::Nothing;
             }
         }
         match (self.params.touch_point, self.params.sliding) {
-            (TouchPoint::FaceNormal, _) => Felt::Something,
-            (TouchPoint::FeltNormal, Some(_)) => Felt::Surface(self.motion.surface_normal(ball, dt)),
-            (TouchPoint::FeltNormal, None) => Felt::Surface(ball.force_o.try_normalize(0.0).unwrap_or_default()),
+            (TouchPoint::FaceNormal, _) => ContactState::Something,
+            (TouchPoint::FeltNormal, Some(_)) => ContactState::Surface(self.motion.surface_normal(ball, dt)),
+            (TouchPoint::FeltNormal, None) => {
+                ContactState::Surface(ball.force_o.try_normalize(0.0).unwrap_or_default())
+            }
         }
     }
 
     /// Cases 3 and 4, and without a gate also 1 and 2: moves the face that the ball touches.
-    fn press(&mut self, ball: &Ball, felt: Felt, handle: Option<FaceId>, dt: f64) -> Result<Update, RefineError> {
+    fn press(
+        &mut self,
+        ball: &Ball,
+        felt: ContactState,
+        handle: Option<FaceId>,
+        dt: f64,
+    ) -> Result<Update, RefineError> {
         let Some(pressing) = self.pressing(ball, felt, handle) else {
             self.counts.out_of_reach += 1;
             return Ok(Update { case: Case::SurfaceOnly, mismatch: None, fit: None });
@@ -346,12 +354,12 @@ impl Refiner {
     }
 
     /// The ball against `handle`, else against the face that it touches; `None` beyond the reach.
-    fn pressing(&mut self, ball: &Ball, felt: Felt, handle: Option<FaceId>) -> Option<Pressing> {
+    fn pressing(&mut self, ball: &Ball, felt: ContactState, handle: Option<FaceId>) -> Option<Pressing> {
         let reach = self.deformable.largest_move + self.params.tip.radius;
         // the spring expects the deflection F/k of the tip, a rigid contact does not
         let centre = if self.params.dynamics.take_out_rigid_offset { ball.centre } else { ball.reported };
         let seek = match felt {
-            Felt::Surface(normal) => self.touching_point(centre, &normal),
+            ContactState::Surface(normal) => self.touching_point(centre, &normal),
             _ => centre,
         };
         let last = self.contact_region.handle();
@@ -364,7 +372,7 @@ impl Refiner {
         let mesh = &self.deformable.mesh;
         let face = FaceState { b: mesh.barycentre(handle), n: mesh.normal(handle) };
         Some(match felt {
-            Felt::Surface(normal) => {
+            ContactState::Surface(normal) => {
                 Pressing { handle, face, normal, point: seek, force_o: normal * ball.force_o.dot(&normal) }
             }
             _ => {

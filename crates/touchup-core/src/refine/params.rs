@@ -61,7 +61,7 @@ impl Default for CarveParams {
 
 /// The part of a scan that a refiner has, and where in it may be touched.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TouchedRegion {
+pub struct ScanRegion {
     /// a contact whose ball is centred elsewhere moves nothing
     pub region: Region,
     /// vertices farther from the region than this stay, m
@@ -112,7 +112,7 @@ pub struct RefineParams {
     /// Standard deviation of the scan's vertices, m. Default 0.6 mm.
     pub scan_noise: f64,
     /// `None`: the mesh is all there is, and may be touched anywhere.
-    pub region: Option<TouchedRegion>,
+    pub region: Option<ScanRegion>,
 }
 
 /// Relaxation of a touched face in [`RefineParams::robust`], 1/s: within 40 ms, twenty poses at 500 Hz, so that their

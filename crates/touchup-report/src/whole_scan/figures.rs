@@ -1,6 +1,6 @@
 //! Figures and tables of whole scans.
 
-use super::{CaseResult, ScanResult, TouchedError, Way, WayResult, WholeScan};
+use super::{CaseResult, RefineMethod, ScanResult, TouchedError, WayResult, WholeScan};
 use crate::{Axis, Drawing, Figure, LineStroke, Mark, Series, Spread, Table, TableCell};
 
 /// Points of a drawn law.
@@ -95,14 +95,14 @@ impl WholeScan {
         let mark = |result: &WayResult| Some(Mark { x: result.per_sample_us, y: result.error?.mean_mm().into() });
         let mut series = Vec::new();
         if let Some(scan) = case.main() {
-            let robust = scan.ways.iter().filter(|result| matches!(result.way, Way::Robust(_)));
+            let robust = scan.ways.iter().filter(|result| matches!(result.way, RefineMethod::Robust(_)));
             series.push(Series {
                 name: "robust: handle, one ring, 0.5, 1, 2 tip radii".to_owned(),
                 stroke: LineStroke::Joined,
                 marks: robust.filter_map(mark).collect(),
             });
         }
-        for way in Way::BY_DENSITY.into_iter().filter(|_| case.scans.len() > 1) {
+        for way in RefineMethod::BY_DENSITY.into_iter().filter(|_| case.scans.len() > 1) {
             let scans = by_edge(case);
             let edges: Vec<String> = scans.iter().map(|scan| format!("{:.1}", scan.edge_mm)).collect();
             series.push(Series {
@@ -128,7 +128,7 @@ impl WholeScan {
             stroke,
             marks: by_edge(case).into_iter().filter_map(|scan| Some(mark(scan, &of(scan)?))).collect(),
         };
-        let mut all: Vec<Series> = Way::BY_DENSITY
+        let mut all: Vec<Series> = RefineMethod::BY_DENSITY
             .into_iter()
             .map(|way| series(way.name(), LineStroke::Joined, &|scan| scan.of(way)?.error))
             .collect();
@@ -163,7 +163,7 @@ impl WholeScan {
                 marks: (0..=STEPS).map(step).map(|n| Mark { x: n.into(), y: at(n).into() }).collect(),
             },
         ];
-        for way in [Way::HAPTIC, Way::Patch] {
+        for way in [RefineMethod::HAPTIC, RefineMethod::Patch] {
             let Some(result) = case.main().and_then(|scan| scan.of(way)) else { continue };
             let time = result.per_sample_us.median;
             let ends = [cost.marks.first().map_or(1.0, |mark| mark.0), contacts];

@@ -8,9 +8,9 @@ mod contact_points;
 mod error;
 mod figures;
 mod gaussian;
+mod method;
 mod part;
 mod tell;
-mod way;
 
 use std::time::Duration;
 
@@ -19,10 +19,10 @@ use serde::Serialize;
 pub use contact_points::ContactSculptor;
 pub use error::TouchedError;
 pub use gaussian::{GaussianParams, GaussianProcess, GaussianSurface};
+pub use method::{Reach, RefineMethod};
+use method::{Run, RunLimits, run};
 pub use part::Given;
 use part::{Part, parts};
-pub use way::{Reach, Way};
-use way::{Run, RunLimits, run};
 
 use super::convergence::straight_line;
 use super::{Effort, Spread};
@@ -64,7 +64,7 @@ pub enum WholeScanError {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct WayResult {
     /// which
-    pub way: Way,
+    pub way: RefineMethod,
     /// as the report calls it
     pub name: String,
     /// against the part; `None` where the result has nothing near what was touched
@@ -162,7 +162,7 @@ impl WayResult {
 
 impl ScanResult {
     /// How one way did.
-    pub fn of(&self, way: Way) -> Option<&WayResult> {
+    pub fn of(&self, way: RefineMethod) -> Option<&WayResult> {
         self.ways.iter().find(|result| result.way == way)
     }
 
@@ -177,7 +177,7 @@ impl ScanResult {
 
     /// The region of the haptic update alone with the least mean error.
     pub fn best_haptic(&self) -> Option<&WayResult> {
-        Self::least(self.ways.iter().filter(|result| matches!(result.way, Way::Robust(_))))
+        Self::least(self.ways.iter().filter(|result| matches!(result.way, RefineMethod::Robust(_))))
     }
 
     /// The ways that no other beats in both mean error and time per sample, the fastest first.
@@ -205,7 +205,7 @@ impl CaseResult {
 struct Trial<'a> {
     part: &'a Part,
     scan: &'a TriMesh,
-    way: Way,
+    way: RefineMethod,
     totals_s: Vec<f64>,
     per_sample_us: Vec<f64>,
     ends_ms: Vec<f64>,
@@ -219,7 +219,7 @@ struct First {
 }
 
 impl<'a> Trial<'a> {
-    fn new(part: &'a Part, scan: &'a TriMesh, way: Way) -> Self {
+    fn new(part: &'a Part, scan: &'a TriMesh, way: RefineMethod) -> Self {
         let (totals_s, per_sample_us, ends_ms) = (Vec::new(), Vec::new(), Vec::new());
         Self { part, scan, way, totals_s, per_sample_us, ends_ms, first: None }
     }
@@ -244,11 +244,11 @@ impl<'a> Trial<'a> {
     fn result(&self, before: &TouchedError) -> Option<WayResult> {
         let First { error, run } = self.first.as_ref()?;
         let mut remarks = Vec::new();
-        let is_stopped = run.refused + run.given < run.offered && self.way != Way::GaussianProcess;
+        let is_stopped = run.refused + run.given < run.offered && self.way != RefineMethod::GaussianProcess;
         if is_stopped {
             remarks.push(format!("stopped for its time after {} of {} samples", run.given, run.offered));
         }
-        if self.way == Way::GaussianProcess && run.given < run.offered {
+        if self.way == RefineMethod::GaussianProcess && run.given < run.offered {
             remarks.push(format!("given {} of {} contacts", run.given, run.offered));
         }
         if let Some(why) = &run.why {
@@ -294,7 +294,7 @@ pub fn whole_scan(
     let mut trials: Vec<Trial> = Vec::new();
     for part in &parts {
         for (number, scan) in part.scans.iter().enumerate() {
-            let ways: &[Way] = if number == 0 { &Way::ALL } else { &Way::BY_DENSITY };
+            let ways: &[RefineMethod] = if number == 0 { &RefineMethod::ALL } else { &RefineMethod::BY_DENSITY };
             trials.extend(ways.iter().map(|&way| Trial::new(part, scan, way)));
         }
     }
@@ -317,7 +317,8 @@ fn case(part: &Part, trials: &[Trial]) -> Result<CaseResult, WholeScanError> {
         let ways = own.filter_map(|trial| trial.result(&before)).collect();
         scans.push(ScanResult { edge_mm: mean_edge(scan) * 1e3, faces: scan.face_count(), before, ways });
     }
-    let gaussian = trials.iter().find(|trial| std::ptr::eq(trial.part, part) && trial.way == Way::GaussianProcess);
+    let gaussian =
+        trials.iter().find(|trial| std::ptr::eq(trial.part, part) && trial.way == RefineMethod::GaussianProcess);
     let each = gaussian.and_then(|trial| trial.first.as_ref()).map_or(&[][..], |first| &first.run.each);
     let span_ns = match (part.samples.first(), part.samples.last()) {
         (Some(first), Some(last)) => last.stamp_ns.saturating_sub(first.stamp_ns),

@@ -1,6 +1,6 @@
 //! What whole scans say, in words.
 
-use super::{CaseResult, GaussianCost, Reach, ScanResult, Way, WayResult, WholeScan};
+use super::{CaseResult, GaussianCost, Reach, RefineMethod, ScanResult, WayResult, WholeScan};
 use crate::Chapter;
 
 /// A difference below this share is none.
@@ -75,14 +75,14 @@ impl CaseResult {
         if let Some(haptic) = scan.best_haptic() {
             text += &format!(" Of the regions of the haptic update alone the best is {}.", told(haptic));
             text += &same_regions(scan);
-            text += &against_contact_points(haptic, scan.of(Way::ContactPoints));
+            text += &against_contact_points(haptic, scan.of(RefineMethod::ContactPoints));
         }
         text
     }
 
     /// What finer and coarser scans change.
     fn densities(&self) -> Option<String> {
-        let tell = |way: Way| {
+        let tell = |way: RefineMethod| {
             let mut of_scans: Vec<(f64, &WayResult)> =
                 self.scans.iter().filter_map(|scan| Some((scan.edge_mm, scan.of(way)?))).collect();
             of_scans.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -96,7 +96,7 @@ impl CaseResult {
             };
             format!("{}: {}", way.name(), of_scans.iter().map(each).collect::<Vec<_>>().join(", "))
         };
-        let all = Way::BY_DENSITY.map(tell).join("; ");
+        let all = RefineMethod::BY_DENSITY.map(tell).join("; ");
         (self.scans.len() > 1).then(|| format!("{} over the edge length of the scan. {all}.", self.name))
     }
 
@@ -153,7 +153,7 @@ fn against_contact_points(haptic: &WayResult, points: Option<&WayResult>) -> Str
 
 /// Regions so small that they have nothing but the handle.
 fn same_regions(scan: &ScanResult) -> String {
-    let Some(handle) = scan.of(Way::Robust(Reach::Handle)) else { return String::new() };
+    let Some(handle) = scan.of(RefineMethod::Robust(Reach::Handle)) else { return String::new() };
     let is_same = |result: &&WayResult| result.way != handle.way && result.error == handle.error;
     let same: Vec<&str> = scan.ways.iter().filter(is_same).map(|result| result.name.as_str()).collect();
     if same.is_empty() {

@@ -86,7 +86,7 @@ pub struct IntegratorRun {
 impl WorkPrecision {
     /// Measures all of it.
     pub fn measure(effort: Effort, progress: &mut dyn FnMut(&str)) -> Self {
-        let clock = Timing { repeats: effort.choose(9, 31), batch_s: effort.choose(1e-4, 5e-4) };
+        let clock = TimingParams { repeats: effort.choose(9, 31), batch_s: effort.choose(1e-4, 5e-4) };
         let h_mins = effort.choose(&H_MINS_QUICK_M[..], &H_MINS_M[..]);
         let mut measured = Self { cases: Vec::new(), repeats: clock.repeats, without_reference: Vec::new() };
         for (h_min_m, tilt_deg) in h_mins.iter().flat_map(|h_min| TILTS_DEG.map(|tilt| (*h_min, tilt))) {
@@ -102,7 +102,7 @@ impl WorkPrecision {
 }
 
 /// `None` where there is nothing to compare with.
-fn case(h_min_m: f64, tilt_deg: f64, effort: Effort, clock: &Timing) -> Option<FaceCase> {
+fn case(h_min_m: f64, tilt_deg: f64, effort: Effort, clock: &TimingParams) -> Option<FaceCase> {
     let problem = Problem::of(h_min_m, tilt_deg.to_radians());
     let right = reference(&problem)?;
     let way_m = right.b.coords.norm();
@@ -129,13 +129,13 @@ fn case(h_min_m: f64, tilt_deg: f64, effort: Effort, clock: &Timing) -> Option<F
 }
 
 /// How times are taken.
-struct Timing {
+struct TimingParams {
     repeats: usize,
     /// a single reading spans so many seconds, or one solve
     batch_s: f64,
 }
 
-impl Timing {
+impl TimingParams {
     /// Seconds for one call.
     fn time<T>(&self, mut solve: impl FnMut() -> T) -> Spread {
         let mut seconds = |calls: usize| {

@@ -7,3 +7,8 @@ mod page;
 mod stability;
 mod whole_scan;
 mod work_precision;
+
+use touchup_report::allocations::CountingAllocator;
+
+#[global_allocator]
+static ALLOCATOR: CountingAllocator = CountingAllocator;

@@ -7,8 +7,8 @@ use touchup_core::mesh::{FaceTree, TriMesh, VertexId};
 use touchup_core::refine::TipParams;
 use touchup_core::touch::{CompensatorParams, Sample, Wrench};
 use touchup_report::{
-    ContactSculptor, Drawing, Effort, GaussianParams, GaussianProcess, GaussianSurface, Given, Rule, TableCell,
-    TouchedError, Way, WholeScanError, convergence, fit_decay, straight_line, whole_scan,
+    ContactSculptor, Drawing, Effort, GaussianParams, GaussianProcess, GaussianSurface, Given, RefineMethod, Rule,
+    TableCell, TouchedError, WholeScanError, convergence, fit_decay, straight_line, whole_scan,
 };
 
 /// A square sheet of `cells` × `cells` squares of 1 mm at height `z` (m), looking up.
@@ -221,10 +221,10 @@ fn whole_scans_are_measured_and_told() {
     println!("{:7.2} done", begun.elapsed().as_secs_f64());
     let names: Vec<_> = found.cases.iter().map(|case| case.name.as_str()).collect();
     assert_eq!(names, ["peaks", "plate", "a sheet"]);
-    assert!(lines > 3 * Way::ALL.len());
+    assert!(lines > 3 * RefineMethod::ALL.len());
     for case in &found.cases {
         let scan = case.main().unwrap();
-        assert_eq!(scan.ways.iter().map(|result| result.way).collect::<Vec<_>>(), Way::ALL);
+        assert_eq!(scan.ways.iter().map(|result| result.way).collect::<Vec<_>>(), RefineMethod::ALL);
         for result in scan.ways.iter().filter(|result| !result.is_sound()) {
             assert!(!result.remarks.is_empty(), "{}: {} says why", case.name, result.name);
         }
@@ -248,8 +248,8 @@ fn whole_scans_are_measured_and_told() {
     let sheet = found.cases[2].main().unwrap();
     assert!((sheet.before.mean_mm() - 0.4).abs() < 1e-9, "{:?}", sheet.before);
     // each contact point pulls down what lies behind it too, where the ball does not come again
-    assert!(sheet.of(Way::ContactPoints).unwrap().mean_mm() < 0.4);
-    for way in [Way::HAPTIC, Way::Patch, Way::GaussianProcess] {
+    assert!(sheet.of(RefineMethod::ContactPoints).unwrap().mean_mm() < 0.4);
+    for way in [RefineMethod::HAPTIC, RefineMethod::Patch, RefineMethod::GaussianProcess] {
         assert!(sheet.of(way).unwrap().mean_mm() < 0.1, "{way:?}: an even offset is no difficulty");
     }
     let chapter = found.chapter();

@@ -16,7 +16,7 @@ use std::sync::mpsc::{Receiver, sync_channel};
 
 pub use gate::{Gate, GateKeeper};
 pub use latency::{Latencies, Quantiles};
-pub use probed::ProbedNews;
+pub use probed::TouchDelta;
 use touchup_core::mesh::{Changes, FaceTree, TriMesh};
 use touchup_core::patch::{PatchDelta, Patcher};
 use touchup_core::refine::{RefineError, Refiner, Update};
@@ -101,7 +101,7 @@ pub struct LiveRefiner {
     /// whether the change that is due is known to be late
     is_late: bool,
     /// touches that nobody asked for yet
-    probed: ProbedNews,
+    probed: TouchDelta,
     counts: LiveCounts,
 }
 
@@ -147,7 +147,7 @@ impl LiveRefiner {
             delta: PatchDelta::default(),
             is_done: true,
             is_late: false,
-            probed: ProbedNews::default(),
+            probed: TouchDelta::default(),
             counts: LiveCounts::default(),
         })
     }
@@ -294,7 +294,7 @@ impl LiveRefiner {
     }
 
     /// Touches that the patch has found, or lost, since this was last asked.
-    pub fn take_probed(&mut self) -> Option<ProbedNews> {
+    pub fn take_probed(&mut self) -> Option<TouchDelta> {
         (!self.probed.is_empty()).then(|| std::mem::take(&mut self.probed))
     }
 

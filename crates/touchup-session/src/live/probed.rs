@@ -4,21 +4,21 @@ use touchup_core::touch::ProbedPoint;
 
 /// Touches that came or went: of the list that somebody keeps the first `kept` stay, then come `new`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ProbedNews {
+pub struct TouchDelta {
     /// so many of the touches before stay
     pub kept: usize,
     /// … and these come after them
     pub new: Vec<ProbedPoint>,
 }
 
-impl Default for ProbedNews {
+impl Default for TouchDelta {
     /// All stay and none comes.
     fn default() -> Self {
         Self { kept: usize::MAX, new: Vec::new() }
     }
 }
 
-impl ProbedNews {
+impl TouchDelta {
     /// Whether nothing came or went.
     pub fn is_empty(&self) -> bool {
         self.kept == usize::MAX && self.new.is_empty()
@@ -59,15 +59,15 @@ pub(super) struct PublishedList {
 
 impl PublishedList {
     /// What is to be told of the list as it is now: what was added, or the whole list where it is another one.
-    pub fn news(&mut self, touches: &[ProbedPoint]) -> ProbedNews {
+    pub fn news(&mut self, touches: &[ProbedPoint]) -> TouchDelta {
         let name = |touch: &ProbedPoint| (touch.stamp_ns, touch.stroke);
         let is_longer = self.count.checked_sub(1).and_then(|last| touches.get(last)).map(name) == self.last;
         let kept = if is_longer { self.count } else { 0 };
         self.count = touches.len();
         self.last = touches.last().map(name);
         if kept == touches.len() && is_longer {
-            return ProbedNews::default();
+            return TouchDelta::default();
         }
-        ProbedNews { kept, new: touches[kept..].to_vec() }
+        TouchDelta { kept, new: touches[kept..].to_vec() }
     }
 }

@@ -6,7 +6,7 @@ use std::thread::{Builder, JoinHandle};
 
 use super::LiveError;
 use super::gate::Gate;
-use super::probed::{ProbedNews, PublishedList};
+use super::probed::{PublishedList, TouchDelta};
 use crate::clock::Working;
 use touchup_core::mesh::{FaceTree, TriMesh};
 use touchup_core::patch::{PatchDelta, Patcher};
@@ -28,7 +28,7 @@ pub(super) enum Question {
 /// What the thread found.
 pub(super) struct WorkerAnswer {
     pub delta: PatchDelta,
-    pub probed: ProbedNews,
+    pub probed: TouchDelta,
     /// whether there was a stroke to take back, or to do again
     pub has_changed_strokes: bool,
     /// to be filled again

@@ -3,7 +3,7 @@
 use super::{Scene, SceneError};
 use touchup_core::mesh::{Outside, Region, TriMesh};
 use touchup_core::patch::{PatchRegion, PatcherParams};
-use touchup_core::refine::{RefineParams, RoiSize, TouchedRegion, mean_edge};
+use touchup_core::refine::{RefineParams, RoiSize, ScanRegion, mean_edge};
 use touchup_core::touch::WrenchFrame;
 
 /// A touch changes the patch within so many sizes of the tip: the fit of the touches reaches two, free space another one …
@@ -27,7 +27,7 @@ pub struct CutScan {
 pub struct RegionCut {
     /// the rest of the scan; `None` where the scene names no region
     pub outside: Option<Outside>,
-    haptic: Option<TouchedRegion>,
+    haptic: Option<ScanRegion>,
     patch: Option<PatchRegion>,
 }
 
@@ -53,7 +53,7 @@ impl Scene {
         if mesh.face_count() == 0 {
             return Err(SceneError::EmptyRegion);
         }
-        let haptic = Some(TouchedRegion { region, margin, mean_edge });
+        let haptic = Some(ScanRegion { region, margin, mean_edge });
         Ok(CutScan {
             mesh,
             cut: RegionCut { outside: Some(outside), haptic, patch: Some(PatchRegion { region, faces }) },

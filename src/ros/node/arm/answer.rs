@@ -10,7 +10,7 @@ use crate::ros::messages::{
 };
 use crate::ros::node::convert::{NO_VECTOR, point, time, vector};
 use crate::ros::node::feature_messages::{flagged, found, number_of};
-use crate::ros::node::seeker::ProbeTarget;
+use crate::ros::node::feature_worker::ProbeTarget;
 
 /// Why nothing is probed where all that is flagged was asked for.
 pub const NOTHING_FLAGGED: &str = "nothing is flagged that was not probed already";

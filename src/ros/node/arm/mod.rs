@@ -21,8 +21,8 @@ use self::pace::Paced;
 use self::request::Wanted;
 use self::world::{ArmWorld, ask_mesh};
 use super::convert::header;
-use super::placing::CELL;
-use super::seeker::{ArmMeasurement, ProbeTarget, SeekerInput};
+use super::feature_worker::{ArmMeasurement, FeatureInput, ProbeTarget};
+use super::frame_resolver::CELL;
 use super::shared::Shared;
 use super::view::ViewInput;
 use super::{NodeError, Setup};
@@ -163,13 +163,13 @@ impl ArmHandle {
 }
 
 /// What the thread works with.
-struct Hands {
+struct ArmWorker {
     setup: Arc<Setup>,
     shared: Arc<Shared>,
     port: Arc<dyn Port>,
     samples: Box<dyn SamplePort>,
     view: SyncSender<ViewInput>,
-    seeker: SyncSender<SeekerInput>,
+    seeker: SyncSender<FeatureInput>,
     cell: Cell,
     params: ProbeParams,
     inputs: Receiver<ArmOrder>,
@@ -194,7 +194,7 @@ pub(super) fn start(
     port: &Arc<dyn Port>,
     arm: ArmOfNode,
     view: SyncSender<ViewInput>,
-    seeker: SyncSender<SeekerInput>,
+    seeker: SyncSender<FeatureInput>,
 ) -> Result<(ArmHandle, JoinHandle<()>), NodeError> {
     let (cell, params) = setup.scene.probing().ok_or(NodeError::NoRobot)?;
     let (to, inputs) = sync_channel(QUEUE);
@@ -202,7 +202,7 @@ pub(super) fn start(
     common.allow_motion(setup.shared.parameters().bool("allow_motion"));
     let handle = ArmHandle { inputs: to, common: Arc::clone(&common), cell: cell.clone() };
     let ArmOfNode { kind, samples } = arm;
-    let mut hands = Hands {
+    let mut hands = ArmWorker {
         setup: Arc::clone(setup),
         shared: Arc::clone(&setup.shared),
         port: Arc::clone(port),
@@ -228,7 +228,7 @@ pub(super) fn start(
     Ok((handle, thread))
 }
 
-impl Hands {
+impl ArmWorker {
     fn run_simulated(&mut self, part: &TriMesh) {
         let surface = match MeshSurface::new(part) {
             Ok(surface) => surface,
@@ -414,7 +414,7 @@ impl Hands {
     /// What is flagged, in the order that was asked for, or nearest first.
     fn targets(&mut self, ids: &[u32], arm: &mut dyn Arm) -> Result<Vec<ProbeTarget>, Box<ProbeResult>> {
         let (to, told) = sync_channel(1);
-        let asked = self.seeker.try_send(SeekerInput::Targets(ids.to_vec(), to));
+        let asked = self.seeker.try_send(FeatureInput::Targets(ids.to_vec(), to));
         let answer = asked.ok().and_then(|()| self.wait(arm, &told));
         let first = ids.first().copied().unwrap_or(0);
         let mut told = answer.ok_or_else(|| Box::new(not_probed(first, ProbeResult::ARM_NOT_READY, NOT_TOLD)))?;
@@ -497,7 +497,7 @@ impl Hands {
             let is_done = matches!(probed.ending, Ending::ToleranceReached);
             let session = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
             let measured = ArmMeasurement { session, id: target.id, feature, is_done };
-            if self.seeker.try_send(SeekerInput::Measured(Box::new(measured))).is_err() {
+            if self.seeker.try_send(FeatureInput::Measured(Box::new(measured))).is_err() {
                 warn!(feature = target.id, "what was measured is in the answer, and not among the features");
             }
         }

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use nalgebra::{Isometry3, Point3};
 
-use super::Hands;
+use super::ArmWorker;
 use super::common::Common;
 use crate::clock::Clock;
 use crate::mesh::{FaceHit, TriMesh};
@@ -87,7 +87,7 @@ pub struct ArmWorld<'a> {
 
 impl<'a> ArmWorld<'a> {
     pub fn new(
-        hands: &'a Hands,
+        hands: &'a ArmWorker,
         still: StillWorld,
         watched: Option<(&'a Feedback, &'a Arc<AtomicBool>)>,
         [number, count]: [usize; 2],

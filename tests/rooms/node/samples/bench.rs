@@ -12,7 +12,7 @@ use touchup::clock::{Clock, ManualClock};
 use touchup::io::mesh_file::{MeshUnit, write_mesh};
 use touchup::io::recording::{Topics, write_recording};
 use touchup::mesh::TriMesh;
-use touchup::ros::in_process::{World, start};
+use touchup::ros::in_process::{OtherParticipants, start};
 use touchup::ros::messages::{
     Header, MeshPatch, Point, Pose, PoseStamped, Quaternion, SetBoolRequest, Time, Transform, TransformStamped,
     Vector3, Wrench, WrenchStamped,
@@ -129,7 +129,7 @@ const NEVER: Duration = Duration::from_secs(60);
 /// A node that runs, and the world around it. Its time stands still but for [`Self::pass`], and while somebody waits here.
 pub struct Bench {
     pub node: Node,
-    pub world: World,
+    pub world: OtherParticipants,
     clock: Clock,
     hand: ManualClock,
     published: Vec<Publication>,

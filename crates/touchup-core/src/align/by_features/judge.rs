@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::matching::Matching;
-use super::{Alternative, SAME, SurfacePoint, Surfaces};
+use super::{Alternative, OrientedSample, SAME, Surfaces};
 use crate::align::icp::{IcpFit, IcpParams, icp};
 use crate::mesh::Alone;
 
@@ -85,14 +85,14 @@ pub(super) struct Judge<'a> {
     pub matching: Matching,
     surfaces: Option<&'a Surfaces<'a>>,
     /// in the mirror where that is asked for
-    points: Vec<SurfacePoint>,
+    points: Vec<OrientedSample>,
 }
 
 impl<'a> Judge<'a> {
     pub fn new(matching: Matching, surfaces: Option<&'a Surfaces<'a>>, in_mirror: bool) -> Self {
         let points = surfaces.map_or(&[][..], |surfaces| surfaces.points);
         let flip = |v: Vector3<f64>| if in_mirror { Vector3::new(-v.x, v.y, v.z) } else { v };
-        let point = |p: &SurfacePoint| SurfacePoint { point: flip(p.point.coords).into(), normal: flip(p.normal) };
+        let point = |p: &OrientedSample| OrientedSample { point: flip(p.point.coords).into(), normal: flip(p.normal) };
         let points = points.iter().map(point).collect();
         Self { matching, surfaces, points }
     }
@@ -125,7 +125,7 @@ impl<'a> Judge<'a> {
 
     fn judged(&self, motion: Isometry3<f64>, fit: Option<IcpFit>) -> Judged {
         let coarse = COARSE * self.matching.tolerance;
-        let distance = |p: &SurfacePoint| {
+        let distance = |p: &OrientedSample| {
             let Surfaces { target, tree, .. } = self.surfaces?;
             let hit = tree.closest(target, &(motion * p.point), coarse)?;
             let faces = target.normal(hit.face).dot(&(motion * p.normal)) > FACING;

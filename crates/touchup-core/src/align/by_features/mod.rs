@@ -45,7 +45,7 @@ impl Default for FeaturesParams {
 
 /// A point of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SurfacePoint {
+pub struct OrientedSample {
     /// m
     pub point: Point3<f64>,
     /// outward unit normal
@@ -56,7 +56,7 @@ pub struct SurfacePoint {
 #[derive(Clone, Copy, Debug)]
 pub struct Surfaces<'a> {
     /// spread evenly over the source; 20 000 do
-    pub points: &'a [SurfacePoint],
+    pub points: &'a [OrientedSample],
     /// what they are brought onto
     pub target: &'a TriMesh,
     /// over its faces

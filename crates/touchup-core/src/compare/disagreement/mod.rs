@@ -10,15 +10,15 @@
 
 mod bad_touches;
 mod cells;
-mod misplaced;
 mod regions;
+mod rigid_offset;
 mod scanner;
 
 use nalgebra::Point3;
 
 pub use self::bad_touches::BadTouches;
-pub use self::misplaced::Misplaced;
 pub use self::regions::{DisagreementRegion, RegionEvidence};
+pub use self::rigid_offset::Misplaced;
 pub use self::scanner::Scanner;
 use super::deviation::{closest_places, signed};
 use super::{CompareError, IndexedMesh};
@@ -145,7 +145,7 @@ pub fn disagreement(
     let off = places.off.clone();
     let mut scanner = Scanner::of(scan.mesh, &places);
     let mut misplaced = None;
-    if let Some(fit) = misplaced::OffsetFit::of(&places) {
+    if let Some(fit) = rigid_offset::OffsetFit::of(&places) {
         places.take_off(&fit);
         let placed = Scanner::of(scan.mesh, &places);
         misplaced = placed.as_ref().and_then(|placed| fit.told(placed));
@@ -216,7 +216,7 @@ impl Places {
         Ok(Self { positions: mesh.positions().to_vec(), off, is_seen, is_wide, is_open, may_be, normals, areas })
     }
 
-    fn take_off(&mut self, misplaced: &misplaced::OffsetFit) {
+    fn take_off(&mut self, misplaced: &rigid_offset::OffsetFit) {
         let both = self.positions.iter().zip(&self.normals);
         self.off.iter_mut().zip(both).for_each(|(off, (p, normal))| *off -= misplaced.at(p, normal));
     }

@@ -6,7 +6,7 @@ use chrono::{DateTime, Utc};
 use serde::Serialize;
 
 use super::engine::Engine;
-use super::haptic::Tally;
+use super::refinement::Counters;
 use super::{NodeError, Setup};
 use crate::io::session_folder::SessionFolder;
 use crate::live::Quantiles;
@@ -17,7 +17,7 @@ use crate::session::{Outcome, OutcomePlaces, SessionRecord, SessionRecorder, Unr
 use crate::touch::WrenchFrame;
 
 /// What belongs to a session and goes with it.
-pub struct Sitting {
+pub struct NodeSession {
     /// where all of it is kept
     pub folder: SessionFolder,
     /// takes down what is accepted
@@ -71,7 +71,7 @@ pub struct SessionReport {
     pub result: Option<Outcome>,
 }
 
-impl Sitting {
+impl NodeSession {
     /// Begins a session in a new folder.
     ///
     /// # Errors
@@ -122,7 +122,7 @@ impl Sitting {
     }
 
     /// What is known of it so far.
-    pub fn report(&self, setup: &Setup, port: &dyn Port, tally: &Tally) -> SessionReport {
+    pub fn report(&self, setup: &Setup, port: &dyn Port, tally: &Counters) -> SessionReport {
         let counts = self.engine.refiner().counts();
         let nothing = Quantiles { median: 0, p99: 0, p999: 0, max: 0 };
         SessionReport {

@@ -32,7 +32,7 @@ pub enum Reach {
 /// A way to refine a scan by touch.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Way {
+pub enum RefineMethod {
     /// the published rule, integrated by Dormand–Prince 5(4), the pair of ode45
     PaperOde45,
     /// the published rule in exact steps
@@ -47,7 +47,7 @@ pub enum Way {
     GaussianProcess,
 }
 
-impl Way {
+impl RefineMethod {
     /// The region that the robust mode has by default.
     pub const HAPTIC: Self = Self::Robust(Reach::TipRadii(1.0));
 
@@ -116,24 +116,24 @@ pub(super) struct Run {
 }
 
 /// Refines `scan` in one way.
-pub(super) fn run(way: Way, part: &Part, scan: &TriMesh, bounds: &RunLimits) -> Result<Run, WholeScanError> {
+pub(super) fn run(way: RefineMethod, part: &Part, scan: &TriMesh, bounds: &RunLimits) -> Result<Run, WholeScanError> {
     match way {
-        Way::ContactPoints => Ok(sculpt(part, scan, bounds)),
-        Way::GaussianProcess => Ok(fit_gaussian(part, scan, bounds)),
+        RefineMethod::ContactPoints => Ok(sculpt(part, scan, bounds)),
+        RefineMethod::GaussianProcess => Ok(fit_gaussian(part, scan, bounds)),
         _ => refine(way, part, scan, bounds),
     }
 }
 
-fn params(way: Way, part: &Part) -> RefineParams {
+fn params(way: RefineMethod, part: &Part) -> RefineParams {
     let mut params = match way {
-        Way::PaperOde45 | Way::PaperLie => RefineParams::paper(part.tip),
+        RefineMethod::PaperOde45 | RefineMethod::PaperLie => RefineParams::paper(part.tip),
         _ => RefineParams::robust(part.tip),
     };
     match way {
-        Way::PaperOde45 => params.dynamics.rule = StepRule::DormandPrince,
-        Way::Robust(Reach::Handle) => params.roi = RoiSize::Handle,
-        Way::Robust(Reach::OneRing) => params.roi = RoiSize::OneRing,
-        Way::Robust(Reach::TipRadii(radii)) => params.roi = RoiSize::Radius(radii * part.tip.radius),
+        RefineMethod::PaperOde45 => params.dynamics.rule = StepRule::DormandPrince,
+        RefineMethod::Robust(Reach::Handle) => params.roi = RoiSize::Handle,
+        RefineMethod::Robust(Reach::OneRing) => params.roi = RoiSize::OneRing,
+        RefineMethod::Robust(Reach::TipRadii(radii)) => params.roi = RoiSize::Radius(radii * part.tip.radius),
         _ => {}
     }
     (params.compensator, params.scan_noise) = (part.compensator, part.scan_noise);
@@ -147,11 +147,11 @@ fn patcher(part: &Part) -> Result<Patcher, WholeScanError> {
 }
 
 /// The haptic update, with the patch where the way has one.
-fn refine(way: Way, part: &Part, scan: &TriMesh, bounds: &RunLimits) -> Result<Run, WholeScanError> {
+fn refine(way: RefineMethod, part: &Part, scan: &TriMesh, bounds: &RunLimits) -> Result<Run, WholeScanError> {
     let copy = scan.clone();
     let begun = Instant::now();
     let mut refiner = Refiner::new(copy, params(way, part))?;
-    let mut patcher = if way == Way::Patch { Some(patcher(part)?) } else { None };
+    let mut patcher = if way == RefineMethod::Patch { Some(patcher(part)?) } else { None };
     let built = Instant::now();
     let (mut given, mut refused, mut why) = (0, 0, None);
     for sample in &part.samples {

@@ -7,7 +7,7 @@
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
-use super::contact_store::ContactStore;
+use super::contact_map::ContactMap;
 use super::touches::SurfaceContact;
 
 /// The ball lies on a surface when its centre is its radius away to within this share of it: four times the noise of a usual
@@ -73,7 +73,7 @@ impl TouchedWall {
 /// The two contacts of a ball of `radius` (m) with its centre at `centre` (m, in O) for which the one felt along `normal`
 /// stands; `None` when it touches one surface, or the two are not known.
 pub(super) fn two_points(
-    contacts: &ContactStore,
+    contacts: &ContactMap,
     radius: f64,
     centre: &Point3<f64>,
     normal: &Vector3<f64>,
@@ -96,7 +96,7 @@ fn is_wide([a, b]: [f64; 2], radius: f64) -> bool {
 
 /// The contact as what it is: one, or two with half of its weight each.
 pub(super) fn split(
-    contacts: &ContactStore,
+    contacts: &ContactMap,
     radius: f64,
     centre: &Point3<f64>,
     contact: &SurfaceContact,
@@ -111,7 +111,7 @@ pub(super) fn split(
 }
 
 /// Whether a mean was kept as one contact before it was known to be two.
-pub(super) fn is_mixed(contacts: &ContactStore, radius: f64, at: u32) -> bool {
+pub(super) fn is_mixed(contacts: &ContactMap, radius: f64, at: u32) -> bool {
     let mean = &contacts.means()[at as usize];
     two_points(contacts, radius, &(mean.point + mean.normal * radius), &mean.normal).is_some()
 }
@@ -120,7 +120,7 @@ pub(super) fn is_mixed(contacts: &ContactStore, radius: f64, at: u32) -> bool {
 ///
 /// - `point`: where it seems to touch, m: what is farther from there than two radii is not asked.
 fn walls(
-    contacts: &ContactStore,
+    contacts: &ContactMap,
     radius: f64,
     centre: &Point3<f64>,
     point: &Point3<f64>,
@@ -184,8 +184,8 @@ mod tests {
     }
 
     /// Contacts each 0.4 mm on the floor z = 0 and on the wall x = 0, as far as a ball in the corner reaches.
-    fn corner(open: bool) -> ContactStore {
-        let mut store = ContactStore::new(0.5e-3, 3e-3, None);
+    fn corner(open: bool) -> ContactMap {
+        let mut store = ContactMap::new(0.5e-3, 3e-3, None);
         for i in 0..8 {
             for j in -5..=5 {
                 let (a, y) = (RADIUS + f64::from(i) * 0.4e-3, f64::from(j) * 0.4e-3);

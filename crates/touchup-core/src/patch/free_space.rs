@@ -2,10 +2,10 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::contact_store::{around, cell_of};
+use super::contact_map::{around, cell_of};
 use super::lattice::{CellBox, LatticeNode};
 use super::table::Key;
-use super::thinned::Thinned;
+use super::voxel_set::VoxelSet;
 use crate::touch::{TipBody, TipPlace};
 
 /// Cosine of the widest angle between a way and what counts as straight ahead: 45°.
@@ -21,7 +21,7 @@ const AROUND: f64 = 2.0 / 3.0;
 pub struct SweptSpace {
     cell: f64,
     reach: f64,
-    centres: Thinned<LatticeNode, Point3<f64>>,
+    centres: VoxelSet<LatticeNode, Point3<f64>>,
     body: Option<SweptBody>,
     changed: Vec<Point3<f64>>,
 }
@@ -33,7 +33,7 @@ struct SweptBody {
     /// edge of the cells of one place, m
     cell: f64,
     /// by the middles of the balls that hold the tip there, in cells as large as its scale
-    places: Thinned<Posture, TipPlace>,
+    places: VoxelSet<Posture, TipPlace>,
 }
 
 /// A small cell and a range of axes.
@@ -54,12 +54,12 @@ impl Key for Posture {
 impl SweptSpace {
     /// Nothing swept yet: one centre is kept for each cube of edge `cell` (m), queries go up to `reach` (m).
     pub fn new(cell: f64, reach: f64) -> Self {
-        Self { cell, reach, centres: Thinned::default(), body: None, changed: Vec::new() }
+        Self { cell, reach, centres: VoxelSet::default(), body: None, changed: Vec::new() }
     }
 
     /// Nothing swept yet by a tip of any shape, of which one place is kept for each cube of edge `cell` (m).
     pub fn of_tip(tip: TipBody, cell: f64, reach: f64) -> Self {
-        let body = (!tip.is_ball()).then(|| SweptBody { tip, cell, places: Thinned::default() });
+        let body = (!tip.is_ball()).then(|| SweptBody { tip, cell, places: VoxelSet::default() });
         Self { body, ..Self::new(cell, reach) }
     }
 

@@ -2,7 +2,7 @@
 
 /// One pass over a place, or several put together.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Visit {
+pub(super) struct Pass {
     /// when the last of them began, ns
     pub began_ns: i64,
     /// sum of the weights of their contacts
@@ -16,12 +16,12 @@ const REMEMBERED: usize = 4;
 
 /// The passes over one place. A pass ends after the length of a window: what comes then is independent.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Visits {
-    slots: [Visit; REMEMBERED],
+pub(super) struct IndependentPasses {
+    slots: [Pass; REMEMBERED],
     count: u32,
 }
 
-impl Visits {
+impl IndependentPasses {
     /// Counts a contact of this weight; whether it is independent of those before.
     pub fn note(&mut self, stamp_ns: i64, weight: f64, window_ns: i64) -> bool {
         let newest = self.slots[(self.count.wrapping_sub(1)) as usize % REMEMBERED];
@@ -42,7 +42,7 @@ impl Visits {
         self.count
     }
 
-    pub fn iter(&self) -> impl Iterator<Item = &Visit> + '_ {
+    pub fn iter(&self) -> impl Iterator<Item = &Pass> + '_ {
         self.slots.iter().take(self.count as usize)
     }
 }

@@ -12,20 +12,20 @@ type Bucket<T> = Option<Vec<T>>;
 
 /// Things that have a key, by the cubes they are in.
 #[derive(Clone, Debug)]
-pub(super) struct Thinned<K, T> {
+pub(super) struct VoxelSet<K, T> {
     /// whether a thing with this key is there
     is_kept: CellTable<K, bool>,
     bins: CellTable<LatticeNode, Vec<T>>,
     history: History<LatticeNode, Bucket<T>>,
 }
 
-impl<K: Key, T: Copy> Default for Thinned<K, T> {
+impl<K: Key, T: Copy> Default for VoxelSet<K, T> {
     fn default() -> Self {
         Self { is_kept: CellTable::default(), bins: CellTable::default(), history: History::new(MOST_KEPT) }
     }
 }
 
-impl<K: Key, T: Copy> Thinned<K, T> {
+impl<K: Key, T: Copy> VoxelSet<K, T> {
     /// Puts a thing into a cube, unless one with its key is there; returns whether it did.
     pub fn add(&mut self, key: K, bin: LatticeNode, thing: T) -> bool {
         let (at, _) = self.is_kept.insert_with(key, || false);
@@ -131,14 +131,14 @@ mod tests {
     use super::*;
 
     /// Cubes of ten numbers each.
-    fn state(thinned: &Thinned<u32, u32>) -> Vec<u32> {
+    fn state(thinned: &VoxelSet<u32, u32>) -> Vec<u32> {
         thinned.iter().copied().collect()
     }
 
     #[test]
     fn strokes_with_things_that_come_and_go_are_undone_and_redone() {
         let bin = |x: u32| [(x / 10) as i32, 0, 0];
-        let mut thinned = Thinned::<u32, u32>::default();
+        let mut thinned = VoxelSet::<u32, u32>::default();
         let mut states = vec![state(&thinned)];
         for (come, go) in [(vec![1, 11, 2, 1], vec![]), (vec![3, 25], vec![1, 11]), (vec![11, 1, 40], vec![2, 25])] {
             thinned.begin_stroke();

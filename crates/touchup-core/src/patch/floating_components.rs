@@ -6,8 +6,8 @@
 use std::collections::VecDeque;
 
 use super::evidence::{Evidence, Source};
+use super::grid::{ReconstructionGrid, neighbours};
 use super::lattice::{Lattice, LatticeNode};
-use super::restore::{Restored, neighbours};
 use super::scan_value::ScanValue;
 use super::table::CellTable;
 
@@ -16,7 +16,7 @@ const MOST: usize = 4000;
 
 /// The nodes of all lumps among the nodes `at` and around them, whose signs are settled.
 pub(super) fn lumps(
-    restored: &mut Restored,
+    restored: &mut ReconstructionGrid,
     evidence: &Evidence<'_>,
     lattice: &Lattice,
     at: &[u32],
@@ -37,7 +37,7 @@ pub(super) fn lumps(
 
 /// The piece of material around `start`, if nothing holds it.
 fn floating(
-    restored: &mut Restored,
+    restored: &mut ReconstructionGrid,
     evidence: &Evidence<'_>,
     lattice: &Lattice,
     start: LatticeNode,
@@ -64,12 +64,17 @@ fn floating(
 }
 
 /// Whether a node of the material cannot be of a lump.
-fn is_held(restored: &Restored, node: LatticeNode) -> bool {
+fn is_held(restored: &ReconstructionGrid, node: LatticeNode) -> bool {
     restored.nodes.get(&node).is_some_and(|state| matches!(state.source, Source::Touch | Source::Beyond))
 }
 
 /// Whether there is material at a node; beyond what was looked at the scan says.
-fn is_material(restored: &mut Restored, evidence: &Evidence<'_>, lattice: &Lattice, node: LatticeNode) -> bool {
+fn is_material(
+    restored: &mut ReconstructionGrid,
+    evidence: &Evidence<'_>,
+    lattice: &Lattice,
+    node: LatticeNode,
+) -> bool {
     if let Some(state) = restored.nodes.get(&node) {
         return state.value < 0.0;
     }

@@ -60,14 +60,14 @@ impl Waiting {
 
 /// Messages on their way, which one thread sends.
 #[derive(Default)]
-pub(super) struct Outbox {
+pub(super) struct SendQueue {
     waiting: Mutex<Waiting>,
     more: Condvar,
     unsent_tiles: AtomicU64,
     unsent_others: AtomicU64,
 }
 
-impl Outbox {
+impl SendQueue {
     /// Puts a publication in.
     pub fn put(&self, publication: Publication) {
         match publication {
@@ -195,7 +195,7 @@ mod tests {
     }
 
     /// What goes out, in its order.
-    fn sent(outbox: &Outbox) -> Vec<String> {
+    fn sent(outbox: &SendQueue) -> Vec<String> {
         let sent = Mutex::new(Vec::new());
         outbox.close();
         outbox.send(|publication| {
@@ -207,7 +207,7 @@ mod tests {
 
     #[test]
     fn tiles_wait_for_the_others() {
-        let outbox = Outbox::default();
+        let outbox = SendQueue::default();
         for publication in [tile(7, 1.0), tile(3, 2.0), patch(1), tile(7, 3.0), patch(2)] {
             outbox.put(publication);
         }
@@ -217,7 +217,7 @@ mod tests {
 
     #[test]
     fn what_is_to_be_sent_later_goes_before_what_came_after_it() {
-        let outbox = Outbox::default();
+        let outbox = SendQueue::default();
         [patch(1), patch(2), tile(1, 0.0), tile(2, 0.0)].into_iter().for_each(|publication| outbox.put(publication));
         let tried = Mutex::new(Vec::new());
         let reaches_the_end =
@@ -241,7 +241,7 @@ mod tests {
 
     #[test]
     fn what_there_is_no_room_for_is_counted() {
-        let outbox = Outbox::default();
+        let outbox = SendQueue::default();
         (0..MOST as u32 + 3).for_each(|face| {
             outbox.put(Publication::Mismatch(HapticMismatch { face, ..HapticMismatch::default() }));
         });
@@ -256,7 +256,7 @@ mod tests {
 
     #[test]
     fn what_ros_refuses_is_counted_and_the_rest_goes() {
-        let outbox = Outbox::default();
+        let outbox = SendQueue::default();
         [patch(1), patch(2), tile(1, 0.0)].into_iter().for_each(|publication| outbox.put(publication));
         outbox.close();
         outbox.send(|publication| match publication {
@@ -268,7 +268,7 @@ mod tests {
 
     #[test]
     fn the_thread_that_sends_waits_for_more_and_ends_when_it_is_closed() {
-        let outbox = Arc::new(Outbox::default());
+        let outbox = Arc::new(SendQueue::default());
         let (told, heard) = mpsc::channel();
         let sending = std::thread::spawn({
             let outbox = outbox.clone();

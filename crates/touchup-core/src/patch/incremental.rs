@@ -1,11 +1,11 @@
 //! What is not known is filled in anew around what came, and what is another then is told.
 
-use super::complete::{CompleteParams, complete, open_cells};
 use super::evidence::{Evidence, Source};
 use super::field::FieldScratch;
+use super::floating_components::lumps;
+use super::grid::{Changed, NodeState, ReconstructionGrid, evaluate};
+use super::harmonic_fill::{CompleteParams, complete, open_cells};
 use super::lattice::{CellBox, Lattice, LatticeNode, Numbers, stepped};
-use super::lumps::lumps;
-use super::restore::{Changed, NodeState, Restored, evaluate};
 use super::scan_value::ScanValue;
 use super::table::CellTable;
 
@@ -14,7 +14,7 @@ const SLACK: f64 = 4e-3;
 /// What is filled in is filled in anew up to this many cells around what was looked at again.
 const SETTLED: i32 = 4;
 
-impl Restored {
+impl ReconstructionGrid {
     /// Fills in what is not known in and around `area`; finds what is another now than `before` says, or than it was.
     pub(super) fn settle(
         &mut self,

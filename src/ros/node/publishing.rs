@@ -7,8 +7,8 @@ use nalgebra::{Point3, Vector3};
 
 use super::convert::{NO_VECTOR, header, point, vector};
 use super::edits::Edits;
-use super::haptic::Haptic;
-use super::seeker::SeekerInput;
+use super::feature_worker::FeatureInput;
+use super::refinement::RefinementWorker;
 use super::tip::LastTip;
 use super::view::ViewInput;
 use crate::refine::{Case, Update};
@@ -22,14 +22,14 @@ const TIP_REACH: f64 = 0.02;
 /// A mesh torn by a change that goes on with the next sample is shown all the same when none has come for so long.
 const TORN_AFTER: Duration = Duration::from_millis(200);
 
-impl Haptic {
+impl RefinementWorker {
     pub(super) fn send_probed(&mut self) {
         if self.probed.is_empty() {
             return;
         }
         if let Err(
-            TrySendError::Full(SeekerInput::Probed(news)) | TrySendError::Disconnected(SeekerInput::Probed(news)),
-        ) = self.seeker.try_send(SeekerInput::Probed(std::mem::take(&mut self.probed)))
+            TrySendError::Full(FeatureInput::Probed(news)) | TrySendError::Disconnected(FeatureInput::Probed(news)),
+        ) = self.seeker.try_send(FeatureInput::Probed(std::mem::take(&mut self.probed)))
         {
             self.probed = news;
         }

@@ -2,20 +2,20 @@
 //!
 //! Nothing is ever integrated into a field: the field is evaluated anew from what is stored here.
 //!
-//! Contacts are independent from one pass to the next, not from sample to sample: [`Visits`] counts the passes. With a
+//! Contacts are independent from one pass to the next, not from sample to sample: [`IndependentPasses`] counts the passes. With a
 //! gate, a contact that contradicts the mean of its place (or of the place beside it, where it is the first) by more than
 //! both can be off is rejected. A second pass that says the same takes the place; one that confirms the mean forgets it.
 
 use nalgebra::{Point3, Vector3};
 
-use super::contact_sigma::ContactSigma;
-use super::contact_sums::Sums;
+use super::contact_statistics::ContactStatistics;
+use super::contact_uncertainty::ContactSigma;
 use super::history::History;
 use super::lattice::LatticeNode;
 use super::outliers::{Outlier, Outliers};
+use super::passes::{IndependentPasses, Pass};
 use super::table::CellTable;
 use super::touches::SurfaceContact;
-use super::visits::{Visit, Visits};
 
 /// The mean of the contacts in one cell that face alike.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,16 +70,16 @@ struct Rival {
 #[derive(Clone, Copy, Debug)]
 struct Kept {
     cell: LatticeNode,
-    /// the cell in [`ContactStore::nearby`]
+    /// the cell in [`ContactMap::nearby`]
     home: LatticeNode,
     facing: [i8; 3],
     /// the next mean of the same cell, [`NONE`] for the last
     next: u32,
-    sums: Sums,
-    visits: Visits,
+    sums: ContactStatistics,
+    visits: IndependentPasses,
     /// number of what was rejected here, [`NONE`] where nothing is
     apart: u32,
-    /// whether it stands in [`ContactStore::changed`]
+    /// whether it stands in [`ContactMap::changed`]
     is_noted: bool,
     is_refuted: bool,
     /// stands for two contacts at once
@@ -108,14 +108,14 @@ const OF_APART: u32 = 1 << 31;
 /// Contacts that contradict a mean and agree with each other.
 #[derive(Clone, Copy, Debug)]
 struct Apart {
-    sums: Sums,
-    visits: Visits,
+    sums: ContactStatistics,
+    visits: IndependentPasses,
     last_ns: i64,
 }
 
 /// Contacts, by place and facing.
 #[derive(Clone, Debug)]
-pub struct ContactStore {
+pub struct ContactMap {
     cell: f64,
     reach: f64,
     gate: Option<GateParams>,
@@ -155,7 +155,7 @@ const WAY: f64 = 3.0;
 /// So many windows without a contact part two passes.
 const PAUSE: i64 = 2;
 
-impl ContactStore {
+impl ContactMap {
     /// An empty store of cells of edge `cell` (m), for queries up to `reach` (m).
     ///
     /// - `gate`: when contacts are rejected; `None`: never.
@@ -195,7 +195,7 @@ impl ContactStore {
         {
             // a pass that confirms the mean: what is rejected was an outlier
             self.note_apart(apart);
-            self.apart[apart as usize].sums = Sums::ZERO;
+            self.apart[apart as usize].sums = ContactStatistics::ZERO;
         }
         self.renew(index, contact);
         if self.kept[index as usize].sums.weight >= LEAST_EVIDENCE {
@@ -278,13 +278,14 @@ impl ContactStore {
             apart.sums.weight > 0.0 && apart.sums.innovation(&apart.visits, contact, roughness).1 <= gate.sigmas;
         let is_second = agrees && contact.stamp_ns.saturating_sub(apart.last_ns) > PAUSE * gate.window_ns;
         if !agrees {
-            (apart.sums, apart.visits) = (Sums::ZERO, Visits::default());
+            (apart.sums, apart.visits) = (ContactStatistics::ZERO, IndependentPasses::default());
         }
         apart.sums.add(contact);
         apart.visits.note(contact.stamp_ns, contact.weight, gate.window_ns);
         apart.last_ns = contact.stamp_ns;
         if is_second {
-            let Apart { sums, visits, .. } = std::mem::replace(apart, Apart { sums: Sums::ZERO, ..*apart });
+            let Apart { sums, visits, .. } =
+                std::mem::replace(apart, Apart { sums: ContactStatistics::ZERO, ..*apart });
             self.move_to(rival.index, (sums, visits), contact, bin, gate.sigmas);
             return Verdict::Relocated;
         }
@@ -304,7 +305,11 @@ impl ContactStore {
         self.note_mean(index);
         let at = self.apart.len() as u32;
         self.history.note(at | OF_APART, || Past::Apart(None));
-        self.apart.push(Apart { sums: Sums::ZERO, visits: Visits::default(), last_ns: stamp_ns });
+        self.apart.push(Apart {
+            sums: ContactStatistics::ZERO,
+            visits: IndependentPasses::default(),
+            last_ns: stamp_ns,
+        });
         self.kept[index as usize].apart = at;
         at
     }
@@ -313,7 +318,7 @@ impl ContactStore {
     fn move_to(
         &mut self,
         rival: u32,
-        (sums, visits): (Sums, Visits),
+        (sums, visits): (ContactStatistics, IndependentPasses),
         contact: &SurfaceContact,
         bin: &Bin,
         sigmas: f64,
@@ -329,7 +334,7 @@ impl ContactStore {
             self.note_mean(index);
             self.tell(index);
             let old = &mut self.kept[index as usize];
-            (old.sums, old.visits) = (Sums::ZERO, Visits::default());
+            (old.sums, old.visits) = (ContactStatistics::ZERO, IndependentPasses::default());
             self.means[index as usize].weight = 0.0;
         }
         let index = self.place(self.find(bin), bin, contact);
@@ -375,8 +380,8 @@ impl ContactStore {
             home: cell_of(&point, self.reach),
             facing: bin.facing,
             next: NONE,
-            sums: Sums::ZERO,
-            visits: Visits::default(),
+            sums: ContactStatistics::ZERO,
+            visits: IndependentPasses::default(),
             apart: NONE,
             is_noted: false,
             is_refuted: false,
@@ -509,7 +514,7 @@ impl ContactStore {
     }
 
     /// The passes over the place of a mean.
-    pub(super) fn visits(&self, index: u32) -> impl Iterator<Item = &Visit> + '_ {
+    pub(super) fn visits(&self, index: u32) -> impl Iterator<Item = &Pass> + '_ {
         self.kept[index as usize].visits.iter()
     }
 
@@ -607,7 +612,7 @@ mod tests {
 
     #[test]
     fn contacts_of_one_cell_are_averaged_by_weight_unless_they_face_apart() {
-        let mut store = ContactStore::new(0.5e-3, 3e-3, None);
+        let mut store = ContactMap::new(0.5e-3, 3e-3, None);
         store.add(&contact(0.1e-3, Vector3::z(), 1.0));
         store.add(&contact(0.4e-3, Vector3::z(), 3.0));
         store.add(&contact(0.2e-3, Vector3::x(), 1.0));
@@ -618,7 +623,7 @@ mod tests {
 
     #[test]
     fn near_finds_what_a_walk_over_all_finds() {
-        let mut store = ContactStore::new(0.5e-3, 3e-3, None);
+        let mut store = ContactMap::new(0.5e-3, 3e-3, None);
         let scattered = |i: u32| f64::from(i.wrapping_mul(2_654_435_761) >> 20) / 4096.0 * 10e-3 - 5e-3;
         for i in 0..900 {
             let point = Point3::new(scattered(3 * i), scattered(3 * i + 1), scattered(3 * i + 2));
@@ -643,9 +648,9 @@ mod tests {
 
     #[test]
     fn a_refuted_contact_is_silent_until_it_is_not_refuted_any_more() {
-        let mut store = ContactStore::new(0.5e-3, 3e-3, None);
+        let mut store = ContactMap::new(0.5e-3, 3e-3, None);
         store.add(&contact(0.0, Vector3::z(), 1.0));
-        let count = |store: &ContactStore| {
+        let count = |store: &ContactMap| {
             let mut count = 0;
             store.near(&Point3::origin(), 1e-3, |_, _| count += 1);
             count
@@ -656,7 +661,7 @@ mod tests {
 
     #[test]
     fn clear_changes_are_told_once() {
-        let mut store = ContactStore::new(0.5e-3, 3e-3, None);
+        let mut store = ContactMap::new(0.5e-3, 3e-3, None);
         for x in [0.6e-3, 0.1e-3, 0.2e-3, 0.7e-3] {
             store.add(&contact(x, Vector3::z(), 1.0));
         }
@@ -668,7 +673,7 @@ mod tests {
     }
 
     /// A pass of eight contacts at height `z` (m) from `stamp_ns` on; what became of the last.
-    fn pass(store: &mut ContactStore, z: f64, stamp_ns: i64) -> Verdict {
+    fn pass(store: &mut ContactMap, z: f64, stamp_ns: i64) -> Verdict {
         let sigma = ContactSigma { noise: 10e-6, ..ContactSigma::default() };
         let at = |i: i64| Point3::new(0.1e-3 + 0.03e-3 * i as f64, 0.1e-3, 0.1e-3 + z);
         let contact = |i: i64| SurfaceContact {
@@ -687,8 +692,8 @@ mod tests {
         let second = 1_000_000_000;
         // within the cell, and in the one above
         for moved in [0.2e-3, 0.45e-3] {
-            let mut store = ContactStore::new(0.5e-3, 3e-3, Some(gate));
-            let near = |store: &ContactStore| {
+            let mut store = ContactMap::new(0.5e-3, 3e-3, Some(gate));
+            let near = |store: &ContactMap| {
                 let mut heights = Vec::new();
                 store.near(&Point3::new(0.2e-3, 0.1e-3, 0.3e-3), 1e-3, |_, index| {
                     heights.push((store.means()[index as usize].point.z * 1e6).round());

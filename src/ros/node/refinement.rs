@@ -11,14 +11,14 @@ use tracing::warn;
 
 use super::arm::ArmHandle;
 use super::edits::Edits;
-use super::placing::{Placer, Refusal};
-use super::seeker::SeekerInput;
+use super::feature_worker::FeatureInput;
+use super::frame_resolver::{FrameResolver, Refusal};
+use super::session::NodeSession;
 use super::side_work::SideWork;
-use super::sitting::Sitting;
 use super::streams::{Epoch, StreamWatch};
 use super::view::ViewInput;
 use super::{NodeEnd, NodeError, Setup};
-use crate::live::{Latencies, LiveError, ProbedNews};
+use crate::live::{Latencies, LiveError, TouchDelta};
 use crate::refine::RefineError;
 use crate::ros::messages::{PoseStamped, TFMessage, WrenchStamped};
 use crate::ros::port::{Arrival, Endpoint, Port};
@@ -50,7 +50,7 @@ impl ArrivedMessage {
 
 /// What was refused and lost, and how long things took.
 #[derive(Debug, Default)]
-pub struct Tally {
+pub struct Counters {
     /// samples that the refiner took
     pub accepted: u64,
     /// messages and samples that were not taken, by reason
@@ -59,7 +59,7 @@ pub struct Tally {
     pub paused: u64,
 }
 
-impl Tally {
+impl Counters {
     /// One more of `count`.
     pub fn refuse(&mut self, reason: &str) {
         match self.refused.get_mut(reason) {
@@ -70,11 +70,11 @@ impl Tally {
 }
 
 /// The thread's own.
-pub struct Haptic {
+pub struct RefinementWorker {
     pub(super) setup: Arc<Setup>,
     pub(super) port: Arc<dyn Port>,
     pub(super) view: SyncSender<ViewInput>,
-    pub(super) seeker: SyncSender<SeekerInput>,
+    pub(super) seeker: SyncSender<FeatureInput>,
     pub(super) spare: Receiver<Box<Edits>>,
     /// probes what it is asked for, where there is one
     pub(super) arm: Option<ArmHandle>,
@@ -82,15 +82,15 @@ pub struct Haptic {
     pub(super) unsent: Option<Box<Edits>>,
     /// to be filled again
     pub(super) kept: Option<Box<Edits>>,
-    pub(super) placer: Placer,
-    pub(super) sitting: Sitting,
+    pub(super) placer: FrameResolver,
+    pub(super) sitting: NodeSession,
     pub(super) sync: Synchroniser,
     pub(super) compensator: Compensator,
     epoch: Epoch,
     /// poses and wrenches that wait for a transform, with when they came
     waiting: [VecDeque<(ArrivedMessage, Instant)>; 2],
     /// touches that the thread of the features had no room for
-    pub(super) probed: ProbedNews,
+    pub(super) probed: TouchDelta,
     pub(super) streams: [StreamWatch; 2],
     pub(super) is_paused: bool,
     pub(super) fault: Option<String>,
@@ -101,7 +101,7 @@ pub struct Haptic {
     pub(super) endpoints: BTreeMap<String, Endpoint>,
     /// sessions that are being ended, and files that are being written
     pub(super) side_work: SideWork,
-    pub(super) tally: Tally,
+    pub(super) tally: Counters,
     pub(super) pushes: Latencies,
     /// from the arrival of what completed a sample to the mesh
     pub(super) latencies: Latencies,
@@ -117,7 +117,7 @@ pub struct Haptic {
     told: Instant,
 }
 
-impl Haptic {
+impl RefinementWorker {
     /// Ready to take samples.
     ///
     /// # Errors
@@ -125,16 +125,16 @@ impl Haptic {
     pub fn new(
         setup: Arc<Setup>,
         port: Arc<dyn Port>,
-        sitting: Sitting,
+        sitting: NodeSession,
         view: SyncSender<ViewInput>,
-        seeker: SyncSender<SeekerInput>,
+        seeker: SyncSender<FeatureInput>,
         spare: Receiver<Box<Edits>>,
         arm: Option<ArmHandle>,
     ) -> Result<Self, NodeError> {
         let now = setup.clock.now();
         let mismatch_rate_hz = setup.shared.parameters().double("mismatch_rate_hz");
         let side_work = SideWork::on(setup.clock.clone());
-        let placer = Placer::new(setup.frame_names(), setup.scene.placement());
+        let placer = FrameResolver::new(setup.frame_names(), setup.scene.placement());
         let compensator = setup.compensator(WrenchFrame::default())?;
         Ok(Self {
             sync: Synchroniser::in_order(setup.scene.sync_params())?,
@@ -151,7 +151,7 @@ impl Haptic {
             sitting,
             epoch: Epoch::default(),
             waiting: Default::default(),
-            probed: ProbedNews::default(),
+            probed: TouchDelta::default(),
             streams: [StreamWatch::new(now), StreamWatch::new(now)],
             is_paused: false,
             fault: None,
@@ -159,7 +159,7 @@ impl Haptic {
             last_state: String::new(),
             endpoints: BTreeMap::new(),
             side_work,
-            tally: Tally::default(),
+            tally: Counters::default(),
             pushes: Latencies::new(),
             latencies: Latencies::new(),
             version: 1,
@@ -392,8 +392,8 @@ impl Haptic {
         self.sync = Synchroniser::in_order(self.setup.scene.sync_params())?;
         self.compensator = self.setup.compensator(WrenchFrame::default())?;
         self.placer.forget_axes();
-        (self.epoch, self.waiting, self.probed) = (Epoch::default(), Default::default(), ProbedNews::default());
-        (self.tally, self.pushes, self.latencies) = (Tally::default(), Latencies::new(), Latencies::new());
+        (self.epoch, self.waiting, self.probed) = (Epoch::default(), Default::default(), TouchDelta::default());
+        (self.tally, self.pushes, self.latencies) = (Counters::default(), Latencies::new(), Latencies::new());
         (self.version, self.edits, self.last_ns, self.mismatch_ns) = (1, 0, None, i64::MIN);
         // a change of the session before means nothing in this one
         if let Some(unsent) = self.unsent.take() {

@@ -3,11 +3,11 @@
 use nalgebra::{Point2, Point3, Vector3};
 
 use super::LatticeRegion;
+use super::boundary_loops::outline;
 use super::clip::{Pieces, PointSupport, wall};
-use super::fill::fill;
 use super::lattice::{CellBox, Edge, Lattice, LatticeNode, Owner, PatchFace, Square, VertexKey};
-use super::outline::outline;
 use super::table::{CellTable, Key};
+use super::triangulation::fill;
 use crate::mesh::{BoxQuery, FaceId, FaceTree, TriMesh};
 
 /// Side of the blocks of cells for which the faces nearby are looked up at once, in cells.

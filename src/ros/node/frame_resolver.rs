@@ -68,7 +68,7 @@ pub struct FrameNames {
 
 /// Brings messages into the frames of the recording.
 #[derive(Clone, Debug)]
-pub struct Placer {
+pub struct FrameResolver {
     names: FrameNames,
     placement: Placement,
     /// the axes of the wrenches, once one has come
@@ -77,7 +77,7 @@ pub struct Placer {
     pub frames: FrameBuffer,
 }
 
-impl Placer {
+impl FrameResolver {
     /// - `placement`: of the scene.
     pub fn new(names: FrameNames, placement: Option<Placement>) -> Self {
         Self { names, placement: placement.unwrap_or_default(), axes: None, frames: FrameBuffer::default() }
@@ -206,9 +206,9 @@ mod tests {
         WrenchStamped { header: header(frame), wrench: W { force, torque: V::default() } }
     }
 
-    fn placer(placement: Option<Placement>) -> Placer {
+    fn placer(placement: Option<Placement>) -> FrameResolver {
         let names = FrameNames { object: "object".into(), tool: "stylus".into(), sensor: "stylus_sensor".into() };
-        let mut placer = Placer::new(names, placement);
+        let mut placer = FrameResolver::new(names, placement);
         // a quarter turn about z, 1 m along x
         let half = std::f64::consts::FRAC_1_SQRT_2;
         let transform = Transform {

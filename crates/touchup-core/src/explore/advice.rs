@@ -4,8 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Point3, Vector3};
 
+use super::cylinder_fit::SQUARE;
 use super::design::{Asked, Candidate, Knowledge};
-use super::round::SQUARE;
 use crate::features::fit::{Freedom, Surface};
 use crate::features::{Feature, Kind, Walls};
 use crate::touch::ProbedPoint;

@@ -15,7 +15,7 @@ use super::view::ViewInput;
 use crate::clock::Clock;
 use crate::explore::{NextTouch, next_by_hand};
 use crate::features::{Feature, Kind, Tracker};
-use crate::live::ProbedNews;
+use crate::live::TouchDelta;
 use crate::mesh::{FaceTree, MeshError};
 use crate::ros::messages::{
     DetectFeaturesRequest, DetectFeaturesResponse, Feature as FeatureMsg, FeatureArray, FlagFeatureResponse,
@@ -36,9 +36,9 @@ const MOST_NAMED: usize = 128;
 const SNAPSHOT_WAIT: Duration = Duration::from_secs(10);
 
 /// What the thread is told.
-pub enum SeekerInput {
+pub enum FeatureInput {
     /// touches came or went
-    Probed(ProbedNews),
+    Probed(TouchDelta),
     /// a new session
     Session(String),
     /// somebody points at a place, m, in O
@@ -94,7 +94,7 @@ pub struct ArmMeasurement {
 pub type NextTouches = BTreeMap<u32, NextTouch>;
 
 /// The thread's own.
-pub struct Seeker {
+pub struct FeatureWorker {
     clock: Clock,
     shared: Arc<Shared>,
     view: SyncSender<ViewInput>,
@@ -119,7 +119,7 @@ pub struct Seeker {
     published_at: Option<Instant>,
 }
 
-impl Seeker {
+impl FeatureWorker {
     /// Knows nothing yet.
     pub fn new(clock: Clock, shared: Arc<Shared>, view: SyncSender<ViewInput>, session: String) -> Self {
         let now = clock.now();
@@ -145,7 +145,7 @@ impl Seeker {
     }
 
     /// Runs until nobody tells anything any more.
-    pub fn run(mut self, inputs: &Receiver<SeekerInput>) {
+    pub fn run(mut self, inputs: &Receiver<FeatureInput>) {
         loop {
             let period = Duration::from_secs_f64(1.0 / self.shared.parameters().double("features_rate_hz"));
             match self.clock.recv_timeout(inputs, period) {
@@ -168,37 +168,37 @@ impl Seeker {
         }
     }
 
-    fn take(&mut self, input: SeekerInput) {
+    fn take(&mut self, input: FeatureInput) {
         match input {
-            SeekerInput::Probed(news) => {
+            FeatureInput::Probed(news) => {
                 news.apply_to(&mut self.touches);
                 self.has_news |= !self.tracker.update(&self.touches).is_empty();
             }
-            SeekerInput::Session(session) => {
+            FeatureInput::Session(session) => {
                 *self = Self::new(self.clock.clone(), Arc::clone(&self.shared), self.view.clone(), session);
             }
-            SeekerInput::Flag(flag, reply) => {
+            FeatureInput::Flag(flag, reply) => {
                 let answer = self.flag(flag);
                 if let Some(reply) = reply {
                     reply.send(answer);
                 }
             }
-            SeekerInput::Unflag(id, reply) => {
+            FeatureInput::Unflag(id, reply) => {
                 let (success, message) = self.unflag(id);
                 reply.send(UnflagFeatureResponse { success, message });
             }
-            SeekerInput::Targets(ids, reply) => {
+            FeatureInput::Targets(ids, reply) => {
                 // who asked may have gone
                 let _ = reply.try_send(self.targets(&ids));
             }
-            SeekerInput::Measured(measured) => {
+            FeatureInput::Measured(measured) => {
                 // another session knows nothing of it
                 if measured.session == self.session {
                     self.measured.insert(measured.id, *measured);
                     self.has_news = true;
                 }
             }
-            SeekerInput::Detect(request, reply) => {
+            FeatureInput::Detect(request, reply) => {
                 let looked = self.look();
                 // on its way before who asked is told to look there
                 (self.has_news, self.published_at) = (false, Some(Instant::now()));

@@ -2,9 +2,9 @@
 
 use nalgebra::Point3;
 
+use super::discontinuities::is_torn;
 use super::evidence::{Evidence, Source};
 use super::field::FieldScratch;
-use super::jumps::is_torn;
 use super::lattice::{CellBox, Lattice, LatticeNode, stepped};
 use super::scan_value::ScanValue;
 use super::table::CellTable;
@@ -60,12 +60,12 @@ impl NodeState {
 
 /// What came to the stores: where the contacts are whose mean is new or moved, and the centres that were kept, m, in O.
 #[derive(Clone, Debug, Default)]
-pub(super) struct News {
+pub(super) struct GridChanges {
     pub means: Vec<Point3<f64>>,
     pub centres: Vec<Point3<f64>>,
 }
 
-impl News {
+impl GridChanges {
     pub fn is_empty(&self) -> bool {
         self.means.is_empty() && self.centres.is_empty()
     }
@@ -89,7 +89,7 @@ pub(super) struct Changed {
 
 /// The field around everything that was touched or swept.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Restored {
+pub(super) struct ReconstructionGrid {
     /// every node looked at
     pub nodes: CellTable<LatticeNode, NodeState>,
     /// cells in which the surface would rest on a freely moving ball alone: they stay open
@@ -115,12 +115,18 @@ const BALL_MARGIN: f64 = 2.0;
 /// News count most within this many radii.
 const NEAR: f64 = 1.1;
 
-impl Restored {
+impl ReconstructionGrid {
     /// Brings the field up to date with what came to the stores of `evidence`.
     ///
     /// - `news`: taken in up to where they count most.
     /// - `late`: earlier news, taken in up to where they count at all.
-    pub fn renew(&mut self, evidence: &Evidence<'_>, lattice: &Lattice, news: &News, late: &News) -> Changed {
+    pub fn renew(
+        &mut self,
+        evidence: &Evidence<'_>,
+        lattice: &Lattice,
+        news: &GridChanges,
+        late: &GridChanges,
+    ) -> Changed {
         self.renewals += 1;
         let mut look = CellTable::default();
         if !self.nodes.is_empty() {
@@ -245,7 +251,7 @@ impl Restored {
         &self,
         evidence: &Evidence<'_>,
         lattice: &Lattice,
-        news: &News,
+        news: &GridChanges,
         look: &mut CellTable<LatticeNode, Option<NodeState>>,
     ) {
         let p = evidence.params;
@@ -263,7 +269,7 @@ impl Restored {
         &mut self,
         evidence: &Evidence<'_>,
         lattice: &Lattice,
-        news: &News,
+        news: &GridChanges,
         look: &mut CellTable<LatticeNode, Option<NodeState>>,
     ) {
         let radius = evidence.params.radius;

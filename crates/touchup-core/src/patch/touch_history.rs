@@ -2,14 +2,14 @@
 
 use nalgebra::Point3;
 
-use super::contact_store::{ContactStore, Verdict};
+use super::contact_map::{ContactMap, Verdict};
+use super::double_contact::{is_mixed, split};
+use super::free_space::SweptSpace;
+use super::grid::GridChanges;
 use super::probed_log::ProbedLog;
-use super::restore::News;
 use super::scan_value::ScanValue;
-use super::swept::SweptSpace;
 use super::table::CellTable;
 use super::touches::TipTouch;
-use super::two_points::{is_mixed, split};
 use crate::mesh::{FaceTree, TriMesh};
 use crate::touch::{STROKE_PAUSE_NS, TipPlace};
 
@@ -28,8 +28,8 @@ const MOVED: f64 = 2.0;
 
 /// All that was felt.
 #[derive(Clone, Debug)]
-pub(super) struct Felt {
-    pub contacts: ContactStore,
+pub(super) struct TouchHistory {
+    pub contacts: ContactMap,
     pub swept: SweptSpace,
     pub probed: ProbedLog,
     /// whether where the tip went counts; else `swept` stays empty
@@ -45,10 +45,10 @@ pub(super) struct Felt {
     bounds: Option<[Point3<f64>; 2]>,
 }
 
-impl Felt {
+impl TouchHistory {
     /// Nothing felt yet.
     pub fn new(
-        contacts: ContactStore,
+        contacts: ContactMap,
         swept: SweptSpace,
         keeps_free_space: bool,
         radius: f64,
@@ -121,7 +121,7 @@ impl Felt {
 
     /// Decides which contacts count and which are those of an edge, where anything came since it was last decided; returns
     /// where that is.
-    pub fn settle(&mut self, scan: &TriMesh, tree: &FaceTree) -> News {
+    pub fn settle(&mut self, scan: &TriMesh, tree: &FaceTree) -> GridChanges {
         let Self { contacts, swept, radius, .. } = self;
         let (deepest, outside) = (*radius * (1.0 - REFUTED_DEPTH), OUTSIDE * *radius);
         let bounds = self.bounds.get_or_insert_with(|| {
@@ -155,7 +155,7 @@ impl Felt {
                 add(&mut changed, at);
             }
         }
-        News { means: changed.iter().map(|(at, ())| contacts.means()[at as usize].point).collect(), centres }
+        GridChanges { means: changed.iter().map(|(at, ())| contacts.means()[at as usize].point).collect(), centres }
     }
 }
 
@@ -164,7 +164,7 @@ fn add(numbers: &mut CellTable<u32, ()>, number: u32) {
 }
 
 /// These means and those within `reach` (m) of them, cut off at the reach of the store.
-fn beside(contacts: &ContactStore, means: &CellTable<u32, ()>, reach: f64) -> CellTable<u32, ()> {
+fn beside(contacts: &ContactMap, means: &CellTable<u32, ()>, reach: f64) -> CellTable<u32, ()> {
     let mut beside = means.clone();
     for (at, ()) in means.iter() {
         contacts.near_known(&contacts.means()[at as usize].point, reach, |_, other| add(&mut beside, other));

@@ -5,11 +5,11 @@
 //! scan's own distance pulls weakly, so that a pocket that was felt down to somewhere gets a bottom.
 
 use super::evidence::Source;
+use super::grid::{NodeState, ReconstructionGrid, cell_at, node_at};
 use super::lattice::{LatticeNode, Numbers, stepped};
-use super::restore::{NodeState, Restored, cell_at, node_at};
 use super::table::CellTable;
 
-/// Settings of [`complete`].
+/// Settings of [`harmonic_fill`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct CompleteParams {
     /// weight of the scan beside the six neighbours of a node that is far from it
@@ -53,7 +53,7 @@ const NONE: u32 = u32::MAX;
 /// stays as it is.
 ///
 /// - `numbers`: of the nodes around these.
-pub(super) fn complete(restored: &mut Restored, at: &[u32], numbers: &Numbers, params: &CompleteParams) {
+pub(super) fn complete(restored: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers, params: &CompleteParams) {
     relax(restored, at, numbers, params);
     if drop_islands(restored, at, numbers) {
         relax(restored, at, numbers, params);
@@ -63,7 +63,7 @@ pub(super) fn complete(restored: &mut Restored, at: &[u32], numbers: &Numbers, p
 
 /// Takes nodes near the surface that differ from nearly all around them back to their side: tips and pits that noise makes
 /// where the surface passes through a node.
-fn blunt(restored: &mut Restored, at: &[u32], numbers: &Numbers, params: &CompleteParams) {
+fn blunt(restored: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers, params: &CompleteParams) {
     for &at in at {
         let state = restored.nodes.entry(at).1;
         if state.value.abs() < params.nearly && state.least <= 0.0 {
@@ -89,7 +89,7 @@ struct OpenQuestion {
 }
 
 /// Successive over-relaxation, from below by the space that the ball went through.
-fn relax(restored: &mut Restored, at: &[u32], numbers: &Numbers, params: &CompleteParams) {
+fn relax(restored: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers, params: &CompleteParams) {
     let open: Vec<u32> = at.iter().copied().filter(|&at| restored.nodes.entry(at).1.is_open_question()).collect();
     // the values at hand, close together
     let mut met: CellTable<u32, f64> = CellTable::default();
@@ -119,7 +119,7 @@ fn relax(restored: &mut Restored, at: &[u32], numbers: &Numbers, params: &Comple
 }
 
 fn question(
-    restored: &Restored,
+    restored: &ReconstructionGrid,
     at: u32,
     numbers: &Numbers,
     params: &CompleteParams,
@@ -152,7 +152,7 @@ fn question(
 }
 
 /// The nodes around one, as far as they are there and say something.
-fn neighbours(restored: &Restored, at: u32, numbers: &Numbers) -> [u32; 6] {
+fn neighbours(restored: &ReconstructionGrid, at: u32, numbers: &Numbers) -> [u32; 6] {
     let node = restored.nodes.entry(at).0;
     std::array::from_fn(|i| {
         let other = stepped(node, i / 2, if i % 2 == 0 { 1 } else { -1 });
@@ -163,7 +163,7 @@ fn neighbours(restored: &Restored, at: u32, numbers: &Numbers) -> [u32; 6] {
 
 /// Gives up material and void that nothing holds in its place: a piece of one sign, within the nodes looked at, that was
 /// neither touched nor swept, or is smaller than anything a ball can feel. Returns whether there was any.
-fn drop_islands(restored: &mut Restored, at: &[u32], numbers: &Numbers) -> bool {
+fn drop_islands(restored: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers) -> bool {
     let mut seen = vec![Visited::Outside; restored.nodes.len()];
     at.iter().for_each(|&at| seen[at as usize] = Visited::NotYet);
     let (mut island, mut has_dropped) = (Vec::new(), false);
@@ -196,7 +196,7 @@ enum Visited {
 
 /// Gathers the piece of one sign around its first node; whether what lies beyond those looked at holds it, or evidence and
 /// its size.
-fn is_held(restored: &Restored, piece: &mut Vec<u32>, seen: &mut [Visited], numbers: &Numbers) -> bool {
+fn is_held(restored: &ReconstructionGrid, piece: &mut Vec<u32>, seen: &mut [Visited], numbers: &Numbers) -> bool {
     let (mut next, mut is_felt, mut goes_on) = (0, false, false);
     while let Some(&at) = piece.get(next) {
         next += 1;
@@ -219,7 +219,7 @@ fn is_held(restored: &Restored, piece: &mut Vec<u32>, seen: &mut [Visited], numb
 /// The cells in which a filled surface hangs on a ball that ended its way freely, from there to the nearest evidence within
 /// `reach` cells: a hole that the ball left at its far end has no bottom.
 pub(super) fn open_cells(
-    restored: &Restored,
+    restored: &ReconstructionGrid,
     ends: impl Iterator<Item = LatticeNode>,
     reach: i32,
 ) -> CellTable<LatticeNode, ()> {
@@ -240,7 +240,7 @@ pub(super) fn open_cells(
 }
 
 /// Whether the surface passes through a cell of which no corner is known.
-fn is_unheld_surface(restored: &Restored, cell: LatticeNode) -> bool {
+fn is_unheld_surface(restored: &ReconstructionGrid, cell: LatticeNode) -> bool {
     let mut material = 0;
     for corner in 0..8 {
         let Some(state) = restored.nodes.get(&node_at(cell, corner)) else { return false };
@@ -261,7 +261,7 @@ mod tests {
     const BOX: CellBox = CellBox { lo: [0; 3], hi: [6; 3] };
 
     /// The signs of nodes that were touched everywhere, filled in: those of `value` (pitches) before, at each node.
-    fn completed(value: impl Fn(LatticeNode) -> f64) -> Restored {
+    fn completed(value: impl Fn(LatticeNode) -> f64) -> ReconstructionGrid {
         let state = |node: LatticeNode| NodeState {
             value: value(node) * PITCH,
             source: Source::Touch,
@@ -274,7 +274,7 @@ mod tests {
             felt: Some(value(node) * PITCH),
             renewal: 0,
         };
-        let mut restored = Restored::default();
+        let mut restored = ReconstructionGrid::default();
         BOX.each(|node| {
             restored.nodes.insert(node, state(node));
         });
@@ -289,7 +289,7 @@ mod tests {
         f64::from(k) - 2.8
     }
 
-    fn is_material(restored: &Restored, node: LatticeNode) -> bool {
+    fn is_material(restored: &ReconstructionGrid, node: LatticeNode) -> bool {
         restored.nodes.get(&node).is_some_and(|state| state.value < 0.0)
     }
 

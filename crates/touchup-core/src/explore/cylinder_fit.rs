@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use super::circle::circle;
 use super::design::{Asked, Knowledge};
 use super::measuring::{Measuring, Possible};
-use super::pattern::{PatternParams, Quantity, SearchContext, Wish};
+use super::pattern::{PatternParams, Quantity, SearchContext, TouchPlan};
 use crate::features::fit::{Cylinder, Fit, FitError, FitParams, Freedom, Observation, Plane, fit};
 
 /// Directions that are candidates.
@@ -93,7 +93,7 @@ impl RoundWall {
     /// The touch of the wall that tells most.
     ///
     /// - `depths`: below the surface, m.
-    pub fn best(&mut self, course: &SearchContext, depths: [f64; 2]) -> Option<Wish> {
+    pub fn best(&mut self, course: &SearchContext, depths: [f64; 2]) -> Option<TouchPlan> {
         let surface = self.guess(course);
         let ball = course.params.ball_radius;
         // in a hole from the middle, of a boss from beside it

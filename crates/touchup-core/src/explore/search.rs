@@ -6,7 +6,7 @@
 use nalgebra::Point3;
 
 use super::error::ExploreError;
-use super::pattern::{Felt, PatternParams, SearchContext, Touched, Wish};
+use super::pattern::{PatternParams, SearchContext, TouchPlan, TouchResult, Touched};
 use crate::features::fit::Observation;
 
 /// Distance of the places where it is looked for, over the ball's radius: the ball falls into a hole of 2.2 radii at least.
@@ -41,7 +41,7 @@ impl Looking {
     }
 
     /// Where it is looked for next: the place not tried yet that is nearest to where the ball sank deepest, and to the flag.
-    pub fn next(&self, course: &SearchContext) -> Option<Wish> {
+    pub fn next(&self, course: &SearchContext) -> Option<TouchPlan> {
         let PatternParams { ball_radius, clearance, .. } = course.params;
         let step = STEP * ball_radius;
         let is_new =
@@ -59,7 +59,7 @@ impl Looking {
         let wanted = course.in_f(&touch.wish.from);
         let wanted = Point3::new(wanted.x, wanted.y, 0.0);
         match (touch.felt, touch.place, touch.observation) {
-            (Felt::Nothing, ..) => return Some(wanted),
+            (TouchResult::Nothing, ..) => return Some(wanted),
             (_, Some(place), Some(observation)) => {
                 let surface = course.below(&place);
                 // the highest is the surface; what is lower is a rim, or lower ground

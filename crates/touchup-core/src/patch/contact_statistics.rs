@@ -2,16 +2,16 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::contact_sigma::ContactSigma;
+use super::contact_uncertainty::ContactSigma;
+use super::passes::IndependentPasses;
 use super::touches::SurfaceContact;
-use super::visits::Visits;
 
 /// No normal is known better than this, rad: 1°.
 const LEAST_TILT: f64 = 0.017;
 
 /// Contacts added up.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Sums {
+pub(super) struct ContactStatistics {
     pub point: Vector3<f64>,
     pub normal: Vector3<f64>,
     pub weight: f64,
@@ -23,7 +23,7 @@ pub(super) struct Sums {
     calibration: f64,
 }
 
-impl Sums {
+impl ContactStatistics {
     pub const ZERO: Self = Self {
         point: Vector3::new(0.0, 0.0, 0.0),
         normal: Vector3::new(0.0, 0.0, 0.0),
@@ -59,7 +59,7 @@ impl Sums {
     /// angles to the mean of both normals, unless one is known much better. What calibration leaves is the same in both.
     ///
     /// - `roughness`: by which the surface itself may be off a chord, m.
-    pub fn innovation(&self, visits: &Visits, contact: &SurfaceContact, roughness: f64) -> (f64, f64) {
+    pub fn innovation(&self, visits: &IndependentPasses, contact: &SurfaceContact, roughness: f64) -> (f64, f64) {
         let normal = self.normal.try_normalize(0.0).unwrap_or(contact.normal);
         let arm = contact.point - self.point();
         let own = self.sigma();

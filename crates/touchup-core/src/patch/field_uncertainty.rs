@@ -6,7 +6,7 @@
 
 use nalgebra::Point3;
 
-use super::contact_store::ContactStore;
+use super::contact_map::ContactMap;
 use super::field::{FieldParams, FieldScratch, FieldValue};
 
 /// How well the fit knows the surface, by cause; standard deviations, m.
@@ -60,7 +60,7 @@ impl FieldParams {
     pub fn sigma_of(
         &self,
         found: &FieldValue,
-        store: &ContactStore,
+        store: &ContactMap,
         x: &Point3<f64>,
         window_ns: i64,
         scratch: &mut FieldScratch,
@@ -131,7 +131,7 @@ mod tests {
     /// passes on one line.
     fn sigma_after(passes: i64, spacing_ns: i64) -> FitSigma {
         let gate = GateParams { sigmas: 4.0, window_ns: WINDOW_NS };
-        let mut store = ContactStore::new(0.5e-3, 3e-3, Some(gate));
+        let mut store = ContactMap::new(0.5e-3, 3e-3, Some(gate));
         for i in 0..64 * passes {
             let along = (i % 64) as f64 * 0.04e-3 - 1.28e-3;
             let stamp_ns = i / 64 * 1_000_000_000 + i % 64 * spacing_ns;

@@ -1,7 +1,7 @@
 //! Where touches seem to say something that contradicts itself.
 
+use super::grid::{NodeState, neighbours};
 use super::lattice::LatticeNode;
-use super::restore::{NodeState, neighbours};
 use super::table::CellTable;
 
 /// No distance changes by more than the way: between two neighbours by a pitch, and by noise beyond that.
