@@ -143,8 +143,8 @@ const ROUNDING: f64 = 1e-11;
 /// # Example
 /// ```
 /// use nalgebra::{Isometry3, Point3};
-/// use touchup::align::{IcpParams, icp};
-/// use touchup::mesh::{Alone, FaceTree, TriMesh};
+/// use touchup_core::align::{IcpParams, icp};
+/// use touchup_core::mesh::{Alone, FaceTree, TriMesh};
 /// let p = |x, y| Point3::new(x, y, 0.0);
 /// let square = TriMesh::new(vec![p(0., 0.), p(1., 0.), p(1., 1.), p(0., 1.)], vec![[0, 1, 2], [0, 2, 3]])?;
 /// let above: Vec<_> = (0..100).map(|i| Point3::new(0.1 * f64::from(i % 10), 0.1 * f64::from(i / 10), 0.02)).collect();

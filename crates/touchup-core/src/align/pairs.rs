@@ -84,13 +84,13 @@ pub struct PairsFit {
 ///
 /// # Example
 /// ```
-/// # use touchup::align::{PairsParams, PointPair, fit_pairs};
+/// # use touchup_core::align::{PairsParams, PointPair, fit_pairs};
 /// # use nalgebra::{Point3, Vector3};
 /// let corners = [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]].map(Point3::from);
 /// let pairs = corners.map(|from| PointPair { from, to: from + Vector3::new(0.0, 0.0, 0.5), sigma: None });
 /// let fit = fit_pairs(&pairs, &PairsParams::default())?;
 /// assert!((fit.motion.translation.z - 0.5).abs() < 1e-12 && fit.motion.rotation.angle() < 1e-12);
-/// # Ok::<(), touchup::align::PairsError>(())
+/// # Ok::<(), touchup_core::align::PairsError>(())
 /// ```
 pub fn fit_pairs(pairs: &[PointPair], params: &PairsParams) -> Result<PairsFit, PairsError> {
     if let Some(sigma) = params.sigma.filter(|sigma| !BELIEVABLE_SIGMA.contains(sigma)) {

@@ -121,8 +121,8 @@ impl Block {
 ///
 /// # Example
 /// ```
-/// # use touchup::calibrate::{StillFinder, StillParams};
-/// # use touchup::touch::{Sample, Wrench};
+/// # use touchup_core::calibrate::{StillFinder, StillParams};
+/// # use touchup_core::touch::{Sample, Wrench};
 /// # use nalgebra::Isometry3;
 /// let mut finder = StillFinder::new(StillParams::default());
 /// for ms in 0..1000 {

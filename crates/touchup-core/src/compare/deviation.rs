@@ -70,8 +70,8 @@ fn in_order(points: &[Point3<f64>]) -> Result<(Vec<u32>, Vec<Point3<f64>>), Comp
 /// # Example
 /// ```
 /// use nalgebra::Point3;
-/// use touchup::compare::deviations;
-/// use touchup::mesh::{Alone, FaceTree, TriMesh};
+/// use touchup_core::compare::deviations;
+/// use touchup_core::mesh::{Alone, FaceTree, TriMesh};
 /// let p = |x, y| Point3::new(x, y, 0.0);
 /// let truth = TriMesh::new(vec![p(0.0, 0.0), p(1.0, 0.0), p(0.0, 1.0)], vec![[0, 1, 2]])?;
 /// let points = [Point3::new(0.2, 0.2, 0.5), Point3::new(0.2, 0.2, -0.25)];

@@ -153,7 +153,7 @@ impl PatcherParams {
 /// # Example
 /// ```
 /// use nalgebra::{Isometry3, Point3, Vector3};
-/// use touchup::{mesh::{FaceTree, TriMesh}, patch::{Patcher, PatcherParams}, touch::{Sample, Wrench}};
+/// use touchup_core::{mesh::{FaceTree, TriMesh}, patch::{Patcher, PatcherParams}, touch::{Sample, Wrench}};
 ///
 /// // a scan of 20 mm that lies 0.4 mm too high
 /// let p = |x: f64, y: f64| Point3::new(x * 1e-3, y * 1e-3, 0.4e-3);

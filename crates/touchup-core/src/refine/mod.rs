@@ -145,7 +145,7 @@ pub struct RefineCounts {
 /// # Example
 /// ```
 /// use nalgebra::{Isometry3, Point3, Vector3};
-/// use touchup::{mesh::TriMesh, refine::*, touch::{Sample, Wrench}};
+/// use touchup_core::{mesh::TriMesh, refine::*, touch::{Sample, Wrench}};
 ///
 /// let p = |x, y| Point3::new(x, y, 0.0);
 /// let mesh = TriMesh::new(vec![p(0.0, 0.0), p(0.01, 0.0), p(0.0, 0.01)], vec![[0, 1, 2]])?;
@@ -156,7 +156,7 @@ pub struct RefineCounts {
 ///     let pose_ot = Isometry3::translation(0.003, 0.003, 1.0e-3 + 0.1e-3 - 2.0 / 2e4);
 ///     refiner.push(&Sample { stamp_ns: i * 1_000_000, pose_ot, wrench })?;
 /// }
-/// assert!((refiner.mesh().position(touchup::mesh::VertexId(0)).z - 0.1e-3).abs() < 1e-6);
+/// assert!((refiner.mesh().position(touchup_core::mesh::VertexId(0)).z - 0.1e-3).abs() < 1e-6);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]

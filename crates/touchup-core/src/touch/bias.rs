@@ -40,7 +40,7 @@ impl BiasParams {
 ///
 /// # Example
 /// ```
-/// # use touchup::touch::{BiasParams, BiasTracker, Tip};
+/// # use touchup_core::touch::{BiasParams, BiasTracker, Tip};
 /// # use nalgebra::{Isometry3, Vector3};
 /// let mut tracker = BiasTracker::new(BiasParams::default())?;
 /// let drift = Vector3::new(0.1, 0.0, -0.05);
@@ -49,7 +49,7 @@ impl BiasParams {
 ///     tracker.compensate(&free);
 /// }
 /// assert!((tracker.bias_t() - drift).norm() < 1e-4);
-/// # Ok::<(), touchup::touch::SettingError>(())
+/// # Ok::<(), touchup_core::touch::SettingError>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct BiasTracker {

@@ -58,7 +58,7 @@ pub struct FrictionCoefficient {
 /// # Example
 /// ```
 /// use nalgebra::Vector3;
-/// use touchup::touch::{Friction, Sliding};
+/// use touchup_core::touch::{Friction, Sliding};
 ///
 /// // 1 s at 25 mm/s along x on a floor, μ = 0.2
 /// let mut friction = Friction::new(0.42);

@@ -92,7 +92,7 @@ impl SyncCounts {
 ///
 /// # Example
 /// ```
-/// # use touchup::touch::*;
+/// # use touchup_core::touch::*;
 /// # use nalgebra::Isometry3;
 /// let mut sync = Synchroniser::new(SyncParams::default())?;
 /// for (stamp_ns, x) in [(0, 0.0), (2_000_000, 0.1)] {

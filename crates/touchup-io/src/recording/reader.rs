@@ -33,12 +33,12 @@ const MAX_METADATA_BYTES: u64 = 16 << 20;
 /// item, the error. The iterator gives poses and wrenches; [`Self::next_record`] also markers. Memory is bounded by the largest chunk, at most 256 MiB packed and as much unpacked.
 ///
 /// ```no_run
-/// use touchup::io::recording::{RecordingReader, Topics};
-/// use touchup::touch::Message;
+/// use touchup_io::recording::{RecordingReader, Topics};
+/// use touchup_core::touch::Message;
 /// let mut reader = RecordingReader::open("touch.mcap".as_ref(), &Topics::default())?;
 /// let poses = reader.by_ref().filter(|message| matches!(message, Ok(Message::Pose(_)))).count();
 /// println!("{poses} poses in {:?}", reader.pose_frame());
-/// # Ok::<(), touchup::io::recording::RecordingError>(())
+/// # Ok::<(), touchup_io::recording::RecordingError>(())
 /// ```
 pub struct RecordingReader {
     topics: Topics,

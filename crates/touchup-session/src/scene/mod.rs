@@ -144,10 +144,10 @@ impl Scene {
     ///
     /// # Example
     /// ```
-    /// let scene = touchup::scene::Scene::from_yaml("contact: { on_n: 0.5 }")?;
+    /// let scene = touchup_session::scene::Scene::from_yaml("contact: { on_n: 0.5 }")?;
     /// assert_eq!(scene.contact_params().unwrap().on, 0.5);
     /// assert!(scene.sync.is_none());
-    /// # Ok::<(), touchup::scene::SceneError>(())
+    /// # Ok::<(), touchup_session::scene::SceneError>(())
     /// ```
     pub fn from_yaml(yaml: &str) -> Result<Self, SceneError> {
         // comments between a key and its value are held, and there are few places for them

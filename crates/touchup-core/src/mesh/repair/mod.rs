@@ -82,10 +82,10 @@ impl fmt::Display for RepairReport {
 /// let p = |x, y| Point3::new(x, y, 0.0);
 /// // two triangles as STL has them: each with its own three vertices; the second one lies upside down
 /// let corners = vec![p(0.0, 0.0), p(1.0, 0.0), p(0.0, 1.0), p(1.0, 0.0), p(0.0, 1.0), p(1.0, 1.0)];
-/// let (mesh, report) = touchup::mesh::repair(corners, vec![[0, 1, 2], [3, 4, 5]])?;
+/// let (mesh, report) = touchup_core::mesh::repair(corners, vec![[0, 1, 2], [3, 4, 5]])?;
 /// assert_eq!((mesh.vertex_count(), mesh.face_count()), (4, 2));
 /// assert_eq!((report.welded_vertices, report.flipped_faces), (2, 1));
-/// # Ok::<(), touchup::mesh::MeshError>(())
+/// # Ok::<(), touchup_core::mesh::MeshError>(())
 /// ```
 pub fn repair(mut positions: Vec<Point3<f64>>, mut faces: Vec<[u32; 3]>) -> Result<(TriMesh, RepairReport), MeshError> {
     check(&positions, &faces)?;

@@ -148,14 +148,14 @@ impl Default for DynamicsParams {
 ///
 /// ```
 /// use nalgebra::{Point3, Vector3};
-/// use touchup::refine::{DynamicsParams, FaceDynamics, FaceState};
+/// use touchup_core::refine::{DynamicsParams, FaceDynamics, FaceState};
 ///
 /// let dynamics = FaceDynamics::new(DynamicsParams::default())?;
 /// let face = FaceState { b: Point3::origin(), n: Vector3::z() };
 /// // 2 N push up at 1 mm above the face: it rises towards the tip
 /// let moved = dynamics.step(&face, &Point3::new(0.0, 0.0, 1e-3), &Vector3::new(0.0, 0.0, 2.0), 1e-3)?;
 /// assert!(moved.b.z > 0.0 && moved.b.z < 1e-3);
-/// # Ok::<(), touchup::refine::DynamicsError>(())
+/// # Ok::<(), touchup_core::refine::DynamicsError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FaceDynamics {

@@ -42,7 +42,7 @@ const HELD_FRAMES: usize = 64;
 ///
 /// # Example
 /// ```
-/// # use touchup::touch::*;
+/// # use touchup_core::touch::*;
 /// # use nalgebra::{Isometry3, Point3, Vector3};
 /// let markers_t = [(30.0, 0.0, 150.0), (-30.0, 0.0, 150.0), (0.0, 40.0, 170.0), (0.0, -20.0, 200.0)];
 /// let body = MarkerBody::new(markers_t.map(|(x, y, z)| Point3::new(x, y, z) * 1e-3).to_vec())?;
