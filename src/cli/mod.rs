@@ -106,7 +106,7 @@ enum Verb {
     Simulate(simulate::SimulateArguments),
     /// Measures error against run time, stability and cost on this machine: runs `touchup-report`, a program of its own
     #[command(disable_help_flag = true)]
-    Report(report::ReportArguments),
+    Report(report::HandedOver),
     /// Refines a scan live, as a ROS 2 node
     #[cfg(any(feature = "ros", feature = "r2r"))]
     #[command(after_help = ROS_ARGUMENTS)]

@@ -13,7 +13,7 @@ use super::{CliError, Losses};
 const PROGRAM: &str = "touchup-report";
 
 #[derive(Debug, Args)]
-pub(super) struct ReportArguments {
+pub(super) struct HandedOver {
     /// Those of `touchup-report`; --help lists them
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
     arguments: Vec<OsString>,
@@ -39,7 +39,7 @@ pub enum NoReport {
 }
 
 /// The verb: ends with the exit code of that program.
-pub(super) fn report(arguments: &ReportArguments) -> Result<Losses, CliError> {
+pub(super) fn report(arguments: &HandedOver) -> Result<Losses, CliError> {
     let beside = std::env::current_exe().ok().map(|this| this.with_file_name(PROGRAM)).filter(|path| path.is_file());
     let path = beside.unwrap_or_else(|| PROGRAM.into());
     let status = Command::new(&path).args(&arguments.arguments).status().map_err(|source| match source.kind() {

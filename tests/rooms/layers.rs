@@ -1,42 +1,85 @@
-//! What the order of the crates cannot say: reads the sources and fails on a reference against the flow of data inside a crate, and on
-//! files, threads, clock, environment or printing in a crate that is pure. Comments, strings and inline tests do not count.
+//! What the order of the crates cannot say: reads the sources and fails on a reference that a room may not make, and on files, threads,
+//! clock, environment or printing in a crate that is pure. Comments, strings and inline tests do not count.
 
 use std::fs;
 use std::path::Path;
 
-/// A module, and those that it may use.
-type MayUse = (&'static str, &'static [&'static str]);
-
-/// In each crate that has an order of its own: each module and those it may use; itself always. Which crate may use which says
-/// its Cargo.toml.
-const MAY_USE: &[(&str, &[MayUse])] = &[
+/// Each room and the rooms it may use; itself always. A room that is missing here fails the check. The crates of the simulator, of files and
+/// of the report are a room each. Circles between crates need no check: cargo refuses them.
+const MAY_USE: &[(&str, &[&str])] = &[
+    ("clock", &[]),
+    ("touch", &[]),
+    ("mesh", &[]),
+    ("patch", &["touch", "mesh"]),
+    ("refine", &["touch", "mesh", "patch"]),
+    ("live", &["clock", "touch", "mesh", "patch", "refine"]),
+    ("explore", &["touch", "mesh", "features"]),
+    ("robot", &["touch", "explore"]),
+    ("probe", &["touch", "mesh", "features", "explore", "robot"]),
+    ("sim", &["touch", "mesh", "robot"]),
+    ("features", &["touch", "mesh"]),
+    ("align", &["mesh", "features"]),
+    ("compare", &["touch", "mesh", "align", "features"]),
+    ("calibrate", &["touch", "align"]),
+    ("io", &["touch", "mesh", "features", "align", "robot", "probe"]),
+    ("scene", &["touch", "mesh", "patch", "refine", "explore", "robot", "probe", "sim", "io"]),
+    ("replay", &["touch", "io", "scene"]),
+    ("session", &["clock", "touch", "mesh", "patch", "refine", "live", "features", "io"]),
     (
-        "touchup-core",
+        "report",
         &[
-            ("touch", &[]),
-            ("mesh", &[]),
-            ("patch", &["touch", "mesh"]),
-            ("refine", &["touch", "mesh", "patch"]),
-            ("features", &["touch", "mesh"]),
-            ("align", &["mesh", "features"]),
-            ("compare", &["touch", "mesh", "align", "features"]),
-            ("calibrate", &["touch", "align"]),
-            ("explore", &["touch", "mesh", "features"]),
-            ("robot", &["touch", "explore"]),
-            ("probe", &["touch", "mesh", "features", "explore", "robot"]),
+            "touch", "mesh", "patch", "refine", "live", "features", "align", "sim", "compare", "io", "scene",
+            "session", "replay",
+        ],
+    ),
+    ("ur", &["clock", "touch", "explore", "robot"]),
+    (
+        "ros",
+        &[
+            "clock",
+            "touch",
+            "mesh",
+            "patch",
+            "refine",
+            "live",
+            "features",
+            "explore",
+            "robot",
+            "probe",
+            "sim",
+            "align",
+            "calibrate",
+            "compare",
+            "io",
+            "scene",
+            "session",
         ],
     ),
     (
-        "touchup-session",
+        "cli",
         &[
-            ("clock", &[]),
-            ("live", &["clock"]),
-            ("scene", &[]),
-            ("replay", &["scene"]),
-            ("session", &["clock", "live"]),
+            "clock",
+            "touch",
+            "mesh",
+            "patch",
+            "refine",
+            "live",
+            "features",
+            "explore",
+            "robot",
+            "probe",
+            "sim",
+            "align",
+            "calibrate",
+            "compare",
+            "io",
+            "scene",
+            "session",
+            "replay",
+            "ros",
+            "ur",
         ],
     ),
-    ("touchup", &[("ur", &[]), ("ros", &["ur"]), ("cli", &["ur", "ros"])]),
 ];
 
 /// Same input, same bytes out: nothing of the world outside comes in.
@@ -218,10 +261,12 @@ fn names_at<'a>(tokens: &[&'a str], at: usize) -> Vec<&'a str> {
     names
 }
 
-/// Where a file is: its crate, its module, and how many modules deep it is; the module of a crate's root is empty.
+/// Where a file is.
 struct Place<'a> {
     package: &'a str,
-    module: &'a str,
+    /// empty for `lib.rs` and `main.rs` of a crate with several
+    room: &'a str,
+    /// how many modules deep, where the crate has several rooms; 0 where all of it is one
     depth: usize,
 }
 
@@ -232,30 +277,41 @@ impl<'a> Place<'a> {
             Some(file) => file.split_once("/src/").unwrap(),
             None => ("touchup", file.strip_prefix("src/").unwrap()),
         };
+        if let Some((_, room)) = WHOLE.iter().find(|(name, _)| *name == package) {
+            return Self { package, room, depth: 0 };
+        }
         let path = path.strip_suffix(".rs").unwrap();
         let path = path.strip_suffix("/mod").unwrap_or(path);
         if path == "lib" || path == "main" {
-            return Self { package, module: "", depth: 0 };
+            return Self { package, room: "", depth: 0 };
         }
-        Self { package, module: path.split('/').next().unwrap(), depth: path.split('/').count() }
+        Self { package, room: path.split('/').next().unwrap(), depth: path.split('/').count() }
     }
 }
 
-/// The modules that `tokens` reach, from the root of the crate or by enough `super`.
-fn modules_reached<'a>(tokens: &[&'a str], depth: usize) -> Vec<&'a str> {
-    let mut modules = Vec::new();
+/// Crates that are one room each, and its name.
+const WHOLE: &[(&str, &str)] = &[("touchup-sim", "sim"), ("touchup-io", "io"), ("touchup-report", "report")];
+
+/// Crates with several rooms, as other crates name them.
+const WITH_ROOMS: &[&str] = &["touchup_core", "touchup_session"];
+
+/// The rooms that `tokens` reach: of other crates by their names, of the own one from its root or by enough `super`.
+fn rooms_reached<'a>(tokens: &[&'a str], depth: usize) -> Vec<&'a str> {
+    let mut rooms = Vec::new();
     for at in 0..tokens.len() {
         if at >= 2 && tokens[at - 1] == "::" && (tokens[at - 2] == "super" || tokens[at] == "crate") {
             continue;
         }
+        let is_path = tokens.get(at + 1) == Some(&"::");
         let supers = tokens[at..].chunks(2).take_while(|pair| *pair == ["super", "::"]).count();
-        if tokens[at] == "crate" && tokens.get(at + 1) == Some(&"::") {
-            modules.extend(names_at(tokens, at + 2));
+        if is_path && (WITH_ROOMS.contains(&tokens[at]) || tokens[at] == "crate" && depth > 0) {
+            rooms.extend(names_at(tokens, at + 2));
         } else if supers > 0 && depth > 0 && supers >= depth {
-            modules.extend(names_at(tokens, at + 2 * supers));
+            rooms.extend(names_at(tokens, at + 2 * supers));
         }
+        rooms.extend(WHOLE.iter().filter(|(name, _)| name.replace('-', "_") == tokens[at]).map(|(_, room)| *room));
     }
-    modules
+    rooms
 }
 
 /// Every breach in one file, each as one line.
@@ -264,16 +320,14 @@ fn breaches(file: &str, source: &str) -> Vec<String> {
     let code = code_of(source);
     let tokens = tokens(&code);
     let mut found = Vec::new();
-    if let Some((_, modules)) = MAY_USE.iter().find(|(package, _)| *package == place.package)
-        && !place.module.is_empty()
-    {
-        let Some((module, allowed)) = modules.iter().find(|(module, _)| *module == place.module) else {
-            return vec![format!("{file}: the module {} is not in the table of tests/rooms/layers.rs", place.module)];
+    if !place.room.is_empty() {
+        let Some((room, allowed)) = MAY_USE.iter().find(|(room, _)| *room == place.room) else {
+            return vec![format!("{file}: the room {} is not in the table of tests/rooms/layers.rs", place.room)];
         };
-        let is_module = |name: &&str| modules.iter().any(|(module, _)| module == name);
-        let reached = modules_reached(&tokens, place.depth).into_iter();
-        let wrong = reached.filter(|name| is_module(name) && name != module && !allowed.contains(name));
-        found.extend(wrong.map(|name| format!("{file}: {module} may not use crate::{name}")));
+        let is_room = |name: &&str| MAY_USE.iter().any(|(room, _)| room == name);
+        let reached = rooms_reached(&tokens, place.depth).into_iter();
+        let wrong = reached.filter(|name| is_room(name) && name != room && !allowed.contains(name));
+        found.extend(wrong.map(|name| format!("{file}: {room} may not use {name}")));
     }
     let is_pure = PURE.contains(&place.package);
     let is_in = |starts: &[&str]| starts.iter().any(|start| file.starts_with(start));
@@ -309,18 +363,15 @@ fn rust_files(folder: &Path, into: &mut Vec<std::path::PathBuf>) {
 }
 
 #[test]
-fn every_module_keeps_to_the_flow_of_data() {
+fn every_room_keeps_to_the_flow_of_data() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut files = Vec::new();
     ["src", "crates"].iter().for_each(|folder| rust_files(&root.join(folder), &mut files));
     let names: Vec<&str> = files.iter().map(|path| path.strip_prefix(root).unwrap().to_str().unwrap()).collect();
     let names: Vec<&str> =
         names.into_iter().filter(|name| name.starts_with("src/") || name.contains("/src/")).collect();
-    for (package, modules) in MAY_USE {
-        for (module, _) in *modules {
-            let is_there = |name: &&str| Place::of(name).package == *package && Place::of(name).module == *module;
-            assert!(names.iter().any(is_there), "the module {module} of the table is not in {package}");
-        }
+    for (room, _) in MAY_USE {
+        assert!(names.iter().any(|name| Place::of(name).room == *room), "no file is in the room {room} of the table");
     }
     let found: Vec<_> =
         names.iter().flat_map(|name| breaches(name, &fs::read_to_string(root.join(name)).unwrap())).collect();
@@ -361,6 +412,11 @@ fn a_breach_is_found_however_it_is_written() {
         ("src/cli/ur.rs", "pyo3::Python::attach(f)"),
         ("src/ur/setup.rs", "std::fs::read(path)"),
         ("src/ur/arm.rs", "use crate::cli::demo;"),
+        ("src/ur/arm.rs", "use crate::sim::Plate;"),
+        ("crates/touchup-sim/src/arm.rs", "use touchup_core::patch::Patcher;"),
+        ("crates/touchup-sim/src/arm.rs", "use touchup_core::{mesh::TriMesh, features::Kind};"),
+        ("crates/touchup-session/src/scene/mod.rs", "fn f() -> touchup_core::features::Kind {}"),
+        ("crates/touchup-session/src/session/mod.rs", "use touchup_sim::Plate;"),
         ("cellar/mod.rs", ""),
     ];
     for (file, source) in bad {

@@ -90,7 +90,7 @@ fn a_fat_scan_is_told_from_a_shift_when_it_was_touched_from_all_sides() {
     assert!(found.twist.norm() < 1e-5, "{}", found.twist);
 }
 
-/// From one side surface_offset is a shift for all that touches tell: its own uncertainty must show.
+/// From one side the surface offset is a shift for all that touches tell: its own uncertainty must show.
 #[test]
 fn touched_from_one_side_of_each_axis_the_shift_is_as_uncertain_as_the_fatness() {
     let three = [sides()[0], sides()[2], sides()[4]];

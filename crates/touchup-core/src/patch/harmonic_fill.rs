@@ -9,7 +9,7 @@ use super::grid::{NodeState, ReconstructionGrid, cell_at, node_at};
 use super::lattice::{LatticeNode, Numbers, stepped};
 use super::table::CellTable;
 
-/// Settings of [`harmonic_fill`].
+/// Settings of [`complete`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct CompleteParams {
     /// weight of the scan beside the six neighbours of a node that is far from it

@@ -87,7 +87,7 @@ struct Mean {
     count: f64,
 }
 
-/// Twist and surface_offset.
+/// Twist and surface offset.
 type Unknowns = SVector<f64, 7>;
 type Information = SMatrix<f64, 7, 7>;
 
@@ -127,7 +127,7 @@ impl Registrar {
         for (name, value) in [
             ("scan noise (m)", scan_noise),
             ("correlation length of the scan (m)", correlation),
-            ("surface_offset of the scan (m)", surface_offset),
+            ("surface offset of the scan (m)", surface_offset),
             ("spacing of contacts (m)", spacing),
         ] {
             SettingError::check(name, value, value > 0.0, "more than 0")?;
