@@ -80,22 +80,24 @@ def test_types_of_our_own_exist():
 
 @pytest.fixture(scope="module")
 def colcon(tmp_path_factory):
-    """Runs colcon as docs/ros.md says, but below a folder of its own."""
-    logs = tmp_path_factory.mktemp("colcon")
+    """Runs colcon as docs/ros.md says: in a workspace, with this repository below `src`."""
+    workspace = tmp_path_factory.mktemp("workspace")
+    (workspace / "src").mkdir()
+    (workspace / "src/touchup").symlink_to(ROOT)
 
     def run(*arguments):
-        command = [str(Path(sys.executable).parent / "colcon"), "--log-base", str(logs), *arguments]
-        return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120)
+        command = [str(Path(sys.executable).parent / "colcon"), *arguments]
+        return subprocess.run(command, cwd=workspace, capture_output=True, text=True, timeout=120)
 
     return run
 
 
 def test_colcon_finds_both_packages_and_their_order(colcon):
-    found = colcon("list", "--base-paths", ".", "msg", "--topological-order")
+    found = colcon("list", "--topological-order")
     assert found.returncode == 0, found.stderr
     lines = [line.split() for line in found.stdout.splitlines()]
-    assert lines == [["touchup_msgs", "msg", "(ros.ament_cmake)"], ["touchup", ".", "(ros.ament_cargo)"]]
-    graph = colcon("graph", "--base-paths", ".", "msg")
+    assert lines == [["touchup_msgs", "src/touchup/msg", "(ros.ament_cmake)"], ["touchup", "src/touchup", "(ros.ament_cargo)"]]
+    graph = colcon("graph")
     assert graph.stdout.splitlines()[0].split() == ["touchup_msgs", "+*"]
 
 
