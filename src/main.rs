@@ -5,13 +5,16 @@ use std::io::{IsTerminal, stderr};
 use std::process::ExitCode;
 
 use touchup::cli::{log_filter, run};
-use tracing_subscriber::EnvFilter;
+use tracing_subscriber::filter::Targets;
+use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::util::SubscriberInitExt;
 
 fn main() -> ExitCode {
     let arguments: Vec<OsString> = std::env::args_os().collect();
     // RUST_LOG=touchup=debug shows more; results go to stdout, all else to stderr
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(log_filter(&arguments)));
-    let colours = stderr().is_terminal();
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(stderr).with_ansi(colours).without_time().init();
+    let wanted: Option<Targets> = std::env::var("RUST_LOG").ok().and_then(|levels| levels.parse().ok());
+    let filter = wanted.unwrap_or_else(|| log_filter(&arguments));
+    let lines = tracing_subscriber::fmt::layer().with_writer(stderr).with_ansi(stderr().is_terminal()).without_time();
+    tracing_subscriber::registry().with(lines).with(filter).init();
     run(arguments)
 }

@@ -38,6 +38,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
+use tracing_subscriber::filter::{LevelFilter, Targets};
 
 use crate::align::{FeaturesError, IcpError, PairsError};
 use crate::calibrate::{PayloadError, TipError};
@@ -348,14 +349,19 @@ fn ros_arguments(verb: &Verb, given: Vec<OsString>) -> Result<Vec<String>, CliEr
 }
 
 /// What is logged by default: that of `--log-level` behind `--ros-args`, else warnings.
-pub fn log_filter(arguments: &[OsString]) -> String {
+pub fn log_filter(arguments: &[OsString]) -> Targets {
     let (_, ros) = split(arguments);
     // the last one counts
     let level = ros.iter().rposition(|word| *word == "--log-level").and_then(|at| ros.get(at + 1)?.to_str());
-    let level = level.and_then(|level| log_level(level).ok()).unwrap_or("warn");
+    let level = level.and_then(|level| log_level(level).ok()?.parse().ok()).unwrap_or(LevelFilter::WARN);
     // the libraries below say what is no matter of the user; the last one complains, whenever a node ends, about writers that
     // have left the graph already
-    format!("{level},ros2_client=error,rustdds=error,rustdds::dds::pubsub=off")
+    let libraries = [
+        ("ros2_client", LevelFilter::ERROR),
+        ("rustdds", LevelFilter::ERROR),
+        ("rustdds::dds::pubsub", LevelFilter::OFF),
+    ];
+    Targets::new().with_default(level).with_targets(libraries)
 }
 
 /// Without ROS `--ros-args` is an argument like any other: nobody knows it.
