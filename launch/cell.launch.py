@@ -1,4 +1,4 @@
-"""A cell: the node, the frames of its scene, and RViz.
+"""A cell: the node, the frames of its scene, and RViz where it is installed.
 
     ros2 launch touchup cell.launch.py scan:=part.ply
     ros2 launch touchup cell.launch.py scan:=part.ply robot:=ur ur_type:=ur5e source:=probe scene:=cell.yaml
@@ -11,9 +11,9 @@ other parameters come from the file `params` unless they are given here.
 import os
 import shlex
 
-from ament_index_python.packages import get_package_share_directory
+from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
+from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction, Shutdown
 from launch.substitutions import Command, LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
@@ -22,6 +22,15 @@ from launch_ros.parameter_descriptions import ParameterValue
 def path(*below):
     """Absolute path of what is installed with touchup."""
     return os.path.join(get_package_share_directory("touchup"), *below)
+
+
+def is_installed(package):
+    """Whether this installation of ROS has the package."""
+    try:
+        get_package_share_directory(package)
+    except PackageNotFoundError:
+        return False
+    return True
 
 
 def absolute(given):
@@ -87,7 +96,9 @@ def actions(context):
     held = {"probe"} if robot == "ur" else set()
     started += [frames(tool, [f"scene:={scene}"], common) for tool in sorted(tools - held)]
 
-    if given("rviz") == "true":
+    if given("rviz") == "auto" and not is_installed("rviz2"):
+        started.append(LogInfo(msg="touchup: rviz2 is not installed, no viewer is started (apt install ros-$ROS_DISTRO-rviz2)"))
+    elif given("rviz") != "false":
         started.append(
             Node(
                 package="rviz2",
@@ -117,7 +128,7 @@ def generate_launch_description():
             argument("mesh_unit", default_value="", choices=["", "m", "mm", "inch"], description="Unit of its file."),
             argument("scene", default_value="", description="The scene YAML; empty: config/default.yaml."),
             argument("params", default_value="", description="Parameters of the node; empty: config/node.yaml."),
-            argument("rviz", default_value="true", choices=yes_no, description="Start RViz."),
+            argument("rviz", default_value="auto", choices=["auto", *yes_no], description="Start RViz; auto: where it is installed."),
             argument("namespace", default_value="", description="Namespace of the node and of RViz."),
             argument("use_sim_time", default_value="false", choices=yes_no, description="Time from /clock."),
             argument("ur_type", default_value="ur5e", description="With robot:=ur: which arm, as ur_description names it."),

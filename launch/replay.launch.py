@@ -46,7 +46,7 @@ def generate_launch_description():
             argument("scene", default_value="", description="The scene YAML; empty: config/default.yaml."),
             argument("params", default_value="", description="Parameters of the node; empty: config/node.yaml."),
             argument("source", default_value="stylus", choices=["stylus", "probe"], description="Who touched."),
-            argument("rviz", default_value="true", choices=["true", "false"], description="Start RViz."),
+            argument("rviz", default_value="auto", choices=["auto", "true", "false"], description="Start RViz; auto: where it is installed."),
             argument("namespace", default_value="", description="Namespace of the node, the player and RViz."),
             IncludeLaunchDescription(
                 PythonLaunchDescriptionSource(cell),

@@ -33,6 +33,7 @@ def installation(tmp_path_factory):
     share.mkdir(parents=True)
     for folder in ("launch", "config", "urdf"):
         (share / folder).symlink_to(ROOT / folder)
+    (prefix / "share/rviz2").mkdir()
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(STAND_INS))
         patch.setenv("PYTHONPATH", str(STAND_INS))
@@ -43,6 +44,11 @@ def installation(tmp_path_factory):
 
 def launched(file, **arguments):
     """Nodes that a launch file starts, by name."""
+    return visited(file, **arguments)[0]
+
+
+def visited(file, **arguments):
+    """Nodes that a launch file starts, by name, and the lines that it writes."""
     from launch import LaunchContext, visit
 
     description = runpy.run_path(str(ROOT / "launch" / file))["generate_launch_description"]()
@@ -51,7 +57,7 @@ def launched(file, **arguments):
     context = LaunchContext(arguments)
     visit(description.entities, context)
     assert len({node.name for node in context.nodes}) == len(context.nodes), "two nodes of one name"
-    return {node.name: node for node in context.nodes}
+    return {node.name: node for node in context.nodes}, context.lines
 
 
 def checked(urdf):
@@ -137,6 +143,20 @@ def test_a_cell_starts_the_node_its_frames_and_rviz(robot, source, tools):
     words = node.command_line()
     assert words[words.index("--ros-args") :][:3] == ["--ros-args", "-r", "__node:=touchup"]
     assert nodes["rviz"].arguments[0] == "-d" and Path(nodes["rviz"].arguments[1]).samefile(ROOT / "config/touchup.rviz")
+
+
+def test_without_a_viewer_everything_else_starts(installation):
+    viewer = installation.parent / "rviz2"
+    viewer.rmdir()
+    try:
+        nodes, lines = visited("cell.launch.py", scan="part.ply")
+        assert set(nodes) == {"touchup", "cell_state_publisher", "stylus_state_publisher"}
+        assert len(lines) == 1 and "rviz2 is not installed" in lines[0]
+        # who asks for it gets the error of ROS
+        assert "rviz" in launched("cell.launch.py", scan="part.ply", rviz="true")
+    finally:
+        viewer.mkdir()
+    assert visited("cell.launch.py", scan="part.ply")[1] == []
 
 
 def test_everything_is_in_the_namespace_and_keeps_one_clock():

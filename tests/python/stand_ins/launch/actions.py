@@ -31,6 +31,18 @@ class DeclareLaunchArgument(Action):
             raise RuntimeError(f'Argument "{self.name}" provided value "{values[self.name]}" is not valid.')
 
 
+class LogInfo(Action):
+    """Writes a line; here it is kept in the context."""
+
+    def __init__(self, *, msg, condition=None):
+        super().__init__(condition=condition)
+        self.msg = msg
+
+    def execute(self, context):
+        """Keeps the line."""
+        context.lines.append(perform(self.msg, context))
+
+
 class OpaqueFunction(Action):
     """Calls a function with the context; it returns further actions."""
 

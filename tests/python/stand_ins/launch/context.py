@@ -2,11 +2,11 @@
 
 
 class LaunchContext:
-    """Values of the arguments by name, and the nodes that would be started."""
+    """Values of the arguments by name, the nodes that would be started, and the lines that would be written."""
 
     def __init__(self, given):
         self.launch_configurations = dict(given)
-        self.nodes = []
+        self.nodes, self.lines = [], []
 
 
 def visit(entities, context):
