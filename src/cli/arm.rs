@@ -89,11 +89,11 @@ impl TruePayload {
     /// The simulated arm of a scene with it.
     pub fn held_by(&self, arm: ArmParams, scene: &Scene) -> Result<ArmParams, CliError> {
         let robot = scene.robot.clone().unwrap_or_default();
-        let centre = Vector3::from(robot.payload_centre_mm) / 1e3;
-        let told_payload = Payload { mass: robot.payload_kg, p_sc: centre, ..WEIGHTLESS };
+        let (mass, centre) = (robot.payload_mass, robot.payload_centre);
+        let told_payload = Payload { mass, p_sc: centre, ..WEIGHTLESS };
         let written = |text: &String| millimetres("--truth-payload-centre-mm", text);
         let p_sc = self.truth_payload_centre_mm.as_ref().map(written).transpose()?.unwrap_or(centre);
-        let payload = Payload { mass: self.truth_payload_kg.unwrap_or(robot.payload_kg), p_sc, ..WEIGHTLESS };
+        let payload = Payload { mass: self.truth_payload_kg.unwrap_or(mass), p_sc, ..WEIGHTLESS };
         Ok(ArmParams { payload, told_payload, ..arm })
     }
 }

@@ -509,19 +509,19 @@ impl RefineArguments {
     fn scene(&self) -> Result<Scene, CliError> {
         let mut scene = self.scene.as_deref().map_or_else(|| Ok(Scene::default()), Scene::read)?;
         if let Some(radius_mm) = self.tip_radius_mm {
-            scene.tip.get_or_insert_default().radius_mm = radius_mm;
+            scene.tip.get_or_insert_default().ball.radius = radius_mm / 1e3;
         }
         if let Some(stiffness) = self.stiffness_n_per_mm {
-            scene.tip.get_or_insert_default().stiffness_n_per_mm = Some(stiffness);
+            scene.tip.get_or_insert_default().ball.stiffness = Some(stiffness * 1e3);
         }
         if let Some(noise_mm) = self.scan_noise_mm {
-            scene.scan.get_or_insert_default().noise_mm = noise_mm;
+            scene.scan.get_or_insert_default().quality.noise = noise_mm / 1e3;
         }
         if let Some(mode) = self.mode {
             scene.refine.get_or_insert_default().mode = mode;
         }
         // the file was in range when it was read: what is not now came by a flag
-        scene.check().map_err(|error| CliError::Usage(error.to_string()))?;
+        scene.validate().map_err(|error| CliError::Usage(error.to_string()))?;
         Ok(scene)
     }
 }

@@ -8,8 +8,9 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 use super::names::{GraphPlace, NameError, Remap, checked, matches};
-use super::parameters::{ParameterError, ParameterValue, Parameters, nearest};
+use super::parameters::{ParameterError, ParameterValue, Parameters};
 use crate::io::parameters_file;
+use crate::scene::nearest;
 
 mod yaml;
 
@@ -292,7 +293,7 @@ impl NodeConfig {
 }
 
 fn unknown(argument: &str) -> ArgumentError {
-    let near = nearest(argument, KNOWN.iter().copied().filter(|known| known.len() > 2));
+    let near = nearest(argument, &KNOWN.iter().copied().filter(|known| known.len() > 2).collect::<Vec<_>>());
     ArgumentError::Unknown { argument: argument.to_owned(), near }
 }
 

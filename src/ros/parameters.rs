@@ -5,6 +5,10 @@ use std::fmt;
 
 use thiserror::Error;
 
+use crate::io::mesh_file::MeshUnit;
+use crate::scene::nearest;
+use touchup_core::parameters::Value;
+
 /// Value of a parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ParameterValue {
@@ -104,7 +108,7 @@ pub const PARAMETERS: &[ParameterDescriptor] = {
     &[
         fixed("scene", String(""), "the scene; empty: that of config/default.yaml"),
         fixed("scan", String(""), "the mesh to be refined; empty: the one that the scene names"),
-        fixed("mesh_unit", OneOf("mm", &["m", "mm", "inch"]), "unit of its coordinates"),
+        fixed("mesh_unit", OneOf("mm", MeshUnit::WORDS), "unit of its coordinates"),
         fixed("source", OneOf("stylus", &["stylus", "probe"]), "who touches"),
         fixed("session_folder", String("sessions"), "where sessions go, each in a folder of its own"),
         fixed("object_frame", String("object"), "frame of the mesh"),
@@ -241,35 +245,9 @@ fn within(name: &'static str, value: f64, from: f64, to: f64) -> Result<Paramete
 /// [`ParameterError::Unknown`], with the name that is meant when one is near.
 pub fn descriptor(name: &str) -> Result<&'static ParameterDescriptor, ParameterError> {
     PARAMETERS.iter().find(|declared| declared.name == name).ok_or_else(|| {
-        let near = nearest(name, PARAMETERS.iter().map(|declared| declared.name));
+        let near = nearest(name, &PARAMETERS.iter().map(|declared| declared.name).collect::<Vec<_>>());
         ParameterError::Unknown { name: name.to_owned(), near }
     })
-}
-
-/// The word that is meant: at most a third of its letters differ.
-pub(super) fn nearest(word: &str, known: impl Iterator<Item = &'static str>) -> Option<&'static str> {
-    // nobody types such a name by mistake, and the distance takes as long as both lengths multiplied
-    const LONGEST: usize = 64;
-    if word.len() > LONGEST {
-        return None;
-    }
-    let (distance, near) = known.map(|known| (edits(word, known), known)).min()?;
-    (3 * distance <= near.len()).then_some(near)
-}
-
-/// Letters to change, add or leave out to make one word of the other [Levenshtein 1966].
-fn edits(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, from) in a.chars().enumerate() {
-        let mut diagonal = std::mem::replace(&mut row[0], i + 1);
-        for (j, &to) in b.iter().enumerate() {
-            let changed = diagonal + usize::from(from != to);
-            diagonal = row[j + 1];
-            row[j + 1] = changed.min(diagonal + 1).min(row[j] + 1);
-        }
-    }
-    row[b.len()]
 }
 
 /// Values of all parameters. Each is what its descriptor allows.
@@ -379,8 +357,8 @@ mod tests {
             ),
         ];
         for (name, value, reason) in cases {
-            let told = parameters.set_live(name, &value).unwrap_err().to_string();
-            assert!(told.starts_with(reason), "{told}");
+            let error = parameters.set_live(name, &value).unwrap_err().to_string();
+            assert!(error.starts_with(reason), "{error}");
         }
         assert_eq!(parameters, Parameters::default());
     }

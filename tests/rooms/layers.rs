@@ -8,21 +8,22 @@ use std::path::Path;
 /// of the report are a room each. Circles between crates need no check: cargo refuses them.
 const MAY_USE: &[(&str, &[&str])] = &[
     ("clock", &[]),
-    ("touch", &[]),
+    ("parameters", &[]),
+    ("touch", &["parameters"]),
     ("mesh", &[]),
-    ("patch", &["touch", "mesh"]),
-    ("refine", &["touch", "mesh", "patch"]),
+    ("patch", &["parameters", "touch", "mesh"]),
+    ("refine", &["parameters", "touch", "mesh", "patch"]),
     ("live", &["clock", "touch", "mesh", "patch", "refine"]),
-    ("explore", &["touch", "mesh", "features"]),
-    ("robot", &["touch", "explore"]),
-    ("probe", &["touch", "mesh", "features", "explore", "robot"]),
+    ("explore", &["parameters", "touch", "mesh", "features"]),
+    ("robot", &["parameters", "touch", "explore"]),
+    ("probe", &["parameters", "touch", "mesh", "features", "explore", "robot"]),
     ("sim", &["touch", "mesh", "robot"]),
     ("features", &["touch", "mesh"]),
     ("align", &["mesh", "features"]),
     ("compare", &["touch", "mesh", "align", "features"]),
     ("calibrate", &["touch", "align"]),
-    ("io", &["touch", "mesh", "features", "align", "robot", "probe"]),
-    ("scene", &["touch", "mesh", "patch", "refine", "explore", "robot", "probe", "sim", "io"]),
+    ("io", &["parameters", "touch", "mesh", "features", "align", "robot", "probe"]),
+    ("scene", &["parameters", "touch", "mesh", "patch", "refine", "explore", "robot", "probe", "sim", "io"]),
     ("replay", &["touch", "io", "scene"]),
     ("session", &["clock", "touch", "mesh", "patch", "refine", "live", "features", "io"]),
     (
@@ -36,6 +37,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     (
         "ros",
         &[
+            "parameters",
             "clock",
             "touch",
             "mesh",

@@ -1,5 +1,7 @@
 //! The scene file from outside: the file that is shipped, what is refused, and what reaches the rooms.
 
+mod parameters;
+
 use std::collections::BTreeSet;
 
 use nalgebra::vector;
@@ -8,10 +10,10 @@ use touchup::io::mesh_file::MeshUnit;
 use touchup::patch::PatcherParams;
 use touchup::refine::{Along, ContactModel, DynamicsParams, GuardParams, RefineParams, RoiSize, StepRule, TipParams};
 use touchup::scene::{
-    BiasSection, BiasTrackingSection, CompensationSection, GravityAxes, MarkersSection, Mode, PayloadSection,
-    RobotSection, ScanToSpaceSection, Scene, SceneError, Setting,
+    CompensationSection, GravityAxes, MarkersSection, Mode, PayloadSection, RobotSection, ScanToSpaceSection, Scene,
+    SceneError, Setting,
 };
-use touchup::touch::{BiasParams, SyncParams, TipShape, WrenchFrame};
+use touchup::touch::{BiasParams, SensorBias, SensorMount, SyncParams, TipShape, WrenchFrame};
 
 const DEFAULT_YAML: &str = include_str!("../../config/default.yaml");
 
@@ -30,11 +32,12 @@ fn the_shipped_file_is_the_default() {
     assert_eq!(Scene::from_yaml(DEFAULT_YAML).unwrap(), Scene::default());
     let whole = Scene::from_yaml(&with_all_settings()).unwrap();
     assert_eq!(whole.markers, Some(MarkersSection::default()));
-    assert_eq!(whole.bias_tracking, Some(BiasTrackingSection::default()));
+    assert_eq!(whole.bias_tracking, Some(BiasParams::default()));
     let compensation = whole.compensation.clone().unwrap();
     assert_eq!(compensation.payload, Some(PayloadSection::default()));
     assert_eq!(whole.compensator_params(WrenchFrame::Sensor).pose_ts, nalgebra::Isometry3::identity());
-    let plain = CompensationSection { payload: None, bias: None, sensor_orientation_xyzw: None, ..compensation };
+    let mount = SensorMount { orientation_xyzw: None, ..compensation.mount };
+    let plain = CompensationSection { payload: None, bias: None, mount };
     assert_eq!(plain, CompensationSection::default());
 }
 
@@ -107,7 +110,7 @@ fn the_default_scene_is_the_preset_of_each_mode() {
     scene.guard = None;
     assert_eq!(scene.refine_params(WrenchFrame::Sensor), Some(RefineParams::paper(tip)));
     let mut scene = Scene::default();
-    scene.tip.as_mut().unwrap().stiffness_n_per_mm = None;
+    scene.tip.as_mut().unwrap().ball.stiffness = None;
     let rigid = RefineParams::robust(TipParams { stiffness: None, ..tip });
     assert_eq!(scene.refine_params(WrenchFrame::Sensor), Some(rigid));
 }
@@ -115,7 +118,7 @@ fn the_default_scene_is_the_preset_of_each_mode() {
 #[test]
 fn a_part_is_built_only_when_named() {
     let none = Scene::from_yaml("{}").unwrap();
-    assert!(none.refine_params(WrenchFrame::Sensor).is_none() && none.contact_params().is_none());
+    assert!(none.refine_params(WrenchFrame::Sensor).is_none() && none.contact.is_none());
     assert!(none.patcher_params(WrenchFrame::Sensor).is_none());
     let SyncParams { reorder_ns, largest_gap_ns, .. } = none.sync_params();
     assert_eq!((reorder_ns, largest_gap_ns), (0, 0));
@@ -160,7 +163,7 @@ fn a_header_alone_takes_the_defaults() {
             "markers" => expected.markers = Some(MarkersSection::default()),
             "scan_to_space" => expected.scan_to_space = Some(ScanToSpaceSection::default()),
             "compensation" => expected.compensation = Some(CompensationSection::default()),
-            "bias_tracking" => expected.bias_tracking = Some(BiasTrackingSection::default()),
+            "bias_tracking" => expected.bias_tracking = Some(BiasParams::default()),
             "robot" => expected.robot = Some(RobotSection::default()),
             _ => {}
         }
@@ -169,7 +172,7 @@ fn a_header_alone_takes_the_defaults() {
     }
     assert_eq!(sections, 16);
     let inner = Scene::from_yaml("compensation:\n  payload:\n  bias:\n").unwrap().compensation.unwrap();
-    assert_eq!((inner.payload, inner.bias), (Some(PayloadSection::default()), Some(BiasSection::default())));
+    assert_eq!((inner.payload, inner.bias), (Some(PayloadSection::default()), Some(SensorBias::default())));
 }
 
 #[test]
@@ -335,13 +338,14 @@ fn bias_tracking_is_built_only_when_named_and_not_in_the_paper() {
 /// A scene as a user wrote it, with what each calibration sets.
 fn calibrated(yaml: &str) -> Result<String, SceneError> {
     let mut expected = if yaml.trim().is_empty() { Scene::from_yaml("{}") } else { Scene::from_yaml(yaml) }.unwrap();
-    let section = ScanToSpaceSection { position_mm: [1.5, -2.0, 3.25], orientation_xyzw: [0.0, 0.6, 0.0, 0.8] };
+    let section =
+        ScanToSpaceSection { position: vector![1.5, -2.0, 3.25] / 1e3, orientation_xyzw: [0.0, 0.6, 0.0, 0.8] };
     expected.scan_to_space = Some(section);
-    expected.tip.get_or_insert_default().offset_mm = Some([0.5, 0.0, -142.0]);
+    expected.tip.get_or_insert_default().offset = Some(vector![0.5, 0.0, -142.0] / 1e3);
     let compensation = expected.compensation.get_or_insert_default();
     let payload = compensation.payload.get_or_insert_default();
-    (payload.mass_kg, payload.gravity_axes) = (0.25, GravityAxes::Space);
-    compensation.bias.get_or_insert_default().force_n = [1.0, 2.0, 3.0];
+    (payload.payload.mass, payload.gravity_axes) = (0.25, GravityAxes::Space);
+    compensation.bias.get_or_insert_default().force = vector![1.0, 2.0, 3.0];
     let settings = [
         Setting::list(&["scan_to_space", "position_mm"], &[1.5, -2.0, 3.25]),
         Setting::list(&["scan_to_space", "orientation_xyzw"], &[0.0, 0.6, 0.0, 0.8]),
@@ -403,8 +407,8 @@ compensation: { payload: { mass_kg: 1, centre_mm: [1, 2, 3] }, # the new sensor
 
 /// However a scene is written, the result is right (which `edited` checks itself), or it is refused with what to do.
 #[test]
-fn every_way_of_writing_is_edited_or_refused() {
-    let ways = [
+fn every_form_of_writing_is_edited_or_refused() {
+    let forms = [
         "",
         "# only a comment",
         "tip:",
@@ -421,17 +425,17 @@ fn every_way_of_writing_is_edited_or_refused() {
         "compensation:\n  bias: {}\n  payload: ~\n",
         "scan_to_space: {}\ntip:\n  # nothing\n#tail\n",
     ];
-    for way in ways {
-        let after = calibrated(way).unwrap_or_else(|error| panic!("{way:?}: {error}"));
-        assert_eq!(calibrated(&after).unwrap(), after, "{way:?} twice");
+    for form in forms {
+        let after = calibrated(form).unwrap_or_else(|error| panic!("{form:?}: {error}"));
+        assert_eq!(calibrated(&after).unwrap(), after, "{form:?} twice");
         let comments = |text: &str| text.lines().filter(|line| line.trim_start().starts_with('#')).count();
-        assert!(comments(&after) >= comments(way), "{way:?}: {after}");
+        assert!(comments(&after) >= comments(form), "{form:?}: {after}");
     }
-    for way in ["tip: &t { radius_mm: 2 }\n", "tip: !!map\n  radius_mm: 2\n", "? tip\n: { radius_mm: 2 }\n"] {
-        if Scene::from_yaml(way).is_err() {
+    for form in ["tip: &t { radius_mm: 2 }\n", "tip: !!map\n  radius_mm: 2\n", "? tip\n: { radius_mm: 2 }\n"] {
+        if Scene::from_yaml(form).is_err() {
             continue;
         }
-        match calibrated(way) {
+        match calibrated(form) {
             Ok(_) => {}
             Err(error) => {
                 assert!(error.to_string().contains("by hand: scan_to_space.position_mm: [1.5, -2, 3.25]"), "{error}")
@@ -490,15 +494,15 @@ fn gravity_in_the_axes_of_space_turns_with_the_scan() {
     assert_eq!(scene("object", turned), vector![0.0, 0.0, -9.81]);
     assert_eq!(scene("space", "tip: "), vector![0.0, 0.0, -9.81]);
     for bad in ["scan_to_space: { orientation_xyzw: [0, 0, 0, 0.9] }", "tip: { offset_mm: [0, 0, 1e9] }"] {
-        assert!(matches!(Scene::from_yaml(bad), Err(SceneError::OutOfRange { .. })), "{bad}");
+        assert!(matches!(Scene::from_yaml(bad), Err(SceneError::Setting(_))), "{bad}");
     }
     assert_eq!(Scene::default().placement(), None);
 }
 
 /// Names as they stand in the YAML, in its order, listed here by hand.
 #[test]
-fn a_scene_tells_what_is_built_of_it_and_what_is_left_out() {
-    let told = |yaml: &str| {
+fn a_scene_reports_what_is_built_of_it_and_what_is_left_out() {
+    let built = |yaml: &str| {
         let mut built = Scene::from_yaml(yaml).unwrap().built(&["robot"], &touchup::FEATURES);
         // what the program was compiled with differs from one to the other
         for names in [&mut built.built, &mut built.left_out] {
@@ -508,14 +512,14 @@ fn a_scene_tells_what_is_built_of_it_and_what_is_left_out() {
     };
     let all_but_refine = "sync, clock, markers, scan_to_space, compensation, bias_tracking, contact, tip, scan, \
                           scan.region, sliding, carve, guard, patch, uncertainty, robot";
-    assert_eq!(told("refine:"), format!("built: refine; left out: {all_but_refine}"));
-    assert_eq!(told("sync:\nrefine:\ncontact:"), {
+    assert_eq!(built("refine:"), format!("built: refine; left out: {all_but_refine}"));
+    assert_eq!(built("sync:\nrefine:\ncontact:"), {
         let left_out = "clock, markers, scan_to_space, compensation, bias_tracking, tip, scan, scan.region, sliding, carve, guard, \
                         patch, uncertainty, robot";
         format!("built: sync, contact, refine; left out: {left_out}")
     });
     // the mode of the paper takes neither contact, sliding, carving nor a patch, whatever is named
-    let paper = told("contact:\ntip:\nsliding:\ncarve:\npatch:\nuncertainty:\nguard:\nrefine: { mode: paper }");
+    let paper = built("contact:\ntip:\nsliding:\ncarve:\npatch:\nuncertainty:\nguard:\nrefine: { mode: paper }");
     assert!(paper.starts_with("built: tip, guard, refine; left out: sync"), "{paper}");
     assert!(paper.ends_with("sliding, carve, patch, uncertainty, robot"), "{paper}");
 }

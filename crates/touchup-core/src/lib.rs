@@ -5,6 +5,7 @@
 //!
 //! | module | what it does |
 //! |---|---|
+//! | [`mod@parameters`] | what is declared of each key of the scene: unit, range, default, documentation |
 //! | [`touch`] | pose and wrench become one [`touch::Sample`]: pairing, compensation, contact, friction |
 //! | [`mesh`] | the triangle mesh, its repair, its exact closest-face tree, its Laplacian |
 //! | [`patch`] | the touched part of the scan reconstructed |
@@ -38,6 +39,7 @@ pub mod compare;
 pub mod explore;
 pub mod features;
 pub mod mesh;
+pub mod parameters;
 pub mod patch;
 pub mod probe;
 pub mod refine;

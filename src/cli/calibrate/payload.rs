@@ -13,8 +13,8 @@ use super::super::{CliError, Losses};
 use super::{CalibrationRecording, CalibrationTarget, Change, DraftScene, Vector, payload_by_arm, rounded};
 use crate::calibrate::{PayloadFit, PayloadParams, StaticPose, StillFinder, StillParams, fit_payload};
 use crate::io::static_poses::read_static_poses;
-use crate::scene::{BiasSection, GravityAxes, PayloadSection, Scene, Setting};
-use crate::touch::WrenchFrame;
+use crate::scene::{GravityAxes, PayloadSection, Scene, Setting};
+use crate::touch::{Payload, SensorBias, WrenchFrame};
 
 #[derive(Debug, Args)]
 #[group(id = "poses", required = true, multiple = false, args = ["bag", "samples", "robot"])]
@@ -163,28 +163,24 @@ impl PayloadFound {
 
     fn change(&self, draft: &DraftScene) -> Change {
         let digits = |values: &[f64; 3], digits| values.map(|x| rounded(x, digits));
-        let payload = PayloadSection {
-            mass_kg: rounded(self.mass_kg, 10),
-            centre_mm: digits(&self.centre_mm.value, 7),
-            gravity_m_per_s2: digits(&self.gravity_m_per_s2, 10),
-            gravity_axes: GravityAxes::Space,
-        };
-        let bias = BiasSection {
-            force_n: digits(&self.bias_force_n.value, 10),
-            torque_nm: digits(&self.bias_torque_nm.value, 10),
-        };
+        let (mass_kg, gravity_m_per_s2) = (rounded(self.mass_kg, 10), digits(&self.gravity_m_per_s2, 10));
+        let centre_mm = digits(&self.centre_mm.value, 7);
+        let [force_n, torque_nm] = [&self.bias_force_n, &self.bias_torque_nm].map(|bias| digits(&bias.value, 10));
         let key = |key| ["compensation", "payload", key];
         let settings = vec![
-            Setting::scalar(&key("mass_kg"), payload.mass_kg),
-            Setting::list(&key("centre_mm"), &payload.centre_mm),
-            Setting::list(&key("gravity_m_per_s2"), &payload.gravity_m_per_s2),
-            Setting::scalar(&key("gravity_axes"), "space"),
-            Setting::list(&["compensation", "bias", "force_n"], &bias.force_n),
-            Setting::list(&["compensation", "bias", "torque_nm"], &bias.torque_nm),
+            Setting::scalar(&key("mass_kg"), mass_kg),
+            Setting::list(&key("centre_mm"), &centre_mm),
+            Setting::list(&key("gravity_m_per_s2"), &gravity_m_per_s2),
+            Setting::scalar(&key("gravity_axes"), GravityAxes::Space.word()),
+            Setting::list(&["compensation", "bias", "force_n"], &force_n),
+            Setting::list(&["compensation", "bias", "torque_nm"], &torque_nm),
         ];
         let mut expected: Scene = draft.scene.clone();
         let compensation = expected.compensation.get_or_insert_default();
-        (compensation.payload, compensation.bias) = (Some(payload), Some(bias));
+        let p_sc = Vector3::from(centre_mm) / 1e3;
+        let payload = Payload { mass: mass_kg, p_sc, gravity_o: gravity_m_per_s2.into() };
+        compensation.payload = Some(PayloadSection { gravity_axes: GravityAxes::Space, payload });
+        compensation.bias = Some(SensorBias { force: force_n.into(), torque: torque_nm.into() });
         let remark = format!(
             "payload: {} still phases, residuals {:.3} N and {:.4} N·m rms",
             self.still_phases, self.residual_force_n, self.residual_torque_nm

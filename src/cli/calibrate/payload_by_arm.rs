@@ -5,6 +5,7 @@
 
 use std::fmt;
 
+use nalgebra::Vector3;
 use serde::Serialize;
 
 use super::super::arm::RobotName;
@@ -83,7 +84,7 @@ impl WeighedFound {
         let payload_centre_mm = self.payload.centre_mm.value.map(|mm| rounded(mm, 7));
         let mut expected = draft.scene.clone();
         let robot = expected.robot.get_or_insert_default();
-        (robot.payload_kg, robot.payload_centre_mm) = (payload_kg, payload_centre_mm);
+        (robot.payload_mass, robot.payload_centre) = (payload_kg, Vector3::from(payload_centre_mm) / 1e3);
         Change {
             settings: vec![
                 Setting::scalar(&["robot", "payload_kg"], payload_kg),

@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use nalgebra::Vector6;
+use nalgebra::{Vector3, Vector6};
 use serde::Serialize;
 use tracing::warn;
 
@@ -63,7 +63,7 @@ impl ScanArguments {
         let scene = Scene { scan_to_space: None, ..draft.reading() };
         let tip = scene.tip_params();
         let params = RestParams {
-            gate: scene.contact_params().unwrap_or_default(),
+            gate: scene.contact.unwrap_or_default(),
             radius: tip.radius,
             stiffness: tip.stiffness,
             ..RestParams::default()
@@ -87,7 +87,7 @@ impl ScanArguments {
 /// A weight whose direction was named in the axes of the scan may not have been meant for the scan as it lies now.
 fn warn_of_gravity(scene: &Scene) {
     let payload = scene.compensation.as_ref().and_then(|compensation| compensation.payload.as_ref());
-    if payload.is_some_and(|payload| payload.gravity_axes == GravityAxes::Object && payload.mass_kg > 0.0) {
+    if payload.is_some_and(|payload| payload.gravity_axes == GravityAxes::Object && payload.payload.mass > 0.0) {
         warn!(
             "compensation.payload.gravity_m_per_s2 stays in the axes of the scan: see that it points down there, or calibrate \
              the payload anew, which names it in those of space"
@@ -149,7 +149,7 @@ impl ScanFound {
 
     fn change(&self, draft: &DraftScene) -> Change {
         let ScanMotion { position_mm, orientation_xyzw } = self.scan_to_space;
-        let section = ScanToSpaceSection { position_mm, orientation_xyzw };
+        let section = ScanToSpaceSection { position: Vector3::from(position_mm) / 1e3, orientation_xyzw };
         Change {
             settings: vec![
                 Setting::list(&["scan_to_space", "position_mm"], &position_mm),

@@ -35,7 +35,7 @@ pub(super) fn stiffness(arguments: &StiffnessArguments) -> Result<Losses, CliErr
     let found = StiffnessFound::of(&repeated(arm, scene, spot, *touches)?);
     let stiffness_n_per_mm = rounded(found.stiffness_n_per_mm, 3);
     let mut expected = draft.scene.clone();
-    expected.tip.get_or_insert_default().stiffness_n_per_mm = Some(stiffness_n_per_mm);
+    expected.tip.get_or_insert_default().ball.stiffness = Some(stiffness_n_per_mm * 1e3);
     let change = Change {
         settings: vec![Setting::scalar(&["tip", "stiffness_n_per_mm"], stiffness_n_per_mm)],
         remark: format!("stiffness: {} presses, ± {:.3} N/mm", found.touches, found.std_n_per_mm),

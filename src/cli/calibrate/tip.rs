@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::PathBuf;
 
 use clap::Args;
+use nalgebra::Vector3;
 use serde::Serialize;
 
 use super::super::arm::{CellArguments, RobotName};
@@ -73,7 +74,7 @@ pub(super) fn tip(arguments: &TipArguments) -> Result<Losses, CliError> {
     let mut swing = Swing { poses: Vec::new(), stride: 1, seen: 0 };
     let mut scene = draft.reading();
     // the poses as they are recorded: an older offset does not count
-    scene.tip.iter_mut().for_each(|tip| tip.offset_mm = None);
+    scene.tip.iter_mut().for_each(|tip| tip.offset = None);
     let replayed = source.replay(source.open(bag)?, &scene, |sample| swing.push(sample.pose_ot))?;
     let fit =
         fit_tip(&swing.poses, &TipFitParams::default()).map_err(|error| CliError::Tip { path: bag.clone(), error })?;
@@ -113,7 +114,7 @@ impl TipFound {
     fn change(&self, draft: &DraftScene) -> Change {
         let offset_mm = self.offset_mm.value.map(|x| rounded(x, 7));
         let mut expected: Scene = draft.scene.clone();
-        expected.tip.get_or_insert_default().offset_mm = Some(offset_mm);
+        expected.tip.get_or_insert_default().offset = Some(Vector3::from(offset_mm) / 1e3);
         Change {
             settings: vec![Setting::list(&["tip", "offset_mm"], &offset_mm)],
             remark: format!("tip: {} poses, residuals {:.3} mm rms", self.poses, self.residual_mm),

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use serde::Serialize;
 
 use super::super::arm::{RobotName, millimetres};
@@ -74,7 +74,7 @@ impl PivotFound {
     fn change(&self, draft: &DraftScene) -> Change {
         let tip_position_mm = self.tip_position_mm.value.map(|mm| rounded(mm, 7));
         let mut expected = draft.scene.clone();
-        expected.robot.get_or_insert_default().tip_position_mm = tip_position_mm;
+        expected.robot.get_or_insert_default().tip_position = Vector3::from(tip_position_mm) / 1e3;
         Change {
             settings: vec![Setting::list(&["robot", "tip_position_mm"], &tip_position_mm)],
             remark: format!("tip: {} touches, residuals {:.4} mm rms", self.touches, self.residual_mm),

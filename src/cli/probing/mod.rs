@@ -86,8 +86,8 @@ pub(super) fn ur_params(scene: &Scene) -> Result<UrParams, CliError> {
     let (robot, (cell, _)) = robot.ok_or_else(|| CliError::Usage(NO_HOST.to_owned()))?;
     Ok(UrParams {
         pose_ft: cell.pose_ft,
-        mass: robot.payload_kg,
-        centre: nalgebra::Vector3::from(robot.payload_centre_mm) / 1e3,
+        mass: robot.payload_mass,
+        centre: robot.payload_centre,
         is_lock_step: std::env::var_os(LOCK_STEP).is_some(),
         ..UrParams::new(&robot.host, &robot.site_packages)
     })
@@ -119,7 +119,7 @@ impl Ready {
 
     /// Half width within which the scene wants numbers to be known, mm.
     pub fn tolerance_mm(&self) -> f64 {
-        self.scene.robot.as_ref().map_or(f64::NAN, |robot| robot.tolerance_mm)
+        self.scene.robot.as_ref().map_or(f64::NAN, |robot| robot.tolerance * 1e3)
     }
 
     /// Whether the scene allows motion.

@@ -134,7 +134,7 @@ fn the_corner_is_found_whatever_the_arm_does_after_it() {
 fn without_braking_and_the_way_back_the_delay_is_uncertainty() {
     let both = made(&MAKING, 1);
     let braking = both.iter().position(|m| m.force > 2.0).unwrap();
-    let params = OnsetParams::default();
+    let params = OnsetParams { force_noise: 0.05, ..OnsetParams::default() };
     let found = find_onset(&both[..braking], &params).unwrap();
     assert!((found.travel - MAKING.onset).abs() < 2.0 * found.sigma, "{found:?}");
     let by_delay = params.delay_sigma * MAKING.speed;
@@ -145,7 +145,7 @@ fn without_braking_and_the_way_back_the_delay_is_uncertainty() {
 
 #[test]
 fn what_is_no_clean_touch_is_told() {
-    let params = OnsetParams::default();
+    let params = OnsetParams { force_noise: 0.05, ..OnsetParams::default() };
     let verdict = |moments: &[TouchMoment]| find_onset(moments, &params).unwrap().verdict;
     let clean = made(&MAKING, 1);
     assert_eq!(verdict(&clean), OnsetVerdict::Clean);
@@ -175,7 +175,7 @@ fn what_is_no_clean_touch_is_told() {
 
 #[test]
 fn what_is_no_touch_is_refused() {
-    let params = OnsetParams::default();
+    let params = OnsetParams { force_noise: 0.05, ..OnsetParams::default() };
     let clean = made(&MAKING, 1);
     let air: Vec<_> = clean.iter().copied().take_while(|m| m.travel < 2e-3).collect();
     assert!(matches!(find_onset(&air, &params), Err(OnsetError::NoContact { .. })));

@@ -104,7 +104,7 @@ fn what_is_wrong_is_named_with_a_way_out() {
         ("--scene x", "--ros-args does not know \"--scene\""),
         ("-p", "-p needs NAME:=VALUE behind it"),
         ("-p scan=part.ply", "-p scan=part.ply: it must be NAME:=VALUE, as in scan:=part.ply"),
-        ("-p scna:=part.ply", "-p scna:=part.ply: there is no parameter \"scna\""),
+        ("-p scna:=part.ply", "-p scna:=part.ply: there is no parameter \"scna\": did you mean \"scan\"?"),
         (
             "-p view_rat_hz:=1",
             "-p view_rat_hz:=1: there is no parameter \"view_rat_hz\": did you mean \"view_rate_hz\"?",

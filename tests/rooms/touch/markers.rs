@@ -118,7 +118,7 @@ fn a_step_is_followed_as_by_a_critically_damped_spring() {
 /// Springs from far too soft to far too stiff, frames at random times with random markers: the noise stays noise.
 #[test]
 fn no_spring_and_no_set_of_markers_blows_up() {
-    for frequency in [0.1, 1.0, 12.0, 200.0, 1e6, 1e300] {
+    for frequency in [0.1, 1.0, 12.0, 200.0, 1e6] {
         for damping in [0.5, 1.0, 10.0] {
             let mut rng = Pcg64::seed_from_u64(7);
             let mut stamp_ns = 0;
@@ -321,6 +321,7 @@ fn bodies_and_settings_without_a_meaning_are_refused() {
         MarkerParams { reorder_ns: -1, ..good },
         MarkerParams { spring: SpringParams { frequency: 9.0, damping: 0.4 }, ..good },
         MarkerParams { spring: SpringParams { frequency: 0.0, damping: 1.0 }, ..good },
+        MarkerParams { spring: SpringParams { frequency: 1e300, damping: 1.0 }, ..good },
         MarkerParams { spring: SpringParams { frequency: 9.0, damping: f64::INFINITY }, ..good },
     ] {
         assert!(MarkerFilter::new(body(), bad).is_err(), "{bad:?}");

@@ -9,40 +9,34 @@ use super::slide::Slide;
 use super::{boss, edge, hole, plane, region, slot};
 use crate::features::fit::Observation;
 use crate::features::{Feature, Kind};
+use crate::parameters;
 
-/// What is known and wanted of a flagged feature.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PatternParams {
-    /// Of the ball, m.
-    pub ball_radius: f64,
-    /// The flag is off by no more than this, m; of a plane or an unknown region: so far around the flag is touched.
-    pub flag_radius: f64,
-    /// The ball starts this far above the surface, m.
-    pub clearance: f64,
-    /// It is let in no deeper than this, m.
-    pub depth: f64,
-    /// The number that touches are chosen for.
-    pub quantity: Quantity,
-    /// Wanted standard deviation of it, m, or rad of an axis.
-    pub sigma: f64,
-    /// Touches at most.
-    pub budget: usize,
-    /// Standard deviation of one touch that is expected, m.
-    pub touch_sigma: f64,
-}
-
-impl Default for PatternParams {
-    fn default() -> Self {
-        Self {
-            ball_radius: 1.5e-3,
-            flag_radius: 3e-3,
-            clearance: 3e-3,
-            depth: 5e-3,
-            quantity: Quantity::All,
-            sigma: 4e-6,
-            budget: 39,
-            touch_sigma: 5e-6,
-        }
+parameters! {
+    /// What is known and wanted of a flagged feature.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct PatternParams in "robot" {
+        /// Of the ball, m.
+        ball_radius: f64 = 1.5e-3;
+        /// The flag is off by no more than this, m; of a plane or an unknown region: so far around the flag is touched.
+        flag_radius: f64 = 3e-3;
+        /// Distance of the ball from the surface where a search begins.
+        ///
+        /// In m.
+        clearance: f64 = 3.0, "clearance_mm" [MM, 0.5, 50];
+        /// How deep the centre of the ball is let into a hole.
+        ///
+        /// In m.
+        depth: f64 = 5.0, "depth_mm" [MM, 0, 100];
+        /// The number that touches are chosen for.
+        quantity: Quantity = Quantity::All;
+        /// Wanted standard deviation of it, m, or rad of an axis.
+        sigma: f64 = 4e-6;
+        /// Touches of a feature at most.
+        budget: usize = 39, "touches" [TOUCHES, 1, 1e4];
+        /// Expected standard deviation of one touch.
+        ///
+        /// In m.
+        touch_sigma: f64 = 0.005, "touch_sigma_mm" [MM, 1e-5, 1];
     }
 }
 

@@ -7,19 +7,21 @@
 
 use nalgebra::Vector3;
 
-/// What a calibration leaves uncertain; standard deviations.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CalibrationParams {
-    /// of the surface along its normal by radius of the ball and frame of the scan, m. Default 2 µm: a ball of ruby is
-    /// round within 0.2 µm, a gauge block tells the centre within a few.
-    pub position: f64,
-    /// of the stiffness, as a share. Default 2 %: a weight of 1 N that bends a stylus by 50 µm, read within 1 µm.
-    pub stiffness_share: f64,
-}
+use crate::parameters;
 
-impl Default for CalibrationParams {
-    fn default() -> Self {
-        Self { position: 2e-6, stiffness_share: 0.02 }
+parameters! {
+    /// What a calibration leaves uncertain; standard deviations.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct CalibrationParams in "uncertainty" {
+        /// What is left after calibrating the radius of the tip and the frame of the scan, along the normal; it averages out in no
+        /// number of touches.
+        ///
+        /// In m. A ball of ruby is round within 0.2 µm, a gauge block gives the centre within a few.
+        position: f64 = 0.002, "calibration_mm" [MM, 0, 1000];
+        /// What is left after calibrating the stiffness of the tip.
+        ///
+        /// As a share. A weight of 1 N that bends a stylus by 50 µm, read within 1 µm.
+        stiffness_share: f64 = 2.0, "stiffness_percent" [PERCENT, 0, 100];
     }
 }
 

@@ -67,7 +67,7 @@ pub use history::History;
 pub use lattice::{Edge, Lattice, LatticeNode, Owner, PatchFace, Square, VertexKey};
 pub use outliers::{Outlier, Outliers};
 pub use patched::{Patched, Support};
-pub use patcher::{PatchRegion, Patcher, PatcherParams, UncertaintyParams};
+pub use patcher::{PatchParams, PatchRegion, Patcher, PatcherParams, UncertaintyParams};
 pub use probed_log::ProbedLog;
 pub use scan_clipping::Cut;
 pub use scan_value::ScanValue;

@@ -19,6 +19,7 @@ use super::touches::{TipTouch, TouchFinder, TouchFinderParams};
 use super::unreachable::mark_unreachable;
 use super::vertex_uncertainty::vertex_sigma;
 use crate::mesh::{FaceTree, MeshError, Region, TriMesh};
+use crate::parameters;
 use crate::touch::{Compensator, CompensatorParams, ProbedPoint, Sample, SettingError, TipBody, TipShape};
 
 /// Settings of a [`Patcher`].
@@ -51,33 +52,39 @@ pub struct PatchRegion {
     pub faces: usize,
 }
 
-/// What is said of how well the mesh is known.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct UncertaintyParams {
-    /// standard deviation of a vertex of the scan, m; 0: free of noise
-    pub scan: f64,
-    /// what the calibration leaves
-    pub calibration: CalibrationParams,
-    /// contacts that contradict by more standard deviations than this are rejected
-    pub gate_sigmas: f64,
+parameters! {
+    /// How fine the reconstructed surface is.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct PatchParams in "patch" {
+        /// Edge length of the new faces; left out: half the radius of the tip.
+        ///
+        /// In m.
+        pitch: Option<f64> = None, "pitch_mm" [MM, 0.001, 1000] like "0.75";
+        /// The result has at most this many times the faces of the scan (and 5000): where it would have more, the new faces become
+        /// larger.
+        most_faces: f64 = 10.0, "most_faces" [SCANS, 1, 1e6];
+    }
+}
+
+parameters! {
+    /// What is asked of how well the mesh is known.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct UncertaintyParams in "uncertainty" {
+        /// Standard deviation of a vertex of the scan, m; 0: free of noise.
+        scan: f64 = 0.0;
+        /// A contact that contradicts by more than this many standard deviations is rejected as an outlier.
+        gate_sigmas: f64 = 4.0, "gate_sigmas" [SIGMAS, 0.5, 1e6];
+    }
+    with {
+        /// What the calibration leaves.
+        calibration: CalibrationParams,
+    }
 }
 
 impl UncertaintyParams {
     /// The defaults, for a scan whose points are off by `noise` (m).
     pub fn new(noise: f64) -> Self {
-        Self { scan: noise, calibration: CalibrationParams::default(), gate_sigmas: 4.0 }
-    }
-
-    fn check(&self) -> Result<(), SettingError> {
-        let CalibrationParams { position, stiffness_share } = self.calibration;
-        for (name, value) in [
-            ("noise of the scan (m)", self.scan),
-            ("uncertainty of the calibration (m)", position),
-            ("uncertainty of the stiffness (share)", stiffness_share),
-        ] {
-            SettingError::check(name, value, value >= 0.0, "0 or more")?;
-        }
-        SettingError::check("gate (standard deviations)", self.gate_sigmas, self.gate_sigmas > 0.0, "more than 0")
+        Self { scan: noise, ..Self::default() }
     }
 }
 
@@ -91,7 +98,7 @@ impl PatcherParams {
             evidence: EvidenceParams::new(radius, noise),
             free_space: true,
             pitch: radius / 2.0,
-            most_faces: 10.0,
+            most_faces: PatchParams::default().most_faces,
             uncertainty: Some(UncertaintyParams::new(noise)),
             region: None,
         }
@@ -137,13 +144,11 @@ impl PatcherParams {
     /// # Errors
     /// [`SettingError`] naming the first setting outside its range.
     pub fn check(&self) -> Result<(), SettingError> {
-        for (name, value) in [
-            ("tip radius (m)", self.evidence.radius),
-            ("patch pitch (m)", self.pitch),
-            ("patch budget (times the faces of the scan)", self.most_faces),
-        ] {
-            SettingError::check(name, value, value > 0.0, "more than 0")?;
-        }
+        let radius = self.evidence.radius;
+        SettingError::check("tip.radius_mm", radius * 1e3, radius > 0.0, "more than 0 where there is a patch")?;
+        PatchParams { pitch: Some(self.pitch), most_faces: self.most_faces }.check()?;
+        let noise = self.uncertainty.map_or(0.0, |known| known.scan);
+        SettingError::check("scan.noise_mm", noise * 1e3, noise >= 0.0, "0 to 1000 mm")?;
         self.uncertainty.iter().try_for_each(UncertaintyParams::check)
     }
 }

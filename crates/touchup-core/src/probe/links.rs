@@ -6,23 +6,26 @@
 
 use nalgebra::{Point3, Unit, Vector3};
 
-/// What the arm holds, as far as it must keep clear.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tool {
-    /// of the ball, m
-    pub ball_radius: f64,
-    /// of the shaft, m
-    pub shaft_radius: f64,
-    /// how much of the shaft, and of the hand behind it, is looked at, m
-    pub shaft_length: f64,
-    /// of both, m: what the scan may be wrong by
-    pub margin: f64,
-}
+use crate::parameters;
 
-impl Default for Tool {
-    /// A probe of 3 mm on a shaft of 2 mm.
-    fn default() -> Self {
-        Self { ball_radius: 1.5e-3, shaft_radius: 1e-3, shaft_length: 60e-3, margin: 0.5e-3 }
+parameters! {
+    /// What the arm holds, as far as it must keep clear: by default a probe of 3 mm on a shaft of 2 mm.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Tool in "robot" {
+        /// Of the ball, m.
+        ball_radius: f64 = 1.5e-3;
+        /// Radius of the shaft behind the ball.
+        ///
+        /// In m.
+        shaft_radius: f64 = 1.0, "shaft_radius_mm" [MM, 0.05, 50];
+        /// How much of the shaft, and of the hand behind it, must keep clear of the mesh.
+        ///
+        /// In m.
+        shaft_length: f64 = 60.0, "shaft_length_mm" [MM, 0, 500];
+        /// What the scan may be wrong by, in moves through free air.
+        ///
+        /// In m, of both.
+        margin: f64 = 0.5, "margin_mm" [MM, 0, 50];
     }
 }
 

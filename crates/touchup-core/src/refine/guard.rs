@@ -8,40 +8,38 @@ use super::collision::{Corners, Pairs, bounds};
 use super::marks::ScratchMap;
 use super::ring::Ring;
 use crate::mesh::{BoxQuery, FaceId, FaceTree, TriMesh, VertexId, triangle};
+use crate::parameters;
 
-/// Limits that keep a mesh sound.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GuardParams {
-    /// Smallest twice area over longest edge squared. Default 0.15: a triangle stretched sixfold. Of a triangle that was
-    /// scanned thin [`Self::SCANNED_SHARE`] of what it had, where that is less: it must not hold all around it.
-    pub smallest_quality: f64,
-    /// Smallest cosine between normals before and after one update. Default 0.5: 60°.
-    pub smallest_turn_cosine: f64,
-    /// Smallest cosine between a face's normal and the last that was scanned or felt there. Default 0: a lid may become
-    /// a wall, but not an overhang.
-    pub smallest_evidence_cosine: f64,
-    /// Smallest cosine between neighbours. Default −0.85: 148° apart is a knife's edge, beyond it is a fold.
-    pub smallest_fold_cosine: f64,
-    /// Faces nearer than this share of the mean edge count as touching. Default 0.01.
-    pub gap_share: f64,
+parameters! {
+    /// Limits that keep a mesh sound.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct GuardParams in "guard" {
+        /// Smallest twice area over longest edge squared: 0.15 is a triangle stretched sixfold; of a triangle that was scanned thin
+        /// nine tenths of what it had.
+        ///
+        /// [`Self::SCANNED_SHARE`] of it, where that is less: it must not hold all around it.
+        smallest_quality: f64 = 0.15, "smallest_quality" [ONE, 0, 0.87];
+        /// Smallest cosine between normals before and after one update.
+        ///
+        /// 0.5 is 60°.
+        smallest_turn_cosine: f64 = 0.5, "smallest_turn_cosine" [ONE, -1, 1];
+        /// Smallest cosine between a normal and the last that was scanned or measured there.
+        ///
+        /// At 0 a lid may become a wall, but not an overhang.
+        smallest_evidence_cosine: f64 = 0.0, "smallest_evidence_cosine" [ONE, -1, 1];
+        /// Smallest cosine between neighbours: -0.85 is 148 degrees apart.
+        ///
+        /// That is a knife's edge, beyond it is a fold.
+        smallest_fold_cosine: f64 = -0.85, "smallest_fold_cosine" [ONE, -1, 1];
+        /// Faces nearer than this many mean edges count as touching.
+        gap_share: f64 = 0.01, "gap_edges" [EDGES, 0, 1];
+    }
 }
 
 impl GuardParams {
     /// See [`Self::smallest_quality`]. To follow a touch a thin triangle needs to lose little. With a share of 0.8 a vertex of a
     /// crumpled scan strayed, with 0.3 one more face was the wrong way round on another.
     pub const SCANNED_SHARE: f64 = 0.9;
-}
-
-impl Default for GuardParams {
-    fn default() -> Self {
-        Self {
-            smallest_quality: 0.15,
-            smallest_turn_cosine: 0.5,
-            smallest_evidence_cosine: 0.0,
-            smallest_fold_cosine: -0.85,
-            gap_share: 0.01,
-        }
-    }
 }
 
 /// Normals of a smooth region are within this cosine of their mean: 70°. Such a region is a height field over the plane

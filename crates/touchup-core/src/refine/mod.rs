@@ -22,9 +22,11 @@ use nalgebra::{Point3, Vector3};
 use serde::Serialize;
 
 pub use deform::{Footprint, RegionFit, mean_edge};
-pub use dynamics::{Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, StepRule};
+pub use dynamics::{
+    Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, SigmoidParams, StepRule,
+};
 pub use guard::GuardParams;
-pub use params::{CarveParams, ClosestBy, RefineParams, ScanRegion, TipParams, TouchPoint, relaxing_alpha};
+pub use params::{CarveParams, ClosestBy, RefineParams, ScanParams, ScanRegion, TipParams, TouchPoint, relaxing_alpha};
 pub use registration::{Registrar, Registration, RegistrationError, RegistrationParams};
 pub use roi::RoiSize;
 pub use sliding::{Ball, SlidingParams, TipMotion};

@@ -5,15 +5,33 @@ use nalgebra::{Point3, Vector3};
 use super::guard::GuardParams;
 use super::{Along, ContactModel, DynamicsParams, RoiSize, SlidingParams, StepRule};
 use crate::mesh::Region;
+use crate::parameters;
 use crate::touch::{BiasParams, CompensatorParams, ContactGateParams, SettingError, TipBody, TipShape};
 
-/// The ball at the end of stylus or probe.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TipParams {
-    /// m; 0 for a point
-    pub radius: f64,
-    /// What stylus and probe give way under force, N/m; `None` when rigid or not known.
-    pub stiffness: Option<f64>,
+parameters! {
+    /// The ball at the end of stylus or probe: by default a 3 mm ruby ball on a usual stylus.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct TipParams in "tip" {
+        /// Radius of the ball, of the flat end, or of the nose of the cone.
+        ///
+        /// In m; 0 for a point.
+        radius: f64 = 1.5, "radius_mm" [MM, 0, 1000];
+        /// Stiffness of stylus and holder at the ball; left out: rigid.
+        ///
+        /// In N/m; `None` when rigid or not known.
+        stiffness: Option<f64> = Some(20.0), "stiffness_n_per_mm" [N_PER_MM, 0.001, 1e9, "leave it out for rigid"];
+    }
+}
+
+parameters! {
+    /// How good a scan is.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct ScanParams in "scan" {
+        /// Standard deviation of the scan from the true surface.
+        ///
+        /// In m. A consumer depth camera at half a metre.
+        noise: f64 = 0.6, "noise_mm" [MM, 0, 1000];
+    }
 }
 
 impl TipParams {
@@ -41,21 +59,22 @@ pub enum TouchPoint {
     FeltNormal,
 }
 
-/// Carving: what the ball passes through without a force is not there (case 2).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CarveParams {
-    /// Share of the depth that goes in a second, 1/s. Default 300: what the ball sweeps is certain, and it is gone soon.
-    pub rate: f64,
-    /// Depth that is left alone, m. Default 0.05 mm, the noise of a good tracking system.
-    pub tolerance: f64,
-    /// While in contact only what is deeper than this is carved, m: what is shallower may be the felt surface itself.
-    /// Default 0.2 mm.
-    pub contact_tolerance: f64,
-}
-
-impl Default for CarveParams {
-    fn default() -> Self {
-        Self { rate: 300.0, tolerance: 0.05e-3, contact_tolerance: 0.2e-3 }
+parameters! {
+    /// Carving: what the ball passes through without a force is not there (case 2).
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct CarveParams in "carve" {
+        /// Share of the depth that goes in a second.
+        ///
+        /// In 1/s. What the ball sweeps is certain, and it is gone soon.
+        rate: f64 = 300.0, "rate_per_s" [PER_S, 0, 1e6];
+        /// Depth that is left alone: the noise of the tracking.
+        ///
+        /// In m.
+        tolerance: f64 = 0.05, "tolerance_mm" [MM, 0, 1000];
+        /// While in contact only what is deeper than this is taken away: what is shallower may be the measured surface itself.
+        ///
+        /// In m.
+        contact_tolerance: f64 = 0.2, "contact_tolerance_mm" [MM, 0, 1000];
     }
 }
 
@@ -109,7 +128,7 @@ pub struct RefineParams {
     pub largest_move_edges: f64,
     /// … or within this many times the scan's noise, whichever is more. Default 5.
     pub largest_move_noises: f64,
-    /// Standard deviation of the scan's vertices, m. Default 0.6 mm.
+    /// Standard deviation of the scan's vertices, m.
     pub scan_noise: f64,
     /// `None`: the mesh is all there is, and may be touched anywhere.
     pub region: Option<ScanRegion>,
@@ -171,7 +190,7 @@ impl RefineParams {
             longest_step_edges: 0.04,
             largest_move_edges: 2.6,
             largest_move_noises: 5.0,
-            scan_noise: 0.6e-3,
+            scan_noise: ScanParams::default().noise,
             region: None,
         }
     }
@@ -202,37 +221,21 @@ impl RefineParams {
     /// [`SettingError`] naming the first setting outside its range.
     pub fn check(&self) -> Result<(), SettingError> {
         TipBody::new(self.shape, self.tip.radius)?;
-        let carve = self.carve.unwrap_or_default();
-        let sliding = self.sliding.unwrap_or_default();
+        self.tip.check()?;
+        ScanParams { noise: self.scan_noise }.check()?;
+        self.carve.iter().try_for_each(CarveParams::check)?;
+        self.sliding.iter().try_for_each(SlidingParams::check)?;
+        self.guard.iter().try_for_each(GuardParams::check)?;
         let roi = if let RoiSize::Radius(radius) = self.roi { radius } else { 0.0 };
-        let guard = self.guard.unwrap_or_default();
-        let cosines = [
-            ("smallest contact cosine", self.smallest_contact_cosine),
-            ("friction cone (cosine)", sliding.cone_cosine),
-            ("guard's turn (cosine)", guard.smallest_turn_cosine),
-            ("guard's evidence (cosine)", guard.smallest_evidence_cosine),
-            ("guard's fold (cosine)", guard.smallest_fold_cosine),
-        ];
+        let cosine = self.smallest_contact_cosine;
+        SettingError::check("smallest contact cosine", cosine, cosine.abs() <= 1.0, "-1 to 1")?;
         let not_negative = [
-            ("scan noise (m)", self.scan_noise),
             ("turning (1/s)", self.turning.unwrap_or(0.0)),
             ("region of interest (m)", roi),
             ("largest move (noises)", self.largest_move_noises),
-            ("carving rate (1/s)", carve.rate),
-            ("carving tolerance (m)", carve.tolerance),
-            ("carving's tolerance in contact (m)", carve.contact_tolerance),
-            ("smoothing (s)", sliding.smoothing),
-            ("velocity smoothing (s)", sliding.velocity_smoothing),
-            ("slowest sliding (m/s)", sliding.slowest),
-            ("guard's quality", guard.smallest_quality),
-            ("guard's gap (edges)", guard.gap_share),
         ];
-        let positive = [
-            ("tip stiffness (N/m)", self.tip.stiffness.unwrap_or(1.0)),
-            ("longest step (edges)", self.longest_step_edges),
-            ("largest move (edges)", self.largest_move_edges),
-        ];
-        cosines.iter().try_for_each(|&(name, x)| SettingError::check(name, x, x.abs() <= 1.0, "-1 to 1"))?;
+        let positive =
+            [("longest step (edges)", self.longest_step_edges), ("largest move (edges)", self.largest_move_edges)];
         not_negative
             .iter()
             .try_for_each(|&(name, x)| SettingError::check(name, x, x >= 0.0, "finite and 0 or more"))?;

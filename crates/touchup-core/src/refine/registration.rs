@@ -9,13 +9,14 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Isometry3, Matrix6, Point3, SMatrix, SVector, UnitQuaternion, Vector3, Vector6};
 
+use super::ScanParams;
 use crate::mesh::{FaceTree, TriMesh};
 use crate::touch::SettingError;
 
 /// Settings of a [`Registrar`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RegistrationParams {
-    /// Standard deviation of the scan from the true surface, m. Default 0.6 mm.
+    /// Standard deviation of the scan from the true surface, m.
     pub scan_noise: f64,
     /// Edge of the square over which the noise of the scan counts as one value, m: the root of the area under its
     /// correlation. Default 9 mm, for waves smoothed by 3.5 mm.
@@ -28,7 +29,7 @@ pub struct RegistrationParams {
 
 impl Default for RegistrationParams {
     fn default() -> Self {
-        Self { scan_noise: 0.6e-3, correlation: 9e-3, surface_offset: 0.3e-3, spacing: 1e-3 }
+        Self { scan_noise: ScanParams::default().noise, correlation: 9e-3, surface_offset: 0.3e-3, spacing: 1e-3 }
     }
 }
 

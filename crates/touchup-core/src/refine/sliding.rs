@@ -3,28 +3,31 @@
 use nalgebra::{Point3, Vector3};
 
 use super::TipParams;
+use crate::parameters;
 use crate::touch::{Friction, FrictionCoefficient, Sliding, Tip};
 
-/// Parameters of [`TipMotion`] and of the normal under the ball.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SlidingParams {
-    /// Time constant of the first-order filter on position and force, s; 0 filters nothing. Default 6 ms: three poses at
-    /// 500 Hz, so that 0.2 mm of pose noise becomes 0.1 mm, while a hand at 50 mm/s lags 0.3 mm behind, along the surface.
-    pub smoothing: f64,
-    /// Time constant of the velocity, s. Default 20 ms: with 0.2 mm of pose noise and μ = 0.4 half of the normals are then
-    /// within 3° (12 ms: 4°), while that of a hand that turns by 5 rad/s lags 6° behind, along the surface.
-    pub velocity_smoothing: f64,
-    /// Slower than this the direction of sliding is not known, m/s: 2.5 times the noise of the velocity. Default 8 mm/s,
-    /// for 0.2 mm of pose noise.
-    pub slowest: f64,
-    /// Cosine of the widest friction cone believed: the normal is nowhere farther from the force. Default cos 24°
-    /// (μ = 0.45, dry metal on metal).
-    pub cone_cosine: f64,
-}
-
-impl Default for SlidingParams {
-    fn default() -> Self {
-        Self { smoothing: 6e-3, velocity_smoothing: 20e-3, slowest: 8e-3, cone_cosine: 0.9135 }
+parameters! {
+    /// Parameters of [`TipMotion`] and of the normal under the ball.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct SlidingParams in "sliding" {
+        /// Time constant of the filter on position and force.
+        ///
+        /// In s; 0 filters nothing. 6 ms are three poses at 500 Hz, so that 0.2 mm of pose noise becomes 0.1 mm, while a hand at
+        /// 50 mm/s lags 0.3 mm behind, along the surface.
+        smoothing: f64 = 6.0, "smoothing_ms" [MS, 0, 10000];
+        /// Time constant of the velocity.
+        ///
+        /// In s. With 0.2 mm of pose noise and μ = 0.4 half of the normals are then within 3° (12 ms: 4°), while that of a hand that
+        /// turns by 5 rad/s lags 6° behind, along the surface.
+        velocity_smoothing: f64 = 20.0, "velocity_smoothing_ms" [MS, 0, 10000];
+        /// Uncertainty of the velocity: slower than this the sliding direction says little about the normal.
+        ///
+        /// In m/s: 2.5 times the noise of the velocity for 0.2 mm of pose noise.
+        slowest: f64 = 8.0, "slowest_mm_per_s" [MM_PER_S, 0, 1e6];
+        /// Cosine of the widest friction cone accepted; 0.9135 is 24 degrees, friction 0.45.
+        ///
+        /// The normal is nowhere farther from the force: dry metal on metal.
+        cone_cosine: f64 = 0.9135, "cone_cosine" [ONE, 0, 1];
     }
 }
 

@@ -2,45 +2,53 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
+use crate::parameters;
+use crate::parameters::SettingError;
+
 use super::arm::ArmState;
 use super::kinematics::{Joints, UrGeometry};
 
-/// Bounds of every motion, from the configuration alone. A request may ask for less ([`Self::narrowed`]), never for more.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Limits {
-    /// Smallest corner of the box that the tip stays in, m in B.
-    pub lowest: Point3<f64>,
-    /// Largest corner of it, m in B.
-    pub highest: Point3<f64>,
-    /// Force of the part on the tip, N.
-    pub force: f64,
-    /// Of the tip, m/s.
-    pub speed: f64,
-    /// Of the tip, m/s².
-    pub acceleration: f64,
-    /// Travel of one search, m.
-    pub search: f64,
-    /// Time of one order, s.
-    pub time: f64,
-    /// The least [`UrGeometry::dexterity`] of any pose.
-    pub dexterity: f64,
-}
-
-impl Default for Limits {
-    /// No box: where the arm may be is known by who mounted it.
-    fn default() -> Self {
-        Self {
-            lowest: Point3::origin(),
-            highest: Point3::origin(),
-            // well below the 50 N at which the safety system of a UR may be set at the least
-            force: 15.0,
-            speed: 0.1,
-            acceleration: 0.5,
-            search: 15e-3,
-            time: 600.0,
-            dexterity: 0.02,
-        }
+parameters! {
+    /// Bounds of every motion, from the configuration alone. A request may ask for less ([`Self::narrowed`]), never for more.
+    ///
+    /// By default there is no box: where the arm may be is known by who mounted it.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct Limits in "robot" {
+        /// Smallest corner of the box that the centre of the ball stays in, in the base of the arm; with the default the arm can be
+        /// nowhere.
+        ///
+        /// m in B.
+        lowest: Point3<f64> = [0.0; 3], "workspace_low_mm" [MM, -5000, 5000];
+        /// Largest corner of it, no less than workspace_low_mm.
+        ///
+        /// m in B.
+        highest: Point3<f64> = [0.0; 3], "workspace_high_mm" [MM, -5000, 5000];
+        /// Force at the tip at which everything stops; well below that of the arm's own safety system.
+        ///
+        /// In N: that of a UR may be set to 50 N at the least.
+        force: f64 = 15.0, "largest_force_n" [N, 0.1, 100];
+        /// No motion of the tip is faster.
+        ///
+        /// In m/s.
+        speed: f64 = 100.0, "largest_mm_per_s" [MM_PER_S, 0.1, 250];
+        /// Acceleration of all motions.
+        ///
+        /// Of the tip, m/s².
+        acceleration: f64 = 500.0, "acceleration_mm_per_s2" [MM_PER_S2, 10, 5000];
+        /// Travel of one search at most.
+        ///
+        /// In m.
+        search: f64 = 15.0, "search_mm" [MM, 0.5, 100];
+        /// Time of one feature at most.
+        ///
+        /// In s.
+        time: f64 = 600.0, "time_s" [S, 1, 86400];
+        /// How far the arm stays from singular poses: smallest singular value of its Jacobian, lengths over its reach.
+        ///
+        /// The least [`UrGeometry::dexterity`] of any pose.
+        dexterity: f64 = 0.02, "least_dexterity" [ONE, 0, 1];
     }
+    check Limits::is_box;
 }
 
 /// Which bound would be left, and by how much.
@@ -123,6 +131,13 @@ pub struct Narrower {
 }
 
 impl Limits {
+    fn is_box(&self) -> Result<(), SettingError> {
+        self.lowest.iter().zip(self.highest.iter()).try_for_each(|(low, high)| {
+            let allowed = "robot.workspace_low_mm to 5000 mm";
+            SettingError::check("robot.workspace_high_mm", high * 1e3, high >= low, allowed)
+        })
+    }
+
     /// These limits with what a request asks for.
     ///
     /// # Errors

@@ -8,6 +8,7 @@
 //! that neither the threshold at which the arm was told to stop nor its braking travel is in s₀. τ moves the corner forward
 //! going in and backward coming out: a touch that does both tells it.
 
+use crate::parameters;
 use nalgebra::{Cholesky, Matrix3, Matrix4, Vector3, Vector4};
 
 /// One moment of a touch.
@@ -23,35 +24,25 @@ pub struct TouchMoment {
     pub lateral: f64,
 }
 
-/// Settings of [`find_onset`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct OnsetParams {
-    /// What is believed of τ before the touch, s …
-    pub delay: f64,
-    /// … and its standard deviation, s
-    pub delay_sigma: f64,
-    /// Standard deviation of the force in free air, N; noise that is smaller is not believed
-    pub force_noise: f64,
-    /// The force that counts as contact for verdicts, N.
-    pub contact_force: f64,
-    /// Shorter contacts are impacts, s.
-    pub shortest_contact: f64,
-    /// Largest share of the force across the approach; more is an edge or a slope.
-    pub lateral_share: f64,
-}
-
-impl Default for OnsetParams {
-    fn default() -> Self {
-        Self {
-            delay: 0.0,
-            // a cycle or two of a controller at 500 Hz, and its filter
-            delay_sigma: 4e-3,
-            force_noise: 0.05,
-            contact_force: 0.5,
-            shortest_contact: 10e-3,
-            // friction of a steel ball on metal is below 0.3; a slope of 20 degrees adds as much
-            lateral_share: 0.65,
-        }
+parameters! {
+    /// Settings of [`find_onset`].
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct OnsetParams in "robot" {
+        /// What is believed of τ before the touch, s …
+        delay: f64 = 0.0;
+        /// … and its standard deviation, s: a cycle or two of a controller at 500 Hz, and its filter.
+        delay_sigma: f64 = 4e-3;
+        /// Standard deviation of the measured force.
+        ///
+        /// In N, in free air; noise that is smaller is not believed. That of a wrist.
+        force_noise: f64 = 0.15, "force_noise_n" [N, 0.0001, 10];
+        /// The force that counts as contact for verdicts, N.
+        contact_force: f64 = 0.5;
+        /// Shorter contacts are impacts, s.
+        shortest_contact: f64 = 10e-3;
+        /// Largest share of the force across the approach; more is an edge or a slope. Friction of a steel ball on metal is below
+        /// 0.3; a slope of 20 degrees adds as much.
+        lateral_share: f64 = 0.65;
     }
 }
 

@@ -7,32 +7,25 @@
 use nalgebra::Vector3;
 
 use super::{SettingError, Tip};
+use crate::parameters;
 
-/// Settings of a [`BiasTracker`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BiasParams {
-    /// A force within this of the bias is free air, N. Default 0.3: above the noise of a usual sensor, below a contact. A
-    /// bias that is larger from the start is never found: take it off by [`super::CompensatorParams::bias_s`].
-    pub free: f64,
-    /// … once it has lasted so long, ns; what was learnt in this time before a contact is forgotten. Default 60 ms: a hand
-    /// rises to 0.3 N and falls from it within 10 ms.
-    pub settle_ns: i64,
-    /// Time constant of the running mean, s. Default 0.3: a noise of 0.05 N at 1 kHz becomes 2 mN, and a drift of 10 mN/s is
-    /// followed 3 mN behind.
-    pub time: f64,
-}
-
-impl Default for BiasParams {
-    fn default() -> Self {
-        Self { free: 0.3, settle_ns: 60_000_000, time: 0.3 }
-    }
-}
-
-impl BiasParams {
-    fn check(&self) -> Result<(), SettingError> {
-        SettingError::check("free air (N)", self.free, self.free > 0.0, "more than 0")?;
-        SettingError::check("settling time (ns)", self.settle_ns as f64, self.settle_ns > 0, "more than 0")?;
-        SettingError::check("time constant of the bias (s)", self.time, self.time > 0.0, "more than 0")
+parameters! {
+    /// Settings of a [`BiasTracker`].
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct BiasParams in "bias_tracking" {
+        /// A force within this of the bias is free air.
+        ///
+        /// In N. Above the noise of a usual sensor, below a contact. A bias that is larger from the start is never found: take it off
+        /// by [`super::CompensatorParams::bias_s`].
+        free: f64 = 0.3, "free_n" [N, 1e-6, 1000];
+        /// It is free air once the force has been there for this time; what was learnt in this time before a contact is dropped.
+        ///
+        /// In ns. A hand rises to 0.3 N and falls from it within 10 ms.
+        settle_ns: i64 = 60.0, "settle_ms" [MS, 0.001, 60000];
+        /// Time constant of the running mean.
+        ///
+        /// In s. A noise of 0.05 N at 1 kHz becomes 2 mN, and a drift of 10 mN/s is followed 3 mN behind.
+        time: f64 = 0.3, "time_s" [S, 1e-6, 1e6];
     }
 }
 

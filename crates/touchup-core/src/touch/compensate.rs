@@ -10,6 +10,7 @@
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use super::{Sample, SettingError, Wrench};
+use crate::parameters;
 
 /// The axes in which the measured wrench is expressed. Its torque is about the sensor's origin So in both.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -21,15 +22,51 @@ pub enum WrenchFrame {
     Object,
 }
 
-/// What hangs on the sensor beyond its measuring plane.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Payload {
-    /// kg
-    pub mass: f64,
-    /// Centre of mass C from So, expressed in S, m.
-    pub p_sc: Vector3<f64>,
-    /// Acceleration of gravity, expressed in O, m/s²: (0, 0, −9.81) when z of O points up.
-    pub gravity_o: Vector3<f64>,
+parameters! {
+    /// What hangs on the sensor beyond its measuring plane.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Payload in "compensation.payload" {
+        /// Its mass.
+        ///
+        /// In kg.
+        mass: f64 = 0.0, "mass_kg" [KG, 0, 1000];
+        /// Its centre of mass from the origin of the sensor, in its axes.
+        ///
+        /// C from So, expressed in S, m.
+        p_sc: Vector3<f64> = [0.0; 3], "centre_mm" [MM, -10000, 10000];
+        /// Acceleration of gravity.
+        ///
+        /// Expressed in O, m/s²: (0, 0, −9.81) when z of O points up.
+        gravity_o: Vector3<f64> = [0.0, 0.0, -9.81], "gravity_m_per_s2" [M_PER_S2, -100, 100];
+    }
+}
+
+parameters! {
+    /// Where the sensor sits on the stylus.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct SensorMount in "compensation" {
+        /// Origin of the sensor from the centre of the ball, in the axes of the tip (z: along the shaft, tip to handle).
+        ///
+        /// So from To, expressed in T, m.
+        position: Vector3<f64> = [0.0; 3], "sensor_position_mm" [MM, -1e5, 1e5];
+        /// Orientation of the sensor in the frame of the tip, as a quaternion x, y, z, w; left out: the same axes.
+        orientation_xyzw: Option<[f64; 4]> = None, "sensor_orientation_xyzw" [QUATERNION, 0.999, 1.001] like "[0, 0, 0, 1]";
+    }
+}
+
+parameters! {
+    /// What the sensor reads when nothing touches and nothing hangs on it, expressed in S.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct SensorBias in "compensation.bias" {
+        /// The force, in the axes of the sensor.
+        ///
+        /// In N.
+        force: Vector3<f64> = [0.0; 3], "force_n" [N, -10000, 10000];
+        /// The torque, in the axes of the sensor.
+        ///
+        /// In N·m.
+        torque: Vector3<f64> = [0.0; 3], "torque_nm" [NM, -10000, 10000];
+    }
 }
 
 impl Payload {
@@ -42,14 +79,6 @@ impl Payload {
     pub fn weight_o(&self, r_os: &UnitQuaternion<f64>) -> Wrench {
         let force = self.gravity_o * self.mass;
         Wrench { force, torque: (r_os * self.p_sc).cross(&force) }
-    }
-
-    fn check(&self) -> Result<(), SettingError> {
-        SettingError::check("payload mass (kg)", self.mass, self.mass >= 0.0, "0 or more")?;
-        for x in self.p_sc.iter().chain(&self.gravity_o) {
-            SettingError::check("payload centre (m) or gravity (m/s²)", *x, true, "finite")?;
-        }
-        Ok(())
     }
 }
 
@@ -89,19 +118,15 @@ impl Compensator {
     /// Checks the settings once.
     ///
     /// # Errors
-    /// [`SettingError`] for a negative mass and for anything not finite.
+    /// [`SettingError`] naming the first setting outside its range.
     pub fn new(params: CompensatorParams) -> Result<Self, SettingError> {
-        for x in params.pose_ts.translation.vector.iter().chain(&params.pose_ts.rotation.coords) {
-            SettingError::check("sensor pose in the tip frame (m, quaternion)", *x, true, "finite")?;
+        for c in &params.pose_ts.rotation.coords {
+            SettingError::check("compensation.sensor_orientation_xyzw", *c, true, "finite")?;
         }
-        if let Some(payload) = &params.payload {
-            payload.check()?;
-        }
-        if let Some(bias) = &params.bias_s {
-            for x in bias.force.iter().chain(&bias.torque) {
-                SettingError::check("bias (N, N·m)", *x, true, "finite")?;
-            }
-        }
+        SensorMount { position: params.pose_ts.translation.vector, orientation_xyzw: None }.check()?;
+        params.payload.iter().try_for_each(Payload::check)?;
+        let bias = params.bias_s.map(|Wrench { force, torque }| SensorBias { force, torque });
+        bias.iter().try_for_each(SensorBias::check)?;
         Ok(Self { params })
     }
 

@@ -3,24 +3,32 @@
 use nalgebra::Vector3;
 
 use super::SettingError;
+use crate::parameters;
 
 /// A pause in contact longer than this parts two strokes, ns: a hand that lifts the stylus, not one that bounces.
 pub const STROKE_PAUSE_NS: i64 = 100_000_000;
 
-/// The two thresholds of a [`ContactGate`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ContactGateParams {
-    /// A force above this begins a contact, N. Default 0.4: eight times the 0.05 N by which both noise and bias of a
-    /// usual sensor vary, and far below the 2–4 N of a hand that presses.
-    pub on: f64,
-    /// A force below this ends it, N. Default 0.22: above noise and bias together, and so far below `on` that the noise
-    /// at the threshold does not chatter.
-    pub off: f64,
+parameters! {
+    /// The two thresholds of a [`ContactGate`].
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct ContactGateParams in "contact" {
+        /// A force above this begins a contact; no less than off_n.
+        ///
+        /// In N. Eight times the 0.05 N by which both noise and bias of a usual sensor vary, and far below the 2–4 N of a hand that
+        /// presses.
+        on: f64 = 0.4, "on_n" [N, 0, 1000];
+        /// A force below this ends it.
+        ///
+        /// In N. Above noise and bias together, and so far below `on` that the noise at the threshold does not chatter.
+        off: f64 = 0.22, "off_n" [N, 0, 1000];
+    }
+    check ContactGateParams::is_in_order;
 }
 
-impl Default for ContactGateParams {
-    fn default() -> Self {
-        Self { on: 0.4, off: 0.22 }
+impl ContactGateParams {
+    fn is_in_order(&self) -> Result<(), SettingError> {
+        let allowed = format!("contact.off_n to 1000 N, and contact.off_n is {}", self.off);
+        SettingError::check("contact.on_n", self.on, self.on >= self.off, &allowed)
     }
 }
 
@@ -45,11 +53,9 @@ impl ContactGate {
     /// A gate that starts open: no contact.
     ///
     /// # Errors
-    /// [`SettingError`] unless 0 ≤ `off` ≤ `on`, both finite.
+    /// [`SettingError`] unless 0 ≤ `off` ≤ `on` ≤ 1000.
     pub fn new(params: ContactGateParams) -> Result<Self, SettingError> {
-        let ContactGateParams { on, off } = params;
-        SettingError::check("contact off (N)", off, off >= 0.0, "0 or more")?;
-        SettingError::check("contact on (N)", on, on >= off, "no less than contact off")?;
+        params.check()?;
         Ok(Self { params, contact: None, contacts: 0 })
     }
 

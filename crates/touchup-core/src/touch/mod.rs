@@ -21,7 +21,7 @@ mod tip_shape;
 
 pub use bias::{BiasParams, BiasTracker};
 pub use clock::{ClockEstimator, ClockOffset, ClockParams};
-pub use compensate::{Compensator, CompensatorParams, Payload, Tip, WrenchFrame};
+pub use compensate::{Compensator, CompensatorParams, Payload, SensorBias, SensorMount, Tip, WrenchFrame};
 pub use contact::{Contact, ContactGate, ContactGateParams, STROKE_PAUSE_NS};
 pub use friction::{FeltNormal, Friction, FrictionCoefficient, Sliding};
 pub use local_motion::{LocalMotion, SmoothedMotion};
@@ -31,7 +31,9 @@ pub use markers::{
 pub use placement::Placement;
 pub use probed::ProbedPoint;
 pub use sync::{SyncCounts, SyncParams, Synchroniser};
-pub use tip_shape::{TipBody, TipContact, TipPlace, TipShape};
+pub use tip_shape::{TipBody, TipContact, TipPlace, TipShape, TipSizes};
+
+pub use crate::parameters::SettingError;
 
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
@@ -90,28 +92,6 @@ pub enum SampleError {
         /// time of the sample before it, ns
         last_ns: i64,
     },
-}
-
-/// A setting outside the range in which it has a meaning.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("{name} is {value}; it must be {allowed}")]
-pub struct SettingError {
-    /// which setting, with its unit
-    pub name: &'static str,
-    /// what it is, in SI
-    pub value: f64,
-    /// the range
-    pub allowed: &'static str,
-}
-
-impl SettingError {
-    /// Refuses a value that is not finite or not `inside` the range that `allowed` names.
-    ///
-    /// # Errors
-    /// [`SettingError`], with the name and the value.
-    pub fn check(name: &'static str, value: f64, inside: bool, allowed: &'static str) -> Result<(), SettingError> {
-        if inside && value.is_finite() { Ok(()) } else { Err(SettingError { name, value, allowed }) }
-    }
 }
 
 /// A measured quaternion is rounded, not wrong, this close to norm 1.

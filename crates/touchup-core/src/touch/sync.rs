@@ -9,34 +9,30 @@ use serde::Serialize;
 
 use super::stream::Stream;
 use super::{Message, Sample, SampleError, SettingError, StampedPose, StampedWrench};
+use crate::parameters;
 
-/// Settings of a [`Synchroniser`]; times in ns.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SyncParams {
-    /// How far a message may lag behind the newest stamp of its stream. Default 20 ms: real transports swap and delay by
-    /// up to 16 ms; it is also how long a sample is held back.
-    pub reorder_ns: i64,
-    /// Largest distance between the two poses around a wrench. Default 30 ms: a hand at 50 mm/s goes 1.5 mm, the radius
-    /// of a usual ball, in that time; a longer path would be invented.
-    pub largest_gap_ns: i64,
-    /// A stamp this far ahead of its stream is believed only when the next one agrees. Default 10 s: a pause, not a
-    /// fault, when it is true.
-    pub largest_jump_ns: i64,
-    /// What the clock of the wrench reads beyond the clock of the pose; taken off its stamps. Default 0.
-    pub wrench_offset_ns: i64,
-    /// How many messages of each stream are held. Default 4096: four seconds at 1 kHz, half a megabyte.
-    pub capacity: usize,
-}
-
-impl Default for SyncParams {
-    fn default() -> Self {
-        Self {
-            reorder_ns: 20_000_000,
-            largest_gap_ns: 30_000_000,
-            largest_jump_ns: 10_000_000_000,
-            wrench_offset_ns: 0,
-            capacity: 4096,
-        }
+parameters! {
+    /// Settings of a [`Synchroniser`]; times in ns.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub struct SyncParams in "sync" {
+        /// How far a message may lag behind the newest stamp of its stream; also how long a sample is held back.
+        ///
+        /// Real transports swap and delay by up to 16 ms.
+        reorder_ns: i64 = 20.0, "reorder_ms" [MS, 0, 60000];
+        /// Largest distance between the two poses around a wrench; over a longer one a path would be invented.
+        ///
+        /// A hand at 50 mm/s goes 1.5 mm, the radius of a usual ball, in 30 ms.
+        largest_gap_ns: i64 = 30.0, "largest_gap_ms" [MS, 0, 60000];
+        /// A stamp this far ahead of its stream is accepted only when the next one agrees.
+        ///
+        /// 10 s are a pause, not a fault, when they are true.
+        largest_jump_ns: i64 = 10.0, "largest_jump_s" [S, 0, 1e6];
+        /// What the clock of the wrench reads beyond the clock of the pose; taken off its stamps.
+        wrench_offset_ns: i64 = 0.0, "wrench_offset_ms" [MS, -60000, 60000];
+        /// How many messages of each stream are held.
+        ///
+        /// 4096 are four seconds at 1 kHz, half a megabyte.
+        capacity: usize = 4096, "capacity" [MESSAGES, 2, 1e6];
     }
 }
 
@@ -116,7 +112,7 @@ impl Synchroniser {
     /// Checks the settings and allocates the buffers.
     ///
     /// # Errors
-    /// [`SettingError`] for a negative time and for a capacity below 2 or above a million.
+    /// [`SettingError`] naming the first setting outside its range.
     pub fn new(params: SyncParams) -> Result<Self, SettingError> {
         Self::waiting(params, params.reorder_ns.saturating_add(1))
     }
@@ -132,18 +128,7 @@ impl Synchroniser {
     }
 
     fn waiting(params: SyncParams, wait_ns: i64) -> Result<Self, SettingError> {
-        let times = [
-            ("reorder window (ns)", params.reorder_ns),
-            ("largest gap (ns)", params.largest_gap_ns),
-            ("largest jump (ns)", params.largest_jump_ns),
-        ];
-        if let Some(&(name, value)) = times.iter().find(|(_, value)| *value < 0) {
-            return Err(SettingError { name, value: value as f64, allowed: "0 or more" });
-        }
-        if !(2..=1_000_000).contains(&params.capacity) {
-            let value = params.capacity as f64;
-            return Err(SettingError { name: "buffer capacity (messages)", value, allowed: "2 to 1000000" });
-        }
+        params.check()?;
         let (poses, wrenches) = (Stream::new(params.capacity, wait_ns), Stream::new(params.capacity, wait_ns));
         Ok(Self { params, poses, wrenches, finished: false })
     }

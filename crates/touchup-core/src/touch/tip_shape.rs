@@ -8,6 +8,7 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::SettingError;
+use crate::parameters;
 
 /// Which tip it is; its radius is a setting of its own.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -57,6 +58,22 @@ pub struct TipContact {
     pub is_vague: bool,
 }
 
+parameters! {
+    /// Sizes that only some tips have.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct TipSizes in "tip" {
+        /// Flat: radius of the rounded edge, no more than radius_mm; left out: sharp.
+        edge_radius: Option<f64> = None, "edge_radius_mm" [MM, 0, 1000] like "0.2";
+        /// Cone: the angle between axis and flank.
+        ///
+        /// A blunter cone is a flat tip, a more pointed one a needle, which bends.
+        half_angle: Option<f64> = None, "half_angle_deg" [DEG, 1, 80, "take shape: flat for a blunter one"] like "20";
+        /// Flat and cone: how far from the origin the tip is known to reach, more than edge_radius_mm; left out: two diameters, no
+        /// less than 5 mm.
+        length: Option<f64> = None, "length_mm" [MM, 0.001, 1000] like "6";
+    }
+}
+
 /// A tip of known size and shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TipBody {
@@ -72,10 +89,6 @@ pub struct TipBody {
     flank: [f64; 2],
 }
 
-/// A blunter cone is a flat tip, rad: 80°.
-const BLUNTEST: f64 = 80.0 * std::f64::consts::PI / 180.0;
-/// A more pointed cone is a needle, which bends, rad: 1°.
-const SHARPEST: f64 = std::f64::consts::PI / 180.0;
 /// What a sharp tip can show is limited by how close a hand leads it past itself, m.
 const HAND: f64 = 1e-3;
 /// A face or a line of the tip may touch as a whole when the normal is within so many standard deviations of it …
@@ -97,22 +110,21 @@ impl TipBody {
     /// # Errors
     /// [`SettingError`] for sizes of which no tip can be made.
     pub fn new(shape: TipShape, radius: f64) -> Result<Self, SettingError> {
-        SettingError::check("tip radius (m)", radius, radius >= 0.0, "0 or more")?;
+        SettingError::check("tip.radius_mm", radius * 1e3, radius >= 0.0, "0 to 1000 mm")?;
+        let sizes = TipSizes::default();
         let (round, low, high) = match shape {
             TipShape::Ball => return Ok(Self::ball(radius)),
             TipShape::Flat { edge_radius, length } => {
-                SettingError::check("radius of a flat tip (m)", radius, radius > 0.0, "more than 0")?;
-                let is_edge = (0.0..=radius).contains(&edge_radius);
-                SettingError::check("edge radius of a flat tip (m)", edge_radius, is_edge, "0 to the tip's radius")?;
-                let is_length = length > edge_radius;
-                SettingError::check("length of a flat tip (m)", length, is_length, "more than its edge radius")?;
+                SettingError::check("tip.radius_mm", radius * 1e3, radius > 0.0, "more than 0 mm for a flat tip")?;
+                TipSizes { edge_radius: Some(edge_radius), length: Some(length), ..sizes }.check()?;
+                let (is_edge, is_length) = (edge_radius <= radius, length > edge_radius);
+                SettingError::check("tip.edge_radius_mm", edge_radius * 1e3, is_edge, "0 mm to tip.radius_mm")?;
+                let allowed = "more than tip.edge_radius_mm, to 1000 mm";
+                SettingError::check("tip.length_mm", length * 1e3, is_length, allowed)?;
                 (edge_radius, [radius - edge_radius, edge_radius], [radius - edge_radius, length])
             }
             TipShape::Cone { half_angle, length } => {
-                let is_angle = (SHARPEST..=BLUNTEST).contains(&half_angle);
-                let allowed = "0.0175 to 1.396 (1° to 80°): a blunter tip is a flat one";
-                SettingError::check("half angle of a cone tip (rad)", half_angle, is_angle, allowed)?;
-                SettingError::check("length of a cone tip (m)", length, length > 0.0, "more than 0")?;
+                TipSizes { half_angle: Some(half_angle), length: Some(length), ..sizes }.check()?;
                 (radius, [0.0, 0.0], [length * half_angle.tan(), length])
             }
         };
@@ -390,9 +402,9 @@ mod tests {
     fn impossible_tips_are_refused_by_name_value_and_remedy() {
         let refused = |shape, radius| TipBody::new(shape, radius).unwrap_err().to_string();
         let wide = TipShape::Flat { edge_radius: 3e-3, length: 5e-3 };
-        assert_eq!(refused(wide, 2e-3), "edge radius of a flat tip (m) is 0.003; it must be 0 to the tip's radius");
+        assert_eq!(refused(wide, 2e-3), "tip.edge_radius_mm is 3; it must be 0 mm to tip.radius_mm");
         let blunt = TipShape::Cone { half_angle: 1.5, length: 5e-3 };
-        assert!(refused(blunt, 1e-3).contains("half angle of a cone tip (rad) is 1.5"));
+        assert!(refused(blunt, 1e-3).starts_with("tip.half_angle_deg is 85.9"));
         assert!(refused(TipShape::Cone { half_angle: 0.3, length: 0.0 }, 1e-3).contains("length"));
         assert!(refused(TipShape::Flat { edge_radius: 0.0, length: f64::NAN }, 1e-3).contains("length"));
         assert!(refused(FLAT, 0.0).contains("radius"));

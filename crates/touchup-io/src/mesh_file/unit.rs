@@ -3,7 +3,9 @@
 use std::fmt;
 
 use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
+
+use touchup_core::words;
 
 /// Smallest diagonal of the bounding box: below it lies nothing that a ball tip of about a millimetre could touch.
 pub const SMALLEST_M: f64 = 1e-3;
@@ -11,21 +13,20 @@ pub const SMALLEST_M: f64 = 1e-3;
 /// Largest diagonal of the bounding box: beyond the reach of any arm, while a car body or an aircraft panel is below.
 pub const LARGEST_M: f64 = 20.0;
 
-/// The unit in which a mesh file gives its coordinates.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]
-pub enum MeshUnit {
-    /// 1 m
-    #[value(name = "m")]
-    #[serde(rename = "m")]
-    Metre,
-    /// 0.001 m
-    #[value(name = "mm")]
-    #[serde(rename = "mm")]
-    Millimetre,
-    /// 0.0254 m
-    #[value(name = "inch")]
-    #[serde(rename = "inch")]
-    Inch,
+words! {
+    /// The unit in which a mesh file gives its coordinates.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Serialize)]
+    pub enum MeshUnit {
+        /// 1 m
+        #[value(name = "m")]
+        Metre = "m",
+        /// 0.001 m
+        #[value(name = "mm")]
+        Millimetre = "mm",
+        /// 0.0254 m
+        #[value(name = "inch")]
+        Inch = "inch",
+    }
 }
 
 impl MeshUnit {
@@ -52,11 +53,7 @@ impl MeshUnit {
 
 impl fmt::Display for MeshUnit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Metre => "m",
-            Self::Millimetre => "mm",
-            Self::Inch => "inch",
-        })
+        f.write_str(self.word())
     }
 }
 

@@ -73,7 +73,7 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> Result<Vec<StageCost>
     let points: Vec<_> = samples.iter().map(touching).collect();
     let mut sync = Synchroniser::new(scene.sync_params())?;
     let mut bias = BiasTracker::new(Default::default())?;
-    let mut gate = ContactGate::new(scene.contact_params().unwrap_or_default())?;
+    let mut gate = ContactGate::new(scene.contact.unwrap_or_default())?;
     let mut motion = TipMotion::new(params.sliding.unwrap_or_default(), params.tip);
     let dynamics = FaceDynamics::new(params.dynamics).map_err(touchup_core::refine::RefineError::from)?;
     let mut writer = RecordingWriter::new(Cursor::new(Vec::new()), &Topics::default(), "object", "stylus")?;

@@ -19,7 +19,7 @@ pub struct Built {
 /// Memory at start, MB of 10⁶ bytes. What was touched comes to it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Memory {
-    /// the mesh that is moved: positions, faces, adjacency, where each vertex was scanned, the normal felt on each face
+    /// the mesh that is moved: positions, faces, adjacency, where each vertex was scanned, the normal measured on each face
     pub mesh_mb: f64,
     /// the tree over its faces
     pub tree_mb: f64,

@@ -1,7 +1,7 @@
 //! Settings put into the text of a scene; comments, order and everything else stay as they were written.
 //!
-//! Only the lines of the keys that are set are touched. Whether that went well is not believed but seen: the new text
-//! must parse to exactly the scene that is expected, or it is refused.
+//! Only the lines of the keys that are set are touched. The result is verified: the new text must
+//! parse to exactly the scene that is expected, or it is refused.
 
 mod block;
 mod flow;
@@ -48,7 +48,7 @@ impl Scene {
         for (i, Setting { path, value }) in settings.iter().enumerate() {
             let remark = if i == 0 { format!("  {MARK} {remark}") } else { String::new() };
             text = set(&text, path, value, &remark)
-                .ok_or_else(|| refused(format!("{} is written in an unusual way", path.join("."))))?;
+                .ok_or_else(|| refused(format!("{} is written in an unusual form", path.join("."))))?;
         }
         match Self::from_yaml(&text) {
             Ok(scene) if scene == *expected => Ok(text),
@@ -63,7 +63,7 @@ fn listed(settings: &[Setting]) -> String {
     settings.join("; ")
 }
 
-/// `None`: written in a way that is not understood.
+/// `None`: written in a form that is not understood.
 fn set(text: &str, path: &[&str], value: &str, remark: &str) -> Option<String> {
     if let Some(begin) = flow::start(text) {
         return flow::set(text, begin, path, value);

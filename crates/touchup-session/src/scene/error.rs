@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use touchup_core::touch::SettingError;
+
 /// Why a scene is not usable.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
@@ -22,28 +24,11 @@ pub enum SceneError {
         hint: String,
     },
     /// A value outside its range.
-    #[error("{key} is {value}; it must be {allowed}")]
-    OutOfRange {
-        /// section and key
-        key: &'static str,
-        /// as given, in the unit of the key
-        value: f64,
-        /// the range, in the same unit
-        allowed: &'static str,
-    },
+    #[error(transparent)]
+    Setting(#[from] SettingError),
     /// No face of the scan is near the region that is touched.
     #[error("no face of the scan is in or near scan.region_low_mm to scan.region_high_mm; is scan.unit right?")]
     EmptyRegion,
-    /// A name that means nothing.
-    #[error("{key} is {value}; it must be {allowed}")]
-    NoSuch {
-        /// section and key
-        key: &'static str,
-        /// as given
-        value: String,
-        /// the names
-        allowed: &'static str,
-    },
     /// A key that another one needs is not there.
     #[error("{key} needs {needs}: name both or neither")]
     Incomplete {
@@ -52,10 +37,10 @@ pub enum SceneError {
         /// section and key
         needs: &'static str,
     },
-    /// A file that is written in a way that cannot be edited without harm to the rest of it.
+    /// A file whose form cannot be edited without harm to the rest of it.
     #[error("the scene cannot be edited ({why}); put this in by hand: {settings}")]
     CannotEdit {
-        /// what stands in the way
+        /// what prevents it
         why: String,
         /// keys and values
         settings: String,
@@ -85,23 +70,11 @@ pub(super) fn yaml_error(error: &serde_saphyr::Error) -> SceneError {
     SceneError::Yaml { message: plain.to_string().replace(FOR_PROGRAMMERS, "").replace('\n', " "), hint }
 }
 
-/// The known key that fewest edits turn `word` into, when that is no more than half of it.
-fn nearest<'a>(word: &str, known: &[&'a str]) -> Option<&'a str> {
-    let edits = |key: &&&str| edit_distance(word, key);
-    known.iter().min_by_key(edits).copied().filter(|key| 2 * edit_distance(word, key) <= word.len())
-}
-
-/// Insertions, deletions and replacements that turn `a` into `b`.
-fn edit_distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, x) in a.chars().enumerate() {
-        let mut diagonal = std::mem::replace(&mut row[0], i + 1);
-        for (j, &y) in b.iter().enumerate() {
-            let replaced = diagonal + usize::from(x != y);
-            diagonal = row[j + 1];
-            row[j + 1] = replaced.min(diagonal + 1).min(row[j] + 1);
-        }
-    }
-    row[b.len()]
+/// The known word that fewest insertions, deletions, replacements and swaps turn `word` into, when that is at most half of it.
+pub fn nearest<'a>(word: &str, known: &[&'a str]) -> Option<&'a str> {
+    // nobody types such a name by mistake, and the distance takes as long as both lengths multiplied
+    const LONGEST: usize = 64;
+    let edits = |key: &&str| strsim::osa_distance(word, key);
+    let near = known.iter().copied().filter(|_| word.len() <= LONGEST).min_by_key(edits)?;
+    (2 * edits(&near) <= word.len()).then_some(near)
 }

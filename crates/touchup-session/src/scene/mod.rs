@@ -1,7 +1,8 @@
-//! The YAML that names the parts of a scene and their parameters, turned into the rooms' own settings.
+//! The YAML that names the parts of a scene and their parameters, turned into the modules' own settings.
 //!
 //! A part that is not named is not built: a scene that names only `refine` is the bare loop. A part that is named
-//! without keys takes its defaults. `config/default.yaml` is [`Scene::default`] written out, with every key explained.
+//! without keys takes its defaults. Each parameter is declared once, by [`touchup_core::parameters!`], in the module that it belongs to;
+//! `config/default.yaml` is [`Scene::template`] and docs/scene.md is [`Scene::table`].
 
 mod built;
 mod edit;
@@ -9,102 +10,80 @@ mod error;
 mod params;
 mod region;
 mod sections;
+mod template;
 
 use std::path::{Path, PathBuf};
 
-use serde::Deserialize;
-
 pub use built::{Built, Memory, SceneCost};
 pub use edit::Setting;
-pub use error::SceneError;
 use error::yaml_error;
+pub use error::{SceneError, nearest};
 pub use params::simulated_arm;
 pub use region::{CutScan, RegionCut};
-use sections::named;
 pub use sections::{
-    AlongName, BiasSection, BiasTrackingSection, CarveSection, ClockSection, CompensationSection, ContactSection,
-    GravityAxes, GuardSection, MarkersSection, Mode, ModelName, PatchSection, PayloadSection, RefineSection,
-    RobotSection, ScanSection, ScanToSpaceSection, ShapeName, SlidingSection, StepName, SyncSection, TipSection,
-    UncertaintySection,
+    ArmModel, ClockSection, CompensationSection, GravityAxes, MarkersSection, Mode, ModelName, PayloadSection,
+    RefineSection, RobotSection, ScanSection, ScanToSpaceSection, ShapeName, TipSection,
 };
 
+use touchup_core::parameters;
+use touchup_core::patch::{PatchParams, UncertaintyParams};
+use touchup_core::refine::{CarveParams, GuardParams, SlidingParams};
+use touchup_core::touch::{BiasParams, ContactGateParams, SyncParams, TipBody};
 use touchup_io::mesh_file::MeshUnit;
 
-/// The parts of a scene. `None`: not built.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Scene {
-    /// Pairs poses with wrenches; without it only those of equal stamp pair.
-    #[serde(default, deserialize_with = "named")]
-    pub sync: Option<SyncSection>,
-    /// Finds how late the clock of the wrench reads; without it nobody asks.
-    #[serde(default, deserialize_with = "named")]
-    pub clock: Option<ClockSection>,
-    /// The markers on the stylus, when they and not its pose are recorded.
-    #[serde(default, deserialize_with = "named")]
-    pub markers: Option<MarkersSection>,
-    /// Where the scan lies in the frame of the recorded poses; without it they are in the frame of the scan.
-    #[serde(default, deserialize_with = "named")]
-    pub scan_to_space: Option<ScanToSpaceSection>,
-    /// Takes weight and bias off the wrench.
-    #[serde(default, deserialize_with = "named")]
-    pub compensation: Option<CompensationSection>,
-    /// Follows the slow drift of the sensor in free air; without it the bias stays as it is named.
-    #[serde(default, deserialize_with = "named")]
-    pub bias_tracking: Option<BiasTrackingSection>,
-    /// Tells contact from free motion; without it every sample counts as contact.
-    #[serde(default, deserialize_with = "named")]
-    pub contact: Option<ContactSection>,
-    /// The ball that touches; without it a rigid point does.
-    #[serde(default, deserialize_with = "named")]
-    pub tip: Option<TipSection>,
-    /// The scan, and how good it is; without it the scan counts as free of noise.
-    #[serde(default, deserialize_with = "named")]
-    pub scan: Option<ScanSection>,
-    /// Takes friction out of the felt normal, in the haptic update and in the patch; without it the force is the normal.
-    #[serde(default, deserialize_with = "named")]
-    pub sliding: Option<SlidingSection>,
-    /// Takes away what the tip passes through without a force, in the haptic update and in the patch; without it lids stay.
-    #[serde(default, deserialize_with = "named")]
-    pub carve: Option<CarveSection>,
-    /// Keeps the mesh sound; without it an update may fold it.
-    #[serde(default, deserialize_with = "named")]
-    pub guard: Option<GuardSection>,
-    /// Meshes the surface anew where it was touched; without it the triangles of the scan stay.
-    #[serde(default, deserialize_with = "named")]
-    pub patch: Option<PatchSection>,
-    /// Says how well the surface that was meshed anew is known and rejects outliers; without it every touch counts.
-    #[serde(default, deserialize_with = "named")]
-    pub uncertainty: Option<UncertaintySection>,
-    /// The arm that holds a probe; without it nothing is probed.
-    #[serde(default, deserialize_with = "named")]
-    pub robot: Option<RobotSection>,
-    /// Moves the mesh; without it nothing does.
-    #[serde(default, deserialize_with = "named")]
-    pub refine: Option<RefineSection>,
-}
-
-impl Default for Scene {
-    /// All but compensation, which depends on the sensor, and the parts that only some sensors need.
-    fn default() -> Self {
-        Self {
-            sync: Some(SyncSection::default()),
-            clock: Some(ClockSection::default()),
-            markers: None,
-            scan_to_space: None,
-            compensation: None,
-            bias_tracking: None,
-            contact: Some(ContactSection::default()),
-            tip: Some(TipSection::default()),
-            scan: Some(ScanSection::default()),
-            sliding: Some(SlidingSection::default()),
-            carve: Some(CarveSection::default()),
-            guard: Some(GuardSection::default()),
-            patch: Some(PatchSection::default()),
-            uncertainty: Some(UncertaintySection::default()),
-            robot: None,
-            refine: Some(RefineSection::default()),
-        }
+parameters! {
+    /// The parts of a scene. `None`: not built.
+    ///
+    /// By default all but compensation, which depends on the sensor, and the parts that only some sensors need.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct Scene in "" {
+        /// Pairs poses with wrenches: the pose is interpolated at the stamp of each wrench. Not named: only messages of equal stamp
+        /// pair.
+        sync: Option<SyncParams> = Some(SyncParams::default()), "sync";
+        /// Estimates how late the clock of the wrench reads, from the moments at which contact begins; reported, and never applied
+        /// unasked. It has no keys. Not named: it is not estimated.
+        clock: Option<ClockSection> = Some(ClockSection::default()), "clock";
+        /// The markers on the stylus, for recordings that hold them in place of its pose (--markers-topic): a rigid body is pulled to
+        /// the markers that are seen by springs and dampers. The values are those of the simulated stylus.
+        markers: Option<MarkersSection> = None, "markers";
+        /// Where the scan lies in the frame of the recorded poses: p_space = R p_scan + t (`touchup calibrate scan`). Not named: the
+        /// poses are in the frame of the scan.
+        scan_to_space: Option<ScanToSpaceSection> = None, "scan_to_space";
+        /// Takes weight and bias off the wrench (`touchup calibrate payload`). Not named: the sensor has the axes of the tip and its
+        /// driver does it.
+        compensation: Option<CompensationSection> = None, "compensation";
+        /// Follows the slow drift of the sensor while nothing is touched. Not named: the bias stays as it is named.
+        bias_tracking: Option<BiasParams> = None, "bias_tracking";
+        /// Separates contact from free motion by the measured force. Not named: every sample counts as contact.
+        contact: Option<ContactGateParams> = Some(ContactGateParams::default()), "contact";
+        /// The tip that touches: a ball, the flat end of a cylinder, or a cone with a round nose. The origin of the pose is the centre
+        /// of the ball or nose, or the middle of the flat end; its z runs along the shaft, from the tip to the handle. Not named: a
+        /// rigid point.
+        tip: Option<TipSection> = Some(TipSection::default()), "tip";
+        /// The scan, and how good it is. Not named: it counts as free of noise.
+        scan: Option<ScanSection> = Some(ScanSection::default()), "scan";
+        /// Takes friction out of the measured normal while the ball slides, in the haptic update and in the patch. Not named: the force
+        /// is the normal. All but the cone is for the haptic update, which knows the past alone; the patch looks ahead and finds its
+        /// own.
+        sliding: Option<SlidingParams> = Some(SlidingParams::default()), "sliding";
+        /// Free space: what the tip passes through without a force is not there, in the haptic update and in the patch. Not named: lids
+        /// over holes stay. The keys are for the haptic update; in the patch free space counts as touches do.
+        carve: Option<CarveParams> = Some(CarveParams::default()), "carve";
+        /// Keeps the mesh sound: an update that would break one of these limits is cut back. Not named: anything goes, as in the paper,
+        /// and a noisy scan may blow up.
+        guard: Option<GuardParams> = Some(GuardParams::default()), "guard";
+        /// Reconstructs the surface where it was touched, finer than the scan: edges are sharp, closed holes open, and what was not
+        /// touched stays as it was. Not named: the triangles of the scan stay and are only moved.
+        patch: Option<PatchParams> = Some(PatchParams::default()), "patch";
+        /// Reports how well each vertex is known (sigma_mm in the PLY), and rejects touches that contradict their place as outliers. A
+        /// second pass that confirms the contradiction moves the place. Needs patch. Not named: every touch counts, and nothing is
+        /// reported.
+        uncertainty: Option<UncertaintyParams> = Some(UncertaintyParams::default()), "uncertainty";
+        /// The arm that holds a probe (`touchup probe`, docs/probing.md). Not named: nothing is probed. A request can ask for less than
+        /// these limits, never for more. It needs a ball for a tip, and scan_to_space says where the scan lies in its base.
+        robot: Option<RobotSection> = None, "robot";
+        /// Moves the mesh until measured and expected force agree. Not named: nothing moves it.
+        refine: Option<RefineSection> = Some(RefineSection::default()), "refine";
     }
 }
 
@@ -140,12 +119,12 @@ impl Scene {
     /// Parses and checks a scene.
     ///
     /// # Errors
-    /// [`SceneError::Yaml`], [`SceneError::OutOfRange`].
+    /// [`SceneError`]
     ///
     /// # Example
     /// ```
     /// let scene = touchup_session::scene::Scene::from_yaml("contact: { on_n: 0.5 }")?;
-    /// assert_eq!(scene.contact_params().unwrap().on, 0.5);
+    /// assert_eq!(scene.contact.unwrap().on, 0.5);
     /// assert!(scene.sync.is_none());
     /// # Ok::<(), touchup_session::scene::SceneError>(())
     /// ```
@@ -153,51 +132,44 @@ impl Scene {
         // comments between a key and its value are held, and there are few places for them
         let options = serde_saphyr::options! { emit_comments: false };
         let scene: Self = serde_saphyr::from_str_with_options(yaml, options).map_err(|error| yaml_error(&error))?;
-        scene.check()?;
+        scene.validate()?;
         Ok(scene)
     }
 
-    /// Checks every range; to be called again after a flag changed a value.
+    /// Checks every range, and what one part asks of another; to be called again after a flag changed a value.
     ///
     /// # Errors
-    /// [`SceneError::OutOfRange`], [`SceneError::Incomplete`].
-    pub fn check(&self) -> Result<(), SceneError> {
-        self.sync.iter().try_for_each(SyncSection::check)?;
-        self.scan_to_space.iter().try_for_each(ScanToSpaceSection::check)?;
-        self.compensation.iter().try_for_each(CompensationSection::check)?;
-        self.markers.iter().try_for_each(MarkersSection::check)?;
-        self.bias_tracking.iter().try_for_each(BiasTrackingSection::check)?;
-        self.contact.iter().try_for_each(ContactSection::check)?;
-        self.tip.iter().try_for_each(TipSection::check)?;
-        self.scan.iter().try_for_each(ScanSection::check)?;
-        self.sliding.iter().try_for_each(SlidingSection::check)?;
-        self.carve.iter().try_for_each(CarveSection::check)?;
-        self.guard.iter().try_for_each(GuardSection::check)?;
-        self.patch.iter().try_for_each(PatchSection::check)?;
-        self.uncertainty.iter().try_for_each(UncertaintySection::check)?;
-        self.robot.iter().try_for_each(RobotSection::check)?;
-        self.refine.iter().try_for_each(RefineSection::check)?;
-        let asks_for_spring =
-            self.refine.as_ref().is_some_and(|refine| refine.contact_model == Some(ModelName::Spring));
-        if asks_for_spring && self.tip.as_ref().is_none_or(|tip| tip.stiffness_n_per_mm.is_none()) {
-            return Err(SceneError::Incomplete {
-                key: "refine.contact_model: spring",
-                needs: "tip.stiffness_n_per_mm",
-            });
-        }
-        if self.robot.is_some()
-            && self.tip.as_ref().is_none_or(|tip| tip.radius_mm <= 0.0 || tip.shape != ShapeName::Ball)
-        {
-            return Err(SceneError::Incomplete { key: "robot", needs: "tip.shape: ball and tip.radius_mm above 0" });
-        }
-        if self.patch.is_some() {
-            if self.tip.as_ref().is_none_or(|tip| tip.radius_mm <= 0.0 && tip.shape != ShapeName::Cone) {
-                return Err(SceneError::Incomplete { key: "patch", needs: "tip.radius_mm above 0" });
-            }
-            if self.contact.is_none() {
-                return Err(SceneError::Incomplete { key: "patch", needs: "contact" });
+    /// [`SceneError::Setting`], [`SceneError::Incomplete`].
+    pub fn validate(&self) -> Result<(), SceneError> {
+        self.check()?;
+        let tip = self.tip.as_ref();
+        let shape = tip.map(|tip| tip.shape);
+        let radius = tip.map_or(0.0, |tip| tip.ball.radius);
+        let corners = self.scan.as_ref().map(|scan| (scan.region_low.is_some(), scan.region_high.is_some()));
+        let asks_for_spring = self.refine.as_ref().is_some_and(|it| it.contact_model == Some(ModelName::Spring));
+        let half_angle = tip.and_then(|tip| tip.sizes.half_angle);
+        for (is_missing, key, needs) in [
+            (shape == Some(ShapeName::Cone) && half_angle.is_none(), "tip.shape: cone", "tip.half_angle_deg"),
+            (corners == Some((true, false)), "scan.region_low_mm", "scan.region_high_mm"),
+            (corners == Some((false, true)), "scan.region_high_mm", "scan.region_low_mm"),
+            (
+                asks_for_spring && self.tip_params().stiffness.is_none(),
+                "refine.contact_model: spring",
+                "tip.stiffness_n_per_mm",
+            ),
+            (
+                self.robot.is_some() && (radius <= 0.0 || shape != Some(ShapeName::Ball)),
+                "robot",
+                "tip.shape: ball and tip.radius_mm above 0",
+            ),
+            (self.patch.is_some() && radius <= 0.0 && shape != Some(ShapeName::Cone), "patch", "tip.radius_mm above 0"),
+            (self.patch.is_some() && self.contact.is_none(), "patch", "contact"),
+        ] {
+            if is_missing {
+                return Err(SceneError::Incomplete { key, needs });
             }
         }
+        TipBody::new(self.tip_shape(), radius)?;
         Ok(())
     }
 }

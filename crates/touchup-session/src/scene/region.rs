@@ -35,8 +35,7 @@ impl Scene {
     /// The box that is touched, where the scene names one.
     pub fn region(&self) -> Option<Region> {
         let scan = self.scan.as_ref()?;
-        let corner = |mm: [f64; 3]| mm.map(|x| x / 1e3).into();
-        Some(Region { low: corner(scan.region_low_mm?), high: corner(scan.region_high_mm?) })
+        Some(Region { low: scan.region_low?, high: scan.region_high? })
     }
 
     /// Takes out of the scan what is touched, with what the haptic update and the patch need around it.

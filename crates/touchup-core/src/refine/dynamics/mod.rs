@@ -21,6 +21,8 @@ mod spring_flow;
 
 use nalgebra::{Point3, Vector3};
 
+use crate::{parameters, words};
+
 pub use contact_model::{ContactModel, LARGEST_SHARE};
 use contact_model::{Hold, Shift};
 pub use rotation::turn;
@@ -90,26 +92,54 @@ pub struct FaceState {
     pub n: Vector3<f64>,
 }
 
-/// How the two sub-flows are put together.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum StepRule {
-    /// Position, then rotation: first order, exact where F is parallel to n.
-    #[default]
-    Lie,
-    /// The position flow again with the drift and the mean normal that the rotation causes: second order.
-    DriftCorrected,
-    /// Adaptive Runge–Kutta on the coupled equations: for comparison, refuses stiff steps.
-    DormandPrince,
+words! {
+    /// How the two sub-flows are put together.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum StepRule {
+        /// Position, then rotation: first order, exact where F is parallel to n.
+        #[default]
+        Lie = "lie",
+        /// The position flow again with the drift and the mean normal that the rotation causes: second order.
+        DriftCorrected = "corrected",
+        /// Adaptive Runge–Kutta on the coupled equations: for comparison, refuses stiff steps.
+        DormandPrince = "dp5",
+    }
 }
 
-/// The direction a in which b* moves.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Along {
-    /// n*(0) \[paper, Eq 6\]: n* when the face was first touched, or at the start of the step if no other is told.
-    InitialNormal,
-    /// F/|F|, which stays bounded where n* is far off; n* at the start where F = 0.
-    #[default]
-    Force,
+words! {
+    /// The direction a in which b* moves.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum Along {
+        /// n*(0) \[paper, Eq 6\]: n* when the face was first touched, or at the start of the step if no other is given.
+        InitialNormal = "normal0",
+        /// F/|F|, which stays bounded where n* is far off; n* at the start where F = 0.
+        #[default]
+        Force = "force",
+    }
+}
+
+parameters! {
+    /// The sigmoid of Eq 3.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct SigmoidParams in "refine" {
+        /// Largest force of the sigmoid.
+        ///
+        /// In N. The paper leaves it open.
+        f_max: f64 = 10.0, "f_max_n" [N, 1e-6, 1e6];
+        /// Width of the sigmoid.
+        ///
+        /// In m.
+        h_min: f64 = 0.5, "h_min_mm" [MM, 1e-9, 1e6];
+        /// Shift of the sigmoid.
+        delta: f64 = 5.0, "delta" [ONE, -50, 50];
+    }
+}
+
+impl SigmoidParams {
+    /// The expected force of it.
+    pub fn model(&self) -> ContactModel {
+        ContactModel::Sigmoid { f_max_n: self.f_max, h_min_m: self.h_min, delta: self.delta }
+    }
 }
 
 /// Parameters of [`FaceDynamics`].
@@ -134,7 +164,7 @@ impl Default for DynamicsParams {
     /// The paper's α, β, h_min, δ, with the f_max of 10 N that the paper leaves open; the robust choice elsewhere.
     fn default() -> Self {
         Self {
-            model: ContactModel::Sigmoid { f_max_n: 10.0, h_min_m: 0.5e-3, delta: 5.0 },
+            model: SigmoidParams::default().model(),
             alpha_m_per_n_s: 0.1,
             beta_per_n2_s: 0.1,
             rule: StepRule::Lie,

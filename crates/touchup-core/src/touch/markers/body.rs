@@ -25,8 +25,7 @@ pub struct MarkerBody {
 impl Default for MarkerBody {
     /// Six LEDs around the handle, 120 to 180 mm above the ball: the stylus of the simulation.
     fn default() -> Self {
-        let mm = [[28, 0, 120], [-20, 22, 128], [-16, -26, 140], [18, 24, 155], [-30, 2, 168], [6, -22, 180]];
-        let markers_t = mm.map(|place| Point3::from(place.map(|x| f64::from(x) * 1e-3))).to_vec();
+        let markers_t = Self::STYLUS_MM.map(|place| Point3::from(place.map(|x| x * 1e-3))).to_vec();
         Self::new(markers_t).expect("six markers apart from each other that are not on one line")
     }
 }
@@ -35,6 +34,16 @@ impl Default for MarkerBody {
 pub(super) type MarkerPairs = [(usize, Point3<f64>)];
 
 impl MarkerBody {
+    /// The markers of the default, mm.
+    pub const STYLUS_MM: [[f64; 3]; 6] = [
+        [28.0, 0.0, 120.0],
+        [-20.0, 22.0, 128.0],
+        [-16.0, -26.0, 140.0],
+        [18.0, 24.0, 155.0],
+        [-30.0, 2.0, 168.0],
+        [6.0, -22.0, 180.0],
+    ];
+
     /// - `markers_t`: by label from 0 on, m, in T.
     ///
     /// # Errors
@@ -42,27 +51,24 @@ impl MarkerBody {
     /// anything not finite.
     pub fn new(markers_t: Vec<Point3<f64>>) -> Result<Self, SettingError> {
         let count = markers_t.len();
-        SettingError::check("number of markers", count as f64, (3..=MOST_MARKERS).contains(&count), "3 to 16")?;
+        SettingError::check(
+            "the number of markers.positions_mm",
+            count as f64,
+            (3..=MOST_MARKERS).contains(&count),
+            "3 to 16",
+        )?;
         for x in markers_t.iter().flat_map(|p| p.iter()) {
-            SettingError::check("place of a marker (m)", *x, x.abs() <= 10.0, "within 10 m of the ball")?;
+            SettingError::check("markers.positions_mm", *x * 1e3, x.abs() <= 10.0, "-10000 to 10000 mm")?;
         }
         let centroid_t = centroid(markers_t.iter().copied());
         let pairs = (0..count).flat_map(|i| (0..i).map(move |j| (i, j)));
         let smallest_distance = pairs.map(|(i, j)| (markers_t[i] - markers_t[j]).norm()).fold(f64::MAX, f64::min);
         let [first, second_extent, _] = extents(markers_t.iter().copied());
-        SettingError::check(
-            "smallest distance of markers (m)",
-            smallest_distance,
-            smallest_distance > 0.0,
-            "more than 0",
-        )?;
+        let apart = smallest_distance > 0.0;
+        SettingError::check("the smallest distance of markers.positions_mm", smallest_distance, apart, "more than 0")?;
         let is_no_line = second_extent > FLAT_SHARE * first;
-        SettingError::check(
-            "extent of the markers beside their line (m)",
-            second_extent,
-            is_no_line,
-            "more: they must not be on one line",
-        )?;
+        let what = "the extent of markers.positions_mm beside their line, in m,";
+        SettingError::check(what, second_extent, is_no_line, "more: they must not be on one line")?;
         Ok(Self { markers_t, centroid_t, smallest_distance, second_extent })
     }
 

@@ -84,7 +84,7 @@ impl MarkerFilter {
     /// # Errors
     /// [`SettingError`] naming the first setting outside its range.
     pub fn new(body: MarkerBody, params: MarkerParams) -> Result<Self, SettingError> {
-        params.check(&body)?;
+        params.check_for(&body)?;
         let order = SyncParams { reorder_ns: params.reorder_ns, capacity: HELD_FRAMES, ..SyncParams::default() };
         let frames = Stream::new(HELD_FRAMES, params.reorder_ns.saturating_add(1));
         Ok(Self { body, params, order, frames, tracked: None, counts: MarkerCounts::default() })

@@ -17,6 +17,7 @@ use nalgebra::Point3;
 
 use super::SettingError;
 use super::stream::Stamped;
+use crate::parameters;
 
 /// Markers that a body, and a frame, may have.
 pub const MOST_MARKERS: usize = 16;
@@ -70,53 +71,47 @@ impl Stamped for MarkerFrame {
     }
 }
 
-/// Settings of a [`MarkerFilter`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MarkerParams {
-    /// How the body follows its markers.
-    pub spring: SpringParams,
-    /// Noise of a seen marker per axis, m: what lies much farther from the fit counts little. Default 0.15 mm, an active
-    /// LED system at 2 m.
-    pub noise: f64,
-    /// A marker farther than this from where it is expected is another one, or none, m. Default 4 mm: a hand that
-    /// accelerates with 5 m/s² strays by 2 mm in 30 ms, and markers stand farther apart than twice as much.
-    pub gate: f64,
-    /// How long the body flies on when its markers do not determine it, ns. Default 30 ms, as long as
-    /// [`super::SyncParams::largest_gap_ns`] and for the same reason.
-    pub coast_ns: i64,
-    /// Time between two poses, ns. Default 1 ms.
-    pub period_ns: i64,
-    /// How far a frame may lag behind the newest one, ns. Default 20 ms.
-    pub reorder_ns: i64,
-}
-
-impl Default for MarkerParams {
-    fn default() -> Self {
-        Self {
-            spring: SpringParams::default(),
-            noise: 0.15e-3,
-            gate: 4e-3,
-            coast_ns: 30_000_000,
-            period_ns: 1_000_000,
-            reorder_ns: 20_000_000,
-        }
+parameters! {
+    /// Settings of a [`MarkerFilter`].
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct MarkerParams in "markers" {
+        /// Noise of a marker per axis.
+        ///
+        /// In m: what lies much farther from the fit counts little. An active LED system at 2 m.
+        noise: f64 = 0.15, "noise_mm" [MM, 1e-6, 1000];
+        /// A marker farther than this from where it is expected is another one, or none; less than half of the smallest distance
+        /// between two markers.
+        ///
+        /// In m. A hand that accelerates with 5 m/s² strays by 2 mm in 30 ms, and markers stand farther apart than twice as much.
+        gate: f64 = 4.0, "gate_mm" [MM, 1e-6, 1000];
+        /// How long the body flies on when its markers do not determine it; after that there is no pose.
+        ///
+        /// In ns. As long as [`super::SyncParams::largest_gap_ns`] and for the same reason.
+        coast_ns: i64 = 30.0, "coast_ms" [MS, 0.001, 10000];
+        /// Time between two poses.
+        ///
+        /// In ns.
+        period_ns: i64 = 1.0, "period_ms" [MS, 0.05, 10000];
+        /// How far a frame may lag behind the newest one.
+        ///
+        /// In ns.
+        reorder_ns: i64 = 20.0, "reorder_ms" [MS, 0, 60000];
+    }
+    with {
+        /// How the body follows its markers.
+        spring: SpringParams,
     }
 }
 
 impl MarkerParams {
-    fn check(&self, body: &MarkerBody) -> Result<(), SettingError> {
-        self.spring.check()?;
-        SettingError::check("marker noise (m)", self.noise, self.noise > 0.0, "more than 0")?;
-        let apart = self.gate > 0.0 && 2.0 * self.gate < body.smallest_distance();
-        SettingError::check(
-            "marker gate (m)",
-            self.gate,
-            apart,
-            "more than 0 and less than half of the smallest distance between two markers",
-        )?;
-        for (name, ns) in [("coasting (ns)", self.coast_ns), ("period of poses (ns)", self.period_ns)] {
-            SettingError::check(name, ns as f64, ns > 0, "more than 0")?;
-        }
-        SettingError::check("reorder window (ns)", self.reorder_ns as f64, self.reorder_ns >= 0, "0 or more")
+    /// Refuses the first setting that is not in its range, and a gate that could take one marker of `body` for another.
+    ///
+    /// # Errors
+    /// [`SettingError`]
+    pub fn check_for(&self, body: &MarkerBody) -> Result<(), SettingError> {
+        self.check()?;
+        let apart = 2.0 * self.gate < body.smallest_distance();
+        let allowed = "less than half of the smallest distance between two markers";
+        SettingError::check("markers.gate_mm", self.gate * 1e3, apart, allowed)
     }
 }

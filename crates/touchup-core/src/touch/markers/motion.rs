@@ -11,31 +11,22 @@
 use nalgebra::{Isometry3, Matrix6, Point3, UnitQuaternion, Vector3, Vector6};
 
 use super::body::{MarkerBody, MarkerPairs};
-use crate::touch::SettingError;
+use crate::parameters;
 
-/// Spring and damper at each marker, for the mass at it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SpringParams {
-    /// Natural frequency √(k/m) / 2π, Hz. Default 12: a hand that accelerates by 1 m/s² is followed 0.2 mm behind, and
-    /// the noise of frames at 200 Hz falls to two thirds.
-    pub frequency: f64,
-    /// Damping d / (2 √(k m)); default 1, the fastest that does not swing; at least 0.5.
-    pub damping: f64,
-}
-
-impl Default for SpringParams {
-    fn default() -> Self {
-        Self { frequency: 12.0, damping: 1.0 }
+parameters! {
+    /// Spring and damper at each marker, for the mass at it.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct SpringParams in "markers" {
+        /// Natural frequency √(k/m) / 2π of the springs between the body and its markers: higher follows faster, lower smooths more.
+        ///
+        /// In Hz. A hand that accelerates by 1 m/s² is followed 0.2 mm behind, and the noise of frames at 200 Hz falls to two thirds.
+        frequency: f64 = 12.0, "spring_hz" [HZ, 0.001, 1e6];
+        /// Damping d / (2 √(k m)): 1 is the fastest that does not swing.
+        damping: f64 = 1.0, "damping" [ONE, 0.5, 100];
     }
 }
 
 impl SpringParams {
-    pub(super) fn check(&self) -> Result<(), SettingError> {
-        let Self { frequency, damping } = *self;
-        SettingError::check("natural frequency of the markers (Hz)", frequency, frequency > 0.0, "more than 0")?;
-        SettingError::check("damping of the markers", damping, damping >= 0.5, "0.5 or more: below it the body swings")
-    }
-
     /// α and β over `dt` s.
     pub(super) fn gains(&self, dt: f64) -> (f64, f64) {
         let (turn, damping) = (std::f64::consts::TAU * self.frequency * dt, self.damping);

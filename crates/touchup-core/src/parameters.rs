@@ -1,0 +1,692 @@
+//! Parameters of the scene, each declared once, in the module that it belongs to.
+//!
+//! [`parameters!`](crate::parameters!) makes of one declaration the struct in SI, its defaults, its check, how it reads itself from YAML,
+//! and a [`Parameter`] for each key, of which the template of the scene and the table of docs/scene.md are made:
+//!
+//! ```
+//! use touchup_core::{parameters, parameters::Section};
+//! parameters! {
+//!     /// How a door is closed.
+//!     #[derive(Clone, Debug, PartialEq)]
+//!     pub struct DoorParams in "door" {
+//!         /// The door is closed by this force.
+//!         ///
+//!         /// What follows the first paragraph is not shown to the user: here, why the default is what it is.
+//!         force: f64 = 4.0, "force_n" [N, 0, 100];
+//!         /// How far it is opened; left out: as far as it goes.
+//!         opening: Option<f64> = None, "opening_mm" [MM, 1, 2000] like "800";
+//!         /// Not in the scene.
+//!         count: usize = 0;
+//!     }
+//! }
+//! assert_eq!(DoorParams::default(), DoorParams { force: 4.0, opening: None, count: 0 });
+//! let wide = DoorParams { opening: Some(3.0), ..DoorParams::default() };
+//! assert_eq!(wide.check().unwrap_err().to_string(), "door.opening_mm is 3000; it must be 1 to 2000 mm; it is left out by default");
+//! ```
+//!
+//! A struct may end `with { part: Part }`, whose keys are in the same section, and name a `check path;` of what several parameters
+//! must hold together.
+
+use std::fmt;
+use std::marker::PhantomData;
+use std::path::PathBuf;
+
+use nalgebra::{Point3, Vector3};
+use serde::de::{DeserializeOwned, DeserializeSeed, Deserializer, Error, MapAccess, Visitor};
+
+/// A parameter outside the range in which it has a meaning.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{name} is {}; it must be {allowed}", Number(*.value))]
+pub struct SettingError {
+    /// its key in the scene, or what it is and its unit
+    pub name: String,
+    /// what it is, in the unit of `allowed`
+    pub value: f64,
+    /// the range
+    pub allowed: String,
+}
+
+impl SettingError {
+    /// Refuses a value that is not finite or not `inside` the range that `allowed` names.
+    ///
+    /// # Errors
+    /// [`SettingError`], with the name and the value.
+    pub fn check(name: &str, value: f64, inside: bool, allowed: &str) -> Result<(), SettingError> {
+        if inside && value.is_finite() {
+            return Ok(());
+        }
+        Err(SettingError { name: name.to_owned(), value, allowed: allowed.to_owned() })
+    }
+}
+
+/// A number for people: twelve digits, powers of ten where it is large or small.
+struct Number(f64);
+
+impl fmt::Display for Number {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let rounded = format!("{:.11e}", self.0).parse().unwrap_or(self.0);
+        let is_plain = rounded == 0.0 || !rounded.is_finite() || (1e-4..1e6).contains(&rounded.abs());
+        if is_plain { write!(f, "{rounded}") } else { write!(f, "{rounded:e}") }
+    }
+}
+
+/// The unit of a key.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unit {
+    /// as it is written behind a number; empty for a pure number
+    pub symbol: &'static str,
+    scale: Scale,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Scale {
+    /// so many are one of SI
+    Per(f64),
+    /// one is so many of SI
+    Times(f64),
+}
+
+const SI: Scale = Scale::Per(1.0);
+
+macro_rules! units {
+    ($($NAME:ident $symbol:literal $scale:expr;)*) => {
+        impl Unit {
+            $(
+                #[doc = concat!("`", $symbol, "`")]
+                pub const $NAME: Self = Self { symbol: $symbol, scale: $scale };
+            )*
+        }
+    };
+}
+
+units! {
+    ONE "" SI;
+    N "N" SI;
+    NM "N·m" SI;
+    KG "kg" SI;
+    HZ "Hz" SI;
+    S "s" SI;
+    PER_S "1/s" SI;
+    M_PER_S2 "m/s²" SI;
+    M_PER_N_S "m/(N·s)" SI;
+    PER_N2_S "1/(N²·s)" SI;
+    MESSAGES "messages" SI;
+    TOUCHES "touches" SI;
+    EDGES "mean edges" SI;
+    SIGMAS "standard deviations" SI;
+    SCANS "times the faces of the scan" SI;
+    QUATERNION "(length of the quaternion)" SI;
+    MM "mm" Scale::Per(1e3);
+    MM_PER_S "mm/s" Scale::Per(1e3);
+    MM_PER_S2 "mm/s²" Scale::Per(1e3);
+    MS "ms" Scale::Per(1e3);
+    PERCENT "%" Scale::Per(100.0);
+    N_PER_MM "N/mm" Scale::Times(1e3);
+    DEG "degrees" Scale::Times(std::f64::consts::PI / 180.0);
+}
+
+impl Unit {
+    /// A number of this unit in SI.
+    pub fn to_si(self, x: f64) -> f64 {
+        match self.scale {
+            Scale::Per(count) => x / count,
+            Scale::Times(size) => x * size,
+        }
+    }
+
+    /// A number of SI in this unit.
+    pub fn of_si(self, x: f64) -> f64 {
+        match self.scale {
+            Scale::Per(count) => x * count,
+            Scale::Times(size) => x / size,
+        }
+    }
+}
+
+/// What is declared of one key.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameter {
+    /// the section that it is in, with those around it: `compensation.payload`; empty at the top
+    pub section: &'static str,
+    /// its key there
+    pub key: &'static str,
+    /// of its numbers
+    pub unit: Unit,
+    /// smallest and largest number, in the unit
+    pub range: Option<[f64; 2]>,
+    /// what else is to be said of the range
+    pub hint: &'static str,
+    /// the words to choose from
+    pub words: &'static [&'static str],
+    /// as YAML; `None`: it is left out
+    pub default: Option<String>,
+    /// a value for one that is left out, as YAML
+    pub example: &'static str,
+    /// the whole documentation, line by line
+    pub doc: &'static [&'static str],
+    /// of a section: what is in it
+    pub inner: Vec<Parameter>,
+    /// whether it is a section
+    pub is_section: bool,
+}
+
+impl Parameter {
+    /// Section and key.
+    pub fn name(&self) -> String {
+        if self.section.is_empty() { self.key.to_owned() } else { format!("{}.{}", self.section, self.key) }
+    }
+
+    /// What it does: the first paragraph of its documentation.
+    pub fn summary(&self) -> String {
+        let lines = self.doc.iter().map(|line| line.trim()).take_while(|line| !line.is_empty());
+        lines.collect::<Vec<_>>().join(" ")
+    }
+
+    /// What it may be: a range, or words; empty where anything may be.
+    pub fn allowed(&self) -> String {
+        let Some([low, high]) = self.range else { return self.words.join(", ") };
+        format!("{} to {}", Number(low), Number(high))
+    }
+}
+
+/// What a key may hold.
+pub trait Value: Sized {
+    /// As it is written in the YAML.
+    type Written: DeserializeOwned;
+    /// The words to choose from.
+    const WORDS: &'static [&'static str] = &[];
+    /// Whether it is a section, or one that may be left out.
+    const IS_SECTION: bool = false;
+
+    /// The value in SI.
+    fn of(written: Self::Written, unit: Unit) -> Self;
+
+    /// As YAML on one line; `None`: it is left out.
+    fn yaml(&self, unit: Unit) -> Option<String>;
+
+    /// The value of a key that is there, also without a value: that names a section with its defaults.
+    fn given(written: Self::Written, unit: Unit) -> Self {
+        Self::of(written, unit)
+    }
+
+    /// A section of defaults.
+    fn named() -> Option<Self> {
+        None
+    }
+
+    /// Makes it what it is when its key is not there: no section is built that is not named.
+    fn leave_out(&mut self) {}
+
+    /// Its numbers in SI, all within the range.
+    fn numbers(&self) -> Vec<f64> {
+        vec![]
+    }
+
+    /// Of a section: whether all in it may be.
+    ///
+    /// # Errors
+    /// [`SettingError`]
+    fn check(&self) -> Result<(), SettingError> {
+        Ok(())
+    }
+
+    /// Of a section: what is in it.
+    fn inner() -> Vec<Parameter> {
+        vec![]
+    }
+}
+
+impl Value for f64 {
+    type Written = Self;
+
+    fn of(written: Self, unit: Unit) -> Self {
+        unit.to_si(written)
+    }
+
+    fn yaml(&self, unit: Unit) -> Option<String> {
+        Some(Number(unit.of_si(*self)).to_string())
+    }
+
+    fn numbers(&self) -> Vec<f64> {
+        vec![*self]
+    }
+}
+
+/// Nanoseconds in a second.
+const NS: f64 = 1e9;
+
+/// A time in ns. The smallest stands for what is no number, the largest for infinity: none of them is in a range.
+impl Value for i64 {
+    type Written = f64;
+
+    fn of(written: f64, unit: Unit) -> Self {
+        // 1 ms is exactly 10⁶ ns, where 0.001 s is rounded
+        if written.is_nan() { Self::MIN } else { (written * unit.to_si(NS)).round() as Self }
+    }
+
+    fn yaml(&self, unit: Unit) -> Option<String> {
+        self.numbers()[0].yaml(unit)
+    }
+
+    fn numbers(&self) -> Vec<f64> {
+        vec![match *self {
+            Self::MIN => f64::NAN,
+            Self::MAX => f64::INFINITY,
+            ns => ns as f64 / NS,
+        }]
+    }
+}
+
+/// Values that have no unit: how they are written, and the number in them.
+macro_rules! without_unit {
+    ($($Type:ty, $text:expr, $number:expr;)*) => {$(
+        impl Value for $Type {
+            type Written = Self;
+
+            fn of(written: Self, _: Unit) -> Self {
+                written
+            }
+
+            fn yaml(&self, _: Unit) -> Option<String> {
+                let text: fn(&Self) -> String = $text;
+                Some(text(self))
+            }
+
+            fn numbers(&self) -> Vec<f64> {
+                let number: fn(&Self) -> Option<f64> = $number;
+                number(self).into_iter().collect()
+            }
+        }
+    )*};
+}
+
+without_unit! {
+    bool, bool::to_string, |_| None;
+    String, |text| format!("'{text}'"), |_| None;
+    PathBuf, |path| path.display().to_string(), |_| None;
+    usize, usize::to_string, |count| Some(*count as f64);
+    // a quaternion x, y, z, w as it is written; its one number is its length
+    [f64; 4], |xyzw| list(xyzw, Unit::ONE), |xyzw| Some(xyzw.iter().map(|c| c * c).sum::<f64>().sqrt());
+}
+
+macro_rules! places {
+    ($($Type:ty),*) => {$(
+        impl Value for $Type {
+            type Written = [f64; 3];
+
+            fn of(written: [f64; 3], unit: Unit) -> Self {
+                written.map(|x| unit.to_si(x)).into()
+            }
+
+            fn yaml(&self, unit: Unit) -> Option<String> {
+                Some(list(&self.numbers(), unit))
+            }
+
+            fn numbers(&self) -> Vec<f64> {
+                self.iter().copied().collect()
+            }
+        }
+    )*};
+}
+
+places!(Vector3<f64>, Point3<f64>);
+
+impl<T: Value> Value for Vec<T> {
+    type Written = Vec<T::Written>;
+
+    fn of(written: Self::Written, unit: Unit) -> Self {
+        written.into_iter().map(|one| T::of(one, unit)).collect()
+    }
+
+    fn yaml(&self, unit: Unit) -> Option<String> {
+        Some(list(self, unit))
+    }
+
+    fn numbers(&self) -> Vec<f64> {
+        self.iter().flat_map(T::numbers).collect()
+    }
+}
+
+fn list<T: Value>(values: &[T], unit: Unit) -> String {
+    format!("[{}]", values.iter().filter_map(|one| one.yaml(unit)).collect::<Vec<_>>().join(", "))
+}
+
+impl<T: Value> Value for Option<T> {
+    type Written = Option<T::Written>;
+    const WORDS: &'static [&'static str] = T::WORDS;
+    const IS_SECTION: bool = T::IS_SECTION;
+
+    fn of(written: Self::Written, unit: Unit) -> Self {
+        written.map(|written| T::of(written, unit))
+    }
+
+    fn given(written: Self::Written, unit: Unit) -> Self {
+        Self::of(written, unit).or_else(T::named)
+    }
+
+    fn leave_out(&mut self) {
+        if T::IS_SECTION {
+            *self = None;
+        }
+    }
+
+    fn yaml(&self, unit: Unit) -> Option<String> {
+        self.as_ref()?.yaml(unit)
+    }
+
+    fn numbers(&self) -> Vec<f64> {
+        self.iter().flat_map(T::numbers).collect()
+    }
+
+    fn check(&self) -> Result<(), SettingError> {
+        self.iter().try_for_each(T::check)
+    }
+
+    fn inner() -> Vec<Parameter> {
+        T::inner()
+    }
+}
+
+/// Parameters that are written under one key; made by [`parameters!`](crate::parameters!).
+pub trait Section: Default {
+    /// Its name, with those of the sections around it.
+    const NAME: &'static str;
+
+    /// All keys.
+    fn keys() -> &'static [&'static str];
+
+    /// What is declared of each key.
+    fn parameters() -> Vec<Parameter>;
+
+    /// What it is when no key is named: its defaults, without the sections in it.
+    fn bare() -> Self;
+
+    /// Reads the value of a key; `false` for one that is not of this section.
+    ///
+    /// # Errors
+    /// Those of the deserializer.
+    fn read_key<'de, A: MapAccess<'de>>(&mut self, key: &str, map: &mut A) -> Result<bool, A::Error>;
+}
+
+/// Refuses the first number of the value of `key` that is not in its range.
+///
+/// # Errors
+/// [`SettingError`]
+pub fn check<T: Value>(value: &T, key: &str, declared: &[Parameter]) -> Result<(), SettingError> {
+    value.check()?;
+    let Some(one) = declared.iter().find(|one| one.key == key) else { return Ok(()) };
+    let Some([low, high]) = one.range.map(|range| range.map(|limit| one.unit.to_si(limit))) else { return Ok(()) };
+    let Some(si) = value.numbers().into_iter().find(|si| !(low..=high).contains(si)) else { return Ok(()) };
+    let what_else = match &one.default {
+        _ if !one.hint.is_empty() => one.hint.to_owned(),
+        None => "it is left out by default".to_owned(),
+        Some(default) => format!("the default is {default}"),
+    };
+    let allowed = format!("{}; {what_else}", format!("{} {}", one.allowed(), one.unit.symbol).trim_end());
+    Err(SettingError { name: one.name(), value: one.unit.of_si(si), allowed })
+}
+
+/// Reads a section; what is not named keeps its default.
+///
+/// # Errors
+/// Those of the deserializer; a key that the section does not have.
+pub fn read_section<'de, S: Section, D: Deserializer<'de>>(deserializer: D) -> Result<S, D::Error> {
+    deserializer.deserialize_struct(S::NAME, S::keys(), SectionVisitor(PhantomData))
+}
+
+struct SectionVisitor<S>(PhantomData<S>);
+
+impl<'de, S: Section> Visitor<'de> for SectionVisitor<S> {
+    type Value = S;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("keys with values")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<S, A::Error> {
+        let mut section = S::bare();
+        while let Some(key) = map.next_key_seed(KnownKey(S::keys()))? {
+            section.read_key(key, &mut map)?;
+        }
+        Ok(section)
+    }
+}
+
+/// One of these keys.
+struct KnownKey(&'static [&'static str]);
+
+impl<'de> DeserializeSeed<'de> for KnownKey {
+    type Value = &'static str;
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<&'static str, D::Error> {
+        deserializer.deserialize_identifier(self)
+    }
+}
+
+impl Visitor<'_> for KnownKey {
+    type Value = &'static str;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a key")
+    }
+
+    fn visit_str<E: Error>(self, key: &str) -> Result<&'static str, E> {
+        self.0.iter().find(|known| **known == key).copied().ok_or_else(|| E::unknown_field(key, self.0))
+    }
+}
+
+/// Declares a struct of parameters: see [the module](mod@crate::parameters).
+#[macro_export]
+macro_rules! parameters {
+    (@unit) => { $crate::parameters::Unit::ONE };
+    (@unit $unit:ident) => { $crate::parameters::Unit::$unit };
+    (@range) => { None };
+    (@range $low:literal $high:literal) => { Some([$low as f64, $high as f64]) };
+    (@parameter ($value:expr) ($type:ty) $section:literal [$($doc:literal),*]) => { None };
+    (
+        @parameter ($value:expr) ($type:ty) $section:literal [$($doc:literal),*]
+        $key:literal [$($unit:ident, $low:literal, $high:literal $(, $hint:literal)?)?] [$($example:literal)?]
+    ) => {
+        Some($crate::parameters::Parameter {
+            section: $section,
+            key: $key,
+            unit: $crate::parameters!(@unit $($unit)?),
+            range: $crate::parameters!(@range $($low $high)?),
+            hint: $crate::parameters!(@or $($($hint)?)?),
+            words: <$type as $crate::parameters::Value>::WORDS,
+            default: $crate::parameters::Value::yaml($value, $crate::parameters!(@unit $($unit)?)),
+            example: $crate::parameters!(@or $($example)?),
+            doc: &[$($doc),*],
+            is_section: <$type as $crate::parameters::Value>::IS_SECTION,
+            inner: <$type as $crate::parameters::Value>::inner(),
+        })
+    };
+    (@leave_out $key:literal $field:expr) => { $crate::parameters::Value::leave_out(&mut $field) };
+    (@or) => { "" };
+    (@or $text:literal) => { $text };
+    (@default ($default:expr) ($type:ty)) => { $default };
+    (@default ($default:expr) ($type:ty) [$($unit:ident)?]) => {
+        <$type as $crate::parameters::Value>::of($default, $crate::parameters!(@unit $($unit)?))
+    };
+    (
+        $(#[$meta:meta])*
+        pub struct $Name:ident in $section:literal {
+            $(
+                $(#[doc = $doc:literal])*
+                $field:ident: $type:ty = $default:expr
+                $(, $key:literal $([$unit:ident, $low:literal, $high:literal $(, $hint:literal)?])? $(like $example:literal)?)?;
+            )*
+        }
+        $(with { $($(#[doc = $part_doc:literal])* $part:ident: $Part:ty),* $(,)? })?
+        $(check $together:path;)?
+    ) => {
+        $(#[$meta])*
+        pub struct $Name {
+            $(
+                $(#[doc = $doc])*
+                $(#[doc = concat!("\n\n`", $section, ".", $key, "`, default ", stringify!($default))])?
+                pub $field: $type,
+            )*
+            $($($(#[doc = $part_doc])* pub $part: $Part,)*)?
+        }
+
+        impl Default for $Name {
+            fn default() -> Self {
+                Self {
+                    $($field: $crate::parameters!(@default ($default) ($type) $([$($unit)?])?),)*
+                    $($($part: Default::default(),)*)?
+                }
+            }
+        }
+
+        impl $Name {
+            /// Refuses the first parameter that is not in its range.
+            ///
+            /// # Errors
+            /// A number outside its range, by its key.
+            pub fn check(&self) -> Result<(), $crate::parameters::SettingError> {
+                #[allow(unused_variables)]
+                let declared = <Self as $crate::parameters::Section>::parameters();
+                $($($crate::parameters::check(&self.$field, $key, &declared)?;)?)*
+                $($(self.$part.check()?;)*)?
+                $($together(self)?;)?
+                Ok(())
+            }
+        }
+
+        impl $crate::parameters::Section for $Name {
+            const NAME: &'static str = $section;
+
+            fn keys() -> &'static [&'static str] {
+                static KEYS: ::std::sync::LazyLock<Vec<&'static str>> = ::std::sync::LazyLock::new(|| {
+                    <$Name as $crate::parameters::Section>::parameters().iter().map(|one| one.key).collect()
+                });
+                &KEYS
+            }
+
+            #[allow(unused_variables)]
+            fn parameters() -> Vec<$crate::parameters::Parameter> {
+                let this = Self::default();
+                let own: Vec<Option<$crate::parameters::Parameter>> = vec![$($crate::parameters!(
+                    @parameter (&this.$field) ($type) $section [$($doc),*]
+                    $($key [$($unit, $low, $high $(, $hint)?)?] [$($example)?])?
+                )),*];
+                let parts = own.into_iter().flatten();
+                $($(let parts = parts.chain(<$Part as $crate::parameters::Section>::parameters());)*)?
+                parts.collect()
+            }
+
+            #[allow(unused_mut)]
+            fn bare() -> Self {
+                let mut this = Self::default();
+                $($($crate::parameters!(@leave_out $key this.$field);)?)*
+                this
+            }
+
+            #[allow(unused_variables)]
+            fn read_key<'de, A: ::serde::de::MapAccess<'de>>(&mut self, key: &str, map: &mut A) -> Result<bool, A::Error> {
+                match key {
+                    $($(
+                        $key => {
+                            let (written, unit) = (map.next_value()?, $crate::parameters!(@unit $($unit)?));
+                            self.$field = <$type as $crate::parameters::Value>::given(written, unit);
+                        }
+                    )?)*
+                    _ => {
+                        $($(
+                            if $crate::parameters::Section::read_key(&mut self.$part, key, map)? {
+                                return Ok(true);
+                            }
+                        )*)?
+                        return Ok(false);
+                    }
+                }
+                #[allow(unreachable_code)]
+                Ok(true)
+            }
+        }
+
+        impl<'de> ::serde::Deserialize<'de> for $Name {
+            fn deserialize<D: ::serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                $crate::parameters::read_section(deserializer)
+            }
+        }
+
+        impl $crate::parameters::Value for $Name {
+            type Written = Self;
+            const IS_SECTION: bool = true;
+
+            fn of(written: Self, _: $crate::parameters::Unit) -> Self {
+                written
+            }
+
+            fn yaml(&self, _: $crate::parameters::Unit) -> Option<String> {
+                Some(String::new())
+            }
+
+            fn named() -> Option<Self> {
+                Some(Self::default())
+            }
+
+            fn check(&self) -> Result<(), $crate::parameters::SettingError> {
+                $Name::check(self)
+            }
+
+            fn inner() -> Vec<$crate::parameters::Parameter> {
+                <Self as $crate::parameters::Section>::parameters()
+            }
+        }
+    };
+}
+
+/// Declares an enum of words that a key may hold.
+///
+/// ```
+/// touchup_core::words! {
+///     /// Sense of a turn.
+///     #[derive(Clone, Copy, Debug, Default, PartialEq)]
+///     pub enum Turn {
+///         /// As the clock does.
+///         #[default]
+///         Clockwise = "cw",
+///         /// The other one.
+///         Counter = "ccw",
+///     }
+/// }
+/// assert_eq!(Turn::default().word(), "cw");
+/// ```
+#[macro_export]
+macro_rules! words {
+    (
+        $(#[$meta:meta])*
+        pub enum $Name:ident { $($(#[$word_meta:meta])* $Word:ident = $word:literal),* $(,)? }
+    ) => {
+        $(#[$meta])*
+        #[derive(::serde::Deserialize)]
+        pub enum $Name {
+            $($(#[$word_meta])* #[serde(rename = $word)] $Word,)*
+        }
+
+        impl $Name {
+            /// As it is written.
+            pub fn word(self) -> &'static str {
+                match self {
+                    $(Self::$Word => $word,)*
+                }
+            }
+        }
+
+        impl $crate::parameters::Value for $Name {
+            type Written = Self;
+            const WORDS: &'static [&'static str] = &[$($word),*];
+
+            fn of(written: Self, _: $crate::parameters::Unit) -> Self {
+                written
+            }
+
+            fn yaml(&self, _: $crate::parameters::Unit) -> Option<String> {
+                Some(self.word().to_owned())
+            }
+        }
+    };
+}

@@ -1,0 +1,331 @@
+//! The sections of the YAML that are no struct of one module of the method: each is what a scene says of one thing.
+
+use std::path::PathBuf;
+
+use nalgebra::{Isometry3, Point3, Quaternion, UnitQuaternion, Vector3};
+
+use touchup_core::explore::PatternParams;
+use touchup_core::probe::Tool;
+use touchup_core::refine::{Along, ScanParams, SigmoidParams, StepRule, TipParams};
+use touchup_core::robot::{Limits, TouchParams};
+use touchup_core::touch::{
+    MarkerBody, MarkerParams, Payload, SensorBias, SensorMount, SettingError, TipShape, TipSizes,
+};
+use touchup_core::{parameters, words};
+use touchup_io::mesh_file::MeshUnit;
+
+parameters! {
+    /// `clock`; it has no keys.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct ClockSection in "clock" {}
+}
+
+parameters! {
+    /// `markers`: by default the stylus of the simulation.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct MarkersSection in "markers" {
+        /// Each marker from the centre of the ball, in the axes of the tip (z: along the shaft, tip to handle), by label from 0 on; 3
+        /// to 16, not on one line.
+        ///
+        /// m, in T.
+        positions: Vec<Vector3<f64>> = MarkerBody::STYLUS_MM.into(), "positions_mm" [MM, -10000, 10000];
+    }
+    with {
+        /// How the body is followed.
+        params: MarkerParams,
+    }
+    check MarkersSection::is_body;
+}
+
+impl MarkersSection {
+    /// The rigid body of the markers.
+    ///
+    /// # Errors
+    /// [`SettingError`] for markers on one line.
+    pub(super) fn body(&self) -> Result<MarkerBody, SettingError> {
+        MarkerBody::new(self.positions.iter().map(|&p_t| p_t.into()).collect())
+    }
+
+    fn is_body(&self) -> Result<(), SettingError> {
+        self.params.check_for(&self.body()?)
+    }
+}
+
+parameters! {
+    /// `scan_to_space`: p_space = R p_scan + t. By default the recorded poses are in the frame of the scan.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct ScanToSpaceSection in "scan_to_space" {
+        /// Origin of the scan in the frame of the poses.
+        ///
+        /// t, m.
+        position: Vector3<f64> = [0.0; 3], "position_mm" [MM, -1e6, 1e6];
+        /// Orientation of the scan's axes in that frame, as a quaternion x, y, z, w.
+        ///
+        /// R.
+        orientation_xyzw: [f64; 4] = NO_TURN, "orientation_xyzw" [QUATERNION, 0.999, 1.001];
+    }
+}
+
+impl ScanToSpaceSection {
+    /// Pose of the scan in space.
+    pub(super) fn pose_wo(&self) -> Isometry3<f64> {
+        Isometry3::from_parts(self.position.into(), unit_quaternion(self.orientation_xyzw))
+    }
+}
+
+parameters! {
+    /// `compensation`
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct CompensationSection in "compensation" {
+        /// What hangs on the sensor.
+        payload: Option<PayloadSection> = None, "payload";
+        /// What the sensor reads when nothing touches and nothing hangs on it.
+        bias: Option<SensorBias> = None, "bias";
+    }
+    with {
+        /// Where the sensor sits.
+        mount: SensorMount,
+    }
+}
+
+words! {
+    /// In which axes gravity is named.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum GravityAxes {
+        /// Those of the scan: it must be named again when the part is laid down otherwise.
+        #[default]
+        Object = "object",
+        /// Those of the recorded poses: `scan_to_space` turns it.
+        Space = "space",
+    }
+}
+
+parameters! {
+    /// `compensation.payload`
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct PayloadSection in "compensation.payload" {
+        /// In whose axes gravity is: the scan's own, or those of the recorded poses, which scan_to_space turns.
+        gravity_axes: GravityAxes = GravityAxes::Object, "gravity_axes";
+    }
+    with {
+        /// The payload, its gravity in those axes.
+        payload: Payload,
+    }
+}
+
+words! {
+    /// Which tip touches.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum ShapeName {
+        /// A ball.
+        #[default]
+        Ball = "ball",
+        /// The end of a cylinder.
+        Flat = "flat",
+        /// A cone with a round nose.
+        Cone = "cone",
+    }
+}
+
+parameters! {
+    /// `tip`
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct TipSection in "tip" {
+        /// Shape of the tip.
+        shape: ShapeName = ShapeName::Ball, "shape";
+        /// Centre of the ball from the origin of the recorded pose, in its axes (`touchup calibrate tip`); left out: it is that
+        /// origin. The positions of markers are from that origin too.
+        ///
+        /// m.
+        offset: Option<Vector3<f64>> = None, "offset_mm" [MM, -10000, 10000] like "[0, 0, 0]";
+    }
+    with {
+        /// Its radius and stiffness.
+        ball: TipParams,
+        /// Sizes of a tip that is no ball.
+        sizes: TipSizes,
+    }
+}
+
+/// Length of a tip that the scene does not name, in diameters, and for a sharp cone no less than this, m.
+const USUAL_LENGTH: (f64, f64) = (2.0, 5e-3);
+
+impl TipSection {
+    /// The shape; that of a cone without an angle is none.
+    pub(super) fn tip_shape(&self) -> TipShape {
+        let TipSizes { edge_radius, half_angle, length } = self.sizes;
+        let (diameters, least) = USUAL_LENGTH;
+        let length = length.unwrap_or((diameters * 2.0 * self.ball.radius).max(least));
+        match self.shape {
+            ShapeName::Ball => TipShape::Ball,
+            ShapeName::Flat => TipShape::Flat { edge_radius: edge_radius.unwrap_or(0.0), length },
+            ShapeName::Cone => TipShape::Cone { half_angle: half_angle.unwrap_or_default(), length },
+        }
+    }
+}
+
+parameters! {
+    /// `scan`
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct ScanSection in "scan" {
+        /// The scan itself, where none is named otherwise: PLY, STL or OBJ, relative to the folder of this scene.
+        file: Option<PathBuf> = None, "file" like "scan.ply";
+        /// Unit of the coordinates in that file.
+        unit: MeshUnit = MeshUnit::Millimetre, "unit";
+        /// Lowest corner of the box that the centre of the ball is in whenever it touches, in the frame of the scan: only what is
+        /// near it gets adjacency and a tree, the rest of the scan is kept as it is and written with the result; touches elsewhere
+        /// are refused. Not with an arm, and the node shows the part near the box alone. Name both corners; left out: anywhere.
+        ///
+        /// m, in O.
+        region_low: Option<Point3<f64>> = None, "region_low_mm" [MM, -1e6, 1e6] like "[-20, -20, -10]";
+        /// Highest corner of that box.
+        ///
+        /// m, in O.
+        region_high: Option<Point3<f64>> = None, "region_high_mm" [MM, -1e6, 1e6] like "[20, 20, 10]";
+    }
+    with {
+        /// How good it is.
+        quality: ScanParams,
+    }
+    check ScanSection::is_box;
+}
+
+impl ScanSection {
+    fn is_box(&self) -> Result<(), SettingError> {
+        let mut corners =
+            self.region_low.iter().flat_map(|p| p.iter()).zip(self.region_high.iter().flat_map(|p| p.iter()));
+        let allowed = "more than scan.region_low_mm along each axis";
+        corners.try_for_each(|(low, high)| SettingError::check("scan.region_high_mm", high * 1e3, low < high, allowed))
+    }
+}
+
+words! {
+    /// Which rule moves the mesh.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+    pub enum Mode {
+        /// What works on real scans.
+        #[default]
+        Robust = "robust",
+        /// The published rule, taken literally: no gate, no friction, no carving, whatever the scene names.
+        Paper = "paper",
+    }
+}
+
+words! {
+    /// What force the scan lets expect.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum ModelName {
+        /// `f_max_n`, `h_min_mm`, `delta` (Eq 3).
+        Sigmoid = "sigmoid",
+        /// The stiffness of the tip.
+        Spring = "spring",
+    }
+}
+
+parameters! {
+    /// `refine`; a key that is left out is as the mode has it.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct RefineSection in "refine" {
+        /// Which rule moves the mesh; paper: the published one taken literally, without contact, sliding, carve and patch whatever
+        /// is named; leave guard out too for its own sweeps.
+        mode: Mode = Mode::Robust, "mode";
+        /// Expected force over depth: the sigmoid of Eq 3, or the spring of the tip; left out: the spring where its stiffness is
+        /// known.
+        contact_model: Option<ModelName> = None, "contact_model" like "spring";
+        /// Speed of a face for each newton of mismatch (Eq 6); left out: as the mode has it.
+        alpha: Option<f64> = None, "alpha_m_per_n_s" [M_PER_N_S, 0, 1e6] like "0.00125";
+        /// Turning speed of a face for each square newton of mismatch (Eq 7); left out: as the mode has it.
+        beta: Option<f64> = None, "beta_per_n2_s" [PER_N2_S, 0, 1e9] like "0.1";
+        /// Robust: rate at which a face turns to the measured normal, whatever the force; takes the place of beta.
+        turning: Option<f64> = None, "turning_per_s" [PER_S, 0, 1e6] like "30";
+        /// How the exact sub-flows of a step are put together; dp5: adaptive Runge–Kutta instead.
+        step: Option<StepRule> = None, "step" like "lie";
+        /// In which direction a face moves: along the normal at the start of the sample (Eq 6), or along the force.
+        along: Option<Along> = None, "along" like "force";
+        /// Vertices within this distance of the touched face follow it; left out: the radius of the ball.
+        ///
+        /// m.
+        roi: Option<f64> = None, "roi_mm" [MM, 0, 1000] like "1.5";
+    }
+    with {
+        /// The sigmoid.
+        sigmoid: SigmoidParams,
+    }
+}
+
+words! {
+    /// Which arm it is.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum ArmModel {
+        /// UR3e
+        Ur3e = "ur3e",
+        /// UR5e
+        Ur5e = "ur5e",
+        /// UR10e
+        Ur10e = "ur10e",
+        /// UR16e
+        Ur16e = "ur16e",
+    }
+}
+
+parameters! {
+    /// `robot`: where it stands, what it holds, and what it must never leave.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct RobotSection in "robot" {
+        /// Model of the arm.
+        model: ArmModel = ArmModel::Ur5e, "model";
+        /// Whether it may move at all; without it plans can be made and drawn.
+        allow_motion: bool = false, "allow_motion";
+        /// Name or address of its controller; a simulated arm has none.
+        host: String = String::new(), "host";
+        /// The folder that `touchup ur setup` prints (docs/ur.md); a simulated arm has none.
+        site_packages: String = String::new(), "site_packages";
+        /// Mass of all that hangs on the flange (`touchup calibrate payload --robot`).
+        payload_mass: f64 = 0.25, "payload_kg" [KG, 0, 50];
+        /// Its centre of mass in the flange.
+        ///
+        /// m.
+        payload_centre: Vector3<f64> = [0.0, 0.0, 50.0], "payload_centre_mm" [MM, -1000, 1000];
+        /// Centre of the ball in the flange.
+        ///
+        /// m. 150 mm before the flange, the handle towards it.
+        tip_position: Vector3<f64> = [0.0, 0.0, 150.0], "tip_position_mm" [MM, -2000, 2000];
+        /// Axes of the tip in the flange (z: along the shaft, tip to handle), as a quaternion x, y, z, w.
+        tip_orientation_xyzw: [f64; 4] = [1.0, 0.0, 0.0, 0.0], "tip_orientation_xyzw" [QUATERNION, 0.999, 1.001];
+        /// The numbers of a feature are to be known within ± this, with the probability `confidence`.
+        ///
+        /// m.
+        tolerance: f64 = 0.02, "tolerance_mm" [MM, 0.0001, 10];
+        /// Probability with which they are within the tolerance.
+        confidence: f64 = 0.95, "confidence" [ONE, 0.5, 0.9999];
+    }
+    with {
+        /// What it must never leave.
+        limits: Limits,
+        /// How a touch is made; its stiffness is that of the tip.
+        touch: TouchParams,
+        /// What is wanted of a feature.
+        pattern: PatternParams,
+        /// What must keep clear of the mesh.
+        tool: Tool,
+    }
+    check RobotSection::is_limited;
+}
+
+impl RobotSection {
+    fn is_limited(&self) -> Result<(), SettingError> {
+        self.touch.check_within(&self.limits)
+    }
+
+    /// The tip in the flange.
+    pub(super) fn pose_ft(&self) -> Isometry3<f64> {
+        Isometry3::from_parts(self.tip_position.into(), unit_quaternion(self.tip_orientation_xyzw))
+    }
+}
+
+/// The quaternion x, y, z, w that turns nothing.
+pub(super) const NO_TURN: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
+
+pub(super) fn unit_quaternion([x, y, z, w]: [f64; 4]) -> UnitQuaternion<f64> {
+    UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z))
+}

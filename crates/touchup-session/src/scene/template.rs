@@ -1,0 +1,87 @@
+//! What is written from the definition of the parameters: the scene with every key explained, and the table of them.
+
+use touchup_core::parameters::{Parameter, Section};
+
+use super::Scene;
+
+const HEAD: &str = "\
+# The scene that `touchup refine` uses when none is given. Copy it, change what differs, and give it by --scene.
+# A part that is not named is not built; a part named without keys takes the values below. Flags override both.
+# A line that begins with #key is a setting that is off here.
+# Written from the definition of the parameters, as docs/scene.md is, which has their ranges.
+";
+
+const TABLE_HEAD: &str = "\
+# The scene
+
+Every key of the YAML that `--scene` names, written from the definition of the parameters as
+[`config/default.yaml`](../config/default.yaml) is. A part that is not named is not built; a part named without keys takes the defaults. A
+number outside its range is refused by its key, an unknown key with its line and column.
+";
+
+/// Letters of a line of comment at most.
+const WIDTH: usize = 118;
+/// Spaces that a new level is set in by.
+const STEP: usize = 2;
+
+impl Scene {
+    /// [`Scene::default`] as YAML, with every key explained; what is left out is there as a comment.
+    pub fn template() -> String {
+        Self::parameters().iter().fold(HEAD.to_owned(), |text, section| text + "\n" + &explained(section, 0, false))
+    }
+
+    /// Every key with unit, range and default, as Markdown.
+    pub fn table() -> String {
+        Self::parameters().iter().fold(TABLE_HEAD.to_owned(), |text, section| text + &rows(section))
+    }
+}
+
+/// A key with its comment, and what is in it.
+fn explained(parameter: &Parameter, indent: usize, is_off: bool) -> String {
+    let Parameter { key, default, example, inner, .. } = parameter;
+    let (mark, space) = (if is_off { "#" } else { "" }, " ".repeat(indent));
+    let comment = wrapped(&with_words(parameter), WIDTH - indent);
+    let mut text: String = comment.iter().map(|line| format!("{mark}{space}# {line}\n")).collect();
+    let own_mark = if !is_off && default.is_none() { "#" } else { "" };
+    let value = default.as_deref().unwrap_or(example);
+    text += format!("{mark}{space}{own_mark}{key}: {value}").trim_end();
+    text += "\n";
+    inner.iter().fold(text, |text, below| text + &explained(below, indent + STEP, is_off || default.is_none()))
+}
+
+/// What it does, and the words to choose from.
+fn with_words(parameter: &Parameter) -> String {
+    let summary = parameter.summary();
+    if parameter.words.is_empty() {
+        return summary;
+    }
+    format!("{} ({}).", summary.trim_end_matches('.'), parameter.words.join(", "))
+}
+
+/// In lines of `width` letters at most.
+fn wrapped(text: &str, width: usize) -> Vec<String> {
+    let mut lines: Vec<String> = vec![];
+    for word in text.split(' ') {
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + 1 + word.chars().count() <= width => *line += &format!(" {word}"),
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}
+
+/// A section as a table, and those in it.
+fn rows(section: &Parameter) -> String {
+    let built = if section.default.is_some() { "" } else { " Off in the default scene." };
+    let mut text = format!("\n## `{}`\n\n{}{built}\n", section.name(), section.summary());
+    let keys: Vec<_> = section.inner.iter().filter(|one| !one.is_section).collect();
+    if !keys.is_empty() {
+        text += "\n| key | unit | range | default | what |\n|---|---|---|---|---|\n";
+    }
+    for one in keys {
+        let default = one.default.as_deref().unwrap_or("left out");
+        let [symbol, allowed, what] = [one.unit.symbol, &one.allowed(), &one.summary()];
+        text += &format!("| `{}` | {symbol} | {allowed} | {default} | {what} |\n", one.key);
+    }
+    section.inner.iter().filter(|one| one.is_section).fold(text, |text, inner| text + &rows(inner))
+}
