@@ -6,7 +6,7 @@ mod plate_stream;
 mod subdivided;
 
 use divan::{Bencher, black_box};
-use plate_stream::plate_stream;
+use plate_stream::{contacts_of, plate_stream};
 use subdivided::subdivided;
 use touchup::features::{Tracker, detect};
 use touchup::mesh::{FaceTree, TriMesh};
@@ -54,7 +54,8 @@ fn touched_plate() -> (TriMesh, Vec<ProbedPoint>) {
     let mut params = PatcherParams::new(stylus.radius, Some(stylus.stiffness), stream.noise);
     params.uncertainty = Some(UncertaintyParams::new(stream.noise));
     let mut patcher = Patcher::new(params).expect("the settings are sound");
-    stream.samples.iter().for_each(|sample| patcher.push(sample));
+    let contacts = contacts_of(stylus.radius, Some(stylus.stiffness), &stream.samples);
+    contacts.iter().for_each(|contact| patcher.push(contact));
     patcher.flush();
     let patched = patcher.patched(&stream.scan, &FaceTree::new(&stream.scan)).expect("the plate can be meshed");
     (patched.mesh, patcher.probed().to_vec())

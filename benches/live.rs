@@ -2,7 +2,7 @@
 //! patch has a thread of its own.
 //!
 //! A ball slides over a wavy plate in a raster, felt a little deeper than the scan says. One line for each minute: times of
-//! [`LiveRefiner::push`], how old the touches are that the patch shows (in time of the samples), how many renewals of it
+//! [`Engine::push`], how old the touches are that the patch shows (in time of the samples), how many renewals of it
 //! were late, faces, and memory of the process.
 //!
 //! `cargo bench --bench live [-- FACES [SECONDS [fast]]]`; `fast` does not wait for real time, so that each push waits for
@@ -12,10 +12,10 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use nalgebra::Vector3;
-use touchup::live::{LiveRefiner, Pace};
+use touchup::live::{Engine, Gate, Pace, Renewal};
 use touchup::mesh::FaceTree;
-use touchup::patch::{Patcher, PatcherParams};
-use touchup::refine::{RefineParams, Refiner, TipParams};
+use touchup::patch::PatcherParams;
+use touchup::refine::{RefineParams, TipParams};
 use touchup::sim::wavy::{RADIUS, STEP_NS, STIFFNESS, slide, wavy_plate};
 use touchup::touch::Sample;
 
@@ -59,13 +59,13 @@ fn main() {
     let (faces, seconds, is_fast) = (number(0, 1_000_000), number(1, 60), arguments.len() > 2);
     let mesh = wavy_plate(faces).expect("it can be counted");
     let tip = TipParams { radius: RADIUS, stiffness: Some(STIFFNESS) };
-    let refiner = Refiner::new(mesh.clone(), RefineParams::robust(tip)).expect("the settings are in range");
     // its uncertainty is asked for, too
     let params = PatcherParams::new(RADIUS, Some(STIFFNESS), SCAN_NOISE);
-    let patcher = Patcher::new(params).expect("the settings are in range");
     let scan = Arc::new((mesh.clone(), FaceTree::new(&mesh)));
     let pace = Pace { is_patient: is_fast, ..Pace::default() };
-    let mut live = LiveRefiner::new(scan, refiner, patcher, pace, 1 << 18).expect("there is memory");
+    let renewal = Renewal::Beside { scan, pace, room: 1 << 18, gate: Gate::default() };
+    let refine = RefineParams::robust(tip);
+    let mut live = Engine::new(mesh.clone(), refine, Some(params), renewal).expect("the settings are in range");
     println!("{} faces, {:.0} MB; {seconds} s at 1 kHz", mesh.face_count(), resident());
     let (mut times, mut ages, mut late, begun) = (Vec::new(), Vec::new(), 0, Instant::now());
     for i in 0..seconds * 1000 {
@@ -77,7 +77,7 @@ fn main() {
         live.push(&sample).expect("the sample is sound");
         times.push(start.elapsed().as_nanos() as u64);
         if i > 1000 {
-            ages.push((sample.stamp_ns - live.delta().until_ns) as u64 / 1000);
+            ages.extend(live.patched_until_ns().map(|until_ns| (sample.stamp_ns - until_ns) as u64 / 1000));
         }
         if (i + 1) % MINUTE == 0 || i + 1 == seconds * 1000 {
             times.sort_unstable();

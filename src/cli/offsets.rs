@@ -1,14 +1,12 @@
-//! What a replay tells of clock and registration: offered in the summary, never applied unasked.
+//! What a replay estimates of clock and registration: offered in the summary, never applied unasked.
 
 use std::fmt;
 
 use nalgebra::Vector6;
 use serde::Serialize;
 
-use crate::refine::{
-    RefineParams, Registrar, Registration, RegistrationError, RegistrationParams, SlidingParams, TipMotion,
-};
-use crate::touch::{ClockOffset, ContactGate, SettingError, Tip};
+use crate::refine::{RefineParams, Registrar, Registration, RegistrationError, RegistrationParams};
+use crate::touch::{ClockOffset, ContactSample, SettingError};
 
 /// What the clock of the wrench reads beyond that of the pose; never applied unasked.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -112,42 +110,25 @@ impl fmt::Display for ScanOffset {
 /// Where the part was touched, for the registration.
 pub(super) struct ContactPoints {
     pub registrar: Registrar,
-    motion: TipMotion,
-    gate: ContactGate,
-    sliding: SlidingParams,
+    /// slower than this the normal of the surface is not known, m/s
+    slowest: f64,
     radius: f64,
-    last_ns: Option<i64>,
 }
-
-/// A pause after which the motion of the ball is not known, s.
-const LONGEST_PAUSE: f64 = 0.03;
 
 impl ContactPoints {
     pub fn new(params: &RefineParams) -> Result<Self, SettingError> {
-        let sliding = params.sliding.unwrap_or_default();
+        let registration = RegistrationParams { scan_noise: params.scan_noise, ..RegistrationParams::default() };
         Ok(Self {
-            registrar: Registrar::new(RegistrationParams {
-                scan_noise: params.scan_noise,
-                ..RegistrationParams::default()
-            })?,
-            motion: TipMotion::new(sliding, params.tip),
-            gate: ContactGate::new(params.gate.unwrap_or_default())?,
-            sliding,
+            registrar: Registrar::new(registration)?,
+            slowest: params.sliding.unwrap_or_default().slowest,
             radius: params.tip.radius,
-            last_ns: None,
         })
     }
 
-    pub fn push(&mut self, tip: &Tip) {
-        let dt = self.last_ns.map_or(0.0, |last_ns| (tip.stamp_ns - last_ns) as f64 * 1e-9);
-        self.last_ns = Some(tip.stamp_ns);
-        let ball = self.motion.update(tip, dt, LONGEST_PAUSE);
-        if self.gate.update(tip.stamp_ns, &ball.force_o).is_none() {
-            return self.motion.lift();
-        }
-        let normal = self.motion.surface_normal(&ball, dt.min(LONGEST_PAUSE));
-        if ball.velocity.norm() > self.sliding.slowest {
-            self.registrar.push(&(ball.centre - normal * self.radius), &normal);
+    pub fn push(&mut self, sample: &ContactSample) {
+        let ContactSample { ball, surface, .. } = sample;
+        if let Some(surface) = surface.filter(|_| ball.velocity.norm() > self.slowest) {
+            self.registrar.push(&(ball.centre - surface.normal * self.radius), &surface.normal);
         }
     }
 }

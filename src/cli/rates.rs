@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-use crate::live::{Latencies, LiveCounts, LiveError, LiveRefiner, Pace, Quantiles};
+use crate::live::{Engine, Gate, Latencies, LiveCounts, LiveError, Pace, Quantiles, Renewal};
 use crate::mesh::{FaceTree, TriMesh};
-use crate::patch::Patcher;
-use crate::refine::{RefineError, Refiner};
+use crate::patch::{Patcher, PatcherParams};
+use crate::refine::{RefineError, RefineParams, Refiner};
 use crate::touch::Sample;
 
 /// Room for new faces that is made ahead.
@@ -25,22 +25,21 @@ pub(super) struct LiveSummary {
     pub(super) late: u64,
 }
 
-/// The refiner and what keeps what it feels.
-pub(super) enum Rates {
-    /// as fast as they can be read; the patch is made at the end
-    AtOnce { refiner: Box<Refiner>, patcher: Option<Box<Patcher>> },
-    /// in real time
-    Live(Box<Live>),
+/// The engine, and the rate at which it gets samples.
+pub(super) struct Rates {
+    engine: Engine,
+    /// `None`: as fast as they can be read; the patch is made at the end
+    real_time: Option<RealTime>,
+    stopped: Option<LiveError>,
 }
 
-pub(super) struct Live {
-    /// what the patch is made from
-    scan: Arc<(TriMesh, FaceTree)>,
-    refiner: LiveRefiner,
+/// How samples are awaited.
+struct RealTime {
+    /// memory of the scan and its tree that the patch has for itself
+    scan_bytes: usize,
     /// when the first sample came, and its stamp, ns
     begun: Option<(Instant, i64)>,
     behind: Latencies,
-    stopped: Option<LiveError>,
 }
 
 /// What is left when all samples were pushed.
@@ -51,30 +50,42 @@ pub(super) struct Ended {
 }
 
 impl Rates {
-    /// - `scan`: as the refiner has it.
+    /// As fast as samples can be read.
     ///
     /// # Errors
-    /// As [`LiveRefiner::new`].
-    pub fn live(scan: &TriMesh, refiner: Refiner, patcher: Patcher) -> Result<Self, LiveError> {
-        let scan = Arc::new((scan.clone(), FaceTree::new(scan)));
-        let refiner = LiveRefiner::new(Arc::clone(&scan), refiner, patcher, Pace::default(), ROOM)?;
-        Ok(Self::Live(Box::new(Live { scan, refiner, begun: None, behind: Latencies::new(), stopped: None })))
+    /// As [`Engine::new`].
+    pub fn at_once(mesh: TriMesh, refine: RefineParams, patch: Option<PatcherParams>) -> Result<Self, LiveError> {
+        let engine = Engine::new(mesh, refine, patch, Renewal::AtEnd)?;
+        Ok(Self { engine, real_time: None, stopped: None })
+    }
+
+    /// In real time.
+    ///
+    /// # Errors
+    /// As [`Engine::new`].
+    pub fn live(mesh: TriMesh, refine: RefineParams, patch: PatcherParams) -> Result<Self, LiveError> {
+        let tree = FaceTree::new(&mesh);
+        let scan = Arc::new((mesh.clone(), tree));
+        let scan_bytes = scan.0.bytes() + scan.1.bytes();
+        let renewal = Renewal::Beside { scan, pace: Pace::default(), room: ROOM, gate: Gate::default() };
+        let engine = Engine::new(mesh, refine, Some(patch), renewal)?;
+        let real_time = RealTime { scan_bytes, begun: None, behind: Latencies::new() };
+        Ok(Self { engine, real_time: Some(real_time), stopped: None })
     }
 
     /// The haptic update.
     pub fn refiner(&self) -> &Refiner {
-        match self {
-            Self::AtOnce { refiner, .. } => refiner,
-            Self::Live(live) => live.refiner.refiner(),
-        }
+        self.engine.refiner()
+    }
+
+    /// Keeps what it takes to undo strokes from here on.
+    pub fn keep_strokes(&mut self) {
+        self.engine.keep_strokes();
     }
 
     /// Memory of the scan and its tree that the patch has for itself, bytes.
     pub fn scan_bytes(&self) -> usize {
-        match self {
-            Self::AtOnce { .. } => 0,
-            Self::Live(live) => live.scan.0.bytes() + live.scan.1.bytes(),
-        }
+        self.real_time.as_ref().map_or(0, |real_time| real_time.scan_bytes)
     }
 
     /// Takes the next sample, in real time when it is due; returns how long that took.
@@ -82,35 +93,33 @@ impl Rates {
     /// # Errors
     /// [`RefineError`] for a sample that was refused.
     pub fn push(&mut self, sample: &Sample) -> Result<Duration, (RefineError, Duration)> {
-        match self {
-            Self::AtOnce { refiner, patcher } => {
-                let begun = Instant::now();
-                let pushed = refiner.push(sample);
-                if let (Ok(_), Some(patcher)) = (&pushed, patcher) {
-                    patcher.push(sample);
-                }
-                let time = begun.elapsed();
-                pushed.map(|_| time).map_err(|error| (error, time))
+        if let Some(real_time) = &mut self.real_time {
+            real_time.wait_for(sample.stamp_ns);
+        }
+        let pushing = Instant::now();
+        let pushed = self.engine.push(sample);
+        let time = pushing.elapsed();
+        if let (Some(real_time), Some(until_ns)) = (&mut self.real_time, self.engine.patched_until_ns())
+            && let Ok(behind_ns) = u64::try_from(sample.stamp_ns.saturating_sub(until_ns))
+        {
+            real_time.behind.record(Duration::from_nanos(behind_ns));
+        }
+        match pushed {
+            Ok(_) => Ok(time),
+            Err(LiveError::Refine(error)) => Err((error, time)),
+            Err(error) => {
+                // reported at the end: the samples that are left change nothing
+                self.stopped = Some(error);
+                Ok(time)
             }
-            Self::Live(live) => live.push(sample),
         }
     }
 
     /// Takes the last stroke back, or does it again.
     pub fn change_strokes(&mut self, is_undo: bool) {
-        let of_patch = |patcher: &mut Patcher| if is_undo { patcher.undo() } else { patcher.redo() };
-        match self {
-            Self::AtOnce { patcher: Some(patcher), .. } => {
-                of_patch(patcher);
-            }
-            Self::AtOnce { refiner, .. } => {
-                if is_undo {
-                    refiner.undo()
-                } else {
-                    refiner.redo()
-                };
-            }
-            Self::Live(live) => live.change_strokes(is_undo),
+        let changed = if is_undo { self.engine.undo() } else { self.engine.redo() };
+        if let Err(error) = changed {
+            self.stopped = Some(error);
         }
     }
 
@@ -119,54 +128,23 @@ impl Rates {
     /// # Errors
     /// [`LiveError::Stopped`] when it ended before.
     pub fn finish(self) -> Result<Ended, LiveError> {
-        match self {
-            Self::AtOnce { refiner, patcher } => {
-                Ok(Ended { refiner: *refiner, patcher: patcher.map(|patcher| *patcher), live: None })
-            }
-            Self::Live(live) => {
-                let Live { refiner, behind, stopped, .. } = *live;
-                if let Some(stopped) = stopped {
-                    return Err(stopped);
-                }
-                let LiveCounts { renewals, late } = refiner.counts();
-                let (refiner, patcher) = refiner.finish()?;
-                let live = LiveSummary { behind_ns: behind.quantiles(), renewals, late };
-                Ok(Ended { refiner, patcher: Some(patcher), live: Some(live) })
-            }
+        let Self { engine, real_time, stopped } = self;
+        if let Some(stopped) = stopped {
+            return Err(stopped);
         }
+        let LiveCounts { renewals, late } = engine.counts();
+        let (refiner, patcher) = engine.finish()?;
+        let live =
+            real_time.map(|RealTime { behind, .. }| LiveSummary { behind_ns: behind.quantiles(), renewals, late });
+        Ok(Ended { refiner, patcher, live })
     }
 }
 
-impl Live {
-    fn change_strokes(&mut self, is_undo: bool) {
-        let changed = if is_undo { self.refiner.undo() } else { self.refiner.redo() };
-        if let Err(error) = changed {
-            self.stopped = Some(error);
-        }
-    }
-
-    fn push(&mut self, sample: &Sample) -> Result<Duration, (RefineError, Duration)> {
-        let (begun, first_ns) = *self.begun.get_or_insert((Instant::now(), sample.stamp_ns));
-        let due = Duration::from_nanos(u64::try_from(sample.stamp_ns.saturating_sub(first_ns)).unwrap_or(0));
+impl RealTime {
+    fn wait_for(&mut self, stamp_ns: i64) {
+        let (begun, first_ns) = *self.begun.get_or_insert((Instant::now(), stamp_ns));
+        let due = Duration::from_nanos(u64::try_from(stamp_ns.saturating_sub(first_ns)).unwrap_or(0));
         sleep(due.saturating_sub(begun.elapsed()));
-        let pushing = Instant::now();
-        let pushed = self.refiner.push(sample);
-        let time = pushing.elapsed();
-        // the least there is before the patch has seen a touch
-        let until_ns = Some(self.refiner.delta().until_ns).filter(|&until_ns| until_ns > i64::MIN);
-        let behind_ns = until_ns.and_then(|until_ns| u64::try_from(sample.stamp_ns.saturating_sub(until_ns)).ok());
-        if let (Some(behind_ns), true) = (behind_ns, self.refiner.counts().renewals > 0) {
-            self.behind.record(Duration::from_nanos(behind_ns));
-        }
-        match pushed {
-            Ok(_) => Ok(time),
-            Err(LiveError::Refine(error)) => Err((error, time)),
-            Err(error) => {
-                // told at the end: the samples that are left change nothing
-                self.stopped = Some(error);
-                Ok(time)
-            }
-        }
     }
 }
 

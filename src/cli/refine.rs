@@ -19,13 +19,12 @@ use crate::io::atomic::{AtomicFile, is_same_file};
 use crate::io::mesh_file::{MeshFile, MeshFileError, MeshUnit, check_target, read_mesh};
 use crate::io::recording::Topics;
 use crate::live::{Latencies, Quantiles};
-use crate::mesh::{FaceTree, RepairReport, TriMesh};
-use crate::patch::Patcher;
-use crate::refine::{RefineCounts, RefineError, RefineParams, Refiner};
+use crate::mesh::{FaceTree, RepairReport};
+use crate::refine::{RefineCounts, RefineError, RefineParams};
 use crate::replay::{Recording, Replayed, each_sample, marker_filter};
 use crate::scene::{CutScan, Memory, Mode, Scene, SceneCost};
 use crate::session::{Outcome, OutcomePlaces, PatchSummary, SessionRecord, StrokeChange, UncertaintySummary};
-use crate::touch::{ClockEstimator, Compensator, MarkerCounts, Sample};
+use crate::touch::{ClockEstimator, ContactEstimator, MarkerCounts, Sample};
 
 #[derive(Clone, Debug, Args)]
 pub(super) struct RefineArguments {
@@ -360,13 +359,15 @@ impl RefineArguments {
         let params =
             scene.refine_params(recording.wrench_frame).ok_or_else(|| CliError::Usage(NOTHING_MOVES.to_owned()))?;
         let params = cut.refine_params(params);
-        let mut refiner = Refiner::new(mesh, params)?;
+        let patch = scene.patcher_params().map(|params| cut.patcher_params(params));
+        let mut rates = match patch {
+            Some(patch) if self.live => Rates::live(mesh, params, patch)?,
+            None if self.live => return Err(CliError::Usage(NO_PATCH.to_owned())),
+            patch => Rates::at_once(mesh, params, patch)?,
+        };
         if !self.strokes.is_empty() {
-            refiner.keep_strokes();
+            rates.keep_strokes();
         }
-        let patcher = scene.patcher_params(recording.wrench_frame).map(|params| cut.patcher_params(params));
-        let patcher = patcher.map(Patcher::new).transpose()?;
-        let mut rates = self.rates(refiner, patcher, &as_scanned)?;
         let load_s = started.elapsed().as_secs_f64();
         let cost = self.cost(&scene, &rates, as_scanned.bytes() + cut.bytes());
         at_start(&cost);
@@ -374,21 +375,25 @@ impl RefineArguments {
         let started = Instant::now();
         let mut pushes = Pushes::new();
         let mut strokes = UndoSteps(&self.strokes);
-        let compensator = Compensator::new(params.compensator)?;
         let mut clock = scene.clock_params().map(ClockEstimator::new).transpose()?;
         let mut contacts = self.registration.then(|| ContactPoints::new(&params)).transpose()?;
+        // an update that takes every sample for contact says nothing about contact
+        let mut observer = params.contact().completed().map(ContactEstimator::new).transpose()?;
         let mut progress = WorkProgress::new("replay", recording.message_count());
         let mut at_each = || progress.step();
         let mut replayed =
             each_sample(recording, scene.placement(), scene.sync_params(), markers, &mut at_each, |sample| {
                 strokes.apply_until(sample.stamp_ns, &mut rates);
                 pushes.push(&mut rates, sample);
-                let tip = compensator.compensate(sample);
-                if let Some(clock) = &mut clock {
-                    clock.push(&tip);
+                let contact = match &mut observer {
+                    Some(observer) => observer.observe(sample).ok(),
+                    None => rates.refiner().contact().copied(),
+                };
+                if let (Some(clock), Some(contact)) = (&mut clock, &contact) {
+                    clock.push(contact);
                 }
-                if let Some(contacts) = &mut contacts {
-                    contacts.push(&tip);
+                if let (Some(contacts), Some(contact)) = (&mut contacts, &contact) {
+                    contacts.push(contact);
                 }
             })?;
         strokes.apply_until(i64::MAX, &mut rates);
@@ -452,15 +457,6 @@ impl RefineArguments {
         let unused = if self.markers_topic.is_some() { &["robot"][..] } else { &["robot", "markers"] };
         let memory = Memory::of(rates.refiner().footprint(), scan_bytes + rates.scan_bytes());
         SceneCost { parts: scene.built(unused, &crate::FEATURES), memory }
-    }
-
-    /// Which way the samples go.
-    fn rates(&self, refiner: Refiner, patcher: Option<Patcher>, scan: &TriMesh) -> Result<Rates, CliError> {
-        match patcher {
-            Some(patcher) if self.live => Ok(Rates::live(scan, refiner, patcher)?),
-            None if self.live => Err(CliError::Usage(NO_PATCH.to_owned())),
-            patcher => Ok(Rates::AtOnce { refiner: Box::new(refiner), patcher: patcher.map(Box::new) }),
-        }
     }
 
     fn places(&self) -> OutcomePlaces<'_> {

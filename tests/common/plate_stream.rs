@@ -5,7 +5,9 @@ use touchup::mesh::TriMesh;
 use touchup::sim::{
     Lines, PathParams, Plate, RasterRegion, ScannerParams, Stroke, StylusParams, Touch, plan_demo, raster, scan, touch,
 };
-use touchup::touch::{Sample, SyncParams, Synchroniser, TipShape};
+use touchup::touch::{
+    ContactEstimator, ContactEstimatorParams, ContactSample, Sample, SyncParams, Synchroniser, TipParams, TipShape,
+};
 
 /// A scan of the demo plate and what was felt on the plate.
 pub struct PlateStream {
@@ -27,6 +29,13 @@ fn path(stylus: &StylusParams) -> Vec<Stroke> {
     let region = RasterRegion { frame_ov, low, high, floor: 8e-3, clear: 20e-3 };
     let hand = PathParams { pitch: 1e-3, ..hand };
     [Lines::AlongX, Lines::AlongY].iter().flat_map(|lines| raster(&region, *lines, &hand).unwrap()).collect()
+}
+
+/// What is decided about the contact of each sample, for a tip of this radius (m) and stiffness (N/m).
+pub fn contacts_of(radius: f64, stiffness: Option<f64>, samples: &[Sample]) -> Vec<ContactSample> {
+    let params = ContactEstimatorParams::new(TipParams { radius, stiffness });
+    let mut estimator = ContactEstimator::new(params).unwrap();
+    samples.iter().map(|sample| estimator.observe(sample).unwrap()).collect()
 }
 
 /// With what the simulator knows of it.

@@ -4,14 +4,14 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use nalgebra::Point3;
-use touchup::live::{Gate, GateKeeper, LiveCounts, LiveRefiner, Pace};
+use touchup::live::{Engine, Gate, GateKeeper, LiveCounts, Pace, Renewal};
 use touchup::mesh::{FaceId, FaceTree, TriMesh, VertexId};
 use touchup::patch::{PatchDelta, Patcher, PatcherParams, Splice};
 use touchup::refine::{RefineParams, Refiner, TipParams};
 use touchup::sim::StylusParams;
-use touchup::touch::{ProbedPoint, Sample};
+use touchup::touch::{BiasParams, ContactSample, ProbedPoint, Sample};
 
-use crate::plate_stream::{PlateStream, plate_stream};
+use crate::plate_stream::{PlateStream, contacts_of, plate_stream};
 use crate::soundness::{intersections, rim_length, soundness};
 
 /// Parts of the patch that are taken up at one sample.
@@ -35,20 +35,42 @@ fn last_strokes(seed: u64, share: f64) -> PlateStream {
 }
 
 fn patcher(stream: &PlateStream) -> Patcher {
-    let StylusParams { radius, stiffness, .. } = StylusParams::default();
-    Patcher::new(PatcherParams::new(radius, Some(stiffness), stream.noise)).unwrap()
+    Patcher::new(patcher_params(stream)).unwrap()
 }
 
-fn refiner(scan: &TriMesh) -> Refiner {
+fn patcher_params(stream: &PlateStream) -> PatcherParams {
     let StylusParams { radius, stiffness, .. } = StylusParams::default();
-    Refiner::new(scan.clone(), RefineParams::robust(TipParams { radius, stiffness: Some(stiffness) })).unwrap()
+    PatcherParams::new(radius, Some(stiffness), stream.noise)
+}
+
+fn refine_params() -> RefineParams {
+    let StylusParams { radius, stiffness, .. } = StylusParams::default();
+    RefineParams::robust(TipParams { radius, stiffness: Some(stiffness) })
+}
+
+/// As an engine with a patch has it.
+fn refiner(scan: &TriMesh) -> Refiner {
+    let params = refine_params();
+    let bias = params.gate.as_ref().map(BiasParams::below);
+    Refiner::new(scan.clone(), RefineParams { bias, ..params }).unwrap()
+}
+
+fn engine(stream: &PlateStream, pace: Pace, gate: Gate) -> Engine {
+    let scan = Arc::new((stream.scan.clone(), FaceTree::new(&stream.scan)));
+    let renewal = Renewal::Beside { scan, pace, room: 1000, gate };
+    Engine::new(stream.scan.clone(), refine_params(), Some(patcher_params(stream)), renewal).unwrap()
+}
+
+fn contacts(stream: &PlateStream) -> Vec<ContactSample> {
+    let StylusParams { radius, stiffness, .. } = StylusParams::default();
+    contacts_of(radius, Some(stiffness), &stream.samples)
 }
 
 /// Calls `each` with the change of each renewal, and at the end once more for what is left.
 fn renew(stream: &PlateStream, patcher: &mut Patcher, tree: &FaceTree, mut each: impl FnMut(PatchDelta)) {
     let mut slot = None;
-    for sample in &stream.samples {
-        let here = sample.stamp_ns.div_euclid(EVERY);
+    for sample in &contacts(stream) {
+        let here = sample.tip.stamp_ns.div_euclid(EVERY);
         if slot.replace(here).is_some_and(|before| here > before) {
             each(patcher.renewed(&stream.scan, tree));
         }
@@ -128,7 +150,7 @@ fn one_after_the_other(stream: &PlateStream, pace: Pace) -> (TriMesh, TriMesh) {
         if slot.replace(here).is_some_and(|before| here > before) {
             due.push_back((here * pace.every_ns + pace.after_ns, patcher.renewed(&stream.scan, &tree)));
         }
-        patcher.push(sample);
+        patcher.push(refiner.contact().unwrap());
         if at_hand.is_none() && due.front().is_some_and(|(due_ns, _)| *due_ns <= sample.stamp_ns) {
             at_hand = due.pop_front().map(|(_, delta)| delta);
             at_hand.iter().for_each(|delta| refiner.begin_to_follow(delta));
@@ -158,8 +180,7 @@ fn two_threads_do_what_one_does_and_leave_the_scan_where_it_was() {
     let stream = stream(2, 0.1);
     let pace = PATIENT;
     let (touching, at_the_end) = one_after_the_other(&stream, pace);
-    let scan = Arc::new((stream.scan.clone(), FaceTree::new(&stream.scan)));
-    let mut live = LiveRefiner::new(scan, refiner(&stream.scan), patcher(&stream), pace, 1000).unwrap();
+    let mut live = engine(&stream, pace, Gate::default());
     stream.samples.iter().for_each(|sample| assert!(live.push(sample).is_ok()));
     assert_same(live.refiner().mesh(), &touching);
     let moved = |mesh: &TriMesh| {
@@ -175,7 +196,7 @@ fn two_threads_do_what_one_does_and_leave_the_scan_where_it_was() {
 
 /// Samples that do not wait, with what the thread of the patch is let do at each of them.
 struct Kept {
-    live: LiveRefiner,
+    live: Engine,
     keeper: GateKeeper,
     /// when the renewals that were asked for are due, ns; the thread has done so many of them
     open: VecDeque<i64>,
@@ -187,10 +208,9 @@ struct Kept {
 
 impl Kept {
     fn new(stream: &PlateStream) -> Self {
-        let scan = Arc::new((stream.scan.clone(), FaceTree::new(&stream.scan)));
         let (gate, keeper) = Gate::kept();
         let pace = Pace { is_patient: false, ..PATIENT };
-        let live = LiveRefiner::behind(gate, scan, refiner(&stream.scan), patcher(stream), pace, 1000).unwrap();
+        let live = engine(stream, pace, gate);
         let expected = LiveCounts::default();
         Self { live, keeper, open: VecDeque::new(), done: 0, slot: None, is_late: false, expected }
     }
@@ -222,13 +242,13 @@ impl Kept {
 }
 
 /// What is known at the end is what all samples at once make.
-fn assert_knows_all(stream: &PlateStream, live: LiveRefiner) {
-    let (_, mut told) = live.finish().unwrap();
-    told.flush();
+fn assert_knows_all(stream: &PlateStream, live: Engine) {
+    let mut known = live.finish().unwrap().1.unwrap();
+    known.flush();
     let mut all_at_once = patcher(stream);
-    stream.samples.iter().for_each(|sample| all_at_once.push(sample));
+    contacts(stream).iter().for_each(|contact| all_at_once.push(contact));
     all_at_once.flush();
-    assert!(whole(stream, &told) == whole(stream, &all_at_once));
+    assert!(whole(stream, &known) == whole(stream, &all_at_once));
 }
 
 /// The patch gets a permit for each 100 ms alone: every sample is taken all the same, the patch is renewed as often as it may
@@ -259,8 +279,7 @@ fn a_late_patch_holds_no_sample_up_and_changes_nothing_of_the_result() {
 #[test]
 fn a_patch_in_time_is_that_of_who_waits_for_it_at_every_sample() {
     let stream = stream(5, 0.1);
-    let scan = Arc::new((stream.scan.clone(), FaceTree::new(&stream.scan)));
-    let mut patient = LiveRefiner::new(scan, refiner(&stream.scan), patcher(&stream), PATIENT, 1000).unwrap();
+    let mut patient = engine(&stream, PATIENT, Gate::default());
     let mut kept = Kept::new(&stream);
     for (i, sample) in stream.samples.iter().enumerate() {
         kept.push(sample);
@@ -285,9 +304,9 @@ fn a_patch_in_time_is_that_of_who_waits_for_it_at_every_sample() {
 fn while_no_sample_comes_the_mesh_goes_on_to_what_the_patch_knows() {
     let stream = stream(6, 0.05);
     let (samples, pace) = (&stream.samples, Pace::default());
-    let (scan, tree) = (Arc::new((stream.scan.clone(), FaceTree::new(&stream.scan))), FaceTree::new(&stream.scan));
+    let (contacts, tree) = (contacts(&stream), FaceTree::new(&stream.scan));
     let (gate, keeper) = Gate::kept();
-    let mut live = LiveRefiner::behind(gate, scan, refiner(&stream.scan), patcher(&stream), pace, 1000).unwrap();
+    let mut live = engine(&stream, pace, gate);
     let (mut by_hand, mut patcher) = (refiner(&stream.scan), patcher(&stream));
     by_hand.expect_patch(1000).unwrap();
     for sample in samples {
@@ -297,7 +316,7 @@ fn while_no_sample_comes_the_mesh_goes_on_to_what_the_patch_knows() {
     let slot = |i: usize| samples[i].stamp_ns.div_euclid(pace.every_ns);
     let begins: Vec<usize> = (1..samples.len()).filter(|&i| slot(i) > slot(i - 1)).take(2).collect();
     for (k, batch) in [0..begins[0], begins[0]..begins[1], begins[1]..samples.len()].into_iter().enumerate() {
-        samples[batch].iter().for_each(|sample| patcher.push(sample));
+        contacts[batch].iter().for_each(|contact| patcher.push(contact));
         let delta = patcher.renewed(&stream.scan, &tree);
         by_hand.begin_to_follow(&delta);
         while !by_hand.go_on_following(&delta, AT_ONCE).unwrap() {}
@@ -341,10 +360,10 @@ fn a_touch_moves_the_mesh_at_once_and_is_in_the_patch_within_50_ms() {
         }
     };
     let tip = TipParams { radius: 1.5e-3, stiffness: None };
-    let refiner = Refiner::new(scan.clone(), RefineParams::robust(tip)).unwrap();
-    let patcher = Patcher::new(PatcherParams::new(tip.radius, None, 0.3e-3)).unwrap();
     let both = Arc::new((scan.clone(), FaceTree::new(&scan)));
-    let mut live = LiveRefiner::new(both, refiner, patcher, PATIENT, 1000).unwrap();
+    let renewal = Renewal::Beside { scan: both, pace: PATIENT, room: 1000, gate: Gate::default() };
+    let patch = PatcherParams::new(tip.radius, None, 0.3e-3);
+    let mut live = Engine::new(scan, RefineParams::robust(tip), Some(patch), renewal).unwrap();
     let (mut at_once, mut late) = (0, 0);
     for i in 0..6000 {
         let before = live.refiner().closest_face(&(sample(i).pose_ot.translation.vector.into()), 1.0).unwrap();
@@ -392,7 +411,8 @@ fn strokes_are_undone_and_redone_bit_for_bit() {
     let mut again = patcher.clone();
     // the samples with which a stroke begins to count …
     let mut begun = Vec::new();
-    for (i, sample) in stream.samples.iter().enumerate() {
+    let contacts = contacts(&stream);
+    for (i, sample) in contacts.iter().enumerate() {
         let strokes = patcher.strokes();
         patcher.push(sample);
         begun.extend((patcher.strokes() > strokes).then_some(i));
@@ -402,7 +422,7 @@ fn strokes_are_undone_and_redone_bit_for_bit() {
     assert!(begun.len() >= 3);
     // … and what was known just before each of them, and at the end
     let mut states = Vec::new();
-    for (i, sample) in stream.samples.iter().enumerate() {
+    for (i, sample) in contacts.iter().enumerate() {
         if begun.contains(&i) {
             states.push(whole(&stream, &again));
         }
@@ -426,15 +446,15 @@ fn strokes_are_undone_and_redone_bit_for_bit() {
 #[test]
 fn undoing_while_touching_brings_the_mesh_back() {
     let stream = last_strokes(4, 0.15);
-    let scan = Arc::new((stream.scan.clone(), FaceTree::new(&stream.scan)));
-    let mut live = LiveRefiner::new(scan, refiner(&stream.scan), patcher(&stream), Pace::default(), 1000).unwrap();
+    let mut live = engine(&stream, Pace::default(), Gate::default());
     // the same without the last stroke: what came before it
     let mut before = patcher(&stream);
     let mut counted = patcher(&stream);
     let mut last_stroke = 0;
+    let contacts = contacts(&stream);
     for (i, sample) in stream.samples.iter().enumerate() {
         let strokes = counted.strokes();
-        counted.push(sample);
+        counted.push(&contacts[i]);
         if counted.strokes() > strokes {
             last_stroke = i;
         }
@@ -450,9 +470,9 @@ fn undoing_while_touching_brings_the_mesh_back() {
     let redone = triangles(live.refiner().mesh());
     assert!(undone != touched && undone != redone);
     // what was undone is what all strokes but the last make at once …
-    stream.samples[..last_stroke].iter().for_each(|sample| before.push(sample));
+    contacts[..last_stroke].iter().for_each(|contact| before.push(contact));
     before.flush();
-    let (mesh, anew) = (live.refiner().mesh().clone(), live.finish().unwrap().1);
+    let (mesh, anew) = (live.refiner().mesh().clone(), live.finish().unwrap().1.unwrap());
     assert!(redone == triangles(&mesh));
     assert!(redone == whole(&stream, &anew).0, "and redone what all of them make");
     let close = |a: usize, b: usize| (a as f64 / b as f64 - 1.0).abs() < 0.01;

@@ -119,13 +119,13 @@ fn the_default_scene_is_the_preset_of_each_mode() {
 fn a_part_is_built_only_when_named() {
     let none = Scene::from_yaml("{}").unwrap();
     assert!(none.refine_params(WrenchFrame::Sensor).is_none() && none.contact.is_none());
-    assert!(none.patcher_params(WrenchFrame::Sensor).is_none());
+    assert!(none.patcher_params().is_none());
     let SyncParams { reorder_ns, largest_gap_ns, .. } = none.sync_params();
     assert_eq!((reorder_ns, largest_gap_ns), (0, 0));
     assert_eq!(none.compensator_params(WrenchFrame::Object).payload, None);
     assert_eq!(none.clock_params(), None);
     let clock = Scene::from_yaml("{ clock: , tip: , contact: { on_n: 1 } }").unwrap().clock_params().unwrap();
-    assert_eq!((clock.stiffness, clock.gate.on), (Some(2e4), 1.0));
+    assert_eq!(clock.stiffness, Some(2e4));
 
     let loop_alone = Scene::from_yaml("refine:").unwrap().refine_params(WrenchFrame::Object).unwrap();
     assert_eq!((loop_alone.gate, loop_alone.sliding, loop_alone.carve, loop_alone.guard), (None, None, None, None));
@@ -180,7 +180,7 @@ fn friction_and_free_space_are_parts_of_the_update_and_of_the_patch_or_of_neithe
     let parts = |yaml: &str| {
         let scene = Scene::from_yaml(&format!("{{ contact: , tip: , patch: , refine: , {yaml} }}")).unwrap();
         let refiner = scene.refine_params(WrenchFrame::Sensor).unwrap();
-        let patcher = scene.patcher_params(WrenchFrame::Sensor).unwrap();
+        let patcher = scene.patcher_params().unwrap();
         assert_eq!(refiner.sliding.map(|sliding| sliding.cone_cosine), patcher.touches.cone_cosine);
         assert_eq!(refiner.carve.is_some(), patcher.free_space);
         (patcher.touches.cone_cosine, patcher.free_space)
@@ -199,15 +199,14 @@ fn the_patch_needs_a_ball_and_a_gate_and_is_no_part_of_the_paper() {
     }
     let yaml = "tip: { radius_mm: 2 }\ncontact: { on_n: 1, off_n: 0.5 }\nscan: { noise_mm: 2 }\n\
                 patch: { pitch_mm: 0.4, most_faces: 3 }";
-    let params = Scene::from_yaml(yaml).unwrap().patcher_params(WrenchFrame::Object).unwrap();
+    let params = Scene::from_yaml(yaml).unwrap().patcher_params().unwrap();
     assert_eq!((params.pitch, params.most_faces), (0.4e-3, 3.0));
-    assert_eq!((params.touches.gate.on, params.touches.stiffness), (1.0, Some(2e4)));
+    assert_eq!(params.touches.stiffness, Some(2e4));
     assert_eq!((params.evidence.radius, params.evidence.scan_reach), (2e-3, 6e-3));
-    assert_eq!(params.compensator.wrench_frame, WrenchFrame::Object);
-    let default = Scene::default().patcher_params(WrenchFrame::Sensor);
+    let default = Scene::default().patcher_params();
     assert_eq!(default, Some(PatcherParams::new(1.5e-3, Some(2e4), 0.6e-3)));
     let paper = Scene::from_yaml("tip:\ncontact:\npatch:\nrefine: { mode: paper }").unwrap();
-    assert!(paper.patcher_params(WrenchFrame::Sensor).is_none());
+    assert!(paper.patcher_params().is_none());
 }
 
 #[test]
@@ -302,7 +301,7 @@ fn the_shape_of_the_tip_reaches_refiner_and_patcher() {
     let shapes = |yaml: &str| {
         let scene = Scene::from_yaml(&format!("{{ contact: , refine: , patch: , tip: {{ {yaml} }} }}")).unwrap();
         let refiner = scene.refine_params(WrenchFrame::Sensor).unwrap();
-        let patcher = scene.patcher_params(WrenchFrame::Sensor).unwrap();
+        let patcher = scene.patcher_params().unwrap();
         assert_eq!((refiner.shape, refiner.tip.radius), (patcher.touches.shape, patcher.touches.radius));
         assert!(refiner.check().is_ok() && touchup::patch::Patcher::new(patcher).is_ok());
         (refiner.shape, patcher.evidence.radius)

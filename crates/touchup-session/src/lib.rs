@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`clock`] | steady time, of the machine or of a test that moves it |
 //! | [`scene`] | the YAML that names the parts of a scene and their parameters |
-//! | [`live`] | the haptic update at every sample, the patch beside it on a thread of its own |
+//! | [`live`] | the engine: the haptic update at every sample, the patch beside it or at the end |
 //! | [`replay`] | a recording from its first message to its last, as messages or as samples |
 //! | [`session`] | one run: its recording, its result, and what it takes to get the same again |
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]

@@ -14,7 +14,7 @@ use crate::align::{PairsFit, PairsParams, PointPair, fit_pairs};
 use crate::calibrate::{RestFinder, RestParams};
 use crate::io::pairs_file::{PairsFile, read_pairs, read_scan_points};
 use crate::scene::{GravityAxes, ScanToSpaceSection, Scene, Setting};
-use crate::touch::Compensator;
+use crate::touch::{ContactEstimator, ContactEstimatorParams};
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct ScanArguments {
@@ -62,16 +62,18 @@ impl ScanArguments {
         // the poses stay in space: that is what is looked for
         let scene = Scene { scan_to_space: None, ..draft.reading() };
         let tip = scene.tip_params();
-        let params = RestParams {
-            gate: scene.contact.unwrap_or_default(),
-            radius: tip.radius,
-            stiffness: tip.stiffness,
-            ..RestParams::default()
-        };
-        let mut finder = RestFinder::new(params)?;
+        let mut finder = RestFinder::new(RestParams { radius: tip.radius, ..RestParams::default() });
         let recording = self.source.open(bag)?;
-        let compensator = Compensator::new(scene.compensator_params(recording.wrench_frame))?;
-        let replayed = self.source.replay(recording, &scene, |sample| finder.push(&compensator.compensate(sample)))?;
+        let mut contacts = ContactEstimator::new(ContactEstimatorParams {
+            compensator: scene.compensator_params(recording.wrench_frame),
+            bias: scene.bias_tracking,
+            gate: Some(scene.contact.unwrap_or_default()),
+            sliding: None,
+            tip,
+        })?;
+        let replayed = self.source.replay(recording, &scene, |sample| {
+            contacts.observe(sample).iter().for_each(|contact| finder.push(contact));
+        })?;
         let rests = finder.finish();
         if rests.len() != file.pairs.len() {
             let (found, wanted) = (rests.len(), file.pairs.len());

@@ -6,11 +6,9 @@ use nalgebra::Point3;
 
 use crate::cli::CliError;
 use crate::cli::progress::WorkProgress as Bar;
-use crate::live::{LiveError, LiveRefiner, Pace};
+use crate::live::{Engine, Gate, LiveError, Pace, Renewal};
 use crate::mesh::{FaceHit, FaceTree, TriMesh};
-use crate::patch::Patcher;
 use crate::probe::{Cell, Progress, World};
-use crate::refine::{RefineError, Refiner};
 use crate::robot::{ArmState, Witness};
 use crate::scene::Scene;
 use crate::touch::{Message, Sample, StampedPose, StampedWrench, Wrench, WrenchFrame};
@@ -23,17 +21,11 @@ const EVERY_NS: i64 = 200_000_000;
 
 /// Takes each state of the arm for a sample, and keeps it.
 pub(super) struct LiveWorld<'a> {
-    engine: ProbingEngine,
+    engine: Engine,
     cell: &'a Cell,
     messages: Vec<Message>,
     failed: Option<LiveError>,
     bar: Bar,
-}
-
-/// With or without a patch.
-enum ProbingEngine {
-    Alone(Box<Refiner>),
-    Live(Box<LiveRefiner>),
 }
 
 impl<'a> LiveWorld<'a> {
@@ -45,27 +37,15 @@ impl<'a> LiveWorld<'a> {
     ) -> Result<Self, CliError> {
         let nothing = || CliError::Usage("the scene names no `refine`, so nothing would move the mesh".to_owned());
         let params = scene.refine_params(WrenchFrame::Sensor).ok_or_else(nothing)?;
-        let refiner = Refiner::new(scan.0.clone(), params)?;
-        let engine = match scene.patcher_params(WrenchFrame::Sensor) {
-            None => ProbingEngine::Alone(Box::new(refiner)),
-            Some(patcher) => {
-                let patcher = Patcher::new(patcher).map_err(RefineError::from)?;
-                // what a simulated arm is told does not depend on how fast this computer is; one that exists goes on meanwhile
-                let pace = Pace { is_patient: is_simulated, every_ns: EVERY_NS, ..Pace::default() };
-                ProbingEngine::Live(Box::new(LiveRefiner::new(scan, refiner, patcher, pace, ROOM)?))
-            }
-        };
+        // what a simulated arm does next does not depend on how fast this computer is; one that exists goes on meanwhile
+        let pace = Pace { is_patient: is_simulated, every_ns: EVERY_NS, ..Pace::default() };
+        let mesh = scan.0.clone();
+        let renewal = Renewal::Beside { scan, pace, room: ROOM, gate: Gate::default() };
+        let engine = Engine::new(mesh, params, scene.patcher_params(), renewal)?;
         Ok(Self { engine, cell, messages: Vec::new(), failed: None, bar: Bar::new("probe", None) })
     }
 
-    fn refiner(&self) -> &Refiner {
-        match &self.engine {
-            ProbingEngine::Alone(refiner) => refiner,
-            ProbingEngine::Live(live) => live.refiner(),
-        }
-    }
-
-    /// All that was felt.
+    /// All that was measured.
     pub fn finish(self) -> Result<Vec<Message>, CliError> {
         match self.failed {
             Some(error) => Err(error.into()),
@@ -88,12 +68,8 @@ impl Witness for LiveWorld<'_> {
         self.messages.push(Message::Pose(StampedPose { stamp_ns, pose_ot: state.pose_bt }));
         self.messages.push(Message::Wrench(StampedWrench { stamp_ns, wrench }));
         let sample = Sample { stamp_ns, pose_ot, wrench };
-        let pushed = match &mut self.engine {
-            ProbingEngine::Alone(refiner) => refiner.push(&sample).map(drop).map_err(LiveError::from),
-            ProbingEngine::Live(live) => live.push(&sample).map(drop),
-        };
-        match pushed {
-            Ok(()) | Err(LiveError::Refine(_)) => {}
+        match self.engine.push(&sample) {
+            Ok(_) | Err(LiveError::Refine(_)) => {}
             Err(error) => self.failed = Some(error),
         }
     }
@@ -105,11 +81,11 @@ impl Witness for LiveWorld<'_> {
 
 impl World for LiveWorld<'_> {
     fn mesh(&self) -> &TriMesh {
-        self.refiner().mesh()
+        self.engine.refiner().mesh()
     }
 
     fn closest_face(&self, place: &Point3<f64>, reach: f64) -> Option<FaceHit> {
-        self.refiner().closest_face(place, reach)
+        self.engine.refiner().closest_face(place, reach)
     }
 
     fn tell(&mut self, progress: &Progress) {

@@ -132,7 +132,9 @@ impl RefinementWorker {
         let wanted = request.strokes.clamp(1, MOST_STROKES);
         let (mut strokes, mut why) = (0, None);
         while strokes < wanted {
-            match self.sitting.engine.change_strokes(is_undo) {
+            let engine = &mut self.sitting.engine;
+            let changed = if is_undo { engine.undo() } else { engine.redo() };
+            match changed {
                 Ok(true) => strokes += 1,
                 Ok(false) => break,
                 Err(error) => {

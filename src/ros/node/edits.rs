@@ -5,8 +5,9 @@
 
 use nalgebra::Point3;
 
-use super::engine::{Engine, Scan};
+use super::engine::Scan;
 use super::tiles::FACES_OF_A_TILE;
+use crate::live::Engine;
 use crate::mesh::{Changes, FaceId, VertexId};
 use crate::patch::Support;
 

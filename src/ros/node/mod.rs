@@ -56,7 +56,7 @@ use crate::mesh::FaceTree;
 use crate::refine::RefineError;
 use crate::scene::{CutScan, Memory, RegionCut, Scene, SceneCost, SceneError};
 use crate::session::{OutcomeError, SessionError};
-use crate::touch::{Compensator, SettingError, WrenchFrame};
+use crate::touch::SettingError;
 
 /// Inputs that wait for the view at most: frames of it are dropped first.
 const VIEW_QUEUE: usize = 256;
@@ -190,7 +190,7 @@ impl Setup {
             "" => source.to_owned(),
             named => named.to_owned(),
         };
-        let known = scene.patcher_params(WrenchFrame::default()).and_then(|params| params.uncertainty);
+        let known = scene.patcher_params().and_then(|params| params.uncertainty);
         let scan_sigma = known.map(|known| known.scan).filter(|sigma| *sigma > 0.0);
         Ok(Self {
             clock,
@@ -213,10 +213,6 @@ impl Setup {
             tool: self.tool.clone(),
             sensor: format!("{}_sensor", self.source),
         }
-    }
-
-    fn compensator(&self, axes: WrenchFrame) -> Result<Compensator, NodeError> {
-        Ok(Compensator::new(self.scene.compensator_params(axes))?)
     }
 }
 

@@ -13,7 +13,6 @@ use super::tip::LastTip;
 use super::view::ViewInput;
 use crate::refine::{Case, Update};
 use crate::ros::messages::HapticMismatch;
-use crate::touch::Sample;
 
 /// The distance at the tip is looked up so often.
 const TIP_EVERY: Duration = Duration::from_millis(25);
@@ -35,17 +34,17 @@ impl RefinementWorker {
         }
     }
 
-    pub(super) fn show_mismatch(&mut self, sample: &Sample, update: &Update) {
+    pub(super) fn show_mismatch(&mut self, update: &Update) {
+        let Some(tip) = self.sitting.engine.refiner().contact().map(|contact| contact.tip) else { return };
         let rate_hz = self.mismatch_rate_hz;
-        let is_due = rate_hz <= 0.0 || sample.stamp_ns.saturating_sub(self.mismatch_ns) as f64 * 1e-9 >= 1.0 / rate_hz;
+        let is_due = rate_hz <= 0.0 || tip.stamp_ns.saturating_sub(self.mismatch_ns) as f64 * 1e-9 >= 1.0 / rate_hz;
         if !is_due {
             return;
         }
-        self.mismatch_ns = sample.stamp_ns;
-        let tip = self.compensator.compensate(sample);
+        self.mismatch_ns = tip.stamp_ns;
         let centre = tip.pose_ot.translation.vector.into();
         let base = HapticMismatch {
-            header: header(sample.stamp_ns, &self.setup.shared.frame),
+            header: header(tip.stamp_ns, &self.setup.shared.frame),
             contact_case: number_of(update.case),
             face: HapticMismatch::NO_FACE,
             mesh_version: self.version,
@@ -72,11 +71,11 @@ impl RefinementWorker {
         let now = self.setup.clock.now();
         if now.saturating_duration_since(self.tip_shown) >= TIP_EVERY {
             self.tip_shown = now;
-            self.show_tip(sample, centre);
+            self.show_tip(tip.stamp_ns, centre);
         }
     }
 
-    fn show_tip(&self, sample: &Sample, centre: Point3<f64>) {
+    fn show_tip(&self, stamp_ns: i64, centre: Point3<f64>) {
         let refiner = self.sitting.engine.refiner();
         let radius = self.setup.scene.tip_params().radius;
         let closest = refiner.closest_face(&centre, TIP_REACH).map(|hit| {
@@ -84,7 +83,7 @@ impl RefinementWorker {
             let side = if off.dot(&refiner.mesh().normal(hit.face)) < 0.0 { -1.0 } else { 1.0 };
             (hit.point, side * off.norm() - radius)
         });
-        let tip = LastTip { stamp_ns: sample.stamp_ns, centre, radius, closest };
+        let tip = LastTip { stamp_ns, centre, radius, closest };
         self.setup.shared.show(&self.view, ViewInput::Tip(tip));
     }
 

@@ -22,7 +22,7 @@ use crate::live::{Latencies, LiveError, TouchDelta};
 use crate::refine::RefineError;
 use crate::ros::messages::{PoseStamped, TFMessage, WrenchStamped};
 use crate::ros::port::{Arrival, Endpoint, Port};
-use crate::touch::{Compensator, Message, Sample, SyncCounts, Synchroniser, WrenchFrame};
+use crate::touch::{Message, Sample, SyncCounts, Synchroniser, WrenchFrame};
 
 /// The loop looks at the streams so often when nothing comes.
 const IDLE: Duration = Duration::from_millis(10);
@@ -85,7 +85,6 @@ pub struct RefinementWorker {
     pub(super) placer: FrameResolver,
     pub(super) sitting: NodeSession,
     pub(super) sync: Synchroniser,
-    pub(super) compensator: Compensator,
     epoch: Epoch,
     /// poses and wrenches that wait for a transform, with when they came
     waiting: [VecDeque<(ArrivedMessage, Instant)>; 2],
@@ -135,11 +134,9 @@ impl RefinementWorker {
         let mismatch_rate_hz = setup.shared.parameters().double("mismatch_rate_hz");
         let side_work = SideWork::on(setup.clock.clone());
         let placer = FrameResolver::new(setup.frame_names(), setup.scene.placement());
-        let compensator = setup.compensator(WrenchFrame::default())?;
         Ok(Self {
             sync: Synchroniser::in_order(setup.scene.sync_params())?,
             placer,
-            compensator,
             setup,
             port,
             view,
@@ -314,10 +311,8 @@ impl RefinementWorker {
 
     /// The first wrench says that its axes are those of the object: nothing was pushed yet, so all is begun anew.
     fn turn_to_object_axes(&mut self) {
-        let made = self.sitting.turn_axes(&self.setup, WrenchFrame::Object);
-        match made.and_then(|()| self.setup.compensator(WrenchFrame::Object)) {
-            Ok(compensator) => self.compensator = compensator,
-            Err(error) => self.fault = Some(error.to_string()),
+        if let Err(error) = self.sitting.turn_axes(&self.setup, WrenchFrame::Object) {
+            self.fault = Some(error.to_string());
         }
     }
 
@@ -337,7 +332,7 @@ impl RefinementWorker {
             Ok(update) => {
                 self.tally.accepted += 1;
                 self.last_ns = Some(sample.stamp_ns);
-                self.show_mismatch(sample, &update);
+                self.show_mismatch(&update);
                 self.note_changes();
             }
             Err(LiveError::Refine(error)) => self.tally.refuse(reason_of(&error)),
@@ -390,7 +385,6 @@ impl RefinementWorker {
     /// What a session counts from its beginning.
     pub(super) fn begin_counting(&mut self) -> Result<(), NodeError> {
         self.sync = Synchroniser::in_order(self.setup.scene.sync_params())?;
-        self.compensator = self.setup.compensator(WrenchFrame::default())?;
         self.placer.forget_axes();
         (self.epoch, self.waiting, self.probed) = (Epoch::default(), Default::default(), TouchDelta::default());
         (self.tally, self.pushes, self.latencies) = (Counters::default(), Latencies::new(), Latencies::new());

@@ -5,11 +5,11 @@ use std::time::SystemTime;
 use chrono::{DateTime, Utc};
 use serde::Serialize;
 
-use super::engine::Engine;
+use super::engine::engine_of;
 use super::refinement::Counters;
 use super::{NodeError, Setup};
 use crate::io::session_folder::SessionFolder;
-use crate::live::Quantiles;
+use crate::live::{Engine, Quantiles};
 use crate::mesh::TriMesh;
 use crate::patch::Patcher;
 use crate::ros::port::Port;
@@ -84,7 +84,7 @@ impl NodeSession {
         SessionRecord::begin(&folder, &setup.scan_path, setup.mesh_unit, &setup.scene_yaml, &setup.topics)?;
         let recorder = SessionRecorder::start(&folder, &setup.topics, &setup.clock)?;
         let axes = WrenchFrame::default();
-        let engine = Engine::new(setup, axes)?;
+        let engine = engine_of(setup, axes)?;
         Ok(Self { folder, recorder, engine, axes, told_version: 1, told_edits: 0 })
     }
 
@@ -93,7 +93,7 @@ impl NodeSession {
     /// # Errors
     /// [`NodeError`]
     pub fn turn_axes(&mut self, setup: &Setup, axes: WrenchFrame) -> Result<(), NodeError> {
-        self.engine = Engine::new(setup, axes)?;
+        self.engine = engine_of(setup, axes)?;
         self.axes = axes;
         Ok(())
     }
@@ -141,7 +141,7 @@ impl NodeSession {
             cut_back: counts.cut_back,
             push_ns: nothing,
             latency_ns: nothing,
-            late_renewals: self.engine.late_renewals(),
+            late_renewals: self.engine.counts().late,
             result: None,
         }
     }

@@ -10,7 +10,7 @@ use touchup::patch::{CalibrationParams, Patcher, PatcherParams};
 use touchup::sim::{Plate, StylusParams, TruthFeature, TruthShape};
 
 use crate::full::either;
-use crate::plate_stream::{PlateStream, plate_stream};
+use crate::plate_stream::{PlateStream, contacts_of, plate_stream};
 
 const MM: f64 = 1e3;
 
@@ -34,7 +34,7 @@ fn found(seed: u64, off: Told) -> Vec<Feature> {
     let mut params = PatcherParams::new(radius, Some(stiffness), noise);
     params.uncertainty.as_mut().unwrap().calibration = CalibrationParams { position: 2e-6, stiffness_share: 0.02 };
     let mut patcher = Patcher::new(params).unwrap();
-    samples.iter().for_each(|sample| patcher.push(sample));
+    contacts_of(radius, Some(stiffness), &samples).iter().for_each(|contact| patcher.push(contact));
     patcher.flush();
     let mesh = patcher.patched(&scan, &FaceTree::new(&scan)).unwrap().mesh;
     detect(&mesh, &FaceTree::new(&mesh), patcher.probed()).features

@@ -1,6 +1,6 @@
 //! Features followed between two looks at the mesh: numbers stay, and new touches count at once.
 
-use crate::plate_stream::plate_stream;
+use crate::plate_stream::{contacts_of, plate_stream};
 use touchup::features::{Feature, FittedTo, Kind, Tracker};
 use touchup::mesh::{FaceTree, TriMesh};
 use touchup::patch::{Patcher, PatcherParams};
@@ -14,7 +14,8 @@ fn touched_plate(seed: u64) -> (TriMesh, Vec<ProbedPoint>) {
     let mut params = PatcherParams::new(stylus.radius, Some(stylus.stiffness), stream.noise);
     params.uncertainty = Some(touchup::patch::UncertaintyParams::new(stream.noise));
     let mut patcher = Patcher::new(params).unwrap();
-    stream.samples.iter().for_each(|sample| patcher.push(sample));
+    let contacts = contacts_of(stylus.radius, Some(stylus.stiffness), &stream.samples);
+    contacts.iter().for_each(|contact| patcher.push(contact));
     patcher.flush();
     let patched = patcher.patched(&stream.scan, &FaceTree::new(&stream.scan)).unwrap();
     (patched.mesh, patcher.probed().to_vec())

@@ -12,9 +12,10 @@ use serde_json::Value;
 use tempfile::TempDir;
 use touchup::io::mesh_file::{MeshUnit, VertexColumn, read_mesh, write_mesh, write_mesh_with};
 use touchup::io::recording::{RecordingReader, Topics, write_recording};
+use touchup::live::{Engine, Renewal};
 use touchup::mesh::{FaceTree, TriMesh};
-use touchup::patch::{Patcher, PatcherParams};
-use touchup::refine::{RefineParams, Refiner, TipParams};
+use touchup::patch::PatcherParams;
+use touchup::refine::{RefineParams, TipParams};
 use touchup::touch::{Message, StampedPose, StampedWrench, SyncParams, Synchroniser, Wrench};
 
 use crate::common::{grid, within};
@@ -223,14 +224,13 @@ fn plate_touches() -> Vec<Message> {
 fn a_replay_equals_the_first_run_byte_for_byte() {
     let plate = Plate::new();
     let scan = read_mesh(&plate.at("scan.ply"), MeshUnit::Millimetre).unwrap().mesh;
-    let mut refiner = Refiner::new(scan.clone(), RefineParams::robust(TIP)).unwrap();
-    let mut patcher = Patcher::new(PatcherParams::new(TIP.radius, TIP.stiffness, 0.6e-3)).unwrap();
+    let patch = PatcherParams::new(TIP.radius, TIP.stiffness, 0.6e-3);
+    let mut engine = Engine::new(scan.clone(), RefineParams::robust(TIP), Some(patch), Renewal::AtEnd).unwrap();
     let mut sync = Synchroniser::new(SyncParams::default()).unwrap();
     let mut samples = 0;
     let mut take = |sync: &mut Synchroniser| {
         while let Some(sample) = sync.next_sample() {
-            refiner.push(&sample).unwrap();
-            patcher.push(&sample);
+            engine.push(&sample).unwrap();
             samples += 1;
         }
     };
@@ -240,6 +240,8 @@ fn a_replay_equals_the_first_run_byte_for_byte() {
     }
     sync.finish();
     take(&mut sync);
+    let (refiner, patcher) = engine.finish().unwrap();
+    let mut patcher = patcher.unwrap();
     patcher.flush();
     let patched = patcher.patched(&scan, &FaceTree::new(&scan)).unwrap();
     let columns = patched.columns().into_iter();

@@ -9,7 +9,7 @@ use touchup::sim::{Moment, Plate, StylusParams, Surface, TruthFeature, TruthShap
 use touchup::touch::{Sample, TipShape, Wrench};
 
 use crate::full::either;
-use crate::plate_stream::{PlateStream, plate_stream};
+use crate::plate_stream::{PlateStream, contacts_of, plate_stream};
 use crate::soundness::{intersections, soundness};
 
 /// A touched plate: how it was scanned, where the ball really touched, and what the patcher made of it.
@@ -32,7 +32,7 @@ fn case_with(stylus: &StylusParams, seed: u64, change: impl Fn(&mut PatcherParam
     let mut params = PatcherParams::for_tip(stylus.shape, stylus.radius, Some(stylus.stiffness), noise).unwrap();
     change(&mut params);
     let mut patcher = Patcher::new(params).unwrap();
-    samples.iter().for_each(|sample| patcher.push(sample));
+    contacts_of(stylus.radius, Some(stylus.stiffness), &samples).iter().for_each(|contact| patcher.push(contact));
     patcher.flush();
     let patched = patcher.patched(&scan, &FaceTree::new(&scan)).unwrap();
     let contact_points = |moment: &Moment| moment.contacts.iter().map(|contact| contact.point).collect::<Vec<_>>();
@@ -190,7 +190,7 @@ fn what_the_ball_went_all_around_is_no_part() {
             add(MOAT_MM - (MOAT_MM - inner_mm) * turns / 10.0, turns, -8.0, 2.0);
         }
         let mut patcher = Patcher::new(PatcherParams::new(1.5e-3, None, 0.1e-3)).unwrap();
-        samples.iter().for_each(|sample| patcher.push(sample));
+        contacts_of(1.5e-3, None, &samples).iter().for_each(|contact| patcher.push(contact));
         patcher.flush();
         let mesh = patcher.patched(&scan, &FaceTree::new(&scan)).unwrap().mesh;
         let in_the_middle = |p: &Point3<f64>| (p.x - 20e-3).hypot(p.y - 20e-3) < 1e-3;
@@ -217,7 +217,7 @@ fn where_free_space_is_no_evidence_lids_stay() {
     let distance = |free_space: bool| {
         let params = PatcherParams { free_space, ..PatcherParams::new(1.5e-3, None, 0.1e-3) };
         let mut patcher = Patcher::new(params).unwrap();
-        samples.iter().for_each(|sample| patcher.push(sample));
+        contacts_of(1.5e-3, None, &samples).iter().for_each(|contact| patcher.push(contact));
         patcher.flush();
         let mesh = patcher.patched(&scan, &FaceTree::new(&scan)).unwrap().mesh;
         let lid = Point3::new(25e-3, 20e-3, 0.0);

@@ -1,8 +1,8 @@
 //! A scan of which only a region is touched: what comes out is what the whole scan would give, and the rest is as it was.
 
 use nalgebra::{Isometry3, Point3, Vector3};
+use touchup::live::{Engine, Renewal};
 use touchup::mesh::{FaceTree, MeshError, Region, TriMesh, VertexId};
-use touchup::patch::Patcher;
 use touchup::refine::Refiner;
 use touchup::scene::{CutScan, Scene};
 use touchup::sim::wavy::{FORCE, RADIUS, STIFFNESS, height, wavy_plate};
@@ -162,9 +162,11 @@ fn the_patch_of_the_region_is_that_of_the_whole_scan() {
     let scan = wavy_plate(60_000).unwrap();
     let patched = |scene: &Scene| {
         let cut = scene.cut(scan.clone()).unwrap();
-        let params = cut.cut.patcher_params(scene.patcher_params(WrenchFrame::Object).unwrap());
-        let mut patcher = Patcher::new(params).unwrap();
-        touches(0.14).iter().for_each(|sample| patcher.push(sample));
+        let patch = cut.cut.patcher_params(scene.patcher_params().unwrap());
+        let refine = cut.cut.refine_params(scene.refine_params(WrenchFrame::Object).unwrap());
+        let mut engine = Engine::new(cut.mesh.clone(), refine, Some(patch), Renewal::AtEnd).unwrap();
+        touches(0.14).iter().for_each(|sample| assert!(engine.push(sample).is_ok()));
+        let mut patcher = engine.finish().unwrap().1.unwrap();
         patcher.flush();
         let patched = patcher.patched(&cut.mesh, &FaceTree::new(&cut.mesh)).unwrap();
         (cut, patched)

@@ -5,7 +5,7 @@ use touchup::patch::{TipTouch, TouchFinder, TouchFinderParams};
 use touchup::sim::{
     Lines, Moment, PathParams, Plate, RasterRegion, Stroke, StylusParams, Surface, plan_demo, raster, touch,
 };
-use touchup::touch::{Compensator, CompensatorParams, SyncParams, Synchroniser, TipShape};
+use touchup::touch::{ContactEstimator, ContactEstimatorParams, SyncParams, Synchroniser, TipParams, TipShape};
 
 use crate::full::either;
 
@@ -36,13 +36,14 @@ fn felt(stylus: &StylusParams, seed: u64) -> Vec<(TipTouch, Moment)> {
     let params =
         TouchFinderParams { shape: stylus.shape, ..TouchFinderParams::new(stylus.radius, Some(stylus.stiffness)) };
     let mut finder = TouchFinder::new(params).unwrap();
-    let compensator = Compensator::new(CompensatorParams::default()).unwrap();
+    let tip = TipParams { radius: stylus.radius, stiffness: Some(stylus.stiffness) };
+    let mut contacts = ContactEstimator::new(ContactEstimatorParams::new(tip)).unwrap();
     let mut sync = Synchroniser::new(SyncParams::default()).unwrap();
     let mut touches = Vec::new();
     for message in &recording.messages {
         sync.push(*message);
         std::iter::from_fn(|| sync.next_sample())
-            .for_each(|sample| finder.push(&compensator.compensate(&sample), |touch| touches.push(touch)));
+            .for_each(|sample| finder.push(&contacts.observe(&sample).unwrap(), |touch| touches.push(touch)));
     }
     finder.flush(|touch| touches.push(touch));
     let truth = |touch: TipTouch| {

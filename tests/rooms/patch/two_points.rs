@@ -4,7 +4,7 @@ use nalgebra::{Point3, UnitVector3, Vector3};
 use touchup::mesh::{FaceTree, TriMesh};
 use touchup::patch::{Patched, Patcher, PatcherParams, Support};
 use touchup::sim::{Bounds, Stroke, StylusParams, Surface, SurfacePoint, touch};
-use touchup::touch::{SyncParams, Synchroniser};
+use touchup::touch::{ContactEstimator, ContactEstimatorParams, SyncParams, Synchroniser, TipParams};
 
 const RADIUS: f64 = 1.5e-3;
 
@@ -135,9 +135,11 @@ fn felt(profile: &Profile, path: &[Stroke], friction: f64, seed: u64) -> (Patche
     let recording = touch(profile, path, &stylus, seed).unwrap();
     let mut patcher = Patcher::new(PatcherParams::new(RADIUS, Some(stylus.stiffness), 0.3e-3)).unwrap();
     let mut sync = Synchroniser::new(SyncParams::default()).unwrap();
+    let tip = TipParams { radius: RADIUS, stiffness: Some(stylus.stiffness) };
+    let mut contacts = ContactEstimator::new(ContactEstimatorParams::new(tip)).unwrap();
     for message in &recording.messages {
         sync.push(*message);
-        std::iter::from_fn(|| sync.next_sample()).for_each(|sample| patcher.push(&sample));
+        std::iter::from_fn(|| sync.next_sample()).for_each(|sample| patcher.push(&contacts.observe(&sample).unwrap()));
     }
     let scan = strips(profile);
     let patched = patcher.patched(&scan, &FaceTree::new(&scan)).unwrap();

@@ -12,7 +12,9 @@ use touchup::patch::{CalibrationParams, Patched, Patcher, PatcherParams, Support
 use touchup::sim::{
     PathParams, Plate, ScannerParams, SensorParams, StylusParams, Surface, Touch, plan_demo, scan, touch,
 };
-use touchup::touch::{Message, ProbedPoint, Sample, SyncParams, Synchroniser, Tip, Wrench};
+use touchup::touch::{
+    ContactEstimator, ContactEstimatorParams, Message, ProbedPoint, Sample, SyncParams, Synchroniser, TipParams, Wrench,
+};
 
 use crate::full::either;
 
@@ -38,15 +40,20 @@ fn touched_plate(told: &StylusParams, seed: u64) -> (TriMesh, Touch, PatcherPara
     (scan, touch, params)
 }
 
+fn estimator(radius: f64, stiffness: Option<f64>) -> ContactEstimator {
+    ContactEstimator::new(ContactEstimatorParams::new(TipParams { radius, stiffness })).unwrap()
+}
+
 fn patcher_of(messages: &[Message], params: PatcherParams) -> Patcher {
     let mut patcher = Patcher::new(params).unwrap();
     let mut sync = Synchroniser::new(SyncParams::default()).unwrap();
+    let mut contacts = estimator(params.touches.radius, params.touches.stiffness);
     for message in messages {
         sync.push(*message);
-        std::iter::from_fn(|| sync.next_sample()).for_each(|sample| patcher.push(&sample));
+        std::iter::from_fn(|| sync.next_sample()).for_each(|sample| patcher.push(&contacts.observe(&sample).unwrap()));
     }
     sync.finish();
-    std::iter::from_fn(|| sync.next_sample()).for_each(|sample| patcher.push(&sample));
+    std::iter::from_fn(|| sync.next_sample()).for_each(|sample| patcher.push(&contacts.observe(&sample).unwrap()));
     patcher
 }
 
@@ -365,7 +372,7 @@ fn outliers_are_counted_and_do_not_dent_the_mesh() {
 }
 
 /// Goes over the square from −4 to 4 mm in lines 1 mm apart at height `z` (m), from `start_ns` on; returns the time after.
-fn pass(patcher: &mut Patcher, z: f64, start_ns: i64, rng: &mut Pcg64) -> i64 {
+fn pass((patcher, contacts): (&mut Patcher, &mut ContactEstimator), z: f64, start_ns: i64, rng: &mut Pcg64) -> i64 {
     let (speed, force) = (0.02, Vector3::new(0.0, 0.0, 2.0));
     let mut stamp_ns = start_ns;
     for line in 0..9 {
@@ -375,7 +382,8 @@ fn pass(patcher: &mut Patcher, z: f64, start_ns: i64, rng: &mut Pcg64) -> i64 {
             let shake = Vector3::from_fn(|_, _| normal(rng) * 0.03e-3);
             let centre = Vector3::new(x, f64::from(line) * 1e-3 - 4e-3, z + 1.5e-3) + shake - force / 2e4;
             let wrench = Wrench { force, torque: Vector3::zeros() };
-            patcher.push(&Sample { stamp_ns, pose_ot: Isometry3::translation(centre.x, centre.y, centre.z), wrench });
+            let pose_ot = Isometry3::translation(centre.x, centre.y, centre.z);
+            patcher.push(&contacts.observe(&Sample { stamp_ns, pose_ot, wrench }).unwrap());
             stamp_ns += 1_000_000;
         }
     }
@@ -390,6 +398,7 @@ fn a_place_moves_when_a_second_pass_confirms_it() {
     for moved in [0.25e-3, -0.25e-3] {
         let mut rng = Pcg64::seed_from_u64(3);
         let mut patcher = Patcher::new(PatcherParams::new(1.5e-3, Some(2e4), 0.6e-3)).unwrap();
+        let mut contacts = estimator(1.5e-3, Some(2e4));
         let height = |patcher: &mut Patcher| {
             let made = patched(patcher, &scan);
             let tree = FaceTree::new(&made.mesh);
@@ -400,14 +409,14 @@ fn a_place_moves_when_a_second_pass_confirms_it() {
             errors.sort_by(f64::total_cmp);
             errors[12]
         };
-        let now = pass(&mut patcher, 0.0, 0, &mut rng);
-        let now = pass(&mut patcher, 0.0, now, &mut rng);
+        let now = pass((&mut patcher, &mut contacts), 0.0, 0, &mut rng);
+        let now = pass((&mut patcher, &mut contacts), 0.0, now, &mut rng);
         assert!(height(&mut patcher).abs() < 0.01e-3 && patcher.outliers().rejected == 0);
-        let now = pass(&mut patcher, moved, now, &mut rng);
+        let now = pass((&mut patcher, &mut contacts), moved, now, &mut rng);
         let (held, relocated) = (patcher.outliers().rejected, patcher.outliers().relocated);
         assert!(held > 3000 && relocated == 0, "{held} {relocated}");
         assert!(height(&mut patcher).abs() < 0.01e-3, "one pass is an outlier: {}", height(&mut patcher));
-        pass(&mut patcher, moved, now, &mut rng);
+        pass((&mut patcher, &mut contacts), moved, now, &mut rng);
         let found = height(&mut patcher);
         assert!((found - moved).abs() < 0.02e-3, "{found} after {} relocated", patcher.outliers().relocated);
         assert!(patcher.outliers().relocated > 50);
@@ -423,22 +432,22 @@ fn contacts_lie_about_the_plane_as_their_stated_noise_says() {
     let calibration = Some(CalibrationParams { position: 0.0, stiffness_share: 0.0 });
     let mut finder =
         TouchFinder::new(TouchFinderParams { calibration, ..TouchFinderParams::new(radius, Some(20_000.0)) }).unwrap();
+    let mut contacts = estimator(radius, Some(20_000.0));
     let (mut over, mut before, mut next) = (Vec::new(), Vector3::zeros(), Vector3::zeros());
     for i in 0..60_000_i64 {
         if i % 2 == 0 {
             (before, next) = (next, Vector3::from_fn(|_, _| normal(&mut rng) * pose_noise));
         }
         let t = i as f64 / 1000.0;
-        let (force_o, noise) = (Vector3::z() * 4.0, before.lerp(&next, (i % 2) as f64 / 2.0));
+        let (force, noise) = (Vector3::z() * 4.0, before.lerp(&next, (i % 2) as f64 / 2.0));
         // the stylus gives way: its pose goes on by as much
         let centre = Vector3::new(0.02 * t.sin(), 0.02 * (0.7 * t).cos(), radius - 4.0 / 20_000.0) + noise;
-        let tip = Tip {
+        let sample = Sample {
             stamp_ns: 1_000_000_000 + i * 1_000_000,
             pose_ot: Isometry3::translation(centre.x, centre.y, centre.z),
-            force_o,
-            torque_o: Vector3::zeros(),
+            wrench: Wrench { force, torque: Vector3::zeros() },
         };
-        finder.push(&tip, |touch| {
+        finder.push(&contacts.observe(&sample).unwrap(), |touch| {
             // the noise is known after some hundred samples
             if let Some(contact) = touch.contact.filter(|_| i > 5_000) {
                 over.push(contact.point.z / contact.sigma.noise);

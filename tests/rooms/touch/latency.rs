@@ -3,8 +3,15 @@
 use nalgebra::{Isometry3, Vector3};
 use touchup::sim::{PathParams, Plate, SensorParams, StylusParams, plan_demo, touch};
 use touchup::touch::{
-    ClockEstimator, ClockOffset, ClockParams, Compensator, CompensatorParams, SyncParams, Synchroniser, Tip,
+    ClockEstimator, ClockOffset, ClockParams, ContactEstimator, ContactEstimatorParams, Sample, SyncParams,
+    Synchroniser, TipParams, Wrench,
 };
+
+fn contacts() -> ContactEstimator {
+    let tip = TipParams { radius: 0.0, stiffness: None };
+    ContactEstimator::new(ContactEstimatorParams { bias: None, sliding: None, ..ContactEstimatorParams::new(tip) })
+        .unwrap()
+}
 
 fn estimated(sensor: SensorParams, seed: u64) -> Option<ClockOffset> {
     let plate = Plate::default();
@@ -12,13 +19,12 @@ fn estimated(sensor: SensorParams, seed: u64) -> Option<ClockOffset> {
     let stylus = StylusParams { sensor, ..StylusParams::default() };
     let touch = touch(&plate, &path, &stylus, seed).unwrap();
     let mut sync = Synchroniser::new(SyncParams::default()).unwrap();
-    let compensator = Compensator::new(CompensatorParams::default()).unwrap();
-    let mut clock =
-        ClockEstimator::new(ClockParams { stiffness: Some(stylus.stiffness), ..ClockParams::default() }).unwrap();
+    let mut contacts = contacts();
+    let mut clock = ClockEstimator::new(ClockParams { stiffness: Some(stylus.stiffness) }).unwrap();
     for message in touch.messages {
         sync.push(message);
         while let Some(sample) = sync.next_sample() {
-            clock.push(&compensator.compensate(&sample));
+            clock.push(&contacts.observe(&sample).unwrap());
         }
     }
     clock.offset()
@@ -39,14 +45,15 @@ fn the_delay_is_right_within_its_uncertainty_over_twenty_seeds() {
     assert!(worst <= 2.0, "{worst} standard uncertainties");
 }
 
-fn tip(ms: i64, height: f64, force: f64) -> Tip {
+fn sample(ms: i64, height: f64, force: f64) -> Sample {
     let pose_ot = Isometry3::translation(0.0, 0.0, height);
-    Tip { stamp_ns: ms * 1_000_000, pose_ot, force_o: Vector3::z() * force, torque_o: Vector3::zeros() }
+    let wrench = Wrench { force: Vector3::z() * force, torque: Vector3::zeros() };
+    Sample { stamp_ns: ms * 1_000_000, pose_ot, wrench }
 }
 
-fn offset_of(tips: impl IntoIterator<Item = Tip>) -> Option<ClockOffset> {
-    let mut clock = ClockEstimator::new(ClockParams::default()).unwrap();
-    tips.into_iter().for_each(|tip| clock.push(&tip));
+fn offset_of(samples: impl IntoIterator<Item = Sample>) -> Option<ClockOffset> {
+    let (mut clock, mut contacts) = (ClockEstimator::new(ClockParams::default()).unwrap(), contacts());
+    samples.into_iter().for_each(|sample| clock.push(&contacts.observe(&sample).unwrap()));
     clock.offset()
 }
 
@@ -58,7 +65,7 @@ fn a_clean_stop_gives_the_delay_that_was_put_in() {
             let (since_pose, since_force) = ((ms % 200 - 100) as f64, (ms % 200 - 100) as f64 - late_ms);
             let height = if since_pose < 0.0 { -since_pose * 50e-6 } else { 0.0 };
             let force = if ms % 200 < 180 { 2.0 * (1.0 - (-since_force.max(0.0) / 10.0).exp()) } else { 0.0 };
-            tip(ms, height, force)
+            sample(ms, height, force)
         };
         let found = offset_of((0..4000).map(at)).unwrap();
         assert!((found.offset * 1e3 - late_ms).abs() < 0.15, "{late_ms} ms: {found:?}");
@@ -69,9 +76,9 @@ fn a_clean_stop_gives_the_delay_that_was_put_in() {
 #[test]
 fn where_there_is_nothing_to_see_nothing_is_found() {
     // never in contact; always in contact; the ball comes to rest long before it is pressed; two onsets alone
-    assert_eq!(offset_of((0..5000).map(|ms| tip(ms, 0.01, 0.05))), None);
-    assert_eq!(offset_of((0..5000).map(|ms| tip(ms, 0.01 * (ms as f64 * 0.01).sin(), 2.0))), None);
-    assert_eq!(offset_of((0..5000).map(|ms| tip(ms, 0.0, if ms % 200 < 100 { 0.0 } else { 2.0 }))), None);
-    let stop = |ms: i64| tip(ms, (100 - ms % 200).max(0) as f64 * 50e-6, if ms % 200 < 100 { 0.0 } else { 2.0 });
+    assert_eq!(offset_of((0..5000).map(|ms| sample(ms, 0.01, 0.05))), None);
+    assert_eq!(offset_of((0..5000).map(|ms| sample(ms, 0.01 * (ms as f64 * 0.01).sin(), 2.0))), None);
+    assert_eq!(offset_of((0..5000).map(|ms| sample(ms, 0.0, if ms % 200 < 100 { 0.0 } else { 2.0 }))), None);
+    let stop = |ms: i64| sample(ms, (100 - ms % 200).max(0) as f64 * 50e-6, if ms % 200 < 100 { 0.0 } else { 2.0 });
     assert_eq!(offset_of((0..400).map(stop)), None);
 }

@@ -6,7 +6,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::touch::{ContactGate, ContactGateParams, SettingError, Tip};
+use crate::touch::ContactSample;
 
 /// Settings of a [`RestFinder`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,19 +15,14 @@ pub struct RestParams {
     pub dwell_ns: i64,
     /// … and the ball stays within this of where it began, m. Default 0.5 mm: a hand trembles by a tenth of that.
     pub wander: f64,
-    /// Tells contact.
-    pub gate: ContactGateParams,
     /// Of the ball, m.
     pub radius: f64,
-    /// Of stylus and holder at the ball, N/m; `None`: rigid.
-    pub stiffness: Option<f64>,
 }
 
 impl Default for RestParams {
-    /// A rigid point.
+    /// A point.
     fn default() -> Self {
-        let gate = ContactGateParams::default();
-        Self { dwell_ns: 500_000_000, wander: 0.5e-3, gate, radius: 0.0, stiffness: None }
+        Self { dwell_ns: 500_000_000, wander: 0.5e-3, radius: 0.0 }
     }
 }
 
@@ -59,26 +54,22 @@ struct Stretch {
 #[derive(Debug)]
 pub struct RestFinder {
     params: RestParams,
-    gate: ContactGate,
     stretch: Option<Stretch>,
     found: Vec<Rest>,
 }
 
 impl RestFinder {
     /// Nothing seen yet.
-    ///
-    /// # Errors
-    /// [`SettingError`] of the gate.
-    pub fn new(params: RestParams) -> Result<Self, SettingError> {
-        Ok(Self { params, gate: ContactGate::new(params.gate)?, stretch: None, found: Vec::new() })
+    pub fn new(params: RestParams) -> Self {
+        Self { params, stretch: None, found: Vec::new() }
     }
 
-    /// Takes what is felt at one instant; O stands for the frame of the poses.
-    pub fn push(&mut self, tip: &Tip) {
-        if self.gate.update(tip.stamp_ns, &tip.force_o).is_none() {
+    /// Takes the next sample, in order of time; O stands for the frame of the poses.
+    pub fn push(&mut self, sample: &ContactSample) {
+        if !sample.is_in_contact() {
             return self.close();
         }
-        let centre = tip.pose_ot.translation.vector + tip.force_o / self.params.stiffness.unwrap_or(f64::INFINITY);
+        let (tip, centre) = (&sample.tip, sample.centre.coords);
         if self.stretch.is_some_and(|stretch| (centre - stretch.anchor).norm() > self.params.wander) {
             self.close();
         }

@@ -20,13 +20,11 @@ use super::unreachable::mark_unreachable;
 use super::vertex_uncertainty::vertex_sigma;
 use crate::mesh::{FaceTree, MeshError, Region, TriMesh};
 use crate::parameters;
-use crate::touch::{Compensator, CompensatorParams, ProbedPoint, Sample, SettingError, TipBody, TipShape};
+use crate::touch::{ContactSample, ProbedPoint, SettingError, TipBody, TipShape};
 
 /// Settings of a [`Patcher`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PatcherParams {
-    /// weight, bias, frames
-    pub compensator: CompensatorParams,
     /// how touches are found
     pub touches: TouchFinderParams,
     /// how far they are believed
@@ -93,7 +91,6 @@ impl PatcherParams {
     /// `noise` (m).
     pub fn new(radius: f64, stiffness: Option<f64>, noise: f64) -> Self {
         Self {
-            compensator: CompensatorParams::default(),
             touches: TouchFinderParams::new(radius, stiffness),
             evidence: EvidenceParams::new(radius, noise),
             free_space: true,
@@ -158,19 +155,20 @@ impl PatcherParams {
 /// # Example
 /// ```
 /// use nalgebra::{Isometry3, Point3, Vector3};
-/// use touchup_core::{mesh::{FaceTree, TriMesh}, patch::{Patcher, PatcherParams}, touch::{Sample, Wrench}};
+/// use touchup_core::{mesh::{FaceTree, TriMesh}, patch::{Patcher, PatcherParams}, touch::*};
 ///
 /// // a scan of 20 mm that lies 0.4 mm too high
 /// let p = |x: f64, y: f64| Point3::new(x * 1e-3, y * 1e-3, 0.4e-3);
 /// let scan = TriMesh::new(vec![p(0., 0.), p(20., 0.), p(20., 20.), p(0., 20.)], vec![[0, 1, 2], [0, 2, 3]])?;
 /// let mut patcher = Patcher::new(PatcherParams::new(1.5e-3, None, 0.3e-3))?;
+/// let mut contacts = ContactEstimator::new(ContactEstimatorParams::new(TipParams { radius: 1.5e-3, stiffness: None }))?;
 /// // a ball slides over the real surface, z = 0, in lines 1 mm apart
 /// for i in 0..8000_i64 {
 ///     let (line, along) = ((i / 800) as f64, (i % 800) as f64 * 0.0125e-3);
 ///     let x = if line % 2.0 == 0.0 { 5e-3 + along } else { 15e-3 - along };
 ///     let pose_ot = Isometry3::translation(x, 5e-3 + line * 1e-3, 1.5e-3);
 ///     let wrench = Wrench { force: Vector3::new(0.0, 0.0, 2.0), torque: Vector3::zeros() };
-///     patcher.push(&Sample { stamp_ns: i * 1_000_000, pose_ot, wrench });
+///     patcher.push(&contacts.observe(&Sample { stamp_ns: i * 1_000_000, pose_ot, wrench })?);
 /// }
 /// patcher.flush();
 /// let mesh = patcher.patched(&scan, &FaceTree::new(&scan))?.mesh;
@@ -182,7 +180,6 @@ impl PatcherParams {
 #[derive(Clone, Debug)]
 pub struct Patcher {
     params: PatcherParams,
-    compensator: Compensator,
     finder: TouchFinder,
     felt: TouchHistory,
     live: Option<LivePatch>,
@@ -242,7 +239,6 @@ impl Patcher {
         params.check()?;
         let radius = params.evidence.radius;
         Ok(Self {
-            compensator: Compensator::new(params.compensator)?,
             finder: TouchFinder::new(params.finder_params())?,
             felt: TouchHistory::new(
                 ContactMap::new(CONTACT_CELL * radius, params.evidence.field.reach, params.gate()),
@@ -267,8 +263,8 @@ impl Patcher {
 
     /// A copy of what was felt, without what was made of it for a mesh that follows.
     pub fn copy(&self) -> Self {
-        let Self { params, compensator, finder, felt, .. } = self;
-        Self { params: *params, compensator: *compensator, finder: finder.clone(), felt: felt.clone(), live: None }
+        let Self { params, finder, felt, .. } = self;
+        Self { params: *params, finder: finder.clone(), felt: felt.clone(), live: None }
     }
 
     /// The settings.
@@ -278,10 +274,9 @@ impl Patcher {
 
     /// Takes the next sample, which is later than the one before. What it says counts once the smoothing window around it
     /// is complete.
-    pub fn push(&mut self, sample: &Sample) {
-        let tip = self.compensator.compensate(sample);
+    pub fn push(&mut self, sample: &ContactSample) {
         let Self { finder, felt, params, .. } = self;
-        finder.push(&tip, |touch| keep(felt, params, &touch));
+        finder.push(sample, |touch| keep(felt, params, &touch));
     }
 
     /// The touches themselves, in order of time.

@@ -1,4 +1,4 @@
-//! From compensated tips to touches: where the ball really was, and what it touched there.
+//! From samples to touches: where the ball really was, and what it touched there.
 //!
 //! The patch follows a few tens of milliseconds behind the stream, so position and force are smoothed by a window that
 //! looks as far ahead as back: it does not lag. Its length follows from the noise: as long as the velocity needs, and no
@@ -10,8 +10,8 @@ use nalgebra::{Point3, Vector3};
 
 use super::contact_uncertainty::{CalibrationParams, ContactSigma, ForceNoise};
 use crate::touch::{
-    BiasParams, BiasTracker, ContactGate, ContactGateParams, FeltNormal, Friction, FrictionCoefficient, LocalMotion,
-    SettingError, Sliding, SmoothedMotion, Tip, TipBody, TipContact, TipPlace, TipShape,
+    ContactSample, FeltNormal, Friction, FrictionCoefficient, LocalMotion, SettingError, Sliding, SmoothedMotion,
+    TipBody, TipContact, TipPlace, TipShape, WIDEST_CONE_COSINE,
 };
 
 /// How touches are found.
@@ -23,15 +23,13 @@ pub struct TouchFinderParams {
     pub shape: TipShape,
     /// what stylus and probe give way under force, N/m; `None`: rigid
     pub stiffness: Option<f64>,
-    /// tells contact from free motion
-    pub gate: ContactGateParams,
     /// half of the longest smoothing window, ns. Default 32 ms: 0.2 mm of pose noise at 500 Hz then leaves the direction of
     /// 25 mm/s uncertain by 6°, which friction known from the stream turns into a normal within 1–2°.
     pub half_window_ns: i64,
     /// a pause longer than this parts the stream, ns. Default 30 ms.
     pub largest_gap_ns: i64,
     /// cosine of the widest friction cone believed; `None`: friction is not asked for, the normal is the force. Default
-    /// cos 24° (μ = 0.45, dry metal on metal).
+    /// [`WIDEST_CONE_COSINE`].
     pub cone_cosine: Option<f64>,
     /// a touch whose normal is uncertain by this much weighs half, rad. Default 5°: what curved pieces take for smooth.
     pub uncertain_normal: f64,
@@ -46,10 +44,9 @@ impl TouchFinderParams {
             radius,
             shape: TipShape::Ball,
             stiffness,
-            gate: ContactGateParams::default(),
             half_window_ns: 32_000_000,
             largest_gap_ns: 30_000_000,
-            cone_cosine: Some(0.9135),
+            cone_cosine: Some(WIDEST_CONE_COSINE),
             uncertain_normal: 5f64.to_radians(),
             calibration: None,
         }
@@ -93,13 +90,11 @@ struct WindowEntry {
     in_contact: bool,
 }
 
-/// Finds touches in a stream of tips.
+/// Finds touches in a stream of samples.
 #[derive(Clone, Debug)]
 pub struct TouchFinder {
     params: TouchFinderParams,
     body: TipBody,
-    gate: ContactGate,
-    bias: BiasTracker,
     friction: Option<Friction>,
     noise: PathNoise,
     shake: ForceNoise,
@@ -111,13 +106,11 @@ pub struct TouchFinder {
 
 impl TouchFinder {
     /// # Errors
-    /// [`SettingError`] of the gate and of the tip.
+    /// [`SettingError`] of the tip.
     pub fn new(params: TouchFinderParams) -> Result<Self, SettingError> {
         Ok(Self {
-            gate: ContactGate::new(params.gate)?,
             body: TipBody::new(params.shape, params.radius)?,
             params,
-            bias: BiasTracker::new(BiasParams { free: FREE_SHARE * params.gate.on, ..BiasParams::default() })?,
             friction: params.cone_cosine.map(|cosine| Friction::new(cosine.clamp(-1.0, 1.0).acos())),
             noise: PathNoise::default(),
             shake: ForceNoise::default(),
@@ -126,23 +119,21 @@ impl TouchFinder {
         })
     }
 
-    /// Takes the next tip, which is later than the one before; gives each touch whose window is complete to `each`.
-    pub fn push(&mut self, tip: &Tip, mut each: impl FnMut(TipTouch)) {
+    /// Takes the next sample, which is later than the one before; gives each touch whose window is complete to `each`.
+    pub fn push(&mut self, sample: &ContactSample, mut each: impl FnMut(TipTouch)) {
+        let tip = &sample.tip;
         if self.held.back().is_some_and(|last| tip.stamp_ns - last.stamp_ns > self.params.largest_gap_ns) {
             self.flush(&mut each);
         }
-        let force_o = self.bias.compensate(tip);
         if let Some(last) = self.held.back() {
-            self.shake.note(&last.force_o, &force_o);
+            self.shake.note(&last.force_o, &tip.force_o);
         }
-        let bend = self.params.stiffness.map_or_else(Vector3::zeros, |stiffness| force_o / stiffness);
-        let TipPlace { centre, axis } = TipPlace::from(&tip.pose_ot);
         self.held.push_back(WindowEntry {
             stamp_ns: tip.stamp_ns,
-            centre: centre + bend,
-            axis,
-            force_o,
-            in_contact: self.gate.update(tip.stamp_ns, &force_o).is_some(),
+            centre: sample.centre,
+            axis: TipPlace::from(&tip.pose_ot).axis,
+            force_o: tip.force_o,
+            in_contact: sample.is_in_contact(),
         });
         while self.held[self.next].stamp_ns + self.params.half_window_ns <= tip.stamp_ns {
             each(self.touch(self.next));
@@ -165,7 +156,7 @@ impl TouchFinder {
         self.next = 0;
     }
 
-    /// Kinetic friction as felt so far; `None` until the ball has slid far enough, or where friction is not asked for.
+    /// Kinetic friction as measured so far; `None` until the ball has slid far enough, or where friction is not asked for.
     pub fn friction(&self) -> Option<FrictionCoefficient> {
         self.friction.as_ref()?.coefficient()
     }
@@ -334,6 +325,3 @@ impl PathNoise {
         }
     }
 }
-
-/// Less than this from the bias is free air, as a share of the force that begins a contact.
-const FREE_SHARE: f64 = 0.75;

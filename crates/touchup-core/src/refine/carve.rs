@@ -5,9 +5,9 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::{Ball, CarveParams, Case, ContactState, Refiner, RegionFit, RoiSize, Update};
+use super::{CarveParams, Case, ContactState, Refiner, RegionFit, RoiSize, Update};
 use crate::mesh::{BoxQuery, FaceHit, FaceId, triangle};
-use crate::touch::{TipBody, TipPlace};
+use crate::touch::{Ball, TipBody, TipPlace};
 
 /// Faces beside the closest one that move in one update, at most: those of a ball on a scan as coarse as itself.
 const MOST_OTHERS: usize = 6;

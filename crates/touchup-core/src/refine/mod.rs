@@ -1,7 +1,6 @@
 //! The haptic update: one sample of pose and force moves the mesh.
 //!
-//! [`Refiner::push`] is the whole way: compensation, contact gate, closest face, face dynamics, deformation of the
-//! region around it, update of the tree. [`RefineParams::robust`] is what works on real scans, [`RefineParams::paper`]
+//! [`Refiner::push`] does all of it: contact, closest face, face dynamics, deformation of the region around it, update of the tree. [`RefineParams::robust`] is what works on real scans, [`RefineParams::paper`]
 //! the published rule.
 
 mod carve;
@@ -15,7 +14,6 @@ mod params;
 mod registration;
 mod ring;
 mod roi;
-mod sliding;
 mod strokes;
 
 use nalgebra::{Point3, Vector3};
@@ -26,22 +24,22 @@ pub use dynamics::{
     Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, SigmoidParams, StepRule,
 };
 pub use guard::GuardParams;
-pub use params::{CarveParams, ClosestBy, RefineParams, ScanParams, ScanRegion, TipParams, TouchPoint, relaxing_alpha};
+pub use params::{CarveParams, ClosestBy, RefineParams, ScanParams, ScanRegion, TouchPoint, relaxing_alpha};
 pub use registration::{Registrar, Registration, RegistrationError, RegistrationParams};
 pub use roi::RoiSize;
-pub use sliding::{Ball, SlidingParams, TipMotion};
+
+/// Of a stylus: part of [`RefineParams`].
+pub use crate::touch::{SlidingParams, TipParams};
 
 use crate::mesh::{Changes, FaceHit, FaceId, MeshError, Nearby, TriMesh, VertexId};
 use crate::patch::{PatchDelta, Support};
 use crate::touch::{
-    BiasTracker, Compensator, ContactGate, FrictionCoefficient, Sample, SampleError, SettingError, TipBody, TipPlace,
+    Ball, ContactEstimator, ContactSample, FrictionCoefficient, LONGEST_HOLD, Sample, SampleError, SettingError,
+    TipBody, TipPlace,
 };
 use carve::InsideScratch;
 use deform::{DeformableMesh, HandleRegion};
 use dynamics::turn;
-
-/// A held sample never acts for longer than this, s: what happened in a longer pause is not known.
-const LONGEST_HOLD: f64 = 0.03;
 
 /// The felt normal of one sample is uncertain by this, rad: a flat tip that may lie on its face does.
 const FLUSH: f64 = 0.05;
@@ -164,10 +162,9 @@ pub struct RefineCounts {
 #[derive(Clone, Debug)]
 pub struct Refiner {
     params: RefineParams,
-    compensator: Compensator,
-    bias: Option<BiasTracker>,
-    gate: Option<ContactGate>,
-    motion: TipMotion,
+    contacts: ContactEstimator,
+    /// that of the last sample
+    last: Option<ContactSample>,
     dynamics: FaceDynamics,
     deformable: DeformableMesh,
     contact_region: HandleRegion,
@@ -180,7 +177,6 @@ pub struct Refiner {
     /// from the tip to the handle, unit, in O; a ball needs none
     axis: Vector3<f64>,
     inside: InsideScratch,
-    last_ns: Option<i64>,
     /// the handle and n*(0), its normal when it became the handle (Eq 6)
     begun: Option<(FaceId, Vector3<f64>)>,
     counts: RefineCounts,
@@ -213,10 +209,8 @@ impl Refiner {
         deformable.largest_move =
             (params.largest_move_edges * deformable.mean_edge).max(params.largest_move_noises * params.scan_noise);
         Ok(Self {
-            compensator: Compensator::new(params.compensator)?,
-            bias: params.bias.map(BiasTracker::new).transpose()?,
-            gate: params.gate.map(ContactGate::new).transpose()?,
-            motion: TipMotion::new(params.sliding.unwrap_or_default(), params.tip),
+            contacts: ContactEstimator::new(params.contact())?,
+            last: None,
             dynamics: FaceDynamics::new(params.dynamics)?,
             contact_region: deformable.region(params.roi),
             carve_region: deformable.region(RoiSize::Handle),
@@ -226,7 +220,6 @@ impl Refiner {
             body: TipBody::new(params.shape, params.tip.radius)?,
             axis: Vector3::z(),
             inside: InsideScratch::new(),
-            last_ns: None,
             begun: None,
             counts: RefineCounts::default(),
             params,
@@ -255,23 +248,14 @@ impl Refiner {
     }
 
     fn take(&mut self, sample: &Sample, handle: Option<FaceId>) -> Result<Update, RefineError> {
-        sample.check()?;
-        let dt = sample.seconds_since(self.last_ns)?;
-        self.last_ns = Some(sample.stamp_ns);
+        let contact = self.contacts.observe(sample)?;
+        self.last = Some(contact);
         self.deformable.now_ns = sample.stamp_ns;
-        let mut tip = self.compensator.compensate(sample);
-        if let Some(bias) = &mut self.bias {
-            tip.force_o = bias.compensate(&tip);
-        }
-        let ball = match self.params.sliding {
-            Some(_) => self.motion.update(&tip, dt, LONGEST_HOLD),
-            None => self.motion.still(&tip),
-        };
         if !self.body.is_ball() {
-            self.axis = TipPlace::from(&tip.pose_ot).axis;
+            self.axis = TipPlace::from(&contact.tip.pose_ot).axis;
         }
-        let dt = dt.min(LONGEST_HOLD);
-        let felt = self.felt_normal(sample.stamp_ns, &ball, dt);
+        let (ball, dt) = (contact.ball, contact.dt.min(LONGEST_HOLD));
+        let felt = self.contact_state(&contact);
         if self.params.region.is_some_and(|touched| !touched.region.contains(&ball.centre)) {
             return Ok(self.pass(felt));
         }
@@ -301,21 +285,16 @@ impl Refiner {
         }
     }
 
-    fn felt_normal(&mut self, stamp_ns: i64, ball: &Ball, dt: f64) -> ContactState {
-        if let Some(gate) = &mut self.gate {
-            let contact = gate.update(stamp_ns, &ball.force_o).is_some();
-            self.counts.contacts = gate.contacts();
-            if !contact {
-                self.begun = None;
-                self.motion.lift();
-                return ContactState::Nothing;
-            }
+    fn contact_state(&mut self, sample: &ContactSample) -> ContactState {
+        self.counts.contacts = self.contacts.contacts();
+        if sample.ball_contact.is_none() {
+            self.begun = None;
+            return ContactState::Nothing;
         }
-        match (self.params.touch_point, self.params.sliding) {
-            (TouchPoint::FaceNormal, _) => ContactState::Something,
-            (TouchPoint::FeltNormal, Some(_)) => ContactState::Surface(self.motion.surface_normal(ball, dt)),
-            (TouchPoint::FeltNormal, None) => {
-                ContactState::Surface(ball.force_o.try_normalize(0.0).unwrap_or_default())
+        match self.params.touch_point {
+            TouchPoint::FaceNormal => ContactState::Something,
+            TouchPoint::FeltNormal => {
+                ContactState::Surface(sample.surface.map(|surface| surface.normal).unwrap_or_default())
             }
         }
     }
@@ -548,9 +527,14 @@ impl Refiner {
         &self.counts
     }
 
-    /// Kinetic friction as felt so far; `None` until the ball has slid far enough, or where friction is not asked for.
+    /// Kinetic friction as measured so far; `None` until the ball has slid far enough, or where friction is not asked for.
     pub fn friction(&self) -> Option<FrictionCoefficient> {
-        self.motion.friction()
+        self.contacts.friction()
+    }
+
+    /// What was decided about the contact of the last sample; `None` before the first.
+    pub fn contact(&self) -> Option<&ContactSample> {
+        self.last.as_ref()
     }
 
     /// The vertices that the last contact moved.

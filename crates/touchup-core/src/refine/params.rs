@@ -1,27 +1,13 @@
 //! The settings of a [`super::Refiner`], and the two presets.
 
-use nalgebra::{Point3, Vector3};
-
 use super::guard::GuardParams;
-use super::{Along, ContactModel, DynamicsParams, RoiSize, SlidingParams, StepRule};
+use super::{Along, ContactModel, DynamicsParams, RoiSize, StepRule};
 use crate::mesh::Region;
 use crate::parameters;
-use crate::touch::{BiasParams, CompensatorParams, ContactGateParams, SettingError, TipBody, TipShape};
-
-parameters! {
-    /// The ball at the end of stylus or probe: by default a 3 mm ruby ball on a usual stylus.
-    #[derive(Clone, Copy, Debug, PartialEq)]
-    pub struct TipParams in "tip" {
-        /// Radius of the ball, of the flat end, or of the nose of the cone.
-        ///
-        /// In m; 0 for a point.
-        radius: f64 = 1.5, "radius_mm" [MM, 0, 1000];
-        /// Stiffness of stylus and holder at the ball; left out: rigid.
-        ///
-        /// In N/m; `None` when rigid or not known.
-        stiffness: Option<f64> = Some(20.0), "stiffness_n_per_mm" [N_PER_MM, 0.001, 1e9, "leave it out for rigid"];
-    }
-}
+use crate::touch::{
+    BiasParams, CompensatorParams, ContactEstimatorParams, ContactGateParams, SettingError, SlidingParams, TipBody,
+    TipParams, TipShape,
+};
 
 parameters! {
     /// How good a scan is.
@@ -31,13 +17,6 @@ parameters! {
         ///
         /// In m. A consumer depth camera at half a metre.
         noise: f64 = 0.6, "noise_mm" [MM, 0, 1000];
-    }
-}
-
-impl TipParams {
-    /// Where the ball really is, m: the pose is that of a rigid stylus, and the force F bends it back by F/k.
-    pub fn centre(&self, reported: &Point3<f64>, force_o: &Vector3<f64>) -> Point3<f64> {
-        self.stiffness.map_or(*reported, |stiffness| reported + force_o / stiffness)
     }
 }
 
@@ -215,6 +194,12 @@ impl RefineParams {
             largest_move_edges: f64::MAX,
             ..Self::robust(tip)
         }
+    }
+
+    /// How contact is decided.
+    pub fn contact(&self) -> ContactEstimatorParams {
+        let &Self { compensator, bias, gate, tip, sliding, .. } = self;
+        ContactEstimatorParams { compensator, bias, gate, tip, sliding }
     }
 
     /// # Errors

@@ -6,7 +6,7 @@
 
 use nalgebra::Vector3;
 
-use super::{SettingError, Tip};
+use super::{ContactGateParams, SettingError, Tip};
 use crate::parameters;
 
 parameters! {
@@ -26,6 +26,16 @@ parameters! {
         ///
         /// In s. A noise of 0.05 N at 1 kHz becomes 2 mN, and a drift of 10 mN/s is followed 3 mN behind.
         time: f64 = 0.3, "time_s" [S, 1e-6, 1e6];
+    }
+}
+
+/// Free air ends at this share of the force that begins a contact.
+const FREE_SHARE: f64 = 0.75;
+
+impl BiasParams {
+    /// The defaults, with free air well below the onset of a contact.
+    pub fn below(gate: &ContactGateParams) -> Self {
+        Self { free: FREE_SHARE * gate.on, ..Self::default() }
     }
 }
 

@@ -10,15 +10,13 @@ use std::collections::VecDeque;
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 use serde::Serialize;
 
-use super::{ContactGate, ContactGateParams, SettingError, Tip};
+use super::{ContactSample, SettingError};
 
 /// Settings of a [`ClockEstimator`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ClockParams {
     /// What stylus and probe give way under force, N/m; `None`: rigid.
     pub stiffness: Option<f64>,
-    /// Tells contact from free motion.
-    pub gate: ContactGateParams,
 }
 
 /// What the clock of the wrench reads beyond that of the pose.
@@ -63,7 +61,7 @@ const LARGEST_SIGMA: f64 = 3e-3;
 #[derive(Clone, Debug)]
 pub struct ClockEstimator {
     params: ClockParams,
-    gate: ContactGate,
+    is_in_contact: bool,
     held: VecDeque<OnsetEntry>,
     /// stamp at which contact began or ended last, and the onset that waits for its samples
     turned_ns: Option<i64>,
@@ -85,19 +83,19 @@ type Profile = [f64; DELAYS];
 
 impl ClockEstimator {
     /// # Errors
-    /// [`SettingError`] of the gate, and for a stiffness of no use.
+    /// [`SettingError`] for a stiffness of no use.
     pub fn new(params: ClockParams) -> Result<Self, SettingError> {
         let stiffness = params.stiffness.unwrap_or(1.0);
         SettingError::check("tip stiffness (N/m)", stiffness, stiffness > 0.0, "more than 0")?;
-        let gate = ContactGate::new(params.gate)?;
         let held = VecDeque::with_capacity(MOST_SAMPLES);
-        Ok(Self { params, gate, held, turned_ns: None, onset_ns: None, period: 0.0, onsets: VecDeque::new() })
+        let onsets = VecDeque::new();
+        Ok(Self { params, is_in_contact: false, held, turned_ns: None, onset_ns: None, period: 0.0, onsets })
     }
 
-    /// Takes the next tip, which is later than the one before.
-    pub fn push(&mut self, tip: &Tip) {
-        let was_in_contact = self.gate.is_in_contact();
-        let is_in_contact = self.gate.update(tip.stamp_ns, &tip.force_o).is_some();
+    /// Takes the next sample, which is later than the one before.
+    pub fn push(&mut self, sample: &ContactSample) {
+        let (tip, is_in_contact) = (&sample.tip, sample.is_in_contact());
+        let was_in_contact = std::mem::replace(&mut self.is_in_contact, is_in_contact);
         if self.held.len() == MOST_SAMPLES {
             self.held.pop_front();
         }

@@ -1,4 +1,4 @@
-//! Is the stylus in contact? A gate on the felt force, with hysteresis.
+//! Is the stylus in contact? A gate on the measured force, with hysteresis.
 
 use nalgebra::Vector3;
 
@@ -39,7 +39,7 @@ pub struct Contact {
     pub onset_ns: i64,
 }
 
-/// Tells contact from free motion by |F|: on above one threshold, off below a lower one.
+/// Separates contact from free motion by |F|: on above one threshold, off below a lower one.
 ///
 /// Without it the expected force of a hovering stylus (f(0) > 0) would push the mesh away for ever.
 #[derive(Clone, Debug)]
@@ -72,11 +72,6 @@ impl ContactGate {
             _ => None,
         };
         self.contact
-    }
-
-    /// Whether a contact is going on.
-    pub fn is_in_contact(&self) -> bool {
-        self.contact.is_some()
     }
 
     /// How many contacts have begun.

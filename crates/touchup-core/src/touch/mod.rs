@@ -2,14 +2,16 @@
 //!
 //! [`MarkerFilter`] makes the pose of the markers on the stylus, [`Placement`] brings it to the ball and into the frame of
 //! the scan, [`Synchroniser`] brings the two streams to one instant,
-//! [`Compensator`] takes weight and bias off and turns the force into the frame of the object, [`BiasTracker`] follows
-//! what drifts, [`ContactGate`] says whether the stylus touches, [`TipBody`] with which of its points. [`LocalMotion`] and [`Friction`] say how the ball slides
-//! and which way the surface under it faces.
+//! [`ContactEstimator`] makes of each sample, once for all who use it, one [`ContactSample`]: [`Compensator`] takes weight and bias off and
+//! turns the force into the frame of the object, [`BiasTracker`] follows what drifts, [`ContactGate`] decides whether the stylus touches,
+//! [`TipMotion`] and [`Friction`] how the ball slides and how the surface under it is oriented. [`TipBody`] finds the point of the tip that
+//! touches, [`LocalMotion`] the motion around one instant.
 
 mod bias;
 mod clock;
 mod compensate;
 mod contact;
+mod contact_estimator;
 mod friction;
 mod local_motion;
 mod markers;
@@ -17,13 +19,15 @@ mod placement;
 mod probed;
 mod stream;
 mod sync;
+mod tip_motion;
 mod tip_shape;
 
 pub use bias::{BiasParams, BiasTracker};
 pub use clock::{ClockEstimator, ClockOffset, ClockParams};
 pub use compensate::{Compensator, CompensatorParams, Payload, SensorBias, SensorMount, Tip, WrenchFrame};
 pub use contact::{Contact, ContactGate, ContactGateParams, STROKE_PAUSE_NS};
-pub use friction::{FeltNormal, Friction, FrictionCoefficient, Sliding};
+pub use contact_estimator::{ContactEstimator, ContactEstimatorParams, ContactSample, LONGEST_HOLD};
+pub use friction::{FeltNormal, Friction, FrictionCoefficient, Sliding, WIDEST_CONE_COSINE};
 pub use local_motion::{LocalMotion, SmoothedMotion};
 pub use markers::{
     MOST_MARKERS, MarkerBody, MarkerCounts, MarkerFilter, MarkerFrame, MarkerParams, SeenMarker, SpringParams, Tracking,
@@ -31,6 +35,7 @@ pub use markers::{
 pub use placement::Placement;
 pub use probed::ProbedPoint;
 pub use sync::{SyncCounts, SyncParams, Synchroniser};
+pub use tip_motion::{Ball, SlidingParams, TipMotion, TipParams};
 pub use tip_shape::{TipBody, TipContact, TipPlace, TipShape, TipSizes};
 
 pub use crate::parameters::SettingError;

@@ -15,9 +15,10 @@ use crate::Spread;
 use touchup_core::features::detect;
 use touchup_core::mesh::{FaceId, FaceTree, Nearby, RefitPlan, TriMesh};
 use touchup_core::patch::Patcher;
-use touchup_core::refine::{FaceDynamics, FaceState, TipMotion};
+use touchup_core::refine::{FaceDynamics, FaceState};
 use touchup_core::touch::{
-    BiasTracker, Compensator, ContactGate, Message, Sample, StampedPose, StampedWrench, Synchroniser, Tip, WrenchFrame,
+    BiasTracker, Compensator, ContactEstimator, ContactEstimatorParams, ContactGate, ContactSample, Message, Sample,
+    StampedPose, StampedWrench, Synchroniser, Tip, TipMotion, TipParams, WrenchFrame,
 };
 use touchup_io::recording::{RecordingWriter, Topics};
 use touchup_session::scene::Scene;
@@ -59,6 +60,13 @@ fn messages(sample: &Sample) -> [Message; 2] {
     [Message::Pose(StampedPose { stamp_ns, pose_ot }), Message::Wrench(StampedWrench { stamp_ns, wrench })]
 }
 
+/// What is decided about the contact of each.
+fn contacts_of(samples: &[Sample], tip: TipParams) -> Result<Vec<ContactSample>, CostError> {
+    let mut estimator = ContactEstimator::new(ContactEstimatorParams::new(tip))?;
+    let observe = |sample| estimator.observe(sample).map_err(touchup_core::refine::RefineError::from);
+    Ok(samples.iter().map(observe).collect::<Result<_, _>>()?)
+}
+
 /// Times every stage that can be called by itself, on a scan of edges of 1 mm.
 pub(super) fn stage_costs(faces: usize, timing: Timing) -> Result<Vec<StageCost>, CostError> {
     let side = side_of(faces);
@@ -70,6 +78,7 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> Result<Vec<StageCost>
 
     let plain = Compensator::new(params.compensator)?;
     let tips: Vec<Tip> = samples.iter().map(|sample| plain.compensate(sample)).collect();
+    let contacts = contacts_of(&samples, params.tip)?;
     let points: Vec<_> = samples.iter().map(touching).collect();
     let mut sync = Synchroniser::new(scene.sync_params())?;
     let mut bias = BiasTracker::new(Default::default())?;
@@ -77,7 +86,7 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> Result<Vec<StageCost>
     let mut motion = TipMotion::new(params.sliding.unwrap_or_default(), params.tip);
     let dynamics = FaceDynamics::new(params.dynamics).map_err(touchup_core::refine::RefineError::from)?;
     let mut writer = RecordingWriter::new(Cursor::new(Vec::new()), &Topics::default(), "object", "stylus")?;
-    let mut patcher = Patcher::new(scene.patcher_params(WrenchFrame::Sensor).ok_or(CostError::NothingMoves)?)?;
+    let mut patcher = Patcher::new(scene.patcher_params().ok_or(CostError::NothingMoves)?)?;
     let (mut last, mut nearby, mut moving) = (None, Nearby::default(), Moving::new(&mesh));
     let face = FaceState { b: Point3::origin(), n: Vector3::z() };
 
@@ -149,7 +158,7 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> Result<Vec<StageCost>
             Ok(())
         }),
         TimedWay::new("patch: touches found and kept", |block| {
-            samples[block].iter().for_each(|sample| patcher.push(sample));
+            contacts[block].iter().for_each(|contact| patcher.push(contact));
             Ok(())
         }),
     ];
@@ -197,14 +206,15 @@ pub(super) fn seldom_costs(faces: usize, repeats: usize) -> Result<Vec<SeldomCos
     let faces = mesh.face_count();
     let scene = Scene::default();
     let samples = samples_on(side, 1000 + RENEWAL * repeats);
-    let patcher = Patcher::new(scene.patcher_params(WrenchFrame::Sensor).ok_or(CostError::NothingMoves)?)?;
+    let patcher = Patcher::new(scene.patcher_params().ok_or(CostError::NothingMoves)?)?;
     let patcher = RefCell::new(patcher);
     // the first renewal takes in all that came before
-    samples[..1000].iter().for_each(|sample| patcher.borrow_mut().push(sample));
+    let contacts = contacts_of(&samples, scene.tip_params())?;
+    contacts[..1000].iter().for_each(|contact| patcher.borrow_mut().push(contact));
     black_box(patcher.borrow_mut().renewed(&mesh, &tree));
     let renewals = (0..repeats).map(|i| {
         let first = 1000 + i * RENEWAL;
-        samples[first..first + RENEWAL].iter().for_each(|sample| patcher.borrow_mut().push(sample));
+        contacts[first..first + RENEWAL].iter().for_each(|contact| patcher.borrow_mut().push(contact));
         let started = Instant::now();
         black_box(patcher.borrow_mut().renewed(&mesh, &tree));
         started.elapsed().as_secs_f64() * 1e3

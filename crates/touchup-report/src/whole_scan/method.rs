@@ -1,4 +1,4 @@
-//! The ways in which a scan is refined, and how long each takes.
+//! The methods by which a scan is refined, and how long each takes.
 
 use std::time::{Duration, Instant};
 
@@ -9,8 +9,9 @@ use super::contact_points::ContactSculptor;
 use super::gaussian::{GaussianParams, GaussianSurface};
 use super::part::Part;
 use touchup_core::mesh::{FaceTree, TriMesh};
-use touchup_core::patch::{Patcher, PatcherParams};
-use touchup_core::refine::{RefineParams, Refiner, RoiSize, StepRule};
+use touchup_core::patch::PatcherParams;
+use touchup_core::refine::{RefineParams, RoiSize, StepRule};
+use touchup_session::live::{Engine, Renewal};
 
 /// Standard deviation of a contact point for the Gaussian process, m: that of a good tracking system.
 const CONTACT_NOISE: f64 = 0.05e-3;
@@ -29,7 +30,7 @@ pub enum Reach {
     TipRadii(f64),
 }
 
-/// A way to refine a scan by touch.
+/// A method that refines a scan by touch.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RefineMethod {
@@ -115,21 +116,26 @@ pub(super) struct Run {
     pub each: Vec<f64>,
 }
 
-/// Refines `scan` in one way.
-pub(super) fn run(way: RefineMethod, part: &Part, scan: &TriMesh, bounds: &RunLimits) -> Result<Run, WholeScanError> {
-    match way {
+/// Refines `scan` by one method.
+pub(super) fn run(
+    method: RefineMethod,
+    part: &Part,
+    scan: &TriMesh,
+    bounds: &RunLimits,
+) -> Result<Run, WholeScanError> {
+    match method {
         RefineMethod::ContactPoints => Ok(sculpt(part, scan, bounds)),
         RefineMethod::GaussianProcess => Ok(fit_gaussian(part, scan, bounds)),
-        _ => refine(way, part, scan, bounds),
+        _ => refine(method, part, scan, bounds),
     }
 }
 
-fn params(way: RefineMethod, part: &Part) -> RefineParams {
-    let mut params = match way {
+fn params(method: RefineMethod, part: &Part) -> RefineParams {
+    let mut params = match method {
         RefineMethod::PaperOde45 | RefineMethod::PaperLie => RefineParams::paper(part.tip),
         _ => RefineParams::robust(part.tip),
     };
-    match way {
+    match method {
         RefineMethod::PaperOde45 => params.dynamics.rule = StepRule::DormandPrince,
         RefineMethod::Robust(Reach::Handle) => params.roi = RoiSize::Handle,
         RefineMethod::Robust(Reach::OneRing) => params.roi = RoiSize::OneRing,
@@ -140,18 +146,13 @@ fn params(way: RefineMethod, part: &Part) -> RefineParams {
     params
 }
 
-fn patcher(part: &Part) -> Result<Patcher, WholeScanError> {
-    let mut params = PatcherParams::new(part.tip.radius, part.tip.stiffness, part.scan_noise);
-    params.compensator = part.compensator;
-    Ok(Patcher::new(params)?)
-}
-
-/// The haptic update, with the patch where the way has one.
-fn refine(way: RefineMethod, part: &Part, scan: &TriMesh, bounds: &RunLimits) -> Result<Run, WholeScanError> {
+/// The haptic update, with the patch where the method has one.
+fn refine(method: RefineMethod, part: &Part, scan: &TriMesh, bounds: &RunLimits) -> Result<Run, WholeScanError> {
     let copy = scan.clone();
     let begun = Instant::now();
-    let mut refiner = Refiner::new(copy, params(way, part))?;
-    let mut patcher = if way == RefineMethod::Patch { Some(patcher(part)?) } else { None };
+    let patch = (method == RefineMethod::Patch)
+        .then(|| PatcherParams::new(part.tip.radius, part.tip.stiffness, part.scan_noise));
+    let mut engine = Engine::new(copy, params(method, part), patch, Renewal::AtEnd)?;
     let built = Instant::now();
     let (mut given, mut refused, mut why) = (0, 0, None);
     for sample in &part.samples {
@@ -159,19 +160,17 @@ fn refine(way: RefineMethod, part: &Part, scan: &TriMesh, bounds: &RunLimits) ->
             break;
         }
         given += 1;
-        match refiner.push(sample) {
-            Ok(_) => patcher.iter_mut().for_each(|patcher| patcher.push(sample)),
-            Err(error) => {
-                refused += 1;
-                why.get_or_insert_with(|| error.to_string());
-            }
+        if let Err(error) = engine.push(sample) {
+            refused += 1;
+            why.get_or_insert_with(|| error.to_string());
         }
     }
     let pushed = Instant::now();
+    let (refiner, patcher) = engine.finish()?;
     let counts = *refiner.counts();
-    let mesh = match &mut patcher {
+    let mesh = match patcher {
         None => refiner.into_mesh(),
-        Some(patcher) => {
+        Some(mut patcher) => {
             patcher.flush();
             patcher.patched(scan, &FaceTree::new(scan))?.mesh
         }

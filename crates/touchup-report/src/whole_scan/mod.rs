@@ -28,8 +28,8 @@ use super::convergence::straight_line;
 use super::{Effort, Spread};
 use touchup_core::compare::CompareError;
 use touchup_core::mesh::{MeshError, TriMesh};
-use touchup_core::refine::RefineError;
 use touchup_core::touch::SettingError;
+use touchup_session::live::LiveError;
 use touchup_sim::SimError;
 
 /// Why whole scans were not measured.
@@ -41,9 +41,9 @@ pub enum WholeScanError {
     /// A setting of what was given.
     #[error(transparent)]
     Setting(#[from] SettingError),
-    /// A refiner that could not be built.
+    /// An engine that could not be built.
     #[error(transparent)]
-    Refine(#[from] RefineError),
+    Engine(#[from] LiveError),
     /// A patch that is too large.
     #[error(transparent)]
     Mesh(#[from] MeshError),

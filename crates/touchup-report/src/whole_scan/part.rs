@@ -8,7 +8,7 @@ use touchup_core::compare::TouchedRegion;
 use touchup_core::mesh::{FaceTree, TriMesh};
 use touchup_core::refine::TipParams;
 use touchup_core::touch::{
-    Compensator, CompensatorParams, ContactGate, ContactGateParams, Sample, SyncParams, Synchroniser,
+    CompensatorParams, ContactEstimator, ContactEstimatorParams, ContactGateParams, Sample, SyncParams, Synchroniser,
 };
 use touchup_sim::{
     Lines, PathParams, Peaks, Plate, RasterRegion, ScannerParams, Stroke, StylusParams, Surface, add_vertex_noise,
@@ -160,17 +160,14 @@ impl Part {
     fn new(given: Given, others: Vec<TriMesh>) -> Result<Self, WholeScanError> {
         let Given { name, scan, truth, samples, tip, compensator, scan_noise } = given;
         let tree = FaceTree::new(&truth);
-        let (compensate, mut gate) = (Compensator::new(compensator)?, ContactGate::new(ContactGateParams::default())?);
+        let gate = Some(ContactGateParams::default());
+        let mut estimator =
+            ContactEstimator::new(ContactEstimatorParams { compensator, bias: None, gate, tip, sliding: None })?;
         let (mut contacts, mut touched) = (Vec::new(), Vec::new());
-        for sample in samples.iter().filter(|sample| sample.check().is_ok()) {
-            let felt = compensate.compensate(sample);
-            let Some(normal) = felt.force_o.try_normalize(0.0) else { continue };
-            if gate.update(felt.stamp_ns, &felt.force_o).is_none() {
-                continue;
-            }
-            let reported = Point3::from(felt.pose_ot.translation.vector);
-            let centre = tip.centre(&reported, &felt.force_o);
-            contacts.push(FeltContact { reported, point: centre - tip.radius * normal });
+        for sample in samples.iter().filter_map(|sample| estimator.observe(sample).ok()) {
+            let (centre, Some(surface)) = (sample.centre, sample.surface) else { continue };
+            let reported = Point3::from(sample.tip.pose_ot.translation.vector);
+            contacts.push(FeltContact { reported, point: centre - tip.radius * surface.normal });
             touched.extend(tree.closest(&truth, &centre, tip.radius + ON_PART).map(|hit| hit.point));
         }
         let region = TouchedRegion::of(touched);

@@ -1,27 +1,28 @@
-//! Two rates: the haptic update answers every sample at once, the patch follows beside it on a thread of its own.
+//! The engine of a session: the haptic update answers every sample at once, the reconstruction (the patch) follows at its own rate.
 //!
-//! When the patch is renewed, and at which sample its change is taken up, follows from the stamps alone, as long as its thread
-//! keeps up. Where that is late the samples go on, and the next renewal takes in all that came meanwhile: the mesh shows a
-//! touch later, and what comes out at the end is the same, as it is made of all touches at once. With [`Pace::is_patient`]
-//! [`LiveRefiner::push`] waits instead, and the mesh at each sample is the same on every machine.
+//! [`Engine`] is all of it, for the node, the command line and the report alike; [`Renewal`] says when the patch is made: once at the end,
+//! or again and again on a thread of its own. Then the stamps alone decide when it is renewed and at which sample its change is taken up,
+//! as long as the thread keeps up. Where the thread is late the samples go on, and the next renewal takes in all that came meanwhile: the
+//! mesh shows a touch later, and the result at the end is the same, as it is made of all touches at once. With [`Pace::is_patient`]
+//! [`Engine::push`] waits instead, and the mesh at each sample is the same on every machine.
 
 mod gate;
 mod latency;
 mod probed;
+mod renewals;
 mod worker;
 
-use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, sync_channel};
 
 pub use gate::{Gate, GateKeeper};
 pub use latency::{Latencies, Quantiles};
 pub use probed::TouchDelta;
-use touchup_core::mesh::{Changes, FaceTree, TriMesh};
-use touchup_core::patch::{PatchDelta, Patcher};
-use touchup_core::refine::{RefineError, Refiner, Update};
-use touchup_core::touch::{Sample, SettingError};
-use worker::{Question, Worker, WorkerAnswer};
+use renewals::Renewals;
+use touchup_core::mesh::{Changes, FaceTree, TriMesh, VertexId};
+use touchup_core::patch::{Patcher, PatcherParams, Support};
+use touchup_core::refine::{RefineError, RefineParams, Refiner, Update};
+use touchup_core::touch::{BiasParams, Sample, SettingError};
 
 /// Why a sample was not taken.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -66,13 +67,6 @@ impl Pace {
     }
 }
 
-/// Parts of a change of the patch that are taken up at one sample: some 50 µs on a mesh of a million faces.
-const AT_ONCE: usize = 40;
-
-/// Renewals that are asked for and not taken up at most, where samples do not wait: one that the thread works at, and one for
-/// it to go on with.
-const MOST_OPEN: usize = 2;
-
 /// How far the patch was behind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LiveCounts {
@@ -82,149 +76,112 @@ pub struct LiveCounts {
     pub late: u64,
 }
 
-/// Refines a scan by touch, sample by sample, with the patch beside it.
-#[derive(Debug)]
-pub struct LiveRefiner {
-    refiner: Refiner,
-    worker: Worker,
-    pace: Pace,
-    /// samples since the last renewal
-    batch: Vec<Sample>,
-    /// number of the time between two renewals in which the last sample lies
-    slot: Option<i64>,
-    /// when the changes that were asked for are to be taken up, ns
-    due_ns: VecDeque<i64>,
-    /// the change that was taken up last …
-    delta: PatchDelta,
-    /// … and whether all of it is in the mesh
-    is_done: bool,
-    /// whether the change that is due is known to be late
-    is_late: bool,
-    /// touches that nobody asked for yet
-    probed: TouchDelta,
-    counts: LiveCounts,
+/// When the patch of an [`Engine`] is made.
+#[derive(Clone, Debug)]
+pub enum Renewal {
+    /// once, of all touches, by who [`Engine::finish`]es
+    AtEnd,
+    /// again and again, on a thread of its own
+    Beside {
+        /// the scan as it came, with the tree over its faces
+        scan: Arc<(TriMesh, FaceTree)>,
+        /// when, in time of the samples
+        pace: Pace,
+        /// for so many new faces memory is taken at the start; more are taken in all the same, with a pause
+        room: usize,
+        /// what each renewal passes
+        gate: Gate,
+    },
 }
 
-impl LiveRefiner {
-    /// Puts the two side by side; starts the thread.
+/// Refines a scan by touch, sample by sample, with or without a patch.
+#[derive(Debug)]
+pub struct Engine {
+    refiner: Refiner,
+    patch: Reconstruction,
+}
+
+#[derive(Debug)]
+enum Reconstruction {
+    Without,
+    AtEnd(Box<Patcher>),
+    Beside(Box<Renewals>),
+}
+
+impl Engine {
+    /// Nothing touched yet. Where a patch needs the slow drift of the sensor and `refine` names no settings for it, it is followed by
+    /// those that [`BiasParams::below`] the contact threshold has, for patch and haptic update alike.
     ///
-    /// - `scan`: as it came, with the tree over its faces; `refiner` was made of the same.
-    /// - `room`: for so many new faces memory is taken now; more are taken in all the same, with a pause.
+    /// - `mesh`: the scan as it came.
+    /// - `patch`: `None`: the haptic update alone; `renewal` is of no use then.
     ///
     /// # Errors
-    /// [`LiveError::Setting`], [`LiveError::Refine`] where memory is short, [`LiveError::NoThread`].
+    /// [`LiveError::Setting`], [`LiveError::Refine`] for settings and where memory is short, [`LiveError::NoThread`].
     pub fn new(
-        scan: Arc<(TriMesh, FaceTree)>,
-        refiner: Refiner,
-        patcher: Patcher,
-        pace: Pace,
-        room: usize,
+        mesh: TriMesh,
+        mut refine: RefineParams,
+        patch: Option<PatcherParams>,
+        renewal: Renewal,
     ) -> Result<Self, LiveError> {
-        Self::behind(Gate::default(), scan, refiner, patcher, pace, room)
+        if patch.is_some() {
+            refine.bias = refine.bias.or(refine.gate.as_ref().map(BiasParams::below));
+        }
+        let mut refiner = Refiner::new(mesh, refine)?;
+        let patch = match (patch.map(Patcher::new).transpose()?, renewal) {
+            (None, _) => Reconstruction::Without,
+            (Some(patcher), Renewal::AtEnd) => Reconstruction::AtEnd(Box::new(patcher)),
+            (Some(patcher), Renewal::Beside { scan, pace, room, gate }) => {
+                refiner.expect_patch(room)?;
+                Reconstruction::Beside(Box::new(Renewals::new(scan, patcher, pace, gate)?))
+            }
+        };
+        Ok(Self { refiner, patch })
     }
 
-    /// As [`Self::new`], where each renewal passes a gate.
-    ///
-    /// # Errors
-    /// As there.
-    pub fn behind(
-        gate: Gate,
-        scan: Arc<(TriMesh, FaceTree)>,
-        mut refiner: Refiner,
-        patcher: Patcher,
-        pace: Pace,
-        room: usize,
-    ) -> Result<Self, LiveError> {
-        pace.check()?;
-        refiner.expect_patch(room)?;
-        Ok(Self {
-            refiner,
-            worker: Worker::new(scan, patcher, gate)?,
-            pace,
-            batch: Vec::new(),
-            slot: None,
-            due_ns: VecDeque::new(),
-            delta: PatchDelta::default(),
-            is_done: true,
-            is_late: false,
-            probed: TouchDelta::default(),
-            counts: LiveCounts::default(),
-        })
-    }
-
-    /// Takes the next sample and moves the mesh by what it tells, then by what the patch has found that is due by now.
+    /// Takes the next sample and moves the mesh by it, then by the change of the patch that is due.
     ///
     /// # Errors
     /// Those of [`Refiner::push`], by which nothing is changed, and [`LiveError::Stopped`].
     pub fn push(&mut self, sample: &Sample) -> Result<Update, LiveError> {
         let update = self.refiner.push(sample)?;
-        let slot = sample.stamp_ns.div_euclid(self.pace.every_ns);
-        let has_begun = self.slot.replace(slot).is_some_and(|before| slot > before);
-        if has_begun && (self.pace.is_patient || self.due_ns.len() < MOST_OPEN) {
-            self.ask(slot.saturating_mul(self.pace.every_ns).saturating_add(self.pace.after_ns))?;
+        if let Some(contact) = self.refiner.contact().copied() {
+            match &mut self.patch {
+                Reconstruction::Without => {}
+                Reconstruction::AtEnd(patcher) => patcher.push(&contact),
+                Reconstruction::Beside(renewals) => renewals.push(&mut self.refiner, contact)?,
+            }
         }
-        self.batch.push(*sample);
-        if self.is_done && self.due_ns.front().is_some_and(|&due_ns| due_ns <= sample.stamp_ns) {
-            self.take_up_due()?;
-        }
-        self.go_on(AT_ONCE)?;
         Ok(update)
     }
 
-    /// Takes up the change that is due, if it is there or samples wait for it.
-    fn take_up_due(&mut self) -> Result<(), LiveError> {
-        let there = self.worker.answer_if_there()?;
-        if there.is_none() && !std::mem::replace(&mut self.is_late, true) {
-            self.counts.late += 1;
-        }
-        let answer = match there {
-            None if self.pace.is_patient => self.worker.answer()?,
-            None => return Ok(()),
-            Some(answer) => answer,
-        };
-        self.take_up(answer);
-        Ok(())
-    }
-
-    /// Takes up some more of the change at hand.
-    fn go_on(&mut self, most: usize) -> Result<(), LiveError> {
-        if !self.is_done {
-            self.is_done = self.refiner.go_on_following(&self.delta, most)?;
-        }
-        Ok(())
-    }
-
-    /// To be called now and then while no sample comes: takes up some more of what the patch has made, and hands it the samples that
-    /// it does not know yet. Never waits.
+    /// To be called now and then while no sample comes: takes up some more of what the patch has made, and hands it the samples
+    /// that it does not know yet. Never waits.
     ///
     /// # Errors
     /// [`LiveError::Stopped`], [`LiveError::Refine`].
     pub fn rest(&mut self) -> Result<(), LiveError> {
-        self.go_on(AT_ONCE)?;
-        if !self.is_done {
-            return Ok(());
+        match &mut self.patch {
+            Reconstruction::Beside(renewals) => renewals.rest(&mut self.refiner),
+            _ => Ok(()),
         }
-        if let Some(answer) = self.worker.answer_if_there()? {
-            self.take_up(answer);
-        } else if !self.batch.is_empty() && self.due_ns.len() < MOST_OPEN {
-            self.ask(i64::MIN)?;
-        }
-        Ok(())
     }
 
-    /// Waits until the patch knows all samples so far, as after a pause.
+    /// Waits until the mesh shows a patch of all samples so far, as after a pause; does nothing where the patch is made at the end.
     ///
     /// # Errors
     /// [`LiveError::Stopped`], [`LiveError::Refine`].
     pub fn catch_up(&mut self) -> Result<(), LiveError> {
-        self.ask(i64::MAX)?;
-        // the second time for what was taken in only nearby
-        for _ in 0..2 {
-            self.worker.ask(Question::Flush)?;
-            self.due_ns.push_back(i64::MAX);
+        match &mut self.patch {
+            Reconstruction::Beside(renewals) => renewals.catch_up(&mut self.refiner),
+            _ => Ok(()),
         }
-        self.take_up_all()?;
-        Ok(())
+    }
+
+    /// Keeps what it takes to undo strokes from here on; a patch keeps it in any case.
+    pub fn keep_strokes(&mut self) {
+        if matches!(self.patch, Reconstruction::Without) {
+            self.refiner.keep_strokes();
+        }
     }
 
     /// Takes the last stroke back, as [`Patcher::undo`], and waits until the mesh is that of the patch before it. Returns
@@ -233,7 +190,11 @@ impl LiveRefiner {
     /// # Errors
     /// As [`Self::catch_up`].
     pub fn undo(&mut self) -> Result<bool, LiveError> {
-        self.change_strokes(Question::Undo)
+        match &mut self.patch {
+            Reconstruction::Without => Ok(self.refiner.undo()),
+            Reconstruction::AtEnd(patcher) => Ok(patcher.undo()),
+            Reconstruction::Beside(renewals) => renewals.undo(&mut self.refiner),
+        }
     }
 
     /// Does again what was undone last, as [`Patcher::redo`]. Returns whether there was anything.
@@ -241,61 +202,35 @@ impl LiveRefiner {
     /// # Errors
     /// As [`Self::catch_up`].
     pub fn redo(&mut self) -> Result<bool, LiveError> {
-        self.change_strokes(Question::Redo)
-    }
-
-    fn change_strokes(&mut self, question: Question) -> Result<bool, LiveError> {
-        self.catch_up()?;
-        self.worker.ask(question)?;
-        self.due_ns.push_back(i64::MAX);
-        self.take_up_all()
-    }
-
-    /// Hands the samples over, for a change that is to be taken up at `due_ns`.
-    fn ask(&mut self, due_ns: i64) -> Result<(), LiveError> {
-        let batch = std::mem::replace(&mut self.batch, self.worker.empty_batch());
-        self.worker.ask(Question::Renew(batch))?;
-        self.due_ns.push_back(due_ns);
-        Ok(())
-    }
-
-    /// Takes up all changes that were asked for, as a whole; whether the last one was one of strokes.
-    fn take_up_all(&mut self) -> Result<bool, LiveError> {
-        self.go_on(usize::MAX)?;
-        let mut has_changed_strokes = false;
-        while !self.due_ns.is_empty() {
-            let answer = self.worker.answer()?;
-            has_changed_strokes = answer.has_changed_strokes;
-            self.take_up(answer);
-            self.go_on(usize::MAX)?;
+        match &mut self.patch {
+            Reconstruction::Without => Ok(self.refiner.redo()),
+            Reconstruction::AtEnd(patcher) => Ok(patcher.redo()),
+            Reconstruction::Beside(renewals) => renewals.redo(&mut self.refiner),
         }
-        Ok(has_changed_strokes)
-    }
-
-    fn take_up(&mut self, WorkerAnswer { delta, probed, .. }: WorkerAnswer) {
-        self.due_ns.pop_front();
-        self.delta = delta;
-        self.probed.extend(probed);
-        self.counts.renewals += 1;
-        self.is_late = false;
-        self.is_done = false;
-        self.refiner.begin_to_follow(&self.delta);
     }
 
     /// A copy of what the patch knows of all samples so far, and of nothing that it has made of it: it comes when the thread
-    /// has made it. [`Patcher::flush`] and [`Patcher::patched`] make of it what they would make at the end.
+    /// has made it. [`Patcher::flush`] and [`Patcher::patched`] make of it what they would make at the end. `None` without a patch,
+    /// or where nothing was touched.
     ///
     /// # Errors
     /// [`LiveError::Stopped`].
-    pub fn copy_patcher(&self) -> Result<Receiver<Patcher>, LiveError> {
+    pub fn copy_patcher(&self) -> Result<Option<Receiver<Patcher>>, LiveError> {
+        if self.refiner.counts().contacts == 0 {
+            return Ok(None);
+        }
         let (to, copy) = sync_channel(1);
-        self.worker.ask(Question::Copy(self.batch.clone(), to))?;
-        Ok(copy)
+        match &self.patch {
+            Reconstruction::Without => return Ok(None),
+            Reconstruction::AtEnd(patcher) => drop(to.send(patcher.copy())),
+            Reconstruction::Beside(renewals) => renewals.copy_patcher(to)?,
+        }
+        Ok(Some(copy))
     }
 
-    /// Touches that the patch has found, or lost, since this was last asked.
+    /// Touches that the patch beside the samples has found, or lost, since this was last asked.
     pub fn take_probed(&mut self) -> Option<TouchDelta> {
-        (!self.probed.is_empty()).then(|| std::mem::take(&mut self.probed))
+        self.renewals_mut()?.take_probed()
     }
 
     /// From here on notes what changes in the mesh, for [`Self::take_changes`].
@@ -315,25 +250,55 @@ impl LiveRefiner {
 
     /// Whether the mesh is one skin: large changes of the patch are taken up over several samples.
     pub fn is_whole(&self) -> bool {
-        self.is_done
+        self.renewals().is_none_or(Renewals::is_whole)
     }
 
-    /// The change of the patch that was taken up last.
-    pub fn delta(&self) -> &PatchDelta {
-        &self.delta
+    /// What a vertex rests on. Where there is no patch, or it does not know yet, a vertex that is not where the scan has it
+    /// rests on a touch, or is guessed from touches.
+    ///
+    /// - `scan`: as it came.
+    pub fn support(&self, scan: &TriMesh, vertex: VertexId) -> Support {
+        let is_moved = || {
+            let was = scan.positions().get(vertex.0 as usize);
+            was.is_none_or(|was| *was != self.refiner.mesh().position(vertex))
+        };
+        match self.refiner.support(vertex) {
+            None if is_moved() => Support::Touched,
+            Some(Support::Scan) if is_moved() => Support::Guessed,
+            support => support.unwrap_or(Support::Scan),
+        }
     }
 
-    /// How far the patch was behind.
+    /// Stamp of the last sample that the patch in the mesh knows, ns; `None` before the patch has seen a touch, and where it is made
+    /// at the end.
+    pub fn patched_until_ns(&self) -> Option<i64> {
+        self.renewals()?.patched_until_ns()
+    }
+
+    /// How far the patch beside the samples was behind.
     pub fn counts(&self) -> LiveCounts {
-        self.counts
+        self.renewals().map(Renewals::counts).unwrap_or_default()
     }
 
-    /// Ends the thread; gives both back.
+    /// Ends the thread, if there is one; gives both back.
     ///
     /// # Errors
     /// [`LiveError::Stopped`].
-    pub fn finish(mut self) -> Result<(Refiner, Patcher), LiveError> {
+    pub fn finish(mut self) -> Result<(Refiner, Option<Patcher>), LiveError> {
         self.catch_up()?;
-        Ok((self.refiner, self.worker.finish()?))
+        let patcher = match self.patch {
+            Reconstruction::Without => None,
+            Reconstruction::AtEnd(patcher) => Some(*patcher),
+            Reconstruction::Beside(renewals) => Some(renewals.finish()?),
+        };
+        Ok((self.refiner, patcher))
+    }
+
+    fn renewals(&self) -> Option<&Renewals> {
+        if let Reconstruction::Beside(renewals) = &self.patch { Some(renewals) } else { None }
+    }
+
+    fn renewals_mut(&mut self) -> Option<&mut Renewals> {
+        if let Reconstruction::Beside(renewals) = &mut self.patch { Some(renewals) } else { None }
     }
 }

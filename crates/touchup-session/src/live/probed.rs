@@ -2,7 +2,7 @@
 
 use touchup_core::touch::ProbedPoint;
 
-/// Touches that came or went: of the list that somebody keeps the first `kept` stay, then come `new`.
+/// Touches that came or went: of a list of touches the first `kept` stay, then come `new`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TouchDelta {
     /// so many of the touches before stay
@@ -49,17 +49,17 @@ impl TouchDelta {
     }
 }
 
-/// What of a list was told.
+/// What of a list was published.
 #[derive(Debug, Default)]
 pub(super) struct PublishedList {
     count: usize,
-    /// stamp and stroke of the last that was told
+    /// stamp and stroke of the last that was published
     last: Option<(i64, u32)>,
 }
 
 impl PublishedList {
-    /// What is to be told of the list as it is now: what was added, or the whole list where it is another one.
-    pub fn news(&mut self, touches: &[ProbedPoint]) -> TouchDelta {
+    /// What is to be published of the list as it is now: what was added, or the whole list where it is another one.
+    pub fn changes(&mut self, touches: &[ProbedPoint]) -> TouchDelta {
         let name = |touch: &ProbedPoint| (touch.stamp_ns, touch.stroke);
         let is_longer = self.count.checked_sub(1).and_then(|last| touches.get(last)).map(name) == self.last;
         let kept = if is_longer { self.count } else { 0 };

@@ -10,17 +10,17 @@ use super::probed::{PublishedList, TouchDelta};
 use crate::clock::Working;
 use touchup_core::mesh::{FaceTree, TriMesh};
 use touchup_core::patch::{PatchDelta, Patcher};
-use touchup_core::touch::Sample;
+use touchup_core::touch::ContactSample;
 
 /// What the thread is asked for.
 pub(super) enum Question {
-    /// take these in, and tell what changed
-    Renew(Vec<Sample>),
-    /// take in what is still in the smoothing window, and tell what changed
+    /// take these in, and answer what changed
+    Renew(Vec<ContactSample>),
+    /// take in what is still in the smoothing window, and answer what changed
     Flush,
     /// copy what is known, with these samples more
-    Copy(Vec<Sample>, SyncSender<Patcher>),
-    /// take the last stroke back, or do it again, and tell what changed
+    Copy(Vec<ContactSample>, SyncSender<Patcher>),
+    /// take the last stroke back, or do it again, and answer what changed
     Undo,
     Redo,
 }
@@ -32,7 +32,7 @@ pub(super) struct WorkerAnswer {
     /// whether there was a stroke to take back, or to do again
     pub has_changed_strokes: bool,
     /// to be filled again
-    batch: Vec<Sample>,
+    batch: Vec<ContactSample>,
 }
 
 /// A patcher on a thread of its own. Each question but that for a copy has one answer, in the same order.
@@ -42,17 +42,17 @@ pub(super) struct Worker {
     questions: Sender<(Question, Working)>,
     answers: Receiver<WorkerAnswer>,
     thread: JoinHandle<Patcher>,
-    batches: Vec<Vec<Sample>>,
+    batches: Vec<Vec<ContactSample>>,
 }
 
 impl Worker {
     pub fn new(scan: Arc<(TriMesh, FaceTree)>, mut patcher: Patcher, gate: Gate) -> Result<Self, LiveError> {
         let (questions, inbox) = channel::<(Question, Working)>();
-        let (outbox, answers) = channel();
+        let (to_engine, answers) = channel();
         let gate_of_thread = gate.clone();
         let work = move || {
             let gate = gate_of_thread;
-            let mut told = PublishedList::default();
+            let mut published = PublishedList::default();
             for (question, _working) in inbox {
                 let (mut batch, mut has_changed_strokes) = (Vec::new(), false);
                 let is_renewal = matches!(question, Question::Renew(_));
@@ -75,8 +75,8 @@ impl Worker {
                     Question::Redo => has_changed_strokes = patcher.redo(),
                 }
                 let delta = patcher.renewed(&scan.0, &scan.1);
-                let probed = told.news(patcher.probed());
-                if outbox.send(WorkerAnswer { delta, probed, has_changed_strokes, batch }).is_err() {
+                let probed = published.changes(patcher.probed());
+                if to_engine.send(WorkerAnswer { delta, probed, has_changed_strokes, batch }).is_err() {
                     break;
                 }
                 if is_renewal {
@@ -90,7 +90,7 @@ impl Worker {
         Ok(Self { gate, questions, answers, thread, batches: Vec::new() })
     }
 
-    pub fn empty_batch(&mut self) -> Vec<Sample> {
+    pub fn empty_batch(&mut self) -> Vec<ContactSample> {
         self.batches.pop().unwrap_or_default()
     }
 

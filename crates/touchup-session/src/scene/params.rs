@@ -53,8 +53,7 @@ impl Scene {
 
     /// Settings of the estimate of the clock, if there is one.
     pub fn clock_params(&self) -> Option<ClockParams> {
-        let gate = self.contact.unwrap_or_default();
-        self.clock.as_ref().map(|_| ClockParams { stiffness: self.tip_params().stiffness, gate })
+        self.clock.as_ref().map(|_| ClockParams { stiffness: self.tip_params().stiffness })
     }
 
     /// The filter that makes poses of markers, if there is one.
@@ -123,10 +122,9 @@ impl Scene {
         Some(params)
     }
 
-    /// Settings of the patcher for a wrench that arrives in the axes of `wrench_frame`; `None` without `patch`, and in the
-    /// mode of the paper.
-    pub fn patcher_params(&self, wrench_frame: WrenchFrame) -> Option<PatcherParams> {
-        let PatchParams { pitch, most_faces } = self.patch?;
+    /// Settings of the patcher; `None` without `patch` or `contact`, and in the mode of the paper.
+    pub fn patcher_params(&self) -> Option<PatcherParams> {
+        let PatchParams { pitch, most_faces } = self.patch.filter(|_| self.contact.is_some())?;
         if self.refine.as_ref().is_some_and(|refine| refine.mode == Mode::Paper) {
             return None;
         }
@@ -135,8 +133,6 @@ impl Scene {
         let mut params = PatcherParams::for_tip(shape, radius, stiffness, noise)
             .unwrap_or_else(|_| PatcherParams::new(radius, stiffness, noise));
         params.touches.shape = shape;
-        params.compensator = self.compensator_params(wrench_frame);
-        params.touches.gate = self.contact?;
         params.touches.cone_cosine = self.sliding.map(|sliding| sliding.cone_cosine);
         params.free_space = self.carve.is_some();
         if let Some(sync) = &self.sync {

@@ -63,7 +63,7 @@ impl Scene {
     fn margin(&self, mean_edge: f64) -> f64 {
         // which axes the wrench has changes no length
         let haptic = self.refine_params(WrenchFrame::default());
-        let patch = self.patcher_params(WrenchFrame::default());
+        let patch = self.patcher_params();
         let of_update = haptic.map_or(0.0, |params| {
             let roi = if let RoiSize::Radius(radius) = params.roi { radius } else { 0.0 };
             let furthest = params.largest_move_edges * mean_edge;

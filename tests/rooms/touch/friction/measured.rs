@@ -8,7 +8,10 @@ use std::path::Path;
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Vector3};
 use touchup::patch::{TipTouch, TouchFinder, TouchFinderParams};
-use touchup::touch::{ContactGateParams, Tip};
+use touchup::touch::{
+    BiasParams, CompensatorParams, ContactEstimator, ContactEstimatorParams, ContactGateParams, Sample, Tip, TipParams,
+    Wrench, WrenchFrame,
+};
 
 use super::Errors;
 
@@ -101,16 +104,30 @@ fn on_real_streams_at_most_half_of_the_raw_forces_error_is_left() {
     for (name, largest_share) in FILES {
         let tips = tips(&folder.join(name));
         let params = TouchFinderParams {
-            gate: ContactGateParams { on: 0.1, off: 0.05 },
             // 66 Hz, 4 mm/s
             half_window_ns: 200_000_000,
             largest_gap_ns: GAP_NS,
             cone_cosine: Some(0.82),
             ..TouchFinderParams::new(BALL, None)
         };
+        let gate = ContactGateParams { on: 0.1, off: 0.05 };
+        let mut contacts = ContactEstimator::new(ContactEstimatorParams {
+            compensator: CompensatorParams { wrench_frame: WrenchFrame::Object, ..CompensatorParams::default() },
+            bias: Some(BiasParams::below(&gate)),
+            gate: Some(gate),
+            ..ContactEstimatorParams::new(TipParams { radius: BALL, stiffness: None })
+        })
+        .unwrap();
+        let sample_of = |&Tip { stamp_ns, pose_ot, force_o, torque_o }: &Tip| Sample {
+            stamp_ns,
+            pose_ot,
+            wrench: Wrench { force: force_o, torque: torque_o },
+        };
         let mut finder = TouchFinder::new(params).unwrap();
         let mut touches = Vec::new();
-        tips.iter().for_each(|tip| finder.push(tip, |touch| touches.push(touch)));
+        for tip in &tips {
+            finder.push(&contacts.observe(&sample_of(tip)).unwrap(), |touch| touches.push(touch));
+        }
         finder.flush(|touch| touches.push(touch));
         assert_eq!(touches.len(), tips.len());
         let (mut raw, mut felt) = (Errors::default(), Errors::default());

@@ -5,11 +5,10 @@
 
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 use touchup::patch::{TouchFinder, TouchFinderParams};
-use touchup::refine::{SlidingParams, TipMotion, TipParams};
 use touchup::sim::{Bounds, Moment, SensorParams, Stroke, StylusParams, Surface, SurfacePoint, touch};
 use touchup::touch::{
-    Compensator, CompensatorParams, ContactGate, ContactGateParams, Friction, FrictionCoefficient, LocalMotion, Sample,
-    Sliding, SyncParams, Synchroniser, Tip,
+    ContactEstimator, ContactEstimatorParams, Friction, FrictionCoefficient, LocalMotion, Sample, Sliding, SyncParams,
+    Synchroniser, TipParams, Wrench,
 };
 
 mod measured;
@@ -152,23 +151,15 @@ struct Found {
 
 impl Found {
     fn add(&mut self, shape: Shape, stream: &Stream) {
-        let compensator = Compensator::new(CompensatorParams::default()).unwrap();
         let mut finder = TouchFinder::new(TouchFinderParams::new(RADIUS, Some(STIFFNESS))).unwrap();
-        let mut gate = ContactGate::new(ContactGateParams::default()).unwrap();
         let tip = TipParams { radius: RADIUS, stiffness: Some(STIFFNESS) };
-        let mut motion = TipMotion::new(SlidingParams::default(), tip);
-        let (mut touches, mut last) = (Vec::new(), None);
+        let mut contacts = ContactEstimator::new(ContactEstimatorParams::new(tip)).unwrap();
+        let mut touches = Vec::new();
         for sample in &stream.samples {
-            let tip = compensator.compensate(sample);
-            let dt = sample.seconds_since(last).unwrap();
-            last = Some(sample.stamp_ns);
-            finder.push(&tip, |touch| touches.push(touch));
-            let ball = motion.update(&tip, dt, 0.03);
-            let Some(contact) = gate.update(sample.stamp_ns, &ball.force_o) else {
-                motion.lift();
-                continue;
-            };
-            let normal = motion.surface_normal(&ball, dt.min(0.03));
+            let observed = contacts.observe(sample).unwrap();
+            finder.push(&observed, |touch| touches.push(touch));
+            let (ball, Some(contact)) = (observed.ball, observed.ball_contact) else { continue };
+            let normal = observed.surface.unwrap().normal;
             // the first 50 ms of a contact are the filter's
             let is_settled = sample.stamp_ns - contact.onset_ns > 50_000_000;
             if let Some(truth) = stream.truth(shape, sample.stamp_ns).filter(|_| is_settled) {
@@ -183,7 +174,7 @@ impl Found {
             }
         }
         self.true_friction.push(stream.true_friction());
-        self.causal_friction.extend(motion.friction());
+        self.causal_friction.extend(contacts.friction());
         self.friction.extend(finder.friction());
     }
 }
@@ -270,10 +261,13 @@ fn where_friction_is_not_asked_for_the_normal_is_the_force() {
     let touched = |cone_cosine: Option<f64>| {
         let params = TouchFinderParams { cone_cosine, ..TouchFinderParams::new(RADIUS, None) };
         let (mut finder, mut touches) = (TouchFinder::new(params).unwrap(), Vec::new());
+        let tip = TipParams { radius: RADIUS, stiffness: None };
+        let mut contacts = ContactEstimator::new(ContactEstimatorParams::new(tip)).unwrap();
         for i in 0..2000_i64 {
             let pose_ot = Isometry3::translation(i as f64 * 25e-6, 0.0, RADIUS);
-            let tip = Tip { stamp_ns: i * 1_000_000, pose_ot, force_o, torque_o: Vector3::zeros() };
-            finder.push(&tip, |touch| touches.push(touch));
+            let wrench = Wrench { force: force_o, torque: Vector3::zeros() };
+            let sample = Sample { stamp_ns: i * 1_000_000, pose_ot, wrench };
+            finder.push(&contacts.observe(&sample).unwrap(), |touch| touches.push(touch));
         }
         (touches.last().unwrap().contact.unwrap().normal, finder.friction())
     };

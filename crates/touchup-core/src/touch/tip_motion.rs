@@ -1,10 +1,32 @@
-//! Where the ball is, which way it slides, and which way the surface under it faces, from the past alone.
+//! Where the ball is, in which direction it slides, and how the surface under it is oriented, from the past alone.
 
 use nalgebra::{Point3, Vector3};
 
-use super::TipParams;
+use super::friction::WIDEST_CONE_COSINE;
+use super::{FeltNormal, Friction, FrictionCoefficient, Sliding, Tip};
 use crate::parameters;
-use crate::touch::{Friction, FrictionCoefficient, Sliding, Tip};
+
+parameters! {
+    /// The ball at the end of stylus or probe: by default a 3 mm ruby ball on a usual stylus.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct TipParams in "tip" {
+        /// Radius of the ball, of the flat end, or of the nose of the cone.
+        ///
+        /// In m; 0 for a point.
+        radius: f64 = 1.5, "radius_mm" [MM, 0, 1000];
+        /// Stiffness of stylus and holder at the ball; left out: rigid.
+        ///
+        /// In N/m; `None` when rigid or not known.
+        stiffness: Option<f64> = Some(20.0), "stiffness_n_per_mm" [N_PER_MM, 0.001, 1e9, "leave it out for rigid"];
+    }
+}
+
+impl TipParams {
+    /// Where the ball really is, m: the pose is that of a rigid stylus, and the force F bends it back by F/k.
+    pub fn centre(&self, reported: &Point3<f64>, force_o: &Vector3<f64>) -> Point3<f64> {
+        self.stiffness.map_or(*reported, |stiffness| reported + force_o / stiffness)
+    }
+}
 
 parameters! {
     /// Parameters of [`TipMotion`] and of the normal under the ball.
@@ -27,11 +49,11 @@ parameters! {
         /// Cosine of the widest friction cone accepted; 0.9135 is 24 degrees, friction 0.45.
         ///
         /// The normal is nowhere farther from the force: dry metal on metal.
-        cone_cosine: f64 = 0.9135, "cone_cosine" [ONE, 0, 1];
+        cone_cosine: f64 = WIDEST_CONE_COSINE, "cone_cosine" [ONE, 0, 1];
     }
 }
 
-/// The ball as the refiner sees it.
+/// The ball as position and force, smoothed by the past, have it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ball {
     /// Reported centre of the ball (that of a rigid stylus), smoothed, m, in O.
@@ -103,15 +125,15 @@ impl TipMotion {
         }
     }
 
-    /// Outward normal of the surface under the ball, which has been in contact for the last `dt` (s); zero without a force.
-    pub fn surface_normal(&mut self, ball: &Ball, dt: f64) -> Vector3<f64> {
+    /// Outward normal of the surface under the ball, which has been in contact for the last `dt` (s); `None` without a force.
+    pub fn surface_normal(&mut self, ball: &Ball, dt: f64) -> Option<FeltNormal> {
         let velocity_sigma = VELOCITY_NOISE * self.params.slowest;
         let sliding = Sliding { force_o: ball.force_o, velocity: ball.velocity, velocity_sigma };
         self.touched_for += dt;
         if self.touched_for > SETTLED * (self.params.smoothing + self.params.velocity_smoothing) {
             self.friction.observe(&Sliding { force_o: ball.force_with_velocity, ..sliding }, dt);
         }
-        self.friction.normal(&sliding).map_or_else(Vector3::zeros, |felt| felt.normal)
+        self.friction.normal(&sliding)
     }
 
     /// The ball is free.
@@ -120,13 +142,13 @@ impl TipMotion {
         self.friction.lift();
     }
 
-    /// Kinetic friction as felt so far; `None` until the ball has slid far enough.
+    /// Kinetic friction as measured so far; `None` until the ball has slid far enough.
     pub fn friction(&self) -> Option<FrictionCoefficient> {
         self.friction.coefficient()
     }
 }
 
-/// Share of the way that a first-order filter goes in `dt`.
+/// Share of a step that a first-order filter makes in `dt`.
 fn follow(dt: f64, time_constant: f64) -> f64 {
     if time_constant > 0.0 { -(-dt / time_constant).exp_m1() } else { 1.0 }
 }
@@ -151,20 +173,24 @@ mod tests {
     fn friction_does_not_tilt_the_normal_of_a_sliding_ball() {
         let mut motion = TipMotion::new(SlidingParams::default(), RIGID);
         let mut ball = motion.update(&tip(0.0), 0.0, 0.03);
-        assert_eq!(motion.surface_normal(&ball, 0.0), ball.force_o.normalize(), "at rest the force is all there is");
+        assert_eq!(
+            motion.surface_normal(&ball, 0.0).unwrap().normal,
+            ball.force_o.normalize(),
+            "at rest the force is all there is"
+        );
         // 20 mm/s along x, for 0.4 s: 20 time constants of the velocity
         for i in 1..400 {
             ball = motion.update(&tip(i as f64 * 2e-5), 1e-3, 0.03);
         }
         assert!((ball.velocity - Vector3::new(0.02, 0.0, 0.0)).norm() < 1e-6);
-        let first = motion.surface_normal(&ball, 1e-3);
+        let first = motion.surface_normal(&ball, 1e-3).unwrap().normal;
         assert!(first.angle(&Vector3::z()).to_degrees() < 2.0, "before the friction is known: {first}");
         // 40 mm: eight stretches
         for _ in 0..2000 {
             motion.surface_normal(&ball, 1e-3);
         }
         // noise of 3.2 mm/s is reckoned with: 2 · 3.2² / 20² = 5 % of atan 0.15 stay
-        assert!(motion.surface_normal(&ball, 1e-3).angle(&Vector3::z()).to_degrees() < 0.6);
+        assert!(motion.surface_normal(&ball, 1e-3).unwrap().normal.angle(&Vector3::z()).to_degrees() < 0.6);
         assert!((motion.friction().unwrap().mu - 0.15).abs() < 5e-3);
     }
 

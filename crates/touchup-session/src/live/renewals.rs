@@ -1,0 +1,198 @@
+//! A patch that is renewed beside the samples, and how its changes come into the mesh.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::sync::mpsc::SyncSender;
+
+use super::worker::{Question, Worker, WorkerAnswer};
+use super::{Gate, LiveCounts, LiveError, Pace, TouchDelta};
+use touchup_core::mesh::{FaceTree, TriMesh};
+use touchup_core::patch::{PatchDelta, Patcher};
+use touchup_core::refine::Refiner;
+use touchup_core::touch::ContactSample;
+
+/// Parts of a change of the patch that are taken up at one sample: some 50 µs on a mesh of a million faces.
+const AT_ONCE: usize = 40;
+
+/// Renewals that are asked for and not taken up at most, where samples do not wait: one that the thread works at, and one for
+/// it to go on with.
+const MOST_OPEN: usize = 2;
+
+/// The thread of the patch, and what is on its way to it and from it.
+#[derive(Debug)]
+pub(super) struct Renewals {
+    worker: Worker,
+    pace: Pace,
+    /// samples since the last renewal
+    batch: Vec<ContactSample>,
+    /// number of the time between two renewals in which the last sample lies
+    slot: Option<i64>,
+    /// when the changes that were asked for are to be taken up, ns
+    due_ns: VecDeque<i64>,
+    /// the change that was taken up last …
+    delta: PatchDelta,
+    /// … and whether all of it is in the mesh
+    is_done: bool,
+    /// whether the change that is due is known to be late
+    is_late: bool,
+    /// touches that nobody asked for yet
+    probed: TouchDelta,
+    counts: LiveCounts,
+}
+
+impl Renewals {
+    /// Starts the thread.
+    pub fn new(scan: Arc<(TriMesh, FaceTree)>, patcher: Patcher, pace: Pace, gate: Gate) -> Result<Self, LiveError> {
+        pace.check()?;
+        Ok(Self {
+            worker: Worker::new(scan, patcher, gate)?,
+            pace,
+            batch: Vec::new(),
+            slot: None,
+            due_ns: VecDeque::new(),
+            delta: PatchDelta::default(),
+            is_done: true,
+            is_late: false,
+            probed: TouchDelta::default(),
+            counts: LiveCounts::default(),
+        })
+    }
+
+    /// Takes a sample that the haptic update has taken; moves the mesh by what the patch has found that is due by now.
+    pub fn push(&mut self, refiner: &mut Refiner, contact: ContactSample) -> Result<(), LiveError> {
+        let stamp_ns = contact.tip.stamp_ns;
+        let slot = stamp_ns.div_euclid(self.pace.every_ns);
+        let has_begun = self.slot.replace(slot).is_some_and(|before| slot > before);
+        if has_begun && (self.pace.is_patient || self.due_ns.len() < MOST_OPEN) {
+            self.ask(slot.saturating_mul(self.pace.every_ns).saturating_add(self.pace.after_ns))?;
+        }
+        self.batch.push(contact);
+        if self.is_done && self.due_ns.front().is_some_and(|&due_ns| due_ns <= stamp_ns) {
+            self.take_up_due(refiner)?;
+        }
+        self.go_on(refiner, AT_ONCE)
+    }
+
+    /// Takes up the change that is due, if it is there or samples wait for it.
+    fn take_up_due(&mut self, refiner: &mut Refiner) -> Result<(), LiveError> {
+        let there = self.worker.answer_if_there()?;
+        if there.is_none() && !std::mem::replace(&mut self.is_late, true) {
+            self.counts.late += 1;
+        }
+        let answer = match there {
+            None if self.pace.is_patient => self.worker.answer()?,
+            None => return Ok(()),
+            Some(answer) => answer,
+        };
+        self.take_up(refiner, answer);
+        Ok(())
+    }
+
+    /// Takes up some more of the change at hand.
+    fn go_on(&mut self, refiner: &mut Refiner, most: usize) -> Result<(), LiveError> {
+        if !self.is_done {
+            self.is_done = refiner.go_on_following(&self.delta, most)?;
+        }
+        Ok(())
+    }
+
+    /// As [`super::Engine::rest`].
+    pub fn rest(&mut self, refiner: &mut Refiner) -> Result<(), LiveError> {
+        self.go_on(refiner, AT_ONCE)?;
+        if !self.is_done {
+            return Ok(());
+        }
+        if let Some(answer) = self.worker.answer_if_there()? {
+            self.take_up(refiner, answer);
+        } else if !self.batch.is_empty() && self.due_ns.len() < MOST_OPEN {
+            self.ask(i64::MIN)?;
+        }
+        Ok(())
+    }
+
+    /// As [`super::Engine::catch_up`].
+    pub fn catch_up(&mut self, refiner: &mut Refiner) -> Result<(), LiveError> {
+        self.ask(i64::MAX)?;
+        // the second time for what was taken in only nearby
+        for _ in 0..2 {
+            self.worker.ask(Question::Flush)?;
+            self.due_ns.push_back(i64::MAX);
+        }
+        self.take_up_all(refiner)?;
+        Ok(())
+    }
+
+    /// As [`super::Engine::undo`].
+    pub fn undo(&mut self, refiner: &mut Refiner) -> Result<bool, LiveError> {
+        self.change_strokes(refiner, Question::Undo)
+    }
+
+    /// As [`super::Engine::redo`].
+    pub fn redo(&mut self, refiner: &mut Refiner) -> Result<bool, LiveError> {
+        self.change_strokes(refiner, Question::Redo)
+    }
+
+    fn change_strokes(&mut self, refiner: &mut Refiner, question: Question) -> Result<bool, LiveError> {
+        self.catch_up(refiner)?;
+        self.worker.ask(question)?;
+        self.due_ns.push_back(i64::MAX);
+        self.take_up_all(refiner)
+    }
+
+    /// Hands the samples over, for a change that is to be taken up at `due_ns`.
+    fn ask(&mut self, due_ns: i64) -> Result<(), LiveError> {
+        let batch = std::mem::replace(&mut self.batch, self.worker.empty_batch());
+        self.worker.ask(Question::Renew(batch))?;
+        self.due_ns.push_back(due_ns);
+        Ok(())
+    }
+
+    /// Takes up all changes that were asked for, as a whole; whether the last one was one of strokes.
+    fn take_up_all(&mut self, refiner: &mut Refiner) -> Result<bool, LiveError> {
+        self.go_on(refiner, usize::MAX)?;
+        let mut has_changed_strokes = false;
+        while !self.due_ns.is_empty() {
+            let answer = self.worker.answer()?;
+            has_changed_strokes = answer.has_changed_strokes;
+            self.take_up(refiner, answer);
+            self.go_on(refiner, usize::MAX)?;
+        }
+        Ok(has_changed_strokes)
+    }
+
+    fn take_up(&mut self, refiner: &mut Refiner, WorkerAnswer { delta, probed, .. }: WorkerAnswer) {
+        self.due_ns.pop_front();
+        self.delta = delta;
+        self.probed.extend(probed);
+        self.counts.renewals += 1;
+        self.is_late = false;
+        self.is_done = false;
+        refiner.begin_to_follow(&self.delta);
+    }
+
+    /// Asks for a copy of what the patch knows of all samples so far.
+    pub fn copy_patcher(&self, to: SyncSender<Patcher>) -> Result<(), LiveError> {
+        self.worker.ask(Question::Copy(self.batch.clone(), to))
+    }
+
+    pub fn take_probed(&mut self) -> Option<TouchDelta> {
+        (!self.probed.is_empty()).then(|| std::mem::take(&mut self.probed))
+    }
+
+    pub fn is_whole(&self) -> bool {
+        self.is_done
+    }
+
+    pub fn patched_until_ns(&self) -> Option<i64> {
+        // the least there is before the patch has seen a touch
+        Some(self.delta.until_ns).filter(|&until_ns| until_ns > i64::MIN && self.counts.renewals > 0)
+    }
+
+    pub fn counts(&self) -> LiveCounts {
+        self.counts
+    }
+
+    pub fn finish(self) -> Result<Patcher, LiveError> {
+        self.worker.finish()
+    }
+}
