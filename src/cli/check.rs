@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::arm::{ArmArguments, millimetres};
 use super::probing::Ready;
 use super::progress::WorkProgress;
-use super::{CliError, Losses, tell};
+use super::{CliError, Losses, print_result};
 use crate::probe::{Prober, Repeatability};
 
 /// Touches that a spot may have; with three each side has been come from, and one says how far they scatter.
@@ -45,9 +45,9 @@ pub(super) fn check(arguments: &CheckArguments) -> Result<Losses, CliError> {
     let found = repeated(arm, scene, spot, *touches)?;
     let checked = Checked::of(&found, *gate_um);
     if *json {
-        tell(&serde_json::to_string(&checked).expect("numbers and names alone cannot fail"));
+        print_result(&serde_json::to_string(&checked).expect("numbers and names alone cannot fail"));
     } else {
-        tell(&checked.to_string());
+        print_result(&checked.to_string());
     }
     let why = format!(
         "the touches of one spot are {:.1} µm apart, the gate is {gate_um} µm: look for play in probe, flange and joints",

@@ -11,9 +11,9 @@ use serde::Serialize;
 use tracing::warn;
 
 use self::alignment::{Alignment, aligned_by_features, aligned_by_icp, aligned_by_pairs, moved};
-use self::table::ComparisonTold;
+use self::table::ComparisonReport;
 use super::progress::WorkProgress;
-use super::{CliError, Losses, Threads, tell};
+use super::{CliError, Losses, Threads, print_result};
 use crate::compare::{
     CompareParams, Comparison, IndexedMesh, PicturePanel, PictureParams, Regions, SupportRegion, colour_of,
     compare as compare_shapes, draw_picture,
@@ -25,7 +25,7 @@ use crate::mesh::{FaceTree, TriMesh};
 
 #[derive(Debug, Args)]
 pub(super) struct CompareArguments {
-    /// The mesh to be judged: PLY, STL or OBJ; a refined PLY is told by what was touched and what was not
+    /// The mesh to be judged: PLY, STL or OBJ; of a refined PLY touched and untouched parts are listed apart
     mesh: PathBuf,
     /// The part as it should be, or truly is: PLY, STL or OBJ
     truth: PathBuf,
@@ -38,7 +38,7 @@ pub(super) struct CompareArguments {
     /// Unit of the coordinates in TRUTH
     #[arg(long, value_name = "U", default_value = "mm")]
     truth_unit: MeshUnit,
-    /// The scan before it was refined, in the frame of MESH: told beside it
+    /// The scan before it was refined, in the frame of MESH: compared beside it
     #[arg(long, value_name = "MESH")]
     before: Option<PathBuf>,
     /// How MESH is brought onto TRUTH
@@ -86,19 +86,19 @@ enum Align {
 /// What `--json` prints.
 #[derive(Debug, Serialize)]
 pub(super) struct CompareReport {
-    mesh: ShapeTold,
-    truth: ShapeTold,
+    mesh: ShapeReport,
+    truth: ShapeReport,
     #[serde(skip_serializing_if = "Option::is_none")]
     alignment: Option<Alignment>,
     /// the scan, where that was asked for
     #[serde(skip_serializing_if = "Option::is_none")]
-    before: Option<ComparisonTold>,
+    before: Option<ComparisonReport>,
     /// the mesh
-    after: ComparisonTold,
+    after: ComparisonReport,
 }
 
 #[derive(Debug, Serialize)]
-struct ShapeTold {
+struct ShapeReport {
     file: String,
     vertices: usize,
     faces: usize,
@@ -122,13 +122,13 @@ impl PlacedMesh {
     }
 }
 
-/// The verb: compares and tells.
+/// The command: compares, and prints the result.
 pub(super) fn compare(arguments: &CompareArguments) -> Result<Losses, CliError> {
-    let told = compared(arguments)?;
+    let report = compared(arguments)?;
     if arguments.json {
-        tell(&serde_json::to_string(&told).expect("numbers and names alone cannot fail"));
+        print_result(&serde_json::to_string(&report).expect("numbers and names alone cannot fail"));
     } else {
-        tell(&told.to_string());
+        print_result(&report.to_string());
     }
     Ok(Losses::new())
 }
@@ -150,15 +150,16 @@ pub(super) fn compared(arguments: &CompareArguments) -> Result<CompareReport, Cl
     let truth = PlacedMesh::new(truth);
     drop(reading);
 
-    let with_told = |(pose, told)| (pose, Some(told));
+    let with_report = |(pose, alignment)| (pose, Some(alignment));
     let (pose, alignment) = match arguments.align {
         Align::None => (Isometry3::identity(), None),
-        Align::Icp => aligned_by_icp(&as_read, truth.shape(), arguments.seed).map(with_told)?,
+        Align::Icp => aligned_by_icp(&as_read, truth.shape(), arguments.seed).map(with_report)?,
         Align::Features => {
             let alternative = arguments.alternative.map(usize::from);
-            aligned_by_features(&as_read, truth.shape(), arguments.seed, alternative, arguments.json).map(with_told)?
+            aligned_by_features(&as_read, truth.shape(), arguments.seed, alternative, arguments.json)
+                .map(with_report)?
         }
-        Align::Pairs => aligned_by_pairs(arguments.pairs()?).map(with_told)?,
+        Align::Pairs => aligned_by_pairs(arguments.pairs()?).map(with_report)?,
     };
     let mesh = PlacedMesh::new(moved(&as_read, &pose));
     let before = before.map(|scan| PlacedMesh::new(moved(&scan, &pose)));
@@ -168,11 +169,11 @@ pub(super) fn compared(arguments: &CompareArguments) -> Result<CompareReport, Cl
         write_coloured(path, &as_read, arguments.mesh_unit, &measured.after)?;
     }
     Ok(CompareReport {
-        mesh: ShapeTold::of(&arguments.mesh, &as_read),
-        truth: ShapeTold::of(&arguments.truth, &truth.mesh),
+        mesh: ShapeReport::of(&arguments.mesh, &as_read),
+        truth: ShapeReport::of(&arguments.truth, &truth.mesh),
         alignment,
-        before: measured.before.as_ref().map(ComparisonTold::of),
-        after: ComparisonTold::of(&measured.after),
+        before: measured.before.as_ref().map(ComparisonReport::of),
+        after: ComparisonReport::of(&measured.after),
     })
 }
 
@@ -385,13 +386,13 @@ fn unit_hint([mesh, truth]: [&TriMesh; 2], [mesh_unit, truth_unit]: [MeshUnit; 2
         .map(|unit| format!("--mesh-unit {unit}"))
         .chain(of_truth.map(|unit| format!("--truth-unit {unit}")))
         .collect();
-    let (factor, way) = if ratio > 1.0 { (ratio, "larger") } else { (1.0 / ratio, "smaller") };
+    let (factor, comparative) = if ratio > 1.0 { (ratio, "larger") } else { (1.0 / ratio, "smaller") };
     let advice =
         if flags.is_empty() { "are these the same part?".to_owned() } else { format!("try {}", flags.join(" or ")) };
-    Some(format!("the mesh is {factor:.1} times {way} than the truth: {advice}"))
+    Some(format!("the mesh is {factor:.1} times {comparative} than the truth: {advice}"))
 }
 
-impl ShapeTold {
+impl ShapeReport {
     fn of(path: &Path, mesh: &TriMesh) -> Self {
         let [lo, hi] = mesh.bounds();
         let size = (hi - lo) * 1e3;

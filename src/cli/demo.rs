@@ -16,7 +16,7 @@ use super::progress::WorkProgress;
 use super::refine::{RefineArguments, RefineSummary, Refined};
 use super::simulate::{Feel, Simulated, write_simulation};
 use super::touched::{RegionError, TouchedTruth};
-use super::{CliError, Losses, tell};
+use super::{CliError, Losses, print_result};
 use crate::io::atomic::write_atomically;
 use crate::io::features_file::read_features;
 use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
@@ -83,7 +83,7 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
     let bag = arguments.out.join("touch.mcap");
     let files = RefineArguments::of_files(scan_path.clone(), bag, refined_path.clone(), MeshUnit::Millimetre)
         .with_features(features_path.clone(), touches_path);
-    let Refined { summary, losses, .. } = files.refined(|_| ())?;
+    let Refined { summary, losses, .. } = files.refined()?;
     // measured is what was written
     let MeshFile { mesh: refined, .. } = read_mesh(&refined_path, MeshUnit::Millimetre).map_err(CliError::ReadMesh)?;
 
@@ -103,7 +103,11 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
     };
     demo.write(arguments)?;
     let picture = arguments.out.join("deviation.png");
-    tell(&format!("{demo}\nwrote {}; where it was wrong and is right: {}", arguments.out.display(), picture.display()));
+    print_result(&format!(
+        "{demo}\nwrote {}; where it was wrong and is right: {}",
+        arguments.out.display(),
+        picture.display()
+    ));
     Ok(losses)
 }
 

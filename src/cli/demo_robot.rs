@@ -13,7 +13,7 @@ use super::compare::{CompareArguments, compared};
 use super::demo::DemoArguments;
 use super::probing::{Done, Probing, ProbingSummary};
 use super::progress::WorkProgress;
-use super::{CliError, Losses, tell};
+use super::{CliError, Losses, print_result};
 use crate::features::{Feature, Kind};
 use crate::io::atomic::{create_folder, write_atomically};
 use crate::io::mesh_file::{MeshUnit, write_mesh};
@@ -92,7 +92,7 @@ pub(super) fn demo_robot(arguments: &DemoArguments) -> Result<Losses, CliError> 
     let path = out.join("summary.json");
     let text = serde_json::to_string_pretty(&demo).expect("numbers and names alone cannot fail");
     write_atomically(&path, |file| writeln!(file, "{text}")).map_err(|source| CliError::Write { path, source })?;
-    tell(&format!(
+    print_result(&format!(
         "{demo}\nwrote {}: plan.png is what the arm would do, touches.png what it did, deviation.png what is right now",
         out.display()
     ));

@@ -8,7 +8,7 @@ use nalgebra::{Point3, Vector3};
 use serde::Serialize;
 
 use super::progress::WorkProgress;
-use super::{CliError, Losses, tell};
+use super::{CliError, Losses, print_result};
 use crate::compare::{
     BadTouches, Class, ClassMap, Disagreement, DisagreementRegion, IndexedMesh, PicturePanel, PictureParams,
     RefinedShape, Scanner, VertexBasis, colour_of_class, disagreement, draw_picture,
@@ -51,17 +51,17 @@ pub(super) struct DisagreeArguments {
 /// What `--json` prints.
 #[derive(Debug, Serialize)]
 struct DisagreeReport {
-    /// `null` where too little was touched to tell how the scanner errs
-    scanner: Option<ScannerTold>,
+    /// `null` where too little was touched to know how the scanner errs
+    scanner: Option<ScannerReport>,
     /// of the scan as a whole, taken off before places are judged
-    misplaced: Option<MisplacedTold>,
-    classes: Vec<ClassTold>,
+    misplaced: Option<MisplacedReport>,
+    classes: Vec<ClassReport>,
     regions: Vec<DisagreementRow>,
-    bad_touches: Vec<BadTold>,
+    bad_touches: Vec<BadTouchReport>,
 }
 
 #[derive(Debug, Serialize)]
-struct ScannerTold {
+struct ScannerReport {
     /// touch − scan where the scanner sees well: negative where the part looks too fat
     offset_mm: f64,
     noise_mm: f64,
@@ -72,7 +72,7 @@ struct ScannerTold {
 }
 
 #[derive(Debug, Serialize)]
-struct MisplacedTold {
+struct MisplacedReport {
     /// would bring the scan onto the touches, at `center_mm`
     shift_mm: [f64; 3],
     /// and rotation vector
@@ -85,7 +85,7 @@ struct MisplacedTold {
 }
 
 #[derive(Debug, Serialize)]
-struct ClassTold {
+struct ClassReport {
     class: &'static str,
     /// as in the column `class`
     number: usize,
@@ -107,7 +107,7 @@ struct DisagreementRow {
 }
 
 #[derive(Debug, Serialize)]
-struct BadTold {
+struct BadTouchReport {
     center_mm: [f64; 3],
     touches: Vec<u32>,
     off_mm: f64,
@@ -116,7 +116,7 @@ struct BadTold {
     against: usize,
 }
 
-/// The verb: finds and tells.
+/// The command: finds, and prints the result.
 pub(super) fn disagree(arguments: &DisagreeArguments) -> Result<Losses, CliError> {
     arguments.check_outputs()?;
     let reading = WorkProgress::stage("read");
@@ -142,9 +142,9 @@ pub(super) fn disagree(arguments: &DisagreeArguments) -> Result<Losses, CliError
             write_coloured(path, mesh, map, unit)?;
         }
     }
-    let told = DisagreeReport::of(&found);
-    let json = || serde_json::to_string(&told).expect("finite numbers and names alone cannot fail");
-    tell(&if arguments.json { json() } else { told.to_string() });
+    let report = DisagreeReport::of(&found);
+    let json = || serde_json::to_string(&report).expect("finite numbers and names alone cannot fail");
+    print_result(&if arguments.json { json() } else { report.to_string() });
     Ok(Losses::new())
 }
 
@@ -208,8 +208,8 @@ impl DisagreeArguments {
         let Some(path) = &self.picture else { return Ok(()) };
         let _drawing = WorkProgress::stage("draw");
         let map = &found.refined;
-        let is_felt = |class: &Class| !matches!(class, Class::NeverTouched | Class::Unreachable);
-        let weights: Vec<f64> = map.classes.iter().map(|class| if is_felt(class) { 1.0 } else { 0.0 }).collect();
+        let is_touched = |class: &Class| !matches!(class, Class::NeverTouched | Class::Unreachable);
+        let weights: Vec<f64> = map.classes.iter().map(|class| if is_touched(class) { 1.0 } else { 0.0 }).collect();
         let range = found.scanner.map_or(1e-3, |scanner| (4.0 * scanner.noise + scanner.offset.abs()).max(1e-6));
         let panel = |classes, title| PicturePanel {
             mesh: refined,
@@ -241,15 +241,15 @@ fn mm(p: &Point3<f64>) -> [f64; 3] {
 
 impl DisagreeReport {
     fn of(found: &Disagreement) -> Self {
-        let class = |(number, class): (usize, Class)| ClassTold {
+        let class = |(number, class): (usize, Class)| ClassReport {
             class: class.name(),
             number,
             refined_mm2: found.refined.areas[number] * 1e6,
             scan_mm2: found.scan.areas[number] * 1e6,
         };
         Self {
-            scanner: found.scanner.as_ref().map(ScannerTold::of),
-            misplaced: found.misplaced.as_ref().map(|misplaced| MisplacedTold {
+            scanner: found.scanner.as_ref().map(ScannerReport::of),
+            misplaced: found.misplaced.as_ref().map(|misplaced| MisplacedReport {
                 shift_mm: mm(&misplaced.shift.into()),
                 turn_deg: misplaced.turn.map(f64::to_degrees).into(),
                 shift_std_mm: mm(&misplaced.shift_sigma.into()),
@@ -258,12 +258,12 @@ impl DisagreeReport {
             }),
             classes: Class::ALL.into_iter().enumerate().map(class).collect(),
             regions: found.regions.iter().map(DisagreementRow::of).collect(),
-            bad_touches: found.bad_touches.iter().map(BadTold::of).collect(),
+            bad_touches: found.bad_touches.iter().map(BadTouchReport::of).collect(),
         }
     }
 }
 
-impl ScannerTold {
+impl ScannerReport {
     fn of(scanner: &Scanner) -> Self {
         Self {
             offset_mm: scanner.offset * 1e3,
@@ -293,7 +293,7 @@ impl DisagreementRow {
     }
 }
 
-impl BadTold {
+impl BadTouchReport {
     fn of(bad: &BadTouches) -> Self {
         let BadTouches { touches, centre, off, sigmas, rejected, against } = bad;
         Self {
@@ -307,21 +307,21 @@ impl BadTold {
     }
 }
 
-/// So many regions and bad touches are told; `--json` has all.
-const MOST_TOLD: usize = 12;
+/// So many regions and bad touches are listed; `--json` has all.
+const MOST_LISTED: usize = 12;
 
 impl fmt::Display for DisagreeReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.scanner {
-            Some(ScannerTold { offset_mm, noise_mm, correlation_mm, edge_mm, sees_from_mm, places }) => writeln!(
+            Some(ScannerReport { offset_mm, noise_mm, correlation_mm, edge_mm, sees_from_mm, places }) => writeln!(
                 f,
                 "the scanner, by {places} touched places that it should see well: offset {offset_mm:+.3} mm, noise \
                  {noise_mm:.3} mm alike over {correlation_mm:.1} mm; edges of {edge_mm:.2} mm, so that what is narrower than \
                  {sees_from_mm:.1} mm may be closed over"
             )?,
-            None => writeln!(f, "too little was touched to tell how the scanner errs: nothing is called changed")?,
+            None => writeln!(f, "too little was touched to know how the scanner errs: nothing is called changed")?,
         }
-        if let Some(MisplacedTold { shift_mm: [x, y, z], turn_deg, .. }) = &self.misplaced {
+        if let Some(MisplacedReport { shift_mm: [x, y, z], turn_deg, .. }) = &self.misplaced {
             let turn = Vector3::from(*turn_deg).norm();
             writeln!(
                 f,
@@ -329,7 +329,7 @@ impl fmt::Display for DisagreeReport {
             )?;
         }
         write!(f, "{:<14} {:>12} {:>12}", "class", "refined, mm2", "scan, mm2")?;
-        for ClassTold { class, refined_mm2, scan_mm2, .. } in &self.classes {
+        for ClassReport { class, refined_mm2, scan_mm2, .. } in &self.classes {
             write!(f, "\n{class:<14} {refined_mm2:>12.1} {scan_mm2:>12.1}")?;
         }
         if !self.regions.is_empty() {
@@ -339,7 +339,7 @@ impl fmt::Display for DisagreeReport {
                 "region", "center, mm", "area, mm2", "mean, mm", "sigmas", "lengths", "passes", "at edges"
             )?;
         }
-        for region in self.regions.iter().take(MOST_TOLD) {
+        for region in self.regions.iter().take(MOST_LISTED) {
             let [x, y, z] = region.center_mm;
             write!(
                 f,
@@ -355,7 +355,7 @@ impl fmt::Display for DisagreeReport {
             )?;
         }
         more(f, self.regions.len(), "regions")?;
-        for bad in self.bad_touches.iter().take(MOST_TOLD) {
+        for bad in self.bad_touches.iter().take(MOST_LISTED) {
             let ([x, y, z], count) = (bad.center_mm, bad.touches.len());
             write!(
                 f,
@@ -369,5 +369,5 @@ impl fmt::Display for DisagreeReport {
 }
 
 fn more(f: &mut fmt::Formatter<'_>, count: usize, what: &str) -> fmt::Result {
-    if count > MOST_TOLD { write!(f, "\n… and {} more {what}", count - MOST_TOLD) } else { Ok(()) }
+    if count > MOST_LISTED { write!(f, "\n… and {} more {what}", count - MOST_LISTED) } else { Ok(()) }
 }

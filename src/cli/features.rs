@@ -7,7 +7,7 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 
 use super::progress::WorkProgress;
-use super::{CliError, Losses, check_kept, tell};
+use super::{CliError, Losses, check_kept, print_result};
 use crate::features::clusters::{Cluster, ClusterParams, PaperParams, clusters, paper_clusters};
 use crate::features::curvature::curvature;
 use crate::features::{Detection, Feature, FittedTo, Kind, Measured};
@@ -55,7 +55,7 @@ enum FeaturesMode {
     Paper,
 }
 
-/// The verb: finds and tells.
+/// The command: finds, and prints the result.
 pub(super) fn features(arguments: &FeaturesArguments) -> Result<Losses, CliError> {
     arguments.check()?;
     if let Some(out) = &arguments.out {
@@ -82,12 +82,12 @@ pub(super) fn features(arguments: &FeaturesArguments) -> Result<Losses, CliError
         write_features(out, &file)?;
     }
     if arguments.json {
-        tell(&serde_json::to_string(&file).expect("finite numbers and names alone cannot fail"));
+        print_result(&serde_json::to_string(&file).expect("finite numbers and names alone cannot fail"));
         return Ok(Losses::new());
     }
-    tell(&format!("mesh: {repair}\n{table}\nfound in {took_s:.2} s"));
+    print_result(&format!("mesh: {repair}\n{table}\nfound in {took_s:.2} s"));
     if let Some(out) = &arguments.out {
-        tell(&format!("wrote {}", out.display()));
+        print_result(&format!("wrote {}", out.display()));
     }
     Ok(Losses::new())
 }

@@ -27,6 +27,9 @@ struct FoundNumber {
     truth: f64,
     found: Option<f64>,
     std: Option<f64>,
+    /// of a depth whose floor was not touched
+    #[serde(skip)]
+    is_lower_bound: bool,
 }
 
 /// All features of a part, and how many found ones are none of them.
@@ -68,6 +71,9 @@ impl FoundFeature {
             truth: truth * 1e3,
             found: record.and_then(value),
             std: record.and_then(|record| record.std.get(name).copied()),
+            is_lower_bound: name == "depth_mm"
+                && kind != "boss"
+                && record.is_some_and(|record| !record.std.contains_key(name)),
         };
         let diameter = |d| number("diameter_mm", d, |record| record.diameter_mm);
         let depth = |d| number("depth_mm", d, |record| record.depth_mm);
@@ -146,7 +152,11 @@ impl fmt::Display for FoundNumber {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let truth = format!("{} {:.3}", self.name.trim_end_matches("_mm"), self.truth);
         let Some(found) = self.found else { return write!(f, "{truth:>22} {:>26} {:>10}", "not measured", "") };
-        let std = self.std.map_or("(not felt)".to_owned(), |std| format!("± {std:.3}"));
-        write!(f, "{truth:>22} {:>26} {:>10}", format!("{found:.3} {std}"), format!("{:+.3}", found - self.truth))
+        let shown = match self.std {
+            Some(std) => format!("{found:.3} ± {std:.3}"),
+            None if self.is_lower_bound => format!("≥ {found:.3}, floor not touched"),
+            None => format!("{found:.3} (not touched)"),
+        };
+        write!(f, "{truth:>22} {shown:>26} {:>10}", format!("{:+.3}", found - self.truth))
     }
 }

@@ -1,7 +1,8 @@
 //! The command line: one file for each verb.
 //!
 //! Results go to stdout, everything else to stderr. Exit codes, which other tools rely on: 0 done, 1 the result could
-//! not be written, 2 wrong usage, 3 bad input file, 4 done with losses, which are named.
+//! not be written, 2 wrong usage, 3 bad input file, 4 done with losses, which are named. With `--json` an error is one object
+//! on stderr.
 
 mod arm;
 mod calibrate;
@@ -10,6 +11,7 @@ mod compare;
 mod demo;
 mod demo_robot;
 mod disagree;
+mod failure;
 mod features;
 mod found;
 #[cfg(any(feature = "ros", feature = "r2r"))]
@@ -31,6 +33,8 @@ mod touched;
 mod ur;
 
 pub use threads::Threads;
+
+use failure::{ErrorForm, Failure};
 
 use std::ffi::OsString;
 use std::io::{ErrorKind, Write, stderr, stdin, stdout};
@@ -91,9 +95,9 @@ enum Verb {
     Calibrate(calibrate::CalibrateArguments),
     /// Makes a plate, scans it badly, touches it and refines the scan: needs no input
     Demo(demo::DemoArguments),
-    /// Tells how far a mesh is from the true part, in numbers and as a picture
+    /// Measures how far a mesh is from the true part, in numbers and as a picture
     Compare(compare::CompareArguments),
-    /// Tells where touch and scan disagree, and whether scanner, part or touch is to blame
+    /// Finds where touch and scan disagree, and whether scanner, part or touch is to blame
     Disagree(disagree::DisagreeArguments),
     /// Refines a scan by a recording of touches
     Refine(refine::RefineArguments),
@@ -101,7 +105,7 @@ enum Verb {
     Features(features::FeaturesArguments),
     /// Has an arm probe flagged features by itself
     Probe(probe::ProbeArguments),
-    /// Has an arm touch one spot again and again, and tells whether it can be trusted
+    /// Has an arm touch one spot again and again, and says whether it can be trusted
     Check(check::CheckArguments),
     /// Scans and touches a known part: makes the input of refine
     Simulate(simulate::SimulateArguments),
@@ -234,6 +238,41 @@ impl From<OutcomeError> for CliError {
 }
 
 impl CliError {
+    /// What kind of thing is wrong, as `--json` names it.
+    fn kind(&self) -> &'static str {
+        match self {
+            Self::Usage(_) => "usage",
+            Self::Scene(_) | Self::Setting(_) => "scene",
+            Self::ReadMesh(_) | Self::ReadTruth(_) | Self::Mesh(_) => "mesh",
+            Self::ReadRecording(_) => "recording",
+            Self::WriteMesh(_) | Self::WriteRecording(_) | Self::Write { .. } | Self::Stream(_) => "not_written",
+            Self::Touches(TouchesFileError::Write { .. }) | Self::Features(FeaturesFileError::Write { .. }) => {
+                "not_written"
+            }
+            Self::Session(_) => "session",
+            Self::Touches(_) => "touches",
+            Self::Features(_) => "features",
+            Self::Simulate(_) => "simulation",
+            Self::Refine(_) | Self::Live(_) => "refinement",
+            Self::Table(_) | Self::Pairs { .. } | Self::Payload { .. } | Self::Tip { .. } | Self::Rests { .. } => {
+                "calibration"
+            }
+            Self::Align(_) | Self::AlignFeatures(_) => "alignment",
+            Self::Arm(_) => "arm",
+            Self::Explore(..) => "plan",
+            Self::Report(_) => "report",
+            Self::Compare(_) => "comparison",
+            #[cfg(any(feature = "ros", feature = "r2r"))]
+            Self::RosArguments(_) => "usage",
+            #[cfg(any(feature = "ros", feature = "r2r"))]
+            Self::Node(_) => "node",
+            #[cfg(any(feature = "ros", feature = "r2r"))]
+            Self::Ros(_) => "ros",
+            #[cfg(feature = "ur")]
+            Self::UrSetup(_) | Self::UrChild(_) => "arm",
+        }
+    }
+
     fn exit_code(&self) -> u8 {
         match self {
             Self::WriteMesh(_) | Self::WriteRecording(_) | Self::Write { .. } | Self::Stream(_) => 1,
@@ -264,31 +303,25 @@ impl CliError {
     }
 }
 
-/// What was lost on the way of work that was done; empty: nothing.
+/// What was lost although the work was done; empty: nothing.
 type Losses = Vec<String>;
 
 /// Runs the verb that `arguments` name, the program's own name first.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let (arguments, ros) = split(arguments);
+    let form = ErrorForm::of(&arguments);
     let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
-        Err(told) => {
-            // help and version come this way too, with code 0; a closed pipe leaves nobody to tell
-            let _ = told.print();
-            return ExitCode::from(told.exit_code() as u8);
-        }
+        Err(error) => return form.print_parse_error(&error),
     };
     let ended = ros_arguments(&arguments.verb, ros).and_then(|ros| arguments.verb.run(&ros));
     match ended {
         Ok(losses) if losses.is_empty() => ExitCode::SUCCESS,
         Ok(losses) => {
-            complain(&format!("done with losses: {}", losses.join("; ")));
-            ExitCode::from(4)
+            let message = format!("done with losses: {}", losses.join("; "));
+            form.print(&Failure { kind: "losses", message, hint: None, exit_code: 4 })
         }
-        Err(error) => {
-            complain(&error.to_string());
-            ExitCode::from(error.exit_code())
-        }
+        Err(error) => form.print(&Failure::of(&error)),
     }
 }
 
@@ -313,13 +346,13 @@ impl Verb {
             Self::Completions { shell } => {
                 let mut script = Vec::new();
                 clap_complete::generate(*shell, &mut Arguments::command(), "touchup", &mut script);
-                tell(String::from_utf8_lossy(&script).trim_end());
+                print_result(String::from_utf8_lossy(&script).trim_end());
                 Ok(Losses::new())
             }
             Self::Man => {
                 let mut page = Vec::new();
                 clap_mangen::Man::new(Arguments::command()).render(&mut page)?;
-                tell(String::from_utf8_lossy(&page).trim_end());
+                print_result(String::from_utf8_lossy(&page).trim_end());
                 Ok(Losses::new())
             }
             #[cfg(feature = "ur")]
@@ -397,12 +430,12 @@ fn check_kept_by(by: &str, flag: &str, input: &Path, output: &Path) -> Result<()
     Err(CliError::Usage(format!("{by} would write over {path}, which {flag} reads: choose another place")))
 }
 
-/// One line on stderr.
-fn complain(line: &str) {
+/// One line on stderr, of what is no error.
+fn notify(line: &str) {
     let _ = writeln!(stderr(), "touchup: {}", line.replace('\n', " "));
 }
 
 /// One line, or several, on stdout. A reader that has gone away is no error of ours.
-fn tell(text: &str) {
+fn print_result(text: &str) {
     let _ = writeln!(stdout(), "{text}");
 }

@@ -1,4 +1,4 @@
-//! `touchup node`: the ROS 2 node, until it is told to end.
+//! `touchup node`: the ROS 2 node, until it is asked to end.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use clap::Args;
 use tokio::signal::unix::{SignalKind, signal};
 
 use super::arm::connect_ur;
-use super::{CliError, Losses, complain, tell};
+use super::{CliError, Losses, notify, print_result};
 use crate::io::mesh_file::{MeshFile, read_mesh};
 use crate::live::Quantiles;
 use crate::ros;
@@ -38,20 +38,24 @@ pub(super) fn node(arguments: &NodeArguments, ros: &[String]) -> Result<Losses, 
     }
     let ready = Prepared::new(config.parameters.clone())?;
     let (scan, faces) = ready.scan();
-    tell(&format!("scan: {} with {faces} faces; session: {}", scan.display(), ready.folder().display()));
-    tell(&ready.cost(config.parameters.string("robot") != "none").to_string());
+    print_result(&format!("scan: {} with {faces} faces; session: {}", scan.display(), ready.folder().display()));
+    print_result(&ready.cost(config.parameters.string("robot") != "none").to_string());
     let (inbox, arrivals) = sync_channel(INBOX);
     end_on_signals(inbox.clone()).map_err(|error| NodeError::NoThread(error.to_string()))?;
     let port = ros::start(&config, inbox)?;
     let arm = arm_of(&config, ready.scene())?;
     let running = ready.start(port, arrivals, arm)?;
     let topics: Vec<_> = config.sample_topics().iter().filter_map(|name| config.resolve(name).ok()).collect();
-    tell(&format!("{} listens to {}; Ctrl-C saves and ends it", config.place.full_name(), topics.join(" and ")));
+    print_result(&format!(
+        "{} listens to {}; Ctrl-C saves and ends it",
+        config.place.full_name(),
+        topics.join(" and ")
+    ));
     let NodeEnd { folder, report } = running.join()?;
     if arguments.json {
-        tell(&serde_json::to_string(&report).expect("numbers and names alone cannot fail"));
+        print_result(&serde_json::to_string(&report).expect("numbers and names alone cannot fail"));
     } else {
-        tell(&format!("{report}\nwrote {}", folder.join("refined.ply").display()));
+        print_result(&format!("{report}\nwrote {}", folder.join("refined.ply").display()));
     }
     Ok(losses(&report))
 }
@@ -104,7 +108,7 @@ fn end_on_signals(inbox: SyncSender<Arrival>) -> std::io::Result<()> {
     };
     let listen = move || {
         runtime.block_on(any(&mut signals));
-        complain("ends and saves; a second signal ends it at once");
+        notify("ends and saves; a second signal ends it at once");
         // a node that has ended already needs none
         let _ = inbox.send(Arrival::Shutdown);
         runtime.block_on(any(&mut signals));
@@ -124,15 +128,15 @@ async fn any(signals: &mut [tokio::signal::unix::Signal]) {
 
 fn losses(report: &SessionReport) -> Losses {
     let ([wrenches, poses], [samples, others]) = (report.lost, report.dropped);
-    let told = [
+    let counted = [
         (wrenches, "wrenches lost on the way"),
         (poses, "poses lost on the way"),
         (samples, "wrenches and poses dropped: the computer is too slow"),
         (others, "other messages dropped"),
         (report.unrecorded, "messages not in the session's recording"),
     ];
-    let told = told.into_iter().filter(|(count, _)| *count > 0);
-    told.map(|(count, what)| format!("{count} {what}")).collect()
+    let counted = counted.into_iter().filter(|(count, _)| *count > 0);
+    counted.map(|(count, what)| format!("{count} {what}")).collect()
 }
 
 impl fmt::Display for SessionReport {

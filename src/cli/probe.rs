@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::arm::{ArmArguments, RobotName};
-use super::probing::{Done, Probing, Ready, flag_of, told_files};
-use super::{CliError, Losses, tell};
+use super::probing::{Done, Probing, Ready, flag_of, picture_files};
+use super::{CliError, Losses, print_result};
 use crate::probe::Flag;
 use crate::robot::{Arm, Narrower};
 
@@ -105,24 +105,24 @@ impl ProbeArguments {
             for (flag, plan) in probing.flags.iter().zip(&plans) {
                 let slides =
                     if plan.slides.is_empty() { String::new() } else { format!(" and {} slides", plan.slides.len()) };
-                tell(&format!(
+                print_result(&format!(
                     "feature {}: {} touches{slides} planned, {} cannot be made",
                     flag.id,
                     plan.wishes.len(),
                     plan.held_back.len()
                 ));
-                plan.held_back.iter().for_each(|(touch, why)| tell(&format!("  touch {touch}: {why}")));
+                plan.held_back.iter().for_each(|(touch, why)| print_result(&format!("  touch {touch}: {why}")));
             }
-            tell(&format!("nothing moved; wrote {}", self.out.join("plan.png").display()));
+            print_result(&format!("nothing moved; wrote {}", self.out.join("plan.png").display()));
             return Ok(Losses::new());
         }
         ready.may_move()?;
         let Done { summary, losses, .. } = probing.done(ready, arm)?;
         if self.json {
-            tell(&serde_json::to_string(&summary).expect("numbers and names alone cannot fail"));
+            print_result(&serde_json::to_string(&summary).expect("numbers and names alone cannot fail"));
         } else {
-            let files: Vec<String> = told_files(&self.out).iter().map(|path| path.display().to_string()).collect();
-            tell(&format!("{summary}\nwrote {}", files.join(", ")));
+            let files: Vec<String> = picture_files(&self.out).iter().map(|path| path.display().to_string()).collect();
+            print_result(&format!("{summary}\nwrote {}", files.join(", ")));
         }
         Ok(losses)
     }

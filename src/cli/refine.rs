@@ -14,7 +14,7 @@ use tracing::{debug, warn};
 use super::offsets::{ContactPoints, ScanOffset, WrenchOffset};
 use super::progress::WorkProgress;
 use super::rates::{Ended, LiveSummary, Rates};
-use super::{CliError, Losses, check_kept_by, tell};
+use super::{CliError, Losses, check_kept_by, print_result};
 use crate::io::atomic::{AtomicFile, is_same_file};
 use crate::io::mesh_file::{MeshFile, MeshFileError, MeshUnit, check_target, read_mesh};
 use crate::io::recording::Topics;
@@ -65,10 +65,10 @@ pub(super) struct RefineArguments {
     /// The repaired method, or the paper's taken literally
     #[arg(long)]
     mode: Option<Mode>,
-    /// Also looks how far the scan lies from the touched part, and tells; nothing is moved by it
+    /// Also measures how far the scan lies from the touched part; nothing is moved by it
     #[arg(long)]
     registration: bool,
-    /// Replays in real time with the patch beside it, as next to a stylus, and tells how far it is behind; the result is
+    /// Replays in real time with the patch beside it, as next to a stylus, and reports how far it is behind; the result is
     /// the same
     #[arg(long)]
     live: bool,
@@ -85,6 +85,9 @@ pub(super) struct RefineArguments {
     /// Strokes that were taken back or done again in the session
     #[arg(skip)]
     strokes: Vec<StrokeChange>,
+    /// Prints timings, rejected samples and what was built of the scene too
+    #[arg(long, short)]
+    verbose: bool,
     /// Prints the summary as one JSON object
     #[arg(long)]
     json: bool,
@@ -118,10 +121,10 @@ pub(super) struct RefineSummary {
     refused: BTreeMap<String, u64>,
     /// times that the stylus came into contact
     contacts: u64,
-    /// of the markers, where they tell the pose
+    /// of the markers, where they give the pose
     #[serde(skip_serializing_if = "Option::is_none")]
     markers: Option<MarkerCounts>,
-    /// how late the clock of the wrench reads beyond what the scene says, where the touches tell it and the scene has `clock`
+    /// how late the clock of the wrench reads beyond what the scene says, where the touches determine it and the scene has `clock`
     #[serde(skip_serializing_if = "Option::is_none")]
     wrench_offset: Option<WrenchOffset>,
     /// how far the scan lies from the part, where that was asked for
@@ -140,7 +143,7 @@ pub(super) struct RefineSummary {
     /// of the patch beside the samples, where that was asked for
     #[serde(skip_serializing_if = "Option::is_none")]
     live: Option<LiveSummary>,
-    /// what was meshed anew; `null` when the scene has no `patch`, or nothing was touched
+    /// the reconstructed faces; `null` when the scene has no `patch`, or nothing was touched
     patch: Option<PatchSummary>,
     /// how well that is known; not there when the scene has no `uncertainty`
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -168,23 +171,20 @@ const NO_SCAN: &str = "there is no scan to refine: name it by --scan, or as `sca
 
 const NO_PATCH: &str = "--live lets the patch follow, and the scene has none: add `patch:` to it";
 
-/// The verb: refines and tells.
+/// The command: refines, and prints the result.
 pub(super) fn refine(arguments: &RefineArguments) -> Result<Losses, CliError> {
     let completed = match arguments.resume.as_deref() {
         Some(session) => arguments.resumed(session)?,
         None => arguments.with_scan()?,
     };
     let arguments = &completed;
-    let at_start = |cost: &SceneCost| {
-        if !arguments.json {
-            tell(&cost.to_string());
-        }
-    };
-    let Refined { repair, summary, losses } = arguments.refined(at_start)?;
+    let Refined { repair, summary, losses } = arguments.refined()?;
     if arguments.json {
-        tell(&serde_json::to_string(&summary).expect("numbers and names alone cannot fail"));
+        print_result(&serde_json::to_string(&summary).expect("numbers and names alone cannot fail"));
     } else {
-        tell(&format!("scan: {repair}\n{summary}\nwrote {}", arguments.out.display()));
+        let details =
+            if arguments.verbose { format!("\nscan file: {repair}\n{}", summary.details()) } else { String::new() };
+        print_result(&format!("{summary}{details}\nwrote {}", arguments.out.display()));
     }
     Ok(losses)
 }
@@ -248,11 +248,11 @@ fn lost_samples(replayed: &Replayed, accepted: u64) -> Option<String> {
     })
 }
 
-/// Contacts that were mostly felt where there is no mesh.
+/// Contacts that were mostly where there is no mesh.
 fn lost_contacts(params: &RefineParams, counts: &RefineCounts) -> Option<String> {
     (params.gate.is_some() && counts.out_of_reach > counts.moved).then(|| {
         format!(
-            "{} samples felt contact where the scan has no face near: are the poses in its frame, and is --mesh-unit right?",
+            "{} samples are in contact where the scan has no face near: are the poses in its frame, and is --mesh-unit right?",
             counts.out_of_reach
         )
     })
@@ -295,6 +295,7 @@ impl RefineArguments {
             touches_out: None,
             resume: None,
             strokes: Vec::new(),
+            verbose: false,
             json: false,
         }
     }
@@ -344,9 +345,7 @@ impl RefineArguments {
     }
 
     /// Reads, replays and writes.
-    ///
-    /// - `at_start`: is told what was built, before the first sample.
-    pub(super) fn refined(&self, at_start: impl FnOnce(&SceneCost)) -> Result<Refined, CliError> {
+    pub(super) fn refined(&self) -> Result<Refined, CliError> {
         let scene = self.scene()?;
         self.check_out()?;
         let started = Instant::now();
@@ -370,7 +369,6 @@ impl RefineArguments {
         }
         let load_s = started.elapsed().as_secs_f64();
         let cost = self.cost(&scene, &rates, as_scanned.bytes() + cut.bytes());
-        at_start(&cost);
 
         let started = Instant::now();
         let mut pushes = Pushes::new();
@@ -402,7 +400,7 @@ impl RefineArguments {
         let Ended { refiner, patcher, live } = rates.finish()?;
         let replay_s = started.elapsed().as_secs_f64();
         let counts = refiner.counts();
-        let stage = WorkProgress::stage("mesh anew");
+        let stage = WorkProgress::stage("reconstruct");
         let patcher = patcher.filter(|_| counts.contacts > 0);
         let Outcome { moved_faces, patch, uncertainty, .. } =
             OutcomePlaces { outside: cut.outside.as_ref(), ..self.places() }.write(
@@ -522,37 +520,61 @@ impl RefineArguments {
     }
 }
 
+impl RefineSummary {
+    /// What happened, in one sentence: what was reconstructed or moved, how well it is known.
+    fn verdict(&self) -> String {
+        match (&self.patch, self.contacts) {
+            (_, 0) => "unchanged: the stylus never came into contact with the scan".to_owned(),
+            (Some(patch), _) => match &self.uncertainty {
+                Some(uncertainty) => format!("refined: {patch}, {uncertainty}"),
+                None => format!("refined: {patch}"),
+            },
+            (None, contacts) => {
+                format!("refined: the stylus came into contact {contacts} times and moved {} faces", self.moved_faces)
+            }
+        }
+    }
+
+    /// Counts of samples, timings, and what was built of the scene.
+    fn details(&self) -> String {
+        let refused: Vec<_> = self.refused.iter().map(|(reason, count)| format!("{count} {reason}")).collect();
+        let Quantiles { median, p99, p999, max } = self.push_ns;
+        let mut lines = vec![
+            format!("samples: {} read, {} accepted; refused: {}", self.samples, self.accepted, list(&refused)),
+            format!("faces moved: {}; updates cut back: {}", self.moved_faces, self.cut_back),
+        ];
+        lines.extend(self.patch.as_ref().map(|patch| format!("reconstruction: {:.2} s", patch.build_s)));
+        lines.push(format!("time of a sample: median {median} ns, p99 {p99} ns, p99.9 {p999} ns, max {max} ns"));
+        lines.push(format!("loaded in {:.2} s, replayed in {:.2} s", self.load_s, self.replay_s));
+        lines.push(self.scene.to_string());
+        lines.join("\n")
+    }
+}
+
+/// The verdict, then what else was found.
 impl fmt::Display for RefineSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let refused: Vec<_> = self.refused.iter().map(|(reason, count)| format!("{count} {reason}")).collect();
-        if let Some(FrictionFound { mu, sigma }) = &self.friction {
-            writeln!(f, "friction: {mu:.3} ± {sigma:.3}")?;
+        write!(f, "{}", self.verdict())?;
+        if let Some(last) = self.uncertainty.as_ref().and_then(UncertaintySummary::last_outlier) {
+            write!(f, "\n{last}")?;
         }
-        let Quantiles { median, p99, p999, max } = self.push_ns;
-        writeln!(f, "samples: {} read, {} accepted; refused: {}", self.samples, self.accepted, list(&refused))?;
-        writeln!(
-            f,
-            "contacts: {}; faces moved: {}; updates cut back: {}",
-            self.contacts, self.moved_faces, self.cut_back
-        )?;
+        if let Some(FrictionFound { mu, sigma }) = &self.friction {
+            write!(f, "\nfriction: {mu:.3} ± {sigma:.3}")?;
+        }
         if let Some(MarkerCounts { held, coasting, lost, relabelled, rejected }) = self.markers {
-            writeln!(
+            write!(
                 f,
-                "marker frames: {held} held the pose, {coasting} coasted, {lost} without a pose; markers: {relabelled} \
+                "\nmarker frames: {held} held the pose, {coasting} coasted, {lost} without a pose; markers: {relabelled} \
                  relabelled, {rejected} rejected"
             )?;
         }
         if let Some(clock) = &self.wrench_offset {
-            writeln!(f, "clock: {clock}")?;
+            write!(f, "\nclock: {clock}")?;
         }
         if let Some(registration) = &self.registration {
-            writeln!(f, "scan: {registration}")?;
+            write!(f, "\nscan: {registration}")?;
         }
-        write!(f, "push: median {median} ns, p99 {p99} ns, p99.9 {p999} ns, max {max} ns; ")?;
-        write!(f, "loaded in {:.2} s, replayed in {:.2} s", self.load_s, self.replay_s)?;
-        self.live.iter().try_for_each(|live| write!(f, "\n{live}"))?;
-        self.patch.iter().try_for_each(|patch| write!(f, "\n{patch}"))?;
-        self.uncertainty.iter().try_for_each(|known| write!(f, "\n{known}"))
+        self.live.iter().try_for_each(|live| write!(f, "\n{live}"))
     }
 }
 

@@ -9,7 +9,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::progress::WorkProgress;
-use super::{CliError, Losses, complain, tell};
+use super::{CliError, Losses, notify, print_result};
 use crate::io::recording::Topics;
 use crate::replay::{Recording, each_message, marker_filter};
 use crate::ros;
@@ -20,11 +20,11 @@ use crate::ros::port::SamplePort;
 use crate::scene::Scene;
 use crate::touch::{Message, SyncParams, WrenchFrame};
 
-/// Who listens has told us; whether he has heard of us he does not tell.
+/// Subscribers are discovered; whether they have discovered us in turn they do not announce.
 const SETTLE: Duration = Duration::from_secs(1);
 /// How often it is looked who listens.
 const LOOK: Duration = Duration::from_millis(50);
-/// Someone who waits for longer is told for what.
+/// Someone who waits for longer is warned, and why.
 const TELL_AFTER: Duration = Duration::from_secs(2);
 /// What was sent last is on its way for so long at most.
 const LINGER: Duration = Duration::from_millis(300);
@@ -123,10 +123,10 @@ pub(super) fn replay(arguments: &ReplayArguments, ros: &[String]) -> Result<Loss
         losses.push("who listened has left before the end".to_owned());
     }
     if arguments.json {
-        tell(&serde_json::to_string(&played).expect("numbers alone cannot fail"));
+        print_result(&serde_json::to_string(&played).expect("numbers alone cannot fail"));
     } else {
         let Played { wrenches, poses, played_s, .. } = played;
-        tell(&format!("played {wrenches} wrenches and {poses} poses in {played_s:.1} s"));
+        print_result(&format!("played {wrenches} wrenches and {poses} poses in {played_s:.1} s"));
     }
     Ok(losses)
 }
@@ -146,7 +146,7 @@ fn wait_for_listeners(port: &mut dyn SamplePort, config: &NodeConfig, recording:
         if !is_told && began.elapsed() > TELL_AFTER {
             let topics = config.sample_topics().map(|name| config.resolve(name).unwrap_or_else(|_| name.to_owned()));
             let (recording, topics) = (recording.display(), topics.join(" and "));
-            complain(&format!("{recording} waits for a node that listens to {topics} (touchup node); Ctrl-C gives up"));
+            notify(&format!("{recording} waits for a node that listens to {topics} (touchup node); Ctrl-C gives up"));
             is_told = true;
         }
         sleep(LOOK);
@@ -244,13 +244,15 @@ mod tests {
         };
         let recorded =
             [(0, true), (5, false), (12, true), (9, true), (9, true), (30, true), (2, false), (3, true), (40, false)];
-        let (mut order, mut told) = (StampOrder::default(), Vec::new());
-        let mut each = |message: Message| told.push((message.stamp_ns() / ms, matches!(message, Message::Wrench(_))));
+        let (mut order, mut replayed) = (StampOrder::default(), Vec::new());
+        let mut each =
+            |message: Message| replayed.push((message.stamp_ns() / ms, matches!(message, Message::Wrench(_))));
         for (stamp_ms, is_wrench) in recorded {
             order.push(message(stamp_ms, is_wrench), &mut each);
         }
         order.finish(&mut each);
-        let of = |wanted| told.iter().filter(move |(_, is_wrench)| *is_wrench == wanted).map(|(stamp_ms, _)| *stamp_ms);
+        let of =
+            |wanted| replayed.iter().filter(move |(_, is_wrench)| *is_wrench == wanted).map(|(stamp_ms, _)| *stamp_ms);
         // 3 is more than 20 ms behind: it comes where it came
         assert_eq!(of(true).collect::<Vec<_>>(), [0, 9, 9, 3, 12, 30]);
         assert_eq!(of(false).collect::<Vec<_>>(), [2, 5, 40]);

@@ -8,7 +8,7 @@ use clap::Args;
 use tracing::warn;
 
 use super::progress::WorkProgress;
-use super::{CliError, Losses, check_kept, tell};
+use super::{CliError, Losses, check_kept, print_result};
 use crate::io::atomic::create_folder;
 use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh, write_mesh};
 use crate::io::recording::{Record, Topics, write_recording};
@@ -64,7 +64,7 @@ pub(super) struct SimulateArguments {
     markers: bool,
 }
 
-/// The verb: scans the part from above (along −z), touches it from there, and tells.
+/// The command: scans the part from above (along −z), touches it from there, and prints where the files are.
 pub(super) fn simulate(arguments: &SimulateArguments) -> Result<Losses, CliError> {
     if !TIP_RADII_MM.contains(&arguments.tip_radius_mm) {
         let (given, smallest, largest) = (arguments.tip_radius_mm, TIP_RADII_MM.start(), TIP_RADII_MM.end());
@@ -95,7 +95,7 @@ pub(super) fn simulate(arguments: &SimulateArguments) -> Result<Losses, CliError
     let path = plan_mesh(&surface, &surface.bounds(), &scanner.view, &hand)?;
     let Simulated { scan, touch } = write_simulation(&surface, &truth, &path, &scanner, &feel, &arguments.out)?;
     let seconds = touch.moments.last().map_or(0.0, |moment| moment.t);
-    tell(&format!(
+    print_result(&format!(
         "scan: {} faces\ntouched for {seconds:.0} s of simulated time: {} messages\nwrote {}",
         scan.face_count(),
         touch.messages.len(),

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Subcommand;
 
-use super::{CliError, Losses, tell};
+use super::{CliError, Losses, print_result};
 use crate::ur::{child, setup};
 
 #[derive(Debug, Subcommand)]
@@ -26,7 +26,7 @@ pub(super) fn ur(arguments: &UrArguments) -> Result<Losses, CliError> {
     match arguments {
         UrArguments::Setup { folder, python } => {
             let site_packages = setup(folder, python.as_deref())?;
-            tell(&format!("site_packages: {}", site_packages.display()));
+            print_result(&format!("site_packages: {}", site_packages.display()));
         }
         UrArguments::Child => child::run()?,
     }

@@ -209,7 +209,34 @@ fn refine_in_words_names_what_it_wrote() {
     let output = case.refine("touch.mcap", "out.stl", &[]);
     assert_eq!((code(&output), text(&output.stderr)), (0, ""));
     let words = text(&output.stdout);
-    assert!(words.contains("1001 read, 1001 accepted; refused: none") && words.contains("out.stl"), "{words}");
+    let details = "1001 read, 1001 accepted; refused: none";
+    assert!(words.starts_with("refined: ") && words.contains("out.stl") && !words.contains(details), "{words}");
+
+    let output = case.refine("touch.mcap", "out.stl", &["-v"]);
+    let words = text(&output.stdout);
+    assert!(words.starts_with("refined: ") && words.contains(details) && words.contains("replayed in"), "{words}");
+}
+
+#[test]
+fn an_error_with_json_is_one_json_object_with_the_same_exit_code() {
+    let cases = [
+        (&["refine", "--frobnicate"][..], "usage", 2),
+        (&["compare", "no.ply", "no.stl"], "mesh", 3),
+        (&["features", "no.ply"], "mesh", 3),
+        (&["disagree", "no.ply", "no.ply", "--touches", "no.csv"], "mesh", 3),
+        (&["probe", "--feature", "hole@1,2", "--scene", "no.yaml", "--out", "no"], "usage", 2),
+    ];
+    for (arguments, kind, exit_code) in cases {
+        let in_words = touchup(arguments, "");
+        assert_eq!(code(&in_words), exit_code, "{arguments:?}: {}", text(&in_words.stderr));
+        assert!(serde_json::from_slice::<Value>(&in_words.stderr).is_err(), "{arguments:?}");
+        let output = touchup(&[arguments, &["--json"]].concat(), "");
+        assert_eq!((code(&output), text(&output.stdout)), (exit_code, ""), "{arguments:?}");
+        let error: Value = serde_json::from_slice(&output.stderr).expect("one object");
+        assert_eq!(keys(&error), ["exit_code", "hint", "kind", "message"], "{error}");
+        assert_eq!((&error["kind"], &error["exit_code"]), (&kind.into(), &exit_code.into()), "{error}");
+        assert!(error["message"].as_str().is_some_and(|message| !message.is_empty()), "{error}");
+    }
 }
 
 #[test]

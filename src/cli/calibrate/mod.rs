@@ -14,7 +14,7 @@ use clap::{Args, Subcommand};
 use serde::Serialize;
 
 use super::progress::WorkProgress;
-use super::{CliError, Losses, check_kept, tell};
+use super::{CliError, Losses, check_kept, print_result};
 use crate::calibrate::Known;
 use crate::io::atomic::write_atomically;
 use crate::io::recording::Topics;
@@ -47,7 +47,7 @@ pub(super) fn calibrate(arguments: &CalibrateArguments) -> Result<Losses, CliErr
 /// Why a calibration with an arm has no scene to begin with.
 const NO_SCENE: &str = "--scene is needed: it says where the arm stands and what it must never leave";
 
-/// What is written, and how it is told.
+/// What is written, and how it is printed.
 #[derive(Debug, Args)]
 struct CalibrationTarget {
     /// The scene to put the result into: all else in it stays as it was written. Left out: a new file
@@ -91,7 +91,7 @@ impl CalibrationTarget {
         Ok(DraftScene { text, scene })
     }
 
-    /// Puts `found` into the scene and tells what it was.
+    /// Puts `found` into the scene and prints what it was.
     fn write<T: Serialize + std::fmt::Display>(
         &self,
         draft: &DraftScene,
@@ -107,9 +107,9 @@ impl CalibrationTarget {
         write_atomically(&self.out, |file| file.write_all(text.as_bytes()))
             .map_err(|source| CliError::Write { path: self.out.clone(), source })?;
         if self.json {
-            tell(&serde_json::to_string(found).expect("numbers and names alone cannot fail"));
+            print_result(&serde_json::to_string(found).expect("numbers and names alone cannot fail"));
         } else {
-            tell(&format!("{found}\nwrote {}", self.out.display()));
+            print_result(&format!("{found}\nwrote {}", self.out.display()));
         }
         Ok(())
     }

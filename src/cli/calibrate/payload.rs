@@ -93,21 +93,21 @@ pub(super) fn warn_of_residuals(fit: &PayloadFit, besides: &str) {
 
 impl PayloadArguments {
     fn poses(&self, draft: &DraftScene) -> Result<(Vec<StaticPose>, WrenchFrame, Losses), CliError> {
-        let told = self.wrench_axes.map(|axes| match axes {
+        let named = self.wrench_axes.map(|axes| match axes {
             Axes::Sensor => WrenchFrame::Sensor,
             Axes::Pose => WrenchFrame::Object,
         });
         if let Some(samples) = &self.samples {
             let pose = |(r_wt, wrench)| StaticPose { r_wt, wrench, noise: None, samples: 1 };
             let poses = read_static_poses(samples)?.into_iter().map(pose).collect();
-            return Ok((poses, told.unwrap_or_default(), Losses::new()));
+            return Ok((poses, named.unwrap_or_default(), Losses::new()));
         }
         let mut finder = StillFinder::new(StillParams::default());
         let bag = self.bag.as_deref().unwrap_or_else(|| "".as_ref());
         let recording = self.source.open(bag)?;
         let recorded = recording.wrench_frame;
         let replayed = self.source.replay(recording, &draft.reading(), |sample| finder.push(sample))?;
-        Ok((finder.finish(), told.unwrap_or(recorded), replayed.losses))
+        Ok((finder.finish(), named.unwrap_or(recorded), replayed.losses))
     }
 }
 

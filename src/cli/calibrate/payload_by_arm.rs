@@ -1,7 +1,7 @@
 //! `touchup calibrate payload --robot`: what hangs on the flange, weighed by the arm itself.
 //!
-//! The controller of an arm takes the weight off by itself, by the payload that it was told. So what is found goes where that is told:
-//! `robot.payload_kg` and `robot.payload_centre_mm`. The bias is told only: a sensor is zeroed before each touch.
+//! The controller of an arm takes the weight off by itself, by the payload set there. So what is found goes where that is set:
+//! `robot.payload_kg` and `robot.payload_centre_mm`. The bias is only printed: a sensor is zeroed before each touch.
 
 use std::fmt;
 
@@ -26,17 +26,17 @@ pub(super) fn payload(arguments: &PayloadArguments, robot: RobotName) -> Result<
     let (scan, unit) = cell.scan(scene)?;
     let ready = Ready::read(scene, &scan, unit)?;
     ready.may_move()?;
-    let weighing = WorkProgress::stage("weigh");
+    let measuring = WorkProgress::stage("identify the payload");
     let truth = |arm| truth_payload.held_by(arm, &ready.scene);
     let Weighed { rests, not_reached } = cell.with(robot, &ready, truth, |arm| {
         let mut world = ready.still_world();
         let mut prober = Prober::new(arm, &ready.cell, &ready.params, &mut world);
         prober.weigh().map_err(|error| CliError::Arm(error.to_string()))
     })?;
-    drop(weighing);
+    drop(measuring);
     let poses: Vec<StaticPose> = rests.iter().map(static_pose).collect();
     let params = PayloadParams { gravity: arguments.gravity_m_per_s2, ..PayloadParams::default() };
-    let fit = fit_payload(&poses, &params).map_err(|error| CliError::Arm(told(&error)))?;
+    let fit = fit_payload(&poses, &params).map_err(|error| CliError::Arm(advice(&error)))?;
     warn_of_residuals(&fit, "does a hose pull, ");
     let payload = PayloadFound::of(&fit, ["flange", "base"]);
     let found = WeighedFound { payload, not_reached: not_reached.iter().map(NotReached::to_string).collect() };
@@ -50,8 +50,8 @@ fn static_pose(rest: &WeighedRest) -> StaticPose {
     StaticPose { r_wt: r_bf, wrench: wrench_f, noise: Some(noise), samples: readings }
 }
 
-/// Why the rests of an arm do not tell its payload.
-fn told(error: &PayloadError) -> String {
+/// Why the static segments of an arm do not determine its payload.
+fn advice(error: &PayloadError) -> String {
     match error {
         PayloadError::WrongAxes { rms_n, other_rms_n, .. } => format!(
             "the raw wrench of this arm is not in the axes of its flange: residuals are {rms_n:.3} N, and {other_rms_n:.3} N in \
@@ -59,7 +59,7 @@ fn told(error: &PayloadError) -> String {
         ),
         PayloadError::NoWeight { weight_n, sigma_n } => format!(
             "the weight is {weight_n:.3} N, no more than three times its uncertainty of {sigma_n:.3} N: nothing hangs on the \
-             flange, or the arm tells no raw wrench"
+             flange, or the arm reports no raw wrench"
         ),
         PayloadError::Inconsistent { rejected, poses } => format!(
             "{rejected} of {poses} rests do not fit the others: the probe must touch nothing, and no hose or cable may pull it"

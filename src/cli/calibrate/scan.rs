@@ -106,7 +106,7 @@ struct ScanFound {
     sigma_mm: f64,
     /// p_space = R p_scan + t
     scan_to_space: ScanMotion,
-    /// middle of the pairs in space, for which the shift is told
+    /// middle of the pairs in space, for which the shift is given
     centroid_mm: [f64; 3],
     shift_std_mm: [f64; 3],
     turn_std_deg: [f64; 3],

@@ -51,7 +51,7 @@ struct StiffnessFound {
     touches: usize,
     stiffness_n_per_mm: f64,
     std_n_per_mm: f64,
-    /// of the places where the spot was felt
+    /// of the places where the spot was touched
     range_um: f64,
 }
 
@@ -70,7 +70,7 @@ impl StiffnessFound {
 impl fmt::Display for StiffnessFound {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { touches, stiffness_n_per_mm, std_n_per_mm, range_um } = self;
-        writeln!(f, "presses: {touches}, felt within {range_um:.1} µm")?;
+        writeln!(f, "presses: {touches}, contact repeated within {range_um:.1} µm")?;
         write!(f, "stiffness   {stiffness_n_per_mm:.3} ± {std_n_per_mm:.3} N/mm, of arm and probe together")
     }
 }

@@ -94,7 +94,7 @@ struct TipFound {
     /// where the ball rested, in the frame of the poses
     rest_mm: Vector,
     residual_mm: f64,
-    /// poses that tell as much as one if each told something new
+    /// number of independent poses that hold as much information
     correlation: f64,
 }
 

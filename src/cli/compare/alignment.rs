@@ -1,4 +1,4 @@
-//! The mesh brought onto the truth, and how that is told.
+//! The mesh brought onto the truth, and how that is reported.
 
 use std::fmt;
 use std::path::Path;
@@ -12,7 +12,7 @@ use crate::align::{
     align_features, fit_pairs, icp,
 };
 use crate::cli::progress::WorkProgress;
-use crate::cli::{CliError, Threads, tell};
+use crate::cli::{CliError, Threads, print_result};
 use crate::compare::{IndexedMesh, sample_surface, surface_area};
 use crate::features::detect;
 use crate::io::pairs_file::read_pairs;
@@ -28,13 +28,13 @@ const POINTS_EACH: f64 = 20_000.0;
 pub(super) struct Alignment {
     method: &'static str,
     #[serde(flatten)]
-    motion: MotionTold,
+    motion: MotionReport,
     /// of the points to the tangent planes, or of the pairs
     #[serde(skip_serializing_if = "Option::is_none")]
     rms_mm: Option<f64>,
     /// point to plane
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
-    fit: Option<FitTold>,
+    fit: Option<FitReport>,
     /// by features
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     explained: Option<Explained>,
@@ -47,7 +47,7 @@ pub(super) struct Alignment {
 
 /// Moves the mesh, as it is in its file, onto the truth.
 #[derive(Debug, Serialize)]
-struct MotionTold {
+struct MotionReport {
     /// rows of the rotation
     rotation: [[f64; 3]; 3],
     /// and then the shift
@@ -55,7 +55,7 @@ struct MotionTold {
 }
 
 #[derive(Debug, Serialize)]
-struct FitTold {
+struct FitReport {
     points: usize,
     inliers: usize,
     rounds: usize,
@@ -95,11 +95,11 @@ struct Choices {
     ambiguous: Vec<Choice>,
     /// the axis about which each may be turned
     #[serde(skip_serializing_if = "Option::is_none")]
-    free_turn: Option<FreeTurnTold>,
+    free_turn: Option<FreeTurnReport>,
 }
 
 #[derive(Debug, Serialize)]
-struct FreeTurnTold {
+struct FreeTurnReport {
     axis: [f64; 3],
     through_mm: [f64; 3],
 }
@@ -109,7 +109,7 @@ struct Choice {
     /// as --alternative takes it
     alternative: usize,
     #[serde(flatten)]
-    motion: MotionTold,
+    motion: MotionReport,
     #[serde(flatten)]
     explained: Explained,
     rms_mm: Option<f64>,
@@ -130,9 +130,9 @@ pub(super) fn aligned_by_icp(mesh: &TriMesh, truth: IndexedMesh<'_>, seed: u64) 
     let _aligning = WorkProgress::stage("align");
     let points: Vec<_> = spread(mesh, POINTS, seed).iter().map(|p| p.point).collect();
     let fit = icp(&points, truth.mesh, truth.tree, &Isometry3::identity(), &IcpParams::default(), &Threads)?;
-    let told = Alignment { fit: Some(FitTold::of(&fit, points.len())), ..Alignment::of_icp("icp", &fit) };
-    told.warn();
-    Ok((fit.source_to_target, told))
+    let alignment = Alignment { fit: Some(FitReport::of(&fit, points.len())), ..Alignment::of_icp("icp", &fit) };
+    alignment.warn();
+    Ok((fit.source_to_target, alignment))
 }
 
 /// The same from anywhere, by features.
@@ -170,22 +170,22 @@ pub(super) fn aligned_by_features(
         (None, Some(error)) => {
             let choices = Choices::of(&found, counts, &error);
             let as_json = || serde_json::to_string(&choices).expect("numbers and names alone cannot fail");
-            tell(&if json { as_json() } else { choices.to_string() });
+            print_result(&if json { as_json() } else { choices.to_string() });
             return Err(error.into());
         }
     };
     let explained = Some(Explained::of(chosen, counts));
-    let told = match &chosen.icp {
+    let alignment = match &chosen.icp {
         Some(fit) => {
-            Alignment { explained, fit: Some(FitTold::of(fit, points.len())), ..Alignment::of_icp("features", fit) }
+            Alignment { explained, fit: Some(FitReport::of(fit, points.len())), ..Alignment::of_icp("features", fit) }
         }
         None => Alignment { explained, ..Alignment::of("features", &chosen.source_to_target) },
     };
-    told.warn();
-    Ok((chosen.source_to_target, told))
+    alignment.warn();
+    Ok((chosen.source_to_target, alignment))
 }
 
-/// The motion that pairs of picked points tell; `scan` is the mesh and `space` the truth.
+/// The motion that pairs of picked points print_result; `scan` is the mesh and `space` the truth.
 ///
 /// # Errors
 /// [`CliError::Table`], [`CliError::Pairs`].
@@ -201,8 +201,8 @@ pub(super) fn aligned_by_pairs(path: &Path) -> Aligned {
     let numbered: Vec<String> = (1..=file.pairs.len()).map(|number| number.to_string()).collect();
     let names = if file.names.len() == file.pairs.len() { &file.names } else { &numbered };
     let residuals = fit.residuals.iter().zip(names).map(residual).collect();
-    let told = Alignment { residuals, rms_mm: Some(fit.rms * 1e3), ..Alignment::of("pairs", &fit.motion) };
-    Ok((fit.motion, told))
+    let alignment = Alignment { residuals, rms_mm: Some(fit.rms * 1e3), ..Alignment::of("pairs", &fit.motion) };
+    Ok((fit.motion, alignment))
 }
 
 fn spread(mesh: &TriMesh, count: f64, seed: u64) -> Vec<OrientedSample> {
@@ -225,7 +225,7 @@ fn mm(v: Vector3<f64>) -> [f64; 3] {
     [v.x, v.y, v.z].map(|x| x * 1e3)
 }
 
-impl MotionTold {
+impl MotionReport {
     fn of(motion: &Isometry3<f64>) -> Self {
         let rotation = motion.rotation.to_rotation_matrix();
         Self {
@@ -235,7 +235,7 @@ impl MotionTold {
     }
 }
 
-impl FitTold {
+impl FitReport {
     fn of(fit: &IcpFit, points: usize) -> Self {
         Self { points, inliers: fit.inliers, rounds: fit.rounds }
     }
@@ -252,7 +252,7 @@ impl Choices {
     fn of(alternatives: &[Alternative], counts: [usize; 2], error: &FeaturesError) -> Self {
         let free_turn = match error {
             FeaturesError::FreeTurn { turn, .. } => {
-                Some(FreeTurnTold { axis: turn.axis.into(), through_mm: mm(turn.through.coords) })
+                Some(FreeTurnReport { axis: turn.axis.into(), through_mm: mm(turn.through.coords) })
             }
             _ => None,
         };
@@ -260,7 +260,7 @@ impl Choices {
             let [turn, shift] = alternative.differs;
             Choice {
                 alternative: at + 1,
-                motion: MotionTold::of(&alternative.source_to_target),
+                motion: MotionReport::of(&alternative.source_to_target),
                 explained: Explained::of(alternative, counts),
                 rms_mm: alternative.icp.as_ref().map(|fit| fit.rms * 1e3),
                 turn_deg: turn.norm().to_degrees(),
@@ -274,7 +274,7 @@ impl Choices {
 
 impl Alignment {
     fn of(method: &'static str, motion: &Isometry3<f64>) -> Self {
-        let motion = MotionTold::of(motion);
+        let motion = MotionReport::of(motion);
         Self {
             method,
             motion,
@@ -319,7 +319,7 @@ impl fmt::Display for Alignment {
         if let Some(rms_mm) = self.rms_mm {
             write!(f, ", rms {rms_mm:.4} mm")?;
         }
-        if let Some(FitTold { points, inliers, rounds }) = self.fit {
+        if let Some(FitReport { points, inliers, rounds }) = self.fit {
             write!(f, " of {inliers} of {points} points, {rounds} rounds")?;
         }
         for Residual { pair, residual_mm: [x, y, z], distance_mm } in &self.residuals {
@@ -354,7 +354,7 @@ impl fmt::Display for Choices {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.free_turn {
             None => writeln!(f, "these motions explain the mesh about equally well; --alternative K takes one")?,
-            Some(FreeTurnTold { axis: [a, b, c], through_mm: [x, y, z] }) => writeln!(
+            Some(FreeTurnReport { axis: [a, b, c], through_mm: [x, y, z] }) => writeln!(
                 f,
                 "free to turn about ({a:.3}, {b:.3}, {c:.3}) through ({x:.2}, {y:.2}, {z:.2}) mm; --alternative K takes one \
                  with the turn that it has"

@@ -9,7 +9,7 @@ use crate::compare::{Comparison, Histogram, RegionComparison, Summary, SupportRe
 
 /// What `--json` prints of one mesh.
 #[derive(Debug, Serialize)]
-pub(super) struct ComparisonTold {
+pub(super) struct ComparisonReport {
     /// points spread over each surface
     density_per_mm2: f64,
     /// of the true surface, which the mesh does not show: never scanned, or missing
@@ -21,19 +21,19 @@ pub(super) struct ComparisonTold {
 #[derive(Debug, Serialize)]
 struct DeviationRow {
     region: &'static str,
-    mesh_to_truth: Option<SummaryTold>,
-    truth_to_mesh: Option<SummaryTold>,
-    vertices_to_truth: Option<SummaryTold>,
-    cloud_to_truth: Option<SummaryTold>,
-    truth_to_cloud: Option<SummaryTold>,
-    normals: Option<NormalsTold>,
+    mesh_to_truth: Option<SummaryReport>,
+    truth_to_mesh: Option<SummaryReport>,
+    vertices_to_truth: Option<SummaryReport>,
+    cloud_to_truth: Option<SummaryReport>,
+    truth_to_cloud: Option<SummaryReport>,
+    normals: Option<NormalsReport>,
     /// of `mesh_to_truth`
-    histogram: HistogramTold,
+    histogram: HistogramReport,
 }
 
 /// Distances; all but `bias_mm` without sign.
 #[derive(Debug, Serialize)]
-struct SummaryTold {
+struct SummaryReport {
     points: usize,
     mean_mm: f64,
     rms_mm: f64,
@@ -47,7 +47,7 @@ struct SummaryTold {
 }
 
 #[derive(Debug, Serialize)]
-struct NormalsTold {
+struct NormalsReport {
     median_deg: f64,
     p95_deg: f64,
     /// of the area, more than 90 degrees off
@@ -55,7 +55,7 @@ struct NormalsTold {
 }
 
 #[derive(Debug, Serialize)]
-struct HistogramTold {
+struct HistogramReport {
     from_mm: f64,
     bin_mm: f64,
     counts: Vec<usize>,
@@ -63,7 +63,7 @@ struct HistogramTold {
     above: usize,
 }
 
-impl ComparisonTold {
+impl ComparisonReport {
     pub fn of(comparison: &Comparison) -> Self {
         let regions = comparison.regions.iter().map(DeviationRow::of).collect();
         Self { density_per_mm2: comparison.density * 1e-6, unseen_share: comparison.unseen, regions }
@@ -72,22 +72,22 @@ impl ComparisonTold {
 
 impl DeviationRow {
     fn of(part: &RegionComparison) -> Self {
-        let told = |summary: &Option<Summary>| summary.as_ref().map(SummaryTold::of);
-        let unsigned = |summary| told(summary).map(|told| SummaryTold { bias_mm: None, ..told });
+        let report = |summary: &Option<Summary>| summary.as_ref().map(SummaryReport::of);
+        let unsigned = |summary| report(summary).map(|report| SummaryReport { bias_mm: None, ..report });
         let Histogram { from, width, counts, below, above } = &part.histogram;
         Self {
             region: name_of(part.region),
-            mesh_to_truth: told(&part.mesh_to_truth),
-            truth_to_mesh: told(&part.truth_to_mesh),
-            vertices_to_truth: told(&part.vertices_to_truth),
+            mesh_to_truth: report(&part.mesh_to_truth),
+            truth_to_mesh: report(&part.truth_to_mesh),
+            vertices_to_truth: report(&part.vertices_to_truth),
             cloud_to_truth: unsigned(&part.cloud_to_truth),
             truth_to_cloud: unsigned(&part.truth_to_cloud),
-            normals: part.tilt.map(|TiltSummary { median, p95, flipped }| NormalsTold {
+            normals: part.tilt.map(|TiltSummary { median, p95, flipped }| NormalsReport {
                 median_deg: median.to_degrees(),
                 p95_deg: p95.to_degrees(),
                 flipped_share: flipped,
             }),
-            histogram: HistogramTold {
+            histogram: HistogramReport {
                 from_mm: from * 1e3,
                 bin_mm: width * 1e3,
                 counts: counts.clone(),
@@ -98,7 +98,7 @@ impl DeviationRow {
     }
 }
 
-impl SummaryTold {
+impl SummaryReport {
     fn of(summary: &Summary) -> Self {
         let Summary { points, mean, rms, median, p95, p99, max, bias } = *summary;
         let [mean_mm, rms_mm, median_mm, p95_mm, p99_mm, max_mm, bias_mm] =
@@ -129,8 +129,30 @@ pub(super) fn note(comparison: &Comparison) -> String {
 
 const HEAD: &str = "                            mean      rms   median      p95      p99      max     bias    points";
 
+impl CompareReport {
+    /// How far the mesh is off, where it was touched if it says so, and what it was before.
+    fn verdict(&self) -> String {
+        let part = |comparison: &'_ ComparisonReport, region: &str| {
+            let row = comparison.regions.iter().find(|row| row.region == region)?;
+            row.mesh_to_truth.as_ref().map(|summary| [summary.mean_mm, summary.p95_mm])
+        };
+        let touched = part(&self.after, "touched").map(|numbers| ("touched", "where touched", numbers));
+        let all = || part(&self.after, "all").map(|numbers| ("all", "over all", numbers));
+        let Some((region, place, [mean, p95])) = touched.or_else(all) else {
+            return "the mesh shows nothing of the true surface".to_owned();
+        };
+        let before = self.before.as_ref().and_then(|before| part(before, region));
+        let before = before.map(|[mean, p95]| format!("; before: mean {mean:.3} mm, 95 % within {p95:.3} mm"));
+        format!(
+            "the mesh is off by {mean:.3} mm on average {place}, 95 % within {p95:.3} mm{}",
+            before.unwrap_or_default()
+        )
+    }
+}
+
 impl fmt::Display for CompareReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}", self.verdict())?;
         for (what, shape) in [("mesh", &self.mesh), ("truth", &self.truth)] {
             let [x, y, z] = shape.size_mm;
             writeln!(f, "{what:5} {}: {} faces, {x:.1} x {y:.1} x {z:.1} mm", shape.file, shape.faces)?;
@@ -148,7 +170,7 @@ impl fmt::Display for CompareReport {
     }
 }
 
-impl fmt::Display for ComparisonTold {
+impl fmt::Display for ComparisonReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (at, part) in self.regions.iter().enumerate() {
             if at > 0 {
@@ -175,7 +197,7 @@ impl fmt::Display for DeviationRow {
             region = "";
         }
         match &self.normals {
-            Some(NormalsTold { median_deg, p95_deg, flipped_share }) => write!(
+            Some(NormalsReport { median_deg, p95_deg, flipped_share }) => write!(
                 f,
                 "{region:9} normals        median {median_deg:.2}, p95 {p95_deg:.2} deg, flipped {:.3} %",
                 flipped_share * 100.0
@@ -185,7 +207,7 @@ impl fmt::Display for DeviationRow {
     }
 }
 
-impl fmt::Display for SummaryTold {
+impl fmt::Display for SummaryReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for x in [self.mean_mm, self.rms_mm, self.median_mm, self.p95_mm, self.p99_mm, self.max_mm] {
             write!(f, "{x:9.4}")?;

@@ -182,7 +182,7 @@ impl Probing<'_> {
         let arguments = RefineArguments::of_files(self.scan.to_owned(), bag, refined.clone(), self.unit)
             .with_features(features, touches)
             .with_scene(self.scene.to_owned(), probe_topics());
-        let Refined { summary, mut losses, .. } = arguments.refined(|_| ())?;
+        let Refined { summary, mut losses, .. } = arguments.refined()?;
         let is_found =
             |one: &&Probed| matches!(one.ending, Ending::ToleranceReached | Ending::TouchesSpent | Ending::TimeSpent);
         losses.extend(
@@ -217,7 +217,7 @@ pub(super) fn flag_of(id: u32, text: &str, radius: f64) -> Result<Flag, CliError
     }
 }
 
-/// Where a file goes, for what is told at the end.
-pub(super) fn told_files(out: &Path) -> Vec<PathBuf> {
+/// The files that the result names.
+pub(super) fn picture_files(out: &Path) -> Vec<PathBuf> {
     ["plan.png", "touches.png", "probed.json"].map(|name| out.join(name)).to_vec()
 }

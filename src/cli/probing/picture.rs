@@ -15,7 +15,7 @@ const FLAG: Rgb = [214, 40, 40];
 const WAY: Rgb = [120, 150, 205];
 const SEARCH: Rgb = [28, 78, 160];
 const HELD_BACK: Rgb = [150, 40, 150];
-const FELT: Rgb = [20, 130, 60];
+const TOUCHED: Rgb = [20, 130, 60];
 const MISS: Rgb = [28, 78, 160];
 const REFUSED: Rgb = [230, 140, 20];
 /// Lines and places, over the diagonal of the part.
@@ -99,16 +99,16 @@ pub(super) fn draw_plan(scan: &TriMesh, plans: &[Plan], flags: &[Flag], path: &P
 pub(super) fn draw_touches(mesh: &TriMesh, probed: &[Probed], flags: &[Flag], path: &Path) -> Result<(), CliError> {
     let size = diagonal(mesh);
     let mut drawing = DrawnMesh::of(mesh, PART);
-    let (mut felt, mut missed, mut refused) = (0, 0, 0);
+    let (mut touched, mut missed, mut refused) = (0, 0, 0);
     for touch in probed.iter().flat_map(|one| &one.touches) {
         let along = touch.wish.direction.into_inner();
         let (end, colour) = match (&touch.centre, &touch.refused) {
-            (Some(centre), None) => (*centre, FELT),
+            (Some(centre), None) => (*centre, TOUCHED),
             (_, Some(_)) => (touch.wish.from, REFUSED),
             (None, None) => (touch.wish.from + along * touch.wish.search, MISS),
         };
         match colour {
-            FELT => felt += 1,
+            TOUCHED => touched += 1,
             MISS => missed += 1,
             _ => refused += 1,
         }
@@ -118,11 +118,11 @@ pub(super) fn draw_touches(mesh: &TriMesh, probed: &[Probed], flags: &[Flag], pa
     for probed in probed.iter().flat_map(|one| &one.slides) {
         let reached = probed.record.as_ref().map_or(0, |record| record.reached);
         for pair in probed.slide.stations[..=reached].windows(2) {
-            drawing.line(&pair[0].centre, &pair[1].centre, LINE * size, FELT);
+            drawing.line(&pair[0].centre, &pair[1].centre, LINE * size, TOUCHED);
         }
     }
     flagged(&mut drawing, flags, size);
-    let note = format!("{felt} touches felt the part, {missed} missed it, {refused} do not count");
-    let legend = [(FLAG, "flag"), (FELT, "felt"), (MISS, "nothing there"), (REFUSED, "does not count")];
+    let note = format!("{touched} touches reached the part, {missed} missed it, {refused} do not count");
+    let legend = [(FLAG, "flag"), (TOUCHED, "touched"), (MISS, "nothing there"), (REFUSED, "does not count")];
     write(&[(drawing, "the refined mesh", note)], "what the arm touched", &legend, path)
 }

@@ -50,12 +50,12 @@ struct SlideRecordOfFile {
     ending: String,
     length_mm: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
-    felt: Option<SlideFelt>,
+    forces: Option<SlideForces>,
 }
 
-/// What was felt along it.
+/// The contact force along it.
 #[derive(Clone, Debug, Serialize)]
-struct SlideFelt {
+struct SlideForces {
     duration_s: f64,
     mean_force_n: f64,
     /// how far the mean of a tenth of a second was from what was set, at most
@@ -66,17 +66,17 @@ struct SlideFelt {
 impl SlideRecordOfFile {
     fn of(probed: &ProbedSlide) -> Self {
         let ending = probed.record.as_ref().map(|record| record.ending.to_string()).or_else(|| probed.refused.clone());
-        let felt = probed.record.as_ref().map(|record| SlideFelt {
+        let forces = probed.record.as_ref().map(|record| SlideForces {
             duration_s: (record.stamps_ns[1] - record.stamps_ns[0]) as f64 * 1e-9,
             mean_force_n: record.mean_force,
             worst_force_error_n: record.worst_force,
             largest_force_n: record.peak_force,
         });
-        Self { ending: ending.unwrap_or_default(), length_mm: probed.slide.length() * 1e3, felt }
+        Self { ending: ending.unwrap_or_default(), length_mm: probed.slide.length() * 1e3, forces }
     }
 }
 
-/// What is told at the end.
+/// The summary of a probing.
 #[derive(Debug, Serialize)]
 pub(in crate::cli) struct ProbingSummary {
     features: Vec<ProbedRecord>,
@@ -136,12 +136,15 @@ impl ProbingSummary {
 
 impl fmt::Display for ProbingSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let reached = self.features.iter().filter(|record| record.code == code(&Ending::ToleranceReached)).count();
+        writeln!(f, "tolerance reached: {reached} of {} features", self.features.len())?;
         for record in &self.features {
             let ProbedRecord { flag, kind, touches, duration_s, largest_force_n, ending, .. } = record;
-            write!(f, "{kind} {flag}: {touches} touches, {duration_s:.0} s, {largest_force_n:.1} N at most; {ending}")?;
+            write!(f, "{kind} {flag}: {ending}")?;
             if let Some(feature) = &record.feature {
-                write!(f, "\n  {}", numbers(feature))?;
+                write!(f, ": {}", numbers(feature))?;
             }
+            write!(f, "\n  {touches} touches, {duration_s:.0} s, {largest_force_n:.1} N at most")?;
             for slide in &record.slides {
                 write!(f, "\n  {slide}")?;
             }
@@ -154,8 +157,8 @@ impl fmt::Display for ProbingSummary {
 impl fmt::Display for SlideRecordOfFile {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "slide of {:.0} mm: {}", self.length_mm, self.ending)?;
-        match &self.felt {
-            Some(SlideFelt { duration_s, mean_force_n, worst_force_error_n, .. }) => {
+        match &self.forces {
+            Some(SlideForces { duration_s, mean_force_n, worst_force_error_n, .. }) => {
                 write!(f, " after {duration_s:.1} s, {mean_force_n:.2} N, at most {worst_force_error_n:.2} N off")
             }
             None => Ok(()),

@@ -326,7 +326,7 @@ fn check_outcome(output: &Output, out: &Path, unit: MeshUnit, faces: impl FnOnce
         assert!(!out.exists(), "{what}: no result");
         return;
     }
-    let loss = told(output).lines().last().is_some_and(|line| line.starts_with("touchup: done with losses: "));
+    let loss = told(output).lines().last().is_some_and(|line| line.starts_with("{\"kind\":\"losses\""));
     assert_eq!(loss, code == 4, "{what}: {}", told(output));
     let patch = &any_summary(output)["patch"];
     let [added, removed] = ["added_faces", "removed_faces"].map(|key| patch[key].as_u64().unwrap_or(0) as usize);

@@ -132,7 +132,7 @@ fn slides_bring_the_mesh_to_the_part() {
             assert_eq!(slides > 0, more.contains(&"--slide"));
             for slide in probed["features"][0]["slides"].as_array().into_iter().flatten() {
                 assert_eq!(slide["ending"], "arrived", "{slide}");
-                assert!(slide["felt"]["worst_force_error_n"].as_f64().unwrap() < 0.3, "{slide}");
+                assert!(slide["forces"]["worst_force_error_n"].as_f64().unwrap() < 0.3, "{slide}");
             }
             off(folder.path())
         });

@@ -30,9 +30,9 @@ pub enum Ending {
 impl std::fmt::Display for Ending {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::ToleranceReached => f.write_str("known as well as was asked"),
-            Self::TouchesSpent => f.write_str("the touches are spent before it is known as well as was asked"),
-            Self::TimeSpent => f.write_str("the time is spent before it is known as well as was asked"),
+            Self::ToleranceReached => f.write_str("tolerance reached"),
+            Self::TouchesSpent => f.write_str("tolerance not reached: the touches are spent"),
+            Self::TimeSpent => f.write_str("tolerance not reached: the time is spent"),
             Self::NothingFound(error) => write!(f, "nothing found: {error}"),
             Self::Cancelled => f.write_str("cancelled: the arm stopped and retracted"),
             Self::OutOfLimits(error) => write!(f, "not begun: {error}"),

@@ -75,9 +75,10 @@ pub struct PatchSummary {
     removed_faces: usize,
     /// faces that came
     added_faces: usize,
-    /// share of the new vertices that rest on what was felt nearby, not there
+    /// share of the new vertices that rest on contacts nearby, not there
     guessed_share: f64,
-    build_s: f64,
+    /// time of the reconstruction, s
+    pub build_s: f64,
 }
 
 /// Features of a mesh and the touches on it, also as a file has them.
@@ -195,11 +196,11 @@ impl PatchSummary {
 
 impl fmt::Display for PatchSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { pitch_mm, removed_faces, added_faces, guessed_share, build_s } = self;
+        let Self { pitch_mm, removed_faces, added_faces, guessed_share, .. } = self;
         write!(
             f,
-            "meshed anew: {added_faces} faces of {pitch_mm:.2} mm for {removed_faces} of the scan, {:.0} % of their \
-             vertices guessed, in {build_s:.2} s",
+            "{removed_faces} faces of the scan replaced by {added_faces} faces of {pitch_mm:.2} mm ({:.0} % of their vertices \
+             guessed)",
             guessed_share * 100.0
         )
     }

@@ -35,8 +35,8 @@ struct OutlierSummary {
     contacts: u64,
 }
 
-/// So many are told.
-const TOLD: usize = 8;
+/// So many are listed.
+const MOST_LISTED: usize = 8;
 
 impl UncertaintySummary {
     /// What a patcher says of its result.
@@ -45,13 +45,23 @@ impl UncertaintySummary {
         let mut touched: Vec<f64> =
             known.filter(|(_, support)| **support == Support::Touched).map(|(sigma, _)| sigma * 1e3).collect();
         touched.sort_by(f64::total_cmp);
-        let skipped = outliers.last().count().saturating_sub(TOLD);
+        let skipped = outliers.last().count().saturating_sub(MOST_LISTED);
         Self {
             touched_sigma_mm: touched.get(touched.len() / 2).copied().unwrap_or_default(),
             rejected: outliers.rejected,
             relocated: outliers.relocated,
             outliers: outliers.last().skip(skipped).map(OutlierSummary::of).collect(),
         }
+    }
+}
+
+impl UncertaintySummary {
+    /// Where the last outlier is, and how far off.
+    pub fn last_outlier(&self) -> Option<String> {
+        let OutlierSummary { point_mm: [x, y, z], off_mm, sigmas, .. } = self.outliers.last()?;
+        Some(format!(
+            "last outlier: at ({x:.1}, {y:.1}, {z:.1}) mm, {off_mm:+.3} mm or {sigmas:.0} standard deviations off"
+        ))
     }
 }
 
@@ -71,16 +81,11 @@ impl OutlierSummary {
 
 impl fmt::Display for UncertaintySummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { touched_sigma_mm, rejected, relocated, outliers } = self;
+        let Self { touched_sigma_mm, rejected, relocated, .. } = self;
         write!(
             f,
-            "known: within {touched_sigma_mm:.3} mm (median standard deviation) where touched; {rejected} contacts rejected \
-             as outliers, {relocated} places moved by a second pass"
-        )?;
-        let Some(OutlierSummary { point_mm: [x, y, z], off_mm, sigmas, .. }) = outliers.last() else { return Ok(()) };
-        write!(
-            f,
-            "; last outlier at ({x:.1}, {y:.1}, {z:.1}) mm, {off_mm:+.3} mm or {sigmas:.0} standard deviations off"
+            "± {touched_sigma_mm:.3} mm where touched (median standard deviation); {rejected} contacts rejected as outliers, \
+             {relocated} places moved by a second pass"
         )
     }
 }
