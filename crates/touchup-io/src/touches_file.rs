@@ -135,7 +135,7 @@ pub fn read_touches(path: &Path) -> Result<Vec<ProbedPoint>, TouchesFileError> {
     Ok(touches)
 }
 
-/// Touches come in order of time, and all within a span that can be told in ns.
+/// Touches come in order of time, and all within a span that ns can count.
 fn in_order(before: &[ProbedPoint], touch: ProbedPoint) -> Result<ProbedPoint, String> {
     let (Some(first), Some(last)) = (before.first(), before.last()) else { return Ok(touch) };
     let ProbedPoint { stamp_ns, stroke, .. } = touch;

@@ -131,7 +131,7 @@ impl MeasuredChapters {
     }
 }
 
-/// Measures what is asked for, writes it, and tells the verdict.
+/// Measures what is asked for, writes it, and prints the verdict.
 pub fn report(arguments: &ReportArguments) -> Result<(), CommandError> {
     let ReportArguments { out, json, .. } = arguments;
     let write_error = |path: &Path| {

@@ -1,6 +1,6 @@
 //! Error against run time, stability, and what each part costs: everything that `touchup-report` measures and shows.
 //!
-//! Each part measures into a type of its own, tells it as a [`Chapter`], and hands on what the verdict needs.
+//! Each part measures into a type of its own, writes it as a [`Chapter`], and hands on what the verdict needs.
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
 pub mod allocations;

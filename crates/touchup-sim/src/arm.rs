@@ -132,7 +132,7 @@ impl ArmParams {
 /// What goes wrong, when it is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ArmFault {
-    /// No state comes any more; the arm stops when nobody tells it anything.
+    /// No state comes any more; the arm stops when no command comes.
     LinkLost,
     /// States come, and their stamps stand still; the arm stands.
     ControllerKilled,
@@ -149,7 +149,7 @@ const PERIOD: f64 = 2e-3;
 /// Steps of the motion in it.
 const STEPS: usize = 4;
 const STEP: f64 = PERIOD / STEPS as f64;
-/// An arm that nobody tells anything stops after this time, s: the watchdog that is set in a UR.
+/// An arm that receives no command stops after this time, s: the watchdog that is set in a UR.
 const WATCHDOG: f64 = 0.1;
 /// With which it stops when it has to, m/s².
 const HARD_STOP: f64 = 8.0;

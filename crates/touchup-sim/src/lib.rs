@@ -1,7 +1,7 @@
 //! Known surfaces, a scanner and a stylus to test against.
 //!
 //! A [`Surface`] knows how far every point is from it. The scanner makes a bad mesh of one, the stylus slides a ball
-//! over it and says what it felt ([`touch`]). All randomness comes from a seed.
+//! over it and records its contacts ([`touch`]). All randomness comes from a seed.
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
 mod arm;

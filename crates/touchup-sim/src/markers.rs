@@ -92,7 +92,7 @@ fn uniform(rng: &mut Pcg64, [low, high]: [f64; 2]) -> f64 {
 
 /// The frames of a camera that watches a simulated touch.
 ///
-/// The markers sit on the handle, so that they tell the pose of a stylus that does not bend, as the poses do.
+/// The markers sit on the handle, so that they give the pose of a stylus that does not bend, as the poses do.
 ///
 /// - `stiffness`: of the tip, N/m.
 ///

@@ -9,7 +9,7 @@ use touchup_core::mesh::{BoxQuery, FaceHit, FaceId, FaceTree, MeshError, TriMesh
 
 /// A triangle mesh with exact distances to its triangles.
 ///
-/// Inside and outside are told apart by the face, edge or vertex that is closest: by the sum of the normals of the faces
+/// Inside and outside are distinguished by the face, edge or vertex that is closest: by the sum of the normals of the faces
 /// that meet there, weighted by their angles [Bærentzen & Aanæs 2005]. That is right for closed meshes without
 /// self-intersection whose faces look outwards; where a mesh is open, the side of the nearest face decides.
 pub struct MeshSurface<'a> {

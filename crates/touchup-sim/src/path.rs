@@ -193,7 +193,7 @@ pub fn plan_demo(plate: &Plate, params: &PathParams) -> Result<Vec<Stroke>, SimE
     strokes.extend(raster(&region([step - 4e-3, 0.010], [step + 5e-3, 0.036]), Lines::AlongX, params)?);
     strokes.extend(raster(&region([step - 1e-3, 0.010], [step + 2e-3, 0.036]), Lines::AlongY, params)?);
     for (e, inside) in [(&plate.through, true), (&plate.blind, true), (&plate.slot, true), (&plate.boss, false)] {
-        // near the floor (floor and wall are felt together), half way, and just below the rim
+        // near the floor (the ball touches floor and wall at once), half way, and just below the rim
         let heights = [e.low + 0.9 * params.radius, (e.low + e.high) / 2.0, e.high - params.radius / 2.0];
         strokes.extend(around_wall(&e.outline, inside, &heights, clear, params));
     }

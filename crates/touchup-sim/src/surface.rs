@@ -1,4 +1,4 @@
-//! What every known surface can tell: how far away it is, and where it is closest.
+//! What every known surface answers: how far away it is, and where it is closest.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 

@@ -110,7 +110,7 @@ impl McapReader {
         self.described.channels.values().cloned().collect()
     }
 
-    /// Messages on the two topics, when the index tells.
+    /// Messages on the two topics, when the index says.
     pub fn promised(&self) -> Option<u64> {
         self.promised
     }
@@ -233,7 +233,7 @@ fn unpack_chunk(chunk: &[u8], records: &mut Vec<u8>) -> Result<(), Damage> {
     let packed_len = fields.u64("packed size of a chunk")?;
     let packed = fields.bytes(packed_len, "records of a chunk")?;
     check_length("unpacked chunk", announced)?;
-    // one byte more than announced tells that there is more
+    // one byte more than announced shows that there is more
     let limit = announced + 1;
     match compression.as_str() {
         "" => packed.take(limit).read_to_end(records)?,
@@ -282,7 +282,7 @@ impl Described {
     }
 }
 
-/// What the end of the file tells about the rest.
+/// What the end of the file says about the rest.
 struct Index {
     described: Described,
     /// Messages on each channel, when the file has statistics.

@@ -80,7 +80,7 @@ impl Topics {
         }
     }
 
-    /// The two that are read: what tells the pose, and the wrench.
+    /// The two that are read: the topic of the pose, and that of the wrench.
     fn kinds(&self) -> [TopicKind; 2] {
         [if self.markers.is_some() { TopicKind::Markers } else { TopicKind::Pose }, TopicKind::Wrench]
     }

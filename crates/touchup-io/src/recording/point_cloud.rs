@@ -1,4 +1,4 @@
-//! Markers as `sensor_msgs/msg/PointCloud2`: one point for each, with fields x, y, z and, where the camera tells markers
+//! Markers as `sensor_msgs/msg/PointCloud2`: one point for each, with fields x, y, z and, where the camera identifies markers
 //! apart, `id`.
 //!
 //! Without `id` a point's place in the cloud is its label. A point that is not finite was not seen. Sizes in a message

@@ -53,7 +53,7 @@ pub struct RecordingReader {
 impl RecordingReader {
     /// Opens a recording: an `.mcap` or `.db3` file, either of them compressed by zstd as a whole, or a rosbag2 folder
     /// with its `metadata.yaml`, whose files are read in the order named there; without it the .mcap files of the folder, in
-    /// the order of their names. Files are told by their content.
+    /// the order of their names. Their content decides the format.
     ///
     /// # Errors
     /// [`RecordingError::MissingTopic`], [`RecordingError::WrongType`] and [`RecordingError::WrongEncoding`] when the
@@ -78,7 +78,7 @@ impl RecordingReader {
         Ok(reader)
     }
 
-    /// Messages on the two topics, for a progress bar; `None` when a file does not tell (MCAP without its end).
+    /// Messages on the two topics, for a progress bar; `None` when a file does not say (MCAP without its end).
     pub fn message_count(&self) -> Option<u64> {
         self.message_count
     }

@@ -26,7 +26,7 @@ pub struct SegmentedWriter {
     flushed_length: u64,
 }
 
-/// What `metadata.yaml` tells of one file.
+/// What `metadata.yaml` says of one file.
 #[derive(Clone, Debug)]
 struct FileSegment {
     name: String,

@@ -8,11 +8,11 @@ use crate::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Series, Spread, Ta
 
 /// A time within this of the law is no more than the law.
 const NO_MORE: f64 = 1.05;
-/// A difference of whole pushes below this share of a push is not told from noise.
+/// A difference of whole pushes below this share of a push cannot be distinguished from noise.
 const TELLING: f64 = 0.02;
 
 impl Cost {
-    /// As it is told.
+    /// As it is printed.
     pub fn chapter(&self) -> Chapter {
         Chapter {
             title: "Cost of each stage".to_owned(),

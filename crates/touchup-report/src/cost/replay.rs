@@ -74,7 +74,7 @@ fn messages(sample: &Sample) -> [Message; 2] {
     [Message::Pose(StampedPose { stamp_ns, pose_ot }), Message::Wrench(StampedWrench { stamp_ns, wrench })]
 }
 
-/// Samples per second of work that tells how many it did.
+/// Samples per second of work that reports how many it did.
 fn rate(work: impl FnOnce() -> Result<usize, CostError>) -> Result<f64, CostError> {
     let started = Instant::now();
     let count = work()?;

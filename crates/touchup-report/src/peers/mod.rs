@@ -41,7 +41,7 @@ pub struct TouchupTimes {
     pub push_us: Spread,
 }
 
-/// One peer as the script tells it.
+/// One peer as the script reports it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PeerTimes {
     /// which
@@ -68,7 +68,7 @@ pub struct PeerTimes {
     pub largest_difference: Option<f64>,
 }
 
-/// A spread as the script tells it.
+/// A spread as the script reports it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpreadOf {
     median: f64,

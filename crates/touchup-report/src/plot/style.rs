@@ -1,8 +1,8 @@
-//! How one series is told from another: by colour, and without it by mark and dashes.
+//! How one series differs from another: by colour, and without it by mark and dashes.
 
 use super::writer::Svg;
 
-/// Colours that colour-blind readers tell apart too (Okabe and Ito), dark enough on white.
+/// Colours that colour-blind readers distinguish too (Okabe and Ito), dark enough on white.
 const COLOURS: [&str; 8] = ["#0072b2", "#d55e00", "#009e73", "#b5559b", "#3a9bd9", "#b87d00", "#000000", "#7a7a7a"];
 /// Of the lines between marks.
 const DASHES: [&str; 4] = ["", "7 3", "2 3", "9 3 2 3"];

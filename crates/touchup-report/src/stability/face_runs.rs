@@ -131,7 +131,7 @@ impl FaceRun {
         if self.params.take_out_rigid_offset { 0.0 } else { self.params.model.distance(self.held.force.dot(n)) }
     }
 
-    /// Runs it. A normal whose length is off is set to 1 after each step, as anybody would do; that it was off is told apart.
+    /// Runs it. A normal whose length is off is set to 1 after each step, as anybody would do; that it was off is reported apart.
     pub fn judge(&self, integrator: Integrator) -> JudgedRun {
         let (mut held, mut n) = (self.held, self.n);
         let towards = held.force.normalize();

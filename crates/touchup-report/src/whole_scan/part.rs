@@ -1,4 +1,4 @@
-//! The parts that are touched: a known surface, a bad scan of it, and what was felt.
+//! The parts that are touched: a known surface, a bad scan of it, and the contacts.
 
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 
@@ -15,7 +15,7 @@ use touchup_sim::{
     plan_demo, raster, scan, touch,
 };
 
-/// A scan, the part as it is, and what was felt on it, as the caller has them; all in O.
+/// A scan, the part as it is, and the contacts on it, as the caller has them; all in O.
 #[derive(Clone, Debug)]
 pub struct Given {
     /// how the report calls it
@@ -34,7 +34,7 @@ pub struct Given {
     pub scan_noise: f64,
 }
 
-/// A contact as it was felt.
+/// A contact as it was measured.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FeltContact {
     /// centre of a tip that does not bend, m: all that is known without a force
