@@ -14,6 +14,9 @@ use touchup::ros::messages::{
     ProbeFeedback, ProbeResponse, ProbeResult, ProbeTouch, SetBoolResponse, UndoResponse, Vector3,
 };
 use touchup::ros::port::{Arrival, Call, GoalEnd, Publication};
+use tracing_subscriber::filter::{LevelFilter, Targets};
+use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::util::SubscriberInitExt;
 
 /// A tile of 500 triangles, each point different.
 fn tile(id: i32) -> Marker {
@@ -43,7 +46,11 @@ fn touch(id: u32, index: u32) -> ProbeTouch {
 }
 
 fn main() -> anyhow::Result<()> {
-    tracing_subscriber::fmt().with_writer(std::io::stderr).with_env_filter("warn,touchup=info").init();
+    let filter = Targets::new().with_default(LevelFilter::WARN).with_target("touchup", LevelFilter::INFO);
+    tracing_subscriber::registry()
+        .with(tracing_subscriber::fmt::layer().with_writer(std::io::stderr))
+        .with(filter)
+        .init();
     let (own, ros) = split(std::env::args().skip(1));
     let tiles: i32 = own.first().map_or(Ok(0), |count| count.parse())?;
     let config = NodeConfig::new(&ros, |name| std::env::var(name).ok())?;
