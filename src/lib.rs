@@ -37,3 +37,7 @@ pub const FEATURES: [(&str, bool); 3] = [
     ("feature r2r", cfg!(feature = "r2r")),
     ("feature ur", cfg!(feature = "ur")),
 ];
+
+#[cfg(test)]
+#[path = "../tests/common/colour_vision.rs"]
+mod colour_vision;

@@ -6,19 +6,20 @@ mod table;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use serde::Serialize;
 use tracing::warn;
 
 use self::alignment::{Alignment, aligned_by_features, aligned_by_icp, aligned_by_pairs, moved};
 use self::table::ComparisonReport;
 use super::progress::WorkProgress;
-use super::{CliError, Losses, Threads, print_result};
+use super::{CliError, Losses, Threads, print_result, today};
 use crate::compare::{
-    CompareParams, Comparison, IndexedMesh, PicturePanel, PictureParams, Regions, SupportRegion, colour_of,
-    compare as compare_shapes, draw_picture,
+    CompareParams, Comparison, IndexedMesh, PictureLabel, PicturePanel, PictureParams, Regions, SupportRegion,
+    colour_of, compare as compare_shapes, draw_picture,
 };
 use crate::io::atomic::{AtomicFile, is_same_file};
+use crate::io::features_file::{FeatureRecord, read_features};
 use crate::io::mesh_file::{MeshFile, MeshUnit, VertexColumn, read_mesh, read_vertex_columns, write_mesh_with};
 use crate::io::png::write_png;
 use crate::mesh::{FaceTree, TriMesh};
@@ -56,6 +57,12 @@ pub(super) struct CompareArguments {
     /// Ends of the colours and of the histogram, mm; by default from the 95th percentile
     #[arg(long, value_name = "R", value_parser = positive)]
     range_mm: Option<f64>,
+    /// Deviations of at most this are within tolerance: their share is listed, and the picture has one colour for them
+    #[arg(long, value_name = "T", value_parser = positive)]
+    tolerance_mm: Option<f64>,
+    /// Names the holes, slots, pockets and bosses of this file in the picture; it is in the frame of MESH, as `refine` writes it
+    #[arg(long, value_name = "JSON", requires = "picture")]
+    features: Option<PathBuf>,
     /// From which direction the picture is taken, in the frame of TRUTH; by default the side that was touched
     #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', num_args = 3, allow_negative_numbers = true)]
     view: Option<Vec<f64>>,
@@ -164,7 +171,13 @@ pub(super) fn compared(arguments: &CompareArguments) -> Result<CompareReport, Cl
     let mesh = PlacedMesh::new(moved(&as_read, &pose));
     let before = before.map(|scan| PlacedMesh::new(moved(&scan, &pose)));
     let measured = arguments.measure(&mesh, &truth, before.as_ref(), regions.as_deref())?;
-    arguments.draw(&mesh, before.as_ref(), &measured, regions.as_deref())?;
+    if let Some(path) = &arguments.picture {
+        let labels = arguments.features.as_deref().map(|features| feature_labels(features, &pose)).transpose()?;
+        let caption =
+            format!("{}; {}", today(), alignment.as_ref().map_or("not aligned".to_owned(), Alignment::in_short));
+        let drawing = Drawing { caption, labels: labels.unwrap_or_default(), regions: regions.as_deref() };
+        arguments.draw(path, &mesh, before.as_ref(), &measured, &drawing)?;
+    }
     if let Some(path) = &arguments.coloured {
         write_coloured(path, &as_read, arguments.mesh_unit, &measured.after)?;
     }
@@ -177,6 +190,28 @@ pub(super) fn compared(arguments: &CompareArguments) -> Result<CompareReport, Cl
     })
 }
 
+/// What stands in a picture beside the deviations.
+struct Drawing<'a> {
+    caption: String,
+    labels: Vec<PictureLabel>,
+    /// of each vertex slot of the mesh
+    regions: Option<&'a [SupportRegion]>,
+}
+
+/// The names of the features in a file, with their sizes, where the alignment brings them.
+fn feature_labels(path: &Path, pose: &Isometry3<f64>) -> Result<Vec<PictureLabel>, CliError> {
+    let file = read_features(path)?;
+    let label = |feature: &FeatureRecord| {
+        let text = match (feature.kind.as_str(), feature.diameter_mm, feature.width_mm.zip(feature.length_mm)) {
+            (kind @ ("hole" | "boss"), Some(diameter), _) => format!("{kind} Ø{diameter:.2}"),
+            (kind @ ("slot" | "pocket"), _, Some((width, length))) => format!("{kind} {width:.2} × {length:.2}"),
+            _ => return None,
+        };
+        Some(PictureLabel { place: pose * (Point3::from(feature.center_mm?) * 1e-3), text })
+    };
+    Ok(file.features.iter().filter_map(label).collect())
+}
+
 /// Both comparisons, in one range.
 struct MeasuredBoth {
     before: Option<Comparison>,
@@ -184,8 +219,10 @@ struct MeasuredBoth {
 }
 
 impl CompareArguments {
-    /// A picture of a mesh in mm and of what it was before, beside the truth.
-    pub(super) fn of_picture([mesh, truth, before, picture]: [PathBuf; 4]) -> Self {
+    /// A picture of a mesh in mm and of what it was before, beside the truth, with the names of its features.
+    ///
+    /// - `tolerance_mm`: marked in it.
+    pub(super) fn of_picture([mesh, truth, before, features, picture]: [PathBuf; 5], tolerance_mm: f64) -> Self {
         Self {
             mesh,
             truth,
@@ -196,6 +233,8 @@ impl CompareArguments {
             alternative: None,
             pairs: None,
             picture: Some(picture),
+            tolerance_mm: Some(tolerance_mm),
+            features: Some(features),
             view: None,
             coloured: None,
             range_mm: None,
@@ -214,7 +253,9 @@ impl CompareArguments {
     ) -> Result<MeasuredBoth, CliError> {
         let _measuring = WorkProgress::stage("measure");
         let range = self.range_mm.map(|range| range * 1e-3);
-        let params = CompareParams { samples: self.samples as usize, seed: self.seed, range, ..Default::default() };
+        let tolerance = self.tolerance_mm.map(|tolerance| tolerance * 1e-3);
+        let samples = self.samples as usize;
+        let params = CompareParams { samples, seed: self.seed, range, tolerance, ..Default::default() };
         let own = regions.map_or(Regions::Unknown, Regions::Own);
         let Some(before) = before else {
             return Ok(MeasuredBoth {
@@ -230,48 +271,51 @@ impl CompareArguments {
         Ok(MeasuredBoth { before: Some(before), after })
     }
 
-    /// Draws what was measured, where that is asked for.
+    /// Draws what was measured.
     fn draw(
         &self,
+        path: &Path,
         mesh: &PlacedMesh,
         before: Option<&PlacedMesh>,
         measured: &MeasuredBoth,
-        regions: Option<&[SupportRegion]>,
+        drawing: &Drawing<'_>,
     ) -> Result<(), CliError> {
-        let Some(path) = &self.picture else { return Ok(()) };
         let _drawing = WorkProgress::stage("draw");
         let name = |path: &Path| path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned());
         let title = format!("{} against {}", name(&self.mesh), name(&self.truth));
-        let scan = before.zip(measured.before.as_ref()).zip(self.before.as_ref()).map(|((placed, compared), path)| {
-            (placed, compared, format!("before: {}", name(path)), table::note(compared))
-        });
-        let now = (mesh, &measured.after, format!("after: {}", name(&self.mesh)), table::note(&measured.after));
+        let note = |compared| table::note(compared, self.tolerance_mm);
+        let scan = before
+            .zip(measured.before.as_ref())
+            .zip(self.before.as_ref())
+            .map(|((placed, compared), path)| (placed, compared, format!("before: {}", name(path)), note(compared)));
+        let now = (mesh, &measured.after, format!("after: {}", name(&self.mesh)), note(&measured.after));
         let panels: Vec<PicturePanel<'_>> = scan
             .iter()
             .chain([&now])
             .map(|(placed, compared, title, note)| PicturePanel {
-                mesh: &placed.mesh,
                 deviations: &compared.vertex_deviations,
-                classes: None,
-                paint: None,
+                histogram: table::shown(compared).map(|part| &part.histogram),
                 title: if scan.is_some() { title } else { "" },
                 note,
+                ..PicturePanel::of(&placed.mesh)
             })
             .collect();
-        let weights = regions.filter(|regions| regions.contains(&SupportRegion::Touched)).map(|regions| {
-            regions.iter().map(|region| if *region == SupportRegion::Touched { 1.0 } else { 0.0 }).collect::<Vec<f64>>()
+        let is_touched = |region: &SupportRegion| *region == SupportRegion::Touched;
+        let weights = drawing.regions.filter(|regions| regions.iter().any(is_touched)).map(|regions| {
+            regions.iter().map(|region| if is_touched(region) { 1.0 } else { 0.0 }).collect::<Vec<f64>>()
         });
-        let from = self.view.as_ref().map(|view| Vector3::from_column_slice(view));
         let params = PictureParams {
             title: &title,
-            width: 1600,
+            caption: &drawing.caption,
             range: measured.after.range,
-            from,
+            tolerance: self.tolerance_mm.map(|tolerance| tolerance * 1e-3),
+            from: self.view.as_ref().map(|view| Vector3::from_column_slice(view)),
             weights: weights.as_deref(),
-            legend: &[],
+            labels: &drawing.labels,
+            ..PictureParams::default()
         };
         let picture = draw_picture(&panels, &params);
-        let write = |source| CliError::Write { path: path.clone(), source };
+        let write = |source| CliError::Write { path: path.to_owned(), source };
         write_png(path, picture.size, &picture.pixels).map_err(write)
     }
 
@@ -304,9 +348,8 @@ impl CompareArguments {
             if !shown.to_string().to_ascii_lowercase().ends_with(ending) {
                 return Err(CliError::Usage(format!("{flag} {shown} must end in {ending}")));
             }
-            for input in
-                [Some(&self.mesh), Some(&self.truth), self.before.as_ref(), self.pairs.as_ref()].into_iter().flatten()
-            {
+            let others = [self.before.as_ref(), self.pairs.as_ref(), self.features.as_ref()];
+            for input in [&self.mesh, &self.truth].into_iter().chain(others.into_iter().flatten()) {
                 if is_same_file(input, path) {
                     return Err(CliError::Usage(format!(
                         "{flag} would write over {shown}, which is compared: choose another place"

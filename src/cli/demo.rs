@@ -25,6 +25,9 @@ use crate::sim::{PathParams, Plate, ScannerParams, StylusParams, measure_quality
 /// Largest distance of the written plate's round walls from circles, m.
 const CHORD_ERROR: f64 = 10e-6;
 
+/// What the pictures of the demo call within tolerance, mm: medium of ISO 2768-1 for lengths of up to 6 mm.
+pub(super) const TOLERANCE_MM: f64 = 0.1;
+
 #[derive(Debug, Args)]
 pub(super) struct DemoArguments {
     /// Folder for truth.ply, scan.ply, touch.mcap, refined.ply, features.json, touches.csv, deviation.png (all in mm) and
@@ -88,8 +91,9 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
     let MeshFile { mesh: refined, .. } = read_mesh(&refined_path, MeshUnit::Millimetre).map_err(CliError::ReadMesh)?;
 
     let found = FoundTable::of(&plate.features(), &read_features(&features_path)?.features);
-    let picture = [refined_path, arguments.out.join("truth.ply"), scan_path, arguments.out.join("deviation.png")];
-    compared(&CompareArguments::of_picture(picture))?;
+    let picture = arguments.out.join("deviation.png");
+    let drawn = [refined_path, arguments.out.join("truth.ply"), scan_path, features_path, picture.clone()];
+    compared(&CompareArguments::of_picture(drawn, TOLERANCE_MM))?;
 
     let _measuring = WorkProgress::stage("measure");
     let touched = TouchedTruth::of(&touch.moments);
@@ -102,7 +106,6 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
         found,
     };
     demo.write(arguments)?;
-    let picture = arguments.out.join("deviation.png");
     print_result(&format!(
         "{demo}\nwrote {}; where it was wrong and is right: {}",
         arguments.out.display(),

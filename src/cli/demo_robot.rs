@@ -10,7 +10,7 @@ use rand_pcg::Pcg64;
 use serde::Serialize;
 
 use super::compare::{CompareArguments, compared};
-use super::demo::DemoArguments;
+use super::demo::{DemoArguments, TOLERANCE_MM};
 use super::probing::{Done, Probing, ProbingSummary};
 use super::progress::WorkProgress;
 use super::{CliError, Losses, print_result};
@@ -82,8 +82,8 @@ pub(super) fn demo_robot(arguments: &DemoArguments) -> Result<Losses, CliError> 
     probing.planned(&ready, &mut arm)?;
     let Done { summary, probed, losses } = probing.done(&ready, &mut arm)?;
 
-    let picture = [out.join("refined.ply"), truth_path, scan_path, out.join("deviation.png")];
-    compared(&CompareArguments::of_picture(picture))?;
+    let [refined, names, picture] = ["refined.ply", "features.json", "deviation.png"].map(|name| out.join(name));
+    compared(&CompareArguments::of_picture([refined, truth_path, scan_path, names, picture], TOLERANCE_MM))?;
     let errors = flags.iter().zip(&features).map(|(flag, truth)| {
         let probed = probed.iter().find(|probed| probed.flag == flag.id);
         ProbedError::of(flag, truth, probed)

@@ -212,22 +212,20 @@ impl DisagreeArguments {
         let weights: Vec<f64> = map.classes.iter().map(|class| if is_touched(class) { 1.0 } else { 0.0 }).collect();
         let range = found.scanner.map_or(1e-3, |scanner| (4.0 * scanner.noise + scanner.offset.abs()).max(1e-6));
         let panel = |classes, title| PicturePanel {
-            mesh: refined,
             deviations: &map.disagreement,
             classes,
-            paint: None,
             title,
-            note: "",
+            ..PicturePanel::of(refined)
         };
         let panels = [panel(Some(&map.classes[..]), "why"), panel(None, "touch - scan")];
         let file = |path: &Path| path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned());
         let params = PictureParams {
             title: &format!("where {} and the scan {} disagree", file(&self.refined), file(&self.scan)),
-            width: 1600,
+            caption: &super::today(),
             range,
             from: self.view.as_ref().map(|view| Vector3::from_column_slice(view)),
             weights: Some(&weights),
-            legend: &[],
+            ..PictureParams::default()
         };
         let picture = draw_picture(&panels, &params);
         let write = |source| CliError::Write { path: path.clone(), source };

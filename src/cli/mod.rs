@@ -40,7 +40,9 @@ use std::ffi::OsString;
 use std::io::{ErrorKind, Write, stderr, stdin, stdout};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::SystemTime;
 
+use chrono::{DateTime, Utc};
 use clap::{CommandFactory, Parser, Subcommand};
 use tracing_subscriber::filter::{LevelFilter, Targets};
 
@@ -433,6 +435,11 @@ fn check_kept_by(by: &str, flag: &str, input: &Path, output: &Path) -> Result<()
 /// One line on stderr, of what is no error.
 fn notify(line: &str) {
     let _ = writeln!(stderr(), "touchup: {}", line.replace('\n', " "));
+}
+
+/// The date of the system clock (UTC), as pictures carry it.
+fn today() -> String {
+    DateTime::<Utc>::from(SystemTime::now()).format("%Y-%m-%d").to_string()
 }
 
 /// One line, or several, on stdout. A reader that has gone away is no error of ours.

@@ -385,12 +385,12 @@ impl RefineArguments {
                 pushes.push(&mut rates, sample);
                 let contact = match &mut observer {
                     Some(observer) => observer.observe(sample).ok(),
-                    None => rates.refiner().contact().copied(),
+                    None => rates.refiner().contact(),
                 };
-                if let (Some(clock), Some(contact)) = (&mut clock, &contact) {
+                if let (Some(clock), Some(contact)) = (&mut clock, contact) {
                     clock.push(contact);
                 }
-                if let (Some(contacts), Some(contact)) = (&mut contacts, &contact) {
+                if let (Some(contacts), Some(contact)) = (&mut contacts, contact) {
                     contacts.push(contact);
                 }
             })?;

@@ -35,7 +35,7 @@ fn path(stylus: &StylusParams) -> Vec<Stroke> {
 pub fn contacts_of(radius: f64, stiffness: Option<f64>, samples: &[Sample]) -> Vec<ContactSample> {
     let params = ContactEstimatorParams::new(TipParams { radius, stiffness });
     let mut estimator = ContactEstimator::new(params).unwrap();
-    samples.iter().map(|sample| estimator.observe(sample).unwrap()).collect()
+    samples.iter().map(|sample| *estimator.observe(sample).unwrap()).collect()
 }
 
 /// With what the simulator knows of it.

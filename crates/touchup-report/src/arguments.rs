@@ -14,8 +14,8 @@ use touchup_io::mesh_file::{MeshFileError, MeshUnit, read_mesh};
 use touchup_io::recording::{RecordingError, Topics};
 use touchup_report::cost::{CostError, cost};
 use touchup_report::{
-    Chapter, Effort, Given, Report, ReportError, WholeScanError, WorkPrecision, convergence, extremes, stability,
-    verdict, whole_scan,
+    Chapter, Effort, Given, Report, ReportError, Table, TableCell, WholeScanError, WorkPrecision, convergence,
+    extremes, stability, verdict, whole_scan,
 };
 use touchup_session::replay::{Recording, ReplayError, each_sample};
 use touchup_session::scene::{Scene, SceneError};
@@ -121,11 +121,12 @@ enum ReportChapter {
 #[derive(Default)]
 struct MeasuredChapters {
     chapters: Vec<Chapter>,
+    advice: Option<Table>,
     verdict: Vec<String>,
 }
 
 impl MeasuredChapters {
-    fn tell(&mut self, chapter: Chapter, verdict: Vec<String>) {
+    fn add(&mut self, chapter: Chapter, verdict: Vec<String>) {
         self.chapters.push(chapter);
         self.verdict.extend(verdict);
     }
@@ -143,12 +144,13 @@ pub fn report(arguments: &ReportArguments) -> Result<(), CommandError> {
     }
     // before minutes of measuring
     create_folder(out).map_err(write_error(out))?;
-    let MeasuredChapters { chapters, verdict } = measure(arguments, &mut lines_on_stderr())?;
+    let MeasuredChapters { chapters, advice, verdict } = measure(arguments, &mut lines_on_stderr())?;
     let report = Report {
         machine: describe_machine(),
         commit: COMMIT.to_owned(),
         command: command(arguments),
         date: DateTime::<Utc>::from(SystemTime::now()).format("%Y-%m-%d %H:%M UTC").to_string(),
+        advice,
         verdict,
         chapters,
     };
@@ -159,9 +161,18 @@ pub fn report(arguments: &ReportArguments) -> Result<(), CommandError> {
     if *json {
         print(&serde_json::to_string(&report).map_err(ReportError::from)?);
     } else {
-        print(&format!("{}\n\nwrote {}", report.verdict.join("\n\n"), out.join("report.html").display()));
+        let advice = report.advice.iter().flat_map(|table| table.rows.iter().map(|row| advice_line(row)));
+        let lines: Vec<String> = advice.chain(report.verdict.iter().cloned()).collect();
+        print(&format!("{}\n\nwrote {}", lines.join("\n\n"), out.join("report.html").display()));
     }
     Ok(())
+}
+
+/// "question: use this. Because …; cost …".
+fn advice_line(row: &[TableCell]) -> String {
+    let cells: Vec<&str> =
+        row.iter().map(|cell| if let TableCell::Text(text) = cell { text.as_str() } else { "" }).collect();
+    cells.into_iter().filter(|text| !text.is_empty()).collect::<Vec<_>>().join("\n  ")
 }
 
 /// Every chapter that is asked for, in the order of the page.
@@ -178,33 +189,32 @@ fn measure(arguments: &ReportArguments, progress: &mut dyn FnMut(&str)) -> Resul
     let mut all = MeasuredChapters::default();
     if is_wanted(ReportChapter::WorkPrecision) {
         let measured = WorkPrecision::measure(effort, progress);
-        all.tell(measured.chapter(), measured.verdict());
+        all.add(measured.chapter(), measured.verdict());
     }
     let scans =
         is_wanted(ReportChapter::WholeScan).then(|| whole_scan(effort, given.as_ref(), progress)).transpose()?;
     if let Some(measured) = &scans {
-        all.tell(measured.chapter(), verdict::of_whole_scans(measured));
+        all.add(measured.chapter(), verdict::of_whole_scans(measured));
     }
     if is_wanted(ReportChapter::Convergence) {
         let measured = convergence(effort, progress);
-        all.tell(measured.chapter(), verdict::of_convergence(&measured));
+        all.add(measured.chapter(), verdict::of_convergence(&measured));
     }
     let stability = is_wanted(ReportChapter::Stability).then(|| stability(effort, progress));
     if let Some(measured) = &stability {
-        all.tell(measured.chapter(), verdict::of_stability(measured));
+        all.add(measured.chapter(), verdict::of_stability(measured));
         progress("extremes");
         let measured = extremes();
-        all.tell(measured.chapter(), verdict::of_extremes(&measured));
+        all.add(measured.chapter(), verdict::of_extremes(&measured));
     }
     let cost = is_wanted(ReportChapter::Cost).then(|| cost(effort, progress)).transpose()?;
     if let Some(measured) = &cost {
-        all.tell(measured.chapter(), verdict::of_cost(measured));
+        all.add(measured.chapter(), verdict::of_cost(measured));
     }
     if let Some(measured) = peers {
-        all.tell(measured.chapter(), verdict::of_peers(&measured));
+        all.add(measured.chapter(), verdict::of_peers(&measured));
     }
-    let short = scans.and_then(|scans| verdict::in_short(&scans, stability.as_ref(), cost.as_ref()));
-    all.verdict.splice(..0, short);
+    all.advice = scans.and_then(|scans| verdict::advice(&scans, stability.as_ref(), cost.as_ref()));
     Ok(all)
 }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use serde::Serialize;
 
-use super::figure::Chapter;
+use super::figure::{Chapter, Drawing, Table};
 use super::{csv, page, plot};
 
 /// Why a report cannot be written down.
@@ -32,7 +32,9 @@ pub struct Report {
     pub command: String,
     /// day and time in UTC
     pub date: String,
-    /// what a practitioner should take from it, a paragraph each
+    /// what a practitioner should take from it: use this, because, cost; `None` where too little was measured to say
+    pub advice: Option<Table>,
+    /// what each part found, a paragraph each
     pub verdict: Vec<String>,
     /// its parts, in order
     pub chapters: Vec<Chapter>,
@@ -55,20 +57,34 @@ impl Report {
     pub fn files(&self) -> Result<Vec<OutputFile>, ReportError> {
         self.check_names()?;
         let provenance = self.provenance();
+        let looks = self.looks();
         let mut files = vec![
             OutputFile::new("report.html".to_owned(), page::html(self)),
             OutputFile::new("report.json".to_owned(), serde_json::to_string_pretty(self)? + "\n"),
         ];
         for chapter in &self.chapters {
             for figure in &chapter.figures {
-                files.push(OutputFile::new(format!("{}.svg", figure.id), plot::svg(figure, &provenance)));
+                files.push(OutputFile::new(format!("{}.svg", figure.id), plot::svg(figure, &looks, &provenance)));
                 files.push(OutputFile::new(format!("{}.csv", figure.id), csv::of_figure(figure)));
             }
-            for table in &chapter.tables {
-                files.push(OutputFile::new(format!("{}.csv", table.id), csv::of_table(table)));
-            }
+        }
+        for table in self.tables() {
+            files.push(OutputFile::new(format!("{}.csv", table.id), csv::of_table(table)));
         }
         Ok(files)
+    }
+
+    fn tables(&self) -> impl Iterator<Item = &Table> {
+        self.advice.iter().chain(self.chapters.iter().flat_map(|chapter| &chapter.tables))
+    }
+
+    /// One look for each series, the same in all figures.
+    pub(super) fn looks(&self) -> plot::Looks {
+        let figures = self.chapters.iter().flat_map(|chapter| &chapter.figures);
+        plot::Looks::of(figures.filter_map(|figure| match &figure.drawing {
+            Drawing::Curves(series) => Some(series.iter().map(|series| series.name.as_str()).collect()),
+            Drawing::Maps { .. } => None,
+        }))
     }
 
     /// What every picture says about where it is from.
@@ -78,7 +94,7 @@ impl Report {
 
     fn check_names(&self) -> Result<(), ReportError> {
         let figures = self.chapters.iter().flat_map(|chapter| chapter.figures.iter().map(|figure| &figure.id));
-        let tables = self.chapters.iter().flat_map(|chapter| chapter.tables.iter().map(|table| &table.id));
+        let tables = self.tables().map(|table| &table.id);
         let mut seen = BTreeSet::from(["report"]);
         for id in figures.chain(tables) {
             if id.is_empty() || !id.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_') {

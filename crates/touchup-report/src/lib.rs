@@ -28,7 +28,6 @@ pub use extremes::{Extreme, Extremes, extremes};
 pub use figure::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Panel, Scale, Series, Spread, Table, TableCell};
 pub use number::three_digits;
 pub use peers::Peers;
-pub use plot::svg;
 pub use stability::{
     BadShape, FaceShares, Integrator, MeshShares, RunEnding, ShareMap, Stability, SubFlowError, stability,
 };

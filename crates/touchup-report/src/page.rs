@@ -3,7 +3,7 @@
 use super::document::Report;
 use super::figure::{Chapter, Figure, Spread, Table, TableCell};
 use super::number::three_digits;
-use super::plot::{escaped, svg};
+use super::plot::{Looks, escaped, svg};
 
 const STYLE: &str = "\
 body{font:16px/1.55 system-ui,'DejaVu Sans',Arial,sans-serif;color:#222;background:#fff;max-width:900px;margin:2em auto;\
@@ -29,11 +29,13 @@ pub(super) fn html(report: &Report) -> String {
          <h1>touchup: what it does, how exactly, and what it costs</h1>\n"
     );
     page += &head(report);
-    page += &format!("<h2 id=\"verdict\">Verdict</h2>\n<div class=\"verdict\">\n{}</div>\n", text(&report.verdict));
+    let advice = report.advice.as_ref().map_or_else(String::new, table);
+    let verdict = text(&report.verdict);
+    page += &format!("<h2 id=\"summary\">Verdict</h2>\n<div class=\"verdict\">\n{advice}{verdict}</div>\n");
     page += &contents(&report.chapters);
-    let provenance = report.provenance();
+    let (looks, provenance) = (report.looks(), report.provenance());
     for (number, chapter) in report.chapters.iter().enumerate() {
-        page += &self::chapter(number, chapter, &provenance);
+        page += &self::chapter(number, chapter, &looks, &provenance);
     }
     page + "</body>\n</html>\n"
 }
@@ -63,9 +65,9 @@ fn anchor(number: usize) -> String {
     format!("chapter{}", number + 1)
 }
 
-fn chapter(number: usize, chapter: &Chapter, provenance: &str) -> String {
+fn chapter(number: usize, chapter: &Chapter, looks: &Looks, provenance: &str) -> String {
     let title = format!("<h2 id=\"{}\">{}. {}</h2>\n", anchor(number), number + 1, escaped(&chapter.title));
-    let figures: String = chapter.figures.iter().map(|figure| self::figure(figure, provenance)).collect();
+    let figures: String = chapter.figures.iter().map(|figure| self::figure(figure, looks, provenance)).collect();
     let tables: String = chapter.tables.iter().map(table).collect();
     title + &text(&chapter.text) + &figures + &tables
 }
@@ -74,12 +76,12 @@ fn text(paragraphs: &[String]) -> String {
     paragraphs.iter().map(|paragraph| format!("<p>{}</p>\n", escaped(paragraph))).collect()
 }
 
-fn figure(figure: &Figure, provenance: &str) -> String {
+fn figure(figure: &Figure, looks: &Looks, provenance: &str) -> String {
     let (id, caption) = (&figure.id, escaped(&figure.caption));
     format!(
         "<figure id=\"{id}\">\n{}<figcaption class=\"caption\">{caption} <a href=\"{id}.csv\">{id}.csv</a> \
          <a href=\"{id}.svg\">{id}.svg</a></figcaption>\n</figure>\n",
-        svg(figure, provenance)
+        svg(figure, looks, provenance)
     )
 }
 

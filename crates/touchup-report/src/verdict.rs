@@ -2,61 +2,92 @@
 //! it fails.
 
 use super::cost::Cost;
+use super::figure::{Table, TableCell};
 use super::whole_scan::{CaseResult, RefineMethod, ScanResult, WayResult};
 use super::{Convergence, Extremes, Integrator, Peers, Rule, Stability, WholeScan, three_digits};
 
-/// Mode, region, step, rate, cost and limits in one paragraph; `None` where no way made any scan better.
-pub fn in_short(scans: &WholeScan, stability: Option<&Stability>, cost: Option<&Cost>) -> Option<String> {
+/// Method and region, step, rate and limits, each with its reason and its cost; `None` where no method made any scan better.
+pub fn advice(scans: &WholeScan, stability: Option<&Stability>, cost: Option<&Cost>) -> Option<Table> {
     let best = by_part(scans, ScanResult::best);
-    let slowest_us = best.iter().map(|(_, way)| way.per_sample_us.median).reduce(f64::max)?;
-    let mut text = format!("In short: take {}.", one_or_each(&best));
-    let haptic = by_part(scans, ScanResult::best_haptic);
-    if !haptic.is_empty() {
-        text += &format!(" Where the haptic update runs alone take {}.", one_or_each(&haptic));
-    }
-    if stability.is_some_and(Stability::is_default_stable) {
-        text += " Leave the step at lie: it was stable in every run.";
-    }
-    text += &format!(
-        " With all of it a sample takes up to {} µs: at 1 kHz {} % of one core, which keeps up with {} samples per second.",
+    let slowest_us = best.iter().map(|choice| choice.method.per_sample_us.median).reduce(f64::max)?;
+    let mut answer = format!(
+        "up to {} µs per sample: at 1 kHz {} % of one core, which keeps up with {} samples per second",
         three_digits(slowest_us),
         three_digits(0.1 * slowest_us),
         three_digits(1e6 / slowest_us)
     );
     if let Some(size) = cost.and_then(|cost| cost.sizes.last()) {
         let answer_us = size.default_larger.time_ns.median * 1e-3;
-        text += &format!(" The haptic update answers it in {} µs, the patch follows.", three_digits(answer_us));
+        answer += &format!("; the haptic update answers in {} µs, the patch follows", three_digits(answer_us));
+    }
+    let mut rows = vec![["method and region".to_owned(), one_or_each(&best), errors(&best), answer]];
+    let haptic = by_part(scans, ScanResult::best_haptic);
+    if let Some(us) = haptic.iter().map(|choice| choice.method.per_sample_us.median).reduce(f64::max) {
+        let cost = format!("up to {} µs per sample", three_digits(us));
+        rows.push(["haptic update alone".to_owned(), one_or_each(&haptic), errors(&haptic), cost]);
+    }
+    if stability.is_some_and(Stability::is_default_stable) {
+        rows.push(["step of the face", "lie", "stable in every run", "two closed forms per sample"].map(str::to_owned));
     }
     let mut fails = Vec::new();
     if let Some(quality) = stability.and_then(Stability::default_stable_from_quality).filter(|quality| *quality > 0.0) {
-        fails.push(format!("on some triangles narrower than {} of their length", three_digits(quality)));
+        fails.push(format!("triangles narrower than {} of their length", three_digits(quality)));
     }
     let of_patch = |scan: &ScanResult| scan.of(RefineMethod::Patch).is_some_and(|patch| !patch.is_sound());
     for case in &scans.cases {
         fails.extend(case.scans.iter().filter(|scan| of_patch(scan)).map(|scan| {
-            format!("on {} in edges of {} mm, where the patch made it worse", case.name, three_digits(scan.edge_mm))
+            format!("{} in edges of {} mm, where the patch made it worse", case.name, three_digits(scan.edge_mm))
         }));
     }
     if !fails.is_empty() {
-        text += &format!(" It fails {}.", fails.join("; "));
+        rows.push(["not for".to_owned(), fails.join("; "), "measured below".to_owned(), String::new()]);
     }
-    Some(text)
+    Some(Table {
+        id: "verdict".to_owned(),
+        title: "What to take".to_owned(),
+        caption: "Of the parts that were measured here.".to_owned(),
+        heads: ["question", "use this", "because", "cost"].map(str::to_owned).to_vec(),
+        rows: rows.into_iter().map(|row| row.map(TableCell::Text).to_vec()).collect(),
+    })
 }
 
-/// A way on each part where there is one, with the part's name.
-fn by_part<'a>(
-    scans: &'a WholeScan,
-    way: impl Fn(&'a ScanResult) -> Option<&'a WayResult>,
-) -> Vec<(&'a str, &'a WayResult)> {
-    scans.cases.iter().filter_map(|case| Some((case.name.as_str(), way(case.main()?)?))).collect()
+/// The method chosen on a part.
+struct Choice<'a> {
+    part: &'a str,
+    method: &'a WayResult,
+    /// mean error of the scan as it came, mm
+    before_mm: f64,
 }
 
-/// The way, where it is the same on every part, else each with its part.
-fn one_or_each(ways: &[(&str, &WayResult)]) -> String {
-    match ways {
-        [(_, first), others @ ..] if others.iter().all(|(_, way)| way.way == first.way) => first.name.clone(),
-        _ => ways.iter().map(|(part, way)| format!("{} on {part}", way.name)).collect::<Vec<_>>().join("; "),
+/// The method on each part where there is one.
+fn by_part<'a>(scans: &'a WholeScan, method: impl Fn(&'a ScanResult) -> Option<&'a WayResult>) -> Vec<Choice<'a>> {
+    let choice = |case: &'a CaseResult| {
+        let scan = case.main()?;
+        Some(Choice { part: &case.name, method: method(scan)?, before_mm: scan.before.mean_mm() })
+    };
+    scans.cases.iter().filter_map(choice).collect()
+}
+
+/// The method, where it is the same on every part, else each with its part.
+fn one_or_each(choices: &[Choice<'_>]) -> String {
+    match choices {
+        [first, others @ ..] if others.iter().all(|choice| choice.method.way == first.method.way) => {
+            first.method.name.clone()
+        }
+        _ => join(choices, |choice| format!("{} on {}", choice.method.name, choice.part)),
     }
+}
+
+fn errors(choices: &[Choice<'_>]) -> String {
+    let error = |choice: &Choice<'_>| {
+        let [now, before] = [choice.method.mean_mm(), choice.before_mm].map(three_digits);
+        format!("{}: {before} mm off before, {now} mm after", choice.part)
+    };
+    join(choices, error)
+}
+
+fn join(choices: &[Choice<'_>], text: impl Fn(&Choice<'_>) -> String) -> String {
+    choices.iter().map(text).collect::<Vec<_>>().join("; ")
 }
 
 /// Which way, and which region, on each part; and what failed there.
@@ -223,34 +254,43 @@ mod tests {
         }
     }
 
-    fn of(cases: Vec<CaseResult>) -> Option<String> {
-        in_short(&WholeScan { cases, repeats: 1, slow_s: 1.0 }, None, None)
+    /// Each row in one line.
+    fn of(cases: Vec<CaseResult>) -> Option<Vec<String>> {
+        let table = advice(&WholeScan { cases, repeats: 1, slow_s: 1.0 }, None, None)?;
+        let text = |cell: &TableCell| match cell {
+            TableCell::Text(text) => text.clone(),
+            other => panic!("{other:?}"),
+        };
+        Some(table.rows.iter().map(|row| row.iter().map(text).collect::<Vec<_>>().join(" | ")).collect())
     }
 
     #[test]
-    fn what_is_best_everywhere_is_named_once_and_what_fails_is_told() {
+    fn what_is_best_everywhere_is_named_once_and_what_fails_is_listed() {
         let good = |us| way(RefineMethod::Patch, "patch", 0.01, us, false);
-        let text = of(vec![
+        let rows = of(vec![
             case("peaks", vec![vec![good(40.0)], vec![way(RefineMethod::Patch, "patch", 2.0, 50.0, true)]]),
             case(
                 "plate",
                 vec![vec![good(50.0), way(RefineMethod::Robust(Reach::TipRadii(2.0)), "two radii", 0.3, 10.0, false)]],
             ),
         ]);
-        let text = text.unwrap();
-        assert!(text.starts_with("In short: take patch. Where the haptic update runs alone take two radii."), "{text}");
         // the slower of the two: 50 µs are a twentieth of a millisecond
-        assert!(text.contains("up to 50 µs: at 1 kHz 5 % of one core, which keeps up with 20000 samples"), "{text}");
-        assert!(text.contains("It fails on peaks in edges of 1.5 mm, where the patch made it worse."), "{text}");
+        let expected = [
+            "method and region | patch | peaks: 1 mm off before, 0.01 mm after; plate: 1 mm off before, 0.01 mm after | up to 50 µs per \
+             sample: at 1 kHz 5 % of one core, which keeps up with 20000 samples per second",
+            "haptic update alone | two radii | plate: 1 mm off before, 0.3 mm after | up to 10 µs per sample",
+            "not for | peaks in edges of 1.5 mm, where the patch made it worse | measured below | ",
+        ];
+        assert_eq!(rows.unwrap(), expected);
     }
 
     #[test]
     fn where_the_parts_differ_each_is_named_and_without_anything_good_nothing_is_said() {
         let patch = || way(RefineMethod::Patch, "patch", 0.01, 40.0, false);
         let paper = || way(RefineMethod::Robust(Reach::TipRadii(1.0)), "one radius", 0.005, 8.0, false);
-        let text = of(vec![case("peaks", vec![vec![patch()]]), case("plate", vec![vec![patch(), paper()]])]).unwrap();
-        assert!(text.starts_with("In short: take patch on peaks; one radius on plate."), "{text}");
-        assert!(!text.contains("fails"), "{text}");
+        let rows = of(vec![case("peaks", vec![vec![patch()]]), case("plate", vec![vec![patch(), paper()]])]).unwrap();
+        assert!(rows[0].starts_with("method and region | patch on peaks; one radius on plate | "), "{rows:?}");
+        assert!(!rows.iter().any(|row| row.starts_with("not for")), "{rows:?}");
         assert_eq!(of(vec![case("peaks", vec![vec![way(RefineMethod::Patch, "patch", 3.0, 1.0, true)]])]), None);
     }
 }

@@ -72,7 +72,7 @@ impl ScanArguments {
             tip,
         })?;
         let replayed = self.source.replay(recording, &scene, |sample| {
-            contacts.observe(sample).iter().for_each(|contact| finder.push(contact));
+            contacts.observe(sample).into_iter().for_each(|contact| finder.push(contact));
         })?;
         let rests = finder.finish();
         if rests.len() != file.pairs.len() {

@@ -185,7 +185,7 @@ pub(super) fn aligned_by_features(
     Ok((chosen.source_to_target, alignment))
 }
 
-/// The motion that pairs of picked points print_result; `scan` is the mesh and `space` the truth.
+/// The motion that fits pairs of picked points; `scan` is the mesh and `space` the truth.
 ///
 /// # Errors
 /// [`CliError::Table`], [`CliError::Pairs`].
@@ -297,6 +297,12 @@ impl Alignment {
             undetermined: fit.undetermined().map(loose).collect(),
             ..Self::of(method, &fit.source_to_target)
         }
+    }
+
+    /// How it was aligned, and how well that fits.
+    pub(super) fn in_short(&self) -> String {
+        let rms = self.rms_mm.map_or_else(String::new, |rms_mm| format!(", rms {rms_mm:.4} mm"));
+        format!("aligned by {}{rms}", self.method)
     }
 
     fn warn(&self) {

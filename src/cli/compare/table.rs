@@ -29,6 +29,9 @@ struct DeviationRow {
     normals: Option<NormalsReport>,
     /// of `mesh_to_truth`
     histogram: HistogramReport,
+    /// of `mesh_to_truth`, within --tolerance-mm
+    #[serde(skip_serializing_if = "Option::is_none")]
+    within_tolerance_share: Option<f64>,
 }
 
 /// Distances; all but `bias_mm` without sign.
@@ -94,6 +97,7 @@ impl DeviationRow {
                 below: *below,
                 above: *above,
             },
+            within_tolerance_share: part.within_tolerance,
         }
     }
 }
@@ -116,15 +120,20 @@ fn name_of(region: Option<SupportRegion>) -> &'static str {
     }
 }
 
-/// What stands below a picture: how far the touched part is off where there is one, else all, and what the colours clip.
-pub(super) fn note(comparison: &Comparison) -> String {
+/// What a picture says in numbers: of the touched part where there is one, else of all.
+pub(super) fn shown(comparison: &Comparison) -> Option<&RegionComparison> {
     let touched = comparison.regions.iter().find(|part| part.region == Some(SupportRegion::Touched));
-    let Some(part) = touched.or(comparison.regions.first()) else { return String::new() };
+    touched.or(comparison.regions.first())
+}
+
+/// What stands below a picture: how far that is off, and how much of it is within tolerance.
+pub(super) fn note(comparison: &Comparison, tolerance_mm: Option<f64>) -> String {
+    let Some(part) = shown(comparison) else { return String::new() };
     let Some(Summary { mean, p95, .. }) = part.mesh_to_truth else { return String::new() };
-    let Histogram { counts, below, above, .. } = &comparison.regions[0].histogram;
-    let beyond = (below + above) as f64 / (below + above + counts.iter().sum::<usize>()).max(1) as f64;
     let (name, [mean, p95]) = (name_of(part.region), [mean, p95].map(|x| x * 1e3));
-    format!("{name}: mean {mean:.3}, p95 {p95:.3} mm; beyond the colours {:.1} %", beyond * 100.0)
+    let within = part.within_tolerance.zip(tolerance_mm);
+    let within = within.map(|(share, mm)| format!("; {:.1} % within ±{mm} mm", share * 100.0));
+    format!("{name}: mean {mean:.3}, p95 {p95:.3} mm{}", within.unwrap_or_default())
 }
 
 const HEAD: &str = "                            mean      rms   median      p95      p99      max     bias    points";
@@ -195,6 +204,9 @@ impl fmt::Display for DeviationRow {
         for (what, summary) in rows.iter().filter_map(|(what, summary)| Some((what, (*summary).as_ref()?))) {
             writeln!(f, "{region:9} {what:14} {summary}")?;
             region = "";
+        }
+        if let Some(share) = self.within_tolerance_share {
+            writeln!(f, "{region:9} in tolerance   {:.2} %", share * 100.0)?;
         }
         match &self.normals {
             Some(NormalsReport { median_deg, p95_deg, flipped_share }) => write!(

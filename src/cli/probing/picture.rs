@@ -11,13 +11,13 @@ use crate::mesh::TriMesh;
 use crate::probe::{Flag, Plan, Probed};
 
 const PART: Rgb = [206, 209, 214];
-const FLAG: Rgb = [214, 40, 40];
-const WAY: Rgb = [120, 150, 205];
-const SEARCH: Rgb = [28, 78, 160];
-const HELD_BACK: Rgb = [150, 40, 150];
-const TOUCHED: Rgb = [20, 130, 60];
-const MISS: Rgb = [28, 78, 160];
-const REFUSED: Rgb = [230, 140, 20];
+const FLAG: Rgb = [20, 20, 20];
+const WAY: Rgb = [110, 170, 220];
+const SEARCH: Rgb = [0, 80, 160];
+const HELD_BACK: Rgb = [213, 94, 0];
+const TOUCHED: Rgb = [0, 114, 178];
+const MISS: Rgb = [213, 94, 0];
+const REFUSED: Rgb = [240, 200, 30];
 /// Lines and places, over the diagonal of the part.
 const LINE: f64 = 0.0012;
 const PLACE: f64 = 0.005;
@@ -25,7 +25,6 @@ const PLACE: f64 = 0.005;
 const PIN: f64 = 0.13;
 /// From where it is seen.
 const FROM: [f64; 3] = [-0.45, -0.75, 1.0];
-const WIDTH: u32 = 1600;
 
 fn diagonal(mesh: &TriMesh) -> f64 {
     let [low, high] = mesh.bounds();
@@ -45,17 +44,9 @@ fn write(
     }
     let panels: Vec<PicturePanel<'_>> = drawn
         .iter()
-        .map(|(mesh, paint, title, note)| PicturePanel {
-            mesh,
-            deviations: &[],
-            classes: None,
-            paint: Some(paint),
-            title,
-            note,
-        })
+        .map(|(mesh, paint, title, note)| PicturePanel { paint: Some(paint), title, note, ..PicturePanel::of(mesh) })
         .collect();
-    let params =
-        PictureParams { title, width: WIDTH, range: 1e-3, from: Some(Vector3::from(FROM)), weights: None, legend };
+    let params = PictureParams { title, from: Some(Vector3::from(FROM)), legend, ..PictureParams::default() };
     let picture = draw_picture(&panels, &params);
     write_png(path, picture.size, &picture.pixels).map_err(|source| CliError::Write { path: path.to_owned(), source })
 }
@@ -125,4 +116,16 @@ pub(super) fn draw_touches(mesh: &TriMesh, probed: &[Probed], flags: &[Flag], pa
     let note = format!("{touched} touches reached the part, {missed} missed it, {refused} do not count");
     let legend = [(FLAG, "flag"), (TOUCHED, "touched"), (MISS, "nothing there"), (REFUSED, "does not count")];
     write(&[(drawing, "the refined mesh", note)], "what the arm touched", &legend, path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::colour_vision::least_difference;
+
+    #[test]
+    fn states_are_apart_without_red_and_green() {
+        assert!(least_difference(&[PART, FLAG, WAY, SEARCH, HELD_BACK]) > 23.0);
+        assert!(least_difference(&[PART, FLAG, TOUCHED, MISS, REFUSED]) > 23.0);
+    }
 }

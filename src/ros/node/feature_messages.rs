@@ -167,12 +167,16 @@ fn has_label(feature: &FeatureMsg) -> bool {
         || feature.status == FeatureMsg::STATUS_FLAGGED
 }
 
-/// None of them is a colour of the mesh, in front of which they are.
+/// Red, green, blue of what is flagged, fitted to touches, and found on the mesh. None of them is a colour of the mesh, in front
+/// of which they are.
+pub(super) const COLOURS: [[f32; 3]; 3] = [[0.64, 0.01, 0.52], [0.1, 0.3, 1.0], [0.2, 0.95, 1.0]];
+
 fn colour(feature: &FeatureMsg) -> ColorRGBA {
+    let [flagged, fitted, found] = COLOURS;
     let [r, g, b] = match (feature.status, feature.fitted_to) {
-        (FeatureMsg::STATUS_FLAGGED, _) => [1.0, 0.2, 0.8],
-        (_, FeatureMsg::FITTED_TO_TOUCHES) => [0.1, 0.3, 1.0],
-        _ => [0.1, 0.85, 0.95],
+        (FeatureMsg::STATUS_FLAGGED, _) => flagged,
+        (_, FeatureMsg::FITTED_TO_TOUCHES) => fitted,
+        _ => found,
     };
     ColorRGBA { r, g, b, a: 0.6 }
 }

@@ -222,10 +222,10 @@ fn light([a, b, c]: &[Point3<f64>; 3]) -> f64 {
 /// Dark enough for white labels in front of it.
 fn of_support(support: Support) -> [f64; 3] {
     match support {
-        Support::Scan => [0.50, 0.52, 0.56],
-        Support::Touched => [0.16, 0.58, 0.26],
-        Support::Guessed => [0.78, 0.62, 0.20],
-        Support::Unreachable => [0.72, 0.33, 0.24],
+        Support::Scan => [0.60, 0.61, 0.63],
+        Support::Touched => [0.0, 0.61, 0.32],
+        Support::Guessed => [0.90, 0.78, 0.27],
+        Support::Unreachable => [0.34, 0.13, 0.10],
     }
 }
 
@@ -241,8 +241,19 @@ fn of_mismatch(distance: f32) -> [f64; 3] {
 
 #[cfg(test)]
 mod tests {
+    use super::super::feature_messages;
     use super::*;
+    use crate::colour_vision::least_difference;
     use crate::mesh::TriMesh;
+
+    #[test]
+    fn states_and_the_features_before_them_are_apart_without_red_and_green() {
+        let states = [Support::Scan, Support::Touched, Support::Guessed, Support::Unreachable].map(of_support);
+        let features = feature_messages::COLOURS.map(|colour| colour.map(f64::from));
+        let colours: Vec<[u8; 3]> =
+            states.iter().chain(&features).map(|colour| colour.map(|x| (255.0 * x).round() as u8)).collect();
+        assert!(least_difference(&colours) > 23.0);
+    }
 
     /// What a port keeps is the end of the list of all that was sent.
     #[test]

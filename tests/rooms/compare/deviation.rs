@@ -276,9 +276,9 @@ proptest! {
 
 /// A square in one colour on each half.
 fn picture_of(deviations: &[f64], mesh: &TriMesh, panels: usize) -> Picture {
-    let panel = PicturePanel { mesh, deviations, classes: None, paint: None, title: "a panel", note: "its note" };
+    let panel = PicturePanel { deviations, title: "a panel", note: "its note", ..PicturePanel::of(mesh) };
     let from = Some(Vector3::z());
-    let params = PictureParams { title: "a title", width: 800, range: 1e-3, from, weights: None, legend: &[] };
+    let params = PictureParams { title: "a title", width: 800, from, ..PictureParams::default() };
     draw_picture(&vec![panel; panels], &params)
 }
 

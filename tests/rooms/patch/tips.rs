@@ -43,7 +43,7 @@ fn felt(stylus: &StylusParams, seed: u64) -> Vec<(TipTouch, Moment)> {
     for message in &recording.messages {
         sync.push(*message);
         std::iter::from_fn(|| sync.next_sample())
-            .for_each(|sample| finder.push(&contacts.observe(&sample).unwrap(), |touch| touches.push(touch)));
+            .for_each(|sample| finder.push(contacts.observe(&sample).unwrap(), |touch| touches.push(touch)));
     }
     finder.flush(|touch| touches.push(touch));
     let truth = |touch: TipTouch| {

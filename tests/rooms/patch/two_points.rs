@@ -139,7 +139,7 @@ fn felt(profile: &Profile, path: &[Stroke], friction: f64, seed: u64) -> (Patche
     let mut contacts = ContactEstimator::new(ContactEstimatorParams::new(tip)).unwrap();
     for message in &recording.messages {
         sync.push(*message);
-        std::iter::from_fn(|| sync.next_sample()).for_each(|sample| patcher.push(&contacts.observe(&sample).unwrap()));
+        std::iter::from_fn(|| sync.next_sample()).for_each(|sample| patcher.push(contacts.observe(&sample).unwrap()));
     }
     let scan = strips(profile);
     let patched = patcher.patched(&scan, &FaceTree::new(&scan)).unwrap();

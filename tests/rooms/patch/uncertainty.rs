@@ -50,10 +50,10 @@ fn patcher_of(messages: &[Message], params: PatcherParams) -> Patcher {
     let mut contacts = estimator(params.touches.radius, params.touches.stiffness);
     for message in messages {
         sync.push(*message);
-        std::iter::from_fn(|| sync.next_sample()).for_each(|sample| patcher.push(&contacts.observe(&sample).unwrap()));
+        std::iter::from_fn(|| sync.next_sample()).for_each(|sample| patcher.push(contacts.observe(&sample).unwrap()));
     }
     sync.finish();
-    std::iter::from_fn(|| sync.next_sample()).for_each(|sample| patcher.push(&contacts.observe(&sample).unwrap()));
+    std::iter::from_fn(|| sync.next_sample()).for_each(|sample| patcher.push(contacts.observe(&sample).unwrap()));
     patcher
 }
 
@@ -383,7 +383,7 @@ fn pass((patcher, contacts): (&mut Patcher, &mut ContactEstimator), z: f64, star
             let centre = Vector3::new(x, f64::from(line) * 1e-3 - 4e-3, z + 1.5e-3) + shake - force / 2e4;
             let wrench = Wrench { force, torque: Vector3::zeros() };
             let pose_ot = Isometry3::translation(centre.x, centre.y, centre.z);
-            patcher.push(&contacts.observe(&Sample { stamp_ns, pose_ot, wrench }).unwrap());
+            patcher.push(contacts.observe(&Sample { stamp_ns, pose_ot, wrench }).unwrap());
             stamp_ns += 1_000_000;
         }
     }
@@ -447,7 +447,7 @@ fn contacts_lie_about_the_plane_as_their_stated_noise_says() {
             pose_ot: Isometry3::translation(centre.x, centre.y, centre.z),
             wrench: Wrench { force, torque: Vector3::zeros() },
         };
-        finder.push(&contacts.observe(&sample).unwrap(), |touch| {
+        finder.push(contacts.observe(&sample).unwrap(), |touch| {
             // the noise is known after some hundred samples
             if let Some(contact) = touch.contact.filter(|_| i > 5_000) {
                 over.push(contact.point.z / contact.sigma.noise);

@@ -24,7 +24,7 @@ fn estimated(sensor: SensorParams, seed: u64) -> Option<ClockOffset> {
     for message in touch.messages {
         sync.push(message);
         while let Some(sample) = sync.next_sample() {
-            clock.push(&contacts.observe(&sample).unwrap());
+            clock.push(contacts.observe(&sample).unwrap());
         }
     }
     clock.offset()
@@ -53,7 +53,7 @@ fn sample(ms: i64, height: f64, force: f64) -> Sample {
 
 fn offset_of(samples: impl IntoIterator<Item = Sample>) -> Option<ClockOffset> {
     let (mut clock, mut contacts) = (ClockEstimator::new(ClockParams::default()).unwrap(), contacts());
-    samples.into_iter().for_each(|sample| clock.push(&contacts.observe(&sample).unwrap()));
+    samples.into_iter().for_each(|sample| clock.push(contacts.observe(&sample).unwrap()));
     clock.offset()
 }
 

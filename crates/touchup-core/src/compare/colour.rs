@@ -30,22 +30,51 @@ pub fn colour_of(deviation: f64, range: f64) -> Rgb {
     std::array::from_fn(|i| (STOPS[below][i] + (STOPS[below + 1][i] - STOPS[below][i]) * part).round() as u8)
 }
 
+/// Colours of deviations, with one colour for all that is within tolerance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct ColourScale {
+    /// its ends, m, more than 0
+    pub range: f64,
+    /// at most so much has the colour of 0, m
+    pub tolerance: Option<f64>,
+}
+
+impl ColourScale {
+    pub fn colour(&self, deviation: f64) -> Rgb {
+        let is_within = self.tolerance.is_some_and(|tolerance| deviation.abs() <= tolerance);
+        colour_of(if is_within { 0.0 } else { deviation }, self.range)
+    }
+}
+
 /// The colour of a class, set apart also for the colour-blind.
 pub fn colour_of_class(class: Class) -> Rgb {
     match class {
-        Class::Agrees => [226, 236, 222],
-        Class::ScannerError => [112, 172, 216],
-        Class::ChangedPart => [204, 56, 40],
-        Class::BadTouch => [122, 40, 138],
-        Class::Unsure => [244, 180, 62],
-        Class::NeverTouched => [186, 188, 192],
+        Class::Agrees => [238, 240, 242],
+        Class::ScannerError => [112, 176, 224],
+        Class::ChangedPart => [204, 76, 20],
+        Class::BadTouch => [92, 20, 110],
+        Class::Unsure => [244, 192, 62],
+        Class::NeverTouched => [170, 172, 176],
         Class::Unreachable => [96, 98, 104],
     }
 }
 
 #[cfg(test)]
+#[path = "../../../../tests/common/colour_vision.rs"]
+mod colour_vision;
+
+#[cfg(test)]
 mod tests {
+    use super::colour_vision::least_difference;
     use super::*;
+
+    #[test]
+    fn classes_are_apart_without_red_and_green() {
+        // ten times what is just seen
+        assert!(least_difference(&Class::ALL.map(colour_of_class)) > 23.0);
+        let former_pair = [[204, 56, 40], [20, 130, 60]];
+        assert!(least_difference(&former_pair) < 15.0, "red and green of one brightness are not");
+    }
 
     #[test]
     fn ends_and_middle_are_as_listed_and_what_is_beyond_is_clipped() {

@@ -52,11 +52,13 @@ pub struct CompareParams {
     /// How far a true place may be from the mesh and yet be one that it shows, m. Default 2 mm: three times the noise of a
     /// poor scan.
     pub reach: f64,
+    /// Deviations of at most so much are within tolerance, m. Default: nobody asks.
+    pub tolerance: Option<f64>,
 }
 
 impl Default for CompareParams {
     fn default() -> Self {
-        Self { samples: 200_000, seed: 1, range: None, reach: 2e-3 }
+        Self { samples: 200_000, seed: 1, range: None, reach: 2e-3, tolerance: None }
     }
 }
 
@@ -75,6 +77,8 @@ pub struct RegionComparison {
     pub mesh_to_truth: Option<Summary>,
     /// the same in bins
     pub histogram: Histogram,
+    /// share of them within [`CompareParams::tolerance`]; `None` where there is none, or no point
+    pub within_tolerance: Option<f64>,
     /// points spread over the true surface, to the mesh: what is missing. A region has those that the mesh shows; all of it
     /// has also what was never scanned.
     pub truth_to_mesh: Option<Summary>,
@@ -129,7 +133,7 @@ struct Foot {
     corner: VertexId,
 }
 
-/// Everything measured, before it is told by region.
+/// Everything measured, before it is summed up by region.
 struct MeasuredDeviations {
     to_truth: Sorted,
     to_mesh: Sorted,
@@ -167,11 +171,11 @@ pub fn compare(
     let parts = match regions {
         Regions::Unknown => Vec::new(),
         _ => [SupportRegion::Touched, SupportRegion::Guessed, SupportRegion::Untouched]
-            .map(|region| measured.told(Some(region), range))
+            .map(|region| measured.comparison(Some(region), range, params.tolerance))
             .into(),
     };
     let is_there = |part: &RegionComparison| part.mesh_to_truth.is_some() || part.truth_to_mesh.is_some();
-    let whole = measured.told(None, range);
+    let whole = measured.comparison(None, range, params.tolerance);
     let regions = std::iter::once(whole).chain(parts.into_iter().filter(is_there)).collect();
     let unseen = measured.to_mesh.regions.iter().filter(|region| region.is_none()).count() as f64;
     let unseen = unseen / measured.to_mesh.regions.len().max(1) as f64;
@@ -228,13 +232,17 @@ fn measure(
 }
 
 impl MeasuredDeviations {
-    fn told(&self, region: Option<SupportRegion>, range: f64) -> RegionComparison {
+    fn comparison(&self, region: Option<SupportRegion>, range: f64, tolerance: Option<f64>) -> RegionComparison {
+        let to_truth = self.to_truth.within(region);
         let tilts =
             self.tilts.iter().filter(|(_, at)| region.is_none_or(|region| region == *at)).map(|(tilt, _)| *tilt);
         RegionComparison {
             region,
-            mesh_to_truth: self.to_truth.summary(region),
-            histogram: Histogram::of(&self.to_truth.within(region), range),
+            mesh_to_truth: Summary::of(&to_truth),
+            histogram: Histogram::of(&to_truth, range),
+            within_tolerance: tolerance.filter(|_| !to_truth.is_empty()).map(|tolerance| {
+                to_truth.iter().filter(|d| d.abs() <= tolerance).count() as f64 / to_truth.len() as f64
+            }),
             truth_to_mesh: self.to_mesh.summary(region),
             vertices_to_truth: self.vertices.summary(region),
             cloud_to_truth: self.cloud_to_truth.summary(region),

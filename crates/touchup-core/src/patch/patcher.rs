@@ -168,7 +168,7 @@ impl PatcherParams {
 ///     let x = if line % 2.0 == 0.0 { 5e-3 + along } else { 15e-3 - along };
 ///     let pose_ot = Isometry3::translation(x, 5e-3 + line * 1e-3, 1.5e-3);
 ///     let wrench = Wrench { force: Vector3::new(0.0, 0.0, 2.0), torque: Vector3::zeros() };
-///     patcher.push(&contacts.observe(&Sample { stamp_ns: i * 1_000_000, pose_ot, wrench })?);
+///     patcher.push(contacts.observe(&Sample { stamp_ns: i * 1_000_000, pose_ot, wrench })?);
 /// }
 /// patcher.flush();
 /// let mesh = patcher.patched(&scan, &FaceTree::new(&scan))?.mesh;

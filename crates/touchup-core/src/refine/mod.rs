@@ -34,8 +34,8 @@ pub use crate::touch::{SlidingParams, TipParams};
 use crate::mesh::{Changes, FaceHit, FaceId, MeshError, Nearby, TriMesh, VertexId};
 use crate::patch::{PatchDelta, Support};
 use crate::touch::{
-    Ball, ContactEstimator, ContactSample, FrictionCoefficient, LONGEST_HOLD, Sample, SampleError, SettingError,
-    TipBody, TipPlace,
+    Ball, ContactEstimator, ContactSample, FeltNormal, FrictionCoefficient, LONGEST_HOLD, Sample, SampleError,
+    SettingError, TipBody, TipPlace,
 };
 use carve::InsideScratch;
 use deform::{DeformableMesh, HandleRegion};
@@ -163,8 +163,6 @@ pub struct RefineCounts {
 pub struct Refiner {
     params: RefineParams,
     contacts: ContactEstimator,
-    /// that of the last sample
-    last: Option<ContactSample>,
     dynamics: FaceDynamics,
     deformable: DeformableMesh,
     contact_region: HandleRegion,
@@ -210,7 +208,6 @@ impl Refiner {
             (params.largest_move_edges * deformable.mean_edge).max(params.largest_move_noises * params.scan_noise);
         Ok(Self {
             contacts: ContactEstimator::new(params.contact())?,
-            last: None,
             dynamics: FaceDynamics::new(params.dynamics)?,
             contact_region: deformable.region(params.roi),
             carve_region: deformable.region(RoiSize::Handle),
@@ -248,14 +245,13 @@ impl Refiner {
     }
 
     fn take(&mut self, sample: &Sample, handle: Option<FaceId>) -> Result<Update, RefineError> {
-        let contact = self.contacts.observe(sample)?;
-        self.last = Some(contact);
+        let &ContactSample { ball, dt, ball_contact, surface, .. } = self.contacts.observe(sample)?;
+        let dt = dt.min(LONGEST_HOLD);
         self.deformable.now_ns = sample.stamp_ns;
         if !self.body.is_ball() {
-            self.axis = TipPlace::from(&contact.tip.pose_ot).axis;
+            self.axis = TipPlace::from(&sample.pose_ot).axis;
         }
-        let (ball, dt) = (contact.ball, contact.dt.min(LONGEST_HOLD));
-        let felt = self.contact_state(&contact);
+        let felt = self.contact_state(ball_contact.is_some(), surface);
         if self.params.region.is_some_and(|touched| !touched.region.contains(&ball.centre)) {
             return Ok(self.pass(felt));
         }
@@ -285,17 +281,15 @@ impl Refiner {
         }
     }
 
-    fn contact_state(&mut self, sample: &ContactSample) -> ContactState {
+    fn contact_state(&mut self, is_in_contact: bool, surface: Option<FeltNormal>) -> ContactState {
         self.counts.contacts = self.contacts.contacts();
-        if sample.ball_contact.is_none() {
+        if !is_in_contact {
             self.begun = None;
             return ContactState::Nothing;
         }
         match self.params.touch_point {
             TouchPoint::FaceNormal => ContactState::Something,
-            TouchPoint::FeltNormal => {
-                ContactState::Surface(sample.surface.map(|surface| surface.normal).unwrap_or_default())
-            }
+            TouchPoint::FeltNormal => ContactState::Surface(surface.map(|surface| surface.normal).unwrap_or_default()),
         }
     }
 
@@ -534,7 +528,7 @@ impl Refiner {
 
     /// What was decided about the contact of the last sample; `None` before the first.
     pub fn contact(&self) -> Option<&ContactSample> {
-        self.last.as_ref()
+        self.contacts.latest()
     }
 
     /// The vertices that the last contact moved.

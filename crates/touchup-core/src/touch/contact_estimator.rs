@@ -115,7 +115,7 @@ pub struct ContactEstimator {
     ball_gate: Option<ContactGate>,
     motion: TipMotion,
     first_ns: Option<i64>,
-    last_ns: Option<i64>,
+    latest: Option<ContactSample>,
 }
 
 impl ContactEstimator {
@@ -131,7 +131,7 @@ impl ContactEstimator {
             ball_gate: params.gate.map(ContactGate::new).transpose()?,
             motion: TipMotion::new(params.sliding.unwrap_or_default(), params.tip),
             first_ns: None,
-            last_ns: None,
+            latest: None,
             params,
         })
     }
@@ -141,14 +141,13 @@ impl ContactEstimator {
     /// # Errors
     /// [`SampleError`] for one that is not finite, absurd or not after the last; nothing is changed then.
     #[inline]
-    pub fn observe(&mut self, sample: &Sample) -> Result<ContactSample, SampleError> {
+    pub fn observe(&mut self, sample: &Sample) -> Result<&ContactSample, SampleError> {
         sample.check()?;
-        let dt = sample.seconds_since(self.last_ns)?;
+        let dt = sample.seconds_since(self.latest.as_ref().map(|latest| latest.tip.stamp_ns))?;
         Ok(self.decide(self.compensator.compensate(sample), dt))
     }
 
-    fn decide(&mut self, mut tip: Tip, dt: f64) -> ContactSample {
-        self.last_ns = Some(tip.stamp_ns);
+    fn decide(&mut self, mut tip: Tip, dt: f64) -> &ContactSample {
         let bias_t = match &mut self.bias {
             Some(bias) => {
                 tip.force_o = bias.compensate(&tip);
@@ -177,7 +176,12 @@ impl ContactEstimator {
         };
         let reported = tip.pose_ot.translation.vector.into();
         let centre = self.params.tip.centre(&reported, &tip.force_o);
-        ContactSample { tip, dt, bias_t, centre, contact, ball, ball_contact, surface }
+        self.latest.insert(ContactSample { tip, dt, bias_t, centre, contact, ball, ball_contact, surface })
+    }
+
+    /// The last sample that was taken; `None` before the first.
+    pub fn latest(&self) -> Option<&ContactSample> {
+        self.latest.as_ref()
     }
 
     /// How many contacts of the smoothed ball have begun; 0 without thresholds of contact.

@@ -63,8 +63,8 @@ fn messages(sample: &Sample) -> [Message; 2] {
 /// What is decided about the contact of each.
 fn contacts_of(samples: &[Sample], tip: TipParams) -> Result<Vec<ContactSample>, CostError> {
     let mut estimator = ContactEstimator::new(ContactEstimatorParams::new(tip))?;
-    let observe = |sample| estimator.observe(sample).map_err(touchup_core::refine::RefineError::from);
-    Ok(samples.iter().map(observe).collect::<Result<_, _>>()?)
+    let observe = |sample| Ok(*estimator.observe(sample).map_err(touchup_core::refine::RefineError::from)?);
+    samples.iter().map(observe).collect()
 }
 
 /// Times every stage that can be called by itself, on a scan of edges of 1 mm.

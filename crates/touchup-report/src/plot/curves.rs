@@ -3,7 +3,7 @@
 use super::super::figure::{Figure, LineStroke, Mark, Series, Spread};
 use super::axis::Extent;
 use super::frame::Frame;
-use super::style::{Look, text_width};
+use super::style::{Look, Looks, text_width};
 use super::writer::{Anchor, Svg};
 use super::{TOP, WIDTH};
 
@@ -21,7 +21,7 @@ const SAMPLE: f64 = 34.0;
 const LINE: f64 = 21.0;
 
 /// Draws below the title, and returns how far down it reaches.
-pub(super) fn draw(svg: &mut Svg, figure: &Figure, series: &[Series]) -> f64 {
+pub(super) fn draw(svg: &mut Svg, figure: &Figure, series: &[Series], looks: &Looks) -> f64 {
     let name_width = series.iter().map(|series| text_width(&series.name, 12.5)).fold(0.0, f64::max);
     let is_beside = name_width <= WIDEST_BESIDE && series.len() as f64 * LINE <= HEIGHT;
     let right = if is_beside { name_width + SAMPLE + 24.0 } else { 24.0 };
@@ -31,17 +31,17 @@ pub(super) fn draw(svg: &mut Svg, figure: &Figure, series: &[Series]) -> f64 {
     frame.draw_grid(svg, &x, &y);
     frame.name_axes(svg, &figure.x.label, &figure.y.label);
     let mut hidden = 0;
-    for (index, series) in series.iter().enumerate() {
-        hidden += draw_series(svg, &frame, [&x, &y], Look::of(index), series);
+    for series in series {
+        hidden += draw_series(svg, &frame, [&x, &y], looks.look(&series.name), series);
     }
     frame.draw_border(svg);
     let below = frame.bottom() + BELOW;
     let bottom = if is_beside {
-        draw_legend(svg, series, [frame.right() + 14.0, TOP + 12.0], 1, 0.0);
+        draw_legend(svg, (series, looks), [frame.right() + 14.0, TOP + 12.0], 1, 0.0);
         below
     } else {
         let columns = (((WIDTH - LEFT) / (name_width + SAMPLE + 20.0)) as usize).max(1);
-        let lines = draw_legend(svg, series, [LEFT, below + 12.0], columns, (WIDTH - LEFT) / columns as f64);
+        let lines = draw_legend(svg, (series, looks), [LEFT, below + 12.0], columns, (WIDTH - LEFT) / columns as f64);
         below + lines as f64 * LINE
     };
     if hidden == 0 {
@@ -106,9 +106,15 @@ fn bar(svg: &mut Svg, from: [f64; 2], to: [f64; 2], [dx, dy]: [f64; 2], style: &
 }
 
 /// Returns how many lines it has.
-fn draw_legend(svg: &mut Svg, series: &[Series], corner: [f64; 2], columns: usize, width: f64) -> usize {
+fn draw_legend(
+    svg: &mut Svg,
+    (series, looks): (&[Series], &Looks),
+    corner: [f64; 2],
+    columns: usize,
+    width: f64,
+) -> usize {
     for (index, series) in series.iter().enumerate() {
-        let look = Look::of(index);
+        let look = looks.look(&series.name);
         let (column, line) = (index % columns, index / columns);
         let [x, y] = [corner[0] + column as f64 * width, corner[1] + line as f64 * LINE];
         let style = if series.stroke == LineStroke::Dashed { look.dashed() } else { look.line() };

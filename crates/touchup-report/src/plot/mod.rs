@@ -7,6 +7,7 @@ mod maps;
 mod style;
 mod writer;
 
+pub(super) use style::Looks;
 use style::text_width;
 pub(super) use writer::escaped;
 use writer::{Anchor, Svg};
@@ -21,11 +22,13 @@ const SMALL: f64 = 10.5;
 const TOP: f64 = 38.0;
 
 /// The figure as a picture of its own. `provenance`, in small letters below it: where and by what it was measured.
-pub fn svg(figure: &Figure, provenance: &str) -> String {
+///
+/// - `looks`: of its series.
+pub(super) fn svg(figure: &Figure, looks: &Looks, provenance: &str) -> String {
     let mut svg = Svg::new();
     svg.text([14.0, 22.0], Anchor::Start, "font-size=\"15\" font-weight=\"600\"", &figure.title);
     let bottom = match &figure.drawing {
-        Drawing::Curves(series) => curves::draw(&mut svg, figure, series),
+        Drawing::Curves(series) => curves::draw(&mut svg, figure, series, looks),
         Drawing::Maps { share_of, panels } => maps::draw(&mut svg, figure, share_of, panels),
     };
     let mut y = bottom + 20.0;

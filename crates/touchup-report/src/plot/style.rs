@@ -1,5 +1,7 @@
 //! How one series differs from another: by colour, and without it by mark and dashes.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use super::writer::Svg;
 
 /// Colours that colour-blind readers distinguish too (Okabe and Ito), dark enough on white.
@@ -11,17 +13,42 @@ const MODEL_DASHES: [&str; 4] = ["4 4", "10 4", "1 3", "10 3 1 3"];
 /// Half the size of a mark, pixels.
 const HALF: f64 = 4.5;
 
-/// The look of the series at `index`, the same in frame and legend.
+/// Which look each series has, by its name, in all figures.
+#[derive(Debug)]
+pub struct Looks(BTreeMap<String, usize>);
+
+impl Looks {
+    /// Names keep the look of their first figure; a new one gets the first look that none beside it has, in any figure.
+    ///
+    /// - `figures`: the names in each.
+    pub fn of<'a>(figures: impl Iterator<Item = Vec<&'a str>>) -> Self {
+        let figures: Vec<Vec<&str>> = figures.collect();
+        let mut looks = BTreeMap::new();
+        for name in figures.iter().flatten() {
+            if looks.contains_key(*name) {
+                continue;
+            }
+            let beside = figures.iter().filter(|names| names.contains(name)).flatten();
+            let taken: BTreeSet<usize> = beside.filter_map(|other| looks.get(*other).copied()).collect();
+            let free = (0..).find(|look| !taken.contains(look)).unwrap_or_default();
+            looks.insert((*name).to_owned(), free);
+        }
+        Self(looks)
+    }
+
+    /// That of a series in one of the figures.
+    pub(super) fn look(&self, name: &str) -> Look {
+        Look { index: self.0.get(name).copied().unwrap_or_default() }
+    }
+}
+
+/// The look of a series, the same in frame and legend.
 #[derive(Clone, Copy)]
 pub(super) struct Look {
     index: usize,
 }
 
 impl Look {
-    pub fn of(index: usize) -> Self {
-        Self { index }
-    }
-
     pub fn colour(self) -> &'static str {
         COLOURS[self.index % COLOURS.len()]
     }

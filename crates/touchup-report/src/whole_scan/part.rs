@@ -164,7 +164,8 @@ impl Part {
         let mut estimator =
             ContactEstimator::new(ContactEstimatorParams { compensator, bias: None, gate, tip, sliding: None })?;
         let (mut contacts, mut touched) = (Vec::new(), Vec::new());
-        for sample in samples.iter().filter_map(|sample| estimator.observe(sample).ok()) {
+        for sample in &samples {
+            let Ok(sample) = estimator.observe(sample) else { continue };
             let (centre, Some(surface)) = (sample.centre, sample.surface) else { continue };
             let reported = Point3::from(sample.tip.pose_ot.translation.vector);
             contacts.push(FeltContact { reported, point: centre - tip.radius * surface.normal });

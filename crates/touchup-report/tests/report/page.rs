@@ -70,6 +70,7 @@ fn report() -> Report {
         commit: "0123456789ab".to_owned(),
         command: "touchup-report --out <x>".to_owned(),
         date: "2026-01-01 00:00 UTC".to_owned(),
+        advice: Some(Table { id: "verdict".to_owned(), ..table.clone() }),
         verdict: vec![HOSTILE.to_owned()],
         chapters: vec![Chapter {
             title: HOSTILE.to_owned(),
@@ -138,6 +139,33 @@ fn pictures_and_page_are_well_formed_and_every_coordinate_is_a_number_on_the_pic
     }
 }
 
+/// The colours that a legend gives to each name: the text follows its mark.
+fn colours_by_name(svg: &str, name: &str) -> Vec<String> {
+    let at = svg.find(&format!(">{name}</text>")).unwrap_or_else(|| panic!("no {name}"));
+    let mark = svg[..at].rfind("fill=\"#").or_else(|| svg[..at].rfind("stroke=\"#")).unwrap();
+    let stroke = svg[..at].rfind("stroke=\"#").unwrap();
+    [mark, stroke].map(|from| svg[from..].split('"').nth(1).unwrap().to_owned()).to_vec()
+}
+
+#[test]
+fn a_method_has_one_colour_in_all_figures_and_two_of_one_figure_have_two() {
+    let points = [(1.0, 1.0), (2.0, 3.0)];
+    let names = [vec!["lie", "strang"], vec!["rk4", "strang", "dp5"], vec!["dp5", "lie"]];
+    let figure = |(at, names): (usize, &Vec<&str>)| {
+        curves(&format!("figure{at}"), false, names.iter().map(|name| series(name, &points)).collect())
+    };
+    let figures = names.iter().enumerate().map(figure).collect();
+    let files = Report { chapters: vec![Chapter { figures, ..Chapter::default() }], ..report() }.files().unwrap();
+    let colours = |at: usize, name: &str| colours_by_name(&text(&files, &format!("figure{at}.svg")), name);
+    assert_eq!(colours(0, "strang"), colours(1, "strang"));
+    assert_eq!(colours(0, "lie"), colours(2, "lie"));
+    assert_eq!(colours(1, "dp5"), colours(2, "dp5"));
+    for (at, names) in names.iter().enumerate() {
+        let all: std::collections::BTreeSet<_> = names.iter().map(|name| colours(at, name)).collect();
+        assert_eq!(all.len(), names.len(), "{names:?}");
+    }
+}
+
 #[test]
 fn a_page_needs_nothing_else() {
     let html = text(&report().files().unwrap(), "report.html");
@@ -148,7 +176,7 @@ fn a_page_needs_nothing_else() {
     for linked in ["log.csv", "maps.csv", "table.csv", "report.json"] {
         assert!(html.contains(&format!("href=\"{linked}\"")), "{linked}");
     }
-    let verdict = html.find("id=\"verdict\"").unwrap();
+    let verdict = html.find("id=\"summary\"").unwrap();
     assert!(verdict < html.find("Contents").unwrap() && html.contains("0123456789ab"));
 }
 

@@ -178,6 +178,7 @@ fn what_is_measured_becomes_a_chapter_with_the_same_numbers() {
         commit: String::new(),
         command: String::new(),
         date: String::new(),
+        advice: None,
         verdict: measured.verdict(),
         chapters: vec![chapter],
     };

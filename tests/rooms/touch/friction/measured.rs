@@ -126,7 +126,7 @@ fn on_real_streams_at_most_half_of_the_raw_forces_error_is_left() {
         let mut finder = TouchFinder::new(params).unwrap();
         let mut touches = Vec::new();
         for tip in &tips {
-            finder.push(&contacts.observe(&sample_of(tip)).unwrap(), |touch| touches.push(touch));
+            finder.push(contacts.observe(&sample_of(tip)).unwrap(), |touch| touches.push(touch));
         }
         finder.flush(|touch| touches.push(touch));
         assert_eq!(touches.len(), tips.len());

@@ -157,7 +157,7 @@ impl Found {
         let mut touches = Vec::new();
         for sample in &stream.samples {
             let observed = contacts.observe(sample).unwrap();
-            finder.push(&observed, |touch| touches.push(touch));
+            finder.push(observed, |touch| touches.push(touch));
             let (ball, Some(contact)) = (observed.ball, observed.ball_contact) else { continue };
             let normal = observed.surface.unwrap().normal;
             // the first 50 ms of a contact are the filter's
@@ -267,7 +267,7 @@ fn where_friction_is_not_asked_for_the_normal_is_the_force() {
             let pose_ot = Isometry3::translation(i as f64 * 25e-6, 0.0, RADIUS);
             let wrench = Wrench { force: force_o, torque: Vector3::zeros() };
             let sample = Sample { stamp_ns: i * 1_000_000, pose_ot, wrench };
-            finder.push(&contacts.observe(&sample).unwrap(), |touch| touches.push(touch));
+            finder.push(contacts.observe(&sample).unwrap(), |touch| touches.push(touch));
         }
         (touches.last().unwrap().contact.unwrap().normal, finder.friction())
     };

@@ -75,6 +75,31 @@ impl Picture {
         }
     }
 
+    /// Writes one line on a box of `paper` that is a little larger than the text.
+    pub(super) fn write_on(&mut self, [x, y]: [i32; 2], font: Font, [ink, paper]: [Rgb; 2], text: &str) {
+        self.fill([x - 4, y - 1], [font.width(text) + 8, font.height() + 2], paper);
+        self.write([x, y], font, ink, text);
+    }
+
+    /// A line of two pixels' width.
+    pub(super) fn line(&mut self, from: [i32; 2], to: [i32; 2], colour: Rgb) {
+        let [dx, dy] = [to[0] - from[0], to[1] - from[1]].map(f64::from);
+        let steps = dx.abs().max(dy.abs()).max(1.0);
+        for step in 0..=steps as i32 {
+            let share = f64::from(step) / steps;
+            let place = [from[0] + (dx * share).round() as i32, from[1] + (dy * share).round() as i32];
+            self.fill(place, [2, 2], colour);
+        }
+    }
+
+    /// A disc of a radius in pixels around a middle.
+    pub(super) fn disc(&mut self, [x, y]: [i32; 2], radius: i32, colour: Rgb) {
+        for dy in -radius..=radius {
+            let half = f64::from(radius * radius - dy * dy).sqrt().round() as i32;
+            self.fill([x - half, y + dy], [2 * half + 1, 1], colour);
+        }
+    }
+
     /// Lays another picture over this one.
     pub fn paste(&mut self, [x, y]: [i32; 2], other: &Self) {
         let width = other.size[0].max(1) as usize;

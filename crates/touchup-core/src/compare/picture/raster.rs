@@ -5,7 +5,7 @@ use nalgebra::{Vector2, Vector3};
 use super::camera::Camera;
 use super::canvas::Picture;
 use super::{BACKGROUND, PicturePanel};
-use crate::compare::colour::{Rgb, colour_of, colour_of_class};
+use crate::compare::colour::{ColourScale, Rgb, colour_of_class};
 use crate::mesh::FaceId;
 
 /// Samples on each axis of a pixel.
@@ -36,6 +36,15 @@ pub(super) struct PictureFrame {
     pub size: [u32; 2],
 }
 
+impl PictureFrame {
+    /// Pixels to the right and downwards of a place in the plane of the view, m.
+    pub fn pixel(&self, place: &Vector2<f64>) -> [f64; 2] {
+        let [width, height] = self.size.map(f64::from);
+        let off = (place - self.middle) * self.scale;
+        [width / 2.0 + off.x, height / 2.0 - off.y]
+    }
+}
+
 /// Samples of a picture.
 struct Samples {
     width: usize,
@@ -46,7 +55,9 @@ struct Samples {
 }
 
 /// Draws one mesh in the colours of its deviations.
-pub(super) fn draw(panel: &PicturePanel<'_>, camera: &Camera, frame: &PictureFrame, range: f64) -> Picture {
+///
+/// - `colours`: of deviations.
+pub(super) fn draw(panel: &PicturePanel<'_>, camera: &Camera, frame: &PictureFrame, colours: &ColourScale) -> Picture {
     let [width, height] = frame.size.map(|side| (side * FINE) as usize);
     let mut samples = Samples {
         width,
@@ -54,11 +65,13 @@ pub(super) fn draw(panel: &PicturePanel<'_>, camera: &Camera, frame: &PictureFra
         depth: vec![f32::NEG_INFINITY; width * height],
         colour: vec![BACKGROUND; width * height],
     };
-    let shades: Vec<Rgb> = (0..SHADES).map(|i| colour_of(2.0 * i as f64 / (SHADES - 1) as f64 - 1.0, 1.0)).collect();
+    let range = colours.range;
+    let shades: Vec<Rgb> =
+        (0..SHADES).map(|i| colours.colour((2.0 * i as f64 / (SHADES - 1) as f64 - 1.0) * range)).collect();
     let scale = frame.scale * f64::from(FINE);
     let place = |p: &Vector3<f64>| {
-        let x = (p.x - frame.middle.x) * scale + width as f64 / 2.0;
-        Vector3::new(x, height as f64 / 2.0 - (p.y - frame.middle.y) * scale, p.z)
+        let [x, y] = frame.pixel(&p.xy()).map(|side| side * f64::from(FINE));
+        Vector3::new(x, y, p.z)
     };
     for (face, corners) in panel.mesh.faces() {
         let places = panel.mesh.triangle(face).map(|p| place(&camera.project(&p)));
