@@ -175,7 +175,7 @@ pub(super) fn compared(arguments: &CompareArguments) -> Result<CompareReport, Cl
         let labels = arguments.features.as_deref().map(|features| feature_labels(features, &pose)).transpose()?;
         let caption =
             format!("{}; {}", today(), alignment.as_ref().map_or("not aligned".to_owned(), Alignment::in_short));
-        let drawing = Drawing { caption, labels: labels.unwrap_or_default(), regions: regions.as_deref() };
+        let drawing = Annotations { caption, labels: labels.unwrap_or_default(), regions: regions.as_deref() };
         arguments.draw(path, &mesh, before.as_ref(), &measured, &drawing)?;
     }
     if let Some(path) = &arguments.coloured {
@@ -191,7 +191,7 @@ pub(super) fn compared(arguments: &CompareArguments) -> Result<CompareReport, Cl
 }
 
 /// What stands in a picture beside the deviations.
-struct Drawing<'a> {
+struct Annotations<'a> {
     caption: String,
     labels: Vec<PictureLabel>,
     /// of each vertex slot of the mesh
@@ -278,7 +278,7 @@ impl CompareArguments {
         mesh: &PlacedMesh,
         before: Option<&PlacedMesh>,
         measured: &MeasuredBoth,
-        drawing: &Drawing<'_>,
+        drawing: &Annotations<'_>,
     ) -> Result<(), CliError> {
         let _drawing = WorkProgress::stage("draw");
         let name = |path: &Path| path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned());

@@ -52,7 +52,7 @@ pub fn advice(scans: &WholeScan, stability: Option<&Stability>, cost: Option<&Co
 }
 
 /// The method chosen on a part.
-struct Choice<'a> {
+struct MethodChoice<'a> {
     part: &'a str,
     method: &'a WayResult,
     /// mean error of the scan as it came, mm
@@ -60,16 +60,19 @@ struct Choice<'a> {
 }
 
 /// The method on each part where there is one.
-fn by_part<'a>(scans: &'a WholeScan, method: impl Fn(&'a ScanResult) -> Option<&'a WayResult>) -> Vec<Choice<'a>> {
+fn by_part<'a>(
+    scans: &'a WholeScan,
+    method: impl Fn(&'a ScanResult) -> Option<&'a WayResult>,
+) -> Vec<MethodChoice<'a>> {
     let choice = |case: &'a CaseResult| {
         let scan = case.main()?;
-        Some(Choice { part: &case.name, method: method(scan)?, before_mm: scan.before.mean_mm() })
+        Some(MethodChoice { part: &case.name, method: method(scan)?, before_mm: scan.before.mean_mm() })
     };
     scans.cases.iter().filter_map(choice).collect()
 }
 
 /// The method, where it is the same on every part, else each with its part.
-fn one_or_each(choices: &[Choice<'_>]) -> String {
+fn one_or_each(choices: &[MethodChoice<'_>]) -> String {
     match choices {
         [first, others @ ..] if others.iter().all(|choice| choice.method.way == first.method.way) => {
             first.method.name.clone()
@@ -78,15 +81,15 @@ fn one_or_each(choices: &[Choice<'_>]) -> String {
     }
 }
 
-fn errors(choices: &[Choice<'_>]) -> String {
-    let error = |choice: &Choice<'_>| {
+fn errors(choices: &[MethodChoice<'_>]) -> String {
+    let error = |choice: &MethodChoice<'_>| {
         let [now, before] = [choice.method.mean_mm(), choice.before_mm].map(three_digits);
         format!("{}: {before} mm off before, {now} mm after", choice.part)
     };
     join(choices, error)
 }
 
-fn join(choices: &[Choice<'_>], text: impl Fn(&Choice<'_>) -> String) -> String {
+fn join(choices: &[MethodChoice<'_>], text: impl Fn(&MethodChoice<'_>) -> String) -> String {
     choices.iter().map(text).collect::<Vec<_>>().join("; ")
 }
 

@@ -14,12 +14,12 @@ pub(super) const BAR: [i32; 2] = [640, 24];
 pub(super) const HISTOGRAM: i32 = 96;
 
 /// Where the bar of colours lies across the picture, pixels.
-struct Scale {
+struct ColourBar {
     left: i32,
     length: i32,
 }
 
-impl Scale {
+impl ColourBar {
     fn of(picture: &Picture) -> Self {
         let width = picture.size[0] as i32;
         let length = BAR[0].min(width * 2 / 5);
@@ -49,7 +49,7 @@ pub(super) fn draw_legend(picture: &mut Picture, top: i32, legend: &[(Rgb, &str)
 pub(super) fn draw_scale(picture: &mut Picture, tops: [i32; 2], colours: &ColourScale, label: &str) {
     let [top, bar] = tops;
     let width = picture.size[0] as i32;
-    let Scale { left, length } = Scale::of(picture);
+    let ColourBar { left, length } = ColourBar::of(picture);
     picture.write([(width - NOTE.width(label)) / 2, top], NOTE, SOFT_INK, label);
     picture.fill([left - 1, bar - 1], [length + 2, BAR[1] + 2], SOFT_INK);
     for x in 0..length {
@@ -75,7 +75,7 @@ pub(super) fn draw_scale(picture: &mut Picture, tops: [i32; 2], colours: &Colour
 /// How much of the surface lies in each bin of deviations: bars for the last panel, a line for the others. The height is the root of
 /// the share, so that what is rare is seen.
 pub(super) fn draw_histograms(picture: &mut Picture, bar: i32, panels: &[PicturePanel<'_>], colours: &ColourScale) {
-    let Scale { left, length } = Scale::of(picture);
+    let ColourBar { left, length } = ColourBar::of(picture);
     let shares = |histogram: &Histogram| -> Vec<f64> {
         let all = histogram.below + histogram.above + histogram.counts.iter().sum::<usize>();
         histogram.counts.iter().map(|&count| (count as f64 / all.max(1) as f64).sqrt()).collect()
@@ -117,14 +117,16 @@ pub(super) fn draw_histograms(picture: &mut Picture, bar: i32, panels: &[Picture
     }
 }
 
-/// Names of places with a line to each. A name keeps clear of those before it as far as there is room.
+/// Names of places with a line to each. A name keeps clear of the places and of the names before it as far as
+/// there is room.
 pub(super) fn draw_labels(picture: &mut Picture, labels: &[PictureLabel], camera: &Camera, frame: &PictureFrame) {
     /// Directions in which a name may stand from its place: right and down, in heights of a letter.
     const AROUND: [[i32; 2]; 8] = [[2, -3], [-2, -3], [2, 2], [-2, 2], [3, -5], [-3, -5], [3, 4], [-3, 4]];
     let [width, height] = picture.size.map(|side| side as i32);
-    let mut taken: Vec<[i32; 4]> = Vec::new();
+    let at = |label: &PictureLabel| frame.pixel(&camera.project(&label.place).xy()).map(|side| side.round() as i32);
+    let mut taken: Vec<[i32; 4]> = labels.iter().map(at).map(|[x, y]| [x - 5, y - 5, x + 5, y + 5]).collect();
     for label in labels {
-        let [x, y] = frame.pixel(&camera.project(&label.place).xy()).map(|side| side.round() as i32);
+        let [x, y] = at(label);
         let size = [NOTE.width(&label.text), NOTE.height()];
         let box_at = |[right, down]: [i32; 2]| {
             let left = if right > 0 { x + right * size[1] } else { x + right * size[1] - size[0] };
