@@ -39,6 +39,9 @@ using eprosima::fastrtps::rtps::SerializedPayload_t;
 using eprosima::fastrtps::rtps::WriteParams;
 using Clock = std::chrono::steady_clock;
 
+// what comes is asked for, not when: a machine that is busy may take its time
+constexpr std::chrono::seconds PATIENCE{300};
+
 // a message as it is on the wire, four bytes of encapsulation first
 using Bytes = std::vector<uint8_t>;
 
@@ -99,7 +102,7 @@ struct Met {
   }
   bool all(int wanted) {
     std::unique_lock<std::mutex> lock(mutex);
-    if (!more.wait_for(lock, std::chrono::seconds(60), [&] { return count >= wanted; })) {
+    if (!more.wait_for(lock, PATIENCE, [&] { return count >= wanted; })) {
       std::printf("nobody was met\n");
       return false;
     }
@@ -183,7 +186,7 @@ int tiles(int domain, size_t count) {
   Bytes bytes;
   SampleInfo info;
   while (ids.size() < count) {
-    if (!listener.next(bytes, info, std::chrono::seconds(60))) {
+    if (!listener.next(bytes, info, PATIENCE)) {
       std::printf("only %zu of %zu tiles came\n", ids.size(), count);
       return 1;
     }
@@ -232,7 +235,7 @@ int call(int domain, const std::string& service, const std::string& type) {
     const auto wanted = params.sample_identity().sequence_number();
     Bytes bytes;
     SampleInfo info;
-    if (!listener.next(bytes, info, std::chrono::seconds(60))) {
+    if (!listener.next(bytes, info, PATIENCE)) {
       std::printf("no answer\n");
       return 1;
     }
@@ -296,7 +299,7 @@ int echo(int domain, uint32_t count) {
   std::vector<Clock::time_point> sent(count);
   const auto until_behind = [&](size_t wanted) {
     std::unique_lock<std::mutex> lock(times.mutex);
-    return times.more.wait_for(lock, std::chrono::seconds(60), [&] { return times.count >= wanted || !times.in_order; });
+    return times.more.wait_for(lock, PATIENCE, [&] { return times.count >= wanted || !times.in_order; });
   };
   constexpr uint32_t AHEAD = 32;
   for (uint32_t number = 0; number < count; ++number) {
