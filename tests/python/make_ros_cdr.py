@@ -23,7 +23,6 @@ STANDARD = [
     "rosgraph_msgs/msg/Clock",
     "nav_msgs/msg/Path",
     "sensor_msgs/msg/CompressedImage",
-    "unique_identifier_msgs/msg/UUID",
 ]
 # std_srvs as its files say; an empty request has one byte
 SERVICES = {
@@ -101,14 +100,6 @@ def types():
         found.update(get_types_from_msg(text, name))
     store.register({name: kind for name, kind in found.items() if name not in store.fielddefs})
     return store
-
-
-def constants():
-    """Message name -> its constants, of ours and of the packages of ROS 2."""
-    store = types()
-    names = [*STANDARD, *definitions()]
-    found = {name.rsplit("/", 1)[1]: store.fielddefs[known(name)][0] for name in names}
-    return {name: {key: value for key, _, value in listed} for name, listed in found.items() if listed}
 
 
 def made():

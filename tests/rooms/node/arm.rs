@@ -137,7 +137,7 @@ fn what_was_found_is_slid_over_where_that_is_asked_for() {
     let cell = Cell::start(true);
     let id = cell.flag(Feature::KIND_PLANE, [45.0, 9.0, 12.0]);
     let slide = ProbeSettings { pattern: ProbeSettings::PATTERN_SLIDE, ..ProbeSettings::default() };
-    let planned = cell.probe(id, ProbeSettings { dry_run: true, ..slide.clone() });
+    let planned = cell.probe(id, ProbeSettings { dry_run: true, ..slide });
     assert!(planned.code == ProbeResult::PLANNED && planned.message.contains("and 1 slides"), "{}", planned.message);
     let result = cell.probe(id, slide);
     assert_eq!(result.code, ProbeResult::TOLERANCE_REACHED, "{}", result.message);
@@ -242,7 +242,7 @@ fn orders_that_must_not_be_are_refused_and_nothing_moves() {
         ProbeSettings { tolerance: -1.0, ..ProbeSettings::default() },
         ProbeSettings { confidence: 2.0, ..ProbeSettings::default() },
     ] {
-        let result = cell.probe(id, bad.clone());
+        let result = cell.probe(id, bad);
         assert_eq!(result.code, ProbeResult::BAD_REQUEST, "{bad:?}: {}", result.message);
     }
     let all = cell.world.call(Call::ProbeAll).recv().unwrap();

@@ -1,3 +1,4 @@
 mod arguments;
+mod definitions;
 mod messages;
 mod parameters;
