@@ -31,6 +31,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let made = env::var("OUT_DIR")?;
     let write = |name: &str, text: String| fs::write(Path::new(&made).join(name), text);
     write("messages.rs", rust::structs(&messages)?)?;
+    write("carried.rs", rust::carried(&messages))?;
     write("conversions.rs", rust::conversions(&messages))?;
     write("stand_ins.rs", rust::stand_ins(&messages))?;
     Ok(())

@@ -43,7 +43,25 @@ fn structure(message: &Message, all: &[Message]) -> Result<String, String> {
     let gap = if part.is_empty() { "" } else { "_" };
     let whole = format!("\"{package}/{kind}/{file}{gap}{part}\"");
     text += &format!("impl RosMessage for {name} {{\n    const TYPE_NAME: &'static str = {whole};\n}}\n\n");
+    if message.part == "Request" {
+        text += &service(message);
+    }
     Ok(text)
+}
+
+/// A service by itself, as a type without values.
+fn service(Message { package, file, .. }: &Message) -> String {
+    let declared =
+        format!("/// The service `{package}/srv/{file}`.\n#[derive(Clone, Copy, Debug)]\npub enum {file} {{}}\n");
+    let parts = format!("    type Request = {file}Request;\n    type Response = {file}Response;\n");
+    let name = format!("    const TYPE_NAME: [&'static str; 2] = [\"{package}\", \"{file}\"];\n");
+    format!("{declared}impl RosService for {file} {{\n{parts}{name}}}\n\n")
+}
+
+/// For `carried!`: requests, answers and feedback.
+pub fn carried(messages: &[Message]) -> String {
+    let parts: Vec<_> = messages.iter().filter(|message| !message.part.is_empty()).map(name).collect();
+    format!("carried!({});\n", parts.join(", "))
 }
 
 /// In a package of Rust names stand alone: `FlagFeatureRequest`; the result of an action gives way to the message of that name.
@@ -135,13 +153,19 @@ fn raw(name: &str) -> String {
     if name == "type" { format!("r#{name}") } else { name.to_owned() }
 }
 
-/// For `both_ways!`: each message, what r2r calls it, and its fields on both sides.
+/// For `message!` and `service!`: each message, what r2r calls it, and its fields on both sides; each service, and its path there.
 pub fn conversions(messages: &[Message]) -> String {
-    let lines = messages.iter().filter(|message| !message.fields.is_empty()).map(|message| {
+    let lines = messages.iter().map(|message| {
         let fields = message.fields.iter().map(|field| format!("{}: {}, ", raw(&field.name), trailed(&field.name)));
-        format!("    {} = {} {{ {}}}\n", name(message), path(message), fields.collect::<String>())
+        let both = format!("message!({} = {} {{ {}}});\n", name(message), path(message), fields.collect::<String>());
+        let service = path(message).replace("::Request", "::Service");
+        both + &if message.part == "Request" {
+            format!("service!({} = {service});\n", message.file)
+        } else {
+            String::new()
+        }
     });
-    format!("both_ways! {{\n{}}}\n", lines.collect::<String>())
+    lines.collect()
 }
 
 /// A name as r2r takes it.

@@ -18,18 +18,32 @@ const MOST_TILES: usize = 8192;
 /// Sends an answer.
 pub(super) type Answer = Box<dyn FnOnce() + Send>;
 
-/// What became of a publication.
-pub(super) enum Sent {
+/// What became of a message.
+pub(super) enum Sent<M> {
     /// it is on its way
     Done,
     /// never: it is counted
     Refused,
     /// somebody listens too slowly: here it is again, for later
-    #[cfg_attr(
-        not(any(feature = "ros", test)),
-        expect(dead_code, reason = "ROS keeps what is on its way, or drops it")
-    )]
-    Later(Box<Publication>),
+    Later(M),
+}
+
+impl<M> Sent<M> {
+    /// Of one that waits for nobody.
+    pub fn now<T>(self) -> Sent<T> {
+        match self {
+            Self::Done => Sent::Done,
+            Self::Refused | Self::Later(_) => Sent::Refused,
+        }
+    }
+
+    /// Of one that waits for who listens slowly.
+    pub fn or_later<T>(self, publication: impl FnOnce(M) -> T) -> Sent<T> {
+        match self {
+            Self::Later(message) => Sent::Later(publication(message)),
+            other => other.now(),
+        }
+    }
 }
 
 enum Outgoing {
@@ -92,7 +106,7 @@ impl SendQueue {
     }
 
     /// Sends until it is closed and empty, or closed and somebody listens too slowly.
-    pub fn send(&self, publish: impl Fn(Publication) -> Sent) {
+    pub fn send(&self, publish: impl Fn(Publication) -> Sent<Publication>) {
         while let Some(message) = self.take() {
             let publication = match message {
                 Outgoing::Answer(send) => {
@@ -107,7 +121,7 @@ impl SendQueue {
                 Sent::Refused => _ = count.fetch_add(1, Ordering::Relaxed),
                 Sent::Later(publication) => {
                     let mut waiting = self.waiting();
-                    waiting.put_back(*publication);
+                    waiting.put_back(publication);
                     // who leaves does not wait for who listens slowly
                     if waiting.is_closed {
                         return;
@@ -229,7 +243,7 @@ mod tests {
                 outbox.close();
             }
             // each is taken at the second time
-            if tried.len() % 2 == 1 { Sent::Later(Box::new(publication)) } else { Sent::Done }
+            if tried.len() % 2 == 1 { Sent::Later(publication) } else { Sent::Done }
         });
         let tried = tried.into_inner().unwrap();
         let both = |name: &'static str| [name, name];

@@ -19,13 +19,28 @@ STANDARD = [
     *(f"geometry_msgs/msg/{name}" for name in ["PointStamped", "PoseStamped", "WrenchStamped", "TransformStamped"]),
     *(f"diagnostic_msgs/msg/{name}" for name in ["KeyValue", "DiagnosticStatus", "DiagnosticArray"]),
     *(f"visualization_msgs/msg/{name}" for name in ["UVCoordinate", "MeshFile", "Marker", "MarkerArray"]),
+    *(f"rcl_interfaces/msg/{name}" for name in ["FloatingPointRange", "IntegerRange", "ListParametersResult", "Parameter"]),
+    *(f"rcl_interfaces/msg/Parameter{name}" for name in ["Descriptor", "Event", "Value"]),
+    "rcl_interfaces/msg/SetParametersResult",
     "tf2_msgs/msg/TFMessage",
     "rosgraph_msgs/msg/Clock",
     "nav_msgs/msg/Path",
     "sensor_msgs/msg/CompressedImage",
 ]
-# std_srvs as its files say; an empty request has one byte
+# std_srvs and rcl_interfaces as their files say; an empty request has one byte
 SERVICES = {
+    "rcl_interfaces/srv/GetParameters_Request": "string[] names",
+    "rcl_interfaces/srv/GetParameters_Response": "rcl_interfaces/msg/ParameterValue[] values",
+    "rcl_interfaces/srv/GetParameterTypes_Request": "string[] names",
+    "rcl_interfaces/srv/GetParameterTypes_Response": "uint8[] types",
+    "rcl_interfaces/srv/ListParameters_Request": "string[] prefixes\nuint64 depth",
+    "rcl_interfaces/srv/ListParameters_Response": "rcl_interfaces/msg/ListParametersResult result",
+    "rcl_interfaces/srv/DescribeParameters_Request": "string[] names",
+    "rcl_interfaces/srv/DescribeParameters_Response": "rcl_interfaces/msg/ParameterDescriptor[] descriptors",
+    "rcl_interfaces/srv/SetParameters_Request": "rcl_interfaces/msg/Parameter[] parameters",
+    "rcl_interfaces/srv/SetParameters_Response": "rcl_interfaces/msg/SetParametersResult[] results",
+    "rcl_interfaces/srv/SetParametersAtomically_Request": "rcl_interfaces/msg/Parameter[] parameters",
+    "rcl_interfaces/srv/SetParametersAtomically_Response": "rcl_interfaces/msg/SetParametersResult result",
     "std_srvs/srv/Trigger_Request": "uint8 structure_needs_at_least_one_member",
     "std_srvs/srv/Trigger_Response": "bool success\nstring message",
     "std_srvs/srv/SetBool_Request": "bool data",
@@ -72,7 +87,7 @@ def filled(store, name, numbers):
         item = of[0]
         count = of[1] if kind == 3 else 3
         items = [field(item) for _ in range(count)]
-        is_number = item[0] == 1 and item[1][0] not in ("string", "bool")
+        is_number = item[0] == 1 and item[1][0] != "string"
         kinds = {"byte": "uint8", "char": "uint8"}
         return numpy.array(items, dtype=kinds.get(item[1][0], item[1][0])) if is_number else items
 

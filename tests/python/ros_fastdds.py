@@ -14,19 +14,6 @@ from conftest import ROOT
 from rosbags.typesys import get_types_from_msg
 from running import Running
 
-# rcl_interfaces as its files say, which rosbags has without the services
-SERVICES = {
-    "ListParameters_Request": "string[] prefixes\nuint64 depth",
-    "ListParameters_Response": "rcl_interfaces/msg/ListParametersResult result",
-    "GetParameters_Request": "string[] names",
-    "GetParameters_Response": "rcl_interfaces/msg/ParameterValue[] values",
-    "GetParameterTypes_Request": "string[] names",
-    "GetParameterTypes_Response": "uint8[] types",
-    "DescribeParameters_Request": "string[] names",
-    "DescribeParameters_Response": "rcl_interfaces/msg/ParameterDescriptor[] descriptors",
-    "SetParameters_Request": "rcl_interfaces/msg/Parameter[] parameters",
-    "SetParameters_Response": "rcl_interfaces/msg/SetParametersResult[] results",
-}
 GET_RESULT = {
     "GetResult_Request": "unique_identifier_msgs/msg/UUID goal_id",
     "GetResult_Response": "int8 status\ntouchup_msgs/action/Probe_Result result",
@@ -57,10 +44,8 @@ class FastDds:
         self.binary, self.libraries = build(folder)
         self.store = make_ros_cdr.types()
         known = {}
-        for package, services in {"rcl_interfaces/srv": SERVICES, "touchup_msgs/action": GET_RESULT}.items():
-            for name, text in services.items():
-                name = f"{package}/{name}" if "action" not in package else f"{package}/Probe_{name}"
-                known.update(get_types_from_msg(text, name))
+        for name, text in GET_RESULT.items():
+            known.update(get_types_from_msg(text, f"touchup_msgs/action/Probe_{name}"))
         self.store.register(known)
 
     def start(self, *arguments, wrapper=()):

@@ -16,20 +16,18 @@ use ros2_client::dds::rustdds::mio1::event::Source;
 use ros2_client::qos::{Durability, History};
 use ros2_client::{ActionServer, ActionTypeName, Node, RmwRequestId};
 
+use super::answers::Room;
 use super::incoming::Listener;
 use super::server::SERVICE;
 use super::services::unreadable;
 use super::topics::dds_name;
-use super::{DdsShared, RosError, mapping};
+use super::{RosError, mapping};
 use crate::ros::arguments::NodeConfig;
+use crate::ros::exchange::Exchange;
 use crate::ros::messages::{ProbeFeedback, ProbeGoal, ProbeResponse};
 use crate::ros::port::{Arrival, Call, Feedback, Goal, GoalEnd, Reply};
+use crate::ros::services::PROBE;
 
-impl ros2_client::Message for ProbeGoal {}
-impl ros2_client::Message for ProbeResponse {}
-impl ros2_client::Message for ProbeFeedback {}
-
-const NAME: &str = "~/probe";
 /// Goals that are remembered; of those that ended the oldest are forgotten first.
 const MOST_GOALS: usize = 32;
 /// Calls that wait for the result of one goal.
@@ -60,7 +58,8 @@ struct Goals {
 
 struct ProbeAction {
     server: ProbeServer,
-    shared: Arc<DdsShared>,
+    exchange: Arc<Exchange>,
+    room: Arc<Room>,
     goals: Mutex<Goals>,
 }
 
@@ -70,7 +69,8 @@ struct ProbeListener(Arc<ProbeAction>);
 pub(super) fn server(
     config: &NodeConfig,
     node: &mut Node,
-    shared: &Arc<DdsShared>,
+    exchange: &Arc<Exchange>,
+    room: &Arc<Room>,
 ) -> Result<Box<dyn Listener>, RosError> {
     let latched = SERVICE.durability(Durability::TransientLocal).history(History::KeepLast { depth: 1 });
     let qos = ActionServerQosPolicies {
@@ -80,11 +80,11 @@ pub(super) fn server(
         feedback_publisher: SERVICE,
         status_publisher: latched,
     };
-    let name = dds_name(&config.resolve(NAME)?)?;
+    let name = dds_name(&config.resolve(PROBE)?)?;
     let type_name = ActionTypeName::new("touchup_msgs", "Probe");
     let server = node.create_action_server(mapping(config), &name, &type_name, qos);
     let server = server.map_err(|error| RosError::dds("offering an action", &error))?;
-    let probe = ProbeAction { server, shared: shared.clone(), goals: Mutex::default() };
+    let probe = ProbeAction { server, exchange: exchange.clone(), room: room.clone(), goals: Mutex::default() };
     Ok(Box::new(ProbeListener(Arc::new(probe))))
 }
 
@@ -104,14 +104,14 @@ impl Listener for ProbeListener {
 
     fn take(&mut self) {
         let probe = &self.0;
-        drain(&probe.shared, || probe.server.receive_goal(), |id, request| probe.ask(id, request));
-        drain(&probe.shared, || probe.server.receive_cancel_request(), |id, request| probe.cancel(id, &request));
-        drain(&probe.shared, || probe.server.receive_result_request(), |id, r| probe.wait_for(id, r.goal_id));
+        drain(&probe.exchange, || probe.server.receive_goal(), |id, request| probe.ask(id, request));
+        drain(&probe.exchange, || probe.server.receive_cancel_request(), |id, request| probe.cancel(id, &request));
+        drain(&probe.exchange, || probe.server.receive_result_request(), |id, r| probe.wait_for(id, r.goal_id));
     }
 }
 
 fn drain<T>(
-    shared: &DdsShared,
+    exchange: &Exchange,
     receive: impl Fn() -> ros2_client::ReadResult<Option<(RmwRequestId, T)>>,
     take: impl Fn(RmwRequestId, T),
 ) {
@@ -119,7 +119,7 @@ fn drain<T>(
         match receive() {
             Ok(Some((id, request))) => take(id, request),
             Ok(None) => return,
-            Err(error) => unreadable(NAME, shared, &error),
+            Err(error) => unreadable(PROBE, exchange, &error),
         }
     }
 }
@@ -133,7 +133,7 @@ impl ProbeAction {
     /// Does it in the thread that sends.
     fn later(self: &Arc<Self>, send: impl FnOnce(&Self) + Send + 'static) {
         let probe = self.clone();
-        self.shared.urgent.answer(Box::new(move || send(&probe)));
+        self.exchange.urgent.answer(Box::new(move || send(&probe)));
     }
 
     /// A new goal: the node decides.
@@ -158,7 +158,7 @@ impl ProbeAction {
             result: Reply::new(move |(end, response)| for_result.end(id, end, response)),
             is_cancelled,
         };
-        self.shared.arrivals.put(Arrival::Call(Call::Probe(request.goal, goal)));
+        self.exchange.arrivals.put(Arrival::Call(Call::Probe(request.goal, goal)));
     }
 
     fn accept(self: &Arc<Self>, request_id: RmwRequestId, id: GoalId, accepted: bool) {
@@ -213,7 +213,7 @@ impl ProbeAction {
     }
 
     fn send_result(&self, request_id: RmwRequestId, status: GoalStatusEnum, result: ProbeResponse) {
-        let answer = self.shared.room.fit_packet("~/probe/_action/get_result", GetResultResponse { status, result });
+        let answer = self.room.fit_packet("~/probe/_action/get_result", GetResultResponse { status, result });
         report("get_result", self.server.send_result(request_id, answer));
     }
 

@@ -13,14 +13,12 @@ use std::sync::{Mutex, PoisonError};
 use byteorder::LittleEndian;
 use ros2_client::ServiceMapping;
 use ros2_client::action::GetResultResponse;
-use ros2_client::rcl_interfaces::{
-    DescribeParametersResponse, GetParameterTypesResponse, GetParametersResponse, ListParametersResponse,
-    SetParametersAtomicallyResponse, SetParametersResponse,
-};
 
 use crate::ros::messages::{
-    DetectFeaturesResponse, FlagFeatureResponse, ProbeFeatureResponse, ProbeResponse, ResyncMeshResponse,
-    SaveMeshResponse, SetBoolResponse, TriggerResponse, UndoResponse, UnflagFeatureResponse,
+    DescribeParametersResponse, DetectFeaturesResponse, FlagFeatureResponse, GetParameterTypesResponse,
+    GetParametersResponse, ListParametersResponse, ProbeFeatureResponse, ProbeResponse, ResyncMeshResponse,
+    SaveMeshResponse, SetBoolResponse, SetParametersAtomicallyResponse, SetParametersResponse, TriggerResponse,
+    UndoResponse, UnflagFeatureResponse,
 };
 
 /// Largest packet of a network, in bytes: that of Ethernet, which RustDDS too assumes where it knows no smaller one.
@@ -160,7 +158,7 @@ impl Shrinkable for GetParametersResponse {
 
 impl Shrinkable for GetParameterTypesResponse {
     fn reduce(&mut self, _: usize) {
-        self.values.clear();
+        self.types.clear();
     }
 }
 
@@ -173,9 +171,9 @@ impl Shrinkable for ListParametersResponse {
 impl Shrinkable for DescribeParametersResponse {
     fn reduce(&mut self, most: usize) {
         // types, ranges and words to choose from are what programs need
-        self.values.iter_mut().for_each(|one| one.description.clear());
+        self.descriptors.iter_mut().for_each(|one| one.description.clear());
         if size(self) > most {
-            self.values.clear();
+            self.descriptors.clear();
         }
     }
 }
@@ -195,11 +193,14 @@ mod tests {
     use ros2_client::action::{GoalId, GoalInfo, GoalStatusEnum, SendGoalResponse};
     use ros2_client::action_msgs::CancelGoalResponseEnum;
     use ros2_client::builtin_interfaces::Time;
-    use ros2_client::parameters::raw;
-    use ros2_client::rcl_interfaces::ListParametersResult;
 
     use super::*;
-    use crate::ros::messages::{Feature, Header, Point, ProbeResult};
+    use crate::ros::messages::{
+        self, DescribeParametersRequest, Feature, GetParametersRequest, Header, ListParametersRequest,
+        ListParametersResult, Point, ProbeResult, SetParametersResult,
+    };
+    use crate::ros::parameter_services::{describe_all, get, list, result as set_result};
+    use crate::ros::parameters::{PARAMETERS, ParameterDescriptor, ParameterValue, Parameters};
 
     /// The smallest packet that a network of today has: what IPv6 asks for, and tunnels have.
     const TUNNEL: usize = 1280;
@@ -284,19 +285,19 @@ mod tests {
         fits(FlagFeatureResponse { message: long(), ..FlagFeatureResponse::default() });
         fits(UnflagFeatureResponse { message: long(), success: true });
         fits(SetBoolResponse { message: long(), success: true });
-        let refused = raw::SetParametersResult { successful: false, reason: long() };
+        let refused = SetParametersResult { successful: false, reason: long() };
         assert!(fits(SetParametersAtomicallyResponse { result: refused }).result.reason.ends_with(" …"));
     }
 
     #[test]
     fn of_too_many_parameters_the_answer_is_empty_and_keeps_what_was_set() {
-        let value = || raw::ParameterValue::from(ros2_client::ParameterValue::String("a".repeat(100)));
+        let value = || messages::ParameterValue { string_value: "a".repeat(100), ..Default::default() };
         assert!(fits(GetParametersResponse { values: vec![value(); 20] }).values.is_empty());
-        assert!(fits(GetParameterTypesResponse { values: vec![0; 2000] }).values.is_empty());
+        assert!(fits(GetParameterTypesResponse { types: vec![0; 2000] }).types.is_empty());
         let names = vec!["a name of a parameter".to_owned(); 100];
         let list = ListParametersResponse { result: ListParametersResult { names, prefixes: Vec::new() } };
         assert!(fits(list).result.names.is_empty());
-        let set = |successful| raw::SetParametersResult { successful, reason: "a".repeat(100) };
+        let set = |successful| SetParametersResult { successful, reason: "a".repeat(100) };
         let results = fits(SetParametersResponse { results: (0..20).map(|i| set(i % 2 == 0)).collect() }).results;
         assert_eq!(results.iter().map(|one| one.successful).collect::<Vec<_>>(), [true, false].repeat(10));
         assert!(fits(SetParametersResponse { results: vec![set(true); 1000] }).results.is_empty());
@@ -304,8 +305,8 @@ mod tests {
 
     #[test]
     fn the_mapping_of_cyclone_has_no_limit() {
-        let whole = GetParameterTypesResponse { values: vec![0; 100_000] };
-        let fit = |mapping| Room::new(&mapping).fit("~/get_parameter_types", whole.clone()).values.len();
+        let whole = GetParameterTypesResponse { types: vec![0; 100_000] };
+        let fit = |mapping| Room::new(&mapping).fit("~/get_parameter_types", whole.clone()).types.len();
         assert_eq!([ServiceMapping::Cyclone, ServiceMapping::Enhanced].map(fit), [100_000, 0]);
     }
 
@@ -316,5 +317,69 @@ mod tests {
             cut(&mut text, by);
             assert!(text.len() <= 20usize.saturating_sub(by), "{by}: {text}");
         }
+    }
+
+    fn names() -> Vec<String> {
+        PARAMETERS.iter().map(|declared| declared.name.to_owned()).collect()
+    }
+
+    /// What `ros2 param dump` asks for.
+    fn all_values(values: &Parameters) -> GetParametersResponse {
+        get(values, &GetParametersRequest { names: names() })
+    }
+
+    fn described(names: Vec<String>) -> DescribeParametersResponse {
+        describe_all(&DescribeParametersRequest { names })
+    }
+
+    /// As a launch file starts it: paths where there are some.
+    fn launched() -> Parameters {
+        let mut values = Parameters::default();
+        let share = "/home/somebody/ws/install/touchup/share/touchup/config/probe.yaml";
+        for (name, path) in [("scene", share), ("scan", "/home/somebody/scans/part.ply"), ("tool_frame", "probe_tip")] {
+            values.set(name, &ParameterValue::String(path.to_owned())).unwrap();
+        }
+        values
+    }
+
+    #[test]
+    fn what_is_asked_of_all_parameters_fits_into_one_packet() {
+        let mut described_briefly = described(names());
+        described_briefly.reduce(room(ETHERNET));
+        let types = GetParameterTypesResponse { types: vec![0; PARAMETERS.len()] };
+        let live = PARAMETERS.iter().filter(|declared| declared.live);
+        let refused =
+            |one: &ParameterDescriptor| Parameters::default().set_live(one.name, &ParameterValue::Integer(-1));
+        let results = live.map(|one| set_result(refused(one).map_err(|why| why.to_string()))).collect();
+        let sizes = [
+            ("list_parameters", size(&list(&ListParametersRequest { prefixes: Vec::new(), depth: 0 }))),
+            ("get_parameters of all, as they are declared", size(&all_values(&Parameters::default()))),
+            ("get_parameters of all, with paths", size(&all_values(&launched()))),
+            ("get_parameter_types of all", size(&types)),
+            ("describe_parameters of all, without descriptions", size(&described_briefly)),
+            ("set_parameters of all that are live, refused", size(&SetParametersResponse { results })),
+        ];
+        println!("{} parameters; described in full: {} bytes", PARAMETERS.len(), size(&described(names())));
+        for (service, bytes) in sizes {
+            println!("{bytes:5} bytes of {} {service}", room(ETHERNET));
+            assert!(bytes <= room(ETHERNET), "{service}: {bytes} bytes");
+        }
+        // nothing but the descriptions is left out
+        let of =
+            |one: &messages::ParameterDescriptor| (one.name.clone(), one.r#type, one.additional_constraints.clone());
+        assert_eq!(
+            described_briefly.descriptors.iter().map(of).collect::<Vec<_>>(),
+            described(names()).descriptors.iter().map(of).collect::<Vec<_>>()
+        );
+        assert!(described_briefly.descriptors.iter().all(|one| one.description.is_empty()));
+    }
+
+    #[test]
+    fn a_few_parameters_are_described_in_full() {
+        let names = names();
+        let largest = names.windows(8).map(|few| size(&described(few.to_vec())));
+        let largest = largest.max().unwrap();
+        println!("{largest} bytes of {}", room(ETHERNET));
+        assert!(largest <= room(ETHERNET));
     }
 }

@@ -14,9 +14,11 @@ use ros2_client::{Context, ServiceMapping};
 
 use super::incoming::Listener;
 use super::keep_alive::{KeepAlive, LOOK_EVERY};
-use super::{DdsShared, mapping};
+use super::mapping;
 use crate::ros::arguments::NodeConfig;
-use crate::ros::port::{Arrival, Endpoint};
+use crate::ros::exchange::Exchange;
+use crate::ros::graph;
+use crate::ros::port::Arrival;
 
 /// Vendors by their number on the wire: who knows one mapping of services alone.
 const FAST_DDS: [u8; 2] = [0x01, 0x0f];
@@ -30,7 +32,7 @@ pub(super) struct DdsGraph {
     listener: DomainParticipantStatusListener,
     /// `None` on this computer alone, where nobody is out of reach
     keep_alive: Option<KeepAlive>,
-    shared: Arc<DdsShared>,
+    exchange: Arc<Exchange>,
     mapping: ServiceMapping,
     own: GUID,
     /// ROS name and type of our topics, by their name in DDS
@@ -50,7 +52,7 @@ pub(super) struct DdsGraph {
 }
 
 impl DdsGraph {
-    pub fn new(context: &Context, shared: &Arc<DdsShared>, config: &NodeConfig) -> Self {
+    pub fn new(context: &Context, exchange: &Arc<Exchange>, config: &NodeConfig) -> Self {
         let participant = context.domain_participant();
         let keep_alive = (!config.localhost_only).then(|| {
             KeepAlive::new(config.domain_id, participant.participant_id()).inspect_err(
@@ -60,7 +62,7 @@ impl DdsGraph {
         Self {
             listener: participant.status_listener(),
             keep_alive: keep_alive.and_then(Result::ok),
-            shared: shared.clone(),
+            exchange: exchange.clone(),
             mapping: mapping(config),
             own: participant.guid(),
             names: BTreeMap::new(),
@@ -119,7 +121,7 @@ impl DdsGraph {
                     self.tell(local, None);
                 }
                 if is_new && self.tiles == Some(local) {
-                    self.shared.arrivals.put(Arrival::Viewer);
+                    self.exchange.arrivals.put(Arrival::Viewer);
                 }
                 if let Some((service, what)) = self.callers.get(&remote) {
                     tracing::info!(service, "{what}");
@@ -178,7 +180,7 @@ impl DdsGraph {
             if ours != type_name && self.told.insert(guid) {
                 let reason = format!("somebody has it with the type {type_name}, here it is {ours}");
                 let (name, count) = (name.clone(), self.count(topic));
-                self.report(name, count, Some(reason));
+                graph::report(&self.exchange.arrivals, name, count, Some(reason));
             }
             return;
         }
@@ -194,7 +196,7 @@ impl DdsGraph {
             let reason = format!(
                 "somebody who calls it has another header: start this node with -p service_mapping:={right}, or all with one RMW"
             );
-            self.report(service.to_owned(), 1, Some(reason));
+            graph::report(&self.exchange.arrivals, service.to_owned(), 1, Some(reason));
         }
     }
 
@@ -205,15 +207,7 @@ impl DdsGraph {
     fn tell(&self, local: GUID, mismatch: Option<String>) {
         let Some((topic, others)) = self.matched.get(&local) else { return };
         let name = self.names.get(topic).map_or_else(|| topic.clone(), |(name, _)| name.clone());
-        self.report(name, others.len(), mismatch);
-    }
-
-    fn report(&self, topic: String, count: usize, mismatch: Option<String>) {
-        match &mismatch {
-            Some(reason) => tracing::warn!(topic, "{reason}"),
-            None => tracing::info!(topic, others = count, "who is on a topic has changed"),
-        }
-        self.shared.arrivals.put(Arrival::Matched(Endpoint { topic, count, mismatch }));
+        graph::report(&self.exchange.arrivals, name, others.len(), mismatch);
     }
 }
 

@@ -10,7 +10,8 @@ use ros2_client::dds::rustdds::mio1::event::Source;
 use ros2_client::dds::rustdds::mio1::{Events, Interest, Poll, Token, Waker};
 use ros2_client::{Gid, Subscription};
 
-use super::{DdsShared, RosError};
+use super::RosError;
+use crate::ros::exchange::Exchange;
 use crate::ros::messages::RosMessage;
 use crate::ros::port::Arrival;
 
@@ -40,7 +41,7 @@ const WAKE: Token = Token(usize::MAX);
 /// Starts the thread; the waker lets it look whether all is over.
 pub(super) fn listen(
     mut listeners: Vec<Box<dyn Listener>>,
-    shared: Arc<DdsShared>,
+    exchange: Arc<Exchange>,
 ) -> Result<(Arc<Waker>, JoinHandle<()>), RosError> {
     let mut poll = Poll::new()?;
     for (token, listener) in listeners.iter_mut().enumerate() {
@@ -55,13 +56,13 @@ pub(super) fn listen(
         listeners.iter_mut().for_each(|listener| listener.take());
         let look_every = listeners.iter().filter_map(|listener| listener.look_every()).min();
         let mut looked = Instant::now();
-        while !shared.arrivals.is_over() {
+        while !exchange.arrivals.is_over() {
             if let Err(error) = poll.poll(&mut events, look_every) {
                 if error.kind() == std::io::ErrorKind::Interrupted {
                     continue;
                 }
                 tracing::error!(%error, "the node hears nothing any more");
-                shared.arrivals.put(Arrival::Shutdown);
+                exchange.arrivals.put(Arrival::Shutdown);
                 return;
             }
             for event in &events {
@@ -103,17 +104,17 @@ impl LastNumbers {
 }
 
 /// A topic that is listened to.
-pub(super) struct Topic<M: RosMessage> {
+pub(super) struct HeardTopic<M: RosMessage> {
     pub name: &'static str,
     pub subscription: Subscription<M>,
-    pub shared: Arc<DdsShared>,
-    pub arrival: fn(&DdsShared, M) -> Option<Arrival>,
+    pub exchange: Arc<Exchange>,
+    pub arrival: fn(&Exchange, M) -> Arrival,
     /// which of the two counters of what was lost on the way
     pub counter: Option<usize>,
     pub numbers: LastNumbers,
 }
 
-impl<M: RosMessage> Listener for Topic<M> {
+impl<M: RosMessage> Listener for HeardTopic<M> {
     fn source(&mut self, _: usize) -> &mut dyn Source {
         &mut self.subscription
     }
@@ -124,14 +125,12 @@ impl<M: RosMessage> Listener for Topic<M> {
                 Ok(Some((message, info))) => {
                     if let Some(counter) = self.counter {
                         let lost = self.numbers.missing(info.publisher_gid(), info.sequence_number());
-                        self.shared.lost[counter].fetch_add(lost, Ordering::Relaxed);
+                        self.exchange.lost[counter].fetch_add(lost, Ordering::Relaxed);
                     }
-                    if let Some(arrival) = (self.arrival)(&self.shared, message) {
-                        self.shared.arrivals.put(arrival);
-                    }
+                    self.exchange.arrivals.put((self.arrival)(&self.exchange, message));
                 }
                 Ok(None) => return,
-                Err(error) => self.shared.arrivals.put(Arrival::Unreadable(self.name, error.to_string())),
+                Err(error) => self.exchange.arrivals.put(Arrival::Unreadable(self.name, error.to_string())),
             }
         }
     }

@@ -8,15 +8,13 @@ mod answers;
 mod graph;
 mod incoming;
 mod keep_alive;
-mod parameter_services;
 mod samples;
 mod server;
 mod services;
 mod topics;
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::thread::{Builder, JoinHandle};
+use std::sync::{Arc, OnceLock};
+use std::thread::JoinHandle;
 
 use ros2_client::dds::rustdds;
 use ros2_client::{Context, Node, NodeName, NodeOptions, ServiceMapping};
@@ -24,11 +22,12 @@ use thiserror::Error;
 
 use self::answers::Room;
 use super::arguments::NodeConfig;
-use super::arrivals::Arrivals;
-use super::clock::RosClock;
+use super::exchange::{self, Exchange, Joined};
 use super::names::NameError;
-use super::port::{Inbox, Port, Publication};
-use super::send_queue::SendQueue;
+use super::parameter_services;
+use super::parameters::{PARAMETERS, ParameterValue, Parameters};
+use super::port::{Arrival, Inbox, Port};
+use super::topics::{MeshTopics, UrgentTopics, subscribe};
 pub use samples::samples;
 
 /// Why the node cannot speak to others.
@@ -58,65 +57,21 @@ impl RosError {
     }
 }
 
-/// What the parts of the port share.
-struct DdsShared {
-    arrivals: Arrivals,
-    /// wrenches, poses that did not come
-    lost: [AtomicU64; 2],
-    clock: RosClock,
-    urgent: SendQueue,
-    mesh: SendQueue,
-    room: Room,
-}
-
-struct DdsPort {
-    shared: Arc<DdsShared>,
+struct DdsConnection {
+    exchange: Arc<Exchange>,
     waker: Arc<rustdds::mio1::Waker>,
     threads: Vec<JoinHandle<()>>,
     // its entities leave the graph when it goes
     _node: Arc<Node>,
 }
 
-impl Port for DdsPort {
-    fn publish(&self, publication: Publication) {
-        let outbox = if publication.may_wait() { &self.shared.mesh } else { &self.shared.urgent };
-        outbox.put(publication);
-    }
-
-    fn now_ns(&self) -> i64 {
-        self.shared.clock.now_ns()
-    }
-
-    fn dropped(&self) -> [u64; 2] {
-        self.shared.arrivals.dropped()
-    }
-
-    fn lost(&self) -> [u64; 2] {
-        self.shared.lost.each_ref().map(|count| count.load(Ordering::Relaxed))
-    }
-
-    fn unsent(&self) -> [u64; 2] {
-        let [tiles, patches] = self.shared.mesh.unsent();
-        let [_, others] = self.shared.urgent.unsent();
-        [tiles, patches + others]
-    }
-
-    fn tiles_waiting(&self) -> usize {
-        self.shared.mesh.tiles_waiting()
-    }
-}
-
-impl Drop for DdsPort {
+impl Drop for DdsConnection {
     fn drop(&mut self) {
-        self.shared.arrivals.end();
-        self.shared.urgent.close();
-        self.shared.mesh.close();
+        self.exchange.arrivals.end();
+        self.exchange.close();
         // without it the thread stays until the next message: nothing worse
         let _ = self.waker.wake();
-        for thread in self.threads.drain(..) {
-            // one that panicked has said so
-            let _ = thread.join();
-        }
+        exchange::join(self.threads.drain(..));
     }
 }
 
@@ -125,43 +80,55 @@ impl Drop for DdsPort {
 /// # Errors
 /// [`RosError`]: a name that is none, no network, no thread.
 pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosError> {
-    let is_simulated = config.parameters.bool("use_sim_time");
-    let shared = Arc::new(DdsShared {
-        arrivals: Arrivals::new(inbox),
-        lost: [const { AtomicU64::new(0) }; 2],
-        clock: RosClock::new(is_simulated),
-        urgent: SendQueue::default(),
-        mesh: SendQueue::default(),
-        room: Room::new(&mapping(config)),
-    });
+    let exchange = Exchange::new(config, inbox);
+    let room = Arc::new(Room::new(&mapping(config)));
     // its own parameter services know one mapping alone, and nothing of ranges
-    let options = parameter_services::declare(NodeOptions::new().start_parameter_services(false), &config.parameters);
+    let options = declare(NodeOptions::new().start_parameter_services(false), &config.parameters);
     let (context, mut node) = join(config, options)?;
-    let mut graph = graph::DdsGraph::new(&context, &shared, config);
-    let (urgent, mesh) = topics::writers(config, &mut node, &mut graph)?;
-    let mut listeners = topics::readers(config, &mut node, &mut graph, &shared)?;
-    listeners.extend(services::servers(config, &context, &mut node, &mut graph, &shared)?);
-    listeners.push(action::server(config, &mut node, &shared)?);
-    let parameters = parameter_services::servers(config, &context, &mut node, &shared)?;
+    let mut graph = graph::DdsGraph::new(&context, &exchange, config);
+    let mut topics = topics::DdsTopics::new(config, &mut node, &mut graph, &exchange);
+    let (mesh, urgent) = (MeshTopics::new(&mut topics)?, UrgentTopics::new(&mut topics)?);
+    subscribe(config, &mut topics)?;
+    let mut listeners = topics.listeners;
+    let mut services = services::DdsServices::new(config, &context, &mut node, &exchange, &room);
+    let arrivals = exchange.clone();
+    super::services::serve(&mut services, move |call| arrivals.arrivals.put(Arrival::Call(call)))?;
+    services.whole_names()?.into_iter().for_each(|name| graph.serve(name));
+    let announcing = Arc::new(OnceLock::<Arc<Node>>::new());
+    let announce = announcing.clone();
+    let announce = move |name: &str, value: &ParameterValue| {
+        if let Some(Err(reason)) = announce.get().map(|node| node.set_parameter(name, native(value))) {
+            tracing::warn!(name, reason, "a change of a parameter is not announced");
+        }
+    };
+    parameter_services::serve(&mut services, &exchange, &config.parameters, Box::new(announce))?;
+    listeners.append(&mut services.listeners);
+    listeners.push(action::server(config, &mut node, &exchange, &room)?);
     let node = Arc::new(node);
-    listeners.extend(parameters.listeners(&node));
+    announcing.get_or_init(|| node.clone());
     listeners.push(Box::new(graph));
-    let (waker, listening) = incoming::listen(listeners, shared.clone())?;
-    let threads = vec![
-        listening,
-        thread("touchup-send", &shared, move |shared| shared.urgent.send(|one| urgent.send(one)))?,
-        thread("touchup-mesh", &shared, move |shared| shared.mesh.send(|one| mesh.send(one)))?,
-    ];
-    Ok(Arc::new(DdsPort { shared, waker, threads, _node: node }))
+    let (waker, listening) = incoming::listen(listeners, exchange.clone())?;
+    let mut threads = vec![listening];
+    threads.extend(exchange.senders(move |one| urgent.send(one), move |one| mesh.send(one))?);
+    let connection = DdsConnection { exchange: exchange.clone(), waker, threads, _node: node };
+    Ok(Arc::new(Joined { exchange, _connection: connection }))
 }
 
-fn thread(
-    name: &str,
-    shared: &Arc<DdsShared>,
-    send: impl FnOnce(&DdsShared) + Send + 'static,
-) -> Result<JoinHandle<()>, RosError> {
-    let shared = Arc::clone(shared);
-    Ok(Builder::new().name(name.to_owned()).spawn(move || send(&shared))?)
+/// Tells ros2-client the values, so that it announces their changes on `/parameter_events`.
+fn declare(options: NodeOptions, parameters: &Parameters) -> NodeOptions {
+    PARAMETERS.iter().fold(options, |options, declared| {
+        let value = parameters.value(declared.name).cloned().unwrap_or(declared.default_value());
+        options.declare_parameter(declared.name, native(&value))
+    })
+}
+
+fn native(value: &ParameterValue) -> ros2_client::ParameterValue {
+    match value {
+        ParameterValue::Bool(on) => ros2_client::ParameterValue::Boolean(*on),
+        ParameterValue::Integer(whole) => ros2_client::ParameterValue::Integer(*whole),
+        ParameterValue::Double(number) => ros2_client::ParameterValue::Double(*number),
+        ParameterValue::String(word) => ros2_client::ParameterValue::String(word.clone()),
+    }
 }
 
 fn mapping(config: &NodeConfig) -> ServiceMapping {

@@ -1,49 +1,32 @@
-//! The services of docs/ros.md.
+//! Services as servers of ros2-client, or our own.
 
 use std::sync::Arc;
 
 use ros2_client::dds::rustdds::mio1::event::Source;
 use ros2_client::{Context, Node, ReadError};
 
-use super::answers::Shrinkable;
-use super::graph::DdsGraph;
+use super::RosError;
+use super::answers::{Room, Shrinkable};
 use super::incoming::Listener;
-use super::server::{CallId, Server};
-use super::{DdsShared, RosError};
+use super::server::Server;
 use crate::ros::arguments::NodeConfig;
+use crate::ros::exchange::Exchange;
 use crate::ros::messages::*;
-use crate::ros::port::{Arrival, Call, Reply};
+use crate::ros::port::{Arrival, Reply};
+use crate::ros::services::Serves;
 
 macro_rules! carried {
-    ($($message:ident),+ $(,)?) => { $(impl ros2_client::Message for $message {})+ };
+    ($($message:ident),+) => { $(impl ros2_client::Message for $message {})+ };
 }
-carried!(
-    FlagFeatureRequest,
-    FlagFeatureResponse,
-    UnflagFeatureRequest,
-    UnflagFeatureResponse,
-    DetectFeaturesRequest,
-    DetectFeaturesResponse,
-    SaveMeshRequest,
-    SaveMeshResponse,
-    ResyncMeshRequest,
-    ResyncMeshResponse,
-    UndoRequest,
-    UndoResponse,
-    TriggerRequest,
-    TriggerResponse,
-    SetBoolRequest,
-    SetBoolResponse,
-    ProbeFeatureRequest,
-    ProbeFeatureResponse,
-);
+include!(concat!(env!("OUT_DIR"), "/carried.rs"));
 
 /// One service: what it is called, and what is done with a request.
-pub(super) struct Service<Q: ros2_client::Message + 'static, A: ros2_client::Message + 'static> {
-    pub name: &'static str,
-    pub server: Arc<Server<Q, A>>,
-    pub shared: Arc<DdsShared>,
-    pub call: Box<dyn FnMut(Q, Reply<A>) + Send>,
+struct Service<Q: ros2_client::Message + 'static, A: ros2_client::Message + 'static> {
+    name: &'static str,
+    server: Arc<Server<Q, A>>,
+    exchange: Arc<Exchange>,
+    room: Arc<Room>,
+    call: Box<dyn FnMut(Q, Reply<A>) + Send>,
 }
 
 impl<Q, A> Listener for Service<Q, A>
@@ -59,90 +42,68 @@ where
         loop {
             match self.server.take() {
                 Ok(Some((id, request))) => {
-                    let reply = reply(self.name, &self.server, &self.shared, id);
-                    (self.call)(request, reply);
+                    let (name, server, room) = (self.name, self.server.clone(), self.room.clone());
+                    let send = move |answer| server.send(id, room.fit(name, answer));
+                    (self.call)(request, self.exchange.reply(name, send));
                 }
                 Ok(None) => return,
-                Err(error) => unreadable(self.name, &self.shared, &error),
+                Err(error) => unreadable(self.name, &self.exchange, &error),
             }
         }
     }
 }
 
 /// A request that cannot be read is most often one with another header.
-pub(super) fn unreadable(name: &'static str, shared: &DdsShared, error: &ReadError) {
+pub(super) fn unreadable(name: &'static str, exchange: &Exchange, error: &ReadError) {
     let reason = format!("{error}; has the caller another service_mapping?");
-    shared.arrivals.put(Arrival::Unreadable(name, reason));
+    exchange.arrivals.put(Arrival::Unreadable(name, reason));
 }
 
-/// Answers a request from the thread that sends.
-fn reply<Q, A>(name: &'static str, server: &Arc<Server<Q, A>>, shared: &Arc<DdsShared>, id: CallId) -> Reply<A>
-where
-    Q: ros2_client::Message + Send + Sync + 'static,
-    A: Shrinkable + Send + Sync + 'static,
-{
-    let (server, shared) = (server.clone(), shared.clone());
-    Reply::new(move |answer| {
-        let answer = shared.room.fit(name, answer);
-        shared.urgent.answer(Box::new(move || {
-            if let Err(error) = server.send(id, answer) {
-                tracing::warn!(service = name, %error, "an answer is not sent");
-            }
-        }));
-    })
-}
-
-/// All services but those of parameters and the action.
-pub(super) fn servers(
-    config: &NodeConfig,
-    context: &Context,
-    node: &mut Node,
-    graph: &mut DdsGraph,
-    shared: &Arc<DdsShared>,
-) -> Result<Vec<Box<dyn Listener>>, RosError> {
-    let mut made = Services { config, context, node, graph, shared, listeners: Vec::new() };
-    made.add("~/flag_feature", "touchup_msgs", "FlagFeature", Call::Flag)?;
-    made.add("~/unflag_feature", "touchup_msgs", "UnflagFeature", Call::Unflag)?;
-    made.add("~/detect_features", "touchup_msgs", "DetectFeatures", Call::Detect)?;
-    made.add("~/save_mesh", "touchup_msgs", "SaveMesh", Call::Save)?;
-    made.add("~/resync_mesh", "touchup_msgs", "ResyncMesh", Call::Resync)?;
-    made.add("~/undo", "touchup_msgs", "Undo", Call::Undo)?;
-    made.add("~/redo", "touchup_msgs", "Undo", Call::Redo)?;
-    made.add("~/reset", "std_srvs", "Trigger", |_: TriggerRequest, reply| Call::Reset(reply))?;
-    made.add("~/pause", "std_srvs", "SetBool", Call::Pause)?;
-    made.add("~/probe_all", "std_srvs", "Trigger", |_: TriggerRequest, reply| Call::ProbeAll(reply))?;
-    made.add("~/recover", "std_srvs", "Trigger", |_: TriggerRequest, reply| Call::Recover(reply))?;
-    made.add("~/arm_state", "std_srvs", "Trigger", |_: TriggerRequest, reply| Call::ArmState(reply))?;
-    made.add("~/probe_feature", "touchup_msgs", "ProbeFeature", Call::ProbeFeature)?;
-    Ok(made.listeners)
-}
-
-struct Services<'a> {
+/// Makes servers.
+pub(super) struct DdsServices<'a> {
     config: &'a NodeConfig,
     context: &'a Context,
     node: &'a mut Node,
-    shared: &'a Arc<DdsShared>,
-    graph: &'a mut DdsGraph,
-    listeners: Vec<Box<dyn Listener>>,
+    exchange: &'a Arc<Exchange>,
+    room: &'a Arc<Room>,
+    names: Vec<&'static str>,
+    pub listeners: Vec<Box<dyn Listener>>,
 }
 
-impl Services<'_> {
-    fn add<Q, A>(
+impl<'a> DdsServices<'a> {
+    pub fn new(
+        config: &'a NodeConfig,
+        context: &'a Context,
+        node: &'a mut Node,
+        exchange: &'a Arc<Exchange>,
+        room: &'a Arc<Room>,
+    ) -> Self {
+        Self { config, context, node, exchange, room, names: Vec::new(), listeners: Vec::new() }
+    }
+
+    /// Of those that are served so far, absolute and remapped.
+    pub fn whole_names(&self) -> Result<Vec<String>, RosError> {
+        self.names.iter().map(|name| Ok(self.config.resolve(name)?)).collect()
+    }
+}
+
+impl<S> Serves<S> for DdsServices<'_>
+where
+    S: RosService<Request: ros2_client::Message, Response: Shrinkable>,
+{
+    type Error = RosError;
+
+    fn serve(
         &mut self,
         name: &'static str,
-        package: &str,
-        type_name: &str,
-        call: fn(Q, Reply<A>) -> Call,
-    ) -> Result<(), RosError>
-    where
-        Q: ros2_client::Message + Clone + Send + Sync + 'static,
-        A: Shrinkable + Send + Sync + 'static,
-    {
-        self.graph.serve(self.config.resolve(name)?);
-        let server = Arc::new(Server::new(self.config, self.context, self.node, name, package, type_name)?);
-        let arrivals = self.shared.clone();
-        let call = Box::new(move |request, reply| arrivals.arrivals.put(Arrival::Call(call(request, reply))));
-        self.listeners.push(Box::new(Service { name, server, shared: self.shared.clone(), call }));
+        call: impl FnMut(S::Request, Reply<S::Response>) + Send + 'static,
+    ) -> Result<(), RosError> {
+        let [package, type_name] = S::TYPE_NAME;
+        let server =
+            Server::<S::Request, S::Response>::new(self.config, self.context, self.node, name, package, type_name);
+        let (server, exchange, room) = (Arc::new(server?), self.exchange.clone(), self.room.clone());
+        self.names.push(name);
+        self.listeners.push(Box::new(Service { name, server, exchange, room, call: Box::new(call) }));
         Ok(())
     }
 }

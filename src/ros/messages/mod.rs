@@ -14,4 +14,14 @@ pub trait RosMessage: Clone + PartialEq + std::fmt::Debug + Serialize + Deserial
     const TYPE_NAME: &'static str;
 }
 
+/// A service: what is asked, and what is answered.
+pub trait RosService: 'static {
+    /// what is asked
+    type Request: RosMessage + Sync;
+    /// what is answered
+    type Response: RosMessage + Sync;
+    /// package and name
+    const TYPE_NAME: [&'static str; 2];
+}
+
 include!(concat!(env!("OUT_DIR"), "/messages.rs"));

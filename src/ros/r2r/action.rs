@@ -8,12 +8,11 @@ use r2r::{ActionServerCancelRequest, ActionServerGoal, ActionServerGoalRequest, 
 
 use super::convert::Convert;
 use super::touchup_msgs::action::Probe::Action;
-use super::{During, PollSource, R2rShared, RosError, source};
-use crate::ros::messages::{ProbeFeedback, ProbeResponse};
+use super::{During, PollSource, RosError, source};
+use crate::ros::exchange::Exchange;
+use crate::ros::messages::{ProbeFeedback, ProbeGoal, ProbeResponse};
 use crate::ros::port::{Arrival, Call, Feedback, Goal, GoalEnd};
-
-/// Its name.
-pub(super) const NAME: &str = "~/probe";
+use crate::ros::services::PROBE;
 
 /// A goal from the first question to the result.
 enum GoalState {
@@ -45,20 +44,20 @@ struct Cancels {
 type Running = Arc<Mutex<Vec<Cancels>>>;
 
 /// The server of the action: one source of goals, one of what is asked of those that run.
-pub(super) fn server(node: &mut Node, shared: &Arc<R2rShared>) -> Result<[PollSource; 2], RosError> {
-    let requests = node.create_action_server::<Action>(NAME).during("offering an action")?;
+pub(super) fn server(node: &mut Node, exchange: &Arc<Exchange>) -> Result<[PollSource; 2], RosError> {
+    let requests = node.create_action_server::<Action>(PROBE).during("offering an action")?;
     let running = Running::default();
     let cancels = running.clone();
-    let shared = shared.clone();
+    let exchange = exchange.clone();
     let goals = source(requests, move |request: ActionServerGoalRequest<Action>| {
-        let wanted = request.goal.clone().convert();
-        shared.arrivals.put(Arrival::Call(Call::Probe(wanted, goal(request, &shared, &running))));
+        let wanted = ProbeGoal::ours(request.goal.clone());
+        exchange.arrivals.put(Arrival::Call(Call::Probe(wanted, goal(request, &exchange, &running))));
     });
     Ok([goals, Box::new(move || take_cancels(&mut locked(&cancels)))])
 }
 
 /// What the node answers with: it goes out from the thread that sends, so the answers keep their order.
-fn goal(request: ActionServerGoalRequest<Action>, shared: &Arc<R2rShared>, running: &Running) -> Goal {
+fn goal(request: ActionServerGoalRequest<Action>, exchange: &Arc<Exchange>, running: &Running) -> Goal {
     let is_cancelled = Arc::new(AtomicBool::new(false));
     let handle = Arc::new(GoalHandle {
         state: Mutex::new(GoalState::Asked(request)),
@@ -66,14 +65,14 @@ fn goal(request: ActionServerGoalRequest<Action>, shared: &Arc<R2rShared>, runni
         is_over: AtomicBool::new(false),
     });
     let [for_accept, for_feedback, for_result] = [handle.clone(), handle.clone(), handle];
-    let (running, sending) = (running.clone(), shared.clone());
+    let (running, sending) = (running.clone(), exchange.clone());
     Goal {
-        accept: shared.reply(NAME, move |is_accepted| accept(&for_accept, is_accepted, &running)),
+        accept: exchange.reply(PROBE, move |is_accepted| accept(&for_accept, is_accepted, &running)),
         feedback: Feedback(Box::new(move |feedback| {
             let handle = for_feedback.clone();
             sending.urgent.answer(Box::new(move || tell(&handle, feedback)));
         })),
-        result: shared.reply(NAME, move |(end, response)| finish(&for_result, end, response)),
+        result: exchange.reply(PROBE, move |(end, response)| finish(&for_result, end, response)),
         is_cancelled,
     }
 }
@@ -91,7 +90,7 @@ fn accept(handle: &Arc<GoalHandle>, is_accepted: bool, running: &Running) -> r2r
 
 fn tell(handle: &GoalHandle, feedback: ProbeFeedback) {
     if let GoalState::Running(goal) = &*locked(&handle.state)
-        && let Err(error) = goal.publish_feedback(feedback.convert())
+        && let Err(error) = goal.publish_feedback(feedback.theirs())
     {
         // nobody waits for it who misses it
         tracing::debug!(%error, "feedback is not sent");
@@ -101,12 +100,12 @@ fn tell(handle: &GoalHandle, feedback: ProbeFeedback) {
 fn finish(handle: &GoalHandle, end: GoalEnd, response: ProbeResponse) -> r2r::Result<()> {
     let GoalState::Running(mut goal) = handle.change(GoalState::Over) else { return Ok(()) };
     handle.is_over.store(true, Ordering::Relaxed);
-    let cancelled = response.clone().convert();
+    let cancelled = response.clone().theirs();
     // r2r lets go of a goal once its cancelling is confirmed: from then on no other end reaches who waits
     match end {
         GoalEnd::Canceled => goal.cancel(cancelled),
-        GoalEnd::Succeeded => goal.succeed(response.convert()).or_else(|_| goal.cancel(cancelled)),
-        GoalEnd::Aborted => goal.abort(response.convert()).or_else(|_| goal.cancel(cancelled)),
+        GoalEnd::Succeeded => goal.succeed(response.theirs()).or_else(|_| goal.cancel(cancelled)),
+        GoalEnd::Aborted => goal.abort(response.theirs()).or_else(|_| goal.cancel(cancelled)),
     }
 }
 

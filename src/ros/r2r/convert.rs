@@ -2,52 +2,110 @@
 //!
 //! The two differ in nothing but the type; `generate/` lists the fields, and the compiler sees when one is missing on either side.
 
-use crate::ros::messages as ours;
+use r2r::WrappedServiceTypeSupport;
 
-/// The same value as the other side has it.
-pub(super) trait Convert<T> {
-    /// Makes it.
-    fn convert(self) -> T;
+use crate::ros::messages::{self as ours, RosService};
+
+/// A value that r2r has too.
+pub(super) trait Convert: Sized {
+    /// its type there
+    type Theirs;
+
+    /// The value as r2r has it.
+    fn theirs(self) -> Self::Theirs;
+
+    /// The value as the node has it.
+    fn ours(theirs: Self::Theirs) -> Self;
+}
+
+/// A service that r2r offers.
+pub(super) trait R2rService: RosService<Request: Convert<Theirs: Clone>, Response: Convert> {
+    /// its type there
+    type Theirs: WrappedServiceTypeSupport<
+            Request = <Self::Request as Convert>::Theirs,
+            Response = <Self::Response as Convert>::Theirs,
+        > + 'static;
 }
 
 macro_rules! the_same {
     ($($plain:ty),+) => {
-        $(impl Convert<$plain> for $plain {
-            fn convert(self) -> $plain {
+        $(impl Convert for $plain {
+            type Theirs = Self;
+
+            fn theirs(self) -> Self {
                 self
+            }
+
+            fn ours(theirs: Self) -> Self {
+                theirs
             }
         })+
     };
 }
-the_same!(bool, u8, i32, u32, u64, f32, f64);
+the_same!(bool, u8, i32, u32, i64, u64, f32, f64);
 
-impl Convert<String> for String {
+impl Convert for String {
+    type Theirs = Self;
+
     /// Without zeros: a string of C ends at the first, and r2r panics on one.
-    fn convert(mut self) -> String {
+    fn theirs(mut self) -> Self {
         self.retain(|c| c != '\0');
         self
     }
-}
 
-impl<A: Convert<B>, B> Convert<Vec<B>> for Vec<A> {
-    fn convert(self) -> Vec<B> {
-        self.into_iter().map(Convert::convert).collect()
+    fn ours(theirs: Self) -> Self {
+        theirs
     }
 }
 
-/// Both directions, the field of ours first: `both_ways!(UndoRequest = super::touchup_msgs::srv::Undo::Request { strokes: strokes })`.
-macro_rules! both_ways {
-    ($($ours:ident = $($theirs:ident)::+ { $($mine:ident: $other:ident),+ $(,)? })+) => {
-        $(impl Convert<$($theirs)::+> for ours::$ours {
-            fn convert(self) -> $($theirs)::+ {
-                $($theirs)::+ { $($other: self.$mine.convert(),)+ }
+impl<A: Convert> Convert for Vec<A> {
+    type Theirs = Vec<A::Theirs>;
+
+    fn theirs(self) -> Self::Theirs {
+        self.into_iter().map(A::theirs).collect()
+    }
+
+    fn ours(theirs: Self::Theirs) -> Self {
+        theirs.into_iter().map(A::ours).collect()
+    }
+}
+
+/// A message, the field of ours first: `message!(UndoRequest = super::touchup_msgs::srv::Undo::Request { strokes: strokes })`.
+macro_rules! message {
+    ($ours:ident = $($theirs:ident)::+ {}) => {
+        impl Convert for ours::$ours {
+            type Theirs = $($theirs)::+;
+
+            fn theirs(self) -> Self::Theirs {
+                $($theirs)::+ {}
+            }
+
+            fn ours(_: Self::Theirs) -> Self {
+                Self::default()
             }
         }
-        impl Convert<ours::$ours> for $($theirs)::+ {
-            fn convert(self) -> ours::$ours {
-                ours::$ours { $($mine: self.$other.convert(),)+ }
+    };
+    ($ours:ident = $($theirs:ident)::+ { $($mine:ident: $other:ident),+ $(,)? }) => {
+        impl Convert for ours::$ours {
+            type Theirs = $($theirs)::+;
+
+            fn theirs(self) -> Self::Theirs {
+                $($theirs)::+ { $($other: self.$mine.theirs(),)+ }
             }
-        })+
+
+            fn ours(theirs: Self::Theirs) -> Self {
+                Self { $($mine: Convert::ours(theirs.$other),)+ }
+            }
+        }
+    };
+}
+
+/// A service: `service!(Undo = super::touchup_msgs::srv::Undo::Service)`.
+macro_rules! service {
+    ($ours:ident = $($theirs:ident)::+) => {
+        impl R2rService for ours::$ours {
+            type Theirs = $($theirs)::+;
+        }
     };
 }
 
@@ -57,93 +115,84 @@ include!(concat!(env!("OUT_DIR"), "/conversions.rs"));
 mod tests {
     use serde::Serialize;
 
-    use r2r::{
-        builtin_interfaces, diagnostic_msgs, geometry_msgs, nav_msgs, rosgraph_msgs, std_msgs, tf2_msgs,
-        visualization_msgs,
-    };
-
     use super::super::filled::filled;
-    use super::super::{std_srvs, touchup_msgs};
     use super::*;
 
     /// The same text from both sides: names, order and values of all fields, by the code that serde made for each. And the
     /// message itself comes back.
-    fn both_agree<M, T>()
-    where
-        M: ours::RosMessage + Convert<T>,
-        T: Clone + Serialize + Convert<M>,
-    {
+    fn both_agree<M: ours::RosMessage + Convert<Theirs: Clone + Serialize>>() {
         let ours: M = filled();
-        let theirs: T = ours.clone().convert();
+        let theirs = ours.clone().theirs();
         assert_eq!(serde_json::to_string(&theirs).unwrap(), serde_json::to_string(&ours).unwrap());
-        assert_eq!(theirs.convert(), ours);
+        assert_eq!(M::ours(theirs), ours);
     }
 
     macro_rules! all_agree {
-        ($($ours:ident = $($theirs:ident)::+),+ $(,)?) => { $(both_agree::<ours::$ours, $($theirs)::+>();)+ };
+        ($($ours:ident),+ $(,)?) => { $(both_agree::<ours::$ours>();)+ };
     }
 
     #[test]
     fn every_field_of_a_standard_message_arrives() {
         all_agree!(
-            Time = builtin_interfaces::msg::Time,
-            Duration = builtin_interfaces::msg::Duration,
-            WrenchStamped = geometry_msgs::msg::WrenchStamped,
-            PoseStamped = geometry_msgs::msg::PoseStamped,
-            PointStamped = geometry_msgs::msg::PointStamped,
-            TFMessage = tf2_msgs::msg::TFMessage,
-            Clock = rosgraph_msgs::msg::Clock,
-            Path = nav_msgs::msg::Path,
-            DiagnosticArray = diagnostic_msgs::msg::DiagnosticArray,
-            Marker = visualization_msgs::msg::Marker,
-            MarkerArray = visualization_msgs::msg::MarkerArray,
-            SetBoolRequest = std_srvs::srv::SetBool::Request,
-            SetBoolResponse = std_srvs::srv::SetBool::Response,
-            TriggerResponse = std_srvs::srv::Trigger::Response,
+            Time,
+            Duration,
+            WrenchStamped,
+            PoseStamped,
+            PointStamped,
+            TFMessage,
+            Clock,
+            Path,
+            DiagnosticArray,
+            Marker,
+            MarkerArray,
+            SetBoolRequest,
+            SetBoolResponse,
+            TriggerResponse,
+            GetParametersResponse,
+            DescribeParametersResponse,
+            ParameterEvent,
         );
     }
 
     #[test]
     fn every_field_of_an_own_message_arrives() {
-        use touchup_msgs::{action::Probe, msg, srv};
         all_agree!(
-            FeatureArray = msg::FeatureArray,
-            MeshPatch = msg::MeshPatch,
-            HapticMismatch = msg::HapticMismatch,
-            ProbeResult = msg::ProbeResult,
-            ProbeTouch = msg::ProbeTouch,
-            ProbeGoal = Probe::Goal,
-            ProbeResponse = Probe::Result,
-            ProbeFeedback = Probe::Feedback,
-            FlagFeatureRequest = srv::FlagFeature::Request,
-            FlagFeatureResponse = srv::FlagFeature::Response,
-            UnflagFeatureRequest = srv::UnflagFeature::Request,
-            UnflagFeatureResponse = srv::UnflagFeature::Response,
-            DetectFeaturesRequest = srv::DetectFeatures::Request,
-            DetectFeaturesResponse = srv::DetectFeatures::Response,
-            SaveMeshRequest = srv::SaveMesh::Request,
-            SaveMeshResponse = srv::SaveMesh::Response,
-            ResyncMeshRequest = srv::ResyncMesh::Request,
-            ResyncMeshResponse = srv::ResyncMesh::Response,
-            UndoRequest = srv::Undo::Request,
-            UndoResponse = srv::Undo::Response,
-            ProbeFeatureRequest = srv::ProbeFeature::Request,
-            ProbeFeatureResponse = srv::ProbeFeature::Response,
+            FeatureArray,
+            MeshPatch,
+            HapticMismatch,
+            ProbeResult,
+            ProbeTouch,
+            ProbeGoal,
+            ProbeResponse,
+            ProbeFeedback,
+            FlagFeatureRequest,
+            FlagFeatureResponse,
+            UnflagFeatureRequest,
+            UnflagFeatureResponse,
+            DetectFeaturesRequest,
+            DetectFeaturesResponse,
+            SaveMeshRequest,
+            SaveMeshResponse,
+            ResyncMeshRequest,
+            ResyncMeshResponse,
+            UndoRequest,
+            UndoResponse,
+            ProbeFeatureRequest,
+            ProbeFeatureResponse,
         );
     }
 
     #[test]
     fn a_marker_is_what_its_constants_say() {
         let ours = ours::Marker { r#type: ours::Marker::TRIANGLE_LIST, ..Default::default() };
-        let theirs: visualization_msgs::msg::Marker = ours.convert();
+        let theirs = ours.theirs();
         assert_eq!((theirs.type_, theirs.pose.orientation.w), (11, 1.0));
     }
 
     #[test]
     fn a_zero_in_a_text_does_not_reach_c() {
         let ours = ours::Header { frame_id: "a\0b".into(), ..Default::default() };
-        let theirs: std_msgs::msg::Header = ours.convert();
-        assert_eq!(theirs.frame_id, "ab");
+        assert_eq!(ours.theirs().frame_id, "ab");
     }
 
     #[test]

@@ -38,6 +38,7 @@ impl<'de> Deserializer<'de> for &mut Filler {
             self.bytes
         };
         deserialize_i32, visit_i32: self => -(self.whole() as i32);
+        deserialize_i64, visit_i64: self => -i64::from(self.whole());
         deserialize_u32, visit_u32: self => self.whole();
         deserialize_u64, visit_u64: self => 1 << 40 | u64::from(self.whole());
         deserialize_f32, visit_f32: self => self.number();
@@ -66,7 +67,7 @@ impl<'de> Deserializer<'de> for &mut Filler {
     }
 
     serde::forward_to_deserialize_any! {
-        i8 i16 i64 i128 u16 u128 char str bytes byte_buf option unit unit_struct newtype_struct tuple tuple_struct map enum
+        i8 i16 i128 u16 u128 char str bytes byte_buf option unit unit_struct newtype_struct tuple tuple_struct map enum
         identifier ignored_any
     }
 }

@@ -6,8 +6,9 @@ use std::time::{Duration, Instant};
 use r2r::qos::{DurabilityPolicy, QosProfile, ReliabilityPolicy};
 use r2r::{Context, Node, Publisher, WrappedTypesupport};
 
-use super::R2rShared;
-use crate::ros::port::{Arrival, Endpoint};
+use crate::ros::exchange::Exchange;
+use crate::ros::graph;
+use crate::ros::port::Arrival;
 
 /// How often it is asked.
 const PERIOD: Duration = Duration::from_secs(1);
@@ -72,14 +73,14 @@ impl R2rGraph {
     }
 
     /// Tells what has changed, when it is time to look again; whether ROS is still there.
-    pub fn look(&mut self, node: &Node, shared: &R2rShared) -> bool {
+    pub fn look(&mut self, node: &Node, exchange: &Exchange) -> bool {
         if self.looked.elapsed() < PERIOD {
             return true;
         }
         self.looked = Instant::now();
         for watched in &mut self.watched {
             match (watched.look)(node) {
-                Ok(seen) if seen != watched.told => watched.tell(seen, shared),
+                Ok(seen) if seen != watched.told => watched.tell(seen, exchange),
                 Ok(_) => {}
                 Err(error) => tracing::debug!(topic = watched.topic, %error, "nobody knows who is on a topic"),
             }
@@ -89,18 +90,13 @@ impl R2rGraph {
 }
 
 impl WatchedTopic {
-    fn tell(&mut self, seen: EndpointMatch, shared: &R2rShared) {
+    fn tell(&mut self, seen: EndpointMatch, exchange: &Exchange) {
         let topic = self.topic.clone();
         if self.is_mesh && seen.0 > self.told.0 {
-            shared.arrivals.put(Arrival::Viewer);
+            exchange.arrivals.put(Arrival::Viewer);
         }
         self.told = seen.clone();
-        let (count, mismatch) = seen;
-        match &mismatch {
-            Some(reason) => tracing::warn!(topic, "{reason}"),
-            None => tracing::info!(topic, others = count, "who is on a topic has changed"),
-        }
-        shared.arrivals.put(Arrival::Matched(Endpoint { topic, count, mismatch }));
+        graph::report(&exchange.arrivals, topic, seen.0, seen.1);
     }
 }
 

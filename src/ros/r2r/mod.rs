@@ -9,15 +9,14 @@ mod convert;
 #[cfg(test)]
 mod filled;
 mod graph;
-mod parameter_services;
 mod samples;
 mod services;
 #[cfg(feature = "r2r-check")]
 mod stand_in;
 mod topics;
 
-use std::sync::Arc;
-use std::thread::{Builder, JoinHandle};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use futures::{FutureExt, Stream, StreamExt};
@@ -28,11 +27,14 @@ use stand_in::{std_srvs, touchup_msgs};
 use thiserror::Error;
 
 use super::arguments::NodeConfig;
-use super::arrivals::Arrivals;
-use super::clock::RosClock;
+use super::exchange::{self, Exchange, Joined};
+use super::messages::{Parameter, ParameterEvent, Time};
 use super::names::NameError;
-use super::port::{Arrival, Inbox, Port, Publication, Reply};
-use super::send_queue::SendQueue;
+use super::parameter_services::{self, raw};
+use super::parameters::ParameterValue;
+use super::port::{Arrival, Inbox, Port};
+use super::topics::{MeshTopics, UrgentTopics, subscribe};
+use convert::Convert;
 pub use samples::samples;
 
 /// Why the node cannot speak to others.
@@ -68,36 +70,6 @@ impl<T> During<T> for r2r::Result<T> {
     }
 }
 
-/// What the parts of the port share.
-struct R2rShared {
-    arrivals: Arrivals,
-    clock: RosClock,
-    urgent: SendQueue,
-    mesh: SendQueue,
-}
-
-impl R2rShared {
-    fn new(inbox: Inbox, clock: RosClock) -> Self {
-        Self { arrivals: Arrivals::new(inbox), clock, urgent: SendQueue::default(), mesh: SendQueue::default() }
-    }
-
-    /// An answer that goes out from the thread that sends.
-    fn reply<A: Send + 'static>(
-        self: &Arc<Self>,
-        name: &'static str,
-        send: impl FnOnce(A) -> r2r::Result<()> + Send + 'static,
-    ) -> Reply<A> {
-        let shared = self.clone();
-        Reply::new(move |answer| {
-            shared.urgent.answer(Box::new(move || {
-                if let Err(error) = send(answer) {
-                    tracing::warn!(name, %error, "an answer is not sent");
-                }
-            }));
-        })
-    }
-}
-
 /// Takes all that has come from one topic, service or action since it was called last; whether anything had.
 type PollSource = Box<dyn FnMut() -> bool + Send>;
 
@@ -116,55 +88,19 @@ where
     })
 }
 
-struct R2rPort {
-    shared: Arc<R2rShared>,
+struct R2rConnection {
+    exchange: Arc<Exchange>,
     sending: Vec<JoinHandle<()>>,
     spinning: Option<JoinHandle<()>>,
 }
 
-impl Port for R2rPort {
-    fn publish(&self, publication: Publication) {
-        let outbox = if publication.may_wait() { &self.shared.mesh } else { &self.shared.urgent };
-        outbox.put(publication);
-    }
-
-    fn now_ns(&self) -> i64 {
-        self.shared.clock.now_ns()
-    }
-
-    fn dropped(&self) -> [u64; 2] {
-        self.shared.arrivals.dropped()
-    }
-
-    /// r2r does not tell the numbers of senders.
-    fn lost(&self) -> [u64; 2] {
-        [0, 0]
-    }
-
-    fn unsent(&self) -> [u64; 2] {
-        let [tiles, patches] = self.shared.mesh.unsent();
-        let [_, others] = self.shared.urgent.unsent();
-        [tiles, patches + others]
-    }
-
-    fn tiles_waiting(&self) -> usize {
-        self.shared.mesh.tiles_waiting()
-    }
-}
-
-impl Drop for R2rPort {
+impl Drop for R2rConnection {
     /// Sends what waits, then leaves: the node of rcl must outlive all who send.
     fn drop(&mut self) {
-        self.shared.urgent.close();
-        self.shared.mesh.close();
-        for thread in self.sending.drain(..) {
-            // one that panicked has said so
-            let _ = thread.join();
-        }
-        self.shared.arrivals.end();
-        if let Some(thread) = self.spinning.take() {
-            let _ = thread.join();
-        }
+        self.exchange.close();
+        exchange::join(self.sending.drain(..));
+        self.exchange.arrivals.end();
+        exchange::join(self.spinning.take());
     }
 }
 
@@ -173,22 +109,53 @@ impl Drop for R2rPort {
 /// # Errors
 /// [`RosError`]: a name that is none, ROS does not start, no thread.
 pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosError> {
-    let shared = Arc::new(R2rShared::new(inbox, RosClock::new(config.parameters.bool("use_sim_time"))));
+    let exchange = Exchange::new(config, inbox);
     let context = context()?;
     let node = r2r::Node::create(context.clone(), &config.place.node, &config.place.namespace);
     let mut node = node.during("making the node")?;
     let mut graph = graph::R2rGraph::new(context);
-    let urgent = topics::UrgentPublishers::new(config, &mut node, &mut graph)?;
-    let mesh = topics::MeshPublishers::new(config, &mut node, &mut graph)?;
-    let mut sources = topics::subscriptions(config, &mut node, &mut graph, &shared)?;
-    sources.extend(services::servers(&mut node, &shared)?);
-    sources.extend(action::server(&mut node, &shared)?);
-    sources.extend(parameter_services::servers(config, &mut node, &shared)?);
-    let mut port = R2rPort { shared: shared.clone(), sending: Vec::new(), spinning: None };
-    port.spinning = Some(thread("touchup-spin", &shared, move |shared| spin(node, sources, graph, shared))?);
-    port.sending.push(thread("touchup-send", &shared, move |shared| shared.urgent.send(|one| urgent.send(one)))?);
-    port.sending.push(thread("touchup-mesh", &shared, move |shared| shared.mesh.send(|one| mesh.send(one)))?);
-    Ok(Arc::new(port))
+    let mut topics = topics::R2rTopics::new(config, &mut node, &mut graph, &exchange);
+    let (mesh, urgent) = (MeshTopics::new(&mut topics)?, UrgentTopics::new(&mut topics)?);
+    subscribe(config, &mut topics)?;
+    let mut sources = topics.sources;
+    let announce = announce(&mut node, config.place.full_name(), &exchange)?;
+    let mut services = services::R2rServices::new(&mut node, &exchange);
+    let arrivals = exchange.clone();
+    super::services::serve(&mut services, move |call| arrivals.arrivals.put(Arrival::Call(call)))?;
+    parameter_services::serve(&mut services, &exchange, &config.parameters, Box::new(announce))?;
+    sources.append(&mut services.sources);
+    sources.extend(action::server(&mut node, &exchange)?);
+    let mut connection = R2rConnection { exchange: exchange.clone(), sending: Vec::new(), spinning: None };
+    let spinning = exchange.thread("touchup-spin", move |exchange| spin(node, sources, graph, exchange))?;
+    connection.spinning = Some(spinning);
+    connection.sending.extend(exchange.senders(move |one| urgent.send(one), move |one| mesh.send(one))?);
+    Ok(Arc::new(Joined { exchange, _connection: connection }))
+}
+
+/// Publishes changes of parameters on `/parameter_events`.
+fn announce(
+    node: &mut r2r::Node,
+    name: String,
+    exchange: &Arc<Exchange>,
+) -> Result<impl Fn(&str, &ParameterValue) + Send + Sync + 'static, RosError> {
+    let events = node.create_publisher("/parameter_events", r2r::qos::QosProfile::parameter_events());
+    let (events, exchange) = (Arc::new(Mutex::new(events.during("publishing a topic")?)), exchange.clone());
+    Ok(move |parameter: &str, value: &ParameterValue| {
+        let stamp_ns = exchange.clock.now_ns();
+        let event = ParameterEvent {
+            stamp: Time { sec: (stamp_ns / 1_000_000_000) as i32, nanosec: (stamp_ns % 1_000_000_000) as u32 },
+            node: name.clone(),
+            changed_parameters: vec![Parameter { name: parameter.to_owned(), value: raw(Some(value)) }],
+            ..ParameterEvent::default()
+        };
+        let events = events.clone();
+        exchange.urgent.answer(Box::new(move || {
+            // nothing of ours panics while it holds it
+            if let Err(error) = events.lock().unwrap_or_else(PoisonError::into_inner).publish(&event.theirs()) {
+                tracing::warn!(%error, "a change of a parameter is not announced");
+            }
+        }));
+    })
 }
 
 /// The context of the process. r2r panics where rcl refuses the command line or the environment.
@@ -202,15 +169,6 @@ fn context() -> Result<r2r::Context, RosError> {
     }
 }
 
-fn thread(
-    name: &str,
-    shared: &Arc<R2rShared>,
-    work: impl FnOnce(&Arc<R2rShared>) + Send + 'static,
-) -> std::io::Result<JoinHandle<()>> {
-    let shared = shared.clone();
-    Builder::new().name(name.to_owned()).spawn(move || work(&shared))
-}
-
 /// So long it takes to notice that all is over when nothing comes; what comes wakes it at once.
 const NOTHING_CAME: Duration = Duration::from_millis(50);
 /// Some 10 ms of spinning for nothing, more than lies between two samples at 100 Hz.
@@ -219,10 +177,10 @@ const MOST_IN_VAIN: u32 = 160;
 const PAUSE: Duration = Duration::from_millis(2);
 
 /// The thread that takes what comes. There is always a subscription, or rcl would not wait at all (r2r issue 93).
-fn spin(mut node: r2r::Node, mut sources: Vec<PollSource>, mut graph: graph::R2rGraph, shared: &Arc<R2rShared>) {
-    let _told = ToldWhenOver(shared);
+fn spin(mut node: r2r::Node, mut sources: Vec<PollSource>, mut graph: graph::R2rGraph, exchange: &Exchange) {
+    let _reports_end = ReportsEnd(exchange);
     let mut in_vain = 0;
-    while !shared.arrivals.is_over() {
+    while !exchange.arrivals.is_over() {
         let began = Instant::now();
         node.spin_once(NOTHING_CAME);
         let has_come = sources.iter_mut().fold(false, |any, take| take() | any);
@@ -231,16 +189,16 @@ fn spin(mut node: r2r::Node, mut sources: Vec<PollSource>, mut graph: graph::R2r
         if in_vain > MOST_IN_VAIN {
             std::thread::sleep(PAUSE);
         }
-        if !graph.look(&node, shared) {
+        if !graph.look(&node, exchange) {
             return;
         }
     }
 }
 
 /// The node ends too, and saves, when nothing can come any more.
-struct ToldWhenOver<'a>(&'a R2rShared);
+struct ReportsEnd<'a>(&'a Exchange);
 
-impl Drop for ToldWhenOver<'_> {
+impl Drop for ReportsEnd<'_> {
     fn drop(&mut self) {
         if !self.0.arrivals.is_over() {
             tracing::error!("the node hears nothing any more: ROS has ended");

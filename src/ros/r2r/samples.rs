@@ -3,11 +3,12 @@
 use r2r::{Publisher, WrappedTypesupport, geometry_msgs::msg as geometry};
 
 use super::convert::Convert;
-use super::topics::best_effort;
+use super::topics::profile;
 use super::{During, RosError, context};
 use crate::ros::arguments::NodeConfig;
 use crate::ros::messages::{PoseStamped, WrenchStamped};
 use crate::ros::port::SamplePort;
+use crate::ros::topics::Topic;
 
 /// Nothing is sent twice: what is kept is for who takes it at once.
 const DEPTH: usize = 100;
@@ -27,8 +28,9 @@ pub fn samples(config: &NodeConfig) -> Result<Box<dyn SamplePort>, RosError> {
     let node = r2r::Node::create(context()?, &config.place.node, &config.place.namespace);
     let mut node = node.during("making the node")?;
     let [wrench, pose] = config.sample_topics();
-    let wrench = node.create_publisher(wrench, best_effort(DEPTH)).during("publishing a topic")?;
-    let pose = node.create_publisher(pose, best_effort(DEPTH)).during("publishing a topic")?;
+    let wrench =
+        node.create_publisher(wrench, profile(Topic::best_effort(wrench, DEPTH))).during("publishing a topic")?;
+    let pose = node.create_publisher(pose, profile(Topic::best_effort(pose, DEPTH))).during("publishing a topic")?;
     Ok(Box::new(R2rSamples { wrench, pose, _node: node }))
 }
 
@@ -39,11 +41,11 @@ fn count<T: WrappedTypesupport + 'static>(publisher: &Publisher<T>) -> usize {
 
 impl SamplePort for R2rSamples {
     fn publish_wrench(&self, wrench: WrenchStamped) -> bool {
-        self.wrench.publish(&wrench.convert()).is_ok()
+        self.wrench.publish(&wrench.theirs()).is_ok()
     }
 
     fn publish_pose(&self, pose: PoseStamped) -> bool {
-        self.pose.publish(&pose.convert()).is_ok()
+        self.pose.publish(&pose.theirs()).is_ok()
     }
 
     fn listeners(&mut self) -> [usize; 2] {

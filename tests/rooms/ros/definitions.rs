@@ -105,8 +105,15 @@ fn parts_of_a_service_are_named_for_it_and_an_empty_one_has_a_byte() {
     ] {
         assert!(text.contains(part), "{part}: {text}");
     }
-    let conversion = "LookResponse = super::touchup_msgs::srv::Look::Response { count: count, }";
-    assert_eq!(rust::conversions(&messages).lines().nth(1).map(str::trim), Some(conversion));
+    let service = "pub enum Look {}\nimpl RosService for Look {\n    type Request = LookRequest;\n    type Response = LookResponse;\n";
+    assert!(text.contains(service), "{text}");
+    let conversions = [
+        "message!(LookRequest = super::touchup_msgs::srv::Look::Request { });",
+        "service!(Look = super::touchup_msgs::srv::Look::Service);",
+        "message!(LookResponse = super::touchup_msgs::srv::Look::Response { count: count, });",
+    ];
+    assert_eq!(rust::conversions(&messages).lines().collect::<Vec<_>>(), conversions);
+    assert_eq!(rust::carried(&messages), "carried!(LookRequest, LookResponse);\n");
     assert!(rust::stand_ins(&messages).contains("\nservice!(Look { } { count: u32, });\n"));
 }
 

@@ -48,6 +48,10 @@ fn every_message_is_on_the_wire_as_rosbags_has_it() {
         Time Duration Header ColorRGBA Point Vector3 Quaternion Pose Transform Wrench PointStamped PoseStamped
         WrenchStamped TransformStamped KeyValue DiagnosticStatus DiagnosticArray UVCoordinate MeshFile Marker MarkerArray
         TFMessage Clock Path CompressedImage
+        FloatingPointRange IntegerRange ListParametersResult Parameter ParameterDescriptor ParameterEvent ParameterValue
+        SetParametersResult GetParametersRequest GetParametersResponse GetParameterTypesRequest GetParameterTypesResponse
+        ListParametersRequest ListParametersResponse DescribeParametersRequest DescribeParametersResponse
+        SetParametersRequest SetParametersResponse SetParametersAtomicallyRequest SetParametersAtomicallyResponse
         TriggerRequest TriggerResponse SetBoolRequest SetBoolResponse
         Feature FeatureArray HapticMismatch MeshPatch ProbeResult ProbeSettings ProbeTouch
         DetectFeaturesRequest DetectFeaturesResponse FlagFeatureRequest FlagFeatureResponse ProbeFeatureRequest

@@ -1,0 +1,123 @@
+//! What every port on a network has: the way in, the time of ROS, and two threads that send.
+
+use std::fmt::Display;
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::thread::{Builder, JoinHandle};
+
+use super::arguments::NodeConfig;
+use super::arrivals::Arrivals;
+use super::clock::RosClock;
+use super::port::{Inbox, Port, Publication, Reply};
+use super::send_queue::{SendQueue, Sent};
+
+/// What the parts of a port share.
+pub(super) struct Exchange {
+    pub arrivals: Arrivals,
+    pub clock: RosClock,
+    /// what is small and urgent, answers among it
+    pub urgent: SendQueue,
+    mesh: SendQueue,
+    /// wrenches, poses that were sent and did not come, where the port sees their numbers
+    pub lost: [AtomicU64; 2],
+}
+
+impl Exchange {
+    pub fn new(config: &NodeConfig, inbox: Inbox) -> Arc<Self> {
+        Arc::new(Self {
+            arrivals: Arrivals::new(inbox),
+            clock: RosClock::new(config.parameters.bool("use_sim_time")),
+            urgent: SendQueue::default(),
+            mesh: SendQueue::default(),
+            lost: Default::default(),
+        })
+    }
+
+    /// An answer that goes out from the thread that sends.
+    pub fn reply<A: Send + 'static, E: Display>(
+        self: &Arc<Self>,
+        service: &'static str,
+        send: impl FnOnce(A) -> Result<(), E> + Send + 'static,
+    ) -> Reply<A> {
+        let exchange = self.clone();
+        Reply::new(move |answer| {
+            exchange.urgent.answer(Box::new(move || {
+                if let Err(error) = send(answer) {
+                    tracing::warn!(service, %error, "an answer is not sent");
+                }
+            }));
+        })
+    }
+
+    /// Starts the threads that send: one what is urgent, one the mesh, where a slow listener may hold things up.
+    pub fn senders(
+        self: &Arc<Self>,
+        urgent: impl Fn(Publication) -> Sent<Publication> + Send + 'static,
+        mesh: impl Fn(Publication) -> Sent<Publication> + Send + 'static,
+    ) -> io::Result<[JoinHandle<()>; 2]> {
+        Ok([
+            self.thread("touchup-send", move |exchange| exchange.urgent.send(urgent))?,
+            self.thread("touchup-mesh", move |exchange| exchange.mesh.send(mesh))?,
+        ])
+    }
+
+    /// Starts a thread.
+    pub fn thread(
+        self: &Arc<Self>,
+        name: &str,
+        work: impl FnOnce(&Arc<Self>) + Send + 'static,
+    ) -> io::Result<JoinHandle<()>> {
+        let exchange = self.clone();
+        Builder::new().name(name.to_owned()).spawn(move || work(&exchange))
+    }
+
+    /// Has the threads that send end when all is sent.
+    pub fn close(&self) {
+        self.urgent.close();
+        self.mesh.close();
+    }
+}
+
+/// Waits for threads to end.
+pub(super) fn join(threads: impl IntoIterator<Item = JoinHandle<()>>) {
+    for thread in threads {
+        // one that panicked has said so
+        let _ = thread.join();
+    }
+}
+
+/// A port at work; `_connection` leaves the network when it goes.
+pub(super) struct Joined<C> {
+    pub exchange: Arc<Exchange>,
+    pub _connection: C,
+}
+
+impl<C: Send + Sync> Port for Joined<C> {
+    fn publish(&self, publication: Publication) {
+        let queue = if publication.may_wait() { &self.exchange.mesh } else { &self.exchange.urgent };
+        queue.put(publication);
+    }
+
+    fn now_ns(&self) -> i64 {
+        self.exchange.clock.now_ns()
+    }
+
+    fn dropped(&self) -> [u64; 2] {
+        self.exchange.arrivals.dropped()
+    }
+
+    fn lost(&self) -> [u64; 2] {
+        self.exchange.lost.each_ref().map(|count| count.load(Ordering::Relaxed))
+    }
+
+    fn unsent(&self) -> [u64; 2] {
+        let [tiles, patches] = self.exchange.mesh.unsent();
+        let [_, others] = self.exchange.urgent.unsent();
+        [tiles, patches + others]
+    }
+
+    fn tiles_waiting(&self) -> usize {
+        self.exchange.mesh.tiles_waiting()
+    }
+}

@@ -1,0 +1,284 @@
+//! The six services of parameters, as `ros2 param` calls them.
+//!
+//! Own ones: those of the client libraries know neither ranges nor descriptions, and cannot wait for the node's answer.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use super::exchange::Exchange;
+use super::messages::{
+    self, DescribeParameters, DescribeParametersRequest, DescribeParametersResponse, FloatingPointRange,
+    GetParameterTypes, GetParameterTypesRequest, GetParameterTypesResponse, GetParameters, GetParametersRequest,
+    GetParametersResponse, ListParameters, ListParametersRequest, ListParametersResponse, ListParametersResult,
+    Parameter, SetParameters, SetParametersAtomically, SetParametersAtomicallyResponse, SetParametersResponse,
+    SetParametersResult,
+};
+use super::parameters::{Allowed, PARAMETERS, ParameterValue, Parameters, descriptor};
+use super::port::{Arrival, Reply};
+use super::services::Serves;
+
+/// Parameters that one call may name; beyond that it is answered short.
+const MOST_NAMES: usize = 1024;
+
+// the numbers of rcl_interfaces/msg/ParameterType
+const NOT_SET: u8 = 0;
+const BOOL: u8 = 1;
+const INTEGER: u8 = 2;
+const DOUBLE: u8 = 3;
+const STRING: u8 = 4;
+
+/// Publishes that a parameter has changed.
+type Announce = Box<dyn Fn(&str, &ParameterValue) + Send + Sync>;
+
+/// The values as others see them.
+struct PublicParameters {
+    exchange: Arc<Exchange>,
+    values: Mutex<Parameters>,
+    announce: Announce,
+}
+
+type SetResults = Vec<Result<(), String>>;
+type SetReply = Box<dyn FnOnce(SetResults) + Send>;
+
+/// Offers the services.
+///
+/// - `announce`: publishes that a parameter has changed.
+pub(super) fn serve<E, B>(
+    back_end: &mut B,
+    exchange: &Arc<Exchange>,
+    values: &Parameters,
+    announce: Announce,
+) -> Result<(), E>
+where
+    B: Serves<GetParameters, Error = E>
+        + Serves<GetParameterTypes, Error = E>
+        + Serves<ListParameters, Error = E>
+        + Serves<DescribeParameters, Error = E>
+        + Serves<SetParameters, Error = E>
+        + Serves<SetParametersAtomically, Error = E>,
+{
+    let values = Mutex::new(values.clone());
+    let held = Arc::new(PublicParameters { exchange: exchange.clone(), values, announce });
+    let [for_get, for_types, for_set, for_all] = std::array::from_fn(|_| held.clone());
+    <B as Serves<GetParameters>>::serve(back_end, "~/get_parameters", move |request, reply| {
+        reply.send(get(&for_get.values(), &request));
+    })?;
+    <B as Serves<GetParameterTypes>>::serve(back_end, "~/get_parameter_types", move |request, reply| {
+        reply.send(types(&for_types.values(), &request));
+    })?;
+    <B as Serves<ListParameters>>::serve(back_end, "~/list_parameters", |request, reply| reply.send(list(&request)))?;
+    <B as Serves<DescribeParameters>>::serve(back_end, "~/describe_parameters", |request, reply| {
+        reply.send(describe_all(&request));
+    })?;
+    <B as Serves<SetParameters>>::serve(back_end, "~/set_parameters", move |request, reply| {
+        let answer = |results: SetResults| {
+            reply.send(SetParametersResponse { results: results.into_iter().map(result).collect() });
+        };
+        for_set.set(request.parameters, Box::new(answer));
+    })?;
+    <B as Serves<SetParametersAtomically>>::serve(back_end, "~/set_parameters_atomically", move |request, reply| {
+        for_all.set_all(request.parameters, reply);
+    })
+}
+
+impl PublicParameters {
+    fn values(&self) -> MutexGuard<'_, Parameters> {
+        // nothing of ours panics while it holds it
+        self.values.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Asks the node for one after the other, and answers when all are done.
+    fn set(self: &Arc<Self>, wanted: Vec<Parameter>, answer: SetReply) {
+        let wanted: Vec<_> = wanted.into_iter().take(MOST_NAMES).collect();
+        self.clone().set_next(wanted.into_iter(), Vec::new(), answer);
+    }
+
+    fn set_next(self: Arc<Self>, mut wanted: std::vec::IntoIter<Parameter>, mut results: SetResults, answer: SetReply) {
+        // what is refused here needs no answer of the node
+        let (name, value) = loop {
+            let Some(next) = wanted.next() else { return answer(results) };
+            let checked = check(&self.values(), &next);
+            match checked {
+                Ok(value) => break (next.name, value),
+                Err(reason) => results.push(Err(reason)),
+            }
+        };
+        let exchange = self.exchange.clone();
+        let (set_name, set_value) = (name.clone(), value.clone());
+        let reply = Reply::new(move |result: Result<(), String>| {
+            if result.is_ok() {
+                self.keep(&set_name, &set_value);
+            }
+            results.push(result);
+            self.set_next(wanted, results, answer);
+        });
+        exchange.arrivals.put(Arrival::SetParameter(name, value, reply));
+    }
+
+    /// All or none, as far as the table of parameters can tell before any is set.
+    fn set_all(self: &Arc<Self>, wanted: Vec<Parameter>, reply: Reply<SetParametersAtomicallyResponse>) {
+        let answer = move |results: SetResults| {
+            let first = results.into_iter().find(Result::is_err).unwrap_or(Ok(()));
+            reply.send(SetParametersAtomicallyResponse { result: result(first) });
+        };
+        let refused = if wanted.len() > MOST_NAMES {
+            Some(format!("{} parameters in one call: at most {MOST_NAMES}", wanted.len()))
+        } else {
+            let values = self.values();
+            wanted.iter().find_map(|parameter| check(&values, parameter).err())
+        };
+        match refused {
+            Some(reason) => answer(vec![Err(reason)]),
+            None => self.set(wanted, Box::new(answer)),
+        }
+    }
+
+    /// Keeps what the node took, and announces it.
+    fn keep(&self, name: &str, value: &ParameterValue) {
+        // it was checked before the node was asked
+        let _ = self.values().set_live(name, value);
+        (self.announce)(name, value);
+    }
+}
+
+/// The value as it is to be set, if it may be.
+fn check(values: &Parameters, wanted: &Parameter) -> Result<ParameterValue, String> {
+    let value = ours(&wanted.value).ok_or("no parameter of this node has a value of this type")?;
+    let mut values = values.clone();
+    values.set_live(&wanted.name, &value).map_err(|error| error.to_string())?;
+    values.value(&wanted.name).cloned().ok_or_else(|| format!("there is no parameter \"{}\"", wanted.name))
+}
+
+fn few(names: &[String]) -> &[String] {
+    &names[..names.len().min(MOST_NAMES)]
+}
+
+pub(super) fn result(result: Result<(), String>) -> SetParametersResult {
+    SetParametersResult { successful: result.is_ok(), reason: result.err().unwrap_or_default() }
+}
+
+pub(super) fn get(values: &Parameters, request: &GetParametersRequest) -> GetParametersResponse {
+    GetParametersResponse { values: few(&request.names).iter().map(|name| raw(values.value(name))).collect() }
+}
+
+fn types(values: &Parameters, request: &GetParameterTypesRequest) -> GetParameterTypesResponse {
+    let types = few(&request.names).iter().map(|name| values.value(name).map_or(NOT_SET, type_of));
+    GetParameterTypesResponse { types: types.collect() }
+}
+
+/// Names with one of the prefixes; none of ours has a dot, so the depth matters to nobody.
+pub(super) fn list(request: &ListParametersRequest) -> ListParametersResponse {
+    let is_wanted = |name: &str| request.prefixes.is_empty() || request.prefixes.iter().any(|prefix| prefix == name);
+    let names = PARAMETERS.iter().map(|declared| declared.name.to_owned()).filter(|name| is_wanted(name)).collect();
+    ListParametersResponse { result: ListParametersResult { names, prefixes: Vec::new() } }
+}
+
+pub(super) fn describe_all(request: &DescribeParametersRequest) -> DescribeParametersResponse {
+    DescribeParametersResponse { descriptors: few(&request.names).iter().map(|name| describe(name)).collect() }
+}
+
+fn describe(name: &str) -> messages::ParameterDescriptor {
+    let mut described = messages::ParameterDescriptor { name: name.to_owned(), ..Default::default() };
+    let Ok(declared) = descriptor(name) else { return described };
+    described.r#type = type_of(&declared.default_value());
+    described.description = declared.description.to_owned();
+    described.read_only = !declared.live;
+    match declared.allowed {
+        Allowed::Double(_, from_value, to_value) => {
+            described.floating_point_range = vec![FloatingPointRange { from_value, to_value, step: 0.0 }];
+        }
+        Allowed::OneOf(_, words) => described.additional_constraints = format!("one of {}", words.join(", ")),
+        Allowed::Bool(_) | Allowed::String(_) => {}
+    }
+    described
+}
+
+fn type_of(value: &ParameterValue) -> u8 {
+    match value {
+        ParameterValue::Bool(_) => BOOL,
+        ParameterValue::Integer(_) => INTEGER,
+        ParameterValue::Double(_) => DOUBLE,
+        ParameterValue::String(_) => STRING,
+    }
+}
+
+/// As it is on the wire; of `None` that it is not set.
+pub(super) fn raw(value: Option<&ParameterValue>) -> messages::ParameterValue {
+    let mut raw = messages::ParameterValue { r#type: value.map_or(NOT_SET, type_of), ..Default::default() };
+    match value {
+        Some(ParameterValue::Bool(on)) => raw.bool_value = *on,
+        Some(ParameterValue::Integer(whole)) => raw.integer_value = *whole,
+        Some(ParameterValue::Double(number)) => raw.double_value = *number,
+        Some(ParameterValue::String(word)) => raw.string_value = word.clone(),
+        None => {}
+    }
+    raw
+}
+
+/// `None` of a type that no parameter here has.
+fn ours(value: &messages::ParameterValue) -> Option<ParameterValue> {
+    match value.r#type {
+        BOOL => Some(ParameterValue::Bool(value.bool_value)),
+        INTEGER => Some(ParameterValue::Integer(value.integer_value)),
+        DOUBLE => Some(ParameterValue::Double(value.double_value)),
+        STRING => Some(ParameterValue::String(value.string_value.clone())),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wanted(name: &str, value: messages::ParameterValue) -> Parameter {
+        Parameter { name: name.to_owned(), value }
+    }
+
+    #[test]
+    fn a_value_comes_back_as_it_went() {
+        let values = [
+            ParameterValue::Bool(true),
+            ParameterValue::Integer(-3),
+            ParameterValue::Double(0.25),
+            ParameterValue::String("hole".into()),
+        ];
+        for (value, number) in values.into_iter().zip(1..) {
+            let raw = raw(Some(&value));
+            assert_eq!(raw.r#type, number, "as rcl_interfaces/msg/ParameterType counts them");
+            assert_eq!(ours(&raw), Some(value));
+        }
+        assert_eq!((raw(None).r#type, ours(&raw(None))), (0, None));
+    }
+
+    #[test]
+    fn a_list_is_refused_and_so_is_what_the_table_refuses() {
+        let values = Parameters::default();
+        let list = messages::ParameterValue { r#type: 8, double_array_value: vec![1.0], ..raw(None) };
+        let reason = check(&values, &wanted("view_rate_hz", list)).unwrap_err();
+        assert_eq!(reason, "no parameter of this node has a value of this type");
+        let high = raw(Some(&ParameterValue::Double(1e3)));
+        let reason = check(&values, &wanted("view_rate_hz", high)).unwrap_err();
+        assert_eq!(reason, "view_rate_hz is 1000.0: it may be 0.1 to 100");
+        let whole = raw(Some(&ParameterValue::Integer(5)));
+        assert_eq!(check(&values, &wanted("view_rate_hz", whole)), Ok(ParameterValue::Double(5.0)));
+    }
+
+    #[test]
+    fn descriptions_tell_type_range_words_and_what_is_fixed() {
+        let rate = describe("view_rate_hz");
+        let range = &rate.floating_point_range[0];
+        assert_eq!((rate.r#type, rate.read_only, range.from_value, range.to_value), (3, false, 0.1, 100.0));
+        let robot = describe("robot");
+        assert_eq!((robot.r#type, robot.read_only), (4, true));
+        assert_eq!(robot.additional_constraints, "one of none, sim, ur");
+        assert_eq!(describe("use_sim_time").r#type, 1);
+        assert_eq!((describe("nothing").r#type, describe("nothing").name.as_str()), (0, "nothing"));
+    }
+
+    #[test]
+    fn names_are_listed_all_or_those_that_are_asked_for() {
+        let all = list(&ListParametersRequest { prefixes: Vec::new(), depth: 0 }).result.names;
+        assert_eq!(all.len(), PARAMETERS.len());
+        let request = ListParametersRequest { prefixes: vec!["robot".into(), "none".into()], depth: 1 };
+        assert_eq!(list(&request).result.names, ["robot"]);
+    }
+}
