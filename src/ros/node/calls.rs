@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, TrySendError, sync_channel};
+use std::sync::mpsc::{Receiver, TrySendError};
 use std::time::Duration;
 
 use nalgebra::Point3;
@@ -13,7 +13,7 @@ use super::convert::{header, stamp_ns};
 use super::feature_messages::KIND_NAMES;
 use super::feature_worker::{FeatureInput, FlaggedPlace};
 use super::refinement::RefinementWorker;
-use super::replica::{Replica, Snapshot};
+use super::replica::{MeshVersion, Snapshot};
 use super::session::NodeSession;
 use super::view::ViewInput;
 use super::{NodeError, Setup};
@@ -31,7 +31,7 @@ use crate::session::{OutcomePlaces, StrokeChange};
 const LARGEST_RADIUS: f64 = 1.0;
 /// Strokes that are taken back by one call at most.
 const MOST_STROKES: u32 = 1000;
-/// How long mesh and patch may take to be handed out for a file.
+/// How long mesh and patch may take until they are complete for a file.
 const COPY_WAIT: Duration = Duration::from_secs(30);
 /// The name of a file that nobody named.
 const DEFAULT_NAME: &str = "refined.ply";
@@ -181,9 +181,10 @@ impl RefinementWorker {
         self.side_work.begin("ending", end).map_err(NodeError::no_thread)?;
         self.fault = None;
         self.begin_counting()?;
-        let replica = Box::new(Replica::of(&self.setup.scan.0, &name));
+        let replica = Box::new(MeshVersion::of(&self.setup.scan.0, &name));
         // both take these however much they have to do
         let _ = self.view.send(ViewInput::Session(replica));
+        self.setup.shared.mesh.announce_session();
         let _ = self.seeker.send(FeatureInput::Session(name.clone()));
         Ok(name)
     }
@@ -210,15 +211,10 @@ impl RefinementWorker {
             Err(error) => return reply.send(SaveMeshResponse { message: error.to_string(), ..Default::default() }),
         };
         self.show_edits();
-        let (to, snapshot) = sync_channel(1);
-        let has_asked = self.view.try_send(ViewInput::Snapshot(to)).is_ok();
+        let snapshot = self.setup.shared.mesh.complete();
         let (setup, version) = (Arc::clone(&self.setup), self.version);
         let work = move || {
-            let written = match has_asked {
-                true => places.write(&setup, &snapshot, patcher),
-                false => Err("the view is behind: save again".to_owned()),
-            };
-            reply.send(match written {
+            reply.send(match places.write(&setup, &snapshot, patcher) {
                 Ok(counts) => places.answer(version, counts),
                 Err(message) => SaveMeshResponse { message, ..Default::default() },
             });
@@ -285,7 +281,7 @@ impl SavedFiles {
         snapshot: &Receiver<Snapshot>,
         patcher: Option<Receiver<Patcher>>,
     ) -> Result<[usize; 2], String> {
-        let late = |_| "the mesh was not handed out in time: save again".to_owned();
+        let late = |_| "mesh and touches were not complete in time: save again".to_owned();
         let patcher = patcher.map(|patcher| setup.clock.recv_timeout(&patcher, COPY_WAIT)).transpose().map_err(late)?;
         let refined = match patcher {
             // all of it comes from scan and patch

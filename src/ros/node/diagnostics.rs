@@ -125,7 +125,7 @@ impl RefinementWorker {
             value("latency_max_us", us(latency.max)),
             value("late_renewals", report.late_renewals),
             value("tiles_waiting", shared.waiting_tiles()),
-            value("versions_behind", self.version.saturating_sub(shared.version_shown())),
+            value("versions_behind", self.version.saturating_sub(shared.mesh.version())),
             value("dropped_view_frames", report.dropped_view_frames),
             value("unrecorded", unrecorded.messages),
         ];

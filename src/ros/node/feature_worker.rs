@@ -2,14 +2,13 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender};
 use std::time::{Duration, Instant};
 
 use nalgebra::{Point3, Vector3};
 
 use super::convert::header;
 use super::feature_messages::{self, KIND_NAMES, flagged, found};
-use super::replica::Snapshot;
 use super::shared::Shared;
 use super::view::ViewInput;
 use crate::clock::Clock;
@@ -32,7 +31,7 @@ const LOOKS_APART: u32 = 10;
 const MOST_FLAGS: usize = 1000;
 /// Numbers of features in one answer at most, so that it goes out in one packet.
 const MOST_NAMED: usize = 128;
-/// How long the view may take to hand out the mesh.
+/// How long a change of the mesh may take until it is complete.
 const SNAPSHOT_WAIT: Duration = Duration::from_secs(10);
 
 /// What the thread is told.
@@ -210,7 +209,7 @@ impl FeatureWorker {
 
     /// Whether the mesh is another one than at the last look, and now is the time.
     fn is_due(&mut self) -> bool {
-        let version = self.shared.version_shown();
+        let version = self.shared.mesh.version();
         if std::mem::replace(&mut self.seen_version, version) != version {
             self.changed_at = self.clock.now();
         }
@@ -227,20 +226,18 @@ impl FeatureWorker {
 
     fn look(&mut self) -> Result<(), String> {
         let started = self.clock.now();
-        let snapshot = self.snapshot().ok_or("the mesh was not handed out: is it changing all the time?")?;
+        let snapshot = self.clock.recv_timeout(&self.shared.mesh.complete(), SNAPSHOT_WAIT).ok();
+        let snapshot = snapshot.filter(|snapshot| snapshot.session == self.session);
+        let snapshot = snapshot.ok_or("the mesh was not complete in time: is it changing all the time?")?;
         let mesh = snapshot.mesh().map_err(|error: MeshError| error.to_string())?;
-        self.tracker.renew(&mesh, &FaceTree::new(&mesh), &self.touches);
         self.looked = Some((snapshot.version, snapshot.stamp_ns));
+        // its next version need not be a copy
+        drop(snapshot);
+        self.tracker.renew(&mesh, &FaceTree::new(&mesh), &self.touches);
         self.name_found_flags();
         let now = self.clock.now();
         (self.look_took, self.looked_at, self.has_news) = (now.saturating_duration_since(started), now, true);
         Ok(())
-    }
-
-    fn snapshot(&self) -> Option<Snapshot> {
-        let (reply, snapshot) = sync_channel(1);
-        self.view.send(ViewInput::Snapshot(reply)).ok()?;
-        self.clock.recv_timeout(&snapshot, SNAPSHOT_WAIT).ok().filter(|snapshot| snapshot.session == self.session)
     }
 
     /// The number under which a feature is known.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::convert::header;
 use super::edits::Edits;
-use super::replica::Replica;
+use super::replica::MeshVersion;
 use crate::mesh::IdSet;
 use crate::patch::Support;
 use crate::ros::messages::MeshPatch;
@@ -30,7 +30,7 @@ impl MeshPatches {
     /// Followers have what the replica has.
     ///
     /// - `scan_sigma`: standard deviation of the scan, m, when it is known.
-    pub fn of(replica: &Replica, scan_sigma: Option<f64>) -> Self {
+    pub fn of(replica: &MeshVersion, scan_sigma: Option<f64>) -> Self {
         let [vertices, faces] = replica.slots();
         Self {
             version: replica.version,
@@ -41,11 +41,6 @@ impl MeshPatches {
         }
     }
 
-    /// The state that followers have.
-    pub fn version(&self) -> u64 {
-        self.version
-    }
-
     /// Remembers what changed.
     pub fn note(&mut self, edits: &Edits) {
         edits.vertices.iter().for_each(|(vertex, _)| self.vertices.insert(*vertex));
@@ -53,7 +48,7 @@ impl MeshPatches {
     }
 
     /// The change from what followers have to what the replica has, in parts; none when it is the same.
-    pub fn change(&mut self, replica: &Replica, frame: &str) -> Vec<MeshPatch> {
+    pub fn change(&mut self, replica: &MeshVersion, frame: &str) -> Vec<MeshPatch> {
         if self.version == replica.version || (self.vertices.is_empty() && self.faces.is_empty()) {
             return Vec::new();
         }
@@ -82,23 +77,24 @@ impl MeshPatches {
             _ => {}
         });
         let base = std::mem::replace(&mut self.version, replica.version);
-        draft.parts(replica, base, frame, self.scan_variance).collect()
+        let part = |part| draft.part(part, replica, [base, self.version], frame, self.scan_variance);
+        (0..draft.part_count()).map(part).collect()
     }
 
-    /// The whole state, part by part.
+    /// The whole state, part by part: that of the replica, which followers have.
     pub fn whole(
         &self,
-        snapshot: Arc<Replica>,
+        replica: Arc<MeshVersion>,
         frame: String,
     ) -> impl Iterator<Item = MeshPatch> + Send + 'static + use<> {
-        let [vertices, faces] = snapshot.slots();
+        let [vertices, faces] = replica.slots();
         let draft = DraftPatch {
-            set: (0..vertices).filter(|&vertex| snapshot.vertex(vertex).is_some()).collect(),
-            faces: (0..faces).filter(|&face| snapshot.face(face).is_some()).collect(),
+            set: (0..vertices).filter(|&vertex| replica.vertex(vertex).is_some()).collect(),
+            faces: (0..faces).filter(|&face| replica.face(face).is_some()).collect(),
             ..DraftPatch::default()
         };
-        let (count, variance) = (draft.part_count(), self.scan_variance);
-        (0..count).map(move |part| draft.part(part, count, &snapshot, 0, &frame, variance))
+        let (version, variance) = (self.version, self.scan_variance);
+        (0..draft.part_count()).map(move |part| draft.part(part, &replica, [0, version], &frame, variance))
     }
 }
 
@@ -128,20 +124,9 @@ impl DraftPatch {
         (self.lengths().iter().sum::<usize>().div_ceil(OF_A_PART) as u32).max(1)
     }
 
-    fn parts<'a>(
-        &'a self,
-        replica: &'a Replica,
-        base: u64,
-        frame: &'a str,
-        scan_variance: f32,
-    ) -> impl Iterator<Item = MeshPatch> + 'a {
-        let count = self.part_count();
-        (0..count).map(move |part| self.part(part, count, replica, base, frame, scan_variance))
-    }
-
     /// The four lists one after the other, cut into parts: so a face comes after its corners, and a vertex goes after all
     /// faces that used it.
-    fn part(&self, part: u32, part_count: u32, replica: &Replica, base: u64, frame: &str, scan: f32) -> MeshPatch {
+    fn part(&self, part: u32, replica: &MeshVersion, [base, version]: [u64; 2], frame: &str, scan: f32) -> MeshPatch {
         let (mut from, mut to) = (part as usize * OF_A_PART, (part as usize + 1) * OF_A_PART);
         let mut cut = |list: &[u32]| {
             let ours = list[from.min(list.len())..to.min(list.len())].to_vec();
@@ -152,10 +137,10 @@ impl DraftPatch {
         let mut message = MeshPatch {
             header: header(replica.stamp_ns, frame),
             session: replica.session.clone(),
-            version: replica.version,
+            version,
             base_version: base,
             part,
-            part_count,
+            part_count: self.part_count(),
             removed_faces: cut(&self.removed_faces),
             vertices: cut(&self.set),
             faces: cut(&self.faces),

@@ -42,7 +42,7 @@ use self::engine::Scan;
 use self::feature_worker::FeatureWorker;
 use self::frame_resolver::FrameNames;
 use self::refinement::RefinementWorker;
-use self::replica::Replica;
+use self::replica::MeshReplica;
 use self::session::NodeSession;
 use self::shared::Shared;
 use self::view::View;
@@ -192,9 +192,10 @@ impl Setup {
         };
         let known = scene.patcher_params().and_then(|params| params.uncertainty);
         let scan_sigma = known.map(|known| known.scan).filter(|sigma| *sigma > 0.0);
+        let replica = MeshReplica::new(clock.clone(), &mesh);
         Ok(Self {
             clock,
-            shared: Arc::new(Shared::new(parameters, scan_sigma)),
+            shared: Arc::new(Shared::new(parameters, scan_sigma, replica)),
             scan: Arc::new((mesh, tree)),
             scan_path,
             mesh_unit,
@@ -267,6 +268,7 @@ impl Prepared {
     pub fn on(clock: Clock, parameters: Parameters) -> Result<Self, NodeError> {
         let setup = Arc::new(Setup::new(parameters, clock)?);
         let sitting = NodeSession::begin(&setup)?;
+        setup.shared.mesh.name_session(sitting.folder.name());
         Ok(Self { setup, sitting })
     }
 
@@ -319,11 +321,10 @@ impl Prepared {
         for _ in 0..EDITS_ROUND {
             to_spare.send(Box::<Edits>::default()).map_err(|_| NodeError::Stopped)?;
         }
-        let replica = Replica::of(&setup.scan.0, &session);
         let clock = setup.clock.clone();
-        let view = View::new(clock.clone(), Arc::clone(&port), Arc::clone(&setup.shared), to_spare, replica);
+        let view = View::new(clock.clone(), Arc::clone(&port), Arc::clone(&setup.shared), to_spare);
         let seeker = FeatureWorker::new(clock.clone(), Arc::clone(&setup.shared), to_view.clone(), session);
-        let arm = arm.map(|arm| arm::start(&setup, &port, arm, to_view.clone(), to_seeker.clone())).transpose()?;
+        let arm = arm.map(|arm| arm::start(&setup, &port, arm, to_seeker.clone())).transpose()?;
         let (handle, arm) = arm.unzip();
         let haptic = RefinementWorker::new(setup, port, sitting, to_view, to_seeker, spare, handle)?;
         let view = begin(&clock, "view", move || view.run(&view_inputs))?;

@@ -91,10 +91,12 @@ impl RefinementWorker {
     pub(super) fn show_edits(&mut self) {
         let is_idle = self.setup.clock.since(self.sampled) >= TORN_AFTER;
         while let Some(edits) = self.unsent.take().or_else(|| self.filled(is_idle)) {
+            let complete = edits.is_complete.then_some(edits.version);
             if let Err(TrySendError::Full(ViewInput::Edits(back))) = self.view.try_send(ViewInput::Edits(edits)) {
                 self.unsent = Some(back);
                 return;
             }
+            complete.into_iter().for_each(|version| self.setup.shared.mesh.announce(version));
         }
     }
 

@@ -1,12 +1,14 @@
-//! The mesh as the view knows it: plain arrays by id, brought up to date by what it is told.
+//! The replica of the mesh: plain arrays by id, which one worker keeps up to date and all of them read.
 
 use std::ops::Deref;
-use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use nalgebra::Point3;
 
 use super::edits::Edits;
-use crate::clock::Working;
+use crate::clock::{Clock, Working};
 use crate::mesh::{MeshError, TriMesh, VertexId};
 use crate::patch::Support;
 
@@ -15,7 +17,7 @@ const NO_FACE: [u32; 3] = [u32::MAX; 3];
 
 /// The mesh at one version.
 #[derive(Clone, Debug, Default)]
-pub struct Replica {
+pub struct MeshVersion {
     /// name of the session
     pub session: String,
     /// state of the mesh, as in `MeshPatch`
@@ -29,7 +31,7 @@ pub struct Replica {
     face_count: u32,
 }
 
-impl Replica {
+impl MeshVersion {
     /// The scan, before anything was touched.
     pub fn of(scan: &TriMesh, session: &str) -> Self {
         let slots = scan.vertex_slots() as u32;
@@ -108,25 +110,138 @@ impl Replica {
     }
 }
 
-/// A replica that no longer changes. Time waits for who does something with it.
+/// A state of the mesh: which session, counted from 0 on, and which version in it.
+type Revision = (u64, u64);
+
+/// The mesh as it was sent so far. The publishing worker writes, and it, the feature worker, the arm and who saves the mesh read.
+///
+/// Who reads holds a state that no longer changes. The writer copies it only where somebody still reads it when the next change
+/// comes.
 #[derive(Debug)]
-pub struct Snapshot {
-    replica: Arc<Replica>,
-    _working: Working,
+pub struct MeshReplica {
+    clock: Clock,
+    state: Mutex<ReplicaState>,
+    /// the last complete state that is on its way to the writer, or with it
+    announced: Mutex<Revision>,
+    version: AtomicU64,
 }
 
-impl Snapshot {
-    /// For one who asked.
-    pub fn new(replica: Arc<Replica>, working: Working) -> Self {
-        Self { replica, _working: working }
+#[derive(Debug)]
+struct ReplicaState {
+    mesh: Arc<MeshVersion>,
+    session: u64,
+    /// all of a change is in it: before that, ids may not fit each other
+    is_complete: bool,
+    is_closed: bool,
+    /// who waits for a complete state, this one or a later one
+    waiting: Vec<(Revision, SyncSender<Snapshot>)>,
+}
+
+impl MeshReplica {
+    /// The scan, before anything was touched, in no session yet.
+    pub fn new(clock: Clock, scan: &TriMesh) -> Self {
+        let mesh = Arc::new(MeshVersion::of(scan, ""));
+        let state = ReplicaState { mesh, session: 0, is_complete: true, is_closed: false, waiting: Vec::new() };
+        Self { clock, state: Mutex::new(state), announced: Mutex::new((0, 1)), version: AtomicU64::new(1) }
+    }
+
+    /// Names the first session.
+    pub fn name_session(&self, name: &str) {
+        name.clone_into(&mut Arc::make_mut(&mut locked(&self.state).mesh).session);
+    }
+
+    /// Changes up to this version are on their way to the writer: who reads from now on gets it or a later one.
+    pub fn announce(&self, version: u64) {
+        locked(&self.announced).1 = version;
+    }
+
+    /// Another session is on its way to the writer.
+    pub fn announce_session(&self) {
+        let mut announced = locked(&self.announced);
+        *announced = (announced.0 + 1, 1);
+    }
+
+    /// Takes changes up.
+    pub fn apply(&self, edits: &Edits) {
+        let mut state = locked(&self.state);
+        Arc::make_mut(&mut state.mesh).apply(edits);
+        state.is_complete = edits.is_complete;
+        self.answer(&mut state);
+    }
+
+    /// Goes over to another session.
+    pub fn begin_session(&self, mesh: MeshVersion) {
+        let mut state = locked(&self.state);
+        state.mesh = Arc::new(mesh);
+        (state.session, state.is_complete) = (state.session + 1, true);
+        self.answer(&mut state);
+    }
+
+    /// Nothing comes any more: nobody is to wait.
+    pub fn close(&self) {
+        let mut state = locked(&self.state);
+        state.is_closed = true;
+        state.waiting.clear();
+    }
+
+    /// The version that it has got to.
+    pub fn version(&self) -> u64 {
+        self.version.load(Ordering::Relaxed)
+    }
+
+    /// As it is now, and whether it is complete: for the writer.
+    pub fn now(&self) -> (Arc<MeshVersion>, bool) {
+        let state = locked(&self.state);
+        (Arc::clone(&state.mesh), state.is_complete)
+    }
+
+    /// As it is when all that was announced is in it, and it is complete: mostly at once. Nothing comes after [`Self::close`].
+    pub fn complete(&self) -> Receiver<Snapshot> {
+        let wanted = *locked(&self.announced);
+        let (reply, snapshot) = sync_channel(1);
+        let mut state = locked(&self.state);
+        state.waiting.push((wanted, reply));
+        self.answer(&mut state);
+        if state.is_closed {
+            state.waiting.clear();
+        }
+        snapshot
+    }
+
+    fn answer(&self, state: &mut ReplicaState) {
+        self.version.store(state.mesh.version, Ordering::Relaxed);
+        if !state.is_complete {
+            return;
+        }
+        let (revision, mesh) = ((state.session, state.mesh.version), &state.mesh);
+        state.waiting.retain(|(wanted, reply)| {
+            let is_there = *wanted <= revision;
+            if is_there {
+                // who asked may have gone
+                drop(reply.try_send(Snapshot { mesh: Arc::clone(mesh), _working: self.clock.begin_work() }));
+            }
+            !is_there
+        });
     }
 }
 
-impl Deref for Snapshot {
-    type Target = Replica;
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    // what is in it is whole whoever held it
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
-    fn deref(&self) -> &Replica {
-        &self.replica
+/// A state of the mesh that no longer changes. Time waits for who takes it up.
+#[derive(Debug)]
+pub struct Snapshot {
+    mesh: Arc<MeshVersion>,
+    _working: Working,
+}
+
+impl Deref for Snapshot {
+    type Target = MeshVersion;
+
+    fn deref(&self) -> &MeshVersion {
+        &self.mesh
     }
 }
 
@@ -152,7 +267,7 @@ mod tests {
     #[test]
     fn every_change_of_the_mesh_is_in_it() {
         let scan = strip(1000);
-        let mut replica = Replica::of(&scan, "some");
+        let mut replica = MeshVersion::of(&scan, "some");
         let moved = |i: u32, step: u32| Point3::new(f64::from(i), f64::from(step), f64::from(i * step) * 0.1);
         for step in 1..=3 {
             let place = |i: u32| Some((moved(i, step), Support::Touched));
@@ -173,5 +288,60 @@ mod tests {
         assert_eq!((replica.vertex(0), replica.vertex(2400), replica.vertex(2500)), (None, None, Some(new)));
         assert_eq!((replica.face(0), replica.face(2050), replica.face(2100)), (None, None, Some([1, 2, 2500])));
         assert_eq!((replica.counts(), replica.slots()), ([2000, 1998], [2501, 2101]));
+    }
+
+    fn version(version: u64, is_complete: bool) -> Edits {
+        let mut edits = Edits::default();
+        (edits.version, edits.is_complete) = (version, is_complete);
+        edits
+    }
+
+    #[test]
+    fn who_reads_waits_for_what_was_announced_and_for_a_complete_state() {
+        let replica = MeshReplica::new(Clock::system(), &strip(10));
+        let read = |readers: &[Receiver<Snapshot>]| -> Vec<Option<u64>> {
+            readers.iter().map(|reader| reader.try_recv().ok().map(|snapshot| snapshot.version)).collect()
+        };
+        assert_eq!(read(&[replica.complete()]), [Some(1)]);
+        replica.announce(2);
+        let mut readers = vec![replica.complete()];
+        replica.announce(3);
+        readers.push(replica.complete());
+        assert_eq!(read(&readers), [None, None]);
+        replica.apply(&version(2, true));
+        assert_eq!(read(&readers), [Some(2), None]);
+        replica.apply(&version(3, false));
+        assert_eq!((read(&readers), replica.version()), (vec![None, None], 2));
+        replica.apply(&version(3, true));
+        assert_eq!((read(&readers), replica.version()), (vec![None, Some(3)], 3));
+        // versions begin anew with a session
+        replica.announce_session();
+        let of_the_next = [replica.complete()];
+        assert_eq!(read(&of_the_next), [None]);
+        replica.begin_session(MeshVersion::of(&strip(10), "next"));
+        assert_eq!((read(&of_the_next), replica.version()), (vec![Some(1)], 1));
+    }
+
+    #[test]
+    fn what_somebody_reads_stays_as_it_was() {
+        let replica = MeshReplica::new(Clock::system(), &strip(10));
+        let before = replica.complete().recv().unwrap();
+        let mut moved = version(2, true);
+        moved.vertices.push((0, Some((Point3::new(7.0, 8.0, 9.0), Support::Touched))));
+        replica.apply(&moved);
+        let after = replica.complete().recv().unwrap();
+        assert_eq!((before.version, before.vertex(0)), (1, Some((Point3::origin(), Support::Scan))));
+        assert_eq!((after.version, after.vertex(0)), (2, Some((Point3::new(7.0, 8.0, 9.0), Support::Touched))));
+    }
+
+    #[test]
+    fn nobody_waits_for_what_no_longer_comes() {
+        let replica = MeshReplica::new(Clock::system(), &strip(10));
+        replica.announce(2);
+        let waiting = replica.complete();
+        replica.close();
+        assert!(waiting.recv().is_err() && replica.complete().recv().is_err());
+        replica.announce(1);
+        assert!(replica.complete().recv().is_ok(), "what is there can be read");
     }
 }

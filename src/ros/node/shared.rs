@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{SyncSender, TrySendError};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use super::replica::MeshReplica;
 use super::view::ViewInput;
 use crate::ros::parameters::Parameters;
 
@@ -14,8 +15,9 @@ pub struct Shared {
     pub frame: String,
     /// standard deviation of the scan, m, when the scene says it
     pub scan_sigma: Option<f64>,
+    /// the mesh as far as it was sent
+    pub mesh: MeshReplica,
     parameters: Mutex<Arc<Parameters>>,
-    shown_version: AtomicU64,
     tiles_waiting: AtomicUsize,
     dropped_frames: AtomicU64,
     has_new_viewer: AtomicBool,
@@ -23,12 +25,12 @@ pub struct Shared {
 
 impl Shared {
     /// Nothing shown yet.
-    pub fn new(parameters: Parameters, scan_sigma: Option<f64>) -> Self {
+    pub fn new(parameters: Parameters, scan_sigma: Option<f64>, mesh: MeshReplica) -> Self {
         Self {
             frame: parameters.string("object_frame").to_owned(),
             scan_sigma,
+            mesh,
             parameters: Mutex::new(Arc::new(parameters)),
-            shown_version: AtomicU64::new(1),
             tiles_waiting: AtomicUsize::new(0),
             dropped_frames: AtomicU64::new(0),
             has_new_viewer: AtomicBool::new(false),
@@ -48,16 +50,6 @@ impl Shared {
     fn lock(&self) -> MutexGuard<'_, Arc<Parameters>> {
         // what is in it is whole whoever held it
         self.parameters.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// The view has got this far.
-    pub fn shown_version(&self, version: u64) {
-        self.shown_version.store(version, Ordering::Relaxed);
-    }
-
-    /// How far the view is.
-    pub fn version_shown(&self) -> u64 {
-        self.shown_version.load(Ordering::Relaxed)
     }
 
     /// So many tiles are still to be sent.

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use nalgebra::{Point3, Vector3};
 
 use super::convert::{header, point};
-use super::replica::Replica;
+use super::replica::MeshVersion;
 use crate::patch::Support;
 use crate::ros::messages::{ColorRGBA, Marker, Vector3 as Vector3Msg};
 
@@ -77,14 +77,14 @@ pub struct Tiles {
 
 impl Tiles {
     /// All of them are to be sent.
-    pub fn all_of(replica: &Replica) -> Self {
+    pub fn all_of(replica: &MeshVersion) -> Self {
         let mut tiles = Self::default();
         tiles.renew(replica);
         tiles
     }
 
     /// Everything is to be sent again.
-    pub fn renew(&mut self, replica: &Replica) {
+    pub fn renew(&mut self, replica: &MeshVersion) {
         (0..replica.slots()[1].div_ceil(FACES_OF_A_TILE).max(self.is_drawn.len() as u32))
             .for_each(|tile| self.again.push(tile));
     }
@@ -109,7 +109,7 @@ impl Tiles {
     }
 
     /// Another mesh: everything is to be sent, and nothing was touched.
-    pub fn restart(&mut self, replica: &Replica) {
+    pub fn restart(&mut self, replica: &MeshVersion) {
         self.mismatch.clear();
         self.sent_as.fill(0);
         self.renew(replica);
@@ -128,7 +128,7 @@ impl Tiles {
     }
 
     /// A face was touched this far from where the mesh had it, m.
-    pub fn note_mismatch(&mut self, face: u32, distance: f64, replica: &Replica) {
+    pub fn note_mismatch(&mut self, face: u32, distance: f64, replica: &MeshVersion) {
         if face >= replica.slots()[1] {
             return;
         }
@@ -149,7 +149,7 @@ impl Tiles {
         &mut self,
         most: usize,
         now: Instant,
-        replica: &Replica,
+        replica: &MeshVersion,
         (by, frame): (ColourBy, &str),
         mut each: impl FnMut(Marker),
     ) {
@@ -182,7 +182,7 @@ impl Tiles {
     }
 }
 
-fn drawn(tile: u32, replica: &Replica, by: ColourBy, mismatch: &[f32], frame: &str) -> Marker {
+fn drawn(tile: u32, replica: &MeshVersion, by: ColourBy, mismatch: &[f32], frame: &str) -> Marker {
     let mut marker = Marker {
         header: header(replica.stamp_ns, frame),
         ns: NAMESPACE.to_owned(),
@@ -261,7 +261,7 @@ mod tests {
         let corner = |i: u32| Point3::new(f64::from(i), f64::from(i % 2), 0.0);
         let strip = (0..4 * FACES_OF_A_TILE).map(|i| if i % 2 == 0 { [i, i + 1, i + 2] } else { [i + 1, i, i + 2] });
         let mesh = TriMesh::new((0..4 * FACES_OF_A_TILE + 2).map(corner).collect(), strip.collect()).unwrap();
-        let replica = Replica::of(&mesh, "test");
+        let replica = MeshVersion::of(&mesh, "test");
         let mut tiles = Tiles::all_of(&replica);
         let mut sent = Vec::new();
         let take = |tiles: &mut Tiles, sent: &mut Vec<u32>| {
@@ -297,10 +297,10 @@ mod tests {
         let strip = (0..3 * FACES_OF_A_TILE).map(|i| if i % 2 == 0 { [i, i + 1, i + 2] } else { [i + 1, i, i + 2] });
         let mesh = TriMesh::new((0..3 * FACES_OF_A_TILE + 2).map(corner).collect(), strip.collect()).unwrap();
         let first = TriMesh::new(vec![corner(0), corner(1), corner(2)], vec![[0, 1, 2]]).unwrap();
-        let [whole, none] = [Replica::of(&mesh, "test"), Replica::of(&first, "test")];
+        let [whole, none] = [MeshVersion::of(&mesh, "test"), MeshVersion::of(&first, "test")];
         let mut tiles = Tiles::all_of(&whole);
         let begun = Instant::now();
-        let mut at = |seconds: u64, replica: &Replica, changed: &[u32]| {
+        let mut at = |seconds: u64, replica: &MeshVersion, changed: &[u32]| {
             let now = begun + Duration::from_secs(seconds);
             changed.iter().for_each(|&tile| tiles.note(tile));
             tiles.renew_settled(now);

@@ -8,7 +8,7 @@ use super::edits::Edits;
 use super::feature_messages;
 use super::feature_worker::NextTouches;
 use super::mesh_patches::MeshPatches;
-use super::replica::{Replica, Snapshot};
+use super::replica::MeshVersion;
 use super::shared::Shared;
 use super::tiles::{ColourBy, Tiles};
 use super::tip::{self, LastTip};
@@ -28,15 +28,13 @@ pub enum ViewInput {
     /// the mesh changed
     Edits(Box<Edits>),
     /// a new session
-    Session(Box<Replica>),
+    Session(Box<MeshVersion>),
     /// one sample
     Mismatch(HapticMismatch),
     /// where the tip is
     Tip(LastTip),
     /// all features, and where a hand should touch them next
     Features(Arc<FeatureArray>, NextTouches),
-    /// somebody wants the mesh as it is
-    Snapshot(SyncSender<Snapshot>),
     /// somebody wants the whole state on the topic
     Resync,
     /// once a second
@@ -52,14 +50,11 @@ pub struct View {
     shared: Arc<Shared>,
     /// where changes go to be filled again
     spare: SyncSender<Box<Edits>>,
-    replica: Replica,
-    is_complete: bool,
     tiles: Tiles,
     patches: MeshPatches,
     colour_by: ColourBy,
     whole: Option<Box<dyn Iterator<Item = MeshPatch> + Send>>,
     asked_whole: bool,
-    snapshots: Vec<SyncSender<Snapshot>>,
     tip: Option<LastTip>,
     features: Arc<FeatureArray>,
     next: NextTouches,
@@ -67,30 +62,22 @@ pub struct View {
 
 impl View {
     /// Shows nothing yet.
-    pub fn new(
-        clock: Clock,
-        port: Arc<dyn Port>,
-        shared: Arc<Shared>,
-        spare: SyncSender<Box<Edits>>,
-        replica: Replica,
-    ) -> Self {
+    pub fn new(clock: Clock, port: Arc<dyn Port>, shared: Arc<Shared>, spare: SyncSender<Box<Edits>>) -> Self {
+        let (replica, _) = shared.mesh.now();
         let features = feature_messages::no_features(0, &shared.frame, &replica.session);
         Self {
             clock,
             tiles: Tiles::all_of(&replica),
             patches: MeshPatches::of(&replica, shared.scan_sigma),
             colour_by: colour_by(&shared),
-            is_complete: true,
             whole: None,
             asked_whole: false,
-            snapshots: Vec::new(),
             tip: None,
             features: Arc::new(features),
             next: NextTouches::new(),
             port,
             shared,
             spare,
-            replica,
         }
     }
 
@@ -110,34 +97,31 @@ impl View {
             }
         }
         self.tick(true);
+        self.shared.mesh.close();
     }
 
     fn take(&mut self, input: ViewInput) {
         match input {
             ViewInput::Edits(edits) => {
-                self.replica.apply(&edits);
+                self.shared.mesh.apply(&edits);
                 self.patches.note(&edits);
                 edits.tiles.iter().for_each(|&tile| self.tiles.note(tile));
                 edits.faces.iter().for_each(|(face, _)| self.tiles.forget_mismatch(*face));
-                self.is_complete = edits.is_complete;
-                self.shared.shown_version(self.replica.version);
                 match self.spare.try_send(edits) {
                     // as many come back as went out
                     Ok(()) | Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => {}
                 }
-                self.answer_snapshots();
             }
             ViewInput::Session(replica) => {
-                self.replica = *replica;
-                self.is_complete = true;
-                self.tiles.restart(&self.replica);
-                self.patches = MeshPatches::of(&self.replica, self.shared.scan_sigma);
+                self.tiles.restart(&replica);
+                self.patches = MeshPatches::of(&replica, self.shared.scan_sigma);
+                self.shared.mesh.begin_session(*replica);
                 // who follows sees another session and asks; it would see that only at the next change
                 (self.whole, self.asked_whole) = (None, true);
             }
             ViewInput::Mismatch(mismatch) => {
                 if self.colour_by == ColourBy::Mismatch && !mismatch.signed_distance.is_nan() {
-                    self.tiles.note_mismatch(mismatch.face, mismatch.signed_distance, &self.replica);
+                    self.tiles.note_mismatch(mismatch.face, mismatch.signed_distance, &self.shared.mesh.now().0);
                 }
                 self.port.publish(Publication::Mismatch(mismatch));
             }
@@ -147,27 +131,14 @@ impl View {
                 self.port.publish(Publication::FeatureMarkers(feature_messages::markers(&features)));
                 (self.features, self.next) = (features, next);
             }
-            ViewInput::Snapshot(reply) => {
-                self.snapshots.push(reply);
-                self.answer_snapshots();
-            }
             ViewInput::Resync => self.asked_whole = true,
             ViewInput::Diagnostics(diagnostics) => self.port.publish(Publication::Diagnostics(*diagnostics)),
             ViewInput::Parameters => {
                 let by = colour_by(&self.shared);
                 if std::mem::replace(&mut self.colour_by, by) != by {
-                    self.tiles.renew(&self.replica);
+                    self.tiles.renew(&self.shared.mesh.now().0);
                 }
             }
-        }
-    }
-
-    fn answer_snapshots(&mut self) {
-        if self.is_complete && !self.snapshots.is_empty() {
-            let replica = Arc::new(self.replica.clone());
-            let snapshot = || Snapshot::new(Arc::clone(&replica), self.clock.begin_work());
-            // who asked may have gone
-            self.snapshots.drain(..).for_each(|reply| drop(reply.try_send(snapshot())));
         }
     }
 
@@ -179,17 +150,16 @@ impl View {
         if let Some(tip) = self.tip.take() {
             self.port.publish(Publication::Tip(tip::markers(&tip, &self.features, &self.next, frame)));
         }
-        if !self.is_complete {
+        let (replica, is_complete) = self.shared.mesh.now();
+        if !is_complete {
             return true;
         }
-        for part in self.patches.change(&self.replica, frame) {
+        for part in self.patches.change(&replica, frame) {
             self.port.publish(Publication::MeshPatch(part));
         }
         if self.whole.is_none() && std::mem::take(&mut self.asked_whole) {
             // the next change leads from what was sent last
-            let mut snapshot = self.replica.clone();
-            snapshot.version = self.patches.version();
-            self.whole = Some(Box::new(self.patches.whole(Arc::new(snapshot), frame.to_owned())));
+            self.whole = Some(Box::new(self.patches.whole(Arc::clone(&replica), frame.to_owned())));
         }
         if let Some(whole) = &mut self.whole {
             let mut sent = 0;
@@ -206,9 +176,9 @@ impl View {
         }
         let now = self.clock.now();
         self.tiles.renew_settled(now);
-        let Self { tiles, replica, colour_by, port, .. } = self;
+        let Self { tiles, colour_by, port, .. } = self;
         let most = if is_last { usize::MAX } else { TILES_AHEAD.saturating_sub(port.tiles_waiting()) };
-        tiles.take(most, now, replica, (*colour_by, frame), |tile| port.publish(Publication::Tile(tile)));
+        tiles.take(most, now, &replica, (*colour_by, frame), |tile| port.publish(Publication::Tile(tile)));
         self.shared.tiles_waiting(self.tiles.waiting());
         self.tiles.waiting() > 0 || self.whole.is_some() || self.asked_whole
     }

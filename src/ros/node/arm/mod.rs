@@ -24,7 +24,6 @@ use super::convert::header;
 use super::feature_worker::{ArmMeasurement, FeatureInput, ProbeTarget};
 use super::frame_resolver::CELL;
 use super::shared::Shared;
-use super::view::ViewInput;
 use super::{NodeError, Setup};
 use crate::io::probed_touches_file::append_probed_touches;
 use crate::mesh::TriMesh;
@@ -42,7 +41,7 @@ use crate::sim::{MeshSurface, SimArm};
 const QUEUE: usize = 1;
 /// An arm from which nothing comes is asked again after this.
 const LOST: Duration = Duration::from_millis(200);
-/// How long the other threads may take to tell what is flagged, and to hand the mesh out.
+/// How long the other threads may take to tell what is flagged, and until the mesh is complete.
 const WAIT: Duration = Duration::from_secs(15);
 /// The clock of an arm is followed by this share of how far it is off, with each state: latency comes and goes, drift stays.
 const FOLLOW: i64 = 1024;
@@ -168,7 +167,6 @@ struct ArmWorker {
     shared: Arc<Shared>,
     port: Arc<dyn Port>,
     samples: Box<dyn SamplePort>,
-    view: SyncSender<ViewInput>,
     seeker: SyncSender<FeatureInput>,
     cell: Cell,
     params: ProbeParams,
@@ -193,7 +191,6 @@ pub(super) fn start(
     setup: &Arc<Setup>,
     port: &Arc<dyn Port>,
     arm: ArmOfNode,
-    view: SyncSender<ViewInput>,
     seeker: SyncSender<FeatureInput>,
 ) -> Result<(ArmHandle, JoinHandle<()>), NodeError> {
     let (cell, params) = setup.scene.probing().ok_or(NodeError::NoRobot)?;
@@ -207,7 +204,6 @@ pub(super) fn start(
         shared: Arc::clone(&setup.shared),
         port: Arc::clone(port),
         samples,
-        view,
         seeker,
         cell,
         params,
@@ -461,12 +457,12 @@ impl ArmWorker {
         let Some(state) = self.common.last() else { return not_ready("nothing has come from the arm yet") };
         let flag = Flag { id: target.id, kind: target.kind, place: target.place, radius: target.radius };
         let (cell, params) = (self.cell.clone(), wanted.params.clone());
-        let ready = ask_mesh(&self.setup.clock, &self.view, move |still| {
+        let ready = ask_mesh(&self.setup.clock, &self.shared.mesh, move |still| {
             let planned = plan(&cell, &params, &still, &flag, &state);
             (still, planned)
         });
         let Some((still, planned)) = self.wait(arm, &ready) else {
-            return not_ready("the mesh was not handed out in time: probe again");
+            return not_ready("the mesh was not complete in time: probe again");
         };
         let mut world = ArmWorld::new(self, still, watched, counts);
         match planned {

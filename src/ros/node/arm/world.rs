@@ -1,8 +1,8 @@
-//! What is around the arm of the node: the mesh as the view has it, the topics, and whoever may cancel.
+//! What is around the arm of the node: the mesh as it was sent, the topics, and whoever may cancel.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
+use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
 use std::thread::Builder;
 use std::time::{Duration, Instant};
 
@@ -16,38 +16,36 @@ use crate::probe::{Phase, Progress, StillWorld, World};
 use crate::robot::{ArmState, Witness};
 use crate::ros::messages::{PoseStamped, ProbeFeedback};
 use crate::ros::node::convert::{as_pose, as_wrench};
-use crate::ros::node::replica::Snapshot;
-use crate::ros::node::view::ViewInput;
+use crate::ros::node::replica::MeshReplica;
 use crate::ros::port::{Feedback, SamplePort};
 use crate::touch::{StampedPose, StampedWrench, Wrench};
 
 /// Feedback comes at least so often while the arm moves.
 const TELL_EVERY: Duration = Duration::from_millis(100);
-/// How long the view may take to hand the mesh out.
+/// How long a change of the mesh may take until it is complete.
 const COPY_WAIT: Duration = Duration::from_secs(15);
 
 /// Has something made of the mesh as it is now, beside the loop of the arm, which must not wait for it. Nothing comes where the
-/// view or the memory has no room.
+/// mesh is not complete in time, or the memory has no room.
 pub fn ask_mesh<T: Send + 'static>(
     clock: &Clock,
-    view: &SyncSender<ViewInput>,
+    mesh: &MeshReplica,
     make_of: impl FnOnce(StillWorld) -> T + Send + 'static,
 ) -> Receiver<T> {
     let (to, ready) = sync_channel(1);
-    let (ask, snapshot) = sync_channel(1);
+    let snapshot = mesh.complete();
     let (working, clock) = (clock.begin_work(), clock.clone());
     let make = move || {
-        let snapshot: Option<Snapshot> = clock.recv_timeout(&snapshot, COPY_WAIT).ok();
-        if let Some(mesh) = snapshot.as_ref().and_then(|snapshot| snapshot.mesh().ok()) {
+        // the snapshot goes at once: the next version of the mesh need not be a copy
+        let mesh = clock.recv_timeout(&snapshot, COPY_WAIT).ok().and_then(|snapshot| snapshot.mesh().ok());
+        if let Some(mesh) = mesh {
             // who asked may have gone
             let _ = to.send(make_of(StillWorld::new(mesh)));
         }
         drop(working);
     };
-    if view.try_send(ViewInput::Snapshot(ask)).is_ok() {
-        // without a thread the receiver finds its sender gone, as it does where nothing comes
-        let _ = Builder::new().name("arm mesh".to_owned()).spawn(make);
-    }
+    // without a thread the receiver finds its sender gone, as it does where nothing comes
+    let _ = Builder::new().name("arm mesh".to_owned()).spawn(make);
     ready
 }
 
@@ -66,7 +64,7 @@ pub struct ArmWorld<'a> {
     still: StillWorld,
     /// as it will be
     next: Option<Receiver<StillWorld>>,
-    view: &'a SyncSender<ViewInput>,
+    mesh: &'a MeshReplica,
     samples: &'a dyn SamplePort,
     base: &'a str,
     object: &'a str,
@@ -96,7 +94,7 @@ impl<'a> ArmWorld<'a> {
             clock: &hands.setup.clock,
             still,
             next: None,
-            view: &hands.view,
+            mesh: &hands.shared.mesh,
             samples: &*hands.samples,
             base: hands.base(),
             object: &hands.shared.frame,
@@ -121,7 +119,7 @@ impl<'a> ArmWorld<'a> {
             Some(Err(TryRecvError::Empty)) => return,
             Some(Err(TryRecvError::Disconnected)) | None => {}
         }
-        self.next = Some(ask_mesh(self.clock, self.view, |still| still));
+        self.next = Some(ask_mesh(self.clock, self.mesh, |still| still));
     }
 
     fn send_feedback(&mut self) {
