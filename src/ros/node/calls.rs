@@ -9,14 +9,14 @@ use nalgebra::Point3;
 use tracing::warn;
 
 use super::arm::ArmInput;
+use super::channels::{FeatureInput, FlaggedPlace, ViewInput};
 use super::convert::{header, stamp_ns};
+use super::error::NodeError;
 use super::feature_messages::KIND_NAMES;
-use super::feature_worker::{FeatureInput, FlaggedPlace};
 use super::refinement::RefinementWorker;
 use super::replica::{MeshVersion, Snapshot};
 use super::session::NodeSession;
-use super::view::ViewInput;
-use super::{NodeError, Setup};
+use super::setup::Setup;
 use crate::io::session_folder::SessionFolder;
 use crate::patch::Patcher;
 use crate::ros::messages::{

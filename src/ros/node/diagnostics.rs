@@ -4,11 +4,11 @@ use std::time::Duration;
 
 use tracing::{info, warn};
 
+use super::channels::ViewInput;
 use super::convert::header;
+use super::error::NodeError;
 use super::refinement::RefinementWorker;
-use super::session::SessionReport;
-use super::view::ViewInput;
-use super::{NodeEnd, NodeError};
+use super::session::{NodeEnd, SessionReport};
 use crate::live::Quantiles;
 use crate::ros::messages::{DiagnosticArray, DiagnosticStatus, KeyValue};
 use crate::session::Unrecorded;

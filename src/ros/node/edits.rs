@@ -5,15 +5,15 @@
 
 use nalgebra::Point3;
 
-use super::engine::Scan;
-use super::tiles::FACES_OF_A_TILE;
 use crate::live::Engine;
-use crate::mesh::{Changes, FaceId, VertexId};
+use crate::mesh::{Changes, FaceId, TriMesh, VertexId};
 use crate::patch::Support;
 
 /// Vertices, and faces, that go at once: some 50 µs.
 const AT_ONCE: usize = 1000;
 
+/// Faces of a tile, by number: 1500 points are 60 kB with their colours, below the 64 kB of a datagram.
+pub const FACES_OF_A_TILE: u32 = 500;
 /// Where a vertex is, m, in O, and what it rests on.
 pub type VertexPlace = (Point3<f64>, Support);
 
@@ -39,7 +39,7 @@ impl Edits {
     /// Fills it with what changed.
     ///
     /// - `may_be_torn`: count as complete what is in the middle of a change of the patch.
-    pub fn fill(&mut self, engine: &mut Engine, scan: &Scan, version: u64, stamp_ns: i64, may_be_torn: bool) {
+    pub fn fill(&mut self, engine: &mut Engine, scan: &TriMesh, version: u64, stamp_ns: i64, may_be_torn: bool) {
         let Self { vertices, faces, tiles, taken, .. } = self;
         vertices.clear();
         faces.clear();
@@ -57,7 +57,7 @@ impl Edits {
         for &vertex in &taken.vertices {
             let place = mesh.has_vertex(vertex).then(|| {
                 mesh.star(vertex).iter().for_each(|&face| note(face));
-                (mesh.position(vertex), engine.support(&scan.0, vertex))
+                (mesh.position(vertex), engine.support(scan, vertex))
             });
             vertices.push((vertex.0, place));
         }

@@ -2,16 +2,13 @@
 
 use std::sync::Arc;
 
-use super::{NodeError, Setup};
+use super::error::NodeError;
+use super::setup::Setup;
 use crate::live::{Engine, Gate, Pace, Renewal};
-use crate::mesh::{FaceTree, TriMesh};
 use crate::touch::WrenchFrame;
 
 /// Room for new faces that is made ahead.
 const ROOM: usize = 1 << 18;
-
-/// The scan as it came, and the tree over its faces.
-pub type Scan = Arc<(TriMesh, FaceTree)>;
 
 /// What moves the mesh; nothing touched yet.
 ///

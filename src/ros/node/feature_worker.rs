@@ -5,22 +5,20 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender};
 use std::time::{Duration, Instant};
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 
+use super::channels::{ArmMeasurement, FeatureInput, FlaggedPlace, NextTouches, ProbeTarget, ViewInput};
 use super::convert::header;
 use super::feature_messages::{self, KIND_NAMES, flagged, found};
 use super::shared::Shared;
-use super::view::ViewInput;
 use crate::clock::Clock;
 use crate::explore::{NextTouch, next_by_hand};
-use crate::features::{Feature, Kind, Tracker};
-use crate::live::TouchDelta;
+use crate::features::{Feature, Tracker};
 use crate::mesh::{FaceTree, MeshError};
 use crate::ros::messages::{
     DetectFeaturesRequest, DetectFeaturesResponse, Feature as FeatureMsg, FeatureArray, FlagFeatureResponse,
     UnflagFeatureResponse,
 };
-use crate::ros::port::Reply;
 use crate::touch::ProbedPoint;
 
 /// The mesh is looked at again when it has not changed for so long …
@@ -33,64 +31,6 @@ const MOST_FLAGS: usize = 1000;
 const MOST_NAMED: usize = 128;
 /// How long a change of the mesh may take until it is complete.
 const SNAPSHOT_WAIT: Duration = Duration::from_secs(10);
-
-/// What the thread is told.
-pub enum FeatureInput {
-    /// touches came or went
-    Probed(TouchDelta),
-    /// a new session
-    Session(String),
-    /// somebody points at a place, m, in O
-    Flag(FlaggedPlace, Option<Reply<FlagFeatureResponse>>),
-    /// takes that back
-    Unflag(u32, Reply<UnflagFeatureResponse>),
-    /// asks what is to be probed; no numbers: all that is flagged
-    Targets(Vec<u32>, SyncSender<Vec<ProbeTarget>>),
-    /// an arm has measured something
-    Measured(Box<ArmMeasurement>),
-    /// looks at the mesh now
-    Detect(DetectFeaturesRequest, Reply<DetectFeaturesResponse>),
-}
-
-/// A place that somebody pointed at.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FlaggedPlace {
-    /// as in messages; 0: a region to be explored
-    pub kind: u8,
-    /// m, in O
-    pub point: Point3<f64>,
-    /// how far around it, m
-    pub radius: f64,
-}
-
-/// What an arm can be sent to.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ProbeTarget {
-    /// by which it is known
-    pub id: u32,
-    /// `None`: nobody knows
-    pub kind: Option<Kind>,
-    /// m, in O
-    pub place: Point3<f64>,
-    /// how far around it, m
-    pub radius: f64,
-}
-
-/// What an arm has measured.
-#[derive(Clone, Debug)]
-pub struct ArmMeasurement {
-    /// in which it was flagged
-    pub session: String,
-    /// number of the flag
-    pub id: u32,
-    /// what it is
-    pub feature: Feature,
-    /// it is known as well as was wanted
-    pub is_done: bool,
-}
-
-/// Where a hand should touch next, by the number of the feature.
-pub type NextTouches = BTreeMap<u32, NextTouch>;
 
 /// The thread's own.
 pub struct FeatureWorker {

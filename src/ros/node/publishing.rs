@@ -5,12 +5,10 @@ use std::time::Duration;
 
 use nalgebra::{Point3, Vector3};
 
+use super::channels::{FeatureInput, LastTip, ViewInput};
 use super::convert::{NO_VECTOR, header, point, vector};
 use super::edits::Edits;
-use super::feature_worker::FeatureInput;
 use super::refinement::RefinementWorker;
-use super::tip::LastTip;
-use super::view::ViewInput;
 use crate::refine::{Case, Update};
 use crate::ros::messages::HapticMismatch;
 
@@ -110,7 +108,7 @@ impl RefinementWorker {
         let mut edits = self.kept.take().or_else(|| self.spare.try_recv().ok())?;
         let told_edits = mesh.edits();
         let stamp_ns = self.last_ns.unwrap_or(0);
-        edits.fill(&mut self.sitting.engine, &self.setup.scan, self.version, stamp_ns, is_idle);
+        edits.fill(&mut self.sitting.engine, &self.setup.scan.0, self.version, stamp_ns, is_idle);
         if edits.is_empty() && !edits.is_complete {
             self.kept = Some(edits);
             return None;

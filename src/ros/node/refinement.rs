@@ -10,14 +10,14 @@ use std::time::{Duration, Instant};
 use tracing::warn;
 
 use super::arm::ArmHandle;
+use super::channels::{FeatureInput, ViewInput};
 use super::edits::Edits;
-use super::feature_worker::FeatureInput;
+use super::error::NodeError;
 use super::frame_resolver::{FrameResolver, Refusal};
-use super::session::NodeSession;
+use super::session::{Counters, NodeEnd, NodeSession};
+use super::setup::Setup;
 use super::side_work::SideWork;
 use super::streams::{Epoch, StreamWatch};
-use super::view::ViewInput;
-use super::{NodeEnd, NodeError, Setup};
 use crate::live::{Latencies, LiveError, TouchDelta};
 use crate::refine::RefineError;
 use crate::ros::messages::{PoseStamped, TFMessage, WrenchStamped};
@@ -45,27 +45,6 @@ enum ArrivedMessage {
 impl ArrivedMessage {
     fn stream(&self) -> usize {
         usize::from(matches!(self, Self::Wrench(_)))
-    }
-}
-
-/// What was refused and lost, and how long things took.
-#[derive(Debug, Default)]
-pub struct Counters {
-    /// samples that the refiner took
-    pub accepted: u64,
-    /// messages and samples that were not taken, by reason
-    pub refused: BTreeMap<String, u64>,
-    /// messages that came while the node was paused
-    pub paused: u64,
-}
-
-impl Counters {
-    /// One more of `count`.
-    pub fn refuse(&mut self, reason: &str) {
-        match self.refused.get_mut(reason) {
-            Some(count) => *count += 1,
-            None => drop(self.refused.insert(reason.to_owned(), 1)),
-        }
     }
 }
 

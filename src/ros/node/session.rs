@@ -1,13 +1,15 @@
 //! One session of the node: its folder, its recording, and the mesh that is refined in it.
 
+use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::time::SystemTime;
 
 use chrono::{DateTime, Utc};
 use serde::Serialize;
 
 use super::engine::engine_of;
-use super::refinement::Counters;
-use super::{NodeError, Setup};
+use super::error::NodeError;
+use super::setup::Setup;
 use crate::io::session_folder::SessionFolder;
 use crate::live::{Engine, Quantiles};
 use crate::mesh::TriMesh;
@@ -15,6 +17,27 @@ use crate::patch::Patcher;
 use crate::ros::port::Port;
 use crate::session::{Outcome, OutcomePlaces, SessionRecord, SessionRecorder, Unrecorded};
 use crate::touch::WrenchFrame;
+
+/// What was refused and lost, and how long things took.
+#[derive(Debug, Default)]
+pub struct Counters {
+    /// samples that the refiner took
+    pub accepted: u64,
+    /// messages and samples that were not taken, by reason
+    pub refused: BTreeMap<String, u64>,
+    /// messages that came while the node was paused
+    pub paused: u64,
+}
+
+impl Counters {
+    /// One more of `count`.
+    pub fn refuse(&mut self, reason: &str) {
+        match self.refused.get_mut(reason) {
+            Some(count) => *count += 1,
+            None => drop(self.refused.insert(reason.to_owned(), 1)),
+        }
+    }
+}
 
 /// What belongs to a session and goes with it.
 pub struct NodeSession {
@@ -40,7 +63,7 @@ pub struct SessionReport {
     /// samples that the refiner took
     pub accepted: u64,
     /// messages and samples that were not taken, by reason; `pose_…` are poses
-    pub refused: std::collections::BTreeMap<String, u64>,
+    pub refused: BTreeMap<String, u64>,
     /// samples that were sent and did not come: wrenches, poses
     pub lost: [u64; 2],
     /// arrivals that the node had no time for: wrenches and poses, others
@@ -71,6 +94,15 @@ pub struct SessionReport {
     pub result: Option<Outcome>,
 }
 
+/// What is left of a node.
+#[derive(Debug)]
+pub struct NodeEnd {
+    /// folder of the last session, with the refined mesh in it
+    pub folder: PathBuf,
+    /// what became of it
+    pub report: SessionReport,
+}
+
 impl NodeSession {
     /// Begins a session in a new folder.
     ///
@@ -78,7 +110,7 @@ impl NodeSession {
     /// [`NodeError`]
     pub fn begin(setup: &Setup) -> Result<Self, NodeError> {
         let parameters = setup.shared.parameters();
-        let parent = std::path::PathBuf::from(parameters.string("session_folder"));
+        let parent = PathBuf::from(parameters.string("session_folder"));
         let folder = SessionFolder::create(&parent, &name_of(SystemTime::now()))
             .map_err(|source| NodeError::Folder { path: parent, source })?;
         SessionRecord::begin(&folder, &setup.scan_path, setup.mesh_unit, &setup.scene_yaml, &setup.topics)?;

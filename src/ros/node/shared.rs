@@ -4,8 +4,8 @@ use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{SyncSender, TrySendError};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use super::channels::ViewInput;
 use super::replica::MeshReplica;
-use super::view::ViewInput;
 use crate::ros::parameters::Parameters;
 
 /// Read by all threads.

@@ -1,9 +1,27 @@
-//! Threads beside the haptic one that write sessions and files: counted, and none is left behind.
+//! Threads of the node, and those beside that write sessions and files: counted, and none is left behind.
 
 use std::io;
 use std::thread::{Builder, JoinHandle};
 
 use crate::clock::Clock;
+
+/// Starts a thread that waits on `clock`.
+///
+/// # Errors
+/// Of the operating system, when there is no thread for it.
+pub fn begin<T: Send + 'static>(
+    clock: &Clock,
+    name: &str,
+    run: impl FnOnce() -> T + Send + 'static,
+) -> io::Result<JoinHandle<T>> {
+    let working = clock.begin_work();
+    let work = move || {
+        let ended = run();
+        drop(working);
+        ended
+    };
+    Builder::new().name(name.to_owned()).spawn(work)
+}
 
 /// What is under way.
 #[derive(Debug)]
@@ -29,12 +47,7 @@ impl SideWork {
     /// # Errors
     /// Of the operating system, when there is no thread for it.
     pub fn begin(&mut self, name: &str, work: impl FnOnce() + Send + 'static) -> io::Result<()> {
-        let working = self.clock.begin_work();
-        let work = move || {
-            work();
-            drop(working);
-        };
-        self.threads.push(Builder::new().name(name.to_owned()).spawn(work)?);
+        self.threads.push(begin(&self.clock, name, work)?);
         Ok(())
     }
 

@@ -6,12 +6,11 @@ use std::time::{Duration, Instant};
 use nalgebra::{Point3, Vector3};
 
 use super::convert::{header, point};
+use super::edits::FACES_OF_A_TILE;
 use super::replica::MeshVersion;
 use crate::patch::Support;
 use crate::ros::messages::{ColorRGBA, Marker, Vector3 as Vector3Msg};
 
-/// Faces of a tile, by number: 1500 points are 60 kB with their colours, below the 64 kB of a datagram.
-pub const FACES_OF_A_TILE: u32 = 500;
 /// A tile is sent once more when it has not changed for so long: a network that was away for less has kept nothing from anybody.
 const ONCE_MORE_AFTER: Duration = Duration::from_secs(10);
 /// Namespace of the markers.

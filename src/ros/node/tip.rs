@@ -2,24 +2,11 @@
 
 use nalgebra::Point3;
 
+use super::channels::{LastTip, NextTouches};
 use super::convert::{header, point};
 use super::feature_messages::{LETTERS, label};
-use super::feature_worker::NextTouches;
 use crate::explore::NextTouch;
 use crate::ros::messages::{ColorRGBA, Feature, FeatureArray, Marker, MarkerArray, Pose, Vector3};
-
-/// Where the tip was last.
-#[derive(Clone, Copy, Debug)]
-pub struct LastTip {
-    /// of the sample, ns
-    pub stamp_ns: i64,
-    /// centre of the ball, m, in O
-    pub centre: Point3<f64>,
-    /// radius of the ball, m
-    pub radius: f64,
-    /// the closest point of the mesh, and how far the ball's surface is from it, m; `None` beyond the reach
-    pub closest: Option<(Point3<f64>, f64)>,
-}
 
 /// Farther from a feature than this nobody asks for it, m.
 const NEAR: f64 = 0.05;

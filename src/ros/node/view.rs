@@ -4,16 +4,15 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError};
 use std::time::Duration;
 
+use super::channels::{LastTip, NextTouches, ViewInput};
 use super::edits::Edits;
 use super::feature_messages;
-use super::feature_worker::NextTouches;
 use super::mesh_patches::MeshPatches;
-use super::replica::MeshVersion;
 use super::shared::Shared;
 use super::tiles::{ColourBy, Tiles};
-use super::tip::{self, LastTip};
+use super::tip;
 use crate::clock::Clock;
-use crate::ros::messages::{DiagnosticArray, FeatureArray, HapticMismatch, MeshPatch};
+use crate::ros::messages::{FeatureArray, MeshPatch};
 use crate::ros::port::{Port, Publication, TILES_KEPT};
 
 /// Tiles that wait in the port at most: what waits here is sent as it is then, and what has changed goes first.
@@ -22,26 +21,6 @@ const TILES_AHEAD: usize = 32;
 const PARTS_AT_ONCE: usize = 64;
 /// While there is more to send than that, it goes on after so long.
 const CATCH_UP: Duration = Duration::from_millis(10);
-
-/// What the view is told.
-pub enum ViewInput {
-    /// the mesh changed
-    Edits(Box<Edits>),
-    /// a new session
-    Session(Box<MeshVersion>),
-    /// one sample
-    Mismatch(HapticMismatch),
-    /// where the tip is
-    Tip(LastTip),
-    /// all features, and where a hand should touch them next
-    Features(Arc<FeatureArray>, NextTouches),
-    /// somebody wants the whole state on the topic
-    Resync,
-    /// once a second
-    Diagnostics(Box<DiagnosticArray>),
-    /// a parameter was set
-    Parameters,
-}
 
 /// The thread's own.
 pub struct View {

@@ -1,2 +1,3 @@
 mod arm;
+mod files;
 mod samples;

@@ -8,9 +8,9 @@ use crate::ros::messages::{
     Feature, Header, Point, Pose, ProbeResponse, ProbeResult, ProbeTouch, Quaternion, Time, Vector3 as Vector3Msg,
     Wrench as WrenchMsg,
 };
+use crate::ros::node::channels::ProbeTarget;
 use crate::ros::node::convert::{NO_VECTOR, point, time, vector};
 use crate::ros::node::feature_messages::{flagged, found, number_of};
-use crate::ros::node::feature_worker::ProbeTarget;
 
 /// Why nothing is probed where all that is flagged was asked for.
 pub const NOTHING_FLAGGED: &str = "nothing is flagged that was not probed already";

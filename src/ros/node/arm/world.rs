@@ -8,7 +8,6 @@ use std::time::{Duration, Instant};
 
 use nalgebra::{Isometry3, Point3};
 
-use super::ArmWorker;
 use super::common::Common;
 use crate::clock::Clock;
 use crate::mesh::{FaceHit, TriMesh};
@@ -60,58 +59,30 @@ pub fn publish(samples: &dyn SamplePort, base: &str, tool: &str, state: &ArmStat
 
 /// The world during one probing.
 pub struct ArmWorld<'a> {
-    clock: &'a Clock,
-    still: StillWorld,
+    pub clock: &'a Clock,
+    pub still: StillWorld,
     /// as it will be
-    next: Option<Receiver<StillWorld>>,
-    mesh: &'a MeshReplica,
-    samples: &'a dyn SamplePort,
-    base: &'a str,
-    object: &'a str,
-    tool: &'a str,
-    offset_ns: i64,
-    feedback: Option<&'a Feedback>,
-    is_cancelled: Option<&'a Arc<AtomicBool>>,
-    common: &'a Common,
+    pub next: Option<Receiver<StillWorld>>,
+    pub mesh: &'a MeshReplica,
+    pub samples: &'a dyn SamplePort,
+    pub base: &'a str,
+    pub object: &'a str,
+    pub tool: &'a str,
+    pub offset_ns: i64,
+    pub feedback: Option<&'a Feedback>,
+    pub is_cancelled: Option<&'a Arc<AtomicBool>>,
+    pub common: &'a Common,
     /// number of the feature, from 1 on, and how many
-    feature: [u32; 2],
+    pub feature: [u32; 2],
     /// when the order was taken up
-    begun: Instant,
-    progress: Option<Progress>,
-    phase: Phase,
-    told: Instant,
-    last: Option<ArmState>,
+    pub begun: Instant,
+    pub progress: Option<Progress>,
+    pub phase: Phase,
+    pub told: Instant,
+    pub last: Option<ArmState>,
 }
 
 impl<'a> ArmWorld<'a> {
-    pub fn new(
-        hands: &'a ArmWorker,
-        still: StillWorld,
-        watched: Option<(&'a Feedback, &'a Arc<AtomicBool>)>,
-        [number, count]: [usize; 2],
-    ) -> Self {
-        Self {
-            clock: &hands.setup.clock,
-            still,
-            next: None,
-            mesh: &hands.shared.mesh,
-            samples: &*hands.samples,
-            base: hands.base(),
-            object: &hands.shared.frame,
-            tool: &hands.setup.tool,
-            offset_ns: hands.offset_ns.unwrap_or(0),
-            feedback: watched.map(|(feedback, _)| feedback),
-            is_cancelled: watched.map(|(_, cancelled)| cancelled),
-            common: &hands.common,
-            feature: [number as u32 + 1, count as u32],
-            begun: hands.begun,
-            progress: None,
-            phase: Phase::Planning,
-            told: hands.begun,
-            last: None,
-        }
-    }
-
     /// Takes the mesh that has become ready, and asks for the next: it is behind by a touch, or by as long as it takes to make.
     fn renew(&mut self) {
         match self.next.as_ref().map(Receiver::try_recv) {

@@ -1,0 +1,544 @@
+//! The thread of the arm: it streams wrench and pose like any probe, and probes what is asked for.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, TrySendError, sync_channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use tracing::{info, warn};
+
+use super::answer::{not_probed, planned as planned_result, refused, response_of, result_of, summary_of, touches_of};
+use super::common::Common;
+use super::pace::Paced;
+use super::request::Wanted;
+use super::world::{ArmWorld, ask_mesh, publish};
+use crate::io::probed_touches_file::append_probed_touches;
+use crate::mesh::TriMesh;
+use crate::probe::{Cell, Ending, Flag, Phase, ProbeParams, Prober, StillWorld, plan};
+use crate::robot::Arm;
+use crate::ros::messages::{
+    Header, Path as PathMsg, ProbeFeatureRequest, ProbeFeatureResponse, ProbeGoal, ProbeResponse, ProbeResult,
+    ProbeSettings, TriggerResponse,
+};
+use crate::ros::node::channels::{ArmMeasurement, FeatureInput, ProbeTarget};
+use crate::ros::node::convert::header;
+use crate::ros::node::error::NodeError;
+use crate::ros::node::frame_resolver::CELL;
+use crate::ros::node::setup::Setup;
+use crate::ros::node::shared::Shared;
+use crate::ros::node::side_work::begin;
+use crate::ros::port::{Feedback, Goal, GoalEnd, Port, Publication, Reply, SamplePort};
+use crate::scene::simulated_arm;
+use crate::sim::{MeshSurface, SimArm};
+
+/// Orders that wait for the thread: one is taken up at a time, and who comes meanwhile is told so.
+const QUEUE: usize = 1;
+/// An arm from which nothing comes is asked again after this.
+const LOST: Duration = Duration::from_millis(200);
+/// How long the other threads may take to tell what is flagged, and until the mesh is complete.
+const WAIT: Duration = Duration::from_secs(15);
+/// The clock of an arm is followed by this share of how far it is off, with each state: latency comes and goes, drift stays.
+const FOLLOW: i64 = 1024;
+/// Farther off it is another clock, ns.
+const OTHER_CLOCK_NS: i64 = 200_000_000;
+
+/// What the thread is asked.
+pub enum ArmInput {
+    /// `~/probe_feature`
+    Feature(ProbeFeatureRequest, Reply<ProbeFeatureResponse>),
+    /// `~/probe`
+    Goal(ProbeGoal, Goal),
+    /// `~/probe_all`
+    All(Reply<TriggerResponse>),
+    /// `~/recover`
+    Recover(Reply<TriggerResponse>),
+}
+
+impl ArmInput {
+    /// Answers that nothing was done, and why.
+    ///
+    /// - `code`: of [`ProbeResult`]
+    pub fn refuse(self, header: Header, code: u8, why: &str) {
+        match self {
+            Self::Feature(request, reply) => {
+                let result = ProbeResult { header, ..not_probed(request.id, code, why) };
+                reply.send(ProbeFeatureResponse { result });
+            }
+            Self::Goal(goal, Goal { accept, result, .. }) => {
+                accept.send(true);
+                let first = goal.ids.first().copied();
+                let (ids, codes) = first.map(|id| (id, code)).into_iter().unzip();
+                result.send((GoalEnd::Aborted, ProbeResponse { header, code, message: why.to_owned(), ids, codes }));
+            }
+            Self::All(reply) | Self::Recover(reply) => {
+                reply.send(TriggerResponse { success: false, message: why.to_owned() });
+            }
+        }
+    }
+}
+
+/// What the thread works at.
+struct ArmOrder {
+    input: ArmInput,
+    folder: PathBuf,
+}
+
+/// Which arm there is.
+pub enum ArmKind {
+    /// A simulated one, against the part as it is.
+    Sim(Box<TriMesh>),
+    /// One that exists.
+    Real(Box<dyn Arm + Send>),
+}
+
+/// An arm, and where what it feels is published.
+pub struct ArmOfNode {
+    /// which
+    pub kind: ArmKind,
+    /// on the topics of the probe
+    pub samples: Box<dyn SamplePort>,
+}
+
+/// The arm's thread, as the others see it. Dropped, it has the arm stop, retract and end.
+#[derive(Debug)]
+pub struct ArmHandle {
+    inputs: SyncSender<ArmOrder>,
+    common: Arc<Common>,
+    cell: Cell,
+}
+
+impl Drop for ArmHandle {
+    fn drop(&mut self) {
+        self.common.end();
+    }
+}
+
+impl ArmHandle {
+    /// Gives an order.
+    ///
+    /// - `folder`: of the session, where what is touched is written down.
+    ///
+    /// # Errors
+    /// The order, when it cannot be taken up; a code of [`ProbeResult`], and why.
+    pub fn order(&self, input: ArmInput, folder: &Path) -> Result<(), (Box<ArmInput>, u8, String)> {
+        let busy = |input| (Box::new(input), ProbeResult::BUSY, BUSY.to_owned());
+        if !self.common.begin() {
+            return Err(busy(input));
+        }
+        let order = ArmOrder { input, folder: folder.to_owned() };
+        self.inputs.try_send(order).map_err(|error| {
+            self.common.done();
+            match error {
+                TrySendError::Full(order) => busy(order.input),
+                // its thread has ended, and has said why
+                TrySendError::Disconnected(order) => {
+                    let why = self.common.ready().err().unwrap_or_else(|| "the thread of the arm has ended".to_owned());
+                    (Box::new(order.input), ProbeResult::ARM_NOT_READY, why)
+                }
+            }
+        })
+    }
+
+    /// `~/arm_state`: answered at once, whatever the arm does.
+    pub fn state(&self) -> TriggerResponse {
+        self.common.state(&self.cell)
+    }
+
+    /// `~/pause`
+    pub fn pause(&self, is_paused: bool) {
+        self.common.pause(is_paused);
+    }
+
+    /// The parameter `allow_motion`.
+    pub fn allow_motion(&self, is_allowed: bool) {
+        self.common.allow_motion(is_allowed);
+    }
+}
+
+/// What the thread works with.
+struct ArmWorker {
+    setup: Arc<Setup>,
+    shared: Arc<Shared>,
+    port: Arc<dyn Port>,
+    samples: Box<dyn SamplePort>,
+    seeker: SyncSender<FeatureInput>,
+    cell: Cell,
+    params: ProbeParams,
+    inputs: Receiver<ArmOrder>,
+    common: Arc<Common>,
+    /// from the arm's clock to that of ROS, ns
+    offset_ns: Option<i64>,
+    /// the time of ROS when the last state came, ns
+    told_ns: i64,
+    /// when the order at hand was taken up
+    begun: Instant,
+}
+
+/// Who follows a goal: what is told, and whether it is to end.
+type GoalWatcher<'a> = (&'a Feedback, &'a Arc<AtomicBool>);
+
+/// Starts the thread of an arm.
+///
+/// # Errors
+/// [`NodeError::NoRobot`] where the scene has none, [`NodeError::NoThread`].
+pub fn start(
+    setup: &Arc<Setup>,
+    port: &Arc<dyn Port>,
+    arm: ArmOfNode,
+    seeker: SyncSender<FeatureInput>,
+) -> Result<(ArmHandle, JoinHandle<()>), NodeError> {
+    let (cell, params) = setup.scene.probing().ok_or(NodeError::NoRobot)?;
+    let (to, inputs) = sync_channel(QUEUE);
+    let common = Arc::new(Common::default());
+    common.allow_motion(setup.shared.parameters().bool("allow_motion"));
+    let handle = ArmHandle { inputs: to, common: Arc::clone(&common), cell: cell.clone() };
+    let ArmOfNode { kind, samples } = arm;
+    let mut hands = ArmWorker {
+        setup: Arc::clone(setup),
+        shared: Arc::clone(&setup.shared),
+        port: Arc::clone(port),
+        samples,
+        seeker,
+        cell,
+        params,
+        inputs,
+        common,
+        offset_ns: None,
+        told_ns: i64::MIN,
+        begun: setup.clock.now(),
+    };
+    let run = move || {
+        match kind {
+            ArmKind::Real(mut arm) => hands.run(&mut *arm),
+            ArmKind::Sim(part) => hands.run_simulated(&part),
+        }
+        hands.refuse_the_rest();
+    };
+    let thread = begin(&setup.clock, "arm", run).map_err(NodeError::no_thread)?;
+    Ok((handle, thread))
+}
+
+impl ArmWorker {
+    fn run_simulated(&mut self, part: &TriMesh) {
+        let surface = match MeshSurface::new(part) {
+            Ok(surface) => surface,
+            Err(error) => return self.fail(&format!("the simulated arm has no part to touch: {error}")),
+        };
+        match SimArm::new(&surface, simulated_arm(&self.cell, &self.params), &self.cell.above(part)) {
+            Ok(arm) => self.run(&mut Paced::new(self.setup.clock.clone(), arm)),
+            Err(error) => self.fail(&format!("the simulated arm cannot begin: {error}")),
+        }
+    }
+
+    fn fail(&self, why: &str) {
+        warn!("{why}");
+        self.common.fail(why);
+    }
+
+    /// Streams, and does what it is asked, until the node ends.
+    fn run(&mut self, arm: &mut dyn Arm) {
+        while !self.common.is_ending() {
+            self.see_next(arm);
+            match self.inputs.try_recv() {
+                Ok(order) => self.take(order, arm),
+                Err(TryRecvError::Empty) => {}
+                Err(TryRecvError::Disconnected) => return,
+            }
+        }
+    }
+
+    /// Nobody who still waits is left without an answer.
+    fn refuse_the_rest(&self) {
+        for order in self.inputs.try_iter() {
+            order.input.refuse(self.header(), ProbeResult::SHUTDOWN, "the node ends");
+        }
+    }
+
+    /// Frame of the poses: the base of the arm, where the scene says where the scan lies in it.
+    fn base(&self) -> &str {
+        if self.setup.scene.scan_to_space.is_some() { CELL } else { &self.shared.frame }
+    }
+
+    /// Takes the next state of an arm that nobody moves.
+    fn see_next(&mut self, arm: &mut dyn Arm) {
+        let state = match arm.next_state() {
+            Ok(state) => state,
+            Err(error) => {
+                if self.common.miss(&error) {
+                    warn!(%error, "the arm");
+                }
+                return self.setup.clock.sleep(LOST);
+            }
+        };
+        self.common.see(&state);
+        let now_ns = self.port.now_ns();
+        let off = now_ns - state.stamp_ns;
+        let followed = match self.offset_ns {
+            // a simulated time that has not come yet, or stands still, says nothing of the arm's clock
+            Some(offset) if now_ns == self.told_ns => offset,
+            Some(offset) if (off - offset).abs() < OTHER_CLOCK_NS => offset + (off - offset) / FOLLOW,
+            _ => off,
+        };
+        self.told_ns = now_ns;
+        self.offset_ns = Some(followed);
+        publish(&*self.samples, self.base(), &self.setup.tool, &state, followed);
+    }
+
+    /// Waits for what another thread makes ready, while the arm's states go on.
+    fn wait<T>(&mut self, arm: &mut dyn Arm, ready: &Receiver<T>) -> Option<T> {
+        let deadline = self.setup.clock.now() + WAIT;
+        loop {
+            match ready.try_recv() {
+                Ok(made) => return Some(made),
+                Err(TryRecvError::Disconnected) => return None,
+                Err(TryRecvError::Empty) if self.setup.clock.now() > deadline || self.common.is_ending() => {
+                    return None;
+                }
+                Err(TryRecvError::Empty) => self.see_next(arm),
+            }
+        }
+    }
+
+    /// Works at an order. Who has the answer may give the next, so it is done before that is sent.
+    fn take(&mut self, ArmOrder { input, folder }: ArmOrder, arm: &mut dyn Arm) {
+        self.begun = self.setup.clock.now();
+        match input {
+            ArmInput::Recover(reply) => {
+                let recovered = self.recover(arm);
+                self.common.done();
+                reply.send(recovered);
+            }
+            ArmInput::All(reply) => {
+                let results = self.probe(&folder, &[], &ProbeSettings::default(), arm, None);
+                self.common.done();
+                reply.send(TriggerResponse {
+                    success: !results.is_empty() && results.iter().all(|one| one.code < ProbeResult::CANCELLED),
+                    message: summary_of(&results),
+                });
+            }
+            ArmInput::Feature(request, reply) => {
+                let results = self.probe(&folder, &[request.id], &request.settings, arm, None);
+                let none = || self.done(not_probed(request.id, ProbeResult::ARM_NOT_READY, NOT_TOLD));
+                self.common.done();
+                reply.send(ProbeFeatureResponse { result: results.into_iter().next().unwrap_or_else(none) });
+            }
+            ArmInput::Goal(goal, handles) => self.goal(&folder, &goal, handles, arm),
+        }
+    }
+
+    fn goal(&mut self, folder: &Path, goal: &ProbeGoal, handles: Goal, arm: &mut dyn Arm) {
+        let Goal { accept, feedback, result, is_cancelled } = handles;
+        accept.send(true);
+        let results = self.probe(folder, &goal.ids, &goal.settings, arm, Some((&feedback, &is_cancelled)));
+        let response = response_of(&results, self.header());
+        let was_broken_off = results.last().is_some_and(|last| last.code == ProbeResult::CANCELLED);
+        let end = match response.code {
+            // by who gave it, and by nobody else: a pause ends it too
+            _ if was_broken_off && is_cancelled.load(Ordering::Acquire) => GoalEnd::Canceled,
+            code if code < ProbeResult::CANCELLED => GoalEnd::Succeeded,
+            _ => GoalEnd::Aborted,
+        };
+        self.common.done();
+        result.send((end, response));
+    }
+
+    /// A result as it is now, for who follows and for who asked.
+    fn done(&self, result: ProbeResult) -> ProbeResult {
+        let result = ProbeResult { header: self.header(), ..result };
+        self.port.publish(Publication::ProbeResult(Box::new(result.clone())));
+        result
+    }
+
+    fn header(&self) -> Header {
+        header(self.port.now_ns(), &self.shared.frame)
+    }
+
+    fn recover(&mut self, arm: &mut dyn Arm) -> TriggerResponse {
+        match arm.recover() {
+            Ok(()) => {
+                self.common.recovered();
+                TriggerResponse { success: true, message: "the arm may move again".to_owned() }
+            }
+            Err(error) => TriggerResponse { success: false, message: error.to_string() },
+        }
+    }
+
+    /// Probes what is asked for, one after the other; a result for each that was begun.
+    fn probe(
+        &mut self,
+        folder: &Path,
+        ids: &[u32],
+        settings: &ProbeSettings,
+        arm: &mut dyn Arm,
+        watched: Option<GoalWatcher<'_>>,
+    ) -> Vec<ProbeResult> {
+        let targets = match self.targets(ids, arm) {
+            Ok(targets) => targets,
+            Err(refusal) => return vec![self.done(*refusal)],
+        };
+        let count = targets.len();
+        let mut results: Vec<ProbeResult> = Vec::new();
+        for (number, target) in targets.into_iter().enumerate() {
+            let is_cancelled = watched.is_some_and(|(_, is_cancelled)| is_cancelled.load(Ordering::Acquire));
+            let result = match self.wanted(settings, &target) {
+                _ if is_cancelled => {
+                    refused(&target, ProbeResult::CANCELLED, "cancelled before it was begun".to_owned())
+                }
+                Err((code, why)) => refused(&target, code, why),
+                Ok(wanted) => self.probe_one(folder, &target, &wanted, arm, watched, [number, count]),
+            };
+            // after a cancel or a stop the others are not begun
+            let goes_on = result.code < ProbeResult::CANCELLED
+                || matches!(
+                    result.code,
+                    ProbeResult::OUT_OF_LIMITS | ProbeResult::NO_CLEAR_PATH | ProbeResult::BAD_REQUEST
+                );
+            results.push(self.done(result));
+            if !goes_on {
+                break;
+            }
+        }
+        results
+    }
+
+    /// What is flagged, in the order that was asked for, or nearest first.
+    fn targets(&mut self, ids: &[u32], arm: &mut dyn Arm) -> Result<Vec<ProbeTarget>, Box<ProbeResult>> {
+        let (to, told) = sync_channel(1);
+        let asked = self.seeker.try_send(FeatureInput::Targets(ids.to_vec(), to));
+        let answer = asked.ok().and_then(|()| self.wait(arm, &told));
+        let first = ids.first().copied().unwrap_or(0);
+        let mut told = answer.ok_or_else(|| Box::new(not_probed(first, ProbeResult::ARM_NOT_READY, NOT_TOLD)))?;
+        if let Some(missing) = ids.iter().find(|id| told.iter().all(|target| target.id != **id)) {
+            let why = format!("there is no feature with the number {missing}: flag it first");
+            return Err(Box::new(not_probed(*missing, ProbeResult::NO_SUCH_FEATURE, &why)));
+        }
+        if ids.is_empty() {
+            let tip = self.common.last().map(|state| self.cell.place(&state.pose_bt)).unwrap_or_default();
+            let far = |target: &ProbeTarget| (target.place - tip).norm();
+            told.sort_by(|a, b| far(a).total_cmp(&far(b)));
+        }
+        Ok(told)
+    }
+
+    fn wanted(&self, settings: &ProbeSettings, target: &ProbeTarget) -> Result<Wanted, (u8, String)> {
+        let wanted = Wanted::of(settings, &self.params, target.kind)?;
+        if !wanted.is_dry_run {
+            let scene_allows = self.setup.scene.robot.as_ref().is_some_and(|robot| robot.allow_motion);
+            if !scene_allows || !self.shared.parameters().bool("allow_motion") {
+                let whose =
+                    if scene_allows { "the parameter allow_motion" } else { "allow_motion under robot in the scene" };
+                let why = format!("the arm may not move: look at a dry run first, then set {whose}");
+                return Err((ProbeResult::MOTION_NOT_ALLOWED, why));
+            }
+            if let Some((code, why)) = self.common.why_not() {
+                return Err((code, why.to_owned()));
+            }
+        }
+        self.common.ready().map_err(|why| (ProbeResult::ARM_NOT_READY, why))?;
+        Ok(wanted)
+    }
+
+    /// What is around the arm while it probes feature `number` of `count`.
+    fn world<'a>(
+        &'a self,
+        still: StillWorld,
+        watched: Option<GoalWatcher<'a>>,
+        [number, count]: [usize; 2],
+    ) -> ArmWorld<'a> {
+        ArmWorld {
+            clock: &self.setup.clock,
+            still,
+            next: None,
+            mesh: &self.shared.mesh,
+            samples: &*self.samples,
+            base: self.base(),
+            object: &self.shared.frame,
+            tool: &self.setup.tool,
+            offset_ns: self.offset_ns.unwrap_or(0),
+            feedback: watched.map(|(feedback, _)| feedback),
+            is_cancelled: watched.map(|(_, cancelled)| cancelled),
+            common: &self.common,
+            feature: [number as u32 + 1, count as u32],
+            begun: self.begun,
+            progress: None,
+            phase: Phase::Planning,
+            told: self.begun,
+            last: None,
+        }
+    }
+
+    fn probe_one(
+        &mut self,
+        folder: &Path,
+        target: &ProbeTarget,
+        wanted: &Wanted,
+        arm: &mut dyn Arm,
+        watched: Option<GoalWatcher<'_>>,
+        counts: [usize; 2],
+    ) -> ProbeResult {
+        let not_ready = |why: &str| refused(target, ProbeResult::ARM_NOT_READY, why.to_owned());
+        let Some(state) = self.common.last() else { return not_ready("nothing has come from the arm yet") };
+        let flag = Flag { id: target.id, kind: target.kind, place: target.place, radius: target.radius };
+        let (cell, params) = (self.cell.clone(), wanted.params.clone());
+        let ready = ask_mesh(&self.setup.clock, &self.shared.mesh, move |still| {
+            let planned = plan(&cell, &params, &still, &flag, &state);
+            (still, planned)
+        });
+        let Some((still, planned)) = self.wait(arm, &ready) else {
+            return not_ready("the mesh was not complete in time: probe again");
+        };
+        let mut world = self.world(still, watched, counts);
+        match planned {
+            Ok(planned) => {
+                let poses = world.path(&planned.path);
+                self.port.publish(Publication::Path(PathMsg { header: self.header(), poses }));
+                if wanted.is_dry_run {
+                    return planned_result(target, &planned);
+                }
+            }
+            // there is no such pattern, or no such number
+            Err(error) => return refused(target, ProbeResult::BAD_REQUEST, format!("nothing is planned: {error}")),
+        }
+        let probed = Prober::new(arm, &self.cell, &wanted.params, &mut world).probe(&flag);
+        info!(feature = target.id, ending = %probed.ending, touches = probed.touches.len(), "probed");
+        if let Ending::Stopped(_) = &probed.ending {
+            self.common.stop(&probed.ending.to_string());
+        }
+        let ball_radius = wanted.params.pattern.ball_radius;
+        if let Err(error) =
+            append_probed_touches(&probed, ball_radius, self.offset_ns.unwrap_or(0), &folder.join(TOUCHES))
+        {
+            warn!(%error, "the touches of a feature are on the topic alone");
+        }
+        let is_whole = matches!(probed.ending, Ending::ToleranceReached | Ending::TouchesSpent | Ending::TimeSpent);
+        if let Some(feature) = probed.found.as_ref().and_then(|found| found.feature.clone()).filter(|_| is_whole) {
+            // the number that was wanted is still wanted, where it is not known well enough
+            let is_done = matches!(probed.ending, Ending::ToleranceReached);
+            let session = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            let measured = ArmMeasurement { session, id: target.id, feature, is_done };
+            if self.seeker.try_send(FeatureInput::Measured(Box::new(measured))).is_err() {
+                warn!(feature = target.id, "what was measured is in the answer, and not among the features");
+            }
+        }
+        let offset_ns = self.offset_ns.unwrap_or(0);
+        for touch in touches_of(target, &probed, &wanted.params, &self.cell, offset_ns, &self.shared.frame) {
+            self.port.publish(Publication::ProbeTouch(Box::new(touch)));
+        }
+        let mut result = result_of(target, &probed);
+        if let (ProbeResult::CANCELLED, Some((code, why))) = (result.code, self.common.why_not()) {
+            result.message = format!("{why}: {}", result.message);
+            // the others are refused before they begin
+            if code == ProbeResult::SHUTDOWN {
+                result.code = code;
+            }
+        }
+        result
+    }
+}
+
+/// Beside the recording of a session.
+const TOUCHES: &str = "probed_touches.jsonl";
+const BUSY: &str = "the arm works at an order: wait, or cancel that";
+const NOT_TOLD: &str = "the features were not told in time: ask again";

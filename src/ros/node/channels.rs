@@ -1,0 +1,109 @@
+//! What the workers send each other.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::mpsc::SyncSender;
+
+use nalgebra::Point3;
+
+use super::edits::Edits;
+use super::replica::MeshVersion;
+use crate::explore::NextTouch;
+use crate::features::{Feature, Kind};
+use crate::live::TouchDelta;
+use crate::ros::messages::{
+    DetectFeaturesRequest, DetectFeaturesResponse, DiagnosticArray, FeatureArray, FlagFeatureResponse, HapticMismatch,
+    UnflagFeatureResponse,
+};
+use crate::ros::port::Reply;
+
+/// What the view is told.
+pub enum ViewInput {
+    /// the mesh changed
+    Edits(Box<Edits>),
+    /// a new session
+    Session(Box<MeshVersion>),
+    /// one sample
+    Mismatch(HapticMismatch),
+    /// where the tip is
+    Tip(LastTip),
+    /// all features, and where a hand should touch them next
+    Features(Arc<FeatureArray>, NextTouches),
+    /// somebody wants the whole state on the topic
+    Resync,
+    /// once a second
+    Diagnostics(Box<DiagnosticArray>),
+    /// a parameter was set
+    Parameters,
+}
+
+/// Where the tip was last.
+#[derive(Clone, Copy, Debug)]
+pub struct LastTip {
+    /// of the sample, ns
+    pub stamp_ns: i64,
+    /// centre of the ball, m, in O
+    pub centre: Point3<f64>,
+    /// radius of the ball, m
+    pub radius: f64,
+    /// the closest point of the mesh, and how far the ball's surface is from it, m; `None` beyond the reach
+    pub closest: Option<(Point3<f64>, f64)>,
+}
+
+/// What the thread is told.
+pub enum FeatureInput {
+    /// touches came or went
+    Probed(TouchDelta),
+    /// a new session
+    Session(String),
+    /// somebody points at a place, m, in O
+    Flag(FlaggedPlace, Option<Reply<FlagFeatureResponse>>),
+    /// takes that back
+    Unflag(u32, Reply<UnflagFeatureResponse>),
+    /// asks what is to be probed; no numbers: all that is flagged
+    Targets(Vec<u32>, SyncSender<Vec<ProbeTarget>>),
+    /// an arm has measured something
+    Measured(Box<ArmMeasurement>),
+    /// looks at the mesh now
+    Detect(DetectFeaturesRequest, Reply<DetectFeaturesResponse>),
+}
+
+/// A place that somebody pointed at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FlaggedPlace {
+    /// as in messages; 0: a region to be explored
+    pub kind: u8,
+    /// m, in O
+    pub point: Point3<f64>,
+    /// how far around it, m
+    pub radius: f64,
+}
+
+/// What an arm can be sent to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ProbeTarget {
+    /// by which it is known
+    pub id: u32,
+    /// `None`: nobody knows
+    pub kind: Option<Kind>,
+    /// m, in O
+    pub place: Point3<f64>,
+    /// how far around it, m
+    pub radius: f64,
+}
+
+/// What an arm has measured.
+#[derive(Clone, Debug)]
+pub struct ArmMeasurement {
+    /// in which it was flagged
+    pub session: String,
+    /// number of the flag
+    pub id: u32,
+    /// what it is
+    pub feature: Feature,
+    /// it is known as well as was wanted
+    pub is_done: bool,
+}
+
+/// Where a hand should touch next, by the number of the feature.
+pub type NextTouches = BTreeMap<u32, NextTouch>;

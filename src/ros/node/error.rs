@@ -1,0 +1,94 @@
+//! Why the node does not start, or its session was not kept.
+
+use std::path::PathBuf;
+
+use crate::io::mesh_file::MeshFileError;
+use crate::live::LiveError;
+use crate::refine::RefineError;
+use crate::scene::SceneError;
+use crate::session::{OutcomeError, SessionError};
+use crate::touch::SettingError;
+
+/// Why the node does not start, or its session was not kept.
+#[derive(Debug, thiserror::Error)]
+pub enum NodeError {
+    /// Neither the parameter `scan` nor the scene names one.
+    #[error("there is no scan to refine: name one by -p scan:=FILE, or as `scan: {{ file: … }}` in the scene")]
+    NoScan,
+    /// An arm must keep clear of the whole scan.
+    #[error(
+        "an arm keeps clear of the whole scan, of which scan.region_low_mm and scan.region_high_mm leave only a part: take \
+         them out of the scene, or start without robot"
+    )]
+    RegionWithRobot,
+    /// The scene cannot be used.
+    #[error(transparent)]
+    Scene(Box<SceneError>),
+    /// The scene has no `refine`.
+    #[error("the scene names no `refine`, so nothing would move the mesh: add `refine:` to it")]
+    NothingMoves,
+    /// The scene has no `robot`.
+    #[error(
+        "robot:= needs `robot:` in the scene: nobody knows where the arm stands and what it must never leave (config/probe.yaml is an example)"
+    )]
+    NoRobot,
+    /// The scan cannot be read.
+    #[error("{0}")]
+    Scan(Box<MeshFileError>),
+    /// A setting of the scene.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    /// The scan cannot be refined.
+    #[error("the scan cannot be refined: {0}")]
+    Refine(#[from] RefineError),
+    /// The thread of the patch.
+    #[error(transparent)]
+    Live(#[from] LiveError),
+    /// The folder of sessions cannot be used.
+    #[error("{}: {source}; name another by -p session_folder:=FOLDER", path.display())]
+    Folder {
+        /// which one
+        path: PathBuf,
+        /// what the system says
+        source: std::io::Error,
+    },
+    /// The session cannot be kept.
+    #[error(transparent)]
+    Session(#[from] SessionError),
+    /// The result cannot be written.
+    #[error(transparent)]
+    Outcome(Box<OutcomeError>),
+    /// The result is written, the recording is not whole.
+    #[error("{count} messages are not in the session's recording: {reason}")]
+    Unrecorded {
+        /// how many
+        count: u64,
+        /// why
+        reason: String,
+    },
+    /// The system gives no thread.
+    #[error("no thread for the node: {0}; end other programs")]
+    NoThread(String),
+    /// A thread ended by a fault.
+    #[error("a thread of the node ended by a fault of touchup: please report it with the session's folder")]
+    Stopped,
+}
+
+impl From<SceneError> for NodeError {
+    fn from(error: SceneError) -> Self {
+        Self::Scene(Box::new(error))
+    }
+}
+
+impl From<OutcomeError> for NodeError {
+    fn from(error: OutcomeError) -> Self {
+        Self::Outcome(Box::new(error))
+    }
+}
+
+impl NodeError {
+    /// Of the operating system.
+    pub(super) fn no_thread(error: std::io::Error) -> Self {
+        Self::NoThread(error.to_string())
+    }
+}

@@ -1,0 +1,148 @@
+//! A node from its preparation to its end.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, sync_channel};
+use std::thread::JoinHandle;
+
+use super::arm::{self, ArmOfNode};
+use super::edits::Edits;
+use super::error::NodeError;
+use super::feature_worker::FeatureWorker;
+use super::refinement::RefinementWorker;
+use super::session::{NodeEnd, NodeSession};
+use super::setup::Setup;
+use super::side_work::begin;
+use super::view::View;
+use crate::clock::Clock;
+use crate::ros::parameters::Parameters;
+use crate::ros::port::{Arrival, Port};
+use crate::scene::{Memory, Scene, SceneCost};
+
+/// Inputs that wait for the view at most: frames of it are dropped first.
+const VIEW_QUEUE: usize = 256;
+/// Inputs that wait for the thread of the features at most.
+const SEEKER_QUEUE: usize = 256;
+/// Changes of the mesh that go round.
+const EDITS_ROUND: usize = 2;
+/// Arrivals that wait for the node at most: two seconds of both streams.
+pub const INBOX: usize = 4096;
+
+/// A node that runs.
+#[derive(Debug)]
+pub struct Node {
+    haptic: JoinHandle<Result<NodeEnd, NodeError>>,
+    view: JoinHandle<()>,
+    seeker: JoinHandle<()>,
+    arm: Option<JoinHandle<()>>,
+    folder: PathBuf,
+}
+
+/// A node that has read scene and scan and begun a session, and hears nothing yet: loading a large scan takes seconds, in
+/// which nothing that is sent to the node may be lost.
+pub struct Prepared {
+    setup: Arc<Setup>,
+    sitting: NodeSession,
+}
+
+impl Prepared {
+    /// Reads scene and scan and begins a session.
+    ///
+    /// # Errors
+    /// [`NodeError`]
+    pub fn new(parameters: Parameters) -> Result<Self, NodeError> {
+        Self::on(Clock::system(), parameters)
+    }
+
+    /// As [`Self::new`]; all that is due at a time is so on `clock`.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn on(clock: Clock, parameters: Parameters) -> Result<Self, NodeError> {
+        let setup = Arc::new(Setup::new(parameters, clock)?);
+        let sitting = NodeSession::begin(&setup)?;
+        setup.shared.mesh.name_session(sitting.folder.name());
+        Ok(Self { setup, sitting })
+    }
+
+    /// Folder of the session.
+    pub fn folder(&self) -> &Path {
+        self.sitting.folder.path()
+    }
+
+    /// The scan: where it was read from, and how many faces it has.
+    pub fn scan(&self) -> (&Path, usize) {
+        (&self.setup.scan_path, self.setup.scan.0.face_count())
+    }
+
+    /// The scene as it was read.
+    pub fn scene(&self) -> &Scene {
+        &self.setup.scene
+    }
+
+    /// What was built of the scene, and the memory that it took.
+    ///
+    /// - `has_arm`: whether an arm probes.
+    pub fn cost(&self, has_arm: bool) -> SceneCost {
+        let Self { setup, sitting } = self;
+        // the node looks for no clock, and poses come as such
+        let unused = if has_arm { &["clock", "markers"][..] } else { &["clock", "markers", "robot"] };
+        let (scan, tree) = &*setup.scan;
+        let memory = Memory::of(sitting.engine.refiner().footprint(), scan.bytes() + tree.bytes() + setup.cut.bytes());
+        SceneCost { parts: setup.scene.built(unused, &crate::FEATURES), memory }
+    }
+
+    /// Starts the threads.
+    ///
+    /// - `arm`: that probes what is flagged; without one orders are answered so.
+    /// - `inbox`: where the port puts what arrives; the node ends with [`Arrival::Shutdown`], or when nothing can arrive any
+    ///   more.
+    ///
+    /// # Errors
+    /// [`NodeError`]
+    pub fn start(
+        self,
+        port: Arc<dyn Port>,
+        inbox: Receiver<Arrival>,
+        arm: Option<ArmOfNode>,
+    ) -> Result<Node, NodeError> {
+        let Self { setup, sitting } = self;
+        let (folder, session) = (sitting.folder.path().to_owned(), sitting.folder.name().to_owned());
+        let (to_view, view_inputs) = sync_channel(VIEW_QUEUE);
+        let (to_seeker, seeker_inputs) = sync_channel(SEEKER_QUEUE);
+        let (to_spare, spare) = sync_channel(EDITS_ROUND);
+        for _ in 0..EDITS_ROUND {
+            to_spare.send(Box::<Edits>::default()).map_err(|_| NodeError::Stopped)?;
+        }
+        let clock = setup.clock.clone();
+        let view = View::new(clock.clone(), Arc::clone(&port), Arc::clone(&setup.shared), to_spare);
+        let seeker = FeatureWorker::new(clock.clone(), Arc::clone(&setup.shared), to_view.clone(), session);
+        let arm = arm.map(|arm| arm::start(&setup, &port, arm, to_seeker.clone())).transpose()?;
+        let (handle, arm) = arm.unzip();
+        let haptic = RefinementWorker::new(setup, port, sitting, to_view, to_seeker, spare, handle)?;
+        let view = begin(&clock, "view", move || view.run(&view_inputs)).map_err(NodeError::no_thread)?;
+        let seeker = begin(&clock, "seeker", move || seeker.run(&seeker_inputs)).map_err(NodeError::no_thread)?;
+        let haptic = begin(&clock, "haptic", move || haptic.run(&inbox)).map_err(NodeError::no_thread)?;
+        Ok(Node { haptic, view, seeker, arm, folder })
+    }
+}
+
+impl Node {
+    /// Folder of the session that it began with.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Waits for its end.
+    ///
+    /// # Errors
+    /// [`NodeError`] when the result was not written, or a thread ended by a fault.
+    pub fn join(self) -> Result<NodeEnd, NodeError> {
+        let Self { haptic, view, seeker, arm, .. } = self;
+        let ended = haptic.join().map_err(|_| NodeError::Stopped)?;
+        for thread in arm.into_iter().chain([seeker, view]) {
+            thread.join().map_err(|_| NodeError::Stopped)?;
+        }
+        ended
+    }
+}

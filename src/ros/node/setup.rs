@@ -1,0 +1,95 @@
+//! What the node is started with: parameters, scene and scan.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::error::NodeError;
+use super::frame_resolver::FrameNames;
+use super::replica::MeshReplica;
+use super::shared::Shared;
+use crate::clock::Clock;
+use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
+use crate::io::recording::Topics;
+use crate::mesh::{FaceTree, TriMesh};
+use crate::ros::parameters::Parameters;
+use crate::scene::{CutScan, RegionCut, Scene};
+
+/// The scene of who names none.
+const DEFAULT_SCENE: &str = include_str!("../../../config/default.yaml");
+
+/// The scan as it came, and the tree over its faces.
+pub type Scan = Arc<(TriMesh, FaceTree)>;
+
+/// All that does not change while the node runs.
+pub(crate) struct Setup {
+    pub clock: Clock,
+    pub shared: Arc<Shared>,
+    pub scan: Scan,
+    pub scan_path: PathBuf,
+    pub mesh_unit: MeshUnit,
+    pub scene: Scene,
+    pub cut: RegionCut,
+    pub scene_yaml: String,
+    pub topics: Topics,
+    pub source: &'static str,
+    pub tool: String,
+}
+
+impl Setup {
+    pub fn new(parameters: Parameters, clock: Clock) -> Result<Self, NodeError> {
+        let scene_path = Path::new(parameters.string("scene"));
+        let (scene, scene_yaml) = match scene_path.as_os_str().is_empty() {
+            true => (Scene::from_yaml(DEFAULT_SCENE)?, DEFAULT_SCENE.to_owned()),
+            false => Scene::read_with_text(scene_path)?,
+        };
+        let (scan_path, mesh_unit) = match parameters.string("scan") {
+            "" => scene.scan_file(scene_path).ok_or(NodeError::NoScan)?,
+            path => (PathBuf::from(path), mesh_unit(&parameters)),
+        };
+        let MeshFile { mesh, .. } =
+            read_mesh(&scan_path, mesh_unit).map_err(|error| NodeError::Scan(Box::new(error)))?;
+        if scene.region().is_some() && parameters.string("robot") != "none" {
+            return Err(NodeError::RegionWithRobot);
+        }
+        let CutScan { mesh, cut } = scene.cut(mesh)?;
+        let tree = FaceTree::new(&mesh);
+        let source = if parameters.string("source") == "probe" { "probe" } else { "stylus" };
+        let tool = match parameters.string("tool_frame") {
+            "" => source.to_owned(),
+            named => named.to_owned(),
+        };
+        let known = scene.patcher_params().and_then(|params| params.uncertainty);
+        let scan_sigma = known.map(|known| known.scan).filter(|sigma| *sigma > 0.0);
+        let replica = MeshReplica::new(clock.clone(), &mesh);
+        Ok(Self {
+            clock,
+            shared: Arc::new(Shared::new(parameters, scan_sigma, replica)),
+            scan: Arc::new((mesh, tree)),
+            scan_path,
+            mesh_unit,
+            scene,
+            cut,
+            scene_yaml,
+            topics: Topics { pose: format!("/{source}/pose"), wrench: format!("/{source}/wrench"), markers: None },
+            source,
+            tool,
+        })
+    }
+
+    pub fn frame_names(&self) -> FrameNames {
+        FrameNames {
+            object: self.shared.frame.clone(),
+            tool: self.tool.clone(),
+            sensor: format!("{}_sensor", self.source),
+        }
+    }
+}
+
+/// The unit of the files, of the parameter `mesh_unit`.
+pub fn mesh_unit(parameters: &Parameters) -> MeshUnit {
+    match parameters.string("mesh_unit") {
+        "m" => MeshUnit::Metre,
+        "inch" => MeshUnit::Inch,
+        _ => MeshUnit::Millimetre,
+    }
+}
