@@ -153,7 +153,7 @@ fn raw(name: &str) -> String {
     if name == "type" { format!("r#{name}") } else { name.to_owned() }
 }
 
-/// For `message!` and `service!`: each message, what r2r calls it, and its fields on both sides; each service, and its path there.
+/// For `message!` and `service!`: each message and service, what r2r calls it, and the fields on both sides.
 pub fn conversions(messages: &[Message]) -> String {
     let lines = messages.iter().map(|message| {
         let fields = message.fields.iter().map(|field| format!("{}: {}, ", raw(&field.name), trailed(&field.name)));

@@ -1,4 +1,4 @@
-//! What a ROS node is told when it starts: `--ros-args` and the environment.
+//! What a ROS node is started with: `--ros-args` and the environment.
 //!
 //! The later of two values counts, be it from `-p` or from a file.
 

@@ -18,7 +18,7 @@ impl Arrivals {
         Self { inbox, dropped: [const { AtomicU64::new(0) }; 2], is_over: AtomicBool::new(false) }
     }
 
-    /// Hands it to the node, or counts it; never waits.
+    /// Puts it into the inbox of the node, or counts it; never waits.
     pub fn put(&self, arrival: Arrival) {
         match self.inbox.try_send(arrival) {
             Ok(()) => {}

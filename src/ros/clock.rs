@@ -42,7 +42,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_simulated_clock_says_what_it_was_told() {
+    fn a_simulated_clock_says_what_it_was_set_to() {
         let clock = RosClock::new(true);
         assert_eq!(clock.now_ns(), 0);
         clock.set(Time { sec: 2, nanosec: 5 });

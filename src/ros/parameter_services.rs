@@ -114,7 +114,7 @@ impl PublicParameters {
         exchange.arrivals.put(Arrival::SetParameter(name, value, reply));
     }
 
-    /// All or none, as far as the table of parameters can tell before any is set.
+    /// All or none, as far as the table of parameters can say before any is set.
     fn set_all(self: &Arc<Self>, wanted: Vec<Parameter>, reply: Reply<SetParametersAtomicallyResponse>) {
         let answer = move |results: SetResults| {
             let first = results.into_iter().find(Result::is_err).unwrap_or(Ok(()));
@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn descriptions_tell_type_range_words_and_what_is_fixed() {
+    fn descriptions_have_type_range_words_and_what_is_fixed() {
         let rate = describe("view_rate_hz");
         let range = &rate.floating_point_range[0];
         assert_eq!((rate.r#type, rate.read_only, range.from_value, range.to_value), (3, false, 0.1, 100.0));

@@ -112,7 +112,7 @@ pub struct Feedback(pub Box<dyn Fn(ProbeFeedback) + Send>);
 pub struct Reply<T>(Box<dyn FnOnce(T) + Send>);
 
 impl<T> Reply<T> {
-    /// A reply that hands the answer to `send`, which must not block.
+    /// A reply that passes the answer to `send`, which must not block.
     pub fn new(send: impl FnOnce(T) + Send + 'static) -> Self {
         Self(Box::new(send))
     }

@@ -209,10 +209,10 @@ mod tests {
     }
 
     /// What goes out, in its order.
-    fn sent(outbox: &SendQueue) -> Vec<String> {
+    fn sent(queue: &SendQueue) -> Vec<String> {
         let sent = Mutex::new(Vec::new());
-        outbox.close();
-        outbox.send(|publication| {
+        queue.close();
+        queue.send(|publication| {
             sent.lock().unwrap().push(name(&publication));
             Sent::Done
         });
@@ -221,26 +221,26 @@ mod tests {
 
     #[test]
     fn tiles_wait_for_the_others() {
-        let outbox = SendQueue::default();
+        let queue = SendQueue::default();
         for publication in [tile(7, 1.0), tile(3, 2.0), patch(1), tile(7, 3.0), patch(2)] {
-            outbox.put(publication);
+            queue.put(publication);
         }
-        assert_eq!(outbox.tiles_waiting(), 3);
-        assert_eq!(sent(&outbox), ["patch 1", "patch 2", "tile 7 at 1", "tile 3 at 2", "tile 7 at 3"]);
+        assert_eq!(queue.tiles_waiting(), 3);
+        assert_eq!(sent(&queue), ["patch 1", "patch 2", "tile 7 at 1", "tile 3 at 2", "tile 7 at 3"]);
     }
 
     #[test]
     fn what_is_to_be_sent_later_goes_before_what_came_after_it() {
-        let outbox = SendQueue::default();
-        [patch(1), patch(2), tile(1, 0.0), tile(2, 0.0)].into_iter().for_each(|publication| outbox.put(publication));
+        let queue = SendQueue::default();
+        [patch(1), patch(2), tile(1, 0.0), tile(2, 0.0)].into_iter().for_each(|publication| queue.put(publication));
         let tried = Mutex::new(Vec::new());
         let reaches_the_end =
             |publication: &Publication| matches!(publication, Publication::Tile(tile) if tile.id == 2);
-        outbox.send(|publication| {
+        queue.send(|publication| {
             let mut tried = tried.lock().unwrap();
             tried.push(name(&publication));
             if reaches_the_end(&publication) {
-                outbox.close();
+                queue.close();
             }
             // each is taken at the second time
             if tried.len() % 2 == 1 { Sent::Later(publication) } else { Sent::Done }
@@ -250,18 +250,18 @@ mod tests {
         let expected = [both("patch 1"), both("patch 2"), both("tile 1 at 0")].concat();
         assert_eq!(tried[..6], expected);
         assert_eq!(tried[6..], ["tile 2 at 0"], "it was closed, and somebody listens too slowly");
-        assert_eq!(outbox.unsent(), [0, 0]);
+        assert_eq!(queue.unsent(), [0, 0]);
     }
 
     #[test]
     fn what_there_is_no_room_for_is_counted() {
-        let outbox = SendQueue::default();
+        let queue = SendQueue::default();
         (0..MOST as u32 + 3).for_each(|face| {
-            outbox.put(Publication::Mismatch(HapticMismatch { face, ..HapticMismatch::default() }));
+            queue.put(Publication::Mismatch(HapticMismatch { face, ..HapticMismatch::default() }));
         });
-        (0..MOST_TILES as i32 + 2).for_each(|id| outbox.put(tile(id, 0.0)));
-        assert_eq!(outbox.unsent(), [2, 3]);
-        let sent = sent(&outbox);
+        (0..MOST_TILES as i32 + 2).for_each(|id| queue.put(tile(id, 0.0)));
+        assert_eq!(queue.unsent(), [2, 3]);
+        let sent = sent(&queue);
         assert_eq!(
             (sent.len(), sent[0].as_str(), sent[MOST].as_str()),
             (MOST + MOST_TILES, "mismatch 0", "tile 2 at 0")
@@ -270,30 +270,30 @@ mod tests {
 
     #[test]
     fn what_ros_refuses_is_counted_and_the_rest_goes() {
-        let outbox = SendQueue::default();
-        [patch(1), patch(2), tile(1, 0.0)].into_iter().for_each(|publication| outbox.put(publication));
-        outbox.close();
-        outbox.send(|publication| match publication {
+        let queue = SendQueue::default();
+        [patch(1), patch(2), tile(1, 0.0)].into_iter().for_each(|publication| queue.put(publication));
+        queue.close();
+        queue.send(|publication| match publication {
             Publication::MeshPatch(patch) if patch.version == 2 => Sent::Done,
             _ => Sent::Refused,
         });
-        assert_eq!(outbox.unsent(), [1, 1]);
+        assert_eq!(queue.unsent(), [1, 1]);
     }
 
     #[test]
     fn the_thread_that_sends_waits_for_more_and_ends_when_it_is_closed() {
-        let outbox = Arc::new(SendQueue::default());
-        let (told, heard) = mpsc::channel();
+        let queue = Arc::new(SendQueue::default());
+        let (sent, heard) = mpsc::channel();
         let sending = std::thread::spawn({
-            let outbox = outbox.clone();
-            move || outbox.send(|_| Sent::Done)
+            let queue = queue.clone();
+            move || queue.send(|_| Sent::Done)
         });
         for number in [1, 2] {
-            let told = told.clone();
-            outbox.answer(Box::new(move || told.send(number).unwrap()));
+            let sent = sent.clone();
+            queue.answer(Box::new(move || sent.send(number).unwrap()));
             assert_eq!(heard.recv(), Ok(number));
         }
-        outbox.close();
+        queue.close();
         sending.join().unwrap();
     }
 }

@@ -69,7 +69,7 @@ pub(super) trait Subscribes<M> {
     /// why not
     type Error;
 
-    /// Hands what comes over.
+    /// Listens: what comes goes to the inbox of the node.
     fn subscribe(&mut self, topic: Topic, arrival: fn(&Exchange, M) -> Arrival) -> Result<(), Self::Error>;
 }
 

@@ -173,7 +173,7 @@ impl ProbeAction {
         }
         self.later(move |probe| {
             report("send_goal", probe.server.send_goal_response(request_id, SendGoalResponse { accepted, stamp }));
-            probe.tell_status();
+            probe.publish_status();
         });
     }
 
@@ -195,7 +195,7 @@ impl ProbeAction {
             for request_id in waiting {
                 probe.send_result(request_id, status, response.clone());
             }
-            probe.tell_status();
+            probe.publish_status();
         });
     }
 
@@ -222,11 +222,11 @@ impl ProbeAction {
         let response = self.goals().cancel(wanted(request));
         self.later(move |probe| {
             report("cancel_goal", probe.server.send_cancel_response(request_id, response));
-            probe.tell_status();
+            probe.publish_status();
         });
     }
 
-    fn tell_status(&self) {
+    fn publish_status(&self) {
         let status = |(id, known): (&GoalId, &KnownGoal)| GoalStatus {
             goal_info: GoalInfo { goal_id: *id, stamp: known.accepted },
             status: known.status,

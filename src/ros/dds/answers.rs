@@ -43,14 +43,14 @@ pub(super) struct Room {
     /// whether answers of services have to fit into one
     is_for_services: bool,
     /// services of which the log has it
-    told: Mutex<BTreeSet<&'static str>>,
+    logged: Mutex<BTreeSet<&'static str>>,
 }
 
 impl Room {
     /// That of the networks of this computer.
     pub fn new(mapping: &ServiceMapping) -> Self {
         let is_for_services = *mapping != ServiceMapping::Cyclone;
-        Self { most: room(smallest_packet()), is_for_services, told: Mutex::default() }
+        Self { most: room(smallest_packet()), is_for_services, logged: Mutex::default() }
     }
 
     /// The answer of a service, or what of it there is room for.
@@ -65,7 +65,7 @@ impl Room {
             return answer;
         }
         // nothing of ours panics while it holds it
-        if self.told.lock().unwrap_or_else(PoisonError::into_inner).insert(service) {
+        if self.logged.lock().unwrap_or_else(PoisonError::into_inner).insert(service) {
             tracing::warn!(service, bytes, most = self.most, "{TOO_LARGE}");
         }
         answer.reduce(self.most);
@@ -82,7 +82,7 @@ pub(super) fn room(packet: usize) -> usize {
     packet.saturating_sub(HEADERS)
 }
 
-/// Of all networks that are up now, as Linux tells it; elsewhere that of Ethernet.
+/// Of all networks that are up now, as Linux has it; elsewhere that of Ethernet.
 fn smallest_packet() -> usize {
     let read = |path: std::path::PathBuf| fs::read_to_string(path).map(|text| text.trim().to_owned()).ok();
     let devices = fs::read_dir("/sys/class/net").into_iter().flatten().flatten();

@@ -46,7 +46,7 @@ pub(super) struct DdsGraph {
     /// of the other participants
     vendors: BTreeMap<GUID, [u8; 2]>,
     /// said once for each
-    told: BTreeSet<GUID>,
+    reported: BTreeSet<GUID>,
     /// what sends tiles
     tiles: Option<GUID>,
 }
@@ -70,7 +70,7 @@ impl DdsGraph {
             matched: BTreeMap::new(),
             callers: BTreeMap::new(),
             vendors: BTreeMap::new(),
-            told: BTreeSet::new(),
+            reported: BTreeSet::new(),
             tiles: None,
         }
     }
@@ -108,7 +108,7 @@ impl DdsGraph {
                 }
                 self.vendors.retain(|guid, _| guid.prefix != id);
                 self.callers.retain(|guid, _| guid.prefix != id);
-                self.told.retain(|guid| guid.prefix != id);
+                self.reported.retain(|guid| guid.prefix != id);
                 self.unmatch(|guid| guid.prefix == id);
             }
             Event::ReaderDetected { reader: other } | Event::WriterDetected { writer: other } => {
@@ -118,7 +118,7 @@ impl DdsGraph {
             | Event::RemoteWriterMatched { local_reader: local, remote_writer: remote } => {
                 let is_new = self.matched.get_mut(&local).is_some_and(|(_, others)| others.insert(remote));
                 if is_new {
-                    self.tell(local, None);
+                    self.report(local, None);
                 }
                 if is_new && self.tiles == Some(local) {
                     self.exchange.arrivals.put(Arrival::Viewer);
@@ -139,7 +139,7 @@ impl DdsGraph {
     }
 
     fn lost(&mut self, guid: GUID) {
-        self.told.remove(&guid);
+        self.reported.remove(&guid);
         self.callers.remove(&guid);
         self.unmatch(|other| *other == guid);
     }
@@ -153,12 +153,12 @@ impl DdsGraph {
                 fewer.push(*local);
             }
         }
-        fewer.into_iter().for_each(|local| self.tell(local, None));
+        fewer.into_iter().for_each(|local| self.report(local, None));
     }
 
     fn misfit(&mut self, local: GUID, remote: GUID, wanted: &QosPolicies, offered: &QosPolicies, who: &str) {
-        if self.told.insert(remote) {
-            self.tell(local, Some(format!("{who} does not fit: {}", difference(wanted, offered))));
+        if self.reported.insert(remote) {
+            self.report(local, Some(format!("{who} does not fit: {}", difference(wanted, offered))));
         }
     }
 
@@ -177,7 +177,7 @@ impl DdsGraph {
             }
         }
         if let Some((name, ours)) = self.names.get(topic) {
-            if ours != type_name && self.told.insert(guid) {
+            if ours != type_name && self.reported.insert(guid) {
                 let reason = format!("somebody has it with the type {type_name}, here it is {ours}");
                 let (name, count) = (name.clone(), self.count(topic));
                 graph::report(&self.exchange.arrivals, name, count, Some(reason));
@@ -191,7 +191,7 @@ impl DdsGraph {
             _ => return,
         };
         let Some(service) = topic.strip_prefix("rq").and_then(|topic| topic.strip_suffix("Request")) else { return };
-        if self.services.iter().any(|own| own == service) && wants != self.mapping && self.told.insert(guid) {
+        if self.services.iter().any(|own| own == service) && wants != self.mapping && self.reported.insert(guid) {
             let right = if wants == ServiceMapping::Cyclone { "cyclone" } else { "enhanced" };
             let reason = format!(
                 "somebody who calls it has another header: start this node with -p service_mapping:={right}, or all with one RMW"
@@ -204,7 +204,7 @@ impl DdsGraph {
         self.matched.values().filter(|(name, _)| name == topic).map(|(_, others)| others.len()).sum()
     }
 
-    fn tell(&self, local: GUID, mismatch: Option<String>) {
+    fn report(&self, local: GUID, mismatch: Option<String>) {
         let Some((topic, others)) = self.matched.get(&local) else { return };
         let name = self.names.get(topic).map_or_else(|| topic.clone(), |(name, _)| name.clone());
         graph::report(&self.exchange.arrivals, name, others.len(), mismatch);

@@ -335,7 +335,7 @@ mod tests {
         }
     }
 
-    /// One that is looked at twice a second, and the port that it hands over to.
+    /// One that is looked at twice a second, and the port that it forwards to.
     struct WatchedPeer {
         keep_alive: KeepAlive,
         own: UdpSocket,

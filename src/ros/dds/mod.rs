@@ -1,7 +1,7 @@
 //! The port on its own DDS: ros2-client over RustDDS, no ROS installation needed.
 //!
-//! Three threads of ours stand beside those of DDS. One takes what comes and hands it to the node. Two send: one what is
-//! small and urgent, answers among it; one the mesh, where a slow listener may hold things up.
+//! Three threads of ours stand beside those of DDS. One takes what comes and puts it into the inbox of the node. Two
+//! send: one what is small and urgent, answers among it; one the mesh, where a slow listener may hold things up.
 
 mod action;
 mod answers;
@@ -114,7 +114,7 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
     Ok(Arc::new(Joined { exchange, _connection: connection }))
 }
 
-/// Tells ros2-client the values, so that it announces their changes on `/parameter_events`.
+/// Declares the values to ros2-client, so that it announces their changes on `/parameter_events`.
 fn declare(options: NodeOptions, parameters: &Parameters) -> NodeOptions {
     PARAMETERS.iter().fold(options, |options, declared| {
         let value = parameters.value(declared.name).cloned().unwrap_or(declared.default_value());

@@ -45,8 +45,8 @@ impl RefinementWorker {
                 Ok(flag) => self.send_flag(flag, Some(reply)),
                 Err(message) => reply.send(FlagFeatureResponse { success: false, message, id: 0 }),
             },
-            Call::Unflag(request, reply) => self.ask_seeker(FeatureInput::Unflag(request.id, reply)),
-            Call::Detect(request, reply) => self.ask_seeker(FeatureInput::Detect(request, reply)),
+            Call::Unflag(request, reply) => self.ask_features(FeatureInput::Unflag(request.id, reply)),
+            Call::Detect(request, reply) => self.ask_features(FeatureInput::Detect(request, reply)),
             Call::Save(request, reply) => self.save(request, reply),
             Call::Resync(_, reply) => self.resync(reply),
             Call::Undo(request, reply) => reply.send(self.change_strokes(&request, true)),
@@ -69,8 +69,8 @@ impl RefinementWorker {
         }
     }
 
-    fn ask_seeker(&self, input: FeatureInput) {
-        if let Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) = self.seeker.try_send(input) {
+    fn ask_features(&self, input: FeatureInput) {
+        if let Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) = self.features.try_send(input) {
             warn!("a call about features found no room: its caller gets no answer");
         }
     }
@@ -89,19 +89,19 @@ impl RefinementWorker {
         self.setup.shared.parameters().double("flag_radius_mm") / 1e3
     }
 
-    fn point_in_object(&self, told: &PointStamped) -> Result<Point3<f64>, String> {
-        let stamp_ns = match stamp_ns(&told.header.stamp).ok_or("the stamp of the point is no time")? {
+    fn point_in_object(&self, clicked: &PointStamped) -> Result<Point3<f64>, String> {
+        let stamp_ns = match stamp_ns(&clicked.header.stamp).ok_or("the stamp of the point is no time")? {
             0 => self.last_ns.unwrap_or_else(|| self.port.now_ns()),
             stamp_ns => stamp_ns,
         };
-        let frame = self.placer.object_from(&told.header.frame_id, stamp_ns).map_err(|why| why.to_string())?;
-        let point = frame * Point3::new(told.point.x, told.point.y, told.point.z);
+        let frame = self.resolver.object_from(&clicked.header.frame_id, stamp_ns).map_err(|why| why.to_string())?;
+        let point = frame * Point3::new(clicked.point.x, clicked.point.y, clicked.point.z);
         let is_sound = point.coords.iter().all(|x| x.abs() <= crate::touch::LARGEST_POSITION);
         is_sound.then_some(point).ok_or_else(|| "the point is not finite, or absurdly far".to_owned())
     }
 
     fn send_flag(&self, flag: FlaggedPlace, reply: Option<Reply<FlagFeatureResponse>>) {
-        self.ask_seeker(FeatureInput::Flag(flag, reply));
+        self.ask_features(FeatureInput::Flag(flag, reply));
     }
 
     /// RViz's Publish Point.
@@ -112,7 +112,7 @@ impl RefinementWorker {
             Ok(point) => self.send_flag(FlaggedPlace { kind: kind as u8, point, radius: self.flag_radius() }, None),
             Err(why) => {
                 warn!(why, "a clicked point was not taken");
-                self.tally.refuse("clicked_point");
+                self.counters.refuse("clicked_point");
             }
         }
     }
@@ -123,7 +123,7 @@ impl RefinementWorker {
         reply.send(ResyncMeshResponse {
             success: sent,
             message: message.to_owned(),
-            session: self.sitting.folder.name().to_owned(),
+            session: self.session.folder.name().to_owned(),
             version: self.version,
         });
     }
@@ -132,7 +132,7 @@ impl RefinementWorker {
         let wanted = request.strokes.clamp(1, MOST_STROKES);
         let (mut strokes, mut why) = (0, None);
         while strokes < wanted {
-            let engine = &mut self.sitting.engine;
+            let engine = &mut self.session.engine;
             let changed = if is_undo { engine.undo() } else { engine.redo() };
             match changed {
                 Ok(true) => strokes += 1,
@@ -143,7 +143,7 @@ impl RefinementWorker {
                 }
             }
             let change = StrokeChange { after_ns: self.last_ns.unwrap_or(i64::MIN), is_undo };
-            if let Err(error) = self.sitting.recorder.write_stroke(change) {
+            if let Err(error) = self.session.recorder.write_stroke(change) {
                 warn!(%error, "after a crash this stroke would be as it was");
             }
         }
@@ -171,7 +171,7 @@ impl RefinementWorker {
         self.finish_samples();
         let report = self.report();
         let name = next.folder.name().to_owned();
-        let before = std::mem::replace(&mut self.sitting, next);
+        let before = std::mem::replace(&mut self.session, next);
         let setup = Arc::clone(&self.setup);
         let end = move || {
             if let Err(error) = before.end(&setup, report) {
@@ -185,7 +185,7 @@ impl RefinementWorker {
         // both take these however much they have to do
         let _ = self.view.send(ViewInput::Session(replica));
         self.setup.shared.mesh.announce_session();
-        let _ = self.seeker.send(FeatureInput::Session(name.clone()));
+        let _ = self.features.send(FeatureInput::Session(name.clone()));
         Ok(name)
     }
 
@@ -202,15 +202,15 @@ impl RefinementWorker {
             let message = format!("{MOST_SAVING} meshes are being saved: save again when they are done");
             return reply.send(SaveMeshResponse { message, ..Default::default() });
         }
-        let places = match SavedFiles::of(&self.sitting.folder, &request) {
+        let places = match SavedFiles::of(&self.session.folder, &request) {
             Ok(places) => places,
             Err(message) => return reply.send(SaveMeshResponse { message, ..Default::default() }),
         };
-        let patcher = match self.sitting.engine.copy_patcher() {
+        let patcher = match self.session.engine.copy_patcher() {
             Ok(patcher) => patcher,
             Err(error) => return reply.send(SaveMeshResponse { message: error.to_string(), ..Default::default() }),
         };
-        self.show_edits();
+        self.send_edits();
         let snapshot = self.setup.shared.mesh.complete();
         let (setup, version) = (Arc::clone(&self.setup), self.version);
         let work = move || {
@@ -224,11 +224,11 @@ impl RefinementWorker {
         }
     }
 
-    /// Hands an order on to the arm, or answers why it is not taken up.
+    /// Passes an order to the arm, or answers why it is not taken up.
     fn order_arm(&self, input: ArmInput) {
         let (code, why, input) = match &self.arm {
             None => (ProbeResult::NO_ARM, NO_ARM.to_owned(), input),
-            Some(arm) => match arm.order(input, self.sitting.folder.path()) {
+            Some(arm) => match arm.order(input, self.session.folder.path()) {
                 Ok(()) => return,
                 Err((input, code, why)) => (code, why, *input),
             },
@@ -242,7 +242,7 @@ impl RefinementWorker {
         self.mismatch_rate_hz = parameters.double("mismatch_rate_hz");
         self.arm.iter().for_each(|arm| arm.allow_motion(parameters.bool("allow_motion")));
         self.setup.shared.set_parameters(parameters);
-        self.setup.shared.show(&self.view, ViewInput::Parameters);
+        self.setup.shared.offer(&self.view, ViewInput::Parameters);
         Ok(())
     }
 

@@ -17,7 +17,7 @@ use crate::ros::messages::{
 };
 use crate::ros::port::Reply;
 
-/// What the view is told.
+/// What goes to the view.
 pub enum ViewInput {
     /// the mesh changed
     Edits(Box<Edits>),
@@ -50,7 +50,7 @@ pub struct LastTip {
     pub closest: Option<(Point3<f64>, f64)>,
 }
 
-/// What the thread is told.
+/// What goes to the feature worker.
 pub enum FeatureInput {
     /// touches came or went
     Probed(TouchDelta),

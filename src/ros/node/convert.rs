@@ -22,7 +22,7 @@ pub fn time(stamp_ns: i64) -> Time {
     Time { sec: sec as i32, nanosec: stamp_ns.rem_euclid(NS_PER_S) as u32 }
 }
 
-/// Header of what is told in `frame`.
+/// Header of what is published in `frame`.
 pub fn header(stamp_ns: i64, frame: &str) -> Header {
     Header { stamp: time(stamp_ns), frame_id: frame.to_owned() }
 }

@@ -42,7 +42,7 @@ impl RefinementWorker {
         if let Some(fault) = &self.fault {
             return said(DiagnosticStatus::ERROR, format!("stopped: {fault}"));
         }
-        if let Unrecorded { reason: Some(reason), is_refused: true, .. } = self.sitting.recorder.unrecorded() {
+        if let Unrecorded { reason: Some(reason), is_refused: true, .. } = self.session.recorder.unrecorded() {
             let words = format!("does not record, make room on the disk and it goes on: {reason}");
             return said(DiagnosticStatus::ERROR, words);
         }
@@ -80,11 +80,11 @@ impl RefinementWorker {
             clock_jumps: self.clock_jumps(),
             push_ns: self.pushes.quantiles(),
             latency_ns: self.latencies.quantiles(),
-            ..self.sitting.report(&self.setup, &*self.port, &self.tally)
+            ..self.session.report(&self.setup, &*self.port, &self.counters)
         }
     }
 
-    pub(super) fn tell_diagnostics(&mut self) {
+    pub(super) fn publish_diagnostics(&mut self) {
         let StreamState { level, words } = self.state();
         let report = self.report();
         let stamp_ns = self.port.now_ns();
@@ -103,14 +103,14 @@ impl RefinementWorker {
             values: self.stream_numbers(&report),
         };
         let message = DiagnosticArray { header: header(stamp_ns, ""), status: vec![status, streams] };
-        self.setup.shared.show(&self.view, ViewInput::Diagnostics(Box::new(message)));
+        self.setup.shared.offer(&self.view, ViewInput::Diagnostics(Box::new(message)));
     }
 
     fn numbers(&self, report: &SessionReport) -> Vec<KeyValue> {
         let Quantiles { median, p99, max, .. } = report.push_ns;
         let latency = report.latency_ns;
         let us = |ns: u64| format!("{:.1}", ns as f64 * 1e-3);
-        let unrecorded = self.sitting.recorder.unrecorded();
+        let unrecorded = self.session.recorder.unrecorded();
         let shared = &self.setup.shared;
         let mut values = vec![
             value("session", report.session.clone()),
@@ -162,12 +162,12 @@ impl RefinementWorker {
     /// Ends the session and what still ends of those before.
     pub(super) fn end(mut self) -> Result<NodeEnd, NodeError> {
         self.finish_samples();
-        self.show_edits();
+        self.send_edits();
         let report = self.report();
-        let folder = self.sitting.folder.path().to_owned();
-        let Self { setup, sitting, side_work, .. } = self;
+        let folder = self.session.folder.path().to_owned();
+        let Self { setup, session, side_work, .. } = self;
         side_work.finish();
-        Ok(NodeEnd { folder, report: sitting.end(&setup, report)? })
+        Ok(NodeEnd { folder, report: session.end(&setup, report)? })
     }
 }
 

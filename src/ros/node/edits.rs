@@ -1,4 +1,4 @@
-//! Changes of the mesh on their way from the thread that makes them to the one that shows them.
+//! Changes of the mesh on their way from the thread that makes them to the one that publishes them.
 //!
 //! Two of them go round, each bounded. When both are on their way, what changes stays in the mesh's journal, which is bounded
 //! by the mesh: the view can be as slow as it likes.
@@ -70,7 +70,7 @@ impl Edits {
         (self.version, self.stamp_ns) = (version, stamp_ns);
     }
 
-    /// Whether it tells nothing.
+    /// Whether nothing has changed.
     pub fn is_empty(&self) -> bool {
         self.vertices.is_empty() && self.faces.is_empty()
     }

@@ -54,7 +54,7 @@ pub struct FeatureWorker {
     looked_at: Instant,
     changed_at: Instant,
     seen_version: u64,
-    has_news: bool,
+    has_changes: bool,
     published_at: Option<Instant>,
 }
 
@@ -78,12 +78,12 @@ impl FeatureWorker {
             looked_at: now,
             changed_at: now,
             seen_version: 0,
-            has_news: true,
+            has_changes: true,
             published_at: None,
         }
     }
 
-    /// Runs until nobody tells anything any more.
+    /// Runs until nobody sends anything any more.
     pub fn run(mut self, inputs: &Receiver<FeatureInput>) {
         loop {
             let period = Duration::from_secs_f64(1.0 / self.shared.parameters().double("features_rate_hz"));
@@ -100,8 +100,8 @@ impl FeatureWorker {
                 // a mesh that cannot be had now is asked for again
                 let _ = self.look();
             }
-            if self.has_news && self.published_at.is_none_or(|at| self.clock.since(at) >= period) {
-                (self.has_news, self.published_at) = (false, Some(self.clock.now()));
+            if self.has_changes && self.published_at.is_none_or(|at| self.clock.since(at) >= period) {
+                (self.has_changes, self.published_at) = (false, Some(self.clock.now()));
                 self.publish();
             }
         }
@@ -109,9 +109,9 @@ impl FeatureWorker {
 
     fn take(&mut self, input: FeatureInput) {
         match input {
-            FeatureInput::Probed(news) => {
-                news.apply_to(&mut self.touches);
-                self.has_news |= !self.tracker.update(&self.touches).is_empty();
+            FeatureInput::Probed(changes) => {
+                changes.apply_to(&mut self.touches);
+                self.has_changes |= !self.tracker.update(&self.touches).is_empty();
             }
             FeatureInput::Session(session) => {
                 *self = Self::new(self.clock.clone(), Arc::clone(&self.shared), self.view.clone(), session);
@@ -134,13 +134,13 @@ impl FeatureWorker {
                 // another session knows nothing of it
                 if measured.session == self.session {
                     self.measured.insert(measured.id, *measured);
-                    self.has_news = true;
+                    self.has_changes = true;
                 }
             }
             FeatureInput::Detect(request, reply) => {
                 let looked = self.look();
-                // on its way before who asked is told to look there
-                (self.has_news, self.published_at) = (false, Some(Instant::now()));
+                // on its way before the answer names its version
+                (self.has_changes, self.published_at) = (false, Some(Instant::now()));
                 self.publish();
                 reply.send(self.answer(&request, looked));
             }
@@ -176,7 +176,7 @@ impl FeatureWorker {
         self.tracker.renew(&mesh, &FaceTree::new(&mesh), &self.touches);
         self.name_found_flags();
         let now = self.clock.now();
-        (self.look_took, self.looked_at, self.has_news) = (now.saturating_duration_since(started), now, true);
+        (self.look_took, self.looked_at, self.has_changes) = (now.saturating_duration_since(started), now, true);
         Ok(())
     }
 
@@ -219,7 +219,7 @@ impl FeatureWorker {
         let far = |feature: &&Feature| (feature.centre.value - flag.point).norm();
         let wanted = self.tracker.features().iter().filter(|_| flag.kind != FeatureMsg::KIND_UNKNOWN);
         let known = wanted.filter(|feature| Self::fits(&flag, feature)).min_by(|a, b| far(a).total_cmp(&far(b)));
-        self.has_news = true;
+        self.has_changes = true;
         if let Some(id) = known.map(|feature| self.name_of(feature)) {
             self.radii.insert(id, flag.radius);
             return FlagFeatureResponse { success: true, message: format!("flagged {kind} {id}, known before"), id };
@@ -233,7 +233,7 @@ impl FeatureWorker {
 
     fn unflag(&mut self, id: u32) -> (bool, String) {
         let (was_place, was_found) = (self.flags.remove(&id).is_some(), self.radii.remove(&id).is_some());
-        self.has_news |= was_place || was_found;
+        self.has_changes |= was_place || was_found;
         match (was_place, was_found) {
             (true, _) => (true, format!("took flag {id} back")),
             (_, true) => (true, format!("took the flag of {id} back; the feature stays")),
@@ -279,13 +279,13 @@ impl FeatureWorker {
             return DetectFeaturesResponse { message, mesh_version, ..Default::default() };
         }
         features.retain(|feature| request.kinds.is_empty() || request.kinds.contains(&feature.kind));
-        let told = KIND_NAMES.iter().zip(0u8..).filter_map(|(name, kind)| {
+        let counts = KIND_NAMES.iter().zip(0u8..).filter_map(|(name, kind)| {
             let is_such = |f: &&FeatureMsg| f.kind == kind && f.status != FeatureMsg::STATUS_FLAGGED;
             let count = features.iter().filter(is_such).count();
             (count > 0).then(|| format!("{count} {name}{}", if count == 1 { "" } else { "s" }))
         });
-        let told: Vec<_> = told.collect();
-        let message = if told.is_empty() { "nothing found".to_owned() } else { told.join(", ") };
+        let counts: Vec<_> = counts.collect();
+        let message = if counts.is_empty() { "nothing found".to_owned() } else { counts.join(", ") };
         DetectFeaturesResponse {
             success: true,
             message,
@@ -309,10 +309,10 @@ impl FeatureWorker {
             Some(FeatureMsg { status: FeatureMsg::STATUS_PROBED, ..found(feature, id, radius) })
         };
         // what an arm has measured is better than what the mesh shows
-        let mut features: Vec<_> = known.chain(places).map(|told| measured(told.id).unwrap_or(told)).collect();
+        let mut features: Vec<_> = known.chain(places).map(|one| measured(one.id).unwrap_or(one)).collect();
         // also one that is flagged no longer
-        let is_told = |id: &&u32| features.iter().any(|told| told.id == **id);
-        let others: Vec<_> = self.measured.keys().filter(|id| !is_told(id)).filter_map(|&id| measured(id)).collect();
+        let is_listed = |id: &&u32| features.iter().any(|one| one.id == **id);
+        let others: Vec<_> = self.measured.keys().filter(|id| !is_listed(id)).filter_map(|&id| measured(id)).collect();
         features.extend(others);
         features.sort_by_key(|feature| feature.id);
         FeatureArray {

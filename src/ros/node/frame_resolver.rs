@@ -105,10 +105,10 @@ impl FrameResolver {
 
     /// # Errors
     /// [`Refusal`]
-    pub fn pose(&self, told: &PoseStamped) -> Result<Message, Refusal> {
-        let stamp_ns = stamp_ns(&told.header.stamp).ok_or(Refusal::Stamp)?;
-        let mut pose_ot = isometry(&told.pose).ok_or(Refusal::Quaternion)?;
-        if let Some(frame) = self.recorded_from(&told.header.frame_id, stamp_ns)? {
+    pub fn pose(&self, stamped: &PoseStamped) -> Result<Message, Refusal> {
+        let stamp_ns = stamp_ns(&stamped.header.stamp).ok_or(Refusal::Stamp)?;
+        let mut pose_ot = isometry(&stamped.pose).ok_or(Refusal::Quaternion)?;
+        if let Some(frame) = self.recorded_from(&stamped.header.frame_id, stamp_ns)? {
             pose_ot = frame * pose_ot;
         }
         Ok(Message::Pose(StampedPose { stamp_ns, pose_ot }))
@@ -116,10 +116,10 @@ impl FrameResolver {
 
     /// # Errors
     /// [`Refusal`]
-    pub fn wrench(&mut self, told: &WrenchStamped) -> Result<Message, Refusal> {
-        let stamp_ns = stamp_ns(&told.header.stamp).ok_or(Refusal::Stamp)?;
-        let wrench = Wrench { force: vector_of(&told.wrench.force), torque: vector_of(&told.wrench.torque) };
-        let (axes, wrench) = self.turned(&told.header.frame_id, stamp_ns, wrench)?;
+    pub fn wrench(&mut self, stamped: &WrenchStamped) -> Result<Message, Refusal> {
+        let stamp_ns = stamp_ns(&stamped.header.stamp).ok_or(Refusal::Stamp)?;
+        let wrench = Wrench { force: vector_of(&stamped.wrench.force), torque: vector_of(&stamped.wrench.torque) };
+        let (axes, wrench) = self.turned(&stamped.header.frame_id, stamp_ns, wrench)?;
         if *self.axes.get_or_insert(axes) != axes {
             return Err(Refusal::AxesChanged);
         }
@@ -206,9 +206,9 @@ mod tests {
         WrenchStamped { header: header(frame), wrench: W { force, torque: V::default() } }
     }
 
-    fn placer(placement: Option<Placement>) -> FrameResolver {
+    fn resolver(placement: Option<Placement>) -> FrameResolver {
         let names = FrameNames { object: "object".into(), tool: "stylus".into(), sensor: "stylus_sensor".into() };
-        let mut placer = FrameResolver::new(names, placement);
+        let mut resolver = FrameResolver::new(names, placement);
         // a quarter turn about z, 1 m along x
         let half = std::f64::consts::FRAC_1_SQRT_2;
         let transform = Transform {
@@ -216,10 +216,10 @@ mod tests {
             rotation: Quaternion { x: 0.0, y: 0.0, z: half, w: half },
         };
         for (parent, child) in [("object", "base"), ("stylus_sensor", "gauge")] {
-            let told = TransformStamped { header: header(parent), child_frame_id: child.to_owned(), transform };
-            assert!(placer.frames.insert(&told, true));
+            let stamped = TransformStamped { header: header(parent), child_frame_id: child.to_owned(), transform };
+            assert!(resolver.frames.insert(&stamped, true));
         }
-        placer
+        resolver
     }
 
     fn position(message: Message) -> Vector3<f64> {
@@ -235,41 +235,41 @@ mod tests {
     /// Worked by hand.
     #[test]
     fn poses_come_into_the_frame_of_the_object() {
-        let placer = placer(None);
-        assert_eq!(position(placer.pose(&pose("object")).unwrap()), vector![1.0, 2.0, 3.0]);
-        assert_eq!(position(placer.pose(&pose("cell")).unwrap()), vector![1.0, 2.0, 3.0]);
-        let turned = position(placer.pose(&pose("/base")).unwrap());
+        let resolver = resolver(None);
+        assert_eq!(position(resolver.pose(&pose("object")).unwrap()), vector![1.0, 2.0, 3.0]);
+        assert_eq!(position(resolver.pose(&pose("cell")).unwrap()), vector![1.0, 2.0, 3.0]);
+        let turned = position(resolver.pose(&pose("/base")).unwrap());
         assert!((turned - vector![-1.0, 1.0, 3.0]).norm() < 1e-12, "{turned}");
-        assert_eq!(placer.pose(&pose("")).unwrap_err(), Refusal::NoFrame);
-        assert_eq!(placer.pose(&pose("nowhere")).unwrap_err().name(), "unknown_frame");
+        assert_eq!(resolver.pose(&pose("")).unwrap_err(), Refusal::NoFrame);
+        assert_eq!(resolver.pose(&pose("nowhere")).unwrap_err().name(), "unknown_frame");
         let mut bad = pose("object");
         bad.pose.orientation.w = 0.0;
-        assert_eq!(placer.pose(&bad).unwrap_err(), Refusal::Quaternion);
+        assert_eq!(resolver.pose(&bad).unwrap_err(), Refusal::Quaternion);
         bad.header.stamp.nanosec = 1_000_000_000;
-        assert_eq!(placer.pose(&bad).unwrap_err(), Refusal::Stamp);
+        assert_eq!(resolver.pose(&bad).unwrap_err(), Refusal::Stamp);
     }
 
     #[test]
     fn with_scan_to_space_they_come_into_the_cell() {
         let pose_wo = Some(Isometry3::translation(10.0, 0.0, 0.0));
-        let placer = placer(Some(Placement { pose_wo, p_ht: None }));
-        assert_eq!(placer.recorded_frame(), "cell");
-        assert_eq!(position(placer.pose(&pose("cell")).unwrap()), vector![1.0, 2.0, 3.0], "bit by bit");
-        assert_eq!(position(placer.pose(&pose("object")).unwrap()), vector![11.0, 2.0, 3.0]);
-        let placed = placer.placed(placer.pose(&pose("base")).unwrap());
+        let resolver = resolver(Some(Placement { pose_wo, p_ht: None }));
+        assert_eq!(resolver.recorded_frame(), "cell");
+        assert_eq!(position(resolver.pose(&pose("cell")).unwrap()), vector![1.0, 2.0, 3.0], "bit by bit");
+        assert_eq!(position(resolver.pose(&pose("object")).unwrap()), vector![11.0, 2.0, 3.0]);
+        let placed = resolver.placed(resolver.pose(&pose("base")).unwrap());
         assert!((position(placed) - vector![-1.0, 1.0, 3.0]).norm() < 1e-12);
-        assert_eq!(placer.object_from("cell", 0).unwrap().translation.vector.x, -10.0);
+        assert_eq!(resolver.object_from("cell", 0).unwrap().translation.vector.x, -10.0);
     }
 
     #[test]
     fn wrenches_come_into_the_axes_of_the_sensor_or_of_the_object() {
-        let mut of_sensor = placer(None);
+        let mut of_sensor = resolver(None);
         assert_eq!(force(of_sensor.wrench(&wrench("stylus")).unwrap()), Vector3::x());
         assert_eq!(force(of_sensor.wrench(&wrench("stylus_sensor")).unwrap()), Vector3::x());
         assert!((force(of_sensor.wrench(&wrench("gauge")).unwrap()) - Vector3::y()).norm() < 1e-12);
         assert_eq!(of_sensor.axes(), Some(WrenchFrame::Sensor));
         assert_eq!(of_sensor.wrench(&wrench("object")).unwrap_err(), Refusal::AxesChanged);
-        let mut of_object = placer(None);
+        let mut of_object = resolver(None);
         assert!((force(of_object.wrench(&wrench("base")).unwrap()) - Vector3::y()).norm() < 1e-12);
         assert_eq!(force(of_object.wrench(&wrench("object")).unwrap()), Vector3::x());
         assert_eq!(of_object.axes(), Some(WrenchFrame::Object));

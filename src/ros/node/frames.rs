@@ -1,4 +1,4 @@
-//! Where frames are, as `/tf` and `/tf_static` tell it, at any moment of the last seconds.
+//! Where frames are, as `/tf` and `/tf_static` publish it, at any moment of the last seconds.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -19,7 +19,7 @@ const LONGEST_NAME: usize = 256;
 /// Why two frames are not connected.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FrameError {
-    /// Nobody has told of this frame.
+    /// No transform of this frame has come.
     #[error("frame \"{0}\" is not known: is its transform published?")]
     Unknown(String),
     /// Both are known, and nothing joins them.
@@ -63,11 +63,11 @@ pub fn plain_name(name: &str) -> &str {
 
 impl FrameBuffer {
     /// Takes a transform; whether it was one that can be.
-    pub fn insert(&mut self, told: &TransformStamped, is_static: bool) -> bool {
-        let (parent, child) = (plain_name(&told.header.frame_id), plain_name(&told.child_frame_id));
+    pub fn insert(&mut self, stamped: &TransformStamped, is_static: bool) -> bool {
+        let (parent, child) = (plain_name(&stamped.header.frame_id), plain_name(&stamped.child_frame_id));
         let is_name = |name: &str| !name.is_empty() && name.len() <= LONGEST_NAME;
         let is_room = self.links.len() < MOST_FRAMES || self.links.contains_key(child);
-        let (Some(pose), Some(stamp)) = (transform(&told.transform), stamp_ns(&told.header.stamp)) else {
+        let (Some(pose), Some(stamp)) = (transform(&stamped.transform), stamp_ns(&stamped.header.stamp)) else {
             return false;
         };
         if !is_name(parent) || !is_name(child) || parent == child || !is_room {
@@ -108,7 +108,7 @@ impl FrameBuffer {
         Ok(self.climbed(&target[..down], stamp_ns)?.inv_mul(&self.climbed(&source[..up], stamp_ns)?))
     }
 
-    /// A frame that is told of, as a child or as a parent.
+    /// A frame of which a transform has come, as a child or as a parent.
     fn is_known(&self, name: &str) -> bool {
         self.links.contains_key(name) || self.links.values().any(|link| link.parent == name)
     }
@@ -177,7 +177,7 @@ mod tests {
     use super::*;
     use crate::ros::messages::{Header, Quaternion, Time, Transform, Vector3 as Vector3Msg};
 
-    fn told(parent: &str, child: &str, sec: i32, x: f64, quarter_turns: f64) -> TransformStamped {
+    fn stamped(parent: &str, child: &str, sec: i32, x: f64, quarter_turns: f64) -> TransformStamped {
         let half = quarter_turns * std::f64::consts::FRAC_PI_4;
         TransformStamped {
             header: Header { stamp: Time { sec, nanosec: 0 }, frame_id: parent.to_owned() },
@@ -193,10 +193,10 @@ mod tests {
     #[test]
     fn a_moving_frame_is_between_its_poses() {
         let mut frames = FrameBuffer::default();
-        assert!(frames.insert(&told("cell", "arm", 10, 0.0, 0.0), false));
-        assert!(frames.insert(&told("/cell", "/arm", 12, 2.0, 1.0), false));
-        assert!(frames.insert(&told("arm", "tool", 0, 1.0, 0.0), true));
-        assert!(frames.insert(&told("cell", "object", 0, 5.0, 0.0), true));
+        assert!(frames.insert(&stamped("cell", "arm", 10, 0.0, 0.0), false));
+        assert!(frames.insert(&stamped("/cell", "/arm", 12, 2.0, 1.0), false));
+        assert!(frames.insert(&stamped("arm", "tool", 0, 1.0, 0.0), true));
+        assert!(frames.insert(&stamped("cell", "object", 0, 5.0, 0.0), true));
         let pose = frames.pose("object", "tool", 11_000_000_000).unwrap();
         let diagonal = std::f64::consts::FRAC_1_SQRT_2;
         assert!((pose.translation.vector - Vector3::new(1.0 + diagonal - 5.0, diagonal, 0.0)).norm() < 1e-12);
@@ -212,29 +212,29 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_connect_is_told() {
+    fn what_does_not_connect_is_named() {
         let mut frames = FrameBuffer::default();
-        frames.insert(&told("a", "b", 0, 0.0, 0.0), true);
-        frames.insert(&told("c", "d", 0, 0.0, 0.0), true);
+        frames.insert(&stamped("a", "b", 0, 0.0, 0.0), true);
+        frames.insert(&stamped("c", "d", 0, 0.0, 0.0), true);
         assert_eq!(frames.pose("a", "x", 0), Err(FrameError::Unknown("x".into())));
         assert_eq!(frames.pose("b", "d", 0), Err(FrameError::NotConnected("b".into(), "d".into())));
-        frames.insert(&told("b", "a", 0, 0.0, 0.0), true);
+        frames.insert(&stamped("b", "a", 0, 0.0, 0.0), true);
         assert!(matches!(frames.pose("c", "a", 0), Err(FrameError::Cycle(_))));
-        for bad in [told("a", "a", 0, 0.0, 0.0), told("", "a", 0, 0.0, 0.0), told("a", "b", -1, 0.0, 0.0)] {
+        for bad in [stamped("a", "a", 0, 0.0, 0.0), stamped("", "a", 0, 0.0, 0.0), stamped("a", "b", -1, 0.0, 0.0)] {
             assert!(!frames.insert(&bad, false));
         }
-        assert!(!frames.insert(&told("a", "b", 0, f64::NAN, 0.0), false));
+        assert!(!frames.insert(&stamped("a", "b", 0, f64::NAN, 0.0), false));
     }
 
     #[test]
     fn memory_is_bounded() {
         let mut frames = FrameBuffer::default();
         for sec in 0..100 {
-            frames.insert(&told("a", "b", sec, f64::from(sec), 0.0), false);
+            frames.insert(&stamped("a", "b", sec, f64::from(sec), 0.0), false);
         }
         assert!(matches!(frames.pose("a", "b", 88_000_000_000), Err(FrameError::TooEarly(_, 89_000_000_000, _))));
         for number in 0..5000 {
-            frames.insert(&told("a", &format!("f{number}"), 0, 0.0, 0.0), true);
+            frames.insert(&stamped("a", &format!("f{number}"), 0, 0.0, 0.0), true);
         }
         assert_eq!(frames.links.len(), MOST_FRAMES);
     }

@@ -1,8 +1,8 @@
 //! The node: wrench and pose in, the refined mesh and its features out.
 //!
-//! Five threads. `haptic` has the refiner and takes samples, `view` shows the mesh, `seeker` knows the features, `recorder`
-//! takes down what was accepted, `arm` moves one where there is one. Between them go bounded queues; where something must give, it is what is only for viewing,
-//! and it is counted.
+//! Five threads. `haptic` has the refiner and takes samples, `view` publishes the mesh, `features` finds and fits features,
+//! `recorder` writes down what was accepted, `arm` moves an arm where there is one. Between them are bounded queues; where one is
+//! full, what is only for viewing is dropped first, and it is counted.
 
 mod arm;
 mod calls;

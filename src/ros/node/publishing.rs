@@ -1,4 +1,4 @@
-//! What the thread of the samples tells the others: each mismatch, the place of the tip, changes of the mesh, touches.
+//! What the thread of the samples sends to the others: each mismatch, the place of the tip, changes of the mesh, touches.
 
 use std::sync::mpsc::TrySendError;
 use std::time::Duration;
@@ -25,15 +25,16 @@ impl RefinementWorker {
             return;
         }
         if let Err(
-            TrySendError::Full(FeatureInput::Probed(news)) | TrySendError::Disconnected(FeatureInput::Probed(news)),
-        ) = self.seeker.try_send(FeatureInput::Probed(std::mem::take(&mut self.probed)))
+            TrySendError::Full(FeatureInput::Probed(changes))
+            | TrySendError::Disconnected(FeatureInput::Probed(changes)),
+        ) = self.features.try_send(FeatureInput::Probed(std::mem::take(&mut self.probed)))
         {
-            self.probed = news;
+            self.probed = changes;
         }
     }
 
-    pub(super) fn show_mismatch(&mut self, update: &Update) {
-        let Some(tip) = self.sitting.engine.refiner().contact().map(|contact| contact.tip) else { return };
+    pub(super) fn publish_mismatch(&mut self, update: &Update) {
+        let Some(tip) = self.session.engine.refiner().contact().map(|contact| contact.tip) else { return };
         let rate_hz = self.mismatch_rate_hz;
         let is_due = rate_hz <= 0.0 || tip.stamp_ns.saturating_sub(self.mismatch_ns) as f64 * 1e-9 >= 1.0 / rate_hz;
         if !is_due {
@@ -65,16 +66,16 @@ impl RefinementWorker {
                 ..base
             },
         };
-        self.setup.shared.show(&self.view, ViewInput::Mismatch(message));
+        self.setup.shared.offer(&self.view, ViewInput::Mismatch(message));
         let now = self.setup.clock.now();
-        if now.saturating_duration_since(self.tip_shown) >= TIP_EVERY {
-            self.tip_shown = now;
-            self.show_tip(tip.stamp_ns, centre);
+        if now.saturating_duration_since(self.tip_published) >= TIP_EVERY {
+            self.tip_published = now;
+            self.publish_tip(tip.stamp_ns, centre);
         }
     }
 
-    fn show_tip(&self, stamp_ns: i64, centre: Point3<f64>) {
-        let refiner = self.sitting.engine.refiner();
+    fn publish_tip(&self, stamp_ns: i64, centre: Point3<f64>) {
+        let refiner = self.session.engine.refiner();
         let radius = self.setup.scene.tip_params().radius;
         let closest = refiner.closest_face(&centre, TIP_REACH).map(|hit| {
             let off: Vector3<f64> = centre - hit.point;
@@ -82,11 +83,11 @@ impl RefinementWorker {
             (hit.point, side * off.norm() - radius)
         });
         let tip = LastTip { stamp_ns, centre, radius, closest };
-        self.setup.shared.show(&self.view, ViewInput::Tip(tip));
+        self.setup.shared.offer(&self.view, ViewInput::Tip(tip));
     }
 
     /// Sends what changed in the mesh, as far as the view has taken up what was sent before.
-    pub(super) fn show_edits(&mut self) {
+    pub(super) fn send_edits(&mut self) {
         let is_idle = self.setup.clock.since(self.sampled) >= TORN_AFTER;
         while let Some(edits) = self.unsent.take().or_else(|| self.filled(is_idle)) {
             let complete = edits.is_complete.then_some(edits.version);
@@ -98,23 +99,23 @@ impl RefinementWorker {
         }
     }
 
-    /// The next changes, when one of those that go round is here and there is anything to tell.
+    /// The next changes, when one of those that go round is here and anything has changed.
     fn filled(&mut self, is_idle: bool) -> Option<Box<Edits>> {
-        let mesh = self.sitting.engine.refiner().mesh();
-        let is_told = self.sitting.told_version == self.version && self.sitting.told_edits == mesh.edits();
-        if is_told {
+        let mesh = self.session.engine.refiner().mesh();
+        let is_sent = self.session.sent_version == self.version && self.session.sent_edits == mesh.edits();
+        if is_sent {
             return None;
         }
         let mut edits = self.kept.take().or_else(|| self.spare.try_recv().ok())?;
-        let told_edits = mesh.edits();
+        let sent_edits = mesh.edits();
         let stamp_ns = self.last_ns.unwrap_or(0);
-        edits.fill(&mut self.sitting.engine, &self.setup.scan.0, self.version, stamp_ns, is_idle);
+        edits.fill(&mut self.session.engine, &self.setup.scan.0, self.version, stamp_ns, is_idle);
         if edits.is_empty() && !edits.is_complete {
             self.kept = Some(edits);
             return None;
         }
         if edits.is_complete {
-            (self.sitting.told_version, self.sitting.told_edits) = (self.version, told_edits);
+            (self.session.sent_version, self.session.sent_edits) = (self.version, sent_edits);
         }
         Some(edits)
     }

@@ -1,5 +1,5 @@
-//! The thread of the samples: frames, pairing, haptic update. It alone has the refiner, and does little else; what it tells
-//! the other threads is in `showing`.
+//! The thread of the samples: frames, pairing, haptic update. It alone has the refiner, and does little else; what it
+//! sends to the other threads is in `publishing.rs`.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::ControlFlow;
@@ -27,9 +27,9 @@ use crate::touch::{Message, Sample, SyncCounts, Synchroniser, WrenchFrame};
 /// The loop looks at the streams so often when nothing comes.
 const IDLE: Duration = Duration::from_millis(10);
 /// Changes of the mesh go to the view so often.
-const SHOW_EVERY: Duration = Duration::from_millis(5);
+const EDITS_EVERY: Duration = Duration::from_millis(5);
 /// Diagnostics come so often.
-const TELL_EVERY: Duration = Duration::from_secs(1);
+const DIAGNOSTICS_EVERY: Duration = Duration::from_secs(1);
 /// Without a sample for so long the streams rest: longer than a renewal is given, and than usual gaps between poses.
 const RESTS_AFTER: Duration = Duration::from_millis(50);
 /// Messages of a stream that wait for a transform at most.
@@ -53,7 +53,7 @@ pub struct RefinementWorker {
     pub(super) setup: Arc<Setup>,
     pub(super) port: Arc<dyn Port>,
     pub(super) view: SyncSender<ViewInput>,
-    pub(super) seeker: SyncSender<FeatureInput>,
+    pub(super) features: SyncSender<FeatureInput>,
     pub(super) spare: Receiver<Box<Edits>>,
     /// probes what it is asked for, where there is one
     pub(super) arm: Option<ArmHandle>,
@@ -61,8 +61,8 @@ pub struct RefinementWorker {
     pub(super) unsent: Option<Box<Edits>>,
     /// to be filled again
     pub(super) kept: Option<Box<Edits>>,
-    pub(super) placer: FrameResolver,
-    pub(super) sitting: NodeSession,
+    pub(super) resolver: FrameResolver,
+    pub(super) session: NodeSession,
     pub(super) sync: Synchroniser,
     epoch: Epoch,
     /// poses and wrenches that wait for a transform, with when they came
@@ -79,7 +79,7 @@ pub struct RefinementWorker {
     pub(super) endpoints: BTreeMap<String, Endpoint>,
     /// sessions that are being ended, and files that are being written
     pub(super) side_work: SideWork,
-    pub(super) tally: Counters,
+    pub(super) counters: Counters,
     pub(super) pushes: Latencies,
     /// from the arrival of what completed a sample to the mesh
     pub(super) latencies: Latencies,
@@ -88,11 +88,11 @@ pub struct RefinementWorker {
     edits: u64,
     pub(super) last_ns: Option<i64>,
     pub(super) sampled: Instant,
-    shown: Instant,
-    pub(super) tip_shown: Instant,
+    edits_sent: Instant,
+    pub(super) tip_published: Instant,
     pub(super) mismatch_ns: i64,
     pub(super) mismatch_rate_hz: f64,
-    told: Instant,
+    diagnosed: Instant,
 }
 
 impl RefinementWorker {
@@ -103,28 +103,28 @@ impl RefinementWorker {
     pub fn new(
         setup: Arc<Setup>,
         port: Arc<dyn Port>,
-        sitting: NodeSession,
+        session: NodeSession,
         view: SyncSender<ViewInput>,
-        seeker: SyncSender<FeatureInput>,
+        features: SyncSender<FeatureInput>,
         spare: Receiver<Box<Edits>>,
         arm: Option<ArmHandle>,
     ) -> Result<Self, NodeError> {
         let now = setup.clock.now();
         let mismatch_rate_hz = setup.shared.parameters().double("mismatch_rate_hz");
         let side_work = SideWork::on(setup.clock.clone());
-        let placer = FrameResolver::new(setup.frame_names(), setup.scene.placement());
+        let resolver = FrameResolver::new(setup.frame_names(), setup.scene.placement());
         Ok(Self {
             sync: Synchroniser::in_order(setup.scene.sync_params())?,
-            placer,
+            resolver,
             setup,
             port,
             view,
-            seeker,
+            features,
             spare,
             arm,
             unsent: None,
             kept: None,
-            sitting,
+            session,
             epoch: Epoch::default(),
             waiting: Default::default(),
             probed: TouchDelta::default(),
@@ -135,18 +135,18 @@ impl RefinementWorker {
             last_state: String::new(),
             endpoints: BTreeMap::new(),
             side_work,
-            tally: Counters::default(),
+            counters: Counters::default(),
             pushes: Latencies::new(),
             latencies: Latencies::new(),
             version: 1,
             edits: 0,
             last_ns: None,
             sampled: now,
-            shown: now,
-            tip_shown: now,
+            edits_sent: now,
+            tip_published: now,
             mismatch_ns: i64::MIN,
             mismatch_rate_hz,
-            told: now,
+            diagnosed: now,
         })
     }
 
@@ -176,11 +176,11 @@ impl RefinementWorker {
             Arrival::Tf(transforms) => self.transforms(&transforms, false),
             Arrival::TfStatic(transforms) => self.transforms(&transforms, true),
             Arrival::ClickedPoint(clicked) => self.flag_clicked(&clicked),
-            // stamps tell the time of samples; the port has this one
+            // samples have their time in their stamps; the port has this one
             Arrival::Clock(_) => {}
             Arrival::Unreadable(topic, why) => {
                 warn!(topic, why, "a message could not be read");
-                self.tally.refuse("unreadable");
+                self.counters.refuse("unreadable");
             }
             Arrival::Call(call) => self.call(call),
             Arrival::SetParameter(name, value, reply) => reply.send(self.set_parameter(&name, &value)),
@@ -195,34 +195,34 @@ impl RefinementWorker {
         ControlFlow::Continue(())
     }
 
-    fn transforms(&mut self, told: &TFMessage, is_static: bool) {
-        for transform in &told.transforms {
-            if !self.placer.frames.insert(transform, is_static) {
-                self.tally.refuse("bad_transform");
+    fn transforms(&mut self, message: &TFMessage, is_static: bool) {
+        for transform in &message.transforms {
+            if !self.resolver.frames.insert(transform, is_static) {
+                self.counters.refuse("bad_transform");
             }
         }
         self.retry_waiting();
     }
 
-    fn message(&mut self, told: ArrivedMessage, at: Instant) {
-        let stream = told.stream();
+    fn message(&mut self, message: ArrivedMessage, at: Instant) {
+        let stream = message.stream();
         self.streams[stream].arrive(self.setup.clock.now());
         if self.is_paused || self.fault.is_some() {
-            self.tally.paused += 1;
+            self.counters.paused += 1;
             return;
         }
         if self.waiting[stream].is_empty() {
-            if let Some(told) = self.place(told, at) {
-                self.waiting[stream].push_back((told, at));
+            if let Some(message) = self.place(message, at) {
+                self.waiting[stream].push_back((message, at));
             }
             return;
         }
         // behind those that wait already, so that the order stays
         if self.waiting[stream].len() >= MOST_WAITING {
-            self.tally.refuse("transform");
+            self.counters.refuse("transform");
             return;
         }
-        self.waiting[stream].push_back((told, at));
+        self.waiting[stream].push_back((message, at));
         self.retry_waiting();
     }
 
@@ -231,35 +231,35 @@ impl RefinementWorker {
         let now = self.setup.clock.now();
         let longest = Duration::from_secs_f64(self.setup.shared.parameters().double("stale_ms") / 1e3);
         for stream in 0..2 {
-            while let Some((told, at)) = self.waiting[stream].pop_front() {
-                let Some(told) = self.place(told, at) else { continue };
+            while let Some((message, at)) = self.waiting[stream].pop_front() {
+                let Some(message) = self.place(message, at) else { continue };
                 if now.saturating_duration_since(at) <= longest {
-                    self.waiting[stream].push_front((told, at));
+                    self.waiting[stream].push_front((message, at));
                     break;
                 }
-                self.tally.refuse("transform");
+                self.counters.refuse("transform");
                 self.lost_transform =
-                    Some((now, "a moving frame is not told of up to the stamps of the messages".to_owned()));
+                    Some((now, "no transform of a moving frame has come up to the stamps of the messages".to_owned()));
             }
         }
     }
 
     /// Brings a message into its frame and on; gives it back where a transform has to come first.
-    fn place(&mut self, told: ArrivedMessage, at: Instant) -> Option<ArrivedMessage> {
-        let placed = match &told {
-            ArrivedMessage::Pose(pose) => self.placer.pose(pose),
-            ArrivedMessage::Wrench(wrench) => self.placer.wrench(wrench),
+    fn place(&mut self, message: ArrivedMessage, at: Instant) -> Option<ArrivedMessage> {
+        let placed = match &message {
+            ArrivedMessage::Pose(pose) => self.resolver.pose(pose),
+            ArrivedMessage::Wrench(wrench) => self.resolver.wrench(wrench),
         };
         match placed {
-            Ok(message) => self.pair(message, told.stream(), at),
-            Err(refusal) if refusal.may_pass() => return Some(told),
+            Ok(placed) => self.pair(placed, message.stream(), at),
+            Err(refusal) if refusal.may_pass() => return Some(message),
             Err(refusal) => self.refuse(&refusal),
         }
         None
     }
 
     fn refuse(&mut self, refusal: &Refusal) {
-        self.tally.refuse(refusal.name());
+        self.counters.refuse(refusal.name());
         if let Refusal::Frame(error) = refusal {
             self.lost_transform = Some((self.setup.clock.now(), error.to_string()));
         }
@@ -267,21 +267,21 @@ impl RefinementWorker {
 
     /// A message in its frame goes to the synchroniser and to the recording, and what the first lets out to the refiner.
     fn pair(&mut self, message: Message, stream: usize, at: Instant) {
-        if self.placer.axes() == Some(WrenchFrame::Object) && self.sitting.axes == WrenchFrame::Sensor {
+        if self.resolver.axes() == Some(WrenchFrame::Object) && self.session.axes == WrenchFrame::Sensor {
             self.turn_to_object_axes();
         }
         let message = shifted(message, self.epoch.shift_ns);
-        let is_taken = message.stamp_ns() >= 0 && self.sync.push(self.placer.placed(message));
+        let is_taken = message.stamp_ns() >= 0 && self.sync.push(self.resolver.placed(message));
         if self.epoch.note(stream, message.stamp_ns(), is_taken) {
             warn!("the clock of both streams was set back: they are taken up where they are now");
-            self.placer.frames.forget_moving();
+            self.resolver.frames.forget_moving();
         }
         if is_taken {
-            let frame = match (stream, self.sitting.axes) {
+            let frame = match (stream, self.session.axes) {
                 (1, WrenchFrame::Sensor) => self.setup.source,
-                _ => self.placer.recorded_frame(),
+                _ => self.resolver.recorded_frame(),
             };
-            self.sitting.recorder.write(message, frame);
+            self.session.recorder.write(message, frame);
         }
         while let Some(sample) = self.sync.next_sample() {
             self.sample(&sample, Some(at));
@@ -290,17 +290,17 @@ impl RefinementWorker {
 
     /// The first wrench says that its axes are those of the object: nothing was pushed yet, so all is begun anew.
     fn turn_to_object_axes(&mut self) {
-        if let Err(error) = self.sitting.turn_axes(&self.setup, WrenchFrame::Object) {
+        if let Err(error) = self.session.turn_axes(&self.setup, WrenchFrame::Object) {
             self.fault = Some(error.to_string());
         }
     }
 
-    /// Moves the mesh, then tells the others.
+    /// Moves the mesh, then sends what changed to the others.
     ///
     /// - `at`: when the message came that completed the sample, where one did.
     pub(super) fn sample(&mut self, sample: &Sample, at: Option<Instant>) {
         let pushing = self.setup.clock.now();
-        let pushed = self.sitting.engine.push(sample);
+        let pushed = self.session.engine.push(sample);
         let pushed_at = self.setup.clock.now();
         self.pushes.record(pushed_at.saturating_duration_since(pushing));
         if let Some(at) = at {
@@ -309,19 +309,19 @@ impl RefinementWorker {
         self.sampled = pushing;
         match pushed {
             Ok(update) => {
-                self.tally.accepted += 1;
+                self.counters.accepted += 1;
                 self.last_ns = Some(sample.stamp_ns);
-                self.show_mismatch(&update);
+                self.publish_mismatch(&update);
                 self.note_changes();
             }
-            Err(LiveError::Refine(error)) => self.tally.refuse(reason_of(&error)),
+            Err(LiveError::Refine(error)) => self.counters.refuse(reason_of(&error)),
             Err(error) => self.fail(&error),
         }
     }
 
     /// While no sample comes the mesh goes on to what the patch knows by then: what is shown is not left behind.
     fn rest(&mut self) {
-        match self.sitting.engine.rest() {
+        match self.session.engine.rest() {
             Ok(()) => self.note_changes(),
             Err(error) => self.fail(&error),
         }
@@ -334,10 +334,10 @@ impl RefinementWorker {
 
     /// Another state of the mesh has another version; touches that are new go to the features.
     fn note_changes(&mut self) {
-        let edits = self.sitting.engine.refiner().mesh().edits();
+        let edits = self.session.engine.refiner().mesh().edits();
         self.version += u64::from(std::mem::replace(&mut self.edits, edits) != edits);
-        if let Some(news) = self.sitting.engine.take_probed() {
-            self.probed.extend(news);
+        if let Some(changes) = self.session.engine.take_probed() {
+            self.probed.extend(changes);
             self.send_probed();
         }
     }
@@ -345,28 +345,28 @@ impl RefinementWorker {
     /// What is due now and then.
     fn tick(&mut self) {
         let now = self.setup.clock.now();
-        if now.saturating_duration_since(self.shown) >= SHOW_EVERY {
-            self.shown = now;
+        if now.saturating_duration_since(self.edits_sent) >= EDITS_EVERY {
+            self.edits_sent = now;
             if self.fault.is_none() && now.saturating_duration_since(self.sampled) >= RESTS_AFTER {
                 self.rest();
             }
-            self.show_edits();
+            self.send_edits();
             self.send_probed();
             self.retry_waiting();
             self.watch_streams();
         }
-        if now.saturating_duration_since(self.told) >= TELL_EVERY {
-            self.told = now;
-            self.tell_diagnostics();
+        if now.saturating_duration_since(self.diagnosed) >= DIAGNOSTICS_EVERY {
+            self.diagnosed = now;
+            self.publish_diagnostics();
         }
     }
 
     /// What a session counts from its beginning.
     pub(super) fn begin_counting(&mut self) -> Result<(), NodeError> {
         self.sync = Synchroniser::in_order(self.setup.scene.sync_params())?;
-        self.placer.forget_axes();
+        self.resolver.forget_axes();
         (self.epoch, self.waiting, self.probed) = (Epoch::default(), Default::default(), TouchDelta::default());
-        (self.tally, self.pushes, self.latencies) = (Counters::default(), Latencies::new(), Latencies::new());
+        (self.counters, self.pushes, self.latencies) = (Counters::default(), Latencies::new(), Latencies::new());
         (self.version, self.edits, self.last_ns, self.mismatch_ns) = (1, 0, None, i64::MIN);
         // a change of the session before means nothing in this one
         if let Some(unsent) = self.unsent.take() {
@@ -382,7 +382,7 @@ impl RefinementWorker {
 
     /// Everything that was not taken, by reason; those of poses begin with `pose_`.
     pub(super) fn refused(&self) -> BTreeMap<String, u64> {
-        let mut refused = self.tally.refused.clone();
+        let mut refused = self.counters.refused.clone();
         let mut add = |counts: &SyncCounts, prefix: &str| {
             for (reason, count) in counts.reasons().into_iter().filter(|(_, count)| *count > 0) {
                 *refused.entry(format!("{prefix}{reason}")).or_default() += count;

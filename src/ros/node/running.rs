@@ -22,7 +22,7 @@ use crate::scene::{Memory, Scene, SceneCost};
 /// Inputs that wait for the view at most: frames of it are dropped first.
 const VIEW_QUEUE: usize = 256;
 /// Inputs that wait for the thread of the features at most.
-const SEEKER_QUEUE: usize = 256;
+const FEATURE_QUEUE: usize = 256;
 /// Changes of the mesh that go round.
 const EDITS_ROUND: usize = 2;
 /// Arrivals that wait for the node at most: two seconds of both streams.
@@ -33,7 +33,7 @@ pub const INBOX: usize = 4096;
 pub struct Node {
     haptic: JoinHandle<Result<NodeEnd, NodeError>>,
     view: JoinHandle<()>,
-    seeker: JoinHandle<()>,
+    features: JoinHandle<()>,
     arm: Option<JoinHandle<()>>,
     folder: PathBuf,
 }
@@ -42,7 +42,7 @@ pub struct Node {
 /// which nothing that is sent to the node may be lost.
 pub struct Prepared {
     setup: Arc<Setup>,
-    sitting: NodeSession,
+    session: NodeSession,
 }
 
 impl Prepared {
@@ -60,14 +60,14 @@ impl Prepared {
     /// As there.
     pub fn on(clock: Clock, parameters: Parameters) -> Result<Self, NodeError> {
         let setup = Arc::new(Setup::new(parameters, clock)?);
-        let sitting = NodeSession::begin(&setup)?;
-        setup.shared.mesh.name_session(sitting.folder.name());
-        Ok(Self { setup, sitting })
+        let session = NodeSession::begin(&setup)?;
+        setup.shared.mesh.name_session(session.folder.name());
+        Ok(Self { setup, session })
     }
 
     /// Folder of the session.
     pub fn folder(&self) -> &Path {
-        self.sitting.folder.path()
+        self.session.folder.path()
     }
 
     /// The scan: where it was read from, and how many faces it has.
@@ -84,11 +84,11 @@ impl Prepared {
     ///
     /// - `has_arm`: whether an arm probes.
     pub fn cost(&self, has_arm: bool) -> SceneCost {
-        let Self { setup, sitting } = self;
+        let Self { setup, session } = self;
         // the node looks for no clock, and poses come as such
         let unused = if has_arm { &["clock", "markers"][..] } else { &["clock", "markers", "robot"] };
         let (scan, tree) = &*setup.scan;
-        let memory = Memory::of(sitting.engine.refiner().footprint(), scan.bytes() + tree.bytes() + setup.cut.bytes());
+        let memory = Memory::of(session.engine.refiner().footprint(), scan.bytes() + tree.bytes() + setup.cut.bytes());
         SceneCost { parts: setup.scene.built(unused, &crate::FEATURES), memory }
     }
 
@@ -106,24 +106,25 @@ impl Prepared {
         inbox: Receiver<Arrival>,
         arm: Option<ArmOfNode>,
     ) -> Result<Node, NodeError> {
-        let Self { setup, sitting } = self;
-        let (folder, session) = (sitting.folder.path().to_owned(), sitting.folder.name().to_owned());
+        let Self { setup, session } = self;
+        let (folder, name) = (session.folder.path().to_owned(), session.folder.name().to_owned());
         let (to_view, view_inputs) = sync_channel(VIEW_QUEUE);
-        let (to_seeker, seeker_inputs) = sync_channel(SEEKER_QUEUE);
+        let (to_features, feature_inputs) = sync_channel(FEATURE_QUEUE);
         let (to_spare, spare) = sync_channel(EDITS_ROUND);
         for _ in 0..EDITS_ROUND {
             to_spare.send(Box::<Edits>::default()).map_err(|_| NodeError::Stopped)?;
         }
         let clock = setup.clock.clone();
         let view = View::new(clock.clone(), Arc::clone(&port), Arc::clone(&setup.shared), to_spare);
-        let seeker = FeatureWorker::new(clock.clone(), Arc::clone(&setup.shared), to_view.clone(), session);
-        let arm = arm.map(|arm| arm::start(&setup, &port, arm, to_seeker.clone())).transpose()?;
+        let features = FeatureWorker::new(clock.clone(), Arc::clone(&setup.shared), to_view.clone(), name);
+        let arm = arm.map(|arm| arm::start(&setup, &port, arm, to_features.clone())).transpose()?;
         let (handle, arm) = arm.unzip();
-        let haptic = RefinementWorker::new(setup, port, sitting, to_view, to_seeker, spare, handle)?;
+        let haptic = RefinementWorker::new(setup, port, session, to_view, to_features, spare, handle)?;
         let view = begin(&clock, "view", move || view.run(&view_inputs)).map_err(NodeError::no_thread)?;
-        let seeker = begin(&clock, "seeker", move || seeker.run(&seeker_inputs)).map_err(NodeError::no_thread)?;
+        let features =
+            begin(&clock, "features", move || features.run(&feature_inputs)).map_err(NodeError::no_thread)?;
         let haptic = begin(&clock, "haptic", move || haptic.run(&inbox)).map_err(NodeError::no_thread)?;
-        Ok(Node { haptic, view, seeker, arm, folder })
+        Ok(Node { haptic, view, features, arm, folder })
     }
 }
 
@@ -138,9 +139,9 @@ impl Node {
     /// # Errors
     /// [`NodeError`] when the result was not written, or a thread ended by a fault.
     pub fn join(self) -> Result<NodeEnd, NodeError> {
-        let Self { haptic, view, seeker, arm, .. } = self;
+        let Self { haptic, view, features, arm, .. } = self;
         let ended = haptic.join().map_err(|_| NodeError::Stopped)?;
-        for thread in arm.into_iter().chain([seeker, view]) {
+        for thread in arm.into_iter().chain([features, view]) {
             thread.join().map_err(|_| NodeError::Stopped)?;
         }
         ended

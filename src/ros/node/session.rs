@@ -49,10 +49,10 @@ pub struct NodeSession {
     pub engine: Engine,
     /// axes of the wrenches that the engine expects
     pub axes: WrenchFrame,
-    /// state of the mesh that the view was told of completely
-    pub told_version: u64,
+    /// state of the mesh that went to the view completely
+    pub sent_version: u64,
     /// … and edits at that time
-    pub told_edits: u64,
+    pub sent_edits: u64,
 }
 
 /// What a session says of itself when it is over.
@@ -117,7 +117,7 @@ impl NodeSession {
         let recorder = SessionRecorder::start(&folder, &setup.topics, &setup.clock)?;
         let axes = WrenchFrame::default();
         let engine = engine_of(setup, axes)?;
-        Ok(Self { folder, recorder, engine, axes, told_version: 1, told_edits: 0 })
+        Ok(Self { folder, recorder, engine, axes, sent_version: 1, sent_edits: 0 })
     }
 
     /// Wrenches come in other axes than was thought; nothing was touched yet.
@@ -154,17 +154,17 @@ impl NodeSession {
     }
 
     /// What is known of it so far.
-    pub fn report(&self, setup: &Setup, port: &dyn Port, tally: &Counters) -> SessionReport {
+    pub fn report(&self, setup: &Setup, port: &dyn Port, counters: &Counters) -> SessionReport {
         let counts = self.engine.refiner().counts();
         let nothing = Quantiles { median: 0, p99: 0, p999: 0, max: 0 };
         SessionReport {
             session: self.folder.name().to_owned(),
-            accepted: tally.accepted,
+            accepted: counters.accepted,
             refused: Default::default(),
             lost: port.lost(),
             dropped: port.dropped(),
             unsent: port.unsent(),
-            paused: tally.paused,
+            paused: counters.paused,
             unrecorded: self.recorder.unrecorded().messages,
             dropped_view_frames: setup.shared.dropped_frames(),
             gaps: [0; 2],

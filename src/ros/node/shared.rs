@@ -72,8 +72,8 @@ impl Shared {
         self.has_new_viewer.swap(false, Ordering::Relaxed)
     }
 
-    /// Tells the view something that it can do without: where it has no time, that is dropped and counted.
-    pub fn show(&self, view: &SyncSender<ViewInput>, input: ViewInput) {
+    /// Sends the view something that it can do without: where it has no time, that is dropped and counted.
+    pub fn offer(&self, view: &SyncSender<ViewInput>, input: ViewInput) {
         if let Err(TrySendError::Full(_)) = view.try_send(input) {
             self.dropped_frames.fetch_add(1, Ordering::Relaxed);
         }

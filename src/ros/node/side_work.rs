@@ -75,11 +75,11 @@ mod tests {
         let (mut work, done) = (SideWork::on(Clock::system()), Arc::new(AtomicUsize::new(0)));
         let begin = |work: &mut SideWork, gate: mpsc::Receiver<()>| {
             let done = Arc::clone(&done);
-            let until_told = move || {
+            let until_open = move || {
                 let _ = gate.recv();
                 done.fetch_add(1, Ordering::SeqCst);
             };
-            work.begin("test", until_told).unwrap();
+            work.begin("test", until_open).unwrap();
         };
         let (gates, held): (Vec<_>, Vec<_>) = (0..4).map(|_| channel()).unzip();
         held.into_iter().for_each(|gate| begin(&mut work, gate));

@@ -60,7 +60,7 @@ impl View {
         }
     }
 
-    /// Runs until nobody tells anything any more, then shows what is left.
+    /// Runs until nobody sends anything any more, then publishes what is left.
     pub fn run(mut self, inputs: &Receiver<ViewInput>) {
         let mut due = self.clock.now();
         loop {

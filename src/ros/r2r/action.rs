@@ -70,7 +70,7 @@ fn goal(request: ActionServerGoalRequest<Action>, exchange: &Arc<Exchange>, runn
         accept: exchange.reply(PROBE, move |is_accepted| accept(&for_accept, is_accepted, &running)),
         feedback: Feedback(Box::new(move |feedback| {
             let handle = for_feedback.clone();
-            sending.urgent.answer(Box::new(move || tell(&handle, feedback)));
+            sending.urgent.answer(Box::new(move || publish(&handle, feedback)));
         })),
         result: exchange.reply(PROBE, move |(end, response)| finish(&for_result, end, response)),
         is_cancelled,
@@ -88,7 +88,7 @@ fn accept(handle: &Arc<GoalHandle>, is_accepted: bool, running: &Running) -> r2r
     Ok(())
 }
 
-fn tell(handle: &GoalHandle, feedback: ProbeFeedback) {
+fn publish(handle: &GoalHandle, feedback: ProbeFeedback) {
     if let GoalState::Running(goal) = &*locked(&handle.state)
         && let Err(error) = goal.publish_feedback(feedback.theirs())
     {
@@ -109,7 +109,7 @@ fn finish(handle: &GoalHandle, end: GoalEnd, response: ProbeResponse) -> r2r::Re
     }
 }
 
-/// Confirms what is asked for and tells the node, which stops when it can; forgets goals that are over.
+/// Confirms what is asked for and sets the node's flag, which stops when it can; forgets goals that are over.
 fn take_cancels(running: &mut Vec<Cancels>) -> bool {
     let mut has_come = false;
     for cancels in running.iter_mut() {

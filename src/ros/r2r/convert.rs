@@ -70,7 +70,7 @@ impl<A: Convert> Convert for Vec<A> {
     }
 }
 
-/// A message, the field of ours first: `message!(UndoRequest = super::touchup_msgs::srv::Undo::Request { strokes: strokes })`.
+/// A message, the field of ours first: `message!(Marker = r2r::visualization_msgs::msg::Marker { r#type: type_ })`.
 macro_rules! message {
     ($ours:ident = $($theirs:ident)::+ {}) => {
         impl Convert for ours::$ours {

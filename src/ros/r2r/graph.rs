@@ -1,4 +1,4 @@
-//! Who else is on our topics, and why somebody who is does not fit. r2r tells of nothing by itself, so it is asked once in a
+//! Who else is on our topics, and why somebody who is does not fit. r2r reports nothing by itself, so it is asked once in a
 //! second; of those who listen it knows the number alone.
 
 use std::time::{Duration, Instant};
@@ -23,7 +23,7 @@ struct WatchedTopic {
     /// who listens is a viewer
     is_mesh: bool,
     look: GraphQuery,
-    told: EndpointMatch,
+    reported: EndpointMatch,
 }
 
 pub(super) struct R2rGraph {
@@ -69,10 +69,10 @@ impl R2rGraph {
         is_mesh: bool,
         look: impl Fn(&Node) -> r2r::Result<EndpointMatch> + Send + 'static,
     ) {
-        self.watched.push(WatchedTopic { topic, is_mesh, look: Box::new(look), told: (0, None) });
+        self.watched.push(WatchedTopic { topic, is_mesh, look: Box::new(look), reported: (0, None) });
     }
 
-    /// Tells what has changed, when it is time to look again; whether ROS is still there.
+    /// Reports what has changed, when it is time to look again; whether ROS is still there.
     pub fn look(&mut self, node: &Node, exchange: &Exchange) -> bool {
         if self.looked.elapsed() < PERIOD {
             return true;
@@ -80,7 +80,7 @@ impl R2rGraph {
         self.looked = Instant::now();
         for watched in &mut self.watched {
             match (watched.look)(node) {
-                Ok(seen) if seen != watched.told => watched.tell(seen, exchange),
+                Ok(seen) if seen != watched.reported => watched.report(seen, exchange),
                 Ok(_) => {}
                 Err(error) => tracing::debug!(topic = watched.topic, %error, "nobody knows who is on a topic"),
             }
@@ -90,12 +90,12 @@ impl R2rGraph {
 }
 
 impl WatchedTopic {
-    fn tell(&mut self, seen: EndpointMatch, exchange: &Exchange) {
+    fn report(&mut self, seen: EndpointMatch, exchange: &Exchange) {
         let topic = self.topic.clone();
-        if self.is_mesh && seen.0 > self.told.0 {
+        if self.is_mesh && seen.0 > self.reported.0 {
             exchange.arrivals.put(Arrival::Viewer);
         }
-        self.told = seen.clone();
+        self.reported = seen.clone();
         graph::report(&exchange.arrivals, topic, seen.0, seen.1);
     }
 }

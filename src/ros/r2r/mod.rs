@@ -1,8 +1,8 @@
 //! The port on a sourced ROS 2: r2r over rcl, with whichever RMW is chosen there.
 //!
-//! Three threads of ours stand beside those of the RMW. One spins: it takes what comes and hands it to the node. Two send:
-//! one what is small and urgent, answers among it; one the mesh, where a slow listener may hold things up. rcl reads the
-//! command line and the environment by itself, so names go to it as the node has them, not yet remapped.
+//! Three threads of ours stand beside those of the RMW. One spins: it takes what comes and puts it into the inbox of the
+//! node. Two send: one what is small and urgent, answers among it; one the mesh, where a slow listener may hold things up. rcl
+//! reads the command line and the environment by itself, so names go to it as the node has them, not yet remapped.
 
 mod action;
 mod convert;

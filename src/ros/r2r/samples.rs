@@ -34,7 +34,7 @@ pub fn samples(config: &NodeConfig) -> Result<Box<dyn SamplePort>, RosError> {
     Ok(Box::new(R2rSamples { wrench, pose, _node: node }))
 }
 
-/// None where rcl does not tell.
+/// None where rcl does not know.
 fn count<T: WrappedTypesupport + 'static>(publisher: &Publisher<T>) -> usize {
     publisher.get_inter_process_subscription_count().unwrap_or_default()
 }

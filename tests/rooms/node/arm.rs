@@ -131,7 +131,7 @@ impl Cell {
     }
 }
 
-/// Of a plane one raster: planned, made, and told.
+/// Of a plane one raster: planned, made, and published.
 #[test]
 fn what_was_found_is_slid_over_where_that_is_asked_for() {
     let cell = Cell::start(true);
@@ -165,12 +165,12 @@ fn a_flagged_hole_is_probed_and_shown() {
         _ => None,
     });
     let touches: Vec<_> = touches.collect();
-    let told = published.iter().filter_map(|publication| match publication {
-        Publication::ProbeResult(told) => Some((told.code, told.touch_count as usize)),
+    let results = published.iter().filter_map(|publication| match publication {
+        Publication::ProbeResult(result) => Some((result.code, result.touch_count as usize)),
         _ => None,
     });
     // of the dry run and of what was measured, as in the answers
-    assert_eq!(told.collect::<Vec<_>>(), [(planned.code, 0), (result.code, touches.len())]);
+    assert_eq!(results.collect::<Vec<_>>(), [(planned.code, 0), (result.code, touches.len())]);
     assert_eq!(result.touch_count as usize, touches.len());
     let numbered = |(index, touch): (usize, &&ProbeTouch)| (touch.id, touch.index as usize) == (id, index);
     assert!(touches.iter().enumerate().all(numbered));
@@ -249,7 +249,7 @@ fn orders_that_must_not_be_are_refused_and_nothing_moves() {
     assert!(!all.success && all.message.contains("allow_motion"), "{}", all.message);
     assert!(cell.world.call(Call::Recover).recv().unwrap().success);
     let numbers =
-        |told: &str| -> Vec<f64> { told.split([' ', '(', ')']).filter_map(|word| word.parse().ok()).collect() };
+        |text: &str| -> Vec<f64> { text.split([' ', '(', ')']).filter_map(|word| word.parse().ok()).collect() };
     let (before, after) = (numbers(&at), numbers(&cell.state().1));
     assert_eq!((before.len(), after.len()), (3, 3), "{at}");
     assert!(before.iter().zip(&after).all(|(a, b)| (a - b).abs() < 0.2), "it moved: {before:?} {after:?}");
@@ -327,12 +327,12 @@ enum Asked {
     Zero(SyncSender<Result<(), ArmError>>),
 }
 
-/// A simulated arm on a thread of its own, whose safety system says what it is told.
+/// A simulated arm on a thread of its own, whose safety system says what the test sets.
 struct Stopping {
     asks: SyncSender<Asked>,
     said: Receiver<(Safety, SyncSender<()>)>,
     safety: Safety,
-    /// to be told when the node has taken the last state
+    /// a message when the node has taken the last state
     seen: Option<SyncSender<()>>,
     clock: Clock,
 }

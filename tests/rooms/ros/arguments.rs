@@ -12,7 +12,7 @@ fn config(line: &str) -> Result<NodeConfig, ArgumentError> {
     NodeConfig::new(&words(line), |_| None)
 }
 
-fn told(line: &str) -> String {
+fn refusal_of(line: &str) -> String {
     config(line).unwrap_err().to_string()
 }
 
@@ -123,11 +123,11 @@ fn what_is_wrong_is_named_with_a_way_out() {
         ),
     ];
     for (line, reason) in cases {
-        assert_eq!(told(line), reason);
+        assert_eq!(refusal_of(line), reason);
     }
     let not_nodes = file("view_rate_hz: 3.0\n");
     let line = format!("--params-file {}", not_nodes.path().display());
-    assert!(told(&line).ends_with("\"view_rate_hz\" is no node: below it must be ros__parameters, or a node"));
+    assert!(refusal_of(&line).ends_with("\"view_rate_hz\" is no node: below it must be ros__parameters, or a node"));
 }
 
 #[test]

@@ -44,14 +44,14 @@ pub fn refused(target: &ProbeTarget, code: u8, message: String) -> ProbeResult {
 
 /// A dry run.
 pub fn planned(target: &ProbeTarget, plan: &Plan) -> ProbeResult {
-    let told = plan.held_back.iter().map(|(touch, why)| format!("touch {touch}: {why}"));
+    let held_back = plan.held_back.iter().map(|(touch, why)| format!("touch {touch}: {why}"));
     let (code, message) = match plan.held_back.len() {
         0 => {
             let slides =
                 if plan.slides.is_empty() { String::new() } else { format!(" and {} slides", plan.slides.len()) };
             (ProbeResult::PLANNED, format!("{} touches{slides} planned; the path is published", plan.wishes.len()))
         }
-        _ => (ProbeResult::OUT_OF_LIMITS, told.collect::<Vec<_>>().join("; ")),
+        _ => (ProbeResult::OUT_OF_LIMITS, held_back.collect::<Vec<_>>().join("; ")),
     };
     refused(target, code, message)
 }
@@ -112,14 +112,14 @@ pub fn response_of(results: &[ProbeResult], header: Header) -> ProbeResponse {
 /// How all that is flagged ended, in words: each where they are few, else how many and the worst.
 pub fn summary_of(results: &[ProbeResult]) -> String {
     const FEW: usize = 4;
-    let told = |one: &ProbeResult| format!("{}: {}", one.id, one.message);
+    let line = |one: &ProbeResult| format!("{}: {}", one.id, one.message);
     match results.iter().max_by_key(|one| one.code) {
         None => NOTHING_FLAGGED.to_owned(),
-        Some(_) if results.len() <= FEW => results.iter().map(told).collect::<Vec<_>>().join("; "),
+        Some(_) if results.len() <= FEW => results.iter().map(line).collect::<Vec<_>>().join("; "),
         Some(worst) => {
             let done = results.iter().filter(|one| one.code < ProbeResult::CANCELLED).count();
             let count = results.len();
-            format!("{done} of {count} done, each is on probe_results; the worst: {}", told(worst))
+            format!("{done} of {count} done, each is on probe_results; the worst: {}", line(worst))
         }
     }
 }
@@ -136,7 +136,7 @@ pub fn touches_of(
     let touches = probed.touches.iter().enumerate();
     let made = touches.map(|(index, touch)| {
         let (stamp, made) = touch_of(index, touch, params, cell, offset_ns);
-        ProbeTouch { header: Header { stamp, frame_id: frame.to_owned() }, id: target.id, ..thinned(made) }
+        ProbeTouch { header: Header { stamp, frame_id: frame.to_owned() }, id: target.id, ..downsampled(made) }
     });
     made.collect()
 }
@@ -146,7 +146,7 @@ pub fn touches_of(
 const MOST_ROWS: usize = 2000;
 
 /// Every so many rows where there are more, the first and the last among them.
-fn thinned(mut touch: ProbeTouch) -> ProbeTouch {
+fn downsampled(mut touch: ProbeTouch) -> ProbeTouch {
     let thin = |row: &mut Vec<f32>| {
         if row.len() > MOST_ROWS {
             let last = row.len() - 1;
@@ -200,7 +200,7 @@ fn touch_of(
     offset_ns: i64,
 ) -> (Time, ProbeTouch) {
     let radius = params.pattern.ball_radius;
-    let way = touch.wish.direction.into_inner();
+    let approach = touch.wish.direction.into_inner();
     let base = ProbeTouch {
         index: index as u32,
         verdict: ProbeTouch::HELD_BACK,
@@ -209,7 +209,7 @@ fn touch_of(
         contact: NOWHERE,
         contact_std: f64::NAN,
         normal: NO_VECTOR,
-        approach: vector(&way),
+        approach: vector(&approach),
         deviation: touch.deviation.unwrap_or(f64::NAN),
         tip_radius: radius,
         ..ProbeTouch::default()
@@ -221,7 +221,7 @@ fn touch_of(
     match (&record.outcome, touch.centre) {
         (TouchOutcome::Contact { onset, force_b, .. }, Some(centre)) => {
             // the part pushes along its normal, but for friction
-            let normal = (cell.pose_bo.rotation.inverse() * force_b).try_normalize(0.0).unwrap_or(-way);
+            let normal = (cell.pose_bo.rotation.inverse() * force_b).try_normalize(0.0).unwrap_or(-approach);
             let measured_ns = record.curve_ns + (onset_at(record, onset.travel) * 1e9) as i64;
             let touch = ProbeTouch {
                 pose: pose_at(&centre, &pose_ot),
@@ -233,7 +233,7 @@ fn touch_of(
             (time(measured_ns + offset_ns), touch)
         }
         (TouchOutcome::Miss { travel }, _) => {
-            let end = touch.wish.from + way * *travel;
+            let end = touch.wish.from + approach * *travel;
             (time(record.stamps_ns[1] + offset_ns), ProbeTouch { pose: pose_at(&end, &pose_ot), ..with })
         }
         _ => {
@@ -302,12 +302,12 @@ mod tests {
 
     #[test]
     fn a_touch_fits_into_a_datagram_and_a_thinned_curve_keeps_its_ends() {
-        let long = thinned(touch(60_000));
+        let long = downsampled(touch(60_000));
         assert!(cdr_encoding::to_vec::<_, byteorder::LittleEndian>(&long).unwrap().len() < 48_000);
         assert!(long.curve_time.len() == MOST_ROWS && long.curve_time.is_sorted());
         assert_eq!((long.curve_time[0], long.curve_time.last()), (0.0, Some(&59_999.0)));
         assert_eq!(long.curve_time, long.curve_lateral_force);
-        assert_eq!(thinned(touch(20)), touch(20));
+        assert_eq!(downsampled(touch(20)), touch(20));
     }
 
     #[test]

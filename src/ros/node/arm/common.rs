@@ -132,9 +132,9 @@ impl Common {
     pub fn state(&self, cell: &Cell) -> TriggerResponse {
         let ready = self.ready();
         let work = if self.is_busy.load(Ordering::Acquire) { "it works at an order" } else { "it waits for an order" };
-        let told = ready.clone().map_or_else(|why| why, |()| work.to_owned());
+        let words = ready.clone().map_or_else(|why| why, |()| work.to_owned());
         let place = self.last().map(|state| cell.place(&state.pose_bt) * 1e3);
         let place = place.map(|at| format!("; tip at ({:.1} {:.1} {:.1}) mm in the object", at.x, at.y, at.z));
-        TriggerResponse { success: ready.is_ok(), message: told + &place.unwrap_or_default() }
+        TriggerResponse { success: ready.is_ok(), message: words + &place.unwrap_or_default() }
     }
 }

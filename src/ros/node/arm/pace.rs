@@ -9,7 +9,7 @@ use crate::sim::SimArm;
 /// So late it begins to count anew: it does not run after the time.
 const LATE: Duration = Duration::from_millis(100);
 
-/// Hands states out when they are due.
+/// Returns states when they are due.
 pub struct Paced<'a> {
     clock: Clock,
     arm: SimArm<'a>,
@@ -61,7 +61,7 @@ mod tests {
     use super::*;
     use crate::sim::{ArmParams, Plate};
 
-    /// What it is told it does, each order of it: as the arm does without a clock.
+    /// It does each order as the arm does without a clock.
     #[test]
     fn every_order_reaches_the_arm() {
         let (clock, _hand) = Clock::lock_step();

@@ -33,11 +33,11 @@ use crate::ros::port::{Feedback, Goal, GoalEnd, Port, Publication, Reply, Sample
 use crate::scene::simulated_arm;
 use crate::sim::{MeshSurface, SimArm};
 
-/// Orders that wait for the thread: one is taken up at a time, and who comes meanwhile is told so.
+/// Orders that wait for the thread: one is taken up at a time, and who comes meanwhile is refused.
 const QUEUE: usize = 1;
 /// An arm from which nothing comes is asked again after this.
 const LOST: Duration = Duration::from_millis(200);
-/// How long the other threads may take to tell what is flagged, and until the mesh is complete.
+/// How long the other threads may take to answer what is flagged, and until the mesh is complete.
 const WAIT: Duration = Duration::from_secs(15);
 /// The clock of an arm is followed by this share of how far it is off, with each state: latency comes and goes, drift stays.
 const FOLLOW: i64 = 1024;
@@ -163,7 +163,7 @@ struct ArmWorker {
     shared: Arc<Shared>,
     port: Arc<dyn Port>,
     samples: Box<dyn SamplePort>,
-    seeker: SyncSender<FeatureInput>,
+    features: SyncSender<FeatureInput>,
     cell: Cell,
     params: ProbeParams,
     inputs: Receiver<ArmOrder>,
@@ -171,12 +171,12 @@ struct ArmWorker {
     /// from the arm's clock to that of ROS, ns
     offset_ns: Option<i64>,
     /// the time of ROS when the last state came, ns
-    told_ns: i64,
+    ros_ns: i64,
     /// when the order at hand was taken up
     begun: Instant,
 }
 
-/// Who follows a goal: what is told, and whether it is to end.
+/// Who follows a goal: the feedback, and whether it is to end.
 type GoalWatcher<'a> = (&'a Feedback, &'a Arc<AtomicBool>);
 
 /// Starts the thread of an arm.
@@ -187,7 +187,7 @@ pub fn start(
     setup: &Arc<Setup>,
     port: &Arc<dyn Port>,
     arm: ArmOfNode,
-    seeker: SyncSender<FeatureInput>,
+    features: SyncSender<FeatureInput>,
 ) -> Result<(ArmHandle, JoinHandle<()>), NodeError> {
     let (cell, params) = setup.scene.probing().ok_or(NodeError::NoRobot)?;
     let (to, inputs) = sync_channel(QUEUE);
@@ -195,26 +195,26 @@ pub fn start(
     common.allow_motion(setup.shared.parameters().bool("allow_motion"));
     let handle = ArmHandle { inputs: to, common: Arc::clone(&common), cell: cell.clone() };
     let ArmOfNode { kind, samples } = arm;
-    let mut hands = ArmWorker {
+    let mut worker = ArmWorker {
         setup: Arc::clone(setup),
         shared: Arc::clone(&setup.shared),
         port: Arc::clone(port),
         samples,
-        seeker,
+        features,
         cell,
         params,
         inputs,
         common,
         offset_ns: None,
-        told_ns: i64::MIN,
+        ros_ns: i64::MIN,
         begun: setup.clock.now(),
     };
     let run = move || {
         match kind {
-            ArmKind::Real(mut arm) => hands.run(&mut *arm),
-            ArmKind::Sim(part) => hands.run_simulated(&part),
+            ArmKind::Real(mut arm) => worker.run(&mut *arm),
+            ArmKind::Sim(part) => worker.run_simulated(&part),
         }
-        hands.refuse_the_rest();
+        worker.refuse_the_rest();
     };
     let thread = begin(&setup.clock, "arm", run).map_err(NodeError::no_thread)?;
     Ok((handle, thread))
@@ -277,11 +277,11 @@ impl ArmWorker {
         let off = now_ns - state.stamp_ns;
         let followed = match self.offset_ns {
             // a simulated time that has not come yet, or stands still, says nothing of the arm's clock
-            Some(offset) if now_ns == self.told_ns => offset,
+            Some(offset) if now_ns == self.ros_ns => offset,
             Some(offset) if (off - offset).abs() < OTHER_CLOCK_NS => offset + (off - offset) / FOLLOW,
             _ => off,
         };
-        self.told_ns = now_ns;
+        self.ros_ns = now_ns;
         self.offset_ns = Some(followed);
         publish(&*self.samples, self.base(), &self.setup.tool, &state, followed);
     }
@@ -320,7 +320,7 @@ impl ArmWorker {
             }
             ArmInput::Feature(request, reply) => {
                 let results = self.probe(&folder, &[request.id], &request.settings, arm, None);
-                let none = || self.done(not_probed(request.id, ProbeResult::ARM_NOT_READY, NOT_TOLD));
+                let none = || self.done(not_probed(request.id, ProbeResult::ARM_NOT_READY, NO_TARGETS));
                 self.common.done();
                 reply.send(ProbeFeatureResponse { result: results.into_iter().next().unwrap_or_else(none) });
             }
@@ -405,21 +405,21 @@ impl ArmWorker {
 
     /// What is flagged, in the order that was asked for, or nearest first.
     fn targets(&mut self, ids: &[u32], arm: &mut dyn Arm) -> Result<Vec<ProbeTarget>, Box<ProbeResult>> {
-        let (to, told) = sync_channel(1);
-        let asked = self.seeker.try_send(FeatureInput::Targets(ids.to_vec(), to));
-        let answer = asked.ok().and_then(|()| self.wait(arm, &told));
+        let (to, targets) = sync_channel(1);
+        let asked = self.features.try_send(FeatureInput::Targets(ids.to_vec(), to));
+        let answer = asked.ok().and_then(|()| self.wait(arm, &targets));
         let first = ids.first().copied().unwrap_or(0);
-        let mut told = answer.ok_or_else(|| Box::new(not_probed(first, ProbeResult::ARM_NOT_READY, NOT_TOLD)))?;
-        if let Some(missing) = ids.iter().find(|id| told.iter().all(|target| target.id != **id)) {
+        let mut targets = answer.ok_or_else(|| Box::new(not_probed(first, ProbeResult::ARM_NOT_READY, NO_TARGETS)))?;
+        if let Some(missing) = ids.iter().find(|id| targets.iter().all(|target| target.id != **id)) {
             let why = format!("there is no feature with the number {missing}: flag it first");
             return Err(Box::new(not_probed(*missing, ProbeResult::NO_SUCH_FEATURE, &why)));
         }
         if ids.is_empty() {
             let tip = self.common.last().map(|state| self.cell.place(&state.pose_bt)).unwrap_or_default();
             let far = |target: &ProbeTarget| (target.place - tip).norm();
-            told.sort_by(|a, b| far(a).total_cmp(&far(b)));
+            targets.sort_by(|a, b| far(a).total_cmp(&far(b)));
         }
-        Ok(told)
+        Ok(targets)
     }
 
     fn wanted(&self, settings: &ProbeSettings, target: &ProbeTarget) -> Result<Wanted, (u8, String)> {
@@ -464,7 +464,7 @@ impl ArmWorker {
             begun: self.begun,
             progress: None,
             phase: Phase::Planning,
-            told: self.begun,
+            feedback_sent: self.begun,
             last: None,
         }
     }
@@ -518,7 +518,7 @@ impl ArmWorker {
             let is_done = matches!(probed.ending, Ending::ToleranceReached);
             let session = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
             let measured = ArmMeasurement { session, id: target.id, feature, is_done };
-            if self.seeker.try_send(FeatureInput::Measured(Box::new(measured))).is_err() {
+            if self.features.try_send(FeatureInput::Measured(Box::new(measured))).is_err() {
                 warn!(feature = target.id, "what was measured is in the answer, and not among the features");
             }
         }
@@ -541,4 +541,4 @@ impl ArmWorker {
 /// Beside the recording of a session.
 const TOUCHES: &str = "probed_touches.jsonl";
 const BUSY: &str = "the arm works at an order: wait, or cancel that";
-const NOT_TOLD: &str = "the features were not told in time: ask again";
+const NO_TARGETS: &str = "the features did not answer in time: ask again";

@@ -20,7 +20,7 @@ use crate::ros::port::{Feedback, SamplePort};
 use crate::touch::{StampedPose, StampedWrench, Wrench};
 
 /// Feedback comes at least so often while the arm moves.
-const TELL_EVERY: Duration = Duration::from_millis(100);
+const FEEDBACK_EVERY: Duration = Duration::from_millis(100);
 /// How long a change of the mesh may take until it is complete.
 const COPY_WAIT: Duration = Duration::from_secs(15);
 
@@ -78,7 +78,7 @@ pub struct ArmWorld<'a> {
     pub begun: Instant,
     pub progress: Option<Progress>,
     pub phase: Phase,
-    pub told: Instant,
+    pub feedback_sent: Instant,
     pub last: Option<ArmState>,
 }
 
@@ -94,7 +94,7 @@ impl<'a> ArmWorld<'a> {
     }
 
     fn send_feedback(&mut self) {
-        self.told = self.clock.now();
+        self.feedback_sent = self.clock.now();
         let (Some(Feedback(send)), Some(progress)) = (self.feedback, &self.progress) else { return };
         send(ProbeFeedback {
             id: progress.flag,
@@ -132,7 +132,7 @@ impl Witness for ArmWorld<'_> {
         self.last = Some(*state);
         self.common.see(state);
         publish(self.samples, self.base, self.tool, state, self.offset_ns);
-        if self.clock.since(self.told) >= TELL_EVERY {
+        if self.clock.since(self.feedback_sent) >= FEEDBACK_EVERY {
             self.send_feedback();
         }
     }

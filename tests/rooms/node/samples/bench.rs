@@ -81,8 +81,8 @@ impl Plate {
 /// Runs `touchup refine`; a recording that has lost its end is no failure.
 pub fn refine(arguments: &[&std::ffi::OsStr]) {
     let done = Command::new(env!("CARGO_BIN_EXE_touchup")).arg("refine").args(arguments).output().unwrap();
-    let told = String::from_utf8_lossy(&done.stderr);
-    assert!(matches!(done.status.code(), Some(0 | 4)), "{told}");
+    let output = String::from_utf8_lossy(&done.stderr);
+    assert!(matches!(done.status.code(), Some(0 | 4)), "{output}");
 }
 
 fn header(stamp_ns: i64, frame: &str) -> Header {
@@ -107,11 +107,11 @@ pub fn wrench(message: &Message, frame: &str) -> WrenchStamped {
     WrenchStamped { header: header(message.stamp_ns(), frame), wrench }
 }
 
-/// A pose as somebody at `place` (in O) tells it.
+/// A pose as somebody at `place` (in O) measures it.
 pub fn seen_from(message: &Message, place: &Isometry3<f64>, frame: &str) -> PoseStamped {
-    let Message::Pose(told) = message else { panic!("no pose") };
-    let pose_ot = place.inv_mul(&told.pose_ot);
-    pose(&Message::Pose(StampedPose { pose_ot, ..*told }), frame)
+    let Message::Pose(measured) = message else { panic!("no pose") };
+    let pose_ot = place.inv_mul(&measured.pose_ot);
+    pose(&Message::Pose(StampedPose { pose_ot, ..*measured }), frame)
 }
 
 pub fn transform(stamp_ns: i64, parent: &str, child: &str, pose: &Isometry3<f64>) -> TransformStamped {
@@ -259,12 +259,12 @@ impl Bench {
             self.published.clear();
             self.wait_for("diagnostics", |published| matches!(published, Publication::Diagnostics(_)).then_some(()));
         }
-        let Some(Publication::Diagnostics(told)) =
+        let Some(Publication::Diagnostics(message)) =
             self.published.iter().rev().find(|published| matches!(published, Publication::Diagnostics(_)))
         else {
             panic!("it was there")
         };
-        let values = told.status.iter().flat_map(|status| &status.values);
+        let values = message.status.iter().flat_map(|status| &status.values);
         values.filter(|value| value.key == key).map(|value| value.value.clone()).next()
     }
 

@@ -95,17 +95,17 @@ fn a_follower_that_loses_messages_ends_with_the_mesh() {
     let (mut seen, mut lost) = (0, 0);
     let mut strict = Follower::of(&plate.scan);
     let mut take = |bench: &mut Bench, is_lossy: bool, follower: &mut Follower, strict: &mut Follower| {
-        let told = patches(bench.published());
-        for (k, patch) in told.iter().enumerate().skip(seen) {
+        let sent = patches(bench.published());
+        for (k, patch) in sent.iter().enumerate().skip(seen) {
             strict.take(patch);
-            // never the last, whose loss nothing tells
-            if is_lossy && k + 1 < told.len() && rng.random_range(0..20) == 0 {
+            // never the last, whose loss nothing shows
+            if is_lossy && k + 1 < sent.len() && rng.random_range(0..20) == 0 {
                 lost += 1;
             } else {
                 follower.take(patch);
             }
         }
-        seen = told.len();
+        seen = sent.len();
         if std::mem::take(&mut follower.asks) {
             let request = ResyncMeshRequest::default();
             let answer = bench.call(|reply| Call::Resync(request, reply));
@@ -212,10 +212,10 @@ fn poses_wait_for_the_transform_of_a_moving_frame_and_not_for_ever() {
         let t = (stamp_ns - begin_ns) as f64 * 1e-9;
         Isometry3::new(Vector3::new(0.05 * t, 0.2, 0.3), Vector3::z() * (0.1 * PI * t))
     };
-    let told = |stamp_ns: i64| {
+    let transforms = |stamp_ns: i64| {
         Arrival::Tf(TFMessage { transforms: vec![transform(stamp_ns, "object", "rig", &rig(stamp_ns))] })
     };
-    bench.world.arrive_patiently(told(begin_ns));
+    bench.world.arrive_patiently(transforms(begin_ns));
     // between two transforms the rig is taken to move evenly, which it does
     let parts: Vec<_> =
         plate.messages.chunk_by(|a, b| a.stamp_ns() / 20_000_000 == b.stamp_ns() / 20_000_000).collect();
@@ -234,7 +234,7 @@ fn poses_wait_for_the_transform_of_a_moving_frame_and_not_for_ever() {
         give(part);
         bench.taken();
         bench.pass(STALE);
-        bench.world.arrive_patiently(told(until(part)));
+        bench.world.arrive_patiently(transforms(until(part)));
         bench.taken();
     }
     given_up.iter().for_each(|part| give(part));
@@ -262,7 +262,7 @@ fn poses_wait_for_the_transform_of_a_moving_frame_and_not_for_ever() {
 }
 
 #[test]
-fn a_burst_is_dropped_where_there_is_no_room_and_the_recording_tells_what_was_taken() {
+fn a_burst_is_dropped_where_there_is_no_room_and_the_recording_holds_what_was_taken() {
     let plate = Plate::touched(0.1);
     let bench = Bench::start(&plate);
     let mut dropped = 0;
@@ -512,7 +512,7 @@ fn it_holds_while_a_stream_is_away_and_after_the_clock_was_set_back_and_goes_on(
     let plate = Plate::touched(0.1);
     let mut bench = Bench::start(&plate);
     let words = |published: &Publication| match published {
-        Publication::Diagnostics(told) => Some(told.status[0].message.clone()),
+        Publication::Diagnostics(message) => Some(message.status[0].message.clone()),
         _ => None,
     };
     assert!(bench.wait_for("a state", words).starts_with("waits"));
