@@ -1,4 +1,4 @@
-//! What is asked of the allocator, counted for each thread.
+//! Allocated bytes, counted for each thread.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -7,7 +7,7 @@ thread_local! {
     static ASKED: Cell<AllocationCounts> = const { Cell::new(AllocationCounts { requests: 0, bytes: 0 }) };
 }
 
-/// Asked of the allocator by one thread since it began.
+/// Bytes allocated by one thread since it began.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct AllocationCounts {
     /// how often
@@ -31,7 +31,7 @@ impl CountingAllocator {
     }
 }
 
-// SAFETY: hands every call to the system's allocator unchanged
+// SAFETY: forwards every call to the system's allocator unchanged
 unsafe impl GlobalAlloc for CountingAllocator {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         Self::note(layout.size());
@@ -53,7 +53,7 @@ unsafe impl GlobalAlloc for CountingAllocator {
     }
 }
 
-/// Asked by this thread so far; `None` where the program does not count.
+/// Bytes allocated by this thread so far; `None` where the program does not count.
 pub fn asked() -> Option<AllocationCounts> {
     let before = ASKED.get();
     drop(std::hint::black_box(Box::new(0u8)));

@@ -14,7 +14,7 @@ use touchup_io::mesh_file::{MeshFileError, MeshUnit, read_mesh};
 use touchup_io::recording::{RecordingError, Topics};
 use touchup_report::cost::{CostError, cost};
 use touchup_report::{
-    Chapter, Effort, Given, Report, ReportError, Table, TableCell, WholeScanError, WorkPrecision, convergence,
+    Chapter, Effort, GivenPart, Report, ReportError, Table, TableCell, WholeScanError, WorkPrecision, convergence,
     extremes, stability, verdict, whole_scan,
 };
 use touchup_session::replay::{Recording, ReplayError, each_sample};
@@ -102,12 +102,12 @@ pub struct ReportArguments {
     only: Vec<ReportChapter>,
 }
 
-/// A chapter that can be asked for by name.
+/// A chapter, selectable by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum ReportChapter {
     /// Error against time and evaluations of each integrator, for one face
     WorkPrecision,
-    /// Error against time of each way to refine whole scans, with two baselines
+    /// Error against time of each method to refine whole scans, with two baselines
     WholeScan,
     /// Error from sweep to sweep
     Convergence,
@@ -117,7 +117,7 @@ enum ReportChapter {
     Cost,
 }
 
-/// What is on the page.
+/// Contents of the page.
 #[derive(Default)]
 struct MeasuredChapters {
     chapters: Vec<Chapter>,
@@ -132,7 +132,7 @@ impl MeasuredChapters {
     }
 }
 
-/// Measures what is asked for, writes it, and prints the verdict.
+/// Measures the selected chapters, writes the report, and prints the verdict.
 pub fn report(arguments: &ReportArguments) -> Result<(), CommandError> {
     let ReportArguments { out, json, .. } = arguments;
     let write_error = |path: &Path| {
@@ -175,7 +175,7 @@ fn advice_line(row: &[TableCell]) -> String {
     cells.into_iter().filter(|text| !text.is_empty()).collect::<Vec<_>>().join("\n  ")
 }
 
-/// Every chapter that is asked for, in the order of the page.
+/// Every selected chapter, in the order of the page.
 fn measure(arguments: &ReportArguments, progress: &mut dyn FnMut(&str)) -> Result<MeasuredChapters, CommandError> {
     let effort = Effort { is_quick: arguments.quick };
     let is_wanted = |part| arguments.only.is_empty() || arguments.only.contains(&part);
@@ -220,7 +220,7 @@ fn measure(arguments: &ReportArguments, progress: &mut dyn FnMut(&str)) -> Resul
 
 impl ReportArguments {
     /// The case that is given by files.
-    fn given(&self) -> Result<Option<Given>, CommandError> {
+    fn given(&self) -> Result<Option<GivenPart>, CommandError> {
         let (Some(scan), Some(truth), Some(bag)) = (&self.scan, &self.truth, &self.bag) else { return Ok(None) };
         let scene = self.scene.as_deref().map_or_else(|| Ok(Scene::default()), Scene::read)?;
         let recording = Recording::open(bag, &Topics::default())?;
@@ -231,7 +231,7 @@ impl ReportArguments {
         each_sample(recording, scene.placement(), scene.sync_params(), None, &mut || {}, |sample| {
             samples.push(*sample)
         })?;
-        Ok(Some(Given {
+        Ok(Some(GivenPart {
             name: scan.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
             scan: read_mesh(scan, self.mesh_unit)?.mesh,
             truth: read_mesh(truth, self.mesh_unit)?.mesh,

@@ -16,19 +16,19 @@ pub enum ReportError {
     /// A name that is no plain file name.
     #[error("{0:?} cannot be the name of a file: small letters, digits and _ alone")]
     BadName(String),
-    /// What was measured has no JSON form.
+    /// The results have no JSON form.
     #[error("the report cannot be written as JSON: {0}")]
     Json(#[from] serde_json::Error),
 }
 
-/// What was measured, where and by what.
+/// Provenance of the measurements.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
     /// processor, cores, memory, system
     pub machine: String,
     /// of the program that measured; "unknown" where it was built without its repository
     pub commit: String,
-    /// as it was called
+    /// the command line
     pub command: String,
     /// day and time in UTC
     pub date: String,

@@ -112,7 +112,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_environment_that_cannot_be_made_is_told_with_what_it_needs() {
+    fn a_failed_environment_names_what_it_needs() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("taken");
         std::fs::write(&file, "no folder").unwrap();

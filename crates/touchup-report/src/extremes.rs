@@ -1,4 +1,4 @@
-//! Input that no careful hand would send: what came out, and what the right answer is, from another reason than the code.
+//! Extreme inputs: the outcome, and the right answer derived independently of the code.
 
 mod face;
 mod mesh;
@@ -10,13 +10,13 @@ use super::{Chapter, Table};
 /// One extreme.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Extreme {
-    /// what was fed
+    /// the input
     pub fed: String,
-    /// what came out
+    /// the outcome
     pub came_out: String,
     /// the right answer, and why
     pub right_answer: String,
-    /// what came out is the right answer
+    /// whether the outcome is the right answer
     pub is_right: bool,
 }
 
@@ -27,7 +27,7 @@ pub struct Extremes {
     pub rows: Vec<Extreme>,
 }
 
-/// What came out, in words, and whether it is right.
+/// The outcome in words, and whether it is right.
 type CaseOutcome = (String, bool);
 
 fn extreme(fed: &str, right_answer: &str, (came_out, is_right): CaseOutcome) -> Extreme {
@@ -45,7 +45,7 @@ impl Extremes {
         self.rows.iter().filter(|row| !row.is_right)
     }
 
-    /// The table and what it says.
+    /// The table and its text.
     pub fn chapter(&self) -> Chapter {
         let wrong: Vec<&str> = self.wrong().map(|row| row.fed.as_str()).collect();
         let verdict = if wrong.is_empty() {
@@ -70,7 +70,7 @@ impl Extremes {
             id: "extremes".to_owned(),
             title: "Extremes".to_owned(),
             caption: "Each answer was checked by the program that made this report. f_max 10 N, h_min 0.5 mm, delta 5, alpha 0.1 m/(N s) unless \
-                      told otherwise; a ball of 1.5 mm on triangles of 2 mm."
+                      stated otherwise; a ball of 1.5 mm on triangles of 2 mm."
                 .to_owned(),
             heads: ["fed", "came out", "right answer, and why", "verdict"].map(str::to_owned).to_vec(),
             rows: self.rows.iter().map(line).collect(),

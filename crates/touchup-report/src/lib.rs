@@ -1,6 +1,6 @@
 //! Error against run time, stability, and what each part costs: everything that `touchup-report` measures and shows.
 //!
-//! Each part measures into a type of its own, writes it as a [`Chapter`], and hands on what the verdict needs.
+//! Each part measures into a type of its own, writes it as a [`Chapter`], and returns what the verdict needs.
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
 pub mod allocations;
@@ -32,8 +32,8 @@ pub use stability::{
     BadShape, FaceShares, Integrator, MeshShares, RunEnding, ShareMap, Stability, SubFlowError, stability,
 };
 pub use whole_scan::{
-    CaseResult, ContactSculptor, GaussianCost, GaussianParams, GaussianProcess, GaussianSurface, Given, Reach,
-    RefineMethod, ScanResult, TouchedError, WayResult, WholeScan, WholeScanError, whole_scan,
+    CaseResult, ContactSculptor, GaussianCost, GaussianParams, GaussianProcess, GaussianSurface, GivenPart,
+    MethodResult, Reach, RefineMethod, ScanResult, TouchedError, WholeScan, WholeScanError, whole_scan,
 };
 pub use work_precision::WorkPrecision;
 

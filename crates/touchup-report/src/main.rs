@@ -11,17 +11,17 @@ use touchup_report::allocations::CountingAllocator;
 
 use arguments::{ReportArguments, report};
 
-/// Counts what is asked for memory: the report shows it.
+/// Counts allocations for the report.
 #[global_allocator]
 static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 fn main() -> ExitCode {
     let arguments = match ReportArguments::try_parse() {
         Ok(arguments) => arguments,
-        Err(told) => {
-            // help and version come this way too, with code 0; a closed pipe leaves nobody to print for
-            let _ = told.print();
-            return ExitCode::from(told.exit_code() as u8);
+        Err(error) => {
+            // help and version arrive as errors too, with code 0; a closed pipe is not an error
+            let _ = error.print();
+            return ExitCode::from(error.exit_code() as u8);
         }
     };
     match report(&arguments) {

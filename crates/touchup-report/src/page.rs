@@ -1,4 +1,4 @@
-//! The report as one page of HTML that needs nothing else.
+//! The report as one self-contained page of HTML.
 
 use super::document::Report;
 use super::figure::{Chapter, Figure, Spread, Table, TableCell};

@@ -1,15 +1,15 @@
-//! What a practitioner asks, answered by what was measured: which mode, step and region, at which rate, what it costs, and where
-//! it fails.
+//! The practitioner's questions, answered by the measurements: which mode, step and region, at which rate, what it costs, and
+//! where it fails.
 
 use super::cost::Cost;
 use super::figure::{Table, TableCell};
-use super::whole_scan::{CaseResult, RefineMethod, ScanResult, WayResult};
+use super::whole_scan::{CaseResult, MethodResult, RefineMethod, ScanResult};
 use super::{Convergence, Extremes, Integrator, Peers, Rule, Stability, WholeScan, three_digits};
 
 /// Method and region, step, rate and limits, each with its reason and its cost; `None` where no method made any scan better.
 pub fn advice(scans: &WholeScan, stability: Option<&Stability>, cost: Option<&Cost>) -> Option<Table> {
     let best = by_part(scans, ScanResult::best);
-    let slowest_us = best.iter().map(|choice| choice.method.per_sample_us.median).reduce(f64::max)?;
+    let slowest_us = best.iter().map(|choice| choice.result.per_sample_us.median).reduce(f64::max)?;
     let mut answer = format!(
         "up to {} µs per sample: at 1 kHz {} % of one core, which keeps up with {} samples per second",
         three_digits(slowest_us),
@@ -22,7 +22,7 @@ pub fn advice(scans: &WholeScan, stability: Option<&Stability>, cost: Option<&Co
     }
     let mut rows = vec![["method and region".to_owned(), one_or_each(&best), errors(&best), answer]];
     let haptic = by_part(scans, ScanResult::best_haptic);
-    if let Some(us) = haptic.iter().map(|choice| choice.method.per_sample_us.median).reduce(f64::max) {
+    if let Some(us) = haptic.iter().map(|choice| choice.result.per_sample_us.median).reduce(f64::max) {
         let cost = format!("up to {} µs per sample", three_digits(us));
         rows.push(["haptic update alone".to_owned(), one_or_each(&haptic), errors(&haptic), cost]);
     }
@@ -54,19 +54,16 @@ pub fn advice(scans: &WholeScan, stability: Option<&Stability>, cost: Option<&Co
 /// The method chosen on a part.
 struct MethodChoice<'a> {
     part: &'a str,
-    method: &'a WayResult,
-    /// mean error of the scan as it came, mm
+    result: &'a MethodResult,
+    /// mean error of the scan, mm
     before_mm: f64,
 }
 
 /// The method on each part where there is one.
-fn by_part<'a>(
-    scans: &'a WholeScan,
-    method: impl Fn(&'a ScanResult) -> Option<&'a WayResult>,
-) -> Vec<MethodChoice<'a>> {
+fn by_part<'a>(scans: &'a WholeScan, result: impl Fn(&'a ScanResult) -> Option<&'a MethodResult>) -> Vec<MethodChoice<'a>> {
     let choice = |case: &'a CaseResult| {
         let scan = case.main()?;
-        Some(MethodChoice { part: &case.name, method: method(scan)?, before_mm: scan.before.mean_mm() })
+        Some(MethodChoice { part: &case.name, result: result(scan)?, before_mm: scan.before.mean_mm() })
     };
     scans.cases.iter().filter_map(choice).collect()
 }
@@ -74,16 +71,16 @@ fn by_part<'a>(
 /// The method, where it is the same on every part, else each with its part.
 fn one_or_each(choices: &[MethodChoice<'_>]) -> String {
     match choices {
-        [first, others @ ..] if others.iter().all(|choice| choice.method.way == first.method.way) => {
-            first.method.name.clone()
+        [first, others @ ..] if others.iter().all(|choice| choice.result.method == first.result.method) => {
+            first.result.name.clone()
         }
-        _ => join(choices, |choice| format!("{} on {}", choice.method.name, choice.part)),
+        _ => join(choices, |choice| format!("{} on {}", choice.result.name, choice.part)),
     }
 }
 
 fn errors(choices: &[MethodChoice<'_>]) -> String {
     let error = |choice: &MethodChoice<'_>| {
-        let [now, before] = [choice.method.mean_mm(), choice.before_mm].map(three_digits);
+        let [now, before] = [choice.result.mean_mm(), choice.before_mm].map(three_digits);
         format!("{}: {before} mm off before, {now} mm after", choice.part)
     };
     join(choices, error)
@@ -93,14 +90,14 @@ fn join(choices: &[MethodChoice<'_>], text: impl Fn(&MethodChoice<'_>) -> String
     choices.iter().map(text).collect::<Vec<_>>().join("; ")
 }
 
-/// Which way, and which region, on each part; and what failed there.
+/// The best method and region on each part, and the methods that failed there.
 pub fn of_whole_scans(measured: &WholeScan) -> Vec<String> {
     measured.cases.iter().filter_map(of_case).collect()
 }
 
 fn of_case(case: &CaseResult) -> Option<String> {
     let scan = case.main()?;
-    let told = |result: &WayResult| {
+    let describe = |result: &MethodResult| {
         format!(
             "{} ({} mm, {} µs per sample)",
             result.name,
@@ -110,13 +107,14 @@ fn of_case(case: &CaseResult) -> Option<String> {
     };
     let mut text = format!("On {}, scanned {} mm off in the mean, ", case.name, three_digits(scan.before.mean_mm()));
     match scan.best() {
-        Some(best) => text += &format!("take {}.", told(best)),
-        None => text += "no way made the scan better.",
+        Some(best) => text += &format!("take {}.", describe(best)),
+        None => text += "no method reduced the error.",
     }
     if let Some(haptic) = scan.best_haptic() {
-        text += &format!(" Of the regions of the haptic update alone take {}.", told(haptic));
+        text += &format!(" Of the regions of the haptic update alone take {}.", describe(haptic));
     }
-    let failed: Vec<&str> = scan.ways.iter().filter(|way| !way.is_sound()).map(|way| way.name.as_str()).collect();
+    let failed: Vec<&str> =
+        scan.methods.iter().filter(|result| !result.is_sound()).map(|result| result.name.as_str()).collect();
     if !failed.is_empty() {
         text += &format!(" Fails here (worse than the scan, or not at the end in time): {}.", failed.join("; "));
     }
@@ -195,7 +193,7 @@ pub fn of_cost(measured: &Cost) -> Vec<String> {
     vec![text]
 }
 
-/// How it stands against the libraries that others would use.
+/// Comparison with the libraries that others would use.
 pub fn of_peers(measured: &Peers) -> Vec<String> {
     let at_size = |size: &super::peers::PeersAtSize| {
         Some(format!(
@@ -206,9 +204,9 @@ pub fn of_peers(measured: &Peers) -> Vec<String> {
             three_digits(size.query_factor()?)
         ))
     };
-    let told: Vec<String> = measured.sizes.iter().filter_map(at_size).collect();
+    let ratios: Vec<String> = measured.sizes.iter().filter_map(at_size).collect();
     let promise = if measured.holds() { "Both promises hold" } else { "A promise is MISSED" };
-    vec![format!("Against peers: {}. {promise}: 100 times, and faster than a query.", told.join("; "))]
+    vec![format!("Against peers: {}. {promise}: 100 times, and faster than a query.", ratios.join("; "))]
 }
 
 #[cfg(test)]
@@ -216,7 +214,7 @@ mod tests {
     use super::*;
     use crate::{Reach, TouchedError};
 
-    fn way(way: RefineMethod, name: &str, mean_mm: f64, per_sample_us: f64, is_worse: bool) -> WayResult {
+    fn result(method: RefineMethod, name: &str, mean_mm: f64, per_sample_us: f64, is_worse: bool) -> MethodResult {
         let error = TouchedError {
             part_to_mesh_mean_mm: mean_mm,
             part_to_mesh_p95_mm: mean_mm,
@@ -225,8 +223,8 @@ mod tests {
             normal_mean_deg: 1.0,
             normal_p95_deg: 1.0,
         };
-        WayResult {
-            way,
+        MethodResult {
+            method,
             name: name.to_owned(),
             error: Some(error),
             total_s: 1.0.into(),
@@ -241,11 +239,13 @@ mod tests {
         }
     }
 
-    fn case(name: &str, scans: Vec<Vec<WayResult>>) -> CaseResult {
-        let before =
-            TouchedError { part_to_mesh_mean_mm: 1.0, ..way(RefineMethod::Patch, "", 1.0, 1.0, false).error.unwrap() };
+    fn case(name: &str, scans: Vec<Vec<MethodResult>>) -> CaseResult {
+        let before = TouchedError {
+            part_to_mesh_mean_mm: 1.0,
+            ..result(RefineMethod::Patch, "", 1.0, 1.0, false).error.unwrap()
+        };
         let scans = scans.into_iter().zip([3.0, 1.5]);
-        let scans = scans.map(|(ways, edge_mm)| ScanResult { edge_mm, faces: 100, before, ways }).collect();
+        let scans = scans.map(|(methods, edge_mm)| ScanResult { edge_mm, faces: 100, before, methods }).collect();
         CaseResult {
             name: name.to_owned(),
             samples: 1000,
@@ -269,12 +269,15 @@ mod tests {
 
     #[test]
     fn what_is_best_everywhere_is_named_once_and_what_fails_is_listed() {
-        let good = |us| way(RefineMethod::Patch, "patch", 0.01, us, false);
+        let good = |us| result(RefineMethod::Patch, "patch", 0.01, us, false);
         let rows = of(vec![
-            case("peaks", vec![vec![good(40.0)], vec![way(RefineMethod::Patch, "patch", 2.0, 50.0, true)]]),
+            case("peaks", vec![vec![good(40.0)], vec![result(RefineMethod::Patch, "patch", 2.0, 50.0, true)]]),
             case(
                 "plate",
-                vec![vec![good(50.0), way(RefineMethod::Robust(Reach::TipRadii(2.0)), "two radii", 0.3, 10.0, false)]],
+                vec![vec![
+                    good(50.0),
+                    result(RefineMethod::Robust(Reach::TipRadii(2.0)), "two radii", 0.3, 10.0, false),
+                ]],
             ),
         ]);
         // the slower of the two: 50 µs are a twentieth of a millisecond
@@ -289,11 +292,11 @@ mod tests {
 
     #[test]
     fn where_the_parts_differ_each_is_named_and_without_anything_good_nothing_is_said() {
-        let patch = || way(RefineMethod::Patch, "patch", 0.01, 40.0, false);
-        let paper = || way(RefineMethod::Robust(Reach::TipRadii(1.0)), "one radius", 0.005, 8.0, false);
+        let patch = || result(RefineMethod::Patch, "patch", 0.01, 40.0, false);
+        let paper = || result(RefineMethod::Robust(Reach::TipRadii(1.0)), "one radius", 0.005, 8.0, false);
         let rows = of(vec![case("peaks", vec![vec![patch()]]), case("plate", vec![vec![patch(), paper()]])]).unwrap();
         assert!(rows[0].starts_with("method and region | patch on peaks; one radius on plate | "), "{rows:?}");
         assert!(!rows.iter().any(|row| row.starts_with("not for")), "{rows:?}");
-        assert_eq!(of(vec![case("peaks", vec![vec![way(RefineMethod::Patch, "patch", 3.0, 1.0, true)]])]), None);
+        assert_eq!(of(vec![case("peaks", vec![vec![result(RefineMethod::Patch, "patch", 3.0, 1.0, true)]])]), None);
     }
 }

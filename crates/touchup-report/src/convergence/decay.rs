@@ -9,9 +9,9 @@ pub struct Line {
     pub offset: f64,
     /// y over x
     pub slope: f64,
-    /// root mean square of what it leaves in y
+    /// root mean square residual in y
     pub left: f64,
-    /// 1 − (what it leaves in y)² / (what there is about its mean)²; `None` where y does not vary
+    /// coefficient of determination, 1 − Σ residual² / Σ (y − mean)²; `None` where y does not vary
     pub r_squared: Option<f64>,
 }
 
@@ -34,7 +34,7 @@ pub struct Law {
     pub rate: f64,
     /// of an exponential law the error at sweep 0, of a power law that at sweep 1, in the unit of the errors
     pub start: f64,
-    /// root mean square of what the law leaves in the logarithm
+    /// root mean square residual of the law in the logarithm
     pub left: f64,
     /// share of the variance of the logarithm that it explains; `None` where that does not vary
     pub r_squared: Option<f64>,

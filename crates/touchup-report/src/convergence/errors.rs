@@ -1,4 +1,4 @@
-//! How far a mesh is from the truth, face by face.
+//! Errors of a mesh against the truth, face by face.
 
 use nalgebra::Point3;
 use serde::Serialize;

@@ -4,7 +4,7 @@
 mod decay;
 mod errors;
 mod sweeps;
-mod tell;
+mod text;
 
 use serde::Serialize;
 
@@ -47,7 +47,7 @@ pub struct SweepRun {
 /// Error from sweep to sweep.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Convergence {
-    /// sweeps that were asked for
+    /// requested sweeps
     pub sweeps: usize,
     /// each scan with each rule
     pub runs: Vec<SweepRun>,

@@ -17,7 +17,7 @@ const PERIOD_NS: i64 = 5_000_000;
 const PERIOD: f64 = 5e-3;
 /// Samples on each face: 20 s.
 const SAMPLES_PER_FACE: usize = 4000;
-/// A mean error that has grown to so many times its start does not come back.
+/// A mean error beyond this multiple of its start counts as diverged.
 pub const BLOWN_UP: f64 = 2.0;
 /// The raster's ball, m, and its stiffness, N/m.
 const TIP: TipParams = TipParams { radius: 1.5e-3, stiffness: Some(20e3) };
@@ -62,7 +62,7 @@ impl PaperSweeps {
         Ok(Self { truth, refiner, params, stamp_ns: 0 })
     }
 
-    /// Sets the stylus to each face in turn and lets both go where Eq 8–11 and Eq 6–7 take them. The true face feels as
+    /// Sets the stylus to each face in turn and lets both go where Eq 8–11 and Eq 6–7 take them. The true face acts as
     /// its plane does in the paper's contact model.
     ///
     /// Stops when the mean distance error is beyond [`BLOWN_UP`] times `start_mm`.

@@ -9,7 +9,7 @@ use crate::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Series, Spread, Ta
 /// A time within this of the law is no more than the law.
 const NO_MORE: f64 = 1.05;
 /// A difference of whole pushes below this share of a push cannot be distinguished from noise.
-const TELLING: f64 = 0.02;
+const DISCERNIBLE: f64 = 0.02;
 
 impl Cost {
     /// As it is printed.
@@ -57,7 +57,7 @@ impl Cost {
             id: "push_time_by_faces".to_owned(),
             title: "One push against the size of the scan".to_owned(),
             caption: format!(
-                "Median and p10–p90 of blocks of samples, all ways in turns. Dashed: t = a + b ln F, fitted to the scans of \
+                "Median and p10–p90 of blocks of samples, all cases in turns. Dashed: t = a + b ln F, fitted to the scans of \
                  up to {LAW_UP_TO} faces. What lies above it is the cache; where a scan of one size gets finer, more \
                  vertices move with each touch.",
             ),
@@ -70,7 +70,7 @@ impl Cost {
     fn size_text(&self) -> Option<String> {
         let (first, last) = (self.sizes.first()?, self.sizes.last()?);
         let more = last.faces as f64 / first.faces as f64;
-        let told = |name: &str, law: Option<LogLaw>, time: fn(&SizeCost) -> &PerSample| {
+        let line = |name: &str, law: Option<LogLaw>, time: fn(&SizeCost) -> &PerSample| {
             let (from, to) = (time(first).time_ns.median, time(last).time_ns.median);
             let expected = law.map_or(String::new(), |law| {
                 let times = to / law.at(last.faces);
@@ -89,8 +89,8 @@ impl Cost {
              {:.0}, and the default scene takes {:.1} µs instead of {:.1} µs.",
             last.faces,
             first.faces,
-            told("", self.barest_law, |size| &size.barest).trim_start(),
-            told("the default scene, with edges of 1 mm on both,", self.default_law, |size| &size.default_larger),
+            line("", self.barest_law, |size| &size.barest).trim_start(),
+            line("the default scene, with edges of 1 mm on both,", self.default_law, |size| &size.default_larger),
             last.moved_finer,
             first.moved_finer,
             last.default_finer.time_ns.median * 1e-3,
@@ -118,15 +118,15 @@ impl Cost {
 
     fn part_text(&self) -> Option<String> {
         let faces = self.parts.iter().map(|part| part.faces).max()?;
-        let told = self.parts.iter().filter(|part| part.faces == faces).map(|part| {
+        let parts = self.parts.iter().filter(|part| part.faces == faces).map(|part| {
             let PartCost { part: name, cost_ns, without, .. } = part;
-            let is_lost = cost_ns.median.abs() < TELLING * without.time_ns.median;
+            let is_lost = cost_ns.median.abs() < DISCERNIBLE * without.time_ns.median;
             let noise = if is_lost { " (within the noise)" } else { "" };
             format!("{name} {:+.0} ns{noise}", cost_ns.median)
         });
         Some(format!(
             "What the parts cost, as the difference of whole pushes with and without them on {faces} faces: {}.",
-            told.collect::<Vec<_>>().join(", ")
+            parts.collect::<Vec<_>>().join(", ")
         ))
     }
 
@@ -138,7 +138,7 @@ impl Cost {
     }
 
     fn replay_text(&self) -> Option<String> {
-        let told = self.replays.iter().map(|ReplaySpeed { scene, edge_mm, samples_per_s, .. }| {
+        let replays = self.replays.iter().map(|ReplaySpeed { scene, edge_mm, samples_per_s, .. }| {
             let verdict = match samples_per_s.median >= LEAST_REPLAY_PER_S {
                 _ if scene == READING => String::new(),
                 true => format!(" (holds {LEAST_REPLAY_PER_S:.0})"),
@@ -149,7 +149,7 @@ impl Cost {
         let faces = self.replays.first()?.faces;
         Some(format!(
             "A recording is replayed by one thread, from the file to the moved mesh of {faces} faces: {}.",
-            told.collect::<Vec<_>>().join("; ")
+            replays.collect::<Vec<_>>().join("; ")
         ))
     }
 

@@ -12,7 +12,7 @@ const RELAXATION: f64 = 25.0;
 const STEP: f64 = 1e-3;
 /// By which boxes are made wider where they are planned: far more than a sample moves, m.
 const MARGIN: f64 = 2e-5;
-/// Farther than this nothing is touched, m.
+/// Search radius of a contact, m.
 const REACH: f64 = 0.01;
 
 /// A mesh that follows the ball of [`touchup_sim::wavy`], and nothing else.
@@ -76,7 +76,7 @@ impl MinimalLoop {
         true
     }
 
-    /// The mesh as it stands.
+    /// The current mesh.
     pub fn mesh(&self) -> &TriMesh {
         &self.mesh
     }

@@ -26,7 +26,7 @@ use touchup_session::scene::SceneError;
 pub use turns::PerSample;
 use turns::Timing;
 
-/// The cheapest scene that moves a mesh: the touched face follows the ball, and nothing else is asked for.
+/// The cheapest scene that moves a mesh: the touched face follows the ball, without further stages.
 pub const BAREST: &str = "tip:\nrefine: { roi_mm: 0, beta_per_n2_s: 0 }\n";
 
 /// The cheapest scene takes at most this many times as long as the loop that is written by hand.
@@ -84,7 +84,7 @@ pub struct Cost {
     pub seldom: Vec<SeldomCost>,
     /// recordings read and refined
     pub replays: Vec<ReplaySpeed>,
-    /// whether the program counts what it asks of the allocator
+    /// whether the program counts its allocations
     pub counts_allocations: bool,
 }
 

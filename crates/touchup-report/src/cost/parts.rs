@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::CostError;
 use super::sizes::{pushing, refiner_of, samples_on, side_of};
-use super::turns::{PerSample, TimedWay, Timing, difference, in_turns};
+use super::turns::{PerSample, TimedCase, Timing, difference, in_turns};
 use crate::Spread;
 use touchup_core::refine::Refiner;
 use touchup_session::scene::Scene;
@@ -27,7 +27,7 @@ pub struct PartCost {
     pub cost_ns: Spread,
 }
 
-/// Weighs nothing and is off by nothing: it costs what any other payload and bias cost, and the touches stay the same.
+/// Zero mass and zero bias: it costs what any other payload and bias cost, and the touches stay the same.
 const COMPENSATION: &str = "compensation: { payload: { mass_kg: 0, centre_mm: [0, 0, 40] }, \
                             bias: { force_n: [0, 0, 0], torque_nm: [0, 0, 0] } }";
 
@@ -67,9 +67,9 @@ pub(super) fn part_costs(faces: usize, timing: Timing) -> Result<Vec<PartCost>, 
     let names: Vec<_> = std::iter::once("default").chain(named.iter().map(|(name, _)| *name)).collect();
     let mut moved = vec![0; refiners.len()];
     let each = refiners.iter_mut().zip(&mut moved).zip(&names);
-    let mut ways: Vec<TimedWay> =
+    let mut cases: Vec<TimedCase> =
         each.map(|((refiner, moved), name)| pushing(name, refiner, &samples, moved)).collect();
-    let timed = in_turns(&mut ways, timing)?;
+    let timed = in_turns(&mut cases, timing)?;
     let costs = named.iter().zip(&timed[1..]).map(|(&(name, is_default), other)| {
         let (with, without) = if is_default { (&timed[0], other) } else { (other, &timed[0]) };
         Ok(PartCost {

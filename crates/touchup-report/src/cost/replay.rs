@@ -13,7 +13,7 @@ use touchup_io::recording::{Record, RecordingReader, Topics, write_recording};
 use touchup_session::scene::Scene;
 use touchup_sim::wavy::plate;
 
-/// What reads and pairs, and moves nothing.
+/// Reading and synchronisation alone.
 pub const READING: &str = "none: read and paired alone";
 
 /// One scene over the whole recording.

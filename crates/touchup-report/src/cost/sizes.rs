@@ -4,7 +4,7 @@ use nalgebra::Point3;
 use serde::Serialize;
 
 use super::minimal::MinimalLoop;
-use super::turns::{PerSample, TimedWay, Timing, in_turns, ratio};
+use super::turns::{PerSample, TimedCase, Timing, in_turns, ratio};
 use super::{BAREST, CostError};
 use crate::Spread;
 use touchup_core::mesh::{FaceTree, TriMesh};
@@ -75,8 +75,8 @@ pub(super) fn pushing<'a>(
     refiner: &'a mut Refiner,
     samples: &'a [Sample],
     moved: &'a mut u64,
-) -> TimedWay<'a> {
-    TimedWay::new(name, move |block| {
+) -> TimedCase<'a> {
+    TimedCase::new(name, move |block| {
         for sample in &samples[block] {
             refiner.push(sample)?;
             *moved += refiner.moved_vertices().len() as u64;
@@ -85,8 +85,8 @@ pub(super) fn pushing<'a>(
     })
 }
 
-fn looping<'a>(name: &'a str, minimal: &'a mut MinimalLoop, samples: &'a [Sample]) -> TimedWay<'a> {
-    TimedWay::new(name, |block| {
+fn looping<'a>(name: &'a str, minimal: &'a mut MinimalLoop, samples: &'a [Sample]) -> TimedCase<'a> {
+    TimedCase::new(name, |block| {
         samples[block].iter().for_each(|sample| {
             std::hint::black_box(minimal.push(sample));
         });
@@ -115,14 +115,14 @@ pub(super) fn size_cost(faces: usize, timing: Timing) -> Result<SizeCost, CostEr
     let mut keeping = MinimalLoop::keeping(mesh.clone());
     let mut minimal = MinimalLoop::new(mesh);
     let (mut moved_barest, mut moved_finer) = (0, 0);
-    let mut ways = [
+    let mut cases = [
         looping("hand-written loop", &mut minimal, &samples),
         looping("the loop, keeping", &mut keeping, &samples),
         pushing("cheapest scene", &mut barest, &samples, &mut moved_barest),
         pushing("default scene", &mut default, &samples, &mut moved_finer),
     ];
-    let timed = in_turns(&mut ways, timing)?;
-    drop(ways);
+    let timed = in_turns(&mut cases, timing)?;
+    drop(cases);
     let larger = default_larger(faces, timing)?;
     let per_face = |bytes: usize| bytes as f64 / faces.max(1) as f64;
     Ok(SizeCost {

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::CostError;
 use super::sizes::{samples_on, side_of};
-use super::turns::{PerSample, TimedWay, Timing, in_turns};
+use super::turns::{PerSample, TimedCase, Timing, in_turns};
 use crate::Spread;
 use touchup_core::features::detect;
 use touchup_core::mesh::{FaceId, FaceTree, Nearby, RefitPlan, TriMesh};
@@ -35,7 +35,7 @@ pub struct StageCost {
     pub per_sample: PerSample,
 }
 
-/// What is done now and then, not at each sample.
+/// Work done now and then, not at each sample.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SeldomCost {
     /// what it does
@@ -60,7 +60,7 @@ fn messages(sample: &Sample) -> [Message; 2] {
     [Message::Pose(StampedPose { stamp_ns, pose_ot }), Message::Wrench(StampedWrench { stamp_ns, wrench })]
 }
 
-/// What is decided about the contact of each.
+/// The contact state of each sample.
 fn contacts_of(samples: &[Sample], tip: TipParams) -> Result<Vec<ContactSample>, CostError> {
     let mut estimator = ContactEstimator::new(ContactEstimatorParams::new(tip))?;
     let observe = |sample| Ok(*estimator.observe(sample).map_err(touchup_core::refine::RefineError::from)?);
@@ -90,8 +90,8 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> Result<Vec<StageCost>
     let (mut last, mut nearby, mut moving) = (None, Nearby::default(), Moving::new(&mesh));
     let face = FaceState { b: Point3::origin(), n: Vector3::z() };
 
-    let mut ways = [
-        TimedWay::new("sync", |block| {
+    let mut cases = [
+        TimedCase::new("sync", |block| {
             for sample in &samples[block] {
                 messages(sample).into_iter().for_each(|message| {
                     sync.push(message);
@@ -100,38 +100,38 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> Result<Vec<StageCost>
             }
             Ok(())
         }),
-        TimedWay::new("compensation (nothing to take off)", |block| {
+        TimedCase::new("compensation (nothing to take off)", |block| {
             samples[block].iter().for_each(|sample| {
                 black_box(plain.compensate(black_box(sample)));
             });
             Ok(())
         }),
-        TimedWay::new("bias tracking", |block| {
+        TimedCase::new("bias tracking", |block| {
             tips[block].iter().for_each(|tip| {
                 black_box(bias.compensate(tip));
             });
             Ok(())
         }),
-        TimedWay::new("contact gate", |block| {
+        TimedCase::new("contact gate", |block| {
             tips[block].iter().for_each(|tip| {
                 black_box(gate.update(tip.stamp_ns, &tip.force_o));
             });
             Ok(())
         }),
-        TimedWay::new("sliding and friction", |block| {
+        TimedCase::new("sliding and friction", |block| {
             for tip in &tips[block] {
                 let ball = motion.update(tip, 1e-3, 0.03);
                 black_box(motion.surface_normal(&ball, 1e-3));
             }
             Ok(())
         }),
-        TimedWay::new("closest face, from the root", |block| {
+        TimedCase::new("closest face, from the root", |block| {
             points[block].iter().for_each(|p| {
                 black_box(tree.closest(&mesh, p, RADIUS));
             });
             Ok(())
         }),
-        TimedWay::new("closest face, from the last one", |block| {
+        TimedCase::new("closest face, from the last one", |block| {
             for p in &points[block] {
                 let hit = match last {
                     Some(hint) => tree.closest_nearby(&mesh, p, hint, RADIUS, &mut nearby),
@@ -141,7 +141,7 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> Result<Vec<StageCost>
             }
             Ok(())
         }),
-        TimedWay::new("face dynamics", |block| {
+        TimedCase::new("face dynamics", |block| {
             for sample in &samples[block] {
                 let p = Point3::new(0.0, 0.0, -0.05e-3);
                 black_box(dynamics.step(black_box(&face), &p, &sample.wrench.force, 1e-3))
@@ -149,24 +149,25 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> Result<Vec<StageCost>
             }
             Ok(())
         }),
-        TimedWay::new("tree update around one face", |block| {
+        TimedCase::new("tree update around one face", |block| {
             points[block].iter().for_each(|p| moving.follow(p));
             Ok(())
         }),
-        TimedWay::new("recording (on a thread of its own)", |block| {
+        TimedCase::new("recording (on a thread of its own)", |block| {
             samples[block].iter().flat_map(messages).try_for_each(|message| writer.write(&message))?;
             Ok(())
         }),
-        TimedWay::new("patch: touches found and kept", |block| {
+        TimedCase::new("patch: touches found and kept", |block| {
             contacts[block].iter().for_each(|contact| patcher.push(contact));
             Ok(())
         }),
     ];
-    let timed = in_turns(&mut ways, timing)?;
+    let timed = in_turns(&mut cases, timing)?;
     let faces = mesh.face_count();
-    ways.iter()
+    cases
+        .iter()
         .zip(&timed)
-        .map(|(way, timed)| Ok(StageCost { stage: way.name.to_owned(), faces, per_sample: timed.per_sample()? }))
+        .map(|(case, timed)| Ok(StageCost { stage: case.name.to_owned(), faces, per_sample: timed.per_sample()? }))
         .collect()
 }
 
@@ -184,7 +185,7 @@ impl Moving {
     }
 
     /// Brings the boxes around the face under the tip up to date. Which face that is, and which boxes, is looked up
-    /// once for a millimetre of the way, as the refiner does it once for each face.
+    /// once for a millimetre of travel, as the refiner does it once for each face.
     fn follow(&mut self, p: &Point3<f64>) {
         let Self { mesh, tree, plan, at } = self;
         let is_far = at.is_none_or(|face| (mesh.barycentre(face) - p).norm_squared() > 1e-6);
@@ -198,7 +199,7 @@ impl Moving {
     }
 }
 
-/// Times what is not done at each sample.
+/// Times the work that is not done at each sample.
 pub(super) fn seldom_costs(faces: usize, repeats: usize) -> Result<Vec<SeldomCost>, CostError> {
     let side = side_of(faces);
     let mesh = plate(faces, side)?;

@@ -1,4 +1,4 @@
-//! Ways to do the same work, timed in turns, so that what disturbs the machine disturbs all of them.
+//! Cases of the same work, timed in turns, so that a disturbance of the machine affects all of them.
 
 use std::ops::Range;
 use std::time::Instant;
@@ -9,13 +9,13 @@ use super::CostError;
 use crate::Spread;
 use crate::allocations::asked;
 
-/// One way: does the work of these samples, by number.
-pub(super) struct TimedWay<'a> {
+/// One case: does the work of these samples, by number.
+pub(super) struct TimedCase<'a> {
     pub name: &'a str,
     pub run: Box<dyn FnMut(Range<usize>) -> Result<(), CostError> + 'a>,
 }
 
-impl<'a> TimedWay<'a> {
+impl<'a> TimedCase<'a> {
     pub fn new(name: &'a str, run: impl FnMut(Range<usize>) -> Result<(), CostError> + 'a) -> Self {
         Self { name, run: Box::new(run) }
     }
@@ -43,11 +43,11 @@ pub struct PerSample {
     pub time_ns: Spread,
     /// requests to the allocator; `None` where the program does not count them
     pub allocations: Option<f64>,
-    /// what they asked for, bytes
+    /// allocated bytes
     pub allocated_bytes: Option<f64>,
 }
 
-/// What was timed of one way, block by block.
+/// Times of one case, block by block.
 pub(super) struct Timed {
     /// of one sample, ns
     pub blocks_ns: Vec<f64>,
@@ -62,11 +62,11 @@ impl Timed {
         Self { blocks_ns: Vec::with_capacity(blocks), requests: 0, bytes: 0, samples: 0, counts: asked().is_some() }
     }
 
-    fn add(&mut self, way: &mut TimedWay, samples: Range<usize>) -> Result<(), CostError> {
+    fn add(&mut self, case: &mut TimedCase, samples: Range<usize>) -> Result<(), CostError> {
         let count = samples.len();
         let before = asked();
         let started = Instant::now();
-        (way.run)(samples)?;
+        (case.run)(samples)?;
         let time_ns = started.elapsed().as_nanos() as f64;
         // asking is a request of its own
         if let (Some(before), Some(after)) = (before, asked()) {
@@ -88,17 +88,17 @@ impl Timed {
     }
 }
 
-/// Runs all ways over the same samples: first to warm up, then block by block, another one first each time.
-pub(super) fn in_turns(ways: &mut [TimedWay], timing: Timing) -> Result<Vec<Timed>, CostError> {
-    let mut timed: Vec<_> = ways.iter().map(|_| Timed::new(timing.blocks)).collect();
-    for way in ways.iter_mut() {
-        (way.run)(0..timing.warm)?;
+/// Runs all cases over the same samples: first to warm up, then block by block, another one first each time.
+pub(super) fn in_turns(cases: &mut [TimedCase], timing: Timing) -> Result<Vec<Timed>, CostError> {
+    let mut timed: Vec<_> = cases.iter().map(|_| Timed::new(timing.blocks)).collect();
+    for case in cases.iter_mut() {
+        (case.run)(0..timing.warm)?;
     }
     for block in 0..timing.blocks {
         let first = timing.warm + block * timing.block;
-        for turn in 0..ways.len() {
-            let at = (turn + block) % ways.len();
-            timed[at].add(&mut ways[at], first..first + timing.block)?;
+        for turn in 0..cases.len() {
+            let at = (turn + block) % cases.len();
+            timed[at].add(&mut cases[at], first..first + timing.block)?;
         }
     }
     Ok(timed)
@@ -121,22 +121,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_way_gets_every_sample_once_and_in_order() {
+    fn every_case_gets_every_sample_once_and_in_order() {
         let (mut first, mut second) = (Vec::new(), Vec::new());
-        let mut ways = [
-            TimedWay::new("first", |samples| {
+        let mut cases = [
+            TimedCase::new("first", |samples| {
                 first.extend(samples);
                 Ok(())
             }),
-            TimedWay::new("second", |samples| {
+            TimedCase::new("second", |samples| {
                 second.extend(samples);
                 Ok(())
             }),
         ];
         let timing = Timing { warm: 3, blocks: 4, block: 2 };
-        let timed = in_turns(&mut ways, timing).unwrap();
+        let timed = in_turns(&mut cases, timing).unwrap();
         assert_eq!(timed.iter().map(|timed| (timed.blocks_ns.len(), timed.samples)).collect::<Vec<_>>(), [(4, 8); 2]);
-        drop(ways);
+        drop(cases);
         assert_eq!((first, second), ((0..11).collect(), (0..11).collect::<Vec<_>>()));
     }
 

@@ -35,7 +35,7 @@ fn press(force: f64) -> Vector3<f64> {
 }
 
 /// In words, with what must hold of it.
-fn told(stepped: Stepped, is_right: impl Fn(&FaceState) -> bool) -> CaseOutcome {
+fn outcome(stepped: Stepped, is_right: impl Fn(&FaceState) -> bool) -> CaseOutcome {
     match stepped {
         Ok(face) => (
             format!("b at {:.4e} m along the normal, normal turned by {:.1e} rad", face.b.z, turned(&face)),
@@ -104,37 +104,37 @@ fn forces() -> Vec<Extreme> {
         extreme(
             "no force, tip 1 mm above the face, 1 s, rule as printed",
             "the face flees by 0.52 mm: f(0) is not 0 and u + e^u grows with time; only a contact gate prevents it",
-            told(hovering, |face| near(face.b.z, pushed, 1e-12) && near(pushed, -0.52e-3, 0.5e-5)),
+            outcome(hovering, |face| near(face.b.z, pushed, 1e-12) && near(pushed, -0.52e-3, 0.5e-5)),
         ),
         extreme(
             "12 N at f_max 10 N, tip 1 mm above, robust, 1000 s",
             "the face comes to the tip and stays: a force without an equilibrium is clamped",
-            told(clamped, |face| near(face.b.z, 1e-3, 1e-12)),
+            outcome(clamped, |face| near(face.b.z, 1e-3, 1e-12)),
         ),
         extreme(
             "12 N at f_max 10 N, rule as printed, deep inside, 1 s",
             "it runs away at alpha (12 N - 10 N) = 0.2 m/s: Eq 6 has no rest point there",
-            told(runaway, |face| near(face.b.z, 0.2, 1e-12)),
+            outcome(runaway, |face| near(face.b.z, 0.2, 1e-12)),
         ),
         extreme(
             "1e7 N, tip 1 mm above, robust, 1000 s",
             "the face comes to the tip, not beyond: how hard it is pressed says nothing about where",
-            told(huge, |face| near(face.b.z, 1e-3, 1e-12)),
+            outcome(huge, |face| near(face.b.z, 1e-3, 1e-12)),
         ),
         extreme(
             "2 N against the normal, tip on the face, robust, 1 s",
             "finite, and not turned: exactly opposite has no direction to turn to; a refiner lets no such force act on the face",
-            told(against, |face| face.b.z.is_finite() && turned(face) == 0.0),
+            outcome(against, |face| face.b.z.is_finite() && turned(face) == 0.0),
         ),
         extreme(
             "2 N exactly against the normal, deep inside, 1e9 s, only turning",
             "not turned: dn/dt is zero there, though it is no stable rest",
-            told(opposite, |face| face.n == UP.n && face.b == UP.b),
+            outcome(opposite, |face| face.n == UP.n && face.b == UP.b),
         ),
         extreme(
             "a force of 5e-324 N, the smallest there is, tip on the face",
             "at rest to rounding: the direction is kept, the size is no force at all",
-            told(denormal, |face| near(face.b.z, 0.0, 1e-18) && turned(face) == 0.0),
+            outcome(denormal, |face| near(face.b.z, 0.0, 1e-18) && turned(face) == 0.0),
         ),
     ]
 }
@@ -148,17 +148,17 @@ fn depths() -> Vec<Extreme> {
         extreme(
             "h/h_min = +1e9, 2 N, 1 ms",
             "alpha F dt = 0.2 mm towards the tip: nothing is expected that far outside",
-            told(outside, |face| near(face.b.z, ALPHA * 2.0 * 1e-3, 1e-16)),
+            outcome(outside, |face| near(face.b.z, ALPHA * 2.0 * 1e-3, 1e-16)),
         ),
         extreme(
             "h/h_min = -1e9, 2 N, 1 ms",
             "alpha (F - f_max) dt = -0.8 mm: all of f_max is expected that deep",
-            told(inside, |face| near(face.b.z, ALPHA * (2.0 - F_MAX) * 1e-3, 1e-16)),
+            outcome(inside, |face| near(face.b.z, ALPHA * (2.0 - F_MAX) * 1e-3, 1e-16)),
         ),
         extreme(
             "a depth of 5e-324 m, 2 N, robust",
             "at rest to rounding: that is on the surface",
-            told(tiny, |face| near(face.b.z, 0.0, 1e-17)),
+            outcome(tiny, |face| near(face.b.z, 0.0, 1e-17)),
         ),
     ]
 }
@@ -170,16 +170,16 @@ fn times() -> Vec<Extreme> {
     let long = step(paper(), at(0.0), press(2.0), 1e12);
     let too_long = step(paper(), at(0.0), press(2.0), 1e303);
     vec![
-        extreme("a step of 0 s", "the same bits: no time, no change", told(nothing, |face| *face == UP)),
+        extreme("a step of 0 s", "the same bits: no time, no change", outcome(nothing, |face| *face == UP)),
         extreme(
             "a step of 5e-324 s",
             "at rest: less than a rounding happens",
-            told(denormal, |face| near(face.b.z, 0.0, 1e-300)),
+            outcome(denormal, |face| near(face.b.z, 0.0, 1e-300)),
         ),
         extreme(
             "a step of 1e12 s, 2 N, rule as printed",
             "at the rest point h_min (delta - ln(f_max/F - 1)) = 1.81 mm, the bias of a rigid contact",
-            told(long, |face| near(face.b.z, rest, 1e-16)),
+            outcome(long, |face| near(face.b.z, rest, 1e-16)),
         ),
         extreme(
             "a step of 1e303 s",

@@ -13,7 +13,7 @@ const RADIUS: f64 = 1.5e-3;
 /// N/m
 const STIFFNESS: f64 = 2e4;
 const FORCE_N: f64 = 2.0;
-/// How far below the scan the true surface lies, m.
+/// Depth of the true surface below the scan, m.
 const DEPTH: f64 = 0.05e-3;
 const MILLISECOND_NS: i64 = 1_000_000;
 
@@ -42,7 +42,7 @@ fn refiner((positions, faces): (Vec<Point3<f64>>, Vec<[u32; 3]>), radius: f64) -
     Refiner::new(TriMesh::new(positions, faces)?, RefineParams::robust(tip(radius)))
 }
 
-/// A ball at rest that feels `force`, its lowest point at `point` where nothing bends.
+/// A ball at rest under `force`, its lowest point at `point` where nothing bends.
 fn sample(tick: i64, point: Point3<f64>, radius: f64, force: Vector3<f64>) -> Sample {
     let reported = point + Vector3::z() * radius - force / STIFFNESS;
     let wrench = Wrench { force, torque: Vector3::zeros() };
@@ -73,7 +73,7 @@ fn depth_at(refiner: &Refiner, [x, y]: [f64; 2]) -> f64 {
     refiner.closest_face(&Point3::new(x, y, 0.0), 1.0).map_or(f64::NAN, |hit| -hit.point.z)
 }
 
-/// Presses at a place: sound, and down to the true surface within a fifth of the way.
+/// Presses at a place: sound, and down to the true surface within a fifth of the depth.
 fn pressed(shape: (Vec<Point3<f64>>, Vec<[u32; 3]>), place: [f64; 2]) -> CaseOutcome {
     let outcome = refiner(shape, RADIUS).and_then(|mut refiner| press(&mut refiner, place).map(|()| refiner));
     match outcome {
@@ -138,7 +138,7 @@ fn samples() -> Vec<Extreme> {
         ),
         extreme(
             "2 N against the normal for 1 s",
-            "not one bit changed: what is felt is another surface, or a fault",
+            "not one bit changed: the contact is on another surface, or a fault",
             pulling(),
         ),
         extreme(
@@ -202,7 +202,7 @@ fn shapes() -> Vec<Extreme> {
         faces.push([24, 25, positions.len() as u32 - 1]);
         (positions, faces)
     };
-    // a fin that stands on an edge of two faces
+    // a fin on an edge of two faces
     let fin = {
         let (mut positions, mut faces) = plain();
         positions.push(positions[17] - Vector3::z() * EDGE);

@@ -1,6 +1,6 @@
 //! Against what a user would take instead: libraries from PyPI, on the same mesh, with the same queries, on one thread.
 //!
-//! Here are the input, touchup's own times, the script that measures the peers, and what comes of both. Files and processes
+//! Here are the input, touchup's own times, the script that measures the peers, and the comparison. Files and processes
 //! are the matter of the command line.
 
 mod input;
@@ -14,7 +14,7 @@ use super::{Chapter, Spread};
 
 /// Measures the peers; prints a [`PeerTimes`] or a [`PeerError`] as JSON on each line.
 pub const SCRIPT: &str = include_str!("peers.py");
-/// What it needs, in the versions with which it is known to work.
+/// Its requirements, in tested versions.
 pub const PACKAGES: [&str; 7] = [
     "numpy==2.4.6",
     "scipy==1.17.1",
@@ -33,7 +33,7 @@ pub const AGREEMENT: f64 = 1e-9;
 /// Times of touchup itself on the same input, µs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TouchupTimes {
-    /// one closest face, nothing known
+    /// one closest face, without a starting face
     pub query_us: Spread,
     /// one closest face, near the last
     pub next_query_us: Spread,
@@ -60,7 +60,7 @@ pub struct PeerTimes {
     pub pipeline_us: SpreadOf,
     /// how many samples that was measured over
     pub pipeline_samples: usize,
-    /// what it found, m; none where it does not look for the closest face
+    /// distances, m; none where it has no closest-face query
     #[serde(skip_serializing)]
     distances_m: Vec<Option<f64>>,
     /// largest difference from touchup's distance, relative; `None` where it does not look for the closest face
@@ -87,7 +87,7 @@ impl From<SpreadOf> for Spread {
 pub struct PeerError {
     /// which
     pub peer: String,
-    /// what it said
+    /// its output
     pub error: String,
 }
 
@@ -117,7 +117,7 @@ pub struct Peers {
 pub struct UnknownLine {
     /// as it came
     pub line: String,
-    /// what is wrong with it
+    /// the error
     pub error: serde_json::Error,
 }
 
@@ -184,7 +184,7 @@ impl Peers {
         self.sizes.iter().all(|size| beyond(size.pipeline_factor(), WANTED_FACTOR) && beyond(size.query_factor(), 1.0))
     }
 
-    /// The table and what it says.
+    /// The table and its text.
     pub fn chapter(&self) -> Chapter {
         text::chapter(self)
     }

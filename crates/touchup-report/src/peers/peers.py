@@ -1,7 +1,7 @@
 """Measures the closest-face query and the per-sample pipeline of libraries from PyPI; one thread, one process.
 
 Called with a folder that holds `positions.f64` (V x 3, m), `faces.i32` (F x 3), `queries.f64` (Q x 3, m) and a number of samples.
-Prints one JSON line for each peer; times in microseconds. A peer that cannot be had is told on a line of its own.
+Prints one JSON line for each peer; times in microseconds. A peer that is not installed gets a line with its error.
 """
 
 import json
@@ -94,9 +94,9 @@ class ScipyStale(Scipy):
         self.first_radius = self.radius
 
     def refresh(self, moved, touched):
-        way = self.positions[moved] - self.start[moved]
-        # no corner is farther from the barycentre in the tree than the radius then and its own way since
-        self.radius = max(self.radius, self.first_radius + float(np.sqrt((way * way).sum(axis=1)).max()))
+        moved_by = self.positions[moved] - self.start[moved]
+        # no corner is farther from the barycentre in the tree than the radius then and its own displacement since
+        self.radius = max(self.radius, self.first_radius + float(np.sqrt((moved_by * moved_by).sum(axis=1)).max()))
 
 
 class Barycentre(Scipy):
@@ -283,10 +283,10 @@ def main():
     queries = np.fromfile(folder / "queries.f64").reshape(-1, 3)
     for peer in (Barycentre, Scipy, ScipyStale, Sklearn, Open3d, Libigl, Trimesh):
         try:
-            told = measure(peer, positions, faces, queries, samples)
+            result = measure(peer, positions, faces, queries, samples)
         except Exception as error:  # one that fails must not take the others with it
-            told = {"peer": peer.name, "error": f"{type(error).__name__}: {error}"}
-        print(json.dumps(told), flush=True)
+            result = {"peer": peer.name, "error": f"{type(error).__name__}: {error}"}
+        print(json.dumps(result), flush=True)
 
 
 main()

@@ -6,7 +6,7 @@ use crate::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Series, Spread, Ta
 pub(super) fn chapter(peers: &Peers) -> Chapter {
     let how = "The same wavy plate, the same point sliding over it at 50 mm/s and 1 kHz, one thread on one processor, one run: touchup before \
                the peers and after them. A peer's pipeline finds the closest face, moves the vertices around it, and brings its index up \
-               to date in the cheapest way that leaves it exact; touchup's push does that and filters, gates, solves the dynamics and \
+               to date by the cheapest method that leaves it exact; touchup's push does that and filters, gates, solves the dynamics and \
                guards the mesh. Of both turns of touchup the slower counts.";
     let mut text = vec![how.to_owned()];
     text.extend(peers.sizes.iter().flat_map(verdicts));

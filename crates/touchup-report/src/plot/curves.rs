@@ -20,7 +20,7 @@ const SAMPLE: f64 = 34.0;
 /// From line to line of the legend.
 const LINE: f64 = 21.0;
 
-/// Draws below the title, and returns how far down it reaches.
+/// Draws below the title, and returns its lower edge.
 pub(super) fn draw(svg: &mut Svg, figure: &Figure, series: &[Series], looks: &Looks) -> f64 {
     let name_width = series.iter().map(|series| text_width(&series.name, 12.5)).fold(0.0, f64::max);
     let is_beside = name_width <= WIDEST_BESIDE && series.len() as f64 * LINE <= HEIGHT;

@@ -70,7 +70,7 @@ impl Frame {
         }
     }
 
-    /// What the axes are, below and on the left.
+    /// Labels of the axes, below and on the left.
     pub fn name_axes(&self, svg: &mut Svg, x: &str, y: &str) {
         svg.text([self.left + 0.5 * self.width, self.bottom() + 38.0], Anchor::Middle, "", x);
         svg.upward_text([self.left - 56.0, self.top + 0.5 * self.height], y);

@@ -33,7 +33,7 @@ const CRISP: &str = "shape-rendering=\"crispEdges\"";
 /// Where nothing was run.
 const NOTHING: &str = "#e4e4e4";
 
-/// Draws below the title, and returns how far down it reaches.
+/// Draws below the title, and returns its lower edge.
 pub(super) fn draw(svg: &mut Svg, figure: &Figure, share_of: &str, panels: &[Panel]) -> f64 {
     // as many lines as it takes, evenly filled
     let lines = panels.len().div_ceil(ACROSS).max(1);
@@ -67,8 +67,8 @@ fn draw_panel(svg: &mut Svg, frame: &Frame, figure: &Figure, panel: &Panel) {
         let (row, column) = (at / columns, at % columns);
         let corner = [frame.left + column as f64 * size[0], frame.bottom() - (row + 1) as f64 * size[1]];
         let (x, y) = (three_digits(panel.xs[column]), three_digits(panel.ys[row]));
-        let told = share.map_or("nothing was run".to_owned(), three_digits);
-        let title = format!("{}: {x}; {}: {y}; {told}", figure.x.label, figure.y.label);
+        let text = share.map_or("nothing was run".to_owned(), three_digits);
+        let title = format!("{}: {x}; {}: {y}; {text}", figure.x.label, figure.y.label);
         let colour = share.map_or(NOTHING.to_owned(), colour);
         svg.rectangle(corner, size, &format!("fill=\"{colour}\" {CRISP}"), &title);
     }

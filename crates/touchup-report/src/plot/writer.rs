@@ -1,4 +1,4 @@
-//! Elements of SVG as text: what is written is escaped, and no coordinate is anything but a finite number.
+//! Elements of SVG as text: text is escaped, and all coordinates are finite.
 
 use std::fmt::Write;
 

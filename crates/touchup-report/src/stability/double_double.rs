@@ -1,4 +1,4 @@
-//! Numbers of 32 digits as a sum of two doubles \[Dekker 1971\], with what the closed forms need: an independent way to the
+//! Numbers of 32 digits as a sum of two doubles \[Dekker 1971\], with what the closed forms need: an independent method for the
 //! same answer.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};

@@ -1,11 +1,11 @@
-//! Runs of one face: parameters drawn over twelve decades each, and what became of the face.
+//! Runs of one face: parameters drawn over twelve decades each, and the final state of the face.
 
 use nalgebra::{Unit, UnitQuaternion, Vector3};
 use rand::RngExt;
 use rand_pcg::Pcg64;
 use serde::Serialize;
 
-use super::integrators::{Held, Integrator};
+use super::integrators::{HeldSample, Integrator};
 use touchup_core::refine::{ContactModel, DynamicsParams};
 
 /// Samples held in each run.
@@ -58,7 +58,7 @@ pub(super) struct FaceRun {
     pub h_min: f64,
     pub f_max: f64,
     n: Vector3<f64>,
-    held: Held,
+    held: HeldSample,
 }
 
 /// What [`FaceRun::judge`] saw.
@@ -74,7 +74,7 @@ fn log_uniform(rng: &mut Pcg64, decades: Decades) -> f64 {
 }
 
 impl FaceRun {
-    /// Draws all that there is of a run; `is_spring`: of the two contact models the linear one. A spring pulls a tip outside the
+    /// Draws the parameters of a run; `is_spring`: of the two contact models the linear one. A spring pulls a tip outside the
     /// face, and Eq 7 would turn the face away from the force there: with a spring the normal turns at a rate of its own, as
     /// in [`touchup_core::refine::RefineParams::robust`].
     pub fn draw(rng: &mut Pcg64, is_spring: bool) -> Self {
@@ -102,7 +102,7 @@ impl FaceRun {
         let arm = length * Vector3::from_fn(|_, _| rng.random_range(-1.0..1.0));
         let axis = Unit::new_normalize(Vector3::from_fn(|_, _| rng.random_range(-1.0..1.0)));
         let turn = UnitQuaternion::from_axis_angle(&axis, rng.random_range(0.0..3.0));
-        let held = Held {
+        let held = HeldSample {
             arm: turn * arm,
             force: turn * Vector3::new(sine, 0.0, cosine) * magnitude,
             dt: log_uniform(rng, STEP),
@@ -126,7 +126,7 @@ impl FaceRun {
         (self.params.beta_per_n2_s * self.f_max * self.f_max + self.held.turning) * self.held.dt
     }
 
-    /// The h at which the face rests under `n`, m.
+    /// Equilibrium h of the face under `n`, m.
     fn rest(&self, n: &Vector3<f64>) -> f64 {
         if self.params.take_out_rigid_offset { 0.0 } else { self.params.model.distance(self.held.force.dot(n)) }
     }
@@ -139,9 +139,9 @@ impl FaceRun {
         let mut kept_unit = true;
         for _ in 0..STEPS {
             let end = |ending| JudgedRun { ending, kept_unit };
-            let Some((way, raw)) = integrator.step(&self.params, &n, &held) else { return end(RunEnding::GaveUp) };
+            let Some((travel, raw)) = integrator.step(&self.params, &n, &held) else { return end(RunEnding::GaveUp) };
             let length = raw.norm();
-            if !(way.is_finite() && length.is_finite()) {
+            if !(travel.is_finite() && length.is_finite()) {
                 return end(RunEnding::NotFinite);
             }
             kept_unit &= (length - 1.0).abs() <= UNIT_TOLERANCE;
@@ -154,7 +154,7 @@ impl FaceRun {
             if turned.dot(&self.n) <= 0.0 {
                 return JudgedRun { ending: RunEnding::Flipped, kept_unit };
             }
-            let arm = held.arm - towards * way;
+            let arm = held.arm - towards * travel;
             if self.crosses(&n, &turned, [&held.arm, &arm], CROSSING * longest) || turns_past(&n, &turned, &towards) {
                 return JudgedRun { ending: RunEnding::Overshot, kept_unit };
             }
@@ -192,7 +192,8 @@ mod tests {
             take_out_rigid_offset: false,
             ..DynamicsParams::default()
         };
-        let held = Held { arm: Vector3::z() * 1e-3, force: Vector3::z() * 2.0, dt: stiffness / 100.0, turning: 0.0 };
+        let held =
+            HeldSample { arm: Vector3::z() * 1e-3, force: Vector3::z() * 2.0, dt: stiffness / 100.0, turning: 0.0 };
         FaceRun { params, h_min: 1e-3, f_max: 1.0, n: Vector3::z(), held }
     }
 

@@ -6,14 +6,14 @@ use serde::Serialize;
 use touchup_core::refine::dynamics::{LARGEST_SHARE, turn};
 use touchup_core::refine::{ContactModel, DynamicsParams, FaceDynamics, FaceState, StepRule};
 
-/// Newton's method of the implicit step gives up after so many steps.
+/// Most Newton iterations of the implicit step.
 const NEWTON_STEPS: usize = 50;
 /// It has converged where the next step is below this share of the scale.
 const NEWTON_TOLERANCE: f64 = 1e-12;
 /// Differences for its Jacobian: half of the digits.
 const DIFFERENCE: f64 = 1e-8;
 
-/// One way to advance a face by one sample.
+/// An integrator that advances a face by one sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Integrator {
@@ -33,7 +33,7 @@ pub enum Integrator {
 
 /// One sample, held.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Held {
+pub(super) struct HeldSample {
     /// p − b at the start, m
     pub arm: Vector3<f64>,
     /// N
@@ -79,7 +79,7 @@ impl Integrator {
         }
     }
 
-    /// What it is in [`FaceDynamics`], if it is.
+    /// Its counterpart in [`FaceDynamics`], if any.
     pub fn rule(self) -> Option<StepRule> {
         match self {
             Self::DormandPrince => Some(StepRule::DormandPrince),
@@ -89,8 +89,13 @@ impl Integrator {
         }
     }
 
-    /// The way along the force, m, and the normal, whatever its length, after one sample; `None` where it gives up.
-    pub(super) fn step(self, params: &DynamicsParams, n: &Vector3<f64>, held: &Held) -> Option<(f64, Vector3<f64>)> {
+    /// The travel along the force, m, and the normal, whatever its length, after one sample; `None` where it gives up.
+    pub(super) fn step(
+        self,
+        params: &DynamicsParams,
+        n: &Vector3<f64>,
+        held: &HeldSample,
+    ) -> Option<(f64, Vector3<f64>)> {
         if let Some(rule) = self.rule() {
             return by_touchup(&DynamicsParams { rule, ..*params }, n, held);
         }
@@ -111,7 +116,7 @@ impl Integrator {
     }
 }
 
-fn by_touchup(params: &DynamicsParams, n: &Vector3<f64>, held: &Held) -> Option<(f64, Vector3<f64>)> {
+fn by_touchup(params: &DynamicsParams, n: &Vector3<f64>, held: &HeldSample) -> Option<(f64, Vector3<f64>)> {
     let dynamics = FaceDynamics::new(*params).ok()?;
     let face = FaceState { b: nalgebra::Point3::origin(), n: *n };
     let next = dynamics.step(&face, &held.arm.into(), &held.force, held.dt).ok()?;
@@ -119,27 +124,27 @@ fn by_touchup(params: &DynamicsParams, n: &Vector3<f64>, held: &Held) -> Option<
     Some((next.b.coords.dot(&along), turn(&next.n, &along, held.turning * held.dt)))
 }
 
-/// Eq 6 and 7 along the force, written down anew: way along F (m/s) and normal (1/s).
-fn rate(params: &DynamicsParams, held: &Held, y: &Vector4<f64>) -> Vector4<f64> {
+/// Eq 6 and 7 along the force, written independently: velocity along F (m/s) and normal (1/s).
+fn rate(params: &DynamicsParams, held: &HeldSample, y: &Vector4<f64>) -> Vector4<f64> {
     let n = Vector3::new(y[1], y[2], y[3]);
     let magnitude = held.force.norm();
     let towards = held.force / magnitude;
     let h = (held.arm - towards * y[0]).dot(&n);
-    let felt = held.force.dot(&n);
-    let (felt, h) = match params.model {
+    let force_along_n = held.force.dot(&n);
+    let (force_along_n, h) = match params.model {
         ContactModel::Sigmoid { f_max_n, .. } if params.take_out_rigid_offset => {
             let lowest = params.model.force(0.0);
-            (felt.max(lowest).min(LARGEST_SHARE * f_max_n), h + params.model.rigid_offset(felt))
+            (force_along_n.max(lowest).min(LARGEST_SHARE * f_max_n), h + params.model.rigid_offset(force_along_n))
         }
-        _ => (felt, h),
+        _ => (force_along_n, h),
     };
     let expected = params.model.force(h);
     let turning = (towards - n * towards.dot(&n)) * (params.beta_per_n2_s * magnitude * expected + held.turning);
-    Vector4::new(params.alpha_m_per_n_s * (felt - expected), turning.x, turning.y, turning.z)
+    Vector4::new(params.alpha_m_per_n_s * (force_along_n - expected), turning.x, turning.y, turning.z)
 }
 
 /// The length that counts, m.
-fn scale(params: &DynamicsParams, held: &Held) -> f64 {
+fn scale(params: &DynamicsParams, held: &HeldSample) -> f64 {
     let of_model = match params.model {
         ContactModel::Sigmoid { h_min_m, .. } => h_min_m,
         ContactModel::Spring { stiffness_n_per_m } => held.force.norm() / stiffness_n_per_m,
@@ -203,11 +208,11 @@ mod tests {
         };
         // 2 N rest at h = −2 mm: 3 mm to go at z = α k dt = 0.5
         let (z, force) = (0.5f64, Vector3::new(0.0, 0.0, 2.0));
-        let held = Held { arm: Vector3::new(0.0, 0.0, 1e-3), force, dt: z / 100.0, turning: 0.0 };
+        let held = HeldSample { arm: Vector3::new(0.0, 0.0, 1e-3), force, dt: z / 100.0, turning: 0.0 };
         let left = |integrator: Integrator| {
-            let (way, n) = integrator.step(&params, &Vector3::z(), &held).unwrap();
+            let (travel, n) = integrator.step(&params, &Vector3::z(), &held).unwrap();
             assert_eq!(n, Vector3::z());
-            (3e-3 - way) / 3e-3
+            (3e-3 - travel) / 3e-3
         };
         let expected = [
             (Integrator::ExplicitEuler, 1.0 - z),
@@ -226,12 +231,12 @@ mod tests {
     fn all_agree_on_a_short_coupled_step() {
         let params = DynamicsParams::default();
         let (force, n) = (Vector3::new(0.8, -0.3, 2.0), Vector3::z());
-        let held = Held { arm: Vector3::new(2e-4, 1e-4, 8e-4), force, dt: 1e-6, turning: 0.0 };
+        let held = HeldSample { arm: Vector3::new(2e-4, 1e-4, 8e-4), force, dt: 1e-6, turning: 0.0 };
         let (exact, turned) = Integrator::DormandPrince.step(&params, &n, &held).unwrap();
         assert!(exact > 1e-8 && turned != n);
         for integrator in Integrator::ALL {
-            let (way, end) = integrator.step(&params, &n, &held).unwrap();
-            assert!((way / exact - 1.0).abs() < 1e-3, "{}: {way:e} {exact:e}", integrator.name());
+            let (travel, end) = integrator.step(&params, &n, &held).unwrap();
+            assert!((travel / exact - 1.0).abs() < 1e-3, "{}: {travel:e} {exact:e}", integrator.name());
             assert!((end - turned).norm() < 1e-3 * (turned - n).norm() + 1e-15, "{}", integrator.name());
         }
     }

@@ -23,7 +23,7 @@ const CROSSING: f64 = 1e-9;
 /// Decades of the quality: from one in a thousand to one.
 pub(super) const QUALITY: std::ops::Range<f64> = -3.0..0.0;
 
-/// Which way a triangle is bad.
+/// How a triangle is degenerate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BadShape {
@@ -116,12 +116,12 @@ impl MeshRun {
         let before: Vec<Vector3<f64>> = mesh.faces().map(|(face, _)| mesh.normal(face)).collect();
         let (barycentre, normal) = (mesh.barycentre(FaceId(self.face)), mesh.normal(FaceId(self.face)));
         let Ok(mut refiner) = Refiner::new(mesh, params) else { return RunEnding::GaveUp };
-        let felt = (normal + self.tilt).normalize();
-        let force = 2.0 * felt;
-        let centre = barycentre + felt * (RADIUS + self.depth) - force / STIFFNESS;
+        let measured = (normal + self.tilt).normalize();
+        let force = 2.0 * measured;
+        let centre = barycentre + measured * (RADIUS + self.depth) - force / STIFFNESS;
         let wrench = Wrench { force, torque: Vector3::zeros() };
         let pose_ot = Isometry3::from_parts(centre.coords.into(), UnitQuaternion::identity());
-        let point = centre - felt * RADIUS;
+        let point = centre - measured * RADIUS;
         let mut last: Option<PressedFace> = None;
         for i in 1..=SAMPLES {
             let stamp_ns = (i as f64 * self.dt_s * 1e9) as i64;
@@ -160,7 +160,7 @@ impl PressedFace {
         self.face == next.face && (over(1.0) || over(-1.0))
     }
 
-    /// How far from rest it was and is, for both normals, m.
+    /// Distance to equilibrium before and after, for both normals, m.
     fn left(&self, next: &Self, point: &Point3<f64>, force: &Vector3<f64>) -> ([f64; 2], [f64; 2]) {
         let left =
             |at: &Self| [self.normal, next.normal].map(|n| (point - at.barycentre).dot(&n) + force.dot(&n) / STIFFNESS);

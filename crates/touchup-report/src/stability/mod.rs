@@ -68,7 +68,7 @@ pub struct MeshShares {
     pub by_quality: ShareMap,
 }
 
-/// What was measured of stability.
+/// Results on stability.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Stability {
     /// one for each integrator
@@ -161,7 +161,7 @@ impl Stability {
         self.sub_flows.iter().map(|flow| flow.largest_error).fold(0.0, f64::max)
     }
 
-    /// The maps, the tables and what they say.
+    /// The maps, the tables and their text.
     pub fn chapter(&self) -> Chapter {
         text::chapter(self)
     }

@@ -1,4 +1,4 @@
-//! The exact sub-flows against another way: the implicit closed form, solved by bisection in numbers of 32 digits.
+//! The exact sub-flows against an independent method: the implicit closed form, solved by bisection in numbers of 32 digits.
 
 use nalgebra::{Point3, Vector3};
 use rand::RngExt;
@@ -18,20 +18,20 @@ const NEAREST_OPPOSITE: std::ops::Range<f64> = -5.0..-1.0;
 /// Without rounding of the input: lengths in units of h_min, forces of f_max, times of h_min/(α f_max).
 const UNIT_MODEL: ContactModel = ContactModel::Sigmoid { f_max_n: 1.0, h_min_m: 1.0, delta: 0.0 };
 
-/// How far one sub-flow was from the truth at worst.
+/// Largest error of one sub-flow.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SubFlowError {
     /// which, and in which regime
     pub name: String,
     /// compared
     pub cases: usize,
-    /// largest error over the scale: of a position the way and h_min, of a normal 1
+    /// largest error over the scale: of a position the travel and h_min, of a normal 1
     pub largest_error: f64,
     /// where that was
     pub worst: String,
 }
 
-/// What the force is in a regime of the sigmoid, in units of f_max.
+/// Force in a regime of the sigmoid, in units of f_max.
 type ForceShare = fn(&mut Pcg64) -> f64;
 
 fn power(rng: &mut Pcg64, decades: std::ops::Range<f64>) -> f64 {
@@ -91,8 +91,8 @@ fn dynamics(model: ContactModel, alpha: f64, beta: f64) -> Option<FaceDynamics> 
 
 const FACE: FaceState = FaceState { b: Point3::new(0.0, 0.0, 0.0), n: Vector3::new(0.0, 0.0, 1.0) };
 
-/// The way of a face at the origin that looks up, in units of h_min.
-fn way(model: ContactModel, h: f64, force: f64, t: f64) -> f64 {
+/// Travel of a face at the origin that looks up, in units of h_min.
+fn travel(model: ContactModel, h: f64, force: f64, t: f64) -> f64 {
     let after = dynamics(model, 1.0, 0.0)
         .and_then(|dynamics| dynamics.step(&FACE, &Point3::new(0.0, 0.0, h), &(Vector3::z() * force), t).ok());
     after.map_or(f64::NAN, |face| face.b.z)
@@ -104,8 +104,8 @@ fn of_sigmoid(rng: &mut Pcg64, name: &str, share: ForceShare, cases: usize) -> S
         // half of them where the logistic bends, half of them anywhere an exponential is finite
         let u = if case % 2 == 0 { rng.random_range(-12.0..12.0) } else { rng.random_range(-600.0..600.0) };
         let (c, t) = (share(rng), power(rng, -6.0..6.0));
-        let Some(exact) = exact_way(u, c, t) else { continue };
-        let found = way(UNIT_MODEL, u, c, t);
+        let Some(exact) = exact_travel(u, c, t) else { continue };
+        let found = travel(UNIT_MODEL, u, c, t);
         worst.take((found - exact).abs() / (1.0 + exact.abs()), || format!("u {u}, F/f_max {c}, T {t}"));
     }
     worst.error
@@ -113,12 +113,12 @@ fn of_sigmoid(rng: &mut Pcg64, name: &str, share: ForceShare, cases: usize) -> S
 
 /// −Δu of du/dT = 1/(1+eᵘ) − c after T: the root of ∫ du / (1/(1+eᵘ) − c) = T between the start and the farthest it can be.
 /// `None` where it ends beyond the largest exponential without having been beyond the bend from the start.
-fn exact_way(u: f64, c: f64, t: f64) -> Option<f64> {
+fn exact_travel(u: f64, c: f64, t: f64) -> Option<f64> {
     let rate = share(u.into()) - c.into();
     if rate.high == 0.0 {
         return Some(0.0);
     }
-    // u moves one way, towards the rest point where there is one, and no faster than the larger of the rates at both ends
+    // u moves monotonically, towards the rest point where there is one, and no faster than the larger of the rates at both ends
     let up = rate.high > 0.0;
     let fastest = if up { (1.0 - c).abs() } else { c.abs() }.max(rate.high.abs());
     let farthest = u + if up { fastest * t } else { -fastest * t };
@@ -145,7 +145,7 @@ fn exact_way(u: f64, c: f64, t: f64) -> Option<f64> {
     Some((Double2::from(u) - near).value())
 }
 
-/// Where u runs so far that the exponential has no say: the rate is −c or 1 − c all the way but for the tail of the bend.
+/// Where u runs so far that the exponential has no say: the rate is −c or 1 − c throughout but for the tail of the bend.
 fn straight(u: f64, c: f64, t: f64, far: f64) -> Option<f64> {
     let is_flat = |low: f64, high: f64| low > 60.0 || high < -60.0;
     let (low, high) = (u.min(far), u.max(far));
@@ -186,7 +186,7 @@ fn of_spring(rng: &mut Pcg64, cases: usize) -> SubFlowError {
         // h + F falls to e^−t of itself
         let fallen = Double2::from(1.0) - Double2::from(-t.min(300.0)).exp();
         let exact = ((Double2::from(h) + force.into()) * fallen).value();
-        let found = way(model, h, force, t);
+        let found = travel(model, h, force, t);
         worst.take((found - exact).abs() / (1.0 + exact.abs()), || format!("h {h}, F {force}, T {t}"));
     }
     worst.error

@@ -1,4 +1,4 @@
-//! The chapter: maps, tables and what they say.
+//! The chapter: maps, tables and text.
 
 use super::{FaceShares, LARGEST_SUB_FLOW_ERROR, MeshShares, RunEnding, ShareMap, Stability};
 use crate::{Axis, Chapter, Drawing, Figure, Panel, Table, TableCell};
@@ -55,7 +55,7 @@ fn verdicts(stability: &Stability) -> Vec<String> {
     text.push(if stability.is_default_stable() {
         "One face: the integrator used by default (Lie, robust mode) was stable in every run.".to_owned()
     } else {
-        "MISSED: the integrator used by default (Lie, robust mode) was not stable in every run; the tables tell where."
+        "MISSED: the integrator used by default (Lie, robust mode) was not stable in every run; the tables show where."
             .to_owned()
     });
     text.push(of_default_on_meshes(stability));
@@ -230,7 +230,7 @@ fn sub_flows_table(stability: &Stability) -> Table {
         id: "stability_sub_flows".to_owned(),
         title: "Exact sub-flows against their implicit closed form in 32 digits".to_owned(),
         caption: format!(
-            "Largest error over the scale: of a position h_min and the way, of a normal 1. Limit {LARGEST_SUB_FLOW_ERROR:.0e}. Depths \
+            "Largest error over the scale: of a position h_min and the travel, of a normal 1. Limit {LARGEST_SUB_FLOW_ERROR:.0e}. Depths \
              up to 600 h_min, scaled times from 1e-6 to 1e6."
         ),
         heads: ["sub-flow", "cases", "largest error", "1e-10", "where"].map(str::to_owned).to_vec(),

@@ -1,5 +1,5 @@
 //! A baseline: contact points alone. The mesh is moved so that it passes through the point where the ball touches; no
-//! force, no felt normal, no guard on what an update may do.
+//! force, no measured normal, no guard on what an update may do.
 
 use nalgebra::{Point3, Vector3};
 
@@ -7,10 +7,10 @@ use touchup_core::mesh::{FaceHit, FaceId, FaceTree, TriMesh, VertexId, pseudo_no
 
 /// A mesh that is pulled through contact points.
 ///
-/// Which point of the ball touches is not known without a force: the one under the normal of the scan as it came is taken,
+/// Which point of the ball touches is not known without a force: the one under the normal of the unrefined scan is taken,
 /// in the place that is closest to the centre. The corners of the face closest to that point make the least moves along that
-/// normal that bring it as far, wᵢ / Σ w² of the way by its barycentric coordinates w; the vertices around it make (1 − (d/R)²)² of the way, d
-/// their distance from the place that is moved.
+/// normal that bring it as far, wᵢ / Σ w² of the displacement by its barycentric coordinates w; the vertices around it make (1 −
+/// (d/R)²)² of the displacement, d their distance from the place that is moved.
 #[derive(Clone, Debug)]
 pub struct ContactSculptor<'a> {
     scan: &'a TriMesh,
@@ -25,7 +25,7 @@ pub struct ContactSculptor<'a> {
 }
 
 impl<'a> ContactSculptor<'a> {
-    /// - `radius`: of the ball, m; `reach`: R, how far vertices follow, m.
+    /// - `radius`: of the ball, m; `reach`: R, radius within which vertices follow, m.
     pub fn new(scan: &'a TriMesh, radius: f64, reach: f64) -> Self {
         let (scan_tree, mesh) = (FaceTree::new(scan), scan.clone());
         let tree = scan_tree.clone();
@@ -72,7 +72,7 @@ impl<'a> ContactSculptor<'a> {
         }
     }
 
-    /// The mesh as it stands.
+    /// The current mesh.
     pub fn mesh(&self) -> &TriMesh {
         &self.mesh
     }

@@ -1,4 +1,4 @@
-//! How far a mesh is from the part where it was touched.
+//! Errors of a mesh against the part in the touched region.
 
 use serde::Serialize;
 
@@ -10,7 +10,7 @@ use touchup_core::mesh::{Alone, FaceTree, TriMesh};
 
 /// Points on the mesh for each m²: four in a square millimetre.
 const DENSITY: f64 = 4e6;
-/// At most so many of them: a mesh that blew up has a huge area.
+/// Largest number of points: a mesh that blew up has a huge area.
 const MOST_POINTS: f64 = 200e3;
 /// Of the points on the mesh.
 const SEED: u64 = 1;
@@ -18,11 +18,11 @@ const SEED: u64 = 1;
 /// Distances and angles between mesh and part in the touched region.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TouchedError {
-    /// mean distance from the places that were touched to the mesh: what is missing, mm
+    /// mean distance from the touched places to the mesh (completeness), mm
     pub part_to_mesh_mean_mm: f64,
     /// its 95th percentile, mm
     pub part_to_mesh_p95_mm: f64,
-    /// mean distance from the mesh to the part, where the closest place of the part was touched: what is wrong, mm
+    /// mean distance from the mesh to the part, where the closest place of the part was touched (accuracy), mm
     pub mesh_to_part_mean_mm: f64,
     /// its 95th percentile, mm
     pub mesh_to_part_p95_mm: f64,
@@ -63,7 +63,7 @@ impl TouchedError {
         })
     }
 
-    /// The worse of the two mean distances, mm: neither what is missing nor what is wrong is hidden by the other.
+    /// The worse of the two mean distances, mm: neither completeness nor accuracy hides the other.
     pub fn mean_mm(&self) -> f64 {
         self.part_to_mesh_mean_mm.max(self.mesh_to_part_mean_mm)
     }

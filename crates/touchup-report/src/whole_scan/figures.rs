@@ -1,18 +1,18 @@
 //! Figures and tables of whole scans.
 
-use super::{CaseResult, RefineMethod, ScanResult, TouchedError, WayResult, WholeScan};
+use super::{CaseResult, MethodResult, RefineMethod, ScanResult, TouchedError, WholeScan};
 use crate::{Axis, Drawing, Figure, LineStroke, Mark, Series, Spread, Table, TableCell};
 
 /// Points of a drawn law.
 const STEPS: usize = 12;
 
-/// A figure of one case: what it is called, and its axes.
+/// A figure of one case: its name and its axes.
 struct FigurePlan<'a> {
     id: &'a str,
     title: &'a str,
     x: Axis,
     y: Axis,
-    of: fn(&WayResult, &TouchedError) -> Mark,
+    of: fn(&MethodResult, &TouchedError) -> Mark,
 }
 
 fn time_axis() -> Axis {
@@ -50,7 +50,7 @@ impl WholeScan {
         ];
         let mut figures: Vec<Figure> = case
             .main()
-            .map_or_else(Vec::new, |scan| plans.into_iter().map(|plan| self.ways(case, scan, plan)).collect());
+            .map_or_else(Vec::new, |scan| plans.into_iter().map(|plan| self.methods(case, scan, plan)).collect());
         figures.extend([self.regions_and_densities(case), self.error_over_edge(case)]);
         figures.extend(self.gaussian_cost(case));
         figures
@@ -64,11 +64,11 @@ impl WholeScan {
         )
     }
 
-    /// One mark for each way on the main scan.
-    fn ways(&self, case: &CaseResult, scan: &ScanResult, plan: FigurePlan) -> Figure {
+    /// One mark for each method on the main scan.
+    fn methods(&self, case: &CaseResult, scan: &ScanResult, plan: FigurePlan) -> Figure {
         let FigurePlan { id, title, x, y, of } = plan;
         let mut series: Vec<Series> = scan
-            .ways
+            .methods
             .iter()
             .filter_map(|result| {
                 let marks = vec![of(result, &result.error?)];
@@ -80,7 +80,7 @@ impl WholeScan {
             id: format!("whole_scan_{id}_{}", file_name(&case.name)),
             title: format!("{title}, {}", case.name),
             caption: format!(
-                "Errors where the part was touched. {} Down and to the left is better; dashed: the scan as it came. For the \
+                "Errors where the part was touched. {} Down and to the left is better; dashed: the unrefined scan. For the \
                  Gaussian process a sample is a touch that it keeps.",
                 self.repeats()
             ),
@@ -90,25 +90,25 @@ impl WholeScan {
         }
     }
 
-    /// The robust mode over the sizes of its region, and three ways over the edges of the scan.
+    /// The robust mode over the sizes of its region, and three methods over the edges of the scan.
     fn regions_and_densities(&self, case: &CaseResult) -> Figure {
-        let mark = |result: &WayResult| Some(Mark { x: result.per_sample_us, y: result.error?.mean_mm().into() });
+        let mark = |result: &MethodResult| Some(Mark { x: result.per_sample_us, y: result.error?.mean_mm().into() });
         let mut series = Vec::new();
         if let Some(scan) = case.main() {
-            let robust = scan.ways.iter().filter(|result| matches!(result.way, RefineMethod::Robust(_)));
+            let robust = scan.methods.iter().filter(|result| matches!(result.method, RefineMethod::Robust(_)));
             series.push(Series {
                 name: "robust: handle, one ring, 0.5, 1, 2 tip radii".to_owned(),
                 stroke: LineStroke::Joined,
                 marks: robust.filter_map(mark).collect(),
             });
         }
-        for way in RefineMethod::BY_DENSITY.into_iter().filter(|_| case.scans.len() > 1) {
+        for method in RefineMethod::BY_DENSITY.into_iter().filter(|_| case.scans.len() > 1) {
             let scans = by_edge(case);
             let edges: Vec<String> = scans.iter().map(|scan| format!("{:.1}", scan.edge_mm)).collect();
             series.push(Series {
-                name: format!("{}: edges of {} mm", way.name(), edges.join(", ")),
+                name: format!("{}: edges of {} mm", method.name(), edges.join(", ")),
                 stroke: LineStroke::Joined,
-                marks: scans.into_iter().filter_map(|scan| mark(scan.of(way)?)).collect(),
+                marks: scans.into_iter().filter_map(|scan| mark(scan.of(method)?)).collect(),
             });
         }
         Figure {
@@ -130,9 +130,9 @@ impl WholeScan {
         };
         let mut all: Vec<Series> = RefineMethod::BY_DENSITY
             .into_iter()
-            .map(|way| series(way.name(), LineStroke::Joined, &|scan| scan.of(way)?.error))
+            .map(|method| series(method.name(), LineStroke::Joined, &|scan| scan.of(method)?.error))
             .collect();
-        all.push(series("scan as it came".to_owned(), LineStroke::Dashed, &|scan| Some(scan.before)));
+        all.push(series("unrefined scan".to_owned(), LineStroke::Dashed, &|scan| Some(scan.before)));
         Figure {
             id: format!("whole_scan_density_{}", file_name(&case.name)),
             title: format!("Mean surface error over the density of the scan, {}", case.name),
@@ -163,19 +163,19 @@ impl WholeScan {
                 marks: (0..=STEPS).map(step).map(|n| Mark { x: n.into(), y: at(n).into() }).collect(),
             },
         ];
-        for way in [RefineMethod::HAPTIC, RefineMethod::Patch] {
-            let Some(result) = case.main().and_then(|scan| scan.of(way)) else { continue };
+        for method in [RefineMethod::HAPTIC, RefineMethod::Patch] {
+            let Some(result) = case.main().and_then(|scan| scan.of(method)) else { continue };
             let time = result.per_sample_us.median;
             let ends = [cost.marks.first().map_or(1.0, |mark| mark.0), contacts];
             let marks = ends.iter().map(|&n| Mark { x: n.into(), y: time.into() }).collect();
-            series.push(Series { name: way.name(), stroke: LineStroke::Dashed, marks });
+            series.push(Series { name: method.name(), stroke: LineStroke::Dashed, marks });
         }
         Some(Figure {
             id: format!("whole_scan_gaussian_{}", file_name(&case.name)),
             title: format!("Time for one more touch over the touches kept, {}", case.name),
             caption: "Marks: medians of groups of touches in the first run, bars from p10 to p90 within the group. Dashed: \
                       the power law through the larger half of them, up to all contacts there were, and the mean time per \
-                      sample of two other ways."
+                      sample of two other methods."
                 .to_owned(),
             x: Axis::log("touches kept", "touches"),
             y: Axis::log("time for one more touch, µs", "time_per_touch_us"),
@@ -187,7 +187,7 @@ impl WholeScan {
         let heads = [
             "part",
             "edge, mm",
-            "way",
+            "method",
             "mean error, mm",
             "p95 error, mm",
             "part to mesh mean, mm",
@@ -205,7 +205,7 @@ impl WholeScan {
         let rows = self.cases.iter().flat_map(|case| case.scans.iter().map(move |scan| (case, scan)));
         Table {
             id: "whole_scan".to_owned(),
-            title: "All ways on all scans".to_owned(),
+            title: "All methods on all scans".to_owned(),
             caption: format!(
                 "Errors where the part was touched; mean and p95 error are the worse of both directions. Time per sample \
                  has the work after the last sample in it, shared out. Total time begins with the scan in memory. {}",
@@ -219,10 +219,10 @@ impl WholeScan {
 
 fn rows_of<'a>(case: &'a CaseResult, scan: &'a ScanResult) -> impl Iterator<Item = Vec<TableCell>> + 'a {
     let begin = move |name: &str| [case.name.as_str().into(), scan.edge_mm.into(), name.into()];
-    let mut first = begin("scan as it came").to_vec();
+    let mut first = begin("unrefined scan").to_vec();
     first.extend(error_cells(Some(&scan.before)));
     first.resize(16, TableCell::Empty);
-    let of_way = move |result: &WayResult| {
+    let of_method = move |result: &MethodResult| {
         let mut cells = begin(&result.name).to_vec();
         cells.extend(error_cells(result.error.as_ref()));
         cells.extend([
@@ -236,7 +236,7 @@ fn rows_of<'a>(case: &'a CaseResult, scan: &'a ScanResult) -> impl Iterator<Item
         ]);
         cells
     };
-    [first].into_iter().chain(scan.ways.iter().map(of_way))
+    [first].into_iter().chain(scan.methods.iter().map(of_method))
 }
 
 fn error_cells(error: Option<&TouchedError>) -> [TableCell; 6] {
@@ -252,12 +252,12 @@ fn error_cells(error: Option<&TouchedError>) -> [TableCell; 6] {
 }
 
 /// A dashed line at the error of the scan, as wide as the marks.
-fn as_it_came(series: &[Series], scan: &ScanResult, of: fn(&WayResult, &TouchedError) -> Mark) -> Option<Series> {
+fn as_it_came(series: &[Series], scan: &ScanResult, of: fn(&MethodResult, &TouchedError) -> Mark) -> Option<Series> {
     let xs = || series.iter().flat_map(|series| &series.marks).map(|mark| mark.x.median);
     let ends = [xs().reduce(f64::min)?, xs().reduce(f64::max)?];
-    let Mark { y, .. } = of(scan.ways.first()?, &scan.before);
+    let Mark { y, .. } = of(scan.methods.first()?, &scan.before);
     let marks = ends.iter().map(|&x| Mark { x: Spread::from(x), y }).collect();
-    Some(Series { name: "scan as it came".to_owned(), stroke: LineStroke::Dashed, marks })
+    Some(Series { name: "unrefined scan".to_owned(), stroke: LineStroke::Dashed, marks })
 }
 
 /// The scans of a case, the finest first.
@@ -267,7 +267,7 @@ fn by_edge(case: &CaseResult) -> Vec<&ScanResult> {
     scans
 }
 
-/// A name as it may stand in a file name.
+/// A name with the characters of a file name.
 fn file_name(name: &str) -> String {
     name.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '_' }).collect()
 }

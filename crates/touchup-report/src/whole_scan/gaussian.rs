@@ -2,7 +2,7 @@
 //!
 //! f(x) = d(x) + g(x), where d is the signed distance from the scan and g a Gaussian process of mean 0 and covariance
 //! k(x, y) = s² exp(−|x − y|² / 2ℓ²). Each contact p says f(p) = 0 up to noise σ, that is g(p) = −d(p). The mean of g is
-//! Σ k(x, pᵢ) wᵢ with (K + σ² I) w = −d(p), solved by Cholesky: n³/3 operations for n touches, each time anew.
+//! Σ k(x, pᵢ) wᵢ with (K + σ² I) w = −d(p), solved by Cholesky: n³/3 operations for n touches, refitted each time.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Point3};
 
@@ -10,17 +10,17 @@ use touchup_core::mesh::{FaceTree, TriMesh, VertexId, signed_distance};
 
 /// Rounds in which a vertex is moved to the zero of f along its normal.
 const ROUNDS: usize = 4;
-/// Beyond so many ℓ from every touch nothing is moved: there k is below 1e-4 of its height.
+/// Vertices beyond this many ℓ from every touch stay: there k is below 1e-4 of its height.
 const FAR: f64 = 4.5;
 
 /// What a Gaussian process assumes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GaussianParams {
-    /// s: how far values are from 0, root mean square
+    /// s: root mean square of the values
     pub amplitude: f64,
     /// ℓ: distance over which values are alike, m
     pub length: f64,
-    /// σ: standard deviation of what is measured, as the values
+    /// σ: standard deviation of a measured value
     pub noise: f64,
 }
 
@@ -81,7 +81,7 @@ impl<'a> GaussianSurface<'a> {
         Self { scan, tree: FaceTree::new(scan), params, points: Vec::new(), values: Vec::new(), process: None }
     }
 
-    /// Takes a contact point (m, in O) and fits anew; whether that was possible. A touch that makes it impossible is
+    /// Takes a contact point (m, in O) and refits; whether that was possible. A touch that makes it impossible is
     /// forgotten.
     pub fn push(&mut self, contact: Point3<f64>) -> bool {
         let Some(distance) = signed_distance(self.scan, &self.tree, &contact, f64::INFINITY) else { return false };
@@ -107,7 +107,7 @@ impl<'a> GaussianSurface<'a> {
             let sum: nalgebra::Vector3<f64> =
                 self.scan.star(vertex).iter().map(|&face| self.scan.double_area_normal(face)).sum();
             let Some(normal) = sum.try_normalize(0.0).filter(|_| !process.is_far(&position)) else { continue };
-            // along the normal d is the way gone, so f is zero where that is −g
+            // along the normal d is the displacement, so f is zero where that is −g
             let gone = (0..ROUNDS).fold(0.0, |gone, _| -process.mean(&(position + gone * normal)));
             mesh.set_position(vertex, position + gone * normal);
         }

@@ -15,10 +15,10 @@ use touchup_session::live::{Engine, Renewal};
 
 /// Standard deviation of a contact point for the Gaussian process, m: that of a good tracking system.
 const CONTACT_NOISE: f64 = 0.05e-3;
-/// The clock is asked once in so many samples whether the time is up.
+/// Number of samples between two checks of the time limit.
 const CLOCK_EVERY: usize = 64;
 
-/// How far the mesh around a touched face follows it.
+/// Radius of the region that follows a touched face.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reach {
@@ -40,7 +40,7 @@ pub enum RefineMethod {
     PaperLie,
     /// the repaired rule: the haptic update alone
     Robust(Reach),
-    /// the repaired rule with the touched part meshed anew, as `touchup refine` does it
+    /// the repaired rule with the touched part remeshed, as `touchup refine` does it
     Patch,
     /// contact points alone, a baseline
     ContactPoints,

@@ -1,4 +1,4 @@
-//! Error against run time on whole scans: each way to refine a scan by touch, on the same scans and samples, with the
+//! Error against run time on whole scans: each method to refine a scan by touch, on the same scans and samples, with the
 //! alternatives that the paper names as baselines.
 //!
 //! The surface error is measured where the part was touched, in both directions; the worse of the two counts. Runs are made
@@ -10,7 +10,7 @@ mod figures;
 mod gaussian;
 mod method;
 mod part;
-mod tell;
+mod text;
 
 use std::time::Duration;
 
@@ -21,7 +21,7 @@ pub use error::TouchedError;
 pub use gaussian::{GaussianParams, GaussianProcess, GaussianSurface};
 pub use method::{Reach, RefineMethod};
 use method::{Run, RunLimits, run};
-pub use part::Given;
+pub use part::GivenPart;
 use part::{Part, parts};
 
 use super::convergence::straight_line;
@@ -38,7 +38,7 @@ pub enum WholeScanError {
     /// A simulated part.
     #[error(transparent)]
     Sim(#[from] SimError),
-    /// A setting of what was given.
+    /// A setting of a given part.
     #[error(transparent)]
     Setting(#[from] SettingError),
     /// An engine that could not be built.
@@ -60,11 +60,11 @@ pub enum WholeScanError {
     },
 }
 
-/// How one way did on one scan.
+/// One method on one scan.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct WayResult {
+pub struct MethodResult {
     /// which
-    pub way: RefineMethod,
+    pub method: RefineMethod,
     /// as the report calls it
     pub name: String,
     /// against the part; `None` where the result has nothing near what was touched
@@ -89,17 +89,17 @@ pub struct WayResult {
     pub remarks: Vec<String>,
 }
 
-/// All ways on one scan.
+/// All methods on one scan.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ScanResult {
     /// mean edge length of the scan, mm
     pub edge_mm: f64,
     /// its faces
     pub faces: usize,
-    /// of the scan as it came
+    /// of the unrefined scan
     pub before: TouchedError,
     /// in the order in which they were tried
-    pub ways: Vec<WayResult>,
+    pub methods: Vec<MethodResult>,
 }
 
 /// What a touch costs the Gaussian process.
@@ -128,7 +128,7 @@ pub struct CaseResult {
     pub tip_radius_mm: f64,
     /// of the scan's vertices, mm
     pub scan_noise_mm: f64,
-    /// the first is the one on which all ways were tried
+    /// the first is the one on which all methods were run
     pub scans: Vec<ScanResult>,
     /// where it was tried
     pub gaussian: Option<GaussianCost>,
@@ -137,9 +137,9 @@ pub struct CaseResult {
 /// Error against run time on whole scans.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct WholeScan {
-    /// peaks, plate, and what was given
+    /// peaks, plate, and given parts
     pub cases: Vec<CaseResult>,
-    /// how often each way was run that is not slow
+    /// runs of each method that is not slow
     pub repeats: usize,
     /// a run that takes longer than this is made only once, s
     pub slow_s: f64,
@@ -148,7 +148,7 @@ pub struct WholeScan {
 /// Touches in a group of [`GaussianCost::marks`].
 const GROUP: usize = 25;
 
-impl WayResult {
+impl MethodResult {
     /// Whether it came to the end with a result that is no worse than the scan.
     pub fn is_sound(&self) -> bool {
         self.error.is_some() && !self.is_worse && !self.is_stopped
@@ -161,67 +161,67 @@ impl WayResult {
 }
 
 impl ScanResult {
-    /// How one way did.
-    pub fn of(&self, way: RefineMethod) -> Option<&WayResult> {
-        self.ways.iter().find(|result| result.way == way)
+    /// One method on one scan, with its errors and times.
+    pub fn of(&self, method: RefineMethod) -> Option<&MethodResult> {
+        self.methods.iter().find(|result| result.method == method)
     }
 
-    fn least<'a>(ways: impl Iterator<Item = &'a WayResult>) -> Option<&'a WayResult> {
-        ways.filter(|result| result.is_sound()).min_by(|a, b| a.mean_mm().total_cmp(&b.mean_mm()))
+    fn least<'a>(methods: impl Iterator<Item = &'a MethodResult>) -> Option<&'a MethodResult> {
+        methods.filter(|result| result.is_sound()).min_by(|a, b| a.mean_mm().total_cmp(&b.mean_mm()))
     }
 
-    /// The way with the least mean error.
-    pub fn best(&self) -> Option<&WayResult> {
-        Self::least(self.ways.iter())
+    /// The method with the least mean error.
+    pub fn best(&self) -> Option<&MethodResult> {
+        Self::least(self.methods.iter())
     }
 
     /// The region of the haptic update alone with the least mean error.
-    pub fn best_haptic(&self) -> Option<&WayResult> {
-        Self::least(self.ways.iter().filter(|result| matches!(result.way, RefineMethod::Robust(_))))
+    pub fn best_haptic(&self) -> Option<&MethodResult> {
+        Self::least(self.methods.iter().filter(|result| matches!(result.method, RefineMethod::Robust(_))))
     }
 
-    /// The ways that no other beats in both mean error and time per sample, the fastest first.
-    pub fn front(&self) -> Vec<&WayResult> {
-        let mut ways: Vec<_> = self.ways.iter().filter(|result| result.is_sound()).collect();
-        ways.sort_by(|a, b| a.per_sample_us.median.total_cmp(&b.per_sample_us.median));
+    /// Pareto front over mean error and time per sample, the fastest method first.
+    pub fn front(&self) -> Vec<&MethodResult> {
+        let mut methods: Vec<_> = self.methods.iter().filter(|result| result.is_sound()).collect();
+        methods.sort_by(|a, b| a.per_sample_us.median.total_cmp(&b.per_sample_us.median));
         let mut least = f64::INFINITY;
-        ways.retain(|result| {
+        methods.retain(|result| {
             let is_better = result.mean_mm() < least;
             least = least.min(result.mean_mm());
             is_better
         });
-        ways
+        methods
     }
 }
 
 impl CaseResult {
-    /// The scan on which all ways were tried.
+    /// The scan on which all methods were run.
     pub fn main(&self) -> Option<&ScanResult> {
         self.scans.first()
     }
 }
 
-/// One way on one scan, with the runs so far.
+/// One method on one scan, with the runs so far.
 struct Trial<'a> {
     part: &'a Part,
     scan: &'a TriMesh,
-    way: RefineMethod,
+    method: RefineMethod,
     totals_s: Vec<f64>,
     per_sample_us: Vec<f64>,
     ends_ms: Vec<f64>,
     first: Option<First>,
 }
 
-/// What is the same in each run, and the times of touches in the first.
+/// The quantities equal in each run, and the times of touches in the first.
 struct First {
     error: Result<TouchedError, CompareError>,
     run: Run,
 }
 
 impl<'a> Trial<'a> {
-    fn new(part: &'a Part, scan: &'a TriMesh, way: RefineMethod) -> Self {
+    fn new(part: &'a Part, scan: &'a TriMesh, method: RefineMethod) -> Self {
         let (totals_s, per_sample_us, ends_ms) = (Vec::new(), Vec::new(), Vec::new());
-        Self { part, scan, way, totals_s, per_sample_us, ends_ms, first: None }
+        Self { part, scan, method, totals_s, per_sample_us, ends_ms, first: None }
     }
 
     fn is_slow(&self, slow_s: f64) -> bool {
@@ -229,7 +229,7 @@ impl<'a> Trial<'a> {
     }
 
     fn run(&mut self, bounds: &RunLimits) -> Result<(), WholeScanError> {
-        let run = run(self.way, self.part, self.scan, bounds)?;
+        let run = run(self.method, self.part, self.scan, bounds)?;
         self.totals_s.push((run.build + run.samples + run.end).as_secs_f64());
         self.per_sample_us.push((run.samples + run.end).as_secs_f64() * 1e6 / run.given.max(1) as f64);
         self.ends_ms.push(run.end.as_secs_f64() * 1e3);
@@ -241,30 +241,30 @@ impl<'a> Trial<'a> {
         Ok(())
     }
 
-    fn result(&self, before: &TouchedError) -> Option<WayResult> {
+    fn result(&self, before: &TouchedError) -> Option<MethodResult> {
         let First { error, run } = self.first.as_ref()?;
         let mut remarks = Vec::new();
-        let is_stopped = run.refused + run.given < run.offered && self.way != RefineMethod::GaussianProcess;
+        let is_stopped = run.refused + run.given < run.offered && self.method != RefineMethod::GaussianProcess;
         if is_stopped {
             remarks.push(format!("stopped for its time after {} of {} samples", run.given, run.offered));
         }
-        if self.way == RefineMethod::GaussianProcess && run.given < run.offered {
+        if self.method == RefineMethod::GaussianProcess && run.given < run.offered {
             remarks.push(format!("given {} of {} contacts", run.given, run.offered));
         }
         if let Some(why) = &run.why {
             remarks.push(format!("{} of {} samples refused: {why}", run.refused, run.given));
         }
         if let Err(why) = error {
-            remarks.push(format!("no error can be told: {why}"));
+            remarks.push(format!("the error is undefined: {why}"));
         }
         let error = error.as_ref().ok().copied();
         let is_worse = error.is_none_or(|error| error.mean_mm() > before.mean_mm());
         if let Some(error) = error.filter(|_| is_worse) {
             remarks.push(format!("worse than the scan ({:.3} to {:.3} mm)", before.mean_mm(), error.mean_mm()));
         }
-        Some(WayResult {
-            way: self.way,
-            name: self.way.name(),
+        Some(MethodResult {
+            method: self.method,
+            name: self.method.name(),
             error,
             total_s: Spread::of(self.totals_s.clone())?,
             per_sample_us: Spread::of(self.per_sample_us.clone())?,
@@ -279,13 +279,13 @@ impl<'a> Trial<'a> {
     }
 }
 
-/// Measures every way on peaks, on the plate, and on what is given.
+/// Measures every method on peaks, on the plate, and on given parts.
 ///
 /// # Errors
-/// [`WholeScanError`], of what is given above all: a way that fails on its own is told in its result.
+/// [`WholeScanError`], mostly of given parts: a method that fails on its own says so in its result.
 pub fn whole_scan(
     effort: Effort,
-    given: Option<&Given>,
+    given: Option<&GivenPart>,
     progress: &mut dyn FnMut(&str),
 ) -> Result<WholeScan, WholeScanError> {
     let (repeats, slow_s) = (effort.choose(3, 7), effort.choose(0.25, 2.0));
@@ -294,14 +294,14 @@ pub fn whole_scan(
     let mut trials: Vec<Trial> = Vec::new();
     for part in &parts {
         for (number, scan) in part.scans.iter().enumerate() {
-            let ways: &[RefineMethod] = if number == 0 { &RefineMethod::ALL } else { &RefineMethod::BY_DENSITY };
-            trials.extend(ways.iter().map(|&way| Trial::new(part, scan, way)));
+            let methods: &[RefineMethod] = if number == 0 { &RefineMethod::ALL } else { &RefineMethod::BY_DENSITY };
+            trials.extend(methods.iter().map(|&method| Trial::new(part, scan, method)));
         }
     }
     for repeat in 0..repeats {
         for trial in trials.iter_mut().filter(|trial| !trial.is_slow(slow_s)) {
-            let (name, way) = (&trial.part.name, trial.way.name());
-            progress(&format!("whole scan: {name}, {way}, {} of {repeats}", repeat + 1));
+            let (name, method) = (&trial.part.name, trial.method.name());
+            progress(&format!("whole scan: {name}, {method}, {} of {repeats}", repeat + 1));
             trial.run(&bounds)?;
         }
     }
@@ -314,11 +314,11 @@ fn case(part: &Part, trials: &[Trial]) -> Result<CaseResult, WholeScanError> {
     for scan in &part.scans {
         let before = TouchedError::of(scan, &part.truth, &part.tree, &part.region)?;
         let own = trials.iter().filter(|trial| std::ptr::eq(trial.scan, scan));
-        let ways = own.filter_map(|trial| trial.result(&before)).collect();
-        scans.push(ScanResult { edge_mm: mean_edge(scan) * 1e3, faces: scan.face_count(), before, ways });
+        let methods = own.filter_map(|trial| trial.result(&before)).collect();
+        scans.push(ScanResult { edge_mm: mean_edge(scan) * 1e3, faces: scan.face_count(), before, methods });
     }
     let gaussian =
-        trials.iter().find(|trial| std::ptr::eq(trial.part, part) && trial.way == RefineMethod::GaussianProcess);
+        trials.iter().find(|trial| std::ptr::eq(trial.part, part) && trial.method == RefineMethod::GaussianProcess);
     let each = gaussian.and_then(|trial| trial.first.as_ref()).map_or(&[][..], |first| &first.run.each);
     let span_ns = match (part.samples.first(), part.samples.last()) {
         (Some(first), Some(last)) => last.stamp_ns.saturating_sub(first.stamp_ns),

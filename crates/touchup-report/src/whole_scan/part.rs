@@ -15,14 +15,14 @@ use touchup_sim::{
     plan_demo, raster, scan, touch,
 };
 
-/// A scan, the part as it is, and the contacts on it, as the caller has them; all in O.
+/// A scan, the true part, and the contacts on it, given by the caller; all in O.
 #[derive(Clone, Debug)]
-pub struct Given {
+pub struct GivenPart {
     /// how the report calls it
     pub name: String,
     /// as it came
     pub scan: TriMesh,
-    /// the part as it is
+    /// the true part
     pub truth: TriMesh,
     /// in order of time
     pub samples: Vec<Sample>,
@@ -34,7 +34,7 @@ pub struct Given {
     pub scan_noise: f64,
 }
 
-/// A contact as it was measured.
+/// A measured contact.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FeltContact {
     /// centre of a tip that does not bend, m: all that is known without a force
@@ -52,14 +52,14 @@ pub(super) struct Part {
     pub tip: TipParams,
     pub compensator: CompensatorParams,
     pub scan_noise: f64,
-    /// what was touched of `truth`
+    /// the touched region of `truth`
     pub region: TouchedRegion,
     pub contacts: Vec<FeltContact>,
-    /// the first is the one on which all ways are tried
+    /// the first is the one on which all methods are run
     pub scans: Vec<TriMesh>,
 }
 
-/// Seed of scans and hands.
+/// Seed of scans and paths.
 const SEED: u64 = 1;
 /// Edge length of the true mesh of `peaks`, m: its chords are within 5 µm of the surface.
 const TRUE_EDGE: f64 = 0.25e-3;
@@ -71,7 +71,7 @@ const ON_PART: f64 = 1e-3;
 /// Peaks and plate, and the part that was given.
 pub(super) fn parts(
     effort: Effort,
-    given: Option<&Given>,
+    given: Option<&GivenPart>,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Vec<Part>, WholeScanError> {
     // what is given first: it may be refused
@@ -84,7 +84,7 @@ pub(super) fn parts(
 }
 
 /// The samples that a hand-held stylus gives on a surface.
-fn felt_on(surface: &dyn Surface, path: &[Stroke]) -> Result<Vec<Sample>, WholeScanError> {
+fn contacts_on(surface: &dyn Surface, path: &[Stroke]) -> Result<Vec<Sample>, WholeScanError> {
     let touch = touch(surface, path, &StylusParams::default(), SEED)?;
     let mut sync = Synchroniser::new(SyncParams::default())?;
     let mut samples = Vec::new();
@@ -120,11 +120,11 @@ fn touched_peaks(effort: Effort) -> Result<Part, WholeScanError> {
         clear: bounds.max.z + 2.0 * tip.radius,
     };
     let path = raster(&region, Lines::AlongX, &PathParams { pitch: 1e-3, ..PathParams::default() })?;
-    let given = Given {
+    let given = GivenPart {
         name: "peaks".to_owned(),
         scan: scanned(2.4e-3)?,
         truth: peaks.mesh(TRUE_EDGE)?,
-        samples: felt_on(&peaks, &path)?,
+        samples: contacts_on(&peaks, &path)?,
         tip,
         compensator: CompensatorParams::default(),
         scan_noise: noise,
@@ -142,11 +142,11 @@ fn touched_plate(effort: Effort) -> Result<Part, WholeScanError> {
         // the first raster: there, over it, and away
         path.truncate(3);
     }
-    let given = Given {
+    let given = GivenPart {
         name: "plate".to_owned(),
         scan: scanned(ScannerParams::default().edge)?,
         truth: plate.mesh(CHORD_ERROR)?,
-        samples: felt_on(&plate, &path)?,
+        samples: contacts_on(&plate, &path)?,
         tip,
         compensator: CompensatorParams::default(),
         scan_noise: ScannerParams::default().noise,
@@ -157,8 +157,8 @@ fn touched_plate(effort: Effort) -> Result<Part, WholeScanError> {
 
 impl Part {
     /// - `others`: scans beside the one that was given.
-    fn new(given: Given, others: Vec<TriMesh>) -> Result<Self, WholeScanError> {
-        let Given { name, scan, truth, samples, tip, compensator, scan_noise } = given;
+    fn new(given: GivenPart, others: Vec<TriMesh>) -> Result<Self, WholeScanError> {
+        let GivenPart { name, scan, truth, samples, tip, compensator, scan_noise } = given;
         let tree = FaceTree::new(&truth);
         let gate = Some(ContactGateParams::default());
         let mut estimator =

@@ -34,7 +34,7 @@ pub enum Method {
     DriftCorrected,
 }
 
-/// What is turned to make it more exact.
+/// The setting that controls its accuracy.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SolverSetting {
@@ -44,7 +44,7 @@ pub enum SolverSetting {
     RelativeTolerance(f64),
 }
 
-/// Where an integrator left the face, and what it took.
+/// Final state of an integrator, and its cost.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Solved {
     /// at the end of the sample

@@ -6,7 +6,7 @@ mod method;
 mod problem;
 mod reference;
 mod rosenbrock;
-mod told;
+mod text;
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -27,7 +27,7 @@ const H_MINS_M: [f64; 8] = [1e-3, PAPER_H_MIN_M, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1
 const H_MINS_QUICK_M: [f64; 4] = [1e-3, PAPER_H_MIN_M, 1e-6, 1e-9];
 /// Without friction, and as real force streams lean: 4 to 28° were seen.
 const TILTS_DEG: [f64; 2] = [0.0, 20.0];
-/// What the reference knows: to this share of h_min, or to a few roundings of the way.
+/// Accuracy of the reference: to this share of h_min, or to a few roundings of the travel.
 const REFERENCE_SHARE: f64 = 1e-12;
 const REFERENCE_ROUNDINGS: f64 = 4.0;
 
@@ -38,7 +38,7 @@ pub struct WorkPrecision {
     pub cases: Vec<FaceCase>,
     /// of each time
     pub repeats: usize,
-    /// where no reference was found, so that nothing could be said
+    /// where no reference was found
     pub without_reference: Vec<String>,
 }
 
@@ -49,8 +49,8 @@ pub struct FaceCase {
     pub h_min_m: f64,
     /// between force and normal, degrees
     pub tilt_deg: f64,
-    /// how far the face really moves, m
-    pub way_m: f64,
+    /// exact displacement of the face, m
+    pub travel_m: f64,
     /// errors below it are shown as it: the reference knows no better, m
     pub floor_m: f64,
     /// one for each of [`Method::ALL`]
@@ -75,7 +75,7 @@ pub struct IntegratorRun {
     pub setting: SolverSetting,
     /// of the barycentre at the end, m
     pub error_m: f64,
-    /// |n − n_ref| at the end: the angle, rad, and what the length is off
+    /// |n − n_ref| at the end: the angle, rad, and the error of the length
     pub normal_error: f64,
     /// as in [`Solved`]
     pub evaluations: u64,
@@ -105,8 +105,8 @@ impl WorkPrecision {
 fn case(h_min_m: f64, tilt_deg: f64, effort: Effort, clock: &TimingParams) -> Option<FaceCase> {
     let problem = Problem::of(h_min_m, tilt_deg.to_radians());
     let right = reference(&problem)?;
-    let way_m = right.b.coords.norm();
-    let floor_m = (REFERENCE_SHARE * h_min_m).max(REFERENCE_ROUNDINGS * f64::EPSILON * way_m);
+    let travel_m = right.b.coords.norm();
+    let floor_m = (REFERENCE_SHARE * h_min_m).max(REFERENCE_ROUNDINGS * f64::EPSILON * travel_m);
     let curve = |method: Method| {
         let (mut points, mut gave_up) = (Vec::new(), Vec::new());
         for setting in method.settings(effort) {
@@ -125,7 +125,7 @@ fn case(h_min_m: f64, tilt_deg: f64, effort: Effort, clock: &TimingParams) -> Op
         }
         Curve { method, points, gave_up }
     };
-    Some(FaceCase { h_min_m, tilt_deg, way_m, floor_m, curves: Method::ALL.map(curve).to_vec() })
+    Some(FaceCase { h_min_m, tilt_deg, travel_m, floor_m, curves: Method::ALL.map(curve).to_vec() })
 }
 
 /// How times are taken.

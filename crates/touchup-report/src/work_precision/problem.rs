@@ -1,4 +1,4 @@
-//! One face held against one sample, as every integrator gets it: four unknowns, the way along n*(0) and the normal.
+//! One face held against one sample, as every integrator gets it: four unknowns, the travel along n*(0) and the normal.
 //!
 //! ```text
 //! ds/dt = α ((F − f n)·n)      dn/dt = β f (n × F) × n      h = (p − b₀ − s n(0))·n      f = f_max / (1 + exp(h/h_min + δ))
@@ -8,7 +8,7 @@ use nalgebra::{Matrix4, Point3, Vector3, Vector4};
 
 use touchup_core::refine::{Along, ContactModel, DynamicsParams, FaceState, StepRule};
 
-/// Way along n*(0), m, and the normal.
+/// Travel along n*(0), m, and the normal.
 pub type State = [f64; 4];
 
 /// f_max of the contact model, N; the paper leaves it open.

@@ -1,5 +1,6 @@
-//! What is right, by another way: the equations in the plane of normal and force, with the angle θ between them for an unknown, by
-//! Radau IIA of order 5 with Newton's method, each stretch of time halved until one step and two half steps agree.
+//! The reference solution, by an independent method: the equations in the plane of normal and force, with the angle θ between
+//! them for an unknown, by Radau IIA of order 5 with Newton's method, each stretch of time halved until one step and two half
+//! steps agree.
 //!
 //! ```text
 //! ds/dt = α (|F| cos θ − f)      dθ/dt = −β |F| f sin θ      n = cos θ F̂ + sin θ ê
@@ -17,7 +18,7 @@ const MOST_HALVINGS: u32 = 46;
 /// Newton's method has converged, or never will.
 const MOST_ITERATIONS: usize = 12;
 
-/// Where the face is at the end of the sample; `None` where the way there could not be followed.
+/// Where the face is at the end of the sample; `None` where the path could not be followed.
 pub fn reference(problem: &Problem) -> Option<FaceState> {
     let plane = ForcePlane::of(problem);
     let end = plane.follow(Vector2::new(0.0, plane.angle), problem.dt_s, 0)?;
@@ -65,13 +66,13 @@ impl<'a> ForcePlane<'a> {
         let n = self.normal(y.y);
         let arm = self.problem.arm - y.x * self.problem.normal;
         let (f, slope) = self.problem.expected(arm.dot(&n));
-        let by_way = -slope * self.problem.normal.dot(&n);
+        let by_travel = -slope * self.problem.normal.dot(&n);
         let by_angle = slope * arm.dot(&(cosine * self.across - sine * self.along));
         let turn = BETA_PER_N2_S * self.magnitude;
         Matrix2::new(
-            -ALPHA_M_PER_N_S * by_way,
+            -ALPHA_M_PER_N_S * by_travel,
             -ALPHA_M_PER_N_S * (self.magnitude * sine + by_angle),
-            -turn * sine * by_way,
+            -turn * sine * by_travel,
             -turn * (sine * by_angle + f * cosine),
         )
     }

@@ -67,7 +67,7 @@ pub fn integrate(
     None
 }
 
-/// The result of order 4, and what it differs by from that of order 3.
+/// The result of order 4, and its difference from that of order 3.
 fn stages(
     y: &Vector4<f64>,
     dt: f64,

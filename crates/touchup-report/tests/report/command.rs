@@ -23,19 +23,19 @@ fn a_folder_that_cannot_be_and_a_chapter_that_is_not_are_wrong_usage() {
 }
 
 #[test]
-fn one_chapter_is_measured_written_and_told() {
+fn one_chapter_is_measured_written_and_printed() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("made/anew");
     let output = report(&["--out", out.to_str().unwrap(), "--quick", "--json", "--only", "work-precision"]);
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
-    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let printed: Value = serde_json::from_slice(&output.stdout).unwrap();
     let written: Value = serde_json::from_slice(&fs::read(out.join("report.json")).unwrap()).unwrap();
-    assert_eq!(told, written);
-    assert_eq!(told["chapters"].as_array().unwrap().len(), 1);
-    assert!(told["command"].as_str().unwrap().ends_with("--quick --only work-precision"));
-    assert!(!told["machine"].as_str().unwrap().is_empty() && !told["commit"].as_str().unwrap().is_empty());
+    assert_eq!(printed, written);
+    assert_eq!(printed["chapters"].as_array().unwrap().len(), 1);
+    assert!(printed["command"].as_str().unwrap().ends_with("--quick --only work-precision"));
+    assert!(!printed["machine"].as_str().unwrap().is_empty() && !printed["commit"].as_str().unwrap().is_empty());
     let html = fs::read_to_string(out.join("report.html")).unwrap();
-    for figure in told["chapters"][0]["figures"].as_array().unwrap() {
+    for figure in printed["chapters"][0]["figures"].as_array().unwrap() {
         let id = figure["id"].as_str().unwrap();
         for name in [format!("{id}.csv"), format!("{id}.svg")] {
             assert!(out.join(&name).is_file() && html.contains(&format!("href=\"{name}\"")), "{name}");

@@ -1,4 +1,4 @@
-//! What a push costs, as the report tells it: the text from the numbers, and that both sides of the ratio do the same work.
+//! The cost of a push in the report: the text from the numbers, and that both sides of the ratio do the same work.
 
 use touchup_core::mesh::{FaceTree, TriMesh};
 use touchup_core::refine::Refiner;
@@ -65,7 +65,7 @@ fn made_up() -> Cost {
 }
 
 #[test]
-fn the_text_tells_hits_and_misses_as_they_were_measured() {
+fn the_text_reports_hits_and_misses_as_measured() {
     let mut cost = made_up();
     let text = cost.chapter().text.join("\n");
     // 180 ns where the law says 160
@@ -110,11 +110,11 @@ fn the_cheapest_scene_moves_the_mesh_as_the_hand_written_loop_does() {
         refiner.push(&sample).unwrap();
         assert_eq!(refiner.moved_vertices().len(), 3);
     }
-    let way = |mesh: &TriMesh| {
+    let displacement = |mesh: &TriMesh| {
         let moved = mesh.positions().iter().zip(scan.positions()).map(|(now, before)| (now - before).norm());
         moved.sum::<f64>()
     };
-    let [by_loop, by_scene] = [minimal.mesh(), refiner.mesh()].map(way);
+    let [by_loop, by_scene] = [minimal.mesh(), refiner.mesh()].map(displacement);
     println!("vertices moved by {by_loop:.3e} m and {by_scene:.3e} m in all");
     assert!(by_loop > 1e-3 && (0.8..1.25).contains(&(by_scene / by_loop)), "{by_scene} and {by_loop}");
     // the two loops differ in how they find the face and the boxes alone
@@ -125,11 +125,11 @@ fn the_cheapest_scene_moves_the_mesh_as_the_hand_written_loop_does() {
 
 #[test]
 fn the_small_measurement_measures_every_part() {
-    let mut told = Vec::new();
+    let mut lines = Vec::new();
     let began = std::time::Instant::now();
     let cost = cost(Effort { is_quick: true }, &mut |line| {
         println!("{:6.1} s {line}", began.elapsed().as_secs_f64());
-        told.push(line.to_owned());
+        lines.push(line.to_owned());
     })
     .unwrap();
     println!("{:6.1} s", began.elapsed().as_secs_f64());
@@ -142,7 +142,7 @@ fn the_small_measurement_measures_every_part() {
             println!("{}", cells.join(" | "));
         }
     }
-    assert!(told.len() >= 5 && told.iter().all(|line| line.starts_with("cost: ")));
+    assert!(lines.len() >= 5 && lines.iter().all(|line| line.starts_with("cost: ")));
     let faces: Vec<_> = cost.sizes.iter().map(|size| size.faces).collect();
     assert!(faces.is_sorted() && faces.len() == 3, "{faces:?}");
     let names: Vec<_> = cost.parts.iter().take(7).map(|part| part.part.as_str()).collect();

@@ -7,7 +7,7 @@ use touchup_core::mesh::{FaceTree, TriMesh, VertexId};
 use touchup_core::refine::TipParams;
 use touchup_core::touch::{CompensatorParams, Sample, Wrench};
 use touchup_report::{
-    ContactSculptor, Drawing, Effort, GaussianParams, GaussianProcess, GaussianSurface, Given, RefineMethod, Rule,
+    ContactSculptor, Drawing, Effort, GaussianParams, GaussianProcess, GaussianSurface, GivenPart, RefineMethod, Rule,
     TableCell, TouchedError, WholeScanError, convergence, fit_decay, straight_line, whole_scan,
 };
 
@@ -74,7 +74,7 @@ fn the_implicit_surface_goes_through_a_touch() {
     let mesh = surface.mesh();
     let z = |i: u32, j: u32| mesh.position(VertexId(i + 41 * j)).z;
     assert!((z(20, 20) - height).abs() < 1e-9, "{}", z(20, 20));
-    // 2 mm aside: one length, so about exp(−1/2) of it; the way up changes that by less than h²/2ℓ² = 0.5 %
+    // 2 mm aside: one length, so about exp(−1/2) of it; the height changes that by less than h²/2ℓ² = 0.5 %
     assert!((z(22, 20) / height - (-0.5f64).exp()).abs() < 0.005, "{}", z(22, 20));
     assert_eq!(z(40, 20), 0.0);
 }
@@ -84,7 +84,7 @@ fn contact_points_pull_the_mesh_through_themselves() {
     let radius = 1.5e-3;
     let scan = sheet(20, 0.4e-3);
     let mut sculptor = ContactSculptor::new(&scan, radius, 2e-3);
-    // a ball that rests on z = 0, inside a face, on an edge and on a vertex
+    // a ball on z = 0, inside a face, on an edge and on a vertex
     for (x, y) in [(5.3e-3, 5.2e-3), (12.5e-3, 9e-3), (15e-3, 15e-3)] {
         let contact = sculptor.push(&Point3::new(x, y, radius)).unwrap();
         assert!((contact - Point3::new(x, y, 0.0)).norm() < 1e-15);
@@ -187,7 +187,7 @@ fn what_cannot_be_fitted_is_not() {
 }
 
 /// A sheet that lies 0.4 mm too high, and a rigid ball that slides over the true one.
-fn given() -> Given {
+fn given() -> GivenPart {
     let radius = 1.5e-3;
     let samples = (0..12_000_i64).map(|i| {
         let (line, along) = (i / 1000, (i % 1000) as f64 * 0.012e-3);
@@ -196,7 +196,7 @@ fn given() -> Given {
         let wrench = Wrench { force: Vector3::new(0.0, 0.0, 2.0), torque: Vector3::zeros() };
         Sample { stamp_ns: i * 1_000_000, pose_ot, wrench }
     });
-    Given {
+    GivenPart {
         name: "a sheet".to_owned(),
         scan: sheet(20, 0.4e-3),
         truth: sheet(20, 0.0),
@@ -210,7 +210,7 @@ fn given() -> Given {
 const QUICK: Effort = Effort { is_quick: true };
 
 #[test]
-fn whole_scans_are_measured_and_told() {
+fn whole_scans_are_measured_and_reported() {
     let (given, mut lines) = (given(), 0);
     let begun = std::time::Instant::now();
     let found = whole_scan(QUICK, Some(&given), &mut |line| {
@@ -224,11 +224,11 @@ fn whole_scans_are_measured_and_told() {
     assert!(lines > 3 * RefineMethod::ALL.len());
     for case in &found.cases {
         let scan = case.main().unwrap();
-        assert_eq!(scan.ways.iter().map(|result| result.way).collect::<Vec<_>>(), RefineMethod::ALL);
-        for result in scan.ways.iter().filter(|result| !result.is_sound()) {
+        assert_eq!(scan.methods.iter().map(|result| result.method).collect::<Vec<_>>(), RefineMethod::ALL);
+        for result in scan.methods.iter().filter(|result| !result.is_sound()) {
             assert!(!result.remarks.is_empty(), "{}: {} says why", case.name, result.name);
         }
-        for result in case.scans.iter().flat_map(|scan| &scan.ways) {
+        for result in case.scans.iter().flat_map(|scan| &scan.methods) {
             println!(
                 "{:8} {:35} {:7.3} mm {:7.3} mm {:6.1} deg {:9.3} µs {:8.3} s {:?}",
                 case.name,
@@ -242,23 +242,23 @@ fn whole_scans_are_measured_and_told() {
             );
         }
         let best = scan.best().unwrap();
-        assert!(scan.ways.iter().all(|result| !result.is_sound() || result.mean_mm() >= best.mean_mm()));
+        assert!(scan.methods.iter().all(|result| !result.is_sound() || result.mean_mm() >= best.mean_mm()));
         assert!(scan.front().iter().any(|result| result.mean_mm() == best.mean_mm()));
     }
     let sheet = found.cases[2].main().unwrap();
     assert!((sheet.before.mean_mm() - 0.4).abs() < 1e-9, "{:?}", sheet.before);
     // each contact point pulls down what lies behind it too, where the ball does not come again
     assert!(sheet.of(RefineMethod::ContactPoints).unwrap().mean_mm() < 0.4);
-    for way in [RefineMethod::HAPTIC, RefineMethod::Patch, RefineMethod::GaussianProcess] {
-        assert!(sheet.of(way).unwrap().mean_mm() < 0.1, "{way:?}: an even offset is no difficulty");
+    for method in [RefineMethod::HAPTIC, RefineMethod::Patch, RefineMethod::GaussianProcess] {
+        assert!(sheet.of(method).unwrap().mean_mm() < 0.1, "{method:?}: an even offset is no difficulty");
     }
     let chapter = found.chapter();
     chapter.text.iter().for_each(|text| println!("{text}\n"));
     check_chapter(&chapter);
     let rows = &chapter.tables[0].rows;
     let scans: usize = found.cases.iter().map(|case| case.scans.len()).sum();
-    let ways: usize = found.cases.iter().flat_map(|case| &case.scans).map(|scan| scan.ways.len()).sum();
-    assert_eq!(rows.len(), scans + ways, "nothing is left out");
+    let methods: usize = found.cases.iter().flat_map(|case| &case.scans).map(|scan| scan.methods.len()).sum();
+    assert_eq!(rows.len(), scans + methods, "nothing is left out");
 }
 
 #[test]
@@ -270,7 +270,7 @@ fn what_touches_nothing_is_refused() {
 }
 
 #[test]
-fn convergence_is_measured_and_told() {
+fn convergence_is_measured_and_reported() {
     let found = convergence(QUICK, &mut |_| {});
     assert!(found.failed.is_empty());
     for rule in [Rule::Paper, Rule::Robust] {

@@ -17,7 +17,7 @@ fn at_half_of_f_max(h_min_m: f64, from: f64) -> Problem {
 }
 
 /// du/dT = −tanh(u/2)/2 at half of f_max: sinh(u/2) falls by e^(−T/4), T = α f_max t / h_min.
-fn way_at_half(problem: &Problem, from: f64) -> f64 {
+fn travel_at_half(problem: &Problem, from: f64) -> f64 {
     let scaled = 0.1 * 10.0 * problem.dt_s / problem.h_min_m;
     let to = 2.0 * ((from / 2.0).sinh() * (-scaled / 4.0).exp()).asinh();
     (from - to) * problem.h_min_m
@@ -30,14 +30,14 @@ fn the_reference_agrees_with_the_closed_form_however_stiff() {
             let problem = at_half_of_f_max(h_min_m, from);
             let found = reference(&problem).unwrap().b.z;
             // what the report relies on: 1e-12 of h_min
-            let off = (found - way_at_half(&problem, from)).abs() / h_min_m;
+            let off = (found - travel_at_half(&problem, from)).abs() / h_min_m;
             assert!(off < 1e-12, "h_min {h_min_m} from {from}: off by {off} of h_min");
         }
     }
 }
 
 #[test]
-fn the_reference_turns_the_normal_by_the_impulse_it_has_felt() {
+fn the_reference_turns_the_normal_by_the_impulse_applied() {
     // tan(θ/2) falls by e^(−β|F|J), J = F·n t − s/α while n hardly turns; here it is held fast by a tiny dt of a deep tip
     let tilt: f64 = 0.6;
     let problem = Problem {
@@ -97,7 +97,7 @@ fn an_adaptive_solver_gets_a_digit_for_its_evaluations() {
 fn without_friction_one_exact_step_is_the_solution_and_no_explicit_one_is() {
     for h_min_m in [1e-3, 1e-6, 1e-9] {
         let problem = at_half_of_f_max(h_min_m, 3.0);
-        let right = way_at_half(&problem, 3.0);
+        let right = travel_at_half(&problem, 3.0);
         for method in [Method::Lie, Method::DriftCorrected] {
             let end = method.solve(&problem, SolverSetting::Steps(1)).unwrap().face;
             assert!((end.b.z - right).abs() < 1e-13 * h_min_m && end.n == Vector3::z());
@@ -158,7 +158,7 @@ fn what_is_measured_becomes_a_chapter_with_the_same_numbers() {
         let lie = case.curve(Method::Lie).unwrap().one_step().unwrap().error_m;
         let corrected = case.curve(Method::DriftCorrected).unwrap().one_step().unwrap().error_m;
         if case.tilt_deg == 0.0 {
-            assert!(lie <= 2e-12 * case.h_min_m.max(case.way_m), "{lie} at {}", case.h_min_m);
+            assert!(lie <= 2e-12 * case.h_min_m.max(case.travel_m), "{lie} at {}", case.h_min_m);
         } else {
             assert!(lie > 1e-12 && corrected < lie, "{lie} {corrected} at {}", case.h_min_m);
         }

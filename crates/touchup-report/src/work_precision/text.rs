@@ -1,10 +1,10 @@
-//! What was measured as a chapter, and what it says.
+//! The results as a chapter, with its text.
 
 use super::{Curve, FaceCase, IntegratorRun, Method, PAPER_H_MIN_M, TILTS_DEG, WorkPrecision};
 use crate::number::three_digits;
 use crate::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Series, Spread, Table, TableCell};
 
-/// What is asked for, m: what a sensor can tell, a thousandth of that, and as good as exact.
+/// Requested accuracy, m: the resolution of a sensor, a thousandth of that, and as good as exact.
 const LEVELS_M: [(f64, &str); 3] = [(1e-6, "1 µm"), (1e-9, "1 nm"), (1e-12, "1 pm")];
 /// Stiffnesses with figures of their own.
 const SHOWN_H_MINS_M: [f64; 2] = [PAPER_H_MIN_M, 1e-9];
@@ -66,7 +66,7 @@ impl WorkPrecision {
         });
         let ((straight_case, straight), (case, tilted)) = (straight?, tilted?);
         let without_friction = if straight.error_m <= straight_case.floor_m {
-            "without friction it is as exact as the reference can tell, whatever h_min".to_owned()
+            "without friction it is as exact as the reference can resolve, whatever h_min".to_owned()
         } else {
             format!("without friction it is off by at most {}", length(straight.error_m))
         };
@@ -81,7 +81,7 @@ impl WorkPrecision {
         ))
     }
 
-    /// Who is fastest to an error: where it is an exact step, and where it is not, by how much.
+    /// The fastest integrator for an error: where it is an exact step, and where not, by how much.
     fn wins_and_losses(&self, (error_m, name): (f64, &str)) -> String {
         let outcomes: Vec<FastestSolvers> = self.cases.iter().map(|case| FastestSolvers::of(case, error_m)).collect();
         let won: Vec<&FastestSolvers> = outcomes.iter().filter(|outcome| outcome.is_won()).collect();
@@ -120,7 +120,7 @@ impl WorkPrecision {
     /// Up to which stiffness the explicit solvers are of use.
     fn explicit_limits(&self) -> Vec<String> {
         let explicit = [Method::Euler, Method::RungeKutta, Method::DormandPrince];
-        let tell = |method: Method, error_m: f64| {
+        let fastest = |method: Method, error_m: f64| {
             let fails = |case: &&FaceCase| case.curve(method).is_none_or(|curve| curve.cheapest(error_m).is_none());
             let failing: Vec<f64> = self.cases.iter().filter(fails).map(|case| case.h_min_m).collect();
             largest(&failing).map_or_else(
@@ -136,14 +136,14 @@ impl WorkPrecision {
             )
         };
         let levels = LEVELS_M[..2].iter();
-        let told =
-            levels.map(|(error_m, name)| format!("{}: {}", name, explicit.map(|m| tell(m, *error_m)).join(", ")));
+        let lines =
+            levels.map(|(error_m, name)| format!("{}: {}", name, explicit.map(|m| fastest(m, *error_m)).join(", ")));
         let first = self.cases.iter().filter_map(|case| case.curve(Method::Euler)?.points.last());
         let Some(steps) = first.map(|point| point.evaluations).max() else { return Vec::new() };
         vec![format!(
             "Explicit solvers, with up to {steps} steps a sample. Within {}. The expected force is bounded, so \
              steps that are too coarse do not run away: they rattle around the answer.",
-            told.collect::<Vec<_>>().join(". Within ")
+            lines.collect::<Vec<_>>().join(". Within ")
         )]
     }
 
@@ -170,7 +170,7 @@ impl WorkPrecision {
         let mark = |point: &IntegratorRun| Mark { x: point.time_s.times(1e6), y: (1e3 * point.error_m).into() };
         let mut figure = case.figure("time", Axis::log("time for the sample, µs", "time_us"), mark);
         figure.caption = format!(
-            "Lower left is better. Bars: p10–p90 of {} repeats. Errors at the lower edge are as small as the reference can tell.{}",
+            "Lower left is better. Bars: p10–p90 of {} repeats. Errors at the lower edge are as small as the reference can resolve.{}",
             self.repeats,
             case.gave_up()
         );
@@ -223,7 +223,7 @@ impl WorkPrecision {
         let heads = ["h_min, mm", "tilt, °", "within", "fastest"].map(str::to_owned).into_iter();
         Table {
             id: "work_precision_fastest".to_owned(),
-            title: "Fastest way to an error".to_owned(),
+            title: "Fastest integrator for an error".to_owned(),
             caption: "Time for the sample; empty: not reached with any setting that was tried.".to_owned(),
             heads: heads.chain(Method::ALL.map(|method| format!("{}, µs", method.name()))).collect(),
             rows,
@@ -240,14 +240,14 @@ impl WorkPrecision {
             None => [TableCell::Empty, TableCell::Empty, TableCell::Empty],
         };
         let row = |case: &FaceCase| {
-            let way = [1e3 * case.h_min_m, case.tilt_deg, 1e3 * case.way_m].map(TableCell::Number);
+            let parameters = [1e3 * case.h_min_m, case.tilt_deg, 1e3 * case.travel_m].map(TableCell::Number);
             let steps = [Method::Lie, Method::DriftCorrected].map(|method| cells(case.curve(method)));
-            way.into_iter().chain(steps.into_iter().flatten()).collect()
+            parameters.into_iter().chain(steps.into_iter().flatten()).collect()
         };
         let heads = [
             "h_min, mm",
             "tilt, °",
-            "way, mm",
+            "travel, mm",
             "Lie: error, mm",
             "Lie: normal, °",
             "Lie: time, µs",
@@ -258,7 +258,9 @@ impl WorkPrecision {
         Table {
             id: "work_precision_one_step".to_owned(),
             title: "The whole sample in one exact step".to_owned(),
-            caption: "Way: how far the face really moves. Without tilt the one step is the exact solution.".to_owned(),
+            caption:
+                "Travel: how far the face moves in the exact solution. Without tilt the one step is the exact solution."
+                    .to_owned(),
             heads: heads.map(str::to_owned).to_vec(),
             rows: self.cases.iter().map(row).collect(),
         }
@@ -357,13 +359,13 @@ impl FaceCase {
     /// Which integrators gave up, and how often; empty where none did.
     fn gave_up(&self) -> String {
         let giving_up = self.curves.iter().filter(|curve| !curve.gave_up.is_empty());
-        let told: Vec<String> = giving_up
+        let failures: Vec<String> = giving_up
             .map(|curve| {
                 let all = curve.gave_up.len() + curve.points.len();
                 format!("{} gave up at {} of {all} settings", curve.method.name(), curve.gave_up.len())
             })
             .collect();
-        if told.is_empty() { String::new() } else { format!(" {}.", told.join("; ")) }
+        if failures.is_empty() { String::new() } else { format!(" {}.", failures.join("; ")) }
     }
 }
 

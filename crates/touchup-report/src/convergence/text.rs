@@ -40,7 +40,7 @@ impl Convergence {
         )
     }
 
-    /// What the runs of one rule say.
+    /// Result of the runs of one rule.
     fn verdict(&self, rule: Rule) -> String {
         let runs: Vec<&SweepRun> = self.of(rule).collect();
         let converged: Vec<&SweepRun> = runs.iter().copied().filter(|run| run.has_converged()).collect();

@@ -1,6 +1,6 @@
 //! What whole scans say, in words.
 
-use super::{CaseResult, GaussianCost, Reach, RefineMethod, ScanResult, WayResult, WholeScan};
+use super::{CaseResult, GaussianCost, MethodResult, Reach, RefineMethod, ScanResult, WholeScan};
 use crate::Chapter;
 
 /// A difference below this share is none.
@@ -10,8 +10,8 @@ impl WholeScan {
     /// As a part of the report.
     pub fn chapter(&self) -> Chapter {
         let mut text = vec![
-            "Each way gets the same scan and the same samples, one thread. The surface error is measured where the part was \
-             touched, from the part to the mesh and from the mesh to the part; the worse of the two counts. Two of the ways \
+            "Each method gets the same scan and the same samples, one thread. The surface error is measured where the part was \
+             touched, from the part to the mesh and from the mesh to the part; the worse of the two counts. Two of the methods \
              are baselines of our own for what the paper names as alternatives: contact points alone pull the mesh through \
              the point under the ball, knowing of the force only that there is contact, and the Gaussian process is an exact \
              implicit surface over the scan that is refitted from nothing at each touch it keeps."
@@ -32,8 +32,8 @@ impl WholeScan {
     }
 }
 
-/// Name, error and time of one way.
-fn told(result: &WayResult) -> String {
+/// Name, error and time of one method.
+fn describe(result: &MethodResult) -> String {
     format!(
         "{} ({}{:.3} mm, {:.2} µs per sample)",
         result.name,
@@ -44,10 +44,10 @@ fn told(result: &WayResult) -> String {
 }
 
 impl CaseResult {
-    /// Which way is the best for its time.
+    /// The Pareto front over error and time.
     fn verdict(&self, scan: &ScanResult) -> String {
         let mut text = format!(
-            "{}: {} faces with edges of {:.1} mm, {} samples in {:.0} s of touching; the scan as it came is off by {:.3} mm \
+            "{}: {} faces with edges of {:.1} mm, {} samples in {:.0} s of touching; the unrefined scan is off by {:.3} mm \
              (p95 {:.3} mm, normals {:.1} deg).",
             self.name,
             scan.faces,
@@ -59,21 +59,22 @@ impl CaseResult {
             scan.before.normal_mean_deg
         );
         match scan.best() {
-            None => text += " No way made it better.",
+            None => text += " No method reduced the error.",
             Some(best) => {
                 text += &format!(
                     " The least mean error has {}: {:.1} times less than the scan.",
-                    told(best),
+                    describe(best),
                     scan.before.mean_mm() / best.mean_mm()
                 );
             }
         }
-        let front: Vec<String> = scan.front().into_iter().map(told).collect();
+        let front: Vec<String> = scan.front().into_iter().map(describe).collect();
         if front.len() > 1 {
-            text += &format!(" No other way is both faster and better than one of these: {}.", front.join(", "));
+            text +=
+                &format!(" No other method is both faster and more accurate than one of these: {}.", front.join(", "));
         }
         if let Some(haptic) = scan.best_haptic() {
-            text += &format!(" Of the regions of the haptic update alone the best is {}.", told(haptic));
+            text += &format!(" Of the regions of the haptic update alone the best is {}.", describe(haptic));
             text += &same_regions(scan);
             text += &against_contact_points(haptic, scan.of(RefineMethod::ContactPoints));
         }
@@ -82,11 +83,11 @@ impl CaseResult {
 
     /// What finer and coarser scans change.
     fn densities(&self) -> Option<String> {
-        let tell = |way: RefineMethod| {
-            let mut of_scans: Vec<(f64, &WayResult)> =
-                self.scans.iter().filter_map(|scan| Some((scan.edge_mm, scan.of(way)?))).collect();
+        let text = |method: RefineMethod| {
+            let mut of_scans: Vec<(f64, &MethodResult)> =
+                self.scans.iter().filter_map(|scan| Some((scan.edge_mm, scan.of(method)?))).collect();
             of_scans.sort_by(|a, b| b.0.total_cmp(&a.0));
-            let each = |&(edge, result): &(f64, &WayResult)| {
+            let each = |&(edge, result): &(f64, &MethodResult)| {
                 let worse = if result.is_worse { ", worse than the scan" } else { "" };
                 format!(
                     "{:.3} mm in {:.2} µs per sample at {edge:.1} mm{worse}",
@@ -94,9 +95,9 @@ impl CaseResult {
                     result.per_sample_us.median
                 )
             };
-            format!("{}: {}", way.name(), of_scans.iter().map(each).collect::<Vec<_>>().join(", "))
+            format!("{}: {}", method.name(), of_scans.iter().map(each).collect::<Vec<_>>().join(", "))
         };
-        let all = RefineMethod::BY_DENSITY.map(tell).join("; ");
+        let all = RefineMethod::BY_DENSITY.map(text).join("; ");
         (self.scans.len() > 1).then(|| format!("{} over the edge length of the scan. {all}.", self.name))
     }
 
@@ -124,7 +125,7 @@ fn long_time(seconds: f64) -> String {
 }
 
 /// Whether force and normals are worth it.
-fn against_contact_points(haptic: &WayResult, points: Option<&WayResult>) -> String {
+fn against_contact_points(haptic: &MethodResult, points: Option<&MethodResult>) -> String {
     let Some(points) = points else { return String::new() };
     if !points.is_sound() {
         return format!(" Contact points alone did not do: {}.", points.remarks.join("; "));
@@ -154,17 +155,18 @@ fn against_contact_points(haptic: &WayResult, points: Option<&WayResult>) -> Str
 /// Regions so small that they have nothing but the handle.
 fn same_regions(scan: &ScanResult) -> String {
     let Some(handle) = scan.of(RefineMethod::Robust(Reach::Handle)) else { return String::new() };
-    let is_same = |result: &&WayResult| result.way != handle.way && result.error == handle.error;
-    let same: Vec<&str> = scan.ways.iter().filter(is_same).map(|result| result.name.as_str()).collect();
+    let is_same = |result: &&MethodResult| result.method != handle.method && result.error == handle.error;
+    let same: Vec<&str> = scan.methods.iter().filter(is_same).map(|result| result.name.as_str()).collect();
     if same.is_empty() {
         return String::new();
     }
     format!(" With edges of {:.1} mm nothing but the handle moves with: {}.", scan.edge_mm, same.join(", "))
 }
 
-/// Ways that did not come to the end, or made the scan worse.
+/// Methods that stopped early or made the scan worse.
 fn failures(scan: &ScanResult) -> String {
-    let failed = scan.ways.iter().filter(|result| !result.is_sound());
-    let told: Vec<String> = failed.map(|result| format!("{}: {}", result.name, result.remarks.join("; "))).collect();
-    if told.is_empty() { String::new() } else { format!("What did not do: {}.", told.join(". ")) }
+    let failed = scan.methods.iter().filter(|result| !result.is_sound());
+    let failures: Vec<String> =
+        failed.map(|result| format!("{}: {}", result.name, result.remarks.join("; "))).collect();
+    if failures.is_empty() { String::new() } else { format!("What did not do: {}.", failures.join(". ")) }
 }
