@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 /// A file that appears under its name only by [`AtomicFile::commit`].
 ///
-/// Until then it stands beside its target under a temporary name; dropped without commit it is removed and an older
+/// Until then it lies beside its target under a temporary name; dropped without commit it is removed and an older
 /// file of that name stays untouched. A link is followed, so that what it points to is replaced.
 #[derive(Debug)]
 pub struct AtomicFile {

@@ -45,10 +45,10 @@ pub enum FeaturesFileError {
 pub struct FeatureFile {
     /// in order of `id`
     pub features: Vec<FeatureRecord>,
-    /// share of the mesh's area that belongs to no plane, cylinder or cone: nothing was looked for there
+    /// share of the mesh's area that belongs to no plane, cylinder or cone and is not searched
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unexplained: Option<f64>,
-    /// places of high curvature, the paper's way to features; there only in that mode
+    /// places of high curvature, the paper's method for features; there only in that mode
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub clusters: Vec<ClusterRecord>,
 }
@@ -103,7 +103,7 @@ pub struct FeatureRecord {
     /// without the tip; of a round opening in a sheet left out, as is `through`); boss: its height
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth_mm: Option<f64>,
-    /// hole, slot, pocket; left out where the mesh ends before the hole does, or nobody touched its floor
+    /// hole, slot, pocket; left out where the mesh ends before the hole does, or its floor is untouched
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub through: Option<bool>,
     /// hole: full angle of its countersink

@@ -1,4 +1,4 @@
-//! What the machine says about itself, for reports of what was measured on it.
+//! Description of the machine, for reports of measurements.
 
 use std::fs;
 use std::thread::available_parallelism;
@@ -8,7 +8,7 @@ pub const COMMIT: &str = env!("TOUCHUP_COMMIT");
 /// Version and commit.
 pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("TOUCHUP_COMMIT"), ")");
 
-/// Processor, threads that run at the same time, memory, and system, as far as they are known.
+/// Processor, threads that run at the same time, memory, and system, where known.
 pub fn describe_machine() -> String {
     let processor = fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| value_of(&text, "model name"));
     let threads = available_parallelism().map_or(1, usize::from);
@@ -24,7 +24,7 @@ pub fn describe_machine() -> String {
     parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
 }
 
-/// What stands behind `key` and `:` or `=`, the first time, without quotes.
+/// The value behind `key` and `:` or `=`, the first time, without quotes.
 fn value_of(text: &str, key: &str) -> Option<String> {
     let value = |line: &str| {
         let rest = line.strip_prefix(key)?.trim_start().strip_prefix([':', '='])?;
@@ -44,7 +44,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_linux_says_is_read() {
+    fn linux_machine_files_are_read() {
         let text = "processor\t: 0\nmodel name\t: Some CPU @ 2 GHz\nmodel name\t: another\n";
         assert_eq!(value_of(text, "model name").as_deref(), Some("Some CPU @ 2 GHz"));
         assert_eq!(value_of("NAME=x\nPRETTY_NAME=\"Debian 13\"\n", "PRETTY_NAME").as_deref(), Some("Debian 13"));

@@ -32,7 +32,7 @@ pub fn read_pairs(path: &Path) -> Result<PairsFile, TableError> {
     pairs(path, read_table(path, &[SCAN, SPACE].concat(), &[NAME, SIGMA])?)
 }
 
-/// Reads the points on the scan alone, each with itself; columns of space may be there and are not looked at.
+/// Reads the points on the scan alone, each with itself; columns of space are ignored.
 ///
 /// # Errors
 /// [`TableError`], with the line.
@@ -87,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_told_with_its_line() {
+    fn errors_name_their_line() {
         let cases = [
             (String::new(), 1, "nothing in it"),
             ("# only this\n".into(), 1, "nothing in it"),
@@ -103,8 +103,8 @@ mod tests {
             (format!("{HEADER},sigma_mm\n1,2,3,4,5,6,x\n"), 2, "sigma_mm is \"x\""),
         ];
         for (text, line, named) in cases {
-            let told = read(&text).unwrap_err().to_string();
-            assert!(told.contains(&format!("line {line}: ")) && told.contains(named), "{text}: {told}");
+            let message = read(&text).unwrap_err().to_string();
+            assert!(message.contains(&format!("line {line}: ")) && message.contains(named), "{text}: {message}");
         }
         assert!(matches!(read_pairs("no.csv".as_ref()), Err(TableError::Io { .. })));
     }

@@ -17,13 +17,13 @@ pub fn write_png(path: &Path, size: [u32; 2], pixels: &[u8]) -> io::Result<()> {
         let mut encoder = png::Encoder::new(out, size[0], size[1]);
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
-        let mut writer = encoder.write_header().map_err(told)?;
-        writer.write_image_data(pixels).map_err(told)?;
-        writer.finish().map_err(told)
+        let mut writer = encoder.write_header().map_err(io_error)?;
+        writer.write_image_data(pixels).map_err(io_error)?;
+        writer.finish().map_err(io_error)
     })
 }
 
-fn told(error: png::EncodingError) -> io::Error {
+fn io_error(error: png::EncodingError) -> io::Error {
     match error {
         png::EncodingError::IoError(error) => error,
         error => io::Error::new(io::ErrorKind::InvalidInput, error),

@@ -1,4 +1,4 @@
-//! The folder of a session: made once, and nothing is written out of it.
+//! The folder of a session: made once; no file is written outside of it.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read, Write};

@@ -117,7 +117,7 @@ impl<'a> TableHeader<'a> {
         let (there, named) = (values.len(), self.count);
         if there != named {
             return Err(format!(
-                "{there} values for {named} columns; commas stand between values alone, decimals have a point"
+                "{there} values for {named} columns; commas separate values only, decimals have a point"
             ));
         }
         let numbers = self.columns.iter().map(|(name, at)| number(values[*at], name)).collect::<Result<_, _>>()?;

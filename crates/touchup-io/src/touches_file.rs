@@ -142,7 +142,7 @@ fn in_order(before: &[ProbedPoint], touch: ProbedPoint) -> Result<ProbedPoint, S
     if stamp_ns < last.stamp_ns || stroke < last.stroke {
         let (before_ns, before) = (last.stamp_ns, last.stroke);
         return Err(format!(
-            "stamp_ns {stamp_ns}, stroke {stroke} after {before_ns}, {before}: touches stand in order"
+            "stamp_ns {stamp_ns}, stroke {stroke} after {before_ns}, {before}: touches are not in order of time"
         ));
     }
     stamp_ns.checked_sub(first.stamp_ns).map(|_| touch).ok_or_else(|| "stamp_ns 292 years after the first".to_owned())

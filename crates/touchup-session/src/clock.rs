@@ -1,6 +1,6 @@
 //! Steady time, of this machine or of a test that moves it by hand.
 //!
-//! Whoever keeps a deadline asks a [`Clock`]. With [`Clock::manual`] time stands still until [`ManualClock::advance`], so a
+//! All deadlines come from a [`Clock`]. With [`Clock::manual`] time stands still until [`ManualClock::advance`], so a
 //! deadline passes when a test says so, however busy the machine is. Threads that say so by [`Clock::begin_work`] are waited for:
 //! time then passes only while all of them wait, so none of them is late, however slow it is.
 
@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 /// How long a wait on a manual clock sleeps before it looks at its channel or condition again. No result depends on it.
 const LOOK: Duration = Duration::from_micros(500);
-/// Who does not come to wait for so long hangs: a test fails then. No result depends on it.
+/// A thread that does not wait again within this time hangs: a test fails then. No result depends on it.
 const HUNG: Duration = Duration::from_secs(120);
 
 /// Where time comes from. Clones show the same time.
@@ -38,13 +38,13 @@ struct Manual {
 struct Waits {
     elapsed: Duration,
     next: u64,
-    /// deadlines of the waits under way, since `begun`
+    /// deadlines of the running waits, since `begun`
     deadlines: BTreeMap<u64, Duration>,
     /// threads, and pieces of work, that time waits for until they wait themselves
     workers: usize,
 }
 
-/// Time of a manual clock stands still until this is dropped, or who has it waits on that clock.
+/// Time of a manual clock stands still until this is dropped, or its holder waits on that clock.
 #[derive(Debug)]
 pub struct Working(Option<Arc<Manual>>);
 
@@ -59,8 +59,8 @@ impl Clock {
         Self::moved_by_hand(false)
     }
 
-    /// A clock that also who sleeps moves, by as long as it sleeps: what a simulated device does in its time is done as fast as
-    /// the others keep up. One thread may sleep.
+    /// A clock that a sleeping thread moves too, by as long as it sleeps: what a simulated device does in its time is done as
+    /// fast as the others keep up. One thread may sleep.
     pub fn lock_step() -> (Self, ManualClock) {
         Self::moved_by_hand(true)
     }
@@ -123,7 +123,7 @@ impl Clock {
         }
     }
 
-    /// As [`Condvar::wait_timeout_while`], without telling whether the time ran out: the caller looks at the value.
+    /// As [`Condvar::wait_timeout_while`], but does not return whether the time ran out: the caller checks the value.
     pub fn wait_while<'a, T>(
         &self,
         condvar: &Condvar,
@@ -147,8 +147,8 @@ impl Clock {
 }
 
 impl ManualClock {
-    /// Moves time on as soon as all who work wait, and returns when no wait of before is left whose deadline has passed, and all
-    /// who work wait again.
+    /// Moves time on as soon as all workers wait, and returns when no wait of before is left whose deadline has passed, and all
+    /// workers wait again.
     ///
     /// # Panics
     /// When somebody hangs.
@@ -158,18 +158,18 @@ impl ManualClock {
         drop(self.0.wait_until_idle(self.0.waits()));
     }
 
-    /// Waits under way.
+    /// Running waits.
     pub fn waiting(&self) -> usize {
         self.0.waits().deadlines.len()
     }
 
-    /// Waits that have begun so far: whoever waits anew has seen the time as it was then.
+    /// Number of waits begun so far: a new wait has seen the time as it was then.
     pub fn begun(&self) -> u64 {
         self.0.waits().next
     }
 }
 
-/// A wait under way; over when dropped.
+/// A running wait; over when dropped.
 struct Wait<'a> {
     manual: &'a Manual,
     number: u64,
@@ -181,7 +181,7 @@ impl Manual {
         self.waits.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits until all who work wait.
+    /// Waits until all workers wait.
     fn wait_until_idle<'a>(&'a self, waits: MutexGuard<'a, Waits>) -> MutexGuard<'a, Waits> {
         self.wait_while(waits, |waits| waits.deadlines.len() < waits.workers)
     }
@@ -193,7 +193,7 @@ impl Manual {
         waits
     }
 
-    /// Moves time on and waits for who waited for that, but not for the wait `own`.
+    /// Moves time on and waits for the threads that it wakes, but not for the wait `own`.
     fn move_to(&self, to: Duration, own: u64) {
         let mut waits = self.wait_until_idle(self.waits());
         waits.elapsed = waits.elapsed.max(to);
@@ -303,7 +303,7 @@ mod tests {
 
     /// However slow it is, a thread that works is not late: both loops do what they do in the same order every time.
     #[test]
-    fn time_waits_for_who_works_and_passes_while_they_wait() {
+    fn time_waits_for_workers_and_passes_while_they_wait() {
         let (clock, hand) = Clock::manual();
         let (sender, receiver) = channel::<Duration>();
         let begun = clock.now();
@@ -314,7 +314,7 @@ mod tests {
                 let _work = work;
                 for _ in 0..3 {
                     clock.sleep(SECOND);
-                    // time stands, so however long this takes is nothing
+                    // time is stopped, so this takes none of it
                     thread::sleep(Duration::from_millis(20));
                     sender.send(clock.since(begun)).unwrap();
                 }
@@ -323,12 +323,12 @@ mod tests {
         (0..3).for_each(|_| hand.advance(SECOND));
         thread.join().unwrap();
         assert_eq!(receiver.try_iter().collect::<Vec<_>>(), [SECOND, 2 * SECOND, 3 * SECOND]);
-        // nobody is left to be waited for
+        // no thread is left to wait for
         hand.advance(SECOND);
     }
 
     #[test]
-    fn who_sleeps_moves_a_clock_in_lock_step_past_the_deadlines_of_others() {
+    fn a_sleeper_moves_a_clock_in_lock_step_past_the_deadlines_of_others() {
         let (clock, _hand) = Clock::lock_step();
         let begun = clock.now();
         let work = [clock.begin_work(), clock.begin_work()];

@@ -1,4 +1,4 @@
-//! One session: what the scene file says, both rates side by side, and what comes of it.
+//! One session: the scene file, both rates side by side, and the result.
 //!
 //! | module | what it does |
 //! |---|---|
@@ -6,7 +6,7 @@
 //! | [`scene`] | the YAML that names the parts of a scene and their parameters |
 //! | [`live`] | the engine: the haptic update at every sample, the patch beside it or at the end |
 //! | [`replay`] | a recording from its first message to its last, as messages or as samples |
-//! | [`session`] | one run: its recording, its result, and what it takes to get the same again |
+//! | [`session`] | one run: its recording, its result, and the inputs that reproduce it |
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
 pub mod clock;

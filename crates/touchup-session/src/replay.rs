@@ -24,7 +24,7 @@ pub enum ReplayError {
     Setting(#[from] SettingError),
 }
 
-/// Reasons that are gaps in the recording itself; every other one is a message lost on the way.
+/// Reasons that are gaps in the recording itself; every other one is a lost message.
 const NOT_A_LOSS: [&str; 4] = ["gap", "no_pose_before", "no_pose_after", "duplicate"];
 
 /// What a replay found besides its samples.
@@ -36,11 +36,11 @@ pub struct Replayed {
     pub refused: BTreeMap<String, u64>,
     /// What a better recording would not lack.
     pub losses: Vec<String>,
-    /// What became of the markers, where they tell the pose.
+    /// Counts of markers, where they give the pose.
     pub markers: Option<MarkerCounts>,
 }
 
-/// Messages that are kept at most while the frames are looked for: a minute of both topics, 20 MB; 60 MB with markers.
+/// Messages that are kept at most during the search for the frames: a minute of both topics, 20 MB; 60 MB with markers.
 const MOST_AHEAD: usize = 100_000;
 
 /// A recording that has been read until the frames of both topics are known, and keeps what it has read.
@@ -52,7 +52,7 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Opens a recording and reads up to the first message of both topics; one that has only one of them is told by the
+    /// Opens a recording and reads up to the first message of both topics; one that has only one of them fails in the
     /// replay.
     ///
     /// # Errors
@@ -111,7 +111,7 @@ pub fn marker_filter(scene: &Scene, topic: Option<&str>) -> Result<Option<Marker
 /// Gives each message of `recording` to `each`, in its order.
 ///
 /// - `markers`: makes the poses of a recording that holds markers.
-/// - `at_each`: is called after each record, to show how far it is.
+/// - `at_each`: called after each record, to show the progress.
 ///
 /// # Errors
 /// [`ReplayError::Read`] when the recording is damaged before its first message; later damage is a loss.
@@ -177,7 +177,7 @@ pub fn each_sample(
 }
 
 impl Replayed {
-    /// Takes over what the filter of the markers dropped.
+    /// Adds the counts of the marker filter.
     fn account_markers(&mut self, filter: &MarkerFilter) {
         for (reason, count) in filter.frame_counts().reasons().into_iter().filter(|(_, count)| *count > 0) {
             if !NOT_A_LOSS.contains(&reason) {
@@ -188,7 +188,7 @@ impl Replayed {
         self.markers = Some(*filter.counts());
     }
 
-    /// Takes over what the synchroniser dropped.
+    /// Adds the counts of the synchroniser.
     fn account_sync(&mut self, sync: &Synchroniser) {
         let of_wrenches = sync.counts().reasons().map(|(reason, count)| (reason, reason.to_owned(), count));
         let of_poses = sync.pose_counts().reasons().map(|(reason, count)| (reason, format!("pose_{reason}"), count));
@@ -200,7 +200,7 @@ impl Replayed {
         }
     }
 
-    /// Takes over what the reader left out.
+    /// Adds the counts of the reader.
     fn account_reader(&mut self, recording: &RecordingReader) {
         for (reason, bad) in recording.bad_messages() {
             let (path, place, count) = (bad.path.display(), &bad.place, bad.poses + bad.wrenches);

@@ -20,15 +20,15 @@ impl fmt::Display for FilePlace {
     }
 }
 
-/// What is wrong there.
+/// The defect.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Defect {
-    /// Something else stands there.
+    /// The field has another value.
     #[error("expected {expected}, found {found}")]
     Unexpected {
         /// what could have been read
         expected: &'static str,
-        /// what stands there, shortened
+        /// the text found, shortened
         found: String,
     },
     /// Fewer bytes than the header asks for.
@@ -60,7 +60,7 @@ pub enum Defect {
     /// A vertex number that names no vertex.
     #[error("a face uses vertex {vertex}, but there are only {vertices} vertices")]
     NoSuchVertex {
-        /// as it stands in the file
+        /// as written in the file
         vertex: i64,
         /// how many there are
         vertices: usize,

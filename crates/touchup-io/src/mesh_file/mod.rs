@@ -1,4 +1,4 @@
-//! Triangle mesh files: PLY, STL and OBJ in, repaired on the way; the same three out.
+//! Triangle mesh files: PLY, STL and OBJ in, repaired on reading; the same three out.
 
 mod defect;
 mod obj;
@@ -22,7 +22,7 @@ pub use unit::{Implausible, LARGEST_M, MeshUnit, SMALLEST_M};
 /// Why a mesh file could not be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum MeshFileError {
-    /// The disk says no.
+    /// An input or output error.
     #[error("cannot read {}: {source}", path.display())]
     Read {
         /// the file
@@ -30,7 +30,7 @@ pub enum MeshFileError {
         /// what the system reports
         source: io::Error,
     },
-    /// The disk says no.
+    /// An input or output error.
     #[error("cannot write {}: {source}", path.display())]
     Write {
         /// the file
@@ -85,11 +85,11 @@ pub enum MeshFileError {
 pub struct MeshFile {
     /// vertices in m, in the file's own frame, which becomes O
     pub mesh: TriMesh,
-    /// what was wrong with the file
+    /// defects of the file
     pub repair: RepairReport,
 }
 
-/// Triangles as they stand in a file.
+/// Triangles as read from a file.
 #[derive(Debug, Default)]
 struct Soup {
     positions: Vec<Point3<f64>>,
@@ -124,7 +124,7 @@ impl Format {
         }
     }
 
-    /// By what stands in the file, where that leaves no doubt.
+    /// From the content of the file, where it is unambiguous.
     fn of_content(bytes: &[u8]) -> Option<Self> {
         match bytes {
             [b'p', b'l', b'y', b'\r' | b'\n', ..] => Some(Self::Ply),
@@ -211,7 +211,7 @@ fn sides(mesh: &TriMesh) -> Vector3<f64> {
     high - low
 }
 
-/// Whether [`write_mesh`] can write there: to be asked before long work.
+/// Whether [`write_mesh`] can write there: call it before long work.
 ///
 /// # Errors
 /// As [`write_mesh`].

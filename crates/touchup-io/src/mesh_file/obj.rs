@@ -42,7 +42,7 @@ fn as_utf8(bytes: &[u8]) -> Result<Cow<'_, [u8]>, Syntax> {
     Ok(Cow::Owned(text.map_err(broken)?.into_bytes()))
 }
 
-/// Hands on the lines that make the mesh, `v` without colours and `f`, and counts.
+/// Passes on the lines that make the mesh, `v` without colours and `f`, and counts.
 struct Geometry<'a> {
     rest: &'a [u8],
     line: &'a [u8],

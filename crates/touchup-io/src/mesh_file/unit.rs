@@ -107,7 +107,7 @@ mod tests {
 
     #[test]
     fn an_implausible_size_is_refused_with_a_suggestion() {
-        // the block of 5 x 2.5 x 1.375 inch, named in each wrong way
+        // the block of 5 x 2.5 x 1.375 inch, named in each wrong unit
         let block = Vector3::new(5.0, 2.5, 1.375);
         let refusal = |sides: Vector3<f64>, unit: MeshUnit| {
             Implausible::check(sides * unit.metres(), unit).map_err(|e| e.to_string())

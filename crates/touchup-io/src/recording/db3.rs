@@ -96,7 +96,7 @@ impl Db3Reader {
         found.ok().and_then(|n| u64::try_from(n).ok())
     }
 
-    /// A `-wal` or `-journal` file beside it holds what was not merged.
+    /// A `-wal` or `-journal` file beside it holds unmerged transactions.
     pub fn truncated(&self) -> bool {
         self.truncated
     }

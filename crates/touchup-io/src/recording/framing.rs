@@ -13,7 +13,7 @@ const MAX_RECORD_BYTES: u64 = 256 << 20;
 const MAX_TEXT_BYTES: u64 = 64 << 10;
 /// Opcode and length in front of every record.
 pub(super) const HEAD_BYTES: usize = 9;
-/// Piece in which records that nobody needs are passed over.
+/// Piece in which unused records are skipped.
 const SKIP_BYTES: u64 = 1 << 20;
 
 /// A stored checksum of 0 means that none was computed.
@@ -29,7 +29,7 @@ pub(super) fn check_length(what: &'static str, bytes: u64) -> Result<(), Damage>
 pub(super) struct ByteStream {
     input: Box<dyn Read>,
     pub at: u64,
-    /// Of the file; unknown while it is unpacked on the way.
+    /// Of the file; unknown while it is unpacked in a stream.
     size: Option<u64>,
     /// Of everything so far, without the head of the data end.
     pub crc: crc32fast::Hasher,

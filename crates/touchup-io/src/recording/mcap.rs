@@ -110,7 +110,7 @@ impl McapReader {
         self.described.channels.values().cloned().collect()
     }
 
-    /// Messages on the two topics, when the index says.
+    /// Messages on the two topics, from the index.
     pub fn promised(&self) -> Option<u64> {
         self.promised
     }
@@ -185,7 +185,7 @@ impl McapReader {
         Ok(None)
     }
 
-    /// Loads the next chunk, or the next record that stands outside of chunks; `false` at the end of the data.
+    /// Loads the next chunk, or the next record outside of chunks; `false` at the end of the data.
     fn refill(&mut self) -> Result<bool, Damage> {
         loop {
             self.at = self.stream.at;
@@ -282,7 +282,7 @@ impl Described {
     }
 }
 
-/// What the end of the file says about the rest.
+/// The summary at the end of the file.
 struct Index {
     described: Described,
     /// Messages on each channel, when the file has statistics.

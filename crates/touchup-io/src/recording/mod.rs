@@ -57,7 +57,7 @@ impl Record {
 pub struct Topics {
     /// `geometry_msgs/msg/PoseStamped`: tip T in the object frame O, m.
     pub pose: String,
-    /// `geometry_msgs/msg/WrenchStamped`: what the object does to the stylus, N and N·m.
+    /// `geometry_msgs/msg/WrenchStamped`: wrench of the object on the stylus, N and N·m.
     pub wrench: String,
     /// `sensor_msgs/msg/PointCloud2`: the markers on the stylus in O, m. When it is named it is read in place of the
     /// pose, and written beside it.

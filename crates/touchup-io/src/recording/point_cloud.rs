@@ -98,7 +98,7 @@ pub(super) fn decode_markers(payload: &[u8]) -> Result<(Cow<'_, str>, MarkerFram
     Ok((msg.header.frame_id, frame))
 }
 
-/// `None` when the cloud is not what it says.
+/// `None` when the cloud contradicts its header.
 fn read_points(msg: &PointCloud2Msg, frame: &mut MarkerFrame) -> Option<()> {
     let [x, y, z] = ["x", "y", "z"].map(|name| CloudField::of(msg, name));
     let (x, y, z) = (x?, y?, z?);

@@ -25,7 +25,7 @@ const MAX_METADATA_BYTES: u64 = 16 << 20;
 /// Poses and wrenches of a recording, one after another.
 ///
 /// The order is that of the recording: MCAP files as written (rosbag2 writes as it receives), SQLite files by time of
-/// reception and row. It is not the order of the header stamps: whoever pairs the two topics sorts by stamp within a
+/// reception and row. It is not the order of the header stamps: sort by stamp to pair the two topics, within a
 /// bounded buffer.
 ///
 /// Positions, forces and torques may be NaN or absurd; rotations are unit quaternions. A message that cannot be used is
@@ -180,7 +180,7 @@ impl Iterator for RecordingReader {
 
 impl FusedIterator for RecordingReader {}
 
-/// Decodes messages and keeps account of frames and of what cannot be used.
+/// Decodes messages, and counts frames and unusable messages.
 #[derive(Default)]
 struct Intake {
     pose_frame: Option<String>,

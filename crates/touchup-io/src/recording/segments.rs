@@ -26,7 +26,7 @@ pub struct SegmentedWriter {
     flushed_length: u64,
 }
 
-/// What `metadata.yaml` says of one file.
+/// Entry of one file in `metadata.yaml`.
 #[derive(Clone, Debug)]
 struct FileSegment {
     name: String,
@@ -91,7 +91,7 @@ impl SegmentedWriter {
         Ok(())
     }
 
-    /// Hands all that was written to the system; returns how many messages these are.
+    /// Flushes to the operating system; returns how many messages these are.
     ///
     /// # Errors
     /// [`RecordingError::Write`], [`RecordingError::Io`].

@@ -119,7 +119,7 @@ impl<W: Write + Seek> RecordingWriter<W> {
         append(&mut self.mcap, channel, message.stamp_ns(), &payload)
     }
 
-    /// Hands all that was written to the output, so that a reader gets up to here.
+    /// Flushes to the output, so that a reader gets up to here.
     ///
     /// # Errors
     /// [`RecordingError::Write`].

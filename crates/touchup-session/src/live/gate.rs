@@ -1,4 +1,4 @@
-//! What the thread of the patch asks before it renews: in a program nothing, in a test the test.
+//! Gate before a renewal of the patch: open in a program, controlled in a test.
 
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
@@ -69,8 +69,8 @@ impl GateKeeper {
         let mut state = self.0.lock();
         state.given = state.done + 1;
         self.0.changed.notify_all();
-        let is_under_way = |state: &mut GateState| state.done < state.given;
-        drop(self.0.changed.wait_while(state, is_under_way).unwrap_or_else(PoisonError::into_inner));
+        let is_running = |state: &mut GateState| state.done < state.given;
+        drop(self.0.changed.wait_while(state, is_running).unwrap_or_else(PoisonError::into_inner));
     }
 }
 
@@ -82,7 +82,7 @@ impl Drop for GateKeeper {
 }
 
 impl Permits {
-    /// Counts are whole whoever held them.
+    /// Counts are valid after any panic.
     fn lock(&self) -> MutexGuard<'_, GateState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -19,7 +19,7 @@ pub struct Latencies {
     max_ns: u64,
 }
 
-/// What is told of them, ns.
+/// Percentiles in the report, ns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Quantiles {
     /// half are no longer
@@ -113,7 +113,7 @@ mod tests {
         assert_eq!(max, 1000);
     }
 
-    /// So many of a thousand are short that one more or less makes the quantile long.
+    /// So many of a thousand are short that one more or less changes the quantile.
     #[test]
     fn a_quantile_is_exceeded_by_its_share_and_no_more() {
         let quantiles = |short: usize| {

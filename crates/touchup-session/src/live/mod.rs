@@ -2,8 +2,9 @@
 //!
 //! [`Engine`] is all of it, for the node, the command line and the report alike; [`Renewal`] says when the patch is made: once at the end,
 //! or again and again on a thread of its own. Then the stamps alone decide when it is renewed and at which sample its change is taken up,
-//! as long as the thread keeps up. Where the thread is late the samples go on, and the next renewal takes in all that came meanwhile: the
-//! mesh shows a touch later, and the result at the end is the same, as it is made of all touches at once. With [`Pace::is_patient`]
+//! as long as the thread keeps up. Where the thread is late the samples go on, and the next renewal takes in all samples since:
+//! the mesh shows a touch later, and the result at the end is the same, as it is made of all touches at once. With
+//! [`Pace::is_patient`]
 //! [`Engine::push`] waits instead, and the mesh at each sample is the same on every machine.
 
 mod gate;
@@ -67,7 +68,7 @@ impl Pace {
     }
 }
 
-/// How far the patch was behind.
+/// Lag of the patch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LiveCounts {
     /// renewals taken up
@@ -79,15 +80,15 @@ pub struct LiveCounts {
 /// When the patch of an [`Engine`] is made.
 #[derive(Clone, Debug)]
 pub enum Renewal {
-    /// once, of all touches, by who [`Engine::finish`]es
+    /// once, of all touches, by [`Engine::finish`]
     AtEnd,
     /// again and again, on a thread of its own
     Beside {
-        /// the scan as it came, with the tree over its faces
+        /// the scan, with the tree over its faces
         scan: Arc<(TriMesh, FaceTree)>,
         /// when, in time of the samples
         pace: Pace,
-        /// for so many new faces memory is taken at the start; more are taken in all the same, with a pause
+        /// memory reserved at the start, in new faces; beyond that it grows, with a pause
         room: usize,
         /// what each renewal passes
         gate: Gate,
@@ -112,7 +113,7 @@ impl Engine {
     /// Nothing touched yet. Where a patch needs the slow drift of the sensor and `refine` names no settings for it, it is followed by
     /// those that [`BiasParams::below`] the contact threshold has, for patch and haptic update alike.
     ///
-    /// - `mesh`: the scan as it came.
+    /// - `mesh`: the scan.
     /// - `patch`: `None`: the haptic update alone; `renewal` is of no use then.
     ///
     /// # Errors
@@ -154,7 +155,7 @@ impl Engine {
         Ok(update)
     }
 
-    /// To be called now and then while no sample comes: takes up some more of what the patch has made, and hands it the samples
+    /// To be called now and then while no sample comes: applies more of the changes of the patch, and passes it the samples
     /// that it does not know yet. Never waits.
     ///
     /// # Errors
@@ -197,7 +198,7 @@ impl Engine {
         }
     }
 
-    /// Does again what was undone last, as [`Patcher::redo`]. Returns whether there was anything.
+    /// Redoes the last undone stroke, as [`Patcher::redo`]. Returns whether there was anything.
     ///
     /// # Errors
     /// As [`Self::catch_up`].
@@ -209,7 +210,7 @@ impl Engine {
         }
     }
 
-    /// A copy of what the patch knows of all samples so far, and of nothing that it has made of it: it comes when the thread
+    /// A copy of the evidence of the patch from all samples so far, without its results: it comes when the thread
     /// has made it. [`Patcher::flush`] and [`Patcher::patched`] make of it what they would make at the end. `None` without a patch,
     /// or where nothing was touched.
     ///
@@ -228,7 +229,7 @@ impl Engine {
         Ok(Some(copy))
     }
 
-    /// Touches that the patch beside the samples has found, or lost, since this was last asked.
+    /// Touches that the patch beside the samples has added or removed since the last call.
     pub fn take_probed(&mut self) -> Option<TouchDelta> {
         self.renewals_mut()?.take_probed()
     }
@@ -238,12 +239,12 @@ impl Engine {
         self.refiner.watch();
     }
 
-    /// What changed in the mesh since this was last asked, as [`TriMesh::take_changes`].
+    /// Changes of the mesh since the last call, as [`TriMesh::take_changes`].
     pub fn take_changes(&mut self, most: usize, into: &mut Changes) -> bool {
         self.refiner.take_changes(most, into)
     }
 
-    /// The haptic update, with the mesh as it stands.
+    /// The haptic update, with the current mesh.
     pub fn refiner(&self) -> &Refiner {
         &self.refiner
     }
@@ -253,10 +254,10 @@ impl Engine {
         self.renewals().is_none_or(Renewals::is_whole)
     }
 
-    /// What a vertex rests on. Where there is no patch, or it does not know yet, a vertex that is not where the scan has it
-    /// rests on a touch, or is guessed from touches.
+    /// Support of a vertex. Where there is no patch, or it does not know yet, a vertex that is not where the scan has it
+    /// counts as touched, or as guessed from touches.
     ///
-    /// - `scan`: as it came.
+    /// - `scan`: unrefined.
     pub fn support(&self, scan: &TriMesh, vertex: VertexId) -> Support {
         let is_moved = || {
             let was = scan.positions().get(vertex.0 as usize);
@@ -275,7 +276,7 @@ impl Engine {
         self.renewals()?.patched_until_ns()
     }
 
-    /// How far the patch beside the samples was behind.
+    /// Lag of the patch beside the samples.
     pub fn counts(&self) -> LiveCounts {
         self.renewals().map(Renewals::counts).unwrap_or_default()
     }

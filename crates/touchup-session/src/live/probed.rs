@@ -5,7 +5,7 @@ use touchup_core::touch::ProbedPoint;
 /// Touches that came or went: of a list of touches the first `kept` stay, then come `new`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TouchDelta {
-    /// so many of the touches before stay
+    /// number of earlier touches that stay
     pub kept: usize,
     /// … and these come after them
     pub new: Vec<ProbedPoint>,
@@ -24,7 +24,7 @@ impl TouchDelta {
         self.kept == usize::MAX && self.new.is_empty()
     }
 
-    /// Adds what came after it.
+    /// Adds a later change.
     pub fn extend(&mut self, next: Self) {
         if next.is_empty() {
             return;
@@ -58,7 +58,7 @@ pub(super) struct PublishedList {
 }
 
 impl PublishedList {
-    /// What is to be published of the list as it is now: what was added, or the whole list where it is another one.
+    /// The message about the current list: the added touches, or the whole list after a removal.
     pub fn changes(&mut self, touches: &[ProbedPoint]) -> TouchDelta {
         let name = |touch: &ProbedPoint| (touch.stamp_ns, touch.stroke);
         let is_longer = self.count.checked_sub(1).and_then(|last| touches.get(last)).map(name) == self.last;

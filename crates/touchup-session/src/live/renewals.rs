@@ -18,7 +18,7 @@ const AT_ONCE: usize = 40;
 /// it to go on with.
 const MOST_OPEN: usize = 2;
 
-/// The thread of the patch, and what is on its way to it and from it.
+/// The thread of the patch, and the channels to it and from it.
 #[derive(Debug)]
 pub(super) struct Renewals {
     worker: Worker,
@@ -27,7 +27,7 @@ pub(super) struct Renewals {
     batch: Vec<ContactSample>,
     /// number of the time between two renewals in which the last sample lies
     slot: Option<i64>,
-    /// when the changes that were asked for are to be taken up, ns
+    /// due times of the requested changes, ns
     due_ns: VecDeque<i64>,
     /// the change that was taken up last …
     delta: PatchDelta,
@@ -35,7 +35,7 @@ pub(super) struct Renewals {
     is_done: bool,
     /// whether the change that is due is known to be late
     is_late: bool,
-    /// touches that nobody asked for yet
+    /// touches not yet requested
     probed: TouchDelta,
     counts: LiveCounts,
 }
@@ -139,7 +139,7 @@ impl Renewals {
         self.take_up_all(refiner)
     }
 
-    /// Hands the samples over, for a change that is to be taken up at `due_ns`.
+    /// Passes the samples on, for a change that is to be taken up at `due_ns`.
     fn ask(&mut self, due_ns: i64) -> Result<(), LiveError> {
         let batch = std::mem::replace(&mut self.batch, self.worker.empty_batch());
         self.worker.ask(Question::Renew(batch))?;
@@ -147,7 +147,7 @@ impl Renewals {
         Ok(())
     }
 
-    /// Takes up all changes that were asked for, as a whole; whether the last one was one of strokes.
+    /// Takes up all requested changes as a whole; returns whether the last one was of strokes.
     fn take_up_all(&mut self, refiner: &mut Refiner) -> Result<bool, LiveError> {
         self.go_on(refiner, usize::MAX)?;
         let mut has_changed_strokes = false;
@@ -170,7 +170,7 @@ impl Renewals {
         refiner.begin_to_follow(&self.delta);
     }
 
-    /// Asks for a copy of what the patch knows of all samples so far.
+    /// Requests a copy of the evidence of the patch from all samples so far.
     pub fn copy_patcher(&self, to: SyncSender<Patcher>) -> Result<(), LiveError> {
         self.worker.ask(Question::Copy(self.batch.clone(), to))
     }

@@ -12,20 +12,20 @@ use touchup_core::mesh::{FaceTree, TriMesh};
 use touchup_core::patch::{PatchDelta, Patcher};
 use touchup_core::touch::ContactSample;
 
-/// What the thread is asked for.
+/// Requests to the thread.
 pub(super) enum Question {
     /// take these in, and answer what changed
     Renew(Vec<ContactSample>),
     /// take in what is still in the smoothing window, and answer what changed
     Flush,
-    /// copy what is known, with these samples more
+    /// copy the evidence, with these further samples
     Copy(Vec<ContactSample>, SyncSender<Patcher>),
     /// take the last stroke back, or do it again, and answer what changed
     Undo,
     Redo,
 }
 
-/// What the thread found.
+/// Answers of the thread.
 pub(super) struct WorkerAnswer {
     pub delta: PatchDelta,
     pub probed: TouchDelta,
@@ -35,7 +35,7 @@ pub(super) struct WorkerAnswer {
     batch: Vec<ContactSample>,
 }
 
-/// A patcher on a thread of its own. Each question but that for a copy has one answer, in the same order.
+/// A patcher on a thread of its own. Each request except for a copy has one answer, in the same order.
 #[derive(Debug)]
 pub(super) struct Worker {
     gate: Gate,
@@ -66,7 +66,7 @@ impl Worker {
                     Question::Copy(samples, to) => {
                         let mut copy = patcher.copy();
                         samples.iter().for_each(|sample| copy.push(sample));
-                        // who asked may want it no more
+                        // the receiver may be gone
                         let _ = to.send(copy);
                         continue;
                     }

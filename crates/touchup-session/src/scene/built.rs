@@ -23,7 +23,7 @@ pub struct Memory {
     pub mesh_mb: f64,
     /// the tree over its faces
     pub tree_mb: f64,
-    /// the scan as it came, with a tree of its own where the patch is made beside the samples
+    /// the unrefined scan, with a tree of its own where the patch is made beside the samples
     pub scan_mb: f64,
     /// what the mesh keeps of a patch that it follows; 0 where there is none
     pub patch_mb: f64,
@@ -79,7 +79,7 @@ impl Scene {
 impl Memory {
     /// Of what was just built.
     ///
-    /// - `scan_bytes`: of the scan as it came, with the trees over it.
+    /// - `scan_bytes`: of the unrefined scan, with the trees over it.
     pub fn of(refiner: Footprint, scan_bytes: usize) -> Self {
         let mb = |bytes: usize| bytes as f64 / 1e6;
         let Footprint { mesh, tree, patch } = refiner;
@@ -100,7 +100,7 @@ impl fmt::Display for Memory {
         let all = mesh_mb + tree_mb + scan_mb + patch_mb;
         write!(
             f,
-            "memory at start: {all:.2} MB: mesh {mesh_mb:.2}, its tree {tree_mb:.2}, scan as it came {scan_mb:.2}, patch \
+            "memory at start: {all:.2} MB: mesh {mesh_mb:.2}, its tree {tree_mb:.2}, unrefined scan {scan_mb:.2}, patch \
              {patch_mb:.2}"
         )
     }

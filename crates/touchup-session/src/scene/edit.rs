@@ -37,7 +37,7 @@ impl Scene {
     /// The text of a scene with `settings` in it.
     ///
     /// - `yaml`: the scene as it was; empty for a new one.
-    /// - `remark`: stands behind the first key that is set, where no comment of the user does; one line.
+    /// - `remark`: goes behind the first key that is set, where no comment of the user does; one line.
     /// - `expected`: what the new text must parse to.
     ///
     /// # Errors

@@ -55,7 +55,7 @@ pub enum SceneError {
     },
 }
 
-/// What the parser adds for those who program with it.
+/// The parser's text for programmers.
 const FOR_PROGRAMMERS: &str = ", set DuplicateKeyPolicy in Options if acceptable";
 
 /// One line with the place, and the nearest known key where one is misspelt.
@@ -72,7 +72,7 @@ pub(super) fn yaml_error(error: &serde_saphyr::Error) -> SceneError {
 
 /// The known word that fewest insertions, deletions, replacements and swaps turn `word` into, when that is at most half of it.
 pub fn nearest<'a>(word: &str, known: &[&'a str]) -> Option<&'a str> {
-    // nobody types such a name by mistake, and the distance takes as long as both lengths multiplied
+    // such a name is no typing mistake, and the distance costs the product of both lengths
     const LONGEST: usize = 64;
     let edits = |key: &&str| strsim::osa_distance(word, key);
     let near = known.iter().copied().filter(|_| word.len() <= LONGEST).min_by_key(edits)?;

@@ -269,7 +269,7 @@ words! {
 }
 
 parameters! {
-    /// `robot`: where it stands, what it holds, and what it must never leave.
+    /// `robot`: pose of its base, its payload, and the volume that it must never leave.
     #[derive(Clone, Debug, PartialEq)]
     pub struct RobotSection in "robot" {
         /// Model of the arm.

@@ -1,4 +1,4 @@
-//! One run of touching a part: what comes of it, and where it is kept.
+//! One run of touching a part: its result and its files.
 //!
 //! [`Outcome`] is what `touchup refine` and the node write alike: the refined mesh, the features on it, the touches they rest
 //! on. [`SessionRecord`] keeps in a folder all that it takes to get the same again, up to the last moment before a crash.

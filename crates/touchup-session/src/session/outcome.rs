@@ -51,12 +51,12 @@ pub struct OutcomePlaces<'a> {
     pub outside: Option<&'a Outside>,
 }
 
-/// What became of the touched part.
+/// Result on the touched part.
 #[derive(Debug, Serialize)]
 pub struct Outcome {
     /// faces that are not where the scan had them
     pub moved_faces: u64,
-    /// what was meshed anew; `null` when the scene has no `patch`, or nothing was touched
+    /// what was remeshed; `null` when the scene has no `patch`, or nothing was touched
     pub patch: Option<PatchSummary>,
     /// how well that is known; not there when the scene has no `uncertainty`
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -66,7 +66,7 @@ pub struct Outcome {
     pub counts: [usize; 2],
 }
 
-/// What is told of the patch.
+/// The patch in the report.
 #[derive(Debug, Serialize)]
 pub struct PatchSummary {
     /// edge length of the new faces
@@ -97,7 +97,7 @@ pub fn moved_faces(before: &TriMesh, after: &TriMesh) -> u64 {
     after.faces().filter(|&(face, corners)| !is_as_scanned(face, corners)).count() as u64
 }
 
-/// A part that was meshed anew, with the rest of its scan.
+/// A remeshed part, with the rest of its scan.
 ///
 /// - `of_scan`: standard deviation of a vertex that was not touched, m.
 fn sewn(part: Patched, outside: &Outside, of_scan: f64) -> Result<Patched, MeshError> {
@@ -114,11 +114,11 @@ fn written_counts(mesh: &TriMesh) -> [usize; 2] {
 }
 
 impl OutcomePlaces<'_> {
-    /// Writes what was refined.
+    /// Writes the refined mesh.
     ///
-    /// - `scan`: as it came.
+    /// - `scan`: unrefined.
     /// - `refined`: as the haptic update left it; written where there is no patch.
-    /// - `patcher`: what meshes the touched part anew; `None` without `patch` in the scene, or when nothing was touched.
+    /// - `patcher`: remeshes the touched part; `None` without `patch` in the scene, or when nothing was touched.
     ///
     /// # Errors
     /// [`OutcomeError`]; no file is left half written.
@@ -134,7 +134,7 @@ impl OutcomePlaces<'_> {
         self.write_patched(scan, patcher)
     }
 
-    /// Meshes the touched part of the scan anew and writes the result.
+    /// Remeshes the touched part of the scan and writes the result.
     fn write_patched(&self, scan: &TriMesh, mut patcher: Patcher) -> Result<Outcome, OutcomeError> {
         let (started, wanted) = (Instant::now(), patcher.params().pitch);
         patcher.flush();
@@ -166,7 +166,7 @@ impl OutcomePlaces<'_> {
         })
     }
 
-    /// Writes what was touched, and the features of the result, where that was asked for: of the mesh and by the touches as
+    /// Writes the touches and the features of the result, where requested: of the mesh and by the touches as
     /// they are written, so that `touchup features` finds the same to the last bit.
     fn write_features(&self, touches: &[ProbedPoint]) -> Result<(), OutcomeError> {
         if let Some(out) = self.touches {

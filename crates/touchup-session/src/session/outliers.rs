@@ -1,4 +1,4 @@
-//! What `refine` tells of how well the mesh is known, and of touches that contradicted it.
+//! What `refine` reports: the uncertainty of the mesh, and contacts rejected as outliers.
 
 use std::fmt;
 
@@ -13,7 +13,7 @@ pub struct UncertaintySummary {
     touched_sigma_mm: f64,
     /// contacts that contradicted their place and did not count
     rejected: u64,
-    /// places that moved because a second pass contradicted them in the same way
+    /// places that moved because a second pass confirmed the contradiction
     relocated: u64,
     /// the last that were rejected, in order of time
     outliers: Vec<OutlierSummary>,
@@ -28,18 +28,18 @@ struct OutlierSummary {
     point_mm: [f64; 3],
     /// … and its normal
     normal: [f64; 3],
-    /// how far it was outside of the place
+    /// its distance from the place
     off_mm: f64,
     /// … in standard deviations
     sigmas: f64,
     contacts: u64,
 }
 
-/// So many are listed.
+/// Number of listed outliers.
 const MOST_LISTED: usize = 8;
 
 impl UncertaintySummary {
-    /// What a patcher says of its result.
+    /// Summary of a patcher's result.
     pub fn of(patched: &Patched, outliers: &Outliers) -> Self {
         let known = patched.sigma.iter().zip(&patched.support);
         let mut touched: Vec<f64> =
@@ -56,7 +56,7 @@ impl UncertaintySummary {
 }
 
 impl UncertaintySummary {
-    /// Where the last outlier is, and how far off.
+    /// Place and distance of the last outlier.
     pub fn last_outlier(&self) -> Option<String> {
         let OutlierSummary { point_mm: [x, y, z], off_mm, sigmas, .. } = self.outliers.last()?;
         Some(format!(

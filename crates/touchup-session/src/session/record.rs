@@ -1,4 +1,4 @@
-//! All that it takes to get a session's result again: scene, scan, what was touched, and which strokes were taken back.
+//! The record of a session, which reproduces its result: scene, scan, recording, and the undone strokes.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -20,9 +20,9 @@ const SCENE: &str = "scene.yaml";
 const STROKES: &str = "strokes.jsonl";
 const RECORDING: &str = "recording";
 
-/// What was written reaches the system at least so often: a crash loses no more.
+/// Longest time between flushes: a crash loses no more.
 const FLUSH_EVERY: Duration = Duration::from_millis(50);
-/// A disk that refused is asked again after this time.
+/// Retry period after a write error.
 const ASK_AGAIN: Duration = Duration::from_secs(1);
 /// Messages that wait for the disk at most: several seconds of both streams.
 const MOST_WAITING: usize = 1 << 14;
@@ -47,7 +47,7 @@ pub enum SessionError {
         reason: String,
     },
     /// The scan is another one now.
-    #[error("{}: it changed since the session began: bring the scan back as it was", path.display())]
+    #[error("{}: it changed since the session began: restore the scan", path.display())]
     ScanChanged {
         /// the scan
         path: PathBuf,
@@ -147,18 +147,18 @@ fn read_strokes(path: &Path) -> Result<Vec<StrokeChange>, SessionError> {
     whole.lines().map(read).collect()
 }
 
-/// What is not in the recording of a session.
+/// Messages missing in the recording of a session.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Unrecorded {
     /// how many messages
     pub messages: u64,
-    /// what the disk said last, if it refused any
+    /// the last write error
     pub reason: Option<String>,
     /// it still refuses
     pub is_refused: bool,
 }
 
-/// Takes messages down on a thread of its own.
+/// Records messages on a thread of its own.
 #[derive(Debug)]
 pub struct SessionRecorder {
     folder: SessionFolder,
@@ -188,7 +188,7 @@ impl SessionRecorder {
         let end = Arc::new(RecordingEnd::default());
         let taker = Taker {
             writer,
-            told: Arc::clone(&unrecorded),
+            shared: Arc::clone(&unrecorded),
             refused_at: None,
             clock: clock.clone(),
             end: Arc::clone(&end),
@@ -219,7 +219,7 @@ impl SessionRecorder {
         self.folder.append_line(STROKES, &line).map_err(io)
     }
 
-    /// What is not in the recording so far.
+    /// Messages missing in the recording so far.
     pub fn unrecorded(&self) -> Unrecorded {
         locked(&self.unrecorded).clone()
     }
@@ -239,13 +239,13 @@ impl SessionRecorder {
     }
 }
 
-/// A count and words are whole whoever held them.
+/// A count and a text are valid after any panic.
 fn locked(unrecorded: &Mutex<Unrecorded>) -> MutexGuard<'_, Unrecorded> {
     unrecorded.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl RecordingEnd {
-    /// A truth value is whole whoever held it.
+    /// A truth value is valid after any panic.
     fn lock(&self) -> MutexGuard<'_, bool> {
         self.has_come.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -253,16 +253,16 @@ impl RecordingEnd {
 
 struct Taker {
     writer: SegmentedWriter,
-    told: Arc<Mutex<Unrecorded>>,
+    shared: Arc<Mutex<Unrecorded>>,
     refused_at: Option<Instant>,
     clock: Clock,
     end: Arc<RecordingEnd>,
 }
 
 impl Taker {
-    /// Looks by itself for what has come: to be woken for each message would cost who hands it over more than the message.
+    /// Polls the queue: a wake-up for each message would cost the sender more than the message.
     ///
-    /// What the disk does not take is lost; a moment later it is asked again, for somebody may have made room.
+    /// Messages of a failed write are lost; writing is retried later, as space may be freed.
     fn take_down(mut self, messages: &Receiver<(Message, &'static str)>) {
         loop {
             drop(self.clock.wait_while(&self.end.changed, self.end.lock(), FLUSH_EVERY, |has_come| !*has_come));
@@ -281,15 +281,15 @@ impl Taker {
                 break;
             }
         }
-        let Self { writer, told, .. } = self;
+        let Self { writer, shared, .. } = self;
         if let Err(error) = writer.finish() {
-            locked(&told).reason = Some(error.to_string());
+            locked(&shared).reason = Some(error.to_string());
         }
     }
 
     fn take(&mut self, message: &Message, frame: &str) {
         if !self.is_asked() {
-            locked(&self.told).messages += 1;
+            locked(&self.shared).messages += 1;
         } else if let Err(error) = self.writer.write(message, frame) {
             self.refuse(1, &error);
         }
@@ -302,16 +302,16 @@ impl Taker {
 
     fn accept(&mut self) {
         if self.refused_at.take().is_some() {
-            locked(&self.told).is_refused = false;
+            locked(&self.shared).is_refused = false;
         }
     }
 
     fn refuse(&mut self, messages: u64, error: &RecordingError) {
         self.refused_at = Some(self.clock.now());
         let messages = messages + self.writer.give_up_segment();
-        let mut told = locked(&self.told);
-        told.messages += messages;
-        (told.reason, told.is_refused) = (Some(error.to_string()), true);
+        let mut shared = locked(&self.shared);
+        shared.messages += messages;
+        (shared.reason, shared.is_refused) = (Some(error.to_string()), true);
     }
 }
 
@@ -363,7 +363,7 @@ mod tests {
         assert_eq!(on_disk(&folder), written);
     }
 
-    /// The machine stands still for as long as the queue holds, and nothing is lost; what comes after that is counted.
+    /// The disk stalls for as long as the queue holds, and nothing is lost; later messages are counted as lost.
     #[test]
     fn what_waits_for_the_disk_is_not_lost_and_what_finds_no_room_is_counted() {
         let ((_parent, folder), (clock, hand)) = (folder(), Clock::manual());

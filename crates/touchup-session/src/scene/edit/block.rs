@@ -15,7 +15,7 @@ pub(super) fn set(text: &str, path: &[&str], value: &str, remark: &str) -> Optio
     set_in(&lines, whole, indent, path, value, remark)
 }
 
-/// Sets it in the mapping that stands in the lines of `range`, its keys set in by `indent`.
+/// Sets it in the mapping in the lines of `range`, its keys set in by `indent`.
 fn set_in(
     lines: &[&str],
     range: Range<usize>,
@@ -68,7 +68,7 @@ fn end_of(lines: &[&str], range: Range<usize>, indent: usize) -> usize {
     range.clone().rev().find(is_part).map_or(range.start, |at| at + 1)
 }
 
-/// Behind the last line of what stands under a key: deeper ones, and items of a list at its own depth. Comments and
+/// Behind the last line of the value of a key: deeper ones, and items of a list at its own depth. Comments and
 /// empty lines at the end belong to the next key, unless they are deeper.
 fn body_end(lines: &[&str], range: Range<usize>, indent: usize) -> usize {
     let is_item = |line: &str| indent_of(line) == indent && line.trim_start().starts_with('-');
@@ -107,7 +107,7 @@ fn key_end(line: &str, indent: usize, key: &str) -> Option<usize> {
     (after.is_empty() || after.starts_with(char::is_whitespace)).then_some(indent + written.len() + colon + 1)
 }
 
-/// Value and comment of what stands behind a colon; a `#` in quotes is none.
+/// Value and comment behind a colon; a `#` in quotes is none.
 fn split_comment(text: &str) -> (&str, &str) {
     let (mut quote, mut before) = (None, ' ');
     for (at, c) in text.char_indices() {

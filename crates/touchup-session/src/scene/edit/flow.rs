@@ -40,7 +40,7 @@ fn spliced(text: &str, begin: usize, end: usize, new: &str) -> String {
     format!("{}{new}{}", &text[..begin], &text[end..])
 }
 
-/// One key, and where its value stands, up to its last character.
+/// One key, and the range of its value, up to its last character.
 struct FlowEntry<'a> {
     key: &'a str,
     begin: usize,
@@ -51,7 +51,7 @@ struct Mapping<'a> {
     entries: Vec<FlowEntry<'a>>,
     /// just behind the last thing that is no comment
     last: usize,
-    /// a comma or the opening brace stands there
+    /// a comma or the opening brace is there
     is_separated: bool,
 }
 
