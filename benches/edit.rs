@@ -1,9 +1,9 @@
-//! What it costs to replace faces: 300 by 600 in a spot of 5 mm, and back, in mesh and tree, again and again.
+//! Cost of replacing faces: 300 by 600 in a spot of 5 mm, and back, in mesh and tree, again and again.
 //!
 //! Each round takes the 300 faces nearest to the middle of the spot out, one after another, and splits each of them in
 //! two at the middle of its longest edge; the next round undoes it. After that the spot moves on. Queries are timed on
-//! the tree that was edited and on one built anew. Figures are per face, from an own sorted list. All of it is done
-//! three times over, and the least of three counts for each edit: what the machine does beside is not an edit's cost.
+//! the tree that was edited and on a rebuilt one. Figures are per face, from an own sorted list. All of it is done
+//! three times over, and the least of three counts for each edit: other load of the machine is not an edit's cost.
 //!
 //! `cargo bench --bench edit [-- FACES…]`
 
@@ -37,7 +37,7 @@ fn report(name: &str, mut times: Vec<u64>) {
     );
 }
 
-/// What was timed.
+/// The timed operations.
 #[derive(Default)]
 struct Times {
     insert: Vec<u64>,
@@ -81,7 +81,7 @@ fn insert(mesh: &mut TriMesh, tree: &mut FaceTree, corners: [VertexId; 3], times
     face
 }
 
-/// The same as [`remove`] and [`insert`], timed as a whole: what one push would wait for.
+/// The same as [`remove`] and [`insert`], timed as a whole: the delay of one push.
 fn replace(mesh: &mut TriMesh, tree: &mut FaceTree, old: &[FaceId], new: &[[VertexId; 3]], made: &mut Vec<FaceId>) {
     made.clear();
     for &face in old {
@@ -129,8 +129,8 @@ fn queries(mesh: &TriMesh, tree: &FaceTree) -> Vec<u64> {
     for _ in 0..REPEATS {
         let mut times = Vec::new();
         for i in 0..least.len() {
-            let way = |share: f64| HALF_SPOT * (2.0 * (i as f64 * share).fract() - 1.0);
-            let p = spot(i % SPOTS) + nalgebra::vector![way(0.7548), way(0.5698), 0.2e-3];
+            let offset = |share: f64| HALF_SPOT * (2.0 * (i as f64 * share).fract() - 1.0);
+            let p = spot(i % SPOTS) + nalgebra::vector![offset(0.7548), offset(0.5698), 0.2e-3];
             timed(&mut times, || tree.closest(mesh, &p, 0.01));
         }
         least.iter_mut().zip(times).for_each(|(least, time)| *least = time.min(*least));
@@ -182,12 +182,12 @@ fn bench(faces: usize) {
     report("TriMesh, a face more or less", times.mesh);
     report("300 faces by 600", times.replace);
     let start = Instant::now();
-    let anew = FaceTree::new(&mesh);
+    let rebuilt = FaceTree::new(&mesh);
     let took = start.elapsed().as_millis();
     println!("  after: depth {}, mesh and tree {:?} bytes", tree.depth(), (mesh.bytes(), tree.bytes()));
     report("closest, edited tree", queries(&mesh, &tree));
-    report("closest, tree built anew", queries(&mesh, &anew));
-    println!("  building anew takes {took} ms and gives depth {}", anew.depth());
+    report("closest, rebuilt tree", queries(&mesh, &rebuilt));
+    println!("  rebuilding takes {took} ms and gives depth {}", rebuilt.depth());
 }
 
 fn main() {

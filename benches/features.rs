@@ -29,8 +29,8 @@ fn fine_scan(divisions: u32) -> TriMesh {
         bias: 0.0,
         rounding: 20e-6,
         closes_holes_below: 0.0,
-        misplaced: 0.0,
-        misplaced_angle: 0.0,
+        rigid_shift: 0.0,
+        rigid_turn: 0.0,
         ..ScannerParams::default()
     };
     let plate = Plate::default();

@@ -1,7 +1,7 @@
-//! What one sample costs with everything on, and how far the patch is behind: samples come at 1 kHz in real time, the
+//! Cost of one sample with everything on, and lag of the patch: samples come at 1 kHz in real time, the
 //! patch has a thread of its own.
 //!
-//! A ball slides over a wavy plate in a raster, felt a little deeper than the scan says. One line for each minute: times of
+//! A ball slides over a wavy plate in a raster, with contacts a little below the scan. One line for each minute: times of
 //! [`Engine::push`], how old the touches are that the patch shows (in time of the samples), how many renewals of it
 //! were late, faces, and memory of the process.
 //!
@@ -23,7 +23,7 @@ use touchup::touch::Sample;
 const WIDTH: f64 = 40e-3;
 /// Noise of the tracker on each axis, m.
 const NOISE: f64 = 0.03e-3;
-/// What the scan is taken to be off, m.
+/// Assumed scan noise, m.
 const SCAN_NOISE: f64 = 0.3e-3;
 /// Samples in one line of the table.
 const MINUTE: usize = 60_000;

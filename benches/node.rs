@@ -1,9 +1,9 @@
-//! What a sample costs in the node: from the arrival of what completes it to the mesh, with view, features and recording
+//! Cost of a sample in the node: from the arrival of what completes it to the mesh, with view, features and recording
 //! beside it. A ball slides over a wavy plate in real time, wrench and pose each at 1 kHz.
 //!
 //! - `cargo bench --bench node [-- FACES…]`: alone, what arrives is put in by hand.
 //! - `cargo bench --bench node -- dds [FACES [SECONDS]]`: sensors and viewer are another process, over DDS on the loopback
-//!   interface; before and after it a bare echo over the same. 600 s is the soak; memory is told each minute.
+//!   interface; before and after it a bare echo over the same. 600 s is the soak; memory is printed each minute.
 
 #[path = "node/peer.rs"]
 mod peer;
@@ -31,7 +31,7 @@ use touchup::touch::Sample;
 const WIDTH: f64 = 20e-3;
 /// So long it slides in process.
 const SECONDS: usize = 20;
-/// So long the echo is asked.
+/// Duration of the echo measurement.
 const ECHO_SECONDS: usize = 10;
 
 fn header(stamp_ns: i64, frame: &str) -> Header {
@@ -56,7 +56,7 @@ fn shown(Quantiles { median, p99, p999, max }: Quantiles) -> String {
     format!("p50 {:.1} us p99 {:.0} p99.9 {:.0} max {:.0}", us(median), us(p99), us(p999), us(max))
 }
 
-fn told(report: &SessionReport) {
+fn print_summary(report: &SessionReport) {
     println!(
         "accepted {} dropped {:?} refused {:?} unrecorded {}; push {}; from arrival to mesh {}; {} view frames dropped, {} \
          renewals late",
@@ -103,7 +103,7 @@ fn alone(faces: usize) {
     }
     println!("{:.1} s, {published} messages out", begun.elapsed().as_secs_f64());
     world.arrive_patiently(Arrival::Shutdown);
-    told(&node.join().expect("the result can be written").report);
+    print_summary(&node.join().expect("the result can be written").report);
 }
 
 /// This program again, as the other end.
@@ -153,7 +153,7 @@ fn resident() -> f64 {
 }
 
 fn over_dds(faces: usize, seconds: usize) {
-    // a domain that nobody else is likely to have: those above 101 take ports that Linux gives away
+    // a domain unlikely to be in use: those above 101 take ports that Linux gives away
     let domain = 1 + (std::process::id() % 100) as u16;
     echo(domain);
     let folder = tempfile::tempdir().expect("there is room in the folder for temporary files");
@@ -178,9 +178,9 @@ fn over_dds(faces: usize, seconds: usize) {
     println!("at the end {:.0} MB", resident());
     let joined = other("late", domain, 0).wait();
     assert!(joined.is_ok_and(|status| status.success()), "the late joiner failed");
-    println!("lost on the way {:?}, unsent {:?}", port.lost(), port.unsent());
+    println!("lost in transport {:?}, unsent {:?}", port.lost(), port.unsent());
     inbox.send(Arrival::Shutdown).expect("the node listens");
-    told(&node.join().expect("the result can be written").report);
+    print_summary(&node.join().expect("the result can be written").report);
     drop(port);
     echo(domain);
 }

@@ -1,6 +1,6 @@
-//! What one sample costs: `Refiner::push` on meshes of 10k to 5M faces, and the hand-written minimal loop beside it.
+//! Cost of one sample: `Refiner::push` on meshes of 10k to 5M faces, and the hand-written minimal loop beside it.
 //!
-//! A ball slides over a wavy plate at 50 mm/s and 1 kHz and is felt a little deeper than the scan says, so that every
+//! A ball slides over a wavy plate at 50 mm/s and 1 kHz with contacts a little below the scan, so that every
 //! timed push is in contact and moves vertices. Afterwards 1,000 queries are compared with brute force. Figures are per
 //! push, from an own sorted list: a mean would hide the tails.
 //!
@@ -60,7 +60,7 @@ fn push(name: &str, mesh: &TriMesh, roi: RoiSize, carve: bool) {
     report(name, mesh.face_count(), times, &more);
 }
 
-/// 1,000 closest faces against brute force over the faces nearby, on the mesh as it stands now.
+/// 1,000 closest faces against brute force over the faces nearby, on the current mesh.
 fn check_index(refiner: &Refiner) {
     let mesh = refiner.mesh();
     for i in 0..1_000 {
@@ -80,7 +80,7 @@ fn check_index(refiner: &Refiner) {
     }
 }
 
-/// The same queries against a tree built anew.
+/// The same queries against a rebuilt tree.
 fn check_against_new_tree(refiner: &Refiner) {
     let mesh = refiner.mesh();
     let tree = FaceTree::new(mesh);

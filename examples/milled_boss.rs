@@ -9,7 +9,7 @@ use touchup::io::mesh_file::{MeshUnit, write_mesh};
 use touchup::mesh::VertexId;
 use touchup::sim::Plate;
 
-/// What was milled off, m.
+/// Milled depth, m.
 const LOST: f64 = 1e-3;
 /// Nothing but the top of the boss lies higher, m.
 const ABOVE: f64 = 15e-3;

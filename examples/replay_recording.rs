@@ -17,7 +17,7 @@ fn main() -> anyhow::Result<()> {
 
     let scan = read_mesh(Path::new(scan), MeshUnit::Millimetre)?;
     println!("{}", scan.repair);
-    // a ball of 3 mm on a stylus that gives way by 1 mm at 20 N; wrenches in the axes of the stylus
+    // a ball of 3 mm on a stylus that deflects by 1 mm at 20 N; wrenches in the axes of the stylus
     let tip = TipParams { radius: 1.5e-3, stiffness: Some(20e3) };
     let mut refiner = Refiner::new(scan.mesh, RefineParams::robust(tip))?;
 

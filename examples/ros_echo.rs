@@ -1,5 +1,5 @@
-//! Answers every wrench with a mismatch that has its stamp and force, over DDS: what the way costs without any work on it,
-//! and a second node for those who test theirs.
+//! Answers every wrench with a mismatch that has its stamp and force, over DDS: the cost of the transport alone,
+//! and a second node to test another node with.
 //!
 //! cargo run --release --example ros_echo -- [TILES] [--ros-args ...]; ends when its standard input does
 
@@ -58,7 +58,7 @@ fn main() -> anyhow::Result<()> {
     let port = dds::start(&config, inbox.clone())?;
     (0..tiles).for_each(|id| port.publish(Publication::Tile(tile(id))));
     thread::spawn(move || {
-        // ends as well when nobody holds the other end any more
+        // ends as well when the other end is dropped
         let _ = std::io::copy(&mut stdin(), &mut std::io::sink());
         let _ = inbox.send(Arrival::Shutdown);
     });

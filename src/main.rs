@@ -1,4 +1,4 @@
-//! Starts logging and hands over to the command line.
+//! Starts logging and runs the command line.
 
 use std::ffi::OsString;
 use std::io::{IsTerminal, stderr};

@@ -158,7 +158,7 @@ elif stage "Python packages" python_environment && [ -e "$venv.made" ]; then
   stage "Python tests" python_tests
 else
   count=$(cat tests/python/test_*.py | grep -c '^ *def test_')
-  skip "$count" "tests/python needs a Python environment in $venv (Debian: apt-get install python3-venv; and a way to the packages of $requirements)"
+  skip "$count" "tests/python needs a Python environment in $venv (Debian: apt-get install python3-venv; and access to the packages of $requirements)"
 fi
 
 echo

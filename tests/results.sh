@@ -39,11 +39,11 @@ while IFS='|' read -r test heading; do
   [ -n "$text" ] || { echo "$test printed nothing into $log" >&2; exit 1; }
   printf '\n## %s\n\n`%s`\n\n```text\n%s\n```\n' "$heading" "$test" "$text"
 done <<'PROOFS'
-features::touched::what_was_touched_is_found_and_as_good_as_it_says|Features of the touched plate, fifty seeds
+features::touched::touched_features_are_found_within_their_stated_uncertainty|Features of the touched plate, fifty seeds
 patch::accuracy::other_tips_hands_and_friction|Other tips, hands and friction, twenty seeds
 patch::uncertainty::what_was_touched_is_as_well_known_as_it_says_where_errors_are_as_the_model_has_them|Stated uncertainty where errors are as the model has them
-patch::uncertainty::what_the_model_does_not_know_is_not_in_what_it_says|Stated uncertainty where errors are others
-patch::tips::a_tip_says_where_it_touched|Where a tip touched
+patch::uncertainty::errors_outside_of_the_model_are_not_in_the_stated_uncertainty|Stated uncertainty where errors are others
+patch::tips::contacts_of_a_tip_are_located|Where a tip touched
 refine::sweeps::the_published_rule_converges_where_no_face_leans_out_of_its_basin_and_only_there|Where the published rule converges
 refine::sweeps::the_guard_lets_the_published_rule_starve_no_face|Sweeps of the published rule, throttled by the guard's longest step
 refine::sweeps::the_robust_mode_never_blows_up_with_noise_larger_than_half_an_edge|Sweeps of the robust mode

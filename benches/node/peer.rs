@@ -21,9 +21,9 @@ use crate::{WIDTH, messages, shown};
 
 /// All tiles are there when none has come for so long.
 const QUIET: Duration = Duration::from_secs(1);
-/// Nobody is there after so long.
+/// Time limit for discovery of the other end.
 const PATIENCE: Duration = Duration::from_secs(60);
-/// What is under way when the last sample is sent comes within this.
+/// Time limit for the answers after the last sample.
 const REST: Duration = Duration::from_secs(2);
 
 const SAMPLES: QosProfile = QosProfile::subscription_default().history(History::KeepLast { depth: 2048 });
@@ -83,16 +83,16 @@ fn wait_for_matches(context: &Context, wanted: usize) {
             Some(_) => {}
             None => sleep(Duration::from_millis(10)),
         }
-        assert!(begun.elapsed() < PATIENCE, "nobody is there");
+        assert!(begun.elapsed() < PATIENCE, "the other end was not discovered");
     }
     // the other end learns of it a little later
     sleep(QUIET);
 }
 
 /// Where a vertex is, as a change of the mesh names it: x y z in single precision, as bits.
-type Place = [u32; 3];
+type VertexBits = [u32; 3];
 
-fn place(point: &Point) -> Place {
+fn place(point: &Point) -> VertexBits {
     [point.x, point.y, point.z].map(|coordinate| (coordinate as f32).to_bits())
 }
 
@@ -100,7 +100,7 @@ fn place(point: &Point) -> Place {
 #[derive(Default)]
 struct Tiles {
     /// corners of what is drawn
-    seen: BTreeMap<i32, Vec<Place>>,
+    seen: BTreeMap<i32, Vec<VertexBits>>,
     changed: Option<Instant>,
     received: u64,
 }
@@ -126,7 +126,7 @@ impl Tiles {
     }
 }
 
-/// Joins, and tells how many tiles the mesh has and how long they took to come.
+/// Joins; returns how many tiles the mesh has and how long they took to come.
 pub fn join_late(domain: u16) {
     let begun = Instant::now();
     let (_context, mut node) = joined(domain, "late");
@@ -140,22 +140,22 @@ pub fn join_late(domain: u16) {
     println!("a late joiner has {} tiles after {took:.1} s", tiles.seen.len());
 }
 
-/// What comes back.
-struct Seen {
+/// Answers of the node.
+struct Viewer {
     sent_ns: Arc<Vec<AtomicI64>>,
     begin_ns: i64,
     answered: u64,
     round_trips: Latencies,
     /// when a vertex was first drawn here, ns
-    drawn: HashMap<Place, i64>,
-    /// vertices that are told to be here and are not drawn here
-    told: HashMap<Place, u32>,
+    drawn: HashMap<VertexBits, i64>,
+    /// vertices reported at a place and not yet drawn there
+    pending: HashMap<VertexBits, u32>,
     /// of each of these vertices the samples that moved it, and where to, in their order
-    moves: HashMap<u32, Vec<(usize, Place)>>,
+    moves: HashMap<u32, Vec<(usize, VertexBits)>>,
     visible: Latencies,
 }
 
-impl Seen {
+impl Viewer {
     fn sent(&self, number: usize) -> i64 {
         self.sent_ns.get(number).map_or(0, |sent| sent.load(Ordering::Relaxed))
     }
@@ -170,17 +170,17 @@ impl Seen {
         self.round_trips.record(Duration::from_nanos((steady_ns() - self.sent(number)).max(0) as u64));
     }
 
-    /// Vertices were moved; a tile that came before it was told may show it.
+    /// Vertices were moved; an earlier tile may show the new position.
     fn note(&mut self, patch: &MeshPatch) {
         let Some(number) = self.number(&patch.header) else { return };
         for (&vertex, position) in patch.vertices.iter().zip(patch.positions.chunks_exact(3)) {
             let place = [0, 1, 2].map(|axis| position[axis].to_bits());
             match self.drawn.get(&place) {
-                // it went back to where it was before: what is drawn there does not tell when
+                // it went back to where it was before: the drawing does not show when
                 Some(&at_ns) if at_ns < self.sent(number) => self.forget(vertex),
                 Some(&at_ns) => self.record(number, at_ns),
                 None => {
-                    self.told.insert(place, vertex);
+                    self.pending.insert(place, vertex);
                     self.moves.entry(vertex).or_default().push((number, place));
                 }
             }
@@ -190,20 +190,20 @@ impl Seen {
 
     fn forget(&mut self, vertex: u32) {
         for (_, place) in self.moves.remove(&vertex).unwrap_or_default() {
-            self.told.remove(&place);
+            self.pending.remove(&place);
         }
     }
 
-    /// Who shows where a vertex is now need not show where it was before.
-    fn look(&mut self, corners: &[Place], at_ns: i64) {
+    /// A drawn place of a vertex answers for its earlier places too.
+    fn look(&mut self, corners: &[VertexBits], at_ns: i64) {
         for &place in corners {
             self.drawn.entry(place).or_insert(at_ns);
-            let Some(vertex) = self.told.remove(&place) else { continue };
+            let Some(vertex) = self.pending.remove(&place) else { continue };
             let moves = self.moves.remove(&vertex).unwrap_or_default();
             let until = moves.iter().rposition(|&(_, to)| to == place).map_or(0, |last| last + 1);
             let (shown, open) = moves.split_at(until);
             for &(number, to) in shown {
-                self.told.remove(&to);
+                self.pending.remove(&to);
                 self.record(number, at_ns);
             }
             if !open.is_empty() {
@@ -217,7 +217,7 @@ impl Seen {
     }
 }
 
-/// Sends wrenches at 1 kHz, and poses and looks at tiles where the other end is the node; tells how long answers took.
+/// Sends wrenches at 1 kHz, and poses and looks at tiles where the other end is the node; measures how long answers take.
 pub fn run(domain: u16, seconds: usize, is_node: bool) {
     let (context, mut node) = joined(domain, "sensors");
     let mut mismatches = reader::<HapticMismatch>(&mut node, "/mismatch", SAMPLES);
@@ -235,7 +235,7 @@ pub fn run(domain: u16, seconds: usize, is_node: bool) {
         let took = tiles.changed.map_or(f64::NAN, |changed| (changed - begun).as_secs_f64());
         println!("the viewer has {} tiles after {took:.1} s", tiles.seen.len());
     }
-    let drawn: HashMap<Place, i64> = tiles.seen.values().flatten().map(|&place| (place, 0)).collect();
+    let drawn: HashMap<VertexBits, i64> = tiles.seen.values().flatten().map(|&place| (place, 0)).collect();
     let count = seconds * 1000;
     let sent_ns: Arc<Vec<AtomicI64>> = Arc::new((0..count).map(|_| AtomicI64::new(0)).collect());
     let (begin, begin_ns) = (Instant::now(), wall_ns());
@@ -258,13 +258,13 @@ pub fn run(domain: u16, seconds: usize, is_node: bool) {
             }
         }
     });
-    let mut seen = Seen {
+    let mut seen = Viewer {
         sent_ns,
         begin_ns,
         answered: 0,
         round_trips: Latencies::new(),
         drawn,
-        told: HashMap::new(),
+        pending: HashMap::new(),
         moves: HashMap::new(),
         visible: Latencies::new(),
     };

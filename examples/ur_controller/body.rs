@@ -1,4 +1,4 @@
-//! The arm itself: it follows a velocity with a limited acceleration, bends against the part, and feels it.
+//! The arm itself: it follows a velocity with a limited acceleration, bends against the part, and measures the contact force.
 //!
 //! The encoders say where the tip would be if nothing bent, x_c; the ball is at x, where the part lets it be, and the part
 //! pushes with K (x − x_c). Across the normal friction holds the ball back. In force mode the velocity along one axis comes
@@ -26,7 +26,7 @@ pub const HARD_STOP: f64 = 8.0;
 /// States that a spike lasts.
 const SPIKE: u32 = 3;
 
-/// What the tip is told: a velocity, m/s and rad/s in B, and how fast it may change, m/s².
+/// Commanded motion of the tip: a velocity, m/s and rad/s in B, and how fast it may change, m/s².
 #[derive(Clone, Copy, Debug)]
 pub struct Motion {
     pub linear: Vector3<f64>,
@@ -67,13 +67,13 @@ pub struct Body<'a> {
     /// N in the flange
     tare: Vector3<f64>,
     /// what the controller takes off for the payload
-    pub told_payload: Payload,
+    pub configured_payload: Payload,
     waiting: VecDeque<(f64, Motion, Option<Force>)>,
     motion: Motion,
     force: Option<Force>,
     spike: u32,
     spike_force: f64,
-    /// of the tool that it was told, in the flange
+    /// TCP set by the client, in the flange
     pub tcp: Isometry3<f64>,
 }
 
@@ -97,7 +97,7 @@ impl<'a> Body<'a> {
             ball: start,
             forces: VecDeque::from(vec![Vector3::zeros(); late + 1]),
             tare: Vector3::zeros(),
-            told_payload: params.told_payload,
+            configured_payload: params.configured_payload,
             waiting: VecDeque::new(),
             motion: Motion::rest(HARD_STOP),
             force: None,
@@ -108,12 +108,12 @@ impl<'a> Body<'a> {
         })
     }
 
-    /// Told by the program; it moves some milliseconds later.
+    /// A command of the program; the arm follows some milliseconds later.
     pub fn follow(&mut self, motion: Motion, force: Option<Force>) {
         self.waiting.push_back((self.time + self.params.command_latency, motion, force));
     }
 
-    /// Told by what needs no program: at once.
+    /// A command that needs no program, followed at once.
     pub fn brake(&mut self) {
         self.waiting.clear();
         (self.motion, self.force) = (Motion::rest(HARD_STOP), None);
@@ -129,12 +129,13 @@ impl<'a> Body<'a> {
         self.tare = self.unweighed();
     }
 
-    /// What of the force is not taken for weight, N in the flange: contact, bias, and what the payload weighs more than was told.
+    /// Force without the configured payload's weight, N in the flange: contact, bias, and the weight beyond the configured
+    /// payload.
     fn unweighed(&self) -> Vector3<f64> {
         let r_bf = self.flange().rotation;
         let weight = |payload: &Payload| payload.weight_o(&r_bf).force;
-        let load = weight(&self.params.payload) - weight(&self.told_payload);
-        r_bf.inverse() * (self.felt() + load) + self.params.force_bias
+        let load = weight(&self.params.payload) - weight(&self.configured_payload);
+        r_bf.inverse() * (self.contact_force() + load) + self.params.force_bias
     }
 
     /// What is taken for the part's, N in B.
@@ -149,8 +150,8 @@ impl<'a> Body<'a> {
         let flange = self.flange();
         let turn = |a: f64, b: f64| (a - b + 3.0 * std::f64::consts::PI).rem_euclid(std::f64::consts::TAU);
         let far = |joints: &Joints| {
-            let ways = joints.iter().zip(&self.joints).map(|(a, b)| (turn(*a, *b) - std::f64::consts::PI).abs());
-            ways.fold(0.0, f64::max)
+            let margins = joints.iter().zip(&self.joints).map(|(a, b)| (turn(*a, *b) - std::f64::consts::PI).abs());
+            margins.fold(0.0, f64::max)
         };
         let solutions = self.geometry().inverse(&flange, &self.joints);
         if let Some(next) = solutions.into_iter().min_by(|a, b| far(a).total_cmp(&far(b))) {
@@ -180,7 +181,7 @@ impl<'a> Body<'a> {
         }
         self.linear += (wanted.cap_magnitude(self.params.top_speed) - self.linear).cap_magnitude(acceleration * STEP);
         self.angular += (self.motion.angular - self.angular).cap_magnitude(TURN_ACCELERATION * STEP);
-        // the velocity is that of the tool it was told
+        // the velocity is that of the configured TCP
         let mut tool = self.flange() * self.tcp;
         let turn = UnitQuaternion::from_scaled_axis(self.angular * STEP);
         tool = Isometry3::from_parts(
@@ -208,7 +209,7 @@ impl<'a> Body<'a> {
         self.forces.pop_front();
     }
 
-    fn felt(&self) -> Vector3<f64> {
+    fn contact_force(&self) -> Vector3<f64> {
         self.forces.front().copied().unwrap_or_default()
     }
 
@@ -249,7 +250,7 @@ impl<'a> Body<'a> {
         let (noise, torque_noise) = (self.noise(self.params.force_noise), self.noise(self.params.torque_noise));
         let ArmParams { payload, pose_ft, force_bias, torque_bias, .. } = &self.params;
         let r_bf = self.flange().rotation;
-        let (weight, contact) = (payload.weight_o(&r_bf), r_bf.inverse() * (self.felt() + spike));
+        let (weight, contact) = (payload.weight_o(&r_bf), r_bf.inverse() * (self.contact_force() + spike));
         let force = contact + r_bf.inverse() * (weight.force + noise) + force_bias;
         let lever = pose_ft.translation.vector;
         let torque = lever.cross(&contact) + r_bf.inverse() * weight.torque + torque_bias + torque_noise;

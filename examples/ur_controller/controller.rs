@@ -20,7 +20,7 @@ const QUIET_LOOKS_MOVING: u32 = 200;
 /// order, and not as far as to where the watchdog stops the program.
 const AHEAD: f64 = 80e-3;
 
-/// What the safety system says.
+/// Status of the safety system.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Safety {
     Normal,
@@ -43,7 +43,7 @@ pub struct Faults {
     pub is_dead: bool,
 }
 
-/// The program of the client, as far as it is looked at.
+/// The program of the client, as far as it is interpreted.
 #[derive(Default)]
 struct Program {
     is_running: bool,
@@ -125,7 +125,7 @@ impl<'a> Controller<'a> {
 
     /// The client has written the register of commands.
     pub fn hear(&mut self, id: i32) {
-        // what it was told to do before and has not yet read it never does
+        // an earlier command that it has not read yet is dropped
         if self.is_heard && matches!(self.ints_in[0], 6 | 10) && self.ints_in[0] != id {
             self.record.event(&format!("command {} is never read", self.ints_in[0]));
         }
@@ -147,7 +147,7 @@ impl<'a> Controller<'a> {
             return true;
         }
         self.quiet_looks += 1;
-        // where nobody is there any more, or waits for a program that hangs, time passes all the same
+        // with no client, or one that waits for a program that hangs, time passes all the same
         let is_in_vain = self.owner.is_none() || self.faults.is_stuck;
         let [linear, angular] = self.body.velocity();
         let moves = linear.norm() + angular.norm() > 0.0;
@@ -170,7 +170,7 @@ impl<'a> Controller<'a> {
         self.record.line(&self.body);
     }
 
-    /// What is in the registers then is done at once, also what an earlier program was told.
+    /// The command in the registers is executed at once, also what an earlier program left there.
     fn start_program(&mut self) {
         if self.program.starts_at.is_some_and(|at| at <= self.body.time) && self.safety == Safety::Normal {
             self.program = Program { is_running: true, ..Program::default() };
@@ -231,7 +231,7 @@ impl<'a> Controller<'a> {
                 self.ints_out[0] = 1;
             }
             6 | 10 => self.realtime(id),
-            255 => self.stop_program("told by the client"),
+            255 => self.stop_program("requested by the client"),
             _ if self.program.is_handled => {}
             _ => {
                 self.program.is_handled = true;
@@ -274,7 +274,7 @@ impl<'a> Controller<'a> {
             let motion = Motion { linear: self.vector(0), angular: self.vector(3), acceleration };
             let goes = |motion: &Motion| motion.linear.norm() + motion.angular.norm() > 0.0;
             if !goes(&motion) && self.program.velocity.as_ref().is_none_or(goes) {
-                self.record.event(&format!("told to stop with {acceleration} m/s²"));
+                self.record.event(&format!("stop requested with {acceleration} m/s²"));
             }
             self.program.speed_time = self.doubles_in[7];
             self.program.velocity = Some(motion);
@@ -310,18 +310,19 @@ impl<'a> Controller<'a> {
                 self.doubles_out[3..6].copy_from_slice(turn.as_slice());
             }
             17 => {
-                let told = Payload { mass: self.doubles_in[0], p_sc: self.vector(1), ..self.body.told_payload };
-                self.body.told_payload = told;
-                self.record.event(&format!("payload {} kg", told.mass));
+                let payload =
+                    Payload { mass: self.doubles_in[0], p_sc: self.vector(1), ..self.body.configured_payload };
+                self.body.configured_payload = payload;
+                self.record.event(&format!("payload {} kg", payload.mass));
             }
             // how force mode is tuned is not simulated
             20 | 21 => self.record.event(&format!("set {id}: {:?}", &self.doubles_in[..4])),
             35 => self.program.watchdog = Some(1.0 / self.doubles_in[0]),
-            31 => self.stop_for(Safety::Protective, "told by the client"),
+            31 => self.stop_for(Safety::Protective, "requested by the client"),
             _ => self.stop_program(&format!("command {id} is not simulated")),
         }
         if self.program.braking.is_some() {
-            // done when it stands
+            // done at rest
             self.ints_out[0] = 1;
         }
     }

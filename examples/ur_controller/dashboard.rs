@@ -1,4 +1,4 @@
-//! The dashboard port: one line asked, one line answered.
+//! The dashboard port: one line in, one line out.
 
 use std::io::{BufRead, BufReader, Write};
 use std::net::TcpStream;

@@ -42,7 +42,7 @@ const LOOK: Duration = Duration::from_micros(500);
 /// The holes of the part are polygons within this of their circles, m.
 const CHORD: f64 = 2e-6;
 
-/// What hangs on the flange: as much as the client says of a probe where it is told nothing else.
+/// What hangs on the flange: the payload that the client states for a probe by default.
 const PROBE: Payload = Payload { mass: 0.25, p_sc: Vector3::new(0.0, 0.0, 0.05), ..WEIGHTLESS };
 
 struct Arguments {

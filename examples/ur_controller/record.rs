@@ -1,4 +1,4 @@
-//! What the arm did, by its own clock: one line for each period, and the events between.
+//! The motion of the arm, by its own clock: one line for each period, and the events between.
 
 use std::fs::File;
 use std::io::Write;
@@ -34,7 +34,7 @@ impl Record {
         let (speed, turn, force, time) = (linear.norm(), angular.norm(), body.true_force(), body.time);
         let line =
             format!("{time:.4},{:.7},{:.7},{:.7},{speed:.7},{turn:.7},{force:.3},{event}\n", place.x, place.y, place.z);
-        // a record that cannot be written ends the run of who reads it, by its deadline
+        // a record that cannot be written ends the run of its reader, by its deadline
         let _ = out.write_all(line.as_bytes());
     }
 }

@@ -10,7 +10,7 @@ const OUTPUTS: u8 = b'O';
 const INPUTS: u8 = b'I';
 const DATA: u8 = b'U';
 
-/// A client that has asked for states.
+/// A client that subscribed to states.
 pub struct Stream {
     socket: TcpStream,
     names: Vec<String>,
@@ -33,7 +33,7 @@ fn packet(kind: u8, body: &[u8]) -> Vec<u8> {
     packet
 }
 
-/// All that can be asked for, at one moment.
+/// All outputs, at one moment.
 pub struct States {
     time: f64,
     q: [f64; 6],

@@ -55,7 +55,7 @@ pub(super) struct ArmArguments {
     pub cell: CellArguments,
 }
 
-/// What an arm stands before; a verb that has other sources than an arm takes these without the arm.
+/// The scene of an arm; a verb that has other sources than an arm takes these without the arm.
 #[derive(Debug, Args)]
 #[group(id = "cell")]
 pub(super) struct CellArguments {
@@ -65,22 +65,22 @@ pub(super) struct CellArguments {
     /// Unit of the coordinates in the scan's file, and in the part's
     #[arg(long, value_name = "U", default_value = "mm")]
     mesh_unit: MeshUnit,
-    /// The part as it is, for a simulated arm: a closed mesh
+    /// The true part, for a simulated arm: a closed mesh
     #[arg(long, value_name = "MESH")]
     truth: Option<PathBuf>,
-    /// Noise of the simulated arm comes from it
+    /// Seed of the noise of the simulated arm
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
 }
 
-/// What hangs on the flange of a simulated arm, where the scene is wrong about it.
+/// True payload of a simulated arm, where it differs from the scene.
 #[derive(Debug, Args)]
 #[group(id = "true_payload")]
 pub(super) struct TruePayload {
-    /// What really hangs on the flange of a simulated arm, kg; left out: robot.payload_kg of the scene
+    /// True payload of a simulated arm, kg; default: robot.payload_kg of the scene
     #[arg(long, value_name = "M")]
     truth_payload_kg: Option<f64>,
-    /// Its centre of mass in the flange, mm; left out: robot.payload_centre_mm of the scene
+    /// Its centre of mass in the flange, mm; default: robot.payload_centre_mm of the scene
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     truth_payload_centre_mm: Option<String>,
 }
@@ -90,11 +90,11 @@ impl TruePayload {
     pub fn held_by(&self, arm: ArmParams, scene: &Scene) -> Result<ArmParams, CliError> {
         let robot = scene.robot.clone().unwrap_or_default();
         let (mass, centre) = (robot.payload_mass, robot.payload_centre);
-        let told_payload = Payload { mass, p_sc: centre, ..WEIGHTLESS };
+        let configured_payload = Payload { mass, p_sc: centre, ..WEIGHTLESS };
         let written = |text: &String| millimetres("--truth-payload-centre-mm", text);
         let p_sc = self.truth_payload_centre_mm.as_ref().map(written).transpose()?.unwrap_or(centre);
         let payload = Payload { mass: self.truth_payload_kg.unwrap_or(mass), p_sc, ..WEIGHTLESS };
-        Ok(ArmParams { payload, told_payload, ..arm })
+        Ok(ArmParams { payload, configured_payload, ..arm })
     }
 }
 
@@ -113,7 +113,7 @@ impl ArmArguments {
         self.cell.scan(scene)
     }
 
-    /// Does something with the arm.
+    /// A call on the arm.
     pub fn with<T>(
         &self,
         ready: &Ready,
@@ -134,9 +134,9 @@ impl CellArguments {
         }
     }
 
-    /// Does something with an arm.
+    /// Runs a call on an arm.
     ///
-    /// - `truth`: makes of the simulated arm of the scene the one that there is.
+    /// - `truth`: turns the simulated arm of the scene into the true one.
     pub fn with<T>(
         &self,
         robot: RobotName,

@@ -1,4 +1,4 @@
-//! `touchup check`: whether an arm feels one spot in one place, before it is trusted with a part.
+//! `touchup check`: whether an arm measures one spot at one place, before it is trusted with a part.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ use super::progress::WorkProgress;
 use super::{CliError, Losses, print_result};
 use crate::probe::{Prober, Repeatability};
 
-/// Touches that a spot may have; with three each side has been come from, and one says how far they scatter.
+/// Allowed number of touches; with three each side is approached, and the repeatability is known.
 const TOUCHES: std::ops::RangeInclusive<usize> = 3..=100;
 
 #[derive(Debug, Args)]
@@ -26,10 +26,10 @@ pub(super) struct CheckArguments {
     /// A flat place of the part with nothing within 15 mm, in the frame of the scan, mm
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     spot: String,
-    /// How often it is touched, every second time from the other side
+    /// Number of touches, every second one from the other side
     #[arg(long, value_name = "N", default_value_t = 10)]
     touches: usize,
-    /// All touches have to be within this, µm
+    /// Gate: largest distance of a touch from the mean, µm
     #[arg(long, value_name = "G", default_value_t = 25.0)]
     gate_um: f64,
     /// Prints the result as one JSON object
@@ -75,7 +75,7 @@ pub(super) fn repeated(
     ready.may_move()?;
     let _touching = WorkProgress::stage("touch");
     arm.with(&ready, |arm| {
-        let mut world = ready.still_world();
+        let mut world = ready.static_world();
         let mut prober = Prober::new(arm, &ready.cell, &ready.params, &mut world);
         prober.repeat(&place, touches).map_err(|error| CliError::Arm(error.to_string()))
     })

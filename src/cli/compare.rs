@@ -28,7 +28,7 @@ use crate::mesh::{FaceTree, TriMesh};
 pub(super) struct CompareArguments {
     /// The mesh to be judged: PLY, STL or OBJ; of a refined PLY touched and untouched parts are listed apart
     mesh: PathBuf,
-    /// The part as it should be, or truly is: PLY, STL or OBJ
+    /// The nominal or true part: PLY, STL or OBJ
     truth: PathBuf,
     /// With --align pairs: the same points on MESH (columns scan_x_mm …) and on TRUTH (space_x_mm …), as CSV
     #[arg(value_name = "PAIRS")]
@@ -69,7 +69,7 @@ pub(super) struct CompareArguments {
     /// Points spread over TRUTH; over MESH they are as dense
     #[arg(long, value_name = "N", default_value_t = 200_000, value_parser = clap::value_parser!(u32).range(100..=5_000_000))]
     samples: u32,
-    /// Another seed spreads them anew
+    /// Another seed spreads them differently
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Prints one JSON object
@@ -80,7 +80,7 @@ pub(super) struct CompareArguments {
 /// How the mesh is brought onto the truth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Align {
-    /// It is there
+    /// MESH is already aligned
     None,
     /// From about the right place, point to plane
     Icp,
@@ -97,7 +97,7 @@ pub(super) struct CompareReport {
     truth: ShapeReport,
     #[serde(skip_serializing_if = "Option::is_none")]
     alignment: Option<Alignment>,
-    /// the scan, where that was asked for
+    /// the scan, with --before
     #[serde(skip_serializing_if = "Option::is_none")]
     before: Option<ComparisonReport>,
     /// the mesh
@@ -140,7 +140,7 @@ pub(super) fn compare(arguments: &CompareArguments) -> Result<Losses, CliError> 
     Ok(Losses::new())
 }
 
-/// Compares, and writes what is asked for.
+/// Compares, and writes the requested files.
 pub(super) fn compared(arguments: &CompareArguments) -> Result<CompareReport, CliError> {
     arguments.check_alignment()?;
     arguments.check_outputs()?;
@@ -190,7 +190,7 @@ pub(super) fn compared(arguments: &CompareArguments) -> Result<CompareReport, Cl
     })
 }
 
-/// What stands in a picture beside the deviations.
+/// Labels of a picture beside the deviations.
 struct Annotations<'a> {
     caption: String,
     labels: Vec<PictureLabel>,
@@ -271,7 +271,7 @@ impl CompareArguments {
         Ok(MeasuredBoth { before: Some(before), after })
     }
 
-    /// Draws what was measured.
+    /// Draws the deviations.
     fn draw(
         &self,
         path: &Path,
@@ -338,7 +338,7 @@ impl CompareArguments {
         Ok(())
     }
 
-    /// The work is not begun when its result cannot be kept.
+    /// Checks that the result can be written before the work begins.
     fn check_outputs(&self) -> Result<(), CliError> {
         let outputs = [("--picture", ".png", &self.picture), ("--coloured", ".ply", &self.coloured)];
         for (flag, ending, path) in
@@ -374,7 +374,7 @@ fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
-/// What each vertex of a refined PLY rests on; `None` for a mesh that does not say.
+/// Support of each vertex of a refined PLY; `None` for a mesh without it.
 fn read_regions(path: &Path, unit: MeshUnit, mesh: &TriMesh) -> Result<Option<Vec<SupportRegion>>, CliError> {
     let columns = read_vertex_columns(path, unit, mesh, ["support", "touched"]).map_err(CliError::ReadMesh)?;
     let of_support = |support: &f32| match *support {

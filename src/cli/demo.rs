@@ -14,7 +14,7 @@ use super::demo_robot::demo_robot;
 use super::found::FoundTable;
 use super::progress::WorkProgress;
 use super::refine::{RefineArguments, RefineSummary, Refined};
-use super::simulate::{Feel, Simulated, write_simulation};
+use super::simulate::{Simulated, TouchModel, write_simulation};
 use super::touched::{RegionError, TouchedTruth};
 use super::{CliError, Losses, print_result};
 use crate::io::atomic::write_atomically;
@@ -25,7 +25,7 @@ use crate::sim::{PathParams, Plate, ScannerParams, StylusParams, measure_quality
 /// Largest distance of the written plate's round walls from circles, m.
 const CHORD_ERROR: f64 = 10e-6;
 
-/// What the pictures of the demo call within tolerance, mm: medium of ISO 2768-1 for lengths of up to 6 mm.
+/// Tolerance in the pictures of the demo, mm: medium of ISO 2768-1 for lengths of up to 6 mm.
 pub(super) const TOLERANCE_MM: f64 = 0.1;
 
 #[derive(Debug, Args)]
@@ -34,10 +34,10 @@ pub(super) struct DemoArguments {
     /// summary.json
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub(super) out: PathBuf,
-    /// Another seed makes another scan and another hand
+    /// Another seed makes another scan and another path
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(super) seed: u64,
-    /// An arm touches instead of a hand: it probes what is flagged by itself (probed.json, plan.png, touches.png)
+    /// An arm touches instead of a hand: it probes the flagged features (probed.json, plan.png, touches.png)
     #[arg(long, value_name = "ARM")]
     robot: Option<RobotName>,
 }
@@ -52,7 +52,7 @@ struct DemoSummary {
     /// and of the refined mesh
     after: RegionError,
     refine: RefineSummary,
-    /// true features beside what was found of them
+    /// true features beside the found ones
     found: FoundTable,
 }
 
@@ -77,8 +77,8 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
     let path = plan_demo(&plate, &PathParams::default())?;
     let scanner = ScannerParams { seed: arguments.seed, ..ScannerParams::default() };
     let truth = plate.mesh(CHORD_ERROR)?;
-    let feel = Feel { stylus: StylusParams::default(), camera: None, seed: arguments.seed };
-    let Simulated { scan, touch } = write_simulation(&plate, &truth, &path, &scanner, &feel, &arguments.out)?;
+    let model = TouchModel { stylus: StylusParams::default(), camera: None, seed: arguments.seed };
+    let Simulated { scan, touch } = write_simulation(&plate, &truth, &path, &scanner, &model, &arguments.out)?;
 
     let refined_path = arguments.out.join("refined.ply");
     let [scan_path, touches_path, features_path] =

@@ -20,11 +20,11 @@ use crate::io::mesh_file::{MeshUnit, write_mesh};
 use crate::probe::{Flag, Probed};
 use crate::sim::{Plate, ScannerParams, SimArm, TruthFeature, TruthShape, scan};
 
-/// The scene of it, which is written beside the rest.
+/// Its scene, written beside the other files.
 const SCENE: &str = include_str!("../../config/probe.yaml");
 /// The triangles of the part are this near to it, m: what is probed on them differs from the drawing by no more than a touch does.
 const CHORD_ERROR: f64 = 0.5e-6;
-/// A click is off by no more than this, m.
+/// Largest error of a click, m.
 const CLICK: f64 = 3e-3;
 
 /// What `summary.json` holds; lengths in mm.
@@ -34,11 +34,11 @@ struct RobotSummary {
     errors: Vec<ProbedError>,
 }
 
-/// How far what was probed is from the part.
+/// Errors of the probed features.
 #[derive(Debug, Serialize)]
 struct ProbedError {
     name: &'static str,
-    /// how far the click was off
+    /// error of the click
     click_mm: f64,
     touches: usize,
     duration_s: f64,

@@ -21,9 +21,9 @@ use crate::mesh::{FaceTree, TriMesh};
 
 #[derive(Debug, Args)]
 pub(super) struct DisagreeArguments {
-    /// The scan as it was: PLY, STL or OBJ
+    /// The scan before refinement: PLY, STL or OBJ
     scan: PathBuf,
-    /// What refine made of it: a PLY, which says what was touched
+    /// The refined mesh: a PLY of refine, which marks what was touched
     refined: PathBuf,
     /// The touches, as refine --touches-out writes them
     #[arg(long, value_name = "CSV")]
@@ -54,7 +54,7 @@ struct DisagreeReport {
     /// `null` where too little was touched to know how the scanner errs
     scanner: Option<ScannerReport>,
     /// of the scan as a whole, taken off before places are judged
-    misplaced: Option<MisplacedReport>,
+    rigid_offset: Option<RigidOffsetReport>,
     classes: Vec<ClassReport>,
     regions: Vec<DisagreementRow>,
     bad_touches: Vec<BadTouchReport>,
@@ -62,7 +62,7 @@ struct DisagreeReport {
 
 #[derive(Debug, Serialize)]
 struct ScannerReport {
-    /// touch − scan where the scanner sees well: negative where the part looks too fat
+    /// touch − scan where the scanner sees well: negative where the part looks too large
     offset_mm: f64,
     noise_mm: f64,
     correlation_mm: f64,
@@ -72,7 +72,7 @@ struct ScannerReport {
 }
 
 #[derive(Debug, Serialize)]
-struct MisplacedReport {
+struct RigidOffsetReport {
     /// would bring the scan onto the touches, at `center_mm`
     shift_mm: [f64; 3],
     /// and rotation vector
@@ -148,7 +148,7 @@ pub(super) fn disagree(arguments: &DisagreeArguments) -> Result<Losses, CliError
     Ok(Losses::new())
 }
 
-/// What each vertex rests on.
+/// Support of each vertex.
 fn read_known(path: &Path, unit: MeshUnit, mesh: &TriMesh) -> Result<Vec<VertexBasis>, CliError> {
     let [support] = read_vertex_columns(path, unit, mesh, ["support"]).map_err(CliError::ReadMesh)?;
     let support = support.filter(|support| support.len() == mesh.vertex_slots()).ok_or_else(|| {
@@ -177,7 +177,7 @@ fn write_coloured(path: &Path, mesh: &TriMesh, map: &ClassMap, unit: MeshUnit) -
 }
 
 impl DisagreeArguments {
-    /// The work is not begun when its result cannot be kept.
+    /// Checks that the result can be written before the work begins.
     fn check_outputs(&self) -> Result<(), CliError> {
         let outputs = [
             ("--picture", ".png", &self.picture),
@@ -247,12 +247,12 @@ impl DisagreeReport {
         };
         Self {
             scanner: found.scanner.as_ref().map(ScannerReport::of),
-            misplaced: found.misplaced.as_ref().map(|misplaced| MisplacedReport {
-                shift_mm: mm(&misplaced.shift.into()),
-                turn_deg: misplaced.turn.map(f64::to_degrees).into(),
-                shift_std_mm: mm(&misplaced.shift_sigma.into()),
-                turn_std_deg: misplaced.turn_sigma.map(f64::to_degrees).into(),
-                center_mm: mm(&misplaced.centre),
+            rigid_offset: found.misplaced.as_ref().map(|offset| RigidOffsetReport {
+                shift_mm: mm(&offset.shift.into()),
+                turn_deg: offset.turn.map(f64::to_degrees).into(),
+                shift_std_mm: mm(&offset.shift_sigma.into()),
+                turn_std_deg: offset.turn_sigma.map(f64::to_degrees).into(),
+                center_mm: mm(&offset.centre),
             }),
             classes: Class::ALL.into_iter().enumerate().map(class).collect(),
             regions: found.regions.iter().map(DisagreementRow::of).collect(),
@@ -305,7 +305,7 @@ impl BadTouchReport {
     }
 }
 
-/// So many regions and bad touches are listed; `--json` has all.
+/// Number of listed regions and bad touches; `--json` has all.
 const MOST_LISTED: usize = 12;
 
 impl fmt::Display for DisagreeReport {
@@ -319,7 +319,7 @@ impl fmt::Display for DisagreeReport {
             )?,
             None => writeln!(f, "too little was touched to know how the scanner errs: nothing is called changed")?,
         }
-        if let Some(MisplacedReport { shift_mm: [x, y, z], turn_deg, .. }) = &self.misplaced {
+        if let Some(RigidOffsetReport { shift_mm: [x, y, z], turn_deg, .. }) = &self.rigid_offset {
             let turn = Vector3::from(*turn_deg).norm();
             writeln!(
                 f,

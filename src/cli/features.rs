@@ -26,19 +26,19 @@ pub(super) struct FeaturesArguments {
     /// Unit of the coordinates in its file
     #[arg(long, value_name = "U", default_value = "mm")]
     mesh_unit: MeshUnit,
-    /// What was touched, as refine --touches-out writes it
+    /// The touches, as refine --touches-out writes them
     #[arg(long, value_name = "CSV")]
     touches: Option<PathBuf>,
     /// What is looked for
     #[arg(long, value_name = "MODE", default_value = "fitted")]
     mode: FeaturesMode,
-    /// paper: number of clusters; left out: it comes from the data
+    /// paper: number of clusters; default: estimated from the data
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     clusters: Option<u32>,
     /// paper: vertices of more Gaussian curvature than this belong to clusters, 1/mm²
     #[arg(long, value_name = "T", default_value_t = 0.3)]
     threshold_per_mm2: f64,
-    /// Where the features go, as JSON
+    /// Output: the features as JSON
     #[arg(long, value_name = "JSON")]
     out: Option<PathBuf>,
     /// Prints the features as JSON
@@ -46,7 +46,7 @@ pub(super) struct FeaturesArguments {
     json: bool,
 }
 
-/// What is looked for on a mesh.
+/// Kind of search on a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum FeaturesMode {
     /// holes, slots, pockets, bosses, edges, corners and planes, fitted by least squares
@@ -122,7 +122,7 @@ impl FeaturesArguments {
     }
 }
 
-/// Clusters as people read them.
+/// Clusters as text.
 struct ClusterTable<'a>(&'a FeatureFile);
 
 impl fmt::Display for ClusterTable<'_> {
@@ -147,7 +147,7 @@ pub(super) fn find(mesh: &TriMesh, touches: &[ProbedPoint]) -> (Detection, Featu
     found(mesh, touches)
 }
 
-/// Features as people read them.
+/// Features as text.
 pub(super) struct FeatureTable<'a>(pub &'a Detection);
 
 impl fmt::Display for FeatureTable<'_> {
@@ -163,15 +163,15 @@ impl fmt::Display for FeatureTable<'_> {
                 write!(f, "\n{}", FeatureRow(feature))?;
             }
         }
-        if *unexplained > TOLD {
+        if *unexplained > NOTABLE {
             write!(f, "\nnot looked at: {:.0} % of the surface, which is neither flat nor round", unexplained * 100.0)?;
         }
         Ok(())
     }
 }
 
-/// A share of the surface that is worth a line.
-const TOLD: f64 = 0.05;
+/// Smallest share of the surface that gets a line.
+const NOTABLE: f64 = 0.05;
 
 const KINDS: [Kind; 7] = [Kind::Hole, Kind::Slot, Kind::Pocket, Kind::Boss, Kind::Edge, Kind::Corner, Kind::Plane];
 

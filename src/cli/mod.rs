@@ -92,7 +92,7 @@ ROS_AUTOMATIC_DISCOVERY_RANGE are heeded. Topics, services and parameters: docs/
 
 #[derive(Debug, Subcommand)]
 enum Verb {
-    /// Finds what the scene must know: where the scan lies, what hangs on the sensor, where the ball is
+    /// Identifies parameters of the scene: pose of the scan, payload of the sensor, centre of the ball
     #[command(subcommand)]
     Calibrate(calibrate::CalibrateArguments),
     /// Makes a plate, scans it badly, touches it and refines the scan: needs no input
@@ -105,9 +105,9 @@ enum Verb {
     Refine(refine::RefineArguments),
     /// Finds holes, slots, pockets, bosses, edges, corners and planes on a mesh, and measures them
     Features(features::FeaturesArguments),
-    /// Has an arm probe flagged features by itself
+    /// Probes flagged features with an arm
     Probe(probe::ProbeArguments),
-    /// Has an arm touch one spot again and again, and says whether it can be trusted
+    /// Checks the repeatability of an arm on one spot
     Check(check::CheckArguments),
     /// Scans and touches a known part: makes the input of refine
     Simulate(simulate::SimulateArguments),
@@ -118,7 +118,7 @@ enum Verb {
     #[cfg(any(feature = "ros", feature = "r2r"))]
     #[command(after_help = ROS_ARGUMENTS)]
     Node(node::NodeArguments),
-    /// Plays a recording onto the topics of a node, as if it were touched now
+    /// Plays a recording on the topics of a node, in real time
     #[cfg(any(feature = "ros", feature = "r2r"))]
     #[command(after_help = ROS_ARGUMENTS)]
     Replay(replay::ReplayArguments),
@@ -138,10 +138,10 @@ enum Verb {
     Ur(ur::UrArguments),
 }
 
-/// Why a verb gave up.
+/// Error of a verb.
 #[derive(Debug, thiserror::Error)]
 enum CliError {
-    /// A flag that is well-formed and yet cannot be.
+    /// A well-formed flag with an impossible value.
     #[error("{0}; see --help")]
     Usage(String),
     #[error(transparent)]
@@ -183,9 +183,9 @@ enum CliError {
     Payload { path: PathBuf, error: PayloadError },
     #[error("{path}: {error}", path = path.display())]
     Tip { path: PathBuf, error: TipError },
-    #[error("{path}: the stylus rested {found} times for half a second in contact, and {wanted} points are picked on the scan; \
-             they are matched in order: rest once on each, in the order of the file", path = path.display())]
-    Rests { path: PathBuf, found: usize, wanted: usize },
+    #[error("{path}: {found} dwells of half a second in contact, and {wanted} points picked on the scan; \
+             they are matched in order: dwell once on each, in the order of the file", path = path.display())]
+    Dwells { path: PathBuf, found: usize, wanted: usize },
     #[error(transparent)]
     Live(#[from] LiveError),
     #[error("the mesh cannot be aligned with the truth: {0}")]
@@ -240,7 +240,7 @@ impl From<OutcomeError> for CliError {
 }
 
 impl CliError {
-    /// What kind of thing is wrong, as `--json` names it.
+    /// Kind of the error, as `--json` names it.
     fn kind(&self) -> &'static str {
         match self {
             Self::Usage(_) => "usage",
@@ -256,7 +256,7 @@ impl CliError {
             Self::Features(_) => "features",
             Self::Simulate(_) => "simulation",
             Self::Refine(_) | Self::Live(_) => "refinement",
-            Self::Table(_) | Self::Pairs { .. } | Self::Payload { .. } | Self::Tip { .. } | Self::Rests { .. } => {
+            Self::Table(_) | Self::Pairs { .. } | Self::Payload { .. } | Self::Tip { .. } | Self::Dwells { .. } => {
                 "calibration"
             }
             Self::Align(_) | Self::AlignFeatures(_) => "alignment",
@@ -298,14 +298,14 @@ impl CliError {
             // settings come from a scene file: its flags are checked before
             Self::Scene(_) | Self::ReadMesh(_) | Self::ReadTruth(_) | Self::ReadRecording(_) | Self::Simulate(_) => 3,
             Self::Touches(_) | Self::Features(_) | Self::Session(_) => 3,
-            Self::Table(_) | Self::Pairs { .. } | Self::Payload { .. } | Self::Tip { .. } | Self::Rests { .. } => 3,
+            Self::Table(_) | Self::Pairs { .. } | Self::Payload { .. } | Self::Tip { .. } | Self::Dwells { .. } => 3,
             Self::Mesh(_) | Self::Setting(_) | Self::Refine(_) | Self::Live(_) => 3,
             Self::Align(_) | Self::AlignFeatures(_) | Self::Compare(_) => 3,
         }
     }
 }
 
-/// What was lost although the work was done; empty: nothing.
+/// Losses of work that was done; empty: none.
 type Losses = Vec<String>;
 
 /// Runs the verb that `arguments` name, the program's own name first.
@@ -371,7 +371,7 @@ impl Verb {
     }
 }
 
-/// What stands behind `--ros-args`, for the verbs that take it.
+/// Arguments behind `--ros-args`, for the verbs that take it.
 fn ros_arguments(verb: &Verb, given: Vec<OsString>) -> Result<Vec<String>, CliError> {
     if !given.is_empty() && !verb.takes_ros_arguments() {
         return Err(CliError::Usage("--ros-args is for the verbs node and replay".to_owned()));
@@ -383,7 +383,7 @@ fn ros_arguments(verb: &Verb, given: Vec<OsString>) -> Result<Vec<String>, CliEr
     given.into_iter().map(text).collect()
 }
 
-/// What is logged by default: that of `--log-level` behind `--ros-args`, else warnings.
+/// The default log filter: that of `--log-level` behind `--ros-args`, else warnings.
 pub fn log_filter(arguments: &[OsString]) -> Targets {
     let (_, ros) = split(arguments);
     // the last one counts
@@ -399,7 +399,7 @@ pub fn log_filter(arguments: &[OsString]) -> Targets {
     Targets::new().with_default(level).with_targets(libraries)
 }
 
-/// Without ROS `--ros-args` is an argument like any other: nobody knows it.
+/// Without ROS `--ros-args` is an unknown argument like any other.
 #[cfg(not(any(feature = "ros", feature = "r2r")))]
 fn split<T>(arguments: impl IntoIterator<Item = T>) -> (Vec<T>, Vec<T>) {
     (arguments.into_iter().collect(), Vec::new())
@@ -432,7 +432,7 @@ fn check_kept_by(by: &str, flag: &str, input: &Path, output: &Path) -> Result<()
     Err(CliError::Usage(format!("{by} would write over {path}, which {flag} reads: choose another place")))
 }
 
-/// One line on stderr, of what is no error.
+/// One line on stderr that is no error.
 fn notify(line: &str) {
     let _ = writeln!(stderr(), "touchup: {}", line.replace('\n', " "));
 }

@@ -1,4 +1,4 @@
-//! `touchup node`: the ROS 2 node, until it is asked to end.
+//! `touchup node`: the ROS 2 node, until a signal ends it.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -29,7 +29,7 @@ pub(super) struct NodeArguments {
     json: bool,
 }
 
-/// - `ros`: what stands behind `--ros-args`.
+/// - `ros`: the arguments behind `--ros-args`.
 pub(super) fn node(arguments: &NodeArguments, ros: &[String]) -> Result<Losses, CliError> {
     let mut config = NodeConfig::new(ros, |name| std::env::var(name).ok())?;
     arguments.set_scene(&mut config)?;
@@ -85,7 +85,7 @@ fn arm_of(config: &NodeConfig, scene: &Scene) -> Result<Option<ArmOfNode>, CliEr
 }
 
 impl NodeArguments {
-    /// The flag stands above files of parameters, which may name a scene for every node.
+    /// The flag overrides files of parameters, which may name a scene for every node.
     fn set_scene(&self, config: &mut NodeConfig) -> Result<(), CliError> {
         let Some(scene) = &self.scene else { return Ok(()) };
         let path = scene.to_str().ok_or_else(|| {
@@ -129,8 +129,8 @@ async fn any(signals: &mut [tokio::signal::unix::Signal]) {
 fn losses(report: &SessionReport) -> Losses {
     let ([wrenches, poses], [samples, others]) = (report.lost, report.dropped);
     let counted = [
-        (wrenches, "wrenches lost on the way"),
-        (poses, "poses lost on the way"),
+        (wrenches, "wrenches lost in transport"),
+        (poses, "poses lost in transport"),
         (samples, "wrenches and poses dropped: the computer is too slow"),
         (others, "other messages dropped"),
         (report.unrecorded, "messages not in the session's recording"),
@@ -147,7 +147,7 @@ impl fmt::Display for SessionReport {
         writeln!(f, "samples: {} accepted; refused: {refused}", self.accepted)?;
         writeln!(
             f,
-            "lost on the way: {wrenches} wrenches, {poses} poses; streams stale: {wrenches_stale} times wrenches, \
+            "lost in transport: {wrenches} wrenches, {poses} poses; streams stale: {wrenches_stale} times wrenches, \
              {poses_stale} times poses"
         )?;
         writeln!(f, "contacts: {}; updates cut back: {}", self.contacts, self.cut_back)?;

@@ -1,4 +1,4 @@
-//! What a replay estimates of clock and registration: offered in the summary, never applied unasked.
+//! Estimates of clock offset and registration from a replay: reported in the summary, never applied.
 
 use std::fmt;
 
@@ -8,19 +8,19 @@ use serde::Serialize;
 use crate::refine::{RefineParams, Registrar, Registration, RegistrationError, RegistrationParams};
 use crate::touch::{ClockOffset, ContactSample, SettingError};
 
-/// What the clock of the wrench reads beyond that of the pose; never applied unasked.
+/// Clock offset of the wrench against the pose; never applied automatically.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub(super) struct WrenchOffset {
-    /// the whole of it: what the scene has and what was found
+    /// total offset: that of the scene and the correction
     pub wrench_offset_ms: f64,
     /// standard uncertainty
     pub sigma_ms: f64,
-    /// onsets of contact that it comes from
+    /// number of contact onsets used
     pub onsets: usize,
 }
 
 impl WrenchOffset {
-    /// - `applied_ns`: what the scene takes off already.
+    /// - `applied_ns`: offset that the scene applies already.
     pub fn of(found: &ClockOffset, applied_ns: i64) -> Self {
         Self {
             wrench_offset_ms: found.offset * 1e3 + applied_ns as f64 * 1e-6,
@@ -41,7 +41,7 @@ impl fmt::Display for WrenchOffset {
     }
 }
 
-/// What would move the scan onto the contacts; never applied unasked.
+/// Motion of the scan onto the contacts; never applied automatically.
 #[derive(Clone, Debug, Serialize)]
 #[serde(untagged)]
 pub(super) enum ScanOffset {
@@ -52,7 +52,7 @@ pub(super) enum ScanOffset {
         /// rotation vector about that, and its standard uncertainty
         turn_deg: [f64; 3],
         turn_sigma_deg: [f64; 3],
-        /// by how much the scan is too fat
+        /// surface offset of the scan, outwards
         surface_offset_mm: f64,
         surface_offset_sigma_mm: f64,
         /// the middle of the contacts
@@ -89,7 +89,7 @@ impl fmt::Display for ScanOffset {
             values.iter().zip(sigmas).map(|(x, s)| format!("{x:+.3} ± {s:.3}")).collect::<Vec<_>>().join(", ")
         };
         match self {
-            Self::Refused { refused } => write!(f, "not told: {refused}"),
+            Self::Refused { refused } => write!(f, "undetermined: {refused}"),
             Self::Found {
                 shift_mm,
                 shift_sigma_mm,
@@ -101,7 +101,7 @@ impl fmt::Display for ScanOffset {
             } => {
                 write!(f, "shift ({}) mm, ", pairs(shift_mm, shift_sigma_mm))?;
                 write!(f, "turn ({})°, ", pairs(turn_deg, turn_sigma_deg))?;
-                write!(f, "too fat by {surface_offset_mm:+.3} ± {surface_offset_sigma_mm:.3} mm; not applied")
+                write!(f, "surface offset {surface_offset_mm:+.3} ± {surface_offset_sigma_mm:.3} mm; not applied")
             }
         }
     }

@@ -17,28 +17,28 @@ pub(super) struct ProbeArguments {
     /// The scene, with `robot` (config/probe.yaml is an example)
     #[arg(long, value_name = "YAML")]
     scene: PathBuf,
-    /// What is probed, in the frame of the scan: KIND@X,Y,Z or KIND@X,Y,Z,RADIUS in mm; again for each
+    /// Features to probe, in the frame of the scan: KIND@X,Y,Z or KIND@X,Y,Z,RADIUS in mm; repeat for each
     #[arg(long = "feature", value_name = "FLAG", required = true, allow_hyphen_values = true)]
     features: Vec<String>,
     /// How far a feature may be from its flag, mm, where the flag does not say
     #[arg(long, value_name = "R", default_value_t = 3.0)]
     search_radius_mm: f64,
-    /// Half width within which the numbers are to be known, with the confidence of the scene, mm
+    /// Target half width of the confidence interval of each dimension, at the confidence of the scene, mm
     #[arg(long, value_name = "T")]
     tolerance_mm: Option<f64>,
-    /// Touches of a feature at most
+    /// Most touches of a feature
     #[arg(long, value_name = "N")]
     max_touches: Option<usize>,
-    /// Force at the tip at most, N: less than the scene allows
+    /// Largest force at the tip, N: less than the scene allows
     #[arg(long, value_name = "F")]
     max_force_n: Option<f64>,
-    /// Time of a feature at most, s: less than the scene allows
+    /// Longest time for a feature, s: less than the scene allows
     #[arg(long, value_name = "T")]
     max_duration_s: Option<f64>,
-    /// Slides over all of what was found, with constant force, so that the mesh follows it: along walls and across rims
+    /// Slides over the found feature with constant force, so that the mesh follows: along walls and across rims
     #[arg(long)]
     slide: bool,
-    /// Plans, checks reach and ways, draws the plan, and moves nothing
+    /// Plans, checks reach and paths, draws the plan, and moves nothing
     #[arg(long)]
     dry_run: bool,
     /// Folder for plan.png, touches.png, probed.json, probed_touches.jsonl, touch.mcap, refined.ply, features.json, touches.csv

@@ -12,7 +12,7 @@ use crate::patch::{Patcher, PatcherParams};
 use crate::refine::{RefineError, RefineParams, Refiner};
 use crate::touch::Sample;
 
-/// Room for new faces that is made ahead.
+/// Room reserved for new faces.
 const ROOM: usize = 1 << 18;
 
 /// What `--json` prints of `--live`.
@@ -42,7 +42,7 @@ struct RealTime {
     behind: Latencies,
 }
 
-/// What is left when all samples were pushed.
+/// The engine after the last sample.
 pub(super) struct Ended {
     pub refiner: Refiner,
     pub patcher: Option<Patcher>,

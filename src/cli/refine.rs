@@ -34,7 +34,7 @@ pub(super) struct RefineArguments {
     /// The touches: a ROS 2 recording, MCAP or SQLite, a file or a folder
     #[arg(long, value_name = "RECORDING", required_unless_present = "resume", default_value = "", value_parser = PathOrNone)]
     bag: PathBuf,
-    /// Where the refined mesh goes: PLY, STL or OBJ, in the unit of the scan
+    /// Output: the refined mesh as PLY, STL or OBJ, in the unit of the scan
     #[arg(long, value_name = "MESH", required_unless_present = "resume", default_value = "", value_parser = PathOrNone)]
     out: PathBuf,
     /// Unit of the coordinates in the scan's file
@@ -43,7 +43,7 @@ pub(super) struct RefineArguments {
     /// Names the parts and their parameters; the flags below override it
     #[arg(long, value_name = "YAML")]
     scene: Option<PathBuf>,
-    /// geometry_msgs/WrenchStamped: what the part does to the stylus
+    /// geometry_msgs/WrenchStamped: the wrench of the part on the stylus
     #[arg(long, value_name = "TOPIC", default_value = "/stylus/wrench")]
     wrench_topic: String,
     /// geometry_msgs/PoseStamped: centre of the ball in the frame of the scan, or as tip.offset_mm and scan_to_space in the
@@ -62,20 +62,20 @@ pub(super) struct RefineArguments {
     /// Standard deviation of the scan from the true surface, mm
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     scan_noise_mm: Option<f64>,
-    /// The repaired method, or the paper's taken literally
+    /// The robust method, or the published one literally
     #[arg(long)]
     mode: Option<Mode>,
-    /// Also measures how far the scan lies from the touched part; nothing is moved by it
+    /// Also estimates the rigid offset of the scan from the touched part; the scan is not moved
     #[arg(long)]
     registration: bool,
     /// Replays in real time with the patch beside it, as next to a stylus, and reports how far it is behind; the result is
     /// the same
     #[arg(long)]
     live: bool,
-    /// Where the features of the refined mesh go, measured by the touches, as JSON
+    /// Output: the features of the refined mesh, measured by the touches, as JSON
     #[arg(long, value_name = "JSON")]
     features_out: Option<PathBuf>,
-    /// Where the touches go that features name, as CSV
+    /// Output: the touches that features name, as CSV
     #[arg(long, value_name = "CSV")]
     touches_out: Option<PathBuf>,
     /// Folder of a session of the node: takes scan, scene and touches from there, also after a crash, and writes refined.ply,
@@ -85,7 +85,7 @@ pub(super) struct RefineArguments {
     /// Strokes that were taken back or done again in the session
     #[arg(skip)]
     strokes: Vec<StrokeChange>,
-    /// Prints timings, rejected samples and what was built of the scene too
+    /// Also prints timings, rejected samples and the stages built from the scene
     #[arg(long, short)]
     verbose: bool,
     /// Prints the summary as one JSON object
@@ -111,13 +111,13 @@ impl TypedValueParser for PathOrNone {
 /// What `--json` prints; times in s, `push_ns` in ns.
 #[derive(Debug, Serialize)]
 pub(super) struct RefineSummary {
-    /// what was built of the scene, what was left out, and the memory that it took at start
+    /// stages built from the scene, those left out, and the memory at start
     scene: SceneCost,
     /// wrenches of the recording: each could be a sample
     samples: u64,
     /// those that the refiner took
     accepted: u64,
-    /// those that it did not, by reason; `pose_…` are lost poses and not samples
+    /// those that it refused, by reason; `pose_…` are lost poses and not samples
     refused: BTreeMap<String, u64>,
     /// times that the stylus came into contact
     contacts: u64,
@@ -127,7 +127,7 @@ pub(super) struct RefineSummary {
     /// how late the clock of the wrench reads beyond what the scene says, where the touches determine it and the scene has `clock`
     #[serde(skip_serializing_if = "Option::is_none")]
     wrench_offset: Option<WrenchOffset>,
-    /// how far the scan lies from the part, where that was asked for
+    /// rigid offset of the scan from the part, with --registration
     #[serde(skip_serializing_if = "Option::is_none")]
     registration: Option<ScanOffset>,
     /// faces that are not where the scan had them
@@ -140,7 +140,7 @@ pub(super) struct RefineSummary {
     push_ns: Quantiles,
     load_s: f64,
     replay_s: f64,
-    /// of the patch beside the samples, where that was asked for
+    /// of the patch beside the samples, with --live
     #[serde(skip_serializing_if = "Option::is_none")]
     live: Option<LiveSummary>,
     /// the reconstructed faces; `null` when the scene has no `patch`, or nothing was touched
@@ -157,9 +157,9 @@ struct FrictionFound {
     sigma: f64,
 }
 
-/// What became of a scan.
+/// Result of refining a scan.
 pub(super) struct Refined {
-    /// what had to be repaired in the file
+    /// repairs of the scan's file
     repair: RepairReport,
     pub summary: RefineSummary,
     pub losses: Losses,
@@ -189,7 +189,7 @@ pub(super) fn refine(arguments: &RefineArguments) -> Result<Losses, CliError> {
     Ok(losses)
 }
 
-/// What became of the samples, and how long each took.
+/// Counts and times of the samples.
 struct Pushes {
     accepted: u64,
     refused: BTreeMap<String, u64>,
@@ -218,7 +218,7 @@ impl Pushes {
 struct UndoSteps<'a>(&'a [StrokeChange]);
 
 impl UndoSteps<'_> {
-    /// Changes those that were changed before the sample of this stamp came.
+    /// Applies the changes made before the sample of this stamp.
     fn apply_until(&mut self, stamp_ns: i64, rates: &mut Rates) {
         while let Some((first, rest)) = self.0.split_first().filter(|(first, _)| first.after_ns < stamp_ns) {
             rates.change_strokes(first.is_undo);
@@ -237,7 +237,7 @@ fn reason_of(error: &RefineError) -> &'static str {
     }
 }
 
-/// Wrenches of which not one became a sample, where no fault of single messages explains it.
+/// Hint for a recording without a single sample, where no fault of single messages explains it.
 fn lost_samples(replayed: &Replayed, accepted: u64) -> Option<String> {
     (accepted == 0 && replayed.losses.is_empty()).then(|| {
         format!(
@@ -324,7 +324,7 @@ impl RefineArguments {
         Ok(Self { scan, mesh_unit, ..self.clone() })
     }
 
-    /// What refines a session again.
+    /// Refines a session again.
     fn resumed(&self, session: &Path) -> Result<Self, CliError> {
         let SessionRecord { scan, mesh_unit, scene, recording, topics, strokes } = SessionRecord::open(session)?;
         let or = |chosen: Option<PathBuf>, name: &str| chosen.unwrap_or_else(|| session.join(name));
@@ -449,7 +449,7 @@ impl RefineArguments {
         Ok(Refined { repair, summary, losses: replayed.losses })
     }
 
-    /// What was built of the scene for these samples.
+    /// The stages built from the scene for these samples.
     fn cost(&self, scene: &Scene, rates: &Rates, scan_bytes: usize) -> SceneCost {
         // no arm moves while a recording is replayed
         let unused = if self.markers_topic.is_some() { &["robot"][..] } else { &["robot", "markers"] };
@@ -467,14 +467,14 @@ impl RefineArguments {
         Topics { pose, wrench, markers: self.markers_topic.clone() }
     }
 
-    /// What is written, by its flag.
+    /// Output files, by flag.
     fn outputs(&self) -> Vec<(&'static str, &PathBuf)> {
         let more = [("--features-out", &self.features_out), ("--touches-out", &self.touches_out)];
         let more = more.into_iter().filter_map(|(flag, out)| Some((flag, out.as_ref()?)));
         [("--out", &self.out)].into_iter().chain(more).collect()
     }
 
-    /// The work is not begun when its result cannot be kept.
+    /// Checks that the result can be written before the work begins.
     fn check_out(&self) -> Result<(), CliError> {
         check_target(&self.out).map_err(|error| match error {
             MeshFileError::UnknownFormat { path } => {
@@ -521,7 +521,7 @@ impl RefineArguments {
 }
 
 impl RefineSummary {
-    /// What happened, in one sentence: what was reconstructed or moved, how well it is known.
+    /// The verdict in one sentence: the reconstructed or moved part and its uncertainty.
     fn verdict(&self) -> String {
         match (&self.patch, self.contacts) {
             (_, 0) => "unchanged: the stylus never came into contact with the scan".to_owned(),
@@ -535,7 +535,7 @@ impl RefineSummary {
         }
     }
 
-    /// Counts of samples, timings, and what was built of the scene.
+    /// Counts of samples, timings, and the stages built from the scene.
     fn details(&self) -> String {
         let refused: Vec<_> = self.refused.iter().map(|(reason, count)| format!("{count} {reason}")).collect();
         let Quantiles { median, p99, p999, max } = self.push_ns;
@@ -551,7 +551,7 @@ impl RefineSummary {
     }
 }
 
-/// The verdict, then what else was found.
+/// The verdict, then further results.
 impl fmt::Display for RefineSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.verdict())?;

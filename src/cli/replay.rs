@@ -1,4 +1,4 @@
-//! `touchup replay`: a recording onto the topics, as if it were touched now.
+//! `touchup replay`: plays a recording on the topics, in real time.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -20,15 +20,15 @@ use crate::ros::port::SamplePort;
 use crate::scene::Scene;
 use crate::touch::{Message, SyncParams, WrenchFrame};
 
-/// Subscribers are discovered; whether they have discovered us in turn they do not announce.
-const SETTLE: Duration = Duration::from_secs(1);
-/// How often it is looked who listens.
+/// Wait after discovery of the subscribers: whether they have discovered us in turn they do not announce.
+const DISCOVERY: Duration = Duration::from_secs(1);
+/// Period of the look for subscribers.
 const LOOK: Duration = Duration::from_millis(50);
-/// Someone who waits for longer is warned, and why.
-const TELL_AFTER: Duration = Duration::from_secs(2);
-/// What was sent last is on its way for so long at most.
+/// A longer wait is reported, with its reason.
+const REPORT_AFTER: Duration = Duration::from_secs(2);
+/// Longest transport time of the last message.
 const LINGER: Duration = Duration::from_millis(300);
-/// A rest in the recording is shortened to this: nothing happens in it.
+/// A pause in the recording is shortened to this.
 const LONGEST_REST_NS: i64 = 2_000_000_000;
 
 #[derive(Debug, Args)]
@@ -36,10 +36,10 @@ pub(super) struct ReplayArguments {
     /// A ROS 2 recording, MCAP or SQLite, a file or a folder
     #[arg(value_name = "RECORDING")]
     recording: PathBuf,
-    /// Times its own pace
+    /// Speed, in multiples of the recorded one
     #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = speed)]
     speed: f64,
-    /// Who touched: on whose topics it is played
+    /// What touched: selects the topics to play on
     #[arg(long, value_name = "WHO", default_value = "stylus", value_parser = ["stylus", "probe"])]
     source: String,
     /// geometry_msgs/WrenchStamped in the recording
@@ -54,7 +54,7 @@ pub(super) struct ReplayArguments {
     /// The scene that says where the markers sit
     #[arg(long, value_name = "YAML")]
     scene: Option<PathBuf>,
-    /// Prints what was played as one JSON object
+    /// Prints the counts of played messages as one JSON object
     #[arg(long)]
     json: bool,
 }
@@ -74,7 +74,7 @@ struct Played {
     played_s: f64,
 }
 
-/// - `ros`: what stands behind `--ros-args`.
+/// - `ros`: the arguments behind `--ros-args`.
 pub(super) fn replay(arguments: &ReplayArguments, ros: &[String]) -> Result<Losses, CliError> {
     let mut config = NodeConfig::named("touchup_replay", ros, |name| std::env::var(name).ok())?;
     let source = config.parameters.set("source", &ParameterValue::String(arguments.source.clone()));
@@ -120,7 +120,7 @@ pub(super) fn replay(arguments: &ReplayArguments, ros: &[String]) -> Result<Loss
         losses.push(format!("{} messages not taken by the network", played.unsent));
     }
     if listeners.contains(&0) {
-        losses.push("who listened has left before the end".to_owned());
+        losses.push("a subscriber left before the end".to_owned());
     }
     if arguments.json {
         print_result(&serde_json::to_string(&played).expect("numbers alone cannot fail"));
@@ -138,20 +138,20 @@ impl ReplayArguments {
     }
 }
 
-/// Nothing is played to nobody: a recording begins with what must not be lost either.
+/// Waits for subscribers: the beginning of a recording must not be lost either.
 fn wait_for_listeners(port: &mut dyn SamplePort, config: &NodeConfig, recording: &Path) {
     let began = Instant::now();
-    let mut is_told = false;
+    let mut is_reported = false;
     while port.listeners().contains(&0) {
-        if !is_told && began.elapsed() > TELL_AFTER {
+        if !is_reported && began.elapsed() > REPORT_AFTER {
             let topics = config.sample_topics().map(|name| config.resolve(name).unwrap_or_else(|_| name.to_owned()));
             let (recording, topics) = (recording.display(), topics.join(" and "));
             notify(&format!("{recording} waits for a node that listens to {topics} (touchup node); Ctrl-C gives up"));
-            is_told = true;
+            is_reported = true;
         }
         sleep(LOOK);
     }
-    sleep(SETTLE);
+    sleep(DISCOVERY);
 }
 
 /// Puts each stream in the order of its stamps, in which a sensor sends and the node takes it: what came into the recording
@@ -171,7 +171,7 @@ struct ReplayStream {
 }
 
 impl StampOrder {
-    /// Hands on what cannot be overtaken any more: `touchup refine` waits as long.
+    /// Passes on what cannot be overtaken any more: `touchup refine` waits as long.
     fn push(&mut self, message: Message, mut each: impl FnMut(Message)) {
         let stamp_ns = message.stamp_ns();
         let stream = &mut self.streams[usize::from(matches!(message, Message::Wrench(_)))];
@@ -186,7 +186,7 @@ impl StampOrder {
         }
     }
 
-    /// Hands on the rest.
+    /// Passes on the rest.
     fn finish(self, each: impl FnMut(Message)) {
         let [mut poses, wrenches] = self.streams.map(|stream| stream.held);
         poses.extend(wrenches);
@@ -197,7 +197,7 @@ impl StampOrder {
 /// When what was measured at a stamp is due.
 struct ReplayPace {
     speed: f64,
-    /// time since the first message by the stamps, rests taken out, ns
+    /// time since the first message by the stamps, without pauses, ns
     passed_ns: i64,
     last_ns: Option<i64>,
     began: Instant,

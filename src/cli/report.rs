@@ -1,4 +1,4 @@
-//! `touchup report`: hands over to the program `touchup-report`, so that nothing of it is in this one.
+//! `touchup report`: runs the program `touchup-report`, so that nothing of it is in this one.
 
 use std::ffi::OsString;
 use std::io::ErrorKind;

@@ -1,4 +1,4 @@
-//! `touchup simulate`: what a known surface looks like to a bad scanner and feels like to a stylus, as the files that
+//! `touchup simulate`: scan and touches of a known surface by a bad scanner and a stylus, as the files that
 //! `refine` reads.
 
 use std::ops::RangeInclusive;
@@ -19,7 +19,7 @@ use crate::sim::{
 };
 use crate::touch::{MarkerFrame, Message};
 
-/// File of the part as it is, in the folder that is asked for.
+/// File of the true part, in the output folder.
 const TRUTH_NAME: &str = "truth.ply";
 /// The hand moves 0.08 mm in each tick of the simulation: a smaller ball would go through the part and take for ever.
 const TIP_RADII_MM: RangeInclusive<f64> = 0.1..=100.0;
@@ -32,7 +32,7 @@ const MARKERS_TOPIC: &str = "/stylus/markers";
 
 #[derive(Debug, Args)]
 pub(super) struct SimulateArguments {
-    /// The part as it is: a closed mesh, PLY, STL or OBJ
+    /// The true part: a closed mesh, PLY, STL or OBJ
     #[arg(long, value_name = "MESH")]
     truth: PathBuf,
     /// Unit of the coordinates in the part's file
@@ -41,7 +41,7 @@ pub(super) struct SimulateArguments {
     /// Folder for truth.ply, scan.ply (both in mm) and touch.mcap
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Another seed makes another scan and another hand
+    /// Another seed makes another scan and another path
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Radius of the ball, mm
@@ -90,10 +90,10 @@ pub(super) fn simulate(arguments: &SimulateArguments) -> Result<Losses, CliError
         friction: arguments.friction,
         ..StylusParams::default()
     };
-    let feel = Feel { stylus, camera: arguments.markers.then(CameraParams::default), seed: arguments.seed };
+    let model = TouchModel { stylus, camera: arguments.markers.then(CameraParams::default), seed: arguments.seed };
     let hand = PathParams { radius, ..PathParams::default() };
     let path = plan_mesh(&surface, &surface.bounds(), &scanner.view, &hand)?;
-    let Simulated { scan, touch } = write_simulation(&surface, &truth, &path, &scanner, &feel, &arguments.out)?;
+    let Simulated { scan, touch } = write_simulation(&surface, &truth, &path, &scanner, &model, &arguments.out)?;
     let seconds = touch.moments.last().map_or(0.0, |moment| moment.t);
     print_result(&format!(
         "scan: {} faces\ntouched for {seconds:.0} s of simulated time: {} messages\nwrote {}",
@@ -104,8 +104,8 @@ pub(super) fn simulate(arguments: &SimulateArguments) -> Result<Losses, CliError
     Ok(Losses::new())
 }
 
-/// What touches the part, and what watches it.
-pub(super) struct Feel {
+/// Stylus and camera.
+pub(super) struct TouchModel {
     pub stylus: StylusParams,
     /// sees the markers on the stylus
     pub camera: Option<CameraParams>,
@@ -125,7 +125,7 @@ pub(super) fn write_simulation(
     truth: &TriMesh,
     path: &[Stroke],
     scanner: &ScannerParams,
-    feel: &Feel,
+    model: &TouchModel,
     folder: &Path,
 ) -> Result<Simulated, CliError> {
     create_folder(folder).map_err(|source| CliError::Write { path: folder.to_owned(), source })?;
@@ -133,7 +133,7 @@ pub(super) fn write_simulation(
     let scan = scan(surface, scanner)?;
     drop(stage);
     let _stage = WorkProgress::stage("touch");
-    let Feel { stylus, camera, seed } = feel;
+    let TouchModel { stylus, camera, seed } = model;
     let touch = touch(surface, path, stylus, *seed)?;
     let see = |camera: &CameraParams| see_markers(&touch.moments, stylus.stiffness, camera, *seed);
     let frames = camera.as_ref().map_or_else(|| Ok(Vec::new()), see)?;

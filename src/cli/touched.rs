@@ -1,4 +1,4 @@
-//! How far a mesh is from the part where a simulated stylus really touched it.
+//! Distance between a mesh and the part in the region touched by a simulated stylus.
 
 use nalgebra::Point3;
 use serde::Serialize;
@@ -7,7 +7,7 @@ use crate::compare::TouchedRegion;
 use crate::mesh::{FaceTree, TriMesh};
 use crate::sim::{Moment, Surface, measure_quality};
 
-/// Where the ball really touched the part.
+/// True contacts of the ball with the part.
 #[derive(Debug)]
 pub(super) struct TouchedTruth(TouchedRegion);
 
@@ -26,7 +26,7 @@ impl TouchedTruth {
         Self(TouchedRegion::of(moments.iter().flat_map(|moment| &moment.contacts).map(|contact| contact.point)))
     }
 
-    /// How far `mesh` and `part` are from each other here.
+    /// Distances between `mesh` and `part` in the touched region.
     pub fn error(&self, part: &dyn Surface, mesh: &TriMesh) -> RegionError {
         let tree = FaceTree::new(mesh);
         let to_mesh = |p: &Point3<f64>| tree.closest(mesh, p, f64::INFINITY).map(|hit| (hit.point - p).norm());

@@ -1,4 +1,4 @@
-//! `touchup ur`: what a UR arm needs on this machine.
+//! `touchup ur`: the Python environment of a UR arm.
 
 use std::path::PathBuf;
 

@@ -1,6 +1,6 @@
-//! A UR behind the trait [`Arm`]: what it is told becomes velocities, and what it says becomes states.
+//! A UR behind the trait [`Arm`]: commands become velocities, and reports become states.
 //!
-//! Every motion is a velocity that is said anew with each state (`speedL`), lines too: v = min(v_max, √(2 η a d), d/T) towards
+//! Every motion is a velocity that is sent again with each state (`speedL`), lines too: v = min(v_max, √(2 η a d), d/T) towards
 //! the end, d away. So there is one kind of motion, no thread of the controller's program that would have to be ended before the next
 //! one begins, and an arm that hears nothing any more has nothing left to finish.
 
@@ -12,19 +12,19 @@ use super::error::UrError;
 use super::guard::Halt;
 use super::params::UrParams;
 use super::probe::probe;
-use super::protocol::{State, What, pose_of, vector_of};
+use super::protocol::{Action, UrState, pose_of, vector_of};
 use crate::robot::{Arm, ArmError, ArmState, Command, Safety};
 use crate::touch::Wrench;
 
 /// Time between two states, s: an e-Series sends them at 500 Hz.
 const PERIOD: f64 = 2e-3;
-/// `actual_TCP_force` times this is what the part does to the tip, and `ft_raw_wrench` likewise. Taken for granted and not yet seen
-/// on a robot: docs/ur.md says how to look.
+/// `actual_TCP_force` times this is the force of the part on the tip, and `ft_raw_wrench` likewise. An assumption, not yet
+/// verified on a robot: docs/ur.md has the check.
 const FORCE_SIGN: f64 = 1.0;
 /// Share of the acceleration that a line counts on when it brakes: the arm follows some milliseconds late.
 const BRAKE: f64 = 0.7;
 /// A line comes to its end with this time constant, s: four times what passes from a state to the motion that answers it.
-const SETTLE: f64 = 60e-3;
+const SETTLING_TIME: f64 = 60e-3;
 /// Most that a line turns the tip, rad/s.
 const TURN: f64 = 0.5;
 /// Of the feed while pressing, m/s².
@@ -33,12 +33,12 @@ const FEED_ACCELERATION: f64 = 0.5;
 const TOP_ACCELERATION: f64 = 10.0;
 /// A UR arm that holds a probe.
 ///
-/// Its client lives in a process of its own. Whatever becomes of that, the arm is stopped by the dashboard, and where that does
-/// not answer by the watchdog of the controller. After such a fault every call says what it was, until [`Arm::recover`].
+/// Its client lives in a process of its own. Whatever happens to it, the arm is stopped by the dashboard, and where that does
+/// not answer by the watchdog of the controller. After such a fault every call returns it, until [`Arm::recover`].
 pub struct UrArm {
     params: UrParams,
     client: Client,
-    last: State,
+    last: UrState,
 }
 
 impl UrArm {
@@ -76,7 +76,7 @@ impl UrArm {
     }
 
     /// The order that a command is, now.
-    fn order(&self, command: &Command) -> Result<What, ArmError> {
+    fn order(&self, command: &Command) -> Result<Action, ArmError> {
         match *command {
             Command::Line { to, speed, acceleration } => {
                 self.check("a line", speed, acceleration)?;
@@ -84,11 +84,11 @@ impl UrArm {
                 if !is_pose {
                     return Err(Self::refused("a line", "its end is no pose"));
                 }
-                Ok(What::Move { twist: towards(&pose_of(self.last.pose), &to, speed, acceleration), acceleration })
+                Ok(Action::Move { twist: towards(&pose_of(self.last.pose), &to, speed, acceleration), acceleration })
             }
             Command::Velocity { linear, acceleration } => {
                 self.check("a velocity", linear.norm(), acceleration)?;
-                Ok(What::Move { twist: [linear.x, linear.y, linear.z, 0.0, 0.0, 0.0], acceleration })
+                Ok(Action::Move { twist: [linear.x, linear.y, linear.z, 0.0, 0.0, 0.0], acceleration })
             }
             Command::Press { axis, force, feed, speed } => {
                 self.check("a press", feed.norm().max(speed), FEED_ACCELERATION)?;
@@ -102,7 +102,7 @@ impl UrArm {
                 let place = pose_of(self.last.pose).translation.vector;
                 let frame = Isometry3::from_parts(place.into(), frame);
                 let across = feed - axis * feed.dot(&axis);
-                Ok(What::Press {
+                Ok(Action::Press {
                     frame: vector_of(&frame),
                     force_n: force,
                     speed,
@@ -112,7 +112,7 @@ impl UrArm {
             }
             Command::Stop { deceleration } => {
                 self.check("a stop", 0.0, deceleration)?;
-                Ok(What::Stop { deceleration })
+                Ok(Action::Stop { deceleration })
             }
         }
     }
@@ -131,7 +131,7 @@ impl UrArm {
         Ok(())
     }
 
-    /// Ends what stops the arm, as far as a call can.
+    /// Clears the stop of the arm, as far as a call can.
     fn unlock(&self) -> Result<(), ArmError> {
         let silent_ms = self.params.deadlines.dashboard.as_millis() as u64;
         let lost = |_: UrError| ArmError::Lost { silent_ms };
@@ -186,17 +186,17 @@ impl Arm for UrArm {
         if safety != Safety::Normal {
             return Err(ArmError::Stopped { safety });
         }
-        self.client.ask(What::Zero)?;
+        self.client.ask(Action::Zero)?;
         self.client.forget_states();
         Ok(())
     }
 
     /// With a new client in any case: the program of the controller does at once what the registers hold from before, and only a new
-    /// client clears them first. Tool, payload and watchdog are set anew. The sensor is not zeroed, for the probe may still be
+    /// client clears them first. Tool, payload and watchdog are set again. The sensor is not zeroed, for the probe may still be
     /// pressed: back off, then [`crate::robot::Watched::zero`].
     fn recover(&mut self) -> Result<(), ArmError> {
         self.unlock()?;
-        self.client.close("was ended to be started anew, and that failed");
+        self.client.close("was ended for a restart, and that failed");
         *self = Self::connect(&self.params).map_err(|error| Self::refused("to recover", error.to_string()))?;
         Ok(())
     }
@@ -211,8 +211,8 @@ fn towards(from: &Isometry3<f64>, to: &Isometry3<f64>, speed: f64, acceleration:
     let left = to.translation.vector - from.translation.vector;
     let turn = (to.rotation * from.rotation.inverse()).scaled_axis();
     let distance = left.norm();
-    // share of the way in a second; at the end itself all but the settling is without bound
-    let share = (1.0 / SETTLE)
+    // share of the path in a second; at the end itself all but the settling is without bound
+    let share = (1.0 / SETTLING_TIME)
         .min(speed / distance)
         .min((2.0 * BRAKE * acceleration / distance).sqrt())
         .min(TURN / turn.norm());

@@ -1,4 +1,4 @@
-//! The process that speaks to the arm, as seen from here: how it is started, told and asked, and ended.
+//! The process that speaks to the arm, as seen from here: how it is started, commanded, queried and ended.
 
 use std::io::{BufRead, BufReader, Write};
 use std::os::unix::process::CommandExt;
@@ -12,7 +12,7 @@ use super::dashboard::Dashboard;
 use super::error::UrError;
 use super::guard::{ClientLoss, FAREWELL, Guard, GuardState, Halt, SharedGuard, ZEROING};
 use super::params::UrParams;
-use super::protocol::{Begin, ClientReport, Order, State, What, vector_of};
+use super::protocol::{Action, Begin, ClientReport, Order, UrState, vector_of};
 use crate::clock::Clock;
 use crate::robot::ArmError;
 
@@ -35,7 +35,7 @@ impl Client {
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
-            // an interrupt from the terminal is for the parent, who stops the arm first
+            // an interrupt from the terminal is for the parent, which stops the arm first
             .process_group(0)
             .spawn()
             .map_err(|error| UrError::Client(format!("does not start ({}): {error}", params.program.display())))?;
@@ -55,7 +55,7 @@ impl Client {
             gain: params.gain,
             is_lock_step,
         };
-        let told = line_of(&begin).and_then(|line| orders.write_all(&line));
+        let sent = line_of(&begin).and_then(|line| orders.write_all(&line));
         let (sender, reports) = channel();
         thread::spawn(move || {
             for line in BufReader::new(lines).lines().map_while(Result::ok) {
@@ -84,7 +84,7 @@ impl Client {
         let guard = Guard { child, host: params.host.clone(), dashboard, shared: shared.clone(), hand };
         let guard = thread::spawn(move || guard.watch(&reports));
         let client = Self { shared, orders: Some(orders), guard: Some(guard), halt: None, id };
-        told.map_err(|error| UrError::Client(format!("does not listen: {error}")))?;
+        sent.map_err(|error| UrError::Client(format!("does not listen: {error}")))?;
         let known = client.wait(params.deadlines.connect + params.deadlines.beat, |known| known.is_ready);
         match known.broken.clone() {
             None if known.is_ready => {}
@@ -107,7 +107,7 @@ impl Client {
     }
 
     /// The next state, the oldest that has not been given yet.
-    pub fn next_state(&self, deadline: Duration) -> Result<State, ArmError> {
+    pub fn next_state(&self, deadline: Duration) -> Result<UrState, ArmError> {
         let has_ended = |known: &GuardState| known.has_ended(self.shared.clock.now());
         let mut known = self.wait(deadline, |known| !known.states.is_empty() || has_ended(known));
         if let Some(broken) = &known.broken {
@@ -126,19 +126,19 @@ impl Client {
     }
 
     /// Sends an order without waiting for it.
-    pub fn order(&mut self, what: What) -> Result<u64, ArmError> {
+    pub fn order(&mut self, what: Action) -> Result<u64, ArmError> {
         let mut known = self.shared.known();
         if let Some(broken) = &known.broken {
             return Err(broken.error());
         }
-        let number = known.send(what == What::Zero, self.shared.clock.now());
+        let number = known.send(what == Action::Zero, self.shared.clock.now());
         drop(known);
         let sent = match &mut self.orders {
             Some(orders) => line_of(&Order { number, what }).and_then(|line| orders.write_all(&line)),
             None => Err(std::io::ErrorKind::BrokenPipe.into()),
         };
         if sent.is_err() {
-            // its end is found by the guard, who knows the reason
+            // its end is found by the guard, which knows the reason
             let known = self.wait(ZEROING, |_| false);
             return Err(known.broken.as_ref().map_or(ArmError::Lost { silent_ms: 0 }, ClientLoss::error));
         }
@@ -146,7 +146,7 @@ impl Client {
     }
 
     /// Sends an order and waits until it is done.
-    pub fn ask(&mut self, what: What) -> Result<(), ArmError> {
+    pub fn ask(&mut self, what: Action) -> Result<(), ArmError> {
         let number = self.order(what)?;
         let known = self.wait(ZEROING + FAREWELL, |known| known.done >= number);
         known.broken.as_ref().map_or(Ok(()), |broken| Err(broken.error()))
@@ -157,7 +157,7 @@ impl Client {
         self.shared.known().broken.is_some()
     }
 
-    /// Ends it, and with it the program of the controller; from here on it says why it is not there.
+    /// Ends it, and with it the program of the controller; later calls return the reason.
     pub fn close(&mut self, reason: &str) {
         self.shared.known().close(self.shared.clock.now());
         // at the end of its stdin it brakes, ends the program of the controller and itself
@@ -207,12 +207,12 @@ mod tests {
     use crate::ur::dashboard::tests::listen;
 
     /// Time is the controller's only where both say so: a controller that could lift the deadlines by its greeting alone would be
-    /// watched by nobody.
+    /// without a guard.
     #[test]
-    fn a_greeting_alone_puts_nobody_in_lock_step() {
+    fn a_greeting_alone_starts_no_lock_step() {
         let folder = tempfile::tempdir().unwrap();
-        let (program, told) = (folder.path().join("client"), folder.path().join("told"));
-        fs::write(&program, format!("#!/bin/sh\nhead -n 1 > {}\n", told.display())).unwrap();
+        let (program, first_line) = (folder.path().join("client"), folder.path().join("first_line"));
+        fs::write(&program, format!("#!/bin/sh\nhead -n 1 > {}\n", first_line.display())).unwrap();
         fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
         for (is_allowed, greeting) in
             [(false, "in lock step"), (true, "Universal Robots Dashboard Server"), (true, "a test in lock step")]
@@ -229,7 +229,7 @@ mod tests {
                 UrParams { program: program.clone(), is_lock_step: is_allowed, ..UrParams::new(&host, "none") };
             let ended = Client::start(&params, dashboard).err().unwrap();
             assert!(matches!(&ended, UrError::Client(reason) if reason.contains("has ended")), "{ended}");
-            let begin: serde_json::Value = serde_json::from_slice(&fs::read(&told).unwrap()).unwrap();
+            let begin: serde_json::Value = serde_json::from_slice(&fs::read(&first_line).unwrap()).unwrap();
             let is_both = is_allowed && greeting.ends_with("in lock step");
             assert_eq!(begin["is_lock_step"], is_both, "allowed: {is_allowed}, greeted: {greeting}");
             drop(greets.join().unwrap());

@@ -1,4 +1,4 @@
-//! The dashboard of a UR, on a connection of its own: the way to stop the arm that needs neither Python nor a program.
+//! The dashboard of a UR, on a connection of its own: a stop of the arm that needs neither Python nor a program.
 
 use std::io::{BufRead, BufReader, ErrorKind, Write};
 use std::net::{TcpStream, ToSocketAddrs};
@@ -9,7 +9,7 @@ use crate::robot::Safety;
 
 /// TCP port of the dashboard.
 const PORT: u16 = 29999;
-/// In the greeting of a simulated controller whose clock waits for its client. No robot says so.
+/// In the greeting of a simulated controller whose clock waits for its client. No robot sends it.
 const LOCK_STEP: &str = "in lock step";
 
 /// A connection to a dashboard.
@@ -64,7 +64,7 @@ impl Dashboard {
         self.line()
     }
 
-    /// Whether nobody has closed it; a silent one counts as open.
+    /// Whether it is open; a silent one counts as open.
     pub fn is_open(&mut self) -> bool {
         let socket = self.replies.get_ref();
         let look = || {
@@ -98,7 +98,7 @@ impl Dashboard {
         if is_running { Ok(()) } else { Err(UrError::Off { host: self.host.clone(), mode }) }
     }
 
-    /// What the safety system says.
+    /// Status of the safety system.
     pub fn safety(&mut self) -> Result<Safety, UrError> {
         let answer = self.ask("safetystatus")?;
         let status = answer.rsplit(' ').next().unwrap_or_default();

@@ -19,8 +19,8 @@ pub enum UrError {
         /// of all
         unit: &'static str,
     },
-    /// Nobody listens there, or answers.
-    #[error("{host}:{port} ({service}): {reason}; look whether the controller is on, and at the cable and the address")]
+    /// No server listens or answers there.
+    #[error("{host}:{port} ({service}): {reason}; check that the controller is on, the cable and the address")]
     Unreachable {
         /// of the controller
         host: String,
@@ -53,8 +53,8 @@ pub enum UrError {
         /// as it says it
         mode: String,
     },
-    /// It stands for its own safety.
-    #[error("the arm stands: {0}")]
+    /// A safety function stopped it.
+    #[error("the arm is stopped: {0}")]
     Stopped(crate::robot::Safety),
     /// No ur-rtde, or another one.
     #[error("{}: {reason}; make it with `touchup ur setup`", site_packages.display())]
@@ -67,7 +67,7 @@ pub enum UrError {
     /// The program that speaks to the arm does not start, or not in time.
     #[error("the program that speaks to the arm {0}")]
     Client(String),
-    /// It was set, and something else is there.
-    #[error("the controller has another tool than it was told: {0}")]
+    /// The controller reads back another TCP than was set.
+    #[error("the TCP of the controller is not the one that was set: {0}")]
     Tool(String),
 }

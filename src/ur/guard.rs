@@ -1,4 +1,4 @@
-//! Who waits for each line of the client with a deadline.
+//! Waits for each line of the client with a deadline.
 //!
 //! When one stays away the guard kills the client, so that nothing feeds the arm any more, and stops the arm by the dashboard; then it
 //! says why.
@@ -11,13 +11,13 @@ use std::time::{Duration, Instant};
 
 use super::dashboard::Dashboard;
 use super::params::Deadlines;
-use super::protocol::{ClientReport, Link, State};
+use super::protocol::{ClientReport, Link, UrState};
 use crate::clock::{Clock, ManualClock};
 use crate::robot::{ArmError, Safety};
 
-/// States that wait for a caller who is late, 128 ms of them; older ones are dropped.
+/// States that wait for a late caller, 128 ms of them; older ones are dropped.
 const WAITING: usize = 64;
-/// A program that has ended is told after this time: the reason, when it is one of safety, comes a little later.
+/// The end of a program is reported after this time: a safety reason arrives a little later.
 pub(super) const ENDED: Duration = Duration::from_millis(40);
 /// Zeroing, with the braking before it, has this much time.
 pub(super) const ZEROING: Duration = Duration::from_secs(3);
@@ -36,11 +36,11 @@ pub enum Halt {
     Watchdog,
 }
 
-/// What the guard knows. It decides by what is reported and by the time that it is given, and waits for nothing.
+/// State of the guard. It decides by the reports and by the time passed in, and never blocks.
 pub(super) struct GuardState {
     pub deadlines: Deadlines,
     pub is_ready: bool,
-    pub states: VecDeque<State>,
+    pub states: VecDeque<UrState>,
     pub done: u64,
     pub sent: u64,
     pub served: u64,
@@ -55,7 +55,7 @@ pub(super) struct GuardState {
     /// since when the program of the controller does not run
     ended_since: Option<Instant>,
     pub broken: Option<ClientLoss>,
-    /// since when it is told to end
+    /// since when it is asked to end
     closing_since: Option<Instant>,
 }
 
@@ -70,7 +70,7 @@ pub(super) enum ClientLoss {
     Tool(String),
 }
 
-/// What the guard knows, that it has changed, and the clock that all deadlines are kept on.
+/// State of the guard, its condition variable, and the clock of all deadlines.
 pub(super) struct SharedGuard {
     pub known: Mutex<GuardState>,
     pub changed: Condvar,
@@ -131,7 +131,7 @@ impl GuardState {
         self.sent
     }
 
-    /// The client is told to end.
+    /// Asks the client to end.
     pub fn close(&mut self, now: Instant) {
         self.closing_since = Some(now);
     }
@@ -140,7 +140,7 @@ impl GuardState {
         self.closing_since.is_some()
     }
 
-    /// Whether the program of the controller does not run, for long enough that the reason would have been told.
+    /// Whether the program of the controller does not run, for long enough that the reason would have arrived.
     pub fn has_ended(&self, now: Instant) -> bool {
         self.ended_since.is_some_and(|since| now.saturating_duration_since(since) > ENDED)
     }
@@ -151,7 +151,7 @@ impl GuardState {
         deadline.saturating_sub(now.saturating_duration_since(since.unwrap_or(now)))
     }
 
-    /// What is wrong when that time has passed without a line.
+    /// The fault when that time has passed without a line.
     pub fn missed(&self) -> ClientLoss {
         let (_, deadline, misses) = self.awaited();
         ClientLoss::client(format!("hangs: {misses} for {} ms", deadline.as_millis()))
@@ -166,7 +166,7 @@ impl GuardState {
         }
     }
 
-    /// What a line tells; returns what is wrong.
+    /// Takes a line of the client; returns a fault.
     pub fn take(&mut self, report: ClientReport, now: Instant) -> Option<ClientLoss> {
         match report {
             ClientReport::Ready => {
@@ -254,7 +254,7 @@ impl Guard {
                     self.shared.changed.notify_all();
                     broken
                 }
-                // it ended because it was told to
+                // it ended on request
                 Err(RecvTimeoutError::Disconnected) if self.shared.known().is_closing() => break None,
                 Err(RecvTimeoutError::Timeout) => Some(self.shared.known().missed()),
                 Err(RecvTimeoutError::Disconnected) => {

@@ -1,4 +1,4 @@
-//! What has to be known of a UR, and how long it may take.
+//! Parameters of a UR, and its deadlines.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -23,7 +23,7 @@ pub struct UrParams {
     pub mass: f64,
     /// Its centre of mass, m in F.
     pub centre: Vector3<f64>,
-    /// Most that is ever asked of the tip, m/s; [`crate::robot::Limits`] are below it.
+    /// Highest commanded speed of the tip, m/s; [`crate::robot::Limits`] are below it.
     pub top_speed: f64,
     /// Most that is ever pressed with, N.
     pub top_force: f64,
@@ -63,7 +63,7 @@ impl UrParams {
         }
     }
 
-    /// Refuses what cannot be before anything is connected.
+    /// Checks the parameters before anything is connected.
     pub(super) fn check(&self) -> Result<(), UrError> {
         let within = |what: &'static str, value: f64, lowest: f64, highest: f64, unit: &'static str| {
             // what is no number is in no range
@@ -91,7 +91,7 @@ impl UrParams {
     }
 }
 
-/// What takes longer has gone wrong.
+/// Longer calls are faults.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Deadlines {
     /// From the start of the client to the arm at its command.
@@ -108,8 +108,8 @@ pub struct Deadlines {
 
 impl Default for Deadlines {
     /// A fault and the braking after it take less than 200 ms together; a machine that is not real-time is late by 25 ms now
-    /// and then. A call that ends force mode waits until the arm stands; while one hangs the watchdog of the controller, 100 ms,
-    /// is not fed.
+    /// and then. A call that ends force mode waits until the arm is at rest; while one hangs the watchdog of the controller, 100
+    /// ms, is not fed.
     fn default() -> Self {
         Self {
             connect: Duration::from_secs(10),

@@ -12,9 +12,9 @@ use super::error::UrError;
 const PORT: u16 = 30004;
 /// The version of RTDE, as the library asks for it.
 const PROTOCOL: [u8; 2] = [0, 2];
-/// The oldest minor version of PolyScope 5 that sends what its force sensor reads by itself.
+/// The oldest minor version of PolyScope 5 that sends the raw reading of its force sensor.
 const OLDEST: u32 = 9;
-/// States that are looked at; the clock has to go on between them.
+/// Number of states read; the clock has to advance between them.
 const STATES: usize = 3;
 
 /// Refuses a controller that is silent, or not of the kind that is needed.
@@ -42,7 +42,7 @@ pub(super) fn probe(host: &str, deadline: Duration) -> Result<(), UrError> {
         return Err(UrError::Version { host: host.to_owned(), found });
     }
     if stamps.first() == stamps.last() {
-        return Err(reason("its clock stands still".to_owned()));
+        return Err(reason("its clock has stopped".to_owned()));
     }
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! What the two processes say to each other: one JSON object on each line.
+//! The protocol of the two processes: one JSON object on each line.
 //!
 //! Orders go down the client's stdin, reports come up its stdout. Poses and velocities are those of ur_rtde: place and rotation
 //! vector in the base B, m and rad.
@@ -34,12 +34,12 @@ pub struct Begin {
 pub struct Order {
     /// one more for each
     pub number: u64,
-    pub what: What,
+    pub what: Action,
 }
 
 /// What is to be done. The newest motion takes the place of those before; a zero is done whatever comes after it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub enum What {
+pub enum Action {
     /// Goes with a velocity, until the next order or until orders stay away.
     Move { twist: [f64; 6], acceleration: f64 },
     /// Presses along z of a frame of B and goes with a velocity.
@@ -56,7 +56,7 @@ pub enum ClientReport {
     /// The arm is at command.
     Ready,
     /// A new state.
-    State(Box<State>),
+    State(Box<UrState>),
     /// Nothing new from the arm; the client lives.
     Beat { served: u64 },
     /// `Zero` is done.
@@ -78,15 +78,15 @@ pub enum Link {
     Control,
 }
 
-/// What the arm says of itself.
+/// State of the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct State {
+pub struct UrState {
     /// of the controller
     pub stamp_s: f64,
     pub pose: [f64; 6],
     /// of the tip, m/s and rad/s
     pub velocity: [f64; 6],
-    /// N and N m, less payload and what it was zeroed by; in B about the tip
+    /// N and N m, less payload and zero offset; in B about the tip
     pub wrench: [f64; 6],
     /// as the sensor has it; in the flange
     pub raw_wrench: [f64; 6],
@@ -107,8 +107,8 @@ const OPERATOR_BITS: u32 = 1 << 4 | 1 << 5 | 1 << 6 | 1 << 7;
 /// Protective stop, and stopped for any reason of safety.
 const PROTECTIVE_BITS: u32 = 1 << 2 | 1 << 10;
 
-impl State {
-    /// What the bits of the safety system mean; the gravest counts.
+impl UrState {
+    /// Meaning of the bits of the safety system; the gravest counts.
     pub fn safety(&self) -> Safety {
         match self.safety_bits {
             bits if bits & FAULT_BITS != 0 => Safety::Fault,
@@ -125,7 +125,7 @@ pub fn vector_of(pose: &Isometry3<f64>) -> [f64; 6] {
     [place.x, place.y, place.z, turn.x, turn.y, turn.z]
 }
 
-/// The other way.
+/// The reverse direction.
 pub fn pose_of([x, y, z, rx, ry, rz]: [f64; 6]) -> Isometry3<f64> {
     let turn = UnitQuaternion::from_scaled_axis(Vector3::new(rx, ry, rz));
     Isometry3::from_parts(Translation3::new(x, y, z), turn)
@@ -147,7 +147,7 @@ pub(super) mod tests {
         assert!((turned - Vector3::y()).norm() < 1e-15, "{turned}");
     }
 
-    pub const STATE: State = State {
+    pub const STATE: UrState = UrState {
         stamp_s: 12.345_678_901_234_5,
         pose: [0.1; 6],
         velocity: [-1e-17; 6],
@@ -161,7 +161,7 @@ pub(super) mod tests {
 
     #[test]
     fn the_gravest_of_the_bits_counts() {
-        let safety = |safety_bits| State { safety_bits, ..STATE }.safety();
+        let safety = |safety_bits| UrState { safety_bits, ..STATE }.safety();
         assert_eq!(safety(1), Safety::Normal);
         // reduced mode
         assert_eq!(safety(0b10), Safety::Normal);
@@ -176,7 +176,7 @@ pub(super) mod tests {
         let line = serde_json::to_string(&ClientReport::State(Box::new(state))).unwrap();
         assert_eq!(serde_json::from_str::<ClientReport>(&line).unwrap(), ClientReport::State(Box::new(state)));
         assert!(!line.contains('\n'));
-        let order = Order { number: 1, what: What::Move { twist: [0.1; 6], acceleration: 0.5 } };
+        let order = Order { number: 1, what: Action::Move { twist: [0.1; 6], acceleration: 0.5 } };
         let line = serde_json::to_string(&order).unwrap();
         assert_eq!(line, r#"{"number":1,"what":{"Move":{"twist":[0.1,0.1,0.1,0.1,0.1,0.1],"acceleration":0.5}}}"#);
     }

@@ -1,4 +1,4 @@
-//! How far apart colours are for those who see red and green alike.
+//! Distances of colours under red-green colour blindness.
 
 /// Linear RGB as seen without the cones for red, and without those for green (Machado, Oliveira and Fernandes 2009, severity 1).
 const SEEN: [[[f64; 3]; 3]; 3] = [

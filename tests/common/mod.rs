@@ -1,4 +1,4 @@
-//! What the tests of meshes and of their refinement share.
+//! Shared by the tests of meshes and of their refinement.
 
 use nalgebra::Point3;
 use rand_distr::{Distribution, StandardUniform};

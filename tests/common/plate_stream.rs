@@ -9,7 +9,7 @@ use touchup::touch::{
     ContactEstimator, ContactEstimatorParams, ContactSample, Sample, SyncParams, Synchroniser, TipParams, TipShape,
 };
 
-/// A scan of the demo plate and what was felt on the plate.
+/// A scan of the demo plate and the contacts on the plate.
 pub struct PlateStream {
     pub scan: TriMesh,
     /// standard deviation of the scan, m
@@ -31,14 +31,14 @@ fn path(stylus: &StylusParams) -> Vec<Stroke> {
     [Lines::AlongX, Lines::AlongY].iter().flat_map(|lines| raster(&region, *lines, &hand).unwrap()).collect()
 }
 
-/// What is decided about the contact of each sample, for a tip of this radius (m) and stiffness (N/m).
+/// The contact state of each sample, for a tip of this radius (m) and stiffness (N/m).
 pub fn contacts_of(radius: f64, stiffness: Option<f64>, samples: &[Sample]) -> Vec<ContactSample> {
     let params = ContactEstimatorParams::new(TipParams { radius, stiffness });
     let mut estimator = ContactEstimator::new(params).unwrap();
     samples.iter().map(|sample| *estimator.observe(sample).unwrap()).collect()
 }
 
-/// With what the simulator knows of it.
+/// With the simulator's ground truth.
 pub fn plate_stream(stylus: &StylusParams, seed: u64) -> (PlateStream, Touch) {
     let plate = Plate::default();
     let scanner = ScannerParams { seed, ..ScannerParams::default() };

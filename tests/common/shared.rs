@@ -1,4 +1,4 @@
-//! Files of `../shared/data`, and how a test says that it did not run.
+//! Files of `../shared/data`, and the report of a skipped test.
 
 use std::path::{Path, PathBuf};
 
@@ -12,7 +12,7 @@ pub fn shared(below: &str) -> Option<PathBuf> {
     None
 }
 
-/// Says that this test did not run: `tests/all.sh` counts the line as a skipped test, not as a passed one.
+/// Reports that this test was skipped: `tests/all.sh` counts the line as a skipped test, not as a passed one.
 pub fn skip(reason: &str) {
     let thread = std::thread::current();
     println!("SKIPPED: {}: {reason}", thread.name().unwrap_or("a thread of a test"));

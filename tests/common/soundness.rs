@@ -1,4 +1,4 @@
-//! Whether a mesh is one closed skin: edges, rims, intersections; by other ways than the code that made it.
+//! Whether a mesh is one closed skin: edges, rims, intersections; by other methods than the code that made it.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,11 +10,11 @@ use touchup::mesh::{FaceId, TriMesh};
 pub struct Soundness {
     /// edges with one face, as ordered pairs of vertices
     pub rims: BTreeSet<[u32; 2]>,
-    /// edges with more than two faces, or two that run along it the same way
+    /// edges with more than two faces, or two that run along it in the same direction
     pub bad_edges: usize,
     /// vertices around which the faces form more than one fan
     pub bad_vertices: usize,
-    /// V − E + F of what is used
+    /// V − E + F of the used vertices
     pub euler: i64,
 }
 
@@ -102,7 +102,7 @@ fn meet(mesh: &TriMesh, f: FaceId, g: FaceId, slack: f64) -> bool {
 
 /// Pairs of faces that meet where they should not, among pairs of which `is_watched` holds for one.
 ///
-/// Boxes are swept along x; what is looked at is exact up to volumes of 10⁻¹² of the cube of `size` (m).
+/// Boxes are swept along x; the test is exact up to volumes of 10⁻¹² of the cube of `size` (m).
 pub fn intersections(mesh: &TriMesh, size: f64, is_watched: impl Fn(FaceId) -> bool) -> Vec<[FaceId; 2]> {
     let slack = 1e-12 * size.powi(3);
     let mut boxes: Vec<(FaceId, Vector3<f64>, Vector3<f64>, bool)> = mesh

@@ -23,7 +23,7 @@ const PATH: i64 = 2_000;
 const ROUNDS: i64 = 5;
 const TIP: TipParams = TipParams { radius: 1.5e-3, stiffness: Some(20e3) };
 
-/// A figure of eight on the true plane z = 0, pressed with 2 N for four fifths of the way and lifted off for the rest;
+/// A figure of eight on the true plane z = 0, pressed with 2 N for four fifths of the path and lifted off for the rest;
 /// the scan lies up to 0.3 mm off.
 fn sample(tick: i64) -> Sample {
     let turn = std::f64::consts::TAU * tick as f64 / PATH as f64;

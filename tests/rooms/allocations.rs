@@ -18,7 +18,7 @@ fn note(bytes: usize) {
     let _ = LARGEST.try_with(|largest| largest.set(largest.get().max(bytes)));
 }
 
-// SAFETY: hands every call to the counting allocator unchanged
+// SAFETY: forwards every call to the counting allocator unchanged
 unsafe impl GlobalAlloc for Metered {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         note(layout.size());
@@ -43,7 +43,7 @@ unsafe impl GlobalAlloc for Metered {
 #[global_allocator]
 static METERED: Metered = Metered;
 
-/// Result of `f`, and the largest request of this thread on the way, bytes.
+/// Result of `f`, and the largest request of this thread during it, bytes.
 pub fn largest_request<T>(f: impl FnOnce() -> T) -> (T, usize) {
     LARGEST.set(0);
     let result = f();

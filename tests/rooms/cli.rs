@@ -249,9 +249,9 @@ fn the_same_recording_gives_the_same_bytes() {
     assert_ne!(case.bytes("one.ply"), case.bytes("scan.ply"));
 }
 
-/// The same touch by a tilted stylus, told in either frame: the header decides.
+/// The same touch by a tilted stylus, expressed in either frame: the header decides.
 #[test]
-fn the_header_of_the_wrench_says_its_axes() {
+fn the_header_of_the_wrench_names_its_axes() {
     let case = Case::new();
     let tilted = UnitQuaternion::from_euler_angles(0.5, -0.3, 1.0);
     case.record("own.mcap", "stylus", &touch(tilted, false));
@@ -266,13 +266,13 @@ fn the_header_of_the_wrench_says_its_axes() {
     assert!((raised[0] - raised[2]).abs() > 1e-6, "the wrong axes must show: {raised:?}");
 }
 
-/// The frames are known only when both topics have begun; what was read before is not lost, nor is it kept for ever.
+/// The frames are known only when both topics have begun; messages read before are not lost, nor are they kept for ever.
 #[test]
 fn a_topic_that_begins_late_loses_no_message() {
     let case = Case::new();
     let tilted = UnitQuaternion::from_euler_angles(0.5, -0.3, 1.0);
     let spoken = touch(tilted, true);
-    // wrenches at 1 kHz before the first pose, in and beyond what is read ahead
+    // wrenches at 1 kHz before the first pose, within and beyond the read-ahead
     for early in [1_000_i64, 100_001] {
         let mut messages = spoken.clone();
         for message in &mut messages {
@@ -352,9 +352,9 @@ fn bad_input_is_3_in_one_line_that_names_it() {
         (case.refine("touch.mcap", "no/out.ply", &[]), 1, "out.ply"),
     ];
     for (output, expected, named) in &outputs {
-        let told = text(&output.stderr);
-        assert_eq!((code(output), text(&output.stdout)), (*expected, ""), "{told}");
-        assert!(told.contains(named) && told.lines().count() == 1, "{named}: {told}");
+        let message = text(&output.stderr);
+        assert_eq!((code(output), text(&output.stdout)), (*expected, ""), "{message}");
+        assert!(message.contains(named) && message.lines().count() == 1, "{named}: {message}");
     }
     fs::remove_file(case.path("scan.ply")).unwrap();
     let output = case.refine("touch.mcap", "out.ply", &[]);
@@ -363,7 +363,7 @@ fn bad_input_is_3_in_one_line_that_names_it() {
     assert!(!case.path("out.ply").exists());
 }
 
-/// Work is done with what is sound; the rest is counted, named, and told by the exit code.
+/// Sound input is processed; the rest is counted, named, and shown by the exit code.
 #[test]
 fn losses_are_4_and_named() {
     let case = Case::new();
@@ -391,7 +391,7 @@ fn losses_are_4_and_named() {
 
 /// What a new user gets wrong first: another clock, another frame, no contact at all.
 #[test]
-fn a_recording_that_moves_nothing_says_why() {
+fn a_recording_that_moves_nothing_reports_the_reason() {
     let case = Case::new();
     let sound = touch(UnitQuaternion::identity(), false);
     let changed = |name: &str, change: &dyn Fn(&mut Message)| {
@@ -402,23 +402,23 @@ fn a_recording_that_moves_nothing_says_why() {
         assert_eq!(json(&output)["moved_faces"], 0, "{name}");
         (code(&output), text(&output.stderr).to_owned())
     };
-    let (exit, told) = changed("clock.mcap", &|message| {
+    let (exit, message) = changed("clock.mcap", &|message| {
         if let Message::Wrench(wrench) = message {
             wrench.stamp_ns += 60_000_000_000;
         }
     });
-    assert!(exit == 4 && told.contains("no sample came of 1001 wrenches") && told.contains("clock"), "{told}");
-    let (exit, told) = changed("frame.mcap", &|message| {
+    assert!(exit == 4 && message.contains("no sample came of 1001 wrenches") && message.contains("clock"), "{message}");
+    let (exit, message) = changed("frame.mcap", &|message| {
         if let Message::Pose(pose) = message {
             pose.pose_ot.translation.x += 1.0;
         }
     });
-    assert!(exit == 4 && told.contains("the scan has no face near") && told.contains("--mesh-unit"), "{told}");
-    let (exit, told) = changed("air.mcap", &|message| match message {
+    assert!(exit == 4 && message.contains("the scan has no face near") && message.contains("--mesh-unit"), "{message}");
+    let (exit, message) = changed("air.mcap", &|message| match message {
         Message::Pose(pose) => pose.pose_ot.translation.z += 0.1,
         Message::Wrench(wrench) => wrench.wrench.force /= 10.0,
     });
-    assert!(exit == 0 && told.contains("contact.on_n") && told.lines().count() == 1, "{told}");
+    assert!(exit == 0 && message.contains("contact.on_n") && message.lines().count() == 1, "{message}");
 }
 
 // ---- demo -------------------------------------------------------------------------------------------------------
@@ -508,7 +508,7 @@ fn cube_in_mm() -> String {
     )
 }
 
-/// A known part goes the whole way: simulated in inches, refined in millimetres.
+/// A known part through the whole pipeline: simulated in inches, refined in millimetres.
 #[test]
 fn simulate_makes_the_input_of_refine() {
     use touchup::io::mesh_file::{MeshUnit, write_mesh};
@@ -526,8 +526,11 @@ fn simulate_makes_the_input_of_refine() {
     assert!(summary["moved_faces"].as_u64().unwrap() > 100 && summary["contacts"].as_u64().unwrap() > 0, "{summary}");
     // the scan is in mm: 25 times as large it is a plausible part that has nothing to do with the touches
     let output = touchup(&["refine", "--scan", &scan, "--bag", &bag, "--out", &out, "--mesh-unit", "inch"], "");
-    let told = text(&output.stderr);
-    assert!(code(&output) == 0 && told.contains("updates were cut back") && told.contains("--mesh-unit"), "{told}");
+    let message = text(&output.stderr);
+    assert!(
+        code(&output) == 0 && message.contains("updates were cut back") && message.contains("--mesh-unit"),
+        "{message}"
+    );
 
     for flags in [
         ["--friction", "-1"],
@@ -563,9 +566,9 @@ fn step_answers_each_line_in_order_and_goes_on_after_a_bad_one() {
 
 // ---- report -----------------------------------------------------------------------------------------------------
 
-/// The program is copied into a folder of its own, with a script beside it that stands for `touchup-report`.
+/// The program is copied into a folder of its own, with a script beside it that replaces `touchup-report`.
 #[test]
-fn report_hands_its_arguments_to_a_program_of_its_own_and_ends_with_its_code() {
+fn report_passes_its_arguments_to_a_program_of_its_own_and_ends_with_its_code() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     fs::copy(env!("CARGO_BIN_EXE_touchup"), path("touchup")).unwrap();

@@ -34,9 +34,9 @@ fn observation(candidate: &Candidate, group: u32) -> Observation {
     Observation { point: candidate.point, offset: 0.0, sigma: candidate.sigma, group }
 }
 
-/// The fit has its covariance by another way: from all touches at once.
+/// The fit has its covariance by another method: from all touches at once.
 #[test]
-fn what_is_known_is_what_the_fit_says() {
+fn predicted_and_fitted_covariance_agree() {
     let (surface, wall) = (hole(), wall());
     let chosen: Vec<_> = wall.iter().step_by(7).copied().collect();
     let known =
@@ -49,7 +49,7 @@ fn what_is_known_is_what_the_fit_says() {
     }
 }
 
-/// A circle in a known plane: three touches a third of a turn apart tell its centre best, whatever the first was.
+/// A circle in a known plane: three touches a third of a turn apart determine its centre best, whatever the first was.
 #[test]
 fn three_touches_of_a_round_wall_are_a_third_of_a_turn_apart() {
     let surface = hole();
@@ -68,7 +68,7 @@ fn three_touches_of_a_round_wall_are_a_third_of_a_turn_apart() {
     assert!((gaps[0] - TAU / 3.0).abs() < TAU / 11.0 && (gaps[1] - 2.0 * TAU / 3.0).abs() < TAU / 11.0, "{gaps:?}");
 }
 
-/// The tilt of a plane is told by its corners, its height by any place.
+/// The tilt of a plane is determined by its corners, its height by any place.
 #[test]
 fn the_tilt_of_a_plane_is_asked_at_its_corners() {
     let surface = Plane::new(Point3::origin(), &Vector3::z());
@@ -86,7 +86,7 @@ fn the_tilt_of_a_plane_is_asked_at_its_corners() {
     }
 }
 
-/// It ends when what was asked for is known, and says how well beforehand what the fit then says of real touches.
+/// It ends at the requested accuracy, and predicts the uncertainty that the fit of real touches then has.
 #[test]
 fn touches_are_as_many_as_the_goal_asks_for() {
     let (surface, wall) = (hole(), wall());
@@ -104,15 +104,15 @@ fn touches_are_as_many_as_the_goal_asks_for() {
         let mut rng = Pcg64::seed_from_u64(7);
         let errors: Vec<f64> = (0..200)
             .map(|_| {
-                let felt = chosen.iter().zip(0..).map(|(&index, group)| {
+                let result = chosen.iter().zip(0..).map(|(&index, group)| {
                     let (_, by) = surface.derivatives(&wall[index].point);
-                    let way = -Vector3::new(by[0], by[1], 0.0);
+                    let direction = -Vector3::new(by[0], by[1], 0.0);
                     let noise: f64 = StandardNormal.sample(&mut rng);
-                    let point = wall[index].point + surface.pose_of * way * (noise * SIGMA);
+                    let point = wall[index].point + surface.pose_of * direction * (noise * SIGMA);
                     observation(&Candidate { point, sigma: SIGMA }, group)
                 });
-                let felt: Vec<_> = felt.collect();
-                2.0 * (fit(&surface, &felt, &FitParams::default()).unwrap().surface.radius - surface.radius)
+                let result: Vec<_> = result.collect();
+                2.0 * (fit(&surface, &result, &FitParams::default()).unwrap().surface.radius - surface.radius)
             })
             .collect();
         let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
@@ -122,15 +122,15 @@ fn touches_are_as_many_as_the_goal_asks_for() {
     assert!(counts.is_sorted() && counts[0] < counts[2], "{counts:?}");
 }
 
-/// A feature with a number that is asked for: where it could be touched, and a grid over all of it.
+/// A feature with a requested dimension: where it could be touched, and a grid over all of it.
 struct Case<M> {
     name: &'static str,
     truth: M,
-    /// how the numbers that are asked for change with the freedoms, and the deviation that is wanted
+    /// derivatives of the requested dimensions by the parameters, and the target deviation
     asked: Vec<(Freedom, f64, f64)>,
-    /// how far the number of a fit is from the true one
+    /// error of the dimension of a fit
     error: fn(&M, &M) -> f64,
-    /// that it begins with, whatever is asked
+    /// of the first touches, for any request
     first: Vec<Candidate>,
     places: Vec<Candidate>,
     grid: Vec<Candidate>,
@@ -142,7 +142,8 @@ const LEAN: f64 = 0.02;
 /// Outward normal at a point, by differences of the distance.
 fn normal_of<M: Surface>(surface: &M, p: &Point3<f64>) -> Vector3<f64> {
     let step = 1e-6;
-    let by = |way: Vector3<f64>| surface.distance(&(p + way * step)) - surface.distance(&(p - way * step));
+    let by =
+        |direction: Vector3<f64>| surface.distance(&(p + direction * step)) - surface.distance(&(p - direction * step));
     Vector3::new(by(Vector3::x()), by(Vector3::y()), by(Vector3::z())).normalize()
 }
 
@@ -178,10 +179,11 @@ fn sigma_by_differences<M: Surface>(truth: &M, touches: &[Point3<f64>], asked: &
 }
 
 /// Touches of a planned pattern and of a grid of as many, where the surface is known as badly as after the first touches: it is
-/// planned for one that lies and leans elsewhere and has other sizes, and what is touched is the true one. Root mean square error of
+/// planned for one that lies and leans elsewhere and has other sizes, and the true one is touched. Root mean square error of
 /// the number over 20 such surfaces with 10 draws of noise each, and the ratio of both.
 ///
-/// Both are what the information of the touches says, and the best of 300 patterns of random places is no better than the plan.
+/// Both are those of the information matrix of the touches, and the best of 300 patterns of random places is no better than the
+/// plan.
 fn planned_over_grid<M: Surface>(case: &Case<M>) -> f64 {
     let count = case.grid.len();
     let (mut squares, mut variances, mut random) = ([0.0; 2], [0.0; 2], 0.0);
@@ -236,20 +238,20 @@ fn planned_over_grid<M: Surface>(case: &Case<M>) -> f64 {
         }
     }
     let rms = squares.map(|sum| (sum / (surfaces * draws) as f64).sqrt());
-    let told = variances.map(|sum| (sum / surfaces as f64).sqrt());
+    let stated = variances.map(|sum| (sum / surfaces as f64).sqrt());
     println!(
         "{:<34} {count:>3} touches: {:>6.2} planned ({:.2} by information), {:>6.2} grid ({:.2}), ratio {:.2}; best of 300 \
          random {random:.2}",
         case.name,
         rms[0] * 1e6,
-        told[0] * 1e6,
+        stated[0] * 1e6,
         rms[1] * 1e6,
-        told[1] * 1e6,
+        stated[1] * 1e6,
         rms[0] / rms[1]
     );
-    // 200 errors tell a deviation within a twentieth; χ² of 200 (or 400) leaves a fifth to chance once in 10,000
-    for (rms, told) in rms.iter().zip(told) {
-        assert!((rms / told - 1.0).abs() < 0.2, "{}: {rms} is not {told}", case.name);
+    // 200 errors determine a deviation within a twentieth; χ² of 200 (or 400) leaves a fifth to chance once in 10,000
+    for (rms, stated) in rms.iter().zip(stated) {
+        assert!((rms / stated - 1.0).abs() < 0.2, "{}: {rms} is not {stated}", case.name);
     }
     assert!(random > 0.95, "{}: random touches are better, {random}", case.name);
     rms[0] / rms[1]
@@ -299,9 +301,9 @@ fn opening(hole: &Cylinder) -> Point3<f64> {
     c - axis * (c.z / axis.z)
 }
 
-/// Planned touches beat a grid of as many over the feature itself by about half where some of the feature says little of the
-/// number: the walls of a slot of its length, touches near the axis' own plane of a lean. Where every touch says as much, as of
-/// a diameter, no plan can be better, and it must not be worse.
+/// Planned touches beat a grid of as many over the feature itself by about half where some of the feature is little informative
+/// about the number: the walls of a slot of its length, touches near the axis' own plane of a lean. Where all touches are equally
+/// informative, as of a diameter, no plan can be better, and it must not be worse.
 #[test]
 fn planned_touches_beat_a_uniform_grid() {
     let depths = evenly(1e-3, 5e-3, 4);
@@ -366,14 +368,14 @@ fn planned_touches_beat_a_uniform_grid() {
     }
 }
 
-/// What a ball feels that is let down and then moved in a straight line until it meets the material, exactly, with noise along its
-/// way; a way that is blocked before tells nothing.
-fn feel(distance: &dyn Fn(&Point3<f64>) -> f64, wish: &TouchPlan, ball: f64, noise: f64) -> TouchResult {
+/// Contact of a ball that is let down and then moved in a straight line until it meets the material, exactly, with noise along
+/// its path; a path that is blocked before measures nothing.
+fn probe(distance: &dyn Fn(&Point3<f64>) -> f64, planned: &TouchPlan, ball: f64, noise: f64) -> TouchResult {
     // the distance changes no faster than the place
-    let free = |from: &Point3<f64>, way: &Vector3<f64>, length: f64| {
+    let free = |from: &Point3<f64>, direction: &Vector3<f64>, length: f64| {
         let mut gone = 0.0;
         while gone < length {
-            let room = distance(&(from + way * gone)) - ball;
+            let room = distance(&(from + direction * gone)) - ball;
             if room < 1e-8 {
                 return Some(gone);
             }
@@ -381,12 +383,12 @@ fn feel(distance: &dyn Fn(&Point3<f64>) -> f64, wish: &TouchPlan, ball: f64, noi
         }
         None
     };
-    let down = wish.from - wish.entry;
-    if down.norm() > 0.0 && free(&wish.entry, &down.normalize(), down.norm()).is_some() {
+    let down = planned.from - planned.entry;
+    if down.norm() > 0.0 && free(&planned.entry, &down.normalize(), down.norm()).is_some() {
         return TouchResult::Unclear;
     }
-    free(&wish.from, &wish.direction, wish.search).map_or(TouchResult::Nothing, |gone| TouchResult::At {
-        centre: wish.from + wish.direction.into_inner() * (gone + noise),
+    free(&planned.from, &planned.direction, planned.search).map_or(TouchResult::Nothing, |gone| TouchResult::At {
+        centre: planned.from + planned.direction.into_inner() * (gone + noise),
         sigma: SIGMA,
     })
 }
@@ -402,9 +404,9 @@ fn explored(
     let mut lean = || rng.random_range(-0.05..0.05);
     let normal = Unit::new_normalize(Vector3::new(lean(), lean(), 1.0));
     let mut explorer = Explorer::new(Some(kind), &flag, &normal, params).unwrap();
-    while let Some(wish) = explorer.wish() {
+    while let Some(planned) = explorer.wish() {
         let noise: f64 = StandardNormal.sample(rng);
-        explorer.take(&feel(distance, &wish, params.ball_radius, noise * SIGMA));
+        explorer.take(&probe(distance, &planned, params.ball_radius, noise * SIGMA));
     }
     explorer.found()
 }
@@ -414,7 +416,7 @@ const TOP: f64 = 12e-3;
 /// Middle of its slot: 20 × 6 mm along x, 5 mm deep.
 const SLOT: Point3<f64> = Point3::new(25e-3, 14e-3, TOP);
 
-/// Wherever in it a slot is flagged: what is claimed is so, by its drawing, and most is claimed.
+/// Wherever in it a slot is flagged: claimed dimensions agree with the drawing, and most are claimed.
 #[test]
 fn a_slot_that_is_claimed_is_the_one_of_the_drawing() {
     let (plate, mut rng) = (Plate::default(), Pcg64::seed_from_u64(21));
@@ -441,9 +443,9 @@ fn a_slot_that_is_claimed_is_the_one_of_the_drawing() {
     assert!(claimed * 100 >= 95 * count, "{claimed} of {count}");
 }
 
-/// A pin stands in the slot: the slot does not end where it was met.
+/// A pin in the slot: the slot does not end where it was met.
 #[test]
-fn what_stands_in_a_slot_is_not_its_end() {
+fn an_obstacle_in_a_slot_is_not_its_end() {
     let (plate, mut rng) = (Plate::default(), Pcg64::seed_from_u64(22));
     for _ in 0..40 {
         let (x, y, radius) = (
@@ -458,9 +460,9 @@ fn what_stands_in_a_slot_is_not_its_end() {
     }
 }
 
-/// A groove that runs through the whole plate has no length, and none is told.
+/// A groove that runs through the whole plate has no length, and none is reported.
 #[test]
-fn a_slot_without_ends_is_told_as_one() {
+fn a_slot_without_ends_is_reported_as_such() {
     let mut rng = Pcg64::seed_from_u64(23);
     // two blocks 6 mm apart on a floor 5 mm below their top
     let distance = |p: &Point3<f64>| {
@@ -475,7 +477,7 @@ fn a_slot_without_ends_is_told_as_one() {
     }
 }
 
-/// A touch that met something else does not make a hole of it: one in six of its walls is felt 0.3 to 1 mm before it.
+/// A touch that met something else does not make a hole of it: one in six of its walls is met 0.3 to 1 mm before it.
 #[test]
 fn a_hole_is_not_claimed_from_touches_of_something_else() {
     let (plate, mut rng) = (Plate::default(), Pcg64::seed_from_u64(24));
@@ -485,12 +487,12 @@ fn a_hole_is_not_claimed_from_touches_of_something_else() {
         let flag = Point3::new(16e-3 + rng.random_range(-2e-3..2e-3), 36e-3 + rng.random_range(-2e-3..2e-3), TOP);
         let mut explorer = Explorer::new(Some(Kind::Hole), &flag, &Vector3::z_axis(), params).unwrap();
         let mut walls = 0;
-        while let Some(wish) = explorer.wish() {
-            walls += usize::from(wish.direction.z.abs() < 0.5);
+        while let Some(planned) = explorer.wish() {
+            walls += usize::from(planned.direction.z.abs() < 0.5);
             let noise: f64 = StandardNormal.sample(&mut rng);
-            let is_wrong = walls % 6 == 5 && wish.direction.z.abs() < 0.5;
+            let is_wrong = walls % 6 == 5 && planned.direction.z.abs() < 0.5;
             let off = if is_wrong { rng.random_range(-1e-3..-0.3e-3) } else { noise * SIGMA };
-            explorer.take(&feel(&|p| plate.signed_distance(p), &wish, params.ball_radius, off));
+            explorer.take(&probe(&|p| plate.signed_distance(p), &planned, params.ball_radius, off));
         }
         let Ok(found) = explorer.found() else { continue };
         let hole = found.feature.unwrap();
@@ -502,10 +504,10 @@ fn a_hole_is_not_claimed_from_touches_of_something_else() {
         }
     }
     println!("{claimed} of 50 claimed");
-    assert!(claimed > 0, "with one in six of them wrong the others still tell");
+    assert!(claimed > 0, "with one in six of them wrong the others still determine it");
 }
 
-/// A boss of which one of the first three directions felt nothing is touched in more of them, or not measured at all.
+/// A boss of which one of the first three directions met nothing is touched in more of them, or not measured at all.
 #[test]
 fn a_boss_is_measured_from_three_walls_at_the_least() {
     let (plate, mut rng) = (Plate::default(), Pcg64::seed_from_u64(25));
@@ -515,12 +517,12 @@ fn a_boss_is_measured_from_three_walls_at_the_least() {
         let params = PatternParams { sigma: 10e-6, ..PatternParams::default() };
         let mut explorer = Explorer::new(Some(Kind::Boss), &flag, &Vector3::z_axis(), params).unwrap();
         let mut walls = 0;
-        while let Some(wish) = explorer.wish() {
-            let is_wall = wish.direction.z.abs() < 0.5;
+        while let Some(planned) = explorer.wish() {
+            let is_wall = planned.direction.z.abs() < 0.5;
             walls += usize::from(is_wall);
             let noise: f64 = StandardNormal.sample(&mut rng);
-            let felt = feel(&|p| plate.signed_distance(p), &wish, params.ball_radius, noise * SIGMA);
-            explorer.take(if is_wall && walls == missed + 1 { &TouchResult::Nothing } else { &felt });
+            let result = probe(&|p| plate.signed_distance(p), &planned, params.ball_radius, noise * SIGMA);
+            explorer.take(if is_wall && walls == missed + 1 { &TouchResult::Nothing } else { &result });
         }
         let found = explorer.found().unwrap();
         assert!(found.is_as_asked, "{found:?}");

@@ -1,5 +1,5 @@
-//! What the order of the crates cannot say: reads the sources and fails on a reference that a room may not make, and on files, threads,
-//! clock, environment or printing in a crate that is pure. Comments, strings and inline tests do not count.
+//! Rules that the order of the crates cannot enforce: reads the sources and fails on a reference that a room may not make, and on
+//! files, threads, clock, environment or printing in a crate that is pure. Comments, strings and inline tests do not count.
 
 use std::fs;
 use std::path::Path;

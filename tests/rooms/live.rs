@@ -116,17 +116,17 @@ fn renewed_bit_by_bit_it_is_the_skin_of_all_at_once_and_sound_all_along() {
     assert!((faces[0] / faces[1] - 1.0).abs() < 0.004, "{faces:?} faces bit by bit and at once");
     for (name, distances) in [("there", distances(&mesh, &whole)), ("back", distances(&whole, &mesh))] {
         let at = |share: f64| distances[((distances.len() - 1) as f64 * share) as usize] * 1e3;
-        let told = format!("{name}: median {:.1e}, 95 % {:.1e}, 99 % {:.1e} mm", at(0.5), at(0.95), at(0.99));
+        let summary = format!("{name}: median {:.1e}, 95 % {:.1e}, 99 % {:.1e} mm", at(0.5), at(0.95), at(0.99));
         // what was taken in only nearby differs: 0.0004, 0.006 and 0.09 mm
-        assert!(at(0.5) < 0.0006 && at(0.95) < 0.008 && at(0.99) < 0.1, "{told}");
+        assert!(at(0.5) < 0.0006 && at(0.95) < 0.008 && at(0.99) < 0.1, "{summary}");
     }
     let rims = [&mesh, &whole].map(|mesh| rim_length(mesh, &soundness(mesh).rims) * 1e3);
     assert!((rims[0] - rims[1]).abs() < 0.2, "rims {rims:.1?} mm");
     // the tree followed
-    let anew = FaceTree::new(&mesh);
+    let rebuilt = FaceTree::new(&mesh);
     for corner in whole.positions().iter().step_by(7) {
         let x = corner + nalgebra::Vector3::new(0.3e-3, -0.2e-3, 0.4e-3);
-        let [a, b] = [&mesh_tree, &anew].map(|tree| tree.closest(&mesh, &x, 1.0).unwrap().distance_squared);
+        let [a, b] = [&mesh_tree, &rebuilt].map(|tree| tree.closest(&mesh, &x, 1.0).unwrap().distance_squared);
         assert_eq!(a, b);
     }
     // and what no touch came near stayed
@@ -194,11 +194,11 @@ fn two_threads_do_what_one_does_and_leave_the_scan_where_it_was() {
     assert_eq!(moved(refiner.mesh()), 0);
 }
 
-/// Samples that do not wait, with what the thread of the patch is let do at each of them.
+/// Samples that do not wait, with the permits of the patch's thread at each of them.
 struct Kept {
     live: Engine,
     keeper: GateKeeper,
-    /// when the renewals that were asked for are due, ns; the thread has done so many of them
+    /// due times of the requested renewals, ns; the thread has done so many of them
     open: VecDeque<i64>,
     done: usize,
     slot: Option<i64>,
@@ -220,7 +220,7 @@ impl Kept {
         self.done += 1;
     }
 
-    /// Pushes a sample and counts by the words of the documentation what has to come of it.
+    /// Pushes a sample and counts the effects that the documentation states.
     fn push(&mut self, sample: &Sample) {
         let can_take_up = self.live.is_whole();
         self.live.push(sample).unwrap();
@@ -241,7 +241,7 @@ impl Kept {
     }
 }
 
-/// What is known at the end is what all samples at once make.
+/// The result at the end equals that of all samples at once.
 fn assert_knows_all(stream: &PlateStream, live: Engine) {
     let mut known = live.finish().unwrap().1.unwrap();
     known.flush();
@@ -252,7 +252,7 @@ fn assert_knows_all(stream: &PlateStream, live: Engine) {
 }
 
 /// The patch gets a permit for each 100 ms alone: every sample is taken all the same, the patch is renewed as often as it may
-/// be, each time late, and what is known at the end is the same.
+/// be, each time late, and the result at the end is the same.
 #[test]
 fn a_late_patch_holds_no_sample_up_and_changes_nothing_of_the_result() {
     let stream = stream(5, 0.1);
@@ -277,7 +277,7 @@ fn a_late_patch_holds_no_sample_up_and_changes_nothing_of_the_result() {
 
 /// Where the thread is done in time, no sample that waits would find another mesh.
 #[test]
-fn a_patch_in_time_is_that_of_who_waits_for_it_at_every_sample() {
+fn a_patch_in_time_equals_one_awaited_at_every_sample() {
     let stream = stream(5, 0.1);
     let mut patient = engine(&stream, PATIENT, Gate::default());
     let mut kept = Kept::new(&stream);
@@ -301,7 +301,7 @@ fn a_patch_in_time_is_that_of_who_waits_for_it_at_every_sample() {
 /// The patch is late by two renewals and all that came since when the samples end: while none comes the mesh goes on to what the
 /// patch knows of all of them, as it does by hand.
 #[test]
-fn while_no_sample_comes_the_mesh_goes_on_to_what_the_patch_knows() {
+fn without_samples_the_mesh_catches_up_with_the_patch() {
     let stream = stream(6, 0.05);
     let (samples, pace) = (&stream.samples, Pace::default());
     let (contacts, tree) = (contacts(&stream), FaceTree::new(&stream.scan));
@@ -320,7 +320,7 @@ fn while_no_sample_comes_the_mesh_goes_on_to_what_the_patch_knows() {
         let delta = patcher.renewed(&stream.scan, &tree);
         by_hand.begin_to_follow(&delta);
         while !by_hand.go_on_following(&delta, AT_ONCE).unwrap() {}
-        // nothing is done without a permit, and the third is asked for when the first two are taken up
+        // nothing is done without a permit, and the third is requested when the first two are taken up
         live.rest().unwrap();
         assert_eq!(live.counts().renewals, k as u64);
         keeper.let_one_through();
@@ -396,7 +396,7 @@ fn triangles(mesh: &TriMesh) -> Vec<[[u64; 3]; 3]> {
     triangles
 }
 
-/// What the patcher makes of all that counts now, to the last bit: triangles, and how well vertices are known; and the
+/// The reconstruction from the current evidence, to the last bit: triangles, and how well vertices are known; and the
 /// touches of which features are measured.
 fn whole(stream: &PlateStream, patcher: &Patcher) -> (Vec<[[u64; 3]; 3]>, Vec<u64>, Vec<ProbedPoint>) {
     let patched = patcher.clone().patched(&stream.scan, &FaceTree::new(&stream.scan)).unwrap();
@@ -469,12 +469,12 @@ fn undoing_while_touching_brings_the_mesh_back() {
     assert!(live.redo().unwrap());
     let redone = triangles(live.refiner().mesh());
     assert!(undone != touched && undone != redone);
-    // what was undone is what all strokes but the last make at once …
+    // the undone result is that of all strokes but the last at once …
     contacts[..last_stroke].iter().for_each(|contact| before.push(contact));
     before.flush();
-    let (mesh, anew) = (live.refiner().mesh().clone(), live.finish().unwrap().1.unwrap());
+    let (mesh, rebuilt) = (live.refiner().mesh().clone(), live.finish().unwrap().1.unwrap());
     assert!(redone == triangles(&mesh));
-    assert!(redone == whole(&stream, &anew).0, "and redone what all of them make");
+    assert!(redone == whole(&stream, &rebuilt).0, "and redone what all of them make");
     let close = |a: usize, b: usize| (a as f64 / b as f64 - 1.0).abs() < 0.01;
     assert!(close(undone.len(), whole(&stream, &before).0.len()));
     assert!(close(touched.len(), redone.len()));

@@ -1,4 +1,4 @@
-//! The scene file from outside: the file that is shipped, what is refused, and what reaches the rooms.
+//! The scene file from outside: the shipped file, refusals, and the resulting parameters.
 
 mod parameters;
 
@@ -98,7 +98,7 @@ fn every_key_of_the_code_is_in_the_shipped_file_and_documented() {
     assert!(known.len() >= 35, "{known:?}");
 }
 
-/// The presets of the room are the ones that a user gets who changes nothing.
+/// The presets of the room are the defaults of a user.
 #[test]
 fn the_default_scene_is_the_preset_of_each_mode() {
     let tip = TipParams { radius: 1.5e-3, stiffness: Some(2e4) };
@@ -210,7 +210,7 @@ fn the_patch_needs_a_ball_and_a_gate_and_is_no_part_of_the_paper() {
 }
 
 #[test]
-fn what_refine_says_goes_over_its_mode() {
+fn keys_of_refine_override_its_mode() {
     let yaml = "tip: { radius_mm: 2, stiffness_n_per_mm: 0.1 }
 refine: { mode: paper, contact_model: spring, alpha_m_per_n_s: 0.5, beta_per_n2_s: 0, step: corrected, along: force, roi_mm: 4 }";
     let params = Scene::from_yaml(yaml).unwrap().refine_params(WrenchFrame::Sensor).unwrap();
@@ -256,7 +256,7 @@ compensation:
 }
 
 #[test]
-fn each_mistake_is_refused_in_one_line_that_says_where_and_what() {
+fn each_mistake_is_refused_in_one_line_with_place_and_cause() {
     let bad = [
         ("sync:\n  reordr_ms: 3\n", &["reordr_ms", "did you mean `reorder_ms`", "line 2"][..]),
         ("contcat: {}", &["contcat", "did you mean `contact`", "line 1"]),
@@ -498,12 +498,12 @@ fn gravity_in_the_axes_of_space_turns_with_the_scan() {
     assert_eq!(Scene::default().placement(), None);
 }
 
-/// Names as they stand in the YAML, in its order, listed here by hand.
+/// Names as in the YAML, in its order, listed here by hand.
 #[test]
 fn a_scene_reports_what_is_built_of_it_and_what_is_left_out() {
     let built = |yaml: &str| {
         let mut built = Scene::from_yaml(yaml).unwrap().built(&["robot"], &touchup::FEATURES);
-        // what the program was compiled with differs from one to the other
+        // compiled features differ from one to the other
         for names in [&mut built.built, &mut built.left_out] {
             names.retain(|name| !name.starts_with("feature "));
         }

@@ -1,4 +1,4 @@
-//! What goes wrong in mid-move: the arm stands, the reason is the true one, and it is recovered when somebody says so.
+//! What goes wrong in mid-move: the arm comes to rest, the reported reason is the true one, and it recovers on command.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -19,20 +19,20 @@ const SPEED: f64 = 50e-3;
 /// The brakes of the stand-in take 50 mm/s at 8 m/s², s.
 const BRAKES: f64 = 10e-3;
 
-/// Nobody commands any more: after 60 ms the client brakes, and the program of the controller lives on.
+/// Without commands: after 60 ms the client brakes, and the program of the controller lives on.
 #[test]
-fn an_arm_that_hears_nothing_stands() {
+fn without_commands_the_arm_stops() {
     with_library(|packages| {
         let mut stand_in = StandIn::start(&["--start-mm", "45,8,80"]);
         let mut arm = stand_in.connect(packages);
         move_for(&mut arm, 0.3);
-        stand_in.tell("mark silence of the caller");
-        let silence = stand_in.record_between("mark silence of the caller", "told to stop");
+        stand_in.send("mark silence of the caller");
+        let silence = stand_in.record_between("mark silence of the caller", "stop requested");
         let after = silence[silence.len() - 1].time - silence[0].time;
-        println!("the caller is silent: told to stop after {:.0} ms", after * 1e3);
+        println!("the caller is silent: stop requested after {:.0} ms", after * 1e3);
         assert!((50e-3..90e-3).contains(&after), "{after}");
-        stand_in.stands_in("told to stop with 2", 20e-3 / 2.0 + LATENCY);
-        // and moves again when it is told to, without having to be recovered
+        stand_in.stands_in("stop requested with 2", 20e-3 / 2.0 + LATENCY);
+        // and moves again on command, without recovery
         move_for(&mut arm, 0.2);
         assert!(arm.halt().is_none());
         Ok(())
@@ -41,12 +41,12 @@ fn an_arm_that_hears_nothing_stands() {
 
 /// What happens when the program that owns the arm goes: its client sees the pipe end.
 #[test]
-fn an_arm_that_is_let_go_stands() {
+fn a_released_arm_stops() {
     with_library(|packages| {
         let mut stand_in = StandIn::start(&["--start-mm", "45,8,80"]);
         let mut arm = stand_in.connect(packages);
         move_for(&mut arm, 0.3);
-        stand_in.tell("mark let go");
+        stand_in.send("mark let go");
         drop(arm);
         stand_in.stands_in("mark let go", 20e-3 / 2.0 + 2.0 * LATENCY);
         let record = stand_in.record_after("program stops");
@@ -61,7 +61,7 @@ fn move_for(arm: &mut UrArm, seconds: f64) {
     go_for(arm, seconds, &Command::Velocity { linear: Vector3::new(0.0, 0.0, 20e-3), acceleration: 1.0 });
 }
 
-/// Is told to stand, for some seconds of the arm.
+/// Commands zero velocity, for some seconds of the arm.
 pub fn rest_for(arm: &mut UrArm, seconds: f64) {
     go_for(arm, seconds, &Command::Stop { deceleration: 1.0 });
 }
@@ -77,10 +77,10 @@ fn go_for(arm: &mut UrArm, seconds: f64, command: &Command) {
     }
 }
 
-/// Whether an error says what was.
+/// Whether an error names the true cause.
 type IsTrue = fn(&ProbeError) -> bool;
 
-/// Moves up until it is broken off, and makes something happen on the way.
+/// Moves up until it is broken off, and makes something happen meanwhile.
 fn broken_off(arm: &mut UrArm, mut happen: impl FnMut()) -> ProbeError {
     let [x, y] = PLACE;
     let from = arm.next_state().unwrap().pose_bt.translation.z;
@@ -114,7 +114,7 @@ fn is_client(error: &ProbeError, says: &str) -> bool {
     matches!(error, ProbeError::Arm { error: ArmError::Client { reason }, .. } if reason.contains(says))
 }
 
-fn stands_for(error: &ProbeError, why: Safety) -> bool {
+fn is_stopped_by(error: &ProbeError, why: Safety) -> bool {
     matches!(error, ProbeError::Arm { error: ArmError::Stopped { safety }, .. } if *safety == why)
 }
 
@@ -131,11 +131,11 @@ enum Passes {
     Controller(u32),
     /// that of the guard, line by line of the client, which come each 10 ms; and of the controller, ms
     Guard(u32),
-    /// that of the guard, who gets no lines any more
+    /// that of the guard, which gets no lines any more
     GuardAlone,
 }
 
-/// Who stops the arm, as the record says it.
+/// What stops the arm, by the record.
 #[derive(Clone, Copy)]
 enum By {
     Dashboard,
@@ -155,10 +155,11 @@ struct Fault {
 
 /// In mid-move at 50 mm/s. The table of docs/ur.md.
 #[test]
-fn after_each_fault_the_arm_stands_and_the_reason_is_the_true_one() {
+fn after_each_fault_the_arm_is_at_rest_and_the_reported_reason_is_true() {
     use By::{Client, Controller, Dashboard, Watchdog};
     let fault = |name, happens, passes, by, is_true| Fault { name, happens, passes, by, is_true };
-    let is_stopped: [IsTrue; 2] = [|e| stands_for(e, Safety::ProtectiveStop), |e| stands_for(e, Safety::OperatorStop)];
+    let is_stopped: [IsTrue; 2] =
+        [|e| is_stopped_by(e, Safety::ProtectiveStop), |e| is_stopped_by(e, Safety::OperatorStop)];
     let faults = [
         fault("connections dropped", "drop", Passes::Nothing, Dashboard, is_dropped_somewhere),
         fault("connection of the dashboard dropped", "undash", Passes::Nothing, Dashboard, |e| {
@@ -166,7 +167,13 @@ fn after_each_fault_the_arm_stands_and_the_reason_is_the_true_one() {
         }),
         fault("states silent", "silent", Passes::Guard(0), Dashboard, is_lost),
         fault("half open: states come, orders do not arrive", "deaf", Passes::Controller(150), Watchdog, has_ended),
-        fault("cable pulled: nothing both ways, no dashboard", "unplug", Passes::Guard(150), Watchdog, is_lost),
+        fault(
+            "cable pulled: nothing in either direction, no dashboard",
+            "unplug",
+            Passes::Guard(150),
+            Watchdog,
+            is_lost,
+        ),
         fault("controller without power", "die", Passes::Nothing, Controller, is_dropped_somewhere),
         // later the watchdog is sooner
         fault("program of the controller hangs", "stuck", Passes::Controller(80), Dashboard, |e| {
@@ -182,7 +189,7 @@ fn after_each_fault_the_arm_stands_and_the_reason_is_the_true_one() {
         fault("client crashed (SIGABRT)", "ABRT", Passes::Nothing, Dashboard, |e| is_client(e, "signal: 6")),
         fault("client hangs (SIGSTOP)", "STOP", Passes::GuardAlone, Dashboard, |e| is_client(e, "hangs")),
     ];
-    println!("| fault | told | stopped by | then stands after |");
+    println!("| fault | reported | stopped by | at rest after |");
     println!("|---|---|---|---|");
     for fault in faults {
         with_library(|packages| one_fault(packages, &fault));
@@ -207,10 +214,10 @@ fn one_fault(packages: &Path, fault: &Fault) -> Result<(), ProbeError> {
     let mut passing = None;
     let error = broken_off(&mut arm, || {
         if is_signal {
-            stand_in.tell(&format!("mark {happens}"));
+            stand_in.send(&format!("mark {happens}"));
             signal(client, happens);
         } else {
-            stand_in.tell(happens);
+            stand_in.send(happens);
         }
         if let Passes::Controller(ms) | Passes::Guard(ms) = passes {
             stand_in.run(ms);
@@ -223,13 +230,13 @@ fn one_fault(packages: &Path, fault: &Fault) -> Result<(), ProbeError> {
         By::Dashboard => ("program stops: dashboard", BRAKES),
         By::Watchdog => ("program stops: watchdog after 10", BRAKES),
         By::Controller => ("program stops", BRAKES),
-        By::Client => ("told to stop", SPEED / limits().acceleration + LATENCY),
+        By::Client => ("stop requested", SPEED / limits().acceleration + LATENCY),
     };
     let stood = stand_in.stood_after(event);
     let stopped = match halt {
         Some(Halt::Dashboard { .. }) => "dashboard",
-        Some(Halt::Watchdog) => "nobody else",
-        None => "nobody else, nor has to",
+        Some(Halt::Watchdog) => "nothing else",
+        None => "nothing else, nor has to",
     };
     let by_whom = stand_in.record_after(event).swap_remove(0).event;
     println!("| {name} | {error} | {by_whom}; by the guard: {stopped} | {:.0} ms |", stood * 1e3);
@@ -276,17 +283,17 @@ impl Drop for Passing {
 
 /// Neither the client nor the guard does anything: the watchdog of the controller does, in its time and not before.
 #[test]
-fn the_watchdog_stops_an_arm_that_nobody_feeds() {
+fn the_watchdog_stops_an_uncommanded_arm() {
     with_library(|packages| {
         let mut stand_in = StandIn::start(&["--start-mm", "45,8,40"]);
         let mut params = stand_in.params(packages);
-        // nobody moves it: the guard waits
+        // uncommanded: the guard waits
         let (clock, hand) = Clock::manual();
         params.clock = clock;
         let mut arm = UrArm::connect(&params).unwrap();
         move_for(&mut arm, 0.2);
         signal(arm.client_id(), "STOP");
-        stand_in.tell("mark stopped");
+        stand_in.send("mark stopped");
         stand_in.run(150);
         let record = stand_in.record_between("mark stopped", "program stops: watchdog after 10");
         let before = &record[..record.len() - 1];
@@ -302,14 +309,14 @@ fn the_watchdog_stops_an_arm_that_nobody_feeds() {
 
 /// A controller that is really killed: the record ends with it, the reason does not.
 #[test]
-fn a_killed_controller_is_told() {
+fn a_killed_controller_is_reported() {
     with_library(|packages| {
         let mut stand_in = StandIn::start(&["--start-mm", "45,8,40"]);
         let mut arm = stand_in.connect(packages);
         let error = broken_off(&mut arm, || stand_in.kill());
         assert!(is_dropped_somewhere(&error), "{error}");
         assert_eq!(arm.halt(), Some(Halt::Watchdog));
-        // it stays so, and recovery says why it cannot be
+        // it stays so, and recovery reports the reason
         assert!(matches!(arm.next_state(), Err(ArmError::Dropped { .. })));
         assert!(arm.command(&Command::Stop { deceleration: 1.0 }).is_err());
         assert!(matches!(arm.recover(), Err(ArmError::Lost { .. })));
@@ -327,16 +334,16 @@ fn after_a_protective_stop_it_is_recovered() {
     with_library(|packages| {
         let mut stand_in = StandIn::start(&["--start-mm", "45,8,40"]);
         let mut arm = stand_in.connect(packages);
-        let error = broken_off(&mut arm, || stand_in.tell("protective"));
-        assert!(stands_for(&error, Safety::ProtectiveStop), "{error}");
+        let error = broken_off(&mut arm, || stand_in.send("protective"));
+        assert!(is_stopped_by(&error, Safety::ProtectiveStop), "{error}");
         let up = Command::Velocity { linear: Vector3::new(0.0, 0.0, 10e-3), acceleration: 1.0 };
         assert_eq!(arm.command(&up), Err(ArmError::Stopped { safety: Safety::ProtectiveStop }));
         let moved = |record: Vec<Line>| record.iter().any(|line| line.speed > 0.0);
         stand_in.stands_in("program stops: a safety plane", BRAKES);
-        stand_in.tell("mark recovering");
+        stand_in.send("mark recovering");
         arm.recover().unwrap();
         rest_for(&mut arm, 0.1);
-        stand_in.tell("mark recovered");
+        stand_in.send("mark recovered");
         assert!(!moved(stand_in.record_between("mark recovering", "mark recovered")), "recovery moves nothing");
         // tool, payload and watchdog are set again: it touches as it did before
         let record = touched(&mut arm, &above(5e-3))?;
@@ -353,7 +360,7 @@ fn after_a_lost_client_it_is_recovered() {
         for fault in ["KILL", "drop"] {
             let client = arm.client_id();
             let error =
-                broken_off(&mut arm, || if fault == "KILL" { signal(client, fault) } else { stand_in.tell(fault) });
+                broken_off(&mut arm, || if fault == "KILL" { signal(client, fault) } else { stand_in.send(fault) });
             assert!(is_client(&error, "signal") || is_dropped_somewhere(&error), "{error}");
             arm.recover().unwrap();
             assert_ne!(arm.client_id(), client);
@@ -364,7 +371,7 @@ fn after_a_lost_client_it_is_recovered() {
 }
 
 /// The client lives, the program of the controller does not: by a hand at the panel, or by the watchdog while nothing arrived.
-/// The program that is started then does what the registers hold: a velocity from before the fault, if nobody clears them.
+/// The restarted program executes what the registers hold: a velocity from before the fault, unless they are cleared.
 #[test]
 fn after_an_ended_program_it_is_recovered() {
     with_library(|packages| {
@@ -372,7 +379,7 @@ fn after_an_ended_program_it_is_recovered() {
         let mut arm = stand_in.connect(packages);
         for fault in ["halt", "deaf"] {
             let error = broken_off(&mut arm, || {
-                stand_in.tell(fault);
+                stand_in.send(fault);
                 if fault == "deaf" {
                     stand_in.run(150);
                 }
@@ -380,10 +387,10 @@ fn after_an_ended_program_it_is_recovered() {
             assert!(has_ended(&error), "{error}");
             stand_in.stands_in("program stops", BRAKES);
             let [mended, recovered] = ["mend", "mark recovered"].map(|mark| format!("{mark} after {fault}"));
-            stand_in.tell(&mended);
+            stand_in.send(&mended);
             arm.recover().unwrap();
             rest_for(&mut arm, 0.5);
-            stand_in.tell(&recovered);
+            stand_in.send(&recovered);
             let record = stand_in.record_between(&mended, &recovered);
             assert!(record.iter().all(|line| line.speed == 0.0), "recovery moves nothing");
             move_for(&mut arm, 0.2);
@@ -392,7 +399,7 @@ fn after_an_ended_program_it_is_recovered() {
     });
 }
 
-/// Whoever comes second goes away again, and the first one's motion goes on.
+/// A second client is refused, and the first one's motion goes on.
 #[test]
 fn a_second_client_is_refused_and_disturbs_nothing() {
     with_library(|packages| {
@@ -401,8 +408,8 @@ fn a_second_client_is_refused_and_disturbs_nothing() {
         let params = stand_in.params(packages);
         let second = thread::spawn(move || UrArm::connect(&params).err().unwrap());
         // up and down: how long that takes is no matter
-        for way in [20e-3, -20e-3].into_iter().cycle() {
-            let linear = Vector3::new(0.0, 0.0, way);
+        for speed in [20e-3, -20e-3].into_iter().cycle() {
+            let linear = Vector3::new(0.0, 0.0, speed);
             go_for(&mut arm, 0.1, &Command::Velocity { linear, acceleration: 1.0 });
             if second.is_finished() {
                 break;
@@ -415,18 +422,18 @@ fn a_second_client_is_refused_and_disturbs_nothing() {
     });
 }
 
-/// What the operator has stopped no call may start again.
+/// No call may restart an arm stopped by the operator.
 #[test]
 fn an_operators_stop_is_released_by_the_operator_alone() {
     with_library(|packages| {
         let mut stand_in = StandIn::start(&["--start-mm", "45,8,40"]);
         let mut arm = stand_in.connect(packages);
-        let error = broken_off(&mut arm, || stand_in.tell("operator"));
-        assert!(stands_for(&error, Safety::OperatorStop), "{error}");
+        let error = broken_off(&mut arm, || stand_in.send("operator"));
+        assert!(is_stopped_by(&error, Safety::OperatorStop), "{error}");
         assert_eq!(arm.recover(), Err(ArmError::Stopped { safety: Safety::OperatorStop }));
         let refused = UrArm::connect(&stand_in.params(packages)).err().unwrap();
         assert!(matches!(refused, UrError::Stopped(Safety::OperatorStop)), "{refused}");
-        stand_in.tell("release");
+        stand_in.send("release");
         arm.recover().unwrap();
         move_for(&mut arm, 0.2);
         Ok(())

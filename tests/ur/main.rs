@@ -1,18 +1,18 @@
 //! The real ur-rtde client against a stand-in for the controller: the library, the child process, the wire and the arm behind it.
 //!
-//! Whether the arm stands is read in the record of the stand-in, by its own clock. That waits for the client, and so do the deadlines of
-//! client and guard: how busy this machine is changes nothing. When a fault is noticed is a test of the guard and of the driver
-//! (`src/ur`), on clocks that are moved by hand.
+//! Whether the arm is at rest is read in the record of the stand-in, by its own clock. That waits for the client, and so do the
+//! deadlines of client and guard: how busy this machine is changes nothing. When a fault is noticed is a test of the guard and of
+//! the driver (`src/ur`), on clocks that are moved by hand.
 
 mod faults;
 mod motion;
+mod payload_identification;
 mod probing;
 mod refusals;
 #[path = "../common/shared.rs"]
 #[expect(dead_code, reason = "no arm is tested on shared data")]
 mod shared;
 mod stand_in;
-mod weighing;
 
 use std::path::Path;
 
@@ -56,7 +56,7 @@ fn above(height: f64) -> TouchTarget {
     TouchTarget { standoff_bt: at([x, y, TOP + height]), direction: -Vector3::z_axis(), search: 8e-3, expected: None }
 }
 
-/// Runs with ur-rtde, or says that this test was skipped.
+/// Runs with ur-rtde, or reports that this test was skipped.
 fn with_library(body: impl FnOnce(&Path) -> Result<(), ProbeError>) {
     match packages() {
         Ok(packages) => body(packages).unwrap(),
@@ -101,26 +101,26 @@ fn where_nothing_is_that_is_the_answer() {
     });
 }
 
-/// A surface that comes earlier than the mesh says.
+/// A surface nearer than in the mesh.
 #[test]
-fn what_is_in_the_way_stops_it() {
+fn an_obstacle_stops_it() {
     with_library(|packages| {
         let mut stand_in = StandIn::start(&[]);
         let mut arm = stand_in.connect(packages);
-        stand_in.tell("mark begin");
+        stand_in.send("mark begin");
         let error = touched(&mut arm, &above(-3e-3)).err().unwrap();
-        stand_in.tell("mark told");
+        stand_in.send("mark commanded");
         let ProbeError::InTheWay { place_mm, force_n, .. } = error else { panic!("{error}") };
         let expected = ArmParams::default().pose_bo * Point3::new(0.0, 0.0, TOP + ArmParams::default().radius) * 1e3;
         assert!((place_mm[2] - expected.z).abs() < 0.5 && force_n > 1.0, "{place_mm:?}, {force_n} N");
-        let record = stand_in.record_between("mark begin", "mark told");
-        assert!(record.iter().any(|line| line.force > 1.0), "the part was felt");
+        let record = stand_in.record_between("mark begin", "mark commanded");
+        assert!(record.iter().any(|line| line.force > 1.0), "the part was touched");
         assert!(
             record.iter().all(|line| line.force < limits().force),
             "the part is not pressed by more than the limit"
         );
-        // from where it was told to stop, as slow as it searches
-        stand_in.stands_in("told to stop", TouchParams::default().search_speed / limits().acceleration + LATENCY);
+        // from the stop command, as slow as it searches
+        stand_in.stands_in("stop requested", TouchParams::default().search_speed / limits().acceleration + LATENCY);
         Ok(())
     });
 }

@@ -1,4 +1,4 @@
-//! Lines, velocities and presses, and how they end when they are told to.
+//! Lines, velocities and presses, and how they end on command.
 
 use crate::Onlooker;
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
@@ -8,7 +8,7 @@ use touchup::sim::ArmParams;
 use crate::stand_in::{StandIn, limits};
 use crate::{LATENCY, PLACE, TOP, at, with_library};
 
-/// A line turns the tip on its way, and ends where and how it was asked to.
+/// A line turns the tip while it moves, and ends where and how it was commanded.
 #[test]
 fn a_line_ends_at_its_place_and_turn() {
     with_library(|packages| {
@@ -20,12 +20,12 @@ fn a_line_ends_at_its_place_and_turn() {
         let to = Isometry3::from_parts(place, turn);
         let begun = arm.next_state().unwrap();
         let mut onlooker = Onlooker { seen: |_: &_| {}, is_cancelled: || false };
-        stand_in.tell("mark begin");
+        stand_in.send("mark begin");
         let mut watched = Watched::new(&mut arm, limits(), &mut onlooker);
         watched.line("going there", &to, 50e-3, &TouchParams::default(), 5.0)?;
         watched.zero()?;
         let state = arm.next_state().unwrap();
-        stand_in.tell("mark end");
+        stand_in.send("mark end");
         let off = (state.pose_bt.translation.vector - place.vector).norm();
         let turned = state.pose_bt.rotation.angle_to(&turn);
         assert!(off < 0.15e-3 && turned < 2e-3, "{off} m, {turned} rad");
@@ -103,14 +103,14 @@ fn a_slide_keeps_its_force() {
                 }
             }
         }
-        stand_in.tell("mark over");
+        stand_in.send("mark over");
         arm.command(&Command::Stop { deceleration: 1.0 }).unwrap();
         let mean = forces.iter().sum::<f64>() / forces.len() as f64;
         // the sensor's noise of 0.15 N is in each: over a tenth of a second it is 0.02 N
         let worst = forces.windows(50).map(|w| (w.iter().sum::<f64>() / 50.0 - 5.0).abs()).fold(0.0, f64::max);
         println!("{} states, mean {mean:.3} N, worst tenth of a second {worst:.3} N off", forces.len());
         assert!((mean - 5.0).abs() < 0.1 && worst < 0.3, "{mean} {worst}");
-        // neither the feed nor the force goes on, whatever is said after it
+        // neither the feed nor the force goes on, whatever is commanded after it
         stand_in.stands_in("mark over", 10e-3 / 1.0 + 2.0 * LATENCY);
         Ok(())
     });
@@ -149,7 +149,7 @@ fn motion_is_streamed_at_500_hz() {
     with_library(|packages| {
         let mut stand_in = StandIn::start(&["--start-mm", "45,8,80"]);
         let mut arm = stand_in.connect(packages);
-        stand_in.tell("mark begin");
+        stand_in.send("mark begin");
         let mut states = Vec::new();
         let begun = arm.next_state().unwrap();
         let mut last = begun;
@@ -165,18 +165,18 @@ fn motion_is_streamed_at_500_hz() {
         let worst = gaps.fold(0.0, f64::max);
         println!("{} states in 2 s, {worst:.0} ms between two at most", states.len());
         assert!(states.len() >= 990 && worst < 20.0, "{} states, {worst} ms", states.len());
-        stand_in.tell("mark end");
+        stand_in.send("mark end");
         let record = stand_in.record_between("mark begin", "mark end");
-        // the way of half a swing: 20 mm/s / pi
+        // the travel of half a swing: 20 mm/s / pi
         let xs: Vec<f64> = record.iter().map(|line| line.place.x).collect();
-        let way = xs.iter().fold(f64::MIN, |a, b| a.max(*b)) - xs.iter().fold(f64::MAX, |a, b| a.min(*b));
-        assert!((way - 20e-3 / std::f64::consts::PI).abs() < 0.3e-3, "{way}");
+        let travel = xs.iter().fold(f64::MIN, |a, b| a.max(*b)) - xs.iter().fold(f64::MAX, |a, b| a.min(*b));
+        assert!((travel - 20e-3 / std::f64::consts::PI).abs() < 0.3e-3, "{travel}");
         Ok(())
     });
 }
 
 #[test]
-fn a_cancelled_move_stands_when_it_has_braked() {
+fn a_cancelled_move_brakes_to_rest() {
     with_library(|packages| {
         let mut stand_in = StandIn::start(&["--start-mm", "45,8,80"]);
         let mut arm = stand_in.connect(packages);
@@ -186,7 +186,7 @@ fn a_cancelled_move_stands_when_it_has_braked() {
         let from = arm.next_state().unwrap().pose_bt.translation.z;
         let mut seen = |state: &touchup::robot::ArmState| {
             if !is_cancelled.get() && from - state.pose_bt.translation.z > 20e-3 {
-                stand_in.tell("mark cancelled");
+                stand_in.send("mark cancelled");
                 is_cancelled.set(true);
             }
         };
@@ -201,7 +201,7 @@ fn a_cancelled_move_stands_when_it_has_braked() {
     });
 }
 
-/// While it is still getting faster; the controller would else first reach the speed and then look for what it is told next.
+/// While it is still getting faster; the controller would else first reach the speed and then read its next command.
 #[test]
 fn a_stop_while_it_accelerates_is_not_put_off() {
     with_library(|packages| {
@@ -214,7 +214,7 @@ fn a_stop_while_it_accelerates_is_not_put_off() {
             arm.command(&Command::Velocity { linear, acceleration: 0.2 }).unwrap();
             last = arm.next_state().unwrap();
         }
-        stand_in.tell("mark stop");
+        stand_in.send("mark stop");
         arm.command(&Command::Stop { deceleration: 2.0 }).unwrap();
         // 40 mm/s at 2 m/s²
         stand_in.stands_in("mark stop", 40e-3 / 2.0 + LATENCY);

@@ -1,4 +1,4 @@
-//! What is refused before anything moves, and by which name.
+//! Refusals before any motion, and their errors.
 
 use std::time::Duration;
 
@@ -16,7 +16,7 @@ fn what_cannot_be_is_refused_before_it_moves() {
     with_library(|packages| {
         let mut stand_in = StandIn::start(&[]);
         let mut arm = stand_in.connect(packages);
-        stand_in.tell("mark begin");
+        stand_in.send("mark begin");
         let velocity =
             |z: f64, acceleration: f64| Command::Velocity { linear: Vector3::new(0.0, 0.0, z), acceleration };
         let press =
@@ -40,20 +40,20 @@ fn what_cannot_be_is_refused_before_it_moves() {
         }
         // time passes, and nothing moves
         rest_for(&mut arm, 0.2);
-        stand_in.tell("mark end");
+        stand_in.send("mark end");
         assert!(stand_in.record_between("mark begin", "mark end").iter().all(|line| line.speed == 0.0));
         Ok(())
     });
 }
 
-/// Whatever is wrong at the beginning is said at once, and by its name.
+/// Faults at the start are reported at once, by name.
 #[test]
 fn a_wrong_controller_or_library_is_refused() {
     with_library(|packages| {
         for (version, found) in [("3.15.8", "3.15.8.0"), ("5.4.0", "5.4.0.0"), ("10.7.0", "10.7.0.0")] {
             let stand_in = StandIn::start(&["--version", version]);
             let error = UrArm::connect(&stand_in.params(packages)).err().unwrap();
-            assert!(matches!(&error, UrError::Version { found: told, .. } if told == found), "{error}");
+            assert!(matches!(&error, UrError::Version { found: reported, .. } if reported == found), "{error}");
         }
         let stand_in = StandIn::start(&[]);
         let params = stand_in.params(packages);
@@ -79,15 +79,15 @@ fn a_wrong_controller_or_library_is_refused() {
 
 /// In local control, without power, silent, gone. The library would wait for a silent one without end.
 #[test]
-fn a_controller_that_is_not_at_hand_is_told_at_once() {
+fn a_controller_that_is_not_at_hand_is_reported_at_once() {
     with_library(|packages| {
         let mut stand_in = StandIn::start(&[]);
-        stand_in.tell("local");
+        stand_in.send("local");
         let error = UrArm::connect(&stand_in.params(packages)).err().unwrap();
         assert!(matches!(error, UrError::Local { .. }), "{error}");
         drop(stand_in);
         let mut stand_in = StandIn::start(&[]);
-        stand_in.tell("stuck");
+        stand_in.send("stuck");
         // the library waits 4 s for the first answer of its program
         let error = UrArm::connect(&stand_in.params(packages)).err().unwrap();
         assert!(matches!(&error, UrError::Client(reason) if reason.contains("setPayload")), "{error}");
@@ -108,10 +108,10 @@ fn a_controller_that_is_not_at_hand_is_told_at_once() {
         assert!(matches!(&error, UrError::Client(reason) if reason.contains("not ready for 2000 ms")), "{error}");
         drop(stand_in);
         let mut stand_in = StandIn::start(&[]);
-        stand_in.tell("off");
+        stand_in.send("off");
         let error = UrArm::connect(&stand_in.params(packages)).err().unwrap();
         assert!(matches!(error, UrError::Off { .. }), "{error}");
-        stand_in.tell("unplug");
+        stand_in.send("unplug");
         let error = UrArm::connect(&stand_in.params(packages)).err().unwrap();
         assert!(matches!(error, UrError::Unreachable { .. }), "{error}");
         stand_in.kill();
@@ -122,7 +122,7 @@ fn a_controller_that_is_not_at_hand_is_told_at_once() {
 }
 
 #[test]
-fn a_setup_that_fails_says_which_step() {
+fn a_failed_setup_names_its_step() {
     let folder = tempfile::tempdir().unwrap();
     let setup = std::process::Command::new(env!("CARGO_BIN_EXE_touchup"))
         .args(["ur", "setup", "--python", "/bin/false"])
@@ -130,7 +130,7 @@ fn a_setup_that_fails_says_which_step() {
         .output()
         .unwrap();
     assert_eq!(setup.status.code(), Some(1));
-    let told = String::from_utf8_lossy(&setup.stderr);
-    assert!(told.contains("/bin/false -c") && told.contains("it failed"), "{told}");
+    let message = String::from_utf8_lossy(&setup.stderr);
+    assert!(message.contains("/bin/false -c") && message.contains("it failed"), "{message}");
     assert!(setup.stdout.is_empty());
 }

@@ -14,9 +14,9 @@ use touchup::ur::{UrArm, UrParams};
 
 /// Ports that the library has fixed.
 const PORTS: [u16; 3] = [30004, 29999, 30003];
-/// The record is read again until it holds what is waited for; longer than this is never.
+/// Longest wait for an entry of the record.
 const NEVER: Duration = Duration::from_secs(60);
-/// Periods without motion after which the arm stands.
+/// Periods without motion after which the arm is at rest.
 const STANDING: usize = 20;
 
 static NEXT: AtomicU8 = AtomicU8::new(2);
@@ -26,8 +26,8 @@ pub fn packages() -> Result<&'static Path, &'static str> {
     static PACKAGES: LazyLock<Result<PathBuf, String>> = LazyLock::new(|| {
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("ur");
         let setup = Command::new(env!("CARGO_BIN_EXE_touchup")).args(["ur", "setup"]).arg(folder).output().unwrap();
-        let told = String::from_utf8(setup.stdout).unwrap();
-        match told.trim().strip_prefix("site_packages: ") {
+        let output = String::from_utf8(setup.stdout).unwrap();
+        match output.trim().strip_prefix("site_packages: ") {
             Some(packages) if setup.status.success() => Ok(packages.into()),
             _ => Err(String::from_utf8_lossy(&setup.stderr).trim().to_owned()),
         }
@@ -93,14 +93,14 @@ impl StandIn {
     }
 
     /// Makes a fault, and returns when it is there; `mark …` only writes a line into the record.
-    pub fn tell(&mut self, fault: &str) {
+    pub fn send(&mut self, fault: &str) {
         writeln!(self.orders, "{fault}").unwrap();
         assert_eq!(self.answer(), fault);
     }
 
-    /// Lets some time of the controller pass, whatever the client says, ms.
+    /// Lets some time of the controller pass, whatever the client sends, ms.
     pub fn run(&mut self, ms: u32) {
-        self.tell(&format!("run {ms}"));
+        self.send(&format!("run {ms}"));
     }
 
     /// Ends it as a power cut would.
@@ -139,7 +139,7 @@ impl StandIn {
             .collect()
     }
 
-    /// What is found in the record, once it is there.
+    /// Waits for an entry of the record.
     fn wait<T>(&self, what: &str, find: impl Fn(&[Line]) -> Option<T>) -> T {
         let begun = Instant::now();
         while begun.elapsed() < NEVER {
@@ -166,10 +166,10 @@ impl StandIn {
         })
     }
 
-    /// From the last such event, which is in mid-move, to the last motion before the arm stands, s.
+    /// From the last such event, which is in mid-move, to the last motion before the arm is at rest, s.
     pub fn stood_after(&self, event: &str) -> f64 {
         let moves = |line: &Line| line.speed > 0.0 || line.turn > 0.0;
-        let (at_event, stood) = self.wait(&format!("an arm that stands after `{event}`"), |record| {
+        let (at_event, stood) = self.wait(&format!("an arm at rest after `{event}`"), |record| {
             let at = record.iter().rposition(|line| line.event.contains(event))?;
             let still = record[at..].windows(STANDING).position(|lines| !lines.iter().any(moves))?;
             let last = record[at + still.saturating_sub(1)].time;
@@ -182,8 +182,8 @@ impl StandIn {
     /// As [`Self::stood_after`], which has to be within some seconds.
     pub fn stands_in(&self, event: &str, seconds: f64) {
         let stood = self.stood_after(event);
-        println!("{event}: stands after {:.0} ms of at most {:.0}", stood * 1e3, seconds * 1e3);
-        assert!(stood < seconds, "{event}: stands after {stood} s");
+        println!("{event}: at rest after {:.0} ms of at most {:.0}", stood * 1e3, seconds * 1e3);
+        assert!(stood < seconds, "{event}: at rest after {stood} s");
     }
 }
 

@@ -12,9 +12,9 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64;
 
 use super::ball::push_ball;
+use super::drift::gauss;
 use super::error::{SimError, not_negative, positive, up_to};
 use super::surface::Surface;
-use super::wander::gauss;
 use touchup_core::robot::{Arm, ArmError, ArmState, Command, Joints, Safety, UrGeometry};
 use touchup_core::touch::{Payload, Wrench};
 
@@ -27,7 +27,7 @@ pub struct ArmParams {
     pub pose_bo: Isometry3<f64>,
     /// The tip (centre of its ball, z from tip to handle) in the flange.
     pub pose_ft: Isometry3<f64>,
-    /// How far the centre of its ball really is from there, in the axes of the tip, m.
+    /// True offset of the centre of its ball from there, in the axes of the tip, m.
     pub ball_offset: Vector3<f64>,
     /// Of the ball, m.
     pub radius: f64,
@@ -35,20 +35,20 @@ pub struct ArmParams {
     pub stiffness: f64,
     /// Coefficient of friction.
     pub friction: f64,
-    /// Of what the encoders say, per axis, root mean square, m.
+    /// Position noise of the encoders, per axis, root mean square, m.
     pub pose_noise: f64,
     /// Of the force, per axis, root mean square, N.
     pub force_noise: f64,
     /// Of the torque about the flange's origin, per axis, root mean square, N·m.
     pub torque_noise: f64,
-    /// What the sensor reads before it is zeroed, N in the flange.
+    /// Bias of the sensor before zeroing, N in the flange.
     pub force_bias: Vector3<f64>,
     /// … of the torque, N·m in the flange.
     pub torque_bias: Vector3<f64>,
     /// What hangs on the flange: its centre in the flange, gravity in B.
     pub payload: Payload,
-    /// What its controller takes off for that.
-    pub told_payload: Payload,
+    /// Payload that its controller compensates.
+    pub configured_payload: Payload,
     /// From a command to the motion, s.
     pub command_latency: f64,
     /// How much older than its stamp the force is, s.
@@ -67,7 +67,7 @@ pub struct ArmParams {
     pub seed: u64,
 }
 
-/// Nothing hangs on the flange; the base stands upright.
+/// Nothing hangs on the flange; the base is upright.
 pub const WEIGHTLESS: Payload =
     Payload { mass: 0.0, p_sc: Vector3::new(0.0, 0.0, 0.0), gravity_o: Vector3::new(0.0, 0.0, -9.81) };
 
@@ -90,7 +90,7 @@ impl Default for ArmParams {
             force_bias: Vector3::new(0.4, -0.3, 1.1),
             torque_bias: Vector3::new(0.05, -0.08, 0.02),
             payload: WEIGHTLESS,
-            told_payload: WEIGHTLESS,
+            configured_payload: WEIGHTLESS,
             command_latency: 6e-3,
             force_latency: 4e-3,
             top_speed: 0.5,
@@ -114,7 +114,7 @@ impl ArmParams {
         up_to("the torque noise", self.torque_noise, "N·m", 100.0, "from zero to 100 N·m")?;
         not_negative("the bias of the force", self.force_bias.norm(), "N")?;
         not_negative("the bias of the torque", self.torque_bias.norm(), "N·m")?;
-        for payload in [&self.payload, &self.told_payload] {
+        for payload in [&self.payload, &self.configured_payload] {
             up_to("the payload", payload.mass, "kg", 100.0, "from zero to 100 kg")?;
             not_negative("the distance of the payload's centre", payload.p_sc.norm(), "m")?;
             not_negative("gravity", payload.gravity_o.norm(), "m/s²")?;
@@ -129,12 +129,12 @@ impl ArmParams {
     }
 }
 
-/// What goes wrong, when it is asked for.
+/// An injected fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ArmFault {
     /// No state comes any more; the arm stops when no command comes.
     LinkLost,
-    /// States come, and their stamps stand still; the arm stands.
+    /// States come with frozen stamps; the arm is at rest.
     ControllerKilled,
     /// Somebody presses the button.
     OperatorStop,
@@ -251,8 +251,8 @@ impl<'a> SimArm<'a> {
         self.time
     }
 
-    /// Since when it stands, s.
-    pub fn stands_since(&self) -> f64 {
+    /// Since when it is at rest, s.
+    pub fn at_rest_since(&self) -> f64 {
         self.moved_at
     }
 
@@ -336,10 +336,10 @@ impl<'a> SimArm<'a> {
                 (left * (next / distance), acceleration)
             }
             Command::Press { axis, force, feed, speed } => {
-                let felt = -self.felt().dot(&axis);
+                let force_along = -self.contact_force().dot(&axis);
                 let late = self.params.command_latency + self.params.force_latency + PERIOD;
                 let gain = 1.0 / (CALM * self.params.stiffness * late);
-                (axis * ((force - felt) * gain).clamp(-speed, speed) + feed, self.params.top_acceleration)
+                (axis * ((force - force_along) * gain).clamp(-speed, speed) + feed, self.params.top_acceleration)
             }
         }
     }
@@ -381,7 +381,7 @@ impl<'a> SimArm<'a> {
     }
 
     /// Force of the part as the sensor has it now, N in B.
-    fn felt(&self) -> Vector3<f64> {
+    fn contact_force(&self) -> Vector3<f64> {
         self.forces.front().copied().unwrap_or_default()
     }
 
@@ -390,7 +390,7 @@ impl<'a> SimArm<'a> {
         self.nominal.rotation * self.params.pose_ft.rotation.inverse()
     }
 
-    /// What the sensor has: contact, weight, bias and noise, in the axes of the flange about its origin.
+    /// Reading of the sensor: contact, weight, bias and noise, in the axes of the flange about its origin.
     fn read(&mut self) -> Wrench {
         let noise = Vector3::from_fn(|_, _| gauss(&mut self.rng)) * self.params.force_noise;
         let shaft = self.nominal.rotation * Vector3::z();
@@ -398,7 +398,7 @@ impl<'a> SimArm<'a> {
         let torque_noise = Vector3::from_fn(|_, _| gauss(&mut self.torque_rng)) * self.params.torque_noise;
         let ArmParams { payload, pose_ft, ball_offset, force_bias, torque_bias, .. } = &self.params;
         let r_bf = self.flange();
-        let (weight, contact) = (payload.weight_o(&r_bf), r_bf.inverse() * (self.felt() + spike));
+        let (weight, contact) = (payload.weight_o(&r_bf), r_bf.inverse() * (self.contact_force() + spike));
         let ball = pose_ft * Point3::from(*ball_offset);
         Wrench {
             force: contact + r_bf.inverse() * (weight.force + noise) + force_bias,
@@ -409,7 +409,7 @@ impl<'a> SimArm<'a> {
     /// What of a force the controller does not take for weight, N in the flange.
     fn unweighed(&self, raw: &Wrench) -> Vector3<f64> {
         let r_bf = self.flange();
-        raw.force - r_bf.inverse() * self.params.told_payload.weight_o(&r_bf).force
+        raw.force - r_bf.inverse() * self.params.configured_payload.weight_o(&r_bf).force
     }
 
     /// The joints that belong to the pose; the arm stops where there are none, or where they would have to jump.

@@ -11,7 +11,7 @@ const ROUNDS: usize = 40;
 const JOINS: usize = 40;
 /// A plane is broken by more than this, m.
 const BROKEN: f64 = REST / 4.0;
-/// Planes whose normals span less than this (determinant of their Gram matrix) count as parallel: one stands for all.
+/// Planes whose normals span less than this (determinant of their Gram matrix) count as parallel: one represents all.
 const PARALLEL: f64 = 1e-10;
 /// The ball has come to rest when a round moves it by less than this, m; and it may enter the surface by as much.
 const REST: f64 = 1e-12;
@@ -25,7 +25,7 @@ pub struct BallContact {
     pub point: Point3<f64>,
     /// From there to the centre of the ball, or out of the tip, unit vector in O: the contact normal, also on edges and corners.
     pub normal: Vector3<f64>,
-    /// How far the ball is held back along `normal` from where it was pushed, m.
+    /// Distance along `normal` by which the ball is held back from the guide, m.
     pub held_back: f64,
 }
 
@@ -37,7 +37,7 @@ struct ContactPlane {
     held_back: f64,
 }
 
-/// Where the ball rests, and which planes hold it back how far, m.
+/// Equilibrium of the ball, and penetration of the planes that hold it, m.
 type BallRest = (Point3<f64>, Vec<(usize, f64)>);
 
 /// Moves a ball from `from`, where it is free, towards `to`, and returns where it comes to rest: the point nearest to

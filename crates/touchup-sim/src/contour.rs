@@ -10,7 +10,7 @@ use touchup_core::mesh::{BoxQuery, FaceId, FaceTree, MeshError, TriMesh};
 
 /// Rounds of flipping, evening out and going back to the level.
 const ROUNDS: usize = 12;
-/// How far a vertex goes towards the middle of its neighbours in one round.
+/// Relaxation: share of the step towards the middle of its neighbours in one round.
 const EVEN: f64 = 0.5;
 /// A vertex may not tilt a face more than this (cosine) against the level's normal.
 const UPRIGHT: f64 = 0.3;
@@ -92,14 +92,14 @@ impl MeshDraft {
         for _ in 0..ROUNDS {
             let stars = self.stars();
             for (v, star) in stars.iter().enumerate() {
-                self.settle_mut(v as u32, star, field, side);
+                self.relax_mut(v as u32, star, field, side);
             }
             self.flip_mut();
         }
     }
 
     /// Moves a vertex onto the level, and along it towards the middle of its neighbours if no face turns over by that.
-    fn settle_mut(&mut self, vertex: u32, star: &[usize], field: &Field, side: f64) {
+    fn relax_mut(&mut self, vertex: u32, star: &[usize], field: &Field, side: f64) {
         let old = on_level(field, self.positions[vertex as usize], side);
         self.positions[vertex as usize] = old;
         let corners = star.iter().flat_map(|&face| self.faces[face]).filter(|&v| v != vertex);

@@ -1,4 +1,4 @@
-/// Why a simulation cannot be run as asked.
+/// Errors of the simulation's parameters.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SimError {
     /// A parameter outside its range.
@@ -29,7 +29,7 @@ pub enum SimError {
     /// A tip that cannot be.
     #[error(transparent)]
     Tip(#[from] touchup_core::touch::SettingError),
-    /// Nothing to follow.
+    /// The path is empty.
     #[error("the path has no point: give at least one stroke with two points")]
     EmptyPath,
     /// The scan would be larger than is sensible.

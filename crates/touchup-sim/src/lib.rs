@@ -1,6 +1,6 @@
 //! Known surfaces, a scanner and a stylus to test against.
 //!
-//! A [`Surface`] knows how far every point is from it. The scanner makes a bad mesh of one, the stylus slides a ball
+//! A [`Surface`] has a signed distance at every point. The scanner makes a bad mesh of one, the stylus slides a ball
 //! over it and records its contacts ([`touch`]). All randomness comes from a seed.
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
@@ -8,6 +8,7 @@ mod arm;
 mod ball;
 mod contour;
 pub mod coupled;
+mod drift;
 mod error;
 mod field;
 mod markers;
@@ -22,7 +23,6 @@ mod stylus;
 mod surface;
 mod tip;
 mod triangulate;
-mod wander;
 pub mod wavy;
 
 pub use arm::{ArmFault, ArmParams, SimArm, WEIGHTLESS};

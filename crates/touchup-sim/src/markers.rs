@@ -5,9 +5,9 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardUniform};
 use rand_pcg::Pcg64;
 
+use super::drift::gauss;
 use super::error::{SimError, positive, up_to};
 use super::stylus::{Moment, TICK};
-use super::wander::gauss;
 use touchup_core::touch::{MarkerBody, MarkerFrame, SeenMarker};
 
 /// The camera and how badly it sees.
@@ -63,7 +63,7 @@ impl CameraParams {
 const SPELL: [f64; 2] = [0.05, 0.3];
 /// How long all are hidden, s.
 const BLACKOUT: [f64; 2] = [0.01, 0.1];
-/// How far a reflection lies from its marker, m.
+/// Distance of a reflection from its marker, m.
 const REFLECTION: [f64; 2] = [1e-3, 50e-3];
 
 /// Until when something lasts.
@@ -141,10 +141,10 @@ pub fn see_markers(
     Ok(frames)
 }
 
-/// How far a marker is seen from where it is, m.
+/// Error of the position of a marker, m.
 fn seen_off(camera: &CameraParams, rng: &mut Pcg64) -> Vector3<f64> {
     let noise = Vector3::from_fn(|_, _| gauss(rng) * camera.noise);
-    let way = Vector3::from_fn(|_, _| gauss(rng)).try_normalize(0.0).unwrap_or_default();
+    let direction = Vector3::from_fn(|_, _| gauss(rng)).try_normalize(0.0).unwrap_or_default();
     let (is_outlier, distance) = (uniform(rng, [0.0, 1.0]) < camera.outliers, uniform(rng, REFLECTION));
-    if is_outlier { way * distance } else { noise }
+    if is_outlier { direction * distance } else { noise }
 }

@@ -33,7 +33,7 @@ pub struct RasterRegion {
     pub clear: f64,
 }
 
-/// Which way the lines of a raster run.
+/// Direction of the lines of a raster.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lines {
     /// along x of the region's frame
@@ -53,7 +53,7 @@ pub struct PathParams {
     pub speed: f64,
     /// Speed along walls, m/s.
     pub wall_speed: f64,
-    /// How far beyond the wall the hand aims when it runs along it, m.
+    /// Distance of the guide beyond the wall along which it runs, m.
     pub lean: f64,
     /// Longest time for the rasters of [`plan_mesh`], s; the pitch grows to keep it.
     pub longest: f64,
@@ -140,7 +140,7 @@ pub fn raster(region: &RasterRegion, lines: Lines, params: &PathParams) -> Resul
     ])
 }
 
-/// Runs once around the wall that stands along z over an outline, at each of the given heights of the ball's centre.
+/// Runs once around the wall along z over an outline, at each of the given heights of the ball's centre.
 ///
 /// - `inside`: along a hole or slot from within, else around a boss from without.
 /// - `heights`: z, m, in O; `clear`: z at which the ball is free, m, in O.
@@ -193,7 +193,7 @@ pub fn plan_demo(plate: &Plate, params: &PathParams) -> Result<Vec<Stroke>, SimE
     strokes.extend(raster(&region([step - 4e-3, 0.010], [step + 5e-3, 0.036]), Lines::AlongX, params)?);
     strokes.extend(raster(&region([step - 1e-3, 0.010], [step + 2e-3, 0.036]), Lines::AlongY, params)?);
     for (e, inside) in [(&plate.through, true), (&plate.blind, true), (&plate.slot, true), (&plate.boss, false)] {
-        // near the floor (the ball touches floor and wall at once), half way, and just below the rim
+        // near the floor (the ball touches floor and wall at once), halfway up, and just below the rim
         let heights = [e.low + 0.9 * params.radius, (e.low + e.high) / 2.0, e.high - params.radius / 2.0];
         strokes.extend(around_wall(&e.outline, inside, &heights, clear, params));
     }

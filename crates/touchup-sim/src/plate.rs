@@ -1,6 +1,6 @@
 //! A machined plate made by code, with an exact signed distance and its features as plain numbers.
 //!
-//! The plate lies on z = 0 with one corner in the origin. Every wall stands along z, so the boundary consists of three
+//! The plate lies on z = 0 with one corner in the origin. Every wall is parallel to z, so the boundary consists of three
 //! kinds of patch: rectangles with holes, lids, and walls above the outline of a [`PlateStadium`]. The distance is the
 //! smallest over all patches, each of which has a closed form; the sign comes from the cross-section at the height asked.
 
@@ -50,7 +50,7 @@ impl PlateStadium {
     }
 }
 
-/// A hole, slot or boss: what stands or is cut along z over the outline of a stadium.
+/// A hole, slot or boss: raised or cut along z over the outline of a stadium.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Extrusion {
     pub(super) outline: PlateStadium,
@@ -117,7 +117,7 @@ pub struct TruthFeature {
 pub struct Plate {
     /// length, width, height below the step; m
     pub(super) size: Vector3<f64>,
-    /// the step's riser stands here, m
+    /// x of the step's riser, m
     pub(super) step_x: f64,
     /// height beyond the step, m
     pub(super) step_z: f64,
@@ -239,7 +239,7 @@ enum BoundaryPatch {
     Flat { axis: usize, side: f64, level: f64, low: Point2<f64>, high: Point2<f64>, holes: Vec<PlateStadium> },
     /// A stadium at a height, its normal along +z.
     Lid { outline: PlateStadium, level: f64 },
-    /// What stands above an outline; `side`: +1 when the normal points away from the stadium.
+    /// The prism above an outline; `side`: +1 when the normal points away from the stadium.
     Wall { outline: PlateStadium, low: f64, high: f64, side: f64 },
 }
 

@@ -8,9 +8,9 @@ use super::plate::{Extrusion, Plate, PlateStadium};
 use super::triangulate::triangulate;
 use touchup_core::mesh::{MeshError, TriMesh};
 
-/// Fewest corners that stand for a circle: a square is the smallest polygon that keeps a hole open.
+/// Fewest corners of a circle: a square is the smallest polygon that keeps a hole open.
 const MIN_CORNERS: f64 = 4.0;
-/// Most corners that stand for a circle: more would only slow the ear cutting.
+/// Most corners of a circle: more would only slow the ear cutting.
 const MAX_CORNERS: f64 = 512.0;
 
 impl PlateStadium {

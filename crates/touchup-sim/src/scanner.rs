@@ -1,9 +1,9 @@
 //! A scanner that makes a bad mesh of a good surface.
 //!
 //! What it loses is lost on the signed distance, on a grid: a flat closing across the view fills holes that are too
-//! narrow, a blur rounds the edges, an offset makes the part too fat, a smooth random field makes it wavy. The level of
+//! narrow, a blur rounds the edges, an offset makes the part too large, a smooth random field makes it wavy. The level of
 //! such a field cannot cross itself, and its triangles keep to that. Then what cannot be seen goes, and the rest is
-//! misplaced.
+//! rigidly offset.
 
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, Unit, Vector3};
 use rand::SeedableRng;
@@ -11,11 +11,11 @@ use rand_distr::{Distribution, StandardUniform};
 use rand_pcg::Pcg64;
 
 use super::contour::{MeshDraft, contour};
+use super::drift::gauss;
 use super::error::{SimError, not_negative, positive};
 use super::field::Field;
 use super::path::looking_along;
 use super::surface::Surface;
-use super::wander::gauss;
 use touchup_core::mesh::TriMesh;
 
 /// How bad the scanner is.
@@ -29,16 +29,16 @@ pub struct ScannerParams {
     pub noise_correlation: f64,
     /// Share of the noise's power that is independent from vertex to vertex.
     pub white_share: f64,
-    /// How much too fat the part looks, m.
+    /// Surface offset: the part looks larger by this on all sides, m.
     pub bias: f64,
     /// Standard deviation of the blur that rounds the edges, m.
     pub rounding: f64,
     /// Holes and slots narrower than this are closed over, m; where only a little narrower the noise may open them.
     pub closes_holes_below: f64,
-    /// How far the scan is misplaced, m.
-    pub misplaced: f64,
+    /// Translation of the rigid offset of the scan, m.
+    pub rigid_shift: f64,
     /// And by which angle, rad.
-    pub misplaced_angle: f64,
+    pub rigid_turn: f64,
     /// Direction in which the scanner looks, in O.
     pub view: Unit<Vector3<f64>>,
     /// Whether what cannot be seen from the view direction is missing; otherwise the scan is closed.
@@ -58,8 +58,8 @@ impl Default for ScannerParams {
             bias: 0.3e-3,
             rounding: 0.8e-3,
             closes_holes_below: 11e-3,
-            misplaced: 0.2e-3,
-            misplaced_angle: 0.15f64.to_radians(),
+            rigid_shift: 0.2e-3,
+            rigid_turn: 0.15f64.to_radians(),
             view: -Vector3::z_axis(),
             open_back: true,
             seed: 1,
@@ -82,7 +82,7 @@ const COARSE: f64 = 0.1;
 /// Faces that look away from the scanner by more than this (cosine of the angle to the view) are not seen. Walls that
 /// stand along the view are: the scanner is moved about.
 const SEEN: f64 = -0.35;
-/// Patches of fewer faces do not stand alone: seen ones are dirt, unseen ones in between are filled in.
+/// Patches of fewer faces are removed where isolated: seen ones are dirt, unseen ones in between are filled in.
 const FEWEST_FACES: usize = 30;
 
 /// Rounds of repair and evening out; the second finds little, the third next to nothing.
@@ -99,8 +99,8 @@ impl ScannerParams {
         not_negative("the coloured share of the noise", 1.0 - self.white_share, "")?;
         not_negative("the rounding", self.rounding, "m")?;
         not_negative("the width of closed holes", self.closes_holes_below, "m")?;
-        not_negative("the misplacement", self.misplaced, "m")?;
-        not_negative("the misplacement's angle", self.misplaced_angle, "rad")?;
+        not_negative("the rigid shift", self.rigid_shift, "m")?;
+        not_negative("the rigid turn", self.rigid_turn, "rad")?;
         not_negative("the size of the bias", self.bias.abs(), "m")
     }
 
@@ -110,7 +110,7 @@ impl ScannerParams {
     }
 }
 
-/// Scans a surface as badly as asked; same parameters, same mesh.
+/// Scans a surface with the errors of `params`; same parameters, same mesh.
 ///
 /// # Errors
 /// [`SimError::BadParameter`]; [`SimError::TooFine`] when the grid would not fit; [`SimError::TooCoarse`] and
@@ -179,7 +179,7 @@ fn scanned_field(
     let (mean, deviation) = waves.spread(&mut field);
     let amplitude = params.noise * (1.0 - params.white_share).sqrt() / deviation;
     // far from the level the noise decides nothing
-    waves.visit(&mut field, band, |d, wave| *d -= params.bias + (wave - mean) * amplitude);
+    waves.for_each_near(&mut field, band, |d, wave| *d -= params.bias + (wave - mean) * amplitude);
     Ok(field)
 }
 
@@ -224,7 +224,7 @@ impl Waves {
     fn spread(&self, field: &mut Field) -> (f64, f64) {
         let mut found = Vec::new();
         let pitch = field.pitch;
-        self.visit(field, pitch, |_, wave| found.push(wave));
+        self.for_each_near(field, pitch, |_, wave| found.push(wave));
         let count = found.len().max(1) as f64;
         let mean = found.iter().sum::<f64>() / count;
         let variance = found.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / count;
@@ -232,7 +232,7 @@ impl Waves {
     }
 
     /// Calls `f(value of the field, sum of the waves)` for every node whose value is less than `level` from zero.
-    fn visit(&self, field: &mut Field, level: f64, mut f: impl FnMut(&mut f64, f64)) {
+    fn for_each_near(&self, field: &mut Field, level: f64, mut f: impl FnMut(&mut f64, f64)) {
         for (first, values) in field.runs_mut(RUN) {
             if values.iter().any(|value| value.abs() < level) {
                 let sums = self.along(&first);
@@ -246,7 +246,7 @@ impl Waves {
     }
 }
 
-/// Whether a face looks towards the scanner and nothing stands in between.
+/// Whether a face looks towards the scanner and nothing occludes it.
 fn is_seen(field: &Field, [a, b, c]: &[Point3<f64>; 3]) -> bool {
     let middle = Point3::from((a.coords + b.coords + c.coords) / 3.0);
     let Some(normal) = field.gradient(&middle).try_normalize(0.0) else { return false };
@@ -257,15 +257,15 @@ fn is_seen(field: &Field, [a, b, c]: &[Point3<f64>; 3]) -> bool {
     normal.z > SEEN && (0..steps).all(|i| field.at(&(start + Vector3::z() * (i as f64 * field.pitch))) > -field.pitch)
 }
 
-/// The motion by which the scan is misplaced, about the middle of the part.
+/// The rigid offset of the scan, about the middle of the part.
 fn slip(params: &ScannerParams, rng: &mut Pcg64) -> Isometry3<f64> {
     let mut direction = || Unit::new_normalize(Vector3::from_fn(|_, _| gauss(rng)));
-    let shift = Translation3::from(direction().into_inner() * params.misplaced);
-    let turn = Rotation3::from_axis_angle(&direction(), params.misplaced_angle);
+    let shift = Translation3::from(direction().into_inner() * params.rigid_shift);
+    let turn = Rotation3::from_axis_angle(&direction(), params.rigid_turn);
     Isometry3::from_parts(shift, turn.into())
 }
 
-/// How far a scan is from the surface it shows.
+/// Deviation of a scan from its surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScanQuality {
     /// how many triangles
@@ -290,7 +290,7 @@ const SAMPLES: [[f64; 3]; 4] = [
     [1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0],
 ];
 
-/// Measures a mesh against the surface it should show; every point counts by the area it stands for.
+/// Measures a mesh against the surface it should show; every point counts by the area it represents.
 ///
 /// - `within`: which points count, e.g. those of a touched region; the edges are those of all faces.
 /// - returns `None` when no point counts.

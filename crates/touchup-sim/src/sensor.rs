@@ -7,12 +7,12 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, Exp1, StandardUniform};
 use rand_pcg::Pcg64;
 
+use super::drift::{Drift, gauss};
 use super::error::{SimError, not_negative, up_to};
 use super::stylus::{Moment, TICK};
-use super::wander::{Wander, gauss};
 use touchup_core::touch::{Message, StampedPose, StampedWrench, Wrench};
 
-/// What the sensors and the wire add. All noise is root mean square.
+/// Errors of sensors and transport. All noise is root mean square.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SensorParams {
     /// Per axis, m.
@@ -107,12 +107,12 @@ const LATE: [f64; 2] = [5e-3, 15e-3];
 /// Length of gaps, s.
 const GAP: [f64; 2] = [5e-3, 60e-3];
 /// Period of the bias' drift, s.
-const DRIFT: f64 = 40.0;
+const DRIFT_PERIOD: f64 = 40.0;
 
 pub(super) struct Sensor<'a> {
     params: &'a SensorParams,
     stiffness: f64,
-    bias: [Wander; 3],
+    bias: [Drift; 3],
     rng: Pcg64,
 }
 
@@ -128,7 +128,7 @@ impl<'a> Sensor<'a> {
     pub(super) fn new(params: &'a SensorParams, stiffness: f64, seed: u64) -> Self {
         // a stream of its own, so that the hand moves the same whatever the sensors do
         let mut rng = Pcg64::seed_from_u64(seed ^ 0x5e75_0412_93ab_77c1);
-        let bias = [(); 3].map(|()| Wander::new(DRIFT, &mut rng));
+        let bias = [(); 3].map(|()| Drift::new(DRIFT_PERIOD, &mut rng));
         Self { params, stiffness, bias, rng }
     }
 

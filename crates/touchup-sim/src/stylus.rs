@@ -1,4 +1,4 @@
-//! A hand-held stylus: a tip led over a rigid surface, and what its sensors say.
+//! A hand-held stylus: a tip led over a rigid surface, and its sensor readings.
 //!
 //! The hand pulls the tip, a ball unless said otherwise, along [`Stroke`]s, presses, slows where it is blocked and climbs
 //! out of what it fell into. The tip does not enter the part ([`super::push_ball`]); what holds it back gives the direction of the force, the hand gives
@@ -10,12 +10,12 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64;
 
 use super::ball::BallContact;
+use super::drift::Drift;
 use super::error::{SimError, not_negative, positive, up_to};
 use super::path::Stroke;
 use super::sensor::{Sensor, SensorParams};
 use super::surface::Surface;
 use super::tip::SimTip;
-use super::wander::Wander;
 use touchup_core::touch::{Message, TipShape};
 
 /// The stylus and the hand that leads it.
@@ -37,9 +37,9 @@ pub struct StylusParams {
     pub force_range: [f64; 2],
     /// Root mean square of the shaft's tilt about each of two axes, rad.
     pub tilt: f64,
-    /// Root mean square of how far the hand strays from its line, per axis, m.
+    /// Root mean square deviation of the hand from its line, per axis, m.
     pub stray: f64,
-    /// What the sensors and the wire add.
+    /// Errors of sensors and transport.
     pub sensor: SensorParams,
 }
 
@@ -127,16 +127,16 @@ const PATIENCE_FACTOR: f64 = 2.0;
 
 /// Slow motions of the hand.
 struct Hand {
-    force: Wander,
-    tilt: [Wander; 3],
-    stray: [Wander; 3],
+    force: Drift,
+    tilt: [Drift; 3],
+    stray: [Drift; 3],
 }
 
 impl Hand {
     fn new(seed: u64) -> Self {
         let mut rng = Pcg64::seed_from_u64(seed);
-        let mut wander = |period: f64| Wander::new(period, &mut rng);
-        Self { force: wander(1.0), tilt: [(); 3].map(|()| wander(4.0)), stray: [(); 3].map(|()| wander(1.5)) }
+        let mut drift = |period: f64| Drift::new(period, &mut rng);
+        Self { force: drift(1.0), tilt: [(); 3].map(|()| drift(4.0)), stray: [(); 3].map(|()| drift(1.5)) }
     }
 
     fn stray(&self, t: f64) -> Vector3<f64> {
@@ -159,7 +159,7 @@ struct Leading<'a> {
 
 /// Leads a ball along `path` over `surface` and records what the stylus reports.
 ///
-/// Starts at the path's first point. The shaft stands against the first direction of pressing (along z when there is
+/// Starts at the path's first point. The shaft is opposite to the first direction of pressing (along z when there is
 /// none), give or take the tilt. Same surface, path, parameters and seed give the same messages.
 ///
 /// # Errors

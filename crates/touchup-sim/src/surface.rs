@@ -1,4 +1,4 @@
-//! What every known surface answers: how far away it is, and where it is closest.
+//! The queries of a known surface: signed distance and closest point.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -56,7 +56,7 @@ impl Bounds {
 
 /// A surface that is known exactly, with material behind it.
 ///
-/// The distance of a point that is not finite is NaN, and so is what is closest to it.
+/// The distance of a point that is not finite is NaN, and so is its closest point.
 pub trait Surface {
     /// Distance to the surface, m; positive outside the material, negative inside.
     fn signed_distance(&self, p: &Point3<f64>) -> f64;

@@ -55,7 +55,7 @@ pub fn plate(faces: usize, side: f64) -> Result<TriMesh, MeshError> {
 
 /// Sample `i` of a raster over the middle of the plate of [`SIDE`], at 50 mm/s and 1 kHz.
 ///
-/// - `width`: of the raster, m; it begins anew where that is done.
+/// - `width`: of the raster, m; it starts over at its end.
 pub fn slide(i: usize, width: f64) -> Sample {
     slide_on(SIDE, i, width)
 }
@@ -71,8 +71,8 @@ pub fn slide_on(side: f64, i: usize, width: f64) -> Sample {
 /// Where the ball touches the part at sample `i` of [`slide_on`], m, and the outward normal there.
 pub fn contact_on(side: f64, i: usize, width: f64) -> (Point3<f64>, Vector3<f64>) {
     let length = 0.8 * side;
-    let way = SPEED * i as f64 * STEP_NS as f64 * 1e-9;
-    let (line, along) = ((way / length).floor(), way % length);
+    let travel = SPEED * i as f64 * STEP_NS as f64 * 1e-9;
+    let (line, along) = ((travel / length).floor(), travel % length);
     let x = 0.1 * side + if line % 2.0 == 0.0 { along } else { length - along };
     let y = 0.1 * side + (line * LINE) % width;
     let slope = 1e-6;

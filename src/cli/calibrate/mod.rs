@@ -1,4 +1,4 @@
-//! `touchup calibrate`: what the scene must know of scan, sensor and tip, found and written into it.
+//! `touchup calibrate`: parameters of scan, sensor and tip, identified and written into the scene.
 
 mod payload;
 mod payload_by_arm;
@@ -26,11 +26,11 @@ use crate::touch::{Placement, Sample};
 pub(super) enum CalibrateArguments {
     /// Where the scan lies in the frame of the recorded poses, from points picked on both
     Scan(scan::ScanArguments),
-    /// Weight, centre of mass and bias of the sensor, from still poses in free air: of a recording, or of an arm
+    /// Weight, centre of mass and bias of the sensor, from static segments in free air: of a recording, or of an arm
     Payload(payload::PayloadArguments),
     /// The centre of the ball: in the tracked stylus, from a swing about it; in the flange of an arm, from touches of one spot
     Tip(tip::TipArguments),
-    /// How far arm and probe give way, from presses of an arm on one spot
+    /// Compliance of arm and probe, from presses of an arm on one spot
     Stiffness(stiffness::StiffnessArguments),
 }
 
@@ -44,13 +44,13 @@ pub(super) fn calibrate(arguments: &CalibrateArguments) -> Result<Losses, CliErr
     }
 }
 
-/// Why a calibration with an arm has no scene to begin with.
-const NO_SCENE: &str = "--scene is needed: it says where the arm stands and what it must never leave";
+/// Error of a calibration with an arm but without a scene.
+const NO_SCENE: &str = "--scene is needed: it has the pose of the arm's base and the volume that it must never leave";
 
-/// What is written, and how it is printed.
+/// Where the result goes, and how it is printed.
 #[derive(Debug, Args)]
 struct CalibrationTarget {
-    /// The scene to put the result into: all else in it stays as it was written. Left out: a new file
+    /// The scene to put the result into: all else in it stays as written. Default: a new file
     #[arg(long, value_name = "YAML")]
     scene: Option<PathBuf>,
     /// Where the scene goes; may be the one that --scene names
@@ -115,16 +115,16 @@ impl CalibrationTarget {
     }
 }
 
-/// How the result came about, as comments above it.
+/// The source of the result, as comments above it.
 fn new_file(found: &impl std::fmt::Display) -> String {
     let lines = format!("Made by `touchup calibrate`; one section of a scene: put it into yours.\n\n{found}");
     lines.lines().map(|line| format!("# {line}").trim_end().to_owned()).collect::<Vec<_>>().join("\n")
 }
 
-/// What a calibration does to the scene.
+/// The change of the scene by a calibration.
 struct Change {
     settings: Vec<Setting>,
-    /// how it came about, in one line
+    /// its source, in one line
     remark: String,
     /// the scene with it
     expected: Scene,

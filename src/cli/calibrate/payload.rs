@@ -1,4 +1,4 @@
-//! `touchup calibrate payload`: what hangs on the sensor, from still poses of a recording; with an arm: `payload_by_arm`.
+//! `touchup calibrate payload`: payload identification, from static segments of a recording; with an arm: `payload_by_arm`.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -32,7 +32,7 @@ pub(in crate::cli) struct PayloadArguments {
     pub(super) cell: CellArguments,
     #[command(flatten)]
     pub(super) truth_payload: TruePayload,
-    /// In whose axes the wrench is; left out: as the recording says, or the sensor's for --samples
+    /// Axes of the wrench; default: those of the recording, or the sensor's for --samples
     #[arg(long, value_name = "AXES", conflicts_with = "robot")]
     wrench_axes: Option<Axes>,
     /// Acceleration of gravity, by which the weight is divided
@@ -52,7 +52,7 @@ enum Axes {
     Pose,
 }
 
-/// A residual so many times what the noise explains has another cause.
+/// A residual over this many times the noise has another cause.
 const UNEXPLAINED: f64 = 5.0;
 
 /// The verb.
@@ -80,7 +80,7 @@ pub(super) fn payload(arguments: &PayloadArguments) -> Result<Losses, CliError> 
     Ok(losses)
 }
 
-/// - `besides`: what else may be the cause.
+/// - `besides`: other possible causes.
 pub(super) fn warn_of_residuals(fit: &PayloadFit, besides: &str) {
     if let Some(expected) = fit.expected_force.filter(|expected| fit.rms_force > UNEXPLAINED * expected) {
         warn!(
@@ -117,7 +117,7 @@ pub(super) struct PayloadFound {
     /// whose axes are those of the sensor, and whose those of the poses
     #[serde(skip)]
     axes: [&'static str; 2],
-    pub still_phases: usize,
+    pub static_segments: usize,
     /// those that did not fit, from 0 on
     left_out: Vec<usize>,
     tilt_deg: f64,
@@ -133,7 +133,7 @@ pub(super) struct PayloadFound {
     bias_torque_nm: Vector,
     pub residual_force_n: f64,
     pub residual_torque_nm: f64,
-    /// what the noise of the sensor lets expect
+    /// expected from the noise of the sensor
     expected_residual_n: Option<f64>,
 }
 
@@ -144,7 +144,7 @@ impl PayloadFound {
         let [weight, sigma] = fit.weight;
         Self {
             axes,
-            still_phases: fit.poses,
+            static_segments: fit.poses,
             left_out: fit.rejected.clone(),
             tilt_deg: fit.tilt.to_degrees(),
             weight_n: weight,
@@ -182,8 +182,8 @@ impl PayloadFound {
         compensation.payload = Some(PayloadSection { gravity_axes: GravityAxes::Space, payload });
         compensation.bias = Some(SensorBias { force: force_n.into(), torque: torque_nm.into() });
         let remark = format!(
-            "payload: {} still phases, residuals {:.3} N and {:.4} N·m rms",
-            self.still_phases, self.residual_force_n, self.residual_torque_nm
+            "payload: {} static segments, residuals {:.3} N and {:.4} N·m rms",
+            self.static_segments, self.residual_force_n, self.residual_torque_nm
         );
         Change { settings, remark, expected }
     }
@@ -193,8 +193,8 @@ impl fmt::Display for PayloadFound {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let down = Vector3::from(self.gravity_m_per_s2);
         let [x, y, z]: [f64; 3] = (down / down.norm()).into();
-        let (phases, left_out, tilt) = (self.still_phases, self.left_out.len(), self.tilt_deg);
-        writeln!(f, "still phases: {phases}, left out: {left_out}; tilted by {tilt:.0}° or more about every axis")?;
+        let (phases, left_out, tilt) = (self.static_segments, self.left_out.len(), self.tilt_deg);
+        writeln!(f, "static segments: {phases}, left out: {left_out}; tilted by {tilt:.0}° or more about every axis")?;
         writeln!(f, "weight      {:.4} ± {:.4} N", self.weight_n, self.weight_std_n)?;
         writeln!(f, "mass        {:.5} ± {:.5} kg", self.mass_kg, self.mass_std_kg)?;
         let [of_sensor, of_poses] = self.axes;

@@ -1,6 +1,6 @@
-//! `touchup calibrate payload --robot`: what hangs on the flange, weighed by the arm itself.
+//! `touchup calibrate payload --robot`: payload identification by the arm itself.
 //!
-//! The controller of an arm takes the weight off by itself, by the payload set there. So what is found goes where that is set:
+//! The controller of an arm compensates the weight of the payload set there. So the result goes to its parameters:
 //! `robot.payload_kg` and `robot.payload_centre_mm`. The bias is only printed: a sensor is zeroed before each touch.
 
 use std::fmt;
@@ -28,13 +28,13 @@ pub(super) fn payload(arguments: &PayloadArguments, robot: RobotName) -> Result<
     ready.may_move()?;
     let measuring = WorkProgress::stage("identify the payload");
     let truth = |arm| truth_payload.held_by(arm, &ready.scene);
-    let Weighed { rests, not_reached } = cell.with(robot, &ready, truth, |arm| {
-        let mut world = ready.still_world();
+    let Weighed { rests: segments, not_reached } = cell.with(robot, &ready, truth, |arm| {
+        let mut world = ready.static_world();
         let mut prober = Prober::new(arm, &ready.cell, &ready.params, &mut world);
         prober.weigh().map_err(|error| CliError::Arm(error.to_string()))
     })?;
     drop(measuring);
-    let poses: Vec<StaticPose> = rests.iter().map(static_pose).collect();
+    let poses: Vec<StaticPose> = segments.iter().map(static_pose).collect();
     let params = PayloadParams { gravity: arguments.gravity_m_per_s2, ..PayloadParams::default() };
     let fit = fit_payload(&poses, &params).map_err(|error| CliError::Arm(advice(&error)))?;
     warn_of_residuals(&fit, "does a hose pull, ");
@@ -55,14 +55,14 @@ fn advice(error: &PayloadError) -> String {
     match error {
         PayloadError::WrongAxes { rms_n, other_rms_n, .. } => format!(
             "the raw wrench of this arm is not in the axes of its flange: residuals are {rms_n:.3} N, and {other_rms_n:.3} N in \
-             those of its base; its payload has to be weighed another way"
+             those of its base; identify its payload from a recording or a scale"
         ),
         PayloadError::NoWeight { weight_n, sigma_n } => format!(
             "the weight is {weight_n:.3} N, no more than three times its uncertainty of {sigma_n:.3} N: nothing hangs on the \
              flange, or the arm reports no raw wrench"
         ),
         PayloadError::Inconsistent { rejected, poses } => format!(
-            "{rejected} of {poses} rests do not fit the others: the probe must touch nothing, and no hose or cable may pull it"
+            "{rejected} of {poses} static segments do not fit the others: the probe must touch nothing, and no hose or cable may pull it"
         ),
         error => error.to_string(),
     }
@@ -73,13 +73,13 @@ fn advice(error: &PayloadError) -> String {
 struct WeighedFound {
     #[serde(flatten)]
     payload: PayloadFound,
-    /// orientations that the arm does not get to, and why
+    /// unreachable orientations, and why
     not_reached: Vec<String>,
 }
 
 impl WeighedFound {
     fn change(&self, draft: &DraftScene) -> Change {
-        let PayloadFound { still_phases, residual_force_n, residual_torque_nm, .. } = self.payload;
+        let PayloadFound { static_segments, residual_force_n, residual_torque_nm, .. } = self.payload;
         let payload_kg = rounded(self.payload.mass_kg, 10);
         let payload_centre_mm = self.payload.centre_mm.value.map(|mm| rounded(mm, 7));
         let mut expected = draft.scene.clone();
@@ -91,7 +91,7 @@ impl WeighedFound {
                 Setting::list(&["robot", "payload_centre_mm"], &payload_centre_mm),
             ],
             remark: format!(
-                "payload: {still_phases} orientations, residuals {residual_force_n:.3} N and {residual_torque_nm:.4} N·m rms"
+                "payload: {static_segments} orientations, residuals {residual_force_n:.3} N and {residual_torque_nm:.4} N·m rms"
             ),
             expected,
         }

@@ -22,11 +22,11 @@ pub(in crate::cli) struct ScanArguments {
     /// sigma_mm
     #[arg(long, value_name = "CSV")]
     pairs: PathBuf,
-    /// A recording in which the stylus rests on each point for a second, in the order of the file, which then needs no
+    /// A recording in which the stylus dwells on each point for a second, in the order of the file, which then needs no
     /// columns of space
     #[arg(long, value_name = "RECORDING")]
     bag: Option<PathBuf>,
-    /// Standard deviation of a pair per axis, mm; left out: found from the residuals
+    /// Standard deviation of a pair per axis, mm; default: from the residuals
     #[arg(long, value_name = "S")]
     sigma_mm: Option<f64>,
     #[command(flatten)]
@@ -55,7 +55,7 @@ pub(super) fn scan(arguments: &ScanArguments) -> Result<Losses, CliError> {
 }
 
 impl ScanArguments {
-    /// The points of the file, each with the place where the stylus rested.
+    /// The points of the file, each with the place where the stylus dwelled.
     fn touched_pairs(&self, bag: &Path, draft: &DraftScene) -> Result<(PairsFile, Losses), CliError> {
         check_kept("--bag", bag, &self.target.out)?;
         let mut file = read_scan_points(&self.pairs)?;
@@ -74,12 +74,12 @@ impl ScanArguments {
         let replayed = self.source.replay(recording, &scene, |sample| {
             contacts.observe(sample).into_iter().for_each(|contact| finder.push(contact));
         })?;
-        let rests = finder.finish();
-        if rests.len() != file.pairs.len() {
-            let (found, wanted) = (rests.len(), file.pairs.len());
-            return Err(CliError::Rests { path: bag.to_owned(), found, wanted });
+        let segments = finder.finish();
+        if segments.len() != file.pairs.len() {
+            let (found, wanted) = (segments.len(), file.pairs.len());
+            return Err(CliError::Dwells { path: bag.to_owned(), found, wanted });
         }
-        for (pair, rest) in file.pairs.iter_mut().zip(rests) {
+        for (pair, rest) in file.pairs.iter_mut().zip(segments) {
             pair.to = rest.point;
         }
         Ok((file, replayed.losses))
@@ -92,7 +92,7 @@ fn warn_of_gravity(scene: &Scene) {
     if payload.is_some_and(|payload| payload.gravity_axes == GravityAxes::Object && payload.payload.mass > 0.0) {
         warn!(
             "compensation.payload.gravity_m_per_s2 stays in the axes of the scan: see that it points down there, or calibrate \
-             the payload anew, which names it in those of space"
+             the payload again, which names it in those of space"
         );
     }
 }

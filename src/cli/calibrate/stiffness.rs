@@ -1,4 +1,4 @@
-//! `touchup calibrate stiffness`: how far arm and probe give way, from presses on one spot.
+//! `touchup calibrate stiffness`: compliance of arm and probe, from presses on one spot.
 
 use std::fmt;
 
@@ -19,7 +19,7 @@ pub(in crate::cli) struct StiffnessArguments {
     /// A flat place of a stiff part with nothing within 15 mm, in the frame of the scan, mm
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     spot: String,
-    /// How often it is pressed
+    /// Number of presses
     #[arg(long, value_name = "N", default_value_t = 10)]
     touches: usize,
     #[command(flatten)]

@@ -16,7 +16,7 @@ use crate::scene::{Scene, Setting};
 #[derive(Debug, Args)]
 #[group(id = "swing", required = true, multiple = false, args = ["bag", "robot"])]
 pub(in crate::cli) struct TipArguments {
-    /// A recording in which the ball rests in a cone or divot while the stylus is swung to all sides
+    /// A recording in which the ball sits in a cone or divot while the stylus is swung to all sides
     #[arg(long, value_name = "RECORDING", conflicts_with_all = ["cell", "spot", "truth_tip_mm"])]
     bag: Option<PathBuf>,
     /// An arm that touches --spot with its probe leaning to all sides; it needs --scene
@@ -27,7 +27,7 @@ pub(in crate::cli) struct TipArguments {
     /// With --robot: a flat place of the part with nothing within 20 mm, in the frame of the scan, mm
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub(super) spot: Option<String>,
-    /// Where the ball of a simulated arm really is in the flange, mm; left out: robot.tip_position_mm of the scene
+    /// True position of the ball of a simulated arm in the flange, mm; default: robot.tip_position_mm of the scene
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub(super) truth_tip_mm: Option<String>,
     #[command(flatten)]
@@ -91,10 +91,10 @@ struct TipFound {
     swing_deg: f64,
     /// in the axes of the recorded pose
     offset_mm: Vector,
-    /// where the ball rested, in the frame of the poses
+    /// centre of the resting ball, in the frame of the poses
     rest_mm: Vector,
     residual_mm: f64,
-    /// number of independent poses that hold as much information
+    /// number of independent poses with the same information
     correlation: f64,
 }
 

@@ -34,7 +34,7 @@ pub(super) fn tip(arguments: &TipArguments, robot: RobotName, spot: &str) -> Res
         Ok(ArmParams { ball_offset: arm.pose_ft.rotation.inverse() * off, ..arm })
     };
     let Pivoted { poses_bf, normal_b, not_reached } = cell.with(robot, &ready, truth, |arm| {
-        let mut world = ready.still_world();
+        let mut world = ready.static_world();
         let mut prober = Prober::new(arm, &ready.cell, &ready.params, &mut world);
         prober.pivot(&place).map_err(|error| CliError::Arm(error.to_string()))
     })?;
@@ -51,10 +51,10 @@ struct PivotFound {
     touches: usize,
     /// centre of the ball in the flange
     tip_position_mm: Vector,
-    /// from where the scene had it, in the flange
+    /// correction to the scene, in the flange
     moved_mm: [f64; 3],
     residual_mm: f64,
-    /// orientations that the arm does not get to, and why
+    /// unreachable orientations, and why
     not_reached: Vec<String>,
 }
 

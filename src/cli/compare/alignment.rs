@@ -71,7 +71,7 @@ struct Explained {
     agreeing_share: Option<f64>,
 }
 
-/// Where a pair is off: truth − moved mesh.
+/// Residual of a pair: truth − moved mesh.
 #[derive(Debug, Serialize)]
 struct Residual {
     pair: String,
@@ -79,7 +79,7 @@ struct Residual {
     distance_mm: f64,
 }
 
-/// A motion that nothing holds: a shift along and a turn about a point.
+/// An unconstrained motion: a shift along and a turn about a point.
 #[derive(Debug, Serialize)]
 struct Loose {
     /// of the point `about_mm`, times any length
@@ -122,7 +122,7 @@ struct Choice {
 
 type Aligned = Result<(Isometry3<f64>, Alignment), CliError>;
 
-/// The motion that brings `mesh` onto the truth from roughly in place, and what is said of it.
+/// The motion that brings `mesh` onto the truth from roughly in place, and its report.
 ///
 /// # Errors
 /// [`CliError::Align`].
@@ -299,7 +299,7 @@ impl Alignment {
         }
     }
 
-    /// How it was aligned, and how well that fits.
+    /// The method and the residuals of the alignment.
     pub(super) fn in_short(&self) -> String {
         let rms = self.rms_mm.map_or_else(String::new, |rms_mm| format!(", rms {rms_mm:.4} mm"));
         format!("aligned by {}{rms}", self.method)

@@ -14,7 +14,7 @@ pub(super) struct ComparisonReport {
     density_per_mm2: f64,
     /// of the true surface, which the mesh does not show: never scanned, or missing
     unseen_share: f64,
-    /// all, touched, guessed, untouched, as far as they are there
+    /// all, touched, guessed, untouched, where present
     regions: Vec<DeviationRow>,
 }
 
@@ -120,13 +120,13 @@ fn name_of(region: Option<SupportRegion>) -> &'static str {
     }
 }
 
-/// What a picture says in numbers: of the touched part where there is one, else of all.
+/// The numbers of a picture: of the touched part where there is one, else of all.
 pub(super) fn shown(comparison: &Comparison) -> Option<&RegionComparison> {
     let touched = comparison.regions.iter().find(|part| part.region == Some(SupportRegion::Touched));
     touched.or(comparison.regions.first())
 }
 
-/// What stands below a picture: how far that is off, and how much of it is within tolerance.
+/// Caption of a picture: the deviation, and the share within tolerance.
 pub(super) fn note(comparison: &Comparison, tolerance_mm: Option<f64>) -> String {
     let Some(part) = shown(comparison) else { return String::new() };
     let Some(Summary { mean, p95, .. }) = part.mesh_to_truth else { return String::new() };
@@ -139,7 +139,7 @@ pub(super) fn note(comparison: &Comparison, tolerance_mm: Option<f64>) -> String
 const HEAD: &str = "                            mean      rms   median      p95      p99      max     bias    points";
 
 impl CompareReport {
-    /// How far the mesh is off, where it was touched if it says so, and what it was before.
+    /// Deviation of the mesh, of the touched part where known, and of the mesh before.
     fn verdict(&self) -> String {
         let part = |comparison: &'_ ComparisonReport, region: &str| {
             let row = comparison.regions.iter().find(|row| row.region == region)?;

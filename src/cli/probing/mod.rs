@@ -1,4 +1,5 @@
-//! What `touchup probe` and `touchup demo --robot sim` share: features are probed while the mesh follows, and all is written down.
+//! What `touchup probe` and `touchup demo --robot sim` share: features are probed while the mesh follows, and all results are
+//! written.
 
 mod picture;
 mod report;
@@ -36,19 +37,19 @@ const BASE_FRAME: &str = "base";
 /// Frame of the wrenches: the probe's own.
 const PROBE_FRAME: &str = "probe";
 
-/// What is probed, where, and where it is written down.
+/// The features to probe, the cell, and the output files.
 pub(super) struct Probing<'a> {
     /// with `robot`
     pub scene: &'a Path,
     pub scan: &'a Path,
     pub unit: MeshUnit,
     pub flags: &'a [Flag],
-    /// the arm waits for whoever looks on; one that exists does not
+    /// the simulated arm waits for viewers; a real one does not
     pub is_simulated: bool,
     pub out: &'a Path,
 }
 
-/// A probing that is ready to begin.
+/// A prepared probing.
 pub(super) struct Ready {
     pub cell: Cell,
     pub params: ProbeParams,
@@ -56,14 +57,14 @@ pub(super) struct Ready {
     mesh: TriMesh,
 }
 
-/// What became of it.
+/// Its results.
 pub(super) struct Done {
     pub summary: ProbingSummary,
     pub probed: Vec<Probed>,
     pub losses: Losses,
 }
 
-const NO_ROBOT: &str = "the scene names no `robot`, so nobody knows where the arm stands and what it must never leave: add \
+const NO_ROBOT: &str = "the scene names no `robot`, so the pose of the arm's base and its allowed volume are unknown: add \
                         `robot:` to it (config/probe.yaml is an example)";
 
 /// Set where the controller is a simulation whose clock waits for its client: docs/ur.md.
@@ -112,12 +113,12 @@ impl Ready {
         ArmParams { seed, ..simulated_arm(&self.cell, &self.params) }
     }
 
-    /// The scan as it is.
-    pub fn still_world(&self) -> StillWorld {
+    /// The scan, unchanged during probing.
+    pub fn static_world(&self) -> StillWorld {
         StillWorld::new(self.mesh.clone())
     }
 
-    /// Half width within which the scene wants numbers to be known, mm.
+    /// Target half width of the scene, mm.
     pub fn tolerance_mm(&self) -> f64 {
         self.scene.robot.as_ref().map_or(f64::NAN, |robot| robot.tolerance * 1e3)
     }
@@ -142,11 +143,11 @@ impl Probing<'_> {
         Ok(ready)
     }
 
-    /// Plans all, and draws the plan; nothing moves.
+    /// Plans all touches and draws the plan; nothing moves.
     pub fn planned(&self, ready: &Ready, arm: &mut dyn Arm) -> Result<Vec<Plan>, CliError> {
         let _planning = WorkProgress::stage("plan");
         let now = arm.next_state().map_err(|error| CliError::Arm(error.to_string()))?;
-        let world = ready.still_world();
+        let world = ready.static_world();
         let plan_of = |flag: &Flag| {
             plan(&ready.cell, &ready.params, &world, flag, &now).map_err(|error| CliError::Explore(flag.id, error))
         };
@@ -155,7 +156,7 @@ impl Probing<'_> {
         Ok(plans)
     }
 
-    /// Probes all flags, in their order, and writes everything down. A stop of the arm ends it; what was measured until then is
+    /// Probes all flags, in their order, and writes all results. A stop of the arm ends it; what was measured until then is
     /// written.
     pub fn done(&self, ready: &Ready, arm: &mut dyn Arm) -> Result<Done, CliError> {
         let scan = Arc::new((ready.mesh.clone(), FaceTree::new(&ready.mesh)));

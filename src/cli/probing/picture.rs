@@ -1,4 +1,4 @@
-//! Pictures of the way that an arm would go, and of the touches that it made.
+//! Pictures of the path that an arm would follow, and of the touches that it made.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use crate::probe::{Flag, Plan, Probed};
 
 const PART: Rgb = [206, 209, 214];
 const FLAG: Rgb = [20, 20, 20];
-const WAY: Rgb = [110, 170, 220];
+const PATH: Rgb = [110, 170, 220];
 const SEARCH: Rgb = [0, 80, 160];
 const HELD_BACK: Rgb = [213, 94, 0];
 const TOUCHED: Rgb = [0, 114, 178];
@@ -23,7 +23,7 @@ const LINE: f64 = 0.0012;
 const PLACE: f64 = 0.005;
 /// A flag is a pin of this height, over the same.
 const PIN: f64 = 0.13;
-/// From where it is seen.
+/// Direction of view.
 const FROM: [f64; 3] = [-0.45, -0.75, 1.0];
 
 fn diagonal(mesh: &TriMesh) -> f64 {
@@ -59,19 +59,19 @@ fn flagged(drawing: &mut DrawnMesh, flags: &[Flag], size: f64) {
     }
 }
 
-/// The scan with the way that the arm would go.
+/// The scan with the planned path of the arm.
 pub(super) fn draw_plan(scan: &TriMesh, plans: &[Plan], flags: &[Flag], path: &Path) -> Result<(), CliError> {
     let size = diagonal(scan);
     let mut drawing = DrawnMesh::of(scan, PART);
     for plan in plans {
         for pair in plan.path.windows(2) {
-            drawing.line(&pair[0], &pair[1], LINE * size, WAY);
+            drawing.line(&pair[0], &pair[1], LINE * size, PATH);
         }
-        for (number, wish) in plan.wishes.iter().enumerate() {
+        for (number, planned) in plan.wishes.iter().enumerate() {
             let is_held_back = plan.held_back.iter().any(|(at, _)| *at == number);
             let colour = if is_held_back { HELD_BACK } else { SEARCH };
-            let end: Point3<f64> = wish.from + wish.direction.into_inner() * wish.search;
-            drawing.line(&wish.from, &end, LINE * size, colour);
+            let end: Point3<f64> = planned.from + planned.direction.into_inner() * planned.search;
+            drawing.line(&planned.from, &end, LINE * size, colour);
         }
     }
     flagged(&mut drawing, flags, size);
@@ -79,14 +79,14 @@ pub(super) fn draw_plan(scan: &TriMesh, plans: &[Plan], flags: &[Flag], path: &P
     let note = format!("{touches} touches if the part is as the scan has it");
     let legend = [
         (FLAG, "flag"),
-        (WAY, "way through free air"),
+        (PATH, "path through free air"),
         (SEARCH, "search for the surface"),
         (HELD_BACK, "cannot be reached"),
     ];
     write(&[(drawing, "the scan", note)], "what the arm would do", &legend, path)
 }
 
-/// The refined mesh with the touches that were made.
+/// The refined mesh with the touches.
 pub(super) fn draw_touches(mesh: &TriMesh, probed: &[Probed], flags: &[Flag], path: &Path) -> Result<(), CliError> {
     let size = diagonal(mesh);
     let mut drawing = DrawnMesh::of(mesh, PART);
@@ -125,7 +125,7 @@ mod tests {
 
     #[test]
     fn states_are_apart_without_red_and_green() {
-        assert!(least_difference(&[PART, FLAG, WAY, SEARCH, HELD_BACK]) > 23.0);
+        assert!(least_difference(&[PART, FLAG, PATH, SEARCH, HELD_BACK]) > 23.0);
         assert!(least_difference(&[PART, FLAG, TOUCHED, MISS, REFUSED]) > 23.0);
     }
 }

@@ -1,4 +1,4 @@
-//! What was probed, as a table, as JSON, and touch by touch.
+//! Probing results, as a table, as JSON, and touch by touch.
 
 use std::fmt;
 use std::io::Write;
@@ -46,7 +46,7 @@ struct ProbedRecord {
 /// One slide.
 #[derive(Clone, Debug, Serialize)]
 struct SlideRecordOfFile {
-    /// how it ended, or why it was not made
+    /// its outcome, or why it was not made
     ending: String,
     length_mm: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -58,7 +58,7 @@ struct SlideRecordOfFile {
 struct SlideForces {
     duration_s: f64,
     mean_force_n: f64,
-    /// how far the mean of a tenth of a second was from what was set, at most
+    /// largest deviation of the mean over a tenth of a second from the set force
     worst_force_error_n: f64,
     largest_force_n: f64,
 }

@@ -13,10 +13,10 @@ use crate::robot::{ArmState, Witness};
 use crate::scene::Scene;
 use crate::touch::{Message, Sample, StampedPose, StampedWrench, Wrench, WrenchFrame};
 
-/// Room for new faces that is made ahead.
+/// Room reserved for new faces.
 const ROOM: usize = 1 << 16;
 
-/// The mesh is wanted as it is now before each touch, and nobody looks at it in between: a renewal each 200 ms, ns.
+/// The mesh is read before each touch alone, not in between: a renewal each 200 ms, ns.
 const EVERY_NS: i64 = 200_000_000;
 
 /// Takes each state of the arm for a sample, and keeps it.
@@ -37,7 +37,7 @@ impl<'a> LiveWorld<'a> {
     ) -> Result<Self, CliError> {
         let nothing = || CliError::Usage("the scene names no `refine`, so nothing would move the mesh".to_owned());
         let params = scene.refine_params(WrenchFrame::Sensor).ok_or_else(nothing)?;
-        // what a simulated arm does next does not depend on how fast this computer is; one that exists goes on meanwhile
+        // what a simulated arm does next does not depend on how fast this computer is; a real one goes on in that time
         let pace = Pace { is_patient: is_simulated, every_ns: EVERY_NS, ..Pace::default() };
         let mesh = scan.0.clone();
         let renewal = Renewal::Beside { scan, pace, room: ROOM, gate: Gate::default() };
@@ -45,7 +45,7 @@ impl<'a> LiveWorld<'a> {
         Ok(Self { engine, cell, messages: Vec::new(), failed: None, bar: Bar::new("probe", None) })
     }
 
-    /// All that was measured.
+    /// All samples.
     pub fn finish(self) -> Result<Vec<Message>, CliError> {
         match self.failed {
             Some(error) => Err(error.into()),

@@ -1,4 +1,4 @@
-//! The one thread that tells the arm what to do.
+//! The one thread that commands the arm.
 //!
 //! It moves only while orders come: when they stay away it brakes, and then feeds the watchdog of the controller for as long as it
 //! lives. A thread that hangs in a call feeds nothing, and the arm is stopped by that watchdog.
@@ -9,9 +9,9 @@ use std::time::{Duration, Instant};
 
 use super::{ChildError, ChildShared, failure};
 use crate::clock::Clock;
-use crate::ur::protocol::{Begin, ClientReport, Link, Order, What};
+use crate::ur::protocol::{Action, Begin, ClientReport, Link, Order};
 
-/// How long it waits for an order before it looks after the arm by itself.
+/// Time without an order after which it acts by itself.
 const TURN: Duration = Duration::from_millis(5);
 /// Orders that stay away for this long leave the arm to brake.
 const FRESH: Duration = Duration::from_millis(60);
@@ -21,10 +21,10 @@ const BRAKE: f64 = 2.0;
 const WATCHDOG_HZ: f64 = 10.0;
 /// At rest it is fed this often.
 const FEED: Duration = Duration::from_millis(20);
-/// The tip stands below this speed, m/s and rad/s; what is left a hard stop takes.
-const STANDING: f64 = 1e-3;
-/// From an order to the states that show what came of it, at the most.
-const SETTLED: Duration = Duration::from_millis(20);
+/// The tip counts as at rest below this speed, m/s and rad/s; what is left a hard stop takes.
+const AT_REST: f64 = 1e-3;
+/// Longest time from an order to the states that show its effect.
+const REST_TIME: Duration = Duration::from_millis(20);
 /// The hard stop of `speedStop`, m/s².
 const HARD: f64 = 10.0;
 /// The program of the controller starts within this time of its upload.
@@ -35,14 +35,14 @@ const EXCUSE: Duration = Duration::from_millis(40);
 const FIXED_FRAME: i32 = 2;
 /// Two cycles of the controller: its program reads one command in each, and what comes sooner takes the place of the one before.
 const CYCLES: Duration = Duration::from_millis(4);
-/// A press is said again this often, should it have been lost.
+/// Period in which a press is repeated, in case it was lost.
 const REPEAT: Duration = Duration::from_millis(100);
 /// Across the axis of a press the tip may be this far from where it should be, m and rad: what the feed and the friction make.
 const ASIDE: [f64; 2] = [0.05, 0.2];
 /// The tool that is read back may differ by this rounding, m and rad.
 const SAME_TOOL: f64 = 1e-6;
 
-/// What the arm is doing.
+/// The current motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Doing {
     Resting,
@@ -57,15 +57,15 @@ pub trait Control {
     fn is_connected(&self) -> bool;
     /// Whether the uploaded program runs; an old answer when the connection is lost.
     fn is_running(&self) -> bool;
-    /// Goes with a velocity, m/s and rad/s in B, reached with an acceleration, m/s², until it is told otherwise.
+    /// Goes with a velocity, m/s and rad/s in B, reached with an acceleration, m/s², until the next command.
     fn speed(&self, twist: [f64; 6], acceleration: f64) -> Result<(), ChildError>;
     /// Presses along z of a frame of B with a force, N; `limits`: speed along z, m/s, how far off across, m and rad.
     fn press(&self, frame: [f64; 6], force: f64, kind: i32, limits: [f64; 6]) -> Result<(), ChildError>;
     /// Ends pressing. A velocity that was not stopped before goes on.
     fn end_press(&self) -> Result<(), ChildError>;
-    /// Stops what `speed` began, with a deceleration, m/s²; returns when the arm stands.
+    /// Stops what `speed` began, with a deceleration, m/s²; returns when the arm is at rest.
     fn hard_stop(&self, deceleration: f64) -> Result<(), ChildError>;
-    /// Takes what the sensor reads for nothing.
+    /// Zeroes the sensor.
     fn zero(&self) -> Result<(), ChildError>;
     /// kg, and m in the flange.
     fn set_payload(&self, mass: f64, centre: [f64; 3]) -> Result<(), ChildError>;
@@ -73,7 +73,7 @@ pub trait Control {
     fn set_tool(&self, tool: [f64; 6]) -> Result<(), ChildError>;
     /// The tip in the flange, as the controller has it.
     fn tool(&self) -> Result<[f64; 6], ChildError>;
-    /// How force mode gives way.
+    /// Compliance of force mode.
     fn set_force_mode(&self, damping: f64, gain: f64) -> Result<(), ChildError>;
     /// Has the controller stop when it hears less often.
     fn set_watchdog(&self, least_hz: f64) -> Result<(), ChildError>;
@@ -131,14 +131,14 @@ impl<'a, C: Control> Driver<'a, C> {
         if self.control.is_connected() { Ok(()) } else { Err(DriverEnd::Lost(Link::Control)) }
     }
 
-    /// Does what an order says, or what is to be done when none has come.
+    /// Executes an order, or the action due without one.
     fn turn(&mut self, order: Option<Order>) -> Result<(), DriverEnd> {
         let Some(order) = order else {
             return self.look_after().or_else(|error| self.failed(&error));
         };
         self.ordered = self.clock.now();
         match self.serve(&order.what) {
-            Ok(()) if order.what == What::Zero => self.shared.report(&ClientReport::Done { number: order.number }),
+            Ok(()) if order.what == Action::Zero => self.shared.report(&ClientReport::Done { number: order.number }),
             Ok(()) => {}
             Err(error) => self.failed(&error)?,
         }
@@ -146,14 +146,14 @@ impl<'a, C: Control> Driver<'a, C> {
         Ok(())
     }
 
-    fn serve(&mut self, what: &What) -> Result<(), ChildError> {
+    fn serve(&mut self, what: &Action) -> Result<(), ChildError> {
         match *what {
-            What::Move { twist, acceleration } => {
+            Action::Move { twist, acceleration } => {
                 self.end_press()?;
                 self.doing = Doing::Moving;
                 self.control.speed(twist, acceleration)
             }
-            What::Press { frame, force_n, speed, feed: [x, y, z], acceleration } => {
+            Action::Press { frame, force_n, speed, feed: [x, y, z], acceleration } => {
                 let doing = Doing::Pressing { frame, force: force_n, speed };
                 // the axis, not the place, is what makes it another press
                 let is_same = matches!(self.doing, Doing::Pressing { frame: [.., a, b, c], force, speed: most }
@@ -166,8 +166,8 @@ impl<'a, C: Control> Driver<'a, C> {
                 }
                 self.control.speed([x, y, z, 0.0, 0.0, 0.0], acceleration)
             }
-            What::Stop { deceleration } => self.brake(deceleration),
-            What::Zero => {
+            Action::Stop { deceleration } => self.brake(deceleration),
+            Action::Zero => {
                 self.rest()?;
                 self.control.zero()
             }
@@ -183,7 +183,7 @@ impl<'a, C: Control> Driver<'a, C> {
         self.doing = Doing::Resting;
         let found = self.set_up().map_err(DriverEnd::NotReady)?;
         let tool = &self.begin.tool;
-        if found.iter().zip(tool).any(|(found, told)| (found - told).abs() > SAME_TOOL) {
+        if found.iter().zip(tool).any(|(found, set)| (found - set).abs() > SAME_TOOL) {
             return Err(DriverEnd::BadTool(format!("{found:?} and not {tool:?}")));
         }
         // last, for what is above takes its time
@@ -192,7 +192,7 @@ impl<'a, C: Control> Driver<'a, C> {
         Ok(())
     }
 
-    /// Returns the tool as it is read back.
+    /// Returns the TCP as read back.
     fn set_up(&self) -> Result<[f64; 6], ChildError> {
         let Begin { tool, mass_kg, centre_m, damping, gain, .. } = self.begin;
         self.control.set_payload(*mass_kg, *centre_m)?;
@@ -202,7 +202,7 @@ impl<'a, C: Control> Driver<'a, C> {
         Ok(found)
     }
 
-    /// What is to be done when no order comes.
+    /// The action without an order.
     fn look_after(&mut self) -> Result<(), ChildError> {
         match self.doing {
             Doing::Resting if self.clock.since(self.fed) >= FEED => self.feed(),
@@ -232,9 +232,9 @@ impl<'a, C: Control> Driver<'a, C> {
         self.doing = Doing::Braking { deceleration, since };
         self.control.speed([0.0; 6], deceleration)?;
         let speed = |velocity: [f64; 6]| velocity.iter().map(|part| part * part).sum::<f64>().sqrt();
-        let is_standing = self.shared.latest().is_some_and(|state| speed(state.velocity) < STANDING);
+        let is_at_rest = self.shared.latest().is_some_and(|state| speed(state.velocity) < AT_REST);
         // the first states may still be those of an arm that has not begun to move
-        if is_standing && self.clock.since(since) > SETTLED {
+        if is_at_rest && self.clock.since(since) > REST_TIME {
             self.control.hard_stop(HARD)?;
             self.doing = Doing::Resting;
         }
@@ -251,7 +251,7 @@ impl<'a, C: Control> Driver<'a, C> {
         Ok(())
     }
 
-    /// Brakes until the arm stands.
+    /// Brakes until the arm is at rest.
     fn rest(&mut self) -> Result<(), ChildError> {
         let begun = self.clock.now();
         while self.doing != Doing::Resting && self.clock.since(begun) < UPLOAD {
@@ -276,7 +276,7 @@ impl<'a, C: Control> Driver<'a, C> {
         Ok(())
     }
 
-    /// Nobody gives orders any more.
+    /// Orders have ended.
     fn end(&mut self) {
         // what fails here the watchdog does
         let _ = self.rest().and_then(|()| self.control.end_program());
@@ -285,7 +285,7 @@ impl<'a, C: Control> Driver<'a, C> {
 
 /// The last of the orders that wait, or the first of them that is to be done whatever comes after it.
 fn newest(mut order: Order, orders: &Receiver<Order>) -> Order {
-    while order.what != What::Zero {
+    while order.what != Action::Zero {
         match orders.try_recv() {
             Ok(next) => order = next,
             Err(_) => break,

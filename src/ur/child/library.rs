@@ -9,14 +9,14 @@ use pyo3::call::PyCallArgs;
 use pyo3::prelude::*;
 
 use super::{ChildError, control};
-use crate::ur::protocol::{State, WHEEL};
+use crate::ur::protocol::{UrState, WHEEL};
 
 /// Rate of the states and of the control, Hz.
 const RATE_HZ: f64 = 500.0;
 /// Uploads its program, and takes the force from the arm's own sensor: no upper registers, no cap, no external sensor.
 const FLAGS: u32 = 0x01 | 0x40;
 const CAP_PORT: u16 = 50002;
-/// The states that are asked for: the default are 58 of 1180 bytes.
+/// The requested states: the default are 58 of 1180 bytes.
 const VARIABLES: [&str; 9] = [
     "timestamp",
     "actual_q",
@@ -31,7 +31,7 @@ const VARIABLES: [&str; 9] = [
 /// Of `runtime_state`: the program runs.
 const PLAYING: u32 = 2;
 /// Readings of one state that may fall into the coming of the next.
-const TEARS: usize = 3;
+const TORN_READS: usize = 3;
 
 fn failed(call: &'static str) -> impl Fn(PyErr) -> ChildError {
     move |error| ChildError::Python { call, reason: error.to_string() }
@@ -61,7 +61,7 @@ pub fn load(site_packages: &Path) -> Result<(), ChildError> {
 
 /// Ends the process at once: the destructors of the library take a second, and after a lost link they crash.
 pub fn leave(code: i32) -> ! {
-    // a Python that cannot even do that is ended the hard way
+    // a Python that cannot even do that is killed
     let _ = Python::attach(|py| py.import("os").and_then(|os| os.call_method1("_exit", (code,)).map(drop)));
     std::process::abort()
 }
@@ -91,12 +91,12 @@ impl Receive {
     }
 
     /// The newest state, all of one moment; `None`: it cannot be read.
-    pub fn state(&self, served: u64) -> Option<State> {
-        Python::attach(|py| -> PyResult<Option<State>> {
+    pub fn state(&self, served: u64) -> Option<UrState> {
+        Python::attach(|py| -> PyResult<Option<UrState>> {
             let read = |name: &str| self.0.call_method0(py, name);
-            for _ in 0..TEARS {
+            for _ in 0..TORN_READS {
                 let stamp_s = read("getTimestamp")?.extract::<f64>(py)?;
-                let state = State {
+                let state = UrState {
                     stamp_s,
                     pose: read("getActualTCPPose")?.extract(py)?,
                     velocity: read("getActualTCPSpeed")?.extract(py)?,
@@ -123,7 +123,7 @@ impl Receive {
 pub struct RtdeControl(Py<PyAny>);
 
 impl RtdeControl {
-    /// Uploads the program and waits until it runs; no other thread can use Python meanwhile.
+    /// Uploads the program and waits until it runs; no other thread can use Python in that time.
     pub fn connect(host: &str) -> Result<Self, ChildError> {
         Python::attach(|py| {
             let module = py.import("rtde_control").map_err(failed("import rtde_control"))?;

@@ -1,6 +1,6 @@
 //! The process that speaks to the arm, from the inside: the only place with Python.
 //!
-//! One thread owns `rtde_control` and does what the orders say ([`control`]); a second one hands on the states of
+//! One thread owns `rtde_control` and executes the orders ([`control`]); a second one passes on the states of
 //! `rtde_receive` ([`states`]); a third reads the orders. When a connection of the library is lost the process says so and ends at
 //! once, for the library would connect again by itself, start its program unasked, and crash.
 
@@ -19,7 +19,7 @@ use pyo3::prelude::*;
 
 use self::control::{Driver, DriverEnd};
 use self::library::{Receive, RtdeControl, leave};
-use super::protocol::{Begin, ClientReport, Link, Order, State};
+use super::protocol::{Begin, ClientReport, Link, Order, UrState};
 use crate::clock::Clock;
 
 /// Why the process gives up before it has begun.
@@ -38,27 +38,27 @@ pub enum ChildError {
     },
 }
 
-/// What the threads share.
+/// Shared by the threads.
 struct ChildShared {
     reports: Mutex<PipeWriter>,
     /// number of the last order whose calls have returned
     served: AtomicU64,
-    latest: Mutex<Option<State>>,
+    latest: Mutex<Option<UrState>>,
 }
 
 impl ChildShared {
     fn report(&self, report: &ClientReport) {
         let Ok(mut line) = serde_json::to_vec(report) else { return };
         line.push(b'\n');
-        // when nobody reads any more, stdin ends too
+        // when the reader is gone, stdin ends too
         let _ = self.reports.lock().unwrap_or_else(PoisonError::into_inner).write_all(&line);
     }
 
-    fn latest(&self) -> Option<State> {
+    fn latest(&self) -> Option<UrState> {
         *self.latest.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Says that a connection is gone, and ends the process.
+    /// Reports a lost connection, and ends the process.
     fn lost(&self, which: Link) -> ! {
         self.report(&ClientReport::Lost { which });
         leave(3)
@@ -72,7 +72,7 @@ impl ChildShared {
 /// Serves orders until stdin ends; then brakes, ends the program of the controller and itself.
 ///
 /// # Errors
-/// [`ChildError`], when it cannot begin. What comes later is told as a report.
+/// [`ChildError`], when it cannot begin. Later errors go out as reports.
 pub fn run() -> Result<(), ChildError> {
     let mut lines = BufReader::new(stdin()).lines().map_while(Result::ok);
     let first = lines.next().unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Hands on what the arm says, once each; and a beat where it says nothing.
+//! Passes on each state of the arm once, and a heartbeat where none comes.
 
 use std::sync::PoisonError;
 use std::thread;
@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use super::ChildShared;
 use super::library::Receive;
 use crate::clock::{Clock, ManualClock};
-use crate::ur::protocol::{ClientReport, Link, State};
+use crate::ur::protocol::{ClientReport, Link, UrState};
 
 /// Between two looks: a fifth of the time between two states.
 const LOOK: Duration = Duration::from_micros(400);
@@ -18,40 +18,40 @@ const BEAT: Duration = Duration::from_millis(10);
 ///
 /// - `hand`: of the clock that follows the controller.
 pub fn hand_on(receive: &Receive, shared: &ChildShared, hand: Option<&ManualClock>) -> ! {
-    // that this process lives is told by the time of this machine
+    // the heartbeat of this process follows the time of this machine
     let clock = Clock::system();
-    let mut said = Said { stamp_s: f64::INFINITY, at: clock.now() };
+    let mut last = LastReport { stamp_s: f64::INFINITY, at: clock.now() };
     loop {
         if !receive.is_connected() {
             shared.lost(Link::States);
         }
-        let state = receive.stamp().filter(|stamp| said.is_new(*stamp)).and_then(|_| receive.state(shared.number()));
+        let state = receive.stamp().filter(|stamp| last.is_new(*stamp)).and_then(|_| receive.state(shared.number()));
         if let Some(state) = state {
             *shared.latest.lock().unwrap_or_else(PoisonError::into_inner) = Some(state);
             if let Some(hand) = hand {
-                hand.advance(Duration::try_from_secs_f64(state.stamp_s - said.stamp_s).unwrap_or_default());
+                hand.advance(Duration::try_from_secs_f64(state.stamp_s - last.stamp_s).unwrap_or_default());
             }
         }
-        if let Some(report) = said.next(state, shared.number(), clock.now()) {
+        if let Some(report) = last.next(state, shared.number(), clock.now()) {
             shared.report(&report);
         }
         thread::sleep(LOOK);
     }
 }
 
-/// What was handed on last, and when.
-struct Said {
+/// The last report, and its time.
+struct LastReport {
     stamp_s: f64,
     at: Instant,
 }
 
-impl Said {
+impl LastReport {
     fn is_new(&self, stamp_s: f64) -> bool {
         stamp_s != self.stamp_s
     }
 
-    /// What is to be said now.
-    fn next(&mut self, state: Option<State>, served: u64, now: Instant) -> Option<ClientReport> {
+    /// The report due now.
+    fn next(&mut self, state: Option<UrState>, served: u64, now: Instant) -> Option<ClientReport> {
         let report = match state {
             Some(state) => {
                 self.stamp_s = state.stamp_s;
@@ -71,17 +71,17 @@ mod tests {
     use crate::ur::protocol::tests::STATE;
 
     #[test]
-    fn a_state_is_said_at_once_and_where_none_comes_a_beat_each_10_ms() {
+    fn a_state_is_reported_at_once_and_where_none_comes_a_beat_each_10_ms() {
         let (clock, hand) = Clock::manual();
-        let mut said = Said { stamp_s: f64::INFINITY, at: clock.now() };
-        assert!(said.is_new(0.0));
-        let state = said.next(Some(STATE), 7, clock.now());
+        let mut last = LastReport { stamp_s: f64::INFINITY, at: clock.now() };
+        assert!(last.is_new(0.0));
+        let state = last.next(Some(STATE), 7, clock.now());
         assert_eq!(state, Some(ClientReport::State(Box::new(STATE))));
-        assert!(!said.is_new(STATE.stamp_s));
+        assert!(!last.is_new(STATE.stamp_s));
         let mut beats = Vec::new();
         for ms in 1..=35 {
             hand.advance(Duration::from_millis(1));
-            beats.extend(said.next(None, 7, clock.now()).map(|report| (ms, report)));
+            beats.extend(last.next(None, 7, clock.now()).map(|report| (ms, report)));
         }
         assert_eq!(beats, [11, 22, 33].map(|ms| (ms, ClientReport::Beat { served: 7 })));
     }

@@ -46,14 +46,14 @@ impl GuardBench {
 }
 
 fn state(is_playing: bool, safety_bits: u32, served: u64) -> ClientReport {
-    ClientReport::State(Box::new(State { is_playing, safety_bits, served, ..STATE }))
+    ClientReport::State(Box::new(UrState { is_playing, safety_bits, served, ..STATE }))
 }
 
 #[test]
 fn a_client_has_ten_seconds_to_be_ready_and_from_then_on_80_ms_for_each_line() {
     let mut bench = GuardBench::new();
     bench.hand.advance(9_000 * MS);
-    // what it says meanwhile changes nothing
+    // its states in that time change nothing
     assert_eq!(bench.take(ClientReport::Beat { served: 0 }), None);
     assert_eq!(bench.known.patience(bench.clock.now()), 1_000 * MS);
     bench.hand.advance(999 * MS);
@@ -86,7 +86,7 @@ fn a_call_that_does_not_return_for_more_than_200_ms_is_a_hanging_client() {
     let broken = bench.until_broken(&state(true, 1, 1));
     let hangs = |ms| ClientLoss::client(format!("hangs: a call of ur-rtde has not returned for {ms} ms"));
     assert_eq!(broken, (201, hangs(201)));
-    // none under way, no deadline
+    // no running call, no deadline
     assert_eq!(bench.take(state(true, 1, 2)), None);
     bench.hand.advance(5_000 * MS);
     assert_eq!(bench.take(state(true, 1, 2)), None);
@@ -100,7 +100,7 @@ fn a_call_that_does_not_return_for_more_than_200_ms_is_a_hanging_client() {
 }
 
 #[test]
-fn a_program_that_has_ended_is_told_after_40_ms_unless_the_state_says_why() {
+fn a_program_that_has_ended_is_reported_after_40_ms_unless_the_state_gives_the_reason() {
     let mut bench = GuardBench::ready();
     let has_ended = |bench: &GuardBench| bench.known.has_ended(bench.clock.now());
     bench.take(state(false, 1, 0));
@@ -121,7 +121,7 @@ fn a_program_that_has_ended_is_told_after_40_ms_unless_the_state_says_why() {
 }
 
 #[test]
-fn a_client_that_is_told_to_end_has_a_second_and_a_half() {
+fn a_client_that_is_asked_to_end_has_a_second_and_a_half() {
     let mut bench = GuardBench::ready();
     bench.known.close(bench.clock.now());
     bench.hand.advance(1_499 * MS);
@@ -133,7 +133,7 @@ fn a_client_that_is_told_to_end_has_a_second_and_a_half() {
 }
 
 #[test]
-fn states_that_nobody_takes_are_the_newest_64() {
+fn untaken_states_are_the_newest_64() {
     let mut bench = GuardBench::ready();
     for served in 0..100 {
         bench.take(state(true, 1, served));
@@ -196,7 +196,7 @@ impl Watch {
         }
     }
 
-    /// Nothing is wrong after some time.
+    /// No fault after some time.
     fn is_calm_after(&self, time: Duration) {
         self.hand.advance(time);
         assert_eq!(self.hand.waiting(), 1, "it waits on");
@@ -209,7 +209,7 @@ impl Watch {
         assert_eq!(self.hand.waiting(), 0, "it waits on");
     }
 
-    /// How the guard ended, what was wrong, and what the dashboard was asked.
+    /// The end of the guard, the fault, and the requests to the dashboard.
     fn end(self) -> (Option<Halt>, Option<ClientLoss>, Vec<String>) {
         let begun = Instant::now();
         while !self.guard.is_finished() {
@@ -255,7 +255,7 @@ fn silent_states_stop_the_arm_though_lines_come() {
 }
 
 #[test]
-fn a_client_that_is_never_ready_is_killed_and_nobody_elses_program_stopped() {
+fn a_client_that_is_never_ready_is_killed_and_no_other_program_is_stopped() {
     let watch = Watch::begin(1);
     watch.is_calm_after(9_999 * MS);
     watch.acts_after(MS);
@@ -278,7 +278,7 @@ fn a_client_that_does_not_end_is_killed_and_the_arm_stopped() {
 }
 
 #[test]
-fn a_client_that_ends_as_it_was_told_is_no_fault() {
+fn a_client_that_ends_on_request_is_no_fault() {
     let watch = Watch::begin(1);
     watch.say(ClientReport::Ready);
     watch.shared.known().close(watch.shared.clock.now());

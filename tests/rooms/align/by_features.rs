@@ -1,4 +1,4 @@
-//! Registration by features: known motions of real parts are found from anywhere, and what is not determined is told.
+//! Registration by features: known motions of real parts are found from anywhere, and what is not determined is reported.
 
 use std::path::{Path, PathBuf};
 
@@ -20,7 +20,7 @@ fn part_path(name: &str) -> Option<PathBuf> {
     shared(&format!("parts/permissive/{name}"))
 }
 
-/// A shape with what is on it.
+/// A shape with its features.
 struct Part {
     mesh: TriMesh,
     tree: FaceTree,
@@ -47,7 +47,7 @@ impl Part {
         samples.iter().map(|s| OrientedSample { point: s.point, normal: self.mesh.normal(s.face) }).collect()
     }
 
-    /// Largest way of a corner of the box around it between two motions, m.
+    /// Largest displacement between two motions of a corner of its bounding box, m.
     fn apart(&self, a: &Isometry3<f64>, b: &Isometry3<f64>) -> f64 {
         let [lo, hi] = self.mesh.bounds();
         let pick = |i: usize| Point3::from(Vector3::from_fn(|axis, _| if i >> axis & 1 == 0 { lo } else { hi }[axis]));
@@ -96,7 +96,7 @@ fn false_ones(part: &Part, count: usize, rng: &mut Pcg64) -> Vec<Feature> {
 }
 
 /// Three tenths of the features are left out.
-fn thinned(features: &[Feature], rng: &mut Pcg64) -> Vec<Feature> {
+fn subset(features: &[Feature], rng: &mut Pcg64) -> Vec<Feature> {
     features.iter().filter(|_| uniform(rng) >= 0.3).cloned().collect()
 }
 
@@ -129,13 +129,13 @@ fn features_may_be_missing_and_false_and_out_of_place() {
     for (name, unit) in PARTS {
         let Some(target) = Part::read(name, unit) else { return };
         let [lo, hi] = target.mesh.bounds();
-        // half of what is allowed
+        // half of the allowed
         let noise = 0.002 * (hi - lo).norm();
         let mut rng = Pcg64::new(23, 3);
         for round in 0..either(1, 4) {
             let known = anywhere(&mut rng);
             let source = target.moved(&known.inverse());
-            let mut features = thinned(&source.features, &mut rng);
+            let mut features = subset(&source.features, &mut rng);
             for feature in &mut features {
                 feature.centre.value += Vector3::from_fn(|_, _| noise * normal(&mut rng));
             }
@@ -151,7 +151,7 @@ fn features_may_be_missing_and_false_and_out_of_place() {
 }
 
 #[test]
-fn features_alone_tell_the_motion_as_well_as_they_are_known() {
+fn features_alone_determine_the_motion_as_well_as_they_are_known() {
     let Some(target) = Part::read("crs_ee2.stl", MeshUnit::Metre) else { return };
     let mut rng = Pcg64::new(5, 9);
     for _ in 0..6 {
@@ -188,8 +188,8 @@ fn a_flange_is_ambiguous_without_the_one_hole_that_breaks_its_symmetry() {
     let with_it = part.features.len();
     let features: Vec<_> = part.features.iter().filter(|f| !is_dowel(f)).cloned().collect();
     assert_eq!(features.len(), with_it - 1);
-    let told = align_features(&features, &part.features, None, &FeaturesParams::default());
-    let Err(FeaturesError::Ambiguous { alternatives }) = told else { panic!("{told:?}") };
+    let answer = align_features(&features, &part.features, None, &FeaturesParams::default());
+    let Err(FeaturesError::Ambiguous { alternatives }) = answer else { panic!("{answer:?}") };
     assert_eq!(alternatives.len(), 2);
     let [turn, shift] = alternatives[1].differs;
     assert!((turn.norm() - std::f64::consts::PI).abs() < 1e-3 && turn.normalize().y.abs() > 0.999, "{turn}");
@@ -211,13 +211,13 @@ fn block(size: [f64; 3]) -> TriMesh {
 
 // The rotations of a body onto itself: 24 of a cube, 8 of a square prism, 4 of a box with three different sides.
 #[test]
-fn every_rotation_of_a_box_onto_itself_is_told() {
+fn every_rotation_of_a_box_onto_itself_is_reported() {
     let motion = anywhere(&mut Pcg64::new(3, 3));
     for (size, rotations) in [([30e-3, 30e-3, 30e-3], 24), ([30e-3, 30e-3, 50e-3], 8), ([20e-3, 30e-3, 50e-3], 4)] {
         let target = Part::new(block(size));
         let source = target.moved(&motion);
-        let told = align(&source, &source.features, &target);
-        let Err(FeaturesError::Ambiguous { alternatives }) = told else { panic!("{size:?}: {told:?}") };
+        let answer = align(&source, &source.features, &target);
+        let Err(FeaturesError::Ambiguous { alternatives }) = answer else { panic!("{size:?}: {answer:?}") };
         assert_eq!(alternatives.len(), rotations, "{size:?}");
         let is_there = alternatives.iter().any(|a| source.apart(&a.source_to_target, &motion.inverse()) < 1e-6);
         assert!(is_there, "{size:?}");
@@ -228,8 +228,8 @@ fn every_rotation_of_a_box_onto_itself_is_told() {
 fn a_mirror_image_is_refused() {
     let twin = Part::new(skewed_block(-1.0));
     let part = Part::new(skewed_block(1.0));
-    let told = align(&twin, &twin.features, &part);
-    assert!(matches!(told, Err(FeaturesError::Mirrored { .. })), "{told:?}");
+    let answer = align(&twin, &twin.features, &part);
+    assert!(matches!(answer, Err(FeaturesError::Mirrored { .. })), "{answer:?}");
     assert!(align(&part, &part.features, &part).is_ok());
 }
 
@@ -242,24 +242,24 @@ fn skewed_block(hand: f64) -> TriMesh {
 }
 
 #[test]
-fn what_cannot_be_aligned_is_told_with_what_to_do() {
+fn failed_alignments_say_what_to_do() {
     let part = Part::new(skewed_block(1.0));
     let params = FeaturesParams::default();
     for (source, target, side) in
         [(&[][..], &part.features[..], FeaturesSide::Source), (&part.features, &[], FeaturesSide::Target)]
     {
-        let told = align_features(source, target, None, &params).unwrap_err();
-        assert_eq!(told, FeaturesError::NoFeatures { side });
-        assert!(told.to_string().contains("pick pairs of points"), "{told}");
+        let answer = align_features(source, target, None, &params).unwrap_err();
+        assert_eq!(answer, FeaturesError::NoFeatures { side });
+        assert!(answer.to_string().contains("pick pairs of points"), "{answer}");
     }
-    // planes alone tell no place
+    // planes alone determine no position
     let planes: Vec<_> = part.features.iter().filter(|f| f.kind == Kind::Plane).cloned().collect();
-    let told = align_features(&planes, &part.features, None, &params).unwrap_err();
-    assert_eq!(told, FeaturesError::TooFew { side: FeaturesSide::Source, found: 4 });
+    let answer = align_features(&planes, &part.features, None, &params).unwrap_err();
+    assert_eq!(answer, FeaturesError::TooFew { side: FeaturesSide::Source, found: 4 });
     // another part
     let other = Part::new(block([20e-3, 30e-3, 50e-3]));
-    let told = align(&other, &other.features, &part).unwrap_err();
-    assert!(matches!(told, FeaturesError::NoMatch { .. }), "{told:?}");
+    let answer = align(&other, &other.features, &part).unwrap_err();
+    assert!(matches!(answer, FeaturesError::NoMatch { .. }), "{answer:?}");
 }
 
 /// A body of revolution about z, of so many sides: corners of its outline as radius and height, m, from the axis outside and
@@ -300,24 +300,24 @@ fn mm(outline: &[[f64; 2]]) -> Vec<[f64; 2]> {
 
 // A continuum of motions, of which any one would be as good: the axis is that of the body, z before it was moved.
 #[test]
-fn a_part_of_revolution_is_told_to_be_free_to_turn() {
+fn a_part_of_revolution_is_reported_free_to_turn() {
     let bar =
         mm(&[[0.0, 0.0], [15.0, 0.0], [15.0, 20.0], [10.0, 20.0], [10.0, 45.0], [6.0, 45.0], [6.0, 60.0], [0.0, 60.0]]);
     let flange = mm(&[[8.0, 0.0], [40.0, 0.0], [40.0, 10.0], [20.0, 10.0], [20.0, 25.0], [8.0, 25.0]]);
     let disc = mm(&[[8.0, 0.0], [40.0, 0.0], [40.0, 10.0], [8.0, 10.0]]);
     let mut rng = Pcg64::new(17, 2);
-    for (name, outline, ways) in [("bar", &bar, 1), ("flange", &flange, 1), ("disc", &disc, 2)] {
+    for (name, outline, count) in [("bar", &bar, 1), ("flange", &flange, 1), ("disc", &disc, 2)] {
         for sides in [64, 90] {
             let target = Part::new(turned_part(outline, sides));
             let known = anywhere(&mut rng);
             let source = target.moved(&known.inverse());
-            let told = align(&source, &source.features, &target);
-            let Err(FeaturesError::FreeTurn { turn, alternatives }) = told else {
-                panic!("{name}, {sides} sides: {told:?}")
+            let answer = align(&source, &source.features, &target);
+            let Err(FeaturesError::FreeTurn { turn, alternatives }) = answer else {
+                panic!("{name}, {sides} sides: {answer:?}")
             };
             assert!(turn.axis.z.abs() > 0.9999 && turn.through.coords.xy().norm() < 0.1e-3, "{name}: {turn:?}");
-            assert_eq!(alternatives.len(), ways, "{name}, {sides}: laid onto the axis from one end, or from both");
-            // what is told is right but for the turn
+            assert_eq!(alternatives.len(), count, "{name}, {sides}: laid onto the axis from one end, or from both");
+            // the answer is right but for the turn
             let turned = alternatives[0].source_to_target * known.inverse();
             let off = |p: Point3<f64>| {
                 let [own, there] = [p, turned * p];
@@ -334,9 +334,9 @@ fn a_part_of_revolution_is_told_to_be_free_to_turn() {
 #[test]
 fn a_flange_with_more_than_its_middle_hole_is_not_free() {
     let Some(part) = Part::read("crs_ee3.stl", MeshUnit::Metre) else { return };
-    let told = align(&part, &part.features, &part);
-    assert!(told.is_ok(), "{told:?}");
-    // its middle hole and the planes square to it alone tell no turn, and the surface says that there is one
+    let answer = align(&part, &part.features, &part);
+    assert!(answer.is_ok(), "{answer:?}");
+    // its middle hole and the planes square to it alone determine no turn, and the surface says that there is one
     let middle = |f: &Feature| match f.kind {
         Kind::Hole => f.centre.value.coords.xz().norm() < 1e-3,
         Kind::Plane => f.axis.as_ref().is_some_and(|axis| axis.value.y.abs() > 0.99),
@@ -344,8 +344,8 @@ fn a_flange_with_more_than_its_middle_hole_is_not_free() {
     };
     let few: Vec<Feature> = part.features.iter().filter(|f| middle(f)).cloned().collect();
     assert!(few.iter().any(|f| f.kind == Kind::Hole));
-    let told = align(&part, &few, &part).unwrap_err();
-    assert_eq!(told, FeaturesError::TooFew { side: FeaturesSide::Source, found: few.len() });
+    let answer = align(&part, &few, &part).unwrap_err();
+    assert_eq!(answer, FeaturesError::TooFew { side: FeaturesSide::Source, found: few.len() });
 }
 
 // ---- at the boundary of the process -------------------------------------------------------------------------------
@@ -367,7 +367,7 @@ fn refined_case(name: &str, folder: &Path) -> Option<[PathBuf; 2]> {
     Some([out, case.join("truth.ply")])
 }
 
-// A third to a half of these meshes is the bare scan, 0.6 mm noisy and 0.3 mm too fat, so the fit is as good as that. From
+// A third to a half of these meshes is the bare scan, 0.6 mm noisy and 0.3 mm too large, so the fit is as good as that. From
 // above the flange has a half turn that the touches do not break: the dowel hole is on the other side.
 #[test]
 fn refined_meshes_come_onto_their_truth_from_anywhere() {
@@ -393,7 +393,7 @@ fn refined_meshes_come_onto_their_truth_from_anywhere() {
 }
 
 #[test]
-fn the_command_line_tells_alternatives_and_takes_one() {
+fn the_command_line_lists_alternatives_and_takes_one() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let [mesh, truth] = [path("mesh.ply"), path("truth.ply")];
@@ -406,21 +406,21 @@ fn the_command_line_tells_alternatives_and_takes_one() {
     };
     let json = |output: &std::process::Output| serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap();
 
-    let told = call(&[]);
-    assert_eq!(told.status.code(), Some(3));
-    assert!(String::from_utf8_lossy(&told.stdout).contains("--alternative K"));
-    let told = call(&["--json"]);
-    let alternatives = json(&told)["ambiguous"].as_array().unwrap().clone();
-    assert_eq!((told.status.code(), alternatives.len()), (Some(3), 4));
+    let answer = call(&[]);
+    assert_eq!(answer.status.code(), Some(3));
+    assert!(String::from_utf8_lossy(&answer.stdout).contains("--alternative K"));
+    let answer = call(&["--json"]);
+    let alternatives = json(&answer)["ambiguous"].as_array().unwrap().clone();
+    assert_eq!((answer.status.code(), alternatives.len()), (Some(3), 4));
     // the other three are half turns
     assert!(
         alternatives[1..].iter().all(|a| (a["turn_deg"].as_f64().unwrap() - 180.0).abs() < 1e-3),
         "{alternatives:?}"
     );
     for number in ["1", "4"] {
-        let told = call(&["--json", "--alternative", number]);
-        assert!(told.status.success(), "{}", String::from_utf8_lossy(&told.stderr));
-        assert!(json(&told)["after"]["regions"][0]["mesh_to_truth"]["max_mm"].as_f64().is_none_or(|max| max < 1e-3));
+        let answer = call(&["--json", "--alternative", number]);
+        assert!(answer.status.success(), "{}", String::from_utf8_lossy(&answer.stderr));
+        assert!(json(&answer)["after"]["regions"][0]["mesh_to_truth"]["max_mm"].as_f64().is_none_or(|max| max < 1e-3));
     }
     assert_eq!(call(&["--alternative", "5"]).status.code(), Some(2));
 
@@ -434,9 +434,9 @@ fn the_command_line_tells_alternatives_and_takes_one() {
         text += &format!("{},{},{},{},{},{},{name}\n", from.x, from.y, from.z, to[0], to[1], to[2]);
     }
     std::fs::write(&pairs, text).unwrap();
-    let told = touchup(&["compare", &mesh, &truth, "--align", "pairs", &pairs, "--samples", "1000", "--json"]);
-    assert!(told.status.success(), "{}", String::from_utf8_lossy(&told.stderr));
-    let alignment = &json(&told)["alignment"];
+    let answer = touchup(&["compare", &mesh, &truth, "--align", "pairs", &pairs, "--samples", "1000", "--json"]);
+    assert!(answer.status.success(), "{}", String::from_utf8_lossy(&answer.stderr));
+    let alignment = &json(&answer)["alignment"];
     assert_eq!(alignment["residuals"].as_array().unwrap().len(), 4);
     assert!((0.05..0.3).contains(&alignment["rms_mm"].as_f64().unwrap()), "{alignment}");
     assert_eq!(touchup(&["compare", &mesh, &truth, "--align", "pairs"]).status.code(), Some(2));
@@ -445,17 +445,17 @@ fn the_command_line_tells_alternatives_and_takes_one() {
     // no features: what to do instead
     std::fs::write(&mesh, "ply\nformat ascii 1.0\nelement vertex 3\nproperty double x\nproperty double y\nproperty double z\n\
                            element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n9 0 0\n0 9 0\n3 0 1 2\n").unwrap();
-    let told = call(&[]);
-    assert_eq!(told.status.code(), Some(3));
+    let answer = call(&[]);
+    assert_eq!(answer.status.code(), Some(3));
     assert!(
-        String::from_utf8_lossy(&told.stderr).contains("pick pairs of points"),
+        String::from_utf8_lossy(&answer.stderr).contains("pick pairs of points"),
         "{}",
-        String::from_utf8_lossy(&told.stderr)
+        String::from_utf8_lossy(&answer.stderr)
     );
 }
 
 #[test]
-fn the_command_line_tells_about_which_axis_a_part_is_free_to_turn() {
+fn the_command_line_reports_the_axis_of_a_free_turn() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let [mesh, truth] = [path("mesh.ply"), path("truth.ply")];
@@ -467,14 +467,14 @@ fn the_command_line_tells_about_which_axis_a_part_is_free_to_turn() {
     let call = |more: &[&str]| {
         touchup(&[&["compare", &mesh, &truth, "--align", "features", "--samples", "1000"], more].concat())
     };
-    let told = call(&[]);
-    let text = String::from_utf8_lossy(&told.stdout).into_owned();
-    assert_eq!(told.status.code(), Some(3), "{text}");
+    let answer = call(&[]);
+    let text = String::from_utf8_lossy(&answer.stdout).into_owned();
+    assert_eq!(answer.status.code(), Some(3), "{text}");
     assert!(text.contains("free to turn about") && text.contains("--alternative K"), "{text}");
-    let told = call(&["--json"]);
-    let told: serde_json::Value = serde_json::from_slice(&told.stdout).unwrap();
-    let axis = told["free_turn"]["axis"].as_array().unwrap_or_else(|| panic!("{told}"));
-    assert!(axis[2].as_f64().unwrap().abs() > 0.9999, "{told}");
+    let answer = call(&["--json"]);
+    let answer: serde_json::Value = serde_json::from_slice(&answer.stdout).unwrap();
+    let axis = answer["free_turn"]["axis"].as_array().unwrap_or_else(|| panic!("{answer}"));
+    assert!(axis[2].as_f64().unwrap().abs() > 0.9999, "{answer}");
     // of a body of 64 sides any turn is as good, within what its sides are off the circle
     let taken = call(&["--json", "--alternative", "1"]);
     assert!(taken.status.success(), "{}", String::from_utf8_lossy(&taken.stderr));

@@ -69,7 +69,7 @@ proptest! {
         prop_assert!(found.rms < 1e-13 && found.motion.rotation.to_rotation_matrix().matrix().determinant() > 0.999);
     }
 
-    /// The fit is a minimum: whichever way the motion is changed, the squares grow.
+    /// The fit is a minimum: any change of the motion increases the sum of squares.
     #[test]
     fn no_other_motion_fits_better(seed in 0..1000u64, change in prop::array::uniform6(-1.0..1.0f64)) {
         let pairs = pairs_of(&motion(), 0.5e-3, seed);
@@ -163,8 +163,8 @@ fn what_determines_no_motion_is_refused() {
     bent[2].to = motion() * bent[2].from;
     assert!(fit(&bent).is_ok());
     let coarse = PairsParams { sigma: Some(1e-3), ..PairsParams::default() };
-    let told = fit_pairs(&bent, &coarse).unwrap_err();
-    assert!(matches!(told, PairsError::Collinear { .. }) && told.to_string().contains("far off the line"), "{told}");
+    let error = fit_pairs(&bent, &coarse).unwrap_err();
+    assert!(matches!(error, PairsError::Collinear { .. }) && error.to_string().contains("far off the line"), "{error}");
 }
 
 /// With five pairs or more the wrong one is named, whichever it is; fewer disagree.
@@ -174,17 +174,17 @@ fn a_pair_that_does_not_fit_is_named() {
         for wrong in 0..PICKS.len() {
             let mut pairs = pairs_of(&motion(), 0.2e-3, seed);
             pairs[wrong].to += vector![0.0, 4e-3, -3e-3];
-            let told = fit(&pairs).unwrap_err();
-            let PairsError::Outlier { pair, distance_mm, others, rest_mm } = told else { panic!("{told}") };
-            assert_eq!((pair, others), (wrong + 1, 6), "{told}");
-            assert!((3.5..7.0).contains(&distance_mm) && rest_mm < 0.6, "{told}");
+            let error = fit(&pairs).unwrap_err();
+            let PairsError::Outlier { pair, distance_mm, others, rest_mm } = error else { panic!("{error}") };
+            assert_eq!((pair, others), (wrong + 1, 6), "{error}");
+            assert!((3.5..7.0).contains(&distance_mm) && rest_mm < 0.6, "{error}");
         }
         assert!(fit(&pairs_of(&motion(), 0.2e-3, seed)).is_ok(), "good picks, seed {seed}");
     }
     let mut four = pairs_of(&motion(), 0.2e-3, 3)[..4].to_vec();
     four[1].to.x += 15e-3;
-    let told = fit(&four).unwrap_err();
-    assert!(matches!(told, PairsError::Disagree { .. }) && told.to_string().contains("5 pairs or more"), "{told}");
+    let error = fit(&four).unwrap_err();
+    assert!(matches!(error, PairsError::Disagree { .. }) && error.to_string().contains("5 pairs or more"), "{error}");
     // picks that are all good to 1 mm only are good picks of a bad scan
     assert!((0..50).all(|seed| fit(&pairs_of(&motion(), 1e-3, seed)).is_ok()));
 }
@@ -213,14 +213,14 @@ fn units_and_mirrors_are_named() {
     };
     for (factor, named) in [(1000.0, "1000:"), (1e-3, "1/1000"), (25.4, "25.4:"), (1.0 / 25.4, "1/25.4"), (10.0, "cm")]
     {
-        let told = scaled(factor);
-        assert!(matches!(told, PairsError::Scale { .. }) && told.to_string().contains(named), "{told}");
+        let error = scaled(factor);
+        assert!(matches!(error, PairsError::Scale { .. }) && error.to_string().contains(named), "{error}");
     }
     assert!(matches!(scaled(1.5), PairsError::Disagree { .. } | PairsError::Outlier { .. }));
     let mut pairs = pairs_of(&motion(), 0.1e-3, 5);
     pairs.iter_mut().for_each(|pair| pair.to.y = -pair.to.y);
-    let told = fit(&pairs).unwrap_err();
-    assert!(matches!(told, PairsError::Mirrored { .. }), "{told}");
+    let error = fit(&pairs).unwrap_err();
+    assert!(matches!(error, PairsError::Mirrored { .. }), "{error}");
     // a half turn is no mirror
     let turned = Isometry3::from_parts(
         motion().translation,

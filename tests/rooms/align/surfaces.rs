@@ -1,4 +1,4 @@
-//! Registration of points to a mesh: known motions are found, and what nothing holds is told.
+//! Registration of points to a mesh: known motions are found, and unconstrained directions are reported.
 
 use std::f64::consts::TAU;
 
@@ -28,7 +28,7 @@ fn noisy(mesh: &TriMesh, count: usize, noise: f64) -> Vec<Point3<f64>> {
     samples.into_iter().map(|sample| shaken(sample.point)).collect()
 }
 
-/// Largest way of a corner of the box around the mesh between two motions, m.
+/// Largest displacement between two motions of a corner of the bounding box, m.
 fn apart(mesh: &TriMesh, a: &Isometry3<f64>, b: &Isometry3<f64>) -> f64 {
     let [lo, hi] = mesh.bounds();
     let corner =
@@ -108,7 +108,7 @@ fn a_cylinder_turns_and_slides_along_its_axis() {
 }
 
 #[test]
-fn a_sphere_turns_every_way() {
+fn a_sphere_turns_about_every_axis() {
     let outline: Vec<_> = (0..=48)
         .map(|i| TAU / 96.0 * f64::from(i) - TAU / 4.0)
         .map(|a| (10e-3 * a.cos().max(0.0), 10e-3 * a.sin()))

@@ -125,13 +125,13 @@ fn changed(messages: &[Message], change: impl Fn(&UnitQuaternion<f64>, Wrench) -
     messages.iter().map(change).collect()
 }
 
-/// Weight and bias on top of what is felt.
-fn weighed(r_wt: &UnitQuaternion<f64>, wrench: Wrench) -> Wrench {
-    let weight = felt(r_wt);
+/// Adds weight and bias to a contact wrench.
+fn loaded(r_wt: &UnitQuaternion<f64>, wrench: Wrench) -> Wrench {
+    let weight = load(r_wt);
     Wrench { force: wrench.force + weight.force, torque: wrench.torque + weight.torque }
 }
 
-fn felt(r_wt: &UnitQuaternion<f64>) -> Wrench {
+fn load(r_wt: &UnitQuaternion<f64>) -> Wrench {
     let weight = r_wt.inverse() * WEIGHT_W;
     Wrench { force: weight + BIAS.force, torque: CENTRE.cross(&weight) + BIAS.torque }
 }
@@ -140,14 +140,14 @@ fn felt(r_wt: &UnitQuaternion<f64>) -> Wrench {
 fn recording(count: i64, pose: impl Fn(i64) -> Isometry3<f64>) -> Vec<Message> {
     let pair = |i: i64| {
         let (stamp_ns, pose_ot) = (1_000_000_000 + i * 10_000_000, pose(i));
-        let wrench = felt(&pose_ot.rotation);
+        let wrench = load(&pose_ot.rotation);
         [Message::Pose(StampedPose { stamp_ns, pose_ot }), Message::Wrench(StampedWrench { stamp_ns, wrench })]
     };
     (0..count).flat_map(pair).collect()
 }
 
-/// Held still for 1.5 s in each of twelve orientations.
-fn still_poses() -> Vec<Message> {
+/// Held static for 1.5 s in each of twelve orientations.
+fn static_segments() -> Vec<Message> {
     recording(12 * 150, |i| {
         let k = (i / 150) as f64;
         let turn = vector![(1.3 * k).sin(), (2.1 * k).cos(), (0.7 * k).sin()] * 1.5;
@@ -155,7 +155,7 @@ fn still_poses() -> Vec<Message> {
     })
 }
 
-/// The ball rests while the stylus swings.
+/// The ball stays while the stylus swings.
 fn swing() -> Vec<Message> {
     recording(3000, |i| {
         let t = i as f64 / 100.0;
@@ -189,21 +189,21 @@ fn a_calibrated_scene_gives_the_mesh_of_the_plain_recording() {
     let scan = read_mesh(&case.path("made/scan.ply"), MeshUnit::Millimetre).unwrap().mesh;
     assert!(plain.positions().len() != scan.positions().len(), "something was touched");
     fs::write(case.path("pairs.csv"), pairs_csv()).unwrap();
-    case.record("still.mcap", "stylus", &still_poses());
+    case.record("static.mcap", "stylus", &static_segments());
     case.record("swing.mcap", "stylus", &swing());
-    let (pairs, still, swing) = (case.name("pairs.csv"), case.name("still.mcap"), case.name("swing.mcap"));
+    let (pairs, held, swing) = (case.name("pairs.csv"), case.name("static.mcap"), case.name("swing.mcap"));
 
-    let told: Value =
+    let report: Value =
         serde_json::from_str(done(&case.calibrate(&["scan", "--pairs", &pairs], "plain.yaml", "scan.yaml"))).unwrap();
-    assert!(told["rms_mm"].as_f64().unwrap() < 1e-9 && told["pairs"][4]["name"] == "E", "{told}");
-    let told: Value =
+    assert!(report["rms_mm"].as_f64().unwrap() < 1e-9 && report["pairs"][4]["name"] == "E", "{report}");
+    let report: Value =
         serde_json::from_str(done(&case.calibrate(&["tip", "--bag", &swing], "plain.yaml", "tip.yaml"))).unwrap();
-    assert!((told["offset_mm"]["value"][2].as_f64().unwrap() + 141.8).abs() < 1e-7, "{told}");
-    let told: Value =
-        serde_json::from_str(done(&case.calibrate(&["payload", "--bag", &still], "plain.yaml", "payload.yaml")))
+    assert!((report["offset_mm"]["value"][2].as_f64().unwrap() + 141.8).abs() < 1e-7, "{report}");
+    let report: Value =
+        serde_json::from_str(done(&case.calibrate(&["payload", "--bag", &held], "plain.yaml", "payload.yaml")))
             .unwrap();
-    assert!((told["weight_n"].as_f64().unwrap() - WEIGHT_W.norm()).abs() < 1e-9, "{told}");
-    assert_eq!(told["still_phases"], 12);
+    assert!((report["weight_n"].as_f64().unwrap() - WEIGHT_W.norm()).abs() < 1e-9, "{report}");
+    assert_eq!(report["static_segments"], 12);
     // all three, the payload first: its gravity is in the axes of space and turns with the scan that comes after it
     done(&case.calibrate(&["scan", "--pairs", &pairs], "payload.yaml", "all.yaml"));
     done(&case.calibrate(&["tip", "--bag", &swing], "all.yaml", "all.yaml"));
@@ -222,7 +222,7 @@ fn a_calibrated_scene_gives_the_mesh_of_the_plain_recording() {
         })
         .collect();
     case.record("tip.mcap", "stylus", &other_tip);
-    case.record("all.mcap", "stylus", &changed(&moved, weighed));
+    case.record("all.mcap", "stylus", &changed(&moved, loaded));
     for (bag, scene) in [("moved.mcap", "scan.yaml"), ("tip.mcap", "tip.yaml"), ("all.mcap", "all.yaml")] {
         let mesh = case.refined(bag, scene, "out.ply");
         let difference = largest_difference(&plain, &mesh);
@@ -242,24 +242,24 @@ fn a_calibrated_scene_gives_the_mesh_of_the_plain_recording() {
 }
 
 #[test]
-fn results_are_told_and_written_and_bad_data_is_3() {
+fn results_are_printed_and_written_and_bad_data_is_3() {
     let folder = tempfile::tempdir().unwrap();
     let name = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let (pairs, out) = (name("pairs.csv"), name("new.yaml"));
     fs::write(&pairs, pairs_csv()).unwrap();
     let scan = |more: &[&str]| touchup(&[&["calibrate", "scan", "--pairs", &pairs, "--out", &out], more].concat());
     let output = scan(&[]);
-    let told = done(&output);
-    assert!(told.contains("residual, mm") && told.contains("rms 0.000 mm") && told.contains(&out), "{told}");
+    let report = done(&output);
+    assert!(report.contains("residual, mm") && report.contains("rms 0.000 mm") && report.contains(&out), "{report}");
     let new = fs::read_to_string(&out).unwrap();
     assert!(new.starts_with("# Made by `touchup calibrate`") && new.contains("\n# E "), "{new}");
     assert!(new.contains("# touchup calibrate scan: 5 pairs, residuals 0.000 mm rms"), "{new}");
     assert!(touchup::scene::Scene::read(Path::new(&out)).unwrap().scan_to_space.is_some());
 
     let refused = |output: Output, exit: i32, named: &str| {
-        let told = text(&output.stderr);
-        assert_eq!((output.status.code(), text(&output.stdout)), (Some(exit), ""), "{told}");
-        assert!(told.contains(named) && told.lines().count() == 1, "{named}: {told}");
+        let report = text(&output.stderr);
+        assert_eq!((output.status.code(), text(&output.stdout)), (Some(exit), ""), "{report}");
+        assert!(report.contains(named) && report.lines().count() == 1, "{named}: {report}");
         assert_eq!(fs::read_to_string(&out).unwrap(), new, "{named}: what was there stays");
     };
     let lines: Vec<String> = pairs_csv().lines().map(str::to_owned).collect();
@@ -287,7 +287,7 @@ fn results_are_told_and_written_and_bad_data_is_3() {
     refused(touchup(&["calibrate", "payload", "--bag", &rest, "--out", &out]), 3, "1 still phases");
 }
 
-/// The stylus goes from point to point and rests on each for 0.8 s, pressing with 2 N along the normal; the poses are
+/// The stylus goes from point to point and dwells on each for 0.8 s, pressing with 2 N along the normal; the poses are
 /// of H.
 fn resting_on(points: &[(Point3<f64>, Vector3<f64>)]) -> Vec<Message> {
     let (radius, stiffness) = (1.5e-3, 20e3);
@@ -333,15 +333,15 @@ fn points_can_be_picked_with_the_stylus() {
         let [pairs, bag, scene, out] = ["points.csv", bag, "tip.yaml", "out.yaml"].map(name);
         touchup(&["calibrate", "scan", "--pairs", &pairs, "--bag", &bag, "--scene", &scene, "--out", &out, "--json"])
     };
-    let told: Value = serde_json::from_str(done(&scan("rests.mcap", &points))).unwrap();
-    assert!(told["rms_mm"].as_f64().unwrap() < 1e-6, "{told}");
+    let report: Value = serde_json::from_str(done(&scan("dwells.mcap", &points))).unwrap();
+    assert!(report["rms_mm"].as_f64().unwrap() < 1e-6, "{report}");
     let found: Vec<f64> =
-        told["scan_to_space"]["position_mm"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect();
+        report["scan_to_space"]["position_mm"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect();
     let off = Vector3::from_column_slice(&found) - pose_wo().translation.vector * 1e3;
     assert!(off.norm() < 1e-5, "{off}");
     let output = scan("four.mcap", &points[..4]);
     assert_eq!(output.status.code(), Some(3));
-    assert!(text(&output.stderr).contains("rested 4 times") && text(&output.stderr).contains("5 points"));
+    assert!(text(&output.stderr).contains("4 dwells") && text(&output.stderr).contains("5 points"));
 }
 
 /// The markers of a tracker in space, where they are read in place of the pose.
@@ -375,7 +375,7 @@ fn markers_in_space_refine_as_those_in_the_frame_of_the_scan() {
         serde_json::from_str(text(&output.stdout)).unwrap()
     };
     let (plain, space) = (refined("made/touch.mcap", "markers.yaml"), refined("space.mcap", "space.yaml"));
-    // markers are recorded in single precision, so that 1e-8 m is all that can be asked
+    // markers are recorded in single precision, so that 1e-8 m is the achievable accuracy
     let ratio = |key: &str| space[key].as_f64().unwrap() / plain[key].as_f64().unwrap();
     assert!(plain["moved_faces"].as_u64().unwrap() > 1000, "{plain}");
     for key in ["accepted", "moved_faces", "contacts"] {
@@ -401,7 +401,7 @@ fn real_static_poses_from_a_table() {
     assert_eq!(output.status.code(), Some(3));
     assert!(text(&output.stderr).contains("--wrench-axes pose"), "{}", text(&output.stderr));
     let output = touchup(&[&payload[..], &["--wrench-axes", "pose"]].concat());
-    let told = done(&output);
-    println!("{told}");
-    assert!(told.contains("weight      10.80") || told.contains("weight      10.81"), "{told}");
+    let report = done(&output);
+    println!("{report}");
+    assert!(report.contains("weight      10.80") || report.contains("weight      10.81"), "{report}");
 }

@@ -35,8 +35,8 @@ fn mounted() -> UnitQuaternion<f64> {
     UnitQuaternion::from_scaled_axis(vector![0.3, 0.2, -1.0])
 }
 
-/// What a sensor feels at rest: the formulas of the room's head, written down again.
-fn felt(r_wt: &UnitQuaternion<f64>, frame: WrenchFrame) -> Wrench {
+/// Wrench of a sensor at rest: the formulas of the room's head, written down again.
+fn load(r_wt: &UnitQuaternion<f64>, frame: WrenchFrame) -> Wrench {
     let r_ws = r_wt * mounted();
     let weight_s = r_ws.inverse() * WEIGHT;
     let (force, torque) = (weight_s + BIAS_F, CENTRE.cross(&weight_s) + BIAS_T);
@@ -50,7 +50,7 @@ fn static_poses(count: usize, noise: [f64; 2], frame: WrenchFrame, seed: u64) ->
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
     let mut pose = || {
         let r_wt = any_turn(&mut rng);
-        let mut wrench = felt(&r_wt, frame);
+        let mut wrench = load(&r_wt, frame);
         wrench.force += normal(&mut rng, noise[0]);
         wrench.torque += normal(&mut rng, noise[1]);
         StaticPose { r_wt, wrench, noise: Some(noise[0] * 10.0), samples: 100 }
@@ -95,7 +95,7 @@ fn uncertainties_of_the_payload_hold() {
     assert!(normalised.iter().all(|x| (0.75..1.3).contains(x)), "{normalised:?}");
 }
 
-/// Torques told exactly: the centre is as well known as the weight that pulls at it, and no better.
+/// Exact torques: the centre is as well known as the weight that pulls at it, and no better.
 #[test]
 fn the_centre_is_known_no_better_than_the_weight() {
     let (mut square, mut shares) = (0.0, Vec::new());
@@ -126,7 +126,7 @@ fn poses_in_contact_are_left_out() {
 }
 
 #[test]
-fn poses_that_do_not_tell_are_refused() {
+fn poses_that_do_not_determine_the_payload_are_refused() {
     let all = static_poses(12, [0.02, 0.002], WrenchFrame::Sensor, 2);
     let fitted = |poses: &[StaticPose]| fit_payload(poses, &params(WrenchFrame::Sensor));
     assert_eq!(fitted(&all[..3]).unwrap_err(), PayloadError::TooFew { count: 3 });
@@ -135,12 +135,12 @@ fn poses_that_do_not_tell_are_refused() {
     let one_axis: Vec<_> = (0..12)
         .map(|i| {
             let r_wt = UnitQuaternion::from_scaled_axis(axis * f64::from(i)) * all[0].r_wt;
-            StaticPose { r_wt, wrench: felt(&r_wt, WrenchFrame::Sensor), ..all[0] }
+            StaticPose { r_wt, wrench: load(&r_wt, WrenchFrame::Sensor), ..all[0] }
         })
         .collect();
-    let told = fitted(&one_axis).unwrap_err();
-    let PayloadError::TooAlike { tilt_deg, axis: named } = told else { panic!("{told}") };
-    assert!(tilt_deg < 1e-3 && (Vector3::from(named).dot(&axis).abs() - 1.0).abs() < 1e-6, "{told}");
+    let error = fitted(&one_axis).unwrap_err();
+    let PayloadError::TooAlike { tilt_deg, axis: named } = error else { panic!("{error}") };
+    assert!(tilt_deg < 1e-3 && (Vector3::from(named).dot(&axis).abs() - 1.0).abs() < 1e-6, "{error}");
     // nothing hangs on it
     let mut rng = Pcg64Mcg::seed_from_u64(3);
     let empty: Vec<_> = all
@@ -149,9 +149,9 @@ fn poses_that_do_not_tell_are_refused() {
         .collect();
     assert!(matches!(fitted(&empty), Err(PayloadError::NoWeight { .. })));
     // the other axes
-    let told = fit_payload(&all, &params(WrenchFrame::Object)).unwrap_err();
-    assert!(matches!(told, PayloadError::WrongAxes { other: "sensor", .. }), "{told}");
-    assert!(told.to_string().contains("--wrench-axes sensor"));
+    let error = fit_payload(&all, &params(WrenchFrame::Object)).unwrap_err();
+    assert!(matches!(error, PayloadError::WrongAxes { other: "sensor", .. }), "{error}");
+    assert!(error.to_string().contains("--wrench-axes sensor"));
     // half of them lean on something
     let mut rng = Pcg64Mcg::seed_from_u64(4);
     let mut leaning = static_poses(21, [0.02, 0.002], WrenchFrame::Sensor, 2);
@@ -159,10 +159,10 @@ fn poses_that_do_not_tell_are_refused() {
     assert!(matches!(fitted(&leaning), Err(PayloadError::Inconsistent { .. } | PayloadError::NoWeight { .. })));
 }
 
-/// A robot that turns to eight orientations and rests in each for a second: the phases are found, the turning between
+/// A robot that turns to eight orientations and dwells in each for a second: the segments are found, the turning between
 /// them and the settling after it are not in them.
 #[test]
-fn still_phases_of_a_recording_are_found() {
+fn static_segments_of_a_recording_are_found() {
     let mut rng = Pcg64Mcg::seed_from_u64(9);
     let turns: Vec<_> = (0..8).map(|_| any_turn(&mut rng)).collect();
     let mut finder = StillFinder::new(StillParams::default());
@@ -170,9 +170,9 @@ fn still_phases_of_a_recording_are_found() {
     for pair in turns.windows(2) {
         for tick in 0..2500 {
             stamp_ns += 1_000_000;
-            let way = ((f64::from(tick) - 1500.0) / 1000.0).clamp(0.0, 1.0);
-            let r_wt = pair[0].slerp(&pair[1], way);
-            let mut wrench = felt(&r_wt, WrenchFrame::Sensor);
+            let share = ((f64::from(tick) - 1500.0) / 1000.0).clamp(0.0, 1.0);
+            let r_wt = pair[0].slerp(&pair[1], share);
+            let mut wrench = load(&r_wt, WrenchFrame::Sensor);
             let settling = (-f64::from(tick) / 100.0).exp();
             wrench.force += normal(&mut rng, 0.05) + vector![2.0, 0.0, 0.0] * settling;
             let pose_ot = Isometry3::from_parts(Vector3::zeros().into(), r_wt);
@@ -184,7 +184,7 @@ fn still_phases_of_a_recording_are_found() {
     for (pose, turn) in poses.iter().zip(&turns) {
         assert!(pose.r_wt.angle_to(turn) < 2e-3, "{}", pose.r_wt.angle_to(turn));
         assert!((pose.noise.unwrap() - 0.05).abs() < 0.004 && pose.samples >= 600, "{pose:?}");
-        assert!((pose.wrench.force - felt(turn, WrenchFrame::Sensor).force).norm() < 0.05);
+        assert!((pose.wrench.force - load(turn, WrenchFrame::Sensor).force).norm() < 0.05);
     }
 }
 
@@ -201,7 +201,7 @@ fn turn_of(xyzw: &[f64]) -> UnitQuaternion<f64> {
 /// Seven static poses of an ATI Axia80, the wrench in the axes of the poses: the authors found 10.80 N. An independent
 /// least squares (numpy) gives 10.807 N, residuals of 0.147 N rms per axis, and gravity along −z of the robot's base.
 #[test]
-fn seven_real_poses_weigh_what_their_authors_found() {
+fn seven_real_poses_give_the_payload_of_their_authors() {
     let (Some(poses), Some(wrenches)) = (real("pose_7.txt"), real("wrench_7.txt")) else { return };
     assert_eq!((poses.len(), wrenches.len()), (7, 7));
     let pose = |(pose, wrench): (&Vec<f64>, &Vec<f64>)| StaticPose {
@@ -221,15 +221,15 @@ fn seven_real_poses_weigh_what_their_authors_found() {
     assert!((found.weight[0] - 10.806727).abs() < 1e-5, "numpy: {:?}", found.weight);
     assert!((found.rms_force / 3f64.sqrt() - 0.1468989).abs() < 1e-6, "numpy: {}", found.rms_force);
     assert!(found.weight_w.value.z / found.weight[0] < -0.9999);
-    let told = fit_payload(&poses, &PayloadParams::default()).unwrap_err();
-    assert!(matches!(told, PayloadError::WrongAxes { other: "pose", .. }), "{told}");
+    let error = fit_payload(&poses, &PayloadParams::default()).unwrap_err();
+    assert!(matches!(error, PayloadError::WrongAxes { other: "pose", .. }), "{error}");
 }
 
 /// Three minutes of the same set-up, the wrench in the sensor's own axes, settling slowly after each turn. Over all
 /// rows an independent least squares (numpy) gives 11.413 N: 5.7 % more than the authors' result from their other
 /// poses.
 #[test]
-fn a_real_stream_weighs_the_same_within_its_settling() {
+fn a_real_stream_gives_the_same_payload_within_its_settling() {
     let Some(rows) = real("GP2025.txt") else { return };
     let mut finder = StillFinder::new(StillParams::default());
     let mut poses = Vec::new();
@@ -241,8 +241,8 @@ fn a_real_stream_weighs_the_same_within_its_settling() {
         poses.push(StaticPose { r_wt, wrench, noise: None, samples: 1 });
     }
     let params = PayloadParams::default();
-    let still = finder.finish();
-    let by_phases = fit_payload(&still, &params).unwrap();
+    let segments = finder.finish();
+    let by_phases = fit_payload(&segments, &params).unwrap();
     let by_rows = fit_payload(&poses, &params).unwrap();
     for (name, found) in [("phases", &by_phases), ("rows", &by_rows)] {
         let (poses, rejected, tilt) = (found.poses, found.rejected.len(), found.tilt.to_degrees());
@@ -251,15 +251,15 @@ fn a_real_stream_weighs_the_same_within_its_settling() {
             found.weight, found.rms_force
         );
     }
-    assert!(still.len() >= 10, "{}", still.len());
+    assert!(segments.len() >= 10, "{}", segments.len());
     for found in [&by_phases, &by_rows] {
         assert!((found.weight[0] / 10.80 - 1.0).abs() < 0.065, "{:?}", found.weight);
         assert!(found.weight_w.value.z / found.weight[0] < -0.999);
     }
     assert!((by_rows.weight[0] - 11.413).abs() < 0.1 && by_phases.rms_force < by_rows.rms_force);
     let in_pose_axes = PayloadParams { wrench_frame: WrenchFrame::Object, ..params };
-    let told = fit_payload(&poses, &in_pose_axes).unwrap_err();
-    assert!(matches!(told, PayloadError::WrongAxes { other: "sensor", .. }), "{told}");
+    let error = fit_payload(&poses, &in_pose_axes).unwrap_err();
+    assert!(matches!(error, PayloadError::WrongAxes { other: "sensor", .. }), "{error}");
 }
 
 // ---- tip --------------------------------------------------------------------------------------------------------
@@ -287,7 +287,7 @@ fn an_exact_swing_gives_the_tip() {
     assert_eq!(found.rejected, 0);
 }
 
-/// Offset and resting point over their stated uncertainties, 100 seeds, for noise that comes anew and noise that lasts.
+/// Offset and resting point over their stated uncertainties, 100 seeds, for white and for correlated noise.
 #[test]
 fn uncertainties_of_the_tip_hold() {
     for memory in [0.0, 0.9] {
@@ -326,7 +326,7 @@ fn slips_are_left_out() {
 }
 
 #[test]
-fn swings_that_do_not_tell_are_refused() {
+fn swings_that_do_not_determine_the_tip_are_refused() {
     let fitted = |poses: &[Isometry3<f64>]| fit_tip(poses, &TipFitParams::default()).unwrap_err();
     assert_eq!(fitted(&swing(5, 0.5, 1.0, 0.0, 0.0, 0)), TipError::TooFew { count: 5 });
     // about one axis (x, turned by 0.3 rad about z): the offset along it is anything
@@ -336,13 +336,13 @@ fn swings_that_do_not_tell_are_refused() {
             Isometry3::from_parts((REST - turn * OFFSET).into(), turn)
         })
         .collect();
-    let told = fitted(&hinge);
-    let TipError::TooSmall { swing_deg, axis, .. } = told else { panic!("{told}") };
-    assert!(swing_deg < 1e-3 && axis[0].abs() > 0.999_999, "{told}");
-    // to all sides, but by 4°: what lies across the shaft is seen least, since each of its axes tilts one way only
-    let told = fitted(&swing(3000, 0.07, 1.0, 0.05e-3, 0.0, 1));
-    let TipError::TooSmall { swing_deg, axis, .. } = told else { panic!("{told}") };
-    assert!((2.0..6.0).contains(&swing_deg) && axis[2].abs() < 0.05, "{told}");
+    let error = fitted(&hinge);
+    let TipError::TooSmall { swing_deg, axis, .. } = error else { panic!("{error}") };
+    assert!(swing_deg < 1e-3 && axis[0].abs() > 0.999_999, "{error}");
+    // to all sides, but by 4°: what lies across the shaft is seen least, since each of its axes tilts in one direction only
+    let error = fitted(&swing(3000, 0.07, 1.0, 0.05e-3, 0.0, 1));
+    let TipError::TooSmall { swing_deg, axis, .. } = error else { panic!("{error}") };
+    assert!((2.0..6.0).contains(&swing_deg) && axis[2].abs() < 0.05, "{error}");
     // swung in free air about the hand
     let mut rng = Pcg64Mcg::seed_from_u64(7);
     let mut free = swing(2000, 0.5, 1.0, 0.0, 0.0, 0);

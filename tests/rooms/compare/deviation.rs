@@ -99,12 +99,12 @@ fn parallel_planes_are_as_far_apart_as_they_are() {
     for (height, side) in [(0.3e-3, 1.0), (-0.3e-3, -1.0)] {
         let found = compared(&square(7, height), &truth, &few());
         let all = &found.regions[0];
-        for told in [&all.mesh_to_truth, &all.truth_to_mesh, &all.vertices_to_truth] {
-            let Summary { mean, rms, median, p95, p99, max, bias, .. } = told.clone().unwrap();
+        for summary in [&all.mesh_to_truth, &all.truth_to_mesh, &all.vertices_to_truth] {
+            let Summary { mean, rms, median, p95, p99, max, bias, .. } = summary.clone().unwrap();
             for size in [mean, rms, median, p95, p99, max] {
-                assert!((size - 0.3e-3).abs() < 1e-15, "{told:?}");
+                assert!((size - 0.3e-3).abs() < 1e-15, "{summary:?}");
             }
-            assert!((bias - side * 0.3e-3).abs() < 1e-15, "above is too much, below too little: {told:?}");
+            assert!((bias - side * 0.3e-3).abs() < 1e-15, "above is too much, below too little: {summary:?}");
         }
         let tilt = all.tilt.unwrap();
         assert_eq!((tilt.median, tilt.p95, tilt.flipped), (0.0, 0.0, 0.0));
@@ -158,13 +158,13 @@ fn a_shifted_cube_is_off_where_it_sticks_out() {
         let expected = if p.x > 10e-3 { 1e-3 } else { 0.0 };
         assert!((deviation - expected).abs() < 1e-16, "{p}: {deviation}");
     }
-    let told = found.regions[0].mesh_to_truth.clone().unwrap();
-    assert!((told.max - 1e-3).abs() < 1e-15, "{told:?}");
+    let summary = found.regions[0].mesh_to_truth.clone().unwrap();
+    assert!((summary.max - 1e-3).abs() < 1e-15, "{summary:?}");
     // integrals over the faces, mm²·mm: the one in front 100 · 1; the four at its sides ∫₀¹ x dx · 10 each; behind, at a
     // depth of 1, a pyramid's frustum ∫ min(1, distance to the rim) = (100 + 10 · 8 + 64) / 3 · 1 below zero
     let [front, sides, behind] = [100.0, 4.0 * 5.0, -(100.0 + 80.0 + 64.0) / 3.0];
     let expected = (front + sides + behind) / 600.0 * 1e-3;
-    assert!((told.bias - expected).abs() < 0.01e-3, "{} instead of {expected}", told.bias);
+    assert!((summary.bias - expected).abs() < 0.01e-3, "{} instead of {expected}", summary.bias);
 }
 
 #[test]
@@ -191,7 +191,7 @@ fn samples_are_even_and_come_again() {
 }
 
 #[test]
-fn regions_are_told_apart_and_looked_up_for_the_scan() {
+fn regions_are_separated_and_looked_up_for_the_scan() {
     let truth = square(1, 0.0);
     // as after a touch: the left half fits, the right half is 0.5 mm too high
     let mut mesh = square(20, 0.0);
@@ -261,9 +261,9 @@ proptest! {
         let [here, there] = [compared(&mesh, &truth, &params), compared(&moved(&mesh), &moved(&truth), &params)];
         let numbers = |found: &Comparison| -> Vec<f64> {
             let all = &found.regions[0];
-            let told = [&all.mesh_to_truth, &all.truth_to_mesh, &all.vertices_to_truth, &all.cloud_to_truth, &all.truth_to_cloud];
-            told.into_iter().flat_map(|told| {
-                let Summary { mean, rms, median, p95, p99, max, bias, .. } = told.clone().unwrap();
+            let summaries = [&all.mesh_to_truth, &all.truth_to_mesh, &all.vertices_to_truth, &all.cloud_to_truth, &all.truth_to_cloud];
+            summaries.into_iter().flat_map(|summary| {
+                let Summary { mean, rms, median, p95, p99, max, bias, .. } = summary.clone().unwrap();
                 [mean, rms, median, p95, p99, max, bias]
             }).collect()
         };
@@ -378,7 +378,7 @@ fn touchup(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_touchup")).args(arguments).env_remove("RUST_LOG").output().unwrap()
 }
 
-fn told(output: &Output) -> (i32, &str, &str) {
+fn parts_of(output: &Output) -> (i32, &str, &str) {
     let text = |bytes| std::str::from_utf8(bytes).unwrap();
     (output.status.code().unwrap(), text(&output.stdout), text(&output.stderr))
 }
@@ -393,17 +393,17 @@ fn plates(folder: &Path) -> [String; 2] {
 }
 
 #[test]
-fn the_verb_tells_numbers_and_writes_picture_and_colours() {
+fn compare_prints_numbers_and_writes_picture_and_colours() {
     let folder = tempfile::tempdir().unwrap();
     let [mesh, truth] = plates(folder.path());
     let [picture, coloured] = ["a.png", "a.ply"].map(|name| folder.path().join(name).to_str().unwrap().to_owned());
     let files = ["--picture", &picture, "--coloured", &coloured, "--before", &mesh, "--samples", "1000"];
     let output = touchup(&[&["compare", &mesh, &truth, "--json"][..], &files].concat());
-    let (code, out, err) = told(&output);
+    let (code, out, err) = parts_of(&output);
     assert_eq!((code, err), (0, ""));
-    let told: serde_json::Value = serde_json::from_str(out).unwrap();
+    let report: serde_json::Value = serde_json::from_str(out).unwrap();
     for what in ["before", "after"] {
-        let all = &told[what]["regions"][0];
+        let all = &report[what]["regions"][0];
         assert_eq!(all["region"], "all");
         for distance in ["mean_mm", "rms_mm", "median_mm", "p95_mm", "p99_mm", "max_mm", "bias_mm"] {
             let found = all["mesh_to_truth"][distance].as_f64().unwrap();
@@ -420,29 +420,29 @@ fn the_verb_tells_numbers_and_writes_picture_and_colours() {
     assert_eq!(deviation.unwrap(), vec![0.25; 25]);
 
     let output = touchup(&["compare", &mesh, &truth, "--samples", "1000", "--align", "icp"]);
-    let (code, out, err) = self::told(&output);
+    let (code, out, err) = parts_of(&output);
     assert_eq!(code, 0);
     assert!(err.contains("3 motions leave the mesh"), "{err}");
     assert!(out.contains("aligned by icp") && out.contains("not determined") && out.contains("mesh to truth"), "{out}");
 }
 
 #[test]
-fn a_refined_mesh_is_told_by_what_it_rests_on() {
+fn a_refined_mesh_is_reported_by_support() {
     let folder = tempfile::tempdir().unwrap();
     let [_, truth] = plates(folder.path());
     let path = folder.path().join("refined.ply");
     let mesh = square(4, 0.25e-3);
-    let told_of = |columns: &[VertexColumn<'_>]| -> Vec<(String, u64)> {
+    let region_sizes = |columns: &[VertexColumn<'_>]| -> Vec<(String, u64)> {
         write_mesh_with(&path, &mesh, columns, MeshUnit::Millimetre).unwrap();
         let output = touchup(&["compare", path.to_str().unwrap(), &truth, "--samples", "1000", "--json"]);
-        let (code, out, err) = told(&output);
+        let (code, out, err) = parts_of(&output);
         assert_eq!((code, err), (0, ""));
-        let told: serde_json::Value = serde_json::from_str(out).unwrap();
-        let regions = told["after"]["regions"].as_array().unwrap().iter();
+        let report: serde_json::Value = serde_json::from_str(out).unwrap();
+        let regions = report["after"]["regions"].as_array().unwrap().iter();
         let points = |part: &serde_json::Value| part["vertices_to_truth"]["points"].as_u64().unwrap();
         regions.map(|part| (part["region"].as_str().unwrap().to_owned(), points(part))).collect()
     };
-    // 3 scanned, 10 felt, 7 guessed, 5 that the ball cannot reach, which are guessed too
+    // 3 scanned, 10 touched, 7 guessed, 5 that the ball cannot reach, which are guessed too
     let support: Vec<f32> =
         [(0.0, 3), (1.0, 10), (2.0, 7), (3.0, 5)].iter().flat_map(|&(n, times)| vec![n; times]).collect();
     let touched: Vec<f32> = [(0.0, 4), (1.0, 12), (0.5, 9)].iter().flat_map(|&(n, times)| vec![n; times]).collect();
@@ -450,9 +450,9 @@ fn a_refined_mesh_is_told_by_what_it_rests_on() {
     let named = |counts: [u64; 4]| -> Vec<(String, u64)> {
         ["all", "touched", "guessed", "untouched"].iter().map(|name| (*name).to_owned()).zip(counts).collect()
     };
-    assert_eq!(told_of(&[column("touched", &touched), column("support", &support)]), named([25, 10, 12, 3]));
-    assert_eq!(told_of(&[column("touched", &touched)]), named([25, 12, 9, 4]));
-    assert_eq!(told_of(&[]), [("all".to_owned(), 25)]);
+    assert_eq!(region_sizes(&[column("touched", &touched), column("support", &support)]), named([25, 10, 12, 3]));
+    assert_eq!(region_sizes(&[column("touched", &touched)]), named([25, 12, 9, 4]));
+    assert_eq!(region_sizes(&[]), [("all".to_owned(), 25)]);
 }
 
 #[test]
@@ -460,12 +460,12 @@ fn a_wrong_unit_is_suspected_with_the_flag_that_helps() {
     let folder = tempfile::tempdir().unwrap();
     let [mesh, truth] = plates(folder.path());
     let (flag, output) = ("--truth-unit", touchup(&["compare", &mesh, &truth, "--truth-unit", "inch"]));
-    let (code, _, err) = told(&output);
+    let (code, _, err) = parts_of(&output);
     assert_eq!(code, 0);
     assert!(err.contains("25.4 times smaller") && err.contains(&format!("try --mesh-unit inch or {flag} mm")), "{err}");
     // 20 000 mm: no work-piece, and the flag is the one of the truth
     let output = touchup(&["compare", &mesh, &truth, "--truth-unit", "m"]);
-    let (code, out, err) = told(&output);
+    let (code, out, err) = parts_of(&output);
     assert_eq!((code, out), (3, ""));
     assert!(err.contains("try --truth-unit mm"), "{err}");
 }
@@ -487,14 +487,14 @@ fn bad_use_is_refused_before_any_work() {
         &["--align", "magic"],
     ] {
         let output = touchup(&[&["compare", &mesh, &truth][..], arguments].concat());
-        let (code, out, err) = told(&output);
+        let (code, out, err) = parts_of(&output);
         assert_eq!((code, out), (2, ""), "{arguments:?}: {err}");
     }
     assert_eq!(fs::read(&mesh).unwrap(), before, "an input is never written over");
     let nowhere = touchup(&["compare", &mesh, &truth, "--picture", "/no/such/place/a.png"]);
-    assert_eq!(told(&nowhere).0, 1);
+    assert_eq!(parts_of(&nowhere).0, 1);
     let missing = touchup(&["compare", &mesh, "/no/such/part.stl"]);
-    assert_eq!(told(&missing).0, 3);
+    assert_eq!(parts_of(&missing).0, 3);
 }
 
 /// So many threads, each with its share.

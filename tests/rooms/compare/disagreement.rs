@@ -13,7 +13,7 @@ use touchup::touch::Message;
 
 use crate::full::either;
 
-/// A scanner of the better kind; it still closes holes, rounds edges, is too fat and out of place.
+/// A scanner of the better kind; it still closes holes, rounds edges, is too large and displaced.
 fn scanner(seed: u64) -> ScannerParams {
     let closes = 6e-3;
     ScannerParams {
@@ -62,8 +62,8 @@ impl Case {
     fn disagree(&self) -> Value {
         let [scan, refined, csv, map] =
             ["scan.ply", "refined.ply", "touches.csv", "map.ply"].map(|name| self.text(name));
-        let told = touchup(&["disagree", &scan, &refined, "--touches", &csv, "--json", "--coloured", &map]);
-        serde_json::from_str(&told).unwrap()
+        let report = touchup(&["disagree", &scan, &refined, "--touches", &csv, "--json", "--coloured", &map]);
+        serde_json::from_str(&report).unwrap()
     }
 }
 
@@ -73,13 +73,13 @@ fn touchup(arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-fn area(told: &Value, class: &str) -> f64 {
-    let classes = told["classes"].as_array().unwrap();
+fn area(report: &Value, class: &str) -> f64 {
+    let classes = report["classes"].as_array().unwrap();
     classes.iter().find(|own| own["class"] == class).unwrap()["refined_mm2"].as_f64().unwrap()
 }
 
-fn regions<'a>(told: &'a Value, class: &'a str) -> Vec<&'a Value> {
-    told["regions"].as_array().unwrap().iter().filter(|own| own["class"] == class).collect()
+fn regions<'a>(report: &'a Value, class: &'a str) -> Vec<&'a Value> {
+    report["regions"].as_array().unwrap().iter().filter(|own| own["class"] == class).collect()
 }
 
 fn centre(region: &Value) -> Vector3<f64> {
@@ -147,16 +147,16 @@ fn a_part_that_was_not_changed_is_not_called_changed() {
     for seed in 1..=either(1, 3) {
         // the demo's poor scanner, and a better one
         for scanner in [ScannerParams { seed, ..Default::default() }, scanner(seed)] {
-            let told = Case::new(&plate(), &plate(), &scanner, |_| ()).disagree();
-            assert_eq!(regions(&told, "changed part").len(), 0, "{seed}: {told}");
-            assert_eq!(area(&told, "changed part"), 0.0);
-            let felt = area(&told, "agrees") + area(&told, "scanner error");
-            // noise at an edge cannot be told from a small change, least of all that of a poor scanner
+            let report = Case::new(&plate(), &plate(), &scanner, |_| ()).disagree();
+            assert_eq!(regions(&report, "changed part").len(), 0, "{seed}: {report}");
+            assert_eq!(area(&report, "changed part"), 0.0);
+            let touched = area(&report, "agrees") + area(&report, "scanner error");
+            // noise at an edge cannot be distinguished from a small change, least of all that of a poor scanner
             let share = if scanner.noise > 0.3e-3 { 0.06 } else { 0.04 };
-            let small = |class| area(&told, class) < share * felt;
-            assert!(small("unsure") && small("bad touch"), "{seed}: {} {}", told["classes"], told["regions"]);
-            // what it was told to be, as far as a few dozen independent places can tell
-            let noise = told["scanner"]["noise_mm"].as_f64().unwrap();
+            let small = |class| area(&report, class) < share * touched;
+            assert!(small("unsure") && small("bad touch"), "{seed}: {} {}", report["classes"], report["regions"]);
+            // the simulated value, as far as a few dozen independent places determine it
+            let noise = report["scanner"]["noise_mm"].as_f64().unwrap();
             assert!((0.5..1.6).contains(&(noise / (scanner.noise * 1e3))), "{seed}: {noise}");
         }
     }
@@ -166,13 +166,13 @@ fn a_part_that_was_not_changed_is_not_called_changed() {
 fn a_boss_that_was_milled_off_by_a_millimetre_is_found() {
     for seed in 1..=either(1, 3) {
         let now = moved(&plate(), |p| if p.z > 15e-3 { p - Vector3::z() * 1e-3 } else { p });
-        let told = Case::new(&plate(), &now, &scanner(seed), |_| ()).disagree();
-        let found = regions(&told, "changed part");
-        assert_eq!(found.len(), 1, "{seed}: {told}");
-        // the boss stands at (47, 25) mm, 10 mm wide
+        let report = Case::new(&plate(), &now, &scanner(seed), |_| ()).disagree();
+        let found = regions(&report, "changed part");
+        assert_eq!(found.len(), 1, "{seed}: {report}");
+        // the boss is at (47, 25) mm, 10 mm wide
         assert!((centre(found[0]) - Vector3::new(47.0, 25.0, 15.0)).norm() < 1.0, "{seed}: {}", found[0]);
         let (mean, area) = (found[0]["mean_mm"].as_f64().unwrap(), found[0]["area_mm2"].as_f64().unwrap());
-        assert!((-1.35..-0.8).contains(&mean), "1 mm, and what the scan is too fat: {mean}");
+        assert!((-1.35..-0.8).contains(&mean), "1 mm, and the surface offset of the scan: {mean}");
         assert!((20.0..100.0).contains(&area), "at most the top of 78.5 mm2 and its rim: {area}");
     }
 }
@@ -182,15 +182,15 @@ fn a_groove_that_was_cut_is_found() {
     let before = block(&[[0.0, 12.0], [60.0, 12.0]]);
     let now = block(&[[0.0, 12.0], [22.0, 12.0], [22.0, 10.5], [38.0, 10.5], [38.0, 12.0], [60.0, 12.0]]);
     for seed in 1..=either(1, 3) {
-        let told = Case::new(&before, &now, &scanner(seed), |_| ()).disagree();
-        let found = regions(&told, "changed part");
-        assert!(!found.is_empty(), "{seed}: {told}");
+        let report = Case::new(&before, &now, &scanner(seed), |_| ()).disagree();
+        let found = regions(&report, "changed part");
+        assert!(!found.is_empty(), "{seed}: {report}");
         for region in found {
             let centre = centre(region);
             assert!((22.0..38.0).contains(&centre.x) && (centre.z - 10.5).abs() < 0.6, "{seed}: {region}");
         }
-        // and nowhere else: the map says the same place by place
-        let changed = area(&told, "changed part");
+        // and nowhere else: the map agrees place by place
+        let changed = area(&report, "changed part");
         assert!((250.0..720.0).contains(&changed), "16 mm by 40 mm and its walls: {changed}");
     }
 }
@@ -198,7 +198,7 @@ fn a_groove_that_was_cut_is_found() {
 #[test]
 fn spikes_of_the_pose_are_bad_touches() {
     for seed in 1..=either(1, 2) {
-        // 12 times for 30 ms the tracker says 1.2 mm too high
+        // 12 times for 30 ms the tracker reads 1.2 mm too high
         let shake = |messages: &mut [Message]| {
             let last = messages.len();
             for burst in 1..=12 {
@@ -216,9 +216,9 @@ fn spikes_of_the_pose_are_bad_touches() {
         };
         let plain = Case::new(&plate(), &plate(), &scanner(seed), |_| ()).disagree();
         let spiked = Case::new(&plate(), &plate(), &scanner(seed), shake).disagree();
-        let count = |told: &Value| {
+        let count = |report: &Value| {
             let far = |bad: &&Value| bad["off_mm"].as_f64().unwrap() > 0.4;
-            told["bad_touches"].as_array().unwrap().iter().filter(far).count()
+            report["bad_touches"].as_array().unwrap().iter().filter(far).count()
         };
         assert_eq!(count(&plain), 0, "{seed}: {plain}");
         assert!(count(&spiked) >= 3, "{seed}: {}", spiked["bad_touches"]);
@@ -227,14 +227,14 @@ fn spikes_of_the_pose_are_bad_touches() {
 }
 
 #[test]
-fn what_is_written_is_what_was_told() {
+fn written_columns_match_the_report() {
     let case = Case::new(&plate(), &plate(), &scanner(4), |_| ());
-    let told = case.disagree();
+    let report = case.disagree();
     let map = read_mesh(&case.path("map.ply"), MeshUnit::Millimetre).unwrap().mesh;
-    let all: f64 = told["classes"].as_array().unwrap().iter().map(|c| c["refined_mm2"].as_f64().unwrap()).sum();
+    let all: f64 = report["classes"].as_array().unwrap().iter().map(|c| c["refined_mm2"].as_f64().unwrap()).sum();
     let area: f64 = map.faces().map(|(face, _)| map.double_area_normal(face).norm() / 2.0).sum();
     assert!((all / (area * 1e6) - 1.0).abs() < 1e-4);
-    // the same without a PLY that says what was touched
+    // the same without a PLY that marks touched vertices
     let output = Command::new(env!("CARGO_BIN_EXE_touchup"))
         .args(["disagree", &case.text("scan.ply"), &case.text("scan.ply"), "--touches", &case.text("touches.csv")])
         .output()
@@ -244,22 +244,22 @@ fn what_is_written_is_what_was_told() {
     assert!(Path::new(&case.text("map.ply")).exists());
 }
 
-// The scan is turned by 0.15° and shifted by 0.2 mm, of which noise of 0.6 mm hides most: what is told is no more than that,
-// as far as the stated deviation goes. Turned by 3°, it is told in most.
+// The scan is turned by 0.15° and shifted by 0.2 mm, of which noise of 0.6 mm hides most: the reported offset is no more than
+// that, as far as the stated deviation goes. Turned by 3°, it is reported in most.
 #[test]
-fn a_scan_is_told_to_be_turned_only_as_far_as_that_is_known() {
-    let mut told_turned = 0;
+fn a_turned_scan_is_reported_only_as_far_as_the_turn_is_known() {
+    let mut turned_found = 0;
     for seed in 1..=either(1, 3) {
         let poor = ScannerParams { seed, ..Default::default() };
-        let told = Case::new(&plate(), &plate(), &poor, |_| ()).disagree();
-        let vector = |name: &str| Vector3::from_fn(|i, _| told["misplaced"][name][i].as_f64().unwrap());
-        if !told["misplaced"].is_null() {
+        let report = Case::new(&plate(), &plate(), &poor, |_| ()).disagree();
+        let vector = |name: &str| Vector3::from_fn(|i, _| report["rigid_offset"][name][i].as_f64().unwrap());
+        if !report["rigid_offset"].is_null() {
             let far = vector("turn_deg").norm() - 0.15;
-            assert!(far < 3.0 * vector("turn_std_deg").norm(), "{seed}: {}", told["misplaced"]);
+            assert!(far < 3.0 * vector("turn_std_deg").norm(), "{seed}: {}", report["rigid_offset"]);
         }
-        let turned = ScannerParams { misplaced_angle: 3f64.to_radians(), ..poor };
-        let told = Case::new(&plate(), &plate(), &turned, |_| ()).disagree();
-        told_turned += usize::from(!told["misplaced"].is_null());
+        let turned = ScannerParams { rigid_turn: 3f64.to_radians(), ..poor };
+        let report = Case::new(&plate(), &plate(), &turned, |_| ()).disagree();
+        turned_found += usize::from(!report["rigid_offset"].is_null());
     }
-    assert!(told_turned >= either(1, 2), "{told_turned} of {}", either(1, 3));
+    assert!(turned_found >= either(1, 2), "{turned_found} of {}", either(1, 3));
 }

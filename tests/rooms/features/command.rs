@@ -17,12 +17,12 @@ fn text(bytes: &[u8]) -> &str {
     std::str::from_utf8(bytes).unwrap()
 }
 
-fn told(output: &Output) -> (i32, &str, &str) {
+fn parts_of(output: &Output) -> (i32, &str, &str) {
     (output.status.code().expect("no signal ended it"), text(&output.stdout), text(&output.stderr))
 }
 
 fn done(output: &Output) -> &str {
-    let (code, stdout, stderr) = told(output);
+    let (code, stdout, stderr) = parts_of(output);
     assert_eq!((code, stderr), (0, ""));
     stdout
 }
@@ -51,7 +51,7 @@ impl Folder {
     }
 }
 
-/// The plate as its drawing says, and a file of one touch.
+/// The plate by its drawing, and a file of one touch.
 fn drawn() -> Folder {
     let folder = Folder::new();
     let plate = touchup::sim::Plate::default().mesh(10e-6).unwrap();
@@ -81,7 +81,7 @@ fn bad_input_is_3_in_one_line_that_names_it() {
         (with_touches(""), "bad.csv"),
     ];
     for (output, named) in &cases {
-        let (code, stdout, stderr) = told(output);
+        let (code, stdout, stderr) = parts_of(output);
         assert_eq!((code, stdout), (3, ""), "{named}: {stderr}");
         assert!(stderr.contains(named) && stderr.lines().count() == 1, "{named}: {stderr}");
     }
@@ -95,12 +95,12 @@ fn outputs_over_inputs_are_refused() {
         let (before, out) = (folder.bytes(input), folder.name(&format!("./{input}")));
         let output =
             touchup(&["features", &folder.name("plate.ply"), "--touches", &folder.name("touches.csv"), "--out", &out]);
-        let (code, stdout, stderr) = told(&output);
+        let (code, stdout, stderr) = parts_of(&output);
         assert!((code, stdout) == (2, "") && stderr.contains(&format!("which {flag} reads")), "{code}: {stderr}");
         assert_eq!(folder.bytes(input), before);
     }
     let nowhere = touchup(&["features", &folder.name("plate.ply"), "--out", &folder.name("no/out.json")]);
-    let (code, stdout, stderr) = told(&nowhere);
+    let (code, stdout, stderr) = parts_of(&nowhere);
     assert!((code, stdout) == (1, "") && stderr.contains("out.json"), "{code}: {stderr}");
 }
 
@@ -112,9 +112,9 @@ fn a_mesh_with_nothing_on_it_gives_an_empty_list() {
     let words = done(&touchup(&features)).to_owned();
     assert!(words.contains("no features") && words.contains("out.json"), "{words}");
     assert_eq!(folder.json("out.json")["features"], serde_json::json!([]));
-    let told: Value = serde_json::from_str(done(&touchup(&[&features[..], &["--json"]].concat()))).unwrap();
-    assert_eq!(told, folder.json("out.json"));
-    assert!(words.contains("not looked at") && told["unexplained"].as_f64().unwrap() > 0.1, "{words} {told}");
+    let report: Value = serde_json::from_str(done(&touchup(&[&features[..], &["--json"]].concat()))).unwrap();
+    assert_eq!(report, folder.json("out.json"));
+    assert!(words.contains("not looked at") && report["unexplained"].as_f64().unwrap() > 0.1, "{words} {report}");
 }
 
 /// Fields that the issue names for each kind, without those that only touches give.
@@ -216,13 +216,13 @@ fn features_of_the_files_are_those_of_refine() {
         (&free, &out, "--out"),
     ] {
         let output = flags(features, touches);
-        let (code, stdout, stderr) = told(&output);
+        let (code, stdout, stderr) = parts_of(&output);
         assert!((code, stdout) == (2, "") && stderr.contains(named), "{features} {touches}: {code} {stderr}");
     }
     let nowhere = folder.name("no/file");
     for (features, touches) in [(&nowhere, &free), (&free, &nowhere)] {
         let output = flags(features, touches);
-        let (code, stdout, stderr) = told(&output);
+        let (code, stdout, stderr) = parts_of(&output);
         assert!((code, stdout) == (1, "") && stderr.contains("no/file"), "{code} {stderr}");
     }
     assert!(!folder.path("out.ply").exists() && !folder.path("free").exists());

@@ -1,4 +1,4 @@
-//! Files of touches and of features: what is written is what is read, and what is damaged is named.
+//! Files of touches and of features: a round trip is exact, and damage is named.
 
 use std::fs;
 
@@ -57,7 +57,7 @@ proptest! {
         write_touches(file.path(), &touches).unwrap();
         let read = read_touches(file.path()).unwrap();
         prop_assert_eq!(read.len(), touches.len());
-        // half of the last digit, and what is lost on the way to millimetres and back
+        // half of the last digit, and what is lost in the conversion to millimetres and back
         let (length, share, weight) = (0.51e-9, 1.1e-6, 0.51e-4);
         for (a, b) in read.iter().zip(&touches) {
             let of = |t: &ProbedPoint| (t.stamp_ns, t.stroke, t.is_rejected);
@@ -71,9 +71,9 @@ proptest! {
         prop_assert_eq!(read, as_written(&touches));
     }
 
-    /// Whatever stands in some fields of a good line: it is a touch of finite numbers, or the line is named with what is wrong.
+    /// Whatever some fields hold of a good line: it is a touch of finite numbers, or the line is named with its error.
     #[test]
-    fn what_stands_in_a_line_is_a_touch_or_is_named(
+    fn a_line_is_a_touch_or_its_error_is_named(
         changed in prop::collection::vec((0..17usize, "-?[0-9]{1,4}|[-+0-9.eE,naif ]{0,9}"), 1..4),
     ) {
         let changed: Vec<_> = changed.iter().map(|(at, text)| (*at, text.as_str())).collect();
@@ -243,7 +243,7 @@ fn features_come_back_bit_by_bit() {
     assert_eq!(fs::read(file.path()).unwrap(), bytes);
 }
 
-/// As the judge's README shows it: what is not known is left out.
+/// As the judge's README shows it: unknown values are left out.
 #[test]
 fn files_of_others_are_read() {
     let file = tempfile::NamedTempFile::new().unwrap();

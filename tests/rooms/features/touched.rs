@@ -1,5 +1,5 @@
-//! Features of the simulated plate, measured by what was touched, against the drawing: what they are off by, and whether
-//! that is what they say.
+//! Features of the simulated plate, measured by touches, against the drawing: errors, and whether
+//! they agree with the stated uncertainties.
 //!
 //! `TOUCHUP_FULL=1` runs all seeds; `--nocapture` or `--show-output` shows the numbers.
 
@@ -18,15 +18,15 @@ fn seeds() -> u64 {
     either(4, 50)
 }
 
-/// What the program is told is off by this: the radius, m, and the stiffness, as a share. The calibration says 2 µm and 2 %.
+/// Error of the configured stylus: radius, m, and stiffness, as a share. The calibration says 2 µm and 2 %.
 #[derive(Clone, Copy, Debug, Default)]
-struct Told {
+struct CalibrationOffset {
     radius: f64,
     stiffness: f64,
 }
 
-/// What is on the plate of one seed, scanned and touched as in the demo.
-fn found(seed: u64, off: Told) -> Vec<Feature> {
+/// Features of the plate of one seed, scanned and touched as in the demo.
+fn found(seed: u64, off: CalibrationOffset) -> Vec<Feature> {
     let stylus = StylusParams::default();
     assert_eq!((stylus.friction, stylus.sensor.pose_noise), (0.15, 0.05e-3), "the demo has changed");
     let (PlateStream { scan, noise, samples }, _) = plate_stream(&stylus, seed);
@@ -40,7 +40,7 @@ fn found(seed: u64, off: Told) -> Vec<Feature> {
     detect(&mesh, &FaceTree::new(&mesh), patcher.probed()).features
 }
 
-/// What one number of one feature was off by, and its standard uncertainty, seed by seed; mm or degrees.
+/// Errors of one dimension of one feature, and its standard uncertainty, seed by seed; mm or degrees.
 struct Row {
     name: String,
     /// at most, by the issue
@@ -69,7 +69,7 @@ fn rms(values: impl Iterator<Item = f64>) -> f64 {
 #[derive(Default)]
 struct Table {
     rows: Vec<Row>,
-    /// holes said to go through that are blind, or the other way round
+    /// holes said to go through that are blind, or the reverse
     wrongly_through: usize,
 }
 
@@ -149,7 +149,7 @@ fn compare(table: &mut Table, truth: &TruthFeature, feature: &Feature) {
         TruthShape::Slot { width, length, depth, direction } => {
             number("width", width, &feature.width, BOUND);
             number("length", length, &feature.length, None);
-            // where its floor was felt
+            // where its floor was touched
             if feature.depth.as_ref().is_some_and(|depth| depth.std.is_some()) {
                 number("depth", depth, &feature.depth, None);
             }
@@ -174,21 +174,21 @@ fn of_truth<'a>(truth: &TruthFeature, kind: Kind, features: &'a [Feature]) -> &'
     found.next().unwrap_or_else(|| panic!("the {} was not found", truth.name))
 }
 
-/// Between what the root mean square of `count` normalised errors of standard deviation 1 is in 99.8 % of cases: quantiles of
+/// Interval of the root mean square of `count` normalised errors of standard deviation 1 in 99.8 % of cases: quantiles of
 /// χ² by Wilson and Hilferty's cube (six have 0.05 and 3.78 as mean squares; Abramowitz & Stegun, table 26.8, 0.06 and 3.74).
-fn told_by(count: usize) -> [f64; 2] {
+fn stated_over(count: usize) -> [f64; 2] {
     let spread = 2.0 / (9.0 * count as f64);
     [-3.09, 3.09].map(|z| (1.0 - spread + z * spread.sqrt()).max(0.0).powf(1.5))
 }
 
 #[test]
-fn what_was_touched_is_found_and_as_good_as_it_says() {
+fn touched_features_are_found_within_their_stated_uncertainty() {
     let truths = Plate::default().features();
     let mut table = Table::default();
     for seed in 1..=seeds() {
-        // by one and a half of what the calibration says, each way in turn: no draws of the model that is to be proved
+        // by one and a half of what the calibration says, each sign in turn: no draws of the model under test
         let sign = |bit: u64| if seed >> bit & 1 == 0 { 1.5 } else { -1.5 };
-        let features = found(seed, Told { radius: sign(0) * 2e-6, stiffness: sign(1) * 0.02 });
+        let features = found(seed, CalibrationOffset { radius: sign(0) * 2e-6, stiffness: sign(1) * 0.02 });
         let count = |kind: Kind| features.iter().filter(|feature| feature.kind == kind).count();
         let counts = [Kind::Hole, Kind::Slot, Kind::Pocket, Kind::Boss].map(count);
         assert_eq!(counts, [2, 1, 0, 1], "seed {seed}: holes, slots, pockets, bosses");
@@ -200,26 +200,27 @@ fn what_was_touched_is_found_and_as_good_as_it_says() {
     for row in &table.rows {
         let (name, z) = (&row.name, rms(row.normalised()));
         assert!(row.bound.is_none_or(|bound| row.worst() < bound), "{name} is off by {}", row.worst());
-        // few errors tell a standard deviation no better than χ² says; a floor was felt in few seeds
+        // few errors determine a standard deviation no better than χ² allows; the floor was touched in few seeds
         let count = row.errors.len();
-        // widths in every seed, a depth where the floor was felt
-        assert!(count == seeds() as usize || name.ends_with("depth"), "{name}: told in {count} seeds");
-        let [low, high] = if count < 50 { told_by(count) } else { [1.0; 2] };
+        // widths in every seed, a depth where the floor was touched
+        assert!(count == seeds() as usize || name.ends_with("depth"), "{name}: measured in {count} seeds");
+        let [low, high] = if count < 50 { stated_over(count) } else { [1.0; 2] };
         assert!((0.5 * low..=2.0 * high).contains(&z), "{name}: rms of error over uncertainty {z}");
     }
     let all = rms(table.rows.iter().flat_map(Row::normalised));
     println!("all: {all:.2}; wrongly through or blind: {} of {} holes", table.wrongly_through, 2 * seeds());
     assert!((0.5..=2.0).contains(&all), "rms of error over uncertainty {all}");
-    // where no floor was felt it is not known
+    // an untouched floor is not known
     assert_eq!(table.wrongly_through, 0);
 }
 
-/// The centre of the ball is where it is, whatever its radius is said to be: a ball told 20 µm too large, ten times what the
-/// calibration says, makes bores and slots 40 µm wider and bosses 40 µm thinner, and nothing in what is said of them shows it.
+/// The centre of the ball is where it is, for any stated radius: a ball stated 20 µm too large, ten times what the
+/// calibration says, makes bores and slots 40 µm wider and bosses 40 µm thinner, and their stated uncertainties do not show it.
 #[test]
-fn a_radius_told_wrong_goes_twice_into_every_width_and_is_not_in_its_uncertainty() {
+fn a_wrong_radius_goes_twice_into_every_width_and_is_not_in_its_uncertainty() {
     let off = 20e-6;
-    let [right, wrong] = [0.0, off].map(|radius| found(1, Told { radius, ..Told::default() }));
+    let [right, wrong] =
+        [0.0, off].map(|radius| found(1, CalibrationOffset { radius, ..CalibrationOffset::default() }));
     let (mut compared, mut outside) = (0, 0);
     for (truth, kind) in Plate::default().features().iter().filter_map(|truth| Some((truth, kind_of(truth)?))) {
         let width = |features: &[Feature]| {

@@ -7,7 +7,7 @@ use touchup::patch::{Patcher, PatcherParams};
 use touchup::sim::StylusParams;
 use touchup::touch::ProbedPoint;
 
-/// The demo's plate as it is after all touches, and the touches.
+/// The demo's plate after all touches, and the touches.
 fn touched_plate(seed: u64) -> (TriMesh, Vec<ProbedPoint>) {
     let stylus = StylusParams::default();
     let (stream, _) = plate_stream(&stylus, seed);
@@ -55,7 +55,7 @@ fn new_touches_are_in_the_numbers_at_once() {
         }
     }
     assert_eq!(before.len(), after.len());
-    // a look at the whole mesh says the same within what the thinned fit may differ, and keeps the numbers
+    // a search of the whole mesh agrees within the error of the subsampled fit, and keeps the numbers
     let whole = sizes(tracker.renew(&mesh, &tree, &touches));
     assert_eq!(whole.len(), after.len());
     for ((id, kind, size), (other_id, other_kind, other)) in whole.iter().zip(&after) {

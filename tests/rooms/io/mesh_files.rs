@@ -289,7 +289,7 @@ fn ply_variants_are_read() {
          8 0 1 3 2 -1 0 1 2\n"
     );
     let MeshFile { mesh, repair } = read_text("a.ply", strips.as_bytes()).unwrap();
-    // faces 013, 312 and 012, of which the last lies the other way round
+    // faces 013, 312 and 012, of which the last is inverted
     assert_eq!((mesh.face_count(), repair.boundary_edges, repair.flipped_faces), (3, 3, 1));
     let refusal = |content: &str| count(content).unwrap_err().to_string();
     assert!(
@@ -331,7 +331,7 @@ fn obj_variants_are_read() {
 }
 
 #[test]
-fn stl_with_more_than_its_header_says_is_refused() {
+fn stl_with_more_than_its_header_announces_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.stl");
     write_mesh(&path, &ball(), Metre).unwrap();

@@ -38,7 +38,7 @@ fn code(output: &Output) -> i32 {
     output.status.code().unwrap_or(-1)
 }
 
-fn told(output: &Output) -> String {
+fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
@@ -50,7 +50,7 @@ fn summary(output: &Output) -> Value {
 }
 
 fn any_summary(output: &Output) -> Value {
-    serde_json::from_slice(&output.stdout).unwrap_or_else(|_| panic!("{}", told(output)))
+    serde_json::from_slice(&output.stdout).unwrap_or_else(|_| panic!("{}", stderr(output)))
 }
 
 /// samples = accepted + Σ refused; lost poses are no samples.
@@ -142,7 +142,7 @@ fn a_real_recording_shapes_a_flat_patch_the_same_from_both_containers() {
     let mut results = vec![];
     for (bag, out) in [(&mcap, "a.ply"), (&db3, "b.ply"), (&mcap, "c.ply"), (&db3, "d.ply")] {
         let output = refine(&at("patch.ply"), bag, &at(out), &flags);
-        assert_eq!((code(&output), told(&output)), (0, String::new()), "nothing is lost");
+        assert_eq!((code(&output), stderr(&output)), (0, String::new()), "nothing is lost");
         let mut summary = summary(&output);
         for time in ["push_ns", "load_s", "replay_s"] {
             summary.as_object_mut().unwrap().remove(time);
@@ -250,7 +250,7 @@ fn a_replay_equals_the_first_run_byte_for_byte() {
 
     for out in ["one.ply", "two.ply"] {
         let output = plate.refine(out, &[]);
-        assert_eq!((code(&output), told(&output)), (0, String::new()));
+        assert_eq!((code(&output), stderr(&output)), (0, String::new()));
         let summary = summary(&output);
         assert_eq!(number(&summary, "accepted"), samples);
         assert_eq!(number(&summary, "cut_back"), refiner.counts().cut_back);
@@ -261,7 +261,7 @@ fn a_replay_equals_the_first_run_byte_for_byte() {
 
     // in real time, with the patch on a thread of its own
     let output = plate.refine("beside.ply", &["--live"]);
-    assert_eq!((code(&output), told(&output)), (0, String::new()));
+    assert_eq!((code(&output), stderr(&output)), (0, String::new()));
     let live = &summary(&output)["live"];
     // 4.2 s in steps of 8 ms, and what is left at the end; those that come after a late one take more in and are fewer
     let least = if number(live, "late") == 0 { 520 } else { 1 };
@@ -273,10 +273,10 @@ fn a_replay_equals_the_first_run_byte_for_byte() {
     fs::write(plate.at("scene.yaml"), "tip:\n  radius_mm: 1.5\nrefine:\n").unwrap();
     let output = plate.refine("none.ply", &["--live", "--scene", plate.at("scene.yaml").to_str().unwrap()]);
     assert_eq!(code(&output), 2);
-    assert!(told(&output).contains("add `patch:` to it"), "{}", told(&output));
+    assert!(stderr(&output).contains("add `patch:` to it"), "{}", stderr(&output));
 }
 
-/// A pose that is no rotation is a lost pose: no sample is lost for it, and the sum says so.
+/// A pose that is no rotation is a lost pose: no sample is lost for it, and the sum shows it.
 #[test]
 fn the_numbers_add_up_when_a_pose_is_bad() {
     let plate = Plate::new();
@@ -285,7 +285,7 @@ fn the_numbers_add_up_when_a_pose_is_bad() {
     pose.pose_ot.rotation.as_mut_unchecked().coords *= 2.0;
     write_recording(&plate.at("touch.mcap"), &Topics::default(), "object", "stylus", messages).unwrap();
     let output = plate.refine("out.ply", &[]);
-    assert_eq!(code(&output), 4, "{}", told(&output));
+    assert_eq!(code(&output), 4, "{}", stderr(&output));
     let summary = summary(&output);
     assert_eq!(
         (number(&summary, "samples"), number(&summary, "accepted")),
@@ -307,7 +307,7 @@ fn other_parameters_give_another_mesh() {
     let mut meshes = BTreeSet::new();
     for flags in what_ifs {
         let output = plate.refine("out.ply", flags);
-        assert_eq!(code(&output), 0, "{}", told(&output));
+        assert_eq!(code(&output), 0, "{}", stderr(&output));
         assert!(number(&summary(&output), "moved_faces") > 0);
         meshes.insert(plate.bytes("out.ply"));
     }
@@ -319,15 +319,15 @@ fn other_parameters_give_another_mesh() {
 /// What any run may do: finish, with a whole mesh; or refuse with one line, and leave no file.
 fn check_outcome(output: &Output, out: &Path, unit: MeshUnit, faces: impl FnOnce() -> usize, what: &str) {
     let code = code(output);
-    assert!([0, 3, 4].contains(&code), "{what}: code {code}, {}", told(output));
-    let lines = told(output).lines().count();
+    assert!([0, 3, 4].contains(&code), "{what}: code {code}, {}", stderr(output));
+    let lines = stderr(output).lines().count();
     if code == 3 {
-        assert_eq!((lines, output.stdout.len()), (1, 0), "{what}: {}", told(output));
+        assert_eq!((lines, output.stdout.len()), (1, 0), "{what}: {}", stderr(output));
         assert!(!out.exists(), "{what}: no result");
         return;
     }
-    let loss = told(output).lines().last().is_some_and(|line| line.starts_with("{\"kind\":\"losses\""));
-    assert_eq!(loss, code == 4, "{what}: {}", told(output));
+    let loss = stderr(output).lines().last().is_some_and(|line| line.starts_with("{\"kind\":\"losses\""));
+    assert_eq!(loss, code == 4, "{what}: {}", stderr(output));
     let patch = &any_summary(output)["patch"];
     let [added, removed] = ["added_faces", "removed_faces"].map(|key| patch[key].as_u64().unwrap_or(0) as usize);
     let refined = read_mesh(out, unit).unwrap_or_else(|error| panic!("{what}: {error}"));
@@ -373,7 +373,7 @@ fn damaged_recordings_are_refused_or_read_as_far_as_they_go() {
             let what = format!("{file}, seed {seed}, {how}");
             check_outcome(&output, &out, MeshUnit::Millimetre, || faces, &what);
             if code(&output) == 3 {
-                assert!(told(&output).contains(file), "{what}: the file is named: {}", told(&output));
+                assert!(stderr(&output).contains(file), "{what}: the file is named: {}", stderr(&output));
             }
             if code(&output) != 3 && !adds_up(&any_summary(&output)) {
                 unbalanced.push(format!("{what}: {}", any_summary(&output)));
@@ -402,7 +402,7 @@ fn nasty_scans_are_refused_in_one_line_or_refined() {
             let flags = ["--json", "--mesh-unit", &unit.to_string()];
             let output = refine(scan, &plate.at("touch.mcap"), &out, &flags);
             let name = scan.file_name().unwrap().to_str().unwrap();
-            assert!(code(&output) != 3 || told(&output).contains(name), "{what}: {}", told(&output));
+            assert!(code(&output) != 3 || stderr(&output).contains(name), "{what}: {}", stderr(&output));
             check_outcome(&output, &out, unit, || read_mesh(scan, unit).unwrap().mesh.face_count(), &what);
             codes[code(&output) as usize] += 1;
         }

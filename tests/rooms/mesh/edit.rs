@@ -10,7 +10,7 @@ use touchup::mesh::{BoxQuery, FaceId, FaceTree, Nearby, RefitPlan, TriMesh, Vert
 
 use crate::common::{grid, within};
 
-// ---- what the mesh should hold ----------------------------------------------------------------------------------
+// ---- expected content of the mesh ----------------------------------------------------------------------------------
 
 /// The same mesh as plain lists, edited beside the one under test.
 #[derive(Default)]
@@ -26,7 +26,7 @@ impl Ledger {
         Self { faces, vertices }
     }
 
-    /// Counts every star anew and compares.
+    /// Recounts every star and compares.
     fn check(&self, mesh: &TriMesh) {
         assert_eq!((mesh.face_count(), mesh.vertex_count()), (self.faces.len(), self.vertices.len()));
         let listed = self.faces.iter().map(|(&face, corners)| (FaceId(face), corners.map(VertexId)));
@@ -111,7 +111,7 @@ fn a_million_replacements_leave_storage_bounded_and_stars_exact() {
     // 700 faces and 400 vertices would take 36 kB: 12 bytes for a face, 24 + 12 for a vertex, 16 for a face in a star
     assert!(mesh.bytes() < 100_000, "{} bytes", mesh.bytes());
     // an array that doubles once more may, as the largest number of faces ever is a matter of chance
-    assert!(mesh.bytes() <= 2 * early, "{} bytes, after a tenth of the way {early}", mesh.bytes());
+    assert!(mesh.bytes() <= 2 * early, "{} bytes, after a tenth of the edits {early}", mesh.bytes());
 }
 
 // ---- the tree ---------------------------------------------------------------------------------------------------
@@ -311,14 +311,14 @@ impl Edited {
 }
 
 impl Edited {
-    /// A tree built anew names the same faces, where several meet too.
+    /// A rebuilt tree names the same faces, where several meet too.
     fn check_against_new_tree(&self, rng: &mut Pcg64) {
-        let anew = FaceTree::new(&self.mesh);
+        let rebuilt = FaceTree::new(&self.mesh);
         for (face, corners) in self.mesh.faces().step_by(97) {
             let [a, b] = [self.mesh.position(corners[0]), self.mesh.position(corners[1])];
             let off = self.mesh.normal(face) * within(rng, 0.0, 0.01 * self.scale);
             for p in [a, a + off, nalgebra::center(&a, &b) + off, point(rng, self.scale)] {
-                assert_eq!(self.tree.closest(&self.mesh, &p, 1.0), anew.closest(&self.mesh, &p, 1.0), "{p}");
+                assert_eq!(self.tree.closest(&self.mesh, &p, 1.0), rebuilt.closest(&self.mesh, &p, 1.0), "{p}");
             }
         }
     }
@@ -365,7 +365,7 @@ impl Pushed {
     }
 }
 
-/// What is kept nearby must hold while the mesh moves below the point and beside it, and faces come and go.
+/// Cached neighbours must stay valid while the mesh moves below the point and beside it, and faces come and go.
 #[test]
 fn a_walk_over_a_mesh_that_moves_finds_what_a_search_from_the_root_finds() {
     const EDGE: f64 = 1e-3;
@@ -404,13 +404,13 @@ fn a_walk_over_a_mesh_that_moves_finds_what_a_search_from_the_root_finds() {
     }
 }
 
-/// Levels at most over so many faces: a side holds a fifth or more of the faces of a node, and five are the fewest over
+/// Largest depth over this many faces: a side holds a fifth or more of the faces of a node, and five are the fewest over
 /// two leaves.
 fn most_levels(faces: usize) -> usize {
     (faces as f64 / 5.0).log(1.25).max(0.0) as usize + 2
 }
 
-/// Spots that wander over the mesh: faces are cut in two there and put together again, some of it stays.
+/// Spots that move over the mesh: faces are cut in two there and put together again, some of it stays.
 #[test]
 fn a_long_session_leaves_the_tree_shallow_small_and_exact() {
     let mut rng = Pcg64::seed_from_u64(8);

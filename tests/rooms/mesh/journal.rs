@@ -1,4 +1,4 @@
-//! Who keeps a copy of a mesh by what its journal names ends with that mesh, whatever was done to it.
+//! A copy that follows the journal of a mesh ends equal to it, after any edits.
 
 use std::collections::BTreeMap;
 
@@ -6,7 +6,7 @@ use nalgebra::Point3;
 use proptest::prelude::*;
 use touchup::mesh::{Changes, FaceId, TriMesh, VertexId};
 
-/// One edit; numbers are taken modulo what is there.
+/// One edit; numbers are taken modulo the current counts.
 #[derive(Clone, Debug)]
 enum Edit {
     Move(usize, f64),
@@ -31,7 +31,7 @@ fn edit() -> impl Strategy<Value = Edit> {
     ]
 }
 
-/// A copy that knows only what it is told.
+/// A copy that follows the reported changes alone.
 #[derive(Debug, Default, PartialEq)]
 struct Copy {
     vertices: BTreeMap<u32, Point3<f64>>,
@@ -103,19 +103,19 @@ proptest! {
         copy.take(&mesh, &changes);
         prop_assert_eq!(copy, Copy::of(&mesh));
         changes.clear();
-        prop_assert!(mesh.take_changes(usize::MAX, &mut changes) && changes == Changes::default(), "told once");
+        prop_assert!(mesh.take_changes(usize::MAX, &mut changes) && changes == Changes::default(), "reported once");
     }
 }
 
 #[test]
-fn nobody_is_told_who_does_not_watch() {
+fn without_watching_nothing_is_recorded() {
     let mut mesh = square();
     mesh.set_position(VertexId(0), Point3::origin());
     let mut changes = Changes::default();
     assert!(mesh.take_changes(usize::MAX, &mut changes) && changes == Changes::default());
 }
 
-/// As many vertices as are taken at once, and more faces than that: it is not all until those are told, too.
+/// As many vertices as are taken at once, and more faces than that: it is not complete until those are reported, too.
 #[test]
 fn it_is_not_all_while_faces_are_left() {
     let mut mesh = square();

@@ -1,4 +1,4 @@
-//! The touched part of a simulated scan meshed anew, against the part that the simulator knows.
+//! The touched part of a simulated scan, remeshed, against the part that the simulator knows.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,7 +12,7 @@ use crate::full::either;
 use crate::plate_stream::{PlateStream, contacts_of, plate_stream};
 use crate::soundness::{intersections, soundness};
 
-/// A touched plate: how it was scanned, where the ball really touched, and what the patcher made of it.
+/// A touched plate: its scan, the true contacts, and the reconstruction.
 struct Case {
     scan: TriMesh,
     contacts: Vec<Point3<f64>>,
@@ -168,7 +168,7 @@ fn sample(at: usize, p_mm: [f64; 3], newtons: f64) -> Sample {
 }
 
 /// A ball goes round and round in a moat of 12 mm across, down to its floor at z = -9.5 mm, which it touches from
-/// `inner_mm` off the middle on. What stands in the middle is a post where the floor below it was not reached, and else
+/// `inner_mm` off the middle on. The middle is a post where the floor below it was not reached, and else
 /// floats.
 #[test]
 fn what_the_ball_went_all_around_is_no_part() {
@@ -201,7 +201,7 @@ fn what_the_ball_went_all_around_is_no_part() {
     assert!(post.abs() < 1e-9 && (floor + 9.5).abs() < 0.05, "{post} {floor} mm");
 }
 
-/// A ball slides over a sheet at x = 0 to 10 mm, and goes to and fro through it at x = 20 to 30 mm, where it feels nothing.
+/// A ball slides over a sheet at x = 0 to 10 mm, and goes to and fro through it at x = 20 to 30 mm, without contact.
 #[test]
 fn where_free_space_is_no_evidence_lids_stay() {
     let scan = sheet();

@@ -96,7 +96,7 @@ fn a_sphere_is_a_sphere() {
     let field = |p: &Point3<f64>| p.coords.norm() - radius;
     let mesh = surface(&lattice(PITCH), &cube(8), &field);
     assert_skin(&mesh, PITCH, 2);
-    // between two tangents a cell apart the vertex stands off by (pitch √3 / 2)² / 2 radius at most
+    // between two tangents a cell apart the vertex is off by (pitch √3 / 2)² / 2 radius at most
     let bound = 0.75 * PITCH * PITCH / (2.0 * radius);
     assert!(largest_distance(&mesh, &field) < bound);
     for (face, _) in mesh.faces() {
@@ -209,7 +209,7 @@ fn region_around(lattice: &Lattice, scan: &TriMesh, points: &[Point3<f64>], radi
 }
 
 /// Adds what is beyond open squares that the scan crosses, until there are none: no region grows by more rounds than this.
-fn settle(lattice: &Lattice, region: &mut LatticeRegion, scan: &TriMesh, tree: &FaceTree, field: Field) {
+fn close_region(lattice: &Lattice, region: &mut LatticeRegion, scan: &TriMesh, tree: &FaceTree, field: Field) {
     for _ in 0..60 {
         let open = Cut::new(lattice, region, scan, tree).open_squares(region, &node_values(lattice, region, field));
         let beyond: Vec<LatticeNode> = open.iter().filter(|open| open.is_scanned).map(|open| open.beyond).collect();
@@ -281,11 +281,11 @@ fn some_points(scan: &TriMesh, count: usize, seed: u64) -> Vec<Point3<f64>> {
     (0..count).map(|_| scan.barycentre(FaceId(within(&mut rng, 0.0, scan.face_count() as f64) as u32))).collect()
 }
 
-/// Settles and splices a region; the field is the scan's own distance.
+/// Closes and splices a region; the field is the scan's own distance.
 fn splice_own(lattice: &Lattice, region: &mut LatticeRegion, scan: &TriMesh) -> (Patch, TriMesh) {
     let tree = FaceTree::new(scan);
     let field = |p: &Point3<f64>| signed_distance(scan, &tree, p, 1.0).unwrap();
-    settle(lattice, region, scan, &tree, &field);
+    close_region(lattice, region, scan, &tree, &field);
     let patch = patch_of(lattice, region, scan, &tree, &field);
     let mesh = spliced(scan, &patch, lattice.pitch);
     (patch, mesh)
@@ -294,7 +294,7 @@ fn splice_own(lattice: &Lattice, region: &mut LatticeRegion, scan: &TriMesh) -> 
 const SCANS: [&str; 3] = ["plate", "flange", "featuretype"];
 
 #[test]
-fn a_scan_meshed_anew_by_its_own_distance_is_the_same_skin() {
+fn a_scan_remeshed_by_its_own_distance_is_the_same_surface() {
     for (name, seed) in SCANS.into_iter().flat_map(|name| [(name, 0), (name, 1)]) {
         let Some(scan) = shared_scan(name) else { return };
         let lattice = lattice(PITCH);
@@ -337,7 +337,7 @@ fn a_dent_is_pressed_into_a_scan() {
             signed_distance(&scan, &tree, p, 1.0).unwrap() + depth * share * share * (3.0 - 2.0 * share)
         };
         let mut region = region_around(&lattice, &scan, &middle, 5e-3, 0.0);
-        settle(&lattice, &mut region, &scan, &tree, &field);
+        close_region(&lattice, &mut region, &scan, &tree, &field);
         let patch = patch_of(&lattice, &region, &scan, &tree, &field);
         let mesh = spliced(&scan, &patch, PITCH);
         let heights = new_faces(&scan, &mesh)
@@ -478,7 +478,7 @@ proptest! {
         let scan = thin_sheet(edge, noise * edge, thickness * share * edge, seed);
         let lattice = lattice(share * edge);
         let (patch, mesh) = splice_own(&lattice, &mut crumbs(&lattice, &scan, seed, 12), &scan);
-        // both sides on one edge cannot be told apart by signs; with smaller cells all is closed, and no hole is made
+        // both sides on one edge cannot be distinguished by signs; with smaller cells all is closed, and no hole is made
         prop_assert!(thickness < 1.5 || (patch.open.is_empty() && soundness(&mesh).rims.is_empty()));
         prop_assert!(thickness < 2.2 || soundness(&mesh).euler == 2);
     }

@@ -1,6 +1,6 @@
 mod accuracy;
 mod contour;
+mod double_contact;
 mod region;
 mod tips;
-mod two_points;
 mod uncertainty;

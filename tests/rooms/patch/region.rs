@@ -1,4 +1,4 @@
-//! A scan of which only a region is touched: what comes out is what the whole scan would give, and the rest is as it was.
+//! A scan of which only a region is touched: the result equals that of the whole scan, and the rest is unchanged.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use touchup::live::{Engine, Renewal};
@@ -124,7 +124,7 @@ fn a_part_whose_rim_was_moved_or_torn_is_refused() {
     assert_eq!(sewn.positions().iter().zip(scan.positions()).filter(|(a, b)| a != b).count(), 1);
 }
 
-/// The other way is the whole scan, refined as if there were no region.
+/// The reference is the whole scan, refined without a region.
 #[test]
 fn touches_in_the_region_do_what_they_do_to_the_whole_scan() {
     let scan = wavy_plate(60_000).unwrap();

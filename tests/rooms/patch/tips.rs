@@ -1,4 +1,4 @@
-//! Flat and cone tips led over the plate that the simulator knows: where they say that they touched, against where they did.
+//! Flat and cone tips led over the plate that the simulator knows: estimated contacts against true ones.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use touchup::patch::{TipTouch, TouchFinder, TouchFinderParams};
@@ -28,8 +28,8 @@ fn path(stylus: &StylusParams, hand: &PathParams) -> Vec<Stroke> {
     raster(&region, Lines::AlongX, hand).unwrap()
 }
 
-/// What was felt, with what really was at that time.
-fn felt(stylus: &StylusParams, seed: u64) -> Vec<(TipTouch, Moment)> {
+/// Contacts, with the truth at that time.
+fn contacts(stylus: &StylusParams, seed: u64) -> Vec<(TipTouch, Moment)> {
     let plate = Plate::default();
     let hand = PathParams { radius: stylus.radius, ..PathParams::default() };
     let recording = touch(&plate, &path(stylus, &hand), stylus, seed).unwrap();
@@ -53,12 +53,12 @@ fn felt(stylus: &StylusParams, seed: u64) -> Vec<(TipTouch, Moment)> {
     touches.into_iter().filter_map(truth).collect()
 }
 
-/// Share of the samples in contact that say where, and median and 90th percentile of the distance of their points from the
-/// part, mm, and of the error of their normals, degrees, where one place alone touched.
-fn quality(felt: &[(TipTouch, Moment)]) -> [f64; 5] {
+/// Share of the samples in contact with an estimated place, and median and 90th percentile of the distance of their points from
+/// the part, mm, and of the error of their normals, degrees, where one place alone touched.
+fn quality(contacts: &[(TipTouch, Moment)]) -> [f64; 5] {
     let plate = Plate::default();
     let (mut distances, mut angles, mut touching) = (Vec::new(), Vec::new(), 0);
-    for (touch, moment) in felt {
+    for (touch, moment) in contacts {
         let [truth] = &moment.contacts[..] else { continue };
         touching += 1;
         let Some(contact) = touch.contact else { continue };
@@ -87,7 +87,7 @@ fn the_simulated_tip_does_not_enter_the_part() {
         let stylus = StylusParams { shape, radius, ..StylusParams::default() };
         let body = TipBody::new(shape, radius).unwrap();
         let (mut deepest, mut touching) = (0.0f64, 0);
-        for (_, moment) in felt(&stylus, 1).iter().step_by(50) {
+        for (_, moment) in contacts(&stylus, 1).iter().step_by(50) {
             let place = TipPlace::from(&moment.pose_ot);
             touching += usize::from(!moment.contacts.is_empty());
             // points all over the end of the tip and its side
@@ -110,7 +110,7 @@ fn the_simulated_tip_does_not_enter_the_part() {
 }
 
 #[test]
-fn a_tip_says_where_it_touched() {
+fn contacts_of_a_tip_are_located() {
     let with =
         |shape, radius, tilt: f64| StylusParams { shape, radius, tilt: tilt.to_radians(), ..StylusParams::default() };
     let tips = [
@@ -123,7 +123,7 @@ fn a_tip_says_where_it_touched() {
     ];
     println!("{:24} {:>6} {:>14} {:>14}", "", "share", "distance, mm", "normal, °");
     for (name, stylus) in &tips[..either(2, 6)] {
-        let [share, median, p90, angle_median, angle_p90] = quality(&felt(stylus, 1));
+        let [share, median, p90, angle_median, angle_p90] = quality(&contacts(stylus, 1));
         println!("{name:24} {share:6.2} {median:6.3} {p90:7.3} {angle_median:6.1} {angle_p90:7.1}");
         // noise of 0.05 mm at 500 Hz, averaged over 16 ms and more, and a tenth of the samples at edges and turns
         assert!(share > 0.8 && median < 0.03 && angle_median < 3.0, "{name}");

@@ -1,5 +1,5 @@
-//! How well the patched mesh says it is known, against the part that the simulator knows: where the errors are those of its
-//! model, which shows that it is consistent, and where they are not, which shows what it does not know; outliers, and places that move.
+//! Stated uncertainty of the patched mesh against the simulator's part: where the errors are those of its
+//! model, which shows that it is consistent, and where they are not, which shows its limits; outliers, and places that move.
 
 use std::collections::BTreeSet;
 
@@ -22,17 +22,17 @@ fn normal(rng: &mut Pcg64) -> f64 {
     StandardNormal.sample(rng)
 }
 
-/// A plate as scanned and as touched by `stylus`, whose radius and stiffness are those of `told` give or take what the
+/// A plate as scanned and as touched by `stylus`, whose radius and stiffness are those of `stated` give or take what the
 /// calibration leaves.
-fn touched_plate(told: &StylusParams, seed: u64) -> (TriMesh, Touch, PatcherParams) {
+fn touched_plate(stated: &StylusParams, seed: u64) -> (TriMesh, Touch, PatcherParams) {
     let scanner = ScannerParams { seed, ..ScannerParams::default() };
-    let params = PatcherParams::new(told.radius, Some(told.stiffness), scanner.noise);
+    let params = PatcherParams::new(stated.radius, Some(stated.stiffness), scanner.noise);
     let calibration = params.uncertainty.unwrap().calibration;
     let mut rng = Pcg64::seed_from_u64(seed);
     let stylus = StylusParams {
-        radius: told.radius + normal(&mut rng) * calibration.position,
-        stiffness: told.stiffness * (1.0 + normal(&mut rng) * calibration.stiffness_share),
-        ..*told
+        radius: stated.radius + normal(&mut rng) * calibration.position,
+        stiffness: stated.stiffness * (1.0 + normal(&mut rng) * calibration.stiffness_share),
+        ..*stated
     };
     let (plate, hand) = (Plate::default(), PathParams { radius: stylus.radius, ..PathParams::default() });
     let scan = scan(&plate, &scanner).unwrap();
@@ -87,10 +87,10 @@ impl Normalised {
     }
 }
 
-/// Consistency, not truth: noise, friction and what the calibration leaves are drawn as the model has them.
+/// Consistency, not truth: noise, friction and residual calibration errors are drawn from the model.
 #[test]
 fn what_was_touched_is_as_well_known_as_it_says_where_errors_are_as_the_model_has_them() {
-    // one draw of the stiffness says nothing of how often it is within what it says
+    // one draw of the stiffness says nothing about its coverage
     let seeds = either(2, 20);
     let noisy = SensorParams { pose_noise: 0.2e-3, orientation_noise: 0.3f64.to_radians(), ..SensorParams::default() };
     let styli = [
@@ -127,21 +127,21 @@ fn what_was_touched_is_as_well_known_as_it_says_where_errors_are_as_the_model_ha
     }
 }
 
-/// What the sensors add to the pose besides what the model knows, at 500 Hz.
+/// Pose errors outside of the model, at 500 Hz.
 #[derive(Clone, Copy, Debug)]
 enum Foreign {
     Nothing,
     /// Student's t with 3 degrees of freedom: one in 25 is beyond three times its root mean square
     HeavyTails,
     /// what is left of it after 50 ms is e⁻¹: nothing averages out in a window
-    Wandering,
+    Drifting,
 }
 
 /// Adds noise with a root mean square of 0.05 mm on each axis.
 fn disturbed(messages: &[Message], foreign: Foreign, seed: u64) -> Vec<Message> {
     let mut rng = Pcg64::seed_from_u64(seed);
     let rms = 0.05e-3;
-    let mut wander = Vector3::zeros();
+    let mut drift = Vector3::zeros();
     let mut add = |rng: &mut Pcg64| match foreign {
         Foreign::Nothing => Vector3::zeros(),
         Foreign::HeavyTails => Vector3::from_fn(|_, _| {
@@ -149,10 +149,10 @@ fn disturbed(messages: &[Message], foreign: Foreign, seed: u64) -> Vec<Message> 
             // its variance is 3
             rms / 3f64.sqrt() * normal(rng) / (chi_squared / 3.0).sqrt()
         }),
-        Foreign::Wandering => {
+        Foreign::Drifting => {
             let kept = (-2e-3f64 / 50e-3).exp();
-            wander = wander * kept + Vector3::from_fn(|_, _| normal(rng) * rms * (1.0 - kept * kept).sqrt());
-            wander
+            drift = drift * kept + Vector3::from_fn(|_, _| normal(rng) * rms * (1.0 - kept * kept).sqrt());
+            drift
         }
     };
     let mut messages = messages.to_vec();
@@ -164,9 +164,9 @@ fn disturbed(messages: &[Message], foreign: Foreign, seed: u64) -> Vec<Message> 
     messages
 }
 
-/// Touched vertices of a plate over which told values and noise are others than the model has: normalised errors, errors in
+/// Touched vertices of a plate whose stated parameters and noise differ from those of the model: normalised errors, errors in
 /// m, and standard deviations.
-fn foreign(told: [f64; 2], noise: Foreign, seed: u64) -> (Normalised, Vec<f64>, Vec<f64>) {
+fn foreign(stated: [f64; 2], noise: Foreign, seed: u64) -> (Normalised, Vec<f64>, Vec<f64>) {
     let scanner = ScannerParams { seed, ..ScannerParams::default() };
     let own = if matches!(noise, Foreign::Nothing) { SensorParams::default().pose_noise } else { 0.0 };
     let stylus =
@@ -174,7 +174,7 @@ fn foreign(told: [f64; 2], noise: Foreign, seed: u64) -> (Normalised, Vec<f64>, 
     let plate = Plate::default();
     let scan = scan(&plate, &scanner).unwrap();
     let touch = touch(&plate, &plan_demo(&plate, &PathParams::default()).unwrap(), &stylus, seed).unwrap();
-    let params = PatcherParams::new(stylus.radius * told[0], Some(stylus.stiffness * told[1]), scanner.noise);
+    let params = PatcherParams::new(stylus.radius * stated[0], Some(stylus.stiffness * stated[1]), scanner.noise);
     let made = patched(&mut patcher_of(&disturbed(&touch.messages, noise, seed), params), &scan);
     let mut normalised = Normalised::default();
     normalised.add(&made, &plate, Support::Touched);
@@ -189,9 +189,9 @@ fn mean(values: &[f64]) -> f64 {
 }
 
 #[test]
-fn what_the_model_does_not_know_is_not_in_what_it_says() {
-    let told = |name: &str, told, noise| {
-        let (z, errors, sigmas) = foreign(told, noise, 201);
+fn errors_outside_of_the_model_are_not_in_the_stated_uncertainty() {
+    let report = |name: &str, stated, noise| {
+        let (z, errors, sigmas) = foreign(stated, noise, 201);
         let shares = [1.0, 1.96, 3.0].map(|sigmas| z.within(sigmas));
         let off = mean(&errors);
         println!(
@@ -204,29 +204,30 @@ fn what_the_model_does_not_know_is_not_in_what_it_says() {
         let by = |shift: f64| mean(&sigmas.iter().map(|sigma| (shift / sigma).powi(2)).collect::<Vec<_>>());
         (off, z.rms(), shares[1], [by(20e-6), by(11.4e-6)])
     };
-    let (off, rms, within, shifted) = told("as told", [1.0, 1.0], Foreign::Nothing);
+    let (off, rms, within, shifted) = report("as stated", [1.0, 1.0], Foreign::Nothing);
     assert!((0.8..=1.25).contains(&rms) && within > 0.93 && off.abs() < 3e-6, "{off} {rms} {within}");
 
-    // the centre is where it is: a ball that is told 20 µm too small leaves the surface 20 µm too high, and the mean square of what
+    // the centre is where it is: a ball stated 20 µm too small leaves the surface 20 µm too high, and the mean square of what
     // is normalised grows by that of the shift
-    let small = told("radius 20 µm small", [1.48 / 1.5, 1.0], Foreign::Nothing);
+    let small = report("radius 20 µm small", [1.48 / 1.5, 1.0], Foreign::Nothing);
     assert!((small.0 - off - 20e-6).abs() < 2e-6, "{}", small.0);
     assert!((small.1 / rms.hypot(shifted[0].sqrt()) - 1.0).abs() < 0.15, "{} {rms} {shifted:?}", small.1);
     assert!(small.2 < 0.75, "95 % are {}", small.2);
 
-    // 2.5 N bend it by 125 µm, of which a stiffness told 10 % too large leaves 11.4 µm
-    let stiff = told("stiffness 10 % large", [1.0, 1.1], Foreign::Nothing);
+    // 2.5 N bend it by 125 µm, of which a stiffness stated 10 % too large leaves 11.4 µm
+    let stiff = report("stiffness 10 % large", [1.0, 1.1], Foreign::Nothing);
     assert!((stiff.0 - off + 11.4e-6).abs() < 2e-6, "{}", stiff.0);
     assert!((stiff.1 / rms.hypot(shifted[1].sqrt()) - 1.0).abs() < 0.15, "{} {rms} {shifted:?}", stiff.1);
     assert!(stiff.2 < 0.93, "95 % are {}", stiff.2);
 
-    // the same root mean square in other ways: single outliers are averaged and rejected …
-    let tails = told("heavy tails", [1.0, 1.0], Foreign::HeavyTails);
+    // the same root mean square in other forms: single outliers are averaged and rejected …
+    let tails = report("heavy tails", [1.0, 1.0], Foreign::HeavyTails);
     assert!((0.8..=1.25).contains(&tails.1) && tails.2 > 0.93, "{tails:?}");
-    // … and what does not average out in a window is not told: of its 50 ms a smoothing of some milliseconds leaves all of the
-    // 50 µm, and 20 times as many errors are beyond two deviations as ought to be, if this is half as much as it says
-    let wander = told("wandering poses", [1.0, 1.0], Foreign::Wandering);
-    assert!((1.5..=3.5).contains(&wander.1) && (0.5..0.85).contains(&wander.2), "{wander:?}");
+    // … and what does not average out in a window is not in the stated uncertainty: of its 50 ms a smoothing of some milliseconds
+    // leaves all of the 50 µm, and 20 times as many errors are beyond two deviations as ought to be, if this is half of the
+    // stated deviation
+    let drift = report("drifting poses", [1.0, 1.0], Foreign::Drifting);
+    assert!((1.5..=3.5).contains(&drift.1) && (0.5..0.85).contains(&drift.2), "{drift:?}");
 }
 
 /// What a calibration leaves does not average out: 20 µm of position, or 16 % of the 125 µm that 2.5 N bend the stylus, stand beside
@@ -257,7 +258,7 @@ fn what_the_calibration_leaves_is_in_every_vertex() {
 }
 
 #[test]
-fn only_new_vertices_are_better_known_than_the_scan_and_nobody_pays_who_does_not_ask() {
+fn only_new_vertices_are_better_known_than_the_scan_and_uncertainty_is_optional() {
     let (scan, touch, params) = touched_plate(&StylusParams::default(), 1);
     let made = patched(&mut patcher_of(&touch.messages, params), &scan);
     assert_eq!(made.sigma.len(), made.mesh.vertex_slots());
@@ -278,7 +279,7 @@ fn only_new_vertices_are_better_known_than_the_scan_and_nobody_pays_who_does_not
 /// Time between two disturbances, ns.
 const PERIOD_NS: i64 = 1_000_000_000;
 
-/// Disturbs `messages` every second: by turns a spike of force, which a shaken handle makes, and a jump of the pose, as when
+/// Disturbs `messages` every second: by turns a spike of force, which a shaken handle makes, and a step of the pose, as when
 /// the stylus slips off, and its shaft still touches.
 fn shaken_and_slipped(messages: &[Message]) -> Vec<Message> {
     let (spike_ns, slip_ns) = (8_000_000, 40_000_000);
@@ -327,7 +328,7 @@ fn outliers_are_counted_and_do_not_dent_the_mesh() {
             let made = patched(patcher, &scan);
             let tree = FaceTree::new(&made.mesh);
             let off = |p: &Point3<f64>| tree.closest(&made.mesh, p, 1e-2).unwrap().distance_squared.sqrt() * 1e3;
-            // a disturbance is felt over the millimetre that the ball slides in a window
+            // a disturbance lasts over the millimetre that the ball slides in a window
             let around =
                 |p: &Point3<f64>| (-2..=2).map(|i| p + Vector3::x() * (f64::from(i) * 0.5e-3)).collect::<Vec<_>>();
             errors.extend(hit.iter().map(|p| around(p).iter().map(off).fold(0.0, f64::max)));
@@ -344,8 +345,8 @@ fn outliers_are_counted_and_do_not_dent_the_mesh() {
         // of the same hand where it was disturbed and where it was not, calm and shaken
         let [[calm, calm_elsewhere], [held, held_elsewhere]] = [0, 1].map(|i| {
             let apart = || patchers[i].probed().iter().filter(|touch| touch.is_rejected);
-            let at_knocks = apart().filter(|touch| near(touch.stamp_ns)).count();
-            [at_knocks, apart().count() - at_knocks]
+            let at_impacts = apart().filter(|touch| near(touch.stamp_ns)).count();
+            [at_impacts, apart().count() - at_impacts]
         });
         let second =
             |touch: &ProbedPoint| (touch.stamp_ns - SensorParams::default().start_ns + PERIOD_NS / 2) / PERIOD_NS;
@@ -424,9 +425,9 @@ fn a_place_moves_when_a_second_pass_confirms_it() {
 }
 
 /// A ball slides over the plane z = 0, its poses come with white noise at half of the rate of the force and are interpolated: the
-/// points felt lie about the plane as far as their stated noise. Of other rates this says nothing.
+/// touched points lie about the plane as far as their stated noise. Other rates are not covered.
 #[test]
-fn contacts_lie_about_the_plane_as_their_stated_noise_says() {
+fn contacts_scatter_about_the_plane_by_their_stated_noise() {
     let (radius, pose_noise) = (1.5e-3, 20e-6);
     let mut rng = Pcg64::seed_from_u64(17);
     let calibration = Some(CalibrationParams { position: 0.0, stiffness_share: 0.0 });
@@ -440,7 +441,7 @@ fn contacts_lie_about_the_plane_as_their_stated_noise_says() {
         }
         let t = i as f64 / 1000.0;
         let (force, noise) = (Vector3::z() * 4.0, before.lerp(&next, (i % 2) as f64 / 2.0));
-        // the stylus gives way: its pose goes on by as much
+        // the stylus deflects: its pose goes on by as much
         let centre = Vector3::new(0.02 * t.sin(), 0.02 * (0.7 * t).cos(), radius - 4.0 / 20_000.0) + noise;
         let sample = Sample {
             stamp_ns: 1_000_000_000 + i * 1_000_000,

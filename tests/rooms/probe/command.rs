@@ -39,7 +39,7 @@ fn probe(folder: &Path, change: impl Fn(String) -> String, more: &[&str]) -> Out
 /// fewer than 40 touches each, and no force is above 1.5 times the 3 N that are set.
 #[test]
 fn the_arm_of_the_demo_finds_every_feature() {
-    // with seed 8 the ball slides over a rim first, and one touch alone tells of an end of the slot
+    // with seed 8 the ball slides over a rim first, and one touch alone measures an end of the slot
     for seed in ["1", "8"] {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().to_str().unwrap();
@@ -58,11 +58,11 @@ fn the_arm_of_the_demo_finds_every_feature() {
             assert!(error["largest_force_n"].as_f64().unwrap() < 4.5, "{name}: {error}");
         }
         is_written(folder.path());
-        is_as_uncertain_as_told(folder.path());
+        errors_match_the_stated_uncertainty(folder.path());
     }
 }
 
-/// All files are there, and what was recorded is refined to the same mesh by another run.
+/// All files are there, and the recording is refined to the same mesh by another run.
 fn is_written(folder: &Path) {
     for file in ["plan.png", "touches.png", "deviation.png", "refined.ply", "touch.mcap", "probed.json", "scene.yaml"] {
         assert!(folder.join(file).exists(), "{file}");
@@ -93,8 +93,8 @@ fn is_written(folder: &Path) {
 }
 
 /// The part of the demo is as round as its drawing: a hole that is probed on its triangles has the drawing's diameter of 8 mm and
-/// its place within three of the standard deviations that are told.
-fn is_as_uncertain_as_told(folder: &Path) {
+/// its place within three of the reported standard deviations.
+fn errors_match_the_stated_uncertainty(folder: &Path) {
     let path = |name: &str| folder.join(name).to_str().unwrap().to_owned();
     let (scene, truth, out) = (path("scene.yaml"), path("truth.ply"), path("again"));
     let arguments = ["probe", "--robot", "sim", "--scene", &scene, "--truth", &truth, "--out", &out];
@@ -109,7 +109,7 @@ fn is_as_uncertain_as_told(folder: &Path) {
     assert!(off[0].hypot(off[1]) < 3.0 * std("center_mm"), "{off:?} mm, {}", hole["std"]);
 }
 
-/// Touches tell the numbers of a hole; slides bring the mesh around it to the drawing.
+/// Touches determine the dimensions of a hole; slides bring the mesh around it to the drawing.
 #[test]
 fn slides_bring_the_mesh_to_the_part() {
     let plate = Plate::default();
@@ -151,7 +151,7 @@ fn a_dry_run_draws_the_plan_and_moves_nothing() {
     assert!(!folder.path().join("out/touch.mcap").exists());
 }
 
-/// What is asked, how the scene is changed for it, and a part of the refusal.
+/// The request, the change of the scene, and a part of the refusal.
 type Refused<'a> = (&'a [&'a str], fn(String) -> String, &'a str);
 
 #[test]
@@ -180,9 +180,9 @@ fn what_must_not_be_is_refused_by_name() {
     }
 }
 
-/// Where the box ends above the part nothing is begun, and that is said.
+/// Where the box ends above the part the probing is refused.
 #[test]
-fn a_box_that_is_too_small_is_told_and_nothing_moves() {
+fn a_box_that_is_too_small_is_reported_and_nothing_moves() {
     let folder = tempfile::tempdir().unwrap();
     let raise =
         |scene: String| scene.replace("workspace_low_mm: [-600, -300, 0]", "workspace_low_mm: [-600, -300, 70]");
@@ -220,20 +220,20 @@ fn an_arm_without_play_passes_the_check() {
 }
 
 #[test]
-fn a_gate_that_is_not_kept_is_told_and_ends_with_its_code() {
+fn a_missed_gate_is_reported_and_sets_the_exit_code() {
     let folder = tempfile::tempdir().unwrap();
     let done = with_arm(folder.path(), |scene| scene, &["check"], &["--touches", "4", "--gate-um", "0.01"]);
     assert_eq!(done.status.code(), Some(4), "{}", stderr(&done));
-    let told = String::from_utf8_lossy(&done.stdout).into_owned();
-    assert!(told.contains("FAILED: the gate is 0.01 µm") && told.contains("touch   4 from the other"), "{told}");
+    let output = String::from_utf8_lossy(&done.stdout).into_owned();
+    assert!(output.contains("FAILED: the gate is 0.01 µm") && output.contains("touch   4 from the other"), "{output}");
     assert!(stderr(&done).contains("look for play"), "{}", stderr(&done));
 }
 
 #[test]
 fn an_arm_that_may_not_move_does_not_and_bad_spots_are_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let still = |scene: String| scene.replace("allow_motion: true", "allow_motion: false");
-    let done = with_arm(folder.path(), still, &["check"], &[]);
+    let motionless = |scene: String| scene.replace("allow_motion: true", "allow_motion: false");
+    let done = with_arm(folder.path(), motionless, &["check"], &[]);
     assert_eq!(done.status.code(), Some(2), "{}", stderr(&done));
     assert!(stderr(&done).contains("allow_motion"), "{}", stderr(&done));
     for (more, why) in [
@@ -269,22 +269,22 @@ fn the_stiffness_of_the_arm_is_found_and_written_into_the_scene() {
 }
 
 /// `touchup calibrate payload --robot sim` of a cell.
-fn weigh(folder: &Path, change: impl Fn(String) -> String, more: &[&str]) -> Output {
+fn identify_payload(folder: &Path, change: impl Fn(String) -> String, more: &[&str]) -> Output {
     let [scene, truth] = cell(folder, change);
     let out = folder.join("calibrated.yaml");
     let with = ["--robot", "sim", "--scene", &scene, "--truth", &truth, "--out", out.to_str().unwrap()];
     touchup(&[&["calibrate", "payload"], &with[..], more].concat())
 }
 
-/// The scene says 0.25 kg in the middle; what hangs on the flange is four times as heavy and off the axis. The biases are those that
+/// The scene says 0.25 kg in the middle; the true payload is four times as heavy and off the axis. The biases are those that
 /// `ArmParams` has.
 #[test]
-fn the_payload_is_weighed_within_what_it_says_of_itself() {
+fn the_payload_is_identified_within_its_stated_uncertainty() {
     for seed in ["1", "2", "3"] {
         let folder = tempfile::tempdir().unwrap();
         let held = ["--truth-payload-kg", "1.17", "--truth-payload-centre-mm", "3,-2,42"];
         let more = [&held[..], &["--seed", seed, "--json"]].concat();
-        let done = weigh(folder.path(), |scene| scene, &more);
+        let done = identify_payload(folder.path(), |scene| scene, &more);
         assert_eq!(done.status.code(), Some(0), "{}", stderr(&done));
         let found: Value = serde_json::from_slice(&done.stdout).unwrap();
         println!("{found}");
@@ -299,7 +299,7 @@ fn the_payload_is_weighed_within_what_it_says_of_itself() {
                 assert!((value - expected[axis]).abs() < 3.0 * std, "{key} {axis}: {value} ± {std}");
             }
         }
-        assert_eq!(found["still_phases"], 13);
+        assert_eq!(found["static_segments"], 13);
         assert_eq!(found["not_reached"].as_array().unwrap().len(), 0);
         // the scene with it differs in its two keys alone
         let [before, after] =
@@ -314,7 +314,7 @@ fn the_payload_is_weighed_within_what_it_says_of_itself() {
 }
 
 /// `touchup calibrate tip --robot sim` of a cell, on its flat top beside the slot.
-fn pivot(folder: &Path, change: impl Fn(String) -> String, more: &[&str]) -> Output {
+fn calibrate_tip(folder: &Path, change: impl Fn(String) -> String, more: &[&str]) -> Output {
     let [scene, truth] = cell(folder, change);
     let out = folder.join("calibrated.yaml");
     let with = ["--robot", "sim", "--scene", &scene, "--truth", &truth, "--out", out.to_str().unwrap()];
@@ -323,18 +323,19 @@ fn pivot(folder: &Path, change: impl Fn(String) -> String, more: &[&str]) -> Out
 
 /// The scene says 150 mm straight out of the flange; the ball is 2 mm farther and off to the side.
 #[test]
-fn the_tip_is_found_within_what_it_says_of_itself() {
+fn the_tip_is_found_within_its_stated_uncertainty() {
     for seed in ["1", "2", "3"] {
         let folder = tempfile::tempdir().unwrap();
         let expected = [0.9, -1.3, 152.0];
-        let done = pivot(folder.path(), |scene| scene, &["--truth-tip-mm", "0.9,-1.3,152", "--seed", seed, "--json"]);
+        let done =
+            calibrate_tip(folder.path(), |scene| scene, &["--truth-tip-mm", "0.9,-1.3,152", "--seed", seed, "--json"]);
         assert_eq!(done.status.code(), Some(0), "{}", stderr(&done));
         let found: Value = serde_json::from_slice(&done.stdout).unwrap();
         println!("{found}");
         for axis in 0..3 {
             let [value, std] = ["value", "std"].map(|part| found["tip_position_mm"][part][axis].as_f64().unwrap());
             let off = value - expected[axis];
-            // 12 touches of 5 µm, of which the leans tell a half to a fifth
+            // 12 touches of 5 µm, of which the leans determine a half to a fifth
             assert!(off.abs() < 3.0 * std && std < 0.05, "{axis}: {off} ± {std} mm");
         }
         assert_eq!((&found["touches"], found["not_reached"].as_array().unwrap().len()), (&16.into(), 0));
@@ -358,31 +359,31 @@ fn a_tip_that_cannot_be_found_is_refused_and_nothing_is_written() {
     ];
     for (more, change, code, part) in refused {
         let folder = tempfile::tempdir().unwrap();
-        let done = pivot(folder.path(), change, more);
+        let done = calibrate_tip(folder.path(), change, more);
         assert_eq!(done.status.code(), Some(code), "{more:?}: {}", stderr(&done));
         assert!(stderr(&done).contains(part), "{more:?}: {}", stderr(&done));
         assert!(!folder.path().join("calibrated.yaml").exists(), "{more:?}");
     }
 }
 
-/// Where the wrist would come too near to a singular place an orientation is left out and told; the others do.
+/// Where the wrist would come too near to a singularity an orientation is left out and listed; the others suffice.
 #[test]
-fn orientations_out_of_reach_are_left_out_and_told() {
+fn orientations_out_of_reach_are_left_out_and_listed() {
     let folder = tempfile::tempdir().unwrap();
     let least = |scene: String| scene.replace("robot:\n", "robot:\n  least_dexterity: 0.15\n");
-    let done = weigh(folder.path(), least, &[]);
+    let done = identify_payload(folder.path(), least, &[]);
     assert_eq!(done.status.code(), Some(0), "{}", stderr(&done));
-    let told = String::from_utf8_lossy(&done.stdout).into_owned();
-    let left_out = told.lines().filter(|line| line.starts_with("left out    60° towards")).count();
-    assert!(left_out > 0 && told.contains("nearly stuck"), "{told}");
-    assert!(told.contains(&format!("still phases: {},", 13 - left_out)), "{told}");
+    let output = String::from_utf8_lossy(&done.stdout).into_owned();
+    let left_out = output.lines().filter(|line| line.starts_with("left out    60° towards")).count();
+    assert!(left_out > 0 && output.contains("nearly stuck"), "{output}");
+    assert!(output.contains(&format!("static segments: {},", 13 - left_out)), "{output}");
 }
 
-/// What is asked beside `--out`, how the scene is changed, the code and a part of the refusal.
+/// The arguments beside `--out`, the change of the scene, the code and a part of the refusal.
 type NotWeighed<'a> = (&'a [&'a str], fn(String) -> String, i32, &'a str);
 
 #[test]
-fn a_payload_that_cannot_be_weighed_is_refused_and_nothing_is_written() {
+fn an_undetermined_payload_is_refused_and_nothing_is_written() {
     let same = |scene: String| scene;
     let refused: [NotWeighed; 8] = [
         (&[], |scene| scene.replace("allow_motion: true", "allow_motion: false"), 2, "allow_motion"),
@@ -398,11 +399,11 @@ fn a_payload_that_cannot_be_weighed_is_refused_and_nothing_is_written() {
         (&["--truth-payload-kg", "0"], same, 1, "nothing hangs on the flange"),
         (&["--truth-payload-centre-mm", "1,2"], same, 2, "--truth-payload-centre-mm 1,2 is not X,Y,Z in mm"),
         (&["--truth-payload-kg", "1000"], same, 2, "the payload"),
-        (&["--bag", "still.mcap"], same, 2, "cannot be used with"),
+        (&["--bag", "static.mcap"], same, 2, "cannot be used with"),
     ];
     for (more, change, code, part) in refused {
         let folder = tempfile::tempdir().unwrap();
-        let done = weigh(folder.path(), change, more);
+        let done = identify_payload(folder.path(), change, more);
         assert_eq!(done.status.code(), Some(code), "{more:?}: {}", stderr(&done));
         assert!(stderr(&done).contains(part), "{more:?}: {}", stderr(&done));
         assert!(!folder.path().join("calibrated.yaml").exists(), "{more:?}");
@@ -411,8 +412,8 @@ fn a_payload_that_cannot_be_weighed_is_refused_and_nothing_is_written() {
     for (more, part) in [
         (&[][..], "<--bag <RECORDING>|--samples <CSV>|--robot <ARM>>"),
         (&["--robot", "sim"], "--scene is needed"),
-        (&["--bag", "still.mcap", "--seed", "3"], "cannot be used with"),
-        (&["--samples", "still.csv", "--truth-payload-kg", "1"], "cannot be used with"),
+        (&["--bag", "static.mcap", "--seed", "3"], "cannot be used with"),
+        (&["--samples", "static.csv", "--truth-payload-kg", "1"], "cannot be used with"),
         (&["--robot", "sim", "--wrench-axes", "pose"], "cannot be used with"),
     ] {
         let done = touchup(&[&calibrate[..], more].concat());

@@ -1,4 +1,4 @@
-//! From a flag to a feature: ways that keep clear, limits that hold, and a true reason for every ending.
+//! From a flag to a feature: paths that keep clear, limits that hold, and a true reason for every ending.
 
 use std::path::PathBuf;
 
@@ -14,28 +14,28 @@ use touchup::probe::{Cell, Ending, Flag, ProbeParams, Probed, Prober, Progress, 
 use touchup::robot::{Arm, ArmState, Limits, ProbeError, Safety, TouchParams, UrGeometry, Witness};
 use touchup::sim::{ArmFault, ArmParams, Plate, ScannerParams, SimArm, Surface, scan};
 
-/// A mesh that stays as it is.
-struct Still {
+/// A mesh that stays unchanged.
+struct StaticScan {
     mesh: TriMesh,
     tree: FaceTree,
-    /// wants it to end after so many states
+    /// cancels after this many states
     patience: Option<usize>,
     seen: usize,
     touches: Vec<usize>,
-    /// what the mesh becomes when more than 2 N is felt
+    /// what the mesh becomes when more than 2 N is measured
     after: Option<TriMesh>,
     /// height of the tip in B when it was wanted to end, and the least since then, m
     since_then: Option<[f64; 2]>,
 }
 
-impl Still {
+impl StaticScan {
     fn new(mesh: TriMesh) -> Self {
         let tree = FaceTree::new(&mesh);
         Self { mesh, tree, patience: None, seen: 0, touches: Vec::new(), after: None, since_then: None }
     }
 }
 
-impl Witness for Still {
+impl Witness for StaticScan {
     fn see(&mut self, state: &ArmState) {
         self.seen += 1;
         if state.wrench_b.force.norm() > 2.0
@@ -56,7 +56,7 @@ impl Witness for Still {
     }
 }
 
-impl World for Still {
+impl World for StaticScan {
     fn mesh(&self) -> &TriMesh {
         &self.mesh
     }
@@ -92,20 +92,20 @@ fn above(cell: &Cell, place: [f64; 3]) -> Isometry3<f64> {
     cell.pose(&UnitQuaternion::identity(), &place.into())
 }
 
-/// The hole of the plate is probed, with what was changed before.
-fn probed(params: &ProbeParams, world: &mut Still, change: impl FnOnce(&mut SimArm)) -> (Probed, f64, [f64; 3]) {
+/// Probes the hole of the plate, after a change of the arm.
+fn probed(params: &ProbeParams, world: &mut StaticScan, change: impl FnOnce(&mut SimArm)) -> (Probed, f64, [f64; 3]) {
     let (plate, cell) = (Plate::default(), cell());
     let mut arm = SimArm::new(&plate, ArmParams::default(), &above(&cell, [40e-3, 25e-3, 50e-3])).unwrap();
     change(&mut arm);
     let probed = Prober::new(&mut arm, &cell, params, world).probe(&HOLE);
     arm.advance(0.5);
-    (probed, arm.stands_since(), arm.ball().into())
+    (probed, arm.at_rest_since(), arm.ball().into())
 }
 
 /// The hole of the plate: Ø 8 mm at (16, 36).
 #[test]
 fn a_flag_becomes_a_feature() {
-    let mut world = Still::new(plate_scan());
+    let mut world = StaticScan::new(plate_scan());
     let (probed, _, end) = probed(&params(), &mut world, |_| {});
     assert_eq!(probed.ending, Ending::ToleranceReached);
     let hole = probed.found.as_ref().unwrap().feature.as_ref().unwrap();
@@ -115,7 +115,7 @@ fn a_flag_becomes_a_feature() {
     assert!(probed.touches.len() < 40 && probed.peak_force < 4.5, "{} {}", probed.touches.len(), probed.peak_force);
     // it has retracted: the ball is above the part
     assert!(end[2] > 14e-3, "{end:?}");
-    // each before it is made, and the last again with what it told
+    // each before it is made, and the last again with its result
     let count = probed.touches.len();
     assert_eq!(world.touches, (1..=count).chain([count]).collect::<Vec<_>>());
     let records = probed.touches.iter().filter_map(|touch| touch.record.as_ref());
@@ -124,8 +124,8 @@ fn a_flag_becomes_a_feature() {
 }
 
 #[test]
-fn what_is_spent_is_said() {
-    let of = |params: ProbeParams| probed(&params, &mut Still::new(plate_scan()), |_| {}).0;
+fn exhausted_limits_are_reported() {
+    let of = |params: ProbeParams| probed(&params, &mut StaticScan::new(plate_scan()), |_| {}).0;
     let few = PatternParams { budget: 13, sigma: 1e-9, ..PatternParams::default() };
     let spent = of(ProbeParams { pattern: few, ..params() });
     assert_eq!((spent.ending, spent.touches.len()), (Ending::TouchesSpent, 13));
@@ -137,19 +137,19 @@ fn what_is_spent_is_said() {
 
 #[test]
 fn a_cancelled_probing_stops_and_retracts() {
-    let mut world = Still { patience: Some(6000), ..Still::new(plate_scan()) };
+    let mut world = StaticScan { patience: Some(6000), ..StaticScan::new(plate_scan()) };
     let (probed, _, end) = probed(&params(), &mut world, |_| {});
     assert_eq!(probed.ending, Ending::Cancelled);
     assert!(!probed.touches.is_empty());
     assert!(end[2] > 14e-3, "{end:?}");
 }
 
-/// Wherever it is when it is cancelled, the way out does not lead deeper: from 50 mm/s a stop takes 2.5 mm.
+/// Wherever it is when it is cancelled, the retreat does not lead deeper: from 50 mm/s a stop takes 2.5 mm.
 #[test]
 fn a_cancelled_probing_goes_no_deeper() {
-    // every stretch of its way, also between the places on the way out
+    // every segment of its path, also between the places of the retreat
     for patience in (1..16).map(|times| 700 * times).chain((0..8).map(|times| 3000 + 211 * times)) {
-        let mut world = Still { patience: Some(patience), ..Still::new(plate_scan()) };
+        let mut world = StaticScan { patience: Some(patience), ..StaticScan::new(plate_scan()) };
         let (probed, _, end) = probed(&params(), &mut world, |_| {});
         assert_eq!(probed.ending, Ending::Cancelled, "{patience}");
         let [first, least] = world.since_then.unwrap();
@@ -158,11 +158,11 @@ fn a_cancelled_probing_goes_no_deeper() {
     }
 }
 
-/// A probe that stands in the part would have its force taken for nothing.
+/// A probe inside the part would have its force zeroed.
 #[test]
 fn nothing_is_zeroed_where_the_probe_is_at_the_mesh() {
     let (plate, cell, params) = (Plate::default(), cell(), params());
-    let mut world = Still::new(plate.mesh(1e-5).unwrap());
+    let mut world = StaticScan::new(plate.mesh(1e-5).unwrap());
     let start = above(&cell, [45e-3, 8e-3, 12e-3 + 1.6e-3]);
     let mut arm = SimArm::new(&plate, ArmParams::default(), &start).unwrap();
     // pressed onto the top, as after a stop
@@ -183,7 +183,7 @@ fn nothing_is_zeroed_where_the_probe_is_at_the_mesh() {
 fn what_is_out_of_reach_is_refused_before_anything_moves() {
     let mut tight = params();
     tight.limits.lowest.z = 0.07;
-    let mut world = Still::new(plate_scan());
+    let mut world = StaticScan::new(plate_scan());
     let (probed, stood, _) = probed(&tight, &mut world, |_| {});
     assert!(matches!(probed.ending, Ending::OutOfLimits(_)), "{}", probed.ending);
     assert!(stood.abs() < 1e-9, "it moved until {stood} s");
@@ -191,7 +191,7 @@ fn what_is_out_of_reach_is_refused_before_anything_moves() {
 
 #[test]
 fn a_stop_of_the_arm_ends_it_with_what_was_measured() {
-    let mut world = Still::new(plate_scan());
+    let mut world = StaticScan::new(plate_scan());
     let (probed, stood, _) = probed(&params(), &mut world, |arm| arm.fail_at(20.0, ArmFault::ProtectiveStop));
     let Ending::Stopped(ProbeError::Arm { error, .. }) = &probed.ending else { panic!("{}", probed.ending) };
     assert_eq!(*error, touchup::robot::ArmError::Stopped { safety: Safety::ProtectiveStop });
@@ -203,23 +203,23 @@ fn a_stop_of_the_arm_ends_it_with_what_was_measured() {
 #[test]
 fn a_stop_keeps_the_force_and_the_time_of_the_touch_that_it_ended() {
     let hit = |arm: &mut SimArm| arm.fail_at(20.0, ArmFault::ForceSpike(40.0));
-    let (spiked, ..) = probed(&params(), &mut Still::new(plate_scan()), hit);
+    let (spiked, ..) = probed(&params(), &mut StaticScan::new(plate_scan()), hit);
     assert!(matches!(spiked.ending, Ending::Stopped(ProbeError::Limit { .. })), "{}", spiked.ending);
     assert!((spiked.peak_force - 40.0).abs() < 5.0, "{}", spiked.peak_force);
     let lose = |arm: &mut SimArm| arm.fail_at(20.0, ArmFault::LinkLost);
-    let (lost, ..) = probed(&params(), &mut Still::new(plate_scan()), lose);
+    let (lost, ..) = probed(&params(), &mut StaticScan::new(plate_scan()), lose);
     // the sensor was zeroed in 64 readings before it began
     assert!((lost.seconds - 20.0).abs() < 0.3, "{}", lost.seconds);
 }
 
-/// The scan lies 0.3 mm below the part, and follows as soon as the part is felt: the first touch tells what it was.
+/// The scan lies 0.3 mm below the part, and follows as soon as the part is touched: the first touch measures the offset.
 #[test]
 fn the_deviation_of_a_touch_is_from_the_mesh_before_it() {
     let (plate, cell) = (Plate::default(), cell());
     let right = plate.mesh(1e-5).unwrap();
     let corners: Vec<_> = right.faces().map(|(_, corners)| corners.map(|corner| corner.0)).collect();
     let low = right.positions().iter().map(|p| p - Vector3::z() * 0.3e-3).collect();
-    let mut world = Still { after: Some(right), ..Still::new(TriMesh::new(low, corners).unwrap()) };
+    let mut world = StaticScan { after: Some(right), ..StaticScan::new(TriMesh::new(low, corners).unwrap()) };
     let mut arm = SimArm::new(&plate, ArmParams::default(), &above(&cell, [45e-3, 9e-3, 50e-3])).unwrap();
     let flag = Flag { id: 1, kind: Some(Kind::Plane), place: Point3::new(45e-3, 9e-3, 12e-3), radius: 3e-3 };
     let params = ProbeParams { pattern: PatternParams { budget: 4, ..params().pattern }, ..params() };
@@ -229,9 +229,9 @@ fn the_deviation_of_a_touch_is_from_the_mesh_before_it() {
     assert!(deviations[1..].iter().all(|deviation| deviation.abs() < 30e-6), "{deviations:?}");
 }
 
-/// Looks how fast a probe turns, and how near its shaft comes to the part as it is.
+/// Records how fast a probe turns, and how near its shaft comes to the true part.
 struct Turning {
-    still: Still,
+    scan: StaticScan,
     plate: Plate,
     cell: Cell,
     before: Option<UnitQuaternion<f64>>,
@@ -247,21 +247,21 @@ impl Witness for Turning {
         let (ball, shaft) = (self.cell.place(&state.pose_bt), self.cell.shaft(&rotation));
         let along = (3..60).map(|mm| self.plate.signed_distance(&(ball + shaft.into_inner() * (f64::from(mm) * 1e-3))));
         self.nearest = along.fold(self.nearest, f64::min);
-        self.still.see(state);
+        self.scan.see(state);
     }
 }
 
 impl World for Turning {
     fn mesh(&self) -> &TriMesh {
-        self.still.mesh()
+        self.scan.mesh()
     }
 
     fn closest_face(&self, place: &Point3<f64>, reach: f64) -> Option<FaceHit> {
-        self.still.closest_face(place, reach)
+        self.scan.closest_face(place, reach)
     }
 
     fn tell(&mut self, progress: &Progress) {
-        self.still.tell(progress);
+        self.scan.tell(progress);
     }
 }
 
@@ -274,7 +274,7 @@ fn a_leaning_probe_is_turned_slowly_and_clear_of_the_part() {
     let start = cell.pose(&lean, &Point3::new(30e-3, 25e-3, 16e-3));
     let mut arm = SimArm::new(&plate, ArmParams::default(), &start).unwrap();
     let mut world = Turning {
-        still: Still::new(plate_scan()),
+        scan: StaticScan::new(plate_scan()),
         plate: plate.clone(),
         cell: cell.clone(),
         before: None,
@@ -287,7 +287,7 @@ fn a_leaning_probe_is_turned_slowly_and_clear_of_the_part() {
     assert!(world.fastest > 0.0 && world.nearest > cell.tool.shaft_radius, "{}", world.nearest);
 }
 
-/// Beside a wall that stands on the side it turns to, a tool turns only above it.
+/// Beside a wall on the side it turns to, a tool turns only above it.
 #[test]
 fn a_turn_that_would_meet_a_wall_is_made_above_it() {
     // the half space x > 10 mm below z = 50 mm
@@ -304,9 +304,9 @@ fn a_turn_that_would_meet_a_wall_is_made_above_it() {
     };
     let place = turning_place(&tool, &Point3::origin(), std::f64::consts::FRAC_PI_3, &shaft, &wall).unwrap();
     for step in 0..=100 {
-        let way = shaft(f64::from(step) / 100.0);
+        let direction = shaft(f64::from(step) / 100.0);
         for mm in 0..=600 {
-            let p = place + way.into_inner() * (f64::from(mm) * 1e-4);
+            let p = place + direction.into_inner() * (f64::from(mm) * 1e-4);
             assert!(wall(&p, 1.0) >= tool.shaft_radius + tool.margin - 1e-9, "{p} at {step} %");
         }
     }
@@ -337,9 +337,9 @@ proptest! {
         let shaft_room = places.iter().map(from_shaft).fold(f64::INFINITY, f64::min) - tool.shaft_radius - tool.margin;
         let ball_room = distance(&Point3::origin(), 1.0) - tool.ball_radius - tool.margin;
         let least = shaft_room.min(ball_room);
-        // of what is in the mesh only that is told
+        // only that part of the mesh is reported
         prop_assert!(room <= least + 1e-12 || (room < 0.0 && least < 0.0), "{room} of {shaft_room} {ball_room}");
-        // and not less than half of what there is beyond the balls that stand for the shaft
+        // and not less than half of what there is beyond the balls that model the shaft
         let spare = tool.shaft_radius * (1.25f64.sqrt() - 1.0);
         let there = (shaft_room - spare).min(ball_room);
         prop_assert!(room >= (there / 2.0).min(there).min(reach / 2.0) - 1e-12, "{room} of {there}");
@@ -352,10 +352,10 @@ fn a_dry_run_moves_nothing() {
     let start = above(&cell, [40e-3, 25e-3, 50e-3]);
     let mut arm = SimArm::new(&plate, ArmParams::default(), &start).unwrap();
     let now = arm.next_state().unwrap();
-    let world = Still::new(plate_scan());
+    let world = StaticScan::new(plate_scan());
     let planned = plan(&cell, &params(), &world, &HOLE, &now).unwrap();
     assert!(!planned.wishes.is_empty() && planned.held_back.is_empty(), "{:?}", planned.held_back);
-    assert_eq!(arm.stands_since(), 0.0);
+    assert_eq!(arm.at_rest_since(), 0.0);
 }
 
 /// Distance of a point from a triangle, by its corners, edges and inside one after the other.
@@ -418,11 +418,11 @@ struct Moves {
     plans: usize,
     touches: usize,
     links: usize,
-    /// with the shaft along z, so that it can be looked at
+    /// with the shaft along z, so that it can be tested
     upright: usize,
     /// that pass within two millimetres of what they must keep
     close: usize,
-    /// that go where the straight way from the last place in free air is barred
+    /// that go where the straight path from the last place in free air is barred
     around: usize,
 }
 
@@ -450,7 +450,7 @@ fn check_move(
 }
 
 /// For any part: no plan leaves the box, and no move through free air brings ball or shaft nearer to the mesh than their radii and the
-/// margin. Distances are those of another way than the tree's: all triangles, one after the other.
+/// margin. Distances come from another method than the tree's: all triangles, one after the other.
 #[test]
 fn no_plan_leaves_the_limits_or_passes_through_the_mesh() {
     let is_full = crate::full::is_full();
@@ -469,7 +469,7 @@ fn no_plan_leaves_the_limits_or_passes_through_the_mesh() {
         }
         moves.parts += 1;
         let [low, high] = mesh.bounds();
-        // wherever the part is, in the middle of what the arm reaches
+        // wherever the part is, in the middle of the arm's workspace
         let middle = nalgebra::center(&low, &high);
         let base = Point3::new(-0.4, -0.1, 0.1);
         let pose_bo = Isometry3::translation(base.x - middle.x, base.y - middle.y, base.z - low.z);
@@ -477,7 +477,7 @@ fn no_plan_leaves_the_limits_or_passes_through_the_mesh() {
         let params = ProbeParams { pattern: PatternParams { budget: 12, ..params().pattern }, ..params() };
         let start = above(&cell, [middle.x, middle.y, high.z + 60e-3]);
         let faces: Vec<_> = mesh.faces().map(|(face, _)| mesh.triangle(face)).collect();
-        let (triangles, world) = (Triangles::new(&mesh), Still::new(mesh.clone()));
+        let (triangles, world) = (Triangles::new(&mesh), StaticScan::new(mesh.clone()));
         let flange = start * cell.pose_ft.inverse();
         let joints = cell.geometry.inverse(&flange, &[0.0; 6])[0];
         let now = ArmState {
@@ -494,12 +494,16 @@ fn no_plan_leaves_the_limits_or_passes_through_the_mesh() {
             let flag = Flag { id: 1, kind, place, radius: 4e-3 };
             let planned = plan(&cell, &params, &world, &flag, &now).unwrap();
             moves.plans += 1;
-            for (number, wish) in planned.wishes.iter().enumerate() {
+            for (number, planned_touch) in planned.wishes.iter().enumerate() {
                 if planned.held_back.iter().any(|(at, _)| *at == number) {
                     continue;
                 }
                 moves.touches += 1;
-                for place in [wish.entry, wish.from, wish.from + wish.direction.into_inner() * wish.search] {
+                for place in [
+                    planned_touch.entry,
+                    planned_touch.from,
+                    planned_touch.from + planned_touch.direction.into_inner() * planned_touch.search,
+                ] {
                     let p = cell.pose_bo * place;
                     let is_in = (0..3)
                         .all(|i| p[i] >= params.limits.lowest[i] - 1e-9 && p[i] <= params.limits.highest[i] + 1e-9);
@@ -519,8 +523,8 @@ fn no_plan_leaves_the_limits_or_passes_through_the_mesh() {
             moves.around += planned
                 .links
                 .windows(3)
-                .filter(|way| {
-                    let [from, to] = [way[0][0], way[2][1]];
+                .filter(|path| {
+                    let [from, to] = [path[0][0], path[2][1]];
                     let mut straight = (0..=100).map(|at| from + (to - from) * (f64::from(at) / 100.0));
                     straight.any(|p| triangles.distance(&p, 10e-3) < cell.tool.ball_radius)
                 })
@@ -533,7 +537,7 @@ fn no_plan_leaves_the_limits_or_passes_through_the_mesh() {
     assert!(upright >= 20 && close >= 20 && around >= 10, "{moves:?}");
 }
 
-/// The shaft stands where the normal is, when it leans.
+/// The shaft is along the normal, when it leans.
 #[test]
 fn the_shaft_is_turned_to_the_surface_and_left_where_it_is_near() {
     let cell = cell();

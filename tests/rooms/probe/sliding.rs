@@ -47,7 +47,8 @@ fn probed(flag: &Flag, world: &mut dyn World) -> (Probed, Point3<f64>) {
     (probed, arm.ball())
 }
 
-/// The ball just touches at each station, and its normal leads away from where it does; lifted, and all the way up, it is clear.
+/// The ball just touches at each station, and its normal leads away from where it does; lifted, and on the whole path up, it is
+/// clear.
 fn lies_on(plate: &Plate, slide: &Slide) {
     for (number, station) in slide.stations.iter().enumerate() {
         let off = plate.signed_distance(&station.centre) - BALL;
@@ -102,9 +103,9 @@ fn slides_lie_on_what_was_found_and_keep_their_force() {
     }
 }
 
-/// From a flag beside a hole that nobody has named: only over what was felt, and into nothing.
+/// From a flag beside an undetected hole: only over what was touched, and into nothing.
 #[test]
-fn an_unknown_region_is_slid_over_where_it_was_felt() {
+fn an_unknown_region_is_slid_over_where_it_was_touched() {
     let plate = Plate::default();
     let (probed, end) = probed(&flag(None, [20e-3, 33e-3, TOP], 6e-3), &mut world());
     assert!(!probed.slides.is_empty() && end.z > TOP + BALL);
@@ -159,11 +160,11 @@ fn a_surface_that_ends_is_left() {
 
 /// The boss has a radius of 5 mm at (47 25) mm.
 #[test]
-fn what_stands_in_the_way_ends_a_slide() {
+fn an_obstacle_ends_a_slide() {
     let (record, ball, peak) = slid([30e-3, 25e-3], [47e-3, 25e-3], 0.0);
     assert_eq!(record.ending, SlideEnding::Blocked);
     assert!((ball.x - (42e-3 - BALL)).abs() < 0.3e-3 && ball.z > TOP + BALL + 2.5e-3, "{ball}");
-    // 15 N/mm at 10 mm/s, until it is known, the arm has heard it, and stands
+    // 15 N/mm at 10 mm/s, until it is known, the arm has received it and is at rest
     assert!(peak < 10.0, "{peak}");
 }
 
@@ -176,7 +177,7 @@ fn where_no_surface_is_nothing_is_slid_over() {
 
 /// Wants it to end after some states of a slide.
 struct Impatient {
-    still: StillWorld,
+    inner: StillWorld,
     is_sliding: bool,
     seen: usize,
 }
@@ -193,11 +194,11 @@ impl Witness for Impatient {
 
 impl World for Impatient {
     fn mesh(&self) -> &TriMesh {
-        self.still.mesh()
+        self.inner.mesh()
     }
 
     fn closest_face(&self, place: &Point3<f64>, reach: f64) -> Option<FaceHit> {
-        self.still.closest_face(place, reach)
+        self.inner.closest_face(place, reach)
     }
 
     fn tell(&mut self, _: &Progress) {}
@@ -209,14 +210,14 @@ impl World for Impatient {
 
 #[test]
 fn a_cancelled_slide_comes_out_of_the_hole() {
-    let mut world = Impatient { still: world(), is_sliding: false, seen: 0 };
+    let mut world = Impatient { inner: world(), is_sliding: false, seen: 0 };
     let (probed, end) = probed(&flag(Some(Kind::Hole), [17e-3, 35e-3, TOP], 3e-3), &mut world);
     assert_eq!(probed.ending, Ending::Cancelled);
     assert!(probed.found.is_some() && end.z > TOP + BALL + 1e-3, "{end}");
     assert!(probed.peak_force < 4.5, "{}", probed.peak_force);
 }
 
-/// A plan has the slides too, and holds back what is out of reach.
+/// A plan has the slides too, and leaves out what is out of reach.
 #[test]
 fn slides_are_planned_and_checked() {
     let (plate, cell, params) = (Plate::default(), cell(), params());
@@ -225,8 +226,8 @@ fn slides_are_planned_and_checked() {
     let flag = flag(Some(Kind::Plane), [45e-3, 9e-3, TOP], 5e-3);
     let planned = plan(&cell, &params, &world(), &flag, &now).unwrap();
     assert_eq!((planned.slides.len(), planned.held_back.len()), (1, 0), "{:?}", planned.held_back);
-    let on_way = |place: &Point3<f64>| planned.path.contains(place);
-    assert!(planned.slides[0].stations.iter().all(|station| on_way(&station.centre)));
+    let on_path = |place: &Point3<f64>| planned.path.contains(place);
+    assert!(planned.slides[0].stations.iter().all(|station| on_path(&station.centre)));
     // a floor of the workspace between the clear height and the surface
     let floor = (cell.pose_bo * Point3::new(45e-3, 9e-3, TOP + BALL + 1e-3)).z;
     let lowest = Point3::new(-0.6, -0.3, floor);

@@ -1,4 +1,4 @@
-//! Drawn cases that are counted by what they could show, so that a property cannot hold because nothing was looked at.
+//! Drawn cases that are counted by what they could show, so that a property cannot hold vacuously.
 
 use std::cell::Cell;
 

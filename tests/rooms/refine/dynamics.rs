@@ -136,7 +136,7 @@ fn half_the_tangent_of_half_the_angle_after_ln_2() {
 }
 
 #[test]
-fn opposite_force_and_no_force_do_not_turn_and_a_long_one_turns_all_the_way() {
+fn opposite_force_and_no_force_do_not_turn_and_a_long_one_turns_fully() {
     let params = paper(0.0, 1e3);
     let deep = Point3::new(0.0, 0.0, -1.0);
     assert_eq!(step(params, &UP, deep, press(-2.0), 1e9).n, UP.n);
@@ -352,17 +352,17 @@ fn check_extremes(sizes: &Sizes, [n, f, side]: [Vector3<f64>; 3], params: Dynami
 fn extremes_give_a_unit_normal_or_an_error() {
     let cases = |reach| (sizes(reach), [unit(), unit(), unit()], params());
     // the largest product is (α f_max t / h_min) of 10^120
-    let told = tried("sizes of 1e-25 to 1e25", 2048, cases(25.0), |(sizes, directions, params)| {
+    let counts = tried("sizes of 1e-25 to 1e25", 2048, cases(25.0), |(sizes, directions, params)| {
         check_extremes(&sizes, directions, params, false)
     });
-    assert!(told.values > 1500, "{told:?}");
+    assert!(counts.values > 1500, "{counts:?}");
     // as far as numbers go: a product of four sizes may be as far from 1 as 10^100, and what is refused is one of those
-    let told = tried("sizes of 1e-300 to 1e300", 2048, cases(300.0), |(sizes, directions, params)| {
+    let counts = tried("sizes of 1e-300 to 1e300", 2048, cases(300.0), |(sizes, directions, params)| {
         let mut powers = sizes.exponents.map(f64::abs);
         powers.sort_by(f64::total_cmp);
         check_extremes(&sizes, directions, params, powers[3..].iter().sum::<f64>() > 100.0)
     });
-    assert!(told.values > 200, "{told:?}");
+    assert!(counts.values > 200, "{counts:?}");
 }
 
 /// A face in a saturated model goes at one of two speeds, −c where nothing is expected (u > 0) and 1 − c where f_max is (u < 0),
@@ -376,7 +376,7 @@ fn check_saturated(u: f64, c: f64, scaled: f64, rule: StepRule) -> Shown {
     let moved = if to_bend < 0.0 || to_bend > scaled {
         free
     } else {
-        // at the bend it rests, or goes on at the other speed
+        // at the bend it is at rest, or goes on at the other speed
         let beyond = speed(-u);
         -u + if (beyond > 0.0) == (speed(u) > 0.0) { beyond * (scaled - to_bend) } else { 0.0 }
     };
@@ -393,10 +393,10 @@ fn check_saturated(u: f64, c: f64, scaled: f64, rule: StepRule) -> Shown {
 fn saturated_depths_and_long_times_go_at_the_speeds_of_both_ends() {
     let rule = prop_oneof![Just(StepRule::Lie), Just(StepRule::DriftCorrected)];
     let scaled = (3.0..15.0f64).prop_map(|x| 10f64.powf(x));
-    let told = tried("saturated", 4096, (-1e9..1e9, -3.0..3.0f64, scaled, rule), |(u, c, scaled, rule)| {
+    let counts = tried("saturated", 4096, (-1e9..1e9, -3.0..3.0f64, scaled, rule), |(u, c, scaled, rule)| {
         check_saturated(u, c, scaled, rule)
     });
-    assert!(told.values > 3000, "{told:?}");
+    assert!(counts.values > 3000, "{counts:?}");
 }
 
 /// c = F·n/f_max on both sides of every special value.
@@ -411,8 +411,8 @@ fn shares() -> impl Strategy<Value = f64> {
     ]
 }
 
-/// Two flows of a share of the time each are the one of all of it; and each way lies between the rates of its ends, f by
-/// f_max e^(−u/2) / (2 cosh(u/2)), as h moves one way and f falls with h.
+/// Two flows of a share of the time each are the one of all of it; and each travel lies between the rates of its ends, f by
+/// f_max e^(−u/2) / (2 cosh(u/2)), as h moves monotonically and f falls with h.
 fn check_sum(u: f64, c: f64, t: f64, first: f64, tilted: bool) -> Shown {
     let model = ContactModel::Sigmoid { f_max_n: 1.0, h_min_m: 1.0, delta: 0.0 };
     let along = if tilted { Along::Force } else { Along::InitialNormal };
@@ -440,25 +440,25 @@ fn check_sum(u: f64, c: f64, t: f64, first: f64, tilted: bool) -> Shown {
     };
     // along a, which leans by 45° where it is tilted, and looks down where F does
     let up = once.b.z.signum() * once.b.coords.norm();
-    let way = if tilted { up * c.signum() } else { up };
+    let travel = if tilted { up * c.signum() } else { up };
     let ends = [rate(u) * t, rate(u - once.b.z) * t];
     let [least, most] = [ends[0].min(ends[1]), ends[0].max(ends[1])];
     let slack =
         1e-12 * (least.abs() + most.abs()) + 64.0 * f64::EPSILON * (t * (1.0 + c.abs()) + u.abs()) + 4.0 * rounding;
-    assert!(way >= least - slack && way <= most + slack, "{way} not in {least} … {most} from {u} at {c}, {t}");
-    let is_told =
-        slack + rounding < 1e-3 * way.abs() && least.abs().min(most.abs()) > 0.05 * least.abs().max(most.abs());
-    if is_told { Shown::Value } else { Shown::Little }
+    assert!(travel >= least - slack && travel <= most + slack, "{travel} not in {least} … {most} from {u} at {c}, {t}");
+    let is_meaningful =
+        slack + rounding < 1e-3 * travel.abs() && least.abs().min(most.abs()) > 0.05 * least.abs().max(most.abs());
+    if is_meaningful { Shown::Value } else { Shown::Little }
 }
 
 #[test]
 fn position_flows_add_up_in_every_regime() {
     let depth = prop_oneof![-45.0..45.0, -700.0..700.0];
     let cases = (depth, shares(), -6.0..6.0f64, 0.05..0.95, any::<bool>());
-    let told = tried("sums of flows", 20_000, cases, |(u, c, scaled, first, tilted)| {
+    let counts = tried("sums of flows", 20_000, cases, |(u, c, scaled, first, tilted)| {
         check_sum(u, c, 10f64.powf(scaled), first, tilted)
     });
-    assert!(told.values > 8_000, "{told:?}");
+    assert!(counts.values > 8_000, "{counts:?}");
 }
 
 /// Distance of the planes at the true barycentre, m, and angle between the normals, rad, before each millisecond.

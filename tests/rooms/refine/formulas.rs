@@ -1,6 +1,6 @@
-//! A property for each formula of the method, over the whole range of numbers: denormals, overflow and cancellation are looked
-//! for on purpose. What was the worst in long runs stands as a case of its own. Where a case can show little it is counted, and
-//! what may be refused is said by a predicate of the test.
+//! A property for each formula of the method, over the whole range of numbers: denormals, overflow and cancellation are included
+//! on purpose. What was the worst in long runs is a case of its own. Where a case can show little it is counted, and
+//! a predicate of the test decides what may be refused.
 
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -25,7 +25,7 @@ fn any_size() -> impl Strategy<Value = f64> {
     ]
 }
 
-/// Ten to the power of what is drawn.
+/// Ten to the power of the drawn number.
 fn power(low: f64, high: f64) -> impl Strategy<Value = f64> {
     (low..high).prop_map(|x| 10f64.powf(x))
 }
@@ -86,7 +86,7 @@ fn check_inverse(f_max: f64, delta: f64, share: f64) -> Shown {
     let size = h.abs() + delta.abs() + 1.0;
     let tolerance = 8.0 * EPSILON * size * force + 1e-322;
     assert!((back - force).abs() <= tolerance, "{back:e} {force:e} at h {h}");
-    // near f_max the force says little of the distance: a millionth of h_min must show
+    // near f_max the force determines the distance poorly: a millionth of h_min must show
     if tolerance < 1e-6 * force * (1.0 - share) { Shown::Value } else { Shown::Little }
 }
 
@@ -105,10 +105,10 @@ fn check_turn(n: &Vector3<f64>, to: &Vector3<f64>, exponent: f64) -> Shown {
     // it stays in the plane of both
     let across = n.cross(to);
     assert!(turned.dot(&across).abs() <= 8.0 * EPSILON, "{}", turned.dot(&across));
-    // it has turned, and neither all the way nor to the other side
+    // it has turned, and neither fully nor to the other side
     let open = before.min(left).min(std::f64::consts::FRAC_PI_2 - before.max(left));
-    let is_told = tolerance < 1e-6 * open.min((before - left).abs());
-    if is_told { Shown::Value } else { Shown::Little }
+    let is_meaningful = tolerance < 1e-6 * open.min((before - left).abs());
+    if is_meaningful { Shown::Value } else { Shown::Little }
 }
 
 /// Whether a product is beyond the largest number, or so near that a factor of two might be: by its factors' powers of ten.
@@ -116,7 +116,7 @@ fn is_huge(factors: &[f64]) -> bool {
     factors.iter().map(|x| x.abs().log10()).sum::<f64>() > 307.0
 }
 
-/// A spring falls to e^−αkt of its distance to rest. It is refused only where a product is huge that its way h + F/k, its
+/// A spring falls to e^−αkt of its distance to rest. It is refused only where a product is huge that its travel h + F/k, its
 /// impulse k ∫ h dt or their terms consist of.
 fn check_spring(stiffness: f64, alpha: f64, dt: f64, h: f64, force: f64) -> Shown {
     let model = ContactModel::Spring { stiffness_n_per_m: stiffness };
@@ -139,22 +139,22 @@ fn check_spring(stiffness: f64, alpha: f64, dt: f64, h: f64, force: f64) -> Show
     };
     let left = h + force / stiffness;
     let expected = if z < 1e-17 { alpha * dt * (stiffness * h + force) } else { left * -(-z).exp_m1() };
-    // both terms of the sum are rounded before they meet; what underflows on the way is below the smallest normal number
+    // both terms of the sum are rounded before they meet; what underflows in between is below the smallest normal number
     let terms = (h.abs() + (force / stiffness).abs()) * z.min(1.0);
     let underflow = f64::MIN_POSITIVE * (1.0 + alpha * dt) * (1.0 + stiffness.recip().min(1e300));
     let tolerance = 16.0 * EPSILON * terms + underflow;
-    let is_told = [z, expected, terms, underflow, stiffness * h].iter().all(|x| x.is_finite()) && z.is_normal();
+    let is_meaningful = [z, expected, terms, underflow, stiffness * h].iter().all(|x| x.is_finite()) && z.is_normal();
     // with few digits left in αk or αt there are no more in what comes of it: less than a rounding of h
-    let is_told = is_told && (alpha * stiffness).is_normal() && (alpha * dt).is_normal();
-    assert!(!is_told || (after.b.z - expected).abs() <= tolerance, "{:e} {expected:e}", after.b.z);
-    if is_told && tolerance < 1e-9 * expected.abs() { Shown::Value } else { Shown::Little }
+    let is_meaningful = is_meaningful && (alpha * stiffness).is_normal() && (alpha * dt).is_normal();
+    assert!(!is_meaningful || (after.b.z - expected).abs() <= tolerance, "{:e} {expected:e}", after.b.z);
+    if is_meaningful && tolerance < 1e-9 * expected.abs() { Shown::Value } else { Shown::Little }
 }
 
 /// Towards rest, not over it, and as far as the rate allows. With F inside (0, f_max) the rate only falls, and the distance g
-/// to rest obeys s′(u) g with a slope s′ = s (1 − s) between that of both ends and 1/4: so the way lies between the last rate and
-/// the first times t, and between g (1 − e^−mT) and g (1 − e^−T/4).
+/// to rest obeys s′(u) g with a slope s′ = s (1 − s) between that of both ends and 1/4: so the travel lies between the last rate
+/// and the first times t, and between g (1 − e^−mT) and g (1 − e^−T/4).
 ///
-/// It is refused only where the scaled time α f_max t / h_min or the way α F t is huge.
+/// It is refused only where the scaled time α f_max t / h_min or the travel α F t is huge.
 fn check_position(h_min: f64, f_max: f64, alpha: f64, share: f64, u: f64, dt: f64) -> Shown {
     let model = sigmoid(f_max, h_min, 0.0);
     let (h, force) = (u * h_min, share * f_max);
@@ -172,27 +172,27 @@ fn check_position(h_min: f64, f_max: f64, alpha: f64, share: f64, u: f64, dt: f6
     };
     // ln(f_max/F − 1), the force apart from the code
     let at_rest = if share > 1e-290 { (1.0 - share).ln() - share.ln() } else { -share.ln() };
-    let (way, rest) = (after.b.z, h - h_min * at_rest);
+    let (travel, rest) = (after.b.z, h - h_min * at_rest);
     // the rest point carries the rounding of F near f_max
     let near = share.min(1.0 - share).max(EPSILON);
     let rounding = 16.0 * EPSILON * (h.abs() + h_min * at_rest.abs() + h_min / near);
-    assert!(way * rest >= 0.0 || way.abs() <= rounding, "{way:e} away from rest at {rest:e}");
-    assert!(way.abs() <= rest.abs() + rounding, "{way:e} beyond rest at {rest:e}");
+    assert!(travel * rest >= 0.0 || travel.abs() <= rounding, "{travel:e} away from rest at {rest:e}");
+    assert!(travel.abs() <= rest.abs() + rounding, "{travel:e} beyond rest at {rest:e}");
     let rate = |u: f64| alpha * (force - force_by_cosh(f_max, u)).abs();
     let reach = alpha * f_max * dt;
     let scaled = reach / h_min;
     let lost = reach * EPSILON * (32.0 + u.abs() + at_rest.abs());
-    // where the rate underflows it says nothing
-    let is_told = [alpha * f_max, rate(u), reach, scaled, lost].iter().all(|x| x.is_normal());
-    if !is_told {
+    // where the rate underflows it bounds nothing
+    let is_meaningful = [alpha * f_max, rate(u), reach, scaled, lost].iter().all(|x| x.is_normal());
+    if !is_meaningful {
         return Shown::Little;
     }
     let slope = |u: f64| 0.25 / (0.5 * u).cosh().powi(2);
     let slowest = -slope(u).min(slope(at_rest)) * scaled;
-    let least = (rate(u - way / h_min) * dt - lost).max(rest.abs() * -slowest.exp_m1());
+    let least = (rate(u - travel / h_min) * dt - lost).max(rest.abs() * -slowest.exp_m1());
     let most = (rate(u) * dt + lost).min(rest.abs() * -(-0.25 * scaled).exp_m1());
-    assert!(way.abs() <= most * (1.0 + 1e-12) + rounding, "{way:e} farther than {most:e}");
-    assert!(way.abs() >= least * (1.0 - 1e-12) - rounding, "{way:e} not as far as {least:e}");
+    assert!(travel.abs() <= most * (1.0 + 1e-12) + rounding, "{travel:e} farther than {most:e}");
+    assert!(travel.abs() >= least * (1.0 - 1e-12) - rounding, "{travel:e} not as far as {least:e}");
     if rounding < 1e-3 * least && least > 0.01 * most { Shown::Value } else { Shown::Little }
 }
 
@@ -258,7 +258,7 @@ fn check_push(shake: &[f64], centre: &Vector3<f64>, force: &Vector3<f64>, depth:
     let normal = force.normalize();
     let at = Point3::from(*centre) + normal * (1.5e-3 + depth);
     let mut before = mesh.positions().to_vec();
-    let mut told = 0;
+    let mut meaningful = 0;
     for tick in 1..4 {
         let update = refiner.push(&pressed(tick, at, *force)).unwrap();
         let Some(mismatch) = update.mismatch else { continue };
@@ -269,7 +269,7 @@ fn check_push(shake: &[f64], centre: &Vector3<f64>, force: &Vector3<f64>, depth:
         let h = (at - a - normal * 1.5e-3 - barycentre).dot(&n);
         let rounding = 64.0 * EPSILON * (centre.norm() + 1e-2);
         assert!((mismatch.distance - h).abs() <= rounding * (1.0 + 1e-3 / 1e-4), "{:e} {h:e}", mismatch.distance);
-        let felt = normal * force.dot(&normal);
+        let measured = normal * force.dot(&normal);
         // a spring of 20 N/mm
         let expected = n * (-2e4 * h);
         assert!(
@@ -277,45 +277,45 @@ fn check_push(shake: &[f64], centre: &Vector3<f64>, force: &Vector3<f64>, depth:
             "{}",
             mismatch.expected_force_o
         );
-        let size = felt.norm() + mismatch.expected_force_o.norm();
-        assert!((mismatch.linear + mismatch.expected_force_o - felt).norm() <= 8.0 * EPSILON * size);
-        // the cross product stands across both, and is as long as its parallelogram
-        let squared = mismatch.expected_force_o.norm_squared() * felt.norm_squared();
-        let cosine = mismatch.expected_force_o.dot(&felt);
+        let size = measured.norm() + mismatch.expected_force_o.norm();
+        assert!((mismatch.linear + mismatch.expected_force_o - measured).norm() <= 8.0 * EPSILON * size);
+        // the cross product is normal to both, and is as long as its parallelogram
+        let squared = mismatch.expected_force_o.norm_squared() * measured.norm_squared();
+        let cosine = mismatch.expected_force_o.dot(&measured);
         let area = mismatch.rotational.norm_squared() + cosine * cosine;
         assert!((area - squared).abs() <= 32.0 * EPSILON * squared, "{area:e} {squared:e}");
-        let way = |v: VertexId| (refiner.mesh().position(v) - before[v.0 as usize]).norm();
-        let handle = mesh.corners(mismatch.face).map(way).into_iter().fold(0.0, f64::max);
+        let travel = |v: VertexId| (refiner.mesh().position(v) - before[v.0 as usize]).norm();
+        let handle = mesh.corners(mismatch.face).map(travel).into_iter().fold(0.0, f64::max);
         for vertex in (0..mesh.vertex_count() as u32).map(VertexId) {
             if update.fit.is_some() && refiner.moved_vertices().contains(&vertex) {
                 // weights are not negative and sum to 1 at most: nothing moves farther than the handle
-                assert!(way(vertex) <= handle * (1.0 + 1e-12) + rounding, "{:e} {handle:e}", way(vertex));
+                assert!(travel(vertex) <= handle * (1.0 + 1e-12) + rounding, "{:e} {handle:e}", travel(vertex));
             }
         }
         let barycentre = |at: &dyn Fn(VertexId) -> Vector3<f64>| {
             mesh.corners(mismatch.face).iter().fold(Vector3::zeros(), |sum, v| sum + at(*v)) / 3.0
         };
         let step = barycentre(&|v| refiner.mesh().position(v) - before[v.0 as usize]).dot(&normal);
-        // in a millisecond the handle goes e^−0.025 a·n of its way to rest along the force, or as far as no corner goes farther
-        // than a step may; a turn about the barycentre does not move that
+        // in a millisecond the handle goes e^−0.025 a·n of its distance to rest along the force, or as far as no corner goes
+        // farther than a step may; a turn about the barycentre does not move that
         let cosine = normal.dot(&n);
-        let free = (h + felt.dot(&n) / 2e4) / cosine * -(-0.025 * cosine).exp_m1();
+        let free = (h + measured.dot(&n) / 2e4) / cosine * -(-0.025 * cosine).exp_m1();
         let is_free = handle < LONGEST_STEP && refiner.counts().cut_back == 0 && tick > 1;
         assert!(step.abs() <= free.abs() + 2.0 * rounding, "{step:e} {free:e}");
         if is_free {
             assert!((step - free).abs() <= 20.0 * rounding + 1e-12 * free.abs(), "{step:e} {free:e}");
         }
-        told += u32::from(handle > 1e3 * rounding);
+        meaningful += u32::from(handle > 1e3 * rounding);
         before = refiner.mesh().positions().to_vec();
     }
-    if told == 2 { Shown::Value } else { Shown::Little }
+    if meaningful == 2 { Shown::Value } else { Shown::Little }
 }
 
 const CASES: u32 = 4096;
 
-/// At least so many per cent of the cases told a value.
+/// At least so many per cent of the cases determine a value.
 #[track_caller]
-fn assert_told(counts: Counts, percent: u32) {
+fn assert_meaningful(counts: Counts, percent: u32) {
     let Counts { values, little, refused } = counts;
     assert!(100 * values >= percent * (values + little + refused), "{counts:?}: less than {percent} %");
 }
@@ -323,10 +323,10 @@ fn assert_told(counts: Counts, percent: u32) {
 #[test]
 fn eq_3_is_an_exponential_over_a_hyperbolic_cosine() {
     let bent = (power(-250.0, 300.0), power(-200.0, 200.0), -20.0..20.0f64, -36.0..36.0f64);
-    let told = tried("Eq 3 where it bends", CASES, bent, |(f_max, h_min, delta, u)| {
+    let counts = tried("Eq 3 where it bends", CASES, bent, |(f_max, h_min, delta, u)| {
         check_force(f_max, h_min, delta, (u - delta) * h_min)
     });
-    assert_told(told, 95);
+    assert_meaningful(counts, 95);
     tried(
         "Eq 3 anywhere",
         CASES,
@@ -339,8 +339,8 @@ fn eq_3_is_an_exponential_over_a_hyperbolic_cosine() {
 fn the_inverse_of_eq_3_is_reached_wherever_the_force_is() {
     let share = || prop_oneof![0.0..1.0, power(-300.0, 0.0), power(-16.0, -1.0).prop_map(|x| 1.0 - x)];
     let usual = (power(-6.0, 6.0), -20.0..20.0f64, share());
-    let told = tried("inverse of Eq 3", CASES, usual, |(f_max, delta, share)| check_inverse(f_max, delta, share));
-    assert_told(told, 60);
+    let counts = tried("inverse of Eq 3", CASES, usual, |(f_max, delta, share)| check_inverse(f_max, delta, share));
+    assert_meaningful(counts, 60);
     let anywhere = (any_size(), -20.0..20.0f64, share());
     tried("… anywhere", CASES, anywhere, |(f_max, delta, share)| check_inverse(f_max, delta, share));
 }
@@ -353,13 +353,13 @@ fn eq_7_lets_the_tangent_of_half_the_angle_fall() {
         1 => power(-12.0, 0.0).prop_map(|x| std::f64::consts::PI - x),
     ];
     let exponent = prop_oneof![3 => -6.0..6.0f64, 1 => any_signed()];
-    let told = tried("Eq 7", 2 * CASES, (unit(), unit(), tilt, exponent), |(n, to, tilt, exponent)| {
+    let counts = tried("Eq 7", 2 * CASES, (unit(), unit(), tilt, exponent), |(n, to, tilt, exponent)| {
         let axis = Unit::new_normalize(n.cross(&to) + 1e-3 * n.cross(&Vector3::x()) + 1e-3 * n.cross(&Vector3::y()));
         let to = (UnitQuaternion::from_axis_angle(&axis, tilt) * n).normalize();
         assert!((turn(&n, &to, exponent).norm() - 1.0).abs() <= 2.0 * EPSILON);
         check_turn(&n, &to, exponent.clamp(-30.0, 30.0))
     });
-    assert_told(told, 35);
+    assert_meaningful(counts, 35);
 }
 
 #[test]
@@ -367,11 +367,11 @@ fn a_spring_falls_exponentially() {
     let signed = |low, high| (power(low, high), any::<bool>()).prop_map(|(x, is_up)| if is_up { x } else { -x });
     // by α k t, so that it neither rests nor stays
     let usual = (power(-3.0, 9.0), power(-6.0, 3.0), power(-6.0, 1.5), signed(-9.0, 1.0), signed(-6.0, 4.0));
-    let told = tried("a spring of any usual size", CASES, usual, |(stiffness, alpha, z, h, force)| {
+    let counts = tried("a spring of any usual size", CASES, usual, |(stiffness, alpha, z, h, force)| {
         check_spring(stiffness, alpha, z / (alpha * stiffness), h, force)
     });
-    assert_told(told, 95);
-    assert_eq!(told.refused, 0);
+    assert_meaningful(counts, 95);
+    assert_eq!(counts.refused, 0);
     let anywhere = (any_size(), any_size(), any_size(), any_signed(), any_signed());
     tried("a spring anywhere", 2 * CASES, anywhere, |(stiffness, alpha, dt, h, force)| {
         check_spring(stiffness, alpha, dt, h, force)
@@ -384,17 +384,17 @@ fn eq_6_goes_to_rest_and_as_far_as_its_rate_allows() {
     // by α f_max t / h_min
     let usual =
         (power(-6.0, -2.0), power(-1.0, 3.0), power(-3.0, 1.0), -12.0..12.0f64, 0.001..0.999f64, power(-5.0, 2.0));
-    let told = tried("Eq 6 of any usual size", CASES, usual, |(h_min, f_max, alpha, u, share, scaled)| {
+    let counts = tried("Eq 6 of any usual size", CASES, usual, |(h_min, f_max, alpha, u, share, scaled)| {
         check_position(h_min, f_max, alpha, share, u, scaled * h_min / (alpha * f_max))
     });
-    assert_told(told, 90);
-    assert_eq!(told.refused, 0);
+    assert_meaningful(counts, 90);
+    assert_eq!(counts.refused, 0);
     let saturated = (prop_oneof![-40.0..40.0f64, -700.0..700.0], share(), -12.0..12.0f64);
-    let told = tried("Eq 6 at any depth", CASES, saturated, |(u, share, scaled)| {
+    let counts = tried("Eq 6 at any depth", CASES, saturated, |(u, share, scaled)| {
         check_position(1e-3, 10.0, 0.1, share, u, 10f64.powf(scaled) * 1e-3)
     });
-    assert_told(told, 25);
-    assert_eq!(told.refused, 0);
+    assert_meaningful(counts, 25);
+    assert_eq!(counts.refused, 0);
     let anywhere =
         (any_size(), any_size(), any_size(), any_size(), prop_oneof![-40.0..40.0f64, -700.0..700.0], share());
     tried("Eq 6 anywhere", 2 * CASES, anywhere, |(h_min, f_max, alpha, dt, u, share)| {
@@ -405,8 +405,8 @@ fn eq_6_goes_to_rest_and_as_far_as_its_rate_allows() {
 #[test]
 fn eq_6_is_what_small_steps_come_to() {
     let usual = (-15.0..15.0f64, prop_oneof![-1.0..2.0f64, 0.001..0.999f64], power(-3.0, 2.5));
-    let told = tried("Eq 6 in small steps", CASES, usual, |(u, share, scaled)| check_flow(u, share, scaled));
-    assert_told(told, 90);
+    let counts = tried("Eq 6 in small steps", CASES, usual, |(u, share, scaled)| check_flow(u, share, scaled));
+    assert_meaningful(counts, 90);
 }
 
 #[test]
@@ -414,11 +414,11 @@ fn eq_1_4_and_5_hold_on_a_mesh_and_nothing_moves_farther_than_the_handle() {
     let far = prop_oneof![Just(0.0), 0.0..900.0f64];
     let cases =
         (prop::collection::vec(-1.0..1.0f64, 50..51), far, [-0.3..0.3f64, -0.3..0.3f64], 1.0..50.0f64, -1e-4..1e-4f64);
-    let told = tried("a push on a mesh", 256, cases, |(shake, far, [x, y], size, depth)| {
+    let counts = tried("a push on a mesh", 256, cases, |(shake, far, [x, y], size, depth)| {
         let force = size * Vector3::new(x, y, 1.0).normalize();
         check_push(&shake, &Vector3::new(far, -0.5 * far, 0.1 * far), &force, depth)
     });
-    assert_told(told, 80);
+    assert_meaningful(counts, 80);
 }
 
 /// The same samples, again and on another thread at the same time: the same bits.
@@ -428,9 +428,9 @@ fn a_refiner_gives_the_same_bits_again_and_on_another_thread() {
     let run = || {
         let mut refiner = refiner(&lattice(&shake, &Vector3::zeros()));
         for tick in 1..2_000 {
-            let way = 1e-6 * tick as f64;
-            let force = Vector3::new(0.3 * (way * 3e3).sin(), 0.2, 2.0);
-            refiner.push(&pressed(tick, Point3::new(way - 1e-3, 0.3e-3, 1.4e-3), force)).unwrap();
+            let travel = 1e-6 * tick as f64;
+            let force = Vector3::new(0.3 * (travel * 3e3).sin(), 0.2, 2.0);
+            refiner.push(&pressed(tick, Point3::new(travel - 1e-3, 0.3e-3, 1.4e-3), force)).unwrap();
         }
         assert!(refiner.counts().moved > 1_000, "{:?}", refiner.counts());
         refiner.mesh().positions().iter().flat_map(|p| p.coords.map(f64::to_bits).data.0[0]).collect::<Vec<u64>>()
@@ -478,7 +478,7 @@ fn the_worst_turns_of_eq_7() {
                 let turned = turn(&n, &to, sign * exponent);
                 assert!((turned.norm() - 1.0).abs() <= 2.0 * EPSILON, "{tilt:e} {exponent:e}: {}", turned.norm());
                 let (before, after) = (n.dot(&to), turned.dot(&to));
-                assert!(sign * (after - before) >= -4.0 * EPSILON, "{tilt:e} {exponent:e} turns the wrong way");
+                assert!(sign * (after - before) >= -4.0 * EPSILON, "{tilt:e} {exponent:e} turns in the wrong sense");
             }
         }
     }
@@ -498,7 +498,7 @@ fn the_worst_springs() {
 
 /// α f_max underflowed though α f_max dt does not, and the face went 1e118 times as far as its rest point.
 #[test]
-fn a_product_that_underflows_on_its_way_does_not_pass_for_no_time() {
+fn an_underflowing_product_does_not_pass_for_no_time() {
     check_position(
         4.763_543_788_795_485e-264,
         2.071_989_792_837_727_6e-73,
@@ -514,7 +514,7 @@ fn a_product_that_underflows_on_its_way_does_not_pass_for_no_time() {
     assert!((face.b.z - 1e-200).abs() < 1e-214, "{:e}", face.b.z);
 }
 
-/// At 1e299 scaled times overflowed on the way from u = −700, and the face was 1e299 m away: that is refused now.
+/// At 1e299 scaled times overflowed from u = −700, and the face was 1e299 m away: that is refused now.
 #[test]
 fn the_worst_positions_of_eq_6() {
     for u in [-700.0, -40.0, -1e-16, 0.0, 1e-16, 36.7, 40.0, 700.0] {

@@ -1,4 +1,4 @@
-//! The offset between scan and part: recovered from contacts, refused where they do not tell it, and honest about noise.
+//! The offset between scan and part: recovered from contacts, refused where they do not determine it, and honest about noise.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3, vector};
 use rand::SeedableRng;
@@ -60,7 +60,7 @@ fn estimate(registrar: &Registrar, scan: &TriMesh) -> Result<Registration, Regis
     registrar.estimate(scan, &FaceTree::new(scan))
 }
 
-fn misplaced(seed: u64) -> Isometry3<f64> {
+fn rigid_offset(seed: u64) -> Isometry3<f64> {
     let mut rng = Pcg64::seed_from_u64(seed ^ 77);
     let mut gauss = |rms: f64| Vector3::from_fn(|_, _| rms * Distribution::<f64>::sample(&StandardNormal, &mut rng));
     Isometry3::from_parts(gauss(0.2e-3).into(), UnitQuaternion::from_scaled_axis(gauss(0.15_f64.to_radians())))
@@ -69,7 +69,7 @@ fn misplaced(seed: u64) -> Isometry3<f64> {
 #[test]
 fn a_clean_scan_is_moved_back_exactly() {
     for seed in 0..5 {
-        let moved = misplaced(seed);
+        let moved = rigid_offset(seed);
         let found =
             estimate(&touched(&sides(), RegistrationParams::default()), &scan(&sides(), &moved, |_| 0.0)).unwrap();
         let left = found.scan_to_part * moved;
@@ -79,7 +79,7 @@ fn a_clean_scan_is_moved_back_exactly() {
 }
 
 #[test]
-fn a_fat_scan_is_told_from_a_shift_when_it_was_touched_from_all_sides() {
+fn a_fat_scan_is_distinguished_from_a_shift_when_it_was_touched_from_all_sides() {
     let found = estimate(
         &touched(&sides(), RegistrationParams::default()),
         &scan(&sides(), &Isometry3::identity(), |_| 0.2e-3),
@@ -90,9 +90,9 @@ fn a_fat_scan_is_told_from_a_shift_when_it_was_touched_from_all_sides() {
     assert!(found.twist.norm() < 1e-5, "{}", found.twist);
 }
 
-/// From one side the surface offset is a shift for all that touches tell: its own uncertainty must show.
+/// From one side the surface offset is a shift as far as touches can determine: its own uncertainty must show.
 #[test]
-fn touched_from_one_side_of_each_axis_the_shift_is_as_uncertain_as_the_fatness() {
+fn touched_from_one_side_of_each_axis_the_shift_is_as_uncertain_as_the_surface_offset() {
     let three = [sides()[0], sides()[2], sides()[4]];
     let params = RegistrationParams { scan_noise: 0.1e-3, ..RegistrationParams::default() };
     let found = estimate(&touched(&three, params), &scan(&three, &Isometry3::identity(), |_| 0.0)).unwrap();
@@ -106,15 +106,15 @@ fn touched_from_one_side_of_each_axis_the_shift_is_as_uncertain_as_the_fatness()
 fn a_plane_is_refused_with_the_three_directions_in_which_it_slides() {
     let top = [sides()[4]];
     let error =
-        estimate(&touched(&top, RegistrationParams::default()), &scan(&top, &misplaced(1), |_| 0.0)).unwrap_err();
+        estimate(&touched(&top, RegistrationParams::default()), &scan(&top, &rigid_offset(1), |_| 0.0)).unwrap_err();
     let RegistrationError::Undetermined { directions } = &error else { panic!("{error}") };
     assert_eq!(directions.len(), 3);
-    // nothing along z, no turn about x or y: those the plane does tell
+    // nothing along z, no turn about x or y: those the plane does determine
     assert!(directions.iter().all(|d| d[2].abs() < 0.1 && d[3].abs() < 0.1 && d[4].abs() < 0.1), "{error}");
-    // two planes leave the way along their edge
+    // two planes leave the translation along their edge
     let edge = [sides()[0], sides()[4]];
     let error =
-        estimate(&touched(&edge, RegistrationParams::default()), &scan(&edge, &misplaced(1), |_| 0.0)).unwrap_err();
+        estimate(&touched(&edge, RegistrationParams::default()), &scan(&edge, &rigid_offset(1), |_| 0.0)).unwrap_err();
     let RegistrationError::Undetermined { directions } = &error else { panic!("{error}") };
     assert_eq!(directions.len(), 1);
     assert!(directions[0][1].abs() > 0.9, "{error}");
@@ -161,9 +161,9 @@ fn the_uncertainty_is_honest_over_forty_correlated_scans() {
     );
     let mut sum = 0.0;
     for seed in 0..40 {
-        let moved = misplaced(seed);
+        let moved = rigid_offset(seed);
         let found = estimate(&registrar, &scan(&sides(), &moved, random_field(seed, 0.6e-3))).unwrap();
-        // the way back of the centre, and the turn back
+        // the inverse translation of the centre, and the inverse rotation
         let back = moved.inverse();
         let (shift, turn) = (back * found.centre - found.centre, back.rotation.scaled_axis());
         let off = found.twist - vector![shift.x, shift.y, shift.z, turn.x, turn.y, turn.z];

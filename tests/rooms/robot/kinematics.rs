@@ -15,7 +15,7 @@ use touchup::touch::Payload;
 
 const ARMS: [UrGeometry; 4] = [UrGeometry::UR3E, UrGeometry::UR5E, UrGeometry::UR10E, UrGeometry::UR16E];
 
-/// How a touch is made; what the fit has to find.
+/// Parameters of a touch, which the fit has to find.
 #[derive(Clone, Copy, Debug)]
 struct Making {
     /// m
@@ -53,7 +53,7 @@ const MAKING: Making = Making {
     comes_back: true,
 };
 
-/// A touch at 500 Hz: the arm is told to stop when it feels 2 N, brakes, rests and goes back.
+/// A touch at 500 Hz: the arm stops when it measures 2 N, brakes, dwells and retracts.
 fn made(making: &Making, seed: u64) -> Vec<TouchMoment> {
     const DT: f64 = 2e-3;
     let mut rng = Pcg64::seed_from_u64(seed);
@@ -62,7 +62,7 @@ fn made(making: &Making, seed: u64) -> Vec<TouchMoment> {
         x * rms
     };
     let (mut true_travel, mut speed, mut rested, mut moments) = (0.0, making.speed, 0.0, Vec::new());
-    let (mut history, mut told) = (vec![], false);
+    let (mut history, mut is_stopping) = (vec![], false);
     for tick in 0.. {
         let t = f64::from(tick) * DT;
         history.push((t, true_travel));
@@ -78,16 +78,16 @@ fn made(making: &Making, seed: u64) -> Vec<TouchMoment> {
             force: force + making.bias + noise(making.noise),
             lateral: making.lateral * force,
         });
-        told |= force > 2.0;
-        if told && speed > 0.0 {
+        is_stopping |= force > 2.0;
+        if is_stopping && speed > 0.0 {
             speed = (speed - making.braking * DT).max(0.0);
-        } else if told && rested < 0.02 {
+        } else if is_stopping && rested < 0.02 {
             rested += DT;
-        } else if told {
+        } else if is_stopping {
             speed = (speed - making.braking * DT).max(-making.speed);
         }
         true_travel += speed * DT;
-        let is_back = told && rested >= 0.02 && (!making.comes_back || true_travel < making.onset - 1e-3);
+        let is_back = is_stopping && rested >= 0.02 && (!making.comes_back || true_travel < making.onset - 1e-3);
         if is_back {
             return moments;
         }
@@ -95,7 +95,7 @@ fn made(making: &Making, seed: u64) -> Vec<TouchMoment> {
     unreachable!("it stops")
 }
 
-/// Mean and root mean square of errors, m, and of errors over what was stated.
+/// Mean and root mean square of errors, m, and of normalised errors.
 fn errors(making: &Making, params: &OnsetParams) -> [f64; 3] {
     let found: Vec<_> = (0..100).map(|seed| find_onset(&made(making, seed), params).unwrap()).collect();
     let count = found.len() as f64;
@@ -129,28 +129,28 @@ fn the_corner_is_found_whatever_the_arm_does_after_it() {
     }
 }
 
-/// Going in at one speed, a delay looks like a corner farther in: how far is in what is stated.
+/// Going in at one speed, a delay looks like a corner farther in: the stated uncertainty covers it.
 #[test]
-fn without_braking_and_the_way_back_the_delay_is_uncertainty() {
+fn without_braking_and_retraction_the_delay_is_uncertainty() {
     let both = made(&MAKING, 1);
     let braking = both.iter().position(|m| m.force > 2.0).unwrap();
     let params = OnsetParams { force_noise: 0.05, ..OnsetParams::default() };
     let found = find_onset(&both[..braking], &params).unwrap();
     assert!((found.travel - MAKING.onset).abs() < 2.0 * found.sigma, "{found:?}");
     let by_delay = params.delay_sigma * MAKING.speed;
-    // and that of the corner itself, of which little was felt
+    // and that of the corner itself, which was hardly touched
     assert!((1.0..1.3).contains(&(found.sigma / by_delay)), "{found:?}: {by_delay}");
     assert!(find_onset(&both, &params).unwrap().sigma < 0.2 * by_delay);
 }
 
 #[test]
-fn what_is_no_clean_touch_is_told() {
+fn an_unclean_touch_is_reported() {
     let params = OnsetParams { force_noise: 0.05, ..OnsetParams::default() };
     let verdict = |moments: &[TouchMoment]| find_onset(moments, &params).unwrap().verdict;
     let clean = made(&MAKING, 1);
     assert_eq!(verdict(&clean), OnsetVerdict::Clean);
     assert_eq!(verdict(&made(&Making { lateral: 0.9, ..MAKING }, 1)), OnsetVerdict::Edge);
-    // pushed for 6 ms on its way, in free air
+    // pushed for 6 ms in free air
     let mut hit = clean.clone();
     hit[40..43].iter_mut().for_each(|m| m.force += 3.0);
     assert_eq!(verdict(&hit), OnsetVerdict::Impact);
@@ -162,12 +162,12 @@ fn what_is_no_clean_touch_is_told() {
     let held: Vec<_> = bounced.iter().map(|m| m.force).collect();
     assert!(held[first - 1] > 0.8 && held[first] < 0.5);
     assert_eq!(verdict(&bounced), OnsetVerdict::Bounce);
-    // on its way out a third of the force is gone
+    // while it retracts a third of the force is gone
     let mut slipped = clean.clone();
     let deepest = clean.iter().map(|m| m.travel).fold(0.0, f64::max);
     let top = clean.iter().rposition(|m| m.travel > deepest - 20e-6).unwrap();
     slipped[top..].iter_mut().for_each(|m| m.force -= (m.force - MAKING.bias) * 0.33);
-    // with a delay that nobody knows it could be that
+    // with an unknown delay it could be that
     let known = OnsetParams { delay: MAKING.delay, delay_sigma: 0.3e-3, ..params };
     assert_eq!(find_onset(&clean, &known).unwrap().verdict, OnsetVerdict::Clean);
     assert_eq!(find_onset(&slipped, &known).unwrap().verdict, OnsetVerdict::Slip);
@@ -192,7 +192,7 @@ fn what_is_no_touch_is_refused() {
     assert!(find_onset(&[], &params).is_err());
 }
 
-/// Denavit and Hartenberg's matrices, multiplied as they stand in the book.
+/// Denavit and Hartenberg's matrices, multiplied as in the book.
 fn by_matrices(arm: &UrGeometry, joints: &Joints) -> Matrix4<f64> {
     let table = [
         (arm.d1, 0.0, PI / 2.0),
@@ -273,7 +273,7 @@ proptest! {
     }
 }
 
-/// Arms that cannot move some way: stretched, the hand above the shoulder, axes 4 and 6 parallel.
+/// Arms that cannot move in some direction: stretched, the hand above the shoulder, axes 4 and 6 parallel.
 #[test]
 fn where_an_arm_is_stuck_it_has_no_dexterity() {
     let arm = UrGeometry::UR5E;
@@ -290,10 +290,10 @@ fn where_an_arm_is_stuck_it_has_no_dexterity() {
     assert!(most < 2.0, "lengths are in units of the arm: {most}");
 }
 
-/// Force that a simulated arm tells, N in B, after it was zeroed upright and then turned by 60° about x.
-fn force_after_a_turn(told_payload: Payload) -> Vector3<f64> {
+/// Force that a simulated arm reports, N in B, after it was zeroed upright and then turned by 60° about x.
+fn force_after_a_turn(configured_payload: Payload) -> Vector3<f64> {
     let payload = Payload { mass: 1.2, p_sc: Vector3::new(0.01, 0.0, 0.05), ..WEIGHTLESS };
-    let params = ArmParams { payload, told_payload, ..ArmParams::default() };
+    let params = ArmParams { payload, configured_payload, ..ArmParams::default() };
     let plate = Plate::default();
     let start = Isometry3::translation(-0.37, -0.08, 0.15);
     let mut arm = SimArm::new(&plate, params, &start).unwrap();
@@ -315,15 +315,15 @@ fn force_after_a_turn(told_payload: Payload) -> Vector3<f64> {
     sum / f64::from(states)
 }
 
-/// Zeroed, a weight that nobody takes off is felt by as much as the sensor has turned under it: Δw − R Δw with Δw of 1 kg; and one
-/// that is told rightly is not. The noise of the zero (64 readings of 0.15 N) is 0.02 N on each axis.
+/// After zeroing, an uncompensated weight acts as a force once the sensor turns: Δw − R Δw with Δw of 1 kg; a correct
+/// payload leaves none. The noise of the zero (64 readings of 0.15 N) is 0.02 N on each axis.
 #[test]
-fn a_payload_that_is_told_wrongly_is_felt_when_the_sensor_turns() {
+fn a_wrong_payload_shows_as_a_force_when_the_sensor_turns() {
     let weight = Vector3::new(0.0, 0.0, -9.81);
     let turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI / 3.0);
-    let told = |mass: f64| Payload { mass, p_sc: Vector3::new(0.01, 0.0, 0.05), ..WEIGHTLESS };
-    let felt = force_after_a_turn(told(0.2));
-    assert!((felt - (weight - turn * weight)).norm() < 0.1, "{felt}");
-    let felt = force_after_a_turn(told(1.2));
-    assert!(felt.norm() < 0.1, "{felt}");
+    let payload = |mass: f64| Payload { mass, p_sc: Vector3::new(0.01, 0.0, 0.05), ..WEIGHTLESS };
+    let force = force_after_a_turn(payload(0.2));
+    assert!((force - (weight - turn * weight)).norm() < 0.1, "{force}");
+    let force = force_after_a_turn(payload(1.2));
+    assert!(force.norm() < 0.1, "{force}");
 }

@@ -12,9 +12,9 @@ use touchup::robot::{
 use touchup::sim::{ArmFault, ArmParams, Plate, SimArm};
 use touchup::touch::Wrench;
 
-/// How far a ball's centre is from where it touches, m.
+/// Distance of the ball's centre from its contact, m.
 type Error = Box<dyn Fn(&Point3<f64>) -> f64>;
-/// Whether an error says what was.
+/// Whether an error names the true cause.
 type IsTrue = fn(&ProbeError) -> bool;
 
 /// Top of the plate, m.
@@ -63,13 +63,13 @@ fn the_contact_is_where_the_ball_touches_and_not_where_the_arm_rests() {
         // the sign of `error` is along the approach
         let (target, error): (TouchTarget, Error) = if is_wall {
             let angle = rng.random_range(0.0..std::f64::consts::TAU);
-            let way = Vector3::new(f64::cos(angle), f64::sin(angle), 0.0);
+            let direction = Vector3::new(f64::cos(angle), f64::sin(angle), 0.0);
             let ([x, y], radius) = HOLE;
             let standoff_bt = at(&params, [x, y, TOP - 4e-3]);
             let ball = params.radius;
             let error = move |p: &Point3<f64>| (p.x - x).hypot(p.y - y) - (radius - ball);
             (
-                TouchTarget { standoff_bt, direction: Unit::new_normalize(way), search: 8e-3, expected: None },
+                TouchTarget { standoff_bt, direction: Unit::new_normalize(direction), search: 8e-3, expected: None },
                 Box::new(error),
             )
         } else {
@@ -112,7 +112,7 @@ fn the_contact_is_where_the_ball_touches_and_not_where_the_arm_rests() {
     );
     assert!(mean.abs() < 2e-6 && rms(&errors) < 8e-6, "{mean} {}", rms(&errors));
     assert!((0.4..1.6).contains(&rms(&normal)), "{}", rms(&normal));
-    // what it would be if the place where it rests were taken
+    // the error if the place of rest were taken
     assert!(rms(&rested) > 100e-6);
 }
 
@@ -123,16 +123,20 @@ fn explored(arm: &mut SimArm, params: &ArmParams, touching: &TouchParams, search
     watched.zero().unwrap();
     let pose = |place: &Point3<f64>| at(params, (*place).into());
     let (mut from, mut peak) = (None, 0.0f64);
-    while let Some(wish) = search.wish() {
+    while let Some(planned) = search.wish() {
         // up where it is, over, down
         if let Some(out) = from {
             watched.line("going up", &pose(&out), touching.link_speed, touching, 5.0).unwrap();
         }
-        watched.line("going over", &pose(&wish.entry), touching.link_speed, touching, 1.5).unwrap();
-        let direction = Unit::new_normalize(params.pose_bo.rotation * wish.direction.into_inner());
-        let target =
-            TouchTarget { standoff_bt: pose(&wish.from), direction, search: wish.search, expected: wish.expected };
-        from = Some(wish.entry);
+        watched.line("going over", &pose(&planned.entry), touching.link_speed, touching, 1.5).unwrap();
+        let direction = Unit::new_normalize(params.pose_bo.rotation * planned.direction.into_inner());
+        let target = TouchTarget {
+            standoff_bt: pose(&planned.from),
+            direction,
+            search: planned.search,
+            expected: planned.expected,
+        };
+        from = Some(planned.entry);
         let record = match watched.touch(&target, touching) {
             Ok(record) => record,
             Err(ProbeError::InTheWay { .. }) => {
@@ -214,9 +218,9 @@ fn where_nothing_is_that_is_the_answer() {
     assert!(record.peak_force < 1.0);
 }
 
-/// Where a way should be free and is not, the arm stops and says where.
+/// Where a path is not free as planned, the arm stops and reports the place.
 #[test]
-fn what_is_in_the_way_stops_it() {
+fn an_obstacle_stops_it() {
     let (plate, params) = (Plate::default(), ArmParams::default());
     let mut arm = SimArm::new(&plate, params, &at(&params, [45e-3, 8e-3, 20e-3])).unwrap();
     let inside = down(&params, [45e-3, 8e-3, TOP - 3e-3]);
@@ -226,12 +230,12 @@ fn what_is_in_the_way_stops_it() {
     assert!((place_mm[2] - expected.z).abs() < 0.5 && force_n > 1.0, "{place_mm:?}, {force_n} N");
     arm.advance(0.3);
     assert!(arm.peak_force() < limits().force);
-    assert!(arm.time() - arm.stands_since() > 0.1);
+    assert!(arm.time() - arm.at_rest_since() > 0.1);
 }
 
-/// Whatever happens in the middle of a search, the arm stands within 200 ms, and what is said is what was.
+/// Whatever happens in the middle of a search, the arm is at rest within 200 ms, and the reported cause is the true one.
 #[test]
-fn after_each_fault_the_arm_stands_and_the_reason_is_the_true_one() {
+fn after_each_fault_the_arm_is_at_rest_and_the_reported_reason_is_true() {
     let (plate, params) = (Plate::default(), ArmParams::default());
     let is_true: [(ArmFault, IsTrue); 5] = [
         (ArmFault::LinkLost, |e| matches!(e, ProbeError::Arm { error: ArmError::Lost { .. }, .. })),
@@ -255,9 +259,9 @@ fn after_each_fault_the_arm_stands_and_the_reason_is_the_true_one() {
             touched(&mut arm, &TouchParams { search_speed: 5e-3, ..TouchParams::default() }, &target).unwrap_err();
         assert!(is_true(&error) && error.to_string().contains("search"), "{fault:?}: {error}");
         arm.advance(0.5);
-        let stood = arm.stands_since() - at_s;
+        let stood = arm.at_rest_since() - at_s;
         assert!(stood < 0.2, "{fault:?}: after {stood} s");
-        println!("{fault:?}: {error}; stands after {:.0} ms", stood.max(0.0) * 1e3);
+        println!("{fault:?}: {error}; at rest after {:.0} ms", stood.max(0.0) * 1e3);
     }
 }
 
@@ -287,10 +291,10 @@ fn a_cancelled_touch_stops() {
     assert!(matches!(error, ProbeError::Cancelled { .. }), "{error}");
     let cancelled = arm.time();
     arm.advance(0.3);
-    assert!(arm.stands_since() - cancelled < 0.1);
+    assert!(arm.at_rest_since() - cancelled < 0.1);
 }
 
-/// An arm that never stands, however it is told to: it creeps by 20 µm from state to state.
+/// An arm that never stands still, whatever the command: it creeps by 20 µm from state to state.
 struct Creeping {
     stamp_ns: i64,
 }
@@ -413,7 +417,7 @@ fn places_that_cannot_be_are_refused_before_anything_moves() {
     assert!(matches!(check(&above, &wide), Err(LimitError::Singular { .. } | LimitError::Reach { .. })));
 }
 
-/// One feature of the plate, from a click up to 3 mm off: what was found, the touches and the largest force.
+/// One feature of the plate, from a click up to 3 mm off: the result, the touches and the largest force.
 fn explored_from(kind: Kind, near: Point3<f64>, seed: u64, params: PatternParams) -> (Feature, usize, f64) {
     let plate = Plate::default();
     let mut rng = Pcg64::seed_from_u64(seed);

@@ -22,8 +22,8 @@ fn quiet(height: f64) -> (ArmParams, Isometry3<f64>) {
     (params, Isometry3::from_parts(place.coords.into(), UnitQuaternion::identity()))
 }
 
-/// Pressed into the top and drawn along it, the tip is pulled back by μ times what it presses with (Coulomb), and it presses with
-/// the stiffness times what it is pushed in (Hooke).
+/// Pressed into the top and drawn along it, the tip is pulled back by μ times the normal force (Coulomb), and it presses with
+/// the stiffness times the penetration (Hooke).
 #[test]
 fn a_ball_that_slides_is_held_back_by_friction_and_presses_by_stiffness() {
     for friction in [0.0, 0.15, 0.4] {

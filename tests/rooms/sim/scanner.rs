@@ -130,8 +130,8 @@ fn perfect_scanner_sees_the_surface() {
         bias: 0.0,
         rounding: 0.0,
         closes_holes_below: 0.0,
-        misplaced: 0.0,
-        misplaced_angle: 0.0,
+        rigid_shift: 0.0,
+        rigid_turn: 0.0,
         ..ScannerParams::default()
     };
     let quality = measure_quality(&scan(&peaks, &params).unwrap(), &peaks, |_| true).unwrap();
@@ -147,8 +147,9 @@ fn senseless_scanner_settings_are_refused() {
     assert!(matches!(run(ScannerParams { edge: 0.0, ..base }), SimError::BadParameter { .. }));
     assert!(matches!(run(ScannerParams { noise: f64::NAN, ..base }), SimError::BadParameter { .. }));
     assert!(matches!(run(ScannerParams { edge: 1e-6, ..base }), SimError::TooFine { .. }));
-    let told = |params: ScannerParams| run(params).to_string();
-    let (fine, noisy) = (told(ScannerParams { edge: 1e-6, ..base }), told(ScannerParams { noise: 1e300, ..base }));
+    let message = |params: ScannerParams| run(params).to_string();
+    let (fine, noisy) =
+        (message(ScannerParams { edge: 1e-6, ..base }), message(ScannerParams { noise: 1e300, ..base }));
     assert!(fine.contains("use longer edges") && !fine.contains("less of"), "{fine}");
     assert!(noisy.contains("use less of these three") && noisy.len() < 250, "{noisy}");
     let coarse = run(ScannerParams { edge: 0.03, ..base });

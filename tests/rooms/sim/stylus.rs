@@ -1,4 +1,4 @@
-//! A stylus on a known surface: where the ball goes, what it feels, what its stream says.
+//! A stylus on a known surface: the path of the ball, its contacts, its stream.
 
 use super::*;
 use touchup::sim::{
@@ -75,10 +75,10 @@ fn demo_lasts_a_minute_and_looks_like_a_hand() {
 }
 
 #[test]
-fn demo_feels_every_feature_and_leaves_the_far_end() {
+fn the_demo_touches_every_feature_and_leaves_the_far_end() {
     let plate = Plate::default();
     let touched = demo_touch(&StylusParams::default(), 1);
-    let felt = |test: &dyn Fn(&Point3<f64>) -> bool| {
+    let contacts = |test: &dyn Fn(&Point3<f64>) -> bool| {
         touched.moments.iter().flat_map(|m| &m.contacts).filter(|c| test(&c.point)).count()
     };
     for f in plate.features() {
@@ -88,11 +88,11 @@ fn demo_feels_every_feature_and_leaves_the_far_end() {
             TruthShape::Step { .. } => continue,
         };
         let inside = |p: &Point3<f64>| (p - f.centre).xy().norm() < radius + 1e-6 && (p.z - f.centre.z).abs() > 1e-3;
-        println!("{}: {} contacts inside", f.name, felt(&inside));
-        assert!(felt(&inside) > 500, "{}", f.name);
+        println!("{}: {} contacts inside", f.name, contacts(&inside));
+        assert!(contacts(&inside) > 500, "{}", f.name);
     }
-    assert!(felt(&|p| p.x > 0.0605 && (p.z - 9e-3).abs() < 1e-6) > 500, "the step's tread");
-    assert_eq!(felt(&|p| p.x > 0.07), 0, "the far end stays untouched");
+    assert!(contacts(&|p| p.x > 0.0605 && (p.z - 9e-3).abs() < 1e-6) > 500, "the step's tread");
+    assert_eq!(contacts(&|p| p.x > 0.07), 0, "the far end stays untouched");
 }
 
 #[test]
@@ -168,7 +168,7 @@ fn same_seed_same_stream() {
 }
 
 #[test]
-fn ball_comes_to_rest_where_geometry_says() {
+fn ball_comes_to_rest_at_the_geometric_equilibrium() {
     let plate = Plate::default();
     let mm = |x: f64, y: f64, z: f64| Point3::new(x, y, z) * 1e-3;
     let rest = |from, to| push_ball(&plate, &from, &to, 1.5e-3);
@@ -187,7 +187,7 @@ fn ball_comes_to_rest_where_geometry_says() {
     let (axis, to) = (mm(16., 36., 6.), mm(18.6, 36.1, 6.));
     let (x, _) = rest(mm(18.4, 36., 6.), to);
     assert!((x - (axis + (to - axis).normalize() * 2.5e-3)).norm() < 1e-11);
-    // nothing in the way
+    // nothing blocks it
     let (x, c) = rest(mm(5., 5., 20.), mm(5., 5., 19.9));
     assert!(x == mm(5., 5., 19.9) && c.is_empty());
 }
@@ -213,8 +213,8 @@ fn senseless_stylus_settings_are_refused() {
         StylusParams { sensor: SensorParams { pose_noise: 1e9, ..base.sensor }, ..base },
         StylusParams { sensor: SensorParams { lost: 1.1, ..base.sensor }, ..base },
     ] {
-        let told = run(&path(0.02), &params).to_string();
-        assert!(told.len() < 120, "{told}");
+        let message = run(&path(0.02), &params).to_string();
+        assert!(message.len() < 120, "{message}");
     }
     // 4 N bend this one by 1 m, which is allowed
     touch(&plate, &path(0.02), &StylusParams { stiffness: 4.0, ..base }, 0).unwrap();

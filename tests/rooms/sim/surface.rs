@@ -56,7 +56,7 @@ fn plate_distances_worked_by_hand() {
         (mm(34., 14., 9.5), 1.0),                  // in its rounded end
         (mm(47., 25., 17.0), 1.0),                 // above the boss
         (mm(53., 25., 13.5), 1.0),                 // beside it
-        (mm(47., 25., 12.0), -4.0),                // inside, where the boss stands
+        (mm(47., 25., 12.0), -4.0),                // inside, within the boss
         (mm(56., 25., 19.0), 5.0),                 // off its rim: 4 aside, 3 above
         (mm(-3., -4., -12.), 13.0),                // off a corner
         (mm(59., 25., 8.), -(1f64 + 1f64).sqrt()), // below the inner corner of the step

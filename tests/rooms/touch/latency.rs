@@ -57,7 +57,7 @@ fn offset_of(samples: impl IntoIterator<Item = Sample>) -> Option<ClockOffset> {
     clock.offset()
 }
 
-/// Down at 50 mm/s, stopped where the force begins: worked out by hand, the delay is what the stamps are shifted by.
+/// Down at 50 mm/s, stopped where the force begins: worked out by hand, the delay is the shift of the stamps.
 #[test]
 fn a_clean_stop_gives_the_delay_that_was_put_in() {
     for late_ms in [-3.0, 0.0, 2.5] {

@@ -23,7 +23,7 @@ fn pose(t: f64) -> Isometry3<f64> {
     Isometry3::new(place, Vector3::new(0.2 * (TAU * 0.35 * t).sin(), 0.4, 0.15 * (TAU * 0.25 * t).cos()))
 }
 
-/// What is seen of the labels at a pose, each marker displaced by `off`.
+/// The visible labels at a pose, each marker displaced by `off`.
 fn frame(
     stamp_ns: i64,
     pose_ot: &Isometry3<f64>,
@@ -179,7 +179,7 @@ fn few_markers_are_coasted_over_and_then_there_is_no_pose() {
     for pose_now in &poses {
         let t = pose_now.stamp_ns as f64 * 1e-9;
         let (place, _) = off(&pose_now.pose_ot, &pose(t));
-        // 0.2 m/s² and 3 rad/s² at 150 mm for 30 ms, and what the spring lags behind them
+        // 0.2 m/s² and 3 rad/s² at 150 mm for 30 ms, and the lag of the spring behind them
         assert!(place < 0.5e-3, "{place} m at {t} s");
     }
     assert_eq!(filter.counts().lost, 14 + 14);

@@ -1,4 +1,4 @@
-//! The touch room from outside: what the synchroniser lets out, what the compensator leaves, when the gate opens.
+//! The touch room from outside: samples of the synchroniser, residuals of the compensator, states of the gate.
 
 use nalgebra::{Isometry3, Matrix3, Quaternion, SMatrix, SVector, Translation3, UnitQuaternion, Vector3, vector};
 use proptest::prelude::*;
@@ -21,7 +21,7 @@ fn wrench(stamp_ns: i64, force: f64) -> Message {
     Message::Wrench(StampedWrench { stamp_ns, wrench })
 }
 
-/// All samples of `messages`, drawn as they come, and what was lost of both streams at the end.
+/// All samples of `messages` in order of arrival, and the losses of both streams at the end.
 fn synchronised(params: SyncParams, messages: &[Message]) -> (Vec<Sample>, SyncCounts) {
     let mut sync = Synchroniser::new(params).unwrap();
     let mut samples = Vec::new();
@@ -74,9 +74,9 @@ fn position_between_two_poses_is_the_straight_line() {
     assert_eq!(counts, SyncCounts::default());
 }
 
-/// Angles by hand: a rotation by θ about one axis is (cos θ/2, sin θ/2 · axis); a third of the way is θ/3.
+/// Angles by hand: a rotation by θ about one axis is (cos θ/2, sin θ/2 · axis); a third of the rotation is θ/3.
 #[test]
-fn orientation_turns_at_constant_speed_the_shorter_way() {
+fn orientation_turns_at_constant_speed_by_the_shorter_rotation() {
     for (theta, sign) in [(1.5_f64, 1.0), (1.5, -1.0), (3.1, -1.0), (1e-9, 1.0), (0.0, -1.0)] {
         let to = [(theta / 2.0).cos(), (theta / 2.0).sin(), 0.0, 0.0].map(|c| sign * c);
         let messages = [turned_pose(0, [1.0, 0.0, 0.0, 0.0]), turned_pose(3 * MS, to), wrench(MS, 0.0)];
@@ -107,7 +107,7 @@ proptest! {
     #[test]
     fn orientation_is_the_slerp_of_the_books(a in unit_quaternion(), b in unit_quaternion(), at in 1..8_i64) {
         let dot: f64 = a.iter().zip(b).map(|(x, y)| x * y).sum();
-        // where sin Ω is small the books' form has no digits; where the two ways are equally long either is right
+        // where sin Ω is small the books' form has no digits; where the two rotations are equally long either is right
         prop_assume!(dot.abs() < 0.999 && dot.abs() > 1e-6);
         let (samples, _) = default_synchronised(&[turned_pose(0, a), turned_pose(8 * MS, b), wrench(at * MS, 0.0)]);
         let q = samples[0].pose_ot.rotation;
@@ -368,7 +368,7 @@ proptest! {
         let r_os = r_ot * r_ts;
         // the contact acts at To, which is −R_OT p_TS away from So
         let torque_o = (-(r_ot * p_ts)).cross(&force_o) + (r_os * p_sc).cross(&(gravity_o * mass));
-        let felt_s = r_os.transpose() * (force_o + gravity_o * mass) + bias_force;
+        let force_s = r_os.transpose() * (force_o + gravity_o * mass) + bias_force;
         let torque_s = r_os.transpose() * torque_o + bias_torque;
         let to_axes = if object_axes { r_os } else { Matrix3::identity() };
 
@@ -380,7 +380,7 @@ proptest! {
         })
         .unwrap();
         let pose_ot = Isometry3::from_parts(Translation3::new(0.1, 0.2, 0.3), turn(ot.0, ot.1));
-        let wrench = Wrench { force: to_axes * felt_s, torque: to_axes * torque_s };
+        let wrench = Wrench { force: to_axes * force_s, torque: to_axes * torque_s };
         let tip = compensator.compensate(&Sample { stamp_ns: 7, pose_ot, wrench });
         prop_assert_eq!((tip.stamp_ns, tip.pose_ot), (7, pose_ot));
         prop_assert!((tip.force_o - force_o).norm() < 1e-12, "{}", tip.force_o);
@@ -449,10 +449,10 @@ fn weight_and_bias(rows: &[(UnitQuaternion<f64>, Vector3<f64>)]) -> (Vector3<f64
     (x.fixed_rows::<3>(0).into(), x.fixed_rows::<3>(3).into())
 }
 
-/// A real sensor held still in many orientations feels nothing once weight and bias are off. The weight of 11.4 N and
+/// A real sensor held still in many orientations measures nothing once weight and bias are off. The weight of 11.4 N and
 /// the rms of 0.17 N per axis are those found by others in the same file.
 #[test]
-fn a_real_sensor_held_still_feels_nothing() {
+fn a_real_sensor_at_rest_measures_nothing() {
     let Some(path) = crate::shared::shared("force/gravity_ati/GP2025.txt") else { return };
     let text = std::fs::read_to_string(&path).unwrap();
     let rows = gravity_rows(&text);

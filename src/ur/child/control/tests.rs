@@ -1,4 +1,4 @@
-//! The driver on a clock that the tests move, with a library that notes what it is told.
+//! The driver on a clock that the tests move, with a library that records its calls.
 
 use std::cell::{Cell, RefCell};
 use std::io::{PipeReader, Read, pipe};
@@ -10,14 +10,14 @@ use std::thread;
 use self::LibraryCall::{EndPress, EndProgram, Feed, HardStop, Press, Set, Speed, Zero};
 use super::*;
 use crate::clock::ManualClock;
-use crate::ur::protocol::State;
+use crate::ur::protocol::UrState;
 use crate::ur::protocol::tests::STATE;
 
 const MS: Duration = Duration::from_millis(1);
-const UP: What = What::Move { twist: [0.0, 0.0, 20e-3, 0.0, 0.0, 0.0], acceleration: 1.0 };
+const UP: Action = Action::Move { twist: [0.0, 0.0, 20e-3, 0.0, 0.0, 0.0], acceleration: 1.0 };
 const GOING_UP: LibraryCall = Speed(20e-3, 1.0);
 
-/// What the library was called with.
+/// A call of the library.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum LibraryCall {
     /// along z, and how fast it is reached
@@ -32,7 +32,7 @@ enum LibraryCall {
     EndProgram,
 }
 
-/// A library that writes down what it is called with and when, ms; and an arm that follows.
+/// A library that records its calls with their time, ms; and an arm that follows.
 struct Fake {
     clock: Clock,
     begun: Instant,
@@ -161,7 +161,7 @@ impl ControlBench {
     /// The state says that the tip goes up, m/s.
     fn goes(&self, speed: f64, is_playing: bool) {
         let velocity = [0.0, 0.0, speed, 0.0, 0.0, 0.0];
-        *self.shared.latest.lock().unwrap() = Some(State { velocity, is_playing, ..STATE });
+        *self.shared.latest.lock().unwrap() = Some(UrState { velocity, is_playing, ..STATE });
     }
 
     /// Does something in which time passes as it is slept.
@@ -190,7 +190,7 @@ impl ControlBench {
         }
     }
 
-    fn order(&self, driver: &mut Driver<'_, Fake>, number: u64, what: What) {
+    fn order(&self, driver: &mut Driver<'_, Fake>, number: u64, what: Action) {
         self.sleeping(|| driver.turn(Some(Order { number, what }))).unwrap();
     }
 
@@ -257,7 +257,7 @@ fn at_rest_it_is_fed_each_20_ms_and_with_each_order_while_the_program_runs() {
     let mut driver = bench.driver();
     bench.without_orders(&mut driver, 45);
     assert_eq!(bench.calls(), [(20, Feed), (40, Feed)]);
-    bench.order(&mut driver, 1, What::Stop { deceleration: 1.0 });
+    bench.order(&mut driver, 1, Action::Stop { deceleration: 1.0 });
     bench.without_orders(&mut driver, 20);
     assert_eq!(bench.calls(), [(45, Feed), (65, Feed)]);
     bench.fake.is_running.set(false);
@@ -270,7 +270,7 @@ fn a_call_that_hangs_feeds_nothing_and_is_not_served() {
     let bench = ControlBench::new();
     let mut driver = bench.driver();
     bench.fake.takes.set(500 * MS);
-    bench.order(&mut driver, 1, What::Zero);
+    bench.order(&mut driver, 1, Action::Zero);
     assert_eq!(bench.shared.number(), 1);
     bench.fake.takes.set(Duration::ZERO);
     bench.without_orders(&mut driver, 5);
@@ -279,21 +279,21 @@ fn a_call_that_hangs_feeds_nothing_and_is_not_served() {
 }
 
 #[test]
-fn a_stop_brakes_as_it_is_told_and_ends_hard_when_the_state_shows_rest_20_ms_later() {
+fn a_stop_brakes_as_commanded_and_ends_hard_when_the_state_shows_rest_20_ms_later() {
     let bench = ControlBench::new();
     let mut driver = bench.driver();
     bench.order(&mut driver, 1, UP);
     // the states do not show yet that it moves
     bench.goes(0.0, true);
-    bench.order(&mut driver, 2, What::Stop { deceleration: 0.5 });
+    bench.order(&mut driver, 2, Action::Stop { deceleration: 0.5 });
     bench.without_orders(&mut driver, 30);
     let braking = [0, 5, 10, 15, 20, 25].map(|ms| (ms, Speed(0.0, 0.5)));
     assert_eq!(bench.calls(), [&[(0, GOING_UP)], &braking[..], &[(25, HardStop(10.0)), (30, Feed)]].concat());
 }
 
 #[test]
-fn a_press_has_two_cycles_for_itself_and_is_said_again_after_100_ms() {
-    let press = |angle: f64, force_n: f64| What::Press {
+fn a_press_has_two_cycles_for_itself_and_is_repeated_after_100_ms() {
+    let press = |angle: f64, force_n: f64| Action::Press {
         frame: [0.0, 0.0, 0.0, angle, 0.0, 0.0],
         force_n,
         speed: 5e-3,
@@ -320,8 +320,8 @@ fn a_press_has_two_cycles_for_itself_and_is_said_again_after_100_ms() {
 }
 
 #[test]
-fn a_refused_call_is_reported_after_40_ms_in_which_no_state_says_that_the_program_has_ended() {
-    for (is_playing, ends_at, told) in [(true, 40, 1), (false, 0, 0)] {
+fn a_refused_call_is_reported_after_40_ms_without_a_state_of_an_ended_program() {
+    for (is_playing, ends_at, expected) in [(true, 40, 1), (false, 0, 0)] {
         let bench = ControlBench::new();
         let mut driver = bench.driver();
         bench.goes(0.0, is_playing);
@@ -329,7 +329,7 @@ fn a_refused_call_is_reported_after_40_ms_in_which_no_state_says_that_the_progra
         bench.order(&mut driver, 1, UP);
         assert_eq!(bench.fake.clock.since(bench.fake.begun), ends_at * MS);
         let reports = bench.reports();
-        assert_eq!(reports.len(), told);
+        assert_eq!(reports.len(), expected);
         assert!(reports.iter().all(|report| matches!(report, ClientReport::Failed { .. })), "{reports:?}");
     }
 }
@@ -345,7 +345,7 @@ fn a_program_has_five_seconds_to_start_and_the_watchdog_is_set_last() {
 }
 
 #[test]
-fn another_tool_than_it_was_told_and_a_lost_connection_end_it() {
+fn another_tool_than_the_set_one_and_a_lost_connection_end_it() {
     let (_sender, orders) = channel();
     let bench = ControlBench::new();
     bench.fake.tool.set([0.0; 6]);
@@ -372,7 +372,7 @@ fn where_orders_end_it_brakes_and_ends_the_program() {
 #[test]
 fn of_orders_that_wait_the_newest_counts_and_no_zero_is_left_out() {
     let (sender, orders) = channel();
-    for (number, what) in [(2, UP), (3, What::Zero), (4, UP), (5, What::Stop { deceleration: 1.0 })] {
+    for (number, what) in [(2, UP), (3, Action::Zero), (4, UP), (5, Action::Stop { deceleration: 1.0 })] {
         sender.send(Order { number, what }).unwrap();
     }
     assert_eq!(newest(Order { number: 1, what: UP }, &orders).number, 3);

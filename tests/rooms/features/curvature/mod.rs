@@ -1,4 +1,4 @@
-//! Curvature against Gauss and Bonnet and against surfaces whose curvature is known; clusters against what is there.
+//! Curvature against Gauss and Bonnet and against surfaces whose curvature is known; clusters against the true features.
 
 #[path = "clusters.rs"]
 mod clusters_of;

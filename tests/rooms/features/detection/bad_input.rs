@@ -1,4 +1,4 @@
-//! The same part told badly: turned inside out, torn, twice, with others.
+//! The same part in bad meshes: turned inside out, torn, twice, with others.
 
 use nalgebra::{Point3, Vector3};
 use rand_pcg::Pcg64;
@@ -50,7 +50,7 @@ fn inside_out_is_turned_back() {
 }
 
 #[test]
-fn faces_told_twice_count_once() {
+fn repeated_faces_count_once() {
     for (name, mesh, _) in parts() {
         let mut twice = triangles(&mesh);
         let again: Vec<_> = twice.iter().step_by(3).copied().collect();

@@ -3,7 +3,7 @@
 //! Each part was rendered from six sides by casting rays (Open3D) and its holes were counted in the pictures. Sizes come
 //! from a program of its own (trimesh, numpy): the mesh parted at edges sharper than 30° (35° where circles have twelve
 //! sides), a circle of least squares through the corners that bound each round patch, heights of those corners. Of
-//! closed parts the genus is the number of ways through; it was computed too and agrees.
+//! closed parts the genus is the number of through-openings; it was computed too and agrees.
 
 use touchup::features::Kind;
 use touchup::io::mesh_file::MeshUnit::{Inch, Metre, Millimetre};

@@ -60,7 +60,7 @@ fn a_sphere_has_nothing_cut_or_raised() {
     }
 }
 
-/// What is inside of a ring is round, but no cylinder.
+/// The inside of a ring is round, but no cylinder.
 #[test]
 fn a_torus_has_nothing_cut_or_raised() {
     for (tube, across) in [(4e-3, 24), (8e-3, 40), (8e-3, 16)] {

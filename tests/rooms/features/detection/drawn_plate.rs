@@ -26,7 +26,7 @@ fn everything_on_the_plate_is_found_however_finely_it_is_divided() {
         assert_eq!(counts, [2, 1, 0, 1], "chord {chord}");
         for truth in Plate::default().features() {
             let (kind, expected) = match truth.shape {
-                // from which end a plain through-hole is told is left open
+                // a plain through-hole may be described from either end
                 TruthShape::Hole { through: true, .. } | TruthShape::Step { .. } => continue,
                 TruthShape::Hole { diameter, depth, .. } => (Kind::Hole, vec![diameter, depth]),
                 TruthShape::Boss { diameter, height } => (Kind::Boss, vec![diameter, height]),
@@ -39,7 +39,7 @@ fn everything_on_the_plate_is_found_however_finely_it_is_divided() {
     }
 }
 
-/// An edge is broken by what is no countersink: the hole begins at the plane all the same, and not where its wall does.
+/// An edge is broken by another shape than a countersink: the hole begins at the plane all the same, and not where its wall does.
 #[test]
 fn a_hole_with_a_broken_edge_is_as_deep_as_from_its_plane() {
     // with a flat floor, and with the tip of a drill of 118°

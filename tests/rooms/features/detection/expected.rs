@@ -20,7 +20,7 @@ pub struct Round {
     pub depth: Option<f64>,
     /// of the countersink
     pub cone: Option<f64>,
-    /// whether it may be told from its other end
+    /// whether it may be described from its other end
     pub either_end: bool,
 }
 
@@ -44,7 +44,7 @@ pub fn blind(diameter: f64, at: [f64; 3], out: [f64; 3], depth: f64) -> Round {
 
 /// The tables give thousandths of a millimetre; corners of the files are rounded to less.
 const PLACE: f64 = 3e-3 * MM;
-/// Diameters, as a share: what the issue asks for.
+/// Required tolerance of diameters, as a share.
 const DIAMETER: f64 = 0.005;
 /// Where all corners of an exact mesh lie on the circle there is nothing else than rounding.
 const EXACT_DIAMETER: f64 = 1e-3 * MM;

@@ -31,10 +31,10 @@ fn is_image(one: &Feature, other: &Feature, motion: &Isometry3<f64>, scale: f64,
         [&f.diameter, &f.width, &f.length, &f.depth].map(|size| size.as_ref().map_or(0.0, |size| size.value))
     };
     let sizes = number(one).into_iter().zip(number(other)).all(|(a, b)| (a * scale - b).abs() < limit);
-    // a plain through-hole may be told from its other end
-    let way = one.axis.as_ref().map_or_else(Vector3::zeros, |axis| axis.value);
+    // a plain through-hole may be described from its other end
+    let direction = one.axis.as_ref().map_or_else(Vector3::zeros, |axis| axis.value);
     let depth = one.depth.as_ref().map_or(0.0, |depth| depth.value);
-    let places = [one.centre.value, one.centre.value - way * depth];
+    let places = [one.centre.value, one.centre.value - direction * depth];
     let is_at = |p: &Point3<f64>| (motion * Point3::from(p.coords * scale) - other.centre.value).norm() < limit;
     one.kind == other.kind && one.through == other.through && sizes && places.iter().any(is_at)
 }

@@ -1,4 +1,4 @@
-//! What is found on meshes of known parts, on parts without features, and on bad ones.
+//! Features found on meshes of known parts, on parts without features, and on bad ones.
 
 mod bad_input;
 mod cad_parts;

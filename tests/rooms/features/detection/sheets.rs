@@ -58,8 +58,8 @@ fn a_flat_ring_and_a_dome_have_a_hole_in_the_middle() {
     }
 }
 
-/// The upper side of a plate and the wall of its hole, open below: the lower end of the wall is the same hole, and nobody
-/// knows what is there.
+/// The upper side of a plate and the wall of its hole, open below: the lower end of the wall is the same hole, and its
+/// bottom is unknown.
 #[test]
 fn the_open_end_of_a_wall_is_no_second_hole() {
     for depth in [0.002, 0.006, 0.02] {
@@ -100,7 +100,7 @@ fn a_ragged_gap_is_no_hole() {
     assert_eq!(holes(&torn(|angle| 1e-3 / angle.sin().abs().max(0.07))).len(), 0);
 }
 
-/// A panel with three ragged cut-outs and a cowl, both open, from depth cameras or as good as that.
+/// A panel with three ragged cut-outs and a cowl, both open, from depth cameras or similar.
 #[test]
 fn gaps_of_scanned_panels_are_no_holes() {
     let Some(folder) = shared("scans/crs_scans") else { return };

@@ -1,4 +1,4 @@
-//! What is refused, and with which word.
+//! Refusals and their reasons.
 
 use std::f64::consts::TAU;
 
@@ -41,7 +41,7 @@ fn what_the_touches_do_not_fix_is_named() {
     let strip = on_cylinder(&mut generator(2), 5.0 * MM, 0.02, 8.0 * MM, 40);
     let strip: Vec<_> = strip.iter().map(|o| Observation { sigma: 0.05 * MM, ..*o }).collect();
     assert!(matches!(refusal(&near, &strip), FitError::Undetermined { .. }));
-    // one circle: round it is, but it may lean either way
+    // one circle: round it is, but its lean is undetermined
     let circle: Vec<_> =
         hole().iter().map(|o| Observation { point: Point3::new(o.point.x, o.point.y, 0.0), ..*o }).collect();
     let upright = Cylinder::new(Point3::new(0.3 * MM, 0.0, 0.0), &Vector3::z(), 5.3 * MM, true);

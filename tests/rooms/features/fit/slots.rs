@@ -77,7 +77,7 @@ fn what_was_not_touched_is_undetermined() {
         (fit.undetermined(), fit)
     };
     for ends in [Ends::Round, Ends::Straight] {
-        // walls do not tell whether they lean along themselves; an end does
+        // walls do not show whether they lean along themselves; an end does
         let (undetermined, of_walls) = open(&walls, ends);
         assert_eq!(undetermined, [Freedom::X, Freedom::TiltX, Freedom::Second], "{ends:?}");
         assert_eq!((of_walls.length(), of_walls.end(1.0)), (None, None));

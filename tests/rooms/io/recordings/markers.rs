@@ -104,14 +104,14 @@ fn markers_are_read_in_place_of_poses_from_both_containers() {
         assert_eq!(reader.message_count(), Some(2000));
         assert_eq!(reader.by_ref().filter(|message| matches!(message, Ok(Message::Wrench(_)))).count(), 1000);
         assert_eq!((reader.pose_frame(), reader.wrench_frame()), (Some("O"), Some("T")));
-        // and the poses are still there for those who ask for them
+        // and the poses are still there on request
         let poses = RecordingReader::open(path, &Topics::default()).unwrap();
         assert_eq!(poses.filter(|message| matches!(message, Ok(Message::Pose(_)))).count(), 1000);
     }
 }
 
 #[test]
-fn a_recording_without_the_markers_says_so() {
+fn a_recording_without_the_markers_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("touch.mcap");
     write_recording(&path, &Topics::default(), "O", "T", records(30)).unwrap();

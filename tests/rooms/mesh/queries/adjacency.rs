@@ -1,4 +1,4 @@
-//! Adjacency after any edits against that of a mesh built anew.
+//! Adjacency after any edits against that of a rebuilt mesh.
 
 use super::*;
 
@@ -22,7 +22,7 @@ fn edits() -> impl Strategy<Value = Vec<Edit>> {
 
 proptest! {
     #[test]
-    fn stars_are_those_of_a_mesh_built_anew(edits in edits()) {
+    fn stars_are_those_of_a_rebuilt_mesh(edits in edits()) {
         let mut mesh = grid(3, 1.0, |_, _| 0.0);
         let mut faces: Vec<Option<[u32; 3]>> = mesh.faces().map(|(_, corners)| Some(corners.map(|v| v.0))).collect();
         for edit in edits {
@@ -57,14 +57,14 @@ proptest! {
         prop_assert_eq!(mesh.face_count(), kept.len());
         prop_assert_eq!(mesh.faces().map(|(_, corners)| corners.map(|v| v.0)).collect::<Vec<_>>(), kept.clone());
         prop_assert!(faces.iter().enumerate().all(|(id, face)| mesh.has_face(FaceId(id as u32)) == face.is_some()));
-        let anew = TriMesh::new(mesh.positions().to_vec(), kept).unwrap();
+        let rebuilt = TriMesh::new(mesh.positions().to_vec(), kept).unwrap();
         let star = |mesh: &TriMesh, vertex| {
             let mut star: Vec<_> = mesh.star(vertex).iter().map(|&face| mesh.corners(face)).collect();
             star.sort_unstable();
             star
         };
         for vertex in (0..mesh.vertex_count() as u32).map(VertexId) {
-            prop_assert_eq!(star(&mesh, vertex), star(&anew, vertex));
+            prop_assert_eq!(star(&mesh, vertex), star(&rebuilt, vertex));
         }
         // a tree over what is left sees no face that was removed
         let tree = FaceTree::new(&mesh);

@@ -12,18 +12,18 @@ fn brute_barycentre_distance(mesh: &TriMesh, p: &Point3<f64>) -> f64 {
     mesh.faces().map(|(face, _)| (p - mesh.barycentre(face)).norm()).fold(f64::INFINITY, f64::min)
 }
 
-/// How far a distance may be from the true one when all is computed in doubles, and the face named from the nearest.
+/// Error bound of a distance computed in doubles, and the face named from the nearest.
 ///
 /// Let M be the largest coordinate, D the diagonal of the mesh, d the distance; ε/2 is one rounding.
 ///
 /// - A point of a face, a corner and two shares of edges, is rounded twice by ε/2 · M along each axis and by ε D for the
 ///   products; its distance to `p` by 5/4 ε d. So one distance is off by e = √3 ε M + ε D + 5/4 ε d. Two faces nearer to
-///   each other than 2e cannot be told apart and have to be taken for equal, so the distance of the face named is off by
+///   each other than 2e cannot be distinguished and count as equal, so the distance of the face named is off by
 ///   that and by e for each of the two: 4e < 8 ε M + 4 ε D + 5 ε d.
 /// - The shares are quotients of products of edges with `p` − corner: each moves the point along an edge by up to
 ///   9 ε (D + d), the quotient of dots of three terms. That counts in full only where d is as small, once for either face.
 /// - The brute force works relative to a corner, so M does not enter: 7 ε (D + d), from the same products.
-/// - For each face what it costs to tell inside from side: the normal of a face of quality q (height over longest edge L)
+/// - For each face the error of deciding inside from side: the normal of a face of quality q (height over longest edge L)
 ///   is off by 3 ε/2 / q, and the foot by 16 ε L/q at most; but a mistake between two sides is never more than the height.
 fn rounding(mesh: &TriMesh, p: &Point3<f64>, distance: f64) -> f64 {
     let coordinate = mesh.positions().iter().map(|x| x.coords.amax()).fold(p.coords.amax(), f64::max);
@@ -48,8 +48,12 @@ fn check_query(mesh: &TriMesh, tree: &FaceTree, p: &Point3<f64>) {
     check_hit(mesh, p, &hit, tolerance);
     let found = distance(p, &mesh.triangle(hit.face));
     assert!((found - wanted).abs() <= tolerance, "{p}: face {:?} is {found:e} away, nearest {wanted:e}", hit.face);
-    let told = hit.distance_squared.sqrt();
-    assert!((told - wanted).abs() <= tolerance, "{p}: told {told:e}, nearest {wanted:e}, by {:e}", told - wanted);
+    let found = hit.distance_squared.sqrt();
+    assert!(
+        (found - wanted).abs() <= tolerance,
+        "{p}: reported {found:e}, nearest {wanted:e}, by {:e}",
+        found - wanted
+    );
 
     let middle = tree.closest_barycentre(mesh, p, f64::INFINITY).expect("a face is there");
     let tolerance_middle = rounding(mesh, p, wanted_middle);
@@ -98,7 +102,7 @@ proptest! {
         }
     }
 
-    /// Moves of a vertex, a little or across the whole mesh, each told to the tree.
+    /// Moves of a vertex, a little or across the whole mesh, each passed to the tree.
     #[test]
     fn closest_face_stays_that_of_brute_force_while_vertices_move((mut mesh, scale, shift, seed) in any_mesh()) {
         let mut rng = Pcg64::seed_from_u64(!seed);
@@ -197,7 +201,7 @@ fn outside(outline: &[[f64; 2]], p: &Point3<f64>) -> f64 {
 /// Points straight off every edge and corner in all directions, where two to six faces are equally near; also far from
 /// the origin and askew, where the closest point of each is rounded differently.
 #[test]
-fn at_edges_and_corners_the_sign_tells_inside_from_outside() {
+fn at_edges_and_corners_the_sign_separates_inside_from_outside() {
     let cube = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
     // tan 5° · 2 = 0.175: a wedge of 5° at x = 1
     let wedge = [[-1.0, -0.0875], [1.0, 0.0], [-1.0, 0.0875]];
@@ -225,8 +229,8 @@ fn at_edges_and_corners_the_sign_tells_inside_from_outside() {
                             continue;
                         }
                         let hit = tree.closest(mesh, &p, f64::INFINITY).unwrap();
-                        let told = (p - hit.point).dot(&mesh.normal(hit.face)) * sign;
-                        assert!(told * truth > 0.0, "{p}: {told:e} where {truth:e} is true");
+                        let found = (p - hit.point).dot(&mesh.normal(hit.face)) * sign;
+                        assert!(found * truth > 0.0, "{p}: {found:e} where {truth:e} is true");
                         tried[usize::from(truth > 0.0)] += 1;
                     }
                 }
@@ -287,7 +291,7 @@ fn a_query_that_is_no_point_or_finds_nothing_gives_none() {
 
 #[test]
 fn faces_at_one_place_are_all_searched() {
-    // a thousand equal faces cannot be told apart by a split; the smallest id is named
+    // a thousand equal faces cannot be separated by a split; the smallest id is named
     let positions = vec![Point3::origin(), Point3::new(1.0, 0.0, 0.0), Point3::new(0.0, 1.0, 0.0)];
     let mut mesh = TriMesh::new(positions, vec![[0, 1, 2]; 1000]).unwrap();
     let mut tree = FaceTree::new(&mesh);

@@ -1,5 +1,5 @@
 //! The mesh from outside: closest face against brute force, triangles against exact arithmetic, inside and outside
-//! against winding numbers, adjacency against a mesh that is built anew.
+//! against winding numbers, adjacency against a rebuilt mesh.
 
 mod adjacency;
 mod closest;

@@ -1,4 +1,4 @@
-//! Single triangles: projection against another way, crossings against exact integers.
+//! Single triangles: projection against another method, crossings against exact integers.
 
 use super::*;
 

@@ -10,7 +10,7 @@ type Triangle = [Point3<f64>; 3];
 
 /// Samples in each run.
 const SAMPLES: i64 = 5_000;
-/// Self-intersection is looked for after each of these.
+/// Samples between two tests for self-intersection.
 const LOOK_EVERY: i64 = 250;
 
 /// Twice the area over the longest edge squared, and the unit normal.
@@ -101,7 +101,7 @@ fn stepped_block() -> TriMesh {
     TriMesh::new(positions, faces).unwrap()
 }
 
-/// A plate of 0.8 mm, its two sides not joined: what is pushed down on the one meets the other.
+/// A plate of 0.8 mm, its two sides not joined: a push on one side meets the other.
 fn thin_plate() -> TriMesh {
     let upper = bumpy(8);
     let count = upper.vertex_count() as u32;
@@ -111,7 +111,7 @@ fn thin_plate() -> TriMesh {
     TriMesh::new(upper.positions().iter().copied().chain(lower).collect(), faces().chain(turned).collect()).unwrap()
 }
 
-/// Wanders, jumps, presses, lets go, dives into the mesh, and pushes from every side.
+/// Drifts, jumps, presses, lets go, dives into the mesh, and pushes from every side.
 struct Adversary {
     rng: Pcg64,
     centre: Point3<f64>,
@@ -165,7 +165,7 @@ impl Adversary {
 /// Quality and normal of each face.
 type Shapes = Vec<(f64, Vector3<f64>)>;
 
-/// What was promised of every update, checked face by face: shapes as scanned, and before and after the push.
+/// The guarantees of every update, checked face by face: shapes as scanned, and before and after the push.
 fn check_update(scanned: &Shapes, before: &Shapes, after: &Shapes, hinges: &[(FaceId, FaceId)], at: &str) {
     let GuardParams { smallest_quality, smallest_turn_cosine, smallest_fold_cosine, .. } = GuardParams::default();
     let slack = 1e-9;
@@ -203,11 +203,11 @@ fn torment(scan: &TriMesh, params: RefineParams, seeds: std::ops::Range<u64>) ->
     for seed in seeds {
         let mut refiner = Refiner::new(scan.clone(), params).unwrap();
         let mut adversary = Adversary::new(seed);
-        let mut told = 0;
+        let mut reported = 0;
         let mut before = scanned.clone();
         for i in 0..SAMPLES {
             let update = refiner.push(&adversary.sample()).unwrap();
-            told += u64::from(update.fit == Some(RegionFit::CutBack));
+            reported += u64::from(update.fit == Some(RegionFit::CutBack));
             let at = format!("seed {seed}, sample {i}");
             assert!(refiner.mesh().positions().iter().all(|p| p.coords.iter().all(|x| x.is_finite())), "{at}");
             let after = shapes(refiner.mesh());
@@ -222,9 +222,9 @@ fn torment(scan: &TriMesh, params: RefineParams, seeds: std::ops::Range<u64>) ->
         assert!(farthest <= most * (1.0 + 1e-12), "seed {seed}: {farthest:e} m of {most:e} m");
         let counts = refiner.counts();
         assert_eq!(counts.accepted, SAMPLES as u64);
-        // an update that carves after a contact tells of the contact
-        assert!(counts.cut_back >= told && counts.cut_back <= counts.moved, "{counts:?} {told}");
-        assert!(params.carve.is_some() || counts.cut_back == told, "{counts:?} {told}");
+        // an update that carves after a contact reports the contact
+        assert!(counts.cut_back >= reported && counts.cut_back <= counts.moved, "{counts:?} {reported}");
+        assert!(params.carve.is_some() || counts.cut_back == reported, "{counts:?} {reported}");
         // the tree has followed every move
         for _ in 0..20 {
             let p = Point3::from(adversary.vector(12e-3));

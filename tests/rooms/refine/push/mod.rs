@@ -36,7 +36,7 @@ fn sample(tick: i64, centre: Point3<f64>, force: Vector3<f64>) -> Sample {
 
 /// A ball that slides over the true plane z = 0 in a raster of `lines` per direction, there and across.
 ///
-/// `force` gives N over the way (m); friction `mu` pulls against the motion; the tip gives way by F/k as a real one.
+/// `force` gives N over the path length (m); friction `mu` pulls against the motion; the tip deflects by F/k as a real one.
 fn raster(half: f64, lines: usize, mu: f64, tip: &TipParams, force: impl Fn(f64) -> f64) -> Vec<Sample> {
     // 25 mm/s
     let step = 25e-3 * TICK_NS as f64 * 1e-9;
@@ -50,9 +50,9 @@ fn raster(half: f64, lines: usize, mu: f64, tip: &TipParams, force: impl Fn(f64)
             let (x, y) = if across { (aside, along) } else { (along, aside) };
             let back = if forth { -1.0 } else { 1.0 };
             let friction = if across { vector![0.0, back, 0.0] } else { vector![back, 0.0, 0.0] };
-            let felt = (Vector3::z() + friction * mu) * force(samples.len() as f64 * step);
-            let given = tip.stiffness.map_or(Vector3::zeros(), |stiffness| felt / stiffness);
-            samples.push(sample(samples.len() as i64, Point3::new(x, y, tip.radius) - given, felt));
+            let applied = (Vector3::z() + friction * mu) * force(samples.len() as f64 * step);
+            let given = tip.stiffness.map_or(Vector3::zeros(), |stiffness| applied / stiffness);
+            samples.push(sample(samples.len() as i64, Point3::new(x, y, tip.radius) - given, applied));
         }
     }
     samples
@@ -150,10 +150,10 @@ fn depth(mesh: &Refiner, centre: &Point3<f64>) -> f64 {
     RADIUS - mesh.closest_face(centre, f64::INFINITY).unwrap().distance_squared.sqrt()
 }
 
-/// A ball without a force sinks through a thin lid, down to 4 mm, and stays there: what is left inside it is the
-/// tolerance, and what goes with the exponential after a second. On the way, at v = 20 mm/s, the depth is where carving
-/// by 300 per second keeps up, tolerance + v/300 = 0.12 mm, for a face that lies square to it; for one that gives way at
-/// a slant the way is up to three times as long.
+/// A ball without a force sinks through a thin lid, down to 4 mm, and stays there: the remaining depth is the
+/// tolerance, and what goes with the exponential after a second. While moving at v = 20 mm/s, the depth is where carving
+/// by 300 per second keeps up, tolerance + v/300 = 0.12 mm, for a face that lies square to it; for one that yields at
+/// a slant the path is up to three times as long.
 #[test]
 fn nothing_of_a_lid_stays_inside_the_ball_deeper_than_the_tolerance() {
     let CarveParams { tolerance, rate, .. } = CarveParams::default();
@@ -200,7 +200,7 @@ fn all_faces_inside_the_tip_move_at_once() {
     }
 }
 
-/// The lid has gone down; the ball goes up again: what it does not sweep stays where it is.
+/// The lid has gone down; the ball goes up again: unswept parts stay where they are.
 #[test]
 fn a_ball_that_leaves_takes_nothing_with_it() {
     let mut refiner = Refiner::new(grid(15, EDGE, |_, _| 0.0), RefineParams::robust(BALL)).unwrap();

@@ -51,14 +51,14 @@ fn one_face_flees_from_a_stylus_that_hovers() {
         let middle = (lo + hi) / 2.0;
         if middle + middle.exp() < right { lo = middle } else { hi = middle }
     }
-    let way = (lo - start) * H_MIN;
+    let travel = (lo - start) * H_MIN;
     let found = -height(1e-3, 0.0, 1_000);
     println!("{:.3} mm in one second", found * 1e3);
-    assert!((found - way).abs() < 1e-9, "{found:e} m, {way:e} m expected");
+    assert!((found - travel).abs() < 1e-9, "{found:e} m, {travel:e} m expected");
     assert!((found * 1e3 - 0.52).abs() < 0.01, "the figure of METHOD");
 }
 
-/// At F ≥ f_max the printed rule has no equilibrium: the face rises by α (F − f_max) and more, which is told by a count.
+/// At F ≥ f_max the printed rule has no equilibrium: the face rises by α (F − f_max) and more, which a count reports.
 /// Just below it there is one, far away: h_min (δ + ln 199) = 5.15 mm at 9.95 N.
 #[test]
 fn beyond_f_max_the_printed_rule_runs_away_and_is_counted() {

@@ -61,7 +61,7 @@ fn a_noisy_stylus_leaves_less_than_a_third_of_its_noise() {
 
 /// Lowest, mean and highest vertex of a true plate after it was touched with 1 to 4 N in waves of 6 mm, m.
 fn after_waves(tip: TipParams, params: RefineParams) -> [f64; 3] {
-    let force = |way: f64| 2.5 + 1.5 * (way / 6e-3 * std::f64::consts::TAU).sin();
+    let force = |travel: f64| 2.5 + 1.5 * (travel / 6e-3 * std::f64::consts::TAU).sin();
     let mut refiner = Refiner::new(grid(15, EDGE, |_, _| 0.0), params).unwrap();
     push_all(&mut refiner, &raster(12e-3, 25, 0.0, &tip, force));
     let heights: Vec<_> = inner(refiner.mesh(), 8e-3).map(|p| p.z).collect();
@@ -78,27 +78,27 @@ fn a_varying_force_draws_no_ripples_but_does_in_paper_mode() {
     let point = TipParams { radius: 0.0, stiffness: None };
     for tip in [point, TipParams { radius: RADIUS, ..point }] {
         let [lo, _, hi] = after_waves(tip, RefineParams::robust(tip));
-        // friction is told in steps of a thousandth: half of one is 1.2 µm at the corner of a face
+        // friction is reported in steps of a thousandth: half of one is 1.2 µm at the corner of a face
         assert!(lo.abs() < 1.2e-6 && hi.abs() < 1.2e-6, "the plate is true and stays so: {lo:e} {hi:e} m");
     }
     let [lo, mean, hi] = after_waves(point, RefineParams::paper(point));
-    // a face floats by 1.40 mm where 1 N was felt last and by 2.30 mm where it was 4 N; then lower neighbours are nearer
+    // a face floats by 1.40 mm where 1 N was measured last and by 2.30 mm where it was 4 N; then lower neighbours are nearer
     assert!(mean > 0.7e-3 && mean < 2.3e-3, "the bias: {mean:e} m");
     assert!(hi - lo > 0.45e-3, "ripples of half the spread of the bias at least: {lo:e} {hi:e} m");
 }
 
-/// A tip that gives way: the reported pose goes up and down with the force by up to 0.2 mm, the ball does not.
+/// A compliant tip: the reported pose goes up and down with the force by up to 0.2 mm, the ball does not.
 #[test]
-fn a_varying_force_on_a_tip_that_gives_way_draws_no_ripples() {
+fn a_varying_force_on_a_compliant_tip_draws_no_ripples() {
     let [lo, _, hi] = after_waves(BALL, RefineParams::robust(BALL));
-    // force and position are smoothed alike, so that nothing of the 0.15 mm by which the tip gives way should be left; half
+    // force and position are smoothed alike, so that nothing of the 0.15 mm by which the tip deflects should be left; half
     // a step of friction as above
     assert!(lo.abs() < 1.2e-6 && hi.abs() < 1.2e-6, "the plate is true and stays so: {lo:e} {hi:e} m");
 }
 
 /// Beyond f_max there is no equilibrium: the force is clamped and counted, and the plate stays at the tip.
 #[test]
-fn more_force_than_the_model_knows_does_not_run_away() {
+fn force_beyond_the_model_does_not_run_away() {
     let tip = TipParams { stiffness: None, ..BALL };
     let params = RefineParams::robust(tip);
     assert!(matches!(params.dynamics.model, ContactModel::Sigmoid { f_max_n, .. } if f_max_n == 10.0));
@@ -113,9 +113,9 @@ fn more_force_than_the_model_knows_does_not_run_away() {
     }
 }
 
-/// METHOD 2.4: a face turned farther than 100° from what is felt runs away with the printed rule.
+/// METHOD 2.4: a face turned farther than 100° from the measured normal runs away with the printed rule.
 #[test]
-fn a_face_turned_away_from_the_felt_normal_never_blows_up() {
+fn a_face_turned_away_from_the_measured_normal_never_blows_up() {
     for degrees in [95f64, 101.0, 120.0, 150.0, 179.0, 180.0] {
         let (sin, cos) = degrees.to_radians().sin_cos();
         // a single face about the origin, turned about x
@@ -131,7 +131,7 @@ fn a_face_turned_away_from_the_felt_normal_never_blows_up() {
     }
 }
 
-/// The same within a mesh: every tenth face of a plate lies upside down or stands on edge.
+/// The same within a mesh: every tenth face of a plate is inverted or on edge.
 #[test]
 fn turned_faces_in_a_plate_stay_within_bounds() {
     let mut rng = Pcg64::seed_from_u64(4);

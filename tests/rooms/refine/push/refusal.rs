@@ -57,7 +57,7 @@ fn a_refused_sample_changes_nothing_and_the_loop_goes_on() {
 }
 
 #[test]
-fn a_refusal_says_what_is_wrong() {
+fn a_refusal_names_the_cause() {
     let mut refiner = Refiner::new(bumpy(2), RefineParams::robust(BALL)).unwrap();
     let good = sample(5, Point3::new(0.0, 0.0, RADIUS), Vector3::z());
     refiner.push(&good).unwrap();

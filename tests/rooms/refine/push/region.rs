@@ -90,29 +90,29 @@ fn one_push(scan: TriMesh, size: RoiSize, at: Point3<f64>) -> (Vec<Vector3<f64>>
     assert!(bits(refiner.mesh()) == bits(&scan), "no time has passed");
     let update = refiner.push(&sample(1, at, Vector3::z() * 2.0)).unwrap();
     assert_eq!(update.fit, Some(RegionFit::Whole));
-    let ways = refiner.mesh().positions().iter().zip(scan.positions()).map(|(is, was)| is - was).collect();
-    (ways, update.mismatch.unwrap().face, scan)
+    let displacements = refiner.mesh().positions().iter().zip(scan.positions()).map(|(is, was)| is - was).collect();
+    (displacements, update.mismatch.unwrap().face, scan)
 }
 
 /// The displacement of each free vertex is the mean of its neighbours', in whichever mesh.
 fn check_mean(scan: TriMesh, size: RoiSize, at: Point3<f64>, least_free: usize) {
-    let (ways, handle, scan) = one_push(scan, size, at);
-    let longest = ways.iter().map(|way| way.norm()).fold(0.0, f64::max);
+    let (displacements, handle, scan) = one_push(scan, size, at);
+    let longest = displacements.iter().map(|displacement| displacement.norm()).fold(0.0, f64::max);
     assert!(longest > 1e-7);
     let corners = scan.corners(handle);
     let mut free = 0;
     for vertex in region(&scan, handle, size).into_iter().filter(|vertex| !corners.contains(vertex)) {
         let around = neighbours(&scan, vertex);
-        let mean = around.iter().map(|v| ways[v.0 as usize]).sum::<Vector3<f64>>() / around.len() as f64;
-        let off = (ways[vertex.0 as usize] - mean).norm();
-        assert!(off <= MEAN_TOL * longest, "{size:?} {vertex:?}: {:e} of the longest way", off / longest);
+        let mean = around.iter().map(|v| displacements[v.0 as usize]).sum::<Vector3<f64>>() / around.len() as f64;
+        let off = (displacements[vertex.0 as usize] - mean).norm();
+        assert!(off <= MEAN_TOL * longest, "{size:?} {vertex:?}: {:e} of the longest displacement", off / longest);
         free += 1;
     }
     assert!(free >= least_free, "{free} free");
 }
 
 #[test]
-fn a_free_vertex_goes_the_mean_way_of_its_neighbours() {
+fn a_free_vertex_moves_by_the_mean_displacement_of_its_neighbours() {
     for size in [RoiSize::OneRing, RoiSize::Radius(4e-3), RoiSize::Radius(8e-3)] {
         check_mean(bumpy(5), size, Point3::new(0.3e-3, 0.2e-3, RADIUS + 0.5e-3), 5);
     }
@@ -120,7 +120,7 @@ fn a_free_vertex_goes_the_mean_way_of_its_neighbours() {
 
 /// … also where the region ends at the border of the scan.
 #[test]
-fn a_free_vertex_at_a_border_goes_the_mean_way_of_its_neighbours() {
+fn a_free_vertex_at_a_border_moves_by_the_mean_displacement_of_its_neighbours() {
     let half = 7.5 * EDGE;
     for size in [RoiSize::OneRing, RoiSize::Radius(4e-3)] {
         check_mean(bumpy(5), size, Point3::new(half - 0.9e-3, 0.2e-3, RADIUS + 0.5e-3), 3);
@@ -128,13 +128,13 @@ fn a_free_vertex_at_a_border_goes_the_mean_way_of_its_neighbours() {
     }
 }
 
-/// The handle goes as a rigid body along the felt normal: up, by a step that the tip's distance sets.
+/// The handle goes as a rigid body along the measured normal: up, by a step that the tip's distance sets.
 #[test]
 fn the_handle_rises_to_the_ball() {
     let above = 0.2e-3;
-    let (ways, handle, scan) =
+    let (displacements, handle, scan) =
         one_push(grid(15, EDGE, |_, _| 0.0), RoiSize::OneRing, Point3::new(0.3e-3, 0.2e-3, RADIUS + above));
-    let steps = scan.corners(handle).map(|v| ways[v.0 as usize]);
+    let steps = scan.corners(handle).map(|v| displacements[v.0 as usize]);
     assert!(steps.iter().all(|step| (step - steps[0]).norm() < 1e-15 && step.x == 0.0 && step.y == 0.0));
     // dz/dt = α (F − f), f = k · (z − tip): towards tip + F/k at the rate α k = 25 per second, over 1 ms
     let expected = (above + 2.0 / STIFFNESS) * -(-0.025f64).exp_m1();

@@ -27,10 +27,10 @@ fn strokes_are_undone_and_redone_bit_for_bit_and_the_index_follows() {
     assert!(states.windows(2).all(|pair| pair[0] != pair[1]), "each stroke moves something");
     let check = |refiner: &Refiner, expected: &[Point3<f64>]| {
         assert_eq!(refiner.mesh().positions(), expected);
-        let anew = FaceTree::new(refiner.mesh());
+        let rebuilt = FaceTree::new(refiner.mesh());
         for p in expected.iter().map(|p| p + Vector3::new(0.4e-3, 0.3e-3, 0.5e-3)) {
             let found = refiner.closest_face(&p, 1.0).unwrap().distance_squared;
-            assert_eq!(found, anew.closest(refiner.mesh(), &p, 1.0).unwrap().distance_squared);
+            assert_eq!(found, rebuilt.closest(refiner.mesh(), &p, 1.0).unwrap().distance_squared);
         }
     };
     for expected in states.iter().rev().skip(1) {
@@ -51,7 +51,7 @@ fn strokes_are_undone_and_redone_bit_for_bit_and_the_index_follows() {
 }
 
 #[test]
-fn nothing_is_kept_unless_somebody_asks() {
+fn nothing_is_kept_without_a_request() {
     let mut refiner = Refiner::new(bumpy(3), RefineParams::robust(BALL)).unwrap();
     push_all(&mut refiner, &strokes()[0]);
     assert!(refiner.strokes() == 0 && !refiner.undo() && !refiner.redo());

@@ -42,34 +42,34 @@ fn sweeps(run: &mut PaperSweeps, count: usize) -> Vec<MeshErrors> {
     errors
 }
 
-/// One face while the stylus is on it: how far it leaned from the true one before, and leans and lies off after, rad and m.
+/// One face while the stylus is on it: its tilt before, and its tilt and offset after, rad and m.
 #[derive(Clone, Copy, Debug)]
-struct Visit {
+struct Pass {
     tilt: [f64; 2],
     off: f64,
 }
 
 /// One sweep of [`PaperSweeps`] written out, with what it did to each face.
-fn visits(refiner: &mut Refiner, truth: &TriMesh, stamp_ns: &mut i64) -> Vec<Visit> {
+fn passes(refiner: &mut Refiner, truth: &TriMesh, stamp_ns: &mut i64) -> Vec<Pass> {
     let (model, stylus) = (RefineParams::paper(POINT).dynamics.model, GuidedStylus::default());
-    let visit = |(face, _): (FaceId, _)| {
+    let pass = |(face, _): (FaceId, _)| {
         let (b, n) = (truth.barycentre(face), truth.normal(face));
-        let felt = |p: &Point3<f64>| n * model.force((p - b).dot(&n));
+        let force = |p: &Point3<f64>| n * model.force((p - b).dot(&n));
         let tilt = |refiner: &Refiner| refiner.mesh().normal(face).angle(&n);
         let before = tilt(refiner);
         let mut p = refiner.mesh().barycentre(face);
         for _ in 0..4000 {
             let now = (refiner.mesh().barycentre(face), refiner.mesh().normal(face));
             *stamp_ns += PERIOD_NS;
-            let wrench = Wrench { force: felt(&p), torque: Vector3::zeros() };
+            let wrench = Wrench { force: force(&p), torque: Vector3::zeros() };
             let sample = Sample { stamp_ns: *stamp_ns, pose_ot: Isometry3::translation(p.x, p.y, p.z), wrench };
             refiner.push_on(face, &sample).unwrap();
-            p = stylus.step(&p, &now.0, &now.1, felt, 5e-3);
+            p = stylus.step(&p, &now.0, &now.1, force, 5e-3);
         }
         let off = (refiner.mesh().barycentre(face) - b).dot(&n);
-        Visit { tilt: [before, tilt(refiner)], off }
+        Pass { tilt: [before, tilt(refiner)], off }
     };
-    truth.faces().map(visit).collect()
+    truth.faces().map(pass).collect()
 }
 
 const POINT: TipParams = TipParams { radius: 0.0, stiffness: None };
@@ -77,9 +77,9 @@ const POINT: TipParams = TipParams { radius: 0.0, stiffness: None };
 /// A face that leans by less than the first comes back, by more than the second it runs away (METHOD, 2.4), rad.
 const BASIN: [f64; 2] = [80.0 / 180.0 * std::f64::consts::PI, 100.0 / 180.0 * std::f64::consts::PI];
 
-/// Every scan of a row of seeds, whatever becomes of it. A face is felt as its true plane, so 20 s leave it there if it leaned by
-/// less than the basin is wide; a scan converges if none leans farther when its turn comes, and does not if one leans by more than
-/// comes back.
+/// Every scan of a row of seeds, whatever becomes of it. The force on a face is that of its true plane, so 20 s leave it there if
+/// it leaned by less than the basin is wide; a scan converges if none leans farther when its turn comes, and does not if one
+/// leans by more than comes back.
 #[test]
 fn the_published_rule_converges_where_no_face_leans_out_of_its_basin_and_only_there() {
     let seeds = if is_full() { 1..=20 } else { 1..=7 };
@@ -92,16 +92,16 @@ fn the_published_rule_converges_where_no_face_leans_out_of_its_basin_and_only_th
         let start = MeshErrors::by_index(refiner.mesh(), &truth).distance_mm;
         let mut distances = vec![start];
         for sweep in 1..=10 {
-            let all = visits(&mut refiner, &truth, &mut stamp_ns);
-            let first_out = all.iter().position(|visit| visit.tilt[0] > BASIN[0]);
+            let all = passes(&mut refiner, &truth, &mut stamp_ns);
+            let first_out = all.iter().position(|pass| pass.tilt[0] > BASIN[0]);
             let sound = &all[..first_out.unwrap_or(all.len())];
-            for visit in sound {
+            for pass in sound {
                 // α f′(0) relaxes within a second, β |F| f within four
-                assert!(visit.off.abs() < 1e-6 && visit.tilt[1] < 0.5f64.to_radians(), "seed {seed}: {visit:?}");
+                assert!(pass.off.abs() < 1e-6 && pass.tilt[1] < 0.5f64.to_radians(), "seed {seed}: {pass:?}");
             }
-            inside += sound.iter().filter(|visit| visit.tilt[0] > 0.1).count();
+            inside += sound.iter().filter(|pass| pass.tilt[0] > 0.1).count();
             distances.push(MeshErrors::by_index(refiner.mesh(), &truth).distance_mm);
-            farthest = all.iter().map(|visit| visit.tilt[0]).fold(farthest, f64::max);
+            farthest = all.iter().map(|pass| pass.tilt[0]).fold(farthest, f64::max);
             if sweep == 1 && seed == 1 {
                 let mut run = PaperSweeps::new(10e-3, None, seed).unwrap();
                 run.sweep(f64::INFINITY).unwrap();
@@ -129,7 +129,10 @@ fn the_published_rule_converges_where_no_face_leans_out_of_its_basin_and_only_th
             blown_up += 1;
         }
     }
-    println!("{} converged, {blown_up} blew up, {inside} visits of faces that leaned by more than 6°", converged.len());
+    println!(
+        "{} converged, {blown_up} blew up, {inside} passes over faces that leaned by more than 6°",
+        converged.len()
+    );
     assert!(converged.len() >= 2 && blown_up >= 2 && inside > 200, "{converged:?}");
     // the scan whose start is the 2.4 mm of the paper, and what its second implementation came to
     let paper =
@@ -156,7 +159,7 @@ fn the_guard_lets_the_published_rule_starve_no_face() {
     }
 }
 
-/// No face has become worse than the guard's limit: 0.15, or nine tenths of what it came with.
+/// No face has become worse than the guard's limit: 0.15, or nine tenths of its initial quality.
 #[track_caller]
 fn assert_no_face_starved(before: &[f64], mesh: &TriMesh) {
     let limit = GuardParams::default().smallest_quality;

@@ -19,7 +19,7 @@ use super::Errors;
 const BALL: f64 = 3.15e-3;
 /// Centres within this distance make the reference, m.
 const NEAR: f64 = 4e-3;
-/// What is so close in time is the same pass, ns: 12 mm at 4 mm/s.
+/// Touches within this time belong to the same pass, ns: 12 mm at 4 mm/s.
 const SAME_PASS_NS: i64 = 3_000_000_000;
 /// Two rows so far apart are not one path, ns.
 const GAP_NS: i64 = 200_000_000;
@@ -85,13 +85,13 @@ fn reference(touches: &[TipTouch], at: usize, force: &Vector3<f64>) -> Option<Ve
         let left = DMatrix::from_fn(arms.len(), 6, |row, column| terms(row)[column] * weights[row]);
         let right = DVector::from_fn(arms.len(), |row, _| arms[row].dot(&z) / NEAR * weights[row]);
         let fit = (left.transpose() * &left).cholesky()?.solve(&(left.transpose() * right));
-        let rest = |i: usize| {
+        let residual = |i: usize| {
             (arms[i].dot(&z) / NEAR - terms(i).iter().zip(fit.iter()).map(|(t, c)| t * c).sum::<f64>()).abs()
         };
-        let mut rests: Vec<f64> = (0..arms.len()).map(rest).collect();
-        weights.iter_mut().zip(&rests).for_each(|(weight, rest)| *weight = *rest);
-        rests.sort_unstable_by(f64::total_cmp);
-        let usual = 3.0 * rests[rests.len() / 2] + 1e-9;
+        let mut residuals: Vec<f64> = (0..arms.len()).map(residual).collect();
+        weights.iter_mut().zip(&residuals).for_each(|(weight, residual)| *weight = *residual);
+        residuals.sort_unstable_by(f64::total_cmp);
+        let usual = 3.0 * residuals[residuals.len() / 2] + 1e-9;
         weights.iter_mut().for_each(|weight| *weight = 1.0 / (1.0 + (*weight / usual).powi(2)).sqrt());
         slope = [fit[1], fit[2]];
     }
@@ -130,32 +130,32 @@ fn on_real_streams_at_most_half_of_the_raw_forces_error_is_left() {
         }
         finder.flush(|touch| touches.push(touch));
         assert_eq!(touches.len(), tips.len());
-        let (mut raw, mut felt) = (Errors::default(), Errors::default());
+        let (mut raw, mut corrected) = (Errors::default(), Errors::default());
         for at in (7..tips.len() - 7).step_by(10) {
             let span = &touches[at - 7..=at + 7];
             let seconds = (span[14].stamp_ns - span[0].stamp_ns) as f64 * 1e-9;
-            let ways = [span[7].centre - span[0].centre, span[14].centre - span[7].centre];
+            let halves = [span[7].centre - span[0].centre, span[14].centre - span[7].centre];
             // slides, and does not turn round here
-            let slides = (span[14].centre - span[0].centre).norm() > 2e-3 * seconds && ways[0].dot(&ways[1]) > 0.0;
+            let slides = (span[14].centre - span[0].centre).norm() > 2e-3 * seconds && halves[0].dot(&halves[1]) > 0.0;
             let Some(contact) = touches[at].contact.filter(|_| slides && seconds < 0.5) else { continue };
             let force = tips[at - 7..=at + 7].iter().map(|tip| tip.force_o).sum::<Vector3<f64>>();
             if let Some(normal) = reference(&touches, at, &force) {
                 raw.note(&force, &normal);
-                felt.note(&contact.normal, &normal);
+                corrected.note(&contact.normal, &normal);
             }
         }
         let count = raw.0.len();
-        let ([raw, _], [felt, worse]) = (raw.figures(), felt.figures());
+        let ([raw, _], [corrected, worse]) = (raw.figures(), corrected.figures());
         let friction = finder.friction().unwrap();
         println!(
-            "{name}: {count} places, raw {raw:.2}, felt {felt:.2} (p90 {worse:.2}) degrees, left {:.2}; friction {:.3} ± \
+            "{name}: {count} places, raw {raw:.2}, corrected {corrected:.2} (p90 {worse:.2}) degrees, left {:.2}; friction {:.3} ± \
              {:.3}, spread {:.3}",
-            felt / raw,
+            corrected / raw,
             friction.mu,
             friction.sigma,
             friction.spread
         );
         assert!(count > 300, "{name}: {count}");
-        assert!(felt < largest_share * raw, "{name}: {felt} of {raw}");
+        assert!(corrected < largest_share * raw, "{name}: {corrected} of {raw}");
     }
 }

@@ -1,4 +1,4 @@
-//! The felt normal and the friction found, against simulated touches of surfaces known in closed form.
+//! The estimated normal and friction, against simulated touches of surfaces known in closed form.
 //!
 //! The stylus of the simulator adds friction, noise and clock errors; the truth is the surface's own normal under the
 //! true centre. `--nocapture` or `--show-output` shows the tables.
@@ -75,7 +75,7 @@ fn lines() -> Vec<Stroke> {
     strokes
 }
 
-/// What the stylus reported, and what really was.
+/// The reported stream, and the truth.
 struct Stream {
     samples: Vec<Sample>,
     moments: Vec<Moment>,
@@ -103,8 +103,8 @@ impl Stream {
     fn truth(&self, shape: Shape, stamp_ns: i64) -> Option<Vector3<f64>> {
         let at = usize::try_from((stamp_ns - self.start_ns + 500_000) / 1_000_000).ok()?;
         let centre = |at: usize| self.moments.get(at).map(|moment| Point3::from(moment.pose_ot.translation.vector));
-        let way = centre(at + 10)? - centre(at.checked_sub(10)?)?;
-        (way.norm() > 10e-3 * 20e-3).then_some(shape.closest(&centre(at)?).normal)
+        let displacement = centre(at + 10)? - centre(at.checked_sub(10)?)?;
+        (displacement.norm() > 10e-3 * 20e-3).then_some(shape.closest(&centre(at)?).normal)
     }
 }
 
@@ -138,7 +138,7 @@ impl Errors {
     }
 }
 
-/// What the three ways to take a force for a normal make of one stream.
+/// The three estimates of the normal from the force, on one stream.
 #[derive(Default)]
 struct Found {
     raw: Errors,
@@ -198,7 +198,7 @@ fn the_median_normal_of_a_sliding_ball_is_within_three_degrees_whatever_the_fric
             );
             let expected = f64::atan(mu).to_degrees();
             assert!((raw[0] - expected).abs() < 1.0, "the raw force errs by atan mu: {} {expected}", raw[0]);
-            // with the most noise a tenth is worse, at less than 20 mm/s: the way along the surface is off by φ σᵥ / v, which
+            // with the most noise a tenth is worse, at less than 20 mm/s: the path along the surface is off by φ σᵥ / v, which
             // is 2.8° for μ = 0.4 at 15 mm/s, one standard deviation
             let [[median, worse], [past_median, past_worse]] =
                 if pose_noise > 0.1e-3 { [[2.0, 4.5], [3.0, 7.0]] } else { [[1.0, 2.0], [1.5, 3.0]] };
@@ -228,7 +228,7 @@ fn sliding(mu: f64, velocity_sigma: f64) -> Sliding {
 }
 
 #[test]
-fn nothing_is_said_of_friction_before_the_ball_has_slid_four_stretches() {
+fn friction_is_unknown_before_the_ball_has_slid_four_stretches() {
     let mut friction = Friction::new(0.4);
     (0..799).for_each(|_| friction.observe(&sliding(0.2, 0.0), 1e-3));
     assert_eq!(friction.coefficient(), None, "19.975 mm");
@@ -247,9 +247,9 @@ fn a_ball_at_rest_teaches_nothing_and_its_normal_is_as_uncertain_as_the_cone_is_
     (0..100_000).for_each(|_| friction.observe(&resting, 1e-3));
     assert_eq!(friction.coefficient(), before);
     for velocity in [Vector3::zeros(), Vector3::x() * 1e-6] {
-        let felt = friction.normal(&Sliding { velocity, ..resting }).unwrap();
-        assert!(felt.normal.angle(&resting.force_o) < 1e-4, "the force is all there is");
-        assert!((felt.sigma - f64::atan(0.3)).abs() < 0.02, "{}", felt.sigma);
+        let estimate = friction.normal(&Sliding { velocity, ..resting }).unwrap();
+        assert!(estimate.normal.angle(&resting.force_o) < 1e-4, "the force is all there is");
+        assert!((estimate.sigma - f64::atan(0.3)).abs() < 0.02, "{}", estimate.sigma);
     }
     assert_eq!(friction.normal(&Sliding { force_o: Vector3::zeros(), ..resting }), None);
 }

@@ -1,19 +1,19 @@
-//! Slow, smooth random motion: of a hand, of a sensor's bias.
+//! Drift: slow, smooth random change, of a hand-held stylus or of a sensor's bias.
 
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use rand_pcg::Pcg64;
 
-/// Waves in one [`Wander`]: with five the sum is close to Gaussian and does not visibly repeat.
+/// Waves in one [`Drift`]: with five the sum is close to Gaussian and does not visibly repeat.
 const WAVES: usize = 5;
 
 /// A smooth random function of time with mean 0 and root mean square 1: a few waves of random frequency and phase.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Wander {
+pub(super) struct Drift {
     /// rad/s and rad
     waves: [(f64, f64); WAVES],
 }
 
-impl Wander {
+impl Drift {
     /// - `period`: of the middle wave, s; the others lie within a factor of two.
     pub(super) fn new(period: f64, rng: &mut Pcg64) -> Self {
         let mut uniform = || -> f64 { StandardUniform.sample(rng) };

@@ -107,7 +107,7 @@ fn along_the_slot() -> Vec<Stroke> {
     strokes
 }
 
-/// A scan of the profile by strips, 1 mm wide where `step` says so, off by 0.2 mm.
+/// A scan of the profile by strips, 1 mm wide with `step`, off by 0.2 mm.
 fn strips(profile: &Profile) -> TriMesh {
     let mut across = Vec::new();
     for ends in profile.corners.windows(2) {
@@ -129,8 +129,8 @@ fn strips(profile: &Profile) -> TriMesh {
     TriMesh::new(vertices, faces).unwrap()
 }
 
-/// What was kept and made of a touch.
-fn felt(profile: &Profile, path: &[Stroke], friction: f64, seed: u64) -> (Patcher, Patched) {
+/// Kept contacts and reconstruction of a touch.
+fn reconstructed(profile: &Profile, path: &[Stroke], friction: f64, seed: u64) -> (Patcher, Patched) {
     let stylus = StylusParams { friction, ..StylusParams::default() };
     let recording = touch(profile, path, &stylus, seed).unwrap();
     let mut patcher = Patcher::new(PatcherParams::new(RADIUS, Some(stylus.stiffness), 0.3e-3)).unwrap();
@@ -146,7 +146,7 @@ fn felt(profile: &Profile, path: &[Stroke], friction: f64, seed: u64) -> (Patche
     (patcher, patched)
 }
 
-/// Share of the weight of what was kept whose normal is farther than 5° from those of the walls.
+/// Share of the weight of kept contacts whose normal is farther than 5° from those of the walls.
 fn invented(profile: &Profile, patcher: &Patcher) -> f64 {
     let means = patcher.contacts().means();
     let total: f64 = means.iter().map(|mean| mean.weight).sum();
@@ -160,7 +160,7 @@ fn no_normal_is_invented_between_two_walls() {
     let slot = ("slot", Profile::slot(), along_the_slot(), 0.06);
     for (name, profile, path, most) in [corner, slot] {
         for friction in [0.05, 0.15, 0.4] {
-            let (patcher, _) = felt(&profile, &path, friction, 1);
+            let (patcher, _) = reconstructed(&profile, &path, friction, 1);
             let share = invented(&profile, &patcher);
             println!("{name}, friction {friction}: {:.1} % farther than 5 degrees", share * 1e2);
             // what stays is from before both walls were known, and from where the ball changes from one to the other
@@ -171,7 +171,7 @@ fn no_normal_is_invented_between_two_walls() {
 
 #[test]
 fn what_the_ball_cannot_reach_is_marked() {
-    let (_, patched) = felt(&Profile::corner(), &over_the_corner(), 0.15, 1);
+    let (_, patched) = reconstructed(&Profile::corner(), &over_the_corner(), 0.15, 1);
     let (mut fillet, mut walls) = ([0u32; 2], [0u32; 2]);
     for (_, corners) in patched.mesh.faces() {
         for v in corners {
@@ -200,7 +200,7 @@ fn what_the_ball_cannot_reach_is_marked() {
 fn an_inner_corner_is_a_crease() {
     let profile = Profile::corner();
     for friction in [0.05, 0.15, 0.4] {
-        let (_, patched) = felt(&profile, &over_the_corner(), friction, 1);
+        let (_, patched) = reconstructed(&profile, &over_the_corner(), friction, 1);
         let in_corner = |p: &Point3<f64>| p.y.abs() < 4e-3 && p.x.max(p.z) < 0.8 * RADIUS;
         let vertices = patched.mesh.positions().iter().zip(&patched.support);
         let (mut off, mut guessed) = (Vec::new(), 0);

@@ -9,9 +9,10 @@ use super::probing::cell;
 use super::stand_in::StandIn;
 use super::with_library;
 
-/// 1.17 kg off the axis, where the scene says 0.25 kg: the controller takes off what it was told, and the sensor has all of it.
+/// 1.17 kg off the axis, where the scene says 0.25 kg: the controller takes off the configured payload, and the sensor has all of
+/// it.
 #[test]
-fn a_ur_weighs_what_hangs_on_its_flange() {
+fn a_ur_identifies_the_payload_on_its_flange() {
     with_library(|packages| {
         let stand_in = StandIn::start(&["--start-mm", "30,25,60", "--payload", "1.17,3,-2,42"]);
         let folder = cell(&stand_in, packages);
@@ -35,7 +36,7 @@ fn a_ur_weighs_what_hangs_on_its_flange() {
             assert!((value - expected).abs() < 3.0 * std, "{axis}: {value} ± {std} mm");
         }
         assert!(fs::read_to_string(path("calibrated.yaml")).unwrap().contains("payload_kg: 1.1"));
-        // the controller was told the payload of the scene when the client came, and never anything else
+        // the client set the payload of the scene once, when it started
         let events: Vec<String> = stand_in.record().into_iter().map(|line| line.event).collect();
         let payloads: Vec<&str> = events.iter().map(String::as_str).filter(|event| event.contains("payload")).collect();
         assert!(matches!(payloads[..], [only] if only.contains("payload 0.25 kg")), "{payloads:?}");
