@@ -3,7 +3,7 @@
 
     tests/beside.py [--busy N] [--stops] COMMAND...
 
---busy N: beside so many endless loops of ordinary priority. --stops: all processes of the command stand still for 200 ms every few
+--busy N: beside so many endless loops of ordinary priority. --stops: all processes of the command stop for 200 ms every few
 seconds (SIGSTOP, SIGCONT), as on a machine whose host has something else to do. Ends with the exit code of the command.
 """
 
@@ -48,18 +48,18 @@ def main():
     parser.add_argument("--busy", type=int, default=0)
     parser.add_argument("--stops", action="store_true")
     parser.add_argument("command", nargs=argparse.REMAINDER)
-    told = parser.parse_args()
-    if not told.command:
+    arguments = parser.parse_args()
+    if not arguments.command:
         parser.error("no command")
-    process = subprocess.Popen(told.command, start_new_session=True)
-    loops = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(told.busy)]
+    process = subprocess.Popen(arguments.command, start_new_session=True)
+    loops = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(arguments.busy)]
     rng, stops = random.Random(1), 0
     try:
         while process.poll() is None:
             try:
                 process.wait(rng.uniform(*GOING_S))
             except subprocess.TimeoutExpired:
-                if told.stops:
+                if arguments.stops:
                     stopped = processes_of(process.pid)
                     signal_all(stopped, signal.SIGSTOP)
                     time.sleep(STOPPED_S)
@@ -70,7 +70,7 @@ def main():
         signal_all(processes_of(process.pid), signal.SIGTERM)
         for loop in loops:
             loop.kill()
-    print(f"beside {told.busy} busy loops, stopped {stops} times: exit code {process.returncode}", file=sys.stderr)
+    print(f"beside {arguments.busy} busy loops, stopped {stops} times: exit code {process.returncode}", file=sys.stderr)
     sys.exit(process.returncode)
 
 

@@ -103,7 +103,7 @@ struct Met {
   bool all(int wanted) {
     std::unique_lock<std::mutex> lock(mutex);
     if (!more.wait_for(lock, PATIENCE, [&] { return count >= wanted; })) {
-      std::printf("nobody was met\n");
+      std::printf("no other participant was discovered\n");
       return false;
     }
     std::printf("matched\n");

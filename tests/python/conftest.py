@@ -1,4 +1,4 @@
-"""What the tests of this folder share: the binary, the shared data, the judge.
+"""Shared by the tests of this folder: the binary, the shared data, the judge.
 
 `tests/all.sh` sets TOUCHUP_BIN; without it the release binary of `target/` is used. A test whose data or system packages are
 missing is skipped with the reason. What is marked `full` belongs to `tests/all.sh --full` (TOUCHUP_FULL), and is not selected
@@ -55,7 +55,7 @@ def touchup(touchup_bin):
 
 @pytest.fixture(scope="session")
 def demo_folder(touchup, tmp_path_factory):
-    """What `touchup demo` writes: truth, scan and 74 s of touches, and what refine makes of them. Nobody writes there."""
+    """What `touchup demo` writes: truth, scan and 74 s of touches, and what refine makes of them. No test writes there."""
     out = tmp_path_factory.mktemp("demo")
     done = touchup("demo", "--out", out)
     assert done.returncode == 0, done.stderr

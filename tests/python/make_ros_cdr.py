@@ -27,7 +27,7 @@ STANDARD = [
     "nav_msgs/msg/Path",
     "sensor_msgs/msg/CompressedImage",
 ]
-# std_srvs and rcl_interfaces as their files say; an empty request has one byte
+# std_srvs and rcl_interfaces as in their files; an empty request has one byte
 SERVICES = {
     "rcl_interfaces/srv/GetParameters_Request": "string[] names",
     "rcl_interfaces/srv/GetParameters_Response": "rcl_interfaces/msg/ParameterValue[] values",

@@ -113,7 +113,7 @@ def parts():
 
 
 def simulated(touchup, part, out):
-    """Scan, recording, and where the ball really touched, as far as its recording tells."""
+    """Scan, recording, and where the ball really touched, as far as its recording shows."""
     out.mkdir(parents=True, exist_ok=True)
     part.apply_translation(-part.bounds[0])
     part.export(out / "part.stl")
@@ -137,8 +137,8 @@ def simulated(touchup, part, out):
 
     inner = slice(5, -5)
     position, stamps = smooth(poses[:, 1:4] * 1e3, 7)[inner], poses[inner, 0]
-    felt = smooth(forces[:, 1:], 9)
-    force = np.stack([np.interp(stamps + LATE_S, forces[:, 0], column) for column in felt.T], 1)
+    smoothed = smooth(forces[:, 1:], 9)
+    force = np.stack([np.interp(stamps + LATE_S, forces[:, 0], column) for column in smoothed.T], 1)
     force = Rotation.from_quat(poses[inner, 4:]).apply(force)
     centres = position + force / STIFFNESS_N_PER_MM
     truth = load_mesh(str(out / "truth.ply"))
@@ -146,11 +146,11 @@ def simulated(touchup, part, out):
     is_near = abs(np.linalg.norm(feet - centres, axis=1) - RADIUS_MM) < TOUCHING_MM
     contacts = feet[is_near & (np.linalg.norm(force, axis=1) > PRESSED_N)]
 
-    def thinned(points):
+    def voxel_set(points):
         _, first = np.unique(np.round(points / 0.1).astype(int), axis=0, return_index=True)
         return points[np.sort(first)].astype(np.float32)
 
-    np.savez(out / "oracle.npz", contacts=thinned(contacts), centres=thinned(centres), r=RADIUS_MM, R=np.eye(3))
+    np.savez(out / "oracle.npz", contacts=voxel_set(contacts), centres=voxel_set(centres), r=RADIUS_MM, R=np.eye(3))
     (out / "truth_features.json").write_text('{"features": []}')
 
 
@@ -158,7 +158,7 @@ def row(touchup, name, case):
     files = ["--scan", case / "scan.ply", "--bag", case / "touch.mcap", "--out", case / "refined.ply"]
     subprocess.run([touchup, "refine", *files, *KNOWN], check=True, stdout=subprocess.DEVNULL)
     scan, refined = (judge.judge(str(case), str(case / file)) for file in ["scan.ply", "refined.ply"])
-    means = " / ".join(f"{refined['touched'][way]['mean']:.3f}" for way in ["truth_to_mesh", "mesh_to_truth"])
+    means = " / ".join(f"{refined['touched'][side]['mean']:.3f}" for side in ["truth_to_mesh", "mesh_to_truth"])
     missing, health = refined["missing"], refined["health"]
     rims = f"{missing['open_rim_mm']:.0f} ({missing['scan_open_rim_mm']:.0f})"
     flipped = f"{health['flipped_faces']} ({scan['health']['flipped_faces']})"

@@ -8,7 +8,7 @@ import itertools
 import tempfile
 from pathlib import Path
 
-# those whose ports the system hands to nobody else (DDS gives each domain 250 from 7400 on; Linux takes those of connections from
+# those whose ports the system gives to no other process (DDS gives each domain 250 from 7400 on; Linux takes those of connections from
 # 32768 to 60999); those of users are low
 FREE = [*range(60, 102), *range(215, 233)]
 # a process takes no more, so that others find some too; a test finds its domain empty, as the one before has left it
@@ -16,7 +16,7 @@ MOST = 15
 
 
 def locked(domain):
-    """A lock on it for as long as this process lives; None where somebody else has it."""
+    """A lock on it for as long as this process lives; None where another process has it."""
     try:
         lock = open(Path(tempfile.gettempdir()) / f"touchup-dds-domain-{domain}.lock", "w")
     except OSError:

@@ -27,7 +27,7 @@ class Echo(Running):
 
     def has(self, *words):
         """Whether a line has all of them."""
-        return any(all(word in line for word in words) for line in [*self.out, *self.told])
+        return any(all(word in line for word in words) for line in [*self.out, *self.err])
 
     def __exit__(self, *_):
         # it ends with its stdin

@@ -47,7 +47,7 @@ class Hub:
         self.loss, self.random, self.is_down, self.is_over = loss, random.Random(seed), False, False
         self.names = {name: f"touchup-{name}-{os.getpid()}" for name in names}
         self.passed = self.dropped = 0
-        # by who sent them, the packets that are part of a larger one
+        # by sender, the packets that are part of a larger one
         self.parted = dict.fromkeys(names, 0)
         self.taps = []
         for number, namespace in enumerate(self.names.values()):
@@ -85,7 +85,7 @@ class Hub:
                 self.empty(tap)
 
     def empty(self, tap):
-        """Passes on what has come from one computer."""
+        """Passes on the packets of one computer."""
         while True:
             try:
                 frame = os.read(tap, 2048)
@@ -108,7 +108,7 @@ class Hub:
                     self.dropped += 1
 
     def wrapper(self, name):
-        """What stands before a command that runs there."""
+        """Prefix of a command that runs there."""
         return ["ip", "netns", "exec", self.names[name]]
 
     def __enter__(self):

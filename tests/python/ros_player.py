@@ -1,6 +1,6 @@
-"""Plays a recording to a node over CycloneDDS, in step with it: however busy the machine is, nothing is lost on the way.
+"""Plays a recording to a node over CycloneDDS, in step with it: however busy the machine is, nothing is lost in transport.
 
-Streams of samples are best effort: what comes faster than it is taken from the socket of a node is lost. So a few messages are
+Streams of samples are best effort: messages beyond the capacity of a node's socket are lost. So a few messages are
 sent at a time, and then the node is asked something that it answers behind them, as it takes all that comes one after the other.
 """
 

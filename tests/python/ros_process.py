@@ -32,7 +32,7 @@ class Node(Process):
         (self.session,) = (folder / "sessions").iterdir()
 
     def report(self):
-        """What it said at its end."""
+        """Its report at the end."""
         return json.loads(self.out[-1])
 
 
@@ -71,7 +71,7 @@ class Client:
 
 
 def play(program, recording, *arguments, domain, **options):
-    """`touchup replay` to its end; what it says."""
+    """Runs `touchup replay` to its end; returns its output."""
     with Process(program, "replay", recording, "--json", *arguments, domain=domain, **options) as player:
         assert player.wait() == 0, player.text()
         return json.loads(player.out[-1])

@@ -1,4 +1,4 @@
-"""Debian's RViz on a display of its own, fed with what the node published.
+"""Debian's RViz on a display of its own, showing the topics of the node.
 
     target/python/bin/python tests/python/ros_rviz.py docs/rviz.png     draws the picture of the README
 
@@ -108,7 +108,7 @@ def older(node):
 def config(path, size, view, hidden=()):
     """Writes config/touchup.rviz for RViz 1, with a window that fills the screen; returns its view.
 
-    - `view`: what is otherwise of the view
+    - `view`: changed settings of the view
     - `hidden`: names of displays that are switched off
     """
     made = older(yaml.safe_load((ROOT / "config/touchup.rviz").read_text()))
@@ -117,7 +117,7 @@ def config(path, size, view, hidden=()):
         if display["Name"] in hidden:
             display["Enabled"] = display["Value"] = False
     manager["Views"]["Current"].update(view)
-    # nobody manages windows here, so that it stays where it is put
+    # without a window manager it stays where it is put
     made["Window Geometry"].update({"X": 0, "Y": 0, "Width": size[0], "Height": size[1]})
     Path(path).write_text(yaml.safe_dump(made))
     return manager["Views"]["Current"]
@@ -127,7 +127,7 @@ def config(path, size, view, hidden=()):
 
 
 def free_port():
-    """A port that nobody has, for as long as nobody else asks."""
+    """A free port, for as long as no other process asks for one."""
     with socket.socket() as asked:
         asked.bind(("127.0.0.1", 0))
         return asked.getsockname()[1]
@@ -189,8 +189,8 @@ class Desk:
         screen = ["-screen", "0", f"{width}x{height}x24", "-nolisten", "tcp", "-nocursor", "-fbdir", str(self.folder)]
         self.start("xvfb", "Xvfb", "-displayfd", str(write), *screen, pass_fds=[write])
         os.close(write)
-        with os.fdopen(read) as told:
-            self.environment["DISPLAY"] = f":{int(told.readline())}"
+        with os.fdopen(read) as pipe:
+            self.environment["DISPLAY"] = f":{int(pipe.readline())}"
 
         self.start("master", "/usr/bin/python3", "/usr/bin/rosmaster", "--core", "-p", str(port))
         self.api = xmlrpc.client.ServerProxy(self.master)
@@ -206,7 +206,7 @@ class Desk:
             return self.api.getPid("/test")[0] == 1
 
     def subscribed(self, topics):
-        """Whether somebody listens to all of them."""
+        """Whether all of them have subscribers."""
         _, _, (_, listening, _) = self.api.getSystemState("/test")
         return set(topics) <= {topic for topic, nodes in listening if nodes}
 
@@ -221,7 +221,7 @@ class Desk:
         assert process.wait(DEADLINE_S) == 0, (self.folder / "play.log").read_text()
 
     def screen(self):
-        """What is on the screen: rows, columns, red green blue."""
+        """Picture of the screen: rows, columns, red green blue."""
         raw = (self.folder / "Xvfb_screen0").read_bytes()
         # the X window dump format: header, colour map of 12 bytes each, rows of blue green red nothing
         header = numpy.frombuffer(raw[:100], ">u4")

@@ -1,4 +1,4 @@
-"""What a node publishes to be looked at, from a recording that is played to it, as CycloneDDS has it."""
+"""The visualisation topics of a node during the replay of a recording, received by CycloneDDS."""
 
 import re
 import time
@@ -28,15 +28,15 @@ class Shown:
         return labels(self.features)
 
     def sizes(self):
-        """What the labels say: (kind, its sizes as (value, half of the interval that holds 95 %)), in mm."""
+        """Text of the labels: (kind, its sizes as (value, half of the interval that holds 95 %)), in mm."""
         number = r"(\d+\.\d\d) ± (\d+\.\d\d)"
-        told = []
+        markers = []
         for marker in self.labels():
             read = re.fullmatch(rf"(\w+) Ø?{number}(?: × {number})?", marker.text)
             assert read, marker.text
             given = [float(text) for text in read.groups()[1:] if text]
-            told.append((read[1], list(zip(given[::2], given[1::2], strict=True))))
-        return told
+            markers.append((read[1], list(zip(given[::2], given[1::2], strict=True))))
+        return markers
 
 
 def labels(array):

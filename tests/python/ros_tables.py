@@ -15,7 +15,7 @@ def table(*head):
 
 
 def code(cell):
-    """What stands in code marks."""
+    """Text between code marks."""
     return re.findall(r"`([^`]+)`", cell)
 
 

@@ -1,7 +1,7 @@
-"""A viewer as a process of its own: takes the tiles of the mesh and the diagnostics, writes down what it has when asked.
+"""A viewer as a process of its own: takes the tiles of the mesh and the diagnostics, writes its state on request.
 
 python ros_viewer.py DOMAIN: answers each line on its standard input with one line of JSON: tiles by id, each with its
-number of points and a sum over its bytes; and the last states that the diagnostics told.
+number of points and a sum over its bytes; and the last states in the diagnostics.
 """
 
 import json

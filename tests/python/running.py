@@ -26,10 +26,10 @@ class Running:
             stderr=pipe,
             text=True,
         )
-        self.out, self.told = [], []
+        self.out, self.err = [], []
         self.readers = [
             threading.Thread(target=self.read_lines, args=(stream, lines), daemon=True)
-            for stream, lines in [(self.process.stdout, self.out), (self.process.stderr, self.told)]
+            for stream, lines in [(self.process.stdout, self.out), (self.process.stderr, self.err)]
         ]
         for reader in self.readers:
             reader.start()
@@ -59,7 +59,7 @@ class Running:
         return code
 
     def text(self):
-        return "\n".join([*self.out, *self.told])
+        return "\n".join([*self.out, *self.err])
 
     def __enter__(self):
         return self

@@ -57,16 +57,16 @@ def compared(touchup, *arguments):
 
 @pytest.fixture(scope="module")
 def case(tmp_path_factory, touchup):
-    """A wavy ball against a plain one of fewer facets: what touchup says, and what libigl says of the same points."""
+    """A wavy ball against a plain one of fewer facets: distances by touchup, and by libigl at the same points."""
     folder = tmp_path_factory.mktemp("compare")
     vertices, faces = wavy_ball()
     plain = trimesh.creation.icosphere(subdivisions=3, radius=20.0)
     mesh = write_ply(folder / "mesh.ply", vertices, faces)
     truth = write_ply(folder / "truth.ply", np.array(plain.vertices), np.array(plain.faces))
     coloured = folder / "coloured.ply"
-    told = compared(touchup, mesh, truth, "--coloured", coloured)
+    report = compared(touchup, mesh, truth, "--coloured", coloured)
     by_igl = signed_distances(vertices, np.array(plain.vertices), np.array(plain.faces))
-    return told, read_vertices(coloured), vertices, by_igl
+    return report, read_vertices(coloured), vertices, by_igl
 
 
 def test_each_vertex_has_the_signed_distance_that_libigl_finds(case):
@@ -79,8 +79,8 @@ def test_each_vertex_has_the_signed_distance_that_libigl_finds(case):
     assert (off <= RELATIVE * np.abs(by_igl) + 1e-12).all(), off.max()
 
 
-def test_the_numbers_told_are_those_of_the_distances(case):
-    told, _, _, by_igl = case
+def test_the_reported_numbers_are_those_of_the_distances(case):
+    report, _, _, by_igl = case
     sizes = np.abs(by_igl)
     expected = {
         "mean_mm": sizes.mean(),
@@ -91,7 +91,7 @@ def test_the_numbers_told_are_those_of_the_distances(case):
         "max_mm": sizes.max(),
         "bias_mm": by_igl.mean(),
     }
-    found = told["vertices_to_truth"]
+    found = report["vertices_to_truth"]
     assert found["points"] == len(by_igl)
     for name, value in expected.items():
         assert found[name] == pytest.approx(value, rel=RELATIVE), name
@@ -99,13 +99,13 @@ def test_the_numbers_told_are_those_of_the_distances(case):
 
 def test_samples_say_what_independent_samples_say(case, touchup, tmp_path):
     """Other random points of the same density: the numbers agree as far as 200 000 of them can."""
-    told, _, _, _ = case
+    report, _, _, _ = case
     vertices, faces = wavy_ball()
     plain = trimesh.creation.icosphere(subdivisions=3, radius=20.0)
     mesh = trimesh.Trimesh(vertices, faces, process=False)
     points, _ = trimesh.sample.sample_surface(mesh, 200_000, seed=5)
     theirs = np.abs(signed_distances(np.array(points), np.array(plain.vertices), np.array(plain.faces)))
-    found = told["mesh_to_truth"]
+    found = report["mesh_to_truth"]
     for name, value in [("mean_mm", theirs.mean()), ("rms_mm", np.sqrt((theirs**2).mean())), ("p95_mm", np.quantile(theirs, 0.95))]:
         assert found[name] == pytest.approx(value, rel=5e-3), name
 

@@ -1,6 +1,6 @@
 """Every number of a feature is followed back to the touches that it names, and these to the messages they came from.
 
-The circles are fitted anew by numpy, from those lines of the file of touches alone.
+The circles are fitted again by numpy, from those lines of the file of touches alone.
 """
 
 import csv
@@ -16,7 +16,7 @@ from rosbags.typesys import Stores, get_typestore
 DRAWN = {"hole": [8.0, 6.0], "boss": [10.0], "slot": [6.0]}
 # what a fit without the program's grouping of touches may differ by, mm
 AGREE_MM = 0.003
-# a number rests on at least so many
+# a number is fitted to at least so many
 LEAST_TOUCHES = 12
 
 Demo = namedtuple("Demo", "features touches stamps")

@@ -103,7 +103,7 @@ def baselines(judge):
 
 @pytest.fixture(scope="module")
 def run(touchup, judging, shared, tmp_path_factory):
-    """Refines one case, with or without a scene: what touchup says, and what the judge says about scan and result."""
+    """Refines one case, with or without a scene: the report of touchup, and the judge's verdict on scan and result."""
     out = tmp_path_factory.mktemp("judge")
 
     def run(case, scene=None):
@@ -170,7 +170,7 @@ def table_of(found):
 
 
 def features_of(found):
-    """What was found of each case as a table; mm, degrees."""
+    """The results of each case as a table; mm, degrees."""
     head = ["case", "kind", "required", "found of them", "false", "center max", "size max", "axis mean"]
     rows = [head, ["---"] * len(head)]
     edges = [["case", "touched edges", "recall", "precision"], ["---"] * 4]
@@ -295,7 +295,7 @@ def test_the_quick_judge_says_what_the_judge_says(judge, judged):
     """libigl in place of open3d: every distance, share and count, and the face that a normal is taken of.
 
     Where a place is as near to two faces, as beside an edge, either of them is right, and angles between normals are as far apart
-    as those faces are: so it is looked whether the faces that they name are the nearest, not which one of those it is.
+    as those faces are: so the test checks that the named faces are nearest, not which of several.
     """
     folder, mesh = str(judged["plate"].folder), str(judged["plate"].mesh)
     whole, quick = loaded(judge.parent), loaded(ON_LIBIGL, judge.parent)

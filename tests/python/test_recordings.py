@@ -1,4 +1,4 @@
-"""Other people's readers open the recordings that touchup writes, and agree on what is in them.
+"""Independent readers open the recordings of touchup, and agree on their content.
 
 TOUCHUP_BIN names the touchup program; `touchup demo --out DIR` makes the recording.
 """

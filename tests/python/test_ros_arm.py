@@ -54,12 +54,12 @@ THROUGH, BLIND = ((16.0, 36.0, 12.0), 8.0), ((32.0, 34.0, 12.0), 6.0)
 CONFIGURED = ProbeSettings(0, 0.0, 0.0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, False)
 DRY = ProbeSettings(0, 0.0, 0.0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, True)
 PLANNED = 4
-# a probing takes half a minute; what has not come by then hangs
+# a probing takes half a minute; a longer wait is a fault
 DEADLINE_S = 300
 
 
 def free_address():
-    """A loopback address whose ports of a controller, which ur-rtde has fixed, nobody listens to."""
+    """A loopback address whose ports of a controller, which ur-rtde has fixed, are unused."""
     for number in range(2, 250):
         address = f"127.0.1.{number}"
         with contextlib.ExitStack() as sockets:
@@ -74,7 +74,7 @@ def free_address():
 
 @contextlib.contextmanager
 def controller():
-    """The stand-in for a controller; its address. Its clock waits for the client, who has to be told that this is so."""
+    """The stand-in for a controller; its address. Its clock waits for the client, which must be configured for this."""
     address = free_address()
     command = [os.environ["TOUCHUP_UR_CONTROLLER"], address, "--start-mm", "20,30,60"]
     with Running(command) as process:
@@ -108,8 +108,8 @@ def running(robot, demo_folder, folder, program):
         path.write_text(scene)
         domain = next(domains)
         parameters = [word for parameter in ros for word in ("-p", parameter)]
-        told = {"TOUCHUP_UR_LOCK_STEP": "1"}
-        with Node(program, folder, "--scene", path, domain=domain, ros=parameters, environment=told) as node:
+        environment = {"TOUCHUP_UR_LOCK_STEP": "1"}
+        with Node(program, folder, "--scene", path, domain=domain, ros=parameters, environment=environment) as node:
             yield Cell(node, domain, robot)
             assert node.end() in (0, 4), node.text()
             report = node.report()
@@ -189,27 +189,27 @@ class Cell:
 
     def send_goal(self, name, ids):
         kinds = (SendGoalRequest, SendGoalResponse)
-        nobody = (list(range(16)), [999], CONFIGURED)
-        return self.ask("probe/_action/send_goal", kinds, name, ids, CONFIGURED, harmless=nobody).accepted
+        unknown = (list(range(16)), [999], CONFIGURED)
+        return self.ask("probe/_action/send_goal", kinds, name, ids, CONFIGURED, harmless=unknown).accepted
 
     def result(self, name):
         kinds = (GetResultRequest, GetResultResponse)
         return self.ask("probe/_action/get_result", kinds, name, harmless=([7] * 16,))
 
     def cancel(self, name):
-        kinds, nobody = (CancelGoalRequest, CancelGoalResponse), GoalInfo([7] * 16, Time(0, 0))
-        return self.ask("probe/_action/cancel_goal", kinds, GoalInfo(name, Time(0, 0)), harmless=(nobody,)).return_code
+        kinds, unknown = (CancelGoalRequest, CancelGoalResponse), GoalInfo([7] * 16, Time(0, 0))
+        return self.ask("probe/_action/cancel_goal", kinds, GoalInfo(name, Time(0, 0)), harmless=(unknown,)).return_code
 
 
 def assert_is(result, hole):
     (x, y, _), diameter = hole
     found = result.feature
     off, wide = math.hypot(found.center.x * 1e3 - x, found.center.y * 1e3 - y), found.diameter * 1e3 - diameter
-    told = f"{result.touch_count} touches, {result.duration:.0f} s, {result.max_force:.2f} N; off {off:.4f}, {wide:+.4f} mm"
-    print(told)
+    summary = f"{result.touch_count} touches, {result.duration:.0f} s, {result.max_force:.2f} N; off {off:.4f}, {wide:+.4f} mm"
+    print(summary)
     assert result.code == REACHED, result.message
-    assert found.status == 3 and off < 0.05 and abs(wide) < 0.05, told
-    assert result.touch_count < 40 and result.max_force < 4.5, told
+    assert found.status == 3 and off < 0.05 and abs(wide) < 0.05, summary
+    assert result.touch_count < 40 and result.max_force < 4.5, summary
 
 
 def test_flagged_holes_are_probed_by_service_and_action(cell):
@@ -231,25 +231,25 @@ def test_flagged_holes_are_probed_by_service_and_action(cell):
     assert (ended.ids, ended.codes) == ([blind], [ended.code])
     found = []
 
-    def is_told():
+    def is_reported():
         found.extend(result for result in followed.take(10) if result.id == blind)
         return found
 
-    cell.wait_for(is_told)
+    cell.wait_for(is_reported)
     assert_is(found[0], BLIND)
-    felt = []
+    received = []
 
-    def are_told():
-        felt.extend(touch for touch in touches.take(100) if touch.id == blind)
-        return len(felt) >= found[0].touch_count
+    def are_reported():
+        received.extend(touch for touch in touches.take(100) if touch.id == blind)
+        return len(received) >= found[0].touch_count
 
-    cell.wait_for(are_told)
-    assert [touch.index for touch in felt] == list(range(found[0].touch_count))
-    told = [message for message in feedback.take(1000) if list(message.goal_id) == name]
-    assert len({message.touch for message in told}) > 5 and {message.id for message in told} == {blind}
-    assert all(message.feature_count == 1 and message.touch <= message.touch_count for message in told)
-    # +- 0.02 mm at 95 % is asked for
-    assert told[-1].uncertainty < 0.0103e-3, told[-1]
+    cell.wait_for(are_reported)
+    assert [touch.index for touch in received] == list(range(found[0].touch_count))
+    messages = [message for message in feedback.take(1000) if list(message.goal_id) == name]
+    assert len({message.touch for message in messages}) > 5 and {message.id for message in messages} == {blind}
+    assert all(message.feature_count == 1 and message.touch <= message.touch_count for message in messages)
+    # the target is +- 0.02 mm at 95 %
+    assert messages[-1].uncertainty < 0.0103e-3, messages[-1]
     if cell.robot == "sim":
         everything = cell.trigger("probe_all")
         assert not everything.success and "nothing is flagged" in everything.message
@@ -271,15 +271,15 @@ def test_a_cancelled_goal_stops_and_the_next_is_taken_up(cell):
     through, blind = cell.flag(HOLE, (x + 0.5, y, z)), cell.flag(HOLE, (32.0, 33.0, 12.0))
     feedback = cell.peer.reader("/touchup/probe/_action/feedback", FeedbackMessage, RELIABLE)
     name = [40] * 16
-    assert cell.cancel([41] * 16) == 2, "nobody knows this goal"
+    assert cell.cancel([41] * 16) == 2, "this goal is unknown"
     # until both sides know each other
     assert cell.probe(999).code == NO_SUCH_FEATURE
     assert cell.send_goal(name, [through, blind])
-    told = []
+    messages = []
 
     def has_begun():
-        told.extend(feedback.take(100))
-        return any(message.touch >= 3 for message in told)
+        messages.extend(feedback.take(100))
+        return any(message.touch >= 3 for message in messages)
 
     cell.wait_for(has_begun)
     assert cell.probe(blind).code == BUSY

@@ -241,19 +241,19 @@ def test_what_was_probed_is_on_topics_touch_by_touch(domain):
         assert (result.id, result.touch_count, len(result.feature.points)) == (9, 20, 2)
         # NaN is in it
         assert str(next_of(echo, results)) == str(result)
-        felt = [next_of(echo, touches) for _ in range(result.touch_count)]
-        assert [(touch.id, touch.index) for touch in felt] == [(9, index) for index in range(20)]
-        assert all(len(touch.curve_time) == len(touch.curve_lateral_force) == 2000 for touch in felt)
+        received = [next_of(echo, touches) for _ in range(result.touch_count)]
+        assert [(touch.id, touch.index) for touch in received] == [(9, index) for index in range(20)]
+        assert all(len(touch.curve_time) == len(touch.curve_lateral_force) == 2000 for touch in received)
 
 
-def test_the_wrong_mapping_is_told(domain):
+def test_the_wrong_mapping_is_reported(domain):
     with Echo(domain) as echo:
         client = Peer(domain).client("/touchup/undo", UndoRequest, UndoResponse)
         echo.wait_for(lambda: echo.has("WARN", "/touchup/undo", "-p service_mapping:=cyclone"))
         assert client
 
 
-def test_a_listener_that_wants_more_is_told(domain):
+def test_an_incompatible_subscriber_is_reported(domain):
     with Echo(domain) as echo:
         reader = Peer(domain).reader("/mismatch", HapticMismatch, RELIABLE)
         echo.wait_for(lambda: echo.has("WARN", "/mismatch", "it wants reliable, offered is best effort"))
@@ -261,7 +261,7 @@ def test_a_listener_that_wants_more_is_told(domain):
         assert reader
 
 
-def test_another_type_on_our_topic_is_told(domain):
+def test_another_type_on_our_topic_is_reported(domain):
     with Echo(domain) as echo:
         writer = Peer(domain).writer("/stylus/wrench", PoseStamped, BEST_EFFORT)
         echo.wait_for(lambda: echo.has("WARN", "/stylus/wrench", "PoseStamped_", "here it is", "WrenchStamped_"))
@@ -277,7 +277,7 @@ def test_it_is_counted_when_a_listener_comes_and_goes(domain):
         echo.wait_for(lambda: echo.has("Matched", '"/mesh"', "count: 0"))
 
 
-def test_a_message_that_cannot_be_read_is_told_and_the_next_is_taken(domain):
+def test_an_unreadable_message_is_reported_and_the_next_is_taken(domain):
     with Echo(domain) as echo:
         peer = Peer(domain)
         short = meet(echo, "/stylus/wrench", peer.writer("/stylus/wrench", HeaderAlone, BEST_EFFORT))
@@ -297,7 +297,7 @@ def test_an_action_is_taken_up_goes_on_and_ends(domain):
         send_goal = Client(echo, peer, f"{action}/send_goal", SendGoalRequest, SendGoalResponse)
         get_result = Client(echo, peer, f"{action}/get_result", GetResultRequest, GetResultResponse)
         cancel_goal = Client(echo, peer, f"{action}/cancel_goal", CancelGoalRequest, CancelGoalResponse)
-        # nobody knows this goal
+        # this goal is unknown
         unknown, done = list(range(16)), list(range(16, 32))
         assert get_result(unknown).status == 0
         assert cancel_goal(GoalInfo(unknown, Time(0, 0))).return_code == 2

@@ -72,14 +72,14 @@ def parameters_are_listed_dumped_and_described(fast_dds, echo, domain, wrapper=(
         assert described["scan"].read_only and not described["stale_ms"].read_only
         echo.wait_for(lambda: echo.has(TOO_LARGE, '"~/describe_parameters"', "bytes", "service_mapping:=cyclone", "r2r"))
 
-        # more than fits: well formed, empty, and told
+        # more than fits: well formed, empty, and reported
         assert not echo.has(TOO_LARGE, '"~/get_parameters"')
         assert len(services.get_parameters(names=2 * names).values) == 0
         echo.wait_for(lambda: echo.has(TOO_LARGE, '"~/get_parameters"', "fewer names"))
         # and the next is answered as ever
         assert len(services.get_parameters(names=names).values) == len(names)
 
-        # what is set is told even where the reasons do not fit
+        # the results are reported even where the reasons do not fit
         store = fast_dds.store
         lists = [numpy.array([], dtype=kind) for kind in ("uint8", "bool", "int64", "float64")]
         value = store.types["rcl_interfaces/msg/ParameterValue"](4, False, 0, 0.0, "a" * 500, *lists, [])
@@ -112,8 +112,8 @@ def what_was_probed_is_on_topics(fast_dds, echo, domain, wrapper=()):
         print("probe_feature:", probe.bytes, "bytes")
         assert (result.id, result.message, result.touch_count, len(result.feature.points)) == (9, "reached", 20, 2)
         assert results.next().message == "reached"
-        felt = [touches.next() for _ in range(20)]
-        assert [(touch.id, touch.index, len(touch.curve_force)) for touch in felt] == [(9, index, 2000) for index in range(20)]
+        received = [touches.next() for _ in range(20)]
+        assert [(touch.id, touch.index, len(touch.curve_force)) for touch in received] == [(9, index, 2000) for index in range(20)]
 
 
 def the_result_of_a_goal_comes(fast_dds, echo, domain, wrapper=()):
@@ -132,7 +132,7 @@ def the_result_of_a_goal_comes(fast_dds, echo, domain, wrapper=()):
         assert list(answer.result.codes) == [4] * 128
 
 
-def a_long_text_is_cut_and_told(fast_dds, echo, domain, wrapper=()):
+def a_long_text_is_cut_and_reported(fast_dds, echo, domain, wrapper=()):
     with fast_dds.client(echo, domain, "/touchup/undo", "touchup_msgs/srv/Undo", wrapper) as undo:
         for strokes in range(1, 101):
             answer = undo(strokes=strokes)
@@ -171,9 +171,9 @@ def test_the_result_of_a_goal_comes(fast_dds, domain):
         the_result_of_a_goal_comes(fast_dds, echo, domain)
 
 
-def test_a_long_text_is_cut_and_told(fast_dds, domain):
+def test_a_long_text_is_cut_and_reported(fast_dds, domain):
     with Echo(domain) as echo:
-        a_long_text_is_cut_and_told(fast_dds, echo, domain)
+        a_long_text_is_cut_and_reported(fast_dds, echo, domain)
 
 
 def test_every_wrench_comes_back_in_its_turn(fast_dds, domain):
@@ -187,7 +187,7 @@ def test_every_wrench_comes_back_in_its_turn(fast_dds, domain):
     assert echo.has("dropped [0, 0] lost [0, 0] unsent [0, 0]")
 
 
-def test_the_wrong_mapping_is_told(fast_dds, domain):
+def test_the_wrong_mapping_is_reported(fast_dds, domain):
     with Echo(domain, "--ros-args", "-p", "service_mapping:=cyclone") as echo:
         with fast_dds.start("call", domain, "/touchup/undo", "touchup_msgs::srv::dds_::Undo"):
             echo.wait_for(lambda: echo.has("WARN", "/touchup/undo", "-p service_mapping:=enhanced"))

@@ -8,7 +8,7 @@ from ros_domains import domains
 from ros_echo import Echo
 from ros_network import Hub
 from test_ros_fastdds import (
-    a_long_text_is_cut_and_told,
+    a_long_text_is_cut_and_reported,
     fast_dds,  # noqa: F401
     features_are_on_the_topic,
     parameters_are_listed_dumped_and_described,
@@ -30,7 +30,7 @@ def test_the_largest_answers_reach_another_computer(fast_dds, packet):  # noqa: 
             features_are_on_the_topic,
             what_was_probed_is_on_topics,
             the_result_of_a_goal_comes,
-            a_long_text_is_cut_and_told,
+            a_long_text_is_cut_and_reported,
         ]:
             with Echo(domain, wrapper=hub.wrapper("node")) as echo:
                 proof(fast_dds, echo, domain, caller)

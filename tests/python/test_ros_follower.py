@@ -1,5 +1,5 @@
-"""A program that follows the mesh by MeshPatch and ResyncMesh alone, as docs/ros.md says: it ends with the node's mesh, whatever
-was lost on the way. The messages are those of msg/, read by rosbags; the node is a model of one, with random changes.
+"""A program that follows the mesh by MeshPatch and ResyncMesh alone, as in docs/ros.md: it ends with the node's mesh, whatever
+was lost in transport. The messages are those of msg/, read by rosbags; the node is a model of one, with random changes.
 """
 
 import random
@@ -41,7 +41,7 @@ class Follower:
         """A part of the whole state: of any that begins while it is waited for."""
         if patch.part == 0:
             self.vertices, self.faces = {}, {}
-            # what came before is in it
+            # earlier changes are in it
             self.begun, self.next_part, self.kept = (patch.session, patch.version), 0, []
         if (patch.session, patch.version, patch.part) != (*(self.begun or ("", 0)), self.next_part):
             return
@@ -81,7 +81,7 @@ class Follower:
 
 
 class Node:
-    """Changes a mesh at random and tells it; `send` gets each message as bytes."""
+    """Changes a mesh at random and publishes it; `send` gets each message as bytes."""
 
     def __init__(self, seed, send):
         self.random, self.send = random.Random(seed), send
@@ -115,7 +115,7 @@ class Node:
             self.publish(parts)
 
     def resync(self):
-        """The service: whoever asks while one is being sent gets the next, which has not begun."""
+        """The service: a request while one is being sent gets the next, which has not begun."""
         self.is_asked = True
 
     def parts(self, base, removed, vertices, faces, gone):
@@ -151,7 +151,7 @@ class Node:
         return store.serialize_cdr(patch, "touchup_msgs/msg/MeshPatch")
 
     def publish(self, parts):
-        """Sends a change, then some of the whole state where it was asked for."""
+        """Sends a change, then a part of the whole state where requested."""
         for part in parts:
             self.send(part)
         if self.is_asked and not self.due:
@@ -163,7 +163,7 @@ class Node:
 @pytest.mark.parametrize("seed", range(20))
 def test_a_follower_ends_with_the_mesh_of_the_node(seed):
     chance, lossy, line = random.Random(1000 + seed), True, []
-    # a session of its own from the start: whoever joins late misses the beginning
+    # a session of its own from the start: a late subscriber misses the beginning
     node = Node(seed, lambda message: line.append(message) if not lossy or chance.random() > 0.05 else None)
     for _ in range(chance.randint(0, 5)):
         node.change()
@@ -192,5 +192,5 @@ def test_a_follower_ends_with_the_mesh_of_the_node(seed):
             break
     assert (follower.session, follower.version) == ("b", node.version)
     assert follower.vertices == node.vertices and follower.faces == node.faces
-    # what was lost was noticed, and what was not lost was not asked for again and again
+    # losses were noticed, and received messages were not requested again
     assert 1 < len(asked) < 60

@@ -76,7 +76,7 @@ def xacro(name, **arguments):
 
 
 def poses(root):
-    """Pose of each frame in the root of its tree, 4 x 4, by a way of our own: the product of three turns."""
+    """Pose of each frame in the root of its tree, 4 x 4, computed independently: the product of three turns."""
     joints = {joint.find("child").get("link"): joint for joint in root.iter("joint")}
 
     def turn(axis, angle):
@@ -152,7 +152,7 @@ def test_without_a_viewer_everything_else_starts(installation):
         nodes, lines = visited("cell.launch.py", scan="part.ply")
         assert set(nodes) == {"touchup", "cell_state_publisher", "stylus_state_publisher"}
         assert len(lines) == 1 and "rviz2 is not installed" in lines[0]
-        # who asks for it gets the error of ROS
+        # a request for it gets the error of ROS
         assert "rviz" in launched("cell.launch.py", scan="part.ply", rviz="true")
     finally:
         viewer.mkdir()
@@ -190,7 +190,7 @@ def test_a_replay_starts_the_same_and_the_player():
     nodes = launched("replay.launch.py", recording="touch.mcap", scan="scan.ply", source="stylus")
     assert set(nodes) == {"touchup", "cell_state_publisher", "stylus_state_publisher", "rviz", "replay"}
     assert nodes["replay"].arguments == ["replay", str(Path("touch.mcap").absolute()), "--source", "stylus"]
-    # the result is looked at after the recording has ended
+    # the result is read after the recording has ended
     assert nodes["replay"].on_exit is None
     fast = launched("replay.launch.py", recording="touch.mcap", scan="scan.ply", speed="10")
     assert fast["replay"].arguments[4:] == ["--speed", "10"]
@@ -198,7 +198,7 @@ def test_a_replay_starts_the_same_and_the_player():
         launched("replay.launch.py", scan="scan.ply")
 
 
-def test_a_simulated_arm_has_its_part_and_may_move_only_when_told():
+def test_a_simulated_arm_has_its_part_and_moves_only_when_allowed():
     nodes = launched("cell.launch.py", robot="sim", source="probe", sim_part="truth.ply", allow_motion="true")
     parameters = nodes["touchup"].parameters
     assert (parameters["sim_part"], parameters["allow_motion"]) == (str(Path("truth.ply").absolute()), True)

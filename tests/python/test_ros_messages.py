@@ -207,7 +207,7 @@ def test_a_full_mesh_costs_what_its_numbers_cost(types):
     assert numpy.array_equal(back.corners, patch.corners)
 
 
-def test_codes_of_a_probing_are_told_apart(types):
+def test_codes_of_a_probing_are_distinct(types):
     codes = re.findall(r"^uint8 ([A-Z_]+)=(\d+)$", sections("msg/ProbeResult.msg")[0], re.MULTILINE)
     values = [int(value) for _, value in codes]
     assert 0 not in values and len(set(values)) == len(values) >= 25

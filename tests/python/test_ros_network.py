@@ -31,7 +31,7 @@ class Viewer(Process):
         return json.loads(self.out[-1])
 
 
-def test_the_node_gets_over_losses_and_a_breakdown_and_tells_them(demo_folder, tmp_path, touchup, touchup_bin):
+def test_the_node_survives_losses_and_a_breakdown_and_reports_them(demo_folder, tmp_path, touchup, touchup_bin):
     domain = next(domains)
     scene = scene_for(demo_folder, tmp_path)
     with (
@@ -45,7 +45,7 @@ def test_the_node_gets_over_losses_and_a_breakdown_and_tells_them(demo_folder, t
         ) as player:
             node.wait_for(lambda: int(viewer.seen()["values"].get("accepted", 0)) > 5000, 60)
             hub.is_down = True
-            # how long it is down is what is tried
+            # varies how long it is down
             time.sleep(DOWN_S)
             hub.is_down = False
             player.wait_for(lambda: player.process.poll() is not None or player.out, 120)
@@ -56,7 +56,7 @@ def test_the_node_gets_over_losses_and_a_breakdown_and_tells_them(demo_folder, t
         held = [number for number, state in enumerate(states) if "holds" in state]
         assert any("runs" in state for state in states[held[0] :]), states
 
-        # who was there all the time comes to see what one sees who looks anew, all of the mesh
+        # a subscriber from the start ends with the same whole mesh as a new one
         with Viewer(domain, hub.wrapper("node")) as late:
 
             def both_have_all():
@@ -69,15 +69,15 @@ def test_the_node_gets_over_losses_and_a_breakdown_and_tells_them(demo_folder, t
         report = node.report()
     assert hub.dropped > 0
 
-    # what was lost is told
+    # lost messages are reported
     sent = played["wrenches"]
     lost = report["lost"][0]
     assert lost > 0
     taken = report["accepted"] + sum(n for reason, n in report["refused"].items() if not reason.startswith("pose_"))
-    # what a busy computer dropped is told for poses and wrenches together
+    # messages dropped by a busy computer are counted for poses and wrenches together
     assert 0.99 * sent - report["dropped"][0] <= taken + lost <= sent
-    assert any(f"{lost} wrenches lost" in line for line in node.told)
-    # and what was taken gives the result, as ever
+    assert any(f"{lost} wrenches lost" in line for line in node.err)
+    # and the received samples give the result, as ever
     assert set(stamps(node.session / "recording", "/stylus/wrench")) <= set(stamps(recording, "/stylus/wrench"))
     done = touchup("refine", "--resume", node.session, "--out", tmp_path / "resumed.ply")
     assert done.returncode in (0, 4), done.stderr

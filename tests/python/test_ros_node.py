@@ -149,7 +149,7 @@ def test_who_comes_late_sees_what_is_saved(demo_folder, tmp_path, touchup_bin, d
         assert node.end() in (0, 4), node.text()
 
 
-def test_a_full_disk_is_told_and_the_recording_goes_on_when_there_is_room(demo_folder, tmp_path, touchup, touchup_bin, domain):
+def test_a_full_disk_is_reported_and_the_recording_resumes_when_there_is_room(demo_folder, tmp_path, touchup, touchup_bin, domain):
     disk = tmp_path / "disk"
     disk.mkdir()
     if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=300k", "none", disk], capture_output=True).returncode != 0:
@@ -164,7 +164,7 @@ def test_a_full_disk_is_told_and_the_recording_goes_on_when_there_is_room(demo_f
                 assert player.wait() == 0, player.text()
             replayed = json.loads(player.out[-1])
             code = node.end()
-        assert code == 1 and "are not in the session's recording" in node.told[-1], node.text()
+        assert code == 1 and "are not in the session's recording" in node.err[-1], node.text()
         report = json.loads((node.session / "report.json").read_text())
         taken = stamps(node.session / "recording", "/stylus/wrench") + stamps(node.session / "recording", "/stylus/pose")
         played = [stamp for topic in ["wrench", "pose"] for stamp in stamps(recording, f"/stylus/{topic}")]
@@ -191,7 +191,7 @@ def test_a_full_disk_is_told_and_the_recording_goes_on_when_there_is_room(demo_f
         (["step", "--ros-args", "-p", "a:=b"], 2, ["--ros-args", "node"]),
     ],
 )
-def test_what_cannot_be_is_told(arguments, code, words, touchup, tmp_path):
+def test_bad_input_is_reported(arguments, code, words, touchup, tmp_path):
     done = touchup(*arguments, cwd=tmp_path, env={**os.environ, "ROS_DOMAIN_ID": str(next(domains))})
     assert done.returncode == code, done.stderr
     assert all(word in done.stderr for word in words), done.stderr

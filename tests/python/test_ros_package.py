@@ -82,7 +82,7 @@ def test_types_of_our_own_exist():
 
 @pytest.fixture(scope="module")
 def colcon(tmp_path_factory):
-    """Runs colcon as docs/ros.md says: in a workspace, with this repository below `src`, and cargo-ament-build installed."""
+    """Runs colcon as in docs/ros.md: in a workspace, with this repository below `src`, and cargo-ament-build installed."""
     programs = Path(sys.executable).parent
     environment = {**os.environ, "PATH": f"{programs}:{os.environ['PATH']}"}
     workspace = tmp_path_factory.mktemp("workspace")
@@ -115,7 +115,7 @@ def test_what_the_launch_files_need_is_installed(tmp_path):
         shutil.copy(ROOT / name, source)
     for name in ("launch", "config", "urdf"):
         shutil.copytree(ROOT / name, source / name, ignore=shutil.ignore_patterns("__pycache__"))
-    # benches are no part of what is installed
+    # benches are not installed
     manifest = re.sub(r"\n\[\[bench\]\][^\[]*", "\n", (source / "Cargo.toml").read_text())
     (source / "Cargo.toml").write_text(manifest)
     cargo = stand_in / "cargo"

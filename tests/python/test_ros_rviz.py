@@ -1,7 +1,7 @@
 """Debian's RViz shows the mesh in its colours, and the features with their labels, as a node has published them.
 
 The picture is compared with one that is calculated otherwise: rays through the camera of the view, onto the mesh that the node
-has saved, and onto the places of the recording where the part was felt.
+has saved, and onto the places of the recording where the part was touched.
 """
 
 import numpy
@@ -17,15 +17,15 @@ from ros_shown import show
 
 SIZE = (1280, 800)
 RADIUS_MM = 1.5
-# the part gives way: less than that is noise of the sensor
-FELT_N = 0.5
-# the plate of the demo, mm: what it was milled to
+# the part yields: less than that is noise of the sensor
+CONTACT_N = 0.5
+# the plate of the demo, mm: its nominal dimensions
 DRAWN = [("boss", [10.0]), ("hole", [6.0]), ("hole", [8.0]), ("slot", [6.0, 20.0])]
 
 
 @pytest.fixture(scope="module")
 def shown(demo_folder, touchup_bin, tmp_path_factory):
-    """What the node publishes of the plate of the demo."""
+    """Topics of the node for the plate of the demo."""
     if missing := ros_rviz.missing_packages():
         pytest.skip(f"RViz needs system packages: apt-get install {' '.join(missing)}")
     return show(touchup_bin, demo_folder, tmp_path_factory.mktemp("shown"), next(domains), len(DRAWN))
@@ -42,7 +42,7 @@ def pictures(shown, tmp_path_factory):
         mesh = desk.still()
         desk.play([("/feature_markers", "visualization_msgs/msg/MarkerArray", shown.features)])
         features = desk.still()
-    # to be looked at where a test fails
+    # for inspection after a failure
     for name, picture in [("mesh", mesh), ("features", features)]:
         open3d.io.write_image(str(desk_folder / f"{name}.png"), open3d.geometry.Image(picture))
     return view, mesh, features
@@ -62,20 +62,20 @@ def expected(shown, pictures):
 
 
 def is_green(picture):
-    """The colour of what was touched, in whatever light."""
+    """The colour of the touched part, in any light."""
     red, green, blue = numpy.moveaxis(picture.astype(int), -1, 0)
     return (green > 3 * red // 2) & (green > 3 * blue // 2)
 
 
 def is_seen(picture):
-    """What is not background, which is in the corners."""
+    """The foreground; the background is in the corners."""
     return (numpy.abs(picture.astype(int) - picture[0, 0]) > 2).any(-1)
 
 
 def test_labels_say_what_was_milled(shown):
-    told = sorted(shown.sizes(), key=lambda label: (label[0], label[1][0]))
-    assert [(kind, len(given)) for kind, given in told] == [(kind, len(drawn)) for kind, drawn in DRAWN]
-    for (kind, given), (_, drawn) in zip(told, DRAWN, strict=True):
+    sizes = sorted(shown.sizes(), key=lambda label: (label[0], label[1][0]))
+    assert [(kind, len(given)) for kind, given in sizes] == [(kind, len(drawn)) for kind, drawn in DRAWN]
+    for (kind, given), (_, drawn) in zip(sizes, DRAWN, strict=True):
         for (value, within), true in zip(given, drawn, strict=True):
             assert abs(value - true) < 0.05 and 0 < within < 0.1, (kind, given)
 
@@ -100,20 +100,20 @@ def test_what_the_saved_mesh_calls_touched_is_green(pictures, expected):
     assert (green != is_touched)[is_pure].mean() < 0.02
 
 
-def test_what_is_green_was_felt_and_what_was_felt_is_green(pictures, expected, demo_folder):
+def test_touched_is_green_and_green_was_touched(pictures, expected, demo_folder):
     _, faces, places = expected
     far = numpy.full(faces.shape, numpy.inf)
-    felt = open3d.t.geometry.PointCloud(numpy.float32(felt_at(demo_folder / "touch.mcap")))
-    index = open3d.core.nns.NearestNeighborSearch(felt.point.positions)
+    contacts = open3d.t.geometry.PointCloud(numpy.float32(contact_points(demo_folder / "touch.mcap")))
+    index = open3d.core.nns.NearestNeighborSearch(contacts.point.positions)
     index.knn_index()
     _, squared = index.knn_search(open3d.core.Tensor(numpy.float32(places[faces >= 0])), 1)
     far[faces >= 0] = numpy.sqrt(squared.numpy().ravel()) * 1e3 - RADIUS_MM
     green = is_green(pictures[1]) & (faces >= 0)
-    assert (far[green] < 1.0).mean() > 0.99, "nobody was there"
-    assert green[far < 0.1].mean() > 0.95, "it was felt, and is not shown as touched"
+    assert (far[green] < 1.0).mean() > 0.99, "untouched, and shown as touched"
+    assert green[far < 0.1].mean() > 0.95, "touched, and not shown as touched"
 
 
-def felt_at(recording):
+def contact_points(recording):
     """Centres of the ball while the part pushed, m; the plate's recording has the pose in the frame of the scan."""
     poses, pushed = [], []
     with AnyReader([recording], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
@@ -126,7 +126,7 @@ def felt_at(recording):
                 force = read.wrench.force
                 pushed.append((stamp_s, numpy.linalg.norm([force.x, force.y, force.z])))
     poses, pushed = numpy.array(poses), numpy.array(pushed)
-    return poses[numpy.interp(poses[:, 0], *pushed.T) > FELT_N, 1:]
+    return poses[numpy.interp(poses[:, 0], *pushed.T) > CONTACT_N, 1:]
 
 
 def test_each_label_is_written_where_its_marker_is(shown, pictures):

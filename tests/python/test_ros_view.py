@@ -1,4 +1,4 @@
-"""config/touchup.rviz: what RViz shows is what the node publishes, with a quality of service that matches."""
+"""config/touchup.rviz: RViz shows the topics of the node, with a quality of service that matches."""
 
 import re
 
@@ -41,7 +41,7 @@ def test_displays_show_what_is_published():
         shown.add(name)
         row = mine[name]
         assert code(row["type"]) == [SHOWS[display["Class"]]], name
-        # asking for what is not offered gives silence
+        # an incompatible request gives silence
         assert topic["Durability Policy"].lower() == row["durability"], name
         assert topic["Reliability Policy"].lower() == row["reliability"], name
         assert topic["Depth"] == int(row["depth"]), name
@@ -52,7 +52,7 @@ def test_a_mesh_of_a_million_faces_fits_into_the_queue():
     depth = int(published()["mesh"]["depth"])
     points = int(re.search(r"at most (\d+) points", published()["mesh"]["what"])[1])
     assert depth * points // 3 >= 1_000_000
-    # Fast DDS keeps 5000 samples at most, unless it is told otherwise
+    # Fast DDS keeps 5000 samples at most, unless it is configured otherwise
     assert depth < 5000
 
 

@@ -6,7 +6,7 @@ integral of 1/rate, and the wanted s is where that time is dt: it is found by bi
 integral is elementary; here it is written with plain exponentials and logarithms, and digits pay for what cancels
 (one test checks it by numerical quadrature). The impulse is J = F.n dt - s/alpha, the turned angle comes from angles.
 
-The program is asked through the environment variable TOUCHUP_BIN, or target/release/touchup.
+The program comes from the environment variable TOUCHUP_BIN, or target/release/touchup.
 """
 
 import json
@@ -88,8 +88,8 @@ def change_of_u(u0, c, t):
         rest = abs(mp.log((1 - c) / c) - u0) if 0 < c < 1 and t > 0 else mp.inf
         high = min(rest, abs(t) * max(abs(rate), abs(c), abs(1 - c)))
 
-        def late(way):
-            return way >= rest or abs(time_from_to(u0, u0 + sign * way, c)) > abs(t)
+        def late(travel):
+            return travel >= rest or abs(time_from_to(u0, u0 + sign * travel, c)) > abs(t)
 
         low = high
         while late(low):
@@ -145,7 +145,7 @@ def expected(q):
 
     The bound is 1e-10 of the displacement and of the angle, or what the rounding of the inputs does where that is
     more: h = (p - b).n comes from numbers of the size of |p - b| (four roundings) and meets delta in u (two), F.n comes
-    from |F| (six), a.n from 1 (four). Each is moved by that much and the reference is asked again. Turning adds three
+    from |F| (six), a.n from 1 (four). Each is moved by that much and the reference is evaluated again. Turning adds three
     roundings of a unit vector, seen through how the end depends on the start (that grows near n = -F/|F|). The result
     is rounded to the spacing of the coordinates of b, and s passes through four more products.
     """

@@ -60,7 +60,10 @@ struct MethodChoice<'a> {
 }
 
 /// The method on each part where there is one.
-fn by_part<'a>(scans: &'a WholeScan, result: impl Fn(&'a ScanResult) -> Option<&'a MethodResult>) -> Vec<MethodChoice<'a>> {
+fn by_part<'a>(
+    scans: &'a WholeScan,
+    result: impl Fn(&'a ScanResult) -> Option<&'a MethodResult>,
+) -> Vec<MethodChoice<'a>> {
     let choice = |case: &'a CaseResult| {
         let scan = case.main()?;
         Some(MethodChoice { part: &case.name, result: result(scan)?, before_mm: scan.before.mean_mm() })

@@ -11,7 +11,7 @@ import numpy as np
 
 
 class Tensor(np.ndarray):
-    """An array that hands itself out."""
+    """An array that returns itself."""
 
     def __new__(cls, values):
         return np.asarray(values).view(cls)
