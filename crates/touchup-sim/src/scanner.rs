@@ -17,6 +17,7 @@ use super::field::Field;
 use super::path::looking_along;
 use super::surface::Surface;
 use touchup_core::mesh::TriMesh;
+use touchup_core::numeric::weighted_quantile;
 
 /// How bad the scanner is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -314,24 +315,10 @@ pub fn measure_quality(
     let mut sizes: Vec<_> = points.iter().map(|(d, w)| (d.abs(), *w)).collect();
     Some(ScanQuality {
         faces: mesh.face_count(),
-        edge_median: quantile(&mut edges, 0.5)?,
+        edge_median: weighted_quantile(&mut edges, 0.5)?,
         mean,
         rms,
-        p95: quantile(&mut sizes, 0.95)?,
-        bias: quantile(&mut points, 0.5)?,
+        p95: weighted_quantile(&mut sizes, 0.95)?,
+        bias: weighted_quantile(&mut points, 0.5)?,
     })
-}
-
-/// The value below which the given share of the weight lies.
-fn quantile(values: &mut [(f64, f64)], share: f64) -> Option<f64> {
-    values.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let total: f64 = values.iter().map(|v| v.1).sum();
-    let mut below = 0.0;
-    values
-        .iter()
-        .find(|v| {
-            below += v.1;
-            below >= share * total
-        })
-        .map(|v| v.0)
 }

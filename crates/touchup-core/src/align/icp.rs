@@ -6,9 +6,10 @@
 //! residuals: what alone holds a direction, such as the walls of a few holes, would else count as outliers before it has
 //! come to rest. A direction that nothing holds is left as it was and told.
 
-use nalgebra::{Isometry3, Matrix6, Point3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
 
 use crate::mesh::{FaceTree, TriMesh, Workers, coherent_order, map_by};
+use crate::numeric::{NormalEquations, SIGMA_OF_MEDIAN, TUKEY_WIDTH, biweight, centroid_and_spread, median, moved_by_twist, order_statistic, point_to_plane_row};
 
 /// Settings of [`icp`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -114,10 +115,6 @@ const LEAST_POINTS: usize = 12;
 const LEAST_SHARE: f64 = 0.004;
 /// Points of the first rounds, and of those before all take part; each is every n-th along the curve.
 const LEVELS: [usize; 2] = [1_500, 12_000];
-/// Width of Tukey's weights in standard deviations: 95 % as good as plain least squares where there are no outliers.
-const WIDTH: f64 = 4.685;
-/// Standard deviation of normal errors over their median.
-const SIGMA_OF_MEDIAN: f64 = 1.4826;
 /// The width is at most halved in a round.
 const SHRINK: f64 = 0.5;
 /// The first width, over the distance within which nine of ten points are.
@@ -243,11 +240,8 @@ impl<'a> Search<'a> {
         if squares.len() < LEAST_POINTS {
             return Err(IcpError::TooFew { found: squares.len(), needed: LEAST_POINTS, reach: params.reach });
         }
-        let nine_of_ten = squares.len() * 9 / 10;
-        let far = squares.select_nth_unstable_by(nine_of_ten, f64::total_cmp).1.sqrt();
-        let count = points.len() as f64;
-        let middle = Point3::from(points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / count);
-        let lever = (points.iter().map(|p| (p - middle).norm_squared()).sum::<f64>() / count).sqrt();
+        let far = order_statistic(&mut squares, 0.9).unwrap_or(0.0).sqrt();
+        let (middle, lever) = centroid_and_spread(points.iter());
         let [lo, hi] = target.bounds();
         let rounding = ROUNDING * ((hi - lo).norm() + lo.coords.amax().max(hi.coords.amax()));
         Ok(Self {
@@ -258,7 +252,7 @@ impl<'a> Search<'a> {
             pose: *start,
             middle,
             lever: lever.max(f64::MIN_POSITIVE),
-            width: (FIRST_WIDTH * far).min(params.reach).max(WIDTH * rounding),
+            width: (FIRST_WIDTH * far).min(params.reach).max(TUKEY_WIDTH * rounding),
             scatter: far,
             rounding,
             rounds: 0,
@@ -289,9 +283,7 @@ impl<'a> Search<'a> {
         if self.rounds > self.most_rounds || !round.step.is_finite() {
             return Err(self.unsettled(round.step));
         }
-        let centre = (self.pose * self.middle).coords;
-        let turn = UnitQuaternion::from_scaled_axis(turn);
-        self.pose = Isometry3::from_parts((shift + centre - turn * centre).into(), turn) * self.pose;
+        self.pose = moved_by_twist(&self.pose, &(self.pose * self.middle), &shift, &turn);
         self.narrow(&mut round, &step);
         Ok(round)
     }
@@ -303,8 +295,7 @@ impl<'a> Search<'a> {
             let x = self.pose * self.points[at * stride];
             let hit = self.tree.closest(self.target, &x, self.width)?;
             let normal = self.target.normal(hit.face);
-            let turn = (x - centre).cross(&normal) / self.lever;
-            let row = Vector6::new(normal.x, normal.y, normal.z, turn.x, turn.y, turn.z);
+            let row = point_to_plane_row(&(x - centre), &normal, self.lever);
             Some(Partner { row, residual: normal.dot(&(x - hit.point)) })
         };
         let found = map_by(self.workers, self.points.len().div_ceil(stride), partner);
@@ -314,14 +305,12 @@ impl<'a> Search<'a> {
 
     /// The normal equations with the weights that the residuals have after `step`.
     fn weigh(&self, step: &Vector6<f64>) -> Result<Round, IcpError> {
-        let (mut information, mut right, mut weights) = (Matrix6::zeros(), Vector6::zeros(), 0.0);
+        let (mut equations, mut weights) = (NormalEquations::default(), 0.0);
         let (mut inliers, mut square) = (0, 0.0);
         for Partner { row, residual } in &self.partners {
             let left = residual + row.dot(step);
-            let weight = (1.0 - (left / self.width).powi(2)).max(0.0).powi(2);
-            let weighted = row * weight;
-            information += weighted * row.transpose();
-            right -= weighted * *residual;
+            let weight = biweight((left / self.width).powi(2));
+            equations.add(row, -residual, weight);
             weights += weight;
             if weight > 0.0 {
                 inliers += 1;
@@ -331,7 +320,7 @@ impl<'a> Search<'a> {
         if inliers < LEAST_POINTS {
             return Err(IcpError::TooFew { found: inliers, needed: LEAST_POINTS, reach: self.width });
         }
-        let (information, right) = (information / weights, right / weights);
+        let (information, right) = (equations.information / weights, equations.right / weights);
         Ok(Round { information, right, inliers, square, step: 0.0, is_narrow: false })
     }
 
@@ -340,9 +329,8 @@ impl<'a> Search<'a> {
     fn narrow(&mut self, round: &mut Round, step: &Vector6<f64>) {
         self.sizes.clear();
         self.sizes.extend(self.partners.iter().map(|Partner { row, residual }| (residual + row.dot(step)).abs()));
-        let middle = self.sizes.len() / 2;
-        self.scatter = SIGMA_OF_MEDIAN * *self.sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
-        let wanted = WIDTH * self.scatter.max(self.rounding);
+        self.scatter = SIGMA_OF_MEDIAN * median(&mut self.sizes).unwrap_or(0.0);
+        let wanted = TUKEY_WIDTH * self.scatter.max(self.rounding);
         round.is_narrow = wanted >= self.width * SHRINK;
         let least = if round.step <= self.rest() { wanted } else { self.width * SHRINK };
         self.width = wanted.max(least).min(self.width);

@@ -15,6 +15,8 @@ use std::ops::RangeInclusive;
 pub use error::{PairSide, PairsError};
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Rotation3, SVD, UnitQuaternion, Vector3};
 
+use crate::numeric::median;
+
 /// Farther from the origin than this, a point is a fault, m.
 const LARGEST_COORDINATE: f64 = 1e6;
 /// Standard deviations of a pick that are believed, m: far outside, their squares are no numbers.
@@ -175,8 +177,7 @@ fn given_sigma(pairs: &[PointPair], params: &PairsParams) -> Option<f64> {
 /// (σ₀ / σᵢ)², so that a pair of σ₀ weighs 1. A pair that names no sigma weighs as the median of those that do.
 fn weights(pairs: &[PointPair], params: &PairsParams) -> Vec<f64> {
     let mut named: Vec<f64> = pairs.iter().filter_map(|pair| pair.sigma).collect();
-    named.sort_by(f64::total_cmp);
-    let usual = params.sigma.or(named.get(named.len() / 2).copied()).unwrap_or(1.0);
+    let usual = params.sigma.or(median(&mut named)).unwrap_or(1.0);
     let unit = given_sigma(pairs, params).unwrap_or(usual);
     pairs.iter().map(|pair| (unit / pair.sigma.unwrap_or(usual)).powi(2)).collect()
 }

@@ -9,6 +9,8 @@
 
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
+use crate::numeric::median;
+
 /// One observation of three equations.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Equation {
@@ -92,10 +94,8 @@ pub(super) fn fit(equations: &[Equation], smallest_spread: f64) -> Result<Calibr
         return Ok(found);
     }
     let Some(mut norms) = robust_norms(equations) else { return Ok(found) };
-    let mut sorted = norms.clone();
-    sorted.sort_by(f64::total_cmp);
     let largest = equations.iter().map(|equation| equation.z.amax()).fold(0.0, f64::max);
-    let mut sigma = sorted[sorted.len() / 2] / MEDIAN_NORM;
+    let mut sigma = median(&mut norms.clone()).unwrap_or(0.0) / MEDIAN_NORM;
     for _ in 0..CHOICE_ROUNDS {
         let gate = GATE_SIGMAS * sigma.max(ROUNDING * largest);
         let kept: Vec<bool> = norms.iter().map(|norm| *norm <= gate).collect();

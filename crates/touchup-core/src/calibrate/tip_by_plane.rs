@@ -5,9 +5,10 @@
 //! Unknown are d, n and h. The radius of the ball is in h: it is not determined, nor is it needed. Where Rᵀ n stays in a plane, d across
 //! that is not determined.
 
-use nalgebra::{Isometry3, Matrix3, SMatrix, SVector, SymmetricEigen, Unit, Vector3};
+use nalgebra::{Isometry3, Matrix3, SVector, SymmetricEigen, Unit, Vector3};
 
 use super::payload::Known;
+use crate::numeric::{NormalEquations, tangent_basis};
 
 /// Where the ball is, and how well that is known.
 #[derive(Clone, Debug, PartialEq)]
@@ -77,12 +78,10 @@ pub fn fit_tip_by_plane(poses: &[Isometry3<f64>], normal: &Unit<Vector3<f64>>) -
     check_spread(poses, normal)?;
     let n = count as f64;
     let middle = poses.iter().map(|pose| pose.translation.vector).sum::<Vector3<f64>>() / n;
-    let aside = if normal.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
-    let u = normal.cross(&aside).normalize();
-    let v = normal.cross(&u);
+    let [u, v] = tangent_basis(normal);
     // d, two slopes of the plane, h
     let mut x = Six::zeros();
-    let rows = |x: &Six| -> Vec<(Six, f64)> {
+    let equations = |x: &Six| {
         let (offset, out) = (x.fixed_rows::<3>(0).into_owned(), normal.into_inner() + u * x[3] + v * x[4]);
         let row = |pose: &Isometry3<f64>| {
             let centre = pose.translation.vector - middle + pose.rotation * offset;
@@ -91,23 +90,18 @@ pub fn fit_tip_by_plane(poses: &[Isometry3<f64>], normal: &Unit<Vector3<f64>>) -
             // as a height: the normal with slopes is longer than one
             (by / out.norm(), (out.dot(&centre) - x[5]) / out.norm())
         };
-        poses.iter().map(row).collect()
+        NormalEquations::of(poses.iter().map(row))
     };
-    let normal_matrix =
-        |rows: &[(Six, f64)]| rows.iter().map(|(by, _)| by * by.transpose()).sum::<SMatrix<f64, 6, 6>>();
     for _ in 0..ROUNDS {
-        let rows = rows(&x);
-        let right: Six = rows.iter().map(|(by, height)| by * *height).sum();
-        x -= normal_matrix(&rows).cholesky().ok_or(PlaneTipError::OnOneLine)?.solve(&right);
+        x -= equations(&x).solution().ok_or(PlaneTipError::OnOneLine)?;
     }
-    let rows = rows(&x);
-    let squares: f64 = rows.iter().map(|(_, height)| height * height).sum();
-    let rms = (squares / n).sqrt();
+    let NormalEquations { information, square, .. } = equations(&x);
+    let rms = (square / n).sqrt();
     // NaN is no plane either
     if rms.is_nan() || rms > FLAT {
         return Err(PlaneTipError::NotFlat { rms_mm: rms * 1e3 });
     }
-    let covariance = normal_matrix(&rows).try_inverse().ok_or(PlaneTipError::OnOneLine)? * (squares / (n - 6.0));
+    let covariance = information.try_inverse().ok_or(PlaneTipError::OnOneLine)? * (square / (n - 6.0));
     let covariance: Matrix3<f64> = covariance.fixed_view::<3, 3>(0, 0).into_owned();
     let offset = Known::new(x.fixed_rows::<3>(0).into_owned(), &covariance);
     Ok(PlaneTipFit { offset, rms, touches: count })

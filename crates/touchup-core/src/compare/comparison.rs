@@ -5,9 +5,10 @@ use nalgebra::Point3;
 use super::deviation::{at_closest_places, signed};
 use super::normals::{Tilt, TiltSummary, tilts};
 use super::sampling::{SampledPoint, nearest_corner, sample_surface, surface_area};
-use super::summary::{Histogram, Summary, quantile};
+use super::summary::{Histogram, Summary};
 use super::{CompareError, cloud_distances};
 use crate::mesh::{FaceId, FaceTree, TriMesh, VertexId, Workers};
+use crate::numeric::quantile;
 
 /// A mesh and the tree over its faces.
 #[derive(Clone, Copy, Debug)]
@@ -247,7 +248,7 @@ impl MeasuredDeviations {
             vertices_to_truth: self.vertices.summary(region),
             cloud_to_truth: self.cloud_to_truth.summary(region),
             truth_to_cloud: self.truth_to_cloud.summary(region),
-            tilt: TiltSummary::of(tilts.collect()),
+            tilt: TiltSummary::of(&tilts.collect::<Vec<_>>()),
         }
     }
 }
@@ -309,13 +310,6 @@ fn regions_of_truth(
     Ok(points.iter().zip(&looked_up).map(region).collect())
 }
 
-/// A quantile of the sizes of what is in no order.
-fn sorted_quantile(deviations: &[f64], share: f64) -> f64 {
-    let mut sizes: Vec<f64> = deviations.iter().map(|d| d.abs()).collect();
-    sizes.sort_unstable_by(f64::total_cmp);
-    quantile(&sizes, share)
-}
-
 /// The region of two corners of three, the one between where all differ.
 fn most_common(corners: [VertexId; 3], of_vertex: &[SupportRegion]) -> SupportRegion {
     let mut regions = corners.map(|vertex| of_vertex[vertex.0 as usize]);
@@ -325,8 +319,10 @@ fn most_common(corners: [VertexId; 3], of_vertex: &[SupportRegion]) -> SupportRe
 
 /// A round number just above the 95th percentile of the sizes: 1, 1.5, 2, 3, 5 or 7 times a power of ten, m.
 fn fitting_range(deviations: &[f64]) -> f64 {
+    let mut sizes: Vec<f64> = deviations.iter().map(|d| d.abs()).collect();
+    sizes.sort_unstable_by(f64::total_cmp);
     // a perfect mesh has rounding alone
-    round_up(sorted_quantile(deviations, 0.95).max(SMALLEST_RANGE))
+    round_up(quantile(&sizes, 0.95).max(SMALLEST_RANGE))
 }
 
 /// The next of the round numbers above `x` > 0.

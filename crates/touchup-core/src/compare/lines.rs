@@ -5,6 +5,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::colour::Rgb;
 use crate::mesh::{MeshError, TriMesh};
+use crate::numeric::tangent_basis;
 
 /// A mesh with what is drawn into it, and a colour for each vertex.
 #[derive(Clone, Debug, Default)]
@@ -36,9 +37,7 @@ impl DrawnMesh {
     /// A line of a radius (m) from one place to another; nothing where both are one.
     pub fn line(&mut self, from: &Point3<f64>, to: &Point3<f64>, radius: f64, colour: Rgb) {
         let Some(along) = (to - from).try_normalize(0.0) else { return };
-        let aside = if along.z.abs() < 0.9 { Vector3::z() } else { Vector3::x() };
-        let x = along.cross(&aside).normalize();
-        let y = along.cross(&x);
+        let [x, y] = tangent_basis(&along);
         let around = |end: &Point3<f64>, at: usize| {
             let angle = at as f64 / SIDES as f64 * std::f64::consts::TAU;
             end + (x * angle.cos() + y * angle.sin()) * radius

@@ -7,6 +7,7 @@ use nalgebra::{Point3, Vector3};
 use super::CompareError;
 use super::deviation::closest_places;
 use crate::mesh::{FaceId, FaceTree, TriMesh};
+use crate::numeric::weighted_quantile;
 
 /// The angle between a face's normal and that of the closest true face.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,19 +54,12 @@ pub fn tilts(mesh: &TriMesh, truth: &TriMesh, tree: &FaceTree) -> Result<Vec<Til
 
 impl TiltSummary {
     /// `None` where there is no area.
-    pub fn of(mut tilts: Vec<Tilt>) -> Option<Self> {
-        tilts.sort_unstable_by(|a, b| a.angle.total_cmp(&b.angle).then(a.face.cmp(&b.face)));
-        let total: f64 = tilts.iter().map(|tilt| tilt.area).sum();
-        let flipped: f64 = tilts.iter().filter(|tilt| tilt.angle > FRAC_PI_2).fold(0.0, |sum, tilt| sum + tilt.area);
-        let at = |share: f64| {
-            let mut area = 0.0;
-            let reached = |tilt: &&Tilt| {
-                area += tilt.area;
-                area >= share * total
-            };
-            tilts.iter().find(reached).or(tilts.last()).map_or(0.0, |tilt| tilt.angle)
-        };
-        (total > 0.0).then(|| Self { median: at(0.5), p95: at(0.95), flipped: flipped / total })
+    pub fn of(tilts: &[Tilt]) -> Option<Self> {
+        let mut angles: Vec<_> = tilts.iter().map(|tilt| (tilt.angle, tilt.area)).collect();
+        let (median, p95) = (weighted_quantile(&mut angles, 0.5)?, weighted_quantile(&mut angles, 0.95)?);
+        let total: f64 = angles.iter().map(|(_, area)| area).sum();
+        let flipped = angles.iter().filter(|(angle, _)| *angle > FRAC_PI_2).fold(0.0, |sum, (_, area)| sum + area);
+        (total > 0.0).then(|| Self { median, p95, flipped: flipped / total })
     }
 }
 
@@ -86,8 +80,8 @@ mod tests {
     #[test]
     fn faces_count_by_area() {
         let tilt = |face, angle, area| Tilt { face: FaceId(face), angle, area };
-        let found = TiltSummary::of(vec![tilt(0, 0.1, 6.0), tilt(1, 2.0, 1.0), tilt(2, 0.2, 3.0)]).unwrap();
+        let found = TiltSummary::of(&[tilt(0, 0.1, 6.0), tilt(1, 2.0, 1.0), tilt(2, 0.2, 3.0)]).unwrap();
         assert_eq!(found, TiltSummary { median: 0.1, p95: 2.0, flipped: 0.1 });
-        assert_eq!(TiltSummary::of(vec![]), None);
+        assert_eq!(TiltSummary::of(&[]), None);
     }
 }

@@ -1,5 +1,7 @@
 //! A set of deviations in a few numbers.
 
+use crate::numeric::quantile;
+
 /// What a set of deviations comes to. All but `bias` are of the sizes, without sign.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Summary {
@@ -39,14 +41,6 @@ impl Summary {
             bias: deviations.iter().sum::<f64>() / count,
         })
     }
-}
-
-/// The value at a share of the way through rising `values`, between two of them by proportion; 0 where there are none.
-pub fn quantile(values: &[f64], share: f64) -> f64 {
-    let Some(last) = values.len().checked_sub(1) else { return 0.0 };
-    let at = share.clamp(0.0, 1.0) * last as f64;
-    let (low, high) = (values[at.floor() as usize], values[at.ceil() as usize]);
-    low + (high - low) * at.fract()
 }
 
 /// How many deviations lie in each of equal bins.

@@ -4,6 +4,8 @@ use std::collections::{HashMap, HashSet};
 
 use nalgebra::Point3;
 
+use crate::numeric::{VoxelKey, voxel_neighbourhood, voxel_of};
+
 /// A place belongs to the touched region when a contact is within this distance, m.
 const REACH: f64 = 1e-3;
 /// One contact is kept in each cell of this size, m: a ball that rests does not count a thousandfold.
@@ -14,11 +16,7 @@ const SPACING: f64 = 0.25e-3;
 pub struct TouchedRegion {
     contacts: Vec<Point3<f64>>,
     /// indices into `contacts` by cells of [`REACH`]
-    cells: HashMap<[i64; 3], Vec<usize>>,
-}
-
-fn cell_of(p: &Point3<f64>, size: f64) -> [i64; 3] {
-    [p.x, p.y, p.z].map(|x| (x / size).floor() as i64)
+    cells: HashMap<VoxelKey, Vec<usize>>,
 }
 
 impl TouchedRegion {
@@ -27,8 +25,8 @@ impl TouchedRegion {
         let mut kept = HashSet::new();
         let mut region = Self::default();
         for contact in contacts.into_iter().filter(|contact| contact.coords.iter().all(|x| x.is_finite())) {
-            if kept.insert(cell_of(&contact, SPACING)) {
-                region.cells.entry(cell_of(&contact, REACH)).or_default().push(region.contacts.len());
+            if kept.insert(voxel_of(&contact, SPACING)) {
+                region.cells.entry(voxel_of(&contact, REACH)).or_default().push(region.contacts.len());
                 region.contacts.push(contact);
             }
         }
@@ -42,10 +40,7 @@ impl TouchedRegion {
 
     /// Whether a contact is within a millimetre of `p` (m).
     pub fn is_near(&self, p: &Point3<f64>) -> bool {
-        let [x, y, z] = cell_of(p, REACH);
-        let around = |at: i64| at.saturating_sub(1)..=at.saturating_add(1);
-        around(x).flat_map(|x| around(y).flat_map(move |y| around(z).map(move |z| [x, y, z]))).any(|cell| {
-            self.cells.get(&cell).is_some_and(|some| some.iter().any(|&i| (self.contacts[i] - p).norm() <= REACH))
-        })
+        let mut near = voxel_neighbourhood(voxel_of(p, REACH)).filter_map(|voxel| self.cells.get(&voxel)).flatten();
+        near.any(|&i| (self.contacts[i] - p).norm() <= REACH)
     }
 }

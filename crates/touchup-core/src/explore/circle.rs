@@ -1,19 +1,18 @@
 //! The circle through what was felt of a round wall.
 
-use nalgebra::{Cholesky, Matrix3, Point3, Vector3};
+use nalgebra::{Point3, Vector3};
+
+use crate::numeric::NormalEquations;
 
 /// Middle and radius of the circle through points of a plane, by least squares of x² + y² = 2ax + 2by + c \[Kåsa 1976\].
 pub(super) fn circle(points: &[Point3<f64>]) -> Option<(Point3<f64>, f64)> {
     let count = points.len() as f64;
     let mean = points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / count;
-    let (mut square, mut right) = (Matrix3::zeros(), Vector3::zeros());
-    for p in points {
+    let row = |p: &Point3<f64>| {
         let (x, y) = (p.x - mean.x, p.y - mean.y);
-        let row = Vector3::new(2.0 * x, 2.0 * y, 1.0);
-        square += row * row.transpose();
-        right += row * (x * x + y * y);
-    }
-    let solved = Cholesky::new(square)?.solve(&right);
+        (Vector3::new(2.0 * x, 2.0 * y, 1.0), x * x + y * y)
+    };
+    let solved = NormalEquations::of(points.iter().map(row)).solution()?;
     let radius = (solved.z + solved.x * solved.x + solved.y * solved.y).sqrt();
     let centre = Point3::new(mean.x + solved.x, mean.y + solved.y, 0.0);
     (radius.is_finite() && points.len() >= 3).then_some((centre, radius))

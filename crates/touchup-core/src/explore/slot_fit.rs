@@ -2,6 +2,8 @@
 
 use nalgebra::{Matrix5, Point2, Vector2, Vector5};
 
+use crate::numeric::NormalEquations;
+
 /// All points at a distance from a segment of a plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Oblong {
@@ -59,15 +61,14 @@ impl Oblong {
         let units = Vector5::new(scale, scale, 1.0, scale, scale);
         let mut damping = 1e-3;
         for _ in 0..STEPS {
-            let (mut square, mut right) = (Matrix5::identity() * (HELD + damping), Vector5::zeros());
+            let mut equations =
+                NormalEquations { information: Matrix5::identity() * (HELD + damping), ..NormalEquations::default() };
             for p in points {
                 let (r, by) = self.residual(p);
-                let g = by.component_mul(&units) / scale;
-                square += g * g.transpose();
-                right -= g * (r / scale);
+                equations.add(&(by.component_mul(&units) / scale), -(r / scale), 1.0);
             }
-            let Some(solved) = square.cholesky() else { break };
-            let step = solved.solve(&right).component_mul(&units);
+            let Some(solved) = equations.solution() else { break };
+            let step = solved.component_mul(&units);
             let next = Self {
                 middle: self.middle + step.fixed_rows::<2>(0),
                 angle: self.angle + step[2],

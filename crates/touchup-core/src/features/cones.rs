@@ -6,11 +6,11 @@ use nalgebra::{Point3, Vector2, Vector3};
 
 use super::facets::NONE;
 use super::grow::belongs;
-use super::primitive::{Primitive, Side, refined, square_to};
+use super::primitive::{Primitive, Side, refined};
 use super::scene::Parted;
 use super::segment::Segment;
 use super::walls::Wall;
-use crate::mesh::median;
+use crate::numeric::{median, tangent_basis};
 
 /// Directions in which the ring beyond an end is looked at.
 const AROUND: usize = 36;
@@ -78,7 +78,7 @@ fn cone_beyond(parted: &Parted, wall: &Wall, end: f64, out: f64) -> Option<Segme
 
 /// Faces on a ring around the axis that look at it.
 fn ring(parted: &Parted, wall: &Wall, t: f64, radius: f64) -> Vec<u32> {
-    let [e, g] = square_to(&wall.axis);
+    let [e, g] = tangent_basis(&wall.axis);
     let around = parted.around(wall.segments[0]);
     let mut faces: Vec<u32> = (0..AROUND)
         .filter_map(|i| {

@@ -1,10 +1,11 @@
 //! Edges at which a mesh turns sharply, and how they hang together.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 
 use super::clusters::{Bend, ClusterParams};
 use super::curvature::{VertexCurvature, VertexKind};
 use crate::mesh::{FaceId, TriMesh, VertexId};
+use crate::numeric::{voxel_neighbourhood, voxel_of};
 
 /// Points put on all creases together at most, beside one for each: bounds the work on meshes that are all noise.
 const MOST_POINTS: f64 = 1e6;
@@ -93,16 +94,15 @@ impl CreaseRegions {
             let parts = ((b - a).norm() / spacing).ceil().max(1.0) as u32;
             in_cell.extend((0..=parts).map(|part| {
                 let p = a + (b - a) * (f64::from(part) / f64::from(parts));
-                ((crease.bend, cell(&(p - low), near)), i as u32)
+                ((crease.bend, voxel_of(&(p - low).into(), near)), i as u32)
             }));
         }
         self.join_equal(&mut in_cell);
         in_cell.dedup_by_key(|(key, _)| *key);
-        for &((bend, [x, y, z]), crease) in &in_cell {
+        for &((bend, voxel), crease) in &in_cell {
             // half of the 26 around; the others see this one
-            for (dx, dy, dz) in (0..27).map(|n| (n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1)).filter(|d| *d > (0, 0, 0)) {
-                let key = (bend, [x + dx, y + dy, z + dz]);
-                if let Ok(at) = in_cell.binary_search_by_key(&key, |(key, _)| *key) {
+            for near in voxel_neighbourhood(voxel).skip(14) {
+                if let Ok(at) = in_cell.binary_search_by_key(&(bend, near), |(key, _)| *key) {
                     self.join(crease, in_cell[at].1);
                 }
             }
@@ -131,9 +131,4 @@ impl CreaseRegions {
         let (a, b) = (self.root(a), self.root(b));
         self.parents[a.max(b) as usize] = a.min(b);
     }
-}
-
-/// The cell of a grid from the lowest corner of the box, where all coordinates are ≥ 0.
-fn cell(p: &Vector3<f64>, size: f64) -> [i64; 3] {
-    (Point3::from(p / size)).coords.map(|x| x.floor() as i64).into()
 }

@@ -11,7 +11,8 @@ use super::flats::{FlatPiece, Flats};
 use super::marks::sort;
 use super::primitive::{Moments, NormalSpread, Primitive, cylinder_of, refined};
 use super::segment::{Segment, Segmentation};
-use crate::mesh::{FaceId, VertexId, median};
+use crate::mesh::{FaceId, VertexId};
+use crate::numeric::median;
 
 /// Lengths that come with the mesh.
 #[derive(Clone, Copy, Debug)]

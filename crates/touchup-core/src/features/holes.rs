@@ -2,10 +2,11 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::primitive::{Primitive, Side, square_to};
+use super::primitive::{Primitive, Side};
 use super::scene::{Parted, along_to_plane};
 use super::walls::Wall;
 use crate::mesh::{BoxQuery, FaceId};
+use crate::numeric::tangent_basis;
 
 /// A round hole.
 #[derive(Clone, Debug)]
@@ -197,7 +198,7 @@ fn end(parted: &Parted, wall: &Wall, which: usize) -> WallEnd {
     let rim = rim.filter(|&(_, share)| share > RIM);
     let reach = [CLOSED, MAYBE_CLOSED].map(|radii| wall.height() / 2.0 + radii * radius);
     // beside the axis: on it lie the tips of cones and the edges of floors, which a line may slip through
-    let [e, g] = square_to(&wall.axis);
+    let [e, g] = tangent_basis(&wall.axis);
     let mut rays = around.rays(radius);
     let mut met = [0.4f64, 2.5, 4.6].map(|turn| {
         let aside = (e * turn.cos() + g * turn.sin()) * (ASIDE * radius);
@@ -212,7 +213,7 @@ fn end(parted: &Parted, wall: &Wall, which: usize) -> WallEnd {
 /// Whether the mesh ends there: what the wall goes on in was not seen and not felt. Where a plane is around the end, the
 /// border has to be as long as half of the turn.
 fn is_torn(parted: &Parted, wall: &Wall, end: &WallEnd) -> bool {
-    let (middle, [e, g]) = (wall.at(end.t), square_to(&wall.axis));
+    let (middle, [e, g]) = (wall.at(end.t), tangent_basis(&wall.axis));
     let near = TORN.map(|radii| radii * wall.radius());
     // of a box that holds all of them, however the axis lies
     let reach = Vector3::repeat(near[1] * f64::sqrt(2.0));

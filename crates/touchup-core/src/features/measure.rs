@@ -8,9 +8,10 @@ use nalgebra::{Point3, Vector3};
 use super::feature::{FittedTo, Measured};
 use super::fit::{Cone, Cylinder, Ends, Fit, FitParams, Freedom, Observation, Plane, Stadium, Surface, fit};
 use super::observe::Observed;
-use super::primitive::{Primitive, Side, square_to};
+use super::primitive::{Primitive, Side};
 use super::slots::Slot;
 use super::walls::Wall;
+use crate::numeric::{order_statistic, tangent_basis};
 
 /// A fitted surface and what it was fitted to.
 #[derive(Clone, Debug)]
@@ -160,7 +161,7 @@ impl<'a> Measure<'a> {
 
     /// Share of a turn around a wall that touches cover.
     fn turn(&self, touches: &[u32], wall: &Wall) -> f64 {
-        let [e, g] = square_to(&wall.axis);
+        let [e, g] = tangent_basis(&wall.axis);
         let mut parts = [false; PARTS];
         for &number in touches {
             let v = self.observed.touch(number).point - wall.origin;
@@ -174,8 +175,8 @@ impl<'a> Measure<'a> {
     fn height(&self, touches: &[u32], wall: &Wall) -> f64 {
         let along = |&number: &u32| (self.observed.touch(number).point - wall.origin).dot(&wall.axis);
         let mut along: Vec<f64> = touches.iter().map(along).collect();
-        along.sort_by(f64::total_cmp);
-        along[along.len() * 9 / 10] - along[along.len() / 10]
+        let [lowest, highest] = [0.1, 0.9].map(|share| order_statistic(&mut along, share).unwrap_or(0.0));
+        highest - lowest
     }
 
     /// How much the touches on a plane are spread in their second direction, beside the first.

@@ -10,6 +10,7 @@ use super::primitive::Primitive;
 use super::scene::Parted;
 use super::segment::Segmentation;
 use crate::mesh::{FaceId, TriMesh, VertexId};
+use crate::numeric::{VoxelKey, voxel_neighbourhood, voxel_of};
 use crate::touch::ProbedPoint;
 
 /// The touches on a parted mesh.
@@ -21,7 +22,7 @@ pub(super) struct Observed<'a> {
     /// what shares its error, by touch
     group: Vec<u32>,
     /// numbers of the touches by cells of [`Observed::reach`]
-    cells: BTreeMap<[i64; 3], Vec<u32>>,
+    cells: BTreeMap<VoxelKey, Vec<u32>>,
     /// a place is touched when a touch is within this, m
     reach: f64,
 }
@@ -69,7 +70,7 @@ impl<'a> Observed<'a> {
         for (number, touch) in touches.iter().enumerate().filter(|(_, touch)| !touch.is_rejected) {
             if let Some(segment) = observed.segment_of(of_face, touch) {
                 observed.of_segment[segment].push(number as u32);
-                observed.cells.entry(observed.cell(&touch.point)).or_default().push(number as u32);
+                observed.cells.entry(voxel_of(&touch.point, reach)).or_default().push(number as u32);
             }
         }
         observed
@@ -86,10 +87,6 @@ impl<'a> Observed<'a> {
         let off = segment.primitive.distance(&touch.centre) - touch.radius;
         let is_alike = segment.primitive.normal_at(&touch.centre).dot(&touch.normal) > ALIKE;
         (off.abs() < near && is_alike).then_some(number as usize)
-    }
-
-    fn cell(&self, p: &Point3<f64>) -> [i64; 3] {
-        [p.x, p.y, p.z].map(|x| (x / self.reach).floor() as i64)
     }
 
     /// Numbers of the touches of some segments, in ascending order.
@@ -124,14 +121,14 @@ impl<'a> Observed<'a> {
         // of a drawing the residuals tell what is more than rounding
         let sigma = self.parted.rounding.unwrap_or(segment.tolerance) / 6.0;
         let cell = SHARED_EDGES * self.parted.edge;
-        let mut cells: BTreeMap<[i64; 3], u32> = BTreeMap::new();
+        let mut cells: BTreeMap<VoxelKey, u32> = BTreeMap::new();
         let mut observations = Vec::new();
         for vertex in vertices.into_iter().step_by(step) {
             let point = mesh.position(vertex);
             let own = observations.len() as u32;
             let group = match self.parted.rounding {
                 Some(_) => own,
-                None => *cells.entry([point.x, point.y, point.z].map(|x| (x / cell).floor() as i64)).or_insert(own),
+                None => *cells.entry(voxel_of(&point, cell)).or_insert(own),
             };
             observations.push(Observation { point, offset: 0.0, sigma, group });
         }
@@ -193,12 +190,8 @@ impl<'a> Observed<'a> {
     }
 
     fn is_touched(&self, p: &Point3<f64>) -> bool {
-        let [x, y, z] = self.cell(p);
-        let near = |&number: &u32| (self.touches[number as usize].point - p).norm() <= self.reach;
-        (0..27).any(|at| {
-            let cell = [x + at % 3 - 1, y + at / 3 % 3 - 1, z + at / 9 - 1];
-            self.cells.get(&cell).is_some_and(|some| some.iter().any(near))
-        })
+        let mut around = voxel_neighbourhood(voxel_of(p, self.reach)).filter_map(|voxel| self.cells.get(&voxel)).flatten();
+        around.any(|&number| (self.touches[number as usize].point - p).norm() <= self.reach)
     }
 }
 

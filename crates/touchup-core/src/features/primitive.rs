@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Point3, SMatrix, SVector, Vector3};
 
 use super::facets::Facets;
 use crate::mesh::FaceId;
+use crate::numeric::{NormalEquations, tangent_basis};
 
 /// Which side of a curved surface the material is on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -190,16 +191,9 @@ fn root(x: f64) -> f64 {
 /// The direction without normals is clear when they differ so much more in the next.
 const CLEAR: f64 = 0.5;
 
-/// Two unit vectors square to `axis` and to each other.
-pub(super) fn square_to(axis: &Vector3<f64>) -> [Vector3<f64>; 2] {
-    let other = if axis.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
-    let e = axis.cross(&other).normalize();
-    [e, axis.cross(&e)]
-}
-
 /// The cylinder with this axis whose normals these are: the lines along them meet at its axis.
 pub(super) fn cylinder_of(facets: &Facets, faces: &[u32], axis: &Vector3<f64>) -> Option<Primitive> {
-    let [e, g] = square_to(axis);
+    let [e, g] = tangent_basis(axis);
     let flat = |v: &Vector3<f64>| SVector::<f64, 2>::new(v.dot(&e), v.dot(&g));
     let origin = facets.triangle(faces[0])[0];
     let (mut m, mut right) = (SMatrix::<f64, 2, 2>::zeros(), SVector::<f64, 2>::zeros());
@@ -252,8 +246,8 @@ fn refined_cylinder(start: &Primitive, facets: &Facets, faces: &[u32]) -> Option
     point += axis * along;
     let step = faces.len().div_ceil(MOST_ROWS);
     for _ in 0..ROUNDS {
-        let [e, g] = square_to(&axis);
-        let mut normal = NormalEquations::<5>::new();
+        let [e, g] = tangent_basis(&axis);
+        let mut normal = NormalEquations::<5>::default();
         for (at, &face) in faces.iter().step_by(step).enumerate() {
             let mut corner = |p: &Point3<f64>| {
                 let v = p - point;
@@ -262,7 +256,7 @@ fn refined_cylinder(start: &Primitive, facets: &Facets, faces: &[u32]) -> Option
                 let distance = q.norm();
                 let u = q / distance.max(f64::MIN_POSITIVE);
                 let (ue, ug) = (u.dot(&e), u.dot(&g));
-                normal.add([ue, ug, t * ue, t * ug, 1.0], distance - radius);
+                normal.add(&[ue, ug, t * ue, t * ug, 1.0].into(), distance - radius, 1.0);
             };
             let corners = facets.triangle(face);
             match faces.len() < FEW {
@@ -271,7 +265,7 @@ fn refined_cylinder(start: &Primitive, facets: &Facets, faces: &[u32]) -> Option
             }
             let n = facets.normal(face);
             let arm = NORMAL_ARM * radius;
-            normal.add_two([2, 3], [n.dot(&e) * arm, n.dot(&g) * arm], -n.dot(&axis) * arm);
+            normal.add(&[0.0, 0.0, n.dot(&e) * arm, n.dot(&g) * arm, 0.0].into(), -n.dot(&axis) * arm, 1.0);
         }
         let x = normal.solution()?;
         point += e * x[0] + g * x[1];
@@ -287,42 +281,6 @@ fn refined_cylinder(start: &Primitive, facets: &Facets, faces: &[u32]) -> Option
     Some(Primitive::Cylinder { point, axis, radius, side })
 }
 
-/// Least squares of N unknowns, collected row by row.
-struct NormalEquations<const N: usize> {
-    /// lower triangle
-    matrix: [[f64; N]; N],
-    right: [f64; N],
-}
-
-impl<const N: usize> NormalEquations<N> {
-    fn new() -> Self {
-        Self { matrix: [[0.0; N]; N], right: [0.0; N] }
-    }
-
-    fn add(&mut self, row: [f64; N], value: f64) {
-        for i in 0..N {
-            for j in 0..=i {
-                self.matrix[i][j] += row[i] * row[j];
-            }
-            self.right[i] += row[i] * value;
-        }
-    }
-
-    /// A row of which all but two numbers, at rising places, are zero.
-    fn add_two(&mut self, [i, j]: [usize; 2], [a, b]: [f64; 2], value: f64) {
-        self.matrix[i][i] += a * a;
-        self.matrix[j][i] += b * a;
-        self.matrix[j][j] += b * b;
-        self.right[i] += a * value;
-        self.right[j] += b * value;
-    }
-
-    fn solution(&self) -> Option<SVector<f64, N>> {
-        let matrix = SMatrix::<f64, N, N>::from_fn(|i, j| self.matrix[i.max(j)][i.min(j)]);
-        Some(matrix.cholesky()?.solve(&SVector::from(self.right)))
-    }
-}
-
 /// Of fewer faces all corners count, of more one each: neighbours share theirs.
 const FEW: usize = 40;
 /// So many faces are enough while a region grows.
@@ -332,9 +290,9 @@ fn refined_cone(start: &Primitive, facets: &Facets, faces: &[u32]) -> Option<Pri
     let Primitive::Cone { mut apex, mut axis, mut half_angle, side } = *start else { return None };
     let step = faces.len().div_ceil(MOST_ROWS);
     for _ in 0..ROUNDS {
-        let [e, g] = square_to(&axis);
+        let [e, g] = tangent_basis(&axis);
         let (sine, cosine) = half_angle.sin_cos();
-        let (mut normal, mut size) = (NormalEquations::<6>::new(), 0.0f64);
+        let (mut normal, mut size) = (NormalEquations::<6>::default(), 0.0f64);
         for p in faces.iter().step_by(step).flat_map(|&face| facets.triangle(face)) {
             let v = p - apex;
             let t = v.dot(&axis);
@@ -344,7 +302,7 @@ fn refined_cone(start: &Primitive, facets: &Facets, faces: &[u32]) -> Option<Pri
             let slope = t * cosine + distance * sine;
             let (ue, ug) = (u.dot(&e), u.dot(&g));
             let row = [ue * cosine, ug * cosine, -sine, ue * slope, ug * slope, slope];
-            normal.add(row, distance * cosine - t * sine);
+            normal.add(&row.into(), distance * cosine - t * sine, 1.0);
             size = size.max(distance);
         }
         let x = normal.solution()?;

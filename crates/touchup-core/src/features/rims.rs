@@ -7,9 +7,9 @@ use nalgebra::{Point3, Vector3};
 
 use super::facets::{Facets, NONE};
 use super::fit::{Cylinder, Fit, FitParams, Observation, fit};
-use super::primitive::square_to;
 use super::scene::Parted;
 use crate::mesh::VertexId;
+use crate::numeric::tangent_basis;
 
 /// A round opening.
 #[derive(Clone, Debug)]
@@ -149,7 +149,7 @@ impl Loop {
     }
 
     fn is_round(&self, centre: &Point3<f64>, out: &Vector3<f64>, radius: f64) -> bool {
-        let [e, g] = square_to(out);
+        let [e, g] = tangent_basis(out);
         let place = |p: &Point3<f64>| [(p - centre).dot(&e), (p - centre).dot(&g)];
         let off: Vec<f64> = self.corners.iter().map(place).map(|[x, y]| (x.hypot(y) / radius - 1.0).abs()).collect();
         let mean_square = off.iter().map(|off| off * off).sum::<f64>() / off.len() as f64;

@@ -6,9 +6,10 @@ use super::bodies::{Bodies, Surroundings};
 use super::borders::{borders, without_seams};
 use super::facets::Facets;
 use super::grow::median_edge;
-use super::primitive::{Primitive, square_to};
+use super::primitive::Primitive;
 use super::segment::{Segment, Segmentation};
 use crate::mesh::{FaceTree, TriMesh};
+use crate::numeric::tangent_basis;
 
 /// A parted mesh.
 pub(super) struct Parted<'a> {
@@ -87,7 +88,7 @@ impl<'a> Parted<'a> {
         radii: &[f64],
         reach: f64,
     ) -> Option<(usize, f64)> {
-        let [e, g] = square_to(way);
+        let [e, g] = tangent_basis(way);
         let mut votes: Vec<(usize, usize)> = Vec::new();
         for (i, radius) in (0..AROUND).flat_map(|i| radii.iter().map(move |radius| (i, radius))) {
             let (sine, cosine) = (std::f64::consts::TAU * i as f64 / AROUND as f64).sin_cos();

@@ -3,9 +3,9 @@
 use nalgebra::{Point3, Vector3};
 
 use super::facets::Facets;
-use super::primitive::{Primitive, Side, square_to};
+use super::primitive::{Primitive, Side};
 use super::segment::Segmentation;
-use crate::mesh::median;
+use crate::numeric::{median, tangent_basis};
 
 /// What is left of a round wall.
 #[derive(Clone, Debug)]
@@ -70,7 +70,7 @@ impl Wall {
             Primitive::Cylinder { point, axis, .. } => (point, axis),
             Primitive::Cone { apex, axis, .. } => (apex, axis),
         };
-        let [e, g] = square_to(&axis);
+        let [e, g] = tangent_basis(&axis);
         let mut parts = [[f64::INFINITY, f64::NEG_INFINITY]; PARTS];
         for &face in faces {
             let corners = facets.triangle(face).map(|p| p - origin);

@@ -3,7 +3,6 @@
 mod closest;
 mod coherent;
 mod journal;
-mod median;
 mod region;
 mod repair;
 mod signed_distance;
@@ -15,7 +14,6 @@ mod workers;
 pub use closest::{BoxQuery, FaceHit, FaceTree, Nearby, RefitPlan};
 pub use coherent::coherent_order;
 pub use journal::{Changes, IdSet};
-pub use median::median;
 pub use region::{Outside, Region, Sewn};
 pub use repair::{RepairReport, repair};
 pub use signed_distance::{pseudo_normal, signed_distance};

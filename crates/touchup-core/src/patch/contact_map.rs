@@ -16,6 +16,7 @@ use super::outliers::{Outlier, Outliers};
 use super::passes::{IndependentPasses, Pass};
 use super::table::CellTable;
 use super::touches::SurfaceContact;
+use crate::numeric::{voxel_neighbourhood, voxel_of};
 
 /// The mean of the contacts in one cell that face alike.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -212,7 +213,7 @@ impl ContactMap {
 
     fn bin_of(&self, contact: &SurfaceContact) -> Bin {
         let facing = [contact.normal.x, contact.normal.y, contact.normal.z].map(|x| (x / FACING).floor() as i8);
-        Bin { cell: cell_of(&contact.point, self.cell), facing }
+        Bin { cell: voxel_of(&contact.point, self.cell), facing }
     }
 
     /// The means of a cell.
@@ -252,8 +253,8 @@ impl ContactMap {
     fn around(&self, contact: &SurfaceContact, cell: LatticeNode) -> impl Iterator<Item = u32> + '_ {
         let (point, step) = (contact.point, contact.normal * self.cell);
         let deep = (2..=DEPTH).flat_map(|k| [-k, k]);
-        let deep = deep.map(move |k| cell_of(&(point + step * f64::from(k)), self.cell));
-        around(cell).chain(deep).flat_map(|cell| self.in_cell(cell))
+        let deep = deep.map(move |k| voxel_of(&(point + step * f64::from(k)), self.cell));
+        voxel_neighbourhood(cell).chain(deep).flat_map(|cell| self.in_cell(cell))
     }
 
     /// The mean that the contact before went into, while that is near in time and place.
@@ -377,7 +378,7 @@ impl ContactMap {
         self.history.note(index, || Past::Mean(None));
         let kept = Kept {
             cell: bin.cell,
-            home: cell_of(&point, self.reach),
+            home: voxel_of(&point, self.reach),
             facing: bin.facing,
             next: NONE,
             sums: ContactStatistics::ZERO,
@@ -574,7 +575,7 @@ impl ContactMap {
     #[inline]
     pub(super) fn near_known(&self, x: &Point3<f64>, reach: f64, mut each: impl FnMut(f64, u32)) {
         let limit = reach.min(self.reach).powi(2);
-        for bin in around(cell_of(x, self.reach)) {
+        for bin in voxel_neighbourhood(voxel_of(x, self.reach)) {
             for &index in self.nearby.get(&bin).into_iter().flatten() {
                 let mean = &self.means[index as usize];
                 let distance_squared = (mean.point - x).norm_squared();
@@ -584,16 +585,6 @@ impl ContactMap {
             }
         }
     }
-}
-
-/// The cube of edge `size` (m) that holds `p`.
-pub(super) fn cell_of(p: &Point3<f64>, size: f64) -> LatticeNode {
-    [p.x, p.y, p.z].map(|x| (x / size).floor() as i32)
-}
-
-/// A cube and the 26 around it.
-pub(super) fn around(cell: LatticeNode) -> impl Iterator<Item = LatticeNode> {
-    (0..27).map(move |i| [0, 1, 2].map(|axis| cell[axis].saturating_add(i / [9, 3, 1][axis] % 3 - 1)))
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::contact_map::{ContactMap, MeanContact};
 use super::field_uncertainty::PassShare;
+use crate::numeric::tangent_basis;
 
 /// How contacts are grouped and weighted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -366,9 +367,7 @@ fn is_border(
     under: f64,
     angles: &mut Vec<(f64, f64, f64)>,
 ) -> bool {
-    let side = if normal.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
-    let u = normal.cross(&side).normalize();
-    let v = normal.cross(&u);
+    let [u, v] = tangent_basis(normal);
     angles.clear();
     let flat = arms.map(|arm| (arm.dot(&u), arm.dot(&v))).filter(|(a, b)| a * a + b * b > under * under);
     angles.extend(flat.map(|(a, b)| (turn(a, b), a, b)));

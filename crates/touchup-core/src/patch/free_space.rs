@@ -2,10 +2,10 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::contact_map::{around, cell_of};
 use super::lattice::{CellBox, LatticeNode};
 use super::table::Key;
 use super::voxel_set::VoxelSet;
+use crate::numeric::{voxel_neighbourhood, voxel_of};
 use crate::touch::{TipBody, TipPlace};
 
 /// Cosine of the widest angle between a way and what counts as straight ahead: 45°.
@@ -71,7 +71,7 @@ impl SweptSpace {
     /// Takes a place of the tip.
     pub fn add_place(&mut self, place: &TipPlace) {
         let centre = &place.centre;
-        let is_new = self.centres.add(cell_of(centre, self.cell), cell_of(centre, self.reach), *centre);
+        let is_new = self.centres.add(voxel_of(centre, self.cell), voxel_of(centre, self.reach), *centre);
         match &mut self.body {
             None => self.changed.extend(is_new.then_some(*centre)),
             Some(body) => {
@@ -86,9 +86,9 @@ impl SweptSpace {
     /// ball, as much nearer with its surface as a ball of its scale.
     pub fn forget(&mut self, p: &Point3<f64>, distance: f64) {
         let Self { cell, reach, centres, body, changed } = self;
-        for bin in around(cell_of(p, *reach)) {
+        for bin in voxel_neighbourhood(voxel_of(p, *reach)) {
             let stays = |centre: &Point3<f64>| (centre - p).norm_squared() >= distance * distance;
-            centres.retain(bin, |centre| cell_of(centre, *cell), stays, |centre| changed.push(*centre));
+            centres.retain(bin, |centre| voxel_of(centre, *cell), stays, |centre| changed.push(*centre));
         }
         let Some(SweptBody { tip, cell, places }) = body else { return };
         for bin in bins_around(p, tip.scale(), tip.bound().1 + distance).iter() {
@@ -120,7 +120,7 @@ impl SweptSpace {
         body.iter_mut().for_each(|SweptBody { cell, places, .. }| {
             places.undo(|place| posture(place, *cell));
         });
-        centres.undo(|centre| cell_of(centre, *cell))
+        centres.undo(|centre| voxel_of(centre, *cell))
     }
 
     /// Does again what was undone last. Returns whether there was anything.
@@ -130,7 +130,7 @@ impl SweptSpace {
         body.iter_mut().for_each(|SweptBody { cell, places, .. }| {
             places.redo(|place| posture(place, *cell));
         });
-        centres.redo(|centre| cell_of(centre, *cell))
+        centres.redo(|centre| voxel_of(centre, *cell))
     }
 
     /// The centres that were kept.
@@ -154,7 +154,7 @@ impl SweptSpace {
     /// Whether the way of the ball ended at `centre`, going in `direction` (unit): within `width` (m) all of it is behind.
     pub fn is_end(&self, centre: &Point3<f64>, direction: &Vector3<f64>, width: f64) -> bool {
         let (mut sum, mut count) = (Vector3::zeros(), 0.0f64);
-        for bin in around(cell_of(centre, self.reach)) {
+        for bin in voxel_neighbourhood(voxel_of(centre, self.reach)) {
             for other in self.centres.get(&bin) {
                 if (other - centre).norm_squared() < width * width {
                     sum += other - centre;
@@ -175,7 +175,7 @@ impl SweptSpace {
             return body.nearest(x);
         }
         let mut best = (self.reach * self.reach, None);
-        for bin in around(cell_of(x, self.reach)) {
+        for bin in voxel_neighbourhood(voxel_of(x, self.reach)) {
             for centre in self.centres.get(&bin) {
                 let distance_squared = (centre - x).norm_squared();
                 if distance_squared < best.0 {
@@ -190,7 +190,7 @@ impl SweptSpace {
 impl SweptBody {
     /// The cell of a place.
     fn bin(&self, place: &TipPlace) -> LatticeNode {
-        cell_of(&(place.centre + place.axis * self.tip.bound().0), self.tip.scale())
+        voxel_of(&(place.centre + place.axis * self.tip.bound().0), self.tip.scale())
     }
 
     /// Calls `each` with the middles of balls that cover the tip at a place.
@@ -224,12 +224,12 @@ impl SweptBody {
 
 /// The small cell and the range of axes of a place.
 fn posture(TipPlace { centre, axis }: &TipPlace, cell: f64) -> Posture {
-    Posture { cell: cell_of(centre, cell), lean: [axis.x, axis.y, axis.z].map(|x| (x / LEAN).floor() as i8) }
+    Posture { cell: voxel_of(centre, cell), lean: [axis.x, axis.y, axis.z].map(|x| (x / LEAN).floor() as i8) }
 }
 
 /// The cells of edge `size` that come nearer to `x` than `reach` (m), and some more.
 fn bins_around(x: &Point3<f64>, size: f64, reach: f64) -> CellBox {
-    let (home, steps) = (cell_of(x, size), (reach / size).ceil() as i32);
+    let (home, steps) = (voxel_of(x, size), (reach / size).ceil() as i32);
     CellBox { lo: home, hi: home }.widened(steps, steps)
 }
 

@@ -6,10 +6,11 @@ use super::cone::{NotReached, Orientation, leaned, rings};
 use super::course::{EarlyEnd, FeatureProbing};
 use super::ending::{Ending, ProbedTouch};
 use super::prober::{Flag, Prober};
-use super::repeat::{SpotError, some_other};
+use super::repeat::SpotError;
 use super::world::{normal_about, on_mesh};
 use crate::explore::TouchPlan;
 use crate::features::Kind;
+use crate::numeric::tangent_basis;
 
 /// What the touches of a spot say of the tip.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,8 +62,7 @@ impl Prober<'_> {
         course: &mut FeatureProbing,
         pivoted: &mut Pivoted,
     ) -> Result<Option<SpotError>, EarlyEnd> {
-        let u = normal.cross(&some_other(normal)).normalize() * ASIDE;
-        let v = normal.cross(&u);
+        let [u, v] = tangent_basis(normal).map(|across| across * ASIDE);
         let around = [u, v, -u, -v].map(|aside| (Orientation { lean: 0.0, towards: 0.0 }, aside));
         let leaning = rings(RINGS).map(|orientation| (orientation, Vector3::zeros()));
         let upright = course.rotation;

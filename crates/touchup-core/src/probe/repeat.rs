@@ -7,6 +7,7 @@ use super::prober::{Flag, Prober};
 use super::world::{normal_about, on_mesh};
 use crate::explore::TouchPlan;
 use crate::features::Kind;
+use crate::numeric::tangent_basis;
 use crate::robot::{OnsetVerdict, TouchOutcome};
 
 /// One touch of the spot.
@@ -69,13 +70,13 @@ impl Prober<'_> {
         let (_, mut course) = self.begin(&flag).map_err(|broken| SpotError::Ended(broken.into()))?;
         let place = on_mesh(self.world, spot);
         let normal = normal_about(self.world, &place, &self.cell.shaft(&course.rotation));
-        let across = Unit::new_normalize(normal.cross(&some_other(&normal)));
+        let across = tangent_basis(&normal)[0];
         let from = place + normal.into_inner() * (self.params.pattern.ball_radius + STANDOFF);
         let (mut touches, mut failed) = (Vec::with_capacity(count), None);
         let mut touch_all = || {
             for touch in 1..=count {
                 let side = if touch % 2 == 1 { 1 } else { -1 };
-                let aside = across.into_inner() * (f64::from(side) * ASIDE);
+                let aside = across * (f64::from(side) * ASIDE);
                 let entry = from + normal.into_inner() * ABOVE + aside;
                 let wish = TouchPlan { entry, from, direction: -normal, search: 2.0 * STANDOFF, expected: None };
                 if course.seconds() > self.params.limits.time {
@@ -107,11 +108,6 @@ impl Prober<'_> {
             Ok(()) => failed.map_or(Ok(Repeatability { touches, place, normal }), Err),
         }
     }
-}
-
-/// A direction that is far from another.
-pub(super) fn some_other(of: &Vector3<f64>) -> Vector3<f64> {
-    if of.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() }
 }
 
 impl Repeatability {

@@ -7,10 +7,11 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{Isometry3, Matrix6, Point3, SMatrix, SVector, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6, Point3, SMatrix, SVector, Vector3, Vector6};
 
 use super::ScanParams;
 use crate::mesh::{FaceTree, TriMesh};
+use crate::numeric::{NormalEquations, VoxelKey, cauchy_weight, moved_by_twist, point_to_plane_row, voxel_neighbourhood, voxel_of};
 use crate::touch::SettingError;
 
 /// Settings of a [`Registrar`].
@@ -96,7 +97,7 @@ type Information = SMatrix<f64, 7, 7>;
 #[derive(Clone, Debug)]
 pub struct Registrar {
     params: RegistrationParams,
-    means: BTreeMap<([i64; 3], i8), Mean>,
+    means: BTreeMap<(VoxelKey, i8), Mean>,
 }
 
 /// Cells of contacts that are kept; later ones elsewhere are left out.
@@ -140,7 +141,7 @@ impl Registrar {
     pub fn push(&mut self, point: &Point3<f64>, normal: &Vector3<f64>) {
         // the two sides of a thin wall stay apart
         let facing = (normal.iamax() as i8 + 1) * if normal[normal.iamax()] < 0.0 { -1 } else { 1 };
-        let cell = (cell_of(point, self.params.spacing), facing);
+        let cell = (voxel_of(point, self.params.spacing), facing);
         if self.means.len() >= MOST_MEANS && !self.means.contains_key(&cell) {
             return;
         }
@@ -164,13 +165,13 @@ impl Registrar {
         let mut pose = Isometry3::identity();
         for round in 0..ROUNDS {
             let fit = RegistrationRound::of(self, &contacts, scan, tree, &centre, &pose)?;
-            let step = fit.step;
-            pose = moved(&pose, &centre, &step);
+            let [shift, turn] = [0, 3].map(|at| fit.step.fixed_rows::<3>(at).into_owned());
+            pose = moved_by_twist(&pose, &centre, &shift, &turn);
             let largest = pose.translation.vector.norm() + (pose * centre - centre).norm();
             if !largest.is_finite() || (pose * centre - centre).norm() > REACH * self.params.scan_noise {
                 break;
             }
-            let moved = step.fixed_rows::<3>(0).norm() + step.fixed_rows::<3>(3).norm() * fit.lever;
+            let moved = shift.norm() + turn.norm() * fit.lever;
             let is_at_rest = moved < REST * self.params.scan_noise;
             if is_at_rest || (round >= ROUNDS / 2 && fit.step_in_sigmas() < SMALL_STEP) {
                 return Ok(fit.registration(&pose, &centre));
@@ -182,17 +183,6 @@ impl Registrar {
 
 fn contact_of(mean: &Mean) -> Option<(Point3<f64>, Vector3<f64>)> {
     Some((Point3::from(mean.point / mean.count), mean.normal.try_normalize(0.0)?))
-}
-
-fn cell_of(p: &Point3<f64>, size: f64) -> [i64; 3] {
-    [p.x, p.y, p.z].map(|x| (x / size).floor() as i64)
-}
-
-/// `pose` with a small twist about `centre` after it.
-fn moved(pose: &Isometry3<f64>, centre: &Point3<f64>, step: &Unknowns) -> Isometry3<f64> {
-    let turn = UnitQuaternion::from_scaled_axis(step.fixed_rows::<3>(3).into_owned());
-    let shift = step.fixed_rows::<3>(0) + centre.coords - turn * centre.coords;
-    Isometry3::from_parts(shift.into(), turn) * pose
 }
 
 /// One round of least squares.
@@ -228,9 +218,8 @@ impl RegistrationRound {
                 let hit = tree.closest(scan, &(pose.inverse() * p), REACH * scan_noise)?;
                 let is_same = scan.normal(hit.face).dot(&(pose.inverse() * n)) >= SMALLEST_COSINE;
                 let arm = p - centre;
-                let turn = arm.cross(n);
-                let row = Unknowns::from_column_slice(&[n.x, n.y, n.z, turn.x, turn.y, turn.z, -1.0]);
-                is_same.then(|| (cell_of(p, correlation), row, n.dot(&(p - pose * hit.point)), arm.norm_squared(), *p))
+                let row = point_to_plane_row(&arm, n, 1.0).insert_row(6, -1.0);
+                is_same.then(|| (voxel_of(p, correlation), row, n.dot(&(p - pose * hit.point)), arm.norm_squared(), *p))
             })
             .collect();
         let cells: std::collections::BTreeSet<_> = rows.iter().map(|(cell, ..)| *cell).collect();
@@ -246,17 +235,15 @@ impl RegistrationRound {
         let mut step = Unknowns::zeros();
         let mut weights = vec![1.0; rows.len()];
         for _ in 0..5 {
-            let mut information = Information::zeros();
-            information[(6, 6)] = prior;
-            let mut right = Unknowns::zeros();
+            let mut equations = NormalEquations::default();
+            equations.information[(6, 6)] = prior;
             for ((_, row, error, ..), weight) in rows.iter().zip(&weights) {
-                information += row * row.transpose() * (weight * unit);
-                right += row * (error * weight * unit);
+                equations.add(row, *error, weight * unit);
             }
-            step = information.cholesky().ok_or(RegistrationError::Unsettled)?.solve(&right);
+            step = equations.solution().ok_or(RegistrationError::Unsettled)?;
             for ((_, row, error, ..), weight) in rows.iter().zip(&mut weights) {
                 let left = (error - row.dot(&step)) / (HALF_WEIGHT * scan_noise);
-                *weight = 1.0 / (1.0 + left * left);
+                *weight = cauchy_weight(left * left);
             }
         }
         // where the estimate gives way: not by the weights but by how fast the weighted errors grow
@@ -292,15 +279,14 @@ impl RegistrationRound {
 /// How many independent values of the scan's noise `points` stand for: n² / Σ ρ(p − q) with a correlation ρ that falls
 /// linearly to nothing over `correlation` on each axis.
 fn independent<'a>(points: impl Iterator<Item = &'a Point3<f64>>, correlation: f64) -> f64 {
-    let mut cells: BTreeMap<[i64; 3], f64> = BTreeMap::new();
-    points.for_each(|p| *cells.entry(cell_of(p, correlation / 2.0)).or_insert(0.0) += 1.0);
+    let mut cells: BTreeMap<VoxelKey, f64> = BTreeMap::new();
+    points.for_each(|p| *cells.entry(voxel_of(p, correlation / 2.0)).or_insert(0.0) += 1.0);
     let total: f64 = cells.values().sum();
     let mut alike = 0.0;
     for (cell, count) in &cells {
-        for at in 0..27 {
-            let way = [at % 3 - 1, at / 3 % 3 - 1, at / 9 - 1];
-            let next = cells.get(&[0, 1, 2].map(|axis| cell[axis] + way[axis])).copied().unwrap_or(0.0);
-            alike += count * next * way.iter().map(|x| 1.0 - x.abs() as f64 / 2.0).product::<f64>();
+        for near in voxel_neighbourhood(*cell) {
+            let steps = cell.iter().zip(near).filter(|(a, b)| *a != b).count();
+            alike += count * cells.get(&near).copied().unwrap_or(0.0) * 0.5f64.powi(steps as i32);
         }
     }
     total * total / alike

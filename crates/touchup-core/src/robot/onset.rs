@@ -8,8 +8,10 @@
 //! that neither the threshold at which the arm was told to stop nor its braking travel is in s₀. τ moves the corner forward
 //! going in and backward coming out: a touch that does both tells it.
 
+use nalgebra::{Cholesky, Matrix4, Vector3, Vector4};
+
+use crate::numeric::{NormalEquations, median};
 use crate::parameters;
-use nalgebra::{Cholesky, Matrix3, Matrix4, Vector3, Vector4};
 
 /// One moment of a touch.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -215,16 +217,13 @@ fn smoothed(moments: &[TouchMoment]) -> Vec<Smooth> {
         |index: usize, beside: usize| &moments[index.saturating_sub(beside)..(index + beside + 1).min(moments.len())];
     let travel = |index: usize| {
         let (here, near) = (moments[index], around(index, BESIDE));
-        let (mut square, mut right) = (Matrix3::zeros(), Vector3::zeros());
         // in units that keep the matrix regular
         let scale = near.last().map_or(1.0, |last| last.t) - near[0].t;
-        for m in near {
+        let row = |m: &TouchMoment| {
             let x = (m.t - here.t) / scale;
-            let powers = Vector3::new(1.0, x, x * x);
-            square += powers * powers.transpose();
-            right += powers * (m.travel - here.travel);
-        }
-        here.travel + Cholesky::new(square).map_or(0.0, |square| square.solve(&right)[0])
+            (Vector3::new(1.0, x, x * x), m.travel - here.travel)
+        };
+        here.travel + NormalEquations::of(near.iter().map(row)).solution().map_or(0.0, |parabola| parabola[0])
     };
     let speed = |index: usize| {
         let near = around(index, BESIDE_SPEED);
@@ -278,8 +277,7 @@ impl ForceCurve<'_> {
             return Err(OnsetError::NoFreeAir { count: 0 });
         }
         let mut first: Vec<_> = before.iter().copied().take((before.len() / 4).max(LEAST)).collect();
-        first.sort_by(f64::total_cmp);
-        let free = first.get(first.len() / 2).copied().unwrap_or(peak);
+        let free = median(&mut first).unwrap_or(peak);
         if peak - free < least {
             return Err(OnsetError::NoContact { peak_n: peak - free, contact_n: least });
         }
@@ -342,15 +340,14 @@ impl ForceCurve<'_> {
         self.moments.iter().map(of).sum::<f64>() + believed * believed
     }
 
-    /// JᵀJ and Jᵀr of the moments, as [`Self::cost`] weighs them.
-    fn normal_equations(&self, line: &LineFit) -> (Matrix4<f64>, LineFit) {
-        let (mut square, mut right) = (Matrix4::zeros(), LineFit::zeros());
+    /// Of a small change of the line, as [`Self::cost`] weighs the moments.
+    fn normal_equations(&self, line: &LineFit) -> NormalEquations<4> {
+        let mut equations = NormalEquations::default();
         for m in self.moments {
             let (residual, gradient, variance) = self.residual(m, line);
-            square += gradient * gradient.transpose() / variance;
-            right += gradient * (residual / variance);
+            equations.add(&gradient, residual, 1.0 / variance);
         }
-        (square, right)
+        equations
     }
 
     /// Gauss–Newton, damped where a step does not help. Returns the line and its cost.
@@ -358,11 +355,10 @@ impl ForceCurve<'_> {
         let believed = self.params.delay_sigma.powi(-2);
         let (mut cost, mut damping) = (self.cost(&line), 1e-6);
         for _ in 0..ROUNDS {
-            let (mut square, mut right) = self.normal_equations(&line);
-            square[(TAU, TAU)] += believed;
-            right[TAU] += believed * (self.params.delay - line[TAU]);
-            let damped = square + Matrix4::from_diagonal(&(square.diagonal() * damping));
-            let step = Cholesky::new(damped)?.solve(&right);
+            let mut equations = self.normal_equations(&line);
+            equations.add(&LineFit::ith(TAU, 1.0), self.params.delay - line[TAU], believed);
+            equations.information += Matrix4::from_diagonal(&(equations.information.diagonal() * damping));
+            let step = equations.solution()?;
             let next = line + step;
             let next_cost = self.cost(&next);
             if next_cost <= cost && next[K] > 0.0 {
@@ -410,7 +406,7 @@ impl ForceCurve<'_> {
             noise: [0, 1].map(|at| self.noise[at] * f64::sqrt(shared[at])),
             ..*self
         };
-        let (mut square, _) = weighed.normal_equations(line);
+        let mut square = weighed.normal_equations(line).information;
         // of what tells of τ, some is noise of the speed
         let travel_variance = self.travel_variance();
         let noisy: f64 = (0..self.moments.len())
@@ -498,8 +494,7 @@ impl ForceCurve<'_> {
     fn lateral_share(&self, line: &LineFit) -> f64 {
         let pressing = self.moments.iter().filter(|m| m.force - line[B] >= self.contact_force());
         let mut shares: Vec<f64> = pressing.map(|m| m.lateral.abs() / (m.force - line[B])).collect();
-        shares.sort_by(f64::total_cmp);
-        shares.get(shares.len() / 2).copied().unwrap_or(0.0)
+        median(&mut shares).unwrap_or(0.0)
     }
 
     /// Whether the force differs between going in and coming out at the same depth, by itself or as a delay that cannot be.

@@ -7,10 +7,11 @@
 
 use std::collections::VecDeque;
 
-use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+use nalgebra::{Vector2, Vector3};
 use serde::Serialize;
 
 use super::{ContactSample, SettingError};
+use crate::numeric::NormalEquations;
 
 /// Settings of a [`ClockEstimator`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -208,15 +209,11 @@ fn force_begins(samples: &[OnsetSample]) -> Option<f64> {
     for time in [2e-3, 4e-3, 7e-3, 10e-3, 15e-3, 30e-3] {
         for step in 0..=90 {
             let begun = 1e-3 - f64::from(step) * 1e-4;
-            let (mut normal, mut right, mut squares) = (Matrix2::zeros(), Vector2::zeros(), 0.0);
-            for x in rise() {
-                let row = Vector2::new(1.0, -(-(x.t - begun).max(0.0) / time).exp_m1());
-                normal += row * row.transpose();
-                right += row * x.force;
-                squares += x.force * x.force;
-            }
-            let Some(solved) = normal.cholesky().map(|c| c.solve(&right)) else { continue };
-            let left = squares - solved.dot(&right);
+            let row =
+                |x: &OnsetSample| (Vector2::new(1.0, -(-(x.t - begun).max(0.0) / time).exp_m1()), x.force);
+            let equations = NormalEquations::of(rise().map(row));
+            let Some(solved) = equations.solution() else { continue };
+            let left = equations.residual_square(&solved);
             if best.is_none_or(|(least, _)| left < least) {
                 best = Some((left, begun));
             }
@@ -227,17 +224,13 @@ fn force_begins(samples: &[OnsetSample]) -> Option<f64> {
 
 /// What is left of the centre's way after a bent line is taken off, and the speeds before and after the bend.
 fn kink(samples: &[OnsetSample], begun: f64, delay: f64, bend: f64) -> Option<(f64, [f64; 2])> {
-    let (mut normal, mut right, mut squares) = (Matrix3::zeros(), Vector3::zeros(), 0.0);
-    for x in samples {
-        let centre = x.centre + force_at(samples, x.t + delay) * bend;
+    let row = |x: &OnsetSample| {
         let t = x.t - (begun - delay);
-        let row = Vector3::new(1.0, t.min(0.0), t.max(0.0));
-        normal += row * row.transpose();
-        right += row * centre;
-        squares += centre * centre;
-    }
-    let solved = normal.cholesky()?.solve(&right);
-    Some((squares - solved.dot(&right), [solved.y, solved.z]))
+        (Vector3::new(1.0, t.min(0.0), t.max(0.0)), x.centre + force_at(samples, x.t + delay) * bend)
+    };
+    let equations = NormalEquations::of(samples.iter().map(row));
+    let solved = equations.solution()?;
+    Some((equations.residual_square(&solved), [solved.y, solved.z]))
 }
 
 /// Between samples straight, beyond them as the nearest.

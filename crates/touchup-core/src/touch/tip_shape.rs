@@ -8,6 +8,7 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::SettingError;
+use crate::numeric::tangent_basis;
 use crate::parameters;
 
 /// Which tip it is; its radius is a setting of its own.
@@ -181,7 +182,7 @@ impl TipBody {
         let across = arm - place.axis * height;
         let from_axis = across.norm();
         let (distance, [out, up]) = self.core_distance([from_axis, height]);
-        let outward = across.try_normalize(ON_AXIS * self.radius).unwrap_or_else(|| across_of(&place.axis));
+        let outward = across.try_normalize(ON_AXIS * self.radius).unwrap_or_else(|| tangent_basis(&place.axis)[0]);
         (distance - self.round, outward * out + place.axis * up)
     }
 
@@ -263,13 +264,7 @@ fn split(axis: &Vector3<f64>, direction: &Vector3<f64>) -> (f64, f64, Vector3<f6
     let along = direction.dot(axis);
     let across = direction - axis * along;
     let size = across.norm();
-    (along, size, if size > ON_AXIS { across / size } else { across_of(axis) })
-}
-
-/// Some unit vector across a unit vector.
-fn across_of(axis: &Vector3<f64>) -> Vector3<f64> {
-    let other = if axis.x.abs() < 0.5 { Vector3::x() } else { Vector3::y() };
-    axis.cross(&other).normalize()
+    (along, size, if size > ON_AXIS { across / size } else { tangent_basis(axis)[0] })
 }
 
 #[cfg(test)]

@@ -3,10 +3,11 @@
 use serde::Serialize;
 
 use touchup_core::compare::{
-    CompareError, Summary, TouchedRegion, angle_between, closest_places, deviations, quantile, sample_surface,
+    CompareError, Summary, TouchedRegion, angle_between, closest_places, deviations, sample_surface,
     surface_area,
 };
 use touchup_core::mesh::{Alone, FaceTree, TriMesh};
+use touchup_core::numeric::quantile;
 
 /// Points on the mesh for each m²: four in a square millimetre.
 const DENSITY: f64 = 4e6;

@@ -6,6 +6,7 @@ use super::matching::Matching;
 use super::{Alternative, OrientedSample, SAME, Surfaces};
 use crate::align::icp::{IcpFit, IcpParams, icp};
 use crate::mesh::Alone;
+use crate::numeric::median;
 
 /// Points that bring each motion to rest, at most; all judge it, and bring the last ones to rest.
 const MOST_POINTS: usize = 5_000;
@@ -70,9 +71,7 @@ impl Judged {
     /// From which misfit on a feature is not there, by how well others fit.
     fn absent(&self) -> f64 {
         let mut misfits: Vec<f64> = self.explained().map(|[own, _]| self.misfit(own)).collect();
-        misfits.sort_by(f64::total_cmp);
-        let middle = misfits.get(misfits.len() / 2).copied().unwrap_or(1.0);
-        (ABSENT * middle).clamp(ABSENT_BETWEEN[0], ABSENT_BETWEEN[1])
+        (ABSENT * median(&mut misfits).unwrap_or(1.0)).clamp(ABSENT_BETWEEN[0], ABSENT_BETWEEN[1])
     }
 
     fn misfit(&self, own: usize) -> f64 {

@@ -1,9 +1,10 @@
 //! How many features a motion explains, and the motion that explains them best.
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector3, Vector6};
 
 use super::FeaturesParams;
 use super::landmark::Landmark;
+use crate::numeric::moved_by_twist;
 
 /// Both sets of features, and which may be the same.
 pub(super) struct Matching {
@@ -106,8 +107,6 @@ impl Matching {
         normal += Matrix6::identity() * (normal.diagonal().max() * 1e-9).max(f64::MIN_POSITIVE);
         let twist = normal.cholesky()?.solve(&right);
         let (shift, turn) = (twist.fixed_rows::<3>(0).into_owned(), twist.fixed_rows::<3>(3) / self.lever);
-        let turn = UnitQuaternion::from_scaled_axis(turn);
-        let moved = Isometry3::from_parts(Translation3::from(shift + centre.coords - turn * centre.coords), turn);
-        twist.iter().all(|x| x.is_finite()).then(|| moved * motion)
+        twist.iter().all(|x| x.is_finite()).then(|| moved_by_twist(motion, &centre, &shift, &turn))
     }
 }

@@ -6,6 +6,7 @@ use super::cells::Cells;
 use super::{Class, RefinedShape};
 use crate::compare::CompareError;
 use crate::compare::deviation::closest_places;
+use crate::numeric::median;
 use crate::touch::ProbedPoint;
 
 /// Bad touches one after the other.
@@ -86,8 +87,7 @@ fn against<'a>(
 fn contradiction(touches: &[ProbedPoint], at: usize, taken: &Cells<'_>, foot: &Point3<f64>, reach: f64) -> Option<f64> {
     let off = |other: usize| (touches[at].point - touches[other].point).dot(&touches[other].normal).abs();
     let mut off: Vec<f64> = against(touches, at, taken, foot, reach).map(off).collect();
-    off.sort_by(f64::total_cmp);
-    (off.len() >= FEWEST).then(|| off[off.len() / 2])
+    if off.len() < FEWEST { None } else { median(&mut off) }
 }
 
 fn told(numbers: &[usize], touches: &[ProbedPoint], off: &[f64], against: impl Fn(usize) -> usize) -> BadTouches {

@@ -4,11 +4,13 @@ use std::collections::BTreeMap;
 
 use nalgebra::Point3;
 
+use crate::numeric::{VoxelKey, voxel_neighbourhood, voxel_of};
+
 /// Numbers of points by the cube they lie in.
 pub(super) struct Cells<'a> {
     side: f64,
     points: &'a [Point3<f64>],
-    cells: BTreeMap<[i64; 3], Vec<u32>>,
+    cells: BTreeMap<VoxelKey, Vec<u32>>,
 }
 
 impl<'a> Cells<'a> {
@@ -16,26 +18,15 @@ impl<'a> Cells<'a> {
     /// - `numbers`: of the points that are to be found.
     pub fn new(points: &'a [Point3<f64>], numbers: impl Iterator<Item = usize>, side: f64) -> Self {
         let side = side.max(f64::MIN_POSITIVE);
-        let mut cells: BTreeMap<[i64; 3], Vec<u32>> = BTreeMap::new();
-        numbers.for_each(|at| cells.entry(cell(&points[at], side)).or_default().push(at as u32));
+        let mut cells: BTreeMap<VoxelKey, Vec<u32>> = BTreeMap::new();
+        numbers.for_each(|at| cells.entry(voxel_of(&points[at], side)).or_default().push(at as u32));
         Self { side, points, cells }
     }
 
     /// Numbers of the points within `reach` (m, at most the side) of `p`.
     pub fn near(&self, p: &Point3<f64>, reach: f64) -> impl Iterator<Item = usize> + '_ {
-        let ([x, y, z], p) = (cell(p, self.side), *p);
-        let cubes = (0..27).filter_map(move |at| {
-            self.cells.get(&[
-                x.saturating_add(at % 3 - 1),
-                y.saturating_add(at / 3 % 3 - 1),
-                z.saturating_add(at / 9 - 1),
-            ])
-        });
+        let p = *p;
+        let cubes = voxel_neighbourhood(voxel_of(&p, self.side)).filter_map(|voxel| self.cells.get(&voxel));
         cubes.flatten().map(|&at| at as usize).filter(move |&at| (self.points[at] - p).norm() <= reach)
     }
-}
-
-fn cell(p: &Point3<f64>, side: f64) -> [i64; 3] {
-    // casts end at the largest number
-    [p.x, p.y, p.z].map(|x| (x / side).floor() as i64)
 }

@@ -9,6 +9,7 @@ use std::f64::consts::TAU;
 use nalgebra::{Matrix6, Point3, SMatrix, SVector, Vector3, Vector6};
 
 use super::{Places, Scanner};
+use crate::numeric::{NormalEquations, SIGMA_OF_MEDIAN, TUKEY_WIDTH, biweight, centroid_and_spread, median, point_to_plane_row};
 
 /// The scan against the touches, of small angles.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,10 +28,6 @@ pub struct Misplaced {
 
 /// Rounds of weights.
 const ROUNDS: usize = 10;
-/// Width of Tukey's weights in standard deviations.
-const WIDTH: f64 = 4.685;
-/// Standard deviation of normal errors over their median.
-const SIGMA_OF_MEDIAN: f64 = 1.4826;
 /// By which share of the weight of all places shift and turn are held back.
 const HELD_BACK: f64 = 0.03;
 /// Squares of normal numbers, one to six of them, sum up to more than this once in a thousand times.
@@ -59,38 +56,31 @@ impl OffsetFit {
     /// Of the open places; `None` where they tell nothing.
     pub fn of(places: &Places) -> Option<Self> {
         let open: Vec<usize> = (0..places.off.len()).filter(|&at| places.is_open[at]).collect();
-        let count = open.len() as f64;
-        let sum: Vector3<f64> = open.iter().map(|&at| places.positions[at].coords).sum();
-        let centre = Point3::from(sum / count);
-        let square: f64 = open.iter().map(|&at| (places.positions[at] - centre).norm_squared()).sum();
-        let lever = (square / count).sqrt();
+        let (centre, lever) = centroid_and_spread(open.iter().map(|&at| &places.positions[at]));
         let row = |at: usize| {
-            let (n, arm) = (places.normals[at], (places.positions[at] - centre) / lever);
-            let turn = arm.cross(&n);
-            SVector::<f64, 7>::from([1.0, n.x, n.y, n.z, turn.x, turn.y, turn.z])
+            let arm = places.positions[at] - centre;
+            point_to_plane_row(&arm, &places.normals[at], lever).insert_row(0, 1.0)
         };
         let mut x = SVector::<f64, 7>::zeros();
         let mut width = f64::INFINITY;
         let mut spread = SMatrix::<f64, 7, 7>::zeros();
         for _ in 0..ROUNDS {
-            let (mut normal, mut right, mut weights) = (SMatrix::<f64, 7, 7>::zeros(), SVector::<f64, 7>::zeros(), 0.0);
+            let (mut equations, mut weights) = (NormalEquations::default(), 0.0);
             let mut sizes = Vec::with_capacity(open.len());
             for &at in &open {
                 let row = row(at);
                 let left = places.off[at] - row.dot(&x);
                 sizes.push(left.abs());
-                let weight = (1.0 - (left / width).powi(2)).max(0.0).powi(2) * places.areas[at];
-                normal += row * row.transpose() * weight;
-                right += row * (places.off[at] * weight);
+                let weight = biweight((left / width).powi(2)) * places.areas[at];
+                equations.add(&row, places.off[at], weight);
                 weights += weight;
             }
-            let told = normal;
-            (1..7).for_each(|i| normal[(i, i)] += HELD_BACK * weights);
-            let inverse = normal.cholesky()?.inverse();
-            x = inverse * right;
-            spread = inverse * told * inverse;
-            let middle = sizes.len() / 2;
-            width = WIDTH * SIGMA_OF_MEDIAN * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+            let mut held = equations.information;
+            (1..7).for_each(|i| held[(i, i)] += HELD_BACK * weights);
+            let inverse = held.cholesky()?.inverse();
+            x = inverse * equations.right;
+            spread = inverse * equations.information * inverse;
+            width = TUKEY_WIDTH * SIGMA_OF_MEDIAN * median(&mut sizes)?;
             if width <= 0.0 {
                 break;
             }

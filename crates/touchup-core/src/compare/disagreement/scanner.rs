@@ -4,7 +4,8 @@ use nalgebra::{Point3, Vector3};
 
 use super::cells::Cells;
 use super::{Places, RefinedShape};
-use crate::mesh::{TriMesh, VertexId, median};
+use crate::mesh::{TriMesh, VertexId};
+use crate::numeric::{SIGMA_OF_MEDIAN, median};
 
 /// How the scanner errs where it should see well.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,8 +24,6 @@ pub struct Scanner {
     pub places: usize,
 }
 
-/// Standard deviation of normal errors over their median.
-const SIGMA_OF_MEDIAN: f64 = 1.4826;
 /// The median of a squared normal number of variance 1.
 const MEDIAN_OF_SQUARE: f64 = 0.4549;
 /// What is so many edges of the scan's triangles wide is seen: a facet on each wall, one on the floor, and one in between.

@@ -3,6 +3,7 @@
 use super::solver::FitProblem;
 use super::uncertainty::Uncertainty;
 use super::{Fit, FitError, FitParams, Observation, Surface};
+use crate::numeric::{SIGMA_OF_MEDIAN, TUKEY_WIDTH, biweight, median};
 
 /// Weight updates in one round; the weights settle long before.
 const MOST_UPDATES: usize = 50;
@@ -10,11 +11,8 @@ const MOST_UPDATES: usize = 50;
 const SETTLED_WEIGHT: f64 = 1e-2;
 /// Rounds of rejection; what is kept repeats after two or three.
 const MOST_REJECTIONS: usize = 10;
-/// Median of |x| to standard deviation, for the normal distribution: 1/Φ⁻¹(3/4).
-const MEDIAN_TO_SIGMA: f64 = 1.482_602_218_505_602;
-/// Efficiency of 95 % on normal errors, both.
+/// Efficiency of 95 % on normal errors, as [`TUKEY_WIDTH`].
 const HUBER: f64 = 1.345;
-const TUKEY: f64 = 4.685;
 /// Corrections of the bias by curvature; the second one changes it in the fourth order.
 const DEBIASINGS: usize = 2;
 
@@ -64,16 +62,14 @@ fn huber(z: f64) -> f64 {
 }
 
 fn tukey(z: f64) -> f64 {
-    (1.0 - (z / TUKEY).powi(2)).max(0.0).powi(2)
+    biweight((z / TUKEY_WIDTH).powi(2))
 }
 
 /// Scale of normalised residuals, at least 1: from the median of all, as half of them are good.
 fn scale<M: Surface>(z: &[f64]) -> f64 {
     let mut sizes: Vec<f64> = z.iter().map(|z| z.abs()).collect();
-    let middle = sizes.len() / 2;
-    let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
     let freedom = z.len() as f64 / (z.len().saturating_sub(M::freedom_count())).max(1) as f64;
-    (MEDIAN_TO_SIGMA * *median * freedom.sqrt()).max(1.0)
+    (SIGMA_OF_MEDIAN * median(&mut sizes).unwrap_or(0.0) * freedom.sqrt()).max(1.0)
 }
 
 /// Steps and weights by turns until both settle. A round that does not is no error: the next one goes on from there.

@@ -3,6 +3,7 @@
 use nalgebra::{SMatrix, Vector3};
 
 use super::{FREEDOMS, FitError, FitParams, Observation, Steps, Surface};
+use crate::numeric::{NormalEquations, centroid_and_spread};
 
 /// A matrix over the freedoms.
 pub(super) type FreedomMatrix = SMatrix<f64, FREEDOMS, FREEDOMS>;
@@ -35,22 +36,13 @@ pub(super) struct FitProblem<'a> {
     pub shift: Vec<f64>,
 }
 
-/// The quadratic around a surface: cost + 2 gradient · x + x · information · x in scaled steps.
-pub(super) struct Quadratic {
-    pub information: FreedomMatrix,
-    pub gradient: Steps,
-    pub cost: f64,
-}
-
 impl<'a> FitProblem<'a> {
     pub fn new(observations: &'a [Observation], axis: Vector3<f64>, params: &FitParams) -> Self {
         let mut names: Vec<u32> = observations.iter().map(|o| o.group).collect();
         names.sort_unstable();
         names.dedup();
         let group = observations.iter().map(|o| names.partition_point(|&name| name < o.group)).collect();
-        let n = observations.len().max(1) as f64;
-        let mean = observations.iter().map(|o| o.point.coords).sum::<Vector3<f64>>() / n;
-        let size = (observations.iter().map(|o| (o.point.coords - mean).norm_squared()).sum::<f64>() / n).sqrt();
+        let (_, size) = centroid_and_spread(observations.iter().map(|o| &o.point));
         Self {
             observations,
             group,
@@ -85,16 +77,14 @@ impl<'a> FitProblem<'a> {
         (0..kept.len()).map(weight).collect()
     }
 
-    /// The quadratic around a surface.
-    pub fn quadratic<M: Surface>(&self, surface: &M, weights: &[f64]) -> Quadratic {
+    /// Of the residuals around a surface, which a scaled step is to take off: the step is minus their solution.
+    pub fn equations<M: Surface>(&self, surface: &M, weights: &[f64]) -> NormalEquations<FREEDOMS> {
         let units = self.units::<M>();
         let mut sum = self.prior(surface);
         for (i, &w) in weights.iter().enumerate().filter(|(_, w)| **w > 0.0) {
             let (distance, by) = surface.derivatives(&self.observations[i].point);
-            let (r, by) = (distance - self.observations[i].offset - self.shift[i], by.component_mul(&units));
-            sum.information.ger(w, &by, &by, 1.0);
-            sum.gradient.axpy(w * r, &by, 1.0);
-            sum.cost += w * r * r;
+            let residual = distance - self.observations[i].offset - self.shift[i];
+            sum.add(&by.component_mul(&units), residual, w);
         }
         sum
     }
@@ -102,8 +92,8 @@ impl<'a> FitProblem<'a> {
     /// What the axis known before adds: seen from F it leans by −a, a its own x and y.
     ///
     /// Turning F by ω takes a from a to a + a × ω, ω as in [`Surface::derivatives`].
-    pub fn prior<M: Surface>(&self, surface: &M) -> Quadratic {
-        let mut sum = Quadratic { information: FreedomMatrix::zeros(), gradient: Steps::zeros(), cost: 0.0 };
+    pub fn prior<M: Surface>(&self, surface: &M) -> NormalEquations<FREEDOMS> {
+        let mut sum = NormalEquations::default();
         if let Some((axis, sigma)) = self.known_axis {
             let known = surface.pose_of().inverse_transform_vector(&axis);
             let weight = sigma.powi(-2);
@@ -111,9 +101,7 @@ impl<'a> FitProblem<'a> {
                 let mut by = Steps::zeros();
                 by[tilt] = known.z;
                 by[5] = if M::FREE[5] { turn } else { 0.0 };
-                sum.information.ger(weight, &by, &by, 1.0);
-                sum.gradient.axpy(weight * lean, &by, 1.0);
-                sum.cost += weight * lean * lean;
+                sum.add(&by, lean, weight);
             }
         }
         sum
@@ -121,19 +109,19 @@ impl<'a> FitProblem<'a> {
 
     fn cost<M: Surface>(&self, surface: &M, weights: &[f64]) -> f64 {
         let of_points = |(i, w): (usize, &f64)| if *w > 0.0 { w * self.residual(surface, i).powi(2) } else { 0.0 };
-        self.prior(surface).cost + weights.iter().enumerate().map(of_points).sum::<f64>()
+        self.prior(surface).square + weights.iter().enumerate().map(of_points).sum::<f64>()
     }
 
     /// One step that does not raise the cost, its length in standard deviations, and the damping for the next;
     /// `None` where no step lowers the cost.
     pub fn step<M: Surface>(&self, surface: &M, weights: &[f64], mut damping: f64) -> Option<(M, f64, f64)> {
-        let Quadratic { information, gradient, cost } = self.quadratic(surface, weights);
+        let NormalEquations { information, right, square: cost } = self.equations(surface, weights);
         let units = self.units::<M>();
         let ridge = RIDGE * information.diagonal().max().max(f64::MIN_POSITIVE);
         for _ in 0..MOST_RAISES {
             let damped =
                 information + FreedomMatrix::from_diagonal(&information.diagonal().map(|x| damping * x + ridge));
-            let step = -damped.cholesky()?.solve(&gradient);
+            let step = -damped.cholesky()?.solve(&right);
             let next = surface.moved(&step.component_mul(&units));
             if step.norm() <= LONGEST_STEP && next.check().is_ok() && self.cost(&next, weights) <= cost {
                 let length = step.dot(&(information * step)).max(0.0).sqrt();

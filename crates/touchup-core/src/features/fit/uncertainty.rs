@@ -38,8 +38,8 @@ impl Uncertainty {
     /// below 1 are raised to 1, so neither of the two is ever undercut.
     pub fn of<M: Surface>(problem: &FitProblem, surface: &M, kept: &[f64], params: &FitParams) -> Self {
         let (units, weights) = (problem.units::<M>(), problem.weights(kept));
-        let quadratic = problem.quadratic(surface, &weights);
-        let (scaled, unknown, alone) = directions(&quadratic.information);
+        let equations = problem.equations(surface, &weights);
+        let (scaled, unknown, alone) = directions(&equations.information);
         let fixed = scaled.column_iter().filter(|c| c.norm_squared() > 0.0).count();
         let mut scores = vec![Steps::zeros(); problem.groups];
         let (mut common, mut in_group) = (Steps::zeros(), vec![false; problem.groups]);
@@ -51,7 +51,7 @@ impl Uncertainty {
             in_group[problem.group[i]] = true;
         }
         let groups = in_group.iter().filter(|is| **is).count();
-        let chi_squared = quadratic.cost;
+        let chi_squared = equations.square;
         let degrees = (groups + if problem.known_axis.is_some() { 2 } else { 0 }).saturating_sub(fixed);
         let spread = (chi_squared / degrees.max(1) as f64).max(1.0);
         let (inner, from) = if groups < fixed + SPARE_GROUPS {

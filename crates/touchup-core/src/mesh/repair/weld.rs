@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 
-use crate::mesh::median;
+use crate::numeric::median;
 
 /// Marks a free place in the table: no vertex has this number.
 const FREE: u32 = u32::MAX;

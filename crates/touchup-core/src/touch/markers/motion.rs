@@ -11,6 +11,7 @@
 use nalgebra::{Isometry3, Matrix6, Point3, UnitQuaternion, Vector3, Vector6};
 
 use super::body::{MarkerBody, MarkerPairs};
+use crate::numeric::cauchy_weight;
 use crate::parameters;
 
 parameters! {
@@ -124,7 +125,7 @@ impl BodyMotion {
                 let error = measured - (self.centroid + arm);
                 let left = error - (twist.fixed_rows::<3>(0) + twist.fixed_rows::<3>(3).cross(&arm));
                 let weight =
-                    if round == 0 { 1.0 } else { 1.0 / (1.0 + left.norm_squared() / (HALF_WEIGHT * noise).powi(2)) };
+                    if round == 0 { 1.0 } else { cauchy_weight(left.norm_squared() / (HALF_WEIGHT * noise).powi(2)) };
                 add_mass(&mut mass, &arm, weight);
                 let torque = arm.cross(&error);
                 pull += Vector6::new(error.x, error.y, error.z, torque.x, torque.y, torque.z) * weight;
