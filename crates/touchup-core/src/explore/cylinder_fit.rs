@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use super::circle::circle;
 use super::design::{Asked, Knowledge};
 use super::measuring::{Measuring, Possible};
-use super::pattern::{PatternParams, Quantity, SearchContext, TouchPlan};
+use super::search_context::{PatternParams, Quantity, SearchContext, TouchPlan};
 use crate::features::fit::{Cylinder, Fit, FitError, FitParams, Freedom, Observation, Plane, fit};
 
 /// Directions that are candidates.

@@ -9,7 +9,8 @@ use super::design::{Asked, Knowledge};
 use super::error::ExploreError;
 use super::hole::numbers;
 use super::measuring::{Measuring, Possible};
-use super::pattern::{Next, PatternParams, Quantity, SearchContext, Stage, TouchResult, Touched};
+use super::pattern::{Next, Stage, Touched};
+use super::search_context::{PatternParams, Quantity, SearchContext, TouchPlan, TouchResult};
 use super::search::{ROUGH, SHALLOW};
 use super::slide::{RimStation, Slide};
 use crate::features::Feature;
@@ -171,7 +172,7 @@ impl EdgePattern {
     }
 
     /// Inward from beyond the edge, at a place along it.
-    fn inward(&self, course: &SearchContext, along: f64, depth: f64) -> super::pattern::TouchPlan {
+    fn inward(&self, course: &SearchContext, along: f64, depth: f64) -> TouchPlan {
         let beyond = Self::ring(&course.params) + course.params.ball_radius;
         let from = Point3::origin() + self.over * beyond + self.along() * along;
         course.sideways(&from, depth, &-self.over, 2.0 * beyond)

@@ -12,7 +12,8 @@ use nalgebra::{Point3, Vector3};
 
 use super::cylinder_fit::{BELOW_RIM, RoundWall, surface_about};
 use super::error::ExploreError;
-use super::pattern::{Next, PatternParams, SearchContext, Stage, TouchResult, Touched};
+use super::pattern::{Next, Stage, Touched};
+use super::search_context::{PatternParams, SearchContext, TouchResult};
 use super::search::{Looking, ROUGH, SHALLOW};
 use super::slide::{RimStation, Slide, circle};
 use crate::features::fit::Observation;

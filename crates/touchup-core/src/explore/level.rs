@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, Unit, UnitQuaternion, Vector3};
 
-use super::pattern::SearchContext;
+use super::search_context::SearchContext;
 use crate::features::fit::Observation;
 
 /// Touches within this of a plane are of it, m.

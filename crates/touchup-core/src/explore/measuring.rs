@@ -3,7 +3,8 @@
 use nalgebra::Point3;
 
 use super::design::{Asked, Candidate, Knowledge};
-use super::pattern::{Expected, TouchPlan, TouchResult, Touched};
+use super::pattern::Touched;
+use super::search_context::{Expected, TouchPlan, TouchResult};
 use crate::features::fit::{FitParams, Observation, Surface, fit};
 
 /// A touch that could be made: where the surface would be felt, and how.

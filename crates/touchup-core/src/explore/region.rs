@@ -3,7 +3,8 @@
 use nalgebra::Point3;
 
 use super::error::ExploreError;
-use super::pattern::{Next, PatternParams, SearchContext, Stage, Touched};
+use super::pattern::{Next, Stage, Touched};
+use super::search_context::{PatternParams, SearchContext};
 use super::search::{ROUGH, hexagonal};
 use super::slide::Slide;
 use crate::features::Feature;

@@ -6,7 +6,8 @@
 use nalgebra::Point3;
 
 use super::error::ExploreError;
-use super::pattern::{PatternParams, SearchContext, TouchPlan, TouchResult, Touched};
+use super::pattern::Touched;
+use super::search_context::{PatternParams, SearchContext, TouchPlan, TouchResult};
 use crate::features::fit::Observation;
 
 /// Distance of the places where it is looked for, over the ball's radius: the ball falls into a hole of 2.2 radii at least.

@@ -7,7 +7,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use nalgebra::{Point3, Unit, Vector3};
 
-use super::pattern::SearchContext;
+use super::search_context::SearchContext;
 
 /// A place on the way of a slide, in O.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,0 +1,161 @@
+//! What is asked of a search, the touches that it plans, what came of them, and the frame in which it looks.
+
+use nalgebra::{Isometry3, Point3, Unit, Vector3};
+
+use crate::features::Kind;
+use crate::parameters;
+
+parameters! {
+    /// What is known and wanted of a flagged feature.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct PatternParams in "robot" {
+        /// Of the ball, m.
+        ball_radius: f64 = 1.5e-3;
+        /// The flag is off by no more than this, m; of a plane or an unknown region: so far around the flag is touched.
+        flag_radius: f64 = 3e-3;
+        /// Distance of the ball from the surface where a search begins.
+        ///
+        /// In m.
+        clearance: f64 = 3.0, "clearance_mm" [MM, 0.5, 50];
+        /// How deep the centre of the ball is let into a hole.
+        ///
+        /// In m.
+        depth: f64 = 5.0, "depth_mm" [MM, 0, 100];
+        /// The number that touches are chosen for.
+        quantity: Quantity = Quantity::All;
+        /// Wanted standard deviation of it, m, or rad of an axis.
+        sigma: f64 = 4e-6;
+        /// Touches of a feature at most.
+        budget: usize = 39, "touches" [TOUCHES, 1, 1e4];
+        /// Expected standard deviation of one touch.
+        ///
+        /// In m.
+        touch_sigma: f64 = 0.005, "touch_sigma_mm" [MM, 1e-5, 1];
+    }
+}
+
+/// A number of a feature.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Quantity {
+    /// place and sizes: every length
+    #[default]
+    All,
+    /// where it is
+    Position,
+    /// the direction of its axis, of an edge its line, of a plane its normal; rad
+    Axis,
+    /// of a hole or boss
+    Diameter,
+    /// of a slot
+    Length,
+    /// of a slot
+    Width,
+}
+
+impl Quantity {
+    /// In words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::All => "every length",
+            Self::Position => "position",
+            Self::Axis => "axis",
+            Self::Diameter => "diameter",
+            Self::Length => "length",
+            Self::Width => "width",
+        }
+    }
+
+    /// Whether a feature has it.
+    pub fn is_of(self, kind: Option<Kind>) -> bool {
+        match self {
+            Self::All => true,
+            Self::Position | Self::Axis => kind.is_some(),
+            Self::Diameter => matches!(kind, Some(Kind::Hole | Kind::Boss)),
+            Self::Length | Self::Width => kind == Some(Kind::Slot),
+        }
+    }
+}
+
+/// A touch that is wanted, in O.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TouchPlan {
+    /// Above the part: from here the way to `from` is straight and free.
+    pub entry: Point3<f64>,
+    /// Centre of the ball where the search begins.
+    pub from: Point3<f64>,
+    /// Along which it is searched.
+    pub direction: Unit<Vector3<f64>>,
+    /// How far, m.
+    pub search: f64,
+    /// Where the surface will be, as far as touches tell.
+    pub expected: Option<Expected>,
+}
+
+/// How far from where a search begins the surface will be felt.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Expected {
+    /// of the ball's centre, m
+    pub travel: f64,
+    /// standard deviation, m
+    pub sigma: f64,
+}
+
+/// What came of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum TouchResult {
+    /// The ball was stopped.
+    At {
+        /// its centre, m in O
+        centre: Point3<f64>,
+        /// standard deviation along the direction, m
+        sigma: f64,
+    },
+    /// Nothing on the whole way.
+    Nothing,
+    /// Something whose place nobody knows.
+    Unclear,
+}
+
+/// Where a feature is looked for, and how far that has got.
+#[derive(Clone, Debug)]
+pub(super) struct SearchContext {
+    pub params: PatternParams,
+    /// z out of the part, origin at the flag on the surface; maps the frame F of the search to O
+    pub pose_of: Isometry3<f64>,
+    /// of the surface in F
+    pub height: f64,
+    pub touches: usize,
+}
+
+impl SearchContext {
+    pub fn out(&self) -> Vector3<f64> {
+        self.pose_of.rotation * Vector3::z()
+    }
+
+    pub fn in_f(&self, point: &Point3<f64>) -> Point3<f64> {
+        self.pose_of.inverse_transform_point(point)
+    }
+
+    /// Centre of a ball that is clear of the surface.
+    pub fn clear(&self) -> f64 {
+        self.height + self.params.ball_radius + self.params.clearance
+    }
+
+    /// Down at a place of F.
+    pub fn down(&self, place: &Point3<f64>, search: f64) -> TouchPlan {
+        let from = self.pose_of * Point3::new(place.x, place.y, self.clear());
+        TouchPlan { entry: from, from, direction: Unit::new_unchecked(-self.out()), search, expected: None }
+    }
+
+    /// From a place of F, at a depth below the surface, along a direction of F.
+    pub fn sideways(&self, place: &Point3<f64>, depth: f64, way: &Vector3<f64>, search: f64) -> TouchPlan {
+        let at = |z: f64| self.pose_of * Point3::new(place.x, place.y, z);
+        let direction = Unit::new_normalize(self.pose_of.rotation * way);
+        TouchPlan { entry: at(self.clear()), from: at(self.height - depth), direction, search, expected: None }
+    }
+
+    /// The place that a ball with its centre there touches below it.
+    pub fn below(&self, centre: &Point3<f64>) -> f64 {
+        centre.z - self.params.ball_radius
+    }
+}
