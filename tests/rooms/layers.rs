@@ -1,6 +1,7 @@
 //! Rules that the order of the crates cannot enforce: reads the sources and fails on a reference that a room may not make, and on
 //! files, threads, clock, environment or printing in a crate that is pure. Comments, strings and inline tests do not count.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
@@ -30,8 +31,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     (
         "report",
         &[
-            "numeric", "touch", "mesh", "patch", "refine", "live", "features", "align", "sim", "compare", "io", "scene",
-            "session", "replay",
+            "numeric", "touch", "mesh", "patch", "refine", "live", "features", "align", "sim", "compare", "io",
+            "scene", "session", "replay",
         ],
     ),
     ("ur", &["clock", "touch", "explore", "robot"]),
@@ -365,6 +366,123 @@ fn rust_files(folder: &Path, into: &mut Vec<std::path::PathBuf>) {
     }
 }
 
+/// Rooms without circles between their files.
+const WITHOUT_CIRCLES: &[&str] = &["touchup-core"];
+
+/// The modules of one crate by their path from its root, each with the tokens of its code.
+type Modules<'a> = BTreeMap<Vec<&'a str>, Vec<&'a str>>;
+
+/// Every path that `tokens` name from `at` on, with braces multiplied out.
+fn paths_at<'a>(tokens: &[&'a str], at: &mut usize, before: &[&'a str]) -> Vec<Vec<&'a str>> {
+    let mut path = before.to_vec();
+    while let Some(&token) = tokens.get(*at) {
+        *at += 1;
+        match token {
+            "{" => {
+                let mut paths = Vec::new();
+                while tokens.get(*at).is_some_and(|token| *token != "}") {
+                    paths.extend(paths_at(tokens, at, &path));
+                    *at += usize::from(tokens.get(*at) == Some(&","));
+                }
+                *at += 1;
+                return paths;
+            }
+            word if word.starts_with(|c: char| c.is_alphanumeric() || c == '_' || c == '*') => path.push(word),
+            _ => break,
+        }
+        if tokens.get(*at) != Some(&"::") {
+            break;
+        }
+        *at += 1;
+    }
+    vec![path]
+}
+
+/// What a module names of its crate, as paths from the root: what it uses, and by which name it gives on what.
+fn paths_of<'a>(module: &[&'a str], modules: &Modules<'a>) -> (Vec<Vec<&'a str>>, Vec<Vec<&'a str>>) {
+    let tokens = &modules[module];
+    let (mut used, mut given_on) = (Vec::new(), Vec::new());
+    let (mut at, mut is_public) = (0, false);
+    while at < tokens.len() {
+        let begins = at == 0 || tokens[at - 1] != "::";
+        let child = [module, &[tokens[at]]].concat();
+        let is_local = modules.contains_key(&child) && (tokens.get(at + 1) == Some(&"::") || tokens[at - 1] == "use");
+        let is_path = matches!(tokens[at], "crate" | "super" | "self") && tokens.get(at + 1) == Some(&"::");
+        match tokens[at] {
+            "pub" => is_public = true,
+            "fn" | "mod" | "struct" | ";" | "{" => is_public = false,
+            _ => {}
+        }
+        if !(begins && at > 0 && (is_local || is_path)) {
+            at += 1;
+            continue;
+        }
+        let is_use = tokens[at - 1] == "use";
+        for path in paths_at(tokens, &mut at, &[]) {
+            let supers = path.iter().take_while(|part| **part == "super").count();
+            let path = match path[0] {
+                "crate" => path[1..].to_vec(),
+                "super" => [&module[..module.len() - supers], &path[supers..]].concat(),
+                "self" => [module, &path[1..]].concat(),
+                _ => [module, &path].concat(),
+            };
+            if is_use && is_public { &mut given_on } else { &mut used }.push(path);
+        }
+    }
+    (used, given_on)
+}
+
+/// The module that a file below `src` is.
+fn module_in(file: &str) -> Vec<&str> {
+    let path = file.trim_end_matches(".rs").trim_end_matches("/mod");
+    if path == "lib" { Vec::new() } else { path.split('/').collect() }
+}
+
+/// The module in which what a path names is defined: its longest start that is one, through what modules give on.
+fn module_of<'a>(
+    path: &[&'a str],
+    modules: &Modules<'a>,
+    given_on: &BTreeMap<Vec<&'a str>, Vec<&'a str>>,
+) -> Vec<&'a str> {
+    let mut path = path.to_vec();
+    loop {
+        let depth = (0..=path.len()).rev().find(|&depth| modules.contains_key(&path[..depth])).unwrap_or(0);
+        let named = path.len().min(depth + 1);
+        match given_on.get(&path[..named]) {
+            Some(origin) if named > depth && *origin != path[..named] => path = [origin, &path[named..]].concat(),
+            _ => return path[..depth].to_vec(),
+        }
+    }
+}
+
+/// Modules of one room that use one another in a circle, each with one that it uses.
+///
+/// - `sources`: paths below `src` and code.
+fn circles(sources: &[(String, String)]) -> Vec<String> {
+    let modules: Modules = sources.iter().map(|(file, code)| (module_in(file), tokens(code))).collect();
+    let paths: Vec<_> = modules.keys().map(|name| (name, paths_of(name, &modules))).collect();
+    let given_on = paths.iter().flat_map(|(name, (_, given_on))| {
+        given_on.iter().map(|origin| ([name, &origin[origin.len() - 1..]].concat(), origin.clone()))
+    });
+    let given_on: BTreeMap<_, _> = given_on.collect();
+    let mut uses: BTreeMap<_, BTreeSet<_>> = BTreeMap::new();
+    for (name, (used, _)) in &paths {
+        let others = used.iter().map(|path| module_of(path, &modules, &given_on));
+        uses.insert((*name).clone(), others.filter(|other| other != *name && other.first() == name.first()).collect());
+    }
+    // who is used by nobody left, or uses nobody left, is in no circle
+    loop {
+        let left: BTreeSet<_> = uses.keys().cloned().collect();
+        let used: BTreeSet<_> = uses.values().flatten().cloned().collect();
+        uses.values_mut().for_each(|others| others.retain(|other| left.contains(other)));
+        uses.retain(|name, others| !others.is_empty() && used.contains(name));
+        if uses.len() == left.len() {
+            break;
+        }
+    }
+    uses.iter().map(|(name, others)| format!("{} uses {:?}", name.join("/"), others)).collect()
+}
+
 #[test]
 fn every_room_keeps_to_the_flow_of_data() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -445,4 +563,35 @@ fn what_is_allowed_is_let_through() {
     for (file, source) in good {
         assert_eq!(breaches(&path_of(file), source), Vec::<String>::new(), "{file}: {source}");
     }
+}
+
+#[test]
+fn files_of_a_room_use_one_another_one_way() {
+    for package in WITHOUT_CIRCLES {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("crates").join(package).join("src");
+        let mut files = Vec::new();
+        rust_files(&root, &mut files);
+        let source = |path: &std::path::PathBuf| {
+            let name = path.strip_prefix(&root).unwrap().to_str().unwrap().to_owned();
+            (name, code_of(&fs::read_to_string(path).unwrap()))
+        };
+        let found = circles(&files.iter().map(source).collect::<Vec<_>>());
+        assert!(found.is_empty(), "{package} has circles:\n{}", found.join("\n"));
+    }
+}
+
+#[test]
+fn a_circle_is_found_however_it_is_closed() {
+    let room = |a: &str, b: &str, parent: &str| {
+        let files = [("lib.rs", "pub mod mesh;"), ("mesh/mod.rs", parent), ("mesh/a.rs", a), ("mesh/b.rs", b)];
+        circles(&files.map(|(file, code)| (file.to_owned(), code.to_owned()))).len()
+    };
+    let gives_on = "mod a; mod b; pub use a::{A, F}; pub(crate) use b::B;";
+    assert_eq!(room("use super::b::B;", "use super::a::{self, A};", gives_on), 2);
+    assert_eq!(room("use super::B;", "fn f() -> crate::mesh::A {}", gives_on), 2, "through what the parent gives on");
+    assert_eq!(room("use crate::mesh::{b::{B, C}, D};", "use super::{A};", "mod a; mod b; pub use a::A;"), 2);
+    assert_eq!(room("use super::Own;", "", "mod a; mod b; use a::A; pub struct Own;"), 2, "parent and child");
+    assert_eq!(room("use super::Own;", "", "mod a; mod b; fn f() { a::f() } pub struct Own;"), 2);
+    assert_eq!(room("use super::b::B;", "", gives_on), 0);
+    assert_eq!(room("use super::Own; use super::B;", "", "mod a; mod b; pub use a::A; pub struct Own;"), 0);
 }

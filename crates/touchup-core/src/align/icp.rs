@@ -9,7 +9,10 @@
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
 
 use crate::mesh::{FaceTree, TriMesh, Workers, coherent_order, map_by};
-use crate::numeric::{NormalEquations, SIGMA_OF_MEDIAN, TUKEY_WIDTH, biweight, centroid_and_spread, median, moved_by_twist, order_statistic, point_to_plane_row};
+use crate::numeric::{
+    NormalEquations, SIGMA_OF_MEDIAN, TUKEY_WIDTH, biweight, centroid_and_spread, median, moved_by_twist,
+    order_statistic, point_to_plane_row,
+};
 
 /// Settings of [`icp`].
 #[derive(Clone, Copy, Debug, PartialEq)]

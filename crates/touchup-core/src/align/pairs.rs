@@ -9,74 +9,27 @@
 
 mod error;
 mod misfit;
+mod solved;
 
 use std::ops::RangeInclusive;
 
 pub use error::{PairSide, PairsError};
-use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Rotation3, SVD, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
+pub use solved::{PairsFit, PairsParams, PointPair};
 
+use self::solved::SolvedMotion;
 use crate::numeric::median;
 
 /// Farther from the origin than this, a point is a fault, m.
 const LARGEST_COORDINATE: f64 = 1e6;
 /// Standard deviations of a pick that are believed, m: far outside, their squares are no numbers.
 const BELIEVABLE_SIGMA: RangeInclusive<f64> = 1e-12..=1e3;
-/// A given standard deviation is believed unless the residuals say so many times more: with three pairs once in 130.
-const LARGEST_SIGMA_RATIO: f64 = 2.0;
 /// Points count as on one line when they scatter across it by less than this share of their scatter along it: 1°.
 const LINE_SHARE: f64 = 0.02;
 /// … or by less than so many standard deviations of a pick: the turn about the line is then anything.
 const LINE_SIGMAS: f64 = 3.0;
 /// Picks closer together than this share of their scatter are one point.
 const SAME_SHARE: f64 = 1e-6;
-
-/// One point seen twice, m.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PointPair {
-    /// Where it is before the motion: on the scan, in O.
-    pub from: Point3<f64>,
-    /// Where it is after: in space, in W.
-    pub to: Point3<f64>,
-    /// Standard deviation of the two together, per axis, m; `None`: as good as the others.
-    pub sigma: Option<f64>,
-}
-
-/// Settings of [`fit_pairs`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PairsParams {
-    /// Standard deviation of a pair that names none, per axis, m; `None`: found from the residuals.
-    pub sigma: Option<f64>,
-    /// Largest rms residual that is believed, m; never more than a tenth of the points' scatter. Default 3 mm: a pick
-    /// on a scan of a consumer camera is good to one or two.
-    pub largest_rms: f64,
-    /// A pair that is off by less than this is kept, however well the others agree, m. Default 0.2 mm: nobody picks
-    /// better. Where a sigma is known, four times that is taken instead.
-    pub least_misfit: f64,
-}
-
-impl Default for PairsParams {
-    fn default() -> Self {
-        Self { sigma: None, largest_rms: 3e-3, least_misfit: 0.2e-3 }
-    }
-}
-
-/// A motion found from pairs, and how well it is known.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PairsFit {
-    /// Maps `from` to `to`.
-    pub motion: Isometry3<f64>,
-    /// `to` − motion · `from` of each pair, m.
-    pub residuals: Vec<Vector3<f64>>,
-    /// √(mean |residual|²), m.
-    pub rms: f64,
-    /// Standard deviation of a pair of unit weight, per axis, m: as given, or from the residuals with 3 n − 6 degrees
-    /// of freedom where none is given or they say more than twice as much.
-    pub sigma: f64,
-    /// Middle of the pairs, in the frame of `to`, m.
-    pub centroid: Point3<f64>,
-    /// Of (shift of the centroid, rotation vector about it), both in the frame of `to`; m², m·rad, rad².
-    pub covariance: Matrix6<f64>,
-}
 
 /// The motion, or why there is none.
 ///
@@ -106,67 +59,6 @@ pub fn fit_pairs(pairs: &[PointPair], params: &PairsParams) -> Result<PairsFit, 
     let fit = solved.fit(pairs, &weights, given_sigma(pairs, params));
     check_lines(pairs, fit.sigma)?;
     Ok(fit)
-}
-
-/// A best motion with what tells how good it is.
-struct SolvedMotion {
-    motion: Isometry3<f64>,
-    /// Weighted middle of `from`.
-    middle: Point3<f64>,
-    /// Σ w |residual|².
-    squares: f64,
-    /// The same of the best mirror image or motion.
-    mirrored_squares: f64,
-}
-
-impl SolvedMotion {
-    /// - `without`: a pair that is left out.
-    fn of(pairs: &[PointPair], weights: &[f64], without: Option<usize>) -> Option<Self> {
-        let kept = || pairs.iter().zip(weights).enumerate().filter(|(i, _)| Some(*i) != without).map(|(_, pair)| pair);
-        let total: f64 = kept().map(|(_, w)| w).sum();
-        let mean = |side: fn(&PointPair) -> Point3<f64>| {
-            Point3::from(kept().map(|(pair, w)| side(pair).coords * *w).sum::<Vector3<f64>>() / total)
-        };
-        let (a, b) = (mean(|pair| pair.from), mean(|pair| pair.to));
-        let cross: Matrix3<f64> = kept().map(|(p, w)| (p.to - b) * (p.from - a).transpose() * *w).sum();
-        let svd = SVD::try_new(cross, true, true, f64::EPSILON, 1000)?;
-        let (u, v_t) = (svd.u?, svd.v_t?);
-        let smallest = svd.singular_values.imin();
-        let mut signs = Vector3::repeat(1.0);
-        signs[smallest] = (u.determinant() * v_t.determinant()).signum();
-        let turn = u * Matrix3::from_diagonal(&signs) * v_t;
-        let mut rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn));
-        rotation.renormalize();
-        let motion = Isometry3::from_parts((b - rotation * a.coords).into(), rotation);
-        let mut squares = [motion.rotation.to_rotation_matrix().into_inner(), u * v_t]
-            .into_iter()
-            .map(|turn| kept().map(|(p, w)| w * ((p.to - b) - turn * (p.from - a)).norm_squared()).sum::<f64>());
-        let (squares, mirrored_squares) = (squares.next()?, squares.next()?);
-        squares.is_finite().then_some(Self { motion, middle: a, squares, mirrored_squares })
-    }
-
-    fn fit(&self, pairs: &[PointPair], weights: &[f64], given: Option<f64>) -> PairsFit {
-        let residuals: Vec<_> = pairs.iter().map(|p| p.to - self.motion * p.from).collect();
-        let n = pairs.len() as f64;
-        let rms = (residuals.iter().map(Vector3::norm_squared).sum::<f64>() / n).sqrt();
-        let seen = (self.squares / (3.0 * n - 6.0)).sqrt();
-        let sigma = given.filter(|given| seen <= LARGEST_SIGMA_RATIO * given).unwrap_or(seen);
-        let inertia: Matrix3<f64> = pairs
-            .iter()
-            .zip(weights)
-            .map(|(pair, w)| {
-                let q = self.motion.rotation * (pair.from - self.middle);
-                (Matrix3::identity() * q.norm_squared() - q * q.transpose()) * *w
-            })
-            .sum();
-        let mut covariance = Matrix6::zeros();
-        let shift = Matrix3::identity() / weights.iter().sum::<f64>();
-        covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&shift);
-        // not singular: the points are on no line
-        covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&inertia.try_inverse().unwrap_or_default());
-        let centroid = self.motion * self.middle;
-        PairsFit { motion: self.motion, residuals, rms, sigma, centroid, covariance: covariance * (sigma * sigma) }
-    }
 }
 
 /// σ of a pair of unit weight, where it is known beforehand.

@@ -4,8 +4,8 @@ use nalgebra::Point3;
 
 use super::error::ExploreError;
 use super::pattern::{Next, Stage, Touched};
-use super::search_context::{PatternParams, SearchContext};
 use super::search::{ROUGH, hexagonal};
+use super::search_context::{PatternParams, SearchContext};
 use super::slide::Slide;
 use crate::features::Feature;
 

@@ -4,19 +4,11 @@
 
 use nalgebra::{Point3, Vector3};
 
+pub use super::creases::Bend;
 use super::creases::{CreaseRegions, Creases};
 use super::curvature::VertexCurvature;
 use super::k_means::k_means;
 use crate::mesh::{TriMesh, VertexId};
-
-/// Which way a place is bent.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Bend {
-    /// Outward, as the rim of a hole.
-    Convex,
-    /// Inward, as the bottom of a pocket along its wall.
-    Concave,
-}
 
 /// Vertices that belong together.
 #[derive(Clone, Debug, PartialEq)]
@@ -94,7 +86,7 @@ impl Default for ClusterParams {
 ///
 /// - `curvature`: of `mesh`, from [`super::curvature::curvature`]
 pub fn clusters(mesh: &TriMesh, curvature: &[VertexCurvature], params: &ClusterParams) -> Vec<Cluster> {
-    let creases = Creases::find(mesh, curvature, params);
+    let creases = Creases::find(mesh, curvature, params.sharp_angle, params.sharp_defect);
     let [low, high] = mesh.bounds();
     let near = params.merge_share * (high - low).norm();
     let mut regions = CreaseRegions::connected(&creases);

@@ -2,13 +2,21 @@
 
 use nalgebra::Vector3;
 
-use super::clusters::{Bend, ClusterParams};
 use super::curvature::{VertexCurvature, VertexKind};
 use crate::mesh::{FaceId, TriMesh, VertexId};
 use crate::numeric::{voxel_neighbourhood, voxel_of};
 
 /// Points put on all creases together at most, beside one for each: bounds the work on meshes that are all noise.
 const MOST_POINTS: f64 = 1e6;
+
+/// Which way a place is bent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Bend {
+    /// Outward, as the rim of a hole.
+    Convex,
+    /// Inward, as the bottom of a pocket along its wall.
+    Concave,
+}
 
 /// A sharp edge, or a sharp vertex as an edge without length.
 #[derive(Clone, Copy, Debug)]
@@ -24,12 +32,13 @@ pub(super) struct Creases {
 }
 
 impl Creases {
-    pub fn find(mesh: &TriMesh, curvature: &[VertexCurvature], params: &ClusterParams) -> Self {
+    /// - `sharp_angle`, `sharp_defect`: as in [`super::clusters::ClusterParams`], rad.
+    pub fn find(mesh: &TriMesh, curvature: &[VertexCurvature], sharp_angle: f64, sharp_defect: f64) -> Self {
         let normals: Vec<_> = (0..mesh.face_slots() as u32)
             .map(|f| if mesh.has_face(FaceId(f)) { mesh.normal(FaceId(f)) } else { Vector3::zeros() })
             .collect();
         let (mut list, mut has_crease) = (Vec::new(), vec![false; mesh.vertex_slots()]);
-        let cos_sharp = params.sharp_angle.cos();
+        let cos_sharp = sharp_angle.cos();
         for (face, corners) in mesh.faces() {
             for i in 0..3 {
                 let ends = [corners[i], corners[(i + 1) % 3]];
@@ -44,7 +53,7 @@ impl Creases {
                 }
             }
         }
-        let is_sharp = |c: &VertexCurvature| c.kind == VertexKind::Inner && c.defect.abs() > params.sharp_defect;
+        let is_sharp = |c: &VertexCurvature| c.kind == VertexKind::Inner && c.defect.abs() > sharp_defect;
         for (v, c) in curvature.iter().enumerate().filter(|(v, c)| is_sharp(c) && !has_crease[*v]) {
             let bend = if c.integrated_mean >= 0.0 { Bend::Convex } else { Bend::Concave };
             list.push(Crease { ends: [VertexId(v as u32); 2], bend });

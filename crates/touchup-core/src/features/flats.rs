@@ -1,9 +1,10 @@
 //! The flat pieces of a drawing: faces that lie in one plane and hang together.
 
 use super::facets::Facets;
-use super::grow::SMOOTH;
 use super::segment::Segmentation;
 
+/// Across a sharper edge than this no region grows, and a normal may be off by no more: half of a polygon of 9 sides. 40°.
+pub(super) const SMOOTH: f64 = 0.766;
 /// A mesh is a drawing when this share of its faces lies in one plane with a neighbour …
 const DRAWN_SHARE: f64 = 0.2;
 /// … within this, 1 − cos: 0.01°, what single precision makes of small faces.

@@ -7,7 +7,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::facets::{Facets, NONE};
-use super::flats::{FlatPiece, Flats};
+use super::flats::{FlatPiece, Flats, SMOOTH};
 use super::marks::sort;
 use super::primitive::{Moments, NormalSpread, Primitive, cylinder_of, refined};
 use super::segment::{Segment, Segmentation};
@@ -45,8 +45,6 @@ const SETTLED: f64 = 0.1;
 const SAMPLE: usize = 64;
 /// A region is at least so many tolerances wide.
 const LEAST_WIDTH: f64 = 12.0;
-/// Across a sharper edge than this no region grows, and a normal may be off by no more: half of a polygon of 9 sides. 40°.
-pub(super) const SMOOTH: f64 = 0.766;
 /// A face's normal may be off that of the primitive by this much: 25°.
 const ALIKE: f64 = 0.906;
 /// A segment of which stronger ones leave less than this is none.

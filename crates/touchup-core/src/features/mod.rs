@@ -22,6 +22,7 @@ mod k_means;
 mod marks;
 mod measure;
 mod observe;
+mod parting;
 mod primitive;
 mod rays;
 mod rims;

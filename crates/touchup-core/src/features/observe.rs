@@ -190,7 +190,8 @@ impl<'a> Observed<'a> {
     }
 
     fn is_touched(&self, p: &Point3<f64>) -> bool {
-        let mut around = voxel_neighbourhood(voxel_of(p, self.reach)).filter_map(|voxel| self.cells.get(&voxel)).flatten();
+        let mut around =
+            voxel_neighbourhood(voxel_of(p, self.reach)).filter_map(|voxel| self.cells.get(&voxel)).flatten();
         around.any(|&number| (self.touches[number as usize].point - p).norm() <= self.reach)
     }
 }

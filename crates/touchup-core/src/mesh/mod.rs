@@ -2,6 +2,7 @@
 
 mod closest;
 mod coherent;
+mod ids;
 mod journal;
 mod region;
 mod repair;
@@ -13,9 +14,10 @@ mod workers;
 
 pub use closest::{BoxQuery, FaceHit, FaceTree, Nearby, RefitPlan};
 pub use coherent::coherent_order;
+pub use ids::{FaceId, VertexId};
 pub use journal::{Changes, IdSet};
 pub use region::{Outside, Region, Sewn};
 pub use repair::{RepairReport, repair};
 pub use signed_distance::{pseudo_normal, signed_distance};
-pub use tri_mesh::{FaceId, MeshError, TriMesh, VertexId};
+pub use tri_mesh::{MeshError, TriMesh};
 pub use workers::{Alone, Job, Workers, map_by};

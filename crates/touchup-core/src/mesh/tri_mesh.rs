@@ -2,16 +2,9 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::ids::{FaceId, VertexId};
 use super::journal::{Changes, Journal};
 use super::stars::{MOST_FACES, Stars, Valences};
-
-/// A face of one [`TriMesh`]; stays valid until that face is removed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct FaceId(pub u32);
-
-/// A vertex of one [`TriMesh`]; stays valid until that vertex is removed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct VertexId(pub u32);
 
 /// Marks the slot of a removed face; no id.
 const REMOVED: u32 = u32::MAX;

@@ -69,7 +69,10 @@ mod tests {
     #[test]
     fn a_heavy_value_is_the_quantile_of_all_that_it_holds() {
         let mut values = [(2.0, 3.0), (0.0, 6.0), (1.0, 1.0)];
-        assert_eq!([0.5, 0.6, 0.65, 0.71].map(|share| weighted_quantile(&mut values, share).unwrap()), [0.0, 0.0, 1.0, 2.0]);
+        assert_eq!(
+            [0.5, 0.6, 0.65, 0.71].map(|share| weighted_quantile(&mut values, share).unwrap()),
+            [0.0, 0.0, 1.0, 2.0]
+        );
         assert_eq!(weighted_quantile(&mut [], 0.5), None);
     }
 }

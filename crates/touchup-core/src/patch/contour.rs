@@ -6,24 +6,16 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::crossing::Crossing;
 use super::dual::{bend, diagonal, passes, unfolded};
 use super::lattice::{CellBox, Edge, Lattice, LatticeNode, Owner, PatchFace, Square, VertexKey};
 use super::loops::{Loops, NONE, edge_corners, edge_of, number_in, ring_corners, ring_edges, segments, square_of};
+use super::new_faces::Patch;
 use super::qef::Planes;
 use super::scan_clipping::{Cut, TraceSegment};
-use super::splice::Patch;
 use super::table::CellTable;
 use super::trace::Trace;
 use super::{LatticeRegion, NodeValues};
-
-/// Where f changes its sign on an edge of the lattice.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Crossing {
-    /// the point, m, in O; brought to the inside of the edge if it is not there
-    pub point: Point3<f64>,
-    /// unit normal of the surface there, out of the material
-    pub normal: Vector3<f64>,
-}
 
 /// Settings of [`contour`].
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,7 +2,6 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::contour::Crossing;
 use super::evidence::{Evidence, Source};
 use super::field::FieldScratch;
 use super::grid::ReconstructionGrid;
@@ -13,6 +12,15 @@ use super::table::CellTable;
 const STEPS: usize = 8;
 /// A value of less than this share of the way is zero.
 const ENOUGH: f64 = 1e-3;
+
+/// Where f changes its sign on an edge of the lattice.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Crossing {
+    /// the point, m, in O; brought to the inside of the edge if it is not there
+    pub point: Point3<f64>,
+    /// unit normal of the surface there, out of the material
+    pub normal: Vector3<f64>,
+}
 
 /// Crossings of the touched field, kept as long as the values at both ends stay.
 #[derive(Clone, Debug, Default)]

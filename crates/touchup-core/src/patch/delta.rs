@@ -4,9 +4,9 @@ use nalgebra::Point3;
 
 use super::LatticeRegion;
 use super::lattice::{CellBox, LatticeNode, Owner, VertexKey};
+use super::new_faces::Patch;
 use super::patched::Support;
 use super::remesh::Renewed;
-use super::splice::Patch;
 use super::table::CellTable;
 use crate::mesh::{FaceId, TriMesh};
 

@@ -12,7 +12,6 @@
 use nalgebra::{Point3, Vector3};
 
 use super::contact_map::{ContactMap, MeanContact};
-use super::field_uncertainty::PassShare;
 use crate::numeric::tangent_basis;
 
 /// How contacts are grouped and weighted.
@@ -96,6 +95,14 @@ impl Piece {
     pub(super) fn value(&self) -> f64 {
         self.fit_value / self.fit_weight
     }
+}
+
+/// What one pass over one place has in the fit.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PassShare {
+    pub(super) began_ns: i64,
+    pub(super) noise: f64,
+    pub(super) tilt: f64,
 }
 
 /// Room for one evaluation, used again by the next.

@@ -7,7 +7,7 @@
 use nalgebra::Point3;
 
 use super::contact_map::ContactMap;
-use super::field::{FieldParams, FieldScratch, FieldValue};
+use super::field::{FieldParams, FieldScratch, FieldValue, PassShare};
 
 /// How well the fit knows the surface, by cause; standard deviations, m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -32,14 +32,6 @@ impl FitSigma {
         let Self { noise, tilt, calibration, scatter, border, meeting } = *self;
         [tilt, calibration, scatter, border, meeting].iter().fold(noise, |sum, part| sum.hypot(*part))
     }
-}
-
-/// What one pass over one place has in the fit.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct PassShare {
-    began_ns: i64,
-    noise: f64,
-    tilt: f64,
 }
 
 /// Share of the scatter of the contacts by which the fit is off: ten of them would leave a third if they were independent.

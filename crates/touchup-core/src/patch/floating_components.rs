@@ -6,8 +6,8 @@
 use std::collections::VecDeque;
 
 use super::evidence::{Evidence, Source};
-use super::grid::{ReconstructionGrid, neighbours};
-use super::lattice::{Lattice, LatticeNode};
+use super::grid::ReconstructionGrid;
+use super::lattice::{Lattice, LatticeNode, neighbours};
 use super::scan_value::ScanValue;
 use super::table::CellTable;
 

@@ -5,10 +5,9 @@ use nalgebra::Point3;
 use super::discontinuities::is_torn;
 use super::evidence::{Evidence, Source};
 use super::field::FieldScratch;
-use super::lattice::{CellBox, Lattice, LatticeNode, stepped};
+use super::lattice::{CellBox, Lattice, LatticeNode, LatticeRegion, NodeValues, neighbours};
 use super::scan_value::ScanValue;
 use super::table::CellTable;
-use super::{LatticeRegion, NodeValues};
 
 /// The field at one node.
 #[derive(Clone, Copy, Debug)]
@@ -196,7 +195,7 @@ impl ReconstructionGrid {
         for (node, ()) in near.iter() {
             let Some(before) = self.nodes.get(&node).copied() else { continue };
             let Some(felt) = before.felt else { continue };
-            let is_torn = is_torn(&self.nodes, node, felt, lattice.pitch);
+            let is_torn = is_torn(|node| self.nodes.get(node)?.felt, node, felt, lattice.pitch);
             if is_torn == (before.source == Source::Nothing) {
                 continue;
             }
@@ -359,11 +358,6 @@ fn ball(radius: i32) -> Vec<LatticeNode> {
 
 fn moved(node: &LatticeNode, offset: &LatticeNode) -> LatticeNode {
     std::array::from_fn(|i| node[i].saturating_add(offset[i]))
-}
-
-/// The six nodes one step away.
-pub(super) fn neighbours(node: LatticeNode) -> impl Iterator<Item = LatticeNode> {
-    (0..6).map(move |i| stepped(node, i / 2, if i % 2 == 0 { 1 } else { -1 }))
 }
 
 /// Corner `corner` of a cell: bit i says whether it is the upper one along axis i.

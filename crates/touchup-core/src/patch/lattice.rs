@@ -8,6 +8,12 @@ use crate::mesh::{FaceId, VertexId};
 /// A node of the lattice, or the cell of which it is the lowest corner.
 pub type LatticeNode = [i32; 3];
 
+/// The lattice cells in which the surface is replaced, each named by its lowest node.
+pub type LatticeRegion = CellTable<LatticeNode, ()>;
+
+/// The field at lattice nodes, m: negative in the material.
+pub type NodeValues = CellTable<LatticeNode, f64>;
+
 /// Bits of a packed node for each axis: cells up to ±10⁶ from the origin differ in them.
 const NODE_BITS: u32 = 21;
 
@@ -24,6 +30,11 @@ impl Key for LatticeNode {
 pub(super) fn stepped(mut node: LatticeNode, axis: usize, count: i32) -> LatticeNode {
     node[axis] = node[axis].saturating_add(count);
     node
+}
+
+/// The six nodes one step away.
+pub(super) fn neighbours(node: LatticeNode) -> impl Iterator<Item = LatticeNode> {
+    (0..6).map(move |i| stepped(node, i / 2, if i % 2 == 0 { 1 } else { -1 }))
 }
 
 /// The two axes that follow `axis`, so that (axis, u, v) is right-handed.

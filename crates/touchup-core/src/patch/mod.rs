@@ -36,6 +36,7 @@ mod incremental;
 mod inner_corner;
 mod lattice;
 mod loops;
+mod new_faces;
 mod outliers;
 mod passes;
 mod patched;
@@ -57,27 +58,23 @@ mod voxel_set;
 
 pub use contact_map::{ContactMap, GateParams, MeanContact, Verdict};
 pub use contact_uncertainty::{CalibrationParams, ContactSigma};
-pub use contour::{ContourParams, Crossing, contour};
+pub use contour::{ContourParams, contour};
+pub use crossing::Crossing;
 pub use delta::{PatchDelta, PatchVertex};
 pub use evidence::{Evidence, EvidenceParams, Finding, ScanPrior, Source};
 pub use field::{FieldParams, FieldScratch, FieldValue};
 pub use field_uncertainty::FitSigma;
 pub use free_space::SweptSpace;
 pub use history::History;
-pub use lattice::{Edge, Lattice, LatticeNode, Owner, PatchFace, Square, VertexKey};
+pub use lattice::{Edge, Lattice, LatticeNode, LatticeRegion, NodeValues, Owner, PatchFace, Square, VertexKey};
+pub use new_faces::Patch;
 pub use outliers::{Outlier, Outliers};
 pub use patched::{Patched, Support};
 pub use patcher::{PatchParams, PatchRegion, Patcher, PatcherParams, UncertaintyParams};
 pub use probed_log::ProbedLog;
 pub use scan_clipping::Cut;
 pub use scan_value::ScanValue;
-pub use splice::{Patch, Splice};
+pub use splice::Splice;
 pub use table::{CellTable, Key};
 pub use touches::{SurfaceContact, TipTouch, TouchFinder, TouchFinderParams};
 pub use trace::OpenSquare;
-
-/// The lattice cells in which the surface is replaced, each named by its lowest node.
-pub type LatticeRegion = CellTable<LatticeNode, ()>;
-
-/// The field at lattice nodes, m: negative in the material.
-pub type NodeValues = CellTable<LatticeNode, f64>;

@@ -6,8 +6,8 @@ use super::crossing::Crossings;
 use super::evidence::Evidence;
 use super::grid::{Changed, GridChanges, ReconstructionGrid, cells_of};
 use super::lattice::{CellBox, Lattice, LatticeNode};
+use super::new_faces::Patch;
 use super::scan_clipping::{Cut, cells_around, faces_near};
-use super::splice::Patch;
 use super::table::CellTable;
 use crate::mesh::FaceId;
 

@@ -5,30 +5,15 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::inside_scratch::{InsideScratch, MOST_LOOKED_AT};
 use super::{CarveParams, Case, ContactState, Refiner, RegionFit, RoiSize, Update};
-use crate::mesh::{BoxQuery, FaceHit, FaceId, triangle};
+use crate::mesh::{FaceHit, FaceId, triangle};
 use crate::touch::{Ball, TipBody, TipPlace};
 
 /// Faces beside the closest one that move in one update, at most: those of a ball on a scan as coarse as itself.
 const MOST_OTHERS: usize = 6;
-/// Faces looked at for them, at most: on a scan finer than a tenth of the ball they are a sample.
-const MOST_LOOKED_AT: usize = 128;
 /// An arm whose sine to the face is below this lies sideways.
 const SIDEWAYS: f64 = 0.2;
-
-/// Room for the search for faces inside the tip.
-#[derive(Clone, Debug, Default)]
-pub(super) struct InsideScratch {
-    near: BoxQuery,
-    /// with their depth, m
-    deep: Vec<(f64, FaceId)>,
-}
-
-impl InsideScratch {
-    pub fn new() -> Self {
-        Self { near: BoxQuery::with_room(4 * MOST_LOOKED_AT), deep: Vec::with_capacity(MOST_LOOKED_AT) }
-    }
-}
 
 /// A point of a face inside the tip.
 struct Inside {

@@ -9,6 +9,7 @@ mod deform;
 pub mod dynamics;
 mod followed;
 mod guard;
+mod inside_scratch;
 mod marks;
 mod params;
 mod registration;
@@ -37,9 +38,9 @@ use crate::touch::{
     Ball, ContactEstimator, ContactSample, FeltNormal, FrictionCoefficient, LONGEST_HOLD, Sample, SampleError,
     SettingError, TipBody, TipPlace,
 };
-use carve::InsideScratch;
 use deform::{DeformableMesh, HandleRegion};
 use dynamics::turn;
+use inside_scratch::InsideScratch;
 
 /// The felt normal of one sample is uncertain by this, rad: a flat tip that may lie on its face does.
 const FLUSH: f64 = 0.05;

@@ -11,7 +11,9 @@ use nalgebra::{Isometry3, Matrix6, Point3, SMatrix, SVector, Vector3, Vector6};
 
 use super::ScanParams;
 use crate::mesh::{FaceTree, TriMesh};
-use crate::numeric::{NormalEquations, VoxelKey, cauchy_weight, moved_by_twist, point_to_plane_row, voxel_neighbourhood, voxel_of};
+use crate::numeric::{
+    NormalEquations, VoxelKey, cauchy_weight, moved_by_twist, point_to_plane_row, voxel_neighbourhood, voxel_of,
+};
 use crate::touch::SettingError;
 
 /// Settings of a [`Registrar`].

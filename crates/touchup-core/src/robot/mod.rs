@@ -9,6 +9,7 @@ mod kinematics;
 mod limits;
 mod onset;
 mod sliding;
+mod touch_params;
 mod touching;
 mod watched;
 
@@ -17,5 +18,6 @@ pub use kinematics::{Joints, UrGeometry};
 pub use limits::{LimitError, Limits, Narrower};
 pub use onset::{Onset, OnsetError, OnsetParams, OnsetVerdict, TouchMoment, find_onset};
 pub use sliding::{SlideEnding, SlideRecord, SlideStation, SlideTarget};
-pub use touching::{CRAWL, TouchOutcome, TouchParams, TouchRecord, TouchTarget};
+pub use touch_params::{CRAWL, TouchParams};
+pub use touching::{TouchOutcome, TouchRecord, TouchTarget};
 pub use watched::{ProbeError, Watched, Witness};

@@ -6,7 +6,7 @@
 use nalgebra::{Isometry3, Unit, UnitQuaternion, Vector3};
 
 use super::arm::{ArmState, Command};
-use super::touching::TouchParams;
+use super::touch_params::TouchParams;
 use super::watched::{ProbeError, TRIGGERS, Watched};
 
 /// A place on the way, in B.

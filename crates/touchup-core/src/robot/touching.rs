@@ -6,94 +6,11 @@
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
 use crate::explore::Expected;
-use crate::parameters;
-use crate::parameters::SettingError;
 
 use super::arm::ArmState;
-use super::limits::Limits;
-use super::onset::{Onset, OnsetError, OnsetParams, TouchMoment, find_onset};
+use super::onset::{Onset, OnsetError, TouchMoment, find_onset};
+use super::touch_params::TouchParams;
 use super::watched::{GOING, ProbeError, TRIGGERS, Watched};
-
-parameters! {
-    /// How a touch is made.
-    #[derive(Clone, Copy, Debug, PartialEq)]
-    pub struct TouchParams in "robot" {
-        /// Force that a touch presses with, no more than largest_force_n.
-        ///
-        /// In N: of the second search.
-        force: f64 = 3.0, "touch_force_n" [N, 0.1, 100];
-        /// Force at which a search stops: several deviations of its noise, no more than 0.8 of touch_force_n.
-        ///
-        /// In N: of the first search.
-        trigger: f64 = 1.0, "trigger_n" [N, 0.05, 80];
-        /// Speed through free air.
-        ///
-        /// In m/s: between touches, where the way is clear.
-        link_speed: f64 = 50.0, "link_mm_per_s" [MM_PER_S, 0.1, 250];
-        /// Speed while searching; slower where tip.stiffness_n_per_mm asks for it.
-        ///
-        /// In m/s, at most: where arm and part are stiff it is slower, so that `force` is kept.
-        search_speed: f64 = 10.0, "search_mm_per_s" [MM_PER_S, 0.1, 250];
-        /// Speed while measuring.
-        ///
-        /// In m/s: of the second search.
-        measure_speed: f64 = 2.0, "measure_mm_per_s" [MM_PER_S, 0.05, 250];
-        /// Speed while the ball slides over what was found, at most.
-        ///
-        /// In m/s.
-        slide_speed: f64 = 10.0, "slide_mm_per_s" [MM_PER_S, 0.1, 250];
-        /// Of all motions, m/s²; no more than that of the limits.
-        acceleration: f64 = Limits::default().acceleration;
-        /// How far above the contact the second search begins, m.
-        back_off: f64 = 0.3e-3;
-        /// Arm, probe and part together as far as is known, N/m.
-        stiffness: f64 = 15e3;
-        /// Time from a contact to the beginning of braking.
-        ///
-        /// In s.
-        latency: f64 = 20.0, "latency_ms" [MS, 0, 200];
-    }
-    with {
-        /// Of the curve.
-        onset: OnsetParams,
-    }
-}
-
-/// Share of the force of a touch at which a search may stop: the rest is for its braking.
-const MOST_TRIGGER: f64 = 0.8;
-
-impl TouchParams {
-    /// Refuses a touch that would press harder or move faster than its limits, or whose search would stop too late.
-    ///
-    /// # Errors
-    /// [`SettingError`]
-    pub fn check_within(&self, limits: &Limits) -> Result<(), SettingError> {
-        let hardest = format!("0.1 N to robot.largest_force_n, which is {}", limits.force);
-        SettingError::check("robot.touch_force_n", self.force, self.force <= limits.force, &hardest)?;
-        let is_early = self.trigger <= MOST_TRIGGER * self.force;
-        SettingError::check("robot.trigger_n", self.trigger, is_early, "0.05 N to 0.8 of robot.touch_force_n")?;
-        let fastest = format!("at most robot.largest_mm_per_s, which is {}", limits.speed * 1e3);
-        let speeds = [
-            ("robot.link_mm_per_s", self.link_speed),
-            ("robot.search_mm_per_s", self.search_speed),
-            ("robot.measure_mm_per_s", self.measure_speed),
-            ("robot.slide_mm_per_s", self.slide_speed),
-        ];
-        speeds.iter().try_for_each(|&(key, v)| SettingError::check(key, v * 1e3, v <= limits.speed, &fastest))
-    }
-
-    /// Speed at which a search that stops at [`Self::trigger`] ends below [`Self::force`].
-    ///
-    /// After the trigger the tip goes on by v τ + v²/2a, and each metre of it is k more: v = a (√(τ² + 2 Δ/(k a)) − τ).
-    pub fn safe_speed(&self) -> f64 {
-        let room = (self.force - self.trigger).max(0.0) / self.stiffness;
-        let (a, late) = (self.acceleration, self.latency);
-        (a * ((late * late + 2.0 * room / a).sqrt() - late)).min(self.search_speed).max(CRAWL)
-    }
-}
-
-/// No search is slower, m/s: it would never end.
-pub const CRAWL: f64 = 0.1e-3;
 
 /// A touch that is wanted, in B.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Vector3};
 
 use super::arm::{Arm, ArmError, ArmState, Command, Safety};
 use super::limits::{LimitError, Limits};
-use super::touching::TouchParams;
+use super::touch_params::TouchParams;
 
 /// Why probing was broken off. The arm was told to stop before this was made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -209,8 +209,7 @@ fn force_begins(samples: &[OnsetSample]) -> Option<f64> {
     for time in [2e-3, 4e-3, 7e-3, 10e-3, 15e-3, 30e-3] {
         for step in 0..=90 {
             let begun = 1e-3 - f64::from(step) * 1e-4;
-            let row =
-                |x: &OnsetSample| (Vector2::new(1.0, -(-(x.t - begun).max(0.0) / time).exp_m1()), x.force);
+            let row = |x: &OnsetSample| (Vector2::new(1.0, -(-(x.t - begun).max(0.0) / time).exp_m1()), x.force);
             let equations = NormalEquations::of(rise().map(row));
             let Some(solved) = equations.solution() else { continue };
             let left = equations.residual_square(&solved);

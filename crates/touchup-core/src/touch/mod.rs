@@ -19,6 +19,7 @@ mod placement;
 mod probed;
 mod stream;
 mod sync;
+mod sync_params;
 mod tip_motion;
 mod tip_shape;
 
@@ -34,7 +35,8 @@ pub use markers::{
 };
 pub use placement::Placement;
 pub use probed::ProbedPoint;
-pub use sync::{SyncCounts, SyncParams, Synchroniser};
+pub use sync::Synchroniser;
+pub use sync_params::{SyncCounts, SyncParams};
 pub use tip_motion::{Ball, SlidingParams, TipMotion, TipParams};
 pub use tip_shape::{TipBody, TipContact, TipPlace, TipShape, TipSizes};
 

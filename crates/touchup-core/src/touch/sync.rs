@@ -5,82 +5,10 @@
 //! reorder window gives the same samples, bit for bit.
 
 use nalgebra::Isometry3;
-use serde::Serialize;
 
 use super::stream::Stream;
+use super::sync_params::{SyncCounts, SyncParams};
 use super::{Message, Sample, SampleError, SettingError, StampedPose, StampedWrench};
-use crate::parameters;
-
-parameters! {
-    /// Settings of a [`Synchroniser`]; times in ns.
-    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-    pub struct SyncParams in "sync" {
-        /// How far a message may lag behind the newest stamp of its stream; also how long a sample is held back.
-        ///
-        /// Real transports swap and delay by up to 16 ms.
-        reorder_ns: i64 = 20.0, "reorder_ms" [MS, 0, 60000];
-        /// Largest distance between the two poses around a wrench; over a longer one a path would be invented.
-        ///
-        /// A hand at 50 mm/s goes 1.5 mm, the radius of a usual ball, in 30 ms.
-        largest_gap_ns: i64 = 30.0, "largest_gap_ms" [MS, 0, 60000];
-        /// A stamp this far ahead of its stream is accepted only when the next one agrees.
-        ///
-        /// 10 s are a pause, not a fault, when they are true.
-        largest_jump_ns: i64 = 10.0, "largest_jump_s" [S, 0, 1e6];
-        /// What the clock of the wrench reads beyond the clock of the pose; taken off its stamps.
-        wrench_offset_ns: i64 = 0.0, "wrench_offset_ms" [MS, -60000, 60000];
-        /// How many messages of each stream are held.
-        ///
-        /// 4096 are four seconds at 1 kHz, half a megabyte.
-        capacity: usize = 4096, "capacity" [MESSAGES, 2, 1e6];
-    }
-}
-
-/// Messages of one stream that became no sample, by reason. Every wrench is in a sample, held, or counted once.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct SyncCounts {
-    /// Wrenches whose poses before and after are too far apart.
-    pub gap: u64,
-    /// Wrenches older than the first pose.
-    pub no_pose_before: u64,
-    /// Wrenches newer than the last pose.
-    pub no_pose_after: u64,
-    /// Messages later than the reorder window allows.
-    pub late: u64,
-    /// Messages with the stamp of one already held.
-    pub duplicate: u64,
-    /// Messages with a NaN or infinite component.
-    pub not_finite: u64,
-    /// Messages that no stylus can cause, or whose orientation is no rotation.
-    pub absurd: u64,
-    /// Messages whose stamp leaps ahead and is not confirmed by the next.
-    pub jump: u64,
-    /// Wrenches pushed out of a full buffer, or whose poses were.
-    pub overflow: u64,
-}
-
-impl SyncCounts {
-    /// Each reason by its name, in the order of the fields.
-    pub fn reasons(&self) -> [(&'static str, u64); 9] {
-        let Self { gap, no_pose_before, no_pose_after, late, duplicate, not_finite, absurd, jump, overflow } = *self;
-        [
-            ("gap", gap),
-            ("no_pose_before", no_pose_before),
-            ("no_pose_after", no_pose_after),
-            ("late", late),
-            ("duplicate", duplicate),
-            ("not_finite", not_finite),
-            ("absurd", absurd),
-            ("jump", jump),
-            ("overflow", overflow),
-        ]
-    }
-
-    /// All of them.
-    pub fn total(&self) -> u64 {
-        self.reasons().iter().map(|(_, count)| count).sum()
-    }
-}
 
 /// Turns two streams of messages into one stream of samples, in order of time.
 ///

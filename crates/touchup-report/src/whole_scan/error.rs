@@ -3,8 +3,7 @@
 use serde::Serialize;
 
 use touchup_core::compare::{
-    CompareError, Summary, TouchedRegion, angle_between, closest_places, deviations, sample_surface,
-    surface_area,
+    CompareError, Summary, TouchedRegion, angle_between, closest_places, deviations, sample_surface, surface_area,
 };
 use touchup_core::mesh::{Alone, FaceTree, TriMesh};
 use touchup_core::numeric::quantile;

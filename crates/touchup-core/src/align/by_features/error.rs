@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-use super::{Alternative, FreeTurn};
+use super::FreeTurn;
+use super::alternative::Alternative;
 
 /// Which of the two shapes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

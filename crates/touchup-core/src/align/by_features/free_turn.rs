@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 
-use super::Alternative;
+use super::alternative::Alternative;
 use super::judge::{Judge, Judged};
 use super::landmark::{ALIKE, Landmark};
 use crate::features::Kind;

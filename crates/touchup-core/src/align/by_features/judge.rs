@@ -2,8 +2,8 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
+use super::alternative::{Alternative, OrientedSample, SAME, Surfaces};
 use super::matching::Matching;
-use super::{Alternative, OrientedSample, SAME, Surfaces};
 use crate::align::icp::{IcpFit, IcpParams, icp};
 use crate::mesh::Alone;
 use crate::numeric::median;

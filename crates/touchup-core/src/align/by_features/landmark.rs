@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
-use super::FeaturesParams;
+use super::alternative::FeaturesParams;
 use crate::features::{Feature, Kind};
 
 /// A feature, or the other end of it.

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector3, Vector6};
 
-use super::FeaturesParams;
+use super::alternative::FeaturesParams;
 use super::landmark::Landmark;
 use crate::numeric::moved_by_twist;
 

@@ -7,6 +7,7 @@
 //! told. Features about one axis alone leave the turn about it open: where the surface does not tell it either, that is told.
 //! All is exhaustive and in one order, so nothing is drawn.
 
+mod alternative;
 mod bases;
 mod error;
 mod free_turn;
@@ -14,71 +15,17 @@ mod judge;
 mod landmark;
 mod matching;
 
+pub use alternative::{Alternative, FeaturesParams, OrientedSample, Surfaces};
 pub use error::{FeaturesError, FeaturesSide};
 pub use free_turn::FreeTurn;
 use nalgebra::{Isometry3, Point3, Vector3};
 
+use self::alternative::SAME;
 use self::bases::{Base, SortedSets, axial_bases, bases};
 use self::judge::{Judge, Judged};
 use self::landmark::{Landmark, landmarks};
 use self::matching::Matching;
-use super::icp::IcpFit;
 use crate::features::Feature;
-use crate::mesh::{FaceTree, TriMesh};
-
-/// Settings of [`align_features`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FeaturesParams {
-    /// By how much features may be out of place beyond three standard uncertainties, over the size of the target. Default
-    /// 0.01: 1 mm on a part of 100 mm, as a poor scan has them.
-    pub tolerance: f64,
-    /// By how much diameters and widths may differ beyond three standard uncertainties, over their size. Default 0.05:
-    /// the flats of a hole of 12 sides lie 3.4 % inside.
-    pub size_tolerance: f64,
-}
-
-impl Default for FeaturesParams {
-    fn default() -> Self {
-        Self { tolerance: 0.01, size_tolerance: 0.05 }
-    }
-}
-
-/// A point of a surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct OrientedSample {
-    /// m
-    pub point: Point3<f64>,
-    /// outward unit normal
-    pub normal: Vector3<f64>,
-}
-
-/// What is known beside the features.
-#[derive(Clone, Copy, Debug)]
-pub struct Surfaces<'a> {
-    /// spread evenly over the source; 20 000 do
-    pub points: &'a [OrientedSample],
-    /// what they are brought onto
-    pub target: &'a TriMesh,
-    /// over its faces
-    pub tree: &'a FaceTree,
-}
-
-/// One motion, and what speaks for it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Alternative {
-    /// Moves the source onto the target.
-    pub source_to_target: Isometry3<f64>,
-    /// Features that it brings together: numbers in the lists of source and target.
-    pub explained: Vec<[usize; 2]>,
-    /// Share of the points that lie on the target, within three times the tolerance, and face the same way; `None` without
-    /// surfaces.
-    pub agreeing: Option<f64>,
-    /// How the surfaces fit; `None` without surfaces, or where they came to no rest.
-    pub icp: Option<IcpFit>,
-    /// Against the first alternative: rotation vector, rad, and shift of the middle of the features, m; in the frame of the
-    /// target.
-    pub differs: [Vector3<f64>; 2],
-}
 
 /// Frames of the source that are tried, at most; spread evenly over all.
 const MOST_BASES: usize = 3_000;
@@ -237,9 +184,6 @@ impl Frames {
         Ok(Self { own, theirs: SortedSets::new(theirs), is_axial: true, poor, found })
     }
 }
-
-/// Two motions are one when they bring features no farther apart than so many tolerances.
-const SAME: f64 = 2.0;
 
 /// Every motion that brings a frame onto one like it, with what it explains.
 fn hypotheses(matching: &Matching, own: &[Base], theirs: &SortedSets) -> Vec<(f64, Isometry3<f64>)> {

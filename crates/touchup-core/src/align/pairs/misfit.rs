@@ -4,7 +4,8 @@
 //! distributed when pair i is as good as the others (the F test of a shifted point). A smaller value than chance allows
 //! names the pair.
 
-use super::{PairsError, PairsParams, PointPair, SolvedMotion};
+use super::error::PairsError;
+use super::solved::{PairsParams, PointPair, SolvedMotion};
 
 /// Chance with which good pairs are refused, over all of them.
 const FALSE_ALARM: f64 = 1e-4;

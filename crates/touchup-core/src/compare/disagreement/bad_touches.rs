@@ -3,9 +3,9 @@
 use nalgebra::{Point3, Vector3};
 
 use super::cells::Cells;
-use super::{Class, RefinedShape};
+use super::places::{Class, RefinedShape};
 use crate::compare::CompareError;
-use crate::compare::deviation::closest_places;
+use crate::compare::deviation::{closest_places, signed};
 use crate::numeric::median;
 use crate::touch::ProbedPoint;
 
@@ -115,7 +115,7 @@ fn distances(
     let mut feet = vec![Point3::origin(); touches.len()];
     let centres: Vec<Point3<f64>> = touches.iter().map(|touch| touch.centre).collect();
     closest_places(&centres, mesh, refined.shape.tree, |at, hit| {
-        off[at] = super::signed(&centres[at], mesh, hit) - touches[at].radius;
+        off[at] = signed(&centres[at], mesh, hit) - touches[at].radius;
         feet[at] = hit.point;
     })?;
     Ok((off, feet))

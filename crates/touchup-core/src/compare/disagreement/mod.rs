@@ -10,6 +10,7 @@
 
 mod bad_touches;
 mod cells;
+mod places;
 mod regions;
 mod rigid_offset;
 mod scanner;
@@ -17,6 +18,8 @@ mod scanner;
 use nalgebra::Point3;
 
 pub use self::bad_touches::BadTouches;
+use self::places::Places;
+pub use self::places::{Class, RefinedShape, VertexBasis};
 pub use self::regions::{DisagreementRegion, RegionEvidence};
 pub use self::rigid_offset::Misplaced;
 pub use self::scanner::Scanner;
@@ -24,71 +27,6 @@ use super::deviation::{closest_places, signed};
 use super::{CompareError, IndexedMesh};
 use crate::mesh::{FaceHit, TriMesh, VertexId};
 use crate::touch::ProbedPoint;
-
-/// What a vertex of a refined mesh rests on, as `refine` writes it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum VertexBasis {
-    /// the scan, or what is near touches suggests
-    NotTouched,
-    /// touches
-    Touched,
-    /// nothing can be felt here
-    Unreachable,
-}
-
-/// A refined mesh.
-#[derive(Clone, Copy, Debug)]
-pub struct RefinedShape<'a> {
-    /// in the frame of the scan
-    pub shape: IndexedMesh<'a>,
-    /// by vertex slot
-    pub known: &'a [VertexBasis],
-}
-
-/// What a place is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Class {
-    /// scan and touch agree within the noise of the scan
-    Agrees,
-    /// they do not, and it looks like this scanner: its noise, a rounded edge, a closed hole
-    ScannerError,
-    /// the part is not what was scanned
-    ChangedPart,
-    /// the touch is wrong
-    BadTouch,
-    /// may be changed as well as the scanner's error
-    Unsure,
-    /// nothing is known but the scan
-    NeverTouched,
-    /// the ball does not get there
-    Unreachable,
-}
-
-impl Class {
-    /// All, in the order in which they are told.
-    pub const ALL: [Self; 7] = [
-        Self::Agrees,
-        Self::ScannerError,
-        Self::ChangedPart,
-        Self::BadTouch,
-        Self::Unsure,
-        Self::NeverTouched,
-        Self::Unreachable,
-    ];
-
-    /// As it is told.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Agrees => "agrees",
-            Self::ScannerError => "scanner error",
-            Self::ChangedPart => "changed part",
-            Self::BadTouch => "bad touch",
-            Self::Unsure => "unsure",
-            Self::NeverTouched => "never touched",
-            Self::Unreachable => "unreachable",
-        }
-    }
-}
 
 /// A mesh with its classes.
 #[derive(Clone, Debug, PartialEq)]
@@ -173,26 +111,6 @@ pub fn disagreement(
         regions,
         bad_touches,
     })
-}
-
-/// What is known of each vertex of the refined mesh beside its class.
-struct Places {
-    /// m, by slot
-    pub positions: Vec<Point3<f64>>,
-    /// how far it lies outside of the scan, m, by slot; without what the scan is misplaced, once that is known
-    pub off: Vec<f64>,
-    /// whether it was touched, and the scan is there at all
-    pub is_seen: Vec<bool>,
-    /// whether a scanner of this resolution sees it at all: no narrow place
-    pub is_wide: Vec<bool>,
-    /// whether a scanner of this resolution sees it well: no edge near, and no narrow place
-    pub is_open: Vec<bool>,
-    /// whether an edge near that the scanner rounds may leave it too low, and too high
-    pub may_be: Vec<[bool; 2]>,
-    /// normals, by slot; zero where there are none
-    pub normals: Vec<nalgebra::Vector3<f64>>,
-    /// a third of the faces at it, m²
-    pub areas: Vec<f64>,
 }
 
 impl Places {

@@ -3,8 +3,8 @@
 use nalgebra::{Point3, Vector3};
 
 use super::cells::Cells;
+use super::places::{Class, Places, RefinedShape};
 use super::scanner::{Scanner, rounded, sharp_vertices};
-use super::{Class, Places, RefinedShape};
 use crate::mesh::{TriMesh, VertexId};
 use crate::touch::ProbedPoint;
 

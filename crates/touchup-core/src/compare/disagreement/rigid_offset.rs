@@ -8,8 +8,11 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Matrix6, Point3, SMatrix, SVector, Vector3, Vector6};
 
-use super::{Places, Scanner};
-use crate::numeric::{NormalEquations, SIGMA_OF_MEDIAN, TUKEY_WIDTH, biweight, centroid_and_spread, median, point_to_plane_row};
+use super::places::Places;
+use super::scanner::Scanner;
+use crate::numeric::{
+    NormalEquations, SIGMA_OF_MEDIAN, TUKEY_WIDTH, biweight, centroid_and_spread, median, point_to_plane_row,
+};
 
 /// The scan against the touches, of small angles.
 #[derive(Clone, Copy, Debug, PartialEq)]

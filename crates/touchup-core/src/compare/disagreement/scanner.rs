@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::cells::Cells;
-use super::{Places, RefinedShape};
+use super::places::{Places, RefinedShape};
 use crate::mesh::{TriMesh, VertexId};
 use crate::numeric::{SIGMA_OF_MEDIAN, median};
 

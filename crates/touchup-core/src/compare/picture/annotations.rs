@@ -1,13 +1,29 @@
 //! What stands around and on the panels: legend, scale of colours, histogram, length, names of places.
 
+use nalgebra::Point3;
+
 use super::camera::Camera;
 use super::canvas::{NOTE, Picture, TEXT};
-use super::raster::PictureFrame;
-use super::{GAP, INK, MARGIN, PAPER, PictureLabel, PicturePanel, SOFT_INK};
+use super::raster::{PictureFrame, PicturePanel};
 use crate::compare::colour::{ColourScale, Rgb};
 use crate::compare::comparison::round_up;
 use crate::compare::summary::Histogram;
 
+/// What stands beside a place of the part, in every panel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PictureLabel {
+    /// m, in the frame of the meshes
+    pub place: Point3<f64>,
+    /// Latin-1
+    pub text: String,
+}
+
+/// Around the picture, pixels.
+pub(super) const MARGIN: i32 = 36;
+pub(super) const GAP: i32 = 28;
+pub(super) const PAPER: Rgb = [255, 255, 255];
+pub(super) const INK: Rgb = [32, 36, 44];
+pub(super) const SOFT_INK: Rgb = [92, 98, 110];
 /// The bar of colours, pixels.
 pub(super) const BAR: [i32; 2] = [640, 24];
 /// Height of the histogram above it, pixels.

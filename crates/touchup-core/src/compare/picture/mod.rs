@@ -5,52 +5,21 @@ mod camera;
 mod canvas;
 mod raster;
 
-use nalgebra::{Point3, Vector2, Vector3};
+use nalgebra::{Vector2, Vector3};
 
 use super::colour::{ColourScale, Rgb, colour_of_class};
 use super::disagreement::Class;
-use super::summary::Histogram;
-use crate::mesh::{TriMesh, VertexId};
-use annotations::{BAR, HISTOGRAM, draw_histograms, draw_labels, draw_legend, draw_length, draw_scale};
+use crate::mesh::VertexId;
+pub use annotations::PictureLabel;
+use annotations::{
+    BAR, GAP, HISTOGRAM, INK, MARGIN, PAPER, SOFT_INK, draw_histograms, draw_labels, draw_legend, draw_length,
+    draw_scale,
+};
 use camera::Camera;
 pub use canvas::Picture;
 use canvas::{Font, NOTE, TEXT, TITLE};
+pub use raster::PicturePanel;
 use raster::{PictureFrame, draw};
-
-/// A mesh to be drawn.
-#[derive(Clone, Copy, Debug)]
-pub struct PicturePanel<'a> {
-    /// m
-    pub mesh: &'a TriMesh,
-    /// of each vertex slot, m, + outside
-    pub deviations: &'a [f64],
-    /// of each vertex slot; drawn in their colours where they are given
-    pub classes: Option<&'a [Class]>,
-    /// of each vertex slot, instead of all that; what it means is said in the legend
-    pub paint: Option<&'a [Rgb]>,
-    /// of its deviations, drawn over the bar of colours: bars for the last panel, a line for the others
-    pub histogram: Option<&'a Histogram>,
-    /// stands above it; Latin-1
-    pub title: &'a str,
-    /// stands below it; Latin-1
-    pub note: &'a str,
-}
-
-impl<'a> PicturePanel<'a> {
-    /// A mesh with nothing around it.
-    pub fn of(mesh: &'a TriMesh) -> Self {
-        Self { mesh, deviations: &[], classes: None, paint: None, histogram: None, title: "", note: "" }
-    }
-}
-
-/// What stands beside a place of the part, in every panel.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PictureLabel {
-    /// m, in the frame of the meshes
-    pub place: Point3<f64>,
-    /// Latin-1
-    pub text: String,
-}
 
 /// What is drawn around the panels, and how.
 #[derive(Clone, Debug)]
@@ -92,12 +61,6 @@ impl Default for PictureParams<'_> {
 }
 
 const WIDTHS: [u32; 2] = [400, 8000];
-const MARGIN: i32 = 36;
-const GAP: i32 = 28;
-const PAPER: Rgb = [255, 255, 255];
-const BACKGROUND: Rgb = [233, 236, 240];
-const INK: Rgb = [32, 36, 44];
-const SOFT_INK: Rgb = [92, 98, 110];
 /// What a panel leaves free around the part, share of its sides.
 const AIR: f64 = 0.05;
 /// A panel is at least so high over its width.

@@ -4,10 +4,39 @@ use nalgebra::{Vector2, Vector3};
 
 use super::camera::Camera;
 use super::canvas::Picture;
-use super::{BACKGROUND, PicturePanel};
+use crate::compare::Class;
 use crate::compare::colour::{ColourScale, Rgb, colour_of_class};
-use crate::mesh::FaceId;
+use crate::compare::summary::Histogram;
+use crate::mesh::{FaceId, TriMesh};
 
+/// A mesh to be drawn.
+#[derive(Clone, Copy, Debug)]
+pub struct PicturePanel<'a> {
+    /// m
+    pub mesh: &'a TriMesh,
+    /// of each vertex slot, m, + outside
+    pub deviations: &'a [f64],
+    /// of each vertex slot; drawn in their colours where they are given
+    pub classes: Option<&'a [Class]>,
+    /// of each vertex slot, instead of all that; what it means is said in the legend
+    pub paint: Option<&'a [Rgb]>,
+    /// of its deviations, drawn over the bar of colours: bars for the last panel, a line for the others
+    pub histogram: Option<&'a Histogram>,
+    /// stands above it; Latin-1
+    pub title: &'a str,
+    /// stands below it; Latin-1
+    pub note: &'a str,
+}
+
+impl<'a> PicturePanel<'a> {
+    /// A mesh with nothing around it.
+    pub fn of(mesh: &'a TriMesh) -> Self {
+        Self { mesh, deviations: &[], classes: None, paint: None, histogram: None, title: "", note: "" }
+    }
+}
+
+/// Behind the part.
+const BACKGROUND: Rgb = [233, 236, 240];
 /// Samples on each axis of a pixel.
 const FINE: u32 = 3;
 /// Colours of the scale that are worked out beforehand.

@@ -3,20 +3,13 @@
 use nalgebra::{Point3, Vector3};
 
 use super::aabb::{Aabb, greater, lesser};
-use super::{FaceTree, LEAF_FACES, NONE, ROOT, SiblingNodes, TreeNode};
+use super::{FaceTree, Item, LEAF_FACES, NONE, ROOT, SiblingNodes, TreeNode};
 use crate::mesh::{FaceId, TriMesh};
 
 /// A split at the middle is taken only if it leaves at least this share on either side (1/4).
 const SMALLEST_SHARE: usize = 4;
 /// So few are halved by count, to fill two leaves: 3 bytes less for a face, and queries are no slower.
 const FULL_LEAVES: usize = 2 * LEAF_FACES;
-
-/// A face while a tree is built.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Item {
-    middle: [f32; 3],
-    face: FaceId,
-}
 
 impl FaceTree {
     /// Builds the tree; O(F log F).

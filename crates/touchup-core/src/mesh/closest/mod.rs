@@ -51,6 +51,13 @@ impl TreeNode {
 #[repr(align(64))]
 struct SiblingNodes([TreeNode; 2]);
 
+/// A face while a tree is built.
+#[derive(Clone, Copy, Debug)]
+struct Item {
+    middle: [f32; 3],
+    face: FaceId,
+}
+
 /// Bounding volume tree over the faces of one [`TriMesh`].
 #[derive(Clone, Debug)]
 pub struct FaceTree {
@@ -66,7 +73,7 @@ pub struct FaceTree {
     free_pair: u32,
     free_leaf: u32,
     /// room for what is built anew
-    items: Vec<build::Item>,
+    items: Vec<Item>,
     /// counts insertions and removals, so that a plan knows whether it still holds
     edits: u64,
     /// counts those and the refits after motions of unknown length …
@@ -94,7 +101,7 @@ impl FaceTree {
         self.pairs.capacity() * size_of::<SiblingNodes>()
             + (self.parents.capacity() + self.leaf_of_face.capacity()) * size_of::<u32>()
             + self.leaf_faces.capacity() * size_of::<[FaceId; LEAF_FACES]>()
-            + self.items.capacity() * size_of::<build::Item>()
+            + self.items.capacity() * size_of::<Item>()
     }
 
     #[inline]

@@ -1,6 +1,6 @@
 //! An adaptive Runge–Kutta solver of order 5(4), for comparison with the exact steps.
 
-use super::DynamicsError;
+use super::error::DynamicsError;
 
 /// Error per step, relative to the size of each component, of [`super::StepRule::DormandPrince`].
 pub const RELATIVE: f64 = 1e-11;

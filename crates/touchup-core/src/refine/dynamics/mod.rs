@@ -15,6 +15,8 @@
 
 mod contact_model;
 pub mod dormand_prince;
+mod error;
+mod hold;
 mod rotation;
 mod sigmoid_flow;
 mod spring_flow;
@@ -24,7 +26,8 @@ use nalgebra::{Point3, Vector3};
 use crate::{parameters, words};
 
 pub use contact_model::{ContactModel, LARGEST_SHARE};
-use contact_model::{Hold, Shift};
+pub use error::DynamicsError;
+use hold::{Hold, Shift};
 pub use rotation::turn;
 
 /// How far |n| may be from 1 on input: six digits in a file are enough.
@@ -33,55 +36,6 @@ pub const UNIT_TOLERANCE: f64 = 1e-6;
 const SMALLEST_SQUARE: f64 = f64::MIN_POSITIVE / f64::EPSILON;
 /// Below it the weight of the end is 1/2 + z/12 to rounding.
 const SMALL_DECAY: f64 = 1e-5;
-
-/// What [`FaceDynamics`] refuses.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum DynamicsError {
-    /// A parameter outside its range.
-    #[error("{name} is {value}, but must be {range}", range = range_of(name))]
-    BadParameter {
-        /// as in the scene and in `touchup step`
-        name: &'static str,
-        /// as given
-        value: f64,
-    },
-    /// NaN or infinite input, or a result beyond the largest number.
-    #[error("{what} is not finite; check the units of the input")]
-    NotFinite {
-        /// which quantity
-        what: &'static str,
-    },
-    /// The face has no usable normal.
-    #[error("the normal has length {length}, but must have length 1")]
-    NotUnit {
-        /// |n|
-        length: f64,
-    },
-    /// Time does not run backward.
-    #[error("the time step is {dt_s} s, but must be 0 or more")]
-    BadTimeStep {
-        /// s
-        dt_s: f64,
-    },
-    /// The explicit solver gave up.
-    #[error("too stiff for dp5: {steps} steps reached {reached_s} s of {dt_s} s; use lie or corrected")]
-    Stiff {
-        /// tried
-        steps: usize,
-        /// s
-        reached_s: f64,
-        /// s
-        dt_s: f64,
-    },
-}
-
-fn range_of(name: &str) -> &'static str {
-    match name {
-        "delta" => "finite",
-        "alpha_m_per_n_s" | "beta_per_n2_s" => "finite and 0 or more",
-        _ => "finite and more than 0",
-    }
-}
 
 /// A face as the dynamics sees it: a point and a direction.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,6 +1,6 @@
 //! The exact flow of a linear spring: dh/dt = v − α (a·n) (F·n + k h) is linear in h.
 
-use super::contact_model::{Hold, Shift};
+use super::hold::{Hold, Shift};
 
 /// Below it the series is taken, above it the closed form (which there loses no more than four roundings).
 const SERIES_UP_TO: f64 = 1.0;
