@@ -43,7 +43,7 @@ pub struct Motion {
 
 impl Motion {
     /// Whether the target tells where to stop.
-    pub fn is_determined(&self) -> bool {
+    pub(crate) fn is_determined(&self) -> bool {
         self.share >= LEAST_SHARE
     }
 }

@@ -27,7 +27,7 @@ pub use lines::DrawnMesh;
 pub use normals::{Tilt, TiltSummary, angle_between, tilts};
 pub use picture::{Picture, PictureLabel, PicturePanel, PictureParams, draw_picture};
 pub use sampling::{SampledPoint, sample_surface, surface_area};
-pub use summary::{BINS, Histogram, Summary};
+pub use summary::{Histogram, Summary};
 pub use touched::TouchedRegion;
 
 /// Why two shapes cannot be compared.

@@ -59,7 +59,7 @@ pub struct Histogram {
 }
 
 /// Bins of a [`Histogram`].
-pub const BINS: usize = 40;
+pub(crate) const BINS: usize = 40;
 
 impl Histogram {
     /// Of deviations in m, in [`BINS`] bins from −`range` to `range` (m, more than 0); a bin has its lower end in it.

@@ -94,7 +94,7 @@ impl Knowledge {
     }
 
     /// Standard deviation of the surface along its normal at a place of it, m.
-    pub fn sigma_at<M: Surface>(&self, surface: &M, point: &Point3<f64>) -> f64 {
+    pub(crate) fn sigma_at<M: Surface>(&self, surface: &M, point: &Point3<f64>) -> f64 {
         let (_, g) = surface.derivatives(point);
         g.dot(&(self.covariance * g)).max(0.0).sqrt()
     }

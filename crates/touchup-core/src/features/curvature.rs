@@ -65,7 +65,7 @@ pub fn curvature(mesh: &TriMesh) -> Vec<VertexCurvature> {
 
 /// The faces around a vertex, as pairs of its neighbours; kept only for its memory.
 #[derive(Clone, Debug, Default)]
-pub struct Fan {
+pub(crate) struct Fan {
     links: Vec<[u32; 2]>,
     /// the face that begins where each one ends
     next: Vec<u32>,

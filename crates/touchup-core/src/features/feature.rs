@@ -133,7 +133,7 @@ impl Feature {
     }
 
     /// Numbers of the touches that its sizes come from; one may come again.
-    pub fn touch_numbers(&self) -> impl Iterator<Item = u32> {
+    pub(crate) fn touch_numbers(&self) -> impl Iterator<Item = u32> {
         let sizes = [&self.diameter, &self.width, &self.length].into_iter().flatten();
         sizes.flat_map(|size| size.touches.iter().copied())
     }

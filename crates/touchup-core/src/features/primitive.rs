@@ -18,7 +18,7 @@ pub enum Side {
 
 /// A surface without ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Primitive {
+pub(crate) enum Primitive {
     /// a plane
     Plane {
         /// a point of it, m, in O

@@ -6,7 +6,7 @@ use super::primitive::{Moments, Primitive};
 
 /// A connected piece of the mesh that one primitive explains.
 #[derive(Clone, Debug)]
-pub struct Segment {
+pub(crate) struct Segment {
     /// the surface
     pub primitive: Primitive,
     /// ids of its faces, in ascending order

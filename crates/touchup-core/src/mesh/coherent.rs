@@ -8,7 +8,7 @@ const BITS: u32 = 10;
 /// The indices of `points` along a Z-order curve through cells of 1/1024 of their box; within a cell as they come.
 ///
 /// - `points`: finite, fewer than 2³².
-pub fn coherent_order(points: &[Point3<f64>]) -> Vec<u32> {
+pub(crate) fn coherent_order(points: &[Point3<f64>]) -> Vec<u32> {
     let empty = [f64::INFINITY, f64::NEG_INFINITY].map(|x| Point3::new(x, x, x));
     let [lo, hi] = points.iter().fold(empty, |[lo, hi], p| [lo.inf(p), hi.sup(p)]);
     // cubes: a flat part is ordered as a flat one

@@ -75,7 +75,7 @@ pub struct IdSet {
 
 impl IdSet {
     /// An empty one with room for ids below `slots`; others are taken too.
-    pub fn with_slots(slots: usize) -> Self {
+    pub(crate) fn with_slots(slots: usize) -> Self {
         Self { is_in: vec![0; slots.div_ceil(64)], ids: Vec::new() }
     }
 

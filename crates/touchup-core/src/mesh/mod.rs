@@ -13,11 +13,12 @@ pub mod triangle;
 mod workers;
 
 pub use closest::{BoxQuery, FaceHit, FaceTree, Nearby, RefitPlan};
-pub use coherent::coherent_order;
+pub(crate) use coherent::coherent_order;
 pub use ids::{FaceId, VertexId};
 pub use journal::{Changes, IdSet};
 pub use region::{Outside, Region, Sewn};
 pub use repair::{RepairReport, repair};
 pub use signed_distance::{pseudo_normal, signed_distance};
 pub use tri_mesh::{MeshError, TriMesh};
-pub use workers::{Alone, Job, Workers, map_by};
+pub(crate) use workers::map_by;
+pub use workers::{Alone, Job, Workers};

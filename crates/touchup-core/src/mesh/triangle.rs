@@ -145,7 +145,7 @@ pub fn intersect(t: &[Point3<f64>; 3], u: &[Point3<f64>; 3], gap: f64) -> bool {
 
 /// The square of the longest edge, m².
 #[inline]
-pub fn longest_edge_squared(t: &[Point3<f64>; 3]) -> f64 {
+pub(crate) fn longest_edge_squared(t: &[Point3<f64>; 3]) -> f64 {
     (t[1] - t[0]).norm_squared().max((t[2] - t[1]).norm_squared()).max((t[0] - t[2]).norm_squared())
 }
 

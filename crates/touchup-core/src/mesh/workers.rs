@@ -31,7 +31,7 @@ impl Workers for Alone {
 const LEAST_PIECE: usize = 4_000;
 
 /// What `each` makes of 0 to `count` − 1, in this order, for any workers.
-pub fn map_by<T: Send>(workers: &dyn Workers, count: usize, each: impl Fn(usize) -> T + Sync) -> Vec<T> {
+pub(crate) fn map_by<T: Send>(workers: &dyn Workers, count: usize, each: impl Fn(usize) -> T + Sync) -> Vec<T> {
     let pieces = workers.count().min(count / LEAST_PIECE).max(1);
     if pieces == 1 {
         return (0..count).map(each).collect();

@@ -7,7 +7,7 @@ const FAR_FROM_X: f64 = 0.6;
 
 /// Two unit vectors u and v across `axis`, a unit vector: (u, v, axis) is right-handed. Where they jump as the axis turns is not
 /// defined, as no continuous choice exists.
-pub fn tangent_basis(axis: &Vector3<f64>) -> [Vector3<f64>; 2] {
+pub(crate) fn tangent_basis(axis: &Vector3<f64>) -> [Vector3<f64>; 2] {
     let aside = if axis.x.abs() < FAR_FROM_X { Vector3::x() } else { Vector3::y() };
     let u = axis.cross(&aside).normalize();
     [u, axis.cross(&u)]

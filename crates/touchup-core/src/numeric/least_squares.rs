@@ -6,7 +6,7 @@ use nalgebra::{SMatrix, SVector};
 ///
 /// That is Σ w z² − 2 `right`·x + x·`information` x, and its least is where `information` x = `right`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NormalEquations<const N: usize> {
+pub(crate) struct NormalEquations<const N: usize> {
     /// Σ w a aᵀ: symmetric to rounding, positive semi-definite
     pub information: SMatrix<f64, N, N>,
     /// Σ w z a

@@ -7,9 +7,10 @@ mod robust;
 mod twist;
 mod voxel;
 
-pub use basis::tangent_basis;
-pub use least_squares::NormalEquations;
-pub use quantile::{median, order_statistic, quantile, weighted_quantile};
-pub use robust::{SIGMA_OF_MEDIAN, TUKEY_WIDTH, biweight, cauchy_weight};
-pub use twist::{centroid_and_spread, moved_by_twist, point_to_plane_row};
-pub use voxel::{VoxelKey, voxel_neighbourhood, voxel_of};
+pub(crate) use basis::tangent_basis;
+pub(crate) use least_squares::NormalEquations;
+pub(crate) use quantile::order_statistic;
+pub use quantile::{median, quantile, weighted_quantile};
+pub(crate) use robust::{SIGMA_OF_MEDIAN, TUKEY_WIDTH, biweight, cauchy_weight};
+pub(crate) use twist::{centroid_and_spread, moved_by_twist, point_to_plane_row};
+pub(crate) use voxel::{VoxelKey, voxel_neighbourhood, voxel_of};

@@ -4,7 +4,7 @@
 /// none. The values come out in another order. O(n).
 ///
 /// - `share`: 0 to 1.
-pub fn order_statistic(values: &mut [f64], share: f64) -> Option<f64> {
+pub(crate) fn order_statistic(values: &mut [f64], share: f64) -> Option<f64> {
     let at = ((share * values.len() as f64) as usize).min(values.len().checked_sub(1)?);
     Some(*values.select_nth_unstable_by(at, f64::total_cmp).1)
 }

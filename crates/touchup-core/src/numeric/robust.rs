@@ -1,20 +1,20 @@
 //! Weights of iteratively reweighted least squares, as functions of u², u a residual over the width of the weights.
 
 /// Standard deviation of normal errors over the median of their sizes: 1/Φ⁻¹(3/4).
-pub const SIGMA_OF_MEDIAN: f64 = 1.482_602_218_505_602;
+pub(crate) const SIGMA_OF_MEDIAN: f64 = 1.482_602_218_505_602;
 
 /// Width of Tukey's weights in standard deviations: 95 % as good as plain least squares where there are no outliers.
-pub const TUKEY_WIDTH: f64 = 4.685;
+pub(crate) const TUKEY_WIDTH: f64 = 4.685;
 
 /// Tukey's biweight (1 − u²)², 0 from u = 1 on.
 #[inline]
-pub fn biweight(u_squared: f64) -> f64 {
+pub(crate) fn biweight(u_squared: f64) -> f64 {
     (1.0 - u_squared).max(0.0).powi(2)
 }
 
 /// Cauchy's weight 1/(1 + u²): half at u = 1, never 0.
 #[inline]
-pub fn cauchy_weight(u_squared: f64) -> f64 {
+pub(crate) fn cauchy_weight(u_squared: f64) -> f64 {
     1.0 / (1.0 + u_squared)
 }
 

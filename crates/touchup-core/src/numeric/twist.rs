@@ -3,14 +3,14 @@
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3, Vector6};
 
 /// Mean of the points, m, and the root of their mean square distance from it, m; NaN where there are none.
-pub fn centroid_and_spread<'a>(points: impl Iterator<Item = &'a Point3<f64>> + Clone) -> (Point3<f64>, f64) {
+pub(crate) fn centroid_and_spread<'a>(points: impl Iterator<Item = &'a Point3<f64>> + Clone) -> (Point3<f64>, f64) {
     let count = points.clone().count() as f64;
     let centroid = Point3::from(points.clone().map(|p| p.coords).sum::<Vector3<f64>>() / count);
     (centroid, (points.map(|p| (p - centroid).norm_squared()).sum::<f64>() / count).sqrt())
 }
 
 /// `pose`, then the turn about `centre` by a rotation vector (rad), then the shift (m): x ↦ c + R (x − c) + t.
-pub fn moved_by_twist(
+pub(crate) fn moved_by_twist(
     pose: &Isometry3<f64>,
     centre: &Point3<f64>,
     shift: &Vector3<f64>,
@@ -24,7 +24,7 @@ pub fn moved_by_twist(
 /// and by turn, a turn counted by the shift that it gives at the lever.
 ///
 /// - `arm`: of the point from the centre of the turn, m; `normal`: unit, of the plane; `lever`: m, 1 where turns are counted in rad.
-pub fn point_to_plane_row(arm: &Vector3<f64>, normal: &Vector3<f64>, lever: f64) -> Vector6<f64> {
+pub(crate) fn point_to_plane_row(arm: &Vector3<f64>, normal: &Vector3<f64>, lever: f64) -> Vector6<f64> {
     let turn = arm.cross(normal) / lever;
     Vector6::new(normal.x, normal.y, normal.z, turn.x, turn.y, turn.z)
 }

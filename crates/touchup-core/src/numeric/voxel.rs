@@ -3,17 +3,17 @@
 use nalgebra::Point3;
 
 /// Which cube of a grid from the origin, counted along x, y and z.
-pub type VoxelKey = [i32; 3];
+pub(crate) type VoxelKey = [i32; 3];
 
 /// The cube of edge `size` (m, > 0) that holds `p`: ⌊p / size⌋. What is farther than keys can count is in the last cube; NaN is in the
 /// first.
 #[inline]
-pub fn voxel_of(p: &Point3<f64>, size: f64) -> VoxelKey {
+pub(crate) fn voxel_of(p: &Point3<f64>, size: f64) -> VoxelKey {
     [p.x, p.y, p.z].map(|x| (x / size).floor() as i32)
 }
 
 /// A cube and the 26 around it, x slowest.
-pub fn voxel_neighbourhood(key: VoxelKey) -> impl Iterator<Item = VoxelKey> {
+pub(crate) fn voxel_neighbourhood(key: VoxelKey) -> impl Iterator<Item = VoxelKey> {
     (0..27).map(move |i| [0, 1, 2].map(|axis| key[axis].saturating_add(i / [9, 3, 1][axis] % 3 - 1)))
 }
 

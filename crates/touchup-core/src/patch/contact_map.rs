@@ -436,7 +436,7 @@ impl ContactMap {
     }
 
     /// Begins a stroke, which can be undone.
-    pub fn begin_stroke(&mut self) {
+    pub(crate) fn begin_stroke(&mut self) {
         self.history.begin();
     }
 
@@ -488,7 +488,7 @@ impl ContactMap {
 
     /// The numbers of the means that came since this was last asked, or are clearly elsewhere than when they were last
     /// told, each once.
-    pub fn take_changed(&mut self) -> Vec<u32> {
+    pub(crate) fn take_changed(&mut self) -> Vec<u32> {
         let changed = std::mem::take(&mut self.changed);
         for &at in &changed {
             let (kept, mean) = (&mut self.kept[at as usize], &self.means[at as usize]);
@@ -498,7 +498,7 @@ impl ContactMap {
     }
 
     /// Lets [`Self::take_changed`] tell all means.
-    pub fn note_all(&mut self) {
+    pub(crate) fn note_all(&mut self) {
         self.changed = (0..self.means.len() as u32).collect();
         self.kept.iter_mut().for_each(|kept| kept.is_noted = true);
     }
@@ -525,7 +525,7 @@ impl ContactMap {
     }
 
     /// Takes a mean out of all queries, or back in; returns whether that is new.
-    pub fn refute(&mut self, at: u32, is_refuted: bool) -> bool {
+    pub(crate) fn refute(&mut self, at: u32, is_refuted: bool) -> bool {
         let (kept, mean) = (&mut self.kept[at as usize], &mut self.means[at as usize]);
         kept.is_refuted = is_refuted;
         let before = std::mem::replace(&mut mean.weight, kept.weight());
@@ -547,7 +547,7 @@ impl ContactMap {
 
     /// Finds whether normals within `width` (m) of a mean differ by more than the angle of `cosine`; returns whether that
     /// is new.
-    pub fn mark_fan(&mut self, at: u32, width: f64, cosine: f64) -> bool {
+    pub(crate) fn mark_fan(&mut self, at: u32, width: f64, cosine: f64) -> bool {
         let MeanContact { point, normal, is_fan: before, .. } = self.means[at as usize];
         let mut is_fan = false;
         self.near(&point, width, |_, other| is_fan |= self.means[other as usize].normal.dot(&normal) < cosine);

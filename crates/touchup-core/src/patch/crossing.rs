@@ -135,7 +135,8 @@ fn gradient(restored: &ReconstructionGrid, node: &LatticeNode) -> Vector3<f64> {
 mod tests {
     use super::*;
     use crate::mesh::{FaceTree, TriMesh};
-    use crate::patch::{ContactMap, ContactSigma, EvidenceParams, SurfaceContact, SweptSpace};
+    use crate::patch::free_space::SweptSpace;
+    use crate::patch::{ContactMap, ContactSigma, EvidenceParams, SurfaceContact};
 
     const RADIUS: f64 = 1.5e-3;
 

@@ -83,7 +83,7 @@ pub enum Source {
 
 /// What is known at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Finding {
+pub(crate) struct Finding {
     /// signed distance from the surface, m: positive outside; the scan's own where there is no better
     pub value: f64,
     /// what it rests on
@@ -113,7 +113,7 @@ impl ScanPrior {
 
 /// All evidence.
 #[derive(Clone, Copy, Debug)]
-pub struct Evidence<'a> {
+pub(crate) struct Evidence<'a> {
     /// how far it is believed
     pub params: &'a EvidenceParams,
     /// what was touched
@@ -130,7 +130,7 @@ pub struct Evidence<'a> {
 
 /// How well the scan is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ScanPrior {
+pub(crate) struct ScanPrior {
     /// standard deviation, m; more than 0
     pub sigma: f64,
     /// a scan that is off by more standard deviations shows something else

@@ -31,7 +31,7 @@ pub struct FieldParams {
 
 impl FieldParams {
     /// Settings that hold for a ball of `radius` (m): two radii are what passes of a hand leave between them.
-    pub fn for_ball(radius: f64) -> Self {
+    pub(crate) fn for_ball(radius: f64) -> Self {
         Self { reach: 2.0 * radius, sigma: radius / 2.0, piece_cosine: 0.819, chord: radius / 5.0, least_weight: 2.0 }
     }
 }

@@ -18,7 +18,7 @@ const AROUND: f64 = 2.0 / 3.0;
 
 /// Places of the tip, thinned to one for each small cell.
 #[derive(Clone, Debug)]
-pub struct SweptSpace {
+pub(crate) struct SweptSpace {
     cell: f64,
     reach: f64,
     centres: VoxelSet<LatticeNode, Point3<f64>>,
@@ -61,11 +61,6 @@ impl SweptSpace {
     pub fn of_tip(tip: TipBody, cell: f64, reach: f64) -> Self {
         let body = (!tip.is_ball()).then(|| SweptBody { tip, cell, places: VoxelSet::default() });
         Self { body, ..Self::new(cell, reach) }
-    }
-
-    /// Takes a centre of a ball, m, in O.
-    pub fn add(&mut self, centre: &Point3<f64>) {
-        self.add_place(&TipPlace { centre: *centre, axis: Vector3::z() });
     }
 
     /// Takes a place of the tip.
@@ -242,11 +237,15 @@ fn cell_distance_squared(cell: &LatticeNode, size: f64, x: &Point3<f64>) -> f64 
 mod tests {
     use super::*;
 
+    fn upright(centre: Point3<f64>) -> TipPlace {
+        TipPlace { centre, axis: Vector3::z() }
+    }
+
     #[test]
     fn a_way_ends_where_all_of_it_is_behind() {
         let mut swept = SweptSpace::new(0.1e-3, 2e-3);
         for i in 0..=100 {
-            swept.add(&Point3::new(0.0, 0.0, f64::from(i) * -1e-4));
+            swept.add_place(&upright(Point3::new(0.0, 0.0, f64::from(i) * -1e-4)));
         }
         let [top, middle, bottom] = [0.0, -5e-3, -1e-2].map(|z| Point3::new(0.0, 0.0, z));
         assert!(swept.is_end(&bottom, &-Vector3::z(), 1e-3) && swept.is_end(&top, &Vector3::z(), 1e-3));
@@ -291,7 +290,7 @@ mod tests {
     fn the_nearest_centre_is_found_up_to_the_reach() {
         let mut swept = SweptSpace::new(0.1e-3, 2e-3);
         for i in 0..1000 {
-            swept.add(&Point3::new(f64::from(i) * 1e-5, 0.0, 0.0));
+            swept.add_place(&upright(Point3::new(f64::from(i) * 1e-5, 0.0, 0.0)));
         }
         assert_eq!(swept.centres().count(), 100, "one for each tenth of a millimetre");
         let (distance, centre) = swept.nearest(&Point3::new(5e-3, 1.2e-3, 0.0)).unwrap();
@@ -301,7 +300,7 @@ mod tests {
         swept.forget(&Point3::new(5e-3, 0.0, 0.0), 1.01e-3);
         let nearest = |swept: &SweptSpace| swept.nearest(&Point3::new(5e-3, 0.0, 0.0)).unwrap().0;
         assert!(nearest(&swept) > 1e-3 && swept.centres().count() < 82);
-        swept.add(&Point3::new(5.01e-3, 0.0, 0.0));
+        swept.add_place(&upright(Point3::new(5.01e-3, 0.0, 0.0)));
         assert!(nearest(&swept) < 0.02e-3);
     }
 }

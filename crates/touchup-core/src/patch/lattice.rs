@@ -67,7 +67,7 @@ impl Lattice {
 
     /// The last plane across `axis` at or below coordinate `x` (m), exactly as [`Self::coordinate`] places it.
     #[inline]
-    pub fn index_of(&self, axis: usize, x: f64) -> i32 {
+    pub(crate) fn index_of(&self, axis: usize, x: f64) -> i32 {
         // the conversion saturates
         let index = ((x - self.origin[axis]) / self.pitch).floor() as i32;
         if self.coordinate(axis, index) > x {

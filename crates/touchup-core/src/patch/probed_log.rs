@@ -6,7 +6,7 @@ use crate::touch::ProbedPoint;
 
 /// Touches in order of time. A bounded number: when there are too many, each other one goes.
 #[derive(Clone, Debug)]
-pub struct ProbedLog {
+pub(crate) struct ProbedLog {
     /// radius of the tip when it is a ball, m
     ball: Option<f64>,
     points: Vec<ProbedPoint>,

@@ -6,7 +6,7 @@ use crate::mesh::{FaceHit, FaceTree, TriMesh, VertexId, pseudo_normal};
 
 /// The scan as seen from one point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ScanValue {
+pub(crate) struct ScanValue {
     /// signed distance, m: positive outside
     pub value: f64,
     /// unit normal of the scan at the foot

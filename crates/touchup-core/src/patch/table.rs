@@ -81,7 +81,7 @@ impl<K: Key, V> CellTable<K, V> {
 
     /// How many keys came before `key`.
     #[inline]
-    pub fn index_of(&self, key: &K) -> Option<u32> {
+    pub(crate) fn index_of(&self, key: &K) -> Option<u32> {
         let entry = self.slots[self.slot(key)];
         (entry != EMPTY).then_some(entry)
     }
@@ -106,7 +106,7 @@ impl<K: Key, V> CellTable<K, V> {
 
     /// The value of the `at`-th key that came, to be changed.
     #[inline]
-    pub fn value_mut(&mut self, at: u32) -> &mut V {
+    pub(crate) fn value_mut(&mut self, at: u32) -> &mut V {
         &mut self.entries[at as usize].1
     }
 

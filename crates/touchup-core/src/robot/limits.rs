@@ -156,7 +156,7 @@ impl Limits {
     ///
     /// # Errors
     /// [`LimitError::Workspace`]; also for a place that is no number.
-    pub fn check_place(&self, place: &Vector3<f64>) -> Result<(), LimitError> {
+    pub(crate) fn check_place(&self, place: &Vector3<f64>) -> Result<(), LimitError> {
         let is_in = (0..3).all(|i| place[i] >= self.lowest[i] && place[i] <= self.highest[i]);
         if is_in { Ok(()) } else { Err(LimitError::Workspace { place_mm: millimetres(place) }) }
     }
@@ -192,7 +192,7 @@ impl Limits {
     ///
     /// # Errors
     /// [`LimitError::Workspace`], [`LimitError::Force`].
-    pub fn check_state(&self, state: &ArmState) -> Result<(), LimitError> {
+    pub(crate) fn check_state(&self, state: &ArmState) -> Result<(), LimitError> {
         self.check_place(&state.pose_bt.translation.vector)?;
         let force_n = state.wrench_b.force.norm();
         // what is no number is over every limit

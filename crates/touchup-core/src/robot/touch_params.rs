@@ -76,7 +76,7 @@ impl TouchParams {
     /// Speed at which a search that stops at [`Self::trigger`] ends below [`Self::force`].
     ///
     /// After the trigger the tip goes on by v τ + v²/2a, and each metre of it is k more: v = a (√(τ² + 2 Δ/(k a)) − τ).
-    pub fn safe_speed(&self) -> f64 {
+    pub(crate) fn safe_speed(&self) -> f64 {
         let room = (self.force - self.trigger).max(0.0) / self.stiffness;
         let (a, late) = (self.acceleration, self.latency);
         (a * ((late * late + 2.0 * room / a).sqrt() - late)).min(self.search_speed).max(CRAWL)

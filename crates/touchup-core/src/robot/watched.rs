@@ -84,7 +84,7 @@ impl ProbeError {
     }
 
     /// Whether a touch that ended so had come to its stand-off.
-    pub fn was_at_standoff(&self) -> bool {
+    pub(crate) fn was_at_standoff(&self) -> bool {
         self.doing() != GOING
     }
 }
@@ -142,7 +142,7 @@ impl<'a> Watched<'a> {
     }
 
     /// When the arm was seen last, by its clock, ns; `None` where it was not, or not since the sensor was zeroed.
-    pub fn seen_ns(&self) -> Option<i64> {
+    pub(crate) fn seen_ns(&self) -> Option<i64> {
         self.last.map(|state| state.stamp_ns)
     }
 

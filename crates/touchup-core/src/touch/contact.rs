@@ -6,7 +6,7 @@ use super::SettingError;
 use crate::parameters;
 
 /// A pause in contact longer than this parts two strokes, ns: a hand that lifts the stylus, not one that bounces.
-pub const STROKE_PAUSE_NS: i64 = 100_000_000;
+pub(crate) const STROKE_PAUSE_NS: i64 = 100_000_000;
 
 parameters! {
     /// The two thresholds of a [`ContactGate`].

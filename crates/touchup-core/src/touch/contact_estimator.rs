@@ -18,7 +18,7 @@ use super::{
 };
 
 /// A sample acts for no longer than this, s: what happens in a longer pause is unknown.
-pub const LONGEST_HOLD: f64 = 0.03;
+pub(crate) const LONGEST_HOLD: f64 = 0.03;
 
 /// Settings of a [`ContactEstimator`]. What is `None` is not built.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 
 /// Cosine of the widest friction cone believed by default: cos 24° (μ = 0.45, dry metal on metal). The normal of a surface is nowhere
 /// farther from the force, neither for the haptic update nor for the evidence of the reconstruction.
-pub const WIDEST_CONE_COSINE: f64 = 0.9135;
+pub(crate) const WIDEST_CONE_COSINE: f64 = 0.9135;
 
 /// What the ball does and feels at one instant, averaged over a short time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,7 +39,7 @@ impl FeltNormal {
     /// The force itself, where friction is not asked for; `None` without one.
     ///
     /// - `force_o`: force of the object on the stylus, N, in O.
-    pub fn of_force(force_o: &Vector3<f64>) -> Option<Self> {
+    pub(crate) fn of_force(force_o: &Vector3<f64>) -> Option<Self> {
         force_o.try_normalize(0.0).map(|normal| Self { normal, sigma: LEAST_SIGMA })
     }
 }

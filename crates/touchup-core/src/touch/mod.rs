@@ -26,9 +26,12 @@ mod tip_shape;
 pub use bias::{BiasParams, BiasTracker};
 pub use clock::{ClockEstimator, ClockOffset, ClockParams};
 pub use compensate::{Compensator, CompensatorParams, Payload, SensorBias, SensorMount, Tip, WrenchFrame};
-pub use contact::{Contact, ContactGate, ContactGateParams, STROKE_PAUSE_NS};
-pub use contact_estimator::{ContactEstimator, ContactEstimatorParams, ContactSample, LONGEST_HOLD};
-pub use friction::{FeltNormal, Friction, FrictionCoefficient, Sliding, WIDEST_CONE_COSINE};
+pub(crate) use contact::STROKE_PAUSE_NS;
+pub use contact::{Contact, ContactGate, ContactGateParams};
+pub(crate) use contact_estimator::LONGEST_HOLD;
+pub use contact_estimator::{ContactEstimator, ContactEstimatorParams, ContactSample};
+pub(crate) use friction::WIDEST_CONE_COSINE;
+pub use friction::{FeltNormal, Friction, FrictionCoefficient, Sliding};
 pub use local_motion::{LocalMotion, SmoothedMotion};
 pub use markers::{
     MOST_MARKERS, MarkerBody, MarkerCounts, MarkerFilter, MarkerFrame, MarkerParams, SeenMarker, SpringParams, Tracking,
@@ -53,7 +56,7 @@ pub const LARGEST_POSITION: f64 = 1e3;
 pub const LARGEST_FORCE: f64 = 1e5;
 
 /// A greater torque is a fault and not a measurement, N·m: [`LARGEST_FORCE`] at a lever of one metre.
-pub const LARGEST_TORQUE: f64 = 1e5;
+pub(crate) const LARGEST_TORQUE: f64 = 1e5;
 
 /// A unit quaternion as it arrives may be off by this: components printed with six digits.
 const UNIT_TOLERANCE: f64 = 1e-5;

@@ -146,7 +146,7 @@ impl TipBody {
 
     /// Whether it is a plain ball.
     #[inline]
-    pub fn is_ball(&self) -> bool {
+    pub(crate) fn is_ball(&self) -> bool {
         self.shape == TipShape::Ball
     }
 
@@ -176,7 +176,7 @@ impl TipBody {
     }
 
     /// Signed distance of `x` (m, in O), and the direction in which it grows, unit, in O; zero where there is none.
-    pub fn way_out(&self, place: &TipPlace, x: &Point3<f64>) -> (f64, Vector3<f64>) {
+    pub(crate) fn way_out(&self, place: &TipPlace, x: &Point3<f64>) -> (f64, Vector3<f64>) {
         let arm = x - place.centre;
         let height = arm.dot(&place.axis);
         let across = arm - place.axis * height;
@@ -238,7 +238,7 @@ impl TipBody {
     }
 
     /// Heights on the axis of balls of one radius that together cover the tip, and that radius, m.
-    pub fn cover(&self) -> (Vec<f64>, f64) {
+    pub(crate) fn cover(&self) -> (Vec<f64>, f64) {
         if self.is_ball() {
             return (vec![0.0], self.round);
         }

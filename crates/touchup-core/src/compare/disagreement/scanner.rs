@@ -158,7 +158,7 @@ impl Scanner {
     }
 
     /// Standard deviation of the mean over an area (m²), m.
-    pub fn sigma_of_mean(&self, area: f64) -> f64 {
+    pub(crate) fn sigma_of_mean(&self, area: f64) -> f64 {
         let alike = std::f64::consts::TAU * self.correlation.powi(2);
         self.noise / (1.0 + area / alike.max(f64::MIN_POSITIVE)).sqrt()
     }

@@ -43,7 +43,7 @@ impl Picture {
     }
 
     /// Mixes `share` (0 to 1) of a colour into a pixel; outside of the picture nothing happens.
-    pub fn mix(&mut self, x: i32, y: i32, colour: Rgb, share: f64) {
+    pub(crate) fn mix(&mut self, x: i32, y: i32, colour: Rgb, share: f64) {
         let [width, height] = self.size.map(|side| side as i32);
         if !(0..width).contains(&x) || !(0..height).contains(&y) {
             return;
@@ -101,7 +101,7 @@ impl Picture {
     }
 
     /// Lays another picture over this one.
-    pub fn paste(&mut self, [x, y]: [i32; 2], other: &Self) {
+    pub(crate) fn paste(&mut self, [x, y]: [i32; 2], other: &Self) {
         let width = other.size[0].max(1) as usize;
         for (row, pixels) in (y..).zip(other.pixels.chunks(3 * width)) {
             for (column, pixel) in (x..).zip(pixels.as_chunks::<3>().0) {

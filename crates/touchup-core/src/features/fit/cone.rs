@@ -45,7 +45,7 @@ impl Cone {
     }
 
     /// The same cone with z towards where it is wider.
-    pub fn widening(self) -> Self {
+    pub(crate) fn widening(self) -> Self {
         if self.half_angle >= 0.0 {
             return self;
         }
@@ -59,7 +59,7 @@ impl Cone {
     }
 
     /// Radius at a height above the circle along z, m.
-    pub fn radius_at(&self, height: f64) -> f64 {
+    pub(crate) fn radius_at(&self, height: f64) -> f64 {
         self.radius + height * self.half_angle.tan()
     }
 

@@ -58,7 +58,7 @@ impl<M: Surface> Fit<M> {
     }
 
     /// Standard deviation of a number that changes with the freedoms as `by` says; `None` where it is not fixed.
-    pub fn std_of(&self, by: &Steps) -> Option<f64> {
+    pub(crate) fn std_of(&self, by: &Steps) -> Option<f64> {
         let has_all = (0..by.len()).all(|i| by[i] == 0.0 || M::FREE[i]);
         let scaled = by.component_mul(&self.alone);
         let is_fixed = (self.unknown * scaled).norm() <= KNOWN * scaled.norm();

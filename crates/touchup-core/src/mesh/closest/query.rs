@@ -47,7 +47,7 @@ pub struct BoxQuery {
 
 impl BoxQuery {
     /// A query with room for so many faces.
-    pub fn with_room(faces: usize) -> Self {
+    pub(crate) fn with_room(faces: usize) -> Self {
         let (pairs, leaves) = (vec![0; faces + STACK], vec![(0, 0); faces + STACK]);
         Self { faces: Vec::with_capacity(faces + LEAF_FACES), pairs, leaves }
     }

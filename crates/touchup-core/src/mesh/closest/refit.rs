@@ -20,7 +20,7 @@ pub struct RefitPlan {
 
 impl RefitPlan {
     /// A plan with room for so many faces.
-    pub fn with_room(faces: usize) -> Self {
+    pub(crate) fn with_room(faces: usize) -> Self {
         // the way from the leaves to the root adds a level or so for each halving of the mesh
         let pairs = Vec::with_capacity(2 * faces + STACK);
         Self { faces: Vec::with_capacity(faces), leaves: Vec::with_capacity(faces), pairs, room: 0.0, edits: 0 }

@@ -3,7 +3,7 @@
 use super::error::DynamicsError;
 
 /// Error per step, relative to the size of each component, of [`super::StepRule::DormandPrince`].
-pub const RELATIVE: f64 = 1e-11;
+pub(crate) const RELATIVE: f64 = 1e-11;
 /// Steps, accepted or not, after which the problem is called stiff: some ten milliseconds.
 pub const MAX_STEPS: usize = 20_000;
 /// A step may shrink to a fifth and grow fivefold.
@@ -25,7 +25,7 @@ const E: [f64; 7] =
     [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0];
 
 /// Way along a, m, and the normal.
-pub type OdeState = [f64; 4];
+pub(crate) type OdeState = [f64; 4];
 
 /// Integrates dy/dt = `rate`(y) from 0 to `end`, s; `scale` is the size of each component that counts, and `relative` the error
 /// per step in units of it.

@@ -83,7 +83,7 @@ impl MarkerBody {
     }
 
     /// Between any two markers, m.
-    pub fn smallest_distance(&self) -> f64 {
+    pub(crate) fn smallest_distance(&self) -> f64 {
         self.smallest_distance
     }
 
