@@ -14,11 +14,11 @@ mod solved;
 use std::ops::RangeInclusive;
 
 pub use error::{PairSide, PairsError};
-use nalgebra::{Matrix3, Point3, Vector3};
+use nalgebra::Point3;
 pub use solved::{PairsFit, PairsParams, PointPair};
 
 use self::solved::SolvedMotion;
-use crate::numeric::median;
+use crate::numeric::{median, scatter};
 
 /// Farther from the origin than this, a point is a fault, m.
 const LARGEST_COORDINATE: f64 = 1e6;
@@ -143,11 +143,8 @@ struct Scatter {
 
 impl Scatter {
     fn of(points: &[Point3<f64>]) -> Self {
-        let n = points.len() as f64;
-        let mean = points.iter().map(|p| p.coords / n).sum::<Vector3<f64>>();
-        let covariance: Matrix3<f64> =
-            points.iter().map(|p| (p.coords - mean) * (p.coords - mean).transpose() / n).sum();
-        let mut axes = covariance.symmetric_eigenvalues();
+        let scatter = scatter(points.iter().map(|p| p.coords));
+        let mut axes = (scatter / points.len() as f64).symmetric_eigenvalues();
         axes.as_mut_slice().sort_by(f64::total_cmp);
         Self { along: axes[2].max(0.0).sqrt(), across: axes[1].max(0.0).sqrt() }
     }

@@ -8,7 +8,7 @@
 use nalgebra::{Isometry3, Matrix3, SVector, SymmetricEigen, Unit, Vector3};
 
 use super::payload::Known;
-use crate::numeric::{NormalEquations, tangent_basis};
+use crate::numeric::{NormalEquations, mean, scatter, tangent_basis};
 
 /// Where the ball is, and how well that is known.
 #[derive(Clone, Debug, PartialEq)]
@@ -77,7 +77,7 @@ pub fn fit_tip_by_plane(poses: &[Isometry3<f64>], normal: &Unit<Vector3<f64>>) -
     }
     check_spread(poses, normal)?;
     let n = count as f64;
-    let middle = poses.iter().map(|pose| pose.translation.vector).sum::<Vector3<f64>>() / n;
+    let middle = mean(poses.iter().map(|pose| pose.translation.vector));
     let [u, v] = tangent_basis(normal);
     // d, two slopes of the plane, h
     let mut x = Six::zeros();
@@ -108,11 +108,9 @@ pub fn fit_tip_by_plane(poses: &[Isometry3<f64>], normal: &Unit<Vector3<f64>>) -
 }
 
 fn check_spread(poses: &[Isometry3<f64>], normal: &Unit<Vector3<f64>>) -> Result<(), PlaneTipError> {
-    let n = poses.len() as f64;
-    let seen = || poses.iter().map(|pose| pose.rotation.inverse() * normal.into_inner());
-    let mean = seen().sum::<Vector3<f64>>() / n;
-    let spread: Matrix3<f64> = seen().map(|v| (v - mean) * (v - mean).transpose()).sum::<Matrix3<f64>>() / n;
-    let eigen = SymmetricEigen::new(spread);
+    let seen = poses.iter().map(|pose| pose.rotation.inverse() * normal.into_inner());
+    let scatter = scatter(seen);
+    let eigen = SymmetricEigen::new(scatter / poses.len() as f64);
     let least = eigen.eigenvalues.imin();
     match eigen.eigenvalues[least] < LEAST_SPREAD * LEAST_SPREAD {
         true => Err(PlaneTipError::TooAlike { axis: eigen.eigenvectors.column(least).into_owned().into() }),

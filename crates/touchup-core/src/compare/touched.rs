@@ -1,10 +1,10 @@
 //! The part of a surface that was touched.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 
 use nalgebra::Point3;
 
-use crate::numeric::{VoxelKey, voxel_neighbourhood, voxel_of};
+use crate::numeric::{PointGrid, voxel_of};
 
 /// A place belongs to the touched region when a contact is within this distance, m.
 const REACH: f64 = 1e-3;
@@ -12,21 +12,21 @@ const REACH: f64 = 1e-3;
 const SPACING: f64 = 0.25e-3;
 
 /// Where a ball touched a part.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct TouchedRegion {
     contacts: Vec<Point3<f64>>,
-    /// indices into `contacts` by cells of [`REACH`]
-    cells: HashMap<VoxelKey, Vec<usize>>,
+    /// numbers of `contacts`
+    grid: PointGrid,
 }
 
 impl TouchedRegion {
     /// The region around points of the part, m, that were touched; what is not finite is left out.
     pub fn of(contacts: impl IntoIterator<Item = Point3<f64>>) -> Self {
         let mut kept = HashSet::new();
-        let mut region = Self::default();
+        let mut region = Self { contacts: Vec::new(), grid: PointGrid::new(REACH) };
         for contact in contacts.into_iter().filter(|contact| contact.coords.iter().all(|x| x.is_finite())) {
             if kept.insert(voxel_of(&contact, SPACING)) {
-                region.cells.entry(voxel_of(&contact, REACH)).or_default().push(region.contacts.len());
+                region.grid.insert(region.contacts.len() as u32, &contact);
                 region.contacts.push(contact);
             }
         }
@@ -40,7 +40,6 @@ impl TouchedRegion {
 
     /// Whether a contact is within a millimetre of `p` (m).
     pub fn is_near(&self, p: &Point3<f64>) -> bool {
-        let mut near = voxel_neighbourhood(voxel_of(p, REACH)).filter_map(|voxel| self.cells.get(&voxel)).flatten();
-        near.any(|&i| (self.contacts[i] - p).norm() <= REACH)
+        self.grid.near(p, REACH).next().is_some()
     }
 }

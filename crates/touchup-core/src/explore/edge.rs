@@ -15,6 +15,7 @@ use super::search_context::{PatternParams, Quantity, SearchContext, TouchPlan, T
 use super::slide::{RimStation, Slide};
 use crate::features::Feature;
 use crate::features::fit::{Fit, FitParams, Freedom, Observation, Plane, fit};
+use crate::numeric::mean;
 
 /// Places around the flag where it is looked at what is high and what is low, beside the flag itself.
 const RING: usize = 6;
@@ -181,7 +182,7 @@ impl EdgePattern {
     /// The side through what was felt of it: with its z out of the material, x along the edge.
     fn side_plane(&self, course: &SearchContext) -> Plane {
         let points: Vec<_> = self.side.felt.iter().map(|o| course.in_f(&o.point)).collect();
-        let mean = points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / points.len().max(1) as f64;
+        let mean = mean(points.iter().map(|p| p.coords));
         // a line along the edge by least squares: how much farther over by each metre along
         let (mut sxx, mut sxy) = (0.0, 0.0);
         for p in &points {

@@ -1,9 +1,10 @@
 //! Where the surface around a flag really lies: until it was touched, only the scan says how it looks out.
 
-use nalgebra::{Isometry3, Matrix3, Point3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 
 use super::search_context::SearchContext;
 use crate::features::fit::Observation;
+use crate::numeric::{mean, scatter};
 
 /// Touches within this of a plane are of it, m.
 const OF_PLANE: f64 = 60e-6;
@@ -21,8 +22,7 @@ impl SearchContext {
     pub fn level(&mut self, felt: &mut Vec<Observation>, is_top: bool, places: &mut [&mut Point3<f64>]) -> bool {
         let Some((normal, inliers)) = self.most_plane(felt, is_top) else { return false };
         felt.clone_from(&inliers);
-        let count = inliers.len() as f64;
-        let mean = Point3::from(inliers.iter().map(|o| o.point.coords).sum::<Vector3<f64>>() / count);
+        let mean = Point3::from(mean(inliers.iter().map(|o| o.point.coords)));
         let before = self.pose_of;
         let turn = UnitQuaternion::rotation_between(&self.out(), &normal).unwrap_or_else(UnitQuaternion::identity);
         let rotation = turn * before.rotation;
@@ -67,11 +67,9 @@ impl SearchContext {
                 }
             }
         }
-        let count = best.len() as f64;
-        let mean = best.iter().map(|o| o.point.coords).sum::<Vector3<f64>>() / count;
-        let spread = best.iter().map(|o| (o.point.coords - mean) * (o.point.coords - mean).transpose());
-        let spread = spread.sum::<Matrix3<f64>>().symmetric_eigen();
-        let normal = spread.eigenvectors.column(spread.eigenvalues.imin()).into_owned();
+        let scatter = scatter(best.iter().map(|o| o.point.coords));
+        let axes = scatter.symmetric_eigen();
+        let normal = axes.eigenvectors.column(axes.eigenvalues.imin()).into_owned();
         let normal = Unit::try_new(normal * normal.dot(&self.out()).signum(), 0.0)?;
         (best.len() >= 3).then_some((normal, best))
     }

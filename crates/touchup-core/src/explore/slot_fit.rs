@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix5, Point2, Vector2, Vector5};
 
+use crate::features::fit::from_segment;
 use crate::numeric::NormalEquations;
 
 /// All points at a distance from a segment of a plane.
@@ -41,13 +42,11 @@ impl Oblong {
         let (u, v) = (p - self.middle, self.along());
         let w = Vector2::new(-v.y, v.x);
         let (x, y) = (u.dot(&v), u.dot(&w));
-        let beyond = (x.abs() - self.half).max(0.0).copysign(x);
-        let distance = beyond.hypot(y);
-        let n = if distance > 0.0 { Vector2::new(beyond, y) / distance } else { Vector2::y() };
-        let by_middle = -(v * n.x + w * n.y);
+        let (distance, n) = from_segment(x, y, self.half);
+        let by_middle = -(v * n[0] + w * n[1]);
         // turning the segment by a moves the point to (x + a y, y − a x) of its axes
-        let by_angle = n.x * y - n.y * x;
-        (distance - self.radius, Vector5::new(by_middle.x, by_middle.y, by_angle, -n.x.abs(), -1.0))
+        let by_angle = n[0] * y - n[1] * x;
+        (distance - self.radius, Vector5::new(by_middle.x, by_middle.y, by_angle, -n[0].abs(), -1.0))
     }
 
     fn rms(&self, points: &[Point2<f64>]) -> f64 {

@@ -8,6 +8,7 @@ use nalgebra::Point3;
 use super::facets::{Facets, NONE};
 use super::rays::Rays;
 use crate::mesh::{FaceId, FaceTree, TriMesh};
+use crate::numeric::DisjointSets;
 
 /// The closed pieces of a mesh, where there is more than one piece.
 pub(super) struct Bodies {
@@ -82,28 +83,22 @@ impl<'a> Surroundings<'a> {
 
 /// The piece of each face, and the faces of each piece: those that hang together over edges of two faces.
 fn pieces(facets: &Facets) -> (Vec<u32>, Vec<Vec<u32>>) {
-    let mut piece_of = vec![NONE; facets.slots()];
-    let mut pieces = 0;
-    let mut found = Vec::new();
-    for (FaceId(first), _) in facets.mesh.faces() {
-        if piece_of[first as usize] != NONE {
-            continue;
-        }
-        piece_of[first as usize] = pieces;
-        found.push(first);
-        while let Some(face) = found.pop() {
-            for other in facets.beside[face as usize] {
-                if other != NONE && piece_of[other as usize] == NONE {
-                    piece_of[other as usize] = pieces;
-                    found.push(other);
-                }
-            }
-        }
-        pieces += 1;
+    let mut sets = DisjointSets::of(facets.slots());
+    for (FaceId(face), _) in facets.mesh.faces() {
+        let beside = facets.beside[face as usize].iter().filter(|&&other| other != NONE);
+        beside.for_each(|&other| sets.join(face, other));
     }
-    let mut faces = vec![Vec::new(); pieces as usize];
-    for (face, &piece) in piece_of.iter().enumerate().filter(|&(_, &piece)| pieces > 1 && piece != NONE) {
-        faces[piece as usize].push(face as u32);
+    let (mut piece_of, mut faces) = (vec![NONE; facets.slots()], Vec::new());
+    for (FaceId(face), _) in facets.mesh.faces() {
+        // the lowest face of a piece is its root, so it has its number already
+        let root = sets.root(face);
+        if root == face {
+            piece_of[face as usize] = faces.len() as u32;
+            faces.push(Vec::new());
+        }
+        let piece = piece_of[root as usize];
+        piece_of[face as usize] = piece;
+        faces[piece as usize].push(face);
     }
     (piece_of, faces)
 }

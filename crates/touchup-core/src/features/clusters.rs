@@ -5,7 +5,7 @@
 use nalgebra::{Point3, Vector3};
 
 pub use super::creases::Bend;
-use super::creases::{CreaseRegions, Creases};
+use super::creases::Creases;
 use super::curvature::VertexCurvature;
 use super::k_means::k_means;
 use crate::mesh::{TriMesh, VertexId};
@@ -89,8 +89,8 @@ pub fn clusters(mesh: &TriMesh, curvature: &[VertexCurvature], params: &ClusterP
     let creases = Creases::find(mesh, curvature, params.sharp_angle, params.sharp_defect);
     let [low, high] = mesh.bounds();
     let near = params.merge_share * (high - low).norm();
-    let mut regions = CreaseRegions::connected(&creases);
-    regions.merge(mesh, &creases, near);
+    let mut regions = creases.connected();
+    creases.merge(&mut regions, mesh, near);
     let mut parts: Vec<(u32, usize)> = (0..creases.list.len()).map(|i| (regions.root(i as u32), i)).collect();
     parts.sort_unstable();
     let mut clusters: Vec<_> =

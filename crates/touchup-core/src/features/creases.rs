@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::curvature::{VertexCurvature, VertexKind};
 use crate::mesh::{FaceId, TriMesh, VertexId};
-use crate::numeric::{voxel_neighbourhood, voxel_of};
+use crate::numeric::{DisjointSets, voxel_neighbourhood, voxel_of};
 
 /// Points put on all creases together at most, beside one for each: bounds the work on meshes that are all noise.
 const MOST_POINTS: f64 = 1e6;
@@ -72,33 +72,27 @@ fn neighbour(mesh: &TriMesh, face: FaceId, [a, b]: [VertexId; 2]) -> Option<Face
     is_opposite.then_some(other)
 }
 
-/// Which creases are one region: a forest whose roots name the regions.
-#[derive(Clone, Debug)]
-pub(super) struct CreaseRegions {
-    parents: Vec<u32>,
-}
-
-impl CreaseRegions {
-    /// Creases of one kind that share a vertex.
-    pub fn connected(creases: &Creases) -> Self {
-        let mut regions = Self { parents: (0..creases.list.len() as u32).collect() };
+impl Creases {
+    /// Creases of one kind that share a vertex, as sets.
+    pub fn connected(&self) -> DisjointSets {
+        let mut regions = DisjointSets::of(self.list.len());
         let ends = |(i, crease): (usize, &Crease)| crease.ends.map(|v| ((crease.bend, v), i as u32));
-        let mut at_vertex: Vec<_> = creases.list.iter().enumerate().flat_map(ends).collect();
-        regions.join_equal(&mut at_vertex);
+        let mut at_vertex: Vec<_> = self.list.iter().enumerate().flat_map(ends).collect();
+        join_equal(&mut regions, &mut at_vertex);
         regions
     }
 
-    /// Creases of one kind of which points are in one cell of a grid of size `near`, or in cells that touch: all that are
+    /// Joins creases of one kind of which points are in one cell of a grid of size `near`, or in cells that touch: all that are
     /// closer than `near`, none that are farther than 2√3 times that.
-    pub fn merge(&mut self, mesh: &TriMesh, creases: &Creases, near: f64) {
+    pub fn merge(&self, regions: &mut DisjointSets, mesh: &TriMesh, near: f64) {
         let lengths = |crease: &Crease| (mesh.position(crease.ends[1]) - mesh.position(crease.ends[0])).norm();
-        let spacing = (near / 2.0).max(creases.list.iter().map(lengths).sum::<f64>() / MOST_POINTS);
+        let spacing = (near / 2.0).max(self.list.iter().map(lengths).sum::<f64>() / MOST_POINTS);
         if !(spacing > 0.0 && spacing.is_finite()) {
             return;
         }
         let [low, _] = mesh.bounds();
         let mut in_cell = Vec::new();
-        for (i, crease) in creases.list.iter().enumerate() {
+        for (i, crease) in self.list.iter().enumerate() {
             let [a, b] = crease.ends.map(|v| mesh.position(v));
             let parts = ((b - a).norm() / spacing).ceil().max(1.0) as u32;
             in_cell.extend((0..=parts).map(|part| {
@@ -106,38 +100,23 @@ impl CreaseRegions {
                 ((crease.bend, voxel_of(&(p - low).into(), near)), i as u32)
             }));
         }
-        self.join_equal(&mut in_cell);
+        join_equal(regions, &mut in_cell);
         in_cell.dedup_by_key(|(key, _)| *key);
         for &((bend, voxel), crease) in &in_cell {
             // half of the 26 around; the others see this one
             for near in voxel_neighbourhood(voxel).skip(14) {
                 if let Ok(at) = in_cell.binary_search_by_key(&(bend, near), |(key, _)| *key) {
-                    self.join(crease, in_cell[at].1);
+                    regions.join(crease, in_cell[at].1);
                 }
             }
         }
     }
+}
 
-    /// Sorts by key and joins what has the same.
-    fn join_equal<K: Ord + Copy>(&mut self, keyed: &mut [(K, u32)]) {
-        keyed.sort_unstable();
-        for pair in keyed.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
-            self.join(pair[0].1, pair[1].1);
-        }
-    }
-
-    /// The crease that names the region of another.
-    pub fn root(&mut self, mut crease: u32) -> u32 {
-        while self.parents[crease as usize] != crease {
-            let above = self.parents[self.parents[crease as usize] as usize];
-            self.parents[crease as usize] = above;
-            crease = above;
-        }
-        crease
-    }
-
-    fn join(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.parents[a.max(b) as usize] = a.min(b);
+/// Sorts by key and joins what has the same.
+fn join_equal<K: Ord + Copy>(sets: &mut DisjointSets, keyed: &mut [(K, u32)]) {
+    keyed.sort_unstable();
+    for pair in keyed.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
+        sets.join(pair[0].1, pair[1].1);
     }
 }

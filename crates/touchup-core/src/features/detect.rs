@@ -36,6 +36,8 @@ const LEAST_PLANE: f64 = 1e-3;
 /// - `touches`: as [`crate::patch::Patcher::probed`] has them; features name them by their place in it.
 pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detection {
     let mut parted = Parted::of(mesh, tree);
+    let beside: Vec<_> = borders(&parted, &without_seams(&parted)).into_keys().collect();
+    parted.segmentation.join_planes(&parted.facets, beside.into_iter());
     let mut walls = Wall::all(&parted.facets, &parted.segmentation);
     add_cones(&mut parted, &mut walls);
     let of_face = without_seams(&parted);

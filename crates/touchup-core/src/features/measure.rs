@@ -11,7 +11,7 @@ use super::observe::Observed;
 use super::primitive::{Primitive, Side};
 use super::slots::Slot;
 use super::walls::Wall;
-use crate::numeric::{order_statistic, tangent_basis};
+use crate::numeric::{order_statistic, scatter, tangent_basis};
 
 /// A fitted surface and what it was fitted to.
 #[derive(Clone, Debug)]
@@ -181,10 +181,8 @@ impl<'a> Measure<'a> {
 
     /// How much the touches on a plane are spread in their second direction, beside the first.
     fn spread(&self, touches: &[u32], about: &Point3<f64>) -> f64 {
-        let count = touches.len() as f64;
-        let points = || touches.iter().map(|&number| self.observed.touch(number).point - about);
-        let mean = points().sum::<Vector3<f64>>() / count;
-        let spread = points().map(|v| (v - mean) * (v - mean).transpose()).sum::<nalgebra::Matrix3<f64>>() / count;
+        let scatter = scatter(touches.iter().map(|&number| self.observed.touch(number).point - about));
+        let spread = scatter / touches.len() as f64;
         let mut sizes: Vec<f64> = spread.symmetric_eigenvalues().iter().map(|x| x.max(0.0).sqrt()).collect();
         sizes.sort_by(f64::total_cmp);
         // two lines far apart are as good as a field

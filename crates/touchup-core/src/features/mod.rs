@@ -22,7 +22,6 @@ mod k_means;
 mod marks;
 mod measure;
 mod observe;
-mod parting;
 mod primitive;
 mod rays;
 mod rims;

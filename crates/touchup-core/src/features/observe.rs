@@ -10,7 +10,7 @@ use super::primitive::Primitive;
 use super::scene::Parted;
 use super::segment::Segmentation;
 use crate::mesh::{FaceId, TriMesh, VertexId};
-use crate::numeric::{VoxelKey, voxel_neighbourhood, voxel_of};
+use crate::numeric::{PointGrid, VoxelKey, voxel_of};
 use crate::touch::ProbedPoint;
 
 /// The touches on a parted mesh.
@@ -21,8 +21,8 @@ pub(super) struct Observed<'a> {
     of_segment: Vec<Vec<u32>>,
     /// what shares its error, by touch
     group: Vec<u32>,
-    /// numbers of the touches by cells of [`Observed::reach`]
-    cells: BTreeMap<VoxelKey, Vec<u32>>,
+    /// numbers of the touches by place
+    grid: PointGrid,
     /// a place is touched when a touch is within this, m
     reach: f64,
 }
@@ -64,13 +64,13 @@ impl<'a> Observed<'a> {
             touches,
             of_segment: vec![Vec::new(); parted.segmentation.segments.len()],
             group: groups(touches),
-            cells: BTreeMap::new(),
+            grid: PointGrid::new(reach),
             reach,
         };
         for (number, touch) in touches.iter().enumerate().filter(|(_, touch)| !touch.is_rejected) {
             if let Some(segment) = observed.segment_of(of_face, touch) {
                 observed.of_segment[segment].push(number as u32);
-                observed.cells.entry(voxel_of(&touch.point, reach)).or_default().push(number as u32);
+                observed.grid.insert(number as u32, &touch.point);
             }
         }
         observed
@@ -190,9 +190,7 @@ impl<'a> Observed<'a> {
     }
 
     fn is_touched(&self, p: &Point3<f64>) -> bool {
-        let mut around =
-            voxel_neighbourhood(voxel_of(p, self.reach)).filter_map(|voxel| self.cells.get(&voxel)).flatten();
-        around.any(|&number| (self.touches[number as usize].point - p).norm() <= self.reach)
+        self.grid.near(p, self.reach).next().is_some()
     }
 }
 

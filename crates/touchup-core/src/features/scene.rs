@@ -4,9 +4,10 @@ use nalgebra::{Point3, Vector3};
 
 use super::bodies::{Bodies, Surroundings};
 use super::facets::Facets;
+use super::grow::median_edge;
 use super::primitive::Primitive;
 use super::segment::{Segment, Segmentation};
-use crate::mesh::FaceTree;
+use crate::mesh::{FaceTree, TriMesh};
 use crate::numeric::tangent_basis;
 
 /// A parted mesh.
@@ -31,6 +32,17 @@ const LEAST_AREA: f64 = 1e-5;
 const SQUARE: f64 = 0.94;
 
 impl<'a> Parted<'a> {
+    pub fn of(mesh: &'a TriMesh, tree: &'a FaceTree) -> Self {
+        let facets = Facets::of(mesh);
+        let segmentation = Segmentation::of(&facets);
+        let [lo, hi] = mesh.bounds();
+        let edge = median_edge(&facets);
+        let bodies = Bodies::of(&facets);
+        let exact = segmentation.segments.iter().filter(|segment| segment.is_exact).map(|segment| segment.tolerance);
+        let rounding = exact.min_by(f64::total_cmp);
+        Self { rounding, facets, bodies, tree, segmentation, diagonal: (hi - lo).norm(), edge }
+    }
+
     pub fn segment(&self, number: usize) -> &Segment {
         &self.segmentation.segments[number]
     }

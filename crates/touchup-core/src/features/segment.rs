@@ -3,6 +3,7 @@
 use super::facets::Facets;
 use super::marks::sort;
 use super::primitive::{Moments, Primitive};
+use crate::numeric::DisjointSets;
 
 /// A connected piece of the mesh that one primitive explains.
 #[derive(Clone, Debug)]
@@ -59,11 +60,11 @@ impl Segmentation {
     ///
     /// - `beside`: pairs of segments that meet, over seams too, the smaller number first.
     pub(super) fn join_planes(&mut self, facets: &Facets, beside: impl Iterator<Item = [u32; 2]>) {
-        let mut of: Vec<usize> = (0..self.segments.len()).collect();
+        let mut sets = DisjointSets::of(self.segments.len());
         for pair in beside {
-            let [a, b] = pair.map(|number| root(&of, number as usize));
-            if a != b && is_one_plane(&self.segments[a], &self.segments[b]) {
-                of[a.max(b)] = a.min(b);
+            let [a, b] = pair.map(|number| sets.root(number));
+            if a != b && is_one_plane(&self.segments[a as usize], &self.segments[b as usize]) {
+                sets.join(a, b);
             }
         }
         let parts = std::mem::take(&mut self.segments);
@@ -71,7 +72,7 @@ impl Segmentation {
         let mut joint = Vec::new();
         // the largest is first, so that each root comes before what belongs to it
         for (at, part) in parts.into_iter().enumerate() {
-            let of = root(&of, at);
+            let of = sets.root(at as u32) as usize;
             if of == at {
                 number_of[at] = self.segments.len();
                 self.segments.push(part);
@@ -96,13 +97,6 @@ impl Segmentation {
             segment.faces.iter().for_each(|&face| self.of_face[face as usize] = number as u32);
         }
     }
-}
-
-fn root(of: &[usize], mut number: usize) -> usize {
-    while of[number] != number {
-        number = of[number];
-    }
-    number
 }
 
 /// Normals of one plane differ by less than this: 4°.

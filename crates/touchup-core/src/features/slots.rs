@@ -6,6 +6,7 @@ use super::borders::{Borders, is_convex};
 use super::facets::NONE;
 use super::primitive::{Primitive, Side};
 use super::scene::{Parted, along_to_plane};
+use crate::numeric::mean;
 
 /// A void between two walls that face each other.
 #[derive(Clone, Debug)]
@@ -148,8 +149,8 @@ fn between(parted: &Parted, of_face: &[u32], borders: &Borders, walls: [usize; 2
     if share < LEAST_SHARE {
         return None;
     }
-    let mean = Point3::from(middles.iter().map(|p| p.coords).sum::<Vector3<f64>>() / middles.len() as f64);
-    let far = |p: &Point3<f64>| (p - mean).norm();
+    let centroid = Point3::from(mean(middles.iter().map(|p| p.coords)));
+    let far = |p: &Point3<f64>| (p - centroid).norm();
     let middle = *middles.iter().min_by(|a, b| far(a).total_cmp(&far(b)))?;
     let width =
         along_to_plane(&other, &middle, &n)? + along_to_plane(&parted.segment(walls[0]).primitive, &middle, &-n)?;

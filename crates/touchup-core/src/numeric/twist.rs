@@ -2,13 +2,6 @@
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3, Vector6};
 
-/// Mean of the points, m, and the root of their mean square distance from it, m; NaN where there are none.
-pub(crate) fn centroid_and_spread<'a>(points: impl Iterator<Item = &'a Point3<f64>> + Clone) -> (Point3<f64>, f64) {
-    let count = points.clone().count() as f64;
-    let centroid = Point3::from(points.clone().map(|p| p.coords).sum::<Vector3<f64>>() / count);
-    (centroid, (points.map(|p| (p - centroid).norm_squared()).sum::<f64>() / count).sqrt())
-}
-
 /// `pose`, then the turn about `centre` by a rotation vector (rad), then the shift (m): x ↦ c + R (x − c) + t.
 pub(crate) fn moved_by_twist(
     pose: &Isometry3<f64>,
@@ -34,12 +27,6 @@ mod tests {
     use std::f64::consts::FRAC_PI_2;
 
     use super::*;
-
-    #[test]
-    fn a_square_is_as_wide_as_its_half_diagonal() {
-        let corners = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]].map(|[x, y]| Point3::new(x, y, 5.0));
-        assert_eq!(centroid_and_spread(corners.iter()), (Point3::new(1.0, 1.0, 5.0), 2f64.sqrt()));
-    }
 
     #[test]
     fn a_quarter_turn_about_a_centre_leaves_the_centre_and_moves_the_origin() {

@@ -11,6 +11,7 @@ use nalgebra::{Isometry3, Matrix6, Point3, SMatrix, SVector, Vector3, Vector6};
 
 use super::ScanParams;
 use crate::mesh::{FaceTree, TriMesh};
+use crate::numeric::mean;
 use crate::numeric::{
     NormalEquations, VoxelKey, cauchy_weight, moved_by_twist, point_to_plane_row, voxel_neighbourhood, voxel_of,
 };
@@ -162,8 +163,7 @@ impl Registrar {
     /// [`RegistrationError`].
     pub fn estimate(&self, scan: &TriMesh, tree: &FaceTree) -> Result<Registration, RegistrationError> {
         let contacts: Vec<_> = self.means.values().filter_map(contact_of).collect();
-        let count = contacts.len().max(1) as f64;
-        let centre = Point3::from(contacts.iter().map(|(p, _)| p.coords).sum::<Vector3<f64>>() / count);
+        let centre = Point3::from(mean(contacts.iter().map(|(p, _)| p.coords)));
         let mut pose = Isometry3::identity();
         for round in 0..ROUNDS {
             let fit = RegistrationRound::of(self, &contacts, scan, tree, &centre, &pose)?;
@@ -298,8 +298,7 @@ fn independent<'a>(points: impl Iterator<Item = &'a Point3<f64>>, correlation: f
 fn check_directions(rows: &[Unknowns], lever: f64) -> Result<(), RegistrationError> {
     let mut information = Matrix6::zeros();
     for row in rows {
-        let mut row = row.fixed_rows::<6>(0).into_owned();
-        row.fixed_rows_mut::<3>(3).unscale_mut(lever.max(f64::MIN_POSITIVE));
+        let row = Vector6::from_fn(|i, _| if i < 3 { row[i] } else { row[i] / lever.max(f64::MIN_POSITIVE) });
         information += row * row.transpose() / rows.len() as f64;
     }
     let eigen = information.symmetric_eigen();

@@ -6,6 +6,7 @@
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
 use crate::explore::Expected;
+use crate::numeric::mean;
 
 use super::arm::ArmState;
 use super::onset::{Onset, OnsetError, TouchMoment, find_onset};
@@ -247,7 +248,7 @@ fn outcome_of(line: &ApproachLine, params: &TouchParams, states: &[ArmState]) ->
         let gone = state.pose_bt.translation.vector - line.start;
         gone - line.way * gone.dot(&line.way)
     });
-    let aside = aside.sum::<Vector3<f64>>() / states.len() as f64;
+    let aside = mean(aside);
     let hard = states.iter().filter(|state| line.presses(state) - onset.bias > 0.5 * onset.peak);
     let (sum, count) = hard.fold((Vector3::zeros(), 0u32), |(sum, n), state| (sum + state.wrench_b.force, n + 1));
     let centre = Point3::from(line.start + line.way * onset.travel + aside);

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector3, Vector6};
 
 use super::alternative::FeaturesParams;
 use super::landmark::Landmark;
-use crate::numeric::moved_by_twist;
+use crate::numeric::{mean, moved_by_twist};
 
 /// Both sets of features, and which may be the same.
 pub(super) struct Matching {
@@ -28,8 +28,7 @@ impl Matching {
     pub fn new(source: Vec<Landmark>, target: Vec<Landmark>, params: &FeaturesParams, size: f64) -> Self {
         let partners = |own: &Landmark| (0..target.len()).filter(|&i| own.is_like(&target[i], params)).collect();
         let like = source.iter().map(partners).collect();
-        let count = source.len().max(1) as f64;
-        let middle = Point3::from(source.iter().map(|own| own.place.coords).sum::<Vector3<f64>>() / count);
+        let middle = Point3::from(mean(source.iter().map(|own| own.place.coords)));
         let lever = source.iter().map(|own| (own.place - middle).norm()).fold(0.0, f64::max);
         Self { source, target, like, tolerance: params.tolerance * size, middle, lever: lever.max(size / 8.0) }
     }

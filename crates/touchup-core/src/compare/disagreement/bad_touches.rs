@@ -2,11 +2,10 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::cells::Cells;
 use super::places::{Class, RefinedShape};
 use crate::compare::CompareError;
 use crate::compare::deviation::{closest_places, signed};
-use crate::numeric::median;
+use crate::numeric::{PointGrid, median};
 use crate::touch::ProbedPoint;
 
 /// Bad touches one after the other.
@@ -48,7 +47,7 @@ pub(super) fn find(refined: &RefinedShape<'_>, touches: &[ProbedPoint]) -> Resul
     let (off, feet) = distances(refined, touches)?;
     let points: Vec<Point3<f64>> = touches.iter().map(|touch| touch.point).collect();
     let reach = reach(touches);
-    let taken = Cells::new(&points, (0..touches.len()).filter(|&at| !touches[at].is_rejected), reach);
+    let taken = PointGrid::of(&points, (0..touches.len()).filter(|&at| !touches[at].is_rejected), reach);
     let is_bad = |at: usize| {
         let limit = limit(&touches[at]);
         touches[at].is_rejected
@@ -56,7 +55,7 @@ pub(super) fn find(refined: &RefinedShape<'_>, touches: &[ProbedPoint]) -> Resul
                 && contradiction(touches, at, &taken, &feet[at], reach).is_some_and(|d| d > limit))
     };
     let bad: Vec<usize> = (0..touches.len()).filter(|&at| is_bad(at)).collect();
-    let good = Cells::new(&points, (0..touches.len()).filter(|at| bad.binary_search(at).is_err()), reach);
+    let good = PointGrid::of(&points, (0..touches.len()).filter(|at| bad.binary_search(at).is_err()), reach);
     let goes_on = |a: &usize, b: &usize| touches[*b].stamp_ns.saturating_sub(touches[*a].stamp_ns) <= PAUSE_NS;
     let told = |numbers: &[usize]| {
         told(numbers, touches, &off, |worst| against(touches, worst, &good, &feet[worst], reach).count())
@@ -73,7 +72,7 @@ fn limit(touch: &ProbedPoint) -> f64 {
 fn against<'a>(
     touches: &'a [ProbedPoint],
     at: usize,
-    others: &'a Cells<'_>,
+    others: &'a PointGrid,
     foot: &'a Point3<f64>,
     reach: f64,
 ) -> impl Iterator<Item = usize> + 'a {
@@ -84,7 +83,7 @@ fn against<'a>(
 }
 
 /// How far a touch is from the planes that others felt there, the middle of them, m; `None` where they are too few.
-fn contradiction(touches: &[ProbedPoint], at: usize, taken: &Cells<'_>, foot: &Point3<f64>, reach: f64) -> Option<f64> {
+fn contradiction(touches: &[ProbedPoint], at: usize, taken: &PointGrid, foot: &Point3<f64>, reach: f64) -> Option<f64> {
     let off = |other: usize| (touches[at].point - touches[other].point).dot(&touches[other].normal).abs();
     let mut off: Vec<f64> = against(touches, at, taken, foot, reach).map(off).collect();
     if off.len() < FEWEST { None } else { median(&mut off) }
@@ -131,10 +130,10 @@ pub(super) fn mark(refined: &RefinedShape<'_>, touches: &[ProbedPoint], bad: &[B
     let mesh = refined.shape.mesh;
     let points: Vec<Point3<f64>> = touches.iter().map(|touch| touch.point).collect();
     let reach = reach(touches);
-    let all = Cells::new(&points, 0..points.len(), reach);
+    let all = PointGrid::of(&points, 0..points.len(), reach);
     let mut is_bad = vec![false; touches.len()];
     bad.iter().flat_map(|bad| &bad.touches).for_each(|&at| is_bad[at as usize] = true);
-    let near_bad = Cells::new(&points, (0..points.len()).filter(|&at| is_bad[at]), reach);
+    let near_bad = PointGrid::of(&points, (0..points.len()).filter(|&at| is_bad[at]), reach);
     for (at, class) in classes.iter_mut().enumerate() {
         let p = mesh.positions()[at];
         let is_felt = !matches!(class, Class::NeverTouched | Class::Unreachable);

@@ -9,7 +9,6 @@
 //! edge a disagreement the other way is not the scanner's rounding, but too near to be sure of.
 
 mod bad_touches;
-mod cells;
 mod places;
 mod regions;
 mod rigid_offset;

@@ -2,10 +2,10 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::cells::Cells;
 use super::places::{Class, Places, RefinedShape};
 use super::scanner::{Scanner, rounded, sharp_vertices};
 use crate::mesh::{TriMesh, VertexId};
+use crate::numeric::PointGrid;
 use crate::touch::ProbedPoint;
 
 /// What speaks for the class of a region.
@@ -97,7 +97,8 @@ fn tells(places: &Places, at: usize, way: usize) -> bool {
 /// Means over the surroundings, m, by slot: of open places over open ones, of others over all that are wide.
 fn smoothed(mesh: &TriMesh, places: &Places, scanner: &Scanner) -> Vec<f64> {
     let reach = scanner.correlation / 2.0;
-    let cells = |is_own: &[bool]| Cells::new(&places.positions, (0..places.off.len()).filter(|&at| is_own[at]), reach);
+    let cells =
+        |is_own: &[bool]| PointGrid::of(&places.positions, (0..places.off.len()).filter(|&at| is_own[at]), reach);
     let [open, wide] = [&places.is_open, &places.is_wide].map(|is_own| cells(is_own));
     let mean = |at: usize| {
         let near = if places.is_open[at] { &open } else { &wide }.near(&mesh.positions()[at], reach);
@@ -158,7 +159,7 @@ fn judged(
     let is_sure = open_area >= LEAST_AREA * scanner.edge.powi(2) && sigmas_of(open_area, open_mean) >= CHANGED;
     // on to the edges that it ends at, which the scanner rounds
     let reach = rounded(scanner.edge);
-    let near = Cells::new(&places.positions, own.iter().copied(), reach);
+    let near = PointGrid::of(&places.positions, own.iter().copied(), reach);
     let is_off = |at: usize| {
         let [off, mean] = [places.off[at], own_mean].map(|off| off - scanner.offset);
         off * mean.signum() > (GOES_ON * mean.abs()).max(2.0 * scanner.noise)
@@ -204,7 +205,7 @@ fn judged(
 }
 
 /// Largest number of times that any place of a region was passed.
-fn passes(touches: &[ProbedPoint], region: &Cells<'_>, reach: f64) -> usize {
+fn passes(touches: &[ProbedPoint], region: &PointGrid, reach: f64) -> usize {
     let (mut count, mut last) = (0, None);
     for touch in touches.iter().filter(|touch| !touch.is_rejected) {
         if region.near(&touch.point, reach).next().is_some() {
@@ -226,7 +227,7 @@ fn rim_at_edges(
     is_sharp: &[[bool; 2]],
     reach: f64,
 ) -> f64 {
-    let sharp = Cells::new(&places.positions, (0..is_sharp.len()).filter(|&at| is_sharp[at] != [false; 2]), reach);
+    let sharp = PointGrid::of(&places.positions, (0..is_sharp.len()).filter(|&at| is_sharp[at] != [false; 2]), reach);
     let rim: Vec<usize> = all.iter().copied().filter(|&at| neighbours(mesh, at).any(|other| !is_own[other])).collect();
     let at_edge = rim.iter().filter(|&&at| sharp.near(&places.positions[at], reach).next().is_some()).count();
     at_edge as f64 / rim.len().max(1) as f64

@@ -2,10 +2,9 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::cells::Cells;
 use super::places::{Places, RefinedShape};
 use crate::mesh::{TriMesh, VertexId};
-use crate::numeric::{SIGMA_OF_MEDIAN, median};
+use crate::numeric::{PointGrid, SIGMA_OF_MEDIAN, median};
 
 /// How the scanner errs where it should see well.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -94,7 +93,7 @@ pub(super) fn rounded_at(
     let edge = median_edge(scan);
     let reach = rounded(edge);
     let is_sharp = sharp_vertices(mesh, is_seen);
-    let sharp = Cells::new(mesh.positions(), (0..is_sharp.len()).filter(|&at| is_sharp[at] != [false; 2]), reach);
+    let sharp = PointGrid::of(mesh.positions(), (0..is_sharp.len()).filter(|&at| is_sharp[at] != [false; 2]), reach);
     let rounded = |at: usize| {
         let p = mesh.position(VertexId(at as u32));
         let is_own = |other: &usize| (mesh.positions()[*other] - p).dot(&normals[at]).abs() <= LEVEL * edge;
@@ -118,7 +117,7 @@ pub(super) fn wide_and_open(
     let edge = median_edge(scan);
     let (reach, radius) = (rounded(edge), NARROW * edge / 2.0);
     let is_sharp = sharp_vertices(mesh, is_seen);
-    let sharp = Cells::new(mesh.positions(), (0..is_sharp.len()).filter(|&at| is_sharp[at] != [false; 2]), reach);
+    let sharp = PointGrid::of(mesh.positions(), (0..is_sharp.len()).filter(|&at| is_sharp[at] != [false; 2]), reach);
     let fits = |p: &Point3<f64>, normal: &Vector3<f64>| {
         let middle = p + normal * radius;
         refined.shape.tree.closest(mesh, &middle, FITS * radius).is_none()

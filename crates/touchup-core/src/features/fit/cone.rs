@@ -5,8 +5,9 @@ use std::f64::consts::FRAC_PI_2;
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
 use super::circle::{radial, side};
-use super::normals::{AxisGuess, mean, pose_along};
+use super::normals::{AxisGuess, pose_along};
 use super::{Distance, Estimate, Fit, FitError, Freedom, OrientedPoint, Surface};
+use crate::numeric::mean;
 
 /// A cone, by one of its circles and the angle between its lines and its axis.
 ///
@@ -73,8 +74,6 @@ impl Cone {
 impl Surface for Cone {
     const NAME: &'static str = "cone";
     const FREE: [bool; 8] = [true, true, false, true, true, false, true, true];
-    const NEEDED: [bool; 8] = Self::FREE;
-    const SECOND_IS_LENGTH: bool = false;
 
     fn name_of(freedom: Freedom) -> &'static str {
         match freedom {
@@ -113,7 +112,7 @@ impl Surface for Cone {
 
     fn described_from(&self, points: &[Vector3<f64>]) -> Self {
         let rho = points.iter().map(|q| radial(q).0).sum::<f64>() / points.len() as f64;
-        let q = mean(points);
+        let q = mean(points.iter().copied());
         let (sin, cos) = self.half_angle.sin_cos();
         let along = (rho - self.radius) * sin + q.z * cos;
         let pose_of = self.pose_of * Translation3::new(0.0, 0.0, along * cos);

@@ -3,8 +3,9 @@
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
 use super::circle::{radial, side};
-use super::normals::{AxisGuess, mean, pose_along};
+use super::normals::{AxisGuess, pose_along};
 use super::{Distance, Estimate, Fit, FitError, Freedom, OrientedPoint, Surface};
+use crate::numeric::mean;
 
 /// A cylinder without ends.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,8 +46,6 @@ impl Cylinder {
 impl Surface for Cylinder {
     const NAME: &'static str = "cylinder";
     const FREE: [bool; 8] = [true, true, false, true, true, false, true, false];
-    const NEEDED: [bool; 8] = Self::FREE;
-    const SECOND_IS_LENGTH: bool = false;
 
     fn name_of(freedom: Freedom) -> &'static str {
         match freedom {
@@ -71,7 +70,7 @@ impl Surface for Cylinder {
     }
 
     fn described_from(&self, points: &[Vector3<f64>]) -> Self {
-        let q = mean(points);
+        let q = mean(points.iter().copied());
         Self { pose_of: self.pose_of * Translation3::new(0.0, 0.0, q.z), ..*self }
     }
 

@@ -34,5 +34,6 @@ pub use normals::OrientedPoint;
 pub use observation::{FitParams, Observation};
 pub use plane::Plane;
 pub use robust::fit;
+pub(crate) use stadium::from_segment;
 pub use stadium::{Ends, Stadium};
 pub use surface::{Distance, FREEDOMS, Freedom, Steps, Surface};

@@ -22,11 +22,6 @@ pub(super) fn pose_along(point: Point3<f64>, z: &Vector3<f64>) -> Isometry3<f64>
     Isometry3::from_parts(point.into(), UnitQuaternion::face_towards(z, &across))
 }
 
-/// Mean of at least one point.
-pub(super) fn mean(points: &[Vector3<f64>]) -> Vector3<f64> {
-    points.iter().sum::<Vector3<f64>>() / points.len() as f64
-}
-
 /// An axis, a circle around it, and how the normals stand to it.
 pub(super) struct AxisGuess {
     /// origin: centre of the circle; z: the axis

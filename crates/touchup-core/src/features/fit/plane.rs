@@ -2,8 +2,9 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::normals::{mean, pose_along};
+use super::normals::pose_along;
 use super::{Distance, Fit, FitError, Freedom, OrientedPoint, Surface};
+use crate::numeric::mean;
 
 /// A plane whose air is on the side of z.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,8 +46,6 @@ impl Plane {
 impl Surface for Plane {
     const NAME: &'static str = "plane";
     const FREE: [bool; 8] = [false, false, true, true, true, false, false, false];
-    const NEEDED: [bool; 8] = Self::FREE;
-    const SECOND_IS_LENGTH: bool = false;
 
     fn name_of(freedom: Freedom) -> &'static str {
         match freedom {
@@ -68,7 +67,7 @@ impl Surface for Plane {
     }
 
     fn described_from(&self, points: &[Vector3<f64>]) -> Self {
-        let q = mean(points);
+        let q = mean(points.iter().copied());
         Self { pose_of: self.pose_of * nalgebra::Translation3::new(q.x, q.y, 0.0) }
     }
 

@@ -3,13 +3,22 @@
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
 use super::circle::side;
-use super::normals::{mean, pose_along};
+use super::normals::pose_along;
 use super::{Distance, Estimate, Fit, FitError, Freedom, Surface};
+use crate::numeric::mean;
 
 /// A touch tells where an end is when its normal has at least this share along the slot: 30° from the wall.
 const LEAST_ALONG: f64 = 0.5;
 /// An end is touched when so many touches tell where it is; one may be an outlier.
 const LEAST_TOUCHES: usize = 2;
+
+/// Distance of (x, y) from the segment from (−half, 0) to (half, 0), m, and the unit vector away from it; y on the segment itself, where
+/// both sides will do.
+pub(crate) fn from_segment(x: f64, y: f64, half: f64) -> (f64, [f64; 2]) {
+    let beyond = (x.abs() - half).max(0.0).copysign(x);
+    let rho = beyond.hypot(y);
+    (rho, if rho > 0.0 { [beyond / rho, y / rho] } else { [0.0, 1.0] })
+}
 
 /// What closes a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,9 +87,7 @@ impl Stadium {
     /// Round: all points half a width from a segment as long as length − width.
     fn round_outline(&self, q: &Vector3<f64>) -> (f64, [f64; 2], [f64; 2]) {
         let half_segment = (self.length - self.width).max(0.0) / 2.0;
-        let beyond = (q.x.abs() - half_segment).max(0.0).copysign(q.x);
-        let rho = beyond.hypot(q.y);
-        let normal = if rho > 0.0 { [beyond / rho, q.y / rho] } else { [0.0, 1.0] };
+        let (rho, normal) = from_segment(q.x, q.y, half_segment);
         let along = normal[0].abs() / 2.0;
         (rho - self.width / 2.0, normal, [along - 0.5, -along])
     }
@@ -135,7 +142,7 @@ impl Surface for Stadium {
     }
 
     fn described_from(&self, points: &[Vector3<f64>]) -> Self {
-        let q = mean(points);
+        let q = mean(points.iter().copied());
         let [low, high] = [-1.0, 1.0].map(|sign| self.end_beyond(points, sign));
         let pose_of = self.pose_of * Translation3::new((low + high) / 2.0, 0.0, q.z);
         Self { pose_of, length: high - low, ..*self }

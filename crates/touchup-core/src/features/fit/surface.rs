@@ -63,9 +63,9 @@ pub trait Surface: Clone {
     /// The freedoms it has.
     const FREE: [bool; FREEDOMS];
     /// The freedoms without which a fit of it is worth nothing; the others may come out undetermined.
-    const NEEDED: [bool; FREEDOMS];
+    const NEEDED: [bool; FREEDOMS] = Self::FREE;
     /// Whether its second size is a length.
-    const SECOND_IS_LENGTH: bool;
+    const SECOND_IS_LENGTH: bool = false;
 
     /// What a freedom is called.
     fn name_of(freedom: Freedom) -> &'static str;
