@@ -5,7 +5,7 @@
 //!
 //! | module | what it does |
 //! |---|---|
-//! | [`numeric`] | quantiles, bases, voxels, robust weights, least squares, small rigid motions |
+//! | [`numeric`] | quantiles, means, bases, voxels, disjoint sets, robust weights, least squares, small rigid motions |
 //! | [`mod@parameters`] | what is declared of each key of the scene: unit, range, default, documentation |
 //! | [`touch`] | pose and wrench become one [`touch::Sample`]: pairing, compensation, contact, friction |
 //! | [`mesh`] | the triangle mesh, its repair, its exact closest-face tree, its Laplacian |

@@ -4,11 +4,11 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::circle::circle;
 use super::design::{Asked, Knowledge};
 use super::measuring::{Measuring, Possible};
 use super::search_context::{PatternParams, Quantity, SearchContext, TouchPlan};
 use crate::features::fit::{Cylinder, Fit, FitError, FitParams, Freedom, Observation, Plane, fit};
+use crate::numeric::{NormalEquations, mean};
 
 /// Directions that are candidates.
 const DIRECTIONS: usize = 24;
@@ -39,7 +39,7 @@ impl RoundWall {
 
     fn circle(&self, course: &SearchContext) -> Option<(Point3<f64>, f64)> {
         let points: Vec<_> = self.measuring.felt.iter().map(|o| course.in_f(&o.point)).collect();
-        circle(&points)
+        circle_through(&points)
     }
 
     /// As far as is known, m.
@@ -137,4 +137,17 @@ pub(super) fn surface_about(
 ) -> Result<Fit<Plane>, FitError> {
     let middle = course.pose_of * Point3::new(middle.x, middle.y, course.height);
     fit(&Plane::new(middle, &course.out()), felt, &FitParams::default())
+}
+
+/// Middle and radius of the circle through points of a plane, by least squares of x² + y² = 2ax + 2by + c \[Kåsa 1976\].
+fn circle_through(points: &[Point3<f64>]) -> Option<(Point3<f64>, f64)> {
+    let mean = mean(points.iter().map(|p| p.coords));
+    let row = |p: &Point3<f64>| {
+        let (x, y) = (p.x - mean.x, p.y - mean.y);
+        (Vector3::new(2.0 * x, 2.0 * y, 1.0), x * x + y * y)
+    };
+    let solved = NormalEquations::of(points.iter().map(row)).solution()?;
+    let radius = (solved.z + solved.x * solved.x + solved.y * solved.y).sqrt();
+    let centre = Point3::new(mean.x + solved.x, mean.y + solved.y, 0.0);
+    (radius.is_finite() && points.len() >= 3).then_some((centre, radius))
 }

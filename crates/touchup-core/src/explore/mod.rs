@@ -6,7 +6,6 @@
 
 mod advice;
 mod boss;
-mod circle;
 mod cylinder_fit;
 mod design;
 mod edge;

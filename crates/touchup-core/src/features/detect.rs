@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 use super::borders::{StraightEdge, borders, on_both, straight_edges, without_seams};
 use super::cones::add_cones;
 use super::feature::{Feature, FittedTo, Kind, Measured, SizedSurface};
-use super::fit::{Cylinder, Ends, Fit, Freedom, Plane, Stadium};
+use super::fit::{Cylinder, Ends, Fit, Freedom, Plane, Stadium, Surface};
 use super::holes::{Boss, Hole, bosses, groups, holes};
 use super::measure::{Fitted, Measure};
 use super::observe::Observed;

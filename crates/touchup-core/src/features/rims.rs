@@ -6,7 +6,7 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::{Point3, Vector3};
 
 use super::facets::{Facets, NONE};
-use super::fit::{Cylinder, Fit, FitParams, Observation, fit};
+use super::fit::{Cylinder, Fit, FitParams, Observation, Surface, fit};
 use super::scene::Parted;
 use crate::mesh::VertexId;
 use crate::numeric::tangent_basis;

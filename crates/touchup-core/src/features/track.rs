@@ -7,7 +7,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::detect::{Detection, detect, lateral_std, middle_std};
 use super::feature::{Feature, FittedTo, Kind, Measured, SizedSurface};
-use super::fit::{self, Cylinder, Fit, FitParams, Freedom, Stadium, fit};
+use super::fit::{self, Cylinder, Fit, FitParams, Freedom, Stadium, Surface, fit};
 use super::observe::{groups, observation};
 use crate::mesh::{FaceTree, TriMesh};
 use crate::touch::ProbedPoint;

@@ -1,7 +1,7 @@
 //! The surface meshed anew where it was touched, as one closed skin by construction.
 //!
-//! [`TouchFinder`] makes touches of samples; [`ContactMap`] and [`SweptSpace`] keep what was touched and where the tip
-//! went. [`Evidence`] says what these and the scan know about a point; that is held at the nodes of a regular [`Lattice`] and
+//! [`TouchFinder`] makes touches of samples; [`ContactMap`] and `SweptSpace` keep what was touched and where the tip
+//! went. `Evidence` says what these and the scan know about a point; that is held at the nodes of a regular [`Lattice`] and
 //! completed where nothing is known. [`Patcher`] is the whole way: everything at once, or what changed since the last time, as
 //! a [`PatchDelta`] for a mesh that follows by [`Splice`].
 //!

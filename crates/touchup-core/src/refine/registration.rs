@@ -85,7 +85,7 @@ fn list(directions: &[Vector6<f64>]) -> String {
 }
 
 /// Mean contact of a cell.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Mean {
     point: Vector3<f64>,
     normal: Vector3<f64>,
@@ -148,8 +148,7 @@ impl Registrar {
         if self.means.len() >= MOST_MEANS && !self.means.contains_key(&cell) {
             return;
         }
-        let zero = Mean { point: Vector3::zeros(), normal: Vector3::zeros(), count: 0.0 };
-        let mean = self.means.entry(cell).or_insert(zero);
+        let mean = self.means.entry(cell).or_default();
         mean.point += point.coords;
         mean.normal += normal;
         mean.count += 1.0;

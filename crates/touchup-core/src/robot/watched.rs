@@ -208,7 +208,7 @@ impl<'a> Watched<'a> {
     /// # Errors
     /// [`ProbeError`]; [`ProbeError::InTheWay`] when more than `trigger` (N) is felt.
     ///
-    /// - `speed`: m/s; near the part not above [`TouchParams::safe_speed`].
+    /// - `speed`: m/s; near the part not above `TouchParams::safe_speed`.
     pub fn line(
         &mut self,
         doing: &'static str,

@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 
 /// Cosine of the widest friction cone believed by default: cos 24° (μ = 0.45, dry metal on metal). The normal of a surface is nowhere
 /// farther from the force, neither for the haptic update nor for the evidence of the reconstruction.
-pub(crate) const WIDEST_CONE_COSINE: f64 = 0.9135;
+pub const WIDEST_CONE_COSINE: f64 = 0.9135;
 
 /// What the ball does and feels at one instant, averaged over a short time.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -30,8 +30,7 @@ pub(crate) use contact::STROKE_PAUSE_NS;
 pub use contact::{Contact, ContactGate, ContactGateParams};
 pub(crate) use contact_estimator::LONGEST_HOLD;
 pub use contact_estimator::{ContactEstimator, ContactEstimatorParams, ContactSample};
-pub(crate) use friction::WIDEST_CONE_COSINE;
-pub use friction::{FeltNormal, Friction, FrictionCoefficient, Sliding};
+pub use friction::{FeltNormal, Friction, FrictionCoefficient, Sliding, WIDEST_CONE_COSINE};
 pub use local_motion::{LocalMotion, SmoothedMotion};
 pub use markers::{
     MOST_MARKERS, MarkerBody, MarkerCounts, MarkerFilter, MarkerFrame, MarkerParams, SeenMarker, SpringParams, Tracking,

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use touchup::features::fit::{FitParams, Freedom, fit};
+use touchup::features::fit::{FitParams, Freedom, Surface, fit};
 
 use super::*;
 

@@ -54,11 +54,6 @@ impl Cone {
         Self { pose_of: self.pose_of * over, half_angle: -self.half_angle, ..self }
     }
 
-    /// Centre of the circle, m, in O.
-    pub fn center(&self) -> Point3<f64> {
-        self.pose_of.translation.vector.into()
-    }
-
     /// Radius at a height above the circle along z, m.
     pub(crate) fn radius_at(&self, height: f64) -> f64 {
         self.radius + height * self.half_angle.tan()

@@ -36,11 +36,6 @@ impl Cylinder {
         let guess = AxisGuess::across_normals(faces).ok_or(none)?;
         Ok(Self { pose_of: guess.pose_of, radius: guess.radius, concave: guess.concave })
     }
-
-    /// The point on the axis that F starts from, m, in O.
-    pub fn center(&self) -> Point3<f64> {
-        self.pose_of.translation.vector.into()
-    }
 }
 
 impl Surface for Cylinder {

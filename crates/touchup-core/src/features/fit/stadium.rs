@@ -61,11 +61,6 @@ impl Stadium {
         Self { pose_of: upright * turn, width, length, ends, concave }
     }
 
-    /// Its centre, m, in O.
-    pub fn center(&self) -> Point3<f64> {
-        self.pose_of.translation.vector.into()
-    }
-
     /// Unit vector along it, in O.
     pub fn direction(&self) -> Vector3<f64> {
         self.pose_of.rotation * Vector3::x()

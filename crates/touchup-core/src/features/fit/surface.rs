@@ -88,6 +88,11 @@ pub trait Surface: Clone {
     /// [`FitError::BadSize`].
     fn check(&self) -> Result<(), FitError>;
 
+    /// Where F stands, m, in O: a point of a plane or of the axis of a cylinder, the centre of the circle of a cone, that of a slot.
+    fn center(&self) -> Point3<f64> {
+        self.pose_of().translation.vector.into()
+    }
+
     /// Its axis or normal: z of F, in O.
     fn axis(&self) -> Vector3<f64> {
         self.pose_of().rotation * Vector3::z()
