@@ -5,7 +5,7 @@
 use divan::{Bencher, black_box};
 use nalgebra::{Point3, Vector3};
 use rand::{RngExt, SeedableRng};
-use touchup::refine::{Along, ContactModel, DynamicsParams, FaceDynamics, FaceState, StepRule};
+use touchup::haptic::{Along, ContactModel, DynamicsParams, FaceDynamics, FaceState, StepRule};
 
 fn main() {
     divan::main();

@@ -10,9 +10,9 @@ use plate_stream::{contacts_of, plate_stream};
 use subdivided::subdivided;
 use touchup::features::{Tracker, detect};
 use touchup::mesh::{FaceTree, TriMesh};
-use touchup::patch::{Patcher, PatcherParams, UncertaintyParams};
+use touchup::reconstruct::{Patcher, PatcherParams, UncertaintyParams};
 use touchup::sim::{Plate, ScannerParams, StylusParams, Surface, scan};
-use touchup::touch::ProbedPoint;
+use touchup::stylus::ProbedPoint;
 
 fn main() {
     divan::main();

@@ -12,12 +12,12 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use nalgebra::Vector3;
+use touchup::haptic::{RefineParams, TipParams};
 use touchup::live::{Engine, Gate, Pace, Renewal};
 use touchup::mesh::FaceTree;
-use touchup::patch::PatcherParams;
-use touchup::refine::{RefineParams, TipParams};
+use touchup::reconstruct::PatcherParams;
 use touchup::sim::wavy::{RADIUS, STEP_NS, STIFFNESS, slide, wavy_plate};
-use touchup::touch::Sample;
+use touchup::stylus::Sample;
 
 /// Width of the raster, m: passed over each 4.6 minutes.
 const WIDTH: f64 = 40e-3;

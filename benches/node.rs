@@ -25,7 +25,7 @@ use touchup::ros::parameters::{ParameterValue, Parameters};
 use touchup::ros::port::{Arrival, Publication};
 use touchup::ros::{dds, in_process};
 use touchup::sim::wavy::{slide, wavy_plate};
-use touchup::touch::Sample;
+use touchup::stylus::Sample;
 
 /// Width of the raster, m: 2.3 minutes each time, so that a soak comes to the same places again and again.
 const WIDTH: f64 = 20e-3;

@@ -4,7 +4,7 @@ use divan::Bencher;
 use divan::counter::ItemsCount;
 use nalgebra::{Point3, Vector3};
 use touchup::mesh::{FaceTree, TriMesh, signed_distance};
-use touchup::patch::{ContourParams, Crossing, Cut, Edge, Lattice, LatticeRegion, NodeValues, Patch, contour};
+use touchup::reconstruct::{ContourParams, Crossing, Cut, Edge, Lattice, LatticeRegion, NodeValues, Patch, contour};
 use touchup::sim::wavy;
 
 /// Pitch of the lattice, m.

@@ -10,8 +10,8 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use nalgebra::{Point3, Vector3};
+use touchup::haptic::{RefineParams, Refiner, RoiSize, TipParams};
 use touchup::mesh::{FaceTree, TriMesh, triangle};
-use touchup::refine::{RefineParams, Refiner, RoiSize, TipParams};
 use touchup::sim::wavy::{RADIUS, SIDE, STIFFNESS, slide, wavy_plate};
 use touchup_report::cost::MinimalLoop;
 

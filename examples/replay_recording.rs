@@ -6,10 +6,10 @@
 use std::iter::from_fn;
 use std::path::Path;
 
+use touchup::haptic::{RefineParams, Refiner, TipParams};
 use touchup::io::mesh_file::{MeshUnit, read_mesh, write_mesh};
 use touchup::io::recording::{RecordingReader, Topics};
-use touchup::refine::{RefineParams, Refiner, TipParams};
-use touchup::touch::{SyncParams, Synchroniser};
+use touchup::stylus::{SyncParams, Synchroniser};
 
 fn main() -> anyhow::Result<()> {
     let arguments: Vec<_> = std::env::args().skip(1).collect();

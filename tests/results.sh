@@ -40,12 +40,12 @@ while IFS='|' read -r test heading; do
   printf '\n## %s\n\n`%s`\n\n```text\n%s\n```\n' "$heading" "$test" "$text"
 done <<'PROOFS'
 features::touched::touched_features_are_found_within_their_stated_uncertainty|Features of the touched plate, fifty seeds
-patch::accuracy::other_tips_hands_and_friction|Other tips, hands and friction, twenty seeds
-patch::uncertainty::what_was_touched_is_as_well_known_as_it_says_where_errors_are_as_the_model_has_them|Stated uncertainty where errors are as the model has them
-patch::uncertainty::errors_outside_of_the_model_are_not_in_the_stated_uncertainty|Stated uncertainty where errors are others
-patch::tips::contacts_of_a_tip_are_located|Where a tip touched
-refine::sweeps::the_published_rule_converges_where_no_face_leans_out_of_its_basin_and_only_there|Where the published rule converges
-refine::sweeps::the_guard_lets_the_published_rule_starve_no_face|Sweeps of the published rule, throttled by the guard's longest step
-refine::sweeps::the_robust_mode_never_blows_up_with_noise_larger_than_half_an_edge|Sweeps of the robust mode
-robot::touching::a_hole_is_found_from_one_click_and_measured|A hole from one click, by a simulated arm
+reconstruct::accuracy::other_tips_hands_and_friction|Other tips, hands and friction, twenty seeds
+reconstruct::uncertainty::what_was_touched_is_as_well_known_as_it_says_where_errors_are_as_the_model_has_them|Stated uncertainty where errors are as the model has them
+reconstruct::uncertainty::errors_outside_of_the_model_are_not_in_the_stated_uncertainty|Stated uncertainty where errors are others
+reconstruct::tips::contacts_of_a_tip_are_located|Where a tip touched
+haptic::sweeps::the_published_rule_converges_where_no_face_leans_out_of_its_basin_and_only_there|Where the published rule converges
+haptic::sweeps::the_guard_lets_the_published_rule_starve_no_face|Sweeps of the published rule, throttled by the guard's longest step
+haptic::sweeps::the_robust_mode_never_blows_up_with_noise_larger_than_half_an_edge|Sweeps of the robust mode
+probing::arm::touching::a_hole_is_found_from_one_click_and_measured|A hole from one click, by a simulated arm
 PROOFS

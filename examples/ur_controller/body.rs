@@ -10,9 +10,9 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64;
-use touchup::robot::{Joints, UrGeometry};
+use touchup::probing::arm::{Joints, UrGeometry};
 use touchup::sim::{ArmParams, Surface, push_ball};
-use touchup::touch::Payload;
+use touchup::stylus::Payload;
 
 /// Time between two states, s.
 pub const PERIOD: f64 = 2e-3;

@@ -4,7 +4,7 @@ use std::net::{Shutdown, TcpStream};
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use touchup::touch::Payload;
+use touchup::stylus::Payload;
 
 use crate::body::{Body, Force, HARD_STOP, Motion};
 use crate::record::Record;

@@ -29,7 +29,7 @@ use std::time::{Duration, Instant};
 use anyhow::Context;
 use nalgebra::{Point3, Vector3};
 use touchup::sim::{ArmParams, MeshSurface, Plate, WEIGHTLESS};
-use touchup::touch::Payload;
+use touchup::stylus::Payload;
 
 use body::{Body, PERIOD};
 use controller::{Controller, Safety};

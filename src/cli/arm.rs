@@ -11,10 +11,10 @@ use super::probing::Ready;
 use super::probing::ur_params;
 use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
 use crate::mesh::TriMesh;
-use crate::robot::Arm;
+use crate::probing::arm::Arm;
 use crate::scene::Scene;
 use crate::sim::{ArmParams, MeshSurface, SimArm, WEIGHTLESS};
-use crate::touch::Payload;
+use crate::stylus::Payload;
 #[cfg(feature = "ur")]
 use crate::ur::UrArm;
 

@@ -11,7 +11,7 @@ use super::arm::{ArmArguments, millimetres};
 use super::probing::Ready;
 use super::progress::WorkProgress;
 use super::{CliError, Losses, print_result};
-use crate::probe::{Prober, Repeatability};
+use crate::probing::execute::{Prober, Repeatability};
 
 /// Allowed number of touches; with three each side is approached, and the repeatability is known.
 const TOUCHES: std::ops::RangeInclusive<usize> = 3..=100;
@@ -109,7 +109,7 @@ struct CheckedTouch {
 
 impl Checked {
     fn of(found: &Repeatability, gate_um: f64) -> Self {
-        let touch = |(touch, deviation): (&crate::probe::SpotTouch, f64)| CheckedTouch {
+        let touch = |(touch, deviation): (&crate::probing::execute::SpotTouch, f64)| CheckedTouch {
             side: touch.side,
             deviation_um: deviation * 1e6,
             std_um: touch.sigma * 1e6,

@@ -17,7 +17,7 @@ use super::{CliError, Losses, print_result};
 use crate::features::{Feature, Kind};
 use crate::io::atomic::{create_folder, write_atomically};
 use crate::io::mesh_file::{MeshUnit, write_mesh};
-use crate::probe::{Flag, Probed};
+use crate::probing::execute::{Flag, Probed};
 use crate::sim::{Plate, ScannerParams, SimArm, TruthFeature, TruthShape, scan};
 
 /// Its scene, written beside the other files.

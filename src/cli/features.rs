@@ -16,7 +16,7 @@ use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
 use crate::io::touches_file::read_touches;
 use crate::mesh::TriMesh;
 use crate::session::found;
-use crate::touch::ProbedPoint;
+use crate::stylus::ProbedPoint;
 
 #[derive(Debug, Args)]
 pub(super) struct FeaturesArguments {

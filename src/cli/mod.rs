@@ -49,7 +49,7 @@ use tracing_subscriber::filter::{LevelFilter, Targets};
 use crate::align::{FeaturesError, IcpError, PairsError};
 use crate::calibrate::{PayloadError, TipError};
 use crate::compare::CompareError;
-use crate::explore::ExploreError;
+use crate::haptic::RefineError;
 use crate::io::atomic::is_same_file;
 use crate::io::features_file::FeaturesFileError;
 use crate::io::mesh_file::MeshFileError;
@@ -58,7 +58,7 @@ use crate::io::table::TableError;
 use crate::io::touches_file::TouchesFileError;
 use crate::live::LiveError;
 use crate::mesh::MeshError;
-use crate::refine::RefineError;
+use crate::probing::plan::ExploreError;
 use crate::replay::ReplayError;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use crate::ros::arguments::{ArgumentError, log_level, split};
@@ -67,7 +67,7 @@ use crate::ros::node::NodeError;
 use crate::scene::SceneError;
 use crate::session::{OutcomeError, SessionError};
 use crate::sim::SimError;
-use crate::touch::SettingError;
+use crate::stylus::SettingError;
 
 /// Repairs a 3D scan by touch.
 #[derive(Debug, Parser)]

@@ -5,8 +5,8 @@ use std::fmt;
 use nalgebra::Vector6;
 use serde::Serialize;
 
-use crate::refine::{RefineParams, Registrar, Registration, RegistrationError, RegistrationParams};
-use crate::touch::{ClockOffset, ContactSample, SettingError};
+use crate::haptic::{RefineParams, Registrar, Registration, RegistrationError, RegistrationParams};
+use crate::stylus::{ClockOffset, ContactSample, SettingError};
 
 /// Clock offset of the wrench against the pose; never applied automatically.
 #[derive(Clone, Copy, Debug, Serialize)]

@@ -7,8 +7,8 @@ use clap::Args;
 use super::arm::{ArmArguments, RobotName};
 use super::probing::{Done, Probing, Ready, flag_of, picture_files};
 use super::{CliError, Losses, print_result};
-use crate::probe::Flag;
-use crate::robot::{Arm, Narrower};
+use crate::probing::arm::{Arm, Narrower};
+use crate::probing::execute::Flag;
 
 #[derive(Debug, Args)]
 pub(super) struct ProbeArguments {

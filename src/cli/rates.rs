@@ -6,11 +6,11 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
+use crate::haptic::{RefineError, RefineParams, Refiner};
 use crate::live::{Engine, Gate, Latencies, LiveCounts, LiveError, Pace, Quantiles, Renewal};
 use crate::mesh::{FaceTree, TriMesh};
-use crate::patch::{Patcher, PatcherParams};
-use crate::refine::{RefineError, RefineParams, Refiner};
-use crate::touch::Sample;
+use crate::reconstruct::{Patcher, PatcherParams};
+use crate::stylus::Sample;
 
 /// Room reserved for new faces.
 const ROOM: usize = 1 << 18;

@@ -15,16 +15,16 @@ use super::offsets::{ContactPoints, ScanOffset, WrenchOffset};
 use super::progress::WorkProgress;
 use super::rates::{Ended, LiveSummary, Rates};
 use super::{CliError, Losses, check_kept_by, print_result};
+use crate::haptic::{RefineCounts, RefineError, RefineParams};
 use crate::io::atomic::{AtomicFile, is_same_file};
 use crate::io::mesh_file::{MeshFile, MeshFileError, MeshUnit, check_target, read_mesh};
 use crate::io::recording::Topics;
 use crate::live::{Latencies, Quantiles};
 use crate::mesh::{FaceTree, RepairReport};
-use crate::refine::{RefineCounts, RefineError, RefineParams};
 use crate::replay::{Recording, Replayed, each_sample, marker_filter};
 use crate::scene::{CutScan, Memory, Mode, Scene, SceneCost};
 use crate::session::{Outcome, OutcomePlaces, PatchSummary, SessionRecord, StrokeChange, UncertaintySummary};
-use crate::touch::{ClockEstimator, ContactEstimator, MarkerCounts, Sample};
+use crate::stylus::{ClockEstimator, ContactEstimator, MarkerCounts, Sample};
 
 #[derive(Clone, Debug, Args)]
 pub(super) struct RefineArguments {

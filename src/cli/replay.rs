@@ -18,7 +18,7 @@ use crate::ros::node::{CELL, as_pose, as_wrench};
 use crate::ros::parameters::ParameterValue;
 use crate::ros::port::SamplePort;
 use crate::scene::Scene;
-use crate::touch::{Message, SyncParams, WrenchFrame};
+use crate::stylus::{Message, SyncParams, WrenchFrame};
 
 /// Wait after discovery of the subscribers: whether they have discovered us in turn they do not announce.
 const DISCOVERY: Duration = Duration::from_secs(1);
@@ -233,7 +233,7 @@ mod tests {
     use nalgebra::Isometry3;
 
     use super::*;
-    use crate::touch::{StampedPose, StampedWrench, Wrench};
+    use crate::stylus::{StampedPose, StampedWrench, Wrench};
 
     #[test]
     fn each_stream_comes_in_the_order_of_its_stamps() {

@@ -17,7 +17,7 @@ use crate::sim::{
     CameraParams, MeshSurface, PathParams, ScannerParams, Stroke, StylusParams, Surface, Touch, plan_mesh, scan,
     see_markers, touch,
 };
-use crate::touch::{MarkerFrame, Message};
+use crate::stylus::{MarkerFrame, Message};
 
 /// File of the true part, in the output folder.
 const TRUTH_NAME: &str = "truth.ply";

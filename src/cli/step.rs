@@ -11,7 +11,7 @@ use std::io::{self, BufRead, Write};
 use nalgebra::{Point3, Vector3};
 use serde::Deserialize;
 
-use crate::refine::{Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, StepRule};
+use crate::haptic::{Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, StepRule};
 
 /// A longer line is not a sample.
 const LONGEST_LINE: u64 = 64 * 1024;

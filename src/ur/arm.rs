@@ -13,8 +13,8 @@ use super::guard::Halt;
 use super::params::UrParams;
 use super::probe::probe;
 use super::protocol::{Action, UrState, pose_of, vector_of};
-use crate::robot::{Arm, ArmError, ArmState, Command, Safety};
-use crate::touch::Wrench;
+use crate::probing::arm::{Arm, ArmError, ArmState, Command, Safety};
+use crate::stylus::Wrench;
 
 /// Time between two states, s: an e-Series sends them at 500 Hz.
 const PERIOD: f64 = 2e-3;
@@ -193,7 +193,7 @@ impl Arm for UrArm {
 
     /// With a new client in any case: the program of the controller does at once what the registers hold from before, and only a new
     /// client clears them first. Tool, payload and watchdog are set again. The sensor is not zeroed, for the probe may still be
-    /// pressed: back off, then [`crate::robot::Watched::zero`].
+    /// pressed: back off, then [`crate::probing::arm::Watched::zero`].
     fn recover(&mut self) -> Result<(), ArmError> {
         self.unlock()?;
         self.client.close("was ended for a restart, and that failed");

@@ -14,7 +14,7 @@ use super::guard::{ClientLoss, FAREWELL, Guard, GuardState, Halt, SharedGuard, Z
 use super::params::UrParams;
 use super::protocol::{Action, Begin, ClientReport, Order, UrState, vector_of};
 use crate::clock::Clock;
-use crate::robot::ArmError;
+use crate::probing::arm::ArmError;
 
 /// The process and its guard.
 pub(super) struct Client {

@@ -5,7 +5,7 @@ use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
 use super::error::UrError;
-use crate::robot::Safety;
+use crate::probing::arm::Safety;
 
 /// TCP port of the dashboard.
 const PORT: u16 = 29999;

@@ -55,7 +55,7 @@ pub enum UrError {
     },
     /// A safety function stopped it.
     #[error("the arm is stopped: {0}")]
-    Stopped(crate::robot::Safety),
+    Stopped(crate::probing::arm::Safety),
     /// No ur-rtde, or another one.
     #[error("{}: {reason}; make it with `touchup ur setup`", site_packages.display())]
     Wheel {

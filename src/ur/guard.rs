@@ -13,7 +13,7 @@ use super::dashboard::Dashboard;
 use super::params::Deadlines;
 use super::protocol::{ClientReport, Link, UrState};
 use crate::clock::{Clock, ManualClock};
-use crate::robot::{ArmError, Safety};
+use crate::probing::arm::{ArmError, Safety};
 
 /// States that wait for a late caller, 128 ms of them; older ones are dropped.
 const WAITING: usize = 64;

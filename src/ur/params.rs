@@ -23,7 +23,7 @@ pub struct UrParams {
     pub mass: f64,
     /// Its centre of mass, m in F.
     pub centre: Vector3<f64>,
-    /// Highest commanded speed of the tip, m/s; [`crate::robot::Limits`] are below it.
+    /// Highest commanded speed of the tip, m/s; [`crate::probing::arm::Limits`] are below it.
     pub top_speed: f64,
     /// Most that is ever pressed with, N.
     pub top_force: f64,

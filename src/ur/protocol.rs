@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::robot::Safety;
+use crate::probing::arm::Safety;
 
 /// The one version of ur-rtde that this was made and tested with.
 pub const WHEEL: &str = "1.6.5";

@@ -5,7 +5,7 @@ use touchup::mesh::TriMesh;
 use touchup::sim::{
     Lines, PathParams, Plate, RasterRegion, ScannerParams, Stroke, StylusParams, Touch, plan_demo, raster, scan, touch,
 };
-use touchup::touch::{
+use touchup::stylus::{
     ContactEstimator, ContactEstimatorParams, ContactSample, Sample, SyncParams, Synchroniser, TipParams, TipShape,
 };
 

@@ -3,9 +3,9 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
+use touchup::haptic::{GuardParams, RefineParams, Refiner, RoiSize, TipParams};
 use touchup::mesh::TriMesh;
-use touchup::refine::{GuardParams, RefineParams, Refiner, RoiSize, TipParams};
-use touchup::touch::{
+use touchup::stylus::{
     BiasParams, MarkerBody, MarkerFilter, MarkerFrame, MarkerParams, Sample, SeenMarker, StampedPose, Wrench,
 };
 use touchup_report::allocations::asked;

@@ -9,7 +9,7 @@ use std::process::{Command, Output, Stdio};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3, vector};
 use serde_json::Value;
 use touchup::io::recording::{Topics, write_recording};
-use touchup::touch::{Message, StampedPose, StampedWrench, Wrench};
+use touchup::stylus::{Message, StampedPose, StampedWrench, Wrench};
 
 fn touchup(arguments: &[&str], input: &str) -> Output {
     let mut child = Command::new(env!("CARGO_BIN_EXE_touchup"))

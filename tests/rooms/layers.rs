@@ -11,45 +11,57 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("clock", &[]),
     ("numeric", &[]),
     ("parameters", &[]),
-    ("touch", &["numeric", "parameters"]),
+    ("stylus", &["numeric", "parameters"]),
     ("mesh", &["numeric"]),
-    ("patch", &["numeric", "parameters", "touch", "mesh"]),
-    ("refine", &["numeric", "parameters", "touch", "mesh", "patch"]),
-    ("live", &["clock", "touch", "mesh", "patch", "refine"]),
-    ("explore", &["numeric", "parameters", "touch", "mesh", "features"]),
-    ("robot", &["numeric", "parameters", "touch", "explore"]),
-    ("probe", &["numeric", "parameters", "touch", "mesh", "features", "explore", "robot"]),
-    ("sim", &["numeric", "touch", "mesh", "robot"]),
-    ("features", &["numeric", "touch", "mesh"]),
+    ("reconstruct", &["numeric", "parameters", "stylus", "mesh"]),
+    ("haptic", &["numeric", "parameters", "stylus", "mesh", "reconstruct"]),
+    ("live", &["clock", "stylus", "mesh", "reconstruct", "haptic"]),
+    ("plan", &["numeric", "parameters", "stylus", "mesh", "features"]),
+    ("arm", &["numeric", "parameters", "stylus", "plan"]),
+    ("execute", &["numeric", "parameters", "stylus", "mesh", "features", "plan", "arm"]),
+    ("sim", &["numeric", "stylus", "mesh", "arm"]),
+    ("features", &["numeric", "stylus", "mesh"]),
     ("align", &["numeric", "mesh", "features"]),
-    ("compare", &["numeric", "touch", "mesh", "align", "features"]),
-    ("calibrate", &["numeric", "touch", "align"]),
-    ("io", &["parameters", "touch", "mesh", "features", "align", "robot", "probe"]),
-    ("scene", &["parameters", "touch", "mesh", "patch", "refine", "explore", "robot", "probe", "sim", "io"]),
-    ("replay", &["touch", "io", "scene"]),
-    ("session", &["clock", "touch", "mesh", "patch", "refine", "live", "features", "io"]),
+    ("compare", &["numeric", "stylus", "mesh", "align", "features"]),
+    ("calibrate", &["numeric", "stylus", "align"]),
+    ("io", &["parameters", "stylus", "mesh", "features", "align", "arm", "execute"]),
+    ("scene", &["parameters", "stylus", "mesh", "reconstruct", "haptic", "plan", "arm", "execute", "sim", "io"]),
+    ("replay", &["stylus", "io", "scene"]),
+    ("session", &["clock", "stylus", "mesh", "reconstruct", "haptic", "live", "features", "io"]),
     (
         "report",
         &[
-            "numeric", "touch", "mesh", "patch", "refine", "live", "features", "align", "sim", "compare", "io",
-            "scene", "session", "replay",
+            "numeric",
+            "stylus",
+            "mesh",
+            "reconstruct",
+            "haptic",
+            "live",
+            "features",
+            "align",
+            "sim",
+            "compare",
+            "io",
+            "scene",
+            "session",
+            "replay",
         ],
     ),
-    ("ur", &["clock", "touch", "explore", "robot"]),
+    ("ur", &["clock", "stylus", "plan", "arm"]),
     (
         "ros",
         &[
             "parameters",
             "clock",
-            "touch",
+            "stylus",
             "mesh",
-            "patch",
-            "refine",
+            "reconstruct",
+            "haptic",
             "live",
             "features",
-            "explore",
-            "robot",
-            "probe",
+            "plan",
+            "arm",
+            "execute",
             "sim",
             "align",
             "calibrate",
@@ -63,15 +75,15 @@ const MAY_USE: &[(&str, &[&str])] = &[
         "cli",
         &[
             "clock",
-            "touch",
+            "stylus",
             "mesh",
-            "patch",
-            "refine",
+            "reconstruct",
+            "haptic",
             "live",
             "features",
-            "explore",
-            "robot",
-            "probe",
+            "plan",
+            "arm",
+            "execute",
             "sim",
             "align",
             "calibrate",
@@ -272,6 +284,8 @@ struct Place<'a> {
     room: &'a str,
     /// how many modules deep, where the crate has several rooms; 0 where all of it is one
     depth: usize,
+    /// whether it is one of the rooms of `probing`
+    has_siblings: bool,
 }
 
 impl<'a> Place<'a> {
@@ -282,14 +296,16 @@ impl<'a> Place<'a> {
             None => ("touchup", file.strip_prefix("src/").unwrap()),
         };
         if let Some((_, room)) = WHOLE.iter().find(|(name, _)| *name == package) {
-            return Self { package, room, depth: 0 };
+            return Self { package, room, depth: 0, has_siblings: false };
         }
         let path = path.strip_suffix(".rs").unwrap();
         let path = path.strip_suffix("/mod").unwrap_or(path);
         if path == "lib" || path == "main" {
-            return Self { package, room: "", depth: 0 };
+            return Self { package, room: "", depth: 0, has_siblings: false };
         }
-        Self { package, room: path.split('/').next().unwrap(), depth: path.split('/').count() }
+        let inner = path.strip_prefix("probing/").unwrap_or(path);
+        let room = if inner == "probing" { "" } else { inner.split('/').next().unwrap() };
+        Self { package, room, depth: path.split('/').count(), has_siblings: inner != path }
     }
 }
 
@@ -300,7 +316,9 @@ const WHOLE: &[(&str, &str)] = &[("touchup-sim", "sim"), ("touchup-io", "io"), (
 const WITH_ROOMS: &[&str] = &["touchup_core", "touchup_session"];
 
 /// The rooms that `tokens` reach: of other crates by their names, of the own one from its root or by enough `super`.
-fn rooms_reached<'a>(tokens: &[&'a str], depth: usize) -> Vec<&'a str> {
+///
+/// - `depth`, `has_siblings`: of [`Place`].
+fn rooms_reached<'a>(tokens: &[&'a str], depth: usize, has_siblings: bool) -> Vec<&'a str> {
     let mut rooms = Vec::new();
     for at in 0..tokens.len() {
         if at >= 2 && tokens[at - 1] == "::" && (tokens[at - 2] == "super" || tokens[at] == "crate") {
@@ -310,8 +328,13 @@ fn rooms_reached<'a>(tokens: &[&'a str], depth: usize) -> Vec<&'a str> {
         let supers = tokens[at..].chunks(2).take_while(|pair| *pair == ["super", "::"]).count();
         if is_path && (WITH_ROOMS.contains(&tokens[at]) || tokens[at] == "crate" && depth > 0) {
             rooms.extend(names_at(tokens, at + 2));
-        } else if supers > 0 && depth > 0 && supers >= depth {
+        } else if supers > 0 && depth > 0 && supers + usize::from(has_siblings) >= depth {
             rooms.extend(names_at(tokens, at + 2 * supers));
+        }
+        // the rooms of `probing`, in a path or in a group
+        let follows = at > 0 && ["::", "{", ","].contains(&tokens[at - 1]);
+        if tokens[at] == "probing" && is_path && follows {
+            rooms.extend(names_at(tokens, at + 2));
         }
         rooms.extend(WHOLE.iter().filter(|(name, _)| name.replace('-', "_") == tokens[at]).map(|(_, room)| *room));
     }
@@ -329,7 +352,7 @@ fn breaches(file: &str, source: &str) -> Vec<String> {
             return vec![format!("{file}: the room {} is not in the table of tests/rooms/layers.rs", place.room)];
         };
         let is_room = |name: &&str| MAY_USE.iter().any(|(room, _)| room == name);
-        let reached = rooms_reached(&tokens, place.depth).into_iter();
+        let reached = rooms_reached(&tokens, place.depth, place.has_siblings).into_iter();
         let wrong = reached.filter(|name| is_room(name) && name != room && !allowed.contains(name));
         found.extend(wrong.map(|name| format!("{file}: {room} may not use {name}")));
     }
@@ -509,32 +532,32 @@ fn path_of(file: &str) -> String {
 #[test]
 fn a_breach_is_found_however_it_is_written() {
     let bad = [
-        ("touch/sync.rs", "use crate::mesh::TriMesh;"),
-        ("touch/sync.rs", "use crate::{mesh::{TriMesh, FaceId}, touch::Sample};"),
-        ("touch/sync.rs", "fn f() -> crate :: patch::Error {}"),
-        ("touch/sync.rs", "use super::super::mesh;"),
-        ("touch/mod.rs", "use super::{touch, mesh};"),
-        ("mesh.rs", "use super::refine;"),
-        ("mesh/repair/weld.rs", "use super::super::super::touch;"),
+        ("stylus/sync.rs", "use crate::mesh::TriMesh;"),
+        ("stylus/sync.rs", "use crate::{mesh::{TriMesh, FaceId}, stylus::Sample};"),
+        ("stylus/sync.rs", "fn f() -> crate :: reconstruct::Error {}"),
+        ("stylus/sync.rs", "use super::super::mesh;"),
+        ("stylus/mod.rs", "use super::{stylus, mesh};"),
+        ("mesh.rs", "use super::haptic;"),
+        ("mesh/repair/weld.rs", "use super::super::super::stylus;"),
         ("crates/touchup-session/src/scene/mod.rs", "use crate::live;"),
         ("src/ros/node/mod.rs", "use crate::cli;"),
-        ("refine/mod.rs", "use std::fs::File;"),
-        ("refine/mod.rs", "use std::{collections::HashMap, thread};"),
-        ("refine/mod.rs", "let t = std::time::Instant::now();"),
+        ("haptic/mod.rs", "use std::fs::File;"),
+        ("haptic/mod.rs", "use std::{collections::HashMap, thread};"),
+        ("haptic/mod.rs", "let t = std::time::Instant::now();"),
         ("crates/touchup-sim/src/lib.rs", "let t = SystemTime::now();"),
         ("crates/touchup-sim/src/arm.rs", "let home = std::env::var(\"HOME\");"),
         ("mesh/mod.rs", "/* a */ println!(\"{x}\");"),
         ("mesh/mod.rs", "let c = '\"'; println!(\"{c}\");"),
         ("mesh/mod.rs", "fn f<'a>(x: &'a str) { dbg!(x) }"),
-        ("mesh/mod.rs", "#[cfg(test)] mod tests { fn f() { { } } } use crate::patch;"),
+        ("mesh/mod.rs", "#[cfg(test)] mod tests { fn f() { { } } } use crate::reconstruct;"),
         ("src/cli/demo.rs", "std::fs::write(path, text)"),
-        ("robot/touching.rs", "use std::thread;"),
+        ("probing/arm/touching.rs", "use std::thread;"),
         ("src/ur/client.rs", "use pyo3::Python;"),
         ("src/cli/ur.rs", "pyo3::Python::attach(f)"),
         ("src/ur/setup.rs", "std::fs::read(path)"),
         ("src/ur/arm.rs", "use crate::cli::demo;"),
         ("src/ur/arm.rs", "use crate::sim::Plate;"),
-        ("crates/touchup-sim/src/arm.rs", "use touchup_core::patch::Patcher;"),
+        ("crates/touchup-sim/src/arm.rs", "use touchup_core::reconstruct::Patcher;"),
         ("crates/touchup-sim/src/arm.rs", "use touchup_core::{mesh::TriMesh, features::Kind};"),
         ("crates/touchup-session/src/scene/mod.rs", "fn f() -> touchup_core::features::Kind {}"),
         ("crates/touchup-session/src/session/mod.rs", "use touchup_sim::Plate;"),
@@ -549,14 +572,14 @@ fn a_breach_is_found_however_it_is_written() {
 #[test]
 fn what_is_allowed_is_let_through() {
     let good = [
-        ("refine/mod.rs", "use crate::touch::Sample; use crate::{mesh::TriMesh, refine::Update}; use super::mesh;"),
-        ("touch/sync.rs", "// use crate::mesh\n/* std::fs /* nested */ crate::io */ /// [`crate::refine::Refiner`]\n"),
-        ("touch/sync.rs", "let s = \"crate::mesh println! \\\" std::fs\"; let r = r#\"std::fs \" crate::mesh\"#;"),
-        ("touch/sync.rs", "use super::mesh_like; use super::super::touch::sync;"),
-        ("mesh/mod.rs", "#[cfg(test)] mod tests { use crate::patch; fn f() { println!(\"}\"); } } fn g() {}"),
+        ("haptic/mod.rs", "use crate::stylus::Sample; use crate::{mesh::TriMesh, haptic::Update}; use super::mesh;"),
+        ("stylus/sync.rs", "// use crate::mesh\n/* std::fs /* nested */ crate::io */ /// [`crate::haptic::Refiner`]\n"),
+        ("stylus/sync.rs", "let s = \"crate::mesh println! \\\" std::fs\"; let r = r#\"std::fs \" crate::mesh\"#;"),
+        ("stylus/sync.rs", "use super::mesh_like; use super::super::stylus::sync;"),
+        ("mesh/mod.rs", "#[cfg(test)] mod tests { use crate::reconstruct; fn f() { println!(\"}\"); } } fn g() {}"),
         ("crates/touchup-io/src/lib.rs", "use std::fs; use std::io::Read;"),
         ("src/cli/refine.rs", "let t = std::time::Instant::now(); println!(\"x\");"),
-        ("src/ur/client.rs", "use std::{thread, process}; use std::time::Instant; use crate::robot::ArmError;"),
+        ("src/ur/client.rs", "use std::{thread, process}; use std::time::Instant; use crate::probing::arm::ArmError;"),
         ("src/ur/child/library.rs", "use pyo3::Python;"),
         ("src/main.rs", "use std::fs; fn main() { println!() }"),
     ];

@@ -4,12 +4,12 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use nalgebra::Point3;
+use touchup::haptic::{RefineParams, Refiner, TipParams};
 use touchup::live::{Engine, Gate, GateKeeper, LiveCounts, Pace, Renewal};
 use touchup::mesh::{FaceId, FaceTree, TriMesh, VertexId};
-use touchup::patch::{PatchDelta, Patcher, PatcherParams, Splice};
-use touchup::refine::{RefineParams, Refiner, TipParams};
+use touchup::reconstruct::{PatchDelta, Patcher, PatcherParams, Splice};
 use touchup::sim::StylusParams;
-use touchup::touch::{BiasParams, ContactSample, ProbedPoint, Sample};
+use touchup::stylus::{BiasParams, ContactSample, ProbedPoint, Sample};
 
 use crate::plate_stream::{PlateStream, contacts_of, plate_stream};
 use crate::soundness::{intersections, rim_length, soundness};
@@ -356,7 +356,7 @@ fn a_touch_moves_the_mesh_at_once_and_is_in_the_patch_within_50_ms() {
         Sample {
             stamp_ns: i * 1_000_000,
             pose_ot,
-            wrench: touchup::touch::Wrench { force, torque: nalgebra::Vector3::zeros() },
+            wrench: touchup::stylus::Wrench { force, torque: nalgebra::Vector3::zeros() },
         }
     };
     let tip = TipParams { radius: 1.5e-3, stiffness: None };

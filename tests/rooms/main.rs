@@ -19,20 +19,18 @@ mod allocations;
 mod calibrate;
 mod cli;
 mod compare;
-mod explore;
 mod features;
+mod haptic;
 mod io;
 mod layers;
 mod live;
 mod mesh;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 mod node;
-mod patch;
-mod probe;
-mod refine;
-mod robot;
+mod probing;
+mod reconstruct;
 #[cfg(feature = "ros")]
 mod ros;
 mod scene;
 mod sim;
-mod touch;
+mod stylus;

@@ -6,14 +6,14 @@ use std::collections::BTreeSet;
 
 use nalgebra::vector;
 use proptest::prelude::*;
+use touchup::haptic::{Along, ContactModel, DynamicsParams, GuardParams, RefineParams, RoiSize, StepRule, TipParams};
 use touchup::io::mesh_file::MeshUnit;
-use touchup::patch::PatcherParams;
-use touchup::refine::{Along, ContactModel, DynamicsParams, GuardParams, RefineParams, RoiSize, StepRule, TipParams};
+use touchup::reconstruct::PatcherParams;
 use touchup::scene::{
     CompensationSection, GravityAxes, MarkersSection, Mode, PayloadSection, RobotSection, ScanToSpaceSection, Scene,
     SceneError, Setting,
 };
-use touchup::touch::{BiasParams, SensorBias, SensorMount, SyncParams, TipShape, WrenchFrame};
+use touchup::stylus::{BiasParams, SensorBias, SensorMount, SyncParams, TipShape, WrenchFrame};
 
 const DEFAULT_YAML: &str = include_str!("../../config/default.yaml");
 
@@ -303,7 +303,7 @@ fn the_shape_of_the_tip_reaches_refiner_and_patcher() {
         let refiner = scene.refine_params(WrenchFrame::Sensor).unwrap();
         let patcher = scene.patcher_params().unwrap();
         assert_eq!((refiner.shape, refiner.tip.radius), (patcher.touches.shape, patcher.touches.radius));
-        assert!(refiner.check().is_ok() && touchup::patch::Patcher::new(patcher).is_ok());
+        assert!(refiner.check().is_ok() && touchup::reconstruct::Patcher::new(patcher).is_ok());
         (refiner.shape, patcher.evidence.radius)
     };
     assert_eq!(shapes("radius_mm: 1.5"), (TipShape::Ball, 1.5e-3));

@@ -8,7 +8,9 @@ use std::time::Duration;
 
 use nalgebra::Vector3;
 use touchup::clock::{Clock, ManualClock};
-use touchup::robot::{Arm, ArmError, Command, LimitError, ProbeError, Safety, TouchOutcome, TouchParams, Watched};
+use touchup::probing::arm::{
+    Arm, ArmError, Command, LimitError, ProbeError, Safety, TouchOutcome, TouchParams, Watched,
+};
 use touchup::ur::{Halt, UrArm, UrError};
 
 use crate::stand_in::{Line, StandIn, limits};
@@ -85,7 +87,7 @@ fn broken_off(arm: &mut UrArm, mut happen: impl FnMut()) -> ProbeError {
     let [x, y] = PLACE;
     let from = arm.next_state().unwrap().pose_bt.translation.z;
     let mut has_happened = false;
-    let mut seen = |state: &touchup::robot::ArmState| {
+    let mut seen = |state: &touchup::probing::arm::ArmState| {
         if !has_happened && state.pose_bt.translation.z - from > 10e-3 {
             has_happened = true;
             happen();

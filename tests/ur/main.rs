@@ -18,7 +18,7 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use stand_in::{StandIn, limits, packages};
-use touchup::robot::{OnsetVerdict, ProbeError, TouchOutcome, TouchParams, TouchRecord, TouchTarget, Watched};
+use touchup::probing::arm::{OnsetVerdict, ProbeError, TouchOutcome, TouchParams, TouchRecord, TouchTarget, Watched};
 use touchup::sim::ArmParams;
 use touchup::ur::UrArm;
 
@@ -36,13 +36,13 @@ fn at(place: [f64; 3]) -> Isometry3<f64> {
 }
 
 /// Looks on, and may want it to end.
-struct Onlooker<S: FnMut(&touchup::robot::ArmState), C: Fn() -> bool> {
+struct Onlooker<S: FnMut(&touchup::probing::arm::ArmState), C: Fn() -> bool> {
     seen: S,
     is_cancelled: C,
 }
 
-impl<S: FnMut(&touchup::robot::ArmState), C: Fn() -> bool> touchup::robot::Witness for Onlooker<S, C> {
-    fn see(&mut self, state: &touchup::robot::ArmState) {
+impl<S: FnMut(&touchup::probing::arm::ArmState), C: Fn() -> bool> touchup::probing::arm::Witness for Onlooker<S, C> {
+    fn see(&mut self, state: &touchup::probing::arm::ArmState) {
         (self.seen)(state);
     }
 

@@ -2,7 +2,7 @@
 
 use crate::Onlooker;
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
-use touchup::robot::{Arm, Command, ProbeError, SlideEnding, SlideStation, SlideTarget, TouchParams, Watched};
+use touchup::probing::arm::{Arm, Command, ProbeError, SlideEnding, SlideStation, SlideTarget, TouchParams, Watched};
 use touchup::sim::ArmParams;
 
 use crate::stand_in::{StandIn, limits};
@@ -184,7 +184,7 @@ fn a_cancelled_move_brakes_to_rest() {
         let is_cancelled = std::cell::Cell::new(false);
         let asked = || is_cancelled.get();
         let from = arm.next_state().unwrap().pose_bt.translation.z;
-        let mut seen = |state: &touchup::robot::ArmState| {
+        let mut seen = |state: &touchup::probing::arm::ArmState| {
             if !is_cancelled.get() && from - state.pose_bt.translation.z > 20e-3 {
                 stand_in.send("mark cancelled");
                 is_cancelled.set(true);

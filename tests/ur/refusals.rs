@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use nalgebra::Vector3;
 use touchup::clock::Clock;
-use touchup::robot::{Arm, ArmError, Command};
+use touchup::probing::arm::{Arm, ArmError, Command};
 use touchup::ur::{UrArm, UrError, UrParams};
 
 use crate::faults::rest_for;

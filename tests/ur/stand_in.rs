@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicU8, Ordering};
 use std::time::{Duration, Instant};
 
 use nalgebra::{Point3, Vector3};
-use touchup::robot::Limits;
+use touchup::probing::arm::Limits;
 use touchup::ur::{UrArm, UrParams};
 
 /// Ports that the library has fixed.

@@ -7,17 +7,17 @@
 //! |---|---|
 //! | [`numeric`] | quantiles, means, bases, voxels, disjoint sets, robust weights, least squares, small rigid motions |
 //! | [`mod@parameters`] | what is declared of each key of the scene: unit, range, default, documentation |
-//! | [`touch`] | pose and wrench become one [`touch::Sample`]: pairing, compensation, contact, friction |
+//! | [`stylus`] | pose and wrench become one [`touch::Sample`]: pairing, compensation, contact, friction |
 //! | [`mesh`] | the triangle mesh, its repair, its exact closest-face tree, its Laplacian |
-//! | [`patch`] | the touched part of the scan reconstructed |
-//! | [`refine`] | [`refine::Refiner::push`]: face dynamics, region, guard; one sample moves the mesh |
+//! | [`reconstruct`] | the touched part of the scan reconstructed |
+//! | [`haptic`] | [`refine::Refiner::push`]: face dynamics, region, guard; one sample moves the mesh |
 //! | [`features`] | holes, slots, planes, … of a mesh and its touches, with their uncertainty |
 //! | [`align`] | rigid registration: of pairs, of features, of surfaces |
 //! | [`compare`] | deviation from the true part, discrepancy of scan and touch, as numbers and as a picture |
 //! | [`calibrate`] | payload and tip calibration, registration of the scan |
-//! | [`explore`] | next-touch planning |
-//! | [`robot`] | an arm that holds a probe: kinematics, limits, onset of a contact |
-//! | [`probe`] | from a flag to a feature with an arm |
+//! | [`probing::plan`] | next-touch planning |
+//! | [`probing::arm`] | an arm that holds a probe: kinematics, limits, onset of a contact |
+//! | [`probing::execute`] | from a flag to a feature with an arm |
 //!
 //! # Frames
 //!
@@ -37,13 +37,11 @@
 pub mod align;
 pub mod calibrate;
 pub mod compare;
-pub mod explore;
 pub mod features;
+pub mod haptic;
 pub mod mesh;
 pub mod numeric;
 pub mod parameters;
-pub mod patch;
-pub mod probe;
-pub mod refine;
-pub mod robot;
-pub mod touch;
+pub mod probing;
+pub mod reconstruct;
+pub mod stylus;

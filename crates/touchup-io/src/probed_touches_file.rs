@@ -7,8 +7,8 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::atomic::write_atomically;
-use touchup_core::probe::{Probed, ProbedTouch};
-use touchup_core::robot::TouchOutcome;
+use touchup_core::probing::arm::TouchOutcome;
+use touchup_core::probing::execute::{Probed, ProbedTouch};
 
 /// One line; lengths in mm of O, travel along the approach.
 #[derive(Debug, Serialize)]
@@ -54,7 +54,7 @@ impl<'a> TouchLine<'a> {
             TouchOutcome::Contact { onset, .. } => Some(onset.sigma),
             _ => None,
         });
-        let moment = |m: &touchup_core::robot::TouchMoment| [m.t, m.travel * 1e3, m.force, m.lateral];
+        let moment = |m: &touchup_core::probing::arm::TouchMoment| [m.t, m.travel * 1e3, m.force, m.lateral];
         Self {
             flag,
             index,

@@ -8,7 +8,7 @@ use std::path::Path;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::table::{Row, TableError, read_table};
-use touchup_core::touch::Wrench;
+use touchup_core::stylus::Wrench;
 
 const COLUMNS: [&str; 10] = ["qx", "qy", "qz", "qw", "fx_n", "fy_n", "fz_n", "tx_nm", "ty_nm", "tz_nm"];
 /// A quaternion may be off from 1 by this: components printed with three digits.

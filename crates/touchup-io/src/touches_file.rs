@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Point3, Vector3};
 
 use super::atomic::write_atomically;
-use touchup_core::touch::ProbedPoint;
+use touchup_core::stylus::ProbedPoint;
 
 /// The first line of a file of touches.
 ///

@@ -7,7 +7,7 @@ use std::time::{Instant, SystemTime};
 use chrono::{DateTime, Utc};
 use clap::{Parser, ValueEnum};
 
-use touchup_core::touch::SettingError;
+use touchup_core::stylus::SettingError;
 use touchup_io::atomic::{create_folder, write_atomically};
 use touchup_io::machine::{COMMIT, VERSION, describe_machine};
 use touchup_io::mesh_file::{MeshFileError, MeshUnit, read_mesh};

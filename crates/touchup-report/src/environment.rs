@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use touchup_core::refine::RefineError;
+use touchup_core::haptic::RefineError;
 use touchup_io::atomic::AtomicFile;
 use touchup_report::Effort;
 use touchup_report::peers::{PACKAGES, Peers, PeersAtSize, PeersInput, SCRIPT, UnknownLine};

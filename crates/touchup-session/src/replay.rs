@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::path::Path;
 
-use touchup_core::touch::{
+use touchup_core::stylus::{
     MarkerCounts, MarkerFilter, Message, Placement, Sample, SettingError, SyncParams, Synchroniser, WrenchFrame,
 };
 use touchup_io::recording::{Record, RecordingError, RecordingReader, Topics};

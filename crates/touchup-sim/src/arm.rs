@@ -15,8 +15,8 @@ use super::ball::push_ball;
 use super::drift::gauss;
 use super::error::{SimError, not_negative, positive, up_to};
 use super::surface::Surface;
-use touchup_core::robot::{Arm, ArmError, ArmState, Command, Joints, Safety, UrGeometry};
-use touchup_core::touch::{Payload, Wrench};
+use touchup_core::probing::arm::{Arm, ArmError, ArmState, Command, Joints, Safety, UrGeometry};
+use touchup_core::stylus::{Payload, Wrench};
 
 /// The arm, how it is mounted, and what is not ideal about it.
 #[derive(Clone, Copy, Debug, PartialEq)]

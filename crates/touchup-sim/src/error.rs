@@ -28,7 +28,7 @@ pub enum SimError {
     OutOfReach,
     /// A tip that cannot be.
     #[error(transparent)]
-    Tip(#[from] touchup_core::touch::SettingError),
+    Tip(#[from] touchup_core::stylus::SettingError),
     /// The path is empty.
     #[error("the path has no point: give at least one stroke with two points")]
     EmptyPath,

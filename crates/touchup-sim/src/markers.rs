@@ -8,7 +8,7 @@ use rand_pcg::Pcg64;
 use super::drift::gauss;
 use super::error::{SimError, positive, up_to};
 use super::stylus::{Moment, TICK};
-use touchup_core::touch::{MarkerBody, MarkerFrame, SeenMarker};
+use touchup_core::stylus::{MarkerBody, MarkerFrame, SeenMarker};
 
 /// The camera and how badly it sees.
 #[derive(Clone, Debug, PartialEq)]

@@ -10,7 +10,7 @@ use rand_pcg::Pcg64;
 use super::drift::{Drift, gauss};
 use super::error::{SimError, not_negative, up_to};
 use super::stylus::{Moment, TICK};
-use touchup_core::touch::{Message, StampedPose, StampedWrench, Wrench};
+use touchup_core::stylus::{Message, StampedPose, StampedWrench, Wrench};
 
 /// Errors of sensors and transport. All noise is root mean square.
 #[derive(Clone, Copy, Debug, PartialEq)]

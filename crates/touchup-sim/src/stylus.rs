@@ -16,7 +16,7 @@ use super::path::Stroke;
 use super::sensor::{Sensor, SensorParams};
 use super::surface::Surface;
 use super::tip::SimTip;
-use touchup_core::touch::{Message, TipShape};
+use touchup_core::stylus::{Message, TipShape};
 
 /// The stylus and the hand that leads it.
 #[derive(Clone, Copy, Debug, PartialEq)]

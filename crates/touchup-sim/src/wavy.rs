@@ -4,7 +4,7 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use touchup_core::mesh::{MeshError, TriMesh};
-use touchup_core::touch::{Sample, Wrench};
+use touchup_core::stylus::{Sample, Wrench};
 
 /// Side of the plate where none is said, m.
 pub const SIDE: f64 = 0.3;

@@ -20,7 +20,7 @@ use crate::io::atomic::write_atomically;
 use crate::io::recording::Topics;
 use crate::replay::{Recording, Replayed, each_sample, marker_filter};
 use crate::scene::{Scene, Setting};
-use crate::touch::{Placement, Sample};
+use crate::stylus::{Placement, Sample};
 
 #[derive(Debug, Subcommand)]
 pub(super) enum CalibrateArguments {

@@ -14,7 +14,7 @@ use super::{CalibrationRecording, CalibrationTarget, Change, DraftScene, Vector,
 use crate::calibrate::{PayloadFit, PayloadParams, StaticPose, StillFinder, StillParams, fit_payload};
 use crate::io::static_poses::read_static_poses;
 use crate::scene::{GravityAxes, PayloadSection, Scene, Setting};
-use crate::touch::{Payload, SensorBias, WrenchFrame};
+use crate::stylus::{Payload, SensorBias, WrenchFrame};
 
 #[derive(Debug, Args)]
 #[group(id = "poses", required = true, multiple = false, args = ["bag", "samples", "robot"])]

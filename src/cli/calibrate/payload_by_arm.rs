@@ -15,7 +15,7 @@ use super::super::{CliError, Losses};
 use super::payload::{PayloadArguments, PayloadFound, warn_of_residuals};
 use super::{Change, DraftScene, NO_SCENE, rounded};
 use crate::calibrate::{PayloadError, PayloadParams, StaticPose, fit_payload};
-use crate::probe::{NotReached, Prober, Weighed, WeighedRest};
+use crate::probing::execute::{NotReached, Prober, Weighed, WeighedRest};
 use crate::scene::Setting;
 
 /// The verb.

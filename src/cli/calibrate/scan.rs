@@ -14,7 +14,7 @@ use crate::align::{PairsFit, PairsParams, PointPair, fit_pairs};
 use crate::calibrate::{RestFinder, RestParams};
 use crate::io::pairs_file::{PairsFile, read_pairs, read_scan_points};
 use crate::scene::{GravityAxes, ScanToSpaceSection, Scene, Setting};
-use crate::touch::{ContactEstimator, ContactEstimatorParams};
+use crate::stylus::{ContactEstimator, ContactEstimatorParams};
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct ScanArguments {

@@ -9,7 +9,7 @@ use super::super::arm::ArmArguments;
 use super::super::check::repeated;
 use super::super::{CliError, Losses};
 use super::{CalibrationTarget, Change, NO_SCENE, rounded};
-use crate::probe::Repeatability;
+use crate::probing::execute::Repeatability;
 use crate::scene::Setting;
 
 #[derive(Debug, Args)]

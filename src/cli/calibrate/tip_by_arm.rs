@@ -12,7 +12,7 @@ use super::super::{CliError, Losses};
 use super::tip::TipArguments;
 use super::{Change, DraftScene, NO_SCENE, Vector, rounded};
 use crate::calibrate::{Known, PlaneTipFit, fit_tip_by_plane};
-use crate::probe::{Cell, NotReached, Pivoted, Prober};
+use crate::probing::execute::{Cell, NotReached, Pivoted, Prober};
 use crate::scene::Setting;
 use crate::sim::ArmParams;
 

@@ -20,8 +20,8 @@ use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
 use crate::io::probed_touches_file::write_probed_touches;
 use crate::io::recording::{Topics, write_recording};
 use crate::mesh::{FaceTree, TriMesh};
-use crate::probe::{Cell, Ending, Flag, Plan, ProbeParams, Probed, Prober, StillWorld, plan};
-use crate::robot::Arm;
+use crate::probing::arm::Arm;
+use crate::probing::execute::{Cell, Ending, Flag, Plan, ProbeParams, Probed, Prober, StillWorld, plan};
 #[cfg(feature = "ur")]
 use crate::scene::RobotSection;
 use crate::scene::{Scene, simulated_arm};

@@ -8,7 +8,7 @@ use crate::cli::CliError;
 use crate::compare::{DrawnMesh, PicturePanel, PictureParams, Rgb, draw_picture};
 use crate::io::png::write_png;
 use crate::mesh::TriMesh;
-use crate::probe::{Flag, Plan, Probed};
+use crate::probing::execute::{Flag, Plan, Probed};
 
 const PART: Rgb = [206, 209, 214];
 const FLAG: Rgb = [20, 20, 20];

@@ -11,7 +11,7 @@ use crate::cli::refine::RefineSummary;
 use crate::features::Kind;
 use crate::io::atomic::write_atomically;
 use crate::io::features_file::FeatureRecord;
-use crate::probe::{Ending, Flag, Probed, ProbedSlide};
+use crate::probing::execute::{Ending, Flag, Probed, ProbedSlide};
 
 /// `probed.json`
 #[derive(Debug, Serialize)]

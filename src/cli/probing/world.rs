@@ -8,10 +8,10 @@ use crate::cli::CliError;
 use crate::cli::progress::WorkProgress as Bar;
 use crate::live::{Engine, Gate, LiveError, Pace, Renewal};
 use crate::mesh::{FaceHit, FaceTree, TriMesh};
-use crate::probe::{Cell, Progress, World};
-use crate::robot::{ArmState, Witness};
+use crate::probing::arm::{ArmState, Witness};
+use crate::probing::execute::{Cell, Progress, World};
 use crate::scene::Scene;
-use crate::touch::{Message, Sample, StampedPose, StampedWrench, Wrench, WrenchFrame};
+use crate::stylus::{Message, Sample, StampedPose, StampedWrench, Wrench, WrenchFrame};
 
 /// Room reserved for new faces.
 const ROOM: usize = 1 << 16;

@@ -18,7 +18,7 @@ use super::replica::{MeshVersion, Snapshot};
 use super::session::NodeSession;
 use super::setup::Setup;
 use crate::io::session_folder::SessionFolder;
-use crate::patch::Patcher;
+use crate::reconstruct::Patcher;
 use crate::ros::messages::{
     FlagFeatureRequest, FlagFeatureResponse, PointStamped, ProbeResult, ResyncMeshResponse, SaveMeshRequest,
     SaveMeshResponse, SetBoolResponse, TriggerResponse, UndoRequest, UndoResponse,
@@ -96,7 +96,7 @@ impl RefinementWorker {
         };
         let frame = self.resolver.object_from(&clicked.header.frame_id, stamp_ns).map_err(|why| why.to_string())?;
         let point = frame * Point3::new(clicked.point.x, clicked.point.y, clicked.point.z);
-        let is_sound = point.coords.iter().all(|x| x.abs() <= crate::touch::LARGEST_POSITION);
+        let is_sound = point.coords.iter().all(|x| x.abs() <= crate::stylus::LARGEST_POSITION);
         is_sound.then_some(point).ok_or_else(|| "the point is not finite, or absurdly far".to_owned())
     }
 

@@ -8,9 +8,9 @@ use nalgebra::Point3;
 
 use super::edits::Edits;
 use super::replica::MeshVersion;
-use crate::explore::NextTouch;
 use crate::features::{Feature, Kind};
 use crate::live::TouchDelta;
+use crate::probing::plan::NextTouch;
 use crate::ros::messages::{
     DetectFeaturesRequest, DetectFeaturesResponse, DiagnosticArray, FeatureArray, FlagFeatureResponse, HapticMismatch,
     UnflagFeatureResponse,

@@ -6,7 +6,7 @@ use crate::ros::messages::{
     Header, Point, Pose, PoseStamped, Quaternion as QuaternionMsg, Time, Transform, Vector3 as Vector3Msg,
     Wrench as WrenchMsg, WrenchStamped,
 };
-use crate::touch::{StampedPose, StampedWrench, Wrench, measured_rotation};
+use crate::stylus::{StampedPose, StampedWrench, Wrench, measured_rotation};
 
 const NS_PER_S: i64 = 1_000_000_000;
 

@@ -7,7 +7,7 @@ use nalgebra::Point3;
 
 use crate::live::Engine;
 use crate::mesh::{Changes, FaceId, TriMesh, VertexId};
-use crate::patch::Support;
+use crate::reconstruct::Support;
 
 /// Vertices, and faces, that go at once: some 50 µs.
 const AT_ONCE: usize = 1000;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::error::NodeError;
 use super::setup::Setup;
 use crate::live::{Engine, Gate, Pace, Renewal};
-use crate::touch::WrenchFrame;
+use crate::stylus::WrenchFrame;
 
 /// Room for new faces that is made ahead.
 const ROOM: usize = 1 << 18;

@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
+use crate::haptic::RefineError;
 use crate::io::mesh_file::MeshFileError;
 use crate::live::LiveError;
-use crate::refine::RefineError;
 use crate::scene::SceneError;
 use crate::session::{OutcomeError, SessionError};
-use crate::touch::SettingError;
+use crate::stylus::SettingError;
 
 /// Why the node does not start, or its session was not kept.
 #[derive(Debug, thiserror::Error)]

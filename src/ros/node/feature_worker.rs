@@ -12,14 +12,14 @@ use super::convert::header;
 use super::feature_messages::{self, KIND_NAMES, flagged, found};
 use super::shared::Shared;
 use crate::clock::Clock;
-use crate::explore::{NextTouch, next_by_hand};
 use crate::features::{Feature, Tracker};
 use crate::mesh::{FaceTree, MeshError};
+use crate::probing::plan::{NextTouch, next_by_hand};
 use crate::ros::messages::{
     DetectFeaturesRequest, DetectFeaturesResponse, Feature as FeatureMsg, FeatureArray, FlagFeatureResponse,
     UnflagFeatureResponse,
 };
-use crate::touch::ProbedPoint;
+use crate::stylus::ProbedPoint;
 
 /// The mesh is looked at again when it has not changed for so long …
 const QUIET: Duration = Duration::from_secs(1);

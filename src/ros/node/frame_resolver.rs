@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, UnitQuaternion};
 use super::convert::{isometry, stamp_ns, vector_of};
 use super::frames::{FrameBuffer, FrameError, plain_name};
 use crate::ros::messages::{PoseStamped, WrenchStamped};
-use crate::touch::{Message, Placement, StampedPose, StampedWrench, Wrench, WrenchFrame};
+use crate::stylus::{Message, Placement, StampedPose, StampedWrench, Wrench, WrenchFrame};
 
 /// Frame of the poses where the scene says where the scan lies in it.
 pub const CELL: &str = "cell";

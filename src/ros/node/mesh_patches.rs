@@ -6,7 +6,7 @@ use super::convert::header;
 use super::edits::Edits;
 use super::replica::MeshVersion;
 use crate::mesh::IdSet;
-use crate::patch::Support;
+use crate::reconstruct::Support;
 use crate::ros::messages::MeshPatch;
 
 /// Vertices and faces of one message at most: 37 kB.

@@ -9,7 +9,7 @@ use super::channels::{FeatureInput, LastTip, ViewInput};
 use super::convert::{NO_VECTOR, header, point, vector};
 use super::edits::Edits;
 use super::refinement::RefinementWorker;
-use crate::refine::{Case, Update};
+use crate::haptic::{Case, Update};
 use crate::ros::messages::HapticMismatch;
 
 /// The distance at the tip is looked up so often.

@@ -18,11 +18,11 @@ use super::session::{Counters, NodeEnd, NodeSession};
 use super::setup::Setup;
 use super::side_work::SideWork;
 use super::streams::{Epoch, StreamWatch};
+use crate::haptic::RefineError;
 use crate::live::{Latencies, LiveError, TouchDelta};
-use crate::refine::RefineError;
 use crate::ros::messages::{PoseStamped, TFMessage, WrenchStamped};
 use crate::ros::port::{Arrival, Endpoint, Port};
-use crate::touch::{Message, Sample, SyncCounts, Synchroniser, WrenchFrame};
+use crate::stylus::{Message, Sample, SyncCounts, Synchroniser, WrenchFrame};
 
 /// The loop looks at the streams so often when nothing comes.
 const IDLE: Duration = Duration::from_millis(10);

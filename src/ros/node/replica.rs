@@ -10,7 +10,7 @@ use nalgebra::Point3;
 use super::edits::Edits;
 use crate::clock::{Clock, Working};
 use crate::mesh::{MeshError, TriMesh, VertexId};
-use crate::patch::Support;
+use crate::reconstruct::Support;
 
 /// Corners of a face that is not there.
 const NO_FACE: [u32; 3] = [u32::MAX; 3];

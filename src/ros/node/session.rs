@@ -13,10 +13,10 @@ use super::setup::Setup;
 use crate::io::session_folder::SessionFolder;
 use crate::live::{Engine, Quantiles};
 use crate::mesh::TriMesh;
-use crate::patch::Patcher;
+use crate::reconstruct::Patcher;
 use crate::ros::port::Port;
 use crate::session::{Outcome, OutcomePlaces, SessionRecord, SessionRecorder, Unrecorded};
-use crate::touch::WrenchFrame;
+use crate::stylus::WrenchFrame;
 
 /// What was refused and lost, and how long things took.
 #[derive(Debug, Default)]

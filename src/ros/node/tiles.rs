@@ -8,7 +8,7 @@ use nalgebra::{Point3, Vector3};
 use super::convert::{header, point};
 use super::edits::FACES_OF_A_TILE;
 use super::replica::MeshVersion;
-use crate::patch::Support;
+use crate::reconstruct::Support;
 use crate::ros::messages::{ColorRGBA, Marker, Vector3 as Vector3Msg};
 
 /// A tile is sent once more when it has not changed for so long: a network that was away for less has kept nothing from anybody.

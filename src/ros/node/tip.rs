@@ -5,7 +5,7 @@ use nalgebra::Point3;
 use super::channels::{LastTip, NextTouches};
 use super::convert::{header, point};
 use super::feature_messages::{LETTERS, label};
-use crate::explore::NextTouch;
+use crate::probing::plan::NextTouch;
 use crate::ros::messages::{ColorRGBA, Feature, FeatureArray, Marker, MarkerArray, Pose, Vector3};
 
 /// Farther from a feature than this nobody asks for it, m.

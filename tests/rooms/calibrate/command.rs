@@ -11,7 +11,7 @@ use serde_json::Value;
 use touchup::io::mesh_file::{MeshUnit, read_mesh, write_mesh};
 use touchup::io::recording::{Record, RecordingReader, Topics, write_recording};
 use touchup::mesh::TriMesh;
-use touchup::touch::{MarkerFrame, Message, SeenMarker, StampedPose, StampedWrench, SyncParams, Synchroniser, Wrench};
+use touchup::stylus::{MarkerFrame, Message, SeenMarker, StampedPose, StampedWrench, SyncParams, Synchroniser, Wrench};
 
 const DEFAULT_YAML: &str = include_str!("../../../config/default.yaml");
 

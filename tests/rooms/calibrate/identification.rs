@@ -10,7 +10,7 @@ use touchup::calibrate::{
     Known, PayloadError, PayloadParams, StaticPose, StillFinder, StillParams, TipError, TipFitParams, fit_payload,
     fit_tip,
 };
-use touchup::touch::{Sample, Wrench, WrenchFrame};
+use touchup::stylus::{Sample, Wrench, WrenchFrame};
 
 fn normal(rng: &mut Pcg64Mcg, sigma: f64) -> Vector3<f64> {
     let normal = Normal::new(0.0, sigma).unwrap();

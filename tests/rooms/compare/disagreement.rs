@@ -9,7 +9,7 @@ use touchup::io::mesh_file::{MeshUnit, read_mesh, write_mesh};
 use touchup::io::recording::{Topics, write_recording};
 use touchup::mesh::{TriMesh, VertexId, repair};
 use touchup::sim::{MeshSurface, PathParams, Plate, ScannerParams, StylusParams, plan_mesh, scan, touch};
-use touchup::touch::Message;
+use touchup::stylus::Message;
 
 use crate::full::either;
 

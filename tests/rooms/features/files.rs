@@ -9,7 +9,7 @@ use touchup::io::features_file::{FeatureFile, FeaturesFileError, read_features, 
 use touchup::io::touches_file::{HEADER, TouchesFileError, as_written, read_touches, write_touches};
 use touchup::mesh::FaceTree;
 use touchup::sim::Plate;
-use touchup::touch::ProbedPoint;
+use touchup::stylus::ProbedPoint;
 
 fn point() -> impl Strategy<Value = Point3<f64>> {
     prop::array::uniform3(-1.0..1.0f64).prop_map(Point3::from)

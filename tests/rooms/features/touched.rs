@@ -6,7 +6,7 @@
 use nalgebra::Vector3;
 use touchup::features::{Feature, FittedTo, Kind, Measured, detect};
 use touchup::mesh::FaceTree;
-use touchup::patch::{CalibrationParams, Patcher, PatcherParams};
+use touchup::reconstruct::{CalibrationParams, Patcher, PatcherParams};
 use touchup::sim::{Plate, StylusParams, TruthFeature, TruthShape};
 
 use crate::full::either;

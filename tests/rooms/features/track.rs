@@ -3,16 +3,16 @@
 use crate::plate_stream::{contacts_of, plate_stream};
 use touchup::features::{Feature, FittedTo, Kind, Tracker};
 use touchup::mesh::{FaceTree, TriMesh};
-use touchup::patch::{Patcher, PatcherParams};
+use touchup::reconstruct::{Patcher, PatcherParams};
 use touchup::sim::StylusParams;
-use touchup::touch::ProbedPoint;
+use touchup::stylus::ProbedPoint;
 
 /// The demo's plate after all touches, and the touches.
 fn touched_plate(seed: u64) -> (TriMesh, Vec<ProbedPoint>) {
     let stylus = StylusParams::default();
     let (stream, _) = plate_stream(&stylus, seed);
     let mut params = PatcherParams::new(stylus.radius, Some(stylus.stiffness), stream.noise);
-    params.uncertainty = Some(touchup::patch::UncertaintyParams::new(stream.noise));
+    params.uncertainty = Some(touchup::reconstruct::UncertaintyParams::new(stream.noise));
     let mut patcher = Patcher::new(params).unwrap();
     let contacts = contacts_of(stylus.radius, Some(stylus.stiffness), &stream.samples);
     contacts.iter().for_each(|contact| patcher.push(contact));

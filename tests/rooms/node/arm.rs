@@ -9,7 +9,7 @@ use nalgebra::Isometry3;
 use tempfile::TempDir;
 use touchup::clock::{Clock, ManualClock};
 use touchup::io::mesh_file::{MeshUnit, write_mesh};
-use touchup::robot::{Arm, ArmError, ArmState, Command, Safety};
+use touchup::probing::arm::{Arm, ArmError, ArmState, Command, Safety};
 use touchup::ros::in_process::{OtherParticipants, start};
 use touchup::ros::messages::{
     Feature, FlagFeatureRequest, Header, Point, PointStamped, ProbeFeatureRequest, ProbeGoal, ProbeResponse,

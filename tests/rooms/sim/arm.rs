@@ -1,7 +1,7 @@
 //! The simulated arm against the laws that it is made by.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
-use touchup::robot::{Arm, Command};
+use touchup::probing::arm::{Arm, Command};
 use touchup::sim::{ArmParams, Plate, SimArm};
 
 /// Where the top of the plate is flat for 20 mm, and how high it is, m.

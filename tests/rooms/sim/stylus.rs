@@ -5,7 +5,7 @@ use touchup::sim::{
     Lines, Moment, PathParams, RasterRegion, SensorParams, Stroke, StylusParams, Touch, plan_demo, plan_mesh,
     push_ball, raster, touch,
 };
-use touchup::touch::{Message, StampedPose, StampedWrench};
+use touchup::stylus::{Message, StampedPose, StampedWrench};
 
 fn demo_touch(params: &StylusParams, seed: u64) -> Touch {
     let plate = Plate::default();

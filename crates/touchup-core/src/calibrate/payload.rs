@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::StaticPose;
 use super::fit::{CalibrationFit, Equation, Undetermined, fit, least_seen};
-use crate::touch::{Payload, Wrench, WrenchFrame};
+use crate::stylus::{Payload, Wrench, WrenchFrame};
 
 /// Settings of [`fit_payload`].
 #[derive(Clone, Copy, Debug, PartialEq)]

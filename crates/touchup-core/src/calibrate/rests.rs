@@ -6,7 +6,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::touch::ContactSample;
+use crate::stylus::ContactSample;
 
 /// Settings of a [`RestFinder`].
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,7 +5,7 @@
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-use crate::touch::{Sample, Wrench};
+use crate::stylus::{Sample, Wrench};
 
 /// A stylus at rest: means over a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -122,7 +122,7 @@ impl Block {
 /// # Example
 /// ```
 /// # use touchup_core::calibrate::{StillFinder, StillParams};
-/// # use touchup_core::touch::{Sample, Wrench};
+/// # use touchup_core::stylus::{Sample, Wrench};
 /// # use nalgebra::Isometry3;
 /// let mut finder = StillFinder::new(StillParams::default());
 /// for ms in 0..1000 {

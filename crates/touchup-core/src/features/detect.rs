@@ -15,7 +15,7 @@ use super::scene::Parted;
 use super::slots::{Slot, slots};
 use super::walls::Wall;
 use crate::mesh::{FaceTree, TriMesh};
-use crate::touch::ProbedPoint;
+use crate::stylus::ProbedPoint;
 
 /// What was found on a mesh.
 #[derive(Clone, Debug)]
@@ -33,7 +33,7 @@ const LEAST_PLANE: f64 = 1e-3;
 
 /// Finds the features of a mesh, measured by touches where there are any.
 ///
-/// - `touches`: as [`crate::patch::Patcher::probed`] has them; features name them by their place in it.
+/// - `touches`: as [`crate::reconstruct::Patcher::probed`] has them; features name them by their place in it.
 pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detection {
     let mut parted = Parted::of(mesh, tree);
     let beside: Vec<_> = borders(&parted, &without_seams(&parted)).into_keys().collect();

@@ -11,7 +11,7 @@ use super::scene::Parted;
 use super::segment::Segmentation;
 use crate::mesh::{FaceId, TriMesh, VertexId};
 use crate::numeric::{PointGrid, VoxelKey, voxel_of};
-use crate::touch::ProbedPoint;
+use crate::stylus::ProbedPoint;
 
 /// The touches on a parted mesh.
 pub(super) struct Observed<'a> {

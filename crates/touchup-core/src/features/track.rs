@@ -10,7 +10,7 @@ use super::feature::{Feature, FittedTo, Kind, Measured, SizedSurface};
 use super::fit::{self, Cylinder, Fit, FitParams, Freedom, Stadium, Surface, fit};
 use super::observe::{groups, observation};
 use crate::mesh::{FaceTree, TriMesh};
-use crate::touch::ProbedPoint;
+use crate::stylus::ProbedPoint;
 
 /// Follows the features of one part.
 #[derive(Clone, Debug, Default)]

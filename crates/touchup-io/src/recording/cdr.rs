@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::{BadMessage, RecordingError, ZSTD_MAGIC};
-use touchup_core::touch::{StampedPose, StampedWrench, Wrench, measured_rotation};
+use touchup_core::stylus::{StampedPose, StampedWrench, Wrench, measured_rotation};
 
 /// Longest payload of a pose or wrench: 84 bytes of numbers and a frame name; more than this is no such message.
 pub(super) const MAX_MESSAGE_BYTES: usize = 64 * 1024;

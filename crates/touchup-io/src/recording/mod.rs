@@ -2,7 +2,7 @@
 //! (`geometry_msgs/msg/WrenchStamped`), or in place of the poses the markers on the stylus
 //! (`sensor_msgs/msg/PointCloud2`), read from MCAP and rosbag2 SQLite files, written as MCAP.
 //!
-//! Both deal in [`touchup_core::touch::Message`]s, stamped as the message headers are. [`RecordingReader`] streams: its memory
+//! Both deal in [`touchup_core::stylus::Message`]s, stamped as the message headers are. [`RecordingReader`] streams: its memory
 //! does not grow with the recording, and no length found in a file is believed before it is checked.
 //! [`RecordingWriter`] makes a file that rosbag2, Foxglove and the Python readers open; [`write_recording`] puts one
 //! under its final name only when it is whole, [`SegmentedWriter`] writes one that grows, in pieces that a crash leaves whole.
@@ -25,7 +25,7 @@ pub use writer::{RecordingWriter, write_recording};
 /// What a zstd frame begins with: a file compressed as a whole, or a message (CDR begins with 0).
 const ZSTD_MAGIC: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
 
-use touchup_core::touch::{MarkerFrame, Message};
+use touchup_core::stylus::{MarkerFrame, Message};
 
 /// One entry of a recording.
 #[derive(Clone, Debug, PartialEq)]

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::cdr::{HeaderMsg, decode, encode};
 use super::{BadMessage, RecordingError};
-use touchup_core::touch::{MarkerFrame, SeenMarker};
+use touchup_core::stylus::{MarkerFrame, SeenMarker};
 
 /// The message definition, and that of the type it uses.
 pub(super) const POINT_CLOUD: &str = "std_msgs/Header header\nuint32 height\nuint32 width\n\
@@ -90,7 +90,7 @@ fn size_of_type(datatype: u8) -> Option<usize> {
     [1, 1, 2, 2, 4, 4, 4, 8].get(usize::from(datatype).checked_sub(1)?).copied()
 }
 
-/// Reads a cloud of markers: frame and markers, of which the first [`touchup_core::touch::MOST_MARKERS`] that are there count.
+/// Reads a cloud of markers: frame and markers, of which the first [`touchup_core::stylus::MOST_MARKERS`] that are there count.
 pub(super) fn decode_markers(payload: &[u8]) -> Result<(Cow<'_, str>, MarkerFrame), BadMessage> {
     let msg: PointCloud2Msg = decode(payload)?;
     let mut frame = MarkerFrame::new(msg.header.stamp_ns()?);

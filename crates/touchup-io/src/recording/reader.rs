@@ -16,7 +16,7 @@ use super::mcap::{self, McapReader};
 use super::point_cloud::decode_markers;
 use super::segments::segments_of;
 use super::{BadMessage, RawMessage, Record, RecordingError, TopicInfo, TopicKind, Topics, ZSTD_MAGIC};
-use touchup_core::touch::Message;
+use touchup_core::stylus::Message;
 
 const ROS1_MAGIC: &[u8] = b"#ROSBAG V";
 /// Longest `metadata.yaml`: thousands of files and topics.
@@ -34,7 +34,7 @@ const MAX_METADATA_BYTES: u64 = 16 << 20;
 ///
 /// ```no_run
 /// use touchup_io::recording::{RecordingReader, Topics};
-/// use touchup_core::touch::Message;
+/// use touchup_core::stylus::Message;
 /// let mut reader = RecordingReader::open("touch.mcap".as_ref(), &Topics::default())?;
 /// let poses = reader.by_ref().filter(|message| matches!(message, Ok(Message::Pose(_)))).count();
 /// println!("{poses} poses in {:?}", reader.pose_frame());

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use super::{RecordingError, RecordingWriter, TopicKind, Topics};
 use crate::atomic::write_atomically;
-use touchup_core::touch::Message;
+use touchup_core::stylus::Message;
 
 /// Messages of one file: a quarter of an hour of a stylus, 60 MB.
 const MOST_IN_A_SEGMENT: u64 = 1_000_000;

@@ -12,7 +12,7 @@ use super::cdr::{encode_pose, encode_wrench};
 use super::point_cloud::{POINT_CLOUD, POINT_FIELD, encode_markers};
 use super::{Record, RecordingError, TopicKind, Topics};
 use crate::atomic::AtomicFile;
-use touchup_core::touch::Message;
+use touchup_core::stylus::Message;
 
 /// Message definitions in the form rosbag2 stores: the type, then each type it uses behind a line of 80 equals signs.
 const RULE: &str = "================================================================================";

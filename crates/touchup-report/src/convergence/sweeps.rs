@@ -3,9 +3,9 @@
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 
 use super::errors::MeshErrors;
+use touchup_core::haptic::{GuardParams, RefineError, RefineParams, Refiner, TipParams};
 use touchup_core::mesh::TriMesh;
-use touchup_core::refine::{GuardParams, RefineError, RefineParams, Refiner, TipParams};
-use touchup_core::touch::{Sample, Wrench};
+use touchup_core::stylus::{Sample, Wrench};
 use touchup_sim::coupled::GuidedStylus;
 use touchup_sim::{
     Lines, Moment, PathParams, Peaks, RasterRegion, SensorParams, SimError, StylusParams, Surface, add_vertex_noise,

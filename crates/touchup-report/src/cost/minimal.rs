@@ -3,7 +3,7 @@
 use nalgebra::Point3;
 
 use touchup_core::mesh::{FaceId, FaceTree, Nearby, RefitPlan, TriMesh, VertexId};
-use touchup_core::touch::Sample;
+use touchup_core::stylus::Sample;
 use touchup_sim::wavy::{FORCE, RADIUS, STIFFNESS};
 
 /// Share of the mismatch that goes in a second, 1/s: as in the refiner.

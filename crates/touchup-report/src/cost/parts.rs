@@ -6,7 +6,7 @@ use super::CostError;
 use super::sizes::{pushing, refiner_of, samples_on, side_of};
 use super::turns::{PerSample, TimedCase, Timing, difference, in_turns};
 use crate::Spread;
-use touchup_core::refine::Refiner;
+use touchup_core::haptic::Refiner;
 use touchup_session::scene::Scene;
 use touchup_sim::wavy::plate;
 

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::sizes::{refiner_of, samples_on};
 use super::{BAREST, CostError};
 use crate::Spread;
-use touchup_core::touch::{Message, Sample, StampedPose, StampedWrench, SyncParams, Synchroniser};
+use touchup_core::stylus::{Message, Sample, StampedPose, StampedWrench, SyncParams, Synchroniser};
 use touchup_io::recording::{Record, RecordingReader, Topics, write_recording};
 use touchup_session::scene::Scene;
 use touchup_sim::wavy::plate;

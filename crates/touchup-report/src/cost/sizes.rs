@@ -7,9 +7,9 @@ use super::minimal::MinimalLoop;
 use super::turns::{PerSample, TimedCase, Timing, in_turns, ratio};
 use super::{BAREST, CostError};
 use crate::Spread;
+use touchup_core::haptic::Refiner;
 use touchup_core::mesh::{FaceTree, TriMesh};
-use touchup_core::refine::Refiner;
-use touchup_core::touch::{Sample, WrenchFrame};
+use touchup_core::stylus::{Sample, WrenchFrame};
 use touchup_session::scene::Scene;
 use touchup_sim::wavy::{SIDE, plate, slide_on};
 

@@ -13,10 +13,10 @@ use super::sizes::{samples_on, side_of};
 use super::turns::{PerSample, TimedCase, Timing, in_turns};
 use crate::Spread;
 use touchup_core::features::detect;
+use touchup_core::haptic::{FaceDynamics, FaceState};
 use touchup_core::mesh::{FaceId, FaceTree, Nearby, RefitPlan, TriMesh};
-use touchup_core::patch::Patcher;
-use touchup_core::refine::{FaceDynamics, FaceState};
-use touchup_core::touch::{
+use touchup_core::reconstruct::Patcher;
+use touchup_core::stylus::{
     BiasTracker, Compensator, ContactEstimator, ContactEstimatorParams, ContactGate, ContactSample, Message, Sample,
     StampedPose, StampedWrench, Synchroniser, Tip, TipMotion, TipParams, WrenchFrame,
 };
@@ -63,7 +63,7 @@ fn messages(sample: &Sample) -> [Message; 2] {
 /// The contact state of each sample.
 fn contacts_of(samples: &[Sample], tip: TipParams) -> Result<Vec<ContactSample>, CostError> {
     let mut estimator = ContactEstimator::new(ContactEstimatorParams::new(tip))?;
-    let observe = |sample| Ok(*estimator.observe(sample).map_err(touchup_core::refine::RefineError::from)?);
+    let observe = |sample| Ok(*estimator.observe(sample).map_err(touchup_core::haptic::RefineError::from)?);
     samples.iter().map(observe).collect()
 }
 
@@ -84,7 +84,7 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> Result<Vec<StageCost>
     let mut bias = BiasTracker::new(Default::default())?;
     let mut gate = ContactGate::new(scene.contact.unwrap_or_default())?;
     let mut motion = TipMotion::new(params.sliding.unwrap_or_default(), params.tip);
-    let dynamics = FaceDynamics::new(params.dynamics).map_err(touchup_core::refine::RefineError::from)?;
+    let dynamics = FaceDynamics::new(params.dynamics).map_err(touchup_core::haptic::RefineError::from)?;
     let mut writer = RecordingWriter::new(Cursor::new(Vec::new()), &Topics::default(), "object", "stylus")?;
     let mut patcher = Patcher::new(scene.patcher_params().ok_or(CostError::NothingMoves)?)?;
     let (mut last, mut nearby, mut moving) = (None, Nearby::default(), Moving::new(&mesh));
@@ -145,7 +145,7 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> Result<Vec<StageCost>
             for sample in &samples[block] {
                 let p = Point3::new(0.0, 0.0, -0.05e-3);
                 black_box(dynamics.step(black_box(&face), &p, &sample.wrench.force, 1e-3))
-                    .map_err(touchup_core::refine::RefineError::from)?;
+                    .map_err(touchup_core::haptic::RefineError::from)?;
             }
             Ok(())
         }),

@@ -3,9 +3,9 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::{CaseOutcome, Extreme, extreme};
+use touchup_core::haptic::{RefineError, RefineParams, Refiner, TipParams};
 use touchup_core::mesh::{MeshError, TriMesh};
-use touchup_core::refine::{RefineError, RefineParams, Refiner, TipParams};
-use touchup_core::touch::{Sample, SampleError, Wrench};
+use touchup_core::stylus::{Sample, SampleError, Wrench};
 
 /// Longest leg of a triangle, m.
 const EDGE: f64 = 2e-3;

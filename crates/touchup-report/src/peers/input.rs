@@ -6,8 +6,8 @@ use nalgebra::Point3;
 
 use super::TouchupTimes;
 use crate::{Effort, Spread};
+use touchup_core::haptic::{RefineError, RefineParams, Refiner, TipParams};
 use touchup_core::mesh::{FaceTree, MeshError, Nearby, TriMesh};
-use touchup_core::refine::{RefineError, RefineParams, Refiner, TipParams};
 use touchup_sim::wavy::{RADIUS, SIDE, STIFFNESS, contact_on, slide, wavy_plate};
 
 /// Farther than any query from the plate, m.

@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 use serde::Serialize;
 
 use super::integrators::{HeldSample, Integrator};
-use touchup_core::refine::{ContactModel, DynamicsParams};
+use touchup_core::haptic::{ContactModel, DynamicsParams};
 
 /// Samples held in each run.
 const STEPS: usize = 6;
@@ -76,7 +76,7 @@ fn log_uniform(rng: &mut Pcg64, decades: Decades) -> f64 {
 impl FaceRun {
     /// Draws the parameters of a run; `is_spring`: of the two contact models the linear one. A spring pulls a tip outside the
     /// face, and Eq 7 would turn the face away from the force there: with a spring the normal turns at a rate of its own, as
-    /// in [`touchup_core::refine::RefineParams::robust`].
+    /// in [`touchup_core::haptic::RefineParams::robust`].
     pub fn draw(rng: &mut Pcg64, is_spring: bool) -> Self {
         let (h_min, f_max) = (log_uniform(rng, H_MIN), log_uniform(rng, F_MAX));
         let model = if is_spring {

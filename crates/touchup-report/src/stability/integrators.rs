@@ -3,8 +3,8 @@
 use nalgebra::{Matrix4, Vector3, Vector4};
 use serde::Serialize;
 
-use touchup_core::refine::dynamics::{LARGEST_SHARE, turn};
-use touchup_core::refine::{ContactModel, DynamicsParams, FaceDynamics, FaceState, StepRule};
+use touchup_core::haptic::dynamics::{LARGEST_SHARE, turn};
+use touchup_core::haptic::{ContactModel, DynamicsParams, FaceDynamics, FaceState, StepRule};
 
 /// Most Newton iterations of the implicit step.
 const NEWTON_STEPS: usize = 50;
@@ -192,7 +192,7 @@ fn implicit_euler(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use touchup_core::refine::Along;
+    use touchup_core::haptic::Along;
 
     /// A spring from h = 1 mm to rest at 0 without force along n: dh/dt = −h/τ, whose solution and whose discrete steps are known.
     #[test]

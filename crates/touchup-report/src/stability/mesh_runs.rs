@@ -6,9 +6,9 @@ use rand_pcg::Pcg64;
 use serde::Serialize;
 
 use super::face_runs::RunEnding;
+use touchup_core::haptic::{RefineParams, Refiner, RegionFit, TipParams};
 use touchup_core::mesh::{FaceId, TriMesh, VertexId};
-use touchup_core::refine::{RefineParams, Refiner, RegionFit, TipParams};
-use touchup_core::touch::{Sample, Wrench};
+use touchup_core::stylus::{Sample, Wrench};
 
 /// Cells along each side of the sheet.
 const CELLS: u32 = 12;

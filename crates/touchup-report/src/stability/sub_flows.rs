@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 use serde::Serialize;
 
 use super::double_double::Double2;
-use touchup_core::refine::{Along, ContactModel, DynamicsParams, FaceDynamics, FaceState, StepRule};
+use touchup_core::haptic::{Along, ContactModel, DynamicsParams, FaceDynamics, FaceState, StepRule};
 
 /// Halvings of the bracket: from 1e9 to below a rounding of what is left.
 const BISECTIONS: usize = 140;

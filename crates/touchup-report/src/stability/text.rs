@@ -2,7 +2,7 @@
 
 use super::{FaceShares, LARGEST_SUB_FLOW_ERROR, MeshShares, RunEnding, ShareMap, Stability};
 use crate::{Axis, Chapter, Drawing, Figure, Panel, Table, TableCell};
-use touchup_core::refine::GuardParams;
+use touchup_core::haptic::GuardParams;
 
 /// What of the runs the maps show.
 const SHARE_OF: &str = "stable runs";

@@ -8,9 +8,9 @@ use super::WholeScanError;
 use super::contact_points::ContactSculptor;
 use super::gaussian::{GaussianParams, GaussianSurface};
 use super::part::Part;
+use touchup_core::haptic::{RefineParams, RoiSize, StepRule};
 use touchup_core::mesh::{FaceTree, TriMesh};
-use touchup_core::patch::PatcherParams;
-use touchup_core::refine::{RefineParams, RoiSize, StepRule};
+use touchup_core::reconstruct::PatcherParams;
 use touchup_session::live::{Engine, Renewal};
 
 /// Standard deviation of a contact point for the Gaussian process, m: that of a good tracking system.

@@ -28,7 +28,7 @@ use super::convergence::straight_line;
 use super::{Effort, Spread};
 use touchup_core::compare::CompareError;
 use touchup_core::mesh::{MeshError, TriMesh};
-use touchup_core::touch::SettingError;
+use touchup_core::stylus::SettingError;
 use touchup_session::live::LiveError;
 use touchup_sim::SimError;
 

@@ -5,9 +5,9 @@ use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use super::WholeScanError;
 use crate::Effort;
 use touchup_core::compare::TouchedRegion;
+use touchup_core::haptic::TipParams;
 use touchup_core::mesh::{FaceTree, TriMesh};
-use touchup_core::refine::TipParams;
-use touchup_core::touch::{
+use touchup_core::stylus::{
     CompensatorParams, ContactEstimator, ContactEstimatorParams, ContactGateParams, Sample, SyncParams, Synchroniser,
 };
 use touchup_sim::{

@@ -8,8 +8,8 @@ use serde::Serialize;
 use super::problem::{Problem, State};
 use super::{explicit, rosenbrock};
 use crate::Effort;
-use touchup_core::refine::dynamics::dormand_prince;
-use touchup_core::refine::{FaceDynamics, FaceState, StepRule};
+use touchup_core::haptic::dynamics::dormand_prince;
+use touchup_core::haptic::{FaceDynamics, FaceState, StepRule};
 
 /// A Jacobian has four columns: what it would cost by differences.
 const JACOBIAN_COUNTS: u64 = 4;

@@ -6,7 +6,7 @@
 
 use nalgebra::{Matrix4, Point3, Vector3, Vector4};
 
-use touchup_core::refine::{Along, ContactModel, DynamicsParams, FaceState, StepRule};
+use touchup_core::haptic::{Along, ContactModel, DynamicsParams, FaceState, StepRule};
 
 /// Travel along n*(0), m, and the normal.
 pub type State = [f64; 4];
@@ -58,7 +58,7 @@ impl Problem {
         [self.h_min_m, 1.0, 1.0, 1.0]
     }
 
-    /// The same for [`touchup_core::refine::FaceDynamics`], with the paper's direction of motion.
+    /// The same for [`touchup_core::haptic::FaceDynamics`], with the paper's direction of motion.
     pub fn params(&self, rule: StepRule) -> DynamicsParams {
         DynamicsParams {
             model: ContactModel::Sigmoid { f_max_n: F_MAX_N, h_min_m: self.h_min_m, delta: DELTA },

@@ -9,7 +9,7 @@
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2, Vector3};
 
 use super::problem::{ALPHA_M_PER_N_S, BETA_PER_N2_S, Problem};
-use touchup_core::refine::FaceState;
+use touchup_core::haptic::FaceState;
 
 /// One step and two half steps agree to this share of the size of the unknown.
 const AGREEMENT: f64 = 1e-13;

@@ -1,8 +1,8 @@
 //! The cost of a push in the report: the text from the numbers, and that both sides of the ratio do the same work.
 
+use touchup_core::haptic::Refiner;
 use touchup_core::mesh::{FaceTree, TriMesh};
-use touchup_core::refine::Refiner;
-use touchup_core::touch::WrenchFrame;
+use touchup_core::stylus::WrenchFrame;
 use touchup_report::allocations::asked;
 use touchup_report::cost::{
     BAREST, Cost, LogLaw, MinimalLoop, PartCost, PerSample, ReplaySpeed, SizeCost, StageCost, cost,

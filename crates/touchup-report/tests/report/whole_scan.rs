@@ -3,9 +3,9 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use touchup_core::compare::TouchedRegion;
+use touchup_core::haptic::TipParams;
 use touchup_core::mesh::{FaceTree, TriMesh, VertexId};
-use touchup_core::refine::TipParams;
-use touchup_core::touch::{CompensatorParams, Sample, Wrench};
+use touchup_core::stylus::{CompensatorParams, Sample, Wrench};
 use touchup_report::{
     ContactSculptor, Drawing, Effort, GaussianParams, GaussianProcess, GaussianSurface, GivenPart, RefineMethod, Rule,
     TableCell, TouchedError, WholeScanError, convergence, fit_decay, straight_line, whole_scan,

@@ -20,10 +20,10 @@ pub use gate::{Gate, GateKeeper};
 pub use latency::{Latencies, Quantiles};
 pub use probed::TouchDelta;
 use renewals::Renewals;
+use touchup_core::haptic::{RefineError, RefineParams, Refiner, Update};
 use touchup_core::mesh::{Changes, FaceTree, TriMesh, VertexId};
-use touchup_core::patch::{Patcher, PatcherParams, Support};
-use touchup_core::refine::{RefineError, RefineParams, Refiner, Update};
-use touchup_core::touch::{BiasParams, Sample, SettingError};
+use touchup_core::reconstruct::{Patcher, PatcherParams, Support};
+use touchup_core::stylus::{BiasParams, Sample, SettingError};
 
 /// Why a sample was not taken.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -1,6 +1,6 @@
 //! The touches that features are measured by, as they come from the thread of the patch.
 
-use touchup_core::touch::ProbedPoint;
+use touchup_core::stylus::ProbedPoint;
 
 /// Touches that came or went: of a list of touches the first `kept` stay, then come `new`.
 #[derive(Clone, Debug, PartialEq)]

@@ -6,10 +6,10 @@ use std::sync::mpsc::SyncSender;
 
 use super::worker::{Question, Worker, WorkerAnswer};
 use super::{Gate, LiveCounts, LiveError, Pace, TouchDelta};
+use touchup_core::haptic::Refiner;
 use touchup_core::mesh::{FaceTree, TriMesh};
-use touchup_core::patch::{PatchDelta, Patcher};
-use touchup_core::refine::Refiner;
-use touchup_core::touch::ContactSample;
+use touchup_core::reconstruct::{PatchDelta, Patcher};
+use touchup_core::stylus::ContactSample;
 
 /// Parts of a change of the patch that are taken up at one sample: some 50 µs on a mesh of a million faces.
 const AT_ONCE: usize = 40;

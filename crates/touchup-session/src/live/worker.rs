@@ -9,8 +9,8 @@ use super::gate::Gate;
 use super::probed::{PublishedList, TouchDelta};
 use crate::clock::Working;
 use touchup_core::mesh::{FaceTree, TriMesh};
-use touchup_core::patch::{PatchDelta, Patcher};
-use touchup_core::touch::ContactSample;
+use touchup_core::reconstruct::{PatchDelta, Patcher};
+use touchup_core::stylus::ContactSample;
 
 /// Requests to the thread.
 pub(super) enum Question {

@@ -5,7 +5,7 @@ use std::fmt;
 use serde::Serialize;
 
 use super::{Mode, Scene};
-use touchup_core::refine::Footprint;
+use touchup_core::haptic::Footprint;
 
 /// Parts by their names in the YAML, in its order; then what the program was built with, by feature.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use touchup_core::touch::SettingError;
+use touchup_core::stylus::SettingError;
 
 /// Why a scene is not usable.
 #[derive(Debug, thiserror::Error)]

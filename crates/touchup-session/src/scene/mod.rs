@@ -25,10 +25,10 @@ pub use sections::{
     RefineSection, RobotSection, ScanSection, ScanToSpaceSection, ShapeName, TipSection,
 };
 
+use touchup_core::haptic::{CarveParams, GuardParams, SlidingParams};
 use touchup_core::parameters;
-use touchup_core::patch::{PatchParams, UncertaintyParams};
-use touchup_core::refine::{CarveParams, GuardParams, SlidingParams};
-use touchup_core::touch::{BiasParams, ContactGateParams, SyncParams, TipBody};
+use touchup_core::reconstruct::{PatchParams, UncertaintyParams};
+use touchup_core::stylus::{BiasParams, ContactGateParams, SyncParams, TipBody};
 use touchup_io::mesh_file::MeshUnit;
 
 parameters! {

@@ -7,12 +7,12 @@ use super::{
     CompensationSection, GravityAxes, Mode, ModelName, PayloadSection, RefineSection, RobotSection, ScanToSpaceSection,
     Scene, TipSection,
 };
-use touchup_core::explore::{PatternParams, sigma_of};
-use touchup_core::patch::{PatchParams, PatcherParams, UncertaintyParams};
-use touchup_core::probe::{Cell, ProbeParams, Tool};
-use touchup_core::refine::{ContactModel, RefineParams, RoiSize, TipParams, relaxing_alpha};
-use touchup_core::robot::{TouchParams, UrGeometry};
-use touchup_core::touch::{
+use touchup_core::haptic::{ContactModel, RefineParams, RoiSize, TipParams, relaxing_alpha};
+use touchup_core::probing::arm::{TouchParams, UrGeometry};
+use touchup_core::probing::execute::{Cell, ProbeParams, Tool};
+use touchup_core::probing::plan::{PatternParams, sigma_of};
+use touchup_core::reconstruct::{PatchParams, PatcherParams, UncertaintyParams};
+use touchup_core::stylus::{
     ClockParams, CompensatorParams, MarkerFilter, Payload, Placement, SensorBias, SettingError, SyncParams, TipBody,
     TipShape, Wrench, WrenchFrame,
 };

@@ -1,10 +1,10 @@
 //! A scene in which only a region of the scan is ever touched: the rest gets no adjacency and no tree.
 
 use super::{Scene, SceneError};
+use touchup_core::haptic::{RefineParams, RoiSize, ScanRegion, mean_edge};
 use touchup_core::mesh::{Outside, Region, TriMesh};
-use touchup_core::patch::{PatchRegion, PatcherParams};
-use touchup_core::refine::{RefineParams, RoiSize, ScanRegion, mean_edge};
-use touchup_core::touch::WrenchFrame;
+use touchup_core::reconstruct::{PatchRegion, PatcherParams};
+use touchup_core::stylus::WrenchFrame;
 
 /// A touch changes the patch within so many sizes of the tip: the fit of the touches reaches two, free space another one …
 const TIPS: f64 = 4.0;

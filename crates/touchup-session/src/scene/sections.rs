@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use nalgebra::{Isometry3, Point3, Quaternion, UnitQuaternion, Vector3};
 
-use touchup_core::explore::PatternParams;
-use touchup_core::probe::Tool;
-use touchup_core::refine::{Along, ScanParams, SigmoidParams, StepRule, TipParams};
-use touchup_core::robot::{Limits, TouchParams};
-use touchup_core::touch::{
+use touchup_core::haptic::{Along, ScanParams, SigmoidParams, StepRule, TipParams};
+use touchup_core::probing::arm::{Limits, TouchParams};
+use touchup_core::probing::execute::Tool;
+use touchup_core::probing::plan::PatternParams;
+use touchup_core::stylus::{
     MarkerBody, MarkerParams, Payload, SensorBias, SensorMount, SettingError, TipShape, TipSizes,
 };
 use touchup_core::{parameters, words};

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use touchup_core::patch::{Outlier, Outliers, Patched, Support};
+use touchup_core::reconstruct::{Outlier, Outliers, Patched, Support};
 
 /// What `--json` prints of the uncertainty.
 #[derive(Debug, Serialize)]

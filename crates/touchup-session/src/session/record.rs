@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 
 use crate::clock::Clock;
-use touchup_core::touch::Message;
+use touchup_core::stylus::Message;
 use touchup_io::mesh_file::MeshUnit;
 use touchup_io::recording::{RecordingError, SegmentedWriter, Topics};
 use touchup_io::session_folder::{SessionFolder, fingerprint, read_text};
@@ -323,7 +323,7 @@ mod tests {
     use tempfile::{TempDir, tempdir};
 
     use super::*;
-    use touchup_core::touch::{StampedWrench, Wrench};
+    use touchup_core::stylus::{StampedWrench, Wrench};
     use touchup_io::recording::RecordingReader;
 
     fn wrench(number: u32) -> Message {

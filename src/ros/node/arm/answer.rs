@@ -2,8 +2,10 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use crate::probe::{Cell, Ending, Plan, ProbeParams, Probed, ProbedSlide, ProbedTouch};
-use crate::robot::{ArmError, LimitError, OnsetVerdict, ProbeError, Safety, SlideEnding, TouchOutcome, TouchRecord};
+use crate::probing::arm::{
+    ArmError, LimitError, OnsetVerdict, ProbeError, Safety, SlideEnding, TouchOutcome, TouchRecord,
+};
+use crate::probing::execute::{Cell, Ending, Plan, ProbeParams, Probed, ProbedSlide, ProbedTouch};
 use crate::ros::messages::{
     Feature, Header, Point, Pose, ProbeResponse, ProbeResult, ProbeTouch, Quaternion, Time, Vector3 as Vector3Msg,
     Wrench as WrenchMsg,
@@ -270,7 +272,8 @@ fn onset_at(record: &TouchRecord, travel: f64) -> f64 {
 fn curve_of(touch: ProbeTouch, record: &TouchRecord) -> ProbeTouch {
     let onset =
         if let TouchOutcome::Contact { onset, .. } = &record.outcome { onset_at(record, onset.travel) } else { 0.0 };
-    let row = |value: fn(&crate::robot::TouchMoment) -> f64| record.curve.iter().map(|m| value(m) as f32).collect();
+    let row =
+        |value: fn(&crate::probing::arm::TouchMoment) -> f64| record.curve.iter().map(|m| value(m) as f32).collect();
     // its size is known, and that the part pushes back
     let most = Vector3::from([touch.approach.x, touch.approach.y, touch.approach.z]) * -record.peak_force;
     ProbeTouch {

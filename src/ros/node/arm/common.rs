@@ -3,8 +3,8 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use crate::probe::Cell;
-use crate::robot::{ArmError, ArmState, Safety};
+use crate::probing::arm::{ArmError, ArmState, Safety};
+use crate::probing::execute::Cell;
 use crate::ros::messages::{ProbeResult, TriggerResponse};
 
 /// Read and written by any thread.

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use crate::clock::Clock;
-use crate::robot::{Arm, ArmError, ArmState, Command};
+use crate::probing::arm::{Arm, ArmError, ArmState, Command};
 use crate::sim::SimArm;
 
 /// So late it begins to count anew: it does not run after the time.

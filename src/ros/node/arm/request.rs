@@ -1,9 +1,9 @@
 //! What a request asks for: within what is configured.
 
-use crate::explore::{Quantity, sigma_of};
 use crate::features::Kind;
-use crate::probe::ProbeParams;
-use crate::robot::{CRAWL, Narrower};
+use crate::probing::arm::{CRAWL, Narrower};
+use crate::probing::execute::ProbeParams;
+use crate::probing::plan::{Quantity, sigma_of};
 use crate::ros::messages::{ProbeResult, ProbeSettings};
 
 /// What is wanted of a probing.

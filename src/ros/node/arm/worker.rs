@@ -16,8 +16,8 @@ use super::request::Wanted;
 use super::world::{ArmWorld, ask_mesh, publish};
 use crate::io::probed_touches_file::append_probed_touches;
 use crate::mesh::TriMesh;
-use crate::probe::{Cell, Ending, Flag, Phase, ProbeParams, Prober, StillWorld, plan};
-use crate::robot::Arm;
+use crate::probing::arm::Arm;
+use crate::probing::execute::{Cell, Ending, Flag, Phase, ProbeParams, Prober, StillWorld, plan};
 use crate::ros::messages::{
     Header, Path as PathMsg, ProbeFeatureRequest, ProbeFeatureResponse, ProbeGoal, ProbeResponse, ProbeResult,
     ProbeSettings, TriggerResponse,

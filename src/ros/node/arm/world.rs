@@ -11,13 +11,13 @@ use nalgebra::{Isometry3, Point3};
 use super::common::Common;
 use crate::clock::Clock;
 use crate::mesh::{FaceHit, TriMesh};
-use crate::probe::{Phase, Progress, StillWorld, World};
-use crate::robot::{ArmState, Witness};
+use crate::probing::arm::{ArmState, Witness};
+use crate::probing::execute::{Phase, Progress, StillWorld, World};
 use crate::ros::messages::{PoseStamped, ProbeFeedback};
 use crate::ros::node::convert::{as_pose, as_wrench};
 use crate::ros::node::replica::MeshReplica;
 use crate::ros::port::{Feedback, SamplePort};
-use crate::touch::{StampedPose, StampedWrench, Wrench};
+use crate::stylus::{StampedPose, StampedWrench, Wrench};
 
 /// Feedback comes at least so often while the arm moves.
 const FEEDBACK_EVERY: Duration = Duration::from_millis(100);

@@ -5,7 +5,7 @@ use std::path::Path;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use touchup::io::recording::RecordingError;
-use touchup::touch::Message;
+use touchup::stylus::Message;
 
 use crate::allocations::largest_request;
 use crate::io::recordings::made::{Outcome, db3_of, mcap_bytes, put, read, touch};

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rusqlite::{Connection, params};
 use touchup::io::recording::{RecordingError, RecordingReader, RecordingWriter, Topics};
-use touchup::touch::{Message, StampedPose, StampedWrench, Wrench};
+use touchup::stylus::{Message, StampedPose, StampedWrench, Wrench};
 
 pub const START_NS: i64 = 1_760_000_000_000_000_000;
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use nalgebra::Point3;
 use touchup::io::recording::{BadMessage, Record, RecordingError, RecordingReader, Topics, write_recording};
-use touchup::touch::{MarkerFrame, Message, SeenMarker};
+use touchup::stylus::{MarkerFrame, Message, SeenMarker};
 
 use crate::io::recordings::made::{START_NS, pose, put, wrench};
 

@@ -9,7 +9,7 @@ use std::path::Path;
 use nalgebra::{Translation3, Vector3};
 use proptest::prelude::*;
 use touchup::io::recording::{BadMessage, RecordingError, RecordingPlace, RecordingReader, Topics, write_recording};
-use touchup::touch::{Message, StampedPose, StampedWrench};
+use touchup::stylus::{Message, StampedPose, StampedWrench};
 
 mod damage;
 mod made;

@@ -21,7 +21,7 @@ use touchup::ros::node::{INBOX, Node, NodeEnd, Prepared};
 use touchup::ros::parameters::{ParameterValue, Parameters};
 use touchup::ros::port::{Arrival, Call, Publication, Reply};
 use touchup::sim::StylusParams;
-use touchup::touch::{Message, StampedPose};
+use touchup::stylus::{Message, StampedPose};
 
 use crate::plate_stream::plate_stream;
 

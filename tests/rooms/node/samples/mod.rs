@@ -20,7 +20,7 @@ use touchup::ros::messages::{
 };
 use touchup::ros::parameters::ParameterValue;
 use touchup::ros::port::{Arrival, Call, Publication};
-use touchup::touch::{Message, StampedPose};
+use touchup::stylus::{Message, StampedPose};
 
 /// What was taken is on the disk after so long.
 const FLUSH: Duration = Duration::from_millis(50);

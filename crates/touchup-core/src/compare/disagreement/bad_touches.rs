@@ -6,7 +6,7 @@ use super::places::{Class, RefinedShape};
 use crate::compare::CompareError;
 use crate::compare::deviation::{closest_places, signed};
 use crate::numeric::{PointGrid, median};
-use crate::touch::ProbedPoint;
+use crate::stylus::ProbedPoint;
 
 /// Bad touches one after the other.
 #[derive(Clone, Debug, PartialEq)]

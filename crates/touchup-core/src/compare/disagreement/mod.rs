@@ -25,7 +25,7 @@ pub use self::scanner::Scanner;
 use super::deviation::{closest_places, signed};
 use super::{CompareError, IndexedMesh};
 use crate::mesh::{FaceHit, TriMesh, VertexId};
-use crate::touch::ProbedPoint;
+use crate::stylus::ProbedPoint;
 
 /// A mesh with its classes.
 #[derive(Clone, Debug, PartialEq)]

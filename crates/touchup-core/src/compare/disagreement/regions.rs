@@ -6,7 +6,7 @@ use super::places::{Class, Places, RefinedShape};
 use super::scanner::{Scanner, rounded, sharp_vertices};
 use crate::mesh::{TriMesh, VertexId};
 use crate::numeric::PointGrid;
-use crate::touch::ProbedPoint;
+use crate::stylus::ProbedPoint;
 
 /// What speaks for the class of a region.
 #[derive(Clone, Copy, Debug, PartialEq)]

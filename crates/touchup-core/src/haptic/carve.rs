@@ -1,0 +1,145 @@
+//! Case 2: what the tip passes through is not there.
+//!
+//! All faces inside the tip give way at once, the deepest first: the closest one as the arm from it to the centre of the
+//! ball says, the others, of which only those count that the tip comes to from the front, out of the tip the shortest way.
+
+use nalgebra::{Point3, Vector3};
+
+use super::inside_scratch::{InsideScratch, MOST_LOOKED_AT};
+use super::{CarveParams, Case, ContactState, Refiner, RegionFit, RoiSize, Update};
+use crate::mesh::{FaceHit, FaceId, triangle};
+use crate::stylus::{Ball, TipBody, TipPlace};
+
+/// Faces beside the closest one that move in one update, at most: those of a ball on a scan as coarse as itself.
+const MOST_OTHERS: usize = 6;
+/// An arm whose sine to the face is below this lies sideways.
+const SIDEWAYS: f64 = 0.2;
+
+/// A point of a face inside the tip.
+struct Inside {
+    /// the shortest way out of the tip, unit
+    out: Vector3<f64>,
+    /// m
+    depth: f64,
+    barycentric: [f64; 3],
+}
+
+impl Refiner {
+    /// Moves what is inside the tip out of it.
+    pub(super) fn carve(
+        &mut self,
+        carve: &CarveParams,
+        ball: &Ball,
+        felt: ContactState,
+        dt: f64,
+        update: Update,
+    ) -> Update {
+        // a mesh that the tip does not enter by more than the tolerance is left alone
+        let (tolerance, hint) = match felt {
+            ContactState::Nothing => (carve.tolerance, self.carve_region.handle()),
+            _ => (carve.contact_tolerance.max(carve.tolerance), self.contact_region.handle()),
+        };
+        let place = TipPlace { centre: ball.centre, axis: self.axis };
+        let (height, bound) = self.body.bound();
+        let (middle, reach) = (place.centre + place.axis * height, bound - tolerance);
+        let Some(hit) = self.deformable.closest(&middle, hint, reach, &mut self.near_tip) else {
+            return update;
+        };
+        let counts = self.body.is_ball() && !self.deformable.is_stiff(hit.face);
+        let first = if counts { self.penetration(&place.centre, &hit) } else { None };
+        let mut fit = first.map(|inside| self.give_way(carve, hit.face, &inside, dt));
+        self.gather(&place, tolerance, hit.face);
+        for at in 0..self.inside.deep.len().min(MOST_OTHERS) {
+            let face = self.inside.deep[at].1;
+            // the faces before it have taken its corners along
+            if let Some(inside) = self.inside(&place, face).filter(|inside| inside.depth > tolerance) {
+                let moved = self.give_way(carve, face, &inside, dt);
+                fit = fit.or(Some(moved));
+            }
+        }
+        match update.case {
+            Case::Free if fit.is_some() => Update { case: Case::MeshOnly, mismatch: None, fit },
+            _ => update,
+        }
+    }
+
+    /// Moves a face by the share of its depth that goes in `dt` (s).
+    fn give_way(&mut self, carve: &CarveParams, face: FaceId, inside: &Inside, dt: f64) -> RegionFit {
+        let Inside { out, depth, barycentric } = inside;
+        let share = -(-carve.rate * dt).exp_m1();
+        let way =
+            (share * (depth - carve.tolerance)).min(2.0 * self.params.longest_step_edges * self.deformable.mean_edge);
+        let weight: f64 = barycentric.iter().map(|x| x * x).sum();
+        let steps = barycentric.map(|x| out * (way * x / weight));
+        let fit = self.deformable.deform(&mut self.carve_region, face, RoiSize::Handle, &steps);
+        self.count(fit);
+        fit
+    }
+
+    /// Finds the faces deeper in the tip than `tolerance` (m), the deepest first; not the `first`, when the tip is a ball.
+    fn gather(&mut self, place: &TipPlace, tolerance: f64, first: FaceId) {
+        let (height, bound) = self.body.bound();
+        let (middle, half) = (place.centre + place.axis * height, Vector3::repeat(bound - tolerance));
+        let mut scratch = std::mem::take(&mut self.inside);
+        let InsideScratch { near, deep } = &mut scratch;
+        self.deformable.tree.faces_in_box(&(middle - half), &(middle + half), near);
+        // in the order of their names: that of the tree depends on how it was built
+        near.faces.sort_unstable();
+        deep.clear();
+        let stride = near.faces.len().div_ceil(MOST_LOOKED_AT).max(1);
+        for &face in near.faces.iter().step_by(stride).filter(|&&face| face != first || !self.body.is_ball()) {
+            if let Some(inside) = self.inside(place, face).filter(|inside| inside.depth > tolerance) {
+                deep.push((inside.depth, face));
+            }
+        }
+        deep.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        self.inside = scratch;
+    }
+
+    /// The deepest point of a face that the tip comes to from the front, of those that are looked at.
+    fn inside(&self, place: &TipPlace, face: FaceId) -> Option<Inside> {
+        if self.deformable.is_stiff(face) {
+            return None;
+        }
+        let (mesh, body) = (&self.deformable.mesh, &self.body);
+        let (corners, normal) = (mesh.triangle(face), mesh.normal(face));
+        let (_, barycentric) = deepest_point(body, place, &corners);
+        let point = Point3::from(
+            corners[0].coords * barycentric[0]
+                + corners[1].coords * barycentric[1]
+                + corners[2].coords * barycentric[2],
+        );
+        let (distance, out) = body.way_out(place, &point);
+        let is_front = normal.dot(&out) < -SIDEWAYS;
+        (is_front && distance < 0.0).then_some(Inside { out, depth: -distance, barycentric })
+    }
+
+    /// Which way the mesh gives way to the ball, and how deep the ball is in it.
+    fn penetration(&self, centre: &Point3<f64>, hit: &FaceHit) -> Option<Inside> {
+        let normal = self.deformable.mesh.normal(hit.face);
+        let arm = centre - hit.point;
+        let distance = arm.norm();
+        let height = arm.dot(&normal);
+        if normal == Vector3::zeros() {
+            return None;
+        }
+        // beside a rim the arm says little about inside and outside
+        let away = if height.abs() <= SIDEWAYS * distance { normal } else { arm * (height.signum() / distance) };
+        let depth = self.params.tip.radius - distance.copysign(height);
+        Some(Inside { out: -away, depth, barycentric: hit.barycentric })
+    }
+}
+
+/// The point of a triangle deepest in the tip, with its barycentric coordinates; of a body that is no ball, the best of the
+/// points closest to some balls along its axis.
+fn deepest_point(body: &TipBody, place: &TipPlace, corners: &[Point3<f64>; 3]) -> (Point3<f64>, [f64; 3]) {
+    let first = triangle::closest_point(&place.centre, corners);
+    if body.is_ball() {
+        return first;
+    }
+    let (middle, bound) = body.bound();
+    let heights = [0.25, 0.5, 1.0, 1.5].map(|share| share * middle);
+    let others = heights.map(|height| triangle::closest_point(&(place.centre + place.axis * height), corners));
+    let depth = |point: &Point3<f64>| body.signed_distance(place, point).min(bound);
+    others.into_iter().fold(first, |best, other| if depth(&other.0) < depth(&best.0) { other } else { best })
+}

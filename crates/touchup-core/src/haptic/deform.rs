@@ -1,0 +1,348 @@
+//! Moves a handle face and the region around it, as far as the mesh stays sound.
+
+use nalgebra::{Point3, Vector3};
+
+use super::followed::FollowedPatch;
+use super::guard::{GuardEvidence, GuardParams, GuardVerdict};
+use super::params::ScanRegion;
+use super::roi::{Roi, RoiSize};
+use super::strokes::Strokes;
+use crate::mesh::{FaceHit, FaceId, FaceTree, MeshError, Nearby, RefitPlan, Region, TriMesh, VertexId};
+use crate::reconstruct::{PatchDelta, Support};
+
+/// An update that would break the mesh is tried again at this share of its length …
+const CUT: f64 = 0.35;
+/// … this often, and then given up.
+const TRIES: usize = 3;
+/// Faces within this many mean edges of a region are what it could run into.
+const MARGIN_EDGES: f64 = 0.2;
+/// By how much of the mean edge the boxes of what moves are made wider: a touch moves vertices by less while it stays on a
+/// face.
+const BOX_MARGIN_EDGES: f64 = 0.05;
+/// Faces looked at to find the mean edge.
+const EDGE_SAMPLE: usize = 20_000;
+
+/// How an update ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RegionFit {
+    /// As computed.
+    Whole,
+    /// Shortened, or not made at all, because the mesh would have folded, flipped, starved or met itself.
+    CutBack,
+}
+
+/// Memory of a mesh under refinement, bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Footprint {
+    /// positions, faces, adjacency, where each vertex was scanned, the normal felt on each face
+    pub mesh: usize,
+    /// the tree over the faces
+    pub tree: usize,
+    /// what is kept of a patch that is followed
+    pub patch: usize,
+}
+
+/// A mesh under refinement: the triangles, the tree over them, and what was scanned or felt where.
+#[derive(Clone, Debug)]
+pub(super) struct DeformableMesh {
+    pub mesh: TriMesh,
+    pub tree: FaceTree,
+    /// positions as scanned, m
+    scanned: Vec<Point3<f64>>,
+    /// for each face the last normal scanned or felt there
+    evidence: Vec<[f32; 3]>,
+    guard: Option<GuardParams>,
+    /// mean edge length, m
+    pub mean_edge: f64,
+    /// vertices stay within this distance of where they were scanned, m
+    pub largest_move: f64,
+    /// vertices that were scanned outside of it stay; `None`: all may move
+    movable: Option<Region>,
+    /// stamp of the sample at hand, ns
+    pub now_ns: i64,
+    /// counts the edits, so that a region knows whether others came between
+    edits: u64,
+    displacements: Vec<Vector3<f64>>,
+    before: Vec<Point3<f64>>,
+    patch: Option<FollowedPatch>,
+    strokes: Option<Strokes>,
+}
+
+/// A region of interest with the edit after which it was last looked at.
+#[derive(Clone, Debug)]
+pub(super) struct HandleRegion {
+    roi: Roi,
+    refit: RefitPlan,
+    seen: Option<u64>,
+}
+
+impl HandleRegion {
+    /// The face that was moved last.
+    pub fn handle(&self) -> Option<FaceId> {
+        self.roi.handle()
+    }
+
+    /// Forgets the face that was moved last: faces came or went.
+    pub fn forget(&mut self) {
+        self.roi.forget();
+        self.seen = None;
+    }
+
+    /// The vertices that the last update moved.
+    pub fn vertices(&self) -> &[VertexId] {
+        &self.roi.vertices
+    }
+}
+
+impl DeformableMesh {
+    pub fn new(mesh: TriMesh, guard: Option<GuardParams>, touched: Option<&ScanRegion>) -> Self {
+        let tree = FaceTree::new(&mesh);
+        let mut evidence = vec![[0.0; 3]; mesh.face_slots()];
+        for (face, _) in mesh.faces() {
+            evidence[face.0 as usize] = mesh.normal(face).cast::<f32>().into();
+        }
+        let mean_edge = touched.map_or_else(|| mean_edge(&mesh), |touched| touched.mean_edge);
+        Self {
+            scanned: mesh.positions().to_vec(),
+            evidence,
+            guard,
+            mean_edge,
+            largest_move: f64::INFINITY,
+            movable: touched.map(|touched| touched.region.grown(touched.margin)),
+            now_ns: i64::MIN,
+            edits: 0,
+            displacements: Vec::new(),
+            before: Vec::new(),
+            patch: None,
+            strokes: None,
+            mesh,
+            tree,
+        }
+    }
+
+    /// Memory, bytes.
+    pub fn footprint(&self) -> Footprint {
+        let scanned = self.scanned.capacity() * size_of::<Point3<f64>>();
+        let evidence = self.evidence.capacity() * size_of::<[f32; 3]>();
+        Footprint {
+            mesh: self.mesh.bytes() + scanned + evidence,
+            tree: self.tree.bytes(),
+            patch: self.patch.as_ref().map_or(0, FollowedPatch::bytes),
+        }
+    }
+
+    /// The closest face nearer than `reach` (m), sooner if it is near `hint`, and `p` near what was asked for last with `nearby`.
+    pub fn closest(&self, p: &Point3<f64>, hint: Option<FaceId>, reach: f64, nearby: &mut Nearby) -> Option<FaceHit> {
+        match hint {
+            Some(hint) => self.tree.closest_nearby(&self.mesh, p, hint, reach, nearby),
+            None => self.tree.closest(&self.mesh, p, reach),
+        }
+    }
+
+    /// What a vertex rests on in the patch that is followed.
+    pub fn support(&self, vertex: VertexId) -> Option<Support> {
+        self.patch.as_ref().map(|patch| patch.support(vertex))
+    }
+
+    /// Remembers that a surface facing `normal` was felt on `face`.
+    pub fn feel(&mut self, face: FaceId, normal: &Vector3<f64>) {
+        if let Some(strokes) = &mut self.strokes {
+            strokes.note_evidence(face, self.evidence[face.0 as usize]);
+        }
+        self.evidence[face.0 as usize] = normal.cast::<f32>().into();
+    }
+
+    /// An empty region with room for one of this size.
+    pub fn region(&mut self, size: RoiSize) -> HandleRegion {
+        let vertices = size.room(self.mean_edge);
+        self.displacements.reserve(vertices);
+        self.before.reserve(vertices);
+        HandleRegion { roi: Roi::with_room(vertices), refit: RefitPlan::with_room(3 * vertices), seen: None }
+    }
+
+    /// Moves the corners of `handle` by `steps` (m) and the region around it after them.
+    pub fn deform(
+        &mut self,
+        region: &mut HandleRegion,
+        handle: FaceId,
+        size: RoiSize,
+        steps: &[Vector3<f64>; 3],
+    ) -> RegionFit {
+        if !region.roi.is_for(handle) {
+            region.roi.rebuild(&self.mesh, handle, size, self.guard.is_some());
+            self.tree.plan(region.roi.neighbourhood.ring.moving(), &mut region.refit);
+            region.seen = None;
+        }
+        if let Some(strokes) = &mut self.strokes {
+            strokes.note_positions(&region.roi.vertices, &self.mesh);
+        }
+        let longest = self.displace(&region.roi, steps);
+        let fit = match self.guard {
+            Some(guard) => self.place_soundly(region, longest, &guard),
+            None => {
+                self.place(&region.roi, 1.0);
+                RegionFit::Whole
+            }
+        };
+        if region.seen != Some(self.edits) {
+            region.refit.spend();
+        }
+        self.tree.refit_planned(&self.mesh, &mut region.refit, longest, BOX_MARGIN_EDGES * self.mean_edge);
+        self.edits += 1;
+        region.seen = Some(self.edits);
+        if let Some(patch) = &mut self.patch {
+            patch.note_moved(&region.roi.vertices, self.now_ns);
+        }
+        fit
+    }
+
+    /// Keeps what it takes to undo strokes from here on, unless a patch is followed.
+    pub fn keep_strokes(&mut self) {
+        self.strokes = self.patch.is_none().then(Strokes::default);
+    }
+
+    /// Notes that the sample at hand touches.
+    pub fn touch(&mut self) {
+        if let Some(strokes) = &mut self.strokes {
+            strokes.touch(self.now_ns);
+        }
+    }
+
+    /// How many strokes can be undone.
+    pub fn strokes(&self) -> usize {
+        self.strokes.as_ref().map_or(0, Strokes::len)
+    }
+
+    /// Takes the last stroke back, or does again what was undone last; returns whether there was any.
+    pub fn change_strokes(&mut self, is_undo: bool) -> bool {
+        let Self { strokes, mesh, tree, evidence, .. } = self;
+        let change = if is_undo { Strokes::undo } else { Strokes::redo };
+        let Some(moved) = strokes.as_mut().and_then(|strokes| change(strokes, mesh, evidence)) else { return false };
+        let faces: Vec<FaceId> = moved.iter().flat_map(|&vertex| mesh.star(vertex)).copied().collect();
+        tree.refit(mesh, &faces);
+        self.edits += 1;
+        true
+    }
+
+    /// Makes ready to follow a patch, with room for so many new faces.
+    pub fn expect_patch(&mut self, faces: usize) -> Result<(), MeshError> {
+        self.mesh.reserve(faces / 2, faces)?;
+        self.tree.reserve(faces)?;
+        self.scanned.reserve(faces / 2);
+        self.evidence.reserve(faces);
+        self.strokes = None;
+        self.patch = Some(FollowedPatch::new(&self.mesh, faces / 2));
+        Ok(())
+    }
+
+    /// Whether all corners of a face were touched: the patch alone moves it then.
+    #[inline]
+    pub fn is_stiff(&self, face: FaceId) -> bool {
+        self.patch.as_ref().is_some_and(|patch| self.mesh.corners(face).into_iter().all(|v| patch.is_touched(v)))
+    }
+
+    /// Begins to take up what changed in the patch: puts back what was moved before that; returns whether anything was.
+    pub fn begin_delta(&mut self, delta: &PatchDelta) -> bool {
+        let Some(patch) = &mut self.patch else { return false };
+        patch.splice.begin();
+        let has_put_back = patch.put_back(&mut self.mesh, &mut self.tree, &self.scanned, delta.until_ns);
+        self.edits += u64::from(has_put_back);
+        has_put_back
+    }
+
+    /// Takes up to `most` parts more of it; whether that was all.
+    pub fn go_on(&mut self, delta: &PatchDelta, most: usize) -> Result<bool, MeshError> {
+        let Self { patch: Some(patch), mesh, tree, scanned, .. } = self else { return Ok(true) };
+        let is_done = patch.go_on(delta, most, mesh, tree, scanned)?;
+        self.evidence.resize(self.mesh.face_slots(), [0.0; 3]);
+        for &face in patch.splice.added() {
+            self.evidence[face.0 as usize] = self.mesh.normal(face).cast::<f32>().into();
+        }
+        self.edits += 1;
+        Ok(is_done)
+    }
+
+    fn evidence(&self) -> GuardEvidence<'_> {
+        GuardEvidence { scanned: &self.scanned, normals: &self.evidence }
+    }
+
+    /// Puts the region at the largest share of its displacement that leaves the mesh sound.
+    fn place_soundly(&mut self, region: &mut HandleRegion, longest: f64, guard: &GuardParams) -> RegionFit {
+        let margin = MARGIN_EDGES * self.mean_edge;
+        if region.seen != Some(self.edits) {
+            region.roi.neighbourhood.refresh(&self.mesh, &self.tree, margin, guard, &self.evidence());
+        } else if region.roi.neighbourhood.is_outdated(longest) {
+            region.roi.neighbourhood.collect(&self.mesh, &self.tree, margin);
+        }
+        if region.roi.neighbourhood.may_pass_unseen(longest) {
+            region.roi.neighbourhood.pass_unseen(longest);
+            self.place(&region.roi, 1.0);
+            return RegionFit::Whole;
+        }
+        let mut share = 1.0;
+        for _ in 0..TRIES {
+            let mut verdict = self.judge_at(region, share, longest, guard);
+            if verdict == GuardVerdict::Rough {
+                self.place(&region.roi, 0.0);
+                region.roi.neighbourhood.roughen(&self.mesh, &self.tree, margin);
+                verdict = self.judge_at(region, share, longest, guard);
+            }
+            if verdict == GuardVerdict::Sound {
+                region.roi.neighbourhood.accept(share * longest);
+                return if share == 1.0 { RegionFit::Whole } else { RegionFit::CutBack };
+            }
+            share *= CUT;
+        }
+        self.place(&region.roi, 0.0);
+        RegionFit::CutBack
+    }
+
+    fn judge_at(&mut self, region: &mut HandleRegion, share: f64, longest: f64, guard: &GuardParams) -> GuardVerdict {
+        self.place(&region.roi, share);
+        let gap = guard.gap_share * self.mean_edge;
+        let (mesh, before, marks) = (&self.mesh, &self.before, &region.roi.marks);
+        let moved = |v: VertexId| marks.of(v.0).and_then(|i| before.get(i as usize));
+        let was = |v: VertexId| moved(v).copied().unwrap_or_else(|| mesh.position(v));
+        region.roi.neighbourhood.judge(mesh, guard, &self.evidence(), gap, share * longest, was)
+    }
+
+    /// The displacement of each vertex of the region; returns the longest, m.
+    fn displace(&mut self, roi: &Roi, steps: &[Vector3<f64>; 3]) -> f64 {
+        self.displacements.clear();
+        self.before.clear();
+        let mut longest = 0.0f64;
+        for (&vertex, weights) in roi.vertices.iter().zip(&roi.weights) {
+            let here = self.mesh.position(vertex);
+            let is_outside = self.movable.is_some_and(|movable| !movable.contains(&self.scanned[vertex.0 as usize]));
+            let is_stiff = is_outside || self.patch.as_ref().is_some_and(|patch| patch.is_touched(vertex));
+            let mut step = steps[0] * weights[0] + steps[1] * weights[1] + steps[2] * weights[2];
+            let (way, next) = (here - self.scanned[vertex.0 as usize], here + step - self.scanned[vertex.0 as usize]);
+            if is_stiff || next.norm_squared() > self.largest_move * self.largest_move && next.norm() > way.norm() {
+                step = Vector3::zeros();
+            }
+            longest = longest.max(step.norm_squared());
+            self.displacements.push(step);
+            self.before.push(here);
+        }
+        longest.sqrt()
+    }
+
+    /// Puts the region at a share of its displacement.
+    fn place(&mut self, roi: &Roi, share: f64) {
+        for (i, &vertex) in roi.vertices.iter().enumerate() {
+            self.mesh.set_position(vertex, self.before[i] + self.displacements[i] * share);
+        }
+    }
+}
+
+/// Mean edge length, m, of up to 20,000 faces spread over the mesh.
+pub fn mean_edge(mesh: &TriMesh) -> f64 {
+    let step = (mesh.face_count() / EDGE_SAMPLE).max(1);
+    let (mut sum, mut count) = (0.0, 0.0);
+    for (face, _) in mesh.faces().step_by(step) {
+        let [a, b, c] = mesh.triangle(face);
+        sum += (b - a).norm() + (c - b).norm() + (a - c).norm();
+        count += 3.0;
+    }
+    if count > 0.0 { sum / count } else { 0.0 }
+}

@@ -1,0 +1,371 @@
+//! Face dynamics: how one held sample moves and turns the face it touches \[paper, Eq 1–7\].
+//!
+//! ```text
+//! h = (p − b)·n      F* = f(h) n      db/dt = α ((F − F*)·n) a      dn/dt = β (F* × F) × n
+//! ```
+//!
+//! p and F are held over the step; a is n(0), or F/|F| ([`Along`]). Two sub-flows are solved exactly:
+//!
+//! - **position**, n frozen: b = b₀ + s a, ds/dt = α (F·n − f(h₀ − (a·n) s)). Since a·n is frozen with n, h obeys
+//!   dh/dt = −α (a·n) (F·n − f(h)): the equation for a = n with α (a·n) in the place of α. A moving tip or a turning
+//!   face adds a drift v to dh/dt, frozen as well.
+//! - **rotation**, the impulse J = ∫ f dt given: n turns towards F by tan(θ/2) → tan(θ/2) e^(−β|F|J).
+//!
+//! [`StepRule::Lie`] does one after the other. Where F is parallel to n that is the exact solution, whatever dt.
+
+mod contact_model;
+pub mod dormand_prince;
+mod error;
+mod hold;
+mod rotation;
+mod sigmoid_flow;
+mod spring_flow;
+
+use nalgebra::{Point3, Vector3};
+
+use crate::{parameters, words};
+
+pub use contact_model::{ContactModel, LARGEST_SHARE};
+pub use error::DynamicsError;
+use hold::{Hold, Shift};
+pub use rotation::turn;
+
+/// How far |n| may be from 1 on input: six digits in a file are enough.
+pub const UNIT_TOLERANCE: f64 = 1e-6;
+/// Squares below it have lost digits.
+const SMALLEST_SQUARE: f64 = f64::MIN_POSITIVE / f64::EPSILON;
+/// Below it the weight of the end is 1/2 + z/12 to rounding.
+const SMALL_DECAY: f64 = 1e-5;
+
+/// A face as the dynamics sees it: a point and a direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FaceState {
+    /// b*: barycentre, m, in O
+    pub b: Point3<f64>,
+    /// n*: outward normal, |n*| = 1, in O
+    pub n: Vector3<f64>,
+}
+
+words! {
+    /// How the two sub-flows are put together.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum StepRule {
+        /// Position, then rotation: first order, exact where F is parallel to n.
+        #[default]
+        Lie = "lie",
+        /// The position flow again with the drift and the mean normal that the rotation causes: second order.
+        DriftCorrected = "corrected",
+        /// Adaptive Runge–Kutta on the coupled equations: for comparison, refuses stiff steps.
+        DormandPrince = "dp5",
+    }
+}
+
+words! {
+    /// The direction a in which b* moves.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum Along {
+        /// n*(0) \[paper, Eq 6\]: n* when the face was first touched, or at the start of the step if no other is given.
+        InitialNormal = "normal0",
+        /// F/|F|, which stays bounded where n* is far off; n* at the start where F = 0.
+        #[default]
+        Force = "force",
+    }
+}
+
+parameters! {
+    /// The sigmoid of Eq 3.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct SigmoidParams in "refine" {
+        /// Largest force of the sigmoid.
+        ///
+        /// In N. The paper leaves it open.
+        f_max: f64 = 10.0, "f_max_n" [N, 1e-6, 1e6];
+        /// Width of the sigmoid.
+        ///
+        /// In m.
+        h_min: f64 = 0.5, "h_min_mm" [MM, 1e-9, 1e6];
+        /// Shift of the sigmoid.
+        delta: f64 = 5.0, "delta" [ONE, -50, 50];
+    }
+}
+
+impl SigmoidParams {
+    /// The expected force of it.
+    pub fn model(&self) -> ContactModel {
+        ContactModel::Sigmoid { f_max_n: self.f_max, h_min_m: self.h_min, delta: self.delta }
+    }
+}
+
+/// Parameters of [`FaceDynamics`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DynamicsParams {
+    /// Expected force over depth.
+    pub model: ContactModel,
+    /// α, m/(N·s), ≥ 0
+    pub alpha_m_per_n_s: f64,
+    /// β, 1/(N²·s), ≥ 0
+    pub beta_per_n2_s: f64,
+    /// Order and cost of the step.
+    pub rule: StepRule,
+    /// Direction of motion.
+    pub along: Along,
+    /// Compares h with f⁻¹(F·n) ([`ContactModel::rigid_offset`]) instead of 0, so that a face at rest lies at the tip
+    /// whatever the force. F·n is taken between f(0) and [`LARGEST_SHARE`] · f_max then.
+    pub take_out_rigid_offset: bool,
+}
+
+impl Default for DynamicsParams {
+    /// The paper's α, β, h_min, δ, with the f_max of 10 N that the paper leaves open; the robust choice elsewhere.
+    fn default() -> Self {
+        Self {
+            model: SigmoidParams::default().model(),
+            alpha_m_per_n_s: 0.1,
+            beta_per_n2_s: 0.1,
+            rule: StepRule::Lie,
+            along: Along::Force,
+            take_out_rigid_offset: true,
+        }
+    }
+}
+
+/// Moves a face by one held sample; pure, no allocation.
+///
+/// ```
+/// use nalgebra::{Point3, Vector3};
+/// use touchup_core::haptic::{DynamicsParams, FaceDynamics, FaceState};
+///
+/// let dynamics = FaceDynamics::new(DynamicsParams::default())?;
+/// let face = FaceState { b: Point3::origin(), n: Vector3::z() };
+/// // 2 N push up at 1 mm above the face: it rises towards the tip
+/// let moved = dynamics.step(&face, &Point3::new(0.0, 0.0, 1e-3), &Vector3::new(0.0, 0.0, 2.0), 1e-3)?;
+/// assert!(moved.b.z > 0.0 && moved.b.z < 1e-3);
+/// # Ok::<(), touchup_core::haptic::DynamicsError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FaceDynamics {
+    params: DynamicsParams,
+    /// f(0), N
+    at_zero_n: f64,
+}
+
+/// A sample seen from the face.
+struct FaceSample {
+    /// F/|F|, or zero
+    towards: Vector3<f64>,
+    /// |F|, N
+    magnitude: f64,
+    /// a
+    along: Vector3<f64>,
+    /// p − b at the start
+    arm: Vector3<f64>,
+    dt: f64,
+}
+
+impl FaceDynamics {
+    /// # Errors
+    /// [`DynamicsError::BadParameter`].
+    pub fn new(params: DynamicsParams) -> Result<Self, DynamicsError> {
+        params.model.check()?;
+        for (name, value) in [("alpha_m_per_n_s", params.alpha_m_per_n_s), ("beta_per_n2_s", params.beta_per_n2_s)] {
+            if !(value.is_finite() && value >= 0.0) {
+                return Err(DynamicsError::BadParameter { name, value });
+            }
+        }
+        Ok(Self { params, at_zero_n: params.model.force(0.0) })
+    }
+
+    /// The parameters it was made with.
+    pub fn params(&self) -> &DynamicsParams {
+        &self.params
+    }
+
+    /// The face after holding the tip `p` (m, in O) and the force on the stylus `force` (N, in O) for `dt` (s).
+    ///
+    /// # Errors
+    /// Input that is not finite, a normal that is not of length 1, a negative `dt`, a result that overflows, and
+    /// [`DynamicsError::Stiff`] from [`StepRule::DormandPrince`].
+    pub fn step(
+        &self,
+        face: &FaceState,
+        p: &Point3<f64>,
+        force: &Vector3<f64>,
+        dt: f64,
+    ) -> Result<FaceState, DynamicsError> {
+        self.step_from(&face.n, face, p, force, dt)
+    }
+
+    /// As [`Self::step`], with the n*(0) of an earlier step: [`Along::InitialNormal`] keeps b* on the line on which it
+    /// was then. n*(0) is taken as it is, |n*(0)| = 1.
+    ///
+    /// # Errors
+    /// Those of [`Self::step`].
+    pub fn step_from(
+        &self,
+        initial_normal: &Vector3<f64>,
+        face: &FaceState,
+        p: &Point3<f64>,
+        force: &Vector3<f64>,
+        dt: f64,
+    ) -> Result<FaceState, DynamicsError> {
+        let touch = self.touch(initial_normal, face, p, force, dt)?;
+        let (way, n) = match self.params.rule {
+            StepRule::Lie => self.lie(&face.n, &touch),
+            StepRule::DriftCorrected => self.drift_corrected(&face.n, &touch),
+            StepRule::DormandPrince => self.dormand_prince(&face.n, &touch)?,
+        };
+        let b = face.b + way * touch.along;
+        if !finite(&b.coords) || !finite(&n) {
+            return Err(DynamicsError::NotFinite { what: "the result of the step" });
+        }
+        Ok(FaceState { b, n })
+    }
+
+    fn touch(
+        &self,
+        initial_normal: &Vector3<f64>,
+        face: &FaceState,
+        p: &Point3<f64>,
+        force: &Vector3<f64>,
+        dt: f64,
+    ) -> Result<FaceSample, DynamicsError> {
+        let (magnitude, towards) = split(force);
+        let sum = face.b.coords + face.n + p.coords;
+        if !(finite(&sum) && finite(force) && magnitude.is_finite() && dt.is_finite()) {
+            return Err(not_finite(face, p, force));
+        }
+        let length_squared = face.n.norm_squared();
+        if (length_squared - 1.0).abs() > 2.0 * UNIT_TOLERANCE {
+            return Err(DynamicsError::NotUnit { length: length_squared.sqrt() });
+        }
+        if dt < 0.0 {
+            return Err(DynamicsError::BadTimeStep { dt_s: dt });
+        }
+        let along = if self.params.along == Along::Force && magnitude > 0.0 { towards } else { *initial_normal };
+        Ok(FaceSample { towards, magnitude, along, arm: p - face.b, dt })
+    }
+
+    /// F·n as it is compared, N, and the h that is compared with it, m.
+    #[inline]
+    fn compared(&self, n: &Vector3<f64>, touch: &FaceSample, way: f64) -> (f64, f64) {
+        let force = touch.magnitude * touch.towards.dot(n);
+        let h = (touch.arm - way * touch.along).dot(n);
+        if !self.params.take_out_rigid_offset {
+            return (force, h);
+        }
+        let force = self.params.model.comparable(force, self.at_zero_n);
+        (force, h + self.params.model.distance(force))
+    }
+
+    #[inline]
+    fn hold(&self, n: &Vector3<f64>, touch: &FaceSample) -> Hold {
+        let (force, h) = self.compared(n, touch, 0.0);
+        let cosine = touch.along.dot(n);
+        Hold { h, drift: 0.0, cosine, force, alpha: self.params.alpha_m_per_n_s, dt: touch.dt }
+    }
+
+    #[inline]
+    fn turned(&self, n: &Vector3<f64>, touch: &FaceSample, impulse: f64) -> Vector3<f64> {
+        turn(n, &touch.towards, self.params.beta_per_n2_s * touch.magnitude * impulse)
+    }
+
+    #[inline]
+    fn lie(&self, n: &Vector3<f64>, touch: &FaceSample) -> (f64, Vector3<f64>) {
+        let Shift { way, impulse } = self.params.model.flow(&self.hold(n, touch));
+        (way, self.turned(n, touch, impulse))
+    }
+
+    /// The position flow with h₀ + v t from the arm held and n turning evenly from its start to its predicted end;
+    /// twice, so that b* fits the n* that is returned. F·n and a·n, which change during the step, enter by a mean
+    /// that weighs the end the more the faster h forgets: 1/2 when slow (second order), 1 when stiff.
+    fn drift_corrected(&self, n: &Vector3<f64>, touch: &FaceSample) -> (f64, Vector3<f64>) {
+        let (way, end) = self.lie(n, touch);
+        if touch.dt == 0.0 || end == *n {
+            return (way, end);
+        }
+        let (shift, spare) = self.drifting_flow(n, &end, touch, way);
+        let end = self.turned(n, touch, shift.impulse + spare);
+        let (shift, _) = self.drifting_flow(n, &end, touch, shift.way);
+        (shift.way, end)
+    }
+
+    /// The flow, and what its mean of F·n leaves out of the impulse, N·s.
+    fn drifting_flow(&self, n: &Vector3<f64>, end: &Vector3<f64>, touch: &FaceSample, way: f64) -> (Shift, f64) {
+        let start = self.hold(n, touch);
+        let (force, h) = self.compared(end, touch, 0.0);
+        let cosine = touch.along.dot(end);
+        let (_, h_end) = self.compared(end, touch, way);
+        let decay = -start.alpha * cosine * self.params.model.slope(h_end) * touch.dt;
+        let weight = end_weight(decay);
+        let mean = |from: f64, to: f64| from + weight * (to - from);
+        let hold = Hold {
+            drift: (h - start.h) / touch.dt,
+            cosine: mean(start.cosine, cosine),
+            force: mean(start.force, force),
+            ..start
+        };
+        (self.params.model.flow(&hold), (0.5 - weight) * (force - start.force) * touch.dt)
+    }
+
+    fn dormand_prince(&self, n: &Vector3<f64>, touch: &FaceSample) -> Result<(f64, Vector3<f64>), DynamicsError> {
+        let (model, alpha, beta) = (&self.params.model, self.params.alpha_m_per_n_s, self.params.beta_per_n2_s);
+        let rate = |y: &[f64; 4]| {
+            let n = Vector3::new(y[1], y[2], y[3]);
+            let (force, h) = self.compared(&n, touch, y[0]);
+            let expected = model.force(h);
+            let cosine = touch.towards.dot(&n);
+            let turning = beta * touch.magnitude * expected * (touch.towards - cosine * n);
+            [alpha * (force - expected), turning.x, turning.y, turning.z]
+        };
+        let scale = match *model {
+            ContactModel::Sigmoid { h_min_m, .. } => h_min_m,
+            ContactModel::Spring { stiffness_n_per_m } => {
+                self.hold(n, touch).h.abs() + touch.magnitude / stiffness_n_per_m
+            }
+        };
+        let start = [0.0, n.x, n.y, n.z];
+        let scale = [scale.max(f64::MIN_POSITIVE), 1.0, 1.0, 1.0];
+        let [way, x, y, z] = dormand_prince::integrate(start, touch.dt, scale, dormand_prince::RELATIVE, rate)?;
+        Ok((way, Vector3::new(x, y, z).normalize()))
+    }
+}
+
+/// ∫ e^−z(1−x) x dx / ∫ e^−z(1−x) dx over 0..1.
+fn end_weight(z: f64) -> f64 {
+    if !z.is_finite() || z > f64::MAX.sqrt() {
+        return 1.0;
+    }
+    if z < SMALL_DECAY {
+        return 0.5 + z.max(0.0) / 12.0;
+    }
+    let decayed = -(-z).exp_m1();
+    1.0 / decayed - 1.0 / z
+}
+
+/// |F| and F/|F|, also where |F|² would underflow or overflow; zero where F is.
+#[inline]
+fn split(force: &Vector3<f64>) -> (f64, Vector3<f64>) {
+    let squared = force.norm_squared();
+    if (SMALLEST_SQUARE..f64::MAX).contains(&squared) {
+        let magnitude = squared.sqrt();
+        return (magnitude, force / magnitude);
+    }
+    let largest = force.amax();
+    if largest == 0.0 {
+        return (0.0, Vector3::zeros());
+    }
+    let scaled = force / largest;
+    let length = scaled.norm();
+    (largest * length, scaled / length)
+}
+
+#[cold]
+fn not_finite(face: &FaceState, p: &Point3<f64>, force: &Vector3<f64>) -> DynamicsError {
+    let parts = [("b", face.b.coords), ("n", face.n), ("p", p.coords), ("force", *force)];
+    let what = parts.iter().find(|(_, v)| !finite(v)).map_or("dt, |F| or a sum of the input", |(what, _)| what);
+    DynamicsError::NotFinite { what }
+}
+
+#[inline]
+fn finite(v: &Vector3<f64>) -> bool {
+    v.iter().all(|x| x.is_finite())
+}

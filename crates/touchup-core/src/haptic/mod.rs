@@ -1,0 +1,539 @@
+//! The haptic update: one sample of pose and force moves the mesh.
+//!
+//! [`Refiner::push`] does all of it: contact, closest face, face dynamics, deformation of the region around it, update of the tree. [`RefineParams::robust`] is what works on real scans, [`RefineParams::paper`]
+//! the published rule.
+
+mod carve;
+mod collision;
+mod deform;
+pub mod dynamics;
+mod followed;
+mod guard;
+mod inside_scratch;
+mod marks;
+mod params;
+mod registration;
+mod ring;
+mod roi;
+mod strokes;
+
+use nalgebra::{Point3, Vector3};
+use serde::Serialize;
+
+pub use deform::{Footprint, RegionFit, mean_edge};
+pub use dynamics::{
+    Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, SigmoidParams, StepRule,
+};
+pub use guard::GuardParams;
+pub use params::{CarveParams, ClosestBy, RefineParams, ScanParams, ScanRegion, TouchPoint, relaxing_alpha};
+pub use registration::{Registrar, Registration, RegistrationError, RegistrationParams};
+pub use roi::RoiSize;
+
+/// Of a stylus: part of [`RefineParams`].
+pub use crate::stylus::{SlidingParams, TipParams};
+
+use crate::mesh::{Changes, FaceHit, FaceId, MeshError, Nearby, TriMesh, VertexId};
+use crate::reconstruct::{PatchDelta, Support};
+use crate::stylus::{
+    Ball, ContactEstimator, ContactSample, FeltNormal, FrictionCoefficient, LONGEST_HOLD, Sample, SampleError,
+    SettingError, TipBody, TipPlace,
+};
+use deform::{DeformableMesh, HandleRegion};
+use dynamics::turn;
+use inside_scratch::InsideScratch;
+
+/// The felt normal of one sample is uncertain by this, rad: a flat tip that may lie on its face does.
+const FLUSH: f64 = 0.05;
+
+/// Why a sample was refused, or a refiner not built. A refused sample does not change the mesh.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RefineError {
+    /// Not finite, absurd, or not in order of time.
+    #[error(transparent)]
+    Sample(#[from] SampleError),
+    /// A setting outside its range.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    /// A parameter of the dynamics outside its range, or a step that overflows.
+    #[error(transparent)]
+    Dynamics(#[from] DynamicsError),
+    /// Nothing to refine.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// A handle that is not in the mesh.
+    #[error("the mesh has no face {face}; take a handle from `TriMesh::faces`")]
+    NoSuchFace {
+        /// its id
+        face: u32,
+    },
+}
+
+/// The four cases of haptic mismatch \[paper, Fig 5\].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub enum Case {
+    /// 1: nothing is felt and nothing expected.
+    Free,
+    /// 2: the mesh alone says contact; it is carved away.
+    MeshOnly,
+    /// 3: the surface alone is felt; the mesh is raised to it.
+    SurfaceOnly,
+    /// 4: both; the mesh is moved and turned.
+    Both,
+}
+
+/// Haptic mismatch at the face that was touched \[paper, Eq 1–5\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mismatch {
+    /// the handle
+    pub face: FaceId,
+    /// h, signed distance of the ball's contact point from the face, m (Eq 1)
+    pub distance: f64,
+    /// F*, N, in O (Eq 2)
+    pub expected_force_o: Vector3<f64>,
+    /// ε_L = F − F*, N (Eq 4)
+    pub linear: Vector3<f64>,
+    /// ε_R = F* × F, N² (Eq 5)
+    pub rotational: Vector3<f64>,
+}
+
+/// What the force says.
+#[derive(Clone, Copy, Debug)]
+enum ContactState {
+    /// no contact
+    Nothing,
+    /// contact; which way the surface faces is not asked \[paper\]
+    Something,
+    /// contact with a surface of this outward normal
+    Surface(Vector3<f64>),
+}
+
+/// What one sample did.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Update {
+    /// which of the four cases
+    pub case: Case,
+    /// at the touched face; `None` in free motion and beyond the reach
+    pub mismatch: Option<Mismatch>,
+    /// how the deformation ended; `None` when nothing was to be moved
+    pub fit: Option<RegionFit>,
+}
+
+impl Update {
+    const FREE: Self = Self { case: Case::Free, mismatch: None, fit: None };
+}
+
+/// What became of the samples so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct RefineCounts {
+    /// taken
+    pub accepted: u64,
+    /// times that contact began
+    pub contacts: u64,
+    /// updates of the mesh, by contact or by carving; a sample can bring both
+    pub moved: u64,
+    /// updates shortened or given up to keep the mesh sound
+    pub cut_back: u64,
+    /// contacts beyond the reach of any face
+    pub out_of_reach: u64,
+    /// contacts outside the region that may be touched
+    pub outside_region: u64,
+    /// contacts with a force beyond what the contact model can answer; clamped where the rigid offset is taken out
+    pub clamped: u64,
+}
+
+/// Refines a mesh by touch, sample by sample.
+///
+/// # Example
+/// ```
+/// use nalgebra::{Isometry3, Point3, Vector3};
+/// use touchup_core::{mesh::TriMesh, haptic::*, stylus::{Sample, Wrench}};
+///
+/// let p = |x, y| Point3::new(x, y, 0.0);
+/// let mesh = TriMesh::new(vec![p(0.0, 0.0), p(0.01, 0.0), p(0.0, 0.01)], vec![[0, 1, 2]])?;
+/// let mut refiner = Refiner::new(mesh, RefineParams::robust(TipParams { radius: 1e-3, stiffness: Some(2e4) }))?;
+/// // a ball of 1 mm rests 0.1 mm higher than the scan says, pressed with 2 N
+/// let wrench = Wrench { force: Vector3::new(0.0, 0.0, 2.0), torque: Vector3::zeros() };
+/// for i in 0..1000 {
+///     let pose_ot = Isometry3::translation(0.003, 0.003, 1.0e-3 + 0.1e-3 - 2.0 / 2e4);
+///     refiner.push(&Sample { stamp_ns: i * 1_000_000, pose_ot, wrench })?;
+/// }
+/// assert!((refiner.mesh().position(touchup_core::mesh::VertexId(0)).z - 0.1e-3).abs() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Refiner {
+    params: RefineParams,
+    contacts: ContactEstimator,
+    dynamics: FaceDynamics,
+    deformable: DeformableMesh,
+    contact_region: HandleRegion,
+    carve_region: HandleRegion,
+    /// leaves around the point of the tip that touches …
+    near_contact: Nearby,
+    /// … and around its middle
+    near_tip: Nearby,
+    body: TipBody,
+    /// from the tip to the handle, unit, in O; a ball needs none
+    axis: Vector3<f64>,
+    inside: InsideScratch,
+    /// the handle and n*(0), its normal when it became the handle (Eq 6)
+    begun: Option<(FaceId, Vector3<f64>)>,
+    counts: RefineCounts,
+}
+
+/// The ball against the face it touches.
+struct Pressing {
+    handle: FaceId,
+    /// the face before the update
+    face: FaceState,
+    /// outward normal of the surface as felt, unit; the face's own in [`RefineParams::paper`]
+    normal: Vector3<f64>,
+    /// the point of the reported ball that touches, m, in O
+    point: Point3<f64>,
+    /// force on the stylus; only its part along `normal` where friction is known, N, in O
+    force_o: Vector3<f64>,
+}
+
+impl Refiner {
+    /// Builds tree and buffers; takes O(F log F).
+    ///
+    /// # Errors
+    /// [`RefineError::Setting`], [`RefineError::Dynamics`], [`MeshError::Empty`].
+    pub fn new(mesh: TriMesh, params: RefineParams) -> Result<Self, RefineError> {
+        if mesh.face_count() == 0 {
+            return Err(MeshError::Empty.into());
+        }
+        params.check()?;
+        let mut deformable = DeformableMesh::new(mesh, params.guard, params.region.as_ref());
+        deformable.largest_move =
+            (params.largest_move_edges * deformable.mean_edge).max(params.largest_move_noises * params.scan_noise);
+        Ok(Self {
+            contacts: ContactEstimator::new(params.contact())?,
+            dynamics: FaceDynamics::new(params.dynamics)?,
+            contact_region: deformable.region(params.roi),
+            carve_region: deformable.region(RoiSize::Handle),
+            near_contact: Nearby::default(),
+            near_tip: Nearby::default(),
+            deformable,
+            body: TipBody::new(params.shape, params.tip.radius)?,
+            axis: Vector3::z(),
+            inside: InsideScratch::new(),
+            begun: None,
+            counts: RefineCounts::default(),
+            params,
+        })
+    }
+
+    /// Takes the next sample and moves the mesh by what it tells.
+    ///
+    /// # Errors
+    /// [`RefineError::Sample`] for one that is not finite, absurd or not after the last; nothing is changed then.
+    /// [`RefineError::Dynamics`] for a step that overflows or is too stiff for its rule; the mesh is not changed then.
+    pub fn push(&mut self, sample: &Sample) -> Result<Update, RefineError> {
+        self.take(sample, None)
+    }
+
+    /// As [`Self::push`], but a contact acts on `handle` instead of the closest face: for a stylus that is kept on one
+    /// face after the other \[paper, Sec 4.3\].
+    ///
+    /// # Errors
+    /// Those of [`Self::push`], and [`RefineError::NoSuchFace`]; nothing is changed then.
+    pub fn push_on(&mut self, handle: FaceId, sample: &Sample) -> Result<Update, RefineError> {
+        if !self.deformable.mesh.has_face(handle) {
+            return Err(RefineError::NoSuchFace { face: handle.0 });
+        }
+        self.take(sample, Some(handle))
+    }
+
+    fn take(&mut self, sample: &Sample, handle: Option<FaceId>) -> Result<Update, RefineError> {
+        let &ContactSample { ball, dt, ball_contact, surface, .. } = self.contacts.observe(sample)?;
+        let dt = dt.min(LONGEST_HOLD);
+        self.deformable.now_ns = sample.stamp_ns;
+        if !self.body.is_ball() {
+            self.axis = TipPlace::from(&sample.pose_ot).axis;
+        }
+        let felt = self.contact_state(ball_contact.is_some(), surface);
+        if self.params.region.is_some_and(|touched| !touched.region.contains(&ball.centre)) {
+            return Ok(self.pass(felt));
+        }
+        let update = match felt {
+            ContactState::Nothing => Update::FREE,
+            _ => {
+                self.deformable.touch();
+                self.press(&ball, felt, handle, dt)?
+            }
+        };
+        self.counts.accepted += 1;
+        match self.params.carve {
+            Some(carve) => Ok(self.carve(&carve, &ball, felt, dt, update)),
+            None => Ok(update),
+        }
+    }
+
+    /// A sample outside the region that may be touched moves nothing.
+    fn pass(&mut self, felt: ContactState) -> Update {
+        self.counts.accepted += 1;
+        match felt {
+            ContactState::Nothing => Update::FREE,
+            _ => {
+                self.counts.outside_region += 1;
+                Update { case: Case::SurfaceOnly, mismatch: None, fit: None }
+            }
+        }
+    }
+
+    fn contact_state(&mut self, is_in_contact: bool, surface: Option<FeltNormal>) -> ContactState {
+        self.counts.contacts = self.contacts.contacts();
+        if !is_in_contact {
+            self.begun = None;
+            return ContactState::Nothing;
+        }
+        match self.params.touch_point {
+            TouchPoint::FaceNormal => ContactState::Something,
+            TouchPoint::FeltNormal => ContactState::Surface(surface.map(|surface| surface.normal).unwrap_or_default()),
+        }
+    }
+
+    /// Cases 3 and 4, and without a gate also 1 and 2: moves the face that the ball touches.
+    fn press(
+        &mut self,
+        ball: &Ball,
+        felt: ContactState,
+        handle: Option<FaceId>,
+        dt: f64,
+    ) -> Result<Update, RefineError> {
+        let Some(pressing) = self.pressing(ball, felt, handle) else {
+            self.counts.out_of_reach += 1;
+            return Ok(Update { case: Case::SurfaceOnly, mismatch: None, fit: None });
+        };
+        let mismatch = self.mismatch(&pressing);
+        let case = if mismatch.distance < 0.0 { Case::Both } else { Case::SurfaceOnly };
+        let untouched = Ok(Update { case, mismatch: Some(mismatch), fit: None });
+        let face = &pressing.face;
+        // without area a face has no normal; turned away from what is felt it is another surface
+        let is_apart = face.n == Vector3::zeros() || face.n.dot(&pressing.normal) < self.params.smallest_contact_cosine;
+        if is_apart || self.deformable.is_stiff(pressing.handle) {
+            return untouched;
+        }
+        self.counts.clamped += u64::from(self.params.dynamics.model.clamps(pressing.force_o.dot(&face.n)));
+        let initial = self.begun.filter(|(handle, _)| *handle == pressing.handle).map_or(face.n, |(_, n)| n);
+        self.begun = Some((pressing.handle, initial));
+        let mut next = self.dynamics.step_from(&initial, face, &pressing.point, &pressing.force_o, dt)?;
+        if let Some(turning) = self.params.turning {
+            next.n = turn(&face.n, &pressing.normal, turning * dt);
+        }
+        self.deformable.feel(pressing.handle, &pressing.normal);
+        let steps = self.rigid_steps(&pressing, &next);
+        let fit = self.deformable.deform(&mut self.contact_region, pressing.handle, self.params.roi, &steps);
+        self.count(fit);
+        Ok(Update { case, mismatch: Some(mismatch), fit: Some(fit) })
+    }
+
+    /// The ball against `handle`, else against the face that it touches; `None` beyond the reach.
+    fn pressing(&mut self, ball: &Ball, felt: ContactState, handle: Option<FaceId>) -> Option<Pressing> {
+        let reach = self.deformable.largest_move + self.params.tip.radius;
+        // the spring expects the deflection F/k of the tip, a rigid contact does not
+        let centre = if self.params.dynamics.take_out_rigid_offset { ball.centre } else { ball.reported };
+        let seek = match felt {
+            ContactState::Surface(normal) => self.touching_point(centre, &normal),
+            _ => centre,
+        };
+        let last = self.contact_region.handle();
+        let hit = match self.params.closest {
+            _ if handle.is_some() => None,
+            ClosestBy::Surface => self.deformable.closest(&seek, last, reach, &mut self.near_contact),
+            ClosestBy::Barycentre => self.deformable.tree.closest_barycentre(&self.deformable.mesh, &seek, reach),
+        };
+        let handle = handle.or(hit.map(|hit| hit.face))?;
+        let mesh = &self.deformable.mesh;
+        let face = FaceState { b: mesh.barycentre(handle), n: mesh.normal(handle) };
+        Some(match felt {
+            ContactState::Surface(normal) => {
+                Pressing { handle, face, normal, point: seek, force_o: normal * ball.force_o.dot(&normal) }
+            }
+            _ => {
+                let point = self.touching_point(centre, &face.n);
+                Pressing { handle, face, normal: face.n, point, force_o: ball.force_o }
+            }
+        })
+    }
+
+    /// The point of the tip that touches a surface of this outward normal, m, in O.
+    fn touching_point(&self, centre: Point3<f64>, normal: &Vector3<f64>) -> Point3<f64> {
+        let place = TipPlace { centre, axis: self.axis };
+        match self.body.touched(&place, normal, FLUSH) {
+            Some(touched) => touched.point,
+            None => self.body.support(&place, &-normal),
+        }
+    }
+
+    fn mismatch(&self, pressing: &Pressing) -> Mismatch {
+        let distance = (pressing.point - pressing.face.b).dot(&pressing.face.n);
+        let expected = pressing.face.n * self.params.dynamics.model.force(distance);
+        Mismatch {
+            face: pressing.handle,
+            distance,
+            expected_force_o: expected,
+            linear: pressing.force_o - expected,
+            rotational: expected.cross(&pressing.force_o),
+        }
+    }
+
+    /// The rigid motion of the handle to its next state, as steps of its corners, m.
+    ///
+    /// Along the force a corner only goes along it: the turn's sideways part would make the triangles creep.
+    fn rigid_steps(&self, Pressing { handle, face, normal, .. }: &Pressing, next: &FaceState) -> [Vector3<f64>; 3] {
+        // the smallest rotation from n to n′: x + v × x + v × (v × x) / (1 + n·n′), v = n × n′
+        let axis = face.n.cross(&next.n);
+        let bend = 1.0 / (1.0 + face.n.dot(&next.n)).max(f64::EPSILON);
+        let longest = self.params.longest_step_edges * self.deformable.mean_edge;
+        let along = self.params.dynamics.along == Along::Force;
+        let steps = self.deformable.mesh.triangle(*handle).map(|corner| {
+            let arm = corner - face.b;
+            let across = axis.cross(&arm);
+            let step = across + axis.cross(&across) * bend + (next.b - face.b);
+            if along { normal * step.dot(normal) } else { step }
+        });
+        // by one share: corners shortened each by itself would turn the face
+        let farthest = steps.iter().map(Vector3::norm).fold(0.0, f64::max);
+        if farthest > longest { steps.map(|step| step * (longest / farthest)) } else { steps }
+    }
+
+    /// Keeps what it takes to undo strokes from here on; with a patch that is followed, it is the patch's strokes that are
+    /// undone ([`crate::reconstruct::Patcher::undo`]).
+    pub fn keep_strokes(&mut self) {
+        self.deformable.keep_strokes();
+    }
+
+    /// How many strokes can be undone: 64 at most.
+    pub fn strokes(&self) -> usize {
+        self.deformable.strokes()
+    }
+
+    /// Takes the last stroke back, bit by bit: what was touched without a pause of a tenth of a second, and what the tip moved
+    /// after it. Returns whether there was one. What the samples told of friction and bias stays.
+    pub fn undo(&mut self) -> bool {
+        self.change_strokes(true)
+    }
+
+    /// Does the stroke again that was undone last, bit by bit, unless something was touched since. Returns whether there was
+    /// one.
+    pub fn redo(&mut self) -> bool {
+        self.change_strokes(false)
+    }
+
+    fn change_strokes(&mut self, is_undo: bool) -> bool {
+        let has_changed = self.deformable.change_strokes(is_undo);
+        if has_changed {
+            self.forget_regions();
+        }
+        has_changed
+    }
+
+    /// Makes ready to follow a patch, with room for so many new faces: more are taken in all the same, with a pause.
+    ///
+    /// # Errors
+    /// [`MeshError::TooMany`] where memory is short.
+    pub fn expect_patch(&mut self, faces: usize) -> Result<(), RefineError> {
+        Ok(self.deformable.expect_patch(faces)?)
+    }
+
+    /// Takes up what changed in the patch of this scan. What this moved up to the patch's last touch goes back to where scan
+    /// and patch have it; what was touched stands in the patch now, which alone moves it from then on. Does nothing before
+    /// [`Self::expect_patch`].
+    ///
+    /// # Errors
+    /// [`MeshError::TooMany`] when 32-bit ids do not suffice, [`MeshError::NotFinite`]; the mesh is torn then.
+    pub fn follow(&mut self, delta: &PatchDelta) -> Result<(), RefineError> {
+        self.begin_to_follow(delta);
+        self.go_on_following(delta, usize::MAX)?;
+        Ok(())
+    }
+
+    /// As [`Self::follow`], bit by bit, so that no sample has to wait for long: [`Self::go_on_following`] is to be called with
+    /// the same delta until it is done.
+    pub fn begin_to_follow(&mut self, delta: &PatchDelta) {
+        if self.deformable.begin_delta(delta) {
+            self.forget_regions();
+        }
+    }
+
+    /// Takes up to `most` parts more of the change of the patch, as [`crate::reconstruct::Splice::go_on`]; returns whether that was
+    /// all. In between the mesh has gaps and overlaps where old faces meet new ones.
+    ///
+    /// # Errors
+    /// As [`Self::follow`].
+    pub fn go_on_following(&mut self, delta: &PatchDelta, most: usize) -> Result<bool, RefineError> {
+        if !delta.is_empty() {
+            self.forget_regions();
+        }
+        Ok(self.deformable.go_on(delta, most)?)
+    }
+
+    /// Faces came, went or moved.
+    fn forget_regions(&mut self) {
+        self.contact_region.forget();
+        self.carve_region.forget();
+        self.begun = None;
+    }
+
+    fn count(&mut self, fit: RegionFit) {
+        self.counts.moved += 1;
+        self.counts.cut_back += u64::from(fit == RegionFit::CutBack);
+    }
+
+    /// The mesh as it stands.
+    pub fn mesh(&self) -> &TriMesh {
+        &self.deformable.mesh
+    }
+
+    /// From here on notes what changes in the mesh, for [`Self::take_changes`].
+    pub fn watch(&mut self) {
+        self.deformable.mesh.watch();
+    }
+
+    /// What changed in the mesh since this was last asked, as [`TriMesh::take_changes`].
+    pub fn take_changes(&mut self, most: usize, into: &mut Changes) -> bool {
+        self.deformable.mesh.take_changes(most, into)
+    }
+
+    /// What a vertex rests on in the patch that is followed; `None` where none is.
+    pub fn support(&self, vertex: VertexId) -> Option<Support> {
+        self.deformable.support(vertex)
+    }
+
+    /// Gives the mesh back.
+    pub fn into_mesh(self) -> TriMesh {
+        self.deformable.mesh
+    }
+
+    /// Memory of mesh and tree as they stand.
+    pub fn footprint(&self) -> Footprint {
+        self.deformable.footprint()
+    }
+
+    /// The closest face of the mesh as it stands, by true surface distance, nearer than `reach` (m).
+    pub fn closest_face(&self, p: &Point3<f64>, reach: f64) -> Option<FaceHit> {
+        self.deformable.tree.closest(&self.deformable.mesh, p, reach)
+    }
+
+    /// What became of the samples so far.
+    pub fn counts(&self) -> &RefineCounts {
+        &self.counts
+    }
+
+    /// Kinetic friction as measured so far; `None` until the ball has slid far enough, or where friction is not asked for.
+    pub fn friction(&self) -> Option<FrictionCoefficient> {
+        self.contacts.friction()
+    }
+
+    /// What was decided about the contact of the last sample; `None` before the first.
+    pub fn contact(&self) -> Option<&ContactSample> {
+        self.contacts.latest()
+    }
+
+    /// The vertices that the last contact moved.
+    pub fn moved_vertices(&self) -> &[VertexId] {
+        self.contact_region.vertices()
+    }
+}

@@ -1,0 +1,229 @@
+//! The settings of a [`super::Refiner`], and the two presets.
+
+use super::guard::GuardParams;
+use super::{Along, ContactModel, DynamicsParams, RoiSize, StepRule};
+use crate::mesh::Region;
+use crate::parameters;
+use crate::stylus::{
+    BiasParams, CompensatorParams, ContactEstimatorParams, ContactGateParams, SettingError, SlidingParams, TipBody,
+    TipParams, TipShape,
+};
+
+parameters! {
+    /// How good a scan is.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct ScanParams in "scan" {
+        /// Standard deviation of the scan from the true surface.
+        ///
+        /// In m. A consumer depth camera at half a metre.
+        noise: f64 = 0.6, "noise_mm" [MM, 0, 1000];
+    }
+}
+
+/// Which face is the closest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ClosestBy {
+    /// True distance to the surface.
+    Surface,
+    /// Distance to the barycentre \[paper, Eq 12\].
+    Barycentre,
+}
+
+/// Which point of the ball touches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TouchPoint {
+    /// The one under the normal of the closest face; the force only says how hard \[paper\].
+    FaceNormal,
+    /// The one that the felt force points away from.
+    FeltNormal,
+}
+
+parameters! {
+    /// Carving: what the ball passes through without a force is not there (case 2).
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct CarveParams in "carve" {
+        /// Share of the depth that goes in a second.
+        ///
+        /// In 1/s. What the ball sweeps is certain, and it is gone soon.
+        rate: f64 = 300.0, "rate_per_s" [PER_S, 0, 1e6];
+        /// Depth that is left alone: the noise of the tracking.
+        ///
+        /// In m.
+        tolerance: f64 = 0.05, "tolerance_mm" [MM, 0, 1000];
+        /// While in contact only what is deeper than this is taken away: what is shallower may be the measured surface itself.
+        ///
+        /// In m.
+        contact_tolerance: f64 = 0.2, "contact_tolerance_mm" [MM, 0, 1000];
+    }
+}
+
+/// The part of a scan that a refiner has, and where in it may be touched.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScanRegion {
+    /// a contact whose ball is centred elsewhere moves nothing
+    pub region: Region,
+    /// vertices farther from the region than this stay, m
+    pub margin: f64,
+    /// mean edge of the whole scan, m
+    pub mean_edge: f64,
+}
+
+/// All settings of a [`super::Refiner`]. What is `None` is not built.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RefineParams {
+    /// Weight, bias, frames.
+    pub compensator: CompensatorParams,
+    /// Slow drift of the sensor, followed in free air; `None`: it has none \[paper\].
+    pub bias: Option<BiasParams>,
+    /// `None`: every sample is contact \[paper\].
+    pub gate: Option<ContactGateParams>,
+    /// Size and stiffness of the tip.
+    pub tip: TipParams,
+    /// Which tip it is: a ball in both presets.
+    pub shape: TipShape,
+    /// Smoothing and friction; `None`: the sample as it is, and the force taken for the normal.
+    pub sliding: Option<SlidingParams>,
+    /// Where on the ball the contact is.
+    pub touch_point: TouchPoint,
+    /// Which face is the handle.
+    pub closest: ClosestBy,
+    /// Eq 1–7.
+    pub dynamics: DynamicsParams,
+    /// Rate at which a touched face turns to the felt normal, 1/s: tan(θ/2) falls as e^(−rate t), which is Eq 7 with
+    /// both forces at unit size (on a rigid part F* is F). `None`: Eq 7 as printed, in `dynamics`.
+    pub turning: Option<f64>,
+    /// Carving by free motion; `None` leaves it to the dynamics \[paper\].
+    pub carve: Option<CarveParams>,
+    /// Size of the region that follows the handle.
+    pub roi: RoiSize,
+    /// What an update may not do; `None`: anything \[paper\], which on a noisy scan ends in a blow-up.
+    pub guard: Option<GuardParams>,
+    /// A face turned away from the felt normal by more than this cosine is another surface. Default 0.2: 78°.
+    pub smallest_contact_cosine: f64,
+    /// Longest step of a vertex in one update, in mean edges. Default 1/25, far below any feature the mesh can show.
+    pub longest_step_edges: f64,
+    /// A vertex stays within this many mean edges of where it was scanned: beyond that a triangle is too stretched to
+    /// show anything. Default 2.6.
+    pub largest_move_edges: f64,
+    /// … or within this many times the scan's noise, whichever is more. Default 5.
+    pub largest_move_noises: f64,
+    /// Standard deviation of the scan's vertices, m.
+    pub scan_noise: f64,
+    /// `None`: the mesh is all there is, and may be touched anywhere.
+    pub region: Option<ScanRegion>,
+}
+
+/// Relaxation of a touched face in [`RefineParams::robust`], 1/s: within 40 ms, twenty poses at 500 Hz, so that their
+/// noise is averaged, while a hand at 25 mm/s stays on a face of 2.4 mm for 100 ms.
+const RELAXATION: f64 = 25.0;
+/// Contact force at which [`relaxing_alpha`] holds, N.
+const USUAL_FORCE: f64 = 2.5;
+/// Turning of a touched face in [`RefineParams::robust`], 1/s: about as fast as its motion.
+const TURNING: f64 = 30.0;
+
+/// The α, m/(N·s), by which a face relaxes within 40 ms at the usual force of a hand: rate over −df/dh.
+pub fn relaxing_alpha(model: &ContactModel) -> f64 {
+    let slope = match *model {
+        ContactModel::Spring { stiffness_n_per_m } => stiffness_n_per_m,
+        // f (1 − f/f_max) / h_min; at more than half of f_max the slope falls again
+        ContactModel::Sigmoid { f_max_n, h_min_m, .. } => {
+            let share = (USUAL_FORCE / f_max_n).min(0.5);
+            f_max_n * share * (1.0 - share) / h_min_m
+        }
+    };
+    RELAXATION / slope
+}
+
+impl RefineParams {
+    /// What works on real scans: contact gate, friction, motion along the force, carving by free motion.
+    ///
+    /// With a known stiffness the contact model is the linear spring of the real tip, which has no bias; without one it
+    /// is the paper's sigmoid with the rigid-contact offset taken out.
+    pub fn robust(tip: TipParams) -> Self {
+        let model = match tip.stiffness {
+            Some(stiffness_n_per_m) => ContactModel::Spring { stiffness_n_per_m },
+            None => DynamicsParams::default().model,
+        };
+        Self {
+            compensator: CompensatorParams::default(),
+            bias: None,
+            gate: Some(ContactGateParams::default()),
+            tip,
+            shape: TipShape::Ball,
+            sliding: Some(SlidingParams::default()),
+            touch_point: TouchPoint::FeltNormal,
+            closest: ClosestBy::Surface,
+            dynamics: DynamicsParams {
+                model,
+                alpha_m_per_n_s: relaxing_alpha(&model),
+                beta_per_n2_s: 0.0,
+                rule: StepRule::Lie,
+                along: Along::Force,
+                take_out_rigid_offset: tip.stiffness.is_none(),
+            },
+            turning: Some(TURNING),
+            carve: Some(CarveParams::default()),
+            roi: RoiSize::Radius(tip.radius),
+            guard: Some(GuardParams::default()),
+            smallest_contact_cosine: 0.2,
+            longest_step_edges: 0.04,
+            largest_move_edges: 2.6,
+            largest_move_noises: 5.0,
+            scan_noise: ScanParams::default().noise,
+            region: None,
+        }
+    }
+
+    /// The published rule, taken literally: Eq 1–7 and 12 with a one-ring region, no gate, no correction, no guard.
+    pub fn paper(tip: TipParams) -> Self {
+        Self {
+            gate: None,
+            sliding: None,
+            touch_point: TouchPoint::FaceNormal,
+            closest: ClosestBy::Barycentre,
+            dynamics: DynamicsParams {
+                along: Along::InitialNormal,
+                take_out_rigid_offset: false,
+                ..DynamicsParams::default()
+            },
+            turning: None,
+            carve: None,
+            guard: None,
+            roi: RoiSize::OneRing,
+            smallest_contact_cosine: -1.0,
+            largest_move_edges: f64::MAX,
+            ..Self::robust(tip)
+        }
+    }
+
+    /// How contact is decided.
+    pub fn contact(&self) -> ContactEstimatorParams {
+        let &Self { compensator, bias, gate, tip, sliding, .. } = self;
+        ContactEstimatorParams { compensator, bias, gate, tip, sliding }
+    }
+
+    /// # Errors
+    /// [`SettingError`] naming the first setting outside its range.
+    pub fn check(&self) -> Result<(), SettingError> {
+        TipBody::new(self.shape, self.tip.radius)?;
+        self.tip.check()?;
+        ScanParams { noise: self.scan_noise }.check()?;
+        self.carve.iter().try_for_each(CarveParams::check)?;
+        self.sliding.iter().try_for_each(SlidingParams::check)?;
+        self.guard.iter().try_for_each(GuardParams::check)?;
+        let roi = if let RoiSize::Radius(radius) = self.roi { radius } else { 0.0 };
+        let cosine = self.smallest_contact_cosine;
+        SettingError::check("smallest contact cosine", cosine, cosine.abs() <= 1.0, "-1 to 1")?;
+        let not_negative = [
+            ("turning (1/s)", self.turning.unwrap_or(0.0)),
+            ("region of interest (m)", roi),
+            ("largest move (noises)", self.largest_move_noises),
+        ];
+        let positive =
+            [("longest step (edges)", self.longest_step_edges), ("largest move (edges)", self.largest_move_edges)];
+        not_negative
+            .iter()
+            .try_for_each(|&(name, x)| SettingError::check(name, x, x >= 0.0, "finite and 0 or more"))?;
+        positive.iter().try_for_each(|&(name, x)| SettingError::check(name, x, x > 0.0, "finite and more than 0"))
+    }
+}

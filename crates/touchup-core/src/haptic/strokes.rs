@@ -1,0 +1,79 @@
+//! What was there before each stroke, so that the haptic update can be taken back.
+
+use nalgebra::Point3;
+
+use crate::mesh::{FaceId, TriMesh, VertexId};
+use crate::reconstruct::History;
+use crate::stylus::STROKE_PAUSE_NS;
+
+/// Positions and normals kept at most: some 60 MB.
+const MOST_KEPT: usize = 1_000_000;
+
+/// Positions of vertices, and normals felt on faces, before each stroke moved them.
+#[derive(Clone, Debug)]
+pub(super) struct Strokes {
+    positions: History<u32, Point3<f64>>,
+    evidence: History<u32, [f32; 3]>,
+    last_contact_ns: Option<i64>,
+}
+
+impl Default for Strokes {
+    fn default() -> Self {
+        Self { positions: History::new(MOST_KEPT), evidence: History::new(MOST_KEPT), last_contact_ns: None }
+    }
+}
+
+impl Strokes {
+    /// Begins a stroke when the contact at `stamp_ns` follows none for a while.
+    pub fn touch(&mut self, stamp_ns: i64) {
+        if self.last_contact_ns.is_none_or(|last| stamp_ns - last > STROKE_PAUSE_NS) {
+            self.positions.begin();
+            self.evidence.begin();
+        }
+        self.last_contact_ns = Some(stamp_ns);
+    }
+
+    /// How many strokes can be undone.
+    pub fn len(&self) -> usize {
+        self.positions.len().min(self.evidence.len())
+    }
+
+    /// Keeps where vertices are before they move.
+    pub fn note_positions(&mut self, vertices: &[VertexId], mesh: &TriMesh) {
+        for &vertex in vertices {
+            self.positions.note(vertex.0, || mesh.position(vertex));
+        }
+    }
+
+    /// Keeps the normal known on a face before another is felt.
+    pub fn note_evidence(&mut self, face: FaceId, before: [f32; 3]) {
+        self.evidence.note(face.0, || before);
+    }
+
+    /// Exchanges what the last stroke changed with what was there before it; returns the vertices that moved, `None` where
+    /// there was no stroke.
+    pub fn undo(&mut self, mesh: &mut TriMesh, evidence: &mut [[f32; 3]]) -> Option<Vec<VertexId>> {
+        self.last_contact_ns = None;
+        let mut moved = Vec::new();
+        let has_undone = self.len() > 0
+            && self.positions.undo(|vertex, position| exchange(mesh, vertex, position, &mut moved))
+            && self.evidence.undo(|face, normal| std::mem::swap(&mut evidence[face as usize], normal));
+        has_undone.then_some(moved)
+    }
+
+    /// Does the stroke again that was undone last; as [`Self::undo`].
+    pub fn redo(&mut self, mesh: &mut TriMesh, evidence: &mut [[f32; 3]]) -> Option<Vec<VertexId>> {
+        self.last_contact_ns = None;
+        let mut moved = Vec::new();
+        let has_redone = self.positions.redo(|vertex, position| exchange(mesh, vertex, position, &mut moved))
+            && self.evidence.redo(|face, normal| std::mem::swap(&mut evidence[face as usize], normal));
+        has_redone.then_some(moved)
+    }
+}
+
+fn exchange(mesh: &mut TriMesh, vertex: u32, position: &mut Point3<f64>, moved: &mut Vec<VertexId>) {
+    let vertex = VertexId(vertex);
+    let here = mesh.position(vertex);
+    mesh.set_position(vertex, std::mem::replace(position, here));
+    moved.push(vertex);
+}

@@ -1,0 +1,163 @@
+//! What probing needs of an arm: its state at a steady rate, and a few motions that can be broken off at any moment.
+//!
+//! No motion blocks. Whoever moves the arm asks for the next state, looks at it, and goes on or stops; so the same loop drives
+//! a simulated arm in its own time and a real one at 500 Hz, and a stop is never behind a motion in a queue.
+
+use nalgebra::{Isometry3, Vector3};
+
+use super::kinematics::Joints;
+use crate::stylus::Wrench;
+
+/// What an arm says of itself at one moment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ArmState {
+    /// of the controller's clock, ns
+    pub stamp_ns: i64,
+    /// of the probe's tip, origin in the centre of its ball, in the base B; of an arm that does not bend
+    pub pose_bt: Isometry3<f64>,
+    /// what the part does to the tip, in the axes of B about the centre of the ball; weight is off
+    pub wrench_b: Wrench,
+    /// what the sensor of the arm has: contact, weight and bias, in the axes of the flange F about its origin
+    pub raw_wrench_f: Wrench,
+    /// rad
+    pub joints: Joints,
+    /// whether and why it stands
+    pub safety: Safety,
+}
+
+/// What the safety system of an arm says.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Safety {
+    /// It may move.
+    #[default]
+    Normal,
+    /// It stopped by itself: force, speed or a plane.
+    ProtectiveStop,
+    /// Somebody pressed the button, or opened the door.
+    OperatorStop,
+    /// A fault that takes more than a call to be cleared.
+    Fault,
+}
+
+/// What an arm is told; each takes the place of the one before.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Command {
+    /// Straight to a pose of the tip in B, and to rest there.
+    Line {
+        /// where the tip is then, in B
+        to: Isometry3<f64>,
+        /// m/s
+        speed: f64,
+        /// m/s²
+        acceleration: f64,
+    },
+    /// On and on with a velocity of the tip, m/s in B, without turning. It ends with the next command.
+    Velocity {
+        /// m/s in B
+        linear: Vector3<f64>,
+        /// m/s²
+        acceleration: f64,
+    },
+    /// Presses along an axis with a force and goes across it with a velocity.
+    Press {
+        /// unit vector in B, into the part
+        axis: Vector3<f64>,
+        /// N, what the arm does to the part
+        force: f64,
+        /// across the axis, m/s in B
+        feed: Vector3<f64>,
+        /// largest speed along the axis, m/s
+        speed: f64,
+    },
+    /// To rest.
+    Stop {
+        /// m/s²
+        deceleration: f64,
+    },
+}
+
+/// Why an arm does not do what it was told.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ArmError {
+    /// Nothing comes from it.
+    #[error("nothing has come from the arm for {silent_ms} ms: look at its controller and at the cable")]
+    Lost {
+        /// ms
+        silent_ms: u64,
+    },
+    /// It has closed a connection.
+    #[error("the connection for {what} was closed from the arm's side: look at its controller and at the cable")]
+    Dropped {
+        /// what it was for
+        what: &'static str,
+    },
+    /// The states come and their stamps stand still.
+    #[error("the arm's clock stands still: its controller has stopped")]
+    Stale,
+    /// It is not allowed to move.
+    #[error("the arm stands: {safety}")]
+    Stopped {
+        /// why
+        safety: Safety,
+    },
+    /// What it runs for us has ended, and no safety system says why.
+    #[error(
+        "the program on the arm's controller has ended, at its panel, by its watchdog or by another client: look, then recover"
+    )]
+    ProgramEnded,
+    /// What stands between here and the arm has failed; the arm was stopped another way.
+    #[error("the program that speaks to the arm {reason}; the arm was stopped without it: look, then recover")]
+    Client {
+        /// what happened to it
+        reason: String,
+    },
+    /// It cannot be told that.
+    #[error("the arm refuses {what}: {reason}")]
+    Refused {
+        /// the command
+        what: &'static str,
+        /// why
+        reason: String,
+    },
+}
+
+impl std::fmt::Display for Safety {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Normal => "nothing stops it",
+            Self::ProtectiveStop => "protective stop (force, speed or a safety plane): look, then recover",
+            Self::OperatorStop => "stopped by the operator (button or door): release it, then recover",
+            Self::Fault => "its controller reports a fault: look at its panel",
+        })
+    }
+}
+
+/// An arm that holds a probe.
+pub trait Arm {
+    /// Waits for the next state.
+    ///
+    /// # Errors
+    /// [`ArmError::Lost`], [`ArmError::Stale`].
+    fn next_state(&mut self) -> Result<ArmState, ArmError>;
+
+    /// Begins a motion, instead of the one before.
+    ///
+    /// # Errors
+    /// [`ArmError::Refused`], [`ArmError::Lost`].
+    fn command(&mut self, command: &Command) -> Result<(), ArmError>;
+
+    /// Takes what the sensor reads now for nothing. To be called at rest in free air.
+    ///
+    /// # Errors
+    /// As [`Self::command`].
+    fn zero_sensor(&mut self) -> Result<(), ArmError>;
+
+    /// Lets it move again after a protective stop, once somebody has looked. Nothing else calls it, and it moves nothing.
+    ///
+    /// # Errors
+    /// [`ArmError::Stopped`] when what stops it is still there, [`ArmError::Lost`].
+    fn recover(&mut self) -> Result<(), ArmError>;
+
+    /// Time between two states, s.
+    fn period(&self) -> f64;
+}

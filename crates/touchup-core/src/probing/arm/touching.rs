@@ -1,0 +1,276 @@
+//! One touch: approach, search, back off, a slower search, retract.
+//!
+//! The first search finds the surface; the second comes from just above it, slowly, presses to the force that was asked for,
+//! and goes back through the corner at the same speed. Its curve is what [`find_onset`] is given.
+
+use nalgebra::{Isometry3, Point3, Unit, Vector3};
+
+use crate::numeric::mean;
+use crate::probing::plan::Expected;
+
+use super::arm::ArmState;
+use super::onset::{Onset, OnsetError, TouchMoment, find_onset};
+use super::touch_params::TouchParams;
+use super::watched::{GOING, ProbeError, TRIGGERS, Watched};
+
+/// A touch that is wanted, in B.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TouchTarget {
+    /// Where the search begins: the pose of the tip, clear of the part.
+    pub standoff_bt: Isometry3<f64>,
+    /// Along which it is searched, into the part.
+    pub direction: Unit<Vector3<f64>>,
+    /// How far, m.
+    pub search: f64,
+    /// Where the surface will be, as far as touches have told.
+    pub expected: Option<Expected>,
+}
+
+/// What came of a touch.
+#[derive(Clone, Debug, PartialEq)]
+pub enum TouchOutcome {
+    /// The part was felt.
+    Contact {
+        /// where the curve bends
+        onset: Onset,
+        /// centre of the ball at the onset, m in B
+        centre: Point3<f64>,
+        /// mean force of the part on the tip while pressed by more than half of the most, N in B
+        force_b: Vector3<f64>,
+    },
+    /// Nothing was felt on the whole way.
+    Miss {
+        /// how far the ball went from the stand-off, m
+        travel: f64,
+    },
+    /// Something was felt whose curve says nothing.
+    Unclear(OnsetError),
+}
+
+/// A touch with all that was seen of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TouchRecord {
+    /// what was wanted
+    pub target: TouchTarget,
+    /// when it began and ended, by the arm's clock, ns
+    pub stamps_ns: [i64; 2],
+    /// of the measuring search, m/s
+    pub speed: f64,
+    /// of the measuring search, in and out
+    pub curve: Vec<TouchMoment>,
+    /// when it begins, by the arm's clock, ns
+    pub curve_ns: i64,
+    /// of all, N
+    pub peak_force: f64,
+    /// what came of it
+    pub outcome: TouchOutcome,
+}
+
+impl Watched<'_> {
+    /// Touches once. The arm ends at the stand-off.
+    ///
+    /// # Errors
+    /// [`ProbeError`]; a miss is none.
+    pub fn touch(&mut self, target: &TouchTarget, params: &TouchParams) -> Result<TouchRecord, ProbeError> {
+        self.forget_peak();
+        self.line(GOING, &target.standoff_bt, params.safe_speed(), params, params.trigger)?;
+        let begun = self.next(GOING)?.stamp_ns;
+        let line = ApproachLine::of(target);
+        let travel = target.search.min(self.limits().search);
+
+        let fast = line.way * params.safe_speed().min(self.limits().speed);
+        let mut felt = 0;
+        let mut reached = 0.0;
+        let mut searched = |watched: &mut Self, doing, far: f64| {
+            watched.search(doing, fast, far, &mut |state| reached = line.depth(state), &mut |state| {
+                let is_felt =
+                    line.presses(state) > params.trigger || state.wrench_b.force.norm() > ASIDE * params.trigger;
+                felt = if is_felt { felt + 1 } else { 0 };
+                felt >= TRIGGERS
+            })
+        };
+        let mut states = Vec::new();
+        let mut outcome = None;
+        // where the surface is known it is measured at once, from just above it
+        let known = target.expected.map(|expected| (expected.travel, KNOWN * expected.sigma + params.back_off));
+        let mut gone = 0.0;
+        let mut is_felt = false;
+        if let Some((at, room)) =
+            known.filter(|(at, room)| *room <= MOST_ROOM * params.back_off && room < at && at + room <= travel)
+        {
+            gone = at - room;
+            is_felt = searched(self, "approaching", gone)?;
+            self.rest("approaching", &mut |_| {})?;
+            if !is_felt {
+                let pressed = self.press(target, params, room + at - gone, &mut states)?;
+                gone = self.last().map_or(gone, |state| line.depth(&state)).max(gone);
+                outcome = pressed.then(|| outcome_of(&line, params, &states));
+            }
+        }
+        let outcome = match outcome {
+            Some(outcome) => outcome,
+            None if is_felt || searched(self, "searching", travel - gone)? => {
+                self.rest("stopping at the surface", &mut |_| {})?;
+                let is_free = self.back_off(target, params)?;
+                match is_free && self.press(target, params, SECOND * params.back_off, &mut states)? {
+                    true => outcome_of(&line, params, &states),
+                    false => unfelt(&line, params, &states),
+                }
+            }
+            None => {
+                states.clear();
+                self.rest("stopping after a miss", &mut |_| {})?;
+                TouchOutcome::Miss { travel: reached }
+            }
+        };
+        // on the way back the part may still be felt
+        self.line("retracting", &target.standoff_bt, params.link_speed, params, self.limits().force)?;
+        let ended = self.last().map_or(begun, |state| state.stamp_ns);
+        Ok(TouchRecord {
+            target: *target,
+            stamps_ns: [begun, ended],
+            speed: params.measure_speed,
+            curve: line.curve(&states),
+            curve_ns: states.first().map_or(ended, |state| state.stamp_ns),
+            peak_force: self.peak_force(),
+            outcome,
+        })
+    }
+
+    /// Free of the surface again, then a little farther.
+    ///
+    /// No farther than the stand-off: whether it is free there.
+    fn back_off(&mut self, target: &TouchTarget, params: &TouchParams) -> Result<bool, ProbeError> {
+        let (line, slow) = (ApproachLine::of(target), self.slow(target, params));
+        let way_back = self.last().map_or(0.0, |state| line.depth(&state)).max(SECOND * params.back_off);
+        let mut free_at = None;
+        let is_free = self.search("backing off", -slow * BACK, way_back, &mut |_| {}, &mut |state| {
+            if line.presses(state) < params.trigger * FREE {
+                free_at.get_or_insert(line.depth(state));
+            }
+            free_at.is_some_and(|free_at: f64| line.depth(state) < free_at - params.back_off)
+        })?;
+        self.rest("backing off", &mut |_| {})?;
+        Ok(is_free)
+    }
+
+    /// The measuring search, from just above the surface, in and out; whether it pressed as hard as was wanted.
+    ///
+    /// - `room`: so far away the surface is at most, m.
+    fn press(
+        &mut self,
+        target: &TouchTarget,
+        params: &TouchParams,
+        room: f64,
+        states: &mut Vec<ArmState>,
+    ) -> Result<bool, ProbeError> {
+        let (line, slow) = (ApproachLine::of(target), self.slow(target, params));
+        states.clear();
+        let stop_at = params.force - self.overshoot(params, slow.norm());
+        let is_pressed = |state: &ArmState| line.presses(state) > stop_at;
+        // a ball that slides down a rim is pushed aside more than back
+        self.search(
+            "measuring",
+            slow,
+            room + params.force / params.stiffness * SECOND,
+            &mut |state| states.push(*state),
+            &mut |state| is_pressed(state) || state.wrench_b.force.norm() > ASIDE * stop_at,
+        )?;
+        let pressed = states.iter().any(is_pressed);
+        self.rest("measuring", &mut |state| states.push(*state))?;
+        if let Some(corner) =
+            states.iter().find(|state| state.wrench_b.force.norm() > params.trigger).map(|at| line.depth(at))
+        {
+            self.search(
+                "coming back from the surface",
+                -slow,
+                self.limits().search,
+                &mut |state| states.push(*state),
+                &mut |state| line.depth(state) < corner - params.back_off,
+            )?;
+            self.rest("coming back from the surface", &mut |_| {})?;
+        }
+        Ok(pressed)
+    }
+
+    fn slow(&self, target: &TouchTarget, params: &TouchParams) -> Vector3<f64> {
+        target.direction.into_inner() * params.measure_speed.min(params.safe_speed()).min(self.limits().speed)
+    }
+
+    /// Force by which a search goes beyond where it is stopped, N.
+    fn overshoot(&self, params: &TouchParams, speed: f64) -> f64 {
+        let acceleration = params.acceleration.min(self.limits().acceleration);
+        let most = params.stiffness * speed * (params.latency + speed / (2.0 * acceleration));
+        most.min(params.force - params.trigger)
+    }
+}
+
+/// The line that a touch is made along.
+struct ApproachLine {
+    start: Vector3<f64>,
+    way: Vector3<f64>,
+}
+
+impl ApproachLine {
+    fn of(target: &TouchTarget) -> Self {
+        Self { start: target.standoff_bt.translation.vector, way: target.direction.into_inner() }
+    }
+
+    /// How far the ball has come, m.
+    fn depth(&self, state: &ArmState) -> f64 {
+        (state.pose_bt.translation.vector - self.start).dot(&self.way)
+    }
+
+    /// Force against it, N.
+    fn presses(&self, state: &ArmState) -> f64 {
+        -state.wrench_b.force.dot(&self.way)
+    }
+
+    fn curve(&self, states: &[ArmState]) -> Vec<TouchMoment> {
+        let begun = states.first().map_or(0, |state| state.stamp_ns);
+        let moment = |state: &ArmState| {
+            let force = self.presses(state);
+            let lateral = (state.wrench_b.force + self.way * force).norm();
+            TouchMoment { t: (state.stamp_ns - begun) as f64 * 1e-9, travel: self.depth(state), force, lateral }
+        };
+        states.iter().map(moment).collect()
+    }
+}
+
+/// What a curve tells that pressed as hard as was wanted.
+fn outcome_of(line: &ApproachLine, params: &TouchParams, states: &[ArmState]) -> TouchOutcome {
+    let onset = match find_onset(&line.curve(states), &params.onset) {
+        Ok(onset) => onset,
+        Err(error) => return TouchOutcome::Unclear(error),
+    };
+    // the line that the ball went along, by all poses of the curve
+    let aside = states.iter().map(|state| {
+        let gone = state.pose_bt.translation.vector - line.start;
+        gone - line.way * gone.dot(&line.way)
+    });
+    let aside = mean(aside);
+    let hard = states.iter().filter(|state| line.presses(state) - onset.bias > 0.5 * onset.peak);
+    let (sum, count) = hard.fold((Vector3::zeros(), 0u32), |(sum, n), state| (sum + state.wrench_b.force, n + 1));
+    let centre = Point3::from(line.start + line.way * onset.travel + aside);
+    TouchOutcome::Contact { onset, centre, force_b: sum / f64::from(count.max(1)) }
+}
+
+/// The first search felt something that the second did not.
+fn unfelt(line: &ApproachLine, params: &TouchParams, states: &[ArmState]) -> TouchOutcome {
+    let peak_n = states.iter().map(|state| line.presses(state)).fold(0.0, f64::max);
+    TouchOutcome::Unclear(OnsetError::NoContact { peak_n, contact_n: params.force })
+}
+
+/// A ball is stopped as well when all it feels is more than this many times what it is stopped at along its way: a wall that it
+/// meets at 45° pushes √2 times as much.
+const ASIDE: f64 = 1.42;
+/// Where the surface is known to so many standard deviations it is not searched first …
+const KNOWN: f64 = 4.0;
+/// … as long as they leave no more room than this, over the back-off.
+const MOST_ROOM: f64 = 3.0;
+/// The way back is this much faster than the measuring search.
+const BACK: f64 = 2.0;
+/// Below this share of the trigger the tip is free.
+const FREE: f64 = 0.5;
+/// The second search goes this much farther than it should have to.
+const SECOND: f64 = 3.0;

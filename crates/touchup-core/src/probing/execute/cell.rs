@@ -1,0 +1,78 @@
+//! Where the part stands to the arm, and what the arm holds.
+
+use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
+
+use super::links::Tool;
+use crate::mesh::TriMesh;
+use crate::probing::arm::{Joints, LimitError, Limits, UrGeometry};
+
+/// A robot cell.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cell {
+    /// of the arm
+    pub geometry: UrGeometry,
+    /// of the part in the base: maps O to B
+    pub pose_bo: Isometry3<f64>,
+    /// of the tip in the flange: maps T to the flange; z of T from the tip to the handle
+    pub pose_ft: Isometry3<f64>,
+    /// what must keep clear of the mesh
+    pub tool: Tool,
+}
+
+/// A shaft that leans by less than this from the surface's normal stays as it is, rad.
+const LEANS: f64 = 0.26;
+
+/// So far, m.
+const ABOVE: f64 = 40e-3;
+
+impl Cell {
+    /// Pose of the tip in B with the ball's centre at a place of O.
+    pub fn pose(&self, rotation: &UnitQuaternion<f64>, centre: &Point3<f64>) -> Isometry3<f64> {
+        Isometry3::from_parts((self.pose_bo * centre).coords.into(), *rotation)
+    }
+
+    /// Place of O of a pose of the tip in B.
+    pub fn place(&self, pose_bt: &Isometry3<f64>) -> Point3<f64> {
+        self.pose_bo.inverse_transform_point(&Point3::from(pose_bt.translation.vector))
+    }
+
+    /// Direction of the shaft in O, from the tip to the handle.
+    pub fn shaft(&self, rotation: &UnitQuaternion<f64>) -> Unit<Vector3<f64>> {
+        Unit::new_normalize(self.pose_bo.rotation.inverse() * (rotation * Vector3::z()))
+    }
+
+    /// Orientation of the tip in B that has the shaft stand on a surface: as it is now where that is near enough.
+    pub fn upright(&self, now: &UnitQuaternion<f64>, normal: &Unit<Vector3<f64>>) -> UnitQuaternion<f64> {
+        let (shaft, out) = (now * Vector3::z(), self.pose_bo.rotation * normal.into_inner());
+        if shaft.angle(&out) < LEANS {
+            return *now;
+        }
+        let turn = UnitQuaternion::rotation_between(&shaft, &out)
+            .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&(now * Vector3::x_axis()), std::f64::consts::PI));
+        turn * now
+    }
+
+    /// The tip well above the middle of a part, the shaft along z of O, in B: where a simulated arm begins.
+    pub fn above(&self, part: &TriMesh) -> Isometry3<f64> {
+        let [low, high] = part.bounds();
+        let middle = Point3::new(f64::midpoint(low.x, high.x), f64::midpoint(low.y, high.y), high.z + ABOVE);
+        let up = self.pose_bo.rotation * Vector3::z();
+        let turn = UnitQuaternion::rotation_between(&Vector3::z(), &up)
+            .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
+        self.pose(&turn, &middle)
+    }
+
+    /// Whether the arm may have its tip there.
+    ///
+    /// # Errors
+    /// As [`Limits::check_pose`].
+    pub fn check(
+        &self,
+        limits: &Limits,
+        rotation: &UnitQuaternion<f64>,
+        centre: &Point3<f64>,
+        near: &Joints,
+    ) -> Result<Joints, LimitError> {
+        limits.check_pose(&self.geometry, &self.pose_ft, &self.pose(rotation, centre), near)
+    }
+}

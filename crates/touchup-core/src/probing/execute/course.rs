@@ -1,0 +1,93 @@
+//! A feature that is being probed: where the ball is, the way back into free air, and what was felt.
+
+use nalgebra::{Point3, UnitQuaternion};
+
+use super::ending::{Ending, ProbedSlide, ProbedTouch};
+use super::links::LinkError;
+use super::route::{Barred, ToolState};
+use crate::probing::arm::{LimitError, ProbeError, Watched};
+use crate::probing::plan::ExploreError;
+
+/// Why a probing ended before its explorer had enough.
+pub(super) enum EarlyEnd {
+    Explore(ExploreError),
+    Arm(ProbeError),
+    Limit(LimitError),
+    Link(LinkError),
+}
+
+impl From<EarlyEnd> for Ending {
+    fn from(broken: EarlyEnd) -> Self {
+        match broken {
+            EarlyEnd::Explore(error) => Self::NothingFound(error),
+            EarlyEnd::Arm(ProbeError::Cancelled { .. }) => Self::Cancelled,
+            EarlyEnd::Arm(error) => Self::Stopped(error),
+            EarlyEnd::Limit(error) => Self::OutOfLimits(error),
+            EarlyEnd::Link(error) => Self::NoClearPath(error),
+        }
+    }
+}
+
+impl From<Barred> for EarlyEnd {
+    fn from(barred: Barred) -> Self {
+        match barred {
+            Barred::Limit(error) => Self::Limit(error),
+            Barred::Link(error) => Self::Link(error),
+        }
+    }
+}
+
+impl From<ProbeError> for EarlyEnd {
+    fn from(error: ProbeError) -> Self {
+        Self::Arm(error)
+    }
+}
+
+/// A feature that is being probed.
+pub(super) struct FeatureProbing {
+    pub flag: u32,
+    /// that it is touched with, of the tip in B
+    pub rotation: UnitQuaternion<f64>,
+    /// where the tool was last in free air
+    pub out: ToolState,
+    /// whether it is still there
+    pub is_out: bool,
+    /// below that, where the touch is entered from, m in O; `None` where it is the same, or the ball was not there yet
+    pub entry: Option<Point3<f64>>,
+    /// where the last search began, m in O; `None` where the ball was not there yet
+    pub from: Option<Point3<f64>>,
+    pub begun_ns: i64,
+    pub ended_ns: i64,
+    pub touches: Vec<ProbedTouch>,
+    pub slides: Vec<ProbedSlide>,
+    pub peak_force: f64,
+}
+
+impl FeatureProbing {
+    /// The next place that the ball goes back through into free air, where it has been before; `None` when it is there.
+    pub fn next_out(&self) -> Option<Point3<f64>> {
+        (!self.is_out).then(|| self.from.or(self.entry).unwrap_or(self.out.place))
+    }
+
+    /// It has come to that place, and does not go back behind it, whatever breaks off the rest of the way.
+    pub fn is_at_next_out(&mut self) {
+        if self.from.take().is_none() && self.entry.take().is_none() {
+            self.is_out = true;
+        }
+    }
+
+    /// The ball is inside of the feature, and leaves it by these places.
+    pub fn is_inside(&mut self, from: Point3<f64>, entry: Point3<f64>) {
+        (self.from, self.entry) = (Some(from), Some(entry));
+    }
+
+    /// Keeps what was seen while the arm moved, also where that was broken off.
+    pub fn keep(&mut self, watched: &Watched<'_>) {
+        self.peak_force = self.peak_force.max(watched.peak_force());
+        self.ended_ns = watched.seen_ns().unwrap_or(self.ended_ns).max(self.ended_ns);
+    }
+
+    pub fn seconds(&self) -> f64 {
+        (self.ended_ns - self.begun_ns) as f64 * 1e-9
+    }
+}

@@ -1,0 +1,124 @@
+//! What would be done: the touches that the mesh as it is would lead to, checked, without an arm that moves.
+
+use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
+
+use super::cell::Cell;
+use super::prober::{Flag, ProbeParams};
+use super::route::{Barred, Route, ToolState, may_slide, may_touch, route};
+use super::world::{World, distance, normal_about, on_mesh};
+use crate::probing::arm::ArmState;
+use crate::probing::plan::{ExploreError, Explorer, PatternParams, Slide, TouchPlan, TouchResult};
+
+/// What would be done for a flag.
+#[derive(Clone, Debug, Default)]
+pub struct Plan {
+    /// the places that the ball's centre goes through, in O, m
+    pub path: Vec<Point3<f64>>,
+    /// moves through free air, from and to, in O, m
+    pub links: Vec<[Point3<f64>; 2]>,
+    /// the touches, as they would come if the part were as the mesh has it
+    pub wishes: Vec<TouchPlan>,
+    /// the slides after them
+    pub slides: Vec<Slide>,
+    /// what cannot be done, in words, with the number of the touch; slides are counted on
+    pub held_back: Vec<(usize, String)>,
+}
+
+impl Plan {
+    fn go(&mut self, at: &mut ToolState, stops: Vec<(Point3<f64>, UnitQuaternion<f64>)>) {
+        for (place, turned) in stops {
+            self.links.push([at.place, place]);
+            self.path.push(place);
+            (at.place, at.rotation) = (place, turned);
+        }
+    }
+}
+
+/// Plans the probing of a flag.
+///
+/// - `now`: of the arm.
+///
+/// # Errors
+/// [`ExploreError`] where there is no pattern for it.
+pub fn plan(
+    cell: &Cell,
+    params: &ProbeParams,
+    world: &dyn World,
+    flag: &Flag,
+    now: &ArmState,
+) -> Result<Plan, ExploreError> {
+    let place = on_mesh(world, &flag.place);
+    let normal = normal_about(world, &place, &cell.shaft(&now.pose_bt.rotation));
+    let rotation = cell.upright(&now.pose_bt.rotation, &normal);
+    let pattern = PatternParams { flag_radius: flag.radius, ..params.pattern };
+    let mut explorer = Explorer::new(flag.kind, &place, &normal, pattern)?;
+    let clear = |place: &Point3<f64>, reach: f64| distance(world, place, reach);
+    let mut at = ToolState { place: cell.place(&now.pose_bt), rotation: now.pose_bt.rotation, joints: now.joints };
+    let mut plan = Plan { path: vec![at.place], ..Plan::default() };
+    while let Some(wish) = explorer.wish() {
+        let number = plan.wishes.len();
+        plan.wishes.push(wish);
+        let reached = may_touch(cell, &params.limits, &rotation, &wish, &at.joints).map_err(Barred::from);
+        let routed =
+            reached.and_then(|joints| Ok((joints, route(cell, &params.limits, world, &at, &rotation, &wish.entry)?)));
+        let stops = match routed {
+            Ok((joints, Route { stops, .. })) => {
+                at.joints = joints;
+                stops
+            }
+            Err(error) => {
+                plan.held_back.push((number, error.to_string()));
+                explorer.take(&TouchResult::Unclear);
+                continue;
+            }
+        };
+        plan.go(&mut at, stops);
+        let felt = felt_on_mesh(&wish, params.pattern.ball_radius, &clear, params.pattern.touch_sigma);
+        let end = if let TouchResult::At { centre, .. } = felt { centre } else { wish.from };
+        // in again and out, slowly
+        plan.path.extend([wish.from, end, wish.from, at.place]);
+        explorer.take(&felt);
+    }
+    let slides = if params.slides { explorer.slides() } else { Vec::new() };
+    for slide in slides {
+        let reached = may_slide(cell, &params.limits, &rotation, &slide, &at.joints).map_err(Barred::from);
+        let routed = reached
+            .and_then(|joints| Ok((joints, route(cell, &params.limits, world, &at, &rotation, &slide.above(0))?)));
+        match routed {
+            Ok((joints, Route { stops, .. })) => {
+                at.joints = joints;
+                plan.go(&mut at, stops);
+                let last = slide.stations.len() - 1;
+                plan.path.extend([slide.above(0), slide.lifted(0)]);
+                plan.path.extend(slide.stations.iter().map(|station| station.centre));
+                plan.path.extend([slide.lifted(last), slide.above(last), at.place]);
+            }
+            Err(error) => plan.held_back.push((plan.wishes.len() + plan.slides.len(), error.to_string())),
+        }
+        plan.slides.push(slide);
+    }
+    Ok(plan)
+}
+
+/// What a ball would feel of the mesh: it goes on in steps of what is left, until nothing is.
+fn felt_on_mesh(
+    wish: &TouchPlan,
+    ball_radius: f64,
+    distance: &dyn Fn(&Point3<f64>, f64) -> f64,
+    sigma: f64,
+) -> TouchResult {
+    let along: Unit<Vector3<f64>> = wish.direction;
+    let mut gone = 0.0;
+    while gone <= wish.search {
+        let centre = wish.from + along.into_inner() * gone;
+        let left = distance(&centre, ball_radius + wish.search) - ball_radius;
+        if left < TOUCHES {
+            return TouchResult::At { centre, sigma };
+        }
+        gone += left;
+    }
+    TouchResult::Nothing
+}
+
+/// Nearer than this is a touch, m.
+const TOUCHES: f64 = 5e-6;

@@ -1,0 +1,181 @@
+//! One spot, touched again and again from both sides: how far the arm can be trusted, and how stiff it is.
+
+use nalgebra::{Point3, Unit, Vector3};
+
+use super::ending::Ending;
+use super::prober::{Flag, Prober};
+use super::world::{normal_about, on_mesh};
+use crate::features::Kind;
+use crate::numeric::tangent_basis;
+use crate::probing::arm::{OnsetVerdict, TouchOutcome};
+use crate::probing::plan::TouchPlan;
+
+/// One touch of the spot.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpotTouch {
+    /// The side from which the tool came: 1 or -1.
+    pub side: i8,
+    /// Of the ball's centre where it was felt, along the outward normal, m from the origin of O.
+    pub height: f64,
+    /// Its standard uncertainty, m.
+    pub sigma: f64,
+    /// Of arm, probe and part together, and its standard uncertainty, N/m.
+    pub stiffness: [f64; 2],
+    /// What the curve looks like.
+    pub verdict: OnsetVerdict,
+}
+
+/// What the touches of one spot say.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Repeatability {
+    /// In their order; every second one from the other side.
+    pub touches: Vec<SpotTouch>,
+    /// Place of the spot on the mesh, m in O.
+    pub place: Point3<f64>,
+    /// Out of the part, in O.
+    pub normal: Unit<Vector3<f64>>,
+}
+
+/// Why the spot says nothing.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SpotError {
+    /// The arm did not get so far.
+    #[error("{0}")]
+    Ended(Ending),
+    /// One of the touches felt nothing, or nothing that can be used.
+    #[error("touch {touch} of the spot: {why}")]
+    NotFelt {
+        /// from 1 on
+        touch: usize,
+        /// in words
+        why: String,
+    },
+}
+
+/// The ball begins to search this far above the spot, and searches twice as far, m.
+const STANDOFF: f64 = 2e-3;
+/// The tool comes from this far aside, and from this far above where it begins to search, m.
+const ASIDE: f64 = 10e-3;
+const ABOVE: f64 = 5e-3;
+
+impl Prober<'_> {
+    /// Touches one spot, coming from one side and from the other in turn, so that play of the joints shows.
+    ///
+    /// - `spot`: on the mesh or near it, m in O; flat for some 10 mm about.
+    ///
+    /// # Errors
+    /// [`SpotError`]; the arm stands then, and has retracted wherever it was still allowed to move.
+    pub fn repeat(&mut self, spot: &Point3<f64>, count: usize) -> Result<Repeatability, SpotError> {
+        let flag = Flag { id: 0, kind: Some(Kind::Plane), place: *spot, radius: ASIDE };
+        let (_, mut course) = self.begin(&flag).map_err(|broken| SpotError::Ended(broken.into()))?;
+        let place = on_mesh(self.world, spot);
+        let normal = normal_about(self.world, &place, &self.cell.shaft(&course.rotation));
+        let across = tangent_basis(&normal)[0];
+        let from = place + normal.into_inner() * (self.params.pattern.ball_radius + STANDOFF);
+        let (mut touches, mut failed) = (Vec::with_capacity(count), None);
+        let mut touch_all = || {
+            for touch in 1..=count {
+                let side = if touch % 2 == 1 { 1 } else { -1 };
+                let aside = across * (f64::from(side) * ASIDE);
+                let entry = from + normal.into_inner() * ABOVE + aside;
+                let wish = TouchPlan { entry, from, direction: -normal, search: 2.0 * STANDOFF, expected: None };
+                if course.seconds() > self.params.limits.time {
+                    failed = Some(SpotError::Ended(Ending::TimeSpent));
+                    break;
+                }
+                let probed = self.touch_and_retract(&wish, &mut course)?;
+                let felt = probed.record.as_ref().map(|record| &record.outcome);
+                match (felt, probed.centre, &probed.refused) {
+                    (Some(TouchOutcome::Contact { onset, .. }), Some(centre), None) => touches.push(SpotTouch {
+                        side,
+                        height: centre.coords.dot(&normal),
+                        sigma: onset.sigma,
+                        stiffness: [onset.stiffness, onset.stiffness_sigma],
+                        verdict: onset.verdict,
+                    }),
+                    (_, _, why) => {
+                        let why = why.clone().unwrap_or_else(|| "nothing is there".to_owned());
+                        failed = Some(SpotError::NotFelt { touch, why });
+                        break;
+                    }
+                }
+            }
+            Ok(())
+        };
+        let ended = touch_all();
+        match self.finish(ended, &mut course) {
+            Err(broken) => Err(SpotError::Ended(broken.into())),
+            Ok(()) => failed.map_or(Ok(Repeatability { touches, place, normal }), Err),
+        }
+    }
+}
+
+impl Repeatability {
+    /// From the lowest to the highest, m.
+    pub fn range(&self) -> f64 {
+        let heights = self.touches.iter().map(|touch| touch.height);
+        let [low, high] = heights.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], h| [a.min(h), b.max(h)]);
+        high - low
+    }
+
+    /// Mean height of those from one side, or from both, m.
+    fn mean(&self, side: Option<i8>) -> f64 {
+        let heights = self.touches.iter().filter(|touch| side.is_none_or(|side| touch.side == side));
+        let [sum, count] = heights.fold([0.0, 0.0], |[sum, count], touch| [sum + touch.height, count + 1.0]);
+        sum / count
+    }
+
+    /// Standard deviation of one touch, m.
+    pub fn deviation(&self) -> f64 {
+        let mean = self.mean(None);
+        let squares: f64 = self.touches.iter().map(|touch| (touch.height - mean).powi(2)).sum();
+        (squares / (self.touches.len() as f64 - 1.0)).sqrt()
+    }
+
+    /// How far each touch is from their mean, m.
+    pub fn deviations(&self) -> Vec<f64> {
+        let mean = self.mean(None);
+        self.touches.iter().map(|touch| touch.height - mean).collect()
+    }
+
+    /// How much higher the spot is when the tool comes from the first side, m.
+    pub fn reversal(&self) -> f64 {
+        self.mean(Some(1)) - self.mean(Some(-1))
+    }
+
+    /// Stiffness of arm, probe and part together, and its standard uncertainty, N/m: the mean of what the curves say, and how
+    /// far they scatter.
+    pub fn stiffness(&self) -> [f64; 2] {
+        let (count, all) = (self.touches.len() as f64, || self.touches.iter().map(|touch| touch.stiffness[0]));
+        let mean = all().sum::<f64>() / count;
+        let scatter = (all().map(|k| (k - mean).powi(2)).sum::<f64>() / (count - 1.0)).sqrt();
+        [mean, scatter / count.sqrt()]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Heights in µm and stiffnesses in N/mm with sums that can be made by hand.
+    #[test]
+    fn numbers_are_those_made_by_hand() {
+        let touch = |(at, height, k): (usize, f64, f64)| SpotTouch {
+            side: if at % 2 == 0 { 1 } else { -1 },
+            height: 12e-3 + height * 1e-6,
+            sigma: 1e-6,
+            stiffness: [k * 1e3, 100.0],
+            verdict: OnsetVerdict::Clean,
+        };
+        let touches = [(0, 1.0, 14.0), (1, -3.0, 16.0), (2, 5.0, 14.0), (3, -3.0, 16.0)].map(touch).to_vec();
+        let spot = Repeatability { touches, place: Point3::origin(), normal: Vector3::z_axis() };
+        let near = |value: f64, expected: f64| (value - expected).abs() < 1e-12 + 1e-9 * expected.abs();
+        assert!(near(spot.range(), 8e-6), "{}", spot.range());
+        assert!(near(spot.reversal(), 6e-6), "{}", spot.reversal());
+        // mean 0, squares 1 + 9 + 25 + 9 over 3
+        assert!(near(spot.deviation(), (44.0f64 / 3.0).sqrt() * 1e-6), "{}", spot.deviation());
+        let [k, u] = spot.stiffness();
+        // mean 15, squares 4 over 3, over 4 touches
+        assert!(near(k, 15e3) && near(u, (4.0f64 / 3.0).sqrt() / 2.0 * 1e3), "{k} {u}");
+    }
+}

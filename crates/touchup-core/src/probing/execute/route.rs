@@ -1,0 +1,111 @@
+//! How the tool gets from free air to where a touch is entered from; the same for what is planned and for what is done.
+
+use nalgebra::{Point3, UnitQuaternion};
+
+use super::cell::Cell;
+use super::links::{LinkError, clear_entry, turning_place, way};
+use super::world::{World, distance, highest};
+use crate::probing::arm::{Joints, LimitError, Limits};
+use crate::probing::plan::{Slide, TouchPlan};
+
+/// Why the tool does not get there.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub(super) enum Barred {
+    #[error(transparent)]
+    Limit(#[from] LimitError),
+    #[error(transparent)]
+    Link(#[from] LinkError),
+}
+
+/// Where the tool is, in free air.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ToolState {
+    /// centre of the ball, m in O
+    pub place: Point3<f64>,
+    /// of the tip in B
+    pub rotation: UnitQuaternion<f64>,
+    pub joints: Joints,
+}
+
+/// A way through free air.
+#[derive(Clone, Debug)]
+pub(super) struct Route {
+    /// the places of the ball's centre that it goes through, without the first, and the orientation that it has when it is there;
+    /// m in O, of the tip in B
+    pub stops: Vec<(Point3<f64>, UnitQuaternion<f64>)>,
+    /// at its end
+    pub joints: Joints,
+}
+
+/// Orientations that a turn is checked at for the joints, rad apart.
+const TURN_STEP: f64 = 0.1;
+/// A smaller turn is none, rad.
+const TURNS: f64 = 1e-6;
+
+/// Whether the arm may be everywhere on the way of a touch; joints for where it ends.
+pub(super) fn may_touch(
+    cell: &Cell,
+    limits: &Limits,
+    rotation: &UnitQuaternion<f64>,
+    wish: &TouchPlan,
+    near: &Joints,
+) -> Result<Joints, LimitError> {
+    let deepest = wish.from + wish.direction.into_inner() * wish.search.min(limits.search);
+    let places = [wish.entry, wish.from, deepest];
+    places.iter().try_fold(*near, |joints, place| cell.check(limits, rotation, place, &joints))
+}
+
+/// Every so many stations of a slide the joints are checked: a millimetre or two.
+const CHECKED: usize = 10;
+
+/// Whether the arm may be everywhere on a slide; joints for where it ends.
+pub(super) fn may_slide(
+    cell: &Cell,
+    limits: &Limits,
+    rotation: &UnitQuaternion<f64>,
+    slide: &Slide,
+    near: &Joints,
+) -> Result<Joints, LimitError> {
+    let last = slide.stations.len() - 1;
+    let checked = (0..last).step_by(CHECKED).chain([last]);
+    let mut joints = cell.check(limits, rotation, &slide.above(0), near)?;
+    for station in checked {
+        for place in [slide.lifted(station), slide.stations[station].centre] {
+            joints = cell.check(limits, rotation, &place, &joints)?;
+        }
+    }
+    cell.check(limits, rotation, &slide.above(last), &joints)
+}
+
+/// The way from where the tool is to a place at or above where a touch is entered from: first it turns, then it goes.
+pub(super) fn route(
+    cell: &Cell,
+    limits: &Limits,
+    world: &dyn World,
+    at: &ToolState,
+    rotation: &UnitQuaternion<f64>,
+    entry: &Point3<f64>,
+) -> Result<Route, Barred> {
+    let clear = |place: &Point3<f64>, reach: f64| distance(world, place, reach);
+    let (tool, shaft) = (&cell.tool, cell.shaft(rotation));
+    let mut route = Route { stops: Vec::new(), joints: at.joints };
+    let mut place = at.place;
+    let turn = at.rotation.rotation_to(rotation);
+    let angle = turn.angle();
+    if let Some(axis) = turn.axis().filter(|_| angle > TURNS) {
+        let turned = |share: f64| UnitQuaternion::from_axis_angle(&axis, share * angle) * at.rotation;
+        place = turning_place(tool, &at.place, angle, &|share| cell.shaft(&turned(share)), &clear)?;
+        let steps = (angle / TURN_STEP).ceil().max(1.0);
+        for step in 0..=steps as usize {
+            route.joints = cell.check(limits, &turned(step as f64 / steps), &place, &route.joints)?;
+        }
+        route.stops.extend([(place, at.rotation), (place, *rotation)]);
+    }
+    let entry = clear_entry(tool, entry, &shaft, &clear)?;
+    let top = highest(world.mesh(), &shaft);
+    for place in way(tool, &place, &entry, &shaft, top, &clear)? {
+        route.joints = cell.check(limits, rotation, &place, &route.joints)?;
+        route.stops.push((place, *rotation));
+    }
+    Ok(route)
+}

@@ -1,0 +1,121 @@
+//! What is around a probing: the mesh as it is now, whoever looks on, and whoever may want it to end.
+
+use nalgebra::{Point3, Unit, Vector3};
+
+use crate::mesh::{FaceHit, FaceTree, TriMesh};
+use crate::probing::arm::{ArmState, Witness};
+
+/// How far a probing has got.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Progress {
+    /// number of the feature
+    pub flag: u32,
+    /// the touch at hand, from 1 on; 0 before the first
+    pub touch: usize,
+    /// touches at most
+    pub budget: usize,
+    /// standard uncertainty of the wanted number, m or rad
+    pub uncertainty: Option<f64>,
+}
+
+/// What is around a probing. Each state that the arm is shown in may change the mesh.
+pub trait World: Witness {
+    /// The mesh as it is now, in O.
+    fn mesh(&self) -> &TriMesh;
+
+    /// The face nearest to a place of O, within a reach (m).
+    fn closest_face(&self, place: &Point3<f64>, reach: f64) -> Option<FaceHit>;
+
+    /// Is told how far it has got.
+    fn tell(&mut self, progress: &Progress);
+
+    /// Is told what the arm begins to do.
+    fn enter(&mut self, _: Phase) {}
+}
+
+/// What an arm does while it probes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// nothing yet
+    Planning,
+    /// it goes through free air
+    Link,
+    /// its sensor is zeroed
+    Zeroing,
+    /// it comes near, slowly
+    Approach,
+    /// it touches
+    Search,
+    /// it slides over the surface
+    Slide,
+    /// it goes back into free air
+    Retract,
+}
+
+/// A mesh that does not change, and nobody who looks on.
+pub struct StillWorld {
+    mesh: TriMesh,
+    tree: FaceTree,
+}
+
+impl StillWorld {
+    /// - `mesh`: in O.
+    pub fn new(mesh: TriMesh) -> Self {
+        Self { tree: FaceTree::new(&mesh), mesh }
+    }
+}
+
+impl Witness for StillWorld {
+    fn see(&mut self, _: &ArmState) {}
+}
+
+impl World for StillWorld {
+    fn mesh(&self) -> &TriMesh {
+        &self.mesh
+    }
+
+    fn closest_face(&self, place: &Point3<f64>, reach: f64) -> Option<FaceHit> {
+        self.tree.closest(&self.mesh, place, reach)
+    }
+
+    fn tell(&mut self, _: &Progress) {}
+}
+
+/// How large a surface around a flag tells how it looks out, m.
+const AROUND: f64 = 8e-3;
+/// The mesh is looked for this far from a flag, m.
+const NEAR: f64 = 20e-3;
+/// Faces that look elsewhere by more than this (cosine) are another surface.
+const ALIKE: f64 = 0.7;
+
+/// Distance of a place from the mesh, m; at most the reach.
+pub(super) fn distance(world: &dyn World, place: &Point3<f64>, reach: f64) -> f64 {
+    world.closest_face(place, reach).map_or(reach, |hit| (place - hit.point).norm())
+}
+
+/// How the surface looks out around a flag: the mean of the faces there that look towards the handle of the probe, weighed by
+/// their area; where there are none, the shaft.
+pub(super) fn normal_about(world: &dyn World, flag: &Point3<f64>, shaft: &Unit<Vector3<f64>>) -> Unit<Vector3<f64>> {
+    let mesh = world.mesh();
+    let mut sum = Vector3::zeros();
+    for (face, _) in mesh.faces() {
+        let [a, b, c] = mesh.triangle(face);
+        let middle = Point3::from((a.coords + b.coords + c.coords) / 3.0);
+        let area = (b - a).cross(&(c - a));
+        if (middle - flag).norm() < AROUND && area.dot(shaft) > ALIKE * area.norm() {
+            sum += area;
+        }
+    }
+    Unit::try_new(sum, 0.0).unwrap_or(*shaft)
+}
+
+/// The flag on the mesh: the place below or above it along a direction, where there is one.
+pub(super) fn on_mesh(world: &dyn World, flag: &Point3<f64>) -> Point3<f64> {
+    world.closest_face(flag, NEAR).map_or(*flag, |hit| hit.point)
+}
+
+/// The highest place of the mesh along a direction, m from the origin of O.
+pub(super) fn highest(mesh: &TriMesh, up: &Unit<Vector3<f64>>) -> f64 {
+    let [low, high] = mesh.bounds();
+    (0..3).map(|i| (low[i] * up[i]).max(high[i] * up[i])).sum()
+}

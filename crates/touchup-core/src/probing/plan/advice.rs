@@ -1,0 +1,179 @@
+//! Where a person with a stylus should touch next: by the same reckoning that sends an arm.
+
+use std::f64::consts::{PI, TAU};
+
+use nalgebra::{Point3, Vector3};
+
+use super::cylinder_fit::SQUARE;
+use super::design::{Asked, Candidate, Knowledge};
+use crate::features::fit::{Freedom, Surface};
+use crate::features::{Feature, Kind, Walls};
+use crate::stylus::ProbedPoint;
+
+/// A place worth a touch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NextTouch {
+    /// on the surface, m in O
+    pub place: Point3<f64>,
+    /// out of the part, unit vector in O
+    pub normal: Vector3<f64>,
+}
+
+/// Places around a round wall; along each side and around each end of a slot.
+const AROUND: usize = 12;
+const ALONG: usize = 5;
+/// Places down a wall, as shares of its depth, and the depth of a wall whose own is not known, of its radius.
+const DOWN: [f64; 3] = [0.2, 0.5, 0.8];
+const UNKNOWN_DEPTH: f64 = 1.0;
+/// What one place tells, however often a hand goes over it: the calibration is the same each time. Standard deviation, m.
+const PLACE_SIGMA: f64 = 20e-6;
+/// Enough is known when each number of the feature has this standard deviation, m.
+const ENOUGH: f64 = 10e-6;
+
+/// The touch that would tell most of the numbers of a feature; `None` when enough is known, or it has no wall.
+///
+/// - `touches`: all touches; the feature names its own by their numbers.
+pub fn next_by_hand(feature: &Feature, touches: &[ProbedPoint]) -> Option<NextTouch> {
+    let axis = feature.axis.as_ref()?.value;
+    match feature.walls()? {
+        Walls::Round(wall) => {
+            let square = Asked::default().and(&[(Freedom::X, 1.0)], ENOUGH).and(&[(Freedom::Y, 1.0)], ENOUGH);
+            let asked = square.and(&[(Freedom::Size, 2.0)], 2.0 * ENOUGH);
+            let ring = (0..AROUND).map(|at| {
+                let angle = at as f64 / AROUND as f64 * TAU;
+                Vector3::new(angle.cos(), angle.sin(), 0.0)
+            });
+            let places = ring.map(|out| (out * wall.radius, out)).collect();
+            best(feature, touches, wall, &axis, places, wall.radius, &asked)
+        }
+        Walls::Slot(walls) => {
+            let place = Asked::default().and(&[(Freedom::X, 1.0)], ENOUGH).and(&[(Freedom::Y, 1.0)], ENOUGH);
+            let turned = place.and(&[(Freedom::Turn, 1.0)], 2.0 * ENOUGH / walls.length);
+            let asked = turned.and(&[(Freedom::Second, 1.0)], ENOUGH).and(&[(Freedom::Size, 1.0)], ENOUGH);
+            let (radius, half) = (walls.width / 2.0, (walls.length - walls.width).max(0.0) / 2.0);
+            let spread = |at: usize| at as f64 / (ALONG - 1) as f64 * 2.0 - 1.0;
+            let out = |middle: f64, angle: f64| {
+                let out = Vector3::new(angle.cos(), angle.sin(), 0.0);
+                (Vector3::new(middle, 0.0, 0.0) + out * radius, out)
+            };
+            let sides = (0..ALONG).flat_map(|at| [-PI, PI].map(|turn| out(spread(at) * half, turn / 2.0)));
+            let ends = (0..ALONG).flat_map(|at| {
+                let angle = spread(at) * PI / 3.0;
+                [out(half, angle), out(-half, PI - angle)]
+            });
+            best(feature, touches, walls, &axis, sides.chain(ends).collect(), radius, &asked)
+        }
+    }
+}
+
+/// - `places`: in the plane of the walls' frame, with the direction out of their middle; m.
+fn best<M: Surface>(
+    feature: &Feature,
+    touches: &[ProbedPoint],
+    surface: &M,
+    axis: &Vector3<f64>,
+    places: Vec<(Vector3<f64>, Vector3<f64>)>,
+    radius: f64,
+    asked: &Asked,
+) -> Option<NextTouch> {
+    let pose_of = surface.pose_of();
+    let (up, sign) = match feature.kind {
+        // a boss stands on its foot, and what is out of its middle is out of the part
+        Kind::Boss => (*axis, 1.0),
+        _ => (-axis, -1.0),
+    };
+    let depth = feature.depth.as_ref().map_or(UNKNOWN_DEPTH * radius, |depth| depth.value);
+    // the frame of the walls is somewhere on their axis
+    let on_axis = Point3::from(pose_of.translation.vector);
+    let opening = on_axis + axis * axis.dot(&(feature.centre.value - on_axis));
+    let all: Vec<NextTouch> = DOWN
+        .iter()
+        .flat_map(|share| {
+            places.iter().map(move |(place, out)| NextTouch {
+                place: opening + pose_of.rotation * place + up * (share * depth),
+                normal: pose_of.rotation * out * sign,
+            })
+        })
+        .collect();
+    let candidate = |next: &NextTouch| Candidate { point: next.place, sigma: PLACE_SIGMA };
+    let mut is_touched = vec![false; all.len()];
+    for number in feature.touch_numbers() {
+        let Some(touch) = touches.get(number as usize) else { continue };
+        let far = |next: &NextTouch| (next.place - touch.point).norm_squared();
+        let nearest = (0..all.len()).min_by(|&a, &b| far(&all[a]).total_cmp(&far(&all[b])))?;
+        is_touched[nearest] = true;
+    }
+    let before = Knowledge::before::<M>(radius, SQUARE);
+    let made = all.iter().zip(&is_touched).filter(|(_, is_touched)| **is_touched).map(|(next, _)| candidate(next));
+    let known = made.fold(before, |known, touch| known.with(surface, &touch));
+    if known.worst(asked) <= 1.0 {
+        return None;
+    }
+    let open: Vec<usize> = (0..all.len()).filter(|&at| !is_touched[at]).collect();
+    let candidates: Vec<Candidate> = open.iter().map(|&at| candidate(&all[at])).collect();
+    known.best(surface, &candidates, asked).map(|best| all[open[best]])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::features::fit::Cylinder;
+
+    /// A hole Ø 8 at the origin, 10 deep, out of its opening along z; and touches of its wall.
+    fn hole(touched: &[(f64, f64)]) -> (Feature, Vec<ProbedPoint>) {
+        let touches: Vec<_> = touched
+            .iter()
+            .map(|(angle, depth)| {
+                let out = Vector3::new(angle.cos(), angle.sin(), 0.0);
+                let point = Point3::from(out * 4e-3 - Vector3::z() * *depth);
+                let (stamp_ns, stroke, centre, radius) = (0, 0, point, 0.0);
+                let (sigma, calibration, weight, is_rejected) = (5e-6, 0.0, 1.0, false);
+                let normal = -out;
+                ProbedPoint { stamp_ns, stroke, centre, radius, point, normal, sigma, calibration, weight, is_rejected }
+            })
+            .collect();
+        let wall = Cylinder::new(Point3::new(0.0, 0.0, -3e-3), &Vector3::z(), 4e-3, true);
+        let numbers = (0..touches.len() as u32).collect();
+        (Feature::round_hole(Point3::origin(), Vector3::z(), 10e-3, wall, numbers), touches)
+    }
+
+    #[test]
+    fn a_hole_felt_on_one_side_is_to_be_felt_on_the_other() {
+        let felt: Vec<_> =
+            (0..7).flat_map(|at| DOWN.map(|d| (f64::from(at) / 6.0 * PI - PI / 2.0, d * 10e-3))).collect();
+        let (feature, touches) = hole(&felt);
+        let next = next_by_hand(&feature, &touches).unwrap();
+        // felt where x is above 0
+        assert!(next.place.x < -3e-3 && (next.place.xy().coords.norm() - 4e-3).abs() < 1e-9, "{next:?}");
+        assert!(next.normal.x > 0.7 && next.place.z < 0.0 && next.place.z > -10e-3, "{next:?}");
+    }
+
+    #[test]
+    fn nothing_is_asked_of_a_hole_felt_all_around_and_the_first_touch_is_on_its_wall() {
+        let felt: Vec<_> =
+            (0..AROUND).flat_map(|at| DOWN.map(|d| (at as f64 / AROUND as f64 * TAU, d * 10e-3))).collect();
+        let (feature, touches) = hole(&felt);
+        assert_eq!(next_by_hand(&feature, &touches), None);
+        let (feature, touches) = hole(&[]);
+        let next = next_by_hand(&feature, &touches).unwrap();
+        assert!((next.place.xy().coords.norm() - 4e-3).abs() < 1e-9 && next.normal.dot(&next.place.coords) < 0.0);
+    }
+
+    /// Who does as he is told knows the hole after few places, and is never sent to one twice.
+    #[test]
+    fn doing_as_told_ends() {
+        let mut felt = Vec::new();
+        for count in 0.. {
+            let (feature, touches) = hole(&felt);
+            let Some(next) = next_by_hand(&feature, &touches) else {
+                println!("{count} places");
+                assert!((4..=24).contains(&count), "{count}");
+                break;
+            };
+            let place = (next.place.y.atan2(next.place.x), -next.place.z);
+            let is_new = |(angle, depth): &(f64, f64)| (angle - place.0).abs() > 1e-6 || (depth - place.1).abs() > 1e-6;
+            assert!(felt.iter().all(is_new), "{place:?} again");
+            felt.push(place);
+        }
+    }
+}

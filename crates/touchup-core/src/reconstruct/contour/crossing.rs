@@ -1,0 +1,183 @@
+//! Where the skin crosses an edge of the lattice.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::reconstruct::evidence::point_evidence::{Evidence, Source};
+use crate::reconstruct::field::grid::ReconstructionGrid;
+use crate::reconstruct::field::lattice::{Edge, Lattice, LatticeNode, stepped};
+use crate::reconstruct::field::piecewise::FieldScratch;
+use crate::reconstruct::table::CellTable;
+
+/// Steps towards the zero of the touched field, at most: on a plane one is enough, at an edge it takes some more.
+const STEPS: usize = 8;
+/// A value of less than this share of the way is zero.
+const ENOUGH: f64 = 1e-3;
+
+/// Where f changes its sign on an edge of the lattice.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Crossing {
+    /// the point, m, in O; brought to the inside of the edge if it is not there
+    pub point: Point3<f64>,
+    /// unit normal of the surface there, out of the material
+    pub normal: Vector3<f64>,
+}
+
+/// Crossings of the touched field, kept as long as the values at both ends stay.
+#[derive(Clone, Debug, Default)]
+pub(in crate::reconstruct) struct Crossings {
+    known: CellTable<Edge, KnownCrossing>,
+    scratch: FieldScratch,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct KnownCrossing {
+    crossing: Crossing,
+    /// the renewals that gave the ends their values
+    renewals: [u32; 2],
+}
+
+impl Crossings {
+    /// The crossing of an edge whose ends differ in sign: by the touched field itself between touched nodes, else between
+    /// the values at the ends.
+    pub fn at(
+        &mut self,
+        restored: &ReconstructionGrid,
+        evidence: &Evidence<'_>,
+        lattice: &Lattice,
+        edge: &Edge,
+    ) -> Crossing {
+        let ends = [edge.node, edge.end()];
+        let [Some(a), Some(b)] = ends.map(|node| restored.nodes.get(&node)) else {
+            return between(restored, lattice, edge, [0.0; 2]);
+        };
+        let values = [a.value, b.value];
+        if [a, b].iter().any(|state| state.source != Source::Touch) {
+            return between(restored, lattice, edge, values);
+        }
+        let renewals = [a.renewal, b.renewal];
+        if let Some(known) = self.known.get(edge).filter(|known| known.renewals == renewals) {
+            return known.crossing;
+        }
+        let [a, b] = ends.map(|node| lattice.position(node));
+        let crossing = of_touches(evidence, [&a, &b], values, &mut self.scratch)
+            .unwrap_or_else(|| between(restored, lattice, edge, values));
+        self.known.insert(*edge, KnownCrossing { crossing, renewals });
+        crossing
+    }
+}
+
+/// The crossing of an edge by the values at its ends.
+fn between(restored: &ReconstructionGrid, lattice: &Lattice, edge: &Edge, values: [f64; 2]) -> Crossing {
+    let ends = [edge.node, edge.end()];
+    let [a, b] = ends.map(|node| lattice.position(node));
+    let share = share_of(values);
+    let slope = gradient(restored, &ends[0]) * (1.0 - share) + gradient(restored, &ends[1]) * share;
+    let outward = (b - a) * (values[1] - values[0]).signum();
+    let normal = slope.try_normalize(0.0).unwrap_or_else(|| outward.normalize());
+    Crossing { point: a + (b - a) * share, normal }
+}
+
+/// Where a straight line between two values is 0, as a share of the way.
+fn share_of([at_a, at_b]: [f64; 2]) -> f64 {
+    if at_a == at_b { 0.5 } else { (at_a / (at_a - at_b)).clamp(0.0, 1.0) }
+}
+
+/// The crossing of the touched field between two points at which its values differ in sign, by false position (Illinois).
+/// `None` where the field jumps from one surface to another: the gradient of neither is that of the step between them.
+fn of_touches(
+    evidence: &Evidence<'_>,
+    [a, b]: [&Point3<f64>; 2],
+    values: [f64; 2],
+    scratch: &mut FieldScratch,
+) -> Option<Crossing> {
+    let mut ends = [(0.0, values[0]), (1.0, values[1])];
+    let mut last = None;
+    let mut best: Option<(f64, Crossing)> = None;
+    for _ in 0..STEPS {
+        let share = ends[0].0 + (ends[1].0 - ends[0].0) * share_of(ends.map(|(_, value)| value));
+        let point = a + (b - a) * share;
+        let here = evidence.touched(&point, scratch)?;
+        if best.is_none_or(|(least, _)| here.value.abs() < least) {
+            best = Some((here.value.abs(), Crossing { point, normal: here.gradient }));
+        }
+        if here.value.abs() < ENOUGH * (b - a).norm() {
+            break;
+        }
+        let side = usize::from((here.value < 0.0) != (values[0] < 0.0));
+        ends[side] = (share, here.value);
+        if last == Some(side) {
+            // the other end has stayed: the field bends
+            ends[1 - side].1 /= 2.0;
+        }
+        last = Some(side);
+    }
+    let (_, crossing) = best?;
+    let rises = crossing.normal.dot(&(b - a)) > 0.0;
+    (rises == (values[1] > values[0])).then_some(crossing)
+}
+
+/// Slope of the values at a node, of any length: by central differences, one-sided where a neighbour is missing.
+fn gradient(restored: &ReconstructionGrid, node: &LatticeNode) -> Vector3<f64> {
+    let value = |node: LatticeNode| {
+        let state = restored.nodes.get(&node)?;
+        (state.source != Source::Beyond).then_some(state.value)
+    };
+    let here = value(*node).unwrap_or(0.0);
+    Vector3::from_fn(|axis, _| match (value(stepped(*node, axis, -1)), value(stepped(*node, axis, 1))) {
+        (Some(below), Some(above)) => (above - below) / 2.0,
+        (None, Some(above)) => above - here,
+        (Some(below), None) => here - below,
+        (None, None) => 0.0,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{FaceTree, TriMesh};
+    use crate::reconstruct::evidence::free_space::SweptSpace;
+    use crate::reconstruct::{ContactMap, ContactSigma, EvidenceParams, SurfaceContact};
+
+    const RADIUS: f64 = 1.5e-3;
+
+    #[test]
+    fn just_below_an_edge_the_crossing_is_that_of_the_wall() {
+        // a step: the face z = 0 for y < 0, the wall y = 0 below it
+        let mut contacts = ContactMap::new(RADIUS / 3.0, 2.0 * RADIUS, None);
+        for (i, j) in (-12..=12).flat_map(|i| (1..=16).map(move |j| (f64::from(i) * 0.5e-3, f64::from(j) * 0.5e-3))) {
+            for (point, normal) in [(Point3::new(i, -j, 0.0), Vector3::z()), (Point3::new(i, 0.0, -j), Vector3::y())] {
+                contacts.add(&SurfaceContact {
+                    point,
+                    normal,
+                    weight: 5.0,
+                    stamp_ns: 0,
+                    sigma: ContactSigma::default(),
+                });
+            }
+        }
+        let scan = TriMesh::new(
+            vec![Point3::origin(), Point3::new(1.0, 0.0, 0.0), Point3::new(0.0, 1.0, 0.0)],
+            vec![[0, 1, 2]],
+        );
+        let scan = scan.unwrap();
+        let (tree, params) = (FaceTree::new(&scan), EvidenceParams::new(RADIUS, 0.3e-3));
+        let swept = SweptSpace::new(0.1 * RADIUS, 2.0 * RADIUS);
+        let (contacts, swept) = (&contacts, &swept);
+        let evidence = Evidence { params: &params, contacts, swept, scan: &scan, tree: &tree, prior: None };
+        let mut scratch = FieldScratch::default();
+        for (depth, share) in [(0.02e-3, 0.5), (0.05e-3, 0.7), (0.1e-3, 0.9), (0.3e-3, 0.2)] {
+            let [a, b] = [-share, 1.0 - share].map(|y| Point3::new(0.1e-3, y * RADIUS / 2.0, -depth));
+            let values = [&a, &b].map(|p| params.field.at(contacts, p, &mut scratch).unwrap().value);
+            assert!(values[0] < 0.0 && values[1] > 0.0);
+            let found = of_touches(&evidence, [&a, &b], values, &mut scratch).unwrap();
+            assert!(
+                found.point.y.abs() < 0.02 * RADIUS / 2.0 && (found.normal - Vector3::y()).norm() < 1e-9,
+                "{depth}: {found:?}"
+            );
+        }
+        // from outside below into the material above the face: no surface of the touches
+        let [a, b] = [-0.2e-3, 0.2e-3].map(|z| Point3::new(0.1e-3, -4e-3, z));
+        assert!(of_touches(&evidence, [&a, &b], [-0.2e-3, 0.2e-3], &mut scratch).is_some());
+        assert_eq!(of_touches(&evidence, [&a, &b], [0.2e-3, -0.2e-3], &mut scratch), None);
+    }
+}

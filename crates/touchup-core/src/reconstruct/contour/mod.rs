@@ -1,0 +1,16 @@
+//! The zero set of the field as a mesh: dual contouring, and the scan clipped to its rim.
+
+pub(in crate::reconstruct) mod boundary_loops;
+pub(in crate::reconstruct) mod clip;
+pub(in crate::reconstruct) mod crossing;
+pub(in crate::reconstruct) mod dual;
+pub(in crate::reconstruct) mod dual_contouring;
+pub(in crate::reconstruct) mod loops;
+pub(in crate::reconstruct) mod new_faces;
+pub(in crate::reconstruct) mod patched;
+pub(in crate::reconstruct) mod qef;
+pub(in crate::reconstruct) mod scan_clipping;
+pub(in crate::reconstruct) mod splice;
+pub(in crate::reconstruct) mod trace;
+pub(in crate::reconstruct) mod triangulation;
+pub(in crate::reconstruct) mod vertex_uncertainty;

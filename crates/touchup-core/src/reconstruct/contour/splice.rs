@@ -1,0 +1,138 @@
+//! A mesh that follows the patch.
+
+use crate::mesh::{FaceId, FaceTree, MeshError, TriMesh, VertexId};
+use crate::reconstruct::field::lattice::{Owner, VertexKey};
+use crate::reconstruct::incremental::delta::{PatchDelta, PatchVertex};
+use crate::reconstruct::table::CellTable;
+
+/// To place so many vertices takes as long as to replace the faces of one owner.
+const VERTICES_OF_A_PART: usize = 4;
+
+/// A mesh follows a patch: which of its faces and vertices are those of the patch.
+#[derive(Clone, Debug, Default)]
+pub struct Splice {
+    faces: CellTable<Owner, Vec<FaceId>>,
+    vertices: CellTable<VertexKey, VertexId>,
+    added: Vec<FaceId>,
+    placed: Vec<VertexId>,
+    refit: Vec<FaceId>,
+    /// how many owners and faces of the delta at hand are done
+    next_owner: usize,
+    next_face: usize,
+}
+
+impl Splice {
+    /// Brings the mesh up to date with the patch; faces and vertices that it does not touch keep their ids.
+    ///
+    /// - `mesh`, `tree`: the scan with all deltas before this one in it.
+    ///
+    /// # Errors
+    /// [`MeshError::TooMany`] when 32-bit ids do not suffice, [`MeshError::NotFinite`] for a position that is not finite;
+    /// the mesh is torn then.
+    pub fn apply(&mut self, delta: &PatchDelta, mesh: &mut TriMesh, tree: &mut FaceTree) -> Result<(), MeshError> {
+        self.begin();
+        self.go_on(delta, usize::MAX, mesh, tree)?;
+        Ok(())
+    }
+
+    /// Begins with the next delta: [`Self::go_on`] takes it up.
+    pub fn begin(&mut self) {
+        self.placed.clear();
+        (self.next_owner, self.next_face) = (0, 0);
+    }
+
+    /// Takes up to `most` parts more of the delta that was begun: places its vertices, a few to a part, then replaces the
+    /// faces of its owners; returns whether that was all. In between the mesh has gaps and overlaps where old faces meet new
+    /// ones.
+    ///
+    /// # Errors
+    /// As [`Self::apply`].
+    pub fn go_on(
+        &mut self,
+        delta: &PatchDelta,
+        most: usize,
+        mesh: &mut TriMesh,
+        tree: &mut FaceTree,
+    ) -> Result<bool, MeshError> {
+        self.added.clear();
+        let left = most - self.place(delta, most, mesh, tree)?;
+        let left = if self.placed.len() < delta.vertices.len() { 0 } else { left };
+        for &(owner, count) in delta.owners.iter().skip(self.next_owner).take(left) {
+            self.remove_faces(owner, mesh, tree);
+            let mut ours = Vec::with_capacity(count as usize);
+            for corners in delta.faces.iter().skip(self.next_face).take(count as usize) {
+                let face = mesh.add_face(corners.map(|corner| self.placed[corner as usize]))?;
+                tree.insert(mesh, face);
+                ours.push(face);
+            }
+            self.next_owner += 1;
+            self.next_face += count as usize;
+            self.added.extend_from_slice(&ours);
+            if count > 0 || matches!(owner, Owner::Scan(_)) {
+                self.faces.insert(owner, ours);
+            }
+        }
+        let is_done = self.placed.len() >= delta.vertices.len() && self.next_owner >= delta.owners.len();
+        for key in delta.gone.iter().filter(|_| is_done) {
+            if let Some(vertex) = self.vertices.remove(key) {
+                mesh.remove_vertex(vertex);
+            }
+        }
+        Ok(is_done)
+    }
+
+    /// The faces that were added last.
+    pub fn added(&self) -> &[FaceId] {
+        &self.added
+    }
+
+    /// The vertices of the last delta that were placed so far, in its order.
+    pub fn placed(&self) -> &[VertexId] {
+        &self.placed
+    }
+
+    fn remove_faces(&mut self, owner: Owner, mesh: &mut TriMesh, tree: &mut FaceTree) {
+        let ours = match (self.faces.remove(&owner), owner) {
+            (Some(ours), _) => ours,
+            (None, Owner::Scan(face)) => vec![face],
+            (None, _) => return,
+        };
+        for face in ours {
+            tree.remove(mesh, face);
+            mesh.remove_face(face);
+        }
+    }
+
+    /// Adds new vertices and moves those that are elsewhere now, up to `most` parts of them; returns how many those were.
+    fn place(
+        &mut self,
+        delta: &PatchDelta,
+        most: usize,
+        mesh: &mut TriMesh,
+        tree: &mut FaceTree,
+    ) -> Result<usize, MeshError> {
+        self.refit.clear();
+        let before = self.placed.len();
+        for &PatchVertex { key, position, .. } in
+            delta.vertices.iter().skip(before).take(most.saturating_mul(VERTICES_OF_A_PART))
+        {
+            let known = match key {
+                VertexKey::Scan(id) => Some(id),
+                _ => self.vertices.get(&key).copied(),
+            };
+            let id = match known {
+                Some(id) => id,
+                None => mesh.add_vertex(position)?,
+            };
+            if known.is_none() {
+                self.vertices.insert(key, id);
+            } else if mesh.position(id) != position {
+                mesh.set_position(id, position);
+                self.refit.extend_from_slice(mesh.star(id));
+            }
+            self.placed.push(id);
+        }
+        tree.refit(mesh, &self.refit);
+        Ok((self.placed.len() - before).div_ceil(VERTICES_OF_A_PART))
+    }
+}

@@ -1,0 +1,136 @@
+//! Triangles of a plane region with holes, on its own corners: a constrained Delaunay triangulation, so that no triangle is
+//! thinner than it has to be.
+
+use nalgebra::Point2;
+use spade::handles::{FixedFaceHandle, FixedVertexHandle, InnerTag};
+use spade::{ConstrainedDelaunayTriangulation, Triangulation};
+
+/// Indices of three corners, counter-clockwise.
+pub(in crate::reconstruct) type Triangle = [u32; 3];
+
+type Delaunay = ConstrainedDelaunayTriangulation<spade::Point2<f64>>;
+
+/// Triangles of the region that `loops` bound: each a list of indices into `points`, the region on its left.
+///
+/// Loops may share points, and pass one twice. `None` when rounding has put two points in one place or lets two sides
+/// cross.
+pub(in crate::reconstruct) fn fill(points: &[Point2<f64>], loops: &[Vec<u32>]) -> Option<Vec<Triangle>> {
+    if let [corners] = loops
+        && let [a, b, c] = corners[..]
+    {
+        return Some(vec![[a, b, c]]);
+    }
+    let mut delaunay = Delaunay::new();
+    let mut names = Vec::new();
+    let mut handles = vec![None; points.len()];
+    for &corner in loops.iter().flatten() {
+        let (handle, p) = (&mut handles[corner as usize], points[corner as usize]);
+        if handle.is_none() {
+            *handle = Some(delaunay.insert(spade::Point2::new(p.x, p.y)).ok()?);
+            names.push(corner);
+        }
+    }
+    if delaunay.num_vertices() != names.len() {
+        return None;
+    }
+    let sides = || loops.iter().flat_map(|corners| corners.iter().zip(corners.iter().cycle().skip(1)));
+    let ends = |(a, b): (&u32, &u32)| Some([handles[*a as usize]?, handles[*b as usize]?]);
+    for [from, to] in sides().filter_map(ends) {
+        if !delaunay.can_add_constraint(from, to) {
+            return None;
+        }
+        delaunay.add_constraint(from, to);
+    }
+    let inside = faces_inside(&delaunay, sides().filter_map(ends));
+    let name = |handle: FixedVertexHandle| names[handle.index()];
+    Some(inside.into_iter().map(|face| delaunay.face(face).vertices().map(|vertex| name(vertex.fix()))).collect())
+}
+
+/// The faces on the left of the sides, and those that are reached from there without crossing a side.
+fn faces_inside(
+    delaunay: &Delaunay,
+    sides: impl Iterator<Item = [FixedVertexHandle; 2]>,
+) -> Vec<FixedFaceHandle<InnerTag>> {
+    let mut is_inside = vec![false; delaunay.num_all_faces()];
+    let mut inside: Vec<FixedFaceHandle<InnerTag>> = Vec::new();
+    let mut take = |face: Option<FixedFaceHandle<InnerTag>>, inside: &mut Vec<_>| {
+        if let Some(face) = face
+            && !std::mem::replace(&mut is_inside[face.index()], true)
+        {
+            inside.push(face);
+        }
+    };
+    for [from, to] in sides {
+        let side = delaunay.get_edge_from_neighbors(from, to);
+        take(side.and_then(|side| side.face().as_inner()).map(|face| face.fix()), &mut inside);
+    }
+    let mut next = 0;
+    while let Some(&face) = inside.get(next) {
+        for edge in delaunay.face(face).adjacent_edges().into_iter().filter(|edge| !edge.is_constraint_edge()) {
+            take(edge.rev().face().as_inner().map(|face| face.fix()), &mut inside);
+        }
+        next += 1;
+    }
+    inside
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn areas(points: &[Point2<f64>], triangles: &[Triangle]) -> Vec<f64> {
+        let at = |i: u32| points[i as usize];
+        triangles.iter().map(|t| (at(t[1]) - at(t[0])).perp(&(at(t[2]) - at(t[0])))).collect()
+    }
+
+    /// A square with so many square holes in a row, and points on its lower side.
+    fn holed(holes: u32) -> (Vec<Point2<f64>>, Vec<Vec<u32>>) {
+        let width = f64::from(2 * holes + 1);
+        let mut points: Vec<_> =
+            [(0.0, 0.0), (width, 0.0), (width, 3.0), (0.0, 3.0)].map(|(x, y)| Point2::new(x, y)).into();
+        let mut loops = vec![vec![0, 1, 2, 3]];
+        for hole in 0..holes {
+            let (x, first) = (f64::from(2 * hole + 1), points.len() as u32);
+            points.extend([(0., 1.), (0., 2.), (1., 2.), (1., 1.)].map(|(dx, y)| Point2::new(x + dx, y)));
+            loops.push((first..first + 4).collect());
+        }
+        let first = points.len() as u32;
+        points.extend((1..4).map(|i| Point2::new(f64::from(i) * 0.25, 0.0)));
+        loops[0].splice(1..1, first..first + 3);
+        (points, loops)
+    }
+
+    #[test]
+    fn a_square_with_holes_is_filled_once() {
+        for holes in 0..6 {
+            let (points, loops) = holed(holes);
+            let triangles = fill(&points, &loops).unwrap();
+            let corners: usize = loops.iter().map(Vec::len).sum();
+            assert_eq!(triangles.len(), corners + 2 * holes as usize - 2);
+            let areas = areas(&points, &triangles);
+            assert!(areas.iter().all(|&a| a > 0.0), "{holes} holes: {areas:?}");
+            let wanted = 2.0 * (3.0 * f64::from(2 * holes + 1) - f64::from(holes));
+            assert!((areas.iter().sum::<f64>() - wanted).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn holes_that_meet_at_a_point_and_islands_are_filled() {
+        let at = |(x, y): (i32, i32)| Point2::new(f64::from(x), f64::from(y));
+        // two squares meet at (2, 2); one loop goes round both
+        let points = [(0, 0), (4, 0), (4, 4), (0, 4), (2, 2), (1, 2), (1, 1), (2, 1), (3, 2), (3, 3), (2, 3)].map(at);
+        let triangles = fill(&points, &[vec![0, 1, 2, 3], vec![4, 7, 6, 5, 4, 10, 9, 8]]).unwrap();
+        assert_eq!(areas(&points, &triangles).iter().sum::<f64>(), 2.0 * (16.0 - 2.0));
+        let points = [(0, 0), (1, 0), (0, 1), (5, 0), (6, 0), (5, 1)].map(at);
+        assert_eq!(fill(&points, &[vec![0, 1, 2], vec![3, 4, 5]]).unwrap().len(), 2);
+    }
+
+    #[test]
+    fn points_in_one_place_and_crossing_sides_are_refused() {
+        let at = |(x, y): (i32, i32)| Point2::new(f64::from(x), f64::from(y));
+        let twice = [(0, 0), (1, 0), (1, 1), (1, 1)].map(at);
+        assert_eq!(fill(&twice, &[vec![0, 1, 2, 3]]), None);
+        let bow = [(0, 0), (1, 1), (1, 0), (0, 1)].map(at);
+        assert_eq!(fill(&bow, &[vec![0, 1, 2, 3]]), None);
+    }
+}

@@ -1,0 +1,707 @@
+//! What was touched, thinned to one mean contact for each small cell and facing.
+//!
+//! Nothing is ever integrated into a field: the field is evaluated anew from what is stored here.
+//!
+//! Contacts are independent from one pass to the next, not from sample to sample: [`IndependentPasses`] counts the passes. With a
+//! gate, a contact that contradicts the mean of its place (or of the place beside it, where it is the first) by more than
+//! both can be off is rejected. A second pass that says the same takes the place; one that confirms the mean forgets it.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::numeric::{voxel_neighbourhood, voxel_of};
+use crate::reconstruct::evidence::contact_statistics::ContactStatistics;
+use crate::reconstruct::evidence::contact_uncertainty::ContactSigma;
+use crate::reconstruct::evidence::outliers::{Outlier, Outliers};
+use crate::reconstruct::evidence::passes::{IndependentPasses, Pass};
+use crate::reconstruct::evidence::touches::SurfaceContact;
+use crate::reconstruct::field::lattice::LatticeNode;
+use crate::reconstruct::incremental::history::History;
+use crate::reconstruct::table::CellTable;
+
+/// The mean of the contacts in one cell that face alike.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MeanContact {
+    /// m, in O
+    pub point: Point3<f64>,
+    /// unit, in O
+    pub normal: Vector3<f64>,
+    /// sum of the weights; 0 for one that was refuted
+    pub weight: f64,
+    /// normals close by differ much: the ball rolled over an edge here
+    pub is_fan: bool,
+}
+
+/// What became of a contact.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// it is in the mean of its place
+    Taken,
+    /// it contradicts its place and is rejected
+    Rejected,
+    /// the second pass that contradicts: the place has moved to it
+    Relocated,
+}
+
+/// When a contact is rejected.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GateParams {
+    /// a contact contradicts by more than this many standard deviations
+    pub sigmas: f64,
+    /// contacts of one place within this time share their noise, ns: the longest smoothing window
+    pub window_ns: i64,
+}
+
+/// A small cell and a range of normals.
+#[derive(Clone, Copy, Debug)]
+struct Bin {
+    cell: LatticeNode,
+    facing: [i8; 3],
+}
+
+/// A mean that a contact contradicts.
+#[derive(Clone, Copy, Debug)]
+struct Rival {
+    index: u32,
+    /// m
+    innovation: f64,
+    sigmas: f64,
+}
+
+/// All of one mean that queries do not need.
+#[derive(Clone, Copy, Debug)]
+struct Kept {
+    cell: LatticeNode,
+    /// the cell in [`ContactMap::nearby`]
+    home: LatticeNode,
+    facing: [i8; 3],
+    /// the next mean of the same cell, [`NONE`] for the last
+    next: u32,
+    sums: ContactStatistics,
+    visits: IndependentPasses,
+    /// number of what was rejected here, [`NONE`] where nothing is
+    apart: u32,
+    /// whether it stands in [`ContactMap::changed`]
+    is_noted: bool,
+    is_refuted: bool,
+    /// stands for two contacts at once
+    is_mixed: bool,
+    /// the mean when it was last told
+    told: (Point3<f64>, Vector3<f64>),
+}
+
+impl Kept {
+    /// What it counts in queries.
+    fn weight(&self) -> f64 {
+        if self.is_refuted || self.is_mixed { 0.0 } else { self.sums.weight }
+    }
+}
+
+/// What was there before a stroke, and `None` where nothing was.
+#[derive(Clone, Copy, Debug)]
+enum Past {
+    Mean(Option<(Kept, MeanContact)>),
+    Apart(Option<Apart>),
+}
+
+/// Keys of means are their numbers, those of what was rejected have this bit too.
+const OF_APART: u32 = 1 << 31;
+
+/// Contacts that contradict a mean and agree with each other.
+#[derive(Clone, Copy, Debug)]
+struct Apart {
+    sums: ContactStatistics,
+    visits: IndependentPasses,
+    last_ns: i64,
+}
+
+/// Contacts, by place and facing.
+#[derive(Clone, Debug)]
+pub struct ContactMap {
+    cell: f64,
+    reach: f64,
+    gate: Option<GateParams>,
+    /// the first mean of each cell
+    of_cell: CellTable<LatticeNode, u32>,
+    kept: Vec<Kept>,
+    means: Vec<MeanContact>,
+    nearby: CellTable<LatticeNode, Vec<u32>>,
+    apart: Vec<Apart>,
+    outliers: Outliers,
+    /// the mean that the last contact went into, and when, ns
+    last: Option<(u32, i64)>,
+    changed: Vec<u32>,
+    history: History<u32, Past>,
+}
+
+/// Normals whose components differ by less than this share a mean.
+const FACING: f64 = 0.25;
+/// A mean is told again when it has shifted along its normal by more than this, in cells: 5 µm for a ball of 1.5 mm …
+const SHIFT: f64 = 0.01;
+/// … or turned by more than this, rad: 0.3°, which are 5 µm a millimetre away.
+const TURN: f64 = 5e-3;
+/// Means kept for undoing: 100 MB at most.
+const MOST_KEPT: usize = 200_000;
+/// None.
+const NONE: u32 = u32::MAX;
+/// A mean with less weight than this contradicts nothing; a sliding contact weighs 1.
+const LEAST_EVIDENCE: f64 = 3.0;
+/// Normals within 25° are those of one surface.
+const ALIKE: f64 = 0.906;
+/// So many cells above and below a contact there is nothing that faces alike, or the ball would not have fitted in.
+const DEPTH: i32 = 3;
+/// Share of a cell by which a surface may be off the chord between two of its points.
+const ROUGHNESS: f64 = 0.02;
+/// So many cells away the contact before still says where the next one has to be.
+const WAY: f64 = 3.0;
+/// So many windows without a contact part two passes.
+const PAUSE: i64 = 2;
+
+impl ContactMap {
+    /// An empty store of cells of edge `cell` (m), for queries up to `reach` (m).
+    ///
+    /// - `gate`: when contacts are rejected; `None`: never.
+    pub fn new(cell: f64, reach: f64, gate: Option<GateParams>) -> Self {
+        Self {
+            cell,
+            reach,
+            gate,
+            of_cell: CellTable::default(),
+            kept: Vec::new(),
+            means: Vec::new(),
+            nearby: CellTable::default(),
+            apart: Vec::new(),
+            outliers: Outliers::default(),
+            last: None,
+            changed: Vec::new(),
+            history: History::new(MOST_KEPT),
+        }
+    }
+
+    /// Adds a contact to the mean of its cell, unless it contradicts what is known there.
+    pub fn add(&mut self, contact: &SurfaceContact) -> Verdict {
+        let bin = self.bin_of(contact);
+        let own = self.find(&bin);
+        if let Some(gate) = self.gate
+            && let Some(rival) = self.rival(contact, bin.cell, own, &gate)
+        {
+            return self.contest(&rival, contact, &bin, &gate);
+        }
+        let index = self.place(own, &bin, contact);
+        let kept = &mut self.kept[index as usize];
+        kept.sums.add(contact);
+        let apart = kept.apart;
+        if let Some(gate) = self.gate
+            && kept.visits.note(contact.stamp_ns, contact.weight, gate.window_ns)
+            && apart != NONE
+        {
+            // a pass that confirms the mean: what is rejected was an outlier
+            self.note_apart(apart);
+            self.apart[apart as usize].sums = ContactStatistics::ZERO;
+        }
+        self.renew(index, contact);
+        if self.kept[index as usize].sums.weight >= LEAST_EVIDENCE {
+            self.last = Some((index, contact.stamp_ns));
+        }
+        Verdict::Taken
+    }
+
+    /// Whether a contact contradicts what is known at its place, and would be rejected.
+    pub(in crate::reconstruct) fn contradicts(&self, contact: &SurfaceContact) -> bool {
+        let bin = self.bin_of(contact);
+        self.gate.is_some_and(|gate| self.rival(contact, bin.cell, self.find(&bin), &gate).is_some())
+    }
+
+    fn bin_of(&self, contact: &SurfaceContact) -> Bin {
+        let facing = [contact.normal.x, contact.normal.y, contact.normal.z].map(|x| (x / FACING).floor() as i8);
+        Bin { cell: voxel_of(&contact.point, self.cell), facing }
+    }
+
+    /// The means of a cell.
+    fn in_cell(&self, cell: LatticeNode) -> impl Iterator<Item = u32> + '_ {
+        let first = self.of_cell.get(&cell).copied();
+        std::iter::successors(first, |&index| Some(self.kept[index as usize].next).filter(|&next| next != NONE))
+    }
+
+    fn find(&self, bin: &Bin) -> Option<u32> {
+        self.in_cell(bin.cell).find(|&index| self.kept[index as usize].facing == bin.facing)
+    }
+
+    /// The mean that a contact contradicts: that of its own cell, or where it is among the first there the nearest around
+    /// that faces alike, or where there is none the one before it on its way.
+    fn rival(&self, contact: &SurfaceContact, cell: LatticeNode, own: Option<u32>, gate: &GateParams) -> Option<Rival> {
+        let nearest = |found: &mut dyn Iterator<Item = u32>| {
+            let distance = |index: u32| (self.means[index as usize].point - contact.point).norm_squared();
+            let nearer = |a: &u32, b: &u32| distance(*a).total_cmp(&distance(*b)).then(a.cmp(b));
+            found.filter(|&index| self.faces_alike(index, contact)).min_by(nearer)
+        };
+        let here = own.filter(|&index| self.faces_alike(index, contact));
+        let index = match here.or_else(|| nearest(&mut self.in_cell(cell))) {
+            None => nearest(&mut self.around(contact, cell)).or_else(|| self.before(contact, gate))?,
+            Some(index) => index,
+        };
+        let (innovation, sigmas) = self.innovation(index, contact);
+        (sigmas > gate.sigmas).then_some(Rival { index, innovation, sigmas })
+    }
+
+    /// Whether a mean speaks for the surface that a contact is of.
+    fn faces_alike(&self, index: u32, contact: &SurfaceContact) -> bool {
+        let (kept, mean) = (&self.kept[index as usize], &self.means[index as usize]);
+        kept.sums.weight >= LEAST_EVIDENCE && mean.normal.dot(&contact.normal) > ALIKE
+    }
+
+    /// The means in the cells around a contact, and above and below it.
+    fn around(&self, contact: &SurfaceContact, cell: LatticeNode) -> impl Iterator<Item = u32> + '_ {
+        let (point, step) = (contact.point, contact.normal * self.cell);
+        let deep = (2..=DEPTH).flat_map(|k| [-k, k]);
+        let deep = deep.map(move |k| voxel_of(&(point + step * f64::from(k)), self.cell));
+        voxel_neighbourhood(cell).chain(deep).flat_map(|cell| self.in_cell(cell))
+    }
+
+    /// The mean that the contact before went into, while that is near in time and place.
+    fn before(&self, contact: &SurfaceContact, gate: &GateParams) -> Option<u32> {
+        let (index, last_ns) = self.last?;
+        let is_recent = contact.stamp_ns.saturating_sub(last_ns) <= gate.window_ns;
+        let way = (self.means[index as usize].point - contact.point).norm();
+        (is_recent && way < WAY * self.cell && self.faces_alike(index, contact)).then_some(index)
+    }
+
+    fn innovation(&self, index: u32, contact: &SurfaceContact) -> (f64, f64) {
+        let kept = &self.kept[index as usize];
+        kept.sums.innovation(&kept.visits, contact, ROUGHNESS * self.cell)
+    }
+
+    /// Rejects a contact, or lets it take the place of the mean that it contradicts in a second pass.
+    fn contest(&mut self, rival: &Rival, contact: &SurfaceContact, bin: &Bin, gate: &GateParams) -> Verdict {
+        let roughness = ROUGHNESS * self.cell;
+        let at = self.apart_of(rival.index, contact.stamp_ns);
+        let apart = &mut self.apart[at as usize];
+        let agrees =
+            apart.sums.weight > 0.0 && apart.sums.innovation(&apart.visits, contact, roughness).1 <= gate.sigmas;
+        let is_second = agrees && contact.stamp_ns.saturating_sub(apart.last_ns) > PAUSE * gate.window_ns;
+        if !agrees {
+            (apart.sums, apart.visits) = (ContactStatistics::ZERO, IndependentPasses::default());
+        }
+        apart.sums.add(contact);
+        apart.visits.note(contact.stamp_ns, contact.weight, gate.window_ns);
+        apart.last_ns = contact.stamp_ns;
+        if is_second {
+            let Apart { sums, visits, .. } =
+                std::mem::replace(apart, Apart { sums: ContactStatistics::ZERO, ..*apart });
+            self.move_to(rival.index, (sums, visits), contact, bin, gate.sigmas);
+            return Verdict::Relocated;
+        }
+        let SurfaceContact { stamp_ns, point, normal, .. } = *contact;
+        let Rival { innovation, sigmas, .. } = *rival;
+        self.outliers.note(Outlier { stamp_ns, point, normal, innovation, sigmas, contacts: 1 }, gate.window_ns);
+        Verdict::Rejected
+    }
+
+    /// Number of what is rejected of a mean, about to change.
+    fn apart_of(&mut self, index: u32, stamp_ns: i64) -> u32 {
+        let at = self.kept[index as usize].apart;
+        if at != NONE {
+            self.note_apart(at);
+            return at;
+        }
+        self.note_mean(index);
+        let at = self.apart.len() as u32;
+        self.history.note(at | OF_APART, || Past::Apart(None));
+        self.apart.push(Apart {
+            sums: ContactStatistics::ZERO,
+            visits: IndependentPasses::default(),
+            last_ns: stamp_ns,
+        });
+        self.kept[index as usize].apart = at;
+        at
+    }
+
+    /// Empties the means that a contact contradicts and puts what was rejected in the cell where it was felt.
+    fn move_to(
+        &mut self,
+        rival: u32,
+        (sums, visits): (ContactStatistics, IndependentPasses),
+        contact: &SurfaceContact,
+        bin: &Bin,
+        sigmas: f64,
+    ) {
+        self.outliers.relocated += 1;
+        let contradicts = |&index: &u32| {
+            let is_alike = self.kept[index as usize].sums.weight > 0.0
+                && self.means[index as usize].normal.dot(&contact.normal) > ALIKE;
+            index == rival || is_alike && self.innovation(index, contact).1 > sigmas
+        };
+        let old: Vec<u32> = self.around(contact, bin.cell).chain([rival]).filter(contradicts).collect();
+        for index in old {
+            self.note_mean(index);
+            self.tell(index);
+            let old = &mut self.kept[index as usize];
+            (old.sums, old.visits) = (ContactStatistics::ZERO, IndependentPasses::default());
+            self.means[index as usize].weight = 0.0;
+        }
+        let index = self.place(self.find(bin), bin, contact);
+        let kept = &mut self.kept[index as usize];
+        (kept.sums, kept.visits) = (sums, visits);
+        self.renew(index, contact);
+        self.tell(index);
+    }
+
+    /// The mean of a bin, about to change; a new one where there is none.
+    fn place(&mut self, own: Option<u32>, bin: &Bin, contact: &SurfaceContact) -> u32 {
+        if let Some(index) = own {
+            self.note_mean(index);
+            return index;
+        }
+        self.begin(bin, contact)
+    }
+
+    fn note_mean(&mut self, index: u32) {
+        let Self { history, kept, means, .. } = self;
+        history.note(index, || Past::Mean(Some((kept[index as usize], means[index as usize]))));
+    }
+
+    fn note_apart(&mut self, at: u32) {
+        let Self { history, apart, .. } = self;
+        history.note(at | OF_APART, || Past::Apart(Some(apart[at as usize])));
+    }
+
+    /// Notes that a mean has changed.
+    fn tell(&mut self, index: u32) {
+        if !std::mem::replace(&mut self.kept[index as usize].is_noted, true) {
+            self.changed.push(index);
+        }
+    }
+
+    /// An empty mean for a bin.
+    fn begin(&mut self, bin: &Bin, contact: &SurfaceContact) -> u32 {
+        let SurfaceContact { point, normal, weight, .. } = *contact;
+        let index = self.means.len() as u32;
+        self.history.note(index, || Past::Mean(None));
+        let kept = Kept {
+            cell: bin.cell,
+            home: voxel_of(&point, self.reach),
+            facing: bin.facing,
+            next: NONE,
+            sums: ContactStatistics::ZERO,
+            visits: IndependentPasses::default(),
+            apart: NONE,
+            is_noted: false,
+            is_refuted: false,
+            is_mixed: false,
+            told: (point, normal),
+        };
+        self.push(kept, MeanContact { point, normal, weight, is_fan: false });
+        self.tell(index);
+        index
+    }
+
+    /// Adds a mean as the first of its cell.
+    fn push(&mut self, mut kept: Kept, mean: MeanContact) {
+        let index = self.means.len() as u32;
+        let (at, is_new) = self.of_cell.insert_with(kept.cell, || index);
+        kept.next = if is_new { NONE } else { std::mem::replace(self.of_cell.value_mut(at), index) };
+        let (at, _) = self.nearby.insert_with(kept.home, Vec::new);
+        self.nearby.value_mut(at).push(index);
+        self.kept.push(kept);
+        self.means.push(mean);
+    }
+
+    /// Takes out the mean that came last.
+    fn pop(&mut self) -> Option<(Kept, MeanContact)> {
+        let (kept, mean) = (self.kept.pop()?, self.means.pop()?);
+        if kept.next == NONE {
+            self.of_cell.remove(&kept.cell);
+        } else {
+            self.of_cell.insert(kept.cell, kept.next);
+        }
+        if let Some(home) = self.nearby.get_mut(&kept.home) {
+            home.pop();
+        }
+        Some((kept, mean))
+    }
+
+    /// Brings a mean up to its sums, unless it was refuted.
+    fn renew(&mut self, index: u32, contact: &SurfaceContact) {
+        let (kept, mean) = (&self.kept[index as usize], &mut self.means[index as usize]);
+        let (point, normal) = &kept.told;
+        mean.point = kept.sums.point();
+        mean.normal = kept.sums.normal.try_normalize(0.0).unwrap_or(contact.normal);
+        let before = std::mem::replace(&mut mean.weight, kept.weight());
+        let is_back = before == 0.0 && mean.weight > 0.0;
+        let is_shifted = is_back
+            || (mean.point - point).dot(normal).abs() > SHIFT * self.cell
+            || (mean.normal - normal).norm_squared() > TURN * TURN;
+        if is_shifted {
+            self.tell(index);
+        }
+    }
+
+    /// Begins a stroke, which can be undone.
+    pub(crate) fn begin_stroke(&mut self) {
+        self.history.begin();
+    }
+
+    /// How many strokes can be undone.
+    pub fn strokes(&self) -> usize {
+        self.history.len()
+    }
+
+    /// Takes back what came since the last stroke began. Returns whether there was one.
+    pub fn undo(&mut self) -> bool {
+        self.exchange(|history, swap| history.undo(swap))
+    }
+
+    /// Does again what was undone last. Returns whether there was anything.
+    pub fn redo(&mut self) -> bool {
+        self.exchange(|history, swap| history.redo(swap))
+    }
+
+    fn exchange(&mut self, act: impl FnOnce(&mut History<u32, Past>, &mut dyn FnMut(u32, &mut Past)) -> bool) -> bool {
+        let mut history = std::mem::replace(&mut self.history, History::new(MOST_KEPT));
+        let has_changed = act(&mut history, &mut |key, past| self.swap(key, past));
+        self.history = history;
+        self.last = None;
+        self.note_all();
+        has_changed
+    }
+
+    /// Exchanges what is there with what was kept of it; what came last goes first.
+    fn swap(&mut self, key: u32, past: &mut Past) {
+        let at = (key & !OF_APART) as usize;
+        match past {
+            Past::Mean(kept) => match kept.take() {
+                None => *kept = self.pop(),
+                Some((state, mean)) if at == self.means.len() => self.push(state, mean),
+                Some((state, mean)) => {
+                    let there = (&mut self.kept[at], &mut self.means[at]);
+                    // the chain of its cell has a history of its own
+                    let state = Kept { next: there.0.next, ..state };
+                    *kept = Some((std::mem::replace(there.0, state), std::mem::replace(there.1, mean)));
+                }
+            },
+            Past::Apart(kept) => match kept.take() {
+                None => *kept = self.apart.pop(),
+                Some(apart) if at == self.apart.len() => self.apart.push(apart),
+                Some(apart) => *kept = Some(std::mem::replace(&mut self.apart[at], apart)),
+            },
+        }
+    }
+
+    /// The numbers of the means that came since this was last asked, or are clearly elsewhere than when they were last
+    /// told, each once.
+    pub(crate) fn take_changed(&mut self) -> Vec<u32> {
+        let changed = std::mem::take(&mut self.changed);
+        for &at in &changed {
+            let (kept, mean) = (&mut self.kept[at as usize], &self.means[at as usize]);
+            (kept.is_noted, kept.told) = (false, (mean.point, mean.normal));
+        }
+        changed
+    }
+
+    /// Lets [`Self::take_changed`] tell all means.
+    pub(crate) fn note_all(&mut self) {
+        self.changed = (0..self.means.len() as u32).collect();
+        self.kept.iter_mut().for_each(|kept| kept.is_noted = true);
+    }
+
+    /// How well one pass knows a mean.
+    pub(in crate::reconstruct) fn sigma(&self, index: u32) -> ContactSigma {
+        self.kept[index as usize].sums.sigma()
+    }
+
+    /// Variance of a mean along its normal by noise and calibration, m²: noise averages out by the number of passes.
+    pub(in crate::reconstruct) fn variance(&self, index: u32) -> f64 {
+        let (sigma, visits) = (self.sigma(index), self.kept[index as usize].visits.count().max(1));
+        sigma.noise * sigma.noise / f64::from(visits) + sigma.calibration * sigma.calibration
+    }
+
+    /// The passes over the place of a mean.
+    pub(in crate::reconstruct) fn visits(&self, index: u32) -> impl Iterator<Item = &Pass> + '_ {
+        self.kept[index as usize].visits.iter()
+    }
+
+    /// What was rejected.
+    pub fn outliers(&self) -> &Outliers {
+        &self.outliers
+    }
+
+    /// Takes a mean out of all queries, or back in; returns whether that is new.
+    pub(crate) fn refute(&mut self, at: u32, is_refuted: bool) -> bool {
+        let (kept, mean) = (&mut self.kept[at as usize], &mut self.means[at as usize]);
+        kept.is_refuted = is_refuted;
+        let before = std::mem::replace(&mut mean.weight, kept.weight());
+        (before == 0.0) != (mean.weight == 0.0)
+    }
+
+    /// Takes a mean that stands for two contacts out of all queries, or back in; returns whether that is new.
+    pub(in crate::reconstruct) fn mark_mixed(&mut self, at: u32, is_mixed: bool) -> bool {
+        let (kept, mean) = (&mut self.kept[at as usize], &mut self.means[at as usize]);
+        kept.is_mixed = is_mixed;
+        let before = std::mem::replace(&mut mean.weight, kept.weight());
+        (before == 0.0) != (mean.weight == 0.0)
+    }
+
+    /// What was felt at a mean, whether it counts in queries or not, in contacts while sliding.
+    pub(in crate::reconstruct) fn weight(&self, at: u32) -> f64 {
+        self.kept[at as usize].sums.weight
+    }
+
+    /// Finds whether normals within `width` (m) of a mean differ by more than the angle of `cosine`; returns whether that
+    /// is new.
+    pub(crate) fn mark_fan(&mut self, at: u32, width: f64, cosine: f64) -> bool {
+        let MeanContact { point, normal, is_fan: before, .. } = self.means[at as usize];
+        let mut is_fan = false;
+        self.near(&point, width, |_, other| is_fan |= self.means[other as usize].normal.dot(&normal) < cosine);
+        self.means[at as usize].is_fan = is_fan;
+        is_fan != before
+    }
+
+    /// All means, in the order in which their cells were first touched.
+    pub fn means(&self) -> &[MeanContact] {
+        &self.means
+    }
+
+    /// Calls `each` with the squared distance (m²) and the number of every mean nearer to `x` than `reach` (m), which is
+    /// cut off at that of the store.
+    #[inline]
+    pub fn near(&self, x: &Point3<f64>, reach: f64, mut each: impl FnMut(f64, u32)) {
+        self.near_known(x, reach, |distance_squared, index| {
+            if self.means[index as usize].weight > 0.0 {
+                each(distance_squared, index);
+            }
+        });
+    }
+
+    /// As [`Self::near`], but also those that are taken out of queries.
+    #[inline]
+    pub(in crate::reconstruct) fn near_known(&self, x: &Point3<f64>, reach: f64, mut each: impl FnMut(f64, u32)) {
+        let limit = reach.min(self.reach).powi(2);
+        for bin in voxel_neighbourhood(voxel_of(x, self.reach)) {
+            for &index in self.nearby.get(&bin).into_iter().flatten() {
+                let mean = &self.means[index as usize];
+                let distance_squared = (mean.point - x).norm_squared();
+                if distance_squared < limit {
+                    each(distance_squared, index);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn contact(x: f64, normal: Vector3<f64>, weight: f64) -> SurfaceContact {
+        SurfaceContact {
+            point: Point3::new(x, 0.1e-3, 0.1e-3),
+            normal,
+            weight,
+            stamp_ns: 0,
+            sigma: ContactSigma::default(),
+        }
+    }
+
+    #[test]
+    fn contacts_of_one_cell_are_averaged_by_weight_unless_they_face_apart() {
+        let mut store = ContactMap::new(0.5e-3, 3e-3, None);
+        store.add(&contact(0.1e-3, Vector3::z(), 1.0));
+        store.add(&contact(0.4e-3, Vector3::z(), 3.0));
+        store.add(&contact(0.2e-3, Vector3::x(), 1.0));
+        assert_eq!(store.means().len(), 2);
+        assert!((store.means()[0].point.x - 0.325e-3).abs() < 1e-18);
+        assert_eq!((store.means()[0].weight, store.means()[1].normal), (4.0, Vector3::x()));
+    }
+
+    #[test]
+    fn near_finds_what_a_walk_over_all_finds() {
+        let mut store = ContactMap::new(0.5e-3, 3e-3, None);
+        let scattered = |i: u32| f64::from(i.wrapping_mul(2_654_435_761) >> 20) / 4096.0 * 10e-3 - 5e-3;
+        for i in 0..900 {
+            let point = Point3::new(scattered(3 * i), scattered(3 * i + 1), scattered(3 * i + 2));
+            store.add(&SurfaceContact {
+                point,
+                normal: Vector3::z(),
+                weight: 1.0,
+                stamp_ns: 0,
+                sigma: ContactSigma::default(),
+            });
+        }
+        for i in 0..50 {
+            let x = Point3::new(scattered(7 * i), scattered(5 * i + 1), scattered(11 * i));
+            let mut found = Vec::new();
+            store.near(&x, 2e-3, |_, index| found.push(index));
+            found.sort_unstable();
+            let within = |mean: &MeanContact| (mean.point - x).norm() < 2e-3;
+            let all: Vec<u32> = (0..).zip(store.means()).filter(|(_, mean)| within(mean)).map(|(at, _)| at).collect();
+            assert_eq!(found, all);
+        }
+    }
+
+    #[test]
+    fn a_refuted_contact_is_silent_until_it_is_not_refuted_any_more() {
+        let mut store = ContactMap::new(0.5e-3, 3e-3, None);
+        store.add(&contact(0.0, Vector3::z(), 1.0));
+        let count = |store: &ContactMap| {
+            let mut count = 0;
+            store.near(&Point3::origin(), 1e-3, |_, _| count += 1);
+            count
+        };
+        assert_eq!((store.refute(0, true), store.refute(0, true), count(&store)), (true, false, 0));
+        assert_eq!((store.refute(0, false), store.refute(0, false), count(&store)), (true, false, 1));
+    }
+
+    #[test]
+    fn clear_changes_are_told_once() {
+        let mut store = ContactMap::new(0.5e-3, 3e-3, None);
+        for x in [0.6e-3, 0.1e-3, 0.2e-3, 0.7e-3] {
+            store.add(&contact(x, Vector3::z(), 1.0));
+        }
+        assert_eq!((store.take_changed(), store.take_changed()), (vec![0, 1], vec![]));
+        store.add(&contact(0.3e-3, Vector3::z(), 1.0));
+        assert!(store.take_changed().is_empty(), "it went along the surface");
+        store.add(&SurfaceContact { point: Point3::new(0.3e-3, 0.1e-3, 0.2e-3), ..contact(0.0, Vector3::z(), 1.0) });
+        assert_eq!(store.take_changed(), [1], "it rose by 20 µm");
+    }
+
+    /// A pass of eight contacts at height `z` (m) from `stamp_ns` on; what became of the last.
+    fn pass(store: &mut ContactMap, z: f64, stamp_ns: i64) -> Verdict {
+        let sigma = ContactSigma { noise: 10e-6, ..ContactSigma::default() };
+        let at = |i: i64| Point3::new(0.1e-3 + 0.03e-3 * i as f64, 0.1e-3, 0.1e-3 + z);
+        let contact = |i: i64| SurfaceContact {
+            point: at(i),
+            normal: Vector3::z(),
+            weight: 1.0,
+            stamp_ns: stamp_ns + i * 1_000_000,
+            sigma,
+        };
+        (0..8).map(|i| store.add(&contact(i))).last().unwrap()
+    }
+
+    #[test]
+    fn what_contradicts_is_rejected_until_a_second_pass_insists() {
+        let gate = GateParams { sigmas: 4.0, window_ns: 64_000_000 };
+        let second = 1_000_000_000;
+        // within the cell, and in the one above
+        for moved in [0.2e-3, 0.45e-3] {
+            let mut store = ContactMap::new(0.5e-3, 3e-3, Some(gate));
+            let near = |store: &ContactMap| {
+                let mut heights = Vec::new();
+                store.near(&Point3::new(0.2e-3, 0.1e-3, 0.3e-3), 1e-3, |_, index| {
+                    heights.push((store.means()[index as usize].point.z * 1e6).round());
+                });
+                heights
+            };
+            assert_eq!(pass(&mut store, 0.0, second), Verdict::Taken);
+            assert_eq!(pass(&mut store, 0.01e-3, 2 * second), Verdict::Taken);
+            assert_eq!(near(&store), [105.0], "what agrees is averaged");
+            assert_eq!(pass(&mut store, moved, 3 * second), Verdict::Rejected);
+            assert_eq!((near(&store), store.outliers().rejected), (vec![105.0], 8));
+            // a pass that confirms the mean: the next that contradicts is the first again
+            assert_eq!(pass(&mut store, 0.0, 4 * second), Verdict::Taken);
+            assert_eq!(pass(&mut store, moved, 5 * second), Verdict::Rejected);
+            pass(&mut store, moved, 6 * second);
+            assert_eq!(store.outliers().relocated, 1);
+            assert_eq!(near(&store), [((100e-6 + moved) * 1e6).round()]);
+        }
+    }
+}

@@ -1,0 +1,306 @@
+//! Where the tip has been: no material can be there.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::numeric::{voxel_neighbourhood, voxel_of};
+use crate::reconstruct::evidence::voxel_set::VoxelSet;
+use crate::reconstruct::field::lattice::{CellBox, LatticeNode};
+use crate::reconstruct::table::Key;
+use crate::stylus::{TipBody, TipPlace};
+
+/// Cosine of the widest angle between a way and what counts as straight ahead: 45°.
+const STRAIGHT: f64 = 0.7;
+/// A tip that leans by more than this, as the difference of a component of its axis, is kept beside one in the same cell:
+/// 2°, which moves a shaft of two radii by a fourteenth of a radius.
+const LEAN: f64 = 0.035;
+/// A body that is no ball is told apart from free space up to this share of its scale around it.
+const AROUND: f64 = 2.0 / 3.0;
+
+/// Places of the tip, thinned to one for each small cell.
+#[derive(Clone, Debug)]
+pub(crate) struct SweptSpace {
+    cell: f64,
+    reach: f64,
+    centres: VoxelSet<LatticeNode, Point3<f64>>,
+    body: Option<SweptBody>,
+    changed: Vec<Point3<f64>>,
+}
+
+/// A tip that is no ball.
+#[derive(Clone, Debug)]
+struct SweptBody {
+    tip: TipBody,
+    /// edge of the cells of one place, m
+    cell: f64,
+    /// by the middles of the balls that hold the tip there, in cells as large as its scale
+    places: VoxelSet<Posture, TipPlace>,
+}
+
+/// A small cell and a range of axes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Posture {
+    cell: LatticeNode,
+    lean: [i8; 3],
+}
+
+impl Key for Posture {
+    #[inline]
+    fn bits(&self) -> u64 {
+        let lean = self.lean.iter().fold(0u64, |bits, &x| bits << 6 | u64::from(x as u8 & 63));
+        self.cell.bits() ^ lean << 40
+    }
+}
+
+impl SweptSpace {
+    /// Nothing swept yet: one centre is kept for each cube of edge `cell` (m), queries go up to `reach` (m).
+    pub fn new(cell: f64, reach: f64) -> Self {
+        Self { cell, reach, centres: VoxelSet::default(), body: None, changed: Vec::new() }
+    }
+
+    /// Nothing swept yet by a tip of any shape, of which one place is kept for each cube of edge `cell` (m).
+    pub fn of_tip(tip: TipBody, cell: f64, reach: f64) -> Self {
+        let body = (!tip.is_ball()).then(|| SweptBody { tip, cell, places: VoxelSet::default() });
+        Self { body, ..Self::new(cell, reach) }
+    }
+
+    /// Takes a place of the tip.
+    pub fn add_place(&mut self, place: &TipPlace) {
+        let centre = &place.centre;
+        let is_new = self.centres.add(voxel_of(centre, self.cell), voxel_of(centre, self.reach), *centre);
+        match &mut self.body {
+            None => self.changed.extend(is_new.then_some(*centre)),
+            Some(body) => {
+                if body.places.add(posture(place, body.cell), body.bin(place), *place) {
+                    body.cover(place, |middle| self.changed.push(*middle));
+                }
+            }
+        }
+    }
+
+    /// Forgets where the tip was nearer to `p` with its middle than `distance` (m, up to the reach); of a tip that is no
+    /// ball, as much nearer with its surface as a ball of its scale.
+    pub fn forget(&mut self, p: &Point3<f64>, distance: f64) {
+        let Self { cell, reach, centres, body, changed } = self;
+        for bin in voxel_neighbourhood(voxel_of(p, *reach)) {
+            let stays = |centre: &Point3<f64>| (centre - p).norm_squared() >= distance * distance;
+            centres.retain(bin, |centre| voxel_of(centre, *cell), stays, |centre| changed.push(*centre));
+        }
+        let Some(SweptBody { tip, cell, places }) = body else { return };
+        for bin in bins_around(p, tip.scale(), tip.bound().1 + distance).iter() {
+            let stays = |place: &TipPlace| tip.signed_distance(place, p) + tip.scale() >= distance;
+            places.retain(bin, |place| posture(place, *cell), stays, |place| changed.push(place.centre));
+        }
+    }
+
+    /// The middles of balls that cover what came since this was last asked, and of what went.
+    pub fn take_changed(&mut self) -> Vec<Point3<f64>> {
+        std::mem::take(&mut self.changed)
+    }
+
+    /// Begins a stroke, which can be undone.
+    pub fn begin_stroke(&mut self) {
+        self.centres.begin_stroke();
+        self.body.iter_mut().for_each(|body| body.places.begin_stroke());
+    }
+
+    /// How many strokes can be undone.
+    pub fn strokes(&self) -> usize {
+        self.body.as_ref().map_or(usize::MAX, |body| body.places.strokes()).min(self.centres.strokes())
+    }
+
+    /// Takes back what came since the last stroke began. Returns whether there was one.
+    pub fn undo(&mut self) -> bool {
+        let Self { cell, centres, body, .. } = self;
+        self.changed.clear();
+        body.iter_mut().for_each(|SweptBody { cell, places, .. }| {
+            places.undo(|place| posture(place, *cell));
+        });
+        centres.undo(|centre| voxel_of(centre, *cell))
+    }
+
+    /// Does again what was undone last. Returns whether there was anything.
+    pub fn redo(&mut self) -> bool {
+        let Self { cell, centres, body, .. } = self;
+        self.changed.clear();
+        body.iter_mut().for_each(|SweptBody { cell, places, .. }| {
+            places.redo(|place| posture(place, *cell));
+        });
+        centres.redo(|centre| voxel_of(centre, *cell))
+    }
+
+    /// The centres that were kept.
+    pub fn centres(&self) -> impl Iterator<Item = &Point3<f64>> + '_ {
+        self.centres.iter()
+    }
+
+    /// Radius of the balls of [`Self::cover`], m; of a tip that is a ball its `radius`.
+    pub fn cover_radius(&self, radius: f64) -> f64 {
+        self.body.as_ref().map_or(radius, |body| body.tip.cover().1)
+    }
+
+    /// Calls `each` with the middles of balls that together cover what was swept, m.
+    pub fn cover(&self, mut each: impl FnMut(&Point3<f64>)) {
+        match &self.body {
+            None => self.centres().for_each(each),
+            Some(body) => body.places.iter().for_each(|place| body.cover(place, &mut each)),
+        }
+    }
+
+    /// Whether the way of the ball ended at `centre`, going in `direction` (unit): within `width` (m) all of it is behind.
+    pub fn is_end(&self, centre: &Point3<f64>, direction: &Vector3<f64>, width: f64) -> bool {
+        let (mut sum, mut count) = (Vector3::zeros(), 0.0f64);
+        for bin in voxel_neighbourhood(voxel_of(centre, self.reach)) {
+            for other in self.centres.get(&bin) {
+                if (other - centre).norm_squared() < width * width {
+                    sum += other - centre;
+                    count += 1.0;
+                }
+            }
+        }
+        // on a straight way the mean is half the width behind
+        let behind = -sum.dot(direction) / count.max(1.0);
+        behind > STRAIGHT * sum.norm() / count.max(1.0) && behind > width / 4.0
+    }
+
+    /// Distance from `x` to the nearest centre, m, and that centre; `None` beyond the reach.
+    ///
+    /// Of a tip that is no ball it is the signed distance from its body plus its scale: like a ball of that radius.
+    pub fn nearest(&self, x: &Point3<f64>) -> Option<(f64, Point3<f64>)> {
+        if let Some(body) = &self.body {
+            return body.nearest(x);
+        }
+        let mut best = (self.reach * self.reach, None);
+        for bin in voxel_neighbourhood(voxel_of(x, self.reach)) {
+            for centre in self.centres.get(&bin) {
+                let distance_squared = (centre - x).norm_squared();
+                if distance_squared < best.0 {
+                    best = (distance_squared, Some(*centre));
+                }
+            }
+        }
+        best.1.map(|centre| (best.0.sqrt(), centre))
+    }
+}
+
+impl SweptBody {
+    /// The cell of a place.
+    fn bin(&self, place: &TipPlace) -> LatticeNode {
+        voxel_of(&(place.centre + place.axis * self.tip.bound().0), self.tip.scale())
+    }
+
+    /// Calls `each` with the middles of balls that cover the tip at a place.
+    fn cover(&self, TipPlace { centre, axis }: &TipPlace, mut each: impl FnMut(&Point3<f64>)) {
+        let (heights, _) = self.tip.cover();
+        heights.iter().for_each(|&height| each(&(centre + axis * height)));
+    }
+
+    /// As [`SweptSpace::nearest`].
+    fn nearest(&self, x: &Point3<f64>) -> Option<(f64, Point3<f64>)> {
+        let (middle, bound) = self.tip.bound();
+        let size = self.tip.scale();
+        let mut best = (AROUND * size, None);
+        for cell in bins_around(x, size, bound + best.0).iter() {
+            let limit = |distance: f64| (bound + distance).max(0.0).powi(2);
+            if cell_distance_squared(&cell, size, x) >= limit(best.0) {
+                continue;
+            }
+            for place in self.places.get(&cell) {
+                if (x - (place.centre + place.axis * middle)).norm_squared() < limit(best.0) {
+                    let distance = self.tip.signed_distance(place, x);
+                    if distance < best.0 {
+                        best = (distance, Some(place.centre));
+                    }
+                }
+            }
+        }
+        best.1.map(|centre| (best.0 + size, centre))
+    }
+}
+
+/// The small cell and the range of axes of a place.
+fn posture(TipPlace { centre, axis }: &TipPlace, cell: f64) -> Posture {
+    Posture { cell: voxel_of(centre, cell), lean: [axis.x, axis.y, axis.z].map(|x| (x / LEAN).floor() as i8) }
+}
+
+/// The cells of edge `size` that come nearer to `x` than `reach` (m), and some more.
+fn bins_around(x: &Point3<f64>, size: f64, reach: f64) -> CellBox {
+    let (home, steps) = (voxel_of(x, size), (reach / size).ceil() as i32);
+    CellBox { lo: home, hi: home }.widened(steps, steps)
+}
+
+/// Squared distance of a point from a cell of edge `size`, m².
+fn cell_distance_squared(cell: &LatticeNode, size: f64, x: &Point3<f64>) -> f64 {
+    (0..3).map(|i| (f64::from(cell[i]) * size - x[i]).max(x[i] - f64::from(cell[i] + 1) * size).max(0.0).powi(2)).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn upright(centre: Point3<f64>) -> TipPlace {
+        TipPlace { centre, axis: Vector3::z() }
+    }
+
+    #[test]
+    fn a_way_ends_where_all_of_it_is_behind() {
+        let mut swept = SweptSpace::new(0.1e-3, 2e-3);
+        for i in 0..=100 {
+            swept.add_place(&upright(Point3::new(0.0, 0.0, f64::from(i) * -1e-4)));
+        }
+        let [top, middle, bottom] = [0.0, -5e-3, -1e-2].map(|z| Point3::new(0.0, 0.0, z));
+        assert!(swept.is_end(&bottom, &-Vector3::z(), 1e-3) && swept.is_end(&top, &Vector3::z(), 1e-3));
+        assert!(!swept.is_end(&bottom, &Vector3::z(), 1e-3) && !swept.is_end(&bottom, &Vector3::x(), 1e-3));
+        assert!(!swept.is_end(&middle, &-Vector3::z(), 1e-3) && !swept.is_end(&middle, &Vector3::x(), 1e-3));
+    }
+
+    #[test]
+    fn a_flat_end_sweeps_its_whole_width_and_a_cone_its_flank() {
+        use crate::stylus::TipShape;
+        let shapes = [
+            (TipShape::Flat { edge_radius: 0.0, length: 4e-3 }, 2e-3, 2e-3, 0.0),
+            (
+                TipShape::Cone { half_angle: 0.5, length: 4e-3 },
+                0.3e-3,
+                0.5f64.tan() * 2e-3 + 0.3e-3 / 0.5f64.cos(),
+                -0.3e-3,
+            ),
+        ];
+        for (shape, radius, wide, low) in shapes {
+            let tip = TipBody::new(shape, radius).unwrap();
+            let mut swept = SweptSpace::of_tip(tip, 0.1e-3, 1.0);
+            // along x, upright: 2 mm above its origin the tip is `wide` to either side
+            for i in 0..=100 {
+                let centre = Point3::new(f64::from(i) * 1e-4, 0.0, 0.0);
+                swept.add_place(&TipPlace { centre, axis: Vector3::z() });
+            }
+            let depth = |y: f64, z: f64| swept.nearest(&Point3::new(5e-3, y, z)).map(|found| tip.scale() - found.0);
+            assert!(depth(wide - 0.05e-3, 2e-3).unwrap() > 0.0 && depth(wide + 0.05e-3, 2e-3).unwrap() < 0.0);
+            assert!(depth(0.0, low - 0.05e-3).unwrap() < 0.0);
+            assert_eq!(depth(0.0, low - 2e-3), None, "far below");
+            let (mut covered, mut farthest) = (0, 0.0f64);
+            swept.cover(|middle| {
+                covered += 1;
+                farthest = farthest.max(middle.y.abs());
+            });
+            assert!(covered >= 101 && farthest == 0.0 && swept.cover_radius(0.0) >= wide);
+        }
+    }
+
+    #[test]
+    fn the_nearest_centre_is_found_up_to_the_reach() {
+        let mut swept = SweptSpace::new(0.1e-3, 2e-3);
+        for i in 0..1000 {
+            swept.add_place(&upright(Point3::new(f64::from(i) * 1e-5, 0.0, 0.0)));
+        }
+        assert_eq!(swept.centres().count(), 100, "one for each tenth of a millimetre");
+        let (distance, centre) = swept.nearest(&Point3::new(5e-3, 1.2e-3, 0.0)).unwrap();
+        assert!((distance - 1.2e-3).abs() < 1e-5 && (centre.x - 5e-3).abs() < 1e-4);
+        assert_eq!(swept.nearest(&Point3::new(5e-3, 2.1e-3, 0.0)), None);
+        // what is forgotten can be swept again
+        swept.forget(&Point3::new(5e-3, 0.0, 0.0), 1.01e-3);
+        let nearest = |swept: &SweptSpace| swept.nearest(&Point3::new(5e-3, 0.0, 0.0)).unwrap().0;
+        assert!(nearest(&swept) > 1e-3 && swept.centres().count() < 82);
+        swept.add_place(&upright(Point3::new(5.01e-3, 0.0, 0.0)));
+        assert!(nearest(&swept) < 0.02e-3);
+    }
+}

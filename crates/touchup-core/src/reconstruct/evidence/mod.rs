@@ -1,0 +1,15 @@
+//! What is known of the surface: contacts, where the tip has been, what the scan says.
+
+pub(in crate::reconstruct) mod contact_map;
+pub(in crate::reconstruct) mod contact_statistics;
+pub(in crate::reconstruct) mod contact_uncertainty;
+pub(in crate::reconstruct) mod double_contact;
+pub(in crate::reconstruct) mod free_space;
+pub(in crate::reconstruct) mod outliers;
+pub(in crate::reconstruct) mod passes;
+pub(in crate::reconstruct) mod point_evidence;
+pub(in crate::reconstruct) mod probed_log;
+pub(in crate::reconstruct) mod scan_value;
+pub(in crate::reconstruct) mod touch_history;
+pub(in crate::reconstruct) mod touches;
+pub(in crate::reconstruct) mod voxel_set;

@@ -1,0 +1,180 @@
+//! All that was felt: contacts, and where the tip was.
+
+use nalgebra::Point3;
+
+use crate::mesh::{FaceTree, TriMesh};
+use crate::reconstruct::evidence::contact_map::{ContactMap, Verdict};
+use crate::reconstruct::evidence::double_contact::{is_mixed, split};
+use crate::reconstruct::evidence::free_space::SweptSpace;
+use crate::reconstruct::evidence::probed_log::ProbedLog;
+use crate::reconstruct::evidence::scan_value::ScanValue;
+use crate::reconstruct::evidence::touches::TipTouch;
+use crate::reconstruct::field::grid::GridChanges;
+use crate::reconstruct::table::CellTable;
+use crate::stylus::{STROKE_PAUSE_NS, TipPlace};
+
+/// A contact that the ball went into by more than this is none, in radii: four times the noise of a usual tracker.
+const REFUTED_DEPTH: f64 = 0.133;
+/// Where touches insist, the ball has been nearer than this to what was believed before, in radii.
+const FORGOTTEN: f64 = 1.1;
+/// A contact farther outside of the scan than this belongs to something else, in radii.
+const OUTSIDE: f64 = 4.0;
+/// Normals within this many radii …
+const FAN_WIDTH: f64 = 0.4;
+/// … that differ by more than 25° are those of an edge.
+const FAN_COSINE: f64 = 0.906;
+/// A mean moves within its cell; what depends on it is looked for this many times as far.
+const MOVED: f64 = 2.0;
+
+/// All that was felt.
+#[derive(Clone, Debug)]
+pub(in crate::reconstruct) struct TouchHistory {
+    pub contacts: ContactMap,
+    pub swept: SweptSpace,
+    pub probed: ProbedLog,
+    /// whether where the tip went counts; else `swept` stays empty
+    keeps_free_space: bool,
+    /// size of the tip, m
+    radius: f64,
+    /// radius of the tip when it is a ball, m
+    ball: Option<f64>,
+    /// stamp of the last touch that counts, ns
+    pub until_ns: i64,
+    last_contact_ns: Option<i64>,
+    /// the box around the scan in which contacts may be its own, once the scan is known
+    bounds: Option<[Point3<f64>; 2]>,
+}
+
+impl TouchHistory {
+    /// Nothing felt yet.
+    pub fn new(
+        contacts: ContactMap,
+        swept: SweptSpace,
+        keeps_free_space: bool,
+        radius: f64,
+        ball: Option<f64>,
+    ) -> Self {
+        let until_ns = i64::MIN;
+        let probed = ProbedLog::new(ball);
+        Self { contacts, swept, probed, keeps_free_space, radius, ball, until_ns, last_contact_ns: None, bounds: None }
+    }
+
+    pub fn keep(&mut self, touch: &TipTouch) {
+        self.until_ns = touch.stamp_ns;
+        let place = TipPlace { centre: touch.centre, axis: touch.axis };
+        let Some(contact) = &touch.contact else { return self.sweep(&place) };
+        if self.last_contact_ns.is_none_or(|last| touch.stamp_ns - last > STROKE_PAUSE_NS) {
+            self.contacts.begin_stroke();
+            self.swept.begin_stroke();
+            self.probed.begin_stroke();
+        }
+        self.last_contact_ns = Some(touch.stamp_ns);
+        let two = self.ball.and_then(|radius| split(&self.contacts, radius, &touch.centre, contact));
+        let mut is_believed = false;
+        for contact in two.as_ref().map_or(std::slice::from_ref(contact), |two| two) {
+            // a wall that the ball would have to be nearer to is not touched: that is no outlier
+            if two.is_some() && self.contacts.contradicts(contact) {
+                continue;
+            }
+            let verdict = self.contacts.add(contact);
+            self.probed.note(touch, contact, verdict);
+            is_believed |= verdict != Verdict::Rejected;
+            if verdict == Verdict::Relocated {
+                self.swept.forget(&contact.point, FORGOTTEN * self.radius);
+            }
+        }
+        if is_believed {
+            self.sweep(&place);
+        }
+    }
+
+    fn sweep(&mut self, place: &TipPlace) {
+        if self.keeps_free_space {
+            self.swept.add_place(place);
+        }
+    }
+
+    /// How many strokes can be undone.
+    pub fn strokes(&self) -> usize {
+        self.contacts.strokes().min(self.swept.strokes())
+    }
+
+    /// Takes the last stroke back; returns whether there was one.
+    pub fn undo(&mut self) -> bool {
+        self.last_contact_ns = None;
+        let is_undone = self.strokes() > 0 && self.contacts.undo() && self.swept.undo();
+        if is_undone {
+            self.probed.undo();
+        }
+        is_undone
+    }
+
+    /// Does the stroke again that was undone last; returns whether there was one.
+    pub fn redo(&mut self) -> bool {
+        self.last_contact_ns = None;
+        let is_redone = self.contacts.redo() && self.swept.redo();
+        if is_redone {
+            self.probed.redo();
+        }
+        is_redone
+    }
+
+    /// Decides which contacts count and which are those of an edge, where anything came since it was last decided; returns
+    /// where that is.
+    pub fn settle(&mut self, scan: &TriMesh, tree: &FaceTree) -> GridChanges {
+        let Self { contacts, swept, radius, .. } = self;
+        let (deepest, outside) = (*radius * (1.0 - REFUTED_DEPTH), OUTSIDE * *radius);
+        let bounds = self.bounds.get_or_insert_with(|| {
+            let [lo, hi] = scan.bounds();
+            [lo.map(|x| x - outside), hi.map(|x| x + outside)]
+        });
+        let mut changed: CellTable<u32, ()> = contacts.take_changed().into_iter().collect();
+        let centres = swept.take_changed();
+        let mut doubtful = changed.clone();
+        for centre in &centres {
+            contacts.near(centre, deepest, |_, at| add(&mut doubtful, at));
+        }
+        for (at, ()) in doubtful.iter() {
+            let point = contacts.means()[at as usize].point;
+            let is_refuted = swept.nearest(&point).is_some_and(|(distance, _)| distance < deepest)
+                || is_elsewhere(&point, scan, tree, bounds, outside);
+            if contacts.refute(at, is_refuted) {
+                add(&mut changed, at);
+            }
+        }
+        if let Some(radius) = self.ball {
+            for (at, ()) in beside(contacts, &changed, f64::INFINITY).iter() {
+                let is_mixed = is_mixed(contacts, radius, at);
+                if contacts.mark_mixed(at, is_mixed) {
+                    add(&mut changed, at);
+                }
+            }
+        }
+        for (at, ()) in beside(contacts, &changed, MOVED * FAN_WIDTH * *radius).iter() {
+            if contacts.mark_fan(at, FAN_WIDTH * *radius, FAN_COSINE) {
+                add(&mut changed, at);
+            }
+        }
+        GridChanges { means: changed.iter().map(|(at, ())| contacts.means()[at as usize].point).collect(), centres }
+    }
+}
+
+fn add(numbers: &mut CellTable<u32, ()>, number: u32) {
+    numbers.insert_with(number, || ());
+}
+
+/// These means and those within `reach` (m) of them, cut off at the reach of the store.
+fn beside(contacts: &ContactMap, means: &CellTable<u32, ()>, reach: f64) -> CellTable<u32, ()> {
+    let mut beside = means.clone();
+    for (at, ()) in means.iter() {
+        contacts.near_known(&contacts.means()[at as usize].point, reach, |_, other| add(&mut beside, other));
+    }
+    beside
+}
+
+/// Whether a contact is so far outside that the part of the scan cannot have been touched there. Below a scan without sides
+/// it may be in a hole, but not beyond its rim.
+fn is_elsewhere(p: &Point3<f64>, scan: &TriMesh, tree: &FaceTree, bounds: &[Point3<f64>; 2], reach: f64) -> bool {
+    let is_within = bounds[0].inf(p) == bounds[0] && bounds[1].sup(p) == bounds[1];
+    ScanValue::at(scan, tree, p).is_none_or(|scan| scan.value > reach || !is_within && scan.is_on_rim)
+}

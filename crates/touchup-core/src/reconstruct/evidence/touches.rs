@@ -1,0 +1,327 @@
+//! From samples to touches: where the ball really was, and what it touched there.
+//!
+//! The patch follows a few tens of milliseconds behind the stream, so position and force are smoothed by a window that
+//! looks as far ahead as back: it does not lag. Its length follows from the noise: as long as the velocity needs, and no
+//! longer than the path is a parabola.
+
+use std::collections::VecDeque;
+
+use nalgebra::{Point3, Vector3};
+
+use crate::reconstruct::evidence::contact_uncertainty::{CalibrationParams, ContactSigma, ForceNoise};
+use crate::stylus::{
+    ContactSample, FeltNormal, Friction, FrictionCoefficient, LocalMotion, SettingError, Sliding, SmoothedMotion,
+    TipBody, TipContact, TipPlace, TipShape, WIDEST_CONE_COSINE,
+};
+
+/// How touches are found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TouchFinderParams {
+    /// radius of the ball, of the flat end or of the nose, m
+    pub radius: f64,
+    /// which tip it is
+    pub shape: TipShape,
+    /// what stylus and probe give way under force, N/m; `None`: rigid
+    pub stiffness: Option<f64>,
+    /// half of the longest smoothing window, ns. Default 32 ms: 0.2 mm of pose noise at 500 Hz then leaves the direction of
+    /// 25 mm/s uncertain by 6°, which friction known from the stream turns into a normal within 1–2°.
+    pub half_window_ns: i64,
+    /// a pause longer than this parts the stream, ns. Default 30 ms.
+    pub largest_gap_ns: i64,
+    /// cosine of the widest friction cone believed; `None`: friction is not asked for, the normal is the force. Default
+    /// [`WIDEST_CONE_COSINE`].
+    pub cone_cosine: Option<f64>,
+    /// a touch whose normal is uncertain by this much weighs half, rad. Default 5°: what curved pieces take for smooth.
+    pub uncertain_normal: f64,
+    /// what the calibration leaves uncertain; `None`: the uncertainty of a contact is not asked for
+    pub calibration: Option<CalibrationParams>,
+}
+
+impl TouchFinderParams {
+    /// The defaults, for one tip.
+    pub fn new(radius: f64, stiffness: Option<f64>) -> Self {
+        Self {
+            radius,
+            shape: TipShape::Ball,
+            stiffness,
+            half_window_ns: 32_000_000,
+            largest_gap_ns: 30_000_000,
+            cone_cosine: Some(WIDEST_CONE_COSINE),
+            uncertain_normal: 5f64.to_radians(),
+            calibration: None,
+        }
+    }
+}
+
+/// What the ball touched.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfaceContact {
+    /// point of the surface, m, in O
+    pub point: Point3<f64>,
+    /// outward unit normal of the surface there, in O
+    pub normal: Vector3<f64>,
+    /// how much it counts beside others: at most 1, less where the normal is uncertain
+    pub weight: f64,
+    /// ns
+    pub stamp_ns: i64,
+    /// how well it is known; all 0 where that was not asked for
+    pub sigma: ContactSigma,
+}
+
+/// The ball at one instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TipTouch {
+    /// ns
+    pub stamp_ns: i64,
+    /// centre of the real ball, m, in O
+    pub centre: Point3<f64>,
+    /// from the tip to the handle, unit, in O
+    pub axis: Vector3<f64>,
+    /// `None` in free motion, and where it is not known which point of the tip touches
+    pub contact: Option<SurfaceContact>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct WindowEntry {
+    stamp_ns: i64,
+    centre: Point3<f64>,
+    axis: Vector3<f64>,
+    force_o: Vector3<f64>,
+    in_contact: bool,
+}
+
+/// Finds touches in a stream of samples.
+#[derive(Clone, Debug)]
+pub struct TouchFinder {
+    params: TouchFinderParams,
+    body: TipBody,
+    friction: Option<Friction>,
+    noise: PathNoise,
+    shake: ForceNoise,
+    /// samples since the last gap, as far as a window may still need them
+    held: VecDeque<WindowEntry>,
+    /// the first of `held` whose touch has not been given out
+    next: usize,
+}
+
+impl TouchFinder {
+    /// # Errors
+    /// [`SettingError`] of the tip.
+    pub fn new(params: TouchFinderParams) -> Result<Self, SettingError> {
+        Ok(Self {
+            body: TipBody::new(params.shape, params.radius)?,
+            params,
+            friction: params.cone_cosine.map(|cosine| Friction::new(cosine.clamp(-1.0, 1.0).acos())),
+            noise: PathNoise::default(),
+            shake: ForceNoise::default(),
+            held: VecDeque::new(),
+            next: 0,
+        })
+    }
+
+    /// Takes the next sample, which is later than the one before; gives each touch whose window is complete to `each`.
+    pub fn push(&mut self, sample: &ContactSample, mut each: impl FnMut(TipTouch)) {
+        let tip = &sample.tip;
+        if self.held.back().is_some_and(|last| tip.stamp_ns - last.stamp_ns > self.params.largest_gap_ns) {
+            self.flush(&mut each);
+        }
+        if let Some(last) = self.held.back() {
+            self.shake.note(&last.force_o, &tip.force_o);
+        }
+        self.held.push_back(WindowEntry {
+            stamp_ns: tip.stamp_ns,
+            centre: sample.centre,
+            axis: TipPlace::from(&tip.pose_ot).axis,
+            force_o: tip.force_o,
+            in_contact: sample.is_in_contact(),
+        });
+        while self.held[self.next].stamp_ns + self.params.half_window_ns <= tip.stamp_ns {
+            each(self.touch(self.next));
+            self.next += 1;
+        }
+        let needed = self.held[self.next.min(self.held.len() - 1)].stamp_ns - self.params.half_window_ns;
+        while self.held[0].stamp_ns < needed {
+            self.held.pop_front();
+            self.next -= 1;
+        }
+    }
+
+    /// Gives out what is held: the stream has ended or paused.
+    pub fn flush(&mut self, mut each: impl FnMut(TipTouch)) {
+        for at in self.next..self.held.len() {
+            each(self.touch(at));
+        }
+        self.held.clear();
+        self.lift();
+        self.next = 0;
+    }
+
+    /// Kinetic friction as measured so far; `None` until the ball has slid far enough, or where friction is not asked for.
+    pub fn friction(&self) -> Option<FrictionCoefficient> {
+        self.friction.as_ref()?.coefficient()
+    }
+
+    fn lift(&mut self) {
+        self.friction.iter_mut().for_each(Friction::lift);
+    }
+
+    /// The normal under the ball, which has been in contact for the last `dt` (s); `None` without a force.
+    fn normal(&mut self, sliding: &Sliding, dt: f64) -> Option<FeltNormal> {
+        let Some(friction) = &mut self.friction else { return FeltNormal::of_force(&sliding.force_o) };
+        friction.observe(sliding, dt);
+        friction.normal(sliding)
+    }
+
+    fn touch(&mut self, at: usize) -> TipTouch {
+        let window = self.window(at);
+        let motion = window.sums.motion();
+        let velocity_sigma = motion.velocity_gain * self.noise.sigma * SHARED_NOISE;
+        let sliding = Sliding { force_o: window.force / window.count(), velocity: motion.velocity, velocity_sigma };
+        let place = TipPlace { centre: motion.centre, axis: self.held[at].axis };
+        let mut contact = None;
+        if window.is_alike && self.held[at].in_contact {
+            let dt = if at > 0 { self.held[at].stamp_ns - self.held[at - 1].stamp_ns } else { 0 };
+            let found = self.normal(&sliding, dt as f64 * 1e-9);
+            contact = found.and_then(|felt| self.contact(at, &motion, &sliding.force_o, &felt));
+        } else {
+            self.lift();
+        }
+        TipTouch { stamp_ns: self.held[at].stamp_ns, centre: place.centre, axis: place.axis, contact }
+    }
+
+    /// The longest window around a sample over which the path is a parabola and contact does not change; the shortest in
+    /// any case.
+    fn window(&mut self, at: usize) -> Window {
+        let longest = self.params.half_window_ns;
+        let mut best = Window::new(&self.held[at], at, longest);
+        best.widen(&self.held, at, longest / 8 * WINDOWS[0]);
+        self.noise.note(best.sums.motion().residual);
+        for eighths in &WINDOWS[1..] {
+            let mut wider = best.clone();
+            wider.widen(&self.held, at, longest / 8 * eighths);
+            if !wider.is_alike || wider.sums.motion().residual > ROUGH * self.noise.sigma {
+                break;
+            }
+            best = wider;
+        }
+        best
+    }
+
+    /// Variance of the centre where even the shortest window is no parabola, as after an outlier: as much as the path is off
+    /// it, in those of its noise. Such errors are alike in all of the window and do not average out in it.
+    fn roughness(&self, motion: &SmoothedMotion) -> f64 {
+        let noise = self.noise.sigma.max(LEAST_ROUGH * self.params.radius);
+        let residual = motion.residual / noise;
+        let excess = (residual * residual - ROUGH * ROUGH).max(0.0) / motion.centre_gain;
+        if excess.is_finite() { excess } else { 0.0 }
+    }
+
+    fn contact(
+        &self,
+        at: usize,
+        motion: &SmoothedMotion,
+        force_o: &Vector3<f64>,
+        felt: &FeltNormal,
+    ) -> Option<SurfaceContact> {
+        let WindowEntry { stamp_ns, axis, .. } = self.held[at];
+        let place = TipPlace { centre: motion.centre, axis };
+        let TipContact { point, normal, is_vague } = self.body.touched(&place, &felt.normal, felt.sigma)?;
+        let share = if is_vague { VAGUE } else { 1.0 };
+        let mut weight = share / (1.0 + (felt.sigma / self.params.uncertain_normal).powi(2));
+        let sigma = self.params.calibration.map_or_else(ContactSigma::default, |calibration| {
+            weight /= 1.0 + self.roughness(motion);
+            let softness = self.params.stiffness.map_or(0.0, |stiffness| 1.0 / stiffness);
+            ContactSigma::of(
+                &calibration,
+                [self.noise.sigma, self.shake.sigma() * softness].map(|noise| noise * motion.centre_gain.sqrt()),
+                force_o.dot(&normal) * softness,
+                felt.sigma,
+                self.params.radius,
+            )
+        });
+        Some(SurfaceContact { point, normal, weight, stamp_ns, sigma })
+    }
+}
+
+/// What a contact counts of which it is not known how far up the side of the tip it was.
+const VAGUE: f64 = 0.25;
+/// Halves of the windows that are tried, in eighths of the longest.
+const WINDOWS: [i64; 4] = [3, 4, 6, 8];
+/// A path whose residuals are so many times the noise is no parabola any more.
+const ROUGH: f64 = 1.5;
+/// What the path of a calm hand over an edge is off a parabola, in radii.
+const LEAST_ROUGH: f64 = 0.02;
+/// Samples between two poses share their noise, so that it averages out more slowly than that of as many poses.
+const SHARED_NOISE: f64 = 1.3;
+
+/// The samples around one.
+#[derive(Clone, Debug)]
+struct Window {
+    first: usize,
+    last: usize,
+    sums: LocalMotion,
+    /// sum of the forces, N
+    force: Vector3<f64>,
+    /// all in contact, or none
+    is_alike: bool,
+}
+
+impl Window {
+    fn new(middle: &WindowEntry, at: usize, longest_ns: i64) -> Self {
+        let mut sums = LocalMotion::new(middle.centre, (longest_ns as f64 * 1e-9).max(f64::MIN_POSITIVE));
+        sums.add(0.0, &middle.centre);
+        Self { first: at, last: at, sums, force: middle.force_o, is_alike: true }
+    }
+
+    fn count(&self) -> f64 {
+        (self.last - self.first + 1) as f64
+    }
+
+    /// Takes in all samples up to `half_ns` before and after.
+    fn widen(&mut self, held: &VecDeque<WindowEntry>, at: usize, half_ns: i64) {
+        let middle = held[at].stamp_ns;
+        while self.first > 0 && middle - held[self.first - 1].stamp_ns <= half_ns {
+            self.first -= 1;
+            self.add(&held[self.first], &held[at]);
+        }
+        while self.last + 1 < held.len() && held[self.last + 1].stamp_ns - middle <= half_ns {
+            self.last += 1;
+            self.add(&held[self.last], &held[at]);
+        }
+    }
+
+    fn add(&mut self, entry: &WindowEntry, middle: &WindowEntry) {
+        self.sums.add((entry.stamp_ns - middle.stamp_ns) as f64 * 1e-9, &entry.centre);
+        self.force += entry.force_o;
+        self.is_alike &= entry.in_contact == middle.in_contact;
+    }
+}
+
+/// Follows the noise of the positions: the median distance from short pieces of the path to their parabolas.
+#[derive(Clone, Debug)]
+struct PathNoise {
+    /// m
+    sigma: f64,
+}
+
+/// Step of the running median: settles within some hundred samples.
+const NOISE_STEP: f64 = 0.01;
+/// What is never undercut, m: a good tracker at rest.
+const LEAST_NOISE: f64 = 1e-6;
+/// … and where it starts, m.
+const USUAL_NOISE: f64 = 0.03e-3;
+
+impl Default for PathNoise {
+    fn default() -> Self {
+        Self { sigma: USUAL_NOISE }
+    }
+}
+
+impl PathNoise {
+    fn note(&mut self, residual: f64) {
+        if residual.is_finite() {
+            let step = if residual > self.sigma { NOISE_STEP } else { -NOISE_STEP };
+            self.sigma = (self.sigma * (1.0 + step)).max(LEAST_NOISE);
+        }
+    }
+}

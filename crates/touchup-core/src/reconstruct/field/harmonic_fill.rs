@@ -1,0 +1,318 @@
+//! Fills the field where nothing is known.
+//!
+//! Between the known values goes the smoothest field: ∇²f = 0. Flat goes on flat, a gap between two touched walls closes,
+//! and no island can arise. Where the ball was, f stays above the depth to which it was there. Deep in the material the
+//! scan's own distance pulls weakly, so that a pocket that was felt down to somewhere gets a bottom.
+
+use crate::reconstruct::evidence::point_evidence::Source;
+use crate::reconstruct::field::grid::{NodeState, ReconstructionGrid, cell_at, node_at};
+use crate::reconstruct::field::lattice::{LatticeNode, Numbers, stepped};
+use crate::reconstruct::table::CellTable;
+
+/// Settings of [`complete`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::reconstruct) struct CompleteParams {
+    /// weight of the scan beside the six neighbours of a node that is far from it
+    pull: f64,
+    /// a node this near to the surface may be taken for one on its other side, m
+    nearly: f64,
+    /// changes below this end the relaxation, m
+    enough: f64,
+    /// a hole without a bottom is opened this far around where the ball left it, in cells
+    pub end_reach: i32,
+}
+
+impl CompleteParams {
+    /// For cells of `pitch` and a ball of `radius` (m): the pull reaches two radii deep.
+    pub fn new(pitch: f64, radius: f64) -> Self {
+        let end_reach = (END_REACH * radius / pitch).ceil() as i32;
+        Self { pull: (pitch / (2.0 * radius)).powi(2), enough: 1e-6 * pitch, nearly: NEARLY * pitch, end_reach }
+    }
+}
+
+/// Over-relaxation that converges fast on domains some ten nodes across.
+const RELAXATION: f64 = 1.6;
+/// Weight, at most, of a touched surface going straight on beside the six neighbours of a node: as much as all of them.
+const STRAIGHT: f64 = 6.0;
+/// Weight of the scan out of reach of all evidence: the surface is back at it within a cell or two.
+const FURTHER_PULL: f64 = 1.0;
+/// Nodes of a piece of noise at most: two cells in each direction.
+const SPECK: usize = 8;
+/// A node that differs from so many of its six neighbours is alone.
+const ALONE: usize = 5;
+/// … and may be taken for one on their side, if it is within this many cells of the surface.
+const NEARLY: f64 = 0.5;
+/// Sweeps at most: twice what the largest gaps of the tested parts need.
+const SWEEPS: usize = 200;
+/// Radii around the end of a way within which a hole is opened: as wide as holes that a ball is let through.
+const END_REACH: f64 = 3.0;
+/// No neighbour.
+const NONE: u32 = u32::MAX;
+
+/// Fills in what is not known among the nodes `at`, then gives up what nothing holds in its place; what is around them
+/// stays as it is.
+///
+/// - `numbers`: of the nodes around these.
+pub(in crate::reconstruct) fn complete(
+    restored: &mut ReconstructionGrid,
+    at: &[u32],
+    numbers: &Numbers,
+    params: &CompleteParams,
+) {
+    relax(restored, at, numbers, params);
+    if drop_islands(restored, at, numbers) {
+        relax(restored, at, numbers, params);
+    }
+    blunt(restored, at, numbers, params);
+}
+
+/// Takes nodes near the surface that differ from nearly all around them back to their side: tips and pits that noise makes
+/// where the surface passes through a node.
+fn blunt(restored: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers, params: &CompleteParams) {
+    for &at in at {
+        let state = restored.nodes.entry(at).1;
+        if state.value.abs() < params.nearly && state.least <= 0.0 {
+            let is_other = |other: u32| (restored.nodes.entry(other).1.value < 0.0) != (state.value < 0.0);
+            let around = neighbours(restored, at, numbers);
+            if around.into_iter().filter(|&other| other != NONE && is_other(other)).count() >= ALONE {
+                restored.nodes.value_mut(at).value = -f64::MIN_POSITIVE.copysign(state.value);
+            }
+        }
+    }
+}
+
+/// An open question, and what decides it.
+struct OpenQuestion {
+    /// its number, and those of its neighbours that say something, among the values at hand
+    here: u32,
+    around: [u32; 6],
+    neighbours: u8,
+    /// Σ w f and Σ w over all but the neighbours, then over all
+    pull: f64,
+    weight: f64,
+    least: f64,
+}
+
+/// Successive over-relaxation, from below by the space that the ball went through.
+fn relax(restored: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers, params: &CompleteParams) {
+    let open: Vec<u32> = at.iter().copied().filter(|&at| restored.nodes.entry(at).1.is_open_question()).collect();
+    // the values at hand, close together
+    let mut met: CellTable<u32, f64> = CellTable::default();
+    let mut number = |at: u32| met.insert_with(at, || restored.nodes.entry(at).1.value).0;
+    let questions: Vec<OpenQuestion> =
+        open.iter().map(|&at| question(restored, at, numbers, params, &mut number)).collect();
+    let mut values: Vec<f64> = met.iter().map(|(_, value)| *value).collect();
+    for _ in 0..SWEEPS {
+        let mut largest = 0.0f64;
+        for question in questions.iter().filter(|question| question.weight > 0.0) {
+            let mut sum = question.pull;
+            for &other in &question.around[..question.neighbours as usize] {
+                sum += values[other as usize];
+            }
+            let value = &mut values[question.here as usize];
+            let next = (*value + RELAXATION * (sum / question.weight - *value)).max(question.least);
+            largest = largest.max((next - *value).abs());
+            *value = next;
+        }
+        if largest < params.enough {
+            break;
+        }
+    }
+    for (&at, question) in open.iter().zip(&questions) {
+        restored.nodes.value_mut(at).value = values[question.here as usize];
+    }
+}
+
+fn question(
+    restored: &ReconstructionGrid,
+    at: u32,
+    numbers: &Numbers,
+    params: &CompleteParams,
+    mut number: impl FnMut(u32) -> u32,
+) -> OpenQuestion {
+    let state = &restored.nodes.entry(at).1;
+    let pull = match state.source {
+        _ if state.is_further => FURTHER_PULL,
+        Source::Far => params.pull,
+        _ => 0.0,
+    };
+    let (straight, share) = state.straight;
+    let weight = STRAIGHT * share;
+    let mut question = OpenQuestion {
+        here: number(at),
+        around: [0; 6],
+        neighbours: 0,
+        pull: pull * state.scan + weight * straight,
+        weight: pull + weight,
+        least: state.least,
+    };
+    // what was looked at further follows; how far that went decides nothing here
+    let counts = |other: u32| other != NONE && (state.is_further || !restored.nodes.entry(other).1.is_further);
+    for other in neighbours(restored, at, numbers).into_iter().filter(|&other| counts(other)) {
+        question.around[question.neighbours as usize] = number(other);
+        question.neighbours += 1;
+        question.weight += 1.0;
+    }
+    question
+}
+
+/// The nodes around one, as far as they are there and say something.
+fn neighbours(restored: &ReconstructionGrid, at: u32, numbers: &Numbers) -> [u32; 6] {
+    let node = restored.nodes.entry(at).0;
+    std::array::from_fn(|i| {
+        let other = stepped(node, i / 2, if i % 2 == 0 { 1 } else { -1 });
+        let index = numbers.of(&restored.nodes, &other);
+        index.filter(|&index| restored.nodes.entry(index).1.source != Source::Beyond).unwrap_or(NONE)
+    })
+}
+
+/// Gives up material and void that nothing holds in its place: a piece of one sign, within the nodes looked at, that was
+/// neither touched nor swept, or is smaller than anything a ball can feel. Returns whether there was any.
+fn drop_islands(restored: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers) -> bool {
+    let mut seen = vec![Visited::Outside; restored.nodes.len()];
+    at.iter().for_each(|&at| seen[at as usize] = Visited::NotYet);
+    let (mut island, mut has_dropped) = (Vec::new(), false);
+    for &start in at {
+        if seen[start as usize] != Visited::NotYet {
+            continue;
+        }
+        seen[start as usize] = Visited::Yes;
+        island.clear();
+        island.push(start);
+        if !is_held(restored, &mut island, &mut seen, numbers) {
+            has_dropped = true;
+            for &at in &island {
+                let state = restored.nodes.value_mut(at);
+                (state.source, state.value) = (Source::Nothing, 0.0);
+            }
+        }
+    }
+    has_dropped
+}
+
+/// Whether a node was met while pieces are gathered.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Visited {
+    /// it is not among those looked at
+    Outside,
+    NotYet,
+    Yes,
+}
+
+/// Gathers the piece of one sign around its first node; whether what lies beyond those looked at holds it, or evidence and
+/// its size.
+fn is_held(restored: &ReconstructionGrid, piece: &mut Vec<u32>, seen: &mut [Visited], numbers: &Numbers) -> bool {
+    let (mut next, mut is_felt, mut goes_on) = (0, false, false);
+    while let Some(&at) = piece.get(next) {
+        next += 1;
+        let state = &restored.nodes.entry(at).1;
+        let around = neighbours(restored, at, numbers);
+        is_felt |= matches!(state.source, Source::Touch | Source::Beyond) || state.least > 0.0;
+        goes_on |= around.contains(&NONE);
+        for other in around.into_iter().filter(|&other| other != NONE) {
+            let is_same = (restored.nodes.entry(other).1.value < 0.0) == (state.value < 0.0);
+            goes_on |= is_same && seen[other as usize] == Visited::Outside;
+            if is_same && seen[other as usize] == Visited::NotYet {
+                seen[other as usize] = Visited::Yes;
+                piece.push(other);
+            }
+        }
+    }
+    goes_on || is_felt && piece.len() > SPECK
+}
+
+/// The cells in which a filled surface hangs on a ball that ended its way freely, from there to the nearest evidence within
+/// `reach` cells: a hole that the ball left at its far end has no bottom.
+pub(in crate::reconstruct) fn open_cells(
+    restored: &ReconstructionGrid,
+    ends: impl Iterator<Item = LatticeNode>,
+    reach: i32,
+) -> CellTable<LatticeNode, ()> {
+    let is_end = |state: &NodeState| state.is_free_end && state.value <= state.least;
+    let ends = ends.filter(|end| restored.nodes.get(end).is_some_and(is_end));
+    let mut cells: Vec<(LatticeNode, LatticeNode)> =
+        ends.flat_map(|end| (0..8).map(move |corner| (cell_at(end, corner), end))).collect();
+    let mut open = CellTable::default();
+    let mut next = 0;
+    while let Some(&(cell, end)) = cells.get(next) {
+        next += 1;
+        let is_near = (0..3).map(|i| (cell[i] - end[i]).pow(2)).sum::<i32>() <= reach * reach;
+        if is_near && is_unheld_surface(restored, cell) && open.insert_with(cell, || ()).1 {
+            cells.extend((0..6).map(|i| (stepped(cell, i / 2, if i % 2 == 0 { 1 } else { -1 }), end)));
+        }
+    }
+    open
+}
+
+/// Whether the surface passes through a cell of which no corner is known.
+fn is_unheld_surface(restored: &ReconstructionGrid, cell: LatticeNode) -> bool {
+    let mut material = 0;
+    for corner in 0..8 {
+        let Some(state) = restored.nodes.get(&node_at(cell, corner)) else { return false };
+        if !state.is_open_question() {
+            return false;
+        }
+        material += u8::from(state.value < 0.0);
+    }
+    material % 8 != 0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reconstruct::field::lattice::CellBox;
+
+    const PITCH: f64 = 0.75e-3;
+    const BOX: CellBox = CellBox { lo: [0; 3], hi: [6; 3] };
+
+    /// The signs of nodes that were touched everywhere, filled in: those of `value` (pitches) before, at each node.
+    fn completed(value: impl Fn(LatticeNode) -> f64) -> ReconstructionGrid {
+        let state = |node: LatticeNode| NodeState {
+            value: value(node) * PITCH,
+            source: Source::Touch,
+            is_corner: false,
+            scan: 0.0,
+            straight: (0.0, 0.0),
+            least: f64::NEG_INFINITY,
+            is_free_end: false,
+            is_further: false,
+            felt: Some(value(node) * PITCH),
+            renewal: 0,
+        };
+        let mut restored = ReconstructionGrid::default();
+        BOX.each(|node| {
+            restored.nodes.insert(node, state(node));
+        });
+        let at: Vec<u32> = (0..restored.nodes.len() as u32).collect();
+        let numbers = Numbers::new(&restored.nodes, &BOX);
+        complete(&mut restored, &at, &numbers, &CompleteParams::new(PITCH, 1.5e-3));
+        restored
+    }
+
+    /// Material below z = 2.8 pitches.
+    fn floor([.., k]: LatticeNode) -> f64 {
+        f64::from(k) - 2.8
+    }
+
+    fn is_material(restored: &ReconstructionGrid, node: LatticeNode) -> bool {
+        restored.nodes.get(&node).is_some_and(|state| state.value < 0.0)
+    }
+
+    #[test]
+    fn a_tip_of_noise_goes_and_a_ridge_stays() {
+        let tip = [3, 3, 3];
+        let with_tip = |depth: f64| completed(move |node| if node == tip { -depth } else { floor(node) });
+        assert!(!is_material(&with_tip(0.1), tip));
+        assert!(is_material(&with_tip(0.6), tip), "more than noise");
+        let ridge = completed(|node| if node[0] == 3 && node[2] == 3 { -0.1 } else { floor(node) });
+        assert!(is_material(&ridge, tip));
+    }
+
+    #[test]
+    fn a_speck_goes_whatever_it_rests_on() {
+        let speck = completed(|node| if node == [3, 3, 5] { -1.0 } else { floor(node) });
+        assert!(!is_material(&speck, [3, 3, 5]) && is_material(&speck, [3, 3, 2]));
+        let lump = completed(|node| if node[2] == 5 { -1.0 } else { floor(node) });
+        assert!(is_material(&lump, [3, 3, 5]), "it goes on beyond what was looked at");
+    }
+}

@@ -1,0 +1,11 @@
+//! The signed field on the lattice: piecewise fits of the contacts, free space, the smoothest continuation between.
+
+pub(in crate::reconstruct) mod discontinuities;
+pub(in crate::reconstruct) mod floating_components;
+pub(in crate::reconstruct) mod grid;
+pub(in crate::reconstruct) mod harmonic_fill;
+pub(in crate::reconstruct) mod inner_corner;
+pub(in crate::reconstruct) mod lattice;
+pub(in crate::reconstruct) mod piecewise;
+pub(in crate::reconstruct) mod uncertainty;
+pub(in crate::reconstruct) mod unreachable;

@@ -1,0 +1,167 @@
+//! How well the fit of the contacts is known at a point.
+//!
+//! The fit is a weighted mean of the contacts around, so the noise of each enters by its weight, together with that of the
+//! others in the same smoothing window. That is all on a surface which the pieces describe. Where they do not, the contacts
+//! say so themselves: they scatter around the fit, they end, or another surface is so near that the ball touched both.
+
+use nalgebra::Point3;
+
+use crate::reconstruct::evidence::contact_map::ContactMap;
+use crate::reconstruct::field::piecewise::{FieldParams, FieldScratch, FieldValue, PassShare};
+
+/// How well the fit knows the surface, by cause; standard deviations, m.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FitSigma {
+    /// noise of the contacts
+    pub noise: f64,
+    /// directions of their normals, at the distance at which they are
+    pub tilt: f64,
+    /// what calibration leaves; the same everywhere
+    pub calibration: f64,
+    /// contacts that do not lie on one smooth piece
+    pub scatter: f64,
+    /// beyond the last contact the surface may turn
+    pub border: f64,
+    /// another surface is near, and no edge between them was felt
+    pub meeting: f64,
+}
+
+impl FitSigma {
+    /// All causes together, m.
+    pub fn total(&self) -> f64 {
+        let Self { noise, tilt, calibration, scatter, border, meeting } = *self;
+        [tilt, calibration, scatter, border, meeting].iter().fold(noise, |sum, part| sum.hypot(*part))
+    }
+}
+
+/// Share of the scatter of the contacts by which the fit is off: ten of them would leave a third if they were independent.
+const SCATTER: f64 = 0.33;
+/// How much a surface may turn beyond its last contact, rad: 3°.
+const TURN: f64 = 0.053;
+/// Where two surfaces meet the ball touches both, and the fit is off by up to this share of σ …
+const MEETING: f64 = 0.25;
+/// … when the other is as near as the one; by less and less up to this many σ.
+const MEETING_REACH: f64 = 1.2;
+/// A parabola over a window of length T has the variance that noise of correlation time T / 2.25 has.
+const WINDOW_TO_CORRELATION: f64 = 2.25;
+
+impl FieldParams {
+    /// How well the value is known that was found at `x` last, with the same scratch.
+    ///
+    /// - `window_ns`: passes within this time share their noise, the nearer the more.
+    pub fn sigma_of(
+        &self,
+        found: &FieldValue,
+        store: &ContactMap,
+        x: &Point3<f64>,
+        window_ns: i64,
+        scratch: &mut FieldScratch,
+    ) -> FitSigma {
+        let nearest_other = scratch.nearest_other(found.value);
+        let FieldScratch { near, pieces, shares, decides, .. } = scratch;
+        let Some(piece) = pieces.get(*decides as usize) else { return FitSigma::default() };
+        let (mut calibration, mut scatter) = (0.0, 0.0);
+        shares.clear();
+        for member in near.iter().filter(|member| member.piece == *decides) {
+            let mean = &store.means()[member.index as usize];
+            let weight = member.distance_squared / piece.fit_weight;
+            let arm = x - mean.point;
+            let off = 0.5 * (mean.normal + piece.facing).dot(&arm);
+            let lateral = (arm.norm_squared() - off * off).max(0.0).sqrt();
+            let sigma = store.sigma(member.index);
+            calibration += weight * sigma.calibration;
+            scatter += weight * (off - piece.value()).powi(2);
+            shares.extend(store.visits(member.index).map(|visit| {
+                let share = weight * visit.weight / mean.weight / f64::from(visit.count).sqrt();
+                let tilt = share * 0.5 * lateral * sigma.normal;
+                PassShare { began_ns: visit.began_ns, noise: share * sigma.noise.hypot(sigma.reach), tilt }
+            }));
+        }
+        shares.sort_unstable_by(|a, b| a.began_ns.cmp(&b.began_ns).then(a.noise.total_cmp(&b.noise)));
+        let [noise, tilt] = variances(shares, (window_ns as f64 / WINDOW_TO_CORRELATION) as i64);
+        let nearness = (1.0 - nearest_other / (MEETING_REACH * self.sigma)).max(0.0);
+        FitSigma {
+            noise: noise.sqrt(),
+            tilt: tilt.sqrt(),
+            calibration,
+            scatter: SCATTER * scatter.sqrt(),
+            border: if found.is_border { TURN * found.lateral() } else { 0.0 },
+            meeting: if found.is_edge { 0.0 } else { MEETING * self.sigma * nearness },
+        }
+    }
+}
+
+/// Σᵢⱼ aᵢ aⱼ ρᵢⱼ of noise and tilt, with ρ falling linearly to 0 within `correlation_ns`.
+///
+/// - `shares`: in order of time.
+fn variances(shares: &[PassShare], correlation_ns: i64) -> [f64; 2] {
+    let mut sums = [0.0; 2];
+    for (at, one) in shares.iter().enumerate() {
+        sums = [sums[0] + one.noise * one.noise, sums[1] + one.tilt * one.tilt];
+        for other in &shares[at + 1..] {
+            let apart = other.began_ns.saturating_sub(one.began_ns);
+            if apart >= correlation_ns {
+                break;
+            }
+            let shared = 2.0 * (1.0 - apart as f64 / correlation_ns as f64);
+            sums = [sums[0] + shared * one.noise * other.noise, sums[1] + shared * one.tilt * other.tilt];
+        }
+    }
+    sums
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::reconstruct::{ContactSigma, GateParams, SurfaceContact};
+
+    const WINDOW_NS: i64 = 64_000_000;
+
+    /// σ of the fit over the middle of a plane on which each of `passes` passes of 64 contacts ran along x, 1 s apart; all
+    /// passes on one line.
+    fn sigma_after(passes: i64, spacing_ns: i64) -> FitSigma {
+        let gate = GateParams { sigmas: 4.0, window_ns: WINDOW_NS };
+        let mut store = ContactMap::new(0.5e-3, 3e-3, Some(gate));
+        for i in 0..64 * passes {
+            let along = (i % 64) as f64 * 0.04e-3 - 1.28e-3;
+            let stamp_ns = i / 64 * 1_000_000_000 + i % 64 * spacing_ns;
+            let sigma = ContactSigma { noise: 10e-6, reach: 0.0, calibration: 3e-6, normal: 0.0 };
+            store.add(&SurfaceContact {
+                point: Point3::new(along, 0.1e-3, 0.0),
+                normal: Vector3::z(),
+                weight: 1.0,
+                stamp_ns,
+                sigma,
+            });
+        }
+        let (field, mut scratch, x) = (FieldParams::for_ball(1.5e-3), FieldScratch::default(), Point3::origin());
+        let found = field.at(&store, &x, &mut scratch).unwrap();
+        field.sigma_of(&found, &store, &x, WINDOW_NS, &mut scratch)
+    }
+
+    #[test]
+    fn one_window_averages_nothing_and_passes_average_by_their_number() {
+        // 64 contacts within 6.4 ms are one measurement
+        let once = sigma_after(1, 100_000);
+        assert!((8.5e-6..=10e-6).contains(&once.noise), "{once:?}");
+        for passes in [2, 4, 16] {
+            let often = sigma_after(passes, 100_000);
+            let fell_by = once.noise / often.noise;
+            assert!((fell_by / (passes as f64).sqrt() - 1.0).abs() < 0.02, "{passes}: {fell_by}");
+            assert!((often.calibration - 3e-6).abs() < 1e-12, "{often:?}");
+        }
+        // slow enough for each place to be a window of its own, they are independent: five places count
+        let slow = sigma_after(1, 20_000_000);
+        assert!(slow.noise < 0.6 * once.noise, "{slow:?}");
+    }
+
+    #[test]
+    fn noise_that_is_shared_adds_up_and_else_its_squares_do() {
+        let share = |began_ns| PassShare { began_ns, noise: 1.0, tilt: 2.0 };
+        assert_eq!(variances(&[share(0), share(0)], 100), [4.0, 16.0]);
+        assert_eq!(variances(&[share(0), share(100)], 100), [2.0, 8.0]);
+        assert_eq!(variances(&[share(0), share(50)], 100), [3.0, 12.0]);
+    }
+}

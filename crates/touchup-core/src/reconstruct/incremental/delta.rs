@@ -1,0 +1,245 @@
+//! What changed in the patch since it was last told, for a mesh that follows it.
+
+use nalgebra::Point3;
+
+use crate::mesh::{FaceId, TriMesh};
+use crate::reconstruct::LatticeRegion;
+use crate::reconstruct::contour::new_faces::Patch;
+use crate::reconstruct::contour::patched::Support;
+use crate::reconstruct::field::lattice::{CellBox, LatticeNode, Owner, VertexKey};
+use crate::reconstruct::incremental::remesh::Renewed;
+use crate::reconstruct::table::CellTable;
+
+/// What changed in the patch.
+#[derive(Clone, Debug, Default)]
+pub struct PatchDelta {
+    /// what was touched up to this stamp is in it, ns
+    pub until_ns: i64,
+    /// vertices that are new, have moved, or are corners of `faces`
+    pub vertices: Vec<PatchVertex>,
+    /// whose faces are others now, and how many of `faces` are theirs, in this order. A face of the scan that the patch
+    /// touches goes when its remainder first comes.
+    pub owners: Vec<(Owner, u32)>,
+    /// corners as indices into `vertices`, counter-clockwise seen from outside
+    pub faces: Vec<[u32; 3]>,
+    /// vertices that no face uses any more
+    pub gone: Vec<VertexKey>,
+}
+
+/// A vertex of the patch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PatchVertex {
+    /// its name
+    pub key: VertexKey,
+    /// m, in O
+    pub position: Point3<f64>,
+    /// what it rests on
+    pub support: Support,
+}
+
+impl PatchDelta {
+    /// Whether nothing changed.
+    pub fn is_empty(&self) -> bool {
+        self.vertices.is_empty() && self.owners.is_empty()
+    }
+}
+
+/// Side of the blocks in which owners are looked up, in cells.
+const BLOCK: i32 = 4;
+
+fn block_of(node: LatticeNode) -> LatticeNode {
+    node.map(|x| x.div_euclid(BLOCK))
+}
+
+/// Corners by name.
+type NamedFace = [VertexKey; 3];
+
+/// The patch as it was last told.
+#[derive(Clone, Debug, Default)]
+pub(in crate::reconstruct) struct Shown {
+    faces: CellTable<Owner, Vec<NamedFace>>,
+    /// the owners of the lattice among them, by blocks of cells
+    blocks: CellTable<LatticeNode, Vec<Owner>>,
+    vertices: CellTable<VertexKey, Placed>,
+    face_count: usize,
+    /// faces of the scan that went
+    gone: usize,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Placed {
+    position: Point3<f64>,
+    support: Support,
+    /// corners of faces
+    uses: u32,
+}
+
+/// A delta while it is made.
+#[derive(Default)]
+struct Draft {
+    delta: PatchDelta,
+    /// where each vertex stands in the delta
+    at: CellTable<VertexKey, ()>,
+    /// corners of faces that went
+    left: Vec<VertexKey>,
+}
+
+impl Shown {
+    /// How many faces more the mesh has by the patch.
+    pub fn faces_more(&self) -> f64 {
+        self.face_count as f64 - self.gone as f64
+    }
+
+    /// The faces of the scan that were touched.
+    pub fn scan_faces(&self) -> impl Iterator<Item = FaceId> + '_ {
+        self.faces.iter().filter_map(|(owner, _)| match owner {
+            Owner::Scan(face) => Some(face),
+            Owner::Edge(_) | Owner::Square(_) => None,
+        })
+    }
+
+    /// Takes up what was renewed; returns what is another than before.
+    ///
+    /// - `support`: what a vertex rests on.
+    pub fn take(
+        &mut self,
+        renewed: &Renewed,
+        region: &LatticeRegion,
+        scan: &TriMesh,
+        support: impl Fn(&VertexKey) -> Support,
+    ) -> PatchDelta {
+        let next = faces_by_owner(&renewed.patch);
+        let mut draft = Draft::default();
+        for owner in self.owners_around(&renewed.core, region).into_iter().filter(|owner| !next.contains(owner)) {
+            self.replace(owner, Vec::new(), &mut draft);
+            self.forget(owner);
+        }
+        for owner in renewed.scanned.iter().map(|&face| Owner::Scan(face)).filter(|owner| !next.contains(owner)) {
+            if self.faces.contains(&owner) {
+                self.replace(owner, whole(owner, scan), &mut draft);
+            }
+        }
+        for (owner, faces) in next.iter() {
+            self.replace(owner, faces.clone(), &mut draft);
+        }
+        self.place(&renewed.patch, scan, &support, &mut draft);
+        for key in draft.left {
+            if self.vertices.get(&key).is_some_and(|placed| placed.uses == 0) {
+                self.vertices.remove(&key);
+                draft.delta.gone.push(key);
+            }
+        }
+        draft.delta
+    }
+
+    /// The owners with faces around the cells of `core`, those of the scan left out.
+    fn owners_around(&self, core: &CellBox, region: &LatticeRegion) -> Vec<Owner> {
+        if core.is_empty() {
+            return Vec::new();
+        }
+        let is_around = |owner: &Owner| match owner {
+            Owner::Edge(edge) => edge.cells().iter().any(|cell| core.contains(cell)),
+            // at the rim of the core, the square goes with the cell that is in the region
+            Owner::Square(square) => {
+                let cells = square.cells();
+                cells.iter().all(|cell| core.contains(cell))
+                    || cells.iter().any(|cell| core.contains(cell) && region.contains(cell))
+            }
+            Owner::Scan(_) => false,
+        };
+        let near = core.widened(0, 1);
+        let blocks = CellBox { lo: block_of(near.lo), hi: block_of(near.hi) };
+        let mut owners = Vec::new();
+        blocks.each_in(&self.blocks, |_, block| owners.extend(block.iter().copied().filter(is_around)));
+        owners
+    }
+
+    /// Forgets an owner that has no faces any more.
+    fn forget(&mut self, owner: Owner) {
+        self.faces.remove(&owner);
+        if let Some(block) = owner.node().and_then(|node| self.blocks.get_mut(&block_of(node)))
+            && let Some(at) = block.iter().position(|&other| other == owner)
+        {
+            block.swap_remove(at);
+        }
+    }
+
+    /// Gives an owner other faces, unless they are the same.
+    fn replace(&mut self, owner: Owner, faces: Vec<NamedFace>, draft: &mut Draft) {
+        let (at, is_new) = self.faces.insert_with(owner, Vec::new);
+        if !is_new && *self.faces.value_mut(at) == faces {
+            return;
+        }
+        if is_new {
+            match owner.node() {
+                None => self.gone += 1,
+                Some(node) => {
+                    let (block, _) = self.blocks.insert_with(block_of(node), Vec::new);
+                    self.blocks.value_mut(block).push(owner);
+                }
+            }
+        }
+        draft.delta.owners.push((owner, faces.len() as u32));
+        for key in faces.iter().flatten() {
+            let unplaced = || Placed { position: Point3::origin(), support: Support::Scan, uses: 0 };
+            let (vertex, _) = self.vertices.insert_with(*key, unplaced);
+            self.vertices.value_mut(vertex).uses += 1;
+        }
+        draft.delta.faces.extend(faces.iter().map(|face| face.map(|key| draft.at.insert_with(key, || ()).0)));
+        self.face_count += faces.len();
+        let before = std::mem::replace(self.faces.value_mut(at), faces);
+        self.face_count -= before.len();
+        for key in before.into_iter().flatten() {
+            if let Some(placed) = self.vertices.get_mut(&key) {
+                placed.uses -= 1;
+                draft.left.push(key);
+            }
+        }
+    }
+
+    /// Puts the vertices of the draft's faces, and those that moved, where they belong.
+    fn place(&mut self, patch: &Patch, scan: &TriMesh, support: &impl Fn(&VertexKey) -> Support, draft: &mut Draft) {
+        let mut is_seen = vec![false; patch.vertices.len()];
+        for &vertex in patch.faces.iter().flat_map(|face| &face.corners) {
+            if std::mem::replace(&mut is_seen[vertex as usize], true) {
+                continue;
+            }
+            let (key, position) = patch.vertices.entry(vertex);
+            let Some(placed) = self.vertices.get_mut(key) else { continue };
+            let support = support(key);
+            if placed.position != *position || placed.support != support {
+                (placed.position, placed.support) = (*position, support);
+                draft.at.insert_with(*key, || ());
+            }
+        }
+        for (key, ()) in draft.at.iter() {
+            let Some(placed) = self.vertices.get_mut(&key) else { continue };
+            if let VertexKey::Scan(vertex) = key {
+                placed.position = scan.position(vertex);
+            }
+            let Placed { position, support, .. } = *placed;
+            draft.delta.vertices.push(PatchVertex { key, position, support });
+        }
+    }
+}
+
+/// The faces of a patch by their owners; faces of the scan that go without a remainder have none.
+fn faces_by_owner(patch: &Patch) -> CellTable<Owner, Vec<NamedFace>> {
+    let mut by_owner: CellTable<Owner, Vec<NamedFace>> = CellTable::default();
+    for face in &patch.removed {
+        by_owner.insert_with(Owner::Scan(*face), Vec::new);
+    }
+    for face in &patch.faces {
+        let (at, _) = by_owner.insert_with(face.owner, Vec::new);
+        by_owner.value_mut(at).push(face.corners.map(|vertex| patch.vertices.entry(vertex).0));
+    }
+    by_owner
+}
+
+/// A face of the scan as it came.
+fn whole(owner: Owner, scan: &TriMesh) -> Vec<NamedFace> {
+    match owner {
+        Owner::Scan(face) => vec![scan.corners(face).map(VertexKey::Scan)],
+        Owner::Edge(_) | Owner::Square(_) => Vec::new(),
+    }
+}

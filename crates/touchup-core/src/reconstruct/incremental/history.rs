@@ -1,0 +1,137 @@
+//! What was there before each stroke, so that strokes can be undone and redone bit by bit.
+
+use std::collections::VecDeque;
+
+use crate::reconstruct::table::{CellTable, Key};
+
+/// Strokes that can be undone.
+const MOST_STROKES: usize = 64;
+
+/// Old values by key, stroke by stroke.
+///
+/// Undoing swaps what is kept with what is there, and so does redoing.
+#[derive(Clone, Debug)]
+pub struct History<K, V> {
+    done: VecDeque<Vec<(K, V)>>,
+    undone: Vec<Vec<(K, V)>>,
+    /// the keys of the stroke at hand
+    noted: CellTable<K, ()>,
+    /// values kept at most
+    room: usize,
+    kept: usize,
+}
+
+impl<K: Key, V> History<K, V> {
+    /// Keeps at most `room` values; the oldest strokes go first.
+    pub fn new(room: usize) -> Self {
+        Self { done: VecDeque::new(), undone: Vec::new(), noted: CellTable::default(), room, kept: 0 }
+    }
+
+    /// Begins a stroke; what was undone can be redone no more.
+    pub fn begin(&mut self) {
+        self.noted.clear();
+        self.kept -= self.undone.drain(..).map(|stroke| stroke.len()).sum::<usize>();
+        self.done.push_back(Vec::new());
+        self.forget();
+    }
+
+    /// Keeps the value of `key` as it is before it changes, unless this stroke changed it already. Before the first stroke
+    /// nothing is kept; a stroke too long to be kept can not be undone, nor those before it.
+    pub fn note(&mut self, key: K, before: impl FnOnce() -> V) {
+        let Some(stroke) = self.done.back_mut() else { return };
+        if self.noted.insert_with(key, || ()).1 {
+            stroke.push((key, before()));
+            self.kept += 1;
+            if self.kept > self.room {
+                self.forget();
+            }
+        }
+    }
+
+    fn forget(&mut self) {
+        while self.kept > self.room || self.done.len() > MOST_STROKES {
+            let Some(oldest) = self.done.pop_front() else { return };
+            self.kept -= oldest.len();
+        }
+    }
+
+    /// How many strokes can be undone.
+    pub fn len(&self) -> usize {
+        self.done.len()
+    }
+
+    /// Whether no stroke can be undone.
+    pub fn is_empty(&self) -> bool {
+        self.done.is_empty()
+    }
+
+    /// Undoes the last stroke, the last change first: `swap` exchanges what is kept with what is there. Returns whether
+    /// there was one.
+    pub fn undo(&mut self, mut swap: impl FnMut(K, &mut V)) -> bool {
+        let Some(mut stroke) = self.done.pop_back() else { return false };
+        stroke.iter_mut().rev().for_each(|(key, value)| swap(*key, value));
+        self.undone.push(stroke);
+        self.noted.clear();
+        true
+    }
+
+    /// Does again what was undone last. Returns whether there was anything.
+    pub fn redo(&mut self, mut swap: impl FnMut(K, &mut V)) -> bool {
+        let Some(mut stroke) = self.undone.pop() else { return false };
+        stroke.iter_mut().for_each(|(key, value)| swap(*key, value));
+        self.noted = stroke.iter().map(|(key, _)| *key).collect();
+        self.done.push_back(stroke);
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn write(history: &mut History<u32, i32>, values: &mut [i32], key: u32, value: i32) {
+        history.note(key, || values[key as usize]);
+        values[key as usize] = value;
+    }
+
+    #[test]
+    fn strokes_go_and_come_back() {
+        let (mut history, mut values) = (History::new(100), [0; 3]);
+        write(&mut history, &mut values, 0, 7);
+        let mut states = vec![values];
+        for stroke in 1..4 {
+            history.begin();
+            for key in [0, stroke as u32 % 3, 0] {
+                write(&mut history, &mut values, key, 10 * stroke + key as i32);
+            }
+            states.push(values);
+        }
+        for state in states.iter().rev().skip(1) {
+            assert!(history.undo(|key, value| std::mem::swap(&mut values[key as usize], value)));
+            assert_eq!(values, *state);
+        }
+        assert!(!history.undo(|_, _| ()), "what came before the first stroke stays");
+        for state in &states[1..] {
+            assert!(history.redo(|key, value| std::mem::swap(&mut values[key as usize], value)));
+            assert_eq!(values, *state);
+        }
+        assert!(history.undo(|key, value| std::mem::swap(&mut values[key as usize], value)));
+        history.begin();
+        assert!(!history.redo(|_, _| ()), "something else was done since");
+    }
+
+    #[test]
+    fn memory_is_bounded() {
+        let mut history = History::new(10);
+        for stroke in 0..1000u32 {
+            history.begin();
+            (0..4).for_each(|i| history.note(4 * stroke + i, || ()));
+        }
+        assert_eq!((history.len(), history.kept), (2, 8));
+        history.begin();
+        (0..11).for_each(|i| history.note(i, || ()));
+        assert!(history.is_empty() && history.kept == 0, "too long to be kept");
+        (0..11).for_each(|i| history.note(100 + i, || ()));
+        assert_eq!(history.kept, 0, "the rest of it neither");
+    }
+}

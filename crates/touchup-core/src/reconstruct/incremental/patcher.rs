@@ -1,0 +1,479 @@
+//! Samples in, the scan with its touched part meshed anew out.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::mesh::{FaceTree, MeshError, Region, TriMesh};
+use crate::parameters;
+use crate::reconstruct::contour::new_faces::Patch;
+use crate::reconstruct::contour::patched::{Patched, Support};
+use crate::reconstruct::contour::vertex_uncertainty::vertex_sigma;
+use crate::reconstruct::evidence::contact_map::{ContactMap, GateParams};
+use crate::reconstruct::evidence::contact_uncertainty::CalibrationParams;
+use crate::reconstruct::evidence::free_space::SweptSpace;
+use crate::reconstruct::evidence::outliers::Outliers;
+use crate::reconstruct::evidence::point_evidence::{Evidence, EvidenceParams, ScanPrior, Source};
+use crate::reconstruct::evidence::touch_history::TouchHistory;
+use crate::reconstruct::evidence::touches::{TipTouch, TouchFinder, TouchFinderParams};
+use crate::reconstruct::field::grid::{GridChanges, NodeState, ReconstructionGrid, node_at};
+use crate::reconstruct::field::lattice::{CellBox, Lattice, LatticeNode, VertexKey};
+use crate::reconstruct::field::piecewise::FieldScratch;
+use crate::reconstruct::field::unreachable::mark_unreachable;
+use crate::reconstruct::incremental::delta::{PatchDelta, Shown};
+use crate::reconstruct::incremental::remesh::{Remesh, Renewed};
+use crate::stylus::{ContactSample, ProbedPoint, SettingError, TipBody, TipShape};
+
+/// Settings of a [`Patcher`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PatcherParams {
+    /// how touches are found
+    pub touches: TouchFinderParams,
+    /// how far they are believed
+    pub evidence: EvidenceParams,
+    /// whether free space is evidence: where the tip went, nothing is. Else the scan stays where nothing was touched
+    pub free_space: bool,
+    /// edge length of the lattice, m
+    pub pitch: f64,
+    /// a patch may have this many times the faces of the scan: where it would have more, the lattice is made coarser
+    pub most_faces: f64,
+    /// how well things are known; `None`: nobody asks, and nothing is rejected
+    pub uncertainty: Option<UncertaintyParams>,
+    /// `None`: the mesh is the whole scan, and may be touched anywhere
+    pub region: Option<PatchRegion>,
+}
+
+/// The part of a scan that a patcher has, and where in it may be touched.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PatchRegion {
+    /// what the tip does elsewhere is not looked at
+    pub region: Region,
+    /// faces of the whole scan
+    pub faces: usize,
+}
+
+parameters! {
+    /// How fine the reconstructed surface is.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct PatchParams in "patch" {
+        /// Edge length of the new faces; left out: half the radius of the tip.
+        ///
+        /// In m.
+        pitch: Option<f64> = None, "pitch_mm" [MM, 0.001, 1000] like "0.75";
+        /// The result has at most this many times the faces of the scan (and 5000): where it would have more, the new faces become
+        /// larger.
+        most_faces: f64 = 10.0, "most_faces" [SCANS, 1, 1e6];
+    }
+}
+
+parameters! {
+    /// What is asked of how well the mesh is known.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct UncertaintyParams in "uncertainty" {
+        /// Standard deviation of a vertex of the scan, m; 0: free of noise.
+        scan: f64 = 0.0;
+        /// A contact that contradicts by more than this many standard deviations is rejected as an outlier.
+        gate_sigmas: f64 = 4.0, "gate_sigmas" [SIGMAS, 0.5, 1e6];
+    }
+    with {
+        /// What the calibration leaves.
+        calibration: CalibrationParams,
+    }
+}
+
+impl UncertaintyParams {
+    /// The defaults, for a scan whose points are off by `noise` (m).
+    pub fn new(noise: f64) -> Self {
+        Self { scan: noise, ..Self::default() }
+    }
+}
+
+impl PatcherParams {
+    /// Settings that hold for a ball of `radius` (m) at a stylus of `stiffness` (N/m), and a scan whose points are off by
+    /// `noise` (m).
+    pub fn new(radius: f64, stiffness: Option<f64>, noise: f64) -> Self {
+        Self {
+            touches: TouchFinderParams::new(radius, stiffness),
+            evidence: EvidenceParams::new(radius, noise),
+            free_space: true,
+            pitch: radius / 2.0,
+            most_faces: PatchParams::default().most_faces,
+            uncertainty: Some(UncertaintyParams::new(noise)),
+            region: None,
+        }
+    }
+
+    /// The longest smoothing window: contacts within it share their noise, ns.
+    fn window_ns(&self) -> i64 {
+        2 * self.touches.half_window_ns
+    }
+
+    /// Radius of the tip when it is a ball, m.
+    fn ball(&self) -> Option<f64> {
+        (self.touches.shape == TipShape::Ball).then_some(self.touches.radius)
+    }
+
+    /// When contacts are rejected.
+    fn gate(&self) -> Option<GateParams> {
+        self.uncertainty.map(|known| GateParams { sigmas: known.gate_sigmas, window_ns: self.window_ns() })
+    }
+
+    /// How well the scan is known; a scan free of noise is no better than touches that contradict it.
+    fn scan_prior(&self) -> Option<ScanPrior> {
+        let UncertaintyParams { scan: sigma, gate_sigmas, .. } = self.uncertainty.filter(|known| known.scan > 0.0)?;
+        Some(ScanPrior { sigma, gate_sigmas })
+    }
+
+    /// How touches are found; what calibration leaves is asked for with the rest.
+    fn finder_params(&self) -> TouchFinderParams {
+        TouchFinderParams { calibration: self.uncertainty.map(|known| known.calibration), ..self.touches }
+    }
+
+    /// Settings for a tip of `shape` whose ball, flat end or nose has `radius` (m), else as [`Self::new`]. How far evidence
+    /// is believed goes by the size of what the tip can show.
+    ///
+    /// # Errors
+    /// [`SettingError`] for sizes of which no tip can be made.
+    pub fn for_tip(shape: TipShape, radius: f64, stiffness: Option<f64>, noise: f64) -> Result<Self, SettingError> {
+        let mut params = Self::new(TipBody::new(shape, radius)?.scale(), stiffness, noise);
+        (params.touches.shape, params.touches.radius) = (shape, radius);
+        Ok(params)
+    }
+
+    /// # Errors
+    /// [`SettingError`] naming the first setting outside its range.
+    pub fn check(&self) -> Result<(), SettingError> {
+        let radius = self.evidence.radius;
+        SettingError::check("tip.radius_mm", radius * 1e3, radius > 0.0, "more than 0 where there is a patch")?;
+        PatchParams { pitch: Some(self.pitch), most_faces: self.most_faces }.check()?;
+        let noise = self.uncertainty.map_or(0.0, |known| known.scan);
+        SettingError::check("scan.noise_mm", noise * 1e3, noise >= 0.0, "0 to 1000 mm")?;
+        self.uncertainty.iter().try_for_each(UncertaintyParams::check)
+    }
+}
+
+/// Keeps what was touched and where the ball went, and makes the patch of it.
+///
+/// # Example
+/// ```
+/// use nalgebra::{Isometry3, Point3, Vector3};
+/// use touchup_core::{mesh::{FaceTree, TriMesh}, reconstruct::{Patcher, PatcherParams}, stylus::*};
+///
+/// // a scan of 20 mm that lies 0.4 mm too high
+/// let p = |x: f64, y: f64| Point3::new(x * 1e-3, y * 1e-3, 0.4e-3);
+/// let scan = TriMesh::new(vec![p(0., 0.), p(20., 0.), p(20., 20.), p(0., 20.)], vec![[0, 1, 2], [0, 2, 3]])?;
+/// let mut patcher = Patcher::new(PatcherParams::new(1.5e-3, None, 0.3e-3))?;
+/// let mut contacts = ContactEstimator::new(ContactEstimatorParams::new(TipParams { radius: 1.5e-3, stiffness: None }))?;
+/// // a ball slides over the real surface, z = 0, in lines 1 mm apart
+/// for i in 0..8000_i64 {
+///     let (line, along) = ((i / 800) as f64, (i % 800) as f64 * 0.0125e-3);
+///     let x = if line % 2.0 == 0.0 { 5e-3 + along } else { 15e-3 - along };
+///     let pose_ot = Isometry3::translation(x, 5e-3 + line * 1e-3, 1.5e-3);
+///     let wrench = Wrench { force: Vector3::new(0.0, 0.0, 2.0), torque: Vector3::zeros() };
+///     patcher.push(contacts.observe(&Sample { stamp_ns: i * 1_000_000, pose_ot, wrench })?);
+/// }
+/// patcher.flush();
+/// let mesh = patcher.patched(&scan, &FaceTree::new(&scan))?.mesh;
+/// let tree = FaceTree::new(&mesh);
+/// let found = tree.closest(&mesh, &Point3::new(10e-3, 10e-3, 0.0), 1e-3).ok_or("no face")?;
+/// assert!(found.point.z.abs() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Patcher {
+    params: PatcherParams,
+    finder: TouchFinder,
+    felt: TouchHistory,
+    live: Option<LivePatch>,
+}
+
+/// The patch that a mesh follows.
+#[derive(Clone, Debug)]
+struct LivePatch {
+    remesh: Remesh,
+    shown: Shown,
+    /// what came to the stores since
+    news: GridChanges,
+    /// what came and was taken in only nearby
+    late: GridChanges,
+    /// times since that was taken in as a whole
+    since_late: u32,
+    /// strokes were undone: everything is to be meshed anew
+    is_outdated: bool,
+}
+
+/// News are taken in as a whole each so many times, or when there is nothing else to do.
+const LATE_EVERY: u32 = 4;
+
+impl LivePatch {
+    /// What is to be taken in nearby, and what as a whole.
+    fn take_news(&mut self) -> (GridChanges, GridChanges) {
+        let news = std::mem::take(&mut self.news);
+        self.since_late += 1;
+        if self.since_late < LATE_EVERY && !news.is_empty() {
+            self.late.extend(&news);
+            return (news, GridChanges::default());
+        }
+        self.since_late = 0;
+        let mut late = std::mem::take(&mut self.late);
+        late.extend(&news);
+        (news, late)
+    }
+}
+
+/// Edge of the cells of one mean contact, in radii.
+const CONTACT_CELL: f64 = 1.0 / 3.0;
+/// Edge of the cells of one centre, in radii.
+const SWEPT_CELL: f64 = 0.1;
+/// A budget below this many faces is none: a box has twelve.
+const LEAST_BUDGET: f64 = 5000.0;
+/// Rounds in which the lattice is made coarser to keep the budget.
+const COARSER: usize = 3;
+/// Places the planes of the lattice, in pitches, where no coordinate that a person chose falls on them.
+const ORIGIN: [f64; 3] = [0.164_607_9, 0.312_756_1, 0.460_895_1];
+
+impl Patcher {
+    /// A patcher that has felt nothing yet.
+    ///
+    /// # Errors
+    /// [`SettingError`].
+    pub fn new(params: PatcherParams) -> Result<Self, SettingError> {
+        params.check()?;
+        let radius = params.evidence.radius;
+        Ok(Self {
+            finder: TouchFinder::new(params.finder_params())?,
+            felt: TouchHistory::new(
+                ContactMap::new(CONTACT_CELL * radius, params.evidence.field.reach, params.gate()),
+                SweptSpace::of_tip(
+                    TipBody::new(params.touches.shape, params.touches.radius)?,
+                    SWEPT_CELL * radius,
+                    5.0 / 3.0 * radius,
+                ),
+                params.free_space,
+                radius,
+                params.ball(),
+            ),
+            live: None,
+            params,
+        })
+    }
+
+    /// What was rejected because it contradicted the place it was felt at.
+    pub fn outliers(&self) -> &Outliers {
+        self.felt.contacts.outliers()
+    }
+
+    /// A copy of what was felt, without what was made of it for a mesh that follows.
+    pub fn copy(&self) -> Self {
+        let Self { params, finder, felt, .. } = self;
+        Self { params: *params, finder: finder.clone(), felt: felt.clone(), live: None }
+    }
+
+    /// The settings.
+    pub fn params(&self) -> &PatcherParams {
+        &self.params
+    }
+
+    /// Takes the next sample, which is later than the one before. What it says counts once the smoothing window around it
+    /// is complete.
+    pub fn push(&mut self, sample: &ContactSample) {
+        let Self { finder, felt, params, .. } = self;
+        finder.push(sample, |touch| keep(felt, params, &touch));
+    }
+
+    /// The touches themselves, in order of time.
+    pub fn probed(&self) -> &[ProbedPoint] {
+        self.felt.probed.points()
+    }
+
+    /// What was touched, as it was kept.
+    pub fn contacts(&self) -> &ContactMap {
+        &self.felt.contacts
+    }
+
+    /// Takes in what is still in the smoothing window: the stream has ended or pauses.
+    pub fn flush(&mut self) {
+        let Self { finder, felt, params, .. } = self;
+        finder.flush(|touch| keep(felt, params, &touch));
+    }
+
+    /// How many strokes can be undone. A stroke is what was touched without a pause of a tenth of a second, and where the
+    /// ball went after it.
+    pub fn strokes(&self) -> usize {
+        self.felt.strokes()
+    }
+
+    /// Takes the last stroke back, up to the last sample: what counts is bit by bit what counted before it. Returns whether
+    /// there was one. What the samples told of friction and bias stays.
+    pub fn undo(&mut self) -> bool {
+        self.flush();
+        let has_undone = self.felt.undo();
+        self.start_over(has_undone);
+        has_undone
+    }
+
+    /// Does the stroke again that was undone last, bit by bit, unless something was touched since. Returns whether there was
+    /// one.
+    pub fn redo(&mut self) -> bool {
+        let has_redone = self.felt.redo();
+        self.start_over(has_redone);
+        has_redone
+    }
+
+    /// The next renewal meshes everything anew.
+    fn start_over(&mut self, is_outdated: bool) {
+        if let Some(live) = &mut self.live {
+            live.is_outdated |= is_outdated;
+        }
+    }
+
+    /// The scan with its touched part meshed anew from all that counts so far; vertices and faces that were not touched
+    /// keep their ids.
+    ///
+    /// - `scan`: as it came, with the tree over its faces.
+    ///
+    /// # Errors
+    /// [`MeshError::TooMany`] when 32-bit ids do not suffice.
+    pub fn patched(&mut self, scan: &TriMesh, tree: &FaceTree) -> Result<Patched, MeshError> {
+        self.felt.contacts.note_all();
+        self.settle(scan, tree);
+        let (remesh, Renewed { patch, .. }) = self.meshed_anew(scan, tree);
+        let (mesh, ids) = patch.applied_to(scan)?;
+        let mut support = vec![Support::Scan; mesh.vertex_slots()];
+        for ((key, _), id) in patch.vertices.iter().zip(ids) {
+            if let Some(id) = id {
+                support[id.0 as usize] = support_of(&key, remesh.restored());
+            }
+        }
+        if let Some(radius) = self.params.ball() {
+            mark_unreachable(&mesh, &mut support, &self.felt.swept, radius)?;
+        }
+        let sigma = self.sigma(scan, tree, &mesh, &support);
+        Ok(Patched {
+            mesh,
+            support,
+            sigma,
+            pitch: remesh.lattice().pitch,
+            removed_faces: patch.removed.len(),
+            added_faces: patch.faces.len(),
+            open_squares: patch.open.len(),
+        })
+    }
+
+    /// How well each vertex is known, if somebody asks.
+    fn sigma(&self, scan: &TriMesh, tree: &FaceTree, mesh: &TriMesh, support: &[Support]) -> Vec<f64> {
+        let Self { params, .. } = self;
+        let Some(uncertainty) = &params.uncertainty else { return Vec::new() };
+        let evidence = Evidence { prior: None, ..self.evidence(scan, tree) };
+        let (window_ns, mut scratch) = (params.window_ns(), FieldScratch::default());
+        let mut of = |(p, &support)| vertex_sigma(&evidence, p, support, uncertainty.scan, window_ns, &mut scratch);
+        mesh.positions().iter().zip(support).map(&mut of).collect()
+    }
+
+    /// What changed in the patch since this was last asked. It takes as long as there is to mesh anew near what changed;
+    /// where the budget was passed, everything is meshed anew, by a coarser lattice.
+    ///
+    /// What [`Self::patched`] shows can differ from the sum of these by some thousandths of an edge of the lattice, and where
+    /// nothing was felt by more.
+    ///
+    /// - `scan`, `tree`: as in [`Self::patched`], the same each time.
+    pub fn renewed(&mut self, scan: &TriMesh, tree: &FaceTree) -> PatchDelta {
+        self.settle(scan, tree);
+        let mut live = self.live.take().unwrap_or_else(|| LivePatch {
+            remesh: Remesh::new(lattice_of(self.params.pitch)),
+            shown: Shown::default(),
+            news: self.all_news(),
+            late: GridChanges::default(),
+            since_late: 0,
+            is_outdated: false,
+        });
+        let (news, late) = live.take_news();
+        let faces = self.whole(scan) + live.shown.faces_more();
+        let renewed = if live.is_outdated || faces > self.budget(scan) {
+            let (remesh, mut renewed) = self.meshed_anew(scan, tree);
+            (live.remesh, live.is_outdated) = (remesh, false);
+            renewed.core = CellBox::ALL;
+            renewed.scanned.extend(live.shown.scan_faces());
+            renewed
+        } else {
+            live.remesh.renew(&self.evidence(scan, tree), &news, &late)
+        };
+        let support = |key: &VertexKey| support_of(key, live.remesh.restored());
+        let delta = live.shown.take(&renewed, live.remesh.region(), scan, support);
+        self.live = Some(live);
+        PatchDelta { until_ns: self.felt.until_ns, ..delta }
+    }
+
+    fn settle(&mut self, scan: &TriMesh, tree: &FaceTree) {
+        let news = self.felt.settle(scan, tree);
+        if let Some(live) = &mut self.live {
+            live.news.extend(&news);
+        }
+    }
+
+    fn all_news(&self) -> GridChanges {
+        let means = self.felt.contacts.means().iter().map(|mean| mean.point).collect();
+        let mut centres = Vec::new();
+        self.felt.swept.cover(|centre| centres.push(*centre));
+        GridChanges { means, centres }
+    }
+
+    fn evidence<'a>(&'a self, scan: &'a TriMesh, tree: &'a FaceTree) -> Evidence<'a> {
+        let Self { felt: TouchHistory { contacts, swept, .. }, params, .. } = self;
+        Evidence { params: &params.evidence, contacts, swept, scan, tree, prior: params.scan_prior() }
+    }
+
+    fn budget(&self, scan: &TriMesh) -> f64 {
+        (self.params.most_faces * self.whole(scan)).max(LEAST_BUDGET)
+    }
+
+    /// Faces of the whole scan.
+    fn whole(&self, scan: &TriMesh) -> f64 {
+        self.params.region.map_or(scan.face_count(), |touched| touched.faces) as f64
+    }
+
+    /// The patch of everything, within the budget.
+    fn meshed_anew(&self, scan: &TriMesh, tree: &FaceTree) -> (Remesh, Renewed) {
+        let (evidence, news, budget) = (self.evidence(scan, tree), self.all_news(), self.budget(scan));
+        let meshed = |pitch: f64| {
+            let mut remesh = Remesh::new(lattice_of(pitch));
+            let renewed = remesh.renew(&evidence, &news, &GridChanges::default());
+            (remesh, renewed)
+        };
+        let mut made = meshed(self.params.pitch);
+        for _ in 0..COARSER {
+            let Patch { faces, removed, .. } = &made.1.patch;
+            let faces = self.whole(scan) + faces.len() as f64 - removed.len() as f64;
+            if faces <= budget {
+                break;
+            }
+            // the number of faces falls with the square of the pitch
+            made = meshed(made.0.lattice().pitch * 1.02 * (faces / budget).sqrt());
+        }
+        made
+    }
+}
+
+/// What the tip does outside the region is not looked at.
+fn keep(felt: &mut TouchHistory, params: &PatcherParams, touch: &TipTouch) {
+    if params.region.is_none_or(|touched| touched.region.contains(&touch.centre)) {
+        felt.keep(touch);
+    } else {
+        felt.until_ns = touch.stamp_ns;
+    }
+}
+
+fn lattice_of(pitch: f64) -> Lattice {
+    Lattice { origin: Point3::from(Vector3::from(ORIGIN) * pitch), pitch }
+}
+
+/// A vertex is touched when most of the corners of its cell are near the surface that was; those on the scan are its own.
+fn support_of(key: &VertexKey, restored: &ReconstructionGrid) -> Support {
+    let is_felt = |state: &NodeState| state.source == Source::Touch && !state.is_corner;
+    let is_touched = |node: &LatticeNode| restored.nodes.get(node).is_some_and(is_felt);
+    let touched = match *key {
+        VertexKey::Scan(_) | VertexKey::Trace { .. } | VertexKey::Pierce(..) => return Support::Scan,
+        VertexKey::Cell(cell, _) => (0..8).filter(|&corner| is_touched(&node_at(cell, corner))).count() >= 4,
+        VertexKey::Square(square, _) => square.corners().iter().filter(|node| is_touched(node)).count() >= 2,
+        VertexKey::Edge(edge) => is_touched(&edge.node) || is_touched(&edge.end()),
+    };
+    if touched { Support::Touched } else { Support::Guessed }
+}

@@ -1,0 +1,161 @@
+//! The field, the region and the new faces in it, brought up to date where evidence came.
+
+use crate::mesh::FaceId;
+use crate::reconstruct::LatticeRegion;
+use crate::reconstruct::contour::crossing::Crossings;
+use crate::reconstruct::contour::dual_contouring::{ContourParams, contour_in};
+use crate::reconstruct::contour::new_faces::Patch;
+use crate::reconstruct::contour::scan_clipping::{Cut, cells_around, faces_near};
+use crate::reconstruct::evidence::point_evidence::Evidence;
+use crate::reconstruct::field::grid::{Changed, GridChanges, ReconstructionGrid, cells_of};
+use crate::reconstruct::field::lattice::{CellBox, Lattice, LatticeNode};
+use crate::reconstruct::table::CellTable;
+
+/// Rounds in which the region grows over squares where scan and patch cannot be joined.
+const GROWTH: usize = 3;
+/// Rounds in which the field is looked at further, each two cells, where a surface that is filled in goes on.
+const FURTHER: usize = 4;
+
+/// What is meshed anew, and why.
+#[derive(Clone, Debug)]
+pub(in crate::reconstruct) struct Remesh {
+    lattice: Lattice,
+    restored: ReconstructionGrid,
+    region: LatticeRegion,
+    /// cells that are in the region only because patch and scan cannot be joined at their squares
+    grown: CellTable<LatticeNode, ()>,
+    /// cells that patch and scan would need to be joined, for which nothing was known
+    wanted: CellTable<LatticeNode, ()>,
+    /// a box that holds the region
+    bounds: CellBox,
+    crossings: Crossings,
+}
+
+/// The new faces in and around a part of the lattice.
+#[derive(Clone, Debug)]
+pub(in crate::reconstruct) struct Renewed {
+    /// what is around these cells is new …
+    pub core: CellBox,
+    /// … and stands here, beside more of which not all is there
+    pub patch: Patch,
+    /// the faces of the scan that were looked at: what is left of them stands in the patch
+    pub scanned: Vec<FaceId>,
+}
+
+impl Remesh {
+    /// Nothing meshed anew yet.
+    pub fn new(lattice: Lattice) -> Self {
+        Self {
+            lattice,
+            restored: ReconstructionGrid::default(),
+            region: LatticeRegion::default(),
+            grown: CellTable::default(),
+            wanted: CellTable::default(),
+            bounds: CellBox::EMPTY,
+            crossings: Crossings::default(),
+        }
+    }
+
+    pub fn lattice(&self) -> &Lattice {
+        &self.lattice
+    }
+
+    pub fn restored(&self) -> &ReconstructionGrid {
+        &self.restored
+    }
+
+    pub fn region(&self) -> &LatticeRegion {
+        &self.region
+    }
+
+    /// Brings everything up to date with what came to the stores of `evidence`: as [`ReconstructionGrid::renew`].
+    pub fn renew(&mut self, evidence: &Evidence<'_>, news: &GridChanges, late: &GridChanges) -> Renewed {
+        let mut changed = self.restored.renew(evidence, &self.lattice, news, late);
+        let (mut core, mut left) = (CellBox::EMPTY, Vec::new());
+        for _ in 0..FURTHER {
+            self.take_up(&changed, &mut core, &mut left);
+            let renewed = self.grow(evidence, core, &left);
+            let open = renewed.patch.open.iter().map(|open| open.beyond);
+            let beyond: LatticeRegion = open.filter(|cell| self.restored.is_beyond(*cell)).collect();
+            if beyond.is_empty() {
+                return renewed;
+            }
+            changed = self.restored.look_further(evidence, &self.lattice, &beyond);
+        }
+        self.take_up(&changed, &mut core, &mut left);
+        self.grow(evidence, core, &left)
+    }
+
+    /// Takes cells into the region, or out of it, as the field has changed.
+    ///
+    /// - `core`: widened to the cells that depend on it.
+    /// - `left`: takes those that are in the region no more.
+    fn take_up(&mut self, changed: &Changed, core: &mut CellBox, left: &mut Vec<LatticeNode>) {
+        for node in &changed.at_surface {
+            // the slope at a crossing is taken over the nodes beside it
+            core.take(&node.map(|x| x.saturating_sub(2)));
+            core.take(&node.map(|x| x.saturating_add(1)));
+        }
+        for (cell, ()) in cells_of(changed).iter() {
+            let was_in = self.region.contains(&cell);
+            self.grown.remove(&cell);
+            let is_in = self.restored.is_in_region(cell);
+            if is_in && !was_in {
+                self.region.insert(cell, ());
+                self.bounds.take(&cell);
+            } else if was_in && !is_in {
+                self.region.remove(&cell);
+                left.push(cell);
+            }
+            if is_in != was_in || self.wanted.contains(&cell) {
+                take_around(core, &cell);
+            }
+        }
+        changed.open.iter().for_each(|cell| take_around(core, cell));
+    }
+
+    /// Makes the faces around `core`, and takes cells into the region where they cannot be joined to the scan.
+    ///
+    /// - `left`: cells that are in the region no more.
+    fn grow(&mut self, evidence: &Evidence<'_>, mut core: CellBox, left: &[LatticeNode]) -> Renewed {
+        let mut renewed = self.contoured(evidence, core, left);
+        for _ in 0..GROWTH {
+            let mut has_grown = false;
+            for open in renewed.patch.open.iter().filter(|open| open.is_scanned && self.restored.can_take(open.beyond))
+            {
+                has_grown |= self.region.insert_with(open.beyond, || ()).1;
+                self.grown.insert_with(open.beyond, || ());
+                self.wanted.remove(&open.beyond);
+                self.bounds.take(&open.beyond);
+                take_around(&mut core, &open.beyond);
+            }
+            if !has_grown {
+                break;
+            }
+            renewed = self.contoured(evidence, core, left);
+        }
+        for open in renewed.patch.open.iter().filter(|open| open.is_scanned) {
+            self.wanted.insert(open.beyond, ());
+        }
+        renewed
+    }
+
+    fn contoured(&mut self, evidence: &Evidence<'_>, core: CellBox, left: &[LatticeNode]) -> Renewed {
+        let Self { lattice, restored, region, bounds, crossings, .. } = self;
+        let (mut cells, around) = (left.to_vec(), core.widened(2, 2));
+        around.each_in(region, |cell, ()| cells.push(cell));
+        let mut scanned = faces_near(lattice, cells.into_iter(), evidence.tree);
+        scanned.retain(|&face| !cells_around(lattice, evidence.scan, face).meet(&around).is_empty());
+        let cut = Cut::of_faces(lattice, region, bounds, evidence.scan, &scanned);
+        let values = restored.values_in(&core.widened(1, 1));
+        let patch = contour_in(lattice, region, &core, &values, &cut, &ContourParams::default(), |edge| {
+            crossings.at(restored, evidence, lattice, edge)
+        });
+        Renewed { core, patch, scanned }
+    }
+}
+
+fn take_around(cells: &mut CellBox, cell: &LatticeNode) {
+    cells.take(&cell.map(|x| x.saturating_sub(1)));
+    cells.take(&cell.map(|x| x.saturating_add(1)));
+}

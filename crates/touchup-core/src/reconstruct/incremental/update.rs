@@ -1,0 +1,149 @@
+//! What is not known is filled in anew around what came, and what is another then is told.
+
+use crate::reconstruct::evidence::point_evidence::{Evidence, Source};
+use crate::reconstruct::evidence::scan_value::ScanValue;
+use crate::reconstruct::field::floating_components::lumps;
+use crate::reconstruct::field::grid::{Changed, NodeState, ReconstructionGrid, evaluate};
+use crate::reconstruct::field::harmonic_fill::{CompleteParams, complete, open_cells};
+use crate::reconstruct::field::lattice::{CellBox, Lattice, LatticeNode, Numbers, stepped};
+use crate::reconstruct::field::piecewise::FieldScratch;
+use crate::reconstruct::table::CellTable;
+
+/// A node whose value would change by less than this keeps it, in cells: 3 µm for a ball of 1.5 mm.
+const SLACK: f64 = 4e-3;
+/// What is filled in is filled in anew up to this many cells around what was looked at again.
+const SETTLED: i32 = 4;
+
+impl ReconstructionGrid {
+    /// Fills in what is not known in and around `area`; finds what is another now than `before` says, or than it was.
+    pub(in crate::reconstruct) fn settle(
+        &mut self,
+        evidence: &Evidence<'_>,
+        lattice: &Lattice,
+        area: &CellBox,
+        before: &CellTable<LatticeNode, Option<NodeState>>,
+    ) -> Changed {
+        if area.is_empty() {
+            return Changed::default();
+        }
+        let params = CompleteParams::new(lattice.pitch, evidence.params.radius);
+        let mut area = area.widened(SETTLED, SETTLED);
+        let (mut at, mut was) = self.known_in(&area, before);
+        let mut numbers = Numbers::new(&self.nodes, &area);
+        complete(self, &at, &numbers, &params);
+        let dropped = self.drop_lumps(evidence, lattice, &at);
+        if !dropped.is_empty() {
+            let known = at.iter().zip(was).map(|(&at, was)| (self.nodes.entry(at).0, was));
+            let mut before: CellTable<LatticeNode, Option<NodeState>> = known.collect();
+            for &(node, was) in &dropped {
+                before.insert_with(node, || was);
+                area.take(&node);
+            }
+            area = area.widened(SETTLED, SETTLED);
+            (at, was) = self.known_in(&area, &before);
+            numbers = Numbers::new(&self.nodes, &area);
+            complete(self, &at, &numbers, &params);
+        }
+        let (mut changed, mut turned) = (Changed::default(), Vec::new());
+        for (&at, was) in at.iter().zip(&was) {
+            let (node, now) = *self.nodes.entry(at);
+            let state = self.nodes.value_mut(at);
+            match was {
+                Some(was) if !now.differs(was, SLACK * lattice.pitch) => {
+                    (state.value, state.renewal) = (was.value.max(now.least), was.renewal);
+                }
+                _ => {
+                    state.renewal = self.renewals;
+                    changed.nodes.push(node);
+                    turned.push(was.is_some_and(|was| (was.value < 0.0) != (now.value < 0.0)));
+                }
+            }
+        }
+        let nodes = changed.nodes.iter().zip(turned);
+        let at_surface = nodes.filter(|(node, has_turned)| *has_turned || self.is_at_surface(&numbers, node));
+        changed.at_surface = at_surface.map(|(node, _)| *node).collect();
+        changed.open = self.renew_open(&area, &params);
+        changed
+    }
+
+    /// Whether the surface in the cells around a node depends on its value: one of them is crossed, or an edge from a
+    /// neighbour is, at whose crossing the slope is taken with it.
+    fn is_at_surface(&self, numbers: &Numbers, node: &LatticeNode) -> bool {
+        let is_material = |node: LatticeNode| {
+            let at = numbers.of(&self.nodes, &node)?;
+            Some(self.nodes.entry(at).1.value < 0.0)
+        };
+        let here = is_material(*node);
+        let beyond = (0..6).map(|i| stepped(*node, i / 2, if i % 2 == 0 { 2 } else { -2 }));
+        let is_other = |other: LatticeNode| is_material(other).is_some_and(|other| Some(other) != here);
+        CellBox { lo: *node, hi: *node }.widened(1, 1).iter().chain(beyond).any(is_other)
+    }
+
+    /// The nodes in `area` and what they were: as `before` says, or as they are.
+    fn known_in(
+        &self,
+        area: &CellBox,
+        before: &CellTable<LatticeNode, Option<NodeState>>,
+    ) -> (Vec<u32>, Vec<Option<NodeState>>) {
+        let at = self.indices_in(area);
+        let was = |&at: &u32| {
+            let (node, state) = self.nodes.entry(at);
+            before.get(node).map_or(Some(*state), |before| *before)
+        };
+        let was = at.iter().map(was).collect();
+        (at, was)
+    }
+
+    /// Gives up material that nothing holds; returns its nodes and those beside them, with what was known there before:
+    /// nothing beyond what was looked at.
+    fn drop_lumps(
+        &mut self,
+        evidence: &Evidence<'_>,
+        lattice: &Lattice,
+        at: &[u32],
+    ) -> Vec<(LatticeNode, Option<NodeState>)> {
+        let lumps = lumps(self, evidence, lattice, at);
+        let mut dropped = Vec::new();
+        let mut scratch = FieldScratch::default();
+        // the scan's faces go with it, up to the nodes on their other side
+        let around = |&node: &LatticeNode| CellBox { lo: node, hi: node }.widened(1, 1).iter();
+        for node in lumps.iter().flat_map(around) {
+            let before = self.nodes.get(&node).copied();
+            dropped.push((node, before));
+            if before.is_none()
+                && let Some(scan) = ScanValue::at(evidence.scan, evidence.tree, &lattice.position(node))
+            {
+                self.put(node, evaluate(evidence, lattice, node, &scan, &mut scratch), scan);
+            }
+        }
+        for node in &lumps {
+            if let Some(state) = self.nodes.get_mut(node) {
+                (state.source, state.value, state.straight, state.felt) = (Source::Nothing, 0.0, (0.0, 0.0), None);
+            }
+        }
+        dropped
+    }
+
+    /// Numbers of the nodes in a box; in the order in which they came where that is all of them.
+    fn indices_in(&self, area: &CellBox) -> Vec<u32> {
+        if area.volume() < self.nodes.len() as f64 {
+            let mut at = Vec::new();
+            area.each(|node| at.extend(self.nodes.index_of(&node)));
+            at
+        } else {
+            (0..self.nodes.len() as u32).filter(|&at| area.contains(&self.nodes.entry(at).0)).collect()
+        }
+    }
+
+    /// Finds anew which cells stay open, if a way ends near `area`; returns those for which that is new.
+    fn renew_open(&mut self, area: &CellBox, params: &CompleteParams) -> Vec<LatticeNode> {
+        let near = area.widened(params.end_reach, params.end_reach);
+        if !self.ends.iter().any(|(end, ())| near.contains(&end)) && self.open.is_empty() {
+            return Vec::new();
+        }
+        let open = open_cells(self, self.ends.iter().map(|(end, ())| end), params.end_reach);
+        let old = std::mem::replace(&mut self.open, open);
+        let gone = old.iter().filter(|(cell, ())| !self.open.contains(cell));
+        gone.chain(self.open.iter().filter(|(cell, ())| !old.contains(cell))).map(|(cell, ())| cell).collect()
+    }
+}

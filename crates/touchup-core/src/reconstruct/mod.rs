@@ -1,0 +1,40 @@
+//! The surface meshed anew where it was touched, as one closed skin by construction.
+//!
+//! [`TouchFinder`] makes touches of samples; [`ContactMap`] and `SweptSpace` keep what was touched and where the tip
+//! went. `Evidence` says what these and the scan know about a point; that is held at the nodes of a regular [`Lattice`] and
+//! completed where nothing is known. [`Patcher`] is the whole way: everything at once, or what changed since the last time, as
+//! a [`PatchDelta`] for a mesh that follows by [`Splice`].
+//!
+//! In a set of the lattice's cells, the *region*, the surface is the zero set of that field f (f < 0 in the material),
+//! found by dual contouring that cannot intersect itself (after \[Ju Udeshi 2006\]); outside, the scan stays. On the
+//! squares that bound the region both sides share one *trace*: the polyline in which the scan crosses that square. [`Cut`]
+//! clips the scan and holds the traces, [`contour`] makes the new faces, [`Patch::applied_to`] puts the two together.
+//!
+//! Vertices are named by [`VertexKey`], so neighbours share them without a search and no crack can arise. Each face has an
+//! [`Owner`] whose faces depend on the field, the region and the scan nearby alone.
+
+mod contour;
+mod evidence;
+mod field;
+mod incremental;
+mod table;
+
+pub use contour::crossing::Crossing;
+pub use contour::dual_contouring::{ContourParams, contour};
+pub use contour::new_faces::Patch;
+pub use contour::patched::{Patched, Support};
+pub use contour::scan_clipping::Cut;
+pub use contour::splice::Splice;
+pub use contour::trace::OpenSquare;
+pub use evidence::contact_map::{ContactMap, GateParams, MeanContact, Verdict};
+pub use evidence::contact_uncertainty::{CalibrationParams, ContactSigma};
+pub use evidence::outliers::{Outlier, Outliers};
+pub use evidence::point_evidence::{EvidenceParams, Source};
+pub use evidence::touches::{SurfaceContact, TipTouch, TouchFinder, TouchFinderParams};
+pub use field::lattice::{Edge, Lattice, LatticeNode, LatticeRegion, NodeValues, Owner, PatchFace, Square, VertexKey};
+pub use field::piecewise::{FieldParams, FieldScratch, FieldValue};
+pub use field::uncertainty::FitSigma;
+pub use incremental::delta::{PatchDelta, PatchVertex};
+pub use incremental::history::History;
+pub use incremental::patcher::{PatchParams, PatchRegion, Patcher, PatcherParams, UncertaintyParams};
+pub use table::{CellTable, Key};

@@ -1,0 +1,252 @@
+//! Which way the touched surface faces, when friction tilts the force.
+//!
+//! A sliding ball feels F = N (n − μ t), t the direction of sliding: F lies at φ = atan μ from the normal n, in the plane
+//! of the two, behind. That angle is known in two ways. From this instant alone: t is at right angles to n, so that
+//! sin φ = −F̂·t; this needs no μ, but an error of t out of the surface is one of n, degree for degree. And from all that
+//! was felt before: over a stretch of sliding, ∫ −F·dx / ∫ |F| |dx|, the share of the force that did work, is sin φ, and
+//! the noise of the positions hardly enters it. With φ known, t only has to say which way *along* the surface, and its
+//! error enters by the factor φ. [`Friction::normal`] weighs the two by their variances.
+//!
+//! Slower than the noise of the velocity, t is not known either; the force is then all there is, within the cone.
+
+use nalgebra::Vector3;
+
+/// Cosine of the widest friction cone believed by default: cos 24° (μ = 0.45, dry metal on metal). The normal of a surface is nowhere
+/// farther from the force, neither for the haptic update nor for the evidence of the reconstruction.
+pub const WIDEST_CONE_COSINE: f64 = 0.9135;
+
+/// What the ball does and feels at one instant, averaged over a short time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sliding {
+    /// force of the object on the stylus, N, in O
+    pub force_o: Vector3<f64>,
+    /// velocity of the real centre of the ball, m/s, in O
+    pub velocity: Vector3<f64>,
+    /// standard deviation of each component of the velocity, m/s
+    pub velocity_sigma: f64,
+}
+
+/// The normal of a surface as it was felt.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FeltNormal {
+    /// outward unit normal, in O
+    pub normal: Vector3<f64>,
+    /// standard deviation of its direction, rad
+    pub sigma: f64,
+}
+
+impl FeltNormal {
+    /// The force itself, where friction is not asked for; `None` without one.
+    ///
+    /// - `force_o`: force of the object on the stylus, N, in O.
+    pub(crate) fn of_force(force_o: &Vector3<f64>) -> Option<Self> {
+        force_o.try_normalize(0.0).map(|normal| Self { normal, sigma: LEAST_SIGMA })
+    }
+}
+
+/// A coefficient of kinetic friction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrictionCoefficient {
+    /// median over the stretches of sliding
+    pub mu: f64,
+    /// standard error of that median
+    pub sigma: f64,
+    /// how much one stretch differs from another: standard deviation, by the quartiles
+    pub spread: f64,
+    /// how many stretches
+    pub stretches: u32,
+}
+
+/// Friction as it is found while the ball slides.
+///
+/// # Example
+/// ```
+/// use nalgebra::Vector3;
+/// use touchup_core::stylus::{Friction, Sliding};
+///
+/// // 1 s at 25 mm/s along x on a floor, μ = 0.2
+/// let mut friction = Friction::new(0.42);
+/// let slide = Sliding {
+///     force_o: Vector3::new(-0.4, 0.0, 2.0),
+///     velocity: Vector3::new(25e-3, 0.0, 0.0),
+///     velocity_sigma: 1e-3,
+/// };
+/// for _ in 0..1000 {
+///     friction.observe(&slide, 1e-3);
+/// }
+/// assert!((friction.coefficient().ok_or("nothing slid")?.mu - 0.2).abs() < 5e-3);
+/// // an error of the velocity out of the surface hardly tilts the normal any more
+/// let lifted = Sliding { velocity: Vector3::new(25e-3, 0.0, 5e-3), velocity_sigma: 5e-3, ..slide };
+/// let felt = friction.normal(&lifted).ok_or("no force")?;
+/// assert!(felt.normal.angle(&Vector3::z()).to_degrees() < 1.5);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Friction {
+    /// rad
+    widest: f64,
+    stretch: SlidingStretch,
+    /// all of the way until enough is known
+    early: SlidingStretch,
+    /// how many stretches had a coefficient within each bin
+    bins: [u32; BINS],
+    known: Option<FrictionCoefficient>,
+    /// φ = atan μ and its standard deviation for one more place, rad
+    angle: [f64; 2],
+}
+
+/// A piece of sliding of which one coefficient is made.
+#[derive(Clone, Copy, Debug, Default)]
+struct SlidingStretch {
+    /// m
+    length: f64,
+    /// ∫ −F·dx, J
+    work: f64,
+    /// ∫ |F| |dx|, J
+    most_work: f64,
+}
+
+impl SlidingStretch {
+    fn extend(&mut self, piece: &Self) {
+        self.length += piece.length;
+        self.work += piece.work;
+        self.most_work += piece.most_work;
+    }
+}
+
+/// Width of a bin: a normal is off by 0.03° for half of it.
+const BIN: f64 = 0.001;
+/// Bins from 0 to 1.
+const BINS: usize = 1000;
+/// Length of a stretch, m: 0.2 s of a calm hand, long enough for the noise of the positions to vanish.
+const STRETCH: f64 = 5e-3;
+/// So many make a coefficient.
+const FEWEST: u32 = 4;
+/// Before that all of the way so far tells φ by this standard deviation, rad: place and direction change friction …
+const EARLY_SIGMA: f64 = 0.03;
+/// … and the ends of the way are off by this, m: 0.2 mm of pose noise after smoothing.
+const EARLY_WAY: f64 = 0.1e-3;
+/// Slower than this the ball creeps, and friction is undecided, m/s …
+const CREEP: f64 = 1e-3;
+/// … and slower than so many times the noise of the velocity it may as well rest.
+const CLEAR: f64 = 3.0;
+/// φ before anything is known, and its standard deviation, rad: μ from 0.05 to 0.3.
+const USUAL_ANGLE: [f64; 2] = [0.17, 0.12];
+/// Friction and force are never known better than this, rad: bias and noise of a usual force sensor, 0.05 N of 2.5 N.
+const LEAST_SIGMA: f64 = 0.015;
+/// The two ways to know φ contradict each other when they differ by more standard deviations than this.
+const CONTRADICTION: f64 = 3.0;
+
+impl Friction {
+    /// Nothing felt yet.
+    ///
+    /// - `widest`: angle of the widest friction cone believed, rad.
+    pub fn new(widest: f64) -> Self {
+        let (stretch, early) = (SlidingStretch::default(), SlidingStretch::default());
+        Self { widest, stretch, early, bins: [0; BINS], known: None, angle: USUAL_ANGLE }
+    }
+
+    /// Takes in what the ball did in contact during `dt` (s).
+    pub fn observe(&mut self, sliding: &Sliding, dt: f64) {
+        let Sliding { force_o, velocity, velocity_sigma } = sliding;
+        // two of the three components are along the surface, where noise makes the way longer
+        let speed = (velocity.norm_squared() - 2.0 * velocity_sigma * velocity_sigma).max(0.0).sqrt();
+        if speed < CREEP.max(CLEAR * velocity_sigma) {
+            return;
+        }
+        let (length, work) = (speed * dt, -force_o.dot(velocity) * dt);
+        let piece = SlidingStretch { length, work, most_work: force_o.norm() * length };
+        self.stretch.extend(&piece);
+        if self.known.is_none() {
+            self.early.extend(&piece);
+            self.guess();
+        }
+        if self.stretch.length >= STRETCH {
+            let SlidingStretch { work, most_work, .. } = std::mem::take(&mut self.stretch);
+            if most_work > 0.0 {
+                self.note(work / most_work);
+            }
+        }
+    }
+
+    /// The ball has left the surface: what comes next is another stretch.
+    pub fn lift(&mut self) {
+        self.stretch = SlidingStretch::default();
+    }
+
+    /// What was found; `None` until the ball has slid far enough.
+    pub fn coefficient(&self) -> Option<FrictionCoefficient> {
+        self.known
+    }
+
+    /// The normal under the ball; `None` without a force.
+    pub fn normal(&self, sliding: &Sliding) -> Option<FeltNormal> {
+        let along_force = sliding.force_o.try_normalize(0.0)?;
+        let [usual, usual_sigma] = self.angle;
+        let (speed, noise) = (sliding.velocity.norm(), sliding.velocity_sigma);
+        let across_force = sliding.velocity - along_force * sliding.velocity.dot(&along_force);
+        let across_speed = across_force.norm();
+        if across_speed <= 0.0 {
+            return Some(FeltNormal { normal: along_force, sigma: usual.hypot(usual_sigma) });
+        }
+        // error of the direction of sliding, rad
+        let astray = (noise / speed).min(1.0).hypot(LEAST_SIGMA);
+        let seen = (-sliding.velocity.dot(&along_force) / speed).clamp(-1.0, 1.0).asin();
+        let contradiction = (seen - usual).powi(2);
+        let bound = CONTRADICTION * CONTRADICTION * (astray * astray + usual_sigma * usual_sigma);
+        let [seen_weight, usual_weight] = [astray.powi(-2), usual_sigma.powi(-2)];
+        let mut variance = 1.0 / (seen_weight + usual_weight);
+        let angle = ((seen * seen_weight + usual * usual_weight) * variance).clamp(0.0, self.widest);
+        if contradiction > bound {
+            // another friction, two surfaces at once, or no sliding at all
+            variance += contradiction;
+        }
+        // how far the direction along the surface can be told from noise
+        let squared = across_speed * across_speed;
+        let clear = squared / (squared + 2.0 * noise * noise + CREEP * CREEP);
+        variance += angle * angle * (astray * astray + 1.0 - clear * clear).min(1.0);
+        let normal = (along_force + across_force * (angle.tan() * clear / across_speed)).normalize();
+        Some(FeltNormal { normal, sigma: variance.sqrt() })
+    }
+
+    /// Counts a stretch of this sin φ.
+    fn note(&mut self, sine: f64) {
+        let sine = sine.clamp(0.0, std::f64::consts::FRAC_1_SQRT_2);
+        let mu = sine / (1.0 - sine * sine).sqrt();
+        self.bins[((mu / BIN) as usize).min(BINS - 1)] += 1;
+        let stretches = self.bins.iter().fold(0u32, |sum, &count| sum.saturating_add(count));
+        if stretches >= FEWEST {
+            let [low, mu, high] = [0.25, 0.5, 0.75].map(|share| self.quantile(share * f64::from(stretches)));
+            // of a normal distribution: the quartiles are 1.349 standard deviations apart, and the median varies by
+            // √(π/2) times as much as the mean
+            let spread = (high - low) / 1.349;
+            let sigma = 1.2533 * spread / f64::from(stretches).sqrt();
+            self.known = Some(FrictionCoefficient { mu, sigma, spread, stretches });
+            let per_angle = 1.0 / (1.0 + mu * mu);
+            self.angle = [mu.atan(), (spread.hypot(sigma) * per_angle).hypot(LEAST_SIGMA)];
+        }
+    }
+
+    /// φ while there are too few stretches.
+    fn guess(&mut self) {
+        let SlidingStretch { length, work, most_work } = self.early;
+        let sine = (work / most_work.max(f64::MIN_POSITIVE)).clamp(0.0, std::f64::consts::FRAC_1_SQRT_2);
+        let ([usual, usual_sigma], felt_sigma) = (USUAL_ANGLE, EARLY_SIGMA.hypot(EARLY_WAY / length));
+        let [felt, before] = [felt_sigma, usual_sigma].map(|sigma| sigma.powi(-2));
+        let mean = (sine.asin() * felt + usual * before) / (felt + before);
+        self.angle = [mean, (felt + before).powf(-0.5).hypot(EARLY_SIGMA)];
+    }
+
+    /// The coefficient below which `rank` stretches lie, interpolated within its bin.
+    fn quantile(&self, rank: f64) -> f64 {
+        let mut below = 0.0;
+        for (at, &count) in (0u32..).zip(&self.bins) {
+            let count = f64::from(count);
+            if below + count >= rank && count > 0.0 {
+                return BIN * (f64::from(at) + (rank - below) / count);
+            }
+            below += count;
+        }
+        1.0
+    }
+}

@@ -1,0 +1,248 @@
+//! From raw pose and wrench messages to samples the refiner can use.
+//!
+//! [`MarkerFilter`] makes the pose of the markers on the stylus, [`Placement`] brings it to the ball and into the frame of
+//! the scan, [`Synchroniser`] brings the two streams to one instant,
+//! [`ContactEstimator`] makes of each sample, once for all who use it, one [`ContactSample`]: [`Compensator`] takes weight and bias off and
+//! turns the force into the frame of the object, [`BiasTracker`] follows what drifts, [`ContactGate`] decides whether the stylus touches,
+//! [`TipMotion`] and [`Friction`] how the ball slides and how the surface under it is oriented. [`TipBody`] finds the point of the tip that
+//! touches, [`LocalMotion`] the motion around one instant.
+
+mod bias;
+mod clock;
+mod compensate;
+mod contact;
+mod contact_estimator;
+mod friction;
+mod local_motion;
+mod markers;
+mod placement;
+mod probed;
+mod stream;
+mod sync;
+mod sync_params;
+mod tip_motion;
+mod tip_shape;
+
+pub use bias::{BiasParams, BiasTracker};
+pub use clock::{ClockEstimator, ClockOffset, ClockParams};
+pub use compensate::{Compensator, CompensatorParams, Payload, SensorBias, SensorMount, Tip, WrenchFrame};
+pub(crate) use contact::STROKE_PAUSE_NS;
+pub use contact::{Contact, ContactGate, ContactGateParams};
+pub(crate) use contact_estimator::LONGEST_HOLD;
+pub use contact_estimator::{ContactEstimator, ContactEstimatorParams, ContactSample};
+pub use friction::{FeltNormal, Friction, FrictionCoefficient, Sliding, WIDEST_CONE_COSINE};
+pub use local_motion::{LocalMotion, SmoothedMotion};
+pub use markers::{
+    MOST_MARKERS, MarkerBody, MarkerCounts, MarkerFilter, MarkerFrame, MarkerParams, SeenMarker, SpringParams, Tracking,
+};
+pub use placement::Placement;
+pub use probed::ProbedPoint;
+pub use sync::Synchroniser;
+pub use sync_params::{SyncCounts, SyncParams};
+pub use tip_motion::{Ball, SlidingParams, TipMotion, TipParams};
+pub use tip_shape::{TipBody, TipContact, TipPlace, TipShape, TipSizes};
+
+pub use crate::parameters::SettingError;
+
+use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
+
+/// Farther from the object's origin than this, a pose is a fault and not a measurement, m.
+///
+/// Parts and cells are a few metres large; a corrupted exponent is off by far more than that.
+pub const LARGEST_POSITION: f64 = 1e3;
+
+/// A greater force is a fault and not a measurement, N: a hundred times what a hand-held stylus or a small arm can exert.
+pub const LARGEST_FORCE: f64 = 1e5;
+
+/// A greater torque is a fault and not a measurement, N·m: [`LARGEST_FORCE`] at a lever of one metre.
+pub(crate) const LARGEST_TORQUE: f64 = 1e5;
+
+/// A unit quaternion as it arrives may be off by this: components printed with six digits.
+const UNIT_TOLERANCE: f64 = 1e-5;
+
+/// Why a message or a sample is refused.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum SampleError {
+    /// NaN or infinite component.
+    #[error("the {what} at {stamp_ns} ns is not finite; drop it and go on")]
+    NotFinite {
+        /// "position", "orientation", "force" or "torque"
+        what: &'static str,
+        /// its time, ns
+        stamp_ns: i64,
+    },
+    /// A magnitude that no stylus reaches.
+    #[error("the {what} of {magnitude:e} {unit} at {stamp_ns} ns is beyond {limit:e} {unit}; is the unit right?")]
+    Absurd {
+        /// "position", "force" or "torque"
+        what: &'static str,
+        /// its length, in `unit`
+        magnitude: f64,
+        /// the largest believed, in `unit`
+        limit: f64,
+        /// "m", "N" or "N·m"
+        unit: &'static str,
+        /// its time, ns
+        stamp_ns: i64,
+    },
+    /// An orientation that is no rotation.
+    #[error("the orientation at {stamp_ns} ns is a quaternion of length {norm}, not 1; normalise it at its source")]
+    NotARotation {
+        /// length of the quaternion
+        norm: f64,
+        /// its time, ns
+        stamp_ns: i64,
+    },
+    /// Repeated or backward in time.
+    #[error("the sample at {stamp_ns} ns is not after the one at {last_ns} ns; give samples in order of time")]
+    NotAfter {
+        /// its time, ns
+        stamp_ns: i64,
+        /// time of the sample before it, ns
+        last_ns: i64,
+    },
+}
+
+/// A measured quaternion is rounded, not wrong, this close to norm 1.
+const QUATERNION_NORM_SLACK: f64 = 0.01;
+/// Roundings of a product of three rotations: such a quaternion is kept bit by bit, so that writing and reading again
+/// changes nothing.
+const QUATERNION_ROUNDING: f64 = 8.0 * f64::EPSILON;
+
+/// The rotation that a message means, as its source rounded it; `None` for what is none, NaN among it.
+pub fn measured_rotation(q: Quaternion<f64>) -> Option<UnitQuaternion<f64>> {
+    let off = (q.norm() - 1.0).abs();
+    if off <= QUATERNION_ROUNDING {
+        return Some(UnitQuaternion::new_unchecked(q));
+    }
+    (off <= QUATERNION_NORM_SLACK).then(|| UnitQuaternion::new_normalize(q))
+}
+
+/// Force and torque that the object exerts on the stylus, N and N·m.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wrench {
+    /// N
+    pub force: Vector3<f64>,
+    /// N·m, about the origin of the frame the wrench is expressed in
+    pub torque: Vector3<f64>,
+}
+
+/// A pose message: `pose_ot` maps the tip frame T (origin: ball centre) to the object frame O.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StampedPose {
+    /// Time of measurement, ns.
+    pub stamp_ns: i64,
+    /// Pose of T in O, m.
+    pub pose_ot: Isometry3<f64>,
+}
+
+impl StampedPose {
+    /// Refuses what cannot be a pose.
+    ///
+    /// # Errors
+    /// [`SampleError::NotFinite`], [`SampleError::Absurd`], [`SampleError::NotARotation`].
+    pub fn check(&self) -> Result<(), SampleError> {
+        let stamp_ns = self.stamp_ns;
+        check_vector("position", &self.pose_ot.translation.vector, LARGEST_POSITION, "m", stamp_ns)?;
+        let norm = self.pose_ot.rotation.coords.norm();
+        if !norm.is_finite() {
+            return Err(SampleError::NotFinite { what: "orientation", stamp_ns });
+        }
+        if (norm - 1.0).abs() > UNIT_TOLERANCE {
+            return Err(SampleError::NotARotation { norm, stamp_ns });
+        }
+        Ok(())
+    }
+}
+
+/// A wrench message, in the frame its header names.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StampedWrench {
+    /// Time of measurement, ns.
+    pub stamp_ns: i64,
+    /// As measured: not compensated, not rotated.
+    pub wrench: Wrench,
+}
+
+impl StampedWrench {
+    /// Refuses what cannot be a wrench.
+    ///
+    /// # Errors
+    /// [`SampleError::NotFinite`], [`SampleError::Absurd`].
+    pub fn check(&self) -> Result<(), SampleError> {
+        check_vector("force", &self.wrench.force, LARGEST_FORCE, "N", self.stamp_ns)?;
+        check_vector("torque", &self.wrench.torque, LARGEST_TORQUE, "N·m", self.stamp_ns)
+    }
+}
+
+/// One message of either stream, as a recording or a topic delivers it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Message {
+    /// Where the tip is.
+    Pose(StampedPose),
+    /// What it feels.
+    Wrench(StampedWrench),
+}
+
+impl Message {
+    /// Time of measurement, ns.
+    pub fn stamp_ns(&self) -> i64 {
+        match self {
+            Self::Pose(pose) => pose.stamp_ns,
+            Self::Wrench(wrench) => wrench.stamp_ns,
+        }
+    }
+}
+
+/// Pose and wrench at one instant: what [`crate::haptic::Refiner::push`] takes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// Time of measurement of the wrench, ns; the pose is interpolated to it.
+    pub stamp_ns: i64,
+    /// Pose of T in O, m.
+    pub pose_ot: Isometry3<f64>,
+    /// As measured: not compensated, in the axes that [`WrenchFrame`] names.
+    pub wrench: Wrench,
+}
+
+impl Sample {
+    /// Refuses what cannot be a measurement.
+    ///
+    /// # Errors
+    /// As [`StampedPose::check`] and [`StampedWrench::check`].
+    pub fn check(&self) -> Result<(), SampleError> {
+        StampedPose { stamp_ns: self.stamp_ns, pose_ot: self.pose_ot }.check()?;
+        StampedWrench { stamp_ns: self.stamp_ns, wrench: self.wrench }.check()
+    }
+
+    /// Time since the sample before this one, s; 0 for the first.
+    ///
+    /// # Errors
+    /// [`SampleError::NotAfter`] when this one is repeated or older.
+    pub fn seconds_since(&self, last_ns: Option<i64>) -> Result<f64, SampleError> {
+        match last_ns {
+            Some(last_ns) if self.stamp_ns <= last_ns => {
+                Err(SampleError::NotAfter { stamp_ns: self.stamp_ns, last_ns })
+            }
+            Some(last_ns) => Ok(self.stamp_ns.abs_diff(last_ns) as f64 * 1e-9),
+            None => Ok(0.0),
+        }
+    }
+}
+
+fn check_vector(
+    what: &'static str,
+    vector: &Vector3<f64>,
+    limit: f64,
+    unit: &'static str,
+    stamp_ns: i64,
+) -> Result<(), SampleError> {
+    if !vector.iter().all(|x| x.is_finite()) {
+        return Err(SampleError::NotFinite { what, stamp_ns });
+    }
+    let magnitude = vector.amax();
+    if magnitude > limit {
+        return Err(SampleError::Absurd { what, magnitude, limit, unit, stamp_ns });
+    }
+    Ok(())
+}

@@ -1,0 +1,175 @@
+//! Pose and wrench brought to one instant: the pose is interpolated at the stamp of each wrench.
+//!
+//! The two streams have their own rates and clocks, and their messages arrive late, twice, out of order or not at all.
+//! Which samples come out depends on the messages alone: any order of arrival that moves no message by more than the
+//! reorder window gives the same samples, bit for bit.
+
+use nalgebra::Isometry3;
+
+use super::stream::Stream;
+use super::sync_params::{SyncCounts, SyncParams};
+use super::{Message, Sample, SampleError, SettingError, StampedPose, StampedWrench};
+
+/// Turns two streams of messages into one stream of samples, in order of time.
+///
+/// Memory is bounded and allocated once, in [`Synchroniser::new`].
+///
+/// # Example
+/// ```
+/// # use touchup_core::stylus::*;
+/// # use nalgebra::Isometry3;
+/// let mut sync = Synchroniser::new(SyncParams::default())?;
+/// for (stamp_ns, x) in [(0, 0.0), (2_000_000, 0.1)] {
+///     sync.push(Message::Pose(StampedPose { stamp_ns, pose_ot: Isometry3::translation(x, 0.0, 0.0) }));
+/// }
+/// sync.push(Message::Wrench(StampedWrench { stamp_ns: 500_000, wrench: Wrench::default() }));
+/// sync.finish();
+/// let sample = sync.next_sample().expect("the wrench lies between two poses");
+/// assert!((sample.pose_ot.translation.x - 0.025).abs() < 1e-15);
+/// # Ok::<(), SettingError>(())
+/// ```
+#[derive(Debug)]
+pub struct Synchroniser {
+    params: SyncParams,
+    poses: Stream<StampedPose>,
+    wrenches: Stream<StampedWrench>,
+    finished: bool,
+}
+
+impl Synchroniser {
+    /// Checks the settings and allocates the buffers.
+    ///
+    /// # Errors
+    /// [`SettingError`] naming the first setting outside its range.
+    pub fn new(params: SyncParams) -> Result<Self, SettingError> {
+        Self::waiting(params, params.reorder_ns.saturating_add(1))
+    }
+
+    /// As [`Self::new`], for streams each of which comes in order of its stamps, however the two interleave: a sample goes
+    /// out with the later of its wrench and the pose after it, and what is out of order is late. As long as nothing is, the
+    /// samples are those of any reorder window.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn in_order(params: SyncParams) -> Result<Self, SettingError> {
+        Self::waiting(params, 0)
+    }
+
+    fn waiting(params: SyncParams, wait_ns: i64) -> Result<Self, SettingError> {
+        params.check()?;
+        let (poses, wrenches) = (Stream::new(params.capacity, wait_ns), Stream::new(params.capacity, wait_ns));
+        Ok(Self { params, poses, wrenches, finished: false })
+    }
+
+    /// Takes one message; draw samples with [`Self::next_sample`] before the next one. What comes after
+    /// [`Self::finish`] is late. Returns whether it was taken: what was not is counted and changes nothing else.
+    pub fn push(&mut self, message: Message) -> bool {
+        match message {
+            Message::Pose(pose) => match pose.check() {
+                _ if self.finished => self.poses.counts.refuse_late(),
+                Ok(()) => self.poses.push(pose, &self.params),
+                Err(why) => self.poses.counts.refuse(why),
+            },
+            Message::Wrench(mut wrench) => match wrench.check() {
+                _ if self.finished => self.wrenches.counts.refuse_late(),
+                Ok(()) => {
+                    wrench.stamp_ns = wrench.stamp_ns.saturating_sub(self.params.wrench_offset_ns);
+                    self.wrenches.push(wrench, &self.params)
+                }
+                Err(why) => self.wrenches.counts.refuse(why),
+            },
+        }
+    }
+
+    /// Nothing more will come: what is held may go out.
+    pub fn finish(&mut self) {
+        self.finished = true;
+        self.poses.finish(&self.params);
+        self.wrenches.finish(&self.params);
+    }
+
+    /// The next sample that no message still allowed to arrive could change; `None` when more messages are needed.
+    pub fn next_sample(&mut self) -> Option<Sample> {
+        loop {
+            let wrench = *self.wrenches.held.front()?;
+            if wrench.stamp_ns > self.settled(&self.wrenches) {
+                return None;
+            }
+            let settled = self.settled(&self.poses);
+            self.poses.forget_before(wrench.stamp_ns.min(settled));
+            let pose = self.pose_at(wrench.stamp_ns, settled)?;
+            self.wrenches.pop();
+            match pose {
+                Ok(pose_ot) => return Some(Sample { stamp_ns: wrench.stamp_ns, pose_ot, wrench: wrench.wrench }),
+                Err(count) => *count(&mut self.wrenches.counts) += 1,
+            }
+        }
+    }
+
+    /// Wrenches that became no sample so far, and why.
+    pub fn counts(&self) -> &SyncCounts {
+        &self.wrenches.counts
+    }
+
+    /// Poses dropped so far, and why; a wrench that misses one is counted in [`Self::counts`].
+    pub fn pose_counts(&self) -> &SyncCounts {
+        &self.poses.counts
+    }
+
+    /// Up to this stamp nothing of `stream` can arrive any more.
+    fn settled<T>(&self, stream: &Stream<T>) -> i64 {
+        if self.finished { i64::MAX } else { stream.settled }
+    }
+
+    /// The pose at `stamp_ns`, or the counter to raise when there is none; `None` while that is still open.
+    fn pose_at(&self, stamp_ns: i64, settled: i64) -> Option<Result<Isometry3<f64>, Counter>> {
+        let mut held = self.poses.held.iter();
+        let missing: Counter =
+            if self.poses.overflown { |counts| &mut counts.overflow } else { |counts| &mut counts.no_pose_before };
+        let Some(before) = held.next() else { return self.finished.then_some(Err(missing)) };
+        if before.stamp_ns == stamp_ns {
+            return Some(Ok(before.pose_ot));
+        }
+        if before.stamp_ns > stamp_ns {
+            return (stamp_ns <= settled).then_some(Err(missing));
+        }
+        let Some(after) = held.next() else { return self.finished.then_some(Err(|counts| &mut counts.no_pose_after)) };
+        if after.stamp_ns > settled {
+            return None;
+        }
+        let gap = after.stamp_ns.abs_diff(before.stamp_ns);
+        if gap > self.params.largest_gap_ns as u64 {
+            return Some(Err(|counts| &mut counts.gap));
+        }
+        let t = stamp_ns.abs_diff(before.stamp_ns) as f64 / gap as f64;
+        Some(Ok(interpolated(&before.pose_ot, &after.pose_ot, t)))
+    }
+}
+
+/// Which counter of [`SyncCounts`] to raise.
+type Counter = fn(&mut SyncCounts) -> &mut u64;
+
+impl SyncCounts {
+    fn refuse(&mut self, why: SampleError) -> bool {
+        match why {
+            SampleError::NotFinite { .. } => self.not_finite += 1,
+            SampleError::Absurd { .. } | SampleError::NotARotation { .. } => self.absurd += 1,
+            SampleError::NotAfter { .. } => self.late += 1,
+        }
+        false
+    }
+
+    fn refuse_late(&mut self) -> bool {
+        self.late += 1;
+        false
+    }
+}
+
+/// Between two poses: straight for the position, at constant angular velocity the shorter way for the orientation.
+pub(super) fn interpolated(before: &Isometry3<f64>, after: &Isometry3<f64>, t: f64) -> Isometry3<f64> {
+    let position = before.translation.vector.lerp(&after.translation.vector, t);
+    // the power of the relative rotation keeps its digits at angles where a slerp by sines loses them
+    let mut rotation = before.rotation * (before.rotation.inverse() * after.rotation).powf(t);
+    rotation.renormalize();
+    Isometry3::from_parts(position.into(), rotation)
+}

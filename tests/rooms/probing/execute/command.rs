@@ -1,0 +1,423 @@
+//! `touchup probe` and `touchup demo --robot sim`, as a user runs them.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use nalgebra::Point3;
+use serde_json::Value;
+use touchup::io::mesh_file::{MeshFile, MeshUnit, read_mesh, write_mesh};
+use touchup::sim::{Plate, ScannerParams, Surface, scan};
+
+fn touchup(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_touchup")).args(arguments).output().unwrap()
+}
+
+fn stderr(done: &Output) -> String {
+    String::from_utf8_lossy(&done.stderr).into_owned()
+}
+
+/// Scene, scan and part of the demo in a folder.
+fn cell(folder: &Path, change: impl Fn(String) -> String) -> [String; 2] {
+    let plate = Plate::default();
+    let scanned = scan(&plate, &ScannerParams::default()).unwrap();
+    write_mesh(&folder.join("scan.ply"), &scanned, MeshUnit::Millimetre).unwrap();
+    write_mesh(&folder.join("truth.ply"), &plate.mesh(1e-5).unwrap(), MeshUnit::Millimetre).unwrap();
+    let scene = change(include_str!("../../../../config/probe.yaml").to_owned());
+    fs::write(folder.join("scene.yaml"), scene).unwrap();
+    ["scene.yaml", "truth.ply"].map(|name| folder.join(name).to_str().unwrap().to_owned())
+}
+
+fn probe(folder: &Path, change: impl Fn(String) -> String, more: &[&str]) -> Output {
+    let [scene, truth] = cell(folder, change);
+    let out = folder.join("out");
+    let arguments = ["probe", "--robot", "sim", "--scene", &scene, "--truth", &truth, "--out", out.to_str().unwrap()];
+    touchup(&[&arguments, more].concat())
+}
+
+/// The features of the plate are known by its drawing: each is found from one click up to 3 mm off, holes within 0.05 mm with
+/// fewer than 40 touches each, and no force is above 1.5 times the 3 N that are set.
+#[test]
+fn the_arm_of_the_demo_finds_every_feature() {
+    // with seed 8 the ball slides over a rim first, and one touch alone measures an end of the slot
+    for seed in ["1", "8"] {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().to_str().unwrap();
+        let done = touchup(&["demo", "--robot", "sim", "--seed", seed, "--out", out]);
+        assert_eq!(done.status.code(), Some(0), "{}", stderr(&done));
+        let summary: Value = serde_json::from_slice(&fs::read(folder.path().join("summary.json")).unwrap()).unwrap();
+        let errors = summary["errors"].as_array().unwrap();
+        assert_eq!(errors.len(), 5);
+        for error in errors {
+            let name = error["name"].as_str().unwrap();
+            let place = error["place_mm"].as_f64().unwrap_or_else(|| panic!("{name} was not found"));
+            let sizes =
+                error["sizes_mm"].as_array().unwrap().iter().map(|mm| mm.as_f64().unwrap().abs()).fold(0.0, f64::max);
+            assert!(place < 0.05 && sizes < 0.05, "{name}: {error}");
+            assert!(error["touches"].as_u64().unwrap() < 40, "{name}: {error}");
+            assert!(error["largest_force_n"].as_f64().unwrap() < 4.5, "{name}: {error}");
+        }
+        is_written(folder.path());
+        errors_match_the_stated_uncertainty(folder.path());
+    }
+}
+
+/// All files are there, and the recording is refined to the same mesh by another run.
+fn is_written(folder: &Path) {
+    for file in ["plan.png", "touches.png", "deviation.png", "refined.ply", "touch.mcap", "probed.json", "scene.yaml"] {
+        assert!(folder.join(file).exists(), "{file}");
+    }
+    let touches = fs::read_to_string(folder.join("probed_touches.jsonl")).unwrap();
+    let first: Value = serde_json::from_str(touches.lines().next().unwrap()).unwrap();
+    assert_eq!(first["tip_radius_mm"], 1.5);
+    assert!(touches.lines().count() > 50);
+    let again = folder.join("again.ply");
+    let path = |name: &str| folder.join(name).to_str().unwrap().to_owned();
+    let refined = touchup(&[
+        "refine",
+        "--scene",
+        &path("scene.yaml"),
+        "--scan",
+        &path("scan.ply"),
+        "--bag",
+        &path("touch.mcap"),
+        "--wrench-topic",
+        "/probe/wrench",
+        "--pose-topic",
+        "/probe/pose",
+        "--out",
+        again.to_str().unwrap(),
+    ]);
+    assert_eq!(refined.status.code(), Some(0), "{}", stderr(&refined));
+    assert!(fs::read(&again).unwrap() == fs::read(path("refined.ply")).unwrap());
+}
+
+/// The part of the demo is as round as its drawing: a hole that is probed on its triangles has the drawing's diameter of 8 mm and
+/// its place within three of the reported standard deviations.
+fn errors_match_the_stated_uncertainty(folder: &Path) {
+    let path = |name: &str| folder.join(name).to_str().unwrap().to_owned();
+    let (scene, truth, out) = (path("scene.yaml"), path("truth.ply"), path("again"));
+    let arguments = ["probe", "--robot", "sim", "--scene", &scene, "--truth", &truth, "--out", &out];
+    let done = touchup(&[&arguments[..], &["--feature", "hole@17,35,12"]].concat());
+    assert_eq!(done.status.code(), Some(0), "{}", stderr(&done));
+    let probed: Value = serde_json::from_slice(&fs::read(folder.join("again/probed.json")).unwrap()).unwrap();
+    let hole = &probed["features"][0]["feature"];
+    let std = |name: &str| hole["std"][name].as_f64().unwrap();
+    let off = [0, 1].map(|at| hole["center_mm"][at].as_f64().unwrap() - [16.0, 36.0][at]);
+    let diameter = hole["diameter_mm"].as_f64().unwrap() - 8.0;
+    assert!(diameter.abs() < 3.0 * std("diameter_mm"), "{diameter} mm, {}", hole["std"]);
+    assert!(off[0].hypot(off[1]) < 3.0 * std("center_mm"), "{off:?} mm, {}", hole["std"]);
+}
+
+/// Touches determine the dimensions of a hole; slides bring the mesh around it to the drawing.
+#[test]
+fn slides_bring_the_mesh_to_the_part() {
+    let plate = Plate::default();
+    // mean distance from the drawing of the vertices around the hole, above the bottom of the plate, mm
+    let off = |folder: &Path| {
+        let MeshFile { mesh, .. } = read_mesh(&folder.join("out/refined.ply"), MeshUnit::Millimetre).unwrap();
+        let is_near = |p: &&Point3<f64>| (p.x - 16e-3).hypot(p.y - 36e-3) < 7e-3 && p.z > 6e-3;
+        let distances: Vec<f64> =
+            mesh.positions().iter().filter(is_near).map(|p| plate.signed_distance(p).abs() * 1e3).collect();
+        distances.iter().sum::<f64>() / distances.len() as f64
+    };
+    let [touched, slid] =
+        [&["--feature", "hole@17,35,12"][..], &["--feature", "hole@17,35,12", "--slide"]].map(|more| {
+            let folder = tempfile::tempdir().unwrap();
+            let done = probe(folder.path(), |scene| scene, more);
+            assert_eq!(done.status.code(), Some(0), "{}", stderr(&done));
+            let probed: Value =
+                serde_json::from_slice(&fs::read(folder.path().join("out/probed.json")).unwrap()).unwrap();
+            let slides = probed["features"][0]["slides"].as_array().map_or(0, Vec::len);
+            assert_eq!(slides > 0, more.contains(&"--slide"));
+            for slide in probed["features"][0]["slides"].as_array().into_iter().flatten() {
+                assert_eq!(slide["ending"], "arrived", "{slide}");
+                assert!(slide["forces"]["worst_force_error_n"].as_f64().unwrap() < 0.3, "{slide}");
+            }
+            off(folder.path())
+        });
+    println!("{touched:.3} mm off with touches alone, {slid:.3} with slides");
+    assert!(slid < 0.1 && slid < touched / 3.0, "{touched} mm, {slid} mm");
+}
+
+#[test]
+fn a_dry_run_draws_the_plan_and_moves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let forbid = |scene: String| scene.replace("allow_motion: true", "allow_motion: false");
+    let done = probe(folder.path(), forbid, &["--feature", "hole@16,36,12", "--dry-run"]);
+    assert_eq!(done.status.code(), Some(0), "{}", stderr(&done));
+    assert!(String::from_utf8_lossy(&done.stdout).contains("nothing moved"));
+    assert!(folder.path().join("out/plan.png").exists());
+    assert!(!folder.path().join("out/touch.mcap").exists());
+}
+
+/// The request, the change of the scene, and a part of the refusal.
+type Refused<'a> = (&'a [&'a str], fn(String) -> String, &'a str);
+
+#[test]
+fn what_must_not_be_is_refused_by_name() {
+    let same = |scene: String| scene;
+    let refused: [Refused; 9] = [
+        (&["--feature", "hole@16,36,12", "--max-force-n", "0.8"], same, "feels no surface"),
+        (&["--feature", "hole@16,36"], same, "KIND@X,Y,Z"),
+        (&["--feature", "bore@16,36,12"], same, "KIND@X,Y,Z"),
+        (&["--feature", "corner@16,36,12"], same, "probe the edges"),
+        (&["--feature", "hole@16,36,12", "--max-force-n", "50"], same, "a request can only ask for less"),
+        (&["--feature", "hole@16,36,12", "--max-touches", "500"], same, "must be 1 to 39"),
+        (&["--feature", "hole@16,36,12"], |scene| scene.replace("allow_motion: true", ""), "allow_motion"),
+        (
+            &["--feature", "hole@16,36,12"],
+            |scene| scene.split("robot:").next().unwrap().to_owned() + "refine:\n",
+            "`robot`",
+        ),
+        (&["--feature", "hole@16,36,12"], |scene| scene.replace("ur5e", "ur9"), "ur3e, ur5e"),
+    ];
+    for (more, change, part) in refused {
+        let folder = tempfile::tempdir().unwrap();
+        let done = probe(folder.path(), change, more);
+        assert!(matches!(done.status.code(), Some(2 | 3)), "{more:?}: {}", stderr(&done));
+        assert!(stderr(&done).contains(part), "{more:?}: {}", stderr(&done));
+    }
+}
+
+/// Where the box ends above the part the probing is refused.
+#[test]
+fn a_box_that_is_too_small_is_reported_and_nothing_moves() {
+    let folder = tempfile::tempdir().unwrap();
+    let raise =
+        |scene: String| scene.replace("workspace_low_mm: [-600, -300, 0]", "workspace_low_mm: [-600, -300, 70]");
+    let done = probe(folder.path(), raise, &["--feature", "hole@16,36,12", "--json"]);
+    let summary: Value = serde_json::from_slice(&done.stdout).unwrap_or_else(|_| panic!("{}", stderr(&done)));
+    assert_eq!(done.status.code(), Some(4), "{}", stderr(&done));
+    assert_eq!(summary["features"][0]["code"], "out_of_limits");
+    assert!(summary["features"][0]["ending"].as_str().unwrap().contains("outside the workspace"));
+}
+
+/// Scene and part as arguments of a verb.
+fn with_arm(folder: &Path, change: impl Fn(String) -> String, verb: &[&str], more: &[&str]) -> Output {
+    let [scene, truth] = cell(folder, change);
+    touchup(&[verb, &["--robot", "sim", "--scene", &scene, "--truth", &truth, "--spot", "45,8,12"], more].concat())
+}
+
+/// The simulated arm has no play, 10 µm of noise on each reading, and a stiffness that is set.
+#[test]
+fn an_arm_without_play_passes_the_check() {
+    let folder = tempfile::tempdir().unwrap();
+    let done = with_arm(folder.path(), |scene| scene, &["check"], &["--json"]);
+    assert_eq!(done.status.code(), Some(0), "{}", stderr(&done));
+    let checked: Value = serde_json::from_slice(&done.stdout).unwrap();
+    println!("{checked}");
+    let touches = checked["touches"].as_array().unwrap();
+    let from_one: Vec<i64> = touches.iter().map(|touch| touch["side"].as_i64().unwrap()).collect();
+    assert_eq!(from_one, [1, -1, 1, -1, 1, -1, 1, -1, 1, -1]);
+    let number = |key: &str| checked[key].as_f64().unwrap();
+    assert!(checked["passed"].as_bool().unwrap() && number("range_um") < 25.0 && number("range_um") > 0.0);
+    assert!(number("reversal_um").abs() < 10.0 && number("std_um") < 10.0);
+    assert!((number("stiffness_n_per_mm") - 15.0).abs() < 1.0);
+    // the top of the plate
+    let normal: Vec<f64> = checked["normal"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect();
+    assert!(normal[2] > 0.98, "of a scan with 0.5 mm of noise: {normal:?}");
+}
+
+#[test]
+fn a_missed_gate_is_reported_and_sets_the_exit_code() {
+    let folder = tempfile::tempdir().unwrap();
+    let done = with_arm(folder.path(), |scene| scene, &["check"], &["--touches", "4", "--gate-um", "0.01"]);
+    assert_eq!(done.status.code(), Some(4), "{}", stderr(&done));
+    let output = String::from_utf8_lossy(&done.stdout).into_owned();
+    assert!(output.contains("FAILED: the gate is 0.01 µm") && output.contains("touch   4 from the other"), "{output}");
+    assert!(stderr(&done).contains("look for play"), "{}", stderr(&done));
+}
+
+#[test]
+fn an_arm_that_may_not_move_does_not_and_bad_spots_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let motionless = |scene: String| scene.replace("allow_motion: true", "allow_motion: false");
+    let done = with_arm(folder.path(), motionless, &["check"], &[]);
+    assert_eq!(done.status.code(), Some(2), "{}", stderr(&done));
+    assert!(stderr(&done).contains("allow_motion"), "{}", stderr(&done));
+    for (more, why) in [
+        (["--touches", "1"], "--touches 1 must be 3 to 100"),
+        (["--gate-um", "0"], "--gate-um 0 must be above 0"),
+        (["--touches", "1000"], "must be 3 to 100"),
+    ] {
+        let done = with_arm(folder.path(), |scene| scene, &["check"], &more);
+        assert_eq!(done.status.code(), Some(2), "{}", stderr(&done));
+        assert!(stderr(&done).contains(why), "{}", stderr(&done));
+    }
+}
+
+/// A stiffness that is wrong by a third in the scene is found: the arm has 15 N/mm.
+#[test]
+fn the_stiffness_of_the_arm_is_found_and_written_into_the_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let [_, truth] = cell(folder.path(), |scene| scene);
+    let out = folder.path().join("calibrated.yaml");
+    let more = ["--out", out.to_str().unwrap(), "--json"];
+    let done = with_arm(folder.path(), |scene| scene, &["calibrate", "stiffness"], &more);
+    assert_eq!(done.status.code(), Some(0), "{}", stderr(&done));
+    let found: Value = serde_json::from_slice(&done.stdout).unwrap();
+    let (k, u) = (found["stiffness_n_per_mm"].as_f64().unwrap(), found["std_n_per_mm"].as_f64().unwrap());
+    println!("{k} ± {u} N/mm");
+    assert!((k - 15.0).abs() < 4.0 * u && u < 0.5, "{k} ± {u}");
+    let scene = fs::read_to_string(&out).unwrap();
+    assert!(scene.contains("# touchup calibrate stiffness: 10 presses") && !scene.contains("per_mm: 15\n"), "{scene}");
+    // and the scene is one to probe by
+    let again =
+        touchup(&["check", "--robot", "sim", "--scene", out.to_str().unwrap(), "--truth", &truth, "--spot", "45,8,12"]);
+    assert_eq!(again.status.code(), Some(0), "{}", stderr(&again));
+}
+
+/// `touchup calibrate payload --robot sim` of a cell.
+fn identify_payload(folder: &Path, change: impl Fn(String) -> String, more: &[&str]) -> Output {
+    let [scene, truth] = cell(folder, change);
+    let out = folder.join("calibrated.yaml");
+    let with = ["--robot", "sim", "--scene", &scene, "--truth", &truth, "--out", out.to_str().unwrap()];
+    touchup(&[&["calibrate", "payload"], &with[..], more].concat())
+}
+
+/// The scene says 0.25 kg in the middle; the true payload is four times as heavy and off the axis. The biases are those that
+/// `ArmParams` has.
+#[test]
+fn the_payload_is_identified_within_its_stated_uncertainty() {
+    for seed in ["1", "2", "3"] {
+        let folder = tempfile::tempdir().unwrap();
+        let held = ["--truth-payload-kg", "1.17", "--truth-payload-centre-mm", "3,-2,42"];
+        let more = [&held[..], &["--seed", seed, "--json"]].concat();
+        let done = identify_payload(folder.path(), |scene| scene, &more);
+        assert_eq!(done.status.code(), Some(0), "{}", stderr(&done));
+        let found: Value = serde_json::from_slice(&done.stdout).unwrap();
+        println!("{found}");
+        let number = |key: &str| found[key].as_f64().unwrap();
+        let (off, std) = (number("mass_kg") - 1.17, number("mass_std_kg"));
+        // thirteen means of 500 readings with 0.15 N: 6.7 mN each, on 11.5 N some parts in a thousand
+        assert!(off.abs() < 3.0 * std && std < 1e-3, "{off} ± {std} kg");
+        let [force, torque] = [[0.4, -0.3, 1.1], [0.05, -0.08, 0.02]];
+        for (key, expected) in [("centre_mm", [3.0, -2.0, 42.0]), ("bias_force_n", force), ("bias_torque_nm", torque)] {
+            for axis in 0..3 {
+                let [value, std] = ["value", "std"].map(|part| found[key][part][axis].as_f64().unwrap());
+                assert!((value - expected[axis]).abs() < 3.0 * std, "{key} {axis}: {value} ± {std}");
+            }
+        }
+        assert_eq!(found["static_segments"], 13);
+        assert_eq!(found["not_reached"].as_array().unwrap().len(), 0);
+        // the scene with it differs in its two keys alone
+        let [before, after] =
+            ["scene.yaml", "calibrated.yaml"].map(|name| fs::read_to_string(folder.path().join(name)));
+        let (before, after) = (before.unwrap(), after.unwrap());
+        let added: Vec<&str> = after.lines().filter(|line| !before.lines().any(|old| old == *line)).collect();
+        assert!(
+            matches!(added[..], [kg, mm] if kg.trim().starts_with("payload_kg: 1.1") && mm.contains("payload_centre_mm: ["))
+        );
+        assert!(after.contains("# touchup calibrate payload: 13 orientations"), "{after}");
+    }
+}
+
+/// `touchup calibrate tip --robot sim` of a cell, on its flat top beside the slot.
+fn calibrate_tip(folder: &Path, change: impl Fn(String) -> String, more: &[&str]) -> Output {
+    let [scene, truth] = cell(folder, change);
+    let out = folder.join("calibrated.yaml");
+    let with = ["--robot", "sim", "--scene", &scene, "--truth", &truth, "--out", out.to_str().unwrap()];
+    touchup(&[&["calibrate", "tip", "--spot", "45,9,12"], &with[..], more].concat())
+}
+
+/// The scene says 150 mm straight out of the flange; the ball is 2 mm farther and off to the side.
+#[test]
+fn the_tip_is_found_within_its_stated_uncertainty() {
+    for seed in ["1", "2", "3"] {
+        let folder = tempfile::tempdir().unwrap();
+        let expected = [0.9, -1.3, 152.0];
+        let done =
+            calibrate_tip(folder.path(), |scene| scene, &["--truth-tip-mm", "0.9,-1.3,152", "--seed", seed, "--json"]);
+        assert_eq!(done.status.code(), Some(0), "{}", stderr(&done));
+        let found: Value = serde_json::from_slice(&done.stdout).unwrap();
+        println!("{found}");
+        for axis in 0..3 {
+            let [value, std] = ["value", "std"].map(|part| found["tip_position_mm"][part][axis].as_f64().unwrap());
+            let off = value - expected[axis];
+            // 12 touches of 5 µm, of which the leans determine a half to a fifth
+            assert!(off.abs() < 3.0 * std && std < 0.05, "{axis}: {off} ± {std} mm");
+        }
+        assert_eq!((&found["touches"], found["not_reached"].as_array().unwrap().len()), (&16.into(), 0));
+        let after = fs::read_to_string(folder.path().join("calibrated.yaml")).unwrap();
+        assert!(
+            after.contains("# touchup calibrate tip: 16 touches") && after.contains("tip_position_mm: [0."),
+            "{after}"
+        );
+    }
+}
+
+#[test]
+fn a_tip_that_cannot_be_found_is_refused_and_nothing_is_written() {
+    let same = |scene: String| scene;
+    let refused: [NotWeighed; 5] = [
+        (&[], |scene| scene.replace("allow_motion: true", "allow_motion: false"), 2, "allow_motion"),
+        (&[], |scene| scene.replace("robot:\n", "robot:\n  time_s: 5\n"), 1, "the time is spent"),
+        (&["--truth-tip-mm", "0,0,140"], same, 1, "touch 1 of the spot: nothing is there"),
+        (&["--truth-tip-mm", "0,0"], same, 2, "--truth-tip-mm 0,0 is not X,Y,Z in mm"),
+        (&["--bag", "swing.mcap"], same, 2, "cannot be used with"),
+    ];
+    for (more, change, code, part) in refused {
+        let folder = tempfile::tempdir().unwrap();
+        let done = calibrate_tip(folder.path(), change, more);
+        assert_eq!(done.status.code(), Some(code), "{more:?}: {}", stderr(&done));
+        assert!(stderr(&done).contains(part), "{more:?}: {}", stderr(&done));
+        assert!(!folder.path().join("calibrated.yaml").exists(), "{more:?}");
+    }
+}
+
+/// Where the wrist would come too near to a singularity an orientation is left out and listed; the others suffice.
+#[test]
+fn orientations_out_of_reach_are_left_out_and_listed() {
+    let folder = tempfile::tempdir().unwrap();
+    let least = |scene: String| scene.replace("robot:\n", "robot:\n  least_dexterity: 0.15\n");
+    let done = identify_payload(folder.path(), least, &[]);
+    assert_eq!(done.status.code(), Some(0), "{}", stderr(&done));
+    let output = String::from_utf8_lossy(&done.stdout).into_owned();
+    let left_out = output.lines().filter(|line| line.starts_with("left out    60° towards")).count();
+    assert!(left_out > 0 && output.contains("nearly stuck"), "{output}");
+    assert!(output.contains(&format!("static segments: {},", 13 - left_out)), "{output}");
+}
+
+/// The arguments beside `--out`, the change of the scene, the code and a part of the refusal.
+type NotWeighed<'a> = (&'a [&'a str], fn(String) -> String, i32, &'a str);
+
+#[test]
+fn an_undetermined_payload_is_refused_and_nothing_is_written() {
+    let same = |scene: String| scene;
+    let refused: [NotWeighed; 8] = [
+        (&[], |scene| scene.replace("allow_motion: true", "allow_motion: false"), 2, "allow_motion"),
+        (&[], |scene| scene.split("robot:").next().unwrap().to_owned() + "refine:\n", 2, "`robot`"),
+        // no arm of its size has that anywhere
+        (
+            &[],
+            |scene| scene.replace("robot:\n", "robot:\n  least_dexterity: 0.9\n"),
+            1,
+            "0 of 13 orientations, 6 are needed",
+        ),
+        (&[], |scene| scene.replace("robot:\n", "robot:\n  time_s: 5\n"), 1, "the time is spent"),
+        (&["--truth-payload-kg", "0"], same, 1, "nothing hangs on the flange"),
+        (&["--truth-payload-centre-mm", "1,2"], same, 2, "--truth-payload-centre-mm 1,2 is not X,Y,Z in mm"),
+        (&["--truth-payload-kg", "1000"], same, 2, "the payload"),
+        (&["--bag", "static.mcap"], same, 2, "cannot be used with"),
+    ];
+    for (more, change, code, part) in refused {
+        let folder = tempfile::tempdir().unwrap();
+        let done = identify_payload(folder.path(), change, more);
+        assert_eq!(done.status.code(), Some(code), "{more:?}: {}", stderr(&done));
+        assert!(stderr(&done).contains(part), "{more:?}: {}", stderr(&done));
+        assert!(!folder.path().join("calibrated.yaml").exists(), "{more:?}");
+    }
+    let calibrate = ["calibrate", "payload", "--out", "never.yaml"];
+    for (more, part) in [
+        (&[][..], "<--bag <RECORDING>|--samples <CSV>|--robot <ARM>>"),
+        (&["--robot", "sim"], "--scene is needed"),
+        (&["--bag", "static.mcap", "--seed", "3"], "cannot be used with"),
+        (&["--samples", "static.csv", "--truth-payload-kg", "1"], "cannot be used with"),
+        (&["--robot", "sim", "--wrench-axes", "pose"], "cannot be used with"),
+    ] {
+        let done = touchup(&[&calibrate[..], more].concat());
+        assert_eq!(done.status.code(), Some(2), "{more:?}: {}", stderr(&done));
+        assert!(stderr(&done).contains(part), "{more:?}: {}", stderr(&done));
+    }
+}

@@ -1,0 +1,5 @@
+//! The arm, where it touches next, and a probing from flag to feature.
+
+mod arm;
+mod execute;
+mod plan;

@@ -1,0 +1,84 @@
+//! The delay between pose and wrench, against the one that the simulation put in.
+
+use nalgebra::{Isometry3, Vector3};
+use touchup::sim::{PathParams, Plate, SensorParams, StylusParams, plan_demo, touch};
+use touchup::stylus::{
+    ClockEstimator, ClockOffset, ClockParams, ContactEstimator, ContactEstimatorParams, Sample, SyncParams,
+    Synchroniser, TipParams, Wrench,
+};
+
+fn contacts() -> ContactEstimator {
+    let tip = TipParams { radius: 0.0, stiffness: None };
+    ContactEstimator::new(ContactEstimatorParams { bias: None, sliding: None, ..ContactEstimatorParams::new(tip) })
+        .unwrap()
+}
+
+fn estimated(sensor: SensorParams, seed: u64) -> Option<ClockOffset> {
+    let plate = Plate::default();
+    let path = plan_demo(&plate, &PathParams::default()).unwrap();
+    let stylus = StylusParams { sensor, ..StylusParams::default() };
+    let touch = touch(&plate, &path, &stylus, seed).unwrap();
+    let mut sync = Synchroniser::new(SyncParams::default()).unwrap();
+    let mut contacts = contacts();
+    let mut clock = ClockEstimator::new(ClockParams { stiffness: Some(stylus.stiffness) }).unwrap();
+    for message in touch.messages {
+        sync.push(message);
+        while let Some(sample) = sync.next_sample() {
+            clock.push(contacts.observe(&sample).unwrap());
+        }
+    }
+    clock.offset()
+}
+
+#[test]
+fn the_delay_is_right_within_its_uncertainty_over_twenty_seeds() {
+    let mut worst: f64 = 0.0;
+    for seed in 1..=20 {
+        // every seed its own delay, from -4 to 5.5 ms
+        let truth = (seed as f64 - 9.0) * 0.5e-3;
+        let found = estimated(SensorParams { wrench_clock: truth, ..SensorParams::default() }, seed);
+        let ClockOffset { offset, sigma, onsets } = found.unwrap_or_else(|| panic!("seed {seed}: nothing found"));
+        println!("{seed}: {:.2} ms, found {:.2} ± {:.2} ms, {onsets} onsets", truth * 1e3, offset * 1e3, sigma * 1e3);
+        worst = worst.max((offset - truth).abs() / sigma);
+        assert!(sigma < 1e-3, "seed {seed}: {sigma} s");
+    }
+    assert!(worst <= 2.0, "{worst} standard uncertainties");
+}
+
+fn sample(ms: i64, height: f64, force: f64) -> Sample {
+    let pose_ot = Isometry3::translation(0.0, 0.0, height);
+    let wrench = Wrench { force: Vector3::z() * force, torque: Vector3::zeros() };
+    Sample { stamp_ns: ms * 1_000_000, pose_ot, wrench }
+}
+
+fn offset_of(samples: impl IntoIterator<Item = Sample>) -> Option<ClockOffset> {
+    let (mut clock, mut contacts) = (ClockEstimator::new(ClockParams::default()).unwrap(), contacts());
+    samples.into_iter().for_each(|sample| clock.push(contacts.observe(&sample).unwrap()));
+    clock.offset()
+}
+
+/// Down at 50 mm/s, stopped where the force begins: worked out by hand, the delay is the shift of the stamps.
+#[test]
+fn a_clean_stop_gives_the_delay_that_was_put_in() {
+    for late_ms in [-3.0, 0.0, 2.5] {
+        let at = |ms: i64| {
+            let (since_pose, since_force) = ((ms % 200 - 100) as f64, (ms % 200 - 100) as f64 - late_ms);
+            let height = if since_pose < 0.0 { -since_pose * 50e-6 } else { 0.0 };
+            let force = if ms % 200 < 180 { 2.0 * (1.0 - (-since_force.max(0.0) / 10.0).exp()) } else { 0.0 };
+            sample(ms, height, force)
+        };
+        let found = offset_of((0..4000).map(at)).unwrap();
+        assert!((found.offset * 1e3 - late_ms).abs() < 0.15, "{late_ms} ms: {found:?}");
+        assert_eq!(found.onsets, 20);
+    }
+}
+
+#[test]
+fn where_there_is_nothing_to_see_nothing_is_found() {
+    // never in contact; always in contact; the ball comes to rest long before it is pressed; two onsets alone
+    assert_eq!(offset_of((0..5000).map(|ms| sample(ms, 0.01, 0.05))), None);
+    assert_eq!(offset_of((0..5000).map(|ms| sample(ms, 0.01 * (ms as f64 * 0.01).sin(), 2.0))), None);
+    assert_eq!(offset_of((0..5000).map(|ms| sample(ms, 0.0, if ms % 200 < 100 { 0.0 } else { 2.0 }))), None);
+    let stop = |ms: i64| sample(ms, (100 - ms % 200).max(0) as f64 * 50e-6, if ms % 200 < 100 { 0.0 } else { 2.0 });
+    assert_eq!(offset_of((0..400).map(stop)), None);
+}
