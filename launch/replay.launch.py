@@ -40,7 +40,7 @@ def generate_launch_description():
     return LaunchDescription(
         [
             argument("recording", description="A rosbag2 folder or file, MCAP or SQLite."),
-            argument("speed", default_value="1", description="Times its own pace."),
+            argument("speed", default_value="1", description="Speed, in multiples of the recorded one."),
             argument("scan", description="The mesh that was touched: PLY, STL or OBJ."),
             argument("mesh_unit", default_value="", choices=["", "m", "mm", "inch"], description="Unit of its file."),
             argument("scene", default_value="", description="The scene YAML; empty: config/default.yaml."),

@@ -7,10 +7,10 @@
 //! |---|---|
 //! | [`numeric`] | quantiles, means, bases, voxels, disjoint sets, robust weights, least squares, small rigid motions |
 //! | [`mod@parameters`] | what is declared of each key of the scene: unit, range, default, documentation |
-//! | [`stylus`] | pose and wrench become one [`touch::Sample`]: pairing, compensation, contact, friction |
+//! | [`stylus`] | pose and wrench become one [`stylus::Sample`]: pairing, compensation, contact, friction |
 //! | [`mesh`] | the triangle mesh, its repair, its exact closest-face tree, its Laplacian |
 //! | [`reconstruct`] | the touched part of the scan reconstructed |
-//! | [`haptic`] | [`refine::Refiner::push`]: face dynamics, region, guard; one sample moves the mesh |
+//! | [`haptic`] | [`haptic::Refiner::push`]: face dynamics, region, guard; one sample moves the mesh |
 //! | [`features`] | holes, slots, planes, … of a mesh and its touches, with their uncertainty |
 //! | [`align`] | rigid registration: of pairs, of features, of surfaces |
 //! | [`compare`] | deviation from the true part, discrepancy of scan and touch, as numbers and as a picture |

@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::parameters;
 
 parameters! {
-    /// Settings of a [`Synchroniser`]; times in ns.
+    /// Settings of a [`super::Synchroniser`]; times in ns.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub struct SyncParams in "sync" {
         /// How far a message may lag behind the newest stamp of its stream; also how long a sample is held back.

@@ -16,7 +16,7 @@ pub struct PointPair {
     pub sigma: Option<f64>,
 }
 
-/// Settings of [`fit_pairs`].
+/// Settings of [`super::fit_pairs`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PairsParams {
     /// Standard deviation of a pair that names none, per axis, m; `None`: found from the residuals.
