@@ -1,13 +1,12 @@
 //! Fits of surfaces against surfaces that are known: bias, stated uncertainty, outliers, few and lopsided points.
 
-mod guess;
 mod laws;
 mod monte_carlo;
 mod outliers;
 mod refusals;
 mod slots;
 
-use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use rand_pcg::Pcg64;
@@ -30,12 +29,6 @@ fn between(rng: &mut Pcg64, low: f64, high: f64) -> f64 {
 
 fn shaken(rng: &mut Pcg64, sigma: f64) -> Vector3<f64> {
     Vector3::from_fn(|_, _| normal(rng)) * sigma
-}
-
-/// A pose that is nothing special.
-fn tilted() -> Isometry3<f64> {
-    let turn = UnitQuaternion::from_euler_angles(0.7, -0.4, 1.9);
-    Isometry3::from_parts(Point3::new(0.12, -0.07, 0.31).into(), turn)
 }
 
 /// Points on a cylinder of radius `r` about z, over an arc (rad) and a height, each a group of its own, without errors.

@@ -5,8 +5,8 @@ use std::f64::consts::FRAC_PI_2;
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
 use super::circle::{radial, side};
-use super::normals::{AxisGuess, pose_along};
-use super::{Distance, Estimate, Fit, FitError, Freedom, OrientedPoint, Surface};
+use super::surface::pose_along;
+use super::{Distance, Estimate, Fit, FitError, Freedom, Surface};
 use crate::numeric::mean;
 
 /// A cone, by one of its circles and the angle between its lines and its axis.
@@ -29,29 +29,6 @@ impl Cone {
     /// From the centre of a circle, the axis (any length but 0), radius of the circle, half angle.
     pub fn new(center: Point3<f64>, axis: &Vector3<f64>, radius: f64, half_angle: f64, concave: bool) -> Self {
         Self { pose_of: pose_along(center, axis), radius, half_angle, concave }
-    }
-
-    /// First guess from places with normals, such as the faces of a tessellated countersink.
-    ///
-    /// All normals n have the same n · axis, so their tips lie on a plane, whose normal is the axis.
-    ///
-    /// # Errors
-    /// [`FitError::NoGuess`] when the normals do not spread in two directions.
-    pub fn from_normals(faces: &[OrientedPoint]) -> Result<Self, FitError> {
-        let none = FitError::NoGuess { surface: Self::NAME, count: faces.len() };
-        let guess = AxisGuess::of_tips(faces).ok_or(none)?;
-        // the normal of a boss is cos α away from the axis and −sin α along it, of a hole the opposite
-        let half_angle = (-side(guess.concave) * guess.along).clamp(-1.0, 1.0).asin();
-        Ok(Self { pose_of: guess.pose_of, radius: guess.radius, half_angle, concave: guess.concave }.widening())
-    }
-
-    /// The same cone with z towards where it is wider.
-    pub(crate) fn widening(self) -> Self {
-        if self.half_angle >= 0.0 {
-            return self;
-        }
-        let over = nalgebra::UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
-        Self { pose_of: self.pose_of * over, half_angle: -self.half_angle, ..self }
     }
 
     /// Radius at a height above the circle along z, m.

@@ -3,8 +3,8 @@
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
 use super::circle::{radial, side};
-use super::normals::{AxisGuess, pose_along};
-use super::{Distance, Estimate, Fit, FitError, Freedom, OrientedPoint, Surface};
+use super::surface::pose_along;
+use super::{Distance, Estimate, Fit, FitError, Freedom, Surface};
 use crate::numeric::mean;
 
 /// A cylinder without ends.
@@ -22,19 +22,6 @@ impl Cylinder {
     /// From a point on the axis and the axis, of any length but 0.
     pub fn new(point: Point3<f64>, axis: &Vector3<f64>, radius: f64, concave: bool) -> Self {
         Self { pose_of: pose_along(point, axis), radius, concave }
-    }
-
-    /// First guess from places with normals, such as the faces of a tessellated hole.
-    ///
-    /// The axis is the direction that the normals have least of; the centre is where their lines pass closest, the radius
-    /// the mean distance from it.
-    ///
-    /// # Errors
-    /// [`FitError::NoGuess`] when the normals are all parallel or no lines meet.
-    pub fn from_normals(faces: &[OrientedPoint]) -> Result<Self, FitError> {
-        let none = FitError::NoGuess { surface: Self::NAME, count: faces.len() };
-        let guess = AxisGuess::across_normals(faces).ok_or(none)?;
-        Ok(Self { pose_of: guess.pose_of, radius: guess.radius, concave: guess.concave })
     }
 }
 

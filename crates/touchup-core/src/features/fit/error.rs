@@ -50,12 +50,4 @@ pub enum FitError {
         /// its value, m or rad
         value: f64,
     },
-    /// The normals do not spread as those of the wanted surface do.
-    #[error("the normals of {count} faces do not fix a {surface}")]
-    NoGuess {
-        /// "plane", "cylinder" or "cone"
-        surface: &'static str,
-        /// how many faces were given
-        count: usize,
-    },
 }

@@ -2,8 +2,8 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::normals::pose_along;
-use super::{Distance, Fit, FitError, Freedom, OrientedPoint, Surface};
+use super::surface::pose_along;
+use super::{Distance, Fit, FitError, Freedom, Surface};
 use crate::numeric::mean;
 
 /// A plane whose air is on the side of z.
@@ -17,19 +17,6 @@ impl Plane {
     /// The plane through a point with a normal of any length but 0.
     pub fn new(point: Point3<f64>, normal: &Vector3<f64>) -> Self {
         Self { pose_of: pose_along(point, normal) }
-    }
-
-    /// Weighted mean of the points and of the normals.
-    ///
-    /// # Errors
-    /// [`FitError::NoGuess`] when there are none or their normals cancel.
-    pub fn from_normals(faces: &[OrientedPoint]) -> Result<Self, FitError> {
-        let none = FitError::NoGuess { surface: Self::NAME, count: faces.len() };
-        let weight: f64 = faces.iter().map(|f| f.weight).sum();
-        let normal: Vector3<f64> = faces.iter().map(|f| f.normal * f.weight).sum();
-        let point = faces.iter().map(|f| f.point.coords * f.weight).sum::<Vector3<f64>>() / weight;
-        let sound = weight > 0.0 && normal.norm() > weight * 0.5 && point.iter().all(|x| x.is_finite());
-        sound.then(|| Self::new(point.into(), &normal)).ok_or(none)
     }
 
     /// Normal out of the material, in O.

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
 use super::circle::side;
-use super::normals::pose_along;
+use super::surface::pose_along;
 use super::{Distance, Estimate, Fit, FitError, Freedom, Surface};
 use crate::numeric::mean;
 

@@ -127,3 +127,9 @@ pub trait Surface: Clone {
         Self::FREE.iter().filter(|free| **free).count()
     }
 }
+
+/// The frame at a point whose z is a direction of any length but 0.
+pub(super) fn pose_along(point: Point3<f64>, z: &Vector3<f64>) -> Isometry3<f64> {
+    let across = if z.x.abs() < 0.5 * z.norm() { Vector3::x() } else { Vector3::y() };
+    Isometry3::from_parts(point.into(), UnitQuaternion::face_towards(z, &across))
+}

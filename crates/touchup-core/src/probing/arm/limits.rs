@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use crate::parameters;
 use crate::parameters::SettingError;
 
-use super::arm::ArmState;
+use super::interface::ArmState;
 use super::kinematics::{Joints, UrGeometry};
 
 parameters! {

@@ -4,7 +4,7 @@
 //! was felt: where the curve of force over travel bends ([`find_onset`]), not where the arm came to rest. [`Watched::slide`] presses with a
 //! constant force and goes along a way.
 
-mod arm;
+mod interface;
 mod kinematics;
 mod limits;
 mod onset;
@@ -13,7 +13,7 @@ mod touch_params;
 mod touching;
 mod watched;
 
-pub use arm::{Arm, ArmError, ArmState, Command, Safety};
+pub use interface::{Arm, ArmError, ArmState, Command, Safety};
 pub use kinematics::{Joints, UrGeometry};
 pub use limits::{LimitError, Limits, Narrower};
 pub use onset::{Onset, OnsetError, OnsetParams, OnsetVerdict, TouchMoment, find_onset};

@@ -5,7 +5,7 @@
 
 use nalgebra::{Isometry3, Unit, UnitQuaternion, Vector3};
 
-use super::arm::{ArmState, Command};
+use super::interface::{ArmState, Command};
 use super::touch_params::TouchParams;
 use super::watched::{ProbeError, TRIGGERS, Watched};
 

@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use crate::numeric::mean;
 use crate::probing::plan::Expected;
 
-use super::arm::ArmState;
+use super::interface::ArmState;
 use super::onset::{Onset, OnsetError, TouchMoment, find_onset};
 use super::touch_params::TouchParams;
 use super::watched::{GOING, ProbeError, TRIGGERS, Watched};

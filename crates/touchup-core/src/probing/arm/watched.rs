@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::arm::{Arm, ArmError, ArmState, Command, Safety};
+use super::interface::{Arm, ArmError, ArmState, Command, Safety};
 use super::limits::{LimitError, Limits};
 use super::touch_params::TouchParams;
 
