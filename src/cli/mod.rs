@@ -433,6 +433,7 @@ fn check_kept_by(by: &str, flag: &str, input: &Path, output: &Path) -> Result<()
 }
 
 /// One line on stderr that is no error.
+#[cfg(any(feature = "ros", feature = "r2r"))]
 fn notify(line: &str) {
     let _ = writeln!(stderr(), "touchup: {}", line.replace('\n', " "));
 }

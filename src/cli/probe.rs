@@ -1,14 +1,16 @@
 //! `touchup probe`: an arm probes flagged features by itself, without ROS.
 
+use std::fmt;
 use std::path::PathBuf;
 
 use clap::Args;
+use serde::Serialize;
 
 use super::arm::{ArmArguments, RobotName};
 use super::probing::{Done, Probing, Ready, flag_of, picture_files};
 use super::{CliError, Losses, print_result};
 use crate::probing::arm::{Arm, Narrower};
-use crate::probing::execute::Flag;
+use crate::probing::execute::{Flag, Plan};
 
 #[derive(Debug, Args)]
 pub(super) struct ProbeArguments {
@@ -102,18 +104,12 @@ impl ProbeArguments {
     fn run(&self, probing: &Probing<'_>, ready: &Ready, arm: &mut dyn Arm) -> Result<Losses, CliError> {
         let plans = probing.planned(ready, arm)?;
         if self.dry_run {
-            for (flag, plan) in probing.flags.iter().zip(&plans) {
-                let slides =
-                    if plan.slides.is_empty() { String::new() } else { format!(" and {} slides", plan.slides.len()) };
-                print_result(&format!(
-                    "feature {}: {} touches{slides} planned, {} cannot be made",
-                    flag.id,
-                    plan.wishes.len(),
-                    plan.held_back.len()
-                ));
-                plan.held_back.iter().for_each(|(touch, why)| print_result(&format!("  touch {touch}: {why}")));
+            let report = DryRunReport::of(probing.flags, &plans, self.out.join("plan.png"));
+            if self.json {
+                print_result(&serde_json::to_string(&report).expect("numbers and names alone cannot fail"));
+            } else {
+                print_result(&report.to_string());
             }
-            print_result(&format!("nothing moved; wrote {}", self.out.join("plan.png").display()));
             return Ok(Losses::new());
         }
         ready.may_move()?;
@@ -125,5 +121,59 @@ impl ProbeArguments {
             print_result(&format!("{summary}\nwrote {}", files.join(", ")));
         }
         Ok(losses)
+    }
+}
+
+/// What `--dry-run --json` prints.
+#[derive(Debug, Serialize)]
+struct DryRunReport {
+    features: Vec<PlannedFeature>,
+    picture: PathBuf,
+}
+
+/// The plan for one flag.
+#[derive(Debug, Serialize)]
+struct PlannedFeature {
+    flag: u32,
+    touches: usize,
+    slides: usize,
+    /// touches that cannot be made
+    unreachable: Vec<UnreachableTouch>,
+}
+
+#[derive(Debug, Serialize)]
+struct UnreachableTouch {
+    touch: usize,
+    reason: String,
+}
+
+impl DryRunReport {
+    fn of(flags: &[Flag], plans: &[Plan], picture: PathBuf) -> Self {
+        let planned = |(flag, plan): (&Flag, &Plan)| PlannedFeature {
+            flag: flag.id,
+            touches: plan.wishes.len(),
+            slides: plan.slides.len(),
+            unreachable: plan
+                .held_back
+                .iter()
+                .map(|(touch, reason)| UnreachableTouch { touch: *touch, reason: reason.to_string() })
+                .collect(),
+        };
+        Self { features: flags.iter().zip(plans).map(planned).collect(), picture }
+    }
+}
+
+/// The verdict, then each feature and what cannot be touched.
+impl fmt::Display for DryRunReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let touches: usize = self.features.iter().map(|feature| feature.touches).sum();
+        let unreachable: usize = self.features.iter().map(|feature| feature.unreachable.len()).sum();
+        writeln!(f, "{} of {touches} planned touches can be made; nothing moved", touches - unreachable)?;
+        for PlannedFeature { flag, touches, slides, unreachable } in &self.features {
+            let slides = if *slides == 0 { String::new() } else { format!(" and {slides} slides") };
+            writeln!(f, "feature {flag}: {touches} touches{slides} planned, {} cannot be made", unreachable.len())?;
+            unreachable.iter().try_for_each(|one| writeln!(f, "  touch {}: {}", one.touch, one.reason))?;
+        }
+        write!(f, "wrote {}", self.picture.display())
     }
 }

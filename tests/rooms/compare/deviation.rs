@@ -8,8 +8,9 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use proptest::prelude::*;
 use touchup::align::{IcpParams, icp};
 use touchup::compare::{
-    CompareError, CompareParams, Comparison, IndexedMesh, Picture, PicturePanel, PictureParams, Regions, Summary,
-    SupportRegion, cloud_distances, colour_of, compare, deviations, draw_picture, sample_surface, surface_area, tilts,
+    CompareError, CompareParams, Comparison, IndexedMesh, Picture, PictureLabel, PicturePanel, PictureParams, Regions,
+    Summary, SupportRegion, cloud_distances, colour_of, compare, deviations, draw_picture, sample_surface,
+    surface_area, tilts,
 };
 use touchup::io::mesh_file::{MeshUnit, VertexColumn, read_mesh, read_vertex_columns, write_mesh, write_mesh_with};
 use touchup::io::png::write_png;
@@ -317,6 +318,30 @@ fn a_picture_shows_too_much_in_red_on_the_side_where_it_is() {
     assert_eq!(picture, picture_of(&sides, &mesh, 1), "the same again");
 }
 
+/// A label is drawn at its place, in the box beside it the colours of paper and ink.
+#[test]
+fn a_label_marks_its_place() {
+    let mesh = square(2, 0.0);
+    let flat = vec![0.0; mesh.vertex_slots()];
+    let panel = PicturePanel { deviations: &flat, ..PicturePanel::of(&mesh) };
+    let draw = |labels: &[PictureLabel]| {
+        let from = Some(Vector3::z());
+        draw_picture(&[panel], &PictureParams { width: 800, from, labels, ..PictureParams::default() })
+    };
+    // the middle of the square is the middle of its panel
+    let label = PictureLabel { place: Point3::new(10e-3, 10e-3, 0.0), text: "hole Ø8.00".to_owned() };
+    let [bare, labelled] = [draw(&[]), draw(&[label])];
+    assert_eq!(bare.size, labelled.size);
+    let changed: Vec<[u32; 2]> = (0..bare.size[0])
+        .flat_map(|x| (0..bare.size[1]).map(move |y| [x, y]))
+        .filter(|[x, y]| pixel(&bare, *x, *y) != pixel(&labelled, *x, *y))
+        .collect();
+    let is_ink = |[x, y]: &&[u32; 2]| pixel(&labelled, *x, *y).iter().all(|&c| c < 60);
+    let place = changed.iter().filter(is_ink).map(|[x, _]| *x).min().unwrap();
+    assert!(place.abs_diff(bare.size[0] / 2) < 8, "the dot is the leftmost ink: {place}");
+    assert!(changed.len() > 1000, "a name is written: {}", changed.len());
+}
+
 #[test]
 fn two_panels_stand_side_by_side_and_none_is_no_panic() {
     let mesh = square(2, 0.0);
@@ -411,6 +436,12 @@ fn compare_prints_numbers_and_writes_picture_and_colours() {
         }
         assert_eq!(all["normals"]["flipped_share"], 0.0);
         assert!(all["cloud_to_truth"].get("bias_mm").is_none(), "a cloud has no sides");
+    }
+    // all of it is 0.25 mm off
+    for (tolerance, share) in [("0.3", 1.0), ("0.2", 0.0)] {
+        let output = touchup(&["compare", &mesh, &truth, "--json", "--samples", "1000", "--tolerance-mm", tolerance]);
+        let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(report["after"]["regions"][0]["within_tolerance_share"], share, "{tolerance}");
     }
     let png = fs::read(&picture).unwrap();
     assert_eq!((&png[1..4], u32::from_be_bytes(png[16..20].try_into().unwrap())), (&b"PNG"[..], 1600));

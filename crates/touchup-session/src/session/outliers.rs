@@ -11,6 +11,8 @@ use touchup_core::reconstruct::{Outlier, Outliers, Patched, Support};
 pub struct UncertaintySummary {
     /// median standard deviation of the vertices that were touched
     touched_sigma_mm: f64,
+    /// contacts that the reconstruction was made of, and those that were rejected
+    contacts: u64,
     /// contacts that contradicted their place and did not count
     rejected: u64,
     /// places that moved because a second pass confirmed the contradiction
@@ -48,6 +50,7 @@ impl UncertaintySummary {
         let skipped = outliers.last().count().saturating_sub(MOST_LISTED);
         Self {
             touched_sigma_mm: touched.get(touched.len() / 2).copied().unwrap_or_default(),
+            contacts: outliers.contacts,
             rejected: outliers.rejected,
             relocated: outliers.relocated,
             outliers: outliers.last().skip(skipped).map(OutlierSummary::of).collect(),
@@ -79,13 +82,32 @@ impl OutlierSummary {
     }
 }
 
+/// 13547 as `13,547`.
+fn in_thousands(count: u64) -> String {
+    let digits = count.to_string();
+    let groups = digits.as_bytes().rchunks(3).rev().map(String::from_utf8_lossy);
+    groups.collect::<Vec<_>>().join(",")
+}
+
 impl fmt::Display for UncertaintySummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { touched_sigma_mm, rejected, relocated, .. } = self;
+        let Self { touched_sigma_mm, rejected, relocated, contacts, .. } = self;
+        let contacts = in_thousands(*contacts);
         write!(
             f,
-            "± {touched_sigma_mm:.3} mm where touched (median standard deviation); {rejected} contacts rejected as outliers, \
+            "± {touched_sigma_mm:.3} mm where touched (median standard deviation); {rejected} of {contacts} contacts rejected as outliers, \
              {relocated} places moved by a second pass"
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::in_thousands;
+
+    #[test]
+    fn counts_are_grouped_by_three_digits_from_the_right() {
+        let counts = [0, 7, 999, 1000, 13_547, 1_000_000].map(in_thousands);
+        assert_eq!(counts, ["0", "7", "999", "1,000", "13,547", "1,000,000"]);
     }
 }

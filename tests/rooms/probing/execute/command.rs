@@ -144,9 +144,16 @@ fn slides_bring_the_mesh_to_the_part() {
 fn a_dry_run_draws_the_plan_and_moves_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let forbid = |scene: String| scene.replace("allow_motion: true", "allow_motion: false");
-    let done = probe(folder.path(), forbid, &["--feature", "hole@16,36,12", "--dry-run"]);
+    let hole = ["--feature", "hole@16,36,12", "--dry-run"];
+    let done = probe(folder.path(), forbid, &hole);
     assert_eq!(done.status.code(), Some(0), "{}", stderr(&done));
-    assert!(String::from_utf8_lossy(&done.stdout).contains("nothing moved"));
+    let text = String::from_utf8_lossy(&done.stdout).into_owned();
+    assert!(text.lines().next().unwrap().ends_with("planned touches can be made; nothing moved"), "{text}");
+    let done = probe(folder.path(), forbid, &[&hole[..], &["--json"]].concat());
+    let plan: Value = serde_json::from_slice(&done.stdout).unwrap();
+    let [feature] = plan["features"].as_array().unwrap().as_slice() else { panic!("{plan}") };
+    let planned = format!("feature 1: {} touches planned", feature["touches"]);
+    assert!(feature["touches"].as_u64().unwrap() > 0 && text.contains(&planned), "{plan} {text}");
     assert!(folder.path().join("out/plan.png").exists());
     assert!(!folder.path().join("out/touch.mcap").exists());
 }

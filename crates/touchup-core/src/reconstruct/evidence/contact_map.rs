@@ -179,6 +179,7 @@ impl ContactMap {
 
     /// Adds a contact to the mean of its cell, unless it contradicts what is known there.
     pub fn add(&mut self, contact: &SurfaceContact) -> Verdict {
+        self.outliers.contacts += 1;
         let bin = self.bin_of(contact);
         let own = self.find(&bin);
         if let Some(gate) = self.gate

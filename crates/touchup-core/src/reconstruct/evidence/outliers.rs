@@ -24,7 +24,9 @@ pub struct Outlier {
 /// All that was rejected.
 #[derive(Clone, Debug, Default)]
 pub struct Outliers {
-    /// how many contacts were rejected
+    /// how many contacts were judged
+    pub contacts: u64,
+    /// how many of them were rejected
     pub rejected: u64,
     /// how many places moved because a second pass said the same
     pub relocated: u64,
