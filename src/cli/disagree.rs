@@ -247,7 +247,7 @@ impl DisagreeReport {
         };
         Self {
             scanner: found.scanner.as_ref().map(ScannerReport::of),
-            rigid_offset: found.misplaced.as_ref().map(|offset| RigidOffsetReport {
+            rigid_offset: found.rigid_offset.as_ref().map(|offset| RigidOffsetReport {
                 shift_mm: mm(&offset.shift.into()),
                 turn_deg: offset.turn.map(f64::to_degrees).into(),
                 shift_std_mm: mm(&offset.shift_sigma.into()),

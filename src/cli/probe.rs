@@ -151,7 +151,7 @@ impl DryRunReport {
     fn of(flags: &[Flag], plans: &[Plan], picture: PathBuf) -> Self {
         let planned = |(flag, plan): (&Flag, &Plan)| PlannedFeature {
             flag: flag.id,
-            touches: plan.wishes.len(),
+            touches: plan.touches.len(),
             slides: plan.slides.len(),
             unreachable: plan
                 .held_back

@@ -41,8 +41,8 @@ struct Onlooker<S: FnMut(&touchup::probing::arm::ArmState), C: Fn() -> bool> {
     is_cancelled: C,
 }
 
-impl<S: FnMut(&touchup::probing::arm::ArmState), C: Fn() -> bool> touchup::probing::arm::Witness for Onlooker<S, C> {
-    fn see(&mut self, state: &touchup::probing::arm::ArmState) {
+impl<S: FnMut(&touchup::probing::arm::ArmState), C: Fn() -> bool> touchup::probing::arm::Observer for Onlooker<S, C> {
+    fn on_state(&mut self, state: &touchup::probing::arm::ArmState) {
         (self.seen)(state);
     }
 
@@ -110,7 +110,7 @@ fn an_obstacle_stops_it() {
         stand_in.send("mark begin");
         let error = touched(&mut arm, &above(-3e-3)).err().unwrap();
         stand_in.send("mark commanded");
-        let ProbeError::InTheWay { place_mm, force_n, .. } = error else { panic!("{error}") };
+        let ProbeError::Obstacle { place_mm, force_n, .. } = error else { panic!("{error}") };
         let expected = ArmParams::default().pose_bo * Point3::new(0.0, 0.0, TOP + ArmParams::default().radius) * 1e3;
         assert!((place_mm[2] - expected.z).abs() < 0.5 && force_n > 1.0, "{place_mm:?}, {force_n} N");
         let record = stand_in.record_between("mark begin", "mark commanded");

@@ -15,7 +15,7 @@ use super::super::{CliError, Losses};
 use super::payload::{PayloadArguments, PayloadFound, warn_of_residuals};
 use super::{Change, DraftScene, NO_SCENE, rounded};
 use crate::calibrate::{PayloadError, PayloadParams, StaticPose, fit_payload};
-use crate::probing::execute::{NotReached, Prober, Weighed, WeighedRest};
+use crate::probing::execute::{NotReached, PayloadReading, PayloadReadings, Prober};
 use crate::scene::Setting;
 
 /// The verb.
@@ -28,10 +28,10 @@ pub(super) fn payload(arguments: &PayloadArguments, robot: RobotName) -> Result<
     ready.may_move()?;
     let measuring = WorkProgress::stage("identify the payload");
     let truth = |arm| truth_payload.held_by(arm, &ready.scene);
-    let Weighed { rests: segments, not_reached } = cell.with(robot, &ready, truth, |arm| {
+    let PayloadReadings { segments, not_reached } = cell.with(robot, &ready, truth, |arm| {
         let mut world = ready.static_world();
         let mut prober = Prober::new(arm, &ready.cell, &ready.params, &mut world);
-        prober.weigh().map_err(|error| CliError::Arm(error.to_string()))
+        prober.measure_payload().map_err(|error| CliError::Arm(error.to_string()))
     })?;
     drop(measuring);
     let poses: Vec<StaticPose> = segments.iter().map(static_pose).collect();
@@ -45,8 +45,8 @@ pub(super) fn payload(arguments: &PayloadArguments, robot: RobotName) -> Result<
 }
 
 /// The raw wrench is in the axes of the flange, and so is the orientation.
-fn static_pose(rest: &WeighedRest) -> StaticPose {
-    let WeighedRest { r_bf, wrench_f, noise, readings } = *rest;
+fn static_pose(reading: &PayloadReading) -> StaticPose {
+    let PayloadReading { r_bf, wrench_f, noise, readings } = *reading;
     StaticPose { r_wt: r_bf, wrench: wrench_f, noise: Some(noise), samples: readings }
 }
 

@@ -12,7 +12,7 @@ use super::super::{CliError, Losses};
 use super::tip::TipArguments;
 use super::{Change, DraftScene, NO_SCENE, Vector, rounded};
 use crate::calibrate::{Known, PlaneTipFit, fit_tip_by_plane};
-use crate::probing::execute::{Cell, NotReached, Pivoted, Prober};
+use crate::probing::execute::{Cell, NotReached, Prober, TipPoses};
 use crate::scene::Setting;
 use crate::sim::ArmParams;
 
@@ -33,10 +33,10 @@ pub(super) fn tip(arguments: &TipArguments, robot: RobotName, spot: &str) -> Res
         let off = millimetres("--truth-tip-mm", text)? - arm.pose_ft.translation.vector;
         Ok(ArmParams { ball_offset: arm.pose_ft.rotation.inverse() * off, ..arm })
     };
-    let Pivoted { poses_bf, normal_b, not_reached } = cell.with(robot, &ready, truth, |arm| {
+    let TipPoses { poses_bf, normal_b, not_reached } = cell.with(robot, &ready, truth, |arm| {
         let mut world = ready.static_world();
         let mut prober = Prober::new(arm, &ready.cell, &ready.params, &mut world);
-        prober.pivot(&place).map_err(|error| CliError::Arm(error.to_string()))
+        prober.measure_tip(&place).map_err(|error| CliError::Arm(error.to_string()))
     })?;
     drop(touching);
     let fit = fit_tip_by_plane(&poses_bf, &normal_b).map_err(|error| CliError::Arm(error.to_string()))?;

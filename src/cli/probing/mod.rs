@@ -21,7 +21,7 @@ use crate::io::probed_touches_file::write_probed_touches;
 use crate::io::recording::{Topics, write_recording};
 use crate::mesh::{FaceTree, TriMesh};
 use crate::probing::arm::Arm;
-use crate::probing::execute::{Cell, Ending, Flag, Plan, ProbeParams, Probed, Prober, StillWorld, plan};
+use crate::probing::execute::{Cell, Ending, Flag, Plan, ProbeParams, Probed, Prober, StaticWorld, plan};
 #[cfg(feature = "ur")]
 use crate::scene::RobotSection;
 use crate::scene::{Scene, simulated_arm};
@@ -114,8 +114,8 @@ impl Ready {
     }
 
     /// The scan, unchanged during probing.
-    pub fn static_world(&self) -> StillWorld {
-        StillWorld::new(self.mesh.clone())
+    pub fn static_world(&self) -> StaticWorld {
+        StaticWorld::new(self.mesh.clone())
     }
 
     /// Target half width of the scene, mm.

@@ -67,7 +67,7 @@ pub(super) fn draw_plan(scan: &TriMesh, plans: &[Plan], flags: &[Flag], path: &P
         for pair in plan.path.windows(2) {
             drawing.line(&pair[0], &pair[1], LINE * size, PATH);
         }
-        for (number, planned) in plan.wishes.iter().enumerate() {
+        for (number, planned) in plan.touches.iter().enumerate() {
             let is_held_back = plan.held_back.iter().any(|(at, _)| *at == number);
             let colour = if is_held_back { HELD_BACK } else { SEARCH };
             let end: Point3<f64> = planned.from + planned.direction.into_inner() * planned.search;
@@ -75,7 +75,7 @@ pub(super) fn draw_plan(scan: &TriMesh, plans: &[Plan], flags: &[Flag], path: &P
         }
     }
     flagged(&mut drawing, flags, size);
-    let touches: usize = plans.iter().map(|plan| plan.wishes.len()).sum();
+    let touches: usize = plans.iter().map(|plan| plan.touches.len()).sum();
     let note = format!("{touches} touches if the part is as the scan has it");
     let legend = [
         (FLAG, "flag"),
@@ -92,18 +92,18 @@ pub(super) fn draw_touches(mesh: &TriMesh, probed: &[Probed], flags: &[Flag], pa
     let mut drawing = DrawnMesh::of(mesh, PART);
     let (mut touched, mut missed, mut refused) = (0, 0, 0);
     for touch in probed.iter().flat_map(|one| &one.touches) {
-        let along = touch.wish.direction.into_inner();
+        let along = touch.planned.direction.into_inner();
         let (end, colour) = match (&touch.centre, &touch.refused) {
             (Some(centre), None) => (*centre, TOUCHED),
-            (_, Some(_)) => (touch.wish.from, REFUSED),
-            (None, None) => (touch.wish.from + along * touch.wish.search, MISS),
+            (_, Some(_)) => (touch.planned.from, REFUSED),
+            (None, None) => (touch.planned.from + along * touch.planned.search, MISS),
         };
         match colour {
             TOUCHED => touched += 1,
             MISS => missed += 1,
             _ => refused += 1,
         }
-        drawing.line(&touch.wish.from, &end, LINE * size, colour);
+        drawing.line(&touch.planned.from, &end, LINE * size, colour);
         drawing.place(&end, 0.5 * PLACE * size, colour);
     }
     for probed in probed.iter().flat_map(|one| &one.slides) {

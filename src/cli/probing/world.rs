@@ -8,7 +8,7 @@ use crate::cli::CliError;
 use crate::cli::progress::WorkProgress as Bar;
 use crate::live::{Engine, Gate, LiveError, Pace, Renewal};
 use crate::mesh::{FaceHit, FaceTree, TriMesh};
-use crate::probing::arm::{ArmState, Witness};
+use crate::probing::arm::{ArmState, Observer};
 use crate::probing::execute::{Cell, Progress, World};
 use crate::scene::Scene;
 use crate::stylus::{Message, Sample, StampedPose, StampedWrench, Wrench, WrenchFrame};
@@ -54,8 +54,8 @@ impl<'a> LiveWorld<'a> {
     }
 }
 
-impl Witness for LiveWorld<'_> {
-    fn see(&mut self, state: &ArmState) {
+impl Observer for LiveWorld<'_> {
+    fn on_state(&mut self, state: &ArmState) {
         self.bar.step();
         let turned = |v| state.pose_bt.rotation.inverse() * v;
         // in the axes of the probe, as its sensor would have it
@@ -88,7 +88,7 @@ impl World for LiveWorld<'_> {
         self.engine.refiner().closest_face(place, reach)
     }
 
-    fn tell(&mut self, progress: &Progress) {
+    fn publish(&mut self, progress: &Progress) {
         let uncertainty_um = progress.uncertainty.map(|sigma| sigma * 1e6);
         tracing::debug!(
             feature = progress.flag,

@@ -14,7 +14,7 @@ use super::shared::Shared;
 use crate::clock::Clock;
 use crate::features::{Feature, Tracker};
 use crate::mesh::{FaceTree, MeshError};
-use crate::probing::plan::{NextTouch, next_by_hand};
+use crate::probing::plan::{NextTouch, advise_next_touch};
 use crate::ros::messages::{
     DetectFeaturesRequest, DetectFeaturesResponse, Feature as FeatureMsg, FeatureArray, FlagFeatureResponse,
     UnflagFeatureResponse,
@@ -332,7 +332,7 @@ impl FeatureWorker {
     /// For each feature where a hand should touch next; of a flag its place.
     fn next_touches(&self) -> NextTouches {
         let found = self.tracker.features().iter().filter_map(|feature| {
-            let next = next_by_hand(feature, &self.touches)?;
+            let next = advise_next_touch(feature, &self.touches)?;
             Some((self.name_of(feature), next))
         });
         let flagged =

@@ -404,7 +404,7 @@ fn explored(
     let mut lean = || rng.random_range(-0.05..0.05);
     let normal = Unit::new_normalize(Vector3::new(lean(), lean(), 1.0));
     let mut explorer = Explorer::new(Some(kind), &flag, &normal, params).unwrap();
-    while let Some(planned) = explorer.wish() {
+    while let Some(planned) = explorer.next_touch() {
         let noise: f64 = StandardNormal.sample(rng);
         explorer.take(&probe(distance, &planned, params.ball_radius, noise * SIGMA));
     }
@@ -487,7 +487,7 @@ fn a_hole_is_not_claimed_from_touches_of_something_else() {
         let flag = Point3::new(16e-3 + rng.random_range(-2e-3..2e-3), 36e-3 + rng.random_range(-2e-3..2e-3), TOP);
         let mut explorer = Explorer::new(Some(Kind::Hole), &flag, &Vector3::z_axis(), params).unwrap();
         let mut walls = 0;
-        while let Some(planned) = explorer.wish() {
+        while let Some(planned) = explorer.next_touch() {
             walls += usize::from(planned.direction.z.abs() < 0.5);
             let noise: f64 = StandardNormal.sample(&mut rng);
             let is_wrong = walls % 6 == 5 && planned.direction.z.abs() < 0.5;
@@ -517,7 +517,7 @@ fn a_boss_is_measured_from_three_walls_at_the_least() {
         let params = PatternParams { sigma: 10e-6, ..PatternParams::default() };
         let mut explorer = Explorer::new(Some(Kind::Boss), &flag, &Vector3::z_axis(), params).unwrap();
         let mut walls = 0;
-        while let Some(planned) = explorer.wish() {
+        while let Some(planned) = explorer.next_touch() {
             let is_wall = planned.direction.z.abs() < 0.5;
             walls += usize::from(is_wall);
             let noise: f64 = StandardNormal.sample(&mut rng);

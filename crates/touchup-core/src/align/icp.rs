@@ -4,7 +4,7 @@
 //! small twist (t, θ) about c that is n·t + ((x − c) × n)·θ = −n·(x − q) \[Chen Medioni 1992\]. Each round solves it by
 //! least squares with Tukey's weights, whose width begins at the distances found and shrinks to the scatter of the
 //! residuals: what alone holds a direction, such as the walls of a few holes, would else count as outliers before it has
-//! come to rest. A direction that nothing holds is left as it was and told.
+//! converge. A direction without constraint stays as it was and is reported.
 
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
 
@@ -42,7 +42,7 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// Whether the target tells where to stop.
+    /// Whether the target sets where to stop.
     pub(crate) fn is_determined(&self) -> bool {
         self.share >= LEAST_SHARE
     }
@@ -96,7 +96,7 @@ pub enum IcpError {
         /// how far partners may be, m
         reach: f64,
     },
-    /// The rounds do not come to rest.
+    /// The rounds do not converge.
     #[error("after {rounds} rounds the fit still moves by {:.4} mm, at a scatter of {:.4} mm: {LOOK_AT}",
             .step * 1e3, .scatter * 1e3)]
     Unsettled {
@@ -124,17 +124,17 @@ const SHRINK: f64 = 0.5;
 const FIRST_WIDTH: f64 = 2.0;
 /// A round that moves less than this ends a level, in scatters: partners then stay where they are to the second order.
 const REST: f64 = 0.3;
-/// How often the weights are made anew before the next partners.
-const WEIGHINGS: usize = 4;
+/// How often the weights are updated before the next partners.
+const REWEIGHTINGS: usize = 4;
 /// Lengths below this are rounding, over the size of the target and its distance from the origin: 1 pm for 100 mm.
 const ROUNDING: f64 = 1e-11;
 
 /// The rigid motion at which `points` fit `target`, from a start that is roughly right.
 ///
-/// - `points`: m, in their own frame, in any order; a subset of them finds the way, all of them tell the end.
+/// - `points`: m, in their own frame, in any order; a subset of them is used far from the minimum, all of them at the end.
 /// - `tree`: over the faces of `target`.
 /// - `start`: moves the points to about where they belong.
-/// - `workers`: who looks for the closest places; the motion is the same to the last bit.
+/// - `workers`: threads that search for the closest places; the motion is the same to the last bit.
 /// - returns: the motion; directions that are undetermined are listed in it.
 ///
 /// # Errors
@@ -171,7 +171,7 @@ pub fn icp(
         let stride = points.len() / count;
         loop {
             let round = search.round(stride)?;
-            if search.is_at_rest(&round) {
+            if search.has_converged(&round) {
                 if stride == 1 {
                     return Ok(search.fit(&round));
                 }
@@ -265,18 +265,18 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Looks for partners of every `stride`-th point and moves once.
+    /// Finds partners of every `stride`-th point and moves once.
     fn round(&mut self, stride: usize) -> Result<Round, IcpError> {
         self.find_partners(stride);
-        let mut round = self.weigh(&Vector6::zeros())?;
+        let mut round = self.weighted_round(&Vector6::zeros())?;
         let mut step = solve(&round);
-        // the weights follow the residuals before partners are looked for again, which takes longest
-        for _ in 1..WEIGHINGS {
-            round = self.weigh(&step)?;
+        // the weights follow the residuals before partners are searched again, which takes longest
+        for _ in 1..REWEIGHTINGS {
+            round = self.weighted_round(&step)?;
             let next = solve(&round);
             let change = (next - step).norm();
             step = next;
-            if change <= self.rest() {
+            if change <= self.least_step() {
                 break;
             }
         }
@@ -307,7 +307,7 @@ impl<'a> Search<'a> {
     }
 
     /// The normal equations with the weights that the residuals have after `step`.
-    fn weigh(&self, step: &Vector6<f64>) -> Result<Round, IcpError> {
+    fn weighted_round(&self, step: &Vector6<f64>) -> Result<Round, IcpError> {
         let (mut equations, mut weights) = (NormalEquations::default(), 0.0);
         let (mut inliers, mut square) = (0, 0.0);
         for Partner { row, residual } in &self.partners {
@@ -327,7 +327,7 @@ impl<'a> Search<'a> {
         Ok(Round { information, right, inliers, square, step: 0.0, is_narrow: false })
     }
 
-    /// Brings the width of the weights towards the scatter that is left: at once where the pose has come to rest, else in
+    /// Brings the width of the weights towards the scatter that is left: at once where the pose has converged, else in
     /// steps.
     fn narrow(&mut self, round: &mut Round, step: &Vector6<f64>) {
         self.sizes.clear();
@@ -335,17 +335,17 @@ impl<'a> Search<'a> {
         self.scatter = SIGMA_OF_MEDIAN * median(&mut self.sizes).unwrap_or(0.0);
         let wanted = TUKEY_WIDTH * self.scatter.max(self.rounding);
         round.is_narrow = wanted >= self.width * SHRINK;
-        let least = if round.step <= self.rest() { wanted } else { self.width * SHRINK };
+        let least = if round.step <= self.least_step() { wanted } else { self.width * SHRINK };
         self.width = wanted.max(least).min(self.width);
     }
 
-    /// A step that is none, m.
-    fn rest(&self) -> f64 {
+    /// Steps below this have converged, m.
+    fn least_step(&self) -> f64 {
         (REST * self.scatter).max(self.rounding)
     }
 
-    fn is_at_rest(&self, round: &Round) -> bool {
-        round.is_narrow && round.step <= self.rest()
+    fn has_converged(&self, round: &Round) -> bool {
+        round.is_narrow && round.step <= self.least_step()
     }
 
     fn unsettled(&self, step: f64) -> IcpError {

@@ -4,7 +4,7 @@
 //! singular value decomposition Σ wᵢ b′ᵢ a′ᵢᵀ = U S Vᵀ [Kabsch 1976, Umeyama 1991]. About the centroid shift and turn
 //! are independent: cov = σ² diag(I / Σ wᵢ, (Σ wᵢ (|qᵢ|² I − qᵢ qᵢᵀ))⁻¹), qᵢ = R a′ᵢ.
 //!
-//! People pick wrong points, in wrong units and wrong axes. What is told from the pairs alone: one pair against all the
+//! People pick wrong points, in wrong units and wrong axes. What the pairs alone reveal: one pair against all the
 //! others (leave one out, with an F test), distances that differ by a known factor, a mirror image that fits better.
 
 mod error;
@@ -26,7 +26,7 @@ const LARGEST_COORDINATE: f64 = 1e6;
 const BELIEVABLE_SIGMA: RangeInclusive<f64> = 1e-12..=1e3;
 /// Points count as on one line when they scatter across it by less than this share of their scatter along it: 1°.
 const LINE_SHARE: f64 = 0.02;
-/// … or by less than so many standard deviations of a pick: the turn about the line is then anything.
+/// … or by less than so many standard deviations of a pick: the turn about the line is then undetermined.
 const LINE_SIGMAS: f64 = 3.0;
 /// Picks closer together than this share of their scatter are one point.
 const SAME_SHARE: f64 = 1e-6;
@@ -66,7 +66,7 @@ fn given_sigma(pairs: &[PointPair], params: &PairsParams) -> Option<f64> {
     params.sigma.or_else(|| pairs.iter().all(|pair| pair.sigma.is_some()).then(|| pairs[0].sigma).flatten())
 }
 
-/// (σ₀ / σᵢ)², so that a pair of σ₀ weighs 1. A pair that names no sigma weighs as the median of those that do.
+/// (σ₀ / σᵢ)², so that a pair of σ₀ has weight 1. A pair without a sigma has the median weight of those that have one.
 fn weights(pairs: &[PointPair], params: &PairsParams) -> Vec<f64> {
     let mut named: Vec<f64> = pairs.iter().filter_map(|pair| pair.sigma).collect();
     let usual = params.sigma.or(median(&mut named)).unwrap_or(1.0);

@@ -1,4 +1,4 @@
-//! Colours of signed deviations: blue lacks material, white fits, red has too much. The colour-blind can tell them too. And of
+//! Colours of signed deviations: blue lacks material, white fits, red has too much. The colour-blind can distinguish them. And of
 //! classes of disagreement.
 
 use super::disagreement::Class;

@@ -19,21 +19,21 @@ pub struct IndexedMesh<'a> {
     pub tree: &'a FaceTree,
 }
 
-/// A part of a refined mesh, by what it rests on.
+/// A part of a refined mesh, by its source.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum SupportRegion {
     /// as scanned
     Untouched,
     /// what touches nearby suggest
     Guessed,
-    /// felt
+    /// touched
     Touched,
 }
 
 /// Where the regions of a mesh come from.
 #[derive(Clone, Copy, Debug)]
 pub enum Regions<'a> {
-    /// nobody knows: there is only the whole
+    /// unknown: there is only the whole
     Unknown,
     /// one for each vertex slot of the mesh itself
     Own(&'a [SupportRegion]),
@@ -46,14 +46,14 @@ pub enum Regions<'a> {
 pub struct CompareParams {
     /// Points on the true surface, about; as dense on the mesh. Default 200 000: percentiles to a few tenths of a per cent.
     pub samples: usize,
-    /// Another seed spreads them anew.
+    /// Another seed gives another sample.
     pub seed: u64,
     /// Half the range of the histogram, m. Default: from the 95th percentile.
     pub range: Option<f64>,
     /// How far a true place may be from the mesh and yet be one that it shows, m. Default 2 mm: three times the noise of a
     /// poor scan.
     pub reach: f64,
-    /// Deviations of at most so much are within tolerance, m. Default: nobody asks.
+    /// Deviations of at most so much are within tolerance, m. Default: none.
     pub tolerance: Option<f64>,
 }
 
@@ -66,7 +66,7 @@ impl Default for CompareParams {
 /// A mesh of more than so many times the area of the truth is sampled less densely: its unit is probably wrong.
 const MOST_AREA: f64 = 10.0;
 
-/// Narrowest range chosen, m: nothing that is scanned or felt is known better.
+/// Narrowest range chosen, m: no scan or touch is more accurate.
 const SMALLEST_RANGE: f64 = 1e-6;
 
 /// How far one region is from the truth.
@@ -87,7 +87,7 @@ pub struct RegionComparison {
     pub vertices_to_truth: Option<Summary>,
     /// points spread over the mesh, to the nearest of those spread over the truth; without sign, `bias` is the mean
     pub cloud_to_truth: Option<Summary>,
-    /// and the other way
+    /// and the reverse
     pub truth_to_cloud: Option<Summary>,
     /// of the faces
     pub tilt: Option<TiltSummary>,
@@ -147,7 +147,7 @@ struct MeasuredDeviations {
 
 /// Compares a mesh with the truth; both lie in one frame.
 ///
-/// - `workers`: who looks for the closest places; what comes out is the same to the last bit.
+/// - `workers`: threads that search for the closest places; the result is the same to the last bit.
 ///
 /// # Errors
 /// [`CompareError::NoFaces`] of either; [`CompareError::TooManyPoints`].
@@ -281,7 +281,7 @@ fn regions_of(
 }
 
 /// The region of each point of the truth: that of the closest place of the mesh that has the regions, where this is within
-/// `reach` (m) and faces the same way. A scan from above says nothing of the underside.
+/// `reach` (m) and has a normal alike. A scan from above carries no information on the underside.
 ///
 /// - `feet`: of the points on `mesh`.
 fn regions_of_truth(

@@ -6,7 +6,7 @@ use super::CompareError;
 use crate::mesh::{FaceHit, FaceTree, TriMesh, Workers, coherent_order, map_by, pseudo_normal};
 
 /// Finds the place of `mesh` closest to each of `points` and hands it to `take` with the number of the point: each point
-/// once, in an order in which neighbours follow each other, so that what one query has read is still at hand for the next.
+/// once, in an order in which neighbours follow each other, so that what one query has read is cached for the next.
 ///
 /// - `points`: m, in the frame of `mesh`.
 ///
@@ -25,7 +25,7 @@ pub fn closest_places(
     Ok(())
 }
 
-/// What `tell` makes of each of `points` and its closest place, in their order; the same for any `workers`.
+/// What `evaluate` returns for each of `points` and its closest place, in their order; the same for any `workers`.
 ///
 /// # Errors
 /// As [`closest_places`].
@@ -34,18 +34,18 @@ pub(super) fn at_closest_places<T: Send + Clone>(
     mesh: &TriMesh,
     tree: &FaceTree,
     workers: &dyn Workers,
-    tell: impl Fn(&Point3<f64>, &FaceHit) -> T + Sync,
+    evaluate: impl Fn(&Point3<f64>, &FaceHit) -> T + Sync,
 ) -> Result<Vec<T>, CompareError> {
     let (order, ordered) = in_order(points)?;
-    let told = map_by(workers, ordered.len(), |at| {
-        tree.closest(mesh, &ordered[at], f64::INFINITY).map(|hit| tell(&ordered[at], &hit))
+    let values = map_by(workers, ordered.len(), |at| {
+        tree.closest(mesh, &ordered[at], f64::INFINITY).map(|hit| evaluate(&ordered[at], &hit))
     });
-    let Some(Some(first)) = told.first() else {
+    let Some(Some(first)) = values.first() else {
         return if points.is_empty() { Ok(Vec::new()) } else { Err(CompareError::NoFaces) };
     };
     let mut in_place = vec![first.clone(); points.len()];
-    for (at, told) in order.into_iter().zip(told) {
-        in_place[at as usize] = told.ok_or(CompareError::NoFaces)?;
+    for (at, values) in order.into_iter().zip(values) {
+        in_place[at as usize] = values.ok_or(CompareError::NoFaces)?;
     }
     Ok(in_place)
 }
@@ -62,7 +62,7 @@ fn in_order(points: &[Point3<f64>]) -> Result<(Vec<u32>, Vec<Point3<f64>>), Comp
 /// Signed distance of each point from a surface, m: positive outside of it, negative in the material.
 ///
 /// - `points`: m, in the frame of `truth`.
-/// - `workers`: who looks for the closest places; the distances are the same to the last bit.
+/// - `workers`: threads that search for the closest places; the distances are the same to the last bit.
 ///
 /// # Errors
 /// As [`closest_places`].

@@ -55,8 +55,8 @@ impl DrawnMesh {
 
     /// A place, as an octahedron of a radius (m).
     pub fn place(&mut self, at: &Point3<f64>, radius: f64, colour: Rgb) {
-        let ways = [Vector3::x(), Vector3::y(), Vector3::z()];
-        let points: Vec<_> = ways.iter().flat_map(|way| [at + way * radius, at - way * radius]).collect();
+        let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+        let points: Vec<_> = axes.iter().flat_map(|axis| [at + axis * radius, at - axis * radius]).collect();
         let faces = [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
         self.add(&points, &faces, colour);
     }

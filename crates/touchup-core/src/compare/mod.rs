@@ -1,6 +1,6 @@
 //! How far a mesh is from the part as it is: deviation point to surface and cloud to cloud, normals, and pictures of them.
 //!
-//! All distances are in m. A deviation is positive where the mesh stands proud of the true part and negative where it lies
+//! All distances are in m. A deviation is positive where the mesh lies above the true part and negative where it lies
 //! in its material, whichever of the two the points were taken from.
 
 mod cloud;
@@ -20,7 +20,7 @@ pub use colour::{Rgb, colour_of, colour_of_class};
 pub use comparison::{CompareParams, Comparison, IndexedMesh, RegionComparison, Regions, SupportRegion, compare};
 pub use deviation::{closest_places, deviations};
 pub use disagreement::{
-    BadTouches, Class, ClassMap, Disagreement, DisagreementRegion, Misplaced, RefinedShape, RegionEvidence, Scanner,
+    BadTouches, Class, ClassMap, Disagreement, DisagreementRegion, RefinedShape, RegionEvidence, RigidOffset, Scanner,
     VertexBasis, disagreement,
 };
 pub use lines::DrawnMesh;

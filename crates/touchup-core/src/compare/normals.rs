@@ -20,14 +20,14 @@ pub struct Tilt {
     pub area: f64,
 }
 
-/// What a set of tilts comes to; each face counts by its area.
+/// Statistics of a set of tilts, weighted by area.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TiltSummary {
     /// rad
     pub median: f64,
     /// 95th percentile, rad
     pub p95: f64,
-    /// share of the area that looks the wrong way: more than π/2
+    /// share of the area whose normal is reversed: more than π/2
     pub flipped: f64,
 }
 

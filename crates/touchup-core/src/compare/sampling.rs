@@ -33,7 +33,7 @@ pub fn sample_surface(mesh: &TriMesh, density: f64, seed: u64) -> Vec<SampledPoi
     let mut rng = Pcg64::new(u128::from(seed), u128::from(STREAM));
     let mut random = move || -> f64 { StandardUniform.sample(&mut rng) };
     let mut samples = Vec::new();
-    // where the next point is, counted in pieces from the start of the face at hand
+    // where the next point is, counted in pieces from the start of the current face
     let mut next = random();
     let mut pieces_before = 0.0_f64;
     let mut number = 0.0_f64;
@@ -49,7 +49,7 @@ pub fn sample_surface(mesh: &TriMesh, density: f64, seed: u64) -> Vec<SampledPoi
     samples
 }
 
-/// The point at the share `u` of the way from the first corner to the point at the share `v` of the opposite side; evenly
+/// The point at the share `u` of the segment from the first corner to the point at the share `v` of the opposite side; evenly
 /// spread when `u`² and `v` are.
 fn on_face(mesh: &TriMesh, face: FaceId, corners: [VertexId; 3], u: f64, v: f64) -> SampledPoint {
     let shares = [1.0 - u, u * (1.0 - v), u * v];

@@ -2,7 +2,7 @@
 
 use crate::numeric::quantile;
 
-/// What a set of deviations comes to. All but `bias` are of the sizes, without sign.
+/// Statistics of a set of deviations. All but `bias` are of the sizes, without sign.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Summary {
     /// how many
@@ -87,7 +87,7 @@ mod tests {
         let summary = Summary::of(&[1.0, -2.0, 3.0, -4.0, 0.0]).unwrap();
         assert_eq!((summary.points, summary.mean, summary.median, summary.max), (5, 2.0, 2.0, 4.0));
         assert_eq!((summary.rms, summary.bias), (6.0_f64.sqrt(), -0.4));
-        // sizes 0 1 2 3 4: 95 % of the way is 3.8
+        // sizes 0 1 2 3 4: the 95 % quantile is 3.8
         assert!((summary.p95 - 3.8).abs() < 1e-15 && (summary.p99 - 3.96).abs() < 1e-15);
         assert_eq!(Summary::of(&[]), None);
     }

@@ -8,7 +8,7 @@ use crate::numeric::{PointGrid, voxel_of};
 
 /// A place belongs to the touched region when a contact is within this distance, m.
 const REACH: f64 = 1e-3;
-/// One contact is kept in each cell of this size, m: a ball that rests does not count a thousandfold.
+/// One contact is kept in each cell of this size, m: a static ball does not count a thousandfold.
 const SPACING: f64 = 0.25e-3;
 
 /// Where a ball touched a part.

@@ -105,18 +105,18 @@ fn edges_between(parted: &Parted, planes: [usize; 2], border: &[Border]) -> Vec<
     else {
         return Vec::new();
     };
-    let Some(way) = n.cross(&m).try_normalize(SHARP) else { return Vec::new() };
+    let Some(direction) = n.cross(&m).try_normalize(SHARP) else { return Vec::new() };
     let origin = on_both([p, q], [n, m], &border[0].ends[0]);
     let tolerance = segments[0].tolerance.max(segments[1].tolerance);
     let near = (NEAR_TOLERANCES * tolerance).max(NEAR_EDGES * parted.edge.min(GAP * parted.diagonal));
     let is_near = |x: &Point3<f64>| {
         let v = x - origin;
-        (v - way * v.dot(&way)).norm() < near
+        (v - direction * v.dot(&direction)).norm() < near
     };
     let mut pieces: Vec<[f64; 2]> = border
         .iter()
         .filter(|border| border.ends.iter().all(is_near))
-        .map(|border| border.ends.map(|x| (x - origin).dot(&way)))
+        .map(|border| border.ends.map(|x| (x - origin).dot(&direction)))
         .map(|[a, b]| [a.min(b), a.max(b)])
         .collect();
     pieces.sort_by(|a, b| a[0].total_cmp(&b[0]));
@@ -132,7 +132,7 @@ fn edges_between(parted: &Parted, planes: [usize; 2], border: &[Border]) -> Vec<
     joint
         .into_iter()
         .filter(|[a, b]| b - a > SHORTEST * parted.diagonal)
-        .map(|ends| StraightEdge { planes, ends: ends.map(|t| origin + way * t), is_convex })
+        .map(|ends| StraightEdge { planes, ends: ends.map(|t| origin + direction * t), is_convex })
         .collect()
 }
 

@@ -1,4 +1,4 @@
-//! Where a mesh is bent: places that may be features, before it is known what they are.
+//! Clusters of high curvature: candidate features, before they are classified.
 //!
 //! [`paper_clusters`] is the method of the paper this crate follows; [`clusters`] finds their number itself.
 
@@ -17,7 +17,7 @@ pub struct Cluster {
     pub center: Point3<f64>,
     /// In rising order.
     pub vertices: Vec<VertexId>,
-    /// Which way it is bent; `None` from [`paper_clusters`], which does not tell.
+    /// Sign of the bend; `None` from [`paper_clusters`], which does not report it.
     pub bend: Option<Bend>,
 }
 
@@ -68,7 +68,7 @@ pub struct ClusterParams {
     /// of a tenth of the edges makes defects of 0.3 rad.
     pub sharp_defect: f64,
     /// Creases of one kind whose distance is below this share of the diagonal of the box around the mesh are one cluster,
-    /// and creases shorter than that are none: gaps and specks that noise makes.
+    /// and creases shorter than that are dropped: gaps and specks that noise makes.
     pub merge_share: f64,
 }
 
@@ -82,7 +82,7 @@ impl Default for ClusterParams {
 ///
 /// A crease keeps its angle and a sharp vertex its defect when the faces are split, so the number of clusters depends on
 /// neither the density of the mesh nor the unit. Connected means along creases: two rims of a hole are joined by the
-/// edges of its wall, which say nothing. Rims of an open mesh are not looked at.
+/// edges of its wall, which carry no information. Rims of an open mesh are left out.
 ///
 /// - `curvature`: of `mesh`, from [`super::curvature::curvature`]
 pub fn clusters(mesh: &TriMesh, curvature: &[VertexCurvature], params: &ClusterParams) -> Vec<Cluster> {

@@ -1,6 +1,6 @@
 //! Cones that begin where the wall of a hole ends: countersinks, chamfers, tips of drills.
 //!
-//! A short cone says little of its axis, that of its hole is known: so cones are looked for around the ends of holes.
+//! A short cone hardly determines its axis, that of its hole is known: so cones are searched around the ends of holes.
 
 use nalgebra::{Point3, Vector2, Vector3};
 
@@ -12,7 +12,7 @@ use super::segment::Segment;
 use super::walls::Wall;
 use crate::numeric::{median, tangent_basis};
 
-/// Directions in which the ring beyond an end is looked at.
+/// Directions in which the ring beyond an end is examined.
 const AROUND: usize = 36;
 /// Rings are this much wider and narrower than the hole, as a share of the radius, and that far beyond its end.
 const BESIDE: f64 = 0.08;
@@ -76,7 +76,7 @@ fn cone_beyond(parted: &Parted, wall: &Wall, end: f64, out: f64) -> Option<Segme
     })
 }
 
-/// Faces on a ring around the axis that look at it.
+/// Faces on a ring around the axis that face it.
 fn ring(parted: &Parted, wall: &Wall, t: f64, radius: f64) -> Vec<u32> {
     let [e, g] = tangent_basis(&wall.axis);
     let around = parted.around(wall.segments[0]);
@@ -137,7 +137,7 @@ fn misfit(parted: &Parted, faces: &[u32], cone: &Primitive) -> f64 {
     faces.iter().flat_map(|&face| parted.facets.triangle(face)).map(|p| cone.distance(&p).powi(2)).sum()
 }
 
-/// Whether a cone still has the axis of its hole.
+/// Whether a cone has the axis of its hole.
 fn is_along(cone: &Primitive, wall: &Wall) -> bool {
     let Primitive::Cone { apex, axis, .. } = cone else { return false };
     let v = apex - wall.origin;

@@ -1,4 +1,4 @@
-//! Edges at which a mesh turns sharply, and how they hang together.
+//! Edges at which a mesh turns sharply, and how they are connected.
 
 use nalgebra::Vector3;
 
@@ -9,7 +9,7 @@ use crate::numeric::{DisjointSets, voxel_neighbourhood, voxel_of};
 /// Points put on all creases together at most, beside one for each: bounds the work on meshes that are all noise.
 const MOST_POINTS: f64 = 1e6;
 
-/// Which way a place is bent.
+/// Sign of the bend: convex or concave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Bend {
     /// Outward, as the rim of a hole.
@@ -42,7 +42,7 @@ impl Creases {
         for (face, corners) in mesh.faces() {
             for i in 0..3 {
                 let ends = [corners[i], corners[(i + 1) % 3]];
-                // once for each edge: the other face runs along it the other way
+                // once for each edge: the other face runs along it in the opposite direction
                 let Some(other) = (ends[0] < ends[1]).then(|| neighbour(mesh, face, ends)).flatten() else { continue };
                 let (n, m) = (normals[face.0 as usize], normals[other.0 as usize]);
                 if n.dot(&m) < cos_sharp && n != Vector3::zeros() && m != Vector3::zeros() {

@@ -3,7 +3,7 @@
 //! Gaussian: the angle defect 2π − Σθ over the angles θ at the vertex is its integral over the part of the surface that
 //! belongs to the vertex; over a closed mesh the defects sum to 2πχ (Gauss and Bonnet), whatever the density. Mean: half
 //! the gradient of the area when the vertex moves along its normal is the integral of H; it is positive on bumps and
-//! negative in depressions, which the Gaussian curvature does not tell apart.
+//! negative in depressions, which the Gaussian curvature does not distinguish.
 //!
 //! The area is the mixed Voronoi area of \[Meyer et al. 2003\]: with it a ring of acute triangles inscribed in a sphere has
 //! K = 1/r² to second order in its edges, whatever its shape. (Barycentric areas have that only for regular rings.)
@@ -17,11 +17,11 @@ use crate::mesh::{TriMesh, VertexId};
 /// How the faces around a vertex meet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum VertexKind {
-    /// One closed fan, all faces the same way round.
+    /// One closed fan, all faces with the same orientation.
     Inner,
     /// One open fan: the vertex is on the rim. Its defect π − Σθ is the turn of the rim, no curvature of the surface.
     Rim,
-    /// Several fans, an edge with more than two faces, or a face turned over: nothing is said of curvature.
+    /// Several fans, an edge with more than two faces, or a face turned over: the curvature is undefined.
     Irregular,
     /// No face.
     #[default]
@@ -287,7 +287,7 @@ impl CornerSums {
     }
 }
 
-/// Argument of a complex number, rad, with the short way for the many vertices that are nearly flat.
+/// Argument of a complex number, rad, with a short cut for the many vertices that are nearly flat.
 #[inline]
 fn argument(re: f64, im: f64) -> f64 {
     if im.abs() > SMALL_TANGENT * re {

@@ -107,11 +107,11 @@ fn together(touches: [&[u32]; 2]) -> Vec<u32> {
     all
 }
 
-/// Distance of two places along `way`, each known by so much.
-fn between(from: &AxisEnd, to: &AxisEnd, way: &Vector3<f64>) -> Measured<f64> {
+/// Distance of two places along `direction`, each with its uncertainty.
+fn between(from: &AxisEnd, to: &AxisEnd, direction: &Vector3<f64>) -> Measured<f64> {
     let std = from.std.zip(to.std).map(|(a, b)| a.hypot(b));
     let touches = together([&from.touches, &to.touches]);
-    Measured { value: (from.point - to.point).dot(way).abs(), std, touches }
+    Measured { value: (from.point - to.point).dot(direction).abs(), std, touches }
 }
 
 /// Where an axis meets a plane, or ends.
@@ -132,7 +132,7 @@ impl AxisEnd {
         met.unwrap_or_else(|| Self { point: *point, std: None, touches: Vec::new() })
     }
 
-    /// Beside numbers that were touched, how well the mesh is known is not: nobody felt whether it is true.
+    /// Beside numbers that were touched, the uncertainty of the mesh means nothing: no touch confirms it.
     fn known_as(self, to: FittedTo) -> Self {
         let is_known = to == FittedTo::Mesh || !self.touches.is_empty();
         Self { std: self.std.filter(|_| is_known), ..self }
@@ -159,7 +159,7 @@ fn hole_feature(measure: &Measure, walls: &[Wall], hole: &Hole) -> Feature {
     let bottom = on_axis(&fitted, &(hole.opening - hole.out * hole.depth));
     let floor = AxisEnd::on(measure, hole.floor, &bottom, &axis.value).known_as(fitted.to);
     // beside a wall that was touched, a floor that was not may be a guess
-    let is_told = hole.floor.is_none() || fitted.to == FittedTo::Mesh || !floor.touches.is_empty();
+    let is_known = hole.floor.is_none() || fitted.to == FittedTo::Mesh || !floor.touches.is_empty();
     let std = fitted.fit.as_ref().and_then(|fit| lateral_std(fit, &opening.point));
     let touches = together([&fitted.touches, &opening.touches]);
     let centre = Measured { value: opening.point, std, touches };
@@ -169,7 +169,7 @@ fn hole_feature(measure: &Measure, walls: &[Wall], hole: &Hole) -> Feature {
         diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),
         depth: Some(between(&opening, &floor, &axis.value)),
         axis: Some(axis),
-        through: hole.through.filter(|_| is_told),
+        through: hole.through.filter(|_| is_known),
         surface: SizedSurface::Round(fitted.surface.clone()),
         cone_angle: cone.map(|cone| cone.number(2.0 * cone.surface.half_angle.abs(), &[(Freedom::Second, 2.0)])),
         ..Feature::new(Kind::Hole, centre, touched, fitted.to)
@@ -221,7 +221,7 @@ fn boss_feature(measure: &Measure, walls: &[Wall], boss: &Boss) -> Feature {
     }
 }
 
-/// By how much the middle of a slot may be off, m: across it, and along it where its ends tell that.
+/// By how much the middle of a slot may be off, m: across it, and along it where its ends determine that.
 pub(super) fn middle_std(fit: &Fit<Stadium>) -> Option<f64> {
     let across = fit.std(Freedom::Y)?;
     Some(fit.std(Freedom::X).map_or(across, |along| across.hypot(along)))
@@ -236,7 +236,7 @@ fn slot_feature(measure: &Measure, slot: &Slot, kind: Kind) -> Feature {
     let Stadium { width, length, .. } = fitted.surface;
     let is_fixed = |freedom: Freedom| fitted.fit.as_ref().is_some_and(|fit| fit.std(freedom).is_some());
     let direction = fitted.surface.direction() * fitted.surface.direction().dot(&slot.direction).signum();
-    // along the slot only what ends it tells where it is
+    // along the slot only its ends determine its position
     let start = fitted.surface.center();
     let along = if is_fixed(Freedom::X) { 0.0 } else { (slot.centre - start).dot(&direction) };
     let near = start + direction * along + axis.value * (slot.centre - start).dot(&axis.value);
@@ -278,19 +278,19 @@ fn edge_feature(measure: &Measure, edge: &StraightEdge) -> Option<Feature> {
     let [a, b] = edge.planes.map(|number| measure.plane(number));
     let (a, b) = (a?, b?);
     let normals = [a.surface.normal(), b.surface.normal()];
-    let way = normals[0].cross(&normals[1]);
-    let sine = way.norm();
-    let way = way.try_normalize(0.0)? * (edge.ends[1] - edge.ends[0]).dot(&way).signum();
+    let direction = normals[0].cross(&normals[1]);
+    let sine = direction.norm();
+    let direction = direction.try_normalize(0.0)? * (edge.ends[1] - edge.ends[0]).dot(&direction).signum();
     let ends = edge.ends.map(|end| on_both([a.surface.point(), b.surface.point()], normals, &end));
     let middle = nalgebra::center(&ends[0], &ends[1]);
     let stds = [&a, &b].map(|plane| plane.fit.as_ref().and_then(|fit| fit.std_at(&middle)));
-    // two planes that may be shifted by s and t let their line wander by √(s² + t²) / sin of the angle between them
+    // two planes that may be shifted by s and t displace their line of intersection by √(s² + t²) / sin of the angle between them
     let std = stds[0].zip(stds[1]).map(|(s, t)| s.hypot(t) / sine);
     let touches = together([&a.touches, &b.touches]);
     let touched = measure.observed.touched_along(&ends);
     let length = Measured { value: (ends[1] - ends[0]).norm(), ..Measured::default() };
     Some(Feature {
-        axis: Some(Measured { value: way, std: None, touches: touches.clone() }),
+        axis: Some(Measured { value: direction, std: None, touches: touches.clone() }),
         length: Some(length),
         points: ends.to_vec(),
         is_convex: Some(edge.is_convex),

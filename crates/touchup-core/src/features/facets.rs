@@ -1,4 +1,4 @@
-//! What segmentation asks of each face again and again: normal, area, the faces beside it.
+//! Cached properties of each face for segmentation: normal, area, adjacent faces.
 
 use nalgebra::{Point3, Vector3};
 
@@ -119,7 +119,7 @@ impl VertexFan {
     }
 
     /// The place of the face across the edge to vertex `next`, when there is that one and no third, and it runs along it
-    /// the other way.
+    /// in the opposite direction.
     fn across(&self, next: u32) -> Option<usize> {
         let (mut faces, mut place) = (0, 0);
         let (before, after) = (self.before.as_chunks::<AT_ONCE>().0, self.after.as_chunks::<AT_ONCE>().0);

@@ -1,4 +1,4 @@
-//! What is found: one feature, its numbers, and what they rest on.
+//! What is found: one feature, its numbers, and the data behind them.
 
 use nalgebra::{Point3, Vector3};
 
@@ -56,7 +56,7 @@ pub enum FittedTo {
 pub struct Measured<T> {
     /// m, rad, or a point, m
     pub value: T,
-    /// standard uncertainty, m or rad; `None` where nothing tells it
+    /// standard uncertainty, m or rad; `None` where nothing determines it
     pub std: Option<f64>,
     /// numbers of the touches, in ascending order; none where it was fitted to the mesh
     pub touches: Vec<u32>,
@@ -84,7 +84,7 @@ pub struct Feature {
     pub width: Option<Measured<f64>>,
     /// from opening to floor, or the height of a boss, m
     pub depth: Option<Measured<f64>>,
-    /// whether a hole or slot goes through; `None` where the mesh ends before the hole does, or nobody touched its floor
+    /// whether a hole or slot goes through; `None` where the mesh ends before the hole does, or its floor was not touched
     pub through: Option<bool>,
     /// full angle of the countersink, rad
     pub cone_angle: Option<Measured<f64>>,

@@ -60,7 +60,7 @@ impl Flats {
 }
 
 impl FlatPiece {
-    /// The faces in which it goes on without an edge.
+    /// The faces in which it continues without an edge.
     pub fn beside<'a>(&'a self, facets: &'a Facets) -> impl Iterator<Item = u32> + 'a {
         let normal = facets.normal(self.faces[0]);
         let beside = self.faces.iter().flat_map(|&face| facets.beside(face)).map(|(_, other)| other);

@@ -22,8 +22,8 @@ pub struct End {
 impl Feature {
     /// A hole, or a boss when the wall is convex.
     ///
-    /// - `top`: around the opening, or the foot of the boss; `end`: of the floor, or the boss' top, where it was felt.
-    /// - `touches`: those that it rests on.
+    /// - `top`: around the opening, or the foot of the boss; `end`: of the floor, or the boss' top, where it was touched.
+    /// - `touches`: those used.
     pub fn round(wall: &Fit<Cylinder>, top: &Fit<Plane>, end: Option<&End>, touches: Touches) -> Self {
         let out = top.surface.normal();
         let centre = met(&top.surface, &wall.surface.center(), &wall.surface.axis());
@@ -38,7 +38,7 @@ impl Feature {
         }
     }
 
-    /// A slot: its walls, the surface around its opening, and its floor where it was felt.
+    /// A slot: its walls, the surface around its opening, and its floor where it was touched.
     pub fn slot(wall: &Fit<Stadium>, top: &Fit<Plane>, floor: Option<&End>, touches: Touches) -> Self {
         let centre = met(&top.surface, &wall.surface.center(), &wall.surface.axis());
         let direction = wall.surface.direction();
@@ -61,22 +61,22 @@ impl Feature {
     /// - `ends`: near the edge, m in O.
     pub fn edge(sides: [&Fit<Plane>; 2], ends: &[Point3<f64>; 2], is_convex: bool, touches: Touches) -> Option<Self> {
         let normals = sides.map(|side| side.surface.normal());
-        let way = normals[0].cross(&normals[1]);
-        let sine = way.norm();
-        let way = way.try_normalize(0.0)? * (ends[1] - ends[0]).dot(&way).signum();
+        let direction = normals[0].cross(&normals[1]);
+        let sine = direction.norm();
+        let direction = direction.try_normalize(0.0)? * (ends[1] - ends[0]).dot(&direction).signum();
         let ends = ends.map(|end| on_both(sides.map(|side| side.surface.point()), normals, &end));
         let middle = nalgebra::center(&ends[0], &ends[1]);
         let [s, t] = sides.map(|side| side.std_at(&middle));
-        // two planes that may be shifted by s and t let their line wander by √(s² + t²) / sin of the angle between them
+        // two planes that may be shifted by s and t displace their line of intersection by √(s² + t²) / sin of the angle between them
         let std = s.zip(t).map(|(s, t)| s.hypot(t) / sine);
         // a plane that leans along the edge takes the edge with it
         let leans = [0, 1].map(|at| {
-            let along = sides[at].surface.pose_of.inverse_transform_vector(&way);
+            let along = sides[at].surface.pose_of.inverse_transform_vector(&direction);
             sides[at].estimate(0.0, &[(Freedom::TiltX, along.x), (Freedom::TiltY, along.y)])
         });
         let axis_std = leans[0].zip(leans[1]).map(|(a, b)| a.std.hypot(b.std) / sine);
         Some(Self {
-            axis: Some(Measured { value: way, std: axis_std, touches: touches.clone() }),
+            axis: Some(Measured { value: direction, std: axis_std, touches: touches.clone() }),
             length: Some(Measured { value: (ends[1] - ends[0]).norm(), ..Measured::default() }),
             points: ends.to_vec(),
             is_convex: Some(is_convex),
@@ -100,9 +100,9 @@ impl Feature {
 }
 
 /// Where a line meets a plane, m in O.
-fn met(plane: &Plane, from: &Point3<f64>, way: &Vector3<f64>) -> Point3<f64> {
+fn met(plane: &Plane, from: &Point3<f64>, direction: &Vector3<f64>) -> Point3<f64> {
     let normal = plane.normal();
-    from + way * ((plane.point() - from).dot(&normal) / way.dot(&normal))
+    from + direction * ((plane.point() - from).dot(&normal) / direction.dot(&normal))
 }
 
 fn axis_of<S: Fitted>(fit: &Fit<S>, out: &Vector3<f64>, touches: &Touches) -> Measured<Vector3<f64>> {

@@ -37,9 +37,9 @@ const RUNGS: i32 = 3;
 const SPREAD: f64 = 4.0;
 /// Largest tolerance of a round surface, in its radii.
 const SHARPNESS: f64 = 0.08;
-/// So many faces tell a plane while it grows.
+/// So many faces determine a plane while it grows.
 const MOST_OF_PLANE: usize = 20_000;
-/// A primitive has settled when it moves by less than this share of the tolerance …
+/// A primitive has converged when it moves by less than this share of the tolerance …
 const SETTLED: f64 = 0.1;
 /// … at so many faces.
 const SAMPLE: usize = 64;
@@ -47,19 +47,19 @@ const SAMPLE: usize = 64;
 const LEAST_WIDTH: f64 = 12.0;
 /// A face's normal may be off that of the primitive by this much: 25°.
 const ALIKE: f64 = 0.906;
-/// A segment of which stronger ones leave less than this is none.
+/// A segment of which stronger ones leave less than this is dropped.
 const LEAST_LEFT: f64 = 0.3;
 /// Faces around a seed, to begin with.
 const NEAR: usize = 16;
 /// Root mean square of the normals' sines around a flat seed: 5°.
 const FLAT: f64 = 0.09;
-/// A flat piece that goes on in round ones is so many times larger than their facets.
+/// A flat piece that continues in round ones is so many times larger than their facets.
 const FLAT_AMONG_ROUND: f64 = 20.0;
 /// … and than the flat pieces of which those may be made.
 const FLAT_BESIDE_FLAT: f64 = 5.0;
 /// The same around the seed of a cylinder, at least: 5° is what 17° of its turn have.
 const BENT: f64 = 0.09;
-/// A region is a plane without asking further when less than this share of its border goes on smoothly.
+/// A region is a plane without further tests when less than this share of its border is smooth.
 const BOUNDED: f64 = 0.2;
 /// A curved surface must explain so much more than the plane in its place.
 const MORE: f64 = 1.3;
@@ -67,7 +67,7 @@ const MORE: f64 = 1.3;
 const CURVED_NEAR: [usize; 3] = [12, 32, 90];
 /// Room for as many is made at once.
 const USUAL_NEAR: usize = 100;
-/// Beyond a plane it is looked at so many faces …
+/// Beyond a plane so many faces are examined …
 const MOST_NEAR: usize = 50_000;
 /// … and so many of them are fitted.
 const MOST_FITTED: usize = 300;
@@ -99,7 +99,7 @@ struct Growing<'a> {
     scale: MeshScale,
     of_face: Vec<u32>,
     segments: Vec<Segment>,
-    /// the round in which a face was last looked at
+    /// the round in which a face was last examined
     seen: Vec<u32>,
     round: u32,
     /// what a region from here would need, as far as that is known, m
@@ -134,7 +134,7 @@ impl<'a> Growing<'a> {
         }
     }
 
-    /// Faces by how flat their surroundings are, in order of id where they are alike.
+    /// Faces ordered by the flatness of their surroundings, then by id.
     fn seeds(&self) -> Vec<u32> {
         const BUCKETS: usize = 16;
         let (mut bucket_of, mut ends) = (Vec::with_capacity(self.facets.slots()), [0; BUCKETS]);
@@ -241,7 +241,7 @@ impl<'a> Growing<'a> {
         self.tolerance <= self.scale.exact()
     }
 
-    /// A flat piece of a drawing, where it goes on in round ones, of facets much smaller than it is.
+    /// A flat piece of a drawing, where it continues in round ones, of facets much smaller than it is.
     fn flat_from(&mut self, flat: &FlatPiece) -> Option<DraftRegion> {
         let (facets, seed) = (self.facets, flat.faces[0]);
         let largest = flat.beside(facets).map(|face| facets.area(face)).fold(0.0, f64::max);
@@ -317,7 +317,7 @@ impl<'a> Growing<'a> {
         best
     }
 
-    /// Whether corners of `near` are as near as the tolerance wants them; else tells what they need.
+    /// Whether corners of `near` are as near as the tolerance wants them; else returns what they need.
     fn is_close(&self, primitive: &Primitive, near: &[u32], needs: &mut f64) -> bool {
         let squares = near.iter().flat_map(|&face| self.facets.triangle(face)).map(|p| primitive.distance(&p).powi(2));
         let needed = SPREAD * (squares.sum::<f64>() / (3 * near.len()) as f64).sqrt();
@@ -352,7 +352,7 @@ impl<'a> Growing<'a> {
     /// Goes from the faces of `found` over all that belong to the primitive, which follows them each time their number has
     /// doubled.
     ///
-    /// - `fitted`: how many faces tell the primitive already; fewer of them may be flat by themselves.
+    /// - `fitted`: how many faces already determine the primitive; fewer of them may be flat by themselves.
     fn flood(&mut self, mut found: Vec<u32>, primitive: &mut Primitive, fitted: usize) -> Vec<u32> {
         self.round += 1;
         found.iter().for_each(|&face| self.seen[face as usize] = self.round);
@@ -379,7 +379,7 @@ impl<'a> Growing<'a> {
         found
     }
 
-    /// Whether two primitives are the same on a sample of faces, as far as the tolerance goes.
+    /// Whether two primitives are the same on a sample of faces, within the tolerance.
     fn is_settled(&self, one: &Primitive, other: &Primitive, faces: &[u32]) -> bool {
         faces.iter().step_by(faces.len().div_ceil(SAMPLE)).all(|&face| {
             let p = self.facets.triangle(face)[0];
@@ -401,7 +401,7 @@ impl<'a> Growing<'a> {
         refined(primitive, self.facets, faces)
     }
 
-    /// How much of a region's border goes on without an edge.
+    /// Share of a region's border without an edge.
     fn smooth_share(&mut self, region: &DraftRegion) -> f64 {
         self.round += 1;
         region.faces.iter().for_each(|&face| self.seen[face as usize] = self.round);
@@ -504,7 +504,7 @@ impl MeshScale {
         Self { diagonal: (hi - lo).norm(), edge: median_edge(facets) }
     }
 
-    /// How near the faces around a seed have to be, and how near the rest. Tight ones first: what they explain is not left
+    /// How near the faces around a seed have to be, and how near the others. Tight ones first: what they explain is not left
     /// to loose ones.
     ///
     /// - `is_drawn`: whether neighbours lie in one plane as they do in a drawing.

@@ -44,13 +44,13 @@ pub(super) struct Boss {
     pub top: Option<usize>,
 }
 
-/// A wall around a hole covers at least this share of a turn: with a keyway or a slit it is a hole still.
+/// A wall around a hole covers at least this share of a turn: a hole with a keyway or a slit still counts.
 const HOLE_COVERAGE: f64 = 0.6;
 /// That of a boss.
 const BOSS_COVERAGE: f64 = 0.75;
 /// Faces cover at least this share of what a wall is between its ends.
 const FILLED: f64 = 0.4;
-/// A wall is the rest of another when it is so much smaller …
+/// A wall is a fragment of another when it is so much smaller …
 const SMALLER: f64 = 0.5;
 /// … place and radius agree within this share of the radius …
 const REST: f64 = 0.3;
@@ -60,13 +60,13 @@ const STRAIGHT: f64 = 0.9945;
 const LEAST_HEIGHT: f64 = 0.08;
 /// So much of the radius around the axis is free in a hole.
 const FREE: f64 = 0.5;
-/// Points of the axis that are looked at.
+/// Points of the axis that are examined.
 const PROBES: usize = 7;
 /// What closes a hole is no farther from the end of its wall than this many radii.
 const CLOSED: f64 = 1.0;
 /// Where no plane is around an end and something is met within this many radii, the wall may go on to there unseen.
 const MAYBE_CLOSED: f64 = 3.0;
-/// Lines that look for what closes a hole are this share of the radius beside its axis.
+/// Rays that search for what closes a hole start this share of the radius beside its axis.
 const ASIDE: f64 = 0.05;
 /// Rings around an opening, in its radii: the land beside a hole may be narrow.
 const RINGS: [f64; 3] = [1.06, 1.15, 1.3];
@@ -80,7 +80,7 @@ const RIM: f64 = 0.2;
 const SQUARE: f64 = 0.94;
 /// An end is torn by borders of the mesh from so many radii before it to so many behind it, and as far around it.
 const TORN: [f64; 2] = [0.5, 1.5];
-/// Directions in which an end is looked at.
+/// Directions in which an end is examined.
 const AROUND: usize = 24;
 /// Walls of one hole are no farther apart along the axis than this many radii.
 const SAME_HOLE: f64 = 0.5;
@@ -109,13 +109,14 @@ pub(super) fn holes(parted: &Parted, walls: &[Wall]) -> Vec<Hole> {
     let is_hole = |wall: &Wall| wall.side() == Side::Hole && !wall.is_cone();
     let found: Vec<Hole> =
         (0..walls.len()).filter(|&at| is_hole(&walls[at])).filter_map(|at| hole(parted, walls, at)).collect();
-    let is_rest = |hole: &Hole| found.iter().any(|other| is_rest_of(parted, &walls[hole.wall], &walls[other.wall]));
-    found.iter().filter(|hole| !is_rest(hole)).cloned().collect()
+    let is_fragment =
+        |hole: &Hole| found.iter().any(|other| is_fragment_of(parted, &walls[hole.wall], &walls[other.wall]));
+    found.iter().filter(|hole| !is_fragment(hole)).cloned().collect()
 }
 
-/// Whether a wall is what a better one leaves of the same hole: where it was hardly touched it is crooked.
-fn is_rest_of(parted: &Parted, wall: &Wall, better: &Wall) -> bool {
-    let (rest, whole) = (parted.segment(wall.segments[0]), parted.segment(better.segments[0]));
+/// Whether a wall is a fragment of the same hole as a better one: with few touches it is crooked.
+fn is_fragment_of(parted: &Parted, wall: &Wall, better: &Wall) -> bool {
+    let (part, whole) = (parted.segment(wall.segments[0]), parted.segment(better.segments[0]));
     let v = wall.at(wall.middle()) - better.origin;
     let along = v.dot(&better.axis);
     let aside = (v - better.axis * along).norm();
@@ -123,9 +124,9 @@ fn is_rest_of(parted: &Parted, wall: &Wall, better: &Wall) -> bool {
     let wider = (wall.radius() - better.radius()).abs();
     // a step of the hole would be straight, and of another radius
     let is_crooked = wall.axis.dot(&better.axis).abs() < STRAIGHT;
-    !rest.is_exact
-        && rest.area < SMALLER * whole.area
-        && (is_crooked || wider < rest.tolerance)
+    !part.is_exact
+        && part.area < SMALLER * whole.area
+        && (is_crooked || wider < part.tolerance)
         && wider.max(aside) < REST * better.radius()
         && beyond < better.radius() + wall.height()
 }
@@ -210,7 +211,7 @@ fn end(parted: &Parted, wall: &Wall, which: usize) -> WallEnd {
     WallEnd { t, out, closed_at, is_open, rim }
 }
 
-/// Whether the mesh ends there: what the wall goes on in was not seen and not felt. Where a plane is around the end, the
+/// Whether the mesh ends there: the continuation of the wall was neither scanned nor touched. Where a plane is around the end, the
 /// border has to be as long as half of the turn.
 fn is_torn(parted: &Parted, wall: &Wall, end: &WallEnd) -> bool {
     let (middle, [e, g]) = (wall.at(end.t), tangent_basis(&wall.axis));
@@ -250,7 +251,7 @@ fn openness(walls: &[Wall], at: usize, end: &WallEnd) -> f64 {
     stepped + end.rim.map_or(0.0, |(_, share)| share)
 }
 
-/// The cone that goes on from an end.
+/// The cone that continues an end.
 fn cone_beside(walls: &[Wall], at: usize, end: &WallEnd) -> Option<usize> {
     let wall = &walls[at];
     (0..walls.len()).find(|&other| {
@@ -295,7 +296,7 @@ pub(super) fn groups(walls: &[Wall], holes: &[Hole]) -> Vec<Option<usize>> {
     group
 }
 
-/// All round bosses: walls with material inside that stand on a plane.
+/// All round bosses: walls with material inside whose foot is a plane.
 pub(super) fn bosses(parted: &Parted, walls: &[Wall]) -> Vec<Boss> {
     let is_boss = |wall: &Wall| wall.side() == Side::Boss && !wall.is_cone() && wall.coverage >= BOSS_COVERAGE;
     (0..walls.len()).filter(|&at| is_boss(&walls[at])).filter_map(|at| boss(parted, walls, at)).collect()
@@ -307,18 +308,18 @@ fn boss(parted: &Parted, walls: &[Wall], at: usize) -> Option<Boss> {
     let rings = if parted.rounding.is_some() { RINGS } else { FOOT_RINGS }.map(|ring| ring * radius);
     [(0, 1.0), (1, -1.0)].into_iter().find_map(|(which, out)| {
         let (foot, top) = (wall.ends[which], wall.ends[1 - which]);
-        let way = wall.axis * out;
-        let (base, share) = parted.plane_around(&around, &wall.at(foot), &way, &rings, NEAR_END * radius)?;
+        let direction = wall.axis * out;
+        let (base, share) = parted.plane_around(&around, &wall.at(foot), &direction, &rings, NEAR_END * radius)?;
         if share < 2.0 * RIM || wall.height() < LEAST_HEIGHT * radius {
             return None;
         }
         let to_plane = |number: usize| along_to_plane(&parted.segment(number).primitive, &wall.origin, &wall.axis);
         let foot = to_plane(base)?;
         let lid = parted
-            .plane_around(&around, &wall.at(top), &way, &[FREE * radius], NEAR_END * radius)
+            .plane_around(&around, &wall.at(top), &direction, &[FREE * radius], NEAR_END * radius)
             .map(|(number, _)| number);
         let top = lid.and_then(to_plane).unwrap_or(top);
         let height = (top - foot) * out;
-        (height > 0.0).then(|| Boss { wall: at, foot: wall.at(foot), out: way, height, base, top: lid })
+        (height > 0.0).then(|| Boss { wall: at, foot: wall.at(foot), out: direction, height, base, top: lid })
     })
 }

@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 
 /// Draws for each centre at the start: 2 + ln k for the few clusters of a part.
 const DRAWS: usize = 4;
-/// Rounds at most; points of a mesh settle in tens.
+/// Rounds at most; points of a mesh converge in tens.
 const MOST_ROUNDS: usize = 300;
 
 /// Centres and the points that belong to them.

@@ -40,7 +40,7 @@ const PARTS: usize = 24;
 const SHORT: f64 = 0.35;
 /// A touch beside the outline of a slot by less than this share of its width is of it.
 const BESIDE: f64 = 0.15;
-/// How well a hole is drilled, and a slot milled, square to the plane around it, rad: 0.5°.
+/// Perpendicularity of a drilled hole or milled slot to the plane around it, rad: 0.5°.
 const DRILLED: f64 = 0.0087;
 
 impl<'a> Measure<'a> {
@@ -191,24 +191,24 @@ impl<'a> Measure<'a> {
 }
 
 impl Fitted<Plane> {
-    /// Where a line meets the plane, and how well that is known along the normal, m.
-    pub fn met(&self, from: &Point3<f64>, way: &Vector3<f64>) -> Option<(Point3<f64>, Option<f64>)> {
+    /// Where a line meets the plane, and its uncertainty along the normal, m.
+    pub fn met(&self, from: &Point3<f64>, direction: &Vector3<f64>) -> Option<(Point3<f64>, Option<f64>)> {
         let (point, normal) = (self.surface.point(), self.surface.normal());
-        let t = (point - from).dot(&normal) / way.dot(&normal);
-        let met = from + way * t;
+        let t = (point - from).dot(&normal) / direction.dot(&normal);
+        let met = from + direction * t;
         t.is_finite().then(|| (met, self.fit.as_ref().and_then(|fit| fit.std_at(&met))))
     }
 }
 
 impl<S: Surface> Fitted<S> {
-    /// The direction of the surface, turned to `way`.
-    pub fn axis(&self, way: &Vector3<f64>) -> Measured<Vector3<f64>> {
+    /// The direction of the surface, oriented along `direction`.
+    pub fn axis(&self, direction: &Vector3<f64>) -> Measured<Vector3<f64>> {
         let axis = self.surface.pose_of().rotation * Vector3::z();
-        let value = if axis.dot(way) < 0.0 { -axis } else { axis };
+        let value = if axis.dot(direction) < 0.0 { -axis } else { axis };
         Measured { value, std: self.fit.as_ref().and_then(Fit::axis_std), touches: self.touches.clone() }
     }
 
-    /// A number that was fitted, or what it is without a fit.
+    /// A fitted number, or its value without a fit.
     pub fn number(&self, value: f64, by: &[(Freedom, f64)]) -> Measured<f64> {
         let estimate = self.fit.as_ref().and_then(|fit| fit.estimate(value, by));
         Measured { value, std: estimate.map(|estimate| estimate.std), touches: self.touches.clone() }

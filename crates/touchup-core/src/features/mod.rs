@@ -2,7 +2,7 @@
 //!
 //! The mesh is parted into planes, cylinders and cones ; what they make together is named, and measured
 //! by the touches on it where there are enough, else by the mesh ([`detect`]). [`curvature`] and its [`clusters`] are the
-//! paper's way to the places of features.
+//! paper's method for the places of features.
 
 mod bodies;
 mod borders;

@@ -1,4 +1,4 @@
-//! Which touches are of which segment, and what a fit is given of both.
+//! Assignment of touches to segments, and the observations of both for a fit.
 
 use std::collections::BTreeMap;
 
@@ -19,7 +19,7 @@ pub(super) struct Observed<'a> {
     touches: &'a [ProbedPoint],
     /// numbers of the touches of each segment
     of_segment: Vec<Vec<u32>>,
-    /// what shares its error, by touch
+    /// group with a shared error, by touch
     group: Vec<u32>,
     /// numbers of the touches by place
     grid: PointGrid,
@@ -37,7 +37,7 @@ const NEAR_RADII: f64 = 0.15;
 const ALIKE: f64 = 0.77;
 /// Where the tip is no ball a place is touched within this, m.
 const REACH: f64 = 1e-3;
-/// Least standard deviation, m: where none is stated the residuals tell.
+/// Least standard deviation, m: where none is stated it is estimated from the residuals.
 const LEAST_SIGMA: f64 = 1e-6;
 /// A touch counts at least this much.
 const LEAST_WEIGHT: f64 = 0.01;
@@ -45,11 +45,11 @@ const LEAST_WEIGHT: f64 = 0.01;
 const MOST_VERTICES: usize = 1500;
 /// Fewer vertices than this are not picked out.
 const LEAST_ON: usize = 8;
-/// Faces around a vertex, at most, where it is asked whether it is on a chord.
+/// Faces around a vertex, at most, where it is tested for lying on a chord.
 const MOST_AROUND: usize = 32;
 /// A line is along the straight lines of a round surface when it is within 25° of them.
 const STRAIGHT: f64 = 0.9;
-/// Faces that are asked whether they were touched, at most.
+/// Faces that are tested for touches, at most.
 const MOST_FACES: usize = 400;
 /// Of a measured mesh the vertices within this many edges share their error.
 const SHARED_EDGES: f64 = 3.0;
@@ -96,13 +96,13 @@ impl<'a> Observed<'a> {
         touches
     }
 
-    /// What touches say to a fit.
+    /// Observations of touches for a fit.
     pub fn of_touches(&self, numbers: &[u32]) -> Vec<Observation> {
         let observation = |&number: &u32| observation(&self.touches[number as usize], self.group[number as usize]);
         numbers.iter().map(observation).collect()
     }
 
-    /// What all touches have in common that no number of them averages out, m.
+    /// Error common to all touches, which does not average out, m.
     pub fn common_sigma(&self, numbers: &[u32]) -> f64 {
         let sum: f64 = numbers.iter().map(|&number| self.touches[number as usize].calibration).sum();
         sum / numbers.len().max(1) as f64
@@ -112,13 +112,13 @@ impl<'a> Observed<'a> {
         &self.touches[number as usize]
     }
 
-    /// What the mesh says to a fit.
+    /// Observations of the mesh for a fit.
     pub fn of_mesh(&self, segments: &[usize]) -> Vec<Observation> {
         let mesh = self.parted.facets.mesh;
         let vertices = self.vertices_of(segments);
         let step = vertices.len().div_ceil(MOST_VERTICES).max(1);
         let segment = self.parted.segment(segments[0]);
-        // of a drawing the residuals tell what is more than rounding
+        // in a drawing the residuals show what exceeds rounding
         let sigma = self.parted.rounding.unwrap_or(segment.tolerance) / 6.0;
         let cell = SHARED_EDGES * self.parted.edge;
         let mut cells: BTreeMap<VoxelKey, u32> = BTreeMap::new();
@@ -194,7 +194,7 @@ impl<'a> Observed<'a> {
     }
 }
 
-/// What a touch says to a fit.
+/// Observation of a touch for a fit.
 pub(super) fn observation(touch: &ProbedPoint, group: u32) -> Observation {
     let ProbedPoint { centre, radius, sigma, weight, .. } = *touch;
     let sigma = (sigma / weight.max(LEAST_WEIGHT).sqrt()).max(LEAST_SIGMA);
@@ -220,10 +220,10 @@ fn is_on_chord(mesh: &TriMesh, vertex: VertexId, faces: &[FaceId], primitive: &P
         if (p - a).dot(&(p - b)) >= 0.0 {
             return false;
         }
-        let Some(way) = (b - a).try_normalize(0.0) else { return false };
+        let Some(direction) = (b - a).try_normalize(0.0) else { return false };
         let v = p - a;
-        let off = (v - way * v.dot(&way)).norm();
-        off < rounding && way.dot(&straight).abs() < STRAIGHT
+        let off = (v - direction * v.dot(&direction)).norm();
+        off < rounding && direction.dot(&straight).abs() < STRAIGHT
     };
     around.iter().any(|a| around.iter().any(|b| is_between(a, b)))
 }

@@ -147,7 +147,7 @@ impl Moments {
     }
 }
 
-/// What the normals of faces say of a curved surface.
+/// Statistics of the normals of a curved surface.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NormalSpread {
     /// largest standard deviation of the normals from their mean

@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::mesh::{BoxQuery, FaceId, FaceTree, TriMesh};
 
-/// Looks along lines through one mesh.
+/// Casts rays through one mesh.
 pub(super) struct Rays<'a> {
     mesh: &'a TriMesh,
     tree: &'a FaceTree,
@@ -28,15 +28,15 @@ impl<'a> Rays<'a> {
         Self { mesh, tree, piece, names, query: BoxQuery::default() }
     }
 
-    /// The first face between `from` and the point `reach` (m) away along the unit vector `way`.
-    pub fn first(&mut self, from: &Point3<f64>, way: &Vector3<f64>, reach: f64) -> Option<RayHit> {
+    /// The first face between `from` and the point `reach` (m) away along the unit vector `direction`.
+    pub fn first(&mut self, from: &Point3<f64>, direction: &Vector3<f64>, reach: f64) -> Option<RayHit> {
         let count = (reach / self.piece).ceil().max(1.0);
         let piece = reach / count;
         for i in 0..count as usize {
-            let (a, b) = (from + way * (piece * i as f64), from + way * (piece * (i + 1) as f64));
+            let (a, b) = (from + direction * (piece * i as f64), from + direction * (piece * (i + 1) as f64));
             self.tree.faces_in_box(&a.inf(&b), &a.sup(&b), &mut self.query);
             let found = self.query.faces.iter().filter_map(|&face| {
-                let distance = crossing(&self.mesh.triangle(face), from, way)?;
+                let distance = crossing(&self.mesh.triangle(face), from, direction)?;
                 (distance >= 0.0 && distance <= reach).then_some(RayHit { distance, face })
             });
             // a face of this box may be crossed in a later one, behind a nearer face that is not here
@@ -50,20 +50,20 @@ impl<'a> Rays<'a> {
     }
 
     /// How far the line is free, at most `reach`, m.
-    pub fn free(&mut self, from: &Point3<f64>, way: &Vector3<f64>, reach: f64) -> f64 {
-        self.first(from, way, reach).map_or(reach, |crossing| crossing.distance)
+    pub fn free(&mut self, from: &Point3<f64>, direction: &Vector3<f64>, reach: f64) -> f64 {
+        self.first(from, direction, reach).map_or(reach, |crossing| crossing.distance)
     }
 }
 
 /// Where a line meets the plane of a triangle, if inside of it; edges belong to it.
-fn crossing([a, b, c]: &[Point3<f64>; 3], from: &Point3<f64>, way: &Vector3<f64>) -> Option<f64> {
+fn crossing([a, b, c]: &[Point3<f64>; 3], from: &Point3<f64>, direction: &Vector3<f64>) -> Option<f64> {
     let (ab, ac) = (b - a, c - a);
-    let across = way.cross(&ac);
+    let across = direction.cross(&ac);
     let volume = ab.dot(&across);
     let start = from - a;
     let v = start.dot(&across) / volume;
     let along = start.cross(&ab);
-    let w = way.dot(&along) / volume;
+    let w = direction.dot(&along) / volume;
     // a triangle seen edge-on has no volume: all of this is NaN or infinite, and outside
     (v >= 0.0 && w >= 0.0 && v + w <= 1.0).then(|| ac.dot(&along) / volume)
 }

@@ -45,7 +45,7 @@ const FACING: f64 = 0.4;
 const FACING_SHARE: f64 = 0.9;
 /// An opening is flat when it is within this many radii of a plane: then that has its axis …
 const FLAT: f64 = 0.03;
-/// … to this, rad; otherwise its shape tells.
+/// … to this, rad; otherwise its shape decides.
 const AXIS: f64 = 0.0087;
 /// Rounding of coordinates that were stored in single precision, in diagonals.
 const ROUNDING: f64 = 1e-6;

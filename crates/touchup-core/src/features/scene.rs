@@ -1,4 +1,4 @@
-//! A mesh parted into segments, and what can be asked of it.
+//! A mesh parted into segments, with queries.
 
 use nalgebra::{Point3, Vector3};
 
@@ -24,7 +24,7 @@ pub(super) struct Parted<'a> {
     pub edge: f64,
 }
 
-/// Directions in which the surroundings of an axis are looked at.
+/// Directions in which the surroundings of an axis are examined.
 const AROUND: usize = 24;
 /// A segment of less area than this is no neighbour worth naming, in squared diagonals.
 const LEAST_AREA: f64 = 1e-5;
@@ -71,26 +71,26 @@ impl<'a> Parted<'a> {
         (number != Segmentation::NONE).then_some(number as usize)
     }
 
-    /// The plane that most of some rings lie on which faces along `way`, and its share of them.
+    /// The plane that most of some rings lie on which faces along `direction`, and its share of them.
     ///
-    /// - `middle`, `radii`: of the rings, square to `way`, m
+    /// - `middle`, `radii`: of the rings, square to `direction`, m
     /// - `reach`: how far the plane may be, m
     pub fn plane_around(
         &self,
         around: &Surroundings,
         middle: &Point3<f64>,
-        way: &Vector3<f64>,
+        direction: &Vector3<f64>,
         radii: &[f64],
         reach: f64,
     ) -> Option<(usize, f64)> {
-        let [e, g] = tangent_basis(way);
+        let [e, g] = tangent_basis(direction);
         let mut votes: Vec<(usize, usize)> = Vec::new();
         for (i, radius) in (0..AROUND).flat_map(|i| radii.iter().map(move |radius| (i, radius))) {
             let (sine, cosine) = (std::f64::consts::TAU * i as f64 / AROUND as f64).sin_cos();
             let p = middle + (e * cosine + g * sine) * *radius;
             let Some(number) = self.segment_at(around, &p, reach) else { continue };
             let Primitive::Plane { normal, .. } = self.segment(number).primitive else { continue };
-            if normal.dot(way) < SQUARE {
+            if normal.dot(direction) < SQUARE {
                 continue;
             }
             match votes.iter_mut().find(|(other, _)| *other == number) {
@@ -103,9 +103,9 @@ impl<'a> Parted<'a> {
     }
 }
 
-/// How far from `from` along `way` a plane is met, m.
-pub(super) fn along_to_plane(primitive: &Primitive, from: &Point3<f64>, way: &Vector3<f64>) -> Option<f64> {
+/// How far from `from` along `direction` a plane is met, m.
+pub(super) fn along_to_plane(primitive: &Primitive, from: &Point3<f64>, direction: &Vector3<f64>) -> Option<f64> {
     let Primitive::Plane { point, normal } = primitive else { return None };
-    let t = (point - from).dot(normal) / way.dot(normal);
+    let t = (point - from).dot(normal) / direction.dot(normal);
     t.is_finite().then_some(t)
 }

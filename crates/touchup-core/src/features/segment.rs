@@ -56,7 +56,7 @@ impl Segmentation {
         number as usize
     }
 
-    /// Puts planes together that go on as one another.
+    /// Merges planes that continue each other.
     ///
     /// - `beside`: pairs of segments that meet, over seams too, the smaller number first.
     pub(super) fn join_planes(&mut self, facets: &Facets, beside: impl Iterator<Item = [u32; 2]>) {

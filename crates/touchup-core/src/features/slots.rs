@@ -44,7 +44,7 @@ pub(super) struct Slot {
 const PARALLEL: f64 = 0.9945;
 /// A land or a floor is square to the walls within 9°.
 const SQUARE: f64 = 0.15;
-/// Points of a wall from which it is looked across.
+/// Points of a wall from which rays are cast across.
 const SAMPLES: usize = 60;
 /// Share of the smaller wall that faces the other.
 const LEAST_SHARE: f64 = 0.2;
@@ -183,7 +183,7 @@ fn samples(parted: &Parted, number: usize) -> Vec<Point3<f64>> {
     points
 }
 
-/// Planes that fall away from one of the walls, square to both: around an opening. With the way out.
+/// Planes that fall away from one of the walls, square to both: around an opening. With the outward direction.
 fn lands(parted: &Parted, borders: &Borders, walls: [usize; 2], across: &Vector3<f64>) -> Vec<(usize, Vector3<f64>)> {
     let mut lands: Vec<(usize, Vector3<f64>)> = Vec::new();
     for (pair, border) in borders {
@@ -229,7 +229,7 @@ fn opened(parted: &Parted, of_face: &[u32], seen: &Opened) -> Option<Slot> {
     }
     let named = |face: crate::mesh::FaceId| of_face[face.0 as usize];
     let below = rays.first(&middle, &-out, reach);
-    let walls_end = |way: &Vector3<f64>| middles.iter().map(|p| (p - middle).dot(way)).fold(0.0, f64::max);
+    let walls_end = |along: &Vector3<f64>| middles.iter().map(|p| (p - middle).dot(along)).fold(0.0, f64::max);
     // a floor far below belongs to something else
     let deepest = walls_end(&-out) + 2.0 * width;
     let met = below.filter(|met| met.distance < deepest);
@@ -242,16 +242,17 @@ fn opened(parted: &Parted, of_face: &[u32], seen: &Opened) -> Option<Slot> {
     };
     let direction = out.cross(&across).normalize();
     let (mut ends, mut lengths, mut flat, mut is_aslant) = ([None; 2], [0.0; 2], 0, false);
-    for (at, way) in [direction, -direction].into_iter().enumerate() {
-        let met = rays.first(&middle, &way, reach).filter(|met| met.distance < walls_end(&way) + 1.5 * width);
-        lengths[at] = met.map_or_else(|| walls_end(&way), |met| met.distance);
+    for (at, along) in [direction, -direction].into_iter().enumerate() {
+        let met = rays.first(&middle, &along, reach).filter(|met| met.distance < walls_end(&along) + 1.5 * width);
+        lengths[at] = met.map_or_else(|| walls_end(&along), |met| met.distance);
         let number = met.map(|met| named(met.face)).filter(|&number| number != NONE).map(|number| number as usize);
-        let is_flat = number.is_some_and(|number| is_square(parted, number, &way));
+        let is_flat = number.is_some_and(|number| is_square(parted, number, &along));
         flat += usize::from(is_flat);
-        is_aslant |= number.is_some_and(|number| is_wall_aslant(parted, number, &way, &out));
+        is_aslant |= number.is_some_and(|number| is_wall_aslant(parted, number, &along, &out));
         // what only reaches there over a seam, as a floor does, is no end
         let met = number.filter(|&number| is_flat || is_round_end(parted, number, &out, width));
-        ends[at] = met.or_else(|| round_end_about(parted, &(middle + way * (lengths[at] - width / 2.0)), &out, width));
+        ends[at] =
+            met.or_else(|| round_end_about(parted, &(middle + along * (lengths[at] - width / 2.0)), &out, width));
     }
     let centre = middle + out * up + direction * ((lengths[0] - lengths[1]) / 2.0);
     Some(Slot {
@@ -272,18 +273,18 @@ fn opened(parted: &Parted, of_face: &[u32], seen: &Opened) -> Option<Slot> {
     })
 }
 
-/// Whether a segment is a plane square to `way`.
-fn is_square(parted: &Parted, number: usize, way: &Vector3<f64>) -> bool {
-    matches!(parted.segment(number).primitive, Primitive::Plane { normal, .. } if normal.dot(way).abs() > PARALLEL.powi(4))
+/// Whether a segment is a plane square to `along`.
+fn is_square(parted: &Parted, number: usize, along: &Vector3<f64>) -> bool {
+    matches!(parted.segment(number).primitive, Primitive::Plane { normal, .. } if normal.dot(along).abs() > PARALLEL.powi(4))
 }
 
-/// Whether a segment is an upright wall that `way` meets aslant.
-fn is_wall_aslant(parted: &Parted, number: usize, way: &Vector3<f64>, out: &Vector3<f64>) -> bool {
+/// Whether a segment is an upright wall that `along` meets aslant.
+fn is_wall_aslant(parted: &Parted, number: usize, along: &Vector3<f64>, out: &Vector3<f64>) -> bool {
     let Primitive::Plane { normal, .. } = parted.segment(number).primitive else { return false };
-    ASLANT.contains(&-normal.dot(way)) && normal.dot(out).abs() < SQUARE
+    ASLANT.contains(&-normal.dot(along)) && normal.dot(out).abs() < SQUARE
 }
 
-/// The half-round end about a point: where the wall was hardly touched it may be in pieces, and the line meet another.
+/// The half-round end about a point: where the wall has few touches it may be in pieces, and the line meet another.
 fn round_end_about(parted: &Parted, middle: &Point3<f64>, out: &Vector3<f64>, width: f64) -> Option<usize> {
     let is_there = |number: usize| match parted.segment(number).primitive {
         Primitive::Cylinder { point, axis, .. } => (middle - point).cross(&axis).norm() < ABOUT * width,

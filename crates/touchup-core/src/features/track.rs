@@ -1,6 +1,6 @@
 //! Features followed while they are touched: the same number for the same feature, and new touches in its numbers at once.
 //!
-//! [`Tracker::renew`] looks at the whole mesh; between two such looks [`Tracker::update`] takes new touches into the features
+//! [`Tracker::renew`] detects in the whole mesh; between two detections [`Tracker::update`] takes new touches into the features
 //! that they are on, and leaves all others as they are.
 
 use nalgebra::{Point3, Vector3};
@@ -16,10 +16,10 @@ use crate::stylus::ProbedPoint;
 #[derive(Clone, Debug, Default)]
 pub struct Tracker {
     features: Vec<Feature>,
-    /// share of the area that belonged to no primitive at the last look
+    /// share of the area that belonged to no primitive at the last detection
     unexplained: Option<f64>,
     next_id: u32,
-    /// touches that were looked at
+    /// touches that were examined
     seen: usize,
     /// stamp of the last of them, ns
     until_ns: Option<i64>,
@@ -33,7 +33,7 @@ const SAME_AXIS: f64 = 0.866;
 const NEAR_RADII: f64 = 0.15;
 /// … and its normal by no more than 40°.
 const ALIKE: f64 = 0.77;
-/// So many touches of a feature are fitted between two looks at the mesh, spread over all of them.
+/// So many touches of a feature are fitted between two detections, spread over all of them.
 const MOST_FITTED: usize = 240;
 /// Where the tip is no ball, this counts as its radius, m.
 const RADIUS: f64 = 1e-3;
@@ -49,7 +49,7 @@ impl Tracker {
         &self.features
     }
 
-    /// Looks at the whole mesh again; features that were known keep their ids.
+    /// Detects features in the whole mesh again; features that were known keep their ids.
     pub fn renew(&mut self, mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> &[Feature] {
         let Detection { mut features, unexplained } = detect(mesh, tree, touches);
         self.unexplained = Some(unexplained);
@@ -69,7 +69,7 @@ impl Tracker {
         self.until_ns = touches.last().map(|last| last.stamp_ns);
     }
 
-    /// Share of the mesh's area in which nothing was looked for, at the last look at the whole mesh; `None` before the first.
+    /// Share of the mesh's area left out of the last detection on the whole mesh; `None` before the first.
     pub fn unexplained(&self) -> Option<f64> {
         self.unexplained
     }
@@ -84,18 +84,18 @@ impl Tracker {
     /// those.
     ///
     /// - `touches`: all of them, as for [`Self::renew`]. When some that were there are gone, as after an undone stroke,
-    ///   nothing changes until the whole mesh is looked at again: features name touches by number.
+    ///   nothing changes until the next detection in the whole mesh: features name touches by number.
     pub fn update(&mut self, touches: &[ProbedPoint]) -> Vec<u32> {
         let last = self.seen.checked_sub(1).map(|last| touches.get(last).map(|touch| touch.stamp_ns));
         if last.unwrap_or_default() != self.until_ns {
             return Vec::new();
         }
-        let news = self.seen..touches.len();
+        let added = self.seen..touches.len();
         self.note(touches);
         let mut changed = Vec::new();
         for feature in &mut self.features {
             let is_on = |&number: &usize| is_on(feature, &touches[number]);
-            let new: Vec<u32> = news.clone().filter(is_on).map(|number| number as u32).collect();
+            let new: Vec<u32> = added.clone().filter(is_on).map(|number| number as u32).collect();
             if !new.is_empty() && feature.take(&new, touches) {
                 changed.push(feature.id);
             }
@@ -133,7 +133,7 @@ fn is_on(feature: &Feature, touch: &ProbedPoint) -> bool {
     let Some(axis) = feature.axis.as_ref().filter(|_| !touch.is_rejected) else { return false };
     let height = feature.depth.as_ref().map_or(0.0, |depth| depth.value);
     let along = (touch.point - feature.centre.value).dot(&axis.value);
-    // a hole lies below its opening, a boss stands on its foot
+    // a hole lies below its opening, a boss rises from its foot
     let is_between = match feature.kind {
         Kind::Boss => along > 0.0 && along < height + reach,
         _ => along < 0.0 && along > -height - reach,
@@ -212,7 +212,7 @@ impl Feature {
         let start = found.surface.center();
         let direction = found.surface.direction();
         let off = self.centre.value - start;
-        // along the slot only what ends it tells where it is
+        // along the slot only its ends determine its position
         let along = if found.std(Freedom::X).is_some() { 0.0 } else { off.dot(&direction) };
         let value = start + axis * off.dot(&axis) + direction * along;
         self.centre = Measured { value, std: middle_std(found), touches: touches.clone() };
@@ -220,12 +220,12 @@ impl Feature {
         self.surface = SizedSurface::Slot(found.surface.clone());
     }
 
-    /// A direction turned the way the axis goes.
-    fn turned(&self, way: Vector3<f64>) -> Vector3<f64> {
-        let before = self.axis.as_ref().map_or(way, |axis| axis.value);
-        if way.dot(&before) < 0.0 { -way } else { way }
+    /// A direction with the sign of the axis.
+    fn turned(&self, direction: Vector3<f64>) -> Vector3<f64> {
+        let before = self.axis.as_ref().map_or(direction, |axis| axis.value);
+        if direction.dot(&before) < 0.0 { -direction } else { direction }
     }
 }
 
-/// How well the axis is known from the last look at the mesh, rad: 1°, so that touches at one height are enough.
+/// How well the axis is known from the last detection, rad: 1°, so that touches at one height are enough.
 const AXIS_KNOWN: f64 = 0.0175;

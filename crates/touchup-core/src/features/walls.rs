@@ -1,4 +1,4 @@
-//! Round walls: the segments on one cylinder, or one cone, put together.
+//! Round walls: the segments on one cylinder, or one cone, merged.
 
 use nalgebra::{Point3, Vector3};
 
@@ -7,7 +7,7 @@ use super::primitive::{Primitive, Side};
 use super::segment::Segmentation;
 use crate::numeric::{median, tangent_basis};
 
-/// What is left of a round wall.
+/// A round wall, perhaps interrupted.
 #[derive(Clone, Debug)]
 pub(super) struct Wall {
     /// of its largest segment
@@ -146,7 +146,7 @@ impl Wall {
         }
     }
 
-    /// m; of a cone half way.
+    /// m; of a cone at mid-height.
     pub fn radius(&self) -> f64 {
         match self.primitive {
             Primitive::Cylinder { radius, .. } => radius,

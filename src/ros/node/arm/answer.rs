@@ -51,7 +51,7 @@ pub fn planned(target: &ProbeTarget, plan: &Plan) -> ProbeResult {
         0 => {
             let slides =
                 if plan.slides.is_empty() { String::new() } else { format!(" and {} slides", plan.slides.len()) };
-            (ProbeResult::PLANNED, format!("{} touches{slides} planned; the path is published", plan.wishes.len()))
+            (ProbeResult::PLANNED, format!("{} touches{slides} planned; the path is published", plan.touches.len()))
         }
         _ => (ProbeResult::OUT_OF_LIMITS, held_back.collect::<Vec<_>>().join("; ")),
     };
@@ -185,8 +185,8 @@ fn stopped(error: &ProbeError) -> u8 {
         },
         ProbeError::Limit { error: LimitError::Force { .. }, .. } => ProbeResult::FORCE_OVER_LIMIT,
         ProbeError::Limit { .. } => ProbeResult::LIMIT_OVERRUN,
-        ProbeError::InTheWay { is_link: true, .. } => ProbeResult::UNEXPECTED_CONTACT,
-        ProbeError::InTheWay { .. } => ProbeResult::EARLY_CONTACT,
+        ProbeError::Obstacle { is_link: true, .. } => ProbeResult::UNEXPECTED_CONTACT,
+        ProbeError::Obstacle { .. } => ProbeResult::EARLY_CONTACT,
         ProbeError::LowRate { .. } => ProbeResult::DATA_LOST,
         ProbeError::TooLong { .. } => ProbeResult::FAULT,
         ProbeError::Cancelled { .. } => ProbeResult::CANCELLED,
@@ -202,7 +202,7 @@ fn touch_of(
     offset_ns: i64,
 ) -> (Time, ProbeTouch) {
     let radius = params.pattern.ball_radius;
-    let approach = touch.wish.direction.into_inner();
+    let approach = touch.planned.direction.into_inner();
     let base = ProbeTouch {
         index: index as u32,
         verdict: ProbeTouch::HELD_BACK,
@@ -235,11 +235,11 @@ fn touch_of(
             (time(measured_ns + offset_ns), touch)
         }
         (TouchOutcome::Miss { travel }, _) => {
-            let end = touch.wish.from + approach * *travel;
+            let end = touch.planned.from + approach * *travel;
             (time(record.stamps_ns[1] + offset_ns), ProbeTouch { pose: pose_at(&end, &pose_ot), ..with })
         }
         _ => {
-            let touch = ProbeTouch { pose: pose_at(&touch.wish.from, &pose_ot), ..with };
+            let touch = ProbeTouch { pose: pose_at(&touch.planned.from, &pose_ot), ..with };
             (time(record.stamps_ns[1] + offset_ns), touch)
         }
     }

@@ -122,7 +122,7 @@ impl Common {
         match (&seen.fault, &seen.stop, seen.last.map(|state| state.safety)) {
             (Some(error), ..) => Err(error.clone()),
             (None, _, Some(safety)) if safety != Safety::Normal => Err(safety.to_string()),
-            (None, Some(stop), _) => Err(format!("the arm stands since this: {stop}; look, then call ~/recover")),
+            (None, Some(stop), _) => Err(format!("the arm is stopped since this: {stop}; look, then call ~/recover")),
             (None, None, Some(_)) => Ok(()),
             (None, None, None) => Err("nothing has come from the arm yet".to_owned()),
         }

@@ -17,7 +17,7 @@ use super::world::{ArmWorld, ask_mesh, publish};
 use crate::io::probed_touches_file::append_probed_touches;
 use crate::mesh::TriMesh;
 use crate::probing::arm::Arm;
-use crate::probing::execute::{Cell, Ending, Flag, Phase, ProbeParams, Prober, StillWorld, plan};
+use crate::probing::execute::{Cell, Ending, Flag, Phase, ProbeParams, Prober, StaticWorld, plan};
 use crate::ros::messages::{
     Header, Path as PathMsg, ProbeFeatureRequest, ProbeFeatureResponse, ProbeGoal, ProbeResponse, ProbeResult,
     ProbeSettings, TriggerResponse,
@@ -443,7 +443,7 @@ impl ArmWorker {
     /// What is around the arm while it probes feature `number` of `count`.
     fn world<'a>(
         &'a self,
-        still: StillWorld,
+        still: StaticWorld,
         watched: Option<GoalWatcher<'a>>,
         [number, count]: [usize; 2],
     ) -> ArmWorld<'a> {

@@ -11,8 +11,8 @@ use nalgebra::{Isometry3, Point3};
 use super::common::Common;
 use crate::clock::Clock;
 use crate::mesh::{FaceHit, TriMesh};
-use crate::probing::arm::{ArmState, Witness};
-use crate::probing::execute::{Phase, Progress, StillWorld, World};
+use crate::probing::arm::{ArmState, Observer};
+use crate::probing::execute::{Phase, Progress, StaticWorld, World};
 use crate::ros::messages::{PoseStamped, ProbeFeedback};
 use crate::ros::node::convert::{as_pose, as_wrench};
 use crate::ros::node::replica::MeshReplica;
@@ -29,7 +29,7 @@ const COPY_WAIT: Duration = Duration::from_secs(15);
 pub fn ask_mesh<T: Send + 'static>(
     clock: &Clock,
     mesh: &MeshReplica,
-    make_of: impl FnOnce(StillWorld) -> T + Send + 'static,
+    make_of: impl FnOnce(StaticWorld) -> T + Send + 'static,
 ) -> Receiver<T> {
     let (to, ready) = sync_channel(1);
     let snapshot = mesh.complete();
@@ -39,7 +39,7 @@ pub fn ask_mesh<T: Send + 'static>(
         let mesh = clock.recv_timeout(&snapshot, COPY_WAIT).ok().and_then(|snapshot| snapshot.mesh().ok());
         if let Some(mesh) = mesh {
             // who asked may have gone
-            let _ = to.send(make_of(StillWorld::new(mesh)));
+            let _ = to.send(make_of(StaticWorld::new(mesh)));
         }
         drop(working);
     };
@@ -60,9 +60,9 @@ pub fn publish(samples: &dyn SamplePort, base: &str, tool: &str, state: &ArmStat
 /// The world during one probing.
 pub struct ArmWorld<'a> {
     pub clock: &'a Clock,
-    pub still: StillWorld,
+    pub still: StaticWorld,
     /// as it will be
-    pub next: Option<Receiver<StillWorld>>,
+    pub next: Option<Receiver<StaticWorld>>,
     pub mesh: &'a MeshReplica,
     pub samples: &'a dyn SamplePort,
     pub base: &'a str,
@@ -127,8 +127,8 @@ impl<'a> ArmWorld<'a> {
     }
 }
 
-impl Witness for ArmWorld<'_> {
-    fn see(&mut self, state: &ArmState) {
+impl Observer for ArmWorld<'_> {
+    fn on_state(&mut self, state: &ArmState) {
         self.last = Some(*state);
         self.common.see(state);
         publish(self.samples, self.base, self.tool, state, self.offset_ns);
@@ -151,7 +151,7 @@ impl World for ArmWorld<'_> {
         self.still.closest_face(place, reach)
     }
 
-    fn tell(&mut self, progress: &Progress) {
+    fn publish(&mut self, progress: &Progress) {
         self.renew();
         self.progress = Some(*progress);
         self.send_feedback();

@@ -5,8 +5,8 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use touchup::features::{Feature, Kind, Measured};
 use touchup::probing::arm::{
-    Arm, ArmError, ArmState, Command, LimitError, Limits, Narrower, OnsetVerdict, ProbeError, Safety, TouchOutcome,
-    TouchParams, TouchRecord, TouchTarget, UrGeometry, Watched, Witness,
+    Arm, ArmError, ArmState, Command, LimitError, Limits, Narrower, Observer, OnsetVerdict, ProbeError, Safety,
+    TouchOutcome, TouchParams, TouchRecord, TouchTarget, UrGeometry, Watched,
 };
 use touchup::probing::plan::{ExploreError, Explorer, PatternParams, TouchResult};
 use touchup::sim::{ArmFault, ArmParams, Plate, SimArm};
@@ -25,8 +25,8 @@ const HOLE: ([f64; 2], f64) = ([16e-3, 36e-3], 4e-3);
 /// Looks on.
 struct Onlooker;
 
-impl Witness for Onlooker {
-    fn see(&mut self, _: &ArmState) {}
+impl Observer for Onlooker {
+    fn on_state(&mut self, _: &ArmState) {}
 }
 
 fn limits() -> Limits {
@@ -123,7 +123,7 @@ fn explored(arm: &mut SimArm, params: &ArmParams, touching: &TouchParams, search
     watched.zero().unwrap();
     let pose = |place: &Point3<f64>| at(params, (*place).into());
     let (mut from, mut peak) = (None, 0.0f64);
-    while let Some(planned) = search.wish() {
+    while let Some(planned) = search.next_touch() {
         // up where it is, over, down
         if let Some(out) = from {
             watched.line("going up", &pose(&out), touching.link_speed, touching, 5.0).unwrap();
@@ -139,7 +139,7 @@ fn explored(arm: &mut SimArm, params: &ArmParams, touching: &TouchParams, search
         from = Some(planned.entry);
         let record = match watched.touch(&target, touching) {
             Ok(record) => record,
-            Err(ProbeError::InTheWay { .. }) => {
+            Err(ProbeError::Obstacle { .. }) => {
                 search.take(&TouchResult::Unclear);
                 continue;
             }
@@ -225,7 +225,7 @@ fn an_obstacle_stops_it() {
     let mut arm = SimArm::new(&plate, params, &at(&params, [45e-3, 8e-3, 20e-3])).unwrap();
     let inside = down(&params, [45e-3, 8e-3, TOP - 3e-3]);
     let error = touched(&mut arm, &TouchParams { link_speed: 10e-3, ..TouchParams::default() }, &inside).unwrap_err();
-    let ProbeError::InTheWay { place_mm, force_n, .. } = error else { panic!("{error}") };
+    let ProbeError::Obstacle { place_mm, force_n, .. } = error else { panic!("{error}") };
     let expected = (params.pose_bo * Point3::new(45e-3, 8e-3, TOP + params.radius)) * 1e3;
     assert!((place_mm[2] - expected.z).abs() < 0.5 && force_n > 1.0, "{place_mm:?}, {force_n} N");
     arm.advance(0.3);
@@ -270,8 +270,8 @@ struct Impatient {
     seen: usize,
 }
 
-impl Witness for Impatient {
-    fn see(&mut self, _: &ArmState) {
+impl Observer for Impatient {
+    fn on_state(&mut self, _: &ArmState) {
         self.seen += 1;
     }
 

@@ -9,7 +9,7 @@ use rand_pcg::Pcg64;
 use touchup::features::Kind;
 use touchup::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
 use touchup::mesh::{FaceHit, FaceTree, TriMesh};
-use touchup::probing::arm::{Arm, ArmState, Limits, ProbeError, Safety, TouchParams, UrGeometry, Witness};
+use touchup::probing::arm::{Arm, ArmState, Limits, Observer, ProbeError, Safety, TouchParams, UrGeometry};
 use touchup::probing::execute::{
     Cell, Ending, Flag, ProbeParams, Probed, Prober, Progress, Tool, World, plan, turning_place,
 };
@@ -37,8 +37,8 @@ impl StaticScan {
     }
 }
 
-impl Witness for StaticScan {
-    fn see(&mut self, state: &ArmState) {
+impl Observer for StaticScan {
+    fn on_state(&mut self, state: &ArmState) {
         self.seen += 1;
         if state.wrench_b.force.norm() > 2.0
             && let Some(after) = self.after.take()
@@ -67,7 +67,7 @@ impl World for StaticScan {
         self.tree.closest(&self.mesh, place, reach)
     }
 
-    fn tell(&mut self, progress: &Progress) {
+    fn publish(&mut self, progress: &Progress) {
         self.touches.push(progress.touch);
     }
 }
@@ -244,15 +244,15 @@ struct Turning {
     nearest: f64,
 }
 
-impl Witness for Turning {
-    fn see(&mut self, state: &ArmState) {
+impl Observer for Turning {
+    fn on_state(&mut self, state: &ArmState) {
         let rotation = state.pose_bt.rotation;
         let turned = self.before.replace(rotation).map_or(0.0, |before| before.angle_to(&rotation));
         self.fastest = self.fastest.max(turned / 2e-3);
         let (ball, shaft) = (self.cell.place(&state.pose_bt), self.cell.shaft(&rotation));
         let along = (3..60).map(|mm| self.plate.signed_distance(&(ball + shaft.into_inner() * (f64::from(mm) * 1e-3))));
         self.nearest = along.fold(self.nearest, f64::min);
-        self.scan.see(state);
+        self.scan.on_state(state);
     }
 }
 
@@ -265,8 +265,8 @@ impl World for Turning {
         self.scan.closest_face(place, reach)
     }
 
-    fn tell(&mut self, progress: &Progress) {
-        self.scan.tell(progress);
+    fn publish(&mut self, progress: &Progress) {
+        self.scan.publish(progress);
     }
 }
 
@@ -359,7 +359,7 @@ fn a_dry_run_moves_nothing() {
     let now = arm.next_state().unwrap();
     let world = StaticScan::new(plate_scan());
     let planned = plan(&cell, &params(), &world, &HOLE, &now).unwrap();
-    assert!(!planned.wishes.is_empty() && planned.held_back.is_empty(), "{:?}", planned.held_back);
+    assert!(!planned.touches.is_empty() && planned.held_back.is_empty(), "{:?}", planned.held_back);
     assert_eq!(arm.at_rest_since(), 0.0);
 }
 
@@ -499,7 +499,7 @@ fn no_plan_leaves_the_limits_or_passes_through_the_mesh() {
             let flag = Flag { id: 1, kind, place, radius: 4e-3 };
             let planned = plan(&cell, &params, &world, &flag, &now).unwrap();
             moves.plans += 1;
-            for (number, planned_touch) in planned.wishes.iter().enumerate() {
+            for (number, planned_touch) in planned.touches.iter().enumerate() {
                 if planned.held_back.iter().any(|(at, _)| *at == number) {
                     continue;
                 }

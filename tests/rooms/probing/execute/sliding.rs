@@ -4,10 +4,10 @@ use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use touchup::features::Kind;
 use touchup::mesh::{FaceHit, TriMesh};
 use touchup::probing::arm::{
-    Arm, ArmState, Limits, SlideEnding, SlideRecord, SlideStation, SlideTarget, TouchParams, Watched, Witness,
+    Arm, ArmState, Limits, Observer, SlideEnding, SlideRecord, SlideStation, SlideTarget, TouchParams, Watched,
 };
 use touchup::probing::execute::{
-    Cell, Ending, Flag, Phase, ProbeParams, Probed, Prober, Progress, StillWorld, Tool, World, plan,
+    Cell, Ending, Flag, Phase, ProbeParams, Probed, Prober, Progress, StaticWorld, Tool, World, plan,
 };
 use touchup::probing::plan::{PatternParams, Slide};
 use touchup::sim::{ArmParams, Plate, ScannerParams, SimArm, Surface, scan};
@@ -33,8 +33,8 @@ fn flag(kind: Option<Kind>, [x, y, z]: [f64; 3], radius: f64) -> Flag {
     Flag { id: 1, kind, place: Point3::new(x, y, z), radius }
 }
 
-fn world() -> StillWorld {
-    StillWorld::new(scan(&Plate::default(), &ScannerParams::default()).unwrap())
+fn world() -> StaticWorld {
+    StaticWorld::new(scan(&Plate::default(), &ScannerParams::default()).unwrap())
 }
 
 fn start() -> Isometry3<f64> {
@@ -147,8 +147,8 @@ fn slid(from: [f64; 2], to: [f64; 2], height: f64) -> (SlideRecord, Point3<f64>,
 
 struct Onlooker;
 
-impl Witness for Onlooker {
-    fn see(&mut self, _: &ArmState) {}
+impl Observer for Onlooker {
+    fn on_state(&mut self, _: &ArmState) {}
 }
 
 /// The plate ends at x = 0.
@@ -179,13 +179,13 @@ fn where_no_surface_is_nothing_is_slid_over() {
 
 /// Wants it to end after some states of a slide.
 struct Impatient {
-    inner: StillWorld,
+    inner: StaticWorld,
     is_sliding: bool,
     seen: usize,
 }
 
-impl Witness for Impatient {
-    fn see(&mut self, _: &ArmState) {
+impl Observer for Impatient {
+    fn on_state(&mut self, _: &ArmState) {
         self.seen += usize::from(self.is_sliding);
     }
 
@@ -203,7 +203,7 @@ impl World for Impatient {
         self.inner.closest_face(place, reach)
     }
 
-    fn tell(&mut self, _: &Progress) {}
+    fn publish(&mut self, _: &Progress) {}
 
     fn enter(&mut self, phase: Phase) {
         self.is_sliding |= phase == Phase::Slide;
@@ -235,5 +235,5 @@ fn slides_are_planned_and_checked() {
     let lowest = Point3::new(-0.6, -0.3, floor);
     let narrow = ProbeParams { limits: Limits { lowest, ..params.limits.clone() }, ..params };
     let planned = plan(&cell, &narrow, &world(), &flag, &now).unwrap();
-    assert!(planned.held_back.len() >= planned.wishes.len().max(1), "{:?}", planned.held_back);
+    assert!(planned.held_back.len() >= planned.touches.len().max(1), "{:?}", planned.held_back);
 }

@@ -47,17 +47,17 @@ pub struct Surfaces<'a> {
 pub struct Alternative {
     /// Moves the source onto the target.
     pub source_to_target: Isometry3<f64>,
-    /// Features that it brings together: numbers in the lists of source and target.
+    /// Matched features: numbers in the lists of source and target.
     pub explained: Vec<[usize; 2]>,
-    /// Share of the points that lie on the target, within three times the tolerance, and face the same way; `None` without
+    /// Share of the points that lie on the target, within three times the tolerance, with normals alike; `None` without
     /// surfaces.
     pub agreeing: Option<f64>,
-    /// How the surfaces fit; `None` without surfaces, or where they came to no rest.
+    /// How the surfaces fit; `None` without surfaces, or where the fit did not converge.
     pub icp: Option<IcpFit>,
     /// Against the first alternative: rotation vector, rad, and shift of the middle of the features, m; in the frame of the
     /// target.
     pub differs: [Vector3<f64>; 2],
 }
 
-/// Two motions are one when they bring features no farther apart than so many tolerances.
+/// Two motions are one when they move features no farther apart than so many tolerances.
 pub(super) const SAME: f64 = 2.0;

@@ -1,4 +1,4 @@
-//! Small sets of features that tell a motion: a frame each, and what of it a rigid motion leaves as it is.
+//! Small sets of features that determine a motion: for each a frame and its invariants under rigid motions.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 
@@ -24,7 +24,7 @@ enum SetClass {
 #[derive(Clone, Debug)]
 pub(super) struct Base {
     class: SetClass,
-    /// lengths, m: the first is what it is looked up by
+    /// lengths, m: the first is the search key
     lengths: [f64; 2],
     /// cosines and volumes of directions
     cosines: [f64; 4],
@@ -36,7 +36,7 @@ pub(super) struct Base {
 
 /// Sine of the least angle between two directions that make a frame: 15°.
 const LEAST_SINE: f64 = 0.26;
-/// Cosines of the same set differ by no more than this: 4° where it tells most.
+/// Cosines of the same set differ by no more than this: 4° where it is most sensitive.
 const COSINES: f64 = 0.07;
 /// Features with a place and an axis that make pairs, at most; the first of the list, which are the largest of their kind.
 const MOST_LOCATED: usize = 150;
@@ -52,8 +52,8 @@ fn frame(first: &Vector3<f64>, second: &Vector3<f64>) -> Option<Matrix3<f64>> {
 
 /// All sets.
 ///
-/// - `all_ways`: also from the other end of what goes through, and each turn of a corner: of one side of a match alone.
-pub(super) fn bases(landmarks: &[Landmark], all_ways: bool) -> Vec<Base> {
+/// - `all_frames`: also from the other end of what goes through, and each turn of a corner: of one side of a match alone.
+pub(super) fn bases(landmarks: &[Landmark], all_frames: bool) -> Vec<Base> {
     let located = landmarks.iter().enumerate().filter(|(_, landmark)| landmark.is_located()).take(MOST_LOCATED);
     let ends: Vec<(usize, Landmark)> =
         located.flat_map(|(at, landmark)| landmark.ends().map(move |end| (at, end))).collect();
@@ -63,11 +63,11 @@ pub(super) fn bases(landmarks: &[Landmark], all_ways: bool) -> Vec<Base> {
         let planes = landmarks.iter().filter(|landmark| landmark.kind == Kind::Plane);
         bases.extend(planes.filter_map(|plane| beside(*i, first, plane)));
         bases.extend(slot(*i, first, 1.0));
-        bases.extend(slot(*i, first, -1.0).filter(|_| all_ways));
+        bases.extend(slot(*i, first, -1.0).filter(|_| all_frames));
     }
     for (at, landmark) in landmarks.iter().enumerate() {
-        let ways = if all_ways { 3 } else { 1 };
-        bases.extend((0..ways).filter_map(|way| corner(at, landmark, way)));
+        let turns = if all_frames { 3 } else { 1 };
+        bases.extend((0..turns).filter_map(|turn| corner(at, landmark, turn)));
     }
     bases
 }
@@ -75,13 +75,13 @@ pub(super) fn bases(landmarks: &[Landmark], all_ways: bool) -> Vec<Base> {
 fn pair(of: [usize; 2], first: &Landmark, second: &Landmark) -> Option<Base> {
     let (a, b) = (first.axis?, second.axis?);
     let between = second.place - first.place;
-    let way = between.try_normalize(0.0)?;
-    // the way from one to the other is known best
-    let axes = frame(&way, &a).or_else(|| frame(&way, &b))?;
+    let direction = between.try_normalize(0.0)?;
+    // the displacement from one to the other is known best
+    let axes = frame(&direction, &a).or_else(|| frame(&direction, &b))?;
     Some(Base {
         class: SetClass::Pair(first.class(), second.class()),
         lengths: [between.norm(), 0.0],
-        cosines: [a.dot(&way), b.dot(&way), a.dot(&b), a.cross(&b).dot(&way)],
+        cosines: [a.dot(&direction), b.dot(&direction), a.dot(&b), a.cross(&b).dot(&direction)],
         origin: first.place,
         axes,
         of,
@@ -112,9 +112,9 @@ fn slot(at: usize, landmark: &Landmark, sign: f64) -> Option<Base> {
     })
 }
 
-fn corner(at: usize, landmark: &Landmark, way: usize) -> Option<Base> {
+fn corner(at: usize, landmark: &Landmark, turn: usize) -> Option<Base> {
     let normals = landmark.normals?;
-    let [a, b, c] = [0, 1, 2].map(|i| normals[(way + i) % 3]);
+    let [a, b, c] = [0, 1, 2].map(|i| normals[(turn + i) % 3]);
     Some(Base {
         class: SetClass::Corner,
         lengths: [0.0; 2],
@@ -127,12 +127,12 @@ fn corner(at: usize, landmark: &Landmark, way: usize) -> Option<Base> {
 
 /// Sets that leave the turn about an axis open, each with one turn of many.
 ///
-/// - `all_ways`: as in [`bases`].
-pub(super) fn axial_bases(landmarks: &[Landmark], all_ways: bool) -> Vec<Base> {
+/// - `all_frames`: as in [`bases`].
+pub(super) fn axial_bases(landmarks: &[Landmark], all_frames: bool) -> Vec<Base> {
     let located = landmarks.iter().enumerate().filter(|(_, landmark)| landmark.is_located()).take(MOST_LOCATED);
     let mut found = Vec::new();
     for (at, landmark) in located {
-        for end in landmark.ends().take(if all_ways { 2 } else { 1 }) {
+        for end in landmark.ends().take(if all_frames { 2 } else { 1 }) {
             let others = landmarks.iter().enumerate().filter(|(other, _)| *other != at);
             found.extend(others.filter_map(|(other, second)| about([at, other], &end, second)));
         }
@@ -157,7 +157,7 @@ fn about(of: [usize; 2], first: &Landmark, second: &Landmark) -> Option<Base> {
 }
 
 impl Base {
-    /// The motion that brings this onto `other`.
+    /// The motion that maps this onto `other`.
     pub fn onto(&self, other: &Self) -> Isometry3<f64> {
         let turn = Rotation3::from_matrix_unchecked(other.axes * self.axes.transpose());
         let mut turn = UnitQuaternion::from_rotation_matrix(&turn);

@@ -1,4 +1,4 @@
-//! Why features tell no motion, or more than one.
+//! Why features determine no motion, or more than one.
 
 use std::fmt;
 
@@ -27,7 +27,7 @@ impl fmt::Display for FeaturesSide {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FeaturesError {
     /// Nothing was found on one side.
-    #[error("no features were found on the {side}: {OTHER_WAYS}")]
+    #[error("no features were found on the {side}: {OTHER_METHODS}")]
     NoFeatures {
         /// which
         side: FeaturesSide,
@@ -35,7 +35,7 @@ pub enum FeaturesError {
     /// What was found leaves a turn or a shift open.
     #[error(
         "the {found} features of the {side} leave a turn or a shift open; two holes or slots, one and a plane beside it, or a \
-         corner of three planes would tell it: touch one more, or {OTHER_WAYS}"
+         corner of three planes would fix it: touch one more, or {OTHER_METHODS}"
     )]
     TooFew {
         /// which
@@ -43,10 +43,10 @@ pub enum FeaturesError {
         /// how many there are
         found: usize,
     },
-    /// No motion brings enough together.
+    /// No motion matches enough features.
     #[error(
         "no motion brings the mesh onto the truth: the best explains {explained} of {of} features{}: are both the same part \
-         and in the same unit? If so, {OTHER_WAYS}",
+         and in the same unit? If so, {OTHER_METHODS}",
         agreeing.map_or_else(String::new, |share| format!(" and {:.0} % of the surface", share * 100.0))
     )]
     NoMatch {
@@ -73,22 +73,22 @@ pub enum FeaturesError {
     /// A part of revolution: a continuum of motions.
     #[error(
         "the part is free to turn about the axis ({:.3}, {:.3}, {:.3}) through ({:.2}, {:.2}, {:.2}) mm: neither its features \
-         nor its surface tell the turn; {OTHER_WAYS}",
+         nor its surface fix the turn; {OTHER_METHODS}",
         .turn.axis.x, .turn.axis.y, .turn.axis.z,
         .turn.through.x * 1e3, .turn.through.y * 1e3, .turn.through.z * 1e3
     )]
     FreeTurn {
         /// about which axis
         turn: FreeTurn,
-        /// one motion for each way of laying the axis onto the other, the best first, each with one turn of all
+        /// one motion for each orientation of the axis on the other, the best first, each with one turn of all
         alternatives: Vec<Alternative>,
     },
     /// Several motions are about as good: a symmetric part, or too little of it was seen.
-    #[error("{} motions explain the mesh about equally well: the part is symmetric, or what tells them apart was not seen", .alternatives.len())]
+    #[error("{} motions explain the mesh about equally well: the part is symmetric, or what distinguishes them was not scanned", .alternatives.len())]
     Ambiguous {
         /// all of them, the best first
         alternatives: Vec<Alternative>,
     },
 }
 
-const OTHER_WAYS: &str = "pick pairs of points (pairs), or bring it roughly into place (icp)";
+const OTHER_METHODS: &str = "pick pairs of points (pairs), or bring it roughly into place (icp)";

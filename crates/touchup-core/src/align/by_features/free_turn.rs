@@ -1,4 +1,4 @@
-//! Parts of revolution: features about one axis tell no turn about it.
+//! Parts of revolution: features about one axis do not fix the turn about it.
 
 use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 
@@ -7,7 +7,7 @@ use super::judge::{Judge, Judged};
 use super::landmark::{ALIKE, Landmark};
 use crate::features::Kind;
 
-/// A turn that nothing holds.
+/// An undetermined turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FreeTurn {
     /// unit direction, in the frame of the target
@@ -23,7 +23,7 @@ const STEP: f64 = 2.399_963_229_728_653;
 
 impl Judge<'_> {
     /// The axis about which a motion may be turned and explains as much: all features that it explains lie about it, and so
-    /// does the surface where that is at hand.
+    /// does the surface where it is given.
     pub(super) fn free_turn(&self, best: &Judged) -> Option<FreeTurn> {
         let explained: Vec<&Landmark> = best.explained().map(|[_, theirs]| &self.matching.target[theirs]).collect();
         let turn = axis_of(&explained, self.matching.tolerance)?;
@@ -36,19 +36,19 @@ impl FreeTurn {
     /// Those of the motions that are no such turn of one before.
     ///
     /// - `near`: by how much a turn may move the axis, m
-    pub(super) fn ways(&self, alternatives: Vec<Alternative>, near: f64) -> Vec<Alternative> {
-        let mut ways: Vec<Alternative> = Vec::new();
+    pub(super) fn distinct(&self, alternatives: Vec<Alternative>, near: f64) -> Vec<Alternative> {
+        let mut distinct: Vec<Alternative> = Vec::new();
         for alternative in alternatives {
             let is_turn_of = |other: &Alternative| {
                 let between = alternative.source_to_target * other.source_to_target.inverse();
                 let is_along = (between * self.axis).dot(&self.axis) >= ALIKE;
                 is_along && (between * self.through - self.through).norm() <= near
             };
-            if !ways.iter().any(is_turn_of) {
-                ways.push(alternative);
+            if !distinct.iter().any(is_turn_of) {
+                distinct.push(alternative);
             }
         }
-        ways
+        distinct
     }
 
     fn by(&self, angle: f64) -> Isometry3<f64> {

@@ -8,17 +8,17 @@ use crate::align::icp::{IcpFit, IcpParams, icp};
 use crate::mesh::Alone;
 use crate::numeric::median;
 
-/// Points that bring each motion to rest, at most; all judge it, and bring the last ones to rest.
+/// Points that refine each motion, at most; all judge it, and refine the last ones.
 const MOST_POINTS: usize = 5_000;
 /// Points farther than so many tolerances have no part in a fit: lids on holes, what is not there.
 const REACH: f64 = 5.0;
 /// A point agrees within so many scatters of the best fit.
 const SCATTERS: f64 = 4.0;
-/// … or this share of a tolerance: below it nothing is told apart.
+/// … or this share of a tolerance: below it nothing is distinguished.
 const LEAST_NEAR: f64 = 0.05;
-/// Cosine between normals that face the same way: 45°, as noise turns the small faces of a scan.
+/// Cosine between normals that count as alike: 45°, as noise turns the small faces of a scan.
 const FACING: f64 = 0.7;
-/// A point belongs to the target at all within so many tolerances: a scan that is noisy and too fat still does.
+/// A point belongs to the target at all within so many tolerances: a noisy scan that is offset outward does too.
 const COARSE: f64 = 1.5;
 /// What a motion explains alone outweighs so many times what the other explains alone.
 const CLEARLY: f64 = 3.0;
@@ -27,7 +27,7 @@ const POINTS: f64 = 8.0;
 /// … and over the points that the better motion leaves over: where it fits all but the noise, noise decides nothing.
 const LEFT_OVER: f64 = 0.05;
 /// Share of the points that a part of revolution may lose when it is turned: at the rim of its ends, where facets of one turn
-/// stand proud of those of another.
+/// lie above those of another.
 const AT_RIMS: f64 = 0.003;
 /// Weight of features that decides: one opening, or what else is as much.
 const FEATURES: f64 = 1.0;
@@ -43,13 +43,13 @@ pub(super) struct Judged {
     fit: Option<IcpFit>,
     /// of each feature of the source: its best partner, and how far that is off over what it may be
     partners: Vec<Option<(usize, f64)>>,
-    /// of each point: how far it is from the target that faces the same way, m; infinite beyond the coarse bound. Empty
+    /// of each point: how far it is from the target with a normal alike, m; infinite beyond the coarse bound. Empty
     /// without surfaces
     distances: Vec<f64>,
 }
 
 impl Judged {
-    /// Features that are brought together: of the source, of the target.
+    /// Matched features: of the source, of the target.
     pub fn explained(&self) -> impl Iterator<Item = [usize; 2]> + '_ {
         let is_there = |(own, partner): (usize, &Option<(usize, f64)>)| {
             partner.filter(|(_, misfit)| *misfit <= 1.0).map(|(theirs, _)| [own, theirs])
@@ -96,27 +96,27 @@ impl<'a> Judge<'a> {
         Self { matching, surfaces, points }
     }
 
-    /// Brings each motion to rest and judges it; the best first, no two alike.
+    /// Refines each motion and judges it; the best first, no two alike.
     pub fn all(&self, motions: &[Isometry3<f64>]) -> Vec<Judged> {
         let step = self.points.len().div_ceil(MOST_POINTS).max(1);
         let points: Vec<Point3<f64>> = self.points.iter().step_by(step).map(|p| p.point).collect();
-        let mut rested: Vec<(Isometry3<f64>, Option<IcpFit>)> = Vec::new();
+        let mut refined: Vec<(Isometry3<f64>, Option<IcpFit>)> = Vec::new();
         for coarse in motions {
-            let fit = self.rest(&points, coarse);
+            let fit = self.refine(&points, coarse);
             let motion = fit.as_ref().map_or(*coarse, |fit| fit.source_to_target);
             let is_new = |(other, _): &(_, _)| self.matching.apart(&motion, other) > SAME * self.matching.tolerance;
-            if rested.iter().all(is_new) {
-                rested.push((motion, fit));
+            if refined.iter().all(is_new) {
+                refined.push((motion, fit));
             }
         }
-        let mut judged: Vec<_> = rested.into_iter().map(|(motion, fit)| self.judged(motion, fit)).collect();
+        let mut judged: Vec<_> = refined.into_iter().map(|(motion, fit)| self.judged(motion, fit)).collect();
         let all = self.matching.source.iter().map(|own| own.weight()).sum::<f64>();
         let merit = |judged: &Judged| judged.weight(&self.matching) / all + judged.agreeing().unwrap_or(0.0);
         judged.sort_by(|a, b| merit(b).total_cmp(&merit(a)));
         judged
     }
 
-    fn rest(&self, points: &[Point3<f64>], coarse: &Isometry3<f64>) -> Option<IcpFit> {
+    fn refine(&self, points: &[Point3<f64>], coarse: &Isometry3<f64>) -> Option<IcpFit> {
         let Surfaces { target, tree, .. } = self.surfaces?;
         let params = IcpParams { reach: REACH * self.matching.tolerance, ..IcpParams::default() };
         icp(points, target, tree, coarse, &params, &Alone).ok()
@@ -134,7 +134,7 @@ impl<'a> Judge<'a> {
         Judged { motion, fit, partners: self.matching.partners(&motion), distances }
     }
 
-    /// Whether the evidence decides for `a` against `b`: the surface, and where that does not tell, the features, which were
+    /// Whether the evidence decides for `a` against `b`: the surface, and where that does not decide, the features, which were
     /// found on it.
     fn rules_out(&self, a: &Judged, b: &Judged) -> bool {
         match (self.by_surface(a, b), self.by_surface(b, a)) {
@@ -156,7 +156,7 @@ impl<'a> Judge<'a> {
         self.by_features(a, b) && (self.surfaces.is_none() || self.by_surface(a, b))
     }
 
-    /// Among all points that belong to the target at all, or among those that lie on it as well as the best fit lets them.
+    /// Among all points that belong to the target at all, or among those that lie on it within the scatter of the best fit.
     fn by_surface(&self, a: &Judged, b: &Judged) -> bool {
         let alone = |a: &Judged, b: &Judged, near: f64| {
             a.distances.iter().zip(&b.distances).filter(|(a, b)| **a <= near && **b > near).count() as f64
@@ -168,7 +168,7 @@ impl<'a> Judge<'a> {
         })
     }
 
-    /// Within which a point lies on the target as well as the fit lets it, m.
+    /// Within which a point lies on the target within the scatter of the fit, m.
     fn near(&self, judged: &Judged) -> f64 {
         let (tolerance, scatter) = (self.matching.tolerance, judged.fit.as_ref().map_or(0.0, |fit| fit.scatter));
         (SCATTERS * scatter).clamp(LEAST_NEAR * tolerance, COARSE * tolerance)
@@ -194,12 +194,12 @@ impl<'a> Judge<'a> {
         lost <= POINTS.max(AT_RIMS * self.points.len() as f64)
     }
 
-    /// The motions as they are told, brought to rest with all points.
+    /// The motions to report, refined with all points.
     pub fn settled(&self, judged: Vec<Judged>) -> Vec<Alternative> {
         let points: Vec<Point3<f64>> = self.points.iter().map(|p| p.point).collect();
         let mut alternatives: Vec<Alternative> = Vec::new();
         for judged in judged {
-            let fit = self.rest(&points, &judged.motion).or_else(|| judged.fit.clone());
+            let fit = self.refine(&points, &judged.motion).or_else(|| judged.fit.clone());
             let motion = fit.as_ref().map_or(judged.motion, |fit| fit.source_to_target);
             let first = alternatives.first().map_or(motion, |first| first.source_to_target);
             let turn = (motion.rotation * first.rotation.inverse()).scaled_axis();

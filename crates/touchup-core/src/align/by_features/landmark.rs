@@ -1,4 +1,4 @@
-//! Features as registration sees them: where, which way, how large, and what of that is known.
+//! Features as registration sees them: position, direction, size, and which of these are known.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
@@ -18,7 +18,7 @@ pub(super) struct Landmark {
     size: Option<[f64; 2]>,
     /// standard uncertainty of the place, m
     sigma: f64,
-    /// how far it goes on from its place along the axis, backwards and forwards, m
+    /// how far it extends from its place along the axis, backwards and forwards, m
     span: [f64; 2],
     /// it goes through: which end is the opening is a matter of how it was seen
     is_through: bool,
@@ -67,7 +67,7 @@ impl Landmark {
         }
     }
 
-    /// Whether it has a place of its own and a way out, so that two of them tell a motion.
+    /// Whether it has a position and an outward direction, so that two of them determine a motion.
     pub fn is_located(&self) -> bool {
         matches!(self.kind, Kind::Hole | Kind::Slot | Kind::Pocket | Kind::Boss) && self.axis.is_some()
     }
@@ -112,7 +112,7 @@ impl Landmark {
         tolerance + (SIGMAS * self.sigma.hypot(other.sigma)).min(3.0 * tolerance)
     }
 
-    /// How far it is from `other` after `motion`, over what it may be; infinite where it looks another way. An edge or what
+    /// How far it is from `other` after `motion`, over what it may be; infinite where its direction differs. An edge or what
     /// goes through may be anywhere along the other.
     ///
     /// - `tolerance`: m

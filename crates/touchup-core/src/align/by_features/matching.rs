@@ -102,7 +102,7 @@ impl Matching {
                 add(&Matrix3::identity(), &(axis * arm), 0.0, &offset, weight);
             }
         }
-        // what nothing holds stays
+        // a direction without constraint stays
         normal += Matrix6::identity() * (normal.diagonal().max() * 1e-9).max(f64::MIN_POSITIVE);
         let twist = normal.cholesky()?.solve(&right);
         let (shift, turn) = (twist.fixed_rows::<3>(0).into_owned(), twist.fixed_rows::<3>(3) / self.lever);

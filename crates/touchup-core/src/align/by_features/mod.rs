@@ -1,11 +1,11 @@
-//! The rigid motion that brings the features of one shape onto those of another, from anywhere.
+//! Global registration: the rigid motion that maps the features of one shape onto those of another, from any start.
 //!
 //! Pairs of features, slots, corners and features beside a plane are frames; each frame of the one that is like a frame of
 //! the other in what a motion leaves alone (kinds, sizes, distances, angles, handedness) is a hypothesis. It counts what it
-//! explains of all features, so some may be missing or false on either side; the best are brought to rest by least squares
-//! and point to plane, and judged by how much of the surface then agrees. Two that the evidence does not tell apart are both
-//! told. Features about one axis alone leave the turn about it open: where the surface does not tell it either, that is told.
-//! All is exhaustive and in one order, so nothing is drawn.
+//! explains of all features, so some may be missing or false on either side; the best are refined by least squares
+//! and point to plane, and judged by how much of the surface then agrees. Two that the evidence does not distinguish are both
+//! returned. Features about one axis alone leave the turn about it open: where the surface does not fix it either, an error says so.
+//! The search is exhaustive and deterministic, without random samples.
 
 mod alternative;
 mod bases;
@@ -37,20 +37,20 @@ const MOST_COMPARISONS: usize = 60_000_000;
 const MOST_CANDIDATES: usize = 64;
 /// They explain at least this share of what the best does: without it a feature that is false could not hide the truth.
 const CANDIDATE: f64 = 0.5;
-/// Mirror images that are looked at.
+/// Mirror images that are examined.
 const MOST_MIRRORED: usize = 8;
 /// Share of the surface that must agree.
 const LEAST_AGREEING: f64 = 0.5;
 /// Where there are no surfaces, what must be explained: two openings, the planes about them, and more.
 const LEAST_EXPLAINED: f64 = 2.5;
 
-/// The one motion that brings `source` onto `target`, or why there is none or more than one.
+/// The one motion that maps `source` onto `target`, or why there is none or more than one.
 ///
 /// Work is bounded: at most 30 000 hypotheses, of 3 000 frames of the source (among its 150 largest openings), 64 of which
 /// are tried on the surfaces.
 ///
 /// - `source`, `target`: as [`crate::features::detect`] finds them, each in its own frame.
-/// - `surfaces`: where they are at hand they decide, and make the motion as exact as they are.
+/// - `surfaces`: where they are given they decide, and make the motion as exact as they are.
 ///
 /// # Errors
 /// [`FeaturesError`]; [`FeaturesError::Ambiguous`] has all motions among which the evidence does not decide,
@@ -93,7 +93,7 @@ pub fn align_features(
     }
     let mut alternatives = judge.settled(judged);
     if let Some(turn) = free {
-        let alternatives = turn.ways(alternatives, SAME * judge.matching.tolerance);
+        let alternatives = turn.distinct(alternatives, SAME * judge.matching.tolerance);
         return Err(FeaturesError::FreeTurn { turn, alternatives });
     }
     match alternatives.len() {
@@ -161,7 +161,7 @@ fn candidates(matching: &Matching, frames: &Frames, most: usize) -> Vec<Isometry
 struct Frames {
     own: Vec<Base>,
     theirs: SortedSets,
-    /// whether they leave a turn open, for the features of one side tell none
+    /// whether they leave a turn open, for the features of one side fix none
     is_axial: bool,
     /// which side, and how many features it has
     poor: FeaturesSide,
@@ -185,7 +185,7 @@ impl Frames {
     }
 }
 
-/// Every motion that brings a frame onto one like it, with what it explains.
+/// Every motion that maps a frame onto a congruent one, with the features it explains.
 fn hypotheses(matching: &Matching, own: &[Base], theirs: &SortedSets) -> Vec<(f64, Isometry3<f64>)> {
     let play = 2.0 * matching.tolerance;
     let like = |base| -> Vec<&Base> {
@@ -195,7 +195,7 @@ fn hypotheses(matching: &Matching, own: &[Base], theirs: &SortedSets) -> Vec<(f6
     };
     let tried = own.iter().step_by(own.len().div_ceil(MOST_BASES));
     let mut matches: Vec<(&Base, Vec<&Base>)> = tried.map(|base| (base, like(base))).collect();
-    // what few can be tells most
+    // what few can match is most specific
     matches.sort_by_key(|(_, others)| others.len());
     let most = (MOST_COMPARISONS / matching.cost().max(1)).min(MOST_HYPOTHESES);
     let pairs = matches.iter().flat_map(|(base, others)| others.iter().map(|other| base.onto(other)));

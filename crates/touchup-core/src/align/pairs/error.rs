@@ -18,7 +18,7 @@ impl std::fmt::Display for PairSide {
     }
 }
 
-/// Why pairs do not tell a motion. Pairs are counted from 1.
+/// Why pairs do not determine a motion. Pairs are counted from 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PairsError {
     /// Fewer than three.
@@ -35,7 +35,7 @@ pub enum PairsError {
         /// which of its points
         side: PairSide,
     },
-    /// A standard deviation that is none.
+    /// A standard deviation that is not positive and finite.
     #[error("pair {pair}: its sigma is {sigma_mm} mm; it must be more than 0, leave it out where it is not known")]
     BadSigma {
         /// which pair
@@ -124,10 +124,10 @@ pub enum PairsError {
         worst: usize,
         /// its residual
         worst_mm: f64,
-        /// what would tell more
+        /// what would help
         hint: &'static str,
     },
     /// The decomposition did not converge.
-    #[error("the pairs tell no rotation: their coordinates are out of all proportion; check them")]
+    #[error("the pairs determine no rotation: their coordinates are out of all proportion; check them")]
     NoRotation,
 }

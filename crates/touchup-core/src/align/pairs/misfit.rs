@@ -14,13 +14,13 @@ const FEWEST_TO_BLAME: usize = 5;
 /// Only so many pairs are left out in turn, those of the largest residuals: among more than that no single one has the
 /// power to draw the motion to itself.
 const MOST_TO_BLAME: usize = 32;
-/// A factor between the distances is told when it is off by more than this: picks scatter less.
+/// A factor between the distances is reported when it is off by more than this: picks scatter less.
 const SCALE_TOLERANCE: f64 = 0.05;
 /// … and named when it is this near to one that is known.
 const NAMED_TOLERANCE: f64 = 0.03;
 /// Share of the points' scatter within which they must fit.
 const LARGEST_SHARE: f64 = 0.1;
-/// A mirror image is told when it fits so many times better.
+/// A mirror image is reported when it fits so many times better.
 const MIRROR_RATIO: f64 = 3.0;
 
 /// Factors between units, space over scan, and what they are known for.

@@ -24,7 +24,7 @@ pub struct PairsParams {
     /// Largest rms residual that is believed, m; never more than a tenth of the points' scatter. Default 3 mm: a pick
     /// on a scan of a consumer camera is good to one or two.
     pub largest_rms: f64,
-    /// A pair that is off by less than this is kept, however well the others agree, m. Default 0.2 mm: nobody picks
+    /// A pair that is off by less than this is kept, however well the others agree, m. Default 0.2 mm: no one picks
     /// better. Where a sigma is known, four times that is taken instead.
     pub least_misfit: f64,
 }
@@ -53,7 +53,7 @@ pub struct PairsFit {
     pub covariance: Matrix6<f64>,
 }
 
-/// A best motion with what tells how good it is.
+/// A best motion with its measures of quality.
 pub(super) struct SolvedMotion {
     pub motion: Isometry3<f64>,
     /// Weighted middle of `from`.

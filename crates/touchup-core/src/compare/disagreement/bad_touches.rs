@@ -21,7 +21,7 @@ pub struct BadTouches {
     pub sigmas: f64,
     /// how many were rejected while the mesh was refined
     pub rejected: usize,
-    /// good touches of other times that felt the same way there
+    /// good touches of other passes there with normals alike
     pub against: usize,
 }
 
@@ -31,7 +31,7 @@ const SIGMAS: f64 = 6.0;
 const LEAST_OFF: f64 = 0.15e-3;
 /// Touches of other times that contradict one, at least.
 const FEWEST: usize = 3;
-/// They felt the same way within 26°.
+/// Their normals are alike within 26°.
 const ALIKE: f64 = 0.9;
 /// A standard deviation below this is none, m.
 const LEAST_SIGMA: f64 = 1e-6;
@@ -42,7 +42,7 @@ const NEAR: f64 = 1e-3;
 /// A place is badly touched when this share of its touches is bad.
 const SHARE: f64 = 0.5;
 
-/// Those rejected, and those that lie off the surface and off what others felt there.
+/// Those rejected, and those that lie off the surface and off what others measured there.
 pub(super) fn find(refined: &RefinedShape<'_>, touches: &[ProbedPoint]) -> Result<Vec<BadTouches>, CompareError> {
     let (off, feet) = distances(refined, touches)?;
     let points: Vec<Point3<f64>> = touches.iter().map(|touch| touch.point).collect();
@@ -57,10 +57,10 @@ pub(super) fn find(refined: &RefinedShape<'_>, touches: &[ProbedPoint]) -> Resul
     let bad: Vec<usize> = (0..touches.len()).filter(|&at| is_bad(at)).collect();
     let good = PointGrid::of(&points, (0..touches.len()).filter(|at| bad.binary_search(at).is_err()), reach);
     let goes_on = |a: &usize, b: &usize| touches[*b].stamp_ns.saturating_sub(touches[*a].stamp_ns) <= PAUSE_NS;
-    let told = |numbers: &[usize]| {
-        told(numbers, touches, &off, |worst| against(touches, worst, &good, &feet[worst], reach).count())
+    let bad_touches_of = |numbers: &[usize]| {
+        bad_touches_of(numbers, touches, &off, |worst| against(touches, worst, &good, &feet[worst], reach).count())
     };
-    Ok(bad.chunk_by(goes_on).map(told).collect())
+    Ok(bad.chunk_by(goes_on).map(bad_touches_of).collect())
 }
 
 /// How far off a touch must be, m.
@@ -68,7 +68,7 @@ fn limit(touch: &ProbedPoint) -> f64 {
     (SIGMAS * touch.sigma.hypot(touch.calibration)).max(LEAST_OFF)
 }
 
-/// Touches of other times near the foot of a touch on the surface, that felt the same way.
+/// Touches of other times near the foot of a touch on the surface, with normals alike.
 fn against<'a>(
     touches: &'a [ProbedPoint],
     at: usize,
@@ -82,14 +82,19 @@ fn against<'a>(
     })
 }
 
-/// How far a touch is from the planes that others felt there, the middle of them, m; `None` where they are too few.
+/// How far a touch is from the planes that others measured there, the middle of them, m; `None` where they are too few.
 fn contradiction(touches: &[ProbedPoint], at: usize, taken: &PointGrid, foot: &Point3<f64>, reach: f64) -> Option<f64> {
     let off = |other: usize| (touches[at].point - touches[other].point).dot(&touches[other].normal).abs();
     let mut off: Vec<f64> = against(touches, at, taken, foot, reach).map(off).collect();
     if off.len() < FEWEST { None } else { median(&mut off) }
 }
 
-fn told(numbers: &[usize], touches: &[ProbedPoint], off: &[f64], against: impl Fn(usize) -> usize) -> BadTouches {
+fn bad_touches_of(
+    numbers: &[usize],
+    touches: &[ProbedPoint],
+    off: &[f64],
+    against: impl Fn(usize) -> usize,
+) -> BadTouches {
     let sum: Vector3<f64> = numbers.iter().map(|&at| touches[at].point.coords).sum();
     let sigmas = |at: usize| off[at] / touches[at].sigma.hypot(touches[at].calibration).max(LEAST_SIGMA);
     let worst = numbers.iter().copied().max_by(|a, b| off[*a].abs().total_cmp(&off[*b].abs())).unwrap_or(numbers[0]);
@@ -103,7 +108,7 @@ fn told(numbers: &[usize], touches: &[ProbedPoint], off: &[f64], against: impl F
     }
 }
 
-/// How far the surface that each touch says is from the refined one, m: of a ball by its centre, which the felt normal
+/// How far the surface that each touch says is from the refined one, m: of a ball by its centre, which the measured normal
 /// does not move; and the closest place there.
 fn distances(
     refined: &RefinedShape<'_>,
@@ -136,8 +141,8 @@ pub(super) fn mark(refined: &RefinedShape<'_>, touches: &[ProbedPoint], bad: &[B
     let near_bad = PointGrid::of(&points, (0..points.len()).filter(|&at| is_bad[at]), reach);
     for (at, class) in classes.iter_mut().enumerate() {
         let p = mesh.positions()[at];
-        let is_felt = !matches!(class, Class::NeverTouched | Class::Unreachable);
-        if is_felt && near_bad.near(&p, reach).next().is_some() {
+        let is_touched = !matches!(class, Class::NeverTouched | Class::Unreachable);
+        if is_touched && near_bad.near(&p, reach).next().is_some() {
             let (mut count, mut wrong) = (0, 0);
             all.near(&p, reach / 2.0).for_each(|touch| {
                 count += 1;

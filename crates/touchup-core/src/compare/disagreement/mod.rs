@@ -1,12 +1,12 @@
 //! Where touch and scan disagree, without a true part: what of it looks like this scanner, what like a part that is no longer
 //! what was scanned, and what like a bad touch.
 //!
-//! What the scan is misplaced as a whole, where that is more than noise, comes off first. How the scanner errs is then found
+//! The rigid offset of the scan, where it is more than noise, is removed first. How the scanner errs is then found
 //! where it should see well, on touched places away from edges: its offset b, its noise σ and the distance ℓ over which that
 //! stays alike, Cov = σ² exp(−r²/2ℓ²). The mean over a region of area A then has the variance σ²/(1 + A/2πℓ²), and a region
 //! that is off by many times its root was changed. In what is narrower than a few edges of the scan's triangles the scan lacks
-//! what it could not see, and it rounds edges: of one that stands out it takes off, and one that turns in it fills. Near an
-//! edge a disagreement the other way is not the scanner's rounding, but too near to be sure of.
+//! what it could not see, and it rounds edges: it takes off convex ones and fills concave ones. Near an
+//! edge a disagreement of the other sign is not the scanner's rounding, but too near to be sure of.
 
 mod bad_touches;
 mod places;
@@ -20,7 +20,7 @@ pub use self::bad_touches::BadTouches;
 use self::places::Places;
 pub use self::places::{Class, RefinedShape, VertexBasis};
 pub use self::regions::{DisagreementRegion, RegionEvidence};
-pub use self::rigid_offset::Misplaced;
+pub use self::rigid_offset::RigidOffset;
 pub use self::scanner::Scanner;
 use super::deviation::{closest_places, signed};
 use super::{CompareError, IndexedMesh};
@@ -41,16 +41,16 @@ pub struct ClassMap {
 /// Where touch and scan disagree.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Disagreement {
-    /// how the scan lies off as a whole, which is taken off before the rest is looked at; `None` where it is no more than the
-    /// noise of the scan may make of itself
-    pub misplaced: Option<Misplaced>,
-    /// how the scanner errs; `None` where too little was touched to tell, and then nothing is called changed
+    /// offset of the whole scan, removed before the remainder is examined; `None` where it is no more than the
+    /// noise of the scan explains
+    pub rigid_offset: Option<RigidOffset>,
+    /// how the scanner errs; `None` where too little was touched for an estimate, and then nothing is called changed
     pub scanner: Option<Scanner>,
     /// the refined mesh
     pub refined: ClassMap,
     /// the scan
     pub scan: ClassMap,
-    /// what hangs together, the largest first: changed, unsure, and scanner errors beyond its noise
+    /// connected regions, the largest first: changed, unsure, and scanner errors beyond its noise
     pub regions: Vec<DisagreementRegion>,
     /// touches that others contradict, in order of time
     pub bad_touches: Vec<BadTouches>,
@@ -62,11 +62,11 @@ const AGREES: f64 = 2.0;
 /// Scan and touch speak of the same side of the part when their normals are within 60°.
 const FACING: f64 = 0.5;
 
-/// Tells where touch and scan disagree, and why, as far as the data can tell.
+/// Finds where touch and scan disagree, and why, as far as the data determine it.
 ///
 /// - `scan`: as it was.
-/// - `refined`: what came of it.
-/// - `touches`: of which it came.
+/// - `refined`: the refined mesh.
+/// - `touches`: those that refined it.
 ///
 /// # Errors
 /// [`CompareError::NoFaces`] where either mesh has none.
@@ -81,12 +81,12 @@ pub fn disagreement(
     let mut places = Places::of(scan, refined)?;
     let off = places.off.clone();
     let mut scanner = Scanner::of(scan.mesh, &places);
-    let mut misplaced = None;
+    let mut rigid_offset = None;
     if let Some(fit) = rigid_offset::OffsetFit::of(&places) {
         places.take_off(&fit);
         let placed = Scanner::of(scan.mesh, &places);
-        misplaced = placed.as_ref().and_then(|placed| fit.told(placed));
-        if misplaced.is_some() {
+        rigid_offset = placed.as_ref().and_then(|placed| fit.significant(placed));
+        if rigid_offset.is_some() {
             scanner = placed;
         } else {
             places.off.copy_from_slice(&off);
@@ -99,11 +99,11 @@ pub fn disagreement(
     });
     bad_touches::mark(refined, touches, &bad_touches, &mut classes);
     let mut off = off;
-    let is_felt = |class: &Class| !matches!(class, Class::NeverTouched | Class::Unreachable);
-    off.iter_mut().zip(&classes).filter(|(_, class)| !is_felt(class)).for_each(|(off, _)| *off = 0.0);
+    let is_touched = |class: &Class| !matches!(class, Class::NeverTouched | Class::Unreachable);
+    off.iter_mut().zip(&classes).filter(|(_, class)| !is_touched(class)).for_each(|(off, _)| *off = 0.0);
     let on_scan = carried(scan, refined, &classes)?;
     Ok(Disagreement {
-        misplaced,
+        rigid_offset,
         scanner,
         refined: ClassMap::of(refined.shape.mesh, off, classes),
         scan: on_scan,
@@ -133,9 +133,9 @@ impl Places {
         Ok(Self { positions: mesh.positions().to_vec(), off, is_seen, is_wide, is_open, may_be, normals, areas })
     }
 
-    fn take_off(&mut self, misplaced: &rigid_offset::OffsetFit) {
+    fn take_off(&mut self, rigid_offset: &rigid_offset::OffsetFit) {
         let both = self.positions.iter().zip(&self.normals);
-        self.off.iter_mut().zip(both).for_each(|(off, (p, normal))| *off -= misplaced.at(p, normal));
+        self.off.iter_mut().zip(both).for_each(|(off, (p, normal))| *off -= rigid_offset.at(p, normal));
     }
 
     fn first_classes(&self, refined: &RefinedShape<'_>, scanner: Option<&Scanner>) -> Vec<Class> {

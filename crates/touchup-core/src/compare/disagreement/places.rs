@@ -4,14 +4,14 @@ use nalgebra::{Point3, Vector3};
 
 use crate::compare::IndexedMesh;
 
-/// What a vertex of a refined mesh rests on, as `refine` writes it.
+/// The source of a vertex of a refined mesh, as `refine` writes it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum VertexBasis {
     /// the scan, or what is near touches suggests
     NotTouched,
     /// touches
     Touched,
-    /// nothing can be felt here
+    /// out of reach of the stylus
     Unreachable,
 }
 
@@ -44,7 +44,7 @@ pub enum Class {
 }
 
 impl Class {
-    /// All, in the order in which they are told.
+    /// All, in the order of the report.
     pub const ALL: [Self; 7] = [
         Self::Agrees,
         Self::ScannerError,
@@ -55,7 +55,7 @@ impl Class {
         Self::Unreachable,
     ];
 
-    /// As it is told.
+    /// As the report names it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Agrees => "agrees",
@@ -73,7 +73,7 @@ impl Class {
 pub(super) struct Places {
     /// m, by slot
     pub positions: Vec<Point3<f64>>,
-    /// how far it lies outside of the scan, m, by slot; without what the scan is misplaced, once that is known
+    /// how far it lies outside of the scan, m, by slot; without the rigid offset, once that is known
     pub off: Vec<f64>,
     /// whether it was touched, and the scan is there at all
     pub is_seen: Vec<bool>,

@@ -1,4 +1,4 @@
-//! What hangs together among the disagreements, and what it is.
+//! Connected regions of disagreement, and their classes.
 
 use nalgebra::{Point3, Vector3};
 
@@ -15,7 +15,7 @@ pub struct RegionEvidence {
     pub sigmas: f64,
     /// area that the scanner should have seen well, m²
     pub open_area: f64,
-    /// its extent over the distance on which the scanner's error stays alike
+    /// its extent over the correlation length of the scanner's error
     pub lengths: f64,
     /// times that it was passed by the tip
     pub passes: usize,
@@ -52,15 +52,15 @@ const OFF: f64 = 1.5;
 const CHANGED: f64 = 5.0;
 /// From here on it may be either.
 const UNSURE: f64 = 3.5;
-/// A change that only one pass felt is not sure.
+/// A change that only one pass measured is not sure.
 const PASSES: usize = 2;
 /// Touches later than this are of another pass, ns.
 const PASS_NS: i64 = 1_000_000_000;
-/// Regions smaller than this are not told, over the square of the scan's edges.
+/// Regions smaller than this are not reported, over the square of the scan's edges.
 const LEAST_AREA: f64 = 1.0;
-/// What a region goes on to is off by this share of its mean.
+/// A region grows to places that are off by this share of its mean.
 const GOES_ON: f64 = 0.5;
-/// Neighbours in a mean face the same way within 37°.
+/// Neighbours in a mean have normals alike within 37°.
 const ALIKE: f64 = 0.8;
 
 /// Finds the regions, and gives their classes to the places in them.
@@ -68,8 +68,8 @@ pub(super) fn find(seen: &RegionInput<'_>, classes: &mut [Class]) -> Vec<Disagre
     let (mesh, places, scanner) = (seen.refined.shape.mesh, seen.places, seen.scanner);
     let smooth = smoothed(mesh, places, scanner);
     let sign = |at: usize| match (smooth[at] - scanner.offset) / scanner.noise {
-        z if z > OFF && tells(places, at, 0) => 1i8,
-        z if z < -OFF && tells(places, at, 1) => -1,
+        z if z > OFF && is_evidence(places, at, 0) => 1i8,
+        z if z < -OFF && is_evidence(places, at, 1) => -1,
         _ => 0,
     };
     let signs: Vec<i8> = (0..smooth.len()).map(sign).collect();
@@ -89,9 +89,9 @@ pub(super) fn find(seen: &RegionInput<'_>, classes: &mut [Class]) -> Vec<Disagre
     regions
 }
 
-/// Whether a disagreement is none that the scanner makes of what it cannot see: the scan too low, `way` 0, or too high, 1.
-fn tells(places: &Places, at: usize, way: usize) -> bool {
-    places.is_open[at] || (places.is_wide[at] && !places.may_be[at][way])
+/// Whether a disagreement is evidence of a change, and not of what the scanner cannot see: the scan too low, `side` 0, or too high, 1.
+fn is_evidence(places: &Places, at: usize, side: usize) -> bool {
+    places.is_open[at] || (places.is_wide[at] && !places.may_be[at][side])
 }
 
 /// Means over the surroundings, m, by slot: of open places over open ones, of others over all that are wide.
@@ -115,7 +115,7 @@ fn neighbours(mesh: &TriMesh, at: usize) -> impl Iterator<Item = usize> + '_ {
     mesh.star(VertexId(at as u32)).iter().flat_map(|&face| mesh.corners(face)).map(|v| v.0 as usize)
 }
 
-/// All that hangs together with `start`.
+/// The connected region of `start`.
 fn flood(mesh: &TriMesh, start: usize, is_own: impl Fn(usize) -> bool, is_taken: &mut [bool]) -> Vec<usize> {
     let mut found = vec![start];
     is_taken[start] = true;

@@ -1,8 +1,8 @@
-//! How far the scan as a whole lies off the touches: a small rigid motion, and what it is too fat everywhere.
+//! How far the scan as a whole lies off the touches: a small rigid motion, and a surface offset.
 //!
 //! At a place x with the normal n touch − scan is b + n·s + ((x − c) × n)·θ; b, s and θ by least squares with Tukey's
-//! weights, s and θ held back a little, so that what nothing tells goes to b. Noise that stays alike over a distance tilts a
-//! scan too: of n independent places the motion is told when it explains more than that does once in a thousand times.
+//! weights, s and θ slightly regularised, so that what no touch determines goes to b. Noise that stays alike over a distance tilts a
+//! scan too: of n independent places the motion is reported when it explains more than that does once in a thousand times.
 
 use std::f64::consts::TAU;
 
@@ -16,7 +16,7 @@ use crate::numeric::{
 
 /// The scan against the touches, of small angles.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Misplaced {
+pub struct RigidOffset {
     /// shift that would bring the scan onto the touches, m, at `centre`
     pub shift: Vector3<f64>,
     /// and rotation vector, rad
@@ -56,7 +56,7 @@ pub(super) struct OffsetFit {
 }
 
 impl OffsetFit {
-    /// Of the open places; `None` where they tell nothing.
+    /// Of the open places; `None` where they determine nothing.
     pub fn of(places: &Places) -> Option<Self> {
         let open: Vec<usize> = (0..places.off.len()).filter(|&at| places.is_open[at]).collect();
         let (centre, lever) = centroid_and_spread(open.iter().map(|&at| &places.positions[at]));
@@ -100,10 +100,10 @@ impl OffsetFit {
         normal.dot(&(self.shift + self.turn.cross(&(p - self.centre))))
     }
 
-    /// The motion where it is more than noise.
+    /// The motion where it is significant against the noise.
     ///
     /// - `scanner`: without the motion.
-    pub fn told(&self, scanner: &Scanner) -> Option<Misplaced> {
+    pub fn significant(&self, scanner: &Scanner) -> Option<RigidOffset> {
         let alike = TAU * scanner.correlation.powi(2);
         let more = self.area / alike - UNKNOWNS;
         if more <= 0.0 {
@@ -125,7 +125,7 @@ impl OffsetFit {
         }
         let bound = ONCE_IN_1000[usize::max(directions, 1) - 1] * (1.0 + FEW_PLACES / more);
         let sigmas = covariance.diagonal().map(f64::sqrt);
-        (square > bound).then(|| Misplaced {
+        (square > bound).then(|| RigidOffset {
             shift: self.shift,
             turn: self.turn,
             centre: self.centre,

@@ -9,11 +9,11 @@ use crate::numeric::{PointGrid, SIGMA_OF_MEDIAN, median};
 /// How the scanner errs where it should see well.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scanner {
-    /// median of touch − scan, m: negative where the part looks too fat
+    /// median of touch − scan, m: negative where the scan lies outside of the part
     pub offset: f64,
     /// standard deviation about it, robustly, m
     pub noise: f64,
-    /// distance ℓ over which it stays alike, m
+    /// correlation length ℓ of the noise, m
     pub correlation: f64,
     /// median edge of the scan's triangles, m
     pub edge: f64,
@@ -33,11 +33,11 @@ const ROUNDED: f64 = 1.5;
 const LEVEL: f64 = 0.2;
 /// An edge of the refined mesh turns by more than this, as a cosine: 35°.
 const SHARP: f64 = 0.82;
-/// A ball of the least seen width touches nothing but the place it rests on within this share of its radius.
+/// A ball of the least seen width touches nothing but its contact point within this share of its radius.
 const FITS: f64 = 0.85;
-/// Places of which the scanner can be told.
+/// Places from which the scanner can be characterised.
 const FEWEST: usize = 200;
-/// Places whose pairs are looked at.
+/// Places whose pairs are examined.
 const MOST_PLACES: usize = 1_500;
 /// Distances up to so many edges of the triangles, in so many bins.
 const LONGEST: f64 = 8.0;
@@ -46,7 +46,7 @@ const BINS: usize = 32;
 const FULL: usize = 50;
 /// Where half the mean square difference has grown to 1 − 1/e of the variance, in ℓ.
 const GROWN: f64 = std::f64::consts::SQRT_2;
-/// Noise below this share of the edges is no noise that matters: nothing is told apart below it.
+/// Noise below this share of the edges is no noise that matters: nothing is distinguished below it.
 const LEAST_NOISE: f64 = 1e-3;
 
 /// Median length of the edges, m.
@@ -61,7 +61,7 @@ pub(super) fn rounded(edge: f64) -> f64 {
     ROUNDED * edge
 }
 
-/// Vertices at sharp edges between touched faces, by slot: whether one stands out there, and whether one turns in.
+/// Vertices at sharp edges between touched faces, by slot: whether one is convex there, and whether one is concave.
 pub(super) fn sharp_vertices(mesh: &TriMesh, is_seen: &[bool]) -> Vec<[bool; 2]> {
     let mut is_sharp = vec![[false; 2]; mesh.vertex_slots()];
     for (face, corners) in mesh.faces() {
@@ -72,8 +72,8 @@ pub(super) fn sharp_vertices(mesh: &TriMesh, is_seen: &[bool]) -> Vec<[bool; 2]>
             }
             for other in mesh.faces_at_edge(a, b).filter(|&other| other != face) {
                 if mesh.normal(face).dot(&mesh.normal(other)) < SHARP {
-                    let way = usize::from((mesh.barycentre(other) - mesh.position(a)).dot(&mesh.normal(face)) > 0.0);
-                    [a, b].into_iter().for_each(|v| is_sharp[v.0 as usize][way] = true);
+                    let side = usize::from((mesh.barycentre(other) - mesh.position(a)).dot(&mesh.normal(face)) > 0.0);
+                    [a, b].into_iter().for_each(|v| is_sharp[v.0 as usize][side] = true);
                 }
             }
         }
@@ -81,7 +81,7 @@ pub(super) fn sharp_vertices(mesh: &TriMesh, is_seen: &[bool]) -> Vec<[bool; 2]>
     is_sharp
 }
 
-/// Whether an edge of the surface that a place lies on, near it, stands out, so that a scan may be too low there, and whether
+/// Whether an edge of the surface that a place lies on, near it, is convex, so that a scan may be too low there, and whether
 /// one turns in, so that it may be too high; by slot.
 pub(super) fn rounded_at(
     scan: &TriMesh,

@@ -1,4 +1,4 @@
-//! What stands around and on the panels: legend, scale of colours, histogram, length, names of places.
+//! Annotations of the panels: legend, scale of colours, histogram, length, names of places.
 
 use nalgebra::Point3;
 
@@ -9,7 +9,7 @@ use crate::compare::colour::{ColourScale, Rgb};
 use crate::compare::comparison::round_up;
 use crate::compare::summary::Histogram;
 
-/// What stands beside a place of the part, in every panel.
+/// Annotation beside a place of the part, in every panel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PictureLabel {
     /// m, in the frame of the meshes
@@ -136,7 +136,7 @@ pub(super) fn draw_histograms(picture: &mut Picture, bar: i32, panels: &[Picture
 /// Names of places with a line to each. A name keeps clear of the places and of the names before it as far as
 /// there is room.
 pub(super) fn draw_labels(picture: &mut Picture, labels: &[PictureLabel], camera: &Camera, frame: &PictureFrame) {
-    /// Directions in which a name may stand from its place: right and down, in heights of a letter.
+    /// Directions in which a name may be placed: right and down, in heights of a letter.
     const AROUND: [[i32; 2]; 8] = [[2, -3], [-2, -3], [2, 2], [-2, 2], [3, -5], [-3, -5], [3, 4], [-3, 4]];
     let [width, height] = picture.size.map(|side| side as i32);
     let at = |label: &PictureLabel| frame.pixel(&camera.project(&label.place).xy()).map(|side| side.round() as i32);

@@ -9,7 +9,7 @@ const TILT: f64 = 0.7;
 /// And to the side.
 const YAW: f64 = 0.25;
 
-/// What looks one way, over all that matters, for it to be a side: less is left over by chance.
+/// Share of the surface that faces one direction for it to be a side: less is left over by chance.
 const LEAST_SIDE: f64 = 0.05;
 
 /// A parallel projection.
@@ -19,12 +19,12 @@ pub(super) struct Camera {
     pub right: Vector3<f64>,
     /// up in the picture, unit
     pub up: Vector3<f64>,
-    /// towards the one who looks, unit
+    /// towards the viewer, unit
     pub out: Vector3<f64>,
 }
 
 impl Camera {
-    /// Looks from the direction `out` with `up` upwards, as far as that can be.
+    /// Views from the direction `out` with `up` upwards, as far as that can be.
     pub fn new(out: &Vector3<f64>, up: &Vector3<f64>) -> Self {
         let out = out.try_normalize(0.0).unwrap_or_else(Vector3::z);
         // nearly along the view `up` says nothing
@@ -33,7 +33,7 @@ impl Camera {
         Self { right, up: out.cross(&right), out }
     }
 
-    /// Looks askance at the side that `weight` is on, with the longest extent of the part across the picture.
+    /// Views obliquely the side that `weight` is on, with the longest extent of the part across the picture.
     ///
     /// - `weight`: of each vertex slot, 0 or more.
     pub fn towards(mesh: &TriMesh, weight: impl Fn(VertexId) -> f64) -> Self {

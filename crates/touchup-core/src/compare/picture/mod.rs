@@ -67,7 +67,7 @@ const AIR: f64 = 0.05;
 const FLATTEST: f64 = 0.45;
 /// And a picture of one panel or more at most, so that it fits on a screen.
 const HIGHEST: f64 = 0.62;
-/// What stands above the bar of colours.
+/// Title of the bar of colours.
 const OF_TRUTH: &str = "deviation, mm:  - too little   + too much material";
 const OF_TOUCHES: &str = "touch - scan, mm:  - inside of the scan   + outside";
 /// Draws the panels side by side, in one scale and one view, with title, bar of colours and length.

@@ -22,9 +22,9 @@ pub struct PicturePanel<'a> {
     pub paint: Option<&'a [Rgb]>,
     /// of its deviations, drawn over the bar of colours: bars for the last panel, a line for the others
     pub histogram: Option<&'a Histogram>,
-    /// stands above it; Latin-1
+    /// printed above it; Latin-1
     pub title: &'a str,
-    /// stands below it; Latin-1
+    /// printed below it; Latin-1
     pub note: &'a str,
 }
 
@@ -41,17 +41,17 @@ const BACKGROUND: Rgb = [233, 236, 240];
 const FINE: u32 = 3;
 /// Colours of the scale that are worked out beforehand.
 const SHADES: usize = 512;
-/// Light that is everywhere; the rest comes from the lamp.
+/// Share of ambient light; the remainder comes from the lamp.
 const AMBIENT: f64 = 0.55;
 /// Where the lamp is: right, up, towards the viewer.
 const LAMP: [f64; 3] = [-0.3, 0.45, 0.85];
-/// What the inside of a surface shows of its colour; the rest is grey.
+/// What the inside of a surface shows of its colour; the remainder is grey.
 const INSIDE: f64 = 0.35;
 /// Grey of the inside.
 const INSIDE_GREY: f64 = 120.0;
-/// Share of the light at an outline.
+/// Share of the light at a silhouette.
 const OUTLINE: f64 = 0.45;
-/// A step in depth is an outline from this share of the picture's height on.
+/// A step in depth is a silhouette from this share of the picture's height on.
 const STEP: f64 = 0.012;
 
 /// Where a picture lies in the plane of the view.
@@ -121,7 +121,7 @@ pub(super) fn draw(panel: &PicturePanel<'_>, camera: &Camera, frame: &PictureFra
             }
         }
     }
-    samples.outline((STEP * height as f64 / scale) as f32);
+    samples.silhouette((STEP * height as f64 / scale) as f32);
     samples.averaged(frame.size)
 }
 
@@ -185,7 +185,7 @@ impl Samples {
     }
 
     /// Darkens samples beside which the surface ends or falls back by more than `step` (m).
-    fn outline(&mut self, step: f32) {
+    fn silhouette(&mut self, step: f32) {
         for y in 0..self.height {
             for x in 0..self.width {
                 let at = y * self.width + x;

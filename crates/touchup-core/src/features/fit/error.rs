@@ -36,8 +36,8 @@ pub enum FitError {
         /// which number
         what: &'static str,
     },
-    /// The iteration did not come to rest.
-    #[error("the fit did not settle in {iterations} iterations; is the first guess near the surface?")]
+    /// The iteration did not converge.
+    #[error("the fit did not converge in {iterations} iterations; is the first guess near the surface?")]
     NotConverged {
         /// how many were made
         iterations: usize,

@@ -18,7 +18,7 @@ pub struct Estimate {
     pub std: f64,
 }
 
-/// What the standard deviations of a fit rest on.
+/// Origin of the standard deviations of a fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SigmaFrom {
     /// The stated ones: the residuals are not larger, or there are too few groups to ask them. In that case they are
@@ -45,7 +45,7 @@ pub struct Fit<M> {
     pub degrees: usize,
     /// Groups of which something was kept.
     pub groups: usize,
-    /// What the covariance rests on.
+    /// Origin of the covariance.
     pub sigma_from: SigmaFrom,
     pub(super) unknown: FreedomMatrix,
     pub(super) alone: Steps,

@@ -3,7 +3,7 @@
 //! A surface has a pose and up to two sizes; [`Surface`] says which of these eight [`Freedom`]s it has. The fit makes
 //! Σ wᵢ (dᵢ − oᵢ)² least over the observations it keeps: dᵢ the signed distance of a point from the surface, oᵢ the
 //! offset it should have. A ball that touches has its centre at its radius from the surface, whatever the direction of
-//! the force: fitting centres to the offset surface needs no felt normal, so friction does not enter.
+//! the force: fitting centres to the offset surface needs no measured normal, so friction does not enter.
 //!
 //! Observations of one group share their error and count together as one: wᵢ = 1/(σᵢ² n), n the observations kept of the
 //! group of i. If errors are shared only in part this gives away a little, never too much confidence.

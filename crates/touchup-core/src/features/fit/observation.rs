@@ -18,7 +18,7 @@ pub struct Observation {
     pub group: u32,
 }
 
-/// What a fit is told beside its observations.
+/// Input of a fit beside its observations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FitParams {
     /// Standard deviation of an error that all observations have in common along their normals, m: the calibration of

@@ -1,13 +1,13 @@
-//! The fit itself: three rounds that know better and better which observations belong to the surface.
+//! The fit itself: three rounds of robust regression that reject what does not belong to the surface.
 
 use super::solver::FitProblem;
 use super::uncertainty::Uncertainty;
 use super::{Fit, FitError, FitParams, Observation, Surface};
 use crate::numeric::{SIGMA_OF_MEDIAN, TUKEY_WIDTH, biweight, median};
 
-/// Weight updates in one round; the weights settle long before.
+/// Weight updates in one round; the weights converge long before.
 const MOST_UPDATES: usize = 50;
-/// Weights that change by less than this have settled; the rounds after them need no more.
+/// Weights that change by less than this have converged; the rounds after them need no more.
 const SETTLED_WEIGHT: f64 = 1e-2;
 /// Rounds of rejection; what is kept repeats after two or three.
 const MOST_REJECTIONS: usize = 10;
@@ -19,7 +19,7 @@ const DEBIASINGS: usize = 2;
 /// Fits a surface to observations, from a first guess.
 ///
 /// Huber's weights bring the guess near without being held by outliers, Tukey's biweights drop them; then what lies
-/// beyond `rejection` scaled standard deviations is taken out and the rest is fitted by plain least squares, corrected
+/// beyond `rejection` scaled standard deviations is taken out and the remainder is fitted by plain least squares, corrected
 /// for the bias that curvature brings. The scale is the median of the normalised residuals, and never below 1: groups
 /// share errors, so residuals may look smaller than the errors are.
 ///
@@ -72,7 +72,7 @@ fn scale<M: Surface>(z: &[f64]) -> f64 {
     (SIGMA_OF_MEDIAN * median(&mut sizes).unwrap_or(0.0) * freedom.sqrt()).max(1.0)
 }
 
-/// Steps and weights by turns until both settle. A round that does not is no error: the next one goes on from there.
+/// Steps and weights by turns until both converge. A round that does not is no error: the next one goes on from there.
 fn reweighted<M: Surface>(problem: &FitProblem, mut surface: M, weight: fn(f64) -> f64) -> M {
     let mut before = vec![0.0; problem.observations.len()];
     for _ in 0..MOST_UPDATES {

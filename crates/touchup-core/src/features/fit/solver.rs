@@ -17,7 +17,7 @@ const DAMPING: f64 = 1e-4;
 /// Longest step, in sizes of what was touched and in rad: a longer one may leap into the valley in which a circle fitted to
 /// a short arc grows without end.
 const LONGEST_STEP: f64 = 0.3;
-/// Tenfold increases of the damping before it is said that no step is better.
+/// Tenfold increases of the damping before the solver gives up.
 const MOST_RAISES: usize = 14;
 /// Keeps the matrix definite in directions that nothing fixes; as a share of its largest entry.
 const RIDGE: f64 = 1e-13;

@@ -7,9 +7,9 @@ use super::surface::pose_along;
 use super::{Distance, Estimate, Fit, FitError, Freedom, Surface};
 use crate::numeric::mean;
 
-/// A touch tells where an end is when its normal has at least this share along the slot: 30° from the wall.
+/// A touch determines an end when its normal has at least this share along the slot: 30° from the wall.
 const LEAST_ALONG: f64 = 0.5;
-/// An end is touched when so many touches tell where it is; one may be an outlier.
+/// An end is touched when so many touches determine it; one may be an outlier.
 const LEAST_TOUCHES: usize = 2;
 
 /// Distance of (x, y) from the segment from (−half, 0) to (half, 0), m, and the unit vector away from it; y on the segment itself, where
@@ -66,7 +66,7 @@ impl Stadium {
         self.pose_of.rotation * Vector3::x()
     }
 
-    /// Where the end in direction `sign` is along x; an end that was not touched is put where no point tells of it, for
+    /// Where the end in direction `sign` is along x; an end that was not touched is put where no point constrains it, for
     /// otherwise the last touches of the walls, with their noise, would decide how near it is.
     fn end_beyond(&self, points: &[Vector3<f64>], sign: f64) -> f64 {
         let faces_end = |q: &&Vector3<f64>| q.x * sign > 0.0 && self.distance_at(q).normal.x.abs() > LEAST_ALONG;

@@ -10,7 +10,7 @@ pub const FREEDOMS: usize = 8;
 /// A small change of each freedom, m or rad, indexed by [`Freedom`].
 pub type Steps = SVector<f64, FREEDOMS>;
 
-/// One way in which a surface can change. Directions are those of its own frame F, whose z is its axis or normal.
+/// One degree of freedom of a surface. Directions are those of its own frame F, whose z is its axis or normal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Freedom {
     /// Shift along x of F, m.
@@ -88,7 +88,7 @@ pub trait Surface: Clone {
     /// [`FitError::BadSize`].
     fn check(&self) -> Result<(), FitError>;
 
-    /// Where F stands, m, in O: a point of a plane or of the axis of a cylinder, the centre of the circle of a cone, that of a slot.
+    /// Origin of F, m, in O: a point of a plane or of the axis of a cylinder, the centre of the circle of a cone, that of a slot.
     fn center(&self) -> Point3<f64> {
         self.pose_of().translation.vector.into()
     }

@@ -1,4 +1,4 @@
-//! How well the freedoms of a fitted surface are known.
+//! The covariance of the freedoms of a fitted surface.
 
 use nalgebra::{SymmetricEigen, Vector3};
 
@@ -34,7 +34,7 @@ impl Uncertainty {
     ///
     /// In steps y of one stated standard deviation along the fixed directions the stated covariance is I. The residuals
     /// say S = g/(g − k) Σ s sᵀ over the groups, s = Σ wᵢ rᵢ ∂dᵢ/∂y over one of them (g groups, k unknowns): the sandwich
-    /// whose filling knows nothing of how errors hang together inside a group \[Liang and Zeger 1986\]. Eigenvalues of S
+    /// whose filling knows nothing of how errors are correlated inside a group \[Liang and Zeger 1986\]. Eigenvalues of S
     /// below 1 are raised to 1, so neither of the two is ever undercut.
     pub fn of<M: Surface>(problem: &FitProblem, surface: &M, kept: &[f64], params: &FitParams) -> Self {
         let (units, weights) = (problem.units::<M>(), problem.weights(kept));

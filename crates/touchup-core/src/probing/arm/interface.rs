@@ -1,6 +1,6 @@
 //! What probing needs of an arm: its state at a steady rate, and a few motions that can be broken off at any moment.
 //!
-//! No motion blocks. Whoever moves the arm asks for the next state, looks at it, and goes on or stops; so the same loop drives
+//! No motion blocks. The caller asks for the next state, checks it, and goes on or stops; so the same loop drives
 //! a simulated arm in its own time and a real one at 500 Hz, and a stop is never behind a motion in a queue.
 
 use nalgebra::{Isometry3, Vector3};
@@ -21,7 +21,7 @@ pub struct ArmState {
     pub raw_wrench_f: Wrench,
     /// rad
     pub joints: Joints,
-    /// whether and why it stands
+    /// whether and why it is stopped
     pub safety: Safety,
 }
 
@@ -33,16 +33,16 @@ pub enum Safety {
     Normal,
     /// It stopped by itself: force, speed or a plane.
     ProtectiveStop,
-    /// Somebody pressed the button, or opened the door.
+    /// The emergency stop button was pressed, or a door opened.
     OperatorStop,
     /// A fault that takes more than a call to be cleared.
     Fault,
 }
 
-/// What an arm is told; each takes the place of the one before.
+/// A command to an arm; each replaces the one before.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Command {
-    /// Straight to a pose of the tip in B, and to rest there.
+    /// Straight to a pose of the tip in B, and to a stop there.
     Line {
         /// where the tip is then, in B
         to: Isometry3<f64>,
@@ -69,17 +69,17 @@ pub enum Command {
         /// largest speed along the axis, m/s
         speed: f64,
     },
-    /// To rest.
+    /// To a stop.
     Stop {
         /// m/s²
         deceleration: f64,
     },
 }
 
-/// Why an arm does not do what it was told.
+/// Why an arm does not execute a command.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ArmError {
-    /// Nothing comes from it.
+    /// No states arrive from it.
     #[error("nothing has come from the arm for {silent_ms} ms: look at its controller and at the cable")]
     Lost {
         /// ms
@@ -91,11 +91,11 @@ pub enum ArmError {
         /// what it was for
         what: &'static str,
     },
-    /// The states come and their stamps stand still.
-    #[error("the arm's clock stands still: its controller has stopped")]
+    /// The states come with equal stamps.
+    #[error("the arm's clock is stuck: its controller has stopped")]
     Stale,
     /// It is not allowed to move.
-    #[error("the arm stands: {safety}")]
+    #[error("the arm is stopped: {safety}")]
     Stopped {
         /// why
         safety: Safety,
@@ -105,13 +105,13 @@ pub enum ArmError {
         "the program on the arm's controller has ended, at its panel, by its watchdog or by another client: look, then recover"
     )]
     ProgramEnded,
-    /// What stands between here and the arm has failed; the arm was stopped another way.
+    /// The connection to the arm has failed; the arm was stopped by other means.
     #[error("the program that speaks to the arm {reason}; the arm was stopped without it: look, then recover")]
     Client {
         /// what happened to it
         reason: String,
     },
-    /// It cannot be told that.
+    /// It does not support the command.
     #[error("the arm refuses {what}: {reason}")]
     Refused {
         /// the command
@@ -146,16 +146,16 @@ pub trait Arm {
     /// [`ArmError::Refused`], [`ArmError::Lost`].
     fn command(&mut self, command: &Command) -> Result<(), ArmError>;
 
-    /// Takes what the sensor reads now for nothing. To be called at rest in free air.
+    /// Zeroes the sensor. To be called at rest in free air.
     ///
     /// # Errors
     /// As [`Self::command`].
     fn zero_sensor(&mut self) -> Result<(), ArmError>;
 
-    /// Lets it move again after a protective stop, once somebody has looked. Nothing else calls it, and it moves nothing.
+    /// Lets it move again after a protective stop, once an operator has looked. Nothing else calls it, and it moves nothing.
     ///
     /// # Errors
-    /// [`ArmError::Stopped`] when what stops it is still there, [`ArmError::Lost`].
+    /// [`ArmError::Stopped`] while the cause of the stop persists, [`ArmError::Lost`].
     fn recover(&mut self) -> Result<(), ArmError>;
 
     /// Time between two states, s.

@@ -82,8 +82,8 @@ impl UrGeometry {
         jacobian
     }
 
-    /// How far the arm is from where it cannot move some way: the smallest singular value of its Jacobian, with lengths in
-    /// units of upper arm and forearm together. Zero where it is stretched, where the hand is above the shoulder, and where
+    /// Distance of the arm from a singularity: the smallest singular value of its Jacobian, with lengths in
+    /// units of upper arm and forearm together. Zero where it is stretched, where the wrist is above the shoulder, and where
     /// axes 4 and 6 are parallel.
     pub fn dexterity(&self, joints: &Joints) -> f64 {
         let mut jacobian = self.jacobian(joints);
@@ -93,7 +93,7 @@ impl UrGeometry {
 
     /// All joint angles, within (−π, π], that bring the flange to a pose in B: eight at most, none out of reach.
     ///
-    /// Where axes 4 and 6 are parallel only their sum is told; there the sixth joint stays where `near` has it.
+    /// Where axes 4 and 6 are parallel only their sum is determined; there the sixth joint stays where `near` has it.
     pub fn inverse(&self, pose_bf: &Isometry3<f64>, near: &Joints) -> Vec<Joints> {
         let mut found = Vec::with_capacity(8);
         for q1 in self.shoulders(pose_bf) {
@@ -129,7 +129,7 @@ impl UrGeometry {
         let [x, y] = [Vector3::x(), Vector3::y()].map(|axis| across.dot(&(pose_bf.rotation * axis)));
         let at = |q5: f64| {
             let sign = q5.sin();
-            // axes 4 and 6 are parallel: their sum alone is told
+            // axes 4 and 6 are parallel: their sum alone is determined
             let q6 = if sign.abs() < PARALLEL { q6_near } else { (-y / sign).atan2(x / sign) };
             (q5, wrapped(q6))
         };

@@ -1,4 +1,4 @@
-//! What an arm must never leave, whatever it is asked for.
+//! The limits of an arm, which no request can exceed.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -11,7 +11,7 @@ use super::kinematics::{Joints, UrGeometry};
 parameters! {
     /// Bounds of every motion, from the configuration alone. A request may ask for less ([`Self::narrowed`]), never for more.
     ///
-    /// By default there is no box: where the arm may be is known by who mounted it.
+    /// By default there is no box: only the installer of the arm knows its workspace.
     #[derive(Clone, Debug, PartialEq)]
     pub struct Limits in "robot" {
         /// Smallest corner of the box that the centre of the ball stays in, in the base of the arm; with the default the arm can be
@@ -66,7 +66,7 @@ pub enum LimitError {
         /// of the tip in B, mm
         place_mm: [f64; 3],
     },
-    /// Too near to where the arm cannot move some way.
+    /// Too near to a singularity.
     #[error("at ({:.1} {:.1} {:.1}) mm the arm is nearly stuck: dexterity {dexterity:.3}, {least:.3} is the least",
             place_mm[0], place_mm[1], place_mm[2])]
     Singular {
@@ -99,7 +99,7 @@ pub enum LimitError {
         /// of it
         unit: &'static str,
     },
-    /// Too little to feel anything.
+    /// Too little for a contact.
     #[error("a force of {asked_n} N feels no surface: a touch takes more than {least_n} N")]
     TooSoft {
         /// N
@@ -117,7 +117,7 @@ pub enum LimitError {
     },
 }
 
-/// What a request asks for; `None`: as configured.
+/// The limits of a request; `None`: as configured.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Narrower {
     /// N
@@ -138,7 +138,7 @@ impl Limits {
         })
     }
 
-    /// These limits with what a request asks for.
+    /// These limits, tightened by a request.
     ///
     /// # Errors
     /// [`LimitError::Wider`], [`LimitError::NoLimit`].
@@ -178,8 +178,8 @@ impl Limits {
         self.check_place(&place)?;
         let place_mm = millimetres(&place);
         let solutions = geometry.inverse(&(pose_bt * pose_ft.inverse()), near);
-        let way = |joints: &Joints| joints.iter().zip(near).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        let nearest = solutions.into_iter().min_by(|a, b| way(a).total_cmp(&way(b)));
+        let travel = |joints: &Joints| joints.iter().zip(near).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let nearest = solutions.into_iter().min_by(|a, b| travel(a).total_cmp(&travel(b)));
         let joints = nearest.ok_or(LimitError::Reach { place_mm })?;
         let dexterity = geometry.dexterity(&joints);
         if dexterity < self.dexterity {

@@ -1,8 +1,8 @@
 //! An arm that holds a probe, and how it touches.
 //!
 //! [`Arm`] is what is needed of one, [`Limits`] what it must never leave. [`Watched::touch`] makes one touch and says where the part
-//! was felt: where the curve of force over travel bends ([`find_onset`]), not where the arm came to rest. [`Watched::slide`] presses with a
-//! constant force and goes along a way.
+//! was touched: where the curve of force over travel bends ([`find_onset`]), not where the arm came to rest. [`Watched::slide`] presses with a
+//! constant force and follows a path.
 
 mod interface;
 mod kinematics;
@@ -20,4 +20,4 @@ pub use onset::{Onset, OnsetError, OnsetParams, OnsetVerdict, TouchMoment, find_
 pub use sliding::{SlideEnding, SlideRecord, SlideStation, SlideTarget};
 pub use touch_params::{CRAWL, TouchParams};
 pub use touching::{TouchOutcome, TouchRecord, TouchTarget};
-pub use watched::{ProbeError, Watched, Witness};
+pub use watched::{Observer, ProbeError, Watched};

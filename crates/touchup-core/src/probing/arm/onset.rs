@@ -5,8 +5,8 @@
 //! s is the travel of the arm along its approach as it is reported, f the force against it, b what the sensor reads in free air,
 //! k the stiffness of arm, probe and part in series, τ how much later the force is stamped than the travel. While the arm
 //! presses, it is reported deeper than the tip is, by f/k; at the corner s₀ it is not. The fit takes the whole curve, so
-//! that neither the threshold at which the arm was told to stop nor its braking travel is in s₀. τ moves the corner forward
-//! going in and backward coming out: a touch that does both tells it.
+//! that neither the threshold at which the arm was commanded to stop nor its braking travel is in s₀. τ moves the corner forward
+//! going in and backward coming out: a touch that does both determines it.
 
 use nalgebra::{Cholesky, Matrix4, Vector3, Vector4};
 
@@ -48,12 +48,12 @@ parameters! {
     }
 }
 
-/// What the curve of a touch looks like.
+/// The class of the curve of a touch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OnsetVerdict {
     /// One line in free air, one in contact, the same in and out.
     Clean,
-    /// Going in and coming out differ: the tip went sideways or the part gave way.
+    /// Going in and coming out differ: the tip slipped sideways or the part yielded.
     Slip,
     /// Much of the force was across the approach: an edge, or a slope.
     Edge,
@@ -93,7 +93,7 @@ pub struct Onset {
     pub bias: f64,
     /// largest force above it, N
     pub peak: f64,
-    /// what the curve looks like
+    /// the class of the curve
     pub verdict: OnsetVerdict,
 }
 
@@ -122,8 +122,8 @@ pub enum OnsetError {
         /// which one
         index: usize,
     },
-    /// The fit does not come to rest.
-    #[error("force over travel is no bent line: the fit does not settle")]
+    /// The fit does not converge.
+    #[error("force over travel is no bent line: the fit does not converge")]
     NoFit,
 }
 
@@ -131,9 +131,9 @@ pub enum OnsetError {
 const LEAST: usize = 5;
 /// Rounds of Gauss–Newton; five are usual.
 const ROUNDS: usize = 60;
-/// The corner rests when a round moves it by less than this, m.
+/// The corner has converged when a round moves it by less than this, m.
 const REST: f64 = 1e-9;
-/// A fit that such a damping does not help rests.
+/// A fit that such a damping does not improve has converged.
 const MOST_DAMPING: f64 = 1e9;
 /// Times that the noise is taken from the residuals.
 const WEIGHINGS: usize = 3;
@@ -141,7 +141,7 @@ const WEIGHINGS: usize = 3;
 const SMOOTHED: f64 = 429.0 / 89.0;
 /// Neighbours farther away than this share nothing: twice the smoothing.
 const FARTHEST: usize = 2 * BESIDE;
-/// Deviations of the force that noise alone does not come to.
+/// Deviations of the force that noise alone does not reach.
 const NOISE: f64 = 6.0;
 /// Moments on each side that the travel is smoothed over: 20 ms at 500 Hz.
 const BESIDE: usize = 5;
@@ -156,7 +156,7 @@ const CLEARLY: f64 = 4.0;
 
 /// Fits the bent line to a touch.
 ///
-/// - `moments`: the approach through free air, the contact, and, as far as there is one, the way back.
+/// - `moments`: the approach through free air, the contact, and, as far as there is one, the retraction.
 ///
 /// # Errors
 /// [`OnsetError`].
@@ -211,7 +211,7 @@ fn check(moments: &[TouchMoment]) -> Result<(), OnsetError> {
 }
 
 /// Travel at each moment by a parabola through those around it \[Savitzky Golay 1964\], speed by a line through more of them. A
-/// speed that is noisy would look like one that changes, and so tell of a delay that is none.
+/// speed that is noisy would look like one that changes, and so simulate a delay.
 fn smoothed(moments: &[TouchMoment]) -> Vec<Smooth> {
     let around =
         |index: usize, beside: usize| &moments[index.saturating_sub(beside)..(index + beside + 1).min(moments.len())];
@@ -340,7 +340,7 @@ impl ForceCurve<'_> {
         self.moments.iter().map(of).sum::<f64>() + believed * believed
     }
 
-    /// Of a small change of the line, as [`Self::cost`] weighs the moments.
+    /// Of a small change of the line, as [`Self::cost`] weights the moments.
     fn normal_equations(&self, line: &LineFit) -> NormalEquations<4> {
         let mut equations = NormalEquations::default();
         for m in self.moments {
@@ -401,23 +401,23 @@ impl ForceCurve<'_> {
         // what the noise of the travel adds while it presses is shared over the smoothing
         let by_travel = ((all - alone) / all).max(0.0);
         let shared = [shared(&free), shared(&pressing).max(1.0 + by_travel * (SMOOTHED - 1.0))];
-        let weighed = ForceCurve {
+        let reweighted = ForceCurve {
             path: self.path.clone(),
             noise: [0, 1].map(|at| self.noise[at] * f64::sqrt(shared[at])),
             ..*self
         };
-        let mut square = weighed.normal_equations(line).information;
-        // of what tells of τ, some is noise of the speed
+        let mut square = reweighted.normal_equations(line).information;
+        // of the information on τ, some is noise of the speed
         let travel_variance = self.travel_variance();
         let noisy: f64 = (0..self.moments.len())
-            .filter(|&at| weighed.residual(&self.moments[at], line).1[S0] != 0.0)
+            .filter(|&at| reweighted.residual(&self.moments[at], line).1[S0] != 0.0)
             .map(|at| self.path[at].speed_variance * travel_variance)
             .sum();
-        let told = square[(TAU, TAU)];
-        square[(TAU, TAU)] += self.params.delay_sigma.powi(-2) - noisy * (line[K] / weighed.noise[1]).powi(2);
+        let information = square[(TAU, TAU)];
+        square[(TAU, TAU)] += self.params.delay_sigma.powi(-2) - noisy * (line[K] / reweighted.noise[1]).powi(2);
         let corrected = Cholesky::new(square).map(|square| square.inverse());
         corrected.or_else(|| {
-            square[(TAU, TAU)] = told + self.params.delay_sigma.powi(-2);
+            square[(TAU, TAU)] = information + self.params.delay_sigma.powi(-2);
             square.try_inverse()
         })
     }
@@ -441,7 +441,7 @@ impl ForceCurve<'_> {
         (0..self.path.len()).max_by(|&a, &b| self.path[a].travel.total_cmp(&self.path[b].travel)).unwrap_or(0)
     }
 
-    /// The force that counts as contact, N: noise alone does not come to it.
+    /// The force that counts as contact, N: noise alone does not reach it.
     fn contact_force(&self) -> f64 {
         self.params.contact_force.max(NOISE * self.params.force_noise)
     }

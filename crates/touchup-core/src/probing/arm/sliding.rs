@@ -1,6 +1,6 @@
-//! A slide: the ball is pressed on the surface with a constant force and goes along a way.
+//! A slide: the ball is pressed on the surface with a constant force and follows a path.
 //!
-//! The arm gives way along the normal of the station at hand alone; along the way it is driven, and beside it it is held. The way
+//! The arm complies along the normal of the current station alone; along the path it is driven, and beside it it is held. The path
 //! says where to go, the force how deep: a surface that lies elsewhere than was thought by less than a ball is followed.
 
 use nalgebra::{Isometry3, Unit, UnitQuaternion, Vector3};
@@ -9,7 +9,7 @@ use super::interface::{ArmState, Command};
 use super::touch_params::TouchParams;
 use super::watched::{ProbeError, TRIGGERS, Watched};
 
-/// A place on the way, in B.
+/// A station of the path, in B.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SlideStation {
     /// of the ball's centre, where it touches without pressing, m
@@ -18,7 +18,7 @@ pub struct SlideStation {
     pub normal: Unit<Vector3<f64>>,
 }
 
-/// A slide that is wanted, in B.
+/// A planned slide, in B.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SlideTarget {
     /// of the tip
@@ -43,11 +43,11 @@ impl SlideTarget {
 pub enum SlideEnding {
     /// at the last station
     Arrived,
-    /// nothing was felt at the first station
+    /// no contact at the first station
     NoSurface,
     /// the surface was lost
     Lost,
-    /// something stood in the way
+    /// an obstacle blocked the path
     Blocked,
 }
 
@@ -69,7 +69,7 @@ pub struct SlideRecord {
     pub ending: SlideEnding,
     /// when the ball began to move along and when it ended, by the arm's clock, ns
     pub stamps_ns: [i64; 2],
-    /// the station that it came to
+    /// the last station reached
     pub reached: usize,
     /// mean force along the normal, N
     pub mean_force: f64,
@@ -79,7 +79,7 @@ pub struct SlideRecord {
     pub peak_force: f64,
 }
 
-/// The force is looked at over this, s.
+/// The force is averaged over this, s.
 const WINDOW: f64 = 0.1;
 /// The ball goes along once the force has been within this share of what is set for a window …
 const SETTLED: f64 = 0.2;
@@ -89,11 +89,11 @@ const SETTLING: f64 = 1.0;
 const TURNING: f64 = 2.0;
 /// The normal that is pressed along is no farther ahead than so many stations.
 const MOST_AHEAD: f64 = 2.0;
-/// Beside the way it is brought back with this rate, 1/s.
-const BACK_TO_WAY: f64 = 5.0;
+/// A deviation from the path is corrected with this rate, 1/s.
+const BACK_TO_PATH: f64 = 5.0;
 /// Less than this share of the force for two windows is none.
 const NONE: f64 = 0.25;
-/// More than this share of the force against the way is something that stands in it: friction is less …
+/// More than this share of the force against the path is an obstacle: friction is less …
 const AGAINST: f64 = 0.8;
 /// … in so many states in a row: noise is not.
 const BLOCKED: usize = 4;
@@ -102,14 +102,14 @@ const PATIENCE: (f64, f64) = (3.0, 2.0);
 
 const SLIDING: &str = "sliding over the surface";
 
-/// How far a slide has got, and what was felt.
+/// Progress and contact of a slide.
 struct Slid<'a> {
     target: &'a SlideTarget,
     params: &'a TouchParams,
     station: usize,
     /// of each state
     forces: Vec<f64>,
-    /// states in a row without a surface, and with something in the way
+    /// states in a row without a surface, and with an obstacle
     none: usize,
     against: usize,
     /// states of a window
@@ -117,18 +117,18 @@ struct Slid<'a> {
 }
 
 impl Slid<'_> {
-    /// The direction of the way at the station at hand, unit vector, and the length to the next one, m.
+    /// The direction of the path at the current station, unit vector, and the length to the next one, m.
     fn ahead(&self) -> (Vector3<f64>, f64) {
         let stations = &self.target.stations;
-        let way = stations[self.station + 1].place - stations[self.station].place;
-        (way.try_normalize(0.0).unwrap_or_else(Vector3::zeros), way.norm())
+        let direction = stations[self.station + 1].place - stations[self.station].place;
+        (direction.try_normalize(0.0).unwrap_or_else(Vector3::zeros), direction.norm())
     }
 
     /// Goes on to the station that the ball has passed; whether there are more.
     fn advance(&mut self, place: &Vector3<f64>) -> bool {
         while self.station + 1 < self.target.stations.len() {
-            let (way, length) = self.ahead();
-            if (place - self.target.stations[self.station].place).dot(&way) < length {
+            let (direction, length) = self.ahead();
+            if (place - self.target.stations[self.station].place).dot(&direction) < length {
                 return true;
             }
             self.station += 1;
@@ -141,31 +141,31 @@ impl Slid<'_> {
         Command::Press { axis: -normal.into_inner(), force: self.params.force, feed, speed }
     }
 
-    /// On along the way, and back to it where the ball is beside it.
+    /// On along the path, and back to it where the ball is beside it.
     fn command(&self, place: &Vector3<f64>) -> Command {
         let SlideStation { place: station, normal: here } = self.target.stations[self.station];
         let next = self.target.stations[self.station + 1].normal;
-        let (way, length) = self.ahead();
+        let (direction, length) = self.ahead();
         let speed = self.params.slide_speed.min(TURNING * length / here.angle(&next).max(f64::MIN_POSITIVE));
-        // where the ball is when it does as it is told: half of the latency is on the way there
-        let gone = (place - station).dot(&way) + speed * self.params.latency / 2.0;
+        // where the ball is when the command takes effect: half of the latency is the transmission
+        let gone = (place - station).dot(&direction) + speed * self.params.latency / 2.0;
         let share = (gone / length.max(f64::MIN_POSITIVE)).clamp(0.0, MOST_AHEAD);
         let normal = Unit::new_normalize(here.into_inner() + (next.into_inner() - here.into_inner()) * share);
-        let side = normal.cross(&way);
+        let side = normal.cross(&direction);
         let beside = (place - station).dot(&side);
-        let along = way - normal.into_inner() * way.dot(&normal);
-        self.press(&normal, along * speed - side * (beside * BACK_TO_WAY).clamp(-speed, speed))
+        let along = direction - normal.into_inner() * direction.dot(&normal);
+        self.press(&normal, along * speed - side * (beside * BACK_TO_PATH).clamp(-speed, speed))
     }
 
-    /// Keeps what was felt; how it ended, if it has.
-    fn see(&mut self, state: &ArmState) -> Option<SlideEnding> {
+    /// Keeps the state; how the slide ended, if it has.
+    fn observe(&mut self, state: &ArmState) -> Option<SlideEnding> {
         let SlideStation { place, normal } = self.target.stations[self.station];
         let force = state.wrench_b.force.dot(&normal);
-        let (way, _) = self.ahead();
+        let (direction, _) = self.ahead();
         let off = (state.pose_bt.translation.vector - place).dot(&normal);
         self.forces.push(force);
         self.none = if force < NONE * self.params.force { self.none + 1 } else { 0 };
-        let is_against = -state.wrench_b.force.dot(&way) > AGAINST * self.params.force;
+        let is_against = -state.wrench_b.force.dot(&direction) > AGAINST * self.params.force;
         self.against = if is_against { self.against + 1 } else { 0 };
         if self.none > 2 * self.window || off.abs() > self.target.give + self.params.force / self.params.stiffness {
             Some(SlideEnding::Lost)
@@ -187,7 +187,7 @@ impl Slid<'_> {
 }
 
 impl Watched<'_> {
-    /// Slides once. The ball ends clear of the surface, beside the station that it came to.
+    /// Slides once. The ball ends clear of the surface, beside the last station reached.
     ///
     /// - `reached`: the station that the ball is at, also where this breaks off; `None` while it is not at the first.
     ///
@@ -205,9 +205,9 @@ impl Watched<'_> {
         let begun_ns = self.next(SLIDING)?.stamp_ns;
         let window = (WINDOW / self.period()).ceil() as usize;
         let mut slid = Slid { target, params, station: 0, forces: Vec::new(), none: 0, against: 0, window };
-        let is_felt = self.find_surface(target, params)?;
+        let is_contact = self.find_surface(target, params)?;
         let mut stamps_ns = [begun_ns; 2];
-        let ending = match is_felt {
+        let ending = match is_contact {
             false => SlideEnding::NoSurface,
             true => {
                 self.settle(&slid)?;
@@ -230,15 +230,15 @@ impl Watched<'_> {
     /// Down to the surface at the first station; whether it is there.
     fn find_surface(&mut self, target: &SlideTarget, params: &TouchParams) -> Result<bool, ProbeError> {
         let normal = target.stations[0].normal.into_inner();
-        let mut felt = 0;
+        let mut contacts = 0;
         self.search(
             "looking for the surface of a slide",
             -normal * params.safe_speed(),
             target.lift + target.give,
             &mut |_| {},
             &mut |state| {
-                felt = if state.wrench_b.force.norm() > params.trigger { felt + 1 } else { 0 };
-                felt >= TRIGGERS
+                contacts = if state.wrench_b.force.norm() > params.trigger { contacts + 1 } else { 0 };
+                contacts >= TRIGGERS
             },
         )
     }
@@ -250,7 +250,7 @@ impl Watched<'_> {
         let begun_ns = self.next(doing)?.stamp_ns;
         let mut settled = 0;
         while settled < slid.window {
-            self.tell(doing, &slid.press(&normal, Vector3::zeros()))?;
+            self.send(doing, &slid.press(&normal, Vector3::zeros()))?;
             let state = self.next(doing)?;
             let off = state.wrench_b.force.dot(&normal) - slid.params.force;
             settled = if off.abs() < SETTLED * slid.params.force { settled + 1 } else { 0 };
@@ -272,13 +272,13 @@ impl Watched<'_> {
         *stamps_ns = [state.stamp_ns; 2];
         while slid.advance(&state.pose_bt.translation.vector) {
             *reached = Some(slid.station);
-            if let Some(ending) = slid.see(&state) {
+            if let Some(ending) = slid.observe(&state) {
                 return Ok(ending);
             }
             if (state.stamp_ns - stamps_ns[0]) as f64 * 1e-9 > limit_s {
                 return self.too_long(SLIDING, limit_s);
             }
-            self.tell(SLIDING, &slid.command(&state.pose_bt.translation.vector))?;
+            self.send(SLIDING, &slid.command(&state.pose_bt.translation.vector))?;
             state = self.next(SLIDING)?;
             stamps_ns[1] = state.stamp_ns;
         }
@@ -289,7 +289,7 @@ impl Watched<'_> {
     /// Off the surface along its normal.
     fn leave(&mut self, target: &SlideTarget, station: usize, params: &TouchParams) -> Result<(), ProbeError> {
         let doing = "leaving the surface after a slide";
-        self.rest(doing, &mut |_| {})?;
+        self.halt(doing, &mut |_| {})?;
         self.line(doing, &target.lifted(station), params.safe_speed(), params, self.limits().force)
     }
 }

@@ -19,7 +19,7 @@ parameters! {
         trigger: f64 = 1.0, "trigger_n" [N, 0.05, 80];
         /// Speed through free air.
         ///
-        /// In m/s: between touches, where the way is clear.
+        /// In m/s: between touches, where the path is clear.
         link_speed: f64 = 50.0, "link_mm_per_s" [MM_PER_S, 0.1, 250];
         /// Speed while searching; slower where tip.stiffness_n_per_mm asks for it.
         ///
@@ -50,7 +50,7 @@ parameters! {
     }
 }
 
-/// Share of the force of a touch at which a search may stop: the rest is for its braking.
+/// Share of the force of a touch at which a search may stop: the remainder is for its braking.
 const MOST_TRIGGER: f64 = 0.8;
 
 impl TouchParams {

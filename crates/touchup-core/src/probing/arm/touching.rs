@@ -1,7 +1,7 @@
 //! One touch: approach, search, back off, a slower search, retract.
 //!
-//! The first search finds the surface; the second comes from just above it, slowly, presses to the force that was asked for,
-//! and goes back through the corner at the same speed. Its curve is what [`find_onset`] is given.
+//! The first search finds the surface; the second comes from just above it, slowly, presses to the set force,
+//! and goes back through the corner at the same speed. Its curve is the input of [`find_onset`].
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
@@ -13,7 +13,7 @@ use super::onset::{Onset, OnsetError, TouchMoment, find_onset};
 use super::touch_params::TouchParams;
 use super::watched::{GOING, ProbeError, TRIGGERS, Watched};
 
-/// A touch that is wanted, in B.
+/// A planned touch, in B.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TouchTarget {
     /// Where the search begins: the pose of the tip, clear of the part.
@@ -22,14 +22,14 @@ pub struct TouchTarget {
     pub direction: Unit<Vector3<f64>>,
     /// How far, m.
     pub search: f64,
-    /// Where the surface will be, as far as touches have told.
+    /// Where the surface will be, as predicted from the touches so far.
     pub expected: Option<Expected>,
 }
 
-/// What came of a touch.
+/// The outcome of a touch.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TouchOutcome {
-    /// The part was felt.
+    /// The ball touched the part.
     Contact {
         /// where the curve bends
         onset: Onset,
@@ -38,19 +38,19 @@ pub enum TouchOutcome {
         /// mean force of the part on the tip while pressed by more than half of the most, N in B
         force_b: Vector3<f64>,
     },
-    /// Nothing was felt on the whole way.
+    /// No contact along the whole search.
     Miss {
         /// how far the ball went from the stand-off, m
         travel: f64,
     },
-    /// Something was felt whose curve says nothing.
+    /// A contact whose curve has no onset.
     Unclear(OnsetError),
 }
 
 /// A touch with all that was seen of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TouchRecord {
-    /// what was wanted
+    /// as planned
     pub target: TouchTarget,
     /// when it began and ended, by the arm's clock, ns
     pub stamps_ns: [i64; 2],
@@ -62,7 +62,7 @@ pub struct TouchRecord {
     pub curve_ns: i64,
     /// of all, N
     pub peak_force: f64,
-    /// what came of it
+    /// its outcome
     pub outcome: TouchOutcome,
 }
 
@@ -78,15 +78,15 @@ impl Watched<'_> {
         let line = ApproachLine::of(target);
         let travel = target.search.min(self.limits().search);
 
-        let fast = line.way * params.safe_speed().min(self.limits().speed);
-        let mut felt = 0;
+        let fast = line.direction * params.safe_speed().min(self.limits().speed);
+        let mut contacts = 0;
         let mut reached = 0.0;
         let mut searched = |watched: &mut Self, doing, far: f64| {
             watched.search(doing, fast, far, &mut |state| reached = line.depth(state), &mut |state| {
-                let is_felt =
+                let is_contact =
                     line.presses(state) > params.trigger || state.wrench_b.force.norm() > ASIDE * params.trigger;
-                felt = if is_felt { felt + 1 } else { 0 };
-                felt >= TRIGGERS
+                contacts = if is_contact { contacts + 1 } else { 0 };
+                contacts >= TRIGGERS
             })
         };
         let mut states = Vec::new();
@@ -94,14 +94,14 @@ impl Watched<'_> {
         // where the surface is known it is measured at once, from just above it
         let known = target.expected.map(|expected| (expected.travel, KNOWN * expected.sigma + params.back_off));
         let mut gone = 0.0;
-        let mut is_felt = false;
+        let mut is_contact = false;
         if let Some((at, room)) =
             known.filter(|(at, room)| *room <= MOST_ROOM * params.back_off && room < at && at + room <= travel)
         {
             gone = at - room;
-            is_felt = searched(self, "approaching", gone)?;
-            self.rest("approaching", &mut |_| {})?;
-            if !is_felt {
+            is_contact = searched(self, "approaching", gone)?;
+            self.halt("approaching", &mut |_| {})?;
+            if !is_contact {
                 let pressed = self.press(target, params, room + at - gone, &mut states)?;
                 gone = self.last().map_or(gone, |state| line.depth(&state)).max(gone);
                 outcome = pressed.then(|| outcome_of(&line, params, &states));
@@ -109,21 +109,21 @@ impl Watched<'_> {
         }
         let outcome = match outcome {
             Some(outcome) => outcome,
-            None if is_felt || searched(self, "searching", travel - gone)? => {
-                self.rest("stopping at the surface", &mut |_| {})?;
+            None if is_contact || searched(self, "searching", travel - gone)? => {
+                self.halt("stopping at the surface", &mut |_| {})?;
                 let is_free = self.back_off(target, params)?;
                 match is_free && self.press(target, params, SECOND * params.back_off, &mut states)? {
                     true => outcome_of(&line, params, &states),
-                    false => unfelt(&line, params, &states),
+                    false => no_contact(&line, params, &states),
                 }
             }
             None => {
                 states.clear();
-                self.rest("stopping after a miss", &mut |_| {})?;
+                self.halt("stopping after a miss", &mut |_| {})?;
                 TouchOutcome::Miss { travel: reached }
             }
         };
-        // on the way back the part may still be felt
+        // on the retraction the part may be in contact
         self.line("retracting", &target.standoff_bt, params.link_speed, params, self.limits().force)?;
         let ended = self.last().map_or(begun, |state| state.stamp_ns);
         Ok(TouchRecord {
@@ -150,11 +150,11 @@ impl Watched<'_> {
             }
             free_at.is_some_and(|free_at: f64| line.depth(state) < free_at - params.back_off)
         })?;
-        self.rest("backing off", &mut |_| {})?;
+        self.halt("backing off", &mut |_| {})?;
         Ok(is_free)
     }
 
-    /// The measuring search, from just above the surface, in and out; whether it pressed as hard as was wanted.
+    /// The measuring search, from just above the surface, in and out; whether it reached the wanted force.
     ///
     /// - `room`: so far away the surface is at most, m.
     fn press(
@@ -177,7 +177,7 @@ impl Watched<'_> {
             &mut |state| is_pressed(state) || state.wrench_b.force.norm() > ASIDE * stop_at,
         )?;
         let pressed = states.iter().any(is_pressed);
-        self.rest("measuring", &mut |state| states.push(*state))?;
+        self.halt("measuring", &mut |state| states.push(*state))?;
         if let Some(corner) =
             states.iter().find(|state| state.wrench_b.force.norm() > params.trigger).map(|at| line.depth(at))
         {
@@ -188,7 +188,7 @@ impl Watched<'_> {
                 &mut |state| states.push(*state),
                 &mut |state| line.depth(state) < corner - params.back_off,
             )?;
-            self.rest("coming back from the surface", &mut |_| {})?;
+            self.halt("coming back from the surface", &mut |_| {})?;
         }
         Ok(pressed)
     }
@@ -208,36 +208,36 @@ impl Watched<'_> {
 /// The line that a touch is made along.
 struct ApproachLine {
     start: Vector3<f64>,
-    way: Vector3<f64>,
+    direction: Vector3<f64>,
 }
 
 impl ApproachLine {
     fn of(target: &TouchTarget) -> Self {
-        Self { start: target.standoff_bt.translation.vector, way: target.direction.into_inner() }
+        Self { start: target.standoff_bt.translation.vector, direction: target.direction.into_inner() }
     }
 
     /// How far the ball has come, m.
     fn depth(&self, state: &ArmState) -> f64 {
-        (state.pose_bt.translation.vector - self.start).dot(&self.way)
+        (state.pose_bt.translation.vector - self.start).dot(&self.direction)
     }
 
     /// Force against it, N.
     fn presses(&self, state: &ArmState) -> f64 {
-        -state.wrench_b.force.dot(&self.way)
+        -state.wrench_b.force.dot(&self.direction)
     }
 
     fn curve(&self, states: &[ArmState]) -> Vec<TouchMoment> {
         let begun = states.first().map_or(0, |state| state.stamp_ns);
         let moment = |state: &ArmState| {
             let force = self.presses(state);
-            let lateral = (state.wrench_b.force + self.way * force).norm();
+            let lateral = (state.wrench_b.force + self.direction * force).norm();
             TouchMoment { t: (state.stamp_ns - begun) as f64 * 1e-9, travel: self.depth(state), force, lateral }
         };
         states.iter().map(moment).collect()
     }
 }
 
-/// What a curve tells that pressed as hard as was wanted.
+/// The outcome of a curve that reached the wanted force.
 fn outcome_of(line: &ApproachLine, params: &TouchParams, states: &[ArmState]) -> TouchOutcome {
     let onset = match find_onset(&line.curve(states), &params.onset) {
         Ok(onset) => onset,
@@ -246,29 +246,29 @@ fn outcome_of(line: &ApproachLine, params: &TouchParams, states: &[ArmState]) ->
     // the line that the ball went along, by all poses of the curve
     let aside = states.iter().map(|state| {
         let gone = state.pose_bt.translation.vector - line.start;
-        gone - line.way * gone.dot(&line.way)
+        gone - line.direction * gone.dot(&line.direction)
     });
     let aside = mean(aside);
     let hard = states.iter().filter(|state| line.presses(state) - onset.bias > 0.5 * onset.peak);
     let (sum, count) = hard.fold((Vector3::zeros(), 0u32), |(sum, n), state| (sum + state.wrench_b.force, n + 1));
-    let centre = Point3::from(line.start + line.way * onset.travel + aside);
+    let centre = Point3::from(line.start + line.direction * onset.travel + aside);
     TouchOutcome::Contact { onset, centre, force_b: sum / f64::from(count.max(1)) }
 }
 
-/// The first search felt something that the second did not.
-fn unfelt(line: &ApproachLine, params: &TouchParams, states: &[ArmState]) -> TouchOutcome {
+/// The first search made a contact that the second did not.
+fn no_contact(line: &ApproachLine, params: &TouchParams, states: &[ArmState]) -> TouchOutcome {
     let peak_n = states.iter().map(|state| line.presses(state)).fold(0.0, f64::max);
     TouchOutcome::Unclear(OnsetError::NoContact { peak_n, contact_n: params.force })
 }
 
-/// A ball is stopped as well when all it feels is more than this many times what it is stopped at along its way: a wall that it
+/// A ball is stopped as well when its whole force is more than this many times the limit along its direction: a wall that it
 /// meets at 45° pushes √2 times as much.
 const ASIDE: f64 = 1.42;
 /// Where the surface is known to so many standard deviations it is not searched first …
 const KNOWN: f64 = 4.0;
 /// … as long as they leave no more room than this, over the back-off.
 const MOST_ROOM: f64 = 3.0;
-/// The way back is this much faster than the measuring search.
+/// The retraction is this much faster than the measuring search.
 const BACK: f64 = 2.0;
 /// Below this share of the trigger the tip is free.
 const FREE: f64 = 0.5;

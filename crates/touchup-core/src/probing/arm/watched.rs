@@ -1,5 +1,5 @@
-//! An arm that is watched while it moves: each state is looked at before the next is waited for; what is wrong stops the arm first
-//! and is told second.
+//! An arm that is watched while it moves: each state is checked before the next is awaited; a fault stops the arm first
+//! and is reported second.
 
 use std::collections::VecDeque;
 
@@ -9,7 +9,7 @@ use super::interface::{Arm, ArmError, ArmState, Command, Safety};
 use super::limits::{LimitError, Limits};
 use super::touch_params::TouchParams;
 
-/// Why probing was broken off. The arm was told to stop before this was made.
+/// Why probing was broken off. The arm was commanded to stop before this was made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ProbeError {
     /// The arm.
@@ -28,10 +28,10 @@ pub enum ProbeError {
         /// which
         error: LimitError,
     },
-    /// Something was in the way where nothing should be.
-    #[error("while {doing}: {force_n:.1} N at ({:.1} {:.1} {:.1}) mm, where the way is clear by the mesh; look what is there",
+    /// An obstacle where the path should be clear.
+    #[error("while {doing}: {force_n:.1} N at ({:.1} {:.1} {:.1}) mm, where the path is clear by the mesh; look what is there",
             place_mm[0], place_mm[1], place_mm[2])]
-    InTheWay {
+    Obstacle {
         /// what was being done
         doing: &'static str,
         /// N
@@ -51,7 +51,7 @@ pub enum ProbeError {
         /// ms
         period_ms: f64,
     },
-    /// A motion does not come to its end.
+    /// A motion does not end.
     #[error("while {doing}: the arm did not arrive within {limit_s:.1} s")]
     TooLong {
         /// what was being done
@@ -59,7 +59,7 @@ pub enum ProbeError {
         /// s
         limit_s: f64,
     },
-    /// Somebody wanted it.
+    /// A request cancelled it.
     #[error("cancelled while {doing}")]
     Cancelled {
         /// what was being done
@@ -76,27 +76,27 @@ impl ProbeError {
         match self {
             Self::Arm { doing, .. }
             | Self::Limit { doing, .. }
-            | Self::InTheWay { doing, .. }
+            | Self::Obstacle { doing, .. }
             | Self::LowRate { doing, .. }
             | Self::TooLong { doing, .. }
             | Self::Cancelled { doing } => doing,
         }
     }
 
-    /// Whether a touch that ended so had come to its stand-off.
+    /// Whether a touch that ended so had reached its stand-off.
     pub(crate) fn was_at_standoff(&self) -> bool {
         self.doing() != GOING
     }
 }
 
-/// States whose stamps stand still before that is a fault.
-const STILL: u32 = 5;
+/// States with equal stamps before that is a fault.
+const FROZEN: u32 = 5;
 /// States may come this many periods apart.
 const LATE: f64 = 10.0;
 /// An arm is at rest when it is not farther than this from where it was [`REST_STATES`] before, m: above the noise of what is
 /// reported. At 500 Hz that is 3 mm/s, from which 0.5 m/s² stop within 9 µm.
 const REST: f64 = 60e-6;
-/// States that rest is looked at over.
+/// States over which rest is tested.
 const REST_STATES: usize = 10;
 /// A line has ended within this of its end, m.
 const THERE: f64 = 80e-6;
@@ -109,12 +109,12 @@ const PATIENCE: (f64, f64) = (3.0, 2.0);
 /// Forces above the trigger in a row that are contact; one alone is noise.
 pub(super) const TRIGGERS: u32 = 2;
 
-/// Who is there while an arm moves.
-pub trait Witness {
-    /// Is shown each state, in their order.
-    fn see(&mut self, state: &ArmState);
+/// Observes an arm while it moves.
+pub trait Observer {
+    /// Receives each state, in their order.
+    fn on_state(&mut self, state: &ArmState);
 
-    /// Is asked after each state whether somebody wants it to end.
+    /// Is asked after each state whether to cancel.
     fn is_cancelled(&self) -> bool {
         false
     }
@@ -124,19 +124,19 @@ pub trait Witness {
 pub struct Watched<'a> {
     arm: &'a mut dyn Arm,
     limits: Limits,
-    witness: &'a mut dyn Witness,
+    observer: &'a mut dyn Observer,
     last: Option<ArmState>,
-    still: u32,
+    frozen: u32,
     peak_force: f64,
 }
 
 impl<'a> Watched<'a> {
-    /// - `witness`: is shown each state, and may have it stop.
-    pub fn new(arm: &'a mut dyn Arm, limits: Limits, witness: &'a mut dyn Witness) -> Self {
-        Self { arm, limits, witness, last: None, still: 0, peak_force: 0.0 }
+    /// - `observer`: receives each state, and may cancel.
+    pub fn new(arm: &'a mut dyn Arm, limits: Limits, observer: &'a mut dyn Observer) -> Self {
+        Self { arm, limits, observer, last: None, frozen: 0, peak_force: 0.0 }
     }
 
-    /// The largest force of the touch at hand, or of all lines where there was none, N.
+    /// The largest force of the current touch, or of all lines where there was none, N.
     pub fn peak_force(&self) -> f64 {
         self.peak_force
     }
@@ -146,7 +146,7 @@ impl<'a> Watched<'a> {
         self.last.map(|state| state.stamp_ns)
     }
 
-    /// Has the largest force begin anew.
+    /// Resets the largest force.
     pub(super) fn forget_peak(&mut self) {
         self.peak_force = 0.0;
     }
@@ -164,11 +164,11 @@ impl<'a> Watched<'a> {
         self.arm.period()
     }
 
-    /// The next state, when nothing is wrong with it.
+    /// The next state, if it is valid.
     pub(super) fn next(&mut self, doing: &'static str) -> Result<ArmState, ProbeError> {
         let result = self.look(doing);
         if result.is_err() {
-            // stop first, report second; where it cannot be told, its watchdog stops it
+            // stop first, report second; where no command gets through, its watchdog stops it
             let _ = self.arm.command(&Command::Stop { deceleration: self.limits.acceleration });
         }
         result
@@ -177,11 +177,11 @@ impl<'a> Watched<'a> {
     fn look(&mut self, doing: &'static str) -> Result<ArmState, ProbeError> {
         let arm = |error| ProbeError::Arm { doing, error };
         let state = self.arm.next_state().map_err(arm)?;
-        self.witness.see(&state);
+        self.observer.on_state(&state);
         if let Some(last) = self.last.replace(state) {
             let gap = (state.stamp_ns - last.stamp_ns) as f64 * 1e-9;
-            self.still = if gap > 0.0 { 0 } else { self.still + 1 };
-            if self.still >= STILL {
+            self.frozen = if gap > 0.0 { 0 } else { self.frozen + 1 };
+            if self.frozen >= FROZEN {
                 return Err(arm(ArmError::Stale));
             }
             if gap > LATE * self.arm.period() {
@@ -193,20 +193,20 @@ impl<'a> Watched<'a> {
         }
         self.peak_force = self.peak_force.max(state.wrench_b.force.norm());
         self.limits.check_state(&state).map_err(|error| ProbeError::Limit { doing, error })?;
-        if self.witness.is_cancelled() {
+        if self.observer.is_cancelled() {
             return Err(ProbeError::Cancelled { doing });
         }
         Ok(state)
     }
 
-    pub(super) fn tell(&mut self, doing: &'static str, command: &Command) -> Result<(), ProbeError> {
+    pub(super) fn send(&mut self, doing: &'static str, command: &Command) -> Result<(), ProbeError> {
         self.arm.command(command).map_err(|error| ProbeError::Arm { doing, error })
     }
 
     /// Goes straight to a pose through what should be free air.
     ///
     /// # Errors
-    /// [`ProbeError`]; [`ProbeError::InTheWay`] when more than `trigger` (N) is felt.
+    /// [`ProbeError`]; [`ProbeError::Obstacle`] when the force exceeds `trigger` (N).
     ///
     /// - `speed`: m/s; near the part not above `TouchParams::safe_speed`.
     pub fn line(
@@ -226,17 +226,17 @@ impl<'a> Watched<'a> {
         let turn = begun.pose_bt.rotation.angle_to(&to.rotation);
         let limit_s = PATIENCE.0 * (distance / speed + speed / acceleration + turn / TURN_SPEED) + PATIENCE.1;
         let command = Command::Line { to: *to, speed, acceleration };
-        self.tell(doing, &command)?;
-        let mut felt = 0;
+        self.send(doing, &command)?;
+        let mut contacts = 0;
         loop {
             let state = self.next(doing)?;
             let force_n = state.wrench_b.force.norm();
-            felt = if force_n > trigger { felt + 1 } else { 0 };
-            if felt >= TRIGGERS {
-                self.tell(doing, &Command::Stop { deceleration: self.limits.acceleration })?;
+            contacts = if force_n > trigger { contacts + 1 } else { 0 };
+            if contacts >= TRIGGERS {
+                self.send(doing, &Command::Stop { deceleration: self.limits.acceleration })?;
                 let place_mm = (state.pose_bt.translation.vector * 1e3).into();
                 let is_link = speed > params.safe_speed();
-                return Err(ProbeError::InTheWay { doing, force_n, place_mm, is_link });
+                return Err(ProbeError::Obstacle { doing, force_n, place_mm, is_link });
             }
             let turn = state.pose_bt.rotation.angle_to(&to.rotation);
             if (state.pose_bt.translation.vector - place).norm() < THERE && turn < TURNED {
@@ -245,39 +245,39 @@ impl<'a> Watched<'a> {
             if (state.stamp_ns - begun.stamp_ns) as f64 * 1e-9 > limit_s {
                 return self.too_long(doing, limit_s);
             }
-            // the watchdog of the arm wants to hear it again and again
-            self.tell(doing, &command)?;
+            // the watchdog of the arm needs the command repeated
+            self.send(doing, &command)?;
         }
     }
 
-    /// Stops, waits until the arm stands, and takes what it feels for nothing.
+    /// Stops, waits until the arm is at rest, and zeroes the sensor.
     ///
     /// # Errors
     /// [`ProbeError`]
     pub fn zero(&mut self) -> Result<(), ProbeError> {
         let doing = "zeroing the sensor in free air";
-        self.rest(doing, &mut |_| {})?;
+        self.halt(doing, &mut |_| {})?;
         self.arm.zero_sensor().map_err(|error| ProbeError::Arm { doing, error })?;
         // that took its time
         self.last = None;
         Ok(())
     }
 
-    /// Stops, waits until the arm stands, and shows the states of some time (s) after that.
+    /// Stops, waits until the arm is at rest, and passes on the states of some time (s) after that.
     ///
     /// # Errors
     /// [`ProbeError`]
-    pub fn stand(
+    pub fn dwell(
         &mut self,
         doing: &'static str,
         seconds: f64,
         each: &mut dyn FnMut(&ArmState),
     ) -> Result<(), ProbeError> {
-        self.rest(doing, &mut |_| {})?;
+        self.halt(doing, &mut |_| {})?;
         let command = Command::Stop { deceleration: self.limits.acceleration };
         let mut begun_ns = None;
         loop {
-            self.tell(doing, &command)?;
+            self.send(doing, &command)?;
             let state = self.next(doing)?;
             let begun_ns = *begun_ns.get_or_insert(state.stamp_ns);
             if (state.stamp_ns - begun_ns) as f64 * 1e-9 >= seconds {
@@ -287,13 +287,13 @@ impl<'a> Watched<'a> {
         }
     }
 
-    /// Stops, and waits until it stands.
-    pub(super) fn rest(&mut self, doing: &'static str, each: &mut dyn FnMut(&ArmState)) -> Result<(), ProbeError> {
+    /// Stops, and waits until the arm is at rest.
+    pub(super) fn halt(&mut self, doing: &'static str, each: &mut dyn FnMut(&ArmState)) -> Result<(), ProbeError> {
         let command = Command::Stop { deceleration: self.limits.acceleration };
         let limit_s = PATIENCE.0 * self.limits.speed / self.limits.acceleration + PATIENCE.1;
         let (mut places, mut begun_ns) = (VecDeque::new(), None);
         loop {
-            self.tell(doing, &command)?;
+            self.send(doing, &command)?;
             let state = self.next(doing)?;
             each(&state);
             let place = state.pose_bt.translation.vector;
@@ -324,7 +324,7 @@ impl<'a> Watched<'a> {
         let begun = self.next(doing)?;
         let limit_s = PATIENCE.0 * travel / velocity.norm() + PATIENCE.1;
         loop {
-            self.tell(doing, &command)?;
+            self.send(doing, &command)?;
             let state = self.next(doing)?;
             each(&state);
             if until(&state) {
@@ -341,7 +341,7 @@ impl<'a> Watched<'a> {
     }
 
     pub(super) fn too_long<T>(&mut self, doing: &'static str, limit_s: f64) -> Result<T, ProbeError> {
-        self.tell(doing, &Command::Stop { deceleration: self.limits.acceleration })?;
+        self.send(doing, &Command::Stop { deceleration: self.limits.acceleration })?;
         Err(ProbeError::TooLong { doing, limit_s })
     }
 }

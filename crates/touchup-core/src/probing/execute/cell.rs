@@ -1,4 +1,4 @@
-//! Where the part stands to the arm, and what the arm holds.
+//! The pose of the part relative to the arm, and the tool of the arm.
 
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 
@@ -41,7 +41,7 @@ impl Cell {
         Unit::new_normalize(self.pose_bo.rotation.inverse() * (rotation * Vector3::z()))
     }
 
-    /// Orientation of the tip in B that has the shaft stand on a surface: as it is now where that is near enough.
+    /// Orientation of the tip in B that aligns the shaft with the normal of a surface: as it is now where that is near enough.
     pub fn upright(&self, now: &UnitQuaternion<f64>, normal: &Unit<Vector3<f64>>) -> UnitQuaternion<f64> {
         let (shaft, out) = (now * Vector3::z(), self.pose_bo.rotation * normal.into_inner());
         if shaft.angle(&out) < LEANS {
@@ -62,7 +62,7 @@ impl Cell {
         self.pose(&turn, &middle)
     }
 
-    /// Whether the arm may have its tip there.
+    /// Whether the limits allow the tip there.
     ///
     /// # Errors
     /// As [`Limits::check_pose`].

@@ -1,4 +1,4 @@
-//! What would be done: the touches that the mesh as it is would lead to, checked, without an arm that moves.
+//! Dry run: the touches and paths that the current mesh leads to, checked, without moving the arm.
 
 use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
 
@@ -9,7 +9,7 @@ use super::world::{World, distance, normal_about, on_mesh};
 use crate::probing::arm::ArmState;
 use crate::probing::plan::{ExploreError, Explorer, PatternParams, Slide, TouchPlan, TouchResult};
 
-/// What would be done for a flag.
+/// The plan for a flag.
 #[derive(Clone, Debug, Default)]
 pub struct Plan {
     /// the places that the ball's centre goes through, in O, m
@@ -17,7 +17,7 @@ pub struct Plan {
     /// moves through free air, from and to, in O, m
     pub links: Vec<[Point3<f64>; 2]>,
     /// the touches, as they would come if the part were as the mesh has it
-    pub wishes: Vec<TouchPlan>,
+    pub touches: Vec<TouchPlan>,
     /// the slides after them
     pub slides: Vec<Slide>,
     /// what cannot be done, in words, with the number of the touch; slides are counted on
@@ -55,12 +55,12 @@ pub fn plan(
     let clear = |place: &Point3<f64>, reach: f64| distance(world, place, reach);
     let mut at = ToolState { place: cell.place(&now.pose_bt), rotation: now.pose_bt.rotation, joints: now.joints };
     let mut plan = Plan { path: vec![at.place], ..Plan::default() };
-    while let Some(wish) = explorer.wish() {
-        let number = plan.wishes.len();
-        plan.wishes.push(wish);
-        let reached = may_touch(cell, &params.limits, &rotation, &wish, &at.joints).map_err(Barred::from);
-        let routed =
-            reached.and_then(|joints| Ok((joints, route(cell, &params.limits, world, &at, &rotation, &wish.entry)?)));
+    while let Some(planned) = explorer.next_touch() {
+        let number = plan.touches.len();
+        plan.touches.push(planned);
+        let reached = may_touch(cell, &params.limits, &rotation, &planned, &at.joints).map_err(Barred::from);
+        let routed = reached
+            .and_then(|joints| Ok((joints, route(cell, &params.limits, world, &at, &rotation, &planned.entry)?)));
         let stops = match routed {
             Ok((joints, Route { stops, .. })) => {
                 at.joints = joints;
@@ -73,11 +73,11 @@ pub fn plan(
             }
         };
         plan.go(&mut at, stops);
-        let felt = felt_on_mesh(&wish, params.pattern.ball_radius, &clear, params.pattern.touch_sigma);
-        let end = if let TouchResult::At { centre, .. } = felt { centre } else { wish.from };
+        let result = contact_on_mesh(&planned, params.pattern.ball_radius, &clear, params.pattern.touch_sigma);
+        let end = if let TouchResult::At { centre, .. } = result { centre } else { planned.from };
         // in again and out, slowly
-        plan.path.extend([wish.from, end, wish.from, at.place]);
-        explorer.take(&felt);
+        plan.path.extend([planned.from, end, planned.from, at.place]);
+        explorer.take(&result);
     }
     let slides = if params.slides { explorer.slides() } else { Vec::new() };
     for slide in slides {
@@ -93,25 +93,25 @@ pub fn plan(
                 plan.path.extend(slide.stations.iter().map(|station| station.centre));
                 plan.path.extend([slide.lifted(last), slide.above(last), at.place]);
             }
-            Err(error) => plan.held_back.push((plan.wishes.len() + plan.slides.len(), error.to_string())),
+            Err(error) => plan.held_back.push((plan.touches.len() + plan.slides.len(), error.to_string())),
         }
         plan.slides.push(slide);
     }
     Ok(plan)
 }
 
-/// What a ball would feel of the mesh: it goes on in steps of what is left, until nothing is.
-fn felt_on_mesh(
-    wish: &TouchPlan,
+/// First contact of a ball with the mesh, by sphere tracing: each step is the distance that is left.
+fn contact_on_mesh(
+    planned: &TouchPlan,
     ball_radius: f64,
     distance: &dyn Fn(&Point3<f64>, f64) -> f64,
     sigma: f64,
 ) -> TouchResult {
-    let along: Unit<Vector3<f64>> = wish.direction;
+    let along: Unit<Vector3<f64>> = planned.direction;
     let mut gone = 0.0;
-    while gone <= wish.search {
-        let centre = wish.from + along.into_inner() * gone;
-        let left = distance(&centre, ball_radius + wish.search) - ball_radius;
+    while gone <= planned.search {
+        let centre = planned.from + along.into_inner() * gone;
+        let left = distance(&centre, ball_radius + planned.search) - ball_radius;
         if left < TOUCHES {
             return TouchResult::At { centre, sigma };
         }

@@ -9,19 +9,19 @@ use crate::probing::plan::{ExploreError, Found, Slide, TouchPlan};
 /// How it ended.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Ending {
-    /// The number is known as well as was asked.
+    /// The number has the requested uncertainty.
     ToleranceReached,
     /// The touches are spent; it is as good as they made it.
     TouchesSpent,
     /// The time is spent.
     TimeSpent,
-    /// There is no such feature where it was looked for.
+    /// There is no such feature where it was searched.
     NothingFound(ExploreError),
-    /// Somebody wanted it to end: the arm stopped, and retracted.
+    /// A request cancelled it: the arm stopped, and retracted.
     Cancelled,
     /// The arm did not move: it would leave its limits.
     OutOfLimits(LimitError),
-    /// The arm did not move: nothing is clear of the mesh.
+    /// The arm did not move: no path is clear of the mesh.
     NoClearPath(LinkError),
     /// The arm stopped.
     Stopped(ProbeError),
@@ -45,11 +45,11 @@ impl std::fmt::Display for Ending {
 /// One touch of a probing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProbedTouch {
-    /// what was wanted, in O
-    pub wish: TouchPlan,
-    /// what was seen; `None` when the arm was held back before
+    /// as planned, in O
+    pub planned: TouchPlan,
+    /// as measured; `None` when the arm was held back before
     pub record: Option<TouchRecord>,
-    /// centre of the ball where it was felt, m in O
+    /// centre of the ball at contact, m in O
     pub centre: Option<Point3<f64>>,
     /// of the contact from the mesh as it was before, m, positive outside
     pub deviation: Option<f64>,
@@ -58,7 +58,7 @@ pub struct ProbedTouch {
 }
 
 impl Probed {
-    /// Before anything was done.
+    /// Before the first motion.
     pub(super) fn not_begun(flag: u32, ending: Ending) -> Self {
         let (touches, slides) = (Vec::new(), Vec::new());
         Self { flag, ending, found: None, touches, slides, seconds: 0.0, peak_force: 0.0 }
@@ -68,15 +68,15 @@ impl Probed {
 /// One slide of a probing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProbedSlide {
-    /// what was wanted, in O
+    /// as planned, in O
     pub slide: Slide,
-    /// what was seen; `None` when the arm was held back before
+    /// as measured; `None` when the arm was held back before
     pub record: Option<SlideRecord>,
     /// why it was not made; `None`: it was
     pub refused: Option<String>,
 }
 
-/// What came of a flag.
+/// The result of a flag.
 #[derive(Clone, Debug)]
 pub struct Probed {
     /// its number

@@ -1,7 +1,7 @@
-//! Ways through free air that keep clear of the mesh.
+//! Paths through free air that keep clear of the mesh.
 //!
-//! A way goes straight, or up, over and down at the lowest height at which all three keep clear. A straight line is clear when the
-//! ball, and the shaft above it, stay farther from the mesh than their radii and a margin: walked in steps of what is left, which
+//! A path goes straight, or up, over and down at the lowest height at which all three keep clear. A straight line is clear when the
+//! ball, and the shaft above it, stay farther from the mesh than their radii and a margin: sphere tracing in steps of the distance that is left, which
 //! misses nothing, as the distance changes no faster than the place.
 
 use nalgebra::{Point3, Unit, Vector3};
@@ -29,7 +29,7 @@ parameters! {
     }
 }
 
-/// Why there is no way.
+/// Why there is no path.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LinkError {
     /// It would begin in the part.
@@ -54,10 +54,10 @@ pub enum LinkError {
     },
     /// Nothing is clear.
     #[error(
-        "no way to ({:.1} {:.1} {:.1}) mm keeps {margin_mm:.1} mm clear of the mesh: turn the part, or probe it by hand",
+        "no path to ({:.1} {:.1} {:.1}) mm keeps {margin_mm:.1} mm clear of the mesh: turn the part, or probe it by hand",
         place_mm[0], place_mm[1], place_mm[2]
     )]
-    NoWay {
+    NoPath {
         /// in O, mm
         place_mm: [f64; 3],
         /// mm
@@ -72,9 +72,9 @@ const LEAST_STEP: f64 = 20e-6;
 
 impl Tool {
     /// At most as much room as there is around the tool at a place, m; negative: it is in the mesh, or nearer than the margin, and
-    /// how deep is not told.
+    /// how deep is not known.
     ///
-    /// - `reach`: no more room than that is looked for, m; `shaft`: from the ball to the hand; `distance`: of a place from the mesh, as far as a reach.
+    /// - `reach`: no more room than that matters, m; `shaft`: from the ball to the handle; `distance`: of a place from the mesh, as far as a reach.
     pub fn room(
         &self,
         centre: &Point3<f64>,
@@ -109,10 +109,10 @@ impl Tool {
         distance: &dyn Fn(&Point3<f64>, f64) -> f64,
     ) -> bool {
         let length = (to - from).norm();
-        let way = (to - from).try_normalize(0.0).unwrap_or_else(Vector3::zeros);
+        let direction = (to - from).try_normalize(0.0).unwrap_or_else(Vector3::zeros);
         let mut gone = 0.0;
         loop {
-            let room = self.room(&(from + way * gone), shaft, distance, length - gone);
+            let room = self.room(&(from + direction * gone), shaft, distance, length - gone);
             if room < 0.0 {
                 return false;
             }
@@ -156,7 +156,7 @@ impl Tool {
 
 /// The place where a tool can turn about its ball and keeps clear: where it is, or as little as can be out along its shaft.
 ///
-/// - `angle`: of the turn, rad; `shaft`: after a share of it, from the ball to the hand.
+/// - `angle`: of the turn, rad; `shaft`: after a share of it, from the ball to the handle.
 ///
 /// # Errors
 /// [`LinkError::NoTurn`].
@@ -188,7 +188,7 @@ const RAISES: usize = 30;
 /// The place at or above an entry that is clear: from there on down nothing is fast.
 ///
 /// # Errors
-/// [`LinkError::NoWay`].
+/// [`LinkError::NoPath`].
 pub(super) fn clear_entry(
     tool: &Tool,
     entry: &Point3<f64>,
@@ -196,17 +196,17 @@ pub(super) fn clear_entry(
     distance: &dyn Fn(&Point3<f64>, f64) -> f64,
 ) -> Result<Point3<f64>, LinkError> {
     let mut raised = (0..RAISES).map(|times| entry + shaft.into_inner() * (RAISE * times as f64));
-    let no_way = LinkError::NoWay { place_mm: (entry * 1e3).coords.into(), margin_mm: tool.margin * 1e3 };
-    raised.find(|entry| tool.room(entry, shaft, distance, 0.0) >= 0.0).ok_or(no_way)
+    let no_path = LinkError::NoPath { place_mm: (entry * 1e3).coords.into(), margin_mm: tool.margin * 1e3 };
+    raised.find(|entry| tool.room(entry, shaft, distance, 0.0) >= 0.0).ok_or(no_path)
 }
 
 /// The places that a tool goes through from one place to another, without the first; both are in free air.
 ///
-/// - `shaft`: from the ball to the hand: up is along it; `highest`: of the mesh along it, m from the origin of O.
+/// - `shaft`: from the ball to the handle: up is along it; `highest`: of the mesh along it, m from the origin of O.
 ///
 /// # Errors
-/// [`LinkError::NoWay`].
-pub fn way(
+/// [`LinkError::NoPath`].
+pub fn free_path(
     tool: &Tool,
     from: &Point3<f64>,
     to: &Point3<f64>,
@@ -229,7 +229,7 @@ pub fn way(
             return Ok(places[1..].to_vec());
         }
     }
-    Err(LinkError::NoWay { place_mm: (to * 1e3).coords.into(), margin_mm: tool.margin * 1e3 })
+    Err(LinkError::NoPath { place_mm: (to * 1e3).coords.into(), margin_mm: tool.margin * 1e3 })
 }
 
 #[cfg(test)]
@@ -258,6 +258,6 @@ mod tests {
     fn an_entry_that_is_never_clear_is_refused() {
         let deep = Point3::new(0.0, 0.0, -1.0);
         let refused = clear_entry(&Tool::default(), &deep, &Vector3::z_axis(), &above_a_plate);
-        assert_eq!(refused, Err(LinkError::NoWay { place_mm: [0.0, 0.0, -1e3], margin_mm: 0.5 }));
+        assert_eq!(refused, Err(LinkError::NoPath { place_mm: [0.0, 0.0, -1e3], margin_mm: 0.5 }));
     }
 }

@@ -1,30 +1,30 @@
 //! An arm probes flagged features by itself: from a flag to links through free air, touches, and a feature with its uncertainty.
 //!
-//! [`crate::probing::plan`] wishes for touches, [`crate::probing::arm`] makes each; here a wish becomes a way of the arm that is within its limits
-//! and keeps clear of the mesh as it is now, and whatever happens becomes an [`Ending`] with its reason. Where it is wanted the ball then
+//! [`crate::probing::plan`] plans touches, [`crate::probing::arm`] makes each; here a planned touch becomes a path of the arm that is within its limits
+//! and keeps clear of the mesh as it is now, and each outcome becomes an [`Ending`] with its reason. On request the ball then
 //! slides over all of what was found.
 
 mod cell;
 mod cone;
-mod course;
 mod dry_run;
 mod ending;
+mod feature_probing;
 mod links;
-mod pivot;
+mod payload;
 mod prober;
 mod repeat;
 mod route;
 mod sliding;
-mod weigh;
+mod tip;
 mod world;
 
 pub use cell::Cell;
 pub use cone::{NotReached, Orientation};
 pub use dry_run::{Plan, plan};
 pub use ending::{Ending, Probed, ProbedSlide, ProbedTouch};
-pub use links::{LinkError, Tool, turning_place, way};
-pub use pivot::Pivoted;
+pub use links::{LinkError, Tool, free_path, turning_place};
+pub use payload::{PayloadProbeError, PayloadReading, PayloadReadings};
 pub use prober::{Flag, ProbeParams, Prober};
 pub use repeat::{Repeatability, SpotError, SpotTouch};
-pub use weigh::{WeighError, Weighed, WeighedRest};
-pub use world::{Phase, Progress, StillWorld, World};
+pub use tip::TipPoses;
+pub use world::{Phase, Progress, StaticWorld, World};

@@ -1,26 +1,26 @@
-//! From a flag to a feature: wish, way, touch, and again.
+//! From a flag to a feature: plan, path, touch, and again.
 
 use nalgebra::{Isometry3, Point3, Unit};
 
 use super::cell::Cell;
-use super::course::{EarlyEnd, FeatureProbing};
 use super::ending::{Ending, Probed, ProbedTouch};
+use super::feature_probing::{EarlyEnd, FeatureProbing};
 use super::links::{LinkError, Tool};
 use super::route::{ToolState, may_touch, route};
 use super::world::{Phase, Progress, World, distance, normal_about, on_mesh};
 use crate::features::Kind;
 use crate::probing::arm::{
-    Arm, ArmState, LimitError, Limits, Narrower, OnsetVerdict, ProbeError, TouchOutcome, TouchParams, TouchRecord,
-    TouchTarget, Watched, Witness,
+    Arm, ArmState, LimitError, Limits, Narrower, Observer, OnsetVerdict, ProbeError, TouchOutcome, TouchParams,
+    TouchRecord, TouchTarget, Watched,
 };
 use crate::probing::plan::{ExploreError, Explorer, PatternParams, TouchPlan, TouchResult};
 
-/// Where somebody pointed at.
+/// A place to probe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flag {
     /// its number
     pub id: u32,
-    /// what it is; `None`: nobody knows
+    /// what it is; `None`: unknown
     pub kind: Option<Kind>,
     /// m, in O
     pub place: Point3<f64>,
@@ -41,7 +41,7 @@ pub struct ProbeParams {
     pub limits: Limits,
 }
 
-/// The limit of force is so much above what a touch presses with at least: a press goes on a little while the arm brakes.
+/// The limit of force is so much above the force of a touch at least: the force grows a little while the arm brakes.
 const HEADROOM: f64 = 1.3;
 
 impl ProbeParams {
@@ -68,16 +68,16 @@ pub struct Prober<'a> {
     pub(super) world: &'a mut dyn World,
 }
 
-/// A search that ends this much before what was wanted has not felt the rest, m.
+/// A search that ends this much before its planned length has not searched the remainder, m.
 const SHORT: f64 = 0.1e-3;
 /// Touches that begin nearer than this to each other, over the ball's radius, are gone between inside of the feature.
 const INSIDE: f64 = 0.5;
-/// Looks on, and wants nothing: for a retract, which is what a cancelled probing ends with.
+/// An observer that does not cancel: for the retraction that ends a cancelled probing.
 struct OnlyLooks<'a>(&'a mut dyn World);
 
-impl Witness for OnlyLooks<'_> {
-    fn see(&mut self, state: &ArmState) {
-        self.0.see(state);
+impl Observer for OnlyLooks<'_> {
+    fn on_state(&mut self, state: &ArmState) {
+        self.0.on_state(state);
     }
 }
 
@@ -87,18 +87,18 @@ impl<'a> Prober<'a> {
         Self { arm, cell, params, world }
     }
 
-    /// Probes one flagged feature. Whatever happens, the arm stands when this returns; it has retracted wherever it was still
+    /// Probes one flagged feature. Whatever happens, the arm is stopped when this returns; it has retracted wherever it was still
     /// allowed to move.
     pub fn probe(&mut self, flag: &Flag) -> Probed {
         let mut explorer = None;
-        let (ended, course) = self.run(flag, &mut explorer);
+        let (ended, probing) = self.run(flag, &mut explorer);
         let found = explorer.as_ref().map(Explorer::found);
         let ending = match ended {
             Ok(Some(ending)) => ending,
             Ok(None) => match &found {
                 Some(Ok(found)) if found.is_as_asked => Ending::ToleranceReached,
                 Some(Ok(_)) => Ending::TouchesSpent,
-                // it was not looked for to the end
+                // the search did not end
                 Some(Err(ExploreError::NotDone { .. })) => Ending::TouchesSpent,
                 Some(Err(error)) => Ending::NothingFound(error.clone()),
                 None => Ending::TouchesSpent,
@@ -106,16 +106,16 @@ impl<'a> Prober<'a> {
             Err(broken) => broken.into(),
         };
         let mut probed = Probed { found: found.and_then(Result::ok), ..Probed::not_begun(flag.id, ending) };
-        if let Some(course) = course {
-            probed.seconds = course.seconds();
-            (probed.touches, probed.slides, probed.peak_force) = (course.touches, course.slides, course.peak_force);
+        if let Some(probing) = probing {
+            probed.seconds = probing.seconds();
+            (probed.touches, probed.slides, probed.peak_force) = (probing.touches, probing.slides, probing.peak_force);
         }
         probed
     }
 
     /// Where the arm is, at rest in free air with its sensor zeroed.
     pub(super) fn in_free_air(&mut self) -> Result<ArmState, EarlyEnd> {
-        // what presses now would be taken for nothing
+        // zeroing the sensor would remove a force that acts now
         let world = &*self.world;
         let clear = |place: &Point3<f64>, reach: f64| distance(world, place, reach);
         let arm = |error| ProbeError::Arm { doing: "asking where the arm is", error };
@@ -125,7 +125,7 @@ impl<'a> Prober<'a> {
             let place_mm = (here * 1e3).coords.into();
             return Err(EarlyEnd::Link(LinkError::InPart { place_mm }));
         }
-        // in free air, where it stands: the first link is watched by the force as well
+        // in free air, where it is stopped: the first link is watched by the force as well
         let mut watched = Watched::new(self.arm, self.params.limits.clone(), self.world);
         watched.zero()?;
         Ok(self.arm.next_state().map_err(arm)?)
@@ -140,7 +140,7 @@ impl<'a> Prober<'a> {
         let rotation = self.cell.upright(&state.pose_bt.rotation, &normal);
         let pattern = PatternParams { flag_radius: flag.radius, ..self.params.pattern };
         let explorer = Explorer::new(flag.kind, &place, &normal, pattern).map_err(EarlyEnd::Explore)?;
-        let course = FeatureProbing {
+        let probing = FeatureProbing {
             flag: flag.id,
             rotation,
             out: ToolState {
@@ -157,7 +157,7 @@ impl<'a> Prober<'a> {
             slides: Vec::new(),
             peak_force: 0.0,
         };
-        Ok((explorer, course))
+        Ok((explorer, probing))
     }
 
     fn run(
@@ -165,27 +165,31 @@ impl<'a> Prober<'a> {
         flag: &Flag,
         kept: &mut Option<Explorer>,
     ) -> (Result<Option<Ending>, EarlyEnd>, Option<FeatureProbing>) {
-        let (explorer, mut course) = match self.begin(flag) {
+        let (explorer, mut probing) = match self.begin(flag) {
             Ok(begun) => begun,
             Err(broken) => return (Err(broken), None),
         };
         let explorer = kept.insert(explorer);
-        let mut ended = self.explore(explorer, &mut course);
+        let mut ended = self.explore(explorer, &mut probing);
         if self.params.slides && matches!(ended, Ok(None)) {
-            ended = self.slide_over(explorer.slides(), &mut course).map(|()| None);
+            ended = self.slide_over(explorer.slides(), &mut probing).map(|()| None);
         }
-        (self.finish(ended, &mut course), Some(course))
+        (self.finish(ended, &mut probing), Some(probing))
     }
 
-    /// Retracts, wherever the arm may still move.
-    pub(super) fn finish<T>(&mut self, ended: Result<T, EarlyEnd>, course: &mut FeatureProbing) -> Result<T, EarlyEnd> {
-        let retracted = if is_movable(&ended) { self.retract(course) } else { Ok(()) };
+    /// Retracts, wherever the arm is allowed to move.
+    pub(super) fn finish<T>(
+        &mut self,
+        ended: Result<T, EarlyEnd>,
+        probing: &mut FeatureProbing,
+    ) -> Result<T, EarlyEnd> {
+        let retracted = if is_movable(&ended) { self.retract(probing) } else { Ok(()) };
         // where nothing comes any more it ended when it was seen last
-        course.ended_ns = self.arm.next_state().map_or(course.ended_ns, |state| state.stamp_ns.max(course.ended_ns));
+        probing.ended_ns = self.arm.next_state().map_or(probing.ended_ns, |state| state.stamp_ns.max(probing.ended_ns));
         match (ended, retracted) {
-            // the arm stands where nobody wanted it to stand, which is more than that it was cancelled
+            // a failed retraction outranks a cancellation
             (Ok(_) | Err(EarlyEnd::Arm(ProbeError::Cancelled { .. })), Err(error)) => Err(error.into()),
-            // what broke it off first is what is told
+            // the first error is the one to report
             (ended, _) => ended,
         }
     }
@@ -193,59 +197,59 @@ impl<'a> Prober<'a> {
     /// One touch by itself: there, and back into free air.
     pub(super) fn touch_and_retract(
         &mut self,
-        wish: &TouchPlan,
-        course: &mut FeatureProbing,
+        planned: &TouchPlan,
+        probing: &mut FeatureProbing,
     ) -> Result<ProbedTouch, EarlyEnd> {
-        let joints = may_touch(self.cell, &self.params.limits, &course.rotation, wish, &course.out.joints);
-        course.out.joints = joints.map_err(EarlyEnd::Limit)?;
-        // zeroed anew for each, as another touch has nothing to do with it
-        self.go(wish, course, &mut false)?;
-        let (_, touched) = self.touch(wish, course)?;
-        self.retract(course)?;
+        let joints = may_touch(self.cell, &self.params.limits, &probing.rotation, planned, &probing.out.joints);
+        probing.out.joints = joints.map_err(EarlyEnd::Limit)?;
+        // zeroed again for each, as another touch has nothing to do with it
+        self.go(planned, probing, &mut false)?;
+        let (_, touched) = self.touch(planned, probing)?;
+        self.retract(probing)?;
         Ok(touched)
     }
 
-    fn explore(&mut self, explorer: &mut Explorer, course: &mut FeatureProbing) -> Result<Option<Ending>, EarlyEnd> {
+    fn explore(&mut self, explorer: &mut Explorer, probing: &mut FeatureProbing) -> Result<Option<Ending>, EarlyEnd> {
         let mut is_zeroed = false;
-        while let Some(wish) = explorer.wish() {
-            if course.seconds() > self.params.limits.time {
+        while let Some(planned) = explorer.next_touch() {
+            if probing.seconds() > self.params.limits.time {
                 return Ok(Some(Ending::TimeSpent));
             }
-            self.tell(explorer, course, explorer.touches() + 1);
-            match may_touch(self.cell, &self.params.limits, &course.rotation, &wish, &course.out.joints) {
-                Ok(joints) => course.out.joints = joints,
+            self.publish(explorer, probing, explorer.touches() + 1);
+            match may_touch(self.cell, &self.params.limits, &probing.rotation, &planned, &probing.out.joints) {
+                Ok(joints) => probing.out.joints = joints,
                 // the first one is where the feature is
-                Err(error) if course.touches.is_empty() => return Err(EarlyEnd::Limit(error)),
+                Err(error) if probing.touches.is_empty() => return Err(EarlyEnd::Limit(error)),
                 Err(error) => {
                     explorer.take(&TouchResult::Unclear);
-                    course.touches.push(held_back(wish, error.to_string()));
+                    probing.touches.push(held_back(planned, error.to_string()));
                     continue;
                 }
             }
-            let touched = self.go(&wish, course, &mut is_zeroed).and_then(|()| self.touch(&wish, course));
-            let (felt, touch) = match touched {
-                Ok((felt, touch)) => (felt, touch),
-                Err(EarlyEnd::Arm(error @ ProbeError::InTheWay { is_link: false, .. })) => {
-                    (TouchResult::Unclear, held_back(wish, error.to_string()))
+            let touched = self.go(&planned, probing, &mut is_zeroed).and_then(|()| self.touch(&planned, probing));
+            let (result, touch) = match touched {
+                Ok((result, touch)) => (result, touch),
+                Err(EarlyEnd::Arm(error @ ProbeError::Obstacle { is_link: false, .. })) => {
+                    (TouchResult::Unclear, held_back(planned, error.to_string()))
                 }
-                Err(EarlyEnd::Link(error)) if !course.touches.is_empty() => {
-                    (TouchResult::Unclear, held_back(wish, error.to_string()))
+                Err(EarlyEnd::Link(error)) if !probing.touches.is_empty() => {
+                    (TouchResult::Unclear, held_back(planned, error.to_string()))
                 }
-                Err(EarlyEnd::Limit(error)) if !course.touches.is_empty() => {
-                    (TouchResult::Unclear, held_back(wish, error.to_string()))
+                Err(EarlyEnd::Limit(error)) if !probing.touches.is_empty() => {
+                    (TouchResult::Unclear, held_back(planned, error.to_string()))
                 }
                 Err(error) => return Err(error),
             };
-            explorer.take(&felt);
-            course.touches.push(touch);
+            explorer.take(&result);
+            probing.touches.push(touch);
         }
-        self.tell(explorer, course, explorer.touches());
+        self.publish(explorer, probing, explorer.touches());
         Ok(None)
     }
 
-    fn tell(&mut self, explorer: &Explorer, course: &FeatureProbing, touch: usize) {
-        self.world.tell(&Progress {
-            flag: course.flag,
+    fn publish(&mut self, explorer: &Explorer, probing: &FeatureProbing, touch: usize) {
+        self.world.publish(&Progress {
+            flag: probing.flag,
             touch,
             budget: self.params.pattern.budget,
             uncertainty: explorer.uncertainty(),
@@ -257,98 +261,102 @@ impl<'a> Prober<'a> {
         &mut self,
         doing: &'static str,
         to: &Isometry3<f64>,
-        course: &mut FeatureProbing,
+        probing: &mut FeatureProbing,
         guard: LineGuard,
     ) -> Result<(), EarlyEnd> {
         let TouchParams { link_speed, trigger, .. } = self.params.touch;
         let (speed, trigger) = match guard {
             LineGuard::Link => (link_speed, LINK_TRIGGER * trigger),
             LineGuard::Slow => (self.params.touch.safe_speed(), trigger),
-            // the part may still be felt
+            // the part may be in contact
             LineGuard::Retract => (link_speed, self.params.limits.force),
         };
         let mut watched = Watched::new(self.arm, self.params.limits.clone(), self.world);
         let moved = watched.line(doing, to, speed, &self.params.touch, trigger);
-        course.keep(&watched);
+        probing.keep(&watched);
         // however slow a link is, nothing should be there
         moved.map_err(|error| match (error, guard) {
-            (ProbeError::InTheWay { doing, force_n, place_mm, .. }, LineGuard::Link) => {
-                EarlyEnd::Arm(ProbeError::InTheWay { doing, force_n, place_mm, is_link: true })
+            (ProbeError::Obstacle { doing, force_n, place_mm, .. }, LineGuard::Link) => {
+                EarlyEnd::Arm(ProbeError::Obstacle { doing, force_n, place_mm, is_link: true })
             }
             (error, _) => EarlyEnd::Arm(error),
         })
     }
 
     /// Brings the ball to where a touch is entered from.
-    fn go(&mut self, wish: &TouchPlan, course: &mut FeatureProbing, is_zeroed: &mut bool) -> Result<(), EarlyEnd> {
+    fn go(&mut self, planned: &TouchPlan, probing: &mut FeatureProbing, is_zeroed: &mut bool) -> Result<(), EarlyEnd> {
         let near = INSIDE * self.params.pattern.ball_radius;
-        if course.from.is_some_and(|from| (from - wish.from).norm() < near) && wish.from != wish.entry {
+        if probing.from.is_some_and(|from| (from - planned.from).norm() < near) && planned.from != planned.entry {
             // stays inside of the feature
             return Ok(());
         }
-        self.reach(&wish.entry, course, is_zeroed)
+        self.reach(&planned.entry, probing, is_zeroed)
     }
 
     /// Out of the feature, and through free air to a place above it.
     pub(super) fn reach(
         &mut self,
         above: &Point3<f64>,
-        course: &mut FeatureProbing,
+        probing: &mut FeatureProbing,
         is_zeroed: &mut bool,
     ) -> Result<(), EarlyEnd> {
         self.world.enter(Phase::Link);
-        while let Some(place) = course.next_out() {
-            let pose = self.cell.pose(&course.rotation, &place);
-            self.line("going up out of the feature", &pose, course, LineGuard::Retract)?;
-            course.is_at_next_out();
+        while let Some(place) = probing.next_out() {
+            let pose = self.cell.pose(&probing.rotation, &place);
+            self.line("going up out of the feature", &pose, probing, LineGuard::Retract)?;
+            probing.is_at_next_out();
         }
-        let route = route(self.cell, &self.params.limits, &*self.world, &course.out, &course.rotation, above)?;
+        let route = route(self.cell, &self.params.limits, &*self.world, &probing.out, &probing.rotation, above)?;
         for (place, rotation) in route.stops {
             let pose = self.cell.pose(&rotation, &place);
-            self.line("going through free air", &pose, course, LineGuard::Link)?;
-            (course.out.place, course.out.rotation) = (place, rotation);
+            self.line("going through free air", &pose, probing, LineGuard::Link)?;
+            (probing.out.place, probing.out.rotation) = (place, rotation);
         }
-        course.out.joints = route.joints;
+        probing.out.joints = route.joints;
         if !*is_zeroed {
-            // again where it is touched: a wrist feels its own turning
+            // again where it is touched: turning the wrist loads its sensor
             self.world.enter(Phase::Zeroing);
             let mut watched = Watched::new(self.arm, self.params.limits.clone(), self.world);
             watched.zero()?;
             *is_zeroed = true;
         }
-        course.is_out = false;
-        if course.out.place != *above {
+        probing.is_out = false;
+        if probing.out.place != *above {
             self.world.enter(Phase::Approach);
-            let pose = self.cell.pose(&course.rotation, above);
-            self.line("coming near", &pose, course, LineGuard::Slow)?;
-            course.entry = Some(*above);
+            let pose = self.cell.pose(&probing.rotation, above);
+            self.line("coming near", &pose, probing, LineGuard::Slow)?;
+            probing.entry = Some(*above);
         }
         Ok(())
     }
 
-    fn touch(&mut self, wish: &TouchPlan, course: &mut FeatureProbing) -> Result<(TouchResult, ProbedTouch), EarlyEnd> {
+    fn touch(
+        &mut self,
+        planned: &TouchPlan,
+        probing: &mut FeatureProbing,
+    ) -> Result<(TouchResult, ProbedTouch), EarlyEnd> {
         let target = TouchTarget {
-            standoff_bt: self.cell.pose(&course.rotation, &wish.from),
-            direction: Unit::new_normalize(self.cell.pose_bo.rotation * wish.direction.into_inner()),
-            search: wish.search,
-            expected: wish.expected,
+            standoff_bt: self.cell.pose(&probing.rotation, &planned.from),
+            direction: Unit::new_normalize(self.cell.pose_bo.rotation * planned.direction.into_inner()),
+            search: planned.search,
+            expected: planned.expected,
         };
-        let before = Before::of(self.world, wish, self.params.pattern.ball_radius);
+        let before = Before::of(self.world, planned, self.params.pattern.ball_radius);
         self.world.enter(Phase::Search);
         let mut watched = Watched::new(self.arm, self.params.limits.clone(), self.world);
         let touched = watched.touch(&target, &self.params.touch);
-        course.keep(&watched);
-        // where the ball has not been it does not go on the way out
+        probing.keep(&watched);
+        // where the ball has not been it does not go on the retraction
         if touched.as_ref().map_or_else(ProbeError::was_at_standoff, |_| true) {
-            course.from = Some(wish.from);
+            probing.from = Some(planned.from);
         }
         let record = touched?;
-        Ok(self.told(*wish, record, &before))
+        Ok(self.probed_touch(*planned, record, &before))
     }
 
-    /// What a record tells the explorer.
-    fn told(&self, wish: TouchPlan, record: TouchRecord, before: &Before) -> (TouchResult, ProbedTouch) {
-        let (felt, refused) = match &record.outcome {
+    /// The result for the explorer, and the record of the touch.
+    fn probed_touch(&self, planned: TouchPlan, record: TouchRecord, before: &Before) -> (TouchResult, ProbedTouch) {
+        let (result, refused) = match &record.outcome {
             TouchOutcome::Contact { onset, .. } if onset.verdict == OnsetVerdict::Impact => {
                 (TouchResult::Unclear, Some("an impact: the force was over before the surface held".to_owned()))
             }
@@ -356,48 +364,48 @@ impl<'a> Prober<'a> {
                 let centre = self.cell.pose_bo.inverse_transform_point(centre);
                 (TouchResult::At { centre, sigma: onset.sigma }, None)
             }
-            TouchOutcome::Miss { travel } if *travel < wish.search - SHORT => {
+            TouchOutcome::Miss { travel } if *travel < planned.search - SHORT => {
                 let why = format!("nothing within {:.1} mm, where the limit of a search ends", travel * 1e3);
                 (TouchResult::Unclear, Some(why))
             }
             TouchOutcome::Miss { .. } => (TouchResult::Nothing, None),
             TouchOutcome::Unclear(error) => (TouchResult::Unclear, Some(error.to_string())),
         };
-        let centre = if let TouchResult::At { centre, .. } = felt { Some(centre) } else { None };
-        let deviation = centre.and_then(|centre| before.deviation(&wish, &centre));
-        (felt, ProbedTouch { wish, record: Some(record), centre, deviation, refused })
+        let centre = if let TouchResult::At { centre, .. } = result { Some(centre) } else { None };
+        let deviation = centre.and_then(|centre| before.deviation(&planned, &centre));
+        (result, ProbedTouch { planned, record: Some(record), centre, deviation, refused })
     }
 
     /// Out of the feature into free air.
-    fn retract(&mut self, course: &mut FeatureProbing) -> Result<(), ProbeError> {
+    fn retract(&mut self, probing: &mut FeatureProbing) -> Result<(), ProbeError> {
         self.world.enter(Phase::Retract);
         let (touch, limits) = (&self.params.touch, &self.params.limits);
         let mut onlooker = OnlyLooks(self.world);
         let mut watched = Watched::new(self.arm, limits.clone(), &mut onlooker);
         let mut retracted = Ok(());
-        while let (Ok(()), Some(place)) = (&retracted, course.next_out()) {
-            let pose = self.cell.pose(&course.rotation, &place);
+        while let (Ok(()), Some(place)) = (&retracted, probing.next_out()) {
+            let pose = self.cell.pose(&probing.rotation, &place);
             retracted = watched.line("retracting", &pose, touch.link_speed, touch, limits.force);
             if retracted.is_ok() {
-                course.is_at_next_out();
+                probing.is_at_next_out();
             }
         }
-        course.keep(&watched);
+        probing.keep(&watched);
         retracted
     }
 }
 
-/// How far the mesh is along the way of a touch, as it is before the touch moves it.
+/// How far the mesh is along the path of a touch, as it is before the touch moves it.
 struct Before {
-    /// distance of a ball from it at each [`SAMPLED`] of the way, m, positive outside; `None` where no mesh is near
+    /// distance of a ball from it at each [`SAMPLED`] of the path, m, positive outside; `None` where no mesh is near
     distances: Vec<Option<f64>>,
 }
 
 impl Before {
-    fn of(world: &dyn World, wish: &TouchPlan, ball_radius: f64) -> Self {
-        let count = (wish.search / SAMPLED).ceil() as usize + 1;
+    fn of(world: &dyn World, planned: &TouchPlan, ball_radius: f64) -> Self {
+        let count = (planned.search / SAMPLED).ceil() as usize + 1;
         let at = |sample: usize| {
-            let centre = wish.from + wish.direction.into_inner() * (SAMPLED * sample as f64);
+            let centre = planned.from + planned.direction.into_inner() * (SAMPLED * sample as f64);
             let hit = world.closest_face(&centre, DEVIATION_REACH)?;
             let off = centre - hit.point;
             Some(off.norm().copysign(off.dot(&world.mesh().normal(hit.face))) - ball_radius)
@@ -406,38 +414,38 @@ impl Before {
     }
 
     /// How far the surface that a ball touched is from the mesh, m, positive outside.
-    fn deviation(&self, wish: &TouchPlan, centre: &Point3<f64>) -> Option<f64> {
-        let at = ((centre - wish.from).dot(&wish.direction) / SAMPLED).max(0.0);
+    fn deviation(&self, planned: &TouchPlan, centre: &Point3<f64>) -> Option<f64> {
+        let at = ((centre - planned.from).dot(&planned.direction) / SAMPLED).max(0.0);
         let sample = at as usize;
         let (here, next) = ((*self.distances.get(sample)?)?, (*self.distances.get(sample + 1)?)?);
         Some(here + (next - here) * (at - at.floor()))
     }
 }
 
-/// The mesh is looked for this often along the way of a touch, m: between two of them a wall with a radius of 1 mm bends by 1 µm.
+/// The distance from the mesh is sampled this often along the path of a touch, m: between two of them a wall with a radius of 1 mm bends by 1 µm.
 const SAMPLED: f64 = 0.1e-3;
 
 /// How a line is watched.
 #[derive(Clone, Copy)]
 enum LineGuard {
-    /// fast, where the way is clear
+    /// fast, where the path is clear
     Link,
     /// slow enough for whatever is there
     Slow,
-    /// where the part may still be felt
+    /// where the part may be in contact
     Retract,
 }
 
-/// In a fast move accelerations are felt too: more force than this many triggers is something in the way.
+/// In a fast move the sensor also measures accelerations: more force than this many triggers is an obstacle.
 const LINK_TRIGGER: f64 = 1.5;
-/// The mesh is looked for this far from a contact, m.
+/// The mesh is searched this far from a contact, m.
 const DEVIATION_REACH: f64 = 20e-3;
 
-fn held_back(wish: TouchPlan, refused: String) -> ProbedTouch {
-    ProbedTouch { wish, record: None, centre: None, deviation: None, refused: Some(refused) }
+fn held_back(planned: TouchPlan, refused: String) -> ProbedTouch {
+    ProbedTouch { planned, record: None, centre: None, deviation: None, refused: Some(refused) }
 }
 
-/// Whether the arm may still move.
+/// Whether the arm is allowed to move.
 fn is_movable<T>(ended: &Result<T, EarlyEnd>) -> bool {
     matches!(
         ended,

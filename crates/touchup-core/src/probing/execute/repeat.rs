@@ -15,13 +15,13 @@ use crate::probing::plan::TouchPlan;
 pub struct SpotTouch {
     /// The side from which the tool came: 1 or -1.
     pub side: i8,
-    /// Of the ball's centre where it was felt, along the outward normal, m from the origin of O.
+    /// Of the ball's centre at contact, along the outward normal, m from the origin of O.
     pub height: f64,
     /// Its standard uncertainty, m.
     pub sigma: f64,
     /// Of arm, probe and part together, and its standard uncertainty, N/m.
     pub stiffness: [f64; 2],
-    /// What the curve looks like.
+    /// The class of the curve.
     pub verdict: OnsetVerdict,
 }
 
@@ -36,15 +36,15 @@ pub struct Repeatability {
     pub normal: Unit<Vector3<f64>>,
 }
 
-/// Why the spot says nothing.
+/// Why the spot gives no result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SpotError {
     /// The arm did not get so far.
     #[error("{0}")]
     Ended(Ending),
-    /// One of the touches felt nothing, or nothing that can be used.
+    /// One of the touches made no contact, or none that can be used.
     #[error("touch {touch} of the spot: {why}")]
-    NotFelt {
+    NoContact {
         /// from 1 on
         touch: usize,
         /// in words
@@ -64,12 +64,12 @@ impl Prober<'_> {
     /// - `spot`: on the mesh or near it, m in O; flat for some 10 mm about.
     ///
     /// # Errors
-    /// [`SpotError`]; the arm stands then, and has retracted wherever it was still allowed to move.
+    /// [`SpotError`]; the arm is stopped then, and has retracted wherever it was still allowed to move.
     pub fn repeat(&mut self, spot: &Point3<f64>, count: usize) -> Result<Repeatability, SpotError> {
         let flag = Flag { id: 0, kind: Some(Kind::Plane), place: *spot, radius: ASIDE };
-        let (_, mut course) = self.begin(&flag).map_err(|broken| SpotError::Ended(broken.into()))?;
+        let (_, mut probing) = self.begin(&flag).map_err(|broken| SpotError::Ended(broken.into()))?;
         let place = on_mesh(self.world, spot);
-        let normal = normal_about(self.world, &place, &self.cell.shaft(&course.rotation));
+        let normal = normal_about(self.world, &place, &self.cell.shaft(&probing.rotation));
         let across = tangent_basis(&normal)[0];
         let from = place + normal.into_inner() * (self.params.pattern.ball_radius + STANDOFF);
         let (mut touches, mut failed) = (Vec::with_capacity(count), None);
@@ -78,14 +78,14 @@ impl Prober<'_> {
                 let side = if touch % 2 == 1 { 1 } else { -1 };
                 let aside = across * (f64::from(side) * ASIDE);
                 let entry = from + normal.into_inner() * ABOVE + aside;
-                let wish = TouchPlan { entry, from, direction: -normal, search: 2.0 * STANDOFF, expected: None };
-                if course.seconds() > self.params.limits.time {
+                let planned = TouchPlan { entry, from, direction: -normal, search: 2.0 * STANDOFF, expected: None };
+                if probing.seconds() > self.params.limits.time {
                     failed = Some(SpotError::Ended(Ending::TimeSpent));
                     break;
                 }
-                let probed = self.touch_and_retract(&wish, &mut course)?;
-                let felt = probed.record.as_ref().map(|record| &record.outcome);
-                match (felt, probed.centre, &probed.refused) {
+                let probed = self.touch_and_retract(&planned, &mut probing)?;
+                let outcome = probed.record.as_ref().map(|record| &record.outcome);
+                match (outcome, probed.centre, &probed.refused) {
                     (Some(TouchOutcome::Contact { onset, .. }), Some(centre), None) => touches.push(SpotTouch {
                         side,
                         height: centre.coords.dot(&normal),
@@ -95,7 +95,7 @@ impl Prober<'_> {
                     }),
                     (_, _, why) => {
                         let why = why.clone().unwrap_or_else(|| "nothing is there".to_owned());
-                        failed = Some(SpotError::NotFelt { touch, why });
+                        failed = Some(SpotError::NoContact { touch, why });
                         break;
                     }
                 }
@@ -103,7 +103,7 @@ impl Prober<'_> {
             Ok(())
         };
         let ended = touch_all();
-        match self.finish(ended, &mut course) {
+        match self.finish(ended, &mut probing) {
             Err(broken) => Err(SpotError::Ended(broken.into())),
             Ok(()) => failed.map_or(Ok(Repeatability { touches, place, normal }), Err),
         }
@@ -157,7 +157,7 @@ impl Repeatability {
 mod tests {
     use super::*;
 
-    /// Heights in µm and stiffnesses in N/mm with sums that can be made by hand.
+    /// Heights in µm and stiffnesses in N/mm with sums that can be checked by hand.
     #[test]
     fn numbers_are_those_made_by_hand() {
         let touch = |(at, height, k): (usize, f64, f64)| SpotTouch {

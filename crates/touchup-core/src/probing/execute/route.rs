@@ -3,7 +3,7 @@
 use nalgebra::{Point3, UnitQuaternion};
 
 use super::cell::Cell;
-use super::links::{LinkError, clear_entry, turning_place, way};
+use super::links::{LinkError, clear_entry, free_path, turning_place};
 use super::world::{World, distance, highest};
 use crate::probing::arm::{Joints, LimitError, Limits};
 use crate::probing::plan::{Slide, TouchPlan};
@@ -27,7 +27,7 @@ pub(super) struct ToolState {
     pub joints: Joints,
 }
 
-/// A way through free air.
+/// A path through free air.
 #[derive(Clone, Debug)]
 pub(super) struct Route {
     /// the places of the ball's centre that it goes through, without the first, and the orientation that it has when it is there;
@@ -39,19 +39,19 @@ pub(super) struct Route {
 
 /// Orientations that a turn is checked at for the joints, rad apart.
 const TURN_STEP: f64 = 0.1;
-/// A smaller turn is none, rad.
+/// A smaller turn is left out, rad.
 const TURNS: f64 = 1e-6;
 
-/// Whether the arm may be everywhere on the way of a touch; joints for where it ends.
+/// Whether the arm may be everywhere on the path of a touch; joints for where it ends.
 pub(super) fn may_touch(
     cell: &Cell,
     limits: &Limits,
     rotation: &UnitQuaternion<f64>,
-    wish: &TouchPlan,
+    planned: &TouchPlan,
     near: &Joints,
 ) -> Result<Joints, LimitError> {
-    let deepest = wish.from + wish.direction.into_inner() * wish.search.min(limits.search);
-    let places = [wish.entry, wish.from, deepest];
+    let deepest = planned.from + planned.direction.into_inner() * planned.search.min(limits.search);
+    let places = [planned.entry, planned.from, deepest];
     places.iter().try_fold(*near, |joints, place| cell.check(limits, rotation, place, &joints))
 }
 
@@ -77,7 +77,7 @@ pub(super) fn may_slide(
     cell.check(limits, rotation, &slide.above(last), &joints)
 }
 
-/// The way from where the tool is to a place at or above where a touch is entered from: first it turns, then it goes.
+/// The path from where the tool is to a place at or above where a touch is entered from: first it turns, then it goes.
 pub(super) fn route(
     cell: &Cell,
     limits: &Limits,
@@ -103,7 +103,7 @@ pub(super) fn route(
     }
     let entry = clear_entry(tool, entry, &shaft, &clear)?;
     let top = highest(world.mesh(), &shaft);
-    for place in way(tool, &place, &entry, &shaft, top, &clear)? {
+    for place in free_path(tool, &place, &entry, &shaft, top, &clear)? {
         route.joints = cell.check(limits, rotation, &place, &route.joints)?;
         route.stops.push((place, *rotation));
     }

@@ -2,8 +2,8 @@
 
 use nalgebra::Unit;
 
-use super::course::{EarlyEnd, FeatureProbing};
 use super::ending::ProbedSlide;
+use super::feature_probing::{EarlyEnd, FeatureProbing};
 use super::links::clear_entry;
 use super::prober::Prober;
 use super::route::may_slide;
@@ -12,39 +12,40 @@ use crate::probing::arm::{ProbeError, SlideStation, SlideTarget, Watched};
 use crate::probing::plan::Slide;
 
 impl Prober<'_> {
-    /// Slides along each way in turn, as long as there is time. What cannot be slid over is told with its reason.
-    pub(super) fn slide_over(&mut self, slides: Vec<Slide>, course: &mut FeatureProbing) -> Result<(), EarlyEnd> {
+    /// Slides along each path in turn, as long as there is time. What cannot be slid over is recorded with its reason.
+    pub(super) fn slide_over(&mut self, slides: Vec<Slide>, probing: &mut FeatureProbing) -> Result<(), EarlyEnd> {
         for slide in slides {
             let held_back = |why: String| ProbedSlide { slide: slide.clone(), record: None, refused: Some(why) };
-            if course.seconds() > self.params.limits.time {
-                course.slides.push(held_back("the time is spent".to_owned()));
+            if probing.seconds() > self.params.limits.time {
+                probing.slides.push(held_back("the time is spent".to_owned()));
                 continue;
             }
-            if let Err(error) = may_slide(self.cell, &self.params.limits, &course.rotation, &slide, &course.out.joints)
+            if let Err(error) =
+                may_slide(self.cell, &self.params.limits, &probing.rotation, &slide, &probing.out.joints)
             {
-                course.slides.push(held_back(error.to_string()));
+                probing.slides.push(held_back(error.to_string()));
                 continue;
             }
-            let slid = self.slide(&slide, course);
-            course.slides.push(match slid {
+            let slid = self.slide(&slide, probing);
+            probing.slides.push(match slid {
                 Ok(probed) => probed,
                 Err(EarlyEnd::Link(error)) => held_back(error.to_string()),
                 Err(EarlyEnd::Limit(error)) => held_back(error.to_string()),
-                Err(EarlyEnd::Arm(error @ ProbeError::InTheWay { is_link: false, .. })) => held_back(error.to_string()),
+                Err(EarlyEnd::Arm(error @ ProbeError::Obstacle { is_link: false, .. })) => held_back(error.to_string()),
                 Err(error) => return Err(error),
             });
         }
         Ok(())
     }
 
-    fn slide(&mut self, slide: &Slide, course: &mut FeatureProbing) -> Result<ProbedSlide, EarlyEnd> {
-        self.reach(&slide.above(0), course, &mut true)?;
+    fn slide(&mut self, slide: &Slide, probing: &mut FeatureProbing) -> Result<ProbedSlide, EarlyEnd> {
+        self.reach(&slide.above(0), probing, &mut true)?;
         let in_b = |station: &crate::probing::plan::Station| SlideStation {
             place: (self.cell.pose_bo * station.centre).coords,
             normal: Unit::new_normalize(self.cell.pose_bo.rotation * station.normal.into_inner()),
         };
         let target = SlideTarget {
-            rotation: course.rotation,
+            rotation: probing.rotation,
             stations: slide.stations.iter().map(in_b).collect(),
             lift: slide.lift,
             give: self.params.pattern.ball_radius,
@@ -53,25 +54,25 @@ impl Prober<'_> {
         let mut reached = None;
         let mut watched = Watched::new(self.arm, self.params.limits.clone(), self.world);
         let slid = watched.slide(&target, &self.params.touch, &mut reached);
-        course.keep(&watched);
+        probing.keep(&watched);
         if let Some(station) = reached {
-            self.leave_from(slide, station, course);
+            self.leave_from(slide, station, probing);
         }
         Ok(ProbedSlide { slide: slide.clone(), record: Some(slid?), refused: None })
     }
 
-    /// The way out is straight up from where the slide ended.
-    fn leave_from(&self, slide: &Slide, station: usize, course: &mut FeatureProbing) {
+    /// The retraction is straight up from where the slide ended.
+    fn leave_from(&self, slide: &Slide, station: usize, probing: &mut FeatureProbing) {
         let above = slide.above(station);
-        course.is_inside(slide.lifted(station), above);
+        probing.is_inside(slide.lifted(station), above);
         let world = &*self.world;
         let clear = |place: &nalgebra::Point3<f64>, reach: f64| distance(world, place, reach);
         // where nothing says that it is clear there, it goes back to where it came from
-        let Ok(place) = clear_entry(&self.cell.tool, &above, &self.cell.shaft(&course.rotation), &clear) else {
+        let Ok(place) = clear_entry(&self.cell.tool, &above, &self.cell.shaft(&probing.rotation), &clear) else {
             return;
         };
-        if let Ok(joints) = self.cell.check(&self.params.limits, &course.rotation, &place, &course.out.joints) {
-            (course.out.place, course.out.joints) = (place, joints);
+        if let Ok(joints) = self.cell.check(&self.params.limits, &probing.rotation, &place, &probing.out.joints) {
+            (probing.out.place, probing.out.joints) = (place, joints);
         }
     }
 }

@@ -1,16 +1,16 @@
-//! What is around a probing: the mesh as it is now, whoever looks on, and whoever may want it to end.
+//! The environment of a probing: the current mesh, its observer, and a request to cancel.
 
 use nalgebra::{Point3, Unit, Vector3};
 
 use crate::mesh::{FaceHit, FaceTree, TriMesh};
-use crate::probing::arm::{ArmState, Witness};
+use crate::probing::arm::{ArmState, Observer};
 
 /// How far a probing has got.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress {
     /// number of the feature
     pub flag: u32,
-    /// the touch at hand, from 1 on; 0 before the first
+    /// the current touch, from 1 on; 0 before the first
     pub touch: usize,
     /// touches at most
     pub budget: usize,
@@ -18,18 +18,18 @@ pub struct Progress {
     pub uncertainty: Option<f64>,
 }
 
-/// What is around a probing. Each state that the arm is shown in may change the mesh.
-pub trait World: Witness {
+/// The environment of a probing. Each observed state may change the mesh.
+pub trait World: Observer {
     /// The mesh as it is now, in O.
     fn mesh(&self) -> &TriMesh;
 
     /// The face nearest to a place of O, within a reach (m).
     fn closest_face(&self, place: &Point3<f64>, reach: f64) -> Option<FaceHit>;
 
-    /// Is told how far it has got.
-    fn tell(&mut self, progress: &Progress);
+    /// Publishes the progress.
+    fn publish(&mut self, progress: &Progress);
 
-    /// Is told what the arm begins to do.
+    /// Receives the phase that begins.
     fn enter(&mut self, _: Phase) {}
 }
 
@@ -52,24 +52,24 @@ pub enum Phase {
     Retract,
 }
 
-/// A mesh that does not change, and nobody who looks on.
-pub struct StillWorld {
+/// A mesh that does not change, without an observer.
+pub struct StaticWorld {
     mesh: TriMesh,
     tree: FaceTree,
 }
 
-impl StillWorld {
+impl StaticWorld {
     /// - `mesh`: in O.
     pub fn new(mesh: TriMesh) -> Self {
         Self { tree: FaceTree::new(&mesh), mesh }
     }
 }
 
-impl Witness for StillWorld {
-    fn see(&mut self, _: &ArmState) {}
+impl Observer for StaticWorld {
+    fn on_state(&mut self, _: &ArmState) {}
 }
 
-impl World for StillWorld {
+impl World for StaticWorld {
     fn mesh(&self) -> &TriMesh {
         &self.mesh
     }
@@ -78,14 +78,14 @@ impl World for StillWorld {
         self.tree.closest(&self.mesh, place, reach)
     }
 
-    fn tell(&mut self, _: &Progress) {}
+    fn publish(&mut self, _: &Progress) {}
 }
 
-/// How large a surface around a flag tells how it looks out, m.
+/// Radius around a flag of the surface whose normal is averaged, m.
 const AROUND: f64 = 8e-3;
-/// The mesh is looked for this far from a flag, m.
+/// The mesh is searched this far from a flag, m.
 const NEAR: f64 = 20e-3;
-/// Faces that look elsewhere by more than this (cosine) are another surface.
+/// Faces whose normals differ by more than this (cosine) are another surface.
 const ALIKE: f64 = 0.7;
 
 /// Distance of a place from the mesh, m; at most the reach.
@@ -93,7 +93,7 @@ pub(super) fn distance(world: &dyn World, place: &Point3<f64>, reach: f64) -> f6
     world.closest_face(place, reach).map_or(reach, |hit| (place - hit.point).norm())
 }
 
-/// How the surface looks out around a flag: the mean of the faces there that look towards the handle of the probe, weighed by
+/// Outward normal of the surface around a flag: the mean of the faces there that face the handle of the probe, weighted by
 /// their area; where there are none, the shaft.
 pub(super) fn normal_about(world: &dyn World, flag: &Point3<f64>, shaft: &Unit<Vector3<f64>>) -> Unit<Vector3<f64>> {
     let mesh = world.mesh();

@@ -25,15 +25,15 @@ const ALONG: usize = 5;
 /// Places down a wall, as shares of its depth, and the depth of a wall whose own is not known, of its radius.
 const DOWN: [f64; 3] = [0.2, 0.5, 0.8];
 const UNKNOWN_DEPTH: f64 = 1.0;
-/// What one place tells, however often a hand goes over it: the calibration is the same each time. Standard deviation, m.
+/// Standard deviation of one place, m, however often it is touched by hand: the error of the calibration is shared.
 const PLACE_SIGMA: f64 = 20e-6;
 /// Enough is known when each number of the feature has this standard deviation, m.
 const ENOUGH: f64 = 10e-6;
 
-/// The touch that would tell most of the numbers of a feature; `None` when enough is known, or it has no wall.
+/// The touch with the largest gain for the numbers of a feature; `None` when enough is known, or it has no wall.
 ///
 /// - `touches`: all touches; the feature names its own by their numbers.
-pub fn next_by_hand(feature: &Feature, touches: &[ProbedPoint]) -> Option<NextTouch> {
+pub fn advise_next_touch(feature: &Feature, touches: &[ProbedPoint]) -> Option<NextTouch> {
     let axis = feature.axis.as_ref()?.value;
     match feature.walls()? {
         Walls::Round(wall) => {
@@ -78,7 +78,7 @@ fn best<M: Surface>(
 ) -> Option<NextTouch> {
     let pose_of = surface.pose_of();
     let (up, sign) = match feature.kind {
-        // a boss stands on its foot, and what is out of its middle is out of the part
+        // a boss rises from its foot, and what is out of its middle is out of the part
         Kind::Boss => (*axis, 1.0),
         _ => (-axis, -1.0),
     };
@@ -138,42 +138,42 @@ mod tests {
     }
 
     #[test]
-    fn a_hole_felt_on_one_side_is_to_be_felt_on_the_other() {
-        let felt: Vec<_> =
+    fn a_hole_touched_on_one_side_is_to_be_touched_on_the_other() {
+        let touched: Vec<_> =
             (0..7).flat_map(|at| DOWN.map(|d| (f64::from(at) / 6.0 * PI - PI / 2.0, d * 10e-3))).collect();
-        let (feature, touches) = hole(&felt);
-        let next = next_by_hand(&feature, &touches).unwrap();
-        // felt where x is above 0
+        let (feature, touches) = hole(&touched);
+        let next = advise_next_touch(&feature, &touches).unwrap();
+        // touched where x is above 0
         assert!(next.place.x < -3e-3 && (next.place.xy().coords.norm() - 4e-3).abs() < 1e-9, "{next:?}");
         assert!(next.normal.x > 0.7 && next.place.z < 0.0 && next.place.z > -10e-3, "{next:?}");
     }
 
     #[test]
-    fn nothing_is_asked_of_a_hole_felt_all_around_and_the_first_touch_is_on_its_wall() {
-        let felt: Vec<_> =
+    fn nothing_is_asked_of_a_hole_touched_all_around_and_the_first_touch_is_on_its_wall() {
+        let touched: Vec<_> =
             (0..AROUND).flat_map(|at| DOWN.map(|d| (at as f64 / AROUND as f64 * TAU, d * 10e-3))).collect();
-        let (feature, touches) = hole(&felt);
-        assert_eq!(next_by_hand(&feature, &touches), None);
+        let (feature, touches) = hole(&touched);
+        assert_eq!(advise_next_touch(&feature, &touches), None);
         let (feature, touches) = hole(&[]);
-        let next = next_by_hand(&feature, &touches).unwrap();
+        let next = advise_next_touch(&feature, &touches).unwrap();
         assert!((next.place.xy().coords.norm() - 4e-3).abs() < 1e-9 && next.normal.dot(&next.place.coords) < 0.0);
     }
 
-    /// Who does as he is told knows the hole after few places, and is never sent to one twice.
+    /// Following the advice measures the hole in few places, none of them twice.
     #[test]
-    fn doing_as_told_ends() {
-        let mut felt = Vec::new();
+    fn following_the_advice_ends() {
+        let mut touched = Vec::new();
         for count in 0.. {
-            let (feature, touches) = hole(&felt);
-            let Some(next) = next_by_hand(&feature, &touches) else {
+            let (feature, touches) = hole(&touched);
+            let Some(next) = advise_next_touch(&feature, &touches) else {
                 println!("{count} places");
                 assert!((4..=24).contains(&count), "{count}");
                 break;
             };
             let place = (next.place.y.atan2(next.place.x), -next.place.z);
             let is_new = |(angle, depth): &(f64, f64)| (angle - place.0).abs() > 1e-6 || (depth - place.1).abs() > 1e-6;
-            assert!(felt.iter().all(is_new), "{place:?} again");
-            felt.push(place);
+            assert!(touched.iter().all(is_new), "{place:?} again");
+            touched.push(place);
         }
     }
 }

@@ -14,15 +14,15 @@ use super::slide::{RimStation, Slide, circle};
 use crate::features::fit::Observation;
 use crate::features::{End, Feature};
 
-/// Places around the flag where the top is looked for, beside the flag itself.
+/// Places around the flag where the top is searched, beside the flag itself.
 const RING: usize = 6;
 /// First directions.
 const FIRST: usize = 3;
-/// More directions that are tried where a first one felt nothing.
+/// More directions that are tried after a miss in the first one.
 const MOST_FIRST: usize = 6;
 /// Touches of the ground around the foot.
 const AROUND: usize = 4;
-/// The way outward goes on by this factor.
+/// The distance of the search outward grows by this factor.
 const FARTHER: f64 = 1.4;
 /// No boss is larger, m.
 const LARGEST: f64 = 30e-3;
@@ -30,7 +30,7 @@ const LARGEST: f64 = 30e-3;
 const BESIDE: f64 = 1.2;
 /// The ball stays this far above the ground, m.
 const OFF_GROUND: f64 = 0.4e-3;
-/// So far down the ground is looked for, over the ball's radius.
+/// Depth of the search for the ground, over the ball's radius.
 const GROUND: f64 = 5.0;
 /// The wall is touched no higher than this share of how deep it may be.
 const HIGH: f64 = 0.6;
@@ -57,7 +57,7 @@ pub(super) struct BossPattern {
     seen: Vec<Observation>,
     wall: RoundWall,
     ground: Vec<Observation>,
-    /// height of the ground in F, m; where nothing was felt, as deep as it was looked for
+    /// height of the ground in F, m; at a miss, the depth of the search
     ground_z: f64,
     direction: usize,
     around: usize,
@@ -76,7 +76,7 @@ impl BossPattern {
         }
     }
 
-    fn way(&self) -> Vector3<f64> {
+    fn outward(&self) -> Vector3<f64> {
         // a second round goes between the first
         let turn = self.direction as f64 + 0.5 * (self.direction / FIRST) as f64;
         let angle = turn / FIRST as f64 * TAU;
@@ -84,18 +84,18 @@ impl BossPattern {
     }
 
     /// How far below the top the wall is touched: between the edge of the top and the ground, m.
-    fn depth(&self, course: &SearchContext) -> Option<f64> {
-        let ball = course.params.ball_radius;
-        let deepest = course.height - self.ground_z - ball - OFF_GROUND;
+    fn depth(&self, context: &SearchContext) -> Option<f64> {
+        let ball = context.params.ball_radius;
+        let deepest = context.height - self.ground_z - ball - OFF_GROUND;
         (deepest > 0.2 * ball).then(|| deepest.min(SHALLOW * ball))
     }
 
-    fn too_low(&self, course: &SearchContext) -> ExploreError {
-        let height_mm = (course.height - self.ground_z) * 1e3;
-        ExploreError::TooLow { kind: "boss", height_mm, ball_mm: course.params.ball_radius * 2e3 }
+    fn too_low(&self, context: &SearchContext) -> ExploreError {
+        let height_mm = (context.height - self.ground_z) * 1e3;
+        ExploreError::TooLow { kind: "boss", height_mm, ball_mm: context.params.ball_radius * 2e3 }
     }
 
-    fn take_top(&mut self, course: &mut SearchContext, touch: &Touched) {
+    fn take_top(&mut self, context: &mut SearchContext, touch: &Touched) {
         self.seen.extend(touch.observation);
         self.around += 1;
         if self.around <= RING {
@@ -103,24 +103,24 @@ impl BossPattern {
         }
         self.around = 0;
         let mut top: Vec<Observation> = self.seen.clone();
-        course.level(&mut top, true, &mut []);
-        let places: Vec<_> = top.iter().map(|o| course.in_f(&o.point)).collect();
+        context.level(&mut top, true, &mut []);
+        let places: Vec<_> = top.iter().map(|o| context.in_f(&o.point)).collect();
         if top.len() < 3 {
-            course.height = places.iter().map(|p| course.below(p)).fold(f64::NEG_INFINITY, f64::max);
+            context.height = places.iter().map(|p| context.below(p)).fold(f64::NEG_INFINITY, f64::max);
         }
-        let high: Vec<_> = places.into_iter().filter(|p| (course.below(p) - course.height).abs() < FLAT).collect();
+        let high: Vec<_> = places.into_iter().filter(|p| (context.below(p) - context.height).abs() < FLAT).collect();
         let sum = high.iter().map(|place| place.coords).sum::<Vector3<f64>>();
         self.wall.middle = Point3::from(sum / high.len().max(1) as f64);
         self.wall.middle.z = 0.0;
         self.seen = top;
-        self.phase = BossPhase::Out(course.params.flag_radius + course.params.ball_radius);
+        self.phase = BossPhase::Out(context.params.flag_radius + context.params.ball_radius);
     }
 
-    fn take_out(&mut self, course: &SearchContext, touch: &Touched, distance: f64) {
-        let ball = course.params.ball_radius;
-        let lowest = course.height - GROUND * ball;
-        let z = touch.place.map_or(lowest, |place| course.below(&place));
-        let is_beside = touch.felt != TouchResult::Unclear && course.height - z > BESIDE * ball;
+    fn take_out(&mut self, context: &SearchContext, touch: &Touched, distance: f64) {
+        let ball = context.params.ball_radius;
+        let lowest = context.height - GROUND * ball;
+        let z = touch.place.map_or(lowest, |place| context.below(&place));
+        let is_beside = touch.result != TouchResult::Unclear && context.height - z > BESIDE * ball;
         if is_beside {
             self.ground_z = self.ground_z.max(z);
             self.phase = BossPhase::In(distance);
@@ -129,78 +129,78 @@ impl BossPattern {
         }
     }
 
-    fn take_in(&mut self, course: &SearchContext, touch: &Touched, distance: f64) {
-        let before = self.wall.measuring.felt.len();
+    fn take_in(&mut self, context: &SearchContext, touch: &Touched, distance: f64) {
+        let before = self.wall.measuring.observations.len();
         self.wall.measuring.take(touch);
-        if self.wall.measuring.felt.len() == before && touch.felt == TouchResult::Unclear {
-            // something else was in the way
+        if self.wall.measuring.observations.len() == before && touch.result == TouchResult::Unclear {
+            // another surface was hit
             self.phase = BossPhase::Out(distance * FARTHER);
             return;
         }
         self.direction += 1;
         let reached = touch.place.map_or(distance, |place| (place - self.wall.middle).xy().norm());
-        self.phase = match self.wall.measuring.felt.len() < FIRST {
-            true => BossPhase::Out(reached + course.params.clearance),
+        self.phase = match self.wall.measuring.observations.len() < FIRST {
+            true => BossPhase::Out(reached + context.params.clearance),
             false => BossPhase::Ground,
         };
         if self.phase == BossPhase::Ground {
-            self.wall.recentre(course);
+            self.wall.recentre(context);
         }
     }
 }
 
 impl Stage for BossPattern {
-    fn next(&mut self, course: &SearchContext) -> Next {
-        let (ball, clearance) = (course.params.ball_radius, course.params.clearance);
+    fn next(&mut self, context: &SearchContext) -> Next {
+        let (ball, clearance) = (context.params.ball_radius, context.params.clearance);
         match self.phase {
             BossPhase::Top => {
                 let angle = self.around as f64 / RING as f64 * TAU;
-                let far = if self.around == 0 { 0.0 } else { course.params.flag_radius };
+                let far = if self.around == 0 { 0.0 } else { context.params.flag_radius };
                 let place = Point3::new(far * angle.cos(), far * angle.sin(), 0.0);
-                Next::Touch(course.down(&place, clearance + GROUND * ball + ROUGH))
+                Next::Touch(context.down(&place, clearance + GROUND * ball + ROUGH))
             }
             BossPhase::Out(distance) if distance > LARGEST || self.direction >= MOST_FIRST => {
                 Next::Failed(ExploreError::NoWall {
                     kind: "boss",
-                    walls: self.wall.measuring.felt.len(),
+                    walls: self.wall.measuring.observations.len(),
                     asked: self.direction + 1,
                     reach_mm: LARGEST * 1e3,
                 })
             }
             BossPhase::Out(distance) => {
-                let place = self.wall.middle + self.way() * distance;
-                Next::Touch(course.down(&place, clearance + GROUND * ball))
+                let place = self.wall.middle + self.outward() * distance;
+                Next::Touch(context.down(&place, clearance + GROUND * ball))
             }
-            BossPhase::In(distance) => match self.depth(course) {
-                None => Next::Failed(self.too_low(course)),
+            BossPhase::In(distance) => match self.depth(context) {
+                None => Next::Failed(self.too_low(context)),
                 Some(depth) => {
-                    let place = self.wall.middle + self.way() * distance;
-                    Next::Touch(course.sideways(&place, depth, &-self.way(), distance))
+                    let place = self.wall.middle + self.outward() * distance;
+                    Next::Touch(context.sideways(&place, depth, &-self.outward(), distance))
                 }
             },
             BossPhase::Ground => {
                 let angle = (self.around as f64 + 0.5) / AROUND as f64 * TAU;
-                let away = self.wall.radius(course) + 2.0 * BESIDE * ball;
+                let away = self.wall.radius(context) + 2.0 * BESIDE * ball;
                 let place = self.wall.middle + Vector3::new(angle.cos(), angle.sin(), 0.0) * away;
-                Next::Touch(course.down(&place, clearance + GROUND * ball))
+                Next::Touch(context.down(&place, clearance + GROUND * ball))
             }
-            BossPhase::Wall if self.wall.is_known(course) => Next::Done { is_as_asked: true },
+            BossPhase::Wall if self.wall.is_known(context) => Next::Done { is_as_asked: true },
             BossPhase::Wall => {
-                let Some(deep) = self.depth(course) else { return Next::Failed(self.too_low(course)) };
-                let wish = self.wall.best(course, [(BELOW_RIM * ball).min(HIGH * deep), deep]);
-                wish.map_or(Next::Done { is_as_asked: false }, Next::Touch)
+                let Some(deep) = self.depth(context) else { return Next::Failed(self.too_low(context)) };
+                let planned = self.wall.best(context, [(BELOW_RIM * ball).min(HIGH * deep), deep]);
+                planned.map_or(Next::Done { is_as_asked: false }, Next::Touch)
             }
         }
     }
 
-    fn take(&mut self, course: &mut SearchContext, touch: &Touched) {
+    fn take(&mut self, context: &mut SearchContext, touch: &Touched) {
         match self.phase {
-            BossPhase::Top => self.take_top(course, touch),
-            BossPhase::Out(distance) => self.take_out(course, touch, distance),
-            BossPhase::In(distance) => self.take_in(course, touch, distance),
+            BossPhase::Top => self.take_top(context, touch),
+            BossPhase::Out(distance) => self.take_out(context, touch, distance),
+            BossPhase::In(distance) => self.take_in(context, touch, distance),
             BossPhase::Ground => {
                 let is_ground =
-                    touch.place.is_some_and(|p| (course.below(&p) - self.ground_z).abs() < course.params.ball_radius);
+                    touch.place.is_some_and(|p| (context.below(&p) - self.ground_z).abs() < context.params.ball_radius);
                 self.ground.extend(touch.observation.filter(|_| is_ground));
                 self.around += 1;
                 if self.around >= AROUND {
@@ -209,40 +209,40 @@ impl Stage for BossPattern {
             }
             BossPhase::Wall => {
                 self.wall.measuring.take(touch);
-                self.wall.recentre(course);
+                self.wall.recentre(context);
             }
         }
     }
 
-    fn feature(&self, course: &SearchContext) -> Result<Option<Feature>, ExploreError> {
-        if self.ground.len() < 3 || self.wall.measuring.felt.len() < FIRST {
-            return Err(ExploreError::NotDone { touches: course.touches });
+    fn feature(&self, context: &SearchContext) -> Result<Option<Feature>, ExploreError> {
+        if self.ground.len() < 3 || self.wall.measuring.observations.len() < FIRST {
+            return Err(ExploreError::NotDone { touches: context.touches });
         }
-        let foot = surface_about(course, &self.wall.middle, &self.ground)?;
-        let wall = self.wall.fitted(course, &foot)?;
-        let height = |o: &Observation| course.in_f(&o.point).z;
+        let foot = surface_about(context, &self.wall.middle, &self.ground)?;
+        let wall = self.wall.fitted(context, &foot)?;
+        let height = |o: &Observation| context.in_f(&o.point).z;
         let highest = self.seen.iter().max_by(|a, b| height(a).total_cmp(&height(b)));
-        let top = highest.map(|o| End { point: o.point - course.out() * o.offset, sigma: o.sigma });
-        let touches = numbers([&self.wall.measuring.felt, &self.ground]);
+        let top = highest.map(|o| End { point: o.point - context.out() * o.offset, sigma: o.sigma });
+        let touches = numbers([&self.wall.measuring.observations, &self.ground]);
         Ok(Some(Feature::round(&wall, &foot, top.as_ref(), touches)))
     }
 
-    fn uncertainty(&self, course: &SearchContext) -> Option<f64> {
-        self.wall.uncertainty(course)
+    fn uncertainty(&self, context: &SearchContext) -> Option<f64> {
+        self.wall.uncertainty(context)
     }
 
-    fn slides(&self, course: &SearchContext) -> Vec<Slide> {
-        let (ball, radius) = (course.params.ball_radius, self.wall.radius(course));
-        let Some(deep) = self.depth(course) else { return Vec::new() };
-        let middle = Point3::new(self.wall.middle.x, self.wall.middle.y, course.height);
+    fn slides(&self, context: &SearchContext) -> Vec<Slide> {
+        let (ball, radius) = (context.params.ball_radius, self.wall.radius(context));
+        let Some(deep) = self.depth(context) else { return Vec::new() };
+        let middle = Point3::new(self.wall.middle.x, self.wall.middle.y, context.height);
         let rim = RimStation {
             at: &circle(middle, radius, 1.0),
             length: TAU * radius,
             is_closed: true,
             back: ball.min(HALF * radius),
             depths: [(BELOW_RIM * ball).min(HIGH * deep), deep],
-            room: course.params.clearance,
+            room: context.params.clearance,
         };
-        rim.slides(course)
+        rim.slides(context)
     }
 }

@@ -1,4 +1,4 @@
-//! The wall of a hole or boss: what is asked of it, and where it could be touched.
+//! The wall of a hole or boss: its requested numbers, and its candidate touches.
 
 use std::f64::consts::TAU;
 
@@ -12,10 +12,10 @@ use crate::numeric::{NormalEquations, mean};
 
 /// Directions that are candidates.
 const DIRECTIONS: usize = 24;
-/// A hole stands square to its surface within this, rad.
+/// A hole is perpendicular to its surface within this, rad.
 pub(super) const SQUARE: f64 = 0.02;
 /// The ball's centre is this far below the surface where the wall is touched highest, over its radius: below a rim that is broken
-/// by no more, and as near to the opening as it may be, as that is where the numbers are asked for.
+/// by no more, and as near to the opening as it may be, as the numbers refer to that place.
 pub(super) const BELOW_RIM: f64 = 0.7;
 /// So many touches before it is believed.
 pub(super) const LEAST_WALL: usize = 8;
@@ -30,29 +30,29 @@ pub(super) struct RoundWall {
 }
 
 impl RoundWall {
-    /// The middle of the circle through what was felt.
-    pub fn recentre(&mut self, course: &SearchContext) {
-        if let Some((centre, _)) = self.circle(course) {
+    /// The middle of the circle through the contacts.
+    pub fn recentre(&mut self, context: &SearchContext) {
+        if let Some((centre, _)) = self.circle(context) {
             self.middle = centre;
         }
     }
 
-    fn circle(&self, course: &SearchContext) -> Option<(Point3<f64>, f64)> {
-        let points: Vec<_> = self.measuring.felt.iter().map(|o| course.in_f(&o.point)).collect();
+    fn circle(&self, context: &SearchContext) -> Option<(Point3<f64>, f64)> {
+        let points: Vec<_> = self.measuring.observations.iter().map(|o| context.in_f(&o.point)).collect();
         circle_through(&points)
     }
 
     /// As far as is known, m.
-    pub fn radius(&self, course: &SearchContext) -> f64 {
-        let ball = course.params.ball_radius;
-        let centres = self.circle(course).map_or(0.0, |(_, radius)| radius);
+    pub fn radius(&self, context: &SearchContext) -> f64 {
+        let ball = context.params.ball_radius;
+        let centres = self.circle(context).map_or(0.0, |(_, radius)| radius);
         if self.is_boss { centres - ball } else { centres + ball }
     }
 
-    fn guess(&self, course: &SearchContext) -> Cylinder {
-        let middle = course.pose_of * Point3::new(self.middle.x, self.middle.y, course.height);
-        let pose_of = Isometry3::from_parts(middle.coords.into(), course.pose_of.rotation);
-        Cylinder { pose_of, radius: self.radius(course), concave: !self.is_boss }
+    fn guess(&self, context: &SearchContext) -> Cylinder {
+        let middle = context.pose_of * Point3::new(self.middle.x, self.middle.y, context.height);
+        let pose_of = Isometry3::from_parts(middle.coords.into(), context.pose_of.rotation);
+        Cylinder { pose_of, radius: self.radius(context), concave: !self.is_boss }
     }
 
     fn asked(params: &PatternParams) -> Asked {
@@ -70,73 +70,81 @@ impl RoundWall {
         }
     }
 
-    fn before(course: &SearchContext, guess: &Cylinder) -> Knowledge {
-        Knowledge::before::<Cylinder>(guess.radius.max(course.params.ball_radius), SQUARE)
+    fn before(context: &SearchContext, guess: &Cylinder) -> Knowledge {
+        Knowledge::before::<Cylinder>(guess.radius.max(context.params.ball_radius), SQUARE)
     }
 
-    /// Standard uncertainty of what is asked, m or rad.
-    pub fn uncertainty(&self, course: &SearchContext) -> Option<f64> {
-        let guess = self.guess(course);
+    /// Standard uncertainty of the requested number, m or rad.
+    pub fn uncertainty(&self, context: &SearchContext) -> Option<f64> {
+        let guess = self.guess(context);
         let params = FitParams { axis_sigma: Some(SQUARE), ..FitParams::default() };
-        let asked = Self::asked(&course.params);
-        let share =
-            || self.measuring.told(&guess, &params, Self::before(course, &guess), &asked, course.params.touch_sigma);
-        let has_enough = self.measuring.felt.len() >= LEAST_WALL;
-        has_enough.then(share).flatten().map(|share| share * course.params.sigma)
+        let asked = Self::asked(&context.params);
+        let share = || {
+            self.measuring.uncertainty_ratio(
+                &guess,
+                &params,
+                Self::before(context, &guess),
+                &asked,
+                context.params.touch_sigma,
+            )
+        };
+        let has_enough = self.measuring.observations.len() >= LEAST_WALL;
+        has_enough.then(share).flatten().map(|share| share * context.params.sigma)
     }
 
-    /// Whether it is known as well as was asked.
-    pub fn is_known(&self, course: &SearchContext) -> bool {
-        self.uncertainty(course).is_some_and(|sigma| sigma <= course.params.sigma)
+    /// Whether it has the requested uncertainty.
+    pub fn is_known(&self, context: &SearchContext) -> bool {
+        self.uncertainty(context).is_some_and(|sigma| sigma <= context.params.sigma)
     }
 
-    /// The touch of the wall that tells most.
+    /// The touch of the wall with the largest gain.
     ///
     /// - `depths`: below the surface, m.
-    pub fn best(&mut self, course: &SearchContext, depths: [f64; 2]) -> Option<TouchPlan> {
-        let surface = self.guess(course);
-        let ball = course.params.ball_radius;
+    pub fn best(&mut self, context: &SearchContext, depths: [f64; 2]) -> Option<TouchPlan> {
+        let surface = self.guess(context);
+        let ball = context.params.ball_radius;
         // in a hole from the middle, of a boss from beside it
-        let from = if self.is_boss { surface.radius + ball + course.params.clearance } else { 0.0 };
-        let travel = if self.is_boss { course.params.clearance } else { surface.radius - ball };
+        let from = if self.is_boss { surface.radius + ball + context.params.clearance } else { 0.0 };
+        let travel = if self.is_boss { context.params.clearance } else { surface.radius - ball };
         let possible = (0..DIRECTIONS).flat_map(|at| depths.map(|depth| (at as f64 / DIRECTIONS as f64 * TAU, depth)));
         let possible = possible.map(|(angle, depth)| {
-            let way = Vector3::new(angle.cos(), angle.sin(), 0.0);
-            let wish = course.sideways(&(self.middle + way * from), depth, &self.towards(way), travel + REACH);
-            let point = surface.pose_of * (Point3::origin() + way * surface.radius - Vector3::z() * depth);
-            Possible { point, travel, wish }
+            let direction = Vector3::new(angle.cos(), angle.sin(), 0.0);
+            let planned =
+                context.sideways(&(self.middle + direction * from), depth, &self.towards(direction), travel + REACH);
+            let point = surface.pose_of * (Point3::origin() + direction * surface.radius - Vector3::z() * depth);
+            Possible { point, travel, planned }
         });
         let possible = possible.collect();
-        let known = self.measuring.known(&surface, Self::before(course, &surface), course.params.touch_sigma);
-        let asked = Self::asked(&course.params).and_the_rest::<Cylinder>(course.params.sigma, surface.radius);
-        let (best, _) = self.measuring.best(&surface, &known, possible, &asked, course.params.touch_sigma)?;
+        let known = self.measuring.known(&surface, Self::before(context, &surface), context.params.touch_sigma);
+        let asked = Self::asked(&context.params).and_the_rest::<Cylinder>(context.params.sigma, surface.radius);
+        let (best, _) = self.measuring.best(&surface, &known, possible, &asked, context.params.touch_sigma)?;
         Some(self.measuring.aim(&best))
     }
 
     /// Into the wall, at a direction from the middle.
-    pub fn towards(&self, way: Vector3<f64>) -> Vector3<f64> {
-        if self.is_boss { -way } else { way }
+    pub fn towards(&self, direction: Vector3<f64>) -> Vector3<f64> {
+        if self.is_boss { -direction } else { direction }
     }
 
-    /// The cylinder through what was felt of the wall, square to a surface.
-    pub fn fitted(&self, course: &SearchContext, top: &Fit<Plane>) -> Result<Fit<Cylinder>, FitError> {
-        let middle = self.guess(course).pose_of.translation.vector.into();
-        let guess = Cylinder::new(middle, &top.surface.normal(), self.radius(course), !self.is_boss);
-        fit(&guess, &self.measuring.felt, &FitParams { axis_sigma: Some(SQUARE), ..FitParams::default() })
+    /// The cylinder through the contacts of the wall, perpendicular to a surface.
+    pub fn fitted(&self, context: &SearchContext, top: &Fit<Plane>) -> Result<Fit<Cylinder>, FitError> {
+        let middle = self.guess(context).pose_of.translation.vector.into();
+        let guess = Cylinder::new(middle, &top.surface.normal(), self.radius(context), !self.is_boss);
+        fit(&guess, &self.measuring.observations, &FitParams { axis_sigma: Some(SQUARE), ..FitParams::default() })
     }
 }
 
-/// So much farther than expected a wall is looked for, m.
+/// A wall is searched so much farther than expected, m.
 const REACH: f64 = 3e-3;
 
-/// The plane through what was felt of the surface about a place of F.
+/// The plane through the contacts of the surface about a place of F.
 pub(super) fn surface_about(
-    course: &SearchContext,
+    context: &SearchContext,
     middle: &Point3<f64>,
-    felt: &[Observation],
+    observations: &[Observation],
 ) -> Result<Fit<Plane>, FitError> {
-    let middle = course.pose_of * Point3::new(middle.x, middle.y, course.height);
-    fit(&Plane::new(middle, &course.out()), felt, &FitParams::default())
+    let middle = context.pose_of * Point3::new(middle.x, middle.y, context.height);
+    fit(&Plane::new(middle, &context.out()), observations, &FitParams::default())
 }
 
 /// Middle and radius of the circle through points of a plane, by least squares of x² + y² = 2ax + 2by + c \[Kåsa 1976\].

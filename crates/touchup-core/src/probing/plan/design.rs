@@ -1,4 +1,4 @@
-//! The touch that tells most of the number that is asked for.
+//! Design of experiments: the touch that reduces the uncertainty of the requested number most.
 //!
 //! With the covariance C of a surface's freedoms, a touch with derivatives g of its distance and deviation σ leaves
 //! C' = C − C g gᵀ C / (σ² + gᵀ C g), so a number that changes with the freedoms as c loses (cᵀ C g)² / (σ² + gᵀ C g) of its
@@ -13,22 +13,22 @@ type InformationMatrix = SMatrix<f64, FREEDOMS, FREEDOMS>;
 /// A touch that could be made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Candidate {
-    /// Where the surface would be felt, m in O.
+    /// Where the surface would be touched, m in O.
     pub point: Point3<f64>,
     /// Standard deviation along the normal, m.
     pub sigma: f64,
 }
 
-/// The numbers of a surface that are asked for.
+/// The requested numbers of a surface.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Asked {
-    /// For each number how it changes with the freedoms, over the deviation that is wanted of it.
+    /// For each number how it changes with the freedoms, over its requested deviation.
     by: Vec<Steps>,
-    /// the same for what is not asked for and must not stay unknown
+    /// the same for numbers not requested that must not stay undetermined
     rest: Vec<Steps>,
 }
 
-/// What is not asked for is known well enough with so many times the deviation that is wanted.
+/// A number not requested may have so many times the requested deviation.
 const REST: f64 = 8.0;
 
 impl Asked {
@@ -40,7 +40,7 @@ impl Asked {
         self
     }
 
-    /// Whether a fit fixes all numbers that are asked for.
+    /// Whether a fit fixes all requested numbers.
     pub(super) fn is_fixed_by<M: Surface>(&self, fit: &Fit<M>) -> bool {
         self.by.iter().all(|by| fit.std_of(by).is_some())
     }
@@ -48,7 +48,7 @@ impl Asked {
     /// With all freedoms of a surface to be known roughly: a number comes of a fit, and a fit in which another one is open goes
     /// astray by its curvature.
     ///
-    /// - `sigma`: wanted of the numbers, m; `size`: of the surface, m, by which a lean counts.
+    /// - `sigma`: requested of the numbers, m; `size`: of the surface, m, by which a lean counts.
     pub fn and_the_rest<M: Surface>(mut self, sigma: f64, size: f64) -> Self {
         for freedom in Freedom::ALL.into_iter().filter(|freedom| M::FREE[*freedom as usize]) {
             let is_angle = matches!(freedom, Freedom::TiltX | Freedom::TiltY | Freedom::Turn);
@@ -99,13 +99,13 @@ impl Knowledge {
         g.dot(&(self.covariance * g)).max(0.0).sqrt()
     }
 
-    /// Sum over the numbers asked for of (deviation / wanted deviation)²; below their count when all are known well enough
+    /// Sum over the requested numbers of (deviation / requested deviation)²; below their count when all are known well enough
     /// on average.
     pub fn open(&self, asked: &Asked) -> f64 {
         asked.by.iter().chain(&asked.rest).map(|c| c.dot(&(self.covariance * c))).sum()
     }
 
-    /// The largest of the deviations over what is wanted; at most 1 when all is known.
+    /// The largest of the deviations over the requested ones; at most 1 when all are met.
     pub fn worst(&self, asked: &Asked) -> f64 {
         let shares = asked.by.iter().map(|c| c.dot(&(self.covariance * c)).max(0.0).sqrt());
         shares.fold(0.0, f64::max)
@@ -115,11 +115,11 @@ impl Knowledge {
     pub fn gain<M: Surface>(&self, surface: &M, touch: &Candidate, asked: &Asked) -> f64 {
         let (_, g) = surface.derivatives(&touch.point);
         let cg = self.covariance * g;
-        let told: f64 = asked.by.iter().chain(&asked.rest).map(|c| c.dot(&cg).powi(2)).sum();
-        told / (touch.sigma.powi(2) + g.dot(&cg))
+        let reduction: f64 = asked.by.iter().chain(&asked.rest).map(|c| c.dot(&cg).powi(2)).sum();
+        reduction / (touch.sigma.powi(2) + g.dot(&cg))
     }
 
-    /// The candidate that tells most, the first among equals; `None` when none tells anything.
+    /// The candidate with the largest gain, the first among equals; `None` when none has a gain.
     pub fn best<M: Surface>(&self, surface: &M, candidates: &[Candidate], asked: &Asked) -> Option<usize> {
         let gains = candidates.iter().map(|touch| self.gain(surface, touch, asked)).enumerate();
         let best = gains.fold(None, |best: Option<(usize, f64)>, (index, gain)| match best {
@@ -130,7 +130,7 @@ impl Knowledge {
         best.map(|(index, _)| index)
     }
 
-    /// Up to `count` touches that together tell most; fewer when all is known as well as was asked.
+    /// Up to `count` touches with the largest gain together; fewer when all has the requested uncertainty.
     ///
     /// Each is chosen as if those before had been made; then each is exchanged for a better one as long as there is one
     /// \[Fedorov 1972\]. The derivatives are those of `surface`: it should be known to a small share of its size.

@@ -17,19 +17,19 @@ use crate::features::Feature;
 use crate::features::fit::{Fit, FitParams, Freedom, Observation, Plane, fit};
 use crate::numeric::mean;
 
-/// Places around the flag where it is looked at what is high and what is low, beside the flag itself.
+/// Places around the flag that are sorted into high and low, beside the flag itself.
 const RING: usize = 6;
 /// Lower by this, over the ball's radius, is beyond the edge.
 const BEYOND: f64 = 0.8;
 /// Places on the high side, back from the flag and along the edge, over the radius of the ring.
 const MORE: [[f64; 2]; 4] = [[0.5, -0.9], [0.5, 0.9], [1.3, -0.6], [1.3, 0.6]];
-/// The ground is what was felt beyond this share of the farthest.
+/// The ground is what was touched beyond this share of the farthest.
 const CLEAR: f64 = 0.7;
-/// So far down the ground is looked for, over the ball's radius.
+/// Depth of the search for the ground, over the ball's radius.
 const GROUND: f64 = 4.0;
 /// The ball stays this far above the ground, m.
 const OFF_GROUND: f64 = 0.3e-3;
-/// First touches of the side, that tell how the edge runs.
+/// First touches of the side, that determine the direction of the edge.
 const FIRST: usize = 3;
 /// So many are tried.
 const MOST_FIRST: usize = 6;
@@ -97,21 +97,22 @@ impl EdgePattern {
         params.flag_radius + params.ball_radius
     }
 
-    /// Keeps what was felt from above, also that nothing was.
-    fn see(&mut self, course: &SearchContext, touch: &Touched) {
-        // as deep as it was looked for
-        let lowest = || course.in_f(&(touch.wish.from + touch.wish.direction.into_inner() * touch.wish.search));
-        if touch.felt != TouchResult::Unclear {
+    /// Keeps a touch from above, also a miss.
+    fn record(&mut self, context: &SearchContext, touch: &Touched) {
+        // as deep as the search went
+        let lowest =
+            || context.in_f(&(touch.planned.from + touch.planned.direction.into_inner() * touch.planned.search));
+        if touch.result != TouchResult::Unclear {
             self.seen.push((touch.place.unwrap_or_else(lowest), touch.observation));
         }
         self.tried += 1;
     }
 
-    /// Parts what was seen into high and low, and says which way is over the edge; whether there are both.
-    fn part(&mut self, course: &mut SearchContext) -> bool {
+    /// Parts the touches into high and low, and finds the direction over the edge; whether there are both.
+    fn part(&mut self, context: &mut SearchContext) -> bool {
         let ring = || self.seen.iter().take(RING + 1).map(|(place, _)| place);
-        course.height = ring().map(|p| course.below(p)).fold(f64::NEG_INFINITY, f64::max);
-        let is_low = |p: &Point3<f64>| course.height - course.below(p) > BEYOND * course.params.ball_radius;
+        context.height = ring().map(|p| context.below(p)).fold(f64::NEG_INFINITY, f64::max);
+        let is_low = |p: &Point3<f64>| context.height - context.below(p) > BEYOND * context.params.ball_radius;
         let [mut high, mut low] = [Vector3::zeros(); 2];
         let [mut highs, mut lows] = [0.0f64; 2];
         for place in ring() {
@@ -127,61 +128,62 @@ impl EdgePattern {
         let far = |p: &Point3<f64>| p.coords.dot(&self.over);
         let lowest = || ring().filter(|place| is_low(place));
         let farthest = lowest().map(far).fold(0.0, f64::max);
-        let ground = lowest().filter(|place| far(place) > CLEAR * farthest).map(|place| course.below(place));
+        let ground = lowest().filter(|place| far(place) > CLEAR * farthest).map(|place| context.below(place));
         self.ground_z = ground.fold(f64::NEG_INFINITY, f64::max);
         lows > 0.0 && highs > 0.0
     }
 
-    fn take_ring(&mut self, course: &mut SearchContext, touch: &Touched) {
-        self.see(course, touch);
+    fn take_ring(&mut self, context: &mut SearchContext, touch: &Touched) {
+        self.record(context, touch);
         if self.tried > RING {
             self.tried = 0;
-            self.phase = if self.part(course) { EdgePhase::Top } else { EdgePhase::NoEdge };
+            self.phase = if self.part(context) { EdgePhase::Top } else { EdgePhase::NoEdge };
         }
     }
 
-    /// Some more on the high side: of the ring too few may lie on it to tell how it looks out.
-    fn take_top(&mut self, course: &mut SearchContext, touch: &Touched) {
-        self.see(course, touch);
+    /// Some more on the high side: of the ring too few may lie on it to determine its normal.
+    fn take_top(&mut self, context: &mut SearchContext, touch: &Touched) {
+        self.record(context, touch);
         if self.tried < MORE.len() {
             return;
         }
         self.tried = 0;
-        let before = course.pose_of;
+        let before = context.pose_of;
         let mut top: Vec<Observation> = self.seen.iter().filter_map(|(_, observation)| *observation).collect();
-        if course.level(&mut top, false, &mut []) {
-            self.seen.iter_mut().for_each(|(place, _)| *place = course.in_f(&(before * *place)));
+        if context.level(&mut top, false, &mut []) {
+            self.seen.iter_mut().for_each(|(place, _)| *place = context.in_f(&(before * *place)));
         }
-        let has_both = self.part(course);
-        course.height = top.iter().map(|o| course.below(&course.in_f(&o.point))).sum::<f64>() / top.len().max(1) as f64;
-        self.top.felt = top;
+        let has_both = self.part(context);
+        context.height =
+            top.iter().map(|o| context.below(&context.in_f(&o.point))).sum::<f64>() / top.len().max(1) as f64;
+        self.top.observations = top;
         self.phase = if has_both { EdgePhase::Side } else { EdgePhase::NoEdge };
     }
 
     /// How far below the top the side is touched, m.
-    fn depth(&self, course: &SearchContext) -> Result<f64, ExploreError> {
-        let ball = course.params.ball_radius;
-        let deepest = course.height - self.ground_z - ball - OFF_GROUND;
+    fn depth(&self, context: &SearchContext) -> Result<f64, ExploreError> {
+        let ball = context.params.ball_radius;
+        let deepest = context.height - self.ground_z - ball - OFF_GROUND;
         match deepest > 0.2 * ball {
             true => Ok(deepest.min(SHALLOW * ball)),
             false => Err(ExploreError::TooLow {
                 kind: "edge",
-                height_mm: (course.height - self.ground_z) * 1e3,
+                height_mm: (context.height - self.ground_z) * 1e3,
                 ball_mm: ball * 2e3,
             }),
         }
     }
 
     /// Inward from beyond the edge, at a place along it.
-    fn inward(&self, course: &SearchContext, along: f64, depth: f64) -> TouchPlan {
-        let beyond = Self::ring(&course.params) + course.params.ball_radius;
+    fn inward(&self, context: &SearchContext, along: f64, depth: f64) -> TouchPlan {
+        let beyond = Self::ring(&context.params) + context.params.ball_radius;
         let from = Point3::origin() + self.over * beyond + self.along() * along;
-        course.sideways(&from, depth, &-self.over, 2.0 * beyond)
+        context.sideways(&from, depth, &-self.over, 2.0 * beyond)
     }
 
-    /// The side through what was felt of it: with its z out of the material, x along the edge.
-    fn side_plane(&self, course: &SearchContext) -> Plane {
-        let points: Vec<_> = self.side.felt.iter().map(|o| course.in_f(&o.point)).collect();
+    /// The side through its contacts: with its z out of the material, x along the edge.
+    fn side_plane(&self, context: &SearchContext) -> Plane {
+        let points: Vec<_> = self.side.observations.iter().map(|o| context.in_f(&o.point)).collect();
         let mean = mean(points.iter().map(|p| p.coords));
         // a line along the edge by least squares: how much farther over by each metre along
         let (mut sxx, mut sxy) = (0.0, 0.0);
@@ -194,22 +196,22 @@ impl EdgePattern {
         let out = (self.over - self.along() * slope).normalize();
         let x = out.cross(&Vector3::z());
         let turn = Rotation3::from_matrix_unchecked(nalgebra::Matrix3::from_columns(&[x, out.cross(&x), out]));
-        let origin = mean - out * course.params.ball_radius;
-        let origin = Vector3::new(origin.x, origin.y, course.height);
+        let origin = mean - out * context.params.ball_radius;
+        let origin = Vector3::new(origin.x, origin.y, context.height);
         let in_f = Isometry3::from_parts(origin.into(), UnitQuaternion::from_rotation_matrix(&turn));
-        Plane { pose_of: course.pose_of * in_f }
+        Plane { pose_of: context.pose_of * in_f }
     }
 
-    fn top_plane(&self, course: &SearchContext) -> Plane {
+    fn top_plane(&self, context: &SearchContext) -> Plane {
         // over the edge is x, so that its leans are along and across the edge
         let y = self.along();
         let turn = Rotation3::from_matrix_unchecked(nalgebra::Matrix3::from_columns(&[self.over, y, Vector3::z()]));
-        let at = course.in_f(&self.side_plane(course).point());
+        let at = context.in_f(&self.side_plane(context).point());
         let in_f = Isometry3::from_parts(at.coords.into(), UnitQuaternion::from_rotation_matrix(&turn));
-        Plane { pose_of: course.pose_of * in_f }
+        Plane { pose_of: context.pose_of * in_f }
     }
 
-    /// What is asked of the top, whose y runs along the edge, and of the side, whose x does.
+    /// The requested numbers of the top, whose y runs along the edge, and of the side, whose x does.
     fn asked(params: &PatternParams, lean: Freedom) -> Asked {
         let asked = Asked::default();
         match params.quantity {
@@ -226,15 +228,15 @@ impl EdgePattern {
         Knowledge::before::<Plane>(params.flag_radius, LEAN)
     }
 
-    fn known(&self, course: &SearchContext) -> [(Plane, Knowledge, Asked); 2] {
-        let before = || Self::before(&course.params);
-        let sigma = course.params.touch_sigma;
-        let (top, side) = (self.top_plane(course), self.side_plane(course));
+    fn known(&self, context: &SearchContext) -> [(Plane, Knowledge, Asked); 2] {
+        let before = || Self::before(&context.params);
+        let sigma = context.params.touch_sigma;
+        let (top, side) = (self.top_plane(context), self.side_plane(context));
         let known = [self.top.known(&top, before(), sigma), self.side.known(&side, before(), sigma)];
         let [of_top, of_side] = known;
         [
-            (top, of_top, Self::asked(&course.params, Freedom::TiltY)),
-            (side, of_side, Self::asked(&course.params, Freedom::TiltX)),
+            (top, of_top, Self::asked(&context.params, Freedom::TiltY)),
+            (side, of_side, Self::asked(&context.params, Freedom::TiltX)),
         ]
     }
 
@@ -242,40 +244,40 @@ impl EdgePattern {
         (0..ALONG).map(|at| (at as f64 / (ALONG - 1) as f64 * 2.0 - 1.0) * REACH * params.flag_radius)
     }
 
-    fn possible_top(&self, course: &SearchContext, top: &Plane) -> Vec<Possible> {
-        let PatternParams { ball_radius, clearance, .. } = course.params;
+    fn possible_top(&self, context: &SearchContext, top: &Plane) -> Vec<Possible> {
+        let PatternParams { ball_radius, clearance, .. } = context.params;
         let at = |along: f64, back: f64| {
             let point = top.pose_of * Point3::new(-back * ball_radius, along, 0.0);
-            let wish = course.down(&course.in_f(&point), clearance + ball_radius + ROUGH);
-            Possible { point, travel: clearance, wish }
+            let planned = context.down(&context.in_f(&point), clearance + ball_radius + ROUGH);
+            Possible { point, travel: clearance, planned }
         };
-        Self::places(&course.params).flat_map(|along| TOP.map(|back| at(along, back))).collect()
+        Self::places(&context.params).flat_map(|along| TOP.map(|back| at(along, back))).collect()
     }
 
-    fn possible_side(&self, course: &SearchContext, side: &Plane, deep: f64) -> Vec<Possible> {
-        let PatternParams { ball_radius, clearance, .. } = course.params;
+    fn possible_side(&self, context: &SearchContext, side: &Plane, deep: f64) -> Vec<Possible> {
+        let PatternParams { ball_radius, clearance, .. } = context.params;
         let at = |along: f64, depth: f64| {
-            let point = side.pose_of * Point3::new(along, 0.0, 0.0) - course.out() * depth;
-            let from = course.in_f(&(point + side.normal() * (ball_radius + clearance)));
-            let way = course.pose_of.inverse_transform_vector(&-side.normal());
-            Possible { point, travel: clearance, wish: course.sideways(&from, depth, &way, 2.0 * clearance) }
+            let point = side.pose_of * Point3::new(along, 0.0, 0.0) - context.out() * depth;
+            let from = context.in_f(&(point + side.normal() * (ball_radius + clearance)));
+            let direction = context.pose_of.inverse_transform_vector(&-side.normal());
+            Possible { point, travel: clearance, planned: context.sideways(&from, depth, &direction, 2.0 * clearance) }
         };
-        Self::places(&course.params).flat_map(|along| [0.5 * deep, deep].map(|depth| at(along, depth))).collect()
+        Self::places(&context.params).flat_map(|along| [0.5 * deep, deep].map(|depth| at(along, depth))).collect()
     }
 
-    fn next_of_both(&mut self, course: &SearchContext) -> Next {
-        let deep = match self.depth(course) {
+    fn next_of_both(&mut self, context: &SearchContext) -> Next {
+        let deep = match self.depth(context) {
             Ok(deep) => deep,
             Err(error) => return Next::Failed(error),
         };
-        let [top, side] = self.known(course);
-        let is_enough = self.top.felt.len() >= LEAST && self.side.felt.len() >= LEAST;
-        if is_enough && self.uncertainty(course).is_some_and(|sigma| sigma <= course.params.sigma) {
+        let [top, side] = self.known(context);
+        let is_enough = self.top.observations.len() >= LEAST && self.side.observations.len() >= LEAST;
+        if is_enough && self.uncertainty(context).is_some_and(|sigma| sigma <= context.params.sigma) {
             return Next::Done { is_as_asked: true };
         }
-        let sigma = course.params.touch_sigma;
-        let of_top = self.top.best(&top.0, &top.1, self.possible_top(course, &top.0), &top.2, sigma);
-        let of_side = self.side.best(&side.0, &side.1, self.possible_side(course, &side.0, deep), &side.2, sigma);
+        let sigma = context.params.touch_sigma;
+        let of_top = self.top.best(&top.0, &top.1, self.possible_top(context, &top.0), &top.2, sigma);
+        let of_side = self.side.best(&side.0, &side.1, self.possible_side(context, &side.0, deep), &side.2, sigma);
         let gain = |best: &Option<(Possible, f64)>| best.as_ref().map_or(0.0, |(_, gain)| *gain);
         self.is_top_next = gain(&of_top) >= gain(&of_side);
         let (chosen, measuring) = if self.is_top_next { (of_top, &mut self.top) } else { (of_side, &mut self.side) };
@@ -285,61 +287,61 @@ impl EdgePattern {
         }
     }
 
-    fn fitted(&self, course: &SearchContext) -> Result<[Fit<Plane>; 2], ExploreError> {
-        let top = fit(&self.top_plane(course), &self.top.felt, &FitParams::default())?;
-        let side = fit(&self.side_plane(course), &self.side.felt, &FitParams::default())?;
+    fn fitted(&self, context: &SearchContext) -> Result<[Fit<Plane>; 2], ExploreError> {
+        let top = fit(&self.top_plane(context), &self.top.observations, &FitParams::default())?;
+        let side = fit(&self.side_plane(context), &self.side.observations, &FitParams::default())?;
         Ok([top, side])
     }
 }
 
 impl Stage for EdgePattern {
-    fn next(&mut self, course: &SearchContext) -> Next {
-        let (ball, clearance) = (course.params.ball_radius, course.params.clearance);
+    fn next(&mut self, context: &SearchContext) -> Next {
+        let (ball, clearance) = (context.params.ball_radius, context.params.clearance);
         match self.phase {
-            EdgePhase::NoEdge => Next::Failed(ExploreError::NoEdge { radius_mm: Self::ring(&course.params) * 1e3 }),
+            EdgePhase::NoEdge => Next::Failed(ExploreError::NoEdge { radius_mm: Self::ring(&context.params) * 1e3 }),
             EdgePhase::Ring => {
                 let angle = self.tried as f64 / RING as f64 * TAU;
-                let far = if self.tried == 0 { 0.0 } else { Self::ring(&course.params) };
+                let far = if self.tried == 0 { 0.0 } else { Self::ring(&context.params) };
                 let place = Point3::new(far * angle.cos(), far * angle.sin(), 0.0);
-                Next::Touch(course.down(&place, clearance + GROUND * ball + ROUGH))
+                Next::Touch(context.down(&place, clearance + GROUND * ball + ROUGH))
             }
             EdgePhase::Top => {
-                let [back, along] = MORE[self.tried].map(|share| share * Self::ring(&course.params));
+                let [back, along] = MORE[self.tried].map(|share| share * Self::ring(&context.params));
                 let place = Point3::origin() - self.over * back + self.along() * along;
-                Next::Touch(course.down(&place, clearance + GROUND * ball + ROUGH))
+                Next::Touch(context.down(&place, clearance + GROUND * ball + ROUGH))
             }
             EdgePhase::Side if self.tried >= MOST_FIRST => Next::Failed(ExploreError::NoWall {
                 kind: "edge",
-                walls: self.side.felt.len(),
+                walls: self.side.observations.len(),
                 asked: self.tried,
-                reach_mm: 2e3 * (Self::ring(&course.params) + ball),
+                reach_mm: 2e3 * (Self::ring(&context.params) + ball),
             }),
             EdgePhase::Side => {
-                let along = [0.0, SPREAD, -SPREAD][self.tried % FIRST] * course.params.flag_radius;
-                match self.depth(course) {
-                    Ok(depth) => Next::Touch(self.inward(course, along, depth)),
+                let along = [0.0, SPREAD, -SPREAD][self.tried % FIRST] * context.params.flag_radius;
+                match self.depth(context) {
+                    Ok(depth) => Next::Touch(self.inward(context, along, depth)),
                     Err(error) => Next::Failed(error),
                 }
             }
-            EdgePhase::Both => self.next_of_both(course),
+            EdgePhase::Both => self.next_of_both(context),
         }
     }
 
-    fn take(&mut self, course: &mut SearchContext, touch: &Touched) {
+    fn take(&mut self, context: &mut SearchContext, touch: &Touched) {
         match self.phase {
-            EdgePhase::Ring | EdgePhase::NoEdge => self.take_ring(course, touch),
-            EdgePhase::Top => self.take_top(course, touch),
+            EdgePhase::Ring | EdgePhase::NoEdge => self.take_ring(context, touch),
+            EdgePhase::Top => self.take_top(context, touch),
             EdgePhase::Side => {
                 self.side.take(touch);
                 self.tried += 1;
-                if self.tried >= FIRST && self.side.felt.len() >= 2 {
-                    self.over = course.pose_of.inverse_transform_vector(&self.side_plane(course).normal());
+                if self.tried >= FIRST && self.side.observations.len() >= 2 {
+                    self.over = context.pose_of.inverse_transform_vector(&self.side_plane(context).normal());
                     self.phase = EdgePhase::Both;
                 }
             }
             EdgePhase::Both if self.is_top_next => {
                 self.top.take(touch);
-                let is_far = |p: Point3<f64>| (course.below(&p) - course.height).abs() > course.params.ball_radius;
+                let is_far = |p: Point3<f64>| (context.below(&p) - context.height).abs() > context.params.ball_radius;
                 if touch.place.is_some_and(is_far) {
                     self.top.refuse_last(touch);
                 }
@@ -348,36 +350,36 @@ impl Stage for EdgePattern {
         }
     }
 
-    fn feature(&self, course: &SearchContext) -> Result<Option<Feature>, ExploreError> {
+    fn feature(&self, context: &SearchContext) -> Result<Option<Feature>, ExploreError> {
         if self.phase != EdgePhase::Both {
-            return Err(ExploreError::NotDone { touches: course.touches });
+            return Err(ExploreError::NotDone { touches: context.touches });
         }
-        let [top, side] = self.fitted(course)?;
-        let along = |o: &Observation| course.in_f(&o.point).coords.dot(&self.along());
-        let all = || self.top.felt.iter().chain(&self.side.felt).map(along);
+        let [top, side] = self.fitted(context)?;
+        let along = |o: &Observation| context.in_f(&o.point).coords.dot(&self.along());
+        let all = || self.top.observations.iter().chain(&self.side.observations).map(along);
         let ends = [all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max)];
-        let start = course.in_f(&side.surface.point());
-        let at = |along: f64| course.pose_of * (start + self.along() * (along - start.coords.dot(&self.along())));
-        let touches = numbers([&self.top.felt, &self.side.felt]);
+        let start = context.in_f(&side.surface.point());
+        let at = |along: f64| context.pose_of * (start + self.along() * (along - start.coords.dot(&self.along())));
+        let touches = numbers([&self.top.observations, &self.side.observations]);
         Ok(Feature::edge([&top, &side], &ends.map(at), true, touches))
     }
 
-    fn uncertainty(&self, course: &SearchContext) -> Option<f64> {
-        let params = &course.params;
+    fn uncertainty(&self, context: &SearchContext) -> Option<f64> {
+        let params = &context.params;
         let share = |measuring: &Measuring, plane: &Plane, lean: Freedom| {
             let asked = Self::asked(params, lean);
-            measuring.told(plane, &FitParams::default(), Self::before(params), &asked, params.touch_sigma)
+            measuring.uncertainty_ratio(plane, &FitParams::default(), Self::before(params), &asked, params.touch_sigma)
         };
         let is_both = self.phase == EdgePhase::Both;
-        let of_top = is_both.then(|| share(&self.top, &self.top_plane(course), Freedom::TiltY)).flatten()?;
-        let of_side = share(&self.side, &self.side_plane(course), Freedom::TiltX)?;
+        let of_top = is_both.then(|| share(&self.top, &self.top_plane(context), Freedom::TiltY)).flatten()?;
+        let of_side = share(&self.side, &self.side_plane(context), Freedom::TiltX)?;
         Some(of_top.max(of_side) * params.sigma)
     }
 
-    fn slides(&self, course: &SearchContext) -> Vec<Slide> {
-        let Ok(deep) = self.depth(course) else { return Vec::new() };
-        let PatternParams { ball_radius, clearance, flag_radius, .. } = course.params;
-        let to_f = course.pose_of.inverse() * self.side_plane(course).pose_of;
+    fn slides(&self, context: &SearchContext) -> Vec<Slide> {
+        let Ok(deep) = self.depth(context) else { return Vec::new() };
+        let PatternParams { ball_radius, clearance, flag_radius, .. } = context.params;
+        let to_f = context.pose_of.inverse() * self.side_plane(context).pose_of;
         let reach = REACH * flag_radius;
         let at = |share: f64| (to_f * Point3::new(reach * (2.0 * share - 1.0), 0.0, 0.0), to_f.rotation * Vector3::z());
         let rim = RimStation {
@@ -388,6 +390,6 @@ impl Stage for EdgePattern {
             depths: [(BELOW_RIM * ball_radius).min(HIGH * deep), deep],
             room: clearance,
         };
-        rim.slides(course)
+        rim.slides(context)
     }
 }

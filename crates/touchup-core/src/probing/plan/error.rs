@@ -23,12 +23,12 @@ pub enum ExploreError {
     },
     /// Too few walls.
     #[error(
-        "a wall was felt in only {walls} of {asked} directions: is it a {kind}, and no wider than {reach_mm:.0} mm?"
+        "a wall was touched in only {walls} of {asked} directions: is it a {kind}, and no wider than {reach_mm:.0} mm?"
     )]
     NoWall {
-        /// what was looked for
+        /// the kind that was searched
         kind: &'static str,
-        /// felt
+        /// touched
         walls: usize,
         /// tried
         asked: usize,
@@ -36,7 +36,7 @@ pub enum ExploreError {
         reach_mm: f64,
     },
     /// Nothing closes a slot.
-    #[error("an end of the slot was not felt in {searches} searches along it: is it open? Then probe its edges")]
+    #[error("an end of the slot was not touched in {searches} searches along it: is it open? Then probe its edges")]
     NoEnd {
         /// made towards it
         searches: usize,
@@ -46,23 +46,23 @@ pub enum ExploreError {
         "the wall of the {kind} is {height_mm:.1} mm high, too low for a ball of {ball_mm:.1} mm: take a smaller one"
     )]
     TooLow {
-        /// what was looked for
+        /// the kind that was searched
         kind: &'static str,
         /// mm
         height_mm: f64,
         /// diameter, mm
         ball_mm: f64,
     },
-    /// What was felt is no such surface.
+    /// The touches are not of such a surface.
     #[error(transparent)]
     Fit(#[from] FitError),
-    /// More touches are wanted.
+    /// More touches are needed.
     #[error("{touches} touches are not enough: it is not measured yet; allow more")]
     NotDone {
         /// made
         touches: usize,
     },
-    /// Nobody knows how.
+    /// There is no pattern for it.
     #[error("a {kind} is not probed by itself: probe the edges that meet in it")]
     NoPattern {
         /// what it is
@@ -73,7 +73,7 @@ pub enum ExploreError {
     NoSuchNumber {
         /// what it is
         kind: &'static str,
-        /// what was asked for
+        /// as requested
         number: &'static str,
     },
 }

@@ -13,29 +13,29 @@ use crate::features::{Feature, Kind};
 /// What was found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
-    /// what it is; `None` of an unknown region, which is for the mesh to tell
+    /// what it is; `None` of an unknown region, which only the mesh describes
     pub feature: Option<Feature>,
-    /// touches that were made, those that felt nothing among them
+    /// touches that were made, misses included
     pub touches: usize,
-    /// whether the number is known as well as was asked
+    /// whether the number has the requested uncertainty
     pub is_as_asked: bool,
     /// standard uncertainty of the number, m or rad
     pub uncertainty: Option<f64>,
 }
 
-/// Explores one flagged feature. Nothing is moved here: [`Explorer::wish`] says which touch is wanted, [`Explorer::take`] is told what
-/// was felt, by an arm or by a hand.
+/// Explores one flagged feature. It moves nothing: [`Explorer::next_touch`] plans a touch, [`Explorer::take`] takes its
+/// result, from an arm or by hand.
 #[derive(Debug)]
 pub struct Explorer {
-    course: SearchContext,
+    context: SearchContext,
     stage: Box<dyn Stage>,
     asked: Option<TouchPlan>,
     ended: Option<Result<bool, ExploreError>>,
 }
 
 impl Explorer {
-    /// - `kind`: what it is; `None`: nobody knows. Pockets are explored as slots.
-    /// - `flag`: about where, on the surface, m in O; `normal`: about how the surface looks out there.
+    /// - `kind`: what it is; `None`: unknown. Pockets are explored as slots.
+    /// - `flag`: about where, on the surface, m in O; `normal`: about that of the surface there.
     ///
     /// # Errors
     /// [`ExploreError::NoPattern`], [`ExploreError::NoSuchNumber`].
@@ -63,57 +63,62 @@ impl Explorer {
         let turn = UnitQuaternion::rotation_between(&Vector3::z(), normal)
             .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
         let pose_of = Isometry3::from_parts(flag.coords.into(), turn);
-        Ok(Self { course: SearchContext { params, pose_of, height: 0.0, touches: 0 }, stage, asked: None, ended: None })
+        Ok(Self {
+            context: SearchContext { params, pose_of, height: 0.0, touches: 0 },
+            stage,
+            asked: None,
+            ended: None,
+        })
     }
 
     /// Touches so far.
     pub fn touches(&self) -> usize {
-        self.course.touches
+        self.context.touches
     }
 
     /// Standard uncertainty of the wanted number now, m or rad; `None` while there is none.
     pub fn uncertainty(&self) -> Option<f64> {
-        self.stage.uncertainty(&self.course)
+        self.stage.uncertainty(&self.context)
     }
 
-    /// The touch that is wanted next; `None` when it is done, or cannot be ([`Self::found`] says which).
-    pub fn wish(&mut self) -> Option<TouchPlan> {
+    /// The next planned touch; `None` when it is done, or cannot be ([`Self::found`] says which).
+    pub fn next_touch(&mut self) -> Option<TouchPlan> {
         self.asked = None;
-        if self.ended.is_some() || self.course.touches >= self.course.params.budget {
+        if self.ended.is_some() || self.context.touches >= self.context.params.budget {
             return None;
         }
-        match self.stage.next(&self.course) {
-            Next::Touch(wish) => self.asked = Some(wish),
+        match self.stage.next(&self.context) {
+            Next::Touch(planned) => self.asked = Some(planned),
             Next::Done { is_as_asked } => self.ended = Some(Ok(is_as_asked)),
             Next::Failed(error) => self.ended = Some(Err(error)),
         }
         self.asked
     }
 
-    /// Ways on which the ball slides over all of what was found; none where nothing was, or where a ball has no room to.
+    /// Paths on which the ball slides over the whole feature; none where nothing was found, or where a ball has no room.
     pub fn slides(&self) -> Vec<Slide> {
         match self.found() {
-            Ok(_) => self.stage.slides(&self.course),
+            Ok(_) => self.stage.slides(&self.context),
             Err(_) => Vec::new(),
         }
     }
 
-    /// What came of the touch that was wanted.
-    pub fn take(&mut self, felt: &TouchResult) {
-        let Some(wish) = self.asked.take() else { return };
-        self.course.touches += 1;
-        let (place, observation) = match *felt {
+    /// Takes the result of the planned touch.
+    pub fn take(&mut self, result: &TouchResult) {
+        let Some(planned) = self.asked.take() else { return };
+        self.context.touches += 1;
+        let (place, observation) = match *result {
             TouchResult::At { centre, sigma } => {
-                let offset = self.course.params.ball_radius;
-                let observation = Observation { point: centre, offset, sigma, group: self.course.touches as u32 };
-                (Some(self.course.in_f(&centre)), Some(observation))
+                let offset = self.context.params.ball_radius;
+                let observation = Observation { point: centre, offset, sigma, group: self.context.touches as u32 };
+                (Some(self.context.in_f(&centre)), Some(observation))
             }
             TouchResult::Nothing | TouchResult::Unclear => (None, None),
         };
-        self.stage.take(&mut self.course, &Touched { wish, felt: *felt, place, observation });
+        self.stage.take(&mut self.context, &Touched { planned, result: *result, place, observation });
     }
 
-    /// What was found, once [`Self::wish`] wants nothing more.
+    /// What was found, once [`Self::next_touch`] plans nothing more.
     ///
     /// # Errors
     /// [`ExploreError`].
@@ -124,8 +129,8 @@ impl Explorer {
             None => false,
         };
         Ok(Found {
-            feature: self.stage.feature(&self.course)?,
-            touches: self.course.touches,
+            feature: self.stage.feature(&self.context)?,
+            touches: self.context.touches,
             is_as_asked,
             uncertainty: self.uncertainty(),
         })

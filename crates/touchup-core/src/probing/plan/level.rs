@@ -1,4 +1,4 @@
-//! Where the surface around a flag really lies: until it was touched, only the scan says how it looks out.
+//! The true pose of the surface around a flag: until it was touched, only the scan gives its normal.
 
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 
@@ -8,10 +8,10 @@ use crate::numeric::{mean, scatter};
 
 /// Touches within this of a plane are of it, m.
 const OF_PLANE: f64 = 60e-6;
-/// Three touches tell a plane when the triangle between them is at least this high, over the ball's radius.
+/// Three touches determine a plane when the triangle between them is at least this high, over the ball's radius.
 const SPREAD: f64 = 1.0;
 
-/// The scan is not wrong by more than this about how the surface looks out (cosine): 25°.
+/// The normal of the scan is not wrong by more than this (cosine): 25°.
 const ALIKE: f64 = 0.9;
 
 impl SearchContext {
@@ -19,9 +19,14 @@ impl SearchContext {
     ///
     /// - `is_top`: none may lie above it.
     /// - `places`: of the frame as it was, in its plane of the surface: they stay where they are.
-    pub fn level(&mut self, felt: &mut Vec<Observation>, is_top: bool, places: &mut [&mut Point3<f64>]) -> bool {
-        let Some((normal, inliers)) = self.most_plane(felt, is_top) else { return false };
-        felt.clone_from(&inliers);
+    pub fn level(
+        &mut self,
+        observations: &mut Vec<Observation>,
+        is_top: bool,
+        places: &mut [&mut Point3<f64>],
+    ) -> bool {
+        let Some((normal, inliers)) = self.most_plane(observations, is_top) else { return false };
+        observations.clone_from(&inliers);
         let mean = Point3::from(mean(inliers.iter().map(|o| o.point.coords)));
         let before = self.pose_of;
         let turn = UnitQuaternion::rotation_between(&self.out(), &normal).unwrap_or_else(UnitQuaternion::identity);
@@ -41,12 +46,12 @@ impl SearchContext {
     }
 
     /// Normal of the plane that most touches lie on, and those touches.
-    fn most_plane(&self, felt: &[Observation], is_top: bool) -> Option<(Unit<Vector3<f64>>, Vec<Observation>)> {
+    fn most_plane(&self, observations: &[Observation], is_top: bool) -> Option<(Unit<Vector3<f64>>, Vec<Observation>)> {
         let least = SPREAD * self.params.ball_radius;
         let (mut best, mut most) = (Vec::new(), (0, 0.0));
-        for (i, a) in felt.iter().enumerate() {
-            for (j, b) in felt.iter().enumerate().skip(i + 1) {
-                for c in &felt[j + 1..] {
+        for (i, a) in observations.iter().enumerate() {
+            for (j, b) in observations.iter().enumerate().skip(i + 1) {
+                for c in &observations[j + 1..] {
                     let (u, v) = (b.point - a.point, c.point - a.point);
                     let area = u.cross(&v);
                     let longest = u.norm().max(v.norm()).max((u - v).norm());
@@ -55,8 +60,8 @@ impl SearchContext {
                     }
                     let normal = area.normalize() * area.dot(&self.out()).signum();
                     let off = |o: &Observation| (o.point - a.point).dot(&normal);
-                    let inliers = || felt.iter().filter(|o| off(o).abs() < OF_PLANE);
-                    let is_allowed = !is_top || felt.iter().all(|o| off(o) < OF_PLANE);
+                    let inliers = || observations.iter().filter(|o| off(o).abs() < OF_PLANE);
+                    let is_allowed = !is_top || observations.iter().all(|o| off(o) < OF_PLANE);
                     // among equals the one that is most as the scan has it
                     let score = (inliers().count(), normal.dot(&self.out()));
                     let is_better = score.0 > most.0 || score.0 == most.0 && score.1 > most.1;

@@ -1,7 +1,7 @@
 //! Where to touch next.
 //!
-//! [`Knowledge`] is what touches have told of a surface so far, and what one more would tell before it is made: the next touch
-//! goes where it makes the number that was asked for known best. [`Explorer`] finds a feature from a flag and measures it so;
+//! [`Knowledge`] is the covariance of a surface after its touches, and predicts the gain of one more: the next touch
+//! goes where it reduces the uncertainty of the requested number most. [`Explorer`] finds a feature from a flag and measures it so;
 //! a [`Slide`] leads over the whole of what was found, for the mesh.
 
 mod advice;
@@ -24,7 +24,7 @@ mod slot;
 mod slot_fit;
 mod tolerance;
 
-pub use advice::{NextTouch, next_by_hand};
+pub use advice::{NextTouch, advise_next_touch};
 pub use design::{Asked, Candidate, Knowledge};
 pub use error::ExploreError;
 pub use explorer::{Explorer, Found};

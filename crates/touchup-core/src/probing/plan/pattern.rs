@@ -1,4 +1,4 @@
-//! What all kinds of features have in common when they are explored: a stage plans a touch and takes in what came of it.
+//! What all kinds of features have in common when they are explored: a stage plans a touch and takes its result.
 
 use std::fmt::Debug;
 
@@ -10,20 +10,20 @@ use super::slide::Slide;
 use crate::features::Feature;
 use crate::features::fit::Observation;
 
-/// What a stage wants.
+/// The next action of a stage.
 pub(super) enum Next {
     Touch(TouchPlan),
-    /// all is known as well as was asked, or nothing more can be known
+    /// all has the requested uncertainty, or no touch can improve it
     Done {
         is_as_asked: bool,
     },
     Failed(ExploreError),
 }
 
-/// A touch, as a stage is told of it.
+/// A touch and its result, as a stage takes it.
 pub(super) struct Touched {
-    pub wish: TouchPlan,
-    pub felt: TouchResult,
+    pub planned: TouchPlan,
+    pub result: TouchResult,
     /// centre of the ball in F, where it was stopped
     pub place: Option<Point3<f64>>,
     pub observation: Option<Observation>,
@@ -31,17 +31,17 @@ pub(super) struct Touched {
 
 /// One kind of feature, being explored.
 pub(super) trait Stage: Debug + Send {
-    /// The touch that is wanted next.
-    fn next(&mut self, course: &SearchContext) -> Next;
-    /// What came of it.
-    fn take(&mut self, course: &mut SearchContext, touch: &Touched);
+    /// The next planned touch.
+    fn next(&mut self, context: &SearchContext) -> Next;
+    /// Takes the result of the touch.
+    fn take(&mut self, context: &mut SearchContext, touch: &Touched);
     /// The feature, as far as it is known.
     ///
     /// # Errors
     /// [`ExploreError`]; [`ExploreError::NotDone`] before it can be.
-    fn feature(&self, course: &SearchContext) -> Result<Option<Feature>, ExploreError>;
+    fn feature(&self, context: &SearchContext) -> Result<Option<Feature>, ExploreError>;
     /// Standard uncertainty of the number now, m or rad.
-    fn uncertainty(&self, course: &SearchContext) -> Option<f64>;
-    /// Ways to slide over it, once there is a feature.
-    fn slides(&self, course: &SearchContext) -> Vec<Slide>;
+    fn uncertainty(&self, context: &SearchContext) -> Option<f64>;
+    /// Paths to slide over it, once there is a feature.
+    fn slides(&self, context: &SearchContext) -> Vec<Slide>;
 }

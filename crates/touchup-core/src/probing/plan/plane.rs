@@ -1,4 +1,4 @@
-//! A plane: a first triangle, then where a touch tells most of its place or of its normal.
+//! A plane: a first triangle, then where a touch has the largest gain for its place or its normal.
 
 use nalgebra::Point3;
 
@@ -38,8 +38,8 @@ impl PlanePattern {
         Self { measuring: Measuring::default(), places, first: 0 }
     }
 
-    fn guess(course: &SearchContext) -> Plane {
-        Plane { pose_of: course.pose_of * nalgebra::Translation3::new(0.0, 0.0, course.height) }
+    fn guess(context: &SearchContext) -> Plane {
+        Plane { pose_of: context.pose_of * nalgebra::Translation3::new(0.0, 0.0, context.height) }
     }
 
     fn asked(params: &PatternParams) -> Asked {
@@ -55,79 +55,82 @@ impl PlanePattern {
         }
     }
 
-    fn before(course: &SearchContext) -> Knowledge {
-        Knowledge::before::<Plane>(course.params.flag_radius, LEAN)
+    fn before(context: &SearchContext) -> Knowledge {
+        Knowledge::before::<Plane>(context.params.flag_radius, LEAN)
     }
 
-    fn possible(&self, course: &SearchContext) -> Vec<Possible> {
-        let PatternParams { clearance, ball_radius, .. } = course.params;
+    fn possible(&self, context: &SearchContext) -> Vec<Possible> {
+        let PatternParams { clearance, ball_radius, .. } = context.params;
         let search = clearance + ball_radius + ROUGH;
         let at = |place: &Point3<f64>| Possible {
-            point: course.pose_of * Point3::new(place.x, place.y, course.height),
+            point: context.pose_of * Point3::new(place.x, place.y, context.height),
             travel: clearance,
-            wish: course.down(place, search),
+            planned: context.down(place, search),
         };
         self.places.iter().map(at).collect()
     }
 }
 
 impl Stage for PlanePattern {
-    fn next(&mut self, course: &SearchContext) -> Next {
-        let possible = self.possible(course);
+    fn next(&mut self, context: &SearchContext) -> Next {
+        let possible = self.possible(context);
         if self.first < FIRST {
             // a third of a turn apart, near the rim
             let angle = self.first as f64 / FIRST as f64 * std::f64::consts::TAU;
-            let way = nalgebra::Vector3::new(angle.cos(), angle.sin(), 0.0);
-            let far = |p: &Possible| course.in_f(&p.point).coords.dot(&way);
+            let direction = nalgebra::Vector3::new(angle.cos(), angle.sin(), 0.0);
+            let far = |p: &Possible| context.in_f(&p.point).coords.dot(&direction);
             let Some(at) = possible.into_iter().max_by(|a, b| far(a).total_cmp(&far(b))) else {
                 return Next::Done { is_as_asked: false };
             };
             return Next::Touch(self.measuring.aim(&at));
         }
-        let asked = Self::asked(&course.params);
-        let known = self.measuring.known(&Self::guess(course), Self::before(course), course.params.touch_sigma);
-        if self.uncertainty(course).is_some_and(|sigma| sigma <= course.params.sigma) {
+        let asked = Self::asked(&context.params);
+        let known = self.measuring.known(&Self::guess(context), Self::before(context), context.params.touch_sigma);
+        if self.uncertainty(context).is_some_and(|sigma| sigma <= context.params.sigma) {
             return Next::Done { is_as_asked: true };
         }
-        let best = self.measuring.best(&Self::guess(course), &known, possible, &asked, course.params.touch_sigma);
+        let best = self.measuring.best(&Self::guess(context), &known, possible, &asked, context.params.touch_sigma);
         match best {
             Some((best, _)) => Next::Touch(self.measuring.aim(&best)),
             None => Next::Done { is_as_asked: false },
         }
     }
 
-    fn take(&mut self, course: &mut SearchContext, touch: &Touched) {
+    fn take(&mut self, context: &mut SearchContext, touch: &Touched) {
         self.first += 1;
         self.measuring.take(touch);
-        let Some(place) = touch.place.filter(|_| matches!(touch.felt, TouchResult::At { .. })) else { return };
-        let surface = course.below(&place);
-        if self.measuring.felt.len() == 1 {
-            course.height = surface;
-        } else if (surface - course.height).abs() > course.params.ball_radius {
+        let Some(place) = touch.place.filter(|_| matches!(touch.result, TouchResult::At { .. })) else { return };
+        let surface = context.below(&place);
+        if self.measuring.observations.len() == 1 {
+            context.height = surface;
+        } else if (surface - context.height).abs() > context.params.ball_radius {
             // a step away: another surface
             self.measuring.refuse_last(touch);
         }
     }
 
-    fn feature(&self, course: &SearchContext) -> Result<Option<Feature>, ExploreError> {
-        if self.measuring.felt.len() < FIRST {
-            return Err(ExploreError::NotDone { touches: course.touches });
+    fn feature(&self, context: &SearchContext) -> Result<Option<Feature>, ExploreError> {
+        if self.measuring.observations.len() < FIRST {
+            return Err(ExploreError::NotDone { touches: context.touches });
         }
-        let fitted = surface_about(course, &Point3::origin(), &self.measuring.felt)?;
-        let middle = course.pose_of * Point3::origin();
-        Ok(Some(Feature::plane(&fitted, &middle, numbers([&self.measuring.felt]))))
+        let fitted = surface_about(context, &Point3::origin(), &self.measuring.observations)?;
+        let middle = context.pose_of * Point3::origin();
+        Ok(Some(Feature::plane(&fitted, &middle, numbers([&self.measuring.observations]))))
     }
 
-    fn uncertainty(&self, course: &SearchContext) -> Option<f64> {
-        let (asked, sigma) = (Self::asked(&course.params), course.params.touch_sigma);
-        let guess = Self::guess(course);
-        let share = || self.measuring.told(&guess, &FitParams::default(), Self::before(course), &asked, sigma);
-        (self.measuring.felt.len() >= LEAST).then(share).flatten().map(|share| share * course.params.sigma)
+    fn uncertainty(&self, context: &SearchContext) -> Option<f64> {
+        let (asked, sigma) = (Self::asked(&context.params), context.params.touch_sigma);
+        let guess = Self::guess(context);
+        let share =
+            || self.measuring.uncertainty_ratio(&guess, &FitParams::default(), Self::before(context), &asked, sigma);
+        (self.measuring.observations.len() >= LEAST).then(share).flatten().map(|share| share * context.params.sigma)
     }
 
-    fn slides(&self, course: &SearchContext) -> Vec<Slide> {
-        let Ok(fitted) = surface_about(course, &Point3::origin(), &self.measuring.felt) else { return Vec::new() };
-        let level = SearchContext { pose_of: fitted.surface.pose_of, height: 0.0, ..course.clone() };
-        vec![level.raster(course.params.flag_radius)]
+    fn slides(&self, context: &SearchContext) -> Vec<Slide> {
+        let Ok(fitted) = surface_about(context, &Point3::origin(), &self.measuring.observations) else {
+            return Vec::new();
+        };
+        let level = SearchContext { pose_of: fitted.surface.pose_of, height: 0.0, ..context.clone() };
+        vec![level.raster(context.params.flag_radius)]
     }
 }

@@ -1,4 +1,4 @@
-//! A region of which nobody knows what it is: touched in a spiral from the flag outward, for the mesh to tell.
+//! A region of unknown kind: touched in a spiral from the flag outward, for the mesh alone.
 
 use nalgebra::Point3;
 
@@ -13,8 +13,8 @@ use crate::features::Feature;
 pub(super) struct RegionPattern {
     /// in F, the next one last
     places: Vec<Point3<f64>>,
-    /// the surface at those that were touched, in F; `None` where nothing was felt
-    felt: Vec<Option<Point3<f64>>>,
+    /// the surface at those that were touched, in F; `None` at a miss
+    surface: Vec<Option<Point3<f64>>>,
     /// from one to the next, m
     step: f64,
 }
@@ -34,23 +34,23 @@ impl RegionPattern {
         let ring = |p: &Point3<f64>| (p.coords.norm() / step).round();
         let turn = |p: &Point3<f64>| p.y.atan2(p.x);
         places.sort_by(|a, b| ring(b).total_cmp(&ring(a)).then(turn(b).total_cmp(&turn(a))));
-        Self { places, felt: Vec::new(), step }
+        Self { places, surface: Vec::new(), step }
     }
 }
 
 impl Stage for RegionPattern {
-    fn next(&mut self, course: &SearchContext) -> Next {
-        let PatternParams { clearance, ball_radius, depth, .. } = course.params;
-        let wish = |place: &Point3<f64>| course.down(place, clearance + ball_radius + depth.max(ROUGH));
-        self.places.last().map_or(Next::Done { is_as_asked: false }, |place| Next::Touch(wish(place)))
+    fn next(&mut self, context: &SearchContext) -> Next {
+        let PatternParams { clearance, ball_radius, depth, .. } = context.params;
+        let planned = |place: &Point3<f64>| context.down(place, clearance + ball_radius + depth.max(ROUGH));
+        self.places.last().map_or(Next::Done { is_as_asked: false }, |place| Next::Touch(planned(place)))
     }
 
-    fn take(&mut self, course: &mut SearchContext, touch: &Touched) {
+    fn take(&mut self, context: &mut SearchContext, touch: &Touched) {
         self.places.pop();
-        self.felt.push(touch.place.map(|place| Point3::new(place.x, place.y, course.below(&place))));
+        self.surface.push(touch.place.map(|place| Point3::new(place.x, place.y, context.below(&place))));
         if let Some(place) = touch.place {
             // the next one begins clear of the highest
-            course.height = course.height.max(course.below(&place));
+            context.height = context.height.max(context.below(&place));
         }
     }
 
@@ -62,13 +62,13 @@ impl Stage for RegionPattern {
         None
     }
 
-    fn slides(&self, course: &SearchContext) -> Vec<Slide> {
+    fn slides(&self, context: &SearchContext) -> Vec<Slide> {
         let is_next = |pair: &[Option<Point3<f64>>]| {
             let [Some(a), Some(b)] = pair else { return false };
             (b - a).xy().norm() <= NEXT * self.step && (b.z - a.z).abs() <= STEEP * self.step
         };
-        let felt = self.felt.chunk_by(|a, b| is_next(&[*a, *b]));
-        let chains = felt.map(|chain| chain.iter().flatten().copied().collect::<Vec<_>>());
-        chains.filter(|chain| chain.len() > 1).map(|chain| course.along(&chain)).collect()
+        let surface = self.surface.chunk_by(|a, b| is_next(&[*a, *b]));
+        let chains = surface.map(|chain| chain.iter().flatten().copied().collect::<Vec<_>>());
+        chains.filter(|chain| chain.len() > 1).map(|chain| context.along(&chain)).collect()
     }
 }

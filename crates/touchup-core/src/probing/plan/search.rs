@@ -1,7 +1,7 @@
 //! Where a ball falls in, near a flag that says little more than "about here".
 //!
-//! Down from above at the flag, then around it, next to where the ball sank deepest: a ball that rests on a rim sinks, so the
-//! way leads towards the opening.
+//! Down from above at the flag, then around it, next to where the ball sank deepest: a ball on a rim sinks, so the
+//! path leads towards the opening.
 
 use nalgebra::Point3;
 
@@ -10,7 +10,7 @@ use super::pattern::Touched;
 use super::search_context::{PatternParams, SearchContext, TouchPlan, TouchResult};
 use crate::features::fit::Observation;
 
-/// Distance of the places where it is looked for, over the ball's radius: the ball falls into a hole of 2.2 radii at least.
+/// Distance of the places of the search, over the ball's radius: the ball falls into a hole of 2.2 radii at least.
 const STEP: f64 = 1.0;
 /// So deep below the surface a ball is in, over its radius: the whole ball and a chamfer.
 pub(super) const SHALLOW: f64 = 1.6;
@@ -21,56 +21,56 @@ const FLAT: f64 = 30e-6;
 /// What the scan says of the height may be off by this, m.
 pub(super) const ROUGH: f64 = 1.5e-3;
 
-/// Looks for an opening.
+/// Searches for an opening.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Looking {
+pub(super) struct OpeningSearch {
     /// places that were tried from above in F, and how deep the ball came
     tried: Vec<(Point3<f64>, f64)>,
     /// of the surface
     pub top: Vec<Observation>,
 }
 
-impl Looking {
+impl OpeningSearch {
     pub fn not_found(params: &PatternParams) -> ExploreError {
         ExploreError::NotFound { radius_mm: params.flag_radius * 1e3, ball_mm: params.ball_radius * 2e3 }
     }
 
-    /// So far from the flag it is looked for, m: no farther than all touches lead, each a step from the last.
+    /// Radius of the search around the flag, m: no farther than all touches lead, each a step from the last.
     fn farthest(params: &PatternParams) -> f64 {
         let step = STEP * params.ball_radius;
         (params.flag_radius + step).min(step * params.budget as f64)
     }
 
-    /// Where it is looked for next: the place not tried yet that is nearest to where the ball sank deepest, and to the flag.
-    pub fn next(&self, course: &SearchContext) -> Option<TouchPlan> {
-        let PatternParams { ball_radius, clearance, .. } = course.params;
+    /// The next place of the search: the one not tried yet that is nearest to where the ball sank deepest, and to the flag.
+    pub fn next(&self, context: &SearchContext) -> Option<TouchPlan> {
+        let PatternParams { ball_radius, clearance, .. } = context.params;
         let step = STEP * ball_radius;
         let is_new =
             |place: &&Point3<f64>| self.tried.iter().all(|(tried, _)| (tried - **place).xy().norm() > step / 2.0);
         let deepest = self.tried.iter().max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, depth)| *depth > SUNK);
         let centre = deepest.map_or(Point3::origin(), |(place, _)| *place);
         let near = |place: &Point3<f64>| (place - centre).xy().norm() + 1e-3 * place.coords.xy().norm();
-        let places = hexagonal(step, Self::farthest(&course.params));
+        let places = hexagonal(step, Self::farthest(&context.params));
         let best = places.iter().filter(is_new).min_by(|a, b| near(a).total_cmp(&near(b)))?;
-        Some(course.down(best, clearance + SHALLOW * ball_radius + ROUGH))
+        Some(context.down(best, clearance + SHALLOW * ball_radius + ROUGH))
     }
 
-    /// Takes what was felt; the place where the ball fell in, if it did.
-    pub fn take(&mut self, course: &mut SearchContext, touch: &Touched) -> Option<Point3<f64>> {
-        let wanted = course.in_f(&touch.wish.from);
+    /// Takes a touch; the place where the ball fell in, if it did.
+    pub fn take(&mut self, context: &mut SearchContext, touch: &Touched) -> Option<Point3<f64>> {
+        let wanted = context.in_f(&touch.planned.from);
         let wanted = Point3::new(wanted.x, wanted.y, 0.0);
-        match (touch.felt, touch.place, touch.observation) {
+        match (touch.result, touch.place, touch.observation) {
             (TouchResult::Nothing, ..) => return Some(wanted),
             (_, Some(place), Some(observation)) => {
-                let surface = course.below(&place);
+                let surface = context.below(&place);
                 // the highest is the surface; what is lower is a rim, or lower ground
-                if self.tried.is_empty() || surface > course.height + SUNK {
-                    let lower = surface - course.height;
+                if self.tried.is_empty() || surface > context.height + SUNK {
+                    let lower = surface - context.height;
                     self.tried.iter_mut().for_each(|(_, depth)| *depth += lower);
-                    course.height = surface;
+                    context.height = surface;
                     self.top.clear();
                 }
-                let depth = course.height - surface;
+                let depth = context.height - surface;
                 if depth < FLAT {
                     self.top.push(observation);
                 }
@@ -81,14 +81,14 @@ impl Looking {
         None
     }
 
-    /// The ball slid in over a rim, and cannot be let down there again: it is looked for beside it.
-    pub fn slid_in(&mut self, place: Point3<f64>, course: &SearchContext) {
-        self.tried.push((place, 2.0 * course.params.ball_radius));
+    /// The ball slid in over a rim, and cannot be let down there again: the search goes on beside it.
+    pub fn slid_in(&mut self, place: Point3<f64>, context: &SearchContext) {
+        self.tried.push((place, 2.0 * context.params.ball_radius));
     }
 
-    /// Of what was felt from above only that counts where the ball lay on the surface, and not on the rim.
-    pub fn forget(&mut self, is_on_rim: impl Fn(&Point3<f64>) -> bool, course: &SearchContext) {
-        self.top.retain(|o| !is_on_rim(&course.in_f(&o.point)));
+    /// Of the touches from above only those count where the ball lay on the surface, and not on the rim.
+    pub fn forget(&mut self, is_on_rim: impl Fn(&Point3<f64>) -> bool, context: &SearchContext) {
+        self.top.retain(|o| !is_on_rim(&context.in_f(&o.point)));
     }
 }
 
@@ -111,7 +111,7 @@ mod tests {
     #[test]
     fn a_flag_that_may_be_a_metre_off_makes_no_millions_of_places() {
         let params = PatternParams { flag_radius: 1.0, ..PatternParams::default() };
-        let places = hexagonal(STEP * params.ball_radius, Looking::farthest(&params)).len();
+        let places = hexagonal(STEP * params.ball_radius, OpeningSearch::farthest(&params)).len();
         assert!((5000..6000).contains(&places), "{places}");
     }
 }

@@ -1,4 +1,4 @@
-//! What is asked of a search, the touches that it plans, what came of them, and the frame in which it looks.
+//! The request of a search, the touches that it plans, their results, and the frame of the search.
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
@@ -76,10 +76,10 @@ impl Quantity {
     }
 }
 
-/// A touch that is wanted, in O.
+/// A planned touch, in O.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TouchPlan {
-    /// Above the part: from here the way to `from` is straight and free.
+    /// Above the part: from here the path to `from` is straight and free.
     pub entry: Point3<f64>,
     /// Centre of the ball where the search begins.
     pub from: Point3<f64>,
@@ -87,11 +87,11 @@ pub struct TouchPlan {
     pub direction: Unit<Vector3<f64>>,
     /// How far, m.
     pub search: f64,
-    /// Where the surface will be, as far as touches tell.
+    /// Where the surface will be, as predicted from the touches so far.
     pub expected: Option<Expected>,
 }
 
-/// How far from where a search begins the surface will be felt.
+/// How far from where a search begins the surface is expected.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Expected {
     /// of the ball's centre, m
@@ -100,7 +100,7 @@ pub struct Expected {
     pub sigma: f64,
 }
 
-/// What came of it.
+/// The result of a touch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum TouchResult {
     /// The ball was stopped.
@@ -110,13 +110,13 @@ pub enum TouchResult {
         /// standard deviation along the direction, m
         sigma: f64,
     },
-    /// Nothing on the whole way.
+    /// No contact along the whole search.
     Nothing,
-    /// Something whose place nobody knows.
+    /// A contact at an unknown place.
     Unclear,
 }
 
-/// Where a feature is looked for, and how far that has got.
+/// State of the search for a feature.
 #[derive(Clone, Debug)]
 pub(super) struct SearchContext {
     pub params: PatternParams,
@@ -148,9 +148,9 @@ impl SearchContext {
     }
 
     /// From a place of F, at a depth below the surface, along a direction of F.
-    pub fn sideways(&self, place: &Point3<f64>, depth: f64, way: &Vector3<f64>, search: f64) -> TouchPlan {
+    pub fn sideways(&self, place: &Point3<f64>, depth: f64, direction: &Vector3<f64>, search: f64) -> TouchPlan {
         let at = |z: f64| self.pose_of * Point3::new(place.x, place.y, z);
-        let direction = Unit::new_normalize(self.pose_of.rotation * way);
+        let direction = Unit::new_normalize(self.pose_of.rotation * direction);
         TouchPlan { entry: at(self.clear()), from: at(self.height - depth), direction, search, expected: None }
     }
 

@@ -1,4 +1,4 @@
-//! Ways on which the ball slides over a feature that touches have found: along its walls, and across its rims.
+//! Paths on which the ball slides over a feature that touches have found: along its walls, and across its rims.
 //!
 //! A rim is where a surface above bends down into a wall. The ball's centre stays one radius off both: straight above, around the
 //! rim on a quarter of a circle, straight down along the wall; its normal turns with it.
@@ -9,7 +9,7 @@ use nalgebra::{Point3, Unit, Vector3};
 
 use super::search_context::SearchContext;
 
-/// A place on the way of a slide, in O.
+/// A station of a slide, in O.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Station {
     /// of the ball, where it touches without pressing, m
@@ -18,14 +18,14 @@ pub struct Station {
     pub normal: Unit<Vector3<f64>>,
 }
 
-/// A way on which the ball slides, in O.
+/// A path on which the ball slides, in O.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Slide {
     /// in their order, no farther from each other than a small share of the ball
     pub stations: Vec<Station>,
     /// the ball is clear of the surface, and of all others, when it is so far along the normal, m
     pub lift: f64,
-    /// from there the way up along this is free …
+    /// from there the path up along this is free …
     up: Unit<Vector3<f64>>,
     /// … to this height along it, m from the origin of O
     height: f64,
@@ -44,7 +44,7 @@ impl Slide {
         lifted + self.up.into_inner() * (self.height - lifted.coords.dot(&self.up)).max(0.0)
     }
 
-    /// Of the ball's way, m.
+    /// Of the ball's path, m.
     pub fn length(&self) -> f64 {
         self.stations.windows(2).map(|pair| (pair[1].centre - pair[0].centre).norm()).sum()
     }
@@ -60,7 +60,7 @@ const MOST_LEVELS: usize = 8;
 const MOST_CROSSINGS: usize = 24;
 /// Crossings are so far apart along a rim, over the ball's radius.
 const CROSSINGS: f64 = 2.0;
-/// Pieces that a way between two of them is measured by.
+/// Pieces that a path between two of them is measured by.
 const PIECES: usize = 8;
 /// With less room the ball cannot be lifted off a wall, over its radius.
 const LEAST_ROOM: f64 = 0.2;
@@ -81,24 +81,24 @@ pub(super) struct RimStation<'a> {
 }
 
 impl RimStation<'_> {
-    /// - `way`: of the ball's centre from above the surface to down at the wall, m; 0 where it begins to turn.
-    fn station(&self, course: &SearchContext, share: f64, way: f64) -> Station {
-        let ball = course.params.ball_radius;
+    /// - `path`: length of the path of the ball's centre from above the surface to down at the wall, m; 0 where it begins to turn.
+    fn station(&self, context: &SearchContext, share: f64, path: f64) -> Station {
+        let ball = context.params.ball_radius;
         let (rim, over) = (self.at)(share);
-        let angle = (way / ball).clamp(0.0, FRAC_PI_2);
+        let angle = (path / ball).clamp(0.0, FRAC_PI_2);
         let normal = Vector3::z() * angle.cos() + over * angle.sin();
-        let down = (way - FRAC_PI_2 * ball).max(0.0);
-        let centre = rim + normal * ball + over * way.min(0.0) - Vector3::z() * down;
-        Station { centre: course.pose_of * centre, normal: Unit::new_normalize(course.pose_of.rotation * normal) }
+        let down = (path - FRAC_PI_2 * ball).max(0.0);
+        let centre = rim + normal * ball + over * path.min(0.0) - Vector3::z() * down;
+        Station { centre: context.pose_of * centre, normal: Unit::new_normalize(context.pose_of.rotation * normal) }
     }
 
-    fn slide(&self, course: &SearchContext, stations: Vec<Station>) -> Slide {
-        Slide { lift: course.params.clearance.min(self.room), ..course.slide(stations) }
+    fn slide(&self, context: &SearchContext, stations: Vec<Station>) -> Slide {
+        Slide { lift: context.params.clearance.min(self.room), ..context.slide(stations) }
     }
 
     /// Along the wall at several depths, then across the rim again and again.
-    pub fn slides(&self, course: &SearchContext) -> Vec<Slide> {
-        let ball = course.params.ball_radius;
+    pub fn slides(&self, context: &SearchContext) -> Vec<Slide> {
+        let ball = context.params.ball_radius;
         let [highest, deepest] = self.depths;
         if self.room < LEAST_ROOM * ball || deepest < highest {
             return Vec::new();
@@ -108,17 +108,17 @@ impl RimStation<'_> {
         let mut slides: Vec<Slide> = (0..levels)
             .map(|level| {
                 let depth = highest + (deepest - highest) * level as f64 / (levels - 1).max(1) as f64;
-                let around = steps(self.length, ball).map(|share| self.station(course, share, on_wall(depth)));
-                self.slide(course, around.collect())
+                let around = steps(self.length, ball).map(|share| self.station(context, share, on_wall(depth)));
+                self.slide(context, around.collect())
             })
             .collect();
-        slides.push(self.zigzag(course, on_wall(highest)));
+        slides.push(self.zigzag(context, on_wall(highest)));
         slides
     }
 
     /// Down over the rim, on along the wall, up over the rim, on along the surface above, and again.
-    fn zigzag(&self, course: &SearchContext, deep: f64) -> Slide {
-        let ball = course.params.ball_radius;
+    fn zigzag(&self, context: &SearchContext, deep: f64) -> Slide {
+        let ball = context.params.ball_radius;
         let count = ((self.length / (CROSSINGS * ball)) as usize).clamp(2, MOST_CROSSINGS);
         // where the end is the beginning it is not crossed again
         let share = |crossing: usize| crossing as f64 / if self.is_closed { count } else { count - 1 } as f64;
@@ -126,21 +126,21 @@ impl RimStation<'_> {
         for crossing in 0..count {
             let (from, to) = if crossing % 2 == 0 { (-self.back, deep) } else { (deep, -self.back) };
             let across = steps((to - from).abs(), ball).map(|gone| from + (to - from) * gone);
-            stations.extend(across.map(|way| self.station(course, share(crossing), way)));
+            stations.extend(across.map(|path| self.station(context, share(crossing), path)));
             if crossing + 1 < count {
                 let [here, next] = [share(crossing), share(crossing + 1)];
-                let between = |gone: f64| self.station(course, here + (next - here) * gone, to);
-                // beside a round rim the way is longer, or shorter, than the rim
+                let between = |gone: f64| self.station(context, here + (next - here) * gone, to);
+                // beside a round rim the path is longer, or shorter, than the rim
                 let pieces: Vec<_> = (0..=PIECES).map(|at| between(at as f64 / PIECES as f64).centre).collect();
                 let length = pieces.windows(2).map(|pair| (pair[1] - pair[0]).norm()).sum();
                 stations.extend(steps(length, ball).skip(1).map(between));
             }
         }
-        self.slide(course, stations)
+        self.slide(context, stations)
     }
 }
 
-/// Shares of a way that is gone in small steps, from 0 to 1.
+/// Shares of a path sampled in small steps, from 0 to 1.
 fn steps(length: f64, ball: f64) -> impl Iterator<Item = f64> {
     let count = (length / (CLOSE * ball)).ceil().max(1.0);
     (0..=count as usize).map(move |step| step as f64 / count)
@@ -152,13 +152,13 @@ fn steps(length: f64, ball: f64) -> impl Iterator<Item = f64> {
 pub(super) fn circle(middle: Point3<f64>, radius: f64, side: f64) -> impl Fn(f64) -> (Point3<f64>, Vector3<f64>) {
     move |share| {
         let angle = share * TAU;
-        let way = Vector3::new(angle.cos(), angle.sin(), 0.0);
-        (middle + way * radius, way * side)
+        let direction = Vector3::new(angle.cos(), angle.sin(), 0.0);
+        (middle + direction * radius, direction * side)
     }
 }
 
 /// Length of the rim of a slot, m, and the rim in the frame of the slot: x along it, the origin in its middle.
-pub(super) fn oblong(width: f64, length: f64) -> (f64, impl Fn(f64) -> (Point3<f64>, Vector3<f64>)) {
+pub(super) fn stadium_rim(width: f64, length: f64) -> (f64, impl Fn(f64) -> (Point3<f64>, Vector3<f64>)) {
     let (radius, half) = (width / 2.0, (length - width).max(0.0) / 2.0);
     let (straight, round) = (2.0 * half, FRAC_PI_2 * width);
     let total = 2.0 * (straight + round);
@@ -166,19 +166,19 @@ pub(super) fn oblong(width: f64, length: f64) -> (f64, impl Fn(f64) -> (Point3<f
         let gone = share * total;
         // one half is the other one turned by half a turn
         let (gone, sign) = if gone < total / 2.0 { (gone, 1.0) } else { (gone - total / 2.0, -1.0) };
-        let (middle, way) = if gone < straight {
+        let (middle, direction) = if gone < straight {
             (Vector3::new(half - gone, 0.0, 0.0), Vector3::y())
         } else {
             let angle = FRAC_PI_2 + (gone - straight) / radius;
             (Vector3::new(-half, 0.0, 0.0), Vector3::new(angle.cos(), angle.sin(), 0.0))
         };
-        (Point3::from((middle + way * radius) * sign), -way * sign)
+        (Point3::from((middle + direction * radius) * sign), -direction * sign)
     };
     (total, at)
 }
 
 impl SearchContext {
-    /// A way in free air above, down to stations, and up again from wherever it ends.
+    /// A slide: down from free air to its stations, and up again from wherever it ends.
     fn slide(&self, stations: Vec<Station>) -> Slide {
         let up = Unit::new_normalize(self.out());
         let above = self.pose_of * Point3::new(0.0, 0.0, self.clear());
@@ -204,14 +204,14 @@ impl SearchContext {
         let ball = self.params.ball_radius;
         let mut stations = Vec::new();
         for pair in places.windows(2) {
-            let way = pair[1] - pair[0];
-            let Some(along) = way.try_normalize(0.0) else { continue };
+            let direction = pair[1] - pair[0];
+            let Some(along) = direction.try_normalize(0.0) else { continue };
             let normal = (Vector3::z() - along * along.z).try_normalize(0.0).unwrap_or_else(Vector3::z);
             let station = |gone: f64| Station {
-                centre: self.pose_of * (pair[0] + way * gone + normal * ball),
+                centre: self.pose_of * (pair[0] + direction * gone + normal * ball),
                 normal: Unit::new_normalize(self.pose_of.rotation * normal),
             };
-            stations.extend(steps(way.norm(), ball).map(station));
+            stations.extend(steps(direction.norm(), ball).map(station));
         }
         self.slide(stations)
     }

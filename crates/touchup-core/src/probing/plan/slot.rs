@@ -1,10 +1,10 @@
-//! A slot from one flag: where the ball falls in, which way it runs, where it ends, then its walls and ends.
+//! A slot from one flag: where the ball falls in, its direction, its ends, then its walls and ends.
 //!
-//! 1. Where the ball falls in ([`Looking`]).
+//! 1. Where the ball falls in ([`OpeningSearch`]).
 //! 2. Sideways from there in eight directions: a first slot, whose ends may be open.
-//! 3. Down beside it: the plane of its opening. A long way sideways stays at its depth only from here on.
+//! 3. Down beside it: the plane of its opening. A long path sideways stays at its depth only from here on.
 //! 4. Along it to both ends, then down to its floor.
-//! 5. Each end on its middle and to both sides of it, then walls and ends where a touch tells most of what is asked.
+//! 5. Each end on its middle and to both sides of it, then walls and ends where a touch has the largest gain.
 
 use std::f64::consts::{PI, TAU};
 
@@ -16,18 +16,18 @@ use super::error::ExploreError;
 use super::hole::{OFF_FLOOR, numbers};
 use super::measuring::{Measuring, Possible};
 use super::pattern::{Next, Stage, Touched};
-use super::search::{Looking, ROUGH, SHALLOW};
+use super::search::{OpeningSearch, ROUGH, SHALLOW};
 use super::search_context::{PatternParams, Quantity, SearchContext, TouchPlan, TouchResult};
-use super::slide::{RimStation, Slide, oblong};
-use super::slot_fit::Oblong;
+use super::slide::{RimStation, Slide, stadium_rim};
+use super::slot_fit::SlotFit;
 use crate::features::fit::{Ends, FitParams, Freedom, Stadium, Surface, fit};
 use crate::features::{End, Feature};
 
-/// A wall is looked for this far, m.
+/// A wall is searched this far, m.
 const REACH: f64 = 12e-3;
 /// First directions: five numbers are unknown.
 const FIRST: usize = 8;
-/// Walls that have to be felt in them.
+/// Walls that have to be touched in them.
 const LEAST_FIRST: usize = 5;
 /// An end is searched for so many times at most.
 const SEARCHES: usize = 6;
@@ -40,7 +40,7 @@ const ALONG: usize = 9;
 const ROUND: usize = 9;
 /// So many touches of the walls before they are believed.
 const LEAST_WALL: usize = 10;
-/// So much farther than expected a wall is looked for, m.
+/// A wall is searched so much farther than expected, m.
 const BEYOND: f64 = 3e-3;
 /// An end is believed when it was touched on its middle and on both sides of it: angles from the slot's direction, rad. One touch
 /// alone may have met anything; three that lie on one half circle as wide as the slot have met its end.
@@ -56,7 +56,7 @@ const CHAMFER: f64 = 0.5e-3;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum SlotPhase {
-    Looking,
+    Opening,
     First,
     Around,
     /// along the slot, in a direction of its x, from so far beyond where the ball fell in, m
@@ -68,17 +68,17 @@ enum SlotPhase {
 #[derive(Clone, Debug)]
 pub(super) struct SlotPattern {
     phase: SlotPhase,
-    looking: Looking,
+    opening: OpeningSearch,
     /// where the ball fell in, in F
     middle: Point3<f64>,
     measuring: Measuring,
     /// as far as it is known, in F and in O
-    oblong: Option<Oblong>,
+    slot_fit: Option<SlotFit>,
     walls: Option<Stadium>,
     floor: Option<End>,
     depth: f64,
     tried: usize,
-    /// places of the ball's centre at the end of searches that felt nothing: where it fell in, and along the slot; m in O
+    /// places of the ball's centre at the end of searches without contact: where it fell in, and along the slot; m in O
     free: Vec<Point3<f64>>,
     /// where the ball lay when it did not fall in, m in O
     on_top: Vec<Point3<f64>>,
@@ -87,11 +87,11 @@ pub(super) struct SlotPattern {
 impl SlotPattern {
     pub fn new(params: &PatternParams) -> Self {
         Self {
-            phase: SlotPhase::Looking,
-            looking: Looking::default(),
+            phase: SlotPhase::Opening,
+            opening: OpeningSearch::default(),
             middle: Point3::origin(),
             measuring: Measuring::default(),
-            oblong: None,
+            slot_fit: None,
             walls: None,
             floor: None,
             depth: params.depth.max(SHALLOW * params.ball_radius),
@@ -101,22 +101,22 @@ impl SlotPattern {
         }
     }
 
-    /// The walls through what was felt, at the height of the surface, so that their own frame tells depths.
-    fn renew(&mut self, course: &SearchContext) {
-        let flat: Vec<_> = self.measuring.felt.iter().map(|o| course.in_f(&o.point).xy()).collect();
-        let free: Vec<_> = self.free.iter().map(|place| course.in_f(place).xy()).collect();
-        let oblong = match &self.oblong {
+    /// The walls through the contacts, at the height of the surface, so that depths are coordinates of their frame.
+    fn renew(&mut self, context: &SearchContext) {
+        let flat: Vec<_> = self.measuring.observations.iter().map(|o| context.in_f(&o.point).xy()).collect();
+        let free: Vec<_> = self.free.iter().map(|place| context.in_f(place).xy()).collect();
+        let slot_fit = match &self.slot_fit {
             Some(known) if self.phase == SlotPhase::Wall => Some(known.fitted(&flat)),
             // the first guess of its length may be far off
-            known => Oblong::through(&flat, &free, &self.middle.xy())
-                .map(|oblong| known.map_or(oblong, |known| oblong.along_as(&known))),
+            known => SlotFit::through(&flat, &free, &self.middle.xy())
+                .map(|slot_fit| known.map_or(slot_fit, |known| slot_fit.along_as(&known))),
         };
-        self.oblong = oblong;
-        self.walls = oblong.map(|oblong| {
-            let centre = course.pose_of * Point3::new(oblong.middle.x, oblong.middle.y, course.height);
-            let along = course.pose_of.rotation * Vector3::new(oblong.along().x, oblong.along().y, 0.0);
-            let width = 2.0 * (oblong.radius + course.params.ball_radius);
-            Stadium::new(centre, &course.out(), &along, [width, width + 2.0 * oblong.half], Ends::Round, true)
+        self.slot_fit = slot_fit;
+        self.walls = slot_fit.map(|slot_fit| {
+            let centre = context.pose_of * Point3::new(slot_fit.middle.x, slot_fit.middle.y, context.height);
+            let along = context.pose_of.rotation * Vector3::new(slot_fit.along().x, slot_fit.along().y, 0.0);
+            let width = 2.0 * (slot_fit.radius + context.params.ball_radius);
+            Stadium::new(centre, &context.out(), &along, [width, width + 2.0 * slot_fit.half], Ends::Round, true)
         });
     }
 
@@ -145,11 +145,11 @@ impl SlotPattern {
     /// for none of these walls do not count.
     fn open_part(&self, walls: &Stadium) -> Option<(f64, [f64; 2])> {
         let half = (walls.length - walls.width).max(0.0) / 2.0;
-        let fitted = fit(walls, &self.measuring.felt, &params()).ok();
+        let fitted = fit(walls, &self.measuring.observations, &params()).ok();
         let is_kept = |at: usize| fitted.as_ref().is_some_and(|fitted| fitted.used[at]);
-        let kept = (0..self.measuring.felt.len()).filter(|at| is_kept(*at));
+        let kept = (0..self.measuring.observations.len()).filter(|at| is_kept(*at));
         let kept: Vec<_> =
-            kept.map(|at| walls.pose_of.inverse_transform_point(&self.measuring.felt[at].point)).collect();
+            kept.map(|at| walls.pose_of.inverse_transform_point(&self.measuring.observations[at].point)).collect();
         let is_touched = |sign: f64, [low, high]: [f64; 2]| {
             let angle = |q: &Point3<f64>| q.y.atan2(sign * q.x - half);
             kept.iter().any(|q| sign * q.x > half && (low..=high).contains(&angle(q)))
@@ -160,19 +160,19 @@ impl SlotPattern {
         all.into_iter().find(|(sign, part)| !is_touched(*sign, *part))
     }
 
-    /// Whether the ball could have been where it was: where it fell in and where it went freely is inside, where it lay on top is not.
-    fn is_consistent(&self, course: &SearchContext, walls: &Stadium) -> bool {
-        let ball = course.params.ball_radius;
+    /// Whether the walls agree with the free places of the ball, which lie inside, and with those on top, which do not.
+    fn is_consistent(&self, context: &SearchContext, walls: &Stadium) -> bool {
+        let ball = context.params.ball_radius;
         let has_room = |centre: &Point3<f64>| walls.distance(centre) > ball - SLACK;
-        let sunk = |centre: &Point3<f64>| course.height - course.below(&course.in_f(centre));
+        let sunk = |centre: &Point3<f64>| context.height - context.below(&context.in_f(centre));
         let is_over = |centre: &Point3<f64>| sunk(centre) < FLAT && walls.distance(centre) > ON_RIM * ball;
         self.free.iter().all(has_room) && !self.on_top.iter().any(is_over)
     }
 
     /// Touches of walls and ends, each from the middle line of the slot; of one part of an end alone where that is open.
-    fn possible(&self, course: &SearchContext, walls: &Stadium, part: Option<(f64, [f64; 2])>) -> Vec<Possible> {
+    fn possible(&self, context: &SearchContext, walls: &Stadium, part: Option<(f64, [f64; 2])>) -> Vec<Possible> {
         let (half, radius) = ((walls.length - walls.width).max(0.0) / 2.0, walls.width / 2.0);
-        let travel = radius - course.params.ball_radius;
+        let travel = radius - context.params.ball_radius;
         let spread = |at: usize, count: usize| at as f64 / (count - 1) as f64 * 2.0 - 1.0;
         let straight = (0..ALONG).flat_map(|at| [-1.0, 1.0].map(|side| (spread(at, ALONG) * half, side * PI / 2.0)));
         let round = (0..ROUND).flat_map(|at| {
@@ -186,28 +186,28 @@ impl SlotPattern {
             })
         };
         let places: Vec<(f64, f64)> = straight.chain(round).filter(is_wanted).collect();
-        let depths = [BELOW_RIM * course.params.ball_radius, self.depth];
-        let wish = |(x, angle): (f64, f64), depth: f64| {
-            let way = Vector3::new(angle.cos(), angle.sin(), 0.0);
-            let in_f = |v: Vector3<f64>| course.pose_of.inverse_transform_vector(&(walls.pose_of.rotation * v));
-            let from = course.in_f(&(walls.pose_of * Point3::new(x, 0.0, 0.0)));
-            let point = walls.pose_of * (Point3::new(x, 0.0, -depth) + way * radius);
-            Possible { point, travel, wish: course.sideways(&from, depth, &in_f(way), travel + BEYOND) }
+        let depths = [BELOW_RIM * context.params.ball_radius, self.depth];
+        let planned = |(x, angle): (f64, f64), depth: f64| {
+            let direction = Vector3::new(angle.cos(), angle.sin(), 0.0);
+            let in_f = |v: Vector3<f64>| context.pose_of.inverse_transform_vector(&(walls.pose_of.rotation * v));
+            let from = context.in_f(&(walls.pose_of * Point3::new(x, 0.0, 0.0)));
+            let point = walls.pose_of * (Point3::new(x, 0.0, -depth) + direction * radius);
+            Possible { point, travel, planned: context.sideways(&from, depth, &in_f(direction), travel + BEYOND) }
         };
-        places.into_iter().flat_map(|place| depths.map(|depth| wish(place, depth))).collect()
+        places.into_iter().flat_map(|place| depths.map(|depth| planned(place, depth))).collect()
     }
 
-    fn not_done(&self, course: &SearchContext) -> ExploreError {
+    fn not_done(&self, context: &SearchContext) -> ExploreError {
         match self.phase {
-            SlotPhase::Looking => Looking::not_found(&course.params),
-            _ => ExploreError::NotDone { touches: course.touches },
+            SlotPhase::Opening => OpeningSearch::not_found(&context.params),
+            _ => ExploreError::NotDone { touches: context.touches },
         }
     }
 
-    fn take_first(&mut self, course: &SearchContext, touch: &Touched) {
-        if self.measuring.felt.is_empty() && touch.felt == TouchResult::Unclear {
-            self.looking.slid_in(self.middle, course);
-            self.phase = SlotPhase::Looking;
+    fn take_first(&mut self, context: &SearchContext, touch: &Touched) {
+        if self.measuring.observations.is_empty() && touch.result == TouchResult::Unclear {
+            self.opening.slid_in(self.middle, context);
+            self.phase = SlotPhase::Opening;
             return;
         }
         self.take_wall(touch);
@@ -216,85 +216,85 @@ impl SlotPattern {
             return;
         }
         self.tried = 0;
-        self.renew(course);
-        self.on_top = self.looking.top.iter().map(|o| o.point).collect();
+        self.renew(context);
+        self.on_top = self.opening.top.iter().map(|o| o.point).collect();
         if let Some(walls) = &self.walls {
-            let into_material = |p: &Point3<f64>| -walls.distance(&(course.pose_of * p));
-            self.looking.forget(|p| into_material(p) < CHAMFER, course);
+            let into_material = |p: &Point3<f64>| -walls.distance(&(context.pose_of * p));
+            self.opening.forget(|p| into_material(p) < CHAMFER, context);
         }
         self.phase = SlotPhase::Around;
     }
 
-    /// Takes what was felt of walls that are looked for.
+    /// Takes a touch that searched for walls.
     fn take_wall(&mut self, touch: &Touched) {
         self.measuring.take(touch);
-        if touch.felt == TouchResult::Nothing {
-            self.free.push(end_of(&touch.wish));
+        if touch.result == TouchResult::Nothing {
+            self.free.push(end_of(&touch.planned));
         }
     }
 
-    fn take_around(&mut self, course: &mut SearchContext, touch: &Touched) {
-        self.looking.top.extend(touch.observation);
+    fn take_around(&mut self, context: &mut SearchContext, touch: &Touched) {
+        self.opening.top.extend(touch.observation);
         self.tried += 1;
         if self.tried >= AROUND {
             self.tried = 0;
-            course.level(&mut self.looking.top, false, &mut [&mut self.middle]);
-            self.renew(course);
+            context.level(&mut self.opening.top, false, &mut [&mut self.middle]);
+            self.renew(context);
             self.phase = SlotPhase::End(1.0, 0.0);
         }
     }
 
-    /// Where an end is looked for from, on the middle line of the slot.
-    fn end_from(&self, course: &SearchContext, walls: &Stadium, sign: f64, beyond: f64) -> Point3<f64> {
-        let at = walls.pose_of.inverse_transform_point(&(course.pose_of * self.middle)).x;
-        course.in_f(&(walls.pose_of * Point3::new(at + sign * beyond, 0.0, 0.0)))
+    /// Start of the search for an end, on the middle line of the slot.
+    fn end_from(&self, context: &SearchContext, walls: &Stadium, sign: f64, beyond: f64) -> Point3<f64> {
+        let at = walls.pose_of.inverse_transform_point(&(context.pose_of * self.middle)).x;
+        context.in_f(&(walls.pose_of * Point3::new(at + sign * beyond, 0.0, 0.0)))
     }
 
-    fn take_end(&mut self, course: &SearchContext, touch: &Touched, sign: f64, beyond: f64) {
+    fn take_end(&mut self, context: &SearchContext, touch: &Touched, sign: f64, beyond: f64) {
         self.take_wall(touch);
         self.tried += 1;
-        let ball = course.params.ball_radius;
-        self.phase = match (touch.felt, sign > 0.0) {
+        let ball = context.params.ball_radius;
+        self.phase = match (touch.result, sign > 0.0) {
             (TouchResult::Nothing, _) => SlotPhase::End(sign, beyond + REACH),
             // again, from a little before
             (TouchResult::Unclear, _) => SlotPhase::End(sign, beyond - ball),
             (TouchResult::At { .. }, true) => SlotPhase::End(-1.0, 0.0),
             (TouchResult::At { .. }, false) => SlotPhase::Floor,
         };
-        if matches!(touch.felt, TouchResult::At { .. }) {
+        if matches!(touch.result, TouchResult::At { .. }) {
             self.tried = 0;
-            self.renew(course);
+            self.renew(context);
         }
     }
 
-    fn take_floor(&mut self, course: &SearchContext, touch: &Touched) {
-        self.floor = touch.observation.map(|o| End { point: o.point - course.out() * o.offset, sigma: o.sigma });
+    fn take_floor(&mut self, context: &SearchContext, touch: &Touched) {
+        self.floor = touch.observation.map(|o| End { point: o.point - context.out() * o.offset, sigma: o.sigma });
         if let Some(centre) = touch.place {
-            let deepest = course.height - centre.z - OFF_FLOOR;
-            self.depth = self.depth.min(deepest).max(BELOW_RIM * course.params.ball_radius);
+            let deepest = context.height - centre.z - OFF_FLOOR;
+            self.depth = self.depth.min(deepest).max(BELOW_RIM * context.params.ball_radius);
         }
         self.phase = SlotPhase::Wall;
     }
 
-    /// The touch that is wanted while walls and ends are measured.
-    fn next_wall(&mut self, course: &SearchContext, walls: &Stadium) -> Next {
-        let asked = Self::asked(&course.params, walls);
-        if self.uncertainty(course).is_some_and(|sigma| sigma <= course.params.sigma) {
+    /// The next planned touch while walls and ends are measured.
+    fn next_wall(&mut self, context: &SearchContext, walls: &Stadium) -> Next {
+        let asked = Self::asked(&context.params, walls);
+        if self.uncertainty(context).is_some_and(|sigma| sigma <= context.params.sigma) {
             return Next::Done { is_as_asked: true };
         }
-        let asked = asked.and_the_rest::<Stadium>(course.params.sigma, walls.width / 2.0);
-        let known = self.measuring.known(walls, Self::before(walls), course.params.touch_sigma);
-        let possible = self.possible(course, walls, self.open_part(walls));
-        match self.measuring.best(walls, &known, possible, &asked, course.params.touch_sigma) {
+        let asked = asked.and_the_rest::<Stadium>(context.params.sigma, walls.width / 2.0);
+        let known = self.measuring.known(walls, Self::before(walls), context.params.touch_sigma);
+        let possible = self.possible(context, walls, self.open_part(walls));
+        match self.measuring.best(walls, &known, possible, &asked, context.params.touch_sigma) {
             Some((best, _)) => Next::Touch(self.measuring.aim(&best)),
             None => Next::Done { is_as_asked: false },
         }
     }
 }
 
-/// Where a search ends that feels nothing: the ball's centre, m in O.
-fn end_of(wish: &TouchPlan) -> Point3<f64> {
-    wish.from + wish.direction.into_inner() * wish.search
+/// Where a search without contact ends: the ball's centre, m in O.
+fn end_of(planned: &TouchPlan) -> Point3<f64> {
+    planned.from + planned.direction.into_inner() * planned.search
 }
 
 fn params() -> FitParams {
@@ -302,90 +302,93 @@ fn params() -> FitParams {
 }
 
 impl Stage for SlotPattern {
-    fn next(&mut self, course: &SearchContext) -> Next {
-        let ball = course.params.ball_radius;
+    fn next(&mut self, context: &SearchContext) -> Next {
+        let ball = context.params.ball_radius;
         let shallow = SHALLOW * ball;
-        if self.phase == SlotPhase::Looking {
-            let wish = self.looking.next(course);
-            return wish.map_or_else(|| Next::Failed(Looking::not_found(&course.params)), Next::Touch);
+        if self.phase == SlotPhase::Opening {
+            let planned = self.opening.next(context);
+            return planned.map_or_else(|| Next::Failed(OpeningSearch::not_found(&context.params)), Next::Touch);
         }
         if self.phase == SlotPhase::First {
             let angle = self.tried as f64 / FIRST as f64 * TAU;
-            let way = Vector3::new(angle.cos(), angle.sin(), 0.0);
-            return Next::Touch(course.sideways(&self.middle, shallow, &way, REACH));
+            let direction = Vector3::new(angle.cos(), angle.sin(), 0.0);
+            return Next::Touch(context.sideways(&self.middle, shallow, &direction, REACH));
         }
-        let Some(walls) = self.walls.clone().filter(|_| self.measuring.felt.len() >= LEAST_FIRST) else {
-            let walls = self.measuring.felt.len();
+        let Some(walls) = self.walls.clone().filter(|_| self.measuring.observations.len() >= LEAST_FIRST) else {
+            let walls = self.measuring.observations.len();
             return Next::Failed(ExploreError::NoWall { kind: "slot", walls, asked: FIRST, reach_mm: REACH * 1e3 });
         };
-        let in_f = |v: Vector3<f64>| course.pose_of.inverse_transform_vector(&(walls.pose_of.rotation * v));
-        let centre = course.in_f(&walls.center());
+        let in_f = |v: Vector3<f64>| context.pose_of.inverse_transform_vector(&(walls.pose_of.rotation * v));
+        let centre = context.in_f(&walls.center());
         match self.phase {
-            SlotPhase::Looking | SlotPhase::First => unreachable!("these have returned"),
+            SlotPhase::Opening | SlotPhase::First => unreachable!("these have returned"),
             SlotPhase::Around => {
                 // beside both walls, towards both ends
                 let [x, y] = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]][self.tried];
                 let side = Vector3::new(x * walls.length / 3.0, y * (walls.width / 2.0 + BESIDE * ball), 0.0);
-                Next::Touch(course.down(&(centre + in_f(side)), course.params.clearance + 2.0 * ball + ROUGH))
+                Next::Touch(context.down(&(centre + in_f(side)), context.params.clearance + 2.0 * ball + ROUGH))
             }
             SlotPhase::End(..) if self.tried >= SEARCHES => Next::Failed(ExploreError::NoEnd { searches: self.tried }),
             SlotPhase::End(sign, beyond) => {
-                let from = self.end_from(course, &walls, sign, beyond);
-                Next::Touch(course.sideways(&from, shallow, &in_f(Vector3::x() * sign), REACH + ball))
+                let from = self.end_from(context, &walls, sign, beyond);
+                Next::Touch(context.sideways(&from, shallow, &in_f(Vector3::x() * sign), REACH + ball))
             }
-            SlotPhase::Floor => Next::Touch(course.sideways(&centre, shallow, &-Vector3::z(), REACH)),
-            SlotPhase::Wall => self.next_wall(course, &walls),
+            SlotPhase::Floor => Next::Touch(context.sideways(&centre, shallow, &-Vector3::z(), REACH)),
+            SlotPhase::Wall => self.next_wall(context, &walls),
         }
     }
 
-    fn take(&mut self, course: &mut SearchContext, touch: &Touched) {
+    fn take(&mut self, context: &mut SearchContext, touch: &Touched) {
         match self.phase {
-            SlotPhase::Looking => {
-                if let Some(place) = self.looking.take(course, touch) {
+            SlotPhase::Opening => {
+                if let Some(place) = self.opening.take(context, touch) {
                     self.middle = place;
-                    self.free = vec![end_of(&touch.wish)];
+                    self.free = vec![end_of(&touch.planned)];
                     self.phase = SlotPhase::First;
                 }
             }
-            SlotPhase::First => self.take_first(course, touch),
-            SlotPhase::Around => self.take_around(course, touch),
-            SlotPhase::End(sign, beyond) => self.take_end(course, touch, sign, beyond),
-            SlotPhase::Floor => self.take_floor(course, touch),
+            SlotPhase::First => self.take_first(context, touch),
+            SlotPhase::Around => self.take_around(context, touch),
+            SlotPhase::End(sign, beyond) => self.take_end(context, touch, sign, beyond),
+            SlotPhase::Floor => self.take_floor(context, touch),
             SlotPhase::Wall => {
                 self.measuring.take(touch);
-                self.renew(course);
+                self.renew(context);
             }
         }
     }
 
-    fn feature(&self, course: &SearchContext) -> Result<Option<Feature>, ExploreError> {
-        let walls = self.walls.as_ref().filter(|_| self.looking.top.len() >= 3).ok_or_else(|| self.not_done(course))?;
-        let top = surface_about(course, &course.in_f(&walls.center()), &self.looking.top)?;
-        let fitted = fit(walls, &self.measuring.felt, &params())?;
-        // where an end was not felt it has no length, and no middle
-        fitted.length().ok_or_else(|| self.not_done(course))?;
-        let touches = numbers([&self.measuring.felt, &self.looking.top]);
+    fn feature(&self, context: &SearchContext) -> Result<Option<Feature>, ExploreError> {
+        let walls =
+            self.walls.as_ref().filter(|_| self.opening.top.len() >= 3).ok_or_else(|| self.not_done(context))?;
+        let top = surface_about(context, &context.in_f(&walls.center()), &self.opening.top)?;
+        let fitted = fit(walls, &self.measuring.observations, &params())?;
+        // where an end was not touched it has no length, and no middle
+        fitted.length().ok_or_else(|| self.not_done(context))?;
+        let touches = numbers([&self.measuring.observations, &self.opening.top]);
         Ok(Some(Feature::slot(&fitted, &top, self.floor.as_ref(), touches)))
     }
 
-    fn uncertainty(&self, course: &SearchContext) -> Option<f64> {
+    fn uncertainty(&self, context: &SearchContext) -> Option<f64> {
         let walls = self.walls.as_ref().filter(|_| self.phase == SlotPhase::Wall)?;
-        let is_told = self.open_part(walls).is_none() && self.is_consistent(course, walls);
-        let asked = Self::asked(&course.params, walls);
-        let share = || self.measuring.told(walls, &params(), Self::before(walls), &asked, course.params.touch_sigma);
-        let has_enough = self.measuring.felt.len() >= LEAST_WALL;
-        (has_enough && is_told).then(share).flatten().map(|share| share * course.params.sigma)
+        let is_determined = self.open_part(walls).is_none() && self.is_consistent(context, walls);
+        let asked = Self::asked(&context.params, walls);
+        let share = || {
+            self.measuring.uncertainty_ratio(walls, &params(), Self::before(walls), &asked, context.params.touch_sigma)
+        };
+        let has_enough = self.measuring.observations.len() >= LEAST_WALL;
+        (has_enough && is_determined).then(share).flatten().map(|share| share * context.params.sigma)
     }
 
-    fn slides(&self, course: &SearchContext) -> Vec<Slide> {
+    fn slides(&self, context: &SearchContext) -> Vec<Slide> {
         let Some(walls) = &self.walls else { return Vec::new() };
-        let ball = course.params.ball_radius;
-        let (length, rim) = oblong(walls.width, walls.length);
-        let to_f = course.pose_of.inverse() * walls.pose_of;
+        let ball = context.params.ball_radius;
+        let (length, rim) = stadium_rim(walls.width, walls.length);
+        let to_f = context.pose_of.inverse() * walls.pose_of;
         let at = |share: f64| {
             let (place, over) = rim(share);
             let place = to_f * place;
-            (Point3::new(place.x, place.y, course.height), to_f.rotation * over)
+            (Point3::new(place.x, place.y, context.height), to_f.rotation * over)
         };
         let rim = RimStation {
             at: &at,
@@ -395,6 +398,6 @@ impl Stage for SlotPattern {
             depths: [BELOW_RIM * ball, self.depth],
             room: walls.width / 2.0 - ball,
         };
-        rim.slides(course)
+        rim.slides(context)
     }
 }

@@ -7,7 +7,7 @@ use crate::numeric::NormalEquations;
 
 /// All points at a distance from a segment of a plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Oblong {
+pub(super) struct SlotFit {
     /// of the segment, m
     pub middle: Point2<f64>,
     /// of the segment, from x, rad
@@ -19,7 +19,7 @@ pub(super) struct Oblong {
 }
 
 /// Directions that are tried as first guesses.
-const WAYS: usize = 24;
+const ANGLES: usize = 24;
 /// Half lengths that are tried as first guesses, over the farthest point.
 const HALVES: [f64; 4] = [0.3, 0.6, 0.9, 1.2];
 /// Places that are free may be this much beyond it, m.
@@ -28,10 +28,10 @@ const BESIDE: f64 = 0.2e-3;
 const SHIFTS: [f64; 3] = [-0.9, 0.0, 0.9];
 /// Steps of a fit.
 const STEPS: usize = 60;
-/// What no touch tells stays where it is: weight of the guess against one touch.
+/// What no touch determines stays where it is: weight of the guess against one touch.
 const HELD: f64 = 1e-9;
 
-impl Oblong {
+impl SlotFit {
     /// Unit vector along it.
     pub fn along(&self) -> Vector2<f64> {
         Vector2::new(self.angle.cos(), self.angle.sin())
@@ -83,17 +83,17 @@ impl Oblong {
         self
     }
 
-    /// The best one through points around a place, whatever way it runs, among those with the free places inside.
+    /// The best one through points around a place, in any direction, among those with the free places inside.
     pub fn through(points: &[Point2<f64>], free: &[Point2<f64>], place: &Point2<f64>) -> Option<Self> {
         let distance = |p: &Point2<f64>| (p - place).norm();
         let near = points.iter().map(distance).fold(f64::INFINITY, f64::min);
         let far = points.iter().chain(free).map(distance).fold(0.0, f64::max);
-        // a point beside the segment tells nothing of its ends: one of them has to be near where it really is
+        // a point beside the segment determines neither end: one of them has to be near where it really is
         let guess = |angle: f64, half: f64, shift: f64| {
-            let way = Vector2::new(angle.cos(), angle.sin());
-            Self { middle: place + way * (shift * half), angle, half, radius: near }
+            let direction = Vector2::new(angle.cos(), angle.sin());
+            Self { middle: place + direction * (shift * half), angle, half, radius: near }
         };
-        let angles = (0..WAYS).map(|way| way as f64 / WAYS as f64 * std::f64::consts::PI);
+        let angles = (0..ANGLES).map(|step| step as f64 / ANGLES as f64 * std::f64::consts::PI);
         let sized = angles.flat_map(|angle| HALVES.map(|half| (angle, half * far)));
         let guesses = sized.flat_map(|(angle, half)| SHIFTS.map(|shift| guess(angle, half, shift)));
         let beside = |fit: &Self| free.iter().filter(|p| fit.residual(p).0 > BESIDE).count();
@@ -114,7 +114,7 @@ mod tests {
 
     /// Places of a slot from (−9, 0) to (5, 0) with a distance of 1.5 around its segment, by hand.
     #[test]
-    fn eight_touches_tell_a_slot() {
+    fn eight_touches_determine_a_slot() {
         let points =
             [[6.5, 0.0], [4.0, 1.5], [0.0, 1.5], [-3.0, 1.5], [-10.5, 0.0], [-2.0, -1.5], [0.0, -1.5], [2.0, -1.5]];
         let turn = nalgebra::Rotation2::new(0.7);
@@ -122,21 +122,21 @@ mod tests {
             let p = turn * Point2::new(p[0] * 1e-3, p[1] * 1e-3);
             Point2::from(p.coords)
         });
-        let found = Oblong::through(&points, &[], &Point2::origin()).unwrap();
+        let found = SlotFit::through(&points, &[], &Point2::origin()).unwrap();
         let middle = turn * Point2::new(-2e-3, 0.0);
         assert!((found.middle - middle).norm() < 1e-8, "{found:?}");
         assert!((found.half - 7e-3).abs() < 1e-8 && (found.radius - 1.5e-3).abs() < 1e-8, "{found:?}");
         assert!((found.along().perp(&Vector2::new(0.7f64.cos(), 0.7f64.sin()))).abs() < 1e-6, "{found:?}");
     }
 
-    /// Near one end, seven touches leave open which way a slot of 20 × 6 runs; where the ball went freely tells.
+    /// Near one end, seven touches leave the direction of a slot of 20 × 6 open; where the ball moved freely determines it.
     #[test]
-    fn a_free_place_tells_which_way_a_slot_runs() {
+    fn a_free_place_determines_the_direction_of_a_slot() {
         // the ball's centre 0.35 mm before the centre of the right end, as if by hand
         let points = [[1.15, 0.0], [0.85, 1.08], [0.0, 1.46], [-1.5, 1.5], [-1.5, -1.5], [0.0, -1.46], [0.85, -1.08]];
         let points = points.map(|[x, y]| Point2::new(x * 1e-3, y * 1e-3));
         let free = [Point2::new(-12e-3, 0.0)];
-        let found = Oblong::through(&points, &free, &Point2::origin()).unwrap();
+        let found = SlotFit::through(&points, &free, &Point2::origin()).unwrap();
         assert!(found.along().y.abs() < 0.05 && (found.radius - 1.5e-3).abs() < 0.1e-3, "{found:?}");
         assert!(found.half > 5e-3, "{found:?}");
     }

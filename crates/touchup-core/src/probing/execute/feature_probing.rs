@@ -1,4 +1,4 @@
-//! A feature that is being probed: where the ball is, the way back into free air, and what was felt.
+//! A feature that is being probed: the position of the ball, its path back into free air, and its touches.
 
 use nalgebra::{Point3, UnitQuaternion};
 
@@ -50,7 +50,7 @@ pub(super) struct FeatureProbing {
     pub rotation: UnitQuaternion<f64>,
     /// where the tool was last in free air
     pub out: ToolState,
-    /// whether it is still there
+    /// whether it is there now
     pub is_out: bool,
     /// below that, where the touch is entered from, m in O; `None` where it is the same, or the ball was not there yet
     pub entry: Option<Point3<f64>>,
@@ -69,7 +69,7 @@ impl FeatureProbing {
         (!self.is_out).then(|| self.from.or(self.entry).unwrap_or(self.out.place))
     }
 
-    /// It has come to that place, and does not go back behind it, whatever breaks off the rest of the way.
+    /// It has reached that place, and does not go back behind it, whatever breaks off the remaining path.
     pub fn is_at_next_out(&mut self) {
         if self.from.take().is_none() && self.entry.take().is_none() {
             self.is_out = true;

@@ -1,7 +1,7 @@
-//! What hangs on the flange, weighed by the arm itself: in free air it turns its probe about the ball into a cone of orientations,
-//! stands in each, and what its sensor has there is kept.
+//! Measurements for payload identification by the arm itself: in free air it turns its probe about the ball into a cone of
+//! orientations, dwells in each, and keeps the mean wrench of the sensor there.
 //!
-//! The orientation in which the arm stands at first is the middle. All ways are planned before anything moves. The sensor is zeroed in
+//! The first orientation of the arm is the middle. All paths are planned before anything moves. The sensor is zeroed in
 //! each orientation, so that a weight that is not known yet is no force to stop for; what is kept is the raw wrench, which no
 //! zero changes.
 
@@ -9,17 +9,17 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::cell::Cell;
 use super::cone::{NotReached, Orientation, leaned, rings};
-use super::course::EarlyEnd;
 use super::ending::Ending;
+use super::feature_probing::EarlyEnd;
 use super::links::Tool;
 use super::prober::Prober;
 use super::route::{Route, ToolState, route};
 use crate::probing::arm::{ArmState, Watched};
 use crate::stylus::Wrench;
 
-/// The sensor at rest in one orientation.
+/// Mean wrench over the dwell in one orientation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct WeighedRest {
+pub struct PayloadReading {
     /// Of the flange F in the base B.
     pub r_bf: UnitQuaternion<f64>,
     /// Mean of the raw wrench, in F about its origin.
@@ -30,18 +30,18 @@ pub struct WeighedRest {
     pub readings: usize,
 }
 
-/// What was felt of the weight.
+/// The static segments for payload identification.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Weighed {
+pub struct PayloadReadings {
     /// in their order
-    pub rests: Vec<WeighedRest>,
+    pub segments: Vec<PayloadReading>,
     /// those that were left out
     pub not_reached: Vec<NotReached>,
 }
 
-/// Why nothing was weighed.
+/// Why the payload was not measured.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum WeighError {
+pub enum PayloadProbeError {
     /// The arm did not get so far.
     #[error("{0}")]
     Ended(Ending),
@@ -62,16 +62,16 @@ pub enum WeighError {
 
 /// Leans of the shaft, °, and how many orientations around each: two neighbours are 51° apart at the most.
 const RINGS: [(f64, usize); 3] = [(0.0, 1), (30.0, 6), (60.0, 6)];
-/// Six unknowns of the force and three equations from each; these leave something to tell how good it is.
+/// Six unknowns of the force and three equations from each; these leave degrees of freedom for the residuals.
 const FEWEST: usize = 6;
-/// A sensor and an arm that were just moved settle for so long, s.
+/// A sensor and an arm that were just moved come to equilibrium in so long, s.
 const SETTLE: f64 = 0.3;
 /// The wrench is averaged over this time, s: 500 readings of a UR.
 const AVERAGED: f64 = 1.0;
 
-/// Sums over the states of one rest.
+/// Sums over the states of one dwell.
 #[derive(Default)]
-struct RestSums {
+struct WrenchSums {
     force: Vector3<f64>,
     torque: Vector3<f64>,
     /// Σ |fᵢ − fᵢ₋₁|²
@@ -80,7 +80,7 @@ struct RestSums {
     count: usize,
 }
 
-impl RestSums {
+impl WrenchSums {
     fn add(&mut self, state: &ArmState) {
         let Wrench { force, torque } = state.raw_wrench_f;
         self.force += force;
@@ -96,10 +96,10 @@ impl RestSums {
     }
 
     /// `None` where there are fewer than two states.
-    fn rest(&self, cell: &Cell) -> Option<WeighedRest> {
+    fn reading(&self, cell: &Cell) -> Option<PayloadReading> {
         let n = self.count as f64;
         let last = self.last.filter(|_| self.count > 1)?;
-        Some(WeighedRest {
+        Some(PayloadReading {
             r_bf: last.pose_bt.rotation * cell.pose_ft.rotation.inverse(),
             wrench_f: Wrench { force: self.force / n, torque: self.torque / n },
             // a difference of two readings has twice the variance of one, on three axes
@@ -110,12 +110,12 @@ impl RestSums {
 }
 
 impl Prober<'_> {
-    /// Weighs what hangs on the flange, in free air around where the arm stands, and goes back there.
+    /// Measures the wrench of the payload in free air around the pose of the arm, and goes back there.
     ///
     /// # Errors
-    /// [`WeighError`]; the arm stands then.
-    pub fn weigh(&mut self) -> Result<Weighed, WeighError> {
-        let ended = |broken: EarlyEnd| WeighError::Ended(broken.into());
+    /// [`PayloadProbeError`]; the arm is stopped then.
+    pub fn measure_payload(&mut self) -> Result<PayloadReadings, PayloadProbeError> {
+        let ended = |broken: EarlyEnd| PayloadProbeError::Ended(broken.into());
         let state = self.in_free_air().map_err(ended)?;
         let home = ToolState {
             place: self.cell.place(&state.pose_bt),
@@ -125,28 +125,28 @@ impl Prober<'_> {
         // all of the probe up to the flange keeps clear
         let length = self.cell.pose_ft.translation.vector.norm();
         let cell = Cell { tool: Tool { shaft_length: length, ..self.cell.tool }, ..self.cell.clone() };
-        let (routes, not_reached, last) = self.planned(&cell, &home);
+        let (routes, not_reached, last) = self.routes(&cell, &home);
         if routes.len() < FEWEST {
             let why = not_reached.into_iter().next().map_or_else(String::new, |first: NotReached| first.why);
-            return Err(WeighError::TooFew { reached: routes.len(), wanted: orientations().count(), why });
+            return Err(PayloadProbeError::TooFew { reached: routes.len(), wanted: orientations().count(), why });
         }
         let back = route(&cell, &self.params.limits, &*self.world, &last, &home.rotation, &home.place);
         let back = back.map_err(|barred| ended(barred.into()))?;
-        let mut rests = Vec::new();
+        let mut segments = Vec::new();
         for route in &routes {
             self.turn_along(route).map_err(ended)?;
-            let sums = self.stand().map_err(ended)?;
+            let sums = self.dwell().map_err(ended)?;
             if sums.seconds_after(&state) > self.params.limits.time {
-                return Err(WeighError::Ended(Ending::TimeSpent));
+                return Err(PayloadProbeError::Ended(Ending::TimeSpent));
             }
-            rests.extend(sums.rest(&cell));
+            segments.extend(sums.reading(&cell));
         }
         self.turn_along(&back).map_err(ended)?;
-        Ok(Weighed { rests, not_reached })
+        Ok(PayloadReadings { segments, not_reached })
     }
 
-    /// The ways from one orientation to the next, those that there is none to, and where the last one ends.
-    fn planned(&self, cell: &Cell, home: &ToolState) -> (Vec<Route>, Vec<NotReached>, ToolState) {
+    /// The paths from one orientation to the next, the orientations without a path, and where the last path ends.
+    fn routes(&self, cell: &Cell, home: &ToolState) -> (Vec<Route>, Vec<NotReached>, ToolState) {
         let (mut routes, mut not_reached, mut at) = (Vec::new(), Vec::new(), *home);
         for orientation in orientations() {
             let rotation = leaned(&home.rotation, &orientation);
@@ -167,18 +167,18 @@ impl Prober<'_> {
         let (touch, most) = (&self.params.touch, self.params.limits.force);
         for (place, rotation) in &route.stops {
             let pose = self.cell.pose(rotation, place);
-            // a weight that nobody knows yet is felt as the probe turns
+            // a weight that is not known yet loads the sensor as the probe turns
             watched.line("turning in free air", &pose, touch.link_speed, touch, most)?;
         }
         Ok(())
     }
 
-    /// Stands, keeps what the sensor has, and zeroes it.
-    fn stand(&mut self) -> Result<RestSums, EarlyEnd> {
+    /// Dwells, averages the wrench, and zeroes the sensor.
+    fn dwell(&mut self) -> Result<WrenchSums, EarlyEnd> {
         let mut watched = Watched::new(self.arm, self.params.limits.clone(), self.world);
-        watched.stand("settling in free air", SETTLE, &mut |_| {})?;
-        let mut sums = RestSums::default();
-        watched.stand("weighing", AVERAGED, &mut |state| sums.add(state))?;
+        watched.dwell("settling in free air", SETTLE, &mut |_| {})?;
+        let mut sums = WrenchSums::default();
+        watched.dwell("measuring the payload", AVERAGED, &mut |state| sums.add(state))?;
         watched.zero()?;
         Ok(sums)
     }
