@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 use touchup::haptic::{GuardParams, RefineParams, Refiner, RoiSize, TipParams};
 use touchup::mesh::TriMesh;
 use touchup::stylus::{
-    BiasParams, MarkerBody, MarkerFilter, MarkerFrame, MarkerParams, Sample, SeenMarker, StampedPose, Wrench,
+    BiasParams, MarkerBody, MarkerFilter, MarkerFrame, MarkerObservation, MarkerParams, Sample, StampedPose, Wrench,
 };
 use touchup_report::allocations::asked;
 
@@ -90,7 +90,7 @@ fn no_marker_frame_allocates() {
             let is_seen = (i / 20 + label as i64) % 4 != 0 && i % 400 < 350;
             let far = if label as i64 == i % 50 { 0.1 } else { 0.0 };
             let position = pose_ot * marker + Vector3::x() * far;
-            assert!(!is_seen || frame.see(SeenMarker { label: label as u32, position }));
+            assert!(!is_seen || frame.see(MarkerObservation { label: label as u32, position }));
         }
         filter.push(&frame, |pose| {
             poses += 1;

@@ -6,7 +6,7 @@
 //! | module | what it does |
 //! |---|---|
 //! | [`numeric`] | quantiles, means, bases, voxels, disjoint sets, robust weights, least squares, small rigid motions |
-//! | [`mod@parameters`] | what is declared of each key of the scene: unit, range, default, documentation |
+//! | [`mod@parameters`] | the declaration of each key of the scene: unit, range, default, documentation |
 //! | [`stylus`] | pose and wrench become one [`stylus::Sample`]: pairing, compensation, contact, friction |
 //! | [`mesh`] | the triangle mesh, its repair, its exact closest-face tree, its Laplacian |
 //! | [`reconstruct`] | the touched part of the scan reconstructed |
@@ -22,8 +22,8 @@
 //! # Frames
 //!
 //! O object (the mesh) · T stylus tip (origin: centre of the ball; z: along the shaft, from tip to handle) · S force
-//! sensor · H the stylus as it is tracked (axes of T; the scene says where the ball is in it) · W world or space, in which
-//! it is tracked (the scene says where O is in it; in the simulator z is up) · V view (in the simulator alone; z: towards the scanner
+//! sensor · H the stylus as it is tracked (axes of T; the scene gives the place of the ball in it) · W world or space, in which
+//! it is tracked (the scene gives the pose of O in it; in the simulator z is up) · V view (in the simulator alone; z: towards the scanner
 //! or the hand) · F fitted surface (in [`features`] alone; z: its axis or normal). `pose_ot` maps T to O, `p_ot` is the tip in
 //! O, `force_o` is a force expressed in O. A wrench is what the object does to the stylus and normals point out of the
 //! object, so a stylus that presses has `force_o · normal > 0`.

@@ -255,7 +255,7 @@ impl Value for f64 {
 /// Nanoseconds in a second.
 const NS: f64 = 1e9;
 
-/// A time in ns. The smallest stands for what is no number, the largest for infinity: none of them is in a range.
+/// A time in ns. The smallest represents NaN, the largest infinity: none of them is in a range.
 impl Value for i64 {
     type Written = f64;
 

@@ -8,7 +8,7 @@ use rand_pcg::Pcg64;
 use super::drift::gauss;
 use super::error::{SimError, positive, up_to};
 use super::stylus::{Moment, TICK};
-use touchup_core::stylus::{MarkerBody, MarkerFrame, SeenMarker};
+use touchup_core::stylus::{MarkerBody, MarkerFrame, MarkerObservation};
 
 /// The camera and how badly it sees.
 #[derive(Clone, Debug, PartialEq)]
@@ -133,7 +133,7 @@ pub fn see_markers(
                 _ => i,
             };
             if !is_hidden {
-                frame.see(SeenMarker { label: label as u32, position });
+                frame.see(MarkerObservation { label: label as u32, position });
             }
         }
         frames.push(frame);

@@ -15,7 +15,7 @@ use serde::Serialize;
 
 use super::progress::WorkProgress;
 use super::{CliError, Losses, check_kept, print_result};
-use crate::calibrate::Known;
+use crate::calibrate::VectorEstimate;
 use crate::io::atomic::write_atomically;
 use crate::io::recording::Topics;
 use crate::replay::{Recording, Replayed, each_sample, marker_filter};
@@ -171,7 +171,7 @@ struct Vector {
 
 impl Vector {
     /// - `unit`: how many of the unit are one of SI.
-    fn of(known: &Known, unit: f64) -> Self {
+    fn of(known: &VectorEstimate, unit: f64) -> Self {
         Self { value: (known.value * unit).into(), std: (known.sigma * unit).into() }
     }
 }

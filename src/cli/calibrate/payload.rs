@@ -11,7 +11,7 @@ use tracing::warn;
 use super::super::arm::{CellArguments, RobotName, TruePayload};
 use super::super::{CliError, Losses};
 use super::{CalibrationRecording, CalibrationTarget, Change, DraftScene, Vector, payload_by_arm, rounded};
-use crate::calibrate::{PayloadFit, PayloadParams, StaticPose, StillFinder, StillParams, fit_payload};
+use crate::calibrate::{PayloadFit, PayloadParams, StaticPose, StaticSegmentFinder, StaticSegmentParams, fit_payload};
 use crate::io::static_poses::read_static_poses;
 use crate::scene::{GravityAxes, PayloadSection, Scene, Setting};
 use crate::stylus::{Payload, SensorBias, WrenchFrame};
@@ -102,7 +102,7 @@ impl PayloadArguments {
             let poses = read_static_poses(samples)?.into_iter().map(pose).collect();
             return Ok((poses, named.unwrap_or_default(), Losses::new()));
         }
-        let mut finder = StillFinder::new(StillParams::default());
+        let mut finder = StaticSegmentFinder::new(StaticSegmentParams::default());
         let bag = self.bag.as_deref().unwrap_or_else(|| "".as_ref());
         let recording = self.source.open(bag)?;
         let recorded = recording.wrench_frame;

@@ -11,7 +11,7 @@ use tracing::warn;
 use super::super::{CliError, Losses, check_kept};
 use super::{CalibrationRecording, CalibrationTarget, Change, DraftScene, rounded};
 use crate::align::{PairsFit, PairsParams, PointPair, fit_pairs};
-use crate::calibrate::{RestFinder, RestParams};
+use crate::calibrate::{DwellFinder, DwellParams};
 use crate::io::pairs_file::{PairsFile, read_pairs, read_scan_points};
 use crate::scene::{GravityAxes, ScanToSpaceSection, Scene, Setting};
 use crate::stylus::{ContactEstimator, ContactEstimatorParams};
@@ -62,7 +62,7 @@ impl ScanArguments {
         // the poses stay in space: that is what is looked for
         let scene = Scene { scan_to_space: None, ..draft.reading() };
         let tip = scene.tip_params();
-        let mut finder = RestFinder::new(RestParams { radius: tip.radius, ..RestParams::default() });
+        let mut finder = DwellFinder::new(DwellParams { radius: tip.radius, ..DwellParams::default() });
         let recording = self.source.open(bag)?;
         let mut contacts = ContactEstimator::new(ContactEstimatorParams {
             compensator: scene.compensator_params(recording.wrench_frame),

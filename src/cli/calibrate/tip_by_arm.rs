@@ -11,7 +11,7 @@ use super::super::progress::WorkProgress;
 use super::super::{CliError, Losses};
 use super::tip::TipArguments;
 use super::{Change, DraftScene, NO_SCENE, Vector, rounded};
-use crate::calibrate::{Known, PlaneTipFit, fit_tip_by_plane};
+use crate::calibrate::{PlaneTipFit, VectorEstimate, fit_tip_by_plane};
 use crate::probing::execute::{Cell, NotReached, Prober, TipPoses};
 use crate::scene::Setting;
 use crate::sim::ArmParams;
@@ -60,8 +60,8 @@ struct PivotFound {
 
 impl PivotFound {
     fn of(fit: &PlaneTipFit, cell: &Cell, not_reached: &[NotReached]) -> Self {
-        let Known { value, sigma } = &fit.offset;
-        let tip = Known { value: cell.pose_ft.translation.vector + value, sigma: *sigma };
+        let VectorEstimate { value, sigma } = &fit.offset;
+        let tip = VectorEstimate { value: cell.pose_ft.translation.vector + value, sigma: *sigma };
         Self {
             touches: fit.touches,
             tip_position_mm: Vector::of(&tip, 1e3),

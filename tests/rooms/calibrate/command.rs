@@ -11,7 +11,9 @@ use serde_json::Value;
 use touchup::io::mesh_file::{MeshUnit, read_mesh, write_mesh};
 use touchup::io::recording::{Record, RecordingReader, Topics, write_recording};
 use touchup::mesh::TriMesh;
-use touchup::stylus::{MarkerFrame, Message, SeenMarker, StampedPose, StampedWrench, SyncParams, Synchroniser, Wrench};
+use touchup::stylus::{
+    MarkerFrame, MarkerObservation, Message, StampedPose, StampedWrench, SyncParams, Synchroniser, Wrench,
+};
 
 const DEFAULT_YAML: &str = include_str!("../../../config/default.yaml");
 
@@ -356,7 +358,7 @@ fn markers_in_space_refine_as_those_in_the_frame_of_the_scan() {
         Record::Markers(frame) => {
             let mut in_space = MarkerFrame::new(frame.stamp_ns);
             for marker in frame.seen() {
-                in_space.see(SeenMarker { position: pose_wo() * marker.position, ..*marker });
+                in_space.see(MarkerObservation { position: pose_wo() * marker.position, ..*marker });
             }
             Record::Markers(Box::new(in_space))
         }

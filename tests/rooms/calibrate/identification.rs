@@ -7,8 +7,8 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64Mcg;
 use touchup::calibrate::{
-    Known, PayloadError, PayloadParams, StaticPose, StillFinder, StillParams, TipError, TipFitParams, fit_payload,
-    fit_tip,
+    PayloadError, PayloadParams, StaticPose, StaticSegmentFinder, StaticSegmentParams, TipError, TipFitParams,
+    VectorEstimate, fit_payload, fit_tip,
 };
 use touchup::stylus::{Sample, Wrench, WrenchFrame};
 
@@ -81,7 +81,7 @@ fn uncertainties_of_the_payload_hold() {
     for seed in 0..100 {
         let poses = static_poses(12, [0.05, 0.004], WrenchFrame::Sensor, seed);
         let found = fit_payload(&poses, &params(WrenchFrame::Sensor)).unwrap();
-        let part = |known: &Known, truth: Vector3<f64>| {
+        let part = |known: &VectorEstimate, truth: Vector3<f64>| {
             (known.value - truth).component_div(&known.sigma).norm_squared() / 3.0 / 100.0
         };
         squares[0] += part(&found.weight_w, WEIGHT);
@@ -165,7 +165,7 @@ fn poses_that_do_not_determine_the_payload_are_refused() {
 fn static_segments_of_a_recording_are_found() {
     let mut rng = Pcg64Mcg::seed_from_u64(9);
     let turns: Vec<_> = (0..8).map(|_| any_turn(&mut rng)).collect();
-    let mut finder = StillFinder::new(StillParams::default());
+    let mut finder = StaticSegmentFinder::new(StaticSegmentParams::default());
     let mut stamp_ns = 5_000_000_000_i64;
     for pair in turns.windows(2) {
         for tick in 0..2500 {
@@ -231,7 +231,7 @@ fn seven_real_poses_give_the_payload_of_their_authors() {
 #[test]
 fn a_real_stream_gives_the_same_payload_within_its_settling() {
     let Some(rows) = real("GP2025.txt") else { return };
-    let mut finder = StillFinder::new(StillParams::default());
+    let mut finder = StaticSegmentFinder::new(StaticSegmentParams::default());
     let mut poses = Vec::new();
     for row in &rows {
         let (force, torque) = (Vector3::from_column_slice(&row[1..4]), Vector3::from_column_slice(&row[4..7]));
@@ -294,7 +294,7 @@ fn uncertainties_of_the_tip_hold() {
         let mut squares = [0.0; 2];
         for seed in 0..100 {
             let found = fit_tip(&swing(3000, 0.4, 0.8, 0.1e-3, memory, seed), &TipFitParams::default()).unwrap();
-            let part = |known: &Known, truth: Vector3<f64>| {
+            let part = |known: &VectorEstimate, truth: Vector3<f64>| {
                 (known.value - truth).component_div(&known.sigma).norm_squared() / 3.0 / 100.0
             };
             squares[0] += part(&found.offset, OFFSET);

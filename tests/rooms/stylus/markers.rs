@@ -7,7 +7,8 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use rand_pcg::Pcg64;
 use touchup::stylus::{
-    MarkerBody, MarkerFilter, MarkerFrame, MarkerParams, SeenMarker, SettingError, SpringParams, StampedPose, Tracking,
+    MarkerBody, MarkerFilter, MarkerFrame, MarkerObservation, MarkerParams, SettingError, SpringParams, StampedPose,
+    Tracking,
 };
 
 const MS: i64 = 1_000_000;
@@ -32,7 +33,7 @@ fn frame(
 ) -> MarkerFrame {
     let mut frame = MarkerFrame::new(stamp_ns);
     for i in labels {
-        assert!(frame.see(SeenMarker { label: i as u32, position: pose_ot * body().markers_t()[i] + off(i) }));
+        assert!(frame.see(MarkerObservation { label: i as u32, position: pose_ot * body().markers_t()[i] + off(i) }));
     }
     frame
 }
@@ -198,7 +199,7 @@ fn swapped_labels_change_nothing_but_the_count() {
             let mut relabelled = MarkerFrame::new(seen.stamp_ns);
             for marker in seen.seen() {
                 let label = if swaps { swap(marker.label) } else { marker.label };
-                relabelled.see(SeenMarker { label, ..*marker });
+                relabelled.see(MarkerObservation { label, ..*marker });
             }
             relabelled
         })
@@ -239,11 +240,11 @@ fn a_first_frame_with_reflections_and_a_swap_is_seen_through() {
     let mut seen = frame(0, &truth, 0..4, still);
     let mut swapped = MarkerFrame::new(0);
     for (at, marker) in seen.seen().iter().enumerate() {
-        swapped.see(SeenMarker { label: [0, 1, 2, 5][at], ..*marker });
+        swapped.see(MarkerObservation { label: [0, 1, 2, 5][at], ..*marker });
     }
     seen = swapped;
-    seen.see(SeenMarker { label: 4, position: Point3::new(0.3, 0.3, 0.3) });
-    seen.see(SeenMarker { label: 900, position: Point3::new(-0.3, 0.1, 0.2) });
+    seen.see(MarkerObservation { label: 4, position: Point3::new(0.3, 0.3, 0.3) });
+    seen.see(MarkerObservation { label: 900, position: Point3::new(-0.3, 0.1, 0.2) });
     let mut filter = filter(MarkerParams::default());
     let poses = filtered(&mut filter, [seen]);
     let (place, angle) = off(&poses[0].pose_ot, &truth);
@@ -331,7 +332,7 @@ fn bodies_and_settings_without_a_meaning_are_refused() {
 #[test]
 fn a_frame_takes_no_more_than_it_can_hold_and_no_nonsense() {
     let mut frame = MarkerFrame::new(0);
-    let at = |x| SeenMarker { label: 0, position: Point3::new(x, 0.0, 0.0) };
+    let at = |x| MarkerObservation { label: 0, position: Point3::new(x, 0.0, 0.0) };
     assert!(![f64::NAN, f64::INFINITY, 1e4].into_iter().any(|x| frame.see(at(x))));
     assert_eq!((0..20).filter(|_| frame.see(at(0.0))).count(), 16);
     assert_eq!(frame.seen().len(), 16);

@@ -43,13 +43,13 @@ impl CalibrationFit {
     }
 }
 
-/// Fewer observations cannot say which of them is wrong.
+/// Fewer observations do not determine which of them is an outlier.
 const FEWEST_TO_REJECT: usize = 8;
 /// |r| of three normal components exceeds 5 σ once in 65 000.
 const GATE_SIGMAS: f64 = 5.0;
 /// The median of |r| of three normal components, in σ.
 const MEDIAN_NORM: f64 = 1.5382;
-/// A reweighted fit has settled by then; more would not change which observations are kept.
+/// A reweighted fit has converged by then; more would not change which observations are kept.
 const ROBUST_ROUNDS: usize = 30;
 /// Choices that still change after so many rounds go back and forth between two that are equally good.
 const CHOICE_ROUNDS: usize = 30;
@@ -59,7 +59,7 @@ const ROUNDING: f64 = 1e-12;
 /// A direction of x that the equations do not determine.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Undetermined {
-    /// how well it is seen, as [`spread`] tells
+    /// how well it is observed, by [`spread`]
     pub spread: f64,
     pub axis: Vector3<f64>,
 }
@@ -71,8 +71,8 @@ impl Undetermined {
     }
 }
 
-/// The direction that is seen worst, over the observations that are kept.
-pub(super) fn least_seen(equations: &[Equation], kept: &[bool]) -> Undetermined {
+/// The least determined direction, over the observations that are kept.
+pub(super) fn least_determined(equations: &[Equation], kept: &[bool]) -> Undetermined {
     let weights: Vec<f64> = kept.iter().map(|&kept| f64::from(u8::from(kept))).collect();
     let (n, mean, _) = means(equations, &weights);
     let eigen = SymmetricEigen::new(normal(equations, &weights, &mean) / n);
@@ -80,13 +80,13 @@ pub(super) fn least_seen(equations: &[Equation], kept: &[bool]) -> Undetermined 
     Undetermined { spread: eigen.eigenvalues[i], axis: eigen.eigenvectors.column(i).into_owned() }
 }
 
-/// The fit, or the direction that it cannot tell.
+/// The fit, or the direction that it does not determine.
 ///
 /// - `equations`: at least three.
-/// - `smallest_spread`: a direction seen less than this, as [`least_seen`] tells, is not determined.
+/// - `smallest_spread`: a direction with less [`spread`] than this is not determined.
 pub(super) fn fit(equations: &[Equation], smallest_spread: f64) -> Result<CalibrationFit, Undetermined> {
     let fitted = |kept: Vec<bool>| {
-        let least = least_seen(equations, &kept);
+        let least = least_determined(equations, &kept);
         if least.spread < smallest_spread { None } else { least_squares(equations, kept) }.ok_or(least)
     };
     let mut found = fitted(vec![true; equations.len()])?;
@@ -120,7 +120,7 @@ fn robust_norms(equations: &[Equation]) -> Option<Vec<f64>> {
         if mean <= 0.0 {
             break;
         }
-        // a residual of nothing would weigh without end
+        // a residual of 0 would have infinite weight
         weights = norms.iter().map(|norm| 1.0 / norm.max(1e-3 * mean)).collect();
     }
     Some(norms)

@@ -1,21 +1,21 @@
-//! What the scene must know about the stylus, from recordings made for it: [`fit_payload`] finds weight, centre of mass
-//! and bias from still poses, [`fit_tip`] finds the centre of the ball from a swing about it.
+//! Calibration of the stylus from recordings made for it: [`fit_payload`] finds weight, centre of mass
+//! and bias from static poses, [`fit_tip`] finds the centre of the ball from a swing about it.
 //!
 //! [`fit_tip_by_plane`] finds that centre from touches of a plane with a probe that leans: for an arm, which holds no ball in a cone.
 //!
-//! [`RestFinder`] finds points that were picked with the stylus.
+//! [`DwellFinder`] finds points that were picked with the stylus.
 //!
 //! [`fit_payload`] and [`fit_tip`] are one robust least squares: zᵢ = Aᵢ x + y with a vector x seen in turned axes and a constant y.
 
+mod dwell;
 mod fit;
 mod payload;
-mod rests;
-mod still;
+mod static_segments;
 mod tip;
 mod tip_by_plane;
 
-pub use payload::{Known, PayloadError, PayloadFit, PayloadParams, fit_payload};
-pub use rests::{Rest, RestFinder, RestParams};
-pub use still::{StaticPose, StillFinder, StillParams};
+pub use dwell::{Dwell, DwellFinder, DwellParams};
+pub use payload::{PayloadError, PayloadFit, PayloadParams, VectorEstimate, fit_payload};
+pub use static_segments::{StaticPose, StaticSegmentFinder, StaticSegmentParams};
 pub use tip::{SwingPose, TipError, TipFit, TipFitParams, fit_tip};
 pub use tip_by_plane::{PlaneTipError, PlaneTipFit, fit_tip_by_plane};

@@ -1,13 +1,13 @@
-//! Weight, centre of mass and bias of what hangs on the sensor, from static poses.
+//! Payload identification: weight, centre of mass and bias, from static poses.
 //!
-//! At rest and in free air the sensor feels f_S = R_WSᵀ w + b_f and τ_S = p_SC × R_WSᵀ w + b_τ with the weight w = m g
+//! At rest and in free air the sensor measures f_S = R_WSᵀ w + b_f and τ_S = p_SC × R_WSᵀ w + b_τ with the weight w = m g
 //! in the frame of the poses. The first is linear in w and b_f: the direction of gravity is found, not assumed. With w
 //! known the second is linear in p_SC and b_τ.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::StaticPose;
-use super::fit::{CalibrationFit, Equation, Undetermined, fit, least_seen};
+use super::fit::{CalibrationFit, Equation, Undetermined, fit, least_determined};
 use crate::stylus::{Payload, Wrench, WrenchFrame};
 
 /// Settings of [`fit_payload`].
@@ -29,32 +29,32 @@ impl Default for PayloadParams {
 
 /// A vector and the standard uncertainty of each component.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Known {
+pub struct VectorEstimate {
     /// what it is
     pub value: Vector3<f64>,
     /// its standard uncertainty
     pub sigma: Vector3<f64>,
 }
 
-impl Known {
+impl VectorEstimate {
     pub(super) fn new(value: Vector3<f64>, covariance: &Matrix3<f64>) -> Self {
         Self { value, sigma: covariance.diagonal().map(|variance| variance.max(0.0).sqrt()) }
     }
 }
 
-/// What hangs on the sensor, and how well that is known.
+/// The identified payload and its uncertainty.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PayloadFit {
     /// m |g|, and its standard uncertainty, N.
     pub weight: [f64; 2],
     /// Weight in the frame of the poses, N.
-    pub weight_w: Known,
+    pub weight_w: VectorEstimate,
     /// Centre of mass from So, expressed in S, m.
-    pub p_sc: Known,
+    pub p_sc: VectorEstimate,
     /// Bias of the force, expressed in S, N.
-    pub bias_force: Known,
+    pub bias_force: VectorEstimate,
     /// Bias of the torque, expressed in S, N·m.
-    pub bias_torque: Known,
+    pub bias_torque: VectorEstimate,
     /// √(mean |residual|²) of the force over the poses that were kept, N.
     pub rms_force: f64,
     /// … of the torque, N·m.
@@ -84,7 +84,7 @@ impl PayloadFit {
     }
 }
 
-/// Why static poses do not tell the payload.
+/// Why static poses do not determine the payload.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PayloadError {
     /// Too few static poses.
@@ -99,7 +99,7 @@ pub enum PayloadError {
     /// Poses that differ too little.
     #[error(
         "besides turning about ({:.2}, {:.2}, {:.2}) of the poses' frame the stylus was tilted by {tilt_deg:.1}° only, so the \
-         weight along that axis is not told from the bias: tilt it by 30° or more about axes across that one too",
+         weight along that axis cannot be separated from the bias: tilt it by 30° or more about axes across that one too",
         axis[0],
         axis[1],
         axis[2]
@@ -110,7 +110,7 @@ pub enum PayloadError {
         /// along this the weight is not determined, in W
         axis: [f64; 3],
     },
-    /// Gravity always pulls the same way through the sensor.
+    /// Gravity always pulls in the same direction through the sensor.
     #[error(
         "the centre of mass along ({:.2}, {:.2}, {:.2}) of the sensor is not determined: gravity pulls along it in most poses; \
          lay the stylus down to the other side too", axis[0], axis[1], axis[2]
@@ -132,12 +132,12 @@ pub enum PayloadError {
     },
     /// The other axes explain the wrench far better.
     #[error(
-        "the wrench is in the axes of the {other} and not of the {told}: residuals are {other_rms_n:.3} N instead of {rms_n:.3} N; \
+        "the wrench is in the axes of the {other} and not of the {given}: residuals are {other_rms_n:.3} N instead of {rms_n:.3} N; \
          say --wrench-axes {other}, and where they are recorded mend the frame_id of the wrench"
     )]
     WrongAxes {
         /// as given
-        told: &'static str,
+        given: &'static str,
         /// what fits
         other: &'static str,
         /// as given, N
@@ -157,17 +157,17 @@ pub enum PayloadError {
     },
 }
 
-/// Six unknowns of the force, three equations for each pose, and something left to tell how good it is.
+/// Six unknowns of the force, three equations for each pose, and redundancy for the residuals.
 const FEWEST_POSES: usize = 4;
 /// sin² of the smallest tilt to either side: 5°. The uncertainty is then ten times that of a wide tilt.
 const SMALLEST_SPREAD: f64 = 0.0076;
-/// The same for the centre of mass, by how much gravity turns in the sensor: 2°. What is known worse for it is told by
-/// its uncertainty, and harms little: the force does not need it.
+/// The same for the centre of mass, by how much gravity turns in the sensor: 2°. A worse condition
+/// shows in its uncertainty, and harms little: the force does not need it.
 const SMALLEST_CENTRE_SPREAD: f64 = 0.0012;
-/// The axes of the wrench are believed wrong when the other ones fit so many times better.
+/// The axes of the wrench are taken for wrong when the other ones fit so many times better.
 const AXES_RATIO: f64 = 2.0;
-/// … and there are equations enough to tell.
-const FEWEST_TO_TELL_AXES: usize = 6;
+/// … and there are equations enough to decide.
+const FEWEST_FOR_AXES: usize = 6;
 /// More of the poses may not be wrong.
 const LARGEST_REJECTED: f64 = 0.4;
 
@@ -198,16 +198,16 @@ pub fn fit_payload(poses: &[StaticPose], params: &PayloadParams) -> Result<Paylo
     let expected: Option<f64> = poses.iter().map(variance).sum();
     Ok(PayloadFit {
         weight: [weight, sigma],
-        weight_w: Known::new(force.x, &force.covariance_x),
-        p_sc: Known::new(torque.x, &covariance_p),
-        bias_force: Known::new(force.y, &force.covariance_y),
-        bias_torque: Known::new(torque.y, &covariance_b),
+        weight_w: VectorEstimate::new(force.x, &force.covariance_x),
+        p_sc: VectorEstimate::new(torque.x, &covariance_p),
+        bias_force: VectorEstimate::new(force.y, &force.covariance_y),
+        bias_torque: VectorEstimate::new(torque.y, &covariance_b),
         rms_force: force.rms,
         rms_torque: torque.rms,
         expected_force: expected.map(|sum| (sum / poses.len() as f64).sqrt()),
         poses: poses.len(),
         rejected: (0..poses.len()).filter(|&i| !force.kept[i]).collect(),
-        tilt: least_seen(&forces, &force.kept).angle(),
+        tilt: least_determined(&forces, &force.kept).angle(),
         gravity: params.gravity,
     })
 }
@@ -266,19 +266,19 @@ fn too_alike(least: Undetermined) -> PayloadError {
 }
 
 /// Refuses axes when the other ones fit far better.
-fn check_axes(poses: &[StaticPose], params: &PayloadParams, told: &CalibrationFit) -> Result<(), PayloadError> {
+fn check_axes(poses: &[StaticPose], params: &PayloadParams, given: &CalibrationFit) -> Result<(), PayloadError> {
     let (name, other, other_name) = match params.wrench_frame {
         WrenchFrame::Sensor => ("sensor", WrenchFrame::Object, "pose"),
         WrenchFrame::Object => ("pose", WrenchFrame::Sensor, "sensor"),
     };
-    if poses.len() < FEWEST_TO_TELL_AXES {
+    if poses.len() < FEWEST_FOR_AXES {
         return Ok(());
     }
     let other = equations(poses, &PayloadParams { wrench_frame: other, ..*params });
     let few = poses.len() / 5;
     match fit(&other, SMALLEST_SPREAD) {
-        Ok(better) if better.rejected() <= few.max(told.rejected()) && AXES_RATIO * better.rms < told.rms => {
-            Err(PayloadError::WrongAxes { told: name, other: other_name, rms_n: told.rms, other_rms_n: better.rms })
+        Ok(better) if better.rejected() <= few.max(given.rejected()) && AXES_RATIO * better.rms < given.rms => {
+            Err(PayloadError::WrongAxes { given: name, other: other_name, rms_n: given.rms, other_rms_n: better.rms })
         }
         _ => Ok(()),
     }

@@ -1,4 +1,4 @@
-//! The centre of the ball in the tracked stylus, from a swing about it.
+//! Tip calibration by a pivot: the centre of the ball in the tracked stylus, from a swing about it.
 //!
 //! The ball rests in a cone or a divot while the stylus is swung: p_WH + R_WH d = c for all poses, with the offset d of
 //! the ball and the resting point c. Linear in both; where the stylus turned about one axis alone, d along it is not
@@ -6,8 +6,8 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::fit::{CalibrationFit, Equation, Undetermined, fit, least_seen};
-use super::payload::Known;
+use super::fit::{CalibrationFit, Equation, Undetermined, fit, least_determined};
+use super::payload::VectorEstimate;
 
 /// A pose of the tracked stylus H in the frame W of the poses.
 pub type SwingPose = Isometry3<f64>;
@@ -18,7 +18,7 @@ pub struct TipFitParams {
     /// A ball that rests strays by less than this, rms, m. Default 1 mm.
     pub largest_rms: f64,
     /// Smallest swing to either side across any axis, rms, rad. Default 8°, that is ±12° each way: below it the noise
-    /// of the tracker comes into the offset sevenfold.
+    /// of the tracker is amplified sevenfold in the offset.
     pub smallest_swing: f64,
 }
 
@@ -28,13 +28,13 @@ impl Default for TipFitParams {
     }
 }
 
-/// Where the ball is, and how well that is known.
+/// The calibrated tip and its uncertainty.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TipFit {
     /// Centre of the ball from the origin of H, in its axes, m.
-    pub offset: Known,
+    pub offset: VectorEstimate,
     /// Where it rested, in W, m.
-    pub rest: Known,
+    pub rest: VectorEstimate,
     /// √(mean |residual|²) of the poses that were kept, m.
     pub rms: f64,
     /// Poses that were looked at.
@@ -43,11 +43,11 @@ pub struct TipFit {
     pub rejected: usize,
     /// Swing to either side across the axis across which it was smallest, rms, rad.
     pub swing: f64,
-    /// How many poses tell as much as one would if each told something new: 1 when the noise is not correlated.
+    /// How many poses carry as much information as one independent pose: 1 when the noise is not correlated.
     pub correlation: f64,
 }
 
-/// Why a swing does not tell the offset.
+/// Why a swing does not determine the offset.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum TipError {
     /// Too few poses.
@@ -87,7 +87,7 @@ pub enum TipError {
     },
 }
 
-/// Fewer poses leave nothing to tell slips by.
+/// Fewer poses leave no redundancy to detect slips.
 const FEWEST_POSES: usize = 10;
 /// More of the poses may not be wrong.
 const LARGEST_REJECTED: f64 = 0.4;
@@ -116,12 +116,12 @@ pub fn fit_tip(poses: &[SwingPose], params: &TipFitParams) -> Result<TipFit, Tip
     }
     let correlation = correlation(&found, &equations);
     Ok(TipFit {
-        offset: Known::new(found.x, &(found.covariance_x * correlation)),
-        rest: Known::new(-found.y, &(found.covariance_y * correlation)),
+        offset: VectorEstimate::new(found.x, &(found.covariance_x * correlation)),
+        rest: VectorEstimate::new(-found.y, &(found.covariance_y * correlation)),
         rms: found.rms,
         poses,
         rejected,
-        swing: least_seen(&equations, &found.kept).angle(),
+        swing: least_determined(&equations, &found.kept).angle(),
         correlation,
     })
 }
@@ -134,7 +134,7 @@ fn too_small(least: &Undetermined, params: &TipFitParams) -> TipError {
     }
 }
 
-/// (1 + ρ) / (1 − ρ) with ρ the correlation of neighbouring residuals: a tracker's noise does not come anew with each
+/// (1 + ρ) / (1 − ρ) with ρ the correlation of neighbouring residuals: a tracker's noise is not independent from pose to
 /// pose.
 fn correlation(found: &CalibrationFit, equations: &[Equation]) -> f64 {
     let residuals: Vec<Vector3<f64>> =

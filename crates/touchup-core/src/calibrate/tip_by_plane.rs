@@ -1,27 +1,27 @@
-//! The centre of the ball in the flange, from touches of one plane with the tip in several orientations.
+//! Tip (TCP) calibration by a plane: the centre of the ball in the flange, from touches of one plane with the tip in several orientations.
 //!
 //! A ball that touches a plane has its centre at a height h over the plane, whatever the orientation: n · (p + R d) = h, with the
-//! place p where the centre is believed to be, the axes R of the flange, and the offset d of the true centre from there, in these axes.
+//! place p of the nominal centre, the axes R of the flange, and the offset d of the true centre from there, in these axes.
 //! Unknown are d, n and h. The radius of the ball is in h: it is not determined, nor is it needed. Where Rᵀ n stays in a plane, d across
 //! that is not determined.
 
 use nalgebra::{Isometry3, Matrix3, SVector, SymmetricEigen, Unit, Vector3};
 
-use super::payload::Known;
+use super::payload::VectorEstimate;
 use crate::numeric::{NormalEquations, mean, scatter, tangent_basis};
 
-/// Where the ball is, and how well that is known.
+/// The calibrated tip and its uncertainty.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlaneTipFit {
-    /// Of the centre of the ball from where it was believed to be, in the axes of the flange, m.
-    pub offset: Known,
+    /// Of the centre of the ball from the nominal one, in the axes of the flange, m.
+    pub offset: VectorEstimate,
     /// √(mean r²) of the heights, m.
     pub rms: f64,
     /// Touches.
     pub touches: usize,
 }
 
-/// Why touches of a plane do not tell the offset.
+/// Why touches of a plane do not determine the offset.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PlaneTipError {
     /// Too few touches.
@@ -32,16 +32,16 @@ pub enum PlaneTipError {
     },
     /// The orientations differ too little.
     #[error(
-        "the probe did not lean enough to tell where the ball is along ({:.2}, {:.2}, {:.2}) of the flange: touch a spot where the arm \
+        "the probe did not lean enough to determine where the ball is along ({:.2}, {:.2}, {:.2}) of the flange: touch a spot where the arm \
          gets to leans of 20° and 40° to all sides", axis[0], axis[1], axis[2]
     )]
     TooAlike {
         /// along this the offset is not determined, in the axes of the flange
         axis: [f64; 3],
     },
-    /// How the plane lies is not told.
+    /// The orientation of the plane is not determined.
     #[error(
-        "the touches lie on one line, which does not tell how the plane lies: touch the spot upright to all sides of it too"
+        "the touches lie on one line, which does not determine the orientation of the plane: touch the spot upright to all sides of it too"
     )]
     OnOneLine,
     /// The heights do not fit a plane.
@@ -52,9 +52,9 @@ pub enum PlaneTipError {
     },
 }
 
-/// Six unknowns, and something left to tell how good they are.
+/// Six unknowns, and redundancy for their residuals.
 const FEWEST: usize = 9;
-/// Least spread of Rᵀ n along any axis, rms: the uncertainty of one touch comes into the offset some tenfold at the most.
+/// Least spread of Rᵀ n along any axis, rms: the uncertainty of one touch is amplified at most tenfold in the offset.
 const LEAST_SPREAD: f64 = 0.03;
 /// A plane that is touched is flat within this, rms, m.
 const FLAT: f64 = 0.1e-3;
@@ -65,7 +65,7 @@ type Six = SVector<f64, 6>;
 
 /// Offset of the ball.
 ///
-/// - `poses`: with the axes of the flange, about where the centre of the ball is believed to be, where the plane was felt; `normal`: out of
+/// - `poses`: with the axes of the flange, about the nominal centre of the ball, where the plane was touched; `normal`: out of
 ///   the plane, about; both in the base.
 ///
 /// # Errors
@@ -103,7 +103,7 @@ pub fn fit_tip_by_plane(poses: &[Isometry3<f64>], normal: &Unit<Vector3<f64>>) -
     }
     let covariance = information.try_inverse().ok_or(PlaneTipError::OnOneLine)? * (square / (n - 6.0));
     let covariance: Matrix3<f64> = covariance.fixed_view::<3, 3>(0, 0).into_owned();
-    let offset = Known::new(x.fixed_rows::<3>(0).into_owned(), &covariance);
+    let offset = VectorEstimate::new(x.fixed_rows::<3>(0).into_owned(), &covariance);
     Ok(PlaneTipFit { offset, rms, touches: count })
 }
 
@@ -158,7 +158,7 @@ mod tests {
         let offset = Vector3::new(1e-3, 0.0, 0.0);
         let to_one_side: Vec<_> = (0..12).map(|at| (4.0 * f64::from(at), 0.0)).collect();
         let error = fit_tip_by_plane(&poses(&to_one_side, offset, &normal), &normal).unwrap_err();
-        // it leans about y alone: along y nothing is told
+        // it leans about y alone: along y nothing is determined
         assert!(matches!(error, PlaneTipError::TooAlike { axis } if axis[1].abs() > 0.99), "{error}");
         let few = poses(&all_sides()[..8], offset, &normal);
         assert_eq!(fit_tip_by_plane(&few, &normal), Err(PlaneTipError::TooFew { count: 8 }));

@@ -1,7 +1,7 @@
-//! Case 2: what the tip passes through is not there.
+//! Carving (case 2): what the tip passes through is not there.
 //!
-//! All faces inside the tip give way at once, the deepest first: the closest one as the arm from it to the centre of the
-//! ball says, the others, of which only those count that the tip comes to from the front, out of the tip the shortest way.
+//! All faces inside the tip are displaced at once, the deepest first: the closest one along the arm from it to the centre of the
+//! ball, the others, of which only those count that the tip comes to from the front, out of the tip along the shortest path.
 
 use nalgebra::{Point3, Vector3};
 
@@ -17,7 +17,7 @@ const SIDEWAYS: f64 = 0.2;
 
 /// A point of a face inside the tip.
 struct Inside {
-    /// the shortest way out of the tip, unit
+    /// direction of the shortest path out of the tip, unit
     out: Vector3<f64>,
     /// m
     depth: f64,
@@ -30,12 +30,12 @@ impl Refiner {
         &mut self,
         carve: &CarveParams,
         ball: &Ball,
-        felt: ContactState,
+        state: ContactState,
         dt: f64,
         update: Update,
     ) -> Update {
         // a mesh that the tip does not enter by more than the tolerance is left alone
-        let (tolerance, hint) = match felt {
+        let (tolerance, hint) = match state {
             ContactState::Nothing => (carve.tolerance, self.carve_region.handle()),
             _ => (carve.contact_tolerance.max(carve.tolerance), self.contact_region.handle()),
         };
@@ -47,13 +47,13 @@ impl Refiner {
         };
         let counts = self.body.is_ball() && !self.deformable.is_stiff(hit.face);
         let first = if counts { self.penetration(&place.centre, &hit) } else { None };
-        let mut fit = first.map(|inside| self.give_way(carve, hit.face, &inside, dt));
+        let mut fit = first.map(|inside| self.displace(carve, hit.face, &inside, dt));
         self.gather(&place, tolerance, hit.face);
         for at in 0..self.inside.deep.len().min(MOST_OTHERS) {
             let face = self.inside.deep[at].1;
             // the faces before it have taken its corners along
             if let Some(inside) = self.inside(&place, face).filter(|inside| inside.depth > tolerance) {
-                let moved = self.give_way(carve, face, &inside, dt);
+                let moved = self.displace(carve, face, &inside, dt);
                 fit = fit.or(Some(moved));
             }
         }
@@ -63,14 +63,14 @@ impl Refiner {
         }
     }
 
-    /// Moves a face by the share of its depth that goes in `dt` (s).
-    fn give_way(&mut self, carve: &CarveParams, face: FaceId, inside: &Inside, dt: f64) -> RegionFit {
+    /// Moves a face by the share of its depth that is carved in `dt` (s).
+    fn displace(&mut self, carve: &CarveParams, face: FaceId, inside: &Inside, dt: f64) -> RegionFit {
         let Inside { out, depth, barycentric } = inside;
         let share = -(-carve.rate * dt).exp_m1();
-        let way =
+        let depth_step =
             (share * (depth - carve.tolerance)).min(2.0 * self.params.longest_step_edges * self.deformable.mean_edge);
         let weight: f64 = barycentric.iter().map(|x| x * x).sum();
-        let steps = barycentric.map(|x| out * (way * x / weight));
+        let steps = barycentric.map(|x| out * (depth_step * x / weight));
         let fit = self.deformable.deform(&mut self.carve_region, face, RoiSize::Handle, &steps);
         self.count(fit);
         fit
@@ -109,12 +109,12 @@ impl Refiner {
                 + corners[1].coords * barycentric[1]
                 + corners[2].coords * barycentric[2],
         );
-        let (distance, out) = body.way_out(place, &point);
+        let (distance, out) = body.shortest_exit(place, &point);
         let is_front = normal.dot(&out) < -SIDEWAYS;
         (is_front && distance < 0.0).then_some(Inside { out, depth: -distance, barycentric })
     }
 
-    /// Which way the mesh gives way to the ball, and how deep the ball is in it.
+    /// The direction in which the mesh yields to the ball, and how deep the ball is in it.
     fn penetration(&self, centre: &Point3<f64>, hit: &FaceHit) -> Option<Inside> {
         let normal = self.deformable.mesh.normal(hit.face);
         let arm = centre - hit.point;
@@ -123,7 +123,7 @@ impl Refiner {
         if normal == Vector3::zeros() {
             return None;
         }
-        // beside a rim the arm says little about inside and outside
+        // beside a rim the arm hardly separates inside from outside
         let away = if height.abs() <= SIDEWAYS * distance { normal } else { arm * (height.signum() / distance) };
         let depth = self.params.tip.radius - distance.copysign(height);
         Some(Inside { out: -away, depth, barycentric: hit.barycentric })

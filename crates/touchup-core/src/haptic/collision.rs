@@ -1,4 +1,4 @@
-//! Faces that could come to meet: each pair is looked at exactly, and then left alone for as long as it cannot.
+//! Self-collision: each pair of faces that could meet is tested exactly, and then left alone for as long as it cannot.
 
 use nalgebra::{Point3, Vector3};
 
@@ -72,14 +72,20 @@ impl Pairs {
         self.list.reserve(PAIRS_PER_FACE * faces);
     }
 
-    /// Whether no pair has come to meet by an update whose longest way is `way` (m).
+    /// Whether no pair has come to meet by an update whose largest step is `displacement` (m).
     ///
     /// - `gap`: faces nearer than this meet, m.
     /// - `before`: the position of a vertex before the update, m; a pair that met then may go on.
-    pub fn are_clear(&mut self, mesh: &TriMesh, gap: f64, way: f64, before: impl Fn(VertexId) -> Point3<f64>) -> bool {
+    pub fn are_clear(
+        &mut self,
+        mesh: &TriMesh,
+        gap: f64,
+        displacement: f64,
+        before: impl Fn(VertexId) -> Point3<f64>,
+    ) -> bool {
         let travel = self.travel;
         self.list.iter_mut().all(|pair| {
-            if travel + way <= pair.safe_until {
+            if travel + displacement <= pair.safe_until {
                 return true;
             }
             let [t, u] = pair.faces.map(|face| mesh.triangle(face));
@@ -87,15 +93,15 @@ impl Pairs {
                 let [t, u] = pair.faces.map(|face| mesh.corners(face).map(&before));
                 return meet(&t, &u, pair.common, gap);
             }
-            // should the update be taken back after all, the pair is `way` away from where it was looked at
-            pair.safe_until = travel + margin(&t, &u, pair.common, gap) - way;
+            // should the update be taken back after all, the pair is `displacement` away from where it was looked at
+            pair.safe_until = travel + margin(&t, &u, pair.common, gap) - displacement;
             true
         })
     }
 
-    /// Takes an update whose longest way is `way` (m).
-    pub fn accept(&mut self, way: f64) {
-        self.travel += way;
+    /// Takes an update whose largest step is `displacement` (m).
+    pub fn accept(&mut self, displacement: f64) {
+        self.travel += displacement;
     }
 }
 
@@ -122,7 +128,7 @@ fn meet(t: &TrianglePoints, u: &TrianglePoints, common: Option<[u8; 2]>, gap: f6
         || triangle::segment_crosses(&u[(j + 1) % 3], &u[(j + 2) % 3], t, 0.0)
 }
 
-/// How far every vertex may move before two faces can meet, m; 0 when that cannot be told simply.
+/// How far every vertex may move before two faces can meet, m; 0 when there is no simple bound.
 fn margin(t: &TrianglePoints, u: &TrianglePoints, common: Option<[u8; 2]>, gap: f64) -> f64 {
     match common.map(|pair| pair.map(usize::from)) {
         Some([i, j]) => margin_at_corner(t, i, u, j).max(margin_at_corner(u, j, t, i)),
@@ -136,7 +142,7 @@ fn margin(t: &TrianglePoints, u: &TrianglePoints, common: Option<[u8; 2]>, gap: 
     }
 }
 
-/// How far all of `u` stands on one side of the plane of `t`, m; negative when it does not.
+/// How far all of `u` lies on one side of the plane of `t`, m; negative when it does not.
 fn height_above(t: &TrianglePoints, u: &TrianglePoints) -> f64 {
     let Some(normal) = (t[1] - t[0]).cross(&(t[2] - t[0])).try_normalize(0.0) else { return f64::NEG_INFINITY };
     let heights = u.map(|p| normal.dot(&(p - t[0])));

@@ -6,7 +6,7 @@ use super::followed::FollowedPatch;
 use super::guard::{GuardEvidence, GuardParams, GuardVerdict};
 use super::params::ScanRegion;
 use super::roi::{Roi, RoiSize};
-use super::strokes::Strokes;
+use super::stroke_undo::StrokeUndo;
 use crate::mesh::{FaceHit, FaceId, FaceTree, MeshError, Nearby, RefitPlan, Region, TriMesh, VertexId};
 use crate::reconstruct::{PatchDelta, Support};
 
@@ -34,7 +34,7 @@ pub enum RegionFit {
 /// Memory of a mesh under refinement, bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Footprint {
-    /// positions, faces, adjacency, where each vertex was scanned, the normal felt on each face
+    /// positions, faces, adjacency, where each vertex was scanned, the normal measured on each face
     pub mesh: usize,
     /// the tree over the faces
     pub tree: usize,
@@ -42,14 +42,14 @@ pub struct Footprint {
     pub patch: usize,
 }
 
-/// A mesh under refinement: the triangles, the tree over them, and what was scanned or felt where.
+/// A mesh under refinement: the triangles, the tree over them, and what was scanned or measured where.
 #[derive(Clone, Debug)]
 pub(super) struct DeformableMesh {
     pub mesh: TriMesh,
     pub tree: FaceTree,
     /// positions as scanned, m
     scanned: Vec<Point3<f64>>,
-    /// for each face the last normal scanned or felt there
+    /// for each face the last normal scanned or measured there
     evidence: Vec<[f32; 3]>,
     guard: Option<GuardParams>,
     /// mean edge length, m
@@ -58,14 +58,14 @@ pub(super) struct DeformableMesh {
     pub largest_move: f64,
     /// vertices that were scanned outside of it stay; `None`: all may move
     movable: Option<Region>,
-    /// stamp of the sample at hand, ns
+    /// stamp of the current sample, ns
     pub now_ns: i64,
-    /// counts the edits, so that a region knows whether others came between
+    /// counts the edits, so that a region can detect edits by others
     edits: u64,
     displacements: Vec<Vector3<f64>>,
     before: Vec<Point3<f64>>,
     patch: Option<FollowedPatch>,
-    strokes: Option<Strokes>,
+    strokes: Option<StrokeUndo>,
 }
 
 /// A region of interest with the edit after which it was last looked at.
@@ -82,7 +82,7 @@ impl HandleRegion {
         self.roi.handle()
     }
 
-    /// Forgets the face that was moved last: faces came or went.
+    /// Forgets the face that was moved last: faces were added or removed.
     pub fn forget(&mut self) {
         self.roi.forget();
         self.seen = None;
@@ -139,13 +139,13 @@ impl DeformableMesh {
         }
     }
 
-    /// What a vertex rests on in the patch that is followed.
+    /// The support of a vertex in the patch that is followed.
     pub fn support(&self, vertex: VertexId) -> Option<Support> {
         self.patch.as_ref().map(|patch| patch.support(vertex))
     }
 
-    /// Remembers that a surface facing `normal` was felt on `face`.
-    pub fn feel(&mut self, face: FaceId, normal: &Vector3<f64>) {
+    /// Stores the normal measured on `face`.
+    pub fn note_normal(&mut self, face: FaceId, normal: &Vector3<f64>) {
         if let Some(strokes) = &mut self.strokes {
             strokes.note_evidence(face, self.evidence[face.0 as usize]);
         }
@@ -198,10 +198,10 @@ impl DeformableMesh {
 
     /// Keeps what it takes to undo strokes from here on, unless a patch is followed.
     pub fn keep_strokes(&mut self) {
-        self.strokes = self.patch.is_none().then(Strokes::default);
+        self.strokes = self.patch.is_none().then(StrokeUndo::default);
     }
 
-    /// Notes that the sample at hand touches.
+    /// Notes that the current sample is in contact.
     pub fn touch(&mut self) {
         if let Some(strokes) = &mut self.strokes {
             strokes.touch(self.now_ns);
@@ -210,13 +210,13 @@ impl DeformableMesh {
 
     /// How many strokes can be undone.
     pub fn strokes(&self) -> usize {
-        self.strokes.as_ref().map_or(0, Strokes::len)
+        self.strokes.as_ref().map_or(0, StrokeUndo::len)
     }
 
     /// Takes the last stroke back, or does again what was undone last; returns whether there was any.
     pub fn change_strokes(&mut self, is_undo: bool) -> bool {
         let Self { strokes, mesh, tree, evidence, .. } = self;
-        let change = if is_undo { Strokes::undo } else { Strokes::redo };
+        let change = if is_undo { StrokeUndo::undo } else { StrokeUndo::redo };
         let Some(moved) = strokes.as_mut().and_then(|strokes| change(strokes, mesh, evidence)) else { return false };
         let faces: Vec<FaceId> = moved.iter().flat_map(|&vertex| mesh.star(vertex)).copied().collect();
         tree.refit(mesh, &faces);
@@ -300,8 +300,8 @@ impl DeformableMesh {
     fn judge_at(&mut self, region: &mut HandleRegion, share: f64, longest: f64, guard: &GuardParams) -> GuardVerdict {
         self.place(&region.roi, share);
         let gap = guard.gap_share * self.mean_edge;
-        let (mesh, before, marks) = (&self.mesh, &self.before, &region.roi.marks);
-        let moved = |v: VertexId| marks.of(v.0).and_then(|i| before.get(i as usize));
+        let (mesh, before, numbers) = (&self.mesh, &self.before, &region.roi.numbers);
+        let moved = |v: VertexId| numbers.of(v.0).and_then(|i| before.get(i as usize));
         let was = |v: VertexId| moved(v).copied().unwrap_or_else(|| mesh.position(v));
         region.roi.neighbourhood.judge(mesh, guard, &self.evidence(), gap, share * longest, was)
     }
@@ -316,8 +316,11 @@ impl DeformableMesh {
             let is_outside = self.movable.is_some_and(|movable| !movable.contains(&self.scanned[vertex.0 as usize]));
             let is_stiff = is_outside || self.patch.as_ref().is_some_and(|patch| patch.is_touched(vertex));
             let mut step = steps[0] * weights[0] + steps[1] * weights[1] + steps[2] * weights[2];
-            let (way, next) = (here - self.scanned[vertex.0 as usize], here + step - self.scanned[vertex.0 as usize]);
-            if is_stiff || next.norm_squared() > self.largest_move * self.largest_move && next.norm() > way.norm() {
+            let (displacement, next) =
+                (here - self.scanned[vertex.0 as usize], here + step - self.scanned[vertex.0 as usize]);
+            if is_stiff
+                || next.norm_squared() > self.largest_move * self.largest_move && next.norm() > displacement.norm()
+            {
                 step = Vector3::zeros();
             }
             longest = longest.max(step.norm_squared());

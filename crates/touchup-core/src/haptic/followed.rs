@@ -1,7 +1,7 @@
 //! The patch in the mesh that the haptic update works on.
 //!
-//! What the patch knows from touches is stiff. What the update moves of the rest, scan and guesses, is there at once, and
-//! for the moment: when the patch has caught up with that touch it is put back, and what was felt stands in the patch.
+//! What the patch knows from touches is stiff. What the update moves elsewhere, scan and guesses, is there at once, and
+//! for the moment: when the patch has caught up with that touch it is put back, and the patch has the contact.
 
 use nalgebra::Point3;
 
@@ -15,7 +15,7 @@ const NEVER: i64 = i64::MIN;
 #[derive(Clone, Debug)]
 pub(super) struct FollowedPatch {
     pub splice: Splice,
-    /// for each vertex, what it rests on
+    /// the support of each vertex
     support: Vec<Support>,
     /// vertices that are not where scan and patch have them
     moved: Vec<VertexId>,
@@ -46,7 +46,7 @@ impl FollowedPatch {
         self.support(vertex) == Support::Touched
     }
 
-    /// What a vertex rests on in the patch.
+    /// The support of a vertex in the patch.
     #[inline]
     pub fn support(&self, vertex: VertexId) -> Support {
         self.support[vertex.0 as usize]
@@ -90,7 +90,7 @@ impl FollowedPatch {
         !refit.is_empty()
     }
 
-    /// Takes up some more of a delta, as [`Splice::go_on`]; notes what its vertices rest on, and where they are `scanned`.
+    /// Takes up some more of a delta, as [`Splice::go_on`]; notes the support of its vertices, and where they are `scanned`.
     pub fn go_on(
         &mut self,
         delta: &PatchDelta,

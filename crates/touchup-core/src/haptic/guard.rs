@@ -1,12 +1,12 @@
-//! What an update may not do to the faces around it: flip, fold, starve or pierce one.
+//! The guard of an update: no face around it may flip, fold, degenerate or be pierced.
 //!
-//! A scan may come with such faithless faces; an update may not make one worse.
+//! A scan may have such faces already; an update may not make one worse.
 
 use nalgebra::{Point3, Vector3};
 
 use super::collision::{Corners, Pairs, bounds};
-use super::marks::ScratchMap;
 use super::ring::Ring;
+use super::scratch_map::ScratchMap;
 use crate::mesh::{BoxQuery, FaceId, FaceTree, TriMesh, VertexId, triangle};
 use crate::parameters;
 
@@ -38,7 +38,7 @@ parameters! {
 
 impl GuardParams {
     /// See [`Self::smallest_quality`]. To follow a touch a thin triangle needs to lose little. With a share of 0.8 a vertex of a
-    /// crumpled scan strayed, with 0.3 one more face was the wrong way round on another.
+    /// crumpled scan strayed, with 0.3 one more face was inverted on another.
     pub const SCANNED_SHARE: f64 = 0.9;
 }
 
@@ -58,12 +58,12 @@ const FOLD_MARGIN: f64 = 0.1;
 /// Margin on the quality.
 const QUALITY_MARGIN: f64 = 1.15;
 
-/// What was scanned or felt, against which an update is held.
+/// What was scanned or measured, against which an update is judged.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct GuardEvidence<'a> {
     /// positions as scanned, m
     pub scanned: &'a [Point3<f64>],
-    /// for each face the last normal scanned or felt there; zero where it was scanned without area and never felt: it has no
+    /// for each face the last normal scanned or measured there; zero where it was scanned without area and never touched: it has no
     /// side to keep then, and must not hold the others
     pub normals: &'a [[f32; 3]],
 }
@@ -86,7 +86,7 @@ struct FaceShape {
     altitude: f64,
 }
 
-/// What [`Neighbourhood::judge`] says of an update.
+/// The verdict of [`Neighbourhood::judge`] on an update.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum GuardVerdict {
     /// The mesh is no worse than before.
@@ -175,7 +175,7 @@ impl Neighbourhood {
         self.reached.reserve(4 * faces);
     }
 
-    /// Looks at the region anew after the mesh was changed elsewhere; arguments as in [`Self::judge`].
+    /// Collects the region again after the mesh was changed elsewhere; arguments as in [`Self::judge`].
     pub fn refresh(
         &mut self,
         mesh: &TriMesh,
@@ -266,23 +266,23 @@ impl Neighbourhood {
         }
     }
 
-    /// Whether the vertices may move by `way` (m) without a look.
+    /// Whether the vertices may move by `displacement` (m) without a look.
     #[inline]
-    pub fn may_pass_unseen(&self, way: f64) -> bool {
-        way <= self.unseen
+    pub fn may_pass_unseen(&self, displacement: f64) -> bool {
+        displacement <= self.unseen
     }
 
-    /// Takes a motion of `way` (m) that [`Self::may_pass_unseen`].
+    /// Takes a motion of `displacement` (m) that [`Self::may_pass_unseen`].
     #[inline]
-    pub fn pass_unseen(&mut self, way: f64) {
-        self.unseen -= way;
-        self.allowance -= way;
+    pub fn pass_unseen(&mut self, displacement: f64) {
+        self.unseen -= displacement;
+        self.allowance -= displacement;
     }
 
-    /// Judges the mesh as it stands now against what it was before the update.
+    /// Judges the current mesh against what it was before the update.
     ///
     /// - `gap`: faces nearer than this touch, m.
-    /// - `way`: the longest way of a vertex in the update, m.
+    /// - `displacement`: the largest of a vertex in the update, m.
     /// - `before`: the position of a vertex before the update, m.
     pub fn judge(
         &mut self,
@@ -290,7 +290,7 @@ impl Neighbourhood {
         params: &GuardParams,
         evidence: &GuardEvidence,
         gap: f64,
-        way: f64,
+        displacement: f64,
         before: impl Fn(VertexId) -> Point3<f64>,
     ) -> GuardVerdict {
         self.after.clear();
@@ -301,7 +301,7 @@ impl Neighbourhood {
             return GuardVerdict::Broken;
         }
         let Some(mean) = self.smooth else {
-            return if self.suspects.are_clear(mesh, gap, way, before) {
+            return if self.suspects.are_clear(mesh, gap, displacement, before) {
                 GuardVerdict::Sound
             } else {
                 GuardVerdict::Broken
@@ -369,17 +369,17 @@ impl Neighbourhood {
         look
     }
 
-    /// Takes the state just looked at as the new state before; `way` is the longest of a vertex, m.
-    pub fn accept(&mut self, way: f64) {
+    /// Takes the state just looked at as the new state before; `displacement` is the largest of a vertex, m.
+    pub fn accept(&mut self, displacement: f64) {
         self.before[..self.ring.moving].copy_from_slice(&self.after);
-        self.suspects.accept(way);
-        self.allowance -= way;
+        self.suspects.accept(displacement);
+        self.allowance -= displacement;
     }
 
-    /// Whether the faces nearby must be collected again before a motion of `way` (m).
+    /// Whether the faces nearby must be collected again before a motion of `displacement` (m).
     #[inline]
-    pub fn is_outdated(&self, way: f64) -> bool {
-        self.allowance < way
+    pub fn is_outdated(&self, displacement: f64) -> bool {
+        self.allowance < displacement
     }
 }
 

@@ -10,12 +10,12 @@ pub mod dynamics;
 mod followed;
 mod guard;
 mod inside_scratch;
-mod marks;
 mod params;
 mod registration;
 mod ring;
 mod roi;
-mod strokes;
+mod scratch_map;
+mod stroke_undo;
 
 use nalgebra::{Point3, Vector3};
 use serde::Serialize;
@@ -35,14 +35,14 @@ pub use crate::stylus::{SlidingParams, TipParams};
 use crate::mesh::{Changes, FaceHit, FaceId, MeshError, Nearby, TriMesh, VertexId};
 use crate::reconstruct::{PatchDelta, Support};
 use crate::stylus::{
-    Ball, ContactEstimator, ContactSample, FeltNormal, FrictionCoefficient, LONGEST_HOLD, Sample, SampleError,
+    Ball, ContactEstimator, ContactSample, FrictionCoefficient, LONGEST_HOLD, NormalEstimate, Sample, SampleError,
     SettingError, TipBody, TipPlace,
 };
 use deform::{DeformableMesh, HandleRegion};
 use dynamics::turn;
 use inside_scratch::InsideScratch;
 
-/// The felt normal of one sample is uncertain by this, rad: a flat tip that may lie on its face does.
+/// The measured normal of one sample is uncertain by this, rad: a flat tip that may lie on its face does.
 const FLUSH: f64 = 0.05;
 
 /// Why a sample was refused, or a refiner not built. A refused sample does not change the mesh.
@@ -71,11 +71,11 @@ pub enum RefineError {
 /// The four cases of haptic mismatch \[paper, Fig 5\].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum Case {
-    /// 1: nothing is felt and nothing expected.
+    /// 1: no contact is measured and none expected.
     Free,
-    /// 2: the mesh alone says contact; it is carved away.
+    /// 2: contact is expected but not measured; the mesh is carved.
     MeshOnly,
-    /// 3: the surface alone is felt; the mesh is raised to it.
+    /// 3: contact is measured but not expected; the mesh is raised to the surface.
     SurfaceOnly,
     /// 4: both; the mesh is moved and turned.
     Both,
@@ -96,12 +96,12 @@ pub struct Mismatch {
     pub rotational: Vector3<f64>,
 }
 
-/// What the force says.
+/// The state of the contact by the force.
 #[derive(Clone, Copy, Debug)]
 enum ContactState {
     /// no contact
     Nothing,
-    /// contact; which way the surface faces is not asked \[paper\]
+    /// contact; the normal of the surface is not used \[paper\]
     Something,
     /// contact with a surface of this outward normal
     Surface(Vector3<f64>),
@@ -151,7 +151,7 @@ pub struct RefineCounts {
 /// let p = |x, y| Point3::new(x, y, 0.0);
 /// let mesh = TriMesh::new(vec![p(0.0, 0.0), p(0.01, 0.0), p(0.0, 0.01)], vec![[0, 1, 2]])?;
 /// let mut refiner = Refiner::new(mesh, RefineParams::robust(TipParams { radius: 1e-3, stiffness: Some(2e4) }))?;
-/// // a ball of 1 mm rests 0.1 mm higher than the scan says, pressed with 2 N
+/// // a ball of 1 mm touches 0.1 mm above the scan, pressed with 2 N
 /// let wrench = Wrench { force: Vector3::new(0.0, 0.0, 2.0), torque: Vector3::zeros() };
 /// for i in 0..1000 {
 ///     let pose_ot = Isometry3::translation(0.003, 0.003, 1.0e-3 + 0.1e-3 - 2.0 / 2e4);
@@ -186,7 +186,7 @@ struct Pressing {
     handle: FaceId,
     /// the face before the update
     face: FaceState,
-    /// outward normal of the surface as felt, unit; the face's own in [`RefineParams::paper`]
+    /// measured outward normal of the surface, unit; the face's own in [`RefineParams::paper`]
     normal: Vector3<f64>,
     /// the point of the reported ball that touches, m, in O
     point: Point3<f64>,
@@ -224,7 +224,7 @@ impl Refiner {
         })
     }
 
-    /// Takes the next sample and moves the mesh by what it tells.
+    /// Takes the next sample and moves the mesh accordingly.
     ///
     /// # Errors
     /// [`RefineError::Sample`] for one that is not finite, absurd or not after the last; nothing is changed then.
@@ -252,28 +252,28 @@ impl Refiner {
         if !self.body.is_ball() {
             self.axis = TipPlace::from(&sample.pose_ot).axis;
         }
-        let felt = self.contact_state(ball_contact.is_some(), surface);
+        let state = self.contact_state(ball_contact.is_some(), surface);
         if self.params.region.is_some_and(|touched| !touched.region.contains(&ball.centre)) {
-            return Ok(self.pass(felt));
+            return Ok(self.pass(state));
         }
-        let update = match felt {
+        let update = match state {
             ContactState::Nothing => Update::FREE,
             _ => {
                 self.deformable.touch();
-                self.press(&ball, felt, handle, dt)?
+                self.press(&ball, state, handle, dt)?
             }
         };
         self.counts.accepted += 1;
         match self.params.carve {
-            Some(carve) => Ok(self.carve(&carve, &ball, felt, dt, update)),
+            Some(carve) => Ok(self.carve(&carve, &ball, state, dt, update)),
             None => Ok(update),
         }
     }
 
     /// A sample outside the region that may be touched moves nothing.
-    fn pass(&mut self, felt: ContactState) -> Update {
+    fn pass(&mut self, state: ContactState) -> Update {
         self.counts.accepted += 1;
-        match felt {
+        match state {
             ContactState::Nothing => Update::FREE,
             _ => {
                 self.counts.outside_region += 1;
@@ -282,7 +282,7 @@ impl Refiner {
         }
     }
 
-    fn contact_state(&mut self, is_in_contact: bool, surface: Option<FeltNormal>) -> ContactState {
+    fn contact_state(&mut self, is_in_contact: bool, surface: Option<NormalEstimate>) -> ContactState {
         self.counts.contacts = self.contacts.contacts();
         if !is_in_contact {
             self.begun = None;
@@ -290,7 +290,9 @@ impl Refiner {
         }
         match self.params.touch_point {
             TouchPoint::FaceNormal => ContactState::Something,
-            TouchPoint::FeltNormal => ContactState::Surface(surface.map(|surface| surface.normal).unwrap_or_default()),
+            TouchPoint::MeasuredNormal => {
+                ContactState::Surface(surface.map(|surface| surface.normal).unwrap_or_default())
+            }
         }
     }
 
@@ -298,11 +300,11 @@ impl Refiner {
     fn press(
         &mut self,
         ball: &Ball,
-        felt: ContactState,
+        state: ContactState,
         handle: Option<FaceId>,
         dt: f64,
     ) -> Result<Update, RefineError> {
-        let Some(pressing) = self.pressing(ball, felt, handle) else {
+        let Some(pressing) = self.pressing(ball, state, handle) else {
             self.counts.out_of_reach += 1;
             return Ok(Update { case: Case::SurfaceOnly, mismatch: None, fit: None });
         };
@@ -310,7 +312,7 @@ impl Refiner {
         let case = if mismatch.distance < 0.0 { Case::Both } else { Case::SurfaceOnly };
         let untouched = Ok(Update { case, mismatch: Some(mismatch), fit: None });
         let face = &pressing.face;
-        // without area a face has no normal; turned away from what is felt it is another surface
+        // without area a face has no normal; turned away from the measured normal it is another surface
         let is_apart = face.n == Vector3::zeros() || face.n.dot(&pressing.normal) < self.params.smallest_contact_cosine;
         if is_apart || self.deformable.is_stiff(pressing.handle) {
             return untouched;
@@ -322,7 +324,7 @@ impl Refiner {
         if let Some(turning) = self.params.turning {
             next.n = turn(&face.n, &pressing.normal, turning * dt);
         }
-        self.deformable.feel(pressing.handle, &pressing.normal);
+        self.deformable.note_normal(pressing.handle, &pressing.normal);
         let steps = self.rigid_steps(&pressing, &next);
         let fit = self.deformable.deform(&mut self.contact_region, pressing.handle, self.params.roi, &steps);
         self.count(fit);
@@ -330,11 +332,11 @@ impl Refiner {
     }
 
     /// The ball against `handle`, else against the face that it touches; `None` beyond the reach.
-    fn pressing(&mut self, ball: &Ball, felt: ContactState, handle: Option<FaceId>) -> Option<Pressing> {
+    fn pressing(&mut self, ball: &Ball, state: ContactState, handle: Option<FaceId>) -> Option<Pressing> {
         let reach = self.deformable.largest_move + self.params.tip.radius;
         // the spring expects the deflection F/k of the tip, a rigid contact does not
         let centre = if self.params.dynamics.take_out_rigid_offset { ball.centre } else { ball.reported };
-        let seek = match felt {
+        let seek = match state {
             ContactState::Surface(normal) => self.touching_point(centre, &normal),
             _ => centre,
         };
@@ -347,7 +349,7 @@ impl Refiner {
         let handle = handle.or(hit.map(|hit| hit.face))?;
         let mesh = &self.deformable.mesh;
         let face = FaceState { b: mesh.barycentre(handle), n: mesh.normal(handle) };
-        Some(match felt {
+        Some(match state {
             ContactState::Surface(normal) => {
                 Pressing { handle, face, normal, point: seek, force_o: normal * ball.force_o.dot(&normal) }
             }
@@ -411,7 +413,7 @@ impl Refiner {
     }
 
     /// Takes the last stroke back, bit by bit: what was touched without a pause of a tenth of a second, and what the tip moved
-    /// after it. Returns whether there was one. What the samples told of friction and bias stays.
+    /// after it. Returns whether there was one. Estimates of friction and bias stay.
     pub fn undo(&mut self) -> bool {
         self.change_strokes(true)
     }
@@ -439,11 +441,11 @@ impl Refiner {
     }
 
     /// Takes up what changed in the patch of this scan. What this moved up to the patch's last touch goes back to where scan
-    /// and patch have it; what was touched stands in the patch now, which alone moves it from then on. Does nothing before
+    /// and patch have it; what was touched is in the patch now, which alone moves it from then on. Does nothing before
     /// [`Self::expect_patch`].
     ///
     /// # Errors
-    /// [`MeshError::TooMany`] when 32-bit ids do not suffice, [`MeshError::NotFinite`]; the mesh is torn then.
+    /// [`MeshError::TooMany`] when 32-bit ids do not suffice, [`MeshError::NotFinite`]; the mesh is inconsistent then.
     pub fn follow(&mut self, delta: &PatchDelta) -> Result<(), RefineError> {
         self.begin_to_follow(delta);
         self.go_on_following(delta, usize::MAX)?;
@@ -470,7 +472,7 @@ impl Refiner {
         Ok(self.deformable.go_on(delta, most)?)
     }
 
-    /// Faces came, went or moved.
+    /// Faces were added, removed or moved.
     fn forget_regions(&mut self) {
         self.contact_region.forget();
         self.carve_region.forget();
@@ -482,7 +484,7 @@ impl Refiner {
         self.counts.cut_back += u64::from(fit == RegionFit::CutBack);
     }
 
-    /// The mesh as it stands.
+    /// The current mesh.
     pub fn mesh(&self) -> &TriMesh {
         &self.deformable.mesh
     }
@@ -492,12 +494,12 @@ impl Refiner {
         self.deformable.mesh.watch();
     }
 
-    /// What changed in the mesh since this was last asked, as [`TriMesh::take_changes`].
+    /// What changed in the mesh since the last call, as [`TriMesh::take_changes`].
     pub fn take_changes(&mut self, most: usize, into: &mut Changes) -> bool {
         self.deformable.mesh.take_changes(most, into)
     }
 
-    /// What a vertex rests on in the patch that is followed; `None` where none is.
+    /// The support of a vertex in the patch that is followed; `None` without a patch.
     pub fn support(&self, vertex: VertexId) -> Option<Support> {
         self.deformable.support(vertex)
     }
@@ -507,12 +509,12 @@ impl Refiner {
         self.deformable.mesh
     }
 
-    /// Memory of mesh and tree as they stand.
+    /// Current memory of mesh and tree.
     pub fn footprint(&self) -> Footprint {
         self.deformable.footprint()
     }
 
-    /// The closest face of the mesh as it stands, by true surface distance, nearer than `reach` (m).
+    /// The closest face of the current mesh, by true surface distance, nearer than `reach` (m).
     pub fn closest_face(&self, p: &Point3<f64>, reach: f64) -> Option<FaceHit> {
         self.deformable.tree.closest(&self.deformable.mesh, p, reach)
     }
@@ -522,7 +524,7 @@ impl Refiner {
         &self.counts
     }
 
-    /// Kinetic friction as measured so far; `None` until the ball has slid far enough, or where friction is not asked for.
+    /// Kinetic friction as measured so far; `None` until the ball has slid far enough, or where friction is not estimated.
     pub fn friction(&self) -> Option<FrictionCoefficient> {
         self.contacts.friction()
     }

@@ -32,10 +32,10 @@ pub enum ClosestBy {
 /// Which point of the ball touches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TouchPoint {
-    /// The one under the normal of the closest face; the force only says how hard \[paper\].
+    /// The one under the normal of the closest face; the force only gives the magnitude \[paper\].
     FaceNormal,
-    /// The one that the felt force points away from.
-    FeltNormal,
+    /// The point that the measured force points away from.
+    MeasuredNormal,
 }
 
 parameters! {
@@ -89,7 +89,7 @@ pub struct RefineParams {
     pub closest: ClosestBy,
     /// Eq 1–7.
     pub dynamics: DynamicsParams,
-    /// Rate at which a touched face turns to the felt normal, 1/s: tan(θ/2) falls as e^(−rate t), which is Eq 7 with
+    /// Rate at which a touched face turns to the measured normal, 1/s: tan(θ/2) falls as e^(−rate t), which is Eq 7 with
     /// both forces at unit size (on a rigid part F* is F). `None`: Eq 7 as printed, in `dynamics`.
     pub turning: Option<f64>,
     /// Carving by free motion; `None` leaves it to the dynamics \[paper\].
@@ -98,7 +98,7 @@ pub struct RefineParams {
     pub roi: RoiSize,
     /// What an update may not do; `None`: anything \[paper\], which on a noisy scan ends in a blow-up.
     pub guard: Option<GuardParams>,
-    /// A face turned away from the felt normal by more than this cosine is another surface. Default 0.2: 78°.
+    /// A face turned away from the measured normal by more than this cosine is another surface. Default 0.2: 78°.
     pub smallest_contact_cosine: f64,
     /// Longest step of a vertex in one update, in mean edges. Default 1/25, far below any feature the mesh can show.
     pub longest_step_edges: f64,
@@ -151,7 +151,7 @@ impl RefineParams {
             tip,
             shape: TipShape::Ball,
             sliding: Some(SlidingParams::default()),
-            touch_point: TouchPoint::FeltNormal,
+            touch_point: TouchPoint::MeasuredNormal,
             closest: ClosestBy::Surface,
             dynamics: DynamicsParams {
                 model,

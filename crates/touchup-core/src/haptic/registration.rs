@@ -2,7 +2,7 @@
 //!
 //! Point to plane: a scan point q with normal n that is moved by a small twist (t, θ) about the centre c meets the
 //! contact p when n · (p − q) = n · t + ((q − c) × n) · θ + b. A scan may also be too fat or too thin all over, b; touches
-//! from one side cannot tell that from a shift, so b takes part with what is known of it beforehand. The noise of a scan
+//! from one side cannot distinguish that from a shift, so b takes part with what is known of it beforehand. The noise of a scan
 //! is correlated: all contacts in one cell of the correlation length count as one.
 
 use std::collections::BTreeMap;
@@ -50,7 +50,7 @@ pub struct Registration {
     pub centre: Point3<f64>,
     /// How much fatter the scan is than the part, m, and its standard uncertainty.
     pub surface_offset: [f64; 2],
-    /// Contacts, after thinning, that were used.
+    /// Contacts that were used, one kept per voxel.
     pub contacts: usize,
 }
 
@@ -66,14 +66,14 @@ pub enum RegistrationError {
         needed: usize,
     },
     /// The touched surfaces let the scan slide.
-    #[error("the touched surfaces let the scan move along {}: touch faces that look another way", list(directions))]
+    #[error("the touched surfaces let the scan move along {}: touch faces of other orientations", list(directions))]
     Undetermined {
         /// shift and turn about the middle of the contacts; unit, a turn counting as the shift that it gives on average
         directions: Vec<Vector6<f64>>,
     },
-    /// The rounds do not come to rest, or end outside of what can be a small offset.
-    #[error("the contacts do not settle at one place of the scan")]
-    Unsettled,
+    /// The iterations do not converge, or end outside of what can be a small offset.
+    #[error("the registration does not converge to one place of the scan")]
+    NotConverged,
 }
 
 fn list(directions: &[Vector6<f64>]) -> String {
@@ -105,7 +105,7 @@ pub struct Registrar {
 
 /// Cells of contacts that are kept; later ones elsewhere are left out.
 const MOST_MEANS: usize = 50_000;
-/// Fewer separate places say nothing about six numbers.
+/// Fewer separate places do not determine six numbers.
 const LEAST_CELLS: usize = 20;
 /// Contacts count as of a face when their normals are no farther apart than 37°.
 const SMALLEST_COSINE: f64 = 0.8;
@@ -115,9 +115,9 @@ const LEAST_SHARE: f64 = 0.02;
 const ROUNDS: usize = 30;
 /// A round that moves less than this ends them, in scan noises: below it contacts go to and fro between faces.
 const REST: f64 = 0.02;
-/// Late rounds that go to and fro by less than this many standard uncertainties are at rest for all that can be told.
+/// Late iterations that alternate by less than this many standard uncertainties count as converged.
 const SMALL_STEP: f64 = 0.3;
-/// Smallest mean square error believed, in squares of the scan's noise.
+/// Smallest mean square error accepted, in squares of the scan's noise.
 const LEAST_SCALE: f64 = 0.05;
 /// An error of this many scan noises counts half.
 const HALF_WEIGHT: f64 = 3.0;
@@ -178,7 +178,7 @@ impl Registrar {
                 return Ok(fit.registration(&pose, &centre));
             }
         }
-        Err(RegistrationError::Unsettled)
+        Err(RegistrationError::NotConverged)
     }
 }
 
@@ -241,20 +241,20 @@ impl RegistrationRound {
             for ((_, row, error, ..), weight) in rows.iter().zip(&weights) {
                 equations.add(row, *error, weight * unit);
             }
-            step = equations.solution().ok_or(RegistrationError::Unsettled)?;
+            step = equations.solution().ok_or(RegistrationError::NotConverged)?;
             for ((_, row, error, ..), weight) in rows.iter().zip(&mut weights) {
                 let left = (error - row.dot(&step)) / (HALF_WEIGHT * scan_noise);
                 *weight = cauchy_weight(left * left);
             }
         }
-        // where the estimate gives way: not by the weights but by how fast the weighted errors grow
+        // how far the estimate yields: not by the weights but by how fast the weighted errors grow
         let mut slopes = Information::zeros();
         slopes[(6, 6)] = prior;
         for ((_, row, ..), weight) in rows.iter().zip(&weights) {
             slopes += row * row.transpose() * (weight * (2.0 * weight - 1.0) * unit);
         }
-        let inverse = slopes.try_inverse().ok_or(RegistrationError::Unsettled)?;
-        // no better than the scan is said to be: few places can agree by chance
+        let inverse = slopes.try_inverse().ok_or(RegistrationError::NotConverged)?;
+        // no better than the stated noise of the scan: few places can agree by chance
         let square: f64 =
             rows.iter().zip(&weights).map(|((_, row, error, ..), w)| w * (error - row.dot(&step)).powi(2)).sum();
         let scale = (square / weights.iter().sum::<f64>() / (scan_noise * scan_noise)).max(LEAST_SCALE);
@@ -277,8 +277,8 @@ impl RegistrationRound {
     }
 }
 
-/// How many independent values of the scan's noise `points` stand for: n² / Σ ρ(p − q) with a correlation ρ that falls
-/// linearly to nothing over `correlation` on each axis.
+/// How many independent values of the scan's noise `points` amount to: n² / Σ ρ(p − q) with a correlation ρ that falls
+/// linearly to 0 over `correlation` on each axis.
 fn independent<'a>(points: impl Iterator<Item = &'a Point3<f64>>, correlation: f64) -> f64 {
     let mut cells: BTreeMap<VoxelKey, f64> = BTreeMap::new();
     points.for_each(|p| *cells.entry(voxel_of(p, correlation / 2.0)).or_insert(0.0) += 1.0);

@@ -1,9 +1,9 @@
-//! The ring: the faces around the vertices that move, and how they hang together. Found once, then used by number.
+//! The ring: the faces around the vertices that move, and their connectivity. Found once, then used by number.
 
 use std::hint::select_unpredictable;
 use std::ops::Range;
 
-use super::marks::ScratchMap;
+use super::scratch_map::ScratchMap;
 use crate::mesh::{FaceId, TriMesh, VertexId};
 
 /// Vertices around the ring that do not move, for each that does: all around a single face.
@@ -13,7 +13,7 @@ const STAR_FACES: usize = 8;
 /// Not a number of a vertex.
 const NONE: u32 = u32::MAX;
 
-/// Faces and vertices have numbers here: their order in `faces`, and in the marks of the region.
+/// Faces and vertices have numbers here: their order in `faces`, and in the scratch map of the region.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Ring {
     /// faces with a moving vertex, then the faces that share an edge with one of these
@@ -82,7 +82,7 @@ impl Ring {
         for &face in vertices.iter().flat_map(|&vertex| mesh.star(vertex)) {
             let [number] = self.known.number([face.0]);
             self.stars.push(number);
-            // no branches: which face was met before cannot be foretold
+            // no branches: which face was met before cannot be predicted
             self.faces.push(face);
             self.faces[number as usize] = face;
             self.faces.truncate(self.known.len());
@@ -90,13 +90,14 @@ impl Ring {
         self.moving = self.faces.len();
     }
 
-    /// Finds how they hang together, for the same vertices, which have the first numbers in `marks`; their neighbours get the
+    /// Finds their connectivity, for the same vertices, which have the first numbers in `scratch_map`; their neighbours get the
     /// next.
-    pub fn link(&mut self, mesh: &TriMesh, vertices: &[VertexId], marks: &mut ScratchMap) {
+    pub fn link(&mut self, mesh: &TriMesh, vertices: &[VertexId], scratch_map: &mut ScratchMap) {
         self.corners.clear();
-        self.corners.extend(self.faces.iter().map(|&face| marks.number(mesh.corners(face).map(|corner| corner.0))));
+        self.corners
+            .extend(self.faces.iter().map(|&face| scratch_map.number(mesh.corners(face).map(|corner| corner.0))));
         self.met.clear();
-        self.met.resize(marks.len(), (NONE, NONE, 0));
+        self.met.resize(scratch_map.len(), (NONE, NONE, 0));
         self.edges.clear();
         self.edges.resize(2 * self.stars.len(), (NONE, NONE));
         self.neighbours.resize(2 * self.stars.len(), NONE);
@@ -122,7 +123,7 @@ impl Ring {
         for &face in &self.stars[star] {
             let [a, b, c] = self.corners[face as usize];
             for corner in [select_unpredictable(a == vertex, b, a), select_unpredictable(c == vertex, b, c)] {
-                // no branches: which corner was met before cannot be foretold
+                // no branches: which corner was met before cannot be predicted
                 let (around, other, times) = met[corner as usize];
                 let is_met = around == vertex;
                 met[corner as usize] = (vertex, face, (times + 1) * u32::from(is_met));

@@ -8,8 +8,8 @@
 use nalgebra::Point3;
 
 use super::guard::Neighbourhood;
-use super::marks::ScratchMap;
 use super::ring::Ring;
+use super::scratch_map::ScratchMap;
 use crate::mesh::{FaceId, TriMesh, VertexId};
 
 /// How far the free vertices reach.
@@ -19,7 +19,7 @@ pub enum RoiSize {
     Handle,
     /// All neighbours of the handle are free \[paper\].
     OneRing,
-    /// Vertices within this distance (m) of the handle's barycentre are free, as far as they hang together.
+    /// Vertices within this distance (m) of the handle's barycentre are free, as far as they are connected.
     Radius(f64),
 }
 
@@ -39,7 +39,7 @@ pub(super) struct Roi {
     /// what the guard looks at
     pub neighbourhood: Neighbourhood,
     /// index in `vertices` of each vertex that moves; their neighbours have higher numbers
-    pub marks: ScratchMap,
+    pub numbers: ScratchMap,
     solver: Solver,
 }
 
@@ -63,7 +63,7 @@ impl Roi {
         let mut roi = Self::default();
         roi.vertices.reserve(vertices);
         roi.weights.reserve(vertices);
-        roi.marks.reserve(4 * vertices);
+        roi.numbers.reserve(4 * vertices);
         roi.solver.reserve(vertices);
         roi.neighbourhood.reserve(vertices);
         roi
@@ -84,10 +84,10 @@ impl Roi {
         self.handle = None;
     }
 
-    /// Makes the region of `handle`; how its faces hang together is looked up only for free vertices or a guard.
+    /// Makes the region of `handle`; the connectivity of its faces is looked up only for free vertices or a guard.
     pub fn rebuild(&mut self, mesh: &TriMesh, handle: FaceId, size: RoiSize, is_guarded: bool) {
         self.handle = Some(handle);
-        self.marks.clear();
+        self.numbers.clear();
         self.vertices.clear();
         for vertex in mesh.corners(handle) {
             self.add(vertex);
@@ -96,13 +96,13 @@ impl Roi {
         let ring = &mut self.neighbourhood.ring;
         ring.gather(mesh, &self.vertices);
         if is_guarded || self.vertices.len() > 3 {
-            ring.link(mesh, &self.vertices, &mut self.marks);
+            ring.link(mesh, &self.vertices, &mut self.numbers);
         }
         self.solver.solve(&self.neighbourhood.ring, self.vertices.len(), &mut self.weights);
     }
 
     fn add(&mut self, vertex: VertexId) {
-        self.marks.number([vertex.0]);
+        self.numbers.number([vertex.0]);
         self.vertices.push(vertex);
     }
 
@@ -119,7 +119,7 @@ impl Roi {
                 let face = mesh.star(self.vertices[next])[i];
                 for vertex in mesh.corners(face) {
                     let near = (mesh.position(vertex) - centre).norm_squared() <= radius * radius;
-                    if near && self.marks.of(vertex.0).is_none() {
+                    if near && self.numbers.of(vertex.0).is_none() {
                         self.add(vertex);
                     }
                 }
@@ -185,7 +185,7 @@ impl Solver {
         row + 1 - (self.starts[row + 1] - self.starts[row])
     }
 
-    /// Puts L below the diagonal and D on it. The matrix is positive definite: every free vertex hangs on the handle.
+    /// Puts L below the diagonal and D on it. The matrix is positive definite: every free vertex is connected to the handle.
     fn factorise(&mut self) {
         for row in 0..self.starts.len() - 1 {
             let (first, start) = (self.first(row), self.starts[row]);

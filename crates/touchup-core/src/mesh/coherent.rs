@@ -1,4 +1,4 @@
-//! An order of points in which neighbours in space follow each other, so that what a query has read is still at hand for the next.
+//! An order of points in which neighbours in space follow each other, so that what a query has read is still in the cache for the next.
 
 use nalgebra::Point3;
 

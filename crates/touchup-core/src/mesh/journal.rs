@@ -1,13 +1,13 @@
-//! Which vertices and faces of a mesh changed, for who keeps a copy of it.
+//! Which vertices and faces of a mesh changed, for a caller that keeps a copy of it.
 
 use super::{FaceId, VertexId};
 
 /// What changed in a [`super::TriMesh`] that is watched; each thing is named once, in no particular order.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Changes {
-    /// moved, added or removed: [`super::TriMesh::has_vertex`] tells which
+    /// moved, added or removed: see [`super::TriMesh::has_vertex`]
     pub vertices: Vec<VertexId>,
-    /// added, removed, or with other corners: [`super::TriMesh::has_face`] tells which
+    /// added, removed, or with other corners: see [`super::TriMesh::has_face`]
     pub faces: Vec<FaceId>,
 }
 

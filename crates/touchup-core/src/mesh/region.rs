@@ -155,7 +155,7 @@ impl Outside {
     /// Puts the part back, in which faces may have come, gone and moved.
     ///
     /// # Errors
-    /// [`MeshError::TornRim`] where that went up to the rim, [`MeshError::TooMany`].
+    /// [`MeshError::TornRim`] where that reached the rim, [`MeshError::TooMany`].
     pub fn sew_to(&self, part: &TriMesh) -> Result<Sewn, MeshError> {
         let is_as_it_was =
             |&(vertex, p): &(VertexId, Point3<f64>)| part.has_vertex(vertex) && part.position(vertex) == p;
@@ -183,7 +183,7 @@ impl Outside {
         Ok(Sewn { mesh: TriMesh::new(positions, faces)?, vertices })
     }
 
-    /// Faces in the order of the whole; those that came to the part last.
+    /// Faces in the order of the whole; those that were added to the part last.
     fn all_faces(&self, part: &TriMesh, id_of: impl Fn(VertexId) -> u32) -> Vec<[u32; 3]> {
         let corners = |face: usize| {
             let face = FaceId(face as u32);

@@ -1,4 +1,4 @@
-//! On which side of a mesh a point lies, and how far.
+//! Signed distance of a point from a mesh.
 //!
 //! The sign is that of (p − c)·ñ, where c is the closest point of the mesh and ñ the *pseudo-normal* there: the normal of
 //! the face, the sum of the normals of the faces at the edge, or the sum of the normals at the corner weighted by the
@@ -72,8 +72,8 @@ mod tests {
     }
 
     #[test]
-    fn a_corner_weighs_its_faces_by_angle() {
-        // the corner of a cube at the origin, its faces cut into one, one and two triangles: x, y and z weigh the same
+    fn a_corner_weights_its_faces_by_angle() {
+        // the corner of a cube at the origin, its faces cut into one, one and two triangles: x, y and z have the same weight
         let p = [[0., 0., 0.], [-1., 0., 0.], [0., -1., 0.], [0., 0., -1.], [-1., -1., 0.]].map(Point3::from);
         let mesh = TriMesh::new(p.into(), vec![[0, 2, 3], [0, 3, 1], [0, 1, 4], [0, 4, 2]]).unwrap();
         let normal = corner_normal(&mesh, VertexId(0)).normalize();

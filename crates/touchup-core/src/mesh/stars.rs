@@ -1,6 +1,6 @@
 //! The faces around each vertex, in one array that gives back what it took.
 //!
-//! The stars of a mesh as it was loaded stand one after another, without gaps. A star that outgrows its place moves to a
+//! The stars of a mesh as it was loaded are stored one after another, without gaps. A star that outgrows its place moves to a
 //! block of twice the size, one of which little is left to a block of half the size. Blocks that are left are kept by
 //! size (powers of two) and used again first, so that replacing faces without end takes no more than the largest number
 //! of blocks of each size that was ever needed at once.
@@ -19,7 +19,7 @@ const LARGEST: usize = NONE as usize;
 /// Faces that a mesh can have at most: each is in three stars.
 pub(super) const MOST_FACES: usize = LARGEST / 3;
 
-/// Where the faces around one vertex stand in the list of entries.
+/// Where the faces around one vertex are in the list of entries.
 #[derive(Clone, Copy, Debug, Default)]
 struct StarSlot {
     start: u32,

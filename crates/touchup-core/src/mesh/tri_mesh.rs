@@ -79,7 +79,7 @@ pub struct TriMesh {
     stars: Stars,
     free_faces: Vec<FaceId>,
     free_vertices: Vec<VertexId>,
-    /// what changed since somebody asked, when somebody does
+    /// what changed since the last [`Self::take_changes`], once [`Self::watch`] was called
     journal: Option<Box<Journal>>,
 }
 
@@ -211,7 +211,7 @@ impl TriMesh {
         self.star(a).iter().copied().filter(move |&f| self.corners(f).contains(&b))
     }
 
-    /// Moves one vertex; an index over the faces must be told ([`crate::mesh::FaceTree::refit`]).
+    /// Moves one vertex; an index over the faces must be refitted ([`crate::mesh::FaceTree::refit`]).
     #[inline]
     pub fn set_position(&mut self, vertex: VertexId, position: Point3<f64>) {
         debug_assert!(position.coords.iter().all(|x| x.is_finite()));
@@ -224,7 +224,7 @@ impl TriMesh {
         self.journal = Some(Box::new(Journal::new(self.vertex_slots(), self.face_slots())));
     }
 
-    /// Tells what changed since this was last asked, up to `most` vertices and as many faces, and adds it to `into`; returns
+    /// Lists what changed since the last call, up to `most` vertices and as many faces, and adds it to `into`; returns
     /// whether that was all. Nothing before [`Self::watch`].
     pub fn take_changes(&mut self, most: usize, into: &mut Changes) -> bool {
         self.journal.as_mut().is_none_or(|journal| journal.take(most, into))
@@ -331,7 +331,7 @@ impl TriMesh {
 
     /// Removes a face; its vertices stay. Returns whether there was such a face.
     ///
-    /// An index over the faces must be told before ([`crate::mesh::FaceTree::remove`]).
+    /// Remove it from an index over the faces before ([`crate::mesh::FaceTree::remove`]).
     pub fn remove_face(&mut self, face: FaceId) -> bool {
         if !self.has_face(face) {
             return false;

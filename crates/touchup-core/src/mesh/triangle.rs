@@ -2,8 +2,8 @@
 
 use nalgebra::{Point3, Vector3};
 
-/// Twice the area over the longest edge squared, itself squared, below which the foot inside a triangle is looked for by
-/// another way: the quotient of areas loses ε/0.01 of the edge there, and everything where there is no area.
+/// Twice the area over the longest edge squared, itself squared, below which the foot inside a triangle is found by
+/// another formula: the quotient of areas loses ε/0.01 of the edge there, and everything where there is no area.
 const THIN: f64 = 0.01;
 
 /// The point of triangle `abc` that is closest to `p`, with its barycentric coordinates.

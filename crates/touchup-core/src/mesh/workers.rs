@@ -1,9 +1,9 @@
-//! Work that falls into pieces: a pure room says what is to be done, its caller who does it.
+//! Work in independent pieces: pure code lists the pieces, its caller decides how they run.
 
 /// A piece of work.
 pub type Job<'a> = Box<dyn FnOnce() + Send + 'a>;
 
-/// Who does pieces of work that do not depend on each other. What comes of them is the same whoever does them, and in
+/// Runs pieces of work that do not depend on each other. Their results are the same however they are run, and in
 /// whatever order.
 pub trait Workers: Sync {
     /// How many pieces are done at the same time, about.
@@ -13,7 +13,7 @@ pub trait Workers: Sync {
     fn run(&self, jobs: Vec<Job<'_>>);
 }
 
-/// One piece after the other, by who asked.
+/// One piece after the other, in the calling thread.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Alone;
 

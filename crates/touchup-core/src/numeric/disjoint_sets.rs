@@ -1,4 +1,4 @@
-//! Which of some numbers belong together.
+//! Disjoint sets of numbers (union–find).
 
 /// Sets of the numbers below a limit, each number at first alone. The lowest number of a set is its root.
 #[derive(Clone, Debug)]
@@ -9,7 +9,7 @@ impl DisjointSets {
         Self((0..count as u32).collect())
     }
 
-    /// The number that names the set of another; halves the path on the way.
+    /// The number that names the set of another; halves the path as it goes.
     pub fn root(&mut self, mut number: u32) -> u32 {
         while self.0[number as usize] != number {
             let above = self.0[self.0[number as usize] as usize];

@@ -1,4 +1,4 @@
-//! Points found by place.
+//! A voxel grid of points, for queries by place.
 
 use std::collections::HashMap;
 
@@ -10,14 +10,14 @@ use super::voxel::{VoxelKey, voxel_neighbourhood, voxel_of};
 #[derive(Clone, Debug)]
 pub(crate) struct PointGrid {
     size: f64,
-    /// in the order in which they came
+    /// in order of insertion
     voxels: HashMap<VoxelKey, Vec<(u32, Point3<f64>)>>,
 }
 
 impl PointGrid {
     /// Without points.
     ///
-    /// - `size`: of a voxel, m, more than 0: the largest distance that will be asked for.
+    /// - `size`: of a voxel, m, more than 0: the largest distance of a query.
     pub fn new(size: f64) -> Self {
         Self { size: size.max(f64::MIN_POSITIVE), voxels: HashMap::new() }
     }

@@ -14,7 +14,7 @@ pub fn median(values: &mut [f64]) -> Option<f64> {
     order_statistic(values, 0.5)
 }
 
-/// The value at a share of the way through rising `values`, between two of them by proportion; 0 where there are none.
+/// The value at a share of the range of indices of rising `values`, between two of them by proportion; 0 where there are none.
 ///
 /// - `share`: from the first (0) to the last (1).
 pub fn quantile(rising: &[f64], share: f64) -> f64 {

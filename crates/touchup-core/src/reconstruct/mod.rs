@@ -1,9 +1,9 @@
-//! The surface meshed anew where it was touched, as one closed skin by construction.
+//! The surface remeshed where it was touched, as one closed skin by construction.
 //!
-//! [`TouchFinder`] makes touches of samples; [`ContactMap`] and `SweptSpace` keep what was touched and where the tip
-//! went. `Evidence` says what these and the scan know about a point; that is held at the nodes of a regular [`Lattice`] and
-//! completed where nothing is known. [`Patcher`] is the whole way: everything at once, or what changed since the last time, as
-//! a [`PatchDelta`] for a mesh that follows by [`Splice`].
+//! [`TouchFinder`] makes touches of samples; [`ContactMap`] and `FreeSpace` keep contacts and free space.
+//! `Evidence` combines these and the scan at a point; the field is stored at the nodes of a regular [`Lattice`] and
+//! filled harmonically where there is no evidence. [`Patcher`] runs the whole pipeline: everything at
+//! once, or what changed since the last time, as a [`PatchDelta`] for a mesh that follows by [`Splice`].
 //!
 //! In a set of the lattice's cells, the *region*, the surface is the zero set of that field f (f < 0 in the material),
 //! found by dual contouring that cannot intersect itself (after \[Ju Udeshi 2006\]); outside, the scan stays. On the

@@ -1,4 +1,4 @@
-//! A small map that keeps the order in which keys came, as long as none goes, so that walking it never depends on
+//! A small map that keeps the order of insertion, as long as no key is removed, so that walking it never depends on
 //! hashing.
 
 /// What a [`CellTable`] can look up.
@@ -56,7 +56,7 @@ impl<K: Key, V> CellTable<K, V> {
         self.entries.iter().map(|(key, value)| (*key, value))
     }
 
-    /// The `at`-th key that came, with its value.
+    /// The `at`-th key inserted, with its value.
     #[inline]
     pub fn entry(&self, at: u32) -> &(K, V) {
         &self.entries[at as usize]
@@ -79,7 +79,7 @@ impl<K: Key, V> CellTable<K, V> {
         at
     }
 
-    /// How many keys came before `key`.
+    /// Index of `key` in order of insertion.
     #[inline]
     pub(crate) fn index_of(&self, key: &K) -> Option<u32> {
         let entry = self.slots[self.slot(key)];
@@ -104,7 +104,7 @@ impl<K: Key, V> CellTable<K, V> {
         self.index_of(key).map(|at| &mut self.entries[at as usize].1)
     }
 
-    /// The value of the `at`-th key that came, to be changed.
+    /// The value of the `at`-th key inserted, to be changed.
     #[inline]
     pub(crate) fn value_mut(&mut self, at: u32) -> &mut V {
         &mut self.entries[at as usize].1
@@ -136,7 +136,7 @@ impl<K: Key, V> CellTable<K, V> {
         }
     }
 
-    /// Takes `key` out; the key that came last takes its number. Returns its value.
+    /// Removes `key`; the key inserted last takes its number. Returns its value.
     pub fn remove(&mut self, key: &K) -> Option<V> {
         let slot = self.slot(key);
         let at = self.slots[slot];

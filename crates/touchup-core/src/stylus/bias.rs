@@ -66,7 +66,7 @@ pub struct BiasTracker {
 }
 
 impl BiasTracker {
-    /// A tracker that knows of no bias.
+    /// A tracker without a bias yet.
     ///
     /// # Errors
     /// [`SettingError`] unless all settings are more than 0.
@@ -88,7 +88,7 @@ impl BiasTracker {
         if rest_t.norm() >= self.params.free {
             self.touch();
         } else {
-            // nobody knows what happened in a long pause
+            // what happened in a long pause is unknown
             let paused = since_last_ns > self.params.settle_ns;
             let since_ns = *self.free_since_ns.get_or_insert(tip.stamp_ns);
             if paused {

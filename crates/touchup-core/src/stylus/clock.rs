@@ -1,4 +1,4 @@
-//! How late the clock of the wrench reads, from the samples themselves.
+//! Clock offset: how late the clock of the wrench reads, from the samples themselves.
 //!
 //! A ball that comes down onto a surface is stopped at the instant at which the force leaves zero. Along the force, its
 //! centre p + F/k goes as c + v₋ min(t − t₀, 0) + v₊ max(t − t₀, 0), and the force rises as A (1 − e^(−(t − t₁)/T)). The
@@ -16,7 +16,7 @@ use crate::numeric::NormalEquations;
 /// Settings of a [`ClockEstimator`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ClockParams {
-    /// What stylus and probe give way under force, N/m; `None`: rigid.
+    /// Stiffness of stylus and probe, N/m; `None`: rigid.
     pub stiffness: Option<f64>,
 }
 
@@ -27,7 +27,7 @@ pub struct ClockOffset {
     pub offset: f64,
     /// standard uncertainty, s
     pub sigma: f64,
-    /// onsets of contact that it comes from
+    /// onsets of contact that it is estimated from
     pub onsets: usize,
 }
 
@@ -36,7 +36,7 @@ const BEFORE_NS: i64 = 25_000_000;
 const AFTER_NS: i64 = 15_000_000;
 /// The force's rise is fitted from this long before the gate opens, s …
 const RISE_BEFORE: f64 = 8e-3;
-/// … to this long after, s: later the hand changes its mind.
+/// … to this long after, s: later the hand changes its motion.
 const RISE_AFTER: f64 = 8e-3;
 /// Delays that are tried: ± [`REACH`] steps of [`STEP`] s.
 const REACH: usize = 48;
@@ -46,14 +46,14 @@ const DELAYS: usize = 2 * REACH + 1;
 const MOST_SAMPLES: usize = 256;
 /// With fewer there is no line to fit.
 const LEAST_SAMPLES: usize = 16;
-/// An onset at which the ball loses less speed than this tells nothing, m/s.
+/// An onset at which the ball loses less speed than this is not used, m/s.
 const LEAST_STOP: f64 = 15e-3;
 /// Onsets that are kept; later ones take the place of the first.
 const MOST_ONSETS: usize = 512;
-/// Fewer say nothing about how much they differ.
+/// Fewer do not determine their spread.
 const LEAST_ONSETS: usize = 8;
 /// A force that does not rise exponentially is taken to begin too early or too late by about this, s. Half a period of
-/// the wrench comes to it: nobody knows over which part of it a sensor takes its mean.
+/// the wrench is added: over which part of it a sensor takes its mean is unknown.
 const SHAPE: f64 = 0.3e-3;
 /// A wider uncertainty is no estimate, s.
 const LARGEST_SIGMA: f64 = 3e-3;
@@ -119,7 +119,7 @@ impl ClockEstimator {
         }
     }
 
-    /// The delay of all onsets so far; `None` when they do not tell it.
+    /// The delay of all onsets so far; `None` when they do not determine it.
     pub fn offset(&self) -> Option<ClockOffset> {
         if self.onsets.len() < LEAST_ONSETS {
             return None;
@@ -221,7 +221,7 @@ fn force_begins(samples: &[OnsetSample]) -> Option<f64> {
     best.map(|(_, begun)| begun)
 }
 
-/// What is left of the centre's way after a bent line is taken off, and the speeds before and after the bend.
+/// The residual of the centre's path after a bent line is subtracted, and the speeds before and after the bend.
 fn kink(samples: &[OnsetSample], begun: f64, delay: f64, bend: f64) -> Option<(f64, [f64; 2])> {
     let row = |x: &OnsetSample| {
         let t = x.t - (begun - delay);

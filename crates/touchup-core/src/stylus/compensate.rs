@@ -1,6 +1,6 @@
-//! What the object does to the tip, from what the sensor feels.
+//! The contact wrench on the tip, from the measured wrench.
 //!
-//! A sensor feels the contact, the weight of all that hangs on it, and its own bias:
+//! A sensor measures the contact, the weight of its payload, and its own bias:
 //!
 //! f_S = R_OSᵀ · (F + m g) + b_S,   τ_S likewise, about So
 //!
@@ -23,7 +23,7 @@ pub enum WrenchFrame {
 }
 
 parameters! {
-    /// What hangs on the sensor beyond its measuring plane.
+    /// The payload beyond the measuring plane of the sensor.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Payload in "compensation.payload" {
         /// Its mass.
@@ -55,7 +55,7 @@ parameters! {
 }
 
 parameters! {
-    /// What the sensor reads when nothing touches and nothing hangs on it, expressed in S.
+    /// What the sensor reads without contact and payload, expressed in S.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct SensorBias in "compensation.bias" {
         /// The force, in the axes of the sensor.
@@ -70,7 +70,7 @@ parameters! {
 }
 
 impl Payload {
-    /// Weight of the payload as the sensor feels it, in the axes of O.
+    /// Weight of the payload as the sensor measures it, in the axes of O.
     ///
     /// f = m g,   τ = (R_OS · p_SC) × f
     ///
@@ -82,16 +82,16 @@ impl Payload {
     }
 }
 
-/// How the sensor is mounted and what it carries. The default is a sensor in the tip's axes that carries nothing.
+/// How the sensor is mounted and what it carries. The default is a sensor in the tip's axes without payload.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CompensatorParams {
     /// In which axes the wrench arrives.
     pub wrench_frame: WrenchFrame,
     /// Pose of S in T: orientation of the sensor, and its origin from the centre of the ball, m.
     pub pose_ts: Isometry3<f64>,
-    /// What hangs on the sensor; `None` when the driver takes it off already.
+    /// The payload of the sensor; `None` when the driver subtracts it already.
     pub payload: Option<Payload>,
-    /// What the sensor reads when nothing touches and nothing hangs on it, expressed in S.
+    /// What the sensor reads without contact and payload, expressed in S.
     pub bias_s: Option<Wrench>,
 }
 
@@ -136,18 +136,18 @@ impl Compensator {
         let CompensatorParams { wrench_frame, pose_ts, payload, bias_s } = &self.params;
         let r_ot = &sample.pose_ot.rotation;
         let r_os = r_ot * pose_ts.rotation;
-        let mut felt = match wrench_frame {
+        let mut measured = match wrench_frame {
             WrenchFrame::Sensor => turned(&r_os, &sample.wrench),
             WrenchFrame::Object => sample.wrench,
         };
         for part in [bias_s.map(|bias| turned(&r_os, &bias)), payload.map(|p| p.weight_o(&r_os))].into_iter().flatten()
         {
-            felt.force -= part.force;
-            felt.torque -= part.torque;
+            measured.force -= part.force;
+            measured.torque -= part.torque;
         }
         let p_ts_o = r_ot * pose_ts.translation.vector;
-        let torque_o = felt.torque + p_ts_o.cross(&felt.force);
-        Tip { stamp_ns: sample.stamp_ns, pose_ot: sample.pose_ot, force_o: felt.force, torque_o }
+        let torque_o = measured.torque + p_ts_o.cross(&measured.force);
+        Tip { stamp_ns: sample.stamp_ns, pose_ot: sample.pose_ot, force_o: measured.force, torque_o }
     }
 }
 

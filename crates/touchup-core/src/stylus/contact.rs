@@ -1,4 +1,4 @@
-//! Is the stylus in contact? A gate on the measured force, with hysteresis.
+//! Contact detection: a gate on the measured force, with hysteresis.
 
 use nalgebra::Vector3;
 

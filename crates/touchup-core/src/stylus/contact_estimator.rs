@@ -1,4 +1,4 @@
-//! What one sample says about the contact, decided once for all who use it.
+//! The state of the contact at one sample, decided once for all its users.
 //!
 //! [`ContactEstimator::observe`] turns a raw [`Sample`] into a [`ContactSample`]: weight, lever arm and bias off the wrench, the real
 //! centre of the ball, in contact or not and since when, and the normal of the surface within the friction cone. The haptic update, the
@@ -13,8 +13,8 @@
 use nalgebra::{Point3, Vector3};
 
 use super::{
-    Ball, BiasParams, BiasTracker, Compensator, CompensatorParams, Contact, ContactGate, ContactGateParams, FeltNormal,
-    FrictionCoefficient, Sample, SampleError, SettingError, SlidingParams, Tip, TipMotion, TipParams,
+    Ball, BiasParams, BiasTracker, Compensator, CompensatorParams, Contact, ContactGate, ContactGateParams,
+    FrictionCoefficient, NormalEstimate, Sample, SampleError, SettingError, SlidingParams, Tip, TipMotion, TipParams,
 };
 
 /// A sample acts for no longer than this, s: what happens in a longer pause is unknown.
@@ -66,7 +66,7 @@ pub struct ContactSample {
     pub dt: f64,
     /// bias of the force as tracked so far, in the axes of T, N
     pub bias_t: Vector3<f64>,
-    /// real centre of the ball, m, in O: the reported one and what the tip gives way
+    /// real centre of the ball, m, in O: the reported one and the deflection of the stylus
     pub centre: Point3<f64>,
     /// by the unsmoothed force; `None` in free motion
     pub contact: Option<Contact>,
@@ -75,7 +75,7 @@ pub struct ContactSample {
     /// … and its contact, by the force smoothed alike; `None` in free motion
     pub ball_contact: Option<Contact>,
     /// the surface under [`Self::ball`], within the friction cone; `None` without [`Self::ball_contact`] or force
-    pub surface: Option<FeltNormal>,
+    pub surface: Option<NormalEstimate>,
 }
 
 impl ContactSample {
@@ -119,7 +119,7 @@ pub struct ContactEstimator {
 }
 
 impl ContactEstimator {
-    /// An estimator that has seen nothing yet.
+    /// An estimator without samples yet.
     ///
     /// # Errors
     /// [`SettingError`] naming the first setting outside its range.
@@ -157,7 +157,7 @@ impl ContactEstimator {
         };
         let ball = match self.params.sliding {
             Some(_) => self.motion.update(&tip, dt, LONGEST_HOLD),
-            None => self.motion.still(&tip),
+            None => self.motion.unfiltered(&tip),
         };
         let always = Contact { onset_ns: *self.first_ns.get_or_insert(tip.stamp_ns) };
         let decide = |gate: &mut Option<ContactGate>, force_o: &Vector3<f64>| match gate {
@@ -168,7 +168,7 @@ impl ContactEstimator {
         let ball_contact = decide(&mut self.ball_gate, &ball.force_o);
         let surface = match (ball_contact, self.params.sliding) {
             (Some(_), Some(_)) => self.motion.surface_normal(&ball, dt.min(LONGEST_HOLD)),
-            (Some(_), None) => FeltNormal::of_force(&ball.force_o),
+            (Some(_), None) => NormalEstimate::of_force(&ball.force_o),
             (None, _) => {
                 self.motion.lift();
                 None

@@ -1,21 +1,21 @@
-//! Which way the touched surface faces, when friction tilts the force.
+//! The normal of the touched surface, when friction tilts the force.
 //!
-//! A sliding ball feels F = N (n − μ t), t the direction of sliding: F lies at φ = atan μ from the normal n, in the plane
-//! of the two, behind. That angle is known in two ways. From this instant alone: t is at right angles to n, so that
-//! sin φ = −F̂·t; this needs no μ, but an error of t out of the surface is one of n, degree for degree. And from all that
-//! was felt before: over a stretch of sliding, ∫ −F·dx / ∫ |F| |dx|, the share of the force that did work, is sin φ, and
-//! the noise of the positions hardly enters it. With φ known, t only has to say which way *along* the surface, and its
-//! error enters by the factor φ. [`Friction::normal`] weighs the two by their variances.
+//! The contact force of a sliding ball is F = N (n − μ t), t the direction of sliding: F lies at φ = atan μ from the
+//! normal n, in the plane of the two, behind. Two methods measure that angle. From this instant alone: t is at right
+//! angles to n, so that sin φ = −F̂·t; this needs no μ, but an error of t out of the surface is one of n, degree for
+//! degree. And from all earlier samples: over a stretch of sliding, ∫ −F·dx / ∫ |F| |dx|, the share of the force that did
+//! work, is sin φ, and the noise of the positions hardly enters it. With φ known, t only has to give the direction *along* the surface, and its
+//! error enters by the factor φ. [`Friction::normal`] weights the two by their variances.
 //!
 //! Slower than the noise of the velocity, t is not known either; the force is then all there is, within the cone.
 
 use nalgebra::Vector3;
 
-/// Cosine of the widest friction cone believed by default: cos 24° (μ = 0.45, dry metal on metal). The normal of a surface is nowhere
+/// Cosine of the widest friction cone accepted by default: cos 24° (μ = 0.45, dry metal on metal). The normal of a surface is nowhere
 /// farther from the force, neither for the haptic update nor for the evidence of the reconstruction.
 pub const WIDEST_CONE_COSINE: f64 = 0.9135;
 
-/// What the ball does and feels at one instant, averaged over a short time.
+/// Velocity and contact force of the ball at one instant, averaged over a short time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sliding {
     /// force of the object on the stylus, N, in O
@@ -26,17 +26,17 @@ pub struct Sliding {
     pub velocity_sigma: f64,
 }
 
-/// The normal of a surface as it was felt.
+/// The measured normal of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FeltNormal {
+pub struct NormalEstimate {
     /// outward unit normal, in O
     pub normal: Vector3<f64>,
     /// standard deviation of its direction, rad
     pub sigma: f64,
 }
 
-impl FeltNormal {
-    /// The force itself, where friction is not asked for; `None` without one.
+impl NormalEstimate {
+    /// The force itself, where friction is not estimated; `None` without one.
     ///
     /// - `force_o`: force of the object on the stylus, N, in O.
     pub(crate) fn of_force(force_o: &Vector3<f64>) -> Option<Self> {
@@ -77,8 +77,8 @@ pub struct FrictionCoefficient {
 /// assert!((friction.coefficient().ok_or("nothing slid")?.mu - 0.2).abs() < 5e-3);
 /// // an error of the velocity out of the surface hardly tilts the normal any more
 /// let lifted = Sliding { velocity: Vector3::new(25e-3, 0.0, 5e-3), velocity_sigma: 5e-3, ..slide };
-/// let felt = friction.normal(&lifted).ok_or("no force")?;
-/// assert!(felt.normal.angle(&Vector3::z()).to_degrees() < 1.5);
+/// let estimate = friction.normal(&lifted).ok_or("no force")?;
+/// assert!(estimate.normal.angle(&Vector3::z()).to_degrees() < 1.5);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
@@ -86,7 +86,7 @@ pub struct Friction {
     /// rad
     widest: f64,
     stretch: SlidingStretch,
-    /// all of the way until enough is known
+    /// the whole path until enough is known
     early: SlidingStretch,
     /// how many stretches had a coefficient within each bin
     bins: [u32; BINS],
@@ -122,25 +122,25 @@ const BINS: usize = 1000;
 const STRETCH: f64 = 5e-3;
 /// So many make a coefficient.
 const FEWEST: u32 = 4;
-/// Before that all of the way so far tells φ by this standard deviation, rad: place and direction change friction …
+/// Before that the path so far determines φ with this standard deviation, rad: place and direction change friction …
 const EARLY_SIGMA: f64 = 0.03;
-/// … and the ends of the way are off by this, m: 0.2 mm of pose noise after smoothing.
-const EARLY_WAY: f64 = 0.1e-3;
+/// … and the ends of the path are off by this, m: 0.2 mm of pose noise after smoothing.
+const EARLY_PATH: f64 = 0.1e-3;
 /// Slower than this the ball creeps, and friction is undecided, m/s …
 const CREEP: f64 = 1e-3;
-/// … and slower than so many times the noise of the velocity it may as well rest.
+/// … and slower than so many times the noise of the velocity it may be at rest.
 const CLEAR: f64 = 3.0;
 /// φ before anything is known, and its standard deviation, rad: μ from 0.05 to 0.3.
 const USUAL_ANGLE: [f64; 2] = [0.17, 0.12];
 /// Friction and force are never known better than this, rad: bias and noise of a usual force sensor, 0.05 N of 2.5 N.
 const LEAST_SIGMA: f64 = 0.015;
-/// The two ways to know φ contradict each other when they differ by more standard deviations than this.
+/// The two methods for φ contradict each other when they differ by more standard deviations than this.
 const CONTRADICTION: f64 = 3.0;
 
 impl Friction {
-    /// Nothing felt yet.
+    /// Without samples yet.
     ///
-    /// - `widest`: angle of the widest friction cone believed, rad.
+    /// - `widest`: angle of the widest friction cone accepted, rad.
     pub fn new(widest: f64) -> Self {
         let (stretch, early) = (SlidingStretch::default(), SlidingStretch::default());
         Self { widest, stretch, early, bins: [0; BINS], known: None, angle: USUAL_ANGLE }
@@ -149,7 +149,7 @@ impl Friction {
     /// Takes in what the ball did in contact during `dt` (s).
     pub fn observe(&mut self, sliding: &Sliding, dt: f64) {
         let Sliding { force_o, velocity, velocity_sigma } = sliding;
-        // two of the three components are along the surface, where noise makes the way longer
+        // two of the three components are along the surface, where noise makes the path longer
         let speed = (velocity.norm_squared() - 2.0 * velocity_sigma * velocity_sigma).max(0.0).sqrt();
         if speed < CREEP.max(CLEAR * velocity_sigma) {
             return;
@@ -169,7 +169,7 @@ impl Friction {
         }
     }
 
-    /// The ball has left the surface: what comes next is another stretch.
+    /// The ball has left the surface: the next contact begins another stretch.
     pub fn lift(&mut self) {
         self.stretch = SlidingStretch::default();
     }
@@ -180,33 +180,33 @@ impl Friction {
     }
 
     /// The normal under the ball; `None` without a force.
-    pub fn normal(&self, sliding: &Sliding) -> Option<FeltNormal> {
+    pub fn normal(&self, sliding: &Sliding) -> Option<NormalEstimate> {
         let along_force = sliding.force_o.try_normalize(0.0)?;
         let [usual, usual_sigma] = self.angle;
         let (speed, noise) = (sliding.velocity.norm(), sliding.velocity_sigma);
         let across_force = sliding.velocity - along_force * sliding.velocity.dot(&along_force);
         let across_speed = across_force.norm();
         if across_speed <= 0.0 {
-            return Some(FeltNormal { normal: along_force, sigma: usual.hypot(usual_sigma) });
+            return Some(NormalEstimate { normal: along_force, sigma: usual.hypot(usual_sigma) });
         }
         // error of the direction of sliding, rad
         let astray = (noise / speed).min(1.0).hypot(LEAST_SIGMA);
-        let seen = (-sliding.velocity.dot(&along_force) / speed).clamp(-1.0, 1.0).asin();
-        let contradiction = (seen - usual).powi(2);
+        let measured = (-sliding.velocity.dot(&along_force) / speed).clamp(-1.0, 1.0).asin();
+        let contradiction = (measured - usual).powi(2);
         let bound = CONTRADICTION * CONTRADICTION * (astray * astray + usual_sigma * usual_sigma);
-        let [seen_weight, usual_weight] = [astray.powi(-2), usual_sigma.powi(-2)];
-        let mut variance = 1.0 / (seen_weight + usual_weight);
-        let angle = ((seen * seen_weight + usual * usual_weight) * variance).clamp(0.0, self.widest);
+        let [measured_weight, usual_weight] = [astray.powi(-2), usual_sigma.powi(-2)];
+        let mut variance = 1.0 / (measured_weight + usual_weight);
+        let angle = ((measured * measured_weight + usual * usual_weight) * variance).clamp(0.0, self.widest);
         if contradiction > bound {
             // another friction, two surfaces at once, or no sliding at all
             variance += contradiction;
         }
-        // how far the direction along the surface can be told from noise
+        // how far the direction along the surface can be distinguished from noise
         let squared = across_speed * across_speed;
         let clear = squared / (squared + 2.0 * noise * noise + CREEP * CREEP);
         variance += angle * angle * (astray * astray + 1.0 - clear * clear).min(1.0);
         let normal = (along_force + across_force * (angle.tan() * clear / across_speed)).normalize();
-        Some(FeltNormal { normal, sigma: variance.sqrt() })
+        Some(NormalEstimate { normal, sigma: variance.sqrt() })
     }
 
     /// Counts a stretch of this sin φ.
@@ -231,10 +231,10 @@ impl Friction {
     fn guess(&mut self) {
         let SlidingStretch { length, work, most_work } = self.early;
         let sine = (work / most_work.max(f64::MIN_POSITIVE)).clamp(0.0, std::f64::consts::FRAC_1_SQRT_2);
-        let ([usual, usual_sigma], felt_sigma) = (USUAL_ANGLE, EARLY_SIGMA.hypot(EARLY_WAY / length));
-        let [felt, before] = [felt_sigma, usual_sigma].map(|sigma| sigma.powi(-2));
-        let mean = (sine.asin() * felt + usual * before) / (felt + before);
-        self.angle = [mean, (felt + before).powf(-0.5).hypot(EARLY_SIGMA)];
+        let ([usual, usual_sigma], measured_sigma) = (USUAL_ANGLE, EARLY_SIGMA.hypot(EARLY_PATH / length));
+        let [measured, before] = [measured_sigma, usual_sigma].map(|sigma| sigma.powi(-2));
+        let mean = (sine.asin() * measured + usual * before) / (measured + before);
+        self.angle = [mean, (measured + before).powf(-0.5).hypot(EARLY_SIGMA)];
     }
 
     /// The coefficient below which `rank` stretches lie, interpolated within its bin.

@@ -1,4 +1,4 @@
-//! Where the ball is and how fast, from the positions around one instant.
+//! Position and velocity of the ball, from the positions around one instant.
 //!
 //! A parabola in time through the positions of a window, by least squares: unlike a mean it does not cut corners. Its
 //! window is as long as the path looks like a parabola, give or take the noise of the positions.

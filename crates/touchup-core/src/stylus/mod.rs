@@ -2,7 +2,7 @@
 //!
 //! [`MarkerFilter`] makes the pose of the markers on the stylus, [`Placement`] brings it to the ball and into the frame of
 //! the scan, [`Synchroniser`] brings the two streams to one instant,
-//! [`ContactEstimator`] makes of each sample, once for all who use it, one [`ContactSample`]: [`Compensator`] takes weight and bias off and
+//! [`ContactEstimator`] makes of each sample, once for all its users, one [`ContactSample`]: [`Compensator`] takes weight and bias off and
 //! turns the force into the frame of the object, [`BiasTracker`] follows what drifts, [`ContactGate`] decides whether the stylus touches,
 //! [`TipMotion`] and [`Friction`] how the ball slides and how the surface under it is oriented. [`TipBody`] finds the point of the tip that
 //! touches, [`LocalMotion`] the motion around one instant.
@@ -30,10 +30,11 @@ pub(crate) use contact::STROKE_PAUSE_NS;
 pub use contact::{Contact, ContactGate, ContactGateParams};
 pub(crate) use contact_estimator::LONGEST_HOLD;
 pub use contact_estimator::{ContactEstimator, ContactEstimatorParams, ContactSample};
-pub use friction::{FeltNormal, Friction, FrictionCoefficient, Sliding, WIDEST_CONE_COSINE};
+pub use friction::{Friction, FrictionCoefficient, NormalEstimate, Sliding, WIDEST_CONE_COSINE};
 pub use local_motion::{LocalMotion, SmoothedMotion};
 pub use markers::{
-    MOST_MARKERS, MarkerBody, MarkerCounts, MarkerFilter, MarkerFrame, MarkerParams, SeenMarker, SpringParams, Tracking,
+    MOST_MARKERS, MarkerBody, MarkerCounts, MarkerFilter, MarkerFrame, MarkerObservation, MarkerParams, SpringParams,
+    Tracking,
 };
 pub use placement::Placement;
 pub use probed::ProbedPoint;
@@ -78,7 +79,7 @@ pub enum SampleError {
         what: &'static str,
         /// its length, in `unit`
         magnitude: f64,
-        /// the largest believed, in `unit`
+        /// the largest accepted, in `unit`
         limit: f64,
         /// "m", "N" or "N·m"
         unit: &'static str,
@@ -180,7 +181,7 @@ impl StampedWrench {
 pub enum Message {
     /// Where the tip is.
     Pose(StampedPose),
-    /// What it feels.
+    /// The measured wrench.
     Wrench(StampedWrench),
 }
 

@@ -1,4 +1,4 @@
-//! Where the recorded poses belong: from the tracked stylus to the ball, and from space to the scan.
+//! Frames of the recorded poses: from the tracked stylus to the ball, and from space to the scan.
 //!
 //! A tracker gives the pose of its own point H on the stylus, in its own frame W. The centre of the ball is d from H,
 //! in the axes of H, and the scan lies at `pose_wo`: pose_OT = pose_WO⁻¹ · pose_WH · d. A wrench in the stylus' own

@@ -1,11 +1,10 @@
-//! What is kept of each touch, so that whatever is measured later can be followed back to it.
+//! The record of each touch, so that every later measurement can be traced back to it.
 
 use nalgebra::{Point3, Vector3};
 
 /// One touch of the part.
 ///
-/// A surface that it is of lies at `radius` from `centre`, whatever the normal that was felt; `point` and `normal` say which
-/// surface that is.
+/// Its surface lies at `radius` from `centre`, whatever the measured normal; `point` and `normal` identify that surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProbedPoint {
     /// stamp of the sample, ns
@@ -18,14 +17,14 @@ pub struct ProbedPoint {
     pub radius: f64,
     /// point of the surface, m, in O
     pub point: Point3<f64>,
-    /// outward unit normal of the surface there as it was felt, in O
+    /// measured outward unit normal of the surface there, in O
     pub normal: Vector3<f64>,
-    /// standard deviation of the centre along the normal by what averages out, m; 0 where that was not asked for
+    /// standard deviation of the centre along the normal by what averages out, m; 0 where that is not estimated
     pub sigma: f64,
     /// … by what the calibration leaves, the same in each touch, m
     pub calibration: f64,
     /// what it counts beside others, at most 1
     pub weight: f64,
-    /// it contradicts what was felt there before: an outlier, a slip
+    /// it contradicts earlier contacts there: an outlier, a slip
     pub is_rejected: bool,
 }

@@ -10,7 +10,7 @@ pub(super) struct Stream<T> {
     pub held: VecDeque<T>,
     newest: Option<i64>,
     /// a stamp up to here is late
-    pub settled: i64,
+    pub watermark: i64,
     /// leaps ahead; waits for the next message to agree
     suspect: Option<T>,
     /// how far a message may lag behind the newest, and one more, ns; 0: none may
@@ -25,7 +25,7 @@ impl<T: Stamped + Copy> Stream<T> {
         Self {
             held: VecDeque::with_capacity(capacity),
             newest: None,
-            settled: i64::MIN,
+            watermark: i64::MIN,
             suspect: None,
             wait_ns,
             overflown: false,
@@ -52,7 +52,7 @@ impl<T: Stamped + Copy> Stream<T> {
         }
     }
 
-    /// A message that nothing contradicted is kept.
+    /// A message that no other contradicted is kept.
     pub fn finish(&mut self, params: &SyncParams) {
         match self.suspect.take() {
             Some(only) if self.newest.is_none() => drop(self.insert(only, params)),
@@ -62,7 +62,7 @@ impl<T: Stamped + Copy> Stream<T> {
 
     fn insert(&mut self, message: T, params: &SyncParams) -> bool {
         let stamp = message.stamp_ns();
-        if stamp <= self.settled {
+        if stamp <= self.watermark {
             match self.wait_ns {
                 0 if self.newest == Some(stamp) => self.counts.duplicate += 1,
                 _ => self.counts.late += 1,
@@ -77,7 +77,7 @@ impl<T: Stamped + Copy> Stream<T> {
         self.held.insert(at, message);
         let newest = self.newest.map_or(stamp, |newest| newest.max(stamp));
         self.newest = Some(newest);
-        self.settled = self.settled.max(newest.saturating_sub(self.wait_ns));
+        self.watermark = self.watermark.max(newest.saturating_sub(self.wait_ns));
         if self.held.len() == params.capacity {
             self.pop();
             self.overflown = true;
@@ -95,7 +95,7 @@ impl<T: Stamped + Copy> Stream<T> {
 
     pub fn pop(&mut self) {
         if let Some(gone) = self.held.pop_front() {
-            self.settled = self.settled.max(gone.stamp_ns());
+            self.watermark = self.watermark.max(gone.stamp_ns());
         }
     }
 }

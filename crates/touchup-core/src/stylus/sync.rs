@@ -92,12 +92,12 @@ impl Synchroniser {
     pub fn next_sample(&mut self) -> Option<Sample> {
         loop {
             let wrench = *self.wrenches.held.front()?;
-            if wrench.stamp_ns > self.settled(&self.wrenches) {
+            if wrench.stamp_ns > self.watermark(&self.wrenches) {
                 return None;
             }
-            let settled = self.settled(&self.poses);
-            self.poses.forget_before(wrench.stamp_ns.min(settled));
-            let pose = self.pose_at(wrench.stamp_ns, settled)?;
+            let watermark = self.watermark(&self.poses);
+            self.poses.forget_before(wrench.stamp_ns.min(watermark));
+            let pose = self.pose_at(wrench.stamp_ns, watermark)?;
             self.wrenches.pop();
             match pose {
                 Ok(pose_ot) => return Some(Sample { stamp_ns: wrench.stamp_ns, pose_ot, wrench: wrench.wrench }),
@@ -117,12 +117,12 @@ impl Synchroniser {
     }
 
     /// Up to this stamp nothing of `stream` can arrive any more.
-    fn settled<T>(&self, stream: &Stream<T>) -> i64 {
-        if self.finished { i64::MAX } else { stream.settled }
+    fn watermark<T>(&self, stream: &Stream<T>) -> i64 {
+        if self.finished { i64::MAX } else { stream.watermark }
     }
 
     /// The pose at `stamp_ns`, or the counter to raise when there is none; `None` while that is still open.
-    fn pose_at(&self, stamp_ns: i64, settled: i64) -> Option<Result<Isometry3<f64>, Counter>> {
+    fn pose_at(&self, stamp_ns: i64, watermark: i64) -> Option<Result<Isometry3<f64>, Counter>> {
         let mut held = self.poses.held.iter();
         let missing: Counter =
             if self.poses.overflown { |counts| &mut counts.overflow } else { |counts| &mut counts.no_pose_before };
@@ -131,10 +131,10 @@ impl Synchroniser {
             return Some(Ok(before.pose_ot));
         }
         if before.stamp_ns > stamp_ns {
-            return (stamp_ns <= settled).then_some(Err(missing));
+            return (stamp_ns <= watermark).then_some(Err(missing));
         }
         let Some(after) = held.next() else { return self.finished.then_some(Err(|counts| &mut counts.no_pose_after)) };
-        if after.stamp_ns > settled {
+        if after.stamp_ns > watermark {
             return None;
         }
         let gap = after.stamp_ns.abs_diff(before.stamp_ns);
@@ -165,7 +165,7 @@ impl SyncCounts {
     }
 }
 
-/// Between two poses: straight for the position, at constant angular velocity the shorter way for the orientation.
+/// Between two poses: straight for the position, at constant angular velocity along the shorter arc for the orientation.
 pub(super) fn interpolated(before: &Isometry3<f64>, after: &Isometry3<f64>, t: f64) -> Isometry3<f64> {
     let position = before.translation.vector.lerp(&after.translation.vector, t);
     // the power of the relative rotation keeps its digits at angles where a slerp by sines loses them

@@ -1,4 +1,4 @@
-//! How streams are brought together, and what becomes of messages that make no sample.
+//! Settings of the synchronisation of streams, and counts of messages that make no sample.
 
 use serde::Serialize;
 

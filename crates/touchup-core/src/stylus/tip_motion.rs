@@ -1,9 +1,9 @@
-//! Where the ball is, in which direction it slides, and how the surface under it is oriented, from the past alone.
+//! Centre of the ball, direction of sliding and normal of the surface under it, from the past alone.
 
 use nalgebra::{Point3, Vector3};
 
 use super::friction::WIDEST_CONE_COSINE;
-use super::{FeltNormal, Friction, FrictionCoefficient, Sliding, Tip};
+use super::{Friction, FrictionCoefficient, NormalEstimate, Sliding, Tip};
 use crate::parameters;
 
 parameters! {
@@ -42,7 +42,7 @@ parameters! {
         /// In s. With 0.2 mm of pose noise and μ = 0.4 half of the normals are then within 3° (12 ms: 4°), while that of a hand that
         /// turns by 5 rad/s lags 6° behind, along the surface.
         velocity_smoothing: f64 = 20.0, "velocity_smoothing_ms" [MS, 0, 10000];
-        /// Uncertainty of the velocity: slower than this the sliding direction says little about the normal.
+        /// Uncertainty of the velocity: slower than this the sliding direction hardly determines the normal.
         ///
         /// In m/s: 2.5 times the noise of the velocity for 0.2 mm of pose noise.
         slowest: f64 = 8.0, "slowest_mm_per_s" [MM_PER_S, 0, 1e6];
@@ -58,7 +58,7 @@ parameters! {
 pub struct Ball {
     /// Reported centre of the ball (that of a rigid stylus), smoothed, m, in O.
     pub reported: Point3<f64>,
-    /// Where it really is: the reported centre and what the tip gives way, m, in O.
+    /// Where it really is: the reported centre and the deflection of the stylus, m, in O.
     pub centre: Point3<f64>,
     /// Force of the object on the stylus, smoothed alike, N, in O.
     pub force_o: Vector3<f64>,
@@ -79,20 +79,20 @@ pub struct TipMotion {
     touched_for: f64,
 }
 
-/// The filters still hold what was before a contact for so many of their time constants.
-const SETTLED: f64 = 4.0;
+/// Transient of the filters after the onset of a contact, in time constants.
+const TRANSIENT: f64 = 4.0;
 
 /// Noise of the velocity, as a share of [`SlidingParams::slowest`].
 const VELOCITY_NOISE: f64 = 0.4;
 
 impl TipMotion {
-    /// A motion that has seen nothing yet.
+    /// A filter without samples yet.
     pub fn new(params: SlidingParams, tip: TipParams) -> Self {
         let friction = Friction::new(params.cone_cosine.clamp(-1.0, 1.0).acos());
         Self { params, tip, last: None, friction, touched_for: 0.0 }
     }
 
-    /// Takes the next tip, `dt` (s) after the one before; a longer pause than `largest_gap` (s) starts anew.
+    /// Takes the next tip, `dt` (s) after the one before; a longer pause than `largest_gap` (s) restarts the filter.
     pub fn update(&mut self, tip: &Tip, dt: f64, largest_gap: f64) -> Ball {
         let (here, force) = (Point3::from(tip.pose_ot.translation.vector), tip.force_o);
         let ball = match self.last {
@@ -107,14 +107,14 @@ impl TipMotion {
                 let force_with_velocity = last.force_with_velocity + (force_o - last.force_with_velocity) * slow_gain;
                 Ball { reported, centre, force_o, force_with_velocity, velocity }
             }
-            _ => self.still(tip),
+            _ => self.unfiltered(tip),
         };
         self.last = Some(ball);
         ball
     }
 
-    /// The ball of a tip by itself, where nobody asks how it slides: nothing is smoothed and nothing kept.
-    pub fn still(&self, tip: &Tip) -> Ball {
+    /// The ball of a tip by itself, where its velocity is not needed: nothing is smoothed and nothing kept.
+    pub fn unfiltered(&self, tip: &Tip) -> Ball {
         let (here, force_o) = (Point3::from(tip.pose_ot.translation.vector), tip.force_o);
         Ball {
             reported: here,
@@ -126,11 +126,11 @@ impl TipMotion {
     }
 
     /// Outward normal of the surface under the ball, which has been in contact for the last `dt` (s); `None` without a force.
-    pub fn surface_normal(&mut self, ball: &Ball, dt: f64) -> Option<FeltNormal> {
+    pub fn surface_normal(&mut self, ball: &Ball, dt: f64) -> Option<NormalEstimate> {
         let velocity_sigma = VELOCITY_NOISE * self.params.slowest;
         let sliding = Sliding { force_o: ball.force_o, velocity: ball.velocity, velocity_sigma };
         self.touched_for += dt;
-        if self.touched_for > SETTLED * (self.params.smoothing + self.params.velocity_smoothing) {
+        if self.touched_for > TRANSIENT * (self.params.smoothing + self.params.velocity_smoothing) {
             self.friction.observe(&Sliding { force_o: ball.force_with_velocity, ..sliding }, dt);
         }
         self.friction.normal(&sliding)
@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pause_starts_the_filter_anew() {
+    fn a_pause_restarts_the_filter() {
         let mut motion = TipMotion::new(SlidingParams::default(), RIGID);
         motion.update(&tip(0.0), 0.0, 0.03);
         let ball = motion.update(&tip(0.01), 0.5, 0.03);

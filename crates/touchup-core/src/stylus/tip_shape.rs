@@ -90,7 +90,7 @@ pub struct TipBody {
     flank: [f64; 2],
 }
 
-/// What a sharp tip can show is limited by how close a hand leads it past itself, m.
+/// The resolution of a sharp tip is limited by how closely spaced a hand moves its strokes, m.
 const HAND: f64 = 1e-3;
 /// A face or a line of the tip may touch as a whole when the normal is within so many standard deviations of it …
 const FLUSH_SIGMAS: f64 = 1.5;
@@ -150,7 +150,7 @@ impl TipBody {
         self.shape == TipShape::Ball
     }
 
-    /// The size of what it can show, m: its radius, but for a cone with a sharp nose no less than a hand can lead it.
+    /// Its resolution, m: its radius, but for a cone with a sharp nose no less than the spacing of strokes by hand.
     pub fn scale(&self) -> f64 {
         match self.shape {
             TipShape::Cone { .. } => self.radius.max(HAND),
@@ -172,11 +172,11 @@ impl TipBody {
     /// Signed distance of `x` (m, in O) from the tip, m: negative inside.
     #[inline]
     pub fn signed_distance(&self, place: &TipPlace, x: &Point3<f64>) -> f64 {
-        if self.is_ball() { (x - place.centre).norm() - self.round } else { self.way_out(place, x).0 }
+        if self.is_ball() { (x - place.centre).norm() - self.round } else { self.shortest_exit(place, x).0 }
     }
 
     /// Signed distance of `x` (m, in O), and the direction in which it grows, unit, in O; zero where there is none.
-    pub(crate) fn way_out(&self, place: &TipPlace, x: &Point3<f64>) -> (f64, Vector3<f64>) {
+    pub(crate) fn shortest_exit(&self, place: &TipPlace, x: &Point3<f64>) -> (f64, Vector3<f64>) {
         let arm = x - place.centre;
         let height = arm.dot(&place.axis);
         let across = arm - place.axis * height;
@@ -215,7 +215,7 @@ impl TipBody {
     ///
     /// A flat end touches with its whole face where its axis may be the normal, else with the point of its rim; the side
     /// of a cylinder may lie on a wall or lean on an edge. `None` where the flank of a cone or what is behind it touches:
-    /// where along it, the force does not say.
+    /// the force does not determine where along it.
     pub fn touched(&self, place: &TipPlace, normal: &Vector3<f64>, sigma: f64) -> Option<TipContact> {
         let sharp = |point| Some(TipContact { point, normal: *normal, is_vague: false });
         if self.is_ball() {
@@ -243,7 +243,7 @@ impl TipBody {
             return (vec![0.0], self.round);
         }
         let length = self.high[1] - self.low[1];
-        // finer than the tip is wide brings nothing, coarser covers what is beside it
+        // finer than the width of the tip gains nothing, coarser covers what is beside it
         let widest = self.low[0].max(self.high[0]);
         let count = (length / (widest + self.round)).ceil().clamp(1.0, 64.0);
         let half = 0.5 * length / count;
@@ -321,7 +321,7 @@ mod tests {
                 let place = place(axis);
                 for (j, direction) in directions().into_iter().enumerate() {
                     let x = place.centre + direction * (((7 * i + j) % 13) as f64 * 0.4e-3);
-                    let (distance, out) = body.way_out(&place, &x);
+                    let (distance, out) = body.shortest_exit(&place, &x);
                     let there = x - out * distance;
                     assert!(body.signed_distance(&place, &there).abs() < 1e-9, "{body:?} {distance}");
                 }
@@ -339,7 +339,7 @@ mod tests {
         assert!(flat.signed_distance(&up, &Point3::new(0.0, 2e-3, 3e-3)).abs() < 1e-15);
         assert!((flat.signed_distance(&up, &Point3::new(0.0, 0.0, 1.5e-3)) + 1.5e-3).abs() < 1e-15);
         assert!((sharp.signed_distance(&up, &Point3::new(2.3e-3, 0.0, -0.4e-3)) - 0.5e-3).abs() < 1e-15);
-        // 3 mm up, the flank stands 0.4 mm from a cone of 0.5 rad: tan 0.5 · 3 mm + 0.4 mm / cos 0.5
+        // 3 mm up, the flank is 0.4 mm away from a cone of 0.5 rad: tan 0.5 · 3 mm + 0.4 mm / cos 0.5
         let flank = Point3::new(0.5f64.tan() * 3e-3 + 0.4e-3 / 0.5f64.cos(), 0.0, 3e-3);
         assert!(cone.signed_distance(&up, &flank).abs() < 1e-15);
         assert!(cone.signed_distance(&up, &Point3::new(0.0, 0.0, -0.4e-3)).abs() < 1e-15);

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::cdr::{HeaderMsg, decode, encode};
 use super::{BadMessage, RecordingError};
-use touchup_core::stylus::{MarkerFrame, SeenMarker};
+use touchup_core::stylus::{MarkerFrame, MarkerObservation};
 
 /// The message definition, and that of the type it uses.
 pub(super) const POINT_CLOUD: &str = "std_msgs/Header header\nuint32 height\nuint32 width\n\
@@ -119,7 +119,7 @@ fn read_points(msg: &PointCloud2Msg, frame: &mut MarkerFrame) -> Option<()> {
         let position = Point3::new(x.value(point)?, y.value(point)?, z.value(point)?);
         let label = id.map_or(Some(at as f64), |id| id.value(point))?;
         // a number that is no label becomes one that no marker has
-        frame.see(SeenMarker { label: if label >= 0.0 { label as u32 } else { u32::MAX }, position });
+        frame.see(MarkerObservation { label: if label >= 0.0 { label as u32 } else { u32::MAX }, position });
     }
     Some(())
 }
@@ -217,8 +217,8 @@ mod tests {
 
     const POINTS: [([f32; 3], u32); 2] = [([1.0, -2.0, 0.5], 3), ([0.25, 0.125, 4.0], 0)];
 
-    fn seen(label: u32, p: [f64; 3]) -> SeenMarker {
-        SeenMarker { label, position: p.into() }
+    fn seen(label: u32, p: [f64; 3]) -> MarkerObservation {
+        MarkerObservation { label, position: p.into() }
     }
 
     #[test]

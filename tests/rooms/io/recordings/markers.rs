@@ -4,7 +4,7 @@ use std::path::Path;
 
 use nalgebra::Point3;
 use touchup::io::recording::{BadMessage, Record, RecordingError, RecordingReader, Topics, write_recording};
-use touchup::stylus::{MarkerFrame, Message, SeenMarker};
+use touchup::stylus::{MarkerFrame, MarkerObservation, Message};
 
 use crate::io::recordings::made::{START_NS, pose, put, wrench};
 
@@ -18,7 +18,7 @@ fn frame(i: usize) -> MarkerFrame {
     for label in 0..if i.is_multiple_of(3) { 0 } else { 6 } {
         // numbers that 32 bits hold
         let position = Point3::new(f64::from(label) / 8.0, (i % 100) as f64 / 64.0, -1.5);
-        assert!(frame.see(SeenMarker { label, position }));
+        assert!(frame.see(MarkerObservation { label, position }));
     }
     frame
 }

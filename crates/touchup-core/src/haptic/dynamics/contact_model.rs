@@ -1,4 +1,4 @@
-//! What force a scan lets expect, and how far it moves a face.
+//! The contact model: the force expected from the scan, and the displacement of a face by it.
 
 use super::error::DynamicsError;
 use super::hold::{Hold, Shift};
@@ -88,7 +88,7 @@ impl ContactModel {
         matches!(*self, Self::Sigmoid { f_max_n, .. } if force_n > LARGEST_SHARE * f_max_n)
     }
 
-    /// The force a rigid contact is compared with: F·n between f(0), below which the model cannot tell contact from
+    /// The force a rigid contact is compared with: F·n between f(0), below which the model cannot distinguish contact from
     /// none, and [`LARGEST_SHARE`] · f_max.
     pub(super) fn comparable(&self, force_n: f64, at_zero_n: f64) -> f64 {
         match *self {
@@ -137,20 +137,20 @@ fn sigmoid(hold: &Hold, f_max: f64, h_min: f64, delta: f64) -> Shift {
         // the face does not move along its own normal: only the drift changes h, seen at its middle
         let load = share(u + 0.5 * hold.drift * hold.dt / h_min);
         let impulse = load * f_max * hold.dt;
-        return Shift { way: hold.alpha * (hold.force * hold.dt - impulse), impulse };
+        return Shift { displacement: hold.alpha * (hold.force * hold.dt - impulse), impulse };
     }
     if t.abs() > LONGEST {
-        return Shift { way: f64::NAN, impulse: f64::NAN };
+        return Shift { displacement: f64::NAN, impulse: f64::NAN };
     }
     let moved = advance(u, c, t);
     let impulse = moved.load / t.abs() * f_max * hold.dt;
     let along_h = -moved.delta_u / t * reach;
     if hold.drift == 0.0 {
-        return Shift { way: along_h, impulse };
+        return Shift { displacement: along_h, impulse };
     }
-    // two ways to the same number; the one with the smaller terms loses less
+    // two formulas of the same number; the one with the smaller terms loses less
     let drifted = hold.drift * hold.dt / hold.cosine;
     let pushed = hold.alpha * hold.force * hold.dt;
-    let way = if pushed.abs() < drifted.abs() { pushed - hold.alpha * impulse } else { drifted + along_h };
-    Shift { way, impulse }
+    let displacement = if pushed.abs() < drifted.abs() { pushed - hold.alpha * impulse } else { drifted + along_h };
+    Shift { displacement, impulse }
 }

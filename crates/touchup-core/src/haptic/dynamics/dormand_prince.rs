@@ -24,7 +24,7 @@ const A: [[f64; 6]; 6] = [
 const E: [f64; 7] =
     [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0];
 
-/// Way along a, m, and the normal.
+/// Displacement along a, m, and the normal.
 pub(crate) type OdeState = [f64; 4];
 
 /// Integrates dy/dt = `rate`(y) from 0 to `end`, s; `scale` is the size of each component that counts, and `relative` the error

@@ -21,7 +21,7 @@ pub(super) struct Hold {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Shift {
     /// s = α ∫ (F·n − f) dt, m, along a
-    pub way: f64,
+    pub displacement: f64,
     /// J = ∫ f dt, N·s
     pub impulse: f64,
 }

@@ -208,12 +208,12 @@ impl FaceDynamics {
         dt: f64,
     ) -> Result<FaceState, DynamicsError> {
         let touch = self.touch(initial_normal, face, p, force, dt)?;
-        let (way, n) = match self.params.rule {
+        let (displacement, n) = match self.params.rule {
             StepRule::Lie => self.lie(&face.n, &touch),
             StepRule::DriftCorrected => self.drift_corrected(&face.n, &touch),
             StepRule::DormandPrince => self.dormand_prince(&face.n, &touch)?,
         };
-        let b = face.b + way * touch.along;
+        let b = face.b + displacement * touch.along;
         if !finite(&b.coords) || !finite(&n) {
             return Err(DynamicsError::NotFinite { what: "the result of the step" });
         }
@@ -246,9 +246,9 @@ impl FaceDynamics {
 
     /// F·n as it is compared, N, and the h that is compared with it, m.
     #[inline]
-    fn compared(&self, n: &Vector3<f64>, touch: &FaceSample, way: f64) -> (f64, f64) {
+    fn compared(&self, n: &Vector3<f64>, touch: &FaceSample, displacement: f64) -> (f64, f64) {
         let force = touch.magnitude * touch.towards.dot(n);
-        let h = (touch.arm - way * touch.along).dot(n);
+        let h = (touch.arm - displacement * touch.along).dot(n);
         if !self.params.take_out_rigid_offset {
             return (force, h);
         }
@@ -270,30 +270,36 @@ impl FaceDynamics {
 
     #[inline]
     fn lie(&self, n: &Vector3<f64>, touch: &FaceSample) -> (f64, Vector3<f64>) {
-        let Shift { way, impulse } = self.params.model.flow(&self.hold(n, touch));
-        (way, self.turned(n, touch, impulse))
+        let Shift { displacement, impulse } = self.params.model.flow(&self.hold(n, touch));
+        (displacement, self.turned(n, touch, impulse))
     }
 
     /// The position flow with h₀ + v t from the arm held and n turning evenly from its start to its predicted end;
     /// twice, so that b* fits the n* that is returned. F·n and a·n, which change during the step, enter by a mean
-    /// that weighs the end the more the faster h forgets: 1/2 when slow (second order), 1 when stiff.
+    /// that weights the end the more the faster h forgets: 1/2 when slow (second order), 1 when stiff.
     fn drift_corrected(&self, n: &Vector3<f64>, touch: &FaceSample) -> (f64, Vector3<f64>) {
-        let (way, end) = self.lie(n, touch);
+        let (displacement, end) = self.lie(n, touch);
         if touch.dt == 0.0 || end == *n {
-            return (way, end);
+            return (displacement, end);
         }
-        let (shift, spare) = self.drifting_flow(n, &end, touch, way);
+        let (shift, spare) = self.drifting_flow(n, &end, touch, displacement);
         let end = self.turned(n, touch, shift.impulse + spare);
-        let (shift, _) = self.drifting_flow(n, &end, touch, shift.way);
-        (shift.way, end)
+        let (shift, _) = self.drifting_flow(n, &end, touch, shift.displacement);
+        (shift.displacement, end)
     }
 
     /// The flow, and what its mean of F·n leaves out of the impulse, N·s.
-    fn drifting_flow(&self, n: &Vector3<f64>, end: &Vector3<f64>, touch: &FaceSample, way: f64) -> (Shift, f64) {
+    fn drifting_flow(
+        &self,
+        n: &Vector3<f64>,
+        end: &Vector3<f64>,
+        touch: &FaceSample,
+        displacement: f64,
+    ) -> (Shift, f64) {
         let start = self.hold(n, touch);
         let (force, h) = self.compared(end, touch, 0.0);
         let cosine = touch.along.dot(end);
-        let (_, h_end) = self.compared(end, touch, way);
+        let (_, h_end) = self.compared(end, touch, displacement);
         let decay = -start.alpha * cosine * self.params.model.slope(h_end) * touch.dt;
         let weight = end_weight(decay);
         let mean = |from: f64, to: f64| from + weight * (to - from);
@@ -324,8 +330,9 @@ impl FaceDynamics {
         };
         let start = [0.0, n.x, n.y, n.z];
         let scale = [scale.max(f64::MIN_POSITIVE), 1.0, 1.0, 1.0];
-        let [way, x, y, z] = dormand_prince::integrate(start, touch.dt, scale, dormand_prince::RELATIVE, rate)?;
-        Ok((way, Vector3::new(x, y, z).normalize()))
+        let [displacement, x, y, z] =
+            dormand_prince::integrate(start, touch.dt, scale, dormand_prince::RELATIVE, rate)?;
+        Ok((displacement, Vector3::new(x, y, z).normalize()))
     }
 }
 

@@ -26,7 +26,7 @@ const LARGEST_PRODUCT: f64 = 1e300;
 const CUBE_BELOW_ROUNDING: f64 = 1e-17;
 /// A difference smaller than this share of its terms is taken from another formula: three digits are lost at most.
 const CANCELLED: f64 = 1e-3;
-/// A way up (in u) so short that the sum serves on both sides of the bend, and (e^SHORT − 1)/SHORT, rounded up.
+/// A rise (in u) so short that the sum serves on both sides of the bend, and (e^SHORT − 1)/SHORT, rounded up.
 const SHORT: f64 = 1.5;
 const SHORT_GROWTH: f64 = 2.33;
 /// No progress is possible below two roundings.
@@ -117,14 +117,14 @@ impl Arc {
         let sign = if down { -1.0 } else { 1.0 };
         let free = self.u + sign * slope * span;
         let edge = edge.filter(|&edge| sign * (free - edge) > 0.0);
-        let (way, spent) = edge.map_or((slope * span, span), |edge| {
-            let way = (edge - self.u).abs();
-            (way, (way / slope).min(span))
+        let (displacement, spent) = edge.map_or((slope * span, span), |edge| {
+            let displacement = (edge - self.u).abs();
+            (displacement, (displacement / slope).min(span))
         });
         // the vanishing one of the two integrals: the exponential tail between both ends
         let nearest = self.u.abs().min(edge.unwrap_or(free).abs());
-        let tail = -(-way).exp_m1() * (-nearest).exp() / slope;
-        let here = if self.u < 0.0 { (way, spent, tail) } else { (way, tail, spent) };
+        let tail = -(-displacement).exp_m1() * (-nearest).exp() / slope;
+        let here = if self.u < 0.0 { (displacement, spent, tail) } else { (displacement, tail, spent) };
         let Some(edge) = edge else { return here };
         let left = Self::new(edge, self.c, self.rest).after(sign * (span - spent));
         (here.0 + left.0, here.1 + left.1, here.2 + left.2)
@@ -144,23 +144,23 @@ impl Arc {
         let start = if down { low } else { self.guess(span, high) };
         let short = !down && high <= SHORT && self.c * self.rho * SHORT_GROWTH * high < 0.5;
         let Some(bend) = self.bend().filter(|_| !short) else {
-            let way = self.solve(sign, total, low, high, start, Self::by_sum);
-            return self.passed(way, total, span, sign);
+            let displacement = self.solve(sign, total, low, high, start, Self::by_sum);
+            return self.passed(displacement, total, span, sign);
         };
         let to_bend = if down == (self.e < bend) { 0.0 } else { (bend / self.e).ln().abs() };
         let beyond = to_bend == 0.0 || (to_bend < high && to_bend + self.high(sign * to_bend) < total);
         let (low, high) = if beyond { (low.max(to_bend), high) } else { (low, high.min(to_bend)) };
-        let way = if beyond != down {
+        let displacement = if beyond != down {
             // L must not start near 0 while eᵘ is small: its logarithm is steep there
             let start = if self.e < bend { low } else { start };
             self.solve(sign, total, low, high, start, Self::by_logarithm)
         } else {
             self.solve(sign, total, low, high, start, Self::by_sum)
         };
-        self.passed(way, total, span, sign)
+        self.passed(displacement, total, span, sign)
     }
 
-    /// D of a short or straight way up: (2, 1) Padé approximation of the decaying rate; at most `high`.
+    /// D of a short or straight rise: (2, 1) Padé approximation of the decaying rate; at most `high`.
     #[inline]
     fn guess(&self, span: f64, high: f64) -> f64 {
         let decay = self.e / ((1.0 + self.e) * (1.0 + self.e)) * span;
@@ -192,56 +192,59 @@ impl Arc {
         start: f64,
         equation: impl Fn(&Self, f64, f64, f64) -> (f64, f64, f64),
     ) -> f64 {
-        let mut way = start.max(low).min(high); // rounding may cross the two
+        let mut displacement = start.max(low).min(high); // rounding may cross the two
         for _ in 0..MAX_ITERATIONS {
-            let (residual, slope, bend) = equation(self, sign, total, way);
+            let (residual, slope, bend) = equation(self, sign, total, displacement);
             if residual > 0.0 {
-                high = way
+                high = displacement
             } else {
-                low = way
+                low = displacement
             }
             let newton = residual / slope;
             let step = newton / (1.0 - 0.5 * newton * bend).max(0.5);
-            let next = way - step;
+            let next = displacement - step;
             let inside = next >= low && next <= high;
-            if inside && (step * step * step.abs() <= CUBE_BELOW_ROUNDING * way || step.abs() <= ROUNDING * way) {
+            if inside
+                && (step * step * step.abs() <= CUBE_BELOW_ROUNDING * displacement
+                    || step.abs() <= ROUNDING * displacement)
+            {
                 return next;
             }
-            if !inside && (high - low <= ROUNDING * high || step.abs() <= ROUNDING * way) {
-                return way;
+            if !inside && (high - low <= ROUNDING * high || step.abs() <= ROUNDING * displacement) {
+                return displacement;
             }
-            way = if inside { next } else { 0.5 * (low + high) };
+            displacement = if inside { next } else { 0.5 * (low + high) };
         }
-        way
+        displacement
     }
 
     /// D + L − (1 − c) T as a function of D.
     #[inline]
-    fn by_sum(&self, sign: f64, total: f64, way: f64) -> (f64, f64, f64) {
-        let (high, e) = self.high_and_end(sign * way);
+    fn by_sum(&self, sign: f64, total: f64, displacement: f64) -> (f64, f64, f64) {
+        let (high, e) = self.high_and_end(sign * displacement);
         let l = 1.0 / (self.rest / e - self.c);
-        (way + high - total, 1.0 + l, sign * l * (1.0 + self.c * l) / (1.0 + l))
+        (displacement + high - total, 1.0 + l, sign * l * (1.0 + self.c * l) / (1.0 + l))
     }
 
     /// D − ln(1 + y(L)/ρ) with L = (1 − c) T − D, as a function of D.
     #[inline]
-    fn by_logarithm(&self, sign: f64, total: f64, way: f64) -> (f64, f64, f64) {
-        let x = -self.c * sign * (total - way);
+    fn by_logarithm(&self, sign: f64, total: f64, displacement: f64) -> (f64, f64, f64) {
+        let x = -self.c * sign * (total - displacement);
         let (mapped, m) = if x > LARGE && self.c < 0.0 {
             // 1 + y/ρ overflows or nearly so, its logarithm does not
             (x - (-self.c * self.rho).ln(), -self.c)
         } else if sign < 0.0 && self.c < 0.0 {
             // 1 + y/ρ nearly cancels while u is large, 1 + z does not
-            let grown = if -x < f64::EPSILON { total - way } else { (-x).exp_m1() / -self.c };
+            let grown = if -x < f64::EPSILON { total - displacement } else { (-x).exp_m1() / -self.c };
             let z = -grown * self.rest / self.e;
             (x + z.ln_1p(), 1.0 / (self.rho * (1.0 + z)))
         } else {
             let grown = x.exp_m1();
-            let y = if x.abs() < f64::EPSILON { sign * (total - way) } else { grown / -self.c };
+            let y = if x.abs() < f64::EPSILON { sign * (total - displacement) } else { grown / -self.c };
             ((y / self.rho).ln_1p(), (1.0 + grown) / (self.rho + y))
         };
-        let residual = way - sign * mapped;
-        // D too small on the way down: the logarithm does not exist there
+        let residual = displacement - sign * mapped;
+        // D too small on the descent: the logarithm does not exist there
         let residual = if residual.is_finite() { residual } else { -f64::MAX };
         (residual, 1.0 + m, sign * m * (self.c + m) / (1.0 + m))
     }
@@ -275,24 +278,24 @@ impl Arc {
 
     /// Both integrals: from the sums D + L = (1 − c) T and ∫ 1/(1 + eᵘ) d|T| = |D| + c |T| unless they cancel.
     #[inline]
-    fn passed(&self, way: f64, total: f64, span: f64, sign: f64) -> Passed {
-        let (low, high) = (way + self.c * span, total - way);
-        let low = if low > CANCELLED * way { low } else { self.low(way, sign) };
-        let high = if high > CANCELLED * total { high } else { self.high(sign * way) };
-        (way, low, high)
+    fn passed(&self, displacement: f64, total: f64, span: f64, sign: f64) -> Passed {
+        let (low, high) = (displacement + self.c * span, total - displacement);
+        let low = if low > CANCELLED * displacement { low } else { self.low(displacement, sign) };
+        let high = if high > CANCELLED * total { high } else { self.high(sign * displacement) };
+        (displacement, low, high)
     }
 
     /// ∫ 1/(1 + eᵘ) d|T| = (|D| + ln((1−c−cE)/(1−c−cE′)))/(1−c) for c ≤ 0, from the lower end E to the upper end E′.
     #[inline]
-    fn low(&self, way: f64, sign: f64) -> f64 {
-        let shrunk = (-way).exp();
+    fn low(&self, displacement: f64, sign: f64) -> f64 {
+        let shrunk = (-displacement).exp();
         let e = if sign < 0.0 { self.e * shrunk } else { self.e };
         let lower = self.rest - self.c * e;
-        let x = self.rest * (-way).exp_m1() / lower;
+        let x = self.rest * (-displacement).exp_m1() / lower;
         if x > -0.5 {
             -x.ln_1p() / self.rest
         } else if sign < 0.0 {
-            (way + (lower / (self.rest - self.c * self.e)).ln()) / self.rest
+            (displacement + (lower / (self.rest - self.c * self.e)).ln()) / self.rest
         } else {
             (lower / (self.rest * shrunk - self.c * e)).ln() / self.rest
         }

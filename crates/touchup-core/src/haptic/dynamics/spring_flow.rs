@@ -20,9 +20,9 @@ const INVERSE_FACTORIALS: [f64; 18] = {
 pub(super) fn flow(hold: &Hold, stiffness: f64) -> Shift {
     let Hold { h, drift, cosine, force, alpha, dt } = *hold;
     let (phi1, phi2) = phi(-alpha * cosine * stiffness * dt);
-    let way = alpha * dt * ((force + stiffness * h) * phi1 + stiffness * drift * dt * phi2);
+    let displacement = alpha * dt * ((force + stiffness * h) * phi1 + stiffness * drift * dt * phi2);
     let impulse = -stiffness * dt * (h * phi1 + (drift - alpha * cosine * force) * dt * phi2);
-    Shift { way, impulse }
+    Shift { displacement, impulse }
 }
 
 /// φ₁(z) = (e^z − 1)/z and φ₂(z) = (e^z − 1 − z)/z².

@@ -1,4 +1,4 @@
-//! Boxes of the tree.
+//! Axis-aligned bounding boxes of the tree.
 
 use nalgebra::{Point3, Vector3};
 
@@ -74,7 +74,7 @@ impl Aabb {
         Self { lo: [lo.x, lo.y, lo.z].map(up), hi: [hi.x, hi.y, hi.z].map(|x| -up(-x)) }
     }
 
-    /// Whether two boxes meet; without branches, for which way it goes cannot be foretold.
+    /// Whether two boxes meet; without branches, for the outcome is hard to predict.
     #[inline]
     pub fn overlaps(&self, other: &Self) -> bool {
         (0..3).fold(true, |all, i| all & (self.lo[i] <= other.hi[i]) & (self.hi[i] >= other.lo[i]))

@@ -1,4 +1,4 @@
-//! Builds the tree over a mesh, or anew over the few faces below a node.
+//! Builds the tree over a mesh, or rebuilds it over the few faces below a node.
 
 use nalgebra::{Point3, Vector3};
 
@@ -34,7 +34,7 @@ impl FaceTree {
         tree
     }
 
-    /// Builds what node `at` stands for anew, from the faces below `nodes` and one face more if there is one to add.
+    /// Rebuilds the subtree of node `at`, from the faces below `nodes` and one face more if there is one to add.
     pub(super) fn rebuild(&mut self, mesh: &TriMesh, at: u32, nodes: &[TreeNode], added: Option<FaceId>) {
         let mut items = std::mem::take(&mut self.items);
         nodes.iter().for_each(|&node| self.take_apart(mesh, node, &mut items));

@@ -1,8 +1,8 @@
-//! Faces come and go: the tree stays exact, tight and shallow, and no edit costs more than the way to the root.
+//! Insertion and removal of faces: the tree stays exact, tight and shallow, and no edit costs more than the path to the root.
 //!
-//! A new face goes down where the boxes grow least. On the way back up each box becomes the union of the two below it,
+//! A new face goes down where the boxes grow least. On the path back up each box becomes the union of the two below it,
 //! and a node one of whose sides holds too small a share of the faces is mended: where few faces are below it, it is
-//! built anew; else one of the two grandchildren on the heavy side goes over to the light side. Faces have no order in
+//! rebuilt; else one of the two grandchildren on the heavy side goes over to the light side. Faces have no order in
 //! the tree, so that one such step always suffices.
 
 use super::aabb::Aabb;
@@ -13,7 +13,7 @@ use crate::mesh::{FaceId, MeshError, TriMesh};
 /// many edits lie between two repairs; 1/3 at most, or a grandchild would not suffice. The depth is at most
 /// log(2^31 / 5) / log(5 / 4) + 2 = 91 levels.
 const SMALLEST_SHARE: u64 = 5;
-/// Faces that are built anew at most, one or two µs. Above, both sides of what [`FaceTree::lean`] joins are large enough
+/// Faces that are rebuilt at most, one or two µs. Above, both sides of what [`FaceTree::lean`] joins are large enough
 /// for an inner node and differ by little enough; nine faces would do.
 const MOST_REBUILT: u32 = 16;
 
@@ -39,7 +39,7 @@ impl FaceTree {
         } else {
             self.rebuild(mesh, at, &[leaf], Some(face));
         }
-        self.settle(mesh, at);
+        self.rebalance(mesh, at);
         true
     }
 
@@ -59,7 +59,7 @@ impl FaceTree {
         }
         leaf.bounds = self.bounds_of(mesh, self.faces_of(&leaf));
         *self.node_mut(at) = leaf;
-        self.settle(mesh, at);
+        self.rebalance(mesh, at);
         true
     }
 
@@ -109,10 +109,10 @@ impl FaceTree {
     }
 
     /// Brings the nodes above `at` up to date after what is below it changed.
-    fn settle(&mut self, mesh: &TriMesh, mut at: u32) {
+    fn rebalance(&mut self, mesh: &TriMesh, mut at: u32) {
         self.edits += 1;
         self.changes += 1;
-        // kept at hand: to write a node and read it again at once is slow
+        // kept in a variable: to write a node and read it again at once is slow
         let mut node = *self.node(at);
         while at != ROOT {
             let pair = at / 2;
@@ -135,7 +135,7 @@ impl FaceTree {
         }
     }
 
-    /// Hands one of the two grandchildren on the heavy side of a pair over to the light side.
+    /// Moves one of the two grandchildren on the heavy side of a pair to the light side.
     ///
     /// ```text
     /// heavy(a, b), light  ->  a, (b, light)
@@ -160,7 +160,7 @@ impl FaceTree {
         self.place(2 * pair + 1 - heavy as u32, TreeNode { bounds: joined[over], first: inner, count });
     }
 
-    /// Puts a node in a place and tells what is below it.
+    /// Puts a node in a place and updates the parents of what is below it.
     fn place(&mut self, at: u32, node: TreeNode) {
         *self.node_mut(at) = node;
         if node.is_leaf() {
@@ -180,7 +180,7 @@ mod tests {
     use super::*;
     use crate::mesh::VertexId;
 
-    /// Checks everything that a node says about what is below it; returns the number of levels and of nodes.
+    /// Checks all that a node stores about what is below it; returns the number of levels and of nodes.
     fn check(tree: &FaceTree, mesh: &TriMesh, at: u32, seen: &mut Vec<FaceId>) -> (usize, usize) {
         let node = *tree.node(at);
         if node.is_leaf() {

@@ -3,7 +3,7 @@
 //! A binary tree over the faces. Boxes are kept in single precision relative to the middle of the mesh and rounded
 //! outward, so a query that prunes by them never misses a face; distances to faces are computed in double precision.
 //! [`FaceTree::refit`] recomputes the boxes of the leaves that hold moved faces and all boxes above them;
-//! [`FaceTree::insert`] and [`FaceTree::remove`] do the same on one way to the root. [`FaceTree::refit_planned`] may leave a
+//! [`FaceTree::insert`] and [`FaceTree::remove`] do the same on one path to the root. [`FaceTree::refit_planned`] may leave a
 //! margin, so that small motions inside of it cost nothing. Boxes never only grow, so nothing is left to be tightened later.
 
 mod aabb;
@@ -72,7 +72,7 @@ pub struct FaceTree {
     leaf_of_face: Vec<u32>,
     free_pair: u32,
     free_leaf: u32,
-    /// room for what is built anew
+    /// room for what is rebuilt
     items: Vec<Item>,
     /// counts insertions and removals, so that a plan knows whether it still holds
     edits: u64,

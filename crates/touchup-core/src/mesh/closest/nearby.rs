@@ -1,4 +1,4 @@
-//! Queries that follow each other closely: the leaves around the last one are kept, and looked at without the way from the root.
+//! Queries that follow each other closely: the leaves around the last one are kept, and visited without a descent from the root.
 
 use nalgebra::Point3;
 
@@ -9,7 +9,7 @@ use crate::mesh::{FaceId, TriMesh};
 
 /// The reach of a query with a hint over the distance to the hinted face.
 const HINT_WIDTH: f64 = 1.0 + 1e-6;
-/// Leaves that are kept at most: to look at the boxes of more takes as long as the way from the root.
+/// Leaves that are kept at most: to look at the boxes of more takes as long as a descent from the root.
 const MOST_LEAVES: usize = 64;
 /// How far beyond a query leaves are kept, in longest edges of the hinted face.
 const EDGES_BEYOND: f64 = 0.7;
@@ -139,7 +139,7 @@ mod tests {
         mesh.set_position(corner, Point3::new(10.0, 10.0, 0.3));
         tree.refit_planned(&mesh, &mut plan, 0.3, 0.2);
         assert_eq!(ask(&tree, &mesh, 10.5, &mut nearby), 10.4);
-        // 0.2 m more go into the margin, and cost nothing
+        // 0.2 m more go into the margin, and are free
         mesh.set_position(corner, Point3::new(10.0, 10.0, 0.1));
         tree.refit_planned(&mesh, &mut plan, 0.2, 0.2);
         assert_eq!(ask(&tree, &mesh, 10.5, &mut nearby), 10.4);
@@ -147,7 +147,7 @@ mod tests {
         tree.refit_planned(&mesh, &mut plan, 0.4, 0.2);
         assert_eq!(ask(&tree, &mesh, 10.5, &mut nearby), 10.5, "1.1 m of 0.99 m are used up");
         tree.refit(&mesh, mesh.star(corner));
-        assert_eq!(ask(&tree, &mesh, 10.6, &mut nearby), 10.6, "nobody said by how much");
+        assert_eq!(ask(&tree, &mesh, 10.6, &mut nearby), 10.6, "by an unknown margin");
         assert_eq!(ask(&tree, &mesh, 11.9, &mut nearby), 11.9, "too far away");
     }
 

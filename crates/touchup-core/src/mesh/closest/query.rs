@@ -118,7 +118,7 @@ impl FaceTree {
     /// The face whose surface is closest to `p`, among those nearer than `reach` (m); `None` when there is none.
     ///
     /// Where faces meet at the closest point (an edge or a corner), the one that `p` lies most squarely above or below
-    /// is named, so that the sign of (p − point)·n tells inside from outside; among equals the smallest id.
+    /// is named, so that the sign of (p − point)·n distinguishes inside from outside; among equals the smallest id.
     pub fn closest(&self, mesh: &TriMesh, p: &Point3<f64>, reach: f64) -> Option<FaceHit> {
         self.search(p, reach, |face, limit| surface_hit(mesh, p, face, limit), |a, b| is_less_square(mesh, p, a, b))
     }
@@ -194,7 +194,7 @@ impl FaceTree {
         let largest = |i: usize| self.origin[i].abs() + f64::from(hi[i].max(-lo[i]));
         let diagonal = Vector3::from_fn(|i, _| f64::from(hi[i] - lo[i])).norm();
         let tie = TIE_COORDINATE * largest(0).max(largest(1)).max(largest(2)) + TIE_DIAGONAL * diagonal;
-        // an empty box, or one beyond single precision, says nothing
+        // an empty box, or one beyond single precision, gives no tolerance
         if tie.is_finite() { tie } else { 0.0 }
     }
 

@@ -1,4 +1,4 @@
-//! Boxes after vertices moved.
+//! Refits the boxes after vertices moved.
 
 use super::{FaceTree, NONE, ROOT, STACK};
 use crate::mesh::{FaceId, TriMesh};
@@ -21,7 +21,7 @@ pub struct RefitPlan {
 impl RefitPlan {
     /// A plan with room for so many faces.
     pub(crate) fn with_room(faces: usize) -> Self {
-        // the way from the leaves to the root adds a level or so for each halving of the mesh
+        // the path from the leaves to the root adds a level or so for each halving of the mesh
         let pairs = Vec::with_capacity(2 * faces + STACK);
         Self { faces: Vec::with_capacity(faces), leaves: Vec::with_capacity(faces), pairs, room: 0.0, edits: 0 }
     }
@@ -49,20 +49,20 @@ impl FaceTree {
     }
 
     /// Makes the tree exact again after the corners of the planned faces moved; a plan made before faces were inserted
-    /// or removed is made anew.
+    /// or removed is made again.
     ///
-    /// - `way`: how far a corner moved at most since the last call with this plan, m; infinite where that is not known. Where
-    ///   others moved corners in between, and told the tree, [`RefitPlan::spend`] comes before.
+    /// - `displacement`: how far a corner moved at most since the last call with this plan, m; infinite where that is not known. Where
+    ///   others moved corners in between, and refitted the tree, [`RefitPlan::spend`] comes before.
     /// - `margin`: by how much the boxes are made wider than they need be, m. They are left as they are until corners may
     ///   have left them: a query stays exact and looks at little more.
     #[inline]
-    pub fn refit_planned(&mut self, mesh: &TriMesh, plan: &mut RefitPlan, way: f64, margin: f64) {
-        if way <= plan.room && plan.edits == self.edits {
-            plan.room -= way;
+    pub fn refit_planned(&mut self, mesh: &TriMesh, plan: &mut RefitPlan, displacement: f64, margin: f64) {
+        if displacement <= plan.room && plan.edits == self.edits {
+            plan.room -= displacement;
         } else {
             self.fit(mesh, plan, margin);
-            if way.is_finite() {
-                self.widened += way + margin;
+            if displacement.is_finite() {
+                self.widened += displacement + margin;
             } else {
                 self.changes += 1;
             }
@@ -99,7 +99,7 @@ impl FaceTree {
         }
         pairs.clear();
         for &leaf in leaves.iter() {
-            // the way up ends where it meets that of an earlier leaf, so that what is above stands before what is below
+            // the path up ends where it meets that of an earlier leaf, so that parents come before children
             let (known, mut at) = (pairs.len(), leaf);
             while at != ROOT && self.parents[at as usize / 2] & SEEN == 0 {
                 pairs.push(at / 2);

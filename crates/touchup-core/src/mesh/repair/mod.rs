@@ -204,7 +204,7 @@ mod tests {
         ((0..8).map(corner).collect(), quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect())
     }
 
-    /// Divergence theorem over the faces as they stand.
+    /// Divergence theorem over the faces as they are.
     fn volume(mesh: &TriMesh) -> f64 {
         mesh.faces().map(|(f, _)| mesh.barycentre(f).coords.dot(&mesh.double_area_normal(f)) / 6.0).sum()
     }
@@ -289,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn thin_faces_far_from_the_origin_stay_while_they_can_be_told_from_a_line() {
+    fn thin_faces_far_from_the_origin_stay_while_they_differ_from_a_line() {
         // at 10⁶ m a coordinate is rounded to 1.2e-10 m: a height of 1e-6 m is real, one of 2e-10 m is not
         for (height, kept) in [(1e-6, 1), (2e-10, 0)] {
             let p = |x: f64, y: f64| Point3::new(1e6 + x, 1e6 + y, 1e6);

@@ -186,7 +186,7 @@ fn sides_above<'a>(mesh: &TriMesh, vertex: u32, room: &'a mut [Vec<EdgeSide>; 2]
     })
 }
 
-/// Tells the third corners of faces at the same edge apart.
+/// Distinguishes the third corners of faces at the same edge.
 #[inline]
 fn corner_sum(mesh: &TriMesh, face: u32) -> u32 {
     let [a, b, c] = mesh.corners(FaceId(face)).map(|v| v.0);

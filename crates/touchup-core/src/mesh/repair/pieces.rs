@@ -1,6 +1,6 @@
-//! Which faces hang together, and which of them lie upside down against the others.
+//! Connected components of faces, and which faces of one are oriented upside down against the others.
 
-/// Disjoint sets of faces; each face knows whether it lies as the root of its set does (parity false) or upside down.
+/// Disjoint sets of faces; each face stores whether it is oriented as the root of its set (parity false) or upside down.
 pub(super) struct FaceSets {
     /// parent (31 bits) and parity against it (1 bit)
     parents: Vec<u32>,
@@ -14,7 +14,7 @@ impl FaceSets {
         Self { parents: (0..faces as u32).map(|f| f << 1).collect(), any_against: false }
     }
 
-    /// Root of the set and parity against it; shortens the path on the way.
+    /// Root of the set and parity against it; shortens the path as it goes.
     #[inline]
     fn find(&mut self, mut face: u32) -> (u32, u32) {
         let mut parity = 0;

@@ -23,11 +23,11 @@ const CELL: f64 = 1e-9;
 ///
 /// - `positions`: V × 3, any unit; shortened in place.
 /// - `faces`: F × 3, every index below V; renamed in place.
-/// - returns: how many vertices went away.
+/// - returns: how many vertices were removed.
 pub(super) fn weld(positions: &mut Vec<Point3<f64>>, faces: &mut [[u32; 3]]) -> usize {
     // a closed mesh has half as many vertices as faces; the table has two places for each
     let mut table = PositionTable::new(CELL * spread(positions), positions.len(), faces.len());
-    // empty until the first vertex goes away
+    // empty until the first vertex is removed
     let mut renamed = Vec::new();
     let mut kept = 0;
     for start in (0..positions.len()).step_by(BLOCK) {
@@ -68,7 +68,7 @@ fn spread(positions: &[Point3<f64>]) -> f64 {
     middle(sample().map(|p| (p - Point3::from(centre)).amax()).collect())
 }
 
-/// Vertices that are looked up together: what they need from memory is on its way at the same time.
+/// Vertices that are looked up together: their memory accesses overlap.
 const BLOCK: usize = 64;
 
 /// Where to look for a position in a [`PositionTable`].
@@ -76,7 +76,7 @@ const BLOCK: usize = 64;
 struct PositionProbe {
     /// hash of its cell
     hash: u64,
-    /// what stood at the first place when the block began
+    /// what was at the first place when the block began
     entry: u32,
 }
 

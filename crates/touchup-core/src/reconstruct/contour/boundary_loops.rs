@@ -1,4 +1,4 @@
-//! The outline of the pieces of a face that stay: loops of points, the face on their left.
+//! Boundary loops of the pieces of a face that stay: loops of points, the face on their left.
 
 use crate::reconstruct::LatticeRegion;
 use crate::reconstruct::contour::clip::{Pieces, PointSupport, SideOrigin, wall};
@@ -43,7 +43,7 @@ fn rims(pieces: &Pieces, region: &LatticeRegion) -> Vec<PieceRim> {
     rims
 }
 
-/// What follows side `i`: a side of the same piece first, so that two parts that meet at a point stay apart.
+/// What follows side `i`: a side of the same piece first, so that two parts that meet at a point stay separate.
 fn next(rims: &[PieceRim], i: usize) -> Option<usize> {
     let follows = |j: &usize| !rims[*j].is_used && rims[*j].from == rims[i].to;
     let same = (0..rims.len()).find(|j| follows(j) && rims[*j].piece == rims[i].piece);

@@ -25,7 +25,7 @@ pub(in crate::reconstruct) enum PointSupport {
     Corner(u8),
     /// a side of the face and a plane of the lattice
     Trace { side: u8, axis: u8, plane: i32 },
-    /// the inside of the face and a line of the lattice along `axis`, which stands at `planes` of the two next axes
+    /// the inside of the face and a line of the lattice along `axis`, which is at `planes` of the two next axes
     Pierce { axis: u8, planes: [i32; 2] },
 }
 
@@ -58,7 +58,7 @@ pub(in crate::reconstruct) struct Pieces {
 }
 
 impl Pieces {
-    /// Cuts a face by those planes of the lattice that stand between the cells from `lo` to `hi`; what lies beyond these
+    /// Cuts a face by those planes of the lattice that lie between the cells from `lo` to `hi`; what lies beyond these
     /// cells is given to the outermost of them.
     pub fn cut(&mut self, mesh: &TriMesh, face: FaceId, lattice: &Lattice, lo: LatticeNode, hi: LatticeNode) {
         self.vertices.clear();

@@ -1,4 +1,4 @@
-//! Where the skin crosses an edge of the lattice.
+//! Crossings: where the surface crosses an edge of the lattice.
 
 use nalgebra::{Point3, Vector3};
 
@@ -10,7 +10,7 @@ use crate::reconstruct::table::CellTable;
 
 /// Steps towards the zero of the touched field, at most: on a plane one is enough, at an edge it takes some more.
 const STEPS: usize = 8;
-/// A value of less than this share of the way is zero.
+/// A value of less than this share of the step is zero.
 const ENOUGH: f64 = 1e-3;
 
 /// Where f changes its sign on an edge of the lattice.
@@ -41,18 +41,18 @@ impl Crossings {
     /// the values at the ends.
     pub fn at(
         &mut self,
-        restored: &ReconstructionGrid,
+        grid: &ReconstructionGrid,
         evidence: &Evidence<'_>,
         lattice: &Lattice,
         edge: &Edge,
     ) -> Crossing {
         let ends = [edge.node, edge.end()];
-        let [Some(a), Some(b)] = ends.map(|node| restored.nodes.get(&node)) else {
-            return between(restored, lattice, edge, [0.0; 2]);
+        let [Some(a), Some(b)] = ends.map(|node| grid.nodes.get(&node)) else {
+            return between(grid, lattice, edge, [0.0; 2]);
         };
         let values = [a.value, b.value];
         if [a, b].iter().any(|state| state.source != Source::Touch) {
-            return between(restored, lattice, edge, values);
+            return between(grid, lattice, edge, values);
         }
         let renewals = [a.renewal, b.renewal];
         if let Some(known) = self.known.get(edge).filter(|known| known.renewals == renewals) {
@@ -60,30 +60,30 @@ impl Crossings {
         }
         let [a, b] = ends.map(|node| lattice.position(node));
         let crossing = of_touches(evidence, [&a, &b], values, &mut self.scratch)
-            .unwrap_or_else(|| between(restored, lattice, edge, values));
+            .unwrap_or_else(|| between(grid, lattice, edge, values));
         self.known.insert(*edge, KnownCrossing { crossing, renewals });
         crossing
     }
 }
 
 /// The crossing of an edge by the values at its ends.
-fn between(restored: &ReconstructionGrid, lattice: &Lattice, edge: &Edge, values: [f64; 2]) -> Crossing {
+fn between(grid: &ReconstructionGrid, lattice: &Lattice, edge: &Edge, values: [f64; 2]) -> Crossing {
     let ends = [edge.node, edge.end()];
     let [a, b] = ends.map(|node| lattice.position(node));
     let share = share_of(values);
-    let slope = gradient(restored, &ends[0]) * (1.0 - share) + gradient(restored, &ends[1]) * share;
+    let slope = gradient(grid, &ends[0]) * (1.0 - share) + gradient(grid, &ends[1]) * share;
     let outward = (b - a) * (values[1] - values[0]).signum();
     let normal = slope.try_normalize(0.0).unwrap_or_else(|| outward.normalize());
     Crossing { point: a + (b - a) * share, normal }
 }
 
-/// Where a straight line between two values is 0, as a share of the way.
+/// Where a straight line between two values is 0, as a share of the segment.
 fn share_of([at_a, at_b]: [f64; 2]) -> f64 {
     if at_a == at_b { 0.5 } else { (at_a / (at_a - at_b)).clamp(0.0, 1.0) }
 }
 
 /// The crossing of the touched field between two points at which its values differ in sign, by false position (Illinois).
-/// `None` where the field jumps from one surface to another: the gradient of neither is that of the step between them.
+/// `None` where the field is discontinuous between two surfaces: the gradient of neither is that of the step between them.
 fn of_touches(
     evidence: &Evidence<'_>,
     [a, b]: [&Point3<f64>; 2],
@@ -117,9 +117,9 @@ fn of_touches(
 }
 
 /// Slope of the values at a node, of any length: by central differences, one-sided where a neighbour is missing.
-fn gradient(restored: &ReconstructionGrid, node: &LatticeNode) -> Vector3<f64> {
+fn gradient(grid: &ReconstructionGrid, node: &LatticeNode) -> Vector3<f64> {
     let value = |node: LatticeNode| {
-        let state = restored.nodes.get(&node)?;
+        let state = grid.nodes.get(&node)?;
         (state.source != Source::Beyond).then_some(state.value)
     };
     let here = value(*node).unwrap_or(0.0);
@@ -135,7 +135,7 @@ fn gradient(restored: &ReconstructionGrid, node: &LatticeNode) -> Vector3<f64> {
 mod tests {
     use super::*;
     use crate::mesh::{FaceTree, TriMesh};
-    use crate::reconstruct::evidence::free_space::SweptSpace;
+    use crate::reconstruct::evidence::free_space::FreeSpace;
     use crate::reconstruct::{ContactMap, ContactSigma, EvidenceParams, SurfaceContact};
 
     const RADIUS: f64 = 1.5e-3;
@@ -161,9 +161,9 @@ mod tests {
         );
         let scan = scan.unwrap();
         let (tree, params) = (FaceTree::new(&scan), EvidenceParams::new(RADIUS, 0.3e-3));
-        let swept = SweptSpace::new(0.1 * RADIUS, 2.0 * RADIUS);
-        let (contacts, swept) = (&contacts, &swept);
-        let evidence = Evidence { params: &params, contacts, swept, scan: &scan, tree: &tree, prior: None };
+        let free_space = FreeSpace::new(0.1 * RADIUS, 2.0 * RADIUS);
+        let (contacts, free_space) = (&contacts, &free_space);
+        let evidence = Evidence { params: &params, contacts, free_space, scan: &scan, tree: &tree, prior: None };
         let mut scratch = FieldScratch::default();
         for (depth, share) in [(0.02e-3, 0.5), (0.05e-3, 0.7), (0.1e-3, 0.9), (0.3e-3, 0.2)] {
             let [a, b] = [-share, 1.0 - share].map(|y| Point3::new(0.1e-3, y * RADIUS / 2.0, -depth));

@@ -1,4 +1,4 @@
-//! When two triangles may stand for the four around an edge: the tests of intersection-free contouring \[Ju Udeshi 2006\].
+//! When two triangles may replace the four around an edge: the tests of intersection-free contouring \[Ju Udeshi 2006\].
 //!
 //! Four cells meet at an edge E of the lattice, their vertices are c0 … c3. Where each segment from ci to ci+1 passes
 //! through the square between the two cells, the tetrahedra (E, ci, ci+1) belong to E alone; a triangle inside their union
@@ -175,7 +175,7 @@ mod tests {
         // c0 is drawn in so far that c1–c3 leaves it on the edge's side
         let c = points([(0.05, 0.05, 0.0), (-0.5, 0.9, 0.0), (-0.5, -0.6, 0.0), (0.9, -0.5, 0.0)]);
         assert_eq!(diagonal(&e0, &e1, &c, 1.0), Some(0));
-        // all four stand above the upper end of the edge
+        // all four lie above the upper end of the edge
         let high = c.map(|p| p + Vector3::new(0.0, 0.0, 0.7));
         assert_eq!(diagonal(&e0, &e1, &high, 1.0), None);
     }

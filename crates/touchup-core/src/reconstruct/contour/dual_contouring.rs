@@ -24,7 +24,7 @@ use crate::reconstruct::table::CellTable;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContourParams {
     /// eigenvalues of a cell's planes below this share of their sum count as noise: two planes make an edge when they
-    /// stand at more than 2 · atan √(share / (1 − share)) to each other, 37° for 0.1
+    /// are at more than 2 · atan √(share / (1 − share)) to each other, 37° for 0.1
     pub flat_share: f64,
     /// how far inside its cell a vertex stays, as a share of the pitch: what keeps triangles from losing their area
     pub margin: f64,
@@ -43,7 +43,7 @@ impl Default for ContourParams {
 ///
 /// - `values`: f at all corners of the cells of the region; a cell without is left out.
 /// - `cut`: the scan clipped at this region.
-/// - `crossing`: the crossing of an edge whose ends differ in sign; asked once for each, in a fixed order.
+/// - `crossing`: the crossing of an edge whose ends differ in sign; called once for each, in a fixed order.
 pub fn contour(
     lattice: &Lattice,
     region: &LatticeRegion,
@@ -55,7 +55,7 @@ pub fn contour(
     contour_in(lattice, region, &CellBox::ALL, values, cut, params, crossing)
 }
 
-/// As [`contour`], but of the new faces those alone that touch a cell in `core`: what else is in the patch, and stands
+/// As [`contour`], but of the new faces those alone that touch a cell in `core`: what else is in the patch, and is stored
 /// around, is not whole.
 ///
 /// - `values`: f at all corners of the cells of the region in `core` and around it.
@@ -163,7 +163,7 @@ struct Skin<'a, F> {
     shared: CellTable<Square, ()>,
     fans: Vec<FanTriangle>,
     trace: Trace,
-    /// the traces around the cell at hand, and their segments
+    /// the traces around the current cell, and their segments
     rim: Vec<Rim>,
     segments: Vec<TraceSegment>,
     planes: Planes,
@@ -403,7 +403,7 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
         self.shared.contains(&before) || after.is_some_and(|square| self.shared.contains(&square))
     }
 
-    /// The vertex on a square between two cells, on the segment that ends at `edge`; `None` where the straight way from
+    /// The vertex on a square between two cells, on the segment that ends at `edge`; `None` where the straight segment from
     /// one cell's vertex to the other's passes through the square and serves no other segment.
     fn middle(&mut self, edge: &Edge, square: &Square, around: [u32; 2], vertices: [u32; 2]) -> Option<u32> {
         let cells = around.map(|at| *self.cells.entry(at));
@@ -424,7 +424,7 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
             let (vertex, normal) = self.crossing(&edge);
             (self.patch.vertices.entry(vertex).1, normal)
         });
-        // several loops in one cell stay apart as long as each keeps to the hull of its crossings
+        // several loops in one cell stay disjoint as long as each keeps to the hull of its crossings
         let point = if is_plain { bend(self.lattice, square, &ends) } else { nalgebra::center(&ends[0].0, &ends[1].0) };
         Some(self.patch.vertices.insert_with(VertexKey::Square(*square, number), || point).0)
     }

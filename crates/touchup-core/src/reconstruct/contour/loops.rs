@@ -13,7 +13,7 @@ pub(in crate::reconstruct) const NONE: u8 = u8::MAX;
 pub(in crate::reconstruct) type Segments = [Option<[u8; 2]>; 2];
 
 /// The segments on a square from the signs at its corners (true: material). Where all four edges are crossed,
-/// `is_joined` tells whether the material in the two opposite corners is connected.
+/// `is_joined`: whether the material in the two opposite corners is connected.
 pub(in crate::reconstruct) fn segments(is_material: [bool; 4], is_joined: impl FnOnce() -> bool) -> Segments {
     let leaves = |i: usize| is_material[i] && !is_material[(i + 1) % 4];
     let enters = |i: usize| !is_material[i] && is_material[(i + 1) % 4];
@@ -156,7 +156,7 @@ mod tests {
         }
     }
 
-    /// Every pattern of signs gives closed loops that visit each crossed edge once.
+    /// Every pattern of signs gives closed loops that pass each crossed edge once.
     #[test]
     fn loops_close_for_every_pattern_of_signs() {
         for mask in 0..256u32 {

@@ -1,41 +1,41 @@
-//! The scan with its touched part meshed anew, and what is known of each vertex.
+//! The scan with its touched part remeshed, with support and uncertainty of each vertex.
 
 use crate::mesh::TriMesh;
 
-/// What a vertex rests on.
+/// The evidence for a vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Support {
     /// the scan
     Scan,
     /// touches
     Touched,
-    /// what touches, free space and scan nearby suggest; nothing was felt here
+    /// what touches, free space and scan nearby suggest; nothing was touched here
     Guessed,
-    /// as that, and nothing can be felt here: the ball does not go so far into an inner corner, or into what is narrower
+    /// as that, and nothing can be touched here: the ball does not go so far into an inner corner, or into what is narrower
     Unreachable,
 }
 
-/// A scan with its touched part meshed anew.
+/// A scan with its touched part remeshed.
 #[derive(Clone, Debug)]
 pub struct Patched {
     /// vertices and faces that were not touched keep their ids
     pub mesh: TriMesh,
-    /// what each vertex rests on, by id
+    /// the support of each vertex, by id
     pub support: Vec<Support>,
     /// standard deviation of each vertex along the normal, m, by id; none without [`crate::reconstruct::PatcherParams::uncertainty`]
     pub sigma: Vec<f64>,
     /// edge length of the lattice, m
     pub pitch: f64,
-    /// faces of the scan that went
+    /// faces of the scan that were removed
     pub removed_faces: usize,
-    /// faces that came
+    /// faces that were added
     pub added_faces: usize,
     /// squares on which scan and patch could not be joined
     pub open_squares: usize,
 }
 
 impl Support {
-    /// How much of it was felt: 1 touched, 0.5 guessed from touches nearby, 0 scan.
+    /// How much of it was touched: 1 touched, 0.5 guessed from touches nearby, 0 scan.
     fn touched(self) -> f32 {
         match self {
             Self::Touched => 1.0,
@@ -56,7 +56,7 @@ impl Support {
 }
 
 impl Patched {
-    /// What a file says of each vertex beside its position, by id: `touched`, `support`, and `sigma_mm` where that is known.
+    /// Columns of a file for each vertex beside its position, by id: `touched`, `support`, and `sigma_mm` where that is known.
     pub fn columns(&self) -> Vec<(&'static str, Vec<f32>)> {
         let of_support = |number: fn(Support) -> f32| self.support.iter().map(|&support| number(support)).collect();
         let mut columns = vec![("touched", of_support(Support::touched)), ("support", of_support(Support::number))];
@@ -84,6 +84,6 @@ mod tests {
         let sigma_mm = ("sigma_mm", vec![0.6f32, 2e-3, 0.1, 0.25]);
         assert_eq!(patched.columns(), [touched.clone(), number.clone(), sigma_mm]);
         patched.sigma.clear();
-        assert_eq!(patched.columns(), [touched, number], "nobody asked how well it is known");
+        assert_eq!(patched.columns(), [touched, number], "without uncertainty");
     }
 }

@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 const SWEEPS: usize = 6;
 /// Steps towards the best point on the rim of a box; the error falls by a half or more with each.
 const STEPS: usize = 16;
-/// Shares of the way from the start tried where the best point turns the surface over.
+/// Shares of the step from the start tried where the best point turns the surface over.
 const BACK: [f64; 3] = [0.5, 0.25, 0.0];
 /// A vertex lies on a plane to within this share of how far the crossings are from their mean.
 const ON_PLANE: f64 = 0.1;
@@ -64,7 +64,7 @@ impl Planes {
         self.unturned(start, &x)
     }
 
-    /// `start` + `best`, or the first point on the way back to `start` from which no step of the loop through the planes'
+    /// `start` + `best`, or the first point on the segment back to `start` from which no step of the loop through the planes'
     /// points, in their order, is seen from behind; where there is none, the one from which that is least.
     fn unturned(&self, start: &Point3<f64>, best: &Vector3<f64>) -> Point3<f64> {
         // on all planes at once it is their edge or corner, however its loop looks from there
@@ -204,7 +204,7 @@ mod tests {
         assert_eq!(found(0.2), 0.2);
         assert_eq!(found(0.5), 0.25);
         assert_eq!(found(0.9), 0.225);
-        // the other way round as well
+        // the reverse as well
         planes.list.reverse();
         assert_eq!(planes.unturned(&Point3::origin(), &Vector3::new(0.9, 0.0, 0.1)).x, 0.225);
     }

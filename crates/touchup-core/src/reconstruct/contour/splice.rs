@@ -16,7 +16,7 @@ pub struct Splice {
     added: Vec<FaceId>,
     placed: Vec<VertexId>,
     refit: Vec<FaceId>,
-    /// how many owners and faces of the delta at hand are done
+    /// how many owners and faces of the current delta are done
     next_owner: usize,
     next_face: usize,
 }
@@ -28,7 +28,7 @@ impl Splice {
     ///
     /// # Errors
     /// [`MeshError::TooMany`] when 32-bit ids do not suffice, [`MeshError::NotFinite`] for a position that is not finite;
-    /// the mesh is torn then.
+    /// the mesh is inconsistent then.
     pub fn apply(&mut self, delta: &PatchDelta, mesh: &mut TriMesh, tree: &mut FaceTree) -> Result<(), MeshError> {
         self.begin();
         self.go_on(delta, usize::MAX, mesh, tree)?;

@@ -1,4 +1,4 @@
-//! Whether the scan crosses a square on the rim of the region the way the field says it should.
+//! Whether the scan crosses a square on the rim of the region as the field prescribes.
 
 use nalgebra::{Point2, Point3};
 
@@ -23,7 +23,7 @@ pub struct OpenSquare {
 /// How the scan crosses a square.
 #[derive(Clone, Debug, Default)]
 pub(in crate::reconstruct) struct Trace {
-    /// numbers of the square's edges at which each polyline starts and ends, and where its points stand in `points`;
+    /// numbers of the square's edges at which each polyline starts and ends, and where its points are in `points`;
     /// walking along it with the normal of the scan up, the region is on the left
     pub lines: Vec<Polyline>,
     /// segments of all polylines, one after the other
@@ -87,7 +87,7 @@ impl Cut {
         all.len() <= SEGMENTS && self.chain(&edges, &all, trace) && !self.is_crossed(square, trace)
     }
 
-    /// The crossing of an edge by the scan, where it is the only one and goes the way the field says.
+    /// The crossing of an edge by the scan, where it is the only one and has the direction of the field.
     pub(in crate::reconstruct) fn shared_crossing(
         &self,
         edge: &Edge,

@@ -1,4 +1,4 @@
-//! How well the vertices of a patched mesh are known.
+//! Uncertainty of the vertices of a patched mesh.
 
 use nalgebra::Point3;
 

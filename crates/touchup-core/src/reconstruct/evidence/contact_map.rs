@@ -1,10 +1,10 @@
-//! What was touched, thinned to one mean contact for each small cell and facing.
+//! Contact map: one mean contact for each voxel and range of normals.
 //!
-//! Nothing is ever integrated into a field: the field is evaluated anew from what is stored here.
+//! Nothing is ever integrated into a field: the field is evaluated again from what is stored here.
 //!
 //! Contacts are independent from one pass to the next, not from sample to sample: [`IndependentPasses`] counts the passes. With a
 //! gate, a contact that contradicts the mean of its place (or of the place beside it, where it is the first) by more than
-//! both can be off is rejected. A second pass that says the same takes the place; one that confirms the mean forgets it.
+//! both can be off is rejected. A second pass that agrees with it relocates the mean; one that confirms the mean forgets it.
 
 use nalgebra::{Point3, Vector3};
 
@@ -77,16 +77,16 @@ struct Kept {
     /// the next mean of the same cell, [`NONE`] for the last
     next: u32,
     sums: ContactStatistics,
-    visits: IndependentPasses,
+    passes: IndependentPasses,
     /// number of what was rejected here, [`NONE`] where nothing is
-    apart: u32,
-    /// whether it stands in [`ContactMap::changed`]
+    rejected: u32,
+    /// whether it is in [`ContactMap::changed`]
     is_noted: bool,
     is_refuted: bool,
-    /// stands for two contacts at once
+    /// it mixes two contacts
     is_mixed: bool,
-    /// the mean when it was last told
-    told: (Point3<f64>, Vector3<f64>),
+    /// the mean when it was last reported
+    reported: (Point3<f64>, Vector3<f64>),
 }
 
 impl Kept {
@@ -96,21 +96,21 @@ impl Kept {
     }
 }
 
-/// What was there before a stroke, and `None` where nothing was.
+/// The state before a stroke; `None` where there was none.
 #[derive(Clone, Copy, Debug)]
 enum Past {
     Mean(Option<(Kept, MeanContact)>),
-    Apart(Option<Apart>),
+    Rejected(Option<RejectedContacts>),
 }
 
 /// Keys of means are their numbers, those of what was rejected have this bit too.
-const OF_APART: u32 = 1 << 31;
+const OF_REJECTED: u32 = 1 << 31;
 
 /// Contacts that contradict a mean and agree with each other.
 #[derive(Clone, Copy, Debug)]
-struct Apart {
+struct RejectedContacts {
     sums: ContactStatistics,
-    visits: IndependentPasses,
+    passes: IndependentPasses,
     last_ns: i64,
 }
 
@@ -125,7 +125,7 @@ pub struct ContactMap {
     kept: Vec<Kept>,
     means: Vec<MeanContact>,
     nearby: CellTable<LatticeNode, Vec<u32>>,
-    apart: Vec<Apart>,
+    rejected: Vec<RejectedContacts>,
     outliers: Outliers,
     /// the mean that the last contact went into, and when, ns
     last: Option<(u32, i64)>,
@@ -135,7 +135,7 @@ pub struct ContactMap {
 
 /// Normals whose components differ by less than this share a mean.
 const FACING: f64 = 0.25;
-/// A mean is told again when it has shifted along its normal by more than this, in cells: 5 µm for a ball of 1.5 mm …
+/// A mean is reported again when it has shifted along its normal by more than this, in cells: 5 µm for a ball of 1.5 mm …
 const SHIFT: f64 = 0.01;
 /// … or turned by more than this, rad: 0.3°, which are 5 µm a millimetre away.
 const TURN: f64 = 5e-3;
@@ -143,7 +143,7 @@ const TURN: f64 = 5e-3;
 const MOST_KEPT: usize = 200_000;
 /// None.
 const NONE: u32 = u32::MAX;
-/// A mean with less weight than this contradicts nothing; a sliding contact weighs 1.
+/// A mean with less weight than this contradicts nothing; a sliding contact has weight 1.
 const LEAST_EVIDENCE: f64 = 3.0;
 /// Normals within 25° are those of one surface.
 const ALIKE: f64 = 0.906;
@@ -151,8 +151,8 @@ const ALIKE: f64 = 0.906;
 const DEPTH: i32 = 3;
 /// Share of a cell by which a surface may be off the chord between two of its points.
 const ROUGHNESS: f64 = 0.02;
-/// So many cells away the contact before still says where the next one has to be.
-const WAY: f64 = 3.0;
+/// Up to so many cells away the previous contact predicts the next one.
+const PREDICTION_REACH: f64 = 3.0;
 /// So many windows without a contact part two passes.
 const PAUSE: i64 = 2;
 
@@ -169,7 +169,7 @@ impl ContactMap {
             kept: Vec::new(),
             means: Vec::new(),
             nearby: CellTable::default(),
-            apart: Vec::new(),
+            rejected: Vec::new(),
             outliers: Outliers::default(),
             last: None,
             changed: Vec::new(),
@@ -190,14 +190,14 @@ impl ContactMap {
         let index = self.place(own, &bin, contact);
         let kept = &mut self.kept[index as usize];
         kept.sums.add(contact);
-        let apart = kept.apart;
+        let rejected = kept.rejected;
         if let Some(gate) = self.gate
-            && kept.visits.note(contact.stamp_ns, contact.weight, gate.window_ns)
-            && apart != NONE
+            && kept.passes.note(contact.stamp_ns, contact.weight, gate.window_ns)
+            && rejected != NONE
         {
             // a pass that confirms the mean: what is rejected was an outlier
-            self.note_apart(apart);
-            self.apart[apart as usize].sums = ContactStatistics::ZERO;
+            self.note_rejected(rejected);
+            self.rejected[rejected as usize].sums = ContactStatistics::ZERO;
         }
         self.renew(index, contact);
         if self.kept[index as usize].sums.weight >= LEAST_EVIDENCE {
@@ -228,7 +228,7 @@ impl ContactMap {
     }
 
     /// The mean that a contact contradicts: that of its own cell, or where it is among the first there the nearest around
-    /// that faces alike, or where there is none the one before it on its way.
+    /// that faces alike, or where there is none the one before it on its path.
     fn rival(&self, contact: &SurfaceContact, cell: LatticeNode, own: Option<u32>, gate: &GateParams) -> Option<Rival> {
         let nearest = |found: &mut dyn Iterator<Item = u32>| {
             let distance = |index: u32| (self.means[index as usize].point - contact.point).norm_squared();
@@ -244,7 +244,7 @@ impl ContactMap {
         (sigmas > gate.sigmas).then_some(Rival { index, innovation, sigmas })
     }
 
-    /// Whether a mean speaks for the surface that a contact is of.
+    /// Whether a mean belongs to the surface that a contact is of.
     fn faces_alike(&self, index: u32, contact: &SurfaceContact) -> bool {
         let (kept, mean) = (&self.kept[index as usize], &self.means[index as usize]);
         kept.sums.weight >= LEAST_EVIDENCE && mean.normal.dot(&contact.normal) > ALIKE
@@ -262,33 +262,33 @@ impl ContactMap {
     fn before(&self, contact: &SurfaceContact, gate: &GateParams) -> Option<u32> {
         let (index, last_ns) = self.last?;
         let is_recent = contact.stamp_ns.saturating_sub(last_ns) <= gate.window_ns;
-        let way = (self.means[index as usize].point - contact.point).norm();
-        (is_recent && way < WAY * self.cell && self.faces_alike(index, contact)).then_some(index)
+        let distance = (self.means[index as usize].point - contact.point).norm();
+        (is_recent && distance < PREDICTION_REACH * self.cell && self.faces_alike(index, contact)).then_some(index)
     }
 
     fn innovation(&self, index: u32, contact: &SurfaceContact) -> (f64, f64) {
         let kept = &self.kept[index as usize];
-        kept.sums.innovation(&kept.visits, contact, ROUGHNESS * self.cell)
+        kept.sums.innovation(&kept.passes, contact, ROUGHNESS * self.cell)
     }
 
     /// Rejects a contact, or lets it take the place of the mean that it contradicts in a second pass.
     fn contest(&mut self, rival: &Rival, contact: &SurfaceContact, bin: &Bin, gate: &GateParams) -> Verdict {
         let roughness = ROUGHNESS * self.cell;
-        let at = self.apart_of(rival.index, contact.stamp_ns);
-        let apart = &mut self.apart[at as usize];
-        let agrees =
-            apart.sums.weight > 0.0 && apart.sums.innovation(&apart.visits, contact, roughness).1 <= gate.sigmas;
-        let is_second = agrees && contact.stamp_ns.saturating_sub(apart.last_ns) > PAUSE * gate.window_ns;
+        let at = self.rejected_of(rival.index, contact.stamp_ns);
+        let rejected = &mut self.rejected[at as usize];
+        let agrees = rejected.sums.weight > 0.0
+            && rejected.sums.innovation(&rejected.passes, contact, roughness).1 <= gate.sigmas;
+        let is_second = agrees && contact.stamp_ns.saturating_sub(rejected.last_ns) > PAUSE * gate.window_ns;
         if !agrees {
-            (apart.sums, apart.visits) = (ContactStatistics::ZERO, IndependentPasses::default());
+            (rejected.sums, rejected.passes) = (ContactStatistics::ZERO, IndependentPasses::default());
         }
-        apart.sums.add(contact);
-        apart.visits.note(contact.stamp_ns, contact.weight, gate.window_ns);
-        apart.last_ns = contact.stamp_ns;
+        rejected.sums.add(contact);
+        rejected.passes.note(contact.stamp_ns, contact.weight, gate.window_ns);
+        rejected.last_ns = contact.stamp_ns;
         if is_second {
-            let Apart { sums, visits, .. } =
-                std::mem::replace(apart, Apart { sums: ContactStatistics::ZERO, ..*apart });
-            self.move_to(rival.index, (sums, visits), contact, bin, gate.sigmas);
+            let RejectedContacts { sums, passes, .. } =
+                std::mem::replace(rejected, RejectedContacts { sums: ContactStatistics::ZERO, ..*rejected });
+            self.move_to(rival.index, (sums, passes), contact, bin, gate.sigmas);
             return Verdict::Relocated;
         }
         let SurfaceContact { stamp_ns, point, normal, .. } = *contact;
@@ -298,29 +298,29 @@ impl ContactMap {
     }
 
     /// Number of what is rejected of a mean, about to change.
-    fn apart_of(&mut self, index: u32, stamp_ns: i64) -> u32 {
-        let at = self.kept[index as usize].apart;
+    fn rejected_of(&mut self, index: u32, stamp_ns: i64) -> u32 {
+        let at = self.kept[index as usize].rejected;
         if at != NONE {
-            self.note_apart(at);
+            self.note_rejected(at);
             return at;
         }
         self.note_mean(index);
-        let at = self.apart.len() as u32;
-        self.history.note(at | OF_APART, || Past::Apart(None));
-        self.apart.push(Apart {
+        let at = self.rejected.len() as u32;
+        self.history.note(at | OF_REJECTED, || Past::Rejected(None));
+        self.rejected.push(RejectedContacts {
             sums: ContactStatistics::ZERO,
-            visits: IndependentPasses::default(),
+            passes: IndependentPasses::default(),
             last_ns: stamp_ns,
         });
-        self.kept[index as usize].apart = at;
+        self.kept[index as usize].rejected = at;
         at
     }
 
-    /// Empties the means that a contact contradicts and puts what was rejected in the cell where it was felt.
+    /// Empties the means that a contact contradicts and puts what was rejected in the cell of its contacts.
     fn move_to(
         &mut self,
         rival: u32,
-        (sums, visits): (ContactStatistics, IndependentPasses),
+        (sums, passes): (ContactStatistics, IndependentPasses),
         contact: &SurfaceContact,
         bin: &Bin,
         sigmas: f64,
@@ -334,16 +334,16 @@ impl ContactMap {
         let old: Vec<u32> = self.around(contact, bin.cell).chain([rival]).filter(contradicts).collect();
         for index in old {
             self.note_mean(index);
-            self.tell(index);
+            self.note_change(index);
             let old = &mut self.kept[index as usize];
-            (old.sums, old.visits) = (ContactStatistics::ZERO, IndependentPasses::default());
+            (old.sums, old.passes) = (ContactStatistics::ZERO, IndependentPasses::default());
             self.means[index as usize].weight = 0.0;
         }
         let index = self.place(self.find(bin), bin, contact);
         let kept = &mut self.kept[index as usize];
-        (kept.sums, kept.visits) = (sums, visits);
+        (kept.sums, kept.passes) = (sums, passes);
         self.renew(index, contact);
-        self.tell(index);
+        self.note_change(index);
     }
 
     /// The mean of a bin, about to change; a new one where there is none.
@@ -360,13 +360,13 @@ impl ContactMap {
         history.note(index, || Past::Mean(Some((kept[index as usize], means[index as usize]))));
     }
 
-    fn note_apart(&mut self, at: u32) {
-        let Self { history, apart, .. } = self;
-        history.note(at | OF_APART, || Past::Apart(Some(apart[at as usize])));
+    fn note_rejected(&mut self, at: u32) {
+        let Self { history, rejected, .. } = self;
+        history.note(at | OF_REJECTED, || Past::Rejected(Some(rejected[at as usize])));
     }
 
     /// Notes that a mean has changed.
-    fn tell(&mut self, index: u32) {
+    fn note_change(&mut self, index: u32) {
         if !std::mem::replace(&mut self.kept[index as usize].is_noted, true) {
             self.changed.push(index);
         }
@@ -383,15 +383,15 @@ impl ContactMap {
             facing: bin.facing,
             next: NONE,
             sums: ContactStatistics::ZERO,
-            visits: IndependentPasses::default(),
-            apart: NONE,
+            passes: IndependentPasses::default(),
+            rejected: NONE,
             is_noted: false,
             is_refuted: false,
             is_mixed: false,
-            told: (point, normal),
+            reported: (point, normal),
         };
         self.push(kept, MeanContact { point, normal, weight, is_fan: false });
-        self.tell(index);
+        self.note_change(index);
         index
     }
 
@@ -406,7 +406,7 @@ impl ContactMap {
         self.means.push(mean);
     }
 
-    /// Takes out the mean that came last.
+    /// Removes the mean inserted last.
     fn pop(&mut self) -> Option<(Kept, MeanContact)> {
         let (kept, mean) = (self.kept.pop()?, self.means.pop()?);
         if kept.next == NONE {
@@ -423,7 +423,7 @@ impl ContactMap {
     /// Brings a mean up to its sums, unless it was refuted.
     fn renew(&mut self, index: u32, contact: &SurfaceContact) {
         let (kept, mean) = (&self.kept[index as usize], &mut self.means[index as usize]);
-        let (point, normal) = &kept.told;
+        let (point, normal) = &kept.reported;
         mean.point = kept.sums.point();
         mean.normal = kept.sums.normal.try_normalize(0.0).unwrap_or(contact.normal);
         let before = std::mem::replace(&mut mean.weight, kept.weight());
@@ -432,7 +432,7 @@ impl ContactMap {
             || (mean.point - point).dot(normal).abs() > SHIFT * self.cell
             || (mean.normal - normal).norm_squared() > TURN * TURN;
         if is_shifted {
-            self.tell(index);
+            self.note_change(index);
         }
     }
 
@@ -446,7 +446,7 @@ impl ContactMap {
         self.history.len()
     }
 
-    /// Takes back what came since the last stroke began. Returns whether there was one.
+    /// Undoes the last stroke. Returns whether there was one.
     pub fn undo(&mut self) -> bool {
         self.exchange(|history, swap| history.undo(swap))
     }
@@ -465,9 +465,9 @@ impl ContactMap {
         has_changed
     }
 
-    /// Exchanges what is there with what was kept of it; what came last goes first.
+    /// Exchanges what is there with what was kept of it; the last insertion is undone first.
     fn swap(&mut self, key: u32, past: &mut Past) {
-        let at = (key & !OF_APART) as usize;
+        let at = (key & !OF_REJECTED) as usize;
         match past {
             Past::Mean(kept) => match kept.take() {
                 None => *kept = self.pop(),
@@ -479,45 +479,45 @@ impl ContactMap {
                     *kept = Some((std::mem::replace(there.0, state), std::mem::replace(there.1, mean)));
                 }
             },
-            Past::Apart(kept) => match kept.take() {
-                None => *kept = self.apart.pop(),
-                Some(apart) if at == self.apart.len() => self.apart.push(apart),
-                Some(apart) => *kept = Some(std::mem::replace(&mut self.apart[at], apart)),
+            Past::Rejected(kept) => match kept.take() {
+                None => *kept = self.rejected.pop(),
+                Some(rejected) if at == self.rejected.len() => self.rejected.push(rejected),
+                Some(rejected) => *kept = Some(std::mem::replace(&mut self.rejected[at], rejected)),
             },
         }
     }
 
-    /// The numbers of the means that came since this was last asked, or are clearly elsewhere than when they were last
-    /// told, each once.
+    /// The numbers of the means that are new since the last call, or are clearly elsewhere than when they were last
+    /// reported, each once.
     pub(crate) fn take_changed(&mut self) -> Vec<u32> {
         let changed = std::mem::take(&mut self.changed);
         for &at in &changed {
             let (kept, mean) = (&mut self.kept[at as usize], &self.means[at as usize]);
-            (kept.is_noted, kept.told) = (false, (mean.point, mean.normal));
+            (kept.is_noted, kept.reported) = (false, (mean.point, mean.normal));
         }
         changed
     }
 
-    /// Lets [`Self::take_changed`] tell all means.
+    /// Lets [`Self::take_changed`] report all means.
     pub(crate) fn note_all(&mut self) {
         self.changed = (0..self.means.len() as u32).collect();
         self.kept.iter_mut().for_each(|kept| kept.is_noted = true);
     }
 
-    /// How well one pass knows a mean.
+    /// Uncertainty of a mean by one pass.
     pub(in crate::reconstruct) fn sigma(&self, index: u32) -> ContactSigma {
         self.kept[index as usize].sums.sigma()
     }
 
     /// Variance of a mean along its normal by noise and calibration, m²: noise averages out by the number of passes.
     pub(in crate::reconstruct) fn variance(&self, index: u32) -> f64 {
-        let (sigma, visits) = (self.sigma(index), self.kept[index as usize].visits.count().max(1));
-        sigma.noise * sigma.noise / f64::from(visits) + sigma.calibration * sigma.calibration
+        let (sigma, passes) = (self.sigma(index), self.kept[index as usize].passes.count().max(1));
+        sigma.noise * sigma.noise / f64::from(passes) + sigma.calibration * sigma.calibration
     }
 
     /// The passes over the place of a mean.
-    pub(in crate::reconstruct) fn visits(&self, index: u32) -> impl Iterator<Item = &Pass> + '_ {
-        self.kept[index as usize].visits.iter()
+    pub(in crate::reconstruct) fn passes(&self, index: u32) -> impl Iterator<Item = &Pass> + '_ {
+        self.kept[index as usize].passes.iter()
     }
 
     /// What was rejected.
@@ -533,7 +533,7 @@ impl ContactMap {
         (before == 0.0) != (mean.weight == 0.0)
     }
 
-    /// Takes a mean that stands for two contacts out of all queries, or back in; returns whether that is new.
+    /// Takes a mean of two mixed contacts out of all queries, or back in; returns whether that is new.
     pub(in crate::reconstruct) fn mark_mixed(&mut self, at: u32, is_mixed: bool) -> bool {
         let (kept, mean) = (&mut self.kept[at as usize], &mut self.means[at as usize]);
         kept.is_mixed = is_mixed;
@@ -541,7 +541,7 @@ impl ContactMap {
         (before == 0.0) != (mean.weight == 0.0)
     }
 
-    /// What was felt at a mean, whether it counts in queries or not, in contacts while sliding.
+    /// Weight of the contacts of a mean, whether it counts in queries or not, in contacts while sliding.
     pub(in crate::reconstruct) fn weight(&self, at: u32) -> f64 {
         self.kept[at as usize].sums.weight
     }
@@ -652,7 +652,7 @@ mod tests {
     }
 
     #[test]
-    fn clear_changes_are_told_once() {
+    fn clear_changes_are_reported_once() {
         let mut store = ContactMap::new(0.5e-3, 3e-3, None);
         for x in [0.6e-3, 0.1e-3, 0.2e-3, 0.7e-3] {
             store.add(&contact(x, Vector3::z(), 1.0));
@@ -679,7 +679,7 @@ mod tests {
     }
 
     #[test]
-    fn what_contradicts_is_rejected_until_a_second_pass_insists() {
+    fn what_contradicts_is_rejected_until_a_second_pass_agrees() {
         let gate = GateParams { sigmas: 4.0, window_ns: 64_000_000 };
         let second = 1_000_000_000;
         // within the cell, and in the one above

@@ -1,4 +1,4 @@
-//! Contacts of one place added up, and how far another one is off them.
+//! Contact statistics: sums over the contacts of one place, and the innovation of another one.
 
 use nalgebra::{Point3, Vector3};
 
@@ -49,7 +49,7 @@ impl ContactStatistics {
         Point3::from(self.point / self.weight)
     }
 
-    /// How well one pass of those that were added knows the place.
+    /// Uncertainty of the place by one of the passes that were added.
     pub fn sigma(&self) -> ContactSigma {
         let [noise, reach, tilt] = [self.noise, self.reach, self.tilt].map(|sum| (sum / self.weight).sqrt());
         ContactSigma { noise, reach, calibration: self.calibration / self.weight, normal: tilt }
@@ -59,7 +59,7 @@ impl ContactStatistics {
     /// angles to the mean of both normals, unless one is known much better. What calibration leaves is the same in both.
     ///
     /// - `roughness`: by which the surface itself may be off a chord, m.
-    pub fn innovation(&self, visits: &IndependentPasses, contact: &SurfaceContact, roughness: f64) -> (f64, f64) {
+    pub fn innovation(&self, passes: &IndependentPasses, contact: &SurfaceContact, roughness: f64) -> (f64, f64) {
         let normal = self.normal.try_normalize(0.0).unwrap_or(contact.normal);
         let arm = contact.point - self.point();
         let own = self.sigma();
@@ -69,7 +69,7 @@ impl ContactStatistics {
         let across = (arm.norm_squared() - off * off).max(0.0);
         let [of_mean, of_one] = [own, contact.sigma].map(|sigma| sigma.noise.powi(2) + sigma.reach.powi(2));
         let variance = of_one
-            + of_mean / f64::from(visits.count().max(1))
+            + of_mean / f64::from(passes.count().max(1))
             + across * tilt * of_contact / (tilt + of_contact)
             + roughness * roughness;
         (off, off.abs() / variance.sqrt().max(f64::MIN_POSITIVE))

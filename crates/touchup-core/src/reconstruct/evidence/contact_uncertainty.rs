@@ -1,4 +1,4 @@
-//! How well a contact is known, cause by cause.
+//! Uncertainty of a contact, cause by cause.
 //!
 //! Along the normal a contact is off by noise of the pose and of the force over the stiffness, both after the smoothing
 //! window, and by r (1 − cos σ) where its normal is off by σ: that much the ball reaches over the surface. These average out
@@ -43,7 +43,7 @@ const SHARED_NOISE: f64 = 1.65;
 
 impl ContactSigma {
     /// - `noise`: of the centre by the pose and by the force, after smoothing, m.
-    /// - `bend`: what the stylus gave way along the normal, m.
+    /// - `bend`: deflection of the stylus along the normal, m.
     /// - `normal`: of its direction, rad.
     /// - `radius`: of the ball, m.
     pub(in crate::reconstruct) fn of(
@@ -69,7 +69,7 @@ pub(in crate::reconstruct) struct ForceNoise {
     step: f64,
 }
 
-/// Step of the running median: settles within some hundred samples.
+/// Step of the running median: converges within some hundred samples.
 const NOISE_STEP: f64 = 0.01;
 /// Where it starts, N.
 const USUAL_STEP: f64 = 0.1;

@@ -1,4 +1,4 @@
-//! A ball that touches two surfaces at once, as in an inner corner or a slot no wider than itself.
+//! Double contact: a ball that touches two surfaces at once, as in an inner corner or a slot no wider than itself.
 //!
 //! The force is then the sum of two, and lies anywhere between their normals: taken for one normal it invents a surface
 //! that bridges the corner. Where both surfaces are known from contacts nearby, and the ball lies on both, it is two
@@ -13,21 +13,21 @@ use crate::reconstruct::evidence::touches::SurfaceContact;
 /// The ball lies on a surface when its centre is its radius away to within this share of it: four times the noise of a usual
 /// tracker, and less than it would be off at 20° beside an edge.
 const ON_SURFACE: f64 = 0.05;
-/// Contacts within this many radii of where the ball would touch their plane speak for it.
+/// Contacts within this many radii of where the ball would touch their plane support it.
 const NEARBY: f64 = 1.0;
-/// … and within this many radii of where the ball seems to touch: a new one is told to what is so far away.
+/// … and within this many radii of where the ball seems to touch: a new contact affects means up to there.
 const ASKED: f64 = 2.0;
 /// Contacts that face within 20° of each other are of one surface.
 const ALIKE: f64 = 0.94;
 /// Surfaces at less than 45° to each other are one that bends: beside an edge the ball may lie on both to within the noise.
-const APART: f64 = 0.707;
+const DISTINCT: f64 = 0.707;
 /// A surface that takes less of the force than this share of the other one, 6°, is not pressed.
 const PRESSED: f64 = 0.1;
 /// Sine of how far the force may be off the plane of both normals: 20°, what friction leaves uncertain.
 const OFF_PLANE: f64 = 0.34;
 /// A surface is known by as much as so many contacts while sliding.
 const LEAST_WEIGHT: f64 = 2.0;
-/// The two take no more together than this many times what is felt: a corner of 75° or wider, and no wedge.
+/// The two take no more together than this many times the measured force: a corner of 75° or wider, and no wedge.
 const MOST_FORCE: f64 = 1.6;
 /// Standard deviation of the centres of the balls that touched either surface, across the corner, in radii: those of a ball
 /// that bridges it all lie on one line, to within the noise …
@@ -70,9 +70,9 @@ impl TouchedWall {
     }
 }
 
-/// The two contacts of a ball of `radius` (m) with its centre at `centre` (m, in O) for which the one felt along `normal`
-/// stands; `None` when it touches one surface, or the two are not known.
-pub(in crate::reconstruct) fn two_points(
+/// The two contacts of a ball of `radius` (m) with its centre at `centre` (m, in O) that the one measured along `normal`
+/// is the resultant of; `None` when it touches one surface, or the two are not known.
+pub(in crate::reconstruct) fn double_contact(
     contacts: &ContactMap,
     radius: f64,
     centre: &Point3<f64>,
@@ -83,13 +83,13 @@ pub(in crate::reconstruct) fn two_points(
     let pairs = known().enumerate().flat_map(|(at, a)| known().skip(at + 1).map(move |b| [a, b]));
     // two bridges of one corner are no walls of another
     let between = pairs.filter(|[a, b]| {
-        let is_corner = a.facing.dot(&b.facing) < APART && is_between(normal, &a.facing, &b.facing);
+        let is_corner = a.facing.dot(&b.facing) < DISTINCT && is_between(normal, &a.facing, &b.facing);
         is_corner && is_wide([a.width(b), b.width(a)], radius)
     });
     between.map(|[a, b]| [a.facing, b.facing]).min_by(|[a, b], [c, d]| a.dot(b).total_cmp(&c.dot(d)))
 }
 
-/// Whether two surfaces were touched from places so far apart (m) that none of them is a bridge over their corner.
+/// Whether two surfaces were touched from places so far from each other (m) that none of them is a bridge over their corner.
 fn is_wide([a, b]: [f64; 2], radius: f64) -> bool {
     a.min(b) > SPREAD * radius || a.max(b) > WIDE_SPREAD * radius
 }
@@ -101,7 +101,7 @@ pub(in crate::reconstruct) fn split(
     centre: &Point3<f64>,
     contact: &SurfaceContact,
 ) -> Option<[SurfaceContact; 2]> {
-    let normals = two_points(contacts, radius, centre, &contact.normal)?;
+    let normals = double_contact(contacts, radius, centre, &contact.normal)?;
     Some(normals.map(|normal| SurfaceContact {
         point: centre - normal * radius,
         normal,
@@ -113,12 +113,12 @@ pub(in crate::reconstruct) fn split(
 /// Whether a mean was kept as one contact before it was known to be two.
 pub(in crate::reconstruct) fn is_mixed(contacts: &ContactMap, radius: f64, at: u32) -> bool {
     let mean = &contacts.means()[at as usize];
-    two_points(contacts, radius, &(mean.point + mean.normal * radius), &mean.normal).is_some()
+    double_contact(contacts, radius, &(mean.point + mean.normal * radius), &mean.normal).is_some()
 }
 
 /// The surfaces that a ball lies on, and how many.
 ///
-/// - `point`: where it seems to touch, m: what is farther from there than two radii is not asked.
+/// - `point`: where it seems to touch, m: means farther from there than two radii are not used.
 fn walls(
     contacts: &ContactMap,
     radius: f64,
@@ -143,7 +143,7 @@ fn walls(
         if at < MOST {
             count = count.max(at + 1);
             let wall = &mut walls[at];
-            // walls bend: what is nearest says how they face here
+            // walls bend: the nearest mean has their normal here
             let nearness = 1.0 - aside_squared / (NEARBY * radius).powi(2);
             wall.normal += mean.normal * (weight * nearness * nearness);
             wall.facing = wall.normal.try_normalize(0.0).unwrap_or(mean.normal);
@@ -217,9 +217,9 @@ mod tests {
             }
         }
         // the floor alone is pressed, or the ball is 0.2 mm from the wall
-        assert_eq!(two_points(&store, RADIUS, &centre, &Vector3::new(0.05, 0.0, 1.0).normalize()), None);
+        assert_eq!(double_contact(&store, RADIUS, &centre, &Vector3::new(0.05, 0.0, 1.0).normalize()), None);
         let beside = centre + Vector3::x() * 0.2e-3;
-        assert_eq!(two_points(&store, RADIUS, &beside, &Vector3::new(1.0, 0.0, 1.0).normalize()), None);
+        assert_eq!(double_contact(&store, RADIUS, &beside, &Vector3::new(1.0, 0.0, 1.0).normalize()), None);
     }
 
     #[test]
@@ -228,7 +228,7 @@ mod tests {
         for degrees in [5.0f64, 25.0, 45.0, 85.0] {
             let (sin, cos) = degrees.to_radians().sin_cos();
             let normal = Vector3::new(-sin, 0.0, cos);
-            assert_eq!(two_points(&store, RADIUS, &(Point3::origin() + normal * RADIUS), &normal), None);
+            assert_eq!(double_contact(&store, RADIUS, &(Point3::origin() + normal * RADIUS), &normal), None);
         }
     }
 

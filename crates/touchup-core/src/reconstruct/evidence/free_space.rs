@@ -1,4 +1,4 @@
-//! Where the tip has been: no material can be there.
+//! Free space: the volume that the tip has swept, where no material can be.
 
 use nalgebra::{Point3, Vector3};
 
@@ -8,27 +8,27 @@ use crate::reconstruct::field::lattice::{CellBox, LatticeNode};
 use crate::reconstruct::table::Key;
 use crate::stylus::{TipBody, TipPlace};
 
-/// Cosine of the widest angle between a way and what counts as straight ahead: 45°.
+/// Cosine of the widest angle between a path and what counts as straight ahead: 45°.
 const STRAIGHT: f64 = 0.7;
 /// A tip that leans by more than this, as the difference of a component of its axis, is kept beside one in the same cell:
 /// 2°, which moves a shaft of two radii by a fourteenth of a radius.
 const LEAN: f64 = 0.035;
-/// A body that is no ball is told apart from free space up to this share of its scale around it.
+/// Free space around a body that is no ball is resolved up to this share of its scale around it.
 const AROUND: f64 = 2.0 / 3.0;
 
-/// Places of the tip, thinned to one for each small cell.
+/// Places of the tip, one kept per voxel.
 #[derive(Clone, Debug)]
-pub(crate) struct SweptSpace {
+pub(crate) struct FreeSpace {
     cell: f64,
     reach: f64,
     centres: VoxelSet<LatticeNode, Point3<f64>>,
-    body: Option<SweptBody>,
+    body: Option<SweptVolume>,
     changed: Vec<Point3<f64>>,
 }
 
 /// A tip that is no ball.
 #[derive(Clone, Debug)]
-struct SweptBody {
+struct SweptVolume {
     tip: TipBody,
     /// edge of the cells of one place, m
     cell: f64,
@@ -51,15 +51,15 @@ impl Key for Posture {
     }
 }
 
-impl SweptSpace {
-    /// Nothing swept yet: one centre is kept for each cube of edge `cell` (m), queries go up to `reach` (m).
+impl FreeSpace {
+    /// Empty: one centre is kept for each cube of edge `cell` (m), queries go up to `reach` (m).
     pub fn new(cell: f64, reach: f64) -> Self {
         Self { cell, reach, centres: VoxelSet::default(), body: None, changed: Vec::new() }
     }
 
-    /// Nothing swept yet by a tip of any shape, of which one place is kept for each cube of edge `cell` (m).
+    /// Empty, for a tip of any shape: one place is kept for each cube of edge `cell` (m).
     pub fn of_tip(tip: TipBody, cell: f64, reach: f64) -> Self {
-        let body = (!tip.is_ball()).then(|| SweptBody { tip, cell, places: VoxelSet::default() });
+        let body = (!tip.is_ball()).then(|| SweptVolume { tip, cell, places: VoxelSet::default() });
         Self { body, ..Self::new(cell, reach) }
     }
 
@@ -85,14 +85,14 @@ impl SweptSpace {
             let stays = |centre: &Point3<f64>| (centre - p).norm_squared() >= distance * distance;
             centres.retain(bin, |centre| voxel_of(centre, *cell), stays, |centre| changed.push(*centre));
         }
-        let Some(SweptBody { tip, cell, places }) = body else { return };
+        let Some(SweptVolume { tip, cell, places }) = body else { return };
         for bin in bins_around(p, tip.scale(), tip.bound().1 + distance).iter() {
             let stays = |place: &TipPlace| tip.signed_distance(place, p) + tip.scale() >= distance;
             places.retain(bin, |place| posture(place, *cell), stays, |place| changed.push(place.centre));
         }
     }
 
-    /// The middles of balls that cover what came since this was last asked, and of what went.
+    /// The middles of balls that cover what was added or removed since the last call.
     pub fn take_changed(&mut self) -> Vec<Point3<f64>> {
         std::mem::take(&mut self.changed)
     }
@@ -108,11 +108,11 @@ impl SweptSpace {
         self.body.as_ref().map_or(usize::MAX, |body| body.places.strokes()).min(self.centres.strokes())
     }
 
-    /// Takes back what came since the last stroke began. Returns whether there was one.
+    /// Undoes the last stroke. Returns whether there was one.
     pub fn undo(&mut self) -> bool {
         let Self { cell, centres, body, .. } = self;
         self.changed.clear();
-        body.iter_mut().for_each(|SweptBody { cell, places, .. }| {
+        body.iter_mut().for_each(|SweptVolume { cell, places, .. }| {
             places.undo(|place| posture(place, *cell));
         });
         centres.undo(|centre| voxel_of(centre, *cell))
@@ -122,7 +122,7 @@ impl SweptSpace {
     pub fn redo(&mut self) -> bool {
         let Self { cell, centres, body, .. } = self;
         self.changed.clear();
-        body.iter_mut().for_each(|SweptBody { cell, places, .. }| {
+        body.iter_mut().for_each(|SweptVolume { cell, places, .. }| {
             places.redo(|place| posture(place, *cell));
         });
         centres.redo(|centre| voxel_of(centre, *cell))
@@ -138,7 +138,7 @@ impl SweptSpace {
         self.body.as_ref().map_or(radius, |body| body.tip.cover().1)
     }
 
-    /// Calls `each` with the middles of balls that together cover what was swept, m.
+    /// Calls `each` with the middles of balls that together cover the swept volume, m.
     pub fn cover(&self, mut each: impl FnMut(&Point3<f64>)) {
         match &self.body {
             None => self.centres().for_each(each),
@@ -146,7 +146,7 @@ impl SweptSpace {
         }
     }
 
-    /// Whether the way of the ball ended at `centre`, going in `direction` (unit): within `width` (m) all of it is behind.
+    /// Whether the path of the ball ended at `centre`, going in `direction` (unit): within `width` (m) all of it is behind.
     pub fn is_end(&self, centre: &Point3<f64>, direction: &Vector3<f64>, width: f64) -> bool {
         let (mut sum, mut count) = (Vector3::zeros(), 0.0f64);
         for bin in voxel_neighbourhood(voxel_of(centre, self.reach)) {
@@ -157,7 +157,7 @@ impl SweptSpace {
                 }
             }
         }
-        // on a straight way the mean is half the width behind
+        // on a straight path the mean is half the width behind
         let behind = -sum.dot(direction) / count.max(1.0);
         behind > STRAIGHT * sum.norm() / count.max(1.0) && behind > width / 4.0
     }
@@ -182,7 +182,7 @@ impl SweptSpace {
     }
 }
 
-impl SweptBody {
+impl SweptVolume {
     /// The cell of a place.
     fn bin(&self, place: &TipPlace) -> LatticeNode {
         voxel_of(&(place.centre + place.axis * self.tip.bound().0), self.tip.scale())
@@ -194,7 +194,7 @@ impl SweptBody {
         heights.iter().for_each(|&height| each(&(centre + axis * height)));
     }
 
-    /// As [`SweptSpace::nearest`].
+    /// As [`FreeSpace::nearest`].
     fn nearest(&self, x: &Point3<f64>) -> Option<(f64, Point3<f64>)> {
         let (middle, bound) = self.tip.bound();
         let size = self.tip.scale();
@@ -242,15 +242,15 @@ mod tests {
     }
 
     #[test]
-    fn a_way_ends_where_all_of_it_is_behind() {
-        let mut swept = SweptSpace::new(0.1e-3, 2e-3);
+    fn a_path_ends_where_all_of_it_is_behind() {
+        let mut free_space = FreeSpace::new(0.1e-3, 2e-3);
         for i in 0..=100 {
-            swept.add_place(&upright(Point3::new(0.0, 0.0, f64::from(i) * -1e-4)));
+            free_space.add_place(&upright(Point3::new(0.0, 0.0, f64::from(i) * -1e-4)));
         }
         let [top, middle, bottom] = [0.0, -5e-3, -1e-2].map(|z| Point3::new(0.0, 0.0, z));
-        assert!(swept.is_end(&bottom, &-Vector3::z(), 1e-3) && swept.is_end(&top, &Vector3::z(), 1e-3));
-        assert!(!swept.is_end(&bottom, &Vector3::z(), 1e-3) && !swept.is_end(&bottom, &Vector3::x(), 1e-3));
-        assert!(!swept.is_end(&middle, &-Vector3::z(), 1e-3) && !swept.is_end(&middle, &Vector3::x(), 1e-3));
+        assert!(free_space.is_end(&bottom, &-Vector3::z(), 1e-3) && free_space.is_end(&top, &Vector3::z(), 1e-3));
+        assert!(!free_space.is_end(&bottom, &Vector3::z(), 1e-3) && !free_space.is_end(&bottom, &Vector3::x(), 1e-3));
+        assert!(!free_space.is_end(&middle, &-Vector3::z(), 1e-3) && !free_space.is_end(&middle, &Vector3::x(), 1e-3));
     }
 
     #[test]
@@ -267,40 +267,41 @@ mod tests {
         ];
         for (shape, radius, wide, low) in shapes {
             let tip = TipBody::new(shape, radius).unwrap();
-            let mut swept = SweptSpace::of_tip(tip, 0.1e-3, 1.0);
+            let mut free_space = FreeSpace::of_tip(tip, 0.1e-3, 1.0);
             // along x, upright: 2 mm above its origin the tip is `wide` to either side
             for i in 0..=100 {
                 let centre = Point3::new(f64::from(i) * 1e-4, 0.0, 0.0);
-                swept.add_place(&TipPlace { centre, axis: Vector3::z() });
+                free_space.add_place(&TipPlace { centre, axis: Vector3::z() });
             }
-            let depth = |y: f64, z: f64| swept.nearest(&Point3::new(5e-3, y, z)).map(|found| tip.scale() - found.0);
+            let depth =
+                |y: f64, z: f64| free_space.nearest(&Point3::new(5e-3, y, z)).map(|found| tip.scale() - found.0);
             assert!(depth(wide - 0.05e-3, 2e-3).unwrap() > 0.0 && depth(wide + 0.05e-3, 2e-3).unwrap() < 0.0);
             assert!(depth(0.0, low - 0.05e-3).unwrap() < 0.0);
             assert_eq!(depth(0.0, low - 2e-3), None, "far below");
             let (mut covered, mut farthest) = (0, 0.0f64);
-            swept.cover(|middle| {
+            free_space.cover(|middle| {
                 covered += 1;
                 farthest = farthest.max(middle.y.abs());
             });
-            assert!(covered >= 101 && farthest == 0.0 && swept.cover_radius(0.0) >= wide);
+            assert!(covered >= 101 && farthest == 0.0 && free_space.cover_radius(0.0) >= wide);
         }
     }
 
     #[test]
     fn the_nearest_centre_is_found_up_to_the_reach() {
-        let mut swept = SweptSpace::new(0.1e-3, 2e-3);
+        let mut free_space = FreeSpace::new(0.1e-3, 2e-3);
         for i in 0..1000 {
-            swept.add_place(&upright(Point3::new(f64::from(i) * 1e-5, 0.0, 0.0)));
+            free_space.add_place(&upright(Point3::new(f64::from(i) * 1e-5, 0.0, 0.0)));
         }
-        assert_eq!(swept.centres().count(), 100, "one for each tenth of a millimetre");
-        let (distance, centre) = swept.nearest(&Point3::new(5e-3, 1.2e-3, 0.0)).unwrap();
+        assert_eq!(free_space.centres().count(), 100, "one for each tenth of a millimetre");
+        let (distance, centre) = free_space.nearest(&Point3::new(5e-3, 1.2e-3, 0.0)).unwrap();
         assert!((distance - 1.2e-3).abs() < 1e-5 && (centre.x - 5e-3).abs() < 1e-4);
-        assert_eq!(swept.nearest(&Point3::new(5e-3, 2.1e-3, 0.0)), None);
+        assert_eq!(free_space.nearest(&Point3::new(5e-3, 2.1e-3, 0.0)), None);
         // what is forgotten can be swept again
-        swept.forget(&Point3::new(5e-3, 0.0, 0.0), 1.01e-3);
-        let nearest = |swept: &SweptSpace| swept.nearest(&Point3::new(5e-3, 0.0, 0.0)).unwrap().0;
-        assert!(nearest(&swept) > 1e-3 && swept.centres().count() < 82);
-        swept.add_place(&upright(Point3::new(5.01e-3, 0.0, 0.0)));
-        assert!(nearest(&swept) < 0.02e-3);
+        free_space.forget(&Point3::new(5e-3, 0.0, 0.0), 1.01e-3);
+        let nearest = |free_space: &FreeSpace| free_space.nearest(&Point3::new(5e-3, 0.0, 0.0)).unwrap().0;
+        assert!(nearest(&free_space) > 1e-3 && free_space.centres().count() < 82);
+        free_space.add_place(&upright(Point3::new(5.01e-3, 0.0, 0.0)));
+        assert!(nearest(&free_space) < 0.02e-3);
     }
 }

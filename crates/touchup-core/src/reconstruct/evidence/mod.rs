@@ -1,4 +1,4 @@
-//! What is known of the surface: contacts, where the tip has been, what the scan says.
+//! Evidence for the surface: contacts, free space, signed distance of the scan.
 
 pub(in crate::reconstruct) mod contact_map;
 pub(in crate::reconstruct) mod contact_statistics;
@@ -9,7 +9,7 @@ pub(in crate::reconstruct) mod outliers;
 pub(in crate::reconstruct) mod passes;
 pub(in crate::reconstruct) mod point_evidence;
 pub(in crate::reconstruct) mod probed_log;
-pub(in crate::reconstruct) mod scan_value;
+pub(in crate::reconstruct) mod scan_distance;
 pub(in crate::reconstruct) mod touch_history;
 pub(in crate::reconstruct) mod touches;
 pub(in crate::reconstruct) mod voxel_set;

@@ -1,4 +1,4 @@
-//! What contradicted the place it was felt at: counted, and the last of it kept for inspection.
+//! Outliers: contacts that contradicted earlier ones at their place; counted, and the last of them kept for inspection.
 
 use std::collections::VecDeque;
 
@@ -28,7 +28,7 @@ pub struct Outliers {
     pub contacts: u64,
     /// how many of them were rejected
     pub rejected: u64,
-    /// how many places moved because a second pass said the same
+    /// how many places moved because a second pass agreed
     pub relocated: u64,
     last: VecDeque<Outlier>,
     last_ns: i64,
@@ -69,7 +69,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn contacts_in_a_row_are_one_knock_and_the_last_ones_are_kept() {
+    fn contacts_in_a_row_are_one_outlier_and_the_last_ones_are_kept() {
         let mut outliers = Outliers::default();
         for i in 0..100 {
             for (after_ns, sigmas) in [(0, 5.0), (10, 9.0), (20, 6.0)] {

@@ -1,4 +1,4 @@
-//! How often a place was touched independently: samples in one smoothing window share their noise.
+//! Independent passes over a place: samples in one smoothing window share their noise.
 
 /// One pass over a place, or several put together.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -14,7 +14,7 @@ pub(in crate::reconstruct) struct Pass {
 /// Passes remembered one by one; further ones are put to those.
 const REMEMBERED: usize = 4;
 
-/// The passes over one place. A pass ends after the length of a window: what comes then is independent.
+/// The passes over one place. A pass ends after the length of a window: later contacts are independent.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(in crate::reconstruct) struct IndependentPasses {
     slots: [Pass; REMEMBERED],

@@ -1,15 +1,15 @@
-//! What touches, free space and the scan say about one point.
+//! Evidence of touches, free space and the scan at one point.
 
 use nalgebra::Point3;
 
 use crate::mesh::{FaceTree, TriMesh};
 use crate::reconstruct::evidence::contact_map::ContactMap;
-use crate::reconstruct::evidence::free_space::SweptSpace;
-use crate::reconstruct::evidence::scan_value::ScanValue;
+use crate::reconstruct::evidence::free_space::FreeSpace;
+use crate::reconstruct::evidence::scan_distance::ScanDistance;
 use crate::reconstruct::field::inner_corner::is_inner_corner;
 use crate::reconstruct::field::piecewise::{FieldParams, FieldScratch, FieldValue};
 
-/// How far each kind of evidence is believed.
+/// How each kind of evidence is weighted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EvidenceParams {
     /// radius of the ball, or how large the tip is, m
@@ -18,25 +18,25 @@ pub struct EvidenceParams {
     pub field: FieldParams,
     /// how deep the ball may seem to be in the surface by noise alone, m
     pub swept_margin: f64,
-    /// contacts all around a point speak for it up to this distance along the surface, m
+    /// contacts all around a point support it up to this distance along the surface, m
     pub inner_support: f64,
-    /// the last contacts of a surface speak for what is beyond them up to this, m
+    /// the last contacts of a surface support what is beyond them up to this, m
     pub border_support: f64,
-    /// two felt surfaces go on towards their common edge up to this, m
+    /// two touched surfaces go on towards their common edge up to this, m
     pub edge_support: f64,
     /// the tilted plane at an edge that the ball rolled over goes on up to this, m
     pub fan_support: f64,
-    /// a contact speaks for what is nearer to its surface than this, m: behind it may be another wall
+    /// a contact supports what is nearer to its surface than this, m: behind it may be another wall
     pub touch_depth: f64,
     /// the ball is free when nothing is touched within this distance of its centre, m
     pub free_reach: f64,
-    /// the scan is not believed within this distance of a contact that faces alike, m
+    /// the scan is rejected within this distance of a contact that faces alike, m
     pub scan_removal: f64,
     /// … of any contact, m
     pub wall_removal: f64,
     /// cosine of the widest angle between normals that face alike
     pub alike_cosine: f64,
-    /// the scan speaks for what is nearer to it than this, m
+    /// the scan supports what is nearer to it than this, m
     pub scan_reach: f64,
     /// a scan that the ball came nearer to than its radius and this was swept away, m
     pub swept_reach: f64,
@@ -64,7 +64,7 @@ impl EvidenceParams {
     }
 }
 
-/// What a value rests on.
+/// The evidence for a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// the scan, which nothing contradicts
@@ -86,26 +86,26 @@ pub enum Source {
 pub(crate) struct Finding {
     /// signed distance from the surface, m: positive outside; the scan's own where there is no better
     pub value: f64,
-    /// what it rests on
+    /// the evidence for it
     pub source: Source,
-    /// touches of two surfaces, going straight on to where they meet in an inner corner: nothing was felt here
+    /// touches of two surfaces, going straight on to where they meet in an inner corner: nothing was touched here
     pub is_corner: bool,
     /// signed distance from the scan, m
     pub scan: f64,
-    /// where there is nothing: the signed distance from a touched surface going straight on, m, and how far that is
-    /// believed, from 1 where its support ends down to 0 where it is out of reach
+    /// where there is nothing: the signed distance from a touched surface going straight on, m, and its
+    /// weight, from 1 where its support ends down to 0 where it is out of reach
     pub straight: Option<(f64, f64)>,
     /// how deep the point is in the space that the ball went through, m; not more than 0 outside of it
     pub swept_depth: f64,
-    /// the ball that went through it ended its way towards the point and touched nothing
+    /// the ball that went through it ended its path towards the point and touched nothing
     pub is_free_end: bool,
 }
 
-/// The scan is not asked where it moves a touch by less than this share of what that may be off anyway.
+/// The scan is not used where it moves a touch by less than this share of what that may be off anyway.
 const NOTICED: f64 = 0.1;
 
 impl ScanPrior {
-    /// The variance of a touch, m², unless the scan says nothing beside it: it moves a touch by gate × σₜ² / σₛ at most.
+    /// The variance of a touch, m², unless the scan has no weight beside it: it moves a touch by gate × σₜ² / σₛ at most.
     fn comparable(&self, of_touch: f64) -> Option<f64> {
         (self.gate_sigmas * of_touch.sqrt() > NOTICED * self.sigma).then_some(of_touch)
     }
@@ -114,13 +114,13 @@ impl ScanPrior {
 /// All evidence.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Evidence<'a> {
-    /// how far it is believed
+    /// how it is weighted
     pub params: &'a EvidenceParams,
     /// what was touched
     pub contacts: &'a ContactMap,
     /// where the ball has been
-    pub swept: &'a SweptSpace,
-    /// the scan as it came
+    pub free_space: &'a FreeSpace,
+    /// the original scan
     pub scan: &'a TriMesh,
     /// … and the tree over its faces
     pub tree: &'a FaceTree,
@@ -138,10 +138,10 @@ pub(crate) struct ScanPrior {
 }
 
 impl Evidence<'_> {
-    /// What is known at `x` (m, in O), where the scan is as `scan` says.
+    /// The evidence at `x` (m, in O), with the scan's part in `scan`.
     pub(in crate::reconstruct) fn beside(
         &self,
-        scan: &ScanValue,
+        scan: &ScanDistance,
         x: &Point3<f64>,
         scratch: &mut FieldScratch,
     ) -> Finding {
@@ -170,13 +170,13 @@ impl Evidence<'_> {
     /// The field of the touches at `x` (m, in O), which take the place of the scan by the gain σₛ² / (σₛ² + σₜ²) of the
     /// nearest one; `None` where none is within reach.
     pub fn touched(&self, x: &Point3<f64>, scratch: &mut FieldScratch) -> Option<FieldValue> {
-        self.touched_beside(x, || ScanValue::at(self.scan, self.tree, x), scratch)
+        self.touched_beside(x, || ScanDistance::at(self.scan, self.tree, x), scratch)
     }
 
     fn touched_beside(
         &self,
         x: &Point3<f64>,
-        scan: impl FnOnce() -> Option<ScanValue>,
+        scan: impl FnOnce() -> Option<ScanDistance>,
         scratch: &mut FieldScratch,
     ) -> Option<FieldValue> {
         let mut found = self.params.field.at(self.contacts, x, scratch)?;
@@ -194,8 +194,8 @@ impl Evidence<'_> {
         Some(found)
     }
 
-    /// The field of the touches where they speak for the point, else that of the scan where it holds.
-    fn beside_touches(&self, touched: &FieldValue, scan: &ScanValue) -> (f64, Source) {
+    /// The field of the touches where they support the point, else that of the scan where it holds.
+    fn beside_touches(&self, touched: &FieldValue, scan: &ScanDistance) -> (f64, Source) {
         let p = self.params;
         let lateral = touched.lateral();
         let support = match (touched.is_border, touched.is_fan) {
@@ -219,7 +219,7 @@ impl Evidence<'_> {
 
     /// The touched surface beyond its support: it goes straight on, unless the ball rolled over an edge there, and not out
     /// of the scan.
-    fn straight_on(&self, touched: &FieldValue, scan: &ScanValue) -> Option<(f64, f64)> {
+    fn straight_on(&self, touched: &FieldValue, scan: &ScanDistance) -> Option<(f64, f64)> {
         let p = self.params;
         let inside = (1.0 - scan.value / p.scan_reach).clamp(0.0, 1.0);
         let share = (p.field.reach - touched.lateral()) / (p.field.reach - p.border_support);
@@ -233,7 +233,7 @@ impl Evidence<'_> {
         touched.value.abs() <= p.touch_depth && is_inner_corner(self.contacts, &p.field, p.radius, scratch)
     }
 
-    fn away_from_touches(&self, scan: &ScanValue) -> Source {
+    fn away_from_touches(&self, scan: &ScanDistance) -> Source {
         if scan.value.abs() > self.params.scan_reach {
             Source::Far
         } else if self.is_swept_away(scan) {
@@ -243,8 +243,8 @@ impl Evidence<'_> {
         }
     }
 
-    /// Whether the scan is believed at its foot: near, not swept, and no contact beside it says otherwise.
-    fn scan_holds(&self, scan: &ScanValue) -> bool {
+    /// Whether the scan holds at its foot: near, not swept, and no contact beside it contradicts it.
+    fn scan_holds(&self, scan: &ScanDistance) -> bool {
         let p = self.params;
         if scan.value.abs() > p.scan_reach || scan.is_on_rim || self.is_swept_away(scan) {
             return false;
@@ -263,22 +263,22 @@ impl Evidence<'_> {
         holds
     }
 
-    fn is_swept_away(&self, scan: &ScanValue) -> bool {
+    fn is_swept_away(&self, scan: &ScanDistance) -> bool {
         let limit = self.params.radius + self.params.swept_reach;
-        self.swept.nearest(&scan.foot).is_some_and(|(distance, _)| distance < limit)
+        self.free_space.nearest(&scan.foot).is_some_and(|(distance, _)| distance < limit)
     }
 
-    /// How deep `x` lies in the space that the ball went through, m, and whether that ball ended its way here freely.
+    /// How deep `x` lies in the space that the ball went through, m, and whether that ball ended its path here freely.
     fn swept_depth(&self, x: &Point3<f64>) -> (f64, bool) {
         let p = self.params;
-        let Some((distance, centre)) = self.swept.nearest(x) else { return (f64::NEG_INFINITY, false) };
+        let Some((distance, centre)) = self.free_space.nearest(x) else { return (f64::NEG_INFINITY, false) };
         let depth = p.radius - p.swept_margin - distance;
         if depth <= 0.0 {
             return (depth, false);
         }
         let mut is_free = (x - centre)
             .try_normalize(0.0)
-            .is_some_and(|direction| self.swept.is_end(&centre, &direction, p.radius / 2.0));
+            .is_some_and(|direction| self.free_space.is_end(&centre, &direction, p.radius / 2.0));
         self.contacts.near(&centre, p.free_reach, |_, _| is_free = false);
         (depth, is_free)
     }

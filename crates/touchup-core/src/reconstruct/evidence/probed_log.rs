@@ -1,10 +1,10 @@
-//! The touches themselves, thinned in time, of which features are measured.
+//! The touches themselves, downsampled in time, of which features are measured.
 
 use crate::reconstruct::evidence::contact_map::Verdict;
 use crate::reconstruct::evidence::touches::{SurfaceContact, TipTouch};
 use crate::stylus::ProbedPoint;
 
-/// Touches in order of time. A bounded number: when there are too many, each other one goes.
+/// Touches in order of time. A bounded number: when there are too many, every second one is dropped.
 #[derive(Clone, Debug)]
 pub(crate) struct ProbedLog {
     /// radius of the tip when it is a ball, m
@@ -16,7 +16,7 @@ pub(crate) struct ProbedLog {
     spacing_ns: i64,
 }
 
-/// Touches closer together in time say the same: the window in which they are smoothed is eight times as long.
+/// Touches closer together in time are redundant: the window in which they are smoothed is eight times as long.
 const SPACING_NS: i64 = 4_000_000;
 /// So many touches are kept: over an hour of them.
 const MOST_POINTS: usize = 1 << 20;
@@ -34,7 +34,7 @@ impl ProbedLog {
         &self.points
     }
 
-    /// What comes now belongs to a new stroke.
+    /// Later touches belong to a new stroke.
     pub(in crate::reconstruct) fn begin_stroke(&mut self) {
         self.undone.clear();
         self.strokes += 1;

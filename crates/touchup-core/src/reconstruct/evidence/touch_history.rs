@@ -1,13 +1,13 @@
-//! All that was felt: contacts, and where the tip was.
+//! The touch history: contacts, and the space that the tip went through.
 
 use nalgebra::Point3;
 
 use crate::mesh::{FaceTree, TriMesh};
 use crate::reconstruct::evidence::contact_map::{ContactMap, Verdict};
 use crate::reconstruct::evidence::double_contact::{is_mixed, split};
-use crate::reconstruct::evidence::free_space::SweptSpace;
+use crate::reconstruct::evidence::free_space::FreeSpace;
 use crate::reconstruct::evidence::probed_log::ProbedLog;
-use crate::reconstruct::evidence::scan_value::ScanValue;
+use crate::reconstruct::evidence::scan_distance::ScanDistance;
 use crate::reconstruct::evidence::touches::TipTouch;
 use crate::reconstruct::field::grid::GridChanges;
 use crate::reconstruct::table::CellTable;
@@ -15,7 +15,7 @@ use crate::stylus::{STROKE_PAUSE_NS, TipPlace};
 
 /// A contact that the ball went into by more than this is none, in radii: four times the noise of a usual tracker.
 const REFUTED_DEPTH: f64 = 0.133;
-/// Where touches insist, the ball has been nearer than this to what was believed before, in radii.
+/// Where a contact is relocated, the ball has been nearer than this to the earlier surface, in radii.
 const FORGOTTEN: f64 = 1.1;
 /// A contact farther outside of the scan than this belongs to something else, in radii.
 const OUTSIDE: f64 = 4.0;
@@ -26,13 +26,13 @@ const FAN_COSINE: f64 = 0.906;
 /// A mean moves within its cell; what depends on it is looked for this many times as far.
 const MOVED: f64 = 2.0;
 
-/// All that was felt.
+/// All contacts and the free space.
 #[derive(Clone, Debug)]
 pub(in crate::reconstruct) struct TouchHistory {
     pub contacts: ContactMap,
-    pub swept: SweptSpace,
+    pub free_space: FreeSpace,
     pub probed: ProbedLog,
-    /// whether where the tip went counts; else `swept` stays empty
+    /// whether where the tip went counts; else `free_space` stays empty
     keeps_free_space: bool,
     /// size of the tip, m
     radius: f64,
@@ -46,17 +46,27 @@ pub(in crate::reconstruct) struct TouchHistory {
 }
 
 impl TouchHistory {
-    /// Nothing felt yet.
+    /// Without touches yet.
     pub fn new(
         contacts: ContactMap,
-        swept: SweptSpace,
+        free_space: FreeSpace,
         keeps_free_space: bool,
         radius: f64,
         ball: Option<f64>,
     ) -> Self {
         let until_ns = i64::MIN;
         let probed = ProbedLog::new(ball);
-        Self { contacts, swept, probed, keeps_free_space, radius, ball, until_ns, last_contact_ns: None, bounds: None }
+        Self {
+            contacts,
+            free_space,
+            probed,
+            keeps_free_space,
+            radius,
+            ball,
+            until_ns,
+            last_contact_ns: None,
+            bounds: None,
+        }
     }
 
     pub fn keep(&mut self, touch: &TipTouch) {
@@ -65,12 +75,12 @@ impl TouchHistory {
         let Some(contact) = &touch.contact else { return self.sweep(&place) };
         if self.last_contact_ns.is_none_or(|last| touch.stamp_ns - last > STROKE_PAUSE_NS) {
             self.contacts.begin_stroke();
-            self.swept.begin_stroke();
+            self.free_space.begin_stroke();
             self.probed.begin_stroke();
         }
         self.last_contact_ns = Some(touch.stamp_ns);
         let two = self.ball.and_then(|radius| split(&self.contacts, radius, &touch.centre, contact));
-        let mut is_believed = false;
+        let mut is_accepted = false;
         for contact in two.as_ref().map_or(std::slice::from_ref(contact), |two| two) {
             // a wall that the ball would have to be nearer to is not touched: that is no outlier
             if two.is_some() && self.contacts.contradicts(contact) {
@@ -78,31 +88,31 @@ impl TouchHistory {
             }
             let verdict = self.contacts.add(contact);
             self.probed.note(touch, contact, verdict);
-            is_believed |= verdict != Verdict::Rejected;
+            is_accepted |= verdict != Verdict::Rejected;
             if verdict == Verdict::Relocated {
-                self.swept.forget(&contact.point, FORGOTTEN * self.radius);
+                self.free_space.forget(&contact.point, FORGOTTEN * self.radius);
             }
         }
-        if is_believed {
+        if is_accepted {
             self.sweep(&place);
         }
     }
 
     fn sweep(&mut self, place: &TipPlace) {
         if self.keeps_free_space {
-            self.swept.add_place(place);
+            self.free_space.add_place(place);
         }
     }
 
     /// How many strokes can be undone.
     pub fn strokes(&self) -> usize {
-        self.contacts.strokes().min(self.swept.strokes())
+        self.contacts.strokes().min(self.free_space.strokes())
     }
 
     /// Takes the last stroke back; returns whether there was one.
     pub fn undo(&mut self) -> bool {
         self.last_contact_ns = None;
-        let is_undone = self.strokes() > 0 && self.contacts.undo() && self.swept.undo();
+        let is_undone = self.strokes() > 0 && self.contacts.undo() && self.free_space.undo();
         if is_undone {
             self.probed.undo();
         }
@@ -112,31 +122,31 @@ impl TouchHistory {
     /// Does the stroke again that was undone last; returns whether there was one.
     pub fn redo(&mut self) -> bool {
         self.last_contact_ns = None;
-        let is_redone = self.contacts.redo() && self.swept.redo();
+        let is_redone = self.contacts.redo() && self.free_space.redo();
         if is_redone {
             self.probed.redo();
         }
         is_redone
     }
 
-    /// Decides which contacts count and which are those of an edge, where anything came since it was last decided; returns
+    /// Decides which contacts count and which are those of an edge, where there is new evidence; returns
     /// where that is.
-    pub fn settle(&mut self, scan: &TriMesh, tree: &FaceTree) -> GridChanges {
-        let Self { contacts, swept, radius, .. } = self;
+    pub fn update(&mut self, scan: &TriMesh, tree: &FaceTree) -> GridChanges {
+        let Self { contacts, free_space, radius, .. } = self;
         let (deepest, outside) = (*radius * (1.0 - REFUTED_DEPTH), OUTSIDE * *radius);
         let bounds = self.bounds.get_or_insert_with(|| {
             let [lo, hi] = scan.bounds();
             [lo.map(|x| x - outside), hi.map(|x| x + outside)]
         });
         let mut changed: CellTable<u32, ()> = contacts.take_changed().into_iter().collect();
-        let centres = swept.take_changed();
+        let centres = free_space.take_changed();
         let mut doubtful = changed.clone();
         for centre in &centres {
             contacts.near(centre, deepest, |_, at| add(&mut doubtful, at));
         }
         for (at, ()) in doubtful.iter() {
             let point = contacts.means()[at as usize].point;
-            let is_refuted = swept.nearest(&point).is_some_and(|(distance, _)| distance < deepest)
+            let is_refuted = free_space.nearest(&point).is_some_and(|(distance, _)| distance < deepest)
                 || is_elsewhere(&point, scan, tree, bounds, outside);
             if contacts.refute(at, is_refuted) {
                 add(&mut changed, at);
@@ -176,5 +186,5 @@ fn beside(contacts: &ContactMap, means: &CellTable<u32, ()>, reach: f64) -> Cell
 /// it may be in a hole, but not beyond its rim.
 fn is_elsewhere(p: &Point3<f64>, scan: &TriMesh, tree: &FaceTree, bounds: &[Point3<f64>; 2], reach: f64) -> bool {
     let is_within = bounds[0].inf(p) == bounds[0] && bounds[1].sup(p) == bounds[1];
-    ScanValue::at(scan, tree, p).is_none_or(|scan| scan.value > reach || !is_within && scan.is_on_rim)
+    ScanDistance::at(scan, tree, p).is_none_or(|scan| scan.value > reach || !is_within && scan.is_on_rim)
 }

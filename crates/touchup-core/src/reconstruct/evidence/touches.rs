@@ -1,4 +1,4 @@
-//! From samples to touches: where the ball really was, and what it touched there.
+//! From samples to touches: the true centre of the ball, and the contact there.
 //!
 //! The patch follows a few tens of milliseconds behind the stream, so position and force are smoothed by a window that
 //! looks as far ahead as back: it does not lag. Its length follows from the noise: as long as the velocity needs, and no
@@ -10,7 +10,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::reconstruct::evidence::contact_uncertainty::{CalibrationParams, ContactSigma, ForceNoise};
 use crate::stylus::{
-    ContactSample, FeltNormal, Friction, FrictionCoefficient, LocalMotion, SettingError, Sliding, SmoothedMotion,
+    ContactSample, Friction, FrictionCoefficient, LocalMotion, NormalEstimate, SettingError, Sliding, SmoothedMotion,
     TipBody, TipContact, TipPlace, TipShape, WIDEST_CONE_COSINE,
 };
 
@@ -21,19 +21,19 @@ pub struct TouchFinderParams {
     pub radius: f64,
     /// which tip it is
     pub shape: TipShape,
-    /// what stylus and probe give way under force, N/m; `None`: rigid
+    /// stiffness of stylus and probe, N/m; `None`: rigid
     pub stiffness: Option<f64>,
     /// half of the longest smoothing window, ns. Default 32 ms: 0.2 mm of pose noise at 500 Hz then leaves the direction of
     /// 25 mm/s uncertain by 6°, which friction known from the stream turns into a normal within 1–2°.
     pub half_window_ns: i64,
     /// a pause longer than this parts the stream, ns. Default 30 ms.
     pub largest_gap_ns: i64,
-    /// cosine of the widest friction cone believed; `None`: friction is not asked for, the normal is the force. Default
+    /// cosine of the widest friction cone accepted; `None`: friction is not estimated, the normal is the force. Default
     /// [`WIDEST_CONE_COSINE`].
     pub cone_cosine: Option<f64>,
-    /// a touch whose normal is uncertain by this much weighs half, rad. Default 5°: what curved pieces take for smooth.
+    /// a touch whose normal is uncertain by this much has half the weight, rad. Default 5°: what curved pieces take for smooth.
     pub uncertain_normal: f64,
-    /// what the calibration leaves uncertain; `None`: the uncertainty of a contact is not asked for
+    /// what the calibration leaves uncertain; `None`: the uncertainty of a contact is not estimated
     pub calibration: Option<CalibrationParams>,
 }
 
@@ -64,7 +64,7 @@ pub struct SurfaceContact {
     pub weight: f64,
     /// ns
     pub stamp_ns: i64,
-    /// how well it is known; all 0 where that was not asked for
+    /// how well it is known; all 0 where that is not estimated
     pub sigma: ContactSigma,
 }
 
@@ -156,7 +156,7 @@ impl TouchFinder {
         self.next = 0;
     }
 
-    /// Kinetic friction as measured so far; `None` until the ball has slid far enough, or where friction is not asked for.
+    /// Kinetic friction as measured so far; `None` until the ball has slid far enough, or where friction is not estimated.
     pub fn friction(&self) -> Option<FrictionCoefficient> {
         self.friction.as_ref()?.coefficient()
     }
@@ -166,8 +166,8 @@ impl TouchFinder {
     }
 
     /// The normal under the ball, which has been in contact for the last `dt` (s); `None` without a force.
-    fn normal(&mut self, sliding: &Sliding, dt: f64) -> Option<FeltNormal> {
-        let Some(friction) = &mut self.friction else { return FeltNormal::of_force(&sliding.force_o) };
+    fn normal(&mut self, sliding: &Sliding, dt: f64) -> Option<NormalEstimate> {
+        let Some(friction) = &mut self.friction else { return NormalEstimate::of_force(&sliding.force_o) };
         friction.observe(sliding, dt);
         friction.normal(sliding)
     }
@@ -182,7 +182,7 @@ impl TouchFinder {
         if window.is_alike && self.held[at].in_contact {
             let dt = if at > 0 { self.held[at].stamp_ns - self.held[at - 1].stamp_ns } else { 0 };
             let found = self.normal(&sliding, dt as f64 * 1e-9);
-            contact = found.and_then(|felt| self.contact(at, &motion, &sliding.force_o, &felt));
+            contact = found.and_then(|estimate| self.contact(at, &motion, &sliding.force_o, &estimate));
         } else {
             self.lift();
         }
@@ -221,13 +221,13 @@ impl TouchFinder {
         at: usize,
         motion: &SmoothedMotion,
         force_o: &Vector3<f64>,
-        felt: &FeltNormal,
+        estimate: &NormalEstimate,
     ) -> Option<SurfaceContact> {
         let WindowEntry { stamp_ns, axis, .. } = self.held[at];
         let place = TipPlace { centre: motion.centre, axis };
-        let TipContact { point, normal, is_vague } = self.body.touched(&place, &felt.normal, felt.sigma)?;
+        let TipContact { point, normal, is_vague } = self.body.touched(&place, &estimate.normal, estimate.sigma)?;
         let share = if is_vague { VAGUE } else { 1.0 };
-        let mut weight = share / (1.0 + (felt.sigma / self.params.uncertain_normal).powi(2));
+        let mut weight = share / (1.0 + (estimate.sigma / self.params.uncertain_normal).powi(2));
         let sigma = self.params.calibration.map_or_else(ContactSigma::default, |calibration| {
             weight /= 1.0 + self.roughness(motion);
             let softness = self.params.stiffness.map_or(0.0, |stiffness| 1.0 / stiffness);
@@ -235,7 +235,7 @@ impl TouchFinder {
                 &calibration,
                 [self.noise.sigma, self.shake.sigma() * softness].map(|noise| noise * motion.centre_gain.sqrt()),
                 force_o.dot(&normal) * softness,
-                felt.sigma,
+                estimate.sigma,
                 self.params.radius,
             )
         });
@@ -304,9 +304,9 @@ struct PathNoise {
     sigma: f64,
 }
 
-/// Step of the running median: settles within some hundred samples.
+/// Step of the running median: converges within some hundred samples.
 const NOISE_STEP: f64 = 0.01;
-/// What is never undercut, m: a good tracker at rest.
+/// Lower bound, m: a good tracker at rest.
 const LEAST_NOISE: f64 = 1e-6;
 /// … and where it starts, m.
 const USUAL_NOISE: f64 = 0.03e-3;

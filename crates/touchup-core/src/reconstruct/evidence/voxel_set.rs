@@ -1,4 +1,4 @@
-//! Things thinned to one for each key, in cubes; strokes of them can be undone.
+//! A voxel set: one thing is kept for each key, in cubes; strokes of them can be undone.
 
 use crate::reconstruct::field::lattice::LatticeNode;
 use crate::reconstruct::incremental::history::History;
@@ -88,7 +88,7 @@ impl<K: Key, T: Copy> VoxelSet<K, T> {
         self.history.len()
     }
 
-    /// Takes back what came and went since the last stroke began.
+    /// Undoes the last stroke.
     pub fn undo(&mut self, key: impl Fn(&T) -> K) -> bool {
         self.exchange(|history, swap| history.undo(swap), key)
     }
@@ -109,7 +109,7 @@ impl<K: Key, T: Copy> VoxelSet<K, T> {
         has_changed
     }
 
-    /// Exchanges the things of a cube with those that were kept; cubes that came last go first.
+    /// Exchanges the things of a cube with those that were kept; cubes inserted last go first.
     fn swap(&mut self, bin: LatticeNode, past: &mut Bucket<T>, key: &impl Fn(&T) -> K) {
         let before = past.take();
         let there = match (before.is_some(), self.bins.get_mut(&bin)) {
@@ -131,35 +131,35 @@ mod tests {
     use super::*;
 
     /// Cubes of ten numbers each.
-    fn state(thinned: &VoxelSet<u32, u32>) -> Vec<u32> {
-        thinned.iter().copied().collect()
+    fn state(set: &VoxelSet<u32, u32>) -> Vec<u32> {
+        set.iter().copied().collect()
     }
 
     #[test]
     fn strokes_with_things_that_come_and_go_are_undone_and_redone() {
         let bin = |x: u32| [(x / 10) as i32, 0, 0];
-        let mut thinned = VoxelSet::<u32, u32>::default();
-        let mut states = vec![state(&thinned)];
+        let mut set = VoxelSet::<u32, u32>::default();
+        let mut states = vec![state(&set)];
         for (come, go) in [(vec![1, 11, 2, 1], vec![]), (vec![3, 25], vec![1, 11]), (vec![11, 1, 40], vec![2, 25])] {
-            thinned.begin_stroke();
+            set.begin_stroke();
             for &x in &come {
-                thinned.add(x, bin(x), x);
+                set.add(x, bin(x), x);
             }
             for &x in &go {
-                thinned.retain(bin(x), |&thing| thing, |&thing| thing != x, |&gone| assert_eq!(gone, x));
+                set.retain(bin(x), |&thing| thing, |&thing| thing != x, |&gone| assert_eq!(gone, x));
             }
-            states.push(state(&thinned));
+            states.push(state(&set));
         }
         assert_eq!(states[1..], [vec![1, 2, 11], vec![2, 3, 25], vec![3, 1, 11, 40]]);
         for expected in states.iter().rev().skip(1) {
-            assert!(thinned.undo(|&thing| thing));
-            assert_eq!(state(&thinned), *expected);
+            assert!(set.undo(|&thing| thing));
+            assert_eq!(state(&set), *expected);
         }
-        assert!(!thinned.undo(|&thing| thing));
+        assert!(!set.undo(|&thing| thing));
         for expected in &states[1..] {
-            assert!(thinned.redo(|&thing| thing));
-            assert_eq!(state(&thinned), *expected);
+            assert!(set.redo(|&thing| thing));
+            assert_eq!(state(&set), *expected);
         }
-        assert!(!thinned.add(40, bin(40), 40) && thinned.add(2, bin(2), 2), "what is kept is known");
+        assert!(!set.add(40, bin(40), 40) && set.add(2, bin(2), 2), "what is kept is known");
     }
 }

@@ -1,4 +1,4 @@
-//! Material that floats: what the ball went all around and nobody touched holds on to nothing.
+//! Floating components: material that the ball went all around and never touched is attached to nothing.
 //!
 //! A scan that closes a hole over leaves its lid, or a plug, in the middle of it, where the ball never was. It is one piece
 //! of material within the space that was swept, and no part of the work-piece.
@@ -6,38 +6,38 @@
 use std::collections::VecDeque;
 
 use crate::reconstruct::evidence::point_evidence::{Evidence, Source};
-use crate::reconstruct::evidence::scan_value::ScanValue;
+use crate::reconstruct::evidence::scan_distance::ScanDistance;
 use crate::reconstruct::field::grid::ReconstructionGrid;
 use crate::reconstruct::field::lattice::{Lattice, LatticeNode, neighbours};
 use crate::reconstruct::table::CellTable;
 
-/// Nodes of a lump at most: a plug eight radii wide and as high.
+/// Nodes of a floating component at most: a plug eight radii wide and as high.
 const MOST: usize = 4000;
 
-/// The nodes of all lumps among the nodes `at` and around them, whose signs are settled.
-pub(in crate::reconstruct) fn lumps(
-    restored: &mut ReconstructionGrid,
+/// The nodes of all floating components among the nodes `at` and around them, whose signs are final.
+pub(in crate::reconstruct) fn floating_components(
+    grid: &mut ReconstructionGrid,
     evidence: &Evidence<'_>,
     lattice: &Lattice,
     at: &[u32],
 ) -> Vec<LatticeNode> {
-    let mut lumps = Vec::new();
+    let mut floating_components = Vec::new();
     let mut seen: CellTable<LatticeNode, ()> = CellTable::default();
     for &start in at {
-        let (node, state) = restored.nodes.entry(start);
+        let (node, state) = grid.nodes.entry(start);
         let node = *node;
-        // what is untouched scan throughout is none of our business
+        // components of untouched scan stay
         let is_cut = matches!(state.source, Source::Nothing | Source::Far) && state.value < 0.0;
         if is_cut && !seen.contains(&node) {
-            lumps.extend(floating(restored, evidence, lattice, node, &mut seen));
+            floating_components.extend(floating(grid, evidence, lattice, node, &mut seen));
         }
     }
-    lumps
+    floating_components
 }
 
-/// The piece of material around `start`, if nothing holds it.
+/// The component around `start`, if it is attached to nothing.
 fn floating(
-    restored: &mut ReconstructionGrid,
+    grid: &mut ReconstructionGrid,
     evidence: &Evidence<'_>,
     lattice: &Lattice,
     start: LatticeNode,
@@ -46,16 +46,16 @@ fn floating(
     let mut piece: CellTable<LatticeNode, ()> = std::iter::once((start, ())).collect();
     let mut next = VecDeque::from([start]);
     while let Some(node) = next.pop_front() {
-        // what another way has led to is held, or would have been found to float with this piece
+        // what was reached before is attached, or would have been found to float with this component
         let is_known = !seen.insert_with(node, || ()).1;
-        if is_known || piece.len() > MOST || is_held(restored, node) {
+        if is_known || piece.len() > MOST || is_attached(grid, node) {
             piece.iter().for_each(|(node, ())| {
                 seen.insert_with(node, || ());
             });
             return Vec::new();
         }
         for other in neighbours(node) {
-            if is_material(restored, evidence, lattice, other) && piece.insert_with(other, || ()).1 {
+            if is_material(grid, evidence, lattice, other) && piece.insert_with(other, || ()).1 {
                 next.push_back(other);
             }
         }
@@ -63,23 +63,18 @@ fn floating(
     piece.iter().map(|(node, ())| node).collect()
 }
 
-/// Whether a node of the material cannot be of a lump.
-fn is_held(restored: &ReconstructionGrid, node: LatticeNode) -> bool {
-    restored.nodes.get(&node).is_some_and(|state| matches!(state.source, Source::Touch | Source::Beyond))
+/// Whether a node of the material cannot belong to a floating component.
+fn is_attached(grid: &ReconstructionGrid, node: LatticeNode) -> bool {
+    grid.nodes.get(&node).is_some_and(|state| matches!(state.source, Source::Touch | Source::Beyond))
 }
 
-/// Whether there is material at a node; beyond what was looked at the scan says.
-fn is_material(
-    restored: &mut ReconstructionGrid,
-    evidence: &Evidence<'_>,
-    lattice: &Lattice,
-    node: LatticeNode,
-) -> bool {
-    if let Some(state) = restored.nodes.get(&node) {
+/// Whether there is material at a node; beyond the evaluated nodes by the scan.
+fn is_material(grid: &mut ReconstructionGrid, evidence: &Evidence<'_>, lattice: &Lattice, node: LatticeNode) -> bool {
+    if let Some(state) = grid.nodes.get(&node) {
         return state.value < 0.0;
     }
-    let scan = || ScanValue::at(evidence.scan, evidence.tree, &lattice.position(node));
+    let scan = || ScanDistance::at(evidence.scan, evidence.tree, &lattice.position(node));
     let is_inside = || scan().is_some_and(|scan| scan.value < 0.0);
-    let (at, _) = restored.beyond.insert_with(node, is_inside);
-    restored.beyond.entry(at).1
+    let (at, _) = grid.beyond.insert_with(node, is_inside);
+    grid.beyond.entry(at).1
 }

@@ -3,8 +3,8 @@
 use nalgebra::Point3;
 
 use crate::reconstruct::evidence::point_evidence::{Evidence, Source};
-use crate::reconstruct::evidence::scan_value::ScanValue;
-use crate::reconstruct::field::discontinuities::is_torn;
+use crate::reconstruct::evidence::scan_distance::ScanDistance;
+use crate::reconstruct::field::discontinuities::is_discontinuous;
 use crate::reconstruct::field::lattice::{CellBox, Lattice, LatticeNode, LatticeRegion, NodeValues, neighbours};
 use crate::reconstruct::field::piecewise::FieldScratch;
 use crate::reconstruct::table::CellTable;
@@ -14,20 +14,20 @@ use crate::reconstruct::table::CellTable;
 pub(in crate::reconstruct) struct NodeState {
     /// f, m
     pub value: f64,
-    /// what it rests on
+    /// the evidence for it
     pub source: Source,
     /// the scan's own value, m
     pub scan: f64,
-    /// where nothing is known: value of a touched surface going straight on, m, and how far it is believed, 0 to 1
+    /// where nothing is known: value of a touched surface going straight on, m, and its weight, 0 to 1
     pub straight: (f64, f64),
     /// the ball was here: f is no less than this, m
     pub least: f64,
-    /// … and ended its way here without touching anything, deep inside the scan
+    /// … and ended its path here without touching anything, deep inside the scan
     pub is_free_end: bool,
     /// it is out of reach of all evidence, and was looked at because a surface that is filled in goes on there
     pub is_further: bool,
-    /// what the touches say, m; `None` where they do not speak
-    pub felt: Option<f64>,
+    /// value of the field of the touches, m; `None` out of their support
+    pub touched_value: Option<f64>,
     /// … in an inner corner that two touched surfaces go on into
     pub is_corner: bool,
     /// number of the renewal that gave it this value
@@ -57,7 +57,7 @@ impl NodeState {
     }
 }
 
-/// What came to the stores: where the contacts are whose mean is new or moved, and the centres that were kept, m, in O.
+/// Changes of the evidence: where the contacts are whose mean is new or moved, and the centres that were kept, m, in O.
 #[derive(Clone, Debug, Default)]
 pub(in crate::reconstruct) struct GridChanges {
     pub means: Vec<Point3<f64>>,
@@ -91,16 +91,16 @@ pub(in crate::reconstruct) struct Changed {
 pub(in crate::reconstruct) struct ReconstructionGrid {
     /// every node looked at
     pub nodes: CellTable<LatticeNode, NodeState>,
-    /// cells in which the surface would rest on a freely moving ball alone: they stay open
+    /// cells in which a freely moving ball alone would support the surface: they stay open
     pub open: CellTable<LatticeNode, ()>,
-    /// the nodes at which a ball ended its way freely
+    /// the nodes at which a ball ended its path freely
     pub ends: CellTable<LatticeNode, ()>,
     /// cells with a contact, and with a ball that went into the scan: what is around them is looked at
     touched: CellTable<LatticeNode, ()>,
-    swept: CellTable<LatticeNode, ()>,
-    /// what the scan says at each of `nodes`: it never changes
-    pub scan: Vec<ScanValue>,
-    /// whether the scan has material at nodes that are not looked at, as far as that was asked
+    free_space: CellTable<LatticeNode, ()>,
+    /// signed distance of the scan at each of `nodes`: it never changes
+    pub scan: Vec<ScanDistance>,
+    /// whether the scan has material at nodes that are not looked at, as far as that was evaluated
     pub beyond: CellTable<LatticeNode, bool>,
     pub renewals: u32,
 }
@@ -111,33 +111,33 @@ const WIDEST: f64 = 2.7;
 const REACH: f64 = 2.8;
 /// … and within this many cells of a ball that went into the scan.
 const BALL_MARGIN: f64 = 2.0;
-/// News count most within this many radii.
+/// Changes count most within this many radii.
 const NEAR: f64 = 1.1;
 
 impl ReconstructionGrid {
-    /// Brings the field up to date with what came to the stores of `evidence`.
+    /// Brings the field up to date with the changes of `evidence`.
     ///
-    /// - `news`: taken in up to where they count most.
-    /// - `late`: earlier news, taken in up to where they count at all.
+    /// - `changes`: taken in up to where they count most.
+    /// - `late`: earlier changes, taken in up to where they count at all.
     pub fn renew(
         &mut self,
         evidence: &Evidence<'_>,
         lattice: &Lattice,
-        news: &GridChanges,
+        changes: &GridChanges,
         late: &GridChanges,
     ) -> Changed {
         self.renewals += 1;
         let mut look = CellTable::default();
         if !self.nodes.is_empty() {
             let p = evidence.params;
-            self.look_near(lattice, &news.means, NEAR * p.radius, &mut look);
-            let cover = evidence.swept.cover_radius(p.radius);
-            self.look_near(lattice, &news.centres, cover, &mut look);
+            self.look_near(lattice, &changes.means, NEAR * p.radius, &mut look);
+            let cover = evidence.free_space.cover_radius(p.radius);
+            self.look_near(lattice, &changes.centres, cover, &mut look);
             self.look_near(lattice, &late.means, p.field.reach.max(p.scan_removal + p.scan_reach), &mut look);
             self.look_near(lattice, &late.centres, cover + p.swept_reach + p.scan_reach, &mut look);
             self.look_at_ends(evidence, lattice, late, &mut look);
         }
-        self.widen(evidence, lattice, news, &mut look);
+        self.widen(evidence, lattice, changes, &mut look);
         let mut area = CellBox::EMPTY;
         let mut scratch = FieldScratch::default();
         for at in 0..look.len() as u32 {
@@ -146,7 +146,7 @@ impl ReconstructionGrid {
             let before = known.map(|known| self.nodes.entry(known).1);
             let scan = match known {
                 Some(known) => self.scan[known as usize],
-                None => match ScanValue::at(evidence.scan, evidence.tree, &lattice.position(node)) {
+                None => match ScanDistance::at(evidence.scan, evidence.tree, &lattice.position(node)) {
                     Some(scan) => scan,
                     None => continue,
                 },
@@ -159,11 +159,11 @@ impl ReconstructionGrid {
             self.put(node, state, scan);
             area.take(&node);
         }
-        self.tear(lattice, &mut look, &mut area);
-        self.settle(evidence, lattice, &area, &look)
+        self.drop_discontinuities(lattice, &mut look, &mut area);
+        self.update(evidence, lattice, &area, &look)
     }
 
-    /// Looks further, at what is not known yet in and around `cells`: a surface that is filled in goes on there.
+    /// Evaluates further nodes that are not known yet in and around `cells`: a surface that is filled in goes on there.
     pub fn look_further(&mut self, evidence: &Evidence<'_>, lattice: &Lattice, cells: &LatticeRegion) -> Changed {
         let mut look = CellTable::default();
         let mut area = CellBox::EMPTY;
@@ -171,7 +171,7 @@ impl ReconstructionGrid {
         for (cell, ()) in cells.iter() {
             for node in (CellBox { lo: cell, hi: cell }).widened(1, 2).iter() {
                 if !self.nodes.contains(&node)
-                    && let Some(scan) = ScanValue::at(evidence.scan, evidence.tree, &lattice.position(node))
+                    && let Some(scan) = ScanDistance::at(evidence.scan, evidence.tree, &lattice.position(node))
                 {
                     let state = evaluate(evidence, lattice, node, &scan, &mut scratch);
                     self.put(node, NodeState { is_further: true, ..state }, scan);
@@ -180,7 +180,7 @@ impl ReconstructionGrid {
                 }
             }
         }
-        self.settle(evidence, lattice, &area, &look)
+        self.update(evidence, lattice, &area, &look)
     }
 
     /// Whether some corner of a cell was not looked at.
@@ -188,22 +188,28 @@ impl ReconstructionGrid {
         (0..8).any(|corner| !self.nodes.contains(&node_at(cell, corner)))
     }
 
-    /// Gives up, or takes back, what touches seem to say where it contradicts itself: at the nodes looked at and beside them.
-    fn tear(&mut self, lattice: &Lattice, look: &mut CellTable<LatticeNode, Option<NodeState>>, area: &mut CellBox) {
+    /// Drops, or restores, the values of the touches at discontinuities: at the nodes looked at and beside them.
+    fn drop_discontinuities(
+        &mut self,
+        lattice: &Lattice,
+        look: &mut CellTable<LatticeNode, Option<NodeState>>,
+        area: &mut CellBox,
+    ) {
         let beside = |node: LatticeNode| std::iter::once(node).chain(neighbours(node));
         let near: CellTable<LatticeNode, ()> = look.iter().flat_map(|(node, _)| beside(node)).collect();
         for (node, ()) in near.iter() {
             let Some(before) = self.nodes.get(&node).copied() else { continue };
-            let Some(felt) = before.felt else { continue };
-            let is_torn = is_torn(|node| self.nodes.get(node)?.felt, node, felt, lattice.pitch);
-            if is_torn == (before.source == Source::Nothing) {
+            let Some(touched_value) = before.touched_value else { continue };
+            let is_discontinuous =
+                is_discontinuous(|node| self.nodes.get(node)?.touched_value, node, touched_value, lattice.pitch);
+            if is_discontinuous == (before.source == Source::Nothing) {
                 continue;
             }
             let (at, _) = look.insert_with(node, || Some(before));
             let last = look.entry(at).1.filter(NodeState::is_open_question);
             let state = NodeState {
-                source: if is_torn { Source::Nothing } else { Source::Touch },
-                value: if is_torn { last.map_or(felt, |last| last.value) } else { felt },
+                source: if is_discontinuous { Source::Nothing } else { Source::Touch },
+                value: if is_discontinuous { last.map_or(touched_value, |last| last.value) } else { touched_value },
                 straight: (0.0, 0.0),
                 ..before
             };
@@ -212,7 +218,7 @@ impl ReconstructionGrid {
         }
     }
 
-    pub fn put(&mut self, node: LatticeNode, state: NodeState, scan: ScanValue) {
+    pub fn put(&mut self, node: LatticeNode, state: NodeState, scan: ScanDistance) {
         let (at, is_new) = self.nodes.insert_with(node, || state);
         if is_new {
             self.scan.push(scan);
@@ -245,19 +251,19 @@ impl ReconstructionGrid {
         }
     }
 
-    /// Adds the ends of ways near the news: whether a way ended there depends on the way, and on contacts beside its end.
+    /// Adds the ends of paths near the changes: whether a path ended there depends on the path, and on contacts beside its end.
     fn look_at_ends(
         &self,
         evidence: &Evidence<'_>,
         lattice: &Lattice,
-        news: &GridChanges,
+        changes: &GridChanges,
         look: &mut CellTable<LatticeNode, Option<NodeState>>,
     ) {
         let p = evidence.params;
         for (end, ()) in self.ends.iter() {
             let x = lattice.position(end);
             let is_near = |points: &[Point3<f64>], reach: f64| points.iter().any(|p| (p - x).norm() < reach);
-            if is_near(&news.means, p.radius + p.free_reach) || is_near(&news.centres, 1.5 * p.radius) {
+            if is_near(&changes.means, p.radius + p.free_reach) || is_near(&changes.centres, 1.5 * p.radius) {
                 look.insert_with(end, || None);
             }
         }
@@ -268,12 +274,12 @@ impl ReconstructionGrid {
         &mut self,
         evidence: &Evidence<'_>,
         lattice: &Lattice,
-        news: &GridChanges,
+        changes: &GridChanges,
         look: &mut CellTable<LatticeNode, Option<NodeState>>,
     ) {
         let radius = evidence.params.radius;
         let around_contact = ball((REACH * radius / lattice.pitch).ceil() as i32);
-        let cover = evidence.swept.cover_radius(radius);
+        let cover = evidence.free_space.cover_radius(radius);
         let around_ball = ball((cover / lattice.pitch + BALL_MARGIN).ceil() as i32);
         let mut add = |cell: &LatticeNode, offsets: &[LatticeNode]| {
             for node in offsets.iter().map(|offset| moved(cell, offset)) {
@@ -282,16 +288,16 @@ impl ReconstructionGrid {
                 }
             }
         };
-        for cell in news.means.iter().map(|point| lattice.cell_of(point)) {
+        for cell in changes.means.iter().map(|point| lattice.cell_of(point)) {
             if self.touched.insert_with(cell, || ()).1 {
                 add(&cell, &around_contact);
             }
         }
-        for centre in &news.centres {
+        for centre in &changes.centres {
             let cell = lattice.cell_of(centre);
             let is_near = || evidence.tree.closest(evidence.scan, centre, cover + lattice.pitch).is_some();
-            if !self.swept.contains(&cell) && is_near() {
-                self.swept.insert_with(cell, || ());
+            if !self.free_space.contains(&cell) && is_near() {
+                self.free_space.insert_with(cell, || ());
                 add(&cell, &around_ball);
             }
         }
@@ -325,7 +331,7 @@ pub(in crate::reconstruct) fn evaluate(
     evidence: &Evidence<'_>,
     lattice: &Lattice,
     node: LatticeNode,
-    scan: &ScanValue,
+    scan: &ScanDistance,
     scratch: &mut FieldScratch,
 ) -> NodeState {
     let found = evidence.beside(scan, &lattice.position(node), scratch);
@@ -338,7 +344,7 @@ pub(in crate::reconstruct) fn evaluate(
     let value = found.value.clamp(-widest, widest).max(least);
     NodeState {
         value,
-        felt: (found.source == Source::Touch).then_some(value),
+        touched_value: (found.source == Source::Touch).then_some(value),
         source: found.source,
         is_corner: found.is_corner,
         scan: found.scan.clamp(-widest, widest),

@@ -1,17 +1,17 @@
-//! Fills the field where nothing is known.
+//! Harmonic fill of the field where there is no evidence.
 //!
 //! Between the known values goes the smoothest field: ∇²f = 0. Flat goes on flat, a gap between two touched walls closes,
 //! and no island can arise. Where the ball was, f stays above the depth to which it was there. Deep in the material the
-//! scan's own distance pulls weakly, so that a pocket that was felt down to somewhere gets a bottom.
+//! scan's own distance pulls weakly, so that a pocket that was touched down to some depth gets a bottom.
 
 use crate::reconstruct::evidence::point_evidence::Source;
 use crate::reconstruct::field::grid::{NodeState, ReconstructionGrid, cell_at, node_at};
 use crate::reconstruct::field::lattice::{LatticeNode, Numbers, stepped};
 use crate::reconstruct::table::CellTable;
 
-/// Settings of [`complete`].
+/// Settings of [`harmonic_fill`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::reconstruct) struct CompleteParams {
+pub(in crate::reconstruct) struct HarmonicFillParams {
     /// weight of the scan beside the six neighbours of a node that is far from it
     pull: f64,
     /// a node this near to the surface may be taken for one on its other side, m
@@ -22,7 +22,7 @@ pub(in crate::reconstruct) struct CompleteParams {
     pub end_reach: i32,
 }
 
-impl CompleteParams {
+impl HarmonicFillParams {
     /// For cells of `pitch` and a ball of `radius` (m): the pull reaches two radii deep.
     pub fn new(pitch: f64, radius: f64) -> Self {
         let end_reach = (END_REACH * radius / pitch).ceil() as i32;
@@ -44,38 +44,38 @@ const ALONE: usize = 5;
 const NEARLY: f64 = 0.5;
 /// Sweeps at most: twice what the largest gaps of the tested parts need.
 const SWEEPS: usize = 200;
-/// Radii around the end of a way within which a hole is opened: as wide as holes that a ball is let through.
+/// Radii around the end of a path within which a hole is opened: as wide as holes that a ball is let through.
 const END_REACH: f64 = 3.0;
 /// No neighbour.
 const NONE: u32 = u32::MAX;
 
-/// Fills in what is not known among the nodes `at`, then gives up what nothing holds in its place; what is around them
+/// Fills in what is not known among the nodes `at`, then drops what no evidence supports; what is around them
 /// stays as it is.
 ///
 /// - `numbers`: of the nodes around these.
-pub(in crate::reconstruct) fn complete(
-    restored: &mut ReconstructionGrid,
+pub(in crate::reconstruct) fn harmonic_fill(
+    grid: &mut ReconstructionGrid,
     at: &[u32],
     numbers: &Numbers,
-    params: &CompleteParams,
+    params: &HarmonicFillParams,
 ) {
-    relax(restored, at, numbers, params);
-    if drop_islands(restored, at, numbers) {
-        relax(restored, at, numbers, params);
+    relax(grid, at, numbers, params);
+    if drop_islands(grid, at, numbers) {
+        relax(grid, at, numbers, params);
     }
-    blunt(restored, at, numbers, params);
+    blunt(grid, at, numbers, params);
 }
 
 /// Takes nodes near the surface that differ from nearly all around them back to their side: tips and pits that noise makes
 /// where the surface passes through a node.
-fn blunt(restored: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers, params: &CompleteParams) {
+fn blunt(grid: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers, params: &HarmonicFillParams) {
     for &at in at {
-        let state = restored.nodes.entry(at).1;
+        let state = grid.nodes.entry(at).1;
         if state.value.abs() < params.nearly && state.least <= 0.0 {
-            let is_other = |other: u32| (restored.nodes.entry(other).1.value < 0.0) != (state.value < 0.0);
-            let around = neighbours(restored, at, numbers);
+            let is_other = |other: u32| (grid.nodes.entry(other).1.value < 0.0) != (state.value < 0.0);
+            let around = neighbours(grid, at, numbers);
             if around.into_iter().filter(|&other| other != NONE && is_other(other)).count() >= ALONE {
-                restored.nodes.value_mut(at).value = -f64::MIN_POSITIVE.copysign(state.value);
+                grid.nodes.value_mut(at).value = -f64::MIN_POSITIVE.copysign(state.value);
             }
         }
     }
@@ -83,7 +83,7 @@ fn blunt(restored: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers, param
 
 /// An open question, and what decides it.
 struct OpenQuestion {
-    /// its number, and those of its neighbours that say something, among the values at hand
+    /// its number, and those of its neighbours that have a value, among the gathered values
     here: u32,
     around: [u32; 6],
     neighbours: u8,
@@ -94,13 +94,13 @@ struct OpenQuestion {
 }
 
 /// Successive over-relaxation, from below by the space that the ball went through.
-fn relax(restored: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers, params: &CompleteParams) {
-    let open: Vec<u32> = at.iter().copied().filter(|&at| restored.nodes.entry(at).1.is_open_question()).collect();
-    // the values at hand, close together
+fn relax(grid: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers, params: &HarmonicFillParams) {
+    let open: Vec<u32> = at.iter().copied().filter(|&at| grid.nodes.entry(at).1.is_open_question()).collect();
+    // the values, gathered close together
     let mut met: CellTable<u32, f64> = CellTable::default();
-    let mut number = |at: u32| met.insert_with(at, || restored.nodes.entry(at).1.value).0;
+    let mut number = |at: u32| met.insert_with(at, || grid.nodes.entry(at).1.value).0;
     let questions: Vec<OpenQuestion> =
-        open.iter().map(|&at| question(restored, at, numbers, params, &mut number)).collect();
+        open.iter().map(|&at| question(grid, at, numbers, params, &mut number)).collect();
     let mut values: Vec<f64> = met.iter().map(|(_, value)| *value).collect();
     for _ in 0..SWEEPS {
         let mut largest = 0.0f64;
@@ -119,18 +119,18 @@ fn relax(restored: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers, param
         }
     }
     for (&at, question) in open.iter().zip(&questions) {
-        restored.nodes.value_mut(at).value = values[question.here as usize];
+        grid.nodes.value_mut(at).value = values[question.here as usize];
     }
 }
 
 fn question(
-    restored: &ReconstructionGrid,
+    grid: &ReconstructionGrid,
     at: u32,
     numbers: &Numbers,
-    params: &CompleteParams,
+    params: &HarmonicFillParams,
     mut number: impl FnMut(u32) -> u32,
 ) -> OpenQuestion {
-    let state = &restored.nodes.entry(at).1;
+    let state = &grid.nodes.entry(at).1;
     let pull = match state.source {
         _ if state.is_further => FURTHER_PULL,
         Source::Far => params.pull,
@@ -146,9 +146,9 @@ fn question(
         weight: pull + weight,
         least: state.least,
     };
-    // what was looked at further follows; how far that went decides nothing here
-    let counts = |other: u32| other != NONE && (state.is_further || !restored.nodes.entry(other).1.is_further);
-    for other in neighbours(restored, at, numbers).into_iter().filter(|&other| counts(other)) {
+    // what was looked at further follows; its extent does not matter here
+    let counts = |other: u32| other != NONE && (state.is_further || !grid.nodes.entry(other).1.is_further);
+    for other in neighbours(grid, at, numbers).into_iter().filter(|&other| counts(other)) {
         question.around[question.neighbours as usize] = number(other);
         question.neighbours += 1;
         question.weight += 1.0;
@@ -156,20 +156,20 @@ fn question(
     question
 }
 
-/// The nodes around one, as far as they are there and say something.
-fn neighbours(restored: &ReconstructionGrid, at: u32, numbers: &Numbers) -> [u32; 6] {
-    let node = restored.nodes.entry(at).0;
+/// The nodes around one, as far as they are there and have a value.
+fn neighbours(grid: &ReconstructionGrid, at: u32, numbers: &Numbers) -> [u32; 6] {
+    let node = grid.nodes.entry(at).0;
     std::array::from_fn(|i| {
         let other = stepped(node, i / 2, if i % 2 == 0 { 1 } else { -1 });
-        let index = numbers.of(&restored.nodes, &other);
-        index.filter(|&index| restored.nodes.entry(index).1.source != Source::Beyond).unwrap_or(NONE)
+        let index = numbers.of(&grid.nodes, &other);
+        index.filter(|&index| grid.nodes.entry(index).1.source != Source::Beyond).unwrap_or(NONE)
     })
 }
 
-/// Gives up material and void that nothing holds in its place: a piece of one sign, within the nodes looked at, that was
-/// neither touched nor swept, or is smaller than anything a ball can feel. Returns whether there was any.
-fn drop_islands(restored: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers) -> bool {
-    let mut seen = vec![Visited::Outside; restored.nodes.len()];
+/// Drops material and void that no evidence supports: a piece of one sign, within the nodes looked at, that was
+/// neither touched nor swept, or is smaller than a ball can resolve. Returns whether there was any.
+fn drop_islands(grid: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers) -> bool {
+    let mut seen = vec![Visited::Outside; grid.nodes.len()];
     at.iter().for_each(|&at| seen[at as usize] = Visited::NotYet);
     let (mut island, mut has_dropped) = (Vec::new(), false);
     for &start in at {
@@ -179,10 +179,10 @@ fn drop_islands(restored: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers
         seen[start as usize] = Visited::Yes;
         island.clear();
         island.push(start);
-        if !is_held(restored, &mut island, &mut seen, numbers) {
+        if !is_attached(grid, &mut island, &mut seen, numbers) {
             has_dropped = true;
             for &at in &island {
-                let state = restored.nodes.value_mut(at);
+                let state = grid.nodes.value_mut(at);
                 (state.source, state.value) = (Source::Nothing, 0.0);
             }
         }
@@ -201,16 +201,16 @@ enum Visited {
 
 /// Gathers the piece of one sign around its first node; whether what lies beyond those looked at holds it, or evidence and
 /// its size.
-fn is_held(restored: &ReconstructionGrid, piece: &mut Vec<u32>, seen: &mut [Visited], numbers: &Numbers) -> bool {
-    let (mut next, mut is_felt, mut goes_on) = (0, false, false);
+fn is_attached(grid: &ReconstructionGrid, piece: &mut Vec<u32>, seen: &mut [Visited], numbers: &Numbers) -> bool {
+    let (mut next, mut is_touched, mut goes_on) = (0, false, false);
     while let Some(&at) = piece.get(next) {
         next += 1;
-        let state = &restored.nodes.entry(at).1;
-        let around = neighbours(restored, at, numbers);
-        is_felt |= matches!(state.source, Source::Touch | Source::Beyond) || state.least > 0.0;
+        let state = &grid.nodes.entry(at).1;
+        let around = neighbours(grid, at, numbers);
+        is_touched |= matches!(state.source, Source::Touch | Source::Beyond) || state.least > 0.0;
         goes_on |= around.contains(&NONE);
         for other in around.into_iter().filter(|&other| other != NONE) {
-            let is_same = (restored.nodes.entry(other).1.value < 0.0) == (state.value < 0.0);
+            let is_same = (grid.nodes.entry(other).1.value < 0.0) == (state.value < 0.0);
             goes_on |= is_same && seen[other as usize] == Visited::Outside;
             if is_same && seen[other as usize] == Visited::NotYet {
                 seen[other as usize] = Visited::Yes;
@@ -218,18 +218,18 @@ fn is_held(restored: &ReconstructionGrid, piece: &mut Vec<u32>, seen: &mut [Visi
             }
         }
     }
-    goes_on || is_felt && piece.len() > SPECK
+    goes_on || is_touched && piece.len() > SPECK
 }
 
-/// The cells in which a filled surface hangs on a ball that ended its way freely, from there to the nearest evidence within
+/// The cells in which a filled surface depends on a ball that ended its path freely, from there to the nearest evidence within
 /// `reach` cells: a hole that the ball left at its far end has no bottom.
 pub(in crate::reconstruct) fn open_cells(
-    restored: &ReconstructionGrid,
+    grid: &ReconstructionGrid,
     ends: impl Iterator<Item = LatticeNode>,
     reach: i32,
 ) -> CellTable<LatticeNode, ()> {
     let is_end = |state: &NodeState| state.is_free_end && state.value <= state.least;
-    let ends = ends.filter(|end| restored.nodes.get(end).is_some_and(is_end));
+    let ends = ends.filter(|end| grid.nodes.get(end).is_some_and(is_end));
     let mut cells: Vec<(LatticeNode, LatticeNode)> =
         ends.flat_map(|end| (0..8).map(move |corner| (cell_at(end, corner), end))).collect();
     let mut open = CellTable::default();
@@ -237,7 +237,7 @@ pub(in crate::reconstruct) fn open_cells(
     while let Some(&(cell, end)) = cells.get(next) {
         next += 1;
         let is_near = (0..3).map(|i| (cell[i] - end[i]).pow(2)).sum::<i32>() <= reach * reach;
-        if is_near && is_unheld_surface(restored, cell) && open.insert_with(cell, || ()).1 {
+        if is_near && is_unsupported_surface(grid, cell) && open.insert_with(cell, || ()).1 {
             cells.extend((0..6).map(|i| (stepped(cell, i / 2, if i % 2 == 0 { 1 } else { -1 }), end)));
         }
     }
@@ -245,10 +245,10 @@ pub(in crate::reconstruct) fn open_cells(
 }
 
 /// Whether the surface passes through a cell of which no corner is known.
-fn is_unheld_surface(restored: &ReconstructionGrid, cell: LatticeNode) -> bool {
+fn is_unsupported_surface(grid: &ReconstructionGrid, cell: LatticeNode) -> bool {
     let mut material = 0;
     for corner in 0..8 {
-        let Some(state) = restored.nodes.get(&node_at(cell, corner)) else { return false };
+        let Some(state) = grid.nodes.get(&node_at(cell, corner)) else { return false };
         if !state.is_open_question() {
             return false;
         }
@@ -276,17 +276,17 @@ mod tests {
             least: f64::NEG_INFINITY,
             is_free_end: false,
             is_further: false,
-            felt: Some(value(node) * PITCH),
+            touched_value: Some(value(node) * PITCH),
             renewal: 0,
         };
-        let mut restored = ReconstructionGrid::default();
+        let mut grid = ReconstructionGrid::default();
         BOX.each(|node| {
-            restored.nodes.insert(node, state(node));
+            grid.nodes.insert(node, state(node));
         });
-        let at: Vec<u32> = (0..restored.nodes.len() as u32).collect();
-        let numbers = Numbers::new(&restored.nodes, &BOX);
-        complete(&mut restored, &at, &numbers, &CompleteParams::new(PITCH, 1.5e-3));
-        restored
+        let at: Vec<u32> = (0..grid.nodes.len() as u32).collect();
+        let numbers = Numbers::new(&grid.nodes, &BOX);
+        harmonic_fill(&mut grid, &at, &numbers, &HarmonicFillParams::new(PITCH, 1.5e-3));
+        grid
     }
 
     /// Material below z = 2.8 pitches.
@@ -294,8 +294,8 @@ mod tests {
         f64::from(k) - 2.8
     }
 
-    fn is_material(restored: &ReconstructionGrid, node: LatticeNode) -> bool {
-        restored.nodes.get(&node).is_some_and(|state| state.value < 0.0)
+    fn is_material(grid: &ReconstructionGrid, node: LatticeNode) -> bool {
+        grid.nodes.get(&node).is_some_and(|state| state.value < 0.0)
     }
 
     #[test]
@@ -309,10 +309,10 @@ mod tests {
     }
 
     #[test]
-    fn a_speck_goes_whatever_it_rests_on() {
+    fn a_speck_goes_whatever_it_is_attached_to() {
         let speck = completed(|node| if node == [3, 3, 5] { -1.0 } else { floor(node) });
         assert!(!is_material(&speck, [3, 3, 5]) && is_material(&speck, [3, 3, 2]));
-        let lump = completed(|node| if node[2] == 5 { -1.0 } else { floor(node) });
-        assert!(is_material(&lump, [3, 3, 5]), "it goes on beyond what was looked at");
+        let block = completed(|node| if node[2] == 5 { -1.0 } else { floor(node) });
+        assert!(is_material(&block, [3, 3, 5]), "it goes on beyond what was looked at");
     }
 }

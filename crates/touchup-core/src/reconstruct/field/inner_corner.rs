@@ -3,20 +3,20 @@
 //! A ball that touches one surface at c has its centre at c + r n, and there is room for it before the other one, whose
 //! value is f and whose normal m: f(c) + r n·m ≥ r. Contacts of a hollow that bends from one surface to the other do not
 //! keep this distance; those beside an inner corner do, and the last of them have no more. Between these both surfaces go
-//! straight on to where they meet: nothing else can be felt there, and the scan sees corners worst.
+//! straight on to where they meet: nothing else can be measured there, and scans are least accurate in corners.
 
 use crate::reconstruct::evidence::contact_map::ContactMap;
 use crate::reconstruct::field::piecewise::{FieldParams, FieldScratch, Piece};
 
-/// Surfaces at less than 60° to each other let the ball in as far as the last contacts speak anyway, and at more than 120°
+/// Surfaces at less than 60° to each other let the ball in as far as the last contacts reach anyway, and at more than 120°
 /// they are those of a slot: they meet nowhere near.
 const STEEP_COSINE: f64 = 0.5;
-/// Both surfaces were felt within this many radii of the point: for a corner of 90° the last contacts are one away from it
+/// Both surfaces were touched within this many radii of the point: for a corner of 90° the last contacts are one away from it
 /// on either side, and the passes of a hand leave gaps.
-const FELT: f64 = 1.6;
-/// Contacts within this many radii beyond the nearest say where a surface ends.
+const TOUCHED_WITHIN: f64 = 1.6;
+/// Contacts within this many radii beyond the nearest mark the end of a surface.
 const BESIDE: f64 = 0.3;
-/// A ball in the corner has just room. There has to be this share of it: the rest is noise, and walls that bend along the
+/// A ball in the corner has just room. There has to be this share of it: what is left is for noise, and walls that bend along the
 /// corner …
 const LEAST_ROOM: f64 = 0.8;
 /// … and no more than this: where the last contacts are farther away, the corner may be as round as the ball or more.
@@ -30,8 +30,9 @@ pub(in crate::reconstruct) fn is_inner_corner(
     radius: f64,
     scratch: &FieldScratch,
 ) -> bool {
-    let is_known =
-        |piece: &Piece| piece.flat_weight >= params.least_weight && piece.nearest_squared < (FELT * radius).powi(2);
+    let is_known = |piece: &Piece| {
+        piece.flat_weight >= params.least_weight && piece.nearest_squared < (TOUCHED_WITHIN * radius).powi(2)
+    };
     let Some(one) = scratch.pieces.get(scratch.decides as usize).filter(|one| is_known(one)) else { return false };
     (0..).zip(&scratch.pieces).any(|(at, other)| {
         let cosine = one.facing.dot(&other.facing);
@@ -109,7 +110,7 @@ mod tests {
 
     #[test]
     fn a_hollow_is_no_corner() {
-        // a groove of radius 2.5 mm around y, felt from wall to wall and seen from within the material
+        // a groove of radius 2.5 mm around y, touched from wall to wall and evaluated from within the material
         let groove = (0..=18).map(|i| f64::from(i) * 10f64.to_radians());
         let places: Vec<_> = groove.map(|a| ([-2.5 * a.cos(), -2.5 * a.sin()], [a.cos(), a.sin()])).collect();
         let store = store_of(&places);

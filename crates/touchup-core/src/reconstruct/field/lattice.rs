@@ -1,4 +1,4 @@
-//! The lattice and the names of everything that stands on it.
+//! The lattice and the names of everything on it.
 
 use nalgebra::{Point3, Vector3};
 
@@ -53,7 +53,7 @@ pub struct Lattice {
 }
 
 impl Lattice {
-    /// Where plane number `index` across `axis` stands on that axis, m.
+    /// Where plane number `index` across `axis` is on that axis, m.
     #[inline]
     pub fn coordinate(&self, axis: usize, index: i32) -> f64 {
         self.origin[axis] + self.pitch * f64::from(index)
@@ -177,7 +177,7 @@ impl CellBox {
         }
     }
 
-    /// Calls `each` with the keys of a table that lie in the box, by whichever way is shorter; in no particular order.
+    /// Calls `each` with the keys of a table that lie in the box, by whichever loop is shorter; in no particular order.
     #[inline]
     pub fn each_in<V>(&self, table: &CellTable<LatticeNode, V>, mut each: impl FnMut(LatticeNode, &V)) {
         if self.volume() < table.len() as f64 {
@@ -193,7 +193,7 @@ impl CellBox {
 }
 
 /// Numbers of the keys of a table, found by place within a box where that is small, else by the table. It holds until a
-/// key comes or goes.
+/// key is inserted or removed.
 pub(in crate::reconstruct) struct Numbers {
     cells: CellBox,
     size: [usize; 3],
@@ -243,7 +243,7 @@ impl Edge {
         [self.node, left, stepped(left, v, -1), stepped(self.node, v, -1)]
     }
 
-    /// The four squares that end at it: number i stands between cells i and i + 1 of [`Self::cells`].
+    /// The four squares that end at it: number i is between cells i and i + 1 of [`Self::cells`].
     pub fn squares(&self) -> [Square; 4] {
         let (u, v) = across(self.axis as usize);
         let square = |node, axis: usize| Square { node, axis: axis as u8 };
@@ -360,7 +360,7 @@ pub enum Owner {
 }
 
 impl Owner {
-    /// Where it stands on the lattice; `None` for a face of the scan.
+    /// Its place on the lattice; `None` for a face of the scan.
     pub(in crate::reconstruct) fn node(&self) -> Option<LatticeNode> {
         match self {
             Self::Edge(edge) => Some(edge.node),

@@ -1,4 +1,4 @@
-//! The surface that the touches show, as the zero set of a field: piecewise smooth, evaluated from stored contacts.
+//! The touched surface as the zero set of a field: piecewise smooth, evaluated from stored contacts.
 //!
 //! Contacts near the point are grouped into smooth pieces; each piece is fitted alone, so that nothing is averaged over
 //! an edge, and the pieces are put together by the larger value at a convex edge, by the smaller one at a concave. Within
@@ -25,7 +25,7 @@ pub struct FieldParams {
     pub piece_cosine: f64,
     /// farthest that a contact may be off the chord to the middle of its piece, m
     pub chord: f64,
-    /// a piece with less weight than this is not believed; a sliding contact weighs 1
+    /// a piece with less weight than this is not used; a sliding contact has weight 1
     pub least_weight: f64,
 }
 
@@ -36,7 +36,7 @@ impl FieldParams {
     }
 }
 
-/// What the touches say at a point.
+/// The field of the touches at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldValue {
     /// signed distance from the surface, m; positive outside the part
@@ -51,7 +51,7 @@ pub struct FieldValue {
     pub is_fan: bool,
     /// the contacts of the piece that decides do not surround the point: it is beyond the last of them
     pub is_border: bool,
-    /// two surfaces, each felt away from edges, meet near the point in a convex edge
+    /// two surfaces, each touched away from edges, meet near the point in a convex edge
     pub is_edge: bool,
 }
 
@@ -130,7 +130,7 @@ impl FieldScratch {
 const MOST_PIECES: usize = 8;
 /// No piece.
 const NO_PIECE: u32 = u32::MAX;
-/// Pieces that stand at more than this to each other (cos 60°) make an edge, or the two sides of a thin wall.
+/// Pieces at more than this angle to each other (cos 60°) make an edge, or the two sides of a thin wall.
 const EDGE_COSINE: f64 = 0.5;
 /// Share of the reach within which the tilted planes of an edge count as much as others.
 const TILTED_REACH: f64 = 0.5;
@@ -223,7 +223,7 @@ impl FieldParams {
             piece.fit_weight += weight;
             piece.normal += mean.normal * weight;
             piece.point += mean.point.coords * weight;
-            // from here on the weight is asked for alone
+            // from here on the weight alone is needed
             member.distance_squared = weight;
         }
         for piece in pieces.iter_mut() {
@@ -236,17 +236,17 @@ impl FieldParams {
         }
     }
 
-    /// Puts the pieces together around the nearest one that is believed. The tilted planes of edges that the ball rolled
-    /// over say little from afar: such can only cut off. A piece that would cut off the nearest contact itself is refuted.
+    /// Puts the pieces together around the nearest one with enough weight. The tilted planes of edges that the ball rolled
+    /// over mean little from afar: such can only cut off. A piece that would cut off the nearest contact itself is refuted.
     ///
     /// - `arm`: from the point to that contact, m.
     fn combine(&self, pieces: &[Piece], arm: &Vector3<f64>) -> Option<Combined> {
         let is_flat = |at: usize| pieces[at].flat_weight >= self.least_weight;
         let is_tilted_afar =
             |at: usize| !is_flat(at) && pieces[at].nearest_squared > (TILTED_REACH * self.reach).powi(2);
-        let believed = || (0..pieces.len()).filter(|&at| pieces[at].weight >= self.least_weight);
-        let near = believed().filter(|&at| !is_tilted_afar(at));
-        let mut in_order = near.chain(believed().filter(|&at| is_tilted_afar(at)));
+        let supported = || (0..pieces.len()).filter(|&at| pieces[at].weight >= self.least_weight);
+        let near = supported().filter(|&at| !is_tilted_afar(at));
+        let mut in_order = near.chain(supported().filter(|&at| is_tilted_afar(at)));
         let first_at = in_order.next().unwrap_or(0);
         let first = pieces.get(first_at)?;
         let mut solid = Solid { values: [0.0; MOST_PIECES], is_convex: [0; MOST_PIECES] };
@@ -273,7 +273,7 @@ impl FieldParams {
         Some(Combined { value, gradient: pieces[at].facing, is_edge, piece: at as u32 })
     }
 
-    /// With which of the pieces in the set `taken` another one makes a convex edge: with the rest it makes a concave one.
+    /// With which of the pieces in the set `taken` another one makes a convex edge: with the others it makes a concave one.
     /// `None` where it makes neither with some.
     fn convex_among(&self, pieces: &[Piece], taken: u8, piece: &Piece) -> Option<u8> {
         let mut convex = 0;
@@ -475,8 +475,8 @@ mod tests {
     }
 
     #[test]
-    fn a_tilted_wall_does_not_cut_off_what_was_felt() {
-        // a step along y = 0; the wall was felt 2 mm aside alone, and drag has tilted its normals
+    fn a_tilted_wall_does_not_cut_off_what_was_touched() {
+        // a step along y = 0; the wall was touched 2 mm aside alone, and drag has tilted its normals
         let top = |x: f64, y: f64| (y <= 0.0).then(|| (Point3::new(x, y, 0.0), Vector3::z()));
         let tilted = Vector3::new(0.15, 0.99, 0.0).normalize();
         let wall =
@@ -485,7 +485,7 @@ mod tests {
         for y in [-0.2, -0.1] {
             assert!((value(&step, 0.0, y, -0.2) + 0.2).abs() < 1e-9, "{y}: {}", value(&step, 0.0, y, -0.2));
         }
-        // where it was felt it ends the face
+        // where it was touched it ends the face
         assert!(value(&step, -3.0, 0.4, -0.4) > 0.2);
     }
 

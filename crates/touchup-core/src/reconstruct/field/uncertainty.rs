@@ -1,15 +1,15 @@
-//! How well the fit of the contacts is known at a point.
+//! Uncertainty of the fit of the contacts at a point.
 //!
 //! The fit is a weighted mean of the contacts around, so the noise of each enters by its weight, together with that of the
 //! others in the same smoothing window. That is all on a surface which the pieces describe. Where they do not, the contacts
-//! say so themselves: they scatter around the fit, they end, or another surface is so near that the ball touched both.
+//! show it themselves: they scatter around the fit, they end, or another surface is so near that the ball touched both.
 
 use nalgebra::Point3;
 
 use crate::reconstruct::evidence::contact_map::ContactMap;
 use crate::reconstruct::field::piecewise::{FieldParams, FieldScratch, FieldValue, PassShare};
 
-/// How well the fit knows the surface, by cause; standard deviations, m.
+/// Uncertainty of the fit, by cause; standard deviations, m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FitSigma {
     /// noise of the contacts
@@ -22,7 +22,7 @@ pub struct FitSigma {
     pub scatter: f64,
     /// beyond the last contact the surface may turn
     pub border: f64,
-    /// another surface is near, and no edge between them was felt
+    /// another surface is near, and no edge between them was touched
     pub meeting: f64,
 }
 
@@ -71,10 +71,10 @@ impl FieldParams {
             let sigma = store.sigma(member.index);
             calibration += weight * sigma.calibration;
             scatter += weight * (off - piece.value()).powi(2);
-            shares.extend(store.visits(member.index).map(|visit| {
-                let share = weight * visit.weight / mean.weight / f64::from(visit.count).sqrt();
+            shares.extend(store.passes(member.index).map(|pass| {
+                let share = weight * pass.weight / mean.weight / f64::from(pass.count).sqrt();
                 let tilt = share * 0.5 * lateral * sigma.normal;
-                PassShare { began_ns: visit.began_ns, noise: share * sigma.noise.hypot(sigma.reach), tilt }
+                PassShare { began_ns: pass.began_ns, noise: share * sigma.noise.hypot(sigma.reach), tilt }
             }));
         }
         shares.sort_unstable_by(|a, b| a.began_ns.cmp(&b.began_ns).then(a.noise.total_cmp(&b.noise)));

@@ -1,13 +1,13 @@
-//! Where the ball can never go: in inner corners closer to the other wall than its radius, and in what is narrower than it.
+//! Unreachable surface: in inner corners closer to the other wall than the radius of the ball, and in what is narrower than it.
 //!
 //! A ball that touched the surface at a vertex would have its centre a radius above it. Where some other piece of the new
-//! surface is in its way there, no touch can ever say more.
+//! surface obstructs it there, no touch is possible.
 
 use nalgebra::{Point3, Vector3};
 
 use crate::mesh::{FaceTree, MeshError, TriMesh, VertexId};
 use crate::reconstruct::Support;
-use crate::reconstruct::evidence::free_space::SweptSpace;
+use crate::reconstruct::evidence::free_space::FreeSpace;
 
 /// The ball may enter the surface by this share of its radius: what the lattice and noise leave of a flat face.
 const SLACK: f64 = 0.1;
@@ -19,7 +19,7 @@ const SLACK: f64 = 0.1;
 pub(in crate::reconstruct) fn mark_unreachable(
     mesh: &TriMesh,
     support: &mut [Support],
-    swept: &SweptSpace,
+    free_space: &FreeSpace,
     radius: f64,
 ) -> Result<(), MeshError> {
     let is_new = |corners: &[VertexId; 3]| corners.iter().all(|v| support[v.0 as usize] != Support::Scan);
@@ -28,7 +28,7 @@ pub(in crate::reconstruct) fn mark_unreachable(
     if faces.is_empty() {
         return Ok(());
     }
-    // the scan is not asked: its noise would be in the way
+    // the scan is left out: its noise would obstruct the ball
     let patch = TriMesh::new(mesh.positions().to_vec(), faces.clone())?;
     let tree = FaceTree::new(&patch);
     let deepest = radius * (1.0 - SLACK);
@@ -36,7 +36,7 @@ pub(in crate::reconstruct) fn mark_unreachable(
         let Some(normal) = normal.try_normalize(0.0) else { continue };
         let centre: Point3<f64> = mesh.positions()[vertex] + normal * radius;
         let is_blocked = tree.closest(&patch, &centre, deepest).is_some();
-        let was_there = || swept.nearest(&centre).is_some_and(|(distance, _)| distance < SLACK * radius);
+        let was_there = || free_space.nearest(&centre).is_some_and(|(distance, _)| distance < SLACK * radius);
         if is_blocked && !was_there() {
             support[vertex] = Support::Unreachable;
         }

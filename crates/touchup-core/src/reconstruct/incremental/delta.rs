@@ -1,4 +1,4 @@
-//! What changed in the patch since it was last told, for a mesh that follows it.
+//! What changed in the patch since it was last published, for a mesh that follows it.
 
 use nalgebra::Point3;
 
@@ -18,7 +18,7 @@ pub struct PatchDelta {
     /// vertices that are new, have moved, or are corners of `faces`
     pub vertices: Vec<PatchVertex>,
     /// whose faces are others now, and how many of `faces` are theirs, in this order. A face of the scan that the patch
-    /// touches goes when its remainder first comes.
+    /// touches is removed when its remainder is first listed.
     pub owners: Vec<(Owner, u32)>,
     /// corners as indices into `vertices`, counter-clockwise seen from outside
     pub faces: Vec<[u32; 3]>,
@@ -33,7 +33,7 @@ pub struct PatchVertex {
     pub key: VertexKey,
     /// m, in O
     pub position: Point3<f64>,
-    /// what it rests on
+    /// the evidence for it
     pub support: Support,
 }
 
@@ -54,15 +54,15 @@ fn block_of(node: LatticeNode) -> LatticeNode {
 /// Corners by name.
 type NamedFace = [VertexKey; 3];
 
-/// The patch as it was last told.
+/// The patch as last published.
 #[derive(Clone, Debug, Default)]
-pub(in crate::reconstruct) struct Shown {
+pub(in crate::reconstruct) struct PublishedPatch {
     faces: CellTable<Owner, Vec<NamedFace>>,
     /// the owners of the lattice among them, by blocks of cells
     blocks: CellTable<LatticeNode, Vec<Owner>>,
     vertices: CellTable<VertexKey, Placed>,
     face_count: usize,
-    /// faces of the scan that went
+    /// faces of the scan that were removed
     gone: usize,
 }
 
@@ -78,13 +78,13 @@ struct Placed {
 #[derive(Default)]
 struct Draft {
     delta: PatchDelta,
-    /// where each vertex stands in the delta
+    /// index of each vertex in the delta
     at: CellTable<VertexKey, ()>,
-    /// corners of faces that went
+    /// corners of faces that were removed
     left: Vec<VertexKey>,
 }
 
-impl Shown {
+impl PublishedPatch {
     /// How many faces more the mesh has by the patch.
     pub fn faces_more(&self) -> f64 {
         self.face_count as f64 - self.gone as f64
@@ -100,7 +100,7 @@ impl Shown {
 
     /// Takes up what was renewed; returns what is another than before.
     ///
-    /// - `support`: what a vertex rests on.
+    /// - `support`: of a vertex.
     pub fn take(
         &mut self,
         renewed: &Renewed,
@@ -236,7 +236,7 @@ fn faces_by_owner(patch: &Patch) -> CellTable<Owner, Vec<NamedFace>> {
     by_owner
 }
 
-/// A face of the scan as it came.
+/// A whole face of the scan.
 fn whole(owner: Owner, scan: &TriMesh) -> Vec<NamedFace> {
     match owner {
         Owner::Scan(face) => vec![scan.corners(face).map(VertexKey::Scan)],

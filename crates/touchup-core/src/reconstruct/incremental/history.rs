@@ -1,4 +1,4 @@
-//! What was there before each stroke, so that strokes can be undone and redone bit by bit.
+//! Stroke undo: old values by key, so that strokes can be undone and redone bit by bit.
 
 use std::collections::VecDeque;
 
@@ -14,7 +14,7 @@ const MOST_STROKES: usize = 64;
 pub struct History<K, V> {
     done: VecDeque<Vec<(K, V)>>,
     undone: Vec<Vec<(K, V)>>,
-    /// the keys of the stroke at hand
+    /// the keys of the current stroke
     noted: CellTable<K, ()>,
     /// values kept at most
     room: usize,
@@ -132,6 +132,6 @@ mod tests {
         (0..11).for_each(|i| history.note(i, || ()));
         assert!(history.is_empty() && history.kept == 0, "too long to be kept");
         (0..11).for_each(|i| history.note(100 + i, || ()));
-        assert_eq!(history.kept, 0, "the rest of it neither");
+        assert_eq!(history.kept, 0, "nor its remainder");
     }
 }

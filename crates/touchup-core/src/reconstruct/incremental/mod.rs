@@ -1,4 +1,4 @@
-//! What new evidence changes: field, faces, and what follows them.
+//! Incremental update of field, faces, and the mesh that follows.
 
 pub(in crate::reconstruct) mod delta;
 pub(in crate::reconstruct) mod history;

@@ -1,4 +1,4 @@
-//! Samples in, the scan with its touched part meshed anew out.
+//! Samples in, the scan with its touched part remeshed out.
 
 use nalgebra::{Point3, Vector3};
 
@@ -9,7 +9,7 @@ use crate::reconstruct::contour::patched::{Patched, Support};
 use crate::reconstruct::contour::vertex_uncertainty::vertex_sigma;
 use crate::reconstruct::evidence::contact_map::{ContactMap, GateParams};
 use crate::reconstruct::evidence::contact_uncertainty::CalibrationParams;
-use crate::reconstruct::evidence::free_space::SweptSpace;
+use crate::reconstruct::evidence::free_space::FreeSpace;
 use crate::reconstruct::evidence::outliers::Outliers;
 use crate::reconstruct::evidence::point_evidence::{Evidence, EvidenceParams, ScanPrior, Source};
 use crate::reconstruct::evidence::touch_history::TouchHistory;
@@ -18,7 +18,7 @@ use crate::reconstruct::field::grid::{GridChanges, NodeState, ReconstructionGrid
 use crate::reconstruct::field::lattice::{CellBox, Lattice, LatticeNode, VertexKey};
 use crate::reconstruct::field::piecewise::FieldScratch;
 use crate::reconstruct::field::unreachable::mark_unreachable;
-use crate::reconstruct::incremental::delta::{PatchDelta, Shown};
+use crate::reconstruct::incremental::delta::{PatchDelta, PublishedPatch};
 use crate::reconstruct::incremental::remesh::{Remesh, Renewed};
 use crate::stylus::{ContactSample, ProbedPoint, SettingError, TipBody, TipShape};
 
@@ -27,15 +27,15 @@ use crate::stylus::{ContactSample, ProbedPoint, SettingError, TipBody, TipShape}
 pub struct PatcherParams {
     /// how touches are found
     pub touches: TouchFinderParams,
-    /// how far they are believed
+    /// how they are weighted
     pub evidence: EvidenceParams,
-    /// whether free space is evidence: where the tip went, nothing is. Else the scan stays where nothing was touched
+    /// whether free space is evidence: where the tip went, there is no material. Else the scan stays where nothing was touched
     pub free_space: bool,
     /// edge length of the lattice, m
     pub pitch: f64,
     /// a patch may have this many times the faces of the scan: where it would have more, the lattice is made coarser
     pub most_faces: f64,
-    /// how well things are known; `None`: nobody asks, and nothing is rejected
+    /// the model of uncertainty; `None`: no uncertainty, and nothing is rejected
     pub uncertainty: Option<UncertaintyParams>,
     /// `None`: the mesh is the whole scan, and may be touched anywhere
     pub region: Option<PatchRegion>,
@@ -65,7 +65,7 @@ parameters! {
 }
 
 parameters! {
-    /// What is asked of how well the mesh is known.
+    /// Which uncertainties are estimated.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct UncertaintyParams in "uncertainty" {
         /// Standard deviation of a vertex of the scan, m; 0: free of noise.
@@ -122,13 +122,13 @@ impl PatcherParams {
         Some(ScanPrior { sigma, gate_sigmas })
     }
 
-    /// How touches are found; what calibration leaves is asked for with the rest.
+    /// How touches are found; the calibration uncertainty is evaluated with the others.
     fn finder_params(&self) -> TouchFinderParams {
         TouchFinderParams { calibration: self.uncertainty.map(|known| known.calibration), ..self.touches }
     }
 
     /// Settings for a tip of `shape` whose ball, flat end or nose has `radius` (m), else as [`Self::new`]. How far evidence
-    /// is believed goes by the size of what the tip can show.
+    /// is used depends on the resolution of the tip.
     ///
     /// # Errors
     /// [`SettingError`] for sizes of which no tip can be made.
@@ -181,7 +181,7 @@ impl PatcherParams {
 pub struct Patcher {
     params: PatcherParams,
     finder: TouchFinder,
-    felt: TouchHistory,
+    history: TouchHistory,
     live: Option<LivePatch>,
 }
 
@@ -189,33 +189,33 @@ pub struct Patcher {
 #[derive(Clone, Debug)]
 struct LivePatch {
     remesh: Remesh,
-    shown: Shown,
-    /// what came to the stores since
-    news: GridChanges,
-    /// what came and was taken in only nearby
+    published: PublishedPatch,
+    /// changes of the evidence since
+    changes: GridChanges,
+    /// changes that were taken in only nearby
     late: GridChanges,
     /// times since that was taken in as a whole
     since_late: u32,
-    /// strokes were undone: everything is to be meshed anew
+    /// strokes were undone: everything is to be remeshed
     is_outdated: bool,
 }
 
-/// News are taken in as a whole each so many times, or when there is nothing else to do.
+/// Changes are taken in as a whole each so many times, or when there is nothing else to do.
 const LATE_EVERY: u32 = 4;
 
 impl LivePatch {
     /// What is to be taken in nearby, and what as a whole.
-    fn take_news(&mut self) -> (GridChanges, GridChanges) {
-        let news = std::mem::take(&mut self.news);
+    fn take_changes(&mut self) -> (GridChanges, GridChanges) {
+        let changes = std::mem::take(&mut self.changes);
         self.since_late += 1;
-        if self.since_late < LATE_EVERY && !news.is_empty() {
-            self.late.extend(&news);
-            return (news, GridChanges::default());
+        if self.since_late < LATE_EVERY && !changes.is_empty() {
+            self.late.extend(&changes);
+            return (changes, GridChanges::default());
         }
         self.since_late = 0;
         let mut late = std::mem::take(&mut self.late);
-        late.extend(&news);
-        (news, late)
+        late.extend(&changes);
+        (changes, late)
     }
 }
 
@@ -231,7 +231,7 @@ const COARSER: usize = 3;
 const ORIGIN: [f64; 3] = [0.164_607_9, 0.312_756_1, 0.460_895_1];
 
 impl Patcher {
-    /// A patcher that has felt nothing yet.
+    /// A patcher without touches yet.
     ///
     /// # Errors
     /// [`SettingError`].
@@ -240,9 +240,9 @@ impl Patcher {
         let radius = params.evidence.radius;
         Ok(Self {
             finder: TouchFinder::new(params.finder_params())?,
-            felt: TouchHistory::new(
+            history: TouchHistory::new(
                 ContactMap::new(CONTACT_CELL * radius, params.evidence.field.reach, params.gate()),
-                SweptSpace::of_tip(
+                FreeSpace::of_tip(
                     TipBody::new(params.touches.shape, params.touches.radius)?,
                     SWEPT_CELL * radius,
                     5.0 / 3.0 * radius,
@@ -256,15 +256,15 @@ impl Patcher {
         })
     }
 
-    /// What was rejected because it contradicted the place it was felt at.
+    /// What was rejected because it contradicted earlier contacts at its place.
     pub fn outliers(&self) -> &Outliers {
-        self.felt.contacts.outliers()
+        self.history.contacts.outliers()
     }
 
-    /// A copy of what was felt, without what was made of it for a mesh that follows.
+    /// A copy of the touch history, without the state of a mesh that follows.
     pub fn copy(&self) -> Self {
-        let Self { params, finder, felt, .. } = self;
-        Self { params: *params, finder: finder.clone(), felt: felt.clone(), live: None }
+        let Self { params, finder, history, .. } = self;
+        Self { params: *params, finder: finder.clone(), history: history.clone(), live: None }
     }
 
     /// The settings.
@@ -272,40 +272,40 @@ impl Patcher {
         &self.params
     }
 
-    /// Takes the next sample, which is later than the one before. What it says counts once the smoothing window around it
+    /// Takes the next sample, which is later than the one before. It counts once the smoothing window around it
     /// is complete.
     pub fn push(&mut self, sample: &ContactSample) {
-        let Self { finder, felt, params, .. } = self;
-        finder.push(sample, |touch| keep(felt, params, &touch));
+        let Self { finder, history, params, .. } = self;
+        finder.push(sample, |touch| keep(history, params, &touch));
     }
 
     /// The touches themselves, in order of time.
     pub fn probed(&self) -> &[ProbedPoint] {
-        self.felt.probed.points()
+        self.history.probed.points()
     }
 
     /// What was touched, as it was kept.
     pub fn contacts(&self) -> &ContactMap {
-        &self.felt.contacts
+        &self.history.contacts
     }
 
     /// Takes in what is still in the smoothing window: the stream has ended or pauses.
     pub fn flush(&mut self) {
-        let Self { finder, felt, params, .. } = self;
-        finder.flush(|touch| keep(felt, params, &touch));
+        let Self { finder, history, params, .. } = self;
+        finder.flush(|touch| keep(history, params, &touch));
     }
 
     /// How many strokes can be undone. A stroke is what was touched without a pause of a tenth of a second, and where the
     /// ball went after it.
     pub fn strokes(&self) -> usize {
-        self.felt.strokes()
+        self.history.strokes()
     }
 
     /// Takes the last stroke back, up to the last sample: what counts is bit by bit what counted before it. Returns whether
-    /// there was one. What the samples told of friction and bias stays.
+    /// there was one. Estimates of friction and bias stay.
     pub fn undo(&mut self) -> bool {
         self.flush();
-        let has_undone = self.felt.undo();
+        let has_undone = self.history.undo();
         self.start_over(has_undone);
         has_undone
     }
@@ -313,38 +313,38 @@ impl Patcher {
     /// Does the stroke again that was undone last, bit by bit, unless something was touched since. Returns whether there was
     /// one.
     pub fn redo(&mut self) -> bool {
-        let has_redone = self.felt.redo();
+        let has_redone = self.history.redo();
         self.start_over(has_redone);
         has_redone
     }
 
-    /// The next renewal meshes everything anew.
+    /// The next renewal remeshes everything.
     fn start_over(&mut self, is_outdated: bool) {
         if let Some(live) = &mut self.live {
             live.is_outdated |= is_outdated;
         }
     }
 
-    /// The scan with its touched part meshed anew from all that counts so far; vertices and faces that were not touched
+    /// The scan with its touched part remeshed from all that counts so far; vertices and faces that were not touched
     /// keep their ids.
     ///
-    /// - `scan`: as it came, with the tree over its faces.
+    /// - `scan`: the original, with the tree over its faces.
     ///
     /// # Errors
     /// [`MeshError::TooMany`] when 32-bit ids do not suffice.
     pub fn patched(&mut self, scan: &TriMesh, tree: &FaceTree) -> Result<Patched, MeshError> {
-        self.felt.contacts.note_all();
-        self.settle(scan, tree);
-        let (remesh, Renewed { patch, .. }) = self.meshed_anew(scan, tree);
+        self.history.contacts.note_all();
+        self.update(scan, tree);
+        let (remesh, Renewed { patch, .. }) = self.remeshed(scan, tree);
         let (mesh, ids) = patch.applied_to(scan)?;
         let mut support = vec![Support::Scan; mesh.vertex_slots()];
         for ((key, _), id) in patch.vertices.iter().zip(ids) {
             if let Some(id) = id {
-                support[id.0 as usize] = support_of(&key, remesh.restored());
+                support[id.0 as usize] = support_of(&key, remesh.grid());
             }
         }
         if let Some(radius) = self.params.ball() {
-            mark_unreachable(&mesh, &mut support, &self.felt.swept, radius)?;
+            mark_unreachable(&mesh, &mut support, &self.history.free_space, radius)?;
         }
         let sigma = self.sigma(scan, tree, &mesh, &support);
         Ok(Patched {
@@ -358,7 +358,7 @@ impl Patcher {
         })
     }
 
-    /// How well each vertex is known, if somebody asks.
+    /// Standard deviation of each vertex, where the settings ask for it.
     fn sigma(&self, scan: &TriMesh, tree: &FaceTree, mesh: &TriMesh, support: &[Support]) -> Vec<f64> {
         let Self { params, .. } = self;
         let Some(uncertainty) = &params.uncertainty else { return Vec::new() };
@@ -368,57 +368,57 @@ impl Patcher {
         mesh.positions().iter().zip(support).map(&mut of).collect()
     }
 
-    /// What changed in the patch since this was last asked. It takes as long as there is to mesh anew near what changed;
-    /// where the budget was passed, everything is meshed anew, by a coarser lattice.
+    /// What changed in the patch since the last call. The time depends on how much there is to remesh near the changes;
+    /// where the budget was passed, everything is remeshed, by a coarser lattice.
     ///
     /// What [`Self::patched`] shows can differ from the sum of these by some thousandths of an edge of the lattice, and where
-    /// nothing was felt by more.
+    /// nothing was touched by more.
     ///
     /// - `scan`, `tree`: as in [`Self::patched`], the same each time.
     pub fn renewed(&mut self, scan: &TriMesh, tree: &FaceTree) -> PatchDelta {
-        self.settle(scan, tree);
+        self.update(scan, tree);
         let mut live = self.live.take().unwrap_or_else(|| LivePatch {
             remesh: Remesh::new(lattice_of(self.params.pitch)),
-            shown: Shown::default(),
-            news: self.all_news(),
+            published: PublishedPatch::default(),
+            changes: self.all_changes(),
             late: GridChanges::default(),
             since_late: 0,
             is_outdated: false,
         });
-        let (news, late) = live.take_news();
-        let faces = self.whole(scan) + live.shown.faces_more();
+        let (changes, late) = live.take_changes();
+        let faces = self.whole(scan) + live.published.faces_more();
         let renewed = if live.is_outdated || faces > self.budget(scan) {
-            let (remesh, mut renewed) = self.meshed_anew(scan, tree);
+            let (remesh, mut renewed) = self.remeshed(scan, tree);
             (live.remesh, live.is_outdated) = (remesh, false);
             renewed.core = CellBox::ALL;
-            renewed.scanned.extend(live.shown.scan_faces());
+            renewed.scanned.extend(live.published.scan_faces());
             renewed
         } else {
-            live.remesh.renew(&self.evidence(scan, tree), &news, &late)
+            live.remesh.renew(&self.evidence(scan, tree), &changes, &late)
         };
-        let support = |key: &VertexKey| support_of(key, live.remesh.restored());
-        let delta = live.shown.take(&renewed, live.remesh.region(), scan, support);
+        let support = |key: &VertexKey| support_of(key, live.remesh.grid());
+        let delta = live.published.take(&renewed, live.remesh.region(), scan, support);
         self.live = Some(live);
-        PatchDelta { until_ns: self.felt.until_ns, ..delta }
+        PatchDelta { until_ns: self.history.until_ns, ..delta }
     }
 
-    fn settle(&mut self, scan: &TriMesh, tree: &FaceTree) {
-        let news = self.felt.settle(scan, tree);
+    fn update(&mut self, scan: &TriMesh, tree: &FaceTree) {
+        let changes = self.history.update(scan, tree);
         if let Some(live) = &mut self.live {
-            live.news.extend(&news);
+            live.changes.extend(&changes);
         }
     }
 
-    fn all_news(&self) -> GridChanges {
-        let means = self.felt.contacts.means().iter().map(|mean| mean.point).collect();
+    fn all_changes(&self) -> GridChanges {
+        let means = self.history.contacts.means().iter().map(|mean| mean.point).collect();
         let mut centres = Vec::new();
-        self.felt.swept.cover(|centre| centres.push(*centre));
+        self.history.free_space.cover(|centre| centres.push(*centre));
         GridChanges { means, centres }
     }
 
     fn evidence<'a>(&'a self, scan: &'a TriMesh, tree: &'a FaceTree) -> Evidence<'a> {
-        let Self { felt: TouchHistory { contacts, swept, .. }, params, .. } = self;
-        Evidence { params: &params.evidence, contacts, swept, scan, tree, prior: params.scan_prior() }
+        let Self { history: TouchHistory { contacts, free_space, .. }, params, .. } = self;
+        Evidence { params: &params.evidence, contacts, free_space, scan, tree, prior: params.scan_prior() }
     }
 
     fn budget(&self, scan: &TriMesh) -> f64 {
@@ -431,11 +431,11 @@ impl Patcher {
     }
 
     /// The patch of everything, within the budget.
-    fn meshed_anew(&self, scan: &TriMesh, tree: &FaceTree) -> (Remesh, Renewed) {
-        let (evidence, news, budget) = (self.evidence(scan, tree), self.all_news(), self.budget(scan));
+    fn remeshed(&self, scan: &TriMesh, tree: &FaceTree) -> (Remesh, Renewed) {
+        let (evidence, changes, budget) = (self.evidence(scan, tree), self.all_changes(), self.budget(scan));
         let meshed = |pitch: f64| {
             let mut remesh = Remesh::new(lattice_of(pitch));
-            let renewed = remesh.renew(&evidence, &news, &GridChanges::default());
+            let renewed = remesh.renew(&evidence, &changes, &GridChanges::default());
             (remesh, renewed)
         };
         let mut made = meshed(self.params.pitch);
@@ -453,11 +453,11 @@ impl Patcher {
 }
 
 /// What the tip does outside the region is not looked at.
-fn keep(felt: &mut TouchHistory, params: &PatcherParams, touch: &TipTouch) {
+fn keep(history: &mut TouchHistory, params: &PatcherParams, touch: &TipTouch) {
     if params.region.is_none_or(|touched| touched.region.contains(&touch.centre)) {
-        felt.keep(touch);
+        history.keep(touch);
     } else {
-        felt.until_ns = touch.stamp_ns;
+        history.until_ns = touch.stamp_ns;
     }
 }
 
@@ -466,9 +466,9 @@ fn lattice_of(pitch: f64) -> Lattice {
 }
 
 /// A vertex is touched when most of the corners of its cell are near the surface that was; those on the scan are its own.
-fn support_of(key: &VertexKey, restored: &ReconstructionGrid) -> Support {
-    let is_felt = |state: &NodeState| state.source == Source::Touch && !state.is_corner;
-    let is_touched = |node: &LatticeNode| restored.nodes.get(node).is_some_and(is_felt);
+fn support_of(key: &VertexKey, grid: &ReconstructionGrid) -> Support {
+    let is_of_touch = |state: &NodeState| state.source == Source::Touch && !state.is_corner;
+    let is_touched = |node: &LatticeNode| grid.nodes.get(node).is_some_and(is_of_touch);
     let touched = match *key {
         VertexKey::Scan(_) | VertexKey::Trace { .. } | VertexKey::Pierce(..) => return Support::Scan,
         VertexKey::Cell(cell, _) => (0..8).filter(|&corner| is_touched(&node_at(cell, corner))).count() >= 4,

@@ -1,4 +1,4 @@
-//! The field, the region and the new faces in it, brought up to date where evidence came.
+//! The field, the region and the new faces in it, updated where there is new evidence.
 
 use crate::mesh::FaceId;
 use crate::reconstruct::LatticeRegion;
@@ -16,15 +16,15 @@ const GROWTH: usize = 3;
 /// Rounds in which the field is looked at further, each two cells, where a surface that is filled in goes on.
 const FURTHER: usize = 4;
 
-/// What is meshed anew, and why.
+/// What is remeshed, and why.
 #[derive(Clone, Debug)]
 pub(in crate::reconstruct) struct Remesh {
     lattice: Lattice,
-    restored: ReconstructionGrid,
+    grid: ReconstructionGrid,
     region: LatticeRegion,
     /// cells that are in the region only because patch and scan cannot be joined at their squares
     grown: CellTable<LatticeNode, ()>,
-    /// cells that patch and scan would need to be joined, for which nothing was known
+    /// cells that patch and scan would need to be joined, without a value of the field
     wanted: CellTable<LatticeNode, ()>,
     /// a box that holds the region
     bounds: CellBox,
@@ -36,18 +36,18 @@ pub(in crate::reconstruct) struct Remesh {
 pub(in crate::reconstruct) struct Renewed {
     /// what is around these cells is new …
     pub core: CellBox,
-    /// … and stands here, beside more of which not all is there
+    /// … and is in here, beside more of which not all is there
     pub patch: Patch,
-    /// the faces of the scan that were looked at: what is left of them stands in the patch
+    /// the faces of the scan that were looked at: what is left of them is in the patch
     pub scanned: Vec<FaceId>,
 }
 
 impl Remesh {
-    /// Nothing meshed anew yet.
+    /// Nothing remeshed yet.
     pub fn new(lattice: Lattice) -> Self {
         Self {
             lattice,
-            restored: ReconstructionGrid::default(),
+            grid: ReconstructionGrid::default(),
             region: LatticeRegion::default(),
             grown: CellTable::default(),
             wanted: CellTable::default(),
@@ -60,27 +60,27 @@ impl Remesh {
         &self.lattice
     }
 
-    pub fn restored(&self) -> &ReconstructionGrid {
-        &self.restored
+    pub fn grid(&self) -> &ReconstructionGrid {
+        &self.grid
     }
 
     pub fn region(&self) -> &LatticeRegion {
         &self.region
     }
 
-    /// Brings everything up to date with what came to the stores of `evidence`: as [`ReconstructionGrid::renew`].
-    pub fn renew(&mut self, evidence: &Evidence<'_>, news: &GridChanges, late: &GridChanges) -> Renewed {
-        let mut changed = self.restored.renew(evidence, &self.lattice, news, late);
+    /// Updates everything by the changes of `evidence`: as [`ReconstructionGrid::renew`].
+    pub fn renew(&mut self, evidence: &Evidence<'_>, changes: &GridChanges, late: &GridChanges) -> Renewed {
+        let mut changed = self.grid.renew(evidence, &self.lattice, changes, late);
         let (mut core, mut left) = (CellBox::EMPTY, Vec::new());
         for _ in 0..FURTHER {
             self.take_up(&changed, &mut core, &mut left);
             let renewed = self.grow(evidence, core, &left);
             let open = renewed.patch.open.iter().map(|open| open.beyond);
-            let beyond: LatticeRegion = open.filter(|cell| self.restored.is_beyond(*cell)).collect();
+            let beyond: LatticeRegion = open.filter(|cell| self.grid.is_beyond(*cell)).collect();
             if beyond.is_empty() {
                 return renewed;
             }
-            changed = self.restored.look_further(evidence, &self.lattice, &beyond);
+            changed = self.grid.look_further(evidence, &self.lattice, &beyond);
         }
         self.take_up(&changed, &mut core, &mut left);
         self.grow(evidence, core, &left)
@@ -99,7 +99,7 @@ impl Remesh {
         for (cell, ()) in cells_of(changed).iter() {
             let was_in = self.region.contains(&cell);
             self.grown.remove(&cell);
-            let is_in = self.restored.is_in_region(cell);
+            let is_in = self.grid.is_in_region(cell);
             if is_in && !was_in {
                 self.region.insert(cell, ());
                 self.bounds.take(&cell);
@@ -121,8 +121,7 @@ impl Remesh {
         let mut renewed = self.contoured(evidence, core, left);
         for _ in 0..GROWTH {
             let mut has_grown = false;
-            for open in renewed.patch.open.iter().filter(|open| open.is_scanned && self.restored.can_take(open.beyond))
-            {
+            for open in renewed.patch.open.iter().filter(|open| open.is_scanned && self.grid.can_take(open.beyond)) {
                 has_grown |= self.region.insert_with(open.beyond, || ()).1;
                 self.grown.insert_with(open.beyond, || ());
                 self.wanted.remove(&open.beyond);
@@ -141,15 +140,15 @@ impl Remesh {
     }
 
     fn contoured(&mut self, evidence: &Evidence<'_>, core: CellBox, left: &[LatticeNode]) -> Renewed {
-        let Self { lattice, restored, region, bounds, crossings, .. } = self;
+        let Self { lattice, grid, region, bounds, crossings, .. } = self;
         let (mut cells, around) = (left.to_vec(), core.widened(2, 2));
         around.each_in(region, |cell, ()| cells.push(cell));
         let mut scanned = faces_near(lattice, cells.into_iter(), evidence.tree);
         scanned.retain(|&face| !cells_around(lattice, evidence.scan, face).meet(&around).is_empty());
         let cut = Cut::of_faces(lattice, region, bounds, evidence.scan, &scanned);
-        let values = restored.values_in(&core.widened(1, 1));
+        let values = grid.values_in(&core.widened(1, 1));
         let patch = contour_in(lattice, region, &core, &values, &cut, &ContourParams::default(), |edge| {
-            crossings.at(restored, evidence, lattice, edge)
+            crossings.at(grid, evidence, lattice, edge)
         });
         Renewed { core, patch, scanned }
     }

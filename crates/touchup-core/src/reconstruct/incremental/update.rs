@@ -1,22 +1,22 @@
-//! What is not known is filled in anew around what came, and what is another then is told.
+//! Incremental update: the field is filled again around new evidence, and the changes are listed.
 
 use crate::reconstruct::evidence::point_evidence::{Evidence, Source};
-use crate::reconstruct::evidence::scan_value::ScanValue;
-use crate::reconstruct::field::floating_components::lumps;
+use crate::reconstruct::evidence::scan_distance::ScanDistance;
+use crate::reconstruct::field::floating_components::floating_components;
 use crate::reconstruct::field::grid::{Changed, NodeState, ReconstructionGrid, evaluate};
-use crate::reconstruct::field::harmonic_fill::{CompleteParams, complete, open_cells};
+use crate::reconstruct::field::harmonic_fill::{HarmonicFillParams, harmonic_fill, open_cells};
 use crate::reconstruct::field::lattice::{CellBox, Lattice, LatticeNode, Numbers, stepped};
 use crate::reconstruct::field::piecewise::FieldScratch;
 use crate::reconstruct::table::CellTable;
 
 /// A node whose value would change by less than this keeps it, in cells: 3 µm for a ball of 1.5 mm.
 const SLACK: f64 = 4e-3;
-/// What is filled in is filled in anew up to this many cells around what was looked at again.
-const SETTLED: i32 = 4;
+/// The field is filled again up to this many cells around the nodes that were evaluated again.
+const FILL_MARGIN: i32 = 4;
 
 impl ReconstructionGrid {
-    /// Fills in what is not known in and around `area`; finds what is another now than `before` says, or than it was.
-    pub(in crate::reconstruct) fn settle(
+    /// Fills in what is not known in and around `area`; finds what differs from `before`, or from its earlier value.
+    pub(in crate::reconstruct) fn update(
         &mut self,
         evidence: &Evidence<'_>,
         lattice: &Lattice,
@@ -26,12 +26,12 @@ impl ReconstructionGrid {
         if area.is_empty() {
             return Changed::default();
         }
-        let params = CompleteParams::new(lattice.pitch, evidence.params.radius);
-        let mut area = area.widened(SETTLED, SETTLED);
+        let params = HarmonicFillParams::new(lattice.pitch, evidence.params.radius);
+        let mut area = area.widened(FILL_MARGIN, FILL_MARGIN);
         let (mut at, mut was) = self.known_in(&area, before);
         let mut numbers = Numbers::new(&self.nodes, &area);
-        complete(self, &at, &numbers, &params);
-        let dropped = self.drop_lumps(evidence, lattice, &at);
+        harmonic_fill(self, &at, &numbers, &params);
+        let dropped = self.drop_floating_components(evidence, lattice, &at);
         if !dropped.is_empty() {
             let known = at.iter().zip(was).map(|(&at, was)| (self.nodes.entry(at).0, was));
             let mut before: CellTable<LatticeNode, Option<NodeState>> = known.collect();
@@ -39,10 +39,10 @@ impl ReconstructionGrid {
                 before.insert_with(node, || was);
                 area.take(&node);
             }
-            area = area.widened(SETTLED, SETTLED);
+            area = area.widened(FILL_MARGIN, FILL_MARGIN);
             (at, was) = self.known_in(&area, &before);
             numbers = Numbers::new(&self.nodes, &area);
-            complete(self, &at, &numbers, &params);
+            harmonic_fill(self, &at, &numbers, &params);
         }
         let (mut changed, mut turned) = (Changed::default(), Vec::new());
         for (&at, was) in at.iter().zip(&was) {
@@ -79,7 +79,7 @@ impl ReconstructionGrid {
         CellBox { lo: *node, hi: *node }.widened(1, 1).iter().chain(beyond).any(is_other)
     }
 
-    /// The nodes in `area` and what they were: as `before` says, or as they are.
+    /// The nodes in `area` and their earlier state: of `before`, or the current one.
     fn known_in(
         &self,
         area: &CellBox,
@@ -94,37 +94,38 @@ impl ReconstructionGrid {
         (at, was)
     }
 
-    /// Gives up material that nothing holds; returns its nodes and those beside them, with what was known there before:
+    /// Drops floating components; returns its nodes and those beside them, with what was known there before:
     /// nothing beyond what was looked at.
-    fn drop_lumps(
+    fn drop_floating_components(
         &mut self,
         evidence: &Evidence<'_>,
         lattice: &Lattice,
         at: &[u32],
     ) -> Vec<(LatticeNode, Option<NodeState>)> {
-        let lumps = lumps(self, evidence, lattice, at);
+        let floating_components = floating_components(self, evidence, lattice, at);
         let mut dropped = Vec::new();
         let mut scratch = FieldScratch::default();
         // the scan's faces go with it, up to the nodes on their other side
         let around = |&node: &LatticeNode| CellBox { lo: node, hi: node }.widened(1, 1).iter();
-        for node in lumps.iter().flat_map(around) {
+        for node in floating_components.iter().flat_map(around) {
             let before = self.nodes.get(&node).copied();
             dropped.push((node, before));
             if before.is_none()
-                && let Some(scan) = ScanValue::at(evidence.scan, evidence.tree, &lattice.position(node))
+                && let Some(scan) = ScanDistance::at(evidence.scan, evidence.tree, &lattice.position(node))
             {
                 self.put(node, evaluate(evidence, lattice, node, &scan, &mut scratch), scan);
             }
         }
-        for node in &lumps {
+        for node in &floating_components {
             if let Some(state) = self.nodes.get_mut(node) {
-                (state.source, state.value, state.straight, state.felt) = (Source::Nothing, 0.0, (0.0, 0.0), None);
+                (state.source, state.value, state.straight, state.touched_value) =
+                    (Source::Nothing, 0.0, (0.0, 0.0), None);
             }
         }
         dropped
     }
 
-    /// Numbers of the nodes in a box; in the order in which they came where that is all of them.
+    /// Numbers of the nodes in a box; in order of insertion where that is all of them.
     fn indices_in(&self, area: &CellBox) -> Vec<u32> {
         if area.volume() < self.nodes.len() as f64 {
             let mut at = Vec::new();
@@ -135,8 +136,8 @@ impl ReconstructionGrid {
         }
     }
 
-    /// Finds anew which cells stay open, if a way ends near `area`; returns those for which that is new.
-    fn renew_open(&mut self, area: &CellBox, params: &CompleteParams) -> Vec<LatticeNode> {
+    /// Determines again which cells stay open, if a path ends near `area`; returns those for which that is new.
+    fn renew_open(&mut self, area: &CellBox, params: &HarmonicFillParams) -> Vec<LatticeNode> {
         let near = area.widened(params.end_reach, params.end_reach);
         if !self.ends.iter().any(|(end, ())| near.contains(&end)) && self.open.is_empty() {
             return Vec::new();

@@ -1,18 +1,18 @@
-//! Where the markers sit on the stylus, and the pose that fits a set of seen ones best.
+//! The marker positions on the stylus, and the pose that fits a set of observed ones best.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 
-use super::{MOST_MARKERS, SeenMarker};
+use super::{MOST_MARKERS, MarkerObservation};
 use crate::stylus::SettingError;
 
-/// Markers that hold fewer than this share of the body's second extent are on a line for all that noise lets tell.
+/// Markers that hold fewer than this share of the body's second extent are on a line within the noise.
 const LINE_SHARE: f64 = 0.2;
 /// A body is no line when its second extent is more than this share of the first.
 const FLAT_SHARE: f64 = 0.02;
 
 /// The markers of a rigid body in the frame of the tip.
 ///
-/// Invariant: 3 to [`MOST_MARKERS`] markers, finite, apart from each other and not on one line.
+/// Invariant: 3 to [`MOST_MARKERS`] markers, finite, distinct and not on one line.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MarkerBody {
     markers_t: Vec<Point3<f64>>,
@@ -26,7 +26,7 @@ impl Default for MarkerBody {
     /// Six LEDs around the handle, 120 to 180 mm above the ball: the stylus of the simulation.
     fn default() -> Self {
         let markers_t = Self::STYLUS_MM.map(|place| Point3::from(place.map(|x| x * 1e-3))).to_vec();
-        Self::new(markers_t).expect("six markers apart from each other that are not on one line")
+        Self::new(markers_t).expect("six distinct markers that are not on one line")
     }
 }
 
@@ -110,9 +110,9 @@ impl MarkerBody {
     /// The pose at which most of the seen markers, and at least three, are within `gate` of a marker of the body, and
     /// which markers those are; `None` when not more than half of them agree.
     ///
-    /// Every three markers are asked in turn, each taken for what its label says, so that swapped labels and outliers
+    /// Every three markers are tried in turn, each identified by its label, so that swapped labels and outliers
     /// are outvoted.
-    pub(super) fn acquire(&self, seen: &[SeenMarker], gate: f64) -> Option<(Isometry3<f64>, Matches)> {
+    pub(super) fn acquire(&self, seen: &[MarkerObservation], gate: f64) -> Option<(Isometry3<f64>, Matches)> {
         let mut best: Option<Matches> = None;
         for (i, a) in seen.iter().enumerate() {
             for (j, b) in seen[..i].iter().enumerate() {
@@ -129,7 +129,7 @@ impl MarkerBody {
         Some((self.fit(matches.pairs())?, matches))
     }
 
-    fn pose_of_three(&self, three: [&SeenMarker; 3], gate: f64) -> Option<Isometry3<f64>> {
+    fn pose_of_three(&self, three: [&MarkerObservation; 3], gate: f64) -> Option<Isometry3<f64>> {
         let pairs = three.map(|marker| (marker.label as usize, marker.position));
         let is_known = pairs.iter().all(|&(i, _)| i < self.markers_t.len());
         let [i, j, k] = pairs.map(|(i, _)| i);
@@ -142,7 +142,7 @@ impl MarkerBody {
 
     /// Which seen marker is which of the body at that pose: the labelled one when it is within `gate`, or else the one
     /// that is. Nothing else can be, for markers are farther apart than twice the gate.
-    pub(super) fn matched(&self, pose_ot: &Isometry3<f64>, seen: &[SeenMarker], gate: f64) -> Matches {
+    pub(super) fn matched(&self, pose_ot: &Isometry3<f64>, seen: &[MarkerObservation], gate: f64) -> Matches {
         let mut matches = Matches::new();
         for marker in seen {
             let distance = |i: &usize| (pose_ot * self.markers_t[*i] - marker.position).norm();
@@ -158,7 +158,7 @@ impl MarkerBody {
     }
 }
 
-/// Seen markers that were told to be markers of the body.
+/// Observed markers that are identified with markers of the body.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Matches {
     pairs: [(usize, Point3<f64>); MOST_MARKERS],

@@ -52,7 +52,7 @@ const HELD_FRAMES: usize = 64;
 /// for i in 0..20 {
 ///     let mut frame = MarkerFrame::new(i * 5_000_000);
 ///     for (label, marker) in body.markers_t().iter().enumerate() {
-///         frame.see(SeenMarker { label: label as u32, position: pose_ot * marker });
+///         frame.see(MarkerObservation { label: label as u32, position: pose_ot * marker });
 ///     }
 ///     filter.push(&frame, |pose| poses.push(pose));
 /// }
@@ -93,7 +93,7 @@ impl MarkerFilter {
     /// Takes the next frame and gives the poses that no later frame can change to `each`, in order of time.
     pub fn push(&mut self, frame: &MarkerFrame, mut each: impl FnMut(StampedPose)) {
         self.frames.push(*frame, &self.order);
-        while self.frames.held.front().is_some_and(|frame| frame.stamp_ns <= self.frames.settled) {
+        while self.frames.held.front().is_some_and(|frame| frame.stamp_ns <= self.frames.watermark) {
             self.step(&mut each);
         }
     }

@@ -1,7 +1,7 @@
-//! The pose of a stylus from the LED markers on it, whichever of them are seen.
+//! The pose of a stylus from the LED markers on it, whichever of them are observed.
 //!
 //! A rigid body with its mass in the markers is pulled by a spring and a damper at each marker that is seen to where it
-//! is measured; between two frames it flies on. Spring k and damper d for a mass m say how: by the natural frequency
+//! is measured; between two frames it flies on. Spring k and damper d for a mass m determine how: by the natural frequency
 //! √(k/m) and the damping d/(2 √(k m)). [`MarkerFilter`] finds the first pose in closed form, follows it through
 //! occlusion, swapped labels and outliers, and gives poses at a steady rate.
 
@@ -22,33 +22,33 @@ use crate::parameters;
 /// Markers that a body, and a frame, may have.
 pub const MOST_MARKERS: usize = 16;
 
-/// One marker as it was seen.
+/// The measured position of one marker.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SeenMarker {
+pub struct MarkerObservation {
     /// which marker of the body the camera takes it for; it may be wrong, or none of the body
     pub label: u32,
     /// where, m, in O
     pub position: Point3<f64>,
 }
 
-/// The markers that were seen at one instant.
+/// The markers observed at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MarkerFrame {
     /// Time of measurement, ns.
     pub stamp_ns: i64,
-    seen: [SeenMarker; MOST_MARKERS],
+    seen: [MarkerObservation; MOST_MARKERS],
     count: usize,
 }
 
 impl MarkerFrame {
-    /// A frame in which nothing is seen.
+    /// A frame without markers.
     pub fn new(stamp_ns: i64) -> Self {
-        let none = SeenMarker { label: 0, position: Point3::origin() };
+        let none = MarkerObservation { label: 0, position: Point3::origin() };
         Self { stamp_ns, seen: [none; MOST_MARKERS], count: 0 }
     }
 
     /// Adds a marker; `false` when it is not finite, absurdly far or one too many, and not added.
-    pub fn see(&mut self, marker: SeenMarker) -> bool {
+    pub fn see(&mut self, marker: MarkerObservation) -> bool {
         let fits = marker.position.iter().all(|x| x.abs() <= super::LARGEST_POSITION) && self.count < MOST_MARKERS;
         if fits {
             self.seen[self.count] = marker;
@@ -57,8 +57,8 @@ impl MarkerFrame {
         fits
     }
 
-    /// The markers, in the order in which they came.
-    pub fn seen(&self) -> &[SeenMarker] {
+    /// The markers, in order of insertion.
+    pub fn seen(&self) -> &[MarkerObservation] {
         &self.seen[..self.count]
     }
 }
@@ -82,7 +82,7 @@ parameters! {
         /// A marker farther than this from where it is expected is another one, or none; less than half of the smallest distance
         /// between two markers.
         ///
-        /// In m. A hand that accelerates with 5 m/s² strays by 2 mm in 30 ms, and markers stand farther apart than twice as much.
+        /// In m. A hand that accelerates with 5 m/s² strays by 2 mm in 30 ms, and the distance between markers is more than twice that.
         gate: f64 = 4.0, "gate_mm" [MM, 1e-6, 1000];
         /// How long the body flies on when its markers do not determine it; after that there is no pose.
         ///

@@ -1,4 +1,4 @@
-//! The body in flight, and how its springs and dampers pull it.
+//! The motion model of the body: flight, pulled by springs and dampers.
 //!
 //! For one degree of freedom let e be the distance to the measured place. A damper that acts on the speed relative to
 //! the *measured* motion does not lag behind a steady hand; in the observer form x' = v + d e, v' = k e it needs no
@@ -43,12 +43,12 @@ impl SpringParams {
     }
 }
 
-/// Share of the mass that sits in all markers; the rest sits in those that are seen. It keeps the body from being thrown
+/// Share of the mass that sits in all markers; the remainder sits in those that are observed. It keeps the body from being thrown
 /// about where the seen ones do not hold it: there it flies on.
 const LOOSE_MASS: f64 = 0.02;
-/// Frames closer than this tell no speed but noise, s.
+/// Frames closer than this give no velocity but noise, s.
 const SHORTEST: f64 = 1e-3;
-/// … and for the first ones, which have nothing else to go by, s.
+/// … and for the first ones, which have no earlier frames, s.
 const FIRST_SHORTEST: f64 = 5e-3;
 /// Rounds in which the weights of the markers are found.
 const ROUNDS: usize = 3;
@@ -101,7 +101,7 @@ impl BodyMotion {
         let (first_alpha, first_beta) = ((4.0 * n - 2.0) / (n * (n + 1.0)), 6.0 / (n * (n + 1.0)));
         let alpha = alpha.max(first_alpha).min(1.0);
         let rate = (beta / dt.max(SHORTEST)).max(first_beta / dt.max(FIRST_SHORTEST));
-        // markers that do not hold the body tell no speed: it flies on
+        // markers that do not determine the pose give no velocity: the body flies on
         let rate = if body.is_held_by(pairs) { rate } else { 0.0 };
         let (shift, turn) = (twist.fixed_rows::<3>(0).into_owned(), twist.fixed_rows::<3>(3).into_owned());
         self.centroid += shift * alpha;
@@ -111,7 +111,7 @@ impl BodyMotion {
     }
 
     /// Where the springs pull: M⁻¹ Σ w Jᵀ e with J = \[1, −\[r\]×\], the small motion (shift, turn) that takes the body
-    /// to rest among the seen markers. The eigenvalues of M⁻¹ Σ w JᵀJ lie in \[0, 1\], so no set of markers makes a step
+    /// to equilibrium among the observed markers. The eigenvalues of M⁻¹ Σ w JᵀJ lie in \[0, 1\], so no set of markers makes a step
     /// too long.
     fn twist(&self, body: &MarkerBody, pairs: &MarkerPairs, noise: f64) -> Option<Vector6<f64>> {
         let arm = |i: usize| self.rotation * (body.markers_t()[i] - body.centroid_t());

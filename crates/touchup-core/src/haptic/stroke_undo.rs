@@ -1,4 +1,4 @@
-//! What was there before each stroke, so that the haptic update can be taken back.
+//! Stroke undo: the state before each stroke, so that the haptic update can be reversed.
 
 use nalgebra::Point3;
 
@@ -9,21 +9,21 @@ use crate::stylus::STROKE_PAUSE_NS;
 /// Positions and normals kept at most: some 60 MB.
 const MOST_KEPT: usize = 1_000_000;
 
-/// Positions of vertices, and normals felt on faces, before each stroke moved them.
+/// Positions of vertices, and normals measured on faces, before each stroke moved them.
 #[derive(Clone, Debug)]
-pub(super) struct Strokes {
+pub(super) struct StrokeUndo {
     positions: History<u32, Point3<f64>>,
     evidence: History<u32, [f32; 3]>,
     last_contact_ns: Option<i64>,
 }
 
-impl Default for Strokes {
+impl Default for StrokeUndo {
     fn default() -> Self {
         Self { positions: History::new(MOST_KEPT), evidence: History::new(MOST_KEPT), last_contact_ns: None }
     }
 }
 
-impl Strokes {
+impl StrokeUndo {
     /// Begins a stroke when the contact at `stamp_ns` follows none for a while.
     pub fn touch(&mut self, stamp_ns: i64) {
         if self.last_contact_ns.is_none_or(|last| stamp_ns - last > STROKE_PAUSE_NS) {
@@ -45,7 +45,7 @@ impl Strokes {
         }
     }
 
-    /// Keeps the normal known on a face before another is felt.
+    /// Keeps the normal known on a face before another is measured.
     pub fn note_evidence(&mut self, face: FaceId, before: [f32; 3]) {
         self.evidence.note(face.0, || before);
     }

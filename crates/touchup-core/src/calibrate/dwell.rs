@@ -1,4 +1,4 @@
-//! Points picked with the stylus itself: where it rests on the part for a moment.
+//! Points picked with the stylus itself: where it dwells on the part.
 //!
 //! While it presses and stays where it is, the mean of its ball and of the force make one point: c + F / k − r n, with
 //! the stiffness k of the stylus and n along the force. Friction lets a resting force lean: on a slope of the pressing
@@ -8,27 +8,27 @@ use nalgebra::{Point3, Vector3};
 
 use crate::stylus::ContactSample;
 
-/// Settings of a [`RestFinder`].
+/// Settings of a [`DwellFinder`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RestParams {
-    /// A rest lasts at least so long, ns. Default 0.5 s: longer than a turning point of a stroke.
+pub struct DwellParams {
+    /// Shortest dwell, ns. Default 0.5 s: longer than a turning point of a stroke.
     pub dwell_ns: i64,
     /// … and the ball stays within this of where it began, m. Default 0.5 mm: a hand trembles by a tenth of that.
-    pub wander: f64,
+    pub largest_drift: f64,
     /// Of the ball, m.
     pub radius: f64,
 }
 
-impl Default for RestParams {
+impl Default for DwellParams {
     /// A point.
     fn default() -> Self {
-        Self { dwell_ns: 500_000_000, wander: 0.5e-3, radius: 0.0 }
+        Self { dwell_ns: 500_000_000, largest_drift: 0.5e-3, radius: 0.0 }
     }
 }
 
-/// A point picked by resting on it.
+/// A point picked by a dwell of the stylus on it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rest {
+pub struct Dwell {
     /// The point on the part, in the frame of the poses, m.
     pub point: Point3<f64>,
     /// When it began, ns.
@@ -50,27 +50,27 @@ struct Stretch {
     count: f64,
 }
 
-/// Finds rests in samples in order of time.
+/// Finds dwells in samples in order of time.
 #[derive(Debug)]
-pub struct RestFinder {
-    params: RestParams,
+pub struct DwellFinder {
+    params: DwellParams,
     stretch: Option<Stretch>,
-    found: Vec<Rest>,
+    found: Vec<Dwell>,
 }
 
-impl RestFinder {
+impl DwellFinder {
     /// Nothing seen yet.
-    pub fn new(params: RestParams) -> Self {
+    pub fn new(params: DwellParams) -> Self {
         Self { params, stretch: None, found: Vec::new() }
     }
 
-    /// Takes the next sample, in order of time; O stands for the frame of the poses.
+    /// Takes the next sample, in order of time; O is the frame of the poses.
     pub fn push(&mut self, sample: &ContactSample) {
         if !sample.is_in_contact() {
             return self.close();
         }
         let (tip, centre) = (&sample.tip, sample.centre.coords);
-        if self.stretch.is_some_and(|stretch| (centre - stretch.anchor).norm() > self.params.wander) {
+        if self.stretch.is_some_and(|stretch| (centre - stretch.anchor).norm() > self.params.largest_drift) {
             self.close();
         }
         let (begin_ns, zero) = (tip.stamp_ns, Vector3::zeros());
@@ -82,8 +82,8 @@ impl RestFinder {
         stretch.count += 1.0;
     }
 
-    /// The rests, in order of time.
-    pub fn finish(mut self) -> Vec<Rest> {
+    /// The dwells, in order of time.
+    pub fn finish(mut self) -> Vec<Dwell> {
         self.close();
         self.found
     }
@@ -94,7 +94,7 @@ impl RestFinder {
         let (centre, force) = (centre / count, force / count);
         if let (true, Some(normal)) = (lasted_ns >= self.params.dwell_ns, force.try_normalize(0.0)) {
             let point = Point3::from(centre - normal * self.params.radius);
-            self.found.push(Rest { point, begin_ns, seconds: lasted_ns as f64 * 1e-9, force });
+            self.found.push(Dwell { point, begin_ns, seconds: lasted_ns as f64 * 1e-9, force });
         }
     }
 }

@@ -1,13 +1,13 @@
-//! The still phases of a recording: where neither the stylus turns nor the wrench changes.
+//! Static segments of a recording: where neither the stylus turns nor the wrench changes.
 //!
 //! Samples are averaged over blocks of a fifth of a second, which takes the noise out of the rates; blocks between
-//! which pose and wrench change slowly make a phase, and a phase that lasts is one static pose.
+//! which pose and wrench change slowly make a segment, and a segment that lasts is one static pose.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::stylus::{Sample, Wrench};
 
-/// A stylus at rest: means over a time.
+/// A static pose of the stylus: means over a segment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StaticPose {
     /// Orientation of T (or H, which has its axes) in the frame of the poses.
@@ -20,26 +20,26 @@ pub struct StaticPose {
     pub samples: usize,
 }
 
-/// Settings of a [`StillFinder`].
+/// Settings of a [`StaticSegmentFinder`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StillParams {
+pub struct StaticSegmentParams {
     /// Length of a block, ns. Default 0.2 s.
     pub block_ns: i64,
-    /// Shortest phase, ns. Default 0.6 s: three blocks.
+    /// Shortest segment, ns. Default 0.6 s: three blocks.
     pub least_ns: i64,
-    /// Turning slower than this is rest, rad/s. Default 0.02: a robot's settling, less than a hand's trembling over a
-    /// block.
+    /// Turning slower than this is static, rad/s. Default 0.02: a robot's settling oscillation, less than the tremor of a
+    /// hand over a block.
     pub turning: f64,
     /// The force changes more slowly than this at rest, N/s. Default 0.3: a sensor with 0.05 N of noise at 200 Hz
     /// reaches a third of it by chance.
     pub force_rate: f64,
     /// … and the torque, N·m/s. Default 0.03.
     pub torque_rate: f64,
-    /// A phase ends when the stylus has turned so far since its beginning, rad. Default 0.03.
+    /// A segment ends when the stylus has turned so far since its beginning, rad. Default 0.03.
     pub largest_turn: f64,
 }
 
-impl Default for StillParams {
+impl Default for StaticSegmentParams {
     fn default() -> Self {
         Self {
             block_ns: 200_000_000,
@@ -117,33 +117,33 @@ impl Block {
     }
 }
 
-/// Finds the still phases of samples in order of time.
+/// Finds the static segments of samples in order of time.
 ///
 /// # Example
 /// ```
-/// # use touchup_core::calibrate::{StillFinder, StillParams};
+/// # use touchup_core::calibrate::{StaticSegmentFinder, StaticSegmentParams};
 /// # use touchup_core::stylus::{Sample, Wrench};
 /// # use nalgebra::Isometry3;
-/// let mut finder = StillFinder::new(StillParams::default());
+/// let mut finder = StaticSegmentFinder::new(StaticSegmentParams::default());
 /// for ms in 0..1000 {
 ///     finder.push(&Sample { stamp_ns: ms * 1_000_000, pose_ot: Isometry3::identity(), wrench: Wrench::default() });
 /// }
 /// assert_eq!(finder.finish().len(), 1);
 /// ```
 #[derive(Debug)]
-pub struct StillFinder {
-    params: StillParams,
+pub struct StaticSegmentFinder {
+    params: StaticSegmentParams,
     block: Option<Block>,
     /// the last whole block
     last: Option<Block>,
-    /// blocks of the phase so far, and its first
+    /// blocks of the segment so far, and its first
     phase: Option<(Block, Block)>,
     found: Vec<StaticPose>,
 }
 
-impl StillFinder {
+impl StaticSegmentFinder {
     /// Nothing seen yet.
-    pub fn new(params: StillParams) -> Self {
+    pub fn new(params: StaticSegmentParams) -> Self {
         Self { params, block: None, last: None, phase: None, found: Vec::new() }
     }
 
@@ -161,7 +161,7 @@ impl StillFinder {
         }
     }
 
-    /// The phases, in order of time.
+    /// The static segments, in order of time.
     pub fn finish(mut self) -> Vec<StaticPose> {
         self.block.take().into_iter().for_each(|block| self.take(block));
         self.close();
@@ -169,9 +169,9 @@ impl StillFinder {
     }
 
     fn take(&mut self, block: Block) {
-        let is_still = self.last.is_some_and(|last| self.is_still(&last, &block));
+        let is_static = self.last.is_some_and(|last| self.is_static(&last, &block));
         match &mut self.phase {
-            Some((phase, first)) if is_still && is_near(first, &block, self.params.largest_turn) => phase.join(&block),
+            Some((phase, first)) if is_static && is_near(first, &block, self.params.largest_turn) => phase.join(&block),
             _ => {
                 self.close();
                 self.phase = Some((block, block));
@@ -187,14 +187,14 @@ impl StillFinder {
         }
     }
 
-    fn is_still(&self, before: &Block, after: &Block) -> bool {
+    fn is_static(&self, before: &Block, after: &Block) -> bool {
         let apart_ns = after.begin_ns.saturating_sub(before.begin_ns).max(1);
         let seconds = apart_ns as f64 * 1e-9;
         let change = |of: fn(&Block) -> Vector3<f64>| {
             (of(after) / after.count as f64 - of(before) / before.count as f64).norm() / seconds
         };
-        let StillParams { block_ns, turning, force_rate, torque_rate, .. } = self.params;
-        // across a pause nothing is known
+        let StaticSegmentParams { block_ns, turning, force_rate, torque_rate, .. } = self.params;
+        // a pause ends a segment
         apart_ns < block_ns.saturating_mul(3)
             && before.rotation().angle_to(&after.rotation()) < turning * seconds
             && change(|block| block.force) < force_rate

@@ -1,4 +1,4 @@
-//! A small map that numbers ids as they come, is forgotten in no time and stays in the nearest cache.
+//! A scratch map that numbers ids in order of insertion, is cleared in no time and stays in the nearest cache.
 
 use std::hint::select_unpredictable;
 
@@ -117,20 +117,20 @@ mod tests {
 
     #[test]
     fn it_holds_what_was_put_in_and_nothing_older() {
-        let mut marks = ScratchMap::default();
+        let mut scratch_map = ScratchMap::default();
         for round in 0..3u32 {
-            marks.clear();
+            scratch_map.clear();
             for key in 0..1000u32 {
-                assert_eq!(marks.number([key * 4096 + round; 2]), [key; 2]);
-                assert_eq!(marks.number([key * 4096 + round; 2]), [key; 2]);
+                assert_eq!(scratch_map.number([key * 4096 + round; 2]), [key; 2]);
+                assert_eq!(scratch_map.number([key * 4096 + round; 2]), [key; 2]);
             }
-            assert_eq!(marks.len(), 1000);
-            marks.number([3, 4]);
-            marks.take_back([3, 4]);
-            assert_eq!((marks.of(3), marks.of(4), marks.len()), (None, None, 1000));
+            assert_eq!(scratch_map.len(), 1000);
+            scratch_map.number([3, 4]);
+            scratch_map.take_back([3, 4]);
+            assert_eq!((scratch_map.of(3), scratch_map.of(4), scratch_map.len()), (None, None, 1000));
             for key in 0..1000u32 {
-                assert_eq!(marks.of(key * 4096 + round), Some(key));
-                assert_eq!(marks.of(key * 4096 + round + 1), None);
+                assert_eq!(scratch_map.of(key * 4096 + round), Some(key));
+                assert_eq!(scratch_map.of(key * 4096 + round + 1), None);
             }
         }
     }
