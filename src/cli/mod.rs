@@ -37,7 +37,7 @@ pub use threads::Threads;
 use failure::{ErrorForm, Failure};
 
 use std::ffi::OsString;
-use std::io::{ErrorKind, Write, stderr, stdin, stdout};
+use std::io::{ErrorKind, Write, stdin, stdout};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::SystemTime;
@@ -435,7 +435,7 @@ fn check_kept_by(by: &str, flag: &str, input: &Path, output: &Path) -> Result<()
 /// One line on stderr that is no error.
 #[cfg(any(feature = "ros", feature = "r2r"))]
 fn notify(line: &str) {
-    let _ = writeln!(stderr(), "touchup: {}", line.replace('\n', " "));
+    let _ = writeln!(std::io::stderr(), "touchup: {}", line.replace('\n', " "));
 }
 
 /// The date of the system clock (UTC), as pictures carry it.
