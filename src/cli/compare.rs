@@ -63,6 +63,9 @@ pub(super) struct CompareArguments {
     /// Names the holes, slots, pockets and bosses of this file in the picture; it is in the frame of MESH, as `refine` writes it
     #[arg(long, value_name = "JSON", requires = "picture")]
     features: Option<PathBuf>,
+    /// Named in the picture beside those
+    #[arg(skip)]
+    named: Vec<FeatureRecord>,
     /// From which direction the picture is taken, in the frame of TRUTH; by default the side that was touched
     #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', num_args = 3, allow_negative_numbers = true)]
     view: Option<Vec<f64>>,
@@ -172,10 +175,10 @@ pub(super) fn compared(arguments: &CompareArguments) -> Result<CompareReport, Cl
     let before = before.map(|scan| PlacedMesh::new(moved(&scan, &pose)));
     let measured = arguments.measure(&mesh, &truth, before.as_ref(), regions.as_deref())?;
     if let Some(path) = &arguments.picture {
-        let labels = arguments.features.as_deref().map(|features| feature_labels(features, &pose)).transpose()?;
+        let labels = arguments.feature_labels(&pose)?;
         let caption =
             format!("{}; {}", today(), alignment.as_ref().map_or("not aligned".to_owned(), Alignment::in_short));
-        let drawing = Annotations { caption, labels: labels.unwrap_or_default(), regions: regions.as_deref() };
+        let drawing = Annotations { caption, labels, regions: regions.as_deref() };
         arguments.draw(path, &mesh, before.as_ref(), &measured, &drawing)?;
     }
     if let Some(path) = &arguments.coloured {
@@ -198,20 +201,6 @@ struct Annotations<'a> {
     regions: Option<&'a [SupportRegion]>,
 }
 
-/// The names of the features in a file, with their sizes, where the alignment brings them.
-fn feature_labels(path: &Path, pose: &Isometry3<f64>) -> Result<Vec<PictureLabel>, CliError> {
-    let file = read_features(path)?;
-    let label = |feature: &FeatureRecord| {
-        let text = match (feature.kind.as_str(), feature.diameter_mm, feature.width_mm.zip(feature.length_mm)) {
-            (kind @ ("hole" | "boss"), Some(diameter), _) => format!("{kind} Ø{diameter:.2}"),
-            (kind @ ("slot" | "pocket"), _, Some((width, length))) => format!("{kind} {width:.2} × {length:.2}"),
-            _ => return None,
-        };
-        Some(PictureLabel { place: pose * (Point3::from(feature.center_mm?) * 1e-3), text })
-    };
-    Ok(file.features.iter().filter_map(label).collect())
-}
-
 /// Both comparisons, in one range.
 struct MeasuredBoth {
     before: Option<Comparison>,
@@ -219,10 +208,12 @@ struct MeasuredBoth {
 }
 
 impl CompareArguments {
-    /// A picture of a mesh in mm and of what it was before, beside the truth, with the names of its features.
+    /// A picture of a mesh in mm and of what it was before, beside the truth.
     ///
+    /// - `named`: features whose names are written beside them.
     /// - `tolerance_mm`: marked in it.
-    pub(super) fn of_picture([mesh, truth, before, features, picture]: [PathBuf; 5], tolerance_mm: f64) -> Self {
+    pub(super) fn of_picture(files: [PathBuf; 4], named: Vec<FeatureRecord>, tolerance_mm: f64) -> Self {
+        let [mesh, truth, before, picture] = files;
         Self {
             mesh,
             truth,
@@ -234,7 +225,8 @@ impl CompareArguments {
             pairs: None,
             picture: Some(picture),
             tolerance_mm: Some(tolerance_mm),
-            features: Some(features),
+            features: None,
+            named,
             view: None,
             coloured: None,
             range_mm: None,
@@ -317,6 +309,20 @@ impl CompareArguments {
         let picture = draw_picture(&panels, &params);
         let write = |source| CliError::Write { path: path.to_owned(), source };
         write_png(path, picture.size, &picture.pixels).map_err(write)
+    }
+
+    /// The names of the features with their sizes, where the alignment brings them.
+    fn feature_labels(&self, pose: &Isometry3<f64>) -> Result<Vec<PictureLabel>, CliError> {
+        let read = self.features.as_deref().map(read_features).transpose()?.unwrap_or_default();
+        let label = |feature: &FeatureRecord| {
+            let text = match (feature.kind.as_str(), feature.diameter_mm, feature.width_mm.zip(feature.length_mm)) {
+                (kind @ ("hole" | "boss"), Some(diameter), _) => format!("{kind} Ø{diameter:.2}"),
+                (kind @ ("slot" | "pocket"), _, Some((width, length))) => format!("{kind} {width:.2} × {length:.2}"),
+                _ => return None,
+            };
+            Some(PictureLabel { place: pose * (Point3::from(feature.center_mm?) * 1e-3), text })
+        };
+        Ok(read.features.iter().chain(&self.named).filter_map(label).collect())
     }
 
     fn pairs(&self) -> Result<&Path, CliError> {

@@ -90,10 +90,11 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
     // measured is what was written
     let MeshFile { mesh: refined, .. } = read_mesh(&refined_path, MeshUnit::Millimetre).map_err(CliError::ReadMesh)?;
 
-    let found = FoundTable::of(&plate.features(), &read_features(&features_path)?.features);
+    let named = read_features(&features_path)?.features;
+    let found = FoundTable::of(&plate.features(), &named);
     let picture = arguments.out.join("deviation.png");
-    let drawn = [refined_path, arguments.out.join("truth.ply"), scan_path, features_path, picture.clone()];
-    compared(&CompareArguments::of_picture(drawn, TOLERANCE_MM))?;
+    let drawn = [refined_path, arguments.out.join("truth.ply"), scan_path, picture.clone()];
+    compared(&CompareArguments::of_picture(drawn, named, TOLERANCE_MM))?;
 
     let _measuring = WorkProgress::stage("measure");
     let touched = TouchedTruth::of(&touch.moments);

@@ -16,6 +16,7 @@ use super::progress::WorkProgress;
 use super::{CliError, Losses, print_result};
 use crate::features::{Feature, Kind};
 use crate::io::atomic::{create_folder, write_atomically};
+use crate::io::features_file::FeatureRecord;
 use crate::io::mesh_file::{MeshUnit, write_mesh};
 use crate::probing::execute::{Flag, Probed};
 use crate::sim::{Plate, ScannerParams, SimArm, TruthFeature, TruthShape, scan};
@@ -82,8 +83,9 @@ pub(super) fn demo_robot(arguments: &DemoArguments) -> Result<Losses, CliError> 
     probing.planned(&ready, &mut arm)?;
     let Done { summary, probed, losses } = probing.done(&ready, &mut arm)?;
 
-    let [refined, names, picture] = ["refined.ply", "features.json", "deviation.png"].map(|name| out.join(name));
-    compared(&CompareArguments::of_picture([refined, truth_path, scan_path, names, picture], TOLERANCE_MM))?;
+    let named = probed.iter().filter_map(|one| one.found.as_ref()?.feature.as_ref()).map(FeatureRecord::from).collect();
+    let [refined, picture] = ["refined.ply", "deviation.png"].map(|name| out.join(name));
+    compared(&CompareArguments::of_picture([refined, truth_path, scan_path, picture], named, TOLERANCE_MM))?;
     let errors = flags.iter().zip(&features).map(|(flag, truth)| {
         let probed = probed.iter().find(|probed| probed.flag == flag.id);
         ProbedError::of(flag, truth, probed)
