@@ -136,44 +136,90 @@ struct DryRunReport {
 struct PlannedFeature {
     flag: u32,
     touches: usize,
+    unreachable_touches: Vec<Unreachable>,
     slides: usize,
-    /// touches that cannot be made
-    unreachable: Vec<UnreachableTouch>,
+    unreachable_slides: Vec<Unreachable>,
 }
 
+/// A touch or slide that cannot be made.
 #[derive(Debug, Serialize)]
-struct UnreachableTouch {
-    touch: usize,
+struct Unreachable {
+    /// counted from 0
+    number: usize,
     reason: String,
 }
 
 impl DryRunReport {
     fn of(flags: &[Flag], plans: &[Plan], picture: PathBuf) -> Self {
-        let planned = |(flag, plan): (&Flag, &Plan)| PlannedFeature {
-            flag: flag.id,
-            touches: plan.touches.len(),
-            slides: plan.slides.len(),
-            unreachable: plan
-                .held_back
-                .iter()
-                .map(|(touch, reason)| UnreachableTouch { touch: *touch, reason: reason.to_string() })
-                .collect(),
-        };
-        Self { features: flags.iter().zip(plans).map(planned).collect(), picture }
+        Self {
+            features: flags.iter().zip(plans).map(|(flag, plan)| PlannedFeature::of(flag.id, plan)).collect(),
+            picture,
+        }
     }
 }
 
-/// The verdict, then each feature and what cannot be touched.
+impl PlannedFeature {
+    fn of(flag: u32, plan: &Plan) -> Self {
+        let [touches, slides] = [plan.touches.len(), plan.slides.len()];
+        // slides are numbered on after the touches
+        let (of_touches, of_slides) = plan.held_back.iter().partition::<Vec<_>, _>(|(number, _)| *number < touches);
+        let unreachable = |held_back: Vec<&(usize, String)>, first: usize| {
+            let one =
+                |(number, reason): &(usize, String)| Unreachable { number: number - first, reason: reason.clone() };
+            held_back.into_iter().map(one).collect()
+        };
+        let (unreachable_touches, unreachable_slides) = (unreachable(of_touches, 0), unreachable(of_slides, touches));
+        Self { flag, touches, unreachable_touches, slides, unreachable_slides }
+    }
+}
+
+/// The verdict, then each feature and what cannot be reached.
 impl fmt::Display for DryRunReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let touches: usize = self.features.iter().map(|feature| feature.touches).sum();
-        let unreachable: usize = self.features.iter().map(|feature| feature.unreachable.len()).sum();
-        writeln!(f, "{} of {touches} planned touches can be made; nothing moved", touches - unreachable)?;
-        for PlannedFeature { flag, touches, slides, unreachable } in &self.features {
-            let slides = if *slides == 0 { String::new() } else { format!(" and {slides} slides") };
-            writeln!(f, "feature {flag}: {touches} touches{slides} planned, {} cannot be made", unreachable.len())?;
-            unreachable.iter().try_for_each(|one| writeln!(f, "  touch {}: {}", one.touch, one.reason))?;
+        let sum = |count: fn(&PlannedFeature) -> usize| self.features.iter().map(count).sum::<usize>();
+        let [touches, slides] = [sum(|one| one.touches), sum(|one| one.slides)];
+        let touched = touches - sum(|one| one.unreachable_touches.len());
+        write!(f, "{touched} of {touches} planned touches")?;
+        if slides > 0 {
+            write!(f, " and {} of {slides} slides", slides - sum(|one| one.unreachable_slides.len()))?;
+        }
+        writeln!(f, " can be made; nothing moved")?;
+        for one in &self.features {
+            let slides = if one.slides == 0 { String::new() } else { format!(" and {} slides", one.slides) };
+            let unreachable = one.unreachable_touches.len() + one.unreachable_slides.len();
+            writeln!(f, "feature {}: {} touches{slides} planned, {unreachable} cannot be made", one.flag, one.touches)?;
+            for (kind, unreachable) in [("touch", &one.unreachable_touches), ("slide", &one.unreachable_slides)] {
+                for Unreachable { number, reason } in unreachable {
+                    writeln!(f, "  {kind} {number}: {reason}")?;
+                }
+            }
         }
         write!(f, "wrote {}", self.picture.display())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Point3, Vector3};
+
+    use super::*;
+    use crate::probing::plan::TouchPlan;
+
+    /// A plan numbers its slides on after its touches.
+    #[test]
+    fn a_slide_that_cannot_be_made_is_no_touch() {
+        let (entry, from) = (Point3::origin(), Point3::origin());
+        let touch = TouchPlan { entry, from, direction: Vector3::z_axis(), search: 1e-3, expected: None };
+        let held_back = [1, 2].map(|number| (number, format!("reason {number}"))).to_vec();
+        let plan = Plan { touches: vec![touch; 2], held_back, ..Plan::default() };
+        let planned = PlannedFeature::of(7, &plan);
+        let numbers = |unreachable: &[Unreachable]| -> Vec<(usize, String)> {
+            unreachable.iter().map(|one| (one.number, one.reason.clone())).collect()
+        };
+        assert_eq!(numbers(&planned.unreachable_touches), [(1, "reason 1".to_owned())]);
+        assert_eq!(numbers(&planned.unreachable_slides), [(0, "reason 2".to_owned())]);
+        let text = DryRunReport { features: vec![planned], picture: PathBuf::from("plan.png") }.to_string();
+        assert!(text.starts_with("1 of 2 planned touches can be made; nothing moved\n"), "{text}");
+        assert!(text.contains("  touch 1: reason 1\n  slide 0: reason 2\n"), "{text}");
     }
 }

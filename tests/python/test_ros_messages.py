@@ -33,7 +33,7 @@ def sections(path):
 
 
 def fields(definition):
-    """Yields type, name and comment of each field; a comment speaks for all lines below it up to an empty one."""
+    """Yields type, name and comment of each field; a comment describes all lines below it up to an empty one."""
     comment, is_open = "", False
     for line in definition.splitlines():
         if line.startswith("#"):

@@ -188,7 +188,7 @@ fn refine_json_is_one_object_with_the_documented_keys() {
     let mut patch = ["pitch_mm", "removed_faces", "added_faces", "guessed_share", "build_s"];
     patch.sort_unstable();
     assert_eq!(keys(&summary["patch"]), patch);
-    assert_eq!(keys(&summary["uncertainty"]), ["contacts", "outliers", "rejected", "relocated", "touched_sigma_mm"]);
+    assert_eq!(keys(&summary["uncertainty"]), ["judged", "outliers", "rejected", "relocated", "touched_sigma_mm"]);
     assert_eq!(
         (&summary["uncertainty"]["rejected"], &summary["uncertainty"]["outliers"]),
         (&0.into(), &serde_json::json!([]))

@@ -27,7 +27,7 @@ pub fn advice(scans: &WholeScan, stability: Option<&Stability>, cost: Option<&Co
         rows.push(["haptic update alone".to_owned(), one_or_each(&haptic), errors(&haptic), cost]);
     }
     if stability.is_some_and(Stability::is_default_stable) {
-        rows.push(["step of the face", "lie", "stable in every run", "two closed forms per sample"].map(str::to_owned));
+        rows.push(["step of the face", "lie", "stable in every run", ""].map(str::to_owned));
     }
     let mut fails = Vec::new();
     if let Some(quality) = stability.and_then(Stability::default_stable_from_quality).filter(|quality| *quality > 0.0) {

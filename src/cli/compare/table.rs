@@ -126,14 +126,17 @@ pub(super) fn shown(comparison: &Comparison) -> Option<&RegionComparison> {
     touched.or(comparison.regions.first())
 }
 
-/// Caption of a picture: the deviation, and the share within tolerance.
+/// Caption of a picture: the deviation, the share within tolerance, and what the colours clip.
 pub(super) fn note(comparison: &Comparison, tolerance_mm: Option<f64>) -> String {
     let Some(part) = shown(comparison) else { return String::new() };
     let Some(Summary { mean, p95, .. }) = part.mesh_to_truth else { return String::new() };
     let (name, [mean, p95]) = (name_of(part.region), [mean, p95].map(|x| x * 1e3));
     let within = part.within_tolerance.zip(tolerance_mm);
     let within = within.map(|(share, mm)| format!("; {:.1} % within ±{mm} mm", share * 100.0));
-    format!("{name}: mean {mean:.3}, p95 {p95:.3} mm{}", within.unwrap_or_default())
+    let Histogram { counts, below, above, .. } = &part.histogram;
+    let beyond = (below + above) as f64 / (below + above + counts.iter().sum::<usize>()).max(1) as f64;
+    let within = within.unwrap_or_default();
+    format!("{name}: mean {mean:.3}, p95 {p95:.3} mm{within}; beyond the colours {:.1} %", beyond * 100.0)
 }
 
 const HEAD: &str = "                            mean      rms   median      p95      p99      max     bias    points";

@@ -11,8 +11,8 @@ use touchup_core::reconstruct::{Outlier, Outliers, Patched, Support};
 pub struct UncertaintySummary {
     /// median standard deviation of the vertices that were touched
     touched_sigma_mm: f64,
-    /// contacts that the reconstruction was made of, and those that were rejected
-    contacts: u64,
+    /// contacts of the reconstruction: those that count and those that were rejected
+    judged: u64,
     /// contacts that contradicted their place and did not count
     rejected: u64,
     /// places that moved because a second pass confirmed the contradiction
@@ -50,7 +50,7 @@ impl UncertaintySummary {
         let skipped = outliers.last().count().saturating_sub(MOST_LISTED);
         Self {
             touched_sigma_mm: touched.get(touched.len() / 2).copied().unwrap_or_default(),
-            contacts: outliers.contacts,
+            judged: outliers.contacts,
             rejected: outliers.rejected,
             relocated: outliers.relocated,
             outliers: outliers.last().skip(skipped).map(OutlierSummary::of).collect(),
@@ -91,11 +91,11 @@ fn in_thousands(count: u64) -> String {
 
 impl fmt::Display for UncertaintySummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { touched_sigma_mm, rejected, relocated, contacts, .. } = self;
-        let contacts = in_thousands(*contacts);
+        let Self { touched_sigma_mm, rejected, relocated, judged, .. } = self;
+        let judged = in_thousands(*judged);
         write!(
             f,
-            "± {touched_sigma_mm:.3} mm where touched (median standard deviation); {rejected} of {contacts} contacts rejected as outliers, \
+            "± {touched_sigma_mm:.3} mm where touched (median standard deviation); {rejected} of {judged} contacts rejected as outliers, \
              {relocated} places moved by a second pass"
         )
     }

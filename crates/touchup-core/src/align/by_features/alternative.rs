@@ -42,7 +42,7 @@ pub struct Surfaces<'a> {
     pub tree: &'a FaceTree,
 }
 
-/// One motion, and what speaks for it.
+/// One motion, and the evidence for it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Alternative {
     /// Moves the source onto the target.

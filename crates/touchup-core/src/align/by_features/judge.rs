@@ -1,4 +1,4 @@
-//! What speaks for a motion, by features and by surface, and whether it speaks against another.
+//! The evidence for a motion, by features and by surface, and whether it rules out another.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 

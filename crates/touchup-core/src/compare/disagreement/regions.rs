@@ -8,7 +8,7 @@ use crate::mesh::{TriMesh, VertexId};
 use crate::numeric::PointGrid;
 use crate::stylus::ProbedPoint;
 
-/// What speaks for the class of a region.
+/// The evidence for the class of a region.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RegionEvidence {
     /// how far its mean is from what the scanner is off everywhere, in standard deviations of such a mean
