@@ -1,9 +1,9 @@
 //! The contact model: the force expected from the scan, and the displacement of a face by it.
+//!
+//! The flow of a linear spring is exact too: dh/dt = v − α (a·n) (F·n + k h) is linear in h.
 
 use super::error::DynamicsError;
-use super::hold::{Hold, Shift};
 use super::sigmoid_flow::{advance, share};
-use super::spring_flow;
 
 /// Share of f_max up to which a sigmoid is trusted: beyond it the depth runs off to infinity, and with it the offset.
 pub const LARGEST_SHARE: f64 = 0.99;
@@ -11,6 +11,44 @@ pub const LARGEST_SHARE: f64 = 0.99;
 const NO_TIME: f64 = 1e-200;
 /// Scaled times beyond it leave too little room below the largest number: they are divided by e^u, at u = −40 at least.
 const LONGEST: f64 = 1e280;
+/// Of a spring: below it the series is taken, above it the closed form (which there loses no more than four roundings).
+const SERIES_UP_TO: f64 = 1.0;
+/// 1/k! for k = 2 … 19; the next one is below a rounding of 1/2.
+const INVERSE_FACTORIALS: [f64; 18] = {
+    let (mut inverse, mut factorial, mut k) = ([0.0; 18], 1.0, 2);
+    while k < 20 {
+        factorial *= k as f64;
+        inverse[k - 2] = 1.0 / factorial;
+        k += 1;
+    }
+    inverse
+};
+
+/// One face held against one sample, seen along the direction a in which the face may move.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Hold {
+    /// h at the start, m
+    pub h: f64,
+    /// dh/dt that does not come from the motion of the face, m/s
+    pub drift: f64,
+    /// a · n
+    pub cosine: f64,
+    /// F · n, N
+    pub force: f64,
+    /// α, m/(N·s)
+    pub alpha: f64,
+    /// s
+    pub dt: f64,
+}
+
+/// What one position flow did.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Shift {
+    /// s = α ∫ (F·n − f) dt, m, along a
+    pub displacement: f64,
+    /// J = ∫ f dt, N·s
+    pub impulse: f64,
+}
 
 /// The expected force f over the signed distance h of the tip from the face (positive outside).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,17 +73,15 @@ impl ContactModel {
     /// # Errors
     /// [`DynamicsError::BadParameter`] for a value that is not finite, or not positive where it must be.
     pub fn check(&self) -> Result<(), DynamicsError> {
-        let (positive, finite): (&[_], &[_]) = match *self {
+        let positive = |name, value| DynamicsError::check(name, value, value > 0.0);
+        match *self {
             Self::Sigmoid { f_max_n, h_min_m, delta } => {
-                (&[("f_max_n", f_max_n), ("h_min_m", h_min_m)], &[("delta", delta)])
+                positive("f_max_n", f_max_n)?;
+                positive("h_min_m", h_min_m)?;
+                DynamicsError::check("delta", delta, true)
             }
-            Self::Spring { stiffness_n_per_m } => (&[("k_n_per_m", stiffness_n_per_m)], &[]),
-        };
-        let bad_positive = positive.iter().find(|(_, value)| !(value.is_finite() && *value > 0.0));
-        if let Some(&(name, value)) = bad_positive.or_else(|| finite.iter().find(|(_, value)| !value.is_finite())) {
-            return Err(DynamicsError::BadParameter { name, value });
+            Self::Spring { stiffness_n_per_m } => positive("k_n_per_m", stiffness_n_per_m),
         }
-        Ok(())
     }
 
     /// f(h), N.
@@ -109,7 +145,7 @@ impl ContactModel {
     pub(super) fn flow(&self, hold: &Hold) -> Shift {
         match *self {
             Self::Sigmoid { f_max_n, h_min_m, delta } => sigmoid(hold, f_max_n, h_min_m, delta),
-            Self::Spring { stiffness_n_per_m } => spring_flow::flow(hold, stiffness_n_per_m),
+            Self::Spring { stiffness_n_per_m } => spring(hold, stiffness_n_per_m),
         }
     }
 }
@@ -153,4 +189,25 @@ fn sigmoid(hold: &Hold, f_max: f64, h_min: f64, delta: f64) -> Shift {
     let pushed = hold.alpha * hold.force * hold.dt;
     let displacement = if pushed.abs() < drifted.abs() { pushed - hold.alpha * impulse } else { drifted + along_h };
     Shift { displacement, impulse }
+}
+
+/// s = α t ((F·n + k h₀) φ₁(z) + k v t φ₂(z)), z = −α (a·n) k t, and J = −k ∫ h dt likewise.
+#[inline]
+fn spring(hold: &Hold, stiffness: f64) -> Shift {
+    let Hold { h, drift, cosine, force, alpha, dt } = *hold;
+    let (phi1, phi2) = phi(-alpha * cosine * stiffness * dt);
+    let displacement = alpha * dt * ((force + stiffness * h) * phi1 + stiffness * drift * dt * phi2);
+    let impulse = -stiffness * dt * (h * phi1 + (drift - alpha * cosine * force) * dt * phi2);
+    Shift { displacement, impulse }
+}
+
+/// φ₁(z) = (e^z − 1)/z and φ₂(z) = (e^z − 1 − z)/z².
+#[inline]
+fn phi(z: f64) -> (f64, f64) {
+    if z.abs() < SERIES_UP_TO {
+        let phi2 = INVERSE_FACTORIALS.iter().rev().fold(0.0, |sum, inverse| sum * z + inverse);
+        return (1.0 + z * phi2, phi2);
+    }
+    let phi1 = z.exp_m1() / z;
+    (phi1, (phi1 - 1.0) / z)
 }

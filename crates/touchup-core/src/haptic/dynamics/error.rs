@@ -41,6 +41,13 @@ pub enum DynamicsError {
     },
 }
 
+impl DynamicsError {
+    /// Refuses a parameter that is not finite or not `inside` its range.
+    pub(super) fn check(name: &'static str, value: f64, inside: bool) -> Result<(), Self> {
+        if inside && value.is_finite() { Ok(()) } else { Err(Self::BadParameter { name, value }) }
+    }
+}
+
 fn range_of(name: &str) -> &'static str {
     match name {
         "delta" => "finite",

@@ -16,18 +16,16 @@
 mod contact_model;
 pub mod dormand_prince;
 mod error;
-mod hold;
 mod rotation;
 mod sigmoid_flow;
-mod spring_flow;
 
 use nalgebra::{Point3, Vector3};
 
 use crate::{parameters, words};
 
 pub use contact_model::{ContactModel, LARGEST_SHARE};
+use contact_model::{Hold, Shift};
 pub use error::DynamicsError;
-use hold::{Hold, Shift};
 pub use rotation::turn;
 
 /// How far |n| may be from 1 on input: six digits in a file are enough.
@@ -150,6 +148,8 @@ pub struct FaceDynamics {
 
 /// A sample seen from the face.
 struct FaceSample {
+    /// n at the start
+    n: Vector3<f64>,
     /// F/|F|, or zero
     towards: Vector3<f64>,
     /// |F|, N
@@ -166,17 +166,9 @@ impl FaceDynamics {
     /// [`DynamicsError::BadParameter`].
     pub fn new(params: DynamicsParams) -> Result<Self, DynamicsError> {
         params.model.check()?;
-        for (name, value) in [("alpha_m_per_n_s", params.alpha_m_per_n_s), ("beta_per_n2_s", params.beta_per_n2_s)] {
-            if !(value.is_finite() && value >= 0.0) {
-                return Err(DynamicsError::BadParameter { name, value });
-            }
-        }
+        DynamicsError::check("alpha_m_per_n_s", params.alpha_m_per_n_s, params.alpha_m_per_n_s >= 0.0)?;
+        DynamicsError::check("beta_per_n2_s", params.beta_per_n2_s, params.beta_per_n2_s >= 0.0)?;
         Ok(Self { params, at_zero_n: params.model.force(0.0) })
-    }
-
-    /// The parameters it was made with.
-    pub fn params(&self) -> &DynamicsParams {
-        &self.params
     }
 
     /// The face after holding the tip `p` (m, in O) and the force on the stylus `force` (N, in O) for `dt` (s).
@@ -207,27 +199,6 @@ impl FaceDynamics {
         force: &Vector3<f64>,
         dt: f64,
     ) -> Result<FaceState, DynamicsError> {
-        let touch = self.touch(initial_normal, face, p, force, dt)?;
-        let (displacement, n) = match self.params.rule {
-            StepRule::Lie => self.lie(&face.n, &touch),
-            StepRule::DriftCorrected => self.drift_corrected(&face.n, &touch),
-            StepRule::DormandPrince => self.dormand_prince(&face.n, &touch)?,
-        };
-        let b = face.b + displacement * touch.along;
-        if !finite(&b.coords) || !finite(&n) {
-            return Err(DynamicsError::NotFinite { what: "the result of the step" });
-        }
-        Ok(FaceState { b, n })
-    }
-
-    fn touch(
-        &self,
-        initial_normal: &Vector3<f64>,
-        face: &FaceState,
-        p: &Point3<f64>,
-        force: &Vector3<f64>,
-        dt: f64,
-    ) -> Result<FaceSample, DynamicsError> {
         let (magnitude, towards) = split(force);
         let sum = face.b.coords + face.n + p.coords;
         if !(finite(&sum) && finite(force) && magnitude.is_finite() && dt.is_finite()) {
@@ -241,7 +212,17 @@ impl FaceDynamics {
             return Err(DynamicsError::BadTimeStep { dt_s: dt });
         }
         let along = if self.params.along == Along::Force && magnitude > 0.0 { towards } else { *initial_normal };
-        Ok(FaceSample { towards, magnitude, along, arm: p - face.b, dt })
+        let touch = FaceSample { n: face.n, towards, magnitude, along, arm: p - face.b, dt };
+        let (displacement, n) = match self.params.rule {
+            StepRule::Lie => self.lie(&touch),
+            StepRule::DriftCorrected => self.drift_corrected(&touch),
+            StepRule::DormandPrince => self.dormand_prince(&touch)?,
+        };
+        let b = face.b + displacement * along;
+        if !finite(&b.coords) || !finite(&n) {
+            return Err(DynamicsError::NotFinite { what: "the result of the step" });
+        }
+        Ok(FaceState { b, n })
     }
 
     /// F·n as it is compared, N, and the h that is compared with it, m.
@@ -257,46 +238,40 @@ impl FaceDynamics {
     }
 
     #[inline]
-    fn hold(&self, n: &Vector3<f64>, touch: &FaceSample) -> Hold {
-        let (force, h) = self.compared(n, touch, 0.0);
-        let cosine = touch.along.dot(n);
+    fn hold(&self, touch: &FaceSample) -> Hold {
+        let (force, h) = self.compared(&touch.n, touch, 0.0);
+        let cosine = touch.along.dot(&touch.n);
         Hold { h, drift: 0.0, cosine, force, alpha: self.params.alpha_m_per_n_s, dt: touch.dt }
     }
 
     #[inline]
-    fn turned(&self, n: &Vector3<f64>, touch: &FaceSample, impulse: f64) -> Vector3<f64> {
-        turn(n, &touch.towards, self.params.beta_per_n2_s * touch.magnitude * impulse)
+    fn turned(&self, touch: &FaceSample, impulse: f64) -> Vector3<f64> {
+        turn(&touch.n, &touch.towards, self.params.beta_per_n2_s * touch.magnitude * impulse)
     }
 
     #[inline]
-    fn lie(&self, n: &Vector3<f64>, touch: &FaceSample) -> (f64, Vector3<f64>) {
-        let Shift { displacement, impulse } = self.params.model.flow(&self.hold(n, touch));
-        (displacement, self.turned(n, touch, impulse))
+    fn lie(&self, touch: &FaceSample) -> (f64, Vector3<f64>) {
+        let Shift { displacement, impulse } = self.params.model.flow(&self.hold(touch));
+        (displacement, self.turned(touch, impulse))
     }
 
     /// The position flow with h₀ + v t from the arm held and n turning evenly from its start to its predicted end;
     /// twice, so that b* fits the n* that is returned. F·n and a·n, which change during the step, enter by a mean
     /// that weights the end the more the faster h forgets: 1/2 when slow (second order), 1 when stiff.
-    fn drift_corrected(&self, n: &Vector3<f64>, touch: &FaceSample) -> (f64, Vector3<f64>) {
-        let (displacement, end) = self.lie(n, touch);
-        if touch.dt == 0.0 || end == *n {
+    fn drift_corrected(&self, touch: &FaceSample) -> (f64, Vector3<f64>) {
+        let (displacement, end) = self.lie(touch);
+        if touch.dt == 0.0 || end == touch.n {
             return (displacement, end);
         }
-        let (shift, spare) = self.drifting_flow(n, &end, touch, displacement);
-        let end = self.turned(n, touch, shift.impulse + spare);
-        let (shift, _) = self.drifting_flow(n, &end, touch, shift.displacement);
+        let (shift, spare) = self.drifting_flow(touch, &end, displacement);
+        let end = self.turned(touch, shift.impulse + spare);
+        let (shift, _) = self.drifting_flow(touch, &end, shift.displacement);
         (shift.displacement, end)
     }
 
     /// The flow, and what its mean of F·n leaves out of the impulse, N·s.
-    fn drifting_flow(
-        &self,
-        n: &Vector3<f64>,
-        end: &Vector3<f64>,
-        touch: &FaceSample,
-        displacement: f64,
-    ) -> (Shift, f64) {
-        let start = self.hold(n, touch);
+    fn drifting_flow(&self, touch: &FaceSample, end: &Vector3<f64>, displacement: f64) -> (Shift, f64) {
+        let start = self.hold(touch);
         let (force, h) = self.compared(end, touch, 0.0);
         let cosine = touch.along.dot(end);
         let (_, h_end) = self.compared(end, touch, displacement);
@@ -312,7 +287,7 @@ impl FaceDynamics {
         (self.params.model.flow(&hold), (0.5 - weight) * (force - start.force) * touch.dt)
     }
 
-    fn dormand_prince(&self, n: &Vector3<f64>, touch: &FaceSample) -> Result<(f64, Vector3<f64>), DynamicsError> {
+    fn dormand_prince(&self, touch: &FaceSample) -> Result<(f64, Vector3<f64>), DynamicsError> {
         let (model, alpha, beta) = (&self.params.model, self.params.alpha_m_per_n_s, self.params.beta_per_n2_s);
         let rate = |y: &[f64; 4]| {
             let n = Vector3::new(y[1], y[2], y[3]);
@@ -325,10 +300,10 @@ impl FaceDynamics {
         let scale = match *model {
             ContactModel::Sigmoid { h_min_m, .. } => h_min_m,
             ContactModel::Spring { stiffness_n_per_m } => {
-                self.hold(n, touch).h.abs() + touch.magnitude / stiffness_n_per_m
+                self.hold(touch).h.abs() + touch.magnitude / stiffness_n_per_m
             }
         };
-        let start = [0.0, n.x, n.y, n.z];
+        let start = [0.0, touch.n.x, touch.n.y, touch.n.z];
         let scale = [scale.max(f64::MIN_POSITIVE), 1.0, 1.0, 1.0];
         let [displacement, x, y, z] =
             dormand_prince::integrate(start, touch.dt, scale, dormand_prince::RELATIVE, rate)?;

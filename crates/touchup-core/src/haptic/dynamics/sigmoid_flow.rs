@@ -143,19 +143,19 @@ impl Arc {
         let (low, high) = if down { (self.rate * span, total) } else { (0.0, total.min(self.rate * span)) };
         let start = if down { low } else { self.guess(span, high) };
         let short = !down && high <= SHORT && self.c * self.rho * SHORT_GROWTH * high < 0.5;
+        let by_sum = |displacement| self.by_sum(sign, total, displacement);
         let Some(bend) = self.bend().filter(|_| !short) else {
-            let displacement = self.solve(sign, total, low, high, start, Self::by_sum);
-            return self.passed(displacement, total, span, sign);
+            return self.passed(solve(low, high, start, by_sum), total, span, sign);
         };
         let to_bend = if down == (self.e < bend) { 0.0 } else { (bend / self.e).ln().abs() };
-        let beyond = to_bend == 0.0 || (to_bend < high && to_bend + self.high(sign * to_bend) < total);
+        let beyond = to_bend == 0.0 || (to_bend < high && to_bend + self.high_and_end(sign * to_bend).0 < total);
         let (low, high) = if beyond { (low.max(to_bend), high) } else { (low, high.min(to_bend)) };
         let displacement = if beyond != down {
             // L must not start near 0 while eᵘ is small: its logarithm is steep there
             let start = if self.e < bend { low } else { start };
-            self.solve(sign, total, low, high, start, Self::by_logarithm)
+            solve(low, high, start, |displacement| self.by_logarithm(sign, total, displacement))
         } else {
-            self.solve(sign, total, low, high, start, Self::by_sum)
+            solve(low, high, start, by_sum)
         };
         self.passed(displacement, total, span, sign)
     }
@@ -177,45 +177,6 @@ impl Arc {
         } else {
             Some(1.0)
         }
-    }
-
-    /// Halley's method for the distance |D|, kept between `low` and `high` by bisection.
-    ///
-    /// `equation`: residual, slope, and second derivative over slope, all for the distance.
-    #[inline]
-    fn solve(
-        &self,
-        sign: f64,
-        total: f64,
-        mut low: f64,
-        mut high: f64,
-        start: f64,
-        equation: impl Fn(&Self, f64, f64, f64) -> (f64, f64, f64),
-    ) -> f64 {
-        let mut displacement = start.max(low).min(high); // rounding may cross the two
-        for _ in 0..MAX_ITERATIONS {
-            let (residual, slope, bend) = equation(self, sign, total, displacement);
-            if residual > 0.0 {
-                high = displacement
-            } else {
-                low = displacement
-            }
-            let newton = residual / slope;
-            let step = newton / (1.0 - 0.5 * newton * bend).max(0.5);
-            let next = displacement - step;
-            let inside = next >= low && next <= high;
-            if inside
-                && (step * step * step.abs() <= CUBE_BELOW_ROUNDING * displacement
-                    || step.abs() <= ROUNDING * displacement)
-            {
-                return next;
-            }
-            if !inside && (high - low <= ROUNDING * high || step.abs() <= ROUNDING * displacement) {
-                return displacement;
-            }
-            displacement = if inside { next } else { 0.5 * (low + high) };
-        }
-        displacement
     }
 
     /// D + L − (1 − c) T as a function of D.
@@ -249,13 +210,7 @@ impl Arc {
         (residual, 1.0 + m, sign * m * (self.c + m) / (1.0 + m))
     }
 
-    /// |L| after the signed change `d` of u: ∫ 1/(1 + e⁻ᵘ) d|T|.
-    #[inline]
-    fn high(&self, d: f64) -> f64 {
-        self.high_and_end(d).0
-    }
-
-    /// |L|, taken from the lower end so that nothing cancels, and eᵘ after the signed change `d` of u.
+    /// |L| = ∫ 1/(1 + e⁻ᵘ) d|T|, taken from the lower end so that nothing cancels, and eᵘ after the signed change `d` of u.
     #[inline]
     fn high_and_end(&self, d: f64) -> (f64, f64) {
         let grown = d.exp_m1();
@@ -281,7 +236,7 @@ impl Arc {
     fn passed(&self, displacement: f64, total: f64, span: f64, sign: f64) -> Passed {
         let (low, high) = (displacement + self.c * span, total - displacement);
         let low = if low > CANCELLED * displacement { low } else { self.low(displacement, sign) };
-        let high = if high > CANCELLED * total { high } else { self.high(sign * displacement) };
+        let high = if high > CANCELLED * total { high } else { self.high_and_end(sign * displacement).0 };
         (displacement, low, high)
     }
 
@@ -300,4 +255,34 @@ impl Arc {
             (lower / (self.rest * shrunk - self.c * e)).ln() / self.rest
         }
     }
+}
+
+/// Halley's method for the distance |D|, kept between `low` and `high` by bisection.
+///
+/// `equation`: residual, slope, and second derivative over slope, all for the distance.
+#[inline]
+fn solve(mut low: f64, mut high: f64, start: f64, equation: impl Fn(f64) -> (f64, f64, f64)) -> f64 {
+    let mut displacement = start.max(low).min(high); // rounding may cross the two
+    for _ in 0..MAX_ITERATIONS {
+        let (residual, slope, bend) = equation(displacement);
+        if residual > 0.0 {
+            high = displacement
+        } else {
+            low = displacement
+        }
+        let newton = residual / slope;
+        let step = newton / (1.0 - 0.5 * newton * bend).max(0.5);
+        let next = displacement - step;
+        let inside = next >= low && next <= high;
+        if inside
+            && (step * step * step.abs() <= CUBE_BELOW_ROUNDING * displacement || step.abs() <= ROUNDING * displacement)
+        {
+            return next;
+        }
+        if !inside && (high - low <= ROUNDING * high || step.abs() <= ROUNDING * displacement) {
+            return displacement;
+        }
+        displacement = if inside { next } else { 0.5 * (low + high) };
+    }
+    displacement
 }
