@@ -5,8 +5,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::inside_scratch::{InsideScratch, MOST_LOOKED_AT};
-use super::{CarveParams, Case, ContactState, Refiner, RegionFit, RoiSize, Update};
+use super::{CarveParams, Case, ContactState, MOST_LOOKED_AT, Refiner, RegionFit, RoiSize, Update};
 use crate::mesh::{FaceHit, FaceId, triangle};
 use crate::stylus::{Ball, TipBody, TipPlace};
 
@@ -36,8 +35,8 @@ impl Refiner {
     ) -> Update {
         // a mesh that the tip does not enter by more than the tolerance is left alone
         let (tolerance, hint) = match state {
-            ContactState::Nothing => (carve.tolerance, self.carve_region.handle()),
-            _ => (carve.contact_tolerance.max(carve.tolerance), self.contact_region.handle()),
+            ContactState::Nothing => (carve.tolerance, self.carve_region.roi.handle),
+            _ => (carve.contact_tolerance.max(carve.tolerance), self.contact_region.roi.handle),
         };
         let place = TipPlace { centre: ball.centre, axis: self.axis };
         let (height, bound) = self.body.bound();
@@ -49,8 +48,8 @@ impl Refiner {
         let first = if counts { self.penetration(&place.centre, &hit) } else { None };
         let mut fit = first.map(|inside| self.displace(carve, hit.face, &inside, dt));
         self.gather(&place, tolerance, hit.face);
-        for at in 0..self.inside.deep.len().min(MOST_OTHERS) {
-            let face = self.inside.deep[at].1;
+        for at in 0..self.inside_faces.len().min(MOST_OTHERS) {
+            let face = self.inside_faces[at].1;
             // the faces before it have taken its corners along
             if let Some(inside) = self.inside(&place, face).filter(|inside| inside.depth > tolerance) {
                 let moved = self.displace(carve, face, &inside, dt);
@@ -80,20 +79,21 @@ impl Refiner {
     fn gather(&mut self, place: &TipPlace, tolerance: f64, first: FaceId) {
         let (height, bound) = self.body.bound();
         let (middle, half) = (place.centre + place.axis * height, Vector3::repeat(bound - tolerance));
-        let mut scratch = std::mem::take(&mut self.inside);
-        let InsideScratch { near, deep } = &mut scratch;
-        self.deformable.tree.faces_in_box(&(middle - half), &(middle + half), near);
+        self.deformable.tree.faces_in_box(&(middle - half), &(middle + half), &mut self.near_faces);
+        let near = &mut self.near_faces.faces;
         // in the order of their names: that of the tree depends on how it was built
-        near.faces.sort_unstable();
-        deep.clear();
-        let stride = near.faces.len().div_ceil(MOST_LOOKED_AT).max(1);
-        for &face in near.faces.iter().step_by(stride).filter(|&&face| face != first || !self.body.is_ball()) {
+        near.sort_unstable();
+        let stride = near.len().div_ceil(MOST_LOOKED_AT).max(1);
+        let mut found = std::mem::take(&mut self.inside_faces);
+        found.clear();
+        for &face in self.near_faces.faces.iter().step_by(stride).filter(|&&face| face != first || !self.body.is_ball())
+        {
             if let Some(inside) = self.inside(place, face).filter(|inside| inside.depth > tolerance) {
-                deep.push((inside.depth, face));
+                found.push((inside.depth, face));
             }
         }
-        deep.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        self.inside = scratch;
+        found.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        self.inside_faces = found;
     }
 
     /// The deepest point of a face that the tip comes to from the front, of those that are looked at.

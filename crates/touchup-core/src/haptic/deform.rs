@@ -71,27 +71,9 @@ pub(super) struct DeformableMesh {
 /// A region of interest with the edit after which it was last looked at.
 #[derive(Clone, Debug)]
 pub(super) struct HandleRegion {
-    roi: Roi,
+    pub roi: Roi,
     refit: RefitPlan,
     seen: Option<u64>,
-}
-
-impl HandleRegion {
-    /// The face that was moved last.
-    pub fn handle(&self) -> Option<FaceId> {
-        self.roi.handle()
-    }
-
-    /// Forgets the face that was moved last: faces were added or removed.
-    pub fn forget(&mut self) {
-        self.roi.forget();
-        self.seen = None;
-    }
-
-    /// The vertices that the last update moved.
-    pub fn vertices(&self) -> &[VertexId] {
-        &self.roi.vertices
-    }
 }
 
 impl DeformableMesh {
@@ -168,7 +150,7 @@ impl DeformableMesh {
         size: RoiSize,
         steps: &[Vector3<f64>; 3],
     ) -> RegionFit {
-        if !region.roi.is_for(handle) {
+        if region.roi.handle != Some(handle) {
             region.roi.rebuild(&self.mesh, handle, size, self.guard.is_some());
             self.tree.plan(region.roi.neighbourhood.ring.moving(), &mut region.refit);
             region.seen = None;
@@ -216,8 +198,9 @@ impl DeformableMesh {
     /// Takes the last stroke back, or does again what was undone last; returns whether there was any.
     pub fn change_strokes(&mut self, is_undo: bool) -> bool {
         let Self { strokes, mesh, tree, evidence, .. } = self;
-        let change = if is_undo { StrokeUndo::undo } else { StrokeUndo::redo };
-        let Some(moved) = strokes.as_mut().and_then(|strokes| change(strokes, mesh, evidence)) else { return false };
+        let Some(moved) = strokes.as_mut().and_then(|strokes| strokes.change(is_undo, mesh, evidence)) else {
+            return false;
+        };
         let faces: Vec<FaceId> = moved.iter().flat_map(|&vertex| mesh.star(vertex)).copied().collect();
         tree.refit(mesh, &faces);
         self.edits += 1;
@@ -262,20 +245,20 @@ impl DeformableMesh {
         Ok(is_done)
     }
 
-    fn evidence(&self) -> GuardEvidence<'_> {
-        GuardEvidence { scanned: &self.scanned, normals: &self.evidence }
+    fn evidence<'a>(&'a self, params: &'a GuardParams) -> GuardEvidence<'a> {
+        let gap = params.gap_share * self.mean_edge;
+        GuardEvidence { params, gap, scanned: &self.scanned, normals: &self.evidence }
     }
 
     /// Puts the region at the largest share of its displacement that leaves the mesh sound.
     fn place_soundly(&mut self, region: &mut HandleRegion, longest: f64, guard: &GuardParams) -> RegionFit {
         let margin = MARGIN_EDGES * self.mean_edge;
         if region.seen != Some(self.edits) {
-            region.roi.neighbourhood.refresh(&self.mesh, &self.tree, margin, guard, &self.evidence());
+            region.roi.neighbourhood.refresh(&self.mesh, &self.tree, margin, &self.evidence(guard));
         } else if region.roi.neighbourhood.is_outdated(longest) {
             region.roi.neighbourhood.collect(&self.mesh, &self.tree, margin);
         }
-        if region.roi.neighbourhood.may_pass_unseen(longest) {
-            region.roi.neighbourhood.pass_unseen(longest);
+        if region.roi.neighbourhood.pass_unseen(longest) {
             self.place(&region.roi, 1.0);
             return RegionFit::Whole;
         }
@@ -299,11 +282,10 @@ impl DeformableMesh {
 
     fn judge_at(&mut self, region: &mut HandleRegion, share: f64, longest: f64, guard: &GuardParams) -> GuardVerdict {
         self.place(&region.roi, share);
-        let gap = guard.gap_share * self.mean_edge;
         let (mesh, before, numbers) = (&self.mesh, &self.before, &region.roi.numbers);
         let moved = |v: VertexId| numbers.of(v.0).and_then(|i| before.get(i as usize));
         let was = |v: VertexId| moved(v).copied().unwrap_or_else(|| mesh.position(v));
-        region.roi.neighbourhood.judge(mesh, guard, &self.evidence(), gap, share * longest, was)
+        region.roi.neighbourhood.judge(mesh, &self.evidence(guard), share * longest, was)
     }
 
     /// The displacement of each vertex of the region; returns the longest, m.
@@ -312,15 +294,13 @@ impl DeformableMesh {
         self.before.clear();
         let mut longest = 0.0f64;
         for (&vertex, weights) in roi.vertices.iter().zip(&roi.weights) {
-            let here = self.mesh.position(vertex);
-            let is_outside = self.movable.is_some_and(|movable| !movable.contains(&self.scanned[vertex.0 as usize]));
+            let (here, scanned) = (self.mesh.position(vertex), self.scanned[vertex.0 as usize]);
+            let is_outside = self.movable.is_some_and(|movable| !movable.contains(&scanned));
             let is_stiff = is_outside || self.patch.as_ref().is_some_and(|patch| patch.is_touched(vertex));
             let mut step = steps[0] * weights[0] + steps[1] * weights[1] + steps[2] * weights[2];
-            let (displacement, next) =
-                (here - self.scanned[vertex.0 as usize], here + step - self.scanned[vertex.0 as usize]);
-            if is_stiff
-                || next.norm_squared() > self.largest_move * self.largest_move && next.norm() > displacement.norm()
-            {
+            let (moved, next) = (here - scanned, here + step - scanned);
+            let is_far = next.norm_squared() > self.largest_move * self.largest_move && next.norm() > moved.norm();
+            if is_stiff || is_far {
                 step = Vector3::zeros();
             }
             longest = longest.max(step.norm_squared());

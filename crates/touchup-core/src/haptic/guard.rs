@@ -58,9 +58,12 @@ const FOLD_MARGIN: f64 = 0.1;
 /// Margin on the quality.
 const QUALITY_MARGIN: f64 = 1.15;
 
-/// What was scanned or measured, against which an update is judged.
+/// What was scanned or measured, against which an update is judged, and by which limits.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct GuardEvidence<'a> {
+    pub params: &'a GuardParams,
+    /// faces nearer than this touch, m
+    pub gap: f64,
     /// positions as scanned, m
     pub scanned: &'a [Point3<f64>],
     /// for each face the last normal scanned or measured there; zero where it was scanned without area and never touched: it has no
@@ -70,10 +73,10 @@ pub(super) struct GuardEvidence<'a> {
 
 impl GuardEvidence<'_> {
     /// Twice the area over the longest edge squared that a face may not fall below.
-    fn smallest_quality(&self, mesh: &TriMesh, face: FaceId, params: &GuardParams) -> f64 {
+    fn smallest_quality(&self, mesh: &TriMesh, face: FaceId) -> f64 {
         let corners = mesh.corners(face).map(|vertex| self.scanned[vertex.0 as usize]);
         let double_area = (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).norm();
-        params.smallest_quality.min(GuardParams::SCANNED_SHARE * triangle::shape_quality(&corners, double_area))
+        self.params.smallest_quality.min(GuardParams::SCANNED_SHARE * triangle::shape_quality(&corners, double_area))
     }
 }
 
@@ -95,36 +98,6 @@ pub(super) enum GuardVerdict {
     Broken,
     /// The region ceases to be smooth: [`Neighbourhood::roughen`] it and ask again.
     Rough,
-}
-
-/// How a look at the region ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum LookEnding {
-    Broken,
-    /// sound, but something is at its limit
-    Sound,
-    /// sound with margins
-    Safe,
-}
-
-impl LookEnding {
-    fn of(broken: bool, at_limit: bool) -> Self {
-        if broken {
-            Self::Broken
-        } else if at_limit {
-            Self::Sound
-        } else {
-            Self::Safe
-        }
-    }
-
-    fn and(self, other: Self) -> Self {
-        match (self, other) {
-            (Self::Broken, _) | (_, Self::Broken) => Self::Broken,
-            (Self::Safe, Self::Safe) => Self::Safe,
-            _ => Self::Sound,
-        }
-    }
 }
 
 /// The faces that change when the vertices of a region move, and what they could run into.
@@ -165,9 +138,8 @@ impl Neighbourhood {
     /// Makes room for a region of so many vertices: two to three faces each, three edges for two faces.
     pub fn reserve(&mut self, vertices: usize) {
         let faces = 3 * vertices;
-        for list in [&mut self.before, &mut self.after] {
-            list.reserve(faces);
-        }
+        self.before.reserve(faces);
+        self.after.reserve(faces);
         self.ring.reserve(vertices);
         self.near = BoxQuery::with_room(2 * faces);
         self.boxes.reserve(2 * faces);
@@ -176,14 +148,7 @@ impl Neighbourhood {
     }
 
     /// Collects the region again after the mesh was changed elsewhere; arguments as in [`Self::judge`].
-    pub fn refresh(
-        &mut self,
-        mesh: &TriMesh,
-        tree: &FaceTree,
-        margin: f64,
-        params: &GuardParams,
-        evidence: &GuardEvidence,
-    ) {
+    pub fn refresh(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64, evidence: &GuardEvidence) {
         self.before.clear();
         self.before.extend(self.ring.faces.iter().map(|&face| shape_of(mesh, face)));
         self.collect(mesh, tree, margin);
@@ -191,8 +156,8 @@ impl Neighbourhood {
         if let Some(mean) = self.smooth {
             self.after.clear();
             self.after.extend_from_slice(&self.before[..self.ring.moving]);
-            let lowest = self.after.iter().map(|shape| shape.normal.dot(&mean)).fold(1.0, f64::min);
-            self.allow_unseen(self.look(mesh, params, evidence), lowest);
+            let is_safe = self.is_safe(mesh, evidence) == Some(true);
+            self.stays_smooth(&mean, is_safe);
         }
     }
 
@@ -266,72 +231,57 @@ impl Neighbourhood {
         }
     }
 
-    /// Whether the vertices may move by `displacement` (m) without a look.
+    /// Takes a motion of the vertices by `displacement` (m) if it needs no look; whether it does not.
     #[inline]
-    pub fn may_pass_unseen(&self, displacement: f64) -> bool {
-        displacement <= self.unseen
-    }
-
-    /// Takes a motion of `displacement` (m) that [`Self::may_pass_unseen`].
-    #[inline]
-    pub fn pass_unseen(&mut self, displacement: f64) {
-        self.unseen -= displacement;
-        self.allowance -= displacement;
+    pub fn pass_unseen(&mut self, displacement: f64) -> bool {
+        let passes = displacement <= self.unseen;
+        if passes {
+            self.unseen -= displacement;
+            self.allowance -= displacement;
+        }
+        passes
     }
 
     /// Judges the current mesh against what it was before the update.
     ///
-    /// - `gap`: faces nearer than this touch, m.
     /// - `displacement`: the largest of a vertex in the update, m.
     /// - `before`: the position of a vertex before the update, m.
     pub fn judge(
         &mut self,
         mesh: &TriMesh,
-        params: &GuardParams,
         evidence: &GuardEvidence,
-        gap: f64,
         displacement: f64,
         before: impl Fn(VertexId) -> Point3<f64>,
     ) -> GuardVerdict {
         self.after.clear();
         self.after.extend(self.ring.faces[..self.ring.moving].iter().map(|&face| shape_of(mesh, face)));
-        let look = self.look(mesh, params, evidence);
         self.unseen = 0.0;
-        if look == LookEnding::Broken {
-            return GuardVerdict::Broken;
+        let Some(is_safe) = self.is_safe(mesh, evidence) else { return GuardVerdict::Broken };
+        match self.smooth.map(|mean| self.stays_smooth(&mean, is_safe)) {
+            Some(true) => GuardVerdict::Sound,
+            Some(false) => GuardVerdict::Rough,
+            None if self.suspects.are_clear(mesh, evidence.gap, displacement, before) => GuardVerdict::Sound,
+            None => GuardVerdict::Broken,
         }
-        let Some(mean) = self.smooth else {
-            return if self.suspects.are_clear(mesh, gap, displacement, before) {
-                GuardVerdict::Sound
-            } else {
-                GuardVerdict::Broken
-            };
-        };
-        let lowest = self.after.iter().map(|shape| shape.normal.dot(&mean)).fold(1.0, f64::min);
-        if lowest <= STILL_SMOOTH_COSINE {
-            return GuardVerdict::Rough;
-        }
-        self.allow_unseen(look, lowest);
-        GuardVerdict::Sound
     }
 
-    /// How far vertices may move without a look, after one at a smooth region.
-    fn allow_unseen(&mut self, look: LookEnding, lowest_cosine: f64) {
-        if look == LookEnding::Safe && lowest_cosine > STILL_SMOOTH_COSINE + COSINE_MARGIN {
+    /// Whether a region that was smooth is still; sets how far its vertices may move without a look, where all of it `is_safe`.
+    fn stays_smooth(&mut self, mean: &Vector3<f64>, is_safe: bool) -> bool {
+        let lowest = self.after.iter().map(|shape| shape.normal.dot(mean)).fold(1.0, f64::min);
+        if is_safe && lowest > STILL_SMOOTH_COSINE + COSINE_MARGIN {
             let altitude = self.after.iter().map(|shape| shape.altitude).fold(f64::INFINITY, f64::min);
             self.unseen = UNSEEN_SHARE * altitude;
         }
+        lowest > STILL_SMOOTH_COSINE
     }
 
-    fn look(&self, mesh: &TriMesh, params: &GuardParams, evidence: &GuardEvidence) -> LookEnding {
-        match self.look_at_faces(mesh, params, evidence) {
-            LookEnding::Broken => LookEnding::Broken,
-            look => look.and(self.look_at_edges(params, evidence.normals)),
-        }
+    /// Looks at the region: `None` where it is broken, else whether it is sound with margins.
+    fn is_safe(&self, mesh: &TriMesh, evidence: &GuardEvidence) -> Option<bool> {
+        Some(self.are_faces_safe(mesh, evidence)? & self.are_edges_safe(evidence)?)
     }
 
-    fn look_at_faces(&self, mesh: &TriMesh, params: &GuardParams, evidence: &GuardEvidence) -> LookEnding {
-        let mut look = LookEnding::Safe;
+    fn are_faces_safe(&self, mesh: &TriMesh, evidence: &GuardEvidence) -> Option<bool> {
+        let (params, mut is_safe) = (evidence.params, true);
         for ((&face, old), new) in self.ring.faces.iter().zip(&self.before).zip(&self.after) {
             let seen = Vector3::from(evidence.normals[face.0 as usize].map(f64::from));
             if seen == Vector3::zeros() {
@@ -340,33 +290,34 @@ impl Neighbourhood {
             let worse = |new: f64, old: f64, limit: f64| new < limit && new < old;
             let cosine = new.normal.dot(&seen);
             let is_thin = new.quality < params.smallest_quality * QUALITY_MARGIN;
-            let smallest_quality = if is_thin { evidence.smallest_quality(mesh, face, params) } else { 0.0 };
-            let broken = worse(new.quality, old.quality, smallest_quality)
+            let smallest_quality = if is_thin { evidence.smallest_quality(mesh, face) } else { 0.0 };
+            if worse(new.quality, old.quality, smallest_quality)
                 || worse(cosine, old.normal.dot(&seen), params.smallest_evidence_cosine)
-                || new.normal.dot(&old.normal) < params.smallest_turn_cosine;
-            let at_limit = new.quality < smallest_quality * QUALITY_MARGIN
-                || cosine < params.smallest_evidence_cosine + COSINE_MARGIN;
-            look = look.and(LookEnding::of(broken, at_limit));
-            if look == LookEnding::Broken {
-                break;
+                || new.normal.dot(&old.normal) < params.smallest_turn_cosine
+            {
+                return None;
             }
+            is_safe &= !(new.quality < smallest_quality * QUALITY_MARGIN
+                || cosine < params.smallest_evidence_cosine + COSINE_MARGIN);
         }
-        look
+        Some(is_safe)
     }
 
-    fn look_at_edges(&self, params: &GuardParams, normals: &[[f32; 3]]) -> LookEnding {
-        let mut look = LookEnding::Safe;
-        let has_side = |index: u32| normals[self.ring.faces[index as usize].0 as usize] != [0.0; 3];
+    fn are_edges_safe(&self, evidence: &GuardEvidence) -> Option<bool> {
+        let (limit, mut is_safe) = (evidence.params.smallest_fold_cosine, true);
+        let has_side = |index: u32| evidence.normals[self.ring.faces[index as usize].0 as usize] != [0.0; 3];
         for &(a, b) in &self.ring.edges {
             let (old_a, old_b) = (&self.before[a as usize], &self.before[b as usize]);
             let new_b = self.after.get(b as usize).unwrap_or(old_b);
             let cosine = self.after[a as usize].normal.dot(&new_b.normal);
-            if cosine < params.smallest_fold_cosine + FOLD_MARGIN && has_side(a) && has_side(b) {
-                let broken = cosine < params.smallest_fold_cosine && cosine < old_a.normal.dot(&old_b.normal);
-                look = look.and(LookEnding::of(broken, true));
+            if cosine < limit + FOLD_MARGIN && has_side(a) && has_side(b) {
+                if cosine < limit && cosine < old_a.normal.dot(&old_b.normal) {
+                    return None;
+                }
+                is_safe = false;
             }
         }
-        look
+        Some(is_safe)
     }
 
     /// Takes the state just looked at as the new state before; `displacement` is the largest of a vertex, m.

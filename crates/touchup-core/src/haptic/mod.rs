@@ -9,7 +9,6 @@ mod deform;
 pub mod dynamics;
 mod followed;
 mod guard;
-mod inside_scratch;
 mod params;
 mod registration;
 mod ring;
@@ -32,7 +31,7 @@ pub use roi::RoiSize;
 /// Of a stylus: part of [`RefineParams`].
 pub use crate::stylus::{SlidingParams, TipParams};
 
-use crate::mesh::{Changes, FaceHit, FaceId, MeshError, Nearby, TriMesh, VertexId};
+use crate::mesh::{BoxQuery, Changes, FaceHit, FaceId, MeshError, Nearby, TriMesh, VertexId};
 use crate::reconstruct::{PatchDelta, Support};
 use crate::stylus::{
     Ball, ContactEstimator, ContactSample, FrictionCoefficient, LONGEST_HOLD, NormalEstimate, Sample, SampleError,
@@ -40,10 +39,11 @@ use crate::stylus::{
 };
 use deform::{DeformableMesh, HandleRegion};
 use dynamics::turn;
-use inside_scratch::InsideScratch;
 
 /// The measured normal of one sample is uncertain by this, rad: a flat tip that may lie on its face does.
 const FLUSH: f64 = 0.05;
+/// Faces looked at for those inside the tip, at most: on a scan finer than a tenth of the ball they are a sample.
+const MOST_LOOKED_AT: usize = 128;
 
 /// Why a sample was refused, or a refiner not built. A refused sample does not change the mesh.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -120,6 +120,8 @@ pub struct Update {
 
 impl Update {
     const FREE: Self = Self { case: Case::Free, mismatch: None, fit: None };
+    /// Contact with nothing that may be moved.
+    const BESIDE: Self = Self { case: Case::SurfaceOnly, mismatch: None, fit: None };
 }
 
 /// What became of the samples so far.
@@ -175,7 +177,10 @@ pub struct Refiner {
     body: TipBody,
     /// from the tip to the handle, unit, in O; a ball needs none
     axis: Vector3<f64>,
-    inside: InsideScratch,
+    /// faces near the tip …
+    near_faces: BoxQuery,
+    /// … and those inside it, with their depth, m
+    inside_faces: Vec<(f64, FaceId)>,
     /// the handle and n*(0), its normal when it became the handle (Eq 6)
     begun: Option<(FaceId, Vector3<f64>)>,
     counts: RefineCounts,
@@ -217,7 +222,8 @@ impl Refiner {
             deformable,
             body: TipBody::new(params.shape, params.tip.radius)?,
             axis: Vector3::z(),
-            inside: InsideScratch::new(),
+            near_faces: BoxQuery::with_room(4 * MOST_LOOKED_AT),
+            inside_faces: Vec::with_capacity(MOST_LOOKED_AT),
             begun: None,
             counts: RefineCounts::default(),
             params,
@@ -253,11 +259,14 @@ impl Refiner {
             self.axis = TipPlace::from(&sample.pose_ot).axis;
         }
         let state = self.contact_state(ball_contact.is_some(), surface);
-        if self.params.region.is_some_and(|touched| !touched.region.contains(&ball.centre)) {
-            return Ok(self.pass(state));
-        }
+        // a sample outside the region that may be touched moves nothing
+        let is_outside = self.params.region.is_some_and(|touched| !touched.region.contains(&ball.centre));
         let update = match state {
             ContactState::Nothing => Update::FREE,
+            _ if is_outside => {
+                self.counts.outside_region += 1;
+                Update::BESIDE
+            }
             _ => {
                 self.deformable.touch();
                 self.press(&ball, state, handle, dt)?
@@ -265,20 +274,8 @@ impl Refiner {
         };
         self.counts.accepted += 1;
         match self.params.carve {
-            Some(carve) => Ok(self.carve(&carve, &ball, state, dt, update)),
-            None => Ok(update),
-        }
-    }
-
-    /// A sample outside the region that may be touched moves nothing.
-    fn pass(&mut self, state: ContactState) -> Update {
-        self.counts.accepted += 1;
-        match state {
-            ContactState::Nothing => Update::FREE,
-            _ => {
-                self.counts.outside_region += 1;
-                Update { case: Case::SurfaceOnly, mismatch: None, fit: None }
-            }
+            Some(carve) if !is_outside => Ok(self.carve(&carve, &ball, state, dt, update)),
+            _ => Ok(update),
         }
     }
 
@@ -290,9 +287,7 @@ impl Refiner {
         }
         match self.params.touch_point {
             TouchPoint::FaceNormal => ContactState::Something,
-            TouchPoint::MeasuredNormal => {
-                ContactState::Surface(surface.map(|surface| surface.normal).unwrap_or_default())
-            }
+            TouchPoint::MeasuredNormal => ContactState::Surface(surface.map(|known| known.normal).unwrap_or_default()),
         }
     }
 
@@ -306,7 +301,7 @@ impl Refiner {
     ) -> Result<Update, RefineError> {
         let Some(pressing) = self.pressing(ball, state, handle) else {
             self.counts.out_of_reach += 1;
-            return Ok(Update { case: Case::SurfaceOnly, mismatch: None, fit: None });
+            return Ok(Update::BESIDE);
         };
         let mismatch = self.mismatch(&pressing);
         let case = if mismatch.distance < 0.0 { Case::Both } else { Case::SurfaceOnly };
@@ -340,7 +335,7 @@ impl Refiner {
             ContactState::Surface(normal) => self.touching_point(centre, &normal),
             _ => centre,
         };
-        let last = self.contact_region.handle();
+        let last = self.contact_region.roi.handle;
         let hit = match self.params.closest {
             _ if handle.is_some() => None,
             ClosestBy::Surface => self.deformable.closest(&seek, last, reach, &mut self.near_contact),
@@ -474,8 +469,8 @@ impl Refiner {
 
     /// Faces were added, removed or moved.
     fn forget_regions(&mut self) {
-        self.contact_region.forget();
-        self.carve_region.forget();
+        self.contact_region.roi.handle = None;
+        self.carve_region.roi.handle = None;
         self.begun = None;
     }
 
@@ -536,6 +531,6 @@ impl Refiner {
 
     /// The vertices that the last contact moved.
     pub fn moved_vertices(&self) -> &[VertexId] {
-        self.contact_region.vertices()
+        &self.contact_region.roi.vertices
     }
 }

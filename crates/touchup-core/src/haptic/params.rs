@@ -214,16 +214,12 @@ impl RefineParams {
         let roi = if let RoiSize::Radius(radius) = self.roi { radius } else { 0.0 };
         let cosine = self.smallest_contact_cosine;
         SettingError::check("smallest contact cosine", cosine, cosine.abs() <= 1.0, "-1 to 1")?;
-        let not_negative = [
-            ("turning (1/s)", self.turning.unwrap_or(0.0)),
-            ("region of interest (m)", roi),
-            ("largest move (noises)", self.largest_move_noises),
-        ];
-        let positive =
-            [("longest step (edges)", self.longest_step_edges), ("largest move (edges)", self.largest_move_edges)];
-        not_negative
-            .iter()
-            .try_for_each(|&(name, x)| SettingError::check(name, x, x >= 0.0, "finite and 0 or more"))?;
-        positive.iter().try_for_each(|&(name, x)| SettingError::check(name, x, x > 0.0, "finite and more than 0"))
+        let not_negative = |name, x| SettingError::check(name, x, x >= 0.0, "finite and 0 or more");
+        not_negative("turning (1/s)", self.turning.unwrap_or(0.0))?;
+        not_negative("region of interest (m)", roi)?;
+        not_negative("largest move (noises)", self.largest_move_noises)?;
+        let positive = |name, x| SettingError::check(name, x, x > 0.0, "finite and more than 0");
+        positive("longest step (edges)", self.longest_step_edges)?;
+        positive("largest move (edges)", self.largest_move_edges)
     }
 }

@@ -31,7 +31,8 @@ const ROW_ENTRIES: usize = 32;
 /// One handle and what moves with it.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Roi {
-    handle: Option<FaceId>,
+    /// the face it was made for; `None` after faces were added, removed or moved by others
+    pub handle: Option<FaceId>,
     /// handle vertices first, then the free ones
     pub vertices: Vec<VertexId>,
     /// for each vertex: its share in the displacement of each handle vertex
@@ -69,29 +70,12 @@ impl Roi {
         roi
     }
 
-    /// Whether it was made for this handle.
-    pub fn is_for(&self, handle: FaceId) -> bool {
-        self.handle == Some(handle)
-    }
-
-    /// The handle it was made for.
-    pub fn handle(&self) -> Option<FaceId> {
-        self.handle
-    }
-
-    /// Forgets what it was made for.
-    pub fn forget(&mut self) {
-        self.handle = None;
-    }
-
     /// Makes the region of `handle`; the connectivity of its faces is looked up only for free vertices or a guard.
     pub fn rebuild(&mut self, mesh: &TriMesh, handle: FaceId, size: RoiSize, is_guarded: bool) {
         self.handle = Some(handle);
         self.numbers.clear();
         self.vertices.clear();
-        for vertex in mesh.corners(handle) {
-            self.add(vertex);
-        }
+        mesh.corners(handle).into_iter().for_each(|vertex| self.add(vertex));
         self.spread(mesh, mesh.barycentre(handle), size);
         let ring = &mut self.neighbourhood.ring;
         ring.gather(mesh, &self.vertices);

@@ -50,30 +50,23 @@ impl StrokeUndo {
         self.evidence.note(face.0, || before);
     }
 
-    /// Exchanges what the last stroke changed with what was there before it; returns the vertices that moved, `None` where
-    /// there was no stroke.
-    pub fn undo(&mut self, mesh: &mut TriMesh, evidence: &mut [[f32; 3]]) -> Option<Vec<VertexId>> {
+    /// Exchanges what the last stroke changed with what was there before it, or what was so undone last with what is there;
+    /// returns the vertices that moved, `None` where there was no stroke.
+    pub fn change(&mut self, is_undo: bool, mesh: &mut TriMesh, evidence: &mut [[f32; 3]]) -> Option<Vec<VertexId>> {
         self.last_contact_ns = None;
         let mut moved = Vec::new();
-        let has_undone = self.len() > 0
-            && self.positions.undo(|vertex, position| exchange(mesh, vertex, position, &mut moved))
-            && self.evidence.undo(|face, normal| std::mem::swap(&mut evidence[face as usize], normal));
-        has_undone.then_some(moved)
+        let move_vertex = |vertex, position: &mut Point3<f64>| {
+            let vertex = VertexId(vertex);
+            let here = mesh.position(vertex);
+            mesh.set_position(vertex, std::mem::replace(position, here));
+            moved.push(vertex);
+        };
+        let turn_face = |face: u32, normal: &mut [f32; 3]| std::mem::swap(&mut evidence[face as usize], normal);
+        let has_changed = if is_undo {
+            self.len() > 0 && self.positions.undo(move_vertex) && self.evidence.undo(turn_face)
+        } else {
+            self.positions.redo(move_vertex) && self.evidence.redo(turn_face)
+        };
+        has_changed.then_some(moved)
     }
-
-    /// Does the stroke again that was undone last; as [`Self::undo`].
-    pub fn redo(&mut self, mesh: &mut TriMesh, evidence: &mut [[f32; 3]]) -> Option<Vec<VertexId>> {
-        self.last_contact_ns = None;
-        let mut moved = Vec::new();
-        let has_redone = self.positions.redo(|vertex, position| exchange(mesh, vertex, position, &mut moved))
-            && self.evidence.redo(|face, normal| std::mem::swap(&mut evidence[face as usize], normal));
-        has_redone.then_some(moved)
-    }
-}
-
-fn exchange(mesh: &mut TriMesh, vertex: u32, position: &mut Point3<f64>, moved: &mut Vec<VertexId>) {
-    let vertex = VertexId(vertex);
-    let here = mesh.position(vertex);
-    mesh.set_position(vertex, std::mem::replace(position, here));
-    moved.push(vertex);
 }
