@@ -5,7 +5,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::{CarveParams, Case, ContactState, MOST_LOOKED_AT, Refiner, RegionFit, RoiSize, Update};
+use super::{CarveParams, Case, MOST_LOOKED_AT, Refiner, RegionFit, Update};
 use crate::mesh::{FaceHit, FaceId, triangle};
 use crate::stylus::{Ball, TipBody, TipPlace};
 
@@ -25,18 +25,13 @@ struct Inside {
 
 impl Refiner {
     /// Moves what is inside the tip out of it.
-    pub(super) fn carve(
-        &mut self,
-        carve: &CarveParams,
-        ball: &Ball,
-        state: ContactState,
-        dt: f64,
-        update: Update,
-    ) -> Update {
+    pub(super) fn carve(&mut self, ball: &Ball, is_in_contact: bool, dt: f64, update: Update) -> Update {
+        let Some(carve) = self.params.carve else { return update };
         // a mesh that the tip does not enter by more than the tolerance is left alone
-        let (tolerance, hint) = match state {
-            ContactState::Nothing => (carve.tolerance, self.carve_region.roi.handle),
-            _ => (carve.contact_tolerance.max(carve.tolerance), self.contact_region.roi.handle),
+        let (tolerance, hint) = if is_in_contact {
+            (carve.contact_tolerance.max(carve.tolerance), self.contact_region.roi.handle)
+        } else {
+            (carve.tolerance, self.carve_region.roi.handle)
         };
         let place = TipPlace { centre: ball.centre, axis: self.axis };
         let (height, bound) = self.body.bound();
@@ -46,13 +41,13 @@ impl Refiner {
         };
         let counts = self.body.is_ball() && !self.deformable.is_stiff(hit.face);
         let first = if counts { self.penetration(&place.centre, &hit) } else { None };
-        let mut fit = first.map(|inside| self.displace(carve, hit.face, &inside, dt));
+        let mut fit = first.map(|inside| self.displace(&carve, hit.face, &inside, dt));
         self.gather(&place, tolerance, hit.face);
         for at in 0..self.inside_faces.len().min(MOST_OTHERS) {
             let face = self.inside_faces[at].1;
             // the faces before it have taken its corners along
             if let Some(inside) = self.inside(&place, face).filter(|inside| inside.depth > tolerance) {
-                let moved = self.displace(carve, face, &inside, dt);
+                let moved = self.displace(&carve, face, &inside, dt);
                 fit = fit.or(Some(moved));
             }
         }
@@ -70,7 +65,7 @@ impl Refiner {
             (share * (depth - carve.tolerance)).min(2.0 * self.params.longest_step_edges * self.deformable.mean_edge);
         let weight: f64 = barycentric.iter().map(|x| x * x).sum();
         let steps = barycentric.map(|x| out * (depth_step * x / weight));
-        let fit = self.deformable.deform(&mut self.carve_region, face, RoiSize::Handle, &steps);
+        let fit = self.deformable.deform(&mut self.carve_region, face, &steps);
         self.count(fit);
         fit
     }

@@ -72,6 +72,7 @@ pub(super) struct DeformableMesh {
 #[derive(Clone, Debug)]
 pub(super) struct HandleRegion {
     pub roi: Roi,
+    size: RoiSize,
     refit: RefitPlan,
     seen: Option<u64>,
 }
@@ -139,19 +140,13 @@ impl DeformableMesh {
         let vertices = size.room(self.mean_edge);
         self.displacements.reserve(vertices);
         self.before.reserve(vertices);
-        HandleRegion { roi: Roi::with_room(vertices), refit: RefitPlan::with_room(3 * vertices), seen: None }
+        HandleRegion { roi: Roi::with_room(vertices), size, refit: RefitPlan::with_room(3 * vertices), seen: None }
     }
 
     /// Moves the corners of `handle` by `steps` (m) and the region around it after them.
-    pub fn deform(
-        &mut self,
-        region: &mut HandleRegion,
-        handle: FaceId,
-        size: RoiSize,
-        steps: &[Vector3<f64>; 3],
-    ) -> RegionFit {
+    pub fn deform(&mut self, region: &mut HandleRegion, handle: FaceId, steps: &[Vector3<f64>; 3]) -> RegionFit {
         if region.roi.handle != Some(handle) {
-            region.roi.rebuild(&self.mesh, handle, size, self.guard.is_some());
+            region.roi.rebuild(&self.mesh, handle, region.size, self.guard.is_some());
             self.tree.plan(region.roi.neighbourhood.ring.moving(), &mut region.refit);
             region.seen = None;
         }

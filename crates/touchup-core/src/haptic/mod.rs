@@ -24,7 +24,7 @@ pub use dynamics::{
     Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, SigmoidParams, StepRule,
 };
 pub use guard::GuardParams;
-pub use params::{CarveParams, ClosestBy, RefineParams, ScanParams, ScanRegion, TouchPoint, relaxing_alpha};
+pub use params::{CarveParams, RefineParams, ScanParams, ScanRegion, TouchPoint, relaxing_alpha};
 pub use registration::{Registrar, Registration, RegistrationError, RegistrationParams};
 pub use roi::RoiSize;
 
@@ -94,17 +94,6 @@ pub struct Mismatch {
     pub linear: Vector3<f64>,
     /// ε_R = F* × F, N² (Eq 5)
     pub rotational: Vector3<f64>,
-}
-
-/// The state of the contact by the force.
-#[derive(Clone, Copy, Debug)]
-enum ContactState {
-    /// no contact
-    Nothing,
-    /// contact; the normal of the surface is not used \[paper\]
-    Something,
-    /// contact with a surface of this outward normal
-    Surface(Vector3<f64>),
 }
 
 /// What one sample did.
@@ -258,52 +247,36 @@ impl Refiner {
         if !self.body.is_ball() {
             self.axis = TipPlace::from(&sample.pose_ot).axis;
         }
-        let state = self.contact_state(ball_contact.is_some(), surface);
+        self.counts.contacts = self.contacts.contacts();
         // a sample outside the region that may be touched moves nothing
         let is_outside = self.params.region.is_some_and(|touched| !touched.region.contains(&ball.centre));
-        let update = match state {
-            ContactState::Nothing => Update::FREE,
-            _ if is_outside => {
+        let update = match ball_contact {
+            None => {
+                self.begun = None;
+                Update::FREE
+            }
+            Some(_) if is_outside => {
                 self.counts.outside_region += 1;
                 Update::BESIDE
             }
-            _ => {
+            Some(_) => {
                 self.deformable.touch();
-                self.press(&ball, state, handle, dt)?
+                match self.pressing(&ball, surface, handle) {
+                    Some(pressing) => self.press(&pressing, dt)?,
+                    None => {
+                        self.counts.out_of_reach += 1;
+                        Update::BESIDE
+                    }
+                }
             }
         };
         self.counts.accepted += 1;
-        match self.params.carve {
-            Some(carve) if !is_outside => Ok(self.carve(&carve, &ball, state, dt, update)),
-            _ => Ok(update),
-        }
-    }
-
-    fn contact_state(&mut self, is_in_contact: bool, surface: Option<NormalEstimate>) -> ContactState {
-        self.counts.contacts = self.contacts.contacts();
-        if !is_in_contact {
-            self.begun = None;
-            return ContactState::Nothing;
-        }
-        match self.params.touch_point {
-            TouchPoint::FaceNormal => ContactState::Something,
-            TouchPoint::MeasuredNormal => ContactState::Surface(surface.map(|known| known.normal).unwrap_or_default()),
-        }
+        Ok(if is_outside { update } else { self.carve(&ball, ball_contact.is_some(), dt, update) })
     }
 
     /// Cases 3 and 4, and without a gate also 1 and 2: moves the face that the ball touches.
-    fn press(
-        &mut self,
-        ball: &Ball,
-        state: ContactState,
-        handle: Option<FaceId>,
-        dt: f64,
-    ) -> Result<Update, RefineError> {
-        let Some(pressing) = self.pressing(ball, state, handle) else {
-            self.counts.out_of_reach += 1;
-            return Ok(Update::BESIDE);
-        };
-        let mismatch = self.mismatch(&pressing);
+    fn press(&mut self, pressing: &Pressing, dt: f64) -> Result<Update, RefineError> {
+        let mismatch = self.mismatch(pressing);
         let case = if mismatch.distance < 0.0 { Case::Both } else { Case::SurfaceOnly };
         let untouched = Ok(Update { case, mismatch: Some(mismatch), fit: None });
         let face = &pressing.face;
@@ -320,35 +293,36 @@ impl Refiner {
             next.n = turn(&face.n, &pressing.normal, turning * dt);
         }
         self.deformable.note_normal(pressing.handle, &pressing.normal);
-        let steps = self.rigid_steps(&pressing, &next);
-        let fit = self.deformable.deform(&mut self.contact_region, pressing.handle, self.params.roi, &steps);
+        let steps = self.rigid_steps(pressing, &next);
+        let fit = self.deformable.deform(&mut self.contact_region, pressing.handle, &steps);
         self.count(fit);
         Ok(Update { case, mismatch: Some(mismatch), fit: Some(fit) })
     }
 
     /// The ball against `handle`, else against the face that it touches; `None` beyond the reach.
-    fn pressing(&mut self, ball: &Ball, state: ContactState, handle: Option<FaceId>) -> Option<Pressing> {
+    fn pressing(&mut self, ball: &Ball, surface: Option<NormalEstimate>, handle: Option<FaceId>) -> Option<Pressing> {
+        let normal = surface.map(|known| known.normal).unwrap_or_default();
         let reach = self.deformable.largest_move + self.params.tip.radius;
         // the spring expects the deflection F/k of the tip, a rigid contact does not
         let centre = if self.params.dynamics.take_out_rigid_offset { ball.centre } else { ball.reported };
-        let seek = match state {
-            ContactState::Surface(normal) => self.touching_point(centre, &normal),
-            _ => centre,
+        let seek = match self.params.touch_point {
+            TouchPoint::MeasuredNormal => self.touching_point(centre, &normal),
+            TouchPoint::FaceNormal => centre,
         };
         let last = self.contact_region.roi.handle;
-        let hit = match self.params.closest {
+        let hit = match self.params.touch_point {
             _ if handle.is_some() => None,
-            ClosestBy::Surface => self.deformable.closest(&seek, last, reach, &mut self.near_contact),
-            ClosestBy::Barycentre => self.deformable.tree.closest_barycentre(&self.deformable.mesh, &seek, reach),
+            TouchPoint::MeasuredNormal => self.deformable.closest(&seek, last, reach, &mut self.near_contact),
+            TouchPoint::FaceNormal => self.deformable.tree.closest_barycentre(&self.deformable.mesh, &seek, reach),
         };
         let handle = handle.or(hit.map(|hit| hit.face))?;
         let mesh = &self.deformable.mesh;
         let face = FaceState { b: mesh.barycentre(handle), n: mesh.normal(handle) };
-        Some(match state {
-            ContactState::Surface(normal) => {
+        Some(match self.params.touch_point {
+            TouchPoint::MeasuredNormal => {
                 Pressing { handle, face, normal, point: seek, force_o: normal * ball.force_o.dot(&normal) }
             }
-            _ => {
+            TouchPoint::FaceNormal => {
                 let point = self.touching_point(centre, &face.n);
                 Pressing { handle, face, normal: face.n, point, force_o: ball.force_o }
             }

@@ -20,21 +20,13 @@ parameters! {
     }
 }
 
-/// Which face is the closest.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ClosestBy {
-    /// True distance to the surface.
-    Surface,
-    /// Distance to the barycentre \[paper, Eq 12\].
-    Barycentre,
-}
-
-/// Which point of the ball touches.
+/// Which point of the ball touches, and which face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TouchPoint {
-    /// The one under the normal of the closest face; the force only gives the magnitude \[paper\].
+    /// The face with the closest barycentre \[paper, Eq 12\], at the point under its normal; the force only gives the magnitude
+    /// \[paper\].
     FaceNormal,
-    /// The point that the measured force points away from.
+    /// The point that the measured force points away from, at the face with the least true distance to it.
     MeasuredNormal,
 }
 
@@ -83,10 +75,8 @@ pub struct RefineParams {
     pub shape: TipShape,
     /// Smoothing and friction; `None`: the sample as it is, and the force taken for the normal.
     pub sliding: Option<SlidingParams>,
-    /// Where on the ball the contact is.
+    /// Where on the ball the contact is, and which face is the handle.
     pub touch_point: TouchPoint,
-    /// Which face is the handle.
-    pub closest: ClosestBy,
     /// Eq 1–7.
     pub dynamics: DynamicsParams,
     /// Rate at which a touched face turns to the measured normal, 1/s: tan(θ/2) falls as e^(−rate t), which is Eq 7 with
@@ -152,7 +142,6 @@ impl RefineParams {
             shape: TipShape::Ball,
             sliding: Some(SlidingParams::default()),
             touch_point: TouchPoint::MeasuredNormal,
-            closest: ClosestBy::Surface,
             dynamics: DynamicsParams {
                 model,
                 alpha_m_per_n_s: relaxing_alpha(&model),
@@ -180,7 +169,6 @@ impl RefineParams {
             gate: None,
             sliding: None,
             touch_point: TouchPoint::FaceNormal,
-            closest: ClosestBy::Barycentre,
             dynamics: DynamicsParams {
                 along: Along::InitialNormal,
                 take_out_rigid_offset: false,
