@@ -161,11 +161,15 @@ fn one_after_the_other(stream: &PlateStream, pace: Pace) -> (TriMesh, TriMesh) {
     }
     let touching = refiner.mesh().clone();
     at_hand.iter().for_each(|delta| assert!(refiner.go_on_following(delta, usize::MAX).unwrap()));
-    due.into_iter().for_each(|(_, delta)| refiner.follow(&delta).unwrap());
-    refiner.follow(&patcher.renewed(&stream.scan, &tree)).unwrap();
+    let mut follow = |delta: &PatchDelta| {
+        refiner.begin_to_follow(delta);
+        assert!(refiner.go_on_following(delta, usize::MAX).unwrap());
+    };
+    due.into_iter().for_each(|(_, delta)| follow(&delta));
+    follow(&patcher.renewed(&stream.scan, &tree));
     patcher.flush();
     for _ in 0..2 {
-        refiner.follow(&patcher.renewed(&stream.scan, &tree)).unwrap();
+        follow(&patcher.renewed(&stream.scan, &tree));
     }
     (touching, refiner.into_mesh())
 }

@@ -47,23 +47,20 @@ impl Pairs {
         margin: f64,
         is_wanted: impl Fn(FaceId) -> bool,
     ) {
-        let here = bounds(&mesh.triangle(face));
-        for &(other, _) in others.iter().filter(|(_, there)| !apart(&here, there, margin)) {
-            if is_wanted(other) {
-                self.add(mesh, face, other);
+        let (here, corners) = (bounds(&mesh.triangle(face)), mesh.corners(face));
+        for &(other, there) in others {
+            if apart(&here, &there, margin) || !is_wanted(other) {
+                continue;
             }
-        }
-    }
-
-    fn add(&mut self, mesh: &TriMesh, a: FaceId, b: FaceId) {
-        let (corners, others) = (mesh.corners(a), mesh.corners(b));
-        let mut common = (0..3).filter_map(|i| {
-            let at = others.iter().position(|other| *other == corners[i])?;
-            Some([i as u8, at as u8])
-        });
-        let first = common.next();
-        if common.next().is_none() {
-            self.list.push(FacePair { faces: [a, b], common: first, safe_until: 0.0 });
+            let others = mesh.corners(other);
+            let mut shared = (0..3).filter_map(|i| {
+                let at = others.iter().position(|other| *other == corners[i])?;
+                Some([i as u8, at as u8])
+            });
+            let common = shared.next();
+            if shared.next().is_none() {
+                self.list.push(FacePair { faces: [face, other], common, safe_until: 0.0 });
+            }
         }
     }
 

@@ -8,7 +8,7 @@ use super::params::ScanRegion;
 use super::roi::{Roi, RoiSize};
 use super::stroke_undo::StrokeUndo;
 use crate::mesh::{FaceHit, FaceId, FaceTree, MeshError, Nearby, RefitPlan, Region, TriMesh, VertexId};
-use crate::reconstruct::{PatchDelta, Support};
+use crate::reconstruct::PatchDelta;
 
 /// An update that would break the mesh is tried again at this share of its length …
 const CUT: f64 = 0.35;
@@ -64,7 +64,7 @@ pub(super) struct DeformableMesh {
     edits: u64,
     displacements: Vec<Vector3<f64>>,
     before: Vec<Point3<f64>>,
-    patch: Option<FollowedPatch>,
+    pub patch: Option<FollowedPatch>,
     strokes: Option<StrokeUndo>,
 }
 
@@ -120,11 +120,6 @@ impl DeformableMesh {
             Some(hint) => self.tree.closest_nearby(&self.mesh, p, hint, reach, nearby),
             None => self.tree.closest(&self.mesh, p, reach),
         }
-    }
-
-    /// The support of a vertex in the patch that is followed.
-    pub fn support(&self, vertex: VertexId) -> Option<Support> {
-        self.patch.as_ref().map(|patch| patch.support(vertex))
     }
 
     /// Stores the normal measured on `face`.
@@ -183,11 +178,6 @@ impl DeformableMesh {
         if let Some(strokes) = &mut self.strokes {
             strokes.touch(self.now_ns);
         }
-    }
-
-    /// How many strokes can be undone.
-    pub fn strokes(&self) -> usize {
-        self.strokes.as_ref().map_or(0, StrokeUndo::len)
     }
 
     /// Takes the last stroke back, or does again what was undone last; returns whether there was any.

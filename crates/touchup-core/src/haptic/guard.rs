@@ -176,7 +176,14 @@ impl Neighbourhood {
         self.allowance = 0.5 * margin;
         self.smooth = None;
         self.find_near(mesh, tree, margin);
-        self.collect_suspects(mesh, margin);
+        self.suspects.clear();
+        self.boxes.clear();
+        self.boxes.extend(self.near.faces.iter().map(|&face| (face, bounds(&mesh.triangle(face)))));
+        for (moving, &face) in self.ring.moving().iter().enumerate() {
+            // two moving faces are one pair
+            let is_wanted = |other| self.ring.number_of(other).is_none_or(|index| index as usize > moving);
+            self.suspects.add_near(mesh, face, &self.boxes, margin, is_wanted);
+        }
     }
 
     fn find_near(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64) {
@@ -218,17 +225,6 @@ impl Neighbourhood {
             }
         }
         None
-    }
-
-    fn collect_suspects(&mut self, mesh: &TriMesh, margin: f64) {
-        self.suspects.clear();
-        self.boxes.clear();
-        self.boxes.extend(self.near.faces.iter().map(|&face| (face, bounds(&mesh.triangle(face)))));
-        for (moving, &face) in self.ring.moving().iter().enumerate() {
-            // two moving faces are one pair
-            let is_wanted = |other| self.ring.number_of(other).is_none_or(|index| index as usize > moving);
-            self.suspects.add_near(mesh, face, &self.boxes, margin, is_wanted);
-        }
     }
 
     /// Takes a motion of the vertices by `displacement` (m) if it needs no look; whether it does not.

@@ -376,13 +376,8 @@ impl Refiner {
         self.deformable.keep_strokes();
     }
 
-    /// How many strokes can be undone: 64 at most.
-    pub fn strokes(&self) -> usize {
-        self.deformable.strokes()
-    }
-
     /// Takes the last stroke back, bit by bit: what was touched without a pause of a tenth of a second, and what the tip moved
-    /// after it. Returns whether there was one. Estimates of friction and bias stay.
+    /// after it. Returns whether there was one: 64 at most are kept. Estimates of friction and bias stay.
     pub fn undo(&mut self) -> bool {
         self.change_strokes(true)
     }
@@ -409,20 +404,10 @@ impl Refiner {
         Ok(self.deformable.expect_patch(faces)?)
     }
 
-    /// Takes up what changed in the patch of this scan. What this moved up to the patch's last touch goes back to where scan
-    /// and patch have it; what was touched is in the patch now, which alone moves it from then on. Does nothing before
-    /// [`Self::expect_patch`].
-    ///
-    /// # Errors
-    /// [`MeshError::TooMany`] when 32-bit ids do not suffice, [`MeshError::NotFinite`]; the mesh is inconsistent then.
-    pub fn follow(&mut self, delta: &PatchDelta) -> Result<(), RefineError> {
-        self.begin_to_follow(delta);
-        self.go_on_following(delta, usize::MAX)?;
-        Ok(())
-    }
-
-    /// As [`Self::follow`], bit by bit, so that no sample has to wait for long: [`Self::go_on_following`] is to be called with
-    /// the same delta until it is done.
+    /// Takes up what changed in the patch of this scan, bit by bit, so that no sample has to wait for long:
+    /// [`Self::go_on_following`] is to be called with the same delta until it is done. What this moved up to the patch's last touch
+    /// goes back to where scan and patch have it; what was touched is in the patch now, which alone moves it from then on. Does
+    /// nothing before [`Self::expect_patch`].
     pub fn begin_to_follow(&mut self, delta: &PatchDelta) {
         if self.deformable.begin_delta(delta) {
             self.forget_regions();
@@ -433,7 +418,7 @@ impl Refiner {
     /// all. In between the mesh has gaps and overlaps where old faces meet new ones.
     ///
     /// # Errors
-    /// As [`Self::follow`].
+    /// [`MeshError::TooMany`] when 32-bit ids do not suffice, [`MeshError::NotFinite`]; the mesh is inconsistent then.
     pub fn go_on_following(&mut self, delta: &PatchDelta, most: usize) -> Result<bool, RefineError> {
         if !delta.is_empty() {
             self.forget_regions();
@@ -470,7 +455,7 @@ impl Refiner {
 
     /// The support of a vertex in the patch that is followed; `None` without a patch.
     pub fn support(&self, vertex: VertexId) -> Option<Support> {
-        self.deformable.support(vertex)
+        self.deformable.patch.as_ref().map(|patch| patch.support(vertex))
     }
 
     /// Gives the mesh back.

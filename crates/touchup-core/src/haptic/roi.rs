@@ -91,16 +91,14 @@ impl Roi {
     }
 
     fn spread(&mut self, mesh: &TriMesh, centre: Point3<f64>, size: RoiSize) {
-        let radius = match size {
+        let (radius, last) = match size {
             RoiSize::Handle => return,
-            RoiSize::OneRing => f64::INFINITY,
-            RoiSize::Radius(radius) => radius,
+            RoiSize::OneRing => (f64::INFINITY, 3),
+            RoiSize::Radius(radius) => (radius, usize::MAX),
         };
         let mut next = 0;
-        let last = if size == RoiSize::OneRing { 3 } else { usize::MAX };
         while next < self.vertices.len().min(last) {
-            for i in 0..mesh.star(self.vertices[next]).len() {
-                let face = mesh.star(self.vertices[next])[i];
+            for &face in mesh.star(self.vertices[next]) {
                 for vertex in mesh.corners(face) {
                     let near = (mesh.position(vertex) - centre).norm_squared() <= radius * radius;
                     if near && self.numbers.of(vertex.0).is_none() {

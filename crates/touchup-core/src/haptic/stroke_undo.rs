@@ -33,11 +33,6 @@ impl StrokeUndo {
         self.last_contact_ns = Some(stamp_ns);
     }
 
-    /// How many strokes can be undone.
-    pub fn len(&self) -> usize {
-        self.positions.len().min(self.evidence.len())
-    }
-
     /// Keeps where vertices are before they move.
     pub fn note_positions(&mut self, vertices: &[VertexId], mesh: &TriMesh) {
         for &vertex in vertices {
@@ -63,7 +58,7 @@ impl StrokeUndo {
         };
         let turn_face = |face: u32, normal: &mut [f32; 3]| std::mem::swap(&mut evidence[face as usize], normal);
         let has_changed = if is_undo {
-            self.len() > 0 && self.positions.undo(move_vertex) && self.evidence.undo(turn_face)
+            !self.evidence.is_empty() && self.positions.undo(move_vertex) && self.evidence.undo(turn_face)
         } else {
             self.positions.redo(move_vertex) && self.evidence.redo(turn_face)
         };

@@ -23,7 +23,6 @@ fn strokes_are_undone_and_redone_bit_for_bit_and_the_index_follows() {
         push_all(&mut refiner, &stroke);
         states.push(refiner.mesh().positions().to_vec());
     }
-    assert_eq!(refiner.strokes(), 6);
     assert!(states.windows(2).all(|pair| pair[0] != pair[1]), "each stroke moves something");
     let check = |refiner: &Refiner, expected: &[Point3<f64>]| {
         assert_eq!(refiner.mesh().positions(), expected);
@@ -54,5 +53,5 @@ fn strokes_are_undone_and_redone_bit_for_bit_and_the_index_follows() {
 fn nothing_is_kept_without_a_request() {
     let mut refiner = Refiner::new(bumpy(3), RefineParams::robust(BALL)).unwrap();
     push_all(&mut refiner, &strokes()[0]);
-    assert!(refiner.strokes() == 0 && !refiner.undo() && !refiner.redo());
+    assert!(!refiner.undo() && !refiner.redo());
 }
