@@ -98,15 +98,11 @@ impl Refiner {
         }
         let (mesh, body) = (&self.deformable.mesh, &self.body);
         let (corners, normal) = (mesh.triangle(face), mesh.normal(face));
-        let (_, barycentric) = deepest_point(body, place, &corners);
-        let point = Point3::from(
-            corners[0].coords * barycentric[0]
-                + corners[1].coords * barycentric[1]
-                + corners[2].coords * barycentric[2],
-        );
+        let (_, [u, v, w]) = deepest_point(body, place, &corners);
+        let point = Point3::from(corners[0].coords * u + corners[1].coords * v + corners[2].coords * w);
         let (distance, out) = body.shortest_exit(place, &point);
         let is_front = normal.dot(&out) < -SIDEWAYS;
-        (is_front && distance < 0.0).then_some(Inside { out, depth: -distance, barycentric })
+        (is_front && distance < 0.0).then_some(Inside { out, depth: -distance, barycentric: [u, v, w] })
     }
 
     /// The direction in which the mesh yields to the ball, and how deep the ball is in it.

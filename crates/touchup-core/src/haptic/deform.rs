@@ -2,13 +2,13 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::followed::FollowedPatch;
+use super::followed::{FollowedPatch, NEVER};
 use super::guard::{GuardEvidence, GuardParams, GuardVerdict};
 use super::params::ScanRegion;
 use super::roi::{Roi, RoiSize};
 use super::stroke_undo::StrokeUndo;
 use crate::mesh::{FaceHit, FaceId, FaceTree, MeshError, Nearby, RefitPlan, Region, TriMesh, VertexId};
-use crate::reconstruct::PatchDelta;
+use crate::reconstruct::{PatchDelta, Support};
 
 /// An update that would break the mesh is tried again at this share of its length …
 const CUT: f64 = 0.35;
@@ -209,22 +209,45 @@ impl DeformableMesh {
         self.patch.as_ref().is_some_and(|patch| self.mesh.corners(face).into_iter().all(|v| patch.is_touched(v)))
     }
 
-    /// Begins to take up what changed in the patch: puts back what was moved before that; returns whether anything was.
+    /// Begins to take up what changed in the patch: puts vertices that moved last before that back to where they were scanned,
+    /// or are in the patch; returns whether there was any.
     pub fn begin_delta(&mut self, delta: &PatchDelta) -> bool {
-        let Some(patch) = &mut self.patch else { return false };
+        let Self { patch: Some(patch), mesh, tree, scanned, .. } = self else { return false };
         patch.splice.begin();
-        let has_put_back = patch.put_back(&mut self.mesh, &mut self.tree, &self.scanned, delta.until_ns);
-        self.edits += u64::from(has_put_back);
-        has_put_back
+        let FollowedPatch { moved, moved_ns, refit, .. } = patch;
+        refit.clear();
+        moved.retain(|&vertex| {
+            let at = vertex.0 as usize;
+            let is_late = moved_ns[at] > delta.until_ns;
+            if !is_late {
+                moved_ns[at] = NEVER;
+                if mesh.position(vertex) != scanned[at] {
+                    mesh.set_position(vertex, scanned[at]);
+                    refit.extend_from_slice(mesh.star(vertex));
+                }
+            }
+            is_late
+        });
+        tree.refit(mesh, refit);
+        self.edits += u64::from(!refit.is_empty());
+        !refit.is_empty()
     }
 
-    /// Takes up to `most` parts more of it; whether that was all.
+    /// Takes up to `most` parts more of it, as [`crate::reconstruct::Splice::go_on`]; whether that was all.
     pub fn go_on(&mut self, delta: &PatchDelta, most: usize) -> Result<bool, MeshError> {
-        let Self { patch: Some(patch), mesh, tree, scanned, .. } = self else { return Ok(true) };
-        let is_done = patch.go_on(delta, most, mesh, tree, scanned)?;
-        self.evidence.resize(self.mesh.face_slots(), [0.0; 3]);
+        let Self { patch: Some(patch), mesh, tree, scanned, evidence, .. } = self else { return Ok(true) };
+        let before = patch.splice.placed().len();
+        let is_done = patch.splice.go_on(delta, most, mesh, tree)?;
+        patch.support.resize(mesh.vertex_slots(), Support::Scan);
+        patch.moved_ns.resize(mesh.vertex_slots(), NEVER);
+        scanned.resize(mesh.vertex_slots(), Point3::origin());
+        for (vertex, placed) in patch.splice.placed().iter().zip(&delta.vertices).skip(before) {
+            patch.support[vertex.0 as usize] = placed.support;
+            scanned[vertex.0 as usize] = placed.position;
+        }
+        evidence.resize(mesh.face_slots(), [0.0; 3]);
         for &face in patch.splice.added() {
-            self.evidence[face.0 as usize] = self.mesh.normal(face).cast::<f32>().into();
+            evidence[face.0 as usize] = mesh.normal(face).cast::<f32>().into();
         }
         self.edits += 1;
         Ok(is_done)

@@ -3,25 +3,24 @@
 //! What the patch knows from touches is stiff. What the update moves elsewhere, scan and guesses, is there at once, and
 //! for the moment: when the patch has caught up with that touch it is put back, and the patch has the contact.
 
-use nalgebra::Point3;
-
-use crate::mesh::{FaceId, FaceTree, MeshError, TriMesh, VertexId};
-use crate::reconstruct::{PatchDelta, Splice, Support};
+use crate::mesh::{FaceId, TriMesh, VertexId};
+use crate::reconstruct::{Splice, Support};
 
 /// Never moved.
-const NEVER: i64 = i64::MIN;
+pub(super) const NEVER: i64 = i64::MIN;
 
 /// The patch as the mesh shows it, and what was moved beside it.
 #[derive(Clone, Debug)]
 pub(super) struct FollowedPatch {
     pub splice: Splice,
     /// the support of each vertex
-    support: Vec<Support>,
+    pub support: Vec<Support>,
     /// vertices that are not where scan and patch have them
-    moved: Vec<VertexId>,
+    pub moved: Vec<VertexId>,
     /// … and when each of them moved last, ns
-    moved_ns: Vec<i64>,
-    refit: Vec<FaceId>,
+    pub moved_ns: Vec<i64>,
+    /// room for the faces around them
+    pub refit: Vec<FaceId>,
 }
 
 impl FollowedPatch {
@@ -61,53 +60,5 @@ impl FollowedPatch {
             }
             *moved_ns = stamp_ns;
         }
-    }
-
-    /// Puts vertices that moved last at `until_ns` or before back to where they were `scanned`, or are in the patch; returns
-    /// whether there was any.
-    pub fn put_back(
-        &mut self,
-        mesh: &mut TriMesh,
-        tree: &mut FaceTree,
-        scanned: &[Point3<f64>],
-        until_ns: i64,
-    ) -> bool {
-        let Self { moved, moved_ns, refit, .. } = self;
-        refit.clear();
-        moved.retain(|&vertex| {
-            let at = vertex.0 as usize;
-            let is_late = moved_ns[at] > until_ns;
-            if !is_late {
-                moved_ns[at] = NEVER;
-                if mesh.position(vertex) != scanned[at] {
-                    mesh.set_position(vertex, scanned[at]);
-                    refit.extend_from_slice(mesh.star(vertex));
-                }
-            }
-            is_late
-        });
-        tree.refit(mesh, refit);
-        !refit.is_empty()
-    }
-
-    /// Takes up some more of a delta, as [`Splice::go_on`]; notes the support of its vertices, and where they are `scanned`.
-    pub fn go_on(
-        &mut self,
-        delta: &PatchDelta,
-        most: usize,
-        mesh: &mut TriMesh,
-        tree: &mut FaceTree,
-        scanned: &mut Vec<Point3<f64>>,
-    ) -> Result<bool, MeshError> {
-        let before = self.splice.placed().len();
-        let is_done = self.splice.go_on(delta, most, mesh, tree)?;
-        self.support.resize(mesh.vertex_slots(), Support::Scan);
-        self.moved_ns.resize(mesh.vertex_slots(), NEVER);
-        scanned.resize(mesh.vertex_slots(), Point3::origin());
-        for (vertex, placed) in self.splice.placed().iter().zip(&delta.vertices).skip(before) {
-            self.support[vertex.0 as usize] = placed.support;
-            scanned[vertex.0 as usize] = placed.position;
-        }
-        Ok(is_done)
     }
 }
