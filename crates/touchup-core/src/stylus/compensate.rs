@@ -137,11 +137,10 @@ impl Compensator {
         let r_ot = &sample.pose_ot.rotation;
         let r_os = r_ot * pose_ts.rotation;
         let mut measured = match wrench_frame {
-            WrenchFrame::Sensor => turned(&r_os, &sample.wrench),
+            WrenchFrame::Sensor => sample.wrench.turned(&r_os),
             WrenchFrame::Object => sample.wrench,
         };
-        for part in [bias_s.map(|bias| turned(&r_os, &bias)), payload.map(|p| p.weight_o(&r_os))].into_iter().flatten()
-        {
+        for part in [bias_s.map(|bias| bias.turned(&r_os)), payload.map(|p| p.weight_o(&r_os))].into_iter().flatten() {
             measured.force -= part.force;
             measured.torque -= part.torque;
         }
@@ -149,8 +148,4 @@ impl Compensator {
         let torque_o = measured.torque + p_ts_o.cross(&measured.force);
         Tip { stamp_ns: sample.stamp_ns, pose_ot: sample.pose_ot, force_o: measured.force, torque_o }
     }
-}
-
-fn turned(rotation: &UnitQuaternion<f64>, wrench: &Wrench) -> Wrench {
-    Wrench { force: rotation * wrench.force, torque: rotation * wrench.torque }
 }

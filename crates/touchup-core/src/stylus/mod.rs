@@ -128,6 +128,13 @@ pub struct Wrench {
     pub torque: Vector3<f64>,
 }
 
+impl Wrench {
+    /// In other axes.
+    pub(crate) fn turned(&self, rotation: &UnitQuaternion<f64>) -> Self {
+        Self { force: rotation * self.force, torque: rotation * self.torque }
+    }
+}
+
 /// A pose message: `pose_ot` maps the tip frame T (origin: ball centre) to the object frame O.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StampedPose {

@@ -6,7 +6,7 @@
 
 use nalgebra::{Isometry3, Translation3, Vector3};
 
-use super::{Message, SettingError, StampedPose, StampedWrench, Wrench, WrenchFrame};
+use super::{Message, SettingError, StampedPose, StampedWrench, WrenchFrame};
 
 /// Applied to each message as it is read, before all else. The default changes nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -51,9 +51,7 @@ impl Placement {
 
     fn wrench(&self, wrench: StampedWrench) -> StampedWrench {
         let Some(pose_wo) = &self.pose_wo else { return wrench };
-        let turned = |vector: &Vector3<f64>| pose_wo.rotation.inverse_transform_vector(vector);
-        let StampedWrench { stamp_ns, wrench: Wrench { force, torque } } = &wrench;
-        StampedWrench { stamp_ns: *stamp_ns, wrench: Wrench { force: turned(force), torque: turned(torque) } }
+        StampedWrench { wrench: wrench.wrench.turned(&pose_wo.rotation.inverse()), ..wrench }
     }
 }
 
@@ -62,6 +60,7 @@ mod tests {
     use nalgebra::{UnitQuaternion, vector};
 
     use super::*;
+    use crate::stylus::Wrench;
 
     /// Worked by hand: the scan lies 1 m along x of space, turned by 90° about z; the ball hangs 0.1 m below H.
     #[test]

@@ -64,20 +64,27 @@ impl Synchroniser {
     /// Takes one message; draw samples with [`Self::next_sample`] before the next one. What comes after
     /// [`Self::finish`] is late. Returns whether it was taken: what was not is counted and changes nothing else.
     pub fn push(&mut self, message: Message) -> bool {
+        let (checked, counts) = match &message {
+            Message::Pose(pose) => (pose.check(), &mut self.poses.counts),
+            Message::Wrench(wrench) => (wrench.check(), &mut self.wrenches.counts),
+        };
+        match checked {
+            _ if self.finished => counts.late += 1,
+            Ok(()) => return self.take(message),
+            Err(SampleError::NotFinite { .. }) => counts.not_finite += 1,
+            Err(SampleError::Absurd { .. } | SampleError::NotARotation { .. }) => counts.absurd += 1,
+            Err(SampleError::NotAfter { .. }) => counts.late += 1,
+        }
+        false
+    }
+
+    fn take(&mut self, message: Message) -> bool {
         match message {
-            Message::Pose(pose) => match pose.check() {
-                _ if self.finished => self.poses.counts.refuse_late(),
-                Ok(()) => self.poses.push(pose, &self.params),
-                Err(why) => self.poses.counts.refuse(why),
-            },
-            Message::Wrench(mut wrench) => match wrench.check() {
-                _ if self.finished => self.wrenches.counts.refuse_late(),
-                Ok(()) => {
-                    wrench.stamp_ns = wrench.stamp_ns.saturating_sub(self.params.wrench_offset_ns);
-                    self.wrenches.push(wrench, &self.params)
-                }
-                Err(why) => self.wrenches.counts.refuse(why),
-            },
+            Message::Pose(pose) => self.poses.push(pose, &self.params),
+            Message::Wrench(wrench) => {
+                let stamp_ns = wrench.stamp_ns.saturating_sub(self.params.wrench_offset_ns);
+                self.wrenches.push(StampedWrench { stamp_ns, ..wrench }, &self.params)
+            }
         }
     }
 
@@ -148,22 +155,6 @@ impl Synchroniser {
 
 /// Which counter of [`SyncCounts`] to raise.
 type Counter = fn(&mut SyncCounts) -> &mut u64;
-
-impl SyncCounts {
-    fn refuse(&mut self, why: SampleError) -> bool {
-        match why {
-            SampleError::NotFinite { .. } => self.not_finite += 1,
-            SampleError::Absurd { .. } | SampleError::NotARotation { .. } => self.absurd += 1,
-            SampleError::NotAfter { .. } => self.late += 1,
-        }
-        false
-    }
-
-    fn refuse_late(&mut self) -> bool {
-        self.late += 1;
-        false
-    }
-}
 
 /// Between two poses: straight for the position, at constant angular velocity along the shorter arc for the orientation.
 pub(super) fn interpolated(before: &Isometry3<f64>, after: &Isometry3<f64>, t: f64) -> Isometry3<f64> {

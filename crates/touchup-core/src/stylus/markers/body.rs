@@ -3,6 +3,7 @@
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 
 use super::{MOST_MARKERS, MarkerObservation};
+use crate::numeric::{mean, scatter};
 use crate::stylus::SettingError;
 
 /// Markers that hold fewer than this share of the body's second extent are on a line within the noise.
@@ -17,7 +18,8 @@ const FLAT_SHARE: f64 = 0.02;
 pub struct MarkerBody {
     markers_t: Vec<Point3<f64>>,
     centroid_t: Point3<f64>,
-    smallest_distance: f64,
+    /// between any two markers, m
+    pub(super) smallest_distance: f64,
     /// root of the middle eigenvalue of the scatter about the centroid, m
     second_extent: f64,
 }
@@ -51,12 +53,8 @@ impl MarkerBody {
     /// anything not finite.
     pub fn new(markers_t: Vec<Point3<f64>>) -> Result<Self, SettingError> {
         let count = markers_t.len();
-        SettingError::check(
-            "the number of markers.positions_mm",
-            count as f64,
-            (3..=MOST_MARKERS).contains(&count),
-            "3 to 16",
-        )?;
+        let fits = (3..=MOST_MARKERS).contains(&count);
+        SettingError::check("the number of markers.positions_mm", count as f64, fits, "3 to 16")?;
         for x in markers_t.iter().flat_map(|p| p.iter()) {
             SettingError::check("markers.positions_mm", *x * 1e3, x.abs() <= 10.0, "-10000 to 10000 mm")?;
         }
@@ -80,11 +78,6 @@ impl MarkerBody {
     /// Mean of the markers, m, in T.
     pub fn centroid_t(&self) -> Point3<f64> {
         self.centroid_t
-    }
-
-    /// Between any two markers, m.
-    pub(crate) fn smallest_distance(&self) -> f64 {
-        self.smallest_distance
     }
 
     /// Whether these markers hold the body in all six directions: three that are not on a line.
@@ -172,13 +165,8 @@ pub(super) struct Matches {
 
 impl Matches {
     fn new() -> Self {
-        Self {
-            pairs: [(0, Point3::origin()); MOST_MARKERS],
-            distances: [0.0; MOST_MARKERS],
-            count: 0,
-            relabelled: 0,
-            rejected: 0,
-        }
+        let pairs = [(0, Point3::origin()); MOST_MARKERS];
+        Self { pairs, distances: [0.0; MOST_MARKERS], count: 0, relabelled: 0, rejected: 0 }
     }
 
     pub fn pairs(&self) -> &MarkerPairs {
@@ -206,15 +194,13 @@ impl Matches {
 }
 
 fn centroid(points: impl Iterator<Item = Point3<f64>>) -> Point3<f64> {
-    let (sum, count) = points.fold((Vector3::zeros(), 0.0), |(sum, count), p| (sum + p.coords, count + 1.0));
-    Point3::from(sum / f64::max(count, 1.0))
+    Point3::from(mean(points.map(|p| p.coords)))
 }
 
 /// Roots of the eigenvalues of the scatter about the mean, largest first, m.
 fn extents(points: impl Iterator<Item = Point3<f64>> + Clone) -> [f64; 3] {
-    let mean = centroid(points.clone());
-    let scatter: Matrix3<f64> = points.map(|p| (p - mean) * (p - mean).transpose()).sum();
-    let mut roots: [f64; 3] = scatter.symmetric_eigenvalues().map(|x| x.max(0.0).sqrt()).into();
+    let squares = scatter(points.map(|p| p.coords)).symmetric_eigenvalues();
+    let mut roots: [f64; 3] = squares.map(|x| x.max(0.0).sqrt()).into();
     roots.sort_by(|a, b| b.total_cmp(a));
     roots
 }

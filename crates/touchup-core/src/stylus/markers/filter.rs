@@ -132,7 +132,7 @@ impl MarkerFilter {
         let before = self.tracked.take();
         self.tracked = before.and_then(|before| self.follow(&before, &frame)).or_else(|| self.acquire(&frame));
         match (&before, &self.tracked) {
-            (Some(before), Some(now)) if now.motion.frames() > 1 => self.give(before, now, each),
+            (Some(before), Some(now)) if now.motion.frames > 1 => self.give(before, now, each),
             (_, Some(now)) => each(StampedPose { stamp_ns: now.stamp_ns, pose_ot: now.motion.pose_ot(&self.body) }),
             _ => {}
         }

@@ -110,7 +110,7 @@ impl MarkerParams {
     /// [`SettingError`]
     pub fn check_for(&self, body: &MarkerBody) -> Result<(), SettingError> {
         self.check()?;
-        let apart = 2.0 * self.gate < body.smallest_distance();
+        let apart = 2.0 * self.gate < body.smallest_distance;
         let allowed = "less than half of the smallest distance between two markers";
         SettingError::check("markers.gate_mm", self.gate * 1e3, apart, allowed)
     }

@@ -65,7 +65,7 @@ pub(super) struct BodyMotion {
     /// rad/s, in O
     spin: Vector3<f64>,
     /// frames that went into it
-    frames: u32,
+    pub frames: u32,
 }
 
 impl BodyMotion {
@@ -77,11 +77,6 @@ impl BodyMotion {
     pub fn pose_ot(&self, body: &MarkerBody) -> Isometry3<f64> {
         let p_ot = self.centroid - self.rotation * body.centroid_t().coords;
         Isometry3::from_parts(p_ot.coords.into(), self.rotation)
-    }
-
-    /// How many frames went into it.
-    pub fn frames(&self) -> u32 {
-        self.frames
     }
 
     /// Free flight for `dt` s.
