@@ -5,7 +5,7 @@
 //! profile (0, z₀)–(a₀, z₀)–(a₁, z₁)–(0, z₁), so that one closed form serves all: the point farthest along a direction is
 //! that of the core and the radius on top, the distance is that from the core less the radius.
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector2, Vector3, vector};
 
 use super::SettingError;
 use crate::numeric::tangent_basis;
@@ -83,11 +83,11 @@ pub struct TipBody {
     /// what the core is grown by, m
     round: f64,
     /// (a₀, z₀), m
-    low: [f64; 2],
+    low: Vector2<f64>,
     /// (a₁, z₁), m
-    high: [f64; 2],
+    high: Vector2<f64>,
     /// outward normal of the flank: away from the axis, along it
-    flank: [f64; 2],
+    flank: Vector2<f64>,
 }
 
 /// The resolution of a sharp tip is limited by how closely spaced a hand moves its strokes, m.
@@ -103,7 +103,8 @@ const ON_AXIS: f64 = 1e-9;
 impl TipBody {
     /// A ball of `radius` (m).
     pub fn ball(radius: f64) -> Self {
-        Self { shape: TipShape::Ball, radius, round: radius, low: [0.0; 2], high: [0.0; 2], flank: [1.0, 0.0] }
+        let core = Vector2::zeros();
+        Self { shape: TipShape::Ball, radius, round: radius, low: core, high: core, flank: Vector2::x() }
     }
 
     /// A tip of `shape` with `radius` (m): of the ball, of the flat end, or of the nose of the cone.
@@ -122,16 +123,16 @@ impl TipBody {
                 SettingError::check("tip.edge_radius_mm", edge_radius * 1e3, is_edge, "0 mm to tip.radius_mm")?;
                 let allowed = "more than tip.edge_radius_mm, to 1000 mm";
                 SettingError::check("tip.length_mm", length * 1e3, is_length, allowed)?;
-                (edge_radius, [radius - edge_radius, edge_radius], [radius - edge_radius, length])
+                (edge_radius, vector![radius - edge_radius, edge_radius], vector![radius - edge_radius, length])
             }
             TipShape::Cone { half_angle, length } => {
                 TipSizes { half_angle: Some(half_angle), length: Some(length), ..sizes }.check()?;
-                (radius, [0.0, 0.0], [length * half_angle.tan(), length])
+                (radius, Vector2::zeros(), vector![length * half_angle.tan(), length])
             }
         };
-        let (across, along) = (high[0] - low[0], high[1] - low[1]);
-        let slant = across.hypot(along);
-        Ok(Self { shape, radius, round, low, high, flank: [along / slant, -across / slant] })
+        let side = high - low;
+        let flank = vector![side.y, -side.x] / side.x.hypot(side.y);
+        Ok(Self { shape, radius, round, low, high, flank })
     }
 
     /// Which tip it is.
@@ -164,9 +165,9 @@ impl TipBody {
             return place.centre + direction * self.round;
         }
         let (along, across, outward) = split(&place.axis, direction);
-        let height = |corner: &[f64; 2]| corner[0] * across + corner[1] * along;
+        let height = |corner: &Vector2<f64>| corner.x * across + corner.y * along;
         let corner = if height(&self.high) > height(&self.low) { self.high } else { self.low };
-        place.centre + outward * corner[0] + place.axis * corner[1] + direction * self.round
+        place.centre + outward * corner.x + place.axis * corner.y + direction * self.round
     }
 
     /// Signed distance of `x` (m, in O) from the tip, m: negative inside.
@@ -181,34 +182,28 @@ impl TipBody {
         let height = arm.dot(&place.axis);
         let across = arm - place.axis * height;
         let from_axis = across.norm();
-        let (distance, [out, up]) = self.core_distance([from_axis, height]);
+        let (distance, out) = self.core_distance(&vector![from_axis, height]);
         let outward = across.try_normalize(ON_AXIS * self.radius).unwrap_or_else(|| tangent_basis(&place.axis)[0]);
-        (distance - self.round, outward * out + place.axis * up)
+        (distance - self.round, outward * out.x + place.axis * out.y)
     }
 
     /// Signed distance of a point of the half plane from the core, m, and its gradient there.
-    fn core_distance(&self, p: [f64; 2]) -> (f64, [f64; 2]) {
-        let Self { low, high, flank, .. } = self;
-        let sides = [
-            (low[1] - p[1], [0.0, -1.0]),
-            ((p[0] - low[0]) * flank[0] + (p[1] - low[1]) * flank[1], *flank),
-            (p[1] - high[1], [0.0, 1.0]),
-        ];
+    fn core_distance(&self, p: &Vector2<f64>) -> (f64, Vector2<f64>) {
+        let &Self { low, high, flank, .. } = self;
+        let sides = [(low.y - p.y, vector![0.0, -1.0]), ((p - low).dot(&flank), flank), (p.y - high.y, Vector2::y())];
         let deepest = if sides[1].0 > sides[0].0 { sides[1] } else { sides[0] };
         let deepest = if sides[2].0 > deepest.0 { sides[2] } else { deepest };
         if deepest.0 <= 0.0 {
             return deepest;
         }
-        let closest = [([0.0, low[1]], *low), (*low, *high), (*high, [0.0, high[1]])].map(|(a, b)| {
-            let (along, arm) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);
-            let length = (along[0] * along[0] + along[1] * along[1]).max(f64::MIN_POSITIVE);
-            let share = ((along[0] * arm[0] + along[1] * arm[1]) / length).clamp(0.0, 1.0);
-            [arm[0] - share * along[0], arm[1] - share * along[1]]
+        let closest = [(vector![0.0, low.y], low), (low, high), (high, vector![0.0, high.y])].map(|(a, b)| {
+            let (along, arm) = (b - a, p - a);
+            let share = along.dot(&arm) / along.dot(&along).max(f64::MIN_POSITIVE);
+            arm - along * share.clamp(0.0, 1.0)
         });
-        let arm = closest.into_iter().min_by(|a, b| a[0].hypot(a[1]).total_cmp(&b[0].hypot(b[1])));
-        let arm = arm.unwrap_or([0.0, 0.0]);
-        let distance = arm[0].hypot(arm[1]).max(f64::MIN_POSITIVE);
-        (distance, [arm[0] / distance, arm[1] / distance])
+        let arm = closest.into_iter().min_by(|a, b| a.x.hypot(a.y).total_cmp(&b.x.hypot(b.y))).unwrap_or_default();
+        let distance = arm.x.hypot(arm.y).max(f64::MIN_POSITIVE);
+        (distance, arm / distance)
     }
 
     /// Where the tip touches a surface that faces `normal` (unit, in O), which is uncertain by `sigma` (rad).
@@ -224,16 +219,16 @@ impl TipBody {
         let (along, across, outward) = split(&place.axis, &-normal);
         let flush = (FLUSH_SIGMAS * sigma).max(LEAST_FLUSH);
         let lean = across.atan2(-along);
-        if lean < flush && self.low[0] > 0.0 {
-            let point = place.centre + place.axis * (self.low[1] - self.round);
+        if lean < flush && self.low.x > 0.0 {
+            let point = place.centre + place.axis * (self.low.y - self.round);
             return Some(TipContact { point, normal: place.axis, is_vague: false });
         }
-        let is_vague = lean > self.flank[0].atan2(-self.flank[1]) - flush;
-        let is_beyond = lean > self.flank[0].atan2(-self.flank[1]) + flush;
-        if is_beyond || (is_vague && self.low[0] != self.high[0]) {
+        let is_vague = lean > self.flank.x.atan2(-self.flank.y) - flush;
+        let is_beyond = lean > self.flank.x.atan2(-self.flank.y) + flush;
+        if is_beyond || (is_vague && self.low.x != self.high.x) {
             return None;
         }
-        let point = place.centre + outward * self.low[0] + place.axis * self.low[1] - normal * self.round;
+        let point = place.centre + outward * self.low.x + place.axis * self.low.y - normal * self.round;
         Some(TipContact { point, normal: *normal, is_vague })
     }
 
@@ -242,20 +237,20 @@ impl TipBody {
         if self.is_ball() {
             return (vec![0.0], self.round);
         }
-        let length = self.high[1] - self.low[1];
+        let length = self.high.y - self.low.y;
         // finer than the width of the tip gains nothing, coarser covers what is beside it
-        let widest = self.low[0].max(self.high[0]);
+        let widest = self.low.x.max(self.high.x);
         let count = (length / (widest + self.round)).ceil().clamp(1.0, 64.0);
         let half = 0.5 * length / count;
-        let heights = (0..count as usize).map(|i| self.low[1] + half * (2.0 * i as f64 + 1.0)).collect();
+        let heights = (0..count as usize).map(|i| self.low.y + half * (2.0 * i as f64 + 1.0)).collect();
         (heights, widest.hypot(half) + self.round)
     }
 
     /// Height on the axis of the middle of a ball that holds the tip, and its radius, m.
     pub fn bound(&self) -> (f64, f64) {
-        let half = 0.5 * (self.high[1] - self.low[1]);
-        let widest = self.low[0].max(self.high[0]);
-        (self.low[1] + half, widest.hypot(half) + self.round)
+        let half = 0.5 * (self.high.y - self.low.y);
+        let widest = self.low.x.max(self.high.x);
+        (self.low.y + half, widest.hypot(half) + self.round)
     }
 }
 
