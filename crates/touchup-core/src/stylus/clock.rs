@@ -124,10 +124,7 @@ impl ClockEstimator {
         if self.onsets.len() < LEAST_ONSETS {
             return None;
         }
-        let mut sum = [0.0; DELAYS];
-        for profile in &self.onsets {
-            sum.iter_mut().zip(profile).for_each(|(sum, x)| *sum += x);
-        }
+        let sum: Profile = std::array::from_fn(|at| self.onsets.iter().map(|profile| profile[at]).sum());
         let best = (0..DELAYS).min_by(|&a, &b| sum[a].total_cmp(&sum[b]))?;
         // slopes over ±3 steps: the rounding of single samples is smoother than that
         const SPAN: usize = 3;
@@ -160,28 +157,25 @@ impl ClockEstimator {
         let around = self.held.iter().filter(|x| (-BEFORE_NS..=AFTER_NS).contains(&(x.stamp_ns - onset_ns)));
         let pressed: Vector3<f64> = around.clone().filter(|x| x.stamp_ns > onset_ns).map(|x| x.force_o).sum();
         let along = pressed.try_normalize(0.0)?;
-        let mut samples = [OnsetSample { t: 0.0, centre: 0.0, force: 0.0 }; MOST_SAMPLES];
-        let mut count = 0;
-        for entry in around {
-            let (force, t) = (entry.force_o.dot(&along), (entry.stamp_ns - onset_ns) as f64 * 1e-9);
-            samples[count] = OnsetSample { t, centre: entry.position.dot(&along), force };
-            count += 1;
-        }
-        let samples = &mut samples[..count];
+        let of_entry = |x: &OnsetEntry| {
+            let t = (x.stamp_ns - onset_ns) as f64 * 1e-9;
+            OnsetSample { t, centre: x.position.dot(&along), force: x.force_o.dot(&along) }
+        };
+        let mut samples: Vec<OnsetSample> = around.map(of_entry).collect();
+        let count = samples.len();
         if count < LEAST_SAMPLES || samples[0].t > -0.6e-9 * BEFORE_NS as f64 {
             return None;
         }
         // far-off numbers do not lose the digits of a micrometre
         let middle = samples[count / 2].centre;
         samples.iter_mut().for_each(|x| x.centre -= middle);
-        let begun = force_begins(samples)?;
+        let begun = force_begins(&samples)?;
         let bend = 1.0 / self.params.stiffness.unwrap_or(f64::INFINITY);
         let mut profile = [0.0; DELAYS];
-        let mut stop: f64 = 0.0;
-        let mut least = f64::INFINITY;
+        let (mut stop, mut least) = (0.0, f64::INFINITY);
         for (at, out) in profile.iter_mut().enumerate() {
             let delay = (at as f64 - REACH as f64) * STEP;
-            let (left, speeds) = kink(samples, begun, delay, bend)?;
+            let (left, speeds) = kink(&samples, begun, delay, bend)?;
             *out = 0.5 * count as f64 * left.max(f64::MIN_POSITIVE).ln();
             if left < least {
                 (least, stop) = (left, speeds[1] - speeds[0]);
@@ -192,7 +186,6 @@ impl ClockEstimator {
 }
 
 /// A sample of an onset along the force.
-#[derive(Clone, Copy)]
 struct OnsetSample {
     /// s after the gate opened
     t: f64,

@@ -115,14 +115,9 @@ impl TipMotion {
 
     /// The ball of a tip by itself, where its velocity is not needed: nothing is smoothed and nothing kept.
     pub fn unfiltered(&self, tip: &Tip) -> Ball {
-        let (here, force_o) = (Point3::from(tip.pose_ot.translation.vector), tip.force_o);
-        Ball {
-            reported: here,
-            centre: self.tip.centre(&here, &force_o),
-            force_o,
-            force_with_velocity: force_o,
-            velocity: Vector3::zeros(),
-        }
+        let (reported, force_o) = (Point3::from(tip.pose_ot.translation.vector), tip.force_o);
+        let centre = self.tip.centre(&reported, &force_o);
+        Ball { reported, centre, force_o, force_with_velocity: force_o, velocity: Vector3::zeros() }
     }
 
     /// Outward normal of the surface under the ball, which has been in contact for the last `dt` (s); `None` without a force.
