@@ -75,71 +75,58 @@ impl fmt::Display for Number {
 pub struct Unit {
     /// as it is written behind a number; empty for a pure number
     pub symbol: &'static str,
-    scale: Scale,
+    /// so many are `size` of SI; one of the two is 1, so that a conversion rounds once
+    count: f64,
+    size: f64,
 }
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Scale {
-    /// so many are one of SI
-    Per(f64),
-    /// one is so many of SI
-    Times(f64),
-}
-
-const SI: Scale = Scale::Per(1.0);
 
 macro_rules! units {
-    ($($NAME:ident $symbol:literal $scale:expr;)*) => {
+    ($($NAME:ident $symbol:literal $(per $count:literal)? $(times $size:expr)?;)*) => {
         impl Unit {
+            const SI: Self = Self { symbol: "", count: 1.0, size: 1.0 };
             $(
                 #[doc = concat!("`", $symbol, "`")]
-                pub const $NAME: Self = Self { symbol: $symbol, scale: $scale };
+                pub const $NAME: Self = Self { symbol: $symbol, $(count: $count,)? $(size: $size,)? ..Self::SI };
             )*
         }
     };
 }
 
 units! {
-    ONE "" SI;
-    N "N" SI;
-    NM "N·m" SI;
-    KG "kg" SI;
-    HZ "Hz" SI;
-    S "s" SI;
-    PER_S "1/s" SI;
-    M_PER_S2 "m/s²" SI;
-    M_PER_N_S "m/(N·s)" SI;
-    PER_N2_S "1/(N²·s)" SI;
-    MESSAGES "messages" SI;
-    TOUCHES "touches" SI;
-    EDGES "mean edges" SI;
-    SIGMAS "standard deviations" SI;
-    SCANS "times the faces of the scan" SI;
-    QUATERNION "(length of the quaternion)" SI;
-    MM "mm" Scale::Per(1e3);
-    MM_PER_S "mm/s" Scale::Per(1e3);
-    MM_PER_S2 "mm/s²" Scale::Per(1e3);
-    MS "ms" Scale::Per(1e3);
-    PERCENT "%" Scale::Per(100.0);
-    N_PER_MM "N/mm" Scale::Times(1e3);
-    DEG "degrees" Scale::Times(std::f64::consts::PI / 180.0);
+    ONE "";
+    N "N";
+    NM "N·m";
+    KG "kg";
+    HZ "Hz";
+    S "s";
+    PER_S "1/s";
+    M_PER_S2 "m/s²";
+    M_PER_N_S "m/(N·s)";
+    PER_N2_S "1/(N²·s)";
+    MESSAGES "messages";
+    TOUCHES "touches";
+    EDGES "mean edges";
+    SIGMAS "standard deviations";
+    SCANS "times the faces of the scan";
+    QUATERNION "(length of the quaternion)";
+    MM "mm" per 1e3;
+    MM_PER_S "mm/s" per 1e3;
+    MM_PER_S2 "mm/s²" per 1e3;
+    MS "ms" per 1e3;
+    PERCENT "%" per 100.0;
+    N_PER_MM "N/mm" times 1e3;
+    DEG "degrees" times std::f64::consts::PI / 180.0;
 }
 
 impl Unit {
     /// A number of this unit in SI.
     pub fn to_si(self, x: f64) -> f64 {
-        match self.scale {
-            Scale::Per(count) => x / count,
-            Scale::Times(size) => x * size,
-        }
+        x / self.count * self.size
     }
 
     /// A number of SI in this unit.
     pub fn of_si(self, x: f64) -> f64 {
-        match self.scale {
-            Scale::Per(count) => x * count,
-            Scale::Times(size) => x / size,
-        }
+        x * self.count / self.size
     }
 }
 
@@ -482,25 +469,6 @@ macro_rules! parameters {
     (@unit $unit:ident) => { $crate::parameters::Unit::$unit };
     (@range) => { None };
     (@range $low:literal $high:literal) => { Some([$low as f64, $high as f64]) };
-    (@parameter ($value:expr) ($type:ty) $section:literal [$($doc:literal),*]) => { None };
-    (
-        @parameter ($value:expr) ($type:ty) $section:literal [$($doc:literal),*]
-        $key:literal [$($unit:ident, $low:literal, $high:literal $(, $hint:literal)?)?] [$($example:literal)?]
-    ) => {
-        Some($crate::parameters::Parameter {
-            section: $section,
-            key: $key,
-            unit: $crate::parameters!(@unit $($unit)?),
-            range: $crate::parameters!(@range $($low $high)?),
-            hint: $crate::parameters!(@or $($($hint)?)?),
-            words: <$type as $crate::parameters::Value>::WORDS,
-            default: $crate::parameters::Value::yaml($value, $crate::parameters!(@unit $($unit)?)),
-            example: $crate::parameters!(@or $($example)?),
-            doc: &[$($doc),*],
-            is_section: <$type as $crate::parameters::Value>::IS_SECTION,
-            inner: <$type as $crate::parameters::Value>::inner(),
-        })
-    };
     (@leave_out $key:literal $field:expr) => { $crate::parameters::Value::leave_out(&mut $field) };
     (@or) => { "" };
     (@or $text:literal) => { $text };
@@ -564,16 +532,27 @@ macro_rules! parameters {
                 &KEYS
             }
 
-            #[allow(unused_variables)]
+            #[allow(unused_mut, unused_variables)]
             fn parameters() -> Vec<$crate::parameters::Parameter> {
-                let this = Self::default();
-                let own: Vec<Option<$crate::parameters::Parameter>> = vec![$($crate::parameters!(
-                    @parameter (&this.$field) ($type) $section [$($doc),*]
-                    $($key [$($unit, $low, $high $(, $hint)?)?] [$($example)?])?
-                )),*];
-                let parts = own.into_iter().flatten();
-                $($(let parts = parts.chain(<$Part as $crate::parameters::Section>::parameters());)*)?
-                parts.collect()
+                let (this, mut all) = (Self::default(), Vec::new());
+                $(
+                    let doc: &'static [&'static str] = &[$($doc),*];
+                    $(all.push($crate::parameters::Parameter {
+                        section: $section,
+                        key: $key,
+                        unit: $crate::parameters!(@unit $($unit)?),
+                        range: $crate::parameters!(@range $($low $high)?),
+                        hint: $crate::parameters!(@or $($($hint)?)?),
+                        words: <$type as $crate::parameters::Value>::WORDS,
+                        default: $crate::parameters::Value::yaml(&this.$field, $crate::parameters!(@unit $($unit)?)),
+                        example: $crate::parameters!(@or $($example)?),
+                        doc,
+                        is_section: <$type as $crate::parameters::Value>::IS_SECTION,
+                        inner: <$type as $crate::parameters::Value>::inner(),
+                    });)?
+                )*
+                $($(all.extend(<$Part as $crate::parameters::Section>::parameters());)*)?
+                all
             }
 
             #[allow(unused_mut)]
@@ -592,14 +571,7 @@ macro_rules! parameters {
                             self.$field = <$type as $crate::parameters::Value>::given(written, unit);
                         }
                     )?)*
-                    _ => {
-                        $($(
-                            if $crate::parameters::Section::read_key(&mut self.$part, key, map)? {
-                                return Ok(true);
-                            }
-                        )*)?
-                        return Ok(false);
-                    }
+                    _ => return Ok(false $($(|| $crate::parameters::Section::read_key(&mut self.$part, key, map)?)*)?),
                 }
                 #[allow(unreachable_code)]
                 Ok(true)
