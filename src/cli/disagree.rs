@@ -8,7 +8,7 @@ use nalgebra::{Point3, Vector3};
 use serde::Serialize;
 
 use super::progress::WorkProgress;
-use super::{CliError, Losses, print_result};
+use super::{CliError, Losses, counted, print_result};
 use crate::compare::{
     BadTouches, Class, ClassMap, Disagreement, DisagreementRegion, IndexedMesh, PicturePanel, PictureParams,
     RefinedShape, Scanner, VertexBasis, colour_of_class, disagreement, draw_picture,
@@ -313,9 +313,10 @@ impl fmt::Display for DisagreeReport {
         match &self.scanner {
             Some(ScannerReport { offset_mm, noise_mm, correlation_mm, edge_mm, sees_from_mm, places }) => writeln!(
                 f,
-                "the scanner, by {places} touched places that it should see well: offset {offset_mm:+.3} mm, noise \
+                "the scanner, by {} that it should see well: offset {offset_mm:+.3} mm, noise \
                  {noise_mm:.3} mm alike over {correlation_mm:.1} mm; edges of {edge_mm:.2} mm, so that what is narrower than \
-                 {sees_from_mm:.1} mm may be closed over"
+                 {sees_from_mm:.1} mm may be closed over",
+                counted(*places, "touched place", "touched places")
             )?,
             None => writeln!(f, "too little was touched to know how the scanner errs: nothing is called changed")?,
         }
@@ -352,20 +353,23 @@ impl fmt::Display for DisagreeReport {
                 region.edge_share_of_rim * 100.0
             )?;
         }
-        more(f, self.regions.len(), "regions")?;
+        more(f, self.regions.len(), ["region", "regions"])?;
         for bad in self.bad_touches.iter().take(MOST_LISTED) {
-            let ([x, y, z], count) = (bad.center_mm, bad.touches.len());
+            let ([x, y, z], touches) = (bad.center_mm, counted(bad.touches.len(), "touch", "touches"));
             write!(
                 f,
-                "\nbad touch at ({x:.1}, {y:.1}, {z:.1}) mm: {:+.3} mm or {:.0} standard deviations off, {count} touches from \
+                "\nbad touch at ({x:.1}, {y:.1}, {z:.1}) mm: {:+.3} mm or {:.0} standard deviations off, {touches} from \
                  {} on, {} rejected, against {} nearby",
                 bad.off_mm, bad.sigmas, bad.touches[0], bad.rejected, bad.against
             )?;
         }
-        more(f, self.bad_touches.len(), "bad touches")
+        more(f, self.bad_touches.len(), ["bad touch", "bad touches"])
     }
 }
 
-fn more(f: &mut fmt::Formatter<'_>, count: usize, what: &str) -> fmt::Result {
-    if count > MOST_LISTED { write!(f, "\n… and {} more {what}", count - MOST_LISTED) } else { Ok(()) }
+fn more(f: &mut fmt::Formatter<'_>, count: usize, [one, many]: [&str; 2]) -> fmt::Result {
+    match count.saturating_sub(MOST_LISTED) {
+        0 => Ok(()),
+        left => write!(f, "\n… and {left} more {}", if left == 1 { one } else { many }),
+    }
 }

@@ -7,7 +7,7 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 
 use super::progress::WorkProgress;
-use super::{CliError, Losses, check_kept, print_result};
+use super::{CliError, Losses, check_kept, counted, print_result};
 use crate::features::clusters::{Cluster, ClusterParams, PaperParams, clusters, paper_clusters};
 use crate::features::curvature::curvature;
 use crate::features::{Detection, Feature, FittedTo, Kind, Measured};
@@ -131,7 +131,7 @@ impl fmt::Display for ClusterTable<'_> {
         if clusters.is_empty() {
             return write!(f, "no vertex is curved enough: a lower --threshold-per-mm2, or leave --clusters out");
         }
-        write!(f, "{} clusters\n{:>28}  {:>8}  bent", clusters.len(), "center, mm", "vertices")?;
+        write!(f, "{}\n{:>28}  {:>8}  bent", counted(clusters.len(), "cluster", "clusters"), "center, mm", "vertices")?;
         for cluster in clusters {
             let [x, y, z] = cluster.center_mm;
             let bent = cluster.convex.map_or("", |convex| if convex { "outward" } else { "inward" });
@@ -177,12 +177,8 @@ const KINDS: [Kind; 7] = [Kind::Hole, Kind::Slot, Kind::Pocket, Kind::Boss, Kind
 
 fn count(features: &[Feature], kind: Kind) -> Option<String> {
     let count = features.iter().filter(|feature| feature.kind == kind).count();
-    let ending = match kind {
-        _ if count == 1 => "",
-        Kind::Boss => "es",
-        _ => "s",
-    };
-    (count > 0).then(|| format!("{count} {}{ending}", kind.name()))
+    let ending = if kind == Kind::Boss { "es" } else { "s" };
+    (count > 0).then(|| counted(count, kind.name(), &format!("{}{ending}", kind.name())))
 }
 
 struct FeatureRow<'a>(&'a Feature);

@@ -44,6 +44,7 @@ use std::time::SystemTime;
 
 use chrono::{DateTime, Utc};
 use clap::{CommandFactory, Parser, Subcommand};
+use touchup_core::numeric::counted;
 use tracing_subscriber::filter::{LevelFilter, Targets};
 
 use crate::align::{FeaturesError, IcpError, PairsError};

@@ -9,7 +9,7 @@ use clap::Args;
 use tokio::signal::unix::{SignalKind, signal};
 
 use super::arm::connect_ur;
-use super::{CliError, Losses, notify, print_result};
+use super::{CliError, Losses, counted, notify, print_result};
 use crate::io::mesh_file::{MeshFile, read_mesh};
 use crate::live::Quantiles;
 use crate::ros;
@@ -128,27 +128,28 @@ async fn any(signals: &mut [tokio::signal::unix::Signal]) {
 
 fn losses(report: &SessionReport) -> Losses {
     let ([wrenches, poses], [samples, others]) = (report.lost, report.dropped);
-    let counted = [
-        (wrenches, "wrenches lost in transport"),
-        (poses, "poses lost in transport"),
-        (samples, "wrenches and poses dropped: the computer is too slow"),
-        (others, "other messages dropped"),
-        (report.unrecorded, "messages not in the session's recording"),
+    let lost = [
+        (wrenches, ["wrench", "wrenches"], "lost in transport"),
+        (poses, ["pose", "poses"], "lost in transport"),
+        (samples, ["wrench or pose", "wrenches and poses"], "dropped: the computer is too slow"),
+        (others, ["other message", "other messages"], "dropped"),
+        (report.unrecorded, ["message", "messages"], "not in the session's recording"),
     ];
-    let counted = counted.into_iter().filter(|(count, _)| *count > 0);
-    counted.map(|(count, what)| format!("{count} {what}")).collect()
+    let lost = lost.into_iter().filter(|(count, ..)| *count > 0);
+    lost.map(|(count, [one, many], how)| format!("{} {how}", counted(count, one, many))).collect()
 }
 
 impl fmt::Display for SessionReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let refused: Vec<_> = self.refused.iter().map(|(reason, count)| format!("{count} {reason}")).collect();
         let refused = if refused.is_empty() { "none".to_owned() } else { refused.join(", ") };
-        let ([wrenches, poses], [poses_stale, wrenches_stale]) = (self.lost, self.gaps);
+        let wrenches = counted(self.lost[0], "wrench", "wrenches");
+        let poses = counted(self.lost[1], "pose", "poses");
+        let [poses_stale, wrenches_stale] = self.gaps.map(|gaps| counted(gaps, "time", "times"));
         writeln!(f, "samples: {} accepted; refused: {refused}", self.accepted)?;
         writeln!(
             f,
-            "lost in transport: {wrenches} wrenches, {poses} poses; streams stale: {wrenches_stale} times wrenches, \
-             {poses_stale} times poses"
+            "lost in transport: {wrenches}, {poses}; streams stale: {wrenches_stale} wrenches, {poses_stale} poses"
         )?;
         writeln!(f, "contacts: {}; updates cut back: {}", self.contacts, self.cut_back)?;
         let us = |ns: u64| ns as f64 * 1e-3;

@@ -5,6 +5,7 @@ use std::fmt;
 use nalgebra::Vector6;
 use serde::Serialize;
 
+use super::counted;
 use crate::haptic::{RefineParams, Registrar, Registration, RegistrationError, RegistrationParams};
 use crate::stylus::{ClockOffset, ContactSample, SettingError};
 
@@ -32,10 +33,11 @@ impl WrenchOffset {
 
 impl fmt::Display for WrenchOffset {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { wrench_offset_ms, sigma_ms, onsets } = self;
+        let Self { wrench_offset_ms, sigma_ms, onsets } = *self;
+        let onsets = counted(onsets, "onset", "onsets");
         write!(
             f,
-            "the wrench seems to read {wrench_offset_ms:+.1} ± {sigma_ms:.1} ms beyond the pose, by {onsets} onsets of \
+            "the wrench seems to read {wrench_offset_ms:+.1} ± {sigma_ms:.1} ms beyond the pose, by {onsets} of \
              contact (sync.wrench_offset_ms; not applied)"
         )
     }

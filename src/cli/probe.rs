@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::arm::{ArmArguments, RobotName};
 use super::probing::{Done, Probing, Ready, flag_of, picture_files};
-use super::{CliError, Losses, print_result};
+use super::{CliError, Losses, counted, print_result};
 use crate::probing::arm::{Arm, Narrower};
 use crate::probing::execute::{Flag, Plan};
 
@@ -179,15 +179,19 @@ impl fmt::Display for DryRunReport {
         let sum = |count: fn(&PlannedFeature) -> usize| self.features.iter().map(count).sum::<usize>();
         let [touches, slides] = [sum(|one| one.touches), sum(|one| one.slides)];
         let touched = touches - sum(|one| one.unreachable_touches.len());
-        write!(f, "{touched} of {touches} planned touches")?;
+        write!(f, "{touched} of {}", counted(touches, "planned touch", "planned touches"))?;
         if slides > 0 {
-            write!(f, " and {} of {slides} slides", slides - sum(|one| one.unreachable_slides.len()))?;
+            let made = slides - sum(|one| one.unreachable_slides.len());
+            write!(f, " and {made} of {}", counted(slides, "slide", "slides"))?;
         }
         writeln!(f, " can be made; nothing moved")?;
         for one in &self.features {
-            let slides = if one.slides == 0 { String::new() } else { format!(" and {} slides", one.slides) };
+            write!(f, "feature {}: {}", one.flag, counted(one.touches, "touch", "touches"))?;
+            if one.slides > 0 {
+                write!(f, " and {}", counted(one.slides, "slide", "slides"))?;
+            }
             let unreachable = one.unreachable_touches.len() + one.unreachable_slides.len();
-            writeln!(f, "feature {}: {} touches{slides} planned, {unreachable} cannot be made", one.flag, one.touches)?;
+            writeln!(f, " planned, {unreachable} cannot be made")?;
             for (kind, unreachable) in [("touch", &one.unreachable_touches), ("slide", &one.unreachable_slides)] {
                 for Unreachable { number, reason } in unreachable {
                     writeln!(f, "  {kind} {number}: {reason}")?;

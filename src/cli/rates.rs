@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
+use super::counted;
 use crate::haptic::{RefineError, RefineParams, Refiner};
 use crate::live::{Engine, Gate, Latencies, LiveCounts, LiveError, Pace, Quantiles, Renewal};
 use crate::mesh::{FaceTree, TriMesh};
@@ -152,7 +153,7 @@ impl std::fmt::Display for LiveSummary {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Quantiles { median, p99, .. } = self.behind_ns;
         let [median, p99] = [median, p99].map(|ns| ns as f64 * 1e-6);
-        let Self { renewals, late, .. } = self;
-        write!(f, "live: patch {median:.0} ms behind, p99 {p99:.0} ms; {renewals} renewals, {late} of them late")
+        let renewals = counted(self.renewals, "renewal", "renewals");
+        write!(f, "live: patch {median:.0} ms behind, p99 {p99:.0} ms; {renewals}, {} of them late", self.late)
     }
 }

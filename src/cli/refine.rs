@@ -14,7 +14,7 @@ use tracing::{debug, warn};
 use super::offsets::{ContactPoints, ScanOffset, WrenchOffset};
 use super::progress::WorkProgress;
 use super::rates::{Ended, LiveSummary, Rates};
-use super::{CliError, Losses, check_kept_by, print_result};
+use super::{CliError, Losses, check_kept_by, counted, print_result};
 use crate::haptic::{RefineCounts, RefineError, RefineParams};
 use crate::io::atomic::{AtomicFile, is_same_file};
 use crate::io::mesh_file::{MeshFile, MeshFileError, MeshUnit, check_target, read_mesh};
@@ -241,9 +241,9 @@ fn reason_of(error: &RefineError) -> &'static str {
 fn lost_samples(replayed: &Replayed, accepted: u64) -> Option<String> {
     (accepted == 0 && replayed.losses.is_empty()).then(|| {
         format!(
-            "no sample came of {} wrenches: each needs a pose shortly before and after it by the same clock \
+            "no sample came of {}: each needs a pose shortly before and after it by the same clock \
              (sync.wrench_offset_ms, sync.largest_gap_ms)",
-            replayed.wrenches
+            counted(replayed.wrenches, "wrench", "wrenches")
         )
     })
 }
@@ -252,8 +252,8 @@ fn lost_samples(replayed: &Replayed, accepted: u64) -> Option<String> {
 fn lost_contacts(params: &RefineParams, counts: &RefineCounts) -> Option<String> {
     (params.gate.is_some() && counts.out_of_reach > counts.moved).then(|| {
         format!(
-            "{} samples are in contact where the scan has no face near: are the poses in its frame, and is --mesh-unit right?",
-            counts.out_of_reach
+            "{} in contact where the scan has no face near: are the poses in its frame, and is --mesh-unit right?",
+            counted(counts.out_of_reach, "sample is", "samples are")
         )
     })
 }
@@ -530,7 +530,8 @@ impl RefineSummary {
                 None => format!("refined: {patch}"),
             },
             (None, contacts) => {
-                format!("refined: the stylus came into contact {contacts} times and moved {} faces", self.moved_faces)
+                let (times, faces) = (counted(contacts, "time", "times"), counted(self.moved_faces, "face", "faces"));
+                format!("refined: the stylus came into contact {times} and moved {faces}")
             }
         }
     }

@@ -9,7 +9,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::progress::WorkProgress;
-use super::{CliError, Losses, notify, print_result};
+use super::{CliError, Losses, counted, notify, print_result};
 use crate::io::recording::Topics;
 use crate::replay::{Recording, each_message, marker_filter};
 use crate::ros;
@@ -117,7 +117,7 @@ pub(super) fn replay(arguments: &ReplayArguments, ros: &[String]) -> Result<Loss
 
     let mut losses = replayed.losses;
     if played.unsent > 0 {
-        losses.push(format!("{} messages not taken by the network", played.unsent));
+        losses.push(format!("{} not taken by the network", counted(played.unsent, "message", "messages")));
     }
     if listeners.contains(&0) {
         losses.push("a subscriber left before the end".to_owned());
@@ -125,8 +125,9 @@ pub(super) fn replay(arguments: &ReplayArguments, ros: &[String]) -> Result<Loss
     if arguments.json {
         print_result(&serde_json::to_string(&played).expect("numbers alone cannot fail"));
     } else {
-        let Played { wrenches, poses, played_s, .. } = played;
-        print_result(&format!("played {wrenches} wrenches and {poses} poses in {played_s:.1} s"));
+        let wrenches = counted(played.wrenches, "wrench", "wrenches");
+        let poses = counted(played.poses, "pose", "poses");
+        print_result(&format!("played {wrenches} and {poses} in {:.1} s", played.played_s));
     }
     Ok(losses)
 }

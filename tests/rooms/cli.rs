@@ -215,6 +215,7 @@ fn refine_in_words_names_what_it_wrote() {
     let output = case.refine("touch.mcap", "out.stl", &["-v"]);
     let words = text(&output.stdout);
     assert!(words.starts_with("refined: ") && words.contains(details) && words.contains("replayed in"), "{words}");
+    assert!(words.contains("; 1 piece, 80 boundary edges in 1 loop, 0 non-manifold edges"), "{words}");
 }
 
 #[test]
@@ -379,7 +380,7 @@ fn losses_are_4_and_named() {
     let summary = json(&output);
     assert_eq!(summary["refused"], serde_json::json!({ "not_finite": 1, "pose_absurd": 1 }));
     assert_eq!((&summary["samples"], &summary["accepted"]), (&Value::from(1002), &Value::from(1001)));
-    assert!(text(&output.stderr).contains("1 messages not_finite; 1 messages pose_absurd"));
+    assert!(text(&output.stderr).contains("1 message not_finite; 1 message pose_absurd"));
     assert_eq!(case.bytes("nan.ply"), case.bytes("sound.ply"), "what is refused changes nothing");
 
     let whole = case.bytes("touch.mcap");

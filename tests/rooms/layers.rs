@@ -26,8 +26,8 @@ const MAY_USE: &[(&str, &str)] = &[
     ("calibrate", "numeric stylus align"),
     ("io", "parameters stylus mesh features align arm execute"),
     ("scene", "parameters stylus mesh reconstruct haptic plan arm execute sim io"),
-    ("replay", "stylus io scene"),
-    ("session", "clock stylus mesh reconstruct haptic live features io"),
+    ("replay", "numeric stylus io scene"),
+    ("session", "clock numeric stylus mesh reconstruct haptic live features io"),
     ("report", "numeric stylus mesh reconstruct haptic live features align sim compare io scene session replay"),
     ("ur", "clock stylus plan arm"),
     (
@@ -37,8 +37,8 @@ const MAY_USE: &[(&str, &str)] = &[
     ),
     (
         "cli",
-        "clock stylus mesh reconstruct haptic live features plan arm execute sim align calibrate compare io scene \
-         session replay ros ur",
+        "clock numeric stylus mesh reconstruct haptic live features plan arm execute sim align calibrate compare io \
+         scene session replay ros ur",
     ),
 ];
 

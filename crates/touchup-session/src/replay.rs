@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::path::Path;
 
+use touchup_core::numeric::counted;
 use touchup_core::stylus::{
     MarkerCounts, MarkerFilter, Message, Placement, Sample, SettingError, SyncParams, Synchroniser, WrenchFrame,
 };
@@ -181,7 +182,7 @@ impl Replayed {
     fn account_markers(&mut self, filter: &MarkerFilter) {
         for (reason, count) in filter.frame_counts().reasons().into_iter().filter(|(_, count)| *count > 0) {
             if !NOT_A_LOSS.contains(&reason) {
-                self.losses.push(format!("{count} marker frames {reason}"));
+                self.losses.push(format!("{} {reason}", counted(count, "marker frame", "marker frames")));
             }
             self.refused.insert(format!("markers_{reason}"), count);
         }
@@ -194,7 +195,7 @@ impl Replayed {
         let of_poses = sync.pose_counts().reasons().map(|(reason, count)| (reason, format!("pose_{reason}"), count));
         for (reason, name, count) in of_wrenches.into_iter().chain(of_poses).filter(|(.., count)| *count > 0) {
             if !NOT_A_LOSS.contains(&reason) {
-                self.losses.push(format!("{count} messages {name}"));
+                self.losses.push(format!("{} {name}", counted(count, "message", "messages")));
             }
             self.refused.insert(name, count);
         }
@@ -203,8 +204,9 @@ impl Replayed {
     /// Adds the counts of the reader.
     fn account_reader(&mut self, recording: &RecordingReader) {
         for (reason, bad) in recording.bad_messages() {
-            let (path, place, count) = (bad.path.display(), &bad.place, bad.poses + bad.wrenches);
-            self.losses.push(format!("{count} messages {reason}, the first in {path} at {place}"));
+            let (path, place) = (bad.path.display(), &bad.place);
+            let messages = counted(bad.poses + bad.wrenches, "message", "messages");
+            self.losses.push(format!("{messages} {reason}, the first in {path} at {place}"));
             self.wrenches += bad.wrenches;
             for (name, count) in [(reason.name().to_owned(), bad.wrenches), (format!("pose_{reason}"), bad.poses)] {
                 if count > 0 {

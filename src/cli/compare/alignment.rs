@@ -12,7 +12,7 @@ use crate::align::{
     align_features, fit_pairs, icp,
 };
 use crate::cli::progress::WorkProgress;
-use crate::cli::{CliError, Threads, print_result};
+use crate::cli::{CliError, Threads, counted, print_result};
 use crate::compare::{IndexedMesh, sample_surface, surface_area};
 use crate::features::detect;
 use crate::io::pairs_file::read_pairs;
@@ -164,7 +164,8 @@ pub(super) fn aligned_by_features(
     };
     let chosen = match (alternative, undecided) {
         (Some(number), _) => found.get(number.wrapping_sub(1)).ok_or_else(|| {
-            CliError::Usage(format!("--alternative {number} is not there: {} motions were found", found.len()))
+            let motions = counted(found.len(), "motion was", "motions were");
+            CliError::Usage(format!("--alternative {number} is not there: {motions} found"))
         })?,
         (None, None) => &found[0],
         (None, Some(error)) => {
@@ -306,11 +307,11 @@ impl Alignment {
     }
 
     fn warn(&self) {
-        if !self.undetermined.is_empty() {
-            warn!(
-                "{} motions leave the mesh on the truth as it is: it stays where it is in these",
-                self.undetermined.len()
-            );
+        let count = self.undetermined.len();
+        if count > 0 {
+            let (motions, these) =
+                (counted(count, "motion leaves", "motions leave"), if count == 1 { "this" } else { "these" });
+            warn!("{motions} the mesh on the truth as it is: it stays where it is in {these}");
         }
     }
 }
@@ -326,7 +327,7 @@ impl fmt::Display for Alignment {
             write!(f, ", rms {rms_mm:.4} mm")?;
         }
         if let Some(FitReport { points, inliers, rounds }) = self.fit {
-            write!(f, " of {inliers} of {points} points, {rounds} rounds")?;
+            write!(f, " of {inliers} of {points} points, {}", counted(rounds, "round", "rounds"))?;
         }
         for Residual { pair, residual_mm: [x, y, z], distance_mm } in &self.residuals {
             write!(f, "\n  pair {pair}: off by ({x:.3}, {y:.3}, {z:.3}) mm, {distance_mm:.3} mm")?;
@@ -348,7 +349,7 @@ impl fmt::Display for Alignment {
 
 impl fmt::Display for Explained {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} of {} features", self.explained_features, self.mesh_features)?;
+        write!(f, "{} of {}", self.explained_features, counted(self.mesh_features, "feature", "features"))?;
         match self.agreeing_share {
             Some(share) => write!(f, " and {:.1} % of the surface agree", share * 100.0),
             None => Ok(()),

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use nalgebra::{Point3, Vector3};
 
-use crate::cli::CliError;
+use crate::cli::{CliError, counted};
 use crate::compare::{DrawnMesh, PicturePanel, PictureParams, Rgb, draw_picture};
 use crate::io::png::write_png;
 use crate::mesh::TriMesh;
@@ -76,7 +76,7 @@ pub(super) fn draw_plan(scan: &TriMesh, plans: &[Plan], flags: &[Flag], path: &P
     }
     flagged(&mut drawing, flags, size);
     let touches: usize = plans.iter().map(|plan| plan.touches.len()).sum();
-    let note = format!("{touches} touches if the part is as the scan has it");
+    let note = format!("{} if the part is as the scan has it", counted(touches, "touch", "touches"));
     let legend = [
         (FLAG, "flag"),
         (PATH, "path through free air"),
@@ -113,7 +113,9 @@ pub(super) fn draw_touches(mesh: &TriMesh, probed: &[Probed], flags: &[Flag], pa
         }
     }
     flagged(&mut drawing, flags, size);
-    let note = format!("{touched} touches reached the part, {missed} missed it, {refused} do not count");
+    let touched = counted(touched, "touch", "touches");
+    let refused = counted(refused, "does not count", "do not count");
+    let note = format!("{touched} reached the part, {missed} missed it, {refused}");
     let legend = [(FLAG, "flag"), (TOUCHED, "touched"), (MISS, "nothing there"), (REFUSED, "does not count")];
     write(&[(drawing, "the refined mesh", note)], "what the arm touched", &legend, path)
 }

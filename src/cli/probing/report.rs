@@ -6,8 +6,8 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use crate::cli::CliError;
 use crate::cli::refine::RefineSummary;
+use crate::cli::{CliError, counted};
 use crate::features::Kind;
 use crate::io::atomic::write_atomically;
 use crate::io::features_file::FeatureRecord;
@@ -137,14 +137,15 @@ impl ProbingSummary {
 impl fmt::Display for ProbingSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let reached = self.features.iter().filter(|record| record.code == code(&Ending::ToleranceReached)).count();
-        writeln!(f, "tolerance reached: {reached} of {} features", self.features.len())?;
+        writeln!(f, "tolerance reached: {reached} of {}", counted(self.features.len(), "feature", "features"))?;
         for record in &self.features {
             let ProbedRecord { flag, kind, touches, duration_s, largest_force_n, ending, .. } = record;
             write!(f, "{kind} {flag}: {ending}")?;
             if let Some(feature) = &record.feature {
                 write!(f, ": {}", numbers(feature))?;
             }
-            write!(f, "\n  {touches} touches, {duration_s:.0} s, {largest_force_n:.1} N at most")?;
+            let touches = counted(*touches, "touch", "touches");
+            write!(f, "\n  {touches}, {duration_s:.0} s, {largest_force_n:.1} N at most")?;
             for slide in &record.slides {
                 write!(f, "\n  {slide}")?;
             }

@@ -2,6 +2,7 @@
 //! motions.
 
 mod basis;
+mod counted;
 mod disjoint_sets;
 mod least_squares;
 mod moments;
@@ -12,6 +13,7 @@ mod twist;
 mod voxel;
 
 pub(crate) use basis::tangent_basis;
+pub use counted::counted;
 pub(crate) use disjoint_sets::DisjointSets;
 pub(crate) use least_squares::NormalEquations;
 pub(crate) use moments::{centroid_and_spread, mean, scatter};

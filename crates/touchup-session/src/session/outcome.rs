@@ -10,6 +10,7 @@ use tracing::{debug, warn};
 use super::outliers::UncertaintySummary;
 use touchup_core::features::{Detection, detect};
 use touchup_core::mesh::{FaceId, FaceTree, MeshError, Outside, TriMesh, VertexId};
+use touchup_core::numeric::counted;
 use touchup_core::reconstruct::{Patched, Patcher, Support};
 use touchup_core::stylus::ProbedPoint;
 use touchup_io::features_file::{FeatureFile, FeaturesFileError, write_features};
@@ -196,11 +197,11 @@ impl PatchSummary {
 
 impl fmt::Display for PatchSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { pitch_mm, removed_faces, added_faces, guessed_share, .. } = self;
+        let Self { pitch_mm, guessed_share, .. } = self;
+        let [removed, added] = [self.removed_faces, self.added_faces].map(|count| counted(count, "face", "faces"));
         write!(
             f,
-            "{removed_faces} faces of the scan replaced by {added_faces} faces of {pitch_mm:.2} mm ({:.0} % of their vertices \
-             guessed)",
+            "{removed} of the scan replaced by {added} of {pitch_mm:.2} mm ({:.0} % of their vertices guessed)",
             guessed_share * 100.0
         )
     }

@@ -4,6 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
+use touchup_core::numeric::counted;
 use touchup_core::reconstruct::{Outlier, Outliers, Patched, Support};
 
 /// What `--json` prints of the uncertainty.
@@ -92,11 +93,11 @@ fn in_thousands(count: u64) -> String {
 impl fmt::Display for UncertaintySummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { touched_sigma_mm, rejected, relocated, judged, .. } = self;
-        let judged = in_thousands(*judged);
+        let (judged, places) = (in_thousands(*judged), counted(*relocated, "place", "places"));
         write!(
             f,
             "± {touched_sigma_mm:.3} mm where touched (median standard deviation); {rejected} of {judged} contacts rejected as outliers, \
-             {relocated} places moved by a second pass"
+             {places} moved by a second pass"
         )
     }
 }

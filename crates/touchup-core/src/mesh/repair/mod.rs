@@ -11,6 +11,7 @@ use serde::Serialize;
 
 use super::stars::Valences;
 use super::tri_mesh::{MeshError, TriMesh};
+use crate::numeric::counted;
 use orient::{Edges, boundary_loops};
 
 /// Two times the area below which a face counts as having none, relative to its longest edge times its largest
@@ -45,21 +46,21 @@ pub struct RepairReport {
 
 impl fmt::Display for RepairReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let dropped = self.dropped_not_finite + self.dropped_zero_area + self.dropped_duplicates;
         write!(
             f,
-            "welded {} vertices, left out {} unused ones and {} faces ({} not finite, {} without area, {} twice), \
-             turned over {}; {} pieces, {} boundary edges in {} loops, {} non-manifold edges",
-            self.welded_vertices,
-            self.unused_vertices,
-            self.dropped_not_finite + self.dropped_zero_area + self.dropped_duplicates,
+            "welded {}, left out {} and {} ({} not finite, {} without area, {} twice), turned over {}; {}, {} in {}, {}",
+            counted(self.welded_vertices, "vertex", "vertices"),
+            counted(self.unused_vertices, "unused one", "unused ones"),
+            counted(dropped, "face", "faces"),
             self.dropped_not_finite,
             self.dropped_zero_area,
             self.dropped_duplicates,
             self.flipped_faces,
-            self.components,
-            self.boundary_edges,
-            self.boundary_loops,
-            self.non_manifold_edges
+            counted(self.components, "piece", "pieces"),
+            counted(self.boundary_edges, "boundary edge", "boundary edges"),
+            counted(self.boundary_loops, "loop", "loops"),
+            counted(self.non_manifold_edges, "non-manifold edge", "non-manifold edges")
         )
     }
 }
