@@ -1,7 +1,9 @@
 //! Errors of the command line: one line of text, or one JSON object where `--json` is asked for.
 
+use std::error::Error;
 use std::ffi::OsString;
-use std::io::{Write, stderr};
+use std::io::{self, ErrorKind, Write, stderr};
+use std::iter::successors;
 use std::process::ExitCode;
 
 use serde::Serialize;
@@ -33,11 +35,21 @@ impl Failure {
     pub fn of(error: &CliError) -> Self {
         let hint = match error.kind() {
             "not_written" => Some("check that the folder exists, may be written to and has space left"),
+            _ if is_missing(error) => {
+                Some("check the path: no file is there; a relative path begins at the present folder")
+            }
             "scene" => Some("config/touchup.yaml lists every parameter with its unit and range"),
             _ => None,
         };
         Self { kind: error.kind(), message: one_line(&error.to_string()), hint, exit_code: error.exit_code() }
     }
+}
+
+/// Whether a file that should be read is not there.
+fn is_missing(error: &CliError) -> bool {
+    successors(error.source(), |&cause| cause.source())
+        .filter_map(|cause| cause.downcast_ref::<io::Error>())
+        .any(|cause| cause.kind() == ErrorKind::NotFound)
 }
 
 impl ErrorForm {

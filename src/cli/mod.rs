@@ -147,18 +147,18 @@ enum CliError {
     Usage(String),
     #[error(transparent)]
     Scene(#[from] SceneError),
-    #[error("{0}")]
+    #[error(transparent)]
     ReadMesh(MeshFileError),
     /// The same of the true part, which has a flag of its own.
     #[error("{}", .0.to_string().replace("--mesh-unit", "--truth-unit"))]
-    ReadTruth(MeshFileError),
+    ReadTruth(#[source] MeshFileError),
     #[error(transparent)]
     ReadRecording(RecordingError),
-    #[error("{0}")]
+    #[error(transparent)]
     WriteMesh(MeshFileError),
     #[error("cannot write {}: {source}", path.display())]
     Write { path: PathBuf, source: std::io::Error },
-    #[error("{0}")]
+    #[error(transparent)]
     WriteRecording(RecordingError),
     #[error(transparent)]
     Session(#[from] SessionError),

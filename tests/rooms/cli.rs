@@ -224,6 +224,8 @@ fn an_error_with_json_is_one_json_object_with_the_same_exit_code() {
         (&["refine", "--frobnicate"][..], "usage", 2),
         (&["compare", "no.ply", "no.stl"], "mesh", 3),
         (&["features", "no.ply"], "mesh", 3),
+        (&["refine", "--scene", "no.yaml", "--scan", "no.ply", "--bag", "no.mcap", "--out", "no.ply"], "scene", 3),
+        (&["calibrate", "scan", "--pairs", "no.csv", "--out", "no.yaml"], "calibration", 3),
         (&["disagree", "no.ply", "no.ply", "--touches", "no.csv"], "mesh", 3),
         (&["probe", "--feature", "hole@1,2", "--scene", "no.yaml", "--out", "no"], "usage", 2),
     ];
@@ -237,6 +239,8 @@ fn an_error_with_json_is_one_json_object_with_the_same_exit_code() {
         assert_eq!(keys(&error), ["exit_code", "hint", "kind", "message"], "{error}");
         assert_eq!((&error["kind"], &error["exit_code"]), (&kind.into(), &exit_code.into()), "{error}");
         assert!(error["message"].as_str().is_some_and(|message| !message.is_empty()), "{error}");
+        let next = if exit_code == 3 { "check the path" } else { "" };
+        assert!(next.is_empty() || error["hint"].as_str().is_some_and(|hint| hint.contains(next)), "{error}");
     }
 }
 
