@@ -75,6 +75,9 @@ pub(super) struct CompareArguments {
     /// Another seed spreads them differently
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+    /// Also prints sizes of both, each way of measuring in each region, and how the alignment went
+    #[arg(long, short)]
+    verbose: bool,
     /// Prints one JSON object
     #[arg(long)]
     json: bool,
@@ -138,7 +141,8 @@ pub(super) fn compare(arguments: &CompareArguments) -> Result<Losses, CliError> 
     if arguments.json {
         print_result(&serde_json::to_string(&report).expect("numbers and names alone cannot fail"));
     } else {
-        print_result(&report.to_string());
+        let details = if arguments.verbose { format!("\n{}", report.details()) } else { String::new() };
+        print_result(&format!("{report}{details}"));
     }
     Ok(Losses::new())
 }
@@ -232,6 +236,7 @@ impl CompareArguments {
             range_mm: None,
             samples: 200_000,
             seed: 1,
+            verbose: false,
             json: false,
         }
     }

@@ -306,6 +306,12 @@ impl Alignment {
         format!("aligned by {}{rms}", self.method)
     }
 
+    /// The points that took part, where there were any.
+    pub(super) fn details(&self) -> Option<String> {
+        let FitReport { points, inliers, rounds } = self.fit.as_ref()?;
+        Some(format!("aligned by {inliers} of {points} points, {}", counted(*rounds, "round", "rounds")))
+    }
+
     fn warn(&self) {
         let count = self.undetermined.len();
         if count > 0 {
@@ -325,9 +331,6 @@ impl fmt::Display for Alignment {
         }
         if let Some(rms_mm) = self.rms_mm {
             write!(f, ", rms {rms_mm:.4} mm")?;
-        }
-        if let Some(FitReport { points, inliers, rounds }) = self.fit {
-            write!(f, " of {inliers} of {points} points, {}", counted(rounds, "round", "rounds"))?;
         }
         for Residual { pair, residual_mm: [x, y, z], distance_mm } in &self.residuals {
             write!(f, "\n  pair {pair}: off by ({x:.3}, {y:.3}, {z:.3}) mm, {distance_mm:.3} mm")?;

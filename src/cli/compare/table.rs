@@ -4,7 +4,9 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::CompareReport;
+use super::alignment::Alignment;
+use super::{CompareReport, ShapeReport};
+use crate::cli::counted;
 use crate::compare::{Comparison, Histogram, RegionComparison, Summary, SupportRegion, TiltSummary};
 
 /// What `--json` prints of one mesh.
@@ -142,43 +144,71 @@ pub(super) fn note(comparison: &Comparison, tolerance_mm: Option<f64>) -> String
 const HEAD: &str = "                            mean      rms   median      p95      p99      max     bias    points";
 
 impl CompareReport {
-    /// Deviation of the mesh, of the touched part where known, and of the mesh before.
-    fn verdict(&self) -> String {
-        let part = |comparison: &'_ ComparisonReport, region: &str| {
-            let row = comparison.regions.iter().find(|row| row.region == region)?;
-            row.mesh_to_truth.as_ref().map(|summary| [summary.mean_mm, summary.p95_mm])
+    /// Sizes of both, how the alignment went, and the table of each way of measuring.
+    pub(super) fn details(&self) -> String {
+        let size = |(what, shape): (&str, &ShapeReport)| {
+            let ([x, y, z], faces) = (shape.size_mm, counted(shape.faces, "face", "faces"));
+            format!("{what:5} {}: {faces}, {x:.1} x {y:.1} x {z:.1} mm", shape.file)
         };
-        let touched = part(&self.after, "touched").map(|numbers| ("touched", "where touched", numbers));
-        let all = || part(&self.after, "all").map(|numbers| ("all", "over all", numbers));
-        let Some((region, place, [mean, p95])) = touched.or_else(all) else {
-            return "the mesh shows nothing of the true surface".to_owned();
-        };
-        let before = self.before.as_ref().and_then(|before| part(before, region));
-        let before = before.map(|[mean, p95]| format!("; before: mean {mean:.3} mm, 95 % within {p95:.3} mm"));
-        format!(
-            "the mesh is off by {mean:.3} mm on average {place}, 95 % within {p95:.3} mm{}",
-            before.unwrap_or_default()
-        )
+        let mut lines = vec![size(("mesh", &self.mesh)), size(("truth", &self.truth))];
+        lines.extend(self.alignment.as_ref().and_then(Alignment::details));
+        lines.push(format!("distances in mm; bias +: too much material; {:.2} points/mm2", self.after.density_per_mm2));
+        lines.push(HEAD.to_owned());
+        match &self.before {
+            Some(before) => lines.push(format!("before\n{before}\nafter\n{}", self.after)),
+            None => lines.push(self.after.to_string()),
+        }
+        lines.join("\n")
     }
 }
 
+/// The verdict: deviation of the mesh, of the touched part where known, and of the mesh before. Then the alignment.
 impl fmt::Display for CompareReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{}", self.verdict())?;
-        for (what, shape) in [("mesh", &self.mesh), ("truth", &self.truth)] {
-            let [x, y, z] = shape.size_mm;
-            writeln!(f, "{what:5} {}: {} faces, {x:.1} x {y:.1} x {z:.1} mm", shape.file, shape.faces)?;
+        let places = [("touched", "where touched"), ("all", "over all")];
+        let row = |(region, place)| Some((region, place, self.after.row(region)?));
+        match places.into_iter().find_map(row) {
+            None => writeln!(f, "the mesh shows nothing of the true surface")?,
+            Some((region, place, after)) => {
+                let before = self.before.as_ref().and_then(|before| before.row(region));
+                let ErrorRow { mean_mm, p95_mm, .. } = after;
+                write!(f, "the mesh is off by {mean_mm:.3} mm on average {place}, 95 % within {p95_mm:.3} mm")?;
+                if let Some(ErrorRow { mean_mm, p95_mm, .. }) = before {
+                    write!(f, "; before: mean {mean_mm:.3} mm, 95 % within {p95_mm:.3} mm")?;
+                }
+                write!(f, "\n{after}")?;
+                before.iter().try_for_each(|before| write!(f, "; before: {before}"))?;
+                writeln!(f)?;
+            }
         }
-        if let Some(alignment) = &self.alignment {
-            writeln!(f, "{alignment}")?;
-        }
-        writeln!(f, "distances in mm; bias +: too much material; {:.2} points/mm2", self.after.density_per_mm2)?;
-        writeln!(f, "the mesh shows {:.1} % of the true surface", (1.0 - self.after.unseen_share) * 100.0)?;
-        writeln!(f, "{HEAD}")?;
-        match &self.before {
-            Some(before) => write!(f, "before\n{before}\nafter\n{}", self.after),
-            None => write!(f, "{}", self.after),
-        }
+        write!(f, "the mesh shows {:.1} % of the true surface", (1.0 - self.after.unseen_share) * 100.0)?;
+        self.alignment.iter().try_for_each(|alignment| write!(f, "\n{alignment}"))
+    }
+}
+
+/// What a user judges a region by.
+#[derive(Clone, Copy)]
+struct ErrorRow {
+    mean_mm: f64,
+    rms_mm: f64,
+    p95_mm: f64,
+    max_mm: f64,
+    within_tolerance_share: Option<f64>,
+}
+
+impl ComparisonReport {
+    /// Errors of a region against the truth, where it is there.
+    fn row(&self, region: &str) -> Option<ErrorRow> {
+        let row = self.regions.iter().find(|row| row.region == region)?;
+        let SummaryReport { mean_mm, rms_mm, p95_mm, max_mm, .. } = *row.mesh_to_truth.as_ref()?;
+        Some(ErrorRow { mean_mm, rms_mm, p95_mm, max_mm, within_tolerance_share: row.within_tolerance_share })
+    }
+}
+
+impl fmt::Display for ErrorRow {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "rms {:.3} mm, at most {:.3} mm", self.rms_mm, self.max_mm)?;
+        self.within_tolerance_share.iter().try_for_each(|share| write!(f, ", {:.1} % in tolerance", share * 100.0))
     }
 }
 

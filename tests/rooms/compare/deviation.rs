@@ -454,7 +454,28 @@ fn compare_prints_numbers_and_writes_picture_and_colours() {
     let (code, out, err) = parts_of(&output);
     assert_eq!(code, 0);
     assert!(err.contains("3 motions leave the mesh"), "{err}");
-    assert!(out.contains("aligned by icp") && out.contains("not determined") && out.contains("mesh to truth"), "{out}");
+    assert!(out.contains("aligned by icp") && out.contains("not determined") && !out.contains("rounds"), "{out}");
+}
+
+#[test]
+fn compare_prints_a_verdict_and_with_v_the_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let [mesh, truth] = plates(folder.path());
+    let arguments = ["compare", &mesh, &truth, "--samples", "1000", "--tolerance-mm", "0.3", "--before", &mesh];
+    let output = touchup(&arguments);
+    let (code, verdict, err) = parts_of(&output);
+    assert_eq!((code, err), (0, ""));
+    let expected = "the mesh is off by 0.250 mm on average over all, 95 % within 0.250 mm; before: mean 0.250 mm, 95 % \
+                    within 0.250 mm\nrms 0.250 mm, at most 0.250 mm, 100.0 % in tolerance; before: rms 0.250 mm, at most \
+                    0.250 mm, 100.0 % in tolerance\nthe mesh shows 100.0 % of the true surface\n";
+    assert_eq!(verdict, expected);
+    let output = touchup(&[&arguments[..], &["-v"]].concat());
+    let (code, out, err) = parts_of(&output);
+    assert_eq!((code, err), (0, ""));
+    for row in ["mesh to truth", "truth to mesh", "vertices", "normals", "32 faces, 20.0 x 20.0 x 0.0 mm", "points/mm2"]
+    {
+        assert!(out.starts_with(verdict) && out.contains(row), "{row}: {out}");
+    }
 }
 
 #[test]
