@@ -33,7 +33,7 @@ pub(super) enum RobotName {
 /// [`CliError::Usage`] where the scene names none, or touchup was built without it; [`CliError::Arm`] where it does not answer.
 #[cfg(feature = "ur")]
 pub(super) fn connect_ur(scene: &Scene) -> Result<Box<dyn Arm + Send>, CliError> {
-    let arm = UrArm::connect(&ur_params(scene)?).map_err(|error| CliError::Arm(error.to_string()))?;
+    let arm = UrArm::connect(&ur_params(scene)?).map_err(CliError::arm)?;
     Ok(Box::new(arm))
 }
 

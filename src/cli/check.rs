@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::arm::{ArmArguments, millimetres};
 use super::probing::Ready;
 use super::progress::WorkProgress;
-use super::{CliError, Losses, print_result};
+use super::{CliError, Losses, print_report};
 use crate::probing::execute::{Prober, Repeatability};
 
 /// Allowed number of touches; with three each side is approached, and the repeatability is known.
@@ -44,11 +44,7 @@ pub(super) fn check(arguments: &CheckArguments) -> Result<Losses, CliError> {
     }
     let found = repeated(arm, scene, spot, *touches)?;
     let checked = Checked::of(&found, *gate_um);
-    if *json {
-        print_result(&serde_json::to_string(&checked).expect("numbers and names alone cannot fail"));
-    } else {
-        print_result(&checked.to_string());
-    }
+    print_report(*json, &checked, || checked.to_string());
     let why = format!(
         "the touches of one spot are {:.1} µm apart, the gate is {gate_um} µm: look for play in probe, flange and joints",
         checked.range_um
@@ -77,7 +73,7 @@ pub(super) fn repeated(
     arm.with(&ready, |arm| {
         let mut world = ready.static_world();
         let mut prober = Prober::new(arm, &ready.cell, &ready.params, &mut world);
-        prober.repeat(&place, touches).map_err(|error| CliError::Arm(error.to_string()))
+        prober.repeat(&place, touches).map_err(CliError::arm)
     })
 }
 

@@ -6,22 +6,21 @@ mod table;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Point3};
 use serde::Serialize;
 use tracing::warn;
 
 use self::alignment::{Alignment, aligned_by_features, aligned_by_icp, aligned_by_pairs, moved};
 use self::table::ComparisonReport;
+use super::pictures::{file_name, today, view_from, write_coloured, write_picture};
 use super::progress::WorkProgress;
-use super::{CliError, Losses, Threads, print_result, today};
+use super::{CliError, Losses, Threads, check_outputs, print_report};
 use crate::compare::{
     CompareParams, Comparison, IndexedMesh, PictureLabel, PicturePanel, PictureParams, Regions, SupportRegion,
-    colour_of, compare as compare_shapes, draw_picture,
+    colour_of, compare as compare_shapes,
 };
-use crate::io::atomic::{AtomicFile, is_same_file};
 use crate::io::features_file::{FeatureRecord, read_features};
-use crate::io::mesh_file::{MeshFile, MeshUnit, VertexColumn, read_mesh, read_vertex_columns, write_mesh_with};
-use crate::io::png::write_png;
+use crate::io::mesh_file::{MeshFile, MeshUnit, VertexColumn, read_mesh, read_vertex_columns};
 use crate::mesh::{FaceTree, TriMesh};
 
 #[derive(Debug, Args)]
@@ -138,12 +137,10 @@ impl PlacedMesh {
 /// The command: compares, and prints the result.
 pub(super) fn compare(arguments: &CompareArguments) -> Result<Losses, CliError> {
     let report = compared(arguments)?;
-    if arguments.json {
-        print_result(&serde_json::to_string(&report).expect("numbers and names alone cannot fail"));
-    } else {
-        let details = if arguments.verbose { format!("\n{}", report.details()) } else { String::new() };
-        print_result(&format!("{report}{details}"));
-    }
+    print_report(arguments.json, &report, || match arguments.verbose {
+        true => format!("{report}\n{}", report.details()),
+        false => report.to_string(),
+    });
     Ok(Losses::new())
 }
 
@@ -186,7 +183,11 @@ pub(super) fn compared(arguments: &CompareArguments) -> Result<CompareReport, Cl
         arguments.draw(path, &mesh, before.as_ref(), &measured, &drawing)?;
     }
     if let Some(path) = &arguments.coloured {
-        write_coloured(path, &as_read, arguments.mesh_unit, &measured.after)?;
+        let Comparison { vertex_deviations, range, .. } = &measured.after;
+        let colours: Vec<_> = vertex_deviations.iter().map(|&d| colour_of(d, *range)).collect();
+        let in_mm: Vec<f32> = vertex_deviations.iter().map(|d| (d * 1e3) as f32).collect();
+        let column = VertexColumn { name: "deviation_mm", values: in_mm.into() };
+        write_coloured(path, &as_read, arguments.mesh_unit, &colours, [column])?;
     }
     Ok(CompareReport {
         mesh: ShapeReport::of(&arguments.mesh, &as_read),
@@ -278,14 +279,12 @@ impl CompareArguments {
         drawing: &Annotations<'_>,
     ) -> Result<(), CliError> {
         let _drawing = WorkProgress::stage("draw");
-        let name = |path: &Path| path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned());
-        let title = format!("{} against {}", name(&self.mesh), name(&self.truth));
+        let title = format!("{} against {}", file_name(&self.mesh), file_name(&self.truth));
         let note = |compared| table::note(compared, self.tolerance_mm);
-        let scan = before
-            .zip(measured.before.as_ref())
-            .zip(self.before.as_ref())
-            .map(|((placed, compared), path)| (placed, compared, format!("before: {}", name(path)), note(compared)));
-        let now = (mesh, &measured.after, format!("after: {}", name(&self.mesh)), note(&measured.after));
+        let scan = before.zip(measured.before.as_ref()).zip(self.before.as_ref()).map(|((placed, compared), path)| {
+            (placed, compared, format!("before: {}", file_name(path)), note(compared))
+        });
+        let now = (mesh, &measured.after, format!("after: {}", file_name(&self.mesh)), note(&measured.after));
         let panels: Vec<PicturePanel<'_>> = scan
             .iter()
             .chain([&now])
@@ -306,14 +305,12 @@ impl CompareArguments {
             caption: &drawing.caption,
             range: measured.after.range,
             tolerance: self.tolerance_mm.map(|tolerance| tolerance * 1e-3),
-            from: self.view.as_ref().map(|view| Vector3::from_column_slice(view)),
+            from: view_from(self.view.as_ref())?,
             weights: weights.as_deref(),
             labels: &drawing.labels,
             ..PictureParams::default()
         };
-        let picture = draw_picture(&panels, &params);
-        let write = |source| CliError::Write { path: path.to_owned(), source };
-        write_png(path, picture.size, &picture.pixels).map_err(write)
+        write_picture(path, &panels, &params)
     }
 
     /// The names of the features with their sizes, where the alignment brings them.
@@ -352,29 +349,10 @@ impl CompareArguments {
     /// Checks that the result can be written before the work begins.
     fn check_outputs(&self) -> Result<(), CliError> {
         let outputs = [("--picture", ".png", &self.picture), ("--coloured", ".ply", &self.coloured)];
-        for (flag, ending, path) in
-            outputs.iter().filter_map(|(flag, ending, path)| Some((flag, ending, (*path).as_ref()?)))
-        {
-            let shown = path.display();
-            if !shown.to_string().to_ascii_lowercase().ends_with(ending) {
-                return Err(CliError::Usage(format!("{flag} {shown} must end in {ending}")));
-            }
-            let others = [self.before.as_ref(), self.pairs.as_ref(), self.features.as_ref()];
-            for input in [&self.mesh, &self.truth].into_iter().chain(others.into_iter().flatten()) {
-                if is_same_file(input, path) {
-                    return Err(CliError::Usage(format!(
-                        "{flag} would write over {shown}, which is compared: choose another place"
-                    )));
-                }
-            }
-            AtomicFile::create(path).map(drop).map_err(|source| CliError::Write { path: path.clone(), source })?;
-        }
-        match &self.view {
-            Some(view) if !view.iter().all(|x| x.is_finite()) || view.iter().all(|x| *x == 0.0) => {
-                Err(CliError::Usage("--view must be a direction, such as 1,-1,0.5".to_owned()))
-            }
-            _ => Ok(()),
-        }
+        let [before, pairs, features] = [&self.before, &self.pairs, &self.features].map(Option::as_ref);
+        let inputs = [Some(&self.mesh), Some(&self.truth), before, pairs, features];
+        check_outputs(&outputs, &inputs, "compared: choose another place")?;
+        view_from(self.view.as_ref()).map(drop)
     }
 }
 
@@ -404,20 +382,6 @@ fn read_regions(path: &Path, unit: MeshUnit, mesh: &TriMesh) -> Result<Option<Ve
         [None, None] => return Ok(None),
     };
     Ok((regions.len() == mesh.vertex_slots()).then_some(regions))
-}
-
-/// The mesh as a PLY with colours.
-fn write_coloured(path: &Path, mesh: &TriMesh, unit: MeshUnit, measured: &Comparison) -> Result<(), CliError> {
-    let deviations = &measured.vertex_deviations;
-    let channel = |i: usize| deviations.iter().map(|&d| colour_of(d, measured.range)[i]).collect::<Vec<u8>>().into();
-    let in_mm: Vec<f32> = deviations.iter().map(|d| (d * 1e3) as f32).collect();
-    let columns = [
-        VertexColumn { name: "red", values: channel(0) },
-        VertexColumn { name: "green", values: channel(1) },
-        VertexColumn { name: "blue", values: channel(2) },
-        VertexColumn { name: "deviation_mm", values: in_mm.into() },
-    ];
-    write_mesh_with(path, mesh, &columns, unit).map_err(CliError::WriteMesh)
 }
 
 /// A hint where one shape is so much larger than the other that a unit is probably wrong.

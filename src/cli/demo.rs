@@ -2,7 +2,6 @@
 //! was found on it.
 
 use std::fmt;
-use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -16,8 +15,7 @@ use super::progress::WorkProgress;
 use super::refine::{RefineArguments, RefineSummary, Refined};
 use super::simulate::{Simulated, TouchModel, write_simulation};
 use super::touched::{RegionError, TouchedTruth};
-use super::{CliError, Losses, print_result};
-use crate::io::atomic::write_atomically;
+use super::{CliError, Losses, print_result, write_json};
 use crate::io::features_file::read_features;
 use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
 use crate::sim::{PathParams, Plate, ScannerParams, StylusParams, measure_quality, plan_demo};
@@ -106,7 +104,7 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
         refine: summary,
         found,
     };
-    demo.write(arguments)?;
+    write_json(&arguments.out.join("summary.json"), &demo)?;
     print_result(&format!(
         "{demo}\nwrote {}; where it was wrong and is right: {}",
         arguments.out.display(),
@@ -126,14 +124,6 @@ impl ScanErrors {
             p95_mm: quality.p95 * 1e3,
             bias_mm: quality.bias * 1e3,
         })
-    }
-}
-
-impl DemoSummary {
-    fn write(&self, arguments: &DemoArguments) -> Result<(), CliError> {
-        let path = arguments.out.join("summary.json");
-        let text = serde_json::to_string_pretty(self).expect("numbers and names alone cannot fail");
-        write_atomically(&path, |out| writeln!(out, "{text}")).map_err(|source| CliError::Write { path, source })
     }
 }
 

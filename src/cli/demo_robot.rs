@@ -13,7 +13,7 @@ use super::compare::{CompareArguments, compared};
 use super::demo::{DemoArguments, TOLERANCE_MM};
 use super::probing::{Done, Probing, ProbingSummary};
 use super::progress::WorkProgress;
-use super::{CliError, Losses, print_result};
+use super::{CliError, Losses, not_written, print_result, write_json};
 use crate::features::{Feature, Kind};
 use crate::io::atomic::{create_folder, write_atomically};
 use crate::io::features_file::FeatureRecord;
@@ -53,7 +53,7 @@ struct ProbedError {
 pub(super) fn demo_robot(arguments: &DemoArguments) -> Result<Losses, CliError> {
     let plate = Plate::default();
     let out = &arguments.out;
-    create_folder(out).map_err(|source| CliError::Write { path: out.clone(), source })?;
+    create_folder(out).map_err(not_written(out))?;
     let [truth_path, scan_path, scene_path] = ["truth.ply", "scan.ply", "scene.yaml"].map(|name| out.join(name));
     let truth = plate.mesh(CHORD_ERROR)?;
     let scanning = WorkProgress::stage("scan");
@@ -63,8 +63,7 @@ pub(super) fn demo_robot(arguments: &DemoArguments) -> Result<Losses, CliError> 
     for (path, mesh) in [(&truth_path, &truth), (&scan_path, &scanned)] {
         write_mesh(path, mesh, MeshUnit::Millimetre).map_err(CliError::WriteMesh)?;
     }
-    write_atomically(&scene_path, |file| file.write_all(SCENE.as_bytes()))
-        .map_err(|source| CliError::Write { path: scene_path.clone(), source })?;
+    write_atomically(&scene_path, |file| file.write_all(SCENE.as_bytes())).map_err(not_written(&scene_path))?;
 
     let features = plate.features();
     let mut rng = Pcg64::seed_from_u64(arguments.seed);
@@ -91,9 +90,7 @@ pub(super) fn demo_robot(arguments: &DemoArguments) -> Result<Losses, CliError> 
         ProbedError::of(flag, truth, probed)
     });
     let demo = RobotSummary { probing: summary, errors: errors.collect() };
-    let path = out.join("summary.json");
-    let text = serde_json::to_string_pretty(&demo).expect("numbers and names alone cannot fail");
-    write_atomically(&path, |file| writeln!(file, "{text}")).map_err(|source| CliError::Write { path, source })?;
+    write_json(&out.join("summary.json"), &demo)?;
     print_result(&format!(
         "{demo}\nwrote {}: plan.png is what the arm would do, touches.png what it did, deviation.png what is right now",
         out.display()

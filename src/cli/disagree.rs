@@ -7,15 +7,14 @@ use clap::Args;
 use nalgebra::{Point3, Vector3};
 use serde::Serialize;
 
+use super::pictures::{file_name, today, view_from, write_coloured, write_picture};
 use super::progress::WorkProgress;
-use super::{CliError, Losses, counted, print_result};
+use super::{CliError, Losses, check_outputs, counted, print_report};
 use crate::compare::{
     BadTouches, Class, ClassMap, Disagreement, DisagreementRegion, IndexedMesh, PicturePanel, PictureParams,
-    RefinedShape, Scanner, VertexBasis, colour_of_class, disagreement, draw_picture,
+    RefinedShape, Scanner, VertexBasis, colour_of_class, disagreement,
 };
-use crate::io::atomic::{AtomicFile, is_same_file};
-use crate::io::mesh_file::{MeshUnit, VertexColumn, read_mesh, read_vertex_columns, write_mesh_with};
-use crate::io::png::write_png;
+use crate::io::mesh_file::{MeshUnit, VertexColumn, read_mesh, read_vertex_columns};
 use crate::io::touches_file::read_touches;
 use crate::mesh::{FaceTree, TriMesh};
 
@@ -138,13 +137,18 @@ pub(super) fn disagree(arguments: &DisagreeArguments) -> Result<Losses, CliError
     for (path, mesh, map) in
         [(&arguments.coloured, &refined, &found.refined), (&arguments.coloured_scan, &scan, &found.scan)]
     {
-        if let Some(path) = path {
-            write_coloured(path, mesh, map, unit)?;
-        }
+        let Some(path) = path else { continue };
+        let colours: Vec<_> = map.classes.iter().map(|&class| colour_of_class(class)).collect();
+        let in_mm: Vec<f32> = map.disagreement.iter().map(|d| (d * 1e3) as f32).collect();
+        let number: Vec<u8> = map.classes.iter().map(|&class| class as u8).collect();
+        let columns = [
+            VertexColumn { name: "disagreement_mm", values: in_mm.into() },
+            VertexColumn { name: "class", values: number.into() },
+        ];
+        write_coloured(path, mesh, unit, &colours, columns)?;
     }
     let report = DisagreeReport::of(&found);
-    let json = || serde_json::to_string(&report).expect("finite numbers and names alone cannot fail");
-    print_result(&if arguments.json { json() } else { report.to_string() });
+    print_report(arguments.json, &report, || report.to_string());
     Ok(Losses::new())
 }
 
@@ -162,20 +166,6 @@ fn read_known(path: &Path, unit: MeshUnit, mesh: &TriMesh) -> Result<Vec<VertexB
     Ok(support.iter().map(known).collect())
 }
 
-fn write_coloured(path: &Path, mesh: &TriMesh, map: &ClassMap, unit: MeshUnit) -> Result<(), CliError> {
-    let channel = |i: usize| map.classes.iter().map(|&class| colour_of_class(class)[i]).collect::<Vec<u8>>().into();
-    let in_mm: Vec<f32> = map.disagreement.iter().map(|d| (d * 1e3) as f32).collect();
-    let number: Vec<u8> = map.classes.iter().map(|&class| class as u8).collect();
-    let columns = [
-        VertexColumn { name: "red", values: channel(0) },
-        VertexColumn { name: "green", values: channel(1) },
-        VertexColumn { name: "blue", values: channel(2) },
-        VertexColumn { name: "disagreement_mm", values: in_mm.into() },
-        VertexColumn { name: "class", values: number.into() },
-    ];
-    write_mesh_with(path, mesh, &columns, unit).map_err(CliError::WriteMesh)
-}
-
 impl DisagreeArguments {
     /// Checks that the result can be written before the work begins.
     fn check_outputs(&self) -> Result<(), CliError> {
@@ -184,24 +174,8 @@ impl DisagreeArguments {
             ("--coloured", ".ply", &self.coloured),
             ("--coloured-scan", ".ply", &self.coloured_scan),
         ];
-        for (flag, ending, path) in
-            outputs.iter().filter_map(|(flag, ending, path)| Some((flag, ending, (*path).as_ref()?)))
-        {
-            let shown = path.display();
-            if !shown.to_string().to_ascii_lowercase().ends_with(ending) {
-                return Err(CliError::Usage(format!("{flag} {shown} must end in {ending}")));
-            }
-            if [&self.scan, &self.refined, &self.touches].into_iter().any(|input| is_same_file(input, path)) {
-                return Err(CliError::Usage(format!("{flag} would write over {shown}, which is read")));
-            }
-            AtomicFile::create(path).map(drop).map_err(|source| CliError::Write { path: path.clone(), source })?;
-        }
-        match &self.view {
-            Some(view) if !view.iter().all(|x| x.is_finite()) || view.iter().all(|x| *x == 0.0) => {
-                Err(CliError::Usage("--view must be a direction, such as 1,-1,0.5".to_owned()))
-            }
-            _ => Ok(()),
-        }
+        check_outputs(&outputs, &[&self.scan, &self.refined, &self.touches].map(Some), "read")?;
+        view_from(self.view.as_ref()).map(drop)
     }
 
     fn draw(&self, refined: &TriMesh, found: &Disagreement) -> Result<(), CliError> {
@@ -218,18 +192,16 @@ impl DisagreeArguments {
             ..PicturePanel::of(refined)
         };
         let panels = [panel(Some(&map.classes[..]), "why"), panel(None, "touch - scan")];
-        let file = |path: &Path| path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned());
+        let [refined_name, scan_name] = [&self.refined, &self.scan].map(|path| file_name(path));
         let params = PictureParams {
-            title: &format!("where {} and the scan {} disagree", file(&self.refined), file(&self.scan)),
-            caption: &super::today(),
+            title: &format!("where {refined_name} and the scan {scan_name} disagree"),
+            caption: &today(),
             range,
-            from: self.view.as_ref().map(|view| Vector3::from_column_slice(view)),
+            from: view_from(self.view.as_ref())?,
             weights: Some(&weights),
             ..PictureParams::default()
         };
-        let picture = draw_picture(&panels, &params);
-        let write = |source| CliError::Write { path: path.clone(), source };
-        write_png(path, picture.size, &picture.pixels).map_err(write)
+        write_picture(path, &panels, &params)
     }
 }
 

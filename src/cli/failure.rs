@@ -33,7 +33,8 @@ pub(super) enum ErrorForm {
 impl Failure {
     /// The failure that an error is.
     pub fn of(error: &CliError) -> Self {
-        let hint = match error.kind() {
+        let (kind, exit_code) = error.kind_and_exit_code();
+        let hint = match kind {
             "not_written" => Some("check that the folder exists, may be written to and has space left"),
             _ if is_missing(error) => {
                 Some("check the path: no file is there; a relative path begins at the present folder")
@@ -41,7 +42,7 @@ impl Failure {
             "scene" => Some("config/touchup.yaml lists every parameter with its unit and range"),
             _ => None,
         };
-        Self { kind: error.kind(), message: one_line(&error.to_string()), hint, exit_code: error.exit_code() }
+        Self { kind, message: one_line(&error.to_string()), hint, exit_code }
     }
 }
 

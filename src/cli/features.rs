@@ -7,7 +7,7 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 
 use super::progress::WorkProgress;
-use super::{CliError, Losses, check_kept, counted, print_result};
+use super::{CliError, Losses, check_kept, counted, print_report};
 use crate::features::clusters::{Cluster, ClusterParams, PaperParams, clusters, paper_clusters};
 use crate::features::curvature::curvature;
 use crate::features::{Detection, Feature, FittedTo, Kind, Measured};
@@ -81,14 +81,8 @@ pub(super) fn features(arguments: &FeaturesArguments) -> Result<Losses, CliError
     if let Some(out) = &arguments.out {
         write_features(out, &file)?;
     }
-    if arguments.json {
-        print_result(&serde_json::to_string(&file).expect("finite numbers and names alone cannot fail"));
-        return Ok(Losses::new());
-    }
-    print_result(&format!("mesh: {repair}\n{table}\nfound in {took_s:.2} s"));
-    if let Some(out) = &arguments.out {
-        print_result(&format!("wrote {}", out.display()));
-    }
+    let wrote = arguments.out.as_ref().map_or(String::new(), |out| format!("\nwrote {}", out.display()));
+    print_report(arguments.json, &file, || format!("mesh: {repair}\n{table}\nfound in {took_s:.2} s{wrote}"));
     Ok(Losses::new())
 }
 

@@ -17,6 +17,8 @@ mod found;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 mod node;
 mod offsets;
+mod output;
+mod pictures;
 mod probe;
 mod probing;
 mod progress;
@@ -35,23 +37,26 @@ mod ur;
 pub use threads::Threads;
 
 use failure::{ErrorForm, Failure};
+#[cfg(any(feature = "ros", feature = "r2r"))]
+use output::notify;
+use output::{
+    check_kept, check_kept_by, check_outputs, check_place, not_written, print_report, print_result, write_json,
+};
 
+use std::error::Error;
 use std::ffi::OsString;
-use std::io::{ErrorKind, Write, stdin, stdout};
+use std::fmt::Display;
+use std::io::{ErrorKind, stdin, stdout};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::SystemTime;
 
-use chrono::{DateTime, Utc};
 use clap::{CommandFactory, Parser, Subcommand};
 use touchup_core::numeric::counted;
 use tracing_subscriber::filter::{LevelFilter, Targets};
 
-use crate::align::{FeaturesError, IcpError, PairsError};
-use crate::calibrate::{PayloadError, TipError};
+use crate::align::{FeaturesError, IcpError};
 use crate::compare::CompareError;
 use crate::haptic::RefineError;
-use crate::io::atomic::is_same_file;
 use crate::io::features_file::FeaturesFileError;
 use crate::io::mesh_file::MeshFileError;
 use crate::io::recording::RecordingError;
@@ -179,14 +184,7 @@ enum CliError {
     #[error(transparent)]
     Table(#[from] TableError),
     #[error("{path}: {error}", path = path.display())]
-    Pairs { path: PathBuf, error: PairsError },
-    #[error("{path}: {error}", path = path.display())]
-    Payload { path: PathBuf, error: PayloadError },
-    #[error("{path}: {error}", path = path.display())]
-    Tip { path: PathBuf, error: TipError },
-    #[error("{path}: {found} dwells of half a second in contact, and {wanted} points picked on the scan; \
-             they are matched in order: dwell once on each, in the order of the file", path = path.display())]
-    Dwells { path: PathBuf, found: usize, wanted: usize },
+    Calibration { path: PathBuf, error: Box<dyn Error + Send + Sync> },
     #[error(transparent)]
     Live(#[from] LiveError),
     #[error("the mesh cannot be aligned with the truth: {0}")]
@@ -241,67 +239,54 @@ impl From<OutcomeError> for CliError {
 }
 
 impl CliError {
-    /// Kind of the error, as `--json` names it.
-    fn kind(&self) -> &'static str {
-        match self {
-            Self::Usage(_) => "usage",
-            Self::Scene(_) | Self::Setting(_) => "scene",
-            Self::ReadMesh(_) | Self::ReadTruth(_) | Self::Mesh(_) => "mesh",
-            Self::ReadRecording(_) => "recording",
-            Self::WriteMesh(_) | Self::WriteRecording(_) | Self::Write { .. } | Self::Stream(_) => "not_written",
-            Self::Touches(TouchesFileError::Write { .. }) | Self::Features(FeaturesFileError::Write { .. }) => {
-                "not_written"
-            }
-            Self::Session(_) => "session",
-            Self::Touches(_) => "touches",
-            Self::Features(_) => "features",
-            Self::Simulate(_) => "simulation",
-            Self::Refine(_) | Self::Live(_) => "refinement",
-            Self::Table(_) | Self::Pairs { .. } | Self::Payload { .. } | Self::Tip { .. } | Self::Dwells { .. } => {
-                "calibration"
-            }
-            Self::Align(_) | Self::AlignFeatures(_) => "alignment",
-            Self::Arm(_) => "arm",
-            Self::Explore(..) => "plan",
-            Self::Report(_) => "report",
-            Self::Compare(_) => "comparison",
-            #[cfg(any(feature = "ros", feature = "r2r"))]
-            Self::RosArguments(_) => "usage",
-            #[cfg(any(feature = "ros", feature = "r2r"))]
-            Self::Node(_) => "node",
-            #[cfg(any(feature = "ros", feature = "r2r"))]
-            Self::Ros(_) => "ros",
-            #[cfg(feature = "ur")]
-            Self::UrSetup(_) | Self::UrChild(_) => "arm",
-        }
+    /// What is wrong in a file of a calibration.
+    fn calibration(path: &Path, error: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
+        Self::Calibration { path: path.to_owned(), error: error.into() }
     }
 
-    fn exit_code(&self) -> u8 {
+    /// What an arm, or its work, came to.
+    fn arm(error: impl Display) -> Self {
+        Self::Arm(error.to_string())
+    }
+
+    /// Kind of the error, as `--json` names it, and exit code.
+    fn kind_and_exit_code(&self) -> (&'static str, u8) {
         match self {
-            Self::WriteMesh(_) | Self::WriteRecording(_) | Self::Write { .. } | Self::Stream(_) => 1,
-            Self::Touches(TouchesFileError::Write { .. }) | Self::Features(FeaturesFileError::Write { .. }) => 1,
-            Self::Usage(_) | Self::Explore(..) => 2,
-            Self::Arm(_) | Self::Report(_) => 1,
+            Self::Usage(_) => ("usage", 2),
+            Self::WriteMesh(_) | Self::WriteRecording(_) | Self::Write { .. } | Self::Stream(_) => ("not_written", 1),
+            Self::Touches(TouchesFileError::Write { .. }) => ("not_written", 1),
+            Self::Features(FeaturesFileError::Write { .. }) => ("not_written", 1),
+            // settings come from a scene file: its flags are checked before
+            Self::Scene(_) | Self::Setting(_) => ("scene", 3),
+            Self::ReadMesh(_) | Self::ReadTruth(_) | Self::Mesh(_) => ("mesh", 3),
+            Self::ReadRecording(_) => ("recording", 3),
+            Self::Session(_) => ("session", 3),
+            Self::Touches(_) => ("touches", 3),
+            Self::Features(_) => ("features", 3),
+            Self::Simulate(SimError::BadParameter { .. } | SimError::TooFine { .. } | SimError::TooCoarse { .. }) => {
+                ("simulation", 2)
+            }
+            Self::Simulate(_) => ("simulation", 3),
+            Self::Refine(_) | Self::Live(_) => ("refinement", 3),
+            Self::Table(_) | Self::Calibration { .. } => ("calibration", 3),
+            Self::Align(_) | Self::AlignFeatures(_) => ("alignment", 3),
+            Self::Arm(_) => ("arm", 1),
+            Self::Explore(..) => ("plan", 2),
+            Self::Report(_) => ("report", 1),
+            Self::Compare(_) => ("comparison", 3),
             #[cfg(any(feature = "ros", feature = "r2r"))]
-            Self::RosArguments(_) => 2,
+            Self::RosArguments(_) => ("usage", 2),
             #[cfg(any(feature = "ros", feature = "r2r"))]
-            Self::Ros(_) => 1,
-            #[cfg(feature = "ur")]
-            Self::UrSetup(_) | Self::UrChild(_) => 1,
+            Self::Ros(_) => ("ros", 1),
             #[cfg(any(feature = "ros", feature = "r2r"))]
             Self::Node(error) => match error {
-                NodeError::NoScan | NodeError::RegionWithRobot => 2,
-                NodeError::Scene(_) | NodeError::Scan(_) | NodeError::NothingMoves => 3,
-                NodeError::Setting(_) | NodeError::Refine(_) | NodeError::Live(_) => 3,
-                _ => 1,
+                NodeError::NoScan | NodeError::RegionWithRobot => ("node", 2),
+                NodeError::Scene(_) | NodeError::Scan(_) | NodeError::NothingMoves => ("node", 3),
+                NodeError::Setting(_) | NodeError::Refine(_) | NodeError::Live(_) => ("node", 3),
+                _ => ("node", 1),
             },
-            Self::Simulate(SimError::BadParameter { .. } | SimError::TooFine { .. } | SimError::TooCoarse { .. }) => 2,
-            // settings come from a scene file: its flags are checked before
-            Self::Scene(_) | Self::ReadMesh(_) | Self::ReadTruth(_) | Self::ReadRecording(_) | Self::Simulate(_) => 3,
-            Self::Touches(_) | Self::Features(_) | Self::Session(_) => 3,
-            Self::Table(_) | Self::Pairs { .. } | Self::Payload { .. } | Self::Tip { .. } | Self::Dwells { .. } => 3,
-            Self::Mesh(_) | Self::Setting(_) | Self::Refine(_) | Self::Live(_) => 3,
-            Self::Align(_) | Self::AlignFeatures(_) | Self::Compare(_) => 3,
+            #[cfg(feature = "ur")]
+            Self::UrSetup(_) | Self::UrChild(_) => ("arm", 1),
         }
     }
 }
@@ -417,34 +402,4 @@ fn answer_steps() -> Result<Losses, CliError> {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error.into()),
         _ => Ok(Losses::new()),
     }
-}
-
-/// Refuses an output that would take the place of the input.
-fn check_kept(flag: &str, input: &Path, output: &Path) -> Result<(), CliError> {
-    check_kept_by("--out", flag, input, output)
-}
-
-/// … by the flag `by`.
-fn check_kept_by(by: &str, flag: &str, input: &Path, output: &Path) -> Result<(), CliError> {
-    if !is_same_file(input, output) {
-        return Ok(());
-    }
-    let path = output.display();
-    Err(CliError::Usage(format!("{by} would write over {path}, which {flag} reads: choose another place")))
-}
-
-/// One line on stderr that is no error.
-#[cfg(any(feature = "ros", feature = "r2r"))]
-fn notify(line: &str) {
-    let _ = writeln!(std::io::stderr(), "touchup: {}", line.replace('\n', " "));
-}
-
-/// The date of the system clock (UTC), as pictures carry it.
-fn today() -> String {
-    DateTime::<Utc>::from(SystemTime::now()).format("%Y-%m-%d").to_string()
-}
-
-/// One line, or several, on stdout. A reader that has gone away is no error of ours.
-fn print_result(text: &str) {
-    let _ = writeln!(stdout(), "{text}");
 }

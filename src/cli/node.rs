@@ -9,7 +9,7 @@ use clap::Args;
 use tokio::signal::unix::{SignalKind, signal};
 
 use super::arm::connect_ur;
-use super::{CliError, Losses, counted, notify, print_result};
+use super::{CliError, Losses, counted, notify, print_report, print_result};
 use crate::io::mesh_file::{MeshFile, read_mesh};
 use crate::live::Quantiles;
 use crate::ros;
@@ -52,11 +52,7 @@ pub(super) fn node(arguments: &NodeArguments, ros: &[String]) -> Result<Losses, 
         topics.join(" and ")
     ));
     let NodeEnd { folder, report } = running.join()?;
-    if arguments.json {
-        print_result(&serde_json::to_string(&report).expect("numbers and names alone cannot fail"));
-    } else {
-        print_result(&format!("{report}\nwrote {}", folder.join("refined.ply").display()));
-    }
+    print_report(arguments.json, &report, || format!("{report}\nwrote {}", folder.join("refined.ply").display()));
     Ok(losses(&report))
 }
 

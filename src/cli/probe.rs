@@ -7,8 +7,8 @@ use clap::Args;
 use serde::Serialize;
 
 use super::arm::{ArmArguments, RobotName};
-use super::probing::{Done, Probing, Ready, flag_of, picture_files};
-use super::{CliError, Losses, counted, print_result};
+use super::probing::{Done, Probing, Ready, flag_of};
+use super::{CliError, Losses, counted, print_report};
 use crate::probing::arm::{Arm, Narrower};
 use crate::probing::execute::{Flag, Plan};
 
@@ -105,21 +105,16 @@ impl ProbeArguments {
         let plans = probing.planned(ready, arm)?;
         if self.dry_run {
             let report = DryRunReport::of(probing.flags, &plans, self.out.join("plan.png"));
-            if self.json {
-                print_result(&serde_json::to_string(&report).expect("numbers and names alone cannot fail"));
-            } else {
-                print_result(&report.to_string());
-            }
+            print_report(self.json, &report, || report.to_string());
             return Ok(Losses::new());
         }
         ready.may_move()?;
         let Done { summary, losses, .. } = probing.done(ready, arm)?;
-        if self.json {
-            print_result(&serde_json::to_string(&summary).expect("numbers and names alone cannot fail"));
-        } else {
-            let files: Vec<String> = picture_files(&self.out).iter().map(|path| path.display().to_string()).collect();
-            print_result(&format!("{summary}\nwrote {}", files.join(", ")));
-        }
+        print_report(self.json, &summary, || {
+            let files =
+                ["plan.png", "touches.png", "probed.json"].map(|name| self.out.join(name).display().to_string());
+            format!("{summary}\nwrote {}", files.join(", "))
+        });
         Ok(losses)
     }
 }

@@ -14,9 +14,9 @@ use tracing::{debug, warn};
 use super::offsets::{ContactPoints, ScanOffset, WrenchOffset};
 use super::progress::WorkProgress;
 use super::rates::{Ended, LiveSummary, Rates};
-use super::{CliError, Losses, check_kept_by, counted, print_result};
+use super::{CliError, Losses, check_kept_by, check_place, counted, print_report};
 use crate::haptic::{RefineCounts, RefineError, RefineParams};
-use crate::io::atomic::{AtomicFile, is_same_file};
+use crate::io::atomic::is_same_file;
 use crate::io::mesh_file::{MeshFile, MeshFileError, MeshUnit, check_target, read_mesh};
 use crate::io::recording::Topics;
 use crate::live::{Latencies, Quantiles};
@@ -179,13 +179,11 @@ pub(super) fn refine(arguments: &RefineArguments) -> Result<Losses, CliError> {
     };
     let arguments = &completed;
     let Refined { repair, summary, losses } = arguments.refined()?;
-    if arguments.json {
-        print_result(&serde_json::to_string(&summary).expect("numbers and names alone cannot fail"));
-    } else {
+    print_report(arguments.json, &summary, || {
         let details =
             if arguments.verbose { format!("\nscan file: {repair}\n{}", summary.details()) } else { String::new() };
-        print_result(&format!("{summary}{details}\nwrote {}", arguments.out.display()));
-    }
+        format!("{summary}{details}\nwrote {}", arguments.out.display())
+    });
     Ok(losses)
 }
 
@@ -494,7 +492,7 @@ impl RefineArguments {
             for (read, input) in inputs.into_iter().filter_map(|(read, input)| Some((read, input?))) {
                 check_kept_by(flag, read, input, out)?;
             }
-            AtomicFile::create(out).map(drop).map_err(|source| CliError::Write { path: (*out).clone(), source })?;
+            check_place(out)?;
         }
         Ok(())
     }

@@ -9,7 +9,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::progress::WorkProgress;
-use super::{CliError, Losses, counted, notify, print_result};
+use super::{CliError, Losses, counted, notify, print_report};
 use crate::io::recording::Topics;
 use crate::replay::{Recording, each_message, marker_filter};
 use crate::ros;
@@ -122,13 +122,11 @@ pub(super) fn replay(arguments: &ReplayArguments, ros: &[String]) -> Result<Loss
     if listeners.contains(&0) {
         losses.push("a subscriber left before the end".to_owned());
     }
-    if arguments.json {
-        print_result(&serde_json::to_string(&played).expect("numbers alone cannot fail"));
-    } else {
+    print_report(arguments.json, &played, || {
         let wrenches = counted(played.wrenches, "wrench", "wrenches");
         let poses = counted(played.poses, "pose", "poses");
-        print_result(&format!("played {wrenches} and {poses} in {:.1} s", played.played_s));
-    }
+        format!("played {wrenches} and {poses} in {:.1} s", played.played_s)
+    });
     Ok(losses)
 }
 

@@ -8,7 +8,7 @@ use clap::Args;
 use tracing::warn;
 
 use super::progress::WorkProgress;
-use super::{CliError, Losses, check_kept, print_result};
+use super::{CliError, Losses, check_kept, not_written, print_result};
 use crate::io::atomic::create_folder;
 use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh, write_mesh};
 use crate::io::recording::{Record, Topics, write_recording};
@@ -128,7 +128,7 @@ pub(super) fn write_simulation(
     model: &TouchModel,
     folder: &Path,
 ) -> Result<Simulated, CliError> {
-    create_folder(folder).map_err(|source| CliError::Write { path: folder.to_owned(), source })?;
+    create_folder(folder).map_err(not_written(folder))?;
     let stage = WorkProgress::stage("scan");
     let scan = scan(surface, scanner)?;
     drop(stage);

@@ -14,7 +14,7 @@ use clap::{Args, Subcommand};
 use serde::Serialize;
 
 use super::progress::WorkProgress;
-use super::{CliError, Losses, check_kept, print_result};
+use super::{CliError, Losses, check_kept, not_written, print_report};
 use crate::calibrate::VectorEstimate;
 use crate::io::atomic::write_atomically;
 use crate::io::recording::Topics;
@@ -104,13 +104,8 @@ impl CalibrationTarget {
             text => text.to_owned(),
         };
         let text = Scene::edited(&start, settings, remark, expected)?;
-        write_atomically(&self.out, |file| file.write_all(text.as_bytes()))
-            .map_err(|source| CliError::Write { path: self.out.clone(), source })?;
-        if self.json {
-            print_result(&serde_json::to_string(found).expect("numbers and names alone cannot fail"));
-        } else {
-            print_result(&format!("{found}\nwrote {}", self.out.display()));
-        }
+        write_atomically(&self.out, |file| file.write_all(text.as_bytes())).map_err(not_written(&self.out))?;
+        print_report(self.json, found, || format!("{found}\nwrote {}", self.out.display()));
         Ok(())
     }
 }

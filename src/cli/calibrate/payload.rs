@@ -73,7 +73,7 @@ pub(super) fn payload(arguments: &PayloadArguments) -> Result<Losses, CliError> 
     let (poses, wrench_frame, losses) = arguments.poses(&draft)?;
     let mounted = draft.scene.compensator_params(wrench_frame).pose_ts.rotation;
     let params = PayloadParams { wrench_frame, r_ts: mounted, gravity };
-    let fit = fit_payload(&poses, &params).map_err(|error| CliError::Payload { path: path.clone(), error })?;
+    let fit = fit_payload(&poses, &params).map_err(|error| CliError::calibration(path, error))?;
     warn_of_residuals(&fit, "is the sensor mounted as compensation.sensor_orientation_xyzw says, ");
     let found = PayloadFound::of(&fit, ["sensor", "poses"]);
     arguments.target.write(&draft, &found.change(&draft), &found)?;

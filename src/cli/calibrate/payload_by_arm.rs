@@ -31,7 +31,7 @@ pub(super) fn payload(arguments: &PayloadArguments, robot: RobotName) -> Result<
     let PayloadReadings { segments, not_reached } = cell.with(robot, &ready, truth, |arm| {
         let mut world = ready.static_world();
         let mut prober = Prober::new(arm, &ready.cell, &ready.params, &mut world);
-        prober.measure_payload().map_err(|error| CliError::Arm(error.to_string()))
+        prober.measure_payload().map_err(CliError::arm)
     })?;
     drop(measuring);
     let poses: Vec<StaticPose> = segments.iter().map(static_pose).collect();

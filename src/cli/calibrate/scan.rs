@@ -47,7 +47,7 @@ pub(super) fn scan(arguments: &ScanArguments) -> Result<Losses, CliError> {
         None => (read_pairs(path)?, Losses::new()),
     };
     let params = PairsParams { sigma: sigma_mm.map(|sigma| sigma / 1e3), ..PairsParams::default() };
-    let fit = fit_pairs(&pairs, &params).map_err(|error| CliError::Pairs { path: path.clone(), error })?;
+    let fit = fit_pairs(&pairs, &params).map_err(|error| CliError::calibration(path, error))?;
     warn_of_gravity(&draft.scene);
     let found = ScanFound::of(&pairs, names, &fit);
     target.write(&draft, &found.change(&draft), &found)?;
@@ -76,8 +76,13 @@ impl ScanArguments {
         })?;
         let segments = finder.finish();
         if segments.len() != file.pairs.len() {
-            let (found, wanted) = (segments.len(), file.pairs.len());
-            return Err(CliError::Dwells { path: bag.to_owned(), found, wanted });
+            let why = format!(
+                "{} dwells of half a second in contact, and {} points picked on the scan; they are matched in order: dwell \
+                 once on each, in the order of the file",
+                segments.len(),
+                file.pairs.len()
+            );
+            return Err(CliError::calibration(bag, why));
         }
         for (pair, rest) in file.pairs.iter_mut().zip(segments) {
             pair.to = rest.point;

@@ -76,8 +76,7 @@ pub(super) fn tip(arguments: &TipArguments) -> Result<Losses, CliError> {
     // the poses as they are recorded: an older offset does not count
     scene.tip.iter_mut().for_each(|tip| tip.offset = None);
     let replayed = source.replay(source.open(bag)?, &scene, |sample| swing.push(sample.pose_ot))?;
-    let fit =
-        fit_tip(&swing.poses, &TipFitParams::default()).map_err(|error| CliError::Tip { path: bag.clone(), error })?;
+    let fit = fit_tip(&swing.poses, &TipFitParams::default()).map_err(|error| CliError::calibration(bag, error))?;
     let found = TipFound::of(&fit);
     target.write(&draft, &found.change(&draft), &found)?;
     Ok(replayed.losses)

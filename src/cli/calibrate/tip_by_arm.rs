@@ -36,10 +36,10 @@ pub(super) fn tip(arguments: &TipArguments, robot: RobotName, spot: &str) -> Res
     let TipPoses { poses_bf, normal_b, not_reached } = cell.with(robot, &ready, truth, |arm| {
         let mut world = ready.static_world();
         let mut prober = Prober::new(arm, &ready.cell, &ready.params, &mut world);
-        prober.measure_tip(&place).map_err(|error| CliError::Arm(error.to_string()))
+        prober.measure_tip(&place).map_err(CliError::arm)
     })?;
     drop(touching);
-    let fit = fit_tip_by_plane(&poses_bf, &normal_b).map_err(|error| CliError::Arm(error.to_string()))?;
+    let fit = fit_tip_by_plane(&poses_bf, &normal_b).map_err(CliError::arm)?;
     let found = PivotFound::of(&fit, &ready.cell, &not_reached);
     target.write(&draft, &found.change(&draft), &found)?;
     Ok(Losses::new())

@@ -12,7 +12,7 @@ use crate::align::{
     align_features, fit_pairs, icp,
 };
 use crate::cli::progress::WorkProgress;
-use crate::cli::{CliError, Threads, counted, print_result};
+use crate::cli::{CliError, Threads, counted, print_report};
 use crate::compare::{IndexedMesh, sample_surface, surface_area};
 use crate::features::detect;
 use crate::io::pairs_file::read_pairs;
@@ -170,8 +170,7 @@ pub(super) fn aligned_by_features(
         (None, None) => &found[0],
         (None, Some(error)) => {
             let choices = Choices::of(&found, counts, &error);
-            let as_json = || serde_json::to_string(&choices).expect("numbers and names alone cannot fail");
-            print_result(&if json { as_json() } else { choices.to_string() });
+            print_report(json, &choices, || choices.to_string());
             return Err(error.into());
         }
     };
@@ -189,11 +188,10 @@ pub(super) fn aligned_by_features(
 /// The motion that fits pairs of picked points; `scan` is the mesh and `space` the truth.
 ///
 /// # Errors
-/// [`CliError::Table`], [`CliError::Pairs`].
+/// [`CliError::Table`], [`CliError::Calibration`].
 pub(super) fn aligned_by_pairs(path: &Path) -> Aligned {
     let file = read_pairs(path)?;
-    let refused = |error| CliError::Pairs { path: path.to_owned(), error };
-    let fit = fit_pairs(&file.pairs, &PairsParams::default()).map_err(refused)?;
+    let fit = fit_pairs(&file.pairs, &PairsParams::default()).map_err(|error| CliError::calibration(path, error))?;
     let residual = |(r, name): (&Vector3<f64>, &String)| Residual {
         pair: name.clone(),
         residual_mm: mm(*r),

@@ -13,7 +13,7 @@ use tracing::info;
 
 use super::progress::WorkProgress;
 use super::refine::{RefineArguments, Refined};
-use super::{CliError, Losses};
+use super::{CliError, Losses, not_written};
 use crate::features::Kind;
 use crate::io::atomic::create_folder;
 use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
@@ -139,14 +139,14 @@ impl Probing<'_> {
     /// Reads scene and scan.
     pub fn ready(&self) -> Result<Ready, CliError> {
         let ready = Ready::read(self.scene, self.scan, self.unit)?;
-        create_folder(self.out).map_err(|source| CliError::Write { path: self.out.to_owned(), source })?;
+        create_folder(self.out).map_err(not_written(self.out))?;
         Ok(ready)
     }
 
     /// Plans all touches and draws the plan; nothing moves.
     pub fn planned(&self, ready: &Ready, arm: &mut dyn Arm) -> Result<Vec<Plan>, CliError> {
         let _planning = WorkProgress::stage("plan");
-        let now = arm.next_state().map_err(|error| CliError::Arm(error.to_string()))?;
+        let now = arm.next_state().map_err(CliError::arm)?;
         let world = ready.static_world();
         let plan_of = |flag: &Flag| {
             plan(&ready.cell, &ready.params, &world, flag, &now).map_err(|error| CliError::Explore(flag.id, error))
@@ -173,8 +173,7 @@ impl Probing<'_> {
         // whatever becomes of the mesh, what was measured is kept
         ProbedFile::of(&probed, self.flags).write(self.out)?;
         let path = self.out.join("probed_touches.jsonl");
-        write_probed_touches(&probed, ready.params.pattern.ball_radius, &path)
-            .map_err(|source| CliError::Write { path, source })?;
+        write_probed_touches(&probed, ready.params.pattern.ball_radius, &path).map_err(not_written(&path))?;
         let messages = world.finish()?;
         let bag = self.out.join("touch.mcap");
         write_recording(&bag, &probe_topics(), BASE_FRAME, PROBE_FRAME, messages).map_err(CliError::WriteRecording)?;
@@ -216,9 +215,4 @@ pub(super) fn flag_of(id: u32, text: &str, radius: f64) -> Result<Flag, CliError
         [x, y, z, radius] if radius > 0.0 => Ok(Flag { id, kind, place: Point3::new(x, y, z), radius }),
         _ => Err(wrong()),
     }
-}
-
-/// The files that the result names.
-pub(super) fn picture_files(out: &Path) -> Vec<PathBuf> {
-    ["plan.png", "touches.png", "probed.json"].map(|name| out.join(name)).to_vec()
 }

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use nalgebra::{Point3, Vector3};
 
+use crate::cli::pictures::write_picture;
 use crate::cli::{CliError, counted};
-use crate::compare::{DrawnMesh, PicturePanel, PictureParams, Rgb, draw_picture};
-use crate::io::png::write_png;
+use crate::compare::{DrawnMesh, PicturePanel, PictureParams, Rgb};
 use crate::mesh::TriMesh;
 use crate::probing::execute::{Flag, Plan, Probed};
 
@@ -47,8 +47,7 @@ fn write(
         .map(|(mesh, paint, title, note)| PicturePanel { paint: Some(paint), title, note, ..PicturePanel::of(mesh) })
         .collect();
     let params = PictureParams { title, from: Some(Vector3::from(FROM)), legend, ..PictureParams::default() };
-    let picture = draw_picture(&panels, &params);
-    write_png(path, picture.size, &picture.pixels).map_err(|source| CliError::Write { path: path.to_owned(), source })
+    write_picture(path, &panels, &params)
 }
 
 fn flagged(drawing: &mut DrawnMesh, flags: &[Flag], size: f64) {

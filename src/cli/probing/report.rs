@@ -1,15 +1,13 @@
 //! Probing results, as a table, as JSON, and touch by touch.
 
 use std::fmt;
-use std::io::Write;
 use std::path::Path;
 
 use serde::Serialize;
 
 use crate::cli::refine::RefineSummary;
-use crate::cli::{CliError, counted};
+use crate::cli::{CliError, counted, write_json};
 use crate::features::Kind;
-use crate::io::atomic::write_atomically;
 use crate::io::features_file::FeatureRecord;
 use crate::probing::execute::{Ending, Flag, Probed, ProbedSlide};
 
@@ -122,9 +120,7 @@ impl ProbedFile {
     }
 
     pub fn write(&self, folder: &Path) -> Result<(), CliError> {
-        let path = folder.join("probed.json");
-        let text = serde_json::to_string_pretty(self).expect("numbers and names alone cannot fail");
-        write_atomically(&path, |out| writeln!(out, "{text}")).map_err(|source| CliError::Write { path, source })
+        write_json(&folder.join("probed.json"), self)
     }
 }
 

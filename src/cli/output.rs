@@ -1,0 +1,79 @@
+//! What the verbs write: results on stdout, files, and the checks of their places before the work begins.
+
+use std::io::{self, Write, stdout};
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::CliError;
+use crate::io::atomic::{AtomicFile, is_same_file, write_atomically};
+
+/// One line, or several, on stdout. A reader that has gone away is no error of ours.
+pub(super) fn print_result(text: &str) {
+    let _ = writeln!(stdout(), "{text}");
+}
+
+/// A result as one JSON object, or in words.
+pub(super) fn print_report(as_json: bool, report: &impl Serialize, in_words: impl FnOnce() -> String) {
+    let json = || serde_json::to_string(report).expect("finite numbers and names alone cannot fail");
+    print_result(&if as_json { json() } else { in_words() });
+}
+
+/// One line on stderr that is no error.
+#[cfg(any(feature = "ros", feature = "r2r"))]
+pub(super) fn notify(line: &str) {
+    let _ = writeln!(io::stderr(), "touchup: {}", line.replace('\n', " "));
+}
+
+/// Makes the error of a file or folder that cannot be written.
+pub(super) fn not_written(path: &Path) -> impl FnOnce(io::Error) -> CliError {
+    |source| CliError::Write { path: path.to_owned(), source }
+}
+
+/// Writes a result as JSON.
+pub(super) fn write_json(path: &Path, report: &impl Serialize) -> Result<(), CliError> {
+    let text = serde_json::to_string_pretty(report).expect("numbers and names alone cannot fail");
+    write_atomically(path, |out| writeln!(out, "{text}")).map_err(not_written(path))
+}
+
+/// Refuses an output that would take the place of the input.
+pub(super) fn check_kept(flag: &str, input: &Path, output: &Path) -> Result<(), CliError> {
+    check_kept_by("--out", flag, input, output)
+}
+
+/// … by the flag `by`.
+pub(super) fn check_kept_by(by: &str, flag: &str, input: &Path, output: &Path) -> Result<(), CliError> {
+    if !is_same_file(input, output) {
+        return Ok(());
+    }
+    let path = output.display();
+    Err(CliError::Usage(format!("{by} would write over {path}, which {flag} reads: choose another place")))
+}
+
+/// Checks that a file can be written.
+pub(super) fn check_place(path: &Path) -> Result<(), CliError> {
+    AtomicFile::create(path).map(drop).map_err(not_written(path))
+}
+
+/// Checks names and places of outputs.
+///
+/// - `outputs`: flag, ending and path of each.
+/// - `inputs`: what none of them may write over, and `used`: what becomes of these.
+pub(super) fn check_outputs(
+    outputs: &[(&str, &str, &Option<PathBuf>)],
+    inputs: &[Option<&PathBuf>],
+    used: &str,
+) -> Result<(), CliError> {
+    for (flag, ending, path) in outputs {
+        let Some(path) = path else { continue };
+        let shown = path.display();
+        if !shown.to_string().to_ascii_lowercase().ends_with(ending) {
+            return Err(CliError::Usage(format!("{flag} {shown} must end in {ending}")));
+        }
+        if inputs.iter().flatten().any(|input| is_same_file(input, path)) {
+            return Err(CliError::Usage(format!("{flag} would write over {shown}, which is {used}")));
+        }
+        check_place(path)?;
+    }
+    Ok(())
+}

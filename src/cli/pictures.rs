@@ -1,0 +1,59 @@
+//! What the verbs that draw have in common.
+
+use std::path::Path;
+use std::time::SystemTime;
+
+use chrono::{DateTime, Utc};
+use nalgebra::Vector3;
+
+use super::CliError;
+use super::output::not_written;
+use crate::compare::{PicturePanel, PictureParams, Rgb, draw_picture};
+use crate::io::mesh_file::{MeshUnit, VertexColumn, write_mesh_with};
+use crate::io::png::write_png;
+use crate::mesh::TriMesh;
+
+/// The date of the system clock (UTC), as pictures carry it.
+pub(super) fn today() -> String {
+    DateTime::<Utc>::from(SystemTime::now()).format("%Y-%m-%d").to_string()
+}
+
+/// The last part of a path.
+pub(super) fn file_name(path: &Path) -> String {
+    path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned())
+}
+
+/// The direction that `--view` names.
+pub(super) fn view_from(view: Option<&Vec<f64>>) -> Result<Option<Vector3<f64>>, CliError> {
+    match view {
+        Some(view) if !view.iter().all(|x| x.is_finite()) || view.iter().all(|x| *x == 0.0) => {
+            Err(CliError::Usage("--view must be a direction, such as 1,-1,0.5".to_owned()))
+        }
+        view => Ok(view.map(|view| Vector3::from_column_slice(view))),
+    }
+}
+
+/// Draws panels beside each other into a file.
+pub(super) fn write_picture(
+    path: &Path,
+    panels: &[PicturePanel<'_>],
+    params: &PictureParams<'_>,
+) -> Result<(), CliError> {
+    let picture = draw_picture(panels, params);
+    write_png(path, picture.size, &picture.pixels).map_err(not_written(path))
+}
+
+/// Writes a mesh as a PLY in colours, with further columns.
+pub(super) fn write_coloured(
+    path: &Path,
+    mesh: &TriMesh,
+    unit: MeshUnit,
+    colours: &[Rgb],
+    further: impl IntoIterator<Item = VertexColumn<'static>>,
+) -> Result<(), CliError> {
+    let channel = |at: usize| colours.iter().map(|colour| colour[at]).collect::<Vec<u8>>().into();
+    let named = ["red", "green", "blue"].into_iter().enumerate();
+    let channels = named.map(|(at, name)| VertexColumn { name, values: channel(at) });
+    let columns: Vec<_> = channels.chain(further).collect();
+    write_mesh_with(path, mesh, &columns, unit).map_err(CliError::WriteMesh)
+}
