@@ -10,8 +10,8 @@ use serde::Serialize;
 use super::arm::{ArmArguments, millimetres};
 use super::probing::Ready;
 use super::progress::WorkProgress;
-use super::{CliError, Losses, print_report};
-use crate::probing::execute::{Prober, Repeatability};
+use super::{CliError, Losses, print_report, reported};
+use crate::probing::execute::{Prober, Repeatability, SpotTouch};
 
 /// Allowed number of touches; with three each side is approached, and the repeatability is known.
 const TOUCHES: std::ops::RangeInclusive<usize> = 3..=100;
@@ -77,55 +77,33 @@ pub(super) fn repeated(
     })
 }
 
-/// What `--json` prints.
-#[derive(Debug, Serialize)]
-struct Checked {
-    spot_mm: [f64; 3],
-    normal: [f64; 3],
-    touches: Vec<CheckedTouch>,
-    range_um: f64,
-    std_um: f64,
-    /// first side less the other
-    reversal_um: f64,
-    stiffness_n_per_mm: f64,
-    stiffness_std_n_per_mm: f64,
-    gate_um: f64,
-    passed: bool,
+reported! {
+    /// What `--json` prints.
+    #[derive(Debug, Serialize)]
+    struct Checked, fn of(found: &Repeatability, gate: f64) {
+        spot_mm: [f64; 3] = (found.place * 1e3).coords.into(),
+        normal: [f64; 3] = found.normal.into_inner().into(),
+        touches: Vec<CheckedTouch> = found.touches.iter().zip(found.deviations()).map(CheckedTouch::of).collect(),
+        range_um: f64 = found.range() * 1e6,
+        std_um: f64 = found.deviation() * 1e6,
+        /// first side less the other
+        reversal_um: f64 = found.reversal() * 1e6,
+        stiffness_n_per_mm: f64 = found.stiffness()[0] / 1e3,
+        stiffness_std_n_per_mm: f64 = found.stiffness()[1] / 1e3,
+        gate_um: f64 = gate,
+        passed: bool = found.range() * 1e6 <= gate,
+    }
 }
 
-#[derive(Debug, Serialize)]
-struct CheckedTouch {
-    side: i8,
-    /// outward from the mean of all
-    deviation_um: f64,
-    std_um: f64,
-    stiffness_n_per_mm: f64,
-    verdict: &'static str,
-}
-
-impl Checked {
-    fn of(found: &Repeatability, gate_um: f64) -> Self {
-        let touch = |(touch, deviation): (&crate::probing::execute::SpotTouch, f64)| CheckedTouch {
-            side: touch.side,
-            deviation_um: deviation * 1e6,
-            std_um: touch.sigma * 1e6,
-            stiffness_n_per_mm: touch.stiffness[0] / 1e3,
-            verdict: touch.verdict.name(),
-        };
-        let [stiffness, stiffness_std] = found.stiffness();
-        let range_um = found.range() * 1e6;
-        Self {
-            spot_mm: (found.place * 1e3).coords.into(),
-            normal: found.normal.into_inner().into(),
-            touches: found.touches.iter().zip(found.deviations()).map(touch).collect(),
-            range_um,
-            std_um: found.deviation() * 1e6,
-            reversal_um: found.reversal() * 1e6,
-            stiffness_n_per_mm: stiffness / 1e3,
-            stiffness_std_n_per_mm: stiffness_std / 1e3,
-            gate_um,
-            passed: range_um <= gate_um,
-        }
+reported! {
+    #[derive(Debug, Serialize)]
+    struct CheckedTouch, fn of(found: (&SpotTouch, f64)) {
+        side: i8 = found.0.side,
+        /// outward from the mean of all
+        deviation_um: f64 = found.1 * 1e6,
+        std_um: f64 = found.0.sigma * 1e6,
+        stiffness_n_per_mm: f64 = found.0.stiffness[0] / 1e3,
+        verdict: &'static str = found.0.verdict.name(),
     }
 }
 

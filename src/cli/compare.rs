@@ -6,7 +6,7 @@ mod table;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use serde::Serialize;
 use tracing::warn;
 
@@ -14,7 +14,7 @@ use self::alignment::{Alignment, aligned_by_features, aligned_by_icp, aligned_by
 use self::table::ComparisonReport;
 use super::pictures::{file_name, today, view_from, write_coloured, write_picture};
 use super::progress::WorkProgress;
-use super::{CliError, Losses, Threads, check_outputs, print_report};
+use super::{CliError, Losses, Threads, check_outputs, print_report, reported};
 use crate::compare::{
     CompareParams, Comparison, IndexedMesh, PictureLabel, PicturePanel, PictureParams, Regions, SupportRegion,
     colour_of, compare as compare_shapes,
@@ -109,13 +109,21 @@ pub(super) struct CompareReport {
     after: ComparisonReport,
 }
 
-#[derive(Debug, Serialize)]
-struct ShapeReport {
-    file: String,
-    vertices: usize,
-    faces: usize,
-    /// sides of the box around it
-    size_mm: [f64; 3],
+reported! {
+    #[derive(Debug, Serialize)]
+    struct ShapeReport, fn of(path: &Path, mesh: &TriMesh) {
+        file: String = path.display().to_string(),
+        vertices: usize = mesh.vertex_count(),
+        faces: usize = mesh.face_count(),
+        /// sides of the box around it
+        size_mm: [f64; 3] = (diagonal(mesh) * 1e3).into(),
+    }
+}
+
+/// From the lowest to the highest corner of the box around a mesh, m.
+fn diagonal(mesh: &TriMesh) -> Vector3<f64> {
+    let [low, high] = mesh.bounds();
+    high - low
 }
 
 /// A mesh that was read, brought into the frame of the truth.
@@ -389,11 +397,7 @@ fn unit_hint([mesh, truth]: [&TriMesh; 2], [mesh_unit, truth_unit]: [MeshUnit; 2
     /// A scan may show a part of the part.
     const PLAUSIBLE: std::ops::Range<f64> = 0.125..8.0;
     const ALIKE: std::ops::Range<f64> = 0.6..1.7;
-    let size = |mesh: &TriMesh| {
-        let [lo, hi] = mesh.bounds();
-        (hi - lo).norm()
-    };
-    let ratio = size(mesh) / size(truth);
+    let ratio = diagonal(mesh).norm() / diagonal(truth).norm();
     if PLAUSIBLE.contains(&ratio) {
         return None;
     }
@@ -408,13 +412,4 @@ fn unit_hint([mesh, truth]: [&TriMesh; 2], [mesh_unit, truth_unit]: [MeshUnit; 2
     let advice =
         if flags.is_empty() { "are these the same part?".to_owned() } else { format!("try {}", flags.join(" or ")) };
     Some(format!("the mesh is {factor:.1} times {comparative} than the truth: {advice}"))
-}
-
-impl ShapeReport {
-    fn of(path: &Path, mesh: &TriMesh) -> Self {
-        let [lo, hi] = mesh.bounds();
-        let size = (hi - lo) * 1e3;
-        let (vertices, faces) = (mesh.vertex_count(), mesh.face_count());
-        Self { file: path.display().to_string(), vertices, faces, size_mm: [size.x, size.y, size.z] }
-    }
 }

@@ -15,10 +15,11 @@ use super::progress::WorkProgress;
 use super::refine::{RefineArguments, RefineSummary, Refined};
 use super::simulate::{Simulated, TouchModel, write_simulation};
 use super::touched::{RegionError, TouchedTruth};
-use super::{CliError, Losses, print_result, write_json};
+use super::{CliError, Losses, print_result, reported, write_json};
 use crate::io::features_file::read_features;
 use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
-use crate::sim::{PathParams, Plate, ScannerParams, StylusParams, measure_quality, plan_demo};
+use crate::mesh::MeshError;
+use crate::sim::{PathParams, Plate, ScanQuality, ScannerParams, StylusParams, measure_quality, plan_demo};
 
 /// Largest distance of the written plate's round walls from circles, m.
 const CHORD_ERROR: f64 = 10e-6;
@@ -54,15 +55,17 @@ struct DemoSummary {
     found: FoundTable,
 }
 
-/// The scan as a whole against the part.
-#[derive(Debug, Serialize)]
-struct ScanErrors {
-    faces: usize,
-    edge_median_mm: f64,
-    mean_mm: f64,
-    rms_mm: f64,
-    p95_mm: f64,
-    bias_mm: f64,
+reported! {
+    /// The scan as a whole against the part.
+    #[derive(Debug, Serialize)]
+    struct ScanErrors, fn of(quality: &ScanQuality) {
+        faces: usize = quality.faces,
+        edge_median_mm: f64 = quality.edge_median * 1e3,
+        mean_mm: f64 = quality.mean * 1e3,
+        rms_mm: f64 = quality.rms * 1e3,
+        p95_mm: f64 = quality.p95 * 1e3,
+        bias_mm: f64 = quality.bias * 1e3,
+    }
 }
 
 pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
@@ -97,7 +100,7 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
     let _measuring = WorkProgress::stage("measure");
     let touched = TouchedTruth::of(&touch.moments);
     let demo = DemoSummary {
-        scan: ScanErrors::of(&plate, &scan)?,
+        scan: ScanErrors::of(&measure_quality(&scan, &plate, |_| true).ok_or(MeshError::Empty)?),
         touched_s: touch.moments.last().map_or(0.0, |moment| moment.t),
         before: touched.error(&plate, &scan),
         after: touched.error(&plate, &refined),
@@ -111,20 +114,6 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
         picture.display()
     ));
     Ok(losses)
-}
-
-impl ScanErrors {
-    fn of(plate: &Plate, scan: &crate::mesh::TriMesh) -> Result<Self, CliError> {
-        let quality = measure_quality(scan, plate, |_| true).ok_or(crate::mesh::MeshError::Empty)?;
-        Ok(Self {
-            faces: quality.faces,
-            edge_median_mm: quality.edge_median * 1e3,
-            mean_mm: quality.mean * 1e3,
-            rms_mm: quality.rms * 1e3,
-            p95_mm: quality.p95 * 1e3,
-            bias_mm: quality.bias * 1e3,
-        })
-    }
 }
 
 impl fmt::Display for DemoSummary {

@@ -13,8 +13,8 @@ use super::compare::{CompareArguments, compared};
 use super::demo::{DemoArguments, TOLERANCE_MM};
 use super::probing::{Done, Probing, ProbingSummary};
 use super::progress::WorkProgress;
-use super::{CliError, Losses, not_written, print_result, write_json};
-use crate::features::{Feature, Kind};
+use super::{CliError, Losses, not_written, print_result, reported, write_json};
+use crate::features::{Feature, Kind, Measured};
 use crate::io::atomic::{create_folder, write_atomically};
 use crate::io::features_file::FeatureRecord;
 use crate::io::mesh_file::{MeshUnit, write_mesh};
@@ -35,19 +35,21 @@ struct RobotSummary {
     errors: Vec<ProbedError>,
 }
 
-/// Errors of the probed features.
-#[derive(Debug, Serialize)]
-struct ProbedError {
-    name: &'static str,
-    /// error of the click
-    click_mm: f64,
-    touches: usize,
-    duration_s: f64,
-    largest_force_n: f64,
-    /// across the axis, of an edge across itself
-    place_mm: Option<f64>,
-    /// of the diameter, or of the width and the length
-    sizes_mm: Vec<f64>,
+reported! {
+    /// Errors of the probed features; `found` is what was measured of one, if anything was.
+    #[derive(Debug, Serialize)]
+    struct ProbedError, fn of(flag: &Flag, truth: &TruthFeature, probed: Option<&Probed>, found: Option<&Feature>) {
+        name: &'static str = truth.name,
+        /// error of the click
+        click_mm: f64 = (flag.place - truth.centre).xy().norm() * 1e3,
+        touches: usize = probed.map_or(0, |probed| probed.touches.len()),
+        duration_s: f64 = probed.map_or(0.0, |probed| probed.seconds),
+        largest_force_n: f64 = probed.map_or(0.0, |probed| probed.peak_force),
+        /// across the axis, of an edge across itself
+        place_mm: Option<f64> = found.map(|found| place_error(found, truth) * 1e3),
+        /// of the diameter, or of the width and the length
+        sizes_mm: Vec<f64> = found.map_or(Vec::new(), |found| size_errors(found, truth)),
+    }
 }
 
 pub(super) fn demo_robot(arguments: &DemoArguments) -> Result<Losses, CliError> {
@@ -82,12 +84,12 @@ pub(super) fn demo_robot(arguments: &DemoArguments) -> Result<Losses, CliError> 
     probing.planned(&ready, &mut arm)?;
     let Done { summary, probed, losses } = probing.done(&ready, &mut arm)?;
 
-    let named = probed.iter().filter_map(|one| one.found.as_ref()?.feature.as_ref()).map(FeatureRecord::from).collect();
+    let named = probed.iter().filter_map(feature_of).map(FeatureRecord::from).collect();
     let [refined, picture] = ["refined.ply", "deviation.png"].map(|name| out.join(name));
     compared(&CompareArguments::of_picture([refined, truth_path, scan_path, picture], named, TOLERANCE_MM))?;
     let errors = flags.iter().zip(&features).map(|(flag, truth)| {
         let probed = probed.iter().find(|probed| probed.flag == flag.id);
-        ProbedError::of(flag, truth, probed)
+        ProbedError::of(flag, truth, probed, probed.and_then(feature_of))
     });
     let demo = RobotSummary { probing: summary, errors: errors.collect() };
     write_json(&out.join("summary.json"), &demo)?;
@@ -96,6 +98,10 @@ pub(super) fn demo_robot(arguments: &DemoArguments) -> Result<Losses, CliError> 
         out.display()
     ));
     Ok(losses)
+}
+
+fn feature_of(probed: &Probed) -> Option<&Feature> {
+    probed.found.as_ref()?.feature.as_ref()
 }
 
 /// One click near a feature, as a person makes it: a kind, and no size.
@@ -111,38 +117,25 @@ fn clicked(id: u32, feature: &TruthFeature, rng: &mut Pcg64) -> Flag {
     Flag { id, kind: Some(kind), place, radius: CLICK }
 }
 
-impl ProbedError {
-    fn of(flag: &Flag, truth: &TruthFeature, probed: Option<&Probed>) -> Self {
-        let found = probed.and_then(|probed| probed.found.as_ref()?.feature.as_ref());
-        let (place, sizes) = found.map_or((None, Vec::new()), |found| {
-            let (place, sizes) = errors(found, truth);
-            (Some(place), sizes)
-        });
-        Self {
-            name: truth.name,
-            click_mm: (flag.place - truth.centre).xy().norm() * 1e3,
-            touches: probed.map_or(0, |probed| probed.touches.len()),
-            duration_s: probed.map_or(0.0, |probed| probed.seconds),
-            largest_force_n: probed.map_or(0.0, |probed| probed.peak_force),
-            place_mm: place.map(|error| error * 1e3),
-            sizes_mm: sizes.iter().map(|error| error * 1e3).collect(),
-        }
+/// Error of the place, m.
+fn place_error(found: &Feature, truth: &TruthFeature) -> f64 {
+    let off = found.centre.value - truth.centre;
+    match truth.shape {
+        // where along it the edge was touched is no error
+        TruthShape::Step { direction, .. } => (off - direction * off.dot(&direction)).norm(),
+        _ => off.norm(),
     }
 }
 
-/// Place and sizes against the drawing, m.
-fn errors(found: &Feature, truth: &TruthFeature) -> (f64, Vec<f64>) {
-    let off = found.centre.value - truth.centre;
-    let value = |measured: &Option<crate::features::Measured<f64>>| measured.as_ref().map_or(f64::NAN, |m| m.value);
+/// Errors of the sizes against the drawing, mm.
+fn size_errors(found: &Feature, truth: &TruthFeature) -> Vec<f64> {
+    let error = |measured: &Option<Measured<f64>>, size: f64| {
+        (measured.as_ref().map_or(f64::NAN, |measured| measured.value) - size) * 1e3
+    };
     match truth.shape {
-        TruthShape::Hole { diameter, .. } | TruthShape::Boss { diameter, .. } => {
-            (off.norm(), vec![value(&found.diameter) - diameter])
-        }
-        TruthShape::Slot { width, length, .. } => {
-            (off.norm(), vec![value(&found.width) - width, value(&found.length) - length])
-        }
-        // where along it the edge was touched is no error
-        TruthShape::Step { direction, .. } => ((off - direction * off.dot(&direction)).norm(), Vec::new()),
+        TruthShape::Hole { diameter, .. } | TruthShape::Boss { diameter, .. } => vec![error(&found.diameter, diameter)],
+        TruthShape::Slot { width, length, .. } => vec![error(&found.width, width), error(&found.length, length)],
+        TruthShape::Step { .. } => Vec::new(),
     }
 }
 

@@ -4,15 +4,15 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 use serde::Serialize;
 
 use super::pictures::{file_name, today, view_from, write_coloured, write_picture};
 use super::progress::WorkProgress;
-use super::{CliError, Losses, check_outputs, counted, print_report};
+use super::{CliError, Losses, check_outputs, counted, print_report, reported};
 use crate::compare::{
     BadTouches, Class, ClassMap, Disagreement, DisagreementRegion, IndexedMesh, PicturePanel, PictureParams,
-    RefinedShape, Scanner, VertexBasis, colour_of_class, disagreement,
+    RefinedShape, RigidOffset, Scanner, VertexBasis, colour_of_class, disagreement,
 };
 use crate::io::mesh_file::{MeshUnit, VertexColumn, read_mesh, read_vertex_columns};
 use crate::io::touches_file::read_touches;
@@ -47,72 +47,84 @@ pub(super) struct DisagreeArguments {
     json: bool,
 }
 
-/// What `--json` prints.
-#[derive(Debug, Serialize)]
-struct DisagreeReport {
-    /// `null` where too little was touched to know how the scanner errs
-    scanner: Option<ScannerReport>,
-    /// of the scan as a whole, taken off before places are judged
-    rigid_offset: Option<RigidOffsetReport>,
-    classes: Vec<ClassReport>,
-    regions: Vec<DisagreementRow>,
-    bad_touches: Vec<BadTouchReport>,
+reported! {
+    /// What `--json` prints.
+    #[derive(Debug, Serialize)]
+    struct DisagreeReport, fn of(found: &Disagreement) {
+        /// `null` where too little was touched to know how the scanner errs
+        scanner: Option<ScannerReport> = found.scanner.as_ref().map(ScannerReport::of),
+        /// of the scan as a whole, taken off before places are judged
+        rigid_offset: Option<RigidOffsetReport> = found.rigid_offset.as_ref().map(RigidOffsetReport::of),
+        classes: Vec<ClassReport> = Class::ALL.iter().enumerate().map(|(at, class)| ClassReport::of(found, at, class)).collect(),
+        regions: Vec<DisagreementRow> = found.regions.iter().map(DisagreementRow::of).collect(),
+        bad_touches: Vec<BadTouchReport> = found.bad_touches.iter().map(BadTouchReport::of).collect(),
+    }
 }
 
-#[derive(Debug, Serialize)]
-struct ScannerReport {
-    /// touch − scan where the scanner sees well: negative where the part looks too large
-    offset_mm: f64,
-    noise_mm: f64,
-    correlation_mm: f64,
-    edge_mm: f64,
-    sees_from_mm: f64,
-    places: usize,
+reported! {
+    #[derive(Debug, Serialize)]
+    struct ScannerReport, fn of(scanner: &Scanner) {
+        /// touch − scan where the scanner sees well: negative where the part looks too large
+        offset_mm: f64 = scanner.offset * 1e3,
+        noise_mm: f64 = scanner.noise * 1e3,
+        correlation_mm: f64 = scanner.correlation * 1e3,
+        edge_mm: f64 = scanner.edge * 1e3,
+        sees_from_mm: f64 = scanner.sees_from * 1e3,
+        places: usize = scanner.places,
+    }
 }
 
-#[derive(Debug, Serialize)]
-struct RigidOffsetReport {
-    /// would bring the scan onto the touches, at `center_mm`
-    shift_mm: [f64; 3],
-    /// and rotation vector
-    turn_deg: [f64; 3],
-    /// standard deviation on each axis
-    shift_std_mm: [f64; 3],
-    /// and about each
-    turn_std_deg: [f64; 3],
-    center_mm: [f64; 3],
+reported! {
+    #[derive(Debug, Serialize)]
+    struct RigidOffsetReport, fn of(offset: &RigidOffset) {
+        /// would bring the scan onto the touches, at `center_mm`
+        shift_mm: [f64; 3] = (offset.shift * 1e3).into(),
+        /// and rotation vector
+        turn_deg: [f64; 3] = offset.turn.map(f64::to_degrees).into(),
+        /// standard deviation on each axis
+        shift_std_mm: [f64; 3] = (offset.shift_sigma * 1e3).into(),
+        /// and about each
+        turn_std_deg: [f64; 3] = offset.turn_sigma.map(f64::to_degrees).into(),
+        center_mm: [f64; 3] = (offset.centre.coords * 1e3).into(),
+    }
 }
 
-#[derive(Debug, Serialize)]
-struct ClassReport {
-    class: &'static str,
-    /// as in the column `class`
-    number: usize,
-    refined_mm2: f64,
-    scan_mm2: f64,
+reported! {
+    #[derive(Debug, Serialize)]
+    struct ClassReport, fn of(found: &Disagreement, at: usize, known: &Class) {
+        class: &'static str = known.name(),
+        /// as in the column `class`
+        number: usize = at,
+        refined_mm2: f64 = found.refined.areas[at] * 1e6,
+        scan_mm2: f64 = found.scan.areas[at] * 1e6,
+    }
 }
 
-#[derive(Debug, Serialize)]
-struct DisagreementRow {
-    class: &'static str,
-    center_mm: [f64; 3],
-    area_mm2: f64,
-    mean_mm: f64,
-    sigmas: f64,
-    open_area_mm2: f64,
-    correlation_lengths: f64,
-    passes: usize,
-    edge_share_of_rim: f64,
+reported! {
+    #[derive(Debug, Serialize)]
+    struct DisagreementRow, fn of(region: &DisagreementRegion) {
+        class: &'static str = region.class.name(),
+        center_mm: [f64; 3] = (region.centre.coords * 1e3).into(),
+        area_mm2: f64 = region.area * 1e6,
+        mean_mm: f64 = region.mean * 1e3,
+        sigmas: f64 = region.evidence.sigmas,
+        open_area_mm2: f64 = region.evidence.open_area * 1e6,
+        correlation_lengths: f64 = region.evidence.lengths,
+        passes: usize = region.evidence.passes,
+        edge_share_of_rim: f64 = region.evidence.edges,
+    }
 }
 
-#[derive(Debug, Serialize)]
-struct BadTouchReport {
-    center_mm: [f64; 3],
-    touches: Vec<u32>,
-    off_mm: f64,
-    sigmas: f64,
-    rejected: usize,
-    against: usize,
+reported! {
+    #[derive(Debug, Serialize)]
+    struct BadTouchReport, fn of(bad: &BadTouches) {
+        center_mm: [f64; 3] = (bad.centre.coords * 1e3).into(),
+        touches: Vec<u32> = bad.touches.clone(),
+        off_mm: f64 = bad.off * 1e3,
+        sigmas: f64 = bad.sigmas,
+        rejected: usize = bad.rejected,
+        against: usize = bad.against,
+    }
 }
 
 /// The command: finds, and prints the result.
@@ -202,78 +214,6 @@ impl DisagreeArguments {
             ..PictureParams::default()
         };
         write_picture(path, &panels, &params)
-    }
-}
-
-fn mm(p: &Point3<f64>) -> [f64; 3] {
-    [p.x, p.y, p.z].map(|x| x * 1e3)
-}
-
-impl DisagreeReport {
-    fn of(found: &Disagreement) -> Self {
-        let class = |(number, class): (usize, Class)| ClassReport {
-            class: class.name(),
-            number,
-            refined_mm2: found.refined.areas[number] * 1e6,
-            scan_mm2: found.scan.areas[number] * 1e6,
-        };
-        Self {
-            scanner: found.scanner.as_ref().map(ScannerReport::of),
-            rigid_offset: found.rigid_offset.as_ref().map(|offset| RigidOffsetReport {
-                shift_mm: mm(&offset.shift.into()),
-                turn_deg: offset.turn.map(f64::to_degrees).into(),
-                shift_std_mm: mm(&offset.shift_sigma.into()),
-                turn_std_deg: offset.turn_sigma.map(f64::to_degrees).into(),
-                center_mm: mm(&offset.centre),
-            }),
-            classes: Class::ALL.into_iter().enumerate().map(class).collect(),
-            regions: found.regions.iter().map(DisagreementRow::of).collect(),
-            bad_touches: found.bad_touches.iter().map(BadTouchReport::of).collect(),
-        }
-    }
-}
-
-impl ScannerReport {
-    fn of(scanner: &Scanner) -> Self {
-        Self {
-            offset_mm: scanner.offset * 1e3,
-            noise_mm: scanner.noise * 1e3,
-            correlation_mm: scanner.correlation * 1e3,
-            edge_mm: scanner.edge * 1e3,
-            sees_from_mm: scanner.sees_from * 1e3,
-            places: scanner.places,
-        }
-    }
-}
-
-impl DisagreementRow {
-    fn of(region: &DisagreementRegion) -> Self {
-        let evidence = &region.evidence;
-        Self {
-            class: region.class.name(),
-            center_mm: mm(&region.centre),
-            area_mm2: region.area * 1e6,
-            mean_mm: region.mean * 1e3,
-            sigmas: evidence.sigmas,
-            open_area_mm2: evidence.open_area * 1e6,
-            correlation_lengths: evidence.lengths,
-            passes: evidence.passes,
-            edge_share_of_rim: evidence.edges,
-        }
-    }
-}
-
-impl BadTouchReport {
-    fn of(bad: &BadTouches) -> Self {
-        let BadTouches { touches, centre, off, sigmas, rejected, against } = bad;
-        Self {
-            center_mm: mm(centre),
-            touches: touches.clone(),
-            off_mm: off * 1e3,
-            sigmas: *sigmas,
-            rejected: *rejected,
-            against: *against,
-        }
     }
 }
 

@@ -52,6 +52,7 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
 use touchup_core::numeric::counted;
+use touchup_session::reported;
 use tracing_subscriber::filter::{LevelFilter, Targets};
 
 use crate::align::{FeaturesError, IcpError};

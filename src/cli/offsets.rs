@@ -5,29 +5,20 @@ use std::fmt;
 use nalgebra::Vector6;
 use serde::Serialize;
 
-use super::counted;
+use super::{counted, reported};
 use crate::haptic::{RefineParams, Registrar, Registration, RegistrationError, RegistrationParams};
 use crate::stylus::{ClockOffset, ContactSample, SettingError};
 
-/// Clock offset of the wrench against the pose; never applied automatically.
-#[derive(Clone, Copy, Debug, Serialize)]
-pub(super) struct WrenchOffset {
-    /// total offset: that of the scene and the correction
-    pub wrench_offset_ms: f64,
-    /// standard uncertainty
-    pub sigma_ms: f64,
-    /// number of contact onsets used
-    pub onsets: usize,
-}
-
-impl WrenchOffset {
-    /// - `applied_ns`: offset that the scene applies already.
-    pub fn of(found: &ClockOffset, applied_ns: i64) -> Self {
-        Self {
-            wrench_offset_ms: found.offset * 1e3 + applied_ns as f64 * 1e-6,
-            sigma_ms: found.sigma * 1e3,
-            onsets: found.onsets,
-        }
+reported! {
+    /// Clock offset of the wrench against the pose; never applied automatically.
+    #[derive(Clone, Copy, Debug, Serialize)]
+    pub(super) struct WrenchOffset, pub fn of(found: &ClockOffset, applied_ns: i64) {
+        /// total offset: that which the scene applies, and the correction
+        wrench_offset_ms: f64 = found.offset * 1e3 + applied_ns as f64 * 1e-6,
+        /// standard uncertainty
+        sigma_ms: f64 = found.sigma * 1e3,
+        /// number of contact onsets used
+        onsets: usize = found.onsets,
     }
 }
 
@@ -72,7 +63,7 @@ impl ScanOffset {
             Err(refused) => return Self::Refused { refused: refused.to_string() },
         };
         let sigma = covariance.diagonal().map(f64::sqrt);
-        let three = |v: &Vector6<f64>, first: usize, unit: f64| [0, 1, 2].map(|axis| v[first + axis] * unit);
+        let three = |v: &Vector6<f64>, first: usize, unit: f64| (v.fixed_rows::<3>(first) * unit).into();
         Self::Found {
             shift_mm: three(&twist, 0, 1e3),
             shift_sigma_mm: three(&sigma, 0, 1e3),
@@ -80,7 +71,7 @@ impl ScanOffset {
             turn_sigma_deg: three(&sigma, 3, 1f64.to_degrees()),
             surface_offset_mm: surface_offset[0] * 1e3,
             surface_offset_sigma_mm: surface_offset[1] * 1e3,
-            centre_mm: [centre.x, centre.y, centre.z].map(|x| x * 1e3),
+            centre_mm: (centre.coords * 1e3).into(),
         }
     }
 }

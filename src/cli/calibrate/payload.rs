@@ -9,7 +9,7 @@ use serde::Serialize;
 use tracing::warn;
 
 use super::super::arm::{CellArguments, RobotName, TruePayload};
-use super::super::{CliError, Losses};
+use super::super::{CliError, Losses, reported};
 use super::{CalibrationRecording, CalibrationTarget, Change, DraftScene, Vector, payload_by_arm, rounded};
 use crate::calibrate::{PayloadFit, PayloadParams, StaticPose, StaticSegmentFinder, StaticSegmentParams, fit_payload};
 use crate::io::static_poses::read_static_poses;
@@ -111,56 +111,34 @@ impl PayloadArguments {
     }
 }
 
-/// What `--json` prints.
-#[derive(Debug, Serialize)]
-pub(super) struct PayloadFound {
-    /// whose axes are those of the sensor, and whose those of the poses
-    #[serde(skip)]
-    axes: [&'static str; 2],
-    pub static_segments: usize,
-    /// those that did not fit, from 0 on
-    left_out: Vec<usize>,
-    tilt_deg: f64,
-    weight_n: f64,
-    weight_std_n: f64,
-    pub mass_kg: f64,
-    mass_std_kg: f64,
-    /// in the axes of the sensor, which of an arm are those of its flange
-    pub centre_mm: Vector,
-    /// in the axes of the poses, which of an arm are those of its base
-    gravity_m_per_s2: [f64; 3],
-    bias_force_n: Vector,
-    bias_torque_nm: Vector,
-    pub residual_force_n: f64,
-    pub residual_torque_nm: f64,
-    /// expected from the noise of the sensor
-    expected_residual_n: Option<f64>,
+reported! {
+    /// What `--json` prints; `named`: whose axes are those of the sensor, and whose those of the poses.
+    #[derive(Debug, Serialize)]
+    pub(super) struct PayloadFound, pub fn of(fit: &PayloadFit, named: [&'static str; 2]) {
+        #[serde(skip)]
+        axes: [&'static str; 2] = named,
+        pub static_segments: usize = fit.poses,
+        /// those that did not fit, from 0 on
+        left_out: Vec<usize> = fit.rejected.clone(),
+        tilt_deg: f64 = fit.tilt.to_degrees(),
+        weight_n: f64 = fit.weight[0],
+        weight_std_n: f64 = fit.weight[1],
+        pub mass_kg: f64 = fit.payload().mass,
+        mass_std_kg: f64 = fit.payload().mass * fit.weight[1] / fit.weight[0],
+        /// in the axes of the sensor, which of an arm are those of its flange
+        pub centre_mm: Vector = Vector::of(&fit.p_sc, 1e3),
+        /// in the axes of the poses, which of an arm are those of its base
+        gravity_m_per_s2: [f64; 3] = fit.payload().gravity_o.into(),
+        bias_force_n: Vector = Vector::of(&fit.bias_force, 1.0),
+        bias_torque_nm: Vector = Vector::of(&fit.bias_torque, 1.0),
+        pub residual_force_n: f64 = fit.rms_force,
+        pub residual_torque_nm: f64 = fit.rms_torque,
+        /// expected from the noise of the sensor
+        expected_residual_n: Option<f64> = fit.expected_force,
+    }
 }
 
 impl PayloadFound {
-    /// - `axes`: whose are those of the sensor, and whose those of the poses.
-    pub fn of(fit: &PayloadFit, axes: [&'static str; 2]) -> Self {
-        let payload = fit.payload();
-        let [weight, sigma] = fit.weight;
-        Self {
-            axes,
-            static_segments: fit.poses,
-            left_out: fit.rejected.clone(),
-            tilt_deg: fit.tilt.to_degrees(),
-            weight_n: weight,
-            weight_std_n: sigma,
-            mass_kg: payload.mass,
-            mass_std_kg: payload.mass * sigma / weight,
-            centre_mm: Vector::of(&fit.p_sc, 1e3),
-            gravity_m_per_s2: payload.gravity_o.into(),
-            bias_force_n: Vector::of(&fit.bias_force, 1.0),
-            bias_torque_nm: Vector::of(&fit.bias_torque, 1.0),
-            residual_force_n: fit.rms_force,
-            residual_torque_nm: fit.rms_torque,
-            expected_residual_n: fit.expected_force,
-        }
-    }
-
     fn change(&self, draft: &DraftScene) -> Change {
         let digits = |values: &[f64; 3], digits| values.map(|x| rounded(x, digits));
         let (mass_kg, gravity_m_per_s2) = (rounded(self.mass_kg, 10), digits(&self.gravity_m_per_s2, 10));

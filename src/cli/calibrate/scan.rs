@@ -4,11 +4,11 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use nalgebra::{Vector3, Vector6};
+use nalgebra::{Isometry3, Vector3, Vector6};
 use serde::Serialize;
 use tracing::warn;
 
-use super::super::{CliError, Losses, check_kept};
+use super::super::{CliError, Losses, check_kept, reported};
 use super::{CalibrationRecording, CalibrationTarget, Change, DraftScene, rounded};
 use crate::align::{PairsFit, PairsParams, PointPair, fit_pairs};
 use crate::calibrate::{DwellFinder, DwellParams};
@@ -49,7 +49,7 @@ pub(super) fn scan(arguments: &ScanArguments) -> Result<Losses, CliError> {
     let params = PairsParams { sigma: sigma_mm.map(|sigma| sigma / 1e3), ..PairsParams::default() };
     let fit = fit_pairs(&pairs, &params).map_err(|error| CliError::calibration(path, error))?;
     warn_of_gravity(&draft.scene);
-    let found = ScanFound::of(&pairs, names, &fit);
+    let found = ScanFound::of(&pairs, &names, &fit);
     target.write(&draft, &found.change(&draft), &found)?;
     Ok(losses)
 }
@@ -102,58 +102,47 @@ fn warn_of_gravity(scene: &Scene) {
     }
 }
 
-/// What `--json` prints.
-#[derive(Debug, Serialize)]
-struct ScanFound {
-    pairs: Vec<PairFound>,
-    rms_mm: f64,
-    /// of a pair of unit weight, per axis
-    sigma_mm: f64,
-    /// p_space = R p_scan + t
-    scan_to_space: ScanMotion,
-    /// middle of the pairs in space, for which the shift is given
-    centroid_mm: [f64; 3],
-    shift_std_mm: [f64; 3],
-    turn_std_deg: [f64; 3],
+reported! {
+    /// What `--json` prints.
+    #[derive(Debug, Serialize)]
+    struct ScanFound, fn of(picked: &[PointPair], names: &[String], fit: &PairsFit) {
+        pairs: Vec<PairFound> = names.iter().zip(picked).zip(&fit.residuals).map(PairFound::of).collect(),
+        rms_mm: f64 = fit.rms * 1e3,
+        /// of a pair of unit weight, per axis
+        sigma_mm: f64 = fit.sigma * 1e3,
+        /// p_space = R p_scan + t
+        scan_to_space: ScanMotion = ScanMotion::of(&fit.motion),
+        /// middle of the pairs in space, for which the shift is given
+        centroid_mm: [f64; 3] = (fit.centroid.coords * 1e3).into(),
+        shift_std_mm: [f64; 3] = (sigma(fit).fixed_rows::<3>(0) * 1e3).into(),
+        turn_std_deg: [f64; 3] = (sigma(fit).fixed_rows::<3>(3) * 1f64.to_degrees()).into(),
+    }
 }
 
-#[derive(Debug, Serialize)]
-struct PairFound {
-    name: String,
-    scan_mm: [f64; 3],
-    residual_mm: [f64; 3],
-    distance_mm: f64,
+/// Standard deviations of shift, m, and turn, rad.
+fn sigma(fit: &PairsFit) -> Vector6<f64> {
+    fit.covariance.diagonal().map(f64::sqrt)
 }
 
-#[derive(Clone, Copy, Debug, Serialize)]
-struct ScanMotion {
-    position_mm: [f64; 3],
-    orientation_xyzw: [f64; 4],
+reported! {
+    #[derive(Debug, Serialize)]
+    struct PairFound, fn of(found: ((&String, &PointPair), &Vector3<f64>)) {
+        name: String = found.0.0.clone(),
+        scan_mm: [f64; 3] = (found.0.1.from.coords * 1e3).into(),
+        residual_mm: [f64; 3] = (found.1 * 1e3).into(),
+        distance_mm: f64 = found.1.norm() * 1e3,
+    }
+}
+
+reported! {
+    #[derive(Clone, Copy, Debug, Serialize)]
+    struct ScanMotion, fn of(motion: &Isometry3<f64>) {
+        position_mm: [f64; 3] = motion.translation.vector.map(|x| rounded(x * 1e3, 7)).into(),
+        orientation_xyzw: [f64; 4] = motion.rotation.coords.map(|c| rounded(c, 12)).into(),
+    }
 }
 
 impl ScanFound {
-    fn of(pairs: &[PointPair], names: Vec<String>, fit: &PairsFit) -> Self {
-        let found = names.into_iter().zip(pairs).zip(&fit.residuals).map(|((name, pair), residual)| PairFound {
-            name,
-            scan_mm: (pair.from.coords * 1e3).into(),
-            residual_mm: (residual * 1e3).into(),
-            distance_mm: residual.norm() * 1e3,
-        });
-        let sigma = fit.covariance.diagonal().map(f64::sqrt);
-        let three = |v: &Vector6<f64>, first: usize, unit: f64| [0, 1, 2].map(|axis| v[first + axis] * unit);
-        let [x, y, z] = [0, 1, 2].map(|axis| rounded(fit.motion.translation.vector[axis] * 1e3, 7));
-        let q = fit.motion.rotation.coords.map(|c| rounded(c, 12));
-        Self {
-            pairs: found.collect(),
-            rms_mm: fit.rms * 1e3,
-            sigma_mm: fit.sigma * 1e3,
-            scan_to_space: ScanMotion { position_mm: [x, y, z], orientation_xyzw: q.into() },
-            centroid_mm: (fit.centroid.coords * 1e3).into(),
-            shift_std_mm: three(&sigma, 0, 1e3),
-            turn_std_deg: three(&sigma, 3, 1f64.to_degrees()),
-        }
-    }
-
     fn change(&self, draft: &DraftScene) -> Change {
         let ScanMotion { position_mm, orientation_xyzw } = self.scan_to_space;
         let section = ScanToSpaceSection { position: Vector3::from(position_mm) / 1e3, orientation_xyzw };

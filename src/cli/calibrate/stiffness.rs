@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::super::arm::ArmArguments;
 use super::super::check::repeated;
-use super::super::{CliError, Losses};
+use super::super::{CliError, Losses, reported};
 use super::{CalibrationTarget, Change, NO_SCENE, rounded};
 use crate::probing::execute::Repeatability;
 use crate::scene::Setting;
@@ -45,25 +45,15 @@ pub(super) fn stiffness(arguments: &StiffnessArguments) -> Result<Losses, CliErr
     Ok(Losses::new())
 }
 
-/// What `--json` prints.
-#[derive(Debug, Serialize)]
-struct StiffnessFound {
-    touches: usize,
-    stiffness_n_per_mm: f64,
-    std_n_per_mm: f64,
-    /// of the places where the spot was touched
-    range_um: f64,
-}
-
-impl StiffnessFound {
-    fn of(found: &Repeatability) -> Self {
-        let [stiffness, std] = found.stiffness();
-        Self {
-            touches: found.touches.len(),
-            stiffness_n_per_mm: stiffness / 1e3,
-            std_n_per_mm: std / 1e3,
-            range_um: found.range() * 1e6,
-        }
+reported! {
+    /// What `--json` prints.
+    #[derive(Debug, Serialize)]
+    struct StiffnessFound, fn of(found: &Repeatability) {
+        touches: usize = found.touches.len(),
+        stiffness_n_per_mm: f64 = found.stiffness()[0] / 1e3,
+        std_n_per_mm: f64 = found.stiffness()[1] / 1e3,
+        /// of the places where the spot was touched
+        range_um: f64 = found.range() * 1e6,
     }
 }
 

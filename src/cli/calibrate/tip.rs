@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use serde::Serialize;
 
 use super::super::arm::{CellArguments, RobotName};
-use super::super::{CliError, Losses};
+use super::super::{CliError, Losses, reported};
 use super::{CalibrationRecording, CalibrationTarget, Change, DraftScene, Vector, rounded, tip_by_arm};
 use crate::calibrate::{SwingPose, TipFit, TipFitParams, fit_tip};
 use crate::scene::{Scene, Setting};
@@ -82,34 +82,24 @@ pub(super) fn tip(arguments: &TipArguments) -> Result<Losses, CliError> {
     Ok(replayed.losses)
 }
 
-/// What `--json` prints.
-#[derive(Debug, Serialize)]
-struct TipFound {
-    poses: usize,
-    left_out: usize,
-    swing_deg: f64,
-    /// in the axes of the recorded pose
-    offset_mm: Vector,
-    /// centre of the resting ball, in the frame of the poses
-    rest_mm: Vector,
-    residual_mm: f64,
-    /// number of independent poses with the same information
-    correlation: f64,
+reported! {
+    /// What `--json` prints.
+    #[derive(Debug, Serialize)]
+    struct TipFound, fn of(fit: &TipFit) {
+        poses: usize = fit.poses,
+        left_out: usize = fit.rejected,
+        swing_deg: f64 = fit.swing.to_degrees(),
+        /// in the axes of the recorded pose
+        offset_mm: Vector = Vector::of(&fit.offset, 1e3),
+        /// centre of the resting ball, in the frame of the poses
+        rest_mm: Vector = Vector::of(&fit.rest, 1e3),
+        residual_mm: f64 = fit.rms * 1e3,
+        /// number of independent poses with the same information
+        correlation: f64 = fit.correlation,
+    }
 }
 
 impl TipFound {
-    fn of(fit: &TipFit) -> Self {
-        Self {
-            poses: fit.poses,
-            left_out: fit.rejected,
-            swing_deg: fit.swing.to_degrees(),
-            offset_mm: Vector::of(&fit.offset, 1e3),
-            rest_mm: Vector::of(&fit.rest, 1e3),
-            residual_mm: fit.rms * 1e3,
-            correlation: fit.correlation,
-        }
-    }
-
     fn change(&self, draft: &DraftScene) -> Change {
         let offset_mm = self.offset_mm.value.map(|x| rounded(x, 7));
         let mut expected: Scene = draft.scene.clone();

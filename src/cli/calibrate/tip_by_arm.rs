@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::super::arm::{RobotName, millimetres};
 use super::super::probing::Ready;
 use super::super::progress::WorkProgress;
-use super::super::{CliError, Losses};
+use super::super::{CliError, Losses, reported};
 use super::tip::TipArguments;
 use super::{Change, DraftScene, NO_SCENE, Vector, rounded};
 use crate::calibrate::{PlaneTipFit, VectorEstimate, fit_tip_by_plane};
@@ -45,32 +45,26 @@ pub(super) fn tip(arguments: &TipArguments, robot: RobotName, spot: &str) -> Res
     Ok(Losses::new())
 }
 
-/// What `--json` prints.
-#[derive(Debug, Serialize)]
-struct PivotFound {
-    touches: usize,
-    /// centre of the ball in the flange
-    tip_position_mm: Vector,
-    /// correction to the scene, in the flange
-    moved_mm: [f64; 3],
-    residual_mm: f64,
-    /// unreachable orientations, and why
-    not_reached: Vec<String>,
+reported! {
+    /// What `--json` prints.
+    #[derive(Debug, Serialize)]
+    struct PivotFound, fn of(fit: &PlaneTipFit, cell: &Cell, unreached: &[NotReached]) {
+        touches: usize = fit.touches,
+        /// centre of the ball in the flange
+        tip_position_mm: Vector = Vector::of(&moved(cell.pose_ft.translation.vector, &fit.offset), 1e3),
+        /// correction to the scene, in the flange
+        moved_mm: [f64; 3] = (fit.offset.value * 1e3).into(),
+        residual_mm: f64 = fit.rms * 1e3,
+        /// unreachable orientations, and why
+        not_reached: Vec<String> = unreached.iter().map(ToString::to_string).collect(),
+    }
+}
+
+fn moved(from: Vector3<f64>, by: &VectorEstimate) -> VectorEstimate {
+    VectorEstimate { value: from + by.value, sigma: by.sigma }
 }
 
 impl PivotFound {
-    fn of(fit: &PlaneTipFit, cell: &Cell, not_reached: &[NotReached]) -> Self {
-        let VectorEstimate { value, sigma } = &fit.offset;
-        let tip = VectorEstimate { value: cell.pose_ft.translation.vector + value, sigma: *sigma };
-        Self {
-            touches: fit.touches,
-            tip_position_mm: Vector::of(&tip, 1e3),
-            moved_mm: (value * 1e3).into(),
-            residual_mm: fit.rms * 1e3,
-            not_reached: not_reached.iter().map(ToString::to_string).collect(),
-        }
-    }
-
     fn change(&self, draft: &DraftScene) -> Change {
         let tip_position_mm = self.tip_position_mm.value.map(|mm| rounded(mm, 7));
         let mut expected = draft.scene.clone();

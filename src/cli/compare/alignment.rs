@@ -8,11 +8,11 @@ use serde::Serialize;
 use tracing::warn;
 
 use crate::align::{
-    Alternative, FeaturesError, FeaturesParams, IcpFit, IcpParams, Motion, OrientedSample, PairsParams, Surfaces,
-    align_features, fit_pairs, icp,
+    Alternative, FeaturesError, FeaturesParams, FreeTurn, IcpFit, IcpParams, Motion, OrientedSample, PairsParams,
+    Surfaces, align_features, fit_pairs, icp,
 };
 use crate::cli::progress::WorkProgress;
-use crate::cli::{CliError, Threads, counted, print_report};
+use crate::cli::{CliError, Threads, counted, print_report, reported};
 use crate::compare::{IndexedMesh, sample_surface, surface_area};
 use crate::features::detect;
 use crate::io::pairs_file::read_pairs;
@@ -45,48 +45,58 @@ pub(super) struct Alignment {
     undetermined: Vec<Loose>,
 }
 
-/// Moves the mesh, as it is in its file, onto the truth.
-#[derive(Debug, Serialize)]
-struct MotionReport {
-    /// rows of the rotation
-    rotation: [[f64; 3]; 3],
-    /// and then the shift
-    translation_mm: [f64; 3],
+reported! {
+    /// Moves the mesh, as it is in its file, onto the truth.
+    #[derive(Debug, Serialize)]
+    struct MotionReport, fn of(motion: &Isometry3<f64>) {
+        /// rows of the rotation
+        rotation: [[f64; 3]; 3] = motion.rotation.to_rotation_matrix().matrix().transpose().into(),
+        /// and then the shift
+        translation_mm: [f64; 3] = (motion.translation.vector * 1e3).into(),
+    }
 }
 
-#[derive(Debug, Serialize)]
-struct FitReport {
-    points: usize,
-    inliers: usize,
-    rounds: usize,
+reported! {
+    #[derive(Debug, Serialize)]
+    struct FitReport, fn of(fit: &IcpFit, count: usize) {
+        points: usize = count,
+        inliers: usize = fit.inliers,
+        rounds: usize = fit.rounds,
+    }
 }
 
-#[derive(Debug, Serialize)]
-struct Explained {
-    /// features of the mesh that lie on one of the truth
-    explained_features: usize,
-    mesh_features: usize,
-    truth_features: usize,
-    /// share of the mesh's surface that lies on the truth
-    agreeing_share: Option<f64>,
+reported! {
+    #[derive(Debug, Serialize)]
+    struct Explained, fn of(alternative: &Alternative, counts: [usize; 2]) {
+        /// features of the mesh that lie on one of the truth
+        explained_features: usize = alternative.explained.len(),
+        mesh_features: usize = counts[0],
+        truth_features: usize = counts[1],
+        /// share of the mesh's surface that lies on the truth
+        agreeing_share: Option<f64> = alternative.agreeing,
+    }
 }
 
-/// Residual of a pair: truth − moved mesh.
-#[derive(Debug, Serialize)]
-struct Residual {
-    pair: String,
-    residual_mm: [f64; 3],
-    distance_mm: f64,
+reported! {
+    /// Residual of a pair: truth − moved mesh.
+    #[derive(Debug, Serialize)]
+    struct Residual, fn of(name: &str, residual: &Vector3<f64>) {
+        pair: String = name.to_owned(),
+        residual_mm: [f64; 3] = (residual * 1e3).into(),
+        distance_mm: f64 = residual.norm() * 1e3,
+    }
 }
 
-/// An unconstrained motion: a shift along and a turn about a point.
-#[derive(Debug, Serialize)]
-struct Loose {
-    /// of the point `about_mm`, times any length
-    shift: [f64; 3],
-    /// direction of the axis, times an angle per mm of the shift
-    turn_rad_per_mm: [f64; 3],
-    about_mm: [f64; 3],
+reported! {
+    /// An unconstrained motion: a shift along and a turn about a point.
+    #[derive(Debug, Serialize)]
+    struct Loose, fn of(motion: &Motion, fit: &IcpFit) {
+        /// of the point `about_mm`, times any length
+        shift: [f64; 3] = motion.shift.into(),
+        /// direction of the axis, times an angle per mm of the shift
+        turn_rad_per_mm: [f64; 3] = (motion.turn / fit.lever * 1e-3).into(),
+        about_mm: [f64; 3] = (fit.centre.coords * 1e3).into(),
+    }
 }
 
 /// The motions of which one must be chosen.
@@ -98,26 +108,30 @@ struct Choices {
     free_turn: Option<FreeTurnReport>,
 }
 
-#[derive(Debug, Serialize)]
-struct FreeTurnReport {
-    axis: [f64; 3],
-    through_mm: [f64; 3],
+reported! {
+    #[derive(Debug, Serialize)]
+    struct FreeTurnReport, fn of(turn: &FreeTurn) {
+        axis: [f64; 3] = turn.axis.into(),
+        through_mm: [f64; 3] = (turn.through.coords * 1e3).into(),
+    }
 }
 
-#[derive(Debug, Serialize)]
-struct Choice {
-    /// as --alternative takes it
-    alternative: usize,
-    #[serde(flatten)]
-    motion: MotionReport,
-    #[serde(flatten)]
-    explained: Explained,
-    rms_mm: Option<f64>,
-    /// against the first
-    turn_deg: f64,
-    turn_axis: [f64; 3],
-    /// of the middle of the features, against the first
-    shift_mm: [f64; 3],
+reported! {
+    #[derive(Debug, Serialize)]
+    struct Choice, fn of(number: usize, found: &Alternative, counts: [usize; 2]) {
+        /// as --alternative takes it
+        alternative: usize = number,
+        #[serde(flatten)]
+        motion: MotionReport = MotionReport::of(&found.source_to_target),
+        #[serde(flatten)]
+        explained: Explained = Explained::of(found, counts),
+        rms_mm: Option<f64> = found.icp.as_ref().map(|fit| fit.rms * 1e3),
+        /// against the first
+        turn_deg: f64 = found.differs[0].norm().to_degrees(),
+        turn_axis: [f64; 3] = found.differs[0].try_normalize(1e-9).unwrap_or_default().into(),
+        /// of the middle of the features, against the first
+        shift_mm: [f64; 3] = (found.differs[1] * 1e3).into(),
+    }
 }
 
 type Aligned = Result<(Isometry3<f64>, Alignment), CliError>;
@@ -192,14 +206,9 @@ pub(super) fn aligned_by_features(
 pub(super) fn aligned_by_pairs(path: &Path) -> Aligned {
     let file = read_pairs(path)?;
     let fit = fit_pairs(&file.pairs, &PairsParams::default()).map_err(|error| CliError::calibration(path, error))?;
-    let residual = |(r, name): (&Vector3<f64>, &String)| Residual {
-        pair: name.clone(),
-        residual_mm: mm(*r),
-        distance_mm: r.norm() * 1e3,
-    };
     let numbered: Vec<String> = (1..=file.pairs.len()).map(|number| number.to_string()).collect();
     let names = if file.names.len() == file.pairs.len() { &file.names } else { &numbered };
-    let residuals = fit.residuals.iter().zip(names).map(residual).collect();
+    let residuals = names.iter().zip(&fit.residuals).map(|(name, residual)| Residual::of(name, residual)).collect();
     let alignment = Alignment { residuals, rms_mm: Some(fit.rms * 1e3), ..Alignment::of("pairs", &fit.motion) };
     Ok((fit.motion, alignment))
 }
@@ -220,54 +229,14 @@ pub(super) fn moved(mesh: &TriMesh, pose: &Isometry3<f64>) -> TriMesh {
     moved
 }
 
-fn mm(v: Vector3<f64>) -> [f64; 3] {
-    [v.x, v.y, v.z].map(|x| x * 1e3)
-}
-
-impl MotionReport {
-    fn of(motion: &Isometry3<f64>) -> Self {
-        let rotation = motion.rotation.to_rotation_matrix();
-        Self {
-            rotation: std::array::from_fn(|row| std::array::from_fn(|column| rotation[(row, column)])),
-            translation_mm: mm(motion.translation.vector),
-        }
-    }
-}
-
-impl FitReport {
-    fn of(fit: &IcpFit, points: usize) -> Self {
-        Self { points, inliers: fit.inliers, rounds: fit.rounds }
-    }
-}
-
-impl Explained {
-    fn of(alternative: &Alternative, [mesh_features, truth_features]: [usize; 2]) -> Self {
-        let (explained_features, agreeing_share) = (alternative.explained.len(), alternative.agreeing);
-        Self { explained_features, mesh_features, truth_features, agreeing_share }
-    }
-}
-
 impl Choices {
     fn of(alternatives: &[Alternative], counts: [usize; 2], error: &FeaturesError) -> Self {
         let free_turn = match error {
-            FeaturesError::FreeTurn { turn, .. } => {
-                Some(FreeTurnReport { axis: turn.axis.into(), through_mm: mm(turn.through.coords) })
-            }
+            FeaturesError::FreeTurn { turn, .. } => Some(FreeTurnReport::of(turn)),
             _ => None,
         };
-        let choice = |(at, alternative): (usize, &Alternative)| {
-            let [turn, shift] = alternative.differs;
-            Choice {
-                alternative: at + 1,
-                motion: MotionReport::of(&alternative.source_to_target),
-                explained: Explained::of(alternative, counts),
-                rms_mm: alternative.icp.as_ref().map(|fit| fit.rms * 1e3),
-                turn_deg: turn.norm().to_degrees(),
-                turn_axis: turn.try_normalize(1e-9).unwrap_or_else(Vector3::zeros).into(),
-                shift_mm: mm(shift),
-            }
-        };
-        Self { ambiguous: alternatives.iter().enumerate().map(choice).collect(), free_turn }
+        let choices = (1..).zip(alternatives).map(|(number, one)| Choice::of(number, one, counts));
+        Self { ambiguous: choices.collect(), free_turn }
     }
 }
 
@@ -286,14 +255,9 @@ impl Alignment {
     }
 
     fn of_icp(method: &'static str, fit: &IcpFit) -> Self {
-        let loose = |motion: &Motion| Loose {
-            shift: motion.shift.into(),
-            turn_rad_per_mm: (motion.turn / fit.lever * 1e-3).into(),
-            about_mm: mm(fit.centre.coords),
-        };
         Self {
             rms_mm: Some(fit.rms * 1e3),
-            undetermined: fit.undetermined().map(loose).collect(),
+            undetermined: fit.undetermined().map(|motion| Loose::of(motion, fit)).collect(),
             ..Self::of(method, &fit.source_to_target)
         }
     }

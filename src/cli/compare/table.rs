@@ -6,110 +6,81 @@ use serde::Serialize;
 
 use super::alignment::Alignment;
 use super::{CompareReport, ShapeReport};
-use crate::cli::counted;
+use crate::cli::{counted, reported};
 use crate::compare::{Comparison, Histogram, RegionComparison, Summary, SupportRegion, TiltSummary};
 
-/// What `--json` prints of one mesh.
-#[derive(Debug, Serialize)]
-pub(super) struct ComparisonReport {
-    /// points spread over each surface
-    density_per_mm2: f64,
-    /// of the true surface, which the mesh does not show: never scanned, or missing
-    unseen_share: f64,
-    /// all, touched, guessed, untouched, where present
-    regions: Vec<DeviationRow>,
-}
-
-#[derive(Debug, Serialize)]
-struct DeviationRow {
-    region: &'static str,
-    mesh_to_truth: Option<SummaryReport>,
-    truth_to_mesh: Option<SummaryReport>,
-    vertices_to_truth: Option<SummaryReport>,
-    cloud_to_truth: Option<SummaryReport>,
-    truth_to_cloud: Option<SummaryReport>,
-    normals: Option<NormalsReport>,
-    /// of `mesh_to_truth`
-    histogram: HistogramReport,
-    /// of `mesh_to_truth`, within --tolerance-mm
-    #[serde(skip_serializing_if = "Option::is_none")]
-    within_tolerance_share: Option<f64>,
-}
-
-/// Distances; all but `bias_mm` without sign.
-#[derive(Debug, Serialize)]
-struct SummaryReport {
-    points: usize,
-    mean_mm: f64,
-    rms_mm: f64,
-    median_mm: f64,
-    p95_mm: f64,
-    p99_mm: f64,
-    max_mm: f64,
-    /// not of clouds, which have no sides
-    #[serde(skip_serializing_if = "Option::is_none")]
-    bias_mm: Option<f64>,
-}
-
-#[derive(Debug, Serialize)]
-struct NormalsReport {
-    median_deg: f64,
-    p95_deg: f64,
-    /// of the area, more than 90 degrees off
-    flipped_share: f64,
-}
-
-#[derive(Debug, Serialize)]
-struct HistogramReport {
-    from_mm: f64,
-    bin_mm: f64,
-    counts: Vec<usize>,
-    below: usize,
-    above: usize,
-}
-
-impl ComparisonReport {
-    pub fn of(comparison: &Comparison) -> Self {
-        let regions = comparison.regions.iter().map(DeviationRow::of).collect();
-        Self { density_per_mm2: comparison.density * 1e-6, unseen_share: comparison.unseen, regions }
+reported! {
+    /// What `--json` prints of one mesh.
+    #[derive(Debug, Serialize)]
+    pub(super) struct ComparisonReport, pub fn of(comparison: &Comparison) {
+        /// points spread over each surface
+        density_per_mm2: f64 = comparison.density * 1e-6,
+        /// of the true surface, which the mesh does not show: never scanned, or missing
+        unseen_share: f64 = comparison.unseen,
+        /// all, touched, guessed, untouched, where present
+        regions: Vec<DeviationRow> = comparison.regions.iter().map(DeviationRow::of).collect(),
     }
 }
 
-impl DeviationRow {
-    fn of(part: &RegionComparison) -> Self {
-        let report = |summary: &Option<Summary>| summary.as_ref().map(SummaryReport::of);
-        let unsigned = |summary| report(summary).map(|report| SummaryReport { bias_mm: None, ..report });
-        let Histogram { from, width, counts, below, above } = &part.histogram;
-        Self {
-            region: name_of(part.region),
-            mesh_to_truth: report(&part.mesh_to_truth),
-            truth_to_mesh: report(&part.truth_to_mesh),
-            vertices_to_truth: report(&part.vertices_to_truth),
-            cloud_to_truth: unsigned(&part.cloud_to_truth),
-            truth_to_cloud: unsigned(&part.truth_to_cloud),
-            normals: part.tilt.map(|TiltSummary { median, p95, flipped }| NormalsReport {
-                median_deg: median.to_degrees(),
-                p95_deg: p95.to_degrees(),
-                flipped_share: flipped,
-            }),
-            histogram: HistogramReport {
-                from_mm: from * 1e3,
-                bin_mm: width * 1e3,
-                counts: counts.clone(),
-                below: *below,
-                above: *above,
-            },
-            within_tolerance_share: part.within_tolerance,
-        }
+reported! {
+    #[derive(Debug, Serialize)]
+    struct DeviationRow, fn of(part: &RegionComparison) {
+        region: &'static str = name_of(part.region),
+        mesh_to_truth: Option<SummaryReport> = part.mesh_to_truth.as_ref().map(SummaryReport::of),
+        truth_to_mesh: Option<SummaryReport> = part.truth_to_mesh.as_ref().map(SummaryReport::of),
+        vertices_to_truth: Option<SummaryReport> = part.vertices_to_truth.as_ref().map(SummaryReport::of),
+        cloud_to_truth: Option<SummaryReport> = part.cloud_to_truth.as_ref().map(SummaryReport::without_sign),
+        truth_to_cloud: Option<SummaryReport> = part.truth_to_cloud.as_ref().map(SummaryReport::without_sign),
+        normals: Option<NormalsReport> = part.tilt.as_ref().map(NormalsReport::of),
+        /// of `mesh_to_truth`
+        histogram: HistogramReport = HistogramReport::of(&part.histogram),
+        /// of `mesh_to_truth`, within --tolerance-mm
+        #[serde(skip_serializing_if = "Option::is_none")]
+        within_tolerance_share: Option<f64> = part.within_tolerance,
+    }
+}
+
+reported! {
+    /// Distances; all but `bias_mm` without sign.
+    #[derive(Debug, Serialize)]
+    struct SummaryReport, fn of(summary: &Summary) {
+        points: usize = summary.points,
+        mean_mm: f64 = summary.mean * 1e3,
+        rms_mm: f64 = summary.rms * 1e3,
+        median_mm: f64 = summary.median * 1e3,
+        p95_mm: f64 = summary.p95 * 1e3,
+        p99_mm: f64 = summary.p99 * 1e3,
+        max_mm: f64 = summary.max * 1e3,
+        /// not of clouds, which have no sides
+        #[serde(skip_serializing_if = "Option::is_none")]
+        bias_mm: Option<f64> = Some(summary.bias * 1e3),
     }
 }
 
 impl SummaryReport {
-    fn of(summary: &Summary) -> Self {
-        let Summary { points, mean, rms, median, p95, p99, max, bias } = *summary;
-        let [mean_mm, rms_mm, median_mm, p95_mm, p99_mm, max_mm, bias_mm] =
-            [mean, rms, median, p95, p99, max, bias].map(|x| x * 1e3);
-        Self { points, mean_mm, rms_mm, median_mm, p95_mm, p99_mm, max_mm, bias_mm: Some(bias_mm) }
+    fn without_sign(summary: &Summary) -> Self {
+        Self { bias_mm: None, ..Self::of(summary) }
+    }
+}
+
+reported! {
+    #[derive(Debug, Serialize)]
+    struct NormalsReport, fn of(tilt: &TiltSummary) {
+        median_deg: f64 = tilt.median.to_degrees(),
+        p95_deg: f64 = tilt.p95.to_degrees(),
+        /// of the area, more than 90 degrees off
+        flipped_share: f64 = tilt.flipped,
+    }
+}
+
+reported! {
+    #[derive(Debug, Serialize)]
+    struct HistogramReport, fn of(histogram: &Histogram) {
+        from_mm: f64 = histogram.from * 1e3,
+        bin_mm: f64 = histogram.width * 1e3,
+        counts: Vec<usize> = histogram.counts.clone(),
+        below: usize = histogram.below,
+        above: usize = histogram.above,
     }
 }
 
@@ -166,19 +137,17 @@ impl CompareReport {
 impl fmt::Display for CompareReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let places = [("touched", "where touched"), ("all", "over all")];
-        let row = |(region, place)| Some((region, place, self.after.row(region)?));
-        match places.into_iter().find_map(row) {
+        let shown = |(region, place)| Some((region, place, self.after.row(region)?));
+        match places.into_iter().find_map(shown) {
             None => writeln!(f, "the mesh shows nothing of the true surface")?,
-            Some((region, place, after)) => {
+            Some((region, place, (row, SummaryReport { mean_mm, p95_mm, .. }))) => {
                 let before = self.before.as_ref().and_then(|before| before.row(region));
-                let ErrorRow { mean_mm, p95_mm, .. } = after;
                 write!(f, "the mesh is off by {mean_mm:.3} mm on average {place}, 95 % within {p95_mm:.3} mm")?;
-                if let Some(ErrorRow { mean_mm, p95_mm, .. }) = before {
+                if let Some((_, SummaryReport { mean_mm, p95_mm, .. })) = before {
                     write!(f, "; before: mean {mean_mm:.3} mm, 95 % within {p95_mm:.3} mm")?;
                 }
-                write!(f, "\n{after}")?;
-                before.iter().try_for_each(|before| write!(f, "; before: {before}"))?;
-                writeln!(f)?;
+                let before = before.map_or(String::new(), |(row, _)| format!("; before: {}", row.worst()));
+                writeln!(f, "\n{}{before}", row.worst())?;
             }
         }
         write!(f, "the mesh shows {:.1} % of the true surface", (1.0 - self.after.unseen_share) * 100.0)?;
@@ -186,41 +155,27 @@ impl fmt::Display for CompareReport {
     }
 }
 
-/// What a user judges a region by.
-#[derive(Clone, Copy)]
-struct ErrorRow {
-    mean_mm: f64,
-    rms_mm: f64,
-    p95_mm: f64,
-    max_mm: f64,
-    within_tolerance_share: Option<f64>,
-}
-
 impl ComparisonReport {
-    /// Errors of a region against the truth, where it is there.
-    fn row(&self, region: &str) -> Option<ErrorRow> {
+    /// A region and its distances to the truth, where it has any.
+    fn row(&self, region: &str) -> Option<(&DeviationRow, &SummaryReport)> {
         let row = self.regions.iter().find(|row| row.region == region)?;
-        let SummaryReport { mean_mm, rms_mm, p95_mm, max_mm, .. } = *row.mesh_to_truth.as_ref()?;
-        Some(ErrorRow { mean_mm, rms_mm, p95_mm, max_mm, within_tolerance_share: row.within_tolerance_share })
+        Some((row, row.mesh_to_truth.as_ref()?))
     }
 }
 
-impl fmt::Display for ErrorRow {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "rms {:.3} mm, at most {:.3} mm", self.rms_mm, self.max_mm)?;
-        self.within_tolerance_share.iter().try_for_each(|share| write!(f, ", {:.1} % in tolerance", share * 100.0))
+impl DeviationRow {
+    /// What a part is accepted by.
+    fn worst(&self) -> String {
+        let errors = self.mesh_to_truth.as_ref();
+        let errors = errors.map(|errors| format!("rms {:.3} mm, at most {:.3} mm", errors.rms_mm, errors.max_mm));
+        let within = self.within_tolerance_share.map(|share| format!("{:.1} % in tolerance", share * 100.0));
+        errors.into_iter().chain(within).collect::<Vec<_>>().join(", ")
     }
 }
 
 impl fmt::Display for ComparisonReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (at, part) in self.regions.iter().enumerate() {
-            if at > 0 {
-                writeln!(f)?;
-            }
-            write!(f, "{part}")?;
-        }
-        Ok(())
+        f.write_str(&self.regions.iter().map(DeviationRow::to_string).collect::<Vec<_>>().join("\n"))
     }
 }
 

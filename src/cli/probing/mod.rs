@@ -5,7 +5,8 @@ mod picture;
 mod report;
 mod world;
 
-use std::path::{Path, PathBuf};
+use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::Arc;
 
 use nalgebra::Point3;
@@ -13,7 +14,7 @@ use tracing::info;
 
 use super::progress::WorkProgress;
 use super::refine::{RefineArguments, Refined};
-use super::{CliError, Losses, not_written};
+use super::{CliError, Losses, not_written, write_json};
 use crate::features::Kind;
 use crate::io::atomic::create_folder;
 use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
@@ -29,7 +30,8 @@ use crate::sim::ArmParams;
 #[cfg(feature = "ur")]
 use crate::ur::UrParams;
 use picture::{draw_plan, draw_touches};
-pub(super) use report::{ProbedFile, ProbingSummary};
+pub(super) use report::ProbingSummary;
+use report::records;
 use world::LiveWorld;
 
 /// Frame of the poses in the recording: the base of the arm.
@@ -171,18 +173,19 @@ impl Probing<'_> {
             }
         }
         // whatever becomes of the mesh, what was measured is kept
-        ProbedFile::of(&probed, self.flags).write(self.out)?;
+        let features = records(&probed, self.flags);
+        write_json(&self.out.join("probed.json"), &BTreeMap::from([("features", &features)]))?;
         let path = self.out.join("probed_touches.jsonl");
         write_probed_touches(&probed, ready.params.pattern.ball_radius, &path).map_err(not_written(&path))?;
         let messages = world.finish()?;
         let bag = self.out.join("touch.mcap");
         write_recording(&bag, &probe_topics(), BASE_FRAME, PROBE_FRAME, messages).map_err(CliError::WriteRecording)?;
-        let [refined, features, touches] =
+        let [refined, features_out, touches_out] =
             ["refined.ply", "features.json", "touches.csv"].map(|name| self.out.join(name));
         let arguments = RefineArguments::of_files(self.scan.to_owned(), bag, refined.clone(), self.unit)
-            .with_features(features, touches)
+            .with_features(features_out, touches_out)
             .with_scene(self.scene.to_owned(), probe_topics());
-        let Refined { summary, mut losses, .. } = arguments.refined()?;
+        let Refined { summary: refine, mut losses, .. } = arguments.refined()?;
         let is_found =
             |one: &&Probed| matches!(one.ending, Ending::ToleranceReached | Ending::TouchesSpent | Ending::TimeSpent);
         losses.extend(
@@ -194,7 +197,7 @@ impl Probing<'_> {
         }
         let MeshFile { mesh, .. } = read_mesh(&refined, self.unit).map_err(CliError::ReadMesh)?;
         draw_touches(&mesh, &probed, self.flags, &self.out.join("touches.png"))?;
-        Ok(Done { summary: ProbingSummary::of(&probed, self.flags, summary), probed, losses })
+        Ok(Done { summary: ProbingSummary { features, refine }, probed, losses })
     }
 }
 

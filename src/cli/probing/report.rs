@@ -1,84 +1,74 @@
 //! Probing results, as a table, as JSON, and touch by touch.
 
 use std::fmt;
-use std::path::Path;
 
 use serde::Serialize;
 
 use crate::cli::refine::RefineSummary;
-use crate::cli::{CliError, counted, write_json};
+use crate::cli::{counted, reported};
 use crate::features::Kind;
 use crate::io::features_file::FeatureRecord;
+use crate::probing::arm::SlideRecord;
 use crate::probing::execute::{Ending, Flag, Probed, ProbedSlide};
 
-/// `probed.json`
-#[derive(Debug, Serialize)]
-pub(in crate::cli) struct ProbedFile {
-    features: Vec<ProbedRecord>,
+reported! {
+    /// One flag: of `probed.json`.
+    #[derive(Clone, Debug, Serialize)]
+    pub(in crate::cli) struct ProbedRecord, fn of(probed: &Probed, flagged: Option<&Flag>) {
+        flag: u32 = probed.flag,
+        kind: &'static str = flagged.and_then(|flag| flag.kind).map_or("unknown", Kind::name),
+        flagged_mm: [f64; 3] = flagged.map_or([f64::NAN; 3], |flag| (flag.place * 1e3).coords.into()),
+        search_radius_mm: f64 = flagged.map_or(f64::NAN, |flag| flag.radius * 1e3),
+        /// how it ended: `tolerance_reached`, `touches_spent`, `time_spent`, `nothing_found`, `cancelled`, `out_of_limits`,
+        /// `no_clear_path`, `stopped`
+        code: &'static str = code(&probed.ending),
+        /// the same in words
+        ending: String = probed.ending.to_string(),
+        touches: usize = probed.touches.len(),
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        slides: Vec<SlideRecordOfFile> = probed.slides.iter().map(SlideRecordOfFile::of).collect(),
+        duration_s: f64 = probed.seconds,
+        largest_force_n: f64 = probed.peak_force,
+        /// of the wanted number, mm or rad
+        #[serde(skip_serializing_if = "Option::is_none")]
+        uncertainty_mm: Option<f64> = probed.found.as_ref().and_then(|found| found.uncertainty).map(|sigma| sigma * 1e3),
+        #[serde(skip_serializing_if = "Option::is_none")]
+        feature: Option<FeatureRecord> = probed.found.as_ref().and_then(|found| found.feature.as_ref()).map(Into::into),
+    }
 }
 
-/// One flag.
-#[derive(Clone, Debug, Serialize)]
-struct ProbedRecord {
-    flag: u32,
-    kind: &'static str,
-    flagged_mm: [f64; 3],
-    search_radius_mm: f64,
-    /// how it ended: `tolerance_reached`, `touches_spent`, `time_spent`, `nothing_found`, `cancelled`, `out_of_limits`,
-    /// `no_clear_path`, `stopped`
-    code: &'static str,
-    /// the same in words
-    ending: String,
-    touches: usize,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    slides: Vec<SlideRecordOfFile>,
-    duration_s: f64,
-    largest_force_n: f64,
-    /// of the wanted number, mm or rad
-    #[serde(skip_serializing_if = "Option::is_none")]
-    uncertainty_mm: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    feature: Option<FeatureRecord>,
+reported! {
+    /// One slide.
+    #[derive(Clone, Debug, Serialize)]
+    struct SlideRecordOfFile, fn of(probed: &ProbedSlide) {
+        /// its outcome, or why it was not made
+        ending: String = match &probed.record {
+            Some(record) => record.ending.to_string(),
+            None => probed.refused.clone().unwrap_or_default(),
+        },
+        length_mm: f64 = probed.slide.length() * 1e3,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        forces: Option<SlideForces> = probed.record.as_ref().map(SlideForces::of),
+    }
 }
 
-/// One slide.
-#[derive(Clone, Debug, Serialize)]
-struct SlideRecordOfFile {
-    /// its outcome, or why it was not made
-    ending: String,
-    length_mm: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    forces: Option<SlideForces>,
-}
-
-/// The contact force along it.
-#[derive(Clone, Debug, Serialize)]
-struct SlideForces {
-    duration_s: f64,
-    mean_force_n: f64,
-    /// largest deviation of the mean over a tenth of a second from the set force
-    worst_force_error_n: f64,
-    largest_force_n: f64,
-}
-
-impl SlideRecordOfFile {
-    fn of(probed: &ProbedSlide) -> Self {
-        let ending = probed.record.as_ref().map(|record| record.ending.to_string()).or_else(|| probed.refused.clone());
-        let forces = probed.record.as_ref().map(|record| SlideForces {
-            duration_s: (record.stamps_ns[1] - record.stamps_ns[0]) as f64 * 1e-9,
-            mean_force_n: record.mean_force,
-            worst_force_error_n: record.worst_force,
-            largest_force_n: record.peak_force,
-        });
-        Self { ending: ending.unwrap_or_default(), length_mm: probed.slide.length() * 1e3, forces }
+reported! {
+    /// The contact force along it.
+    #[derive(Clone, Debug, Serialize)]
+    struct SlideForces, fn of(record: &SlideRecord) {
+        duration_s: f64 = (record.stamps_ns[1] - record.stamps_ns[0]) as f64 * 1e-9,
+        mean_force_n: f64 = record.mean_force,
+        /// largest deviation of the mean over a tenth of a second from the set force
+        worst_force_error_n: f64 = record.worst_force,
+        largest_force_n: f64 = record.peak_force,
     }
 }
 
 /// The summary of a probing.
 #[derive(Debug, Serialize)]
 pub(in crate::cli) struct ProbingSummary {
-    features: Vec<ProbedRecord>,
-    refine: RefineSummary,
+    pub features: Vec<ProbedRecord>,
+    pub refine: RefineSummary,
 }
 
 fn code(ending: &Ending) -> &'static str {
@@ -94,40 +84,10 @@ fn code(ending: &Ending) -> &'static str {
     }
 }
 
-impl ProbedRecord {
-    fn of(probed: &Probed, flags: &[Flag]) -> Self {
-        let flag = flags.iter().find(|flag| flag.id == probed.flag);
-        Self {
-            flag: probed.flag,
-            kind: flag.and_then(|flag| flag.kind).map_or("unknown", Kind::name),
-            flagged_mm: flag.map_or([f64::NAN; 3], |flag| (flag.place * 1e3).coords.into()),
-            search_radius_mm: flag.map_or(f64::NAN, |flag| flag.radius * 1e3),
-            code: code(&probed.ending),
-            ending: probed.ending.to_string(),
-            touches: probed.touches.len(),
-            slides: probed.slides.iter().map(SlideRecordOfFile::of).collect(),
-            duration_s: probed.seconds,
-            largest_force_n: probed.peak_force,
-            uncertainty_mm: probed.found.as_ref().and_then(|found| found.uncertainty).map(|sigma| sigma * 1e3),
-            feature: probed.found.as_ref().and_then(|found| found.feature.as_ref()).map(FeatureRecord::from),
-        }
-    }
-}
-
-impl ProbedFile {
-    pub fn of(probed: &[Probed], flags: &[Flag]) -> Self {
-        Self { features: probed.iter().map(|probed| ProbedRecord::of(probed, flags)).collect() }
-    }
-
-    pub fn write(&self, folder: &Path) -> Result<(), CliError> {
-        write_json(&folder.join("probed.json"), self)
-    }
-}
-
-impl ProbingSummary {
-    pub fn of(probed: &[Probed], flags: &[Flag], refine: RefineSummary) -> Self {
-        Self { features: ProbedFile::of(probed, flags).features, refine }
-    }
+/// All flags that were begun.
+pub(in crate::cli) fn records(probed: &[Probed], flags: &[Flag]) -> Vec<ProbedRecord> {
+    let record = |one: &Probed| ProbedRecord::of(one, flags.iter().find(|flag| flag.id == one.flag));
+    probed.iter().map(record).collect()
 }
 
 impl fmt::Display for ProbingSummary {

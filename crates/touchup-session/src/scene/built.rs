@@ -16,17 +16,20 @@ pub struct Built {
     pub left_out: Vec<&'static str>,
 }
 
-/// Memory at start, MB of 10⁶ bytes. What was touched comes to it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Memory {
-    /// the mesh that is moved: positions, faces, adjacency, where each vertex was scanned, the normal measured on each face
-    pub mesh_mb: f64,
-    /// the tree over its faces
-    pub tree_mb: f64,
-    /// the unrefined scan, with a tree of its own where the patch is made beside the samples
-    pub scan_mb: f64,
-    /// what the mesh keeps of a patch that it follows; 0 where there is none
-    pub patch_mb: f64,
+reported! {
+    /// Memory at start, MB of 10⁶ bytes, of what was just built; `scan_bytes`: of the unrefined scan, with the trees over it. What was
+    /// touched comes to it.
+    #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+    pub struct Memory, pub fn of(refiner: Footprint, scan_bytes: usize) {
+        /// the mesh that is moved: positions, faces, adjacency, where each vertex was scanned, the normal measured on each face
+        pub mesh_mb: f64 = refiner.mesh as f64 / 1e6,
+        /// the tree over its faces
+        pub tree_mb: f64 = refiner.tree as f64 / 1e6,
+        /// the unrefined scan, with a tree of its own where the patch is made beside the samples
+        pub scan_mb: f64 = scan_bytes as f64 / 1e6,
+        /// what the mesh keeps of a patch that it follows; 0 where there is none
+        pub patch_mb: f64 = refiner.patch as f64 / 1e6,
+    }
 }
 
 /// Parts and memory.
@@ -73,17 +76,6 @@ impl Scene {
             .partition(|(name, is_built)| *is_built && !unused.contains(name));
         let names = |parts: Vec<(&'static str, bool)>| parts.into_iter().map(|(name, _)| name).collect();
         Built { built: names(built), left_out: names(left_out) }
-    }
-}
-
-impl Memory {
-    /// Of what was just built.
-    ///
-    /// - `scan_bytes`: of the unrefined scan, with the trees over it.
-    pub fn of(refiner: Footprint, scan_bytes: usize) -> Self {
-        let mb = |bytes: usize| bytes as f64 / 1e6;
-        let Footprint { mesh, tree, patch } = refiner;
-        Self { mesh_mb: mb(mesh), tree_mb: mb(tree), scan_mb: mb(scan_bytes), patch_mb: mb(patch) }
     }
 }
 

@@ -8,6 +8,7 @@ use serde::Serialize;
 use tracing::{debug, warn};
 
 use super::outliers::UncertaintySummary;
+use crate::reported;
 use touchup_core::features::{Detection, detect};
 use touchup_core::mesh::{FaceId, FaceTree, MeshError, Outside, TriMesh, VertexId};
 use touchup_core::numeric::counted;
@@ -67,19 +68,27 @@ pub struct Outcome {
     pub counts: [usize; 2],
 }
 
-/// The patch in the report.
-#[derive(Debug, Serialize)]
-pub struct PatchSummary {
-    /// edge length of the new faces
-    pitch_mm: f64,
-    /// faces of the scan that went
-    removed_faces: usize,
-    /// faces that came
-    added_faces: usize,
-    /// share of the new vertices that rest on contacts nearby, not there
-    guessed_share: f64,
-    /// time of the reconstruction, s
-    pub build_s: f64,
+reported! {
+    /// The patch in the report.
+    #[derive(Debug, Serialize)]
+    pub struct PatchSummary, fn of(patched: &Patched, seconds: f64) {
+        /// edge length of the new faces
+        pitch_mm: f64 = patched.pitch * 1e3,
+        /// faces of the scan that went
+        removed_faces: usize = patched.removed_faces,
+        /// faces that came
+        added_faces: usize = patched.added_faces,
+        /// share of the new vertices that rest on contacts nearby, not there
+        guessed_share: f64 = guessed_share(&patched.support),
+        /// time of the reconstruction, s
+        pub build_s: f64 = seconds,
+    }
+}
+
+fn guessed_share(support: &[Support]) -> f64 {
+    let count = |wanted: Support| support.iter().filter(|&&support| support == wanted).count() as f64;
+    let (touched, guessed) = (count(Support::Touched), count(Support::Guessed) + count(Support::Unreachable));
+    guessed / (touched + guessed).max(1.0)
 }
 
 /// Features of a mesh and the touches on it, also as a file has them.
@@ -178,20 +187,6 @@ impl OutcomePlaces<'_> {
             write_features(out, &found(&mesh, &as_written(touches)).1)?;
         }
         Ok(())
-    }
-}
-
-impl PatchSummary {
-    fn of(patched: &Patched, build_s: f64) -> Self {
-        let count = |wanted: Support| patched.support.iter().filter(|&&support| support == wanted).count() as f64;
-        let (touched, guessed) = (count(Support::Touched), count(Support::Guessed) + count(Support::Unreachable));
-        Self {
-            pitch_mm: patched.pitch * 1e3,
-            removed_faces: patched.removed_faces,
-            added_faces: patched.added_faces,
-            guessed_share: guessed / (touched + guessed).max(1.0),
-            build_s,
-        }
     }
 }
 

@@ -22,20 +22,22 @@ pub struct UncertaintySummary {
     outliers: Vec<OutlierSummary>,
 }
 
-/// Contacts one after the other that were rejected.
-#[derive(Debug, Serialize)]
-struct OutlierSummary {
-    /// stamp of the first
-    stamp_s: f64,
-    /// where the one was that contradicted most
-    point_mm: [f64; 3],
-    /// … and its normal
-    normal: [f64; 3],
-    /// its distance from the place
-    off_mm: f64,
-    /// … in standard deviations
-    sigmas: f64,
-    contacts: u64,
+reported! {
+    /// Contacts one after the other that were rejected.
+    #[derive(Debug, Serialize)]
+    struct OutlierSummary, fn of(outlier: &Outlier) {
+        /// stamp of the first
+        stamp_s: f64 = outlier.stamp_ns as f64 * 1e-9,
+        /// where the one was that contradicted most
+        point_mm: [f64; 3] = (outlier.point.coords * 1e3).into(),
+        /// … and its normal
+        normal: [f64; 3] = outlier.normal.into(),
+        /// its distance from the place
+        off_mm: f64 = outlier.innovation * 1e3,
+        /// … in standard deviations
+        sigmas: f64 = outlier.sigmas,
+        contacts: u64 = outlier.contacts,
+    }
 }
 
 /// Number of listed outliers.
@@ -57,29 +59,13 @@ impl UncertaintySummary {
             outliers: outliers.last().skip(skipped).map(OutlierSummary::of).collect(),
         }
     }
-}
 
-impl UncertaintySummary {
     /// Place and distance of the last outlier.
     pub fn last_outlier(&self) -> Option<String> {
         let OutlierSummary { point_mm: [x, y, z], off_mm, sigmas, .. } = self.outliers.last()?;
         Some(format!(
             "last outlier: at ({x:.1}, {y:.1}, {z:.1}) mm, {off_mm:+.3} mm or {sigmas:.0} standard deviations off"
         ))
-    }
-}
-
-impl OutlierSummary {
-    fn of(outlier: &Outlier) -> Self {
-        let Outlier { stamp_ns, point, normal, innovation, sigmas, contacts } = *outlier;
-        Self {
-            stamp_s: stamp_ns as f64 * 1e-9,
-            point_mm: [point.x, point.y, point.z].map(|x| x * 1e3),
-            normal: normal.into(),
-            off_mm: innovation * 1e3,
-            sigmas,
-            contacts,
-        }
     }
 }
 
