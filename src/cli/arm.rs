@@ -1,5 +1,6 @@
 //! The arm that a verb works with: a simulated one, or a UR.
 
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
@@ -9,9 +10,11 @@ use super::CliError;
 use super::probing::Ready;
 #[cfg(feature = "ur")]
 use super::probing::ur_params;
+use super::progress::WorkProgress;
 use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
 use crate::mesh::TriMesh;
 use crate::probing::arm::Arm;
+use crate::probing::execute::{Cell, Prober};
 use crate::scene::Scene;
 use crate::sim::{ArmParams, MeshSurface, SimArm, WEIGHTLESS};
 use crate::stylus::Payload;
@@ -107,22 +110,6 @@ pub(super) fn millimetres(flag: &str, text: &str) -> Result<Vector3<f64>, CliErr
     Ok(Vector3::from(place) / 1e3)
 }
 
-impl ArmArguments {
-    /// As [`CellArguments::scan`].
-    pub fn scan(&self, scene: &Path) -> Result<(PathBuf, MeshUnit), CliError> {
-        self.cell.scan(scene)
-    }
-
-    /// A call on the arm.
-    pub fn with<T>(
-        &self,
-        ready: &Ready,
-        work: impl FnOnce(&mut dyn Arm) -> Result<T, CliError>,
-    ) -> Result<T, CliError> {
-        self.cell.with(self.robot, ready, Ok, work)
-    }
-}
-
 impl CellArguments {
     /// The scan and the unit of its file.
     pub fn scan(&self, scene: &Path) -> Result<(PathBuf, MeshUnit), CliError> {
@@ -153,6 +140,30 @@ impl CellArguments {
                 work(&mut SimArm::new(&surface, params, &ready.cell.above(&part))?)
             }
         }
+    }
+
+    /// Measures something with the probe of an arm about the scan as it is; returns also the cell.
+    ///
+    /// - `stage`: what this is called while it lasts.
+    /// - `truth`: as in [`Self::with`].
+    pub fn measure<T, E: Display>(
+        &self,
+        robot: RobotName,
+        scene: &Path,
+        stage: &'static str,
+        truth: impl FnOnce(ArmParams, &Scene) -> Result<ArmParams, CliError>,
+        work: impl FnOnce(&mut Prober<'_>) -> Result<T, E>,
+    ) -> Result<(T, Cell), CliError> {
+        let (scan, unit) = self.scan(scene)?;
+        let ready = Ready::read(scene, &scan, unit)?;
+        ready.may_move()?;
+        let _measuring = WorkProgress::stage(stage);
+        let truth = |arm| truth(arm, &ready.scene);
+        let measured = self.with(robot, &ready, truth, |arm| {
+            let mut world = ready.static_world();
+            work(&mut Prober::new(arm, &ready.cell, &ready.params, &mut world)).map_err(CliError::arm)
+        })?;
+        Ok((measured, ready.cell))
     }
 
     fn part(&self) -> Result<TriMesh, CliError> {

@@ -8,10 +8,8 @@ use nalgebra::Point3;
 use serde::Serialize;
 
 use super::arm::{ArmArguments, millimetres};
-use super::probing::Ready;
-use super::progress::WorkProgress;
 use super::{CliError, Losses, print_report, reported};
-use crate::probing::execute::{Prober, Repeatability, SpotTouch};
+use crate::probing::execute::{Repeatability, SpotTouch};
 
 /// Allowed number of touches; with three each side is approached, and the repeatability is known.
 const TOUCHES: std::ops::RangeInclusive<usize> = 3..=100;
@@ -66,15 +64,9 @@ pub(super) fn repeated(
         let (least, most) = (TOUCHES.start(), TOUCHES.end());
         return Err(CliError::Usage(format!("--touches {touches} must be {least} to {most}")));
     }
-    let (scan, unit) = arm.scan(scene)?;
-    let ready = Ready::read(scene, &scan, unit)?;
-    ready.may_move()?;
-    let _touching = WorkProgress::stage("touch");
-    arm.with(&ready, |arm| {
-        let mut world = ready.static_world();
-        let mut prober = Prober::new(arm, &ready.cell, &ready.params, &mut world);
-        prober.repeat(&place, touches).map_err(CliError::arm)
-    })
+    let ArmArguments { robot, cell } = arm;
+    let found = cell.measure(*robot, scene, "touch", |arm, _| Ok(arm), |prober| prober.repeat(&place, touches))?;
+    Ok(found.0)
 }
 
 reported! {

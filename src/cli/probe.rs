@@ -53,18 +53,19 @@ pub(super) struct ProbeArguments {
 
 pub(super) fn probe(arguments: &ProbeArguments) -> Result<Losses, CliError> {
     let flags = arguments.flags()?;
-    let (scan, unit) = arguments.arm.scan(&arguments.scene)?;
+    let ArmArguments { robot, cell } = &arguments.arm;
+    let (scan, unit) = cell.scan(&arguments.scene)?;
     let probing = Probing {
         scene: &arguments.scene,
         scan: &scan,
         unit,
         flags: &flags,
-        is_simulated: arguments.arm.robot == RobotName::Sim,
+        is_simulated: *robot == RobotName::Sim,
         out: &arguments.out,
     };
     let mut ready = probing.ready()?;
     arguments.narrow(&mut ready)?;
-    arguments.arm.with(&ready, |arm| arguments.run(&probing, &ready, arm))
+    cell.with(*robot, &ready, Ok, |arm| arguments.run(&probing, &ready, arm))
 }
 
 impl ProbeArguments {

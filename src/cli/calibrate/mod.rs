@@ -91,6 +91,12 @@ impl CalibrationTarget {
         Ok(DraftScene { text, scene })
     }
 
+    /// Reads the scene, which a calibration with an arm needs, and returns its path too.
+    fn open_for_arm(&self) -> Result<(&Path, DraftScene), CliError> {
+        let scene = self.scene.as_deref().ok_or_else(|| CliError::Usage(NO_SCENE.to_owned()))?;
+        Ok((scene, self.open_scene()?))
+    }
+
     /// Puts `found` into the scene and prints what it was.
     fn write<T: Serialize + std::fmt::Display>(
         &self,

@@ -9,31 +9,22 @@ use nalgebra::Vector3;
 use serde::Serialize;
 
 use super::super::arm::RobotName;
-use super::super::probing::Ready;
-use super::super::progress::WorkProgress;
 use super::super::{CliError, Losses};
 use super::payload::{PayloadArguments, PayloadFound, warn_of_residuals};
-use super::{Change, DraftScene, NO_SCENE, rounded};
+use super::{Change, DraftScene, rounded};
 use crate::calibrate::{PayloadError, PayloadParams, StaticPose, fit_payload};
-use crate::probing::execute::{NotReached, PayloadReading, PayloadReadings, Prober};
-use crate::scene::Setting;
+use crate::probing::execute::{NotReached, PayloadReading, PayloadReadings};
+use crate::scene::{Scene, Setting};
+use crate::sim::ArmParams;
 
 /// The verb.
 pub(super) fn payload(arguments: &PayloadArguments, robot: RobotName) -> Result<Losses, CliError> {
     let PayloadArguments { cell, truth_payload, target, .. } = arguments;
-    let scene = target.scene.as_ref().ok_or_else(|| CliError::Usage(NO_SCENE.to_owned()))?;
-    let draft = target.open_scene()?;
-    let (scan, unit) = cell.scan(scene)?;
-    let ready = Ready::read(scene, &scan, unit)?;
-    ready.may_move()?;
-    let measuring = WorkProgress::stage("identify the payload");
-    let truth = |arm| truth_payload.held_by(arm, &ready.scene);
-    let PayloadReadings { segments, not_reached } = cell.with(robot, &ready, truth, |arm| {
-        let mut world = ready.static_world();
-        let mut prober = Prober::new(arm, &ready.cell, &ready.params, &mut world);
-        prober.measure_payload().map_err(CliError::arm)
-    })?;
-    drop(measuring);
+    let (scene, draft) = target.open_for_arm()?;
+    let truth = |arm: ArmParams, scene: &Scene| truth_payload.held_by(arm, scene);
+    let stage = "identify the payload";
+    let (readings, _) = cell.measure(robot, scene, stage, truth, |prober| prober.measure_payload())?;
+    let PayloadReadings { segments, not_reached } = readings;
     let poses: Vec<StaticPose> = segments.iter().map(static_pose).collect();
     let params = PayloadParams { gravity: arguments.gravity_m_per_s2, ..PayloadParams::default() };
     let fit = fit_payload(&poses, &params).map_err(|error| CliError::Arm(advice(&error)))?;

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::super::arm::ArmArguments;
 use super::super::check::repeated;
 use super::super::{CliError, Losses, reported};
-use super::{CalibrationTarget, Change, NO_SCENE, rounded};
+use super::{CalibrationTarget, Change, rounded};
 use crate::probing::execute::Repeatability;
 use crate::scene::Setting;
 
@@ -29,9 +29,7 @@ pub(in crate::cli) struct StiffnessArguments {
 /// The verb.
 pub(super) fn stiffness(arguments: &StiffnessArguments) -> Result<Losses, CliError> {
     let StiffnessArguments { arm, spot, touches, target } = arguments;
-    let needed = || CliError::Usage(NO_SCENE.to_owned());
-    let scene = target.scene.as_ref().ok_or_else(needed)?;
-    let draft = target.open_scene()?;
+    let (scene, draft) = target.open_for_arm()?;
     let found = StiffnessFound::of(&repeated(arm, scene, spot, *touches)?);
     let stiffness_n_per_mm = rounded(found.stiffness_n_per_mm, 3);
     let mut expected = draft.scene.clone();

@@ -6,14 +6,12 @@ use nalgebra::{Point3, Vector3};
 use serde::Serialize;
 
 use super::super::arm::{RobotName, millimetres};
-use super::super::probing::Ready;
-use super::super::progress::WorkProgress;
 use super::super::{CliError, Losses, reported};
 use super::tip::TipArguments;
-use super::{Change, DraftScene, NO_SCENE, Vector, rounded};
+use super::{Change, DraftScene, Vector, rounded};
 use crate::calibrate::{PlaneTipFit, VectorEstimate, fit_tip_by_plane};
-use crate::probing::execute::{Cell, NotReached, Prober, TipPoses};
-use crate::scene::Setting;
+use crate::probing::execute::{Cell, NotReached, TipPoses};
+use crate::scene::{Scene, Setting};
 use crate::sim::ArmParams;
 
 /// The verb.
@@ -22,25 +20,16 @@ use crate::sim::ArmParams;
 pub(super) fn tip(arguments: &TipArguments, robot: RobotName, spot: &str) -> Result<Losses, CliError> {
     let TipArguments { cell, truth_tip_mm, target, .. } = arguments;
     let place = Point3::from(millimetres("--spot", spot)?);
-    let scene = target.scene.as_ref().ok_or_else(|| CliError::Usage(NO_SCENE.to_owned()))?;
-    let draft = target.open_scene()?;
-    let (scan, unit) = cell.scan(scene)?;
-    let ready = Ready::read(scene, &scan, unit)?;
-    ready.may_move()?;
-    let touching = WorkProgress::stage("touch");
-    let truth = |arm: ArmParams| {
+    let (scene, draft) = target.open_for_arm()?;
+    let truth = |arm: ArmParams, _: &Scene| {
         let Some(text) = truth_tip_mm else { return Ok(arm) };
         let off = millimetres("--truth-tip-mm", text)? - arm.pose_ft.translation.vector;
         Ok(ArmParams { ball_offset: arm.pose_ft.rotation.inverse() * off, ..arm })
     };
-    let TipPoses { poses_bf, normal_b, not_reached } = cell.with(robot, &ready, truth, |arm| {
-        let mut world = ready.static_world();
-        let mut prober = Prober::new(arm, &ready.cell, &ready.params, &mut world);
-        prober.measure_tip(&place).map_err(CliError::arm)
-    })?;
-    drop(touching);
+    let (measured, of_arm) = cell.measure(robot, scene, "touch", truth, |prober| prober.measure_tip(&place))?;
+    let TipPoses { poses_bf, normal_b, not_reached } = measured;
     let fit = fit_tip_by_plane(&poses_bf, &normal_b).map_err(CliError::arm)?;
-    let found = PivotFound::of(&fit, &ready.cell, &not_reached);
+    let found = PivotFound::of(&fit, &of_arm, &not_reached);
     target.write(&draft, &found.change(&draft), &found)?;
     Ok(Losses::new())
 }
