@@ -23,7 +23,10 @@ use crate::io::features_file::{FeatureRecord, read_features};
 use crate::io::mesh_file::{MeshFile, MeshUnit, VertexColumn, read_mesh, read_vertex_columns};
 use crate::mesh::{FaceTree, TriMesh};
 
-#[derive(Debug, Args)]
+/// Points spread over the truth, unless more or fewer are wanted.
+const SAMPLES: u32 = 200_000;
+
+#[derive(Debug, Default, Args)]
 pub(super) struct CompareArguments {
     /// The mesh to be judged: PLY, STL or OBJ; of a refined PLY touched and untouched parts are listed apart
     mesh: PathBuf,
@@ -69,7 +72,7 @@ pub(super) struct CompareArguments {
     #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', num_args = 3, allow_negative_numbers = true)]
     view: Option<Vec<f64>>,
     /// Points spread over TRUTH; over MESH they are as dense
-    #[arg(long, value_name = "N", default_value_t = 200_000, value_parser = clap::value_parser!(u32).range(100..=5_000_000))]
+    #[arg(long, value_name = "N", default_value_t = SAMPLES, value_parser = clap::value_parser!(u32).range(100..=5_000_000))]
     samples: u32,
     /// Another seed spreads them differently
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -83,9 +86,10 @@ pub(super) struct CompareArguments {
 }
 
 /// How the mesh is brought onto the truth.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 enum Align {
     /// MESH is already aligned
+    #[default]
     None,
     /// From about the right place, point to plane
     Icp,
@@ -227,27 +231,8 @@ impl CompareArguments {
     /// - `tolerance_mm`: marked in it.
     pub(super) fn of_picture(files: [PathBuf; 4], named: Vec<FeatureRecord>, tolerance_mm: f64) -> Self {
         let [mesh, truth, before, picture] = files;
-        Self {
-            mesh,
-            truth,
-            mesh_unit: MeshUnit::Millimetre,
-            truth_unit: MeshUnit::Millimetre,
-            before: Some(before),
-            align: Align::None,
-            alternative: None,
-            pairs: None,
-            picture: Some(picture),
-            tolerance_mm: Some(tolerance_mm),
-            features: None,
-            named,
-            view: None,
-            coloured: None,
-            range_mm: None,
-            samples: 200_000,
-            seed: 1,
-            verbose: false,
-            json: false,
-        }
+        let (before, picture, tolerance_mm) = (Some(before), Some(picture), Some(tolerance_mm));
+        Self { mesh, truth, before, picture, tolerance_mm, named, samples: SAMPLES, seed: 1, ..Self::default() }
     }
 
     fn measure(

@@ -11,10 +11,11 @@ use serde::Serialize;
 
 use super::compare::{CompareArguments, compared};
 use super::demo::{DemoArguments, TOLERANCE_MM};
+use super::found::kind_of;
 use super::probing::{Done, Probing, ProbingSummary};
 use super::progress::WorkProgress;
 use super::{CliError, Losses, not_written, print_result, reported, write_json};
-use crate::features::{Feature, Kind, Measured};
+use crate::features::{Feature, Measured};
 use crate::io::atomic::{create_folder, write_atomically};
 use crate::io::features_file::FeatureRecord;
 use crate::io::mesh_file::{MeshUnit, write_mesh};
@@ -107,14 +108,9 @@ fn feature_of(probed: &Probed) -> Option<&Feature> {
 /// One click near a feature, as a person makes it: a kind, and no size.
 fn clicked(id: u32, feature: &TruthFeature, rng: &mut Pcg64) -> Flag {
     let (angle, off) = (rng.random_range(0.0..TAU), rng.random_range(0.0..CLICK));
-    let (kind, top) = match feature.shape {
-        TruthShape::Hole { .. } => (Kind::Hole, 0.0),
-        TruthShape::Slot { .. } => (Kind::Slot, 0.0),
-        TruthShape::Boss { height, .. } => (Kind::Boss, height),
-        TruthShape::Step { .. } => (Kind::Edge, 0.0),
-    };
+    let top = if let TruthShape::Boss { height, .. } = feature.shape { height } else { 0.0 };
     let place: Point3<f64> = feature.centre + Vector3::new(off * angle.cos(), off * angle.sin(), top);
-    Flag { id, kind: Some(kind), place, radius: CLICK }
+    Flag { id, kind: Some(kind_of(&feature.shape)), place, radius: CLICK }
 }
 
 /// Error of the place, m.

@@ -11,8 +11,8 @@ use super::pictures::{file_name, today, view_from, write_coloured, write_picture
 use super::progress::WorkProgress;
 use super::{CliError, Losses, check_outputs, counted, print_report, reported};
 use crate::compare::{
-    BadTouches, Class, ClassMap, Disagreement, DisagreementRegion, IndexedMesh, PicturePanel, PictureParams,
-    RefinedShape, RigidOffset, Scanner, VertexBasis, colour_of_class, disagreement,
+    BadTouches, Class, Disagreement, DisagreementRegion, IndexedMesh, PicturePanel, PictureParams, RefinedShape,
+    RigidOffset, Scanner, VertexBasis, colour_of_class, disagreement,
 };
 use crate::io::mesh_file::{MeshUnit, VertexColumn, read_mesh, read_vertex_columns};
 use crate::io::touches_file::read_touches;

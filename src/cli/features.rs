@@ -1,6 +1,6 @@
 //! `touchup features`: a mesh in, and touches where there are any; its holes, slots, edges and planes out.
 
-use std::fmt;
+use std::iter;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -16,7 +16,6 @@ use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
 use crate::io::touches_file::read_touches;
 use crate::mesh::TriMesh;
 use crate::session::found;
-use crate::stylus::ProbedPoint;
 
 #[derive(Debug, Args)]
 pub(super) struct FeaturesArguments {
@@ -69,12 +68,13 @@ pub(super) fn features(arguments: &FeaturesArguments) -> Result<Losses, CliError
     let started = Instant::now();
     let (table, file) = match arguments.mode {
         FeaturesMode::Fitted => {
-            let (detection, file) = find(&mesh, &touches);
-            (FeatureTable(&detection).to_string(), file)
+            let _finding = WorkProgress::stage("find features");
+            let (detection, file) = found(&mesh, &touches);
+            (feature_table(&detection), file)
         }
         FeaturesMode::Paper => {
             let file = FeatureFile::of_clusters(&arguments.find_clusters(&mesh));
-            (ClusterTable(&file).to_string(), file)
+            (cluster_table(&file), file)
         }
     };
     let took_s = started.elapsed().as_secs_f64();
@@ -117,57 +117,42 @@ impl FeaturesArguments {
 }
 
 /// Clusters as text.
-struct ClusterTable<'a>(&'a FeatureFile);
-
-impl fmt::Display for ClusterTable<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let clusters = &self.0.clusters;
-        if clusters.is_empty() {
-            return write!(f, "no vertex is curved enough: a lower --threshold-per-mm2, or leave --clusters out");
-        }
-        write!(f, "{}\n{:>28}  {:>8}  bent", counted(clusters.len(), "cluster", "clusters"), "center, mm", "vertices")?;
-        for cluster in clusters {
-            let [x, y, z] = cluster.center_mm;
-            let bent = cluster.convex.map_or("", |convex| if convex { "outward" } else { "inward" });
-            write!(f, "\n{:>28}  {:>8}  {bent}", format!("{x:.2} {y:.2} {z:.2}"), cluster.vertices)?;
-        }
-        Ok(())
+fn cluster_table(FeatureFile { clusters, .. }: &FeatureFile) -> String {
+    if clusters.is_empty() {
+        return "no vertex is curved enough: a lower --threshold-per-mm2, or leave --clusters out".to_owned();
     }
-}
-
-/// What is on a mesh, and the file of it.
-pub(super) fn find(mesh: &TriMesh, touches: &[ProbedPoint]) -> (Detection, FeatureFile) {
-    let _finding = WorkProgress::stage("find features");
-    found(mesh, touches)
+    let head =
+        format!("{}\n{:>28}  {:>8}  bent", counted(clusters.len(), "cluster", "clusters"), "center, mm", "vertices");
+    let rows = clusters.iter().map(|cluster| {
+        let [x, y, z] = cluster.center_mm;
+        let bent = cluster.convex.map_or("", |convex| if convex { "outward" } else { "inward" });
+        format!("{:>28}  {:>8}  {bent}", format!("{x:.2} {y:.2} {z:.2}"), cluster.vertices)
+    });
+    iter::once(head).chain(rows).collect::<Vec<_>>().join("\n")
 }
 
 /// Features as text.
-pub(super) struct FeatureTable<'a>(pub &'a Detection);
-
-impl fmt::Display for FeatureTable<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Detection { features, unexplained } = self.0;
-        if features.is_empty() {
-            write!(f, "no features")?;
-        } else {
-            let counts: Vec<_> = KINDS.into_iter().filter_map(|kind| count(features, kind)).collect();
-            writeln!(f, "features: {}", counts.join(", "))?;
-            write!(f, "{:>4}  {:<7} {:>28}  {:<44} fitted to", "id", "kind", "center, mm", "size, mm")?;
-            for feature in features.iter().filter(|feature| feature.kind != Kind::Plane) {
-                write!(f, "\n{}", FeatureRow(feature))?;
-            }
-        }
-        if *unexplained > NOTABLE {
-            write!(f, "\nnot looked at: {:.0} % of the surface, which is neither flat nor round", unexplained * 100.0)?;
-        }
-        Ok(())
+fn feature_table(Detection { features, unexplained }: &Detection) -> String {
+    let mut lines = Vec::new();
+    if features.is_empty() {
+        lines.push("no features".to_owned());
+    } else {
+        let counts: Vec<_> = Kind::ALL.into_iter().filter_map(|kind| count(features, kind)).collect();
+        lines.push(format!("features: {}", counts.join(", ")));
+        lines.push(format!("{:>4}  {:<7} {:>28}  {:<44} fitted to", "id", "kind", "center, mm", "size, mm"));
+        lines.extend(features.iter().filter(|feature| feature.kind != Kind::Plane).map(row));
     }
+    if *unexplained > NOTABLE {
+        lines.push(format!(
+            "not looked at: {:.0} % of the surface, which is neither flat nor round",
+            unexplained * 100.0
+        ));
+    }
+    lines.join("\n")
 }
 
 /// Smallest share of the surface that gets a line.
 const NOTABLE: f64 = 0.05;
-
-const KINDS: [Kind; 7] = [Kind::Hole, Kind::Slot, Kind::Pocket, Kind::Boss, Kind::Edge, Kind::Corner, Kind::Plane];
 
 fn count(features: &[Feature], kind: Kind) -> Option<String> {
     let count = features.iter().filter(|feature| feature.kind == kind).count();
@@ -175,19 +160,14 @@ fn count(features: &[Feature], kind: Kind) -> Option<String> {
     (count > 0).then(|| counted(count, kind.name(), &format!("{}{ending}", kind.name())))
 }
 
-struct FeatureRow<'a>(&'a Feature);
-
-impl fmt::Display for FeatureRow<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let feature = self.0;
-        let c = feature.centre.value.coords * 1e3;
-        let place = format!("{:.2} {:.2} {:.2}", c.x, c.y, c.z);
-        let from = match feature.fitted_to {
-            FittedTo::Touches => format!("touches, {:.0} % touched", feature.touched * 100.0),
-            FittedTo::Mesh => "mesh".to_owned(),
-        };
-        write!(f, "{:>4}  {:<7} {place:>28}  {:<44} {from}", feature.id, feature.kind.name(), size(feature))
-    }
+fn row(feature: &Feature) -> String {
+    let c = feature.centre.value.coords * 1e3;
+    let place = format!("{:.2} {:.2} {:.2}", c.x, c.y, c.z);
+    let from = match feature.fitted_to {
+        FittedTo::Touches => format!("touches, {:.0} % touched", feature.touched * 100.0),
+        FittedTo::Mesh => "mesh".to_owned(),
+    };
+    format!("{:>4}  {:<7} {place:>28}  {:<44} {from}", feature.id, feature.kind.name(), size(feature))
 }
 
 fn size(feature: &Feature) -> String {

@@ -5,6 +5,7 @@ use std::fmt;
 use nalgebra::{Point3, Vector3};
 use serde::Serialize;
 
+use crate::features::Kind;
 use crate::io::features_file::FeatureRecord;
 use crate::sim::{TruthFeature, TruthShape};
 
@@ -57,12 +58,7 @@ impl FoundTable {
 
 impl FoundFeature {
     fn of(truth: &TruthFeature, found: &[FeatureRecord]) -> Self {
-        let kind = match truth.shape {
-            TruthShape::Hole { .. } => "hole",
-            TruthShape::Slot { .. } => "slot",
-            TruthShape::Boss { .. } => "boss",
-            TruthShape::Step { .. } => "edge",
-        };
+        let kind = kind_of(&truth.shape).name();
         let of_kind = found.iter().filter(|record| record.kind == kind);
         let off = |record: &&FeatureRecord| off_mm(truth, record).unwrap_or(f64::INFINITY);
         let record = of_kind.min_by(|a, b| off(a).total_cmp(&off(b))).filter(|record| off(record) < NEAR_MM);
@@ -96,6 +92,16 @@ impl FoundFeature {
             axis_off_deg: record.and_then(|record| axis_off_deg(truth, record)),
             touched: record.map(|record| record.touched),
         }
+    }
+}
+
+/// What a true shape is found as.
+pub(super) fn kind_of(shape: &TruthShape) -> Kind {
+    match shape {
+        TruthShape::Hole { .. } => Kind::Hole,
+        TruthShape::Slot { .. } => Kind::Slot,
+        TruthShape::Boss { .. } => Kind::Boss,
+        TruthShape::Step { .. } => Kind::Edge,
     }
 }
 

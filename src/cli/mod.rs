@@ -40,7 +40,8 @@ use failure::{ErrorForm, Failure};
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use output::notify;
 use output::{
-    check_kept, check_kept_by, check_outputs, check_place, not_written, print_report, print_result, write_json,
+    by_reason, check_kept, check_kept_by, check_outputs, check_place, not_written, print_report, print_result,
+    write_json,
 };
 
 use std::error::Error;

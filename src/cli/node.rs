@@ -9,7 +9,7 @@ use clap::Args;
 use tokio::signal::unix::{SignalKind, signal};
 
 use super::arm::connect_ur;
-use super::{CliError, Losses, counted, notify, print_report, print_result};
+use super::{CliError, Losses, by_reason, counted, notify, print_report, print_result};
 use crate::io::mesh_file::{MeshFile, read_mesh};
 use crate::live::Quantiles;
 use crate::ros;
@@ -137,12 +137,10 @@ fn losses(report: &SessionReport) -> Losses {
 
 impl fmt::Display for SessionReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let refused: Vec<_> = self.refused.iter().map(|(reason, count)| format!("{count} {reason}")).collect();
-        let refused = if refused.is_empty() { "none".to_owned() } else { refused.join(", ") };
         let wrenches = counted(self.lost[0], "wrench", "wrenches");
         let poses = counted(self.lost[1], "pose", "poses");
         let [poses_stale, wrenches_stale] = self.gaps.map(|gaps| counted(gaps, "time", "times"));
-        writeln!(f, "samples: {} accepted; refused: {refused}", self.accepted)?;
+        writeln!(f, "samples: {} accepted; refused: {}", self.accepted, by_reason(&self.refused))?;
         writeln!(
             f,
             "lost in transport: {wrenches}, {poses}; streams stale: {wrenches_stale} wrenches, {poses_stale} poses"

@@ -1,5 +1,6 @@
 //! What the verbs write: results on stdout, files, and the checks of their places before the work begins.
 
+use std::collections::BTreeMap;
 use std::io::{self, Write, stdout};
 use std::path::{Path, PathBuf};
 
@@ -17,6 +18,12 @@ pub(super) fn print_result(text: &str) {
 pub(super) fn print_report(as_json: bool, report: &impl Serialize, in_words: impl FnOnce() -> String) {
     let json = || serde_json::to_string(report).expect("finite numbers and names alone cannot fail");
     print_result(&if as_json { json() } else { in_words() });
+}
+
+/// Counts by their reasons, in words.
+pub(super) fn by_reason(counts: &BTreeMap<String, u64>) -> String {
+    let counts: Vec<_> = counts.iter().map(|(reason, count)| format!("{count} {reason}")).collect();
+    if counts.is_empty() { "none".to_owned() } else { counts.join(", ") }
 }
 
 /// One line on stderr that is no error.

@@ -89,11 +89,8 @@ impl Rates {
         self.real_time.as_ref().map_or(0, |real_time| real_time.scan_bytes)
     }
 
-    /// Takes the next sample, in real time when it is due; returns how long that took.
-    ///
-    /// # Errors
-    /// [`RefineError`] for a sample that was refused.
-    pub fn push(&mut self, sample: &Sample) -> Result<Duration, (RefineError, Duration)> {
+    /// Takes the next sample, in real time when it is due; returns whether it was refused, and how long that took.
+    pub fn push(&mut self, sample: &Sample) -> (Result<(), RefineError>, Duration) {
         if let Some(real_time) = &mut self.real_time {
             real_time.wait_for(sample.stamp_ns);
         }
@@ -106,14 +103,12 @@ impl Rates {
             real_time.behind.record(Duration::from_nanos(behind_ns));
         }
         match pushed {
-            Ok(_) => Ok(time),
-            Err(LiveError::Refine(error)) => Err((error, time)),
-            Err(error) => {
-                // reported at the end: the samples that are left change nothing
-                self.stopped = Some(error);
-                Ok(time)
-            }
+            Ok(_) => {}
+            Err(LiveError::Refine(error)) => return (Err(error), time),
+            // reported at the end: the samples that are left change nothing
+            Err(error) => self.stopped = Some(error),
         }
+        (Ok(()), time)
     }
 
     /// Takes the last stroke back, or does it again.

@@ -1,20 +1,19 @@
 //! `touchup refine`: a scan and a recording in, the refined mesh out.
 
 use std::collections::BTreeMap;
-use std::ffi::OsStr;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use clap::builder::{PathBufValueParser, TypedValueParser};
-use clap::{Arg, Args, Command};
+use clap::Args;
+use clap::builder::{OsStringValueParser, TypedValueParser};
 use serde::Serialize;
 use tracing::{debug, warn};
 
 use super::offsets::{ContactPoints, ScanOffset, WrenchOffset};
 use super::progress::WorkProgress;
 use super::rates::{Ended, LiveSummary, Rates};
-use super::{CliError, Losses, check_kept_by, check_place, counted, print_report};
+use super::{CliError, Losses, by_reason, check_kept_by, check_place, counted, print_report};
 use crate::haptic::{RefineCounts, RefineError, RefineParams};
 use crate::io::atomic::is_same_file;
 use crate::io::mesh_file::{MeshFile, MeshFileError, MeshUnit, check_target, read_mesh};
@@ -26,16 +25,16 @@ use crate::scene::{CutScan, Memory, Mode, Scene, SceneCost};
 use crate::session::{Outcome, OutcomePlaces, PatchSummary, SessionRecord, StrokeChange, UncertaintySummary};
 use crate::stylus::{ClockEstimator, ContactEstimator, MarkerCounts, Sample};
 
-#[derive(Clone, Debug, Args)]
+#[derive(Clone, Debug, Default, Args)]
 pub(super) struct RefineArguments {
     /// The scan: PLY, STL or OBJ; not needed when the scene names its file
-    #[arg(long, value_name = "MESH", required_unless_present_any = ["resume", "scene"], default_value = "", value_parser = PathOrNone)]
+    #[arg(long, value_name = "MESH", required_unless_present_any = ["resume", "scene"], default_value = "", value_parser = path_or_none())]
     scan: PathBuf,
     /// The touches: a ROS 2 recording, MCAP or SQLite, a file or a folder
-    #[arg(long, value_name = "RECORDING", required_unless_present = "resume", default_value = "", value_parser = PathOrNone)]
+    #[arg(long, value_name = "RECORDING", required_unless_present = "resume", default_value = "", value_parser = path_or_none())]
     bag: PathBuf,
     /// Output: the refined mesh as PLY, STL or OBJ, in the unit of the scan
-    #[arg(long, value_name = "MESH", required_unless_present = "resume", default_value = "", value_parser = PathOrNone)]
+    #[arg(long, value_name = "MESH", required_unless_present = "resume", default_value = "", value_parser = path_or_none())]
     out: PathBuf,
     /// Unit of the coordinates in the scan's file
     #[arg(long, value_name = "U", default_value = "mm")]
@@ -94,18 +93,8 @@ pub(super) struct RefineArguments {
 }
 
 /// Takes a path that may be left out; empty: left out.
-#[derive(Clone)]
-struct PathOrNone;
-
-impl TypedValueParser for PathOrNone {
-    type Value = PathBuf;
-
-    fn parse_ref(&self, command: &Command, argument: Option<&Arg>, value: &OsStr) -> Result<PathBuf, clap::Error> {
-        match value.is_empty() {
-            true => Ok(PathBuf::new()),
-            false => PathBufValueParser::new().parse_ref(command, argument, value),
-        }
-    }
+fn path_or_none() -> impl TypedValueParser<Value = PathBuf> {
+    OsStringValueParser::new().map(PathBuf::from)
 }
 
 /// What `--json` prints; times in s, `push_ns` in ns.
@@ -188,6 +177,7 @@ pub(super) fn refine(arguments: &RefineArguments) -> Result<Losses, CliError> {
 }
 
 /// Counts and times of the samples.
+#[derive(Default)]
 struct Pushes {
     accepted: u64,
     refused: BTreeMap<String, u64>,
@@ -195,15 +185,8 @@ struct Pushes {
 }
 
 impl Pushes {
-    fn new() -> Self {
-        Self { accepted: 0, refused: BTreeMap::new(), latencies: Latencies::new() }
-    }
-
     fn push(&mut self, rates: &mut Rates, sample: &Sample) {
-        let (pushed, time) = match rates.push(sample) {
-            Ok(time) => (Ok(()), time),
-            Err((error, time)) => (Err(error), time),
-        };
+        let (pushed, time) = rates.push(sample);
         self.latencies.record(time);
         match pushed {
             Ok(()) => self.accepted += 1,
@@ -273,29 +256,8 @@ fn misfit(params: &RefineParams, counts: &RefineCounts) -> Option<String> {
 impl RefineArguments {
     /// The files alone, everything else as it is by default.
     pub(super) fn of_files(scan: PathBuf, bag: PathBuf, out: PathBuf, mesh_unit: MeshUnit) -> Self {
-        let Topics { pose, wrench, markers } = Topics::default();
-        Self {
-            scan,
-            bag,
-            out,
-            mesh_unit,
-            scene: None,
-            wrench_topic: wrench,
-            pose_topic: pose,
-            markers_topic: markers,
-            tip_radius_mm: None,
-            stiffness_n_per_mm: None,
-            scan_noise_mm: None,
-            mode: None,
-            registration: false,
-            live: false,
-            features_out: None,
-            touches_out: None,
-            resume: None,
-            strokes: Vec::new(),
-            verbose: false,
-            json: false,
-        }
+        let Topics { pose, wrench, .. } = Topics::default();
+        Self { scan, bag, out, mesh_unit, wrench_topic: wrench, pose_topic: pose, ..Self::default() }
     }
 
     /// Writes features and touches too.
@@ -369,7 +331,7 @@ impl RefineArguments {
         let cost = self.cost(&scene, &rates, as_scanned.bytes() + cut.bytes());
 
         let started = Instant::now();
-        let mut pushes = Pushes::new();
+        let mut pushes = Pushes::default();
         let mut strokes = UndoSteps(&self.strokes);
         let mut clock = scene.clock_params().map(ClockEstimator::new).transpose()?;
         let mut contacts = self.registration.then(|| ContactPoints::new(&params)).transpose()?;
@@ -536,10 +498,10 @@ impl RefineSummary {
 
     /// Counts of samples, timings, and the stages built from the scene.
     fn details(&self) -> String {
-        let refused: Vec<_> = self.refused.iter().map(|(reason, count)| format!("{count} {reason}")).collect();
+        let (read, accepted, refused) = (self.samples, self.accepted, by_reason(&self.refused));
         let Quantiles { median, p99, p999, max } = self.push_ns;
         let mut lines = vec![
-            format!("samples: {} read, {} accepted; refused: {}", self.samples, self.accepted, list(&refused)),
+            format!("samples: {read} read, {accepted} accepted; refused: {refused}"),
             format!("faces moved: {}; updates cut back: {}", self.moved_faces, self.cut_back),
         ];
         lines.extend(self.patch.as_ref().map(|patch| format!("reconstruction: {:.2} s", patch.build_s)));
@@ -575,8 +537,4 @@ impl fmt::Display for RefineSummary {
         }
         self.live.iter().try_for_each(|live| write!(f, "\n{live}"))
     }
-}
-
-fn list(items: &[String]) -> String {
-    if items.is_empty() { "none".to_owned() } else { items.join(", ") }
 }

@@ -30,23 +30,8 @@ struct StepQuestion {
     k_n_per_m: Option<f64>,
     alpha_m_per_n_s: f64,
     beta_per_n2_s: f64,
-    step: StepWord,
-    along: Direction,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "lowercase")]
-enum StepWord {
-    Lie,
-    Corrected,
-    Dp5,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "lowercase")]
-enum Direction {
-    Normal0,
-    Force,
+    step: StepRule,
+    along: Along,
 }
 
 #[derive(Debug, thiserror::Error)]
@@ -94,15 +79,8 @@ fn answer(line: &[u8]) -> Result<FaceState, StepError> {
         model: model_of(&question)?,
         alpha_m_per_n_s: question.alpha_m_per_n_s,
         beta_per_n2_s: question.beta_per_n2_s,
-        rule: match question.step {
-            StepWord::Lie => StepRule::Lie,
-            StepWord::Corrected => StepRule::DriftCorrected,
-            StepWord::Dp5 => StepRule::DormandPrince,
-        },
-        along: match question.along {
-            Direction::Normal0 => Along::InitialNormal,
-            Direction::Force => Along::Force,
-        },
+        rule: question.step,
+        along: question.along,
         take_out_rigid_offset: false,
     })?;
     let face = FaceState { b: Point3::from(question.b_m), n: Vector3::from(question.n) };

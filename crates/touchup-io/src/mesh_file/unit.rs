@@ -15,12 +15,13 @@ pub const LARGEST_M: f64 = 20.0;
 
 words! {
     /// The unit in which a mesh file gives its coordinates.
-    #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Serialize)]
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum, Serialize)]
     pub enum MeshUnit {
         /// 1 m
         #[value(name = "m")]
         Metre = "m",
         /// 0.001 m
+        #[default]
         #[value(name = "mm")]
         Millimetre = "mm",
         /// 0.0254 m
