@@ -10,6 +10,11 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
+/// What is behind a lock whose holder may have panicked: of values that are valid after any panic.
+pub(crate) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// How long a wait on a manual clock sleeps before it looks at its channel or condition again. No result depends on it.
 const LOOK: Duration = Duration::from_micros(500);
 /// A thread that does not wait again within this time hangs: a test fails then. No result depends on it.
@@ -178,7 +183,7 @@ struct Wait<'a> {
 
 impl Manual {
     fn waits(&self) -> MutexGuard<'_, Waits> {
-        self.waits.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.waits)
     }
 
     /// Waits until all workers wait.

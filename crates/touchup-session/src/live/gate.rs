@@ -1,8 +1,8 @@
 //! Gate before a renewal of the patch: open in a program, controlled in a test.
 
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
 
-use crate::clock::{Clock, Working};
+use crate::clock::{Clock, Working, locked};
 
 /// Where each renewal of the patch needs a permit, and whose time waits for the patch. The default lets everything through.
 #[derive(Clone, Debug, Default)]
@@ -50,14 +50,14 @@ impl Gate {
     pub(super) fn pass(&self) {
         if let Some(permits) = &self.permits {
             let is_shut = |state: &mut GateState| !state.is_open && state.done == state.given;
-            drop(permits.changed.wait_while(permits.lock(), is_shut).unwrap_or_else(PoisonError::into_inner));
+            drop(permits.changed.wait_while(locked(&permits.state), is_shut).unwrap_or_else(PoisonError::into_inner));
         }
     }
 
     /// The change of a renewal can be taken up.
     pub(super) fn note_done(&self) {
         if let Some(permits) = &self.permits {
-            permits.lock().done += 1;
+            locked(&permits.state).done += 1;
             permits.changed.notify_all();
         }
     }
@@ -66,7 +66,7 @@ impl Gate {
 impl GateKeeper {
     /// Lets one renewal through, and returns when its change can be taken up: one has to be asked for.
     pub fn let_one_through(&self) {
-        let mut state = self.0.lock();
+        let mut state = locked(&self.0.state);
         state.given = state.done + 1;
         self.0.changed.notify_all();
         let is_running = |state: &mut GateState| state.done < state.given;
@@ -76,14 +76,7 @@ impl GateKeeper {
 
 impl Drop for GateKeeper {
     fn drop(&mut self) {
-        self.0.lock().is_open = true;
+        locked(&self.0.state).is_open = true;
         self.0.changed.notify_all();
-    }
-}
-
-impl Permits {
-    /// Counts are valid after any panic.
-    fn lock(&self) -> MutexGuard<'_, GateState> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -24,6 +24,7 @@ use touchup_core::haptic::{RefineError, RefineParams, Refiner, Update};
 use touchup_core::mesh::{Changes, FaceTree, TriMesh, VertexId};
 use touchup_core::reconstruct::{Patcher, PatcherParams, Support};
 use touchup_core::stylus::{BiasParams, Sample, SettingError};
+use worker::Question;
 
 /// Why a sample was not taken.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -194,7 +195,7 @@ impl Engine {
         match &mut self.patch {
             Reconstruction::Without => Ok(self.refiner.undo()),
             Reconstruction::AtEnd(patcher) => Ok(patcher.undo()),
-            Reconstruction::Beside(renewals) => renewals.undo(&mut self.refiner),
+            Reconstruction::Beside(renewals) => renewals.change_strokes(&mut self.refiner, Question::Undo),
         }
     }
 
@@ -206,7 +207,7 @@ impl Engine {
         match &mut self.patch {
             Reconstruction::Without => Ok(self.refiner.redo()),
             Reconstruction::AtEnd(patcher) => Ok(patcher.redo()),
-            Reconstruction::Beside(renewals) => renewals.redo(&mut self.refiner),
+            Reconstruction::Beside(renewals) => renewals.change_strokes(&mut self.refiner, Question::Redo),
         }
     }
 
@@ -231,7 +232,10 @@ impl Engine {
 
     /// Touches that the patch beside the samples has added or removed since the last call.
     pub fn take_probed(&mut self) -> Option<TouchDelta> {
-        self.renewals_mut()?.take_probed()
+        match &mut self.patch {
+            Reconstruction::Beside(renewals) => renewals.take_probed(),
+            _ => None,
+        }
     }
 
     /// From here on notes what changes in the mesh, for [`Self::take_changes`].
@@ -251,7 +255,7 @@ impl Engine {
 
     /// Whether the mesh is one skin: large changes of the patch are taken up over several samples.
     pub fn is_whole(&self) -> bool {
-        self.renewals().is_none_or(Renewals::is_whole)
+        self.renewals().is_none_or(|renewals| renewals.is_done)
     }
 
     /// Support of a vertex. Where there is no patch, or it does not know yet, a vertex that is not where the scan has it
@@ -278,7 +282,7 @@ impl Engine {
 
     /// Lag of the patch beside the samples.
     pub fn counts(&self) -> LiveCounts {
-        self.renewals().map(Renewals::counts).unwrap_or_default()
+        self.renewals().map(|renewals| renewals.counts).unwrap_or_default()
     }
 
     /// Ends the thread, if there is one; gives both back.
@@ -297,9 +301,5 @@ impl Engine {
 
     fn renewals(&self) -> Option<&Renewals> {
         if let Reconstruction::Beside(renewals) = &self.patch { Some(renewals) } else { None }
-    }
-
-    fn renewals_mut(&mut self) -> Option<&mut Renewals> {
-        if let Reconstruction::Beside(renewals) = &mut self.patch { Some(renewals) } else { None }
     }
 }

@@ -32,12 +32,12 @@ pub(super) struct Renewals {
     /// the change that was taken up last …
     delta: PatchDelta,
     /// … and whether all of it is in the mesh
-    is_done: bool,
+    pub is_done: bool,
     /// whether the change that is due is known to be late
     is_late: bool,
     /// touches not yet requested
     probed: TouchDelta,
-    counts: LiveCounts,
+    pub counts: LiveCounts,
 }
 
 impl Renewals {
@@ -122,17 +122,8 @@ impl Renewals {
         Ok(())
     }
 
-    /// As [`super::Engine::undo`].
-    pub fn undo(&mut self, refiner: &mut Refiner) -> Result<bool, LiveError> {
-        self.change_strokes(refiner, Question::Undo)
-    }
-
-    /// As [`super::Engine::redo`].
-    pub fn redo(&mut self, refiner: &mut Refiner) -> Result<bool, LiveError> {
-        self.change_strokes(refiner, Question::Redo)
-    }
-
-    fn change_strokes(&mut self, refiner: &mut Refiner, question: Question) -> Result<bool, LiveError> {
+    /// Takes the last stroke back, or does it again, as [`super::Engine::undo`] and [`super::Engine::redo`].
+    pub fn change_strokes(&mut self, refiner: &mut Refiner, question: Question) -> Result<bool, LiveError> {
         self.catch_up(refiner)?;
         self.worker.ask(question)?;
         self.due_ns.push_back(i64::MAX);
@@ -179,17 +170,9 @@ impl Renewals {
         (!self.probed.is_empty()).then(|| std::mem::take(&mut self.probed))
     }
 
-    pub fn is_whole(&self) -> bool {
-        self.is_done
-    }
-
     pub fn patched_until_ns(&self) -> Option<i64> {
         // the least there is before the patch has seen a touch
         Some(self.delta.until_ns).filter(|&until_ns| until_ns > i64::MIN && self.counts.renewals > 0)
-    }
-
-    pub fn counts(&self) -> LiveCounts {
-        self.counts
     }
 
     pub fn finish(self) -> Result<Patcher, LiveError> {

@@ -8,7 +8,6 @@ use serde::Serialize;
 use tracing::{debug, warn};
 
 use super::outliers::UncertaintySummary;
-use crate::reported;
 use touchup_core::features::{Detection, detect};
 use touchup_core::mesh::{FaceId, FaceTree, MeshError, Outside, TriMesh, VertexId};
 use touchup_core::numeric::counted;

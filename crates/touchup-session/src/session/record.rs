@@ -3,13 +3,14 @@
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex};
 use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, Instant};
 
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::clock::Clock;
+use crate::clock::{Clock, locked};
 use touchup_core::stylus::Message;
 use touchup_io::mesh_file::MeshUnit;
 use touchup_io::recording::{RecordingError, SegmentedWriter, Topics};
@@ -101,14 +102,12 @@ impl SessionRecord {
         scene_yaml: &str,
         topics: &Topics,
     ) -> Result<(), SessionError> {
-        let (scan, scan_crc32) =
-            fingerprint(scan).map_err(|source| SessionError::Io { path: scan.to_owned(), source })?;
+        let (scan, scan_crc32) = fingerprint(scan).map_err(io_error(scan))?;
         let (wrench_topic, pose_topic) = (topics.wrench.clone(), topics.pose.clone());
         let description = Description { scan, scan_crc32, mesh_unit, wrench_topic, pose_topic };
         let text = serde_json::to_string_pretty(&description).expect("paths that were read are text, or are refused");
-        let io = |source| SessionError::Io { path: folder.path().to_owned(), source };
-        folder.write_text(SCENE, scene_yaml).map_err(io)?;
-        folder.write_text(DESCRIPTION, &text).map_err(io)
+        folder.write_text(SCENE, scene_yaml).map_err(io_error(folder.path()))?;
+        folder.write_text(DESCRIPTION, &text).map_err(io_error(folder.path()))
     }
 
     /// Reads what the folder of a session holds, whether or not it was ended.
@@ -117,11 +116,9 @@ impl SessionRecord {
     /// [`SessionError`].
     pub fn open(folder: &Path) -> Result<Self, SessionError> {
         let path = folder.join(DESCRIPTION);
-        let text = read_text(&path).map_err(|source| SessionError::Io { path: path.clone(), source })?;
-        let description: Description = serde_json::from_str(&text)
-            .map_err(|error| SessionError::Damaged { path: path.clone(), reason: error.to_string() })?;
-        let Description { scan, scan_crc32, mesh_unit, wrench_topic, pose_topic } = description;
-        let now = fingerprint(&scan).map_err(|source| SessionError::Io { path: scan.clone(), source })?;
+        let text = read_text(&path).map_err(io_error(&path))?;
+        let Description { scan, scan_crc32, mesh_unit, wrench_topic, pose_topic } = parsed(&text, &path)?;
+        let now = fingerprint(&scan).map_err(io_error(&scan))?;
         if now.1 != scan_crc32 {
             return Err(SessionError::ScanChanged { path: scan });
         }
@@ -138,13 +135,14 @@ impl SessionRecord {
 
 /// A last line that a crash cut off was not done either.
 fn read_strokes(path: &Path) -> Result<Vec<StrokeChange>, SessionError> {
-    let text = read_text(path).map_err(|source| SessionError::Io { path: path.to_owned(), source })?;
+    let text = read_text(path).map_err(io_error(path))?;
     let whole = text.rfind('\n').map_or("", |end| &text[..end]);
-    let read = |line: &str| {
-        serde_json::from_str(line)
-            .map_err(|error| SessionError::Damaged { path: path.to_owned(), reason: error.to_string() })
-    };
-    whole.lines().map(read).collect()
+    whole.lines().map(|line| parsed(line, path)).collect()
+}
+
+fn parsed<T: DeserializeOwned>(json: &str, path: &Path) -> Result<T, SessionError> {
+    serde_json::from_str(json)
+        .map_err(|error| SessionError::Damaged { path: path.to_owned(), reason: error.to_string() })
 }
 
 /// Messages missing in the recording of a session.
@@ -181,8 +179,8 @@ impl SessionRecorder {
     /// # Errors
     /// [`SessionError::Io`].
     pub fn start(folder: &SessionFolder, topics: &Topics, clock: &Clock) -> Result<Self, SessionError> {
-        let io = |source| SessionError::Io { path: folder.path().to_owned(), source };
-        let writer = SegmentedWriter::new(&folder.create_folder(RECORDING).map_err(io)?, topics);
+        let recording = folder.create_folder(RECORDING).map_err(io_error(folder.path()))?;
+        let writer = SegmentedWriter::new(&recording, topics);
         let (sender, messages) = sync_channel(MOST_WAITING);
         let unrecorded = Arc::new(Mutex::new(Unrecorded::default()));
         let end = Arc::new(RecordingEnd::default());
@@ -198,7 +196,7 @@ impl SessionRecorder {
             taker.take_down(&messages);
             drop(working);
         };
-        let thread = Builder::new().name("recorder".to_owned()).spawn(work).map_err(io)?;
+        let thread = Builder::new().name("recorder".to_owned()).spawn(work).map_err(io_error(folder.path()))?;
         Ok(Self { folder: folder.clone(), sender, thread, unrecorded, end })
     }
 
@@ -215,8 +213,7 @@ impl SessionRecorder {
     /// [`SessionError::Io`].
     pub fn write_stroke(&self, change: StrokeChange) -> Result<(), SessionError> {
         let line = serde_json::to_string(&change).expect("a number and a truth value cannot fail");
-        let io = |source| SessionError::Io { path: self.folder.path().join(STROKES), source };
-        self.folder.append_line(STROKES, &line).map_err(io)
+        self.folder.append_line(STROKES, &line).map_err(io_error(&self.folder.path().join(STROKES)))
     }
 
     /// Messages missing in the recording so far.
@@ -228,7 +225,7 @@ impl SessionRecorder {
     pub fn finish(self) -> Unrecorded {
         let Self { sender, thread, unrecorded, end, .. } = self;
         drop(sender);
-        *end.lock() = true;
+        *locked(&end.has_come) = true;
         end.changed.notify_all();
         let ended = thread.join();
         let mut unrecorded = locked(&unrecorded).clone();
@@ -239,16 +236,9 @@ impl SessionRecorder {
     }
 }
 
-/// A count and a text are valid after any panic.
-fn locked(unrecorded: &Mutex<Unrecorded>) -> MutexGuard<'_, Unrecorded> {
-    unrecorded.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-impl RecordingEnd {
-    /// A truth value is valid after any panic.
-    fn lock(&self) -> MutexGuard<'_, bool> {
-        self.has_come.lock().unwrap_or_else(PoisonError::into_inner)
-    }
+/// The error of a file or folder.
+fn io_error(path: &Path) -> impl FnOnce(io::Error) -> SessionError {
+    |source| SessionError::Io { path: path.to_owned(), source }
 }
 
 struct Taker {
@@ -265,7 +255,10 @@ impl Taker {
     /// Messages of a failed write are lost; writing is retried later, as space may be freed.
     fn take_down(mut self, messages: &Receiver<(Message, &'static str)>) {
         loop {
-            drop(self.clock.wait_while(&self.end.changed, self.end.lock(), FLUSH_EVERY, |has_come| !*has_come));
+            drop(
+                self.clock
+                    .wait_while(&self.end.changed, locked(&self.end.has_come), FLUSH_EVERY, |has_come| !*has_come),
+            );
             let is_over = loop {
                 match messages.try_recv() {
                     Ok((message, frame)) => self.take(&message, frame),
