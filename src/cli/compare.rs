@@ -186,18 +186,17 @@ pub(super) fn compared(arguments: &CompareArguments) -> Result<CompareReport, Cl
     };
     let mesh = PlacedMesh::new(moved(&as_read, &pose));
     let before = before.map(|scan| PlacedMesh::new(moved(&scan, &pose)));
-    let measured = arguments.measure(&mesh, &truth, before.as_ref(), regions.as_deref())?;
+    let (was, is) = arguments.measure(&mesh, &truth, before.as_ref(), regions.as_deref())?;
     if let Some(path) = &arguments.picture {
         let labels = arguments.feature_labels(&pose)?;
         let caption =
             format!("{}; {}", today(), alignment.as_ref().map_or("not aligned".to_owned(), Alignment::in_short));
         let drawing = Annotations { caption, labels, regions: regions.as_deref() };
-        arguments.draw(path, &mesh, before.as_ref(), &measured, &drawing)?;
+        arguments.draw(path, (&mesh, &is), before.as_ref().zip(was.as_ref()), &drawing)?;
     }
     if let Some(path) = &arguments.coloured {
-        let Comparison { vertex_deviations, range, .. } = &measured.after;
-        let colours: Vec<_> = vertex_deviations.iter().map(|&d| colour_of(d, *range)).collect();
-        let in_mm: Vec<f32> = vertex_deviations.iter().map(|d| (d * 1e3) as f32).collect();
+        let colours: Vec<_> = is.vertex_deviations.iter().map(|&d| colour_of(d, is.range)).collect();
+        let in_mm: Vec<f32> = is.vertex_deviations.iter().map(|d| (d * 1e3) as f32).collect();
         let column = VertexColumn { name: "deviation_mm", values: in_mm.into() };
         write_coloured(path, &as_read, arguments.mesh_unit, &colours, [column])?;
     }
@@ -205,8 +204,8 @@ pub(super) fn compared(arguments: &CompareArguments) -> Result<CompareReport, Cl
         mesh: ShapeReport::of(&arguments.mesh, &as_read),
         truth: ShapeReport::of(&arguments.truth, &truth.mesh),
         alignment,
-        before: measured.before.as_ref().map(ComparisonReport::of),
-        after: ComparisonReport::of(&measured.after),
+        before: was.as_ref().map(ComparisonReport::of),
+        after: ComparisonReport::of(&is),
     })
 }
 
@@ -216,12 +215,6 @@ struct Annotations<'a> {
     labels: Vec<PictureLabel>,
     /// of each vertex slot of the mesh
     regions: Option<&'a [SupportRegion]>,
-}
-
-/// Both comparisons, in one range.
-struct MeasuredBoth {
-    before: Option<Comparison>,
-    after: Comparison,
 }
 
 impl CompareArguments {
@@ -235,49 +228,42 @@ impl CompareArguments {
         Self { mesh, truth, before, picture, tolerance_mm, named, samples: SAMPLES, seed: 1, ..Self::default() }
     }
 
+    /// Compares what the mesh was before, where there is that, and the mesh, in one range.
     fn measure(
         &self,
         mesh: &PlacedMesh,
         truth: &PlacedMesh,
         before: Option<&PlacedMesh>,
         regions: Option<&[SupportRegion]>,
-    ) -> Result<MeasuredBoth, CliError> {
+    ) -> Result<(Option<Comparison>, Comparison), CliError> {
         let _measuring = WorkProgress::stage("measure");
-        let range = self.range_mm.map(|range| range * 1e-3);
-        let tolerance = self.tolerance_mm.map(|tolerance| tolerance * 1e-3);
-        let samples = self.samples as usize;
-        let params = CompareParams { samples, seed: self.seed, range, tolerance, ..Default::default() };
-        let own = regions.map_or(Regions::Unknown, Regions::Own);
-        let Some(before) = before else {
-            return Ok(MeasuredBoth {
-                before: None,
-                after: compare_shapes(mesh.shape(), truth.shape(), own, &params, &Threads)?,
-            });
-        };
+        let [range, tolerance] = [self.range_mm, self.tolerance_mm].map(|mm| mm.map(|mm| mm * 1e-3));
+        let params =
+            CompareParams { samples: self.samples as usize, seed: self.seed, range, tolerance, ..Default::default() };
         let through = regions.map_or(Regions::Unknown, |regions| Regions::Of(mesh.shape(), regions));
-        let before = compare_shapes(before.shape(), truth.shape(), through, &params, &Threads)?;
+        let compared = |scan: &PlacedMesh| compare_shapes(scan.shape(), truth.shape(), through, &params, &Threads);
+        let before = before.map(compared).transpose()?;
         // the scale of what was shows how much better it is
-        let params = CompareParams { range: Some(before.range), ..params };
-        let after = compare_shapes(mesh.shape(), truth.shape(), own, &params, &Threads)?;
-        Ok(MeasuredBoth { before: Some(before), after })
+        let params = CompareParams { range: before.as_ref().map(|before| before.range).or(range), ..params };
+        let own = regions.map_or(Regions::Unknown, Regions::Own);
+        Ok((before, compare_shapes(mesh.shape(), truth.shape(), own, &params, &Threads)?))
     }
 
     /// Draws the deviations.
     fn draw(
         &self,
         path: &Path,
-        mesh: &PlacedMesh,
-        before: Option<&PlacedMesh>,
-        measured: &MeasuredBoth,
+        (mesh, is): (&PlacedMesh, &Comparison),
+        before: Option<(&PlacedMesh, &Comparison)>,
         drawing: &Annotations<'_>,
     ) -> Result<(), CliError> {
         let _drawing = WorkProgress::stage("draw");
         let title = format!("{} against {}", file_name(&self.mesh), file_name(&self.truth));
         let note = |compared| table::note(compared, self.tolerance_mm);
-        let scan = before.zip(measured.before.as_ref()).zip(self.before.as_ref()).map(|((placed, compared), path)| {
-            (placed, compared, format!("before: {}", file_name(path)), note(compared))
-        });
-        let now = (mesh, &measured.after, format!("after: {}", file_name(&self.mesh)), note(&measured.after));
+        let scan = before
+            .zip(self.before.as_ref())
+            .map(|((scan, was), path)| (scan, was, format!("before: {}", file_name(path)), note(was)));
+        let now = (mesh, is, format!("after: {}", file_name(&self.mesh)), note(is));
         let panels: Vec<PicturePanel<'_>> = scan
             .iter()
             .chain([&now])
@@ -296,7 +282,7 @@ impl CompareArguments {
         let params = PictureParams {
             title: &title,
             caption: &drawing.caption,
-            range: measured.after.range,
+            range: is.range,
             tolerance: self.tolerance_mm.map(|tolerance| tolerance * 1e-3),
             from: view_from(self.view.as_ref())?,
             weights: weights.as_deref(),

@@ -18,6 +18,7 @@ use super::touched::{RegionError, TouchedTruth};
 use super::{CliError, Losses, print_result, reported, write_json};
 use crate::io::features_file::read_features;
 use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
+use crate::io::recording::Topics;
 use crate::mesh::MeshError;
 use crate::sim::{PathParams, Plate, ScanQuality, ScannerParams, StylusParams, measure_quality, plan_demo};
 
@@ -81,15 +82,13 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
     let model = TouchModel { stylus: StylusParams::default(), camera: None, seed: arguments.seed };
     let Simulated { scan, touch } = write_simulation(&plate, &truth, &path, &scanner, &model, &arguments.out)?;
 
-    let refined_path = arguments.out.join("refined.ply");
-    let [scan_path, touches_path, features_path] =
-        ["scan.ply", "touches.csv", "features.json"].map(|name| arguments.out.join(name));
-    let bag = arguments.out.join("touch.mcap");
-    let files = RefineArguments::of_files(scan_path.clone(), bag, refined_path.clone(), MeshUnit::Millimetre)
-        .with_features(features_path.clone(), touches_path);
+    let (out, unit) = (&arguments.out, MeshUnit::Millimetre);
+    let [scan_path, refined_path, features_path] =
+        ["scan.ply", "refined.ply", "features.json"].map(|name| out.join(name));
+    let files = RefineArguments::in_folder(scan_path.clone(), unit, out, None, Topics::default());
     let Refined { summary, losses, .. } = files.refined()?;
     // measured is what was written
-    let MeshFile { mesh: refined, .. } = read_mesh(&refined_path, MeshUnit::Millimetre).map_err(CliError::ReadMesh)?;
+    let MeshFile { mesh: refined, .. } = read_mesh(&refined_path, unit).map_err(CliError::ReadMesh)?;
 
     let named = read_features(&features_path)?.features;
     let found = FoundTable::of(&plate.features(), &named);

@@ -162,11 +162,7 @@ const NO_PATCH: &str = "--live lets the patch follow, and the scene has none: ad
 
 /// The command: refines, and prints the result.
 pub(super) fn refine(arguments: &RefineArguments) -> Result<Losses, CliError> {
-    let completed = match arguments.resume.as_deref() {
-        Some(session) => arguments.resumed(session)?,
-        None => arguments.with_scan()?,
-    };
-    let arguments = &completed;
+    let arguments = arguments.clone().completed()?;
     let Refined { repair, summary, losses } = arguments.refined()?;
     print_report(arguments.json, &summary, || {
         let details =
@@ -254,54 +250,38 @@ fn misfit(params: &RefineParams, counts: &RefineCounts) -> Option<String> {
 }
 
 impl RefineArguments {
-    /// The files alone, everything else as it is by default.
-    pub(super) fn of_files(scan: PathBuf, bag: PathBuf, out: PathBuf, mesh_unit: MeshUnit) -> Self {
-        let Topics { pose, wrench, .. } = Topics::default();
-        Self { scan, bag, out, mesh_unit, wrench_topic: wrench, pose_topic: pose, ..Self::default() }
+    /// Takes touch.mcap of a folder, and writes refined.ply, features.json and touches.csv into it.
+    pub(super) fn in_folder(
+        scan: PathBuf,
+        mesh_unit: MeshUnit,
+        folder: &Path,
+        scene: Option<PathBuf>,
+        topics: Topics,
+    ) -> Self {
+        let [bag, out] = ["touch.mcap", "refined.ply"].map(|name| folder.join(name));
+        let [features_out, touches_out] = ["features.json", "touches.csv"].map(|name| Some(folder.join(name)));
+        let Topics { pose: pose_topic, wrench: wrench_topic, markers: markers_topic } = topics;
+        let files = Self { scan, bag, out, mesh_unit, scene, features_out, touches_out, ..Self::default() };
+        Self { wrench_topic, pose_topic, markers_topic, ..files }
     }
 
-    /// Writes features and touches too.
-    pub(super) fn with_features(self, features: PathBuf, touches: PathBuf) -> Self {
-        Self { features_out: Some(features), touches_out: Some(touches), ..self }
-    }
-
-    /// With a scene, and other topics.
-    pub(super) fn with_scene(self, scene: PathBuf, topics: Topics) -> Self {
-        let Topics { pose, wrench, markers } = topics;
-        Self { scene: Some(scene), pose_topic: pose, wrench_topic: wrench, markers_topic: markers, ..self }
-    }
-
-    /// With the scan that the scene names, where the flags name none.
-    fn with_scan(&self) -> Result<Self, CliError> {
-        let named = match &self.scene {
-            Some(path) if self.scan.as_os_str().is_empty() => {
-                let scan = Scene::read(path)?.scan_file(path);
-                Some(scan.ok_or_else(|| CliError::Usage(NO_SCAN.to_owned()))?)
+    /// With what the session to be resumed, or the scene, names in place of flags.
+    fn completed(mut self) -> Result<Self, CliError> {
+        if let Some(session) = self.resume.take() {
+            let SessionRecord { scan, mesh_unit, scene, recording, topics, strokes } = SessionRecord::open(&session)?;
+            (self.scan, self.mesh_unit, self.scene) = (scan, mesh_unit, Some(scene));
+            (self.bag, self.wrench_topic, self.pose_topic) = (recording, topics.wrench, topics.pose);
+            self.strokes = strokes;
+            if self.out.as_os_str().is_empty() {
+                self.out = session.join("refined.ply");
             }
-            _ => None,
-        };
-        let (scan, mesh_unit) = named.unwrap_or((self.scan.clone(), self.mesh_unit));
-        Ok(Self { scan, mesh_unit, ..self.clone() })
-    }
-
-    /// Refines a session again.
-    fn resumed(&self, session: &Path) -> Result<Self, CliError> {
-        let SessionRecord { scan, mesh_unit, scene, recording, topics, strokes } = SessionRecord::open(session)?;
-        let or = |chosen: Option<PathBuf>, name: &str| chosen.unwrap_or_else(|| session.join(name));
-        let out = Some(self.out.clone()).filter(|out| !out.as_os_str().is_empty());
-        Ok(Self {
-            scan,
-            bag: recording,
-            out: or(out, "refined.ply"),
-            mesh_unit,
-            scene: Some(scene),
-            wrench_topic: topics.wrench,
-            pose_topic: topics.pose,
-            features_out: Some(or(self.features_out.clone(), "features.json")),
-            touches_out: Some(or(self.touches_out.clone(), "touches.csv")),
-            strokes,
-            ..self.clone()
-        })
+            self.features_out.get_or_insert_with(|| session.join("features.json"));
+            self.touches_out.get_or_insert_with(|| session.join("touches.csv"));
+        } else if let Some(path) = self.scene.as_ref().filter(|_| self.scan.as_os_str().is_empty()) {
+            let scan = Scene::read(path)?.scan_file(path);
+            (self.scan, self.mesh_unit) = scan.ok_or_else(|| CliError::Usage(NO_SCAN.to_owned()))?;
+        }
+        Ok(self)
     }
 
     /// Reads, replays and writes.
@@ -427,13 +407,6 @@ impl RefineArguments {
         Topics { pose, wrench, markers: self.markers_topic.clone() }
     }
 
-    /// Output files, by flag.
-    fn outputs(&self) -> Vec<(&'static str, &PathBuf)> {
-        let more = [("--features-out", &self.features_out), ("--touches-out", &self.touches_out)];
-        let more = more.into_iter().filter_map(|(flag, out)| Some((flag, out.as_ref()?)));
-        [("--out", &self.out)].into_iter().chain(more).collect()
-    }
-
     /// Checks that the result can be written before the work begins.
     fn check_out(&self) -> Result<(), CliError> {
         check_target(&self.out).map_err(|error| match error {
@@ -442,7 +415,16 @@ impl RefineArguments {
             }
             error => CliError::WriteMesh(error),
         })?;
-        let outputs = self.outputs();
+        let outputs = [
+            ("--out", Some(&self.out)),
+            ("--features-out", self.features_out.as_ref()),
+            ("--touches-out", self.touches_out.as_ref()),
+        ];
+        let inputs = [("--scan", Some(&self.scan)), ("--bag", Some(&self.bag)), ("--scene", self.scene.as_ref())];
+        let [outputs, inputs] = [outputs, inputs].map(|files| {
+            let named = files.into_iter().filter_map(|(flag, path)| Some((flag, path?)));
+            named.collect::<Vec<_>>()
+        });
         for (at, (flag, out)) in outputs.iter().enumerate() {
             if let Some((other, _)) = outputs[..at].iter().find(|(_, other)| other == out || is_same_file(other, out)) {
                 let path = out.display();
@@ -450,8 +432,7 @@ impl RefineArguments {
                     "{flag} and {other} would both write {path}: choose another place"
                 )));
             }
-            let inputs = [("--scan", Some(&self.scan)), ("--bag", Some(&self.bag)), ("--scene", self.scene.as_ref())];
-            for (read, input) in inputs.into_iter().filter_map(|(read, input)| Some((read, input?))) {
+            for (read, input) in &inputs {
                 check_kept_by(flag, read, input, out)?;
             }
             check_place(out)?;

@@ -180,11 +180,8 @@ impl Probing<'_> {
         let messages = world.finish()?;
         let bag = self.out.join("touch.mcap");
         write_recording(&bag, &probe_topics(), BASE_FRAME, PROBE_FRAME, messages).map_err(CliError::WriteRecording)?;
-        let [refined, features_out, touches_out] =
-            ["refined.ply", "features.json", "touches.csv"].map(|name| self.out.join(name));
-        let arguments = RefineArguments::of_files(self.scan.to_owned(), bag, refined.clone(), self.unit)
-            .with_features(features_out, touches_out)
-            .with_scene(self.scene.to_owned(), probe_topics());
+        let (scan, scene) = (self.scan.to_owned(), Some(self.scene.to_owned()));
+        let arguments = RefineArguments::in_folder(scan, self.unit, self.out, scene, probe_topics());
         let Refined { summary: refine, mut losses, .. } = arguments.refined()?;
         let is_found =
             |one: &&Probed| matches!(one.ending, Ending::ToleranceReached | Ending::TouchesSpent | Ending::TimeSpent);
@@ -195,7 +192,7 @@ impl Probing<'_> {
         if not_begun > 0 {
             losses.push(format!("{not_begun} of {} flags were not begun", self.flags.len()));
         }
-        let MeshFile { mesh, .. } = read_mesh(&refined, self.unit).map_err(CliError::ReadMesh)?;
+        let MeshFile { mesh, .. } = read_mesh(&self.out.join("refined.ply"), self.unit).map_err(CliError::ReadMesh)?;
         draw_touches(&mesh, &probed, self.flags, &self.out.join("touches.png"))?;
         Ok(Done { summary: ProbingSummary { features, refine }, probed, losses })
     }

@@ -32,22 +32,16 @@ fn diagonal(mesh: &TriMesh) -> f64 {
 }
 
 fn write(
-    panels: &[(DrawnMesh, &str, String)],
-    title: &str,
+    drawing: DrawnMesh,
+    [title, what]: [&str; 2],
+    note: &str,
     legend: &[(Rgb, &str)],
     path: &Path,
 ) -> Result<(), CliError> {
-    let mut drawn = Vec::new();
-    for (drawing, title, note) in panels {
-        let (mesh, paint) = drawing.clone().finish()?;
-        drawn.push((mesh, paint, *title, note.as_str()));
-    }
-    let panels: Vec<PicturePanel<'_>> = drawn
-        .iter()
-        .map(|(mesh, paint, title, note)| PicturePanel { paint: Some(paint), title, note, ..PicturePanel::of(mesh) })
-        .collect();
+    let (mesh, paint) = drawing.finish()?;
+    let panel = PicturePanel { paint: Some(&paint), title: what, note, ..PicturePanel::of(&mesh) };
     let params = PictureParams { title, from: Some(Vector3::from(FROM)), legend, ..PictureParams::default() };
-    write_picture(path, &panels, &params)
+    write_picture(path, &[panel], &params)
 }
 
 fn flagged(drawing: &mut DrawnMesh, flags: &[Flag], size: f64) {
@@ -82,7 +76,7 @@ pub(super) fn draw_plan(scan: &TriMesh, plans: &[Plan], flags: &[Flag], path: &P
         (SEARCH, "search for the surface"),
         (HELD_BACK, "cannot be reached"),
     ];
-    write(&[(drawing, "the scan", note)], "what the arm would do", &legend, path)
+    write(drawing, ["what the arm would do", "the scan"], &note, &legend, path)
 }
 
 /// The refined mesh with the touches.
@@ -116,7 +110,7 @@ pub(super) fn draw_touches(mesh: &TriMesh, probed: &[Probed], flags: &[Flag], pa
     let refused = counted(refused, "does not count", "do not count");
     let note = format!("{touched} reached the part, {missed} missed it, {refused}");
     let legend = [(FLAG, "flag"), (TOUCHED, "touched"), (MISS, "nothing there"), (REFUSED, "does not count")];
-    write(&[(drawing, "the refined mesh", note)], "what the arm touched", &legend, path)
+    write(drawing, ["what the arm touched", "the refined mesh"], &note, &legend, path)
 }
 
 #[cfg(test)]
