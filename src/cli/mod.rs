@@ -56,26 +56,17 @@ use touchup_core::numeric::counted;
 use touchup_session::reported;
 use tracing_subscriber::filter::{LevelFilter, Targets};
 
-use crate::align::{FeaturesError, IcpError};
-use crate::compare::CompareError;
-use crate::haptic::RefineError;
 use crate::io::features_file::FeaturesFileError;
 use crate::io::mesh_file::MeshFileError;
 use crate::io::recording::RecordingError;
-use crate::io::table::TableError;
 use crate::io::touches_file::TouchesFileError;
-use crate::live::LiveError;
-use crate::mesh::MeshError;
-use crate::probing::plan::ExploreError;
 use crate::replay::ReplayError;
 #[cfg(any(feature = "ros", feature = "r2r"))]
-use crate::ros::arguments::{ArgumentError, log_level, split};
+use crate::ros::arguments::{log_level, split};
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use crate::ros::node::NodeError;
-use crate::scene::SceneError;
-use crate::session::{OutcomeError, SessionError};
+use crate::session::OutcomeError;
 use crate::sim::SimError;
-use crate::stylus::SettingError;
 
 /// Repairs a 3D scan by touch.
 #[derive(Debug, Parser)]
@@ -153,7 +144,7 @@ enum CliError {
     #[error("{0}; see --help")]
     Usage(String),
     #[error(transparent)]
-    Scene(#[from] SceneError),
+    Scene(#[from] crate::scene::SceneError),
     #[error(transparent)]
     ReadMesh(MeshFileError),
     /// The same of the true part, which has a flag of its own.
@@ -168,7 +159,7 @@ enum CliError {
     #[error(transparent)]
     WriteRecording(RecordingError),
     #[error(transparent)]
-    Session(#[from] SessionError),
+    Session(#[from] crate::session::SessionError),
     #[error(transparent)]
     Touches(#[from] TouchesFileError),
     #[error(transparent)]
@@ -176,34 +167,34 @@ enum CliError {
     #[error(transparent)]
     Simulate(#[from] SimError),
     #[error(transparent)]
-    Mesh(#[from] MeshError),
+    Mesh(#[from] crate::mesh::MeshError),
     #[error(transparent)]
-    Setting(#[from] SettingError),
+    Setting(#[from] crate::stylus::SettingError),
     #[error("cannot read stdin or write stdout: {0}")]
     Stream(#[from] std::io::Error),
     #[error("the scan cannot be refined: {0}")]
-    Refine(#[from] RefineError),
+    Refine(#[from] crate::haptic::RefineError),
     #[error(transparent)]
-    Table(#[from] TableError),
+    Table(#[from] crate::io::table::TableError),
     #[error("{path}: {error}", path = path.display())]
     Calibration { path: PathBuf, error: Box<dyn Error + Send + Sync> },
     #[error(transparent)]
-    Live(#[from] LiveError),
+    Live(#[from] crate::live::LiveError),
     #[error("the mesh cannot be aligned with the truth: {0}")]
-    Align(#[from] IcpError),
+    Align(#[from] crate::align::IcpError),
     #[error(transparent)]
-    AlignFeatures(#[from] FeaturesError),
+    AlignFeatures(#[from] crate::align::FeaturesError),
     #[error("{0}")]
     Arm(String),
     #[error("feature {0}: {1}")]
-    Explore(u32, ExploreError),
+    Explore(u32, crate::probing::plan::ExploreError),
     #[error(transparent)]
     Report(#[from] report::NoReport),
     #[error("the two cannot be compared: {0}")]
-    Compare(#[from] CompareError),
+    Compare(#[from] crate::compare::CompareError),
     #[cfg(any(feature = "ros", feature = "r2r"))]
     #[error(transparent)]
-    RosArguments(#[from] ArgumentError),
+    RosArguments(#[from] crate::ros::arguments::ArgumentError),
     #[cfg(any(feature = "ros", feature = "r2r"))]
     #[error(transparent)]
     Node(#[from] NodeError),

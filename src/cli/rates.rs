@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-use super::counted;
+use super::{counted, reported};
 use crate::haptic::{RefineError, RefineParams, Refiner};
 use crate::live::{Engine, Gate, Latencies, LiveCounts, LiveError, Pace, Quantiles, Renewal};
 use crate::mesh::{FaceTree, TriMesh};
@@ -16,14 +16,16 @@ use crate::stylus::Sample;
 /// Room reserved for new faces.
 const ROOM: usize = 1 << 18;
 
-/// What `--json` prints of `--live`.
-#[derive(Debug, Serialize)]
-pub(super) struct LiveSummary {
-    /// how old the touches are that the mesh shows, in time of the samples
-    behind_ns: Quantiles,
-    renewals: u64,
-    /// renewals that were not done when they were due
-    pub(super) late: u64,
+reported! {
+    /// What `--json` prints of `--live`.
+    #[derive(Debug, Serialize)]
+    pub(super) struct LiveSummary, fn of(behind: &Latencies, counts: LiveCounts) {
+        /// how old the touches are that the mesh shows, in time of the samples
+        behind_ns: Quantiles = behind.quantiles(),
+        renewals: u64 = counts.renewals,
+        /// renewals that were not done when they were due
+        pub(super) late: u64 = counts.late,
+    }
 }
 
 /// The engine, and the rate at which it gets samples.
@@ -128,10 +130,9 @@ impl Rates {
         if let Some(stopped) = stopped {
             return Err(stopped);
         }
-        let LiveCounts { renewals, late } = engine.counts();
+        let counts = engine.counts();
         let (refiner, patcher) = engine.finish()?;
-        let live =
-            real_time.map(|RealTime { behind, .. }| LiveSummary { behind_ns: behind.quantiles(), renewals, late });
+        let live = real_time.map(|real_time| LiveSummary::of(&real_time.behind, counts));
         Ok(Ended { refiner, patcher, live })
     }
 }

@@ -191,19 +191,6 @@ impl Pushes {
     }
 }
 
-/// Strokes that are still to be taken back or done again.
-struct UndoSteps<'a>(&'a [StrokeChange]);
-
-impl UndoSteps<'_> {
-    /// Applies the changes made before the sample of this stamp.
-    fn apply_until(&mut self, stamp_ns: i64, rates: &mut Rates) {
-        while let Some((first, rest)) = self.0.split_first().filter(|(first, _)| first.after_ns < stamp_ns) {
-            rates.change_strokes(first.is_undo);
-            self.0 = rest;
-        }
-    }
-}
-
 /// Why the refiner did not take a sample. The synchroniser lets only checked samples out, in order of time, so that what
 /// is left here is a step whose result is no number.
 fn reason_of(error: &RefineError) -> &'static str {
@@ -293,7 +280,8 @@ impl RefineArguments {
         let CutScan { mesh, cut } = scene.cut(mesh)?;
         let as_scanned = mesh.clone();
         let markers = marker_filter(&scene, self.markers_topic.as_deref())?;
-        let topics = self.topics();
+        let (pose, wrench) = (self.pose_topic.clone(), self.wrench_topic.clone());
+        let topics = Topics { pose, wrench, markers: self.markers_topic.clone() };
         let recording = Recording::open(&self.bag, &topics).map_err(CliError::ReadRecording)?;
         let params =
             scene.refine_params(recording.wrench_frame).ok_or_else(|| CliError::Usage(NOTHING_MOVES.to_owned()))?;
@@ -312,7 +300,13 @@ impl RefineArguments {
 
         let started = Instant::now();
         let mut pushes = Pushes::default();
-        let mut strokes = UndoSteps(&self.strokes);
+        let mut strokes = self.strokes.iter().peekable();
+        // those that were taken back or done again before the sample of this stamp
+        let mut change_strokes = |before_ns: i64, rates: &mut Rates| {
+            while let Some(change) = strokes.next_if(|change| change.after_ns < before_ns) {
+                rates.change_strokes(change.is_undo);
+            }
+        };
         let mut clock = scene.clock_params().map(ClockEstimator::new).transpose()?;
         let mut contacts = self.registration.then(|| ContactPoints::new(&params)).transpose()?;
         // an update that takes every sample for contact says nothing about contact
@@ -321,7 +315,7 @@ impl RefineArguments {
         let mut at_each = || progress.step();
         let mut replayed =
             each_sample(recording, scene.placement(), scene.sync_params(), markers, &mut at_each, |sample| {
-                strokes.apply_until(sample.stamp_ns, &mut rates);
+                change_strokes(sample.stamp_ns, &mut rates);
                 pushes.push(&mut rates, sample);
                 let contact = match &mut observer {
                     Some(observer) => observer.observe(sample).ok(),
@@ -334,7 +328,7 @@ impl RefineArguments {
                     contacts.push(contact);
                 }
             })?;
-        strokes.apply_until(i64::MAX, &mut rates);
+        change_strokes(i64::MAX, &mut rates);
         let registration = contacts
             .map(|contacts| ScanOffset::of(contacts.registrar.estimate(&as_scanned, &FaceTree::new(&as_scanned))));
         let Ended { refiner, patcher, live } = rates.finish()?;
@@ -342,12 +336,14 @@ impl RefineArguments {
         let counts = refiner.counts();
         let stage = WorkProgress::stage("reconstruct");
         let patcher = patcher.filter(|_| counts.contacts > 0);
-        let Outcome { moved_faces, patch, uncertainty, .. } =
-            OutcomePlaces { outside: cut.outside.as_ref(), ..self.places() }.write(
-                &as_scanned,
-                refiner.mesh(),
-                patcher,
-            )?;
+        let places = OutcomePlaces {
+            mesh: &self.out,
+            unit: self.mesh_unit,
+            features: self.features_out.as_deref(),
+            touches: self.touches_out.as_deref(),
+            outside: cut.outside.as_ref(),
+        };
+        let Outcome { moved_faces, patch, uncertainty, .. } = places.write(&as_scanned, refiner.mesh(), patcher)?;
         drop(stage);
         debug!(?counts, "replayed");
         replayed.losses.extend(lost_samples(&replayed, pushes.accepted));
@@ -395,16 +391,6 @@ impl RefineArguments {
         let unused = if self.markers_topic.is_some() { &["robot"][..] } else { &["robot", "markers"] };
         let memory = Memory::of(rates.refiner().footprint(), scan_bytes + rates.scan_bytes());
         SceneCost { parts: scene.built(unused, &crate::FEATURES), memory }
-    }
-
-    fn places(&self) -> OutcomePlaces<'_> {
-        let [features, touches] = [&self.features_out, &self.touches_out].map(|out| out.as_deref());
-        OutcomePlaces { mesh: &self.out, unit: self.mesh_unit, features, touches, outside: None }
-    }
-
-    fn topics(&self) -> Topics {
-        let (pose, wrench) = (self.pose_topic.clone(), self.wrench_topic.clone());
-        Topics { pose, wrench, markers: self.markers_topic.clone() }
     }
 
     /// Checks that the result can be written before the work begins.

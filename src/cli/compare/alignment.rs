@@ -24,7 +24,7 @@ const POINTS: f64 = 100_000.0;
 const POINTS_EACH: f64 = 20_000.0;
 
 /// What `--json` prints of the alignment.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Default, Serialize)]
 pub(super) struct Alignment {
     method: &'static str,
     #[serde(flatten)]
@@ -47,7 +47,7 @@ pub(super) struct Alignment {
 
 reported! {
     /// Moves the mesh, as it is in its file, onto the truth.
-    #[derive(Debug, Serialize)]
+    #[derive(Debug, Default, Serialize)]
     struct MotionReport, fn of(motion: &Isometry3<f64>) {
         /// rows of the rotation
         rotation: [[f64; 3]; 3] = motion.rotation.to_rotation_matrix().matrix().transpose().into(),
@@ -242,16 +242,7 @@ impl Choices {
 
 impl Alignment {
     fn of(method: &'static str, motion: &Isometry3<f64>) -> Self {
-        let motion = MotionReport::of(motion);
-        Self {
-            method,
-            motion,
-            rms_mm: None,
-            fit: None,
-            explained: None,
-            residuals: Vec::new(),
-            undetermined: Vec::new(),
-        }
+        Self { method, motion: MotionReport::of(motion), ..Self::default() }
     }
 
     fn of_icp(method: &'static str, fit: &IcpFit) -> Self {
@@ -298,14 +289,11 @@ impl fmt::Display for Alignment {
             write!(f, "\n  pair {pair}: off by ({x:.3}, {y:.3}, {z:.3}) mm, {distance_mm:.3} mm")?;
         }
         for Loose { shift, turn_rad_per_mm, about_mm } in &self.undetermined {
-            let three =
-                |v: &[f64; 3], digits: usize| format!("({:.digits$}, {:.digits$}, {:.digits$})", v[0], v[1], v[2]);
+            let [[a, b, c], [p, q, r], [x, y, z]] = [shift, turn_rad_per_mm, about_mm];
             write!(
                 f,
-                "\n  not determined: shift {} mm with turn {} rad about {} mm",
-                three(shift, 2),
-                three(turn_rad_per_mm, 4),
-                three(about_mm, 1)
+                "\n  not determined: shift ({a:.2}, {b:.2}, {c:.2}) mm with turn ({p:.4}, {q:.4}, {r:.4}) rad about ({x:.1}, \
+                 {y:.1}, {z:.1}) mm"
             )?;
         }
         Ok(())

@@ -47,10 +47,7 @@ impl<'a> LiveWorld<'a> {
 
     /// All samples.
     pub fn finish(self) -> Result<Vec<Message>, CliError> {
-        match self.failed {
-            Some(error) => Err(error.into()),
-            None => Ok(self.messages),
-        }
+        self.failed.map_or(Ok(self.messages), |error| Err(error.into()))
     }
 }
 

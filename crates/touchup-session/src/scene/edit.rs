@@ -47,8 +47,11 @@ impl Scene {
         let mut text = yaml.to_owned();
         for (i, Setting { path, value }) in settings.iter().enumerate() {
             let remark = if i == 0 { format!("  {MARK} {remark}") } else { String::new() };
-            text = set(&text, path, value, &remark)
-                .ok_or_else(|| refused(format!("{} is written in an unusual form", path.join("."))))?;
+            let new = match flow::start(&text) {
+                Some(begin) => flow::set(&text, begin, path, value),
+                None => block::set(&text, path, value, &remark),
+            };
+            text = new.ok_or_else(|| refused(format!("{} is written in an unusual form", path.join("."))))?;
         }
         match Self::from_yaml(&text) {
             Ok(scene) if scene == *expected => Ok(text),
@@ -61,12 +64,4 @@ impl Scene {
 fn listed(settings: &[Setting]) -> String {
     let settings: Vec<_> = settings.iter().map(|s| format!("{}: {}", s.path.join("."), s.value)).collect();
     settings.join("; ")
-}
-
-/// `None`: written in a form that is not understood.
-fn set(text: &str, path: &[&str], value: &str, remark: &str) -> Option<String> {
-    if let Some(begin) = flow::start(text) {
-        return flow::set(text, begin, path, value);
-    }
-    block::set(text, path, value, remark)
 }
