@@ -4,12 +4,11 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use nalgebra::Vector3;
 
 use super::CliError;
-use super::probing::Ready;
 #[cfg(feature = "ur")]
 use super::probing::ur_params;
+use super::probing::{Ready, millimetres};
 use super::progress::WorkProgress;
 use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
 use crate::mesh::TriMesh;
@@ -99,15 +98,6 @@ impl TruePayload {
         let payload = Payload { mass: self.truth_payload_kg.unwrap_or(mass), p_sc, ..WEIGHTLESS };
         Ok(ArmParams { payload, configured_payload, ..arm })
     }
-}
-
-/// A place that was written X,Y,Z in mm, m.
-pub(super) fn millimetres(flag: &str, text: &str) -> Result<Vector3<f64>, CliError> {
-    let wrong = || CliError::Usage(format!("{flag} {text} is not X,Y,Z in mm"));
-    let numbers = text.split(',').map(|mm| mm.parse().ok().filter(|mm: &f64| mm.is_finite()));
-    let numbers = numbers.collect::<Option<Vec<f64>>>().ok_or_else(wrong)?;
-    let place: [f64; 3] = numbers.try_into().map_err(|_| wrong())?;
-    Ok(Vector3::from(place) / 1e3)
 }
 
 impl CellArguments {

@@ -7,7 +7,8 @@ use clap::Args;
 use nalgebra::Point3;
 use serde::Serialize;
 
-use super::arm::{ArmArguments, millimetres};
+use super::arm::ArmArguments;
+use super::probing::millimetres;
 use super::{CliError, Losses, print_report, reported};
 use crate::probing::execute::{Repeatability, SpotTouch};
 

@@ -77,7 +77,7 @@ pub(super) struct CompareArguments {
     /// Another seed spreads them differently
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Also prints sizes of both, each way of measuring in each region, and how the alignment went
+    /// Also prints the sizes of both, the table of all distances, and the points of the alignment
     #[arg(long, short)]
     verbose: bool,
     /// Prints one JSON object
@@ -186,17 +186,17 @@ pub(super) fn compared(arguments: &CompareArguments) -> Result<CompareReport, Cl
     };
     let mesh = PlacedMesh::new(moved(&as_read, &pose));
     let before = before.map(|scan| PlacedMesh::new(moved(&scan, &pose)));
-    let (was, is) = arguments.measure(&mesh, &truth, before.as_ref(), regions.as_deref())?;
+    let (scanned, refined) = arguments.measure(&mesh, &truth, before.as_ref(), regions.as_deref())?;
     if let Some(path) = &arguments.picture {
         let labels = arguments.feature_labels(&pose)?;
         let caption =
             format!("{}; {}", today(), alignment.as_ref().map_or("not aligned".to_owned(), Alignment::in_short));
         let drawing = Annotations { caption, labels, regions: regions.as_deref() };
-        arguments.draw(path, (&mesh, &is), before.as_ref().zip(was.as_ref()), &drawing)?;
+        arguments.draw(path, (&mesh, &refined), before.as_ref().zip(scanned.as_ref()), &drawing)?;
     }
     if let Some(path) = &arguments.coloured {
-        let colours: Vec<_> = is.vertex_deviations.iter().map(|&d| colour_of(d, is.range)).collect();
-        let in_mm: Vec<f32> = is.vertex_deviations.iter().map(|d| (d * 1e3) as f32).collect();
+        let colours: Vec<_> = refined.vertex_deviations.iter().map(|&d| colour_of(d, refined.range)).collect();
+        let in_mm: Vec<f32> = refined.vertex_deviations.iter().map(|d| (d * 1e3) as f32).collect();
         let column = VertexColumn { name: "deviation_mm", values: in_mm.into() };
         write_coloured(path, &as_read, arguments.mesh_unit, &colours, [column])?;
     }
@@ -204,8 +204,8 @@ pub(super) fn compared(arguments: &CompareArguments) -> Result<CompareReport, Cl
         mesh: ShapeReport::of(&arguments.mesh, &as_read),
         truth: ShapeReport::of(&arguments.truth, &truth.mesh),
         alignment,
-        before: was.as_ref().map(ComparisonReport::of),
-        after: ComparisonReport::of(&is),
+        before: scanned.as_ref().map(ComparisonReport::of),
+        after: ComparisonReport::of(&refined),
     })
 }
 
@@ -253,7 +253,7 @@ impl CompareArguments {
     fn draw(
         &self,
         path: &Path,
-        (mesh, is): (&PlacedMesh, &Comparison),
+        (mesh, refined): (&PlacedMesh, &Comparison),
         before: Option<(&PlacedMesh, &Comparison)>,
         drawing: &Annotations<'_>,
     ) -> Result<(), CliError> {
@@ -262,8 +262,8 @@ impl CompareArguments {
         let note = |compared| table::note(compared, self.tolerance_mm);
         let scan = before
             .zip(self.before.as_ref())
-            .map(|((scan, was), path)| (scan, was, format!("before: {}", file_name(path)), note(was)));
-        let now = (mesh, is, format!("after: {}", file_name(&self.mesh)), note(is));
+            .map(|((scan, scanned), path)| (scan, scanned, format!("before: {}", file_name(path)), note(scanned)));
+        let now = (mesh, refined, format!("after: {}", file_name(&self.mesh)), note(refined));
         let panels: Vec<PicturePanel<'_>> = scan
             .iter()
             .chain([&now])
@@ -282,7 +282,7 @@ impl CompareArguments {
         let params = PictureParams {
             title: &title,
             caption: &drawing.caption,
-            range: is.range,
+            range: refined.range,
             tolerance: self.tolerance_mm.map(|tolerance| tolerance * 1e-3),
             from: view_from(self.view.as_ref())?,
             weights: weights.as_deref(),

@@ -5,20 +5,23 @@ use std::fmt;
 use nalgebra::{Point3, Vector3};
 use serde::Serialize;
 
+use super::reported;
 use crate::features::Kind;
 use crate::io::features_file::FeatureRecord;
 use crate::sim::{TruthFeature, TruthShape};
 
-/// A true feature and what was found of it; lengths in mm, angles in degrees.
-#[derive(Debug, Serialize)]
-pub(super) struct FoundFeature {
-    name: &'static str,
-    /// its number in features.json; `null`: not found
-    id: Option<u32>,
-    numbers: Vec<FoundNumber>,
-    center_off_mm: Option<f64>,
-    axis_off_deg: Option<f64>,
-    touched: Option<f64>,
+reported! {
+    /// A true feature and what was found of it; lengths in mm, angles in degrees.
+    #[derive(Debug, Serialize)]
+    pub(super) struct FoundFeature, fn of(truth: &TruthFeature, record: Option<&FeatureRecord>) {
+        name: &'static str = truth.name,
+        /// its number in features.json; `null`: not found
+        id: Option<u32> = record.map(|record| record.id),
+        numbers: Vec<FoundNumber> = numbers(truth, record),
+        center_off_mm: Option<f64> = record.and_then(|record| off_mm(truth, record)),
+        axis_off_deg: Option<f64> = record.and_then(|record| axis_off_deg(truth, record)),
+        touched: Option<f64> = record.map(|record| record.touched),
+    }
 }
 
 /// A number of a drawing, and what was measured.
@@ -49,49 +52,41 @@ const COUNTED: [&str; 4] = ["hole", "slot", "pocket", "boss"];
 impl FoundTable {
     /// Looks for each true feature among the found ones.
     pub fn of(truth: &[TruthFeature], found: &[FeatureRecord]) -> Self {
-        let features: Vec<_> = truth.iter().map(|truth| FoundFeature::of(truth, found)).collect();
+        let features: Vec<_> = truth.iter().map(|truth| FoundFeature::of(truth, nearest(truth, found))).collect();
         let matched = |record: &&FeatureRecord| features.iter().any(|feature| feature.id == Some(record.id));
         let counted = found.iter().filter(|record| COUNTED.contains(&record.kind.as_str()));
         Self { invented: counted.filter(|record| !matched(record)).count(), features }
     }
 }
 
-impl FoundFeature {
-    fn of(truth: &TruthFeature, found: &[FeatureRecord]) -> Self {
-        let kind = kind_of(&truth.shape).name();
-        let of_kind = found.iter().filter(|record| record.kind == kind);
-        let off = |record: &&FeatureRecord| off_mm(truth, record).unwrap_or(f64::INFINITY);
-        let record = of_kind.min_by(|a, b| off(a).total_cmp(&off(b))).filter(|record| off(record) < NEAR_MM);
-        let number = |name, truth: f64, value: fn(&FeatureRecord) -> Option<f64>| FoundNumber {
-            name,
-            truth: truth * 1e3,
-            found: record.and_then(value),
-            std: record.and_then(|record| record.std.get(name).copied()),
-            is_lower_bound: name == "depth_mm"
-                && kind != "boss"
-                && record.is_some_and(|record| !record.std.contains_key(name)),
-        };
-        let diameter = |d| number("diameter_mm", d, |record| record.diameter_mm);
-        let depth = |d| number("depth_mm", d, |record| record.depth_mm);
-        let numbers = match truth.shape {
-            TruthShape::Hole { diameter: d, through: true, .. } => vec![diameter(d)],
-            TruthShape::Hole { diameter: d, depth: h, .. } => vec![diameter(d), depth(h)],
-            TruthShape::Slot { width, length, depth: h, .. } => vec![
-                number("width_mm", width, |record| record.width_mm),
-                number("length_mm", length, |record| record.length_mm),
-                depth(h),
-            ],
-            TruthShape::Boss { diameter: d, height } => vec![diameter(d), depth(height)],
-            TruthShape::Step { .. } => Vec::new(),
-        };
-        Self {
-            name: truth.name,
-            id: record.map(|record| record.id),
-            numbers,
-            center_off_mm: record.and_then(|record| off_mm(truth, record)),
-            axis_off_deg: record.and_then(|record| axis_off_deg(truth, record)),
-            touched: record.map(|record| record.touched),
-        }
+/// The found feature that a true one is, if any.
+fn nearest<'a>(truth: &TruthFeature, found: &'a [FeatureRecord]) -> Option<&'a FeatureRecord> {
+    let kind = kind_of(&truth.shape).name();
+    let off = |record: &&FeatureRecord| off_mm(truth, record).unwrap_or(f64::INFINITY);
+    let of_kind = found.iter().filter(|record| record.kind == kind);
+    of_kind.min_by(|a, b| off(a).total_cmp(&off(b))).filter(|record| off(record) < NEAR_MM)
+}
+
+/// What the drawing says of a feature, beside what was found.
+fn numbers(truth: &TruthFeature, record: Option<&FeatureRecord>) -> Vec<FoundNumber> {
+    let is_boss = matches!(truth.shape, TruthShape::Boss { .. });
+    let number = |name, truth: f64, value: fn(&FeatureRecord) -> Option<f64>| {
+        let std = record.and_then(|record| record.std.get(name).copied());
+        let is_lower_bound = name == "depth_mm" && !is_boss && record.is_some() && std.is_none();
+        FoundNumber { name, truth: truth * 1e3, found: record.and_then(value), std, is_lower_bound }
+    };
+    let diameter = |d| number("diameter_mm", d, |record| record.diameter_mm);
+    let depth = |d| number("depth_mm", d, |record| record.depth_mm);
+    match truth.shape {
+        TruthShape::Hole { diameter: d, through: true, .. } => vec![diameter(d)],
+        TruthShape::Hole { diameter: d, depth: h, .. } => vec![diameter(d), depth(h)],
+        TruthShape::Slot { width, length, depth: h, .. } => vec![
+            number("width_mm", width, |record| record.width_mm),
+            number("length_mm", length, |record| record.length_mm),
+            depth(h),
+        ],
+        TruthShape::Boss { diameter: d, height } => vec![diameter(d), depth(height)],
+        TruthShape::Step { .. } => Vec::new(),
     }
 }
 

@@ -1,6 +1,7 @@
 //! `touchup probe`: an arm probes flagged features by itself, without ROS.
 
 use std::fmt;
+use std::ops::Range;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -158,13 +159,15 @@ impl PlannedFeature {
     fn of(flag: u32, plan: &Plan) -> Self {
         let [touches, slides] = [plan.touches.len(), plan.slides.len()];
         // slides are numbered on after the touches
-        let (of_touches, of_slides) = plan.held_back.iter().partition::<Vec<_>, _>(|(number, _)| *number < touches);
-        let unreachable = |held_back: Vec<&(usize, String)>, first: usize| {
-            let one =
-                |(number, reason): &(usize, String)| Unreachable { number: number - first, reason: reason.clone() };
-            held_back.into_iter().map(one).collect()
+        let unreachable = |numbers: Range<usize>| {
+            let held_back = plan.held_back.iter().filter(|(number, _)| numbers.contains(number));
+            let one = |(number, reason): &(usize, String)| Unreachable {
+                number: number - numbers.start,
+                reason: reason.clone(),
+            };
+            held_back.map(one).collect()
         };
-        let (unreachable_touches, unreachable_slides) = (unreachable(of_touches, 0), unreachable(of_slides, touches));
+        let [unreachable_touches, unreachable_slides] = [0..touches, touches..usize::MAX].map(unreachable);
         Self { flag, touches, unreachable_touches, slides, unreachable_slides }
     }
 }

@@ -68,7 +68,10 @@ pub fn run(mut input: impl BufRead, mut output: impl Write) -> io::Result<()> {
         } else {
             answer(&line)
         };
-        writeln!(output, "{}", reply.map_or_else(|error| refusal(&error), |face| as_json(&face)))?;
+        match reply {
+            Ok(FaceState { b, n }) => writeln!(output, "{{\"b_m\":{},\"n\":{}}}", array(&b.coords), array(&n))?,
+            Err(error) => writeln!(output, "{}", serde_json::json!({ "error": error.to_string() }))?,
+        }
         output.flush()?;
     }
 }
@@ -99,17 +102,9 @@ fn model_of(question: &StepQuestion) -> Result<ContactModel, StepError> {
     Ok(ContactModel::Sigmoid { f_max_n: f_max_n?, h_min_m: h_min_m?, delta: delta? })
 }
 
-fn as_json(face: &FaceState) -> String {
-    format!("{{\"b_m\":{},\"n\":{}}}", array(&face.b.coords), array(&face.n))
-}
-
 /// 17 significant digits name a double uniquely.
 fn array(v: &Vector3<f64>) -> String {
     format!("[{:.16e},{:.16e},{:.16e}]", v.x, v.y, v.z)
-}
-
-fn refusal(error: &StepError) -> String {
-    serde_json::json!({ "error": error.to_string() }).to_string()
 }
 
 #[cfg(test)]

@@ -5,7 +5,8 @@ use std::fmt;
 use nalgebra::{Point3, Vector3};
 use serde::Serialize;
 
-use super::super::arm::{RobotName, millimetres};
+use super::super::arm::RobotName;
+use super::super::probing::millimetres;
 use super::super::{CliError, Losses, reported};
 use super::tip::TipArguments;
 use super::{Change, DraftScene, Vector, rounded};

@@ -144,7 +144,7 @@ pub(super) fn aligned_by_icp(mesh: &TriMesh, truth: IndexedMesh<'_>, seed: u64) 
     let _aligning = WorkProgress::stage("align");
     let points: Vec<_> = spread(mesh, POINTS, seed).iter().map(|p| p.point).collect();
     let fit = icp(&points, truth.mesh, truth.tree, &Isometry3::identity(), &IcpParams::default(), &Threads)?;
-    let alignment = Alignment { fit: Some(FitReport::of(&fit, points.len())), ..Alignment::of_icp("icp", &fit) };
+    let alignment = Alignment::of_icp("icp", &fit, points.len());
     alignment.warn();
     Ok((fit.source_to_target, alignment))
 }
@@ -188,13 +188,11 @@ pub(super) fn aligned_by_features(
             return Err(error.into());
         }
     };
-    let explained = Some(Explained::of(chosen, counts));
     let alignment = match &chosen.icp {
-        Some(fit) => {
-            Alignment { explained, fit: Some(FitReport::of(fit, points.len())), ..Alignment::of_icp("features", fit) }
-        }
-        None => Alignment { explained, ..Alignment::of("features", &chosen.source_to_target) },
+        Some(fit) => Alignment::of_icp("features", fit, points.len()),
+        None => Alignment::of("features", &chosen.source_to_target),
     };
+    let alignment = Alignment { explained: Some(Explained::of(chosen, counts)), ..alignment };
     alignment.warn();
     Ok((chosen.source_to_target, alignment))
 }
@@ -245,9 +243,10 @@ impl Alignment {
         Self { method, motion: MotionReport::of(motion), ..Self::default() }
     }
 
-    fn of_icp(method: &'static str, fit: &IcpFit) -> Self {
+    fn of_icp(method: &'static str, fit: &IcpFit, points: usize) -> Self {
         Self {
             rms_mm: Some(fit.rms * 1e3),
+            fit: Some(FitReport::of(fit, points)),
             undetermined: fit.undetermined().map(|motion| Loose::of(motion, fit)).collect(),
             ..Self::of(method, &fit.source_to_target)
         }

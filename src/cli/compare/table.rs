@@ -115,7 +115,7 @@ pub(super) fn note(comparison: &Comparison, tolerance_mm: Option<f64>) -> String
 const HEAD: &str = "                            mean      rms   median      p95      p99      max     bias    points";
 
 impl CompareReport {
-    /// Sizes of both, how the alignment went, and the table of each way of measuring.
+    /// Sizes of both, the points of the alignment, and the table of all distances.
     pub(super) fn details(&self) -> String {
         let size = |(what, shape): (&str, &ShapeReport)| {
             let ([x, y, z], faces) = (shape.size_mm, counted(shape.faces, "face", "faces"));

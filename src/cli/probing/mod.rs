@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use tracing::info;
 
 use super::progress::WorkProgress;
@@ -198,6 +198,17 @@ impl Probing<'_> {
     }
 }
 
+/// Numbers that were written A,B,C in mm, m; `None` where one is no number.
+fn metres(text: &str) -> Option<Vec<f64>> {
+    text.split(',').map(|mm| mm.parse::<f64>().ok().filter(|mm| mm.is_finite()).map(|mm| mm / 1e3)).collect()
+}
+
+/// A place that was written X,Y,Z in mm, m.
+pub(super) fn millimetres(flag: &str, text: &str) -> Result<Vector3<f64>, CliError> {
+    let place: Option<[f64; 3]> = metres(text).and_then(|place| place.try_into().ok());
+    place.map(Vector3::from).ok_or_else(|| CliError::Usage(format!("{flag} {text} is not X,Y,Z in mm")))
+}
+
 /// A flag of a command line.
 ///
 /// - `radius`: m, where it names none.
@@ -207,9 +218,7 @@ pub(super) fn flag_of(id: u32, text: &str, radius: f64) -> Result<Flag, CliError
     let wrong = || CliError::Usage(format!("--feature {text} is not {FORM}"));
     let (name, numbers) = text.split_once('@').ok_or_else(wrong)?;
     let kind = Kind::ALL.into_iter().find(|kind| kind.name() == name);
-    let metre = |mm: &str| mm.parse().ok().filter(|mm: &f64| mm.is_finite()).map(|mm| mm / 1e3);
-    let metres = numbers.split(',').map(metre).collect::<Option<Vec<f64>>>().ok_or_else(wrong)?;
-    match metres[..] {
+    match metres(numbers).ok_or_else(wrong)?[..] {
         _ if kind.is_none() && name != "unknown" => Err(wrong()),
         [x, y, z] => Ok(Flag { id, kind, place: Point3::new(x, y, z), radius }),
         [x, y, z, radius] if radius > 0.0 => Ok(Flag { id, kind, place: Point3::new(x, y, z), radius }),

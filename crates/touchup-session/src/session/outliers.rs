@@ -7,19 +7,30 @@ use serde::Serialize;
 use touchup_core::numeric::counted;
 use touchup_core::reconstruct::{Outlier, Outliers, Patched, Support};
 
-/// What `--json` prints of the uncertainty.
-#[derive(Debug, Serialize)]
-pub struct UncertaintySummary {
-    /// median standard deviation of the vertices that were touched
-    touched_sigma_mm: f64,
-    /// contacts of the reconstruction: those that count and those that were rejected
-    judged: u64,
-    /// contacts that contradicted their place and did not count
-    rejected: u64,
-    /// places that moved because a second pass confirmed the contradiction
-    relocated: u64,
-    /// the last that were rejected, in order of time
-    outliers: Vec<OutlierSummary>,
+reported! {
+    /// What `--json` prints of the uncertainty.
+    #[derive(Debug, Serialize)]
+    pub struct UncertaintySummary, pub fn of(patched: &Patched, found: &Outliers) {
+        /// median standard deviation of the vertices that were touched
+        touched_sigma_mm: f64 = touched_sigma_mm(patched),
+        /// contacts of the reconstruction: those that count and those that were rejected
+        judged: u64 = found.contacts,
+        /// contacts that contradicted their place and did not count
+        rejected: u64 = found.rejected,
+        /// places that moved because a second pass confirmed the contradiction
+        relocated: u64 = found.relocated,
+        /// the last that were rejected, in order of time
+        outliers: Vec<OutlierSummary> =
+            found.last().skip(found.last().count().saturating_sub(MOST_LISTED)).map(OutlierSummary::of).collect(),
+    }
+}
+
+fn touched_sigma_mm(patched: &Patched) -> f64 {
+    let known = patched.sigma.iter().zip(&patched.support);
+    let mut touched: Vec<f64> =
+        known.filter(|(_, support)| **support == Support::Touched).map(|(sigma, _)| sigma * 1e3).collect();
+    touched.sort_by(f64::total_cmp);
+    touched.get(touched.len() / 2).copied().unwrap_or_default()
 }
 
 reported! {
@@ -44,22 +55,6 @@ reported! {
 const MOST_LISTED: usize = 8;
 
 impl UncertaintySummary {
-    /// Summary of a patcher's result.
-    pub fn of(patched: &Patched, outliers: &Outliers) -> Self {
-        let known = patched.sigma.iter().zip(&patched.support);
-        let mut touched: Vec<f64> =
-            known.filter(|(_, support)| **support == Support::Touched).map(|(sigma, _)| sigma * 1e3).collect();
-        touched.sort_by(f64::total_cmp);
-        let skipped = outliers.last().count().saturating_sub(MOST_LISTED);
-        Self {
-            touched_sigma_mm: touched.get(touched.len() / 2).copied().unwrap_or_default(),
-            judged: outliers.contacts,
-            rejected: outliers.rejected,
-            relocated: outliers.relocated,
-            outliers: outliers.last().skip(skipped).map(OutlierSummary::of).collect(),
-        }
-    }
-
     /// Place and distance of the last outlier.
     pub fn last_outlier(&self) -> Option<String> {
         let OutlierSummary { point_mm: [x, y, z], off_mm, sigmas, .. } = self.outliers.last()?;
