@@ -38,40 +38,40 @@ impl fmt::Display for WrenchOffset {
 #[derive(Clone, Debug, Serialize)]
 #[serde(untagged)]
 pub(super) enum ScanOffset {
-    Found {
+    Found(FoundOffset),
+    Refused { refused: String },
+}
+
+reported! {
+    #[derive(Clone, Debug, Serialize)]
+    pub(super) struct FoundOffset, fn of(found: &Registration) {
         /// of the middle of the contacts, and its standard uncertainty
-        shift_mm: [f64; 3],
-        shift_sigma_mm: [f64; 3],
+        shift_mm: [f64; 3] = three(&found.twist, 0, 1e3),
+        shift_sigma_mm: [f64; 3] = three(&sigma(found), 0, 1e3),
         /// rotation vector about that, and its standard uncertainty
-        turn_deg: [f64; 3],
-        turn_sigma_deg: [f64; 3],
+        turn_deg: [f64; 3] = three(&found.twist, 3, 1f64.to_degrees()),
+        turn_sigma_deg: [f64; 3] = three(&sigma(found), 3, 1f64.to_degrees()),
         /// surface offset of the scan, outwards
-        surface_offset_mm: f64,
-        surface_offset_sigma_mm: f64,
+        surface_offset_mm: f64 = found.surface_offset[0] * 1e3,
+        surface_offset_sigma_mm: f64 = found.surface_offset[1] * 1e3,
         /// the middle of the contacts
-        centre_mm: [f64; 3],
-    },
-    Refused {
-        refused: String,
-    },
+        centre_mm: [f64; 3] = (found.centre.coords * 1e3).into(),
+    }
+}
+
+fn sigma(found: &Registration) -> Vector6<f64> {
+    found.covariance.diagonal().map(f64::sqrt)
+}
+
+fn three(v: &Vector6<f64>, first: usize, unit: f64) -> [f64; 3] {
+    (v.fixed_rows::<3>(first) * unit).into()
 }
 
 impl ScanOffset {
     pub fn of(found: Result<Registration, RegistrationError>) -> Self {
-        let Registration { twist, covariance, centre, surface_offset, .. } = match found {
-            Ok(found) => found,
-            Err(refused) => return Self::Refused { refused: refused.to_string() },
-        };
-        let sigma = covariance.diagonal().map(f64::sqrt);
-        let three = |v: &Vector6<f64>, first: usize, unit: f64| (v.fixed_rows::<3>(first) * unit).into();
-        Self::Found {
-            shift_mm: three(&twist, 0, 1e3),
-            shift_sigma_mm: three(&sigma, 0, 1e3),
-            turn_deg: three(&twist, 3, 1f64.to_degrees()),
-            turn_sigma_deg: three(&sigma, 3, 1f64.to_degrees()),
-            surface_offset_mm: surface_offset[0] * 1e3,
-            surface_offset_sigma_mm: surface_offset[1] * 1e3,
-            centre_mm: (centre.coords * 1e3).into(),
+        match found {
+            Ok(found) => Self::Found(FoundOffset::of(&found)),
+            Err(refused) => Self::Refused { refused: refused.to_string() },
         }
     }
 }
@@ -83,18 +83,11 @@ impl fmt::Display for ScanOffset {
         };
         match self {
             Self::Refused { refused } => write!(f, "undetermined: {refused}"),
-            Self::Found {
-                shift_mm,
-                shift_sigma_mm,
-                turn_deg,
-                turn_sigma_deg,
-                surface_offset_mm,
-                surface_offset_sigma_mm,
-                ..
-            } => {
-                write!(f, "shift ({}) mm, ", pairs(shift_mm, shift_sigma_mm))?;
-                write!(f, "turn ({})°, ", pairs(turn_deg, turn_sigma_deg))?;
-                write!(f, "surface offset {surface_offset_mm:+.3} ± {surface_offset_sigma_mm:.3} mm; not applied")
+            Self::Found(found) => {
+                write!(f, "shift ({}) mm, ", pairs(&found.shift_mm, &found.shift_sigma_mm))?;
+                write!(f, "turn ({})°, ", pairs(&found.turn_deg, &found.turn_sigma_deg))?;
+                let [offset, sigma] = [found.surface_offset_mm, found.surface_offset_sigma_mm];
+                write!(f, "surface offset {offset:+.3} ± {sigma:.3} mm; not applied")
             }
         }
     }

@@ -30,7 +30,7 @@ reported! {
 
 /// The engine, and the rate at which it gets samples.
 pub(super) struct Rates {
-    engine: Engine,
+    pub engine: Engine,
     /// `None`: as fast as they can be read; the patch is made at the end
     real_time: Option<RealTime>,
     stopped: Option<LiveError>,
@@ -43,13 +43,6 @@ struct RealTime {
     /// when the first sample came, and its stamp, ns
     begun: Option<(Instant, i64)>,
     behind: Latencies,
-}
-
-/// The engine after the last sample.
-pub(super) struct Ended {
-    pub refiner: Refiner,
-    pub patcher: Option<Patcher>,
-    pub live: Option<LiveSummary>,
 }
 
 impl Rates {
@@ -74,16 +67,6 @@ impl Rates {
         let engine = Engine::new(mesh, refine, Some(patch), renewal)?;
         let real_time = RealTime { scan_bytes, begun: None, behind: Latencies::new() };
         Ok(Self { engine, real_time: Some(real_time), stopped: None })
-    }
-
-    /// The haptic update.
-    pub fn refiner(&self) -> &Refiner {
-        self.engine.refiner()
-    }
-
-    /// Keeps what it takes to undo strokes from here on.
-    pub fn keep_strokes(&mut self) {
-        self.engine.keep_strokes();
     }
 
     /// Memory of the scan and its tree that the patch has for itself, bytes.
@@ -121,11 +104,11 @@ impl Rates {
         }
     }
 
-    /// Ends the thread of the patch, if there is one.
+    /// Ends the thread of the patch, if there is one; gives back both rates as they are after the last sample, and the lag between them.
     ///
     /// # Errors
     /// [`LiveError::Stopped`] when it ended before.
-    pub fn finish(self) -> Result<Ended, LiveError> {
+    pub fn finish(self) -> Result<(Refiner, Option<Patcher>, Option<LiveSummary>), LiveError> {
         let Self { engine, real_time, stopped } = self;
         if let Some(stopped) = stopped {
             return Err(stopped);
@@ -133,7 +116,7 @@ impl Rates {
         let counts = engine.counts();
         let (refiner, patcher) = engine.finish()?;
         let live = real_time.map(|real_time| LiveSummary::of(&real_time.behind, counts));
-        Ok(Ended { refiner, patcher, live })
+        Ok((refiner, patcher, live))
     }
 }
 

@@ -12,7 +12,7 @@ use tracing::{debug, warn};
 
 use super::offsets::{ContactPoints, ScanOffset, WrenchOffset};
 use super::progress::WorkProgress;
-use super::rates::{Ended, LiveSummary, Rates};
+use super::rates::{LiveSummary, Rates};
 use super::{CliError, Losses, by_reason, check_kept_by, check_place, counted, print_report};
 use crate::haptic::{RefineCounts, RefineError, RefineParams};
 use crate::io::atomic::is_same_file;
@@ -293,7 +293,7 @@ impl RefineArguments {
             patch => Rates::at_once(mesh, params, patch)?,
         };
         if !self.strokes.is_empty() {
-            rates.keep_strokes();
+            rates.engine.keep_strokes();
         }
         let load_s = started.elapsed().as_secs_f64();
         let cost = self.cost(&scene, &rates, as_scanned.bytes() + cut.bytes());
@@ -319,7 +319,7 @@ impl RefineArguments {
                 pushes.push(&mut rates, sample);
                 let contact = match &mut observer {
                     Some(observer) => observer.observe(sample).ok(),
-                    None => rates.refiner().contact(),
+                    None => rates.engine.refiner().contact(),
                 };
                 if let (Some(clock), Some(contact)) = (&mut clock, contact) {
                     clock.push(contact);
@@ -331,7 +331,7 @@ impl RefineArguments {
         change_strokes(i64::MAX, &mut rates);
         let registration = contacts
             .map(|contacts| ScanOffset::of(contacts.registrar.estimate(&as_scanned, &FaceTree::new(&as_scanned))));
-        let Ended { refiner, patcher, live } = rates.finish()?;
+        let (refiner, patcher, live) = rates.finish()?;
         let replay_s = started.elapsed().as_secs_f64();
         let counts = refiner.counts();
         let stage = WorkProgress::stage("reconstruct");
@@ -389,7 +389,7 @@ impl RefineArguments {
     fn cost(&self, scene: &Scene, rates: &Rates, scan_bytes: usize) -> SceneCost {
         // no arm moves while a recording is replayed
         let unused = if self.markers_topic.is_some() { &["robot"][..] } else { &["robot", "markers"] };
-        let memory = Memory::of(rates.refiner().footprint(), scan_bytes + rates.scan_bytes());
+        let memory = Memory::of(rates.engine.refiner().footprint(), scan_bytes + rates.scan_bytes());
         SceneCost { parts: scene.built(unused, &crate::FEATURES), memory }
     }
 

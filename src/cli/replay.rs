@@ -83,7 +83,9 @@ pub(super) fn replay(arguments: &ReplayArguments, ros: &[String]) -> Result<Loss
         Some(scene) => marker_filter(&Scene::read(scene)?, arguments.markers_topic.as_deref())?,
         None => None,
     };
-    let recording = Recording::open(&arguments.recording, &arguments.topics()).map_err(CliError::ReadRecording)?;
+    let (pose, wrench) = (arguments.pose_topic.clone(), arguments.wrench_topic.clone());
+    let topics = Topics { pose, wrench, markers: arguments.markers_topic.clone() };
+    let recording = Recording::open(&arguments.recording, &topics).map_err(CliError::ReadRecording)?;
     let mut port = ros::samples(&config)?;
     wait_for_listeners(&mut *port, &config, &arguments.recording);
 
@@ -128,13 +130,6 @@ pub(super) fn replay(arguments: &ReplayArguments, ros: &[String]) -> Result<Loss
         format!("played {wrenches} and {poses} in {:.1} s", played.played_s)
     });
     Ok(losses)
-}
-
-impl ReplayArguments {
-    fn topics(&self) -> Topics {
-        let (pose, wrench) = (self.pose_topic.clone(), self.wrench_topic.clone());
-        Topics { pose, wrench, markers: self.markers_topic.clone() }
-    }
 }
 
 /// Waits for subscribers: the beginning of a recording must not be lost either.

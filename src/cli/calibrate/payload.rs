@@ -1,7 +1,7 @@
 //! `touchup calibrate payload`: payload identification, from static segments of a recording; with an arm: `payload_by_arm`.
 
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use nalgebra::Vector3;
@@ -64,13 +64,11 @@ pub(super) fn payload(arguments: &PayloadArguments) -> Result<Losses, CliError> 
     if let Some(robot) = arguments.robot {
         return payload_by_arm::payload(arguments, robot);
     }
-    let (flag, path) = match (&arguments.bag, &arguments.samples) {
-        (Some(bag), _) => ("--bag", bag),
-        (None, Some(samples)) => ("--samples", samples),
-        (None, None) => return Err(CliError::Usage("give --bag or --samples".to_owned())),
-    };
+    let bag = arguments.bag.as_ref().map(|bag| ("--bag", bag));
+    let samples = arguments.samples.as_ref().map(|samples| ("--samples", samples));
+    let (flag, path) = bag.or(samples).expect("one of --bag, --samples and --robot is there");
     let draft = arguments.target.open(flag, path)?;
-    let (poses, wrench_frame, losses) = arguments.poses(&draft)?;
+    let (poses, wrench_frame, losses) = arguments.poses(path, &draft)?;
     let mounted = draft.scene.compensator_params(wrench_frame).pose_ts.rotation;
     let params = PayloadParams { wrench_frame, r_ts: mounted, gravity };
     let fit = fit_payload(&poses, &params).map_err(|error| CliError::calibration(path, error))?;
@@ -92,19 +90,18 @@ pub(super) fn warn_of_residuals(fit: &PayloadFit, besides: &str) {
 }
 
 impl PayloadArguments {
-    fn poses(&self, draft: &DraftScene) -> Result<(Vec<StaticPose>, WrenchFrame, Losses), CliError> {
+    fn poses(&self, path: &Path, draft: &DraftScene) -> Result<(Vec<StaticPose>, WrenchFrame, Losses), CliError> {
         let named = self.wrench_axes.map(|axes| match axes {
             Axes::Sensor => WrenchFrame::Sensor,
             Axes::Pose => WrenchFrame::Object,
         });
-        if let Some(samples) = &self.samples {
+        if self.samples.is_some() {
             let pose = |(r_wt, wrench)| StaticPose { r_wt, wrench, noise: None, samples: 1 };
-            let poses = read_static_poses(samples)?.into_iter().map(pose).collect();
+            let poses = read_static_poses(path)?.into_iter().map(pose).collect();
             return Ok((poses, named.unwrap_or_default(), Losses::new()));
         }
         let mut finder = StaticSegmentFinder::new(StaticSegmentParams::default());
-        let bag = self.bag.as_deref().unwrap_or_else(|| "".as_ref());
-        let recording = self.source.open(bag)?;
+        let recording = self.source.open(path)?;
         let recorded = recording.wrench_frame;
         let replayed = self.source.replay(recording, &draft.reading(), |sample| finder.push(sample))?;
         Ok((finder.finish(), named.unwrap_or(recorded), replayed.losses))
