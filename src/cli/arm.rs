@@ -6,19 +6,19 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 
 use super::CliError;
-#[cfg(feature = "ur")]
-use super::probing::ur_params;
 use super::probing::{Ready, millimetres};
 use super::progress::WorkProgress;
 use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
 use crate::mesh::TriMesh;
 use crate::probing::arm::Arm;
 use crate::probing::execute::{Cell, Prober};
+#[cfg(feature = "ur")]
+use crate::scene::RobotSection;
 use crate::scene::Scene;
 use crate::sim::{ArmParams, MeshSurface, SimArm, WEIGHTLESS};
 use crate::stylus::Payload;
 #[cfg(feature = "ur")]
-use crate::ur::UrArm;
+use crate::ur::{UrArm, UrParams};
 
 /// Which arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -29,14 +29,30 @@ pub(super) enum RobotName {
     Ur,
 }
 
+/// Set where the controller is a simulation whose clock waits for its client: docs/ur.md.
+#[cfg(feature = "ur")]
+const LOCK_STEP: &str = "TOUCHUP_UR_LOCK_STEP";
+
+#[cfg(feature = "ur")]
+const NO_HOST: &str = "--robot ur needs robot.host and robot.site_packages in the scene (docs/ur.md)";
+
 /// The UR of a scene.
 ///
 /// # Errors
 /// [`CliError::Usage`] where the scene names none, or touchup was built without it; [`CliError::Arm`] where it does not answer.
 #[cfg(feature = "ur")]
 pub(super) fn connect_ur(scene: &Scene) -> Result<Box<dyn Arm + Send>, CliError> {
-    let arm = UrArm::connect(&ur_params(scene)?).map_err(CliError::arm)?;
-    Ok(Box::new(arm))
+    let named = |robot: &&RobotSection| !robot.host.is_empty() && !robot.site_packages.is_empty();
+    let robot = scene.robot.as_ref().filter(named).zip(scene.probing());
+    let (robot, (cell, _)) = robot.ok_or_else(|| CliError::Usage(NO_HOST.to_owned()))?;
+    let params = UrParams {
+        pose_ft: cell.pose_ft,
+        mass: robot.payload_mass,
+        centre: robot.payload_centre,
+        is_lock_step: std::env::var_os(LOCK_STEP).is_some(),
+        ..UrParams::new(&robot.host, &robot.site_packages)
+    };
+    Ok(Box::new(UrArm::connect(&params).map_err(CliError::arm)?))
 }
 
 #[cfg(not(feature = "ur"))]

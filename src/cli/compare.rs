@@ -23,6 +23,9 @@ use crate::io::features_file::{FeatureRecord, read_features};
 use crate::io::mesh_file::{MeshFile, MeshUnit, VertexColumn, read_mesh, read_vertex_columns};
 use crate::mesh::{FaceTree, TriMesh};
 
+/// Tolerance in the picture of a folder, mm: medium of ISO 2768-1 for lengths of up to 6 mm.
+const TOLERANCE_MM: f64 = 0.1;
+
 /// Points spread over the truth, unless more or fewer are wanted.
 const SAMPLES: u32 = 200_000;
 
@@ -218,13 +221,13 @@ struct Annotations<'a> {
 }
 
 impl CompareArguments {
-    /// A picture of a mesh in mm and of what it was before, beside the truth.
+    /// The picture deviation.png of refined.ply and scan.ply beside truth.ply in one folder, all in mm.
     ///
     /// - `named`: features whose names are written beside them.
-    /// - `tolerance_mm`: marked in it.
-    pub(super) fn of_picture(files: [PathBuf; 4], named: Vec<FeatureRecord>, tolerance_mm: f64) -> Self {
-        let [mesh, truth, before, picture] = files;
-        let (before, picture, tolerance_mm) = (Some(before), Some(picture), Some(tolerance_mm));
+    pub(super) fn in_folder(folder: &Path, named: Vec<FeatureRecord>) -> Self {
+        let [mesh, truth] = ["refined.ply", "truth.ply"].map(|name| folder.join(name));
+        let [before, picture] = ["scan.ply", "deviation.png"].map(|name| Some(folder.join(name)));
+        let tolerance_mm = Some(TOLERANCE_MM);
         Self { mesh, truth, before, picture, tolerance_mm, named, samples: SAMPLES, seed: 1, ..Self::default() }
     }
 

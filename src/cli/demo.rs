@@ -25,9 +25,6 @@ use crate::sim::{PathParams, Plate, ScanQuality, ScannerParams, StylusParams, me
 /// Largest distance of the written plate's round walls from circles, m.
 const CHORD_ERROR: f64 = 10e-6;
 
-/// Tolerance in the pictures of the demo, mm: medium of ISO 2768-1 for lengths of up to 6 mm.
-pub(super) const TOLERANCE_MM: f64 = 0.1;
-
 #[derive(Debug, Args)]
 pub(super) struct DemoArguments {
     /// Folder for truth.ply, scan.ply, touch.mcap, refined.ply, features.json, touches.csv, deviation.png (all in mm) and
@@ -83,18 +80,14 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
     let Simulated { scan, touch } = write_simulation(&plate, &truth, &path, &scanner, &model, &arguments.out)?;
 
     let (out, unit) = (&arguments.out, MeshUnit::Millimetre);
-    let [scan_path, refined_path, features_path] =
-        ["scan.ply", "refined.ply", "features.json"].map(|name| out.join(name));
-    let files = RefineArguments::in_folder(scan_path.clone(), unit, out, None, Topics::default());
+    let files = RefineArguments::in_folder(out.join("scan.ply"), unit, out, None, Topics::default());
     let Refined { summary, losses, .. } = files.refined()?;
     // measured is what was written
-    let MeshFile { mesh: refined, .. } = read_mesh(&refined_path, unit).map_err(CliError::ReadMesh)?;
+    let MeshFile { mesh: refined, .. } = read_mesh(&out.join("refined.ply"), unit).map_err(CliError::ReadMesh)?;
 
-    let named = read_features(&features_path)?.features;
+    let named = read_features(&out.join("features.json"))?.features;
     let found = FoundTable::of(&plate.features(), &named);
-    let picture = arguments.out.join("deviation.png");
-    let drawn = [refined_path, arguments.out.join("truth.ply"), scan_path, picture.clone()];
-    compared(&CompareArguments::of_picture(drawn, named, TOLERANCE_MM))?;
+    compared(&CompareArguments::in_folder(out, named))?;
 
     let _measuring = WorkProgress::stage("measure");
     let touched = TouchedTruth::of(&touch.moments);
@@ -106,12 +99,9 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
         refine: summary,
         found,
     };
-    write_json(&arguments.out.join("summary.json"), &demo)?;
-    print_result(&format!(
-        "{demo}\nwrote {}; where it was wrong and is right: {}",
-        arguments.out.display(),
-        picture.display()
-    ));
+    write_json(&out.join("summary.json"), &demo)?;
+    let picture = out.join("deviation.png");
+    print_result(&format!("{demo}\nwrote {}; where it was wrong and is right: {}", out.display(), picture.display()));
     Ok(losses)
 }
 

@@ -10,7 +10,7 @@ use rand_pcg::Pcg64;
 use serde::Serialize;
 
 use super::compare::{CompareArguments, compared};
-use super::demo::{DemoArguments, TOLERANCE_MM};
+use super::demo::DemoArguments;
 use super::found::kind_of;
 use super::probing::{Done, Probing, ProbingSummary};
 use super::progress::WorkProgress;
@@ -86,8 +86,7 @@ pub(super) fn demo_robot(arguments: &DemoArguments) -> Result<Losses, CliError> 
     let Done { summary, probed, losses } = probing.done(&ready, &mut arm)?;
 
     let named = probed.iter().filter_map(feature_of).map(FeatureRecord::from).collect();
-    let [refined, picture] = ["refined.ply", "deviation.png"].map(|name| out.join(name));
-    compared(&CompareArguments::of_picture([refined, truth_path, scan_path, picture], named, TOLERANCE_MM))?;
+    compared(&CompareArguments::in_folder(out, named))?;
     let errors = flags.iter().zip(&features).map(|(flag, truth)| {
         let probed = probed.iter().find(|probed| probed.flag == flag.id);
         ProbedError::of(flag, truth, probed, probed.and_then(feature_of))

@@ -7,6 +7,7 @@ mod stiffness;
 mod tip;
 mod tip_by_arm;
 
+use std::fmt::{self, Display};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -98,12 +99,7 @@ impl CalibrationTarget {
     }
 
     /// Puts `found` into the scene and prints what it was.
-    fn write<T: Serialize + std::fmt::Display>(
-        &self,
-        draft: &DraftScene,
-        change: &Change,
-        found: &T,
-    ) -> Result<(), CliError> {
+    fn write(&self, draft: &DraftScene, change: &Change, found: &(impl Serialize + Display)) -> Result<(), CliError> {
         let Change { settings, remark, expected } = change;
         let start = match draft.text.as_str() {
             "" => format!("{}\n", new_file(found)),
@@ -117,7 +113,7 @@ impl CalibrationTarget {
 }
 
 /// The source of the result, as comments above it.
-fn new_file(found: &impl std::fmt::Display) -> String {
+fn new_file(found: &impl Display) -> String {
     let lines = format!("Made by `touchup calibrate`; one section of a scene: put it into yours.\n\n{found}");
     lines.lines().map(|line| format!("# {line}").trim_end().to_owned()).collect::<Vec<_>>().join("\n")
 }
@@ -177,8 +173,8 @@ impl Vector {
     }
 }
 
-impl std::fmt::Display for Vector {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl Display for Vector {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let digits = f.precision().unwrap_or(4);
         let pair = |(x, s): (&f64, &f64)| format!("{x:+.digits$} ± {s:.digits$}");
         f.write_str(&self.value.iter().zip(&self.std).map(pair).collect::<Vec<_>>().join(", "))

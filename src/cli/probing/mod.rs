@@ -23,12 +23,8 @@ use crate::io::recording::{Topics, write_recording};
 use crate::mesh::{FaceTree, TriMesh};
 use crate::probing::arm::Arm;
 use crate::probing::execute::{Cell, Ending, Flag, Plan, ProbeParams, Probed, Prober, StaticWorld, plan};
-#[cfg(feature = "ur")]
-use crate::scene::RobotSection;
 use crate::scene::{Scene, simulated_arm};
 use crate::sim::ArmParams;
-#[cfg(feature = "ur")]
-use crate::ur::UrParams;
 use picture::{draw_plan, draw_touches};
 pub(super) use report::ProbingSummary;
 use report::records;
@@ -69,32 +65,8 @@ pub(super) struct Done {
 const NO_ROBOT: &str = "the scene names no `robot`, so the pose of the arm's base and its allowed volume are unknown: add \
                         `robot:` to it (config/probe.yaml is an example)";
 
-/// Set where the controller is a simulation whose clock waits for its client: docs/ur.md.
-#[cfg(feature = "ur")]
-const LOCK_STEP: &str = "TOUCHUP_UR_LOCK_STEP";
-
-#[cfg(feature = "ur")]
-const NO_HOST: &str = "--robot ur needs robot.host and robot.site_packages in the scene (docs/ur.md)";
 const NO_MOTION: &str =
     "the scene does not allow the arm to move: look at plan.png first, then put `allow_motion: true` under `robot`";
-
-/// The UR that a scene has.
-///
-/// # Errors
-/// [`CliError::Usage`] where it names no controller, or no packages.
-#[cfg(feature = "ur")]
-pub(super) fn ur_params(scene: &Scene) -> Result<UrParams, CliError> {
-    let named = |robot: &&RobotSection| !robot.host.is_empty() && !robot.site_packages.is_empty();
-    let robot = scene.robot.as_ref().filter(named).zip(scene.probing());
-    let (robot, (cell, _)) = robot.ok_or_else(|| CliError::Usage(NO_HOST.to_owned()))?;
-    Ok(UrParams {
-        pose_ft: cell.pose_ft,
-        mass: robot.payload_mass,
-        centre: robot.payload_centre,
-        is_lock_step: std::env::var_os(LOCK_STEP).is_some(),
-        ..UrParams::new(&robot.host, &robot.site_packages)
-    })
-}
 
 fn probe_topics() -> Topics {
     Topics { pose: "/probe/pose".to_owned(), wrench: "/probe/wrench".to_owned(), markers: None }
