@@ -5,7 +5,7 @@
 use std::borrow::Cow;
 
 use byteorder::{BigEndian, LittleEndian};
-use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Quaternion};
 use serde::{Deserialize, Serialize};
 
 use super::{BadMessage, RecordingError, ZSTD_MAGIC};
@@ -30,50 +30,18 @@ pub(super) struct HeaderMsg<'a> {
 }
 
 #[derive(Serialize, Deserialize)]
-struct Vector3Msg {
-    x: f64,
-    y: f64,
-    z: f64,
-}
-
-#[derive(Serialize, Deserialize)]
-struct QuaternionMsg {
-    x: f64,
-    y: f64,
-    z: f64,
-    w: f64,
-}
-
-#[derive(Serialize, Deserialize)]
 struct PoseStampedMsg<'a> {
     header: HeaderMsg<'a>,
-    position: Vector3Msg,
-    orientation: QuaternionMsg,
+    position: [f64; 3],
+    /// x, y, z, w
+    orientation: [f64; 4],
 }
 
 #[derive(Serialize, Deserialize)]
 struct WrenchStampedMsg<'a> {
     header: HeaderMsg<'a>,
-    force: Vector3Msg,
-    torque: Vector3Msg,
-}
-
-impl From<Vector3<f64>> for Vector3Msg {
-    fn from(v: Vector3<f64>) -> Self {
-        Self { x: v.x, y: v.y, z: v.z }
-    }
-}
-
-impl From<Vector3Msg> for Vector3<f64> {
-    fn from(v: Vector3Msg) -> Self {
-        Self::new(v.x, v.y, v.z)
-    }
-}
-
-impl QuaternionMsg {
-    fn rotation(&self) -> Result<UnitQuaternion<f64>, BadMessage> {
-        measured_rotation(Quaternion::new(self.w, self.x, self.y, self.z)).ok_or(BadMessage::Quaternion)
-    }
+    force: [f64; 3],
+    torque: [f64; 3],
 }
 
 impl<'a> HeaderMsg<'a> {
@@ -105,8 +73,8 @@ pub(super) fn unpack(payload: &[u8]) -> Result<Cow<'_, [u8]>, BadMessage> {
 pub(super) fn decode_pose(payload: &[u8]) -> Result<(Cow<'_, str>, StampedPose), BadMessage> {
     let msg: PoseStampedMsg = decode(payload)?;
     let stamp_ns = msg.header.stamp_ns()?;
-    let translation = Translation3::from(Vector3::from(msg.position));
-    let pose_ot = Isometry3::from_parts(translation, msg.orientation.rotation()?);
+    let rotation = measured_rotation(Quaternion::from(msg.orientation)).ok_or(BadMessage::Quaternion)?;
+    let pose_ot = Isometry3::from_parts(msg.position.into(), rotation);
     Ok((msg.header.frame_id, StampedPose { stamp_ns, pose_ot }))
 }
 
@@ -139,11 +107,10 @@ pub(super) fn decode<'a, T: Deserialize<'a>>(payload: &'a [u8]) -> Result<T, Bad
 
 /// Writes a `PoseStamped` in little-endian CDR.
 pub(super) fn encode_pose(pose: &StampedPose, frame: &str) -> Result<Vec<u8>, RecordingError> {
-    let q = pose.pose_ot.rotation.coords;
     encode(&PoseStampedMsg {
         header: HeaderMsg::new(pose.stamp_ns, frame)?,
         position: pose.pose_ot.translation.vector.into(),
-        orientation: QuaternionMsg { x: q.x, y: q.y, z: q.z, w: q.w },
+        orientation: pose.pose_ot.rotation.coords.into(),
     })
 }
 
@@ -164,6 +131,8 @@ pub(super) fn encode<T: Serialize>(msg: &T) -> Result<Vec<u8>, RecordingError> {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::{Translation3, UnitQuaternion, Vector3};
+
     use super::*;
 
     /// Assembled by hand from the CDR rules: 4-byte header, i32, u32, length 2, "O\0", 2 bytes to the next multiple of
