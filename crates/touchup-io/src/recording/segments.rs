@@ -57,7 +57,7 @@ impl SegmentedWriter {
             self.begin_segment(message.stamp_ns())?;
         }
         let (Some(writer), Some(segment)) = (&mut self.current, self.segments.last_mut()) else { return Ok(()) };
-        writer.write_in(message, frame)?;
+        writer.write(*message, frame)?;
         self.unflushed += 1;
         match message {
             Message::Pose(_) => segment.poses += 1,
@@ -73,8 +73,7 @@ impl SegmentedWriter {
         let name = format!("touch_{:04}.mcap", self.segments.len());
         let path = self.folder.join(&name);
         let file = File::create_new(&path).map_err(|source| RecordingError::Io { path, source })?;
-        // each message names its own frame
-        self.current = Some(RecordingWriter::new(BufWriter::new(file), &self.topics, "", "")?);
+        self.current = Some(RecordingWriter::new(BufWriter::new(file), &self.topics)?);
         let (first_ns, last_ns) = (stamp_ns, stamp_ns);
         self.segments.push(FileSegment { name, poses: 0, wrenches: 0, first_ns, last_ns, is_whole: false });
         Ok(())

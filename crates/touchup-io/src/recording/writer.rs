@@ -56,18 +56,15 @@ pub struct RecordingWriter<W: Write + Seek> {
 
 struct Channel {
     id: u16,
-    frame: String,
     sequence: u32,
 }
 
 impl<W: Write + Seek> RecordingWriter<W> {
     /// Begins a recording.
     ///
-    /// - `pose_frame`: name of the object frame O, which poses and markers are in; `wrench_frame`: name of the frame the wrenches are expressed in.
-    ///
     /// # Errors
     /// [`RecordingError::Write`] when `out` cannot be written.
-    pub fn new(out: W, topics: &Topics, pose_frame: &str, wrench_frame: &str) -> Result<Self, RecordingError> {
+    pub fn new(out: W, topics: &Topics) -> Result<Self, RecordingError> {
         let options = WriteOptions::new()
             .profile("ros2")
             .library(concat!("touchup ", env!("CARGO_PKG_VERSION")))
@@ -75,48 +72,35 @@ impl<W: Write + Seek> RecordingWriter<W> {
             // several threads cut the stream elsewhere on another machine
             .compression_threads(0);
         let mut mcap = options.create(out)?;
-        let pose = add_channel(&mut mcap, topics, TopicKind::Pose, pose_frame)?;
-        let wrench = add_channel(&mut mcap, topics, TopicKind::Wrench, wrench_frame)?;
-        let wanted = topics.markers.iter();
-        let markers =
-            wanted.map(|_| add_channel(&mut mcap, topics, TopicKind::Markers, pose_frame)).next().transpose()?;
+        let pose = add_channel(&mut mcap, topics, TopicKind::Pose)?;
+        let wrench = add_channel(&mut mcap, topics, TopicKind::Wrench)?;
+        let wanted = topics.markers.as_ref();
+        let markers = wanted.map(|_| add_channel(&mut mcap, topics, TopicKind::Markers)).transpose()?;
         Ok(Self { mcap, pose, wrench, markers })
-    }
-
-    /// Appends one message.
-    ///
-    /// # Errors
-    /// [`RecordingError::Stamp`] when its stamp does not fit a ROS 2 message; [`RecordingError::Write`].
-    pub fn write(&mut self, message: &Message) -> Result<(), RecordingError> {
-        self.write_record(&Record::Message(*message))
     }
 
     /// Appends one message or frame of markers; markers without a topic are left out.
     ///
-    /// # Errors
-    /// As [`Self::write`].
-    pub fn write_record(&mut self, record: &Record) -> Result<(), RecordingError> {
-        let (payload, channel) = match record {
-            Record::Message(Message::Pose(pose)) => (encode_pose(pose, &self.pose.frame)?, &mut self.pose),
-            Record::Message(Message::Wrench(wrench)) => (encode_wrench(wrench, &self.wrench.frame)?, &mut self.wrench),
-            Record::Markers(frame) => {
-                let Some(channel) = &mut self.markers else { return Ok(()) };
-                (encode_markers(frame, &channel.frame)?, channel)
-            }
-        };
-        append(&mut self.mcap, channel, record.stamp_ns(), &payload)
-    }
-
-    /// Appends one message whose header names `frame`.
+    /// - `frame`: for its header; of poses and markers the object frame O, of a wrench that in which it is expressed.
     ///
     /// # Errors
-    /// As [`Self::write`].
-    pub fn write_in(&mut self, message: &Message, frame: &str) -> Result<(), RecordingError> {
-        let (payload, channel) = match message {
-            Message::Pose(pose) => (encode_pose(pose, frame)?, &mut self.pose),
-            Message::Wrench(wrench) => (encode_wrench(wrench, frame)?, &mut self.wrench),
+    /// [`RecordingError::Stamp`] when its stamp does not fit a ROS 2 message; [`RecordingError::Write`].
+    pub fn write(&mut self, record: impl Into<Record>, frame: &str) -> Result<(), RecordingError> {
+        let record = record.into();
+        let (payload, channel) = match &record {
+            Record::Message(Message::Pose(pose)) => (encode_pose(pose, frame)?, &mut self.pose),
+            Record::Message(Message::Wrench(wrench)) => (encode_wrench(wrench, frame)?, &mut self.wrench),
+            Record::Markers(markers) => {
+                let Some(channel) = &mut self.markers else { return Ok(()) };
+                (encode_markers(markers, frame)?, channel)
+            }
         };
-        append(&mut self.mcap, channel, message.stamp_ns(), &payload)
+        let stamp_ns = record.stamp_ns();
+        let time = u64::try_from(stamp_ns).map_err(|_| RecordingError::Stamp { stamp_ns })?;
+        let sequence = channel.sequence;
+        channel.sequence = sequence.wrapping_add(1);
+        let header = MessageHeader { channel_id: channel.id, sequence, log_time: time, publish_time: time };
+        Ok(self.mcap.write_to_known_channel(&header, &payload)?)
     }
 
     /// Flushes to the output, so that a reader gets up to here.
@@ -137,32 +121,20 @@ impl<W: Write + Seek> RecordingWriter<W> {
     }
 }
 
-fn append<W: Write + Seek>(
-    mcap: &mut Writer<W>,
-    channel: &mut Channel,
-    stamp_ns: i64,
-    payload: &[u8],
-) -> Result<(), RecordingError> {
-    let time = u64::try_from(stamp_ns).map_err(|_| RecordingError::Stamp { stamp_ns })?;
-    let sequence = channel.sequence;
-    channel.sequence = sequence.wrapping_add(1);
-    let header = MessageHeader { channel_id: channel.id, sequence, log_time: time, publish_time: time };
-    Ok(mcap.write_to_known_channel(&header, payload)?)
-}
-
 fn add_channel<W: Write + Seek>(
     mcap: &mut Writer<W>,
     topics: &Topics,
     kind: TopicKind,
-    frame: &str,
 ) -> Result<Channel, RecordingError> {
     let schema = mcap.add_schema(kind.type_name(), "ros2msg", definition(kind).as_bytes())?;
     let metadata = BTreeMap::from([("offered_qos_profiles".to_owned(), NO_QOS_PROFILES.to_owned())]);
     let id = mcap.add_channel(schema, topics.name(kind), "cdr", &metadata)?;
-    Ok(Channel { id, frame: frame.to_owned(), sequence: 0 })
+    Ok(Channel { id, sequence: 0 })
 }
 
 /// Writes a whole recording to `path`, which is never half a file ([`AtomicFile`]).
+///
+/// - `pose_frame`: name of the object frame O, which poses and markers are in; `wrench_frame`: name of the frame the wrenches are expressed in.
 ///
 /// # Errors
 /// As [`RecordingWriter`], and [`RecordingError::Io`] with the path for whatever the system refuses.
@@ -176,8 +148,12 @@ pub fn write_recording(
     let io = |source| RecordingError::Io { path: path.to_owned(), source };
     let mut file = AtomicFile::create(path).map_err(io)?;
     let write = || {
-        let mut writer = RecordingWriter::new(&mut file, topics, pose_frame, wrench_frame)?;
-        records.into_iter().try_for_each(|record| writer.write_record(&record.into()))?;
+        let mut writer = RecordingWriter::new(&mut file, topics)?;
+        for record in records {
+            let record = record.into();
+            let is_wrench = matches!(record, Record::Message(Message::Wrench(_)));
+            writer.write(record, if is_wrench { wrench_frame } else { pose_frame })?;
+        }
         writer.finish().map(drop)
     };
     write().map_err(|error| match error {

@@ -85,7 +85,7 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> Result<Vec<StageCost>
     let mut gate = ContactGate::new(scene.contact.unwrap_or_default())?;
     let mut motion = TipMotion::new(params.sliding.unwrap_or_default(), params.tip);
     let dynamics = FaceDynamics::new(params.dynamics).map_err(touchup_core::haptic::RefineError::from)?;
-    let mut writer = RecordingWriter::new(Cursor::new(Vec::new()), &Topics::default(), "object", "stylus")?;
+    let mut writer = RecordingWriter::new(Cursor::new(Vec::new()), &Topics::default())?;
     let mut patcher = Patcher::new(scene.patcher_params().ok_or(CostError::NothingMoves)?)?;
     let (mut last, mut nearby, mut moving) = (None, Nearby::default(), Moving::new(&mesh));
     let face = FaceState { b: Point3::origin(), n: Vector3::z() };
@@ -154,7 +154,7 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> Result<Vec<StageCost>
             Ok(())
         }),
         TimedCase::new("recording (on a thread of its own)", |block| {
-            samples[block].iter().flat_map(messages).try_for_each(|message| writer.write(&message))?;
+            samples[block].iter().flat_map(messages).try_for_each(|message| writer.write(message, "object"))?;
             Ok(())
         }),
         TimedCase::new("patch: touches found and kept", |block| {

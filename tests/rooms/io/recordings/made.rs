@@ -29,8 +29,9 @@ pub fn touch(messages: usize) -> Vec<Message> {
 }
 
 pub fn mcap_bytes(messages: &[Message]) -> Vec<u8> {
-    let mut writer = RecordingWriter::new(Cursor::new(Vec::new()), &Topics::default(), "O", "T").unwrap();
-    messages.iter().for_each(|message| writer.write(message).unwrap());
+    let mut writer = RecordingWriter::new(Cursor::new(Vec::new()), &Topics::default()).unwrap();
+    let frame = |message: &Message| if matches!(message, Message::Pose(_)) { "O" } else { "T" };
+    messages.iter().for_each(|message| writer.write(*message, frame(message)).unwrap());
     writer.finish().unwrap().into_inner()
 }
 
