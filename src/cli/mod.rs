@@ -57,6 +57,7 @@ use touchup_session::reported;
 use tracing_subscriber::filter::{LevelFilter, Targets};
 
 use crate::io::features_file::FeaturesFileError;
+use crate::io::file_error::FileError;
 use crate::io::mesh_file::MeshFileError;
 use crate::io::recording::RecordingError;
 use crate::io::touches_file::TouchesFileError;
@@ -247,8 +248,8 @@ impl CliError {
         match self {
             Self::Usage(_) => ("usage", 2),
             Self::WriteMesh(_) | Self::WriteRecording(_) | Self::Write { .. } | Self::Stream(_) => ("not_written", 1),
-            Self::Touches(TouchesFileError::Write { .. }) => ("not_written", 1),
-            Self::Features(FeaturesFileError::Write { .. }) => ("not_written", 1),
+            Self::Touches(TouchesFileError::File(FileError::Write { .. })) => ("not_written", 1),
+            Self::Features(FeaturesFileError::File(FileError::Write { .. })) => ("not_written", 1),
             // settings come from a scene file: its flags are checked before
             Self::Scene(_) | Self::Setting(_) => ("scene", 3),
             Self::ReadMesh(_) | Self::ReadTruth(_) | Self::Mesh(_) => ("mesh", 3),

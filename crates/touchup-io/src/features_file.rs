@@ -7,29 +7,16 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::atomic::write_atomically;
+use super::file_error::{FileError, read_file, write_file};
 use touchup_core::features::clusters::{Bend, Cluster};
 use touchup_core::features::{Feature, FittedTo, Measured};
 
 /// Why a file of features could not be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum FeaturesFileError {
-    /// The file could not be read.
-    #[error("cannot read {}: {source}", path.display())]
-    Read {
-        /// the file
-        path: PathBuf,
-        /// why
-        source: std::io::Error,
-    },
-    /// It could not be written.
-    #[error("cannot write {}: {source}", path.display())]
-    Write {
-        /// the file
-        path: PathBuf,
-        /// why
-        source: std::io::Error,
-    },
+    /// It could not be read or written.
+    #[error(transparent)]
+    File(#[from] FileError),
     /// It is no file of features.
     #[error("{} is no file of features: {source}", path.display())]
     NoFeatures {
@@ -229,11 +216,10 @@ impl FeatureFile {
 /// Writes features, as a whole or not at all.
 ///
 /// # Errors
-/// [`FeaturesFileError::Write`].
+/// [`FileError::Write`].
 pub fn write_features(path: &Path, file: &FeatureFile) -> Result<(), FeaturesFileError> {
     let text = serde_json::to_string_pretty(file).expect("finite numbers and names alone cannot fail");
-    let wrote = write_atomically(path, |out| writeln!(out, "{text}"));
-    wrote.map_err(|source| FeaturesFileError::Write { path: path.to_owned(), source })
+    Ok(write_file(path, |out| writeln!(out, "{text}"))?)
 }
 
 /// Reads features.
@@ -241,9 +227,8 @@ pub fn write_features(path: &Path, file: &FeatureFile) -> Result<(), FeaturesFil
 /// # Errors
 /// [`FeaturesFileError`].
 pub fn read_features(path: &Path) -> Result<FeatureFile, FeaturesFileError> {
-    let own = || path.to_owned();
-    let text = std::fs::read(path).map_err(|source| FeaturesFileError::Read { path: own(), source })?;
-    serde_json::from_slice(&text).map_err(|source| FeaturesFileError::NoFeatures { path: own(), source })
+    let text = read_file(path)?;
+    serde_json::from_slice(&text).map_err(|source| FeaturesFileError::NoFeatures { path: path.to_owned(), source })
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 
 pub mod atomic;
 pub mod features_file;
+pub mod file_error;
 pub mod machine;
 pub mod mesh_file;
 pub mod pairs_file;
@@ -10,6 +11,7 @@ pub mod parameters_file;
 pub mod png;
 pub mod probed_touches_file;
 pub mod recording;
+mod scalar;
 pub mod session_folder;
 pub mod static_poses;
 pub mod table;

@@ -106,6 +106,6 @@ mod tests {
             let message = read(&text).unwrap_err().to_string();
             assert!(message.contains(&format!("line {line}: ")) && message.contains(named), "{text}: {message}");
         }
-        assert!(matches!(read_pairs("no.csv".as_ref()), Err(TableError::Io { .. })));
+        assert!(matches!(read_pairs("no.csv".as_ref()), Err(TableError::Io(_))));
     }
 }

@@ -6,6 +6,8 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use super::file_error::FileError;
+
 /// Longest file: more than a hundred thousand rows.
 const MAX_BYTES: u64 = 16 << 20;
 
@@ -13,13 +15,8 @@ const MAX_BYTES: u64 = 16 << 20;
 #[derive(Debug, thiserror::Error)]
 pub enum TableError {
     /// It cannot be read.
-    #[error("cannot read {}: {source}", path.display())]
-    Io {
-        /// which file
-        path: PathBuf,
-        /// what the system says
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Io(#[from] FileError),
     /// It is too long, or no text.
     #[error("{}: {why}", path.display())]
     NotText {
@@ -65,7 +62,7 @@ pub(super) fn read_table(path: &Path, columns: &[&str], more: &[&str]) -> Result
 }
 
 fn read_text(path: &Path) -> Result<String, TableError> {
-    let io = |source| TableError::Io { path: path.to_owned(), source };
+    let io = |source| FileError::Read { path: path.to_owned(), source };
     let not_text = |why| TableError::NotText { path: path.to_owned(), why };
     let mut bytes = Vec::new();
     File::open(path).map_err(io)?.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(io)?;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{Point3, Vector3};
 
-use super::atomic::write_atomically;
+use super::file_error::{FileError, read_file, write_file};
 use touchup_core::stylus::ProbedPoint;
 
 /// The first line of a file of touches.
@@ -22,22 +22,9 @@ const RENAMED: (&str, &str) = ("held_apart", "rejected");
 /// Why a file of touches could not be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum TouchesFileError {
-    /// The file could not be read.
-    #[error("cannot read {}: {source}", path.display())]
-    Read {
-        /// the file
-        path: PathBuf,
-        /// why
-        source: std::io::Error,
-    },
-    /// It could not be written.
-    #[error("cannot write {}: {source}", path.display())]
-    Write {
-        /// the file
-        path: PathBuf,
-        /// why
-        source: std::io::Error,
-    },
+    /// It could not be read or written.
+    #[error(transparent)]
+    File(#[from] FileError),
     /// Another header.
     #[error("{} does not begin with the header of a file of touches, \"touch,stamp_ns,…\": make it by touchup refine --touches-out", path.display())]
     NoTouches {
@@ -69,13 +56,12 @@ pub enum TouchesFileError {
 /// Writes touches, as a whole or not at all.
 ///
 /// # Errors
-/// [`TouchesFileError::Write`].
+/// [`FileError::Write`].
 pub fn write_touches(path: &Path, touches: &[ProbedPoint]) -> Result<(), TouchesFileError> {
-    let wrote = write_atomically(path, |out| {
+    Ok(write_file(path, |out| {
         writeln!(out, "{HEADER}")?;
         touches.iter().enumerate().try_for_each(|(number, touch)| writeln!(out, "{}", line_of(touch, number)))
-    });
-    wrote.map_err(|source| TouchesFileError::Write { path: path.to_owned(), source })
+    })?)
 }
 
 /// Touches as [`read_touches`] has them after [`write_touches`]: to the digits written. What is measured by them can be
@@ -113,7 +99,7 @@ fn line_of(touch: &ProbedPoint, number: usize) -> String {
 /// [`TouchesFileError`], with the line.
 pub fn read_touches(path: &Path) -> Result<Vec<ProbedPoint>, TouchesFileError> {
     let own = || path.to_owned();
-    let text = std::fs::read(path).map_err(|source| TouchesFileError::Read { path: own(), source })?;
+    let text = read_file(path)?;
     let text = String::from_utf8_lossy(&text);
     let mut lines = text.strip_prefix('\u{feff}').unwrap_or(&text).lines();
     let header = lines.next().map(str::trim_end).unwrap_or_default();

@@ -208,7 +208,7 @@ impl Replayed {
             let messages = counted(bad.poses + bad.wrenches, "message", "messages");
             self.losses.push(format!("{messages} {reason}, the first in {path} at {place}"));
             self.wrenches += bad.wrenches;
-            for (name, count) in [(reason.name().to_owned(), bad.wrenches), (format!("pose_{reason}"), bad.poses)] {
+            for (name, count) in [(reason.to_string(), bad.wrenches), (format!("pose_{reason}"), bad.poses)] {
                 if count > 0 {
                     *self.refused.entry(name).or_default() += count;
                 }

@@ -484,7 +484,7 @@ fn a_refined_mesh_is_reported_by_support() {
     let [_, truth] = plates(folder.path());
     let path = folder.path().join("refined.ply");
     let mesh = square(4, 0.25e-3);
-    let region_sizes = |columns: &[VertexColumn<'_>]| -> Vec<(String, u64)> {
+    let region_sizes = |columns: &[VertexColumn]| -> Vec<(String, u64)> {
         write_mesh_with(&path, &mesh, columns, MeshUnit::Millimetre).unwrap();
         let output = touchup(&["compare", path.to_str().unwrap(), &truth, "--samples", "1000", "--json"]);
         let (code, out, err) = parts_of(&output);

@@ -6,6 +6,7 @@ use nalgebra::{Point3, Vector3};
 use proptest::prelude::*;
 use touchup::features::{Feature, Kind, detect};
 use touchup::io::features_file::{FeatureFile, FeaturesFileError, read_features, write_features};
+use touchup::io::file_error::FileError;
 use touchup::io::touches_file::{HEADER, TouchesFileError, as_written, read_touches, write_touches};
 use touchup::mesh::FaceTree;
 use touchup::sim::Plate;
@@ -202,9 +203,9 @@ fn another_header_is_refused() {
     }
     assert!(matches!(read("").unwrap_err(), TouchesFileError::NoTouches { .. }));
     let folder = tempfile::tempdir().unwrap();
-    assert!(matches!(read_touches(folder.path()).unwrap_err(), TouchesFileError::Read { .. }));
+    assert!(matches!(read_touches(folder.path()).unwrap_err(), TouchesFileError::File(FileError::Read { .. })));
     let nowhere = folder.path().join("no/touches.csv");
-    assert!(matches!(write_touches(&nowhere, &[]).unwrap_err(), TouchesFileError::Write { .. }));
+    assert!(matches!(write_touches(&nowhere, &[]).unwrap_err(), TouchesFileError::File(FileError::Write { .. })));
 }
 
 /// The features of the drawing, one of them as if it had been touched.
@@ -261,5 +262,5 @@ fn files_of_others_are_read() {
         assert!(error.to_string().contains("is no file of features"), "{error}");
     }
     let missing = read_features(&file.path().join("no.json")).unwrap_err();
-    assert!(matches!(missing, FeaturesFileError::Read { .. }));
+    assert!(matches!(missing, FeaturesFileError::File(FileError::Read { .. })));
 }

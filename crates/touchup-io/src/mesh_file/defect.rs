@@ -2,23 +2,7 @@
 
 use std::fmt;
 
-/// Where in a file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FilePlace {
-    /// counted from 1
-    Line(usize),
-    /// counted from 0
-    Byte(usize),
-}
-
-impl fmt::Display for FilePlace {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Line(line) => write!(f, "line {line}"),
-            Self::Byte(byte) => write!(f, "byte {byte}"),
-        }
-    }
-}
+use crate::file_error::FilePlace;
 
 /// The defect.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -7,15 +7,15 @@ mod stl;
 mod text;
 mod unit;
 
-use std::borrow::Cow;
-use std::io;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Point3, Vector3};
 
-use super::atomic::{AtomicFile, write_atomically};
+use super::atomic::AtomicFile;
+pub use super::file_error::FilePlace;
+use super::file_error::{FileError, read_file, write_file};
+pub use defect::Defect;
 use defect::Syntax;
-pub use defect::{Defect, FilePlace};
 use touchup_core::mesh::{MeshError, RepairReport, TriMesh, repair};
 pub use unit::{Implausible, LARGEST_M, MeshUnit, SMALLEST_M};
 
@@ -23,21 +23,8 @@ pub use unit::{Implausible, LARGEST_M, MeshUnit, SMALLEST_M};
 #[derive(Debug, thiserror::Error)]
 pub enum MeshFileError {
     /// An input or output error.
-    #[error("cannot read {}: {source}", path.display())]
-    Read {
-        /// the file
-        path: PathBuf,
-        /// what the system reports
-        source: io::Error,
-    },
-    /// An input or output error.
-    #[error("cannot write {}: {source}", path.display())]
-    Write {
-        /// the file
-        path: PathBuf,
-        /// what the system reports
-        source: io::Error,
-    },
+    #[error(transparent)]
+    File(#[from] FileError),
     /// Neither the name nor the content is known.
     #[error("{}: not a kind of mesh file known here: convert it to .ply, .stl or .obj", path.display())]
     UnknownFormat {
@@ -143,7 +130,7 @@ impl Format {
 /// # Errors
 /// [`MeshFileError`]: one line that names the file, the place in it, and what to do.
 pub fn read_mesh(path: &Path, unit: MeshUnit) -> Result<MeshFile, MeshFileError> {
-    let bytes = std::fs::read(path).map_err(|source| MeshFileError::Read { path: path.into(), source })?;
+    let bytes = read_file(path)?;
     let format = Format::of_content(&bytes)
         .or_else(|| Format::of_name(path))
         .ok_or_else(|| MeshFileError::UnknownFormat { path: path.into() })?;
@@ -174,14 +161,14 @@ pub fn read_mesh(path: &Path, unit: MeshUnit) -> Result<MeshFile, MeshFileError>
 /// - returns: for each name the numbers by vertex id, or `None`.
 ///
 /// # Errors
-/// [`MeshFileError::Read`], [`MeshFileError::Syntax`].
+/// [`MeshFileError::File`], [`MeshFileError::Syntax`].
 pub fn read_vertex_columns<const N: usize>(
     path: &Path,
     unit: MeshUnit,
     mesh: &TriMesh,
     names: [&str; N],
 ) -> Result<[Option<Vec<f32>>; N], MeshFileError> {
-    let bytes = std::fs::read(path).map_err(|source| MeshFileError::Read { path: path.into(), source })?;
+    let bytes = read_file(path)?;
     if !matches!(Format::of_content(&bytes), Some(Format::Ply)) {
         return Ok([const { None }; N]);
     }
@@ -217,7 +204,7 @@ fn sides(mesh: &TriMesh) -> Vector3<f64> {
 /// As [`write_mesh`].
 pub fn check_target(path: &Path) -> Result<(), MeshFileError> {
     Format::of_name(path).ok_or_else(|| MeshFileError::UnknownFormat { path: path.into() })?;
-    AtomicFile::create(path).map(drop).map_err(|source| MeshFileError::Write { path: path.into(), source })
+    Ok(AtomicFile::create(path).map(drop).map_err(|source| FileError::Write { path: path.into(), source })?)
 }
 
 /// Writes a mesh as PLY (binary, double), STL (binary, which is single) or OBJ, by the extension of `path`.
@@ -228,51 +215,38 @@ pub fn check_target(path: &Path) -> Result<(), MeshFileError> {
 /// - `unit`: the unit of the coordinates in the file; PLY and OBJ in m give back the mesh bit for bit.
 ///
 /// # Errors
-/// [`MeshFileError::UnknownFormat`], [`MeshFileError::Write`].
+/// [`MeshFileError::UnknownFormat`], [`MeshFileError::File`].
 pub fn write_mesh(path: &Path, mesh: &TriMesh, unit: MeshUnit) -> Result<(), MeshFileError> {
     write_mesh_with(path, mesh, &[], unit)
 }
 
 /// One number for each vertex of a mesh, by id; a property of the vertices in a PLY file.
 #[derive(Clone, Debug)]
-pub struct VertexColumn<'a> {
+pub struct VertexColumn {
     /// name of the property, with its unit
     pub name: &'static str,
     /// as many as the mesh has vertices
-    pub values: ColumnValues<'a>,
+    pub values: ColumnValues,
 }
 
 /// The numbers of a [`VertexColumn`], with their type in the file.
 #[derive(Clone, Debug)]
-pub enum ColumnValues<'a> {
+pub enum ColumnValues {
     /// `float`
-    Single(Cow<'a, [f32]>),
+    Single(Vec<f32>),
     /// `uchar`, as colours are
-    Byte(Cow<'a, [u8]>),
+    Byte(Vec<u8>),
 }
 
-impl From<Vec<f32>> for ColumnValues<'_> {
+impl From<Vec<f32>> for ColumnValues {
     fn from(values: Vec<f32>) -> Self {
-        Self::Single(values.into())
+        Self::Single(values)
     }
 }
 
-impl From<Vec<u8>> for ColumnValues<'_> {
+impl From<Vec<u8>> for ColumnValues {
     fn from(values: Vec<u8>) -> Self {
-        Self::Byte(values.into())
-    }
-}
-
-impl ColumnValues<'_> {
-    /// Those of the vertices that are used.
-    fn of_used(&self, is_used: &[bool]) -> ColumnValues<'static> {
-        fn kept<T: Copy>(values: &[T], is_used: &[bool]) -> Vec<T> {
-            values.iter().zip(is_used).filter(|(_, is_used)| **is_used).map(|(value, _)| *value).collect()
-        }
-        match self {
-            Self::Single(values) => kept(values, is_used).into(),
-            Self::Byte(values) => kept(values, is_used).into(),
-        }
+        Self::Byte(values)
     }
 }
 
@@ -283,40 +257,25 @@ impl ColumnValues<'_> {
 pub fn write_mesh_with(
     path: &Path,
     mesh: &TriMesh,
-    columns: &[VertexColumn<'_>],
+    columns: &[VertexColumn],
     unit: MeshUnit,
 ) -> Result<(), MeshFileError> {
     let format = Format::of_name(path).ok_or_else(|| MeshFileError::UnknownFormat { path: path.into() })?;
-    let is_used = used_vertices(mesh);
-    let (soup, unit) = (used_part(mesh, &is_used, unit.metres()), unit.to_string());
-    let of_used =
-        |column: &VertexColumn<'_>| VertexColumn { name: column.name, values: column.values.of_used(&is_used) };
-    let columns: Vec<_> = columns.iter().map(of_used).collect();
-    write_atomically(path, |out| match format {
-        Format::Ply => ply::write(&soup, &columns, &unit, out),
+    let ((soup, ids), unit) = (used_part(mesh, unit.metres()), unit.to_string());
+    Ok(write_file(path, |out| match format {
+        Format::Ply => ply::write(&soup, &ids, columns, &unit, out),
         Format::Stl => stl::write(&soup, &unit, out),
         Format::Obj => obj::write(&soup, &unit, out),
-    })
-    .map_err(|source| MeshFileError::Write { path: path.into(), source })
+    })?)
 }
 
-/// For each vertex, whether a face uses it.
-fn used_vertices(mesh: &TriMesh) -> Vec<bool> {
-    let mut is_used = vec![false; mesh.vertex_slots()];
-    for (_, corners) in mesh.faces() {
-        corners.iter().for_each(|v| is_used[v.0 as usize] = true);
-    }
-    is_used
-}
-
-/// Faces that are there and the vertices they use; coordinates divided by `scale`.
-fn used_part(mesh: &TriMesh, is_used: &[bool], scale: f64) -> Soup {
-    let mut soup = Soup::default();
+/// Faces that are there and the vertices they use, coordinates divided by `scale`; and the ids of these vertices.
+fn used_part(mesh: &TriMesh, scale: f64) -> (Soup, Vec<usize>) {
     let mut renamed = vec![u32::MAX; mesh.vertex_slots()];
-    for ((name, p), _) in renamed.iter_mut().zip(mesh.positions()).zip(is_used).filter(|(_, is_used)| **is_used) {
-        *name = soup.positions.len() as u32;
-        soup.positions.push(p / scale);
-    }
-    soup.faces = mesh.faces().map(|(_, corners)| corners.map(|v| renamed[v.0 as usize])).collect();
-    soup
+    mesh.faces().flat_map(|(_, corners)| corners).for_each(|v| renamed[v.0 as usize] = 0);
+    let ids: Vec<usize> = (0..renamed.len()).filter(|&id| renamed[id] == 0).collect();
+    ids.iter().zip(0..).for_each(|(&id, name)| renamed[id] = name);
+    let positions = ids.iter().map(|&id| mesh.positions()[id] / scale).collect();
+    let faces = mesh.faces().map(|(_, corners)| corners.map(|v| renamed[v.0 as usize])).collect();
+    (Soup { positions, faces, unused: 0 }, ids)
 }

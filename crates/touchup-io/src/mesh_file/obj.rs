@@ -7,8 +7,9 @@ use nalgebra::Point3;
 use tobj::{LoadError, LoadOptions};
 
 use super::Soup;
-use super::defect::{Defect, FilePlace, Syntax};
+use super::defect::{Defect, Syntax};
 use super::text::NumberedLines;
+use crate::file_error::FilePlace;
 
 /// Reads all objects and groups as one mesh; coordinates are multiplied by `scale`. Lines, points, normals, texture
 /// and materials are passed over. Vertices come in the order in which faces first name them.

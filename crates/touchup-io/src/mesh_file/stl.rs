@@ -5,8 +5,9 @@ use std::io::{self, Write};
 use nalgebra::Point3;
 
 use super::Soup;
-use super::defect::{Defect, FilePlace, Syntax};
+use super::defect::{Defect, Syntax};
 use super::text::{NumberedLines, number};
+use crate::file_error::FilePlace;
 
 /// Bytes before the first triangle.
 const HEADER: usize = 84;
@@ -41,16 +42,16 @@ fn announced(bytes: &[u8]) -> Option<u32> {
 
 fn read_binary(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
     let Some(count) = announced(bytes) else {
-        return Err(Syntax::ends(FilePlace::Byte(bytes.len()), "84 bytes of STL header"));
+        return Err(Syntax::ends(FilePlace::Byte(bytes.len() as u64), "84 bytes of STL header"));
     };
     let (count, left) = (u64::from(count), bytes.len() - HEADER);
     let needed = u128::from(count) * RECORD as u128;
     if needed > left as u128 {
         let defect = Defect::TooShort { what: "triangles".into(), count, needed, left };
-        return Err(Syntax { place: FilePlace::Byte(bytes.len()), defect });
+        return Err(Syntax { place: FilePlace::Byte(bytes.len() as u64), defect });
     }
     if needed < left as u128 {
-        let place = FilePlace::Byte(HEADER + needed as usize);
+        let place = FilePlace::Byte(HEADER as u64 + needed as u64);
         return Err(Syntax { place, defect: Defect::TooLong { count, needed, left } });
     }
     let mut positions = Vec::with_capacity(3 * count as usize);

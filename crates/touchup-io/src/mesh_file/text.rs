@@ -2,7 +2,8 @@
 
 use std::borrow::Cow;
 
-use super::defect::{FilePlace, Syntax};
+use super::defect::Syntax;
+use crate::file_error::FilePlace;
 
 /// The lines of a file with their numbers; bytes that are no UTF-8 are shown as such.
 pub(super) struct NumberedLines<'a> {

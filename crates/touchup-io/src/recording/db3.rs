@@ -13,7 +13,7 @@ use rusqlite::{Connection, OpenFlags, Row, params};
 use tempfile::NamedTempFile;
 
 use super::cdr::MAX_MESSAGE_BYTES;
-use super::{Damage, RawMessage, RecordingError, RecordingPlace, TopicInfo, TopicKind, Topics};
+use super::{Damage, FilePlace, RawMessage, RecordingError, RecordingFile, TopicInfo, TopicKind, Topics};
 
 pub(super) const MAGIC: [u8; 16] = *b"SQLite format 3\0";
 /// Rows fetched at a time.
@@ -58,7 +58,7 @@ impl Db3Reader {
     pub fn open(path: &Path, topics: &Topics, packed: bool) -> Result<Self, RecordingError> {
         let unpacked = if packed { Some(unpack(path)?) } else { None };
         let db_path = unpacked.as_ref().map_or(path, |file| file.path());
-        let damaged = |damage| RecordingError::Damaged { path: path.to_owned(), place: RecordingPlace::Row(0), damage };
+        let damaged = |damage| RecordingError::Damaged { path: path.to_owned(), place: FilePlace::Row(0), damage };
         let db = connect(db_path).map_err(|error| damaged(error.into()))?;
         if !has_tables(&db).map_err(|error| damaged(error.into()))? {
             let reason = "a SQLite file without rosbag2's tables `topics` and `messages`".to_owned();
@@ -83,46 +83,9 @@ impl Db3Reader {
         })
     }
 
-    /// Topics of the file.
-    pub fn topics(&self) -> Vec<TopicInfo> {
-        self.topics.clone()
-    }
-
-    /// Messages on the two topics; reads through the table once.
-    pub fn promised(&self) -> Option<u64> {
-        let count = "SELECT count(*) FROM messages WHERE topic_id IN (?1, ?2)";
-        let found: rusqlite::Result<i64> =
-            self.db.query_row(count, params![self.ids[0], self.ids[1]], |row| row.get(0));
-        found.ok().and_then(|n| u64::try_from(n).ok())
-    }
-
-    /// A `-wal` or `-journal` file beside it holds unmerged transactions.
-    pub fn truncated(&self) -> bool {
-        self.truncated
-    }
-
-    /// The next message of the two topics; `None` at the end.
-    pub fn next_message(&mut self) -> Result<Option<RawMessage<'_>>, RecordingError> {
-        if self.rows.is_empty()
-            && !self.done
-            && let Err(damage) = self.fetch()
-        {
-            self.failed = Some(damage);
-            self.done = true;
-        }
-        let Some(message) = self.rows.pop_front() else {
-            return match self.failed.take() {
-                Some(damage) => Err(self.damaged(damage)),
-                None => Ok(None),
-            };
-        };
-        self.current = message.payload;
-        Ok(Some(RawMessage { kind: message.kind, payload: &self.current, place: RecordingPlace::Row(message.id) }))
-    }
-
     fn damaged(&self, damage: Damage) -> RecordingError {
         let row = if self.last.1 == i64::MIN { 0 } else { self.last.1 };
-        RecordingError::Damaged { path: self.path.clone(), place: RecordingPlace::Row(row), damage }
+        RecordingError::Damaged { path: self.path.clone(), place: FilePlace::Row(row), damage }
     }
 
     /// Fetches the next rows; those before an error stay.
@@ -142,6 +105,39 @@ impl Db3Reader {
         }
         self.done = self.rows.len() < BATCH_ROWS;
         Ok(())
+    }
+}
+
+impl RecordingFile for Db3Reader {
+    fn topics(&self) -> Vec<TopicInfo> {
+        self.topics.clone()
+    }
+
+    /// Reads through the table once.
+    fn promised(&self) -> Option<u64> {
+        let count = "SELECT count(*) FROM messages WHERE topic_id IN (?1, ?2)";
+        let found = self.db.query_row(count, self.ids, |row| row.get::<_, i64>(0));
+        found.ok().and_then(|n| u64::try_from(n).ok())
+    }
+
+    /// A `-wal` or `-journal` file beside it holds unmerged transactions.
+    fn truncated(&self) -> bool {
+        self.truncated
+    }
+
+    fn next_message(&mut self) -> Result<Option<RawMessage<'_>>, RecordingError> {
+        if self.rows.is_empty()
+            && !self.done
+            && let Err(damage) = self.fetch()
+        {
+            self.failed = Some(damage);
+            self.done = true;
+        }
+        let Some(message) = self.rows.pop_front() else {
+            return self.failed.take().map_or(Ok(None), |damage| Err(self.damaged(damage)));
+        };
+        self.current = message.payload;
+        Ok(Some(RawMessage { kind: message.kind, payload: &self.current, place: FilePlace::Row(message.id) }))
     }
 }
 
@@ -215,7 +211,7 @@ fn unpack(path: &Path) -> Result<NamedTempFile, RecordingError> {
     let (bytes, plain) = unpack().map_err(|source| RecordingError::Io { path: path.to_owned(), source })?;
     if bytes > MAX_UNPACKED_BYTES {
         let damage = Damage::TooLong { what: "unpacked file", bytes, limit: MAX_UNPACKED_BYTES };
-        return Err(RecordingError::Damaged { path: path.to_owned(), place: RecordingPlace::Row(0), damage });
+        return Err(RecordingError::Damaged { path: path.to_owned(), place: FilePlace::Row(0), damage });
     }
     Ok(plain)
 }

@@ -1,10 +1,10 @@
 //! What can be wrong with a recording, and where.
 
-use std::fmt;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use super::{TopicInfo, TopicKind};
+use super::{TopicInfo, TopicKind, Topics};
+use crate::file_error::FilePlace;
 
 /// Why a recording cannot be opened, read to its end, or written.
 #[derive(Debug, thiserror::Error)]
@@ -43,8 +43,8 @@ pub enum RecordingError {
         topic: String,
         /// the flag that names it
         flag: &'static str,
-        /// topics of the recording with their types
-        found: TopicList,
+        /// topics of the recording with their types, as `/name (type)`
+        found: String,
     },
     /// The topic carries another type of message.
     #[error("{}: topic {topic:?} is {found}, not {wanted}; choose another with {flag}", path.display())]
@@ -76,7 +76,7 @@ pub enum RecordingError {
         /// the file
         path: PathBuf,
         /// where reading stopped
-        place: RecordingPlace,
+        place: FilePlace,
         /// what is wrong there
         damage: Damage,
     },
@@ -92,41 +92,6 @@ pub enum RecordingError {
     /// A message could not be encoded.
     #[error("encoding a message: {0}")]
     Encode(#[from] cdr_encoding::Error),
-}
-
-/// Topics of a recording, shown as `/name (type)`.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct TopicList(pub(super) Vec<TopicInfo>);
-
-impl fmt::Display for TopicList {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.0.is_empty() {
-            return f.write_str("no topics");
-        }
-        for (i, topic) in self.0.iter().enumerate() {
-            write!(f, "{}{} ({})", if i == 0 { "" } else { ", " }, topic.name, topic.type_name)?;
-        }
-        Ok(())
-    }
-}
-
-/// A place in a recording.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum RecordingPlace {
-    /// Offset of the record (for a chunk: of the whole chunk) in the MCAP stream, bytes.
-    Byte(u64),
-    /// `id` in the table `messages`; what fails inside SQLite is placed at the last row that could be read.
-    Row(i64),
-}
-
-impl fmt::Display for RecordingPlace {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Byte(offset) => write!(f, "byte {offset}"),
-            Self::Row(id) => write!(f, "row {id}"),
-        }
-    }
 }
 
 /// What is wrong at a place of a file.
@@ -202,39 +167,25 @@ pub enum Damage {
     RowOrder,
 }
 
-/// Why a single message was left out. Reading goes on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+/// Why a single message was left out, by the name that tables and JSON give it. Reading goes on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 #[non_exhaustive]
 pub enum BadMessage {
     /// Payload that is not CDR of the topic's type.
+    #[error("malformed_message")]
     Malformed,
     /// Nanoseconds of the stamp reach a second.
+    #[error("bad_stamp")]
     Stamp,
     /// A quaternion whose norm is not finite or not within 1 ± 0.01.
+    #[error("bad_quaternion")]
     Quaternion,
     /// A point cloud without x, y and z, or whose sizes do not fit its data.
+    #[error("bad_cloud")]
     Cloud,
     /// The header names another frame than the first message of the topic did.
+    #[error("frame_changed")]
     FrameChanged,
-}
-
-impl BadMessage {
-    /// Name for tables and JSON.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Malformed => "malformed_message",
-            Self::Stamp => "bad_stamp",
-            Self::Quaternion => "bad_quaternion",
-            Self::Cloud => "bad_cloud",
-            Self::FrameChanged => "frame_changed",
-        }
-    }
-}
-
-impl fmt::Display for BadMessage {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
 }
 
 /// How many messages were left out for one reason.
@@ -247,24 +198,18 @@ pub struct BadCount {
     /// file of the first
     pub path: PathBuf,
     /// where in that file the first is
-    pub place: RecordingPlace,
+    pub place: FilePlace,
 }
 
 /// The two topics exist, with the right types.
-pub(super) fn check_topics(
-    path: &std::path::Path,
-    topics: &super::Topics,
-    found: &[TopicInfo],
-) -> Result<(), RecordingError> {
+pub(super) fn check_topics(path: &Path, topics: &Topics, found: &[TopicInfo]) -> Result<(), RecordingError> {
     for kind in topics.kinds() {
         let topic = topics.name(kind);
         let Some(info) = found.iter().find(|info| info.name == topic) else {
-            return Err(RecordingError::MissingTopic {
-                path: path.to_owned(),
-                topic: topic.to_owned(),
-                flag: kind.flag(),
-                found: TopicList(found.to_vec()),
-            });
+            let shown: Vec<_> = found.iter().map(|info| format!("{} ({})", info.name, info.type_name)).collect();
+            let found = if shown.is_empty() { "no topics".to_owned() } else { shown.join(", ") };
+            let (path, topic) = (path.to_owned(), topic.to_owned());
+            return Err(RecordingError::MissingTopic { path, topic, flag: kind.flag(), found });
         };
         check_topic(path, kind, info)?;
     }
@@ -272,7 +217,7 @@ pub(super) fn check_topics(
 }
 
 /// One topic has the type and encoding of its kind.
-pub(super) fn check_topic(path: &std::path::Path, kind: TopicKind, info: &TopicInfo) -> Result<(), RecordingError> {
+pub(super) fn check_topic(path: &Path, kind: TopicKind, info: &TopicInfo) -> Result<(), RecordingError> {
     let (path, topic) = (path.to_owned(), info.name.clone());
     if info.type_name != kind.type_name() {
         let found = info.type_name.clone();

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 use super::error::check_topic;
 use super::framing::{ByteStream, Fields, HEAD_BYTES, check_crc, check_length, split_record};
-use super::{Damage, RawMessage, RecordingError, RecordingPlace, TopicInfo, TopicKind, Topics};
+use super::{Damage, FilePlace, RawMessage, RecordingError, RecordingFile, TopicInfo, TopicKind, Topics};
 
 pub(super) const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
 /// Footer record and the magic behind it.
@@ -105,41 +105,8 @@ impl McapReader {
         None
     }
 
-    /// Topics described so far.
-    pub fn topics(&self) -> Vec<TopicInfo> {
-        self.described.channels.values().cloned().collect()
-    }
-
-    /// Messages on the two topics, from the index.
-    pub fn promised(&self) -> Option<u64> {
-        self.promised
-    }
-
-    /// The file has lost its end, or had none yet.
-    pub fn truncated(&self) -> bool {
-        self.truncated
-    }
-
-    /// The next message of the two topics; `None` at the end.
-    pub fn next_message(&mut self) -> Result<Option<RawMessage<'_>>, RecordingError> {
-        let Some((kind, payload)) = self.advance()? else {
-            return self.finish().map(|()| None);
-        };
-        self.found += 1;
-        Ok(Some(RawMessage { kind, payload: &self.records[payload], place: RecordingPlace::Byte(self.at) }))
-    }
-
-    fn finish(&self) -> Result<(), RecordingError> {
-        match self.promised {
-            Some(promised) if promised != self.found => {
-                Err(self.damaged(Damage::MessageCount { promised, found: self.found }))
-            }
-            _ => Ok(()),
-        }
-    }
-
     fn damaged(&self, damage: Damage) -> RecordingError {
-        RecordingError::Damaged { path: self.path.clone(), place: RecordingPlace::Byte(self.at), damage }
+        RecordingError::Damaged { path: self.path.clone(), place: FilePlace::Byte(self.at), damage }
     }
 
     fn advance(&mut self) -> Result<Option<(TopicKind, Range<usize>)>, RecordingError> {
@@ -219,6 +186,33 @@ impl McapReader {
                 _ => self.stream.skip(len, &mut self.packed)?,
             }
         }
+    }
+}
+
+impl RecordingFile for McapReader {
+    fn topics(&self) -> Vec<TopicInfo> {
+        self.described.channels.values().cloned().collect()
+    }
+
+    fn promised(&self) -> Option<u64> {
+        self.promised
+    }
+
+    fn truncated(&self) -> bool {
+        self.truncated
+    }
+
+    fn next_message(&mut self) -> Result<Option<RawMessage<'_>>, RecordingError> {
+        let Some((kind, payload)) = self.advance()? else {
+            return match self.promised {
+                Some(promised) if promised != self.found => {
+                    Err(self.damaged(Damage::MessageCount { promised, found: self.found }))
+                }
+                _ => Ok(None),
+            };
+        };
+        self.found += 1;
+        Ok(Some(RawMessage { kind, payload: &self.records[payload], place: FilePlace::Byte(self.at) }))
     }
 }
 

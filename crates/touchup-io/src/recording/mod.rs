@@ -17,7 +17,8 @@ mod reader;
 mod segments;
 mod writer;
 
-pub use error::{BadCount, BadMessage, Damage, RecordingError, RecordingPlace, TopicList};
+pub use crate::file_error::FilePlace;
+pub use error::{BadCount, BadMessage, Damage, RecordingError};
 pub use reader::RecordingReader;
 pub use segments::SegmentedWriter;
 pub use writer::{RecordingWriter, write_recording};
@@ -129,5 +130,20 @@ struct TopicInfo {
 struct RawMessage<'a> {
     kind: TopicKind,
     payload: &'a [u8],
-    place: RecordingPlace,
+    place: FilePlace,
+}
+
+/// One file of a recording: its messages on the two topics, one after another.
+trait RecordingFile {
+    /// Topics that are known so far.
+    fn topics(&self) -> Vec<TopicInfo>;
+
+    /// Messages on the two topics, where the file says how many.
+    fn promised(&self) -> Option<u64>;
+
+    /// It has lost its end, or a part of it is elsewhere.
+    fn truncated(&self) -> bool;
+
+    /// The next message of the two topics; `None` at the end.
+    fn next_message(&mut self) -> Result<Option<RawMessage<'_>>, RecordingError>;
 }

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::cdr::{HeaderMsg, decode, encode};
 use super::{BadMessage, RecordingError};
+use crate::scalar::Scalar;
 use touchup_core::stylus::{MarkerFrame, MarkerObservation};
 
 /// The message definition, and that of the type it uses.
@@ -52,7 +53,7 @@ struct PointCloud2Msg<'a> {
 #[derive(Clone, Copy)]
 struct CloudField {
     offset: usize,
-    datatype: u8,
+    scalar: Scalar,
     is_bigendian: bool,
 }
 
@@ -60,34 +61,15 @@ impl CloudField {
     /// `None` when the cloud has no such field, or it does not lie within a point.
     fn of(msg: &PointCloud2Msg, name: &str) -> Option<Self> {
         let field = msg.fields.iter().find(|field| field.name == name)?;
-        let (offset, size) = (usize::try_from(field.offset).ok()?, size_of_type(field.datatype)?);
-        let is_inside = offset.checked_add(size)? <= msg.point_step as usize;
-        is_inside.then_some(Self { offset, datatype: field.datatype, is_bigendian: msg.is_bigendian })
+        let scalar = *Scalar::ALL.get(usize::from(field.datatype).checked_sub(1)?)?;
+        let offset = usize::try_from(field.offset).ok()?;
+        let is_inside = offset.checked_add(scalar.size())? <= msg.point_step as usize;
+        is_inside.then_some(Self { offset, scalar, is_bigendian: msg.is_bigendian })
     }
 
     fn value(&self, point: &[u8]) -> Option<f64> {
-        let mut bytes = [0; 8];
-        let size = size_of_type(self.datatype)?;
-        bytes[..size].copy_from_slice(point.get(self.offset..self.offset + size)?);
-        if self.is_bigendian {
-            bytes[..size].reverse();
-        }
-        let [a, b, c, d, ..] = bytes;
-        Some(match self.datatype {
-            1 => i8::from_le_bytes([a]).into(),
-            2 => a.into(),
-            3 => i16::from_le_bytes([a, b]).into(),
-            4 => u16::from_le_bytes([a, b]).into(),
-            5 => i32::from_le_bytes([a, b, c, d]).into(),
-            UINT32 => u32::from_le_bytes([a, b, c, d]).into(),
-            FLOAT32 => f32::from_le_bytes([a, b, c, d]).into(),
-            _ => f64::from_le_bytes(bytes),
-        })
+        self.scalar.value(point.get(self.offset..)?, self.is_bigendian)
     }
-}
-
-fn size_of_type(datatype: u8) -> Option<usize> {
-    [1, 1, 2, 2, 4, 4, 4, 8].get(usize::from(datatype).checked_sub(1)?).copied()
 }
 
 /// Reads a cloud of markers: frame and markers, of which the first [`touchup_core::stylus::MOST_MARKERS`] that are there count.

@@ -1,6 +1,5 @@
 //! A recording as one sequence of messages, whatever it is kept in.
 
-use std::borrow::Cow;
 use std::collections::{BTreeMap, VecDeque};
 use std::fs::{self, File};
 use std::io::{self, Read};
@@ -15,7 +14,7 @@ use super::error::{BadCount, check_topics};
 use super::mcap::{self, McapReader};
 use super::point_cloud::decode_markers;
 use super::segments::segments_of;
-use super::{BadMessage, RawMessage, Record, RecordingError, TopicInfo, TopicKind, Topics, ZSTD_MAGIC};
+use super::{BadMessage, RawMessage, Record, RecordingError, RecordingFile, TopicInfo, TopicKind, Topics, ZSTD_MAGIC};
 use touchup_core::stylus::Message;
 
 const ROS1_MAGIC: &[u8] = b"#ROSBAG V";
@@ -43,7 +42,7 @@ const MAX_METADATA_BYTES: u64 = 16 << 20;
 pub struct RecordingReader {
     topics: Topics,
     path: PathBuf,
-    source: Option<RecordingFile>,
+    source: Option<Box<dyn RecordingFile>>,
     rest: VecDeque<PathBuf>,
     intake: Intake,
     message_count: Option<u64>,
@@ -104,12 +103,16 @@ impl RecordingReader {
     }
 
     /// Looks into every file once: topics, counts, missing ends. Returns the first, still open: it may be a packed one.
-    fn survey(&mut self, path: &Path, files: &VecDeque<PathBuf>) -> Result<Option<RecordingFile>, RecordingError> {
+    fn survey(
+        &mut self,
+        path: &Path,
+        files: &VecDeque<PathBuf>,
+    ) -> Result<Option<Box<dyn RecordingFile>>, RecordingError> {
         let mut first = None;
         let mut found: Vec<TopicInfo> = Vec::new();
         let mut first_damage = None;
         for file in files {
-            let (source, damage) = RecordingFile::open(file, &self.topics)?;
+            let (source, damage) = open_file(file, &self.topics)?;
             first_damage = first_damage.or(damage);
             self.truncated |= source.truncated();
             self.message_count = self.message_count.zip(source.promised()).map(|(a, b)| a.saturating_add(b));
@@ -127,7 +130,7 @@ impl RecordingReader {
     /// Turns to the next file; `false` after the last.
     fn turn(&mut self) -> Result<bool, RecordingError> {
         let Some(path) = self.rest.pop_front() else { return Ok(false) };
-        self.source = Some(RecordingFile::open(&path, &self.topics)?.0);
+        self.source = Some(open_file(&path, &self.topics)?.0);
         self.path = path;
         Ok(true)
     }
@@ -206,85 +209,40 @@ impl Intake {
 
     fn decode(&mut self, raw: &RawMessage) -> Result<Record, BadMessage> {
         let payload = unpack(raw.payload)?;
-        match raw.kind {
-            TopicKind::Pose => {
-                let (frame, pose) = decode_pose(&payload)?;
-                same_frame(&mut self.pose_frame, frame).map(|()| Message::Pose(pose).into())
-            }
+        let (frame, record) = match raw.kind {
+            TopicKind::Pose => decode_pose(&payload).map(|(frame, pose)| (frame, Message::Pose(pose).into()))?,
             TopicKind::Wrench => {
-                let (frame, wrench) = decode_wrench(&payload)?;
-                same_frame(&mut self.wrench_frame, frame).map(|()| Message::Wrench(wrench).into())
+                decode_wrench(&payload).map(|(frame, wrench)| (frame, Message::Wrench(wrench).into()))?
             }
             TopicKind::Markers => {
-                let (frame, markers) = decode_markers(&payload)?;
-                same_frame(&mut self.pose_frame, frame).map(|()| Record::Markers(Box::new(markers)))
+                decode_markers(&payload).map(|(frame, seen)| (frame, Record::Markers(Box::new(seen))))?
             }
-        }
-    }
-}
-
-fn same_frame(first: &mut Option<String>, frame: Cow<'_, str>) -> Result<(), BadMessage> {
-    match first {
-        Some(first) if *first != frame => Err(BadMessage::FrameChanged),
-        Some(_) => Ok(()),
-        None => {
-            *first = Some(frame.into_owned());
-            Ok(())
-        }
-    }
-}
-
-/// One file of a recording.
-enum RecordingFile {
-    Mcap(Box<McapReader>),
-    Db3(Box<Db3Reader>),
-}
-
-impl RecordingFile {
-    fn open(path: &Path, topics: &Topics) -> Result<(Self, Option<RecordingError>), RecordingError> {
-        let io = |source| RecordingError::Io { path: path.to_owned(), source };
-        let mut front = read_front(File::open(path).map_err(io)?).map_err(io)?;
-        let packed = front.starts_with(&ZSTD_MAGIC);
-        if packed {
-            let unpacked = zstd::Decoder::new(File::open(path).map_err(io)?).and_then(read_front);
-            front = unpacked.map_err(io)?;
-        }
-        if front.starts_with(&mcap::MAGIC) {
-            let (reader, damage) = McapReader::open(path, topics, packed)?;
-            Ok((Self::Mcap(Box::new(reader)), damage))
-        } else if front == db3::MAGIC {
-            Ok((Self::Db3(Box::new(Db3Reader::open(path, topics, packed)?)), None))
+        };
+        let first = if raw.kind == TopicKind::Wrench { &mut self.wrench_frame } else { &mut self.pose_frame };
+        if *first.get_or_insert_with(|| frame.clone().into_owned()) == frame {
+            Ok(record)
         } else {
-            Err(RecordingError::NotARecording { path: path.to_owned(), reason: describe_front(&front) })
+            Err(BadMessage::FrameChanged)
         }
     }
+}
 
-    fn next_message(&mut self) -> Result<Option<RawMessage<'_>>, RecordingError> {
-        match self {
-            Self::Mcap(reader) => reader.next_message(),
-            Self::Db3(reader) => reader.next_message(),
-        }
+/// Opens one file of a recording; with the damage that was met on the search for its topics.
+fn open_file(path: &Path, topics: &Topics) -> Result<(Box<dyn RecordingFile>, Option<RecordingError>), RecordingError> {
+    let io = |source| RecordingError::Io { path: path.to_owned(), source };
+    let mut front = read_front(File::open(path).map_err(io)?).map_err(io)?;
+    let packed = front.starts_with(&ZSTD_MAGIC);
+    if packed {
+        let unpacked = zstd::Decoder::new(File::open(path).map_err(io)?).and_then(read_front);
+        front = unpacked.map_err(io)?;
     }
-
-    fn topics(&self) -> Vec<TopicInfo> {
-        match self {
-            Self::Mcap(reader) => reader.topics(),
-            Self::Db3(reader) => reader.topics(),
-        }
-    }
-
-    fn promised(&self) -> Option<u64> {
-        match self {
-            Self::Mcap(reader) => reader.promised(),
-            Self::Db3(reader) => reader.promised(),
-        }
-    }
-
-    fn truncated(&self) -> bool {
-        match self {
-            Self::Mcap(reader) => reader.truncated(),
-            Self::Db3(reader) => reader.truncated(),
-        }
+    if front.starts_with(&mcap::MAGIC) {
+        let (reader, damage) = McapReader::open(path, topics, packed)?;
+        Ok((Box::new(reader), damage))
+    } else if front == db3::MAGIC {
+        Ok((Box::new(Db3Reader::open(path, topics, packed)?), None))
+    } else {
+        Err(RecordingError::NotARecording { path: path.to_owned(), reason: describe_front(&front) })
     }
 }
 

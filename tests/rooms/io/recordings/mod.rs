@@ -8,7 +8,7 @@ use std::path::Path;
 
 use nalgebra::{Translation3, Vector3};
 use proptest::prelude::*;
-use touchup::io::recording::{BadMessage, RecordingError, RecordingPlace, RecordingReader, Topics, write_recording};
+use touchup::io::recording::{BadMessage, FilePlace, RecordingError, RecordingReader, Topics, write_recording};
 use touchup::stylus::{Message, StampedPose, StampedWrench};
 
 mod damage;
@@ -284,9 +284,9 @@ fn messages_that_cannot_be_used_are_counted_and_reading_goes_on() {
     let bad: Vec<_> =
         reader.bad_messages().iter().map(|(why, bad)| (*why, bad.poses + bad.wrenches, bad.place)).collect();
     let expected = [
-        (BadMessage::Malformed, 3, RecordingPlace::Row(2)),
-        (BadMessage::Quaternion, 1, RecordingPlace::Row(4)),
-        (BadMessage::FrameChanged, 1, RecordingPlace::Row(7)),
+        (BadMessage::Malformed, 3, FilePlace::Row(2)),
+        (BadMessage::Quaternion, 1, FilePlace::Row(4)),
+        (BadMessage::FrameChanged, 1, FilePlace::Row(7)),
     ];
     assert_eq!(bad, expected);
 }

@@ -2,9 +2,11 @@
 
 use nalgebra::Point3;
 
-use super::super::defect::{Defect, FilePlace, Syntax};
+use super::super::defect::{Defect, Syntax};
 use super::super::text::{NumberedLines, number};
-use super::header::{Element, Encoding, PlyHeader, PlyKind, Scalar};
+use super::header::{Element, Encoding, PlyHeader, PlyKind};
+use crate::file_error::FilePlace;
+use crate::scalar::Scalar;
 
 /// What is left of the body.
 pub(super) struct Body<'a> {
@@ -41,41 +43,34 @@ impl<'a> Body<'a> {
     }
 
     /// Reads `count` rows. `take` gets the items of the list in column `list`, or else one value for each column (0 for
-    /// a list), and the place of the row.
+    /// a list), and the place of the row. In ASCII a row is a line; empty lines are passed over.
     pub fn rows(
-        &mut self,
-        element: &Element,
-        count: usize,
-        list: Option<usize>,
-        take: impl FnMut(&[f64], FilePlace) -> Result<(), Syntax>,
-    ) -> Result<(), Syntax> {
-        match self.encoding {
-            Encoding::Ascii => self.ascii_rows(element, count, list, take),
-            Encoding::Little | Encoding::Big => self.binary_rows(element, count, list, take),
-        }
-    }
-
-    /// One line for each row; empty lines are passed over.
-    fn ascii_rows(
         &mut self,
         element: &Element,
         count: usize,
         list: Option<usize>,
         mut take: impl FnMut(&[f64], FilePlace) -> Result<(), Syntax>,
     ) -> Result<(), Syntax> {
-        let mut lines = NumberedLines::new(&self.bytes[self.at..], self.end_of_line);
         let mut row = Vec::new();
+        if self.encoding != Encoding::Ascii {
+            let (bytes, big) = (self.bytes, self.encoding == Encoding::Big);
+            for _ in 0..count {
+                let place = FilePlace::Byte(self.at as u64);
+                read_row(element, list, place, &mut row, |scalar| {
+                    let value = bytes.get(self.at..).and_then(|rest| scalar.value(rest, big));
+                    self.at += scalar.size();
+                    value.ok_or_else(|| Syntax::ends(FilePlace::Byte(bytes.len() as u64), "the rest of a row"))
+                })?;
+                take(&row, place)?;
+            }
+            return Ok(());
+        }
+        let mut lines = NumberedLines::new(&self.bytes[self.at..], self.end_of_line);
         for _ in 0..count {
-            let line = loop {
-                match lines.next() {
-                    Some(line) if line.is_empty() => {}
-                    Some(line) => break line,
-                    None => {
-                        return Err(Syntax::ends(FilePlace::Line(self.lines + lines.number() + 1), "a row of numbers"));
-                    }
-                }
-            };
+            let line = std::iter::from_fn(|| lines.next()).find(|line| !line.is_empty());
             let place = FilePlace::Line(self.lines + lines.number());
+            let line =
+                line.ok_or_else(|| Syntax::ends(FilePlace::Line(self.lines + lines.number() + 1), "a row of numbers"))?;
             let mut words = line.split_ascii_whitespace();
             read_row(element, list, place, &mut row, |_| number(words.next(), place))?;
             if let Some(word) = words.next() {
@@ -85,27 +80,6 @@ impl<'a> Body<'a> {
         }
         self.lines += lines.number();
         self.at += lines.offset();
-        Ok(())
-    }
-
-    fn binary_rows(
-        &mut self,
-        element: &Element,
-        count: usize,
-        list: Option<usize>,
-        mut take: impl FnMut(&[f64], FilePlace) -> Result<(), Syntax>,
-    ) -> Result<(), Syntax> {
-        let (bytes, big) = (self.bytes, self.encoding == Encoding::Big);
-        let mut row = Vec::new();
-        for _ in 0..count {
-            let place = FilePlace::Byte(self.at);
-            read_row(element, list, place, &mut row, |scalar| {
-                let value = bytes.get(self.at..).and_then(|rest| value(rest, scalar, big));
-                self.at += scalar.size();
-                value.ok_or_else(|| Syntax::ends(FilePlace::Byte(bytes.len()), "the rest of a row"))
-            })?;
-            take(&row, place)?;
-        }
         Ok(())
     }
 
@@ -123,7 +97,8 @@ impl<'a> Body<'a> {
         self.at = end;
         let [x, y, z] = columns.map(|column| offsets[column]);
         let big = self.encoding == Encoding::Big;
-        let column = |row: &[u8], (at, scalar)| scale * value(&row[at..], scalar, big).unwrap_or(f64::NAN);
+        let column =
+            |row: &[u8], (at, scalar): (usize, Scalar)| scale * scalar.value(&row[at..], big).unwrap_or(f64::NAN);
         // the types are known to the compiler in the two usual cases
         let point = |row, x, y, z| Point3::new(column(row, x), column(row, y), column(row, z));
         let of_type = |row, t| point(row, (x.0, t), (y.0, t), (z.0, t));
@@ -162,13 +137,9 @@ fn read_row(
 ) -> Result<(), Syntax> {
     row.clear();
     for (column, property) in element.properties.iter().enumerate() {
+        let mut value = 0.0;
         match property.kind {
-            PlyKind::Scalar(scalar) => {
-                let value = next(scalar)?;
-                if list.is_none() {
-                    row.push(value);
-                }
-            }
+            PlyKind::Scalar(scalar) => value = next(scalar)?,
             PlyKind::List { count, item } => {
                 let items = next(count)?;
                 if items < 0.0 || items.fract() != 0.0 {
@@ -181,35 +152,11 @@ fn read_row(
                         row.push(value);
                     }
                 }
-                if list.is_none() {
-                    row.push(0.0);
-                }
             }
+        }
+        if list.is_none() {
+            row.push(value);
         }
     }
     Ok(())
-}
-
-/// The number at the start of `bytes`; every PLY type fits into `f64`.
-#[inline]
-fn value(bytes: &[u8], scalar: Scalar, big: bool) -> Option<f64> {
-    /// The first N bytes, least significant first.
-    #[inline]
-    fn little<const N: usize>(bytes: &[u8], big: bool) -> Option<[u8; N]> {
-        let mut first = *bytes.first_chunk::<N>()?;
-        if big {
-            first.reverse();
-        }
-        Some(first)
-    }
-    Some(match scalar {
-        Scalar::I8 => f64::from(i8::from_le_bytes(little(bytes, big)?)),
-        Scalar::U8 => f64::from(u8::from_le_bytes(little(bytes, big)?)),
-        Scalar::I16 => f64::from(i16::from_le_bytes(little(bytes, big)?)),
-        Scalar::U16 => f64::from(u16::from_le_bytes(little(bytes, big)?)),
-        Scalar::I32 => f64::from(i32::from_le_bytes(little(bytes, big)?)),
-        Scalar::U32 => f64::from(u32::from_le_bytes(little(bytes, big)?)),
-        Scalar::F32 => f64::from(f32::from_le_bytes(little(bytes, big)?)),
-        Scalar::F64 => f64::from_le_bytes(little(bytes, big)?),
-    })
 }

@@ -1,7 +1,9 @@
 //! The text at the head of a PLY file: elements and their properties.
 
-use super::super::defect::{FilePlace, Syntax};
+use super::super::defect::Syntax;
 use super::super::text::NumberedLines;
+use crate::file_error::FilePlace;
+use crate::scalar::Scalar;
 
 /// How the body is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -9,44 +11,6 @@ pub(super) enum Encoding {
     Ascii,
     Little,
     Big,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Scalar {
-    I8,
-    U8,
-    I16,
-    U16,
-    I32,
-    U32,
-    F32,
-    F64,
-}
-
-impl Scalar {
-    fn of_name(name: &str) -> Option<Self> {
-        Some(match name {
-            "char" | "int8" => Self::I8,
-            "uchar" | "uint8" => Self::U8,
-            "short" | "int16" => Self::I16,
-            "ushort" | "uint16" => Self::U16,
-            "int" | "int32" => Self::I32,
-            "uint" | "uint32" => Self::U32,
-            "float" | "float32" => Self::F32,
-            "double" | "float64" => Self::F64,
-            _ => return None,
-        })
-    }
-
-    /// Bytes in a binary file.
-    pub fn size(self) -> usize {
-        match self {
-            Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::I32 | Self::U32 | Self::F32 => 4,
-            Self::F64 => 8,
-        }
-    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -153,13 +117,26 @@ fn element(name: &str, count: &str, line: usize) -> Result<Element, Syntax> {
     Ok(Element { name: name.into(), count, properties: Vec::new(), line })
 }
 
+fn scalar(name: &str, place: FilePlace) -> Result<Scalar, Syntax> {
+    Ok(match name {
+        "char" | "int8" => Scalar::I8,
+        "uchar" | "uint8" => Scalar::U8,
+        "short" | "int16" => Scalar::I16,
+        "ushort" | "uint16" => Scalar::U16,
+        "int" | "int32" => Scalar::I32,
+        "uint" | "uint32" => Scalar::U32,
+        "float" | "float32" => Scalar::F32,
+        "double" | "float64" => Scalar::F64,
+        _ => return Err(Syntax::unexpected(place, "a type such as float or int", name)),
+    })
+}
+
 fn property(words: &[&str], place: FilePlace) -> Result<Property, Syntax> {
-    let scalar = |name: &str| {
-        Scalar::of_name(name).ok_or_else(|| Syntax::unexpected(place, "a type such as float or int", name))
-    };
     let (kind, name) = match *words {
-        ["list", count, item, name] => (PlyKind::List { count: scalar(count)?, item: scalar(item)? }, name),
-        [kind, name] => (PlyKind::Scalar(scalar(kind)?), name),
+        ["list", count, item, name] => {
+            (PlyKind::List { count: scalar(count, place)?, item: scalar(item, place)? }, name)
+        }
+        [kind, name] => (PlyKind::Scalar(scalar(kind, place)?), name),
         _ => return Err(Syntax::unexpected(place, "type and name of a property", words.join(" "))),
     };
     Ok(Property { name: name.into(), kind })

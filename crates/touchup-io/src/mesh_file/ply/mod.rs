@@ -7,8 +7,9 @@ use std::io::{self, Write};
 
 use nalgebra::Point3;
 
-use super::defect::{FilePlace, Syntax};
+use super::defect::Syntax;
 use super::{ColumnValues, Soup, VertexColumn};
+use crate::file_error::FilePlace;
 use body::Body;
 use header::{Element, PlyHeader};
 
@@ -23,7 +24,7 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
     for element in &header.elements {
         body.check_count(element)?;
         match element.name.as_str() {
-            "vertex" => read_vertices(&mut body, element, scale, &mut soup)?,
+            "vertex" => (soup.positions, _) = read_vertices(&mut body, element, scale, [])?,
             "face" => read_polygons(&mut body, element, &mut soup, fan)?,
             "tristrips" => read_polygons(&mut body, element, &mut soup, strips)?,
             _ => body.rows(element, element.count, None, |_, _| Ok(()))?,
@@ -43,45 +44,44 @@ pub(super) fn read_columns<const N: usize>(
 ) -> Result<(Vec<Point3<f64>>, Columns<N>), Syntax> {
     let header = PlyHeader::read(bytes)?;
     let mut body = Body::new(bytes, &header);
-    let (mut positions, mut columns) = (Vec::new(), [const { None }; N]);
     for element in &header.elements {
         body.check_count(element)?;
-        if element.name != "vertex" {
-            body.rows(element, element.count, None, |_, _| Ok(()))?;
-            continue;
+        if element.name == "vertex" {
+            return read_vertices(&mut body, element, scale, names);
         }
-        let place = position_columns(element)?;
-        let found = names.map(|name| element.scalar(name));
-        columns = found.map(|column| column.map(|_| Vec::with_capacity(element.count)));
-        positions.reserve_exact(element.count);
-        body.rows(element, element.count, None, |row, _| {
-            positions.push(Point3::from(place.map(|column| scale * row[column])));
-            for (values, column) in columns.iter_mut().zip(found) {
-                if let (Some(values), Some(column)) = (values, column) {
-                    values.push(row[column] as f32);
-                }
-            }
-            Ok(())
-        })?;
-        break;
+        body.rows(element, element.count, None, |_, _| Ok(()))?;
     }
-    Ok((positions, columns))
+    Ok((Vec::new(), [const { None }; N]))
 }
 
 /// Adds the triangles of one row to the faces.
 type Triangulate = fn(&[f64], FilePlace, &mut Vec<[u32; 3]>) -> Result<(), Syntax>;
 
-fn read_vertices(body: &mut Body, element: &Element, scale: f64, soup: &mut Soup) -> Result<(), Syntax> {
-    let columns = position_columns(element)?;
-    if let Some(positions) = body.fixed_rows(element, columns, scale) {
-        soup.positions = positions;
-        return Ok(());
+fn read_vertices<const N: usize>(
+    body: &mut Body,
+    element: &Element,
+    scale: f64,
+    names: [&str; N],
+) -> Result<(Vec<Point3<f64>>, Columns<N>), Syntax> {
+    let place = position_columns(element)?;
+    let found = names.map(|name| element.scalar(name));
+    let mut columns = found.map(|column| column.map(|_| Vec::with_capacity(element.count)));
+    if N == 0
+        && let Some(positions) = body.fixed_rows(element, place, scale)
+    {
+        return Ok((positions, columns));
     }
-    soup.positions.reserve_exact(element.count);
+    let mut positions = Vec::with_capacity(element.count);
     body.rows(element, element.count, None, |row, _| {
-        soup.positions.push(Point3::from(columns.map(|column| scale * row[column])));
+        positions.push(Point3::from(place.map(|column| scale * row[column])));
+        for (values, column) in columns.iter_mut().zip(found) {
+            if let (Some(values), Some(column)) = (values, column) {
+                values.push(row[column] as f32);
+            }
+        }
         Ok(())
-    })
+    })?;
+    Ok((positions, columns))
 }
 
 /// The columns of x, y and z.
@@ -110,15 +110,19 @@ fn read_polygons(body: &mut Body, element: &Element, soup: &mut Soup, cut: Trian
     body.rows(element, rest, Some(list), |row, place| cut(row, place, &mut soup.faces))
 }
 
-fn vertex_number(value: f64, place: FilePlace) -> Result<u32, Syntax> {
-    let whole = value as u32;
-    if f64::from(whole) == value { Ok(whole) } else { Err(Syntax::unexpected(place, "a vertex number", value)) }
+/// The vertices that three numbers name.
+fn triangle(corners: [f64; 3], place: FilePlace) -> Result<[u32; 3], Syntax> {
+    let whole = corners.map(|number| number as u32);
+    match corners.into_iter().zip(whole).find(|(number, whole)| f64::from(*whole) != *number) {
+        Some((number, _)) => Err(Syntax::unexpected(place, "a vertex number", number)),
+        None => Ok(whole),
+    }
 }
 
 /// Triangles from the first corner of a polygon to its sides; fewer than three corners make none.
 fn fan(polygon: &[f64], place: FilePlace, faces: &mut Vec<[u32; 3]>) -> Result<(), Syntax> {
     for pair in polygon.get(1..).unwrap_or_default().windows(2) {
-        faces.push([vertex_number(polygon[0], place)?, vertex_number(pair[0], place)?, vertex_number(pair[1], place)?]);
+        faces.push(triangle([polygon[0], pair[0], pair[1]], place)?);
     }
     Ok(())
 }
@@ -128,19 +132,23 @@ fn strips(numbers: &[f64], place: FilePlace, faces: &mut Vec<[u32; 3]>) -> Resul
     for strip in numbers.split(|&n| n == -1.0) {
         for (i, corners) in strip.windows(3).enumerate() {
             let (a, b) = if i % 2 == 0 { (0, 1) } else { (1, 0) };
-            faces.push([
-                vertex_number(corners[a], place)?,
-                vertex_number(corners[b], place)?,
-                vertex_number(corners[2], place)?,
-            ]);
+            faces.push(triangle([corners[a], corners[b], corners[2]], place)?);
         }
     }
     Ok(())
 }
 
 /// Binary little endian, coordinates as double: nothing is rounded. Each column is a property of the vertices.
-pub(super) fn write(soup: &Soup, columns: &[VertexColumn<'_>], unit: &str, out: &mut impl Write) -> io::Result<()> {
-    let kind = |values: &ColumnValues<'_>| match values {
+///
+/// - `ids`: of the vertices, by which the columns are read.
+pub(super) fn write(
+    soup: &Soup,
+    ids: &[usize],
+    columns: &[VertexColumn],
+    unit: &str,
+    out: &mut impl Write,
+) -> io::Result<()> {
+    let kind = |values: &ColumnValues| match values {
         ColumnValues::Single(_) => "float",
         ColumnValues::Byte(_) => "uchar",
     };
@@ -154,11 +162,11 @@ pub(super) fn write(soup: &Soup, columns: &[VertexColumn<'_>], unit: &str, out: 
         soup.positions.len(),
         soup.faces.len()
     )?;
-    for (row, p) in soup.positions.iter().enumerate() {
+    for (p, &id) in soup.positions.iter().zip(ids) {
         p.coords.iter().try_for_each(|x| out.write_all(&x.to_le_bytes()))?;
         columns.iter().try_for_each(|column| match &column.values {
-            ColumnValues::Single(values) => out.write_all(&values[row].to_le_bytes()),
-            ColumnValues::Byte(values) => out.write_all(&[values[row]]),
+            ColumnValues::Single(values) => out.write_all(&values[id].to_le_bytes()),
+            ColumnValues::Byte(values) => out.write_all(&[values[id]]),
         })?;
     }
     for corners in &soup.faces {

@@ -1,0 +1,59 @@
+//! What can be wrong with any file: it cannot be read or written, and the place of what is wrong in it.
+
+use std::fmt;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::atomic::{AtomicFile, write_atomically};
+
+/// Why the system did not read or write a file.
+#[derive(Debug, thiserror::Error)]
+pub enum FileError {
+    /// It could not be read.
+    #[error("cannot read {}: {source}", path.display())]
+    Read {
+        /// the file
+        path: PathBuf,
+        /// what the system reports
+        source: io::Error,
+    },
+    /// It could not be written.
+    #[error("cannot write {}: {source}", path.display())]
+    Write {
+        /// the file
+        path: PathBuf,
+        /// what the system reports
+        source: io::Error,
+    },
+}
+
+/// Where in a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FilePlace {
+    /// counted from 1
+    Line(usize),
+    /// counted from 0; in a recording the offset of the record (for a chunk: of the whole chunk) in the MCAP stream
+    Byte(u64),
+    /// `id` in the table `messages`; what fails inside SQLite is placed at the last row that could be read
+    Row(i64),
+}
+
+impl fmt::Display for FilePlace {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Line(line) => write!(f, "line {line}"),
+            Self::Byte(offset) => write!(f, "byte {offset}"),
+            Self::Row(id) => write!(f, "row {id}"),
+        }
+    }
+}
+
+/// All bytes of a file.
+pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, FileError> {
+    std::fs::read(path).map_err(|source| FileError::Read { path: path.to_owned(), source })
+}
+
+/// As [`write_atomically`].
+pub(super) fn write_file(path: &Path, write: impl FnOnce(&mut AtomicFile) -> io::Result<()>) -> Result<(), FileError> {
+    write_atomically(path, write).map_err(|source| FileError::Write { path: path.to_owned(), source })
+}
