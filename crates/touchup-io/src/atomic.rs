@@ -1,8 +1,10 @@
 //! Files that are there whole or not at all.
 
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+
+use tempfile::TempPath;
 
 /// A file that appears under its name only by [`AtomicFile::commit`].
 ///
@@ -11,9 +13,9 @@ use std::path::{Path, PathBuf};
 #[derive(Debug)]
 pub struct AtomicFile {
     target: PathBuf,
-    temporary: PathBuf,
-    /// `None` once committed
-    writer: Option<BufWriter<File>>,
+    writer: BufWriter<File>,
+    /// removes the file when it is dropped
+    temporary: TempPath,
 }
 
 impl AtomicFile {
@@ -34,17 +36,11 @@ impl AtomicFile {
         if !folder.is_dir() {
             return refused(io::ErrorKind::NotFound, format!("there is no folder {}: make it first", folder.display()));
         }
-        for attempt in 0u32.. {
-            let temporary = folder.join(format!(".{}.{}-{attempt}.part", name.display(), std::process::id()));
-            match OpenOptions::new().write(true).create_new(true).open(&temporary) {
-                Ok(file) => {
-                    return Ok(Self { target, temporary, writer: Some(BufWriter::with_capacity(1 << 16, file)) });
-                }
-                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
-                Err(error) => return Err(error),
-            }
-        }
-        refused(io::ErrorKind::AlreadyExists, "no temporary name is free beside it".into())
+        let prefix = format!(".{}.", name.display());
+        let beside =
+            tempfile::Builder::new().prefix(&prefix).suffix(".part").make_in(folder, |path| File::create_new(path))?;
+        let (file, temporary) = beside.into_parts();
+        Ok(Self { target, writer: BufWriter::with_capacity(1 << 16, file), temporary })
     }
 
     /// Brings everything to the disk and gives the file its name, in place of an older one.
@@ -52,48 +48,33 @@ impl AtomicFile {
     /// # Errors
     /// Whatever writing, synchronising or renaming reports; the temporary file is then removed.
     pub fn commit(mut self) -> io::Result<()> {
-        self.buffer()?.flush()?;
-        self.buffer()?.get_ref().sync_all()?;
-        fs::rename(&self.temporary, &self.target)?;
-        self.writer = None;
+        self.writer.flush()?;
+        self.writer.get_ref().sync_all()?;
+        self.temporary.persist(&self.target).map_err(|error| error.error)?;
         // the new name is on the disk once its folder is; some file systems cannot be asked for that
         let _ = File::open(folder_of(&self.target)).and_then(|folder| folder.sync_all());
         Ok(())
-    }
-
-    fn buffer(&mut self) -> io::Result<&mut BufWriter<File>> {
-        self.writer.as_mut().ok_or_else(|| io::Error::from(io::ErrorKind::BrokenPipe))
     }
 }
 
 impl Write for AtomicFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.buffer()?.write(bytes)
+        self.writer.write(bytes)
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.buffer()?.flush()
+        self.writer.flush()
     }
 }
 
 impl Seek for AtomicFile {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        self.buffer()?.seek(to)
+        self.writer.seek(to)
     }
 
     /// Unlike a seek it leaves the buffer as it is.
     fn stream_position(&mut self) -> io::Result<u64> {
-        self.buffer()?.stream_position()
-    }
-}
-
-impl Drop for AtomicFile {
-    fn drop(&mut self) {
-        if let Some(writer) = self.writer.take() {
-            // what is still buffered is not wanted
-            let _ = writer.into_parts();
-            let _ = fs::remove_file(&self.temporary);
-        }
+        self.writer.stream_position()
     }
 }
 
