@@ -67,7 +67,7 @@ impl McapReader {
             }
         }
         let mut scout = Self::start(path, topics, packed)?;
-        let damage = scout.describe();
+        let damage = scout.describe().err();
         reader.described = scout.described;
         Ok((reader, damage))
     }
@@ -94,15 +94,9 @@ impl McapReader {
     }
 
     /// Reads on until both topics are described.
-    fn describe(&mut self) -> Option<RecordingError> {
-        while !self.described.has(&self.topics) {
-            match self.advance() {
-                Ok(Some(_)) => {}
-                Ok(None) => return None,
-                Err(error) => return Some(error),
-            }
-        }
-        None
+    fn describe(&mut self) -> Result<(), RecordingError> {
+        while !self.described.has(&self.topics) && self.advance()?.is_some() {}
+        Ok(())
     }
 
     fn damaged(&self, damage: Damage) -> RecordingError {
@@ -154,6 +148,8 @@ impl McapReader {
 
     /// Loads the next chunk, or the next record outside of chunks; `false` at the end of the data.
     fn refill(&mut self) -> Result<bool, Damage> {
+        self.next = 0;
+        self.records.clear();
         loop {
             self.at = self.stream.at;
             let Some((opcode, len)) = self.stream.head()? else {
@@ -164,13 +160,10 @@ impl McapReader {
             match opcode {
                 op::CHUNK => {
                     self.stream.load(len, &mut self.packed)?;
-                    self.next = 0;
                     unpack_chunk(&self.packed, &mut self.records)?;
                     return Ok(true);
                 }
                 op::SCHEMA | op::CHANNEL | op::MESSAGE => {
-                    self.next = 0;
-                    self.records.clear();
                     self.records.push(opcode);
                     self.records.extend(len.to_le_bytes());
                     self.stream.load(len, &mut self.records)?;
@@ -216,9 +209,8 @@ impl RecordingFile for McapReader {
     }
 }
 
-/// Unpacks the records of a chunk and verifies them.
+/// Unpacks the records of a chunk, for which `records` is empty, and verifies them.
 fn unpack_chunk(chunk: &[u8], records: &mut Vec<u8>) -> Result<(), Damage> {
-    records.clear();
     let mut fields = Fields(chunk);
     let _start_and_end_time = fields.bytes(16, "times of a chunk")?;
     let announced = fields.u64("size of a chunk")?;

@@ -59,21 +59,19 @@ impl RecordingReader {
     /// recording does not have the two topics; [`RecordingError::Damaged`] when damage hides whether it has them;
     /// [`RecordingError::NotARecording`], [`RecordingError::Metadata`], [`RecordingError::Io`].
     pub fn open(path: &Path, topics: &Topics) -> Result<Self, RecordingError> {
-        let mut rest = files_of(path)?;
         let mut reader = Self {
             topics: topics.clone(),
             path: path.to_owned(),
             source: None,
-            rest: VecDeque::new(),
+            rest: files_of(path)?,
             intake: Intake::default(),
             message_count: Some(0),
             truncated: false,
         };
-        reader.source = reader.survey(path, &rest)?;
-        if let Some(first) = rest.pop_front() {
+        reader.source = reader.survey()?;
+        if let Some(first) = reader.rest.pop_front() {
             reader.path = first;
         }
-        reader.rest = rest;
         Ok(reader)
     }
 
@@ -103,15 +101,11 @@ impl RecordingReader {
     }
 
     /// Looks into every file once: topics, counts, missing ends. Returns the first, still open: it may be a packed one.
-    fn survey(
-        &mut self,
-        path: &Path,
-        files: &VecDeque<PathBuf>,
-    ) -> Result<Option<Box<dyn RecordingFile>>, RecordingError> {
+    fn survey(&mut self) -> Result<Option<Box<dyn RecordingFile>>, RecordingError> {
         let mut first = None;
         let mut found: Vec<TopicInfo> = Vec::new();
         let mut first_damage = None;
-        for file in files {
+        for file in &self.rest {
             let (source, damage) = open_file(file, &self.topics)?;
             first_damage = first_damage.or(damage);
             self.truncated |= source.truncated();
@@ -121,30 +115,18 @@ impl RecordingReader {
             found.dedup();
             first = first.or(Some(source));
         }
-        match (check_topics(path, &self.topics, &found), first_damage) {
+        match (check_topics(&self.path, &self.topics, &found), first_damage) {
             (Err(RecordingError::MissingTopic { .. }), Some(damage)) => Err(damage),
             (checked, _) => checked.map(|()| first),
         }
-    }
-
-    /// Turns to the next file; `false` after the last.
-    fn turn(&mut self) -> Result<bool, RecordingError> {
-        let Some(path) = self.rest.pop_front() else { return Ok(false) };
-        self.source = Some(open_file(&path, &self.topics)?.0);
-        self.path = path;
-        Ok(true)
-    }
-
-    fn stop(&mut self) {
-        self.source = None;
-        self.rest.clear();
     }
 
     /// The next pose, wrench or frame of markers; after damage the error, then `None`.
     pub fn next_record(&mut self) -> Option<Result<Record, RecordingError>> {
         let next = self.advance();
         if next.is_err() {
-            self.stop();
+            self.source = None;
+            self.rest.clear();
         }
         next.transpose()
     }
@@ -160,9 +142,9 @@ impl RecordingReader {
             }
             self.truncated |= source.truncated();
             self.source = None;
-            if !self.turn()? {
-                return Ok(None);
-            }
+            let Some(path) = self.rest.pop_front() else { return Ok(None) };
+            self.source = Some(open_file(&path, &self.topics)?.0);
+            self.path = path;
         }
     }
 }
@@ -171,13 +153,11 @@ impl Iterator for RecordingReader {
     type Item = Result<Message, RecordingError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        loop {
-            match self.next_record()? {
-                Ok(Record::Message(message)) => return Some(Ok(message)),
-                Ok(Record::Markers(_)) => {}
-                Err(error) => return Some(Err(error)),
-            }
-        }
+        std::iter::from_fn(|| self.next_record()).find_map(|record| match record {
+            Ok(Record::Message(message)) => Some(Ok(message)),
+            Ok(Record::Markers(_)) => None,
+            Err(error) => Some(Err(error)),
+        })
     }
 }
 
