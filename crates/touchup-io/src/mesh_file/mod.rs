@@ -102,12 +102,13 @@ enum Format {
 }
 
 impl Format {
-    fn of_name(path: &Path) -> Option<Self> {
-        match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
-            "ply" => Some(Self::Ply),
-            "stl" => Some(Self::Stl),
-            "obj" => Some(Self::Obj),
-            _ => None,
+    fn of_name(path: &Path) -> Result<Self, MeshFileError> {
+        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+        match extension.to_str() {
+            Some("ply") => Ok(Self::Ply),
+            Some("stl") => Ok(Self::Stl),
+            Some("obj") => Ok(Self::Obj),
+            _ => Err(MeshFileError::UnknownFormat { path: path.into() }),
         }
     }
 
@@ -131,9 +132,7 @@ impl Format {
 /// [`MeshFileError`]: one line that names the file, the place in it, and what to do.
 pub fn read_mesh(path: &Path, unit: MeshUnit) -> Result<MeshFile, MeshFileError> {
     let bytes = read_file(path)?;
-    let format = Format::of_content(&bytes)
-        .or_else(|| Format::of_name(path))
-        .ok_or_else(|| MeshFileError::UnknownFormat { path: path.into() })?;
+    let format = Format::of_content(&bytes).map_or_else(|| Format::of_name(path), Ok)?;
     let scale = unit.metres();
     let soup = match format {
         _ if bytes.is_empty() => Err(Syntax::ends(FilePlace::Byte(0), "a mesh")),
@@ -203,7 +202,7 @@ fn sides(mesh: &TriMesh) -> Vector3<f64> {
 /// # Errors
 /// As [`write_mesh`].
 pub fn check_target(path: &Path) -> Result<(), MeshFileError> {
-    Format::of_name(path).ok_or_else(|| MeshFileError::UnknownFormat { path: path.into() })?;
+    Format::of_name(path)?;
     Ok(AtomicFile::create(path).map(drop).map_err(|source| FileError::Write { path: path.into(), source })?)
 }
 
@@ -260,7 +259,7 @@ pub fn write_mesh_with(
     columns: &[VertexColumn],
     unit: MeshUnit,
 ) -> Result<(), MeshFileError> {
-    let format = Format::of_name(path).ok_or_else(|| MeshFileError::UnknownFormat { path: path.into() })?;
+    let format = Format::of_name(path)?;
     let ((soup, ids), unit) = (used_part(mesh, unit.metres()), unit.to_string());
     Ok(write_file(path, |out| match format {
         Format::Ply => ply::write(&soup, &ids, columns, &unit, out),
