@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{Point3, Vector3};
 
 use super::field::{Field, cells};
-use touchup_core::mesh::triangle::segment_crosses;
+use touchup_core::mesh::triangle::intersect;
 use touchup_core::mesh::{BoxQuery, FaceId, FaceTree, MeshError, TriMesh};
 
 /// Rounds of flipping, evening out and going back to the level.
@@ -187,7 +187,12 @@ impl MeshDraft {
         let pieces = self.patch_sizes(&vec![true; seen.len()]);
         let patches = self.patch_sizes(&seen);
         let kept = |face: usize| pieces[face] >= fewest && seen[face] != (patches[face] < fewest);
-        let mut kept = (0..seen.len()).map(kept);
+        self.keep_mut((0..seen.len()).map(kept));
+    }
+
+    /// Keeps the faces for which `kept` says so, one after another.
+    fn keep_mut(&mut self, kept: impl IntoIterator<Item = bool>) {
+        let mut kept = kept.into_iter();
         self.faces.retain(|_| kept.next().unwrap_or(false));
     }
 
@@ -220,8 +225,7 @@ impl MeshDraft {
             normal.dot(&gradient) > FOLDED * normal.norm() * gradient.norm()
         };
         let kept: Vec<bool> = self.faces.iter().map(upright).collect();
-        let mut kept = kept.into_iter();
-        self.faces.retain(|_| kept.next().unwrap_or(false));
+        self.keep_mut(kept);
     }
 
     /// Drops faces that cross others.
@@ -238,15 +242,13 @@ impl MeshDraft {
             tree.faces_in_box(&a.inf(&b).inf(&c), &a.sup(&b).sup(&c), &mut near);
             let apart = |other: &&FaceId| mesh.corners(**other).iter().all(|v| !corners.contains(v));
             for other in near.faces.iter().filter(apart) {
-                let [d, e, f] = mesh.triangle(*other);
-                if [(d, e), (e, f), (f, d)].iter().any(|(p, q)| segment_crosses(p, q, &triangle, 0.0)) {
+                if intersect(&triangle, &mesh.triangle(*other), 0.0) {
                     kept[face.0 as usize] = false;
                     kept[other.0 as usize] = false;
                 }
             }
         }
-        let mut kept = kept.into_iter();
-        self.faces.retain(|_| kept.next().unwrap_or(false));
+        self.keep_mut(kept);
         Ok(())
     }
 
@@ -281,13 +283,8 @@ impl MeshDraft {
         let next: BTreeMap<u32, u32> = star.iter().map(side).collect();
         let first = next.keys().find(|v| !next.values().any(|w| w == *v)).or(next.keys().next());
         let Some(&start) = first else { return false };
-        let mut at = start;
-        let mut fan = 0;
-        while let Some(&after) = next.get(&at).filter(|_| fan < star.len() && (fan == 0 || at != start)) {
-            at = after;
-            fan += 1;
-        }
-        fan < star.len()
+        let fan = std::iter::successors(next.get(&start), |at| next.get(*at).filter(|_| **at != start));
+        fan.take(star.len()).count() < star.len()
     }
 
     /// Closes rims of at most `longest` edges with a fan around a new vertex in their middle; the mesh must be tidy, so

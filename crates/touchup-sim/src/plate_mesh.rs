@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use nalgebra::{Point2, Point3};
 
+use super::contour::MeshDraft;
 use super::plate::{Extrusion, Plate, PlateStadium};
 use super::triangulate::triangulate;
 use touchup_core::mesh::{MeshError, TriMesh};
@@ -32,14 +33,7 @@ impl PlateStadium {
     }
 }
 
-/// Positions and faces while the boundary grows.
-#[derive(Default)]
-struct Builder {
-    positions: Vec<Point3<f64>>,
-    faces: Vec<[u32; 3]>,
-}
-
-impl Builder {
+impl MeshDraft {
     fn add(&mut self, points: impl IntoIterator<Item = Point3<f64>>) -> Vec<u32> {
         let first = self.positions.len() as u32;
         self.positions.extend(points);
@@ -77,7 +71,7 @@ impl Plate {
     /// # Errors
     /// Those of [`TriMesh::new`]; none is known to happen.
     pub fn mesh(&self, chord_error: f64) -> Result<TriMesh, MeshError> {
-        let mut b = Builder::default();
+        let mut b = MeshDraft::default();
         let (size, x, z) = (self.size, self.step_x, self.step_z);
         // the step's outline, seen along −y: counter-clockwise with x to the right and z up
         let profile = [(0.0, 0.0), (size.x, 0.0), (size.x, z), (x, z), (x, size.z), (0.0, size.z)];
