@@ -12,8 +12,8 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64;
 
 use super::ball::push_ball;
-use super::drift::gauss;
 use super::error::{SimError, not_negative, positive, up_to};
+use super::random::gauss_vector;
 use super::surface::Surface;
 use touchup_core::probing::arm::{Arm, ArmError, ArmState, Command, Joints, Safety, UrGeometry};
 use touchup_core::stylus::{Payload, Wrench};
@@ -392,10 +392,10 @@ impl<'a> SimArm<'a> {
 
     /// Reading of the sensor: contact, weight, bias and noise, in the axes of the flange about its origin.
     fn read(&mut self) -> Wrench {
-        let noise = Vector3::from_fn(|_, _| gauss(&mut self.rng)) * self.params.force_noise;
+        let noise = gauss_vector(&mut self.rng) * self.params.force_noise;
         let shaft = self.nominal.rotation * Vector3::z();
         let spike = if self.spike > 0 { shaft * self.spike_force } else { Vector3::zeros() };
-        let torque_noise = Vector3::from_fn(|_, _| gauss(&mut self.torque_rng)) * self.params.torque_noise;
+        let torque_noise = gauss_vector(&mut self.torque_rng) * self.params.torque_noise;
         let ArmParams { payload, pose_ft, ball_offset, force_bias, torque_bias, .. } = &self.params;
         let r_bf = self.flange();
         let (weight, contact) = (payload.weight_o(&r_bf), r_bf.inverse() * (self.contact_force() + spike));
@@ -438,7 +438,7 @@ impl Arm for SimArm<'_> {
         self.follow_joints();
         let raw_wrench_f = self.read();
         let force = self.flange() * (self.unweighed(&raw_wrench_f) - self.tare);
-        let noise = Vector3::from_fn(|_, _| gauss(&mut self.rng)) * self.params.pose_noise;
+        let noise = gauss_vector(&mut self.rng) * self.params.pose_noise;
         let mut pose_bt = self.nominal;
         pose_bt.translation.vector += noise;
         let stamp_ns = if self.is_killed { self.last_stamp_ns } else { (self.time * 1e9).round() as i64 };

@@ -66,18 +66,12 @@ pub enum SimError {
 
 /// Refuses values that are not finite or not above zero.
 pub(super) fn positive(name: &'static str, value: f64, unit: &'static str) -> Result<(), SimError> {
-    if value.is_finite() && value > 0.0 {
-        return Ok(());
-    }
-    Err(SimError::BadParameter { name, value, unit, allowed: "greater than zero" })
+    require(value.is_finite() && value > 0.0, name, value, unit, "greater than zero")
 }
 
 /// Refuses values that are not finite or below zero.
 pub(super) fn not_negative(name: &'static str, value: f64, unit: &'static str) -> Result<(), SimError> {
-    if value.is_finite() && value >= 0.0 {
-        return Ok(());
-    }
-    Err(SimError::BadParameter { name, value, unit, allowed: "zero or more" })
+    require(value.is_finite() && value >= 0.0, name, value, unit, "zero or more")
 }
 
 /// Refuses values that are not finite, below zero or beyond `largest`, which `allowed` names.
@@ -88,8 +82,16 @@ pub(super) fn up_to(
     largest: f64,
     allowed: &'static str,
 ) -> Result<(), SimError> {
-    if (0.0..=largest).contains(&value) {
-        return Ok(());
-    }
-    Err(SimError::BadParameter { name, value, unit, allowed })
+    require((0.0..=largest).contains(&value), name, value, unit, allowed)
+}
+
+/// Refuses a value unless `is_allowed`.
+pub(super) fn require(
+    is_allowed: bool,
+    name: &'static str,
+    value: f64,
+    unit: &'static str,
+    allowed: &'static str,
+) -> Result<(), SimError> {
+    if is_allowed { Ok(()) } else { Err(SimError::BadParameter { name, value, unit, allowed }) }
 }

@@ -2,11 +2,10 @@
 
 use nalgebra::{Isometry3, Vector3};
 use rand::SeedableRng;
-use rand_distr::{Distribution, StandardUniform};
 use rand_pcg::Pcg64;
 
-use super::drift::gauss;
 use super::error::{SimError, positive, up_to};
+use super::random::{gauss_vector, uniform};
 use super::stylus::{Moment, TICK};
 use touchup_core::stylus::{MarkerBody, MarkerFrame, MarkerObservation};
 
@@ -85,11 +84,6 @@ impl Spell {
     }
 }
 
-fn uniform(rng: &mut Pcg64, [low, high]: [f64; 2]) -> f64 {
-    let share: f64 = StandardUniform.sample(rng);
-    low + (high - low) * share
-}
-
 /// The frames of a camera that watches a simulated touch.
 ///
 /// The markers sit on the handle, so that they give the pose of a stylus that does not bend, as the poses do.
@@ -143,8 +137,8 @@ pub fn see_markers(
 
 /// Error of the position of a marker, m.
 fn seen_off(camera: &CameraParams, rng: &mut Pcg64) -> Vector3<f64> {
-    let noise = Vector3::from_fn(|_, _| gauss(rng) * camera.noise);
-    let direction = Vector3::from_fn(|_, _| gauss(rng)).try_normalize(0.0).unwrap_or_default();
+    let noise = gauss_vector(rng) * camera.noise;
+    let direction = gauss_vector(rng).try_normalize(0.0).unwrap_or_default();
     let (is_outlier, distance) = (uniform(rng, [0.0, 1.0]) < camera.outliers, uniform(rng, REFLECTION));
     if is_outlier { direction * distance } else { noise }
 }

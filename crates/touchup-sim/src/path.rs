@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point2, Point3, Unit, UnitQuaternion, Vector2, Vector3};
 
-use super::error::{SimError, not_negative, positive};
+use super::error::{SimError, not_negative, positive, up_to};
 use super::plate::{Plate, PlateStadium};
 use super::surface::{Bounds, Surface};
 
@@ -120,10 +120,7 @@ pub fn raster(region: &RasterRegion, lines: Lines, params: &PathParams) -> Resul
     not_negative("the length of the region", length, "m")?;
     not_negative("the width of the region", width, "m")?;
     let count = (width / params.pitch).round().max(1.0);
-    if count > MAX_LINES {
-        let (name, value, allowed) = ("the number of lines", count, "100000 or less: take a larger distance");
-        return Err(SimError::BadParameter { name, value, unit: "", allowed });
-    }
+    up_to("the number of lines", count, "", MAX_LINES, "100000 or less: take a larger distance")?;
     let count = count as usize;
     let corner = |i: usize, far: bool| {
         let (s, t) = (if far { length } else { 0.0 }, width * i as f64 / count as f64);
@@ -269,7 +266,11 @@ fn first_contact(surface: &dyn Surface, region: &RasterRegion, q: &Point2<f64>, 
 
 /// A frame in the middle of a box whose z axis points against the direction of view; any turn about it does.
 pub(super) fn looking_along(view: &Unit<Vector3<f64>>, bounds: &Bounds) -> Isometry3<f64> {
-    let turn = UnitQuaternion::rotation_between(&Vector3::z(), &-view.into_inner())
-        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
-    Isometry3::from_parts(bounds.centre().coords.into(), turn)
+    Isometry3::from_parts(bounds.centre().coords.into(), turned_to(&-view.into_inner()))
+}
+
+/// The smallest turn that takes z to a direction; half a turn about x to the opposite one.
+pub(super) fn turned_to(direction: &Vector3<f64>) -> UnitQuaternion<f64> {
+    UnitQuaternion::rotation_between(&Vector3::z(), direction)
+        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI))
 }

@@ -5,11 +5,12 @@
 
 use nalgebra::{Matrix2, Point2, Point3, Vector2, Vector3};
 use rand::SeedableRng;
-use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
-use super::error::{SimError, positive};
+use super::error::{SimError, positive, require};
+use super::random::gauss_vector;
 use super::surface::{Bounds, Surface, SurfacePoint};
+use super::wavy::height_field;
 use touchup_core::mesh::TriMesh;
 
 /// Length of the sides, m.
@@ -68,26 +69,8 @@ impl Peaks {
     pub fn mesh(&self, edge: f64) -> Result<TriMesh, SimError> {
         positive("the edge length", edge, "m")?;
         let cells = (SIDE / edge).ceil();
-        if cells > MAX_CELLS {
-            return Err(SimError::BadParameter {
-                name: "the edge length",
-                value: edge,
-                unit: "m",
-                allowed: "25 µm or more",
-            });
-        }
-        let cells = cells as u32;
-        let at = |i: u32| (f64::from(i) / f64::from(cells) - 0.5) * SIDE;
-        let row = cells + 1;
-        let positions = (0..row * row).map(|k| {
-            let (x, y) = (at(k % row), at(k / row));
-            Point3::new(x, y, self.height(x, y))
-        });
-        let faces = (0..cells * cells).flat_map(|k| {
-            let a = k % cells + k / cells * row;
-            [[a, a + 1, a + row + 1], [a, a + row + 1, a + row]]
-        });
-        Ok(TriMesh::new(positions.collect(), faces.collect())?)
+        require(cells <= MAX_CELLS, "the edge length", edge, "m", "25 µm or more")?;
+        Ok(height_field(cells as u32, |i| (f64::from(i) / cells - 0.5) * SIDE, |x, y| self.height(x, y))?)
     }
 
     /// Nodes of the starting grid that none of their neighbours beats in closeness to `p`, within `reach` (m) sideways.
@@ -126,8 +109,7 @@ pub fn add_vertex_noise(mesh: &mut TriMesh, noise: f64, offset: &Vector3<f64>, s
     let mut rng = Pcg64::seed_from_u64(seed);
     for vertex in 0..mesh.vertex_count() as u32 {
         let vertex = touchup_core::mesh::VertexId(vertex);
-        let shake = Vector3::from_fn(|_, _| -> f64 { StandardNormal.sample(&mut rng) });
-        mesh.set_position(vertex, mesh.position(vertex) + shake * noise + offset);
+        mesh.set_position(vertex, mesh.position(vertex) + gauss_vector(&mut rng) * noise + offset);
     }
 }
 

@@ -1,5 +1,6 @@
-//! Drift: slow, smooth random change, of a hand-held stylus or of a sensor's bias.
+//! Random numbers, and drift: slow, smooth random change, of a hand-held stylus or of a sensor's bias.
 
+use nalgebra::Vector3;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use rand_pcg::Pcg64;
 
@@ -16,9 +17,9 @@ pub(super) struct Drift {
 impl Drift {
     /// - `period`: of the middle wave, s; the others lie within a factor of two.
     pub(super) fn new(period: f64, rng: &mut Pcg64) -> Self {
-        let mut uniform = || -> f64 { StandardUniform.sample(rng) };
+        let mut share = || uniform(rng, [0.0, 1.0]);
         let turn = std::f64::consts::TAU;
-        Self { waves: [(); WAVES].map(|()| (turn / period * (2.0 * uniform() - 1.0).exp2(), turn * uniform())) }
+        Self { waves: [(); WAVES].map(|()| (turn / period * (2.0 * share() - 1.0).exp2(), turn * share())) }
     }
 
     /// Value at time `t` (s).
@@ -31,4 +32,15 @@ impl Drift {
 /// One draw from the standard normal distribution.
 pub(super) fn gauss(rng: &mut Pcg64) -> f64 {
     StandardNormal.sample(rng)
+}
+
+/// Three of them.
+pub(super) fn gauss_vector(rng: &mut Pcg64) -> Vector3<f64> {
+    Vector3::from_fn(|_, _| gauss(rng))
+}
+
+/// One draw between two numbers, all equally likely.
+pub(super) fn uniform(rng: &mut Pcg64, [low, high]: [f64; 2]) -> f64 {
+    let share: f64 = StandardUniform.sample(rng);
+    low + (high - low) * share
 }

@@ -7,14 +7,13 @@
 
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, Unit, Vector3};
 use rand::SeedableRng;
-use rand_distr::{Distribution, StandardUniform};
 use rand_pcg::Pcg64;
 
 use super::contour::{MeshDraft, contour};
-use super::drift::gauss;
 use super::error::{SimError, not_negative, positive};
 use super::field::Field;
 use super::path::looking_along;
+use super::random::{gauss, gauss_vector, uniform};
 use super::surface::Surface;
 use touchup_core::mesh::TriMesh;
 use touchup_core::numeric::weighted_quantile;
@@ -198,9 +197,8 @@ struct Waves {
 impl Waves {
     fn new(params: &ScannerParams, pitch: f64, rng: &mut Pcg64) -> Self {
         let mut wave = || {
-            let vector = Vector3::from_fn(|_, _| gauss(rng) / params.noise_correlation);
-            let phase: f64 = StandardUniform.sample(rng);
-            (vector, std::f64::consts::TAU * phase)
+            let vector = gauss_vector(rng) / params.noise_correlation;
+            (vector, std::f64::consts::TAU * uniform(rng, [0.0, 1.0]))
         };
         let waves: Vec<(Vector3<f64>, f64)> = (0..WAVES).map(|_| wave()).collect();
         let alphas = |k: &Vector3<f64>| std::array::from_fn::<_, RUN, _>(|i| k.x * pitch * i as f64);
@@ -260,7 +258,7 @@ fn is_seen(field: &Field, [a, b, c]: &[Point3<f64>; 3]) -> bool {
 
 /// The rigid offset of the scan, about the middle of the part.
 fn slip(params: &ScannerParams, rng: &mut Pcg64) -> Isometry3<f64> {
-    let mut direction = || Unit::new_normalize(Vector3::from_fn(|_, _| gauss(rng)));
+    let mut direction = || Unit::new_normalize(gauss_vector(rng));
     let shift = Translation3::from(direction().into_inner() * params.rigid_shift);
     let turn = Rotation3::from_axis_angle(&direction(), params.rigid_turn);
     Isometry3::from_parts(shift, turn.into())

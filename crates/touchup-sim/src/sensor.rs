@@ -4,11 +4,11 @@ use std::f64::consts::PI;
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rand::SeedableRng;
-use rand_distr::{Distribution, Exp1, StandardUniform};
+use rand_distr::{Distribution, Exp1};
 use rand_pcg::Pcg64;
 
-use super::drift::{Drift, gauss};
-use super::error::{SimError, not_negative, up_to};
+use super::error::{SimError, not_negative, require, up_to};
+use super::random::{Drift, gauss, gauss_vector, uniform};
 use super::stylus::{Moment, TICK};
 use touchup_core::stylus::{Message, StampedPose, StampedWrench, Wrench};
 
@@ -86,11 +86,8 @@ impl SensorParams {
         up_to("the share of lost messages", self.lost, "", 1.0, "from zero to one")?;
         up_to("the share of late messages", self.late, "", 1.0, "from zero to one")?;
         not_negative("the rate of gaps", self.gap_rate, "1/s")?;
-        if self.wrench_clock.is_finite() && self.wrench_clock.abs() <= LARGEST_CLOCK {
-            return Ok(());
-        }
-        let allowed = "within one second";
-        Err(SimError::BadParameter { name: "the wrench clock's offset", value: self.wrench_clock, unit: "s", allowed })
+        let is_allowed = self.wrench_clock.abs() <= LARGEST_CLOCK;
+        require(is_allowed, "the wrench clock's offset", self.wrench_clock, "s", "within one second")
     }
 }
 
@@ -153,12 +150,7 @@ impl<'a> Sensor<'a> {
     }
 
     fn shake(&mut self, rms: f64) -> Vector3<f64> {
-        Vector3::from_fn(|_, _| gauss(&mut self.rng) * rms)
-    }
-
-    fn uniform(&mut self, [low, high]: [f64; 2]) -> f64 {
-        let share: f64 = StandardUniform.sample(&mut self.rng);
-        low + (high - low) * share
+        gauss_vector(&mut self.rng) * rms
     }
 
     /// The pose as reported: of a stylus that does not bend.
@@ -182,8 +174,8 @@ impl<'a> Sensor<'a> {
         let limit = JITTER_LIMIT * wire.period;
         let jitter = (gauss(&mut self.rng) * wire.jitter).clamp(-limit, limit);
         let wait: f64 = Exp1.sample(&mut self.rng);
-        let [lost, late, gap] = [(); 3].map(|()| self.uniform([0.0, 1.0]));
-        let (extra, silence) = (self.uniform(LATE), self.uniform(GAP));
+        let [lost, late, gap] = [(); 3].map(|()| uniform(&mut self.rng, [0.0, 1.0]));
+        let (extra, silence) = (uniform(&mut self.rng, LATE), uniform(&mut self.rng, GAP));
         if gap < p.gap_rate * wire.period {
             wire.silent_until = t + silence;
         }

@@ -10,9 +10,9 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64;
 
 use super::ball::BallContact;
-use super::drift::Drift;
 use super::error::{SimError, not_negative, positive, up_to};
-use super::path::Stroke;
+use super::path::{Stroke, turned_to};
+use super::random::Drift;
 use super::sensor::{Sensor, SensorParams};
 use super::surface::Surface;
 use super::tip::SimTip;
@@ -171,8 +171,7 @@ pub fn touch(surface: &dyn Surface, path: &[Stroke], params: &StylusParams, seed
     farthest.copied().try_for_each(|x| not_negative("the size of a path's coordinate", x.abs(), "m"))?;
     let start = path.iter().flat_map(|s| &s.points).next().ok_or(SimError::EmptyPath)?;
     let shaft = path.iter().find_map(|s| s.press).map_or_else(Vector3::z, |press| -press.into_inner());
-    let upright = UnitQuaternion::rotation_between(&Vector3::z(), &shaft)
-        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
+    let upright = turned_to(&shaft);
     let mut leading = Leading {
         surface,
         params,

@@ -43,9 +43,19 @@ pub fn wavy_plate(faces: usize) -> Result<TriMesh, MeshError> {
 /// [`MeshError::TooMany`] for more than 32-bit ids can count.
 pub fn plate(faces: usize, side: f64) -> Result<TriMesh, MeshError> {
     let n = ((faces as f64 / 2.0).sqrt().round() as u32).max(1);
-    let at = |i: u32| side * f64::from(i) / f64::from(n);
-    let positions =
-        (0..=n).flat_map(|j| (0..=n).map(move |i| Point3::new(at(i), at(j), height(at(i), at(j))))).collect();
+    height_field(n, |i| side * f64::from(i) / f64::from(n), height)
+}
+
+/// The surface z = `height`(x, y) over a square grid of `n` by `n` cells, two triangles each, outward up.
+///
+/// - `at`: x or y of line `i` of the grid, m.
+pub(super) fn height_field(
+    n: u32,
+    at: impl Fn(u32) -> f64,
+    height: impl Fn(f64, f64) -> f64,
+) -> Result<TriMesh, MeshError> {
+    let on = |i: u32, j: u32| Point3::new(at(i), at(j), height(at(i), at(j)));
+    let positions = (0..=n).flat_map(|j| (0..=n).map(move |i| (i, j))).map(|(i, j)| on(i, j)).collect();
     let id = |i: u32, j: u32| j * (n + 1) + i;
     let cells = (0..n).flat_map(|j| (0..n).map(move |i| (i, j)));
     let triangles = cells
