@@ -179,16 +179,6 @@ impl Plate {
         ]
     }
 
-    /// Volume of the material in closed form, m³.
-    pub fn volume(&self) -> f64 {
-        let stadium = |e: &Extrusion| {
-            let length = (e.outline.to - e.outline.from).norm();
-            (std::f64::consts::PI * e.outline.radius + 2.0 * length) * e.outline.radius * (e.high - e.low)
-        };
-        let block = self.size.y * (self.step_x * self.size.z + (self.size.x - self.step_x) * self.step_z);
-        block + stadium(&self.boss) - stadium(&self.through) - stadium(&self.blind) - stadium(&self.slot)
-    }
-
     /// Whether `p` is inside the material.
     fn is_inside(&self, p: &Point3<f64>) -> bool {
         let within = |e: &Extrusion| e.outline.contains(&p.xy()) && p.z < e.high;

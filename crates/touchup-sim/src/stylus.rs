@@ -192,11 +192,8 @@ pub fn touch(surface: &dyn Surface, path: &[Stroke], params: &StylusParams, seed
 impl Leading<'_> {
     /// Goes along one stroke, starting wherever the ball is.
     fn follow(&mut self, stroke: &Stroke) {
-        let mut guide = self.centre;
-        if let Some(first) = stroke.points.first() {
-            // a pressed stroke starts sideways of where the ball is, and sinks from there
-            guide = if stroke.press.is_some() { *first } else { guide };
-        }
+        // a pressed stroke starts sideways of where the ball is, and sinks from there
+        let mut guide = stroke.press.and(stroke.points.first()).copied().unwrap_or(self.centre);
         for target in &stroke.points {
             let patience = PATIENCE + PATIENCE_FACTOR * (target - guide).norm() / stroke.speed;
             let until = self.moments.len() + (patience / TICK) as usize;
