@@ -48,8 +48,7 @@ fn pairs(path: &Path, rows: Vec<Row>) -> Result<PairsFile, TableError> {
     for row in rows {
         let pair = pair(&row).map_err(|why| TableError::Line { path: path.to_owned(), line: row.line, why })?;
         file.pairs.push(pair);
-        let [name, ..] = row.more.as_slice() else { continue };
-        file.names.push(name.clone().unwrap_or_else(|| file.pairs.len().to_string()));
+        file.names.push(row.more[0].clone().unwrap_or_else(|| file.pairs.len().to_string()));
     }
     Ok(file)
 }

@@ -45,14 +45,10 @@ struct TouchLine<'a> {
 impl<'a> TouchLine<'a> {
     fn of(flag: u32, index: usize, touch: &'a ProbedTouch, ball_radius: f64, offset_ns: i64) -> Self {
         let record = touch.record.as_ref();
-        let verdict = record.map_or("held_back", |record| match &record.outcome {
-            TouchOutcome::Contact { onset, .. } => onset.verdict.name(),
-            TouchOutcome::Miss { .. } => "miss",
-            TouchOutcome::Unclear(_) => "unclear",
-        });
-        let sigma = record.and_then(|record| match &record.outcome {
-            TouchOutcome::Contact { onset, .. } => Some(onset.sigma),
-            _ => None,
+        let (verdict, sigma) = record.map_or(("held_back", None), |record| match &record.outcome {
+            TouchOutcome::Contact { onset, .. } => (onset.verdict.name(), Some(onset.sigma * 1e3)),
+            TouchOutcome::Miss { .. } => ("miss", None),
+            TouchOutcome::Unclear(_) => ("unclear", None),
         });
         let moment = |m: &touchup_core::probing::arm::TouchMoment| [m.t, m.travel * 1e3, m.force, m.lateral];
         Self {
@@ -67,7 +63,7 @@ impl<'a> TouchLine<'a> {
             approach: touch.planned.direction.into_inner().into(),
             search_mm: touch.planned.search * 1e3,
             centre_mm: touch.centre.map(|centre| (centre * 1e3).coords.into()),
-            sigma_mm: sigma.map(|sigma| sigma * 1e3),
+            sigma_mm: sigma,
             deviation_mm: touch.deviation.map(|deviation| deviation * 1e3),
             speed_mm_per_s: record.map(|record| record.speed * 1e3),
             tip_radius_mm: ball_radius * 1e3,

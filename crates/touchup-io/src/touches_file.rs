@@ -73,23 +73,12 @@ pub fn as_written(touches: &[ProbedPoint]) -> Vec<ProbedPoint> {
 
 fn line_of(touch: &ProbedPoint, number: usize) -> String {
     let ProbedPoint { stamp_ns, stroke, centre, radius, point, normal, sigma, calibration, weight, .. } = touch;
-    let [c, p] = [centre, point].map(|p| p.coords * 1e3);
+    let triple = |v: Vector3<f64>| format!("{:.6},{:.6},{:.6}", v.x, v.y, v.z);
+    let [centre, point, normal] = [centre.coords * 1e3, point.coords * 1e3, *normal].map(triple);
+    let [radius, sigma, calibration] = [radius, sigma, calibration].map(|length| length * 1e3);
+    let rejected = u8::from(touch.is_rejected);
     format!(
-        "{number},{stamp_ns},{stroke},{:.6},{:.6},{:.6},{},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6},{:.4},{}",
-        c.x,
-        c.y,
-        c.z,
-        radius * 1e3,
-        p.x,
-        p.y,
-        p.z,
-        normal.x,
-        normal.y,
-        normal.z,
-        sigma * 1e3,
-        calibration * 1e3,
-        weight,
-        u8::from(touch.is_rejected)
+        "{number},{stamp_ns},{stroke},{centre},{radius},{point},{normal},{sigma:.6},{calibration:.6},{weight:.4},{rejected}"
     )
 }
 
@@ -135,15 +124,13 @@ fn in_order(before: &[ProbedPoint], touch: ProbedPoint) -> Result<ProbedPoint, S
 }
 
 fn touch_of(line: &str, number: usize) -> Result<ProbedPoint, String> {
-    let fields: Vec<&str> = line.split(',').map(str::trim).collect();
-    let wanted = HEADER.split(',').count();
-    if fields.len() != wanted {
-        return Err(format!("{} fields, a touch has {wanted}", fields.len()));
+    let (names, fields): (Vec<_>, Vec<_>) = (HEADER.split(',').collect(), line.split(',').map(str::trim).collect());
+    if fields.len() != names.len() {
+        return Err(format!("{} fields, a touch has {}", fields.len(), names.len()));
     }
     if fields[0].parse() != Ok(number) {
         return Err(format!("touch {} where {number} comes: features name touches by number", fields[0]));
     }
-    let names: Vec<&str> = HEADER.split(',').collect();
     let integer =
         |at: usize| fields[at].parse::<i64>().map_err(|_| format!("{} {:?} is no whole number", names[at], fields[at]));
     let real = |at: usize| match fields[at].parse::<f64>() {
