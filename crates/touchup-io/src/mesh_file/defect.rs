@@ -15,28 +15,17 @@ pub enum Defect {
         /// the text found, shortened
         found: String,
     },
-    /// Fewer bytes than the header asks for.
+    /// Fewer bytes than the header asks for, or more.
     #[error(
-        "the header announces {count} {what}, which take {needed} bytes, but {left} follow: the file is damaged or cut short, export it again"
+        "the header announces {count} {what}, which take {needed} bytes, but {left} follow: {}, export it again",
+        if *needed > *left as u128 { "the file is damaged or cut short" } else { "the count or the end is wrong" }
     )]
-    TooShort {
+    Length {
         /// what is counted
         what: String,
         /// how many there should be
         count: u64,
         /// bytes they take at least
-        needed: u128,
-        /// bytes there are
-        left: usize,
-    },
-    /// More bytes than the header asks for.
-    #[error(
-        "the header announces {count} triangles, which take {needed} bytes, but {left} follow: the count or the end is wrong, export it again"
-    )]
-    TooLong {
-        /// triangles announced
-        count: u64,
-        /// bytes they take
         needed: u128,
         /// bytes there are
         left: usize,

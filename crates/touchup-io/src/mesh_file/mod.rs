@@ -9,7 +9,7 @@ mod unit;
 
 use std::path::{Path, PathBuf};
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 
 use super::atomic::AtomicFile;
 pub use super::file_error::FilePlace;
@@ -149,7 +149,8 @@ pub fn read_mesh(path: &Path, unit: MeshUnit) -> Result<MeshFile, MeshFileError>
     let (mesh, mut report) =
         repair(positions, faces).map_err(|source| MeshFileError::Mesh { path: path.into(), source })?;
     report.unused_vertices += unused;
-    Implausible::check(sides(&mesh), unit).map_err(|size| MeshFileError::Implausible { path: path.into(), size })?;
+    let [low, high] = mesh.bounds();
+    Implausible::check(high - low, unit).map_err(|size| MeshFileError::Implausible { path: path.into(), size })?;
     Ok(MeshFile { mesh, repair: report })
 }
 
@@ -182,19 +183,6 @@ fn rows_of(mesh: &TriMesh, positions: &[Point3<f64>]) -> Vec<usize> {
     let mut rows = positions.iter().enumerate();
     let mut row_of = |wanted: &Point3<f64>| rows.find(|(_, p)| p.coords == wanted.coords).map(|(row, _)| row);
     mesh.positions().iter().map_while(&mut row_of).collect()
-}
-
-/// Sides of the bounding box, m.
-fn sides(mesh: &TriMesh) -> Vector3<f64> {
-    let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
-    for p in mesh.positions() {
-        for axis in 0..3 {
-            // plain comparisons: a mesh has no NaN, for which `min` and `max` would take several instructions more
-            low[axis] = if p[axis] < low[axis] { p[axis] } else { low[axis] };
-            high[axis] = if p[axis] > high[axis] { p[axis] } else { high[axis] };
-        }
-    }
-    high - low
 }
 
 /// Whether [`write_mesh`] can write there: call it before long work.

@@ -46,13 +46,9 @@ fn read_binary(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
     };
     let (count, left) = (u64::from(count), bytes.len() - HEADER);
     let needed = u128::from(count) * RECORD as u128;
-    if needed > left as u128 {
-        let defect = Defect::TooShort { what: "triangles".into(), count, needed, left };
-        return Err(Syntax { place: FilePlace::Byte(bytes.len() as u64), defect });
-    }
-    if needed < left as u128 {
-        let place = FilePlace::Byte(HEADER as u64 + needed as u64);
-        return Err(Syntax { place, defect: Defect::TooLong { count, needed, left } });
+    if needed != left as u128 {
+        let place = FilePlace::Byte(HEADER as u64 + needed.min(left as u128) as u64);
+        return Err(Syntax { place, defect: Defect::Length { what: "triangles".into(), count, needed, left } });
     }
     let mut positions = Vec::with_capacity(3 * count as usize);
     for record in bytes[HEADER..].chunks_exact(RECORD) {

@@ -46,29 +46,15 @@ pub enum RecordingError {
         /// topics of the recording with their types, as `/name (type)`
         found: String,
     },
-    /// The topic carries another type of message.
-    #[error("{}: topic {topic:?} is {found}, not {wanted}; choose another with {flag}", path.display())]
-    WrongType {
+    /// The topic carries another type of message, or its messages are not CDR.
+    #[error("{}: topic {topic:?} is {why}", path.display())]
+    WrongTopic {
         /// the recording
         path: PathBuf,
         /// the topic
         topic: String,
-        /// its type
-        found: String,
-        /// the type that is needed
-        wanted: &'static str,
-        /// the flag that names the topic
-        flag: &'static str,
-    },
-    /// The topic's messages are not CDR.
-    #[error("{}: topic {topic:?} is encoded as {found:?}; only ROS 2's \"cdr\" can be read", path.display())]
-    WrongEncoding {
-        /// the recording
-        path: PathBuf,
-        /// the topic
-        topic: String,
-        /// its encoding
-        found: String,
+        /// what it is instead, and what to do
+        why: String,
     },
     /// The file is damaged; everything before that place has been handed out.
     #[error("{}: damaged at {place}: {damage}", path.display())]
@@ -218,13 +204,12 @@ pub(super) fn check_topics(path: &Path, topics: &Topics, found: &[TopicInfo]) ->
 
 /// One topic has the type and encoding of its kind.
 pub(super) fn check_topic(path: &Path, kind: TopicKind, info: &TopicInfo) -> Result<(), RecordingError> {
-    let (path, topic) = (path.to_owned(), info.name.clone());
-    if info.type_name != kind.type_name() {
-        let found = info.type_name.clone();
-        return Err(RecordingError::WrongType { path, topic, found, wanted: kind.type_name(), flag: kind.flag() });
-    }
-    if info.encoding != "cdr" {
-        return Err(RecordingError::WrongEncoding { path, topic, found: info.encoding.clone() });
-    }
-    Ok(())
+    let why = if info.type_name != kind.type_name() {
+        format!("{}, not {}; choose another with {}", info.type_name, kind.type_name(), kind.flag())
+    } else if info.encoding != "cdr" {
+        format!("encoded as {:?}; only ROS 2's \"cdr\" can be read", info.encoding)
+    } else {
+        return Ok(());
+    };
+    Err(RecordingError::WrongTopic { path: path.to_owned(), topic: info.name.clone(), why })
 }

@@ -55,8 +55,7 @@ impl RecordingReader {
     /// the order of their names. Their content decides the format.
     ///
     /// # Errors
-    /// [`RecordingError::MissingTopic`], [`RecordingError::WrongType`] and [`RecordingError::WrongEncoding`] when the
-    /// recording does not have the two topics; [`RecordingError::Damaged`] when damage hides whether it has them;
+    /// [`RecordingError::MissingTopic`] and [`RecordingError::WrongTopic`] when the recording does not have the two topics; [`RecordingError::Damaged`] when damage hides whether it has them;
     /// [`RecordingError::NotARecording`], [`RecordingError::Metadata`], [`RecordingError::Io`].
     pub fn open(path: &Path, topics: &Topics) -> Result<Self, RecordingError> {
         let mut reader = Self {

@@ -37,8 +37,7 @@ impl<'a> Body<'a> {
         if needed <= left as u128 + 1 {
             return Ok(());
         }
-        let defect =
-            Defect::TooShort { what: element.name.clone() + " rows", count: element.count as u64, needed, left };
+        let defect = Defect::Length { what: element.name.clone() + " rows", count: element.count as u64, needed, left };
         Err(Syntax { place, defect })
     }
 
