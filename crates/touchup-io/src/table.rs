@@ -80,47 +80,35 @@ pub(super) fn parse(text: &str, columns: &[&str], more: &[&str]) -> Result<Vec<R
     let Some((at, first)) = lines.next() else {
         return Err((1, format!("there is nothing in it; its first line must be {}", columns.join(","))));
     };
-    let header = TableHeader::parse(first, columns, more).map_err(|why| (at, why))?;
-    lines.map(|(at, line)| header.row(at, line).map_err(|why| (at, why))).collect()
+    let names = split(first);
+    check_names(&names, columns, more).map_err(|why| (at, why))?;
+    lines.map(|(at, line)| row(at, line, &names, columns, more).map_err(|why| (at, why))).collect()
 }
 
-/// Which value of a line is which.
-struct TableHeader<'a> {
-    count: usize,
-    columns: Vec<(&'a str, usize)>,
-    more: Vec<Option<usize>>,
+/// Each column is known and there once, and none is missing.
+fn check_names(names: &[&str], columns: &[&str], more: &[&str]) -> Result<(), String> {
+    let (known, wanted) = (columns.join(","), more.join(" and "));
+    if let Some(unknown) = names.iter().find(|name| !columns.contains(name) && !more.contains(name)) {
+        let wanted = if more.is_empty() { String::new() } else { format!(", where wanted {wanted}") };
+        return Err(format!("no column is called {unknown:?}; there are {known}{wanted}, set apart by commas"));
+    }
+    if let Some((_, twice)) = names.iter().enumerate().find(|(i, name)| names[..*i].contains(name)) {
+        return Err(format!("the column {twice} is there twice"));
+    }
+    let missing = columns.iter().find(|column| !names.contains(column));
+    missing.map_or(Ok(()), |column| Err(format!("the column {column} is missing")))
 }
 
-impl<'a> TableHeader<'a> {
-    fn parse(line: &str, columns: &[&'a str], more: &[&'a str]) -> Result<Self, String> {
-        let names = split(line);
-        let (known, wanted) = (columns.join(","), more.join(" and "));
-        if let Some(unknown) = names.iter().find(|name| !columns.contains(name) && !more.contains(name)) {
-            let wanted = if more.is_empty() { String::new() } else { format!(", where wanted {wanted}") };
-            return Err(format!("no column is called {unknown:?}; there are {known}{wanted}, set apart by commas"));
-        }
-        if let Some((_, twice)) = names.iter().enumerate().find(|(i, name)| names[..*i].contains(name)) {
-            return Err(format!("the column {twice} is there twice"));
-        }
-        let place = |column: &str| names.iter().position(|name| *name == column);
-        let required =
-            |column: &&'a str| place(column).map(|at| (*column, at)).ok_or(format!("the column {column} is missing"));
-        let more = more.iter().map(|column| place(column)).collect();
-        Ok(Self { count: names.len(), columns: columns.iter().map(required).collect::<Result<_, _>>()?, more })
+fn row(line: usize, text: &str, names: &[&str], columns: &[&str], more: &[&str]) -> Result<Row, String> {
+    let values = split(text);
+    let (there, named) = (values.len(), names.len());
+    if there != named {
+        return Err(format!("{there} values for {named} columns; commas separate values only, decimals have a point"));
     }
-
-    fn row(&self, line: usize, text: &str) -> Result<Row, String> {
-        let values = split(text);
-        let (there, named) = (values.len(), self.count);
-        if there != named {
-            return Err(format!(
-                "{there} values for {named} columns; commas separate values only, decimals have a point"
-            ));
-        }
-        let numbers = self.columns.iter().map(|(name, at)| number(values[*at], name)).collect::<Result<_, _>>()?;
-        let more = self.more.iter().map(|at| at.map(|at| values[at]).filter(|value| !value.is_empty()));
-        Ok(Row { line, numbers, more: more.map(|value| value.map(str::to_owned)).collect() })
-    }
+    let value = |column: &&str| names.iter().zip(&values).find(|(name, _)| *name == column).map(|(_, value)| *value);
+    let numbers = columns.iter().map(|column| number(value(column).unwrap_or_default(), column));
+    let more = more.iter().map(|column| value(column).filter(|value| !value.is_empty()).map(str::to_owned));
+    Ok(Row { line, numbers: numbers.collect::<Result<_, _>>()?, more: more.collect() })
 }
 
 fn number(value: &str, column: &str) -> Result<f64, String> {
