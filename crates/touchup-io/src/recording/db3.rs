@@ -9,7 +9,7 @@ use std::fs;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-use rusqlite::{Connection, OpenFlags, Row, params};
+use rusqlite::{Connection, OpenFlags, params};
 use tempfile::NamedTempFile;
 
 use super::cdr::MAX_MESSAGE_BYTES;
@@ -36,21 +36,13 @@ pub(super) struct Db3Reader {
     kinds: [TopicKind; 2],
     /// Row of each of them in the table `topics`.
     ids: [Option<i64>; 2],
-    rows: VecDeque<Db3Message>,
-    current: Vec<u8>,
+    rows: VecDeque<RawMessage<'static>>,
     /// Time and row of the last message fetched.
     last: (i64, i64),
     /// What ended the fetching, or that the last page is cut; handed out after the rows before it.
     failed: Option<Damage>,
     done: bool,
     truncated: bool,
-}
-
-struct Db3Message {
-    id: i64,
-    timestamp: i64,
-    kind: TopicKind,
-    payload: Vec<u8>,
 }
 
 impl Db3Reader {
@@ -76,7 +68,6 @@ impl Db3Reader {
             _unpacked: unpacked,
             topics: rows.into_iter().map(|(_, info)| info).collect(),
             rows: VecDeque::new(),
-            current: Vec::new(),
             last: (i64::MIN, i64::MIN),
             failed,
             done: false,
@@ -91,17 +82,19 @@ impl Db3Reader {
     /// Fetches the next rows; those before an error stay.
     fn fetch(&mut self) -> Result<(), Damage> {
         let mut statement = self.db.prepare_cached(FETCH)?;
-        let [pose, wrench] = self.ids;
-        let (time, id) = self.last;
-        let mut rows = statement.query(params![MAX_MESSAGE_BYTES as i64, pose, wrench, time, id, BATCH_ROWS as i64])?;
+        let ([first, second], (time, id)) = (self.ids, self.last);
+        let mut rows =
+            statement.query(params![MAX_MESSAGE_BYTES as i64, first, second, time, id, BATCH_ROWS as i64])?;
         while let Some(row) = rows.next()? {
-            let message = read_message(row, pose, self.kinds)?;
-            let key = (message.timestamp, message.id);
-            if key <= self.last {
+            let kind = if Some(row.get(2)?) == first { self.kinds[0] } else { self.kinds[1] };
+            // text, a number or NULL in place of the blob: an empty payload, which counts as malformed
+            let payload = row.get_ref(3)?.as_blob().unwrap_or_default().to_vec();
+            let (id, time) = (row.get(0)?, row.get(1)?);
+            if (time, id) <= self.last {
                 return Err(Damage::RowOrder);
             }
-            self.last = key;
-            self.rows.push_back(message);
+            self.last = (time, id);
+            self.rows.push_back(RawMessage { kind, payload: payload.into(), place: FilePlace::Row(id) });
         }
         self.done = self.rows.len() < BATCH_ROWS;
         Ok(())
@@ -133,19 +126,11 @@ impl RecordingFile for Db3Reader {
             self.failed = Some(damage);
             self.done = true;
         }
-        let Some(message) = self.rows.pop_front() else {
-            return self.failed.take().map_or(Ok(None), |damage| Err(self.damaged(damage)));
-        };
-        self.current = message.payload;
-        Ok(Some(RawMessage { kind: message.kind, payload: &self.current, place: FilePlace::Row(message.id) }))
+        match self.rows.pop_front() {
+            None => self.failed.take().map_or(Ok(None), |damage| Err(self.damaged(damage))),
+            message => Ok(message),
+        }
     }
-}
-
-fn read_message(row: &Row, first: Option<i64>, kinds: [TopicKind; 2]) -> rusqlite::Result<Db3Message> {
-    let kind = if Some(row.get(2)?) == first { kinds[0] } else { kinds[1] };
-    // text, a number or NULL in place of the blob: an empty payload, which counts as malformed
-    let payload = row.get_ref(3)?.as_blob().unwrap_or_default().to_vec();
-    Ok(Db3Message { id: row.get(0)?, timestamp: row.get(1)?, kind, payload })
 }
 
 fn connect(path: &Path) -> rusqlite::Result<Connection> {

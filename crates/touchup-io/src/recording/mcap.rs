@@ -5,6 +5,7 @@
 //! still holds and with a limit of 256 MiB first, buffers grow only with bytes that are really there, and a chunk is
 //! verified before its first message is handed out.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
@@ -205,7 +206,7 @@ impl RecordingFile for McapReader {
             };
         };
         self.found += 1;
-        Ok(Some(RawMessage { kind, payload: &self.records[payload], place: FilePlace::Byte(self.at) }))
+        Ok(Some(RawMessage { kind, payload: Cow::Borrowed(&self.records[payload]), place: FilePlace::Byte(self.at) }))
     }
 }
 

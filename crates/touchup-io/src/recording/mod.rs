@@ -26,6 +26,8 @@ pub use writer::{RecordingWriter, write_recording};
 /// What a zstd frame begins with: a file compressed as a whole, or a message (CDR begins with 0).
 const ZSTD_MAGIC: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
 
+use std::borrow::Cow;
+
 use touchup_core::stylus::{MarkerFrame, Message};
 
 /// One entry of a recording.
@@ -129,7 +131,7 @@ struct TopicInfo {
 /// A message as it lies in the file.
 struct RawMessage<'a> {
     kind: TopicKind,
-    payload: &'a [u8],
+    payload: Cow<'a, [u8]>,
     place: FilePlace,
 }
 

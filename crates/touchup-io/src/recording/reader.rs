@@ -172,22 +172,20 @@ struct Intake {
 
 impl Intake {
     fn accept(&mut self, raw: &RawMessage, path: &Path) -> Option<Record> {
-        match self.decode(raw) {
-            Ok(record) => Some(record),
-            Err(reason) => {
-                let first = BadCount { poses: 0, wrenches: 0, path: path.to_owned(), place: raw.place };
-                let bad = self.bad.entry(reason).or_insert(first);
-                match raw.kind {
-                    TopicKind::Pose | TopicKind::Markers => bad.poses += 1,
-                    TopicKind::Wrench => bad.wrenches += 1,
-                }
-                None
+        let decoded = self.decode(raw);
+        if let Err(reason) = decoded {
+            let first = BadCount { poses: 0, wrenches: 0, path: path.to_owned(), place: raw.place };
+            let bad = self.bad.entry(reason).or_insert(first);
+            match raw.kind {
+                TopicKind::Pose | TopicKind::Markers => bad.poses += 1,
+                TopicKind::Wrench => bad.wrenches += 1,
             }
         }
+        decoded.ok()
     }
 
     fn decode(&mut self, raw: &RawMessage) -> Result<Record, BadMessage> {
-        let payload = unpack(raw.payload)?;
+        let payload = unpack(&raw.payload)?;
         let (frame, record) = match raw.kind {
             TopicKind::Pose => decode_pose(&payload).map(|(frame, pose)| (frame, Message::Pose(pose).into()))?,
             TopicKind::Wrench => {
