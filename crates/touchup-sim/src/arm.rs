@@ -314,6 +314,11 @@ impl<'a> SimArm<'a> {
         self.bend();
     }
 
+    /// - `silent`: since when nothing came over the link, s.
+    fn check_link(&self, silent: f64) -> Result<(), ArmError> {
+        if self.is_lost { Err(ArmError::Lost { silent_ms: (silent * 1e3) as u64 }) } else { Ok(()) }
+    }
+
     /// Velocity that the command asks for now, and its acceleration.
     fn wanted(&mut self) -> (Vector3<f64>, f64) {
         match self.doing {
@@ -432,9 +437,7 @@ impl<'a> SimArm<'a> {
 impl Arm for SimArm<'_> {
     fn next_state(&mut self) -> Result<ArmState, ArmError> {
         self.tick();
-        if self.is_lost {
-            return Err(ArmError::Lost { silent_ms: (PERIOD * 1e3) as u64 });
-        }
+        self.check_link(PERIOD)?;
         self.follow_joints();
         let raw_wrench_f = self.read();
         let force = self.flange() * (self.unweighed(&raw_wrench_f) - self.tare);
@@ -448,9 +451,7 @@ impl Arm for SimArm<'_> {
     }
 
     fn command(&mut self, command: &Command) -> Result<(), ArmError> {
-        if self.is_lost {
-            return Err(ArmError::Lost { silent_ms: 0 });
-        }
+        self.check_link(0.0)?;
         self.heard_at = self.time;
         if self.safety != Safety::Normal && !matches!(command, Command::Stop { .. }) {
             return Err(ArmError::Stopped { safety: self.safety });
@@ -460,9 +461,7 @@ impl Arm for SimArm<'_> {
     }
 
     fn zero_sensor(&mut self) -> Result<(), ArmError> {
-        if self.is_lost {
-            return Err(ArmError::Lost { silent_ms: 0 });
-        }
+        self.check_link(0.0)?;
         self.heard_at = self.time;
         // a controller takes the mean of what it reads for a while
         let readings = 64;

@@ -98,28 +98,26 @@ fn balls_of(tip: &TipBody) -> Vec<TipBall> {
     match tip.shape() {
         TipShape::Ball => vec![TipBall { offset: Vector3::zeros(), radius }],
         TipShape::Cone { half_angle, length } => {
-            let (mut height, mut balls) = (0.0, Vec::new());
-            while height <= length {
-                let radius = radius.max(SHARP) + height * half_angle.sin();
-                balls.push(TipBall { offset: Vector3::z() * height, radius });
-                height += apart(radius);
-            }
-            balls
+            stack([0.0, length], |height| radius.max(SHARP) + height * half_angle.sin()).collect()
         }
         TipShape::Flat { edge_radius, length } => {
             let edge = edge_radius.max(SHARP.min(radius / 2.0));
-            let (mut wide, mut height, mut balls) = (edge, radius, Vec::new());
+            let (mut wide, mut balls) = (edge, Vec::new());
             while wide < radius {
                 balls.extend(ring(radius - wide, wide, radius - edge));
                 wide += apart(wide);
             }
-            while height <= length {
-                balls.push(TipBall { offset: Vector3::z() * height, radius });
-                height += apart(radius);
-            }
+            balls.extend(stack([radius, length], |_| radius));
             balls
         }
     }
+}
+
+/// Balls along the axis between two heights (m), of a radius that depends on the height.
+fn stack([from, to]: [f64; 2], radius: impl Fn(f64) -> f64 + Copy) -> impl Iterator<Item = TipBall> {
+    std::iter::successors(Some(from), move |height| Some(height + apart(radius(*height))))
+        .take_while(move |height| *height <= to)
+        .map(move |height| TipBall { offset: Vector3::z() * height, radius: radius(height) })
 }
 
 /// Distance between balls of this radius (m) in a row, m.
