@@ -53,14 +53,11 @@ fn read_binary(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
     let mut positions = Vec::with_capacity(3 * count as usize);
     for record in bytes[HEADER..].chunks_exact(RECORD) {
         for corner in record[12..48].as_chunks::<12>().0 {
-            positions.push(Point3::from([0, 4, 8].map(|at| scale * f64::from(f32_at(corner, at)))));
+            let numbers = corner.as_chunks::<4>().0;
+            positions.push(Point3::from([0, 1, 2].map(|i| scale * f64::from(f32::from_le_bytes(numbers[i])))));
         }
     }
     Ok(Soup::of_triangles(positions))
-}
-
-fn f32_at(corner: &[u8; 12], at: usize) -> f32 {
-    f32::from_le_bytes([corner[at], corner[at + 1], corner[at + 2], corner[at + 3]])
 }
 
 /// Any number of solids; words in any case; facets of more than three corners are cut into a fan.
