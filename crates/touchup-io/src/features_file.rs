@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
 use super::file_error::{FileError, read_file, write_file};
@@ -125,79 +125,56 @@ pub struct FeatureRecord {
 
 impl From<&Feature> for FeatureRecord {
     fn from(feature: &Feature) -> Self {
-        let mut record = Self {
+        let (mut std, mut touches) = (BTreeMap::new(), BTreeMap::new());
+        let mut note = |name: &str, sigma: Option<f64>, behind: &[u32], unit: f64| {
+            std.extend(sigma.map(|sigma| (name.to_owned(), sigma * unit)));
+            if !behind.is_empty() {
+                touches.insert(name.to_owned(), runs(behind));
+            }
+        };
+        note("center_mm", feature.centre.std, &feature.centre.touches, 1e3);
+        if let Some(axis) = &feature.axis {
+            note("axis_deg", axis.std, &axis.touches, 1f64.to_degrees());
+        }
+        let mut number = |name: &str, measured: &Option<Measured<f64>>, unit: f64| {
+            let measured = measured.as_ref()?;
+            note(name, measured.std, &measured.touches, unit);
+            Some(measured.value * unit)
+        };
+        Self {
             id: feature.id,
             kind: feature.kind.name().to_owned(),
             center_mm: Some(point_mm(&feature.centre.value)),
-            axis: feature.axis.as_ref().map(|axis| direction(&axis.value)),
-            diameter_mm: None,
-            length_mm: None,
-            width_mm: None,
-            depth_mm: None,
+            axis: feature.axis.as_ref().map(|axis| axis.value.into()),
+            diameter_mm: number("diameter_mm", &feature.diameter, 1e3),
+            length_mm: number("length_mm", &feature.length, 1e3),
+            width_mm: number("width_mm", &feature.width, 1e3),
+            depth_mm: number("depth_mm", &feature.depth, 1e3),
             through: feature.through,
-            cone_angle_deg: None,
-            direction: feature.direction.as_ref().map(direction),
+            cone_angle_deg: number("cone_angle_deg", &feature.cone_angle, 1f64.to_degrees()),
+            direction: feature.direction.map(Into::into),
             group: feature.group,
             points_mm: feature.points.iter().map(point_mm).collect(),
             convex: feature.is_convex,
-            std: BTreeMap::new(),
+            std,
             touched: feature.touched,
             fitted_to: match feature.fitted_to {
                 FittedTo::Touches => "touches",
                 FittedTo::Mesh => "mesh",
             }
             .to_owned(),
-            touches: BTreeMap::new(),
-        };
-        record.note("center_mm", &feature.centre, 1e3);
-        if let Some(axis) = &feature.axis {
-            record.note("axis_deg", axis, 1f64.to_degrees());
-        }
-        record.diameter_mm = record.number("diameter_mm", feature.diameter.as_ref(), 1e3);
-        record.length_mm = record.number("length_mm", feature.length.as_ref(), 1e3);
-        record.width_mm = record.number("width_mm", feature.width.as_ref(), 1e3);
-        record.depth_mm = record.number("depth_mm", feature.depth.as_ref(), 1e3);
-        record.cone_angle_deg = record.number("cone_angle_deg", feature.cone_angle.as_ref(), 1f64.to_degrees());
-        record
-    }
-}
-
-impl FeatureRecord {
-    fn number(&mut self, name: &str, measured: Option<&Measured<f64>>, unit: f64) -> Option<f64> {
-        let measured = measured?;
-        self.note(name, measured, unit);
-        Some(measured.value * unit)
-    }
-
-    fn note<T>(&mut self, name: &str, measured: &Measured<T>, unit: f64) {
-        if let Some(std) = measured.std {
-            self.std.insert(name.to_owned(), std * unit);
-        }
-        let runs = runs(&measured.touches);
-        if !runs.is_empty() {
-            self.touches.insert(name.to_owned(), runs);
+            touches,
         }
     }
 }
 
 fn point_mm(p: &Point3<f64>) -> [f64; 3] {
-    [p.x, p.y, p.z].map(|x| x * 1e3)
-}
-
-fn direction(v: &Vector3<f64>) -> [f64; 3] {
-    [v.x, v.y, v.z]
+    (p * 1e3).coords.into()
 }
 
 /// Numbers in ascending order as runs, first and last.
 fn runs(numbers: &[u32]) -> Vec<[u32; 2]> {
-    let mut runs: Vec<[u32; 2]> = Vec::new();
-    for &number in numbers {
-        match runs.last_mut() {
-            Some(last) if last[1] + 1 == number => last[1] = number,
-            _ => runs.push([number, number]),
-        }
-    }
-    runs
+    numbers.chunk_by(|a, b| a + 1 == *b).map(|run| [run[0], run[run.len() - 1]]).collect()
 }
 
 impl FeatureFile {
