@@ -126,6 +126,16 @@ impl<K: Key, V> CellTable<K, V> {
         (at, true)
     }
 
+    /// The value of `key`, to be changed; the default one where it had none.
+    #[inline]
+    pub fn get_or_default(&mut self, key: K) -> &mut V
+    where
+        V: Default,
+    {
+        let (at, _) = self.insert_with(key, V::default);
+        self.value_mut(at)
+    }
+
     /// Gives `key` the value `value`, in place of the one it had.
     pub fn insert(&mut self, key: K, value: V) {
         match self.index_of(&key) {

@@ -2,20 +2,19 @@
 //!
 //! Nothing is ever integrated into a field: the field is evaluated again from what is stored here.
 //!
-//! Contacts are independent from one pass to the next, not from sample to sample: [`IndependentPasses`] counts the passes. With a
+//! Contacts are independent from one pass to the next, not from sample to sample: [`ContactStatistics`] counts the passes. With a
 //! gate, a contact that contradicts the mean of its place (or of the place beside it, where it is the first) by more than
 //! both can be off is rejected. A second pass that agrees with it relocates the mean; one that confirms the mean forgets it.
 
 use nalgebra::{Point3, Vector3};
 
 use crate::numeric::{voxel_neighbourhood, voxel_of};
-use crate::reconstruct::evidence::contact_statistics::ContactStatistics;
+use crate::reconstruct::evidence::contact_statistics::{ContactStatistics, Pass};
 use crate::reconstruct::evidence::contact_uncertainty::ContactSigma;
 use crate::reconstruct::evidence::outliers::{Outlier, Outliers};
-use crate::reconstruct::evidence::passes::{IndependentPasses, Pass};
 use crate::reconstruct::evidence::touches::SurfaceContact;
 use crate::reconstruct::field::lattice::LatticeNode;
-use crate::reconstruct::incremental::history::History;
+use crate::reconstruct::incremental::history::{Direction, History};
 use crate::reconstruct::table::CellTable;
 
 /// The mean of the contacts in one cell that face alike.
@@ -52,7 +51,7 @@ pub struct GateParams {
 }
 
 /// A small cell and a range of normals.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Bin {
     cell: LatticeNode,
     facing: [i8; 3],
@@ -70,14 +69,12 @@ struct Rival {
 /// All of one mean that queries do not need.
 #[derive(Clone, Copy, Debug)]
 struct Kept {
-    cell: LatticeNode,
+    bin: Bin,
     /// the cell in [`ContactMap::nearby`]
     home: LatticeNode,
-    facing: [i8; 3],
     /// the next mean of the same cell, [`NONE`] for the last
     next: u32,
     sums: ContactStatistics,
-    passes: IndependentPasses,
     /// number of what was rejected here, [`NONE`] where nothing is
     rejected: u32,
     /// whether it is in [`ContactMap::changed`]
@@ -110,7 +107,6 @@ const OF_REJECTED: u32 = 1 << 31;
 #[derive(Clone, Copy, Debug)]
 struct RejectedContacts {
     sums: ContactStatistics,
-    passes: IndependentPasses,
     last_ns: i64,
 }
 
@@ -188,16 +184,16 @@ impl ContactMap {
             return self.contest(&rival, contact, &bin, &gate);
         }
         let index = self.place(own, &bin, contact);
-        let kept = &mut self.kept[index as usize];
-        kept.sums.add(contact);
-        let rejected = kept.rejected;
+        let Kept { sums, rejected, .. } = &mut self.kept[index as usize];
+        sums.add(contact);
+        let rejected = *rejected;
         if let Some(gate) = self.gate
-            && kept.passes.note(contact.stamp_ns, contact.weight, gate.window_ns)
+            && sums.passes.note(contact.stamp_ns, contact.weight, gate.window_ns)
             && rejected != NONE
         {
             // a pass that confirms the mean: what is rejected was an outlier
             self.note_rejected(rejected);
-            self.rejected[rejected as usize].sums = ContactStatistics::ZERO;
+            self.rejected[rejected as usize].sums = ContactStatistics::default();
         }
         self.renew(index, contact);
         if self.kept[index as usize].sums.weight >= LEAST_EVIDENCE {
@@ -224,7 +220,7 @@ impl ContactMap {
     }
 
     fn find(&self, bin: &Bin) -> Option<u32> {
-        self.in_cell(bin.cell).find(|&index| self.kept[index as usize].facing == bin.facing)
+        self.in_cell(bin.cell).find(|&index| self.kept[index as usize].bin == *bin)
     }
 
     /// The mean that a contact contradicts: that of its own cell, or where it is among the first there the nearest around
@@ -267,28 +263,25 @@ impl ContactMap {
     }
 
     fn innovation(&self, index: u32, contact: &SurfaceContact) -> (f64, f64) {
-        let kept = &self.kept[index as usize];
-        kept.sums.innovation(&kept.passes, contact, ROUGHNESS * self.cell)
+        self.kept[index as usize].sums.innovation(contact, ROUGHNESS * self.cell)
     }
 
     /// Rejects a contact, or lets it take the place of the mean that it contradicts in a second pass.
     fn contest(&mut self, rival: &Rival, contact: &SurfaceContact, bin: &Bin, gate: &GateParams) -> Verdict {
         let roughness = ROUGHNESS * self.cell;
         let at = self.rejected_of(rival.index, contact.stamp_ns);
-        let rejected = &mut self.rejected[at as usize];
-        let agrees = rejected.sums.weight > 0.0
-            && rejected.sums.innovation(&rejected.passes, contact, roughness).1 <= gate.sigmas;
-        let is_second = agrees && contact.stamp_ns.saturating_sub(rejected.last_ns) > PAUSE * gate.window_ns;
+        let RejectedContacts { sums, last_ns } = &mut self.rejected[at as usize];
+        let agrees = sums.weight > 0.0 && sums.innovation(contact, roughness).1 <= gate.sigmas;
+        let is_second = agrees && contact.stamp_ns.saturating_sub(*last_ns) > PAUSE * gate.window_ns;
         if !agrees {
-            (rejected.sums, rejected.passes) = (ContactStatistics::ZERO, IndependentPasses::default());
+            *sums = ContactStatistics::default();
         }
-        rejected.sums.add(contact);
-        rejected.passes.note(contact.stamp_ns, contact.weight, gate.window_ns);
-        rejected.last_ns = contact.stamp_ns;
+        sums.add(contact);
+        sums.passes.note(contact.stamp_ns, contact.weight, gate.window_ns);
+        *last_ns = contact.stamp_ns;
         if is_second {
-            let RejectedContacts { sums, passes, .. } =
-                std::mem::replace(rejected, RejectedContacts { sums: ContactStatistics::ZERO, ..*rejected });
-            self.move_to(rival.index, (sums, passes), contact, bin, gate.sigmas);
+            let sums = std::mem::take(sums);
+            self.move_to(rival.index, sums, contact, bin, gate.sigmas);
             return Verdict::Relocated;
         }
         let SurfaceContact { stamp_ns, point, normal, .. } = *contact;
@@ -307,24 +300,13 @@ impl ContactMap {
         self.note_mean(index);
         let at = self.rejected.len() as u32;
         self.history.note(at | OF_REJECTED, || Past::Rejected(None));
-        self.rejected.push(RejectedContacts {
-            sums: ContactStatistics::ZERO,
-            passes: IndependentPasses::default(),
-            last_ns: stamp_ns,
-        });
+        self.rejected.push(RejectedContacts { sums: ContactStatistics::default(), last_ns: stamp_ns });
         self.kept[index as usize].rejected = at;
         at
     }
 
     /// Empties the means that a contact contradicts and puts what was rejected in the cell of its contacts.
-    fn move_to(
-        &mut self,
-        rival: u32,
-        (sums, passes): (ContactStatistics, IndependentPasses),
-        contact: &SurfaceContact,
-        bin: &Bin,
-        sigmas: f64,
-    ) {
+    fn move_to(&mut self, rival: u32, sums: ContactStatistics, contact: &SurfaceContact, bin: &Bin, sigmas: f64) {
         self.outliers.relocated += 1;
         let contradicts = |&index: &u32| {
             let is_alike = self.kept[index as usize].sums.weight > 0.0
@@ -335,55 +317,29 @@ impl ContactMap {
         for index in old {
             self.note_mean(index);
             self.note_change(index);
-            let old = &mut self.kept[index as usize];
-            (old.sums, old.passes) = (ContactStatistics::ZERO, IndependentPasses::default());
+            self.kept[index as usize].sums = ContactStatistics::default();
             self.means[index as usize].weight = 0.0;
         }
         let index = self.place(self.find(bin), bin, contact);
-        let kept = &mut self.kept[index as usize];
-        (kept.sums, kept.passes) = (sums, passes);
+        self.kept[index as usize].sums = sums;
         self.renew(index, contact);
         self.note_change(index);
     }
 
-    /// The mean of a bin, about to change; a new one where there is none.
+    /// The mean of a bin, about to change: `own`, or a new one where there is none.
     fn place(&mut self, own: Option<u32>, bin: &Bin, contact: &SurfaceContact) -> u32 {
         if let Some(index) = own {
             self.note_mean(index);
             return index;
         }
-        self.begin(bin, contact)
-    }
-
-    fn note_mean(&mut self, index: u32) {
-        let Self { history, kept, means, .. } = self;
-        history.note(index, || Past::Mean(Some((kept[index as usize], means[index as usize]))));
-    }
-
-    fn note_rejected(&mut self, at: u32) {
-        let Self { history, rejected, .. } = self;
-        history.note(at | OF_REJECTED, || Past::Rejected(Some(rejected[at as usize])));
-    }
-
-    /// Notes that a mean has changed.
-    fn note_change(&mut self, index: u32) {
-        if !std::mem::replace(&mut self.kept[index as usize].is_noted, true) {
-            self.changed.push(index);
-        }
-    }
-
-    /// An empty mean for a bin.
-    fn begin(&mut self, bin: &Bin, contact: &SurfaceContact) -> u32 {
         let SurfaceContact { point, normal, weight, .. } = *contact;
         let index = self.means.len() as u32;
         self.history.note(index, || Past::Mean(None));
         let kept = Kept {
-            cell: bin.cell,
+            bin: *bin,
             home: voxel_of(&point, self.reach),
-            facing: bin.facing,
             next: NONE,
-            sums: ContactStatistics::ZERO,
-            passes: IndependentPasses::default(),
+            sums: ContactStatistics::default(),
             rejected: NONE,
             is_noted: false,
             is_refuted: false,
@@ -395,13 +351,27 @@ impl ContactMap {
         index
     }
 
+    fn note_mean(&mut self, index: u32) {
+        self.history.note(index, || Past::Mean(Some((self.kept[index as usize], self.means[index as usize]))));
+    }
+
+    fn note_rejected(&mut self, at: u32) {
+        self.history.note(at | OF_REJECTED, || Past::Rejected(Some(self.rejected[at as usize])));
+    }
+
+    /// Notes that a mean has changed.
+    fn note_change(&mut self, index: u32) {
+        if !std::mem::replace(&mut self.kept[index as usize].is_noted, true) {
+            self.changed.push(index);
+        }
+    }
+
     /// Adds a mean as the first of its cell.
     fn push(&mut self, mut kept: Kept, mean: MeanContact) {
         let index = self.means.len() as u32;
-        let (at, is_new) = self.of_cell.insert_with(kept.cell, || index);
+        let (at, is_new) = self.of_cell.insert_with(kept.bin.cell, || index);
         kept.next = if is_new { NONE } else { std::mem::replace(self.of_cell.value_mut(at), index) };
-        let (at, _) = self.nearby.insert_with(kept.home, Vec::new);
-        self.nearby.value_mut(at).push(index);
+        self.nearby.get_or_default(kept.home).push(index);
         self.kept.push(kept);
         self.means.push(mean);
     }
@@ -410,9 +380,9 @@ impl ContactMap {
     fn pop(&mut self) -> Option<(Kept, MeanContact)> {
         let (kept, mean) = (self.kept.pop()?, self.means.pop()?);
         if kept.next == NONE {
-            self.of_cell.remove(&kept.cell);
+            self.of_cell.remove(&kept.bin.cell);
         } else {
-            self.of_cell.insert(kept.cell, kept.next);
+            self.of_cell.insert(kept.bin.cell, kept.next);
         }
         if let Some(home) = self.nearby.get_mut(&kept.home) {
             home.pop();
@@ -446,19 +416,10 @@ impl ContactMap {
         self.history.len()
     }
 
-    /// Undoes the last stroke. Returns whether there was one.
-    pub fn undo(&mut self) -> bool {
-        self.exchange(|history, swap| history.undo(swap))
-    }
-
-    /// Does again what was undone last. Returns whether there was anything.
-    pub fn redo(&mut self) -> bool {
-        self.exchange(|history, swap| history.redo(swap))
-    }
-
-    fn exchange(&mut self, act: impl FnOnce(&mut History<u32, Past>, &mut dyn FnMut(u32, &mut Past)) -> bool) -> bool {
+    /// Undoes the last stroke, or does the one again that was undone last. Returns whether there was one.
+    pub(in crate::reconstruct) fn exchange(&mut self, direction: Direction) -> bool {
         let mut history = std::mem::replace(&mut self.history, History::new(MOST_KEPT));
-        let has_changed = act(&mut history, &mut |key, past| self.swap(key, past));
+        let has_changed = history.exchange(direction, |key, past| self.swap(key, past));
         self.history = history;
         self.last = None;
         self.note_all();
@@ -511,13 +472,13 @@ impl ContactMap {
 
     /// Variance of a mean along its normal by noise and calibration, m²: noise averages out by the number of passes.
     pub(in crate::reconstruct) fn variance(&self, index: u32) -> f64 {
-        let (sigma, passes) = (self.sigma(index), self.kept[index as usize].passes.count().max(1));
+        let (sigma, passes) = (self.sigma(index), self.kept[index as usize].sums.passes.count.max(1));
         sigma.noise * sigma.noise / f64::from(passes) + sigma.calibration * sigma.calibration
     }
 
     /// The passes over the place of a mean.
     pub(in crate::reconstruct) fn passes(&self, index: u32) -> impl Iterator<Item = &Pass> + '_ {
-        self.kept[index as usize].passes.iter()
+        self.kept[index as usize].sums.passes.iter()
     }
 
     /// What was rejected.
@@ -527,17 +488,20 @@ impl ContactMap {
 
     /// Takes a mean out of all queries, or back in; returns whether that is new.
     pub(crate) fn refute(&mut self, at: u32, is_refuted: bool) -> bool {
-        let (kept, mean) = (&mut self.kept[at as usize], &mut self.means[at as usize]);
-        kept.is_refuted = is_refuted;
-        let before = std::mem::replace(&mut mean.weight, kept.weight());
-        (before == 0.0) != (mean.weight == 0.0)
+        self.kept[at as usize].is_refuted = is_refuted;
+        self.reweigh(at)
     }
 
     /// Takes a mean of two mixed contacts out of all queries, or back in; returns whether that is new.
     pub(in crate::reconstruct) fn mark_mixed(&mut self, at: u32, is_mixed: bool) -> bool {
-        let (kept, mean) = (&mut self.kept[at as usize], &mut self.means[at as usize]);
-        kept.is_mixed = is_mixed;
-        let before = std::mem::replace(&mut mean.weight, kept.weight());
+        self.kept[at as usize].is_mixed = is_mixed;
+        self.reweigh(at)
+    }
+
+    /// Lets a mean count what its state allows; returns whether it is new that it counts, or that it does not.
+    fn reweigh(&mut self, at: u32) -> bool {
+        let mean = &mut self.means[at as usize];
+        let before = std::mem::replace(&mut mean.weight, self.kept[at as usize].weight());
         (before == 0.0) != (mean.weight == 0.0)
     }
 

@@ -1,16 +1,59 @@
-//! Contact statistics: sums over the contacts of one place, and the innovation of another one.
+//! Contact statistics: sums over the contacts of one place, its independent passes, and the innovation of another contact.
 
 use nalgebra::{Point3, Vector3};
 
 use crate::reconstruct::evidence::contact_uncertainty::ContactSigma;
-use crate::reconstruct::evidence::passes::IndependentPasses;
 use crate::reconstruct::evidence::touches::SurfaceContact;
+
+/// One pass over a place, or several put together.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(in crate::reconstruct) struct Pass {
+    /// when the last of them began, ns
+    pub began_ns: i64,
+    /// sum of the weights of their contacts
+    pub weight: f64,
+    /// how many they are
+    pub count: u32,
+}
+
+/// Passes remembered one by one; further ones are put to those.
+const REMEMBERED: usize = 4;
+
+/// The passes over one place: samples in one smoothing window share their noise. A pass ends after the length of a window: later
+/// contacts are independent.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(in crate::reconstruct) struct IndependentPasses {
+    slots: [Pass; REMEMBERED],
+    /// how many passes
+    pub count: u32,
+}
+
+impl IndependentPasses {
+    /// Counts a contact of this weight; whether it is independent of those before.
+    pub fn note(&mut self, stamp_ns: i64, weight: f64, window_ns: i64) -> bool {
+        let newest = self.slots[(self.count.wrapping_sub(1)) as usize % REMEMBERED];
+        let is_new = self.count == 0 || stamp_ns.saturating_sub(newest.began_ns) > window_ns;
+        if is_new {
+            self.count = self.count.saturating_add(1);
+        }
+        let slot = &mut self.slots[(self.count - 1) as usize % REMEMBERED];
+        slot.weight += weight;
+        if is_new {
+            (slot.began_ns, slot.count) = (stamp_ns, slot.count.saturating_add(1));
+        }
+        is_new
+    }
+
+    pub fn iter(&self) -> impl Iterator<Item = &Pass> + '_ {
+        self.slots.iter().take(self.count as usize)
+    }
+}
 
 /// No normal is known better than this, rad: 1°.
 const LEAST_TILT: f64 = 0.017;
 
 /// Contacts added up.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(in crate::reconstruct) struct ContactStatistics {
     pub point: Vector3<f64>,
     pub normal: Vector3<f64>,
@@ -21,19 +64,10 @@ pub(in crate::reconstruct) struct ContactStatistics {
     tilt: f64,
     /// Σ w σ of the calibration, m
     calibration: f64,
+    pub passes: IndependentPasses,
 }
 
 impl ContactStatistics {
-    pub const ZERO: Self = Self {
-        point: Vector3::new(0.0, 0.0, 0.0),
-        normal: Vector3::new(0.0, 0.0, 0.0),
-        weight: 0.0,
-        noise: 0.0,
-        reach: 0.0,
-        tilt: 0.0,
-        calibration: 0.0,
-    };
-
     pub fn add(&mut self, contact: &SurfaceContact) {
         let SurfaceContact { point, normal, weight, sigma, .. } = contact;
         self.point += point.coords * *weight;
@@ -59,7 +93,7 @@ impl ContactStatistics {
     /// angles to the mean of both normals, unless one is known much better. What calibration leaves is the same in both.
     ///
     /// - `roughness`: by which the surface itself may be off a chord, m.
-    pub fn innovation(&self, passes: &IndependentPasses, contact: &SurfaceContact, roughness: f64) -> (f64, f64) {
+    pub fn innovation(&self, contact: &SurfaceContact, roughness: f64) -> (f64, f64) {
         let normal = self.normal.try_normalize(0.0).unwrap_or(contact.normal);
         let arm = contact.point - self.point();
         let own = self.sigma();
@@ -69,7 +103,7 @@ impl ContactStatistics {
         let across = (arm.norm_squared() - off * off).max(0.0);
         let [of_mean, of_one] = [own, contact.sigma].map(|sigma| sigma.noise.powi(2) + sigma.reach.powi(2));
         let variance = of_one
-            + of_mean / f64::from(passes.count().max(1))
+            + of_mean / f64::from(self.passes.count.max(1))
             + across * tilt * of_contact / (tilt + of_contact)
             + roughness * roughness;
         (off, off.abs() / variance.sqrt().max(f64::MIN_POSITIVE))

@@ -3,8 +3,9 @@
 use nalgebra::{Point3, Vector3};
 
 use crate::numeric::{voxel_neighbourhood, voxel_of};
-use crate::reconstruct::evidence::voxel_set::VoxelSet;
+use crate::reconstruct::evidence::voxel_set::{Keyed, VoxelSet};
 use crate::reconstruct::field::lattice::{CellBox, LatticeNode};
+use crate::reconstruct::incremental::history::Direction;
 use crate::reconstruct::table::Key;
 use crate::stylus::{TipBody, TipPlace};
 
@@ -19,9 +20,8 @@ const AROUND: f64 = 2.0 / 3.0;
 /// Places of the tip, one kept per voxel.
 #[derive(Clone, Debug)]
 pub(crate) struct FreeSpace {
-    cell: f64,
     reach: f64,
-    centres: VoxelSet<LatticeNode, Point3<f64>>,
+    centres: VoxelSet<Point3<f64>>,
     body: Option<SweptVolume>,
     changed: Vec<Point3<f64>>,
 }
@@ -30,10 +30,8 @@ pub(crate) struct FreeSpace {
 #[derive(Clone, Debug)]
 struct SweptVolume {
     tip: TipBody,
-    /// edge of the cells of one place, m
-    cell: f64,
     /// by the middles of the balls that hold the tip there, in cells as large as its scale
-    places: VoxelSet<Posture, TipPlace>,
+    places: VoxelSet<TipPlace>,
 }
 
 /// A small cell and a range of axes.
@@ -51,26 +49,41 @@ impl Key for Posture {
     }
 }
 
+impl Keyed for Point3<f64> {
+    type Key = LatticeNode;
+    fn key(&self, cell: f64) -> LatticeNode {
+        voxel_of(self, cell)
+    }
+}
+
+impl Keyed for TipPlace {
+    type Key = Posture;
+    fn key(&self, cell: f64) -> Posture {
+        let lean = [self.axis.x, self.axis.y, self.axis.z].map(|x| (x / LEAN).floor() as i8);
+        Posture { cell: voxel_of(&self.centre, cell), lean }
+    }
+}
+
 impl FreeSpace {
     /// Empty: one centre is kept for each cube of edge `cell` (m), queries go up to `reach` (m).
     pub fn new(cell: f64, reach: f64) -> Self {
-        Self { cell, reach, centres: VoxelSet::default(), body: None, changed: Vec::new() }
+        Self { reach, centres: VoxelSet::new(cell), body: None, changed: Vec::new() }
     }
 
     /// Empty, for a tip of any shape: one place is kept for each cube of edge `cell` (m).
     pub fn of_tip(tip: TipBody, cell: f64, reach: f64) -> Self {
-        let body = (!tip.is_ball()).then(|| SweptVolume { tip, cell, places: VoxelSet::default() });
+        let body = (!tip.is_ball()).then(|| SweptVolume { tip, places: VoxelSet::new(cell) });
         Self { body, ..Self::new(cell, reach) }
     }
 
     /// Takes a place of the tip.
     pub fn add_place(&mut self, place: &TipPlace) {
         let centre = &place.centre;
-        let is_new = self.centres.add(voxel_of(centre, self.cell), voxel_of(centre, self.reach), *centre);
+        let is_new = self.centres.add(voxel_of(centre, self.reach), *centre);
         match &mut self.body {
             None => self.changed.extend(is_new.then_some(*centre)),
             Some(body) => {
-                if body.places.add(posture(place, body.cell), body.bin(place), *place) {
+                if body.places.add(body.bin(place), *place) {
                     body.cover(place, |middle| self.changed.push(*middle));
                 }
             }
@@ -80,15 +93,15 @@ impl FreeSpace {
     /// Forgets where the tip was nearer to `p` with its middle than `distance` (m, up to the reach); of a tip that is no
     /// ball, as much nearer with its surface as a ball of its scale.
     pub fn forget(&mut self, p: &Point3<f64>, distance: f64) {
-        let Self { cell, reach, centres, body, changed } = self;
+        let Self { reach, centres, body, changed } = self;
         for bin in voxel_neighbourhood(voxel_of(p, *reach)) {
             let stays = |centre: &Point3<f64>| (centre - p).norm_squared() >= distance * distance;
-            centres.retain(bin, |centre| voxel_of(centre, *cell), stays, |centre| changed.push(*centre));
+            centres.retain(bin, stays, |centre| changed.push(*centre));
         }
-        let Some(SweptVolume { tip, cell, places }) = body else { return };
+        let Some(SweptVolume { tip, places }) = body else { return };
         for bin in bins_around(p, tip.scale(), tip.bound().1 + distance).iter() {
             let stays = |place: &TipPlace| tip.signed_distance(place, p) + tip.scale() >= distance;
-            places.retain(bin, |place| posture(place, *cell), stays, |place| changed.push(place.centre));
+            places.retain(bin, stays, |place| changed.push(place.centre));
         }
     }
 
@@ -108,24 +121,13 @@ impl FreeSpace {
         self.body.as_ref().map_or(usize::MAX, |body| body.places.strokes()).min(self.centres.strokes())
     }
 
-    /// Undoes the last stroke. Returns whether there was one.
-    pub fn undo(&mut self) -> bool {
-        let Self { cell, centres, body, .. } = self;
+    /// Undoes the last stroke, or does the one again that was undone last; returns whether there was one.
+    pub fn exchange(&mut self, direction: Direction) -> bool {
         self.changed.clear();
-        body.iter_mut().for_each(|SweptVolume { cell, places, .. }| {
-            places.undo(|place| posture(place, *cell));
-        });
-        centres.undo(|centre| voxel_of(centre, *cell))
-    }
-
-    /// Does again what was undone last. Returns whether there was anything.
-    pub fn redo(&mut self) -> bool {
-        let Self { cell, centres, body, .. } = self;
-        self.changed.clear();
-        body.iter_mut().for_each(|SweptVolume { cell, places, .. }| {
-            places.redo(|place| posture(place, *cell));
-        });
-        centres.redo(|centre| voxel_of(centre, *cell))
+        if let Some(body) = &mut self.body {
+            body.places.exchange(direction);
+        }
+        self.centres.exchange(direction)
     }
 
     /// The centres that were kept.
@@ -215,11 +217,6 @@ impl SweptVolume {
         }
         best.1.map(|centre| (best.0 + size, centre))
     }
-}
-
-/// The small cell and the range of axes of a place.
-fn posture(TipPlace { centre, axis }: &TipPlace, cell: f64) -> Posture {
-    Posture { cell: voxel_of(centre, cell), lean: [axis.x, axis.y, axis.z].map(|x| (x / LEAN).floor() as i8) }
 }
 
 /// The cells of edge `size` that come nearer to `x` than `reach` (m), and some more.

@@ -6,7 +6,6 @@ pub(in crate::reconstruct) mod contact_uncertainty;
 pub(in crate::reconstruct) mod double_contact;
 pub(in crate::reconstruct) mod free_space;
 pub(in crate::reconstruct) mod outliers;
-pub(in crate::reconstruct) mod passes;
 pub(in crate::reconstruct) mod point_evidence;
 pub(in crate::reconstruct) mod probed_log;
 pub(in crate::reconstruct) mod scan_distance;

@@ -2,6 +2,7 @@
 
 use crate::reconstruct::evidence::contact_map::Verdict;
 use crate::reconstruct::evidence::touches::{SurfaceContact, TipTouch};
+use crate::reconstruct::incremental::history::Direction;
 use crate::stylus::ProbedPoint;
 
 /// Touches in order of time. A bounded number: when there are too many, every second one is dropped.
@@ -69,18 +70,20 @@ impl ProbedLog {
         });
     }
 
-    /// Takes the last stroke back.
-    pub(in crate::reconstruct) fn undo(&mut self) {
-        self.strokes = self.strokes.saturating_sub(1);
-        let first = self.points.partition_point(|point| point.stroke < self.strokes);
-        self.undone.extend(self.points.drain(first..).rev());
-    }
-
-    /// Does the stroke again that was undone last.
-    pub(in crate::reconstruct) fn redo(&mut self) {
-        self.strokes += 1;
-        while self.undone.last().is_some_and(|next| next.stroke < self.strokes) {
-            self.points.extend(self.undone.pop());
+    /// Takes the last stroke back, or does the one again that was undone last.
+    pub(in crate::reconstruct) fn exchange(&mut self, direction: Direction) {
+        match direction {
+            Direction::Undo => {
+                self.strokes = self.strokes.saturating_sub(1);
+                let first = self.points.partition_point(|point| point.stroke < self.strokes);
+                self.undone.extend(self.points.drain(first..).rev());
+            }
+            Direction::Redo => {
+                self.strokes += 1;
+                while self.undone.last().is_some_and(|next| next.stroke < self.strokes) {
+                    self.points.extend(self.undone.pop());
+                }
+            }
         }
     }
 }
@@ -108,17 +111,17 @@ mod tests {
         }
         let all = log.points().to_vec();
         assert_eq!(all.len(), 15);
-        log.undo();
-        log.undo();
+        log.exchange(Direction::Undo);
+        log.exchange(Direction::Undo);
         assert_eq!(log.points(), &all[..5]);
-        log.redo();
+        log.exchange(Direction::Redo);
         assert_eq!(log.points(), &all[..10]);
-        log.redo();
+        log.exchange(Direction::Redo);
         assert_eq!(log.points(), &all[..]);
-        log.undo();
+        log.exchange(Direction::Undo);
         log.begin_stroke();
         noted(&mut log, 5000);
-        log.redo();
+        log.exchange(Direction::Redo);
         assert_eq!(log.points().len(), 11, "what was undone is gone once something else was touched");
     }
 

@@ -10,6 +10,7 @@ use crate::reconstruct::evidence::probed_log::ProbedLog;
 use crate::reconstruct::evidence::scan_distance::ScanDistance;
 use crate::reconstruct::evidence::touches::TipTouch;
 use crate::reconstruct::field::grid::GridChanges;
+use crate::reconstruct::incremental::history::Direction;
 use crate::reconstruct::table::CellTable;
 use crate::stylus::{STROKE_PAUSE_NS, TipPlace};
 
@@ -109,24 +110,15 @@ impl TouchHistory {
         self.contacts.strokes().min(self.free_space.strokes())
     }
 
-    /// Takes the last stroke back; returns whether there was one.
-    pub fn undo(&mut self) -> bool {
+    /// Takes the last stroke back, or does the one again that was undone last; returns whether there was one.
+    pub fn exchange(&mut self, direction: Direction) -> bool {
         self.last_contact_ns = None;
-        let is_undone = self.strokes() > 0 && self.contacts.undo() && self.free_space.undo();
-        if is_undone {
-            self.probed.undo();
+        let is_possible = direction == Direction::Redo || self.strokes() > 0;
+        let has_changed = is_possible && self.contacts.exchange(direction) && self.free_space.exchange(direction);
+        if has_changed {
+            self.probed.exchange(direction);
         }
-        is_undone
-    }
-
-    /// Does the stroke again that was undone last; returns whether there was one.
-    pub fn redo(&mut self) -> bool {
-        self.last_contact_ns = None;
-        let is_redone = self.contacts.redo() && self.free_space.redo();
-        if is_redone {
-            self.probed.redo();
-        }
-        is_redone
+        has_changed
     }
 
     /// Decides which contacts count and which are those of an edge, where there is new evidence; returns

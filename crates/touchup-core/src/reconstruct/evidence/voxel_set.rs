@@ -1,7 +1,7 @@
 //! A voxel set: one thing is kept for each key, in cubes; strokes of them can be undone.
 
 use crate::reconstruct::field::lattice::LatticeNode;
-use crate::reconstruct::incremental::history::History;
+use crate::reconstruct::incremental::history::{Direction, History};
 use crate::reconstruct::table::{CellTable, Key};
 
 /// Cubes kept for undoing: some tens of MB.
@@ -10,52 +10,51 @@ const MOST_KEPT: usize = 2000;
 /// The things of one cube; `None` where there are none.
 type Bucket<T> = Option<Vec<T>>;
 
-/// Things that have a key, by the cubes they are in.
+/// A thing of which one is kept among those with the same key.
+pub(in crate::reconstruct) trait Keyed: Copy {
+    /// a small cell, and what else distinguishes the things in it
+    type Key: Key;
+    /// Its key where the small cells have edge `cell` (m).
+    fn key(&self, cell: f64) -> Self::Key;
+}
+
+/// Things by the cubes they are in.
 #[derive(Clone, Debug)]
-pub(in crate::reconstruct) struct VoxelSet<K, T> {
+pub(in crate::reconstruct) struct VoxelSet<T: Keyed> {
+    cell: f64,
     /// whether a thing with this key is there
-    is_kept: CellTable<K, bool>,
+    is_kept: CellTable<T::Key, bool>,
     bins: CellTable<LatticeNode, Vec<T>>,
     history: History<LatticeNode, Bucket<T>>,
 }
 
-impl<K: Key, T: Copy> Default for VoxelSet<K, T> {
-    fn default() -> Self {
-        Self { is_kept: CellTable::default(), bins: CellTable::default(), history: History::new(MOST_KEPT) }
+impl<T: Keyed> VoxelSet<T> {
+    /// An empty set, with small cells of edge `cell` (m).
+    pub fn new(cell: f64) -> Self {
+        Self { cell, is_kept: CellTable::default(), bins: CellTable::default(), history: History::new(MOST_KEPT) }
     }
-}
 
-impl<K: Key, T: Copy> VoxelSet<K, T> {
     /// Puts a thing into a cube, unless one with its key is there; returns whether it did.
-    pub fn add(&mut self, key: K, bin: LatticeNode, thing: T) -> bool {
-        let (at, _) = self.is_kept.insert_with(key, || false);
-        if std::mem::replace(self.is_kept.value_mut(at), true) {
+    pub fn add(&mut self, bin: LatticeNode, thing: T) -> bool {
+        if std::mem::replace(self.is_kept.get_or_default(thing.key(self.cell)), true) {
             return false;
         }
         self.note(bin);
-        let (at, _) = self.bins.insert_with(bin, Vec::new);
-        self.bins.value_mut(at).push(thing);
+        self.bins.get_or_default(bin).push(thing);
         true
     }
 
     /// Takes out of a cube what `stays` does not hold, and gives it to `each`.
-    pub fn retain(
-        &mut self,
-        bin: LatticeNode,
-        key: impl Fn(&T) -> K,
-        stays: impl Fn(&T) -> bool,
-        mut each: impl FnMut(&T),
-    ) {
+    pub fn retain(&mut self, bin: LatticeNode, stays: impl Fn(&T) -> bool, mut each: impl FnMut(&T)) {
         if self.get(&bin).iter().all(&stays) {
             return;
         }
         self.note(bin);
-        let Self { is_kept, bins, .. } = self;
-        let Some(things) = bins.get_mut(&bin) else { return };
+        let Some(things) = self.bins.get_mut(&bin) else { return };
         things.retain(|thing| {
             let stays = stays(thing);
             if !stays {
-                is_kept.insert(key(thing), false);
+                self.is_kept.insert(thing.key(self.cell), false);
                 each(thing);
             }
             stays
@@ -74,8 +73,7 @@ impl<K: Key, T: Copy> VoxelSet<K, T> {
     }
 
     fn note(&mut self, bin: LatticeNode) {
-        let Self { history, bins, .. } = self;
-        history.note(bin, || bins.get(&bin).cloned());
+        self.history.note(bin, || self.bins.get(&bin).cloned());
     }
 
     /// Begins a stroke, which can be undone.
@@ -88,38 +86,25 @@ impl<K: Key, T: Copy> VoxelSet<K, T> {
         self.history.len()
     }
 
-    /// Undoes the last stroke.
-    pub fn undo(&mut self, key: impl Fn(&T) -> K) -> bool {
-        self.exchange(|history, swap| history.undo(swap), key)
-    }
-
-    /// Does again what was undone last.
-    pub fn redo(&mut self, key: impl Fn(&T) -> K) -> bool {
-        self.exchange(|history, swap| history.redo(swap), key)
-    }
-
-    fn exchange(
-        &mut self,
-        act: impl FnOnce(&mut History<LatticeNode, Bucket<T>>, &mut dyn FnMut(LatticeNode, &mut Bucket<T>)) -> bool,
-        key: impl Fn(&T) -> K,
-    ) -> bool {
+    /// Undoes the last stroke, or does the one again that was undone last; returns whether there was one.
+    pub fn exchange(&mut self, direction: Direction) -> bool {
         let mut history = std::mem::replace(&mut self.history, History::new(MOST_KEPT));
-        let has_changed = act(&mut history, &mut |bin, past| self.swap(bin, past, &key));
+        let has_changed = history.exchange(direction, |bin, past| self.swap(bin, past));
         self.history = history;
         has_changed
     }
 
     /// Exchanges the things of a cube with those that were kept; cubes inserted last go first.
-    fn swap(&mut self, bin: LatticeNode, past: &mut Bucket<T>, key: &impl Fn(&T) -> K) {
+    fn swap(&mut self, bin: LatticeNode, past: &mut Bucket<T>) {
         let before = past.take();
         let there = match (before.is_some(), self.bins.get_mut(&bin)) {
             (true, Some(things)) => Some(std::mem::take(things)),
             (true, None) => None,
             (false, _) => self.bins.remove(&bin),
         };
-        there.iter().flatten().for_each(|thing| self.is_kept.insert(key(thing), false));
+        there.iter().flatten().for_each(|thing| self.is_kept.insert(thing.key(self.cell), false));
         if let Some(before) = before {
-            before.iter().for_each(|thing| self.is_kept.insert(key(thing), true));
+            before.iter().for_each(|thing| self.is_kept.insert(thing.key(self.cell), true));
             self.bins.insert(bin, before);
         }
         *past = there;
@@ -130,36 +115,43 @@ impl<K: Key, T: Copy> VoxelSet<K, T> {
 mod tests {
     use super::*;
 
+    impl Keyed for u32 {
+        type Key = u32;
+        fn key(&self, _: f64) -> u32 {
+            *self
+        }
+    }
+
     /// Cubes of ten numbers each.
-    fn state(set: &VoxelSet<u32, u32>) -> Vec<u32> {
+    fn state(set: &VoxelSet<u32>) -> Vec<u32> {
         set.iter().copied().collect()
     }
 
     #[test]
     fn strokes_with_things_that_come_and_go_are_undone_and_redone() {
         let bin = |x: u32| [(x / 10) as i32, 0, 0];
-        let mut set = VoxelSet::<u32, u32>::default();
+        let mut set = VoxelSet::<u32>::new(1.0);
         let mut states = vec![state(&set)];
         for (come, go) in [(vec![1, 11, 2, 1], vec![]), (vec![3, 25], vec![1, 11]), (vec![11, 1, 40], vec![2, 25])] {
             set.begin_stroke();
             for &x in &come {
-                set.add(x, bin(x), x);
+                set.add(bin(x), x);
             }
             for &x in &go {
-                set.retain(bin(x), |&thing| thing, |&thing| thing != x, |&gone| assert_eq!(gone, x));
+                set.retain(bin(x), |&thing| thing != x, |&gone| assert_eq!(gone, x));
             }
             states.push(state(&set));
         }
         assert_eq!(states[1..], [vec![1, 2, 11], vec![2, 3, 25], vec![3, 1, 11, 40]]);
         for expected in states.iter().rev().skip(1) {
-            assert!(set.undo(|&thing| thing));
+            assert!(set.exchange(Direction::Undo));
             assert_eq!(state(&set), *expected);
         }
-        assert!(!set.undo(|&thing| thing));
+        assert!(!set.exchange(Direction::Undo));
         for expected in &states[1..] {
-            assert!(set.redo(|&thing| thing));
+            assert!(set.exchange(Direction::Redo));
             assert_eq!(state(&set), *expected);
         }
-        assert!(!set.add(40, bin(40), 40) && set.add(2, bin(2), 2), "what is kept is known");
+        assert!(!set.add(bin(40), 40) && set.add(bin(2), 2), "what is kept is known");
     }
 }

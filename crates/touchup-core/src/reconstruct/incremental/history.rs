@@ -7,6 +7,15 @@ use crate::reconstruct::table::{CellTable, Key};
 /// Strokes that can be undone.
 const MOST_STROKES: usize = 64;
 
+/// Which stroke is exchanged for what was there instead.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::reconstruct) enum Direction {
+    /// the last one that was not undone
+    Undo,
+    /// the one that was undone last
+    Redo,
+}
+
 /// Old values by key, stroke by stroke.
 ///
 /// Undoing swaps what is kept with what is there, and so does redoing.
@@ -63,6 +72,14 @@ impl<K: Key, V> History<K, V> {
     /// Whether no stroke can be undone.
     pub fn is_empty(&self) -> bool {
         self.done.is_empty()
+    }
+
+    /// [`Self::undo`] or [`Self::redo`].
+    pub(in crate::reconstruct) fn exchange(&mut self, direction: Direction, swap: impl FnMut(K, &mut V)) -> bool {
+        match direction {
+            Direction::Undo => self.undo(swap),
+            Direction::Redo => self.redo(swap),
+        }
     }
 
     /// Undoes the last stroke, the last change first: `swap` exchanges what is kept with what is there. Returns whether

@@ -19,6 +19,7 @@ use crate::reconstruct::field::lattice::{CellBox, Lattice, LatticeNode, VertexKe
 use crate::reconstruct::field::piecewise::FieldScratch;
 use crate::reconstruct::field::unreachable::mark_unreachable;
 use crate::reconstruct::incremental::delta::{PatchDelta, PublishedPatch};
+use crate::reconstruct::incremental::history::Direction;
 use crate::reconstruct::incremental::remesh::{Remesh, Renewed};
 use crate::stylus::{ContactSample, ProbedPoint, SettingError, TipBody, TipShape};
 
@@ -275,8 +276,7 @@ impl Patcher {
     /// Takes the next sample, which is later than the one before. It counts once the smoothing window around it
     /// is complete.
     pub fn push(&mut self, sample: &ContactSample) {
-        let Self { finder, history, params, .. } = self;
-        finder.push(sample, |touch| keep(history, params, &touch));
+        self.finder.push(sample, |touch| keep(&mut self.history, &self.params, &touch));
     }
 
     /// The touches themselves, in order of time.
@@ -291,8 +291,7 @@ impl Patcher {
 
     /// Takes in what is still in the smoothing window: the stream has ended or pauses.
     pub fn flush(&mut self) {
-        let Self { finder, history, params, .. } = self;
-        finder.flush(|touch| keep(history, params, &touch));
+        self.finder.flush(|touch| keep(&mut self.history, &self.params, &touch));
     }
 
     /// How many strokes can be undone. A stroke is what was touched without a pause of a tenth of a second, and where the
@@ -305,24 +304,22 @@ impl Patcher {
     /// there was one. Estimates of friction and bias stay.
     pub fn undo(&mut self) -> bool {
         self.flush();
-        let has_undone = self.history.undo();
-        self.start_over(has_undone);
-        has_undone
+        self.exchange(Direction::Undo)
     }
 
     /// Does the stroke again that was undone last, bit by bit, unless something was touched since. Returns whether there was
     /// one.
     pub fn redo(&mut self) -> bool {
-        let has_redone = self.history.redo();
-        self.start_over(has_redone);
-        has_redone
+        self.exchange(Direction::Redo)
     }
 
-    /// The next renewal remeshes everything.
-    fn start_over(&mut self, is_outdated: bool) {
+    /// The next renewal remeshes everything where a stroke was exchanged; returns whether one was.
+    fn exchange(&mut self, direction: Direction) -> bool {
+        let has_changed = self.history.exchange(direction);
         if let Some(live) = &mut self.live {
-            live.is_outdated |= is_outdated;
+            live.is_outdated |= has_changed;
         }
+        has_changed
     }
 
     /// The scan with its touched part remeshed from all that counts so far; vertices and faces that were not touched
