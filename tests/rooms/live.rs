@@ -101,7 +101,8 @@ fn renewed_bit_by_bit_it_is_the_skin_of_all_at_once_and_sound_all_along() {
     let was = soundness(scan);
     let mut renewals = 0;
     renew(&stream, &mut patcher, &tree, |delta| {
-        splice.apply(&delta, &mut mesh, &mut mesh_tree).unwrap();
+        splice.begin();
+        assert!(splice.go_on(&delta, usize::MAX, &mut mesh, &mut mesh_tree).unwrap());
         renewals += 1;
         if renewals % 200 == 0 {
             let is = soundness(&mesh);

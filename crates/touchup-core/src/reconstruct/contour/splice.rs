@@ -22,19 +22,6 @@ pub struct Splice {
 }
 
 impl Splice {
-    /// Brings the mesh up to date with the patch; faces and vertices that it does not touch keep their ids.
-    ///
-    /// - `mesh`, `tree`: the scan with all deltas before this one in it.
-    ///
-    /// # Errors
-    /// [`MeshError::TooMany`] when 32-bit ids do not suffice, [`MeshError::NotFinite`] for a position that is not finite;
-    /// the mesh is inconsistent then.
-    pub fn apply(&mut self, delta: &PatchDelta, mesh: &mut TriMesh, tree: &mut FaceTree) -> Result<(), MeshError> {
-        self.begin();
-        self.go_on(delta, usize::MAX, mesh, tree)?;
-        Ok(())
-    }
-
     /// Begins with the next delta: [`Self::go_on`] takes it up.
     pub fn begin(&mut self) {
         self.placed.clear();
@@ -43,10 +30,13 @@ impl Splice {
 
     /// Takes up to `most` parts more of the delta that was begun: places its vertices, a few to a part, then replaces the
     /// faces of its owners; returns whether that was all. In between the mesh has gaps and overlaps where old faces meet new
-    /// ones.
+    /// ones. Faces and vertices that the delta does not touch keep their ids.
+    ///
+    /// - `mesh`, `tree`: the scan with all deltas before this one in it.
     ///
     /// # Errors
-    /// As [`Self::apply`].
+    /// [`MeshError::TooMany`] when 32-bit ids do not suffice, [`MeshError::NotFinite`] for a position that is not finite;
+    /// the mesh is inconsistent then.
     pub fn go_on(
         &mut self,
         delta: &PatchDelta,
