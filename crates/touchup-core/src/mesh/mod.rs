@@ -18,6 +18,7 @@ pub use ids::{FaceId, VertexId};
 pub use journal::{Changes, IdSet};
 pub use region::{Outside, Region, Sewn};
 pub use repair::{RepairReport, repair};
+pub(crate) use signed_distance::corner_normal;
 pub use signed_distance::{pseudo_normal, signed_distance};
 pub use tri_mesh::{MeshError, TriMesh};
 pub(crate) use workers::map_by;

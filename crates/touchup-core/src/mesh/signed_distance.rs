@@ -32,7 +32,7 @@ pub fn pseudo_normal(mesh: &TriMesh, hit: &FaceHit) -> Vector3<f64> {
 }
 
 /// Sum of the normals of the faces around a vertex, each times its angle there (rad).
-fn corner_normal(mesh: &TriMesh, vertex: VertexId) -> Vector3<f64> {
+pub(crate) fn corner_normal(mesh: &TriMesh, vertex: VertexId) -> Vector3<f64> {
     let apex = mesh.position(vertex);
     let weighted = mesh.star(vertex).iter().map(|&face| {
         let others = mesh.corners(face).map(|v| mesh.position(v) - apex);

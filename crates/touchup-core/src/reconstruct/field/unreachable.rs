@@ -3,9 +3,7 @@
 //! A ball that touched the surface at a vertex would have its centre a radius above it. Where some other piece of the new
 //! surface obstructs it there, no touch is possible.
 
-use nalgebra::{Point3, Vector3};
-
-use crate::mesh::{FaceTree, MeshError, TriMesh, VertexId};
+use crate::mesh::{FaceTree, MeshError, TriMesh, VertexId, corner_normal};
 use crate::reconstruct::Support;
 use crate::reconstruct::evidence::free_space::FreeSpace;
 
@@ -29,31 +27,17 @@ pub(in crate::reconstruct) fn mark_unreachable(
         return Ok(());
     }
     // the scan is left out: its noise would obstruct the ball
-    let patch = TriMesh::new(mesh.positions().to_vec(), faces.clone())?;
+    let patch = TriMesh::new(mesh.positions().to_vec(), faces)?;
     let tree = FaceTree::new(&patch);
     let deepest = radius * (1.0 - SLACK);
-    for (vertex, normal) in normals(&patch, &faces).into_iter().enumerate() {
-        let Some(normal) = normal.try_normalize(0.0) else { continue };
-        let centre: Point3<f64> = mesh.positions()[vertex] + normal * radius;
+    for (vertex, support) in (0..).map(VertexId).zip(support) {
+        let Some(normal) = corner_normal(&patch, vertex).try_normalize(0.0) else { continue };
+        let centre = mesh.position(vertex) + normal * radius;
         let is_blocked = tree.closest(&patch, &centre, deepest).is_some();
         let was_there = || free_space.nearest(&centre).is_some_and(|(distance, _)| distance < SLACK * radius);
         if is_blocked && !was_there() {
-            support[vertex] = Support::Unreachable;
+            *support = Support::Unreachable;
         }
     }
     Ok(())
-}
-
-/// Sum of the normals around each vertex, weighted by the angles of the faces there.
-fn normals(mesh: &TriMesh, faces: &[[u32; 3]]) -> Vec<Vector3<f64>> {
-    let mut normals = vec![Vector3::zeros(); mesh.vertex_slots()];
-    for corners in faces {
-        let p = corners.map(|v| mesh.positions()[v as usize]);
-        let Some(normal) = (p[1] - p[0]).cross(&(p[2] - p[0])).try_normalize(0.0) else { continue };
-        for i in 0..3 {
-            let [a, b] = [p[(i + 1) % 3] - p[i], p[(i + 2) % 3] - p[i]];
-            normals[corners[i] as usize] += normal * a.angle(&b);
-        }
-    }
-    normals
 }
