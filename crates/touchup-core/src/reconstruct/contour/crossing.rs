@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::reconstruct::evidence::point_evidence::{Evidence, Source};
 use crate::reconstruct::field::grid::ReconstructionGrid;
-use crate::reconstruct::field::lattice::{Edge, Lattice, LatticeNode, stepped};
+use crate::reconstruct::field::lattice::{Edge, LatticeNode, stepped};
 use crate::reconstruct::field::piecewise::FieldScratch;
 use crate::reconstruct::table::CellTable;
 
@@ -25,51 +25,39 @@ pub struct Crossing {
 /// Crossings of the touched field, kept as long as the values at both ends stay.
 #[derive(Clone, Debug, Default)]
 pub(in crate::reconstruct) struct Crossings {
-    known: CellTable<Edge, KnownCrossing>,
+    /// with the renewals that gave the ends their values
+    known: CellTable<Edge, ([u32; 2], Crossing)>,
     scratch: FieldScratch,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct KnownCrossing {
-    crossing: Crossing,
-    /// the renewals that gave the ends their values
-    renewals: [u32; 2],
 }
 
 impl Crossings {
     /// The crossing of an edge whose ends differ in sign: by the touched field itself between touched nodes, else between
     /// the values at the ends.
-    pub fn at(
-        &mut self,
-        grid: &ReconstructionGrid,
-        evidence: &Evidence<'_>,
-        lattice: &Lattice,
-        edge: &Edge,
-    ) -> Crossing {
+    pub fn at(&mut self, grid: &ReconstructionGrid, evidence: &Evidence<'_>, edge: &Edge) -> Crossing {
         let ends = [edge.node, edge.end()];
         let [Some(a), Some(b)] = ends.map(|node| grid.nodes.get(&node)) else {
-            return between(grid, lattice, edge, [0.0; 2]);
+            return between(grid, edge, [0.0; 2]);
         };
         let values = [a.value, b.value];
         if [a, b].iter().any(|state| state.source != Source::Touch) {
-            return between(grid, lattice, edge, values);
+            return between(grid, edge, values);
         }
         let renewals = [a.renewal, b.renewal];
-        if let Some(known) = self.known.get(edge).filter(|known| known.renewals == renewals) {
-            return known.crossing;
+        if let Some((_, known)) = self.known.get(edge).filter(|(of, _)| *of == renewals) {
+            return *known;
         }
-        let [a, b] = ends.map(|node| lattice.position(node));
-        let crossing = of_touches(evidence, [&a, &b], values, &mut self.scratch)
-            .unwrap_or_else(|| between(grid, lattice, edge, values));
-        self.known.insert(*edge, KnownCrossing { crossing, renewals });
+        let [a, b] = ends.map(|node| grid.lattice.position(node));
+        let crossing =
+            of_touches(evidence, [&a, &b], values, &mut self.scratch).unwrap_or_else(|| between(grid, edge, values));
+        self.known.insert(*edge, (renewals, crossing));
         crossing
     }
 }
 
 /// The crossing of an edge by the values at its ends.
-fn between(grid: &ReconstructionGrid, lattice: &Lattice, edge: &Edge, values: [f64; 2]) -> Crossing {
+fn between(grid: &ReconstructionGrid, edge: &Edge, values: [f64; 2]) -> Crossing {
     let ends = [edge.node, edge.end()];
-    let [a, b] = ends.map(|node| lattice.position(node));
+    let [a, b] = ends.map(|node| grid.lattice.position(node));
     let share = share_of(values);
     let slope = gradient(grid, &ends[0]) * (1.0 - share) + gradient(grid, &ends[1]) * share;
     let outward = (b - a) * (values[1] - values[0]).signum();
@@ -96,7 +84,7 @@ fn of_touches(
     for _ in 0..STEPS {
         let share = ends[0].0 + (ends[1].0 - ends[0].0) * share_of(ends.map(|(_, value)| value));
         let point = a + (b - a) * share;
-        let here = evidence.touched(&point, scratch)?;
+        let here = evidence.touched(&point, None, scratch)?;
         if best.is_none_or(|(least, _)| here.value.abs() < least) {
             best = Some((here.value.abs(), Crossing { point, normal: here.gradient }));
         }
@@ -137,6 +125,7 @@ mod tests {
     use crate::mesh::{FaceTree, TriMesh};
     use crate::reconstruct::evidence::free_space::FreeSpace;
     use crate::reconstruct::{ContactMap, ContactSigma, EvidenceParams, SurfaceContact};
+    use crate::stylus::{TipBody, TipShape};
 
     const RADIUS: f64 = 1.5e-3;
 
@@ -161,7 +150,8 @@ mod tests {
         );
         let scan = scan.unwrap();
         let (tree, params) = (FaceTree::new(&scan), EvidenceParams::new(RADIUS, 0.3e-3));
-        let free_space = FreeSpace::new(0.1 * RADIUS, 2.0 * RADIUS);
+        let tip = TipBody::new(TipShape::Ball, RADIUS).unwrap();
+        let free_space = FreeSpace::new(tip, 0.1 * RADIUS, 2.0 * RADIUS);
         let (contacts, free_space) = (&contacts, &free_space);
         let evidence = Evidence { params: &params, contacts, free_space, scan: &scan, tree: &tree, prior: None };
         let mut scratch = FieldScratch::default();

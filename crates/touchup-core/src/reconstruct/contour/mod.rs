@@ -13,4 +13,3 @@ pub(in crate::reconstruct) mod scan_clipping;
 pub(in crate::reconstruct) mod splice;
 pub(in crate::reconstruct) mod trace;
 pub(in crate::reconstruct) mod triangulation;
-pub(in crate::reconstruct) mod vertex_uncertainty;

@@ -3,9 +3,10 @@
 use crate::mesh::TriMesh;
 
 /// The evidence for a vertex.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Support {
     /// the scan
+    #[default]
     Scan,
     /// touches
     Touched,

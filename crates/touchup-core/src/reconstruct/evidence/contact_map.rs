@@ -9,8 +9,7 @@
 use nalgebra::{Point3, Vector3};
 
 use crate::numeric::{voxel_neighbourhood, voxel_of};
-use crate::reconstruct::evidence::contact_statistics::{ContactStatistics, Pass};
-use crate::reconstruct::evidence::contact_uncertainty::ContactSigma;
+use crate::reconstruct::evidence::contact_statistics::ContactStatistics;
 use crate::reconstruct::evidence::outliers::{Outlier, Outliers};
 use crate::reconstruct::evidence::touches::SurfaceContact;
 use crate::reconstruct::field::lattice::LatticeNode;
@@ -67,18 +66,14 @@ struct Rival {
 }
 
 /// All of one mean that queries do not need.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Kept {
     bin: Bin,
     /// the cell in [`ContactMap::nearby`]
     home: LatticeNode,
-    /// the next mean of the same cell, [`NONE`] for the last
-    next: u32,
     sums: ContactStatistics,
-    /// number of what was rejected here, [`NONE`] where nothing is
-    rejected: u32,
-    /// whether it is in [`ContactMap::changed`]
-    is_noted: bool,
+    /// what was rejected here
+    rejected: Option<Box<RejectedContacts>>,
     is_refuted: bool,
     /// it mixes two contacts
     is_mixed: bool,
@@ -93,18 +88,11 @@ impl Kept {
     }
 }
 
-/// The state before a stroke; `None` where there was none.
-#[derive(Clone, Copy, Debug)]
-enum Past {
-    Mean(Option<(Kept, MeanContact)>),
-    Rejected(Option<RejectedContacts>),
-}
-
-/// Keys of means are their numbers, those of what was rejected have this bit too.
-const OF_REJECTED: u32 = 1 << 31;
+/// A mean before a stroke; `None` where there was none.
+type Past = Option<(Kept, MeanContact)>;
 
 /// Contacts that contradict a mean and agree with each other.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug, Default)]
 struct RejectedContacts {
     sums: ContactStatistics,
     last_ns: i64,
@@ -116,16 +104,17 @@ pub struct ContactMap {
     cell: f64,
     reach: f64,
     gate: Option<GateParams>,
-    /// the first mean of each cell
-    of_cell: CellTable<LatticeNode, u32>,
+    /// the means of each cell
+    of_cell: CellTable<LatticeNode, Vec<u32>>,
     kept: Vec<Kept>,
     means: Vec<MeanContact>,
     nearby: CellTable<LatticeNode, Vec<u32>>,
-    rejected: Vec<RejectedContacts>,
-    outliers: Outliers,
+    /// what was rejected
+    pub(in crate::reconstruct) outliers: Outliers,
     /// the mean that the last contact went into, and when, ns
     last: Option<(u32, i64)>,
-    changed: Vec<u32>,
+    /// means that are new or moved since they were last reported
+    changed: CellTable<u32, ()>,
     history: History<u32, Past>,
 }
 
@@ -137,8 +126,6 @@ const SHIFT: f64 = 0.01;
 const TURN: f64 = 5e-3;
 /// Means kept for undoing: 100 MB at most.
 const MOST_KEPT: usize = 200_000;
-/// None.
-const NONE: u32 = u32::MAX;
 /// A mean with less weight than this contradicts nothing; a sliding contact has weight 1.
 const LEAST_EVIDENCE: f64 = 3.0;
 /// Normals within 25° are those of one surface.
@@ -165,10 +152,9 @@ impl ContactMap {
             kept: Vec::new(),
             means: Vec::new(),
             nearby: CellTable::default(),
-            rejected: Vec::new(),
             outliers: Outliers::default(),
             last: None,
-            changed: Vec::new(),
+            changed: CellTable::default(),
             history: History::new(MOST_KEPT),
         }
     }
@@ -186,14 +172,11 @@ impl ContactMap {
         let index = self.place(own, &bin, contact);
         let Kept { sums, rejected, .. } = &mut self.kept[index as usize];
         sums.add(contact);
-        let rejected = *rejected;
         if let Some(gate) = self.gate
             && sums.passes.note(contact.stamp_ns, contact.weight, gate.window_ns)
-            && rejected != NONE
         {
             // a pass that confirms the mean: what is rejected was an outlier
-            self.note_rejected(rejected);
-            self.rejected[rejected as usize].sums = ContactStatistics::default();
+            *rejected = None;
         }
         self.renew(index, contact);
         if self.kept[index as usize].sums.weight >= LEAST_EVIDENCE {
@@ -213,10 +196,9 @@ impl ContactMap {
         Bin { cell: voxel_of(&contact.point, self.cell), facing }
     }
 
-    /// The means of a cell.
+    /// The means of a cell, the last one first.
     fn in_cell(&self, cell: LatticeNode) -> impl Iterator<Item = u32> + '_ {
-        let first = self.of_cell.get(&cell).copied();
-        std::iter::successors(first, |&index| Some(self.kept[index as usize].next).filter(|&next| next != NONE))
+        self.of_cell.get(&cell).into_iter().flat_map(|means| means.iter().rev().copied())
     }
 
     fn find(&self, bin: &Bin) -> Option<u32> {
@@ -269,8 +251,9 @@ impl ContactMap {
     /// Rejects a contact, or lets it take the place of the mean that it contradicts in a second pass.
     fn contest(&mut self, rival: &Rival, contact: &SurfaceContact, bin: &Bin, gate: &GateParams) -> Verdict {
         let roughness = ROUGHNESS * self.cell;
-        let at = self.rejected_of(rival.index, contact.stamp_ns);
-        let RejectedContacts { sums, last_ns } = &mut self.rejected[at as usize];
+        self.note_mean(rival.index);
+        let rejected = self.kept[rival.index as usize].rejected.get_or_insert_default();
+        let RejectedContacts { sums, last_ns } = &mut **rejected;
         let agrees = sums.weight > 0.0 && sums.innovation(contact, roughness).1 <= gate.sigmas;
         let is_second = agrees && contact.stamp_ns.saturating_sub(*last_ns) > PAUSE * gate.window_ns;
         if !agrees {
@@ -290,21 +273,6 @@ impl ContactMap {
         Verdict::Rejected
     }
 
-    /// Number of what is rejected of a mean, about to change.
-    fn rejected_of(&mut self, index: u32, stamp_ns: i64) -> u32 {
-        let at = self.kept[index as usize].rejected;
-        if at != NONE {
-            self.note_rejected(at);
-            return at;
-        }
-        self.note_mean(index);
-        let at = self.rejected.len() as u32;
-        self.history.note(at | OF_REJECTED, || Past::Rejected(None));
-        self.rejected.push(RejectedContacts { sums: ContactStatistics::default(), last_ns: stamp_ns });
-        self.kept[index as usize].rejected = at;
-        at
-    }
-
     /// Empties the means that a contact contradicts and puts what was rejected in the cell of its contacts.
     fn move_to(&mut self, rival: u32, sums: ContactStatistics, contact: &SurfaceContact, bin: &Bin, sigmas: f64) {
         self.outliers.relocated += 1;
@@ -316,14 +284,14 @@ impl ContactMap {
         let old: Vec<u32> = self.around(contact, bin.cell).chain([rival]).filter(contradicts).collect();
         for index in old {
             self.note_mean(index);
-            self.note_change(index);
+            self.changed.insert(index, ());
             self.kept[index as usize].sums = ContactStatistics::default();
             self.means[index as usize].weight = 0.0;
         }
         let index = self.place(self.find(bin), bin, contact);
         self.kept[index as usize].sums = sums;
         self.renew(index, contact);
-        self.note_change(index);
+        self.changed.insert(index, ());
     }
 
     /// The mean of a bin, about to change: `own`, or a new one where there is none.
@@ -334,43 +302,29 @@ impl ContactMap {
         }
         let SurfaceContact { point, normal, weight, .. } = *contact;
         let index = self.means.len() as u32;
-        self.history.note(index, || Past::Mean(None));
+        self.history.note(index, || None);
         let kept = Kept {
             bin: *bin,
             home: voxel_of(&point, self.reach),
-            next: NONE,
             sums: ContactStatistics::default(),
-            rejected: NONE,
-            is_noted: false,
+            rejected: None,
             is_refuted: false,
             is_mixed: false,
             reported: (point, normal),
         };
         self.push(kept, MeanContact { point, normal, weight, is_fan: false });
-        self.note_change(index);
+        self.changed.insert(index, ());
         index
     }
 
     fn note_mean(&mut self, index: u32) {
-        self.history.note(index, || Past::Mean(Some((self.kept[index as usize], self.means[index as usize]))));
+        self.history.note(index, || Some((self.kept[index as usize].clone(), self.means[index as usize])));
     }
 
-    fn note_rejected(&mut self, at: u32) {
-        self.history.note(at | OF_REJECTED, || Past::Rejected(Some(self.rejected[at as usize])));
-    }
-
-    /// Notes that a mean has changed.
-    fn note_change(&mut self, index: u32) {
-        if !std::mem::replace(&mut self.kept[index as usize].is_noted, true) {
-            self.changed.push(index);
-        }
-    }
-
-    /// Adds a mean as the first of its cell.
-    fn push(&mut self, mut kept: Kept, mean: MeanContact) {
+    /// Adds a mean.
+    fn push(&mut self, kept: Kept, mean: MeanContact) {
         let index = self.means.len() as u32;
-        let (at, is_new) = self.of_cell.insert_with(kept.bin.cell, || index);
-        kept.next = if is_new { NONE } else { std::mem::replace(self.of_cell.value_mut(at), index) };
+        self.of_cell.get_or_default(kept.bin.cell).push(index);
         self.nearby.get_or_default(kept.home).push(index);
         self.kept.push(kept);
         self.means.push(mean);
@@ -379,14 +333,8 @@ impl ContactMap {
     /// Removes the mean inserted last.
     fn pop(&mut self) -> Option<(Kept, MeanContact)> {
         let (kept, mean) = (self.kept.pop()?, self.means.pop()?);
-        if kept.next == NONE {
-            self.of_cell.remove(&kept.bin.cell);
-        } else {
-            self.of_cell.insert(kept.bin.cell, kept.next);
-        }
-        if let Some(home) = self.nearby.get_mut(&kept.home) {
-            home.pop();
-        }
+        self.of_cell.get_or_default(kept.bin.cell).pop();
+        self.nearby.get_or_default(kept.home).pop();
         Some((kept, mean))
     }
 
@@ -402,7 +350,7 @@ impl ContactMap {
             || (mean.point - point).dot(normal).abs() > SHIFT * self.cell
             || (mean.normal - normal).norm_squared() > TURN * TURN;
         if is_shifted {
-            self.note_change(index);
+            self.changed.insert(index, ());
         }
     }
 
@@ -426,35 +374,26 @@ impl ContactMap {
         has_changed
     }
 
-    /// Exchanges what is there with what was kept of it; the last insertion is undone first.
-    fn swap(&mut self, key: u32, past: &mut Past) {
-        let at = (key & !OF_REJECTED) as usize;
-        match past {
-            Past::Mean(kept) => match kept.take() {
-                None => *kept = self.pop(),
-                Some((state, mean)) if at == self.means.len() => self.push(state, mean),
-                Some((state, mean)) => {
-                    let there = (&mut self.kept[at], &mut self.means[at]);
-                    // the chain of its cell has a history of its own
-                    let state = Kept { next: there.0.next, ..state };
-                    *kept = Some((std::mem::replace(there.0, state), std::mem::replace(there.1, mean)));
-                }
-            },
-            Past::Rejected(kept) => match kept.take() {
-                None => *kept = self.rejected.pop(),
-                Some(rejected) if at == self.rejected.len() => self.rejected.push(rejected),
-                Some(rejected) => *kept = Some(std::mem::replace(&mut self.rejected[at], rejected)),
-            },
+    /// Exchanges a mean with what was kept of it; the last insertion is undone first.
+    fn swap(&mut self, index: u32, past: &mut Past) {
+        let at = index as usize;
+        match past.take() {
+            None => *past = self.pop(),
+            Some((state, mean)) if at == self.means.len() => self.push(state, mean),
+            Some((state, mean)) => {
+                let there = (&mut self.kept[at], &mut self.means[at]);
+                *past = Some((std::mem::replace(there.0, state), std::mem::replace(there.1, mean)));
+            }
         }
     }
 
     /// The numbers of the means that are new since the last call, or are clearly elsewhere than when they were last
     /// reported, each once.
-    pub(crate) fn take_changed(&mut self) -> Vec<u32> {
+    pub(crate) fn take_changed(&mut self) -> CellTable<u32, ()> {
         let changed = std::mem::take(&mut self.changed);
-        for &at in &changed {
-            let (kept, mean) = (&mut self.kept[at as usize], &self.means[at as usize]);
-            (kept.is_noted, kept.reported) = (false, (mean.point, mean.normal));
+        for (at, ()) in changed.iter() {
+            let mean = &self.means[at as usize];
+            self.kept[at as usize].reported = (mean.point, mean.normal);
         }
         changed
     }
@@ -462,28 +401,18 @@ impl ContactMap {
     /// Lets [`Self::take_changed`] report all means.
     pub(crate) fn note_all(&mut self) {
         self.changed = (0..self.means.len() as u32).collect();
-        self.kept.iter_mut().for_each(|kept| kept.is_noted = true);
     }
 
-    /// Uncertainty of a mean by one pass.
-    pub(in crate::reconstruct) fn sigma(&self, index: u32) -> ContactSigma {
-        self.kept[index as usize].sums.sigma()
+    /// What was added up for a mean, whether it counts in queries or not.
+    pub(in crate::reconstruct) fn sums(&self, index: u32) -> &ContactStatistics {
+        &self.kept[index as usize].sums
     }
 
     /// Variance of a mean along its normal by noise and calibration, m²: noise averages out by the number of passes.
     pub(in crate::reconstruct) fn variance(&self, index: u32) -> f64 {
-        let (sigma, passes) = (self.sigma(index), self.kept[index as usize].sums.passes.count.max(1));
+        let sums = self.sums(index);
+        let (sigma, passes) = (sums.sigma(), sums.passes.count.max(1));
         sigma.noise * sigma.noise / f64::from(passes) + sigma.calibration * sigma.calibration
-    }
-
-    /// The passes over the place of a mean.
-    pub(in crate::reconstruct) fn passes(&self, index: u32) -> impl Iterator<Item = &Pass> + '_ {
-        self.kept[index as usize].sums.passes.iter()
-    }
-
-    /// What was rejected.
-    pub fn outliers(&self) -> &Outliers {
-        &self.outliers
     }
 
     /// Takes a mean out of all queries, or back in; returns whether that is new.
@@ -503,11 +432,6 @@ impl ContactMap {
         let mean = &mut self.means[at as usize];
         let before = std::mem::replace(&mut mean.weight, self.kept[at as usize].weight());
         (before == 0.0) != (mean.weight == 0.0)
-    }
-
-    /// Weight of the contacts of a mean, whether it counts in queries or not, in contacts while sliding.
-    pub(in crate::reconstruct) fn weight(&self, at: u32) -> f64 {
-        self.kept[at as usize].sums.weight
     }
 
     /// Finds whether normals within `width` (m) of a mean differ by more than the angle of `cosine`; returns whether that
@@ -555,6 +479,7 @@ impl ContactMap {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::reconstruct::ContactSigma;
 
     fn contact(x: f64, normal: Vector3<f64>, weight: f64) -> SurfaceContact {
         SurfaceContact {
@@ -621,11 +546,12 @@ mod tests {
         for x in [0.6e-3, 0.1e-3, 0.2e-3, 0.7e-3] {
             store.add(&contact(x, Vector3::z(), 1.0));
         }
-        assert_eq!((store.take_changed(), store.take_changed()), (vec![0, 1], vec![]));
+        let changed = |store: &mut ContactMap| store.take_changed().iter().map(|(at, ())| at).collect::<Vec<_>>();
+        assert_eq!((changed(&mut store), changed(&mut store)), (vec![0, 1], vec![]));
         store.add(&contact(0.3e-3, Vector3::z(), 1.0));
-        assert!(store.take_changed().is_empty(), "it went along the surface");
+        assert!(changed(&mut store).is_empty(), "it went along the surface");
         store.add(&SurfaceContact { point: Point3::new(0.3e-3, 0.1e-3, 0.2e-3), ..contact(0.0, Vector3::z(), 1.0) });
-        assert_eq!(store.take_changed(), [1], "it rose by 20 µm");
+        assert_eq!(changed(&mut store), [1], "it rose by 20 µm");
     }
 
     /// A pass of eight contacts at height `z` (m) from `stamp_ns` on; what became of the last.
@@ -660,12 +586,12 @@ mod tests {
             assert_eq!(pass(&mut store, 0.01e-3, 2 * second), Verdict::Taken);
             assert_eq!(near(&store), [105.0], "what agrees is averaged");
             assert_eq!(pass(&mut store, moved, 3 * second), Verdict::Rejected);
-            assert_eq!((near(&store), store.outliers().rejected), (vec![105.0], 8));
+            assert_eq!((near(&store), store.outliers.rejected), (vec![105.0], 8));
             // a pass that confirms the mean: the next that contradicts is the first again
             assert_eq!(pass(&mut store, 0.0, 4 * second), Verdict::Taken);
             assert_eq!(pass(&mut store, moved, 5 * second), Verdict::Rejected);
             pass(&mut store, moved, 6 * second);
-            assert_eq!(store.outliers().relocated, 1);
+            assert_eq!(store.outliers.relocated, 1);
             assert_eq!(near(&store), [((100e-6 + moved) * 1e6).round()]);
         }
     }

@@ -5,8 +5,6 @@
 //! from window to window. What the radius, the pose of the scan and the stiffness are off by does not: it is the same in
 //! each.
 
-use nalgebra::Vector3;
-
 use crate::parameters;
 
 parameters! {
@@ -25,6 +23,28 @@ parameters! {
     }
 }
 
+parameters! {
+    /// Which uncertainties are estimated.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct UncertaintyParams in "uncertainty" {
+        /// Standard deviation of a vertex of the scan, m; 0: free of noise.
+        scan: f64 = 0.0;
+        /// A contact that contradicts by more than this many standard deviations is rejected as an outlier.
+        gate_sigmas: f64 = 4.0, "gate_sigmas" [SIGMAS, 0.5, 1e6];
+    }
+    with {
+        /// What the calibration leaves.
+        calibration: CalibrationParams,
+    }
+}
+
+impl UncertaintyParams {
+    /// The defaults, for a scan whose points are off by `noise` (m).
+    pub fn new(noise: f64) -> Self {
+        Self { scan: noise, ..Self::default() }
+    }
+}
+
 /// How well a contact is known; standard deviations.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ContactSigma {
@@ -38,60 +58,20 @@ pub struct ContactSigma {
     pub normal: f64,
 }
 
-/// Two of three samples share a pose, so that its noise averages out more slowly than that of as many poses.
-const SHARED_NOISE: f64 = 1.65;
-
-impl ContactSigma {
-    /// - `noise`: of the centre by the pose and by the force, after smoothing, m.
-    /// - `bend`: deflection of the stylus along the normal, m.
-    /// - `normal`: of its direction, rad.
-    /// - `radius`: of the ball, m.
-    pub(in crate::reconstruct) fn of(
-        calibration: &CalibrationParams,
-        [pose, force]: [f64; 2],
-        bend: f64,
-        normal: f64,
-        radius: f64,
-    ) -> Self {
-        Self {
-            noise: (pose * SHARED_NOISE).hypot(force),
-            reach: radius * (1.0 - normal.cos()),
-            calibration: calibration.position.hypot(calibration.stiffness_share * bend),
-            normal,
-        }
-    }
-}
-
-/// Follows the noise of the force: the median step from one sample to the next.
+/// A running median of lengths.
 #[derive(Clone, Debug)]
-pub(in crate::reconstruct) struct ForceNoise {
-    /// N
-    step: f64,
+pub(in crate::reconstruct) struct RunningMedian {
+    pub length: f64,
+    /// what is never undercut
+    pub least: f64,
 }
 
-/// Step of the running median: converges within some hundred samples.
-const NOISE_STEP: f64 = 0.01;
-/// Where it starts, N.
-const USUAL_STEP: f64 = 0.1;
-/// What is never undercut, N.
-const LEAST_STEP: f64 = 1e-4;
-/// Median length of the difference of two vectors of unit noise per axis: √2 times that of χ with three degrees.
-const STEP_PER_SIGMA: f64 = 2.175;
+/// Share by which it moves: it converges within some hundred samples.
+const STEP: f64 = 0.01;
 
-impl Default for ForceNoise {
-    fn default() -> Self {
-        Self { step: USUAL_STEP }
-    }
-}
-
-impl ForceNoise {
-    pub(in crate::reconstruct) fn note(&mut self, before: &Vector3<f64>, after: &Vector3<f64>) {
-        let is_longer = (after - before).norm_squared() > self.step * self.step;
-        self.step = (self.step * if is_longer { 1.0 + NOISE_STEP } else { 1.0 - NOISE_STEP }).max(LEAST_STEP);
-    }
-
-    /// Standard deviation of a component, N.
-    pub(in crate::reconstruct) fn sigma(&self) -> f64 {
-        self.step / STEP_PER_SIGMA
+impl RunningMedian {
+    /// Takes in a length that is larger than the median, or smaller.
+    pub(in crate::reconstruct) fn note(&mut self, is_larger: bool) {
+        self.length = (self.length * if is_larger { 1.0 + STEP } else { 1.0 - STEP }).max(self.least);
     }
 }

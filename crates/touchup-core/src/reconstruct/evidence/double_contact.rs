@@ -38,7 +38,7 @@ const WIDE_SPREAD: f64 = 0.05;
 const MOST: usize = 8;
 
 /// A surface that the ball lies on.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct TouchedWall {
     /// Σ W n, the nearest most
     normal: Vector3<f64>,
@@ -53,15 +53,6 @@ struct TouchedWall {
 }
 
 impl TouchedWall {
-    const NONE: Self = Self {
-        normal: Vector3::new(0.0, 0.0, 0.0),
-        facing: Vector3::new(0.0, 0.0, 0.0),
-        weight: 0.0,
-        count: 0.0,
-        offset: Vector3::new(0.0, 0.0, 0.0),
-        spread: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-    };
-
     /// Standard deviation of the places from which it was touched, across the corner that it makes with another, m.
     fn width(&self, other: &Self) -> f64 {
         let across = self.facing.cross(&self.facing.cross(&other.facing)).normalize();
@@ -125,12 +116,12 @@ fn walls(
     centre: &Point3<f64>,
     point: &Point3<f64>,
 ) -> ([TouchedWall; MOST], usize) {
-    let mut walls = [TouchedWall::NONE; MOST];
+    let mut walls = [TouchedWall::default(); MOST];
     let mut count = 0;
     let reach = radius * (1.0 + ON_SURFACE).hypot(NEARBY);
     contacts.near_known(centre, reach, |distance_squared, index| {
         let mean = &contacts.means()[index as usize];
-        let weight = contacts.weight(index);
+        let weight = contacts.sums(index).weight;
         let height = mean.normal.dot(&(centre - mean.point));
         let aside_squared = distance_squared - height * height;
         let is_on = (height - radius).abs() <= ON_SURFACE * radius && aside_squared <= (NEARBY * radius).powi(2);

@@ -36,7 +36,7 @@ struct SweptVolume {
 
 /// A small cell and a range of axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Posture {
+pub(in crate::reconstruct) struct Posture {
     cell: LatticeNode,
     lean: [i8; 3],
 }
@@ -65,15 +65,10 @@ impl Keyed for TipPlace {
 }
 
 impl FreeSpace {
-    /// Empty: one centre is kept for each cube of edge `cell` (m), queries go up to `reach` (m).
-    pub fn new(cell: f64, reach: f64) -> Self {
-        Self { reach, centres: VoxelSet::new(cell), body: None, changed: Vec::new() }
-    }
-
-    /// Empty, for a tip of any shape: one place is kept for each cube of edge `cell` (m).
-    pub fn of_tip(tip: TipBody, cell: f64, reach: f64) -> Self {
+    /// Empty: one place is kept for each cube of edge `cell` (m); queries of a ball go up to `reach` (m).
+    pub fn new(tip: TipBody, cell: f64, reach: f64) -> Self {
         let body = (!tip.is_ball()).then(|| SweptVolume { tip, places: VoxelSet::new(cell) });
-        Self { body, ..Self::new(cell, reach) }
+        Self { reach, centres: VoxelSet::new(cell), body, changed: Vec::new() }
     }
 
     /// Takes a place of the tip.
@@ -151,13 +146,9 @@ impl FreeSpace {
     /// Whether the path of the ball ended at `centre`, going in `direction` (unit): within `width` (m) all of it is behind.
     pub fn is_end(&self, centre: &Point3<f64>, direction: &Vector3<f64>, width: f64) -> bool {
         let (mut sum, mut count) = (Vector3::zeros(), 0.0f64);
-        for bin in voxel_neighbourhood(voxel_of(centre, self.reach)) {
-            for other in self.centres.get(&bin) {
-                if (other - centre).norm_squared() < width * width {
-                    sum += other - centre;
-                    count += 1.0;
-                }
-            }
+        for other in self.around(centre).filter(|other| (*other - centre).norm_squared() < width * width) {
+            sum += other - centre;
+            count += 1.0;
         }
         // on a straight path the mean is half the width behind
         let behind = -sum.dot(direction) / count.max(1.0);
@@ -171,16 +162,15 @@ impl FreeSpace {
         if let Some(body) = &self.body {
             return body.nearest(x);
         }
-        let mut best = (self.reach * self.reach, None);
-        for bin in voxel_neighbourhood(voxel_of(x, self.reach)) {
-            for centre in self.centres.get(&bin) {
-                let distance_squared = (centre - x).norm_squared();
-                if distance_squared < best.0 {
-                    best = (distance_squared, Some(*centre));
-                }
-            }
-        }
-        best.1.map(|centre| (best.0.sqrt(), centre))
+        let all = self.around(x).map(|centre| ((centre - x).norm_squared(), *centre));
+        let near = all.filter(|(distance_squared, _)| *distance_squared < self.reach * self.reach);
+        let nearest = near.min_by(|a, b| a.0.total_cmp(&b.0));
+        nearest.map(|(distance_squared, centre)| (distance_squared.sqrt(), centre))
+    }
+
+    /// The centres that may be within the reach of a point.
+    fn around(&self, x: &Point3<f64>) -> impl Iterator<Item = &Point3<f64>> + '_ {
+        voxel_neighbourhood(voxel_of(x, self.reach)).flat_map(|bin| self.centres.get(&bin))
     }
 }
 
@@ -233,6 +223,7 @@ fn cell_distance_squared(cell: &LatticeNode, size: f64, x: &Point3<f64>) -> f64 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stylus::TipShape;
 
     fn upright(centre: Point3<f64>) -> TipPlace {
         TipPlace { centre, axis: Vector3::z() }
@@ -240,7 +231,7 @@ mod tests {
 
     #[test]
     fn a_path_ends_where_all_of_it_is_behind() {
-        let mut free_space = FreeSpace::new(0.1e-3, 2e-3);
+        let mut free_space = FreeSpace::new(TipBody::new(TipShape::Ball, 1e-3).unwrap(), 0.1e-3, 2e-3);
         for i in 0..=100 {
             free_space.add_place(&upright(Point3::new(0.0, 0.0, f64::from(i) * -1e-4)));
         }
@@ -252,7 +243,6 @@ mod tests {
 
     #[test]
     fn a_flat_end_sweeps_its_whole_width_and_a_cone_its_flank() {
-        use crate::stylus::TipShape;
         let shapes = [
             (TipShape::Flat { edge_radius: 0.0, length: 4e-3 }, 2e-3, 2e-3, 0.0),
             (
@@ -264,7 +254,7 @@ mod tests {
         ];
         for (shape, radius, wide, low) in shapes {
             let tip = TipBody::new(shape, radius).unwrap();
-            let mut free_space = FreeSpace::of_tip(tip, 0.1e-3, 1.0);
+            let mut free_space = FreeSpace::new(tip, 0.1e-3, 1.0);
             // along x, upright: 2 mm above its origin the tip is `wide` to either side
             for i in 0..=100 {
                 let centre = Point3::new(f64::from(i) * 1e-4, 0.0, 0.0);
@@ -286,7 +276,7 @@ mod tests {
 
     #[test]
     fn the_nearest_centre_is_found_up_to_the_reach() {
-        let mut free_space = FreeSpace::new(0.1e-3, 2e-3);
+        let mut free_space = FreeSpace::new(TipBody::new(TipShape::Ball, 1e-3).unwrap(), 0.1e-3, 2e-3);
         for i in 0..1000 {
             free_space.add_place(&upright(Point3::new(f64::from(i) * 1e-5, 0.0, 0.0)));
         }

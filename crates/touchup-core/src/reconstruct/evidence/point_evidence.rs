@@ -4,6 +4,7 @@ use nalgebra::Point3;
 
 use crate::mesh::{FaceTree, TriMesh};
 use crate::reconstruct::evidence::contact_map::ContactMap;
+use crate::reconstruct::evidence::contact_uncertainty::UncertaintyParams;
 use crate::reconstruct::evidence::free_space::FreeSpace;
 use crate::reconstruct::evidence::scan_distance::ScanDistance;
 use crate::reconstruct::field::inner_corner::is_inner_corner;
@@ -16,51 +17,37 @@ pub struct EvidenceParams {
     pub radius: f64,
     /// the fit of the contacts
     pub field: FieldParams,
-    /// how deep the ball may seem to be in the surface by noise alone, m
-    pub swept_margin: f64,
-    /// contacts all around a point support it up to this distance along the surface, m
-    pub inner_support: f64,
-    /// the last contacts of a surface support what is beyond them up to this, m
-    pub border_support: f64,
-    /// two touched surfaces go on towards their common edge up to this, m
-    pub edge_support: f64,
-    /// the tilted plane at an edge that the ball rolled over goes on up to this, m
-    pub fan_support: f64,
-    /// a contact supports what is nearer to its surface than this, m: behind it may be another wall
-    pub touch_depth: f64,
-    /// the ball is free when nothing is touched within this distance of its centre, m
-    pub free_reach: f64,
-    /// the scan is rejected within this distance of a contact that faces alike, m
-    pub scan_removal: f64,
-    /// … of any contact, m
-    pub wall_removal: f64,
-    /// cosine of the widest angle between normals that face alike
-    pub alike_cosine: f64,
     /// the scan supports what is nearer to it than this, m
     pub scan_reach: f64,
-    /// a scan that the ball came nearer to than its radius and this was swept away, m
-    pub swept_reach: f64,
 }
+
+/// How deep the ball may seem to be in the surface by noise alone, in radii.
+const SWEPT_MARGIN: f64 = 0.027;
+/// Contacts all around a point support it up to this distance along the surface, in radii.
+const INNER_SUPPORT: f64 = 1.3;
+/// The last contacts of a surface support what is beyond them up to this, in radii.
+const BORDER_SUPPORT: f64 = 0.75;
+/// Two touched surfaces go on towards their common edge up to this, in radii.
+const EDGE_SUPPORT: f64 = 1.0;
+/// The tilted plane at an edge that the ball rolled over goes on up to this, in radii.
+const FAN_SUPPORT: f64 = 0.25;
+/// A contact supports what is nearer to its surface than this, in radii: behind it may be another wall.
+const TOUCH_DEPTH: f64 = 0.8;
+/// The ball is free when nothing is touched within this distance of its centre, in radii.
+pub(in crate::reconstruct) const FREE_REACH: f64 = 1.5;
+/// The scan is rejected within this distance of a contact that faces alike, in radii …
+pub(in crate::reconstruct) const SCAN_REMOVAL: f64 = 1.3;
+/// … and of any contact within a radius over this.
+const WALL_REMOVAL: f64 = 3.0;
+/// Cosine of the widest angle between normals that face alike.
+const ALIKE: f64 = 0.6;
+/// A scan that the ball came nearer to than its radius and this was swept away, in radii.
+pub(in crate::reconstruct) const SWEPT_REACH: f64 = 0.067;
 
 impl EvidenceParams {
     /// Settings that hold for a ball of `radius` (m) and a scan whose points are off by `noise` (m).
     pub fn new(radius: f64, noise: f64) -> Self {
-        Self {
-            radius,
-            field: FieldParams::for_ball(radius),
-            swept_margin: 0.027 * radius,
-            inner_support: 1.3 * radius,
-            border_support: 0.75 * radius,
-            edge_support: radius,
-            fan_support: radius / 4.0,
-            touch_depth: 0.8 * radius,
-            free_reach: 1.5 * radius,
-            scan_removal: 1.3 * radius,
-            wall_removal: radius / 3.0,
-            alike_cosine: 0.6,
-            scan_reach: (3.0 * noise).max(radius / 2.0),
-            swept_reach: 0.067 * radius,
-        }
+        Self { radius, field: FieldParams::for_ball(radius), scan_reach: (3.0 * noise).max(radius / 2.0) }
     }
 }
 
@@ -81,35 +68,74 @@ pub enum Source {
     Beyond,
 }
 
-/// What is known at a point.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Finding {
-    /// signed distance from the surface, m: positive outside; the scan's own where there is no better
+/// The field at one node.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::reconstruct) struct NodeState {
+    /// f, m
     pub value: f64,
     /// the evidence for it
     pub source: Source,
-    /// touches of two surfaces, going straight on to where they meet in an inner corner: nothing was touched here
-    pub is_corner: bool,
-    /// signed distance from the scan, m
+    /// the scan's own value, m
     pub scan: f64,
-    /// where there is nothing: the signed distance from a touched surface going straight on, m, and its
-    /// weight, from 1 where its support ends down to 0 where it is out of reach
-    pub straight: Option<(f64, f64)>,
-    /// how deep the point is in the space that the ball went through, m; not more than 0 outside of it
-    pub swept_depth: f64,
-    /// the ball that went through it ended its path towards the point and touched nothing
+    /// where nothing is known: value of a touched surface going straight on, m, and its weight, 0 to 1
+    pub straight: (f64, f64),
+    /// the ball was here: f is no less than this, m
+    pub least: f64,
+    /// … and ended its path here without touching anything, deep inside the scan
     pub is_free_end: bool,
+    /// it is out of reach of all evidence, and was looked at because a surface that is filled in goes on there
+    pub is_further: bool,
+    /// value of the field of the touches, m; `None` out of their support
+    pub touched_value: Option<f64>,
+    /// … in an inner corner that two touched surfaces go on into
+    pub is_corner: bool,
+    /// number of the renewal that gave it this value
+    pub renewal: u32,
 }
 
-/// The scan is not used where it moves a touch by less than this share of what that may be off anyway.
-const NOTICED: f64 = 0.1;
+impl NodeState {
+    /// Touched, with this value of the field, m.
+    #[cfg(test)]
+    pub fn touched(value: f64) -> Self {
+        Self {
+            value,
+            source: Source::Touch,
+            scan: 0.0,
+            straight: (0.0, 0.0),
+            least: f64::NEG_INFINITY,
+            is_free_end: false,
+            is_further: false,
+            touched_value: Some(value),
+            is_corner: false,
+            renewal: 0,
+        }
+    }
 
-impl ScanPrior {
-    /// The variance of a touch, m², unless the scan has no weight beside it: it moves a touch by gate × σₜ² / σₛ at most.
-    fn comparable(&self, of_touch: f64) -> Option<f64> {
-        (self.gate_sigmas * of_touch.sqrt() > NOTICED * self.sigma).then_some(of_touch)
+    /// Whether nothing is known here, so that the value is filled in.
+    pub fn is_open_question(&self) -> bool {
+        matches!(self.source, Source::Nothing | Source::Far)
+    }
+
+    /// Whether the skin differs from the scan here.
+    pub fn is_changed(&self) -> bool {
+        match self.source {
+            Source::Touch | Source::Both | Source::Nothing => true,
+            Source::Far => (self.value < 0.0) != (self.scan < 0.0),
+            Source::Scan | Source::Beyond => false,
+        }
+    }
+
+    /// Whether it shows another surface than `other`, by more than `slack` (m).
+    pub fn differs(&self, other: &Self, slack: f64) -> bool {
+        self.source != other.source
+            || (self.value < 0.0) != (other.value < 0.0)
+            || (self.value - other.value).abs() > slack
     }
 }
+
+/// The scan is not used where it moves a touch, which is by gate × σₜ² / σₛ at most, by less than this share of what that may be off
+/// anyway.
+const NOTICED: f64 = 0.1;
 
 /// All evidence.
 #[derive(Clone, Copy, Debug)]
@@ -125,27 +151,19 @@ pub(crate) struct Evidence<'a> {
     /// … and the tree over its faces
     pub tree: &'a FaceTree,
     /// how well the scan was known before; `None`: where something was touched it does not count
-    pub prior: Option<ScanPrior>,
-}
-
-/// How well the scan is known.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct ScanPrior {
-    /// standard deviation, m; more than 0
-    pub sigma: f64,
-    /// a scan that is off by more standard deviations shows something else
-    pub gate_sigmas: f64,
+    pub prior: Option<UncertaintyParams>,
 }
 
 impl Evidence<'_> {
-    /// The evidence at `x` (m, in O), with the scan's part in `scan`.
+    /// The field at `x` (m, in O), with the scan's part in `scan`, and cut off at ± `widest` (m).
     pub(in crate::reconstruct) fn beside(
         &self,
         scan: &ScanDistance,
         x: &Point3<f64>,
+        widest: f64,
         scratch: &mut FieldScratch,
-    ) -> Finding {
-        let touched = self.touched_beside(x, || Some(*scan), scratch);
+    ) -> NodeState {
+        let touched = self.touched(x, Some(scan), scratch);
         let (mut value, mut source) = match &touched {
             Some(touched) => self.beside_touches(touched, scan),
             None => (scan.value, self.away_from_touches(scan)),
@@ -164,29 +182,47 @@ impl Evidence<'_> {
             source = Source::Beyond;
         }
         let straight = touched.and_then(|touched| self.straight_on(&touched, scan));
-        Finding { value, source, is_corner, scan: scan.value, straight, swept_depth, is_free_end }
+        let is_swept = source != Source::Touch && swept_depth > 0.0;
+        let least = if is_swept { swept_depth.min(widest) } else { f64::NEG_INFINITY };
+        let value = value.clamp(-widest, widest).max(least);
+        NodeState {
+            value,
+            source,
+            scan: scan.value.clamp(-widest, widest),
+            straight: straight.map_or((0.0, 0.0), |(value, share)| (value.clamp(-widest, widest), share)),
+            least,
+            is_free_end: least > 0.0 && is_free_end && scan.value < -self.params.scan_reach,
+            is_further: false,
+            touched_value: (source == Source::Touch).then_some(value),
+            is_corner,
+            renewal: 0,
+        }
+    }
+
+    /// The scan as seen from `x` (m, in O); `None` where it has no face.
+    pub fn scan_at(&self, x: &Point3<f64>) -> Option<ScanDistance> {
+        ScanDistance::at(self.scan, self.tree, x)
     }
 
     /// The field of the touches at `x` (m, in O), which take the place of the scan by the gain σₛ² / (σₛ² + σₜ²) of the
     /// nearest one; `None` where none is within reach.
-    pub fn touched(&self, x: &Point3<f64>, scratch: &mut FieldScratch) -> Option<FieldValue> {
-        self.touched_beside(x, || ScanDistance::at(self.scan, self.tree, x), scratch)
-    }
-
-    fn touched_beside(
+    ///
+    /// - `scan`: as seen from there, where that is known.
+    pub fn touched(
         &self,
         x: &Point3<f64>,
-        scan: impl FnOnce() -> Option<ScanDistance>,
+        scan: Option<&ScanDistance>,
         scratch: &mut FieldScratch,
     ) -> Option<FieldValue> {
         let mut found = self.params.field.at(self.contacts, x, scratch)?;
         if let Some(prior) = self.prior
-            && found.value.abs() < prior.gate_sigmas * prior.sigma
-            && let Some(of_touch) = prior.comparable(self.contacts.variance(found.contact))
-            && let Some(scan) = scan()
+            && found.value.abs() < prior.gate_sigmas * prior.scan
+            && let of_touch = self.contacts.variance(found.contact)
+            && prior.gate_sigmas * of_touch.sqrt() > NOTICED * prior.scan
+            && let Some(scan) = scan.copied().or_else(|| self.scan_at(x))
         {
-            let is_alike = !scan.is_on_rim && scan.normal.dot(&found.gradient) > self.params.alike_cosine;
-            let (off, of_both) = (scan.value - found.value, of_touch + prior.sigma * prior.sigma);
+            let is_alike = !scan.is_on_rim && scan.normal.dot(&found.gradient) > ALIKE;
+            let (off, of_both) = (scan.value - found.value, of_touch + prior.scan * prior.scan);
             if is_alike && off * off < prior.gate_sigmas * prior.gate_sigmas * of_both {
                 found.value += off * of_touch / of_both;
             }
@@ -199,16 +235,16 @@ impl Evidence<'_> {
         let p = self.params;
         let lateral = touched.lateral();
         let support = match (touched.is_border, touched.is_fan) {
-            _ if touched.is_edge => p.edge_support,
-            (false, _) => p.inner_support,
-            (true, false) => p.border_support,
-            (true, true) => p.fan_support,
+            _ if touched.is_edge => EDGE_SUPPORT,
+            (false, _) => INNER_SUPPORT,
+            (true, false) => BORDER_SUPPORT,
+            (true, true) => FAN_SUPPORT,
         };
-        let is_supported = lateral <= support && touched.value.abs() <= p.touch_depth;
+        let is_supported = lateral <= support * p.radius && touched.value.abs() <= TOUCH_DEPTH * p.radius;
         if is_supported && (!touched.is_border || touched.is_edge) {
             return (touched.value, Source::Touch);
         }
-        let is_wall = scan.normal.dot(&touched.gradient) < p.alike_cosine;
+        let is_wall = scan.normal.dot(&touched.gradient) < ALIKE;
         let ends_at_wall = is_wall && scan.value > touched.value;
         if (ends_at_wall || !is_supported) && self.scan_holds(scan) {
             // a wall of the scan ends the surface that was touched
@@ -222,15 +258,15 @@ impl Evidence<'_> {
     fn straight_on(&self, touched: &FieldValue, scan: &ScanDistance) -> Option<(f64, f64)> {
         let p = self.params;
         let inside = (1.0 - scan.value / p.scan_reach).clamp(0.0, 1.0);
-        let share = (p.field.reach - touched.lateral()) / (p.field.reach - p.border_support);
-        let goes_on = !touched.is_fan && touched.value.abs() <= p.touch_depth;
+        let share = (p.field.reach - touched.lateral()) / (p.field.reach - BORDER_SUPPORT * p.radius);
+        let goes_on = !touched.is_fan && touched.value.abs() <= TOUCH_DEPTH * p.radius;
         goes_on.then(|| (touched.value, inside * share.clamp(0.0, 1.0).powi(2)))
     }
 
     /// Whether two touched surfaces go straight on into an inner corner, there where the field was evaluated last.
     fn is_corner(&self, touched: &FieldValue, scratch: &FieldScratch) -> bool {
         let p = self.params;
-        touched.value.abs() <= p.touch_depth && is_inner_corner(self.contacts, &p.field, p.radius, scratch)
+        touched.value.abs() <= TOUCH_DEPTH * p.radius && is_inner_corner(self.contacts, &p.field, p.radius, scratch)
     }
 
     fn away_from_touches(&self, scan: &ScanDistance) -> Source {
@@ -249,22 +285,23 @@ impl Evidence<'_> {
         if scan.value.abs() > p.scan_reach || scan.is_on_rim || self.is_swept_away(scan) {
             return false;
         }
+        let (scan_removal, wall_removal) = (SCAN_REMOVAL * p.radius, p.radius / WALL_REMOVAL);
         let mut holds = true;
-        self.contacts.near(&scan.foot, p.scan_removal, |distance_squared, index| {
+        self.contacts.near(&scan.foot, scan_removal, |distance_squared, index| {
             let contact = &self.contacts.means()[index as usize];
             let cosine = contact.normal.dot(&scan.normal);
             // a scan that faces a touched surface and is not clearly behind it leaves its wall no thickness; in front of
             // it the ball had no room for it
             let depth = contact.normal.dot(&(contact.point - scan.foot));
-            let is_pierced = cosine < -p.alike_cosine && depth < p.wall_removal;
-            let limit = if cosine > p.alike_cosine || is_pierced { p.scan_removal } else { p.wall_removal };
+            let is_pierced = cosine < -ALIKE && depth < wall_removal;
+            let limit = if cosine > ALIKE || is_pierced { scan_removal } else { wall_removal };
             holds &= distance_squared > limit * limit;
         });
         holds
     }
 
     fn is_swept_away(&self, scan: &ScanDistance) -> bool {
-        let limit = self.params.radius + self.params.swept_reach;
+        let limit = self.params.radius + SWEPT_REACH * self.params.radius;
         self.free_space.nearest(&scan.foot).is_some_and(|(distance, _)| distance < limit)
     }
 
@@ -272,14 +309,14 @@ impl Evidence<'_> {
     fn swept_depth(&self, x: &Point3<f64>) -> (f64, bool) {
         let p = self.params;
         let Some((distance, centre)) = self.free_space.nearest(x) else { return (f64::NEG_INFINITY, false) };
-        let depth = p.radius - p.swept_margin - distance;
+        let depth = p.radius - SWEPT_MARGIN * p.radius - distance;
         if depth <= 0.0 {
             return (depth, false);
         }
         let mut is_free = (x - centre)
             .try_normalize(0.0)
             .is_some_and(|direction| self.free_space.is_end(&centre, &direction, p.radius / 2.0));
-        self.contacts.near(&centre, p.free_reach, |_, _| is_free = false);
+        self.contacts.near(&centre, FREE_REACH * p.radius, |_, _| is_free = false);
         (depth, is_free)
     }
 }

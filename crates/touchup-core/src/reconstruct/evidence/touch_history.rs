@@ -34,42 +34,19 @@ pub(in crate::reconstruct) struct TouchHistory {
     pub free_space: FreeSpace,
     pub probed: ProbedLog,
     /// whether where the tip went counts; else `free_space` stays empty
-    keeps_free_space: bool,
+    pub keeps_free_space: bool,
     /// size of the tip, m
-    radius: f64,
+    pub radius: f64,
     /// radius of the tip when it is a ball, m
-    ball: Option<f64>,
+    pub ball: Option<f64>,
     /// stamp of the last touch that counts, ns
     pub until_ns: i64,
-    last_contact_ns: Option<i64>,
+    pub last_contact_ns: Option<i64>,
     /// the box around the scan in which contacts may be its own, once the scan is known
-    bounds: Option<[Point3<f64>; 2]>,
+    pub bounds: Option<[Point3<f64>; 2]>,
 }
 
 impl TouchHistory {
-    /// Without touches yet.
-    pub fn new(
-        contacts: ContactMap,
-        free_space: FreeSpace,
-        keeps_free_space: bool,
-        radius: f64,
-        ball: Option<f64>,
-    ) -> Self {
-        let until_ns = i64::MIN;
-        let probed = ProbedLog::new(ball);
-        Self {
-            contacts,
-            free_space,
-            probed,
-            keeps_free_space,
-            radius,
-            ball,
-            until_ns,
-            last_contact_ns: None,
-            bounds: None,
-        }
-    }
-
     pub fn keep(&mut self, touch: &TipTouch) {
         self.until_ns = touch.stamp_ns;
         let place = TipPlace { centre: touch.centre, axis: touch.axis };
@@ -130,46 +107,42 @@ impl TouchHistory {
             let [lo, hi] = scan.bounds();
             [lo.map(|x| x - outside), hi.map(|x| x + outside)]
         });
-        let mut changed: CellTable<u32, ()> = contacts.take_changed().into_iter().collect();
+        let mut changed = contacts.take_changed();
         let centres = free_space.take_changed();
         let mut doubtful = changed.clone();
         for centre in &centres {
-            contacts.near(centre, deepest, |_, at| add(&mut doubtful, at));
+            contacts.near(centre, deepest, |_, at| doubtful.insert(at, ()));
         }
         for (at, ()) in doubtful.iter() {
             let point = contacts.means()[at as usize].point;
             let is_refuted = free_space.nearest(&point).is_some_and(|(distance, _)| distance < deepest)
                 || is_elsewhere(&point, scan, tree, bounds, outside);
             if contacts.refute(at, is_refuted) {
-                add(&mut changed, at);
+                changed.insert(at, ());
             }
         }
         if let Some(radius) = self.ball {
             for (at, ()) in beside(contacts, &changed, f64::INFINITY).iter() {
                 let is_mixed = is_mixed(contacts, radius, at);
                 if contacts.mark_mixed(at, is_mixed) {
-                    add(&mut changed, at);
+                    changed.insert(at, ());
                 }
             }
         }
         for (at, ()) in beside(contacts, &changed, MOVED * FAN_WIDTH * *radius).iter() {
             if contacts.mark_fan(at, FAN_WIDTH * *radius, FAN_COSINE) {
-                add(&mut changed, at);
+                changed.insert(at, ());
             }
         }
         GridChanges { means: changed.iter().map(|(at, ())| contacts.means()[at as usize].point).collect(), centres }
     }
 }
 
-fn add(numbers: &mut CellTable<u32, ()>, number: u32) {
-    numbers.insert_with(number, || ());
-}
-
 /// These means and those within `reach` (m) of them, cut off at the reach of the store.
 fn beside(contacts: &ContactMap, means: &CellTable<u32, ()>, reach: f64) -> CellTable<u32, ()> {
     let mut beside = means.clone();
     for (at, ()) in means.iter() {
-        contacts.near_known(&contacts.means()[at as usize].point, reach, |_, other| add(&mut beside, other));
+        contacts.near_known(&contacts.means()[at as usize].point, reach, |_, other| beside.insert(other, ()));
     }
     beside
 }

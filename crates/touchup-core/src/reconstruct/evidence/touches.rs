@@ -8,11 +8,14 @@ use std::collections::VecDeque;
 
 use nalgebra::{Point3, Vector3};
 
-use crate::reconstruct::evidence::contact_uncertainty::{CalibrationParams, ContactSigma, ForceNoise};
+use crate::reconstruct::evidence::contact_uncertainty::{CalibrationParams, ContactSigma, RunningMedian};
 use crate::stylus::{
     ContactSample, Friction, FrictionCoefficient, LocalMotion, NormalEstimate, SettingError, Sliding, SmoothedMotion,
     TipBody, TipContact, TipPlace, TipShape, WIDEST_CONE_COSINE,
 };
+
+/// A touch whose normal is uncertain by this many degrees has half the weight: what curved pieces take for smooth.
+const UNCERTAIN_NORMAL: f64 = 5.0;
 
 /// How touches are found.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,8 +34,6 @@ pub struct TouchFinderParams {
     /// cosine of the widest friction cone accepted; `None`: friction is not estimated, the normal is the force. Default
     /// [`WIDEST_CONE_COSINE`].
     pub cone_cosine: Option<f64>,
-    /// a touch whose normal is uncertain by this much has half the weight, rad. Default 5°: what curved pieces take for smooth.
-    pub uncertain_normal: f64,
     /// what the calibration leaves uncertain; `None`: the uncertainty of a contact is not estimated
     pub calibration: Option<CalibrationParams>,
 }
@@ -47,7 +48,6 @@ impl TouchFinderParams {
             half_window_ns: 32_000_000,
             largest_gap_ns: 30_000_000,
             cone_cosine: Some(WIDEST_CONE_COSINE),
-            uncertain_normal: 5f64.to_radians(),
             calibration: None,
         }
     }
@@ -96,8 +96,10 @@ pub struct TouchFinder {
     params: TouchFinderParams,
     body: TipBody,
     friction: Option<Friction>,
-    noise: PathNoise,
-    shake: ForceNoise,
+    /// of the positions: of the distances from short pieces of the path to their parabolas, m
+    noise: RunningMedian,
+    /// of the steps of the force from one sample to the next, N
+    shake: RunningMedian,
     /// samples since the last gap, as far as a window may still need them
     held: VecDeque<WindowEntry>,
     /// the first of `held` whose touch has not been given out
@@ -112,8 +114,8 @@ impl TouchFinder {
             body: TipBody::new(params.shape, params.radius)?,
             params,
             friction: params.cone_cosine.map(|cosine| Friction::new(cosine.clamp(-1.0, 1.0).acos())),
-            noise: PathNoise::default(),
-            shake: ForceNoise::default(),
+            noise: RunningMedian { length: USUAL_NOISE, least: LEAST_NOISE },
+            shake: RunningMedian { length: USUAL_SHAKE, least: LEAST_SHAKE },
             held: VecDeque::new(),
             next: 0,
         })
@@ -126,7 +128,8 @@ impl TouchFinder {
             self.flush(&mut each);
         }
         if let Some(last) = self.held.back() {
-            self.shake.note(&last.force_o, &tip.force_o);
+            let step_squared = (tip.force_o - last.force_o).norm_squared();
+            self.shake.note(step_squared > self.shake.length * self.shake.length);
         }
         self.held.push_back(WindowEntry {
             stamp_ns: tip.stamp_ns,
@@ -165,24 +168,27 @@ impl TouchFinder {
         self.friction.iter_mut().for_each(Friction::lift);
     }
 
-    /// The normal under the ball, which has been in contact for the last `dt` (s); `None` without a force.
-    fn normal(&mut self, sliding: &Sliding, dt: f64) -> Option<NormalEstimate> {
-        let Some(friction) = &mut self.friction else { return NormalEstimate::of_force(&sliding.force_o) };
-        friction.observe(sliding, dt);
-        friction.normal(sliding)
-    }
-
     fn touch(&mut self, at: usize) -> TipTouch {
         let window = self.window(at);
         let motion = window.sums.motion();
-        let velocity_sigma = motion.velocity_gain * self.noise.sigma * SHARED_NOISE;
-        let sliding = Sliding { force_o: window.force / window.count(), velocity: motion.velocity, velocity_sigma };
+        let velocity_sigma = motion.velocity_gain * self.noise.length * SHARED_NOISE;
+        let sliding = Sliding {
+            force_o: window.force / (window.last - window.first + 1) as f64,
+            velocity: motion.velocity,
+            velocity_sigma,
+        };
         let place = TipPlace { centre: motion.centre, axis: self.held[at].axis };
         let mut contact = None;
         if window.is_alike && self.held[at].in_contact {
             let dt = if at > 0 { self.held[at].stamp_ns - self.held[at - 1].stamp_ns } else { 0 };
-            let found = self.normal(&sliding, dt as f64 * 1e-9);
-            contact = found.and_then(|estimate| self.contact(at, &motion, &sliding.force_o, &estimate));
+            let normal = match &mut self.friction {
+                Some(friction) => {
+                    friction.observe(&sliding, dt as f64 * 1e-9);
+                    friction.normal(&sliding)
+                }
+                None => NormalEstimate::of_force(&sliding.force_o),
+            };
+            contact = normal.and_then(|estimate| self.contact(at, &motion, &sliding.force_o, &estimate));
         } else {
             self.lift();
         }
@@ -195,11 +201,14 @@ impl TouchFinder {
         let longest = self.params.half_window_ns;
         let mut best = Window::new(&self.held[at], at, longest);
         best.widen(&self.held, at, longest / 8 * WINDOWS[0]);
-        self.noise.note(best.sums.motion().residual);
+        let residual = best.sums.motion().residual;
+        if residual.is_finite() {
+            self.noise.note(residual > self.noise.length);
+        }
         for eighths in &WINDOWS[1..] {
             let mut wider = best.clone();
             wider.widen(&self.held, at, longest / 8 * eighths);
-            if !wider.is_alike || wider.sums.motion().residual > ROUGH * self.noise.sigma {
+            if !wider.is_alike || wider.sums.motion().residual > ROUGH * self.noise.length {
                 break;
             }
             best = wider;
@@ -210,7 +219,7 @@ impl TouchFinder {
     /// Variance of the centre where even the shortest window is no parabola, as after an outlier: as much as the path is off
     /// it, in those of its noise. Such errors are alike in all of the window and do not average out in it.
     fn roughness(&self, motion: &SmoothedMotion) -> f64 {
-        let noise = self.noise.sigma.max(LEAST_ROUGH * self.params.radius);
+        let noise = self.noise.length.max(LEAST_ROUGH * self.params.radius);
         let residual = motion.residual / noise;
         let excess = (residual * residual - ROUGH * ROUGH).max(0.0) / motion.centre_gain;
         if excess.is_finite() { excess } else { 0.0 }
@@ -227,17 +236,19 @@ impl TouchFinder {
         let place = TipPlace { centre: motion.centre, axis };
         let TipContact { point, normal, is_vague } = self.body.touched(&place, &estimate.normal, estimate.sigma)?;
         let share = if is_vague { VAGUE } else { 1.0 };
-        let mut weight = share / (1.0 + (estimate.sigma / self.params.uncertain_normal).powi(2));
+        let mut weight = share / (1.0 + (estimate.sigma / UNCERTAIN_NORMAL.to_radians()).powi(2));
         let sigma = self.params.calibration.map_or_else(ContactSigma::default, |calibration| {
             weight /= 1.0 + self.roughness(motion);
             let softness = self.params.stiffness.map_or(0.0, |stiffness| 1.0 / stiffness);
-            ContactSigma::of(
-                &calibration,
-                [self.noise.sigma, self.shake.sigma() * softness].map(|noise| noise * motion.centre_gain.sqrt()),
-                force_o.dot(&normal) * softness,
-                estimate.sigma,
-                self.params.radius,
-            )
+            let both = [self.noise.length, self.shake.length / STEP_PER_SIGMA * softness];
+            let [pose, force] = both.map(|noise| noise * motion.centre_gain.sqrt());
+            let bend = force_o.dot(&normal) * softness;
+            ContactSigma {
+                noise: (pose * SHARED_POSE).hypot(force),
+                reach: self.params.radius * (1.0 - estimate.sigma.cos()),
+                calibration: calibration.position.hypot(calibration.stiffness_share * bend),
+                normal: estimate.sigma,
+            }
         });
         Some(SurfaceContact { point, normal, weight, stamp_ns, sigma })
     }
@@ -251,8 +262,20 @@ const WINDOWS: [i64; 4] = [3, 4, 6, 8];
 const ROUGH: f64 = 1.5;
 /// What the path of a calm hand over an edge is off a parabola, in radii.
 const LEAST_ROUGH: f64 = 0.02;
-/// Samples between two poses share their noise, so that it averages out more slowly than that of as many poses.
+/// Samples between two poses share their noise, so that it averages out more slowly than that of as many poses: in the velocity …
 const SHARED_NOISE: f64 = 1.3;
+/// … and, two of three samples sharing a pose, in the centre.
+const SHARED_POSE: f64 = 1.65;
+/// Lower bound of the noise of the positions, m: a good tracker at rest.
+const LEAST_NOISE: f64 = 1e-6;
+/// … and where it starts, m.
+const USUAL_NOISE: f64 = 0.03e-3;
+/// Lower bound of the steps of the force, N.
+const LEAST_SHAKE: f64 = 1e-4;
+/// … and where they start, N.
+const USUAL_SHAKE: f64 = 0.1;
+/// Median length of the difference of two vectors of unit noise per axis: √2 times that of χ with three degrees.
+const STEP_PER_SIGMA: f64 = 2.175;
 
 /// The samples around one.
 #[derive(Clone, Debug)]
@@ -273,10 +296,6 @@ impl Window {
         Self { first: at, last: at, sums, force: middle.force_o, is_alike: true }
     }
 
-    fn count(&self) -> f64 {
-        (self.last - self.first + 1) as f64
-    }
-
     /// Takes in all samples up to `half_ns` before and after.
     fn widen(&mut self, held: &VecDeque<WindowEntry>, at: usize, half_ns: i64) {
         let middle = held[at].stamp_ns;
@@ -294,34 +313,5 @@ impl Window {
         self.sums.add((entry.stamp_ns - middle.stamp_ns) as f64 * 1e-9, &entry.centre);
         self.force += entry.force_o;
         self.is_alike &= entry.in_contact == middle.in_contact;
-    }
-}
-
-/// Follows the noise of the positions: the median distance from short pieces of the path to their parabolas.
-#[derive(Clone, Debug)]
-struct PathNoise {
-    /// m
-    sigma: f64,
-}
-
-/// Step of the running median: converges within some hundred samples.
-const NOISE_STEP: f64 = 0.01;
-/// Lower bound, m: a good tracker at rest.
-const LEAST_NOISE: f64 = 1e-6;
-/// … and where it starts, m.
-const USUAL_NOISE: f64 = 0.03e-3;
-
-impl Default for PathNoise {
-    fn default() -> Self {
-        Self { sigma: USUAL_NOISE }
-    }
-}
-
-impl PathNoise {
-    fn note(&mut self, residual: f64) {
-        if residual.is_finite() {
-            let step = if residual > self.sigma { NOISE_STEP } else { -NOISE_STEP };
-            self.sigma = (self.sigma * (1.0 + step)).max(LEAST_NOISE);
-        }
     }
 }

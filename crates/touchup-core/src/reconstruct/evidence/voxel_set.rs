@@ -97,11 +97,7 @@ impl<T: Keyed> VoxelSet<T> {
     /// Exchanges the things of a cube with those that were kept; cubes inserted last go first.
     fn swap(&mut self, bin: LatticeNode, past: &mut Bucket<T>) {
         let before = past.take();
-        let there = match (before.is_some(), self.bins.get_mut(&bin)) {
-            (true, Some(things)) => Some(std::mem::take(things)),
-            (true, None) => None,
-            (false, _) => self.bins.remove(&bin),
-        };
+        let there = if before.is_some() { self.bins.get_mut(&bin).map(std::mem::take) } else { self.bins.remove(&bin) };
         there.iter().flatten().for_each(|thing| self.is_kept.insert(thing.key(self.cell), false));
         if let Some(before) = before {
             before.iter().for_each(|thing| self.is_kept.insert(thing.key(self.cell), true));

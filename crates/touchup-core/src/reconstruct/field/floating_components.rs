@@ -5,10 +5,9 @@
 
 use std::collections::VecDeque;
 
-use crate::reconstruct::evidence::point_evidence::{Evidence, Source};
-use crate::reconstruct::evidence::scan_distance::ScanDistance;
+use crate::reconstruct::evidence::point_evidence::{Evidence, NodeState, Source};
 use crate::reconstruct::field::grid::ReconstructionGrid;
-use crate::reconstruct::field::lattice::{Lattice, LatticeNode, neighbours};
+use crate::reconstruct::field::lattice::{LatticeNode, neighbours};
 use crate::reconstruct::table::CellTable;
 
 /// Nodes of a floating component at most: a plug eight radii wide and as high.
@@ -18,7 +17,6 @@ const MOST: usize = 4000;
 pub(in crate::reconstruct) fn floating_components(
     grid: &mut ReconstructionGrid,
     evidence: &Evidence<'_>,
-    lattice: &Lattice,
     at: &[u32],
 ) -> Vec<LatticeNode> {
     let mut floating_components = Vec::new();
@@ -29,7 +27,7 @@ pub(in crate::reconstruct) fn floating_components(
         // components of untouched scan stay
         let is_cut = matches!(state.source, Source::Nothing | Source::Far) && state.value < 0.0;
         if is_cut && !seen.contains(&node) {
-            floating_components.extend(floating(grid, evidence, lattice, node, &mut seen));
+            floating_components.extend(floating(grid, evidence, node, &mut seen));
         }
     }
     floating_components
@@ -39,7 +37,6 @@ pub(in crate::reconstruct) fn floating_components(
 fn floating(
     grid: &mut ReconstructionGrid,
     evidence: &Evidence<'_>,
-    lattice: &Lattice,
     start: LatticeNode,
     seen: &mut CellTable<LatticeNode, ()>,
 ) -> Vec<LatticeNode> {
@@ -48,14 +45,13 @@ fn floating(
     while let Some(node) = next.pop_front() {
         // what was reached before is attached, or would have been found to float with this component
         let is_known = !seen.insert_with(node, || ()).1;
-        if is_known || piece.len() > MOST || is_attached(grid, node) {
-            piece.iter().for_each(|(node, ())| {
-                seen.insert_with(node, || ());
-            });
+        let is_attached = |state: &NodeState| matches!(state.source, Source::Touch | Source::Beyond);
+        if is_known || piece.len() > MOST || grid.nodes.get(&node).is_some_and(is_attached) {
+            piece.iter().for_each(|(node, ())| seen.insert(node, ()));
             return Vec::new();
         }
         for other in neighbours(node) {
-            if is_material(grid, evidence, lattice, other) && piece.insert_with(other, || ()).1 {
+            if is_material(grid, evidence, other) && piece.insert_with(other, || ()).1 {
                 next.push_back(other);
             }
         }
@@ -63,18 +59,13 @@ fn floating(
     piece.iter().map(|(node, ())| node).collect()
 }
 
-/// Whether a node of the material cannot belong to a floating component.
-fn is_attached(grid: &ReconstructionGrid, node: LatticeNode) -> bool {
-    grid.nodes.get(&node).is_some_and(|state| matches!(state.source, Source::Touch | Source::Beyond))
-}
-
 /// Whether there is material at a node; beyond the evaluated nodes by the scan.
-fn is_material(grid: &mut ReconstructionGrid, evidence: &Evidence<'_>, lattice: &Lattice, node: LatticeNode) -> bool {
+fn is_material(grid: &mut ReconstructionGrid, evidence: &Evidence<'_>, node: LatticeNode) -> bool {
     if let Some(state) = grid.nodes.get(&node) {
         return state.value < 0.0;
     }
-    let scan = || ScanDistance::at(evidence.scan, evidence.tree, &lattice.position(node));
-    let is_inside = || scan().is_some_and(|scan| scan.value < 0.0);
+    let x = grid.lattice.position(node);
+    let is_inside = || evidence.scan_at(&x).is_some_and(|scan| scan.value < 0.0);
     let (at, _) = grid.beyond.insert_with(node, is_inside);
     grid.beyond.entry(at).1
 }

@@ -4,31 +4,10 @@
 //! and no island can arise. Where the ball was, f stays above the depth to which it was there. Deep in the material the
 //! scan's own distance pulls weakly, so that a pocket that was touched down to some depth gets a bottom.
 
-use crate::reconstruct::evidence::point_evidence::Source;
-use crate::reconstruct::field::grid::{NodeState, ReconstructionGrid, cell_at, node_at};
-use crate::reconstruct::field::lattice::{LatticeNode, Numbers, stepped};
+use crate::reconstruct::evidence::point_evidence::{NodeState, Source};
+use crate::reconstruct::field::grid::ReconstructionGrid;
+use crate::reconstruct::field::lattice::{self, LatticeNode, Numbers, cell_at, node_at};
 use crate::reconstruct::table::CellTable;
-
-/// Settings of [`harmonic_fill`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::reconstruct) struct HarmonicFillParams {
-    /// weight of the scan beside the six neighbours of a node that is far from it
-    pull: f64,
-    /// a node this near to the surface may be taken for one on its other side, m
-    nearly: f64,
-    /// changes below this end the relaxation, m
-    enough: f64,
-    /// a hole without a bottom is opened this far around where the ball left it, in cells
-    pub end_reach: i32,
-}
-
-impl HarmonicFillParams {
-    /// For cells of `pitch` and a ball of `radius` (m): the pull reaches two radii deep.
-    pub fn new(pitch: f64, radius: f64) -> Self {
-        let end_reach = (END_REACH * radius / pitch).ceil() as i32;
-        Self { pull: (pitch / (2.0 * radius)).powi(2), enough: 1e-6 * pitch, nearly: NEARLY * pitch, end_reach }
-    }
-}
 
 /// Over-relaxation that converges fast on domains some ten nodes across.
 const RELAXATION: f64 = 1.6;
@@ -44,6 +23,8 @@ const ALONE: usize = 5;
 const NEARLY: f64 = 0.5;
 /// Sweeps at most: twice what the largest gaps of the tested parts need.
 const SWEEPS: usize = 200;
+/// Changes below this share of the pitch end the relaxation.
+const ENOUGH: f64 = 1e-6;
 /// Radii around the end of a path within which a hole is opened: as wide as holes that a ball is let through.
 const END_REACH: f64 = 3.0;
 /// No neighbour.
@@ -53,25 +34,24 @@ const NONE: u32 = u32::MAX;
 /// stays as it is.
 ///
 /// - `numbers`: of the nodes around these.
-pub(in crate::reconstruct) fn harmonic_fill(
-    grid: &mut ReconstructionGrid,
-    at: &[u32],
-    numbers: &Numbers,
-    params: &HarmonicFillParams,
-) {
-    relax(grid, at, numbers, params);
+/// - `radius`: of the ball, m.
+pub(in crate::reconstruct) fn harmonic_fill(grid: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers, radius: f64) {
+    // it reaches two radii deep
+    let pull = (grid.lattice.pitch / (2.0 * radius)).powi(2);
+    relax(grid, at, numbers, pull);
     if drop_islands(grid, at, numbers) {
-        relax(grid, at, numbers, params);
+        relax(grid, at, numbers, pull);
     }
-    blunt(grid, at, numbers, params);
+    blunt(grid, at, numbers);
 }
 
 /// Takes nodes near the surface that differ from nearly all around them back to their side: tips and pits that noise makes
 /// where the surface passes through a node.
-fn blunt(grid: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers, params: &HarmonicFillParams) {
+fn blunt(grid: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers) {
+    let nearly = NEARLY * grid.lattice.pitch;
     for &at in at {
         let state = grid.nodes.entry(at).1;
-        if state.value.abs() < params.nearly && state.least <= 0.0 {
+        if state.value.abs() < nearly && state.least <= 0.0 {
             let is_other = |other: u32| (grid.nodes.entry(other).1.value < 0.0) != (state.value < 0.0);
             let around = neighbours(grid, at, numbers);
             if around.into_iter().filter(|&other| other != NONE && is_other(other)).count() >= ALONE {
@@ -94,13 +74,14 @@ struct OpenQuestion {
 }
 
 /// Successive over-relaxation, from below by the space that the ball went through.
-fn relax(grid: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers, params: &HarmonicFillParams) {
+///
+/// - `pull`: weight of the scan beside the six neighbours of a node that is far from it.
+fn relax(grid: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers, pull: f64) {
     let open: Vec<u32> = at.iter().copied().filter(|&at| grid.nodes.entry(at).1.is_open_question()).collect();
     // the values, gathered close together
     let mut met: CellTable<u32, f64> = CellTable::default();
     let mut number = |at: u32| met.insert_with(at, || grid.nodes.entry(at).1.value).0;
-    let questions: Vec<OpenQuestion> =
-        open.iter().map(|&at| question(grid, at, numbers, params, &mut number)).collect();
+    let questions: Vec<OpenQuestion> = open.iter().map(|&at| question(grid, at, numbers, pull, &mut number)).collect();
     let mut values: Vec<f64> = met.iter().map(|(_, value)| *value).collect();
     for _ in 0..SWEEPS {
         let mut largest = 0.0f64;
@@ -114,7 +95,7 @@ fn relax(grid: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers, params: &
             largest = largest.max((next - *value).abs());
             *value = next;
         }
-        if largest < params.enough {
+        if largest < ENOUGH * grid.lattice.pitch {
             break;
         }
     }
@@ -127,13 +108,13 @@ fn question(
     grid: &ReconstructionGrid,
     at: u32,
     numbers: &Numbers,
-    params: &HarmonicFillParams,
+    pull: f64,
     mut number: impl FnMut(u32) -> u32,
 ) -> OpenQuestion {
     let state = &grid.nodes.entry(at).1;
     let pull = match state.source {
         _ if state.is_further => FURTHER_PULL,
-        Source::Far => params.pull,
+        Source::Far => pull,
         _ => 0.0,
     };
     let (straight, share) = state.straight;
@@ -158,9 +139,7 @@ fn question(
 
 /// The nodes around one, as far as they are there and have a value.
 fn neighbours(grid: &ReconstructionGrid, at: u32, numbers: &Numbers) -> [u32; 6] {
-    let node = grid.nodes.entry(at).0;
-    std::array::from_fn(|i| {
-        let other = stepped(node, i / 2, if i % 2 == 0 { 1 } else { -1 });
+    lattice::neighbours(grid.nodes.entry(at).0).map(|other| {
         let index = numbers.of(&grid.nodes, &other);
         index.filter(|&index| grid.nodes.entry(index).1.source != Source::Beyond).unwrap_or(NONE)
     })
@@ -221,15 +200,16 @@ fn is_attached(grid: &ReconstructionGrid, piece: &mut Vec<u32>, seen: &mut [Visi
     goes_on || is_touched && piece.len() > SPECK
 }
 
+/// How far around the end of a path of a ball of `radius` (m) a hole is opened, in cells.
+pub(in crate::reconstruct) fn end_reach(grid: &ReconstructionGrid, radius: f64) -> i32 {
+    (END_REACH * radius / grid.lattice.pitch).ceil() as i32
+}
+
 /// The cells in which a filled surface depends on a ball that ended its path freely, from there to the nearest evidence within
 /// `reach` cells: a hole that the ball left at its far end has no bottom.
-pub(in crate::reconstruct) fn open_cells(
-    grid: &ReconstructionGrid,
-    ends: impl Iterator<Item = LatticeNode>,
-    reach: i32,
-) -> CellTable<LatticeNode, ()> {
+pub(in crate::reconstruct) fn open_cells(grid: &ReconstructionGrid, reach: i32) -> CellTable<LatticeNode, ()> {
     let is_end = |state: &NodeState| state.is_free_end && state.value <= state.least;
-    let ends = ends.filter(|end| grid.nodes.get(end).is_some_and(is_end));
+    let ends = grid.ends.iter().map(|(end, ())| end).filter(|end| grid.nodes.get(end).is_some_and(is_end));
     let mut cells: Vec<(LatticeNode, LatticeNode)> =
         ends.flat_map(|end| (0..8).map(move |corner| (cell_at(end, corner), end))).collect();
     let mut open = CellTable::default();
@@ -238,7 +218,7 @@ pub(in crate::reconstruct) fn open_cells(
         next += 1;
         let is_near = (0..3).map(|i| (cell[i] - end[i]).pow(2)).sum::<i32>() <= reach * reach;
         if is_near && is_unsupported_surface(grid, cell) && open.insert_with(cell, || ()).1 {
-            cells.extend((0..6).map(|i| (stepped(cell, i / 2, if i % 2 == 0 { 1 } else { -1 }), end)));
+            cells.extend(lattice::neighbours(cell).map(|cell| (cell, end)));
         }
     }
     open
@@ -260,32 +240,20 @@ fn is_unsupported_surface(grid: &ReconstructionGrid, cell: LatticeNode) -> bool 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reconstruct::field::lattice::CellBox;
+    use crate::reconstruct::field::lattice::{CellBox, Lattice};
 
     const PITCH: f64 = 0.75e-3;
     const BOX: CellBox = CellBox { lo: [0; 3], hi: [6; 3] };
 
     /// The signs of nodes that were touched everywhere, filled in: those of `value` (pitches) before, at each node.
     fn completed(value: impl Fn(LatticeNode) -> f64) -> ReconstructionGrid {
-        let state = |node: LatticeNode| NodeState {
-            value: value(node) * PITCH,
-            source: Source::Touch,
-            is_corner: false,
-            scan: 0.0,
-            straight: (0.0, 0.0),
-            least: f64::NEG_INFINITY,
-            is_free_end: false,
-            is_further: false,
-            touched_value: Some(value(node) * PITCH),
-            renewal: 0,
-        };
-        let mut grid = ReconstructionGrid::default();
+        let mut grid = ReconstructionGrid::new(Lattice { pitch: PITCH, ..Lattice::default() });
         BOX.each(|node| {
-            grid.nodes.insert(node, state(node));
+            grid.nodes.insert(node, NodeState::touched(value(node) * PITCH));
         });
         let at: Vec<u32> = (0..grid.nodes.len() as u32).collect();
         let numbers = Numbers::new(&grid.nodes, &BOX);
-        harmonic_fill(&mut grid, &at, &numbers, &HarmonicFillParams::new(PITCH, 1.5e-3));
+        harmonic_fill(&mut grid, &at, &numbers, 1.5e-3);
         grid
     }
 

@@ -32,9 +32,20 @@ pub(in crate::reconstruct) fn stepped(mut node: LatticeNode, axis: usize, count:
     node
 }
 
+/// Corner `corner` of a cell: bit i says whether it is the upper one along axis i.
+pub(in crate::reconstruct) fn node_at(cell: LatticeNode, corner: u8) -> LatticeNode {
+    std::array::from_fn(|i| cell[i].saturating_add(i32::from(corner >> i & 1)))
+}
+
+/// The cell that has `node` as its corner `corner`.
+pub(in crate::reconstruct) fn cell_at(node: LatticeNode, corner: u8) -> LatticeNode {
+    std::array::from_fn(|i| node[i].saturating_sub(i32::from(corner >> i & 1)))
+}
+
 /// The six nodes one step away.
-pub(in crate::reconstruct) fn neighbours(node: LatticeNode) -> impl Iterator<Item = LatticeNode> {
-    (0..6).map(move |i| stepped(node, i / 2, if i % 2 == 0 { 1 } else { -1 }))
+#[inline]
+pub(in crate::reconstruct) fn neighbours(node: LatticeNode) -> [LatticeNode; 6] {
+    std::array::from_fn(|i| stepped(node, i / 2, if i % 2 == 0 { 1 } else { -1 }))
 }
 
 /// The two axes that follow `axis`, so that (axis, u, v) is right-handed.
@@ -43,8 +54,23 @@ pub(in crate::reconstruct) fn across(axis: usize) -> (usize, usize) {
     ((axis + 1) % 3, (axis + 2) % 3)
 }
 
+/// The four nodes around a square across `axis`, counter-clockwise seen against it, from `node` by steps of `step`.
+#[inline]
+fn ring(node: LatticeNode, axis: u8, step: i32) -> [LatticeNode; 4] {
+    let (u, v) = across(axis as usize);
+    let beside = stepped(node, u, step);
+    [node, beside, stepped(beside, v, step), stepped(node, v, step)]
+}
+
+/// What lies between consecutive nodes of a [`ring`], by node and axis: edges where it goes up, squares where it goes down.
+#[inline]
+fn ring_sides(node: LatticeNode, axis: u8, step: i32) -> [(LatticeNode, u8); 4] {
+    let (u, v) = across(axis as usize);
+    [(node, u as u8), (stepped(node, u, step), v as u8), (stepped(node, v, step), u as u8), (node, v as u8)]
+}
+
 /// A cubic lattice in the object frame O.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Lattice {
     /// position of node (0, 0, 0), m, in O; best such that no coordinate of the scan falls on a plane of the lattice
     pub origin: Point3<f64>,
@@ -119,6 +145,12 @@ pub(in crate::reconstruct) struct CellBox {
     pub hi: LatticeNode,
 }
 
+impl Default for CellBox {
+    fn default() -> Self {
+        Self::EMPTY
+    }
+}
+
 impl CellBox {
     /// No cell.
     pub const EMPTY: Self = Self { lo: [i32::MAX; 3], hi: [i32::MIN; 3] };
@@ -140,6 +172,12 @@ impl CellBox {
         self.hi = std::array::from_fn(|i| self.hi[i].max(cell[i]));
     }
 
+    /// Takes in the cells from `below` cells below a cell to `above` cells above it, on each axis.
+    pub fn take_around(&mut self, cell: &LatticeNode, below: i32, above: i32) {
+        self.take(&cell.map(|x| x.saturating_sub(below)));
+        self.take(&cell.map(|x| x.saturating_add(above)));
+    }
+
     /// The cells in both.
     pub fn meet(&self, other: &Self) -> Self {
         let lo = std::array::from_fn(|i| self.lo[i].max(other.lo[i]));
@@ -153,10 +191,7 @@ impl CellBox {
 
     /// Number of cells: ∞ where it is beyond what a float can count.
     pub fn volume(&self) -> f64 {
-        if self.is_empty() {
-            return 0.0;
-        }
-        (0..3).map(|i| f64::from(self.hi[i]) - f64::from(self.lo[i]) + 1.0).product()
+        (0..3).map(|i| (f64::from(self.hi[i]) - f64::from(self.lo[i]) + 1.0).max(0.0)).product()
     }
 
     /// The cells, x slowest.
@@ -238,21 +273,12 @@ pub struct Edge {
 impl Edge {
     /// The four cells around it, counter-clockwise seen against `axis`.
     pub fn cells(&self) -> [LatticeNode; 4] {
-        let (u, v) = across(self.axis as usize);
-        let left = stepped(self.node, u, -1);
-        [self.node, left, stepped(left, v, -1), stepped(self.node, v, -1)]
+        ring(self.node, self.axis, -1)
     }
 
     /// The four squares that end at it: number i is between cells i and i + 1 of [`Self::cells`].
     pub fn squares(&self) -> [Square; 4] {
-        let (u, v) = across(self.axis as usize);
-        let square = |node, axis: usize| Square { node, axis: axis as u8 };
-        [
-            square(self.node, u),
-            square(stepped(self.node, u, -1), v),
-            square(stepped(self.node, v, -1), u),
-            square(self.node, v),
-        ]
+        ring_sides(self.node, self.axis, -1).map(|(node, axis)| Square { node, axis })
     }
 
     /// Its upper end.
@@ -281,16 +307,12 @@ pub struct Square {
 impl Square {
     /// Its corners, counter-clockwise seen against `axis`.
     pub fn corners(&self) -> [LatticeNode; 4] {
-        let (u, v) = across(self.axis as usize);
-        let right = stepped(self.node, u, 1);
-        [self.node, right, stepped(right, v, 1), stepped(self.node, v, 1)]
+        ring(self.node, self.axis, 1)
     }
 
     /// Its edges: number i joins corners i and i + 1 of [`Self::corners`].
     pub fn edges(&self) -> [Edge; 4] {
-        let (u, v) = across(self.axis as usize);
-        let edge = |node, axis: usize| Edge { node, axis: axis as u8 };
-        [edge(self.node, u), edge(stepped(self.node, u, 1), v), edge(stepped(self.node, v, 1), u), edge(self.node, v)]
+        ring_sides(self.node, self.axis, 1).map(|(node, axis)| Edge { node, axis })
     }
 
     /// The cell below it and the one above, along `axis`.

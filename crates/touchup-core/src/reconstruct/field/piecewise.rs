@@ -160,18 +160,19 @@ impl FieldParams {
         self.group(means, near, pieces);
         self.fit(means, x, near, pieces);
         let arm = means[nearest.index as usize].point - x;
-        let combined = self.combine(pieces, &arm)?;
-        *decides = combined.piece;
-        let members = near.iter().filter(|member| member.piece == combined.piece);
+        let (value, decisive, is_edge) = self.combine(pieces, &arm)?;
+        *decides = decisive as u32;
+        let gradient = pieces[decisive].facing;
+        let members = near.iter().filter(|member| member.piece == *decides);
         let arms = members.map(|member| means[member.index as usize].point - x);
         Some(FieldValue {
-            value: combined.value,
-            gradient: combined.gradient,
+            value,
+            gradient,
             nearest: nearest.distance_squared.sqrt(),
             contact: nearest.index,
             is_fan: means[nearest.index as usize].is_fan,
-            is_border: is_border(arms, &combined.gradient, UNDER * self.sigma, angles),
-            is_edge: combined.is_edge,
+            is_border: is_border(arms, &gradient, UNDER * self.sigma, angles),
+            is_edge,
         })
     }
 
@@ -238,9 +239,10 @@ impl FieldParams {
 
     /// Puts the pieces together around the nearest one with enough weight. The tilted planes of edges that the ball rolled
     /// over mean little from afar: such can only cut off. A piece that would cut off the nearest contact itself is refuted.
+    /// Returns the value, the number of the piece that decides, and whether there is an edge.
     ///
     /// - `arm`: from the point to that contact, m.
-    fn combine(&self, pieces: &[Piece], arm: &Vector3<f64>) -> Option<Combined> {
+    fn combine(&self, pieces: &[Piece], arm: &Vector3<f64>) -> Option<(f64, usize, bool)> {
         let is_flat = |at: usize| pieces[at].flat_weight >= self.least_weight;
         let is_tilted_afar =
             |at: usize| !is_flat(at) && pieces[at].nearest_squared > (TILTED_REACH * self.reach).powi(2);
@@ -270,7 +272,7 @@ impl FieldParams {
             is_edge |= is_near && meets && is_flat(first_at) && is_flat(at);
         }
         let (value, at) = solid.evaluate(taken, first_at);
-        Some(Combined { value, gradient: pieces[at].facing, is_edge, piece: at as u32 })
+        Some((value, at, is_edge))
     }
 
     /// With which of the pieces in the set `taken` another one makes a convex edge: with the others it makes a concave one.
@@ -293,15 +295,6 @@ impl FieldParams {
         }
         Some(convex)
     }
-}
-
-/// The pieces put together.
-struct Combined {
-    value: f64,
-    gradient: Vector3<f64>,
-    is_edge: bool,
-    /// the one that decides
-    piece: u32,
 }
 
 /// The half-spaces behind the pieces, put together to the solid whose edges are as the pieces meet: pieces that meet in

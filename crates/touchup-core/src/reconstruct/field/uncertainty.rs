@@ -1,4 +1,4 @@
-//! Uncertainty of the fit of the contacts at a point.
+//! Uncertainty of the fit of the contacts at a point, and of the vertices of a patched mesh.
 //!
 //! The fit is a weighted mean of the contacts around, so the noise of each enters by its weight, together with that of the
 //! others in the same smoothing window. That is all on a surface which the pieces describe. Where they do not, the contacts
@@ -6,7 +6,9 @@
 
 use nalgebra::Point3;
 
+use crate::reconstruct::contour::patched::Support;
 use crate::reconstruct::evidence::contact_map::ContactMap;
+use crate::reconstruct::evidence::point_evidence::Evidence;
 use crate::reconstruct::field::piecewise::{FieldParams, FieldScratch, FieldValue, PassShare};
 
 /// Uncertainty of the fit, by cause; standard deviations, m.
@@ -68,10 +70,11 @@ impl FieldParams {
             let arm = x - mean.point;
             let off = 0.5 * (mean.normal + piece.facing).dot(&arm);
             let lateral = (arm.norm_squared() - off * off).max(0.0).sqrt();
-            let sigma = store.sigma(member.index);
+            let sums = store.sums(member.index);
+            let sigma = sums.sigma();
             calibration += weight * sigma.calibration;
             scatter += weight * (off - piece.value()).powi(2);
-            shares.extend(store.passes(member.index).map(|pass| {
+            shares.extend(sums.passes.iter().map(|pass| {
                 let share = weight * pass.weight / mean.weight / f64::from(pass.count).sqrt();
                 let tilt = share * 0.5 * lateral * sigma.normal;
                 PassShare { began_ns: pass.began_ns, noise: share * sigma.noise.hypot(sigma.reach), tilt }
@@ -108,6 +111,40 @@ fn variances(shares: &[PassShare], correlation_ns: i64) -> [f64; 2] {
         }
     }
     sums
+}
+
+/// A vertex is off where it is not on the fit: edges and corners are put together of several pieces.
+const OFF_FIT: f64 = 1.4;
+/// A guess one radius from the nearest contact is off by this share of the radius; it grows with the square of the distance.
+const GUESS: f64 = 0.18;
+
+/// Standard deviation of a vertex along the normal, m.
+///
+/// - `scan`: that of a vertex of the scan, m.
+pub(in crate::reconstruct) fn vertex_sigma(
+    evidence: &Evidence<'_>,
+    p: &Point3<f64>,
+    support: Support,
+    scan: f64,
+    window_ns: i64,
+    scratch: &mut FieldScratch,
+) -> f64 {
+    if support == Support::Scan {
+        return scan;
+    }
+    let (field, radius) = (&evidence.params.field, evidence.params.radius);
+    let Some(found) = field.at(evidence.contacts, p, scratch) else {
+        return scan.hypot(guess(field.reach, radius));
+    };
+    let fit = field.sigma_of(&found, evidence.contacts, p, window_ns, scratch).total();
+    match support {
+        Support::Guessed => fit.hypot(guess(found.nearest, radius)),
+        _ => fit.hypot(OFF_FIT * found.value),
+    }
+}
+
+fn guess(distance: f64, radius: f64) -> f64 {
+    GUESS * distance * distance / radius
 }
 
 #[cfg(test)]

@@ -66,7 +66,7 @@ pub(in crate::reconstruct) struct PublishedPatch {
     gone: usize,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Placed {
     position: Point3<f64>,
     support: Support,
@@ -114,9 +114,10 @@ impl PublishedPatch {
             self.replace(owner, Vec::new(), &mut draft);
             self.forget(owner);
         }
-        for owner in renewed.scanned.iter().map(|&face| Owner::Scan(face)).filter(|owner| !next.contains(owner)) {
-            if self.faces.contains(&owner) {
-                self.replace(owner, whole(owner, scan), &mut draft);
+        for &face in &renewed.scanned {
+            let owner = Owner::Scan(face);
+            if !next.contains(&owner) && self.faces.contains(&owner) {
+                self.replace(owner, vec![scan.corners(face).map(VertexKey::Scan)], &mut draft);
             }
         }
         for (owner, faces) in next.iter() {
@@ -173,17 +174,12 @@ impl PublishedPatch {
         if is_new {
             match owner.node() {
                 None => self.gone += 1,
-                Some(node) => {
-                    let (block, _) = self.blocks.insert_with(block_of(node), Vec::new);
-                    self.blocks.value_mut(block).push(owner);
-                }
+                Some(node) => self.blocks.get_or_default(block_of(node)).push(owner),
             }
         }
         draft.delta.owners.push((owner, faces.len() as u32));
         for key in faces.iter().flatten() {
-            let unplaced = || Placed { position: Point3::origin(), support: Support::Scan, uses: 0 };
-            let (vertex, _) = self.vertices.insert_with(*key, unplaced);
-            self.vertices.value_mut(vertex).uses += 1;
+            self.vertices.get_or_default(*key).uses += 1;
         }
         draft.delta.faces.extend(faces.iter().map(|face| face.map(|key| draft.at.insert_with(key, || ()).0)));
         self.face_count += faces.len();
@@ -230,16 +226,7 @@ fn faces_by_owner(patch: &Patch) -> CellTable<Owner, Vec<NamedFace>> {
         by_owner.insert_with(Owner::Scan(*face), Vec::new);
     }
     for face in &patch.faces {
-        let (at, _) = by_owner.insert_with(face.owner, Vec::new);
-        by_owner.value_mut(at).push(face.corners.map(|vertex| patch.vertices.entry(vertex).0));
+        by_owner.get_or_default(face.owner).push(face.corners.map(|vertex| patch.vertices.entry(vertex).0));
     }
     by_owner
-}
-
-/// A whole face of the scan.
-fn whole(owner: Owner, scan: &TriMesh) -> Vec<NamedFace> {
-    match owner {
-        Owner::Scan(face) => vec![scan.corners(face).map(VertexKey::Scan)],
-        Owner::Edge(_) | Owner::Square(_) => Vec::new(),
-    }
 }

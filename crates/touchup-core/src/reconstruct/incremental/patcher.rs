@@ -6,17 +6,18 @@ use crate::mesh::{FaceTree, MeshError, Region, TriMesh};
 use crate::parameters;
 use crate::reconstruct::contour::new_faces::Patch;
 use crate::reconstruct::contour::patched::{Patched, Support};
-use crate::reconstruct::contour::vertex_uncertainty::vertex_sigma;
 use crate::reconstruct::evidence::contact_map::{ContactMap, GateParams};
-use crate::reconstruct::evidence::contact_uncertainty::CalibrationParams;
+use crate::reconstruct::evidence::contact_uncertainty::UncertaintyParams;
 use crate::reconstruct::evidence::free_space::FreeSpace;
 use crate::reconstruct::evidence::outliers::Outliers;
-use crate::reconstruct::evidence::point_evidence::{Evidence, EvidenceParams, ScanPrior, Source};
+use crate::reconstruct::evidence::point_evidence::{Evidence, EvidenceParams, NodeState, Source};
+use crate::reconstruct::evidence::probed_log::ProbedLog;
 use crate::reconstruct::evidence::touch_history::TouchHistory;
 use crate::reconstruct::evidence::touches::{TipTouch, TouchFinder, TouchFinderParams};
-use crate::reconstruct::field::grid::{GridChanges, NodeState, ReconstructionGrid, node_at};
-use crate::reconstruct::field::lattice::{CellBox, Lattice, LatticeNode, VertexKey};
+use crate::reconstruct::field::grid::{GridChanges, ReconstructionGrid};
+use crate::reconstruct::field::lattice::{CellBox, Lattice, LatticeNode, VertexKey, node_at};
 use crate::reconstruct::field::piecewise::FieldScratch;
+use crate::reconstruct::field::uncertainty::vertex_sigma;
 use crate::reconstruct::field::unreachable::mark_unreachable;
 use crate::reconstruct::incremental::delta::{PatchDelta, PublishedPatch};
 use crate::reconstruct::incremental::history::Direction;
@@ -65,28 +66,6 @@ parameters! {
     }
 }
 
-parameters! {
-    /// Which uncertainties are estimated.
-    #[derive(Clone, Copy, Debug, PartialEq)]
-    pub struct UncertaintyParams in "uncertainty" {
-        /// Standard deviation of a vertex of the scan, m; 0: free of noise.
-        scan: f64 = 0.0;
-        /// A contact that contradicts by more than this many standard deviations is rejected as an outlier.
-        gate_sigmas: f64 = 4.0, "gate_sigmas" [SIGMAS, 0.5, 1e6];
-    }
-    with {
-        /// What the calibration leaves.
-        calibration: CalibrationParams,
-    }
-}
-
-impl UncertaintyParams {
-    /// The defaults, for a scan whose points are off by `noise` (m).
-    pub fn new(noise: f64) -> Self {
-        Self { scan: noise, ..Self::default() }
-    }
-}
-
 impl PatcherParams {
     /// Settings that hold for a ball of `radius` (m) at a stylus of `stiffness` (N/m), and a scan whose points are off by
     /// `noise` (m).
@@ -118,14 +97,8 @@ impl PatcherParams {
     }
 
     /// How well the scan is known; a scan free of noise is no better than touches that contradict it.
-    fn scan_prior(&self) -> Option<ScanPrior> {
-        let UncertaintyParams { scan: sigma, gate_sigmas, .. } = self.uncertainty.filter(|known| known.scan > 0.0)?;
-        Some(ScanPrior { sigma, gate_sigmas })
-    }
-
-    /// How touches are found; the calibration uncertainty is evaluated with the others.
-    fn finder_params(&self) -> TouchFinderParams {
-        TouchFinderParams { calibration: self.uncertainty.map(|known| known.calibration), ..self.touches }
+    fn scan_prior(&self) -> Option<UncertaintyParams> {
+        self.uncertainty.filter(|known| known.scan > 0.0)
     }
 
     /// Settings for a tip of `shape` whose ball, flat end or nose has `radius` (m), else as [`Self::new`]. How far evidence
@@ -187,7 +160,7 @@ pub struct Patcher {
 }
 
 /// The patch that a mesh follows.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 struct LivePatch {
     remesh: Remesh,
     published: PublishedPatch,
@@ -208,15 +181,13 @@ impl LivePatch {
     /// What is to be taken in nearby, and what as a whole.
     fn take_changes(&mut self) -> (GridChanges, GridChanges) {
         let changes = std::mem::take(&mut self.changes);
+        self.late.extend(&changes);
         self.since_late += 1;
         if self.since_late < LATE_EVERY && !changes.is_empty() {
-            self.late.extend(&changes);
             return (changes, GridChanges::default());
         }
         self.since_late = 0;
-        let mut late = std::mem::take(&mut self.late);
-        late.extend(&changes);
-        (changes, late)
+        (changes, std::mem::take(&mut self.late))
     }
 }
 
@@ -239,19 +210,21 @@ impl Patcher {
     pub fn new(params: PatcherParams) -> Result<Self, SettingError> {
         params.check()?;
         let radius = params.evidence.radius;
+        let calibration = params.uncertainty.map(|known| known.calibration);
+        let body = TipBody::new(params.touches.shape, params.touches.radius)?;
         Ok(Self {
-            finder: TouchFinder::new(params.finder_params())?,
-            history: TouchHistory::new(
-                ContactMap::new(CONTACT_CELL * radius, params.evidence.field.reach, params.gate()),
-                FreeSpace::of_tip(
-                    TipBody::new(params.touches.shape, params.touches.radius)?,
-                    SWEPT_CELL * radius,
-                    5.0 / 3.0 * radius,
-                ),
-                params.free_space,
+            finder: TouchFinder::new(TouchFinderParams { calibration, ..params.touches })?,
+            history: TouchHistory {
+                contacts: ContactMap::new(CONTACT_CELL * radius, params.evidence.field.reach, params.gate()),
+                free_space: FreeSpace::new(body, SWEPT_CELL * radius, 5.0 / 3.0 * radius),
+                probed: ProbedLog::new(params.ball()),
+                keeps_free_space: params.free_space,
                 radius,
-                params.ball(),
-            ),
+                ball: params.ball(),
+                until_ns: i64::MIN,
+                last_contact_ns: None,
+                bounds: None,
+            },
             live: None,
             params,
         })
@@ -259,7 +232,7 @@ impl Patcher {
 
     /// What was rejected because it contradicted earlier contacts at its place.
     pub fn outliers(&self) -> &Outliers {
-        self.history.contacts.outliers()
+        &self.history.contacts.outliers
     }
 
     /// A copy of the touch history, without the state of a mesh that follows.
@@ -337,7 +310,7 @@ impl Patcher {
         let mut support = vec![Support::Scan; mesh.vertex_slots()];
         for ((key, _), id) in patch.vertices.iter().zip(ids) {
             if let Some(id) = id {
-                support[id.0 as usize] = support_of(&key, remesh.grid());
+                support[id.0 as usize] = support_of(&key, &remesh.grid);
             }
         }
         if let Some(radius) = self.params.ball() {
@@ -348,7 +321,7 @@ impl Patcher {
             mesh,
             support,
             sigma,
-            pitch: remesh.lattice().pitch,
+            pitch: remesh.grid.lattice.pitch,
             removed_faces: patch.removed.len(),
             added_faces: patch.faces.len(),
             open_squares: patch.open.len(),
@@ -357,10 +330,9 @@ impl Patcher {
 
     /// Standard deviation of each vertex, where the settings ask for it.
     fn sigma(&self, scan: &TriMesh, tree: &FaceTree, mesh: &TriMesh, support: &[Support]) -> Vec<f64> {
-        let Self { params, .. } = self;
-        let Some(uncertainty) = &params.uncertainty else { return Vec::new() };
+        let Some(uncertainty) = &self.params.uncertainty else { return Vec::new() };
         let evidence = Evidence { prior: None, ..self.evidence(scan, tree) };
-        let (window_ns, mut scratch) = (params.window_ns(), FieldScratch::default());
+        let (window_ns, mut scratch) = (self.params.window_ns(), FieldScratch::default());
         let mut of = |(p, &support)| vertex_sigma(&evidence, p, support, uncertainty.scan, window_ns, &mut scratch);
         mesh.positions().iter().zip(support).map(&mut of).collect()
     }
@@ -376,11 +348,8 @@ impl Patcher {
         self.update(scan, tree);
         let mut live = self.live.take().unwrap_or_else(|| LivePatch {
             remesh: Remesh::new(lattice_of(self.params.pitch)),
-            published: PublishedPatch::default(),
             changes: self.all_changes(),
-            late: GridChanges::default(),
-            since_late: 0,
-            is_outdated: false,
+            ..LivePatch::default()
         });
         let (changes, late) = live.take_changes();
         let faces = self.whole(scan) + live.published.faces_more();
@@ -393,8 +362,8 @@ impl Patcher {
         } else {
             live.remesh.renew(&self.evidence(scan, tree), &changes, &late)
         };
-        let support = |key: &VertexKey| support_of(key, live.remesh.grid());
-        let delta = live.published.take(&renewed, live.remesh.region(), scan, support);
+        let support = |key: &VertexKey| support_of(key, &live.remesh.grid);
+        let delta = live.published.take(&renewed, &live.remesh.region, scan, support);
         self.live = Some(live);
         PatchDelta { until_ns: self.history.until_ns, ..delta }
     }
@@ -443,7 +412,7 @@ impl Patcher {
                 break;
             }
             // the number of faces falls with the square of the pitch
-            made = meshed(made.0.lattice().pitch * 1.02 * (faces / budget).sqrt());
+            made = meshed(made.0.grid.lattice.pitch * 1.02 * (faces / budget).sqrt());
         }
         made
     }

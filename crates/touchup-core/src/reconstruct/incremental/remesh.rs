@@ -17,13 +17,10 @@ const GROWTH: usize = 3;
 const FURTHER: usize = 4;
 
 /// What is remeshed, and why.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(in crate::reconstruct) struct Remesh {
-    lattice: Lattice,
-    grid: ReconstructionGrid,
-    region: LatticeRegion,
-    /// cells that are in the region only because patch and scan cannot be joined at their squares
-    grown: CellTable<LatticeNode, ()>,
+    pub grid: ReconstructionGrid,
+    pub region: LatticeRegion,
     /// cells that patch and scan would need to be joined, without a value of the field
     wanted: CellTable<LatticeNode, ()>,
     /// a box that holds the region
@@ -45,32 +42,12 @@ pub(in crate::reconstruct) struct Renewed {
 impl Remesh {
     /// Nothing remeshed yet.
     pub fn new(lattice: Lattice) -> Self {
-        Self {
-            lattice,
-            grid: ReconstructionGrid::default(),
-            region: LatticeRegion::default(),
-            grown: CellTable::default(),
-            wanted: CellTable::default(),
-            bounds: CellBox::EMPTY,
-            crossings: Crossings::default(),
-        }
-    }
-
-    pub fn lattice(&self) -> &Lattice {
-        &self.lattice
-    }
-
-    pub fn grid(&self) -> &ReconstructionGrid {
-        &self.grid
-    }
-
-    pub fn region(&self) -> &LatticeRegion {
-        &self.region
+        Self { grid: ReconstructionGrid::new(lattice), ..Self::default() }
     }
 
     /// Updates everything by the changes of `evidence`: as [`ReconstructionGrid::renew`].
     pub fn renew(&mut self, evidence: &Evidence<'_>, changes: &GridChanges, late: &GridChanges) -> Renewed {
-        let mut changed = self.grid.renew(evidence, &self.lattice, changes, late);
+        let mut changed = self.grid.renew(evidence, changes, late);
         let (mut core, mut left) = (CellBox::EMPTY, Vec::new());
         for _ in 0..FURTHER {
             self.take_up(&changed, &mut core, &mut left);
@@ -80,7 +57,7 @@ impl Remesh {
             if beyond.is_empty() {
                 return renewed;
             }
-            changed = self.grid.look_further(evidence, &self.lattice, &beyond);
+            changed = self.grid.look_further(evidence, &beyond);
         }
         self.take_up(&changed, &mut core, &mut left);
         self.grow(evidence, core, &left)
@@ -93,12 +70,10 @@ impl Remesh {
     fn take_up(&mut self, changed: &Changed, core: &mut CellBox, left: &mut Vec<LatticeNode>) {
         for node in &changed.at_surface {
             // the slope at a crossing is taken over the nodes beside it
-            core.take(&node.map(|x| x.saturating_sub(2)));
-            core.take(&node.map(|x| x.saturating_add(1)));
+            core.take_around(node, 2, 1);
         }
         for (cell, ()) in cells_of(changed).iter() {
             let was_in = self.region.contains(&cell);
-            self.grown.remove(&cell);
             let is_in = self.grid.is_in_region(cell);
             if is_in && !was_in {
                 self.region.insert(cell, ());
@@ -108,10 +83,10 @@ impl Remesh {
                 left.push(cell);
             }
             if is_in != was_in || self.wanted.contains(&cell) {
-                take_around(core, &cell);
+                core.take_around(&cell, 1, 1);
             }
         }
-        changed.open.iter().for_each(|cell| take_around(core, cell));
+        changed.open.iter().for_each(|cell| core.take_around(cell, 1, 1));
     }
 
     /// Makes the faces around `core`, and takes cells into the region where they cannot be joined to the scan.
@@ -123,10 +98,9 @@ impl Remesh {
             let mut has_grown = false;
             for open in renewed.patch.open.iter().filter(|open| open.is_scanned && self.grid.can_take(open.beyond)) {
                 has_grown |= self.region.insert_with(open.beyond, || ()).1;
-                self.grown.insert_with(open.beyond, || ());
                 self.wanted.remove(&open.beyond);
                 self.bounds.take(&open.beyond);
-                take_around(&mut core, &open.beyond);
+                core.take_around(&open.beyond, 1, 1);
             }
             if !has_grown {
                 break;
@@ -140,7 +114,8 @@ impl Remesh {
     }
 
     fn contoured(&mut self, evidence: &Evidence<'_>, core: CellBox, left: &[LatticeNode]) -> Renewed {
-        let Self { lattice, grid, region, bounds, crossings, .. } = self;
+        let Self { grid, region, bounds, crossings, .. } = self;
+        let lattice = &grid.lattice;
         let (mut cells, around) = (left.to_vec(), core.widened(2, 2));
         around.each_in(region, |cell, ()| cells.push(cell));
         let mut scanned = faces_near(lattice, cells.into_iter(), evidence.tree);
@@ -148,13 +123,8 @@ impl Remesh {
         let cut = Cut::of_faces(lattice, region, bounds, evidence.scan, &scanned);
         let values = grid.values_in(&core.widened(1, 1));
         let patch = contour_in(lattice, region, &core, &values, &cut, &ContourParams::default(), |edge| {
-            crossings.at(grid, evidence, lattice, edge)
+            crossings.at(grid, evidence, edge)
         });
         Renewed { core, patch, scanned }
     }
-}
-
-fn take_around(cells: &mut CellBox, cell: &LatticeNode) {
-    cells.take(&cell.map(|x| x.saturating_sub(1)));
-    cells.take(&cell.map(|x| x.saturating_add(1)));
 }

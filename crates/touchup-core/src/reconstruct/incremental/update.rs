@@ -1,13 +1,10 @@
 //! Incremental update: the field is filled again around new evidence, and the changes are listed.
 
-use crate::reconstruct::evidence::point_evidence::{Evidence, Source};
-use crate::reconstruct::evidence::scan_distance::ScanDistance;
+use crate::reconstruct::evidence::point_evidence::{Evidence, NodeState, Source};
 use crate::reconstruct::field::floating_components::floating_components;
-use crate::reconstruct::field::grid::{Changed, NodeState, ReconstructionGrid, evaluate};
-use crate::reconstruct::field::harmonic_fill::{HarmonicFillParams, harmonic_fill, open_cells};
-use crate::reconstruct::field::lattice::{CellBox, Lattice, LatticeNode, Numbers, stepped};
-use crate::reconstruct::field::piecewise::FieldScratch;
-use crate::reconstruct::table::CellTable;
+use crate::reconstruct::field::grid::{Changed, EarlierStates, ReconstructionGrid};
+use crate::reconstruct::field::harmonic_fill::{end_reach, harmonic_fill, open_cells};
+use crate::reconstruct::field::lattice::{CellBox, LatticeNode, Numbers, stepped};
 
 /// A node whose value would change by less than this keeps it, in cells: 3 µm for a ball of 1.5 mm.
 const SLACK: f64 = 4e-3;
@@ -19,37 +16,36 @@ impl ReconstructionGrid {
     pub(in crate::reconstruct) fn update(
         &mut self,
         evidence: &Evidence<'_>,
-        lattice: &Lattice,
         area: &CellBox,
-        before: &CellTable<LatticeNode, Option<NodeState>>,
+        before: &EarlierStates,
     ) -> Changed {
         if area.is_empty() {
             return Changed::default();
         }
-        let params = HarmonicFillParams::new(lattice.pitch, evidence.params.radius);
+        let radius = evidence.params.radius;
         let mut area = area.widened(FILL_MARGIN, FILL_MARGIN);
         let (mut at, mut was) = self.known_in(&area, before);
         let mut numbers = Numbers::new(&self.nodes, &area);
-        harmonic_fill(self, &at, &numbers, &params);
-        let dropped = self.drop_floating_components(evidence, lattice, &at);
+        harmonic_fill(self, &at, &numbers, radius);
+        let dropped = self.drop_floating_components(evidence, &at);
         if !dropped.is_empty() {
             let known = at.iter().zip(was).map(|(&at, was)| (self.nodes.entry(at).0, was));
-            let mut before: CellTable<LatticeNode, Option<NodeState>> = known.collect();
-            for &(node, was) in &dropped {
-                before.insert_with(node, || was);
+            let mut before: EarlierStates = known.collect();
+            for (node, was) in dropped.iter() {
+                before.insert_with(node, || *was);
                 area.take(&node);
             }
             area = area.widened(FILL_MARGIN, FILL_MARGIN);
             (at, was) = self.known_in(&area, &before);
             numbers = Numbers::new(&self.nodes, &area);
-            harmonic_fill(self, &at, &numbers, &params);
+            harmonic_fill(self, &at, &numbers, radius);
         }
         let (mut changed, mut turned) = (Changed::default(), Vec::new());
         for (&at, was) in at.iter().zip(&was) {
             let (node, now) = *self.nodes.entry(at);
             let state = self.nodes.value_mut(at);
             match was {
-                Some(was) if !now.differs(was, SLACK * lattice.pitch) => {
+                Some(was) if !now.differs(was, SLACK * self.lattice.pitch) => {
                     (state.value, state.renewal) = (was.value.max(now.least), was.renewal);
                 }
                 _ => {
@@ -62,7 +58,7 @@ impl ReconstructionGrid {
         let nodes = changed.nodes.iter().zip(turned);
         let at_surface = nodes.filter(|(node, has_turned)| *has_turned || self.is_at_surface(&numbers, node));
         changed.at_surface = at_surface.map(|(node, _)| *node).collect();
-        changed.open = self.renew_open(&area, &params);
+        changed.open = self.renew_open(&area, radius);
         changed
     }
 
@@ -80,11 +76,7 @@ impl ReconstructionGrid {
     }
 
     /// The nodes in `area` and their earlier state: of `before`, or the current one.
-    fn known_in(
-        &self,
-        area: &CellBox,
-        before: &CellTable<LatticeNode, Option<NodeState>>,
-    ) -> (Vec<u32>, Vec<Option<NodeState>>) {
+    fn known_in(&self, area: &CellBox, before: &EarlierStates) -> (Vec<u32>, Vec<Option<NodeState>>) {
         let at = self.indices_in(area);
         let was = |&at: &u32| {
             let (node, state) = self.nodes.entry(at);
@@ -96,25 +88,14 @@ impl ReconstructionGrid {
 
     /// Drops floating components; returns its nodes and those beside them, with what was known there before:
     /// nothing beyond what was looked at.
-    fn drop_floating_components(
-        &mut self,
-        evidence: &Evidence<'_>,
-        lattice: &Lattice,
-        at: &[u32],
-    ) -> Vec<(LatticeNode, Option<NodeState>)> {
-        let floating_components = floating_components(self, evidence, lattice, at);
-        let mut dropped = Vec::new();
-        let mut scratch = FieldScratch::default();
+    fn drop_floating_components(&mut self, evidence: &Evidence<'_>, at: &[u32]) -> EarlierStates {
+        let floating_components = floating_components(self, evidence, at);
+        let mut dropped = EarlierStates::default();
         // the scan's faces go with it, up to the nodes on their other side
         let around = |&node: &LatticeNode| CellBox { lo: node, hi: node }.widened(1, 1).iter();
         for node in floating_components.iter().flat_map(around) {
-            let before = self.nodes.get(&node).copied();
-            dropped.push((node, before));
-            if before.is_none()
-                && let Some(scan) = ScanDistance::at(evidence.scan, evidence.tree, &lattice.position(node))
-            {
-                self.put(node, evaluate(evidence, lattice, node, &scan, &mut scratch), scan);
-            }
+            dropped.insert_with(node, || self.nodes.get(&node).copied());
+            self.add(evidence, node, false);
         }
         for node in &floating_components {
             if let Some(state) = self.nodes.get_mut(node) {
@@ -137,12 +118,13 @@ impl ReconstructionGrid {
     }
 
     /// Determines again which cells stay open, if a path ends near `area`; returns those for which that is new.
-    fn renew_open(&mut self, area: &CellBox, params: &HarmonicFillParams) -> Vec<LatticeNode> {
-        let near = area.widened(params.end_reach, params.end_reach);
+    fn renew_open(&mut self, area: &CellBox, radius: f64) -> Vec<LatticeNode> {
+        let reach = end_reach(self, radius);
+        let near = area.widened(reach, reach);
         if !self.ends.iter().any(|(end, ())| near.contains(&end)) && self.open.is_empty() {
             return Vec::new();
         }
-        let open = open_cells(self, self.ends.iter().map(|(end, ())| end), params.end_reach);
+        let open = open_cells(self, reach);
         let old = std::mem::replace(&mut self.open, open);
         let gone = old.iter().filter(|(cell, ())| !self.open.contains(cell));
         gone.chain(self.open.iter().filter(|(cell, ())| !old.contains(cell))).map(|(cell, ())| cell).collect()
