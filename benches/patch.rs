@@ -4,7 +4,7 @@ use divan::Bencher;
 use divan::counter::ItemsCount;
 use nalgebra::{Point3, Vector3};
 use touchup::mesh::{FaceTree, TriMesh, signed_distance};
-use touchup::reconstruct::{ContourParams, Crossing, Cut, Edge, Lattice, LatticeRegion, NodeValues, Patch, contour};
+use touchup::reconstruct::{Crossing, Cut, Edge, Lattice, LatticeRegion, NodeValues, Patch, contour};
 use touchup::sim::wavy;
 
 /// Pitch of the lattice, m.
@@ -68,7 +68,7 @@ impl Case {
             point[edge.axis as usize] += PITCH * a / (a - b);
             Crossing { point, normal: Vector3::z() }
         };
-        contour(&self.lattice, &self.region, &self.values, cut, &ContourParams::default(), crossing)
+        contour(&self.lattice, &self.region, &self.values, cut, crossing)
     }
 }
 

@@ -10,8 +10,7 @@ use touchup::io::mesh_file::{MeshUnit, read_mesh};
 use touchup::mesh::triangle::shape_quality;
 use touchup::mesh::{FaceId, FaceTree, TriMesh, VertexId, signed_distance};
 use touchup::reconstruct::{
-    ContourParams, Crossing, Cut, Edge, Lattice, LatticeNode, LatticeRegion, NodeValues, OpenSquare, Owner, Patch,
-    contour,
+    Crossing, Cut, Edge, Lattice, LatticeNode, LatticeRegion, NodeValues, OpenSquare, Owner, Patch, contour,
 };
 
 use crate::common::{grid, within};
@@ -60,7 +59,7 @@ fn patch_of(lattice: &Lattice, region: &LatticeRegion, scan: &TriMesh, tree: &Fa
     let values = node_values(lattice, region, field);
     let cut = Cut::new(lattice, region, scan, tree);
     assert!(cut.lost.is_empty());
-    contour(lattice, region, &values, &cut, &ContourParams::default(), |edge| crossing(lattice, field, edge))
+    contour(lattice, region, &values, &cut, |edge| crossing(lattice, field, edge))
 }
 
 fn nothing() -> TriMesh {
@@ -211,7 +210,9 @@ fn region_around(lattice: &Lattice, scan: &TriMesh, points: &[Point3<f64>], radi
 /// Adds what is beyond open squares that the scan crosses, until there are none: no region grows by more rounds than this.
 fn close_region(lattice: &Lattice, region: &mut LatticeRegion, scan: &TriMesh, tree: &FaceTree, field: Field) {
     for _ in 0..60 {
-        let open = Cut::new(lattice, region, scan, tree).open_squares(region, &node_values(lattice, region, field));
+        let (cut, values) = (Cut::new(lattice, region, scan, tree), node_values(lattice, region, field));
+        let crossing = |edge: &Edge| Crossing { point: lattice.position(edge.node), normal: Vector3::z() };
+        let open = contour(lattice, region, &values, &cut, crossing).open;
         let beyond: Vec<LatticeNode> = open.iter().filter(|open| open.is_scanned).map(|open| open.beyond).collect();
         if beyond.is_empty() {
             return;
@@ -499,7 +500,7 @@ fn random_crossings_give_a_closed_skin_without_intersections() {
         }
         let scan = nothing();
         let cut = Cut::new(&lattice, &region, &scan, &FaceTree::new(&scan));
-        let patch = contour(&lattice, &region, &values, &cut, &ContourParams::default(), |edge| {
+        let patch = contour(&lattice, &region, &values, &cut, |edge| {
             let mut point = lattice.position(edge.node);
             point[edge.axis as usize] += within(&mut rng, 0.0, PITCH);
             Crossing { point, normal: Vector3::from_fn(|_, _| within(&mut rng, -1.0, 1.0)).normalize() }

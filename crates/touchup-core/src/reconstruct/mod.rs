@@ -20,9 +20,8 @@ mod incremental;
 mod table;
 
 pub use contour::crossing::Crossing;
-pub use contour::dual_contouring::{ContourParams, contour};
-pub use contour::new_faces::Patch;
-pub use contour::patched::{Patched, Support};
+pub use contour::dual_contouring::contour;
+pub use contour::patched::{Patch, Patched, Support};
 pub use contour::scan_clipping::Cut;
 pub use contour::splice::Splice;
 pub use contour::trace::OpenSquare;

@@ -3,7 +3,7 @@
 //! Every new point is named by what it lies on and placed by that name alone, so the pieces of two neighbouring faces have
 //! the same points on their common edge. Which cell a piece lies in follows from the cuts, not from its coordinates.
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 use crate::mesh::{FaceId, TriMesh, VertexId};
 use crate::reconstruct::field::lattice::{Edge, Lattice, LatticeNode, Square, VertexKey, across, stepped};
@@ -47,7 +47,10 @@ pub(in crate::reconstruct) struct Corner {
 /// The pieces of one face.
 #[derive(Clone, Debug, Default)]
 pub(in crate::reconstruct) struct Pieces {
-    vertices: Vec<VertexId>,
+    pub face: FaceId,
+    /// of the face, unit
+    pub normal: Vector3<f64>,
+    vertices: [VertexId; 3],
     triangle: [Point3<f64>; 3],
     points: Vec<(PointSupport, Point3<f64>)>,
     pierces: CellTable<[i32; 3], u32>,
@@ -61,8 +64,7 @@ impl Pieces {
     /// Cuts a face by those planes of the lattice that lie between the cells from `lo` to `hi`; what lies beyond these
     /// cells is given to the outermost of them.
     pub fn cut(&mut self, mesh: &TriMesh, face: FaceId, lattice: &Lattice, lo: LatticeNode, hi: LatticeNode) {
-        self.vertices.clear();
-        self.vertices.extend(mesh.corners(face));
+        (self.face, self.normal, self.vertices) = (face, mesh.normal(face), mesh.corners(face));
         self.triangle = mesh.triangle(face);
         self.points.clear();
         self.points.extend((0..3).map(|i| (PointSupport::Corner(i), self.triangle[i as usize])));
@@ -99,7 +101,7 @@ impl Pieces {
     }
 
     /// The name of a point of a piece that lies in `cell`.
-    pub fn key(&self, face: FaceId, point: u32, cell: LatticeNode) -> VertexKey {
+    pub fn key(&self, point: u32, cell: LatticeNode) -> VertexKey {
         match self.place(point) {
             PointSupport::Corner(i) => VertexKey::Scan(self.vertices[i as usize]),
             PointSupport::Trace { side, axis, plane } => {
@@ -110,7 +112,7 @@ impl Pieces {
                 let (u, v) = across(axis as usize);
                 let mut node = cell;
                 (node[u], node[v]) = (planes[0], planes[1]);
-                VertexKey::Pierce(Edge { node, axis }, face)
+                VertexKey::Pierce(Edge { node, axis }, self.face)
             }
         }
     }
@@ -302,7 +304,7 @@ mod tests {
                     assert!((0..corners.len()).all(|i| at(i) >= lo && at(i) <= hi), "a piece leaves cell {cell:?}");
                 }
                 assert!((area - mesh.double_area_normal(face).norm()).abs() < 1e-12);
-                let key = |point| pieces.key(face, point, [0; 3]);
+                let key = |point| pieces.key(point, [0; 3]);
                 let is_common = |key: &VertexKey| matches!(key, VertexKey::Trace { ends, .. } if *ends == [VertexId(1), VertexId(2)]);
                 let all = (0..pieces.point_count() as u32).map(|i| (key(i), pieces.position(i)));
                 points.extend(all.filter(|(key, _)| is_common(key)));

@@ -52,9 +52,7 @@ pub(in crate::reconstruct) fn bend(
     let (a, b) = (m.dot(&p), n.dot(&q));
     let mut point = middle;
     (point[u], point[v]) = ((a * n.y - b * m.y) / turn, (m.x * b - n.x * a) / turn);
-    let mut size = [1; 3];
-    size[square.axis as usize] = 0;
-    lattice.clamped(point, square.node, size, INSET)
+    lattice.clamped(point, square.node, square.corners()[2], INSET)
 }
 
 /// Six times the signed volume of a tetrahedron.

@@ -6,38 +6,27 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::reconstruct::LatticeRegion;
-use crate::reconstruct::NodeValues;
 use crate::reconstruct::contour::crossing::Crossing;
 use crate::reconstruct::contour::dual::{bend, diagonal, passes, unfolded};
 use crate::reconstruct::contour::loops::{
     Loops, NONE, edge_corners, edge_of, number_in, ring_corners, ring_edges, segments, square_of,
 };
-use crate::reconstruct::contour::new_faces::Patch;
+use crate::reconstruct::contour::patched::Patch;
 use crate::reconstruct::contour::qef::Planes;
 use crate::reconstruct::contour::scan_clipping::{Cut, TraceSegment};
-use crate::reconstruct::contour::trace::Trace;
-use crate::reconstruct::field::lattice::{CellBox, Edge, Lattice, LatticeNode, Owner, PatchFace, Square, VertexKey};
+use crate::reconstruct::contour::trace::Polyline;
+use crate::reconstruct::field::lattice::{
+    CellBox, Edge, Lattice, LatticeNode, LatticeRegion, NodeValues, Owner, PatchFace, Square, VertexKey, node_at,
+};
 use crate::reconstruct::table::CellTable;
 
-/// Settings of [`contour`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ContourParams {
-    /// eigenvalues of a cell's planes below this share of their sum count as noise: two planes make an edge when they
-    /// are at more than 2 · atan √(share / (1 − share)) to each other, 37° for 0.1
-    pub flat_share: f64,
-    /// how far inside its cell a vertex stays, as a share of the pitch: what keeps triangles from losing their area
-    pub margin: f64,
-}
-
+/// Eigenvalues of a cell's planes below this share of their sum count as noise: two planes make an edge when they are at more than
+/// 2 · atan √(share / (1 − share)) to each other, 37°.
+const FLAT_SHARE: f64 = 0.1;
+/// How far inside its cell a vertex stays, as a share of the pitch: what keeps triangles from losing their area.
+const MARGIN: f64 = 1e-3;
 /// The middle of a fan may leave the surface by this share of the pitch to keep the fan from folding over.
 const DRIFT: f64 = 0.05;
-
-impl Default for ContourParams {
-    fn default() -> Self {
-        Self { flat_share: 0.1, margin: 1e-3 }
-    }
-}
 
 /// Meshes the zero set of a field inside `region` and joins it to the scan along the traces of `cut`.
 ///
@@ -49,10 +38,9 @@ pub fn contour(
     region: &LatticeRegion,
     values: &NodeValues,
     cut: &Cut,
-    params: &ContourParams,
     crossing: impl FnMut(&Edge) -> Crossing,
 ) -> Patch {
-    contour_in(lattice, region, &CellBox::ALL, values, cut, params, crossing)
+    contour_in(lattice, region, &CellBox::ALL, values, cut, crossing)
 }
 
 /// As [`contour`], but of the new faces those alone that touch a cell in `core`: what else is in the patch, and is stored
@@ -66,7 +54,6 @@ pub(in crate::reconstruct) fn contour_in(
     core: &CellBox,
     values: &NodeValues,
     cut: &Cut,
-    params: &ContourParams,
     crossing: impl FnMut(&Edge) -> Crossing,
 ) -> Patch {
     let patch = Patch {
@@ -81,15 +68,12 @@ pub(in crate::reconstruct) fn contour_in(
         core,
         values,
         cut,
-        params,
         crossing,
         cells: CellTable::default(),
         crossings: CellTable::default(),
         shared: CellTable::default(),
         fans: Vec::new(),
-        trace: Trace::default(),
         rim: Vec::new(),
-        segments: Vec::new(),
         planes: Planes::default(),
         moved: Vec::new(),
         patch,
@@ -98,11 +82,10 @@ pub(in crate::reconstruct) fn contour_in(
     for at in 0..skin.cells.len() as u32 {
         skin.close_edges(at);
     }
-    skin.close_rim();
-    for &(vertex, point) in &skin.moved {
-        *skin.patch.vertices.value_mut(vertex) = point;
-    }
-    skin.patch
+    let Skin { mut patch, fans, moved, .. } = skin;
+    patch.faces.extend(fans);
+    moved.into_iter().for_each(|(vertex, point)| *patch.vertices.value_mut(vertex) = point);
+    patch
 }
 
 /// A cell that the surface passes through.
@@ -129,24 +112,6 @@ impl SurfaceCell {
     }
 }
 
-/// A trace as one cell sees it: over square `side` from its edge `from` to its edge `to`, against the loop.
-#[derive(Clone, Copy, Debug)]
-struct Rim {
-    side: u8,
-    from: u8,
-    to: u8,
-    /// its segments, in [`Skin::segments`]
-    first: usize,
-    count: usize,
-}
-
-/// A triangle from a cell's vertex to a segment of a trace.
-struct FanTriangle {
-    square: Square,
-    vertex: u32,
-    segment: TraceSegment,
-}
-
 /// The skin while it is made.
 struct Skin<'a, F> {
     lattice: &'a Lattice,
@@ -154,18 +119,17 @@ struct Skin<'a, F> {
     core: &'a CellBox,
     values: &'a NodeValues,
     cut: &'a Cut,
-    params: &'a ContourParams,
     crossing: F,
     cells: CellTable<LatticeNode, SurfaceCell>,
     /// vertex and normal where the surface crosses an edge
     crossings: CellTable<Edge, (u32, Vector3<f64>)>,
     /// squares on which patch and scan meet
     shared: CellTable<Square, ()>,
-    fans: Vec<FanTriangle>,
-    trace: Trace,
-    /// the traces around the current cell, and their segments
-    rim: Vec<Rim>,
-    segments: Vec<TraceSegment>,
+    /// from the cells on the rim to the segments of the traces
+    fans: Vec<PatchFace>,
+    /// the traces around the current cell: the number of the square, and a polyline against the loop whose edges are numbered in
+    /// the cell
+    rim: Vec<(u8, Polyline)>,
     planes: Planes,
     /// middles of fans that are to be moved once all faces are made
     moved: Vec<(u32, Point3<f64>)>,
@@ -179,12 +143,18 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
         let is_crossed = material != 0 && material != u8::MAX;
         let mut loops = Loops::EMPTY;
         self.rim.clear();
-        self.segments.clear();
         for side in 0..6 {
             let square = square_of(node, side);
             let beyond = square.cells()[side as usize % 2];
-            if !self.region.contains(&beyond) && self.take_trace(side, &square, beyond) {
-                self.rim.iter().filter(|rim| rim.side == side).for_each(|rim| loops.link(rim.to, rim.from, side));
+            if !self.region.contains(&beyond)
+                && let Some(lines) = self.trace_on(&square, beyond)
+            {
+                let ring = ring_edges(side);
+                for line in lines {
+                    let (from, to) = (ring[line.from as usize], ring[line.to as usize]);
+                    loops.link(to, from, side);
+                    self.rim.push((side, Polyline { from, to, ..line }));
+                }
             } else if is_crossed {
                 let signs = ring_corners(side).map(|corner| material >> corner & 1 == 1);
                 let found = segments(signs, || self.is_joined(&square));
@@ -198,12 +168,10 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
 
     /// Bit i of the result: corner i is in the material. `None` where the field has no value.
     fn material(&self, cell: LatticeNode) -> Option<u8> {
-        let mut material = 0;
-        for corner in 0..8u8 {
-            let node = std::array::from_fn(|i| cell[i].saturating_add(i32::from(corner >> i & 1)));
-            material |= u8::from(*self.values.get(&node)? < 0.0) << corner;
-        }
-        Some(material)
+        (0..8).try_fold(0, |material, corner| {
+            let value = self.values.get(&node_at(cell, corner))?;
+            Some(material | u8::from(*value < 0.0) << corner)
+        })
     }
 
     /// Whether the material in opposite corners of a square is connected: the sign in the middle, the same for both cells.
@@ -211,29 +179,17 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
         square.corners().iter().filter_map(|node| self.values.get(node)).sum::<f64>() < 0.0
     }
 
-    /// Takes up the trace on a square on the rim of the region; whether patch and scan can meet there.
-    fn take_trace(&mut self, side: u8, square: &Square, beyond: LatticeNode) -> bool {
-        if !self.cut.trace_into(square, self.values, &mut self.trace) {
-            if square.cells().iter().any(|cell| self.core.contains(cell)) {
+    /// The trace on a square on the rim of the region; `None` where patch and scan cannot meet there.
+    fn trace_on(&mut self, square: &Square, beyond: LatticeNode) -> Option<Vec<Polyline>> {
+        let lines = self.cut.trace_on(square, self.values);
+        match &lines {
+            Some(lines) if !lines.is_empty() => self.shared.insert(*square, ()),
+            None if square.cells().iter().any(|cell| self.core.contains(cell)) => {
                 self.patch.open.push(self.cut.open_square(*square, beyond));
             }
-            return false;
+            _ => {}
         }
-        if self.trace.lines.is_empty() {
-            return true;
-        }
-        self.shared.insert(*square, ());
-        let ring = ring_edges(side);
-        let before = self.segments.len();
-        self.segments.extend_from_slice(&self.trace.segments);
-        self.rim.extend(self.trace.lines.iter().map(|line| Rim {
-            side,
-            from: ring[line.from as usize],
-            to: ring[line.to as usize],
-            first: before + line.first as usize,
-            count: line.count as usize,
-        }));
-        true
+        lines
     }
 
     /// One vertex for each loop of a cell.
@@ -244,9 +200,9 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
             let first = (0..12).find(|&edge| loop_at[edge as usize] == number).unwrap_or(0);
             self.gather_planes(node, loops, first);
             let mean = self.planes.mean();
-            let bounds = self.lattice.inner_box(node, self.params.margin);
+            let bounds = self.lattice.inner_box(node, MARGIN);
             let start = mean.sup(&bounds[0]).inf(&bounds[1]);
-            *point = if count == 1 { self.planes.solve(&start, self.params.flat_share, &bounds) } else { start };
+            *point = if count == 1 { self.planes.solve(&start, FLAT_SHARE, &bounds) } else { start };
         }
         // the crossings on the loops have their vertices by now
         let vertex = self.patch.vertices.len() as u32;
@@ -255,23 +211,23 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
         }
         let cell = SurfaceCell { material, loop_at, loops: count, vertex };
         self.cells.insert(node, cell);
-        for rim in self.rim.iter().filter(|_| self.core.contains(&node)) {
-            let (square, vertex) = (square_of(node, rim.side), cell.vertex_at(rim.from));
-            let segments = &self.segments[rim.first..][..rim.count];
-            self.fans.extend(segments.iter().map(|&segment| FanTriangle { square, vertex, segment }));
+        for (side, line) in self.rim.iter().filter(|_| self.core.contains(&node)) {
+            let (owner, vertex) = (Owner::Square(square_of(node, *side)), cell.vertex_at(line.from));
+            let corners = line.segments.iter().map(|segment| [vertex, segment.from, segment.to]);
+            self.fans.extend(corners.map(|corners| PatchFace { corners, owner }));
         }
     }
 
     /// The planes that the loop from edge `first` meets: one at each crossing, and along each trace those of the scan's
     /// faces, each with its share of the trace.
     fn gather_planes(&mut self, node: LatticeNode, loops: &Loops, first: u8) {
-        self.planes.clear();
+        self.planes.0.clear();
         for (edge, side) in loops.walk(first) {
             let (vertex, normal) = self.crossing(&edge_of(node, edge));
-            self.planes.push(self.patch.vertices.entry(vertex).1, normal, 1.0);
-            let Some(rim) = self.rim.iter().find(|rim| rim.side == side && rim.to == edge) else { continue };
+            self.planes.0.push((self.patch.vertices.entry(vertex).1, normal, 1.0));
+            let rim = self.rim.iter().find(|(of, line)| *of == side && line.to == edge);
+            let Some((_, Polyline { segments, .. })) = rim else { continue };
             let ends = |segment: &TraceSegment| [segment.from, segment.to].map(|v| self.patch.vertices.entry(v).1);
-            let segments = &self.segments[rim.first..][..rim.count];
             let length = |segment: &TraceSegment| {
                 let [a, b] = ends(segment);
                 (b - a).norm()
@@ -279,7 +235,7 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
             let total: f64 = segments.iter().map(length).sum();
             for segment in segments.iter().filter(|_| total > 0.0) {
                 let [a, b] = ends(segment);
-                self.planes.push(nalgebra::center(&a, &b), segment.normal, length(segment) / total);
+                self.planes.0.push((nalgebra::center(&a, &b), segment.normal, length(segment) / total));
             }
         }
     }
@@ -293,9 +249,7 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
             Some(pierced) => (pierced.vertex, pierced.normal),
             None => {
                 let Crossing { point, normal } = (self.crossing)(edge);
-                let mut size = [0; 3];
-                size[edge.axis as usize] = 1;
-                let point = self.lattice.clamped(point, edge.node, size, self.params.margin);
+                let point = self.lattice.clamped(point, edge.node, edge.end(), MARGIN);
                 let (vertex, _) = self.patch.vertices.insert_with(VertexKey::Edge(*edge), || point);
                 (vertex, normal)
             }
@@ -379,7 +333,7 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
             ring.iter_mut().for_each(|step| step.reverse());
         }
         let middle = at(centre);
-        let margin = self.params.margin * self.lattice.pitch;
+        let margin = MARGIN * self.lattice.pitch;
         let ends = [edge.node, edge.end()].map(|node| self.lattice.position(node) - middle);
         let within = ends.map(|end| end * (1.0 - margin / end.norm().max(margin)));
         let steps = ring.iter().filter(|[from, to]| from != to).copied().collect::<Vec<_>>();
@@ -427,14 +381,5 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
         // several loops in one cell stay disjoint as long as each keeps to the hull of its crossings
         let point = if is_plain { bend(self.lattice, square, &ends) } else { nalgebra::center(&ends[0].0, &ends[1].0) };
         Some(self.patch.vertices.insert_with(VertexKey::Square(*square, number), || point).0)
-    }
-
-    /// Joins the cells on the rim to the traces.
-    fn close_rim(&mut self) {
-        let faces = self.fans.iter().map(|fan| PatchFace {
-            corners: [fan.vertex, fan.segment.from, fan.segment.to],
-            owner: Owner::Square(fan.square),
-        });
-        self.patch.faces.extend(faces);
     }
 }

@@ -15,34 +15,23 @@ const PULL: f64 = 1e-3;
 
 /// Planes n·(x − p) = 0 with weights, to be met in the least-squares sense near the mean of their points.
 #[derive(Clone, Debug, Default)]
-pub(in crate::reconstruct) struct Planes {
-    list: Vec<WeightedPlane>,
-}
+pub(in crate::reconstruct) struct Planes(pub Vec<WeightedPlane>);
 
 /// A point, its unit normal, its weight.
-type WeightedPlane = (Point3<f64>, Vector3<f64>, f64);
+pub(in crate::reconstruct) type WeightedPlane = (Point3<f64>, Vector3<f64>, f64);
 
 impl Planes {
-    pub fn clear(&mut self) {
-        self.list.clear();
-    }
-
-    /// - `normal`: unit length
-    pub fn push(&mut self, point: Point3<f64>, normal: Vector3<f64>, weight: f64) {
-        self.list.push((point, normal, weight));
-    }
-
     /// Weighted mean of the points.
     pub fn mean(&self) -> Point3<f64> {
-        let total: f64 = self.list.iter().map(|(.., weight)| weight).sum();
-        Point3::from(self.list.iter().map(|(p, _, weight)| p.coords * *weight).sum::<Vector3<f64>>() / total)
+        let total: f64 = self.0.iter().map(|(.., weight)| weight).sum();
+        Point3::from(self.0.iter().map(|(p, _, weight)| p.coords * *weight).sum::<Vector3<f64>>() / total)
     }
 
     /// The point nearest to `start` at which Σ w (n·(x − p))² is least within the box from `lo` to `hi`, which holds
     /// `start`, and from which no part of the loop is seen from behind. Directions in which the sum of the w n nᵀ has an eigenvalue below `threshold` times their sum do not count.
     pub fn solve(&self, start: &Point3<f64>, threshold: f64, [lo, hi]: &[Point3<f64>; 2]) -> Point3<f64> {
         let (mut a, mut b) = (Matrix3::zeros(), Vector3::zeros());
-        for (p, n, weight) in &self.list {
+        for (p, n, weight) in &self.0 {
             let weighted = n * *weight;
             a += weighted * n.transpose();
             b += weighted * n.dot(&(p - start));
@@ -95,7 +84,7 @@ impl Planes {
 
     /// Each plane with the next, the last with the first.
     fn steps(&self) -> impl Iterator<Item = (&WeightedPlane, &WeightedPlane)> {
-        self.list.iter().zip(self.list.iter().cycle().skip(1))
+        self.0.iter().zip(self.0.iter().cycle().skip(1))
     }
 }
 
@@ -174,7 +163,7 @@ mod tests {
         let corner = Point3::new(0.3, -0.2, 0.5);
         for (i, wanted) in [[0.0, 0.0, 0.5], [0.3, 0.0, 0.5], [0.3, -0.2, 0.5]].into_iter().enumerate() {
             let axis = [2, 0, 1][i];
-            planes.push(corner, Vector3::ith(axis, 1.0), 1.0);
+            planes.0.push((corner, Vector3::ith(axis, 1.0), 1.0));
             let found = planes.solve(&Point3::origin(), 0.1, &[Point3::from([-1.0; 3]), Point3::from([1.0; 3])]);
             assert!((found - Point3::from(wanted)).norm() < 1e-15, "{found}");
         }
@@ -186,7 +175,7 @@ mod tests {
         // the line x = y leaves the box at x = 1: with the plane z = 0.5 that leaves one point
         let mut planes = Planes::default();
         for normal in [Vector3::new(1.0, -1.0, 0.0).normalize(), Vector3::z(), Vector3::x()] {
-            planes.push(Point3::new(3.0, 3.0, 0.5), normal, 1.0);
+            planes.0.push((Point3::new(3.0, 3.0, 0.5), normal, 1.0));
         }
         let bounds = [Point3::origin(), Point3::from([1.0; 3])];
         let found = planes.solve(&Point3::from([0.1; 3]), 0.05, &bounds);
@@ -197,7 +186,7 @@ mod tests {
     fn a_point_that_sees_the_loop_from_behind_goes_back() {
         let mut planes = Planes::default();
         for (x, y) in [(0.3, -0.3), (0.3, 0.3), (-0.3, 0.3), (-0.3, -0.3)] {
-            planes.push(Point3::new(x, y, 0.0), Vector3::z(), 1.0);
+            planes.0.push((Point3::new(x, y, 0.0), Vector3::z(), 1.0));
         }
         // over the square every step is seen from the front, beside it one is not
         let found = |x: f64| planes.unturned(&Point3::origin(), &Vector3::new(x, 0.0, 0.1)).x;
@@ -205,7 +194,7 @@ mod tests {
         assert_eq!(found(0.5), 0.25);
         assert_eq!(found(0.9), 0.225);
         // the reverse as well
-        planes.list.reverse();
+        planes.0.reverse();
         assert_eq!(planes.unturned(&Point3::origin(), &Vector3::new(0.9, 0.0, 0.1)).x, 0.225);
     }
 }

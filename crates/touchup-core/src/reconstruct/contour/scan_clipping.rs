@@ -3,11 +3,11 @@
 use nalgebra::{Point2, Point3, Vector3};
 
 use crate::mesh::{BoxQuery, FaceId, FaceTree, TriMesh};
-use crate::reconstruct::LatticeRegion;
-use crate::reconstruct::contour::boundary_loops::outline;
-use crate::reconstruct::contour::clip::{Pieces, PointSupport, wall};
+use crate::reconstruct::contour::clip::{Pieces, PointSupport, SideOrigin, wall};
 use crate::reconstruct::contour::triangulation::fill;
-use crate::reconstruct::field::lattice::{CellBox, Edge, Lattice, LatticeNode, Owner, PatchFace, Square, VertexKey};
+use crate::reconstruct::field::lattice::{
+    CellBox, Edge, Lattice, LatticeNode, LatticeRegion, Owner, PatchFace, Square, VertexKey,
+};
 use crate::reconstruct::table::{CellTable, Key};
 
 /// Side of the blocks of cells for which the faces nearby are looked up at once, in cells.
@@ -15,7 +15,7 @@ const BLOCK: i32 = 8;
 /// How far new points are moved within what they lie on, as a share of the pitch: some tools take collinear sides of
 /// coplanar faces for an intersection, and the cuts through one face leave them by the dozen.
 const LOOSENING: f64 = 1e-7;
-/// No segment.
+/// No vertex.
 const NONE: u32 = u32::MAX;
 
 /// A piece of a trace: where one face of the scan crosses one square that bounds the region. Walking from `from` to `to`
@@ -25,7 +25,6 @@ pub(in crate::reconstruct) struct TraceSegment {
     pub from: u32,
     pub to: u32,
     pub normal: Vector3<f64>,
-    next: u32,
 }
 
 /// Where the scan crosses an edge of the lattice.
@@ -52,9 +51,8 @@ pub struct Cut {
     /// vertices that the remainders and the traces use, m, in O
     pub vertices: CellTable<VertexKey, Point3<f64>>,
     pitch: f64,
-    segments: Vec<TraceSegment>,
-    /// the last segment of each square that the scan crosses on the rim of the region
-    squares: CellTable<Square, u32>,
+    /// the segments on each square on the rim of the region
+    segments: CellTable<Square, Vec<TraceSegment>>,
     pierced: CellTable<Edge, Pierced>,
 }
 
@@ -71,7 +69,9 @@ impl Cut {
     /// Clips `scan` at the squares that bound `region`.
     pub fn new(lattice: &Lattice, region: &LatticeRegion, scan: &TriMesh, tree: &FaceTree) -> Self {
         let faces = faces_near(lattice, region.iter().map(|(cell, ())| cell), tree);
-        Self::of_faces(lattice, region, &bounds_of(region), scan, &faces)
+        let mut bounds = CellBox::EMPTY;
+        region.iter().for_each(|(cell, ())| bounds.take(&cell));
+        Self::of_faces(lattice, region, &bounds, scan, &faces)
     }
 
     /// Clips `faces` of `scan`, each as a whole, at the squares that bound `region`.
@@ -87,19 +87,26 @@ impl Cut {
         let mut cut = Self { pitch: lattice.pitch, ..Self::default() };
         let mut scratch = Scratch::default();
         for &face in faces {
-            cut.take(lattice, region, scan, face, bounds, &mut scratch);
+            let cells = cells_around(lattice, scan, face);
+            let (mut held, mut count) = (CellBox::EMPTY, 0u32);
+            cells.meet(bounds).each_in(region, |cell, ()| {
+                held.take(&cell);
+                count += 1;
+            });
+            if count > 0 && f64::from(count) == cells.volume() {
+                cut.removed.push(face);
+            } else if count > 0 {
+                let CellBox { lo, hi } = cells.meet(&held.widened(1, 1));
+                scratch.pieces.cut(scan, face, lattice, lo, hi);
+                cut.take(region, &mut scratch, &scan.double_area_normal(face));
+            }
         }
         cut
     }
 
-    /// The segments on a square on the rim of the region.
+    /// The segments on a square on the rim of the region, the last one first.
     pub(in crate::reconstruct) fn segments_on(&self, square: &Square) -> impl Iterator<Item = &TraceSegment> + '_ {
-        let mut at = self.squares.get(square).copied().unwrap_or(NONE);
-        std::iter::from_fn(move || {
-            let segment = self.segments.get(at as usize)?;
-            at = segment.next;
-            Some(segment)
-        })
+        self.segments.get(square).into_iter().flat_map(|segments| segments.iter().rev())
     }
 
     /// Where the scan crosses an edge on the rim of the region.
@@ -107,87 +114,49 @@ impl Cut {
         self.pierced.get(edge)
     }
 
-    /// Clips one face.
-    fn take(
-        &mut self,
-        lattice: &Lattice,
-        region: &LatticeRegion,
-        scan: &TriMesh,
-        face: FaceId,
-        bounds: &CellBox,
-        scratch: &mut Scratch,
-    ) {
-        let cells = cells_around(lattice, scan, face);
-        let Some(held) = held_within(region, &cells, bounds) else { return };
-        if held.is_all {
-            self.removed.push(face);
-            return;
-        }
-        let CellBox { lo, hi } = cells.meet(&held.cells.widened(1, 1));
-        scratch.pieces.cut(scan, face, lattice, lo, hi);
-        if scratch.pieces.iter().all(|(cell, _)| !region.contains(&cell)) {
-            return;
-        }
-        self.removed.push(face);
-        scratch.vertex_of.clear();
-        scratch.vertex_of.resize(scratch.pieces.point_count(), NONE);
-        self.take_segments(region, face, scan.normal(face), scratch);
-        self.take_remainder(region, face, scan.double_area_normal(face), scratch);
-    }
-
-    /// Notes where the face crosses the rim of the region.
-    fn take_segments(&mut self, region: &LatticeRegion, face: FaceId, normal: Vector3<f64>, scratch: &mut Scratch) {
+    /// Takes in the pieces of a face, if the region holds any of them.
+    fn take(&mut self, region: &LatticeRegion, scratch: &mut Scratch, double_area_normal: &Vector3<f64>) {
         let Scratch { pieces, vertex_of, .. } = scratch;
+        if pieces.iter().all(|(cell, _)| !region.contains(&cell)) {
+            return;
+        }
+        self.removed.push(pieces.face);
+        vertex_of.clear();
+        vertex_of.resize(pieces.point_count(), NONE);
         for (cell, corners) in pieces.iter().filter(|(cell, _)| region.contains(cell)) {
             for (i, corner) in corners.iter().enumerate() {
                 let Some((square, beyond)) = wall(cell, corner.side) else { continue };
                 if region.contains(&beyond) {
                     continue;
                 }
-                let next = corners[(i + 1) % corners.len()];
-                let [from, to] = [corner.point, next.point]
-                    .map(|point| self.rim_vertex(pieces, face, point, cell, normal, vertex_of));
-                let last = self.segments.len() as u32;
-                let (at, is_new) = self.squares.insert_with(square, || last);
-                let before = if is_new { NONE } else { self.squares.entry(at).1 };
-                self.squares.insert(square, last);
-                self.segments.push(TraceSegment { from, to, normal, next: before });
+                let ends = [corner.point, corners[(i + 1) % corners.len()].point];
+                let [from, to] = ends.map(|point| self.vertex(pieces, point, cell, vertex_of));
+                self.segments.get_or_default(square).push(TraceSegment { from, to, normal: pieces.normal });
             }
         }
+        self.take_remainder(region, double_area_normal, scratch);
     }
 
-    /// The vertex of a point on the rim of the region; notes which edge of the lattice it is on.
-    fn rim_vertex(
-        &mut self,
-        pieces: &Pieces,
-        face: FaceId,
-        point: u32,
-        cell: LatticeNode,
-        normal: Vector3<f64>,
-        vertex_of: &mut [u32],
-    ) -> u32 {
-        let vertex = self.vertex(pieces, face, point, cell, vertex_of);
-        if let VertexKey::Pierce(edge, _) = self.vertices.entry(vertex).0 {
-            let new = Pierced { vertex, normal, face, is_repeated: false };
-            let (_, is_new) = self.pierced.insert_with(edge, || new);
-            if !is_new && let Some(known) = self.pierced.get_mut(&edge) {
-                known.is_repeated |= known.face != face;
-            }
+    /// The vertex of a point; notes which edge of the lattice it is on.
+    fn vertex(&mut self, pieces: &Pieces, point: u32, cell: LatticeNode, vertex_of: &mut [u32]) -> u32 {
+        let known = vertex_of[point as usize];
+        if known != NONE {
+            return known;
+        }
+        let key = pieces.key(point, cell);
+        let (vertex, _) = self.vertices.insert_with(key, || loosened(key, pieces.position(point), self.pitch));
+        vertex_of[point as usize] = vertex;
+        if let VertexKey::Pierce(edge, face) = key {
+            let new = || Pierced { vertex, normal: pieces.normal, face, is_repeated: false };
+            let (at, _) = self.pierced.insert_with(edge, new);
+            let known = self.pierced.value_mut(at);
+            known.is_repeated |= known.face != face;
         }
         vertex
     }
 
-    fn vertex(&mut self, pieces: &Pieces, face: FaceId, point: u32, cell: LatticeNode, vertex_of: &mut [u32]) -> u32 {
-        let known = &mut vertex_of[point as usize];
-        if *known == NONE {
-            let key = pieces.key(face, point, cell);
-            (*known, _) = self.vertices.insert_with(key, || loosened(key, pieces.position(point), self.pitch));
-        }
-        *known
-    }
-
     /// Fills what the region leaves of the face with triangles.
-    fn take_remainder(&mut self, region: &LatticeRegion, face: FaceId, normal: Vector3<f64>, scratch: &mut Scratch) {
+    fn take_remainder(&mut self, region: &LatticeRegion, normal: &Vector3<f64>, scratch: &mut Scratch) {
         let loops = outline(&scratch.pieces, region);
         let Scratch { pieces, vertex_of, plane } = scratch;
         // seen along the normal
@@ -200,7 +169,7 @@ impl Cut {
             Point2::new(x.dot(&across), x.dot(&up))
         }));
         let Some(triangles) = fill(plane, &loops) else {
-            self.lost.push(face);
+            self.lost.push(pieces.face);
             return;
         };
         for corners in triangles {
@@ -209,9 +178,9 @@ impl Cut {
                 debug_assert!(
                     vertex_of[point as usize] != NONE || !matches!(pieces.place(point), PointSupport::Pierce { .. })
                 );
-                self.vertex(pieces, face, point, [0; 3], vertex_of)
+                self.vertex(pieces, point, [0; 3], vertex_of)
             });
-            self.faces.push(PatchFace { corners, owner: Owner::Scan(face) });
+            self.faces.push(PatchFace { corners, owner: Owner::Scan(pieces.face) });
         }
     }
 }
@@ -237,31 +206,6 @@ pub(in crate::reconstruct) fn cells_around(lattice: &Lattice, scan: &TriMesh, fa
     CellBox { lo: lattice.cell_of(&lo), hi: lattice.cell_of(&hi) }
 }
 
-/// The cells of the region within a box.
-struct CellsInBox {
-    cells: CellBox,
-    is_all: bool,
-}
-
-/// The cells of the region in `cells`; `None` when there are none.
-fn held_within(region: &LatticeRegion, cells: &CellBox, bounds: &CellBox) -> Option<CellsInBox> {
-    let mut held = CellsInBox { cells: CellBox::EMPTY, is_all: false };
-    let mut count = 0u32;
-    cells.meet(bounds).each_in(region, |cell, ()| {
-        count += 1;
-        held.cells.take(&cell);
-    });
-    held.is_all = f64::from(count) == cells.volume();
-    (count > 0).then_some(held)
-}
-
-/// A box around the region.
-fn bounds_of(region: &LatticeRegion) -> CellBox {
-    let mut bounds = CellBox::EMPTY;
-    region.iter().for_each(|(cell, ())| bounds.take(&cell));
-    bounds
-}
-
 /// The faces of the scan that may meet any of `cells`, by id.
 pub(in crate::reconstruct) fn faces_near(
     lattice: &Lattice,
@@ -279,4 +223,60 @@ pub(in crate::reconstruct) fn faces_near(
     faces.sort_unstable();
     faces.dedup();
     faces
+}
+
+/// A side of a piece at which the part that stays ends.
+struct PieceRim {
+    from: u32,
+    to: u32,
+    side: SideOrigin,
+    piece: u32,
+    is_used: bool,
+}
+
+/// Loops around all pieces whose cells are not in the region.
+fn outline(pieces: &Pieces, region: &LatticeRegion) -> Vec<Vec<u32>> {
+    let mut rims = rims(pieces, region);
+    let mut loops = Vec::new();
+    for first in 0..rims.len() {
+        let mut corners = Vec::new();
+        let mut at = Some(first).filter(|&first| !rims[first].is_used);
+        while let Some(i) = at {
+            rims[i].is_used = true;
+            corners.push(i);
+            at = next(&rims, i);
+        }
+        loops.extend((corners.len() > 2).then(|| kept_points(pieces, &rims, &corners)));
+    }
+    loops
+}
+
+fn rims(pieces: &Pieces, region: &LatticeRegion) -> Vec<PieceRim> {
+    let ends_at =
+        |cell: LatticeNode, side: SideOrigin| wall(cell, side).is_none_or(|(_, beyond)| region.contains(&beyond));
+    let mut rims = Vec::new();
+    for (piece, (cell, corners)) in pieces.iter().enumerate().filter(|(_, (cell, _))| !region.contains(cell)) {
+        for (i, corner) in corners.iter().enumerate().filter(|(_, corner)| ends_at(cell, corner.side)) {
+            let to = corners[(i + 1) % corners.len()].point;
+            rims.push(PieceRim { from: corner.point, to, side: corner.side, piece: piece as u32, is_used: false });
+        }
+    }
+    rims
+}
+
+/// What follows side `i`: a side of the same piece first, so that two parts that meet at a point stay separate.
+fn next(rims: &[PieceRim], i: usize) -> Option<usize> {
+    let follows = |j: &usize| !rims[*j].is_used && rims[*j].from == rims[i].to;
+    let same = (0..rims.len()).find(|j| follows(j) && rims[*j].piece == rims[i].piece);
+    same.or_else(|| (0..rims.len()).find(follows))
+}
+
+/// The points of a loop, without those on a side of the face where neither this face nor its neighbour ends.
+fn kept_points(pieces: &Pieces, rims: &[PieceRim], corners: &[usize]) -> Vec<u32> {
+    let is_kept = |at: usize| {
+        let (before, here) = (&rims[corners[(at + corners.len() - 1) % corners.len()]], &rims[corners[at]]);
+        let is_trace = matches!(pieces.place(here.from), PointSupport::Trace { .. });
+        !(is_trace && before.side == here.side)
+    };
+    (0..corners.len()).filter(|&at| is_kept(at)).map(|at| rims[corners[at]].from).collect()
 }

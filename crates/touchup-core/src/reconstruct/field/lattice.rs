@@ -118,22 +118,12 @@ impl Lattice {
         [self.position(cell) + inset, self.position(cell.map(|x| x.saturating_add(1))) - inset]
     }
 
-    /// `p` brought into the box from `node` that spans `size` cells, `margin` (share of the pitch) inside where the box
-    /// has any extent.
+    /// `p` brought into the box from node `lo` to node `hi`, `margin` (share of the pitch) inside where the box has any extent.
     #[inline]
-    pub(in crate::reconstruct) fn clamped(
-        &self,
-        p: Point3<f64>,
-        node: LatticeNode,
-        size: [i32; 3],
-        margin: f64,
-    ) -> Point3<f64> {
+    pub(crate) fn clamped(&self, p: Point3<f64>, lo: LatticeNode, hi: LatticeNode, margin: f64) -> Point3<f64> {
         Point3::from(Vector3::from_fn(|i, _| {
-            if size[i] == 0 {
-                return self.coordinate(i, node[i]);
-            }
-            let (lo, hi) = (self.coordinate(i, node[i]), self.coordinate(i, node[i].saturating_add(size[i])));
-            p[i].max(lo + margin * self.pitch).min(hi - margin * self.pitch)
+            let [below, above] = [lo, hi].map(|node| self.coordinate(i, node[i]));
+            if lo[i] == hi[i] { below } else { p[i].max(below + margin * self.pitch).min(above - margin * self.pitch) }
         }))
     }
 }

@@ -4,8 +4,7 @@ use nalgebra::Point3;
 
 use crate::mesh::{FaceId, TriMesh};
 use crate::reconstruct::LatticeRegion;
-use crate::reconstruct::contour::new_faces::Patch;
-use crate::reconstruct::contour::patched::Support;
+use crate::reconstruct::contour::patched::{Patch, Support};
 use crate::reconstruct::field::lattice::{CellBox, LatticeNode, Owner, VertexKey};
 use crate::reconstruct::incremental::remesh::Renewed;
 use crate::reconstruct::table::CellTable;

@@ -4,8 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::mesh::{FaceTree, MeshError, Region, TriMesh};
 use crate::parameters;
-use crate::reconstruct::contour::new_faces::Patch;
-use crate::reconstruct::contour::patched::{Patched, Support};
+use crate::reconstruct::contour::patched::{Patch, Patched, Support};
 use crate::reconstruct::evidence::contact_map::{ContactMap, GateParams};
 use crate::reconstruct::evidence::contact_uncertainty::UncertaintyParams;
 use crate::reconstruct::evidence::free_space::FreeSpace;

@@ -3,8 +3,8 @@
 use crate::mesh::FaceId;
 use crate::reconstruct::LatticeRegion;
 use crate::reconstruct::contour::crossing::Crossings;
-use crate::reconstruct::contour::dual_contouring::{ContourParams, contour_in};
-use crate::reconstruct::contour::new_faces::Patch;
+use crate::reconstruct::contour::dual_contouring::contour_in;
+use crate::reconstruct::contour::patched::Patch;
 use crate::reconstruct::contour::scan_clipping::{Cut, cells_around, faces_near};
 use crate::reconstruct::evidence::point_evidence::Evidence;
 use crate::reconstruct::field::grid::{Changed, GridChanges, ReconstructionGrid, cells_of};
@@ -122,9 +122,7 @@ impl Remesh {
         scanned.retain(|&face| !cells_around(lattice, evidence.scan, face).meet(&around).is_empty());
         let cut = Cut::of_faces(lattice, region, bounds, evidence.scan, &scanned);
         let values = grid.values_in(&core.widened(1, 1));
-        let patch = contour_in(lattice, region, &core, &values, &cut, &ContourParams::default(), |edge| {
-            crossings.at(grid, evidence, edge)
-        });
+        let patch = contour_in(lattice, region, &core, &values, &cut, |edge| crossings.at(grid, evidence, edge));
         Renewed { core, patch, scanned }
     }
 }
