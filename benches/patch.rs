@@ -76,7 +76,7 @@ impl Case {
 #[divan::bench(args = FACES)]
 fn cut(bencher: Bencher, faces: usize) {
     let case = Case::new(faces);
-    assert!(!case.cut().removed.is_empty());
+    assert!(!case.cut().patch.removed.is_empty());
     bencher.counter(ItemsCount::new(case.surface_cells)).bench(|| case.cut());
 }
 

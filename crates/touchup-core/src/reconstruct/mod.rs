@@ -21,10 +21,9 @@ mod table;
 
 pub use contour::crossing::Crossing;
 pub use contour::dual_contouring::contour;
-pub use contour::patched::{Patch, Patched, Support};
+pub use contour::patched::{OpenSquare, Patch, Patched, Support};
 pub use contour::scan_clipping::Cut;
 pub use contour::splice::Splice;
-pub use contour::trace::OpenSquare;
 pub use evidence::contact_map::{ContactMap, GateParams, MeanContact, Verdict};
 pub use evidence::contact_uncertainty::{CalibrationParams, ContactSigma, UncertaintyParams};
 pub use evidence::outliers::{Outlier, Outliers};

@@ -138,11 +138,10 @@ impl<K: Key, V> CellTable<K, V> {
 
     /// Gives `key` the value `value`, in place of the one it had.
     pub fn insert(&mut self, key: K, value: V) {
-        match self.index_of(&key) {
-            Some(at) => self.entries[at as usize].1 = value,
-            None => {
-                self.insert_with(key, || value);
-            }
+        if let Some(known) = self.get_mut(&key) {
+            *known = value;
+        } else {
+            self.insert_with(key, || value);
         }
     }
 

@@ -56,12 +56,6 @@ pub(in crate::reconstruct) fn contour_in(
     cut: &Cut,
     crossing: impl FnMut(&Edge) -> Crossing,
 ) -> Patch {
-    let patch = Patch {
-        vertices: cut.vertices.clone(),
-        faces: cut.faces.clone(),
-        removed: cut.removed.clone(),
-        open: Vec::new(),
-    };
     let mut skin = Skin {
         lattice,
         region,
@@ -76,7 +70,7 @@ pub(in crate::reconstruct) fn contour_in(
         rim: Vec::new(),
         planes: Planes::default(),
         moved: Vec::new(),
-        patch,
+        patch: cut.patch.clone(),
     };
     core.widened(1, 1).each_in(region, |cell, ()| skin.take_cell(cell));
     for at in 0..skin.cells.len() as u32 {

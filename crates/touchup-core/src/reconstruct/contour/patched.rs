@@ -3,8 +3,7 @@
 use nalgebra::Point3;
 
 use crate::mesh::{FaceId, MeshError, TriMesh, VertexId};
-use crate::reconstruct::contour::trace::OpenSquare;
-use crate::reconstruct::field::lattice::{PatchFace, VertexKey};
+use crate::reconstruct::field::lattice::{LatticeNode, PatchFace, Square, VertexKey};
 use crate::reconstruct::table::CellTable;
 
 /// New faces for a region, and the faces of the scan that they replace.
@@ -46,6 +45,19 @@ impl Patch {
         }
         Ok((mesh, ids))
     }
+}
+
+/// A square on the rim of the region on which scan and field disagree: unless the cell beyond is added to the region, both
+/// end there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct OpenSquare {
+    /// the square
+    pub square: Square,
+    /// the cell on its other side, not in the region
+    pub beyond: LatticeNode,
+    /// whether the scan crosses the square; where it does not, the field goes on past the end of the scan and widening the
+    /// region would go on for ever
+    pub is_scanned: bool,
 }
 
 /// The evidence for a vertex, in the order of its numbers in files.

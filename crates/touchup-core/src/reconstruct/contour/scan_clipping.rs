@@ -4,6 +4,7 @@ use nalgebra::{Point2, Point3, Vector3};
 
 use crate::mesh::{BoxQuery, FaceId, FaceTree, TriMesh};
 use crate::reconstruct::contour::clip::{Pieces, PointSupport, SideOrigin, wall};
+use crate::reconstruct::contour::patched::Patch;
 use crate::reconstruct::contour::triangulation::fill;
 use crate::reconstruct::field::lattice::{
     CellBox, Edge, Lattice, LatticeNode, LatticeRegion, Owner, PatchFace, Square, VertexKey,
@@ -42,14 +43,11 @@ pub(in crate::reconstruct) struct Pierced {
 /// Depends on the scan and the region, not on the field.
 #[derive(Clone, Debug, Default)]
 pub struct Cut {
-    /// faces of the scan that the region holds or cuts, by id
-    pub removed: Vec<FaceId>,
-    /// what is left of the faces that it cuts
-    pub faces: Vec<PatchFace>,
+    /// the patch without new faces inside the region: the faces of the scan that the region holds or cuts, what is left of them, and
+    /// the vertices that the remainders and the traces use
+    pub patch: Patch,
     /// faces that it cuts so close to a corner that rounding hides what is left of them; they go without a remainder
     pub lost: Vec<FaceId>,
-    /// vertices that the remainders and the traces use, m, in O
-    pub vertices: CellTable<VertexKey, Point3<f64>>,
     pitch: f64,
     /// the segments on each square on the rim of the region
     segments: CellTable<Square, Vec<TraceSegment>>,
@@ -94,7 +92,7 @@ impl Cut {
                 count += 1;
             });
             if count > 0 && f64::from(count) == cells.volume() {
-                cut.removed.push(face);
+                cut.patch.removed.push(face);
             } else if count > 0 {
                 let CellBox { lo, hi } = cells.meet(&held.widened(1, 1));
                 scratch.pieces.cut(scan, face, lattice, lo, hi);
@@ -120,7 +118,7 @@ impl Cut {
         if pieces.iter().all(|(cell, _)| !region.contains(&cell)) {
             return;
         }
-        self.removed.push(pieces.face);
+        self.patch.removed.push(pieces.face);
         vertex_of.clear();
         vertex_of.resize(pieces.point_count(), NONE);
         for (cell, corners) in pieces.iter().filter(|(cell, _)| region.contains(cell)) {
@@ -144,7 +142,7 @@ impl Cut {
             return known;
         }
         let key = pieces.key(point, cell);
-        let (vertex, _) = self.vertices.insert_with(key, || loosened(key, pieces.position(point), self.pitch));
+        let (vertex, _) = self.patch.vertices.insert_with(key, || loosened(key, pieces.position(point), self.pitch));
         vertex_of[point as usize] = vertex;
         if let VertexKey::Pierce(edge, face) = key {
             let new = || Pierced { vertex, normal: pieces.normal, face, is_repeated: false };
@@ -180,7 +178,7 @@ impl Cut {
                 );
                 self.vertex(pieces, point, [0; 3], vertex_of)
             });
-            self.faces.push(PatchFace { corners, owner: Owner::Scan(pieces.face) });
+            self.patch.faces.push(PatchFace { corners, owner: Owner::Scan(pieces.face) });
         }
     }
 }

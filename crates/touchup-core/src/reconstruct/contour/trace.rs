@@ -2,21 +2,9 @@
 
 use nalgebra::{Point2, Point3};
 
+use crate::reconstruct::contour::patched::OpenSquare;
 use crate::reconstruct::contour::scan_clipping::{Cut, Pierced, TraceSegment};
 use crate::reconstruct::field::lattice::{Edge, LatticeNode, NodeValues, Square, VertexKey, across};
-
-/// A square on the rim of the region on which scan and field disagree: unless the cell beyond is added to the region, both
-/// end there.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct OpenSquare {
-    /// the square
-    pub square: Square,
-    /// the cell on its other side, not in the region
-    pub beyond: LatticeNode,
-    /// whether the scan crosses the square; where it does not, the field goes on past the end of the scan and widening the
-    /// region would go on for ever
-    pub is_scanned: bool,
-}
 
 /// A polyline in which the scan crosses a square, from one of the square's edges to another, by their numbers; walking along it
 /// with the normal of the scan up, the region is on the left.
@@ -69,7 +57,7 @@ impl Cut {
 
     /// Sorts segments into polylines from edge to edge; `None` where that does not use all of them.
     fn chain(&self, edges: &[Edge; 4], all: &[TraceSegment]) -> Option<Vec<Polyline>> {
-        let edge_at = |vertex: u32| match self.vertices.entry(vertex).0 {
+        let edge_at = |vertex: u32| match self.patch.vertices.entry(vertex).0 {
             VertexKey::Pierce(edge, _) => edges.iter().position(|&other| other == edge).map(|at| at as u8),
             _ => None,
         };
@@ -109,7 +97,7 @@ impl Cut {
     fn is_crossed(&self, square: &Square, lines: &[Polyline]) -> bool {
         let (u, v) = across(square.axis as usize);
         let flat = |vertex: u32| {
-            let p: &Point3<f64> = &self.vertices.entry(vertex).1;
+            let p: &Point3<f64> = &self.patch.vertices.entry(vertex).1;
             Point2::new(p[u], p[v])
         };
         let segments: Vec<&TraceSegment> = lines.iter().flat_map(|line| &line.segments).collect();

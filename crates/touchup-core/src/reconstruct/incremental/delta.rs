@@ -134,9 +134,6 @@ impl PublishedPatch {
 
     /// The owners with faces around the cells of `core`, those of the scan left out.
     fn owners_around(&self, core: &CellBox, region: &LatticeRegion) -> Vec<Owner> {
-        if core.is_empty() {
-            return Vec::new();
-        }
         let is_around = |owner: &Owner| match owner {
             Owner::Edge(edge) => edge.cells().iter().any(|cell| core.contains(cell)),
             // at the rim of the core, the square goes with the cell that is in the region
