@@ -32,7 +32,7 @@ fn of_curves(series: &[Series], x: &str, y: &str) -> String {
     let mut lines = line(std::iter::once("series".to_owned()).chain(columns.into_iter().flatten()));
     for series in series {
         for mark in &series.marks {
-            let numbers = [mark.x, mark.y].into_iter().flat_map(three).map(number);
+            let numbers = [mark.x, mark.y].into_iter().flat_map(Spread::numbers).map(number);
             lines += &line(std::iter::once(quoted(&series.name)).chain(numbers));
         }
     }
@@ -45,22 +45,18 @@ fn of_maps(panels: &[Panel], x: &str, y: &str, share_of: &str) -> String {
     for panel in panels {
         let cells = panel.ys.iter().flat_map(|y| panel.xs.iter().map(move |x| (x, y)));
         for ((x, y), share) in cells.zip(&panel.shares) {
-            let share = share.map_or_else(String::new, number);
+            let share = share.map(number).unwrap_or_default();
             lines += &line([quoted(&panel.name), number(*x), number(*y), share]);
         }
     }
     lines
 }
 
-fn three(spread: Spread) -> [f64; 3] {
-    [spread.median, spread.p10, spread.p90]
-}
-
 fn values(cell: &TableCell, has_spread: bool) -> Vec<String> {
     let mut values = match cell {
         TableCell::Text(text) => vec![quoted(text)],
         TableCell::Number(value) => vec![number(*value)],
-        TableCell::Spread(spread) => three(*spread).map(number).to_vec(),
+        TableCell::Spread(spread) => spread.numbers().map(number).to_vec(),
         TableCell::Empty => vec![String::new()],
     };
     values.resize(if has_spread { 3 } else { 1 }, String::new());

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use serde::Serialize;
 
-use super::figure::{Chapter, Drawing, Table};
+use super::figure::{Chapter, Drawing, Figure, Table};
 use super::{csv, page, plot};
 
 /// Why a report cannot be written down.
@@ -58,20 +58,24 @@ impl Report {
         self.check_names()?;
         let provenance = self.provenance();
         let looks = self.looks();
-        let mut files = vec![
-            OutputFile::new("report.html".to_owned(), page::html(self)),
-            OutputFile::new("report.json".to_owned(), serde_json::to_string_pretty(self)? + "\n"),
-        ];
-        for chapter in &self.chapters {
-            for figure in &chapter.figures {
-                files.push(OutputFile::new(format!("{}.svg", figure.id), plot::svg(figure, &looks, &provenance)));
-                files.push(OutputFile::new(format!("{}.csv", figure.id), csv::of_figure(figure)));
-            }
+        let mut files = Vec::new();
+        let mut add = |id: &str, ending: &str, text: String| {
+            files.push(OutputFile { name: format!("{id}.{ending}"), bytes: text.into_bytes() });
+        };
+        add("report", "html", page::html(self));
+        add("report", "json", serde_json::to_string_pretty(self)? + "\n");
+        for figure in self.figures() {
+            add(&figure.id, "svg", plot::svg(figure, &looks, &provenance));
+            add(&figure.id, "csv", csv::of_figure(figure));
         }
         for table in self.tables() {
-            files.push(OutputFile::new(format!("{}.csv", table.id), csv::of_table(table)));
+            add(&table.id, "csv", csv::of_table(table));
         }
         Ok(files)
+    }
+
+    fn figures(&self) -> impl Iterator<Item = &Figure> {
+        self.chapters.iter().flat_map(|chapter| &chapter.figures)
     }
 
     fn tables(&self) -> impl Iterator<Item = &Table> {
@@ -80,8 +84,7 @@ impl Report {
 
     /// One look for each series, the same in all figures.
     pub(super) fn looks(&self) -> plot::Looks {
-        let figures = self.chapters.iter().flat_map(|chapter| &chapter.figures);
-        plot::Looks::of(figures.filter_map(|figure| match &figure.drawing {
+        plot::Looks::of(self.figures().filter_map(|figure| match &figure.drawing {
             Drawing::Curves(series) => Some(series.iter().map(|series| series.name.as_str()).collect()),
             Drawing::Maps { .. } => None,
         }))
@@ -93,10 +96,9 @@ impl Report {
     }
 
     fn check_names(&self) -> Result<(), ReportError> {
-        let figures = self.chapters.iter().flat_map(|chapter| chapter.figures.iter().map(|figure| &figure.id));
         let tables = self.tables().map(|table| &table.id);
         let mut seen = BTreeSet::from(["report"]);
-        for id in figures.chain(tables) {
+        for id in self.figures().map(|figure| &figure.id).chain(tables) {
             if id.is_empty() || !id.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_') {
                 return Err(ReportError::BadName(id.clone()));
             }
@@ -105,11 +107,5 @@ impl Report {
             }
         }
         Ok(())
-    }
-}
-
-impl OutputFile {
-    fn new(name: String, text: String) -> Self {
-        Self { name, bytes: text.into_bytes() }
     }
 }

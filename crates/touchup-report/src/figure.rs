@@ -1,6 +1,6 @@
 //! What a report shows: figures and tables, as data. How they look is the matter of [`super::plot`] and [`super::page`].
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// How an axis is divided.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -37,7 +37,7 @@ impl Axis {
 
 /// A value with its spread over repeats: the median, and a tenth of the repeats on either side. One that was not repeated has
 /// none.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
     /// median, or the only value
     pub median: f64,
@@ -60,6 +60,11 @@ impl Spread {
     pub fn times(self, factor: f64) -> Self {
         Self { median: self.median * factor, p10: self.p10 * factor, p90: self.p90 * factor }
     }
+
+    /// Median, 10th and 90th percentile.
+    pub fn numbers(self) -> [f64; 3] {
+        [self.median, self.p10, self.p90]
+    }
 }
 
 impl From<f64> for Spread {
@@ -75,6 +80,13 @@ pub struct Mark {
     pub x: Spread,
     /// upward
     pub y: Spread,
+}
+
+impl Mark {
+    /// At values with a spread or without.
+    pub fn at(x: impl Into<Spread>, y: impl Into<Spread>) -> Self {
+        Self { x: x.into(), y: y.into() }
+    }
 }
 
 /// How a series is drawn.
@@ -98,6 +110,13 @@ pub struct Series {
     pub stroke: LineStroke,
     /// in the order in which they are joined
     pub marks: Vec<Mark>,
+}
+
+impl Series {
+    /// Of marks in the order in which they are joined.
+    pub fn new(name: impl Into<String>, stroke: LineStroke, marks: impl IntoIterator<Item = Mark>) -> Self {
+        Self { name: name.into(), stroke, marks: marks.into_iter().collect() }
+    }
 }
 
 /// One cell grid of a map: a share of 0 to 1 at each pair of values.
@@ -159,27 +178,28 @@ pub enum TableCell {
     Empty,
 }
 
-impl From<&str> for TableCell {
-    fn from(text: &str) -> Self {
-        Self::Text(text.to_owned())
-    }
+/// What a cell is made of.
+macro_rules! cells_of {
+    ($($value:ty => $cell:expr,)*) => {$(
+        impl From<$value> for TableCell {
+            fn from(value: $value) -> Self {
+                $cell(value)
+            }
+        }
+    )*};
 }
 
-impl From<String> for TableCell {
-    fn from(text: String) -> Self {
-        Self::Text(text)
-    }
+cells_of! {
+    &str => |text: &str| Self::Text(text.to_owned()),
+    String => Self::Text,
+    f64 => Self::Number,
+    usize => |count| Self::Number(count as f64),
+    Spread => Self::Spread,
 }
 
-impl From<f64> for TableCell {
-    fn from(value: f64) -> Self {
-        Self::Number(value)
-    }
-}
-
-impl From<Spread> for TableCell {
-    fn from(spread: Spread) -> Self {
-        Self::Spread(spread)
+impl<T: Into<TableCell>> From<Option<T>> for TableCell {
+    fn from(value: Option<T>) -> Self {
+        value.map_or(Self::Empty, T::into)
     }
 }
 
@@ -196,6 +216,40 @@ pub struct Table {
     pub heads: Vec<String>,
     /// one a line, each as long as `heads`
     pub rows: Vec<Vec<TableCell>>,
+}
+
+impl Table {
+    /// Begins a table of these rows; its columns come one by one.
+    pub fn of<R: Copy>(
+        id: &str,
+        title: &str,
+        caption: impl Into<String>,
+        rows: impl IntoIterator<Item = R>,
+    ) -> TableOf<R> {
+        let [id, title] = [id, title].map(str::to_owned);
+        let rows: Vec<R> = rows.into_iter().collect();
+        let cells = vec![Vec::new(); rows.len()];
+        TableOf { rows, table: Self { id, title, caption: caption.into(), heads: Vec::new(), rows: cells } }
+    }
+}
+
+/// A table that grows column by column.
+pub struct TableOf<R> {
+    rows: Vec<R>,
+    /// with the columns so far
+    pub table: Table,
+}
+
+impl<R: Copy> TableOf<R> {
+    /// Adds a column: its head with the unit, and what it shows of each row.
+    #[must_use]
+    pub fn column<C: Into<TableCell>>(mut self, head: impl Into<String>, cell: impl Fn(R) -> C) -> Self {
+        self.table.heads.push(head.into());
+        for (cells, row) in self.table.rows.iter_mut().zip(&self.rows) {
+            cells.push(cell(*row).into());
+        }
+        self
+    }
 }
 
 /// One part of the report.

@@ -25,12 +25,12 @@ pub use convergence::{
 };
 pub use document::{OutputFile, Report, ReportError};
 pub use extremes::{Extreme, Extremes, extremes};
-pub use figure::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Panel, Scale, Series, Spread, Table, TableCell};
+pub use figure::{
+    Axis, Chapter, Drawing, Figure, LineStroke, Mark, Panel, Scale, Series, Spread, Table, TableCell, TableOf,
+};
 pub use number::three_digits;
 pub use peers::Peers;
-pub use stability::{
-    BadShape, FaceShares, Integrator, MeshShares, RunEnding, ShareMap, Stability, SubFlowError, stability,
-};
+pub use stability::{BadShape, FaceShares, Integrator, MeshShares, RunEnding, ShareMap, Stability, SubFlowError, stability};
 pub use whole_scan::{
     CaseResult, ContactSculptor, GaussianCost, GaussianParams, GaussianProcess, GaussianSurface, GivenPart,
     MethodResult, Reach, RefineMethod, ScanResult, TouchedError, WholeScan, WholeScanError, whole_scan,
@@ -49,4 +49,11 @@ impl Effort {
     pub fn choose<T>(self, quick: T, full: T) -> T {
         if self.is_quick { quick } else { full }
     }
+}
+
+/// Seconds that some work takes, and its result.
+fn timed<T>(work: impl FnOnce() -> T) -> (f64, T) {
+    let started = std::time::Instant::now();
+    let result = std::hint::black_box(work());
+    (started.elapsed().as_secs_f64(), result)
 }

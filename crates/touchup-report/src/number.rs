@@ -33,6 +33,11 @@ pub fn power_of_ten(exponent: i32) -> String {
     format!("10{sign}{}", raised.collect::<String>())
 }
 
+/// The smallest and the largest; `None` where there are none.
+pub fn range(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
+    values.into_iter().map(|value| (value, value)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+}
+
 fn trimmed(digits: &str) -> String {
     if digits.contains('.') { digits.trim_end_matches('0').trim_end_matches('.').to_owned() } else { digits.to_owned() }
 }
