@@ -3,12 +3,12 @@
 mod face;
 mod mesh;
 
-use serde::Serialize;
+use std::fmt::Display;
 
 use super::{Chapter, Table};
 
 /// One extreme.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Extreme {
     /// the input
     pub fed: String,
@@ -21,17 +21,23 @@ pub struct Extreme {
 }
 
 /// All of them.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Extremes {
     /// on one face, then on meshes
     pub rows: Vec<Extreme>,
 }
 
-/// The outcome in words, and whether it is right.
-type CaseOutcome = (String, bool);
+/// The outcome in words, and whether it is right; an error where none would be.
+type CaseOutcome<E> = Result<(String, bool), E>;
 
-fn extreme(fed: &str, right_answer: &str, (came_out, is_right): CaseOutcome) -> Extreme {
+fn extreme<E: Display>(fed: &str, right_answer: &str, outcome: CaseOutcome<E>) -> Extreme {
+    let (came_out, is_right) = outcome.unwrap_or_else(|error| (format!("refused: {error}"), false));
     Extreme { fed: fed.to_owned(), came_out, right_answer: right_answer.to_owned(), is_right }
+}
+
+/// What should be refused with a certain error.
+fn refused<T, E: Display>(result: Result<T, E>, is_right: impl Fn(&E) -> bool) -> CaseOutcome<E> {
+    Ok(result.map_or_else(|error| (format!("refused: {error}"), is_right(&error)), |_| ("taken".to_owned(), false)))
 }
 
 /// Feeds all extremes.
@@ -58,22 +64,17 @@ impl Extremes {
 
     /// One line for each.
     pub fn table(&self) -> Table {
-        let line = |row: &Extreme| {
-            let verdict = if row.is_right { "right" } else { "WRONG" };
-            [&row.fed, &row.came_out, &row.right_answer]
-                .map(|text| text.as_str().into())
-                .into_iter()
-                .chain([verdict.into()])
-                .collect()
-        };
-        Table {
-            id: "extremes".to_owned(),
-            title: "Extremes".to_owned(),
-            caption: "Each answer was checked by the program that made this report. f_max 10 N, h_min 0.5 mm, delta 5, alpha 0.1 m/(N s) unless \
-                      stated otherwise; a ball of 1.5 mm on triangles of 2 mm."
-                .to_owned(),
-            heads: ["fed", "came out", "right answer, and why", "verdict"].map(str::to_owned).to_vec(),
-            rows: self.rows.iter().map(line).collect(),
-        }
+        Table::of(
+            "extremes",
+            "Extremes",
+            "Each answer was checked by the program that made this report. f_max 10 N, h_min 0.5 mm, delta 5, alpha 0.1 m/(N s) unless \
+             stated otherwise; a ball of 1.5 mm on triangles of 2 mm.",
+            &self.rows,
+        )
+        .column("fed", |row| row.fed.as_str())
+        .column("came out", |row| row.came_out.as_str())
+        .column("right answer, and why", |row| row.right_answer.as_str())
+        .column("verdict", |row| if row.is_right { "right" } else { "WRONG" })
+        .table
     }
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::{CaseOutcome, Extreme, extreme};
+use super::{CaseOutcome, Extreme, extreme, refused};
 use touchup_core::haptic::{RefineError, RefineParams, Refiner, TipParams};
 use touchup_core::mesh::{MeshError, TriMesh};
 use touchup_core::stylus::{Sample, SampleError, Wrench};
@@ -16,30 +16,30 @@ const FORCE_N: f64 = 2.0;
 /// Depth of the true surface below the scan, m.
 const DEPTH: f64 = 0.05e-3;
 const MILLISECOND_NS: i64 = 1_000_000;
+/// Where most samples touch, m.
+const PLACE: [f64; 2] = [0.3e-3, 0.1e-3];
+
+/// Vertices and faces.
+type Shape = (Vec<Point3<f64>>, Vec<[u32; 3]>);
+type Outcome = CaseOutcome<RefineError>;
 
 /// A flat square of 6 × 6 cells in the plane z = 0 around `centre`.
-fn square(edge: f64, centre: &Vector3<f64>) -> (Vec<Point3<f64>>, Vec<[u32; 3]>) {
-    let cells = 6u32;
+fn square(edge: f64, centre: &Vector3<f64>) -> Shape {
+    let (cells, row) = (6, 7);
     let at = |i: u32| (f64::from(i) - 0.5 * f64::from(cells)) * edge;
-    let nodes = (0..=cells).flat_map(|j| (0..=cells).map(move |i| (i, j)));
-    let positions = nodes.map(|(i, j)| Point3::new(at(i), at(j), 0.0) + centre).collect();
-    let id = |i: u32, j: u32| j * (cells + 1) + i;
-    let faces = (0..cells).flat_map(|j| (0..cells).map(move |i| (i, j)));
-    let faces = faces
-        .flat_map(|(i, j)| [[id(i, j), id(i + 1, j), id(i + 1, j + 1)], [id(i, j), id(i + 1, j + 1), id(i, j + 1)]]);
-    (positions, faces.collect())
+    let positions = (0..row * row).map(|k| Point3::new(at(k % row), at(k / row), 0.0) + centre);
+    let corners = (0..cells * cells).map(|k| k % cells + k / cells * row);
+    let faces = corners.flat_map(|a| [[a, a + 1, a + row + 1], [a, a + row + 1, a + row]]);
+    (positions.collect(), faces.collect())
 }
 
-fn plain() -> (Vec<Point3<f64>>, Vec<[u32; 3]>) {
+fn plain() -> Shape {
     square(EDGE, &Vector3::zeros())
 }
 
-fn tip(radius: f64) -> TipParams {
-    TipParams { radius, stiffness: Some(STIFFNESS) }
-}
-
-fn refiner((positions, faces): (Vec<Point3<f64>>, Vec<[u32; 3]>), radius: f64) -> Result<Refiner, RefineError> {
-    Refiner::new(TriMesh::new(positions, faces)?, RefineParams::robust(tip(radius)))
+fn refiner((positions, faces): Shape) -> Result<Refiner, RefineError> {
+    let tip = TipParams { radius: RADIUS, stiffness: Some(STIFFNESS) };
+    Refiner::new(TriMesh::new(positions, faces)?, RefineParams::robust(tip))
 }
 
 /// A ball at rest under `force`, its lowest point at `point` where nothing bends.
@@ -57,9 +57,9 @@ fn down() -> Vector3<f64> {
     Vector3::z() * FORCE_N
 }
 
-/// One second of pressing at (x, y), with the true surface [`DEPTH`] below the scan.
-fn press(refiner: &mut Refiner, [x, y]: [f64; 2]) -> Result<(), RefineError> {
-    (1..=1000).try_for_each(|tick| refiner.push(&sample(tick, Point3::new(x, y, -DEPTH), RADIUS, down())).map(drop))
+/// At [`PLACE`], `z` above the plane of the square.
+fn over(z: f64) -> Point3<f64> {
+    Point3::new(PLACE[0], PLACE[1], z)
 }
 
 /// All finite, and no face turned over.
@@ -73,32 +73,25 @@ fn depth_at(refiner: &Refiner, [x, y]: [f64; 2]) -> f64 {
     refiner.closest_face(&Point3::new(x, y, 0.0), 1.0).map_or(f64::NAN, |hit| -hit.point.z)
 }
 
-/// Presses at a place: sound, and down to the true surface within a fifth of the depth.
-fn pressed(shape: (Vec<Point3<f64>>, Vec<[u32; 3]>), place: [f64; 2]) -> CaseOutcome {
-    let outcome = refiner(shape, RADIUS).and_then(|mut refiner| press(&mut refiner, place).map(|()| refiner));
-    match outcome {
-        Ok(refiner) => {
-            let depth = depth_at(&refiner, place);
-            let words = format!("surface {:.1} um down, {} updates cut back", 1e6 * depth, refiner.counts().cut_back);
-            (words, is_sound(refiner.mesh()) && (depth - DEPTH).abs() < 0.2 * DEPTH)
-        }
-        Err(error) => (format!("refused: {error}"), false),
+/// Presses at a place for one second, the true surface [`DEPTH`] below the scan: sound, and down to it within a fifth of the
+/// depth.
+fn pressed(shape: Shape, [x, y]: [f64; 2]) -> Outcome {
+    let mut refiner = refiner(shape)?;
+    for tick in 1..=1000 {
+        refiner.push(&sample(tick, Point3::new(x, y, -DEPTH), RADIUS, down()))?;
     }
+    let depth = depth_at(&refiner, [x, y]);
+    let words = format!("surface {:.1} um down, {} updates cut back", 1e6 * depth, refiner.counts().cut_back);
+    Ok((words, is_sound(refiner.mesh()) && (depth - DEPTH).abs() < 0.2 * DEPTH))
 }
 
-/// One refused sample among good ones leaves every bit of the mesh.
-fn unchanged(pushes: &[Sample], is_right: impl Fn(&RefineError) -> bool) -> CaseOutcome {
-    let Ok(mut refiner) = refiner(plain(), RADIUS) else { return ("the square was refused".to_owned(), false) };
-    let mut last = None;
-    let mut before = refiner.mesh().positions().to_vec();
-    for push in pushes {
-        before = refiner.mesh().positions().to_vec();
-        last = refiner.push(push).err();
-    }
-    match last {
-        Some(error) => (format!("refused: {error}"), is_right(&error) && refiner.mesh().positions() == before),
-        None => ("taken".to_owned(), false),
-    }
+/// One refused sample after a good one leaves every bit of the mesh.
+fn unchanged([good, bad]: [Sample; 2], is_right: impl Fn(&RefineError) -> bool) -> Outcome {
+    let mut refiner = refiner(plain())?;
+    refiner.push(&good)?;
+    let before = refiner.mesh().positions().to_vec();
+    let pushed = refiner.push(&bad).map(drop);
+    refused(pushed, |error| is_right(error) && refiner.mesh().positions() == before)
 }
 
 pub(super) fn rows() -> Vec<Extreme> {
@@ -106,7 +99,7 @@ pub(super) fn rows() -> Vec<Extreme> {
 }
 
 fn samples() -> Vec<Extreme> {
-    let good = sample(5, Point3::new(0.3e-3, 0.1e-3, -DEPTH), RADIUS, down());
+    let good = sample(5, over(-DEPTH), RADIUS, down());
     let with = |change: fn(&mut Sample)| {
         let mut bad = Sample { stamp_ns: 6 * MILLISECOND_NS, ..good };
         change(&mut bad);
@@ -119,27 +112,27 @@ fn samples() -> Vec<Extreme> {
     let is_not_finite = |error: &RefineError| matches!(error, RefineError::Sample(SampleError::NotFinite { .. }));
     let kept = "a refusal that names it, and not one bit of the mesh changed";
     vec![
-        extreme("a sample with a NaN", kept, unchanged(&nan, is_not_finite)),
-        extreme("a sample at infinity", kept, unchanged(&infinite, is_not_finite)),
+        extreme("a sample with a NaN", kept, unchanged(nan, is_not_finite)),
+        extreme("a sample at infinity", kept, unchanged(infinite, is_not_finite)),
         extreme(
             "a sample of 1e7 N",
             "a refusal, and not one bit changed: no sensor measures that, a unit is wrong",
-            unchanged(&huge, |error| matches!(error, RefineError::Sample(SampleError::Absurd { .. }))),
+            unchanged(huge, |error| matches!(error, RefineError::Sample(SampleError::Absurd { .. }))),
         ),
         extreme(
             "a sample older than the last",
             "a refusal, and not one bit changed: what happened in between is done",
-            unchanged(&backward, |error| matches!(error, RefineError::Sample(SampleError::NotAfter { .. }))),
+            unchanged(backward, |error| matches!(error, RefineError::Sample(SampleError::NotAfter { .. }))),
         ),
         extreme(
             "no force 1 mm above the mesh for 1 s",
             "not one bit changed: a stylus that hovers touches nothing",
-            hovering(),
+            unmoved(Vector3::zeros()),
         ),
         extreme(
             "2 N against the normal for 1 s",
             "not one bit changed: the contact is on another surface, or a fault",
-            pulling(),
+            unmoved(-down()),
         ),
         extreme(
             "10 s without a sample, then one",
@@ -149,68 +142,41 @@ fn samples() -> Vec<Extreme> {
     ]
 }
 
-fn unmoved(pushes: impl Iterator<Item = Sample>) -> CaseOutcome {
-    let Ok(mut refiner) = refiner(plain(), RADIUS) else { return ("the square was refused".to_owned(), false) };
+/// A second of `force` with the ball above the mesh: one inside it would rightly carve.
+fn unmoved(force: Vector3<f64>) -> Outcome {
+    let mut refiner = refiner(plain())?;
     let before = refiner.mesh().positions().to_vec();
-    for push in pushes {
-        if let Err(error) = refiner.push(&push) {
-            return (format!("refused: {error}"), false);
-        }
+    for tick in 1..=1000 {
+        refiner.push(&sample(tick, over(1e-3), RADIUS, force))?;
     }
     let moved = refiner.mesh().positions().iter().zip(&before).filter(|(p, q)| p != q).count();
-    (format!("{moved} vertices moved"), moved == 0)
+    Ok((format!("{moved} vertices moved"), moved == 0))
 }
 
-fn hovering() -> CaseOutcome {
-    unmoved((1..=1000).map(|tick| sample(tick, Point3::new(0.3e-3, 0.1e-3, 1e-3), RADIUS, Vector3::zeros())))
-}
-
-fn pulling() -> CaseOutcome {
-    unmoved((1..=1000).map(|tick| {
-        // the ball above the mesh: one inside it would rightly carve
-        sample(tick, Point3::new(0.3e-3, 0.1e-3, 1e-3), RADIUS, -down())
-    }))
-}
-
-fn paused() -> CaseOutcome {
-    let run = |pause_ms: i64| {
-        refiner(plain(), RADIUS).and_then(|mut refiner| {
-            let point = Point3::new(0.3e-3, 0.1e-3, -DEPTH);
-            refiner.push(&sample(1, point, RADIUS, down()))?;
-            refiner.push(&sample(1 + pause_ms, point, RADIUS, down()))?;
-            Ok(refiner.mesh().positions().to_vec())
-        })
-    };
-    match (run(30), run(10_000)) {
-        (Ok(short), Ok(long)) => {
-            let off = short.iter().zip(&long).map(|(p, q)| (p - q).norm()).fold(0.0, f64::max);
-            (format!("{off:.1e} m from what a pause of 30 ms does"), off <= 1e-9)
+fn paused() -> Outcome {
+    let run = |pause_ms: i64| -> Result<_, RefineError> {
+        let mut refiner = refiner(plain())?;
+        for tick in [1, 1 + pause_ms] {
+            refiner.push(&sample(tick, over(-DEPTH), RADIUS, down()))?;
         }
-        (Err(error), _) | (_, Err(error)) => (format!("refused: {error}"), false),
-    }
+        Ok(refiner.mesh().positions().to_vec())
+    };
+    let (short, long) = (run(30)?, run(10_000)?);
+    let off = short.iter().zip(&long).map(|(p, q)| (p - q).norm()).fold(0.0, f64::max);
+    Ok((format!("{off:.1e} m from what a pause of 30 ms does"), off <= 1e-9))
 }
 
 fn shapes() -> Vec<Extreme> {
-    let middle = [0.3e-3, 0.1e-3];
     let (positions, faces) = plain();
-    let of_faces = |more: Vec<[u32; 3]>| (positions.clone(), more);
-    // a face of one edge, laid along a side in the middle
-    let flat = {
-        let (mut positions, mut faces) = plain();
-        let (a, b) = (positions[24], positions[25]);
-        positions.push(a + (b - a) * 0.5);
-        faces.push([24, 25, positions.len() as u32 - 1]);
-        (positions, faces)
+    // one vertex more, and a face of it with two others
+    let with = |corner: Point3<f64>, [a, b]: [u32; 2]| {
+        let added = [a, b, positions.len() as u32];
+        ([&positions[..], &[corner]].concat(), [&faces[..], &[added]].concat())
     };
-    // a fin on an edge of two faces
-    let fin = {
-        let (mut positions, mut faces) = plain();
-        positions.push(positions[17] - Vector3::z() * EDGE);
-        faces.push([17, 18, positions.len() as u32 - 1]);
-        (positions, faces)
-    };
-    let mut doubled = faces.clone();
-    doubled.extend(&faces);
+    // a face of one edge, laid along a side in the middle; a fin on an edge of two faces
+    let flat = with(positions[24] + (positions[25] - positions[24]) * 0.5, [24, 25]);
+    let fin = with(positions[17] - Vector3::z() * EDGE, [17, 18]);
+    let doubled = (positions.clone(), faces.repeat(2));
     let corner = [-3.0 * EDGE + 0.2e-3, -3.0 * EDGE + 0.1e-3];
     let mut bad = positions.clone();
     bad[3].y = f64::NAN;
@@ -218,7 +184,7 @@ fn shapes() -> Vec<Extreme> {
         extreme(
             "a face without area among good ones",
             "the mesh comes down to the true surface and stays sound: such a face has no say",
-            pressed(flat, middle),
+            pressed(flat, PLACE),
         ),
         extreme(
             "a press at a corner of an open mesh",
@@ -228,28 +194,22 @@ fn shapes() -> Vec<Extreme> {
         extreme(
             "an edge of three faces",
             "down to the true surface, sound: scans have such edges",
-            pressed(fin, middle),
+            pressed(fin, PLACE),
         ),
         extreme(
             "every face twice",
             "down to the true surface, sound: both copies share their corners",
-            pressed(of_faces(doubled), middle),
+            pressed(doubled, PLACE),
         ),
         extreme(
             "a vertex that is NaN",
             "a refusal that names the vertex",
-            match TriMesh::new(bad, faces.clone()) {
-                Err(error) => (format!("refused: {error}"), error == MeshError::NotFinite { vertex: 3 }),
-                Ok(_) => ("taken".to_owned(), false),
-            },
+            refused(TriMesh::new(bad, faces), |error| *error == MeshError::NotFinite { vertex: 3 }),
         ),
         extreme(
             "a mesh without faces",
             "a refusal: there is nothing to touch",
-            match refiner(of_faces(vec![]), RADIUS) {
-                Err(error) => (format!("refused: {error}"), error == RefineError::Mesh(MeshError::Empty)),
-                Ok(_) => ("taken".to_owned(), false),
-            },
+            refused(refiner((positions, vec![])), |error| *error == RefineError::Mesh(MeshError::Empty)),
         ),
     ]
 }
@@ -269,46 +229,33 @@ fn sizes() -> Vec<Extreme> {
     ]
 }
 
-fn far_away() -> CaseOutcome {
+fn far_away() -> Outcome {
     let centre = Vector3::new(1e6, 0.0, 0.0);
-    let Ok(mut refiner) = refiner(square(EDGE, &centre), RADIUS) else {
-        return ("the mesh was refused".to_owned(), true);
+    let mut refiner = match refiner(square(EDGE, &centre)) {
+        Ok(refiner) => refiner,
+        error => return refused(error, |_| true),
     };
     let before = refiner.mesh().positions().to_vec();
-    match refiner.push(&sample(1, Point3::new(0.3e-3, 0.1e-3, -DEPTH) + centre, RADIUS, down())) {
-        Err(error) => {
-            let is_named = matches!(error, RefineError::Sample(SampleError::Absurd { .. }));
-            (format!("refused: {error}"), is_named && refiner.mesh().positions() == before)
-        }
-        Ok(_) => ("taken".to_owned(), false),
-    }
+    let pushed = refiner.push(&sample(1, over(-DEPTH) + centre, RADIUS, down())).map(drop);
+    refused(pushed, |error| {
+        let is_named = matches!(error, RefineError::Sample(SampleError::Absurd { .. }));
+        is_named && refiner.mesh().positions() == before
+    })
 }
 
-fn tiny() -> CaseOutcome {
-    let (edge, radius, depth) = (2e-7, 1e-7, 5e-9);
+fn tiny() -> Outcome {
+    let (edge, radius, depth, place) = (2e-7, 1e-7, 5e-9, [3e-8, 1e-8]);
     // a probe so stiff that it does not bend by more than such a mesh is large
     let stiffness = 2e9;
     let params = RefineParams::robust(TipParams { radius, stiffness: Some(stiffness) });
     let (positions, faces) = square(edge, &Vector3::zeros());
-    let run = TriMesh::new(positions, faces).map_err(RefineError::from).and_then(|mesh| {
-        let mut refiner = Refiner::new(mesh, params)?;
-        for tick in 1..=1000 {
-            let point = Point3::new(3e-8, 1e-8, -depth) + down() / STIFFNESS - down() / stiffness;
-            refiner.push(&sample(tick, point, radius, down()))?;
-        }
-        Ok(refiner)
-    });
-    match run {
-        Ok(refiner) => {
-            let found = refiner.closest_face(&Point3::new(3e-8, 1e-8, 0.0), 1.0).map_or(f64::NAN, |hit| -hit.point.z);
-            let words = format!(
-                "surface {:.2} nm down of {:.2} nm, {} updates cut back",
-                1e9 * found,
-                1e9 * depth,
-                refiner.counts().cut_back
-            );
-            (words, is_sound(refiner.mesh()) && (found - depth).abs() < 0.2 * depth)
-        }
-        Err(error) => (format!("refused: {error}"), false),
+    let mut refiner = Refiner::new(TriMesh::new(positions, faces)?, params)?;
+    for tick in 1..=1000 {
+        let point = Point3::new(place[0], place[1], -depth) + down() / STIFFNESS - down() / stiffness;
+        refiner.push(&sample(tick, point, radius, down()))?;
     }
+    let found = depth_at(&refiner, place);
+    let (nm, of_nm, cut_back) = (1e9 * found, 1e9 * depth, refiner.counts().cut_back);
+    let words = format!("surface {nm:.2} nm down of {of_nm:.2} nm, {cut_back} updates cut back");
+    Ok((words, is_sound(refiner.mesh()) && (found - depth).abs() < 0.2 * depth))
 }
