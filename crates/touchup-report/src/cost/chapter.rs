@@ -1,10 +1,9 @@
 //! The chapter of the report.
 
 use super::{
-    Cost, LARGEST_RATIO, LAW_UP_TO, LEAST_REPLAY_PER_S, LogLaw, PartCost, PerSample, READING, ReplaySpeed, SeldomCost,
-    SizeCost, StageCost,
+    Cost, LARGEST_RATIO, LAW_UP_TO, LEAST_REPLAY_PER_S, LogLaw, PartCost, PerSample, READING, ReplaySpeed, SizeCost,
 };
-use crate::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Series, Spread, Table, TableCell};
+use crate::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Series, Spread, Table};
 
 /// A time within this of the law is no more than the law.
 const NO_MORE: f64 = 1.05;
@@ -16,9 +15,10 @@ impl Cost {
     pub fn chapter(&self) -> Chapter {
         Chapter {
             title: "Cost of each stage".to_owned(),
-            text: [self.size_text(), self.ratio_text(), self.part_text(), self.replay_text(), self.count_text()]
+            text: [self.size_text(), self.ratio_text(), self.part_text(), self.replay_text()]
                 .into_iter()
                 .flatten()
+                .chain([self.count_text()])
                 .collect(),
             figures: vec![self.size_figure()],
             tables: vec![
@@ -32,27 +32,26 @@ impl Cost {
     }
 
     fn size_figure(&self) -> Figure {
-        let series = |name: &str, time: fn(&SizeCost) -> &PerSample| {
-            let marks =
-                self.sizes.iter().map(|size| Mark { x: (size.faces as f64).into(), y: time(size).time_ns.times(1e-3) });
-            Series { name: name.to_owned(), stroke: LineStroke::Joined, marks: marks.collect() }
+        let curve = |name: &str, stroke: LineStroke, time: &dyn Fn(&SizeCost) -> Spread| {
+            let marks = self.sizes.iter().map(|size| Mark::at(size.faces as f64, time(size).times(1e-3)));
+            Series::new(name, stroke, marks)
         };
-        let law = |name: &str, law: Option<LogLaw>| {
-            let law = law?;
-            let marks = self
-                .sizes
-                .iter()
-                .map(|size| Mark { x: (size.faces as f64).into(), y: (law.at(size.faces) * 1e-3).into() });
-            Some(Series { name: name.to_owned(), stroke: LineStroke::Dashed, marks: marks.collect() })
-        };
+        let series =
+            |name, time: fn(&SizeCost) -> &PerSample| curve(name, LineStroke::Joined, &|size| time(size).time_ns);
+        let laws = [
+            ("law of the cheapest scene", self.barest_law),
+            ("law of the default scene, 1 mm edges", self.default_law),
+        ];
         let mut curves = vec![
             series("hand-written loop", |size| &size.minimal),
             series("cheapest scene", |size| &size.barest),
             series("default scene, scan of 1 mm edges", |size| &size.default_larger),
             series("default scene, scan of 0.3 m", |size| &size.default_finer),
         ];
-        curves.extend(law("law of the cheapest scene", self.barest_law));
-        curves.extend(law("law of the default scene, 1 mm edges", self.default_law));
+        curves.extend(laws.into_iter().filter_map(|(name, law)| {
+            let law = law?;
+            Some(curve(name, LineStroke::Dashed, &|size| law.at(size.faces).into()))
+        }));
         Figure {
             id: "push_time_by_faces".to_owned(),
             title: "One push against the size of the scan".to_owned(),
@@ -70,7 +69,7 @@ impl Cost {
     fn size_text(&self) -> Option<String> {
         let (first, last) = (self.sizes.first()?, self.sizes.last()?);
         let more = last.faces as f64 / first.faces as f64;
-        let line = |name: &str, law: Option<LogLaw>, time: fn(&SizeCost) -> &PerSample| {
+        let grown = |law: Option<LogLaw>, time: fn(&SizeCost) -> &PerSample| {
             let (from, to) = (time(first).time_ns.median, time(last).time_ns.median);
             let expected = law.map_or(String::new(), |law| {
                 let times = to / law.at(last.faces);
@@ -81,38 +80,31 @@ impl Cost {
                 };
                 format!(" ({times:.2} times what the logarithmic law of the small scans foretells: {verdict})")
             });
-            format!("{name} {:.2} µs instead of {:.2} µs{expected}", to * 1e-3, from * 1e-3)
+            format!("{:.2} µs instead of {:.2} µs{expected}", to * 1e-3, from * 1e-3)
         };
+        let barest = grown(self.barest_law, |size| &size.barest);
+        let default = grown(self.default_law, |size| &size.default_larger);
+        let [[few, short], [many, long]] =
+            [first, last].map(|size| [size.moved_finer, size.default_finer.time_ns.median * 1e-3]);
         Some(format!(
-            "On a scan of {more:.0} times the faces ({} instead of {}) the cheapest scene takes {}; {}. A scan that grows \
-             finer and not larger is another matter: the region that follows the ball then holds {:.0} vertices instead of \
-             {:.0}, and the default scene takes {:.1} µs instead of {:.1} µs.",
-            last.faces,
-            first.faces,
-            line("", self.barest_law, |size| &size.barest).trim_start(),
-            line("the default scene, with edges of 1 mm on both,", self.default_law, |size| &size.default_larger),
-            last.moved_finer,
-            first.moved_finer,
-            last.default_finer.time_ns.median * 1e-3,
-            first.default_finer.time_ns.median * 1e-3,
+            "On a scan of {more:.0} times the faces ({} instead of {}) the cheapest scene takes {barest}; the default scene, with \
+             edges of 1 mm on both, {default}. A scan that grows finer and not larger is another matter: the region that follows \
+             the ball then holds {many:.0} vertices instead of {few:.0}, and the default scene takes {long:.1} µs instead of \
+             {short:.1} µs.",
+            last.faces, first.faces
         ))
     }
 
-    /// The largest of all sizes.
-    pub fn worst_ratio(&self) -> Option<f64> {
-        self.sizes.iter().map(|size| size.barest_to_minimal.median).max_by(f64::total_cmp)
-    }
-
     fn ratio_text(&self) -> Option<String> {
-        let worst = self.worst_ratio()?;
-        let keeping = self.sizes.iter().map(|size| size.barest_to_keeping.median).max_by(f64::total_cmp)?;
-        let is_within = worst <= LARGEST_RATIO;
+        let largest =
+            |ratio: fn(&SizeCost) -> Spread| self.sizes.iter().map(|size| ratio(size).median).max_by(f64::total_cmp);
+        let (worst, keeping) = (largest(|size| size.barest_to_minimal)?, largest(|size| size.barest_to_keeping)?);
         Some(format!(
             "What a scene does not name costs nothing: the cheapest scene takes at most {worst:.3} times as long as the loop \
              that is written by hand, on the same samples in turns; {} the {LARGEST_RATIO} that is allowed. Against the same \
              loop made to keep what it looked up, as the refiner does (which boxes to bring up to date, with a margin, and what \
              is near), it is {keeping:.3} times.",
-            if is_within { "within" } else { "this misses" }
+            if worst <= LARGEST_RATIO { "within" } else { "this misses" }
         ))
     }
 
@@ -153,164 +145,92 @@ impl Cost {
         ))
     }
 
-    fn count_text(&self) -> Option<String> {
-        let most = self
-            .sizes
-            .iter()
-            .flat_map(|size| [&size.barest, &size.default_finer, &size.default_larger])
-            .filter_map(|push| push.allocations)
-            .max_by(f64::total_cmp);
-        Some(match most {
-            Some(most) => {
-                let bound = if most == 0.0 { "never asks".to_owned() } else { format!("asks {most:.2e} times") };
-                format!(
-                    "A push that is warm {bound} for memory, counted by the allocator itself over every timed push."
-                )
-            }
-            None => "This program does not count allocations, so their columns are empty.".to_owned(),
-        })
+    fn count_text(&self) -> String {
+        let pushes = self.sizes.iter().flat_map(|size| [&size.barest, &size.default_finer, &size.default_larger]);
+        let Some(most) = pushes.filter_map(|push| push.allocations).max_by(f64::total_cmp) else {
+            return "This program does not count allocations, so their columns are empty.".to_owned();
+        };
+        let bound = if most == 0.0 { "never asks".to_owned() } else { format!("asks {most:.2e} times") };
+        format!("A push that is warm {bound} for memory, counted by the allocator itself over every timed push.")
     }
 
     fn size_table(&self) -> Table {
-        let rows = self.sizes.iter().map(|size| {
-            vec![
-                TableCell::Number(size.faces as f64),
-                size.minimal.time_ns.into(),
-                size.barest.time_ns.into(),
-                size.barest_to_minimal.into(),
-                size.keeping.time_ns.into(),
-                size.barest_to_keeping.into(),
-                size.default_larger.time_ns.into(),
-                size.default_finer.time_ns.into(),
-                size.moved_finer.into(),
-                optional(size.default_larger.allocations),
-                size.mesh_bytes_per_face.into(),
-                size.tree_bytes_per_face.into(),
-                size.tree_build_ms.into(),
-            ]
-        });
-        table(
+        Table::of(
             "push_by_faces",
             "A push, by size of the scan",
             "Cheapest scene and hand-written loop on a plate of 0.3 m; the default scene without patch, on a plate of edges of \
              1 mm and on the one of 0.3 m. Memory is counted from what mesh and tree own.",
-            &[
-                "faces",
-                "hand-written loop, ns",
-                "cheapest scene, ns",
-                "cheapest / loop",
-                "loop that keeps, ns",
-                "cheapest / keeping loop",
-                "default, 1 mm edges, ns",
-                "default, 0.3 m, ns",
-                "vertices moved at 0.3 m",
-                "allocations",
-                "mesh, bytes/face",
-                "tree, bytes/face",
-                "tree built, ms",
-            ],
-            rows.collect(),
+            &self.sizes,
         )
+        .column("faces", |size| size.faces)
+        .column("hand-written loop, ns", |size| size.minimal.time_ns)
+        .column("cheapest scene, ns", |size| size.barest.time_ns)
+        .column("cheapest / loop", |size| size.barest_to_minimal)
+        .column("loop that keeps, ns", |size| size.keeping.time_ns)
+        .column("cheapest / keeping loop", |size| size.barest_to_keeping)
+        .column("default, 1 mm edges, ns", |size| size.default_larger.time_ns)
+        .column("default, 0.3 m, ns", |size| size.default_finer.time_ns)
+        .column("vertices moved at 0.3 m", |size| size.moved_finer)
+        .column("allocations", |size| size.default_larger.allocations)
+        .column("mesh, bytes/face", |size| size.mesh_bytes_per_face)
+        .column("tree, bytes/face", |size| size.tree_bytes_per_face)
+        .column("tree built, ms", |size| size.tree_build_ms)
+        .table
     }
 
     fn part_table(&self) -> Table {
-        let rows = self.parts.iter().map(|PartCost { part, faces, is_default, with, without, cost_ns }| {
-            vec![
-                part.as_str().into(),
-                TableCell::Number(*faces as f64),
-                if *is_default { "yes" } else { "no" }.into(),
-                with.time_ns.into(),
-                without.time_ns.into(),
-                (*cost_ns).into(),
-                optional(with.allocations),
-                optional(with.allocated_bytes),
-            ]
-        });
-        table(
+        Table::of(
             "push_by_part",
             "A push with and without each optional part",
             "The default scene without patch on a scan of edges of 1 mm, switched in one part. The cost is the difference block \
              by block; a negative one says that the work of the rest grows without the part.",
-            &[
-                "part",
-                "faces",
-                "by default",
-                "push with it, ns",
-                "push without it, ns",
-                "cost, ns",
-                "allocations with it",
-                "bytes asked for with it",
-            ],
-            rows.collect(),
+            &self.parts,
         )
+        .column("part", |part| part.part.as_str())
+        .column("faces", |part| part.faces)
+        .column("by default", |part| if part.is_default { "yes" } else { "no" })
+        .column("push with it, ns", |part| part.with.time_ns)
+        .column("push without it, ns", |part| part.without.time_ns)
+        .column("cost, ns", |part| part.cost_ns)
+        .column("allocations with it", |part| part.with.allocations)
+        .column("bytes asked for with it", |part| part.with.allocated_bytes)
+        .table
     }
 
     fn stage_table(&self) -> Table {
-        let rows = self.stages.iter().map(|StageCost { stage, faces, per_sample }| {
-            vec![
-                stage.as_str().into(),
-                TableCell::Number(*faces as f64),
-                per_sample.time_ns.into(),
-                optional(per_sample.allocations),
-                optional(per_sample.allocated_bytes),
-            ]
-        });
-        table(
+        Table::of(
             "stages",
             "Stages by themselves, per sample",
             "Each called alone over the samples of the slide, all in turns. What keeps the whole session (touches, recording) \
              asks for memory as it grows. Deformation has no name of its own to be called by: it is what a push takes beyond \
              these.",
-            &["stage", "faces", "time, ns", "allocations", "bytes asked for"],
-            rows.collect(),
+            &self.stages,
         )
+        .column("stage", |stage| stage.stage.as_str())
+        .column("faces", |stage| stage.faces)
+        .column("time, ns", |stage| stage.per_sample.time_ns)
+        .column("allocations", |stage| stage.per_sample.allocations)
+        .column("bytes asked for", |stage| stage.per_sample.allocated_bytes)
+        .table
     }
 
     fn seldom_table(&self) -> Table {
-        let rows = self.seldom.iter().map(|SeldomCost { work, faces, time_ms }| {
-            vec![work.as_str().into(), TableCell::Number(*faces as f64), (*time_ms).into()]
-        });
-        table(
-            "seldom",
-            "What is not done at each sample",
-            "Beside the samples, on threads of their own.",
-            &["work", "faces", "time, ms"],
-            rows.collect(),
-        )
+        let caption = "Beside the samples, on threads of their own.";
+        Table::of("seldom", "What is not done at each sample", caption, &self.seldom)
+            .column("work", |seldom| seldom.work.as_str())
+            .column("faces", |seldom| seldom.faces)
+            .column("time, ms", |seldom| seldom.time_ms)
+            .table
     }
 
     fn replay_table(&self) -> Table {
-        let rows = self.replays.iter().map(|ReplaySpeed { scene, faces, edge_mm, samples, samples_per_s }| {
-            vec![
-                scene.as_str().into(),
-                TableCell::Number(*faces as f64),
-                (*edge_mm).into(),
-                TableCell::Number(*samples as f64),
-                (*samples_per_s).into(),
-            ]
-        });
-        table(
-            "replay",
-            "Replay by one thread",
-            "From the MCAP file to the moved mesh: decoding, synchronising, pushing.",
-            &["scene", "faces", "edge, mm", "samples", "samples/s"],
-            rows.collect(),
-        )
-    }
-}
-
-fn optional(value: Option<f64>) -> TableCell {
-    value.map_or(TableCell::Empty, TableCell::Number)
-}
-
-fn table(id: &str, title: &str, caption: &str, heads: &[&str], rows: Vec<Vec<TableCell>>) -> Table {
-    let [id, title, caption] = [id, title, caption].map(str::to_owned);
-    Table { id, title, caption, heads: heads.iter().map(|head| (*head).to_owned()).collect(), rows }
-}
-
-impl PerSample {
-    /// Of a time alone.
-    pub fn of_time(time_ns: Spread) -> Self {
-        Self { time_ns, allocations: None, allocated_bytes: None }
+        let caption = "From the MCAP file to the moved mesh: decoding, synchronising, pushing.";
+        Table::of("replay", "Replay by one thread", caption, &self.replays)
+            .column("scene", |replay| replay.scene.as_str())
+            .column("faces", |replay| replay.faces)
+            .column("edge, mm", |replay| replay.edge_mm)
+            .column("samples", |replay| replay.samples)
+            .column("samples/s", |replay| replay.samples_per_s)
+            .table
     }
 }

@@ -1,9 +1,9 @@
 //! Does the time of a push grow with the logarithm of the scan? t = a + b ln F.
 
-use serde::Serialize;
+use crate::convergence::{Line, straight_line};
 
 /// The law, fitted by least squares.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LogLaw {
     /// ns
     pub a_ns: f64,
@@ -16,17 +16,13 @@ impl LogLaw {
     ///
     /// A time that falls with the size is taken for constant: noise is no law.
     pub fn fit(points: &[(usize, f64)]) -> Option<Self> {
-        let count = points.len() as f64;
-        let x = |faces: usize| (faces as f64).ln();
-        let x_mean = points.iter().map(|&(faces, _)| x(faces)).sum::<f64>() / count;
-        let t_mean = points.iter().map(|&(_, time)| time).sum::<f64>() / count;
-        let (mut xx, mut xt) = (0.0, 0.0);
-        for &(faces, time) in points {
-            xx += (x(faces) - x_mean).powi(2);
-            xt += (x(faces) - x_mean) * (time - t_mean);
+        let logs: Vec<_> = points.iter().map(|&(faces, time)| ((faces as f64).ln(), time)).collect();
+        let Line { offset, slope, .. } = straight_line(&logs)?;
+        if slope > 0.0 {
+            return Some(Self { a_ns: offset, b_ns: slope });
         }
-        let b_ns = (xx > 0.0).then(|| (xt / xx).max(0.0))?;
-        Some(Self { a_ns: t_mean - b_ns * x_mean, b_ns })
+        let mean = points.iter().map(|(_, time)| time).sum::<f64>() / points.len() as f64;
+        Some(Self { a_ns: mean, b_ns: 0.0 })
     }
 
     /// Time at so many faces, ns.

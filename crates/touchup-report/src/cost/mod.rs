@@ -9,8 +9,6 @@ mod sizes;
 mod stages;
 mod turns;
 
-use serde::Serialize;
-
 use super::Effort;
 pub use log_law::LogLaw;
 pub use minimal::MinimalLoop;
@@ -21,7 +19,7 @@ pub use stages::{SeldomCost, StageCost};
 use touchup_core::haptic::RefineError;
 use touchup_core::mesh::MeshError;
 use touchup_core::stylus::SettingError;
-use touchup_io::recording::RecordingError;
+use touchup_session::replay::ReplayError;
 use touchup_session::scene::SceneError;
 pub use turns::PerSample;
 use turns::Timing;
@@ -55,7 +53,7 @@ pub enum CostError {
     Scene(#[from] SceneError),
     /// The recording that is replayed.
     #[error(transparent)]
-    Recording(#[from] RecordingError),
+    Recording(#[from] ReplayError),
     /// Nowhere to put it.
     #[error("no temporary folder for a recording: {0}; name one with room by TMPDIR")]
     Folder(std::io::Error),
@@ -68,7 +66,7 @@ pub enum CostError {
 }
 
 /// Everything that was measured.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Cost {
     /// whole pushes, by size of the scan, rising
     pub sizes: Vec<SizeCost>,
@@ -84,8 +82,6 @@ pub struct Cost {
     pub seldom: Vec<SeldomCost>,
     /// recordings read and refined
     pub replays: Vec<ReplaySpeed>,
-    /// whether the program counts its allocations
-    pub counts_allocations: bool,
 }
 
 /// Measures all of it.
@@ -99,11 +95,11 @@ pub fn cost(effort: Effort, progress: &mut dyn FnMut(&str)) -> Result<Cost, Cost
     );
     let timing = effort
         .choose(Timing { warm: 3_000, blocks: 15, block: 400 }, Timing { warm: 20_000, blocks: 40, block: 1_000 });
-    let mut sizes_cost = Vec::new();
-    for &faces in sizes {
+    let at_size = |&faces: &usize| {
         progress(&format!("cost: a push on {faces} faces"));
-        sizes_cost.push(sizes::size_cost(faces, timing)?);
-    }
+        sizes::size_cost(faces, timing)
+    };
+    let sizes = sizes.iter().map(at_size).collect::<Result<Vec<_>, _>>()?;
     let (mut parts, mut stages, mut seldom) = (Vec::new(), Vec::new(), Vec::new());
     for &faces in effort.choose(&[10_000, 100_000][..], &[10_000, 100_000, 1_000_000, 5_000_000]) {
         progress(&format!("cost: parts and stages on {faces} faces"));
@@ -122,17 +118,16 @@ pub fn cost(effort: Effort, progress: &mut dyn FnMut(&str)) -> Result<Cost, Cost
     let mut replays = replay::replay_speeds((1_000_000, sizes::side_of(1_000_000)), count, repeats)?;
     replays.extend(replay::replay_speeds((1_000_000, touchup_sim::wavy::SIDE), count, repeats)?);
     let law = |time: fn(&SizeCost) -> &PerSample| {
-        let known = sizes_cost.iter().filter(|size| size.faces <= LAW_UP_TO);
+        let known = sizes.iter().filter(|size| size.faces <= LAW_UP_TO);
         LogLaw::fit(&known.map(|size| (size.faces, time(size).time_ns.median)).collect::<Vec<_>>())
     };
     Ok(Cost {
         barest_law: law(|size| &size.barest),
         default_law: law(|size| &size.default_larger),
-        sizes: sizes_cost,
+        sizes,
         parts,
         stages,
         seldom,
         replays,
-        counts_allocations: super::allocations::asked().is_some(),
     })
 }

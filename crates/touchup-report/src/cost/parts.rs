@@ -1,17 +1,16 @@
 //! What each optional part costs: whole pushes with it and without it, in turns.
 
-use serde::Serialize;
+use std::ops::Sub;
 
 use super::CostError;
 use super::sizes::{pushing, refiner_of, samples_on, side_of};
-use super::turns::{PerSample, TimedCase, Timing, difference, in_turns};
+use super::turns::{PerSample, Timing, by_block, in_turns};
 use crate::Spread;
-use touchup_core::haptic::Refiner;
 use touchup_session::scene::Scene;
 use touchup_sim::wavy::plate;
 
 /// A part of the haptic update, switched on and off.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct PartCost {
     /// by its name in the scene
     pub part: String,
@@ -36,12 +35,14 @@ fn scenes() -> Result<Vec<(&'static str, bool, Scene)>, CostError> {
     let default = Scene::default;
     let extra = Scene::from_yaml(&format!("{COMPENSATION}\nbias_tracking:"))?;
     Ok(vec![
+        ("default", true, default()),
         ("contact", true, Scene { contact: None, patch: None, ..default() }),
         ("sliding", true, Scene { sliding: None, ..default() }),
         ("carve", true, Scene { carve: None, ..default() }),
         ("guard", true, Scene { guard: None, ..default() }),
         ("compensation", false, Scene { compensation: extra.compensation, ..default() }),
         ("bias_tracking", false, Scene { bias_tracking: extra.bias_tracking, ..default() }),
+        ("undo of strokes", false, default()),
     ])
 }
 
@@ -51,26 +52,17 @@ pub(super) fn part_costs(faces: usize, timing: Timing) -> Result<Vec<PartCost>, 
     let mesh = plate(faces, side)?;
     let faces = mesh.face_count();
     let samples = samples_on(side, timing.samples());
-    let others = scenes()?;
-    let build = |scene: &Scene| refiner_of(scene, mesh.clone());
-    let mut refiners = vec![build(&Scene::default())?];
-    for (.., scene) in &others {
-        refiners.push(build(scene)?);
-    }
+    let scenes = scenes()?;
+    let refiners = scenes.iter().map(|(.., scene)| refiner_of(scene, mesh.clone()));
+    let mut refiners = refiners.collect::<Result<Vec<_>, _>>()?;
     // what can be undone is kept by the refiner alone where there is no patch
-    let mut keeping: Refiner = build(&Scene::default())?;
-    keeping.keep_strokes();
-    refiners.push(keeping);
-    let mut named: Vec<_> = others.iter().map(|&(name, is_default, _)| (name, is_default)).collect();
-    named.push(("undo of strokes", false));
-
-    let names: Vec<_> = std::iter::once("default").chain(named.iter().map(|(name, _)| *name)).collect();
-    let mut moved = vec![0; refiners.len()];
-    let each = refiners.iter_mut().zip(&mut moved).zip(&names);
-    let mut cases: Vec<TimedCase> =
-        each.map(|((refiner, moved), name)| pushing(name, refiner, &samples, moved)).collect();
+    if let Some(last) = refiners.last_mut() {
+        last.keep_strokes();
+    }
+    let each = scenes.iter().zip(&mut refiners);
+    let mut cases: Vec<_> = each.map(|((name, ..), refiner)| pushing(name, refiner, &samples, |_| {})).collect();
     let timed = in_turns(&mut cases, timing)?;
-    let costs = named.iter().zip(&timed[1..]).map(|(&(name, is_default), other)| {
+    let costs = scenes.iter().zip(&timed).skip(1).map(|(&(name, is_default, _), other)| {
         let (with, without) = if is_default { (&timed[0], other) } else { (other, &timed[0]) };
         Ok(PartCost {
             part: name.to_owned(),
@@ -78,7 +70,7 @@ pub(super) fn part_costs(faces: usize, timing: Timing) -> Result<Vec<PartCost>, 
             is_default,
             with: with.per_sample()?,
             without: without.per_sample()?,
-            cost_ns: difference(with, without)?,
+            cost_ns: by_block(with, without, f64::sub)?,
         })
     });
     costs.collect()

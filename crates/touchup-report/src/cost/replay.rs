@@ -1,15 +1,14 @@
 //! How fast a recording is read and refined by one thread.
 
 use std::path::Path;
-use std::time::Instant;
-
-use serde::Serialize;
 
 use super::sizes::{refiner_of, samples_on};
+use super::turns::spread;
 use super::{BAREST, CostError};
-use crate::Spread;
-use touchup_core::stylus::{Message, Sample, StampedPose, StampedWrench, SyncParams, Synchroniser};
-use touchup_io::recording::{Record, RecordingReader, Topics, write_recording};
+use crate::{Spread, timed};
+use touchup_core::stylus::{Message, Sample, StampedPose, StampedWrench, SyncParams};
+use touchup_io::recording::{Topics, write_recording};
+use touchup_session::replay::{Recording, ReplayError, each_sample};
 use touchup_session::scene::Scene;
 use touchup_sim::wavy::plate;
 
@@ -17,7 +16,7 @@ use touchup_sim::wavy::plate;
 pub const READING: &str = "none: read and paired alone";
 
 /// One scene over the whole recording.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ReplaySpeed {
     /// which
     pub scene: String,
@@ -41,7 +40,8 @@ pub(super) fn replay_speeds(
     let path = folder.path().join("slide.mcap");
     let samples = samples_on(side, count);
     let topics = Topics::default();
-    write_recording(&path, &topics, "object", "stylus", samples.iter().flat_map(messages))?;
+    let written = write_recording(&path, &topics, "object", "stylus", samples.iter().flat_map(messages));
+    written.map_err(ReplayError::from)?;
     let mesh = plate(faces, side)?;
     let edge_mm = side / (mesh.face_count() as f64 / 2.0).sqrt() * 1e3;
     // one after the other: each refiner of a million faces takes its part of the cache
@@ -63,22 +63,22 @@ pub(super) fn replay_speeds(
             faces: mesh.face_count(),
             edge_mm,
             samples: count,
-            samples_per_s: Spread::of(rates).ok_or(CostError::NothingTimed)?,
+            samples_per_s: spread(rates)?,
         })
     };
     names.zip(rates).map(speed).collect()
 }
 
-fn messages(sample: &Sample) -> [Message; 2] {
+/// The two messages of a sample.
+pub(super) fn messages(sample: &Sample) -> [Message; 2] {
     let &Sample { stamp_ns, pose_ot, wrench } = sample;
     [Message::Pose(StampedPose { stamp_ns, pose_ot }), Message::Wrench(StampedWrench { stamp_ns, wrench })]
 }
 
 /// Samples per second of work that reports how many it did.
 fn rate(work: impl FnOnce() -> Result<usize, CostError>) -> Result<f64, CostError> {
-    let started = Instant::now();
-    let count = work()?;
-    Ok(count as f64 / started.elapsed().as_secs_f64())
+    let (seconds, count) = timed(work);
+    Ok(count? as f64 / seconds)
 }
 
 /// Reads and pairs all, and gives each sample to `push`; returns how many there were.
@@ -88,27 +88,13 @@ fn replay(
     sync: SyncParams,
     mut push: impl FnMut(&Sample) -> Result<(), CostError>,
 ) -> Result<usize, CostError> {
-    let mut reader = RecordingReader::open(path, topics)?;
-    let mut sync = Synchroniser::new(sync)?;
-    let mut pushed = 0;
-    while let Some(record) = reader.next_record() {
-        if let Record::Message(message) = record? {
-            sync.push(message);
+    let recording = Recording::open(path, topics).map_err(ReplayError::from)?;
+    let (mut count, mut outcome) = (0, Ok(()));
+    each_sample(recording, None, sync, None, &mut || {}, |sample| {
+        count += 1;
+        if outcome.is_ok() {
+            outcome = push(sample);
         }
-        pushed += push_all(&mut sync, &mut push)?;
-    }
-    sync.finish();
-    Ok(pushed + push_all(&mut sync, &mut push)?)
-}
-
-fn push_all(
-    sync: &mut Synchroniser,
-    push: &mut impl FnMut(&Sample) -> Result<(), CostError>,
-) -> Result<usize, CostError> {
-    let mut pushed = 0;
-    while let Some(sample) = sync.next_sample() {
-        push(&sample)?;
-        pushed += 1;
-    }
-    Ok(pushed)
+    })?;
+    outcome.map(|()| count)
 }

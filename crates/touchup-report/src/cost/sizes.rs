@@ -1,12 +1,11 @@
 //! What a push costs on scans of different size: the hand-written loop, the cheapest scene, the default scene.
 
-use nalgebra::Point3;
-use serde::Serialize;
+use std::ops::Div;
 
 use super::minimal::MinimalLoop;
-use super::turns::{PerSample, TimedCase, Timing, in_turns, ratio};
+use super::turns::{PerSample, TimedCase, Timing, by_block, in_turns};
 use super::{BAREST, CostError};
-use crate::Spread;
+use crate::{Spread, timed};
 use touchup_core::haptic::Refiner;
 use touchup_core::mesh::{FaceTree, TriMesh};
 use touchup_core::stylus::{Sample, WrenchFrame};
@@ -17,7 +16,7 @@ use touchup_sim::wavy::{SIDE, plate, slide_on};
 const EDGE: f64 = 1e-3;
 
 /// On a scan of so many faces.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct SizeCost {
     /// faces
     pub faces: usize,
@@ -69,27 +68,18 @@ pub(super) fn refiner_of(scene: &Scene, mesh: TriMesh) -> Result<Refiner, CostEr
     Ok(Refiner::new(mesh, params)?)
 }
 
-/// Pushes samples into a refiner.
+/// Pushes samples into a refiner; `after` looks at it after each.
 pub(super) fn pushing<'a>(
     name: &'a str,
     refiner: &'a mut Refiner,
     samples: &'a [Sample],
-    moved: &'a mut u64,
+    mut after: impl FnMut(&Refiner) + 'a,
 ) -> TimedCase<'a> {
     TimedCase::new(name, move |block| {
         for sample in &samples[block] {
             refiner.push(sample)?;
-            *moved += refiner.moved_vertices().len() as u64;
+            after(refiner);
         }
-        Ok(())
-    })
-}
-
-fn looping<'a>(name: &'a str, minimal: &'a mut MinimalLoop, samples: &'a [Sample]) -> TimedCase<'a> {
-    TimedCase::new(name, |block| {
-        samples[block].iter().for_each(|sample| {
-            std::hint::black_box(minimal.push(sample));
-        });
         Ok(())
     })
 }
@@ -99,45 +89,38 @@ pub(super) fn size_cost(faces: usize, timing: Timing) -> Result<SizeCost, CostEr
     let mesh = plate(faces, SIDE)?;
     let faces = mesh.face_count();
     let samples = samples_on(SIDE, timing.samples());
-    let started = std::time::Instant::now();
-    let tree = FaceTree::new(&mesh);
-    let tree_build_ms = started.elapsed().as_secs_f64() * 1e3;
-    let touched = samples
-        .last()
-        .is_some_and(|last| tree.closest(&mesh, &Point3::from(last.pose_ot.translation.vector), 0.01).is_some());
-    if !touched {
-        return Err(CostError::NothingTimed);
-    }
+    let (tree_build_s, tree) = timed(|| FaceTree::new(&mesh));
+    let last = samples.last().ok_or(CostError::NothingTimed)?.pose_ot.translation.vector;
+    tree.closest(&mesh, &last.into(), 0.01).ok_or(CostError::NothingTimed)?;
     drop(tree);
     let mut barest = refiner_of(&Scene::from_yaml(BAREST)?, mesh.clone())?;
     let footprint = barest.footprint();
     let mut default = refiner_of(&Scene::default(), mesh.clone())?;
     let mut keeping = MinimalLoop::keeping(mesh.clone());
     let mut minimal = MinimalLoop::new(mesh);
-    let (mut moved_barest, mut moved_finer) = (0, 0);
+    let mut moved_finer = 0;
     let mut cases = [
-        looping("hand-written loop", &mut minimal, &samples),
-        looping("the loop, keeping", &mut keeping, &samples),
-        pushing("cheapest scene", &mut barest, &samples, &mut moved_barest),
-        pushing("default scene", &mut default, &samples, &mut moved_finer),
+        TimedCase::each("hand-written loop", &samples, |sample| minimal.push(sample)),
+        TimedCase::each("the loop, keeping", &samples, |sample| keeping.push(sample)),
+        pushing("cheapest scene", &mut barest, &samples, |_| {}),
+        pushing("default scene", &mut default, &samples, |refiner| moved_finer += refiner.moved_vertices().len()),
     ];
     let timed = in_turns(&mut cases, timing)?;
     drop(cases);
-    let larger = default_larger(faces, timing)?;
     let per_face = |bytes: usize| bytes as f64 / faces.max(1) as f64;
     Ok(SizeCost {
         faces,
         minimal: timed[0].per_sample()?,
         keeping: timed[1].per_sample()?,
         barest: timed[2].per_sample()?,
-        barest_to_minimal: ratio(&timed[2], &timed[0])?,
-        barest_to_keeping: ratio(&timed[2], &timed[1])?,
+        barest_to_minimal: by_block(&timed[2], &timed[0], f64::div)?,
+        barest_to_keeping: by_block(&timed[2], &timed[1], f64::div)?,
         default_finer: timed[3].per_sample()?,
         moved_finer: moved_finer as f64 / timing.samples() as f64,
-        default_larger: larger,
+        default_larger: default_larger(faces, timing)?,
         mesh_bytes_per_face: per_face(footprint.mesh),
         tree_bytes_per_face: per_face(footprint.tree),
-        tree_build_ms,
+        tree_build_ms: tree_build_s * 1e3,
     })
 }
 
@@ -145,7 +128,6 @@ fn default_larger(faces: usize, timing: Timing) -> Result<PerSample, CostError> 
     let side = side_of(faces);
     let samples = samples_on(side, timing.samples());
     let mut refiner = refiner_of(&Scene::default(), plate(faces, side)?)?;
-    let mut moved = 0;
-    let timed = in_turns(&mut [pushing("default scene", &mut refiner, &samples, &mut moved)], timing)?;
+    let timed = in_turns(&mut [pushing("default scene", &mut refiner, &samples, |_| {})], timing)?;
     timed[0].per_sample()
 }

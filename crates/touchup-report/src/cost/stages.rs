@@ -1,31 +1,30 @@
 //! Each stage by itself, over the same samples.
 
-use std::cell::RefCell;
 use std::hint::black_box;
 use std::io::Cursor;
-use std::time::Instant;
 
 use nalgebra::{Point3, Vector3};
-use serde::Serialize;
 
 use super::CostError;
+use super::replay::messages;
 use super::sizes::{samples_on, side_of};
-use super::turns::{PerSample, TimedCase, Timing, in_turns};
-use crate::Spread;
+use super::turns::{PerSample, TimedCase, Timing, in_turns, spread};
+use crate::{Spread, timed};
 use touchup_core::features::detect;
-use touchup_core::haptic::{FaceDynamics, FaceState};
+use touchup_core::haptic::{FaceDynamics, FaceState, RefineError};
 use touchup_core::mesh::{FaceId, FaceTree, Nearby, RefitPlan, TriMesh};
 use touchup_core::reconstruct::Patcher;
 use touchup_core::stylus::{
-    BiasTracker, Compensator, ContactEstimator, ContactEstimatorParams, ContactGate, ContactSample, Message, Sample,
-    StampedPose, StampedWrench, Synchroniser, Tip, TipMotion, TipParams, WrenchFrame,
+    BiasTracker, Compensator, ContactEstimator, ContactEstimatorParams, ContactGate, ContactSample, Sample,
+    Synchroniser, Tip, TipMotion, TipParams, WrenchFrame,
 };
 use touchup_io::recording::{RecordingWriter, Topics};
+use touchup_session::replay::ReplayError;
 use touchup_session::scene::Scene;
 use touchup_sim::wavy::{RADIUS, STIFFNESS, plate};
 
 /// One stage on one scan.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct StageCost {
     /// what it does
     pub stage: String,
@@ -36,7 +35,7 @@ pub struct StageCost {
 }
 
 /// Work done now and then, not at each sample.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct SeldomCost {
     /// what it does
     pub work: String,
@@ -55,15 +54,10 @@ fn touching(sample: &Sample) -> Point3<f64> {
     Point3::from(sample.pose_ot.translation.vector) + force / STIFFNESS - force.normalize() * RADIUS
 }
 
-fn messages(sample: &Sample) -> [Message; 2] {
-    let &Sample { stamp_ns, pose_ot, wrench } = sample;
-    [Message::Pose(StampedPose { stamp_ns, pose_ot }), Message::Wrench(StampedWrench { stamp_ns, wrench })]
-}
-
 /// The contact state of each sample.
 fn contacts_of(samples: &[Sample], tip: TipParams) -> Result<Vec<ContactSample>, CostError> {
     let mut estimator = ContactEstimator::new(ContactEstimatorParams::new(tip))?;
-    let observe = |sample| Ok(*estimator.observe(sample).map_err(touchup_core::haptic::RefineError::from)?);
+    let observe = |sample| Ok(*estimator.observe(sample).map_err(RefineError::from)?);
     samples.iter().map(observe).collect()
 }
 
@@ -84,83 +78,49 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> Result<Vec<StageCost>
     let mut bias = BiasTracker::new(Default::default())?;
     let mut gate = ContactGate::new(scene.contact.unwrap_or_default())?;
     let mut motion = TipMotion::new(params.sliding.unwrap_or_default(), params.tip);
-    let dynamics = FaceDynamics::new(params.dynamics).map_err(touchup_core::haptic::RefineError::from)?;
-    let mut writer = RecordingWriter::new(Cursor::new(Vec::new()), &Topics::default())?;
+    let dynamics = FaceDynamics::new(params.dynamics).map_err(RefineError::from)?;
+    let writer = RecordingWriter::new(Cursor::new(Vec::new()), &Topics::default());
+    let mut writer = writer.map_err(ReplayError::from)?;
     let mut patcher = Patcher::new(scene.patcher_params().ok_or(CostError::NothingMoves)?)?;
     let (mut last, mut nearby, mut moving) = (None, Nearby::default(), Moving::new(&mesh));
     let face = FaceState { b: Point3::origin(), n: Vector3::z() };
 
     let mut cases = [
-        TimedCase::new("sync", |block| {
-            for sample in &samples[block] {
-                messages(sample).into_iter().for_each(|message| {
-                    sync.push(message);
-                });
-                black_box(sync.next_sample());
+        TimedCase::each("sync", &samples, |sample| {
+            for message in messages(sample) {
+                sync.push(message);
             }
-            Ok(())
+            sync.next_sample()
         }),
-        TimedCase::new("compensation (nothing to take off)", |block| {
-            samples[block].iter().for_each(|sample| {
-                black_box(plain.compensate(black_box(sample)));
-            });
-            Ok(())
+        TimedCase::each("compensation (nothing to take off)", &samples, |sample| plain.compensate(black_box(sample))),
+        TimedCase::each("bias tracking", &tips, |tip| bias.compensate(tip)),
+        TimedCase::each("contact gate", &tips, |tip| gate.update(tip.stamp_ns, &tip.force_o)),
+        TimedCase::each("sliding and friction", &tips, |tip| {
+            let ball = motion.update(tip, 1e-3, 0.03);
+            motion.surface_normal(&ball, 1e-3)
         }),
-        TimedCase::new("bias tracking", |block| {
-            tips[block].iter().for_each(|tip| {
-                black_box(bias.compensate(tip));
-            });
-            Ok(())
-        }),
-        TimedCase::new("contact gate", |block| {
-            tips[block].iter().for_each(|tip| {
-                black_box(gate.update(tip.stamp_ns, &tip.force_o));
-            });
-            Ok(())
-        }),
-        TimedCase::new("sliding and friction", |block| {
-            for tip in &tips[block] {
-                let ball = motion.update(tip, 1e-3, 0.03);
-                black_box(motion.surface_normal(&ball, 1e-3));
-            }
-            Ok(())
-        }),
-        TimedCase::new("closest face, from the root", |block| {
-            points[block].iter().for_each(|p| {
-                black_box(tree.closest(&mesh, p, RADIUS));
-            });
-            Ok(())
-        }),
-        TimedCase::new("closest face, from the last one", |block| {
-            for p in &points[block] {
-                let hit = match last {
-                    Some(hint) => tree.closest_nearby(&mesh, p, hint, RADIUS, &mut nearby),
-                    None => tree.closest(&mesh, p, RADIUS),
-                };
-                last = hit.map(|hit| hit.face).or(last);
-            }
-            Ok(())
+        TimedCase::each("closest face, from the root", &points, |p| tree.closest(&mesh, p, RADIUS)),
+        TimedCase::each("closest face, from the last one", &points, |p| {
+            let hit = match last {
+                Some(hint) => tree.closest_nearby(&mesh, p, hint, RADIUS, &mut nearby),
+                None => tree.closest(&mesh, p, RADIUS),
+            };
+            last = hit.map(|hit| hit.face).or(last);
         }),
         TimedCase::new("face dynamics", |block| {
             for sample in &samples[block] {
                 let p = Point3::new(0.0, 0.0, -0.05e-3);
                 black_box(dynamics.step(black_box(&face), &p, &sample.wrench.force, 1e-3))
-                    .map_err(touchup_core::haptic::RefineError::from)?;
+                    .map_err(RefineError::from)?;
             }
             Ok(())
         }),
-        TimedCase::new("tree update around one face", |block| {
-            points[block].iter().for_each(|p| moving.follow(p));
-            Ok(())
-        }),
+        TimedCase::each("tree update around one face", &points, |p| moving.follow(p)),
         TimedCase::new("recording (on a thread of its own)", |block| {
-            samples[block].iter().flat_map(messages).try_for_each(|message| writer.write(message, "object"))?;
-            Ok(())
+            let mut written = samples[block].iter().flat_map(messages).map(|message| writer.write(message, "object"));
+            Ok(written.try_for_each(|one| one).map_err(ReplayError::from)?)
         }),
-        TimedCase::new("patch: touches found and kept", |block| {
-            contacts[block].iter().for_each(|contact| patcher.push(contact));
-            Ok(())
-        }),
+        TimedCase::each("patch: touches found and kept", &contacts, |contact| patcher.push(contact)),
     ];
     let timed = in_turns(&mut cases, timing)?;
     let faces = mesh.face_count();
@@ -207,26 +167,16 @@ pub(super) fn seldom_costs(faces: usize, repeats: usize) -> Result<Vec<SeldomCos
     let faces = mesh.face_count();
     let scene = Scene::default();
     let samples = samples_on(side, 1000 + RENEWAL * repeats);
-    let patcher = Patcher::new(scene.patcher_params().ok_or(CostError::NothingMoves)?)?;
-    let patcher = RefCell::new(patcher);
-    // the first renewal takes in all that came before
+    let mut patcher = Patcher::new(scene.patcher_params().ok_or(CostError::NothingMoves)?)?;
     let contacts = contacts_of(&samples, scene.tip_params())?;
-    contacts[..1000].iter().for_each(|contact| patcher.borrow_mut().push(contact));
-    black_box(patcher.borrow_mut().renewed(&mesh, &tree));
-    let renewals = (0..repeats).map(|i| {
-        let first = 1000 + i * RENEWAL;
-        contacts[first..first + RENEWAL].iter().for_each(|contact| patcher.borrow_mut().push(contact));
-        let started = Instant::now();
-        black_box(patcher.borrow_mut().renewed(&mesh, &tree));
-        started.elapsed().as_secs_f64() * 1e3
-    });
-    let renewals = Spread::of(renewals.collect()).ok_or(CostError::NothingTimed)?;
-    let looks = (0..repeats.clamp(1, 3)).map(|_| {
-        let started = Instant::now();
-        black_box(detect(&mesh, &tree, &[]));
-        started.elapsed().as_secs_f64() * 1e3
-    });
-    let looks = Spread::of(looks.collect()).ok_or(CostError::NothingTimed)?;
+    let mut renew = |contacts: &[ContactSample]| {
+        contacts.iter().for_each(|contact| patcher.push(contact));
+        timed(|| patcher.renewed(&mesh, &tree)).0 * 1e3
+    };
+    // the first renewal takes in all that came before
+    renew(&contacts[..1000]);
+    let renewals = spread(contacts[1000..].chunks_exact(RENEWAL).map(renew))?;
+    let looks = spread((0..repeats.clamp(1, 3)).map(|_| timed(|| detect(&mesh, &tree, &[])).0 * 1e3))?;
     let cost = |work: &str, time_ms| SeldomCost { work: work.to_owned(), faces, time_ms };
     Ok(vec![
         cost("one renewal of the patch, each 8 ms, on a thread of its own", renewals),

@@ -1,9 +1,8 @@
 //! Cases of the same work, timed in turns, so that a disturbance of the machine affects all of them.
 
+use std::hint::black_box;
 use std::ops::Range;
 use std::time::Instant;
-
-use serde::Serialize;
 
 use super::CostError;
 use crate::Spread;
@@ -18,6 +17,16 @@ pub(super) struct TimedCase<'a> {
 impl<'a> TimedCase<'a> {
     pub fn new(name: &'a str, run: impl FnMut(Range<usize>) -> Result<(), CostError> + 'a) -> Self {
         Self { name, run: Box::new(run) }
+    }
+
+    /// Does the same with each of `items`, of which every sample has one.
+    pub fn each<T, R>(name: &'a str, items: &'a [T], mut work: impl FnMut(&'a T) -> R + 'a) -> Self {
+        Self::new(name, move |block| {
+            for item in &items[block] {
+                black_box(work(item));
+            }
+            Ok(())
+        })
     }
 }
 
@@ -37,7 +46,7 @@ impl Timing {
 }
 
 /// Of one sample.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PerSample {
     /// time, ns
     pub time_ns: Spread,
@@ -48,6 +57,7 @@ pub struct PerSample {
 }
 
 /// Times of one case, block by block.
+#[derive(Default)]
 pub(super) struct Timed {
     /// of one sample, ns
     pub blocks_ns: Vec<f64>,
@@ -58,10 +68,6 @@ pub(super) struct Timed {
 }
 
 impl Timed {
-    fn new(blocks: usize) -> Self {
-        Self { blocks_ns: Vec::with_capacity(blocks), requests: 0, bytes: 0, samples: 0, counts: asked().is_some() }
-    }
-
     fn add(&mut self, case: &mut TimedCase, samples: Range<usize>) -> Result<(), CostError> {
         let count = samples.len();
         let before = asked();
@@ -81,7 +87,7 @@ impl Timed {
     pub fn per_sample(&self) -> Result<PerSample, CostError> {
         let share = |count: u64| self.counts.then(|| count as f64 / self.samples.max(1) as f64);
         Ok(PerSample {
-            time_ns: Spread::of(self.blocks_ns.clone()).ok_or(CostError::NothingTimed)?,
+            time_ns: spread(self.blocks_ns.iter().copied())?,
             allocations: share(self.requests),
             allocated_bytes: share(self.bytes),
         })
@@ -90,7 +96,8 @@ impl Timed {
 
 /// Runs all cases over the same samples: first to warm up, then block by block, another one first each time.
 pub(super) fn in_turns(cases: &mut [TimedCase], timing: Timing) -> Result<Vec<Timed>, CostError> {
-    let mut timed: Vec<_> = cases.iter().map(|_| Timed::new(timing.blocks)).collect();
+    let counts = asked().is_some();
+    let mut timed: Vec<_> = cases.iter().map(|_| Timed { counts, ..Timed::default() }).collect();
     for case in cases.iter_mut() {
         (case.run)(0..timing.warm)?;
     }
@@ -104,20 +111,20 @@ pub(super) fn in_turns(cases: &mut [TimedCase], timing: Timing) -> Result<Vec<Ti
     Ok(timed)
 }
 
-/// Block by block, how many times as long the first took as the second.
-pub(super) fn ratio(of: &Timed, to: &Timed) -> Result<Spread, CostError> {
-    let ratios = of.blocks_ns.iter().zip(&to.blocks_ns).map(|(of, to)| of / to).collect();
-    Spread::of(ratios).ok_or(CostError::NothingTimed)
+/// Block by block, the first compared with the second: their ratio, or their difference in ns.
+pub(super) fn by_block(of: &Timed, to: &Timed, compare: fn(f64, f64) -> f64) -> Result<Spread, CostError> {
+    spread(of.blocks_ns.iter().zip(&to.blocks_ns).map(|(of, to)| compare(*of, *to)))
 }
 
-/// Block by block, how much longer the first took than the second, ns.
-pub(super) fn difference(of: &Timed, to: &Timed) -> Result<Spread, CostError> {
-    let more = of.blocks_ns.iter().zip(&to.blocks_ns).map(|(of, to)| of - to).collect();
-    Spread::of(more).ok_or(CostError::NothingTimed)
+/// Of what was timed.
+pub(super) fn spread(times: impl IntoIterator<Item = f64>) -> Result<Spread, CostError> {
+    Spread::of(times.into_iter().collect()).ok_or(CostError::NothingTimed)
 }
 
 #[cfg(test)]
 mod tests {
+    use std::ops::{Div, Sub};
+
     use super::*;
 
     #[test]
@@ -142,16 +149,10 @@ mod tests {
 
     #[test]
     fn ratios_and_differences_are_of_blocks_side_by_side() {
-        let of = |blocks_ns: &[f64]| Timed {
-            blocks_ns: blocks_ns.to_vec(),
-            requests: 0,
-            bytes: 0,
-            samples: 1,
-            counts: false,
-        };
+        let of = |blocks_ns: &[f64]| Timed { blocks_ns: blocks_ns.to_vec(), ..Timed::default() };
         let (slow, fast) = (of(&[300.0, 20.0, 100.0]), of(&[100.0, 10.0, 100.0]));
-        assert_eq!(ratio(&slow, &fast).unwrap(), Spread { median: 2.0, p10: 1.0, p90: 3.0 });
-        assert_eq!(difference(&slow, &fast).unwrap(), Spread { median: 10.0, p10: 0.0, p90: 200.0 });
+        assert_eq!(by_block(&slow, &fast, f64::div).unwrap(), Spread { median: 2.0, p10: 1.0, p90: 3.0 });
+        assert_eq!(by_block(&slow, &fast, f64::sub).unwrap(), Spread { median: 10.0, p10: 0.0, p90: 200.0 });
         assert_eq!(slow.per_sample().unwrap().allocations, None);
     }
 }

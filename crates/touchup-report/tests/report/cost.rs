@@ -60,7 +60,6 @@ fn made_up() -> Cost {
         stages: vec![StageCost { stage: "sync".to_owned(), faces: 100_000, per_sample: ns(70.0) }],
         seldom: Vec::new(),
         replays: vec![replay("cheapest", 800_000.0), replay("default", 400_000.0)],
-        counts_allocations: true,
     }
 }
 
@@ -149,7 +148,7 @@ fn the_small_measurement_measures_every_part() {
     let by_hand = ["contact", "sliding", "carve", "guard", "compensation", "bias_tracking", "undo of strokes"];
     assert_eq!(names, by_hand);
     assert!(cost.replays.iter().all(|replay| replay.samples_per_s.median > 0.0) && cost.replays.len() == 6);
-    assert!(cost.counts_allocations && asked().is_some());
+    assert!(asked().is_some());
     for size in &cost.sizes {
         assert_eq!(size.barest.allocations, Some(0.0), "{} faces", size.faces);
     }
