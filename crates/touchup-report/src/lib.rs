@@ -30,7 +30,7 @@ pub use figure::{
 };
 pub use number::three_digits;
 pub use peers::Peers;
-pub use stability::{BadShape, FaceShares, Integrator, MeshShares, RunEnding, ShareMap, Stability, SubFlowError, stability};
+pub use stability::{BadShape, FaceShares, Integrator, MeshShares, RunEnding, Stability, SubFlowError, stability};
 pub use whole_scan::{
     CaseResult, ContactSculptor, GaussianCost, GaussianParams, GaussianProcess, GaussianSurface, GivenPart,
     MethodResult, Reach, RefineMethod, ScanResult, TouchedError, WholeScan, WholeScanError, whole_scan,

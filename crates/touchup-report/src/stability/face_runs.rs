@@ -3,7 +3,6 @@
 use nalgebra::{Unit, UnitQuaternion, Vector3};
 use rand::RngExt;
 use rand_pcg::Pcg64;
-use serde::Serialize;
 
 use super::integrators::{HeldSample, Integrator};
 use touchup_core::haptic::{ContactModel, DynamicsParams};
@@ -31,8 +30,7 @@ const BETA: Decades = -7.0..5.0;
 pub(super) const STEP: Decades = -9.0..3.0;
 
 /// How a run ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RunEnding {
     /// none of those below
     Stable,
@@ -133,43 +131,50 @@ impl FaceRun {
 
     /// Runs it. A normal whose length is off is set to 1 after each step, as anybody would do; that it was off is reported apart.
     pub fn judge(&self, integrator: Integrator) -> JudgedRun {
+        let mut kept_unit = true;
+        let ending = self.run(integrator, &mut kept_unit);
+        JudgedRun { ending, kept_unit }
+    }
+
+    fn run(&self, integrator: Integrator, kept_unit: &mut bool) -> RunEnding {
         let (mut held, mut n) = (self.held, self.n);
         let towards = held.force.normalize();
         let longest = self.rest(&n).abs() + held.arm.norm() + self.h_min;
-        let mut kept_unit = true;
         for _ in 0..STEPS {
-            let end = |ending| JudgedRun { ending, kept_unit };
-            let Some((travel, raw)) = integrator.step(&self.params, &n, &held) else { return end(RunEnding::GaveUp) };
+            let Some((travel, raw)) = integrator.step(&self.params, &n, &held) else { return RunEnding::GaveUp };
             let length = raw.norm();
             if !(travel.is_finite() && length.is_finite()) {
-                return end(RunEnding::NotFinite);
+                return RunEnding::NotFinite;
             }
-            kept_unit &= (length - 1.0).abs() <= UNIT_TOLERANCE;
-            if integrator.rule().is_some() && !kept_unit {
-                return JudgedRun { ending: RunEnding::NotUnit, kept_unit };
+            *kept_unit &= (length - 1.0).abs() <= UNIT_TOLERANCE;
+            if integrator.rule().is_some() && !*kept_unit {
+                return RunEnding::NotUnit;
             }
-            let Some(turned) = raw.try_normalize(0.0) else {
-                return JudgedRun { ending: RunEnding::NotUnit, kept_unit };
-            };
+            let Some(turned) = raw.try_normalize(0.0) else { return RunEnding::NotUnit };
             if turned.dot(&self.n) <= 0.0 {
-                return JudgedRun { ending: RunEnding::Flipped, kept_unit };
+                return RunEnding::Flipped;
             }
             let arm = held.arm - towards * travel;
             if self.crosses(&n, &turned, [&held.arm, &arm], CROSSING * longest) || turns_past(&n, &turned, &towards) {
-                return JudgedRun { ending: RunEnding::Overshot, kept_unit };
+                return RunEnding::Overshot;
             }
             (held.arm, n) = (arm, turned);
         }
-        JudgedRun { ending: RunEnding::Stable, kept_unit }
+        RunEnding::Stable
     }
 
     /// Whether h goes over its rest point. That lies elsewhere for the normal before and after: it counts only where it is
     /// crossed for both.
     fn crosses(&self, n: &Vector3<f64>, turned: &Vector3<f64>, arms: [&Vector3<f64>; 2], tolerance: f64) -> bool {
         let [from, to] = arms.map(|arm| [n, turned].map(|n| arm.dot(n) - self.rest(n)));
-        let over = |from: [f64; 2], to: [f64; 2]| from.iter().all(|&x| x >= 0.0) && to.iter().all(|&x| x < -tolerance);
-        over(from, to) || over(from.map(|x| -x), to.map(|x| -x))
+        goes_over(from, to, tolerance)
     }
+}
+
+/// Whether a distance to the rest point changes its sign, for the normal before and for that after, and by more than `tolerance`.
+pub(super) fn goes_over(from: [f64; 2], to: [f64; 2], tolerance: f64) -> bool {
+    let over = |sign: f64| from.iter().all(|x| sign * x >= 0.0) && to.iter().all(|x| sign * x < -tolerance);
+    over(1.0) || over(-1.0)
 }
 
 /// Whether n goes from one side of the force to the other.

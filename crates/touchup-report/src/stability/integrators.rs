@@ -1,7 +1,6 @@
 //! The integrators of the map: what a user would write first, and the steps of [`FaceDynamics`].
 
 use nalgebra::{Matrix4, Vector3, Vector4};
-use serde::Serialize;
 
 use touchup_core::haptic::dynamics::{LARGEST_SHARE, turn};
 use touchup_core::haptic::{ContactModel, DynamicsParams, FaceDynamics, FaceState, StepRule};
@@ -14,8 +13,7 @@ const NEWTON_TOLERANCE: f64 = 1e-12;
 const DIFFERENCE: f64 = 1e-8;
 
 /// An integrator that advances a face by one sample.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Integrator {
     /// one explicit Euler step a sample
     ExplicitEuler,
@@ -55,38 +53,31 @@ impl Integrator {
         Self::DriftCorrected,
     ];
 
+    /// As a person reads it, as the end of a file name, and its counterpart in [`FaceDynamics`].
+    fn facts(self) -> (&'static str, &'static str, Option<StepRule>) {
+        match self {
+            Self::ExplicitEuler => ("explicit Euler", "explicit_euler", None),
+            Self::RungeKutta4 => ("RK4", "rk4", None),
+            Self::DormandPrince => ("Dormand-Prince 5(4)", "dormand_prince", Some(StepRule::DormandPrince)),
+            Self::ImplicitEuler => ("implicit Euler", "implicit_euler", None),
+            Self::Lie => ("Lie", "lie", Some(StepRule::Lie)),
+            Self::DriftCorrected => ("drift-corrected", "drift_corrected", Some(StepRule::DriftCorrected)),
+        }
+    }
+
     /// As a person reads it.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::ExplicitEuler => "explicit Euler",
-            Self::RungeKutta4 => "RK4",
-            Self::DormandPrince => "Dormand-Prince 5(4)",
-            Self::ImplicitEuler => "implicit Euler",
-            Self::Lie => "Lie",
-            Self::DriftCorrected => "drift-corrected",
-        }
+        self.facts().0
     }
 
     /// As the end of a file name.
     pub fn id(self) -> &'static str {
-        match self {
-            Self::ExplicitEuler => "explicit_euler",
-            Self::RungeKutta4 => "rk4",
-            Self::DormandPrince => "dormand_prince",
-            Self::ImplicitEuler => "implicit_euler",
-            Self::Lie => "lie",
-            Self::DriftCorrected => "drift_corrected",
-        }
+        self.facts().1
     }
 
     /// Its counterpart in [`FaceDynamics`], if any.
     pub fn rule(self) -> Option<StepRule> {
-        match self {
-            Self::DormandPrince => Some(StepRule::DormandPrince),
-            Self::Lie => Some(StepRule::Lie),
-            Self::DriftCorrected => Some(StepRule::DriftCorrected),
-            _ => None,
-        }
+        self.facts().2
     }
 
     /// The travel along the force, m, and the normal, whatever its length, after one sample; `None` where it gives up.

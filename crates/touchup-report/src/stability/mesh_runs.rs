@@ -3,11 +3,10 @@
 use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, Vector3};
 use rand::RngExt;
 use rand_pcg::Pcg64;
-use serde::Serialize;
 
-use super::face_runs::RunEnding;
+use super::face_runs::{RunEnding, goes_over};
 use touchup_core::haptic::{RefineParams, Refiner, RegionFit, TipParams};
-use touchup_core::mesh::{FaceId, TriMesh, VertexId};
+use touchup_core::mesh::{FaceId, TriMesh};
 use touchup_core::stylus::{Sample, Wrench};
 
 /// Cells along each side of the sheet.
@@ -24,8 +23,7 @@ const CROSSING: f64 = 1e-9;
 pub(super) const QUALITY: std::ops::Range<f64> = -3.0..0.0;
 
 /// How a triangle is degenerate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BadShape {
     /// two long sides and a short one
     Needle,
@@ -69,9 +67,8 @@ impl MeshRun {
         // a sample acts for 30 ms at most
         let dt_s = power(rng.random_range(-6.0..-1.5));
         let stiffness = power(rng.random_range(-6.0..6.0));
-        let equilateral = 0.75f64.sqrt();
         Self {
-            quality: equilateral * power(rng.random_range(QUALITY)),
+            quality: 0.75f64.sqrt() * power(rng.random_range(QUALITY)),
             stiffness,
             shape,
             edge: power(rng.random_range(-3.5..-2.0)),
@@ -87,24 +84,23 @@ impl MeshRun {
     /// A flat sheet of equal triangles with sides of `edge` at most, curled a little: no two normals are the same.
     fn sheet(&self) -> TriMesh {
         let height = self.quality * self.edge;
-        let lean = match self.shape {
-            // the top over the end of the base, or over its middle
-            BadShape::Needle => 0.0,
-            BadShape::Sliver => 0.5,
-        };
+        let is_sliver = self.shape == BadShape::Sliver;
+        // the top over the end of the base, or over its middle
+        let lean = if is_sliver { 0.5 } else { 0.0 };
         let turn = Rotation3::from_euler_angles(0.3, -0.2, 0.7);
-        let at = |i: u32, j: u32| {
+        let row = CELLS + 1;
+        let at = |k: u32| {
+            let (i, j) = (k % row, k / row);
             let (x, y) = (f64::from(i) + lean * f64::from(j % 2), f64::from(j));
             let bent = 0.02 * height * ((f64::from(i) * 1.3).sin() + (f64::from(j) * 0.7).cos());
             turn * Point3::new(x * self.edge, y * height, bent)
         };
-        let id = |i: u32, j: u32| j * (CELLS + 1) + i;
-        let positions = (0..=CELLS).flat_map(|j| (0..=CELLS).map(move |i| (i, j))).map(|(i, j)| at(i, j)).collect();
-        let cells = (0..CELLS).flat_map(|j| (0..CELLS).map(move |i| (i, j)));
-        let faces = cells.flat_map(|(i, j)| {
-            let [a, b, c, d] = [id(i, j), id(i + 1, j), id(i + 1, j + 1), id(i, j + 1)];
-            if j % 2 == 1 && self.shape == BadShape::Sliver { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] }
+        let faces = (0..CELLS * CELLS).flat_map(|k| {
+            let (a, is_odd) = (k % CELLS + k / CELLS * row, k / CELLS % 2 == 1);
+            let [b, c, d] = [a + 1, a + row + 1, a + row];
+            if is_odd && is_sliver { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] }
         });
+        let positions = (0..row * row).map(at).collect();
         TriMesh::new(positions, faces.collect()).unwrap_or_else(|error| unreachable!("the sheet is sound: {error}"))
     }
 
@@ -155,16 +151,10 @@ impl PressedFace {
 
     /// Whether the face went over its rest point to be at `next`: for the normal before and for that after.
     fn crosses(&self, next: &Self, point: &Point3<f64>, force: &Vector3<f64>) -> bool {
-        let (from, to) = self.left(next, point, force);
-        let over = |sign: f64| from.iter().all(|x| sign * x >= 0.0) && to.iter().all(|x| sign * x < -CROSSING);
-        self.face == next.face && (over(1.0) || over(-1.0))
-    }
-
-    /// Distance to equilibrium before and after, for both normals, m.
-    fn left(&self, next: &Self, point: &Point3<f64>, force: &Vector3<f64>) -> ([f64; 2], [f64; 2]) {
-        let left =
-            |at: &Self| [self.normal, next.normal].map(|n| (point - at.barycentre).dot(&n) + force.dot(&n) / STIFFNESS);
-        (left(self), left(next))
+        // distance to equilibrium, m
+        let [from, to] = [self, next]
+            .map(|at| [self.normal, next.normal].map(|n| (point - at.barycentre).dot(&n) + force.dot(&n) / STIFFNESS));
+        self.face == next.face && goes_over(from, to, CROSSING)
     }
 }
 
@@ -173,9 +163,9 @@ fn sound(mesh: &TriMesh, before: &[Vector3<f64>]) -> RunEnding {
     if !mesh.positions().iter().all(|p| p.iter().all(|x| x.is_finite())) {
         return RunEnding::NotFinite;
     }
-    for (face, corners) in mesh.faces() {
+    for (face, _) in mesh.faces() {
         let normal = mesh.normal(face);
-        if (normal.norm() - 1.0).abs() > 1e-9 && !is_flat(mesh, corners) {
+        if (normal.norm() - 1.0).abs() > 1e-9 && mesh.double_area_normal(face) != Vector3::zeros() {
             return RunEnding::NotUnit;
         }
         if normal.dot(&before[face.0 as usize]) <= 0.0 {
@@ -183,9 +173,4 @@ fn sound(mesh: &TriMesh, before: &[Vector3<f64>]) -> RunEnding {
         }
     }
     RunEnding::Stable
-}
-
-fn is_flat(mesh: &TriMesh, corners: [VertexId; 3]) -> bool {
-    let [a, b, c] = corners.map(|v| mesh.position(v));
-    (b - a).cross(&(c - a)) == Vector3::zeros()
 }

@@ -10,26 +10,26 @@ mod text;
 
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
-use serde::Serialize;
 
 pub use face_runs::RunEnding;
 pub use integrators::Integrator;
 pub use mesh_runs::BadShape;
-pub use shares::ShareMap;
 pub use sub_flows::SubFlowError;
 
-use super::{Chapter, Effort};
-use face_runs::FaceRun;
+use super::{Effort, Panel};
+use face_runs::{FaceRun, JudgedRun};
 use mesh_runs::MeshRun;
-use shares::{Counts, Grid};
+use shares::{count_of, share_map, stable_from, stable_up_to, tally};
 
 /// An exact sub-flow may be off by this share of its scale.
 pub const LARGEST_SUB_FLOW_ERROR: f64 = 1e-10;
 /// Same report on every machine.
 const SEED: u64 = 4;
+/// Of position and normal, in the maps: powers of ten.
+const STIFFNESS: std::ops::Range<f64> = -12.0..12.0;
 
 /// How the runs of one integrator on one face ended.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct FaceShares {
     /// which
     pub integrator: Integrator,
@@ -44,14 +44,14 @@ pub struct FaceShares {
     /// largest α f_max dt / h_min below which all runs are stable, in the columns of the map; `None` where not even the first is
     pub stable_up_to: Option<f64>,
     /// x: α f_max dt / h_min, y: β f_max² dt; for the sigmoid and for the spring
-    pub by_stiffness: [ShareMap; 2],
+    pub by_stiffness: [Panel; 2],
     /// x: step length, s; y: h_min, m
-    pub by_step: ShareMap,
+    pub by_step: Panel,
 }
 
 /// How the runs of the default, Lie in the robust mode, on whole meshes ended. The mode turns the normal by itself, so that the
 /// drift-corrected step is the same there.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct MeshShares {
     /// of the triangles
     pub shape: BadShape,
@@ -65,11 +65,11 @@ pub struct MeshShares {
     /// last is
     pub stable_from_quality: Option<f64>,
     /// x: α k dt, y: altitude over longest side
-    pub by_quality: ShareMap,
+    pub by_quality: Panel,
 }
 
 /// Results on stability.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Stability {
     /// one for each integrator
     pub faces: Vec<FaceShares>,
@@ -95,54 +95,56 @@ pub fn stability(effort: Effort, progress: &mut dyn FnMut(&str)) -> Stability {
     Stability { faces: faces.into(), meshes, sub_flows }
 }
 
-fn face_shares(integrator: Integrator, runs: usize) -> FaceShares {
+fn face_shares(integrator: Integrator, count: usize) -> FaceShares {
     let mut rng = Pcg64::seed_from_u64(SEED);
-    let mut counts = Counts::default();
-    let mut kept_unit = 0;
-    let mut stiffness = [Grid::new(-12.0..12.0, -12.0..12.0), Grid::new(-12.0..12.0, -12.0..12.0)];
-    let mut steps = Grid::new(face_runs::STEP, face_runs::H_MIN);
-    for i in 0..runs {
+    let run = |i: usize| {
         let run = FaceRun::draw(&mut rng, i % 2 == 1);
-        let judged = run.judge(integrator);
-        let is_stable = judged.ending == RunEnding::Stable;
-        counts.add(judged.ending);
-        kept_unit += usize::from(judged.kept_unit);
-        stiffness[i % 2].add(run.position_stiffness(), run.turning_stiffness(), is_stable);
-        steps.add(run.dt(), run.h_min, is_stable);
-    }
-    let by_stiffness = stiffness.map(Grid::shares);
-    let stable_up_to = by_stiffness.iter().map(ShareMap::stable_up_to).reduce(|a, b| Some(a?.min(b?))).flatten();
+        (run, run.judge(integrator))
+    };
+    let runs: Vec<(FaceRun, JudgedRun)> = (0..count).map(run).collect();
+    let is_stable = |judged: &JudgedRun| judged.ending == RunEnding::Stable;
+    let by_stiffness = [("sigmoid", 0), ("spring", 1)].map(|(name, first)| {
+        let stiffness = |(run, judged): &(FaceRun, JudgedRun)| {
+            (run.position_stiffness(), run.turning_stiffness(), is_stable(judged))
+        };
+        share_map(name, [&STIFFNESS; 2], runs.iter().skip(first).step_by(2).map(stiffness))
+    });
+    let steps = runs.iter().map(|(run, judged)| (run.dt(), run.h_min, is_stable(judged)));
+    let endings = tally(runs.iter().map(|(_, judged)| judged.ending));
     FaceShares {
         integrator,
-        runs,
-        stable_share: counts.stable_share(),
-        endings: counts.endings(),
-        unit_share: kept_unit as f64 / runs as f64,
-        stable_up_to,
+        runs: count,
+        stable_share: share(count_of(&endings, RunEnding::Stable), count),
+        endings,
+        unit_share: share(runs.iter().filter(|(_, judged)| judged.kept_unit).count(), count),
+        stable_up_to: by_stiffness.iter().map(stable_up_to).reduce(|a, b| Some(a?.min(b?))).flatten(),
         by_stiffness,
-        by_step: steps.shares(),
+        by_step: share_map(integrator.name(), [&face_runs::STEP, &face_runs::H_MIN], steps),
     }
 }
 
-fn mesh_shares(shape: BadShape, runs: usize) -> MeshShares {
+fn mesh_shares(shape: BadShape, count: usize) -> MeshShares {
     let mut rng = Pcg64::seed_from_u64(SEED);
-    let mut counts = Counts::default();
-    let mut quality = Grid::new(-6.0..6.0, mesh_runs::QUALITY);
-    for _ in 0..runs {
+    let run = |_| {
         let run = MeshRun::draw(&mut rng, shape);
-        let ending = run.judge();
-        counts.add(ending);
-        quality.add(run.stiffness, run.quality, ending == RunEnding::Stable);
-    }
-    let by_quality = quality.shares();
+        (run.stiffness, run.quality, run.judge())
+    };
+    let runs: Vec<(f64, f64, RunEnding)> = (0..count).map(run).collect();
+    let stable = runs.iter().map(|&(stiffness, quality, ending)| (stiffness, quality, ending == RunEnding::Stable));
+    let by_quality = share_map(shape.name(), [&(-6.0..6.0), &mesh_runs::QUALITY], stable);
+    let endings = tally(runs.iter().map(|(.., ending)| *ending));
     MeshShares {
         shape,
-        runs,
-        stable_share: counts.stable_share(),
-        endings: counts.endings(),
-        stable_from_quality: by_quality.stable_from(),
+        runs: count,
+        stable_share: share(count_of(&endings, RunEnding::Stable), count),
+        endings,
+        stable_from_quality: stable_from(&by_quality),
         by_quality,
     }
+}
+
+fn share(of: usize, all: usize) -> f64 {
+    of as f64 / all.max(1) as f64
 }
 
 impl Stability {
@@ -159,10 +161,5 @@ impl Stability {
     /// The largest error of all sub-flows, over the scale.
     pub fn largest_sub_flow_error(&self) -> f64 {
         self.sub_flows.iter().map(|flow| flow.largest_error).fold(0.0, f64::max)
-    }
-
-    /// The maps, the tables and their text.
-    pub fn chapter(&self) -> Chapter {
-        text::chapter(self)
     }
 }

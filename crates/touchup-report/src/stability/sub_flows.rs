@@ -3,7 +3,6 @@
 use nalgebra::{Point3, Vector3};
 use rand::RngExt;
 use rand_pcg::Pcg64;
-use serde::Serialize;
 
 use super::double_double::Double2;
 use touchup_core::haptic::{Along, ContactModel, DynamicsParams, FaceDynamics, FaceState, StepRule};
@@ -19,7 +18,7 @@ const NEAREST_OPPOSITE: std::ops::Range<f64> = -5.0..-1.0;
 const UNIT_MODEL: ContactModel = ContactModel::Sigmoid { f_max_n: 1.0, h_min_m: 1.0, delta: 0.0 };
 
 /// Largest error of one sub-flow.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct SubFlowError {
     /// which, and in which regime
     pub name: String,
@@ -38,13 +37,17 @@ fn power(rng: &mut Pcg64, decades: std::ops::Range<f64>) -> f64 {
     10f64.powf(rng.random_range(decades))
 }
 
+fn either_sign(rng: &mut Pcg64) -> f64 {
+    if rng.random_bool(0.5) { 1.0 } else { -1.0 }
+}
+
 /// Each regime with its own closed form or its own cancellation.
 const REGIMES: [(&str, ForceShare); 7] = [
     ("position, 0 < F < f_max", |rng| rng.random_range(0.0..1.0)),
     ("position, F = 0", |_| 0.0),
     ("position, F = f_max", |_| 1.0),
-    ("position, F near 0", |rng| power(rng, -12.0..-2.0) * if rng.random_bool(0.5) { 1.0 } else { -1.0 }),
-    ("position, F near f_max", |rng| 1.0 + power(rng, -12.0..-2.0) * if rng.random_bool(0.5) { 1.0 } else { -1.0 }),
+    ("position, F near 0", |rng| power(rng, -12.0..-2.0) * either_sign(rng)),
+    ("position, F near f_max", |rng| 1.0 + power(rng, -12.0..-2.0) * either_sign(rng)),
     ("position, F against the normal", |rng| -power(rng, -2.0..4.0)),
     ("position, F above f_max", |rng| 1.0 + power(rng, -2.0..4.0)),
 ];
@@ -57,24 +60,18 @@ pub(super) fn sub_flows(rng: &mut Pcg64, cases: usize) -> Vec<SubFlowError> {
     errors
 }
 
-/// Keeps the worst.
-struct Worst {
-    error: SubFlowError,
-}
-
-impl Worst {
-    fn new(name: &str) -> Self {
-        Self { error: SubFlowError { name: name.to_owned(), cases: 0, largest_error: 0.0, worst: String::new() } }
-    }
-
-    fn take(&mut self, error: f64, at: impl FnOnce() -> String) {
-        self.error.cases += 1;
+/// The worst of `cases`: the error of each, and where it was; `None` where there is nothing to compare with.
+fn worst_of(name: &str, cases: usize, mut case: impl FnMut(usize) -> Option<(f64, String)>) -> SubFlowError {
+    let mut worst = SubFlowError { name: name.to_owned(), cases: 0, largest_error: 0.0, worst: String::new() };
+    for (error, at) in (0..cases).filter_map(&mut case) {
+        worst.cases += 1;
         // a NaN is the worst there is
-        if error.is_nan() || error > self.error.largest_error {
-            self.error.largest_error = if error.is_nan() { f64::INFINITY } else { error };
-            self.error.worst = at();
+        if error.is_nan() || error > worst.largest_error {
+            worst.largest_error = if error.is_nan() { f64::INFINITY } else { error };
+            worst.worst = at;
         }
     }
+    worst
 }
 
 fn dynamics(model: ContactModel, alpha: f64, beta: f64) -> Option<FaceDynamics> {
@@ -99,16 +96,14 @@ fn travel(model: ContactModel, h: f64, force: f64, t: f64) -> f64 {
 }
 
 fn of_sigmoid(rng: &mut Pcg64, name: &str, share: ForceShare, cases: usize) -> SubFlowError {
-    let mut worst = Worst::new(name);
-    for case in 0..cases {
+    worst_of(name, cases, |case| {
         // half of them where the logistic bends, half of them anywhere an exponential is finite
         let u = if case % 2 == 0 { rng.random_range(-12.0..12.0) } else { rng.random_range(-600.0..600.0) };
         let (c, t) = (share(rng), power(rng, -6.0..6.0));
-        let Some(exact) = exact_travel(u, c, t) else { continue };
+        let exact = exact_travel(u, c, t)?;
         let found = travel(UNIT_MODEL, u, c, t);
-        worst.take((found - exact).abs() / (1.0 + exact.abs()), || format!("u {u}, F/f_max {c}, T {t}"));
-    }
-    worst.error
+        Some(((found - exact).abs() / (1.0 + exact.abs()), format!("u {u}, F/f_max {c}, T {t}")))
+    })
 }
 
 /// −Δu of du/dT = 1/(1+eᵘ) − c after T: the root of ∫ du / (1/(1+eᵘ) − c) = T between the start and the farthest it can be.
@@ -178,24 +173,21 @@ fn primitive(u: Double2, c: f64) -> Option<Double2> {
 }
 
 fn of_spring(rng: &mut Pcg64, cases: usize) -> SubFlowError {
-    let mut worst = Worst::new("position, linear spring");
     let model = ContactModel::Spring { stiffness_n_per_m: 1.0 };
-    for _ in 0..cases {
-        let sign = if rng.random_bool(0.5) { 1.0 } else { -1.0 };
-        let (h, force, t) = (sign * power(rng, -6.0..3.0), rng.random_range(-3.0..3.0), power(rng, -6.0..6.0));
+    worst_of("position, linear spring", cases, |_| {
+        let (h, force, t) =
+            (either_sign(rng) * power(rng, -6.0..3.0), rng.random_range(-3.0..3.0), power(rng, -6.0..6.0));
         // h + F falls to e^−t of itself
         let fallen = Double2::from(1.0) - Double2::from(-t.min(300.0)).exp();
         let exact = ((Double2::from(h) + force.into()) * fallen).value();
         let found = travel(model, h, force, t);
-        worst.take((found - exact).abs() / (1.0 + exact.abs()), || format!("h {h}, F {force}, T {t}"));
-    }
-    worst.error
+        Some(((found - exact).abs() / (1.0 + exact.abs()), format!("h {h}, F {force}, T {t}")))
+    })
 }
 
 /// tan(θ/2) falls as e^(−β |F| f t); with the tip held at h = 0, f is half of f_max.
 fn of_rotation(rng: &mut Pcg64, cases: usize) -> SubFlowError {
-    let mut worst = Worst::new("normal");
-    for case in 0..cases {
+    worst_of("normal", cases, |case| {
         let angle = match case % 3 {
             0 => power(rng, -12.0..-1.0),
             1 => std::f64::consts::PI - power(rng, NEAREST_OPPOSITE),
@@ -206,10 +198,8 @@ fn of_rotation(rng: &mut Pcg64, cases: usize) -> SubFlowError {
         let after = dynamics(UNIT_MODEL, 0.0, 1.0)
             .and_then(|dynamics| dynamics.step(&FACE, &Point3::origin(), &force, 2.0 * exponent).ok());
         let found = after.map_or(Vector3::repeat(f64::NAN), |face| face.n);
-        let error = (found - exact_normal(&force, exponent)).norm();
-        worst.take(error, || format!("angle {angle}, exponent {exponent}"));
-    }
-    worst.error
+        Some(((found - exact_normal(&force, exponent)).norm(), format!("angle {angle}, exponent {exponent}")))
+    })
 }
 
 /// n = z turned towards `force` in the plane y = 0, in numbers of 32 digits.

@@ -1,13 +1,14 @@
 //! The chapter: maps, tables and text.
 
-use super::{FaceShares, LARGEST_SUB_FLOW_ERROR, MeshShares, RunEnding, ShareMap, Stability};
-use crate::{Axis, Chapter, Drawing, Figure, Panel, Table, TableCell};
+use super::{FaceShares, LARGEST_SUB_FLOW_ERROR, MeshShares, RunEnding, Stability, count_of};
+use crate::{Axis, Chapter, Drawing, Figure, Panel, Table, TableOf};
 use touchup_core::haptic::GuardParams;
 
 /// What of the runs the maps show.
 const SHARE_OF: &str = "stable runs";
-/// Endings other than stable, with the heads of their columns.
-const FAULTS: [(RunEnding, &str); 6] = [
+/// Endings with the heads of their columns.
+const ENDINGS: [(RunEnding, &str); 7] = [
+    (RunEnding::Stable, "stable, %"),
     (RunEnding::GaveUp, "gave up, %"),
     (RunEnding::NotFinite, "not finite, %"),
     (RunEnding::NotUnit, "not unit, %"),
@@ -16,12 +17,15 @@ const FAULTS: [(RunEnding, &str); 6] = [
     (RunEnding::CutBack, "cut back, %"),
 ];
 
-pub(super) fn chapter(stability: &Stability) -> Chapter {
-    Chapter {
-        title: "Stability".to_owned(),
-        text: [vec![what_was_run(stability)], verdicts(stability)].concat(),
-        figures: figures(stability),
-        tables: vec![faces_table(&stability.faces), meshes_table(&stability.meshes), sub_flows_table(stability)],
+impl Stability {
+    /// The maps, the tables and their text.
+    pub fn chapter(&self) -> Chapter {
+        Chapter {
+            title: "Stability".to_owned(),
+            text: [vec![what_was_run(self)], verdicts(self)].concat(),
+            figures: figures(self),
+            tables: vec![faces_table(&self.faces), meshes_table(&self.meshes), sub_flows_table(self)],
+        }
     }
 }
 
@@ -67,12 +71,9 @@ fn of_default_on_meshes(stability: &Stability) -> String {
     if stability.meshes.iter().all(|shares| shares.stable_share == 1.0) {
         return "On meshes of any quality that was tried, the default was stable in every press.".to_owned();
     }
-    let count = |wanted| {
-        let endings = stability.meshes.iter().flat_map(|shares| &shares.endings);
-        endings.filter(|(ending, _)| *ending == wanted).map(|(_, count)| count).sum::<usize>()
-    };
-    let (runs, cut_back) =
-        (stability.meshes.iter().map(|shares| shares.runs).sum::<usize>(), count(RunEnding::CutBack));
+    let count = |wanted| stability.meshes.iter().map(|shares| count_of(&shares.endings, wanted)).sum::<usize>();
+    let runs: usize = stability.meshes.iter().map(|shares| shares.runs).sum();
+    let cut_back = count(RunEnding::CutBack);
     let from = match stability.default_stable_from_quality() {
         Some(quality) => format!("no press is at fault from an altitude of {quality:.2} of the longest side on"),
         None => "there are faults at every quality".to_owned(),
@@ -109,10 +110,6 @@ fn of_mesh(shares: &MeshShares) -> String {
     )
 }
 
-fn panel(name: &str, map: &ShareMap) -> Panel {
-    Panel { name: name.to_owned(), xs: map.xs.clone(), ys: map.ys.clone(), shares: map.shares.clone() }
-}
-
 fn maps(panels: Vec<Panel>) -> Drawing {
     Drawing::Maps { share_of: SHARE_OF.to_owned(), panels }
 }
@@ -126,7 +123,6 @@ fn figures(stability: &Stability) -> Vec<Figure> {
 
 fn stiffness_map(shares: &FaceShares) -> Figure {
     let name = shares.integrator.name();
-    let [sigmoid, spring] = &shares.by_stiffness;
     Figure {
         id: format!("stability_{}", shares.integrator.id()),
         title: format!("Stable runs of one face: {name}"),
@@ -138,7 +134,7 @@ fn stiffness_map(shares: &FaceShares) -> Figure {
         ),
         x: Axis::log("stiffness of the position, alpha f_max dt/h_min", "alpha_f_max_dt_per_h_min"),
         y: Axis::log("stiffness of the normal, beta f_max² dt", "beta_f_max_squared_dt"),
-        drawing: maps(vec![panel("sigmoid", sigmoid), panel("spring", spring)]),
+        drawing: maps(shares.by_stiffness.to_vec()),
     }
 }
 
@@ -150,7 +146,7 @@ fn step_map(faces: &[FaceShares]) -> Figure {
             .to_owned(),
         x: Axis::log("step length, s", "step_s"),
         y: Axis::log("h_min, m", "h_min_m"),
-        drawing: maps(faces.iter().map(|shares| panel(shares.integrator.name(), &shares.by_step)).collect()),
+        drawing: maps(faces.iter().map(|shares| shares.by_step.clone()).collect()),
     }
 }
 
@@ -163,77 +159,49 @@ fn quality_map(meshes: &[MeshShares]) -> Figure {
             .to_owned(),
         x: Axis::log("relaxation in one step, alpha k dt", "alpha_k_dt"),
         y: Axis::log("altitude over longest side", "altitude_per_longest_side"),
-        drawing: maps(meshes.iter().map(|shares| panel(shares.shape.name(), &shares.by_quality)).collect()),
+        drawing: maps(meshes.iter().map(|shares| shares.by_quality.clone()).collect()),
     }
 }
 
-/// Stable, then each fault, in percent of the runs.
-fn shares_of(endings: &[(RunEnding, usize)], runs: usize) -> Vec<TableCell> {
-    let of = |wanted: RunEnding| {
-        let count = endings.iter().find(|(ending, _)| *ending == wanted).map_or(0, |(_, count)| *count);
-        TableCell::Number(100.0 * count as f64 / runs as f64)
-    };
-    [RunEnding::Stable].into_iter().chain(FAULTS.map(|(ending, _)| ending)).map(of).collect()
-}
-
-fn heads(first: &[&str], last: &[&str]) -> Vec<String> {
-    let faults = FAULTS.map(|(_, head)| head);
-    [first, &["runs", "stable, %"], &faults, last].concat().into_iter().map(str::to_owned).collect()
+/// How many runs there were, and how many percent of them ended in each way.
+fn with_endings<'a, R: Copy>(table: TableOf<R>, of: fn(R) -> &'a [(RunEnding, usize)]) -> TableOf<R> {
+    let runs = |row| of(row).iter().map(|(_, count)| count).sum::<usize>();
+    ENDINGS.iter().fold(table.column("runs", runs), |table, (ending, head)| {
+        table.column(*head, |row| 100.0 * count_of(of(row), *ending) as f64 / runs(row) as f64)
+    })
 }
 
 fn faces_table(faces: &[FaceShares]) -> Table {
-    let row = |shares: &FaceShares| {
-        let mut row = vec![shares.integrator.name().into(), TableCell::Number(shares.runs as f64)];
-        row.extend(shares_of(&shares.endings, shares.runs));
-        row.push(TableCell::Number(100.0 * shares.unit_share));
-        row
-    };
-    Table {
-        id: "stability_faces".to_owned(),
-        title: "How the runs of one face ended".to_owned(),
-        caption:
-            "The first fault of a run counts. Last column: runs in which the integrator itself kept |n| = 1 to 1e-9."
-                .to_owned(),
-        heads: heads(&["integrator"], &["kept |n| = 1 by itself, %"]),
-        rows: faces.iter().map(row).collect(),
-    }
+    let caption =
+        "The first fault of a run counts. Last column: runs in which the integrator itself kept |n| = 1 to 1e-9.";
+    let table = Table::of("stability_faces", "How the runs of one face ended", caption, faces)
+        .column("integrator", |shares| shares.integrator.name());
+    with_endings(table, |shares| &shares.endings)
+        .column("kept |n| = 1 by itself, %", |shares| 100.0 * shares.unit_share)
+        .table
 }
 
 fn meshes_table(meshes: &[MeshShares]) -> Table {
-    let row = |shares: &MeshShares| {
-        let mut row = vec![shares.shape.name().into(), TableCell::Number(shares.runs as f64)];
-        row.extend(shares_of(&shares.endings, shares.runs));
-        row
-    };
-    Table {
-        id: "stability_meshes".to_owned(),
-        title: "How the presses on meshes ended".to_owned(),
-        caption: "Robust mode, from equilateral triangles to an altitude of a thousandth of the longest side."
-            .to_owned(),
-        heads: heads(&["triangles"], &[]),
-        rows: meshes.iter().map(row).collect(),
-    }
+    let caption = "Robust mode, from equilateral triangles to an altitude of a thousandth of the longest side.";
+    let table = Table::of("stability_meshes", "How the presses on meshes ended", caption, meshes)
+        .column("triangles", |shares| shares.shape.name());
+    with_endings(table, |shares| &shares.endings).table
 }
 
 fn sub_flows_table(stability: &Stability) -> Table {
-    let rows = stability.sub_flows.iter().map(|flow| {
-        let verdict = if flow.largest_error <= LARGEST_SUB_FLOW_ERROR { "within" } else { "beyond" };
-        vec![
-            flow.name.clone().into(),
-            TableCell::Number(flow.cases as f64),
-            TableCell::Number(flow.largest_error),
-            verdict.into(),
-            flow.worst.clone().into(),
-        ]
-    });
-    Table {
-        id: "stability_sub_flows".to_owned(),
-        title: "Exact sub-flows against their implicit closed form in 32 digits".to_owned(),
-        caption: format!(
+    Table::of(
+        "stability_sub_flows",
+        "Exact sub-flows against their implicit closed form in 32 digits",
+        format!(
             "Largest error over the scale: of a position h_min and the travel, of a normal 1. Limit {LARGEST_SUB_FLOW_ERROR:.0e}. Depths \
              up to 600 h_min, scaled times from 1e-6 to 1e6."
         ),
-        heads: ["sub-flow", "cases", "largest error", "1e-10", "where"].map(str::to_owned).to_vec(),
-        rows: rows.collect(),
-    }
+        &stability.sub_flows,
+    )
+    .column("sub-flow", |flow| flow.name.as_str())
+    .column("cases", |flow| flow.cases)
+    .column("largest error", |flow| flow.largest_error)
+    .column("1e-10", |flow| if flow.largest_error <= LARGEST_SUB_FLOW_ERROR { "within" } else { "beyond" })
+    .column("where", |flow| flow.worst.as_str())
+    .table
 }
