@@ -1,7 +1,5 @@
 //! The two laws by which an error may fall from sweep to sweep, fitted by least squares to its logarithm.
 
-use serde::Serialize;
-
 /// A line through points by least squares.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Line {
@@ -28,7 +26,7 @@ pub fn straight_line(points: &[(f64, f64)]) -> Option<Line> {
 }
 
 /// One law: e(sweep) = start · exp(−rate · x), x the sweep or its logarithm.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Law {
     /// of an exponential law for each sweep; of a power law the exponent
     pub rate: f64,
@@ -41,7 +39,7 @@ pub struct Law {
 }
 
 /// Both laws of the same errors.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Decay {
     /// e ∝ exp(−rate · sweep) \[paper, Fig 11\]
     pub exponential: Law,

@@ -1,14 +1,13 @@
 //! Errors of a mesh against the truth, face by face.
 
 use nalgebra::Point3;
-use serde::Serialize;
 
 use touchup_core::compare::angle_between;
 use touchup_core::mesh::TriMesh;
 use touchup_sim::Surface;
 
 /// Errors of one mesh against the truth.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeshErrors {
     /// mean distance error of the faces, mm
     pub distance_mm: f64,

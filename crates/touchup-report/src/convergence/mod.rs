@@ -6,18 +6,17 @@ mod errors;
 mod sweeps;
 mod text;
 
-use serde::Serialize;
-
 pub use decay::{Decay, Law, Line, fit_decay, straight_line};
 pub use errors::MeshErrors;
+pub(super) use sweeps::region_over;
 pub use sweeps::{BLOWN_UP, PaperSweeps, RobustSweeps, SweepError, noisy, raster_samples};
 
 use super::Effort;
+use touchup_core::stylus::Sample;
 use touchup_sim::Peaks;
 
 /// Which rule made the sweeps.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rule {
     /// the published one, 20 s on each face, faces compared by index
     Paper,
@@ -26,7 +25,7 @@ pub enum Rule {
 }
 
 /// The sweeps over one scan.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct SweepRun {
     /// which rule
     pub rule: Rule,
@@ -45,7 +44,7 @@ pub struct SweepRun {
 }
 
 /// Error from sweep to sweep.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Convergence {
     /// requested sweeps
     pub sweeps: usize,
@@ -71,11 +70,11 @@ impl SweepRun {
         (rule, seed, edge): (Rule, u64, f64),
         start: MeshErrors,
         count: usize,
-        mut sweep: impl FnMut(&MeshErrors) -> Result<MeshErrors, SweepError>,
+        mut sweep: impl FnMut() -> Result<MeshErrors, SweepError>,
     ) -> Self {
         let (mut errors, mut ended, mut has_blown_up) = (vec![start], None, false);
         for number in 1..=count {
-            match sweep(&start) {
+            match sweep() {
                 Ok(now) => {
                     errors.push(now);
                     has_blown_up = now.distance_mm > BLOWN_UP * start.distance_mm;
@@ -118,11 +117,7 @@ pub fn convergence(effort: Effort, progress: &mut dyn FnMut(&str)) -> Convergenc
         Ok(samples) => {
             for seed in seeds {
                 progress(&format!("convergence: robust mode, scan {seed}"));
-                let scan = peaks.mesh(ROBUST_EDGE).map(|truth| noisy(&truth, seed)).map_err(SweepError::from);
-                let run = scan.and_then(|scan| RobustSweeps::new(&peaks, scan, &samples)).map(|mut run| {
-                    SweepRun::of((Rule::Robust, seed, ROBUST_EDGE), run.errors(), sweeps, |_| run.sweep())
-                });
-                found.take(run);
+                found.take(robust_run(&peaks, &samples, seed, sweeps));
             }
         }
     }
@@ -132,7 +127,12 @@ pub fn convergence(effort: Effort, progress: &mut dyn FnMut(&str)) -> Convergenc
 fn paper_run(seed: u64, sweeps: usize) -> Result<SweepRun, SweepError> {
     let mut run = PaperSweeps::new(PAPER_EDGE, None, seed)?;
     let start = run.errors();
-    Ok(SweepRun::of((Rule::Paper, seed, PAPER_EDGE), start, sweeps, |start| run.sweep(start.distance_mm)))
+    Ok(SweepRun::of((Rule::Paper, seed, PAPER_EDGE), start, sweeps, || run.sweep(start.distance_mm)))
+}
+
+fn robust_run(peaks: &Peaks, samples: &[Sample], seed: u64, sweeps: usize) -> Result<SweepRun, SweepError> {
+    let mut run = RobustSweeps::new(peaks, noisy(&peaks.mesh(ROBUST_EDGE)?, seed), samples)?;
+    Ok(SweepRun::of((Rule::Robust, seed, ROBUST_EDGE), run.errors(), sweeps, || run.sweep()))
 }
 
 impl Convergence {

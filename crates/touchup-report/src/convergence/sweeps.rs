@@ -98,6 +98,18 @@ impl PaperSweeps {
     }
 }
 
+/// A square around the middle of `peaks`, from `-half` to `half` (m), for a ball of `radius` (m).
+pub(crate) fn region_over(peaks: &Peaks, half: f64, radius: f64) -> RasterRegion {
+    let bounds = peaks.bounds();
+    RasterRegion {
+        frame_ov: Isometry3::identity(),
+        low: Point2::new(-half, -half),
+        high: Point2::new(half, half),
+        floor: bounds.min.z,
+        clear: bounds.max.z + 2.0 * radius,
+    }
+}
+
 /// One raster of a ball over the whole square: what a perfect sensor reports every millisecond.
 ///
 /// # Errors
@@ -105,14 +117,7 @@ impl PaperSweeps {
 pub fn raster_samples(peaks: &Peaks, friction: f64) -> Result<Vec<Sample>, SweepError> {
     let TipParams { radius, stiffness } = TIP;
     let stiffness = stiffness.unwrap_or(f64::INFINITY);
-    let (bounds, half) = (peaks.bounds(), 0.5 * 50e-3);
-    let region = RasterRegion {
-        frame_ov: Isometry3::identity(),
-        low: Point2::new(-half, -half),
-        high: Point2::new(half, half),
-        floor: bounds.min.z,
-        clear: bounds.max.z + 2.0 * radius,
-    };
+    let region = region_over(peaks, 0.5 * 50e-3, radius);
     let path = raster(&region, Lines::AlongX, &PathParams { radius, ..PathParams::default() })?;
     let stylus = StylusParams {
         radius,

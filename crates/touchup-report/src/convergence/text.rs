@@ -1,7 +1,8 @@
 //! Convergence as a chapter of the report.
 
-use super::{Convergence, Decay, Law, MeshErrors, Rule, SweepRun};
-use crate::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Series, Table, TableCell};
+use super::{Convergence, Decay, MeshErrors, Rule, SweepRun};
+use crate::number::range;
+use crate::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Series, Table};
 
 /// Points of a drawn law between two sweeps.
 const STEPS: usize = 8;
@@ -51,8 +52,7 @@ impl Convergence {
             converged.len(),
             runs.len()
         );
-        let shares: Vec<f64> = converged.iter().filter_map(|run| share_left(run)).collect();
-        if let Some((least, most)) = range(&shares) {
+        if let Some((least, most)) = range(converged.iter().filter_map(|run| share_left(run))) {
             text += &format!(
                 " Where it converged, {:.1} to {:.1} % of the mean error is left after {} sweeps.",
                 least * 100.0,
@@ -68,8 +68,8 @@ impl Convergence {
         if let (Some(power), Some(exponential)) =
             (mean(|decay| decay.power.r_squared), mean(|decay| decay.exponential.r_squared))
         {
-            let exponents: Vec<f64> = runs.iter().filter_map(|run| Some(run.decay?.power.rate)).collect();
-            let (least, most) = range(&exponents).unwrap_or_default();
+            let exponents = runs.iter().filter_map(|run| Some(run.decay?.power.rate));
+            let (least, most) = range(exponents).unwrap_or_default();
             text += &format!(
                 " The power law fits better in {wins} of {fits} scans; mean R² {power:.3} for the power law (exponent \
                  {least:.2} to {most:.2}) and {exponential:.3} for the exponential of the paper."
@@ -81,13 +81,8 @@ impl Convergence {
     fn figure(&self, rule: Rule) -> Figure {
         let series = self.of(rule).flat_map(|run| {
             let name = format!("scan {}", run.seed);
-            let mark =
-                |(sweep, error): (usize, &MeshErrors)| Mark { x: (sweep as f64).into(), y: error.distance_mm.into() };
-            let measured = Series {
-                name: name.clone(),
-                stroke: LineStroke::Marks,
-                marks: run.errors.iter().enumerate().map(mark).collect(),
-            };
+            let marks = run.errors.iter().enumerate().map(|(sweep, error)| Mark::at(sweep as f64, error.distance_mm));
+            let measured = Series::new(&name, LineStroke::Marks, marks);
             let laws = run.decay.iter().flat_map(|decay| drawn(decay, &name, run.errors.len() - 1)).collect::<Vec<_>>();
             [measured].into_iter().chain(laws)
         });
@@ -109,82 +104,46 @@ impl Convergence {
     }
 
     fn table(&self) -> Table {
-        let heads = [
-            "rule",
-            "scan",
-            "edge, mm",
-            "sweeps",
-            "error before, mm",
-            "after 1 sweep, mm",
-            "at the end, mm",
-            "normals before, deg",
-            "normals at the end, deg",
-            "flipped at the end",
-            "power law: exponent",
-            "power law: R²",
-            "exponential: rate a sweep",
-            "exponential: R²",
-            "remark",
-        ];
-        Table {
-            id: "convergence".to_owned(),
-            title: "Sweeps and fits".to_owned(),
-            caption:
-                "Mean distance and mean angle of the faces; R² of the logarithm of the error, from sweep 1 on. A scan \
-                      that blew up has no fit, and ends where its error was twice that of its start."
-                    .to_owned(),
-            heads: heads.map(str::to_owned).to_vec(),
-            rows: self.runs.iter().map(row).collect(),
-        }
+        let error_at = |sweep: usize| move |run: &SweepRun| Some(run.errors.get(sweep)?.distance_mm);
+        let last = |of: fn(&MeshErrors) -> f64| move |run: &SweepRun| run.errors.last().map(of);
+        Table::of(
+            "convergence",
+            "Sweeps and fits",
+            "Mean distance and mean angle of the faces; R² of the logarithm of the error, from sweep 1 on. A scan that blew up \
+             has no fit, and ends where its error was twice that of its start.",
+            &self.runs,
+        )
+        .column("rule", |run| run.rule.name())
+        .column("scan", |run| run.seed as f64)
+        .column("edge, mm", |run| run.edge_mm)
+        .column("sweeps", |run| run.errors.len().saturating_sub(1))
+        .column("error before, mm", error_at(0))
+        .column("after 1 sweep, mm", error_at(1))
+        .column("at the end, mm", last(|error| error.distance_mm))
+        .column("normals before, deg", |run| Some(run.errors.first()?.normal_deg))
+        .column("normals at the end, deg", last(|error| error.normal_deg))
+        .column("flipped at the end", last(|error| error.flipped as f64))
+        .column("power law: exponent", |run| Some(run.decay?.power.rate))
+        .column("power law: R²", |run| run.decay?.power.r_squared)
+        .column("exponential: rate a sweep", |run| Some(run.decay?.exponential.rate))
+        .column("exponential: R²", |run| run.decay?.exponential.r_squared)
+        .column("remark", |run| run.ended.as_deref())
+        .table
     }
-}
-
-fn row(run: &SweepRun) -> Vec<TableCell> {
-    let number =
-        |error: Option<&MeshErrors>, of: fn(&MeshErrors) -> f64| error.map_or(TableCell::Empty, |e| of(e).into());
-    let (first, second, last) = (run.errors.first(), run.errors.get(1), run.errors.last());
-    let distance = |error: &MeshErrors| error.distance_mm;
-    let law = |of: fn(&Decay) -> Law| {
-        run.decay.as_ref().map(of).map_or([TableCell::Empty, TableCell::Empty], |law| {
-            [law.rate.into(), law.r_squared.map_or(TableCell::Empty, TableCell::from)]
-        })
-    };
-    let mut cells = vec![
-        run.rule.name().into(),
-        (run.seed as f64).into(),
-        run.edge_mm.into(),
-        (run.errors.len().saturating_sub(1) as f64).into(),
-        number(first, distance),
-        number(second, distance),
-        number(last, distance),
-        number(first, |error| error.normal_deg),
-        number(last, |error| error.normal_deg),
-        number(last, |error| error.flipped as f64),
-    ];
-    cells.extend(law(|decay| decay.power));
-    cells.extend(law(|decay| decay.exponential));
-    cells.push(run.ended.clone().map_or(TableCell::Empty, TableCell::from));
-    cells
 }
 
 /// Both laws, from sweep 1 to the last.
 fn drawn(decay: &Decay, name: &str, sweeps: usize) -> [Series; 2] {
     let at = |step: usize| 1.0 + step as f64 / STEPS as f64;
     [("exponential", 0), ("power law", 1)].map(|(law, which)| {
-        let steps = (0..=STEPS * (sweeps - 1)).map(at);
-        let marks = steps.map(|sweep| Mark { x: sweep.into(), y: decay.at(sweep)[which].into() }).collect();
-        Series { name: format!("{name}, {law}"), stroke: LineStroke::Dashed, marks }
+        let marks = (0..=STEPS * (sweeps - 1)).map(at).map(|sweep| Mark::at(sweep, decay.at(sweep)[which]));
+        Series::new(format!("{name}, {law}"), LineStroke::Dashed, marks)
     })
 }
 
 /// The share of the error that is left at the end.
 fn share_left(run: &SweepRun) -> Option<f64> {
     Some(run.errors.last()?.distance_mm / run.errors.first()?.distance_mm)
-}
-
-fn range(values: &[f64]) -> Option<(f64, f64)> {
-    let least = values.iter().copied().reduce(f64::min)?;
-    Some((least, values.iter().copied().reduce(f64::max)?))
 }
 
 fn capitalised(text: &str) -> String {

@@ -1,7 +1,5 @@
 //! Errors of a mesh against the part in the touched region.
 
-use serde::Serialize;
-
 use touchup_core::compare::{
     CompareError, Summary, TouchedRegion, angle_between, closest_places, deviations, sample_surface, surface_area,
 };
@@ -16,7 +14,7 @@ const MOST_POINTS: f64 = 200e3;
 const SEED: u64 = 1;
 
 /// Distances and angles between mesh and part in the touched region.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TouchedError {
     /// mean distance from the touched places to the mesh (completeness), mm
     pub part_to_mesh_mean_mm: f64,

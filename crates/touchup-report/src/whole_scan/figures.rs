@@ -1,19 +1,10 @@
 //! Figures and tables of whole scans.
 
 use super::{CaseResult, MethodResult, RefineMethod, ScanResult, TouchedError, WholeScan};
-use crate::{Axis, Drawing, Figure, LineStroke, Mark, Series, Spread, Table, TableCell};
+use crate::{Axis, Drawing, Figure, LineStroke, Mark, Series, Table};
 
 /// Points of a drawn law.
 const STEPS: usize = 12;
-
-/// A figure of one case: its name and its axes.
-struct FigurePlan<'a> {
-    id: &'a str,
-    title: &'a str,
-    x: Axis,
-    y: Axis,
-    of: fn(&MethodResult, &TouchedError) -> Mark,
-}
 
 fn time_axis() -> Axis {
     Axis::log("time per sample, µs", "time_per_sample_us")
@@ -25,32 +16,33 @@ impl WholeScan {
     }
 
     fn figures_of(&self, case: &CaseResult) -> Vec<Figure> {
-        let plans = [
-            FigurePlan {
-                id: "error_total",
-                title: "Mean surface error against total run time",
-                x: Axis::log("total run time, s", "total_s"),
-                y: Axis::log("mean surface error, mm", "mean_error_mm"),
-                of: |result, error| Mark { x: result.total_s, y: error.mean_mm().into() },
-            },
-            FigurePlan {
-                id: "p95_sample",
-                title: "Surface error, 95th percentile, against time per sample",
-                x: time_axis(),
-                y: Axis::log("surface error p95, mm", "p95_error_mm"),
-                of: |result, error| Mark { x: result.per_sample_us, y: error.p95_mm().into() },
-            },
-            FigurePlan {
-                id: "normal_sample",
-                title: "Mean normal error against time per sample",
-                x: time_axis(),
-                y: Axis::log("mean normal error, deg", "normal_error_deg"),
-                of: |result, error| Mark { x: result.per_sample_us, y: error.normal_mean_deg.into() },
-            },
-        ];
-        let mut figures: Vec<Figure> = case
-            .main()
-            .map_or_else(Vec::new, |scan| plans.into_iter().map(|plan| self.methods(case, scan, plan)).collect());
+        let mut figures = Vec::new();
+        if let Some(scan) = case.main() {
+            let mean = Axis::log("mean surface error, mm", "mean_error_mm");
+            let p95 = Axis::log("surface error p95, mm", "p95_error_mm");
+            let normal = Axis::log("mean normal error, deg", "normal_error_deg");
+            let total = Axis::log("total run time, s", "total_s");
+            let figure = |id, title, axes, of: fn(&MethodResult, &TouchedError) -> Mark| {
+                self.methods((case, scan), (id, title), axes, of)
+            };
+            figures = vec![
+                figure("error_total", "Mean surface error against total run time", [total, mean], |result, error| {
+                    Mark::at(result.total_s, error.mean_mm())
+                }),
+                figure(
+                    "p95_sample",
+                    "Surface error, 95th percentile, against time per sample",
+                    [time_axis(), p95],
+                    |result, error| Mark::at(result.per_sample_us, error.p95_mm()),
+                ),
+                figure(
+                    "normal_sample",
+                    "Mean normal error against time per sample",
+                    [time_axis(), normal],
+                    |result, error| Mark::at(result.per_sample_us, error.normal_mean_deg),
+                ),
+            ];
+        }
         figures.extend([self.regions_and_densities(case), self.error_over_edge(case)]);
         figures.extend(self.gaussian_cost(case));
         figures
@@ -65,16 +57,16 @@ impl WholeScan {
     }
 
     /// One mark for each method on the main scan.
-    fn methods(&self, case: &CaseResult, scan: &ScanResult, plan: FigurePlan) -> Figure {
-        let FigurePlan { id, title, x, y, of } = plan;
-        let mut series: Vec<Series> = scan
-            .methods
-            .iter()
-            .filter_map(|result| {
-                let marks = vec![of(result, &result.error?)];
-                Some(Series { name: result.name.clone(), stroke: LineStroke::Marks, marks })
-            })
-            .collect();
+    fn methods(
+        &self,
+        (case, scan): (&CaseResult, &ScanResult),
+        (id, title): (&str, &str),
+        [x, y]: [Axis; 2],
+        of: fn(&MethodResult, &TouchedError) -> Mark,
+    ) -> Figure {
+        let one =
+            |result: &MethodResult| Some(Series::new(&result.name, LineStroke::Marks, [of(result, &result.error?)]));
+        let mut series: Vec<Series> = scan.methods.iter().filter_map(one).collect();
         series.extend(as_it_came(&series, scan, of));
         Figure {
             id: format!("whole_scan_{id}_{}", file_name(&case.name)),
@@ -92,24 +84,19 @@ impl WholeScan {
 
     /// The robust mode over the sizes of its region, and three methods over the edges of the scan.
     fn regions_and_densities(&self, case: &CaseResult) -> Figure {
-        let mark = |result: &MethodResult| Some(Mark { x: result.per_sample_us, y: result.error?.mean_mm().into() });
+        let mark = |result: &MethodResult| Some(Mark::at(result.per_sample_us, result.error?.mean_mm()));
         let mut series = Vec::new();
         if let Some(scan) = case.main() {
             let robust = scan.methods.iter().filter(|result| matches!(result.method, RefineMethod::Robust(_)));
-            series.push(Series {
-                name: "robust: handle, one ring, 0.5, 1, 2 tip radii".to_owned(),
-                stroke: LineStroke::Joined,
-                marks: robust.filter_map(mark).collect(),
-            });
+            let name = "robust: handle, one ring, 0.5, 1, 2 tip radii";
+            series.push(Series::new(name, LineStroke::Joined, robust.filter_map(mark)));
         }
         for method in RefineMethod::BY_DENSITY.into_iter().filter(|_| case.scans.len() > 1) {
             let scans = by_edge(case);
             let edges: Vec<String> = scans.iter().map(|scan| format!("{:.1}", scan.edge_mm)).collect();
-            series.push(Series {
-                name: format!("{}: edges of {} mm", method.name(), edges.join(", ")),
-                stroke: LineStroke::Joined,
-                marks: scans.into_iter().filter_map(|scan| mark(scan.of(method)?)).collect(),
-            });
+            let name = format!("{}: edges of {} mm", method.name(), edges.join(", "));
+            let marks = scans.into_iter().filter_map(|scan| mark(scan.of(method)?));
+            series.push(Series::new(name, LineStroke::Joined, marks));
         }
         Figure {
             id: format!("whole_scan_regions_{}", file_name(&case.name)),
@@ -122,11 +109,9 @@ impl WholeScan {
     }
 
     fn error_over_edge(&self, case: &CaseResult) -> Figure {
-        let mark = |scan: &ScanResult, error: &TouchedError| Mark { x: scan.edge_mm.into(), y: error.mean_mm().into() };
-        let series = |name: String, stroke: LineStroke, of: &dyn Fn(&ScanResult) -> Option<TouchedError>| Series {
-            name,
-            stroke,
-            marks: by_edge(case).into_iter().filter_map(|scan| Some(mark(scan, &of(scan)?))).collect(),
+        let series = |name: String, stroke: LineStroke, of: &dyn Fn(&ScanResult) -> Option<TouchedError>| {
+            let marks = by_edge(case).into_iter().filter_map(|scan| Some(Mark::at(scan.edge_mm, of(scan)?.mean_mm())));
+            Series::new(name, stroke, marks)
         };
         let mut all: Vec<Series> = RefineMethod::BY_DENSITY
             .into_iter()
@@ -151,24 +136,18 @@ impl WholeScan {
         let contacts = cost.contacts as f64;
         let at = |count: f64| at_last.median * (count / last).powf(cost.exponent);
         let step = |i: usize| last * (contacts / last).max(1.0).powf(i as f64 / STEPS as f64);
+        let measured = cost.marks.iter().map(|&(count, time)| Mark::at(count, time));
+        let law = (0..=STEPS).map(step).map(|n| Mark::at(n, at(n)));
+        let law_name = format!("extrapolated, n^{:.2}", cost.exponent);
         let mut series = vec![
-            Series {
-                name: "Gaussian process, refitted".to_owned(),
-                stroke: LineStroke::Joined,
-                marks: cost.marks.iter().map(|&(count, time)| Mark { x: count.into(), y: time }).collect(),
-            },
-            Series {
-                name: format!("extrapolated, n^{:.2}", cost.exponent),
-                stroke: LineStroke::Dashed,
-                marks: (0..=STEPS).map(step).map(|n| Mark { x: n.into(), y: at(n).into() }).collect(),
-            },
+            Series::new("Gaussian process, refitted", LineStroke::Joined, measured),
+            Series::new(law_name, LineStroke::Dashed, law),
         ];
+        let first = cost.marks.first().map_or(1.0, |mark| mark.0);
         for method in [RefineMethod::HAPTIC, RefineMethod::Patch] {
             let Some(result) = case.main().and_then(|scan| scan.of(method)) else { continue };
-            let time = result.per_sample_us.median;
-            let ends = [cost.marks.first().map_or(1.0, |mark| mark.0), contacts];
-            let marks = ends.iter().map(|&n| Mark { x: n.into(), y: time.into() }).collect();
-            series.push(Series { name: method.name(), stroke: LineStroke::Dashed, marks });
+            let marks = [first, contacts].map(|n| Mark::at(n, result.per_sample_us.median));
+            series.push(Series::new(method.name(), LineStroke::Dashed, marks));
         }
         Some(Figure {
             id: format!("whole_scan_gaussian_{}", file_name(&case.name)),
@@ -184,71 +163,53 @@ impl WholeScan {
     }
 
     pub(super) fn table(&self) -> Table {
-        let heads = [
-            "part",
-            "edge, mm",
-            "method",
-            "mean error, mm",
-            "p95 error, mm",
-            "part to mesh mean, mm",
-            "mesh to part mean, mm",
-            "mean normal error, deg",
-            "p95 normal error, deg",
-            "total, s",
-            "per sample, µs",
-            "after the last sample, ms",
-            "samples",
-            "runs",
-            "cut back, %",
-            "remark",
-        ];
-        let rows = self.cases.iter().flat_map(|case| case.scans.iter().map(move |scan| (case, scan)));
-        Table {
-            id: "whole_scan".to_owned(),
-            title: "All methods on all scans".to_owned(),
-            caption: format!(
+        let scans = self.cases.iter().flat_map(|case| case.scans.iter().map(move |scan| (case, scan)));
+        let rows = scans.flat_map(|(case, scan)| {
+            let results = scan.methods.iter().map(Some);
+            std::iter::once(None).chain(results).map(move |result| Row { case, scan, result })
+        });
+        Table::of(
+            "whole_scan",
+            "All methods on all scans",
+            format!(
                 "Errors where the part was touched; mean and p95 error are the worse of both directions. Time per sample \
                  has the work after the last sample in it, shared out. Total time begins with the scan in memory. {}",
                 self.repeats()
             ),
-            heads: heads.map(str::to_owned).to_vec(),
-            rows: rows.flat_map(|(case, scan)| rows_of(case, scan)).collect(),
-        }
+            rows,
+        )
+        .column("part", |row| row.case.name.as_str())
+        .column("edge, mm", |row| row.scan.edge_mm)
+        .column("method", |row| row.result.map_or("unrefined scan", |result| &result.name))
+        .column("mean error, mm", |row| row.error().map(|error| error.mean_mm()))
+        .column("p95 error, mm", |row| row.error().map(|error| error.p95_mm()))
+        .column("part to mesh mean, mm", |row| row.error().map(|error| error.part_to_mesh_mean_mm))
+        .column("mesh to part mean, mm", |row| row.error().map(|error| error.mesh_to_part_mean_mm))
+        .column("mean normal error, deg", |row| row.error().map(|error| error.normal_mean_deg))
+        .column("p95 normal error, deg", |row| row.error().map(|error| error.normal_p95_deg))
+        .column("total, s", |row| Some(row.result?.total_s))
+        .column("per sample, µs", |row| Some(row.result?.per_sample_us))
+        .column("after the last sample, ms", |row| Some(row.result?.end_ms))
+        .column("samples", |row| Some(row.result?.samples))
+        .column("runs", |row| Some(row.result?.runs))
+        .column("cut back, %", |row| Some(row.result?.cut_back_share * 100.0))
+        .column("remark", |row| Some(row.result?.remarks.join("; ")).filter(|remark| !remark.is_empty()))
+        .table
     }
 }
 
-fn rows_of<'a>(case: &'a CaseResult, scan: &'a ScanResult) -> impl Iterator<Item = Vec<TableCell>> + 'a {
-    let begin = move |name: &str| [case.name.as_str().into(), scan.edge_mm.into(), name.into()];
-    let mut first = begin("unrefined scan").to_vec();
-    first.extend(error_cells(Some(&scan.before)));
-    first.resize(16, TableCell::Empty);
-    let of_method = move |result: &MethodResult| {
-        let mut cells = begin(&result.name).to_vec();
-        cells.extend(error_cells(result.error.as_ref()));
-        cells.extend([
-            result.total_s.into(),
-            result.per_sample_us.into(),
-            result.end_ms.into(),
-            (result.samples as f64).into(),
-            (result.runs as f64).into(),
-            (result.cut_back_share * 100.0).into(),
-            if result.remarks.is_empty() { TableCell::Empty } else { result.remarks.join("; ").into() },
-        ]);
-        cells
-    };
-    [first].into_iter().chain(scan.methods.iter().map(of_method))
+/// One method on one scan; `None`: the scan as it came.
+#[derive(Clone, Copy)]
+struct Row<'a> {
+    case: &'a CaseResult,
+    scan: &'a ScanResult,
+    result: Option<&'a MethodResult>,
 }
 
-fn error_cells(error: Option<&TouchedError>) -> [TableCell; 6] {
-    let number = |of: fn(&TouchedError) -> f64| error.map_or(TableCell::Empty, |error| of(error).into());
-    [
-        number(TouchedError::mean_mm),
-        number(TouchedError::p95_mm),
-        number(|error| error.part_to_mesh_mean_mm),
-        number(|error| error.mesh_to_part_mean_mm),
-        number(|error| error.normal_mean_deg),
-        number(|error| error.normal_p95_deg),
-    ]
+impl Row<'_> {
+    fn error(&self) -> Option<TouchedError> {
+        self.result.map_or(Some(self.scan.before), |result| result.error)
+    }
 }
 
 /// A dashed line at the error of the scan, as wide as the marks.
@@ -256,8 +217,7 @@ fn as_it_came(series: &[Series], scan: &ScanResult, of: fn(&MethodResult, &Touch
     let xs = || series.iter().flat_map(|series| &series.marks).map(|mark| mark.x.median);
     let ends = [xs().reduce(f64::min)?, xs().reduce(f64::max)?];
     let Mark { y, .. } = of(scan.methods.first()?, &scan.before);
-    let marks = ends.iter().map(|&x| Mark { x: Spread::from(x), y }).collect();
-    Some(Series { name: "unrefined scan".to_owned(), stroke: LineStroke::Dashed, marks })
+    Some(Series::new("unrefined scan", LineStroke::Dashed, ends.map(|x| Mark::at(x, y))))
 }
 
 /// The scans of a case, the finest first.

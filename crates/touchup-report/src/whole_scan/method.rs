@@ -1,13 +1,12 @@
 //! The methods by which a scan is refined, and how long each takes.
 
+use std::fmt::Display;
 use std::time::{Duration, Instant};
-
-use serde::Serialize;
 
 use super::WholeScanError;
 use super::contact_points::ContactSculptor;
 use super::gaussian::{GaussianParams, GaussianSurface};
-use super::part::Part;
+use super::part::{GivenPart, Part};
 use touchup_core::haptic::{RefineParams, RoiSize, StepRule};
 use touchup_core::mesh::{FaceTree, TriMesh};
 use touchup_core::reconstruct::PatcherParams;
@@ -15,12 +14,13 @@ use touchup_session::live::{Engine, Renewal};
 
 /// Standard deviation of a contact point for the Gaussian process, m: that of a good tracking system.
 const CONTACT_NOISE: f64 = 0.05e-3;
+/// Why a baseline refuses a contact.
+const NO_CONTACT: &str = "the place has no normal, or is another touch's";
 /// Number of samples between two checks of the time limit.
 const CLOCK_EVERY: usize = 64;
 
 /// Radius of the region that follows a touched face.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reach {
     /// the face alone
     Handle,
@@ -31,8 +31,7 @@ pub enum Reach {
 }
 
 /// A method that refines a scan by touch.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RefineMethod {
     /// the published rule, integrated by Dormand–Prince 5(4), the pair of ode45
     PaperOde45,
@@ -98,22 +97,55 @@ pub(super) struct Run {
     pub mesh: TriMesh,
     /// before the first sample
     pub build: Duration,
-    /// all samples
-    pub samples: Duration,
-    /// after the last one
+    pub fed: Fed,
+    /// after the last sample
     pub end: Duration,
-    /// samples or touches that were given to it
-    pub given: usize,
-    /// and what it would have been given without a bound
+    /// samples or touches that there are
     pub offered: usize,
-    /// samples that were refused, and why the first of them
+    /// share of the updates that were cut back
+    pub cut_back_share: f64,
+}
+
+/// What a method was given, one by one.
+#[derive(Default)]
+pub(super) struct Fed {
+    /// all of it
+    pub time: Duration,
+    /// samples or touches
+    pub given: usize,
+    /// of them refused, and why the first
     pub refused: usize,
     pub why: Option<String>,
-    /// updates, and those that were cut back
-    pub moved: u64,
-    pub cut_back: u64,
-    /// seconds that each touch took, where that grows with their number
-    pub each: Vec<f64>,
+    /// seconds between two looks at the clock
+    pub laps: Vec<f64>,
+}
+
+/// Gives `items` to `take` until its time is over, which is seen after each `lap` of them.
+fn feed<T, E: Display>(
+    items: impl Iterator<Item = T>,
+    lap: usize,
+    longest: Duration,
+    mut take: impl FnMut(T) -> Result<(), E>,
+) -> Fed {
+    let begun = Instant::now();
+    let mut fed = Fed::default();
+    for item in items {
+        fed.given += 1;
+        if let Err(error) = take(item) {
+            fed.refused += 1;
+            fed.why.get_or_insert_with(|| error.to_string());
+        }
+        if fed.given % lap == 0 {
+            let time = begun.elapsed();
+            fed.laps.push((time - fed.time).as_secs_f64());
+            fed.time = time;
+            if time > longest {
+                return fed;
+            }
+        }
+    }
+    fed.time = begun.elapsed();
+    fed
 }
 
 /// Refines `scan` by one method.
@@ -121,50 +153,41 @@ pub(super) fn run(
     method: RefineMethod,
     part: &Part,
     scan: &TriMesh,
-    bounds: &RunLimits,
+    limits: &RunLimits,
 ) -> Result<Run, WholeScanError> {
     match method {
-        RefineMethod::ContactPoints => Ok(sculpt(part, scan, bounds)),
-        RefineMethod::GaussianProcess => Ok(fit_gaussian(part, scan, bounds)),
-        _ => refine(method, part, scan, bounds),
+        RefineMethod::ContactPoints => Ok(sculpt(part, scan, limits)),
+        RefineMethod::GaussianProcess => Ok(fit_gaussian(part, scan, limits)),
+        _ => refine(method, part, scan, limits),
     }
 }
 
-fn params(method: RefineMethod, part: &Part) -> RefineParams {
-    let mut params = match method {
-        RefineMethod::PaperOde45 | RefineMethod::PaperLie => RefineParams::paper(part.tip),
-        _ => RefineParams::robust(part.tip),
+fn params(method: RefineMethod, part: &GivenPart) -> RefineParams {
+    let &GivenPart { tip, compensator, scan_noise, .. } = part;
+    let usual = match method {
+        RefineMethod::PaperOde45 | RefineMethod::PaperLie => RefineParams::paper(tip),
+        _ => RefineParams::robust(tip),
     };
+    let mut params = RefineParams { compensator, scan_noise, ..usual };
     match method {
         RefineMethod::PaperOde45 => params.dynamics.rule = StepRule::DormandPrince,
         RefineMethod::Robust(Reach::Handle) => params.roi = RoiSize::Handle,
         RefineMethod::Robust(Reach::OneRing) => params.roi = RoiSize::OneRing,
-        RefineMethod::Robust(Reach::TipRadii(radii)) => params.roi = RoiSize::Radius(radii * part.tip.radius),
+        RefineMethod::Robust(Reach::TipRadii(radii)) => params.roi = RoiSize::Radius(radii * tip.radius),
         _ => {}
     }
-    (params.compensator, params.scan_noise) = (part.compensator, part.scan_noise);
     params
 }
 
 /// The haptic update, with the patch where the method has one.
-fn refine(method: RefineMethod, part: &Part, scan: &TriMesh, bounds: &RunLimits) -> Result<Run, WholeScanError> {
+fn refine(method: RefineMethod, part: &Part, scan: &TriMesh, limits: &RunLimits) -> Result<Run, WholeScanError> {
+    let GivenPart { samples, tip, scan_noise, .. } = &part.given;
     let copy = scan.clone();
     let begun = Instant::now();
-    let patch = (method == RefineMethod::Patch)
-        .then(|| PatcherParams::new(part.tip.radius, part.tip.stiffness, part.scan_noise));
-    let mut engine = Engine::new(copy, params(method, part), patch, Renewal::AtEnd)?;
-    let built = Instant::now();
-    let (mut given, mut refused, mut why) = (0, 0, None);
-    for sample in &part.samples {
-        if given % CLOCK_EVERY == 0 && built.elapsed() > bounds.longest {
-            break;
-        }
-        given += 1;
-        if let Err(error) = engine.push(sample) {
-            refused += 1;
-            why.get_or_insert_with(|| error.to_string());
-        }
-    }
+    let patch = (method == RefineMethod::Patch).then(|| PatcherParams::new(tip.radius, tip.stiffness, *scan_noise));
+    let mut engine = Engine::new(copy, params(method, &part.given), patch, Renewal::AtEnd)?;
+    let build = begun.elapsed();
+    let fed = feed(samples.iter(), CLOCK_EVERY, limits.longest, |sample| engine.push(sample).map(drop));
     let pushed = Instant::now();
     let (refiner, patcher) = engine.finish()?;
     let counts = *refiner.counts();
@@ -175,80 +198,37 @@ fn refine(method: RefineMethod, part: &Part, scan: &TriMesh, bounds: &RunLimits)
             patcher.patched(scan, &FaceTree::new(scan))?.mesh
         }
     };
-    Ok(Run {
-        mesh,
-        build: built - begun,
-        samples: pushed - built,
-        end: pushed.elapsed(),
-        given,
-        offered: part.samples.len(),
-        refused,
-        why,
-        moved: counts.moved,
-        cut_back: counts.cut_back,
-        each: Vec::new(),
-    })
+    let cut_back_share = counts.cut_back as f64 / counts.moved.max(1) as f64;
+    Ok(Run { mesh, build, fed, end: pushed.elapsed(), offered: samples.len(), cut_back_share })
 }
 
-impl Run {
-    /// A baseline's, which refuses `refused` of the contacts it is given.
-    fn of_baseline(mesh: TriMesh, given: usize, refused: usize, offered: usize) -> Self {
-        Self {
-            mesh,
-            build: Duration::ZERO,
-            samples: Duration::ZERO,
-            end: Duration::ZERO,
-            given,
-            offered,
-            refused,
-            why: (refused > 0).then(|| "the place has no normal, or is another touch's".to_owned()),
-            moved: (given - refused) as u64,
-            cut_back: 0,
-            each: Vec::new(),
-        }
-    }
-}
-
-fn sculpt(part: &Part, scan: &TriMesh, bounds: &RunLimits) -> Run {
+fn sculpt(part: &Part, scan: &TriMesh, limits: &RunLimits) -> Run {
+    let (contacts, radius) = (&part.contacts, part.given.tip.radius);
     let begun = Instant::now();
-    let mut sculptor = ContactSculptor::new(scan, part.tip.radius, part.tip.radius);
-    let built = Instant::now();
-    let (mut given, mut refused) = (0, 0);
-    for contact in &part.contacts {
-        if given % CLOCK_EVERY == 0 && built.elapsed() > bounds.longest {
-            break;
-        }
-        given += 1;
-        refused += usize::from(sculptor.push(&contact.reported).is_none());
-    }
-    let pushed = Instant::now();
-    let run = Run::of_baseline(sculptor.into_mesh(), given, refused, part.contacts.len());
-    Run { build: built - begun, samples: pushed - built, ..run }
+    let mut sculptor = ContactSculptor::new(scan, radius, radius);
+    let build = begun.elapsed();
+    let fed = feed(contacts.iter(), CLOCK_EVERY, limits.longest, |contact| {
+        sculptor.push(&contact.reported).map(drop).ok_or(NO_CONTACT)
+    });
+    let (mesh, end) = (sculptor.into_mesh(), Duration::ZERO);
+    Run { mesh, build, fed, end, offered: contacts.len(), cut_back_share: 0.0 }
 }
 
-fn fit_gaussian(part: &Part, scan: &TriMesh, bounds: &RunLimits) -> Run {
+fn fit_gaussian(part: &Part, scan: &TriMesh, limits: &RunLimits) -> Run {
     let process = GaussianParams {
-        amplitude: part.scan_noise.max(CONTACT_NOISE),
-        length: 2.0 * part.tip.radius,
+        amplitude: part.given.scan_noise.max(CONTACT_NOISE),
+        length: 2.0 * part.given.tip.radius,
         noise: CONTACT_NOISE,
     };
-    let stride = part.contacts.len().div_ceil(bounds.touches).max(1);
+    let contacts = &part.contacts;
+    let stride = contacts.len().div_ceil(limits.touches).max(1);
     let begun = Instant::now();
     let mut surface = GaussianSurface::new(scan, process);
-    let built = Instant::now();
-    let (mut given, mut refused, mut each) = (0, 0, Vec::new());
-    let mut last = built;
-    for contact in part.contacts.iter().step_by(stride) {
-        if built.elapsed() > bounds.longest {
-            break;
-        }
-        given += 1;
-        refused += usize::from(!surface.push(contact.point));
-        let now = Instant::now();
-        each.push((now - last).as_secs_f64());
-        last = now;
-    }
+    let build = begun.elapsed();
+    let fed = feed(contacts.iter().step_by(stride), 1, limits.longest, |contact| {
+        surface.push(contact.point).then_some(()).ok_or(NO_CONTACT)
+    });
+    let pushed = Instant::now();
     let mesh = surface.mesh();
-    let run = Run::of_baseline(mesh, given, refused, part.contacts.len());
-    Run { build: built - begun, samples: last - built, end: last.elapsed(), each, ..run }
+    Run { mesh, build, fed, end: pushed.elapsed(), offered: contacts.len(), cut_back_share: 0.0 }
 }

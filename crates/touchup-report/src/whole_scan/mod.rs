@@ -14,8 +14,6 @@ mod text;
 
 use std::time::Duration;
 
-use serde::Serialize;
-
 pub use contact_points::ContactSculptor;
 pub use error::TouchedError;
 pub use gaussian::{GaussianParams, GaussianProcess, GaussianSurface};
@@ -27,6 +25,7 @@ use part::{Part, parts};
 use super::convergence::straight_line;
 use super::{Effort, Spread};
 use touchup_core::compare::CompareError;
+use touchup_core::haptic::mean_edge;
 use touchup_core::mesh::{MeshError, TriMesh};
 use touchup_core::stylus::SettingError;
 use touchup_session::live::LiveError;
@@ -61,7 +60,7 @@ pub enum WholeScanError {
 }
 
 /// One method on one scan.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct MethodResult {
     /// which
     pub method: RefineMethod,
@@ -90,7 +89,7 @@ pub struct MethodResult {
 }
 
 /// All methods on one scan.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ScanResult {
     /// mean edge length of the scan, mm
     pub edge_mm: f64,
@@ -103,7 +102,7 @@ pub struct ScanResult {
 }
 
 /// What a touch costs the Gaussian process.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct GaussianCost {
     /// touches kept so far, and the time to take in one more, µs; the medians of groups
     pub marks: Vec<(f64, Spread)>,
@@ -116,7 +115,7 @@ pub struct GaussianCost {
 }
 
 /// One part with its scans.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct CaseResult {
     /// of the part
     pub name: String,
@@ -124,10 +123,6 @@ pub struct CaseResult {
     pub samples: usize,
     /// time from the first to the last of them, s
     pub duration_s: f64,
-    /// radius of the ball, mm
-    pub tip_radius_mm: f64,
-    /// of the scan's vertices, mm
-    pub scan_noise_mm: f64,
     /// the first is the one on which all methods were run
     pub scans: Vec<ScanResult>,
     /// where it was tried
@@ -135,7 +130,7 @@ pub struct CaseResult {
 }
 
 /// Error against run time on whole scans.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct WholeScan {
     /// peaks, plate, and given parts
     pub cases: Vec<CaseResult>,
@@ -206,53 +201,42 @@ struct Trial<'a> {
     part: &'a Part,
     scan: &'a TriMesh,
     method: RefineMethod,
-    totals_s: Vec<f64>,
-    per_sample_us: Vec<f64>,
-    ends_ms: Vec<f64>,
-    first: Option<First>,
+    /// of each run: s in all, µs per sample, and ms after the last one
+    times: Vec<[f64; 3]>,
+    /// what is equal in each run, and the times of touches in the first
+    first: Option<(Run, Result<TouchedError, CompareError>)>,
 }
 
-/// The quantities equal in each run, and the times of touches in the first.
-struct First {
-    error: Result<TouchedError, CompareError>,
-    run: Run,
-}
-
-impl<'a> Trial<'a> {
-    fn new(part: &'a Part, scan: &'a TriMesh, method: RefineMethod) -> Self {
-        let (totals_s, per_sample_us, ends_ms) = (Vec::new(), Vec::new(), Vec::new());
-        Self { part, scan, method, totals_s, per_sample_us, ends_ms, first: None }
-    }
-
+impl Trial<'_> {
     fn is_slow(&self, slow_s: f64) -> bool {
-        self.totals_s.first().is_some_and(|&total| total > slow_s)
+        self.times.first().is_some_and(|&[total, ..]| total > slow_s)
     }
 
-    fn run(&mut self, bounds: &RunLimits) -> Result<(), WholeScanError> {
-        let run = run(self.method, self.part, self.scan, bounds)?;
-        self.totals_s.push((run.build + run.samples + run.end).as_secs_f64());
-        self.per_sample_us.push((run.samples + run.end).as_secs_f64() * 1e6 / run.given.max(1) as f64);
-        self.ends_ms.push(run.end.as_secs_f64() * 1e3);
+    fn run(&mut self, limits: &RunLimits) -> Result<(), WholeScanError> {
+        let run = run(self.method, self.part, self.scan, limits)?;
+        let samples = run.fed.time + run.end;
+        let per_sample_us = samples.as_secs_f64() * 1e6 / run.fed.given.max(1) as f64;
+        self.times.push([(run.build + samples).as_secs_f64(), per_sample_us, run.end.as_secs_f64() * 1e3]);
         if self.first.is_none() {
-            let Part { truth, tree, region, .. } = self.part;
-            let error = TouchedError::of(&run.mesh, truth, tree, region);
-            self.first = Some(First { error, run });
+            let error = self.part.error_of(&run.mesh);
+            self.first = Some((run, error));
         }
         Ok(())
     }
 
     fn result(&self, before: &TouchedError) -> Option<MethodResult> {
-        let First { error, run } = self.first.as_ref()?;
+        let (Run { fed, offered, cut_back_share, .. }, error) = self.first.as_ref()?;
         let mut remarks = Vec::new();
-        let is_stopped = run.refused + run.given < run.offered && self.method != RefineMethod::GaussianProcess;
+        let is_sparse = self.method == RefineMethod::GaussianProcess;
+        let is_stopped = fed.refused + fed.given < *offered && !is_sparse;
         if is_stopped {
-            remarks.push(format!("stopped for its time after {} of {} samples", run.given, run.offered));
+            remarks.push(format!("stopped for its time after {} of {offered} samples", fed.given));
         }
-        if self.method == RefineMethod::GaussianProcess && run.given < run.offered {
-            remarks.push(format!("given {} of {} contacts", run.given, run.offered));
+        if is_sparse && fed.given < *offered {
+            remarks.push(format!("given {} of {offered} contacts", fed.given));
         }
-        if let Some(why) = &run.why {
-            remarks.push(format!("{} of {} samples refused: {why}", run.refused, run.given));
+        if let Some(why) = &fed.why {
+            remarks.push(format!("{} of {} samples refused: {why}", fed.refused, fed.given));
         }
         if let Err(why) = error {
             remarks.push(format!("the error is undefined: {why}"));
@@ -262,16 +246,17 @@ impl<'a> Trial<'a> {
         if let Some(error) = error.filter(|_| is_worse) {
             remarks.push(format!("worse than the scan ({:.3} to {:.3} mm)", before.mean_mm(), error.mean_mm()));
         }
+        let spread = |which: usize| Spread::of(self.times.iter().map(|times| times[which]).collect());
         Some(MethodResult {
             method: self.method,
             name: self.method.name(),
             error,
-            total_s: Spread::of(self.totals_s.clone())?,
-            per_sample_us: Spread::of(self.per_sample_us.clone())?,
-            end_ms: Spread::of(self.ends_ms.clone())?,
-            runs: self.totals_s.len(),
-            samples: run.given,
-            cut_back_share: run.cut_back as f64 / run.moved.max(1) as f64,
+            total_s: spread(0)?,
+            per_sample_us: spread(1)?,
+            end_ms: spread(2)?,
+            runs: self.times.len(),
+            samples: fed.given,
+            cut_back_share: *cut_back_share,
             is_worse,
             is_stopped,
             remarks,
@@ -289,20 +274,21 @@ pub fn whole_scan(
     progress: &mut dyn FnMut(&str),
 ) -> Result<WholeScan, WholeScanError> {
     let (repeats, slow_s) = (effort.choose(3, 7), effort.choose(0.25, 2.0));
-    let bounds = RunLimits { longest: Duration::from_secs(effort.choose(2, 20)), touches: effort.choose(150, 300) };
+    let limits = RunLimits { longest: Duration::from_secs(effort.choose(2, 20)), touches: effort.choose(150, 300) };
     let parts = parts(effort, given, progress)?;
     let mut trials: Vec<Trial> = Vec::new();
     for part in &parts {
-        for (number, scan) in part.scans.iter().enumerate() {
+        for (number, scan) in part.scans().enumerate() {
             let methods: &[RefineMethod] = if number == 0 { &RefineMethod::ALL } else { &RefineMethod::BY_DENSITY };
-            trials.extend(methods.iter().map(|&method| Trial::new(part, scan, method)));
+            let trial = |&method| Trial { part, scan, method, times: Vec::new(), first: None };
+            trials.extend(methods.iter().map(trial));
         }
     }
     for repeat in 0..repeats {
         for trial in trials.iter_mut().filter(|trial| !trial.is_slow(slow_s)) {
-            let (name, method) = (&trial.part.name, trial.method.name());
+            let (name, method) = (&trial.part.given.name, trial.method.name());
             progress(&format!("whole scan: {name}, {method}, {} of {repeats}", repeat + 1));
-            trial.run(&bounds)?;
+            trial.run(&limits)?;
         }
     }
     let cases = parts.iter().map(|part| case(part, &trials)).collect::<Result<_, _>>()?;
@@ -311,25 +297,22 @@ pub fn whole_scan(
 
 fn case(part: &Part, trials: &[Trial]) -> Result<CaseResult, WholeScanError> {
     let mut scans = Vec::new();
-    for scan in &part.scans {
-        let before = TouchedError::of(scan, &part.truth, &part.tree, &part.region)?;
+    for scan in part.scans() {
+        let before = part.error_of(scan)?;
         let own = trials.iter().filter(|trial| std::ptr::eq(trial.scan, scan));
         let methods = own.filter_map(|trial| trial.result(&before)).collect();
         scans.push(ScanResult { edge_mm: mean_edge(scan) * 1e3, faces: scan.face_count(), before, methods });
     }
     let gaussian =
         trials.iter().find(|trial| std::ptr::eq(trial.part, part) && trial.method == RefineMethod::GaussianProcess);
-    let each = gaussian.and_then(|trial| trial.first.as_ref()).map_or(&[][..], |first| &first.run.each);
-    let span_ns = match (part.samples.first(), part.samples.last()) {
-        (Some(first), Some(last)) => last.stamp_ns.saturating_sub(first.stamp_ns),
-        _ => 0,
-    };
+    let each = gaussian.and_then(|trial| trial.first.as_ref()).map_or(&[][..], |(run, _)| &run.fed.laps);
+    let GivenPart { name, samples, .. } = &part.given;
+    let ends = samples.first().zip(samples.last());
+    let span_ns = ends.map_or(0, |(first, last)| last.stamp_ns.saturating_sub(first.stamp_ns));
     Ok(CaseResult {
-        name: part.name.clone(),
-        samples: part.samples.len(),
+        name: name.clone(),
+        samples: samples.len(),
         duration_s: span_ns as f64 * 1e-9,
-        tip_radius_mm: part.tip.radius * 1e3,
-        scan_noise_mm: part.scan_noise * 1e3,
         scans,
         gaussian: GaussianCost::of(each, part.contacts.len()),
     })
@@ -350,10 +333,4 @@ impl GaussianCost {
         let at_all_contacts_us = (line.offset + line.slope * (contacts.max(1) as f64).ln()).exp();
         Some(Self { marks, exponent: line.slope, contacts, at_all_contacts_us })
     }
-}
-
-fn mean_edge(mesh: &TriMesh) -> f64 {
-    let perimeter = |[a, b, c]: [nalgebra::Point3<f64>; 3]| (b - a).norm() + (c - b).norm() + (a - c).norm();
-    let sum: f64 = mesh.faces().map(|(face, _)| perimeter(mesh.triangle(face))).sum();
-    sum / (3 * mesh.face_count()).max(1) as f64
 }

@@ -1,17 +1,18 @@
 //! The parts that are touched: a known surface, a bad scan of it, and the contacts.
 
-use nalgebra::{Isometry3, Point2, Point3, Vector3};
+use nalgebra::{Point3, Vector3};
 
-use super::WholeScanError;
+use super::{TouchedError, WholeScanError};
 use crate::Effort;
-use touchup_core::compare::TouchedRegion;
+use crate::convergence::region_over;
+use touchup_core::compare::{CompareError, TouchedRegion};
 use touchup_core::haptic::TipParams;
 use touchup_core::mesh::{FaceTree, TriMesh};
 use touchup_core::stylus::{
     CompensatorParams, ContactEstimator, ContactEstimatorParams, ContactGateParams, Sample, SyncParams, Synchroniser,
 };
 use touchup_sim::{
-    Lines, PathParams, Peaks, Plate, RasterRegion, ScannerParams, Stroke, StylusParams, Surface, add_vertex_noise,
+    Lines, PathParams, Peaks, Plate, ScannerParams, SimError, Stroke, StylusParams, Surface, add_vertex_noise,
     plan_demo, raster, scan, touch,
 };
 
@@ -45,18 +46,14 @@ pub(super) struct FeltContact {
 
 /// A part with one scan of it or several, finer and coarser ones.
 pub(super) struct Part {
-    pub name: String,
-    pub truth: TriMesh,
-    pub tree: FaceTree,
-    pub samples: Vec<Sample>,
-    pub tip: TipParams,
-    pub compensator: CompensatorParams,
-    pub scan_noise: f64,
-    /// the touched region of `truth`
-    pub region: TouchedRegion,
+    pub given: GivenPart,
+    /// of the true part
+    tree: FaceTree,
+    /// of it
+    region: TouchedRegion,
     pub contacts: Vec<FeltContact>,
-    /// the first is the one on which all methods are run
-    pub scans: Vec<TriMesh>,
+    /// scans beside the one that was given
+    others: Vec<TriMesh>,
 }
 
 /// Seed of scans and paths.
@@ -83,9 +80,17 @@ pub(super) fn parts(
     Ok([peaks, plate].into_iter().chain(given).collect())
 }
 
-/// The samples that a hand-held stylus gives on a surface.
-fn contacts_on(surface: &dyn Surface, path: &[Stroke]) -> Result<Vec<Sample>, WholeScanError> {
-    let touch = touch(surface, path, &StylusParams::default(), SEED)?;
+/// A simulated part, touched by a hand-held stylus.
+///
+/// - `scans`: the first is the one on which all methods are run.
+fn simulated(
+    name: &str,
+    (surface, truth): (&dyn Surface, TriMesh),
+    path: &[Stroke],
+    mut scans: Vec<TriMesh>,
+) -> Result<Part, WholeScanError> {
+    let params = StylusParams::default();
+    let touch = touch(surface, path, &params, SEED)?;
     let mut sync = Synchroniser::new(SyncParams::default())?;
     let mut samples = Vec::new();
     for message in &touch.messages {
@@ -94,88 +99,78 @@ fn contacts_on(surface: &dyn Surface, path: &[Stroke]) -> Result<Vec<Sample>, Wh
     }
     sync.finish();
     samples.extend(std::iter::from_fn(|| sync.next_sample()));
-    Ok(samples)
-}
-
-fn usual_tip() -> TipParams {
-    let StylusParams { radius, stiffness, .. } = StylusParams::default();
-    TipParams { radius, stiffness: Some(stiffness) }
+    let given = GivenPart {
+        name: name.to_owned(),
+        scan: scans.remove(0),
+        truth,
+        samples,
+        tip: TipParams { radius: params.radius, stiffness: Some(params.stiffness) },
+        compensator: CompensatorParams::default(),
+        scan_noise: ScannerParams::default().noise,
+    };
+    Part::new(given, scans)
 }
 
 /// Peaks: vertices with the noise and the bias of the usual scanner, and a raster over it.
 fn touched_peaks(effort: Effort) -> Result<Part, WholeScanError> {
-    let (peaks, tip) = (Peaks::default(), usual_tip());
+    let peaks = Peaks::default();
     let ScannerParams { noise, bias, .. } = ScannerParams::default();
-    let scanned = |edge: f64| -> Result<TriMesh, WholeScanError> {
+    let scanned = |&edge: &f64| -> Result<TriMesh, SimError> {
         let mut scan = peaks.mesh(edge)?;
         add_vertex_noise(&mut scan, noise, &Vector3::new(0.0, 0.0, bias), SEED);
         Ok(scan)
     };
-    let (bounds, half) = (peaks.bounds(), effort.choose(10e-3, 22e-3));
-    let region = RasterRegion {
-        frame_ov: Isometry3::identity(),
-        low: Point2::new(-half, -half),
-        high: Point2::new(half, half),
-        floor: bounds.min.z,
-        clear: bounds.max.z + 2.0 * tip.radius,
-    };
+    let edges = [2.4e-3, 4.8e-3, 1.2e-3, 0.6e-3];
+    let region = region_over(&peaks, effort.choose(10e-3, 22e-3), StylusParams::default().radius);
     let path = raster(&region, Lines::AlongX, &PathParams { pitch: 1e-3, ..PathParams::default() })?;
-    let given = GivenPart {
-        name: "peaks".to_owned(),
-        scan: scanned(2.4e-3)?,
-        truth: peaks.mesh(TRUE_EDGE)?,
-        samples: contacts_on(&peaks, &path)?,
-        tip,
-        compensator: CompensatorParams::default(),
-        scan_noise: noise,
-    };
-    let edges: &[f64] = effort.choose(&[4.8e-3, 1.2e-3], &[4.8e-3, 1.2e-3, 0.6e-3]);
-    Part::new(given, edges.iter().map(|&edge| scanned(edge)).collect::<Result<_, _>>()?)
+    let scans = edges[..effort.choose(3, 4)].iter().map(scanned).collect::<Result<_, _>>()?;
+    simulated("peaks", (&peaks, peaks.mesh(TRUE_EDGE)?), &path, scans)
 }
 
 /// The plate of the demo, scanned and touched as there; a quick one in one raster over its features.
 fn touched_plate(effort: Effort) -> Result<Part, WholeScanError> {
-    let (plate, tip) = (Plate::default(), usual_tip());
-    let scanned = |edge: f64| scan(&plate, &ScannerParams { edge, seed: SEED, ..ScannerParams::default() });
+    let (plate, usual) = (Plate::default(), ScannerParams::default());
     let mut path = plan_demo(&plate, &PathParams::default())?;
     if effort.is_quick {
         // the first raster: there, over it, and away
         path.truncate(3);
     }
-    let given = GivenPart {
-        name: "plate".to_owned(),
-        scan: scanned(ScannerParams::default().edge)?,
-        truth: plate.mesh(CHORD_ERROR)?,
-        samples: contacts_on(&plate, &path)?,
-        tip,
-        compensator: CompensatorParams::default(),
-        scan_noise: ScannerParams::default().noise,
-    };
-    let edges: &[f64] = effort.choose(&[4.8e-3], &[4.8e-3, 1.2e-3]);
-    Part::new(given, edges.iter().map(|&edge| scanned(edge)).collect::<Result<_, _>>()?)
+    let edges = [usual.edge, 4.8e-3, 1.2e-3];
+    let scanned = |&edge: &f64| scan(&plate, &ScannerParams { edge, seed: SEED, ..usual });
+    let scans = edges[..effort.choose(2, 3)].iter().map(scanned).collect::<Result<_, _>>()?;
+    simulated("plate", (&plate, plate.mesh(CHORD_ERROR)?), &path, scans)
 }
 
 impl Part {
     /// - `others`: scans beside the one that was given.
     fn new(given: GivenPart, others: Vec<TriMesh>) -> Result<Self, WholeScanError> {
-        let GivenPart { name, scan, truth, samples, tip, compensator, scan_noise } = given;
-        let tree = FaceTree::new(&truth);
-        let gate = Some(ContactGateParams::default());
-        let mut estimator =
-            ContactEstimator::new(ContactEstimatorParams { compensator, bias: None, gate, tip, sliding: None })?;
+        let GivenPart { truth, tip, compensator, .. } = &given;
+        let tree = FaceTree::new(truth);
+        let (compensator, gate, tip) = (*compensator, Some(ContactGateParams::default()), *tip);
+        let params = ContactEstimatorParams { compensator, bias: None, gate, tip, sliding: None };
+        let mut estimator = ContactEstimator::new(params)?;
         let (mut contacts, mut touched) = (Vec::new(), Vec::new());
-        for sample in &samples {
+        for sample in &given.samples {
             let Ok(sample) = estimator.observe(sample) else { continue };
             let (centre, Some(surface)) = (sample.centre, sample.surface) else { continue };
             let reported = Point3::from(sample.tip.pose_ot.translation.vector);
             contacts.push(FeltContact { reported, point: centre - tip.radius * surface.normal });
-            touched.extend(tree.closest(&truth, &centre, tip.radius + ON_PART).map(|hit| hit.point));
+            touched.extend(tree.closest(truth, &centre, tip.radius + ON_PART).map(|hit| hit.point));
         }
         let region = TouchedRegion::of(touched);
         if region.contacts().is_empty() {
-            return Err(WholeScanError::NothingTouched { name, samples: samples.len() });
+            return Err(WholeScanError::NothingTouched { samples: given.samples.len(), name: given.name });
         }
-        let scans = [scan].into_iter().chain(others).collect();
-        Ok(Self { name, truth, tree, samples, tip, compensator, scan_noise, region, contacts, scans })
+        Ok(Self { given, tree, region, contacts, others })
+    }
+
+    /// The first is the one on which all methods are run.
+    pub fn scans(&self) -> impl Iterator<Item = &TriMesh> {
+        std::iter::once(&self.given.scan).chain(&self.others)
+    }
+
+    /// Of a mesh against the true part, where that was touched.
+    pub fn error_of(&self, mesh: &TriMesh) -> Result<TouchedError, CompareError> {
+        TouchedError::of(mesh, &self.given.truth, &self.tree, &self.region)
     }
 }

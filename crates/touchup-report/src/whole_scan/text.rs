@@ -19,7 +19,7 @@ impl WholeScan {
         ];
         for case in &self.cases {
             text.extend(case.main().map(|scan| case.verdict(scan)));
-            text.extend(case.main().map(failures).filter(|failed| !failed.is_empty()));
+            text.extend(case.main().and_then(failures));
             text.extend(case.densities());
             text.extend(case.gaussian.as_ref().map(|cost| case.gaussian_text(cost)));
         }
@@ -46,26 +46,18 @@ fn describe(result: &MethodResult) -> String {
 impl CaseResult {
     /// The Pareto front over error and time.
     fn verdict(&self, scan: &ScanResult) -> String {
+        let Self { name, samples, duration_s, .. } = self;
+        let ScanResult { edge_mm, faces, before, .. } = scan;
+        let [mean, p95, normals] = [before.mean_mm(), before.p95_mm(), before.normal_mean_deg];
         let mut text = format!(
-            "{}: {} faces with edges of {:.1} mm, {} samples in {:.0} s of touching; the unrefined scan is off by {:.3} mm \
-             (p95 {:.3} mm, normals {:.1} deg).",
-            self.name,
-            scan.faces,
-            scan.edge_mm,
-            self.samples,
-            self.duration_s,
-            scan.before.mean_mm(),
-            scan.before.p95_mm(),
-            scan.before.normal_mean_deg
+            "{name}: {faces} faces with edges of {edge_mm:.1} mm, {samples} samples in {duration_s:.0} s of touching; the \
+             unrefined scan is off by {mean:.3} mm (p95 {p95:.3} mm, normals {normals:.1} deg)."
         );
         match scan.best() {
             None => text += " No method reduced the error.",
             Some(best) => {
-                text += &format!(
-                    " The least mean error has {}: {:.1} times less than the scan.",
-                    describe(best),
-                    scan.before.mean_mm() / best.mean_mm()
-                );
+                let (best, times) = (describe(best), mean / best.mean_mm());
+                text += &format!(" The least mean error has {best}: {times:.1} times less than the scan.");
             }
         }
         let front: Vec<String> = scan.front().into_iter().map(describe).collect();
@@ -89,11 +81,8 @@ impl CaseResult {
             of_scans.sort_by(|a, b| b.0.total_cmp(&a.0));
             let each = |&(edge, result): &(f64, &MethodResult)| {
                 let worse = if result.is_worse { ", worse than the scan" } else { "" };
-                format!(
-                    "{:.3} mm in {:.2} µs per sample at {edge:.1} mm{worse}",
-                    result.mean_mm(),
-                    result.per_sample_us.median
-                )
+                let (mm, us) = (result.mean_mm(), result.per_sample_us.median);
+                format!("{mm:.3} mm in {us:.2} µs per sample at {edge:.1} mm{worse}")
             };
             format!("{}: {}", method.name(), of_scans.iter().map(each).collect::<Vec<_>>().join(", "))
         };
@@ -131,12 +120,9 @@ fn against_contact_points(haptic: &MethodResult, points: Option<&MethodResult>) 
         return format!(" Contact points alone did not do: {}.", points.remarks.join("; "));
     }
     let share = haptic.mean_mm() / points.mean_mm();
-    let normals = match (haptic.error, points.error) {
-        (Some(haptic), Some(points)) => {
-            format!("; normals {:.1} against {:.1} deg", haptic.normal_mean_deg, points.normal_mean_deg)
-        }
-        _ => String::new(),
-    };
+    let normals = haptic.error.zip(points.error).map_or_else(String::new, |(haptic, points)| {
+        format!("; normals {:.1} against {:.1} deg", haptic.normal_mean_deg, points.normal_mean_deg)
+    });
     let verdict = match share {
         _ if (share - 1.0).abs() < ALIKE => "is as good as",
         ..1.0 => "beats",
@@ -164,9 +150,8 @@ fn same_regions(scan: &ScanResult) -> String {
 }
 
 /// Methods that stopped early or made the scan worse.
-fn failures(scan: &ScanResult) -> String {
+fn failures(scan: &ScanResult) -> Option<String> {
     let failed = scan.methods.iter().filter(|result| !result.is_sound());
-    let failures: Vec<String> =
-        failed.map(|result| format!("{}: {}", result.name, result.remarks.join("; "))).collect();
-    if failures.is_empty() { String::new() } else { format!("What did not do: {}.", failures.join(". ")) }
+    let failed: Vec<String> = failed.map(|result| format!("{}: {}", result.name, result.remarks.join("; "))).collect();
+    (!failed.is_empty()).then(|| format!("What did not do: {}.", failed.join(". ")))
 }
