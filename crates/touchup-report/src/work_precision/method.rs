@@ -3,7 +3,6 @@
 use std::cell::Cell;
 
 use nalgebra::{Point3, Vector3};
-use serde::Serialize;
 
 use super::problem::{Problem, State};
 use super::{explicit, rosenbrock};
@@ -17,8 +16,7 @@ const JACOBIAN_COUNTS: u64 = 4;
 const FLOWS_CORRECTED: u64 = 3;
 
 /// An integrator.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
     /// explicit Euler, fixed step
     Euler,
@@ -35,8 +33,7 @@ pub enum Method {
 }
 
 /// The setting that controls its accuracy.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SolverSetting {
     /// equal steps over the sample
     Steps(usize),

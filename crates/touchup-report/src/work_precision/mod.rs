@@ -9,16 +9,13 @@ mod rosenbrock;
 mod text;
 
 use std::hint::black_box;
-use std::time::Instant;
-
-use serde::Serialize;
 
 pub use method::{Method, Solved, SolverSetting};
 pub use problem::Problem;
 pub use reference::reference;
 
 use super::number::three_digits;
-use super::{Effort, Spread};
+use super::{Effort, Spread, timed};
 
 /// The paper's h_min, m.
 pub const PAPER_H_MIN_M: f64 = 0.5e-3;
@@ -32,7 +29,7 @@ const REFERENCE_SHARE: f64 = 1e-12;
 const REFERENCE_ROUNDINGS: f64 = 4.0;
 
 /// Everything that was measured.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct WorkPrecision {
     /// one for each stiffness and tilt
     pub cases: Vec<FaceCase>,
@@ -43,7 +40,7 @@ pub struct WorkPrecision {
 }
 
 /// One face, one sample, every integrator.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct FaceCase {
     /// m
     pub h_min_m: f64,
@@ -58,7 +55,7 @@ pub struct FaceCase {
 }
 
 /// One integrator over its settings.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
     /// which
     pub method: Method,
@@ -69,7 +66,7 @@ pub struct Curve {
 }
 
 /// One integrator with one setting.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IntegratorRun {
     /// steps, or tolerance
     pub setting: SolverSetting,
@@ -138,13 +135,7 @@ struct TimingParams {
 impl TimingParams {
     /// Seconds for one call.
     fn time<T>(&self, mut solve: impl FnMut() -> T) -> Spread {
-        let mut seconds = |calls: usize| {
-            let started = Instant::now();
-            for _ in 0..calls {
-                black_box(solve());
-            }
-            started.elapsed().as_secs_f64()
-        };
+        let mut seconds = |calls: usize| timed(|| (0..calls).for_each(|_| drop(black_box(solve())))).0;
         seconds(1);
         let mut calls = 1;
         // also warms up

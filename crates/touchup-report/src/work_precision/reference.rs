@@ -6,7 +6,7 @@
 //! ds/dt = α (|F| cos θ − f)      dθ/dt = −β |F| f sin θ      n = cos θ F̂ + sin θ ê
 //! ```
 
-use nalgebra::{Matrix2, SMatrix, SVector, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
 
 use super::problem::{ALPHA_M_PER_N_S, BETA_PER_N2_S, Problem};
 use touchup_core::haptic::FaceState;
@@ -97,26 +97,16 @@ impl<'a> ForcePlane<'a> {
 
     /// A step of Radau IIA; `None` where Newton's method does not converge.
     fn step(&self, y: &Pair, dt: f64) -> Option<Pair> {
-        let a = coefficients();
-        let jacobian = self.jacobian(y);
-        let mut matrix = SMatrix::<f64, 6, 6>::identity();
-        for (i, row) in a.iter().enumerate() {
-            for (j, weight) in row.iter().enumerate() {
-                let mut block = matrix.fixed_view_mut::<2, 2>(2 * i, 2 * j);
-                block -= dt * *weight * jacobian;
-            }
-        }
-        let factors = matrix.lu();
+        let weights = coefficients() * dt;
+        let factors = (SMatrix::<f64, 6, 6>::identity() - weights.kronecker(&self.jacobian(y))).lu();
         let mut z = SVector::<f64, 6>::zeros();
         let mut last = f64::INFINITY;
         for _ in 0..MOST_ITERATIONS {
             let rates = [0, 1, 2].map(|i| self.rate(&(y + z.fixed_rows::<2>(2 * i))));
             let mut residual = -z;
-            for (i, row) in a.iter().enumerate() {
-                for (weight, rate) in row.iter().zip(&rates) {
-                    let mut part = residual.fixed_rows_mut::<2>(2 * i);
-                    part += dt * *weight * rate;
-                }
+            for i in 0..3 {
+                let mut part = residual.fixed_rows_mut::<2>(2 * i);
+                (0..3).for_each(|j| part += weights[(i, j)] * rates[j]);
             }
             let change = factors.solve(&residual)?;
             z += change;
@@ -137,11 +127,12 @@ impl<'a> ForcePlane<'a> {
 }
 
 /// Of the three stages at (4 ∓ √6)/10 and 1 \[Hairer Wanner 1996, table IV.5.6\].
-fn coefficients() -> [[f64; 3]; 3] {
+fn coefficients() -> Matrix3<f64> {
     let root = 6f64.sqrt();
-    [
+    let rows = [
         [(88.0 - 7.0 * root) / 360.0, (296.0 - 169.0 * root) / 1800.0, (-2.0 + 3.0 * root) / 225.0],
         [(296.0 + 169.0 * root) / 1800.0, (88.0 + 7.0 * root) / 360.0, (-2.0 - 3.0 * root) / 225.0],
         [(16.0 - root) / 36.0, (16.0 + root) / 36.0, 1.0 / 9.0],
-    ]
+    ];
+    Matrix3::from(rows).transpose()
 }

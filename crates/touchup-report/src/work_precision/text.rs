@@ -1,8 +1,8 @@
 //! The results as a chapter, with its text.
 
-use super::{Curve, FaceCase, IntegratorRun, Method, PAPER_H_MIN_M, TILTS_DEG, WorkPrecision};
-use crate::number::three_digits;
-use crate::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Series, Spread, Table, TableCell};
+use super::{FaceCase, IntegratorRun, Method, PAPER_H_MIN_M, TILTS_DEG, WorkPrecision};
+use crate::number::{range, three_digits};
+use crate::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Series, Spread, Table};
 
 /// Requested accuracy, m: the resolution of a sensor, a thousandth of that, and as good as exact.
 const LEVELS_M: [(f64, &str); 3] = [(1e-6, "1 µm"), (1e-9, "1 nm"), (1e-12, "1 pm")];
@@ -49,9 +49,8 @@ impl WorkPrecision {
         text.extend(LEVELS_M.map(|level| self.wins_and_losses(level)));
         text.extend(self.explicit_limits());
         text.extend(self.flow_cost());
-        text.extend(
-            self.without_reference.iter().map(|name| format!("No reference was found for {name}: not measured.")),
-        );
+        let missing = self.without_reference.iter();
+        text.extend(missing.map(|name| format!("No reference was found for {name}: not measured.")));
         text
     }
 
@@ -70,14 +69,11 @@ impl WorkPrecision {
         } else {
             format!("without friction it is off by at most {}", length(straight.error_m))
         };
+        let (name, slowest, tilt) = (method.name(), time(slowest.1.time_s), TILTS_DEG[1]);
+        let [most, h_min] = [tilted.error_m, case.h_min_m].map(length);
         Some(format!(
-            "One step \"{}\" over the whole sample takes at most {}; {without_friction}; with the force tilted by {}° it is off \
-             by at most {} (at h_min {}).",
-            method.name(),
-            time(slowest.1.time_s),
-            TILTS_DEG[1],
-            length(tilted.error_m),
-            length(case.h_min_m),
+            "One step \"{name}\" over the whole sample takes at most {slowest}; {without_friction}; with the force tilted by \
+             {tilt}° it is off by at most {most} (at h_min {h_min})."
         ))
     }
 
@@ -89,8 +85,7 @@ impl WorkPrecision {
             outcomes.iter().filter(|outcome| !outcome.is_won() && outcome.other.is_some()).collect();
         let mut text =
             format!("To be within {name}, an exact step is the fastest in {} of {} cases", won.len(), outcomes.len());
-        let factors: Vec<f64> = won.iter().filter_map(|outcome| outcome.factor()).collect();
-        if let (Some(least), Some(most)) = (smallest(&factors), largest(&factors)) {
+        if let Some((least, most)) = range(won.iter().filter_map(|outcome| outcome.factor())) {
             let (least, most) = (three_digits(least), three_digits(most));
             text += &format!(", {least} to {most} times as fast as the best solver ({})", h_mins(&won));
         }
@@ -104,9 +99,9 @@ impl WorkPrecision {
             names.sort_unstable();
             names.dedup();
             text += &format!(" In {} it is not ({}): {} wins", lost.len(), h_mins(&lost), names.join(" or "));
-            let factors: Vec<f64> = lost.iter().filter_map(|outcome| Some(1.0 / outcome.factor()?)).collect();
-            text += &largest(&factors)
-                .map_or_else(String::new, |most| format!(", by at most {} times", three_digits(most)));
+            if let Some((_, most)) = range(lost.iter().filter_map(|outcome| Some(1.0 / outcome.factor()?))) {
+                text += &format!(", by at most {} times", three_digits(most));
+            }
             let never = lost.iter().filter(|outcome| outcome.exact.is_none()).count();
             text += &if never > 0 { format!("; in {never} of them no exact step gets there.") } else { ".".to_owned() };
         }
@@ -123,16 +118,10 @@ impl WorkPrecision {
         let fastest = |method: Method, error_m: f64| {
             let fails = |case: &&FaceCase| case.curve(method).is_none_or(|curve| curve.cheapest(error_m).is_none());
             let failing: Vec<f64> = self.cases.iter().filter(fails).map(|case| case.h_min_m).collect();
-            largest(&failing).map_or_else(
-                || format!("{} gets there everywhere", method.name()),
-                |mildest| {
-                    format!(
-                        "{} misses {} cases, the mildest at h_min {}",
-                        method.name(),
-                        failing.len(),
-                        length(mildest)
-                    )
-                },
+            let (name, count) = (method.name(), failing.len());
+            range(failing).map_or_else(
+                || format!("{name} gets there everywhere"),
+                |(_, mildest)| format!("{name} misses {count} cases, the mildest at h_min {}", length(mildest)),
             )
         };
         let levels = LEVELS_M[..2].iter();
@@ -157,24 +146,20 @@ impl WorkPrecision {
         let (flow, evaluation) = (per_count(Method::Lie)?, per_count(Method::RungeKutta)?);
         let ratio = flow.median / evaluation.median;
         let which = if ratio > 1.0 { "flatters" } else { "wrongs" };
+        let (flow, evaluation, times) = (time(flow), time(evaluation), three_digits(ratio));
         Some(format!(
-            "One exact flow with its rotation takes {}, one evaluation of the right-hand side within RK4 {}: {} times as much. By \
-             so much the picture over evaluations {which} the exact steps; the one over time does not.",
-            time(flow),
-            time(evaluation),
-            three_digits(ratio),
+            "One exact flow with its rotation takes {flow}, one evaluation of the right-hand side within RK4 {evaluation}: {times} \
+             times as much. By so much the picture over evaluations {which} the exact steps; the one over time does not."
         ))
     }
 
     fn time_figure(&self, case: &FaceCase) -> Figure {
-        let mark = |point: &IntegratorRun| Mark { x: point.time_s.times(1e6), y: (1e3 * point.error_m).into() };
-        let mut figure = case.figure("time", Axis::log("time for the sample, µs", "time_us"), mark);
-        figure.caption = format!(
-            "Lower left is better. Bars: p10–p90 of {} repeats. Errors at the lower edge are as small as the reference can resolve.{}",
-            self.repeats,
-            case.gave_up()
+        let mark = |point: &IntegratorRun| Mark::at(point.time_s.times(1e6), 1e3 * point.error_m);
+        let caption = format!(
+            "Lower left is better. Bars: p10–p90 of {} repeats. Errors at the lower edge are as small as the reference can resolve.",
+            self.repeats
         );
-        figure
+        case.figure("time", &caption, Axis::log("time for the sample, µs", "time_us"), mark)
     }
 
     /// Time to the first level over h_min.
@@ -184,9 +169,9 @@ impl WorkPrecision {
             let cases = self.cases.iter().filter(|case| case.tilt_deg == tilt_deg);
             let marks = cases.filter_map(|case| {
                 let point = case.curve(method)?.cheapest(error_m)?;
-                Some(Mark { x: (1e3 * case.h_min_m).into(), y: point.time_s.times(1e6) })
+                Some(Mark::at(1e3 * case.h_min_m, point.time_s.times(1e6)))
             });
-            Series { name: method.name().to_owned(), stroke: LineStroke::Joined, marks: marks.collect() }
+            Series::new(method.name(), LineStroke::Joined, marks)
         });
         Figure {
             id: format!("work_precision_stiffness_{}", force_id(tilt_deg)),
@@ -203,67 +188,42 @@ impl WorkPrecision {
     }
 
     fn ranking_table(&self) -> Table {
-        let mut rows = Vec::new();
-        for case in &self.cases {
-            for (error_m, name) in LEVELS_M {
-                let ranking = case.ranking(error_m);
-                let mut row = vec![
-                    TableCell::Number(1e3 * case.h_min_m),
-                    TableCell::Number(case.tilt_deg),
-                    TableCell::from(name),
-                ];
-                row.push(ranking.first().map_or(TableCell::from("none"), |(method, _)| TableCell::from(method.name())));
-                row.extend(Method::ALL.map(|method| {
-                    let point = ranking.iter().find(|(ranked, _)| *ranked == method);
-                    point.map_or(TableCell::Empty, |(_, point)| TableCell::Spread(point.time_s.times(1e6)))
-                }));
-                rows.push(row);
-            }
-        }
-        let heads = ["h_min, mm", "tilt, °", "within", "fastest"].map(str::to_owned).into_iter();
-        Table {
-            id: "work_precision_fastest".to_owned(),
-            title: "Fastest integrator for an error".to_owned(),
-            caption: "Time for the sample; empty: not reached with any setting that was tried.".to_owned(),
-            heads: heads.chain(Method::ALL.map(|method| format!("{}, µs", method.name()))).collect(),
-            rows,
-        }
+        let rankings: Vec<_> = self
+            .cases
+            .iter()
+            .flat_map(|case| LEVELS_M.map(|(error_m, name)| (case, name, case.ranking(error_m))))
+            .collect();
+        let caption = "Time for the sample; empty: not reached with any setting that was tried.";
+        let table = Table::of("work_precision_fastest", "Fastest integrator for an error", caption, &rankings)
+            .column("h_min, mm", |(case, ..)| 1e3 * case.h_min_m)
+            .column("tilt, °", |(case, ..)| case.tilt_deg)
+            .column("within", |(_, name, _)| *name)
+            .column("fastest", |(.., ranking)| ranking.first().map_or("none", |(method, _)| method.name()));
+        let times = Method::ALL.into_iter().fold(table, |table, wanted| {
+            table.column(format!("{}, µs", wanted.name()), |(.., ranking)| {
+                let (_, point) = ranking.iter().find(|(method, _)| *method == wanted)?;
+                Some(point.time_s.times(1e6))
+            })
+        });
+        times.table
     }
 
     fn one_step_table(&self) -> Table {
-        let cells = |curve: Option<&Curve>| match curve.and_then(Curve::one_step) {
-            Some(point) => [
-                TableCell::Number(1e3 * point.error_m),
-                TableCell::Number(point.normal_error.to_degrees()),
-                TableCell::Spread(point.time_s.times(1e6)),
-            ],
-            None => [TableCell::Empty, TableCell::Empty, TableCell::Empty],
-        };
-        let row = |case: &FaceCase| {
-            let parameters = [1e3 * case.h_min_m, case.tilt_deg, 1e3 * case.travel_m].map(TableCell::Number);
-            let steps = [Method::Lie, Method::DriftCorrected].map(|method| cells(case.curve(method)));
-            parameters.into_iter().chain(steps.into_iter().flatten()).collect()
-        };
-        let heads = [
-            "h_min, mm",
-            "tilt, °",
-            "travel, mm",
-            "Lie: error, mm",
-            "Lie: normal, °",
-            "Lie: time, µs",
-            "drift-corrected: error, mm",
-            "drift-corrected: normal, °",
-            "drift-corrected: time, µs",
-        ];
-        Table {
-            id: "work_precision_one_step".to_owned(),
-            title: "The whole sample in one exact step".to_owned(),
-            caption:
-                "Travel: how far the face moves in the exact solution. Without tilt the one step is the exact solution."
-                    .to_owned(),
-            heads: heads.map(str::to_owned).to_vec(),
-            rows: self.cases.iter().map(row).collect(),
-        }
+        let caption =
+            "Travel: how far the face moves in the exact solution. Without tilt the one step is the exact solution.";
+        let table = Table::of("work_precision_one_step", "The whole sample in one exact step", caption, &self.cases)
+            .column("h_min, mm", |case| 1e3 * case.h_min_m)
+            .column("tilt, °", |case| case.tilt_deg)
+            .column("travel, mm", |case| 1e3 * case.travel_m);
+        let methods = [("Lie", Method::Lie), ("drift-corrected", Method::DriftCorrected)];
+        let steps = methods.into_iter().fold(table, |table, (name, method)| {
+            let step = |case: &FaceCase| case.curve(method)?.one_step().copied();
+            table
+                .column(format!("{name}: error, mm"), |case| Some(1e3 * step(case)?.error_m))
+                .column(format!("{name}: normal, °"), |case| Some(step(case)?.normal_error.to_degrees()))
+                .column(format!("{name}: time, µs"), |case| Some(step(case)?.time_s.times(1e6)))
+        });
+        steps.table
     }
 }
 
@@ -293,20 +253,11 @@ impl FastestSolvers {
 
 /// "h_min 1 nm to 1 µm".
 fn h_mins(outcomes: &[&FastestSolvers]) -> String {
-    let all: Vec<f64> = outcomes.iter().map(|outcome| outcome.h_min_m).collect();
-    match (smallest(&all), largest(&all)) {
-        (Some(low), Some(high)) if low < high => format!("h_min {} to {}", length(low), length(high)),
-        (Some(low), _) => format!("h_min {}", length(low)),
-        _ => String::new(),
+    match range(outcomes.iter().map(|outcome| outcome.h_min_m)) {
+        Some((low, high)) if low < high => format!("h_min {} to {}", length(low), length(high)),
+        Some((low, _)) => format!("h_min {}", length(low)),
+        None => String::new(),
     }
-}
-
-fn smallest(values: &[f64]) -> Option<f64> {
-    values.iter().copied().min_by(f64::total_cmp)
-}
-
-fn largest(values: &[f64]) -> Option<f64> {
-    values.iter().copied().max_by(f64::total_cmp)
 }
 
 /// In the unit that leaves few zeros.
@@ -319,37 +270,28 @@ fn length(metres: f64) -> String {
 /// Median and ends, in the unit that leaves few zeros.
 fn time(seconds: Spread) -> String {
     let (unit, name) = if seconds.median < 1e-7 { (1e-9, "ns") } else { (1e-6, "µs") };
-    let [median, p10, p90] = [seconds.median, seconds.p10, seconds.p90].map(|value| three_digits(value / unit));
+    let [median, p10, p90] = seconds.numbers().map(|value| three_digits(value / unit));
     format!("{median} {name} ({p10}–{p90})")
 }
 
 fn evaluations_figure(case: &FaceCase) -> Figure {
-    let mark = |point: &IntegratorRun| Mark { x: (point.evaluations as f64).into(), y: (1e3 * point.error_m).into() };
+    let mark = |point: &IntegratorRun| Mark::at(point.evaluations as f64, 1e3 * point.error_m);
     let axis = Axis::log("evaluations of the right-hand side, or exact flows", "evaluations");
-    let mut figure = case.figure("evaluations", axis, mark);
-    figure.caption = format!(
-        "The same runs by what is counted instead of timed: no spread, the counts repeat exactly.{}",
-        case.gave_up()
-    );
-    figure
+    let caption = "The same runs by what is counted instead of timed: no spread, the counts repeat exactly.";
+    case.figure("evaluations", caption, axis, mark)
 }
 
 impl FaceCase {
-    fn name(&self) -> String {
-        format!("h_min {}, {}", length(self.h_min_m), force_name(self.tilt_deg))
-    }
-
-    fn figure(&self, over: &str, x: Axis, mark: impl Fn(&IntegratorRun) -> Mark) -> Figure {
-        let series = self.curves.iter().map(|curve| Series {
-            name: curve.method.name().to_owned(),
-            stroke: LineStroke::Joined,
-            marks: curve.points.iter().map(&mark).collect(),
-        });
-        let exponent = (self.h_min_m * 1e9).round();
+    fn figure(&self, over: &str, caption: &str, x: Axis, mark: impl Fn(&IntegratorRun) -> Mark) -> Figure {
+        let series = self
+            .curves
+            .iter()
+            .map(|curve| Series::new(curve.method.name(), LineStroke::Joined, curve.points.iter().map(&mark)));
+        let (exponent, tilt_deg) = ((self.h_min_m * 1e9).round(), self.tilt_deg);
         Figure {
-            id: format!("work_precision_{over}_{exponent}nm_{}", force_id(self.tilt_deg)),
-            title: format!("Error at the end of one sample: {}", self.name()),
-            caption: String::new(),
+            id: format!("work_precision_{over}_{exponent}nm_{}", force_id(tilt_deg)),
+            title: format!("Error at the end of one sample: h_min {}, {}", length(self.h_min_m), force_name(tilt_deg)),
+            caption: format!("{caption}{}", self.gave_up()),
             x,
             y: Axis::log("error of the barycentre, mm", "error_mm"),
             drawing: Drawing::Curves(series.collect()),
