@@ -1,16 +1,11 @@
 //! The peers of the report: a virtual environment with libraries from PyPI, and one process in it.
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Command;
 
 use touchup_core::haptic::RefineError;
-use touchup_io::atomic::AtomicFile;
 use touchup_report::Effort;
 use touchup_report::peers::{PACKAGES, Peers, PeersAtSize, PeersInput, SCRIPT, UnknownLine};
-
-/// Threads of the libraries, as each of them asks for it.
-const ONE_THREAD: [&str; 4] = ["OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "TBB_NUM_THREADS"];
 
 /// Why the peers could not be measured.
 #[derive(Debug, thiserror::Error)]
@@ -60,51 +55,36 @@ fn make_environment(folder: &Path) -> Result<PathBuf, PeersError> {
 }
 
 fn set_up(command: &mut Command) -> Result<(), PeersError> {
-    let failed = |command: &Command, reason: String| {
-        let words = std::iter::once(command.get_program()).chain(command.get_args());
-        let command: Vec<String> = words.map(|word| word.to_string_lossy().into_owned()).collect();
-        PeersError::Setup { command: command.join(" "), reason }
-    };
-    let output = command.output();
-    match output {
-        Ok(output) if output.status.success() => Ok(()),
-        Ok(output) => Err(failed(command, last_words(&output))),
-        Err(error) => Err(failed(command, error.to_string())),
-    }
+    let Err(reason) = run(command) else { return Ok(()) };
+    let words = std::iter::once(command.get_program()).chain(command.get_args());
+    let words: Vec<_> = words.map(|word| word.to_string_lossy()).collect();
+    Err(PeersError::Setup { command: words.join(" "), reason })
 }
 
-/// The last line that a program said before it failed.
-fn last_words(output: &Output) -> String {
-    let said = [output.stdout.as_slice(), output.stderr.as_slice()].concat();
+/// What a program printed, or the last line that it said before it failed.
+fn run(command: &mut Command) -> Result<String, String> {
+    let output = command.output().map_err(|error| error.to_string())?;
+    if output.status.success() {
+        return Ok(String::from_utf8_lossy(&output.stdout).into_owned());
+    }
+    let said = [output.stdout, output.stderr].concat();
     let said = String::from_utf8_lossy(&said);
     let line = said.lines().rev().find(|line| !line.trim().is_empty());
-    line.map_or_else(|| format!("it ended with {}", output.status), str::to_owned)
+    Err(line.map_or_else(|| format!("it ended with {}", output.status), str::to_owned))
 }
 
 fn run_script(python: &Path, input: &PeersInput) -> Result<String, PeersError> {
-    let nowhere = std::env::temp_dir();
-    let folder = tempfile::tempdir().map_err(|source| PeersError::Write { path: nowhere, source })?;
+    let write_error = |path: PathBuf| move |source| PeersError::Write { path, source };
+    let folder = tempfile::tempdir().map_err(write_error(std::env::temp_dir()))?;
     let files =
         [("positions.f64", input.positions()), ("faces.i32", input.triangles()), ("queries.f64", input.queries())];
     for (name, bytes) in files {
         let path = folder.path().join(name);
-        write(&path, &bytes).map_err(|source| PeersError::Write { path, source })?;
+        std::fs::write(&path, bytes).map_err(write_error(path))?;
     }
     let mut command = Command::new(python);
     command.args(["-c", SCRIPT]).arg(folder.path()).arg(input.distances().len().to_string());
-    command.envs(ONE_THREAD.map(|name| (name, "1")));
-    let output = command.output().map_err(|error| PeersError::Script(error.to_string()))?;
-    if output.status.success() {
-        Ok(String::from_utf8_lossy(&output.stdout).into_owned())
-    } else {
-        Err(PeersError::Script(last_words(&output)))
-    }
-}
-
-fn write(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let mut file = AtomicFile::create(path)?;
-    file.write_all(bytes)?;
-    file.commit()
+    run(&mut command).map_err(PeersError::Script)
 }
 
 #[cfg(test)]

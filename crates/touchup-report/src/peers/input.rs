@@ -1,11 +1,9 @@
 //! The wavy plate and the point that slides over it, for the peers and for touchup.
 
-use std::time::Instant;
-
 use nalgebra::Point3;
 
 use super::TouchupTimes;
-use crate::{Effort, Spread};
+use crate::{Effort, Spread, timed};
 use touchup_core::haptic::{RefineError, RefineParams, Refiner, TipParams};
 use touchup_core::mesh::{FaceTree, MeshError, Nearby, TriMesh};
 use touchup_sim::wavy::{RADIUS, SIDE, STIFFNESS, contact_on, slide, wavy_plate};
@@ -23,10 +21,6 @@ pub struct PeersInput {
     mesh: TriMesh,
     queries: Vec<Point3<f64>>,
     distances: Vec<f64>,
-}
-
-fn microseconds(since: Instant) -> f64 {
-    since.elapsed().as_secs_f64() * 1e6
 }
 
 impl PeersInput {
@@ -77,14 +71,12 @@ impl PeersInput {
         let (mut queries, mut next) = (Vec::new(), Vec::new());
         let (mut last, mut nearby) = (None, Nearby::default());
         for p in &self.queries {
-            let start = Instant::now();
-            let hit = std::hint::black_box(tree.closest(&self.mesh, p, REACH));
-            queries.push(microseconds(start));
+            let (seconds, hit) = timed(|| tree.closest(&self.mesh, p, REACH));
+            queries.push(seconds * 1e6);
             let hint = last.or(hit.map(|hit| hit.face));
-            let start = Instant::now();
-            let hit = hint.and_then(|hint| tree.closest_nearby(&self.mesh, p, hint, REACH, &mut nearby));
-            let hit = std::hint::black_box(hit);
-            next.push(microseconds(start));
+            let near = || hint.and_then(|hint| tree.closest_nearby(&self.mesh, p, hint, REACH, &mut nearby));
+            let (seconds, hit) = timed(near);
+            next.push(seconds * 1e6);
             last = hit.map(|hit| hit.face);
         }
         let tip = TipParams { radius: RADIUS, stiffness: Some(STIFFNESS) };
@@ -92,11 +84,10 @@ impl PeersInput {
         let mut pushes = Vec::new();
         for i in 0..WARM + 5 * self.queries.len() {
             let sample = slide(i, WIDTH);
-            let start = Instant::now();
-            std::hint::black_box(refiner.push(&sample))?;
-            let time = microseconds(start);
+            let (seconds, pushed) = timed(|| refiner.push(&sample).map(drop));
+            pushed?;
             if i >= WARM {
-                pushes.push(time);
+                pushes.push(seconds * 1e6);
             }
         }
         let spread = |times| Spread::of(times).unwrap_or(f64::NAN.into());

@@ -6,11 +6,11 @@
 mod input;
 mod text;
 
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
 pub use input::PeersInput;
 
-use super::{Chapter, Spread};
+use super::Spread;
 
 /// Measures the peers; prints a [`PeerTimes`] or a [`PeerError`] as JSON on each line.
 pub const SCRIPT: &str = include_str!("peers.py");
@@ -31,7 +31,7 @@ pub const WANTED_FACTOR: f64 = 100.0;
 pub const AGREEMENT: f64 = 1e-9;
 
 /// Times of touchup itself on the same input, µs.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TouchupTimes {
     /// one closest face, without a starting face
     pub query_us: Spread,
@@ -42,7 +42,7 @@ pub struct TouchupTimes {
 }
 
 /// One peer as the script reports it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct PeerTimes {
     /// which
     pub peer: String,
@@ -50,40 +50,21 @@ pub struct PeerTimes {
     pub versions: String,
     /// how its index is kept true
     pub update: String,
-    /// to build its index, ms
-    pub build_ms: f64,
     /// one closest face per call, µs
-    pub query_us: SpreadOf,
+    pub query_us: Spread,
     /// the same in one call for all, µs for each; where it can
-    pub batched_query_us: Option<SpreadOf>,
+    pub batched_query_us: Option<Spread>,
     /// closest face, ring moved, index true again, µs
-    pub pipeline_us: SpreadOf,
-    /// how many samples that was measured over
-    pub pipeline_samples: usize,
+    pub pipeline_us: Spread,
     /// distances, m; none where it has no closest-face query
-    #[serde(skip_serializing)]
     distances_m: Vec<Option<f64>>,
     /// largest difference from touchup's distance, relative; `None` where it does not look for the closest face
-    #[serde(skip_deserializing)]
+    #[serde(skip)]
     pub largest_difference: Option<f64>,
 }
 
-/// A spread as the script reports it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct SpreadOf {
-    median: f64,
-    p10: f64,
-    p90: f64,
-}
-
-impl From<SpreadOf> for Spread {
-    fn from(SpreadOf { median, p10, p90 }: SpreadOf) -> Self {
-        Self { median, p10, p90 }
-    }
-}
-
 /// A peer that could not be measured.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct PeerError {
     /// which
     pub peer: String,
@@ -92,7 +73,7 @@ pub struct PeerError {
 }
 
 /// All peers on one mesh.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct PeersAtSize {
     /// of the mesh
     pub faces: usize,
@@ -105,7 +86,7 @@ pub struct PeersAtSize {
 }
 
 /// The comparison.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Peers {
     /// the smallest mesh first
     pub sizes: Vec<PeersAtSize>,
@@ -183,11 +164,6 @@ impl Peers {
         let beyond = |factor: Option<f64>, wanted| factor.is_some_and(|factor| factor >= wanted);
         self.sizes.iter().all(|size| beyond(size.pipeline_factor(), WANTED_FACTOR) && beyond(size.query_factor(), 1.0))
     }
-
-    /// The table and its text.
-    pub fn chapter(&self) -> Chapter {
-        text::chapter(self)
-    }
 }
 
 fn largest_difference(found: &[Option<f64>], ours: &[f64]) -> Option<f64> {
@@ -199,7 +175,7 @@ fn largest_difference(found: &[Option<f64>], ours: &[f64]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Effort;
+    use crate::{Chapter, Effort};
 
     fn line(peer: &str, query: f64, pipeline: f64, distance: f64) -> String {
         let spread = |median: f64| format!(r#"{{"median": {median}, "p10": {median}, "p90": {median}}}"#);

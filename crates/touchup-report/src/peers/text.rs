@@ -1,16 +1,18 @@
 //! The chapter: one table of times and ratios, one figure, and the two promises.
 
-use super::{AGREEMENT, PeerTimes, Peers, PeersAtSize, TouchupTimes, WANTED_FACTOR};
+use super::{AGREEMENT, Peers, PeersAtSize, WANTED_FACTOR};
 use crate::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Series, Spread, Table, TableCell};
 
-pub(super) fn chapter(peers: &Peers) -> Chapter {
-    let how = "The same wavy plate, the same point sliding over it at 50 mm/s and 1 kHz, one thread on one processor, one run: touchup before \
-               the peers and after them. A peer's pipeline finds the closest face, moves the vertices around it, and brings its index up \
-               to date by the cheapest method that leaves it exact; touchup's push does that and filters, gates, solves the dynamics and \
-               guards the mesh. Of both turns of touchup the slower counts.";
-    let mut text = vec![how.to_owned()];
-    text.extend(peers.sizes.iter().flat_map(verdicts));
-    Chapter { title: "Against peers".to_owned(), text, figures: vec![figure(peers)], tables: vec![table(peers)] }
+impl Peers {
+    /// The table and its text.
+    pub fn chapter(&self) -> Chapter {
+        let how = "The same wavy plate, the same point sliding over it at 50 mm/s and 1 kHz, one thread on one processor, one run: touchup before \
+                   the peers and after them. A peer's pipeline finds the closest face, moves the vertices around it, and brings its index up \
+                   to date by the cheapest method that leaves it exact; touchup's push does that and filters, gates, solves the dynamics and \
+                   guards the mesh. Of both turns of touchup the slower counts.";
+        let text = std::iter::once(how.to_owned()).chain(self.sizes.iter().flat_map(verdicts)).collect();
+        Chapter { title: "Against peers".to_owned(), text, figures: vec![figure(self)], tables: vec![table(self)] }
+    }
 }
 
 fn verdicts(size: &PeersAtSize) -> Vec<String> {
@@ -33,86 +35,82 @@ fn verdicts(size: &PeersAtSize) -> Vec<String> {
             peer.peer
         ));
     }
-    let others: Vec<_> = size.peers.iter().filter(|peer| peer.largest_difference.is_some() && !peer.agrees()).collect();
-    for peer in others {
-        let difference = peer.largest_difference.unwrap_or(f64::NAN);
+    for peer in size.peers.iter().filter(|peer| !peer.agrees()) {
+        let Some(difference) = peer.largest_difference else { continue };
         text.push(format!(
             "{} faces: {} differs from touchup's distances by up to {difference:.1e}, more than {AGREEMENT:.0e}.",
             size.faces, peer.peer
         ));
     }
-    text.extend(
-        size.failed
-            .iter()
-            .map(|failed| format!("{} faces: {} could not be measured: {}.", size.faces, failed.peer, failed.error)),
-    );
+    let failed = size.failed.iter();
+    text.extend(failed.map(|one| format!("{} faces: {} could not be measured: {}.", size.faces, one.peer, one.error)));
     text
 }
 
-fn touchup_row(faces: usize, name: &str, times: &TouchupTimes) -> Vec<TableCell> {
-    vec![
-        TableCell::Number(faces as f64),
-        name.into(),
-        "boxes of the moved faces refitted".into(),
-        times.query_us.into(),
-        times.next_query_us.into(),
-        times.push_us.into(),
-        TableCell::Empty,
-        TableCell::Empty,
-    ]
+/// A turn of touchup, or a peer.
+struct Row<'a> {
+    faces: usize,
+    who: String,
+    update: &'a str,
+    query_us: Spread,
+    next_query_us: Option<Spread>,
+    sample_us: Spread,
+    ratio: Option<f64>,
+    difference: TableCell,
 }
 
-fn peer_row(size: &PeersAtSize, peer: &PeerTimes) -> Vec<TableCell> {
-    vec![
-        TableCell::Number(size.faces as f64),
-        format!("{} ({})", peer.peer, peer.versions).into(),
-        peer.update.clone().into(),
-        Spread::from(peer.query_us).into(),
-        peer.batched_query_us.map_or(TableCell::Empty, |us| Spread::from(us).into()),
-        Spread::from(peer.pipeline_us).into(),
-        TableCell::Number(peer.pipeline_us.median / size.push_us()),
-        peer.largest_difference.map_or("another question (Eq 12)".into(), TableCell::Number),
-    ]
+fn rows(size: &PeersAtSize) -> Vec<Row<'_>> {
+    let ours = ["touchup, before", "touchup, after"].into_iter().zip(&size.touchup).map(|(name, times)| Row {
+        faces: size.faces,
+        who: name.to_owned(),
+        update: "boxes of the moved faces refitted",
+        query_us: times.query_us,
+        next_query_us: Some(times.next_query_us),
+        sample_us: times.push_us,
+        ratio: None,
+        difference: TableCell::Empty,
+    });
+    let peers = size.peers.iter().map(|peer| Row {
+        faces: size.faces,
+        who: format!("{} ({})", peer.peer, peer.versions),
+        update: &peer.update,
+        query_us: peer.query_us,
+        next_query_us: peer.batched_query_us,
+        sample_us: peer.pipeline_us,
+        ratio: Some(peer.pipeline_us.median / size.push_us()),
+        difference: peer.largest_difference.map_or("another question (Eq 12)".into(), TableCell::Number),
+    });
+    ours.chain(peers).collect()
 }
 
 fn table(peers: &Peers) -> Table {
-    let rows = peers.sizes.iter().flat_map(|size| {
-        let ours = ["touchup, before", "touchup, after"].into_iter().zip(&size.touchup);
-        let ours = ours.map(|(name, times)| touchup_row(size.faces, name, times));
-        ours.chain(size.peers.iter().map(|peer| peer_row(size, peer)))
-    });
-    let heads = [
-        "faces",
-        "who",
-        "how the index is kept true",
-        "closest face per call, µs",
-        "closest face in one call for all (touchup: near the last), µs",
-        "whole sample, µs",
-        "sample over touchup's push",
-        "largest relative difference of a distance",
-    ];
-    Table {
-        id: "peers".to_owned(),
-        title: "Closest face and whole sample against libraries from PyPI".to_owned(),
-        caption: "Medians with p10 to p90, one thread. A rebuild is measured over four seconds.".to_owned(),
-        heads: heads.map(str::to_owned).to_vec(),
-        rows: rows.collect(),
-    }
+    let rows: Vec<Row> = peers.sizes.iter().flat_map(rows).collect();
+    let caption = "Medians with p10 to p90, one thread. A rebuild is measured over four seconds.";
+    Table::of("peers", "Closest face and whole sample against libraries from PyPI", caption, &rows)
+        .column("faces", |row| row.faces)
+        .column("who", |row| row.who.as_str())
+        .column("how the index is kept true", |row| row.update)
+        .column("closest face per call, µs", |row| row.query_us)
+        .column("closest face in one call for all (touchup: near the last), µs", |row| row.next_query_us)
+        .column("whole sample, µs", |row| row.sample_us)
+        .column("sample over touchup's push", |row| row.ratio)
+        .column("largest relative difference of a distance", |row| row.difference.clone())
+        .table
 }
 
 fn figure(peers: &Peers) -> Figure {
     let mut series: Vec<Series> = Vec::new();
     let mut add = |name: &str, faces: usize, y: Spread| {
-        let mark = Mark { x: (faces as f64).into(), y };
+        let mark = Mark::at(faces as f64, y);
         match series.iter_mut().find(|known| known.name == name) {
             Some(known) => known.marks.push(mark),
-            None => series.push(Series { name: name.to_owned(), stroke: LineStroke::Joined, marks: vec![mark] }),
+            None => series.push(Series::new(name, LineStroke::Joined, [mark])),
         }
     };
     for size in &peers.sizes {
         add("touchup", size.faces, size.touchup[0].push_us);
         for peer in &size.peers {
-            add(&peer.peer, size.faces, peer.pipeline_us.into());
+            add(&peer.peer, size.faces, peer.pipeline_us);
         }
     }
     Figure {
