@@ -1,7 +1,7 @@
 //! Where values lie along an axis, and where it is marked.
 
 use super::super::figure::Scale;
-use super::super::number::{power_of_ten, three_digits};
+use super::super::number::{power_of_ten, range, three_digits};
 
 /// Up to so many decades each of them is marked, and their ninths have gridlines.
 const DECADES_WITH_NINTHS: i32 = 4;
@@ -32,12 +32,7 @@ pub(super) struct Tick {
 impl Extent {
     /// Around `values`, with some room; those that cannot be shown do not count.
     pub fn around(scale: Scale, values: impl Iterator<Item = f64>) -> Self {
-        let mut range = None;
-        for even in values.filter_map(|value| even(scale, value)) {
-            let (low, high) = range.unwrap_or((even, even));
-            range = Some((even.min(low), even.max(high)));
-        }
-        let (low, high) = range.unwrap_or((0.0, 1.0));
+        let (low, high) = range(values.filter_map(|value| even(scale, value))).unwrap_or((0.0, 1.0));
         let width = high - low;
         // a single value still needs a stretch around it
         let least = if scale == Scale::Log { 0.3 } else { (0.1 * low.abs()).max(1e-300) };
@@ -71,30 +66,24 @@ impl Extent {
         let (first, last) = (self.low.floor() as i32, self.high.ceil() as i32);
         let decades = last - first;
         let every = 1 + decades / MOST_POWERS;
-        let whole = (first..=last).filter(|power| self.holds(f64::from(*power))).count();
-        let are_written_out = WRITTEN_OUT.contains(&(self.low.ceil() as i32))
-            && WRITTEN_OUT.contains(&(self.high.floor() as i32))
-            || whole < 2;
+        let whole = (first..=last).filter(|power| (self.low..=self.high).contains(&f64::from(*power))).count();
+        let ends = [self.low.ceil() as i32, self.high.floor() as i32];
+        let are_written_out = whole < 2 || ends.iter().all(|end| WRITTEN_OUT.contains(end));
         let mut ticks = Vec::new();
         for power in first..=last {
             for ninth in 1..=9 {
-                let is_power = ninth == 1;
-                // with hardly a whole decade 2 and 5 need their numbers too
-                let has_label =
-                    if is_power { power.rem_euclid(every) == 0 } else { whole < 2 && [2, 5].contains(&ninth) };
-                if !is_power && decades > DECADES_WITH_NINTHS {
+                if ninth > 1 && decades > DECADES_WITH_NINTHS {
                     break;
                 }
+                // with hardly a whole decade 2 and 5 need their numbers too
+                let has_label =
+                    if ninth == 1 { power.rem_euclid(every) == 0 } else { whole < 2 && [2, 5].contains(&ninth) };
                 let value = f64::from(ninth) * 10f64.powi(power);
                 let label = if are_written_out { three_digits(value) } else { power_of_ten(power) };
                 ticks.push(self.tick(value, if has_label { label } else { String::new() }));
             }
         }
         ticks
-    }
-
-    fn holds(&self, even: f64) -> bool {
-        (self.low..=self.high).contains(&even)
     }
 
     fn tick(&self, value: f64, label: String) -> Tick {

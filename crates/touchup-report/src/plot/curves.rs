@@ -1,10 +1,10 @@
 //! Curves and marks in one frame, with a legend beside or below it.
 
-use super::super::figure::{Figure, LineStroke, Mark, Series, Spread};
+use super::super::figure::{Figure, LineStroke, Mark, Series};
 use super::axis::Extent;
 use super::frame::Frame;
 use super::style::{Look, Looks, text_width};
-use super::writer::{Anchor, Svg};
+use super::writer::Svg;
 use super::{TOP, WIDTH};
 
 /// Room on the left for the numbers and the name of the axis, pixels.
@@ -26,14 +26,13 @@ pub(super) fn draw(svg: &mut Svg, figure: &Figure, series: &[Series], looks: &Lo
     let is_beside = name_width <= WIDEST_BESIDE && series.len() as f64 * LINE <= HEIGHT;
     let right = if is_beside { name_width + SAMPLE + 24.0 } else { 24.0 };
     let frame = Frame { left: LEFT, top: TOP, width: WIDTH - LEFT - right, height: HEIGHT };
-    let x = Extent::around(figure.x.scale, series.iter().flat_map(|s| s.marks.iter().flat_map(|m| ends(m.x))));
-    let y = Extent::around(figure.y.scale, series.iter().flat_map(|s| s.marks.iter().flat_map(|m| ends(m.y))));
+    let marks = || series.iter().flat_map(|series| &series.marks);
+    let x = Extent::around(figure.x.scale, marks().flat_map(|mark| mark.x.numbers()));
+    let y = Extent::around(figure.y.scale, marks().flat_map(|mark| mark.y.numbers()));
     frame.draw_grid(svg, &x, &y);
     frame.name_axes(svg, &figure.x.label, &figure.y.label);
-    let mut hidden = 0;
-    for series in series {
-        hidden += draw_series(svg, &frame, [&x, &y], looks.look(&series.name), series);
-    }
+    let mut draw = |series: &Series| draw_series(svg, &frame, [&x, &y], looks.look(&series.name), series);
+    let hidden: usize = series.iter().map(&mut draw).sum();
     frame.draw_border(svg);
     let below = frame.bottom() + BELOW;
     let bottom = if is_beside {
@@ -48,12 +47,8 @@ pub(super) fn draw(svg: &mut Svg, figure: &Figure, series: &[Series], looks: &Lo
         return bottom;
     }
     let note = format!("{hidden} marks are not shown: they have no place on these axes (0, or not finite)");
-    svg.text([LEFT, bottom + 14.0], Anchor::Start, "font-size=\"11.5\" fill=\"#a33\"", &note);
+    svg.text([LEFT, bottom + 14.0], "start", "font-size=\"11.5\" fill=\"#a33\"", &note);
     bottom + 18.0
-}
-
-fn ends(spread: Spread) -> [f64; 3] {
-    [spread.median, spread.p10, spread.p90]
 }
 
 /// Returns how many marks have no place.
@@ -80,28 +75,20 @@ fn place(frame: &Frame, [x, y]: [&Extent; 2], mark: &Mark) -> Option<[f64; 2]> {
     Some(frame.pixel([x.place(mark.x.median)?, y.place(mark.y.median)?]))
 }
 
-/// From the 10th to the 90th percentile, where they are apart.
-fn draw_bars(svg: &mut Svg, frame: &Frame, [x, y]: [&Extent; 2], look: Look, mark: &Mark, [px, py]: [f64; 2]) {
-    let ends = |extent: &Extent, spread: Spread| extent.place(spread.p10).zip(extent.place(spread.p90));
+/// From the 10th to the 90th percentile, where they are apart: a line with a short stroke across each end.
+fn draw_bars(svg: &mut Svg, frame: &Frame, [x, y]: [&Extent; 2], look: Look, mark: &Mark, place: [f64; 2]) {
     let style = look.bar();
-    if let Some((low, high)) = ends(x, mark.x) {
-        let (low, high) = (frame.pixel([low, 0.0])[0], frame.pixel([high, 0.0])[0]);
-        bar(svg, [low, py], [high, py], [0.0, 3.0], &style);
-    }
-    if let Some((low, high)) = ends(y, mark.y) {
-        let (low, high) = (frame.pixel([0.0, low])[1], frame.pixel([0.0, high])[1]);
-        bar(svg, [px, low], [px, high], [3.0, 0.0], &style);
-    }
-}
-
-/// A line with a short stroke across each end.
-fn bar(svg: &mut Svg, from: [f64; 2], to: [f64; 2], [dx, dy]: [f64; 2], style: &str) {
-    if (from[0] - to[0]).abs() + (from[1] - to[1]).abs() < 1.0 {
-        return;
-    }
-    svg.line(from, to, style);
-    for [x, y] in [from, to] {
-        svg.line([x - dx, y - dy], [x + dx, y + dy], style);
+    for (axis, (extent, spread)) in [(x, mark.x), (y, mark.y)].into_iter().enumerate() {
+        let Some(ends) = extent.place(spread.p10).zip(extent.place(spread.p90)) else { continue };
+        let (mut from, mut to, mut across) = (place, place, [3.0; 2]);
+        (from[axis], to[axis], across[axis]) = (frame.pixel([ends.0; 2])[axis], frame.pixel([ends.1; 2])[axis], 0.0);
+        if (from[axis] - to[axis]).abs() < 1.0 {
+            continue;
+        }
+        svg.line(from, to, &style);
+        for [x, y] in [from, to] {
+            svg.line([x - across[0], y - across[1]], [x + across[0], y + across[1]], &style);
+        }
     }
 }
 
@@ -124,7 +111,7 @@ fn draw_legend(
         if series.stroke != LineStroke::Dashed {
             look.mark(svg, [x + 0.5 * (SAMPLE - 8.0), y]);
         }
-        svg.text([x + SAMPLE, y + 4.5], Anchor::Start, "font-size=\"12.5\"", &series.name);
+        svg.text([x + SAMPLE, y + 4.5], "start", "font-size=\"12.5\"", &series.name);
     }
     series.len().div_ceil(columns)
 }

@@ -2,7 +2,7 @@
 
 use super::axis::{Extent, Tick};
 use super::style::text_width;
-use super::writer::{Anchor, Svg};
+use super::writer::Svg;
 
 /// A label closer than this to the one before it is left out, pixels.
 const LEAST_GAP: f64 = 8.0;
@@ -58,7 +58,7 @@ impl Frame {
                 continue;
             }
             free_from = x + half + LEAST_GAP;
-            svg.text([x, y + 17.0], Anchor::Middle, "font-size=\"12\"", &tick.label);
+            svg.text([x, y + 17.0], "middle", "font-size=\"12\"", &tick.label);
         }
     }
 
@@ -66,13 +66,13 @@ impl Frame {
     pub fn draw_y_labels(&self, svg: &mut Svg, ticks: &[Tick]) {
         for tick in ticks {
             let [x, y] = self.pixel([0.0, tick.at]);
-            svg.text([x - 7.0, y + 4.0], Anchor::End, "font-size=\"12\"", &tick.label);
+            svg.text([x - 7.0, y + 4.0], "end", "font-size=\"12\"", &tick.label);
         }
     }
 
     /// Labels of the axes, below and on the left.
     pub fn name_axes(&self, svg: &mut Svg, x: &str, y: &str) {
-        svg.text([self.left + 0.5 * self.width, self.bottom() + 38.0], Anchor::Middle, "", x);
+        svg.text([self.left + 0.5 * self.width, self.bottom() + 38.0], "middle", "", x);
         svg.upward_text([self.left - 56.0, self.top + 0.5 * self.height], y);
     }
 }

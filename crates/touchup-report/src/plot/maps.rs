@@ -5,7 +5,7 @@ use super::super::number::{power_of_ten, three_digits};
 use super::axis::Tick;
 use super::frame::Frame;
 use super::style::text_width;
-use super::writer::{Anchor, Svg};
+use super::writer::Svg;
 use super::{TOP, WIDTH};
 
 /// Room for the numbers and the name of the axis on the left, between grids, for the bar on the right, and below.
@@ -61,7 +61,7 @@ pub(super) fn draw(svg: &mut Svg, figure: &Figure, share_of: &str, panels: &[Pan
 
 fn draw_panel(svg: &mut Svg, frame: &Frame, figure: &Figure, panel: &Panel) {
     let (columns, rows) = (panel.xs.len(), panel.ys.len());
-    svg.text([frame.left, frame.top - 7.0], Anchor::Start, "font-size=\"12.5\" font-weight=\"600\"", &panel.name);
+    svg.text([frame.left, frame.top - 7.0], "start", "font-size=\"12.5\" font-weight=\"600\"", &panel.name);
     let size = [frame.width / columns.max(1) as f64, frame.height / rows.max(1) as f64];
     for (at, share) in panel.shares.iter().take(columns * rows).enumerate() {
         let (row, column) = (at / columns, at % columns);
@@ -74,29 +74,20 @@ fn draw_panel(svg: &mut Svg, frame: &Frame, figure: &Figure, panel: &Panel) {
     }
     frame.draw_border(svg);
     frame.draw_x_labels(svg, &labels(&panel.xs, &figure.x, frame.width / 42.0));
-    svg.text([frame.left + 0.5 * frame.width, frame.bottom() + 35.0], Anchor::Middle, "", &figure.x.label);
+    svg.text([frame.left + 0.5 * frame.width, frame.bottom() + 35.0], "middle", "", &figure.x.label);
 }
 
 /// Numbers at the middles of cells, at most about `most`; powers of ten first.
 fn labels(values: &[f64], axis: &Axis, most: f64) -> Vec<Tick> {
     let is_power = |value: f64| axis.scale == Scale::Log && (value.log10() - value.log10().round()).abs() < 1e-9;
-    let powers = values.iter().filter(|value| is_power(**value)).count();
-    let by_powers = powers > 2;
-    let wanted = if by_powers { powers } else { values.len() };
-    let every = ((wanted as f64 / most.max(1.0)).ceil() as usize).max(1);
-    let mut seen = 0;
-    let mut ticks = Vec::new();
-    for (at, value) in values.iter().enumerate() {
-        if by_powers && !is_power(*value) {
-            continue;
-        }
-        if seen % every == 0 {
-            let label = if by_powers { power_of_ten(value.log10().round() as i32) } else { three_digits(*value) };
-            ticks.push(Tick { at: (at as f64 + 0.5) / values.len() as f64, label });
-        }
-        seen += 1;
-    }
-    ticks
+    let by_powers = values.iter().filter(|value| is_power(**value)).count() > 2;
+    let shown: Vec<_> = values.iter().enumerate().filter(|(_, value)| !by_powers || is_power(**value)).collect();
+    let every = ((shown.len() as f64 / most.max(1.0)).ceil() as usize).max(1);
+    let tick = |(at, value): (usize, &f64)| {
+        let label = if by_powers { power_of_ten(value.log10().round() as i32) } else { three_digits(*value) };
+        Tick { at: (at as f64 + 0.5) / values.len() as f64, label }
+    };
+    shown.into_iter().step_by(every).map(tick).collect()
 }
 
 fn draw_bar(svg: &mut Svg, frame: &Frame, share_of: &str, has_gaps: bool) {
@@ -110,18 +101,18 @@ fn draw_bar(svg: &mut Svg, frame: &Frame, share_of: &str, has_gaps: bool) {
     frame.draw_border(svg);
     for share in [0.0, 0.25, 0.5, 0.75, 1.0] {
         let [x, y] = frame.pixel([1.0, share]);
-        svg.text([x + 5.0, y + 4.0], Anchor::Start, "font-size=\"12\"", &format!("{} %", three_digits(100.0 * share)));
+        svg.text([x + 5.0, y + 4.0], "start", "font-size=\"12\"", &format!("{} %", three_digits(100.0 * share)));
     }
     let name = format!("share of {share_of}");
     if text_width(&name, 12.0) < BAR {
-        svg.text([WIDTH - 6.0, frame.top - 7.0], Anchor::End, "font-size=\"12\"", &name);
+        svg.text([WIDTH - 6.0, frame.top - 7.0], "end", "font-size=\"12\"", &name);
     } else {
         svg.upward_text([frame.left - 6.0, frame.top + 0.5 * frame.height], &name);
     }
     if has_gaps {
         let [x, y] = [frame.left, frame.bottom() + 14.0];
         svg.rectangle([x, y], [18.0, 12.0], &format!("fill=\"{NOTHING}\" stroke=\"#444\""), "");
-        svg.text([x + 23.0, y + 10.0], Anchor::Start, "font-size=\"12\"", "not run");
+        svg.text([x + 23.0, y + 10.0], "start", "font-size=\"12\"", "not run");
     }
 }
 

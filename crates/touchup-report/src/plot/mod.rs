@@ -9,8 +9,8 @@ mod writer;
 
 pub(super) use style::Looks;
 use style::text_width;
+use writer::Svg;
 pub(super) use writer::escaped;
-use writer::{Anchor, Svg};
 
 use super::figure::{Drawing, Figure};
 
@@ -26,14 +26,14 @@ const TOP: f64 = 38.0;
 /// - `looks`: of its series.
 pub(super) fn svg(figure: &Figure, looks: &Looks, provenance: &str) -> String {
     let mut svg = Svg::new();
-    svg.text([14.0, 22.0], Anchor::Start, "font-size=\"15\" font-weight=\"600\"", &figure.title);
+    svg.text([14.0, 22.0], "start", "font-size=\"15\" font-weight=\"600\"", &figure.title);
     let bottom = match &figure.drawing {
         Drawing::Curves(series) => curves::draw(&mut svg, figure, series, looks),
         Drawing::Maps { share_of, panels } => maps::draw(&mut svg, figure, share_of, panels),
     };
     let mut y = bottom + 20.0;
     for line in lines_of(provenance, SMALL, WIDTH - 28.0) {
-        svg.text([14.0, y], Anchor::Start, &format!("font-size=\"{SMALL}\" fill=\"#666\""), &line);
+        svg.text([14.0, y], "start", &format!("font-size=\"{SMALL}\" fill=\"#666\""), &line);
         y += 14.0;
     }
     svg.finish([WIDTH, y - 4.0], &figure.title)

@@ -2,14 +2,6 @@
 
 use std::fmt::Write;
 
-/// Where a text begins, ends, or has its middle.
-#[derive(Clone, Copy)]
-pub(super) enum Anchor {
-    Start,
-    Middle,
-    End,
-}
-
 /// A picture that grows element by element.
 pub(super) struct Svg {
     body: String,
@@ -52,9 +44,9 @@ impl Svg {
         }
     }
 
-    pub fn text(&mut self, at: [f64; 2], anchor: Anchor, style: &str, text: &str) {
-        let ([x, y], anchor) = (at.map(number), name(anchor));
-        let text = escaped(text);
+    /// A text whose `start`, `middle` or `end` (`anchor`) is at a place.
+    pub fn text(&mut self, at: [f64; 2], anchor: &str, style: &str, text: &str) {
+        let ([x, y], text) = (at.map(number), escaped(text));
         self.push(format_args!("<text x=\"{x}\" y=\"{y}\" text-anchor=\"{anchor}\" {style}>{text}</text>"));
     }
 
@@ -108,12 +100,4 @@ fn number(value: f64) -> String {
 
 fn joined(points: &[[f64; 2]]) -> String {
     points.iter().map(|point| point.map(number).join(",")).collect::<Vec<_>>().join(" ")
-}
-
-fn name(anchor: Anchor) -> &'static str {
-    match anchor {
-        Anchor::Start => "start",
-        Anchor::Middle => "middle",
-        Anchor::End => "end",
-    }
 }
