@@ -7,15 +7,14 @@ use std::time::{Instant, SystemTime};
 use chrono::{DateTime, Utc};
 use clap::{Parser, ValueEnum};
 
-use touchup_core::stylus::SettingError;
 use touchup_io::atomic::{create_folder, write_atomically};
 use touchup_io::machine::{COMMIT, VERSION, describe_machine};
 use touchup_io::mesh_file::{MeshFileError, MeshUnit, read_mesh};
-use touchup_io::recording::{RecordingError, Topics};
+use touchup_io::recording::Topics;
 use touchup_report::cost::{CostError, cost};
 use touchup_report::{
-    Chapter, Effort, GivenPart, Report, ReportError, Table, TableCell, WholeScanError, WorkPrecision, convergence,
-    extremes, stability, verdict, whole_scan,
+    Chapter, Effort, GivenPart, Report, ReportError, TableCell, WholeScanError, WorkPrecision, convergence, extremes,
+    stability, verdict, whole_scan,
 };
 use touchup_session::replay::{Recording, ReplayError, each_sample};
 use touchup_session::scene::{Scene, SceneError};
@@ -32,11 +31,7 @@ pub enum CommandError {
     #[error(transparent)]
     ReadMesh(#[from] MeshFileError),
     #[error(transparent)]
-    ReadRecording(#[from] RecordingError),
-    #[error(transparent)]
     Replay(#[from] ReplayError),
-    #[error(transparent)]
-    Setting(#[from] SettingError),
     #[error("cannot write {}: {source}", path.display())]
     Write { path: PathBuf, source: std::io::Error },
     #[error(transparent)]
@@ -55,8 +50,7 @@ impl CommandError {
         match self {
             Self::Write { .. } | Self::Report(_) | Self::Peers(_) | Self::Cost(_) => 1,
             Self::Usage(_) => 2,
-            Self::Scene(_) | Self::ReadMesh(_) | Self::ReadRecording(_) | Self::Replay(_) | Self::Setting(_) => 3,
-            Self::WholeScan(_) => 3,
+            _ => 3,
         }
     }
 }
@@ -117,21 +111,6 @@ enum ReportChapter {
     Cost,
 }
 
-/// Contents of the page.
-#[derive(Default)]
-struct MeasuredChapters {
-    chapters: Vec<Chapter>,
-    advice: Option<Table>,
-    verdict: Vec<String>,
-}
-
-impl MeasuredChapters {
-    fn add(&mut self, chapter: Chapter, verdict: Vec<String>) {
-        self.chapters.push(chapter);
-        self.verdict.extend(verdict);
-    }
-}
-
 /// Measures the selected chapters, writes the report, and prints the verdict.
 pub fn report(arguments: &ReportArguments) -> Result<(), CommandError> {
     let ReportArguments { out, json, .. } = arguments;
@@ -144,16 +123,16 @@ pub fn report(arguments: &ReportArguments) -> Result<(), CommandError> {
     }
     // before minutes of measuring
     create_folder(out).map_err(write_error(out))?;
-    let MeasuredChapters { chapters, advice, verdict } = measure(arguments, &mut lines_on_stderr())?;
-    let report = Report {
+    let mut report = Report {
         machine: describe_machine(),
         commit: COMMIT.to_owned(),
-        command: command(arguments),
+        command: command(),
         date: DateTime::<Utc>::from(SystemTime::now()).format("%Y-%m-%d %H:%M UTC").to_string(),
-        advice,
-        verdict,
-        chapters,
+        advice: None,
+        verdict: Vec::new(),
+        chapters: Vec::new(),
     };
+    measure(arguments, &mut report, &mut lines_on_stderr())?;
     for file in report.files()? {
         let path = out.join(&file.name);
         write_atomically(&path, |to| to.write_all(&file.bytes)).map_err(write_error(&path))?;
@@ -170,13 +149,16 @@ pub fn report(arguments: &ReportArguments) -> Result<(), CommandError> {
 
 /// "question: use this. Because …; cost …".
 fn advice_line(row: &[TableCell]) -> String {
-    let cells: Vec<&str> =
-        row.iter().map(|cell| if let TableCell::Text(text) = cell { text.as_str() } else { "" }).collect();
-    cells.into_iter().filter(|text| !text.is_empty()).collect::<Vec<_>>().join("\n  ")
+    let texts = row.iter().filter_map(|cell| if let TableCell::Text(text) = cell { Some(text.as_str()) } else { None });
+    texts.filter(|text| !text.is_empty()).collect::<Vec<_>>().join("\n  ")
 }
 
-/// Every selected chapter, in the order of the page.
-fn measure(arguments: &ReportArguments, progress: &mut dyn FnMut(&str)) -> Result<MeasuredChapters, CommandError> {
+/// Adds every selected chapter, in the order of the page.
+fn measure(
+    arguments: &ReportArguments,
+    report: &mut Report,
+    progress: &mut dyn FnMut(&str),
+) -> Result<(), CommandError> {
     let effort = Effort { is_quick: arguments.quick };
     let is_wanted = |part| arguments.only.is_empty() || arguments.only.contains(&part);
     let given = arguments.given()?;
@@ -186,36 +168,39 @@ fn measure(arguments: &ReportArguments, progress: &mut dyn FnMut(&str)) -> Resul
         peers(effort, &environment, progress)
     });
     let peers = peers.transpose()?;
-    let mut all = MeasuredChapters::default();
+    let mut add = |chapter: Chapter, verdict: Vec<String>| {
+        report.chapters.push(chapter);
+        report.verdict.extend(verdict);
+    };
     if is_wanted(ReportChapter::WorkPrecision) {
         let measured = WorkPrecision::measure(effort, progress);
-        all.add(measured.chapter(), measured.verdict());
+        add(measured.chapter(), measured.verdict());
     }
     let scans =
         is_wanted(ReportChapter::WholeScan).then(|| whole_scan(effort, given.as_ref(), progress)).transpose()?;
     if let Some(measured) = &scans {
-        all.add(measured.chapter(), verdict::of_whole_scans(measured));
+        add(measured.chapter(), verdict::of_whole_scans(measured));
     }
     if is_wanted(ReportChapter::Convergence) {
         let measured = convergence(effort, progress);
-        all.add(measured.chapter(), verdict::of_convergence(&measured));
+        add(measured.chapter(), verdict::of_convergence(&measured));
     }
     let stability = is_wanted(ReportChapter::Stability).then(|| stability(effort, progress));
     if let Some(measured) = &stability {
-        all.add(measured.chapter(), verdict::of_stability(measured));
+        add(measured.chapter(), verdict::of_stability(measured));
         progress("extremes");
         let measured = extremes();
-        all.add(measured.chapter(), verdict::of_extremes(&measured));
+        add(measured.chapter(), verdict::of_extremes(&measured));
     }
     let cost = is_wanted(ReportChapter::Cost).then(|| cost(effort, progress)).transpose()?;
     if let Some(measured) = &cost {
-        all.add(measured.chapter(), verdict::of_cost(measured));
+        add(measured.chapter(), verdict::of_cost(measured));
     }
     if let Some(measured) = peers {
-        all.add(measured.chapter(), verdict::of_peers(&measured));
+        add(measured.chapter(), verdict::of_peers(&measured));
     }
-    all.advice = scans.and_then(|scans| verdict::advice(&scans, stability.as_ref(), cost.as_ref()));
-    Ok(all)
+    report.advice = scans.and_then(|scans| verdict::advice(&scans, stability.as_ref(), cost.as_ref()));
+    Ok(())
 }
 
 impl ReportArguments {
@@ -223,10 +208,9 @@ impl ReportArguments {
     fn given(&self) -> Result<Option<GivenPart>, CommandError> {
         let (Some(scan), Some(truth), Some(bag)) = (&self.scan, &self.truth, &self.bag) else { return Ok(None) };
         let scene = self.scene.as_deref().map_or_else(|| Ok(Scene::default()), Scene::read)?;
-        let recording = Recording::open(bag, &Topics::default())?;
-        let params = scene.refine_params(recording.wrench_frame);
-        let params =
-            params.ok_or_else(|| CommandError::Usage("the scene names no `refine`: add `refine:` to it".to_owned()))?;
+        let recording = Recording::open(bag, &Topics::default()).map_err(ReplayError::from)?;
+        let no_refine = || CommandError::Usage("the scene names no `refine`: add `refine:` to it".to_owned());
+        let params = scene.refine_params(recording.wrench_frame).ok_or_else(no_refine)?;
         let mut samples = Vec::new();
         each_sample(recording, scene.placement(), scene.sync_params(), None, &mut || {}, |sample| {
             samples.push(*sample)
@@ -252,34 +236,10 @@ fn lines_on_stderr() -> impl FnMut(&str) {
 }
 
 /// As it could be called again.
-fn command(arguments: &ReportArguments) -> String {
-    let mut command = format!("touchup-report --out {}", arguments.out.display());
-    if arguments.quick {
-        command += " --quick";
-    }
-    let paths = [
-        ("scan", &arguments.scan),
-        ("truth", &arguments.truth),
-        ("bag", &arguments.bag),
-        ("scene", &arguments.scene),
-        ("peers-env", &arguments.peers_env),
-    ];
-    for (flag, path) in paths.into_iter().filter_map(|(flag, path)| Some((flag, path.as_ref()?))) {
-        command += &format!(" --{flag} {}", path.display());
-    }
-    if arguments.scan.is_some() {
-        command += &format!(" --mesh-unit {}", arguments.mesh_unit);
-    }
-    if arguments.peers {
-        command += " --peers";
-    }
-    if !arguments.only.is_empty() {
-        command += " --only";
-        for part in &arguments.only {
-            command += &part.to_possible_value().map_or_else(String::new, |value| format!(" {}", value.get_name()));
-        }
-    }
-    command
+fn command() -> String {
+    let arguments = std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned());
+    let arguments = arguments.filter(|word| word != "--json");
+    std::iter::once("touchup-report".to_owned()).chain(arguments).collect::<Vec<_>>().join(" ")
 }
 
 /// Lines on stdout. A reader that has gone away is no error of ours.

@@ -10,11 +10,9 @@ use super::{Convergence, Extremes, Integrator, Peers, Rule, Stability, WholeScan
 pub fn advice(scans: &WholeScan, stability: Option<&Stability>, cost: Option<&Cost>) -> Option<Table> {
     let best = by_part(scans, ScanResult::best);
     let slowest_us = best.iter().map(|choice| choice.result.per_sample_us.median).reduce(f64::max)?;
+    let [us, percent, rate] = [slowest_us, 0.1 * slowest_us, 1e6 / slowest_us].map(three_digits);
     let mut answer = format!(
-        "up to {} µs per sample: at 1 kHz {} % of one core, which keeps up with {} samples per second",
-        three_digits(slowest_us),
-        three_digits(0.1 * slowest_us),
-        three_digits(1e6 / slowest_us)
+        "up to {us} µs per sample: at 1 kHz {percent} % of one core, which keeps up with {rate} samples per second"
     );
     if let Some(size) = cost.and_then(|cost| cost.sizes.last()) {
         let answer_us = size.default_larger.time_ns.median * 1e-3;
@@ -101,12 +99,8 @@ pub fn of_whole_scans(measured: &WholeScan) -> Vec<String> {
 fn of_case(case: &CaseResult) -> Option<String> {
     let scan = case.main()?;
     let describe = |result: &MethodResult| {
-        format!(
-            "{} ({} mm, {} µs per sample)",
-            result.name,
-            three_digits(result.mean_mm()),
-            three_digits(result.per_sample_us.median)
-        )
+        let [mm, us] = [result.mean_mm(), result.per_sample_us.median].map(three_digits);
+        format!("{} ({mm} mm, {us} µs per sample)", result.name)
     };
     let mut text = format!("On {}, scanned {} mm off in the mean, ", case.name, three_digits(scan.before.mean_mm()));
     match scan.best() {
@@ -123,23 +117,16 @@ fn of_case(case: &CaseResult) -> Option<String> {
     }
     if let (Some(patch), true) = (scan.of(RefineMethod::Patch), case.duration_s > 0.0) {
         let rate = case.samples as f64 / case.duration_s;
-        text += &format!(
-            " At {} samples per second the patch takes {} % of one core.",
-            three_digits(rate),
-            three_digits(100.0 * rate * patch.per_sample_us.median * 1e-6)
-        );
+        let [rate, percent] = [rate, 100.0 * rate * patch.per_sample_us.median * 1e-6].map(three_digits);
+        text += &format!(" At {rate} samples per second the patch takes {percent} % of one core.");
     }
     Some(text)
 }
 
 /// How many sweeps it takes, and how often the published rule blows up.
 pub fn of_convergence(measured: &Convergence) -> Vec<String> {
-    let of = |rule| {
-        let runs: Vec<_> = measured.of(rule).collect();
-        let blown_up = runs.iter().filter(|run| run.has_blown_up).count();
-        (runs.len(), blown_up)
-    };
-    let ((paper, paper_up), (robust, robust_up)) = (of(Rule::Paper), of(Rule::Robust));
+    let [(paper, paper_up), (robust, robust_up)] = [Rule::Paper, Rule::Robust]
+        .map(|rule| (measured.of(rule).count(), measured.of(rule).filter(|run| run.has_blown_up).count()));
     vec![format!(
         "Swept over and over, the published rule blew up on {paper_up} of {paper} scans, the robust mode on {robust_up} of {robust}."
     )]
@@ -182,13 +169,11 @@ pub fn of_extremes(measured: &Extremes) -> Vec<String> {
 pub fn of_cost(measured: &Cost) -> Vec<String> {
     let Some(size) = measured.sizes.last() else { return Vec::new() };
     let push = size.default_larger.time_ns;
+    let [us, p90, percent] = [push.median * 1e-3, push.p90 * 1e-3, push.median * 1e-4].map(three_digits);
     let mut text = format!(
-        "Rate: on {} faces one push of the default scene, its patch aside, takes {} µs (p90 {} µs); at 1 kHz that is {} % of one \
-         core.",
-        size.faces,
-        three_digits(push.median * 1e-3),
-        three_digits(push.p90 * 1e-3),
-        three_digits(push.median * 1e-4)
+        "Rate: on {} faces one push of the default scene, its patch aside, takes {us} µs (p90 {p90} µs); at 1 kHz that is \
+         {percent} % of one core.",
+        size.faces
     );
     if let Some(speed) = measured.slowest_replay_per_s() {
         text += &format!(" A recording is replayed with at least {} samples per second.", three_digits(speed));
@@ -199,12 +184,11 @@ pub fn of_cost(measured: &Cost) -> Vec<String> {
 /// Comparison with the libraries that others would use.
 pub fn of_peers(measured: &Peers) -> Vec<String> {
     let at_size = |size: &super::peers::PeersAtSize| {
+        let [pipeline, query] = [size.pipeline_factor()?, size.query_factor()?].map(three_digits);
         Some(format!(
-            "at {} faces a push is {} times faster than the fastest pipeline with an exact index, and {} times as fast as the \
-             fastest closest-face query alone",
-            size.faces,
-            three_digits(size.pipeline_factor()?),
-            three_digits(size.query_factor()?)
+            "at {} faces a push is {pipeline} times faster than the fastest pipeline with an exact index, and {query} times as \
+             fast as the fastest closest-face query alone",
+            size.faces
         ))
     };
     let ratios: Vec<String> = measured.sizes.iter().filter_map(at_size).collect();
@@ -249,15 +233,7 @@ mod tests {
         };
         let scans = scans.into_iter().zip([3.0, 1.5]);
         let scans = scans.map(|(methods, edge_mm)| ScanResult { edge_mm, faces: 100, before, methods }).collect();
-        CaseResult {
-            name: name.to_owned(),
-            samples: 1000,
-            duration_s: 1.0,
-            tip_radius_mm: 1.5,
-            scan_noise_mm: 0.2,
-            scans,
-            gaussian: None,
-        }
+        CaseResult { name: name.to_owned(), samples: 1000, duration_s: 1.0, scans, gaussian: None }
     }
 
     /// Each row in one line.
