@@ -76,14 +76,12 @@ fn run(command: &mut Command) -> Result<String, String> {
 fn run_script(python: &Path, input: &PeersInput) -> Result<String, PeersError> {
     let write_error = |path: PathBuf| move |source| PeersError::Write { path, source };
     let folder = tempfile::tempdir().map_err(write_error(std::env::temp_dir()))?;
-    let files =
-        [("positions.f64", input.positions()), ("faces.i32", input.triangles()), ("queries.f64", input.queries())];
-    for (name, bytes) in files {
+    for (name, bytes) in input.files() {
         let path = folder.path().join(name);
         std::fs::write(&path, bytes).map_err(write_error(path))?;
     }
     let mut command = Command::new(python);
-    command.args(["-c", SCRIPT]).arg(folder.path()).arg(input.distances().len().to_string());
+    command.args(["-c", SCRIPT]).arg(folder.path()).arg(input.distances.len().to_string());
     run(&mut command).map_err(PeersError::Script)
 }
 

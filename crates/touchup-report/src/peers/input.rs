@@ -18,9 +18,11 @@ const WIDTH: f64 = 0.8 * SIDE;
 /// Mesh, queries and samples of one size.
 #[derive(Clone, Debug)]
 pub struct PeersInput {
-    mesh: TriMesh,
+    /// the plate
+    pub mesh: TriMesh,
     queries: Vec<Point3<f64>>,
-    distances: Vec<f64>,
+    /// of each query from the plate, m
+    pub distances: Vec<f64>,
 }
 
 impl PeersInput {
@@ -37,29 +39,14 @@ impl PeersInput {
         Ok(Self { mesh, queries, distances })
     }
 
-    /// The plate.
-    pub fn mesh(&self) -> &TriMesh {
-        &self.mesh
-    }
-
-    /// Distance of each query from the plate, m.
-    pub fn distances(&self) -> &[f64] {
-        &self.distances
-    }
-
-    /// The file `positions.f64`: V × 3, m, little-endian doubles.
-    pub fn positions(&self) -> Vec<u8> {
-        bytes(self.mesh.positions())
-    }
-
-    /// The file `queries.f64`: Q × 3, m, little-endian doubles.
-    pub fn queries(&self) -> Vec<u8> {
-        bytes(&self.queries)
-    }
-
-    /// The file `faces.i32`: F × 3, little-endian.
-    pub fn triangles(&self) -> Vec<u8> {
-        self.mesh.faces().flat_map(|(_, corners)| corners).flat_map(|vertex| vertex.0.to_le_bytes()).collect()
+    /// What the script reads, with the names of the files: V × 3 and Q × 3 doubles in m, F × 3 integers, all little-endian.
+    pub fn files(&self) -> [(&'static str, Vec<u8>); 3] {
+        let corners = self.mesh.faces().flat_map(|(_, corners)| corners);
+        [
+            ("positions.f64", bytes(self.mesh.positions())),
+            ("queries.f64", bytes(&self.queries)),
+            ("faces.i32", corners.flat_map(|vertex| vertex.0.to_le_bytes()).collect()),
+        ]
     }
 
     /// Measures touchup: each query and each push by itself.

@@ -115,7 +115,7 @@ impl PeersAtSize {
     /// # Errors
     /// [`UnknownLine`]
     pub fn read(input: &PeersInput, touchup: [TouchupTimes; 2], printed: &str) -> Result<Self, UnknownLine> {
-        let mut all = Self { faces: input.mesh().face_count(), touchup, peers: vec![], failed: vec![] };
+        let mut all = Self { faces: input.mesh.face_count(), touchup, peers: vec![], failed: vec![] };
         for line in printed.lines().filter(|line| !line.trim().is_empty()) {
             if let Ok(failed) = serde_json::from_str(line) {
                 all.failed.push(failed);
@@ -123,7 +123,7 @@ impl PeersAtSize {
             }
             let read = serde_json::from_str::<PeerTimes>(line);
             let mut times = read.map_err(|error| UnknownLine { line: line.chars().take(200).collect(), error })?;
-            times.largest_difference = largest_difference(&times.distances_m, input.distances());
+            times.largest_difference = largest_difference(&times.distances_m, &input.distances);
             all.peers.push(times);
         }
         Ok(all)
@@ -192,7 +192,7 @@ mod tests {
     fn the_fastest_that_is_right_is_compared() {
         let input = PeersInput::new(200, Effort { is_quick: true }).unwrap();
         let times = |push: f64| TouchupTimes { query_us: 0.5.into(), next_query_us: 0.2.into(), push_us: push.into() };
-        let truth = input.distances()[0];
+        let truth = input.distances[0];
         let printed = [
             line("right", 9.0, 300.0, truth),
             line("wrong", 20.0, 3.0, 1.5 * truth),
@@ -217,10 +217,10 @@ mod tests {
     fn distances_are_those_of_the_plate() {
         let input = PeersInput::new(100_000, Effort { is_quick: true }).unwrap();
         let chord = 1.90e-3f64.powi(2) * 49.3 / 8.0;
-        assert!(input.distances().iter().all(|d| (d - 0.05e-3).abs() < chord), "{:?}", input.distances());
-        assert!(input.distances().iter().any(|d| (d - 0.05e-3).abs() > 0.5 * chord), "no edge is met");
-        assert_eq!(input.queries().len() % 24, 0);
-        assert_eq!(input.positions().len(), 24 * input.mesh().vertex_count());
-        assert_eq!(input.triangles().len(), 12 * input.mesh().face_count());
+        assert!(input.distances.iter().all(|d| (d - 0.05e-3).abs() < chord), "{:?}", input.distances);
+        assert!(input.distances.iter().any(|d| (d - 0.05e-3).abs() > 0.5 * chord), "no edge is met");
+        let lengths = input.files().map(|(_, bytes)| bytes.len());
+        let of_mesh = [24 * input.mesh.vertex_count(), 12 * input.mesh.face_count()];
+        assert_eq!(lengths, [of_mesh[0], 24 * input.distances.len(), of_mesh[1]]);
     }
 }
