@@ -18,7 +18,8 @@ const REACH: f64 = 0.01;
 /// A mesh that follows the ball of [`touchup_sim::wavy`], and nothing else.
 #[derive(Clone, Debug)]
 pub struct MinimalLoop {
-    mesh: TriMesh,
+    /// as it is now
+    pub mesh: TriMesh,
     tree: FaceTree,
     gain: f64,
     faces: Vec<FaceId>,
@@ -74,10 +75,5 @@ impl MinimalLoop {
             }
         }
         true
-    }
-
-    /// The current mesh.
-    pub fn mesh(&self) -> &TriMesh {
-        &self.mesh
     }
 }

@@ -82,7 +82,8 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> Result<Vec<StageCost>
     let writer = RecordingWriter::new(Cursor::new(Vec::new()), &Topics::default());
     let mut writer = writer.map_err(ReplayError::from)?;
     let mut patcher = Patcher::new(scene.patcher_params().ok_or(CostError::NothingMoves)?)?;
-    let (mut last, mut nearby, mut moving) = (None, Nearby::default(), Moving::new(&mesh));
+    let (mut last, mut nearby) = (None, Nearby::default());
+    let mut moving = Moving { mesh: mesh.clone(), tree: tree.clone(), plan: RefitPlan::default(), at: None };
     let face = FaceState { b: Point3::origin(), n: Vector3::z() };
 
     let mut cases = [
@@ -140,10 +141,6 @@ struct Moving {
 }
 
 impl Moving {
-    fn new(mesh: &TriMesh) -> Self {
-        Self { mesh: mesh.clone(), tree: FaceTree::new(mesh), plan: RefitPlan::default(), at: None }
-    }
-
     /// Brings the boxes around the face under the tip up to date. Which face that is, and which boxes, is looked up
     /// once for a millimetre of travel, as the refiner does it once for each face.
     fn follow(&mut self, p: &Point3<f64>) {

@@ -56,7 +56,7 @@ pub(super) struct FaceRun {
     pub h_min: f64,
     pub f_max: f64,
     n: Vector3<f64>,
-    held: HeldSample,
+    pub held: HeldSample,
 }
 
 /// What [`FaceRun::judge`] saw.
@@ -67,7 +67,7 @@ pub(super) struct JudgedRun {
     pub kept_unit: bool,
 }
 
-fn log_uniform(rng: &mut Pcg64, decades: Decades) -> f64 {
+pub(super) fn log_uniform(rng: &mut Pcg64, decades: Decades) -> f64 {
     10f64.powf(rng.random_range(decades))
 }
 
@@ -107,11 +107,6 @@ impl FaceRun {
             turning: if is_spring { beta } else { 0.0 },
         };
         Self { params, h_min, f_max, n: turn * Vector3::z(), held }
-    }
-
-    /// Step length, s.
-    pub fn dt(&self) -> f64 {
-        self.held.dt
     }
 
     /// α f_max dt / h_min: how stiff the position is.
@@ -231,7 +226,7 @@ mod tests {
         for of in [
             |run: &FaceRun| run.h_min,
             |run: &FaceRun| run.f_max,
-            |run: &FaceRun| run.dt(),
+            |run: &FaceRun| run.held.dt,
             |run: &FaceRun| run.params.alpha_m_per_n_s,
         ] {
             let (low, high) = spread(of);

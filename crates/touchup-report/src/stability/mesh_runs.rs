@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, Vector3};
 use rand::RngExt;
 use rand_pcg::Pcg64;
 
-use super::face_runs::{RunEnding, goes_over};
+use super::face_runs::{RunEnding, goes_over, log_uniform};
 use touchup_core::haptic::{RefineParams, Refiner, RegionFit, TipParams};
 use touchup_core::mesh::{FaceId, TriMesh};
 use touchup_core::stylus::{Sample, Wrench};
@@ -63,15 +63,14 @@ pub(super) struct MeshRun {
 impl MeshRun {
     /// Draws a press on a sheet of such triangles.
     pub fn draw(rng: &mut Pcg64, shape: BadShape) -> Self {
-        let power = |x: f64| 10f64.powf(x);
         // a sample acts for 30 ms at most
-        let dt_s = power(rng.random_range(-6.0..-1.5));
-        let stiffness = power(rng.random_range(-6.0..6.0));
+        let dt_s = log_uniform(rng, -6.0..-1.5);
+        let stiffness = log_uniform(rng, -6.0..6.0);
         Self {
-            quality: 0.75f64.sqrt() * power(rng.random_range(QUALITY)),
+            quality: 0.75f64.sqrt() * log_uniform(rng, QUALITY),
             stiffness,
             shape,
-            edge: power(rng.random_range(-3.5..-2.0)),
+            edge: log_uniform(rng, -3.5..-2.0),
             dt_s,
             alpha: stiffness / (STIFFNESS * dt_s),
             // in the middle of the sheet

@@ -109,7 +109,7 @@ fn face_shares(integrator: Integrator, count: usize) -> FaceShares {
         };
         share_map(name, [&STIFFNESS; 2], runs.iter().skip(first).step_by(2).map(stiffness))
     });
-    let steps = runs.iter().map(|(run, judged)| (run.dt(), run.h_min, is_stable(judged)));
+    let steps = runs.iter().map(|(run, judged)| (run.held.dt, run.h_min, is_stable(judged)));
     let endings = tally(runs.iter().map(|(_, judged)| judged.ending));
     FaceShares {
         integrator,

@@ -5,6 +5,7 @@ use rand::RngExt;
 use rand_pcg::Pcg64;
 
 use super::double_double::Double2;
+use super::face_runs::log_uniform;
 use touchup_core::haptic::{Along, ContactModel, DynamicsParams, FaceDynamics, FaceState, StepRule};
 
 /// Halvings of the bracket: from 1e9 to below a rounding of what is left.
@@ -33,10 +34,6 @@ pub struct SubFlowError {
 /// Force in a regime of the sigmoid, in units of f_max.
 type ForceShare = fn(&mut Pcg64) -> f64;
 
-fn power(rng: &mut Pcg64, decades: std::ops::Range<f64>) -> f64 {
-    10f64.powf(rng.random_range(decades))
-}
-
 fn either_sign(rng: &mut Pcg64) -> f64 {
     if rng.random_bool(0.5) { 1.0 } else { -1.0 }
 }
@@ -46,10 +43,10 @@ const REGIMES: [(&str, ForceShare); 7] = [
     ("position, 0 < F < f_max", |rng| rng.random_range(0.0..1.0)),
     ("position, F = 0", |_| 0.0),
     ("position, F = f_max", |_| 1.0),
-    ("position, F near 0", |rng| power(rng, -12.0..-2.0) * either_sign(rng)),
-    ("position, F near f_max", |rng| 1.0 + power(rng, -12.0..-2.0) * either_sign(rng)),
-    ("position, F against the normal", |rng| -power(rng, -2.0..4.0)),
-    ("position, F above f_max", |rng| 1.0 + power(rng, -2.0..4.0)),
+    ("position, F near 0", |rng| log_uniform(rng, -12.0..-2.0) * either_sign(rng)),
+    ("position, F near f_max", |rng| 1.0 + log_uniform(rng, -12.0..-2.0) * either_sign(rng)),
+    ("position, F against the normal", |rng| -log_uniform(rng, -2.0..4.0)),
+    ("position, F above f_max", |rng| 1.0 + log_uniform(rng, -2.0..4.0)),
 ];
 
 /// All of them, `cases` of each.
@@ -99,7 +96,7 @@ fn of_sigmoid(rng: &mut Pcg64, name: &str, share: ForceShare, cases: usize) -> S
     worst_of(name, cases, |case| {
         // half of them where the logistic bends, half of them anywhere an exponential is finite
         let u = if case % 2 == 0 { rng.random_range(-12.0..12.0) } else { rng.random_range(-600.0..600.0) };
-        let (c, t) = (share(rng), power(rng, -6.0..6.0));
+        let (c, t) = (share(rng), log_uniform(rng, -6.0..6.0));
         let exact = exact_travel(u, c, t)?;
         let found = travel(UNIT_MODEL, u, c, t);
         Some(((found - exact).abs() / (1.0 + exact.abs()), format!("u {u}, F/f_max {c}, T {t}")))
@@ -150,12 +147,7 @@ fn straight(u: f64, c: f64, t: f64, far: f64) -> Option<f64> {
 /// 1/(1 + eᵘ)
 fn share(u: Double2) -> Double2 {
     let one = Double2::from(1.0);
-    if u.high > 0.0 {
-        let e = (-u).exp();
-        e / (one + e)
-    } else {
-        one / (one + u.exp())
-    }
+    one / (one + u.exp())
 }
 
 /// ∫ (1 + E) / (1 − c (1 + E)) du, E = eᵘ, by partial fractions.
@@ -176,7 +168,7 @@ fn of_spring(rng: &mut Pcg64, cases: usize) -> SubFlowError {
     let model = ContactModel::Spring { stiffness_n_per_m: 1.0 };
     worst_of("position, linear spring", cases, |_| {
         let (h, force, t) =
-            (either_sign(rng) * power(rng, -6.0..3.0), rng.random_range(-3.0..3.0), power(rng, -6.0..6.0));
+            (either_sign(rng) * log_uniform(rng, -6.0..3.0), rng.random_range(-3.0..3.0), log_uniform(rng, -6.0..6.0));
         // h + F falls to e^−t of itself
         let fallen = Double2::from(1.0) - Double2::from(-t.min(300.0)).exp();
         let exact = ((Double2::from(h) + force.into()) * fallen).value();
@@ -189,11 +181,11 @@ fn of_spring(rng: &mut Pcg64, cases: usize) -> SubFlowError {
 fn of_rotation(rng: &mut Pcg64, cases: usize) -> SubFlowError {
     worst_of("normal", cases, |case| {
         let angle = match case % 3 {
-            0 => power(rng, -12.0..-1.0),
-            1 => std::f64::consts::PI - power(rng, NEAREST_OPPOSITE),
+            0 => log_uniform(rng, -12.0..-1.0),
+            1 => std::f64::consts::PI - log_uniform(rng, NEAREST_OPPOSITE),
             _ => rng.random_range(0.0..std::f64::consts::PI),
         };
-        let exponent = power(rng, -6.0..2.5);
+        let exponent = log_uniform(rng, -6.0..2.5);
         let force = Vector3::new(angle.sin(), 0.0, angle.cos());
         let after = dynamics(UNIT_MODEL, 0.0, 1.0)
             .and_then(|dynamics| dynamics.step(&FACE, &Point3::origin(), &force, 2.0 * exponent).ok());

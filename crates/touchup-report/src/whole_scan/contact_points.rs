@@ -15,7 +15,8 @@ use touchup_core::mesh::{FaceHit, FaceId, FaceTree, TriMesh, VertexId, pseudo_no
 pub struct ContactSculptor<'a> {
     scan: &'a TriMesh,
     scan_tree: FaceTree,
-    mesh: TriMesh,
+    /// as it is now
+    pub mesh: TriMesh,
     tree: FaceTree,
     radius: f64,
     reach: f64,
@@ -70,15 +71,5 @@ impl<'a> ContactSculptor<'a> {
             }
             at += 1;
         }
-    }
-
-    /// The current mesh.
-    pub fn mesh(&self) -> &TriMesh {
-        &self.mesh
-    }
-
-    /// Gives the mesh back.
-    pub fn into_mesh(self) -> TriMesh {
-        self.mesh
     }
 }

@@ -87,15 +87,15 @@ impl<'a> GaussianSurface<'a> {
         let Some(distance) = signed_distance(self.scan, &self.tree, &contact, f64::INFINITY) else { return false };
         self.points.push(contact);
         self.values.push(-distance);
-        match GaussianProcess::fit(self.params, &self.points, &self.values) {
-            Some(process) => self.process = Some(process),
-            None => {
-                self.points.pop();
-                self.values.pop();
-                return false;
-            }
+        let process = GaussianProcess::fit(self.params, &self.points, &self.values);
+        let is_possible = process.is_some();
+        if is_possible {
+            self.process = process;
+        } else {
+            self.points.pop();
+            self.values.pop();
         }
-        true
+        is_possible
     }
 
     /// The scan with its vertices moved along their normals to where f is zero.

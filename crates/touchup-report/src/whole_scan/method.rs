@@ -210,7 +210,7 @@ fn sculpt(part: &Part, scan: &TriMesh, limits: &RunLimits) -> Run {
     let fed = feed(contacts.iter(), CLOCK_EVERY, limits.longest, |contact| {
         sculptor.push(&contact.reported).map(drop).ok_or(NO_CONTACT)
     });
-    let (mesh, end) = (sculptor.into_mesh(), Duration::ZERO);
+    let (mesh, end) = (sculptor.mesh, Duration::ZERO);
     Run { mesh, build, fed, end, offered: contacts.len(), cut_back_share: 0.0 }
 }
 

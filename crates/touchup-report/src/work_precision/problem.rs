@@ -4,7 +4,7 @@
 //! ds/dt = α ((F − f n)·n)      dn/dt = β f (n × F) × n      h = (p − b₀ − s n(0))·n      f = f_max / (1 + exp(h/h_min + δ))
 //! ```
 
-use nalgebra::{Matrix4, Point3, Vector3, Vector4};
+use nalgebra::{Matrix3, Matrix4, Point3, Vector3, Vector4};
 
 use touchup_core::haptic::{Along, ContactModel, DynamicsParams, FaceState, StepRule};
 
@@ -101,21 +101,14 @@ impl Problem {
         // h by each unknown
         let h_by = Vector4::new(-self.normal.dot(&n), arm.x, arm.y, arm.z);
         let towards = squared * self.force - pressing * n;
-        let mut jacobian = Matrix4::zeros();
-        for j in 0..4 {
-            jacobian[(0, j)] = -ALPHA_M_PER_N_S * squared * slope * h_by[j];
-            for i in 0..3 {
-                jacobian[(i + 1, j)] = BETA_PER_N2_S * slope * h_by[j] * towards[i];
-            }
-        }
-        for j in 0..3 {
-            jacobian[(0, j + 1)] += ALPHA_M_PER_N_S * (self.force[j] - 2.0 * f * n[j]);
-            for i in 0..3 {
-                let turned = 2.0 * n[j] * self.force[i] - self.force[j] * n[i];
-                let kept = if i == j { pressing } else { 0.0 };
-                jacobian[(i + 1, j + 1)] += BETA_PER_N2_S * f * (turned - kept);
-            }
-        }
+        let (of_travel, turning) = (-ALPHA_M_PER_N_S * squared, BETA_PER_N2_S * towards);
+        let by_h = slope * Vector4::new(of_travel, turning.x, turning.y, turning.z);
+        let mut jacobian = by_h * h_by.transpose();
+        let mut travel_by_n = jacobian.fixed_view_mut::<1, 3>(0, 1);
+        travel_by_n += ALPHA_M_PER_N_S * (self.force - 2.0 * f * n).transpose();
+        let turned = 2.0 * self.force * n.transpose() - n * self.force.transpose();
+        let mut turning_by_n = jacobian.fixed_view_mut::<3, 3>(1, 1);
+        turning_by_n += BETA_PER_N2_S * f * (turned - pressing * Matrix3::identity());
         jacobian
     }
 }

@@ -88,10 +88,10 @@ fn contact_points_pull_the_mesh_through_themselves() {
     for (x, y) in [(5.3e-3, 5.2e-3), (12.5e-3, 9e-3), (15e-3, 15e-3)] {
         let contact = sculptor.push(&Point3::new(x, y, radius)).unwrap();
         assert!((contact - Point3::new(x, y, 0.0)).norm() < 1e-15);
-        let hit = FaceTree::new(sculptor.mesh()).closest(sculptor.mesh(), &contact, 1.0).unwrap();
+        let hit = FaceTree::new(&sculptor.mesh).closest(&sculptor.mesh, &contact, 1.0).unwrap();
         assert!(hit.distance_squared.sqrt() < 1e-15, "{x} {y}");
     }
-    let moved = sculptor.into_mesh();
+    let moved = sculptor.mesh;
     let (before, after) = (scan.positions(), moved.positions());
     for (a, b) in before.iter().zip(after) {
         let far = |(x, y): (f64, f64)| (a.x - x).hypot(a.y - y) > 2.5e-3;
