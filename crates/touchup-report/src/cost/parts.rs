@@ -3,11 +3,10 @@
 use std::ops::Sub;
 
 use super::CostError;
-use super::sizes::{pushing, refiner_of, samples_on, side_of};
+use super::sizes::{pushing, refiner_of, side_of, touched_plate};
 use super::turns::{PerSample, Timing, by_block, in_turns};
 use crate::Spread;
 use touchup_session::scene::Scene;
-use touchup_sim::wavy::plate;
 
 /// A part of the haptic update, switched on and off.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,10 +47,8 @@ fn scenes() -> Result<Vec<(&'static str, bool, Scene)>, CostError> {
 
 /// Measures every part on a scan of edges of 1 mm.
 pub(super) fn part_costs(faces: usize, timing: Timing) -> Result<Vec<PartCost>, CostError> {
-    let side = side_of(faces);
-    let mesh = plate(faces, side)?;
+    let (mesh, samples) = touched_plate(faces, side_of(faces), timing.samples())?;
     let faces = mesh.face_count();
-    let samples = samples_on(side, timing.samples());
     let scenes = scenes()?;
     let refiners = scenes.iter().map(|(.., scene)| refiner_of(scene, mesh.clone()));
     let mut refiners = refiners.collect::<Result<Vec<_>, _>>()?;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::sizes::{refiner_of, samples_on};
+use super::sizes::{refiner_of, touched_plate};
 use super::turns::spread;
 use super::{BAREST, CostError};
 use crate::{Spread, timed};
@@ -10,7 +10,6 @@ use touchup_core::stylus::{Message, Sample, StampedPose, StampedWrench, SyncPara
 use touchup_io::recording::{Topics, write_recording};
 use touchup_session::replay::{Recording, ReplayError, each_sample};
 use touchup_session::scene::Scene;
-use touchup_sim::wavy::plate;
 
 /// Reading and synchronisation alone.
 pub const READING: &str = "none: read and paired alone";
@@ -38,11 +37,10 @@ pub(super) fn replay_speeds(
 ) -> Result<Vec<ReplaySpeed>, CostError> {
     let folder = tempfile::tempdir().map_err(CostError::Folder)?;
     let path = folder.path().join("slide.mcap");
-    let samples = samples_on(side, count);
+    let (mesh, samples) = touched_plate(faces, side, count)?;
     let topics = Topics::default();
     let written = write_recording(&path, &topics, "object", "stylus", samples.iter().flat_map(messages));
     written.map_err(ReplayError::from)?;
-    let mesh = plate(faces, side)?;
     let edge_mm = side / (mesh.face_count() as f64 / 2.0).sqrt() * 1e3;
     // one after the other: each refiner of a million faces takes its part of the cache
     let of = |scene: &Scene| refiner_of(scene, mesh.clone()).map(|refiner| (scene.sync_params(), refiner));

@@ -56,9 +56,9 @@ pub(super) fn side_of(faces: usize) -> f64 {
     EDGE * (faces as f64 / 2.0).sqrt()
 }
 
-/// The samples of a raster on a plate of `side` (m).
-pub(super) fn samples_on(side: f64, count: usize) -> Vec<Sample> {
-    (0..count).map(|i| slide_on(side, i, 0.8 * side)).collect()
+/// A plate of `side` (m), and the samples of a raster on it.
+pub(super) fn touched_plate(faces: usize, side: f64, count: usize) -> Result<(TriMesh, Vec<Sample>), CostError> {
+    Ok((plate(faces, side)?, (0..count).map(|i| slide_on(side, i, 0.8 * side)).collect()))
 }
 
 /// A refiner as a scene names it.
@@ -86,9 +86,8 @@ pub(super) fn pushing<'a>(
 
 /// Measures one size.
 pub(super) fn size_cost(faces: usize, timing: Timing) -> Result<SizeCost, CostError> {
-    let mesh = plate(faces, SIDE)?;
+    let (mesh, samples) = touched_plate(faces, SIDE, timing.samples())?;
     let faces = mesh.face_count();
-    let samples = samples_on(SIDE, timing.samples());
     let (tree_build_s, tree) = timed(|| FaceTree::new(&mesh));
     let last = samples.last().ok_or(CostError::NothingTimed)?.pose_ot.translation.vector;
     tree.closest(&mesh, &last.into(), 0.01).ok_or(CostError::NothingTimed)?;
@@ -125,9 +124,8 @@ pub(super) fn size_cost(faces: usize, timing: Timing) -> Result<SizeCost, CostEr
 }
 
 fn default_larger(faces: usize, timing: Timing) -> Result<PerSample, CostError> {
-    let side = side_of(faces);
-    let samples = samples_on(side, timing.samples());
-    let mut refiner = refiner_of(&Scene::default(), plate(faces, side)?)?;
+    let (mesh, samples) = touched_plate(faces, side_of(faces), timing.samples())?;
+    let mut refiner = refiner_of(&Scene::default(), mesh)?;
     let timed = in_turns(&mut [pushing("default scene", &mut refiner, &samples, |_| {})], timing)?;
     timed[0].per_sample()
 }

@@ -7,7 +7,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::CostError;
 use super::replay::messages;
-use super::sizes::{samples_on, side_of};
+use super::sizes::{side_of, touched_plate};
 use super::turns::{PerSample, TimedCase, Timing, in_turns, spread};
 use crate::{Spread, timed};
 use touchup_core::features::detect;
@@ -21,7 +21,7 @@ use touchup_core::stylus::{
 use touchup_io::recording::{RecordingWriter, Topics};
 use touchup_session::replay::ReplayError;
 use touchup_session::scene::Scene;
-use touchup_sim::wavy::{RADIUS, STIFFNESS, plate};
+use touchup_sim::wavy::{RADIUS, STIFFNESS};
 
 /// One stage on one scan.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,10 +63,8 @@ fn contacts_of(samples: &[Sample], tip: TipParams) -> Result<Vec<ContactSample>,
 
 /// Times every stage that can be called by itself, on a scan of edges of 1 mm.
 pub(super) fn stage_costs(faces: usize, timing: Timing) -> Result<Vec<StageCost>, CostError> {
-    let side = side_of(faces);
-    let mesh = plate(faces, side)?;
+    let (mesh, samples) = touched_plate(faces, side_of(faces), timing.samples())?;
     let tree = FaceTree::new(&mesh);
-    let samples = samples_on(side, timing.samples());
     let scene = Scene::default();
     let params = scene.refine_params(WrenchFrame::Sensor).ok_or(CostError::NothingMoves)?;
 
@@ -158,12 +156,10 @@ impl Moving {
 
 /// Times the work that is not done at each sample.
 pub(super) fn seldom_costs(faces: usize, repeats: usize) -> Result<Vec<SeldomCost>, CostError> {
-    let side = side_of(faces);
-    let mesh = plate(faces, side)?;
+    let (mesh, samples) = touched_plate(faces, side_of(faces), 1000 + RENEWAL * repeats)?;
     let tree = FaceTree::new(&mesh);
     let faces = mesh.face_count();
     let scene = Scene::default();
-    let samples = samples_on(side, 1000 + RENEWAL * repeats);
     let mut patcher = Patcher::new(scene.patcher_params().ok_or(CostError::NothingMoves)?)?;
     let contacts = contacts_of(&samples, scene.tip_params())?;
     let mut renew = |contacts: &[ContactSample]| {
