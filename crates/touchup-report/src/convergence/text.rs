@@ -46,18 +46,13 @@ impl Convergence {
         let runs: Vec<&SweepRun> = self.of(rule).collect();
         let converged: Vec<&SweepRun> = runs.iter().copied().filter(|run| run.has_converged()).collect();
         let blown_up = runs.iter().filter(|run| run.has_blown_up).count();
-        let mut text = format!(
-            "{}: {} of {} scans ended with less error than they began with, {blown_up} blew up.",
-            capitalised(rule.name()),
-            converged.len(),
-            runs.len()
-        );
+        let (name, fewer, all) = (capitalised(rule.name()), converged.len(), runs.len());
+        let mut text =
+            format!("{name}: {fewer} of {all} scans ended with less error than they began with, {blown_up} blew up.");
         if let Some((least, most)) = range(converged.iter().filter_map(|run| share_left(run))) {
+            let (least, most, sweeps) = (least * 100.0, most * 100.0, self.sweeps);
             text += &format!(
-                " Where it converged, {:.1} to {:.1} % of the mean error is left after {} sweeps.",
-                least * 100.0,
-                most * 100.0,
-                self.sweeps
+                " Where it converged, {least:.1} to {most:.1} % of the mean error is left after {sweeps} sweeps."
             );
         }
         let (wins, fits) = self.power_wins(rule);

@@ -16,35 +16,30 @@ impl Peers {
 }
 
 fn verdicts(size: &PeersAtSize) -> Vec<String> {
-    let mut text = Vec::new();
-    if let (Some(peer), Some(factor)) = (size.fastest_pipeline(), size.pipeline_factor()) {
+    let pipeline = size.fastest_pipeline().zip(size.pipeline_factor()).map(|(peer, factor)| {
         let verdict = if factor >= WANTED_FACTOR { "holds" } else { "MISSES" };
-        text.push(format!(
-            "{} faces: a push is {factor:.0} times faster than the fastest pipeline with an exact index ({}, {:.0} µs): {verdict} the \
-             wanted {WANTED_FACTOR:.0}.",
-            size.faces, peer.peer, peer.pipeline_us.median
-        ));
-    }
-    if let (Some(peer), Some(factor)) = (size.fastest_query(), size.query_factor()) {
+        format!(
+            "a push is {factor:.0} times faster than the fastest pipeline with an exact index ({}, {:.0} µs): {verdict} the wanted \
+             {WANTED_FACTOR:.0}.",
+            peer.peer, peer.pipeline_us.median
+        )
+    });
+    let query = size.fastest_query().zip(size.query_factor()).map(|(peer, factor)| {
         let verdict = if factor > 1.0 { "holds" } else { "MISSES" };
-        text.push(format!(
-            "{} faces: a whole push takes {:.2} µs, the fastest closest-face query alone {:.2} µs ({}), {factor:.1} times as long: {verdict}.",
-            size.faces,
-            size.push_us(),
-            peer.query_us.median,
+        let (push, query) = (size.push_us(), peer.query_us.median);
+        format!(
+            "a whole push takes {push:.2} µs, the fastest closest-face query alone {query:.2} µs ({}), {factor:.1} times as long: \
+             {verdict}.",
             peer.peer
-        ));
-    }
-    for peer in size.peers.iter().filter(|peer| !peer.agrees()) {
-        let Some(difference) = peer.largest_difference else { continue };
-        text.push(format!(
-            "{} faces: {} differs from touchup's distances by up to {difference:.1e}, more than {AGREEMENT:.0e}.",
-            size.faces, peer.peer
-        ));
-    }
-    let failed = size.failed.iter();
-    text.extend(failed.map(|one| format!("{} faces: {} could not be measured: {}.", size.faces, one.peer, one.error)));
-    text
+        )
+    });
+    let differing = size.peers.iter().filter(|peer| !peer.agrees()).filter_map(|peer| {
+        let (name, difference) = (&peer.peer, peer.largest_difference?);
+        Some(format!("{name} differs from touchup's distances by up to {difference:.1e}, more than {AGREEMENT:.0e}."))
+    });
+    let failed = size.failed.iter().map(|one| format!("{} could not be measured: {}.", one.peer, one.error));
+    let all = pipeline.into_iter().chain(query).chain(differing).chain(failed);
+    all.map(|text| format!("{} faces: {text}", size.faces)).collect()
 }
 
 /// A turn of touchup, or a peer.

@@ -35,8 +35,8 @@ fn percent(share: f64) -> String {
 }
 
 fn what_was_run(stability: &Stability) -> String {
-    let runs = stability.faces.iter().map(|shares| shares.runs).max().unwrap_or(0);
-    let fewest = stability.faces.iter().map(|shares| shares.runs).min().unwrap_or(0);
+    let counts = || stability.faces.iter().map(|shares| shares.runs);
+    let (runs, fewest) = (counts().max().unwrap_or(0), counts().min().unwrap_or(0));
     format!(
         "One face and one held sample are drawn at random: h_min, f_max, alpha, beta and the step length each over twelve \
          decades, the force from a millionth of f_max to three times f_max and up to 78 degrees off the normal (what the \
@@ -71,9 +71,9 @@ fn of_default_on_meshes(stability: &Stability) -> String {
     if stability.meshes.iter().all(|shares| shares.stable_share == 1.0) {
         return "On meshes of any quality that was tried, the default was stable in every press.".to_owned();
     }
-    let count = |wanted| stability.meshes.iter().map(|shares| count_of(&shares.endings, wanted)).sum::<usize>();
     let runs: usize = stability.meshes.iter().map(|shares| shares.runs).sum();
-    let cut_back = count(RunEnding::CutBack);
+    let [cut_back, overshot] = [RunEnding::CutBack, RunEnding::Overshot]
+        .map(|ending| stability.meshes.iter().map(|shares| count_of(&shares.endings, ending)).sum::<usize>());
     let from = match stability.default_stable_from_quality() {
         Some(quality) => format!("no press is at fault from an altitude of {quality:.2} of the longest side on"),
         None => "there are faults at every quality".to_owned(),
@@ -82,8 +82,7 @@ fn of_default_on_meshes(stability: &Stability) -> String {
         "MISSED on bad triangles: {from}. Of {runs} presses {cut_back} were cut back, because the guard lets no triangle become \
          thinner than {limit}, or than {share} of what it was scanned with where that is less, nor turn too far or fold: the mesh \
          stays sound there, but does not follow the touch; remesh such a scan first. \
-         In {} the face went over its rest point.",
-        count(RunEnding::Overshot)
+         In {overshot} the face went over its rest point."
     )
 }
 
@@ -93,20 +92,15 @@ fn of_face(shares: &FaceShares) -> String {
         Some(limit) => format!("no fault below alpha f_max dt/h_min = {limit:.0e}"),
         None => "faults in every column of the map".to_owned(),
     };
-    format!(
-        "{}: {} of {} runs are stable; {limit}.",
-        shares.integrator.name(),
-        percent(shares.stable_share),
-        shares.runs
-    )
+    let (name, stable, runs) = (shares.integrator.name(), percent(shares.stable_share), shares.runs);
+    format!("{name}: {stable} of {runs} runs are stable; {limit}.")
 }
 
 fn of_mesh(shares: &MeshShares) -> String {
+    let (name, stable, runs) = (shares.shape.name(), percent(shares.stable_share), shares.runs);
     format!(
-        "Refiner, {}: {} of {} presses are stable, from equilateral triangles to an altitude of a thousandth of the longest side.",
-        shares.shape.name(),
-        percent(shares.stable_share),
-        shares.runs
+        "Refiner, {name}: {stable} of {runs} presses are stable, from equilateral triangles to an altitude of a thousandth of \
+         the longest side."
     )
 }
 

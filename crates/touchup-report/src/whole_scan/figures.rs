@@ -221,7 +221,7 @@ fn as_it_came(series: &[Series], scan: &ScanResult, of: fn(&MethodResult, &Touch
 }
 
 /// The scans of a case, the finest first.
-fn by_edge(case: &CaseResult) -> Vec<&ScanResult> {
+pub(super) fn by_edge(case: &CaseResult) -> Vec<&ScanResult> {
     let mut scans: Vec<&ScanResult> = case.scans.iter().collect();
     scans.sort_by(|a, b| a.edge_mm.total_cmp(&b.edge_mm));
     scans

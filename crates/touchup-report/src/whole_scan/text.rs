@@ -1,5 +1,6 @@
 //! What whole scans say, in words.
 
+use super::figures::by_edge;
 use super::{CaseResult, GaussianCost, MethodResult, Reach, RefineMethod, ScanResult, WholeScan};
 use crate::Chapter;
 
@@ -34,13 +35,9 @@ impl WholeScan {
 
 /// Name, error and time of one method.
 fn describe(result: &MethodResult) -> String {
-    format!(
-        "{} ({}{:.3} mm, {:.2} µs per sample)",
-        result.name,
-        result.error.map_or_else(String::new, |error| format!("normals {:.1} deg, ", error.normal_mean_deg)),
-        result.mean_mm(),
-        result.per_sample_us.median
-    )
+    let normals = result.error.map_or_else(String::new, |error| format!("normals {:.1} deg, ", error.normal_mean_deg));
+    let (mm, us) = (result.mean_mm(), result.per_sample_us.median);
+    format!("{} ({normals}{mm:.3} mm, {us:.2} µs per sample)", result.name)
 }
 
 impl CaseResult {
@@ -76,15 +73,14 @@ impl CaseResult {
     /// What finer and coarser scans change.
     fn densities(&self) -> Option<String> {
         let text = |method: RefineMethod| {
-            let mut of_scans: Vec<(f64, &MethodResult)> =
-                self.scans.iter().filter_map(|scan| Some((scan.edge_mm, scan.of(method)?))).collect();
-            of_scans.sort_by(|a, b| b.0.total_cmp(&a.0));
-            let each = |&(edge, result): &(f64, &MethodResult)| {
+            let each = |scan: &ScanResult| {
+                let result = scan.of(method)?;
+                let (mm, us, edge_mm) = (result.mean_mm(), result.per_sample_us.median, scan.edge_mm);
                 let worse = if result.is_worse { ", worse than the scan" } else { "" };
-                let (mm, us) = (result.mean_mm(), result.per_sample_us.median);
-                format!("{mm:.3} mm in {us:.2} µs per sample at {edge:.1} mm{worse}")
+                Some(format!("{mm:.3} mm in {us:.2} µs per sample at {edge_mm:.1} mm{worse}"))
             };
-            format!("{}: {}", method.name(), of_scans.iter().map(each).collect::<Vec<_>>().join(", "))
+            let all: Vec<String> = by_edge(self).into_iter().rev().filter_map(each).collect();
+            format!("{}: {}", method.name(), all.join(", "))
         };
         let all = RefineMethod::BY_DENSITY.map(text).join("; ");
         (self.scans.len() > 1).then(|| format!("{} over the edge length of the scan. {all}.", self.name))
@@ -128,13 +124,11 @@ fn against_contact_points(haptic: &MethodResult, points: Option<&MethodResult>) 
         ..1.0 => "beats",
         _ => "loses to",
     };
+    let [(mm, us), (points_mm, points_us)] =
+        [haptic, points].map(|result| (result.mean_mm(), result.per_sample_us.median));
     format!(
-        " There the haptic update {verdict} contact points alone: {:.3} against {:.3} mm in {:.2} against {:.2} µs per \
-         sample{normals}.",
-        haptic.mean_mm(),
-        points.mean_mm(),
-        haptic.per_sample_us.median,
-        points.per_sample_us.median
+        " There the haptic update {verdict} contact points alone: {mm:.3} against {points_mm:.3} mm in {us:.2} against \
+         {points_us:.2} µs per sample{normals}."
     )
 }
 
