@@ -201,17 +201,11 @@ struct Search<'a> {
     rounding: f64,
     rounds: usize,
     most_rounds: usize,
-    partners: Vec<Partner>,
+    /// of points with the tangent planes of their closest places: how their distances change with shift and turn, turns counted by the lever,
+    /// and by how much they have to, m
+    partners: Vec<(Vector6<f64>, f64)>,
     /// sizes of the residuals of a round
     sizes: Vec<f64>,
-}
-
-/// A point with the tangent plane of its closest place.
-struct Partner {
-    /// how the residual changes with shift and turn, turns counted by the lever
-    row: Vector6<f64>,
-    /// before the step, m
-    residual: f64,
 }
 
 /// What one round found, and its step.
@@ -298,8 +292,7 @@ impl<'a> Search<'a> {
             let x = self.pose * self.points[at * stride];
             let hit = self.tree.closest(self.target, &x, self.width)?;
             let normal = self.target.normal(hit.face);
-            let row = point_to_plane_row(&(x - centre), &normal, self.lever);
-            Some(Partner { row, residual: normal.dot(&(x - hit.point)) })
+            Some((point_to_plane_row(&(x - centre), &normal, self.lever), -normal.dot(&(x - hit.point))))
         };
         let found = map_by(self.workers, self.points.len().div_ceil(stride), partner);
         self.partners.clear();
@@ -308,18 +301,15 @@ impl<'a> Search<'a> {
 
     /// The normal equations with the weights that the residuals have after `step`.
     fn weighted_round(&self, step: &Vector6<f64>) -> Result<Round, IcpError> {
-        let (mut equations, mut weights) = (NormalEquations::default(), 0.0);
-        let (mut inliers, mut square) = (0, 0.0);
-        for Partner { row, residual } in &self.partners {
-            let left = residual + row.dot(step);
+        let (mut equations, mut inliers, mut square) = (NormalEquations::default(), 0, 0.0);
+        let weights = equations.add_reweighted(self.partners.iter().copied(), step, |_, left| {
             let weight = biweight((left / self.width).powi(2));
-            equations.add(row, -residual, weight);
-            weights += weight;
             if weight > 0.0 {
                 inliers += 1;
                 square += left * left;
             }
-        }
+            weight
+        });
         if inliers < LEAST_POINTS {
             return Err(IcpError::TooFew { found: inliers, needed: LEAST_POINTS, reach: self.width });
         }
@@ -331,7 +321,7 @@ impl<'a> Search<'a> {
     /// steps.
     fn narrow(&mut self, round: &mut Round, step: &Vector6<f64>) {
         self.sizes.clear();
-        self.sizes.extend(self.partners.iter().map(|Partner { row, residual }| (residual + row.dot(step)).abs()));
+        self.sizes.extend(self.partners.iter().map(|(row, value)| (value - row.dot(step)).abs()));
         self.scatter = SIGMA_OF_MEDIAN * median(&mut self.sizes).unwrap_or(0.0);
         let wanted = TUKEY_WIDTH * self.scatter.max(self.rounding);
         round.is_narrow = wanted >= self.width * SHRINK;

@@ -233,20 +233,17 @@ impl RegistrationRound {
 
         let prior = 1.0 / (surface_offset * surface_offset);
         let unit = independent(rows.iter().map(|(_, _, _, _, p)| p), correlation) / count / (scan_noise * scan_noise);
-        let mut step = Unknowns::zeros();
-        let mut weights = vec![1.0; rows.len()];
+        let (mut step, mut half_weight) = (Unknowns::zeros(), f64::INFINITY);
         for _ in 0..5 {
             let mut equations = NormalEquations::default();
             equations.information[(6, 6)] = prior;
-            for ((_, row, error, ..), weight) in rows.iter().zip(&weights) {
-                equations.add(row, *error, weight * unit);
-            }
+            let values = rows.iter().map(|(_, row, error, ..)| (*row, *error));
+            equations.add_reweighted(values, &step, |_, left| cauchy_weight((left / half_weight).powi(2)) * unit);
             step = equations.solution().ok_or(RegistrationError::NotConverged)?;
-            for ((_, row, error, ..), weight) in rows.iter().zip(&mut weights) {
-                let left = (error - row.dot(&step)) / (HALF_WEIGHT * scan_noise);
-                *weight = cauchy_weight(left * left);
-            }
+            half_weight = HALF_WEIGHT * scan_noise;
         }
+        let weight = |error: f64, row: &Unknowns| cauchy_weight(((error - row.dot(&step)) / half_weight).powi(2));
+        let weights: Vec<f64> = rows.iter().map(|(_, row, error, ..)| weight(*error, row)).collect();
         // how far the estimate yields: not by the weights but by how fast the weighted errors grow
         let mut slopes = Information::zeros();
         slopes[(6, 6)] = prior;

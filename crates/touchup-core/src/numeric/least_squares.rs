@@ -1,4 +1,4 @@
-//! Weighted linear least squares by the normal equations.
+//! Weighted least squares by the normal equations: linear, and by damped steps where it is not.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -37,6 +37,29 @@ impl<const N: usize> NormalEquations<N> {
         self.square += weight * value * value;
     }
 
+    /// Takes in rows and values with weights that follow how far `x` leaves them off; returns the sum of the weights.
+    ///
+    /// - `weight`: of the number of a row, and of what `x` leaves of its value.
+    pub fn add_reweighted(
+        &mut self,
+        rows: impl IntoIterator<Item = (SVector<f64, N>, f64)>,
+        x: &SVector<f64, N>,
+        mut weight: impl FnMut(usize, f64) -> f64,
+    ) -> f64 {
+        let add = |(at, (row, value)): (usize, (SVector<f64, N>, f64))| {
+            let weight = weight(at, value - row.dot(x));
+            self.add(&row, value, weight);
+            weight
+        };
+        rows.into_iter().enumerate().map(add).sum()
+    }
+
+    /// The same with a share of its diagonal added to the information: a solution is the shorter the more.
+    pub fn damped(mut self, share: f64) -> Self {
+        self.information += SMatrix::from_diagonal(&(self.information.diagonal() * share));
+        self
+    }
+
     /// The x of least squares; `None` where the rows do not determine it.
     pub fn solution(&self) -> Option<SVector<f64, N>> {
         Some(self.information.cholesky()?.solve(&self.right))
@@ -45,6 +68,67 @@ impl<const N: usize> NormalEquations<N> {
     /// Σ w (a·x − z)² at a [`NormalEquations::solution`].
     pub fn residual_square(&self, solution: &SVector<f64, N>) -> f64 {
         self.square - solution.dot(&self.right)
+    }
+}
+
+/// Damped least squares \[Levenberg 1944, Marquardt 1963\]: how the damping changes, and when to stop.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct DampedSearch {
+    /// damping of the first step
+    pub first: f64,
+    /// by which it is multiplied after a step that helps, and after one that does not
+    pub factors: [f64; 2],
+    /// it falls no lower
+    pub least: f64,
+    /// where so much does not help nothing does
+    pub most: f64,
+    /// steps at most
+    pub tries: usize,
+}
+
+/// Why a [`DampedSearch`] ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum SearchEnd {
+    /// at the least cost, to rounding
+    Converged,
+    /// the equations determine no step
+    Singular,
+    /// after the last step
+    Unsettled,
+}
+
+impl DampedSearch {
+    /// From a place with its cost to the least one near it.
+    ///
+    /// - `equations`: of a step from a place, with so much damping.
+    /// - `better`: the place after a step and its cost, where that helps against the cost before.
+    /// - `is_last`: whether a step that was made is the last.
+    pub fn run<T, const N: usize>(
+        &self,
+        (mut place, mut cost): (T, f64),
+        equations: impl Fn(&T, f64) -> NormalEquations<N>,
+        better: impl Fn(&T, &SVector<f64, N>, f64) -> Option<(T, f64)>,
+        is_last: impl Fn(&SVector<f64, N>, &NormalEquations<N>) -> bool,
+    ) -> (T, f64, SearchEnd) {
+        let mut damping = self.first;
+        for _ in 0..self.tries {
+            let equations = equations(&place, damping);
+            let Some(step) = equations.solution() else { return (place, cost, SearchEnd::Singular) };
+            let factor = if let Some(next) = better(&place, &step, cost) {
+                (place, cost) = next;
+                if is_last(&step, &equations) {
+                    return (place, cost, SearchEnd::Converged);
+                }
+                self.factors[0]
+            } else {
+                self.factors[1]
+            };
+            damping = (damping * factor).max(self.least);
+            if damping > self.most {
+                return (place, cost, SearchEnd::Converged);
+            }
+        }
+        (place, cost, SearchEnd::Unsettled)
     }
 }
 
@@ -75,5 +159,23 @@ mod tests {
     #[test]
     fn parallel_rows_determine_nothing() {
         assert_eq!(NormalEquations::of([(Vector2::new(1.0, 0.0), 1.0)]).solution(), None);
+    }
+
+    /// The bent valley of Rosenbrock, as two residuals 1 − x and 10 (y − x²): its least is 0 at (1, 1).
+    #[test]
+    fn damped_steps_follow_a_bent_valley_to_its_end() {
+        let residuals = |p: &Vector2<f64>| [1.0 - p.x, 10.0 * (p.y - p.x * p.x)];
+        let cost = |p: &Vector2<f64>| residuals(p).map(|r| r * r).iter().sum::<f64>();
+        let rows = |p: &Vector2<f64>| [Vector2::new(-1.0, 0.0), Vector2::new(-20.0 * p.x, 10.0)];
+        let search = DampedSearch { first: 1e-3, factors: [0.1, 10.0], least: 1e-12, most: 1e9, tries: 200 };
+        let start = Vector2::new(-1.2, 1.0);
+        let (end, left, why) = search.run(
+            (start, cost(&start)),
+            |p, damping| NormalEquations::of(rows(p).into_iter().zip(residuals(p).map(|r| -r))).damped(damping),
+            |p, step, before| Some((p + step, cost(&(p + step)))).filter(|(_, after)| *after <= before),
+            |step, _| step.norm() < 1e-12,
+        );
+        assert!((end - Vector2::new(1.0, 1.0)).norm() < 1e-9 && left < 1e-18, "{end} {left}");
+        assert_eq!(why, SearchEnd::Converged);
     }
 }

@@ -3,23 +3,23 @@
 
 mod basis;
 mod counted;
-mod disjoint_sets;
 mod least_squares;
 mod moments;
 mod point_grid;
 mod quantile;
 mod robust;
+mod sets;
 mod twist;
 mod voxel;
 
 pub(crate) use basis::tangent_basis;
 pub use counted::counted;
-pub(crate) use disjoint_sets::DisjointSets;
-pub(crate) use least_squares::NormalEquations;
-pub(crate) use moments::{centroid_and_spread, mean, scatter};
+pub(crate) use least_squares::{DampedSearch, NormalEquations, SearchEnd};
+pub(crate) use moments::{centroid_and_spread, mean, scatter, spreads};
 pub(crate) use point_grid::PointGrid;
 pub(crate) use quantile::order_statistic;
 pub use quantile::{median, quantile, weighted_quantile};
 pub(crate) use robust::{SIGMA_OF_MEDIAN, TUKEY_WIDTH, biweight, cauchy_weight};
+pub(crate) use sets::{DisjointSets, distinct, flood};
 pub(crate) use twist::{moved_by_twist, point_to_plane_row};
 pub(crate) use voxel::{VoxelKey, voxel_neighbourhood, voxel_of};

@@ -14,6 +14,14 @@ pub(crate) fn scatter(vectors: impl Iterator<Item = Vector3<f64>> + Clone) -> Ma
     vectors.map(|v| (v - mean) * (v - mean).transpose()).sum()
 }
 
+/// Root mean square distances of some vectors from their mean along their principal axes, in rising order.
+pub(crate) fn spreads(vectors: impl Iterator<Item = Vector3<f64>> + Clone) -> [f64; 3] {
+    let count = vectors.clone().count() as f64;
+    let mut spreads: [f64; 3] = (scatter(vectors) / count).symmetric_eigenvalues().map(|x| x.max(0.0).sqrt()).into();
+    spreads.sort_by(f64::total_cmp);
+    spreads
+}
+
 /// Mean of the points, m, and the root of their mean square distance from it, m.
 pub(crate) fn centroid_and_spread<'a>(points: impl Iterator<Item = &'a Point3<f64>> + Clone) -> (Point3<f64>, f64) {
     let centroid = Point3::from(mean(points.clone().map(|p| p.coords)));
@@ -38,6 +46,7 @@ mod tests {
     fn a_square_scatters_alike_along_its_sides_and_not_across_itself() {
         let scatter = scatter(corners().iter().map(|p| p.coords));
         assert_eq!(scatter, Matrix3::from_diagonal(&Vector3::new(4.0, 4.0, 0.0)));
+        assert_eq!(spreads(corners().iter().map(|p| p.coords)), [0.0, 1.0, 1.0]);
         assert_eq!(mean(std::iter::empty()), Vector3::zeros());
     }
 }

@@ -58,26 +58,21 @@ pub(super) struct OffsetFit {
 impl OffsetFit {
     /// Of the open places; `None` where they determine nothing.
     pub fn of(places: &Places) -> Option<Self> {
-        let open: Vec<usize> = (0..places.off.len()).filter(|&at| places.is_open[at]).collect();
+        let open = places.open();
         let (centre, lever) = centroid_and_spread(open.iter().map(|&at| &places.positions[at]));
-        let row = |at: usize| {
+        let row = |&at: &usize| {
             let arm = places.positions[at] - centre;
-            point_to_plane_row(&arm, &places.normals[at], lever).insert_row(0, 1.0)
+            (point_to_plane_row(&arm, &places.normals[at], lever).insert_row(0, 1.0), places.off[at])
         };
         let mut x = SVector::<f64, 7>::zeros();
         let mut width = f64::INFINITY;
         let mut spread = SMatrix::<f64, 7, 7>::zeros();
         for _ in 0..ROUNDS {
-            let (mut equations, mut weights) = (NormalEquations::default(), 0.0);
-            let mut sizes = Vec::with_capacity(open.len());
-            for &at in &open {
-                let row = row(at);
-                let left = places.off[at] - row.dot(&x);
+            let (mut equations, mut sizes) = (NormalEquations::default(), Vec::with_capacity(open.len()));
+            let weights = equations.add_reweighted(open.iter().map(row), &x, |at, left| {
                 sizes.push(left.abs());
-                let weight = biweight((left / width).powi(2)) * places.areas[at];
-                equations.add(&row, places.off[at], weight);
-                weights += weight;
-            }
+                biweight((left / width).powi(2)) * places.areas[open[at]]
+            });
             let mut held = equations.information;
             (1..7).for_each(|i| held[(i, i)] += HELD_BACK * weights);
             let inverse = held.cholesky()?.inverse();

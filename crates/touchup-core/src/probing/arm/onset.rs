@@ -10,7 +10,7 @@
 
 use nalgebra::{Cholesky, Matrix4, Vector3, Vector4};
 
-use crate::numeric::{NormalEquations, median};
+use crate::numeric::{DampedSearch, NormalEquations, SearchEnd, median};
 use crate::parameters;
 
 /// One moment of a touch.
@@ -129,12 +129,10 @@ pub enum OnsetError {
 
 /// Moments on each side of the corner at the least.
 const LEAST: usize = 5;
-/// Rounds of Gauss–Newton; five are usual.
-const ROUNDS: usize = 60;
-/// The corner has converged when a round moves it by less than this, m.
+/// Steps of a fit; five are usual.
+const SEARCH: DampedSearch = DampedSearch { first: 1e-6, factors: [0.1, 10.0], least: 1e-12, most: 1e9, tries: 60 };
+/// The corner has converged when a step moves it by less than this, m.
 const REST: f64 = 1e-9;
-/// A fit that such a damping does not improve has converged.
-const MOST_DAMPING: f64 = 1e9;
 /// Times that the noise is taken from the residuals.
 const WEIGHINGS: usize = 3;
 /// Moments that share one error of the travel after smoothing: one over the middle weight of the parabola, 89/429 for eleven.
@@ -350,30 +348,21 @@ impl ForceCurve<'_> {
         equations
     }
 
-    /// Gauss–Newton, damped where a step does not help. Returns the line and its cost.
-    fn fit(&self, mut line: LineFit) -> Option<(LineFit, f64)> {
+    /// The line of least cost near another, and its cost.
+    fn fit(&self, line: LineFit) -> Option<(LineFit, f64)> {
         let believed = self.params.delay_sigma.powi(-2);
-        let (mut cost, mut damping) = (self.cost(&line), 1e-6);
-        for _ in 0..ROUNDS {
-            let mut equations = self.normal_equations(&line);
+        let equations = |line: &LineFit, damping: f64| {
+            let mut equations = self.normal_equations(line);
             equations.add(&LineFit::ith(TAU, 1.0), self.params.delay - line[TAU], believed);
-            equations.information += Matrix4::from_diagonal(&(equations.information.diagonal() * damping));
-            let step = equations.solution()?;
+            equations.damped(damping)
+        };
+        let better = |line: &LineFit, step: &LineFit, before: f64| {
             let next = line + step;
-            let next_cost = self.cost(&next);
-            if next_cost <= cost && next[K] > 0.0 {
-                (line, cost, damping) = (next, next_cost, (damping * 0.1).max(1e-12));
-                if step[S0].abs() < REST && step[TAU].abs() < REST {
-                    break;
-                }
-            } else {
-                damping *= 10.0;
-                if damping > MOST_DAMPING {
-                    break;
-                }
-            }
-        }
-        line.iter().all(|x| x.is_finite()).then_some((line, cost))
+            Some((next, self.cost(&next))).filter(|(next, cost)| *cost <= before && next[K] > 0.0)
+        };
+        let is_last = |step: &LineFit, _: &NormalEquations<4>| step[S0].abs() < REST && step[TAU].abs() < REST;
+        let (line, cost, end) = SEARCH.run((line, self.cost(&line)), equations, better, is_last);
+        (end != SearchEnd::Singular && line.iter().all(|x| x.is_finite())).then_some((line, cost))
     }
 
     /// Residuals in free air and while pressing.

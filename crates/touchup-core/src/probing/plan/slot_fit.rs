@@ -3,7 +3,7 @@
 use nalgebra::{Matrix5, Point2, Vector2, Vector5};
 
 use crate::features::fit::from_segment;
-use crate::numeric::NormalEquations;
+use crate::numeric::{DampedSearch, NormalEquations};
 
 /// All points at a distance from a segment of a plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,8 +26,9 @@ const HALVES: [f64; 4] = [0.3, 0.6, 0.9, 1.2];
 const BESIDE: f64 = 0.2e-3;
 /// Where along it the place is that the ball fell in, over its half length.
 const SHIFTS: [f64; 3] = [-0.9, 0.0, 0.9];
-/// Steps of a fit.
-const STEPS: usize = 60;
+/// All of its steps are made: no touch says how near is near enough.
+const SEARCH: DampedSearch =
+    DampedSearch { first: 1e-3, factors: [0.2, 5.0], least: 0.0, most: f64::INFINITY, tries: 60 };
 /// What no touch determines stays where it is: weight of the guess against one touch.
 const HELD: f64 = 1e-9;
 
@@ -53,34 +54,31 @@ impl SlotFit {
         (points.iter().map(|p| self.residual(p).0.powi(2)).sum::<f64>() / points.len().max(1) as f64).sqrt()
     }
 
-    /// By least squares from a first guess \[Levenberg 1944, Marquardt 1963\].
-    pub fn fitted(mut self, points: &[Point2<f64>]) -> Self {
+    /// By least squares from a first guess.
+    pub fn fitted(self, points: &[Point2<f64>]) -> Self {
         let scale = points.iter().map(|p| (p - self.middle).norm()).fold(1e-6, f64::max);
         // in units of the size, an angle is as large as a length
         let units = Vector5::new(scale, scale, 1.0, scale, scale);
-        let mut damping = 1e-3;
-        for _ in 0..STEPS {
+        let equations = |slot: &Self, damping: f64| {
             let mut equations =
                 NormalEquations { information: Matrix5::identity() * (HELD + damping), ..NormalEquations::default() };
             for p in points {
-                let (r, by) = self.residual(p);
+                let (r, by) = slot.residual(p);
                 equations.add(&(by.component_mul(&units) / scale), -(r / scale), 1.0);
             }
-            let Some(solved) = equations.solution() else { break };
+            equations
+        };
+        let better = |slot: &Self, solved: &Vector5<f64>, before: f64| {
             let step = solved.component_mul(&units);
             let next = Self {
-                middle: self.middle + step.fixed_rows::<2>(0),
-                angle: self.angle + step[2],
-                half: (self.half + step[3]).max(0.0),
-                radius: (self.radius + step[4]).abs(),
+                middle: slot.middle + step.fixed_rows::<2>(0),
+                angle: slot.angle + step[2],
+                half: (slot.half + step[3]).max(0.0),
+                radius: (slot.radius + step[4]).abs(),
             };
-            if next.rms(points) < self.rms(points) {
-                (self, damping) = (next, damping * 0.2);
-            } else {
-                damping *= 5.0;
-            }
-        }
-        self
+            Some((next, next.rms(points))).filter(|(_, rms)| *rms < before)
+        };
+        SEARCH.run((self, self.rms(points)), equations, better, |_, _| false).0
     }
 
     /// The best one through points around a place, in any direction, among those with the free places inside.
