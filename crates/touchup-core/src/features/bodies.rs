@@ -8,7 +8,7 @@ use nalgebra::Point3;
 use super::facets::{Facets, NONE};
 use super::rays::Rays;
 use crate::mesh::{FaceId, FaceTree, TriMesh};
-use crate::numeric::DisjointSets;
+use crate::numeric::{DisjointSets, distinct};
 
 /// The closed pieces of a mesh, where there is more than one piece.
 pub(super) struct Bodies {
@@ -105,9 +105,7 @@ fn pieces(facets: &Facets) -> (Vec<u32>, Vec<Vec<u32>>) {
 
 /// Some faces of a mesh as a mesh of their own.
 fn part(mesh: &TriMesh, faces: &[u32]) -> Option<TriMesh> {
-    let mut vertices: Vec<_> = faces.iter().flat_map(|&face| mesh.corners(FaceId(face))).collect();
-    vertices.sort_unstable();
-    vertices.dedup();
+    let vertices = distinct(faces.iter().flat_map(|&face| mesh.corners(FaceId(face))));
     let number = |vertex| vertices.binary_search(&vertex).map(|at| at as u32).ok();
     let renumbered = faces.iter().map(|&face| {
         let [a, b, c] = mesh.corners(FaceId(face)).map(number);

@@ -6,12 +6,13 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 
 use super::facets::NONE;
-use super::primitive::Primitive;
+use super::fit::{Plane, Surface};
 use super::scene::Parted;
 use super::segment::Segmentation;
+use crate::numeric::distinct;
 
 /// A straight edge between two planes.
 #[derive(Clone, Debug)]
@@ -44,10 +45,8 @@ pub(super) fn without_seams(parted: &Parted) -> Vec<u32> {
     let label = |&number: &u32| if number != NONE && is_strong[number as usize] { number } else { NONE };
     let mut of_face: Vec<u32> = parted.segmentation.of_face.iter().map(label).collect();
     let without = (0..of_face.len() as u32).filter(|&face| of_face[face as usize] == NONE);
-    let mut front: Vec<u32> = without.flat_map(|face| parted.facets.beside(face)).map(|(_, other)| other).collect();
-    front.retain(|&face| of_face[face as usize] != NONE);
-    front.sort_unstable();
-    front.dedup();
+    let beside = without.flat_map(|face| parted.facets.beside(face)).map(|(_, other)| other);
+    let mut front = distinct(beside.filter(|&face| of_face[face as usize] != NONE));
     for _ in 0..SEAM {
         let mut next = Vec::new();
         for face in front {
@@ -100,13 +99,9 @@ pub(super) fn straight_edges(parted: &Parted, borders: &Borders) -> Vec<Straight
 
 fn edges_between(parted: &Parted, planes: [usize; 2], border: &[Border]) -> Vec<StraightEdge> {
     let segments = planes.map(|number| parted.segment(number));
-    let [Primitive::Plane { point: p, normal: n }, Primitive::Plane { point: q, normal: m }] =
-        segments.map(|s| s.primitive)
-    else {
-        return Vec::new();
-    };
-    let Some(direction) = n.cross(&m).try_normalize(SHARP) else { return Vec::new() };
-    let origin = on_both([p, q], [n, m], &border[0].ends[0]);
+    let Some((one, other)) = parted.plane(planes[0]).zip(parted.plane(planes[1])) else { return Vec::new() };
+    let Some(direction) = one.normal().cross(&other.normal()).try_normalize(SHARP) else { return Vec::new() };
+    let origin = on_both([one, other], &border[0].ends[0]);
     let tolerance = segments[0].tolerance.max(segments[1].tolerance);
     let near = (NEAR_TOLERANCES * tolerance).max(NEAR_EDGES * parted.edge.min(GAP * parted.diagonal));
     let is_near = |x: &Point3<f64>| {
@@ -128,7 +123,7 @@ fn edges_between(parted: &Parted, planes: [usize; 2], border: &[Border]) -> Vec<
             _ => joint.push(piece),
         }
     }
-    let is_convex = is_convex(parted, border, [(p, n), (q, m)]);
+    let is_convex = is_convex(parted, border, [one, other]);
     joint
         .into_iter()
         .filter(|[a, b]| b - a > SHORTEST * parted.diagonal)
@@ -137,17 +132,17 @@ fn edges_between(parted: &Parted, planes: [usize; 2], border: &[Border]) -> Vec<
 }
 
 /// Whether each of two planes falls away from the other where they meet.
-pub(super) fn is_convex(parted: &Parted, border: &[Border], planes: [(Point3<f64>, Vector3<f64>); 2]) -> bool {
-    let height = |face: u32, (p, n): (Point3<f64>, Vector3<f64>)| {
-        parted.facets.triangle(face).map(|x| (x - p).dot(&n)).iter().sum::<f64>()
-    };
+pub(super) fn is_convex(parted: &Parted, border: &[Border], planes: [&Plane; 2]) -> bool {
+    let height =
+        |face: u32, plane: &Plane| parted.facets.triangle(face).map(|x| plane.distance(&x)).iter().sum::<f64>();
     let along = |border: &Border| (border.ends[1] - border.ends[0]).norm();
     let above = |b: &Border| (height(b.faces[1], planes[0]) + height(b.faces[0], planes[1])) * along(b);
     border.iter().map(above).sum::<f64>() < 0.0
 }
 
 /// The point on both planes closest to `near`.
-pub(super) fn on_both([p, q]: [Point3<f64>; 2], [n, m]: [Vector3<f64>; 2], near: &Point3<f64>) -> Point3<f64> {
+pub(super) fn on_both(planes: [&Plane; 2], near: &Point3<f64>) -> Point3<f64> {
+    let ([p, q], [n, m]) = (planes.map(Plane::point), planes.map(Plane::normal));
     let (a, b, c) = ((p - near).dot(&n), (q - near).dot(&m), n.dot(&m));
     let square = 1.0 - c * c;
     near + n * ((a - c * b) / square) + m * ((b - c * a) / square)

@@ -9,6 +9,7 @@ use super::creases::Creases;
 use super::curvature::VertexCurvature;
 use super::k_means::k_means;
 use crate::mesh::{TriMesh, VertexId};
+use crate::numeric::distinct;
 
 /// Vertices that belong together.
 #[derive(Clone, Debug, PartialEq)]
@@ -108,9 +109,7 @@ fn cluster_of(mesh: &TriMesh, creases: &Creases, part: &[(u32, usize)], least: f
         sum += nalgebra::center(&ends[0], &ends[1]).coords * own;
         length += own;
     }
-    let mut vertices: Vec<VertexId> = list().flat_map(|crease| crease.ends).collect();
-    vertices.sort_unstable();
-    vertices.dedup();
+    let vertices = distinct(list().flat_map(|crease| crease.ends));
     let has_point = list().any(|crease| crease.ends[0] == crease.ends[1]);
     if length <= least && !has_point {
         return None;

@@ -2,15 +2,18 @@
 //!
 //! A short cone hardly determines its axis, that of its hole is known: so cones are searched around the ends of holes.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{Point3, Vector2, Vector3};
 
 use super::facets::NONE;
+use super::fit::{Cone, Surface};
 use super::grow::belongs;
-use super::primitive::{Primitive, Side, refined};
+use super::primitive::{Primitive, refined};
 use super::scene::Parted;
 use super::segment::Segment;
 use super::walls::Wall;
-use crate::numeric::{median, tangent_basis};
+use crate::numeric::{distinct, flood, median, tangent_basis};
 
 /// Directions in which the ring beyond an end is examined.
 const AROUND: usize = 36;
@@ -37,8 +40,7 @@ const COVERAGE: f64 = 0.6;
 /// Adds the cones at both ends of each hole's wall to the segmentation and to the walls.
 pub(super) fn add_cones(parted: &mut Parted, walls: &mut Vec<Wall>) {
     walls.retain(|wall| !wall.is_cone());
-    let holes: Vec<Wall> =
-        walls.iter().filter(|wall| wall.side() == Side::Hole && wall.coverage > COVERAGE).cloned().collect();
+    let holes: Vec<Wall> = walls.iter().filter(|wall| wall.is_concave() && wall.coverage > COVERAGE).cloned().collect();
     for wall in holes {
         for (which, out) in [(0, -1.0), (1, 1.0)] {
             let Some(segment) = cone_beyond(parted, &wall, wall.ends[which], out) else { continue };
@@ -63,14 +65,14 @@ fn cone_beyond(parted: &Parted, wall: &Wall, end: f64, out: f64) -> Option<Segme
     [1.0 + BESIDE, 1.0 - BESIDE].into_iter().find_map(|wider| {
         let faces = ring(parted, wall, end + out * BESIDE * radius, wider * radius);
         let start = cone_of(parted, wall, &faces, out)?;
-        let faces = flood(parted, faces, &start, tolerance.max(FIRST_SLACK * radius));
+        let faces = faces_on(parted, faces, &start, tolerance.max(FIRST_SLACK * radius));
         let moved = refined(&start, &parted.facets, &faces).filter(|better| is_along(better, wall));
         let misfit = |cone: &Primitive| misfit(parted, &faces, cone);
         // those of a measured mesh are no better than its facets
         let drawn = parted.rounding.and_then(|_| through_corners(parted, wall, &faces, &start));
         let better = [moved, drawn, Some(start)].into_iter().flatten();
         let better = better.min_by(|a, b| misfit(a).total_cmp(&misfit(b)))?;
-        let faces = flood(parted, faces, &better, tolerance);
+        let faces = faces_on(parted, faces, &better, tolerance);
         let area = parted.facets.area_of(&faces);
         (!faces.is_empty()).then_some(Segment { primitive: better, faces, area, tolerance, is_exact })
     })
@@ -80,18 +82,13 @@ fn cone_beyond(parted: &Parted, wall: &Wall, end: f64, out: f64) -> Option<Segme
 fn ring(parted: &Parted, wall: &Wall, t: f64, radius: f64) -> Vec<u32> {
     let [e, g] = tangent_basis(&wall.axis);
     let around = parted.around(wall.segments[0]);
-    let mut faces: Vec<u32> = (0..AROUND)
-        .filter_map(|i| {
-            let (sine, cosine) = (std::f64::consts::TAU * i as f64 / AROUND as f64).sin_cos();
-            let radial = e * cosine + g * sine;
-            let p = wall.at(t) + radial * radius;
-            let face = around.closest(&p, NEAR * wall.radius())?;
-            (parted.facets.normal(face).dot(&radial) < -SINES[0]).then_some(face)
-        })
-        .collect();
-    faces.sort_unstable();
-    faces.dedup();
-    faces
+    distinct((0..AROUND).filter_map(|i| {
+        let (sine, cosine) = (std::f64::consts::TAU * i as f64 / AROUND as f64).sin_cos();
+        let radial = e * cosine + g * sine;
+        let p = wall.at(t) + radial * radius;
+        let face = around.closest(&p, NEAR * wall.radius())?;
+        (parted.facets.normal(face).dot(&radial) < -SINES[0]).then_some(face)
+    }))
 }
 
 /// The cone about the axis of the wall on which most of a ring's faces lie.
@@ -112,12 +109,19 @@ fn cone_of(parted: &Parted, wall: &Wall, faces: &[u32], out: f64) -> Option<Prim
         t - (v - axis * t).norm() / half_angle.tan()
     };
     let apex: Point3<f64> = wall.origin + axis * median(&mut alike.iter().map(apex_of).collect::<Vec<_>>())?;
-    Some(Primitive::Cone { apex, axis, half_angle, side: Side::Hole })
+    Some(cone_from(apex, &axis, half_angle, wall))
+}
+
+/// A hollow cone, by its circle as wide as the wall.
+fn cone_from(apex: Point3<f64>, axis: &Vector3<f64>, half_angle: f64, wall: &Wall) -> Primitive {
+    let radius = wall.radius();
+    Primitive::Cone(Cone::new(apex + axis * (radius / half_angle.tan()), axis, radius, half_angle, true))
 }
 
 /// The cone about the axis of the wall through the corners of faces: those of a coarse one lie on it, its facets do not.
 fn through_corners(parted: &Parted, wall: &Wall, faces: &[u32], start: &Primitive) -> Option<Primitive> {
-    let Primitive::Cone { axis, side, .. } = *start else { return None };
+    let Primitive::Cone(start) = start else { return None };
+    let axis = start.axis();
     let corners = || faces.iter().flat_map(|&face| parted.facets.triangle(face)).map(|p| p - wall.origin);
     // radius over height, a straight line
     let place = |v: Vector3<f64>| Vector2::new(v.dot(&axis), (v - axis * v.dot(&axis)).norm());
@@ -129,7 +133,7 @@ fn through_corners(parted: &Parted, wall: &Wall, faces: &[u32], start: &Primitiv
     let slope = product / square;
     let apex = wall.origin + axis * (mean.x - mean.y / slope);
     let is_cone = slope > 0.0 && apex.coords.iter().all(|x| x.is_finite());
-    is_cone.then(|| Primitive::Cone { apex, axis, half_angle: slope.atan(), side })
+    is_cone.then(|| cone_from(apex, &axis, slope.atan(), wall))
 }
 
 /// Sum of the squares by which corners are off a cone, m².
@@ -139,26 +143,17 @@ fn misfit(parted: &Parted, faces: &[u32], cone: &Primitive) -> f64 {
 
 /// Whether a cone has the axis of its hole.
 fn is_along(cone: &Primitive, wall: &Wall) -> bool {
-    let Primitive::Cone { apex, axis, .. } = cone else { return false };
-    let v = apex - wall.origin;
-    let off = (v - wall.axis * v.dot(&wall.axis)).norm();
-    axis.dot(&wall.axis).abs() > SINES[1] && off < NEAR * wall.radius()
+    let Primitive::Cone(cone) = cone else { return false };
+    let off = |apex: Point3<f64>| (apex - wall.origin).cross(&wall.axis).norm();
+    cone.axis().dot(&wall.axis).abs() > SINES[1] && cone.apex().is_some_and(|apex| off(apex) < NEAR * wall.radius())
 }
 
 /// Faces that lie on the cone, from those of `seeds` on, planes and round walls left alone.
-fn flood(parted: &Parted, seeds: Vec<u32>, cone: &Primitive, tolerance: f64) -> Vec<u32> {
+fn faces_on(parted: &Parted, mut seeds: Vec<u32>, cone: &Primitive, tolerance: f64) -> Vec<u32> {
     let facets = &parted.facets;
     let is_on = |face: u32| belongs(facets, face, cone, tolerance);
-    let mut found: Vec<u32> = seeds.into_iter().filter(|&face| is_on(face)).collect();
-    let mut seen: std::collections::BTreeSet<u32> = found.iter().copied().collect();
-    let mut at = 0;
-    while at < found.len() {
-        for other in facets.beside[found[at] as usize] {
-            if other != NONE && seen.insert(other) && is_on(other) {
-                found.push(other);
-            }
-        }
-        at += 1;
-    }
-    found
+    seeds.retain(|&face| is_on(face));
+    let mut seen: BTreeSet<u32> = seeds.iter().copied().collect();
+    let is_new = |other| other != NONE && seen.insert(other) && is_on(other);
+    flood(seeds, |face| facets.beside[face as usize], is_new)
 }

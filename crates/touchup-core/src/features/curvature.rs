@@ -56,11 +56,7 @@ impl VertexCurvature {
 /// Curvature at all vertices, indexed by [`VertexId`].
 pub fn curvature(mesh: &TriMesh) -> Vec<VertexCurvature> {
     let mut fan = Fan::default();
-    let mut all = Vec::with_capacity(mesh.vertex_slots());
-    for vertex in 0..mesh.vertex_slots() as u32 {
-        all.push(fan.curvature(mesh, VertexId(vertex)));
-    }
-    all
+    (0..mesh.vertex_slots() as u32).map(|vertex| fan.curvature(mesh, VertexId(vertex))).collect()
 }
 
 /// The faces around a vertex, as pairs of its neighbours; kept only for its memory.

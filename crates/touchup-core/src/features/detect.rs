@@ -2,10 +2,10 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::borders::{StraightEdge, borders, on_both, straight_edges, without_seams};
+use super::borders::{StraightEdge, borders, straight_edges, without_seams};
 use super::cones::add_cones;
-use super::feature::{Feature, FittedTo, Kind, Measured, SizedSurface};
-use super::fit::{Cylinder, Ends, Fit, Freedom, Plane, Stadium, Surface};
+use super::feature::{Feature, FittedTo, Kind, Measured, Walls};
+use super::fit::{Ends, Fit, Freedom, Plane, Stadium, Surface};
 use super::holes::{Boss, Hole, bosses, groups, holes};
 use super::measure::{Fitted, Measure};
 use super::observe::Observed;
@@ -15,6 +15,7 @@ use super::scene::Parted;
 use super::slots::{Slot, slots};
 use super::walls::Wall;
 use crate::mesh::{FaceTree, TriMesh};
+use crate::numeric::distinct;
 use crate::stylus::ProbedPoint;
 
 /// What was found on a mesh.
@@ -100,17 +101,10 @@ fn is_sure(parted: &Parted, edge: &StraightEdge) -> bool {
     edge.planes.iter().all(|&number| is_sure_plane(parted, number))
 }
 
-fn together(touches: [&[u32]; 2]) -> Vec<u32> {
-    let mut all = touches.concat();
-    all.sort_unstable();
-    all.dedup();
-    all
-}
-
 /// Distance of two places along `direction`, each with its uncertainty.
 fn between(from: &AxisEnd, to: &AxisEnd, direction: &Vector3<f64>) -> Measured<f64> {
     let std = from.std.zip(to.std).map(|(a, b)| a.hypot(b));
-    let touches = together([&from.touches, &to.touches]);
+    let touches = distinct(from.touches.iter().chain(&to.touches).copied());
     Measured { value: (from.point - to.point).dot(direction).abs(), std, touches }
 }
 
@@ -132,6 +126,14 @@ impl AxisEnd {
         met.unwrap_or_else(|| Self { point: *point, std: None, touches: Vec::new() })
     }
 
+    /// As the place of a feature with a fitted surface.
+    ///
+    /// - `std`: of the place, from the fit, m.
+    fn centre<S>(&self, fitted: &Fitted<S>, std: impl Fn(&Fit<S>) -> Option<f64>) -> Measured<Point3<f64>> {
+        let touches = distinct(fitted.touches.iter().chain(&self.touches).copied());
+        Measured { value: self.point, std: fitted.fit.as_ref().and_then(std), touches }
+    }
+
     /// Beside numbers that were touched, the uncertainty of the mesh means nothing: no touch confirms it.
     fn known_as(self, to: FittedTo) -> Self {
         let is_known = to == FittedTo::Mesh || !self.touches.is_empty();
@@ -139,30 +141,16 @@ impl AxisEnd {
     }
 }
 
-/// The place of a round feature on its axis.
-fn on_axis(fitted: &Fitted<Cylinder>, near: &Point3<f64>) -> Point3<f64> {
-    let (start, axis) = (fitted.surface.center(), fitted.surface.pose_of.rotation * Vector3::z());
-    start + axis * (near - start).dot(&axis)
-}
-
-/// Root mean square distance across the axis by which a place on it may be off, m.
-pub(super) fn lateral_std(fit: &Fit<Cylinder>, at: &Point3<f64>) -> Option<f64> {
-    let height = fit.surface.pose_of.inverse_transform_point(at).z;
-    fit.center_covariance(height).map(|covariance| covariance.trace().max(0.0).sqrt())
-}
-
 fn hole_feature(measure: &Measure, walls: &[Wall], hole: &Hole) -> Feature {
     let wall = &walls[hole.wall];
     let fitted = measure.cylinder(wall, hole.rim);
     let axis = fitted.axis(&hole.out);
-    let opening = AxisEnd::on(measure, hole.rim, &on_axis(&fitted, &hole.opening), &axis.value);
-    let bottom = on_axis(&fitted, &(hole.opening - hole.out * hole.depth));
+    let opening = AxisEnd::on(measure, hole.rim, &fitted.surface.nearest_on_axis(&hole.opening), &axis.value);
+    let bottom = fitted.surface.nearest_on_axis(&(hole.opening - hole.out * hole.depth));
     let floor = AxisEnd::on(measure, hole.floor, &bottom, &axis.value).known_as(fitted.to);
     // beside a wall that was touched, a floor that was not may be a guess
     let is_known = hole.floor.is_none() || fitted.to == FittedTo::Mesh || !floor.touches.is_empty();
-    let std = fitted.fit.as_ref().and_then(|fit| lateral_std(fit, &opening.point));
-    let touches = together([&fitted.touches, &opening.touches]);
-    let centre = Measured { value: opening.point, std, touches };
+    let centre = opening.centre(&fitted, |fit| fit.lateral_std(&opening.point));
     let touched = measure.observed.touched_share(&wall.segments);
     let cone = hole.countersink.and_then(|cone| measure.cone(&walls[cone]));
     Feature {
@@ -170,7 +158,7 @@ fn hole_feature(measure: &Measure, walls: &[Wall], hole: &Hole) -> Feature {
         depth: Some(between(&opening, &floor, &axis.value)),
         axis: Some(axis),
         through: hole.through.filter(|_| is_known),
-        surface: SizedSurface::Round(fitted.surface.clone()),
+        walls: Some(Walls::Round(fitted.surface)),
         cone_angle: cone.map(|cone| cone.number(2.0 * cone.surface.half_angle.abs(), &[(Freedom::Second, 2.0)])),
         ..Feature::new(Kind::Hole, centre, touched, fitted.to)
     }
@@ -189,13 +177,9 @@ fn is_rim_of(wall: &Wall, rim: &RoundOpening) -> bool {
 
 /// A hole of which there is no wall: how deep it is and whether it goes through is not known.
 fn rim_feature(measure: &Measure, rim: &RoundOpening) -> Feature {
-    let fitted = Fitted {
-        surface: rim.fit.surface.clone(),
-        fit: Some(rim.fit.clone()),
-        touches: Vec::new(),
-        to: FittedTo::Mesh,
-    };
-    let centre = Measured { value: rim.centre, std: lateral_std(&rim.fit, &rim.centre), touches: Vec::new() };
+    let fitted =
+        Fitted { surface: rim.fit.surface, fit: Some(rim.fit.clone()), touches: Vec::new(), to: FittedTo::Mesh };
+    let centre = Measured { value: rim.centre, std: rim.fit.lateral_std(&rim.centre), touches: Vec::new() };
     Feature {
         diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),
         axis: Some(fitted.axis(&rim.out)),
@@ -207,29 +191,23 @@ fn boss_feature(measure: &Measure, walls: &[Wall], boss: &Boss) -> Feature {
     let wall = &walls[boss.wall];
     let fitted = measure.cylinder(wall, Some(boss.base));
     let axis = fitted.axis(&boss.out);
-    let foot = AxisEnd::on(measure, Some(boss.base), &on_axis(&fitted, &boss.foot), &axis.value);
-    let top = on_axis(&fitted, &(boss.foot + boss.out * boss.height));
+    let foot = fitted.surface.nearest_on_axis(&boss.foot);
+    let foot = AxisEnd::on(measure, Some(boss.base), &foot, &axis.value);
+    let top = fitted.surface.nearest_on_axis(&(boss.foot + boss.out * boss.height));
     let top = AxisEnd::on(measure, boss.top, &top, &axis.value).known_as(fitted.to);
-    let std = fitted.fit.as_ref().and_then(|fit| lateral_std(fit, &foot.point));
-    let centre = Measured { value: foot.point, std, touches: together([&fitted.touches, &foot.touches]) };
+    let centre = foot.centre(&fitted, |fit| fit.lateral_std(&foot.point));
     Feature {
         diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),
         depth: Some(between(&top, &foot, &axis.value)),
         axis: Some(axis),
-        surface: SizedSurface::Round(fitted.surface.clone()),
+        walls: Some(Walls::Round(fitted.surface)),
         ..Feature::new(Kind::Boss, centre, measure.observed.touched_share(&wall.segments), fitted.to)
     }
 }
 
-/// By how much the middle of a slot may be off, m: across it, and along it where its ends determine that.
-pub(super) fn middle_std(fit: &Fit<Stadium>) -> Option<f64> {
-    let across = fit.std(Freedom::Y)?;
-    Some(fit.std(Freedom::X).map_or(across, |along| across.hypot(along)))
-}
-
 fn slot_feature(measure: &Measure, slot: &Slot, kind: Kind) -> Feature {
     let is_round =
-        |&number: &usize| matches!(measure.observed.parted.segment(number).primitive, Primitive::Cylinder { .. });
+        |&number: &usize| matches!(measure.observed.parted.segment(number).primitive, Primitive::Cylinder(_));
     let ends = if slot.ends.iter().flatten().any(is_round) { Ends::Round } else { Ends::Straight };
     let fitted = measure.stadium(slot, ends);
     let axis = fitted.axis(&slot.out);
@@ -242,11 +220,7 @@ fn slot_feature(measure: &Measure, slot: &Slot, kind: Kind) -> Feature {
     let near = start + direction * along + axis.value * (slot.centre - start).dot(&axis.value);
     let opening = AxisEnd::on(measure, Some(slot.land), &near, &axis.value);
     let floor = AxisEnd::on(measure, slot.floor, &(near - axis.value * slot.depth), &axis.value).known_as(fitted.to);
-    let centre = Measured {
-        value: opening.point,
-        std: fitted.fit.as_ref().and_then(middle_std),
-        touches: together([&fitted.touches, &opening.touches]),
-    };
+    let centre = opening.centre(&fitted, Fit::middle_std);
     let length = if is_fixed(Freedom::Second) { length } else { slot.length };
     let half = direction * (length / 2.0);
     let touched = measure.observed.touched_share(&slot.walls);
@@ -262,7 +236,7 @@ fn slot_feature(measure: &Measure, slot: &Slot, kind: Kind) -> Feature {
         depth: Some(depth),
         axis: Some(axis),
         through: Some(slot.through),
-        surface: SizedSurface::Slot(fitted.surface.clone()),
+        walls: Some(Walls::Slot(fitted.surface)),
         points: vec![opening.point - half, opening.point + half],
         ..Feature::new(kind, centre, touched, fitted.to)
     }
@@ -277,25 +251,11 @@ fn fitted_to(planes: &[&Fitted<Plane>]) -> FittedTo {
 fn edge_feature(measure: &Measure, edge: &StraightEdge) -> Option<Feature> {
     let [a, b] = edge.planes.map(|number| measure.plane(number));
     let (a, b) = (a?, b?);
-    let normals = [a.surface.normal(), b.surface.normal()];
-    let direction = normals[0].cross(&normals[1]);
-    let sine = direction.norm();
-    let direction = direction.try_normalize(0.0)? * (edge.ends[1] - edge.ends[0]).dot(&direction).signum();
-    let ends = edge.ends.map(|end| on_both([a.surface.point(), b.surface.point()], normals, &end));
-    let middle = nalgebra::center(&ends[0], &ends[1]);
-    let stds = [&a, &b].map(|plane| plane.fit.as_ref().and_then(|fit| fit.std_at(&middle)));
-    // two planes that may be shifted by s and t displace their line of intersection by √(s² + t²) / sin of the angle between them
-    let std = stds[0].zip(stds[1]).map(|(s, t)| s.hypot(t) / sine);
-    let touches = together([&a.touches, &b.touches]);
-    let touched = measure.observed.touched_along(&ends);
-    let length = Measured { value: (ends[1] - ends[0]).norm(), ..Measured::default() };
-    Some(Feature {
-        axis: Some(Measured { value: direction, std: None, touches: touches.clone() }),
-        length: Some(length),
-        points: ends.to_vec(),
-        is_convex: Some(edge.is_convex),
-        ..Feature::new(Kind::Edge, Measured { value: middle, std, touches }, touched, fitted_to(&[&a, &b]))
-    })
+    let std_at = |side: usize, point: &Point3<f64>| [&a, &b][side].fit.as_ref()?.std_at(point);
+    let touches = distinct(a.touches.iter().chain(&b.touches).copied());
+    let (axis, _, found) = Feature::crossing([&a.surface, &b.surface], std_at, &edge.ends, edge.is_convex, touches)?;
+    let touched = measure.observed.touched_along(&[found.points[0], found.points[1]]);
+    Some(Feature { axis: Some(axis), touched, fitted_to: fitted_to(&[&a, &b]), ..found })
 }
 
 /// Ends of edges closer together than this are one corner, in diagonals; of exact planes: what is farther off is round.
@@ -306,9 +266,7 @@ fn corners(parted: &Parted, measure: &Measure, edges: &[StraightEdge]) -> Vec<Fe
     let mut found: Vec<([usize; 3], Feature)> = Vec::new();
     for (at, first) in edges.iter().enumerate() {
         for second in &edges[..at] {
-            let mut planes = [first.planes, second.planes].concat();
-            planes.sort_unstable();
-            planes.dedup();
+            let planes = distinct([first.planes, second.planes].concat());
             let &[i, j, k] = planes.as_slice() else { continue };
             let Some(corner) = corner_of(measure, [i, j, k]) else { continue };
             let is_exact = planes.iter().all(|&number| parted.segment(number).is_exact);
@@ -345,7 +303,7 @@ fn corner_of(measure: &Measure, planes: [usize; 3]) -> Option<Feature> {
         }
         _ => None,
     };
-    let touches = together([&together([&planes[0].touches, &planes[1].touches]), &planes[2].touches]);
+    let touches = distinct(planes.iter().flat_map(|plane| plane.touches.iter().copied()));
     let touched = measure.observed.touched_along(&[point, point]);
     let to = fitted_to(&[&planes[0], &planes[1], &planes[2]]);
     Some(Feature::new(Kind::Corner, Measured { value: point, std, touches }, touched, to))
@@ -353,7 +311,7 @@ fn corner_of(measure: &Measure, planes: [usize; 3]) -> Option<Feature> {
 
 fn plane_feature(measure: &Measure, number: usize) -> Option<Feature> {
     let fitted = measure.plane(number)?;
-    let Primitive::Plane { point, normal } = measure.observed.parted.segment(number).primitive else { return None };
+    let (point, normal) = measure.observed.parted.plane(number).map(|plane| (plane.point(), plane.normal()))?;
     let axis = fitted.axis(&normal);
     let (value, std) = fitted.met(&point, &normal)?;
     let touched = measure.observed.touched_share(&[number]);

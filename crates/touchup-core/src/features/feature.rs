@@ -98,40 +98,20 @@ pub struct Feature {
     pub touched: f64,
     /// what its numbers were fitted to
     pub fitted_to: FittedTo,
-    /// the surface that its sizes are of
-    pub(super) surface: SizedSurface,
-}
-
-/// The surface that the sizes of a feature are of.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum SizedSurface {
-    /// of a hole or boss
-    Round(Cylinder),
-    /// of a slot or pocket
-    Slot(Stadium),
-    /// none alone
-    Other,
+    /// the walls that its sizes are of, where it has some
+    pub walls: Option<Walls>,
 }
 
 /// The walls of a feature.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Walls<'a> {
+pub enum Walls {
     /// of a hole or boss
-    Round(&'a Cylinder),
+    Round(Cylinder),
     /// of a slot or pocket
-    Slot(&'a Stadium),
+    Slot(Stadium),
 }
 
 impl Feature {
-    /// The walls that its sizes are of, where it has some.
-    pub fn walls(&self) -> Option<Walls<'_>> {
-        match &self.surface {
-            SizedSurface::Round(wall) => Some(Walls::Round(wall)),
-            SizedSurface::Slot(walls) => Some(Walls::Slot(walls)),
-            SizedSurface::Other => None,
-        }
-    }
-
     /// Numbers of the touches that its sizes come from; one may come again.
     pub(crate) fn touch_numbers(&self) -> impl Iterator<Item = u32> {
         let sizes = [&self.diameter, &self.width, &self.length].into_iter().flatten();
@@ -154,7 +134,7 @@ impl Feature {
             axis: Some(Measured { value: axis, ..Measured::default() }),
             diameter: Some(diameter),
             depth: Some(Measured { value: depth, ..Measured::default() }),
-            surface: SizedSurface::Round(wall),
+            walls: Some(Walls::Round(wall)),
             ..Self::new(Kind::Hole, Measured { value: opening, ..Measured::default() }, 1.0, FittedTo::Touches)
         }
     }
@@ -178,7 +158,7 @@ impl Feature {
             is_convex: None,
             touched,
             fitted_to,
-            surface: SizedSurface::Other,
+            walls: None,
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::facets::Facets;
 use super::segment::Segmentation;
+use crate::numeric::flood;
 
 /// Across a sharper edge than this no region grows, and a normal may be off by no more: half of a polygon of 9 sides. 40°.
 pub(super) const SMOOTH: f64 = 0.766;
@@ -29,8 +30,7 @@ pub(super) struct FlatPiece {
 impl Flats {
     /// `None` for a mesh that is no drawing.
     pub fn of(facets: &Facets) -> Option<Self> {
-        let of_face = || vec![Segmentation::NONE; facets.slots()];
-        is_drawn(facets).then(|| Self { of_face: of_face(), flats: Vec::new() })
+        is_drawn(facets).then(|| Self { of_face: vec![Segmentation::NONE; facets.slots()], flats: Vec::new() })
     }
 
     /// That of a face.
@@ -43,17 +43,15 @@ impl Flats {
     fn add(&mut self, facets: &Facets, seed: u32) -> u32 {
         let (normal, number) = (facets.normal(seed), self.flats.len() as u32);
         self.of_face[seed as usize] = number;
-        let (mut faces, mut at) = (vec![seed], 0);
-        while at < faces.len() {
-            for (_, other) in facets.beside(faces[at]) {
-                let is_new = self.of_face[other as usize] == Segmentation::NONE;
-                if is_new && 1.0 - normal.dot(&facets.normal(other)) < COPLANAR {
-                    self.of_face[other as usize] = number;
-                    faces.push(other);
-                }
+        let beside = |face| facets.beside(face).map(|(_, other)| other);
+        let faces = flood(vec![seed], beside, |other| {
+            let of_other = &mut self.of_face[other as usize];
+            let is_new = *of_other == Segmentation::NONE && 1.0 - normal.dot(&facets.normal(other)) < COPLANAR;
+            if is_new {
+                *of_other = number;
             }
-            at += 1;
-        }
+            is_new
+        });
         self.flats.push(FlatPiece { area: facets.area_of(&faces), faces });
         number
     }

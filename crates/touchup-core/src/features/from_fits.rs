@@ -3,12 +3,11 @@
 use nalgebra::{Point3, Vector3};
 
 use super::borders::on_both;
-use super::detect::{lateral_std, middle_std};
-use super::feature::{Feature, FittedTo, Kind, Measured, SizedSurface};
-use super::fit::{Cylinder, Fit, Freedom, Plane, Stadium, Surface as Fitted};
+use super::feature::{Feature, FittedTo, Kind, Measured, Walls};
+use super::fit::{Cylinder, Fit, Freedom, Plane, Stadium, Surface};
 
 /// Numbers of touches, in ascending order.
-type Touches = Vec<u32>;
+pub(super) type Touches = Vec<u32>;
 
 /// A place where a hole or slot ends, or the top of a boss.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,8 +32,8 @@ impl Feature {
             diameter: Some(number(wall, 2.0 * wall.surface.radius, &[(Freedom::Size, 2.0)], &touches)),
             depth: end.map(|end| apart(top, end, &touches)),
             through: end.filter(|_| kind == Kind::Hole).map(|_| false),
-            surface: SizedSurface::Round(wall.surface.clone()),
-            ..Self::touched(kind, centre, lateral_std(wall, &centre), touches)
+            walls: Some(Walls::Round(wall.surface)),
+            ..Self::touched(kind, centre, wall.lateral_std(&centre), touches)
         }
     }
 
@@ -51,8 +50,8 @@ impl Feature {
             depth: floor.map(|floor| apart(top, floor, &touches)),
             through: floor.map(|_| false),
             points: vec![centre - half, centre + half],
-            surface: SizedSurface::Slot(wall.surface.clone()),
-            ..Self::touched(Kind::Slot, centre, middle_std(wall), touches)
+            walls: Some(Walls::Slot(wall.surface)),
+            ..Self::touched(Kind::Slot, centre, wall.middle_std(), touches)
         }
     }
 
@@ -60,28 +59,44 @@ impl Feature {
     ///
     /// - `ends`: near the edge, m in O.
     pub fn edge(sides: [&Fit<Plane>; 2], ends: &[Point3<f64>; 2], is_convex: bool, touches: Touches) -> Option<Self> {
-        let normals = sides.map(|side| side.surface.normal());
-        let direction = normals[0].cross(&normals[1]);
-        let sine = direction.norm();
-        let direction = direction.try_normalize(0.0)? * (ends[1] - ends[0]).dot(&direction).signum();
-        let ends = ends.map(|end| on_both(sides.map(|side| side.surface.point()), normals, &end));
-        let middle = nalgebra::center(&ends[0], &ends[1]);
-        let [s, t] = sides.map(|side| side.std_at(&middle));
-        // two planes that may be shifted by s and t displace their line of intersection by √(s² + t²) / sin of the angle between them
-        let std = s.zip(t).map(|(s, t)| s.hypot(t) / sine);
+        let planes = sides.map(|side| &side.surface);
+        let std_at = |side: usize, point: &Point3<f64>| sides[side].std_at(point);
+        let (mut axis, sine, edge) = Self::crossing(planes, std_at, ends, is_convex, touches)?;
         // a plane that leans along the edge takes the edge with it
-        let leans = [0, 1].map(|at| {
-            let along = sides[at].surface.pose_of.inverse_transform_vector(&direction);
-            sides[at].estimate(0.0, &[(Freedom::TiltX, along.x), (Freedom::TiltY, along.y)])
+        let leans = sides.map(|side| {
+            let along = side.surface.pose_of.inverse_transform_vector(&axis.value);
+            side.estimate(0.0, &[(Freedom::TiltX, along.x), (Freedom::TiltY, along.y)])
         });
-        let axis_std = leans[0].zip(leans[1]).map(|(a, b)| a.std.hypot(b.std) / sine);
-        Some(Self {
-            axis: Some(Measured { value: direction, std: axis_std, touches: touches.clone() }),
+        axis.std = leans[0].zip(leans[1]).map(|(a, b)| a.std.hypot(b.std) / sine);
+        Some(Self { axis: Some(axis), ..edge })
+    }
+
+    /// The edge in which two planes meet, as far as from one place near it to another: its axis, the sine between the planes, and the rest;
+    /// `None` when they are parallel.
+    ///
+    /// - `std_at`: of a plane along its normal at a point of it, m.
+    pub(super) fn crossing(
+        planes: [&Plane; 2],
+        std_at: impl Fn(usize, &Point3<f64>) -> Option<f64>,
+        ends: &[Point3<f64>; 2],
+        is_convex: bool,
+        touches: Touches,
+    ) -> Option<(Measured<Vector3<f64>>, f64, Self)> {
+        let direction = planes[0].normal().cross(&planes[1].normal());
+        let sine = direction.norm();
+        let value = direction.try_normalize(0.0)? * (ends[1] - ends[0]).dot(&direction).signum();
+        let ends = ends.map(|end| on_both(planes, &end));
+        let middle = nalgebra::center(&ends[0], &ends[1]);
+        // two planes that may be shifted by s and t displace their line of intersection by √(s² + t²) / sin of the angle between them
+        let std = std_at(0, &middle).zip(std_at(1, &middle)).map(|(s, t)| s.hypot(t) / sine);
+        let axis = Measured { value, std: None, touches: touches.clone() };
+        let edge = Self {
             length: Some(Measured { value: (ends[1] - ends[0]).norm(), ..Measured::default() }),
             points: ends.to_vec(),
             is_convex: Some(is_convex),
             ..Self::touched(Kind::Edge, middle, std, touches)
-        })
+        };
+        Some((axis, sine, edge))
     }
 
     /// A plane, at the place of it that is nearest to `middle`.
@@ -105,13 +120,13 @@ fn met(plane: &Plane, from: &Point3<f64>, direction: &Vector3<f64>) -> Point3<f6
     from + direction * ((plane.point() - from).dot(&normal) / direction.dot(&normal))
 }
 
-fn axis_of<S: Fitted>(fit: &Fit<S>, out: &Vector3<f64>, touches: &Touches) -> Measured<Vector3<f64>> {
-    let axis = fit.surface.axis();
-    let value = if axis.dot(out) < 0.0 { -axis } else { axis };
-    Measured { value, std: fit.axis_std(), touches: touches.clone() }
+/// Its direction, with the sign of `out`.
+pub(super) fn axis_of<S: Surface>(fit: &Fit<S>, out: &Vector3<f64>, touches: &Touches) -> Measured<Vector3<f64>> {
+    Measured { value: fit.surface.axis_towards(out), std: fit.axis_std(), touches: touches.clone() }
 }
 
-fn number<S: Fitted>(fit: &Fit<S>, value: f64, by: &[(Freedom, f64)], touches: &Touches) -> Measured<f64> {
+/// A number with its derivatives by the freedoms.
+pub(super) fn number<S: Surface>(fit: &Fit<S>, value: f64, by: &[(Freedom, f64)], touches: &Touches) -> Measured<f64> {
     Measured { value, std: fit.estimate(value, by).map(|estimate| estimate.std), touches: touches.clone() }
 }
 

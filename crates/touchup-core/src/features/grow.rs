@@ -4,12 +4,10 @@
 //! it and grows over neighbours whose corners lie on it and which face as it does. Where a plane ends without an edge it may
 //! be a strip of something round: then whatever explains more of the surface is taken.
 
-use nalgebra::{Point3, Vector3};
-
 use super::facets::{Facets, NONE};
 use super::flats::{FlatPiece, Flats, SMOOTH};
 use super::marks::sort;
-use super::primitive::{Moments, NormalSpread, Primitive, cylinder_of, refined};
+use super::primitive::{NormalSpread, Primitive, cylinder_of, plane_of, refined};
 use super::segment::{Segment, Segmentation};
 use crate::mesh::{FaceId, VertexId};
 use crate::numeric::median;
@@ -24,7 +22,7 @@ struct MeshScale {
 }
 
 /// Rounding of coordinates that were stored in single precision, in diagonals.
-const ROUNDING: f64 = 1e-6;
+pub(super) const ROUNDING: f64 = 1e-6;
 /// Waves of a surface that is good otherwise, in median edges.
 const WAVES: f64 = 0.05;
 /// The same, at most, in diagonals of the mesh.
@@ -110,14 +108,6 @@ struct Growing<'a> {
     tolerance: f64,
 }
 
-/// A region before it is accepted.
-struct DraftRegion {
-    primitive: Primitive,
-    faces: Vec<u32>,
-    area: f64,
-    tolerance: f64,
-}
-
 impl<'a> Growing<'a> {
     fn of(facets: &'a Facets<'a>) -> Self {
         let slots = facets.slots();
@@ -136,24 +126,15 @@ impl<'a> Growing<'a> {
 
     /// Faces ordered by the flatness of their surroundings, then by id.
     fn seeds(&self) -> Vec<u32> {
-        const BUCKETS: usize = 16;
-        let (mut bucket_of, mut ends) = (Vec::with_capacity(self.facets.slots()), [0; BUCKETS]);
+        let mut buckets: [Vec<u32>; 16] = Default::default();
         for (face, normal) in self.facets.normals.iter().enumerate() {
             let turns = self.facets.beside(face as u32).map(|(_, other)| 1.0 - normal.dot(&self.facets.normal(other)));
             let sharpest = turns.fold(0.0, f64::max);
             // 1 − cos: a bucket for each power of two above a thousandth of a degree
             let at = power_of_two((sharpest / 1.5e-10).max(1.0)) / 2;
-            bucket_of.push(at.min(BUCKETS - 1) as u8);
-            ends[at.min(BUCKETS - 1)] += 1;
+            buckets[at.min(buckets.len() - 1)].push(face as u32);
         }
-        let mut starts = ends.iter().scan(0, |end, count| Some(std::mem::replace(end, *end + count)));
-        let mut places: [usize; BUCKETS] = std::array::from_fn(|_| starts.next().unwrap_or(0));
-        let mut seeds = vec![0; bucket_of.len()];
-        for (face, &bucket) in bucket_of.iter().enumerate() {
-            seeds[places[bucket as usize]] = face as u32;
-            places[bucket as usize] += 1;
-        }
-        seeds
+        buckets.concat()
     }
 
     /// Free faces around `seed` that are reached over smooth edges, the nearest first.
@@ -197,7 +178,7 @@ impl<'a> Growing<'a> {
         if !is_bounded {
             let enough = best.as_ref().map_or(0.0, |plane| MORE * plane.area);
             let faces = best.as_ref().map_or(0, |plane| plane.faces.len());
-            let is_more = |curved: &DraftRegion| curved.area > enough;
+            let is_more = |curved: &Segment| curved.area > enough;
             let mut curved = self.cylinder_from(seed, faces, &mut needs).filter(is_more);
             if curved.is_none() && faces > 0 && self.is_exact() {
                 // facets of a drawing that were divided further lie off the circle
@@ -218,20 +199,14 @@ impl<'a> Growing<'a> {
         }
     }
 
-    fn accept(&mut self, region: DraftRegion) {
-        let DraftRegion { primitive, mut faces, area, tolerance } = region;
-        sort(&mut faces, self.of_face.len());
-        for &face in &faces {
-            self.of_face[face as usize] = self.segments.len() as u32;
-        }
-        let is_exact = tolerance <= self.scale.exact();
-        self.segments.push(Segment { primitive, faces, area, tolerance, is_exact });
+    fn accept(&mut self, mut region: Segment) {
+        sort(&mut region.faces, self.of_face.len());
+        region.faces.iter().for_each(|&face| self.of_face[face as usize] = self.segments.len() as u32);
+        self.segments.push(region);
     }
 
-    fn plane_from(&mut self, seed: u32, near: &[u32], needs: &mut f64) -> Option<DraftRegion> {
-        let mut moments = Moments::about(self.facets.triangle(seed)[0]);
-        near.iter().for_each(|&face| moments.add(self.facets, face));
-        let start = moments.plane()?;
+    fn plane_from(&mut self, seed: u32, near: &[u32], needs: &mut f64) -> Option<Segment> {
+        let start = plane_of(self.facets, self.facets.triangle(seed)[0], near.iter().copied())?;
         self.is_close(&start, near, needs).then_some(())?;
         self.grown(seed, start, near.len())
     }
@@ -242,12 +217,14 @@ impl<'a> Growing<'a> {
     }
 
     /// A flat piece of a drawing, where it continues in round ones, of facets much smaller than it is.
-    fn flat_from(&mut self, flat: &FlatPiece) -> Option<DraftRegion> {
+    fn flat_from(&mut self, flat: &FlatPiece) -> Option<Segment> {
         let (facets, seed) = (self.facets, flat.faces[0]);
         let largest = flat.beside(facets).map(|face| facets.area(face)).fold(0.0, f64::max);
-        let mut moments = Moments::about(facets.triangle(seed)[0]);
-        moments.add(facets, seed);
-        if flat.area > FLAT_AMONG_ROUND * largest { self.grown(seed, moments.plane()?, flat.faces.len()) } else { None }
+        if flat.area <= FLAT_AMONG_ROUND * largest {
+            return None;
+        }
+        let start = plane_of(facets, facets.triangle(seed)[0], std::iter::once(seed))?;
+        self.grown(seed, start, flat.faces.len())
     }
 
     /// Takes the flat pieces of a drawing that are left between its round ones: what is beside may have kept a seed from
@@ -274,15 +251,15 @@ impl<'a> Growing<'a> {
         }
     }
 
-    fn is_wide(&self, region: &DraftRegion) -> bool {
+    fn is_wide(&self, region: &Segment) -> bool {
         region.area > (LEAST_WIDTH * self.tolerance).powi(2)
     }
 
     /// The largest cylinder through the faces around a seed.
     ///
     /// - `plane`: number of faces of the plane that was found there.
-    fn cylinder_from(&mut self, seed: u32, plane: usize, needs: &mut f64) -> Option<DraftRegion> {
-        let mut best: Option<DraftRegion> = None;
+    fn cylinder_from(&mut self, seed: u32, plane: usize, needs: &mut f64) -> Option<Segment> {
+        let mut best: Option<Segment> = None;
         let (mut before, mut is_all) = (0, false);
         for most in CURVED_NEAR.into_iter().chain([(3 * plane + 24).min(MOST_NEAR)]) {
             if is_all || most <= before {
@@ -328,7 +305,7 @@ impl<'a> Growing<'a> {
     /// The region around `seed` that a primitive explains, and the primitive through all of it.
     ///
     /// - `near`: from how many faces around the primitive comes.
-    fn grown(&mut self, seed: u32, start: Primitive, near: usize) -> Option<DraftRegion> {
+    fn grown(&mut self, seed: u32, start: Primitive, near: usize) -> Option<Segment> {
         let mut primitive = start;
         let mut faces = Vec::new();
         for _ in 0..2 {
@@ -338,15 +315,15 @@ impl<'a> Growing<'a> {
             faces = self.flood(vec![seed], &mut primitive, near);
             let used = primitive;
             primitive = self.fitted(&used, &faces)?;
-            if matches!(used, Primitive::Plane { .. }) && self.is_settled(&used, &primitive, &faces) {
+            if used.plane().is_some() && self.is_settled(&used, &primitive, &faces) {
                 break;
             }
         }
-        if matches!(primitive, Primitive::Cylinder { radius, .. } if self.closeness > SHARPNESS * radius) {
+        if matches!(primitive, Primitive::Cylinder(wall) if self.closeness > SHARPNESS * wall.radius) {
             return None;
         }
         let area = self.facets.area_of(&faces);
-        Some(DraftRegion { primitive, faces, area, tolerance: self.tolerance })
+        Some(Segment { primitive, faces, area, tolerance: self.tolerance, is_exact: self.is_exact() })
     }
 
     /// Goes from the faces of `found` over all that belong to the primitive, which follows them each time their number has
@@ -392,17 +369,13 @@ impl<'a> Growing<'a> {
     }
 
     fn fitted(&self, primitive: &Primitive, faces: &[u32]) -> Option<Primitive> {
-        if let Primitive::Plane { point, .. } = primitive {
-            let mut moments = Moments::about(*point);
-            let step = faces.len().div_ceil(MOST_OF_PLANE);
-            faces.iter().step_by(step).for_each(|&face| moments.add(self.facets, face));
-            return moments.plane();
-        }
-        refined(primitive, self.facets, faces)
+        let Some(plane) = primitive.plane() else { return refined(primitive, self.facets, faces) };
+        let step = faces.len().div_ceil(MOST_OF_PLANE);
+        plane_of(self.facets, plane.point(), faces.iter().copied().step_by(step))
     }
 
     /// Share of a region's border without an edge.
-    fn smooth_share(&mut self, region: &DraftRegion) -> f64 {
+    fn smooth_share(&mut self, region: &Segment) -> f64 {
         self.round += 1;
         region.faces.iter().for_each(|&face| self.seen[face as usize] = self.round);
         let (mut smooth, mut all) = (0.0, f64::MIN_POSITIVE);
@@ -450,7 +423,7 @@ impl<'a> Growing<'a> {
                 continue;
             }
             let primitive = self.fitted(&primitive, &faces).unwrap_or(primitive);
-            self.accept(DraftRegion { primitive, faces, area, tolerance: segment.tolerance });
+            self.accept(Segment { primitive, faces, area, ..segment });
         }
     }
 
@@ -469,19 +442,19 @@ impl<'a> Growing<'a> {
 pub(super) fn belongs(facets: &Facets, face: u32, primitive: &Primitive, tolerance: f64) -> bool {
     let normal = match primitive {
         // most are planes: no more is loaded and reckoned than they need
-        Primitive::Plane { point, normal } => {
-            let off = |&vertex: &VertexId| (facets.mesh.position(vertex) - point).dot(normal).abs();
+        Primitive::Plane(plane) => {
+            let (point, normal) = (plane.point(), plane.normal());
+            let off = |&vertex: &VertexId| (facets.mesh.position(vertex) - point).dot(&normal).abs();
             if facets.mesh.corners(FaceId(face)).iter().any(|vertex| off(vertex) > tolerance) {
                 return false;
             }
-            *normal
+            normal
         }
         curved => {
-            let [a, b, c] = facets.triangle(face);
-            if [a, b, c].iter().any(|p| curved.distance(p).abs() > tolerance) {
+            if facets.triangle(face).iter().any(|p| curved.distance(p).abs() > tolerance) {
                 return false;
             }
-            curved.normal_at(&Point3::from((a.coords + b.coords + c.coords) / 3.0))
+            curved.distance_and_normal(&facets.mesh.barycentre(FaceId(face))).1
         }
     };
     if facets.normal(face).dot(&normal) > ALIKE {
@@ -541,10 +514,7 @@ pub(super) fn median_edge(facets: &Facets) -> f64 {
         .step_by(step)
         .filter(|&face| facets.areas[face] > 0.0)
         .map(|face| facets.edge(face as u32, 0))
-        .map(|[a, b]: [Point3<f64>; 2]| -> f64 {
-            let v: Vector3<f64> = b - a;
-            v.norm()
-        })
+        .map(|[a, b]| (b - a).norm())
         .collect();
     median(&mut lengths).unwrap_or(0.0)
 }

@@ -2,8 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::primitive::{Primitive, Side};
-use super::scene::{Parted, along_to_plane};
+use super::scene::Parted;
 use super::walls::Wall;
 use crate::mesh::{BoxQuery, FaceId};
 use crate::numeric::tangent_basis;
@@ -106,7 +105,7 @@ struct WallEnd {
 
 /// All round holes.
 pub(super) fn holes(parted: &Parted, walls: &[Wall]) -> Vec<Hole> {
-    let is_hole = |wall: &Wall| wall.side() == Side::Hole && !wall.is_cone();
+    let is_hole = |wall: &Wall| wall.is_concave() && !wall.is_cone();
     let found: Vec<Hole> =
         (0..walls.len()).filter(|&at| is_hole(&walls[at])).filter_map(|at| hole(parted, walls, at)).collect();
     let is_fragment =
@@ -148,7 +147,7 @@ fn hole(parted: &Parted, walls: &[Wall], at: usize) -> Option<Hole> {
     let (open, other) = (ends[open], ends[1 - open]);
     let on_plane = |end: &WallEnd| {
         let (number, _) = end.rim?;
-        let t = along_to_plane(&parted.segment(number).primitive, &wall.origin, &wall.axis)?;
+        let t = parted.plane(number)?.along(&wall.origin, &wall.axis)?;
         ((t - end.t).abs() < NEAR_END * radius).then_some((number, t))
     };
     let rim = on_plane(&open);
@@ -240,7 +239,7 @@ fn openness(walls: &[Wall], at: usize, end: &WallEnd) -> f64 {
     let wall = &walls[at];
     let is_next = |other: &&Wall| {
         let beyond = (other.at(other.middle()) - wall.at(end.t)).dot(&wall.axis) * end.out;
-        other.side() == Side::Hole
+        other.is_concave()
             && other.coverage >= HOLE_COVERAGE
             && other.is_coaxial(wall, SAME_AXIS)
             && other.gap(wall) < SAME_HOLE * wall.radius()
@@ -258,7 +257,7 @@ fn cone_beside(walls: &[Wall], at: usize, end: &WallEnd) -> Option<usize> {
         let cone = &walls[other];
         let beyond = (cone.at(cone.middle()) - wall.at(end.t)).dot(&wall.axis) * end.out;
         cone.is_cone()
-            && cone.side() == Side::Hole
+            && cone.is_concave()
             && cone.coverage > HOLE_COVERAGE
             && cone.is_coaxial(wall, SAME_AXIS)
             && cone.gap(wall).abs() < SAME_HOLE * wall.radius()
@@ -274,10 +273,7 @@ fn is_countersink(cone: &Wall, wall: &Wall, out: f64) -> bool {
 /// The plane square to the axis that closes a wall at `t`.
 fn floor_at(parted: &Parted, wall: &Wall, t: f64) -> Option<usize> {
     let number = parted.segment_at(&parted.around(wall.segments[0]), &wall.at(t), NEAR_END * wall.radius())?;
-    match parted.segment(number).primitive {
-        Primitive::Plane { normal, .. } if normal.dot(&wall.axis).abs() > SQUARE => Some(number),
-        _ => None,
-    }
+    (parted.plane(number)?.normal().dot(&wall.axis).abs() > SQUARE).then_some(number)
 }
 
 /// Holes that follow each other on one axis: the group of each, where it has company.
@@ -298,7 +294,7 @@ pub(super) fn groups(walls: &[Wall], holes: &[Hole]) -> Vec<Option<usize>> {
 
 /// All round bosses: walls with material inside whose foot is a plane.
 pub(super) fn bosses(parted: &Parted, walls: &[Wall]) -> Vec<Boss> {
-    let is_boss = |wall: &Wall| wall.side() == Side::Boss && !wall.is_cone() && wall.coverage >= BOSS_COVERAGE;
+    let is_boss = |wall: &Wall| !wall.is_concave() && !wall.is_cone() && wall.coverage >= BOSS_COVERAGE;
     (0..walls.len()).filter(|&at| is_boss(&walls[at])).filter_map(|at| boss(parted, walls, at)).collect()
 }
 
@@ -313,7 +309,7 @@ fn boss(parted: &Parted, walls: &[Wall], at: usize) -> Option<Boss> {
         if share < 2.0 * RIM || wall.height() < LEAST_HEIGHT * radius {
             return None;
         }
-        let to_plane = |number: usize| along_to_plane(&parted.segment(number).primitive, &wall.origin, &wall.axis);
+        let to_plane = |number: usize| parted.plane(number)?.along(&wall.origin, &wall.axis);
         let foot = to_plane(base)?;
         let lid = parted
             .plane_around(&around, &wall.at(top), &direction, &[FREE * radius], NEAR_END * radius)

@@ -8,10 +8,10 @@ use nalgebra::{Point3, Vector3};
 use super::feature::{FittedTo, Measured};
 use super::fit::{Cone, Cylinder, Ends, Fit, FitParams, Freedom, Observation, Plane, Stadium, Surface, fit};
 use super::observe::Observed;
-use super::primitive::{Primitive, Side};
+use super::primitive::Primitive;
 use super::slots::Slot;
 use super::walls::Wall;
-use crate::numeric::{order_statistic, scatter, tangent_basis};
+use crate::numeric::{order_statistic, spreads, tangent_basis};
 
 /// A fitted surface and what it was fitted to.
 #[derive(Clone, Debug)]
@@ -53,11 +53,11 @@ impl<'a> Measure<'a> {
         if let Some(known) = self.planes.borrow().get(&number) {
             return Some(known.clone());
         }
-        let Primitive::Plane { point, normal } = self.observed.parted.segment(number).primitive else { return None };
-        let guess = Plane::new(point, &normal);
+        let guess = self.observed.parted.plane(number)?;
         let touches = self.observed.touches_of(&[number]);
-        let is_enough = touches.len() >= LEAST_TOUCHES && self.spread(&touches, &point) > LEAST_TURN;
-        let fitted = self.fitted(&guess, if is_enough { touches } else { Vec::new() }, &[number], None);
+        let is_enough = touches.len() >= LEAST_TOUCHES && self.spread(&touches, &guess.point()) > LEAST_TURN;
+        let touches = if is_enough { touches } else { Vec::new() };
+        let fitted = self.fitted(guess, touches, &self.observed.of_mesh(&[number]), None);
         self.planes.borrow_mut().insert(number, fitted.clone());
         Some(fitted)
     }
@@ -67,28 +67,27 @@ impl<'a> Measure<'a> {
     /// - `rim`: number of the plane around its opening.
     pub fn cylinder(&self, wall: &Wall, rim: Option<usize>) -> Fitted<Cylinder> {
         let touches = self.observed.touches_of(&wall.segments);
-        let mut guess = Cylinder::new(wall.at(wall.middle()), &wall.axis, wall.radius(), wall.side() == Side::Hole);
-        let mut axis_sigma = None;
+        let (mut axis, mut axis_sigma) = (wall.axis, None);
         let is_enough = touches.len() >= LEAST_TOUCHES && self.turn(&touches, wall) >= LEAST_TURN;
         let height = if is_enough { self.height(&touches, wall) } else { wall.height() };
         if height < SHORT * 2.0 * wall.radius()
             && let Some(plane) = rim.and_then(|rim| self.plane(rim))
         {
-            let normal = plane.surface.normal();
-            guess = Cylinder::new(wall.at(wall.middle()), &normal, wall.radius(), wall.side() == Side::Hole);
-            axis_sigma = Some(DRILLED);
+            (axis, axis_sigma) = (plane.surface.normal(), Some(DRILLED));
         }
-        self.fitted(&guess, if is_enough { touches } else { Vec::new() }, &wall.segments, axis_sigma)
+        let guess = Cylinder::new(wall.at(wall.middle()), &axis, wall.radius(), wall.is_concave());
+        let touches = if is_enough { touches } else { Vec::new() };
+        self.fitted(&guess, touches, &self.observed.of_mesh(&wall.segments), axis_sigma)
     }
 
     /// The cone of a wall; `None` for a cylinder.
     pub fn cone(&self, wall: &Wall) -> Option<Fitted<Cone>> {
-        let Primitive::Cone { half_angle, side, .. } = wall.primitive else { return None };
+        let Primitive::Cone(Cone { half_angle, concave, .. }) = wall.primitive else { return None };
         let touches = self.observed.touches_of(&wall.segments);
         let is_enough = touches.len() >= LEAST_TOUCHES && self.turn(&touches, wall) >= LEAST_TURN;
-        let middle = wall.middle();
-        let guess = Cone::new(wall.at(middle), &wall.axis, wall.radius_at(middle), half_angle, side == Side::Hole);
-        Some(self.fitted(&guess, if is_enough { touches } else { Vec::new() }, &wall.segments, None))
+        let guess = Cone::new(wall.at(wall.middle()), &wall.axis, wall.radius(), half_angle, concave);
+        let touches = if is_enough { touches } else { Vec::new() };
+        Some(self.fitted(&guess, touches, &self.observed.of_mesh(&wall.segments), None))
     }
 
     /// The walls of a slot or pocket.
@@ -123,21 +122,11 @@ impl<'a> Measure<'a> {
             touches.clear();
         }
         of_mesh.extend(mesh_of_ends);
-        self.fitted_or(&guess, touches, &of_mesh, Some(DRILLED))
+        self.fitted(&guess, touches, &of_mesh, Some(DRILLED))
     }
 
     /// Fits to touches; where there are none, or it fails, to the mesh.
     fn fitted<S: Surface>(
-        &self,
-        guess: &S,
-        touches: Vec<u32>,
-        segments: &[usize],
-        axis_sigma: Option<f64>,
-    ) -> Fitted<S> {
-        self.fitted_or(guess, touches, &self.observed.of_mesh(segments), axis_sigma)
-    }
-
-    fn fitted_or<S: Surface>(
         &self,
         guess: &S,
         touches: Vec<u32>,
@@ -181,30 +170,24 @@ impl<'a> Measure<'a> {
 
     /// How much the touches on a plane are spread in their second direction, beside the first.
     fn spread(&self, touches: &[u32], about: &Point3<f64>) -> f64 {
-        let scatter = scatter(touches.iter().map(|&number| self.observed.touch(number).point - about));
-        let spread = scatter / touches.len() as f64;
-        let mut sizes: Vec<f64> = spread.symmetric_eigenvalues().iter().map(|x| x.max(0.0).sqrt()).collect();
-        sizes.sort_by(f64::total_cmp);
+        let [_, second, first] = spreads(touches.iter().map(|&number| self.observed.touch(number).point - about));
         // two lines far apart are as good as a field
-        if sizes[2] > 0.0 { (sizes[1] / sizes[2] * 4.0).min(1.0) } else { 0.0 }
+        if first > 0.0 { (second / first * 4.0).min(1.0) } else { 0.0 }
     }
 }
 
 impl Fitted<Plane> {
     /// Where a line meets the plane, and its uncertainty along the normal, m.
     pub fn met(&self, from: &Point3<f64>, direction: &Vector3<f64>) -> Option<(Point3<f64>, Option<f64>)> {
-        let (point, normal) = (self.surface.point(), self.surface.normal());
-        let t = (point - from).dot(&normal) / direction.dot(&normal);
-        let met = from + direction * t;
-        t.is_finite().then(|| (met, self.fit.as_ref().and_then(|fit| fit.std_at(&met))))
+        let met = from + direction * self.surface.along(from, direction)?;
+        Some((met, self.fit.as_ref().and_then(|fit| fit.std_at(&met))))
     }
 }
 
 impl<S: Surface> Fitted<S> {
     /// The direction of the surface, oriented along `direction`.
     pub fn axis(&self, direction: &Vector3<f64>) -> Measured<Vector3<f64>> {
-        let axis = self.surface.pose_of().rotation * Vector3::z();
-        let value = if axis.dot(direction) < 0.0 { -axis } else { axis };
+        let value = self.surface.axis_towards(direction);
         Measured { value, std: self.fit.as_ref().and_then(Fit::axis_std), touches: self.touches.clone() }
     }
 

@@ -2,15 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 
-use super::fit::Observation;
+use super::fit::{Observation, Surface};
 use super::marks::NumberSet;
 use super::primitive::Primitive;
 use super::scene::Parted;
 use super::segment::Segmentation;
 use crate::mesh::{FaceId, TriMesh, VertexId};
-use crate::numeric::{PointGrid, VoxelKey, voxel_of};
+use crate::numeric::{PointGrid, VoxelKey, distinct, voxel_of};
 use crate::stylus::ProbedPoint;
 
 /// The touches on a parted mesh.
@@ -84,9 +84,9 @@ impl<'a> Observed<'a> {
         }
         let segment = self.parted.segment(number as usize);
         let near = (NEAR_TOLERANCES * segment.tolerance).max(NEAR_RADII * self.reach);
-        let off = segment.primitive.distance(&touch.centre) - touch.radius;
-        let is_alike = segment.primitive.normal_at(&touch.centre).dot(&touch.normal) > ALIKE;
-        (off.abs() < near && is_alike).then_some(number as usize)
+        let (distance, normal) = segment.primitive.distance_and_normal(&touch.centre);
+        let is_of = (distance - touch.radius).abs() < near && normal.dot(&touch.normal) > ALIKE;
+        is_of.then_some(number as usize)
     }
 
     /// Numbers of the touches of some segments, in ascending order.
@@ -146,8 +146,7 @@ impl<'a> Observed<'a> {
         }
         let vertices: Vec<VertexId> = vertices.iter().map(VertexId).collect();
         let primitive = self.parted.segment(segments[0]).primitive;
-        let is_flat = matches!(primitive, Primitive::Plane { .. });
-        let Some(rounding) = rounding.filter(|_| !is_flat) else { return vertices };
+        let Some(rounding) = rounding.filter(|_| primitive.plane().is_none()) else { return vertices };
         let is_of = |face: &FaceId| segments.contains(&(segmentation.of_face[face.0 as usize] as usize));
         let is_on = |&vertex: &VertexId| {
             let faces: Vec<FaceId> = mesh.star(vertex).iter().copied().filter(is_of).collect();
@@ -208,13 +207,11 @@ fn is_on_chord(mesh: &TriMesh, vertex: VertexId, faces: &[FaceId], primitive: &P
     }
     let p = mesh.position(vertex);
     let straight = match primitive {
-        Primitive::Plane { .. } => return false,
-        Primitive::Cylinder { axis, .. } => *axis,
-        Primitive::Cone { apex, .. } => (p - apex).try_normalize(0.0).unwrap_or_else(Vector3::zeros),
+        Primitive::Plane(_) => return false,
+        Primitive::Cylinder(cylinder) => cylinder.axis(),
+        Primitive::Cone(cone) => cone.apex().and_then(|apex| (p - apex).try_normalize(0.0)).unwrap_or_default(),
     };
-    let mut around: Vec<VertexId> = faces.iter().flat_map(|&face| mesh.corners(face)).collect();
-    around.sort_unstable();
-    around.dedup();
+    let around = distinct(faces.iter().flat_map(|&face| mesh.corners(face)));
     let around: Vec<Point3<f64>> = around.into_iter().map(|other| mesh.position(other)).filter(|q| *q != p).collect();
     let is_between = |a: &Point3<f64>, b: &Point3<f64>| {
         if (p - a).dot(&(p - b)) >= 0.0 {

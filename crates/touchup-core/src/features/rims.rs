@@ -7,9 +7,10 @@ use nalgebra::{Point3, Vector3};
 
 use super::facets::{Facets, NONE};
 use super::fit::{Cylinder, Fit, FitParams, Observation, Surface, fit};
+use super::grow::ROUNDING;
 use super::scene::Parted;
 use crate::mesh::VertexId;
-use crate::numeric::tangent_basis;
+use crate::numeric::{mean, tangent_basis};
 
 /// A round opening.
 #[derive(Clone, Debug)]
@@ -47,8 +48,6 @@ const FACING_SHARE: f64 = 0.9;
 const FLAT: f64 = 0.03;
 /// … to this, rad; otherwise its shape decides.
 const AXIS: f64 = 0.0087;
-/// Rounding of coordinates that were stored in single precision, in diagonals.
-const ROUNDING: f64 = 1e-6;
 
 /// All round openings, in order of their first faces. The longest border of each piece is where the piece ends.
 pub(super) fn rims(parted: &Parted) -> Vec<RoundOpening> {
@@ -108,8 +107,7 @@ impl Loop {
         if self.corners.len() < LEAST_CORNERS {
             return None;
         }
-        let sum = self.corners.iter().map(|p| p.coords).sum::<Vector3<f64>>();
-        let middle = Point3::from(sum / self.corners.len() as f64);
+        let middle = Point3::from(mean(self.corners.iter().map(|p| p.coords)));
         // the part is on the left: around an opening it is gone around clockwise
         let area = self.edges().map(|(a, b)| (a - middle).cross(&(b - middle))).sum::<Vector3<f64>>();
         let out = -area.try_normalize(0.0)?;
@@ -118,9 +116,8 @@ impl Loop {
         }
         let fit = self.circle(parted, &middle, &out)?;
         let cylinder = &fit.surface;
-        let axis = cylinder.pose_of.rotation * Vector3::z();
-        let out = axis * axis.dot(&out).signum();
-        let centre = cylinder.center() + out * (middle - cylinder.center()).dot(&out);
+        let out = cylinder.axis_towards(&out);
+        let centre = cylinder.nearest_on_axis(&middle);
         let is_round = self.is_round(&centre, &out, cylinder.radius);
         is_round.then(|| RoundOpening { fit, centre, out, corners: self.corners.clone() })
     }

@@ -1,11 +1,13 @@
 //! A mesh parted into segments, with queries.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Point3, Vector3};
 
 use super::bodies::{Bodies, Surroundings};
 use super::facets::Facets;
+use super::fit::Plane;
 use super::grow::median_edge;
-use super::primitive::Primitive;
 use super::segment::{Segment, Segmentation};
 use crate::mesh::{FaceTree, TriMesh};
 use crate::numeric::tangent_basis;
@@ -52,12 +54,15 @@ impl<'a> Parted<'a> {
         self.segment(number).area > LEAST_AREA * self.diagonal * self.diagonal
     }
 
-    /// Numbers and segments, planes alone: a point, the normal.
+    /// The plane of a segment, if it is flat.
+    pub fn plane(&self, number: usize) -> Option<&Plane> {
+        self.segment(number).primitive.plane()
+    }
+
+    /// Numbers of the flat segments, each with a point and the normal.
     pub fn planes(&self) -> impl Iterator<Item = (usize, Point3<f64>, Vector3<f64>)> + '_ {
-        self.segmentation.segments.iter().enumerate().filter_map(|(number, segment)| match segment.primitive {
-            Primitive::Plane { point, normal } => Some((number, point, normal)),
-            _ => None,
-        })
+        let plane = |number| self.plane(number).map(|plane| (number, plane.point(), plane.normal()));
+        (0..self.segmentation.segments.len()).filter_map(plane)
     }
 
     /// What is around a segment.
@@ -84,28 +89,17 @@ impl<'a> Parted<'a> {
         reach: f64,
     ) -> Option<(usize, f64)> {
         let [e, g] = tangent_basis(direction);
-        let mut votes: Vec<(usize, usize)> = Vec::new();
+        let mut votes: BTreeMap<usize, usize> = BTreeMap::new();
         for (i, radius) in (0..AROUND).flat_map(|i| radii.iter().map(move |radius| (i, radius))) {
             let (sine, cosine) = (std::f64::consts::TAU * i as f64 / AROUND as f64).sin_cos();
             let p = middle + (e * cosine + g * sine) * *radius;
             let Some(number) = self.segment_at(around, &p, reach) else { continue };
-            let Primitive::Plane { normal, .. } = self.segment(number).primitive else { continue };
-            if normal.dot(direction) < SQUARE {
+            if self.plane(number).is_none_or(|plane| plane.normal().dot(direction) < SQUARE) {
                 continue;
             }
-            match votes.iter_mut().find(|(other, _)| *other == number) {
-                Some((_, count)) => *count += 1,
-                None => votes.push((number, 1)),
-            }
+            *votes.entry(number).or_default() += 1;
         }
         let (number, count) = votes.into_iter().max_by_key(|&(number, count)| (count, usize::MAX - number))?;
         Some((number, count as f64 / (AROUND * radii.len()) as f64))
     }
-}
-
-/// How far from `from` along `direction` a plane is met, m.
-pub(super) fn along_to_plane(primitive: &Primitive, from: &Point3<f64>, direction: &Vector3<f64>) -> Option<f64> {
-    let Primitive::Plane { point, normal } = primitive else { return None };
-    let t = (point - from).dot(normal) / direction.dot(normal);
-    t.is_finite().then_some(t)
 }

@@ -1,9 +1,10 @@
 //! A mesh parted into pieces that one surface each explains.
 
 use super::facets::Facets;
+use super::fit::Surface;
 use super::marks::sort;
-use super::primitive::{Moments, Primitive};
-use crate::numeric::DisjointSets;
+use super::primitive::{Primitive, plane_of};
+use crate::numeric::{DisjointSets, distinct};
 
 /// A connected piece of the mesh that one primitive explains.
 #[derive(Clone, Debug)]
@@ -32,9 +33,7 @@ pub struct Segmentation {
 impl Segmentation {
     /// The face is in no segment.
     pub const NONE: u32 = u32::MAX;
-}
 
-impl Segmentation {
     /// Adds a segment, which takes its faces from those that had them; returns its number.
     pub(super) fn add(&mut self, facets: &Facets, mut segment: Segment) -> usize {
         let number = self.segments.len() as u32;
@@ -47,9 +46,7 @@ impl Segmentation {
                 poorer.push(before);
             }
         }
-        poorer.sort_unstable();
-        poorer.dedup();
-        for before in poorer {
+        for before in distinct(poorer) {
             self.segments[before as usize].faces.retain(|&face| self.of_face[face as usize] == before);
         }
         self.segments.push(segment);
@@ -84,14 +81,11 @@ impl Segmentation {
             whole.faces.extend(part.faces);
             joint.push(number_of[of]);
         }
-        joint.sort_unstable();
-        joint.dedup();
-        for number in joint {
+        for number in distinct(joint) {
             let whole = &mut self.segments[number];
             sort(&mut whole.faces, facets.slots());
-            let mut moments = Moments::about(facets.triangle(whole.faces[0])[0]);
-            whole.faces.iter().for_each(|&face| moments.add(facets, face));
-            whole.primitive = moments.plane().unwrap_or(whole.primitive);
+            let origin = facets.triangle(whole.faces[0])[0];
+            whole.primitive = plane_of(facets, origin, whole.faces.iter().copied()).unwrap_or(whole.primitive);
         }
         for (number, segment) in self.segments.iter().enumerate() {
             segment.faces.iter().for_each(|&face| self.of_face[face as usize] = number as u32);
@@ -107,11 +101,7 @@ const SAME_PLANE: f64 = 1.5;
 /// Whether the smaller of two segments lies on the larger.
 fn is_one_plane(one: &Segment, other: &Segment) -> bool {
     let (large, small) = if one.area < other.area { (other, one) } else { (one, other) };
-    let (Primitive::Plane { normal, .. }, Primitive::Plane { point, normal: other }) =
-        (large.primitive, small.primitive)
-    else {
-        return false;
-    };
+    let Some((plane, other)) = large.primitive.plane().zip(small.primitive.plane()) else { return false };
     let near = SAME_PLANE * large.tolerance.max(small.tolerance);
-    normal.dot(&other) > SAME_NORMAL && large.primitive.distance(&point).abs() < near
+    plane.normal().dot(&other.normal()) > SAME_NORMAL && plane.distance(&other.point()).abs() < near
 }

@@ -4,8 +4,9 @@ use nalgebra::{Point3, Vector3};
 
 use super::borders::{Borders, is_convex};
 use super::facets::NONE;
-use super::primitive::{Primitive, Side};
-use super::scene::{Parted, along_to_plane};
+use super::fit::{Plane, Surface};
+use super::primitive::Primitive;
+use super::scene::Parted;
 use crate::numeric::mean;
 
 /// A void between two walls that face each other.
@@ -128,17 +129,16 @@ fn is_same_slot(one: &Slot, other: &Slot) -> bool {
 
 /// The void between two walls, and the share of the smaller one that faces the other.
 fn between(parted: &Parted, of_face: &[u32], borders: &Borders, walls: [usize; 2]) -> Option<(Slot, f64)> {
-    let [Primitive::Plane { normal: n, .. }, other] = walls.map(|wall| parted.segment(wall).primitive) else {
-        return None;
-    };
+    let planes = [parted.plane(walls[0])?, parted.plane(walls[1])?];
+    let n = planes[0].normal();
     // across from the smaller wall: the larger one may go on far beyond
     let [from, to] =
         if parted.segment(walls[0]).area < parted.segment(walls[1]).area { walls } else { [walls[1], walls[0]] };
-    let Primitive::Plane { normal, .. } = parted.segment(from).primitive else { return None };
+    let (normal, opposite) = (parted.plane(from)?.normal(), parted.plane(to)?);
     let starts = samples(parted, from);
     let mut middles = Vec::new();
     for p in &starts {
-        let width = along_to_plane(&parted.segment(to).primitive, p, &normal)?;
+        let width = opposite.along(p, &normal)?;
         let met = parted.around(from).rays(width).first(&(p + normal * (OFF * width)), &normal, 1.1 * width);
         let is_met = met.is_some_and(|met| of_face[met.face.0 as usize] == to as u32);
         if is_met && width > 0.0 {
@@ -152,8 +152,7 @@ fn between(parted: &Parted, of_face: &[u32], borders: &Borders, walls: [usize; 2
     let centroid = Point3::from(mean(middles.iter().map(|p| p.coords)));
     let far = |p: &Point3<f64>| (p - centroid).norm();
     let middle = *middles.iter().min_by(|a, b| far(a).total_cmp(&far(b)))?;
-    let width =
-        along_to_plane(&other, &middle, &n)? + along_to_plane(&parted.segment(walls[0]).primitive, &middle, &-n)?;
+    let width = planes[1].along(&middle, &n)? + planes[0].along(&middle, &-n)?;
     let area = share * parted.segment(from).area;
     let lands = lands(parted, borders, walls, &n);
     let seen = lands.into_iter().filter_map(|(land, out)| {
@@ -192,14 +191,10 @@ fn lands(parted: &Parted, borders: &Borders, walls: [usize; 2], across: &Vector3
         if walls.contains(&a) == walls.contains(&b) {
             continue;
         }
-        let [Primitive::Plane { point: p, normal: n }, Primitive::Plane { point: q, normal: m }] =
-            [a, b].map(|number| parted.segment(number).primitive)
-        else {
-            continue;
-        };
-        let out = if land == a { n } else { m };
+        let Some((one, other)) = parted.plane(a).zip(parted.plane(b)) else { continue };
+        let out = if land == a { one } else { other }.normal();
         let is_new = lands.iter().all(|(_, other)| other.dot(&out) < PARALLEL);
-        if is_new && out.dot(across).abs() < SQUARE && is_convex(parted, border, [(p, n), (q, m)]) {
+        if is_new && out.dot(across).abs() < SQUARE && is_convex(parted, border, [one, other]) {
             let out = (out - across * out.dot(across)).normalize();
             lands.push((land, out));
         }
@@ -223,7 +218,7 @@ fn opened(parted: &Parted, of_face: &[u32], seen: &Opened) -> Option<Slot> {
     let Opened { walls, middle, middles, across, width, land, out, area } = *seen;
     let mut rays = parted.around(walls[0]).rays(width);
     let reach = parted.diagonal;
-    let up = along_to_plane(&parted.segment(land).primitive, &middle, &out)?;
+    let up = parted.plane(land)?.along(&middle, &out)?;
     if up < 0.0 || rays.free(&middle, &out, reach) < up + width / 2.0 {
         return None;
     }
@@ -236,7 +231,7 @@ fn opened(parted: &Parted, of_face: &[u32], seen: &Opened) -> Option<Slot> {
     let floor = met.map(|met| named(met.face)).filter(|&number| number != NONE).map(|number| number as usize);
     let flat_floor = floor.filter(|&number| is_square(parted, number, &out));
     let down = match (flat_floor, met) {
-        (Some(number), _) => along_to_plane(&parted.segment(number).primitive, &middle, &-out)?,
+        (Some(number), _) => parted.plane(number)?.along(&middle, &-out)?,
         (None, Some(met)) => met.distance,
         (None, None) => walls_end(&-out),
     };
@@ -275,19 +270,19 @@ fn opened(parted: &Parted, of_face: &[u32], seen: &Opened) -> Option<Slot> {
 
 /// Whether a segment is a plane square to `along`.
 fn is_square(parted: &Parted, number: usize, along: &Vector3<f64>) -> bool {
-    matches!(parted.segment(number).primitive, Primitive::Plane { normal, .. } if normal.dot(along).abs() > PARALLEL.powi(4))
+    parted.plane(number).is_some_and(|plane| plane.normal().dot(along).abs() > PARALLEL.powi(4))
 }
 
 /// Whether a segment is an upright wall that `along` meets aslant.
 fn is_wall_aslant(parted: &Parted, number: usize, along: &Vector3<f64>, out: &Vector3<f64>) -> bool {
-    let Primitive::Plane { normal, .. } = parted.segment(number).primitive else { return false };
+    let Some(normal) = parted.plane(number).map(Plane::normal) else { return false };
     ASLANT.contains(&-normal.dot(along)) && normal.dot(out).abs() < SQUARE
 }
 
 /// The half-round end about a point: where the wall has few touches it may be in pieces, and the line meet another.
 fn round_end_about(parted: &Parted, middle: &Point3<f64>, out: &Vector3<f64>, width: f64) -> Option<usize> {
     let is_there = |number: usize| match parted.segment(number).primitive {
-        Primitive::Cylinder { point, axis, .. } => (middle - point).cross(&axis).norm() < ABOUT * width,
+        Primitive::Cylinder(end) => (middle - end.center()).cross(&end.axis()).norm() < ABOUT * width,
         _ => false,
     };
     // the largest first
@@ -296,10 +291,6 @@ fn round_end_about(parted: &Parted, middle: &Point3<f64>, out: &Vector3<f64>, wi
 
 /// Whether a segment is a half-round end of a slot.
 fn is_round_end(parted: &Parted, number: usize, out: &Vector3<f64>, width: f64) -> bool {
-    match parted.segment(number).primitive {
-        Primitive::Cylinder { axis, radius, side: Side::Hole, .. } => {
-            axis.dot(out).abs() > PARALLEL && (2.0 * radius - width).abs() < 0.2 * width
-        }
-        _ => false,
-    }
+    let Primitive::Cylinder(end) = parted.segment(number).primitive else { return false };
+    end.concave && end.axis().dot(out).abs() > PARALLEL && (2.0 * end.radius - width).abs() < 0.2 * width
 }

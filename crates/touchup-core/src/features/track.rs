@@ -3,13 +3,15 @@
 //! [`Tracker::renew`] detects in the whole mesh; between two detections [`Tracker::update`] takes new touches into the features
 //! that they are on, and leaves all others as they are.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 
-use super::detect::{Detection, detect, lateral_std, middle_std};
-use super::feature::{Feature, FittedTo, Kind, Measured, SizedSurface};
-use super::fit::{self, Cylinder, Fit, FitParams, Freedom, Stadium, Surface, fit};
+use super::detect::{Detection, detect};
+use super::feature::{Feature, FittedTo, Kind, Measured, Walls};
+use super::fit::{Cylinder, Fit, FitParams, Freedom, Stadium, Surface, fit};
+use super::from_fits::{Touches, axis_of, number};
 use super::observe::{groups, observation};
 use crate::mesh::{FaceTree, TriMesh};
+use crate::numeric::distinct;
 use crate::stylus::ProbedPoint;
 
 /// Follows the features of one part.
@@ -142,29 +144,20 @@ fn is_on(feature: &Feature, touch: &ProbedPoint) -> bool {
     if !is_between || (touch.point - feature.centre.value).norm() > far {
         return false;
     }
-    let (distance, normal) = match &feature.surface {
-        SizedSurface::Round(cylinder) => off(cylinder, &touch.centre),
-        SizedSurface::Slot(stadium) => off(stadium, &touch.centre),
-        SizedSurface::Other => return false,
+    let (distance, normal) = match &feature.walls {
+        Some(Walls::Round(cylinder)) => cylinder.distance_and_normal(&touch.centre),
+        Some(Walls::Slot(stadium)) => stadium.distance_and_normal(&touch.centre),
+        None => return false,
     };
     (distance - touch.radius).abs() < NEAR_RADII * reach && normal.dot(&touch.normal) > ALIKE
-}
-
-/// Signed distance and outward normal, in O.
-fn off<S: fit::Surface>(surface: &S, p: &Point3<f64>) -> (f64, Vector3<f64>) {
-    let pose = surface.pose_of();
-    let distance = surface.distance_at(&pose.inverse_transform_point(p).coords);
-    (distance.value, pose.rotation * distance.normal)
 }
 
 impl Feature {
     /// Fits the feature to its touches and the new ones; returns whether that held.
     fn take(&mut self, new: &[u32], touches: &[ProbedPoint]) -> bool {
         let sized = self.diameter.as_ref().or(self.width.as_ref());
-        let mut all = sized.map_or_else(Vec::new, |sized| sized.touches.clone());
-        all.extend(new);
-        all.sort_unstable();
-        all.dedup();
+        let known = sized.into_iter().flat_map(|sized| &sized.touches);
+        let all = distinct(known.chain(new).copied());
         let step = all.len().div_ceil(MOST_FITTED).max(1);
         let fitted: Vec<u32> = all.iter().copied().rev().step_by(step).collect();
         let chosen: Vec<ProbedPoint> = fitted.iter().rev().map(|&number| touches[number as usize]).collect();
@@ -172,58 +165,47 @@ impl Feature {
             chosen.iter().zip(groups(&chosen)).map(|(touch, group)| observation(touch, group)).collect();
         let common_sigma = chosen.iter().map(|touch| touch.calibration).sum::<f64>() / chosen.len() as f64;
         let params = FitParams { common_sigma, axis_sigma: Some(AXIS_KNOWN), ..FitParams::default() };
-        match self.surface.clone() {
-            SizedSurface::Round(cylinder) => match fit(&cylinder, &observations, &params) {
-                Ok(found) => self.is_round(&found, all),
-                Err(_) => return false,
-            },
-            SizedSurface::Slot(stadium) => match fit(&stadium, &observations, &params) {
-                Ok(found) => self.is_slot(&found, all),
-                Err(_) => return false,
-            },
-            SizedSurface::Other => return false,
-        }
-        self.fitted_to = FittedTo::Touches;
-        true
-    }
-
-    fn is_round(&mut self, found: &Fit<Cylinder>, touches: Vec<u32>) {
-        let start = found.surface.center();
-        let axis = self.turned(found.surface.pose_of.rotation * Vector3::z());
-        let centre = start + axis * (self.centre.value - start).dot(&axis);
-        self.centre = Measured { value: centre, std: lateral_std(found, &centre), touches: touches.clone() };
-        self.axis = Some(Measured { value: axis, std: found.axis_std(), touches: touches.clone() });
-        let diameter = found.diameter();
-        let value = 2.0 * found.surface.radius;
-        self.diameter = Some(Measured { value, std: diameter.map(|diameter| diameter.std), touches });
-        self.surface = SizedSurface::Round(found.surface.clone());
-    }
-
-    fn is_slot(&mut self, found: &Fit<Stadium>, touches: Vec<u32>) {
-        let axis = self.turned(found.surface.pose_of.rotation * Vector3::z());
-        let estimate = |value: f64, freedom: Freedom| {
-            let std = found.std(freedom);
-            Measured { value, std, touches: touches.clone() }
+        let is_held = match &self.walls {
+            Some(Walls::Round(cylinder)) => {
+                fit(cylinder, &observations, &params).map(|found| self.is_round(&found, &all)).is_ok()
+            }
+            Some(Walls::Slot(stadium)) => {
+                fit(stadium, &observations, &params).map(|found| self.is_slot(&found, &all)).is_ok()
+            }
+            None => false,
         };
-        self.width = Some(estimate(found.surface.width, Freedom::Size));
-        if found.std(Freedom::Second).is_some() {
-            self.length = Some(estimate(found.surface.length, Freedom::Second));
+        if is_held {
+            self.fitted_to = FittedTo::Touches;
         }
-        let start = found.surface.center();
-        let direction = found.surface.direction();
+        is_held
+    }
+
+    fn is_round(&mut self, found: &Fit<Cylinder>, touches: &Touches) {
+        let centre = found.surface.nearest_on_axis(&self.centre.value);
+        self.centre = Measured { value: centre, std: found.lateral_std(&centre), touches: touches.clone() };
+        self.axis = Some(self.turned(found, touches));
+        self.diameter = Some(number(found, 2.0 * found.surface.radius, &[(Freedom::Size, 2.0)], touches));
+        self.walls = Some(Walls::Round(found.surface));
+    }
+
+    fn is_slot(&mut self, found: &Fit<Stadium>, touches: &Touches) {
+        self.width = Some(number(found, found.surface.width, &[(Freedom::Size, 1.0)], touches));
+        if found.std(Freedom::Second).is_some() {
+            self.length = Some(number(found, found.surface.length, &[(Freedom::Second, 1.0)], touches));
+        }
+        let (axis, start, direction) = (found.surface.axis(), found.surface.center(), found.surface.direction());
         let off = self.centre.value - start;
         // along the slot only its ends determine its position
         let along = if found.std(Freedom::X).is_some() { 0.0 } else { off.dot(&direction) };
         let value = start + axis * off.dot(&axis) + direction * along;
-        self.centre = Measured { value, std: middle_std(found), touches: touches.clone() };
-        self.axis = Some(Measured { value: axis, std: found.axis_std(), touches: touches.clone() });
-        self.surface = SizedSurface::Slot(found.surface.clone());
+        self.centre = Measured { value, std: found.middle_std(), touches: touches.clone() };
+        self.axis = Some(self.turned(found, touches));
+        self.walls = Some(Walls::Slot(found.surface));
     }
 
-    /// A direction with the sign of the axis.
-    fn turned(&self, direction: Vector3<f64>) -> Vector3<f64> {
-        let before = self.axis.as_ref().map_or(direction, |axis| axis.value);
-        if direction.dot(&before) < 0.0 { -direction } else { direction }
+    /// The direction of a fit with the sign of the axis.
+    fn turned<S: Surface>(&self, found: &Fit<S>, touches: &Touches) -> Measured<Vector3<f64>> {
+        axis_of(found, &self.axis.as_ref().map_or_else(|| found.surface.axis(), |axis| axis.value), touches)
     }
 }
 

@@ -3,7 +3,8 @@
 use nalgebra::{Point3, Vector3};
 
 use super::facets::Facets;
-use super::primitive::{Primitive, Side};
+use super::fit::Surface;
+use super::primitive::Primitive;
 use super::segment::Segmentation;
 use crate::numeric::{median, tangent_basis};
 
@@ -65,10 +66,10 @@ impl Wall {
     /// The wall that these faces are; `None` for a plane.
     pub fn of_faces(facets: &Facets, primitive: &Primitive, faces: &[u32], segments: Vec<usize>) -> Option<Self> {
         let primitive = *primitive;
-        let (origin, axis) = match primitive {
-            Primitive::Plane { .. } => return None,
-            Primitive::Cylinder { point, axis, .. } => (point, axis),
-            Primitive::Cone { apex, axis, .. } => (apex, axis),
+        let (origin, axis, slope) = match primitive {
+            Primitive::Plane(_) => return None,
+            Primitive::Cylinder(cylinder) => (cylinder.center(), cylinder.axis(), 0.0),
+            Primitive::Cone(cone) => (cone.apex()?, cone.axis(), cone.half_angle),
         };
         let [e, g] = tangent_basis(&axis);
         let mut parts = [[f64::INFINITY, f64::NEG_INFINITY]; PARTS];
@@ -84,30 +85,24 @@ impl Wall {
         // the usual end, not the farthest: walls have ears
         let ends = [0, 1].map(|end| median(&mut covered.iter().map(|part| part[end]).collect::<Vec<_>>()));
         let [Some(low), Some(high)] = ends else { return None };
-        let ends = [low, high];
-        let radius = match primitive {
-            Primitive::Cone { half_angle, .. } => (low + high) / 2.0 * half_angle.tan() / half_angle.cos(),
-            Primitive::Cylinder { radius, .. } => radius,
-            Primitive::Plane { .. } => return None,
-        };
-        let area = facets.area_of(faces);
-        let whole = std::f64::consts::TAU * radius * (high - low) * coverage;
-        let filled = if whole > 0.0 { area / whole } else { 0.0 };
-        Some(Self { primitive, segments, origin, axis, ends, coverage, filled })
+        let wall = Self { primitive, segments, origin, axis, ends: [low, high], coverage, filled: 0.0 };
+        let whole = std::f64::consts::TAU * (wall.radius() / slope.cos()) * wall.height() * coverage;
+        Some(Self { filled: if whole > 0.0 { facets.area_of(faces) / whole } else { 0.0 }, ..wall })
     }
 
     /// Whether `other` is a piece of the same wall.
     fn goes_on_as(&self, other: &Self) -> bool {
         let is_same = match (self.primitive, other.primitive) {
-            (Primitive::Cylinder { radius, side, .. }, Primitive::Cylinder { radius: r, side: s, .. }) => {
-                side == s && (radius - r).abs() < SAME_RADIUS * radius
-            }
-            (Primitive::Cone { half_angle, side, .. }, Primitive::Cone { half_angle: h, side: s, .. }) => {
-                side == s && (half_angle - h).abs() < SAME_RADIUS && (self.origin - other.origin).norm() < self.radius()
+            (Primitive::Cylinder(a), Primitive::Cylinder(b)) => (a.radius - b.radius).abs() < SAME_RADIUS * a.radius,
+            (Primitive::Cone(a), Primitive::Cone(b)) => {
+                (a.half_angle - b.half_angle).abs() < SAME_RADIUS && (self.origin - other.origin).norm() < self.radius()
             }
             _ => return false,
         };
-        is_same && self.is_coaxial(other, SAME_RADIUS) && self.gap(other) < SAME_WALL * self.radius()
+        is_same
+            && self.is_concave() == other.is_concave()
+            && self.is_coaxial(other, SAME_RADIUS)
+            && self.gap(other) < SAME_WALL * self.radius()
     }
 
     /// Whether the axes are one within a share of the radius.
@@ -138,33 +133,32 @@ impl Wall {
         self.ends[1] - self.ends[0]
     }
 
-    pub fn side(&self) -> Side {
+    /// Whether the air is on the side of the axis: a hole.
+    pub fn is_concave(&self) -> bool {
         match self.primitive {
-            Primitive::Cylinder { side, .. } | Primitive::Cone { side, .. } => side,
+            Primitive::Cylinder(cylinder) => cylinder.concave,
+            Primitive::Cone(cone) => cone.concave,
             // no wall is one
-            Primitive::Plane { .. } => Side::Boss,
+            Primitive::Plane(_) => false,
         }
     }
 
     /// m; of a cone at mid-height.
     pub fn radius(&self) -> f64 {
-        match self.primitive {
-            Primitive::Cylinder { radius, .. } => radius,
-            _ => self.radius_at(self.middle()),
-        }
+        self.radius_at(self.middle())
     }
 
     /// m
     pub fn radius_at(&self, t: f64) -> f64 {
         match self.primitive {
-            Primitive::Cylinder { radius, .. } => radius,
-            Primitive::Cone { half_angle, .. } => t * half_angle.tan(),
-            Primitive::Plane { .. } => f64::INFINITY,
+            Primitive::Cylinder(cylinder) => cylinder.radius,
+            Primitive::Cone(cone) => t * cone.half_angle.tan(),
+            Primitive::Plane(_) => f64::INFINITY,
         }
     }
 
     pub fn is_cone(&self) -> bool {
-        matches!(self.primitive, Primitive::Cone { .. })
+        matches!(self.primitive, Primitive::Cone(_))
     }
 }
 

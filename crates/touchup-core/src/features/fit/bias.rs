@@ -13,14 +13,19 @@
 //! of points; the second term falls with it and matters on short arcs. Both are taken as second differences over one
 //! standard deviation, so no second derivatives are needed.
 
-use super::Surface;
-use super::solver::FitProblem;
-use super::uncertainty::{Uncertainty, along_axes};
+use nalgebra::Vector3;
 
-impl Uncertainty {
+use super::solver::FitProblem;
+use super::uncertainty::SPARE_GROUPS;
+use super::{Fit, Surface};
+
+impl<M: Surface> Fit<M> {
     /// b of each observation, m, for errors as large as the residuals say.
-    pub fn bias<M: Surface>(&self, problem: &FitProblem, surface: &M) -> Vec<f64> {
-        let excess = self.excess();
+    pub(super) fn bias(&self, problem: &FitProblem) -> Vec<f64> {
+        let surface = &self.surface;
+        let fixed = self.groups.saturating_sub(self.degrees);
+        // over the stated errors; as large where there are too few to say
+        let excess = if self.degrees > fixed + SPARE_GROUPS { self.chi_squared / self.degrees as f64 } else { 1.0 };
         let step = excess.sqrt();
         let moved: Vec<M> = self
             .deviations
@@ -31,7 +36,8 @@ impl Uncertainty {
         let of_point = |i: usize| {
             let o = &problem.observations[i];
             let here = surface.distance(&o.point);
-            let around = along_axes(o.sigma * step).into_iter().flat_map(|e| [o.point + e, o.point - e]);
+            let axes = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| axis * (o.sigma * step));
+            let around = axes.into_iter().flat_map(|e| [o.point + e, o.point - e]);
             let by_point: f64 = around.map(|p| surface.distance(&p) - here).sum();
             let by_surface: f64 = moved.iter().map(|m| m.distance(&o.point) - here).sum();
             0.5 * (by_point + by_surface)

@@ -4,8 +4,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
-use super::circle::{radial, side};
-use super::surface::pose_along;
+use super::surface::{check_size, pose_along, radial, side};
 use super::{Distance, Estimate, Fit, FitError, Freedom, Surface};
 use crate::numeric::mean;
 
@@ -13,7 +12,7 @@ use crate::numeric::mean;
 ///
 /// Its freedoms are a shift along its normal and the angle, turned about the circle: both stay well conditioned from a
 /// cylinder (angle 0) to a flat cone (angle near 90°), where apex and radius are not.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cone {
     /// Frame F in O: the origin is the centre of the circle, z the axis.
     pub pose_of: Isometry3<f64>,
@@ -92,12 +91,9 @@ impl Surface for Cone {
     }
 
     fn check(&self) -> Result<(), FitError> {
-        let bad = |what, value| Err(FitError::BadSize { what, value });
-        match (self.radius, self.half_angle) {
-            (radius, _) if !(radius > 0.0 && radius.is_finite()) => bad("radius", radius),
-            (_, angle) if angle.is_nan() || angle.abs() >= FRAC_PI_2 => bad("half angle", angle),
-            _ => Ok(()),
-        }
+        check_size("radius", self.radius)?;
+        let value = self.half_angle;
+        if value.abs() < FRAC_PI_2 { Ok(()) } else { Err(FitError::BadSize { what: "half angle", value }) }
     }
 }
 

@@ -2,13 +2,12 @@
 
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
-use super::circle::{radial, side};
-use super::surface::pose_along;
+use super::surface::{check_size, pose_along, radial, side};
 use super::{Distance, Estimate, Fit, FitError, Freedom, Surface};
 use crate::numeric::mean;
 
 /// A cylinder without ends.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cylinder {
     /// Frame F in O: the origin lies on the axis, z along it.
     pub pose_of: Isometry3<f64>,
@@ -57,8 +56,14 @@ impl Surface for Cylinder {
     }
 
     fn check(&self) -> Result<(), FitError> {
-        let value = self.radius;
-        (value > 0.0 && value.is_finite()).then_some(()).ok_or(FitError::BadSize { what: "radius", value })
+        check_size("radius", self.radius)
+    }
+}
+
+impl Cylinder {
+    /// The place of its axis that is nearest to a point in O, m.
+    pub(crate) fn nearest_on_axis(&self, point: &Point3<f64>) -> Point3<f64> {
+        self.center() + self.axis() * (point - self.center()).dot(&self.axis())
     }
 }
 
@@ -66,5 +71,11 @@ impl Fit<Cylinder> {
     /// Twice the radius, m.
     pub fn diameter(&self) -> Option<Estimate> {
         self.estimate(2.0 * self.surface.radius, &[(Freedom::Size, 2.0)])
+    }
+
+    /// Root mean square distance across the axis by which a place on it may be off, m.
+    pub(crate) fn lateral_std(&self, at: &Point3<f64>) -> Option<f64> {
+        let height = self.surface.pose_of.inverse_transform_point(at).z;
+        self.center_covariance(height).map(|covariance| covariance.trace().max(0.0).sqrt())
     }
 }

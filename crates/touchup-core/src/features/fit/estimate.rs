@@ -47,8 +47,12 @@ pub struct Fit<M> {
     pub groups: usize,
     /// Origin of the covariance.
     pub sigma_from: SigmaFrom,
+    /// projector onto what is not fixed, in units of `alone`
     pub(super) unknown: FreedomMatrix,
+    /// the step of each freedom that changes the residuals by one standard deviation if taken alone
     pub(super) alone: Steps,
+    /// columns: one standard deviation in each fixed direction, as steps; zero columns for what is not fixed
+    pub(super) deviations: FreedomMatrix,
 }
 
 impl<M: Surface> Fit<M> {

@@ -12,7 +12,6 @@
 //! rank and covariance, which it leaves to its caller.
 
 mod bias;
-mod circle;
 mod cone;
 mod cylinder;
 mod error;

@@ -7,7 +7,7 @@ use super::{Distance, Fit, FitError, Freedom, Surface};
 use crate::numeric::mean;
 
 /// A plane whose air is on the side of z.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
     /// Frame F in O: the origin lies on the plane, z is its normal out of the material.
     pub pose_of: Isometry3<f64>,
@@ -27,6 +27,13 @@ impl Plane {
     /// A point on it, m, in O.
     pub fn point(&self) -> Point3<f64> {
         self.pose_of.translation.vector.into()
+    }
+
+    /// How far from `from` along `direction` it is met, m; `None` where they are parallel.
+    pub(crate) fn along(&self, from: &Point3<f64>, direction: &Vector3<f64>) -> Option<f64> {
+        let normal = self.normal();
+        let t = (self.point() - from).dot(&normal) / direction.dot(&normal);
+        t.is_finite().then_some(t)
     }
 }
 

@@ -1,7 +1,6 @@
 //! The fit itself: three rounds of robust regression that reject what does not belong to the surface.
 
 use super::solver::FitProblem;
-use super::uncertainty::Uncertainty;
 use super::{Fit, FitError, FitParams, Observation, Surface};
 use crate::numeric::{SIGMA_OF_MEDIAN, TUKEY_WIDTH, biweight, median};
 
@@ -36,12 +35,12 @@ pub fn fit<M: Surface>(guess: &M, observations: &[Observation], params: &FitPara
     let near = reweighted(&problem, near, tukey);
     let (surface, kept) = rejected(&problem, near, params.rejection)?;
     let weights = problem.weights(&kept);
-    let mut surface = surface;
+    let mut fit = Fit::around(&problem, surface, &kept, params);
     for _ in 0..DEBIASINGS {
-        problem.shift = Uncertainty::of(&problem, &surface, &kept, params).bias(&problem, &surface);
-        surface = problem.solve(surface, &weights)?;
+        problem.shift = fit.bias(&problem);
+        fit = Fit::around(&problem, problem.solve(fit.surface, &weights)?, &kept, params);
     }
-    Uncertainty::of(&problem, &surface, &kept, params).into_fit(&problem, surface, &kept)
+    fit.checked()
 }
 
 /// Refuses fewer observations than unknowns, and those of one group alone.
@@ -80,8 +79,7 @@ fn reweighted<M: Surface>(problem: &FitProblem, mut surface: M, weight: fn(f64) 
         let scale = scale::<M>(&z);
         let kept: Vec<f64> = z.iter().map(|z| weight(z / scale)).collect();
         let change = kept.iter().zip(&before).map(|(a, b): (&f64, &f64)| (a - b).abs()).fold(0.0, f64::max);
-        let Some((next, ..)) = problem.step(&surface, &problem.weights(&kept), 1e-6) else { break };
-        surface = next;
+        surface = problem.step(surface, &problem.weights(&kept));
         if change < SETTLED_WEIGHT {
             break;
         }

@@ -1,24 +1,23 @@
-//! Weighted least squares by Levenberg's and Marquardt's method, weights given.
+//! Weighted least squares over the freedoms of a surface, weights given.
 
 use nalgebra::{SMatrix, Vector3};
 
 use super::{FREEDOMS, FitError, FitParams, Observation, Steps, Surface};
-use crate::numeric::{NormalEquations, centroid_and_spread};
+use crate::numeric::{DampedSearch, NormalEquations, SearchEnd, centroid_and_spread, distinct};
 
 /// A matrix over the freedoms.
 pub(super) type FreedomMatrix = SMatrix<f64, FREEDOMS, FREEDOMS>;
 
-/// Steps of one solution; a sound problem needs fewer than ten.
+/// Steps of one solution that help; a sound problem needs fewer than ten.
 const MOST_STEPS: usize = 100;
+/// At worst one that does not comes before each.
+const SEARCH: DampedSearch =
+    DampedSearch { first: 1e-4, factors: [0.1, 10.0], least: 1e-12, most: 1e10, tries: 2 * MOST_STEPS };
 /// A step below this many standard deviations is the last.
 const SETTLED: f64 = 1e-6;
-/// First damping, as a share of the diagonal; it falls or grows tenfold.
-const DAMPING: f64 = 1e-4;
 /// Longest step, in sizes of what was touched and in rad: a longer one may leap into the valley in which a circle fitted to
 /// a short arc grows without end.
 const LONGEST_STEP: f64 = 0.3;
-/// Tenfold increases of the damping before the solver gives up.
-const MOST_RAISES: usize = 14;
 /// Keeps the matrix definite in directions that nothing fixes; as a share of its largest entry.
 const RIDGE: f64 = 1e-13;
 
@@ -38,9 +37,7 @@ pub(super) struct FitProblem<'a> {
 
 impl<'a> FitProblem<'a> {
     pub fn new(observations: &'a [Observation], axis: Vector3<f64>, params: &FitParams) -> Self {
-        let mut names: Vec<u32> = observations.iter().map(|o| o.group).collect();
-        names.sort_unstable();
-        names.dedup();
+        let names = distinct(observations.iter().map(|o| o.group));
         let group = observations.iter().map(|o| names.partition_point(|&name| name < o.group)).collect();
         let (_, size) = centroid_and_spread(observations.iter().map(|o| &o.point));
         Self {
@@ -112,41 +109,42 @@ impl<'a> FitProblem<'a> {
         self.prior(surface).square + weights.iter().enumerate().map(of_points).sum::<f64>()
     }
 
-    /// One step that does not raise the cost, its length in standard deviations, and the damping for the next;
-    /// `None` where no step lowers the cost.
-    pub fn step<M: Surface>(&self, surface: &M, weights: &[f64], mut damping: f64) -> Option<(M, f64, f64)> {
-        let NormalEquations { information, right, square: cost } = self.equations(surface, weights);
+    /// Steps that do not raise the cost, until one is shorter than `last` standard deviations.
+    fn search<M: Surface>(&self, search: &DampedSearch, surface: M, weights: &[f64], last: f64) -> (M, SearchEnd) {
         let units = self.units::<M>();
-        let ridge = RIDGE * information.diagonal().max().max(f64::MIN_POSITIVE);
-        for _ in 0..MOST_RAISES {
-            let damped =
-                information + FreedomMatrix::from_diagonal(&information.diagonal().map(|x| damping * x + ridge));
-            let step = -damped.cholesky()?.solve(&right);
-            let next = surface.moved(&step.component_mul(&units));
-            if step.norm() <= LONGEST_STEP && next.check().is_ok() && self.cost(&next, weights) <= cost {
-                let length = step.dot(&(information * step)).max(0.0).sqrt();
-                return Some((next, length, (damping * 0.1).max(1e-12)));
-            }
-            damping *= 10.0;
-        }
-        None
+        let start = self.cost(&surface, weights);
+        let equations = |surface: &M, damping: f64| {
+            let equations = self.equations(surface, weights);
+            let ridge = RIDGE * equations.information.diagonal().max().max(f64::MIN_POSITIVE);
+            let mut damped = equations.damped(damping);
+            damped.information += FreedomMatrix::identity() * ridge;
+            damped
+        };
+        let better = |surface: &M, step: &Steps, before: f64| {
+            let next = surface.moved(&-step.component_mul(&units));
+            let cost = (step.norm() <= LONGEST_STEP && next.check().is_ok()).then(|| self.cost(&next, weights));
+            cost.filter(|cost| *cost <= before).map(|cost| (next, cost))
+        };
+        // in standard deviations, squared
+        let is_last = |step: &Steps, equations: &NormalEquations<FREEDOMS>| step.dot(&equations.right) < last * last;
+        let (surface, _, end) = search.run((surface, start), equations, better, is_last);
+        (surface, end)
+    }
+
+    /// One step that does not raise the cost, where there is one.
+    pub fn step<M: Surface>(&self, surface: M, weights: &[f64]) -> M {
+        self.search(&DampedSearch { first: 1e-6, ..SEARCH }, surface, weights, f64::INFINITY).0
     }
 
     /// The surface of least cost.
     ///
     /// # Errors
     /// [`FitError::NotConverged`].
-    pub fn solve<M: Surface>(&self, mut surface: M, weights: &[f64]) -> Result<M, FitError> {
-        let mut damping = DAMPING;
-        for _ in 0..MOST_STEPS {
-            // no step lowers the cost: this is its least, to rounding
-            let Some((next, length, lower)) = self.step(&surface, weights, damping) else { return Ok(surface) };
-            (surface, damping) = (next, lower);
-            if length < SETTLED {
-                return Ok(surface);
-            }
+    pub fn solve<M: Surface>(&self, surface: M, weights: &[f64]) -> Result<M, FitError> {
+        match self.search(&SEARCH, surface, weights, SETTLED) {
+            (_, SearchEnd::Unsettled) => Err(FitError::NotConverged { iterations: MOST_STEPS }),
+            (surface, _) => Ok(surface),
         }
-        Err(FitError::NotConverged { iterations: MOST_STEPS })
     }
 
     /// The same surface described from amid what is kept, of which there is at least one.

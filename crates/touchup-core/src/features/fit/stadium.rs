@@ -2,8 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
-use super::circle::side;
-use super::surface::pose_along;
+use super::surface::{check_size, pose_along, side};
 use super::{Distance, Estimate, Fit, FitError, Freedom, Surface};
 use crate::numeric::mean;
 
@@ -30,7 +29,7 @@ pub enum Ends {
 }
 
 /// A prism over a stadium or a rectangle, without top and bottom.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stadium {
     /// Frame F in O: the origin is the centre, z the direction of the walls' lines (out of the part), x along the slot.
     pub pose_of: Isometry3<f64>,
@@ -144,15 +143,18 @@ impl Surface for Stadium {
     }
 
     fn check(&self) -> Result<(), FitError> {
-        let sizes = [("width", self.width), ("length", self.length)];
-        match sizes.into_iter().find(|(_, value)| !(*value > 0.0 && value.is_finite())) {
-            Some((what, value)) => Err(FitError::BadSize { what, value }),
-            None => Ok(()),
-        }
+        check_size("width", self.width)?;
+        check_size("length", self.length)
     }
 }
 
 impl Fit<Stadium> {
+    /// By how much the middle may be off, m: across it, and along it where its ends determine that.
+    pub(crate) fn middle_std(&self) -> Option<f64> {
+        let across = self.std(Freedom::Y)?;
+        Some(self.std(Freedom::X).map_or(across, |along| across.hypot(along)))
+    }
+
     /// From wall to wall, m; `None` where only one wall was touched.
     pub fn width(&self) -> Option<Estimate> {
         self.estimate(self.surface.width, &[(Freedom::Size, 1.0)])

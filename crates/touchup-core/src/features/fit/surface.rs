@@ -98,9 +98,21 @@ pub trait Surface: Clone {
         self.pose_of().rotation * Vector3::z()
     }
 
+    /// Its axis or normal, with the sign of a direction.
+    fn axis_towards(&self, direction: &Vector3<f64>) -> Vector3<f64> {
+        let axis = self.axis();
+        if axis.dot(direction) < 0.0 { -axis } else { axis }
+    }
+
     /// Signed distance of a point in O, m, positive in the air.
     fn distance(&self, point: &Point3<f64>) -> f64 {
         self.distance_at(&self.pose_of().inverse_transform_point(point).coords).value
+    }
+
+    /// Signed distance of a point in O, m, and the unit normal into the air at the nearest place, in O.
+    fn distance_and_normal(&self, point: &Point3<f64>) -> (f64, Vector3<f64>) {
+        let Distance { value, normal, .. } = self.distance_at(&self.pose_of().inverse_transform_point(point).coords);
+        (value, self.pose_of().rotation * normal)
     }
 
     /// Signed distance of a point in O and its derivatives by each freedom; 0 for those it has not.
@@ -126,6 +138,22 @@ pub trait Surface: Clone {
     fn freedom_count() -> usize {
         Self::FREE.iter().filter(|free| **free).count()
     }
+}
+
+/// Distance of a point from the z axis and the unit vector away from it; x on the axis itself, where every one will do.
+pub(super) fn radial(q: &Vector3<f64>) -> (f64, Vector3<f64>) {
+    let rho = q.xy().norm();
+    (rho, if rho > 0.0 { Vector3::new(q.x / rho, q.y / rho, 0.0) } else { Vector3::x() })
+}
+
+/// +1 where the material is inside (a boss), −1 where the air is (a hole).
+pub(super) fn side(concave: bool) -> f64 {
+    if concave { -1.0 } else { 1.0 }
+}
+
+/// Refuses a size that is not more than 0.
+pub(super) fn check_size(what: &'static str, value: f64) -> Result<(), FitError> {
+    if value > 0.0 && value.is_finite() { Ok(()) } else { Err(FitError::BadSize { what, value }) }
 }
 
 /// The frame at a point whose z is a direction of any length but 0.

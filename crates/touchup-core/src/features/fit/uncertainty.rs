@@ -1,6 +1,6 @@
 //! The covariance of the freedoms of a fitted surface.
 
-use nalgebra::{SymmetricEigen, Vector3};
+use nalgebra::SymmetricEigen;
 
 use super::solver::{FitProblem, FreedomMatrix};
 use super::{Fit, FitError, FitParams, Freedom, SigmaFrom, Steps, Surface};
@@ -11,34 +11,18 @@ const LARGEST_DEVIATION: f64 = 1.0;
 /// … or when the freedoms in it make up for each other to this share of the information of each: below lies rounding.
 const LEAST_SHARE: f64 = 1e-12;
 /// Groups beyond the unknowns from which on the residuals can say how large the errors are.
-const SPARE_GROUPS: usize = 3;
+pub(super) const SPARE_GROUPS: usize = 3;
 
-/// Covariance of a fit, by the directions that the observations fix.
-pub(super) struct Uncertainty {
-    /// columns: one standard deviation in each fixed direction, as steps; zero columns for what is not fixed
-    pub deviations: FreedomMatrix,
-    /// of the steps
-    covariance: FreedomMatrix,
-    /// projector onto what is not fixed, in units of `alone`
-    unknown: FreedomMatrix,
-    /// the step of each freedom that changes the residuals by one standard deviation if taken alone
-    alone: Steps,
-    chi_squared: f64,
-    degrees: usize,
-    groups: usize,
-    from: SigmaFrom,
-}
-
-impl Uncertainty {
+impl<M: Surface> Fit<M> {
     /// Around a surface of least squares over what is kept.
     ///
     /// In steps y of one stated standard deviation along the fixed directions the stated covariance is I. The residuals
     /// say S = g/(g − k) Σ s sᵀ over the groups, s = Σ wᵢ rᵢ ∂dᵢ/∂y over one of them (g groups, k unknowns): the sandwich
     /// whose filling knows nothing of how errors are correlated inside a group \[Liang and Zeger 1986\]. Eigenvalues of S
     /// below 1 are raised to 1, so neither of the two is ever undercut.
-    pub fn of<M: Surface>(problem: &FitProblem, surface: &M, kept: &[f64], params: &FitParams) -> Self {
+    pub(super) fn around(problem: &FitProblem, surface: M, kept: &[f64], params: &FitParams) -> Self {
         let (units, weights) = (problem.units::<M>(), problem.weights(kept));
-        let equations = problem.equations(surface, &weights);
+        let equations = problem.equations(&surface, &weights);
         let (scaled, unknown, alone) = directions(&equations.information);
         let fixed = scaled.column_iter().filter(|c| c.norm_squared() > 0.0).count();
         let mut scores = vec![Steps::zeros(); problem.groups];
@@ -46,7 +30,7 @@ impl Uncertainty {
         for (i, &w) in weights.iter().enumerate().filter(|(_, w)| **w > 0.0) {
             let (_, by) = surface.derivatives(&problem.observations[i].point);
             let by = scaled.tr_mul(&by.component_mul(&units)) * w;
-            scores[problem.group[i]] += by * problem.residual(surface, i);
+            scores[problem.group[i]] += by * problem.residual(&surface, i);
             common += by;
             in_group[problem.group[i]] = true;
         }
@@ -54,11 +38,11 @@ impl Uncertainty {
         let chi_squared = equations.square;
         let degrees = (groups + if problem.known_axis.is_some() { 2 } else { 0 }).saturating_sub(fixed);
         let spread = (chi_squared / degrees.max(1) as f64).max(1.0);
-        let (inner, from) = if groups < fixed + SPARE_GROUPS {
+        let (inner, sigma_from) = if groups < fixed + SPARE_GROUPS {
             (FreedomMatrix::identity() * spread, SigmaFrom::Stated)
         } else {
             let correction = groups as f64 / (groups - fixed) as f64;
-            let prior = scaled.tr_mul(&(problem.prior(surface).information * scaled));
+            let prior = scaled.tr_mul(&(problem.prior(&surface).information * scaled));
             let sandwich = scores.iter().fold(prior, |sum, s| sum + s * s.transpose() * correction);
             at_least_one(sandwich)
         };
@@ -66,34 +50,22 @@ impl Uncertainty {
         let common = deviations * common * params.common_sigma;
         let covariance = deviations * inner * deviations.transpose() + common * common.transpose();
         let alone = units.component_mul(&alone);
-        Self { deviations, covariance, unknown, alone, chi_squared, degrees, groups, from }
-    }
-
-    /// Variance of the residuals over the stated one; 1 where there are too few to say.
-    pub fn excess(&self) -> f64 {
-        let fixed = self.groups.saturating_sub(self.degrees);
-        if self.degrees > fixed + SPARE_GROUPS { self.chi_squared / self.degrees as f64 } else { 1.0 }
-    }
-
-    /// The finished fit.
-    ///
-    /// # Errors
-    /// [`FitError::Undetermined`] when a needed freedom is not fixed.
-    pub fn into_fit<M: Surface>(self, problem: &FitProblem, surface: M, kept: &[f64]) -> Result<Fit<M>, FitError> {
         let used: Vec<bool> = kept.iter().map(|k| *k > 0.0).collect();
         let count = used.iter().filter(|used| **used).count();
         let square = |i: usize| if used[i] { problem.residual(&surface, i).powi(2) } else { 0.0 };
         let rms = ((0..used.len()).map(square).sum::<f64>() / count.max(1) as f64).sqrt();
-        let Self { covariance, unknown, alone, chi_squared, degrees, groups, from, .. } = self;
-        let fit =
-            Fit { surface, covariance, used, rms, chi_squared, degrees, groups, sigma_from: from, unknown, alone };
-        for freedom in Freedom::ALL.into_iter().filter(|f| M::NEEDED[*f as usize]) {
-            if fit.std(freedom).is_none() {
-                return Err(FitError::Undetermined { what: M::name_of(freedom) });
-            }
+        Self { surface, covariance, used, rms, chi_squared, degrees, groups, sigma_from, unknown, alone, deviations }
+    }
+
+    /// # Errors
+    /// [`FitError::Undetermined`] when a needed freedom is not fixed, [`FitError::BadSize`].
+    pub(super) fn checked(self) -> Result<Self, FitError> {
+        let is_open = |freedom: &Freedom| M::NEEDED[*freedom as usize] && self.std(*freedom).is_none();
+        if let Some(freedom) = Freedom::ALL.into_iter().find(is_open) {
+            return Err(FitError::Undetermined { what: M::name_of(freedom) });
         }
-        fit.surface.check()?;
-        Ok(fit)
+        self.surface.check()?;
+        Ok(self)
     }
 }
 
@@ -121,9 +93,4 @@ fn at_least_one(matrix: FreedomMatrix) -> (FreedomMatrix, SigmaFrom) {
     let from = if eigen.eigenvalues.max() > 1.0 { SigmaFrom::Residuals } else { SigmaFrom::Stated };
     eigen.eigenvalues.apply(|x| *x = x.max(1.0));
     (eigen.recompose(), from)
-}
-
-/// The three directions of space, m.
-pub(super) fn along_axes(length: f64) -> [Vector3<f64>; 3] {
-    [Vector3::x() * length, Vector3::y() * length, Vector3::z() * length]
 }

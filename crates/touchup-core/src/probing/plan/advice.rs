@@ -35,7 +35,7 @@ const ENOUGH: f64 = 10e-6;
 /// - `touches`: all touches; the feature names its own by their numbers.
 pub fn advise_next_touch(feature: &Feature, touches: &[ProbedPoint]) -> Option<NextTouch> {
     let axis = feature.axis.as_ref()?.value;
-    match feature.walls()? {
+    match feature.walls.as_ref()? {
         Walls::Round(wall) => {
             let square = Asked::default().and(&[(Freedom::X, 1.0)], ENOUGH).and(&[(Freedom::Y, 1.0)], ENOUGH);
             let asked = square.and(&[(Freedom::Size, 2.0)], 2.0 * ENOUGH);
