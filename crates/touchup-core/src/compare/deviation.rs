@@ -29,7 +29,7 @@ pub fn closest_places(
 ///
 /// # Errors
 /// As [`closest_places`].
-pub(super) fn at_closest_places<T: Send + Clone>(
+pub(super) fn at_closest_places<T: Send>(
     points: &[Point3<f64>],
     mesh: &TriMesh,
     tree: &FaceTree,
@@ -40,14 +40,9 @@ pub(super) fn at_closest_places<T: Send + Clone>(
     let values = map_by(workers, ordered.len(), |at| {
         tree.closest(mesh, &ordered[at], f64::INFINITY).map(|hit| evaluate(&ordered[at], &hit))
     });
-    let Some(Some(first)) = values.first() else {
-        return if points.is_empty() { Ok(Vec::new()) } else { Err(CompareError::NoFaces) };
-    };
-    let mut in_place = vec![first.clone(); points.len()];
-    for (at, values) in order.into_iter().zip(values) {
-        in_place[at as usize] = values.ok_or(CompareError::NoFaces)?;
-    }
-    Ok(in_place)
+    let mut in_place: Vec<Option<T>> = points.iter().map(|_| None).collect();
+    order.into_iter().zip(values).for_each(|(at, value)| in_place[at as usize] = value);
+    in_place.into_iter().map(|value| value.ok_or(CompareError::NoFaces)).collect()
 }
 
 /// Numbers of the points so that neighbours follow each other, and the points in this order: read one by one they would

@@ -60,12 +60,10 @@ fn on_face(mesh: &TriMesh, face: FaceId, corners: [VertexId; 3], u: f64, v: f64)
 
 /// The corner with the largest barycentric coordinate, the first among equals.
 pub(super) fn nearest_corner(corners: [VertexId; 3], shares: &[f64; 3]) -> VertexId {
-    let [x, y, z] = *shares;
-    corners[if x >= y && x >= z {
-        0
-    } else if y >= z {
-        1
-    } else {
-        2
-    }]
+    corners[largest(shares)]
+}
+
+/// Which of three is the largest, the first among equals.
+pub(super) fn largest(shares: &[f64; 3]) -> usize {
+    (1..3).fold(0, |at, i| if shares[i] > shares[at] { i } else { at })
 }

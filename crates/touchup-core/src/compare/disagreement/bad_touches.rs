@@ -4,7 +4,8 @@ use nalgebra::{Point3, Vector3};
 
 use super::places::{Class, RefinedShape};
 use crate::compare::CompareError;
-use crate::compare::deviation::{closest_places, signed};
+use crate::compare::deviation::{at_closest_places, signed};
+use crate::mesh::{Alone, FaceHit};
 use crate::numeric::{PointGrid, median};
 use crate::stylus::ProbedPoint;
 
@@ -114,15 +115,11 @@ fn distances(
     refined: &RefinedShape<'_>,
     touches: &[ProbedPoint],
 ) -> Result<(Vec<f64>, Vec<Point3<f64>>), CompareError> {
-    let mut off = vec![0.0; touches.len()];
     let mesh = refined.shape.mesh;
-    let mut feet = vec![Point3::origin(); touches.len()];
     let centres: Vec<Point3<f64>> = touches.iter().map(|touch| touch.centre).collect();
-    closest_places(&centres, mesh, refined.shape.tree, |at, hit| {
-        off[at] = signed(&centres[at], mesh, hit) - touches[at].radius;
-        feet[at] = hit.point;
-    })?;
-    Ok((off, feet))
+    let foot = |centre: &Point3<f64>, hit: &FaceHit| (signed(centre, mesh, hit), hit.point);
+    let feet = at_closest_places(&centres, mesh, refined.shape.tree, &Alone, foot)?;
+    Ok(feet.into_iter().zip(touches).map(|((distance, foot), touch)| (distance - touch.radius, foot)).unzip())
 }
 
 fn reach(touches: &[ProbedPoint]) -> f64 {
@@ -141,8 +138,7 @@ pub(super) fn mark(refined: &RefinedShape<'_>, touches: &[ProbedPoint], bad: &[B
     let near_bad = PointGrid::of(&points, (0..points.len()).filter(|&at| is_bad[at]), reach);
     for (at, class) in classes.iter_mut().enumerate() {
         let p = mesh.positions()[at];
-        let is_touched = !matches!(class, Class::NeverTouched | Class::Unreachable);
-        if is_touched && near_bad.near(&p, reach).next().is_some() {
+        if class.is_touched() && near_bad.near(&p, reach).next().is_some() {
             let (mut count, mut wrong) = (0, 0);
             all.near(&p, reach / 2.0).for_each(|touch| {
                 count += 1;

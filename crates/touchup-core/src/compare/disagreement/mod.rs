@@ -22,9 +22,11 @@ pub use self::places::{Class, RefinedShape, VertexBasis};
 pub use self::regions::{DisagreementRegion, RegionEvidence};
 pub use self::rigid_offset::RigidOffset;
 pub use self::scanner::Scanner;
-use super::deviation::{closest_places, signed};
+use self::scanner::SharpEdges;
+use super::deviation::{at_closest_places, closest_places, signed};
+use super::sampling::nearest_corner;
 use super::{CompareError, IndexedMesh};
-use crate::mesh::{FaceHit, TriMesh, VertexId};
+use crate::mesh::{Alone, FaceHit, TriMesh, VertexId};
 use crate::stylus::ProbedPoint;
 
 /// A mesh with its classes.
@@ -79,12 +81,12 @@ pub fn disagreement(
         return Err(CompareError::NoFaces);
     }
     let mut places = Places::of(scan, refined)?;
-    let off = places.off.clone();
-    let mut scanner = Scanner::of(scan.mesh, &places);
+    let mut off = places.off.clone();
+    let mut scanner = Scanner::of(&places);
     let mut rigid_offset = None;
     if let Some(fit) = rigid_offset::OffsetFit::of(&places) {
         places.take_off(&fit);
-        let placed = Scanner::of(scan.mesh, &places);
+        let placed = Scanner::of(&places);
         rigid_offset = placed.as_ref().and_then(|placed| fit.significant(placed));
         if rigid_offset.is_some() {
             scanner = placed;
@@ -98,9 +100,7 @@ pub fn disagreement(
         regions::find(&regions::RegionInput { refined, places: &places, scanner, touches }, &mut classes)
     });
     bad_touches::mark(refined, touches, &bad_touches, &mut classes);
-    let mut off = off;
-    let is_touched = |class: &Class| !matches!(class, Class::NeverTouched | Class::Unreachable);
-    off.iter_mut().zip(&classes).filter(|(_, class)| !is_touched(class)).for_each(|(off, _)| *off = 0.0);
+    off.iter_mut().zip(&classes).filter(|(_, class)| !class.is_touched()).for_each(|(off, _)| *off = 0.0);
     let on_scan = carried(scan, refined, &classes)?;
     Ok(Disagreement {
         rigid_offset,
@@ -125,12 +125,14 @@ impl Places {
             is_seen[at] = !is_on_rim(scan.mesh, hit) && refined.known[at] == VertexBasis::Touched;
             faces_alike[at] = scan.mesh.normal(hit.face).dot(&normals[at]) > FACING;
         })?;
-        let may_be = scanner::rounded_at(scan.mesh, refined, &is_seen, &normals);
-        let [mut is_wide, mut is_open] = scanner::wide_and_open(scan.mesh, refined, &is_seen, &normals);
-        for flags in [&mut is_wide, &mut is_open] {
-            flags.iter_mut().zip(&faces_alike).for_each(|(flag, alike)| *flag &= alike);
-        }
-        Ok(Self { positions: mesh.positions().to_vec(), off, is_seen, is_wide, is_open, may_be, normals, areas })
+        let edges = SharpEdges::of(scan.mesh, mesh, &is_seen);
+        let places = || mesh.positions().iter().zip(&normals).enumerate();
+        let may_be = |(at, (p, normal))| if is_seen[at] { edges.may_be(mesh, p, normal) } else { [true; 2] };
+        let may_be = places().map(may_be).collect();
+        let is_wide = |(at, (p, normal))| is_seen[at] && faces_alike[at] && edges.is_wide(&refined.shape, p, normal);
+        let is_wide: Vec<bool> = places().map(is_wide).collect();
+        let is_open = places().map(|(at, (p, _))| is_wide[at] && !edges.is_near(p)).collect();
+        Ok(Self { positions: mesh.positions().to_vec(), off, is_seen, is_wide, is_open, edges, may_be, normals, areas })
     }
 
     fn take_off(&mut self, rigid_offset: &rigid_offset::OffsetFit) {
@@ -199,15 +201,11 @@ fn vertex_normals(mesh: &TriMesh) -> (Vec<nalgebra::Vector3<f64>>, Vec<f64>) {
 /// The classes at the closest places of the refined mesh, for each vertex of the scan.
 fn carried(scan: IndexedMesh<'_>, refined: &RefinedShape<'_>, classes: &[Class]) -> Result<ClassMap, CompareError> {
     let mesh = scan.mesh;
-    let mut off = vec![0.0; mesh.vertex_slots()];
-    let mut carried = vec![Class::NeverTouched; mesh.vertex_slots()];
-    closest_places(mesh.positions(), refined.shape.mesh, refined.shape.tree, |at, hit| {
-        let p: Point3<f64> = mesh.position(VertexId(at as u32));
-        let corner = super::sampling::nearest_corner(refined.shape.mesh.corners(hit.face), &hit.barycentric);
-        carried[at] = classes[corner.0 as usize];
-        if !matches!(carried[at], Class::NeverTouched | Class::Unreachable) {
-            off[at] = -signed(&p, refined.shape.mesh, hit);
-        }
-    })?;
+    let place = |p: &Point3<f64>, hit: &FaceHit| {
+        let class = classes[nearest_corner(refined.shape.mesh.corners(hit.face), &hit.barycentric).0 as usize];
+        (if class.is_touched() { -signed(p, refined.shape.mesh, hit) } else { 0.0 }, class)
+    };
+    let places = at_closest_places(mesh.positions(), refined.shape.mesh, refined.shape.tree, &Alone, place)?;
+    let (off, carried) = places.into_iter().unzip();
     Ok(ClassMap::of(mesh, off, carried))
 }

@@ -2,6 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::scanner::SharpEdges;
 use crate::compare::IndexedMesh;
 
 /// The source of a vertex of a refined mesh, as `refine` writes it.
@@ -55,6 +56,11 @@ impl Class {
         Self::Unreachable,
     ];
 
+    /// Whether a touch says something of it.
+    pub(super) fn is_touched(self) -> bool {
+        !matches!(self, Self::NeverTouched | Self::Unreachable)
+    }
+
     /// As the report names it.
     pub fn name(self) -> &'static str {
         match self {
@@ -81,10 +87,19 @@ pub(super) struct Places {
     pub is_wide: Vec<bool>,
     /// whether a scanner of this resolution sees it well: no edge near, and no narrow place
     pub is_open: Vec<bool>,
-    /// whether an edge near that the scanner rounds may leave it too low, and too high
+    /// edges that the scanner rounds
+    pub edges: SharpEdges,
+    /// whether one of them near may leave it too low, and too high
     pub may_be: Vec<[bool; 2]>,
     /// normals, by slot; zero where there are none
     pub normals: Vec<Vector3<f64>>,
     /// a third of the faces at it, m²
     pub areas: Vec<f64>,
+}
+
+impl Places {
+    /// Numbers of those that the scanner sees well.
+    pub fn open(&self) -> Vec<usize> {
+        (0..self.off.len()).filter(|&at| self.is_open[at]).collect()
+    }
 }

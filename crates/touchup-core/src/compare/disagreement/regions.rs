@@ -3,9 +3,9 @@
 use nalgebra::{Point3, Vector3};
 
 use super::places::{Class, Places, RefinedShape};
-use super::scanner::{Scanner, rounded, sharp_vertices};
+use super::scanner::Scanner;
 use crate::mesh::{TriMesh, VertexId};
-use crate::numeric::PointGrid;
+use crate::numeric::{PointGrid, flood};
 use crate::stylus::ProbedPoint;
 
 /// The evidence for the class of a region.
@@ -73,17 +73,16 @@ pub(super) fn find(seen: &RegionInput<'_>, classes: &mut [Class]) -> Vec<Disagre
         _ => 0,
     };
     let signs: Vec<i8> = (0..smooth.len()).map(sign).collect();
-    let is_sharp = sharp_vertices(mesh, &places.is_seen);
     let mut is_taken = vec![false; smooth.len()];
     let mut regions = Vec::new();
     for start in (0..smooth.len()).filter(|&at| signs[at] != 0) {
         if is_taken[start] {
             continue;
         }
-        let own = flood(mesh, start, |at| signs[at] == signs[start], &mut is_taken);
-        if let Some(region) = judged(seen, &own, &is_sharp, classes) {
-            regions.push(region);
-        }
+        is_taken[start] = true;
+        let is_own = |at: usize| signs[at] == signs[start] && !std::mem::replace(&mut is_taken[at], true);
+        let own = flood(vec![start], |at| neighbours(mesh, at), is_own);
+        regions.extend(judged(seen, &own, classes));
     }
     regions.sort_by(|a, b| b.area.total_cmp(&a.area));
     regions
@@ -115,23 +114,6 @@ fn neighbours(mesh: &TriMesh, at: usize) -> impl Iterator<Item = usize> + '_ {
     mesh.star(VertexId(at as u32)).iter().flat_map(|&face| mesh.corners(face)).map(|v| v.0 as usize)
 }
 
-/// The connected region of `start`.
-fn flood(mesh: &TriMesh, start: usize, is_own: impl Fn(usize) -> bool, is_taken: &mut [bool]) -> Vec<usize> {
-    let mut found = vec![start];
-    is_taken[start] = true;
-    let mut next = 0;
-    while let Some(&at) = found.get(next) {
-        next += 1;
-        for other in neighbours(mesh, at) {
-            if !is_taken[other] && is_own(other) {
-                is_taken[other] = true;
-                found.push(other);
-            }
-        }
-    }
-    found
-}
-
 /// Area, m², and mean of touch − scan, m, of some places.
 fn mean_of(places: &Places, own: impl Iterator<Item = usize>) -> (f64, f64) {
     let (area, sum) =
@@ -140,12 +122,7 @@ fn mean_of(places: &Places, own: impl Iterator<Item = usize>) -> (f64, f64) {
 }
 
 /// What a region is, if it is worth telling; its places get its class.
-fn judged(
-    seen: &RegionInput<'_>,
-    own: &[usize],
-    is_sharp: &[[bool; 2]],
-    classes: &mut [Class],
-) -> Option<DisagreementRegion> {
+fn judged(seen: &RegionInput<'_>, own: &[usize], classes: &mut [Class]) -> Option<DisagreementRegion> {
     let (mesh, places, scanner) = (seen.refined.shape.mesh, seen.places, seen.scanner);
     let is_open = |at: &usize| places.is_open[*at];
     let (own_area, own_mean) = mean_of(places, own.iter().copied());
@@ -158,7 +135,7 @@ fn judged(
     // what lies at edges alone makes nothing sure
     let is_sure = open_area >= LEAST_AREA * scanner.edge.powi(2) && sigmas_of(open_area, open_mean) >= CHANGED;
     // on to the edges that it ends at, which the scanner rounds
-    let reach = rounded(scanner.edge);
+    let reach = places.edges.reach();
     let near = PointGrid::of(&places.positions, own.iter().copied(), reach);
     let is_off = |at: usize| {
         let [off, mean] = [places.off[at], own_mean].map(|off| off - scanner.offset);
@@ -168,30 +145,18 @@ fn judged(
         |at: usize| places.is_seen[at] && is_off(at) && near.near(&places.positions[at], reach).next().is_some();
     let mut is_taken = vec![false; places.off.len()];
     own.iter().for_each(|&at| is_taken[at] = true);
-    let mut all = own.to_vec();
-    let mut next = 0;
-    while let Some(&at) = all.get(next) {
-        next += 1;
-        for other in neighbours(mesh, at) {
-            if !is_taken[other] && goes_on(other) {
-                is_taken[other] = true;
-                all.push(other);
-            }
-        }
-    }
-    let area: f64 = all.iter().map(|&at| places.areas[at]).sum();
-    let weighted = |value: &dyn Fn(usize) -> Vector3<f64>| {
-        all.iter().map(|&at| value(at) * places.areas[at]).sum::<Vector3<f64>>() / area
-    };
-    let centre = Point3::from(weighted(&|at| places.positions[at].coords));
-    let mean = all.iter().map(|&at| places.off[at] * places.areas[at]).sum::<f64>() / area;
+    let is_new = |at: usize| !is_taken[at] && goes_on(at) && !std::mem::replace(&mut is_taken[at], true);
+    let all = flood(own.to_vec(), |at| neighbours(mesh, at), is_new);
+    let (area, mean) = mean_of(places, all.iter().copied());
+    let moments = all.iter().map(|&at| places.positions[at].coords * places.areas[at]);
+    let centre = Point3::from(moments.sum::<Vector3<f64>>() / area);
     let extent = all.iter().map(|&at| (places.positions[at] - centre).norm()).fold(0.0, f64::max);
     let evidence = RegionEvidence {
         sigmas,
         open_area,
         lengths: 2.0 * extent / scanner.correlation,
         passes: passes(seen.touches, &near, reach / 3.0),
-        edges: rim_at_edges(mesh, places, &all, &is_taken, is_sharp, reach),
+        edges: rim_at_edges(mesh, places, &all, &is_taken),
     };
     let class = match sigmas {
         _ if sigmas < UNSURE => Class::ScannerError,
@@ -219,16 +184,8 @@ fn passes(touches: &[ProbedPoint], region: &PointGrid, reach: f64) -> usize {
 }
 
 /// Share of the places at the rim of a region that have an edge near.
-fn rim_at_edges(
-    mesh: &TriMesh,
-    places: &Places,
-    all: &[usize],
-    is_own: &[bool],
-    is_sharp: &[[bool; 2]],
-    reach: f64,
-) -> f64 {
-    let sharp = PointGrid::of(&places.positions, (0..is_sharp.len()).filter(|&at| is_sharp[at] != [false; 2]), reach);
+fn rim_at_edges(mesh: &TriMesh, places: &Places, all: &[usize], is_own: &[bool]) -> f64 {
     let rim: Vec<usize> = all.iter().copied().filter(|&at| neighbours(mesh, at).any(|other| !is_own[other])).collect();
-    let at_edge = rim.iter().filter(|&&at| sharp.near(&places.positions[at], reach).next().is_some()).count();
+    let at_edge = rim.iter().filter(|&&at| places.edges.is_near(&places.positions[at])).count();
     at_edge as f64 / rim.len().max(1) as f64
 }

@@ -2,8 +2,9 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::places::{Places, RefinedShape};
-use crate::mesh::{TriMesh, VertexId};
+use super::places::Places;
+use crate::compare::IndexedMesh;
+use crate::mesh::TriMesh;
 use crate::numeric::{PointGrid, SIGMA_OF_MEDIAN, median};
 
 /// How the scanner errs where it should see well.
@@ -56,13 +57,8 @@ pub(super) fn median_edge(mesh: &TriMesh) -> f64 {
     median(&mut lengths).unwrap_or(0.0)
 }
 
-/// Where edges may be rounded, m.
-pub(super) fn rounded(edge: f64) -> f64 {
-    ROUNDED * edge
-}
-
 /// Vertices at sharp edges between touched faces, by slot: whether one is convex there, and whether one is concave.
-pub(super) fn sharp_vertices(mesh: &TriMesh, is_seen: &[bool]) -> Vec<[bool; 2]> {
+fn sharp_vertices(mesh: &TriMesh, is_seen: &[bool]) -> Vec<[bool; 2]> {
     let mut is_sharp = vec![[false; 2]; mesh.vertex_slots()];
     for (face, corners) in mesh.faces() {
         for i in 0..3 {
@@ -81,63 +77,62 @@ pub(super) fn sharp_vertices(mesh: &TriMesh, is_seen: &[bool]) -> Vec<[bool; 2]>
     is_sharp
 }
 
-/// Whether an edge of the surface that a place lies on, near it, is convex, so that a scan may be too low there, and whether
-/// one turns in, so that it may be too high; by slot.
-pub(super) fn rounded_at(
-    scan: &TriMesh,
-    refined: &RefinedShape<'_>,
-    is_seen: &[bool],
-    normals: &[Vector3<f64>],
-) -> Vec<[bool; 2]> {
-    let mesh = refined.shape.mesh;
-    let edge = median_edge(scan);
-    let reach = rounded(edge);
-    let is_sharp = sharp_vertices(mesh, is_seen);
-    let sharp = PointGrid::of(mesh.positions(), (0..is_sharp.len()).filter(|&at| is_sharp[at] != [false; 2]), reach);
-    let rounded = |at: usize| {
-        let p = mesh.position(VertexId(at as u32));
-        let is_own = |other: &usize| (mesh.positions()[*other] - p).dot(&normals[at]).abs() <= LEVEL * edge;
-        sharp
-            .near(&p, reach)
-            .filter(is_own)
-            .fold([false; 2], |[out, inward], other| [out || is_sharp[other][0], inward || is_sharp[other][1]])
-    };
-    (0..mesh.vertex_slots()).map(|at| if is_seen[at] { rounded(at) } else { [true; 2] }).collect()
+/// The edges of a refined mesh that a scanner rounds.
+pub(super) struct SharpEdges {
+    /// median edge of the scan's triangles, m
+    pub resolution: f64,
+    /// vertices at them, by slot: whether one is convex there, and whether one is concave
+    is_sharp: Vec<[bool; 2]>,
+    /// those vertices
+    grid: PointGrid,
 }
 
-/// Touched places that are wide enough for a scanner of this resolution, and those of them that have no edge near, so that
-/// it sees them well; by slot.
-pub(super) fn wide_and_open(
-    scan: &TriMesh,
-    refined: &RefinedShape<'_>,
-    is_seen: &[bool],
-    normals: &[Vector3<f64>],
-) -> [Vec<bool>; 2] {
-    let mesh = refined.shape.mesh;
-    let edge = median_edge(scan);
-    let (reach, radius) = (rounded(edge), NARROW * edge / 2.0);
-    let is_sharp = sharp_vertices(mesh, is_seen);
-    let sharp = PointGrid::of(mesh.positions(), (0..is_sharp.len()).filter(|&at| is_sharp[at] != [false; 2]), reach);
-    let fits = |p: &Point3<f64>, normal: &Vector3<f64>| {
-        let middle = p + normal * radius;
-        refined.shape.tree.closest(mesh, &middle, FITS * radius).is_none()
-    };
-    let place = |at: usize| mesh.position(VertexId(at as u32));
-    let is_wide = |at: usize| is_seen[at] && fits(&place(at), &normals[at]);
-    let wide: Vec<bool> = (0..mesh.vertex_slots()).map(is_wide).collect();
-    let is_open = |at: usize| wide[at] && sharp.near(&place(at), reach).next().is_none();
-    let open = (0..mesh.vertex_slots()).map(is_open).collect();
-    [wide, open]
+impl SharpEdges {
+    pub fn of(scan: &TriMesh, refined: &TriMesh, is_seen: &[bool]) -> Self {
+        let (resolution, is_sharp) = (median_edge(scan), sharp_vertices(refined, is_seen));
+        let sharp = (0..is_sharp.len()).filter(|&at| is_sharp[at] != [false; 2]);
+        let grid = PointGrid::of(refined.positions(), sharp, ROUNDED * resolution);
+        Self { resolution, is_sharp, grid }
+    }
+
+    /// Edges are rounded within this, m.
+    pub fn reach(&self) -> f64 {
+        ROUNDED * self.resolution
+    }
+
+    /// Vertices at edges that are rounded where a place is.
+    fn near(&self, p: &Point3<f64>) -> impl Iterator<Item = usize> {
+        self.grid.near(p, self.reach())
+    }
+
+    /// Whether the scanner may round an edge where a place is.
+    pub fn is_near(&self, p: &Point3<f64>) -> bool {
+        self.near(p).next().is_some()
+    }
+
+    /// Whether an edge of the surface that a place lies on, near it, is convex, so that a scan may be too low there, and whether one turns
+    /// in, so that it may be too high.
+    pub fn may_be(&self, mesh: &TriMesh, p: &Point3<f64>, normal: &Vector3<f64>) -> [bool; 2] {
+        let is_own = |&other: &usize| (mesh.positions()[other] - p).dot(normal).abs() <= LEVEL * self.resolution;
+        let sides = self.near(p).filter(is_own).map(|other| self.is_sharp[other]);
+        sides.fold([false; 2], |[out, inward], [convex, concave]| [out || convex, inward || concave])
+    }
+
+    /// Whether a place is wide enough for a scanner of this resolution.
+    pub fn is_wide(&self, shape: &IndexedMesh<'_>, p: &Point3<f64>, normal: &Vector3<f64>) -> bool {
+        let radius = NARROW * self.resolution / 2.0;
+        shape.tree.closest(shape.mesh, &(p + normal * radius), FITS * radius).is_none()
+    }
 }
 
 impl Scanner {
     /// `None` where too few places are open.
-    pub(super) fn of(scan: &TriMesh, places: &Places) -> Option<Self> {
-        let open: Vec<usize> = (0..places.off.len()).filter(|&at| places.is_open[at]).collect();
+    pub(super) fn of(places: &Places) -> Option<Self> {
+        let open = places.open();
         if open.len() < FEWEST {
             return None;
         }
-        let edge = median_edge(scan);
+        let edge = places.edges.resolution;
         let mut values: Vec<f64> = open.iter().map(|&at| places.off[at]).collect();
         let offset = median(&mut values)?;
         values.iter_mut().for_each(|value| *value = (*value - offset).abs());

@@ -6,8 +6,9 @@ use super::camera::Camera;
 use super::canvas::Picture;
 use crate::compare::Class;
 use crate::compare::colour::{ColourScale, Rgb, colour_of_class};
+use crate::compare::sampling::largest;
 use crate::compare::summary::Histogram;
-use crate::mesh::{FaceId, TriMesh};
+use crate::mesh::{FaceId, TriMesh, VertexId};
 
 /// A mesh to be drawn.
 #[derive(Clone, Copy, Debug)]
@@ -102,24 +103,20 @@ pub(super) fn draw(panel: &PicturePanel<'_>, camera: &Camera, frame: &PictureFra
         let [x, y] = frame.pixel(&p.xy()).map(|side| side * f64::from(FINE));
         Vector3::new(x, y, p.z)
     };
+    // of a vertex; where there is none, deviations are shown
+    let paint = |v: VertexId| match (panel.paint, panel.classes) {
+        (Some(paint), _) => Some(paint.get(v.0 as usize).copied().unwrap_or(BACKGROUND)),
+        (None, Some(classes)) => Some(classes.get(v.0 as usize).map_or(BACKGROUND, |&class| colour_of_class(class))),
+        (None, None) => None,
+    };
     for (face, corners) in panel.mesh.faces() {
         let places = panel.mesh.triangle(face).map(|p| place(&camera.project(&p)));
-        let values = corners.map(|vertex| panel.deviations.get(vertex.0 as usize).map_or(0.0, |d| d / range));
-        let light = light_on(panel, camera, face);
-        match (panel.paint, panel.classes) {
-            (Some(paint), _) => {
-                let colours = corners.map(|v| paint.get(v.0 as usize).copied().unwrap_or(BACKGROUND));
-                samples.fill(&places, |shares| lit(colours[largest(&shares)], light));
-            }
-            (None, Some(classes)) => {
-                let colours = corners.map(|v| classes.get(v.0 as usize).map_or(BACKGROUND, |&c| colour_of_class(c)));
-                samples.fill(&places, |shares| lit(colours[largest(&shares)], light));
-            }
-            (None, None) => {
-                samples
-                    .fill(&places, |shares| shade(&shades, shares.iter().zip(values).map(|(s, v)| s * v).sum(), light));
-            }
-        }
+        let values = corners.map(|v| panel.deviations.get(v.0 as usize).map_or(0.0, |d| d / range));
+        let (light, paint) = (light_on(panel, camera, face), corners.map(paint));
+        samples.fill(&places, |shares| match paint[largest(&shares)] {
+            Some(colour) => lit(colour, light),
+            None => shade(&shades, shares.iter().zip(values).map(|(s, v)| s * v).sum(), light),
+        });
     }
     samples.silhouette((STEP * height as f64 / scale) as f32);
     samples.averaged(frame.size)
@@ -146,11 +143,6 @@ fn shade(shades: &[Rgb], value: f64, light: f64) -> Rgb {
 fn lit(colour: Rgb, light: f64) -> Rgb {
     let inside = |c: f64| if light < 0.0 { INSIDE_GREY + (c - INSIDE_GREY) * INSIDE } else { c };
     colour.map(|c| (inside(f64::from(c)) * light.abs()).round() as u8)
-}
-
-/// The corner with the largest share.
-fn largest(shares: &[f64; 3]) -> usize {
-    (1..3).fold(0, |at, i| if shares[i] > shares[at] { i } else { at })
 }
 
 impl Samples {
