@@ -18,7 +18,7 @@ use nalgebra::Point3;
 pub use solved::{PairsFit, PairsParams, PointPair};
 
 use self::solved::SolvedMotion;
-use crate::numeric::{median, scatter};
+use crate::numeric::{median, spreads};
 
 /// Farther from the origin than this, a point is a fault, m.
 const LARGEST_COORDINATE: f64 = 1e6;
@@ -95,8 +95,8 @@ fn check(pairs: &[PointPair]) -> Result<(), PairsError> {
 fn check_extent(pairs: &[PointPair], params: &PairsParams) -> Result<(), PairsError> {
     for side in [PairSide::From, PairSide::To] {
         let points: Vec<_> = pairs.iter().map(|pair| pair.on(side)).collect();
-        let scatter = Scatter::of(&points);
-        let apart = SAME_SHARE * scatter.along;
+        let [.., along] = spreads(points.iter().map(|p| p.coords));
+        let apart = SAME_SHARE * along;
         let mut distinct: Vec<usize> = Vec::new();
         let mut same = None;
         for (i, point) in points.iter().enumerate() {
@@ -117,8 +117,7 @@ fn check_extent(pairs: &[PointPair], params: &PairsParams) -> Result<(), PairsEr
 /// - `sigma`: of a pick, m.
 fn check_lines(pairs: &[PointPair], sigma: f64) -> Result<(), PairsError> {
     for side in [PairSide::From, PairSide::To] {
-        let points: Vec<_> = pairs.iter().map(|pair| pair.on(side)).collect();
-        let Scatter { along, across } = Scatter::of(&points);
+        let [_, across, along] = spreads(pairs.iter().map(|pair| pair.on(side).coords));
         if across <= (LINE_SHARE * along).max(LINE_SIGMAS * sigma) {
             return Err(PairsError::Collinear { side, along_mm: along * 1e3, across_mm: across * 1e3 });
         }
@@ -132,20 +131,5 @@ impl PointPair {
             PairSide::From => self.from,
             PairSide::To => self.to,
         }
-    }
-}
-
-/// Rms distance from the middle along the longest axis and along the next, m.
-struct Scatter {
-    along: f64,
-    across: f64,
-}
-
-impl Scatter {
-    fn of(points: &[Point3<f64>]) -> Self {
-        let scatter = scatter(points.iter().map(|p| p.coords));
-        let mut axes = (scatter / points.len() as f64).symmetric_eigenvalues();
-        axes.as_mut_slice().sort_by(f64::total_cmp);
-        Self { along: axes[2].max(0.0).sqrt(), across: axes[1].max(0.0).sqrt() }
     }
 }

@@ -4,6 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::stars::Valences;
 use super::{FaceId, MeshError, TriMesh, VertexId};
+use crate::numeric::distinct;
 
 /// A box, m, in O.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -130,11 +131,8 @@ fn rim_of(part: &TriMesh, faces: &[[u32; 3]], ids: &[u32]) -> (Vec<RimVertex>, V
             }
         }
     }
-    vertices.sort_unstable();
-    vertices.dedup();
-    edges.sort_unstable();
-    edges.dedup();
-    (vertices.into_iter().map(|vertex| (vertex, part.position(vertex))).collect(), edges)
+    let vertices = distinct(vertices).into_iter().map(|vertex| (vertex, part.position(vertex))).collect();
+    (vertices, distinct(edges))
 }
 
 impl Outside {

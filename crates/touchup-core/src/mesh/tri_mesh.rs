@@ -2,7 +2,6 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::ids::{FaceId, VertexId};
 use super::journal::{Changes, Journal};
 use super::stars::{MOST_FACES, Stars, Valences};
 
@@ -10,6 +9,14 @@ use super::stars::{MOST_FACES, Stars, Valences};
 const REMOVED: u32 = u32::MAX;
 /// Vertices that ids can name.
 const MOST_VERTICES: usize = REMOVED as usize - 1;
+
+/// A face of one [`TriMesh`]; stays valid until that face is removed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct FaceId(pub u32);
+
+/// A vertex of one [`TriMesh`]; stays valid until that vertex is removed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct VertexId(pub u32);
 
 /// What makes a triangle soup unusable as a [`TriMesh`].
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

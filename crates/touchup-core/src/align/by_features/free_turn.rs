@@ -1,11 +1,12 @@
 //! Parts of revolution: features about one axis do not fix the turn about it.
 
-use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::alternative::Alternative;
 use super::judge::{Judge, Judged};
 use super::landmark::{ALIKE, Landmark};
 use crate::features::Kind;
+use crate::numeric::moved_by_twist;
 
 /// An undetermined turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,9 +53,7 @@ impl FreeTurn {
     }
 
     fn by(&self, angle: f64) -> Isometry3<f64> {
-        let turn = UnitQuaternion::from_axis_angle(&Unit::new_unchecked(self.axis), angle);
-        let shift = Translation3::from(self.through.coords - turn * self.through.coords);
-        Isometry3::from_parts(shift, turn)
+        moved_by_twist(&Isometry3::identity(), &self.through, &Vector3::zeros(), &(self.axis * angle))
     }
 }
 

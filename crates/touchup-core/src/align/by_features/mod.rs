@@ -18,7 +18,7 @@ mod matching;
 pub use alternative::{Alternative, FeaturesParams, OrientedSample, Surfaces};
 pub use error::{FeaturesError, FeaturesSide};
 pub use free_turn::FreeTurn;
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Point3};
 
 use self::alternative::SAME;
 use self::bases::{Base, SortedSets, axial_bases, bases};
@@ -26,6 +26,7 @@ use self::judge::{Judge, Judged};
 use self::landmark::{Landmark, landmarks};
 use self::matching::Matching;
 use crate::features::Feature;
+use crate::numeric::mean;
 
 /// Frames of the source that are tried, at most; spread evenly over all.
 const MOST_BASES: usize = 3_000;
@@ -122,12 +123,7 @@ fn refusal(
 
 /// Twice the largest distance from the mean, m: the same wherever the shape lies.
 fn size_of(points: impl Iterator<Item = Point3<f64>> + Clone) -> f64 {
-    let (mut sum, mut count) = (Vector3::zeros(), 0.0_f64);
-    for p in points.clone() {
-        sum += p.coords;
-        count += 1.0;
-    }
-    let middle = Point3::from(sum / count.max(1.0));
+    let middle = Point3::from(mean(points.clone().map(|p| p.coords)));
     2.0 * points.map(|p| (p - middle).norm()).fold(f64::MIN_POSITIVE, f64::max)
 }
 

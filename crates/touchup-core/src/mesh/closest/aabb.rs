@@ -89,6 +89,6 @@ pub(super) fn lesser<T: PartialOrd>(a: T, b: T) -> T {
 
 /// The greater of two numbers, neither of which is NaN.
 #[inline]
-pub(super) fn greater<T: PartialOrd>(a: T, b: T) -> T {
+pub(in crate::mesh) fn greater<T: PartialOrd>(a: T, b: T) -> T {
     if a > b { a } else { b }
 }

@@ -1,6 +1,6 @@
 //! Builds the tree over a mesh, or rebuilds it over the few faces below a node.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 
 use super::aabb::{Aabb, greater, lesser};
 use super::{FaceTree, Item, LEAF_FACES, NONE, ROOT, SiblingNodes, TreeNode};
@@ -14,9 +14,9 @@ const FULL_LEAVES: usize = 2 * LEAF_FACES;
 impl FaceTree {
     /// Builds the tree; O(F log F).
     pub fn new(mesh: &TriMesh) -> Self {
-        let faces = mesh.face_count();
+        let ([lo, hi], faces) = (mesh.bounds(), mesh.face_count());
         let mut tree = Self {
-            origin: middle_of(mesh),
+            origin: if mesh.positions().is_empty() { Point3::origin() } else { nalgebra::center(&lo, &hi) },
             root: TreeNode { bounds: Aabb::EMPTY, first: 0, count: 0 },
             pairs: Vec::with_capacity(faces / 2),
             parents: Vec::with_capacity(faces / 2),
@@ -109,15 +109,6 @@ impl FaceTree {
     fn give_leaf_back(&mut self, leaf: u32) {
         self.leaf_faces[leaf as usize][0] = FaceId(std::mem::replace(&mut self.free_leaf, leaf));
     }
-}
-
-/// Middle of the bounding box, m, in O.
-fn middle_of(mesh: &TriMesh) -> Point3<f64> {
-    let (mut lo, mut hi) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
-    for p in mesh.positions() {
-        (lo, hi) = (lo.inf(&p.coords), hi.sup(&p.coords));
-    }
-    if mesh.positions().is_empty() { Point3::origin() } else { Point3::from((lo + hi) / 2.0) }
 }
 
 /// Sorts the items into two groups and gives the size of the first: at the middle of the longest axis, or by count

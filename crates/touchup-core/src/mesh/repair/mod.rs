@@ -9,6 +9,7 @@ use std::fmt;
 use nalgebra::Point3;
 use serde::Serialize;
 
+use super::closest::greater;
 use super::stars::Valences;
 use super::tri_mesh::{MeshError, TriMesh};
 use crate::numeric::counted;
@@ -130,8 +131,8 @@ fn drop_faces(positions: &[Point3<f64>], faces: &mut Vec<[u32; 3]>, report: &mut
         let [a, b, c] = corners.map(|v| positions[v as usize]);
         let (u, v) = (b - a, c - a);
         let double_area_2 = u.cross(&v).norm_squared();
-        let longest_2 = larger(u.norm_squared(), larger(v.norm_squared(), (c - b).norm_squared()));
-        let limit_2 = longest_2 * (ZERO_AREA * larger(largest(&a), larger(largest(&b), largest(&c)))).powi(2);
+        let longest_2 = greater(u.norm_squared(), greater(v.norm_squared(), (c - b).norm_squared()));
+        let limit_2 = longest_2 * (ZERO_AREA * greater(largest(&a), greater(largest(&b), largest(&c)))).powi(2);
         // false for NaN, which every coordinate that is not finite brings about
         let stays = double_area_2 > limit_2 && double_area_2 < f64::INFINITY;
         if stays {
@@ -149,13 +150,7 @@ fn drop_faces(positions: &[Point3<f64>], faces: &mut Vec<[u32; 3]>, report: &mut
 /// The largest coordinate, without its sign.
 #[inline]
 fn largest(p: &Point3<f64>) -> f64 {
-    larger(p.x.abs(), larger(p.y.abs(), p.z.abs()))
-}
-
-/// The larger of two numbers, any of them when one is NaN: one instruction, where [`f64::max`] takes several.
-#[inline]
-fn larger(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
+    greater(p.x.abs(), greater(p.y.abs(), p.z.abs()))
 }
 
 /// Leaves out vertices that no face uses; returns how many.

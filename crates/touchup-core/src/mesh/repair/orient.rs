@@ -2,6 +2,7 @@
 
 use super::pieces::{FaceSets, Numbered};
 use crate::mesh::{FaceId, TriMesh, VertexId};
+use crate::numeric::distinct;
 
 /// A face at an edge: the higher vertex of the edge (upper 32 bits) and the face, one key to sort by.
 #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -55,8 +56,7 @@ impl Edges {
                 edges.add(mesh, [vertex, higher], along, against);
             }
         }
-        edges.duplicates.sort_unstable();
-        edges.duplicates.dedup();
+        edges.duplicates = distinct(edges.duplicates);
         edges
     }
 
@@ -211,9 +211,7 @@ fn split_run(sides: &[EdgeSide], higher: u32) -> (&[EdgeSide], &[EdgeSide]) {
 
 /// How many chains the boundary edges form: one for each hole or outer rim; rims that touch in a vertex count as one.
 pub(super) fn boundary_loops(boundary: &[([u32; 2], u32)]) -> usize {
-    let mut vertices: Vec<u32> = boundary.iter().flat_map(|(ends, _)| *ends).collect();
-    vertices.sort_unstable();
-    vertices.dedup();
+    let vertices = distinct(boundary.iter().flat_map(|(ends, _)| *ends));
     let index = |v: u32| vertices.partition_point(|&w| w < v) as u32;
     let mut chains = FaceSets::new(vertices.len());
     for (ends, _) in boundary {
