@@ -92,8 +92,6 @@ pub(super) fn signed(p: &Point3<f64>, mesh: &TriMesh, hit: &FaceHit) -> f64 {
 
 /// Refuses what is no place.
 pub(super) fn check_finite(points: &[Point3<f64>]) -> Result<(), CompareError> {
-    match points.iter().position(|p| !p.coords.iter().all(|x| x.is_finite())) {
-        Some(point) => Err(CompareError::NotFinite { point }),
-        None => Ok(()),
-    }
+    let bad = points.iter().position(|p| !p.coords.iter().all(|x| x.is_finite()));
+    bad.map_or(Ok(()), |point| Err(CompareError::NotFinite { point }))
 }

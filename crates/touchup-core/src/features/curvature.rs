@@ -201,15 +201,6 @@ struct CornerSums {
     area_gradient: Vector3<f64>,
 }
 
-/// What a face has at one of its corners.
-struct FaceCorner {
-    cos: f64,
-    sin: f64,
-    area: f64,
-    normal: Vector3<f64>,
-    gradient: Vector3<f64>,
-}
-
 /// Products outside this range are brought back to 1, long before they overflow.
 const MAGNITUDES: std::ops::Range<f64> = 1e-100..1e100;
 /// Up to this tangent the series of the arc tangent to the 17th power is exact: the next term is below 2⁻⁶¹ of the angle.
@@ -227,23 +218,23 @@ impl CornerSums {
         let corner = |&[p, q]: &[u32; 2]| [positions[p as usize] - vertex, positions[q as usize] - vertex];
         let (pairs, last) = links.as_chunks::<2>();
         for pair in pairs {
-            let [one, other] = Corners::between([corner(&pair[0]), corner(&pair[1])]).each();
-            sums.add(&one);
-            sums.add(&other);
+            let corners = Corners::between([corner(&pair[0]), corner(&pair[1])]);
+            sums.add(&corners, 0);
+            sums.add(&corners, 1);
         }
         for link in last {
-            let [one, _] = Corners::between([corner(link); 2]).each();
-            sums.add(&one);
+            sums.add(&Corners::between([corner(link); 2]), 0);
         }
         sums
     }
 
     #[inline]
-    fn add(&mut self, corner: &FaceCorner) {
-        self.turn(corner.cos * self.scale, corner.sin * self.scale);
-        self.area += corner.area;
-        self.double_area_normal += corner.normal;
-        self.area_gradient -= corner.gradient;
+    fn add(&mut self, corners: &Corners, i: usize) {
+        let vector = |v: &[Two; 3]| Vector3::new(v[0][i], v[1][i], v[2][i]);
+        self.turn(corners.cos[i] * self.scale, corners.sin[i] * self.scale);
+        self.area += corners.area[i];
+        self.double_area_normal += vector(&corners.normal);
+        self.area_gradient -= vector(&corners.gradient);
     }
 
     /// Turns the product by an angle of 0 to π of any length. It comes round where it passes the negative half of the real
@@ -304,7 +295,7 @@ fn two(of: impl Fn(usize) -> f64) -> Two {
     [of(0), of(1)]
 }
 
-/// Two corners at once: one wide instruction does the same sum for both.
+/// What two faces have at one of their corners each, at once: one wide instruction does the same sum for both.
 struct Corners {
     cos: Two,
     sin: Two,
@@ -333,18 +324,6 @@ impl Corners {
         let gradient =
             [0, 1, 2].map(|axis| two(|i| (f[axis][i] * at_e[i] + e[axis][i] * at_f[i]) * (0.5 * per_sin[i])));
         Self { cos, sin, area, normal, gradient }
-    }
-
-    #[inline]
-    fn each(&self) -> [FaceCorner; 2] {
-        let vector = |v: &[Two; 3], i: usize| Vector3::new(v[0][i], v[1][i], v[2][i]);
-        [0, 1].map(|i| FaceCorner {
-            cos: self.cos[i],
-            sin: self.sin[i],
-            area: self.area[i],
-            normal: vector(&self.normal, i),
-            gradient: vector(&self.gradient, i),
-        })
     }
 }
 

@@ -66,28 +66,32 @@ impl<'a> Measure<'a> {
     ///
     /// - `rim`: number of the plane around its opening.
     pub fn cylinder(&self, wall: &Wall, rim: Option<usize>) -> Fitted<Cylinder> {
-        let touches = self.observed.touches_of(&wall.segments);
+        let touches = self.touches_around(wall);
         let (mut axis, mut axis_sigma) = (wall.axis, None);
-        let is_enough = touches.len() >= LEAST_TOUCHES && self.turn(&touches, wall) >= LEAST_TURN;
-        let height = if is_enough { self.height(&touches, wall) } else { wall.height() };
+        let height = if touches.is_empty() { wall.height() } else { self.height(&touches, wall) };
         if height < SHORT * 2.0 * wall.radius()
             && let Some(plane) = rim.and_then(|rim| self.plane(rim))
         {
             (axis, axis_sigma) = (plane.surface.normal(), Some(DRILLED));
         }
         let guess = Cylinder::new(wall.at(wall.middle()), &axis, wall.radius(), wall.is_concave());
-        let touches = if is_enough { touches } else { Vec::new() };
         self.fitted(&guess, touches, &self.observed.of_mesh(&wall.segments), axis_sigma)
     }
 
     /// The cone of a wall; `None` for a cylinder.
     pub fn cone(&self, wall: &Wall) -> Option<Fitted<Cone>> {
         let Primitive::Cone(Cone { half_angle, concave, .. }) = wall.primitive else { return None };
-        let touches = self.observed.touches_of(&wall.segments);
-        let is_enough = touches.len() >= LEAST_TOUCHES && self.turn(&touches, wall) >= LEAST_TURN;
         let guess = Cone::new(wall.at(wall.middle()), &wall.axis, wall.radius(), half_angle, concave);
-        let touches = if is_enough { touches } else { Vec::new() };
-        Some(self.fitted(&guess, touches, &self.observed.of_mesh(&wall.segments), None))
+        Some(self.fitted(&guess, self.touches_around(wall), &self.observed.of_mesh(&wall.segments), None))
+    }
+
+    /// The touches of a wall, where they are enough around it; else none.
+    fn touches_around(&self, wall: &Wall) -> Vec<u32> {
+        let mut touches = self.observed.touches_of(&wall.segments);
+        if touches.len() < LEAST_TOUCHES || self.turn(&touches, wall) < LEAST_TURN {
+            touches.clear();
+        }
+        touches
     }
 
     /// The walls of a slot or pocket.

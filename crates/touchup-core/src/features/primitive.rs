@@ -11,9 +11,11 @@ use crate::numeric::{NormalEquations, tangent_basis};
 /// The surface of a piece of the mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Primitive {
+    /// flat
     Plane(Plane),
+    /// as wide everywhere
     Cylinder(Cylinder),
-    /// widens along its axis
+    /// wider along its axis
     Cone(Cone),
 }
 

@@ -7,7 +7,7 @@ use super::facets::NONE;
 use super::fit::{Plane, Surface};
 use super::primitive::Primitive;
 use super::scene::Parted;
-use crate::numeric::mean;
+use crate::numeric::{mean, without_repeats};
 
 /// A void between two walls that face each other.
 #[derive(Clone, Debug)]
@@ -102,13 +102,7 @@ fn is_pocket(slot: &Slot) -> bool {
 /// A void may be seen by several pairs of walls: the largest pair names it.
 fn distinct(mut all: Vec<Slot>, is_same: fn(&Slot, &Slot) -> bool) -> Vec<Slot> {
     all.sort_by(|a, b| b.area.total_cmp(&a.area));
-    let mut kept: Vec<Slot> = Vec::new();
-    for slot in all {
-        if !kept.iter().any(|other| is_same(other, &slot)) {
-            kept.push(slot);
-        }
-    }
-    kept
+    without_repeats(all, is_same)
 }
 
 /// Each pair of walls of a pocket sees it.

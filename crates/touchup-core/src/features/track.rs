@@ -108,11 +108,8 @@ impl Tracker {
 
 /// The size that a feature's place is compared with, m.
 fn size(feature: &Feature) -> f64 {
-    let value = |measured: &Option<Measured<f64>>| measured.as_ref().map(|measured| measured.value);
-    value(&feature.diameter)
-        .or_else(|| value(&feature.width))
-        .or_else(|| value(&feature.length))
-        .unwrap_or(2.0 * RADIUS)
+    let mut sizes = [&feature.diameter, &feature.width, &feature.length].into_iter().flatten();
+    sizes.next().map_or(2.0 * RADIUS, |size| size.value)
 }
 
 fn is_same(one: &Feature, other: &Feature) -> bool {

@@ -20,6 +20,6 @@ pub(crate) use point_grid::PointGrid;
 pub(crate) use quantile::order_statistic;
 pub use quantile::{median, quantile, weighted_quantile};
 pub(crate) use robust::{SIGMA_OF_MEDIAN, TUKEY_WIDTH, biweight, cauchy_weight};
-pub(crate) use sets::{DisjointSets, distinct, flood};
+pub(crate) use sets::{DisjointSets, distinct, flood, without_repeats};
 pub(crate) use twist::{moved_by_twist, point_to_plane_row};
 pub(crate) use voxel::{VoxelKey, voxel_neighbourhood, voxel_of};

@@ -8,6 +8,17 @@ pub(crate) fn distinct<T: Ord>(things: impl IntoIterator<Item = T>) -> Vec<T> {
     distinct
 }
 
+/// Things in their order, without those that are the same as one before.
+pub(crate) fn without_repeats<T>(things: impl IntoIterator<Item = T>, is_same: impl Fn(&T, &T) -> bool) -> Vec<T> {
+    let mut kept: Vec<T> = Vec::new();
+    for thing in things {
+        if !kept.iter().any(|before| is_same(before, &thing)) {
+            kept.push(thing);
+        }
+    }
+    kept
+}
+
 /// `found`, then what hangs together with it, the nearest first.
 ///
 /// - `beside`: what lies beside one; `takes`: whether one belongs to them that was not taken yet.
@@ -59,6 +70,7 @@ mod tests {
         let found = flood(vec![3], |at| [at - 1, at + 1], |other| (1..6).contains(&other) && seen.insert(other));
         assert_eq!(found, [3, 2, 4, 1, 5]);
         assert_eq!(distinct([3, 1, 3, 2, 1]), [1, 2, 3]);
+        assert_eq!(without_repeats([3, 1, -3, 2, -1], |a: &i32, b| a.abs() == b.abs()), [3, 1, 2]);
     }
 
     #[test]

@@ -26,7 +26,7 @@ fn input_that_cannot_be_fitted_is_refused() {
     assert_eq!(refusal(&near, &bad), FitError::NotFinite { index: 7 });
     bad[7] = Observation { sigma: 0.0, ..hole()[7] };
     assert_eq!(refusal(&near, &bad), FitError::BadSigma { what: "sigma of an observation", sigma: 0.0 });
-    let negative = Cylinder { radius: -1.0, ..near.clone() };
+    let negative = Cylinder { radius: -1.0, ..near };
     assert_eq!(refusal(&negative, &hole()), FitError::BadSize { what: "radius", value: -1.0 });
     let params = FitParams { common_sigma: -1.0, ..FitParams::default() };
     assert_eq!(fit(&near, &hole(), &params).unwrap_err(), FitError::BadSigma { what: "common_sigma", sigma: -1.0 });

@@ -24,8 +24,8 @@ enum SetClass {
 #[derive(Clone, Debug)]
 pub(super) struct Base {
     class: SetClass,
-    /// lengths, m: the first is the search key
-    lengths: [f64; 2],
+    /// m: the search key
+    length: f64,
     /// cosines and volumes of directions
     cosines: [f64; 4],
     origin: Point3<f64>,
@@ -78,51 +78,28 @@ fn pair(of: [usize; 2], first: &Landmark, second: &Landmark) -> Option<Base> {
     let direction = between.try_normalize(0.0)?;
     // the displacement from one to the other is known best
     let axes = frame(&direction, &a).or_else(|| frame(&direction, &b))?;
-    Some(Base {
-        class: SetClass::Pair(first.class(), second.class()),
-        lengths: [between.norm(), 0.0],
-        cosines: [a.dot(&direction), b.dot(&direction), a.dot(&b), a.cross(&b).dot(&direction)],
-        origin: first.place,
-        axes,
-        of,
-    })
+    let class = SetClass::Pair(first.class(), second.class());
+    let cosines = [a.dot(&direction), b.dot(&direction), a.dot(&b), a.cross(&b).dot(&direction)];
+    Some(Base { class, length: between.norm(), cosines, origin: first.place, axes, of })
 }
 
 fn beside(at: usize, landmark: &Landmark, plane: &Landmark) -> Option<Base> {
     let (axis, normal) = (landmark.axis?, plane.axis?);
-    Some(Base {
-        class: SetClass::Beside(landmark.class()),
-        lengths: [(landmark.place - plane.place).dot(&normal), 0.0],
-        cosines: [axis.dot(&normal), 0.0, 0.0, 0.0],
-        origin: landmark.place,
-        axes: frame(&axis, &normal)?,
-        of: [at, at],
-    })
+    let (class, length) = (SetClass::Beside(landmark.class()), (landmark.place - plane.place).dot(&normal));
+    let (cosines, axes) = ([axis.dot(&normal), 0.0, 0.0, 0.0], frame(&axis, &normal)?);
+    Some(Base { class, length, cosines, origin: landmark.place, axes, of: [at, at] })
 }
 
 fn slot(at: usize, landmark: &Landmark, sign: f64) -> Option<Base> {
     let axes = frame(&landmark.axis?, &(landmark.direction? * sign))?;
-    Some(Base {
-        class: SetClass::Slot,
-        lengths: [0.0; 2],
-        cosines: [0.0; 4],
-        origin: landmark.place,
-        axes,
-        of: [at, at],
-    })
+    Some(Base { class: SetClass::Slot, length: 0.0, cosines: [0.0; 4], origin: landmark.place, axes, of: [at, at] })
 }
 
 fn corner(at: usize, landmark: &Landmark, turn: usize) -> Option<Base> {
     let normals = landmark.normals?;
     let [a, b, c] = [0, 1, 2].map(|i| normals[(turn + i) % 3]);
-    Some(Base {
-        class: SetClass::Corner,
-        lengths: [0.0; 2],
-        cosines: [a.dot(&b), b.dot(&c), c.dot(&a), 0.0],
-        origin: landmark.place,
-        axes: frame(&a, &b)?,
-        of: [at, at],
-    })
+    let (cosines, axes) = ([a.dot(&b), b.dot(&c), c.dot(&a), 0.0], frame(&a, &b)?);
+    Some(Base { class: SetClass::Corner, length: 0.0, cosines, origin: landmark.place, axes, of: [at, at] })
 }
 
 /// Sets that leave the turn about an axis open, each with one turn of many.
@@ -145,15 +122,10 @@ fn about(of: [usize; 2], first: &Landmark, second: &Landmark) -> Option<Base> {
     let between = second.place - first.place;
     let is_about = second.kind == Kind::Plane
         || (second.is_located() && axis.cross(&between).norm() <= LEAST_SINE * between.norm());
-    let aside = Vector3::ith(axis.iamin(), 1.0);
-    (is_about && axis.dot(&other).abs() >= ALIKE).then_some(Base {
-        class: SetClass::Axis(first.class(), second.class()),
-        lengths: [between.dot(&axis), 0.0],
-        cosines: [axis.dot(&other), 0.0, 0.0, 0.0],
-        origin: first.place,
-        axes: frame(&axis, &aside)?,
-        of,
-    })
+    let (class, length) = (SetClass::Axis(first.class(), second.class()), between.dot(&axis));
+    let (cosines, axes) = ([axis.dot(&other), 0.0, 0.0, 0.0], frame(&axis, &Vector3::ith(axis.iamin(), 1.0))?);
+    let is_about = is_about && axis.dot(&other).abs() >= ALIKE;
+    is_about.then_some(Base { class, length, cosines, origin: first.place, axes, of })
 }
 
 impl Base {
@@ -167,9 +139,8 @@ impl Base {
 
     /// - `play`: by which lengths may differ, m
     fn is_like(&self, other: &Self, play: f64) -> bool {
-        let lengths = self.lengths.iter().zip(&other.lengths).all(|(a, b)| (a - b).abs() <= play);
         let cosines = self.cosines.iter().zip(&other.cosines).all(|(a, b)| (a - b).abs() <= COSINES);
-        lengths && cosines
+        cosines && (self.length - other.length).abs() <= play
     }
 }
 
@@ -178,18 +149,17 @@ pub(super) struct SortedSets(Vec<Base>);
 
 impl SortedSets {
     pub fn new(mut bases: Vec<Base>) -> Self {
-        bases.sort_by(|a, b| a.class.cmp(&b.class).then(a.lengths[0].total_cmp(&b.lengths[0])));
+        bases.sort_by(|a, b| a.class.cmp(&b.class).then(a.length.total_cmp(&b.length)));
         Self(bases)
     }
 
     /// Those that may be `base`, by lengths and angles.
     pub fn like<'a>(&'a self, base: &'a Base, play: f64) -> impl Iterator<Item = &'a Base> {
-        let least = base.lengths[0] - play;
-        let is_before = |other: &Base| (other.class, other.lengths[0]) < (base.class, least);
+        let is_before = |other: &Base| (other.class, other.length) < (base.class, base.length - play);
         let from = self.0.partition_point(is_before);
         self.0[from..]
             .iter()
-            .take_while(move |other| other.class == base.class && other.lengths[0] <= base.lengths[0] + play)
+            .take_while(move |other| other.class == base.class && other.length <= base.length + play)
             .filter(move |other| base.is_like(other, play))
     }
 }

@@ -6,7 +6,7 @@ use super::alternative::Alternative;
 use super::judge::{Judge, Judged};
 use super::landmark::{ALIKE, Landmark};
 use crate::features::Kind;
-use crate::numeric::moved_by_twist;
+use crate::numeric::{moved_by_twist, without_repeats};
 
 /// An undetermined turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,18 +38,11 @@ impl FreeTurn {
     ///
     /// - `near`: by how much a turn may move the axis, m
     pub(super) fn distinct(&self, alternatives: Vec<Alternative>, near: f64) -> Vec<Alternative> {
-        let mut distinct: Vec<Alternative> = Vec::new();
-        for alternative in alternatives {
-            let is_turn_of = |other: &Alternative| {
-                let between = alternative.source_to_target * other.source_to_target.inverse();
-                let is_along = (between * self.axis).dot(&self.axis) >= ALIKE;
-                is_along && (between * self.through - self.through).norm() <= near
-            };
-            if !distinct.iter().any(is_turn_of) {
-                distinct.push(alternative);
-            }
-        }
-        distinct
+        without_repeats(alternatives, |before, alternative| {
+            let between = alternative.source_to_target * before.source_to_target.inverse();
+            let is_along = (between * self.axis).dot(&self.axis) >= ALIKE;
+            is_along && (between * self.through - self.through).norm() <= near
+        })
     }
 
     fn by(&self, angle: f64) -> Isometry3<f64> {

@@ -6,7 +6,7 @@ use super::alternative::{Alternative, OrientedSample, SAME, Surfaces};
 use super::matching::Matching;
 use crate::align::icp::{IcpFit, IcpParams, icp};
 use crate::mesh::Alone;
-use crate::numeric::median;
+use crate::numeric::{median, without_repeats};
 
 /// Points that refine each motion, at most; all judge it, and refine the last ones.
 const MOST_POINTS: usize = 5_000;
@@ -100,15 +100,12 @@ impl<'a> Judge<'a> {
     pub fn all(&self, motions: &[Isometry3<f64>]) -> Vec<Judged> {
         let step = self.points.len().div_ceil(MOST_POINTS).max(1);
         let points: Vec<Point3<f64>> = self.points.iter().step_by(step).map(|p| p.point).collect();
-        let mut refined: Vec<(Isometry3<f64>, Option<IcpFit>)> = Vec::new();
-        for coarse in motions {
+        let refined = motions.iter().map(|coarse| {
             let fit = self.refine(&points, coarse);
-            let motion = fit.as_ref().map_or(*coarse, |fit| fit.source_to_target);
-            let is_new = |(other, _): &(_, _)| self.matching.apart(&motion, other) > SAME * self.matching.tolerance;
-            if refined.iter().all(is_new) {
-                refined.push((motion, fit));
-            }
-        }
+            (fit.as_ref().map_or(*coarse, |fit| fit.source_to_target), fit)
+        });
+        let near = SAME * self.matching.tolerance;
+        let refined = without_repeats(refined, |(before, _), (motion, _)| self.matching.apart(motion, before) <= near);
         let mut judged: Vec<_> = refined.into_iter().map(|(motion, fit)| self.judged(motion, fit)).collect();
         let all = self.matching.source.iter().map(|own| own.weight()).sum::<f64>();
         let merit = |judged: &Judged| judged.weight(&self.matching) / all + judged.agreeing().unwrap_or(0.0);

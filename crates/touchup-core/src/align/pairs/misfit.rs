@@ -78,10 +78,7 @@ fn check_scale([from, to]: [f64; 2]) -> Result<(), PairsError> {
         return Ok(());
     }
     let named = UNITS.iter().find(|(known, _)| (factor / known - 1.0).abs() < NAMED_TOLERANCE);
-    match named {
-        Some(&(_, named)) => Err(PairsError::Scale { factor, named }),
-        None => Ok(()),
-    }
+    named.map_or(Ok(()), |&(_, named)| Err(PairsError::Scale { factor, named }))
 }
 
 /// Each pair against the others; as many as may matter.

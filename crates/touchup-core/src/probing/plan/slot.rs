@@ -314,7 +314,7 @@ impl Stage for SlotPattern {
             let direction = Vector3::new(angle.cos(), angle.sin(), 0.0);
             return Next::Touch(context.sideways(&self.middle, shallow, &direction, REACH));
         }
-        let Some(walls) = self.walls.clone().filter(|_| self.measuring.observations.len() >= LEAST_FIRST) else {
+        let Some(walls) = self.walls.filter(|_| self.measuring.observations.len() >= LEAST_FIRST) else {
             let walls = self.measuring.observations.len();
             return Next::Failed(ExploreError::NoWall { kind: "slot", walls, asked: FIRST, reach_mm: REACH * 1e3 });
         };
