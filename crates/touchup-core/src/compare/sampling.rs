@@ -5,6 +5,7 @@ use rand_distr::{Distribution, StandardUniform};
 use rand_pcg::Pcg64;
 
 use crate::mesh::{FaceId, TriMesh, VertexId};
+use crate::numeric::largest;
 
 /// The stream of the generator that belongs to sampling.
 const STREAM: u64 = 0x5a3b;
@@ -61,9 +62,4 @@ fn on_face(mesh: &TriMesh, face: FaceId, corners: [VertexId; 3], u: f64, v: f64)
 /// The corner with the largest barycentric coordinate, the first among equals.
 pub(super) fn nearest_corner(corners: [VertexId; 3], shares: &[f64; 3]) -> VertexId {
     corners[largest(shares)]
-}
-
-/// Which of three is the largest, the first among equals.
-pub(super) fn largest(shares: &[f64; 3]) -> usize {
-    (1..3).fold(0, |at, i| if shares[i] > shares[at] { i } else { at })
 }

@@ -60,19 +60,7 @@ impl Creases {
         }
         Self { list }
     }
-}
 
-/// The one other face at an edge; `None` on the rim, where there are several, and where it is turned over.
-fn neighbour(mesh: &TriMesh, face: FaceId, [a, b]: [VertexId; 2]) -> Option<FaceId> {
-    let (from, to) = if mesh.star(a).len() <= mesh.star(b).len() { (a, b) } else { (b, a) };
-    let mut others = mesh.faces_at_edge(from, to).filter(|other| *other != face);
-    let (Some(other), None) = (others.next(), others.next()) else { return None };
-    let corners = mesh.corners(other);
-    let is_opposite = (0..3).any(|i| corners[i] == b && corners[(i + 1) % 3] == a);
-    is_opposite.then_some(other)
-}
-
-impl Creases {
     /// Creases of one kind that share a vertex, as sets.
     pub fn connected(&self) -> DisjointSets {
         let mut regions = DisjointSets::of(self.list.len());
@@ -111,6 +99,16 @@ impl Creases {
             }
         }
     }
+}
+
+/// The one other face at an edge; `None` on the rim, where there are several, and where it is turned over.
+fn neighbour(mesh: &TriMesh, face: FaceId, [a, b]: [VertexId; 2]) -> Option<FaceId> {
+    let (from, to) = if mesh.star(a).len() <= mesh.star(b).len() { (a, b) } else { (b, a) };
+    let mut others = mesh.faces_at_edge(from, to).filter(|other| *other != face);
+    let (Some(other), None) = (others.next(), others.next()) else { return None };
+    let corners = mesh.corners(other);
+    let is_opposite = (0..3).any(|i| corners[i] == b && corners[(i + 1) % 3] == a);
+    is_opposite.then_some(other)
 }
 
 /// Sorts by key and joins what has the same.

@@ -265,16 +265,13 @@ impl<'a> Growing<'a> {
             if is_all || most <= before {
                 continue;
             }
-            let mut near = self.near(seed, most);
+            let near = self.near(seed, most);
             is_all = near.len() < most;
             if near.len() <= before {
                 continue;
             }
             before = near.len();
-            let step = before.div_ceil(MOST_FITTED);
-            if step > 1 {
-                near = near.into_iter().step_by(step).collect();
-            }
+            let near: Vec<u32> = near.into_iter().step_by(before.div_ceil(MOST_FITTED)).collect();
             let bend = NormalSpread::of(self.facets, &near).filter(|bend| bend.spread > BENT);
             let Some(axis) = bend.and_then(|bend| bend.cylinder_axis()) else { continue };
             let start = cylinder_of(self.facets, &near, &axis);

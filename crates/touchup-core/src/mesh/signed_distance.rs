@@ -35,12 +35,9 @@ pub fn pseudo_normal(mesh: &TriMesh, hit: &FaceHit) -> Vector3<f64> {
 pub(crate) fn corner_normal(mesh: &TriMesh, vertex: VertexId) -> Vector3<f64> {
     let apex = mesh.position(vertex);
     let weighted = mesh.star(vertex).iter().map(|&face| {
-        let others = mesh.corners(face).map(|v| mesh.position(v) - apex);
-        let [u, v] = match mesh.corners(face).iter().position(|&v| v == vertex) {
-            Some(0) => [others[1], others[2]],
-            Some(1) => [others[2], others[0]],
-            _ => [others[0], others[1]],
-        };
+        let corners = mesh.corners(face);
+        let at = corners.iter().position(|&v| v == vertex).unwrap_or(2);
+        let [u, v] = [1, 2].map(|i| mesh.position(corners[(at + i) % 3]) - apex);
         mesh.normal(face) * u.angle(&v)
     });
     weighted.sum()

@@ -152,11 +152,8 @@ impl TriMesh {
 
     /// All faces with their ids, in order of id, removed ones left out.
     pub fn faces(&self) -> impl Iterator<Item = (FaceId, [VertexId; 3])> + '_ {
-        self.faces
-            .iter()
-            .enumerate()
-            .filter(|(_, corners)| corners[0] != REMOVED)
-            .map(|(face, corners)| (FaceId(face as u32), corners.map(VertexId)))
+        let there = self.faces.iter().enumerate().filter(|(_, corners)| corners[0] != REMOVED);
+        there.map(|(face, corners)| (FaceId(face as u32), corners.map(VertexId)))
     }
 
     /// Whether `vertex` names a vertex that is there.

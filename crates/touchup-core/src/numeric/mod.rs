@@ -17,7 +17,7 @@ pub use counted::counted;
 pub(crate) use least_squares::{DampedSearch, NormalEquations, SearchEnd};
 pub(crate) use moments::{centroid_and_spread, mean, scatter, spreads};
 pub(crate) use point_grid::PointGrid;
-pub(crate) use quantile::order_statistic;
+pub(crate) use quantile::{largest, order_statistic};
 pub use quantile::{median, quantile, weighted_quantile};
 pub(crate) use robust::{SIGMA_OF_MEDIAN, TUKEY_WIDTH, biweight, cauchy_weight};
 pub(crate) use sets::{DisjointSets, distinct, flood, without_repeats};

@@ -9,6 +9,11 @@ pub(crate) fn order_statistic(values: &mut [f64], share: f64) -> Option<f64> {
     Some(*values.select_nth_unstable_by(at, f64::total_cmp).1)
 }
 
+/// Which of three is the largest, the first among equals.
+pub(crate) fn largest<T: PartialOrd>(of: &[T; 3]) -> usize {
+    (1..3).fold(0, |at, i| if of[i] > of[at] { i } else { at })
+}
+
 /// The middle one in rising order, the upper of two; `None` where there is none. The values come out in another order. O(n).
 pub fn median(values: &mut [f64]) -> Option<f64> {
     order_statistic(values, 0.5)
@@ -48,6 +53,12 @@ mod tests {
         assert_eq!(median(&mut [3.0, -1.0, 2.0]), Some(2.0));
         assert_eq!(median(&mut [4.0, 1.0, 3.0, 2.0]), Some(3.0));
         assert_eq!(median(&mut []), None);
+    }
+
+    #[test]
+    fn the_first_of_equals_is_the_largest() {
+        let all = [[3, 1, 2], [1, 3, 3], [1, 2, 3], [3, 3, 3], [2, 2, 3]];
+        assert_eq!(all.map(|of| largest(&of)), [0, 1, 2, 0, 2]);
     }
 
     #[test]

@@ -83,10 +83,8 @@ impl SolvedMotion {
         let mut rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn));
         rotation.renormalize();
         let motion = Isometry3::from_parts((b - rotation * a.coords).into(), rotation);
-        let mut squares = [motion.rotation.to_rotation_matrix().into_inner(), u * v_t]
-            .into_iter()
+        let [squares, mirrored_squares] = [motion.rotation.to_rotation_matrix().into_inner(), u * v_t]
             .map(|turn| kept().map(|(p, w)| w * ((p.to - b) - turn * (p.from - a)).norm_squared()).sum::<f64>());
-        let (squares, mirrored_squares) = (squares.next()?, squares.next()?);
         squares.is_finite().then_some(Self { motion, middle: a, squares, mirrored_squares })
     }
 

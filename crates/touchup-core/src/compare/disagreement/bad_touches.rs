@@ -139,12 +139,9 @@ pub(super) fn mark(refined: &RefinedShape<'_>, touches: &[ProbedPoint], bad: &[B
     for (at, class) in classes.iter_mut().enumerate() {
         let p = mesh.positions()[at];
         if class.is_touched() && near_bad.near(&p, reach).next().is_some() {
-            let (mut count, mut wrong) = (0, 0);
-            all.near(&p, reach / 2.0).for_each(|touch| {
-                count += 1;
-                wrong += usize::from(is_bad[touch]);
-            });
-            if wrong > 0 && f64::from(wrong as u32) >= SHARE * f64::from(count) {
+            let count = all.near(&p, reach / 2.0).count();
+            let wrong = all.near(&p, reach / 2.0).filter(|&touch| is_bad[touch]).count();
+            if wrong > 0 && wrong as f64 >= SHARE * count as f64 {
                 *class = Class::BadTouch;
             }
         }

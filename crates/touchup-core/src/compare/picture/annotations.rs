@@ -1,5 +1,7 @@
 //! Annotations of the panels: legend, scale of colours, histogram, length, names of places.
 
+use std::cmp::Ordering;
+
 use nalgebra::Point3;
 
 use super::camera::Camera;
@@ -169,12 +171,10 @@ fn signed_mm(length: f64, range: f64) -> String {
     let digits = (2.0 - (range * 1e3).log10().floor()).clamp(0.0, 9.0) as usize;
     let text = format!("{:.digits$}", (length * 1e3).abs());
     let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
-    let sign = if length < 0.0 {
-        "-"
-    } else if length > 0.0 {
-        "+"
-    } else {
-        ""
+    let sign = match length.partial_cmp(&0.0) {
+        Some(Ordering::Less) => "-",
+        Some(Ordering::Greater) => "+",
+        _ => "",
     };
     format!("{sign}{text}")
 }

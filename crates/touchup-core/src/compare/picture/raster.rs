@@ -6,9 +6,9 @@ use super::camera::Camera;
 use super::canvas::Picture;
 use crate::compare::Class;
 use crate::compare::colour::{ColourScale, Rgb, colour_of_class};
-use crate::compare::sampling::largest;
 use crate::compare::summary::Histogram;
 use crate::mesh::{FaceId, TriMesh, VertexId};
+use crate::numeric::largest;
 
 /// A mesh to be drawn.
 #[derive(Clone, Copy, Debug)]

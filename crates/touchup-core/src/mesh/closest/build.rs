@@ -5,6 +5,7 @@ use nalgebra::Point3;
 use super::aabb::{Aabb, greater, lesser};
 use super::{FaceTree, Item, LEAF_FACES, NONE, ROOT, SiblingNodes, TreeNode};
 use crate::mesh::{FaceId, TriMesh};
+use crate::numeric::largest;
 
 /// A split at the middle is taken only if it leaves at least this share on either side (1/4).
 const SMALLEST_SHARE: usize = 4;
@@ -122,13 +123,7 @@ fn split(items: &mut [Item]) -> usize {
         }
     }
     let extent: [f32; 3] = std::array::from_fn(|i| hi[i] - lo[i]);
-    let axis = if extent[0] >= extent[1] && extent[0] >= extent[2] {
-        0
-    } else if extent[1] >= extent[2] {
-        1
-    } else {
-        2
-    };
+    let axis = largest(&extent);
     let left = if items.len() > FULL_LEAVES { part(items, axis, lo[axis] + extent[axis] / 2.0) } else { 0 };
     if left.min(items.len() - left) * SMALLEST_SHARE >= items.len() {
         return left;
