@@ -30,15 +30,8 @@ impl Kind {
 
     /// As files name it.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Hole => "hole",
-            Self::Slot => "slot",
-            Self::Pocket => "pocket",
-            Self::Boss => "boss",
-            Self::Edge => "edge",
-            Self::Corner => "corner",
-            Self::Plane => "plane",
-        }
+        // in the order of `ALL`
+        ["hole", "slot", "pocket", "boss", "edge", "corner", "plane"][self as usize]
     }
 }
 

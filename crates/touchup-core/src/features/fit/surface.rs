@@ -33,16 +33,8 @@ pub enum Freedom {
 
 impl Freedom {
     /// All, in the order of [`Steps`].
-    pub const ALL: [Freedom; FREEDOMS] = [
-        Freedom::X,
-        Freedom::Y,
-        Freedom::Z,
-        Freedom::TiltX,
-        Freedom::TiltY,
-        Freedom::Turn,
-        Freedom::Size,
-        Freedom::Second,
-    ];
+    pub const ALL: [Self; FREEDOMS] =
+        [Self::X, Self::Y, Self::Z, Self::TiltX, Self::TiltY, Self::Turn, Self::Size, Self::Second];
 }
 
 /// Where a point lies with respect to a surface.
