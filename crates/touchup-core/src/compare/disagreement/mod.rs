@@ -9,6 +9,7 @@
 //! edge a disagreement of the other sign is not the scanner's rounding, but too near to be sure of.
 
 mod bad_touches;
+mod edges;
 mod places;
 mod regions;
 mod rigid_offset;
@@ -17,12 +18,12 @@ mod scanner;
 use nalgebra::Point3;
 
 pub use self::bad_touches::BadTouches;
+use self::edges::SharpEdges;
 use self::places::Places;
 pub use self::places::{Class, RefinedShape, VertexBasis};
 pub use self::regions::{DisagreementRegion, RegionEvidence};
 pub use self::rigid_offset::RigidOffset;
 pub use self::scanner::Scanner;
-use self::scanner::SharpEdges;
 use super::deviation::{at_closest_places, closest_places, signed};
 use super::sampling::nearest_corner;
 use super::{CompareError, IndexedMesh};

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::scanner::SharpEdges;
+use super::edges::SharpEdges;
 use crate::compare::IndexedMesh;
 
 /// The source of a vertex of a refined mesh, as `refine` writes it.
