@@ -91,7 +91,7 @@ impl RefinementWorker {
 
     fn point_in_object(&self, clicked: &PointStamped) -> Result<Point3<f64>, String> {
         let stamp_ns = match stamp_ns(&clicked.header.stamp).ok_or("the stamp of the point is no time")? {
-            0 => self.last_ns.unwrap_or_else(|| self.port.now_ns()),
+            0 => self.session.last_ns.unwrap_or_else(|| self.port.now_ns()),
             stamp_ns => stamp_ns,
         };
         let frame = self.resolver.object_from(&clicked.header.frame_id, stamp_ns).map_err(|why| why.to_string())?;
@@ -112,7 +112,7 @@ impl RefinementWorker {
             Ok(point) => self.send_flag(FlaggedPlace { kind: kind as u8, point, radius: self.flag_radius() }, None),
             Err(why) => {
                 warn!(why, "a clicked point was not taken");
-                self.counters.refuse("clicked_point");
+                self.session.counters.refuse("clicked_point");
             }
         }
     }
@@ -124,7 +124,7 @@ impl RefinementWorker {
             success: sent,
             message: message.to_owned(),
             session: self.session.folder.name().to_owned(),
-            version: self.version,
+            version: self.session.version,
         });
     }
 
@@ -142,12 +142,12 @@ impl RefinementWorker {
                     break;
                 }
             }
-            let change = StrokeChange { after_ns: self.last_ns.unwrap_or(i64::MIN), is_undo };
+            let change = StrokeChange { after_ns: self.session.last_ns.unwrap_or(i64::MIN), is_undo };
             if let Err(error) = self.session.recorder.write_stroke(change) {
                 warn!(%error, "after a crash this stroke would be as it was");
             }
         }
-        self.version += u64::from(strokes > 0);
+        self.session.version += u64::from(strokes > 0);
         let verb = if is_undo { "took back" } else { "did again" };
         let message = match (strokes, why) {
             (_, Some(why)) => why,
@@ -155,7 +155,7 @@ impl RefinementWorker {
             (1, None) => format!("{verb} 1 stroke"),
             (count, None) => format!("{verb} {count} strokes"),
         };
-        UndoResponse { success: strokes > 0, message, strokes, mesh_version: self.version }
+        UndoResponse { success: strokes > 0, message, strokes, mesh_version: self.session.version }
     }
 
     fn reset(&mut self) -> TriggerResponse {
@@ -171,7 +171,7 @@ impl RefinementWorker {
         self.finish_samples();
         let report = self.report();
         let name = next.folder.name().to_owned();
-        let before = std::mem::replace(&mut self.session, next);
+        let before = self.change_session(next);
         let setup = Arc::clone(&self.setup);
         let end = move || {
             if let Err(error) = before.end(&setup, report) {
@@ -180,7 +180,6 @@ impl RefinementWorker {
         };
         self.side_work.begin("ending", end).map_err(NodeError::no_thread)?;
         self.fault = None;
-        self.begin_counting()?;
         let replica = Box::new(MeshVersion::of(&self.setup.scan.0, &name));
         // both take these however much they have to do
         let _ = self.view.send(ViewInput::Session(replica));
@@ -191,8 +190,8 @@ impl RefinementWorker {
 
     /// The samples that only waited for more to come.
     pub(super) fn finish_samples(&mut self) {
-        self.sync.finish();
-        while let Some(sample) = self.sync.next_sample() {
+        self.session.sync.finish();
+        while let Some(sample) = self.session.sync.next_sample() {
             self.sample(&sample, None);
         }
     }
@@ -212,7 +211,7 @@ impl RefinementWorker {
         };
         self.send_edits();
         let snapshot = self.setup.shared.mesh.complete();
-        let (setup, version) = (Arc::clone(&self.setup), self.version);
+        let (setup, version) = (Arc::clone(&self.setup), self.session.version);
         let work = move || {
             reply.send(match places.write(&setup, &snapshot, patcher) {
                 Ok(counts) => places.answer(version, counts),

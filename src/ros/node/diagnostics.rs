@@ -74,14 +74,7 @@ impl RefinementWorker {
 
     /// What the session says of itself so far.
     pub(super) fn report(&self) -> SessionReport {
-        SessionReport {
-            refused: self.refused(),
-            gaps: self.streams.each_ref().map(|stream| stream.gaps),
-            clock_jumps: self.clock_jumps(),
-            push_ns: self.pushes.quantiles(),
-            latency_ns: self.latencies.quantiles(),
-            ..self.session.report(&self.setup, &*self.port, &self.counters)
-        }
+        self.session.report(&self.setup, &*self.port, self.streams.each_ref().map(|stream| stream.gaps))
     }
 
     pub(super) fn publish_diagnostics(&mut self) {
@@ -114,7 +107,7 @@ impl RefinementWorker {
         let shared = &self.setup.shared;
         let mut values = vec![
             value("session", report.session.clone()),
-            value("mesh_version", self.version),
+            value("mesh_version", self.session.version),
             value("accepted", report.accepted),
             value("contacts", report.contacts),
             value("push_p50_us", us(median)),
@@ -125,7 +118,7 @@ impl RefinementWorker {
             value("latency_max_us", us(latency.max)),
             value("late_renewals", report.late_renewals),
             value("tiles_waiting", shared.waiting_tiles()),
-            value("versions_behind", self.version.saturating_sub(shared.mesh.version())),
+            value("versions_behind", self.session.version.saturating_sub(shared.mesh.version())),
             value("dropped_view_frames", report.dropped_view_frames),
             value("unrecorded", unrecorded.messages),
         ];

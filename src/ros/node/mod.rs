@@ -10,7 +10,6 @@ mod channels;
 mod convert;
 mod diagnostics;
 mod edits;
-mod engine;
 mod error;
 mod feature_messages;
 mod feature_worker;

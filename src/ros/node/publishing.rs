@@ -21,15 +21,15 @@ const TORN_AFTER: Duration = Duration::from_millis(200);
 
 impl RefinementWorker {
     pub(super) fn send_probed(&mut self) {
-        if self.probed.is_empty() {
+        if self.session.probed.is_empty() {
             return;
         }
         if let Err(
             TrySendError::Full(FeatureInput::Probed(changes))
             | TrySendError::Disconnected(FeatureInput::Probed(changes)),
-        ) = self.features.try_send(FeatureInput::Probed(std::mem::take(&mut self.probed)))
+        ) = self.features.try_send(FeatureInput::Probed(std::mem::take(&mut self.session.probed)))
         {
-            self.probed = changes;
+            self.session.probed = changes;
         }
     }
 
@@ -46,7 +46,7 @@ impl RefinementWorker {
             header: header(tip.stamp_ns, &self.setup.shared.frame),
             contact_case: number_of(update.case),
             face: HapticMismatch::NO_FACE,
-            mesh_version: self.version,
+            mesh_version: self.session.version,
             tip: point(&centre),
             actual_force: vector(&tip.force_o),
             expected_force: NO_VECTOR,
@@ -102,20 +102,20 @@ impl RefinementWorker {
     /// The next changes, when one of those that go round is here and anything has changed.
     fn filled(&mut self, is_idle: bool) -> Option<Box<Edits>> {
         let mesh = self.session.engine.refiner().mesh();
-        let is_sent = self.session.sent_version == self.version && self.session.sent_edits == mesh.edits();
+        let is_sent = self.session.sent_version == self.session.version && self.session.sent_edits == mesh.edits();
         if is_sent {
             return None;
         }
         let mut edits = self.kept.take().or_else(|| self.spare.try_recv().ok())?;
         let sent_edits = mesh.edits();
-        let stamp_ns = self.last_ns.unwrap_or(0);
-        edits.fill(&mut self.session.engine, &self.setup.scan.0, self.version, stamp_ns, is_idle);
+        let stamp_ns = self.session.last_ns.unwrap_or(0);
+        edits.fill(&mut self.session.engine, &self.setup.scan.0, self.session.version, stamp_ns, is_idle);
         if edits.is_empty() && !edits.is_complete {
             self.kept = Some(edits);
             return None;
         }
         if edits.is_complete {
-            (self.session.sent_version, self.session.sent_edits) = (self.version, sent_edits);
+            (self.session.sent_version, self.session.sent_edits) = (self.session.version, sent_edits);
         }
         Some(edits)
     }

@@ -14,15 +14,15 @@ use super::channels::{FeatureInput, ViewInput};
 use super::edits::Edits;
 use super::error::NodeError;
 use super::frame_resolver::{FrameResolver, Refusal};
-use super::session::{Counters, NodeEnd, NodeSession};
+use super::session::{NodeEnd, NodeSession};
 use super::setup::Setup;
 use super::side_work::SideWork;
-use super::streams::{Epoch, StreamWatch};
+use super::streams::StreamWatch;
 use crate::haptic::RefineError;
-use crate::live::{Latencies, LiveError, TouchDelta};
+use crate::live::LiveError;
 use crate::ros::messages::{PoseStamped, TFMessage, WrenchStamped};
 use crate::ros::port::{Arrival, Endpoint, Port};
-use crate::stylus::{Message, Sample, SyncCounts, Synchroniser, WrenchFrame};
+use crate::stylus::{Message, Sample, WrenchFrame};
 
 /// The loop looks at the streams so often when nothing comes.
 const IDLE: Duration = Duration::from_millis(10);
@@ -63,12 +63,8 @@ pub struct RefinementWorker {
     pub(super) kept: Option<Box<Edits>>,
     pub(super) resolver: FrameResolver,
     pub(super) session: NodeSession,
-    pub(super) sync: Synchroniser,
-    epoch: Epoch,
     /// poses and wrenches that wait for a transform, with when they came
     waiting: [VecDeque<(ArrivedMessage, Instant)>; 2],
-    /// touches that the thread of the features had no room for
-    pub(super) probed: TouchDelta,
     pub(super) streams: [StreamWatch; 2],
     pub(super) is_paused: bool,
     pub(super) fault: Option<String>,
@@ -79,14 +75,6 @@ pub struct RefinementWorker {
     pub(super) endpoints: BTreeMap<String, Endpoint>,
     /// sessions that are being ended, and files that are being written
     pub(super) side_work: SideWork,
-    pub(super) counters: Counters,
-    pub(super) pushes: Latencies,
-    /// from the arrival of what completed a sample to the mesh
-    pub(super) latencies: Latencies,
-    /// state of the mesh, as in `MeshPatch`
-    pub(super) version: u64,
-    edits: u64,
-    pub(super) last_ns: Option<i64>,
     pub(super) sampled: Instant,
     edits_sent: Instant,
     pub(super) tip_published: Instant,
@@ -114,7 +102,6 @@ impl RefinementWorker {
         let side_work = SideWork::on(setup.clock.clone());
         let resolver = FrameResolver::new(setup.frame_names(), setup.scene.placement());
         Ok(Self {
-            sync: Synchroniser::in_order(setup.scene.sync_params())?,
             resolver,
             setup,
             port,
@@ -125,9 +112,7 @@ impl RefinementWorker {
             unsent: None,
             kept: None,
             session,
-            epoch: Epoch::default(),
             waiting: Default::default(),
-            probed: TouchDelta::default(),
             streams: [StreamWatch::new(now), StreamWatch::new(now)],
             is_paused: false,
             fault: None,
@@ -135,12 +120,6 @@ impl RefinementWorker {
             last_state: String::new(),
             endpoints: BTreeMap::new(),
             side_work,
-            counters: Counters::default(),
-            pushes: Latencies::new(),
-            latencies: Latencies::new(),
-            version: 1,
-            edits: 0,
-            last_ns: None,
             sampled: now,
             edits_sent: now,
             tip_published: now,
@@ -180,7 +159,7 @@ impl RefinementWorker {
             Arrival::Clock(_) => {}
             Arrival::Unreadable(topic, why) => {
                 warn!(topic, why, "a message could not be read");
-                self.counters.refuse("unreadable");
+                self.session.counters.refuse("unreadable");
             }
             Arrival::Call(call) => self.call(call),
             Arrival::SetParameter(name, value, reply) => reply.send(self.set_parameter(&name, &value)),
@@ -198,7 +177,7 @@ impl RefinementWorker {
     fn transforms(&mut self, message: &TFMessage, is_static: bool) {
         for transform in &message.transforms {
             if !self.resolver.frames.insert(transform, is_static) {
-                self.counters.refuse("bad_transform");
+                self.session.counters.refuse("bad_transform");
             }
         }
         self.retry_waiting();
@@ -208,7 +187,7 @@ impl RefinementWorker {
         let stream = message.stream();
         self.streams[stream].arrive(self.setup.clock.now());
         if self.is_paused || self.fault.is_some() {
-            self.counters.paused += 1;
+            self.session.counters.paused += 1;
             return;
         }
         if self.waiting[stream].is_empty() {
@@ -219,7 +198,7 @@ impl RefinementWorker {
         }
         // behind those that wait already, so that the order stays
         if self.waiting[stream].len() >= MOST_WAITING {
-            self.counters.refuse("transform");
+            self.session.counters.refuse("transform");
             return;
         }
         self.waiting[stream].push_back((message, at));
@@ -237,7 +216,7 @@ impl RefinementWorker {
                     self.waiting[stream].push_front((message, at));
                     break;
                 }
-                self.counters.refuse("transform");
+                self.session.counters.refuse("transform");
                 self.lost_transform =
                     Some((now, "no transform of a moving frame has come up to the stamps of the messages".to_owned()));
             }
@@ -259,7 +238,7 @@ impl RefinementWorker {
     }
 
     fn refuse(&mut self, refusal: &Refusal) {
-        self.counters.refuse(refusal.name());
+        self.session.counters.refuse(refusal.name());
         if let Refusal::Frame(error) = refusal {
             self.lost_transform = Some((self.setup.clock.now(), error.to_string()));
         }
@@ -270,9 +249,9 @@ impl RefinementWorker {
         if self.resolver.axes() == Some(WrenchFrame::Object) && self.session.axes == WrenchFrame::Sensor {
             self.turn_to_object_axes();
         }
-        let message = shifted(message, self.epoch.shift_ns);
-        let is_taken = message.stamp_ns() >= 0 && self.sync.push(self.resolver.placed(message));
-        if self.epoch.note(stream, message.stamp_ns(), is_taken) {
+        let message = shifted(message, self.session.epoch.shift_ns);
+        let is_taken = message.stamp_ns() >= 0 && self.session.sync.push(self.resolver.placed(message));
+        if self.session.epoch.note(stream, message.stamp_ns(), is_taken) {
             warn!("the clock of both streams was set back: they are taken up where they are now");
             self.resolver.frames.forget_moving();
         }
@@ -283,7 +262,7 @@ impl RefinementWorker {
             };
             self.session.recorder.write(message, frame);
         }
-        while let Some(sample) = self.sync.next_sample() {
+        while let Some(sample) = self.session.sync.next_sample() {
             self.sample(&sample, Some(at));
         }
     }
@@ -302,19 +281,19 @@ impl RefinementWorker {
         let pushing = self.setup.clock.now();
         let pushed = self.session.engine.push(sample);
         let pushed_at = self.setup.clock.now();
-        self.pushes.record(pushed_at.saturating_duration_since(pushing));
+        self.session.pushes.record(pushed_at.saturating_duration_since(pushing));
         if let Some(at) = at {
-            self.latencies.record(pushed_at.saturating_duration_since(at));
+            self.session.latencies.record(pushed_at.saturating_duration_since(at));
         }
         self.sampled = pushing;
         match pushed {
             Ok(update) => {
-                self.counters.accepted += 1;
-                self.last_ns = Some(sample.stamp_ns);
+                self.session.counters.accepted += 1;
+                self.session.last_ns = Some(sample.stamp_ns);
                 self.publish_mismatch(&update);
                 self.note_changes();
             }
-            Err(LiveError::Refine(error)) => self.counters.refuse(reason_of(&error)),
+            Err(LiveError::Refine(error)) => self.session.counters.refuse(reason_of(&error)),
             Err(error) => self.fail(&error),
         }
     }
@@ -335,9 +314,9 @@ impl RefinementWorker {
     /// Another state of the mesh has another version; touches that are new go to the features.
     fn note_changes(&mut self) {
         let edits = self.session.engine.refiner().mesh().edits();
-        self.version += u64::from(std::mem::replace(&mut self.edits, edits) != edits);
+        self.session.version += u64::from(std::mem::replace(&mut self.session.edits, edits) != edits);
         if let Some(changes) = self.session.engine.take_probed() {
-            self.probed.extend(changes);
+            self.session.probed.extend(changes);
             self.send_probed();
         }
     }
@@ -361,36 +340,13 @@ impl RefinementWorker {
         }
     }
 
-    /// What a session counts from its beginning.
-    pub(super) fn begin_counting(&mut self) -> Result<(), NodeError> {
-        self.sync = Synchroniser::in_order(self.setup.scene.sync_params())?;
+    /// Goes over to another session; the one before.
+    pub(super) fn change_session(&mut self, next: NodeSession) -> NodeSession {
         self.resolver.forget_axes();
-        (self.epoch, self.waiting, self.probed) = (Epoch::default(), Default::default(), TouchDelta::default());
-        (self.counters, self.pushes, self.latencies) = (Counters::default(), Latencies::new(), Latencies::new());
-        (self.version, self.edits, self.last_ns, self.mismatch_ns) = (1, 0, None, i64::MIN);
+        (self.waiting, self.mismatch_ns) = (Default::default(), i64::MIN);
         // a change of the session before means nothing in this one
-        if let Some(unsent) = self.unsent.take() {
-            self.kept = Some(unsent);
-        }
-        Ok(())
-    }
-
-    /// Times that the clock was set back.
-    pub(super) fn clock_jumps(&self) -> u64 {
-        self.epoch.jumps + self.sync.counts().jump + self.sync.pose_counts().jump
-    }
-
-    /// Everything that was not taken, by reason; those of poses begin with `pose_`.
-    pub(super) fn refused(&self) -> BTreeMap<String, u64> {
-        let mut refused = self.counters.refused.clone();
-        let mut add = |counts: &SyncCounts, prefix: &str| {
-            for (reason, count) in counts.reasons().into_iter().filter(|(_, count)| *count > 0) {
-                *refused.entry(format!("{prefix}{reason}")).or_default() += count;
-            }
-        };
-        add(self.sync.counts(), "");
-        add(self.sync.pose_counts(), "pose_");
-        refused
+        self.kept = self.unsent.take().or(self.kept.take());
+        std::mem::replace(&mut self.session, next)
     }
 }
 

@@ -2,21 +2,22 @@
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::SystemTime;
 
 use chrono::{DateTime, Utc};
 use serde::Serialize;
 
-use super::engine::engine_of;
 use super::error::NodeError;
 use super::setup::Setup;
+use super::streams::Epoch;
 use crate::io::session_folder::SessionFolder;
-use crate::live::{Engine, Quantiles};
+use crate::live::{Engine, Gate, Latencies, Pace, Quantiles, Renewal, TouchDelta};
 use crate::mesh::TriMesh;
 use crate::reconstruct::Patcher;
 use crate::ros::port::Port;
 use crate::session::{Outcome, OutcomePlaces, SessionRecord, SessionRecorder, Unrecorded};
-use crate::stylus::WrenchFrame;
+use crate::stylus::{Synchroniser, WrenchFrame};
 
 /// What was refused and lost, and how long things took.
 #[derive(Debug, Default)]
@@ -53,6 +54,24 @@ pub struct NodeSession {
     pub sent_version: u64,
     /// … and edits at that time
     pub sent_edits: u64,
+    /// pairs poses and wrenches
+    pub sync: Synchroniser,
+    /// follows clocks that are set back
+    pub epoch: Epoch,
+    /// what was refused
+    pub counters: Counters,
+    /// of one sample through the haptic update
+    pub pushes: Latencies,
+    /// from the arrival of what completed a sample to the mesh
+    pub latencies: Latencies,
+    /// state of the mesh, as in `MeshPatch`
+    pub version: u64,
+    /// … and edits at that time
+    pub edits: u64,
+    /// stamp of the newest sample, ns
+    pub last_ns: Option<i64>,
+    /// touches that the thread of the features had no room for
+    pub probed: TouchDelta,
 }
 
 /// What a session says of itself when it is over.
@@ -117,7 +136,23 @@ impl NodeSession {
         let recorder = SessionRecorder::start(&folder, &setup.topics, &setup.clock)?;
         let axes = WrenchFrame::default();
         let engine = engine_of(setup, axes)?;
-        Ok(Self { folder, recorder, engine, axes, sent_version: 1, sent_edits: 0 })
+        Ok(Self {
+            folder,
+            recorder,
+            engine,
+            axes,
+            sent_version: 1,
+            sent_edits: 0,
+            sync: Synchroniser::in_order(setup.scene.sync_params())?,
+            epoch: Epoch::default(),
+            counters: Counters::default(),
+            pushes: Latencies::new(),
+            latencies: Latencies::new(),
+            version: 1,
+            edits: 0,
+            last_ns: None,
+            probed: TouchDelta::default(),
+        })
     }
 
     /// Wrenches come in other axes than was thought; nothing was touched yet.
@@ -153,30 +188,63 @@ impl NodeSession {
         reason.map_or(Ok(report), |reason| Err(NodeError::Unrecorded { count: messages, reason }))
     }
 
+    /// Everything that was not taken, by reason; those of poses begin with `pose_`.
+    fn refused(&self) -> BTreeMap<String, u64> {
+        let mut refused = self.counters.refused.clone();
+        for (counts, prefix) in [(self.sync.counts(), ""), (self.sync.pose_counts(), "pose_")] {
+            for (reason, count) in counts.reasons().into_iter().filter(|(_, count)| *count > 0) {
+                *refused.entry(format!("{prefix}{reason}")).or_default() += count;
+            }
+        }
+        refused
+    }
+
     /// What is known of it so far.
-    pub fn report(&self, setup: &Setup, port: &dyn Port, counters: &Counters) -> SessionReport {
-        let counts = self.engine.refiner().counts();
-        let nothing = Quantiles { median: 0, p99: 0, p999: 0, max: 0 };
+    ///
+    /// - `gaps`: times that a stream was stale: poses, wrenches.
+    pub fn report(&self, setup: &Setup, port: &dyn Port, gaps: [u64; 2]) -> SessionReport {
+        let Self { engine, sync, counters, .. } = self;
+        let counts = engine.refiner().counts();
         SessionReport {
             session: self.folder.name().to_owned(),
             accepted: counters.accepted,
-            refused: Default::default(),
+            refused: self.refused(),
             lost: port.lost(),
             dropped: port.dropped(),
             unsent: port.unsent(),
             paused: counters.paused,
             unrecorded: self.recorder.unrecorded().messages,
             dropped_view_frames: setup.shared.dropped_frames(),
-            gaps: [0; 2],
-            clock_jumps: 0,
+            gaps,
+            clock_jumps: self.epoch.jumps + sync.counts().jump + sync.pose_counts().jump,
             contacts: counts.contacts,
             cut_back: counts.cut_back,
-            push_ns: nothing,
-            latency_ns: nothing,
-            late_renewals: self.engine.counts().late,
+            push_ns: self.pushes.quantiles(),
+            latency_ns: self.latencies.quantiles(),
+            late_renewals: engine.counts().late,
             result: None,
         }
     }
+}
+
+/// Room for new faces that is made ahead.
+const ROOM: usize = 1 << 18;
+
+/// What moves the mesh: the haptic update, with the patch beside it where the scene has one. Nothing touched yet.
+///
+/// - `axes`: those of the wrenches.
+fn engine_of(setup: &Setup, axes: WrenchFrame) -> Result<Engine, NodeError> {
+    let Setup { scan, scene, cut, clock, .. } = setup;
+    let refine = cut.refine_params(scene.refine_params(axes).ok_or(NodeError::NothingMoves)?);
+    let patch = scene.patcher_params().map(|params| cut.patcher_params(params));
+    let renewal =
+        Renewal::Beside { scan: Arc::clone(scan), pace: Pace::default(), room: ROOM, gate: Gate::open(clock) };
+    let mut engine = Engine::new(scan.0.clone(), refine, patch, renewal)?;
+    engine.watch();
+    engine.keep_strokes();
+    // bounds of the scan, which the first renewal looks up, take some ms on a large one: no sample is to wait for that
+    engine.catch_up()?;
+    Ok(engine)
 }
 
 fn write_result(
